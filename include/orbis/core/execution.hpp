@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Execution policies, and the two loops everything parallel here is made of.
+///
+/// The work is cut into chunks whose bounds depend on the problem alone, never on the number of
+/// threads; an algorithm that writes per element, or combines per-chunk results in chunk order,
+/// gives the same bytes under every policy.
+#pragma once
+
+#include <algorithm>
+#include <atomic>
+#include <concepts>
+#include <cstddef>
+#include <exception>
+#include <mutex>
+#include <thread>
+#include <type_traits>
+#include <vector>
+
+namespace orbis {
+
+/// Everything on the calling thread.
+struct sequential_policy {
+  [[nodiscard]] static constexpr unsigned threads() noexcept { return 1; }
+};
+
+/// On several threads: as many as the machine has, or the number given to `with`.
+struct parallel_policy {
+  unsigned count = 0;  ///< 0: one thread for each hardware thread
+
+  [[nodiscard]] constexpr parallel_policy with(unsigned n) const noexcept { return {n}; }
+  [[nodiscard]] unsigned threads() const noexcept {
+    return count != 0 ? count : std::max(1U, std::thread::hardware_concurrency());
+  }
+};
+
+inline constexpr sequential_policy seq{};
+inline constexpr parallel_policy par{};
+
+/// What may stand as the first argument of an algorithm: it says how many threads may work.
+template <class P>
+concept execution_policy = requires(const std::remove_cvref_t<P>& p) {
+  { p.threads() } -> std::convertible_to<unsigned>;
+};
+
+/// Calls `body(begin, end)` on the consecutive chunks `[i * grain, min((i + 1) * grain, count))` of
+/// `[0, count)`, on the policy's threads, in no particular order. An exception thrown by `body`
+/// stops the handing out of chunks and is rethrown on the calling thread.
+/// @pre grain > 0
+template <execution_policy Policy, std::invocable<std::size_t, std::size_t> Body>
+void for_each_chunk(const Policy& policy, std::size_t count, std::size_t grain, Body&& body) {
+  const std::size_t chunks = count / grain + (count % grain != 0 ? 1 : 0);
+  const auto run = [&](std::size_t chunk) { body(chunk * grain, std::min(count, (chunk + 1) * grain)); };
+  const std::size_t workers = std::min<std::size_t>(policy.threads(), chunks);
+  if (workers <= 1) {
+    for (std::size_t chunk = 0; chunk != chunks; ++chunk) run(chunk);
+    return;
+  }
+
+  std::atomic<std::size_t> next{0};
+  std::exception_ptr failure;
+  std::mutex failure_guard;
+  const auto work = [&] {
+    try {
+      for (std::size_t chunk; (chunk = next.fetch_add(1, std::memory_order_relaxed)) < chunks;) run(chunk);
+    } catch (...) {
+      next.store(chunks, std::memory_order_relaxed);
+      const std::lock_guard lock{failure_guard};
+      if (!failure) failure = std::current_exception();
+    }
+  };
+  {
+    std::vector<std::jthread> others;
+    others.reserve(workers - 1);
+    for (std::size_t i = 1; i != workers; ++i) others.emplace_back(work);
+    work();
+  }
+  if (failure) std::rethrow_exception(failure);
+}
+
+/// Calls `body(i)` for every `i` in `[0, count)`.
+template <execution_policy Policy, std::invocable<std::size_t> Body>
+void for_each_index(const Policy& policy, std::size_t count, std::size_t grain, Body&& body) {
+  for_each_chunk(policy, count, grain, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i != end; ++i) body(i);
+  });
+}
+
+}  // namespace orbis

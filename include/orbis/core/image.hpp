@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Images as pointer, size and stride; pixel centres at integers, (0, 0) is the top left one.
+#pragma once
+
+#include <cassert>
+#include <concepts>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <type_traits>
+#include <vector>
+
+namespace orbis {
+
+/// One colour pixel, in the order the bytes lie in memory.
+struct rgb8 {
+  std::uint8_t r = 0, g = 0, b = 0;
+  friend bool operator==(const rgb8&, const rgb8&) = default;
+};
+static_assert(sizeof(rgb8) == 3);
+
+/// A rectangle of pixels that somebody else owns.
+template <class T>
+class image_view {
+ public:
+  using value_type = std::remove_const_t<T>;
+
+  constexpr image_view() noexcept = default;
+  /// `stride`: from one row to the next, in elements of `T`.
+  /// @pre stride >= width, and `data` holds `(height - 1) * stride + width` pixels
+  constexpr image_view(T* data, int width, int height, std::ptrdiff_t stride) noexcept
+      : data_{data}, width_{width}, height_{height}, stride_{stride} {
+    assert(width >= 0 && height >= 0 && stride >= width);
+  }
+  constexpr image_view(T* data, int width, int height) noexcept : image_view(data, width, height, width) {}
+  /// From mutable to const.
+  constexpr image_view(const image_view<value_type>& other) noexcept requires std::is_const_v<T>
+      : image_view(other.data(), other.width(), other.height(), other.stride()) {}
+
+  [[nodiscard]] constexpr int width() const noexcept { return width_; }
+  [[nodiscard]] constexpr int height() const noexcept { return height_; }
+  [[nodiscard]] constexpr std::ptrdiff_t stride() const noexcept { return stride_; }
+  [[nodiscard]] constexpr T* data() const noexcept { return data_; }
+  [[nodiscard]] constexpr bool empty() const noexcept { return width_ == 0 || height_ == 0; }
+  [[nodiscard]] constexpr bool contains(int x, int y) const noexcept {
+    return x >= 0 && y >= 0 && x < width_ && y < height_;
+  }
+  [[nodiscard]] constexpr std::span<T> row(int y) const noexcept {
+    assert(y >= 0 && y < height_);
+    return {data_ + y * stride_, static_cast<std::size_t>(width_)};
+  }
+  /// @pre contains(x, y)
+  [[nodiscard]] constexpr T& operator()(int x, int y) const noexcept {
+    assert(contains(x, y));
+    return data_[y * stride_ + x];
+  }
+
+ private:
+  T* data_ = nullptr;
+  int width_ = 0;
+  int height_ = 0;
+  std::ptrdiff_t stride_ = 0;
+};
+
+/// An image that owns its pixels, row after row without gaps.
+template <class T>
+class image {
+ public:
+  using value_type = T;
+
+  image() = default;
+  image(int width, int height, const T& value = T{})
+      : width_{width},
+        height_{height},
+        pixels_(static_cast<std::size_t>(width) * static_cast<std::size_t>(height), value) {
+    assert(width >= 0 && height >= 0);
+  }
+
+  [[nodiscard]] int width() const noexcept { return width_; }
+  [[nodiscard]] int height() const noexcept { return height_; }
+  [[nodiscard]] bool empty() const noexcept { return pixels_.empty(); }
+  [[nodiscard]] T* data() noexcept { return pixels_.data(); }
+  [[nodiscard]] const T* data() const noexcept { return pixels_.data(); }
+  [[nodiscard]] std::span<T> pixels() noexcept { return pixels_; }
+  [[nodiscard]] std::span<const T> pixels() const noexcept { return pixels_; }
+  [[nodiscard]] image_view<T> view() noexcept { return {pixels_.data(), width_, height_}; }
+  [[nodiscard]] image_view<const T> view() const noexcept { return {pixels_.data(), width_, height_}; }
+  operator image_view<T>() noexcept { return view(); }              // NOLINT(google-explicit-constructor)
+  operator image_view<const T>() const noexcept { return view(); }  // NOLINT(google-explicit-constructor)
+  [[nodiscard]] std::span<T> row(int y) noexcept { return view().row(y); }
+  [[nodiscard]] std::span<const T> row(int y) const noexcept { return view().row(y); }
+  [[nodiscard]] T& operator()(int x, int y) noexcept { return view()(x, y); }
+  [[nodiscard]] const T& operator()(int x, int y) const noexcept { return view()(x, y); }
+  friend bool operator==(const image&, const image&) = default;
+
+ private:
+  int width_ = 0;
+  int height_ = 0;
+  std::vector<T> pixels_;
+};
+
+}  // namespace orbis

@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// How algorithms read a user's own point type: by a trait, in place.
+///
+/// Anything with members `x`, `y`, `z` (PCL's points, plain structs) and anything indexable with
+/// `p[0], p[1], p[2]` (Eigen vectors, `std::array`, `float[3]`) is a point already. For other types
+/// specialise `point_traits`:
+///
+/// @code
+///   template <> struct orbis::point_traits<my_point> {
+///     using scalar = float;
+///     static float x(const my_point& p) { return p.easting; }
+///     static float y(const my_point& p) { return p.northing; }
+///     static float z(const my_point& p) { return p.height; }
+///   };
+/// @endcode
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <concepts>
+#include <cstddef>
+#include <ranges>
+#include <type_traits>
+
+namespace orbis {
+
+/// The customisation point; the primary template is empty so that `point_like` fails softly.
+template <class P>
+struct point_traits {};
+
+template <class P>
+requires requires(const P& p) {
+  { p.x } -> std::convertible_to<double>;
+  { p.y } -> std::convertible_to<double>;
+  { p.z } -> std::convertible_to<double>;
+}
+struct point_traits<P> {
+  using scalar = std::remove_cvref_t<decltype(std::declval<const P&>().x)>;
+  static constexpr scalar x(const P& p) noexcept { return p.x; }
+  static constexpr scalar y(const P& p) noexcept { return p.y; }
+  static constexpr scalar z(const P& p) noexcept { return p.z; }
+};
+
+template <class P>
+requires(
+    !requires(const P& p) { p.x; } &&
+    requires(const P& p) {
+      { p[0] } -> std::convertible_to<double>;
+      { p[2] } -> std::convertible_to<double>;
+    }) struct point_traits<P> {
+  using scalar = std::remove_cvref_t<decltype(std::declval<const P&>()[0])>;
+  static constexpr scalar x(const P& p) noexcept { return p[0]; }
+  static constexpr scalar y(const P& p) noexcept { return p[1]; }
+  static constexpr scalar z(const P& p) noexcept { return p[2]; }
+};
+
+/// A point whose three coordinates (metres) can be read.
+template <class P>
+concept point_like = requires(const std::remove_cvref_t<P>& p) {
+  typename point_traits<std::remove_cvref_t<P>>::scalar;
+  requires std::floating_point<typename point_traits<std::remove_cvref_t<P>>::scalar>;
+  { point_traits<std::remove_cvref_t<P>>::x(p) } -> std::same_as<typename point_traits<std::remove_cvref_t<P>>::scalar>;
+  { point_traits<std::remove_cvref_t<P>>::y(p) } -> std::same_as<typename point_traits<std::remove_cvref_t<P>>::scalar>;
+  { point_traits<std::remove_cvref_t<P>>::z(p) } -> std::same_as<typename point_traits<std::remove_cvref_t<P>>::scalar>;
+};
+
+/// A sized random-access range of points: a cloud, in place.
+template <class R>
+concept point_range =
+    std::ranges::random_access_range<R> && std::ranges::sized_range<R> && point_like<std::ranges::range_value_t<R>>;
+
+/// The number type of a point's coordinates.
+template <point_like P>
+using point_scalar_t = typename point_traits<std::remove_cvref_t<P>>::scalar;
+
+/// The coordinates of `p` as the number type `S`.
+template <std::floating_point S, point_like P>
+[[nodiscard]] constexpr std::array<S, 3> coordinates(const P& p) noexcept {
+  using traits = point_traits<P>;
+  return {static_cast<S>(traits::x(p)), static_cast<S>(traits::y(p)), static_cast<S>(traits::z(p))};
+}
+
+/// Whether all three coordinates are finite.
+template <point_like P>
+[[nodiscard]] bool is_finite(const P& p) noexcept {
+  using traits = point_traits<P>;
+  return std::isfinite(traits::x(p)) && std::isfinite(traits::y(p)) && std::isfinite(traits::z(p));
+}
+
+}  // namespace orbis

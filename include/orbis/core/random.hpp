@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Deterministic random numbers: the same seed gives the same numbers with every standard library
+/// (`std::normal_distribution` and friends do not).
+#pragma once
+
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+
+namespace orbis {
+
+/// SplitMix64's finaliser: a well-mixed 64-bit hash of `x`. Counter-based noise is
+/// `mix64(seed ^ mix64(index))`, which needs no state and no order.
+/// Source: Steele, Lea, Flood, "Fast splittable pseudorandom number generators", OOPSLA 2014.
+[[nodiscard]] constexpr std::uint64_t mix64(std::uint64_t x) noexcept {
+  x += 0x9e3779b97f4a7c15ULL;
+  x = (x ^ (x >> 30U)) * 0xbf58476d1ce4e5b9ULL;
+  x = (x ^ (x >> 27U)) * 0x94d049bb133111ebULL;
+  return x ^ (x >> 31U);
+}
+
+/// A small, fast generator (SplitMix64); satisfies `std::uniform_random_bit_generator`.
+class random_bits {
+ public:
+  using result_type = std::uint64_t;
+  constexpr explicit random_bits(std::uint64_t seed) noexcept : state_{seed} {}
+  [[nodiscard]] static constexpr result_type min() noexcept { return 0; }
+  [[nodiscard]] static constexpr result_type max() noexcept { return std::numeric_limits<result_type>::max(); }
+
+  constexpr result_type operator()() noexcept {
+    const result_type r = mix64(state_);
+    state_ += 0x9e3779b97f4a7c15ULL;
+    return r;
+  }
+
+  /// Uniform in [0, 1), 53 bits.
+  [[nodiscard]] constexpr double uniform() noexcept { return static_cast<double>((*this)() >> 11U) * 0x1.0p-53; }
+  /// Uniform in [lo, hi).
+  [[nodiscard]] constexpr double uniform(double lo, double hi) noexcept { return lo + (hi - lo) * uniform(); }
+  /// Uniform in [0, n), n > 0, by multiplication (Lemire 2019, without the rejection: bias < n / 2^32).
+  [[nodiscard]] constexpr std::uint32_t below(std::uint32_t n) noexcept {
+    return static_cast<std::uint32_t>((((*this)() >> 32U) * n) >> 32U);
+  }
+  /// Mean 0, standard deviation 1, close to normal out to four sigma: a centred binomial of 64
+  /// coin flips, smoothed by a uniform of its own step width. Uses no function of libm.
+  [[nodiscard]] constexpr double normal() noexcept { return normal_of((*this)(), (*this)()); }
+
+  /// `normal()` of two given random words, for counter-based noise.
+  [[nodiscard]] static constexpr double normal_of(std::uint64_t a, std::uint64_t b) noexcept {
+    // Binomial(64, 1/2) has variance 16, the uniform of width 1 adds 1/12.
+    constexpr double inverse_deviation = 0.24935149047701481;  // 1 / sqrt(16 + 1/12)
+    const double flips = static_cast<double>(std::popcount(a)) - 32.0;
+    const double step = static_cast<double>(b >> 11U) * 0x1.0p-53 - 0.5;
+    return (flips + step) * inverse_deviation;
+  }
+
+ private:
+  std::uint64_t state_;
+};
+
+}  // namespace orbis

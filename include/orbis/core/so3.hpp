@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Rotations in three dimensions: the Lie group SO(3).
+///
+/// Formulas: T. D. Barfoot, "State Estimation for Robotics", chapter 7; J. Sola, J. Deray,
+/// D. Atchuthan, "A micro Lie theory for state estimation in robotics", arXiv:1812.01537.
+#pragma once
+
+#include <cmath>
+#include <concepts>
+#include <limits>
+
+#include <Eigen/Geometry>
+
+#include <orbis/core/types.hpp>
+
+namespace orbis {
+
+/// The skew-symmetric matrix with `hat(a) * b == a.cross(b)`.
+template <class S>
+[[nodiscard]] matrix<3, 3, S> hat(const matrix<3, 1, S>& v) {
+  matrix<3, 3, S> m;
+  m << S(0), -v.z(), v.y(), v.z(), S(0), -v.x(), -v.y(), v.x(), S(0);
+  return m;
+}
+
+/// The inverse of `hat`.
+template <class S>
+[[nodiscard]] matrix<3, 1, S> vee(const matrix<3, 3, S>& m) {
+  return {m(2, 1), m(0, 2), m(1, 0)};
+}
+
+/// A rotation, kept as a unit quaternion. Tangent vectors are rotation vectors (axis times angle,
+/// radians). `R_a_b * p_b == p_a`.
+template <std::floating_point S = double>
+class basic_so3 {
+ public:
+  using scalar = S;
+  static constexpr int dof = 3;
+  using tangent = matrix<3, 1, S>;
+  using point = matrix<3, 1, S>;
+  using quaternion = Eigen::Quaternion<S, Eigen::DontAlign>;
+
+  /// The identity.
+  basic_so3() : q_{quaternion::Identity()} {}
+  /// From a quaternion of any positive norm; normalises it.
+  explicit basic_so3(const Eigen::Quaternion<S>& q) : q_{q.normalized()} {}
+  explicit basic_so3(const quaternion& q) : q_{q.normalized()} {}
+  /// From a matrix that is a rotation up to rounding. For matrices that are further off use
+  /// `nearest_rotation`.
+  explicit basic_so3(const matrix<3, 3, S>& r) : q_{quaternion(r).normalized()} {}
+
+  /// The rotation by `|phi|` radians about `phi`.
+  [[nodiscard]] static basic_so3 exp(const tangent& phi) {
+    const S theta2 = phi.squaredNorm();
+    S real, factor;  // cos(theta / 2), sin(theta / 2) / theta
+    if (theta2 < small) {
+      real = S(1) - theta2 / S(8);
+      factor = S(0.5) - theta2 / S(48);
+    } else {
+      const S theta = std::sqrt(theta2);
+      real = std::cos(theta / S(2));
+      factor = std::sin(theta / S(2)) / theta;
+    }
+    return basic_so3(quaternion(real, factor * phi.x(), factor * phi.y(), factor * phi.z()));
+  }
+
+  /// The rotation vector, of norm at most pi.
+  [[nodiscard]] tangent log() const {
+    const tangent v = q_.vec();
+    const S n2 = v.squaredNorm();
+    const S w = q_.w();
+    if (n2 < small) return (S(2) / w - S(2) * n2 / (S(3) * w * w * w)) * v;
+    const S n = std::sqrt(n2);
+    // atan2 with both signs flipped where w < 0 picks the shorter way round.
+    return (S(2) * (w < S(0) ? std::atan2(-n, -w) : std::atan2(n, w)) / n) * v;
+  }
+
+  [[nodiscard]] basic_so3 inverse() const {
+    basic_so3 r;
+    r.q_ = q_.conjugate();
+    return r;
+  }
+  [[nodiscard]] friend basic_so3 operator*(const basic_so3& a, const basic_so3& b) {
+    return basic_so3(quaternion(a.q_ * b.q_));
+  }
+  [[nodiscard]] friend point operator*(const basic_so3& r, const point& p) { return r.q_ * p; }
+
+  [[nodiscard]] const quaternion& unit_quaternion() const { return q_; }
+  [[nodiscard]] matrix<3, 3, S> rotation_matrix() const { return q_.toRotationMatrix(); }
+  /// `exp(adjoint() * phi) == R exp(phi) R^-1`.
+  [[nodiscard]] matrix<3, 3, S> adjoint() const { return rotation_matrix(); }
+  /// The angle in radians, in [0, pi].
+  [[nodiscard]] S angle() const { return log().norm(); }
+  template <std::floating_point T>
+  [[nodiscard]] basic_so3<T> cast() const {
+    return basic_so3<T>(typename basic_so3<T>::quaternion(q_.template cast<T>()));
+  }
+
+  /// `exp(phi + delta) ~ exp(left_jacobian(phi) * delta) * exp(phi)`.
+  [[nodiscard]] static matrix<3, 3, S> left_jacobian(const tangent& phi) {
+    const S theta2 = phi.squaredNorm();
+    const matrix<3, 3, S> k = hat<S>(phi);
+    S a, b;  // (1 - cos t) / t^2, (t - sin t) / t^3
+    if (theta2 < small) {
+      a = S(0.5) - theta2 / S(24);
+      b = S(1) / S(6) - theta2 / S(120);
+    } else {
+      const S theta = std::sqrt(theta2);
+      const S half = std::sin(theta / S(2)) / theta;
+      a = S(2) * half * half;
+      b = (theta - std::sin(theta)) / (theta2 * theta);
+    }
+    return matrix<3, 3, S>::Identity() + a * k + b * k * k;
+  }
+  [[nodiscard]] static matrix<3, 3, S> left_jacobian_inverse(const tangent& phi) {
+    const S theta2 = phi.squaredNorm();
+    const matrix<3, 3, S> k = hat<S>(phi);
+    S c;  // 1 / t^2 - (1 + cos t) / (2 t sin t)
+    if (theta2 < small) {
+      c = S(1) / S(12) + theta2 / S(720);
+    } else {
+      const S half = std::sqrt(theta2) / S(2);
+      c = (S(1) - half * std::cos(half) / std::sin(half)) / theta2;
+    }
+    return matrix<3, 3, S>::Identity() - S(0.5) * k + c * k * k;
+  }
+  /// `exp(phi + delta) ~ exp(phi) * exp(right_jacobian(phi) * delta)`.
+  [[nodiscard]] static matrix<3, 3, S> right_jacobian(const tangent& phi) { return left_jacobian(-phi); }
+  [[nodiscard]] static matrix<3, 3, S> right_jacobian_inverse(const tangent& phi) {
+    return left_jacobian_inverse(-phi);
+  }
+
+ private:
+  /// Below this squared angle the series is exact to rounding.
+  static constexpr S small = std::same_as<S, float> ? S(1e-4) : S(1e-8);
+  quaternion q_;
+};
+
+using so3 = basic_so3<double>;
+using so3f = basic_so3<float>;
+
+}  // namespace orbis
