@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: BSD-3-Clause
+#
+# The table of components. Used by the build itself and, installed, by orbis-config.cmake, so that
+# `find_package(orbis COMPONENTS octree)` looks for exactly what `octree` needs.
+
+# In an order in which everything a component needs stands before it.
+set(ORBIS_ALL_COMPONENTS core camera features optimize cloud octree io eval slam mapping
+                         interop_opencv interop_octomap)
+
+set(ORBIS_core_PACKAGES Eigen3 tl-expected Threads)
+set(ORBIS_core_LIBRARIES Eigen3::Eigen tl::expected Threads::Threads)
+
+set(ORBIS_camera_NEEDS core)
+
+set(ORBIS_features_NEEDS camera)
+set(ORBIS_features_PACKAGES OpenCV)
+set(ORBIS_features_LIBRARIES opencv_core opencv_imgproc opencv_features2d)
+
+set(ORBIS_optimize_NEEDS camera)
+
+set(ORBIS_cloud_NEEDS camera)
+set(ORBIS_cloud_PACKAGES nanoflann)
+set(ORBIS_cloud_LIBRARIES nanoflann::nanoflann)
+
+set(ORBIS_octree_NEEDS camera)
+
+set(ORBIS_io_NEEDS camera)
+set(ORBIS_io_PACKAGES PNG JPEG tomlplusplus)
+set(ORBIS_io_LIBRARIES PNG::PNG JPEG::JPEG tomlplusplus::tomlplusplus)
+
+set(ORBIS_eval_NEEDS core)
+
+set(ORBIS_slam_NEEDS features optimize cloud)
+set(ORBIS_mapping_NEEDS cloud octree)
+
+set(ORBIS_interop_opencv_NEEDS camera)
+set(ORBIS_interop_opencv_PACKAGES OpenCV)
+set(ORBIS_interop_opencv_LIBRARIES opencv_core)
+
+set(ORBIS_interop_octomap_NEEDS octree)
+set(ORBIS_interop_octomap_PACKAGES octomap)
+set(ORBIS_interop_octomap_LIBRARIES octomap octomath)
+
+# What to ask find_package for beside the package's name.
+set(ORBIS_OpenCV_FIND_ARGUMENTS COMPONENTS core imgproc features2d)
+
+# orbis_close_components(<out> <component>...): the components and all they need, in order.
+function(orbis_close_components out)
+  set(wanted ${ARGN})
+  if("all" IN_LIST wanted)
+    set(wanted ${ORBIS_ALL_COMPONENTS})
+  endif()
+  set(pending ${wanted})
+  while(pending)
+    list(POP_FRONT pending component)
+    if(NOT component IN_LIST ORBIS_ALL_COMPONENTS)
+      message(FATAL_ERROR "orbis has no component \"${component}\"; there are: ${ORBIS_ALL_COMPONENTS}")
+    endif()
+    foreach(need IN LISTS ORBIS_${component}_NEEDS)
+      if(NOT need IN_LIST wanted)
+        list(APPEND wanted ${need})
+        list(APPEND pending ${need})
+      endif()
+    endforeach()
+  endwhile()
+  set(ordered)
+  foreach(component IN LISTS ORBIS_ALL_COMPONENTS)
+    if(component IN_LIST wanted)
+      list(APPEND ordered ${component})
+    endif()
+  endforeach()
+  set(${out} ${ordered} PARENT_SCOPE)
+endfunction()
+
+# One INTERFACE target for each of the wanted components, and orbis::orbis for all of them.
+macro(orbis_add_components)
+  orbis_close_components(ORBIS_PROVIDED_COMPONENTS ${ARGN})
+  set(THREADS_PREFER_PTHREAD_FLAG ON)
+  foreach(_orbis_component IN LISTS ORBIS_PROVIDED_COMPONENTS)
+    foreach(_orbis_package IN LISTS ORBIS_${_orbis_component}_PACKAGES)
+      find_package(${_orbis_package} ${ORBIS_${_orbis_package}_FIND_ARGUMENTS} REQUIRED)
+    endforeach()
+    _orbis_add_component(${_orbis_component})
+  endforeach()
+  add_library(orbis_orbis INTERFACE)
+  add_library(orbis::orbis ALIAS orbis_orbis)
+  set_target_properties(orbis_orbis PROPERTIES EXPORT_NAME orbis)
+  foreach(_orbis_component IN LISTS ORBIS_PROVIDED_COMPONENTS)
+    if(NOT _orbis_component MATCHES "^interop_")
+      target_link_libraries(orbis_orbis INTERFACE orbis_${_orbis_component})
+    endif()
+  endforeach()
+endmacro()
+
+function(_orbis_add_component component)
+  add_library(orbis_${component} INTERFACE)
+  add_library(orbis::${component} ALIAS orbis_${component})
+  set_target_properties(orbis_${component} PROPERTIES EXPORT_NAME ${component})
+  target_compile_features(orbis_${component} INTERFACE cxx_std_20)
+  target_include_directories(orbis_${component} INTERFACE
+    $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/include> $<INSTALL_INTERFACE:include>)
+  foreach(need IN LISTS ORBIS_${component}_NEEDS)
+    target_link_libraries(orbis_${component} INTERFACE orbis_${need})
+  endforeach()
+  target_link_libraries(orbis_${component} INTERFACE ${ORBIS_${component}_LIBRARIES})
+endfunction()

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <numeric>
+#include <stdexcept>
+#include <vector>
+
+#include <orbis/core/execution.hpp>
+
+#include "support/catch.hpp"
+
+TEST_CASE("every index is visited once under every policy") {
+  for (const std::size_t count : {0U, 1U, 7U, 8U, 9U, 1000U}) {
+    std::vector<int> visits(count, 0);
+    const auto visit = [&](std::size_t i) { ++visits[i]; };
+    orbis::for_each_index(orbis::seq, count, 8, visit);
+    orbis::for_each_index(orbis::par, count, 8, visit);
+    orbis::for_each_index(orbis::par.with(5), count, 8, visit);
+    CHECK(std::accumulate(visits.begin(), visits.end(), 0) == static_cast<int>(3 * count));
+    for (const int v : visits) CHECK(v == 3);
+  }
+}
+
+TEST_CASE("chunks do not depend on the number of threads") {
+  const auto chunks = [](const auto& policy) {
+    std::vector<std::size_t> ends(10, 0);
+    orbis::for_each_chunk(policy, 95, 10, [&](std::size_t b, std::size_t e) { ends[b / 10] = e; });
+    return ends;
+  };
+  CHECK(chunks(orbis::seq) == chunks(orbis::par.with(4)));
+}
+
+TEST_CASE("an exception reaches the caller") {
+  const auto thrower = [](std::size_t i) {
+    if (i == 37) throw std::runtime_error("37");
+  };
+  CHECK_THROWS_AS(orbis::for_each_index(orbis::seq, 100, 1, thrower), std::runtime_error);
+  CHECK_THROWS_AS(orbis::for_each_index(orbis::par.with(3), 100, 1, thrower), std::runtime_error);
+}
