@@ -20,9 +20,10 @@ class progress {
 
   template <class F>
   requires(!std::is_same_v<std::remove_cvref_t<F>, progress> &&
-           std::is_invocable_r_v<bool, F&, std::size_t,
-                                 std::size_t>) constexpr progress(F&& callback) noexcept  // NOLINT(google-explicit-constructor):
-                                                                                          // a callback is one
+           std::is_invocable_r_v<
+               bool, F&, std::size_t,
+               std::size_t>) constexpr progress(F&& callback) noexcept  // NOLINT(google-explicit-constructor):
+                                                                        // a callback is one
       : object_{const_cast<void*>(static_cast<const void*>(std::addressof(callback)))},
         call_{[](void* object, std::size_t done, std::size_t total) -> bool {
           return (*static_cast<std::remove_reference_t<F>*>(object))(done, total);

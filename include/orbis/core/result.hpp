@@ -53,9 +53,37 @@ struct error {
   [[nodiscard]] std::string to_string() const { return where.empty() ? message : where + ": " + message; }
 };
 
-/// A `T`, or the reason why there is none.
+/// A `T`, or the reason why there is none: `tl::expected<T, error>` with one difference. Taking the
+/// value out of a temporary gives it by value, so that
+/// `for (const auto& frame : open_recording(path).value())` does not iterate over a dead object.
 template <class T>
-using result = tl::expected<T, error>;
+class [[nodiscard]] result : public tl::expected<T, error> {
+  using base = tl::expected<T, error>;
+
+ public:
+  using base::base;
+  result(base&& other) : base{std::move(other)} {}  // NOLINT(google-explicit-constructor)
+  result(const base& other) : base{other} {}        // NOLINT(google-explicit-constructor)
+
+  /// The value; throws `tl::bad_expected_access` if there is none.
+  [[nodiscard]] T& value() & { return base::value(); }
+  [[nodiscard]] const T& value() const& { return base::value(); }
+  [[nodiscard]] T value() && { return std::move(static_cast<base&>(*this)).value(); }
+  /// The value. @pre has_value()
+  [[nodiscard]] T& operator*() & { return base::operator*(); }
+  [[nodiscard]] const T& operator*() const& { return base::operator*(); }
+  [[nodiscard]] T operator*() && { return std::move(base::operator*()); }
+};
+
+/// Done, or the reason why not.
+template <>
+class [[nodiscard]] result<void> : public tl::expected<void, error> {
+  using base = tl::expected<void, error>;
+
+ public:
+  using base::base;
+  result(base&& other) : base{std::move(other)} {}  // NOLINT(google-explicit-constructor)
+};
 
 /// `return fail(errc::malformed, path, "...");` from a function that returns a `result`.
 [[nodiscard]] inline tl::unexpected<error> fail(errc code, std::string where, std::string message) {

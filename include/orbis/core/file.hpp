@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Whole files in, whole files out: a reader of what we write never sees half a file.
+#pragma once
+
+#include <cerrno>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <ios>
+#include <ostream>
+#include <string>
+#include <system_error>
+#include <type_traits>
+#include <utility>
+
+#include <orbis/core/result.hpp>
+
+namespace orbis {
+
+/// The bytes of a file. Errors: not_found, unreadable.
+[[nodiscard]] inline result<std::string> read_file(const std::filesystem::path& path) {
+  std::error_code ec;
+  const auto status = std::filesystem::status(path, ec);
+  if (!std::filesystem::exists(status)) return fail(errc::not_found, path.string(), "no such file");
+  if (std::filesystem::is_directory(status)) return fail(errc::unreadable, path.string(), "is a directory");
+  std::ifstream in{path, std::ios::binary};
+  if (!in) return fail(errc::unreadable, path.string(), "cannot be opened: " + std::generic_category().message(errno));
+  std::string bytes;
+  if (const auto size = std::filesystem::file_size(path, ec); !ec) bytes.reserve(static_cast<std::size_t>(size));
+  char buffer[65536];
+  while (in.read(buffer, sizeof buffer) || in.gcount() > 0) bytes.append(buffer, static_cast<std::size_t>(in.gcount()));
+  if (in.bad())
+    return fail(errc::unreadable, path.string(), "cannot be read: " + std::generic_category().message(errno));
+  return bytes;
+}
+
+/// Calls `write(std::ostream&)` on a temporary file beside `path` and renames it to `path` when
+/// everything, the closing included, succeeded; otherwise removes it and leaves `path` as it was.
+/// `write` may return `void`, or `result<void>` to give up. Errors: write_failed, or `write`'s own.
+template <class Write>
+[[nodiscard]] result<void> write_file_atomically(const std::filesystem::path& path, Write&& write) {
+  namespace fs = std::filesystem;
+  fs::path temporary = path;
+  temporary += ".part";
+  const auto give_up = [&](std::string why) -> result<void> {
+    std::error_code ignored;
+    fs::remove(temporary, ignored);
+    return fail(errc::write_failed, path.string(), std::move(why));
+  };
+
+  errno = 0;
+  std::ofstream out{temporary, std::ios::binary | std::ios::trunc};
+  if (!out)
+    return fail(errc::write_failed, path.string(), "cannot be created: " + std::generic_category().message(errno));
+  if constexpr (std::is_void_v<std::invoke_result_t<Write&, std::ostream&>>) {
+    write(static_cast<std::ostream&>(out));
+  } else {
+    result<void> done = write(static_cast<std::ostream&>(out));
+    if (!done) {
+      out.close();
+      std::error_code ignored;
+      fs::remove(temporary, ignored);
+      return fail(std::move(done.error()));
+    }
+  }
+  out.close();
+  if (!out) return give_up("cannot be written: " + std::generic_category().message(errno != 0 ? errno : EIO));
+  std::error_code ec;
+  fs::rename(temporary, path, ec);
+  if (ec) return give_up("cannot be put in place: " + ec.message());
+  return {};
+}
+
+}  // namespace orbis
