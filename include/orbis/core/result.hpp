@@ -57,8 +57,8 @@ struct error {
 /// value out of a temporary gives it by value, so that
 /// `for (const auto& frame : open_recording(path).value())` does not iterate over a dead object.
 template <class T>
-class [[nodiscard]] result : public tl::expected<T, error> {
-  using base = tl::expected<T, error>;
+class [[nodiscard]] result : public tl::expected<T, orbis::error> {
+  using base = tl::expected<T, orbis::error>;
 
  public:
   using base::base;
@@ -77,8 +77,8 @@ class [[nodiscard]] result : public tl::expected<T, error> {
 
 /// Done, or the reason why not.
 template <>
-class [[nodiscard]] result<void> : public tl::expected<void, error> {
-  using base = tl::expected<void, error>;
+class [[nodiscard]] result<void> : public tl::expected<void, orbis::error> {
+  using base = tl::expected<void, orbis::error>;
 
  public:
   using base::base;
