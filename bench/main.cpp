@@ -1,1 +1,110 @@
-int main(){}
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// The benchmark harness. Rows are named `group/parameters/who`; rows that differ in `who` alone are
+// the same work done by us and by a peer in the same run, and are printed side by side with their
+// ratio. Repetitions of all rows are interleaved, so that a busy moment of the machine hits both.
+// Everything Google Benchmark offers works as usual, e.g. --benchmark_filter=octree.
+#include <algorithm>
+#include <cstdio>
+#include <iostream>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <benchmark/benchmark.h>
+
+namespace {
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+/// Collects the repetitions of every row and prints medians and ratios when all have run.
+class ratio_table final : public benchmark::BenchmarkReporter {
+ public:
+  bool ReportContext(const Context& context) override {
+    PrintBasicContext(&std::cerr, context);
+    return true;
+  }
+
+  void ReportRuns(const std::vector<Run>& runs) override {
+    for (const Run& run : runs) {
+      if (run.run_type != Run::RT_Iteration) continue;
+      std::string name = run.run_name.function_name;
+      if (!run.run_name.args.empty()) name += "/" + run.run_name.args;
+      if (run.error_occurred) {
+        std::fprintf(stderr, "%s: %s\n", name.c_str(), run.error_message.c_str());
+        continue;
+      }
+      const double seconds =
+          run.real_accumulated_time / static_cast<double>(std::max<benchmark::IterationCount>(1, run.iterations));
+      row_named(name).seconds.push_back(seconds);
+      std::fprintf(stderr, "  %-60s %12.4f ms\n", name.c_str(), 1e3 * seconds);
+    }
+  }
+
+  void Finalize() override {
+    std::printf("\n%-64s %12s %10s\n", "median of the repetitions", "ms", "peer/orbis");
+    std::string previous_group;
+    for (const row& r : rows_) {
+      if (r.group != previous_group) std::printf("%s\n", r.group.c_str());
+      previous_group = r.group;
+      const double ms = 1e3 * median(r.seconds);
+      const row* ours = r.is_orbis() ? nullptr : our_row(r.group);
+      if (ours != nullptr) {
+        std::printf("    %-60s %12.4f %10.2f\n", r.who.c_str(), ms, ms / (1e3 * median(ours->seconds)));
+      } else {
+        std::printf("    %-60s %12.4f\n", r.who.c_str(), ms);
+      }
+    }
+  }
+
+ private:
+  struct row {
+    std::string group;
+    std::string who;
+    std::vector<double> seconds;
+    [[nodiscard]] bool is_orbis() const { return who.starts_with("orbis"); }
+  };
+
+  row& row_named(const std::string& name) {
+    const auto slash = name.rfind('/');
+    std::string group = slash == std::string::npos ? name : name.substr(0, slash);
+    std::string who = slash == std::string::npos ? "orbis" : name.substr(slash + 1);
+    for (row& r : rows_) {
+      if (r.group == group && r.who == who) return r;
+    }
+    // Keep the rows of a group together, in the order in which they came.
+    const auto last = std::find_if(rows_.rbegin(), rows_.rend(), [&](const row& r) { return r.group == group; });
+    return *rows_.insert(last.base() == rows_.begin() ? rows_.end() : last.base(),
+                         row{std::move(group), std::move(who), {}});
+  }
+
+  [[nodiscard]] const row* our_row(const std::string& group) const {
+    const auto found =
+        std::find_if(rows_.begin(), rows_.end(), [&](const row& r) { return r.group == group && r.who == "orbis"; });
+    return found == rows_.end() ? nullptr : &*found;
+  }
+
+  std::vector<row> rows_;
+};
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  std::vector<char*> arguments(argv, argv + argc);
+  std::string repetitions = "--benchmark_repetitions=3";
+  std::string interleaved = "--benchmark_enable_random_interleaving=true";
+  std::string minimum = "--benchmark_min_time=0.2";
+  // Defaults first, so that what the user says overrides them.
+  arguments.insert(arguments.begin() + 1, {repetitions.data(), interleaved.data(), minimum.data()});
+  int count = static_cast<int>(arguments.size());
+  benchmark::Initialize(&count, arguments.data());
+  if (benchmark::ReportUnrecognizedArguments(count, arguments.data())) return 1;
+  ratio_table table;
+  benchmark::RunSpecifiedBenchmarks(&table);
+  benchmark::Shutdown();
+  return 0;
+}
