@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// All of orbis but the interop headers. Include what you use instead where compile time matters.
+#pragma once
+
+#include <orbis/camera.hpp>
+#include <orbis/cloud.hpp>
+#include <orbis/core.hpp>
+#include <orbis/eval.hpp>
+#include <orbis/features.hpp>
+#include <orbis/io.hpp>
+#include <orbis/mapping.hpp>
+#include <orbis/octree.hpp>
+#include <orbis/optimize.hpp>
+#include <orbis/slam.hpp>

@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <array>
+#include <vector>
+
+#include <orbis/cloud.hpp>
+#include <orbis/octree.hpp>
+
+int main() {
+  std::vector<std::array<float, 3>> points;
+  for (int i = 0; i != 100; ++i) points.push_back({1.0F + 0.001F * static_cast<float>(i % 10), 0.001F * static_cast<float>(i / 10), 0.0F});
+  points.push_back({9.0F, 9.0F, 9.0F});
+  const auto keep = orbis::cloud::statistical_inliers(orbis::seq, points, {.neighbors = 8, .sigma_multiplier = 1.0});
+  orbis::octree::occupancy_octree<> map{0.05};
+  map.integrate(points, std::array<float, 3>{0.0F, 0.0F, 0.0F}, {.max_range = 5.0});
+  const bool right = !keep.empty() && keep.back() != 100 &&
+                     map.state(std::array<float, 3>{1.001F, 0.001F, 0.0F}) == orbis::octree::occupancy::occupied;
+  return right ? 0 : 1;
+}
