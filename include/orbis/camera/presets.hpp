@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Cameras of the usual public recordings, by name.
+#pragma once
+
+#include <array>
+#include <string>
+#include <string_view>
+
+#include <orbis/camera/settings.hpp>
+#include <orbis/core/result.hpp>
+
+namespace orbis::camera {
+
+/// The names that `preset` knows.
+inline constexpr std::array<std::string_view, 5> preset_names{"tum_fr1", "tum_fr2", "tum_fr3", "icl", "kinect"};
+
+/// The camera of the TUM RGB-D benchmark's freiburg1, 2 and 3 sequences (the published calibration
+/// of the colour camera; freiburg3 is already undistorted), of ICL-NUIM, or a Kinect by its nominal
+/// values. All are 640x480 at 30 frames per second.
+///
+/// Sources: J. Sturm et al., "A benchmark for the evaluation of RGB-D SLAM systems", IROS 2012, and
+/// its web page on file formats; A. Handa et al., "A benchmark for RGB-D visual odometry, 3D
+/// reconstruction and SLAM", ICRA 2014 (whose y axis points up, hence its negative fy; ours points
+/// down). Errors: invalid_argument for another name, with the list of those known.
+[[nodiscard]] inline result<camera_settings> preset(std::string_view name) {
+  if (name == "tum_fr1")
+    return camera_settings{
+        .model = radial_tangential{{640, 480, 517.3, 516.5, 318.6, 255.3}, {0.2624, -0.9531, -0.0054, 0.0026, 1.1633}},
+        .depth_scale = 5000.0};
+  if (name == "tum_fr2")
+    return camera_settings{
+        .model = radial_tangential{{640, 480, 520.9, 521.0, 325.1, 249.7}, {0.2312, -0.7849, -0.0033, -0.0001, 0.9172}},
+        .depth_scale = 5000.0};
+  if (name == "tum_fr3")
+    return camera_settings{.model = pinhole{640, 480, 535.4, 539.2, 320.1, 247.6}, .depth_scale = 5000.0};
+  if (name == "icl")
+    return camera_settings{.model = pinhole{640, 480, 481.2, 480.0, 319.5, 239.5}, .depth_scale = 5000.0};
+  if (name == "kinect")
+    return camera_settings{.model = pinhole{640, 480, 525.0, 525.0, 319.5, 239.5}};
+
+  std::string known;
+  for (const std::string_view n : preset_names) known += (known.empty() ? "" : ", ") + std::string{n};
+  return fail(errc::invalid_argument, "camera preset", "\"" + std::string{name} + "\" is not one of " + known);
+}
+
+}  // namespace orbis::camera

@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// The usual lens: radial and tangential distortion, with OpenCV's 4, 5 or 8 coefficients.
+///
+/// Model: D. C. Brown, "Decentering distortion of lenses", Photogrammetric Engineering 32(3), 1966;
+/// D. Claus, A. Fitzgibbon, "A rational function lens distortion model for general cameras", CVPR
+/// 2005, for the denominator.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cassert>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <optional>
+#include <utility>
+
+#include <orbis/camera/intrinsics.hpp>
+#include <orbis/camera/monotonic.hpp>
+#include <orbis/core/types.hpp>
+
+namespace orbis::camera {
+
+/// With `x, y` on the plane z = 1 and `s = x^2 + y^2`:
+/// `g = (1 + k1 s + k2 s^2 + k3 s^3) / (1 + k4 s + k5 s^2 + k6 s^3)`,
+/// `x' = g x + 2 p1 x y + p2 (s + 2 x^2)`, `y' = g y + p1 (s + 2 y^2) + 2 p2 x y`.
+///
+/// The polynomial is good only where it was fitted; far out it may fold back, so that one pixel has
+/// several rays. Points beyond the first fold are outside this model's domain. Satisfies
+/// `camera_model`.
+class radial_tangential {
+ public:
+  /// In the order OpenCV lists them; those not given are 0.
+  struct coefficients {
+    double k1 = 0.0, k2 = 0.0, p1 = 0.0, p2 = 0.0, k3 = 0.0, k4 = 0.0, k5 = 0.0, k6 = 0.0;
+    friend bool operator==(const coefficients&, const coefficients&) = default;
+  };
+
+  radial_tangential() = default;
+  /// @pre is_valid(k), all coefficients finite
+  radial_tangential(const intrinsics& k, const coefficients& d) : k_{k}, d_{d}, domain_{domain(d)} {
+    assert(is_valid(k));
+  }
+
+  [[nodiscard]] int width() const noexcept { return k_.width; }
+  [[nodiscard]] int height() const noexcept { return k_.height; }
+  /// Image size and camera matrix.
+  [[nodiscard]] const intrinsics& k() const noexcept { return k_; }
+  [[nodiscard]] const coefficients& distortion() const noexcept { return d_; }
+  /// `x^2 + y^2` on the plane z = 1 has to be below this; infinite where nothing folds back.
+  [[nodiscard]] double max_squared_radius() const noexcept { return domain_; }
+
+  /// The pixel of a point in the camera frame (metres); empty at and behind z = 0, outside the
+  /// domain, and for NaN.
+  [[nodiscard]] std::optional<vec2> project(const vec3& p) const {
+    if (!(p.z() > 0.0)) return std::nullopt;
+    return pixel_of({p.x() / p.z(), p.y() / p.z()});
+  }
+  /// The same, with the derivative of the pixel by the point; `jacobian` is untouched if empty.
+  [[nodiscard]] std::optional<vec2> project(const vec3& p, matrix<2, 3>& jacobian) const {
+    const auto pixel = project(p);
+    if (pixel) {
+      const double inverse_z = 1.0 / p.z();
+      const vec2 m{p.x() * inverse_z, p.y() * inverse_z};
+      mat2 j = distort_derivative(m) * inverse_z;
+      j.row(0) *= k_.fx;
+      j.row(1) *= k_.fy;
+      jacobian << j, -(j * m);
+    }
+    return pixel;
+  }
+  /// The ray through a pixel, scaled to z = 1. The radial part is inverted within the domain, then
+  /// Newton's method on both coordinates takes the tangential part in. Empty where there is no ray,
+  /// and for NaN.
+  [[nodiscard]] std::optional<vec3> unproject(const vec2& pixel) const {
+    const vec2 target{(pixel.x() - k_.cx) / k_.fx, (pixel.y() - k_.cy) / k_.fy};
+    if (!target.allFinite()) return std::nullopt;
+    vec2 m = radial_start(target);
+    for (int i = 0; i != max_iterations; ++i) {
+      const vec2 residual = distort(m) - target;
+      const mat2 j = distort_derivative(m);
+      const double determinant = j(0, 0) * j(1, 1) - j(0, 1) * j(1, 0);
+      const vec2 step{(j(1, 1) * residual.x() - j(0, 1) * residual.y()) / determinant,
+                      (j(0, 0) * residual.y() - j(1, 0) * residual.x()) / determinant};
+      m -= step;
+      if (!(determinant > 0.0) || !(m.squaredNorm() < domain_)) return std::nullopt;
+      if (step.squaredNorm() <= converged * (1.0 + m.squaredNorm())) return vec3{m.x(), m.y(), 1.0};
+    }
+    return std::nullopt;
+  }
+
+  friend bool operator==(const radial_tangential&, const radial_tangential&) = default;
+
+ private:
+  static constexpr int max_iterations = 30;
+  /// Squared relative step; Newton's next step would be its square.
+  static constexpr double converged = 1e-20;
+
+  [[nodiscard]] std::optional<vec2> pixel_of(const vec2& m) const {
+    if (!(m.squaredNorm() < domain_)) return std::nullopt;
+    const vec2 d = distort(m);
+    const vec2 pixel{k_.fx * d.x() + k_.cx, k_.fy * d.y() + k_.cy};
+    if (!pixel.allFinite()) return std::nullopt;
+    return pixel;
+  }
+
+  /// g(s) and its derivative.
+  [[nodiscard]] std::pair<double, double> radial(double s) const noexcept {
+    const double n = 1.0 + s * (d_.k1 + s * (d_.k2 + s * d_.k3));
+    const double dn = d_.k1 + s * (2.0 * d_.k2 + s * 3.0 * d_.k3);
+    const double q = 1.0 + s * (d_.k4 + s * (d_.k5 + s * d_.k6));
+    const double dq = d_.k4 + s * (2.0 * d_.k5 + s * 3.0 * d_.k6);
+    const double g = n / q;
+    return {g, (dn - g * dq) / q};
+  }
+
+  [[nodiscard]] vec2 distort(const vec2& m) const noexcept {
+    const double x = m.x(), y = m.y(), s = x * x + y * y;
+    const double g = radial(s).first;
+    return {g * x + 2.0 * d_.p1 * x * y + d_.p2 * (s + 2.0 * x * x),
+            g * y + d_.p1 * (s + 2.0 * y * y) + 2.0 * d_.p2 * x * y};
+  }
+
+  [[nodiscard]] mat2 distort_derivative(const vec2& m) const noexcept {
+    const double x = m.x(), y = m.y();
+    const auto [g, dg] = radial(x * x + y * y);
+    const double mixed = 2.0 * (dg * x * y + d_.p1 * x + d_.p2 * y);
+    mat2 j;
+    j << g + 2.0 * dg * x * x + 2.0 * d_.p1 * y + 6.0 * d_.p2 * x, mixed,  //
+        mixed, g + 2.0 * dg * y * y + 6.0 * d_.p1 * y + 2.0 * d_.p2 * x;
+    return j;
+  }
+
+  /// The ray that `target` has without tangential distortion, or one on the rim of the domain.
+  [[nodiscard]] vec2 radial_start(const vec2& target) const {
+    const double distorted = target.norm();
+    if (distorted == 0.0) return target;
+    const double end = std::sqrt(domain_);
+    const auto scaled = [&](double r) {
+      const auto [g, dg] = radial(r * r);
+      return std::pair{r * g, g + 2.0 * r * r * dg};
+    };
+    const double r = detail::invert_growing(scaled, distorted, end).value_or(0.99 * std::min(end, distorted));
+    return target * (r / distorted);
+  }
+
+  /// The squared radius at which `r g(r^2)` stops growing: with `g = n / q` the first sign change of
+  /// `n q + 2 s (n' q - n q')`, or of `q`.
+  [[nodiscard]] static double domain(const coefficients& d) {
+    const std::array<double, 4> n{1.0, d.k1, d.k2, d.k3};
+    const std::array<double, 4> q{1.0, d.k4, d.k5, d.k6};
+    std::array<double, 7> slope{};
+    for (std::size_t i = 0; i != 4; ++i)
+      for (std::size_t j = 0; j != 4; ++j)
+        slope[i + j] += n[i] * q[j] * (1.0 + 2.0 * (static_cast<double>(i) - static_cast<double>(j)));
+    return std::min(detail::smallest_positive_root(slope), detail::smallest_positive_root(q));
+  }
+
+  intrinsics k_;
+  coefficients d_;
+  double domain_ = std::numeric_limits<double>::infinity();
+};
+
+}  // namespace orbis::camera
