@@ -36,8 +36,7 @@ inline constexpr std::array<std::string_view, 5> preset_names{"tum_fr1", "tum_fr
     return camera_settings{.model = pinhole{640, 480, 535.4, 539.2, 320.1, 247.6}, .depth_scale = 5000.0};
   if (name == "icl")
     return camera_settings{.model = pinhole{640, 480, 481.2, 480.0, 319.5, 239.5}, .depth_scale = 5000.0};
-  if (name == "kinect")
-    return camera_settings{.model = pinhole{640, 480, 525.0, 525.0, 319.5, 239.5}};
+  if (name == "kinect") return camera_settings{.model = pinhole{640, 480, 525.0, 525.0, 319.5, 239.5}};
 
   std::string known;
   for (const std::string_view n : preset_names) known += (known.empty() ? "" : ", ") + std::string{n};

@@ -34,8 +34,9 @@ class image_view {
     assert(width >= 0 && height >= 0 && stride >= width);
   }
   constexpr image_view(T* data, int width, int height) noexcept : image_view(data, width, height, width) {}
-  /// From mutable to const.
-  constexpr image_view(const image_view<value_type>& other) noexcept requires std::is_const_v<T>
+  /// From mutable to const. A template, so that it never stands in for the copy constructor.
+  template <class U>
+  requires(std::is_const_v<T>&& std::same_as<U, value_type>) constexpr image_view(const image_view<U>& other) noexcept
       : image_view(other.data(), other.width(), other.height(), other.stride()) {}
 
   [[nodiscard]] constexpr int width() const noexcept { return width_; }

@@ -5,6 +5,7 @@
 /// Formulas: T. D. Barfoot, "State Estimation for Robotics", chapter 7.
 #pragma once
 
+#include <cmath>
 #include <concepts>
 
 #include <orbis/core/so3.hpp>
@@ -69,7 +70,54 @@ class basic_se3 {
     return {r_.template cast<T>(), t_.template cast<T>()};
   }
 
+  /// `exp(xi + delta) ~ exp(left_jacobian(xi) * delta) * exp(xi)`.
+  [[nodiscard]] static matrix<6, 6, S> left_jacobian(const tangent& xi) {
+    const matrix<3, 3, S> j = basic_so3<S>::left_jacobian(xi.template tail<3>());
+    return block_triangular(j, q_matrix(xi));
+  }
+  [[nodiscard]] static matrix<6, 6, S> left_jacobian_inverse(const tangent& xi) {
+    const matrix<3, 3, S> j = basic_so3<S>::left_jacobian_inverse(xi.template tail<3>());
+    return block_triangular(j, -(j * q_matrix(xi) * j));
+  }
+  /// `exp(xi + delta) ~ exp(xi) * exp(right_jacobian(xi) * delta)`.
+  [[nodiscard]] static matrix<6, 6, S> right_jacobian(const tangent& xi) { return left_jacobian(-xi); }
+  [[nodiscard]] static matrix<6, 6, S> right_jacobian_inverse(const tangent& xi) { return left_jacobian_inverse(-xi); }
+
  private:
+  [[nodiscard]] static matrix<6, 6, S> block_triangular(const matrix<3, 3, S>& diagonal,
+                                                        const matrix<3, 3, S>& corner) {
+    matrix<6, 6, S> m = matrix<6, 6, S>::Zero();
+    m.template topLeftCorner<3, 3>() = diagonal;
+    m.template topRightCorner<3, 3>() = corner;
+    m.template bottomRightCorner<3, 3>() = diagonal;
+    return m;
+  }
+
+  /// How the translation's tangent depends on the rotation: Barfoot's Q_l, equation 7.86.
+  [[nodiscard]] static matrix<3, 3, S> q_matrix(const tangent& xi) {
+    const matrix<3, 3, S> p = hat<S>(xi.template head<3>());
+    const matrix<3, 3, S> k = hat<S>(xi.template tail<3>());
+    const S t2 = xi.template tail<3>().squaredNorm();
+    // (t - sin t) / t^3, (t^2 + 2 cos t - 2) / (2 t^4), (2 t - 3 sin t + t cos t) / (2 t^5)
+    S a = S(0), b = S(0), c = S(0);
+    if (t2 < S(1)) {  // the closed forms cancel to nothing here
+      S term = S(1) / S(6);
+      for (int n = 0; n != 10; ++n) {  // term = (-t^2)^n / (2 n + 3)!
+        a += term;
+        b += term / S(2 * n + 4);
+        c += term * S(n + 1) / S((2 * n + 4) * (2 * n + 5));
+        term *= -t2 / S((2 * n + 4) * (2 * n + 5));
+      }
+    } else {
+      const S t = std::sqrt(t2);
+      a = (t - std::sin(t)) / (t2 * t);
+      b = (t2 + S(2) * std::cos(t) - S(2)) / (S(2) * t2 * t2);
+      c = (S(2) * t - S(3) * std::sin(t) + t * std::cos(t)) / (S(2) * t2 * t2 * t);
+    }
+    const matrix<3, 3, S> kp = k * p, pk = p * k, kpk = kp * k;
+    return S(0.5) * p + a * (kp + pk + kpk) + b * (k * kp + pk * k - S(3) * kpk) + c * (kpk * k + k * kpk);
+  }
+
   basic_so3<S> r_;
   point t_;
 };

@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// From a camera with distortion to an ideal one: for pixels and for whole images.
+#pragma once
+
+#include <cassert>
+#include <cmath>
+#include <concepts>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <type_traits>
+
+#include <orbis/camera/intrinsics.hpp>
+#include <orbis/camera/model.hpp>
+#include <orbis/camera/pinhole.hpp>
+#include <orbis/core/image.hpp>
+#include <orbis/core/types.hpp>
+
+namespace orbis::camera {
+
+/// A camera model with a camera matrix, so that there is a pinhole like it.
+template <class C>
+concept has_intrinsics = camera_model<C> && requires(const C& camera) {
+  { camera.k() } -> std::convertible_to<intrinsics>;
+};
+
+/// Where the pinhole `ideal` sees what `camera` sees at `pixel`; empty where `camera` has no ray.
+template <camera_model Camera>
+[[nodiscard]] std::optional<vec2> undistort(const Camera& camera, const vec2& pixel, const pinhole& ideal) {
+  const auto ray = camera.unproject(pixel);
+  return ray ? ideal.project(*ray) : std::nullopt;
+}
+
+/// The same for the pinhole with the camera's own size and matrix.
+template <has_intrinsics Camera>
+[[nodiscard]] std::optional<vec2> undistort(const Camera& camera, const vec2& pixel) {
+  return undistort(camera, pixel, pinhole{camera.k()});
+}
+
+/// Remaps images of a camera to those an ideal pinhole would have taken from the same place. Build
+/// it once, apply it to every frame. 8 bytes for each pixel.
+class undistortion {
+ public:
+  /// O(pixels of `ideal`) projections.
+  template <camera_model Camera>
+  undistortion(const Camera& camera, const pinhole& ideal)
+      : source_width_{camera.width()},
+        source_height_{camera.height()},
+        source_{ideal.width(), ideal.height(), vec2f::Constant(std::numeric_limits<float>::quiet_NaN())} {
+    for (int y = 0; y != ideal.height(); ++y)
+      for (int x = 0; x != ideal.width(); ++x) {
+        const auto ray = ideal.unproject({x, y});
+        if (const auto pixel = ray ? camera.project(*ray) : std::nullopt) source_(x, y) = pixel->template cast<float>();
+      }
+  }
+  /// To the pinhole with the camera's own size and matrix.
+  template <has_intrinsics Camera>
+  explicit undistortion(const Camera& camera) : undistortion(camera, pinhole{camera.k()}) {}
+
+  [[nodiscard]] int width() const noexcept { return source_.width(); }
+  [[nodiscard]] int height() const noexcept { return source_.height(); }
+  /// Where the distorted image has what the ideal one shows at (x, y); NaN if nowhere.
+  [[nodiscard]] const vec2f& source(int x, int y) const noexcept { return source_(x, y); }
+
+  /// Bilinear interpolation, for `rgb8` and `std::uint8_t`; `outside` where the image has nothing.
+  /// @pre the image has the camera's size
+  template <class T>
+  requires std::same_as<std::remove_const_t<T>, rgb8> || std::same_as<std::remove_const_t<T>, std::uint8_t>
+  [[nodiscard]] image<std::remove_const_t<T>> bilinear(image_view<T> distorted,
+                                                       const std::remove_const_t<T>& outside = {}) const {
+    return remap(distorted, outside, [](const auto& in, const vec2f& at) {
+      const int x0 = static_cast<int>(at.x()), y0 = static_cast<int>(at.y());
+      const int x1 = x0 + 1 < in.width() ? x0 + 1 : x0, y1 = y0 + 1 < in.height() ? y0 + 1 : y0;
+      const float u = at.x() - static_cast<float>(x0), v = at.y() - static_cast<float>(y0);
+      return mix(in(x0, y0), in(x1, y0), in(x0, y1), in(x1, y1), u, v);
+    });
+  }
+
+  /// The nearest pixel, for everything that must not be mixed: depth (which lies along the optical
+  /// axis and so needs no change of value), labels.
+  /// @pre the image has the camera's size
+  template <class T>
+  [[nodiscard]] image<std::remove_const_t<T>> nearest(image_view<T> distorted,
+                                                      const std::remove_const_t<T>& outside = {}) const {
+    return remap(distorted, outside, [](const auto& in, const vec2f& at) {
+      return in(static_cast<int>(at.x() + 0.5F), static_cast<int>(at.y() + 0.5F));
+    });
+  }
+
+ private:
+  template <class T, class Sample>
+  [[nodiscard]] image<std::remove_const_t<T>> remap(image_view<T> in, const std::remove_const_t<T>& outside,
+                                                    Sample&& sample) const {
+    assert(in.width() == source_width_ && in.height() == source_height_);
+    image<std::remove_const_t<T>> out{width(), height(), outside};
+    const auto right = static_cast<float>(in.width() - 1), bottom = static_cast<float>(in.height() - 1);
+    for (int y = 0; y != height(); ++y)
+      for (int x = 0; x != width(); ++x) {
+        const vec2f& at = source_(x, y);
+        if (at.x() >= 0.0F && at.y() >= 0.0F && at.x() <= right && at.y() <= bottom) out(x, y) = sample(in, at);
+      }
+    return out;
+  }
+
+  [[nodiscard]] static std::uint8_t mix(std::uint8_t a, std::uint8_t b, std::uint8_t c, std::uint8_t d, float u,
+                                        float v) noexcept {
+    const float top = static_cast<float>(a) * (1.0F - u) + static_cast<float>(b) * u;
+    const float low = static_cast<float>(c) * (1.0F - u) + static_cast<float>(d) * u;
+    return static_cast<std::uint8_t>(top * (1.0F - v) + low * v + 0.5F);
+  }
+  [[nodiscard]] static rgb8 mix(const rgb8& a, const rgb8& b, const rgb8& c, const rgb8& d, float u, float v) noexcept {
+    return {mix(a.r, b.r, c.r, d.r, u, v), mix(a.g, b.g, c.g, d.g, u, v), mix(a.b, b.b, c.b, d.b, u, v)};
+  }
+
+  int source_width_ = 0;
+  int source_height_ = 0;
+  image<vec2f> source_;
+};
+
+}  // namespace orbis::camera

@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// The vocabulary of all components.
+#pragma once
+
+#include <orbis/core/execution.hpp>
+#include <orbis/core/file.hpp>
+#include <orbis/core/image.hpp>
+#include <orbis/core/point.hpp>
+#include <orbis/core/point_cloud.hpp>
+#include <orbis/core/progress.hpp>
+#include <orbis/core/random.hpp>
+#include <orbis/core/result.hpp>
+#include <orbis/core/rotation.hpp>
+#include <orbis/core/se3.hpp>
+#include <orbis/core/sim3.hpp>
+#include <orbis/core/simd.hpp>
+#include <orbis/core/so3.hpp>
+#include <orbis/core/trajectory.hpp>
+#include <orbis/core/types.hpp>
