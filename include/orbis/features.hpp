@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Keypoints, descriptors and matching.
+#pragma once
+
+#include <orbis/features/brute_force.hpp>
+#include <orbis/features/descriptor.hpp>
+#include <orbis/features/hamming.hpp>
+#include <orbis/features/hamming_nearest.hpp>
+#include <orbis/features/match.hpp>
+#include <orbis/features/matcher.hpp>
+#include <orbis/features/orb.hpp>
+#include <orbis/features/spread.hpp>
+#include <orbis/features/stages.hpp>

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// The source that compares every query with every train.
+#pragma once
+
+#include <concepts>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include <orbis/core/simd.hpp>
+#include <orbis/features/hamming.hpp>
+#include <orbis/features/hamming_nearest.hpp>
+#include <orbis/features/match.hpp>
+
+namespace orbis::features {
+
+/// Finds for each query the nearest and the second nearest train, and on request for each train the
+/// nearest query, in one pass over all pairs. Made by `brute_force(distance)`.
+template <class Distance>
+struct brute_force_source {
+  using match_source_tag = void;
+  Distance distance{};
+  simd::level level = simd::level::avx512;  ///< the best instruction set to use, if the processor has it
+
+  /// One candidate for each query; none if there are no trains. O(queries x trains).
+  template <class Descriptor>
+  requires descriptor_distance<Distance, Descriptor>
+  [[nodiscard]] std::vector<candidate> search(const feature_view<Descriptor>& queries,
+                                              const feature_view<Descriptor>& trains, search_needs needs) const {
+    const std::size_t query_count = queries.descriptors.size();
+    const std::size_t train_count = trains.descriptors.size();
+    if (query_count == 0 || train_count == 0) return {};
+
+    std::vector<nearest_two> nearest(query_count);
+    std::vector<std::uint32_t> reverse(needs.reverse ? train_count : 0);
+    if constexpr (std::same_as<Distance, hamming> && has_hamming_kernel<Descriptor>) {
+      hamming_nearest(level, queries.descriptors, trains.descriptors, nearest, reverse);
+    } else {
+      detail::nearest_by(distance, queries.descriptors, trains.descriptors, std::span{nearest}, std::span{reverse});
+    }
+
+    std::vector<candidate> candidates(query_count);
+    for (std::size_t i = 0; i != query_count; ++i) {
+      const nearest_two& n = nearest[i];
+      candidates[i] = {static_cast<std::uint32_t>(i), n.index, n.distance, n.second_distance,
+                       needs.reverse ? reverse[n.index] : none};
+    }
+    return candidates;
+  }
+};
+
+/// A source that compares every query with every train: `brute_force(hamming{})`.
+template <class Distance>
+[[nodiscard]] constexpr brute_force_source<Distance> brute_force(Distance distance,
+                                                                 simd::level level = simd::level::avx512) {
+  return {distance, level};
+}
+
+}  // namespace orbis::features

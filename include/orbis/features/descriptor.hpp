@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Keypoints, binary descriptors, and the two together.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <type_traits>
+#include <vector>
+
+namespace orbis::features {
+
+/// A string of bits that describes the neighbourhood of a keypoint. Bit `i` is bit `i % 64` of word
+/// `i / 64`; on a little-endian machine these are the bytes OpenCV stores in a descriptor's row.
+template <std::size_t Bits>
+requires(Bits > 0 && Bits % 64 == 0) struct binary_descriptor {
+  static constexpr std::size_t bits = Bits;
+  std::array<std::uint64_t, Bits / 64> words{};
+
+  /// @pre i < Bits
+  [[nodiscard]] constexpr bool bit(std::size_t i) const noexcept { return ((words[i / 64] >> (i % 64)) & 1U) != 0; }
+  friend constexpr bool operator==(const binary_descriptor&, const binary_descriptor&) = default;
+};
+static_assert(sizeof(binary_descriptor<256>) == 32 && std::is_trivially_copyable_v<binary_descriptor<256>>);
+
+/// A point of an image that can be found again.
+struct keypoint {
+  float x = 0.0F, y = 0.0F;  ///< pixels of the full image, pixel centres at integers
+  float size = 0.0F;         ///< diameter of the described neighbourhood, pixels of the full image
+  float angle = 0.0F;        ///< orientation in radians, [0, 2 pi), from x (right) towards y (down)
+  float response = 0.0F;     ///< strength of the corner; comparable within one extractor
+  int octave = 0;            ///< pyramid level, 0 the finest
+  friend constexpr bool operator==(const keypoint&, const keypoint&) = default;
+};
+
+/// What an extractor finds: `descriptors[i]` describes `keypoints[i]`.
+struct features {
+  std::vector<keypoint> keypoints;
+  std::vector<binary_descriptor<256>> descriptors;
+
+  [[nodiscard]] std::size_t size() const noexcept { return keypoints.size(); }
+  [[nodiscard]] bool empty() const noexcept { return keypoints.empty(); }
+  friend bool operator==(const features&, const features&) = default;
+};
+
+}  // namespace orbis::features

@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// The vocabulary of matching: matches, candidates, what is searched, and what the parts of a
+/// matcher are.
+#pragma once
+
+#include <concepts>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <ranges>
+#include <span>
+#include <type_traits>
+#include <vector>
+
+#include <orbis/features/descriptor.hpp>
+
+namespace orbis::features {
+
+/// Query `query` and train `train` (indices) look alike, at descriptor distance `distance`.
+struct match {
+  std::uint32_t query = 0;
+  std::uint32_t train = 0;
+  std::uint32_t distance = 0;
+  friend constexpr bool operator==(const match&, const match&) = default;
+};
+
+/// In place of an index or a distance that does not exist.
+inline constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
+
+/// What a search finds for one query, and what the stages of a matcher judge.
+struct candidate {
+  std::uint32_t query = 0;
+  std::uint32_t train = 0;               ///< the nearest; the lowest index where several are equally near
+  std::uint32_t distance = 0;            ///< to the nearest
+  std::uint32_t second_distance = none;  ///< to the second nearest, `none` where there is only one
+  std::uint32_t reverse_query = none;    ///< the query nearest to `train` (lowest index on ties), if asked for
+  friend constexpr bool operator==(const candidate&, const candidate&) = default;
+};
+
+/// Descriptors with their keypoints, if these are known, in place. What a matcher is called with:
+/// made of `features` or of any contiguous range of descriptors.
+template <class Descriptor>
+struct feature_view {
+  std::span<const keypoint> keypoints;  ///< empty, or one for each descriptor
+  std::span<const Descriptor> descriptors;
+};
+
+/// Something a matcher can be called with: `features`, a `feature_view`, a range of descriptors.
+[[nodiscard]] inline feature_view<binary_descriptor<256>> view_of(const features& f) noexcept {
+  return {f.keypoints, f.descriptors};
+}
+template <class Descriptor>
+[[nodiscard]] constexpr feature_view<Descriptor> view_of(const feature_view<Descriptor>& view) noexcept {
+  return view;
+}
+template <std::ranges::contiguous_range Range>
+requires std::ranges::sized_range<Range>
+[[nodiscard]] constexpr feature_view<std::ranges::range_value_t<Range>> view_of(const Range& descriptors) noexcept {
+  return {{}, {std::ranges::data(descriptors), std::ranges::size(descriptors)}};
+}
+template <class T>
+concept describable = requires(const T& x) {
+  view_of(x);
+};
+template <describable T>
+using descriptor_of =
+    std::remove_const_t<typename decltype(decltype(view_of(std::declval<const T&>()))::descriptors)::element_type>;
+
+/// What the stages behind a source want to know beyond the nearest neighbour.
+struct search_needs {
+  bool reverse = false;    ///< `candidate::reverse_query`
+  bool keypoints = false;  ///< the keypoints of both sides, of the caller
+  [[nodiscard]] constexpr search_needs operator|(search_needs other) const noexcept {
+    return {reverse || other.reverse, keypoints || other.keypoints};
+  }
+};
+
+/// Where a chain begins: `source.search(queries, trains, needs, where...)` gives the candidates in
+/// ascending order of their query, at most one for each.
+template <class S>
+concept match_source = requires {
+  typename S::match_source_tag;
+};
+
+/// A stage that judges each candidate on its own: any callable `bool(const candidate&)`.
+template <class S>
+concept match_predicate = std::predicate<const S&, const candidate&>;
+
+/// A stage that judges the candidates together, with the keypoints (empty if the caller gave none):
+/// any callable `void(std::vector<candidate>&, std::span<const keypoint>, std::span<const keypoint>)`
+/// that erases what it rejects and keeps the order.
+template <class S>
+concept match_filter = std::invocable < const S&,
+        std::vector<candidate>
+&, std::span<const keypoint>, std::span < const keypoint >> ;
+
+/// Any stage. It may ask for more than the nearest neighbour with a static member `needs`.
+template <class S>
+concept match_stage = (match_predicate<S> || match_filter<S>)&&!match_source<S>;
+
+/// What a stage asks for.
+template <match_stage S>
+[[nodiscard]] constexpr search_needs needs_of() noexcept {
+  if constexpr (requires {
+                  { S::needs } -> std::convertible_to<search_needs>;
+                }) {
+    return S::needs;
+  } else {
+    return {};
+  }
+}
+
+}  // namespace orbis::features

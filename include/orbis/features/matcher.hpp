@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Matchers as values: a source and the stages behind it, composed with `|`.
+///
+/// @code
+///   constexpr auto matcher = brute_force(hamming{}) | ratio_test{0.7f} | cross_check{} | max_distance{50};
+///   std::vector<match> matches = matcher(f1.descriptors, f2.descriptors);
+/// @endcode
+///
+/// A chain begins with one source (`brute_force`, `windowed`); a stage is anything that satisfies
+/// `match_stage`, a lambda `bool(const candidate&)` for example. Stages judge candidates in their
+/// order; each knows the nearest neighbour, the second distance and the reverse neighbour as the
+/// source found them among *all* descriptors, not among what earlier stages left over.
+#pragma once
+
+#include <cassert>
+#include <concepts>
+#include <span>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include <orbis/features/match.hpp>
+
+namespace orbis::features {
+
+/// A source with its stages. Made by `|`, called with queries and trains.
+template <match_source Source, match_stage... Stages>
+class match_chain {
+ public:
+  static constexpr search_needs needs = (search_needs{} | ... | needs_of<Stages>());
+
+  constexpr match_chain(Source source, std::tuple<Stages...> stages) : source_{source}, stages_{std::move(stages)} {}
+
+  /// The matches in ascending order of their query, at most one for each. `where`: what the source
+  /// wants to know in addition, e.g. the windows of `windowed`.
+  /// @pre queries and trains come with keypoints if a stage needs them
+  template <describable Queries, describable Trains, class... Where>
+  requires std::same_as<descriptor_of<Queries>, descriptor_of<Trains>>
+  [[nodiscard]] std::vector<match> operator()(const Queries& queries, const Trains& trains,
+                                              const Where&... where) const {
+    const auto q = view_of(queries);
+    const auto t = view_of(trains);
+    if constexpr (needs.keypoints) {
+      assert(q.keypoints.size() == q.descriptors.size() && t.keypoints.size() == t.descriptors.size());
+    }
+    std::vector<candidate> candidates = source_.search(q, t, needs, where...);
+    std::apply([&](const auto&... stage) { (run(stage, candidates, q.keypoints, t.keypoints), ...); }, stages_);
+
+    std::vector<match> matches;
+    matches.reserve(candidates.size());
+    for (const candidate& c : candidates) matches.push_back({c.query, c.train, c.distance});
+    return matches;
+  }
+
+  /// The same chain with one more stage.
+  template <match_stage Stage>
+  [[nodiscard]] constexpr auto then(Stage stage) const {
+    return match_chain<Source, Stages..., Stage>{source_, std::tuple_cat(stages_, std::tuple<Stage>{std::move(stage)})};
+  }
+
+ private:
+  template <class Stage>
+  static void run(const Stage& stage, std::vector<candidate>& candidates, std::span<const keypoint> queries,
+                  std::span<const keypoint> trains) {
+    if constexpr (match_predicate<Stage>) {
+      std::erase_if(candidates, [&](const candidate& c) { return !stage(c); });
+    } else {
+      stage(candidates, queries, trains);
+    }
+  }
+
+  Source source_;
+  std::tuple<Stages...> stages_;
+};
+
+namespace detail {
+
+template <class T>
+inline constexpr bool is_chain = false;
+template <class... Parts>
+inline constexpr bool is_chain<match_chain<Parts...>> = true;
+
+template <class T>
+concept chain_part = is_chain<T> || match_source<T> || match_stage<T>;
+
+/// What a wrong composition gives, so that the compiler complains about nothing else.
+struct no_matcher {
+  std::vector<match> operator()(const auto&...) const { return {}; }
+};
+
+}  // namespace detail
+
+/// Puts a stage behind a source or a chain.
+template <class Left, class Right>
+requires(detail::chain_part<Left> || detail::chain_part<Right>) [[nodiscard]] constexpr auto operator|(Left left,
+                                                                                                       Right right) {
+  constexpr bool begins_well = detail::is_chain<Left> || match_source<Left>;
+  constexpr bool one_source = !detail::is_chain<Right> && !match_source<Right>;
+  static_assert(begins_well,
+                "orbis: a matcher begins with a source, such as brute_force(hamming{}), and the stages follow");
+  static_assert(!begins_well || one_source, "orbis: a matcher has one source, and it stands first");
+  static_assert(!begins_well || !one_source || match_stage<Right>,
+                "orbis: what follows | must be a matching stage, such as ratio_test{0.7f} or bool(const candidate&)");
+  if constexpr (!begins_well || !one_source || !match_stage<Right>) {
+    return detail::no_matcher{};
+  } else if constexpr (detail::is_chain<Left>) {
+    return left.then(std::move(right));
+  } else {
+    return match_chain<Left, Right>{std::move(left), std::tuple<Right>{std::move(right)}};
+  }
+}
+
+}  // namespace orbis::features
