@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Point clouds: neighbours, filters, automatic selection, voxel grids.
+#pragma once
+
+#include <orbis/cloud/curve_order.hpp>
+#include <orbis/cloud/extract.hpp>
+#include <orbis/cloud/log_density.hpp>
+#include <orbis/cloud/mean_knn_distance.hpp>
+#include <orbis/cloud/nanoflann.hpp>
+#include <orbis/cloud/neighbors.hpp>
+#include <orbis/cloud/pass_through.hpp>
+#include <orbis/cloud/radius.hpp>
+#include <orbis/cloud/select.hpp>
+#include <orbis/cloud/squared_distance.hpp>
+#include <orbis/cloud/statistical.hpp>
+#include <orbis/cloud/voxel_grid.hpp>
+#include <orbis/cloud/voxel_hash.hpp>

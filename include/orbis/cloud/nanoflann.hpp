@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Nearest neighbours by nanoflann's k-d tree, over any range of points, in place.
+///
+/// Works with nanoflann 1.4 and later: results come through a sink of our own and the search
+/// parameters are written `{}`, so that neither the renaming of `SearchParams` in 1.5 nor the
+/// `sort()` that 1.6 asks of result sets is a difference.
+#pragma once
+
+#include <array>
+#include <cassert>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <ranges>
+#include <vector>
+
+#include <nanoflann.hpp>
+
+#include <orbis/cloud/neighbors.hpp>
+#include <orbis/cloud/squared_distance.hpp>
+#include <orbis/core/point.hpp>
+
+namespace orbis::cloud {
+
+/// A k-d tree over `points`, which must outlive it and stay as they are. Points that are not finite
+/// are left out. Building takes O(n log n), a query O(log n + k) on usual clouds; identical points do
+/// no harm. Memory: about 20 bytes per point, and the indices of the finite ones where not all are.
+/// @pre fewer than 2^32 points
+template <point_range Points>
+class nanoflann_search {
+ public:
+  using scalar = point_scalar_t<std::ranges::range_value_t<Points>>;
+  using query = std::array<scalar, 3>;
+
+  explicit nanoflann_search(const Points& points, std::size_t leaf_size = 12)
+      : data_{points}, tree_{3, data_, nanoflann::KDTreeSingleIndexAdaptorParams(leaf_size)} {}
+  nanoflann_search(Points&&, std::size_t = 0) = delete;  // would not outlive the constructor
+  nanoflann_search(const nanoflann_search&) = delete;
+  nanoflann_search& operator=(const nanoflann_search&) = delete;
+
+  [[nodiscard]] std::size_t size() const noexcept { return data_.kdtree_get_point_count(); }
+
+  /// The `min(k, size())` points nearest to `q`, nearest first. @pre q is finite
+  void knn(const query& q, std::size_t k, std::vector<neighbor<scalar>>& out) const {
+    out.clear();
+    if (k == 0) return;
+    nearest_sink<scalar> sink{k, out};
+    visit(q, sink);
+    sink.finish();
+  }
+  /// All points within `r` metres of `q`, nearest first. @pre q is finite, r >= 0
+  void radius(const query& q, scalar r, std::vector<neighbor<scalar>>& out) const {
+    radius_sink<scalar> sink{r, out};
+    visit(q, sink);
+    sink.finish();
+  }
+  /// Reports to `sink` every point within its bound, in no particular order (and, harmlessly, some
+  /// that are further).
+  template <neighbor_sink<scalar> Sink>
+  void visit(const query& q, Sink& sink) const {
+    if (size() == 0) return;
+    result_set<Sink> results{&sink, &data_};
+    tree_.findNeighbors(results, q.data(), {});
+  }
+
+ private:
+  /// nanoflann's view of the points.
+  struct dataset {
+    explicit dataset(const Points& p) : points{&p} {
+      assert(std::ranges::size(p) < std::numeric_limits<std::uint32_t>::max());
+      const auto n = static_cast<std::uint32_t>(std::ranges::size(p));
+      std::uint32_t first_bad = 0;
+      while (first_bad != n && is_finite(at(first_bad))) ++first_bad;
+      if (first_bad == n) return;
+      some_left_out = true;
+      finite.reserve(n);
+      for (std::uint32_t i = 0; i != n; ++i) {
+        if (i < first_bad || is_finite(at(i))) finite.push_back(i);
+      }
+    }
+    [[nodiscard]] decltype(auto) at(std::uint32_t i) const {
+      return std::ranges::begin(*points)[static_cast<std::ranges::range_difference_t<const Points>>(i)];
+    }
+    [[nodiscard]] std::uint32_t original(std::uint32_t i) const noexcept { return some_left_out ? finite[i] : i; }
+    [[nodiscard]] query position(std::uint32_t i) const { return coordinates<scalar>(at(original(i))); }
+
+    [[nodiscard]] std::size_t kdtree_get_point_count() const noexcept {
+      return some_left_out ? finite.size() : std::ranges::size(*points);
+    }
+    [[nodiscard]] scalar kdtree_get_pt(std::size_t i, std::size_t axis) const {
+      return position(static_cast<std::uint32_t>(i))[axis];
+    }
+    template <class Box>
+    [[nodiscard]] bool kdtree_get_bbox(Box&) const noexcept {
+      return false;
+    }
+
+    const Points* points;
+    std::vector<std::uint32_t> finite;
+    bool some_left_out = false;
+  };
+
+  /// The metric, summed as `squared_distance` sums.
+  struct metric {
+    using ElementType = scalar;
+    using DistanceType = scalar;
+    explicit metric(const dataset& d) : data{&d} {}
+    [[nodiscard]] scalar evalMetric(const scalar* a, std::uint32_t b, std::size_t /*dimension*/) const {
+      return squared_distance<scalar>({a[0], a[1], a[2]}, data->position(b));
+    }
+    template <class A, class B>
+    [[nodiscard]] scalar accum_dist(A a, B b, std::size_t /*axis*/) const {
+      return (a - b) * (a - b);
+    }
+    const dataset* data;
+  };
+
+  /// nanoflann's view of the sink. nanoflann adds up the distance to a cell with rounding errors of
+  /// its own; the slack in the bound makes up for them, so that no neighbour is lost.
+  template <class Sink>
+  struct result_set {
+    [[nodiscard]] scalar worstDist() const {
+      constexpr scalar slack = 64 * std::numeric_limits<scalar>::epsilon();
+      return static_cast<scalar>(sink->bound_squared()) * (1 + slack) + std::numeric_limits<scalar>::min();
+    }
+    bool addPoint(scalar distance_squared, std::uint32_t i) { return sink->add(data->original(i), distance_squared); }
+    [[nodiscard]] bool full() const noexcept { return true; }
+    [[nodiscard]] bool empty() const noexcept { return false; }
+    [[nodiscard]] std::size_t size() const noexcept { return 0; }
+    void sort() noexcept {}
+    Sink* sink;
+    const dataset* data;
+  };
+
+  dataset data_;
+  nanoflann::KDTreeSingleIndexAdaptor<metric, dataset, 3, std::uint32_t> tree_;
+};
+
+}  // namespace orbis::cloud
