@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <orbis/camera/pinhole.hpp>
+#include <orbis/camera/radial_tangential.hpp>
+#include <orbis/optimize/pnp.hpp>
+
+#include "support.hpp"
+#include "support/catch.hpp"
+
+using namespace orbis;
+
+namespace {
+
+struct scene {
+  se3 T_world_camera;
+  std::vector<vec3> points;
+  std::vector<vec2> pixels;
+  std::size_t good = 0;  ///< the first `good` matches are right
+};
+
+template <class Camera>
+scene random_scene(const Camera& camera, std::uint64_t seed, std::size_t n, double outliers, double sigma) {
+  random_bits random(seed);
+  scene s;
+  s.T_world_camera = test::random_pose(random);
+  s.good = static_cast<std::size_t>(static_cast<double>(n) * (1.0 - outliers) + 0.5);
+  while (s.points.size() < n) {
+    const vec3 p = test::random_point_in_view(random);
+    const auto pixel = camera.project(p);
+    if (!pixel) continue;
+    s.points.push_back(s.T_world_camera * p);
+    if (s.pixels.size() < s.good)
+      s.pixels.push_back(*pixel + sigma * vec2(random.normal(), random.normal()));
+    else
+      s.pixels.emplace_back(random.uniform(0, camera.width()), random.uniform(0, camera.height()));
+  }
+  return s;
+}
+
+const camera::pinhole pinhole_camera{{.width = 640, .height = 480, .fx = 525, .fy = 525, .cx = 320, .cy = 240}};
+
+}  // namespace
+
+TEST_CASE("PnP finds the pose in 100 of 100 scenes with 85 percent outliers") {
+  int found = 0;
+  for (std::uint64_t seed = 1; seed <= 100; ++seed) {
+    const scene s = random_scene(pinhole_camera, seed, 500, 0.85, 1.0);
+    const auto pose = optimize::estimate_pose(s.points, s.pixels, pinhole_camera, {.threshold = 4.0, .seed = seed});
+    found += pose && test::distance_between(pose->T_world_camera, s.T_world_camera) < 0.05 &&
+             test::angle_between(pose->T_world_camera, s.T_world_camera) < 0.01 && pose->inliers.size() > 65;
+  }
+  CHECK(found == 100);
+}
+
+TEST_CASE("PnP is exact without noise and its inliers are those of the pose it returns") {
+  const scene s = random_scene(pinhole_camera, 5, 200, 0.3, 0.0);
+  const auto pose = optimize::estimate_pose(s.points, s.pixels, pinhole_camera);
+  REQUIRE(pose.has_value());
+  CHECK(test::distance_between(pose->T_world_camera, s.T_world_camera) < 1e-3);
+  const se3 inverse = pose->T_world_camera.inverse();
+  std::vector<std::uint32_t> expected;
+  for (std::uint32_t i = 0; i < s.points.size(); ++i) {
+    const auto pixel = pinhole_camera.project(inverse * s.points[i]);
+    if (pixel && (*pixel - s.pixels[i]).norm() < 3.0) expected.push_back(i);
+  }
+  CHECK(pose->inliers == expected);
+  CHECK(pose->inliers.size() >= s.good);
+}
+
+TEST_CASE("PnP works through a distorting camera") {
+  const camera::radial_tangential camera{
+      {.width = 640, .height = 480, .fx = 517.3, .fy = 516.5, .cx = 318.6, .cy = 255.3},
+      {.k1 = 0.2624, .k2 = -0.9531, .p1 = -0.0054, .p2 = 0.0026, .k3 = 1.1633}};
+  const scene s = random_scene(camera, 9, 300, 0.5, 0.5);
+  const auto pose = optimize::estimate_pose(s.points, s.pixels, camera);
+  REQUIRE(pose.has_value());
+  CHECK(test::distance_between(pose->T_world_camera, s.T_world_camera) < 0.02);
+  CHECK(pose->inliers.size() > 140);
+}
+
+TEST_CASE("PnP is deterministic by seed") {
+  const scene s = random_scene(pinhole_camera, 21, 300, 0.7, 1.0);
+  const auto a = optimize::estimate_pose(s.points, s.pixels, pinhole_camera, {.seed = 4});
+  const auto b = optimize::estimate_pose(s.points, s.pixels, pinhole_camera, {.seed = 4});
+  REQUIRE(a.has_value());
+  REQUIRE(b.has_value());
+  CHECK(a->T_world_camera.to_matrix() == b->T_world_camera.to_matrix());
+  CHECK(a->inliers == b->inliers);
+}
+
+TEST_CASE("PnP says why it has no pose") {
+  scene s = random_scene(pinhole_camera, 2, 100, 1.0, 0.0);
+  CHECK(optimize::estimate_pose(s.points, s.pixels, pinhole_camera, {.max_iterations = 200, .min_inliers = 30})
+            .error()
+            .code == errc::degenerate);
+  CHECK(optimize::estimate_pose(std::span<const vec3>(s.points).first(2), std::span<const vec2>(s.pixels).first(2),
+                                pinhole_camera)
+            .error()
+            .code == errc::no_data);
+  CHECK(optimize::estimate_pose(std::span<const vec3>(s.points).first(5), s.pixels, pinhole_camera).error().code ==
+        errc::invalid_argument);
+  for (std::size_t i = 0; i < s.points.size(); ++i) s.points[i] = vec3(0.1 * static_cast<double>(i), 0, 3);
+  CHECK(optimize::estimate_pose(s.points, s.pixels, pinhole_camera, {.max_iterations = 200}).error().code ==
+        errc::degenerate);
+  for (auto& p : s.points) p.setConstant(std::numeric_limits<double>::quiet_NaN());
+  CHECK(optimize::estimate_pose(s.points, s.pixels, pinhole_camera, {.max_iterations = 200}).error().code ==
+        errc::degenerate);
+}
