@@ -1,0 +1,197 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "command_line.hpp"
+
+#include <cmath>
+#include <cstdio>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include <CLI/App.hpp>
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+#include <toml++/toml.h>
+
+#include <orbis/core/file.hpp>
+
+namespace app {
+namespace {
+
+exit_code complain(std::string what, exit_code code) {
+  for (char& c : what)
+    if (c == '\n' || c == '\r') c = ' ';
+  std::fprintf(stderr, "rgbd_slam: %s\n", what.c_str());
+  return code;
+}
+
+/// A number within [low, high]; unlike CLI11's own ranges it refuses "nan".
+template <class T>
+CLI::Validator within(T low, T high, std::string unit = {}) {
+  std::ostringstream text_of_range;
+  text_of_range << low << " ... " << high << unit;
+  return CLI::Validator(
+      [low, high, range = text_of_range.str()](std::string& text) -> std::string {
+        T value{};
+        if (!CLI::detail::lexical_cast(text, value)) return "\"" + text + "\" is not a number of the kind wanted";
+        if (!(value >= low && value <= high)) return text + " is outside " + range;
+        return {};
+      },
+      "");
+}
+
+CLI::Option* count(CLI::App& cmd, const std::string& name, std::size_t& value, const std::string& what,
+                   std::size_t low = 1, std::size_t high = 100'000'000) {
+  return cmd.add_option(name, value, what)->check(within<std::size_t>(low, high))->type_name("N");
+}
+
+void add_map_options(CLI::App& cmd, settings& s) {
+  cmd.add_option("--out", s.out, "where the files go; made if it is not there")->required()->type_name("DIR");
+  cmd.add_option("--resolution", s.resolution, "edge of the octree's smallest voxels, metres")
+      ->check(within(0.001, 10.0, " m"))
+      ->capture_default_str()
+      ->type_name("M");
+  cmd.add_option("--max-depth", s.max_depth, "farther measurements do not enter the map, metres")
+      ->check(within(0.1, 1000.0, " m"))
+      ->capture_default_str()
+      ->type_name("M");
+  cmd.add_option("--filter", s.filter, "outliers: auto, none or statistical")
+      ->check(CLI::IsMember({"auto", "none", "statistical"}))
+      ->capture_default_str()
+      ->type_name("MODE");
+  count(cmd, "--neighbors", s.neighbors, "statistical filter: neighbours of a point", 1, 100'000)
+      ->capture_default_str();
+  cmd.add_option("--sigma", s.sigma, "statistical filter: how many deviations above the mean a point may lie")
+      ->check(within(0.0, 1000.0))
+      ->capture_default_str()
+      ->type_name("A");
+  cmd.add_option("--threads", s.threads, "threads for filter and map; the result does not depend on it")
+      ->check(within(1U, 1024U))
+      ->type_name("N");
+  cmd.add_flag("--quiet", s.quiet, "say nothing but errors");
+}
+
+void add_recording_options(CLI::App& cmd, settings& s) {
+  cmd.add_option("--format", s.format, "auto, tum, 7scenes or icl")
+      ->check(CLI::IsMember({"auto", "tum", "7scenes", "icl"}))
+      ->capture_default_str()
+      ->type_name("F");
+  cmd.add_option("--camera", s.camera, "camera.toml, or tum_fr1, tum_fr2, tum_fr3, icl, kinect")
+      ->type_name("FILE|NAME");
+}
+
+void add_frame_options(CLI::App& cmd, settings& s) {
+  count(cmd, "--frames", s.frames, "use at most N frames");
+  count(cmd, "--stride", s.stride, "use every N-th frame")->capture_default_str();
+}
+
+/// Fills what the command line left open from a TOML file whose keys are the options' long names.
+std::optional<exit_code> read_config(CLI::App& cmd, const std::string& path) {
+  const orbis::result<std::string> text = orbis::read_file(path);
+  if (!text) return complain(text.error().to_string(), bad_input);
+  toml::table table;
+  try {
+    table = toml::parse(*text);
+  } catch (const toml::parse_error& e) {
+    return complain(path + ":" + std::to_string(e.source().begin.line) + ": " + std::string{e.description()},
+                    bad_input);
+  }
+  for (const auto& [key, value] : table) {
+    const std::string name{key.str()};
+    CLI::Option* option = cmd.get_option_no_throw("--" + name);
+    if (option == nullptr || name == "config" || name == "help")
+      return complain(path + ": \"" + name + "\" is not an option of " + cmd.get_name(), bad_usage);
+    if (value.is_table() || value.is_array()) return complain(path + ": " + name + ": one value is wanted", bad_usage);
+    if (option->count() != 0) continue;  // the command line has the last word
+    std::ostringstream as_text;
+    if (value.is_string())
+      as_text << value.as_string()->get();
+    else
+      value.visit([&](const auto& v) { as_text << v; });
+    try {
+      option->add_result(as_text.str());
+      option->run_callback();
+    } catch (const CLI::ParseError& e) {
+      return complain(path + ": " + e.what(), bad_usage);
+    }
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+std::variant<settings, exit_code> read_command_line(int argc, char** argv) {
+  settings s;
+  std::string config;
+  std::string origin;
+
+  CLI::App cli{"RGB-D SLAM and mapping: from a recording to a trajectory, a cloud and an octree map", "rgbd_slam"};
+  cli.require_subcommand(1);
+  cli.footer(
+      "Exit codes: 0 done, 1 bad usage, 2 unreadable or damaged input (or output that cannot be\n"
+      "written), 3 tracking never started. Interrupting a run keeps what it has reached (130).");
+
+  CLI::App* run = cli.add_subcommand("run", "SLAM on a recording (TUM, 7-Scenes, ICL-NUIM)");
+  run->add_option("DATASET", s.input, "the recording's folder")->required()->type_name("");
+  add_recording_options(*run, s);
+  add_frame_options(*run, s);
+  add_map_options(*run, s);
+  run->add_flag("--deterministic", s.deterministic, "the same bytes on every run (so far always the case)");
+
+  CLI::App* demo = cli.add_subcommand("demo", "SLAM on a synthetic room made on the fly, with ground truth");
+  add_frame_options(*demo, s);
+  count(*demo, "--width", s.width, "width of the images, pixels; the height is 3/4 of it", 160, 1920)
+      ->capture_default_str();
+  demo->add_option("--seed", s.seed, "of the room, the camera's path and the sensor's noise")->capture_default_str();
+  add_map_options(*demo, s);
+  demo->add_flag("--deterministic", s.deterministic, "the same bytes on every run (so far always the case)");
+
+  CLI::App* eval = cli.add_subcommand("eval", "compare a trajectory with ground truth (TUM format): ATE and RPE");
+  eval->add_option("TRAJECTORY", s.input, "the estimate")->required()->type_name("");
+  eval->add_option("GROUNDTRUTH", s.reference, "the reference")->required()->type_name("");
+  eval->add_flag("--json", s.json, "print JSON");
+
+  CLI::App* map = cli.add_subcommand("map", "cloud -> filter -> octree, without SLAM");
+  map->add_option("INPUT", s.input,
+                  "a cloud (.ply, .pcd), or the folder of a recording whose ground truth has the poses")
+      ->required()
+      ->type_name("");
+  map->add_option("--origin", origin,
+                  "x,y,z of the sensor that saw the cloud: rays from there clear free space. "
+                  "Without it the points are marked occupied and nothing is marked free")
+      ->type_name("X,Y,Z");
+  add_recording_options(*map, s);
+  add_frame_options(*map, s);
+  add_map_options(*map, s);
+
+  for (CLI::App* cmd : {run, demo, map})
+    cmd->add_option("--config", config, "options from a TOML file: resolution = 0.02")->type_name("FILE");
+  for (CLI::App* cmd : {run, demo, eval, map}) cmd->get_formatter()->column_width(28);
+
+  try {
+    cli.parse(argc, argv);
+  } catch (const CLI::CallForHelp&) {
+    CLI::App* asked = cli.get_subcommands().empty() ? &cli : cli.get_subcommands().front();
+    std::fputs(asked->help().c_str(), stdout);
+    return done;
+  } catch (const CLI::ParseError& e) {
+    return complain(std::string{e.what()} + " (--help shows the usage)", bad_usage);
+  }
+
+  CLI::App* chosen = cli.get_subcommands().front();
+  s.what = chosen == run    ? command::run
+           : chosen == demo ? command::demo
+           : chosen == eval ? command::eval
+                            : command::map;
+  if (!config.empty())
+    if (const auto failed = read_config(*chosen, config)) return *failed;
+  if (!origin.empty()) {
+    orbis::vec3 p;
+    char rest = 0;
+    if (std::sscanf(origin.c_str(), "%lf,%lf,%lf%c", &p.x(), &p.y(), &p.z(), &rest) != 3 || !p.allFinite())
+      return complain("--origin: \"" + origin + "\" is not x,y,z in metres", bad_usage);
+    s.origin = p;
+  }
+  return s;
+}
+
+}  // namespace app

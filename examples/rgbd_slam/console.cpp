@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "console.hpp"
+
+#include <csignal>
+#include <cstdio>
+
+#include <spdlog/sinks/stdout_color_sinks.h>
+#include <spdlog/spdlog.h>
+#include <unistd.h>
+
+namespace app {
+namespace {
+
+volatile std::sig_atomic_t interrupt_seen = 0;
+
+extern "C" void on_interrupt(int) {
+  interrupt_seen = 1;
+  std::signal(SIGINT, SIG_DFL);  // a second Ctrl-C ends the program at once
+}
+
+std::string one_line(std::string text) {
+  for (char& c : text)
+    if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = ' ';
+  return text;
+}
+
+}  // namespace
+
+console::console(bool quiet) : quiet_{quiet}, terminal_{::isatty(STDERR_FILENO) == 1} {
+  auto sink = std::make_shared<spdlog::sinks::stderr_color_sink_mt>();
+  sink->set_color(spdlog::level::info, sink->reset);
+  log_ = std::make_shared<spdlog::logger>("rgbd_slam", sink);
+  log_->set_pattern("%^%v%$");
+  log_->set_level(quiet ? spdlog::level::err : spdlog::level::info);
+  log_->flush_on(spdlog::level::info);
+}
+
+double console::elapsed() const { return std::chrono::duration<double>(clock::now() - stage_start_).count(); }
+double console::total() const { return std::chrono::duration<double>(clock::now() - program_start_).count(); }
+
+void console::stage(std::string_view name) {
+  stage_ = name;
+  stage_start_ = last_shown_ = clock::now();
+  if (terminal_ && !quiet_) {
+    std::fprintf(stderr, "\r\033[2K%-10s ...", stage_.c_str());
+    std::fflush(stderr);
+    bar_shown_ = true;
+  }
+}
+
+void console::advance(std::size_t done, std::size_t total, const std::string& note) {
+  if (quiet_ || total == 0) return;
+  const auto now = clock::now();
+  const double since = std::chrono::duration<double>(now - last_shown_).count();
+  if (since < (terminal_ ? 0.1 : 10.0)) return;
+  last_shown_ = now;
+  const double seconds = elapsed();
+  const double rate = seconds > 0 ? static_cast<double>(done) / seconds : 0.0;
+  std::string tail = fmt::format("{}/{}", done, total);
+  if (!note.empty()) tail += fmt::format("  {:.1f} fps  {}", rate, note);
+  if (!terminal_) {
+    log_->info("{:<10} {}", stage_, tail);
+    return;
+  }
+  constexpr std::size_t cells = 28;
+  const std::size_t full = std::min(cells, done * cells / total);
+  std::fprintf(stderr, "\r\033[2K%-10s [%s%s] %s", stage_.c_str(), std::string(full, '#').c_str(),
+               std::string(cells - full, '.').c_str(), tail.c_str());
+  std::fflush(stderr);
+  bar_shown_ = true;
+}
+
+void console::finish(const std::string& outcome) {
+  clear_bar();
+  log_->info("{:<10} {:<72} {:6.1f} s", stage_, one_line(outcome), elapsed());
+}
+
+void console::warn(const std::string& what) {
+  clear_bar();
+  log_->warn("rgbd_slam: warning: {}", one_line(what));
+}
+
+void console::error(const orbis::error& e) {
+  clear_bar();
+  log_->error("rgbd_slam: {}", one_line(e.to_string()));
+}
+
+void console::print(const std::string& line) {
+  clear_bar();
+  if (!quiet_) {
+    std::fputs((line + "\n").c_str(), stdout);
+    std::fflush(stdout);
+  }
+}
+
+void console::clear_bar() {
+  if (!bar_shown_) return;
+  std::fputs("\r\033[2K", stderr);
+  std::fflush(stderr);
+  bar_shown_ = false;
+}
+
+bool console::interrupted() { return interrupt_seen != 0; }
+void console::catch_interrupts() { std::signal(SIGINT, on_interrupt); }
+
+}  // namespace app

@@ -1,0 +1,181 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "map_picture.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+namespace app {
+namespace {
+
+using orbis::rgb8;
+using orbis::vec3;
+
+constexpr int oversampling = 2;
+constexpr rgb8 paper{250, 250, 249};
+
+/// A pinhole that looks along `forward`; x right, y down.
+struct eye {
+  vec3 position, right, down, forward;
+  double focal, cx, cy;
+
+  [[nodiscard]] vec3 see(const vec3& p) const {  // pixel and depth
+    const vec3 d = p - position;
+    const double z = forward.dot(d);
+    return {cx + focal * right.dot(d) / z, cy + focal * down.dot(d) / z, z};
+  }
+};
+
+/// Looks at the box from azimuth and elevation (radians), just far enough off to see all of it.
+eye look_at(const vec3& low, const vec3& high, double azimuth, double elevation, double field, int width, int height) {
+  eye e;
+  e.forward =
+      -vec3(std::cos(elevation) * std::cos(azimuth), std::cos(elevation) * std::sin(azimuth), std::sin(elevation));
+  e.right = vec3(-std::sin(azimuth), std::cos(azimuth), 0.0);
+  e.down = e.forward.cross(e.right);
+  e.focal = 0.5 * height / std::tan(0.5 * field);
+  e.cx = 0.5 * width;
+  e.cy = 0.5 * height;
+  const vec3 middle = 0.5 * (low + high);
+  double distance = 0.0;
+  for (int corner = 0; corner != 8; ++corner) {
+    const vec3 d = vec3((corner & 1) != 0 ? high.x() : low.x(), (corner & 2) != 0 ? high.y() : low.y(),
+                        (corner & 4) != 0 ? high.z() : low.z()) -
+                   middle;
+    const double across =
+        std::max(std::abs(e.right.dot(d)) / (0.47 * width), std::abs(e.down.dot(d)) / (0.47 * height));
+    distance = std::max(distance, across * e.focal - e.forward.dot(d));
+  }
+  e.position = middle - std::max(distance, 0.1) * e.forward;
+  return e;
+}
+
+class picture {
+ public:
+  picture(int width, int height) : color_(width, height, paper), inverse_depth_(width, height, 0.0F) {}
+
+  /// A convex quadrilateral, its corners as pixel and depth.
+  void quad(const std::array<vec3, 4>& c, rgb8 color) {
+    triangle(c[0], c[1], c[2], color);
+    triangle(c[0], c[2], c[3], color);
+  }
+
+  /// Darkens pixels that lie behind their neighbours (eye-dome lighting: C. Boucheny, "Interactive
+  /// scientific visualization of large datasets", 2009), and averages `oversampling` squared pixels.
+  [[nodiscard]] orbis::image<rgb8> finish() const {
+    orbis::image<rgb8> out(color_.width() / oversampling, color_.height() / oversampling);
+    constexpr int n = oversampling;
+    for (int y = 0; y != out.height(); ++y)
+      for (int x = 0; x != out.width(); ++x) {
+        std::array<double, 3> sum{};
+        for (int j = 0; j != n; ++j)
+          for (int i = 0; i != n; ++i) {
+            const rgb8 c = color_(n * x + i, n * y + j);
+            const double s = shade(n * x + i, n * y + j);
+            sum[0] += s * c.r;
+            sum[1] += s * c.g;
+            sum[2] += s * c.b;
+          }
+        const auto byte = [](double v) { return static_cast<std::uint8_t>(std::lround(v / (n * n))); };
+        out(x, y) = {byte(sum[0]), byte(sum[1]), byte(sum[2])};
+      }
+    return out;
+  }
+
+ private:
+  void triangle(const vec3& a, const vec3& b, const vec3& c, rgb8 color) {
+    const double area = (b.x() - a.x()) * (c.y() - a.y()) - (b.y() - a.y()) * (c.x() - a.x());
+    if (!(std::abs(area) > 1e-9)) return;
+    const auto pixel = [](double v, int limit) {
+      return static_cast<int>(std::clamp(v, -1.0, static_cast<double>(limit)));
+    };
+    const int x0 = std::max(0, pixel(std::floor(std::min({a.x(), b.x(), c.x()})), color_.width()));
+    const int y0 = std::max(0, pixel(std::floor(std::min({a.y(), b.y(), c.y()})), color_.height()));
+    const int x1 = std::min(color_.width() - 1, pixel(std::ceil(std::max({a.x(), b.x(), c.x()})), color_.width()));
+    const int y1 = std::min(color_.height() - 1, pixel(std::ceil(std::max({a.y(), b.y(), c.y()})), color_.height()));
+    for (int y = y0; y <= y1; ++y)
+      for (int x = x0; x <= x1; ++x) {
+        const double u = ((b.x() - x) * (c.y() - y) - (b.y() - y) * (c.x() - x)) / area;
+        const double v = ((c.x() - x) * (a.y() - y) - (c.y() - y) * (a.x() - x)) / area;
+        const double w = 1.0 - u - v;
+        if (u < 0 || v < 0 || w < 0) continue;
+        const auto nearness = static_cast<float>(u / a.z() + v / b.z() + w / c.z());
+        if (nearness <= inverse_depth_(x, y)) continue;
+        inverse_depth_(x, y) = nearness;
+        color_(x, y) = color;
+      }
+  }
+
+  [[nodiscard]] double shade(int x, int y) const {
+    const float here = inverse_depth_(x, y);
+    if (here <= 0.0F) return 1.0;
+    constexpr int reach = 2 * oversampling;
+    double behind = 0.0;
+    for (const auto [dx, dy] : {std::pair{reach, 0}, {-reach, 0}, {0, reach}, {0, -reach}}) {
+      if (!inverse_depth_.view().contains(x + dx, y + dy)) continue;
+      const float there = inverse_depth_(x + dx, y + dy);
+      if (there > here) behind += std::min(0.25, std::log2(static_cast<double>(there / here)));
+    }
+    return std::exp(-6.0 * behind / 4.0);
+  }
+
+  orbis::image<rgb8> color_;
+  orbis::image<float> inverse_depth_;
+};
+
+rgb8 lit(rgb8 c, double light) {
+  const auto byte = [&](std::uint8_t v) { return static_cast<std::uint8_t>(std::min(255L, std::lround(v * light))); };
+  return {byte(c.r), byte(c.g), byte(c.b)};
+}
+
+orbis::image<rgb8> draw(const std::vector<voxel>& voxels, const view_frame& frame, coloring how, const eye& e,
+                        int width, int height) {
+  picture canvas{width * oversampling, height * oversampling};
+  // The cubes' axes are the world's; in view they are the columns of the rotation.
+  const orbis::mat3 axes = frame.T_view_world.rotation_matrix();
+  for (const voxel& v : voxels) {
+    const vec3 center = frame.T_view_world * v.center.cast<double>();
+    if (center.z() > frame.cut) continue;
+    if (center.z() < frame.low.z() - 0.5) continue;  // strays below the floor
+    const rgb8 color =
+        how == coloring::camera ? v.color : height_color((center.z() - frame.low.z()) / (frame.cut - frame.low.z()));
+    for (int axis = 0; axis != 3; ++axis) {
+      const vec3 half = 0.5 * static_cast<double>(v.size) * axes.col(axis);
+      const double side = half.dot(e.position - center) > 0 ? 1.0 : -1.0;  // of two opposite faces one can be seen
+      const vec3 face = center + side * half;
+      if ((e.position - face).dot(side * half) <= 0) continue;  // the eye is between the two
+      const vec3 u = 0.5 * static_cast<double>(v.size) * axes.col((axis + 1) % 3);
+      const vec3 w = 0.5 * static_cast<double>(v.size) * axes.col((axis + 2) % 3);
+      const std::array<vec3, 4> corners{e.see(face + u + w), e.see(face + u - w), e.see(face - u - w),
+                                        e.see(face - u + w)};
+      if (std::any_of(corners.begin(), corners.end(), [](const vec3& c) { return c.z() < 0.05; })) continue;
+      const vec3 normal = side * half.normalized();
+      canvas.quad(corners, lit(color, 0.72 + 0.3 * std::max(0.0, normal.dot(vec3(-0.35, 0.25, 0.9)))));
+    }
+  }
+  return canvas.finish();
+}
+
+vec3 visible_top(const view_frame& frame) { return {frame.high.x(), frame.high.y(), frame.cut}; }
+
+}  // namespace
+
+orbis::image<rgb8> draw_aslant(const std::vector<voxel>& voxels, const view_frame& frame, coloring how, int width,
+                               int height) {
+  constexpr double degree = std::numbers::pi / 180.0;
+  const eye e = look_at(frame.low, visible_top(frame), -62 * degree, 48 * degree, 38 * degree, width * oversampling,
+                        height * oversampling);
+  return draw(voxels, frame, how, e, width, height);
+}
+
+orbis::image<rgb8> draw_from_above(const std::vector<voxel>& voxels, const view_frame& frame, coloring how, int width,
+                                   int height) {
+  constexpr double degree = std::numbers::pi / 180.0;
+  const eye e = look_at(frame.low, visible_top(frame), -90 * degree, 89.9 * degree, 6 * degree, width * oversampling,
+                        height * oversampling);
+  return draw(voxels, frame, how, e, width, height);
+}
+
+}  // namespace app

@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Everything a run finds out. What is not known is empty, and comes out as null.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <orbis/core/point_cloud.hpp>
+#include <orbis/core/trajectory.hpp>
+
+namespace app {
+
+/// Median, 95th percentile and mean of a list; NaN where it is empty.
+struct spread {
+  double median, p95, mean;
+};
+[[nodiscard]] spread spread_of(std::vector<double> values);
+
+/// An occupied cube of the map.
+struct voxel {
+  orbis::vec3f center;
+  float size;           ///< edge, metres
+  orbis::rgb8 color{};  ///< mean colour of the cloud's points in it
+};
+
+struct tree_numbers {
+  std::size_t leaves = 0, occupied = 0, free = 0;
+  std::uintmax_t bt_bytes = 0;
+};
+
+struct map_results {
+  orbis::point_cloud cloud;         ///< before the filter
+  std::vector<std::uint32_t> kept;  ///< which of its points the filter kept
+  std::string filter_mode, filter_reason;
+  std::uintmax_t cloud_bytes = 0, filtered_bytes = 0;  ///< of the files
+  double resolution = 0.0;
+  tree_numbers unfiltered, filtered;
+  std::uintmax_t ot_bytes = 0;
+  std::vector<double> insert_ms;  ///< of each frame that went into the map
+  std::vector<voxel> voxels_unfiltered, voxels;
+  std::optional<double> error_m;  ///< RMS distance of the filtered cloud to the true surface
+};
+
+/// A pose, the true one that belongs to it (moved into the estimate's world), and how far off it is.
+struct compared_pose {
+  double timestamp;
+  orbis::vec3 estimate, truth;
+  double error_m;
+};
+
+struct accuracy {
+  double ate_rmse_m, ate_mean_m, ate_median_m, ate_max_m;
+  std::optional<double> rpe_trans_rmse_m, rpe_rot_rmse_deg;
+  std::vector<compared_pose> poses;
+  orbis::se3 T_truth_estimate;  ///< aligns the estimate's world with the truth's
+};
+
+struct slam_results {
+  std::size_t frames = 0, tracked = 0, lost = 0, relocalized = 0, landmarks = 0, loops_closed = 0;
+  std::vector<double> tracking_ms;
+  double seconds = 0.0;  ///< reading and tracking
+  orbis::trajectory trajectory, keyframes;
+};
+
+struct results {
+  std::string command, title;
+  std::filesystem::path out;
+  std::vector<std::pair<std::string, std::string>> setup;  ///< what was used, in words
+  std::optional<slam_results> slam;
+  std::optional<map_results> map;
+  std::optional<accuracy> against_truth;
+  std::string truth_note;  ///< why there is no comparison, or what it compares
+  std::vector<std::string> warnings;
+  double wall_s = 0.0;
+};
+
+}  // namespace app

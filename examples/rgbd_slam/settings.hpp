@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// What the user asked for.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include <orbis/core/types.hpp>
+
+namespace app {
+
+/// The documented exit codes, and the shell's own for a run that was interrupted.
+enum exit_code : int { done = 0, bad_usage = 1, bad_input = 2, never_tracked = 3, interrupted = 130 };
+
+enum class command { run, demo, eval, map };
+
+struct settings {
+  command what = command::run;
+
+  std::filesystem::path input;      ///< recording, cloud or estimated trajectory
+  std::filesystem::path reference;  ///< ground truth (eval)
+  std::filesystem::path out;        ///< where the files go
+
+  std::string format = "auto";
+  std::string camera;                 ///< file or preset; empty: as the recording says
+  std::size_t frames = 0;             ///< at most so many; 0: all
+  std::size_t stride = 1;             ///< every so many frames
+  std::size_t width = 640;            ///< of the synthetic camera, pixels
+  std::uint64_t seed = 1;             ///< of the synthetic recording
+  std::optional<orbis::vec3> origin;  ///< of the rays to a cloud's points (map)
+
+  double resolution = 0.05;  ///< octree, metres
+  double max_depth = 4.0;    ///< depth beyond this is left out of the map, metres
+  std::string filter = "auto";
+  std::size_t neighbors = 50;
+  double sigma = 1.0;
+
+  unsigned threads = 0;  ///< 0: all
+  bool deterministic = false;
+  bool quiet = false;
+  bool json = false;
+};
+
+}  // namespace app

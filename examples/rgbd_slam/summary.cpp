@@ -1,0 +1,148 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "summary.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+#include <numeric>
+
+#include <nlohmann/json.hpp>
+#include <sys/resource.h>
+
+#include <orbis/core/file.hpp>
+
+namespace app {
+namespace {
+
+using json = nlohmann::ordered_json;
+
+double peak_rss_mb() {
+  rusage usage{};
+  if (getrusage(RUSAGE_SELF, &usage) != 0) return std::numeric_limits<double>::quiet_NaN();
+  return static_cast<double>(usage.ru_maxrss) / 1024.0;
+}
+
+template <class T>
+json or_null(const std::optional<T>& value) {
+  return value ? json(*value) : json(nullptr);
+}
+
+template <class... Args>
+std::string text(const char* format, Args... args) {
+  char buffer[256];
+  std::snprintf(buffer, sizeof buffer, format, args...);
+  return buffer;
+}
+
+}  // namespace
+
+spread spread_of(std::vector<double> values) {
+  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+  if (values.empty()) return {nan, nan, nan};
+  std::sort(values.begin(), values.end());
+  const auto quantile = [&](double q) {
+    const double at = q * static_cast<double>(values.size() - 1);
+    const auto below = static_cast<std::size_t>(at);
+    const std::size_t above = std::min(below + 1, values.size() - 1);
+    return values[below] + (at - static_cast<double>(below)) * (values[above] - values[below]);
+  };
+  const double sum = std::accumulate(values.begin(), values.end(), 0.0);
+  return {quantile(0.5), quantile(0.95), sum / static_cast<double>(values.size())};
+}
+
+std::string summary_json(const results& r) {
+  json j;  // NaN, which stands for "not known", is written as null
+  const json null = nullptr;
+  const auto& s = r.slam;
+  const auto& m = r.map;
+  const auto& a = r.against_truth;
+  j["frames"] = s ? json(s->frames) : null;
+  j["tracked"] = s ? json(s->tracked) : null;
+  j["lost"] = s ? json(s->lost) : null;
+  j["relocalized"] = s ? json(s->relocalized) : null;
+  j["keyframes"] = s ? json(s->keyframes.size()) : null;
+  j["landmarks"] = s ? json(s->landmarks) : null;
+  j["loops_closed"] = s ? json(s->loops_closed) : null;
+  const spread tracking = spread_of(s ? s->tracking_ms : std::vector<double>{});
+  j["tracking_ms"] = {{"median", tracking.median}, {"p95", tracking.p95}, {"mean", tracking.mean}};
+  j["wall_s"] = r.wall_s;
+  j["fps"] = s && s->seconds > 0 ? json(static_cast<double>(s->frames) / s->seconds) : null;
+  j["peak_rss_mb"] = peak_rss_mb();
+  j["ate_rmse_m"] = a ? json(a->ate_rmse_m) : null;
+  j["rpe_trans_rmse_m"] = a ? or_null(a->rpe_trans_rmse_m) : null;
+  j["rpe_rot_rmse_deg"] = a ? or_null(a->rpe_rot_rmse_deg) : null;
+
+  j["filter"] = {{"mode", m ? json(m->filter_mode) : null},
+                 {"reason", m ? json(m->filter_reason) : null},
+                 {"removed", m ? json(m->cloud.size() - m->kept.size()) : null}};
+  j["cloud"] = {{"points", m ? json(m->cloud.size()) : null},
+                {"points_filtered", m ? json(m->kept.size()) : null},
+                {"bytes", m ? json(m->cloud_bytes) : null},
+                {"bytes_filtered", m ? json(m->filtered_bytes) : null}};
+  const spread insertion = spread_of(m ? m->insert_ms : std::vector<double>{});
+  j["octree"] = {{"resolution_m", m ? json(m->resolution) : null},
+                 {"leaves_unfiltered", m ? json(m->unfiltered.leaves) : null},
+                 {"leaves", m ? json(m->filtered.leaves) : null},
+                 {"occupied", m ? json(m->filtered.occupied) : null},
+                 {"free", m ? json(m->filtered.free) : null},
+                 {"bt_bytes_unfiltered", m ? json(m->unfiltered.bt_bytes) : null},
+                 {"bt_bytes", m ? json(m->filtered.bt_bytes) : null},
+                 {"ot_bytes", m ? json(m->ot_bytes) : null},
+                 {"insert_ms_per_frame", {{"median", insertion.median}, {"p95", insertion.p95}}}};
+  j["map_error_m"] = m ? or_null(m->error_m) : null;
+  return j.dump(2, ' ', false, json::error_handler_t::replace) + "\n";
+}
+
+std::string accuracy_json(const accuracy& a) {
+  const json j = {{"pairs", a.poses.size()},
+                  {"ate_rmse_m", a.ate_rmse_m},
+                  {"ate_mean_m", a.ate_mean_m},
+                  {"ate_median_m", a.ate_median_m},
+                  {"ate_max_m", a.ate_max_m},
+                  {"rpe_trans_rmse_m", or_null(a.rpe_trans_rmse_m)},
+                  {"rpe_rot_rmse_deg", or_null(a.rpe_rot_rmse_deg)}};
+  return j.dump(2) + "\n";
+}
+
+orbis::result<void> write_summary(const results& r) {
+  return orbis::write_file_atomically(r.out / "summary.json", [&](std::ostream& out) { out << summary_json(r); });
+}
+
+std::string bytes_text(std::uintmax_t bytes) {
+  const auto b = static_cast<double>(bytes);
+  if (bytes < 1000) return text("%.0f B", b);
+  if (bytes < 1'000'000) return text("%.1f kB", b / 1e3);
+  return text("%.2f MB", b / 1e6);
+}
+
+std::string count_text(std::uintmax_t n) {
+  std::string digits = std::to_string(n);
+  for (std::size_t i = digits.size(); i > 3; i -= 3) digits.insert(i - 3, ",");
+  return digits;
+}
+
+std::string size_table(const map_results& m) {
+  const std::string octree = text("octree, %g cm", m.resolution * 100);
+  const auto row = [](const std::string& name, const std::string& count, const char* unit, const std::string& bytes) {
+    return text("  %-34s %12s %-8s %12s\n", name.c_str(), count.c_str(), unit, bytes.c_str());
+  };
+  std::string table = row("", "size", "", "on disk");
+  table += row("point cloud", count_text(m.cloud.size()), "points", bytes_text(m.cloud_bytes));
+  table += row("point cloud, filtered", count_text(m.kept.size()), "points", bytes_text(m.filtered_bytes));
+  table +=
+      row(octree + ", before the filter", count_text(m.unfiltered.leaves), "leaves", bytes_text(m.unfiltered.bt_bytes));
+  table += row(octree + ", after the filter", count_text(m.filtered.leaves), "leaves", bytes_text(m.filtered.bt_bytes));
+  table.pop_back();
+  return table;
+}
+
+std::string accuracy_lines(const accuracy& a) {
+  std::string lines = text("  ATE  RMSE %.4f m, mean %.4f, median %.4f, max %.4f, over %zu poses", a.ate_rmse_m,
+                           a.ate_mean_m, a.ate_median_m, a.ate_max_m, a.poses.size());
+  if (a.rpe_trans_rmse_m && a.rpe_rot_rmse_deg)
+    lines += text("\n  RPE  RMSE %.4f m, %.3f deg, from pose to pose", *a.rpe_trans_rmse_m, *a.rpe_rot_rmse_deg);
+  return lines;
+}
+
+}  // namespace app

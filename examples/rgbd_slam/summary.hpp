@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// summary.json, and the tables on the terminal.
+#pragma once
+
+#include <string>
+
+#include <orbis/core/result.hpp>
+
+#include "results.hpp"
+
+namespace app {
+
+/// The summary as JSON text; missing values are null.
+[[nodiscard]] std::string summary_json(const results& r);
+/// The comparison with ground truth alone, for `eval --json`.
+[[nodiscard]] std::string accuracy_json(const accuracy& a);
+[[nodiscard]] orbis::result<void> write_summary(const results& r);
+
+/// The table of sizes: point cloud, octree before the filter, octree after it.
+[[nodiscard]] std::string size_table(const map_results& m);
+[[nodiscard]] std::string accuracy_lines(const accuracy& a);
+
+/// "12.3 MB"
+[[nodiscard]] std::string bytes_text(std::uintmax_t bytes);
+/// "1,234,567"
+[[nodiscard]] std::string count_text(std::uintmax_t n);
+
+}  // namespace app

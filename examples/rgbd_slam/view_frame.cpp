@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "view_frame.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+namespace app {
+namespace {
+
+using orbis::vec3;
+
+/// How unevenly the points spread along `axis`: large where planes across the axis hold many.
+double planarity(const std::vector<vec3>& points, const vec3& axis) {
+  constexpr double bin = 0.03;
+  constexpr int bins = 512;
+  std::array<double, bins> histogram{};
+  for (const vec3& p : points) {
+    const double at = axis.dot(p) / bin;
+    histogram[static_cast<std::size_t>(static_cast<long>(std::floor(at)) & (bins - 1))] += 1.0;
+  }
+  double sum = 0.0;
+  for (const double n : histogram) sum += n * n;
+  return sum;
+}
+
+/// The direction within `reach` radians of `axis` that the points are most planar across; directions
+/// far from `axis` are trusted less.
+vec3 refine(const std::vector<vec3>& points, const vec3& axis, double reach, double step) {
+  const vec3 u = axis.unitOrthogonal();
+  const vec3 v = axis.cross(u);
+  vec3 best = axis;
+  double best_score = -1.0;
+  const int n = static_cast<int>(std::ceil(reach / step));
+  for (int i = -n; i <= n; ++i)
+    for (int j = -n; j <= n; ++j) {
+      const double a = i * step, b = j * step;
+      if (a * a + b * b > reach * reach) continue;
+      const vec3 direction = (axis + std::tan(a) * u + std::tan(b) * v).normalized();
+      const double score = planarity(points, direction) * std::pow(axis.dot(direction), 2.0);
+      if (score > best_score) {
+        best_score = score;
+        best = direction;
+      }
+    }
+  return best;
+}
+
+double quantile(std::vector<double> values, double q) {
+  const auto at = values.begin() + static_cast<std::ptrdiff_t>(q * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), at, values.end());
+  return *at;
+}
+
+}  // namespace
+
+view_frame find_view_frame(const std::vector<orbis::vec3f>& points, const orbis::trajectory& cameras) {
+  std::vector<vec3> sample;
+  const std::size_t stride = std::max<std::size_t>(1, points.size() / 6000);
+  for (std::size_t i = 0; i < points.size(); i += stride)
+    if (points[i].allFinite()) sample.push_back(points[i].cast<double>());
+
+  vec3 up = vec3::Zero();
+  for (const orbis::stamped_pose& c : cameras) up -= c.T_world_camera.rotation() * vec3::UnitY();
+  up = up.norm() > 1e-3 ? up.normalized() : vec3::UnitZ();
+  view_frame frame;
+  if (sample.empty()) return frame;
+  constexpr double degree = std::numbers::pi / 180.0;
+  up = refine(sample, up, 35 * degree, 3 * degree);
+  up = refine(sample, up, 3 * degree, 0.5 * degree);
+
+  const vec3 u = up.unitOrthogonal();
+  const vec3 v = up.cross(u);
+  vec3 x = u;
+  double best = -1.0;
+  for (double yaw = 0.0; yaw < std::numbers::pi / 2; yaw += degree) {
+    const vec3 along = std::cos(yaw) * u + std::sin(yaw) * v;
+    const double score = planarity(sample, along) + planarity(sample, up.cross(along));
+    if (score > best) {
+      best = score;
+      x = along;
+    }
+  }
+  orbis::mat3 rows;
+  rows.row(0) = x;
+  rows.row(1) = up.cross(x);
+  rows.row(2) = up;
+  const orbis::so3 R_view_world{rows};
+
+  for (int axis = 0; axis != 3; ++axis) {
+    std::vector<double> along;
+    along.reserve(sample.size());
+    for (const vec3& p : sample) along.push_back((R_view_world * p)[axis]);
+    frame.low[axis] = quantile(along, 0.005) - 0.05;
+    frame.high[axis] = quantile(std::move(along), 0.995) + 0.05;
+  }
+  const double floor = frame.low.z();
+  frame.low.z() = 0.0;
+  frame.high.z() -= floor;
+  frame.T_view_world = {R_view_world, vec3(0, 0, -floor)};
+
+  frame.cut = frame.high.z();
+  if (!cameras.empty()) {
+    double highest = 0.0;
+    for (const orbis::stamped_pose& c : cameras)
+      highest = std::max(highest, (frame.T_view_world * c.T_world_camera.translation()).z());
+    frame.cut = std::clamp(highest + 0.3, 0.5 * frame.high.z(), frame.high.z());
+  }
+  return frame;
+}
+
+orbis::rgb8 height_color(double t) {
+  constexpr std::array<std::array<double, 3>, 5> anchors{
+      {{44, 74, 138}, {42, 143, 168}, {95, 185, 138}, {226, 200, 96}, {217, 108, 62}}};
+  const double at = std::clamp(t, 0.0, 1.0) * (anchors.size() - 1);
+  const auto i = std::min<std::size_t>(static_cast<std::size_t>(at), anchors.size() - 2);
+  const double f = at - static_cast<double>(i);
+  const auto mix = [&](std::size_t c) {
+    return static_cast<std::uint8_t>(std::lround(anchors[i][c] + f * (anchors[i + 1][c] - anchors[i][c])));
+  };
+  return {mix(0), mix(1), mix(2)};
+}
+
+}  // namespace app

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// A frame to look at a map in: z up, walls along the axes, the floor at zero.
+#pragma once
+
+#include <orbis/core/se3.hpp>
+#include <orbis/core/types.hpp>
+
+#include "results.hpp"
+
+namespace app {
+
+struct view_frame {
+  orbis::se3 T_view_world;
+  orbis::vec3 low = orbis::vec3::Zero(), high = orbis::vec3::Ones();  ///< bounds of the map in view, outliers aside
+  double cut = 1.0;  ///< what lies higher hides the rest from above: a ceiling
+};
+
+/// Guesses which way is up from how the cameras were held, then turns the frame so that floors and
+/// walls fall into few, full bins. For pictures only; nothing is measured in this frame.
+[[nodiscard]] view_frame find_view_frame(const std::vector<orbis::vec3f>& points, const orbis::trajectory& cameras);
+
+/// A colour for a height within the bounds, `t` in [0, 1].
+[[nodiscard]] orbis::rgb8 height_color(double t);
+
+}  // namespace app
