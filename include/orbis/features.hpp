@@ -4,7 +4,9 @@
 #pragma once
 
 #include <orbis/features/brute_force.hpp>
+#include <orbis/features/depth.hpp>
 #include <orbis/features/descriptor.hpp>
+#include <orbis/features/grid.hpp>
 #include <orbis/features/hamming.hpp>
 #include <orbis/features/hamming_nearest.hpp>
 #include <orbis/features/match.hpp>
@@ -12,3 +14,4 @@
 #include <orbis/features/orb.hpp>
 #include <orbis/features/spread.hpp>
 #include <orbis/features/stages.hpp>
+#include <orbis/features/windowed.hpp>

@@ -185,23 +185,27 @@ class orb_extractor {
     const float size =
         static_cast<float>(2 * patch_radius + 1) * static_cast<float>(full.width) / static_cast<float>(level.cols);
     std::vector<cv::KeyPoint> points;
+    std::vector<float> angles;
     points.reserve(corners.size());
+    angles.reserve(corners.size());
     for (const corner& c : corners) {
       constexpr float degrees = 180.0F / std::numbers::pi_v<float>;
+      angles.push_back(orientation_of(level, c.x, c.y));
       points.emplace_back(static_cast<float>(c.x), static_cast<float>(c.y), static_cast<float>(2 * patch_radius + 1),
-                          orientation_of(level, c.x, c.y) * degrees, c.response, 0, static_cast<int>(points.size()));
+                          angles.back() * degrees, c.response, 0, static_cast<int>(points.size()));
     }
     cv::Mat described;
     cv::ORB::create(1, options_.scale_factor, 1, border)->compute(level, points, described);
 
     // OpenCV may drop and reorder; class_id says which corner a row belongs to.
     for (std::size_t i = 0; i != points.size(); ++i) {
-      const corner& c = corners[static_cast<std::size_t>(points[i].class_id)];
+      const auto from = static_cast<std::size_t>(points[i].class_id);
+      const corner& c = corners[from];
       keypoint k;
       k.x = static_cast<float>(full_coordinate(c.x, level.cols, full.width));
       k.y = static_cast<float>(full_coordinate(c.y, level.rows, full.height));
       k.size = size;
-      k.angle = orientation_of(level, c.x, c.y);
+      k.angle = angles[from];
       k.response = c.response;
       k.octave = octave;
       found.keypoints.push_back(k);

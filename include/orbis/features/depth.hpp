@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Depth at a keypoint, with its standard deviation.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cassert>
+#include <cmath>
+#include <cstddef>
+#include <optional>
+
+#include <orbis/camera/depth.hpp>
+
+namespace orbis::features {
+
+/// Standard deviation of a measured depth: `constant + quadratic * z^2`, metres. The defaults are
+/// those of a Kinect, close to Nguyen, Izadi, Lovell, "Modeling Kinect sensor noise for improved 3D
+/// reconstruction and tracking", 3DIMPVT 2012.
+struct depth_noise {
+  double constant = 0.0012;
+  double quadratic = 0.0019;
+  [[nodiscard]] constexpr double operator()(double z) const noexcept { return constant + quadratic * z * z; }
+};
+
+/// How a depth is taken from the neighbourhood of a keypoint.
+struct keypoint_depth_options {
+  int radius = 1;               ///< of the window: 1 is 3x3, 2 is 5x5; at most 3
+  int min_valid = 3;            ///< pixels with a depth in the window
+  float edge_sigmas = 4.0F;     ///< a gap of more than this many sigma ...
+  float edge_relative = 0.02F;  ///< ... and more than this share of the depth is an edge
+  float min_share = 0.7F;       ///< of the valid pixels on one side of every edge; > 0.5
+  depth_noise noise{};
+};
+
+/// A depth and how far to trust it, metres.
+struct keypoint_depth {
+  double z = 0.0;
+  double sigma = 0.0;
+};
+
+/// Depth along the optical axis at pixel `(x, y)`: the median of the valid depths around it.
+///
+/// Empty where too little is valid, where `(x, y)` lies outside the image or is not finite, and where the
+/// window straddles a depth edge: there the pixel belongs to either side, and to which one would be
+/// a guess of decimetres. A few strays (flying pixels) beyond an edge are ignored.
+/// @pre 0 <= radius <= 3
+template <camera::depth_source Depth>
+[[nodiscard]] std::optional<keypoint_depth> depth_at(const Depth& depth, float x, float y,
+                                                     const keypoint_depth_options& options = {}) {
+  constexpr int max_radius = 3;
+  assert(options.radius >= 0 && options.radius <= max_radius);
+  if (!(x > -0.5F && y > -0.5F && x < static_cast<float>(depth.width()) - 0.5F &&
+        y < static_cast<float>(depth.height()) - 0.5F))
+    return std::nullopt;
+  const int cx = static_cast<int>(std::lround(x));
+  const int cy = static_cast<int>(std::lround(y));
+
+  std::array<float, (2 * max_radius + 1) * (2 * max_radius + 1)> z;
+  std::size_t count = 0;
+  for (int v = std::max(0, cy - options.radius); v <= std::min(depth.height() - 1, cy + options.radius); ++v)
+    for (int u = std::max(0, cx - options.radius); u <= std::min(depth.width() - 1, cx + options.radius); ++u)
+      if (const float metres = depth(u, v); metres > 0.0F) z[count++] = metres;
+  if (count == 0 || static_cast<int>(count) < options.min_valid) return std::nullopt;
+  std::sort(z.begin(), z.begin() + static_cast<std::ptrdiff_t>(count));
+
+  // The largest run without a gap: a slope has none, however steep.
+  const auto is_edge = [&](float near, float far) {
+    const double gap = static_cast<double>(far) - static_cast<double>(near);
+    return gap > static_cast<double>(options.edge_sigmas) * options.noise(static_cast<double>(near)) &&
+           gap > static_cast<double>(options.edge_relative) * static_cast<double>(near);
+  };
+  std::size_t begin = 0;
+  std::size_t end = 0;
+  for (std::size_t first = 0, i = 1; i <= count; ++i) {
+    if (i != count && !is_edge(z[i - 1], z[i])) continue;
+    if (i - first > end - begin) {
+      begin = first;
+      end = i;
+    }
+    first = i;
+  }
+  if (static_cast<float>(end - begin) < options.min_share * static_cast<float>(count)) return std::nullopt;
+
+  const std::size_t middle = begin + (end - begin) / 2;
+  const auto upper = static_cast<double>(z[middle]);
+  const double median = (end - begin) % 2 == 1 ? upper : 0.5 * (upper + static_cast<double>(z[middle - 1]));
+  return keypoint_depth{median, options.noise(median)};
+}
+
+/// The column at which a second camera to the right would see a point: `u - bf / z`, pixels, where
+/// `bf` is focal length (pixels) times baseline (metres). @pre z > 0
+[[nodiscard]] constexpr double virtual_right(double u, double z, double bf) noexcept {
+  assert(z > 0.0);
+  return u - bf / z;
+}
+
+}  // namespace orbis::features

@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// OpenCV's images and keypoints as ours, and ours as OpenCV's; pixels stay where they are.
+#pragma once
+
+#include <concepts>
+#include <cstddef>
+#include <cstdint>
+#include <numbers>
+#include <span>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+#include <opencv2/core.hpp>
+
+#include <orbis/core/image.hpp>
+#include <orbis/core/result.hpp>
+#include <orbis/features/descriptor.hpp>
+
+namespace orbis::interop {
+
+/// Three bytes in OpenCV's customary order.
+struct bgr8 {
+  std::uint8_t b = 0, g = 0, r = 0;
+  friend bool operator==(const bgr8&, const bgr8&) = default;
+};
+static_assert(sizeof(bgr8) == 3);
+
+/// Pixels that a `cv::Mat` and an `image_view` can share.
+template <class T>
+concept shared_pixel = std::same_as<T, std::uint8_t> || std::same_as<T, rgb8> || std::same_as<T, bgr8> ||
+    std::same_as<T, std::uint16_t> || std::same_as<T, float>;
+
+/// OpenCV's type number for a pixel: CV_8UC1, CV_8UC3, CV_16UC1 or CV_32FC1.
+template <shared_pixel T>
+inline constexpr int cv_type = std::same_as<T, std::uint8_t>    ? CV_8UC1
+                               : std::same_as<T, std::uint16_t> ? CV_16UC1
+                               : std::same_as<T, float>         ? CV_32FC1
+                                                                : CV_8UC3;
+
+/// The pixels of `mat` in place; `mat` (or another header of its data) must outlive the view. Three
+/// bytes are called `bgr8` or `rgb8` as the caller knows them to be: OpenCV does not say.
+/// Errors: unsupported, if the type is another, if there are more than two dimensions, or if rows
+/// are not a whole number of pixels apart. An empty matrix is an empty view.
+template <shared_pixel T>
+[[nodiscard]] result<image_view<const T>> view_as(const cv::Mat& mat) {
+  if (mat.empty()) return image_view<const T>{};
+  if (mat.dims != 2)
+    return fail(errc::unsupported, "cv::Mat", "has " + std::to_string(mat.dims) + " dimensions, not 2");
+  if (mat.type() != cv_type<T>)
+    return fail(errc::unsupported, "cv::Mat",
+                "has type " + cv::typeToString(mat.type()) + ", not " + cv::typeToString(cv_type<T>));
+  const std::size_t step = mat.step[0];
+  if (mat.rows > 1 && step % sizeof(T) != 0)
+    return fail(errc::unsupported, "cv::Mat", "has rows that are not a whole number of pixels apart");
+  const std::ptrdiff_t stride = mat.rows > 1 ? static_cast<std::ptrdiff_t>(step / sizeof(T)) : mat.cols;
+  return image_view<const T>{mat.ptr<T>(), mat.cols, mat.rows, stride};
+}
+
+/// A `cv::Mat` header over the pixels of a view; the pixels must outlive it.
+template <shared_pixel T>
+[[nodiscard]] cv::Mat mat_over(image_view<T> view) {
+  if (view.empty()) return {};
+  return {view.height(), view.width(), cv_type<T>, view.data(), static_cast<std::size_t>(view.stride()) * sizeof(T)};
+}
+
+/// The same for pixels that must not change. `cv::Mat` has no const: only read from it.
+template <shared_pixel T>
+[[nodiscard]] const cv::Mat mat_over(image_view<const T> view) {  // NOLINT(readability-const-return-type)
+  if (view.empty()) return {};
+  return {view.height(), view.width(), cv_type<T>, const_cast<T*>(view.data()),
+          static_cast<std::size_t>(view.stride()) * sizeof(T)};
+}
+
+/// An `rgb8` image of `bgr8` pixels, a copy.
+[[nodiscard]] inline image<rgb8> to_rgb(image_view<const bgr8> view) {
+  image<rgb8> rgb(view.width(), view.height());
+  for (int y = 0; y != view.height(); ++y)
+    for (int x = 0; x != view.width(); ++x) rgb(x, y) = {view(x, y).r, view(x, y).g, view(x, y).b};
+  return rgb;
+}
+
+/// A CV_8UC3 matrix in OpenCV's customary order, a copy.
+[[nodiscard]] inline cv::Mat to_bgr(image_view<const rgb8> view) {
+  cv::Mat mat(view.height(), view.width(), CV_8UC3);
+  for (int y = 0; y != view.height(); ++y)
+    for (int x = 0; x != view.width(); ++x)
+      mat.at<cv::Vec3b>(y, x) = cv::Vec3b(view(x, y).b, view(x, y).g, view(x, y).r);
+  return mat;
+}
+
+/// Angles: OpenCV's are degrees (-1: none), ours radians (none is 0).
+[[nodiscard]] inline features::keypoint from_cv(const cv::KeyPoint& k) {
+  constexpr float radians = std::numbers::pi_v<float> / 180.0F;
+  return {k.pt.x, k.pt.y, k.size, k.angle < 0.0F ? 0.0F : k.angle * radians, k.response, k.octave};
+}
+[[nodiscard]] inline cv::KeyPoint to_cv(const features::keypoint& k) {
+  constexpr float degrees = 180.0F / std::numbers::pi_v<float>;
+  return {k.x, k.y, k.size, k.angle * degrees, k.response, k.octave};
+}
+[[nodiscard]] inline std::vector<features::keypoint> from_cv(std::span<const cv::KeyPoint> keypoints) {
+  std::vector<features::keypoint> converted;
+  converted.reserve(keypoints.size());
+  for (const cv::KeyPoint& k : keypoints) converted.push_back(from_cv(k));
+  return converted;
+}
+[[nodiscard]] inline std::vector<cv::KeyPoint> to_cv(std::span<const features::keypoint> keypoints) {
+  std::vector<cv::KeyPoint> converted;
+  converted.reserve(keypoints.size());
+  for (const features::keypoint& k : keypoints) converted.push_back(to_cv(k));
+  return converted;
+}
+
+/// Descriptors as OpenCV's CV_8UC1 rows, in place; read only. @pre little-endian byte order
+template <std::size_t Bits>
+[[nodiscard]] const cv::Mat mat_over(  // NOLINT(readability-const-return-type)
+    std::span<const features::binary_descriptor<Bits>> descriptors) {
+  if (descriptors.empty()) return {};
+  return {static_cast<int>(descriptors.size()), static_cast<int>(Bits / 8), CV_8UC1,
+          const_cast<features::binary_descriptor<Bits>*>(descriptors.data())};
+}
+
+}  // namespace orbis::interop
