@@ -1,0 +1,194 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// `camera.toml`: the settings of an RGB-D camera as a file.
+///
+/// @code
+///   model = "radtan"      # pinhole | radtan | kannala_brandt
+///   width = 640
+///   height = 480
+///   fx = 517.3
+///   fy = 516.5
+///   cx = 318.6
+///   cy = 255.3
+///   distortion = [0.2624, -0.9531, -0.0054, 0.0026, 1.1633]  # radtan: k1 k2 p1 p2 [k3 [k4 k5 k6]]
+///   depth_scale = 5000.0  # stored value / depth_scale = metres; default 1000
+///   fps = 30.0            # default 30
+///   baseline = 0.075      # metres, optional
+/// @endcode
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <cstddef>
+#include <filesystem>
+#include <optional>
+#include <ostream>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include <toml++/toml.h>
+
+#include <orbis/camera/settings.hpp>
+#include <orbis/core/file.hpp>
+#include <orbis/core/result.hpp>
+
+namespace orbis::io {
+
+namespace detail {
+
+/// Reads the fields of a camera table; the first failure is kept.
+class camera_fields {
+ public:
+  camera_fields(const toml::table& table, std::string where) : table_{table}, where_{std::move(where)} {}
+
+  /// The number called `name`; it has to satisfy `ok`, described by `wanted`.
+  template <class Ok>
+  double number(const char* name, std::optional<double> fallback, const char* wanted, Ok&& ok) {
+    const auto node = table_[name];
+    if (!node) {
+      if (!fallback) reject(name, "is missing");
+      return fallback.value_or(1.0);
+    }
+    const std::optional<double> value = node.value<double>();
+    if (!value || !std::isfinite(*value) || !ok(*value)) {
+      reject(name, std::string{"must be "} + wanted);
+      return 1.0;
+    }
+    return *value;
+  }
+  double positive(const char* name, std::optional<double> fallback = std::nullopt) {
+    return number(name, fallback, "a number above zero", [](double v) { return v > 0.0 && v < 1e9; });
+  }
+  int size(const char* name) {
+    return static_cast<int>(number(name, std::nullopt, "a whole number from 1 to 100000",
+                                   [](double v) { return v >= 1.0 && v <= 1e5 && v == std::floor(v); }));
+  }
+  std::string text(const char* name) {
+    const auto node = table_[name];
+    const std::optional<std::string> value = node.value<std::string>();
+    if (!node) reject(name, "is missing");
+    else if (!value) reject(name, "must be a string");
+    return value.value_or("");
+  }
+  std::vector<double> numbers(const char* name) {
+    std::vector<double> values;
+    const auto node = table_[name];
+    if (!node) return values;
+    const toml::array* list = node.as_array();
+    if (list == nullptr) {
+      reject(name, "must be a list of numbers");
+      return values;
+    }
+    for (const toml::node& element : *list) {
+      const std::optional<double> value = element.value<double>();
+      if (!value || !std::isfinite(*value)) reject(name, "must be a list of finite numbers");
+      values.push_back(value.value_or(0.0));
+    }
+    return values;
+  }
+  void reject(const char* name, const std::string& why) {
+    if (!failure_) failure_ = error{errc::malformed, where_, std::string{name} + " " + why};
+  }
+  [[nodiscard]] const std::optional<error>& failure() const { return failure_; }
+
+ private:
+  const toml::table& table_;
+  std::string where_;
+  std::optional<error> failure_;
+};
+
+}  // namespace detail
+
+/// The camera that `text` in TOML describes. `where` names the source in errors.
+/// Errors: malformed, naming the field (missing, of the wrong type, NaN, out of range, a distortion
+/// list of a length the model does not have); unsupported (a model we do not know).
+[[nodiscard]] inline result<camera::camera_settings> parse_camera(std::string_view text,
+                                                                  const std::filesystem::path& where = {}) {
+  toml::table table;
+  try {
+    table = toml::parse(text, std::string_view{});
+  } catch (const toml::parse_error& e) {
+    return fail(errc::malformed, where.string() + ":" + std::to_string(e.source().begin.line),
+                "not TOML: " + std::string{e.description()});
+  }
+  detail::camera_fields fields{table, where.string()};
+  const std::string model = fields.text("model");
+  const camera::intrinsics k{
+      .width = fields.size("width"),
+      .height = fields.size("height"),
+      .fx = fields.positive("fx"),
+      .fy = fields.positive("fy"),
+      .cx = fields.number("cx", std::nullopt, "a finite number", [](double v) { return std::abs(v) < 1e9; }),
+      .cy = fields.number("cy", std::nullopt, "a finite number", [](double v) { return std::abs(v) < 1e9; })};
+  const std::vector<double> d = fields.numbers("distortion");
+  camera::camera_settings settings{.model = {}, .depth_scale = fields.positive("depth_scale", 1000.0),
+                                   .fps = fields.positive("fps", 30.0)};
+  if (table.contains("baseline")) settings.baseline = fields.positive("baseline");
+  if (fields.failure()) return fail(*fields.failure());
+
+  const auto list = [&](std::size_t i) { return i < d.size() ? d[i] : 0.0; };
+  const auto wrong_length = [&](const char* wanted) {
+    return fail(errc::malformed, where.string(),
+                "distortion has " + std::to_string(d.size()) + " values, the model " + model + " takes " + wanted);
+  };
+  if (model == "pinhole") {
+    if (std::any_of(d.begin(), d.end(), [](double v) { return v != 0.0; })) return wrong_length("none");
+    settings.model = camera::pinhole{k};
+  } else if (model == "radtan") {
+    if (d.size() != 4 && d.size() != 5 && d.size() != 8) return wrong_length("4, 5 or 8");
+    settings.model = camera::radial_tangential{
+        k, {list(0), list(1), list(2), list(3), list(4), list(5), list(6), list(7)}};
+  } else if (model == "kannala_brandt") {
+    if (d.size() != 4) return wrong_length("4");
+    settings.model = camera::kannala_brandt{k, {list(0), list(1), list(2), list(3)}};
+  } else {
+    return fail(errc::unsupported, where.string(),
+                "model \"" + model + "\" is not one of pinhole, radtan, kannala_brandt");
+  }
+  return settings;
+}
+
+/// Reads a camera file; see `parse_camera`. Errors: not_found, unreadable, malformed, unsupported.
+[[nodiscard]] inline result<camera::camera_settings> read_camera(const std::filesystem::path& path) {
+  const auto text = read_file(path);
+  if (!text) return fail(text.error());
+  return parse_camera(*text, path);
+}
+
+/// Writes a camera file, whole or not at all, such that reading it gives the same settings exactly.
+/// Errors: write_failed.
+inline result<void> write_camera(const std::filesystem::path& path, const camera::camera_settings& settings) {
+  const auto number = [](double value) {
+    char buffer[40];
+    std::string text(buffer, std::to_chars(buffer, buffer + sizeof buffer, value).ptr);
+    if (text.find_first_of(".e") == std::string::npos) text += ".0";
+    return text;
+  };
+  const camera::intrinsics& k = settings.model.k();
+  std::string distortion;
+  const auto add = [&](double value) { distortion += (distortion.empty() ? "" : ", ") + number(value); };
+  if (const auto* m = settings.model.get_if<camera::radial_tangential>()) {
+    const auto& d = m->distortion();
+    for (const double value : {d.k1, d.k2, d.p1, d.p2, d.k3}) add(value);
+    if (d.k4 != 0.0 || d.k5 != 0.0 || d.k6 != 0.0)
+      for (const double value : {d.k4, d.k5, d.k6}) add(value);
+  } else if (const auto* fisheye = settings.model.get_if<camera::kannala_brandt>()) {
+    const auto& d = fisheye->distortion();
+    for (const double value : {d.k1, d.k2, d.k3, d.k4}) add(value);
+  }
+  return write_file_atomically(path, [&](std::ostream& out) {
+    out << "model = \"" << settings.model.model_name() << "\"\n"
+        << "width = " << std::to_string(k.width) << "\nheight = " << std::to_string(k.height) << "\nfx = "
+        << number(k.fx) << "\nfy = " << number(k.fy) << "\ncx = " << number(k.cx) << "\ncy = " << number(k.cy)
+        << "\ndistortion = [" << distortion << "]\n"
+        << "depth_scale = " << number(settings.depth_scale) << "  # stored value / depth_scale = metres\n"
+        << "fps = " << number(settings.fps) << "\n";
+    if (settings.baseline) out << "baseline = " << number(*settings.baseline) << "\n";
+  });
+}
+
+}  // namespace orbis::io

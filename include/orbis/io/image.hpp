@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Colour and depth images from files, by what the file is and not by what it is called.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+
+#include <orbis/core/file.hpp>
+#include <orbis/core/image.hpp>
+#include <orbis/core/result.hpp>
+#include <orbis/io/jpeg.hpp>
+#include <orbis/io/png.hpp>
+
+namespace orbis::io {
+
+/// A PNG (8 or 16 bit, grey, palette, with or without alpha) or JPEG as 8-bit colour.
+/// Errors: not_found, unreadable, malformed (damaged, truncated), unsupported (another format).
+[[nodiscard]] inline result<image<rgb8>> read_color(const std::filesystem::path& path) {
+  const auto bytes = read_file(path);
+  if (!bytes) return fail(bytes.error());
+  if (bytes->empty()) return fail(errc::malformed, path.string(), "the file is empty");
+  if (is_png(*bytes)) return decode_png_color(*bytes, path.string());
+  if (is_jpeg(*bytes)) return decode_jpeg(*bytes, path.string());
+  return fail(errc::unsupported, path.string(), "is neither a PNG nor a JPEG image");
+}
+
+/// A 16-bit grey PNG, as stored (no scale applied).
+/// Errors: not_found, unreadable, malformed (damaged, truncated), unsupported (anything else).
+[[nodiscard]] inline result<image<std::uint16_t>> read_depth(const std::filesystem::path& path) {
+  const auto bytes = read_file(path);
+  if (!bytes) return fail(bytes.error());
+  if (bytes->empty()) return fail(errc::malformed, path.string(), "the file is empty");
+  if (!is_png(*bytes)) return fail(errc::unsupported, path.string(), "a depth image must be a 16-bit grey PNG");
+  return decode_png_depth(*bytes, path.string());
+}
+
+}  // namespace orbis::io

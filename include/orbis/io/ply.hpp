@@ -1,0 +1,262 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Point clouds in PLY files.
+///
+/// Source: G. Turk, "The PLY polygon file format", 1994.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cassert>
+#include <charconv>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <ostream>
+#include <ranges>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include <orbis/core/file.hpp>
+#include <orbis/core/point.hpp>
+#include <orbis/core/point_cloud.hpp>
+#include <orbis/core/result.hpp>
+#include <orbis/io/bytes.hpp>
+#include <orbis/io/text.hpp>
+
+namespace orbis::io {
+
+enum class ply_encoding { ascii, binary };  ///< binary: little-endian
+
+struct ply_options {
+  ply_encoding encoding = ply_encoding::binary;
+};
+
+namespace detail {
+
+struct ply_property {
+  std::string name;
+  scalar_type type = scalar_type::float32;
+  std::optional<scalar_type> count;  ///< of a list: the type of its length
+};
+struct ply_element {
+  std::string name;
+  std::uint64_t count = 0;
+  std::vector<ply_property> properties;
+};
+enum class ply_format { ascii, little, big };
+struct ply_header {
+  ply_format format = ply_format::ascii;
+  std::vector<ply_element> elements;
+};
+
+inline std::optional<scalar_type> ply_type(std::string_view name) {
+  using enum scalar_type;
+  constexpr std::pair<std::string_view, scalar_type> names[] = {
+      {"char", int8},     {"int8", int8},       {"uchar", uint8},     {"uint8", uint8},
+      {"short", int16},   {"int16", int16},     {"ushort", uint16},   {"uint16", uint16},
+      {"int", int32},     {"int32", int32},     {"uint", uint32},     {"uint32", uint32},
+      {"float", float32}, {"float32", float32}, {"double", float64}, {"float64", float64}};
+  for (const auto& [known, type] : names)
+    if (known == name) return type;
+  return std::nullopt;
+}
+
+/// Takes the header off the front of `bytes`.
+inline result<ply_header> take_ply_header(std::string_view& bytes, const std::string& where) {
+  ply_header header;
+  const auto bad = [&](std::string why) { return fail(errc::malformed, where, "PLY header: " + std::move(why)); };
+  if (bytes.empty() || trimmed(next_line(bytes)) != "ply") return fail(errc::malformed, where, "is not a PLY file");
+  bool has_format = false;
+  while (!bytes.empty()) {
+    std::string_view line = next_line(bytes);
+    const std::string_view word = next_field(line);
+    if (word == "end_header") {
+      if (!has_format) return bad("no format line");
+      return header;
+    }
+    if (word.empty() || word == "comment" || word == "obj_info") continue;
+    if (word == "format") {
+      const std::string_view name = next_field(line);
+      if (name == "ascii") header.format = ply_format::ascii;
+      else if (name == "binary_little_endian") header.format = ply_format::little;
+      else if (name == "binary_big_endian") header.format = ply_format::big;
+      else return bad("unknown format");
+      has_format = true;
+    } else if (word == "element") {
+      ply_element element{std::string{next_field(line)}, 0, {}};
+      if (element.name.empty() || !parse_number(next_field(line), element.count)) return bad("a bad element line");
+      header.elements.push_back(std::move(element));
+    } else if (word == "property") {
+      if (header.elements.empty()) return bad("a property before any element");
+      std::string_view type = next_field(line);
+      ply_property property;
+      if (type == "list") {
+        property.count = ply_type(next_field(line));
+        if (!property.count || size_of(*property.count) == 8 || *property.count == scalar_type::float32)
+          return bad("a list with a bad type of length");
+        type = next_field(line);
+      }
+      const auto known = ply_type(type);
+      if (!known) return bad("a property of an unknown type");
+      property.type = *known;
+      property.name = next_field(line);
+      header.elements.back().properties.push_back(std::move(property));
+    } else {
+      return bad("an unknown line");
+    }
+  }
+  return bad("ends early");
+}
+
+/// Reads numbers one after the other from the body, in whichever encoding.
+class ply_body {
+ public:
+  ply_body(std::string_view bytes, ply_format format) : left_{bytes}, format_{format} {}
+
+  /// False at the end of the data, or if there is no number of that type.
+  bool next(scalar_type type, double& value) {
+    if (format_ == ply_format::ascii) return parse_number(next_field(left_), value);
+    const std::size_t size = size_of(type);
+    if (left_.size() < size) return false;
+    value = load_as_double(left_.data(), type, format_ == ply_format::big ? std::endian::big : std::endian::little);
+    left_.remove_prefix(size);
+    return true;
+  }
+  bool skip(const ply_property& property) {
+    double value = 0.0, count = 1.0;
+    if (property.count && (!next(*property.count, count) || !(count >= 0.0))) return false;
+    for (; count >= 1.0; count -= 1.0)
+      if (!next(property.type, value)) return false;
+    return true;
+  }
+  [[nodiscard]] std::size_t bytes_left() const { return left_.size(); }
+  /// The least bytes that a property takes.
+  [[nodiscard]] std::size_t least_size(const ply_property& property) const {
+    if (format_ == ply_format::ascii) return 1;
+    return size_of(property.count.value_or(property.type));
+  }
+
+ private:
+  std::string_view left_;
+  ply_format format_;
+};
+
+}  // namespace detail
+
+/// The vertices of a PLY file in memory: `x y z` of any type and, where they are there, `red green
+/// blue` (8-bit as they are, 16-bit scaled, floating point from 0 to 1). All else is passed over.
+/// Errors: malformed (damaged, truncated), unsupported (no vertices with x, y and z).
+[[nodiscard]] inline result<point_cloud> parse_ply(std::string_view bytes, const std::string& where = {}) {
+  using namespace detail;
+  const auto header = take_ply_header(bytes, where);
+  if (!header) return fail(header.error());
+  ply_body body{bytes, header->format};
+  const auto ends_early = [&] { return fail(errc::malformed, where, "the data end early or are damaged"); };
+
+  for (const ply_element& element : header->elements) {
+    std::size_t least = 0;
+    for (const ply_property& p : element.properties) least += body.least_size(p);
+    if (least == 0) continue;  // takes no space in the file
+    if (element.count > body.bytes_left() / least + 1) return ends_early();
+    if (element.name != "vertex") {
+      for (std::uint64_t i = 0; i != element.count; ++i)
+        for (const ply_property& p : element.properties)
+          if (!body.skip(p)) return ends_early();
+      continue;
+    }
+
+    constexpr std::string_view names[6] = {"x", "y", "z", "red", "green", "blue"};
+    std::vector<int> role(element.properties.size(), -1);
+    std::array<scalar_type, 6> type{};
+    unsigned found = 0;
+    for (std::size_t k = 0; k != role.size(); ++k)
+      for (std::size_t r = 0; r != 6; ++r)
+        if (element.properties[k].name == names[r] && !element.properties[k].count && (found >> r & 1U) == 0) {
+          role[k] = static_cast<int>(r);
+          type[r] = element.properties[k].type;
+          found |= 1U << r;
+        }
+    if ((found & 7U) != 7U) return fail(errc::unsupported, where, "the vertices have no x, y and z");
+    const bool colored = found == 63U;
+    const auto channel = [](double v, scalar_type t) {
+      if (t == scalar_type::float32 || t == scalar_type::float64) v *= 255.0;
+      if (t == scalar_type::uint16) v /= 257.0;
+      return static_cast<std::uint8_t>(v >= 0.0 ? std::min(255.0, std::round(v)) : 0.0);
+    };
+
+    point_cloud cloud;
+    cloud.points.reserve(static_cast<std::size_t>(element.count));
+    if (colored) cloud.colors.reserve(static_cast<std::size_t>(element.count));
+    for (std::uint64_t i = 0; i != element.count; ++i) {
+      double v[6] = {};
+      for (std::size_t k = 0; k != role.size(); ++k) {
+        const bool ok = role[k] < 0 ? body.skip(element.properties[k])
+                                    : body.next(element.properties[k].type, v[static_cast<std::size_t>(role[k])]);
+        if (!ok) return ends_early();
+      }
+      cloud.points.emplace_back(static_cast<float>(v[0]), static_cast<float>(v[1]), static_cast<float>(v[2]));
+      if (colored) cloud.colors.push_back({channel(v[3], type[3]), channel(v[4], type[4]), channel(v[5], type[5])});
+    }
+    return cloud;
+  }
+  return fail(errc::unsupported, where, "there are no vertices");
+}
+
+/// Reads a PLY file; see `parse_ply`. Errors: not_found, unreadable, malformed, unsupported.
+[[nodiscard]] inline result<point_cloud> read_ply(const std::filesystem::path& path) {
+  const auto bytes = read_file(path);
+  if (!bytes) return fail(bytes.error());
+  return parse_ply(*bytes, path.string());
+}
+
+/// Writes points (as float), and their colours if there are any, as a PLY file, whole or not at all.
+/// @pre colors.empty() || colors.size() == size of points. Errors: write_failed.
+template <point_range Points>
+result<void> write_ply(const std::filesystem::path& path, const Points& points, std::span<const rgb8> colors,
+                       const ply_options& options = {}) {
+  const auto count = static_cast<std::size_t>(std::ranges::size(points));
+  assert(colors.empty() || colors.size() == count);
+  const bool binary = options.encoding == ply_encoding::binary;
+  std::string bytes = std::string{"ply\nformat "} + (binary ? "binary_little_endian" : "ascii") +
+                      " 1.0\nelement vertex " + std::to_string(count) +
+                      "\nproperty float x\nproperty float y\nproperty float z\n" +
+                      (colors.empty() ? "" : "property uchar red\nproperty uchar green\nproperty uchar blue\n") +
+                      "end_header\n";
+  bytes.reserve(bytes.size() + count * (binary ? 15 : 40));
+  std::size_t i = 0;
+  for (const auto& point : points) {
+    const auto xyz = coordinates<float>(point);
+    if (binary) {
+      for (const float v : xyz) append_little_endian(bytes, v);
+      if (!colors.empty())
+        for (const std::uint8_t v : {colors[i].r, colors[i].g, colors[i].b}) append_little_endian(bytes, v);
+    } else {
+      char buffer[64];
+      for (const float v : xyz) {
+        bytes.append(buffer, std::to_chars(buffer, buffer + sizeof buffer, v).ptr);
+        bytes += ' ';
+      }
+      if (!colors.empty())
+        for (const unsigned v : {colors[i].r, colors[i].g, colors[i].b}) bytes += std::to_string(v) + ' ';
+      bytes.back() = '\n';
+    }
+    ++i;
+  }
+  return write_file_atomically(
+      path, [&](std::ostream& out) { out.write(bytes.data(), static_cast<std::streamsize>(bytes.size())); });
+}
+
+/// Writes a cloud as a PLY file: `x y z`, with `red green blue` if it has colours.
+inline result<void> write_ply(const std::filesystem::path& path, const point_cloud& cloud,
+                              const ply_options& options = {}) {
+  return write_ply(path, cloud.points, std::span<const rgb8>{cloud.colors}, options);
+}
+
+}  // namespace orbis::io

@@ -1,0 +1,203 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// RGB-D recordings on disk, whatever their format.
+///
+/// @code
+///   for (const auto& frame : orbis::io::open_recording(path).value()) slam.track(frame);
+/// @endcode
+#pragma once
+
+#include <cassert>
+#include <cstddef>
+#include <filesystem>
+#include <iterator>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include <orbis/camera/rgbd_frame.hpp>
+#include <orbis/camera/settings.hpp>
+#include <orbis/core/result.hpp>
+#include <orbis/core/trajectory.hpp>
+#include <orbis/io/camera_file.hpp>
+#include <orbis/io/icl_nuim.hpp>
+#include <orbis/io/image.hpp>
+#include <orbis/io/recording_index.hpp>
+#include <orbis/io/seven_scenes.hpp>
+#include <orbis/io/tum.hpp>
+
+namespace orbis::io {
+
+/// The layouts we read. `automatic`: look which one it is.
+enum class recording_format { automatic, tum, seven_scenes, icl_nuim };
+
+/// The name of a format: "tum", "7scenes", "icl", "auto".
+[[nodiscard]] constexpr std::string_view to_string(recording_format format) noexcept {
+  switch (format) {
+    case recording_format::automatic: return "auto";
+    case recording_format::tum: return "tum";
+    case recording_format::seven_scenes: return "7scenes";
+    case recording_format::icl_nuim: return "icl";
+  }
+  return "unknown";
+}
+
+struct recording_options {
+  recording_format format = recording_format::automatic;
+  std::optional<camera::camera_settings> camera{};  ///< instead of what the recording says
+  double max_time_difference = 0.020;               ///< between a colour and its depth image, seconds
+};
+
+/// A list of frames that are read when asked for. Reading is thread-safe through `frame`, not through
+/// iterators.
+class recording {
+ public:
+  /// @pre !index.frames.empty()
+  recording(recording_index index, camera::camera_settings camera, recording_format format)
+      : index_{std::move(index)}, camera_{std::move(camera)}, format_{format} {
+    assert(!index_.frames.empty());
+  }
+
+  [[nodiscard]] std::size_t size() const noexcept { return index_.frames.size(); }
+  /// Of the colour image, seconds. @pre i < size()
+  [[nodiscard]] double timestamp(std::size_t i) const { return index_.frames[i].timestamp; }
+  [[nodiscard]] const camera::camera_settings& camera() const noexcept { return camera_; }
+  /// All poses of the ground truth, not only those at frames; empty if there is none.
+  [[nodiscard]] const trajectory& ground_truth() const noexcept { return index_.ground_truth; }
+  /// Never `automatic`.
+  [[nodiscard]] recording_format format() const noexcept { return format_; }
+  /// What is worth a warning: images without a partner, lines left out, depth that is not registered.
+  [[nodiscard]] std::span<const std::string> notes() const noexcept { return index_.notes; }
+
+  /// Reads frame `i`. Colour and depth have the camera's size. Errors: not_found, unreadable,
+  /// malformed (damaged, or of another size than the camera's), unsupported. @pre i < size()
+  [[nodiscard]] result<camera::rgbd_frame> frame(std::size_t i) const {
+    assert(i < size());
+    const recording_entry& entry = index_.frames[i];
+    auto color = read_color(entry.color);
+    if (!color) return fail(color.error());
+    auto depth = read_depth(entry.depth);
+    if (!depth) return fail(depth.error());
+    const auto wrong_size = [&](int width, int height) {
+      return width != camera_.model.width() || height != camera_.model.height();
+    };
+    if (wrong_size(color->width(), color->height())) return size_error(entry.color, color->width(), color->height());
+    if (wrong_size(depth->width(), depth->height())) return size_error(entry.depth, depth->width(), depth->height());
+    return camera::rgbd_frame{.timestamp = entry.timestamp,
+                              .color = *std::move(color),
+                              .depth = *std::move(depth),
+                              .depth_scale = camera_.depth_scale,
+                              .T_world_camera = entry.T_world_camera};
+  }
+
+  /// Goes over the frames once, reading each when it is reached. Ends at the first frame that cannot
+  /// be read; then the recording's `status` says why. The frame a reference was taken to lives until
+  /// the iterator moves on.
+  class iterator {
+   public:
+    using iterator_category = std::input_iterator_tag;
+    using iterator_concept = std::input_iterator_tag;
+    using value_type = camera::rgbd_frame;
+    using difference_type = std::ptrdiff_t;
+    using reference = const camera::rgbd_frame&;
+    using pointer = const camera::rgbd_frame*;
+
+    iterator() = default;
+    explicit iterator(recording& of) : of_{&of} { read(); }
+    [[nodiscard]] reference operator*() const { return *frame_; }
+    [[nodiscard]] pointer operator->() const { return frame_.get(); }
+    iterator& operator++() {
+      ++i_;
+      read();
+      return *this;
+    }
+    void operator++(int) { ++*this; }
+    [[nodiscard]] friend bool operator==(const iterator& it, std::default_sentinel_t) noexcept { return !it.frame_; }
+
+   private:
+    void read() {
+      frame_.reset();
+      if (i_ == of_->size()) return;
+      auto frame = of_->frame(i_);
+      if (frame) frame_ = std::make_shared<const camera::rgbd_frame>(*std::move(frame));
+      else of_->status_ = fail(std::move(frame.error()));
+    }
+
+    recording* of_ = nullptr;
+    std::size_t i_ = 0;
+    std::shared_ptr<const camera::rgbd_frame> frame_;  // shared, so that an iterator can be copied
+  };
+
+  /// Starts over, and clears `status`. The recording must outlive the iterator and stay in place.
+  [[nodiscard]] iterator begin() {
+    status_ = {};
+    return iterator(*this);
+  }
+  [[nodiscard]] std::default_sentinel_t end() const noexcept { return {}; }
+  /// Why the last iteration ended before the last frame, if it did.
+  [[nodiscard]] const result<void>& status() const noexcept { return status_; }
+
+ private:
+  tl::unexpected<error> size_error(const std::filesystem::path& path, int width, int height) const {
+    return fail(errc::malformed, path.string(),
+                "the image has " + std::to_string(width) + "x" + std::to_string(height) + " pixels, the camera " +
+                    std::to_string(camera_.model.width()) + "x" + std::to_string(camera_.model.height()));
+  }
+
+  recording_index index_;
+  camera::camera_settings camera_;
+  recording_format format_;
+  result<void> status_;
+};
+
+/// Which format the recording in `folder` has; `automatic` if none is recognised.
+[[nodiscard]] inline recording_format detect_format(const std::filesystem::path& folder) {
+  if (is_icl_nuim(folder)) return recording_format::icl_nuim;
+  if (is_tum(folder)) return recording_format::tum;
+  if (is_seven_scenes(folder)) return recording_format::seven_scenes;
+  return recording_format::automatic;
+}
+
+/// Opens the recording in `folder`: reads its lists, poses and camera, not yet its images.
+///
+/// The camera is the option's; else that of `camera.toml` in the folder; else what the format's own
+/// files or the folder's name tell; else this fails.
+/// Errors: not_found, unreadable, unsupported (no known format), no_data (nothing in it), malformed
+/// (with file and line), invalid_argument (no camera known).
+[[nodiscard]] inline result<recording> open_recording(const std::filesystem::path& folder,
+                                                      const recording_options& options = {}) {
+  std::error_code ignored;
+  if (!present(folder)) return fail(errc::not_found, folder.string(), "no such folder");
+  if (!std::filesystem::is_directory(folder, ignored))
+    return fail(errc::unsupported, folder.string(), "a recording is a folder, this is a file");
+
+  recording_format format = options.format;
+  if (format == recording_format::automatic) format = detect_format(folder);
+  if (format == recording_format::automatic)
+    return fail(errc::unsupported, folder.string(),
+                "no known recording: neither rgb.txt and depth.txt (TUM), nor frame-*.color.png (7-Scenes), nor "
+                "numbered images in rgb and depth (ICL-NUIM)");
+
+  auto index = format == recording_format::tum            ? index_tum(folder, options.max_time_difference)
+               : format == recording_format::seven_scenes ? index_seven_scenes(folder)
+                                                          : index_icl_nuim(folder);
+  if (!index) return fail(index.error());
+
+  std::optional<camera::camera_settings> camera = options.camera;
+  if (const auto file = folder / "camera.toml"; !camera && present(file)) {
+    auto read = read_camera(file);
+    if (!read) return fail(read.error());
+    camera = *std::move(read);
+  }
+  if (!camera) camera = index->camera;
+  if (!camera)
+    return fail(errc::invalid_argument, folder.string(),
+                "the camera is not known: put a camera.toml into the folder, or name a camera");
+  return recording(*std::move(index), *std::move(camera), format);
+}
+
+}  // namespace orbis::io

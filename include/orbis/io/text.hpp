@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// The little text parsing that the readers share: lines, fields and numbers, independent of the
+/// locale.
+#pragma once
+
+#include <charconv>
+#include <concepts>
+#include <cstddef>
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+namespace orbis::io {
+
+/// "path:line", for the `where` of an error.
+[[nodiscard]] inline std::string at_line(const std::filesystem::path& path, std::size_t line) {
+  return path.string() + ":" + std::to_string(line);
+}
+
+[[nodiscard]] constexpr bool is_blank(char c) noexcept { return c == ' ' || c == '\t' || c == '\r' || c == '\n'; }
+
+/// Without blanks (CR and LF among them) at either end.
+[[nodiscard]] constexpr std::string_view trimmed(std::string_view text) noexcept {
+  while (!text.empty() && is_blank(text.front())) text.remove_prefix(1);
+  while (!text.empty() && is_blank(text.back())) text.remove_suffix(1);
+  return text;
+}
+
+/// Takes the next field off the front of `text`; empty when there is none left.
+[[nodiscard]] constexpr std::string_view next_field(std::string_view& text) noexcept {
+  text = trimmed(text);
+  std::size_t end = 0;
+  while (end != text.size() && !is_blank(text[end])) ++end;
+  const std::string_view field = text.substr(0, end);
+  text.remove_prefix(end);
+  return field;
+}
+
+/// Takes the next line, without its end, off the front of `text`. @pre !text.empty()
+[[nodiscard]] constexpr std::string_view next_line(std::string_view& text) noexcept {
+  const std::size_t end = text.find('\n');
+  std::string_view line = text.substr(0, end);
+  text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
+  if (!line.empty() && line.back() == '\r') line.remove_suffix(1);
+  return line;
+}
+
+/// Whether all of `field` is a number; if so it is in `value`. Reads "nan" and "inf" for floating
+/// point.
+template <class T>
+requires std::integral<T> || std::floating_point<T>
+[[nodiscard]] bool parse_number(std::string_view field, T& value) noexcept {
+  if (field.size() > 1 && field.front() == '+' && field[1] != '-') field.remove_prefix(1);
+  const auto [end, failure] = std::from_chars(field.data(), field.data() + field.size(), value);
+  return failure == std::errc{} && end == field.data() + field.size();
+}
+
+/// Calls `visit(line, number)` for every line that is neither blank nor a comment (`#`), trimmed and
+/// numbered from 1, while `visit` returns true. A byte order mark is passed over.
+template <std::predicate<std::string_view, std::size_t> Visit>
+void for_each_line(std::string_view text, Visit&& visit) {
+  if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
+  for (std::size_t number = 1; !text.empty(); ++number) {
+    const std::string_view line = trimmed(next_line(text));
+    if (line.empty() || line.front() == '#') continue;
+    if (!visit(line, number)) return;
+  }
+}
+
+}  // namespace orbis::io
