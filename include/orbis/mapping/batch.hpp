@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// From posed keyframes to a map, all at once: dense cloud, filtered cloud, octrees.
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <orbis/camera/model.hpp>
+#include <orbis/camera/rays.hpp>
+#include <orbis/cloud/extract.hpp>
+#include <orbis/core/execution.hpp>
+#include <orbis/core/point_cloud.hpp>
+#include <orbis/core/progress.hpp>
+#include <orbis/core/result.hpp>
+#include <orbis/mapping/dense_cloud.hpp>
+#include <orbis/mapping/filter.hpp>
+#include <orbis/mapping/keyframe.hpp>
+#include <orbis/octree/occupancy_octree.hpp>
+
+namespace orbis::mapping {
+
+struct map_options {
+  dense_options dense;
+  filter_options filter;
+  double resolution = 0.05;                 ///< of the octrees, metres; > 0
+  octree::integration_options integration;  ///< of every keyframe's points into the octrees
+  bool unfiltered_octree = true;            ///< build the octree of the unfiltered points as well
+};
+
+/// The map, and how it came to be.
+template <class Octree>
+struct built_map {
+  point_cloud cloud;           ///< all keyframes' points, in the world
+  point_cloud filtered_cloud;  ///< those that the filter kept
+  filter_report filter;
+  std::optional<Octree> unfiltered_octree;
+  Octree octree;                             ///< of the points that the filter kept, each seen from its own keyframe
+  std::vector<double> insert_ms;             ///< into `octree`, for each keyframe
+  std::vector<double> insert_ms_unfiltered;  ///< into `unfiltered_octree`, for each keyframe, if it is built
+  std::size_t skipped = 0;                   ///< keyframes without a finite pose
+};
+
+/// Splices the keyframes into a cloud, filters it, and integrates each keyframe's own measurements,
+/// those whose point of the cloud survived, with rays from where that keyframe was. Filtering the
+/// whole cloud lets one keyframe's points judge another's.
+///
+/// Keyframes whose pose is not finite are skipped and counted. Errors: `no_data` if there is no
+/// keyframe; `invalid_argument` if an image's size is not the camera's, or an option is out of range;
+/// `cancelled`. The same result for every policy. `on_progress` counts the keyframes of all passes.
+template <class Octree = octree::occupancy_octree<>, execution_policy Policy, keyframe_range Keyframes,
+          camera::camera_model Camera>
+[[nodiscard]] result<built_map<Octree>> build_map(const Policy& policy, const Keyframes& keyframes,
+                                                  const Camera& camera, const map_options& options = {},
+                                                  progress on_progress = {}) {
+  if (std::ranges::size(keyframes) == 0) return fail(errc::no_data, "keyframes", "there are none");
+  if (!(options.resolution > 0)) return fail(errc::invalid_argument, "resolution", "must be positive");
+  if (options.dense.stride <= 0) return fail(errc::invalid_argument, "stride", "must be positive");
+  if (!(options.dense.voxel_size >= 0)) return fail(errc::invalid_argument, "voxel_size", "must not be negative");
+  const auto fits = [&](const auto& image) {
+    return image.width() == camera.width() && image.height() == camera.height();
+  };
+  const auto finite_pose = [](const auto& k) { return se3(k.T_world_camera).to_matrix().allFinite(); };
+  const std::size_t passes = options.unfiltered_octree ? 3 : 2;
+  const std::size_t total = passes * std::ranges::size(keyframes);
+  std::size_t done = 0;
+
+  built_map<Octree> map{.octree = Octree{options.resolution}};
+  dense_cloud dense{camera::ray_table{camera}, options.dense};
+  for (const auto& k : keyframes) {
+    const image_view<const rgb8> color = k.color;
+    if (!fits(k.depth) || (!color.empty() && !fits(color))) {
+      return fail(errc::invalid_argument, "keyframes", "an image is not of the camera's size");
+    }
+    if (finite_pose(k)) {
+      dense.splice(policy, k);
+    } else {
+      ++map.skipped;
+    }
+    if (!on_progress(++done, total)) return fail(errc::cancelled, {}, "cancelled");
+  }
+
+  map.cloud = dense.cloud();
+  filtered_indices filtered = filter_points(policy, map.cloud.points, dense.ranges(), options.filter);
+  map.filter = std::move(filtered.report);
+  map.filtered_cloud = cloud::extract(map.cloud, filtered.inliers);
+  std::vector<char> kept(map.cloud.size(), 0);
+  for (const std::uint32_t i : filtered.inliers) kept[i] = 1;
+
+  const auto integrate_all = [&](Octree& octree, std::span<const char> mask, std::vector<double>& milliseconds) {
+    std::size_t number = 0;
+    for (const auto& k : keyframes) {
+      if (finite_pose(k)) {
+        const std::vector<vec3f> points = dense.measurements(policy, k, number++, mask);
+        const vec3 origin = se3(k.T_world_camera).translation();
+        const auto start = std::chrono::steady_clock::now();
+        octree.integrate(points, origin, options.integration);
+        const auto time = std::chrono::steady_clock::now() - start;
+        milliseconds.push_back(std::chrono::duration<double, std::milli>(time).count());
+      }
+      if (!on_progress(++done, total)) return false;
+    }
+    return true;
+  };
+  if (options.unfiltered_octree) {
+    map.unfiltered_octree.emplace(options.resolution);
+    if (!integrate_all(*map.unfiltered_octree, {}, map.insert_ms_unfiltered)) {
+      return fail(errc::cancelled, {}, "cancelled");
+    }
+  }
+  if (!integrate_all(map.octree, kept, map.insert_ms)) return fail(errc::cancelled, {}, "cancelled");
+  return map;
+}
+
+}  // namespace orbis::mapping

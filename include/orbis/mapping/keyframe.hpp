@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// What mapping needs of a keyframe.
+#pragma once
+
+#include <cstdint>
+#include <ranges>
+
+#include <orbis/camera/depth.hpp>
+#include <orbis/core/image.hpp>
+#include <orbis/core/se3.hpp>
+
+namespace orbis::mapping {
+
+/// A depth image in place, the colour image registered to it, and where the camera was. The images
+/// belong to the caller.
+template <camera::depth_source Depth = camera::depth_view<std::uint16_t>>
+struct keyframe {
+  Depth depth;
+  image_view<const rgb8> color;  ///< empty, or of the size of `depth`
+  se3 T_world_camera;
+};
+
+/// Anything with a keyframe's members.
+template <class K>
+concept keyframe_like = requires(const K& k) {
+  requires camera::depth_source<std::remove_cvref_t<decltype(k.depth)>>;
+  { k.color } -> std::convertible_to<image_view<const rgb8>>;
+  { k.T_world_camera } -> std::convertible_to<se3>;
+};
+
+/// A range of keyframes that can be gone through more than once.
+template <class R>
+concept keyframe_range =
+    std::ranges::forward_range<R> && std::ranges::sized_range<R> && keyframe_like<std::ranges::range_value_t<R>>;
+
+}  // namespace orbis::mapping
