@@ -1,0 +1,215 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// A recording that is made on the fly.
+#pragma once
+
+#include <cassert>
+#include <cstddef>
+#include <cstdint>
+#include <iterator>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <orbis/camera/pinhole.hpp>
+#include <orbis/camera/rgbd_frame.hpp>
+#include <orbis/camera/settings.hpp>
+#include <orbis/core/execution.hpp>
+#include <orbis/core/result.hpp>
+#include <orbis/core/trajectory.hpp>
+#include <orbis/io/synthetic/path.hpp>
+#include <orbis/io/synthetic/renderer.hpp>
+#include <orbis/io/synthetic/scene.hpp>
+#include <orbis/io/synthetic/sensor.hpp>
+#include <orbis/io/synthetic/texture.hpp>
+
+namespace orbis::io {
+
+/// What to record.
+struct synthetic_options {
+  int frames = 360;           ///< how many
+  double fps = 30.0;          ///< frames per second
+  std::uint64_t seed = 1;     ///< of the room, its textures, the path and the noise
+  int width = 640;            ///< pixels
+  int height = 480;           ///< pixels
+  double depth_scale = 5000;  ///< stored depth / depth_scale = metres; 5000 reaches 13 m
+  int frames_around = 0;      ///< in how many frames the path goes once round; 0: in all
+  synthetic::scene_options scene{};
+  synthetic::path_options path{};
+  synthetic::sensor_options sensor{};
+};
+
+/// A recording of a hand-held camera going once round a furnished room, with everything known
+/// exactly. Frames are independent: each can be asked for in any order, from several threads, and is
+/// the same bytes on every machine (the pose apart, whose last bit may differ).
+///
+/// The room stands on z = 0 with the origin in the middle of its floor. Construction paints the
+/// textures (a few tenths of a second at 640x480, on all threads); copies share them.
+class synthetic_recording {
+ public:
+  class iterator;
+
+  /// @pre frames >= 0, fps > 0, width and height > 0, depth_scale > 0, and those of scene and path
+  explicit synthetic_recording(const synthetic_options& options = {})
+      : options_{options},
+        path_{options.path, options.seed,
+              (options.frames_around > 0 ? options.frames_around : options.frames) / options.fps},
+        k_{options.width,
+           options.height,
+           focal(options),
+           focal(options),
+           0.5 * (options.width - 1),
+           0.5 * (options.height - 1)},
+        scene_{std::make_shared<synthetic::scene>(options.scene, options.seed)},
+        textures_{std::make_shared<synthetic::texture_set>(par, *scene_, texel(options))} {
+    assert(options.frames >= 0 && options.fps > 0.0 && options.depth_scale > 0.0);
+  }
+
+  [[nodiscard]] std::size_t size() const noexcept { return static_cast<std::size_t>(options_.frames); }
+  [[nodiscard]] bool empty() const noexcept { return size() == 0; }
+  /// Seconds.
+  [[nodiscard]] double timestamp(std::size_t i) const noexcept { return static_cast<double>(i) / options_.fps; }
+  [[nodiscard]] const synthetic_options& options() const noexcept { return options_; }
+  /// The room.
+  [[nodiscard]] const synthetic::scene& scene() const noexcept { return *scene_; }
+  /// A pinhole camera of 525 pixels focal length at 640 pixels width.
+  [[nodiscard]] camera::camera_settings camera() const {
+    return {.model = camera::pinhole{k_},
+            .depth_scale = options_.depth_scale,
+            .fps = options_.fps,
+            .baseline = options_.sensor.baseline};
+  }
+  /// The exact pose of frame `i`.
+  [[nodiscard]] se3 T_world_camera(std::size_t i) const { return path_.at(timestamp(i)).T_world_camera(); }
+  /// The exact poses of all frames.
+  [[nodiscard]] trajectory ground_truth() const {
+    trajectory all;
+    all.reserve(size());
+    for (std::size_t i = 0; i != size(); ++i) all.push_back({timestamp(i), T_world_camera(i)});
+    return all;
+  }
+
+  /// Frame `i` as the sensor sees it. Errors: invalid_argument if there is no frame `i`.
+  [[nodiscard]] result<camera::rgbd_frame> frame(std::size_t i) const { return render(par, i); }
+
+  /// The same, on the policy's threads.
+  template <execution_policy Policy>
+  [[nodiscard]] result<camera::rgbd_frame> render(const Policy& policy, std::size_t i) const {
+    if (i >= size()) return no_such_frame(i);
+    const synthetic::sensor_options& s = options_.sensor;
+    synthetic::exact_view exact = exact_view_at(policy, timestamp(i));
+    if (s.motion_blur > 1) blur(policy, timestamp(i), exact.color);
+
+    camera::rgbd_frame f;
+    f.timestamp = timestamp(i);
+    f.depth_scale = options_.depth_scale;
+    f.T_world_camera = T_world_camera(i);
+    f.depth = image<std::uint16_t>(options_.width, options_.height);
+    const synthetic::sensor sensor{s, k_.fx, options_.depth_scale, options_.seed, i};
+    const double gain = synthetic::exposure_gain(s, options_.seed, f.timestamp);
+    for_each_index(policy, static_cast<std::size_t>(options_.height), synthetic::renderer::tile, [&](std::size_t row) {
+      const int y = static_cast<int>(row);
+      sensor.measure_depth(exact, y, f.depth.row(y));
+      sensor.measure_colour(exact.color.row(y), y, options_.width, options_.height, gain);
+    });
+    f.color = std::move(exact.color);
+    return f;
+  }
+
+  /// Colour, depth (metres) and angles of frame `i` without any error of the sensor.
+  /// Errors: invalid_argument if there is no frame `i`.
+  template <execution_policy Policy>
+  [[nodiscard]] result<synthetic::exact_view> exact(const Policy& policy, std::size_t i) const {
+    if (i >= size()) return no_such_frame(i);
+    return exact_view_at(policy, timestamp(i));
+  }
+
+  /// Iteration renders one frame after the other.
+  [[nodiscard]] iterator begin() const;
+  [[nodiscard]] iterator end() const;
+
+ private:
+  [[nodiscard]] static double focal(const synthetic_options& o) noexcept { return 525.0 * o.width / 640.0; }
+  /// Texels are about the size of a pixel at 2 m.
+  [[nodiscard]] static double texel(const synthetic_options& o) noexcept { return std::max(0.003, 2.0 / focal(o)); }
+  [[nodiscard]] tl::unexpected<error> no_such_frame(std::size_t i) const {
+    return fail(errc::invalid_argument, "frame",
+                "there is no frame " + std::to_string(i) + " among " + std::to_string(size()));
+  }
+
+  template <execution_policy Policy>
+  [[nodiscard]] synthetic::exact_view exact_view_at(const Policy& policy, double time) const {
+    const synthetic::renderer picture{scene_->solids_at(time), *textures_, path_.at(time), k_};
+    synthetic::exact_view out{image<rgb8>(k_.width, k_.height), image<float>(k_.width, k_.height),
+                              image<float>(k_.width, k_.height)};
+    for_each_index(policy, static_cast<std::size_t>(picture.tile_rows()), 1,
+                   [&](std::size_t row) { picture.render_tile_row(static_cast<int>(row), out); });
+    return out;
+  }
+
+  /// Averages pictures spread evenly over the exposure time, which is centred on `time`.
+  template <execution_policy Policy>
+  void blur(const Policy& policy, double time, image<rgb8>& color) const {
+    const int count = options_.sensor.motion_blur;
+    std::vector<std::uint32_t> sums(3 * color.pixels().size());
+    for (int k = 0; k != count; ++k) {
+      const double when = time + options_.sensor.exposure * ((k + 0.5) / count - 0.5);
+      const auto part = exact_view_at(policy, when);
+      for (std::size_t i = 0; i != color.pixels().size(); ++i) {
+        const rgb8 c = part.color.pixels()[i];
+        sums[3 * i] += c.r;
+        sums[3 * i + 1] += c.g;
+        sums[3 * i + 2] += c.b;
+      }
+    }
+    const auto n = static_cast<std::uint32_t>(count);
+    const auto mean = [&](std::size_t i) { return static_cast<std::uint8_t>((sums[i] + n / 2) / n); };
+    for (std::size_t i = 0; i != color.pixels().size(); ++i)
+      color.pixels()[i] = {mean(3 * i), mean(3 * i + 1), mean(3 * i + 2)};
+  }
+
+  synthetic_options options_;
+  synthetic::camera_path path_;
+  camera::intrinsics k_;
+  std::shared_ptr<const synthetic::scene> scene_;
+  std::shared_ptr<const synthetic::texture_set> textures_;
+};
+
+/// A single pass over the frames; a frame lives until the iterator moves on.
+class synthetic_recording::iterator {
+ public:
+  using iterator_concept = std::input_iterator_tag;
+  using iterator_category = std::input_iterator_tag;
+  using value_type = camera::rgbd_frame;
+  using difference_type = std::ptrdiff_t;
+  using reference = const camera::rgbd_frame&;
+  using pointer = const camera::rgbd_frame*;
+
+  iterator() = default;
+  iterator(const synthetic_recording& recording, std::size_t index) : recording_{&recording}, index_{index} { load(); }
+
+  [[nodiscard]] reference operator*() const noexcept { return *frame_; }
+  [[nodiscard]] pointer operator->() const noexcept { return frame_.get(); }
+  iterator& operator++() {
+    ++index_;
+    load();
+    return *this;
+  }
+  void operator++(int) { ++*this; }
+  [[nodiscard]] friend bool operator==(const iterator& a, const iterator& b) noexcept { return a.index_ == b.index_; }
+
+ private:
+  void load() {
+    frame_ = index_ < recording_->size() ? std::make_shared<const camera::rgbd_frame>(recording_->frame(index_).value())
+                                         : nullptr;
+  }
+
+  const synthetic_recording* recording_ = nullptr;
+  std::size_t index_ = 0;
+  std::shared_ptr<const camera::rgbd_frame> frame_;
+};
+
+inline synthetic_recording::iterator synthetic_recording::begin() const { return {*this, 0}; }
+inline synthetic_recording::iterator synthetic_recording::end() const { return {*this, size()}; }
+
+}  // namespace orbis::io

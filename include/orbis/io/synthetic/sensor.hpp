@@ -1,0 +1,218 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// What a structured-light RGB-D camera makes of the truth.
+#pragma once
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include <orbis/core/image.hpp>
+#include <orbis/core/random.hpp>
+#include <orbis/io/synthetic/arithmetic.hpp>
+
+#if defined(__clang__)
+#pragma float_control(push)
+#pragma clang fp contract(off)
+#elif defined(__GNUC__)
+#pragma GCC push_options
+#pragma GCC optimize("fp-contract=off")
+#endif
+
+namespace orbis::io::synthetic {
+
+/// Errors of a Kinect- or Astra-like camera; each goes away with the value 0 (or false).
+///
+/// Depth: axial noise of deviation 0.0012 + 0.0019 (z - 0.4)^2 metres and lateral noise, both from
+/// C. V. Nguyen, S. Izadi, D. Lovell, "Modeling Kinect sensor noise for improved 3D reconstruction and
+/// tracking", 3DIMPVT 2012; disparity in steps of 1/8 pixel (K. Khoshelham, S. O. Elberink, "Accuracy
+/// and resolution of Kinect depth data", Sensors 2012).
+struct sensor_options {
+  double min_depth = 0.4;  ///< metres; nearer is not measured
+  double max_depth = 4.5;  ///< metres; further is not measured; 0: no limit
+
+  double axial_noise = 1.0;       ///< factor on the published deviation
+  double lateral_noise = 0.5;     ///< deviation in pixels of where a ray near a depth edge ends up
+  double flying_pixels = 0.15;    ///< share of the pixels on a depth edge that lie between its two sides
+  double disparity_step = 0.125;  ///< resolution of the disparity, pixels of the infrared camera
+  double infrared_focal = 580.0;  ///< of the infrared camera, pixels: disparity = focal * baseline / depth
+  double baseline = 0.075;        ///< from projector to camera, metres
+  double grazing_angle = 1.40;    ///< radians from the normal: surfaces seen flatter are lost; dropping out
+                                  ///< begins 0.15 radians before
+  bool shadow = true;             ///< no depth where the projector (on the right) does not reach
+  double dropouts = 0.002;        ///< share of pixels lost anywhere
+
+  double colour_noise = 2.0;    ///< deviation in grey values
+  double vignetting = 0.0;      ///< loss of brightness in the image's corners, 0..1
+  double exposure_jumps = 0.0;  ///< largest relative change of brightness; a new level every second or so
+  int motion_blur = 1;          ///< pictures averaged over the exposure time; 1: none
+  double exposure = 0.015;      ///< seconds; for motion blur
+
+  /// A camera that sees the truth: only the rounding to whole depth units is left.
+  [[nodiscard]] static sensor_options ideal() noexcept {
+    return {.min_depth = 0.0,
+            .max_depth = 0.0,
+            .axial_noise = 0.0,
+            .lateral_noise = 0.0,
+            .flying_pixels = 0.0,
+            .disparity_step = 0.0,
+            .grazing_angle = 0.0,
+            .shadow = false,
+            .dropouts = 0.0,
+            .colour_noise = 0.0};
+  }
+};
+
+/// The published deviation (metres) of depth `z` (metres).
+[[nodiscard]] inline double axial_deviation(double z) noexcept { return 0.0012 + 0.0019 * (z - 0.4) * (z - 0.4); }
+
+/// The factor on all colours at `time` seconds: a level that changes every second or so.
+[[nodiscard]] inline double exposure_gain(const sensor_options& options, std::uint64_t seed, double time) noexcept {
+  const auto level = static_cast<std::uint64_t>(floor_of(0.8 * time));
+  return 1.0 + options.exposure_jumps * (2.0 * upper_fraction(noise_word(seed, 0x65787073ULL, level)) - 1.0);
+}
+
+/// The exact picture of a moment: for each pixel the depth (metres) and the cosine of the angle
+/// between ray and surface normal.
+struct exact_view {
+  image<rgb8> color;
+  image<float> depth;
+  image<float> cosine;
+};
+
+/// Applies the errors of one frame, row by row; rows do not depend on each other's results.
+class sensor {
+ public:
+  /// `focal`: of the registered image, pixels. `key`: different for each frame.
+  sensor(const sensor_options& options, double focal, double depth_scale, std::uint64_t seed,
+         std::uint64_t key) noexcept
+      : options_{options}, focal_{focal}, depth_scale_{depth_scale}, seed_{noise_word(seed, 0x73656e73ULL, key)} {
+    if (options.grazing_angle > 0.0) {
+      constexpr double turns_per_radian = 0.15915494309189535;
+      lost_cosine_ = static_cast<float>(cos_turns(turns_per_radian * options.grazing_angle));
+      safe_cosine_ = static_cast<float>(cos_turns(turns_per_radian * (options.grazing_angle - 0.15)));
+    }
+  }
+
+  /// The measured depth of row `y`, in units of 1 / depth_scale metres, 0: none.
+  void measure_depth(const exact_view& exact, int y, std::span<std::uint16_t> out) const {
+    const int width = exact.depth.width();
+    const std::vector<bool> dark = options_.shadow ? shadow_of(exact.depth.row(y)) : std::vector<bool>{};
+    for (int x = 0; x != width; ++x) {
+      const auto i = static_cast<std::size_t>(x);
+      out[i] = 0;
+      if (!dark.empty() && dark[i]) continue;
+      const auto pixel = static_cast<std::uint64_t>(y) * 65536U + static_cast<std::uint64_t>(x);
+      const std::uint64_t chance = noise_word(seed_, 1, pixel);
+      if (lower_fraction(chance) < options_.dropouts) continue;
+      if (is_grazed(exact.cosine(x, y), upper_fraction(chance))) continue;
+      const std::uint64_t word = mix64(chance);
+      const double z = perturbed(beside_edge(exact.depth, x, y, word), word);
+      if (z < options_.min_depth || (options_.max_depth > 0.0 && z > options_.max_depth)) continue;
+      const double stored = z * depth_scale_ + 0.5;
+      if (stored < 65535.0) out[i] = static_cast<std::uint16_t>(stored);
+    }
+  }
+
+  /// The colours of row `y` as the camera gives them.
+  void measure_colour(std::span<rgb8> row, int y, int width, int height, double exposure_gain) const noexcept {
+    const bool plain = options_.vignetting == 0.0 && exposure_gain == 1.0;
+    if (plain && options_.colour_noise == 0.0) return;
+    const auto sigma = static_cast<float>(options_.colour_noise * 0.4364357804719847);  // 1 / sqrt(21 / 4)
+    const double cx = 0.5 * (width - 1), cy = 0.5 * (height - 1), corner = cx * cx + cy * cy;
+    for (int x = 0; x != width; ++x) {
+      float gain = 1.0F;
+      if (!plain)
+        gain = static_cast<float>(exposure_gain *
+                                  (1.0 - options_.vignetting * ((x - cx) * (x - cx) + (y - cy) * (y - cy)) / corner));
+      const std::uint64_t a =
+          noise_word(seed_, 2, static_cast<std::uint64_t>(y) * 65536U + static_cast<std::uint64_t>(x));
+      // Of 21 coin flips each, smoothed by a uniform of 21 bits: close enough to normal for colours.
+      const std::uint64_t b = a * 0xd1342543de82ef95ULL;
+      const auto channel = [&](std::uint8_t value, unsigned shift) {
+        const auto flips = static_cast<float>(std::popcount((a >> shift) & 0x1fffffU));
+        const auto step = static_cast<float>((b >> shift) & 0x1fffffU) * 0x1.0p-21F;
+        const float v = gain * static_cast<float>(value) + sigma * (flips + step - 11.0F);
+        return static_cast<std::uint8_t>(std::clamp(v, 0.0F, 255.0F) + 0.5F);
+      };
+      rgb8& p = row[static_cast<std::size_t>(x)];
+      p = {channel(p.r, 0), channel(p.g, 21), channel(p.b, 42)};
+    }
+  }
+
+ private:
+  [[nodiscard]] bool is_grazed(float cosine, double chance) const noexcept {
+    if (cosine >= safe_cosine_) return false;
+    return cosine <= lost_cosine_ || chance * (safe_cosine_ - lost_cosine_) > cosine - lost_cosine_;
+  }
+
+  /// Pixels that the projector does not light: along the row, something to the right of them lies
+  /// further left as seen from the projector.
+  [[nodiscard]] std::vector<bool> shadow_of(std::span<const float> depth) const {
+    std::vector<bool> dark(depth.size());
+    const double shift = focal_ * options_.baseline;
+    double leftmost = 1e30;
+    for (std::size_t i = depth.size(); i-- != 0;) {
+      const double seen_at = static_cast<double>(i) - shift / static_cast<double>(depth[i]);
+      dark[i] = seen_at > leftmost;
+      leftmost = std::min(leftmost, seen_at);
+    }
+    return dark;
+  }
+
+  /// Whether two depths side by side belong to different surfaces.
+  [[nodiscard]] static bool is_edge(double a, double b) noexcept {
+    return std::abs(a - b) > 0.03 + 0.02 * std::min(a, b);
+  }
+
+  /// The depth a ray through (x, y) ends up with: near a depth edge perhaps a neighbour's, or one in
+  /// between.
+  [[nodiscard]] double beside_edge(const image<float>& depth, int x, int y, std::uint64_t word) const noexcept {
+    const double z = static_cast<double>(depth(x, y));
+    if (options_.lateral_noise == 0.0 && options_.flying_pixels == 0.0) return z;
+    const auto at = [&](int dx, int dy) {
+      return static_cast<double>(
+          depth(std::clamp(x + dx, 0, depth.width() - 1), std::clamp(y + dy, 0, depth.height() - 1)));
+    };
+    double other = z;
+    for (const double n : {at(-1, 0), at(1, 0), at(0, -1), at(0, 1)})
+      if (std::abs(n - z) > std::abs(other - z)) other = n;
+    if (!is_edge(z, other)) return z;
+    const std::uint64_t fresh = mix64(word ^ 0x6564676573ULL);
+    if (upper_fraction(fresh) < options_.flying_pixels) {
+      // In between in disparity, as a correlation window that sees both surfaces would find.
+      const double f = lower_fraction(fresh);
+      return 1.0 / ((1.0 - f) / z + f / other);
+    }
+    const double sideways = options_.lateral_noise * random_bits::normal_of(fresh, word);
+    return std::abs(sideways) > 0.5 ? other : z;
+  }
+
+  [[nodiscard]] double perturbed(double z, std::uint64_t word) const noexcept {
+    if (options_.axial_noise != 0.0)
+      z += options_.axial_noise * axial_deviation(z) * random_bits::normal_of(mix64(word), word);
+    if (options_.disparity_step != 0.0 && z > 0.0) {
+      const double fb = options_.infrared_focal * options_.baseline;
+      const double steps = static_cast<double>(floor_of(fb / (z * options_.disparity_step) + 0.5));
+      z = steps > 0.0 ? fb / (steps * options_.disparity_step) : 0.0;
+    }
+    return z;
+  }
+
+  sensor_options options_;
+  double focal_, depth_scale_;
+  std::uint64_t seed_;
+  float lost_cosine_ = -1.0F, safe_cosine_ = -1.0F;
+};
+
+}  // namespace orbis::io::synthetic
+
+#if defined(__clang__)
+#pragma float_control(pop)
+#elif defined(__GNUC__)
+#pragma GCC pop_options
+#endif

@@ -1,0 +1,389 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// The surfaces' looks: painted once, then sampled with the right amount of detail.
+///
+/// Every face is painted with a base (tiles, bricks, wood, ...) under many patches with hard edges
+/// whose sizes follow a power law, as in the "dead leaves" model of natural images: it has corners at
+/// every scale, and no two places look alike (A. B. Lee, D. Mumford, J. Huang, "Occlusion models for
+/// natural images", IJCV 2001). Sampling is trilinear in a pyramid (L. Williams, "Pyramidal
+/// parametrics", SIGGRAPH 1983), so that corners do not flicker as the camera moves.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include <orbis/core/execution.hpp>
+#include <orbis/io/synthetic/arithmetic.hpp>
+#include <orbis/io/synthetic/scene.hpp>
+
+#if defined(__clang__)
+#pragma float_control(push)
+#pragma clang fp contract(off)
+#elif defined(__GNUC__)
+#pragma GCC push_options
+#pragma GCC optimize("fp-contract=off")
+#endif
+
+namespace orbis::io::synthetic {
+
+/// A colour with channels from 0 to 1 or so.
+struct tint {
+  float r = 0.0F, g = 0.0F, b = 0.0F;
+  [[nodiscard]] friend tint operator*(float s, tint c) noexcept { return {s * c.r, s * c.g, s * c.b}; }
+};
+
+/// One face while it is painted.
+class canvas {
+ public:
+  /// Sizes in metres, `texel` metres each.
+  canvas(double width, double height, double texel)
+      : texel_{texel},
+        width_{std::max(1, static_cast<int>(width / texel + 0.999))},
+        height_{std::max(1, static_cast<int>(height / texel + 0.999))},
+        texels_(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_)) {}
+
+  [[nodiscard]] int width() const noexcept { return width_; }
+  [[nodiscard]] int height() const noexcept { return height_; }
+  [[nodiscard]] tint& operator()(int x, int y) noexcept {
+    return texels_[static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(x)];
+  }
+
+  /// The base, texel by texel.
+  void prime(material m, std::uint64_t seed) {
+    random_bits bits{seed};
+    const tint base = base_colour(m, bits);
+    const bool quiet = m == material::plain;
+    for (int y = 0; y != height_; ++y)
+      for (int x = 0; x != width_; ++x) {
+        const double u = (x + 0.5) * texel_, v = (y + 0.5) * texel_;
+        (*this)(x, y) = shade(m, seed, u, v, quiet) * base;
+      }
+  }
+
+  /// `per_square_metre` patches, large ones first.
+  void scatter(double per_square_metre, double contrast, std::uint64_t seed) {
+    random_bits bits{seed};
+    const double w = width_ * texel_, h = height_ * texel_;
+    const int count = static_cast<int>(per_square_metre * w * h + bits.uniform());
+    for (int i = 0; i < count; ++i) {
+      // The i-th largest of `count` radii with N(> r) ~ r^-2.
+      const double rank = (i + bits.uniform()) / count;
+      const double r = std::min(smallest_patch / std::sqrt(rank + 1e-9), largest_patch);
+      const double u = between(bits, 0.0, w), v = between(bits, 0.0, h);
+      stamp(u, v, r, patch_colour(contrast, bits), bits);
+    }
+  }
+
+ private:
+  static constexpr double smallest_patch = 0.009;  // metres
+  static constexpr double largest_patch = 0.22;
+
+  [[nodiscard]] static tint base_colour(material m, random_bits& bits) {
+    const auto around = [&](double r, double g, double b) {
+      const double gain = between(bits, 0.85, 1.15);
+      const double dr = between(bits, -0.06, 0.06), dg = between(bits, -0.04, 0.04), db = between(bits, -0.06, 0.06);
+      return tint{static_cast<float>(gain * (r + dr)), static_cast<float>(gain * (g + dg)),
+                  static_cast<float>(gain * (b + db))};
+    };
+    switch (m) {
+      case material::plain: return around(0.80, 0.78, 0.72);
+      case material::wallpaper: return around(0.72, 0.68, 0.56);
+      case material::brick: return around(0.62, 0.36, 0.28);
+      case material::tile: return around(0.60, 0.62, 0.62);
+      case material::wood: return around(0.58, 0.40, 0.24);
+      case material::fabric: return around(0.34, 0.42, 0.60);
+      case material::books: return around(0.55, 0.50, 0.45);
+      case material::clutter: return around(0.62, 0.60, 0.50);
+    }
+    return {};
+  }
+
+  [[nodiscard]] static tint patch_colour(double contrast, random_bits& bits) {
+    // Bright or dark, seldom in between; a third of them coloured.
+    const double level = bits.uniform() < 0.5 ? between(bits, 0.05, 0.40) : between(bits, 0.60, 1.0);
+    const double mixed = 0.55 + contrast * (level - 0.55);
+    const double colourful = bits.uniform() < 0.35 ? 0.45 : 0.08;
+    const double dr = between(bits, -colourful, colourful), dg = between(bits, -colourful, colourful),
+                 db = between(bits, -colourful, colourful);
+    return {static_cast<float>(std::clamp(mixed + dr, 0.0, 1.0)), static_cast<float>(std::clamp(mixed + dg, 0.0, 1.0)),
+            static_cast<float>(std::clamp(mixed + db, 0.0, 1.0))};
+  }
+
+  [[nodiscard]] static float cell_noise(std::uint64_t seed, std::int64_t i, std::int64_t j) noexcept {
+    return static_cast<float>(
+        upper_fraction(noise_word(seed, static_cast<std::uint64_t>(i), static_cast<std::uint64_t>(j))));
+  }
+  /// Smooth noise in [-1, 1] with one swing for each unit of `u` and `v`.
+  [[nodiscard]] static float value_noise(std::uint64_t seed, double u, double v) noexcept {
+    const std::int64_t i = floor_of(u), j = floor_of(v);
+    const auto f = static_cast<float>(u - static_cast<double>(i)), g = static_cast<float>(v - static_cast<double>(j));
+    const float a = cell_noise(seed, i, j), b = cell_noise(seed, i + 1, j);
+    const float c = cell_noise(seed, i, j + 1), d = cell_noise(seed, i + 1, j + 1);
+    const float top = a + f * (b - a), bottom = c + f * (d - c);
+    return 2.0F * (top + g * (bottom - top)) - 1.0F;
+  }
+
+  /// Brightness factors of the base at (u, v) metres.
+  [[nodiscard]] static tint shade_grey(float s) noexcept { return {s, s, s}; }
+  struct factor {
+    tint f;
+    [[nodiscard]] friend tint operator*(factor a, tint c) noexcept { return {a.f.r * c.r, a.f.g * c.g, a.f.b * c.b}; }
+  };
+  [[nodiscard]] static factor shade(material m, std::uint64_t seed, double u, double v, bool quiet) noexcept {
+    const float slow = value_noise(seed, 1.7 * u, 1.7 * v);
+    if (quiet) return {shade_grey(1.0F + 0.03F * slow)};
+    float s = 1.0F + 0.10F * slow;
+    switch (m) {
+      case material::brick: {
+        const std::int64_t row = floor_of(v / 0.08);
+        const double shifted = u / 0.24 + ((row & 1) != 0 ? 0.5 : 0.0);
+        const std::int64_t column = floor_of(shifted);
+        const double a = shifted - static_cast<double>(column), b = v / 0.08 - static_cast<double>(row);
+        if (a < 0.04 || b < 0.12) return {tint{1.25F, 1.9F, 2.2F}};
+        s *= 0.7F + 0.6F * cell_noise(seed + 1, column, row);
+        break;
+      }
+      case material::tile: {
+        const std::int64_t i = floor_of(u / 0.25), j = floor_of(v / 0.25);
+        const double a = u / 0.25 - static_cast<double>(i), b = v / 0.25 - static_cast<double>(j);
+        if (a < 0.03 || b < 0.03) return {shade_grey(0.45F)};
+        s *= (((i + j) & 1) != 0 ? 0.78F : 1.1F) + 0.25F * cell_noise(seed + 1, i, j);
+        break;
+      }
+      case material::wood: s *= 1.0F + 0.22F * value_noise(seed + 1, 2.0 * u, 45.0 * v); break;
+      case material::fabric: s *= 1.0F + 0.25F * value_noise(seed + 1, 60.0 * u, 60.0 * v); break;
+      case material::books: {
+        const double spine = u / 0.035;
+        const std::int64_t i = floor_of(spine);
+        const double a = spine - static_cast<double>(i);
+        if (a < 0.08) return {shade_grey(0.2F)};
+        const float red = 0.3F + 1.3F * cell_noise(seed + 1, i, 0), green = 0.3F + 1.3F * cell_noise(seed + 2, i, 0),
+                    blue = 0.3F + 1.3F * cell_noise(seed + 3, i, 0);
+        return {tint{s * red, s * green, s * blue}};
+      }
+      case material::plain:
+      case material::wallpaper:
+      case material::clutter: s *= 1.0F + 0.08F * value_noise(seed + 1, 9.0 * u, 9.0 * v); break;
+    }
+    return {shade_grey(s)};
+  }
+
+  /// One patch: a disc, or a convex polygon of three or four corners.
+  void stamp(double u, double v, double r, tint colour, random_bits& bits) {
+    const int x0 = std::max(0, static_cast<int>((u - r) / texel_)),
+              x1 = std::min(width_ - 1, static_cast<int>((u + r) / texel_));
+    const int y0 = std::max(0, static_cast<int>((v - r) / texel_)),
+              y1 = std::min(height_ - 1, static_cast<int>((v + r) / texel_));
+    const int corners = 2 + static_cast<int>(bits.below(3));  // 2: a disc
+    const double at = bits.uniform();
+    std::array<triple, 4> sides{};  // n.x x + n.y y <= n.z
+    for (int k = 0; k != corners; ++k) {
+      const double angle = at + (k + 0.3 * bits.uniform()) / corners;
+      sides[static_cast<std::size_t>(k)] = {cos_turns(angle), sin_turns(angle), r * between(bits, 0.35, 0.75)};
+    }
+    for (int y = y0; y <= y1; ++y) {
+      const double b = (y + 0.5) * texel_ - v;
+      for (int x = x0; x <= x1; ++x) {
+        const double a = (x + 0.5) * texel_ - u;
+        if (a * a + b * b > r * r) continue;
+        bool inside = true;
+        if (corners > 2)
+          for (int k = 0; k != corners; ++k) {
+            const triple& n = sides[static_cast<std::size_t>(k)];
+            inside = inside && n.x * a + n.y * b <= n.z;
+          }
+        if (inside) (*this)(x, y) = colour;
+      }
+    }
+  }
+
+  double texel_;
+  int width_, height_;
+  std::vector<tint> texels_;
+};
+
+/// All faces of a scene, painted and lit, in pyramids.
+class texture_set {
+ public:
+  /// Paints every face with `texel` metres for each texel. O(surface / texel^2).
+  template <execution_policy Policy>
+  texture_set(const Policy& policy, const scene& room, double texel)
+      : inverse_texel_{1.0 / texel}, faces_(6 * room.solids().size()) {
+    for_each_index(policy, faces_.size(), 1, [&](std::size_t i) { paint(room, i, texel); });
+  }
+
+  /// The colour (red in the lowest byte) at (u, v) metres from the corner of face `face` of solid
+  /// `of`, where a pixel covers `footprint` metres.
+  [[nodiscard]] std::uint32_t sample(std::size_t of, int face, double u, double v, double footprint) const noexcept {
+    const pyramid& p = faces_[6 * of + static_cast<std::size_t>(face)];
+    // The logarithm to base 2, linear between powers of two, in 1/256.
+    const auto relative = static_cast<float>(footprint * inverse_texel_);
+    const int detail = (std::bit_cast<std::int32_t>(relative) - 0x3f800000) >> 15;
+    const auto a = static_cast<float>(u * inverse_texel_), b = static_cast<float>(v * inverse_texel_);
+    if (detail <= 0) return pack(bilinear(p, 0, a, b));
+    const int last = p.levels - 1;
+    const int level = std::min(detail >> 8, last);
+    const std::uint64_t fine = bilinear(p, level, a, b);
+    if (level == last) return pack(fine);
+    return pack(blend(fine, bilinear(p, level + 1, a, b), static_cast<std::uint64_t>(detail & 255)));
+  }
+
+ private:
+  static constexpr int most_levels = 12;
+  struct pyramid {
+    std::vector<std::uint32_t> texels;
+    std::array<std::uint32_t, most_levels> begin{};
+    std::array<std::int32_t, most_levels> width{}, height{};
+    int levels = 0;
+  };
+
+  // Three channels side by side in one word, 16 bits apart.
+  [[nodiscard]] static std::uint64_t spread(std::uint32_t c) noexcept {
+    return (c & 0xffU) | (std::uint64_t{c & 0xff00U} << 8U) | (std::uint64_t{c & 0xff0000U} << 16U);
+  }
+  [[nodiscard]] static std::uint32_t pack(std::uint64_t s) noexcept {
+    return static_cast<std::uint32_t>((s & 0xffU) | ((s >> 8U) & 0xff00U) | ((s >> 16U) & 0xff0000U));
+  }
+  /// (a (256 - weight) + b weight) / 256, rounded, in each channel.
+  [[nodiscard]] static std::uint64_t blend(std::uint64_t a, std::uint64_t b, std::uint64_t weight) noexcept {
+    return ((a * (256 - weight) + b * weight + 0x0000008000800080ULL) >> 8U) & 0x000000ff00ff00ffULL;
+  }
+
+  [[nodiscard]] static std::uint64_t bilinear(const pyramid& p, int level, float u, float v) noexcept {
+    const auto l = static_cast<std::size_t>(level);
+    const float scale = std::bit_cast<float>((127 - level) << 23);  // 2^-level
+    const int w = p.width[l], h = p.height[l];
+    // In 1/256 texel, measured between texel centres.
+    const int x = std::clamp(static_cast<int>(u * scale * 256.0F) - 128, 0, (w - 1) * 256);
+    const int y = std::clamp(static_cast<int>(v * scale * 256.0F) - 128, 0, (h - 1) * 256);
+    const int i = x >> 8, j = y >> 8;
+    const std::uint32_t* row = p.texels.data() + p.begin[l] + j * w + i;
+    const int right = i + 1 < w ? 1 : 0, below = j + 1 < h ? w : 0;
+    const auto f = static_cast<std::uint64_t>(x & 255), g = static_cast<std::uint64_t>(y & 255);
+    const std::uint64_t top = blend(spread(row[0]), spread(row[right]), f);
+    const std::uint64_t bottom = blend(spread(row[below]), spread(row[below + right]), f);
+    return blend(top, bottom, g);
+  }
+
+  struct look {
+    material surface;
+    double patches;   ///< for each square metre
+    double contrast;  ///< of the patches
+  };
+
+  [[nodiscard]] static look look_of(const scene& room, std::size_t of, int face) noexcept {
+    material m = room.solids()[of].surface;
+    if (of == 0) {
+      if (face == 4) m = material::tile;   // floor
+      if (face == 5) m = material::plain;  // ceiling
+      if (face == 1 && !room.is_poor_wall(1)) m = material::brick;
+      if (room.is_poor_wall(face)) m = material::plain;
+    }
+    look l{m, 0.0, 0.8};
+    switch (m) {
+      case material::plain: l.patches = of == 0 ? 10.0 : 6.0; break;
+      case material::wallpaper: l.patches = 160.0; break;
+      case material::brick: l.patches = 120.0; break;
+      case material::tile: l.patches = 120.0; break;
+      case material::wood: l.patches = 160.0; break;
+      case material::fabric: l.patches = 300.0; break;
+      case material::books: l.patches = 250.0; break;
+      case material::clutter: l.patches = 700.0, l.contrast = 1.0; break;
+    }
+    if (of == 0 && face == 5) l.patches = 60.0;
+    l.patches *= room.options().texture_density;
+    return l;
+  }
+
+  /// The light that falls on a place of the room: some from everywhere, some from under the ceiling.
+  [[nodiscard]] static float light(const scene& room, triple p, triple normal) noexcept {
+    const triple to_lamp = triple{0.0, 0.0, room.options().height - 0.5} - p;
+    const double d = std::max(length(to_lamp), 0.3);
+    const double facing = std::max(0.0, dot(normal, to_lamp) / d);
+    const double window = std::max(0.0, 0.6 * normal.x + 0.48 * normal.y + 0.64 * normal.z);
+    return static_cast<float>(0.46 + 0.55 * facing / (0.6 + 0.15 * d * d) + 0.16 * window);
+  }
+
+  void paint(const scene& room, std::size_t index, double texel) {
+    const std::size_t of = index / 6;
+    const int face = static_cast<int>(index % 6);
+    const solid& s = room.solids()[of];
+    const std::array<double, 3> half{s.half.x, s.half.y, s.half.z};
+    const int axis = face / 2;
+    const auto ua = static_cast<std::size_t>(axis == 0 ? 1 : 0), va = static_cast<std::size_t>(axis == 2 ? 1 : 2);
+    const std::uint64_t seed = noise_word(s.seed, 7, static_cast<std::uint64_t>(face));
+    const look l = look_of(room, of, face);
+    canvas c{2.0 * half[ua], 2.0 * half[va], texel};
+    c.prime(l.surface, seed);
+    c.scatter(l.patches, l.contrast, mix64(seed));
+
+    pyramid& p = faces_[index];
+    p.width[0] = c.width();
+    p.height[0] = c.height();
+    p.texels.reserve(static_cast<std::size_t>(c.width()) * static_cast<std::size_t>(c.height()) * 4 / 3 + 32);
+    const bool round = s.kind == shape::sphere || s.kind == shape::cylinder;
+    for (int y = 0; y != c.height(); ++y)
+      for (int x = 0; x != c.width(); ++x) {
+        std::array<double, 3> at{}, normal{};
+        at[ua] = (x + 0.5) * texel - half[ua];
+        at[va] = (y + 0.5) * texel - half[va];
+        at[static_cast<std::size_t>(axis)] =
+            (face & 1) != 0 ? half[static_cast<std::size_t>(axis)] : -half[static_cast<std::size_t>(axis)];
+        triple n{};
+        if (round && (s.kind == shape::sphere || axis != 2)) {
+          n = {at[0], at[1], s.kind == shape::sphere ? at[2] : 0.0};
+          n = (1.0 / length(n)) * n;
+        } else {
+          normal[static_cast<std::size_t>(axis)] = ((face & 1) != 0) != (s.kind == shape::room) ? 1.0 : -1.0;
+          n = {normal[0], normal[1], normal[2]};
+        }
+        const float brightness =
+            light(room, s.centre + s.to_world_direction({at[0], at[1], at[2]}), s.to_world_direction(n));
+        const tint t = c(x, y);
+        const auto byte = [&](float v) {
+          return static_cast<std::uint32_t>(std::clamp(v * brightness, 0.0F, 1.0F) * 255.0F + 0.5F);
+        };
+        p.texels.push_back(byte(t.r) | byte(t.g) << 8U | byte(t.b) << 16U);
+      }
+    p.levels = 1;
+    while (p.levels < most_levels && (p.width[static_cast<std::size_t>(p.levels - 1)] > 1 ||
+                                      p.height[static_cast<std::size_t>(p.levels - 1)] > 1))
+      halve(p);
+  }
+
+  /// Appends the next level: means of two by two.
+  static void halve(pyramid& p) {
+    const auto l = static_cast<std::size_t>(p.levels);
+    const int w = p.width[l - 1], h = p.height[l - 1];
+    const std::size_t from = p.begin[l - 1];
+    p.begin[l] = static_cast<std::uint32_t>(p.texels.size());
+    p.width[l] = (w + 1) / 2;
+    p.height[l] = (h + 1) / 2;
+    const auto texel = [&](int x, int y) {
+      return spread(p.texels[from + static_cast<std::size_t>(std::min(y, h - 1) * w + std::min(x, w - 1))]);
+    };
+    for (int y = 0; y != p.height[l]; ++y)
+      for (int x = 0; x != p.width[l]; ++x) {
+        const std::uint64_t sum =
+            texel(2 * x, 2 * y) + texel(2 * x + 1, 2 * y) + texel(2 * x, 2 * y + 1) + texel(2 * x + 1, 2 * y + 1);
+        p.texels.push_back(pack(((sum + 0x0000000200020002ULL) >> 2U) & 0x000000ff00ff00ffULL));
+      }
+    ++p.levels;
+  }
+
+  double inverse_texel_;
+  std::vector<pyramid> faces_;
+};
+
+}  // namespace orbis::io::synthetic
+
+#if defined(__clang__)
+#pragma float_control(pop)
+#elif defined(__GNUC__)
+#pragma GCC pop_options
+#endif
