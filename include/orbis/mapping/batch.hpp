@@ -26,24 +26,24 @@
 namespace orbis::mapping {
 
 struct map_options {
-  dense_options dense;
-  filter_options filter;
-  double resolution = 0.05;                 ///< of the octrees, metres; > 0
-  octree::integration_options integration;  ///< of every keyframe's points into the octrees
-  bool unfiltered_octree = true;            ///< build the octree of the unfiltered points as well
+  dense_options dense{};
+  filter_options filter{};
+  double resolution = 0.05;                   ///< of the octrees, metres; > 0
+  octree::integration_options integration{};  ///< of every keyframe's points into the octrees
+  bool unfiltered_octree = true;              ///< build the octree of the unfiltered points as well
 };
 
 /// The map, and how it came to be.
 template <class Octree>
 struct built_map {
-  point_cloud cloud;           ///< all keyframes' points, in the world
-  point_cloud filtered_cloud;  ///< those that the filter kept
-  filter_report filter;
-  std::optional<Octree> unfiltered_octree;
-  Octree octree;                             ///< of the points that the filter kept, each seen from its own keyframe
-  std::vector<double> insert_ms;             ///< into `octree`, for each keyframe
-  std::vector<double> insert_ms_unfiltered;  ///< into `unfiltered_octree`, for each keyframe, if it is built
-  std::size_t skipped = 0;                   ///< keyframes without a finite pose
+  point_cloud cloud{};           ///< all keyframes' points, in the world
+  point_cloud filtered_cloud{};  ///< those that the filter kept
+  filter_report filter{};
+  std::optional<Octree> unfiltered_octree{};
+  Octree octree;                               ///< of the points that the filter kept, each seen from its own keyframe
+  std::vector<double> insert_ms{};             ///< into `octree`, for each keyframe
+  std::vector<double> insert_ms_unfiltered{};  ///< into `unfiltered_octree`, for each keyframe, if it is built
+  std::size_t skipped = 0;                     ///< keyframes without a finite pose
 };
 
 /// Splices the keyframes into a cloud, filters it, and integrates each keyframe's own measurements,

@@ -29,19 +29,19 @@ enum class filter_kind {
 
 struct filter_options {
   filter_kind kind = filter_kind::automatic;
-  cloud::select_options automatic;  ///< its `ranges` are set from the map
-  cloud::statistical_options statistical;
-  cloud::radius_options radius;
+  cloud::select_options automatic{};  ///< its `ranges` are set from the map
+  cloud::statistical_options statistical{};
+  cloud::radius_options radius{};
 };
 
 /// What a filter did, and why.
 struct filter_report {
   cloud::filter_mode mode = cloud::filter_mode::none;
-  std::string reason;
+  std::string reason{};
   std::size_t points = 0;  ///< before
   std::size_t removed = 0;
   double seconds = 0;
-  std::optional<cloud::filter_choice> choice;  ///< where the cloud chose
+  std::optional<cloud::filter_choice> choice{};  ///< where the cloud chose
 };
 
 struct filtered_indices {
