@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Everything in orbis::octree: the log-odds occupancy octree.
+#pragma once
+
+#include <orbis/octree/brick.hpp>
+#include <orbis/octree/cast_ray.hpp>
+#include <orbis/octree/depth_points.hpp>
+#include <orbis/octree/files.hpp>
+#include <orbis/octree/hash_index.hpp>
+#include <orbis/octree/integration.hpp>
+#include <orbis/octree/key.hpp>
+#include <orbis/octree/occupancy_octree.hpp>
+#include <orbis/octree/pruned_tree.hpp>
+#include <orbis/octree/ray_walk.hpp>
+#include <orbis/octree/scan.hpp>
+#include <orbis/octree/sensor_model.hpp>

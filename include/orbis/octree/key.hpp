@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Voxel keys: which voxel a coordinate lies in, to the last bit as OctoMap computes it.
+#pragma once
+
+#include <array>
+#include <cassert>
+#include <cmath>
+#include <cstdint>
+#include <optional>
+
+#include <orbis/core/point.hpp>
+#include <orbis/core/types.hpp>
+
+namespace orbis::octree {
+
+/// The number of levels below the root, and the number of voxels along one axis.
+inline constexpr int tree_depth = 16;
+inline constexpr std::uint32_t keys_per_axis = std::uint32_t{1} << tree_depth;
+
+/// A voxel's place in the grid: 0 ... keys_per_axis - 1 along each axis; the world's origin is the
+/// lower corner of voxel (32768, 32768, 32768). An inner node is named by its lowest voxel.
+struct voxel_key {
+  std::uint32_t x = 0, y = 0, z = 0;
+  friend constexpr bool operator==(const voxel_key&, const voxel_key&) = default;
+};
+
+/// The i-th child of a node: bit 0 of `i` is x, bit 1 is y, bit 2 is z. `size`: of the child, in voxels.
+[[nodiscard]] constexpr voxel_key child_key(const voxel_key& parent, unsigned i, std::uint32_t size) noexcept {
+  return {parent.x + (i & 1U) * size, parent.y + (i >> 1U & 1U) * size, parent.z + (i >> 2U & 1U) * size};
+}
+
+/// The edge of a node at `depth`, in voxels.
+[[nodiscard]] constexpr std::uint32_t node_cells(int depth) noexcept {
+  return std::uint32_t{1} << static_cast<unsigned>(tree_depth - depth);
+}
+
+/// The regular grid of voxels.
+class voxel_grid {
+ public:
+  /// `resolution`: the edge of a voxel, metres. @pre finite and > 0
+  explicit voxel_grid(double resolution) noexcept : resolution_{resolution}, per_metre_{1.0 / resolution} {
+    assert(std::isfinite(resolution) && resolution > 0.0);
+  }
+
+  [[nodiscard]] double resolution() const noexcept { return resolution_; }
+
+  /// The key along one axis; empty outside the grid and for NaN.
+  [[nodiscard]] std::optional<std::uint32_t> key(double coordinate) const noexcept {
+    const double cell = std::floor(per_metre_ * coordinate);
+    if (!(cell >= -half && cell < half)) return std::nullopt;
+    return static_cast<std::uint32_t>(static_cast<std::int32_t>(cell) + static_cast<std::int32_t>(half));
+  }
+  /// The voxel that `p` (metres) lies in; empty outside the grid and for NaN.
+  template <point_like P>
+  [[nodiscard]] std::optional<voxel_key> key(const P& p) const noexcept {
+    const auto c = coordinates<double>(p);
+    const auto x = key(c[0]);
+    const auto y = key(c[1]);
+    const auto z = key(c[2]);
+    if (!x || !y || !z) return std::nullopt;
+    return voxel_key{*x, *y, *z};
+  }
+
+  /// The centre of voxel `k` along one axis, metres.
+  [[nodiscard]] double center(std::uint32_t k) const noexcept {
+    return (static_cast<double>(static_cast<std::int32_t>(k) - static_cast<std::int32_t>(half)) + 0.5) * resolution_;
+  }
+  [[nodiscard]] vec3 center(const voxel_key& k) const noexcept { return {center(k.x), center(k.y), center(k.z)}; }
+  /// The centre of the node at `depth` whose lowest voxel is `k`, metres.
+  [[nodiscard]] vec3 center(const voxel_key& k, int depth) const noexcept {
+    const double cells = node_cells(depth);
+    const auto along = [&](std::uint32_t c) {
+      return ((static_cast<double>(c) - half) / cells + 0.5) * (resolution_ * cells);
+    };
+    return depth == 0 ? vec3(vec3::Zero()) : vec3{along(k.x), along(k.y), along(k.z)};
+  }
+  /// The edge of a node at `depth`, metres.
+  [[nodiscard]] double node_size(int depth) const noexcept { return resolution_ * node_cells(depth); }
+
+ private:
+  static constexpr double half = keys_per_axis / 2;
+  double resolution_;
+  double per_metre_;
+};
+
+}  // namespace orbis::octree

@@ -1,0 +1,277 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// The occupancy map: a log-odds octree, bit for bit the one OctoMap would make of the same scans.
+///
+/// A. Hornung, K. M. Wurm, M. Bennewitz, C. Stachniss, W. Burgard, "OctoMap: An efficient
+/// probabilistic 3D mapping framework based on octrees", Autonomous Robots 34, 2013.
+#pragma once
+
+#include <bit>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include <orbis/core/execution.hpp>
+#include <orbis/core/point.hpp>
+#include <orbis/core/types.hpp>
+#include <orbis/octree/brick.hpp>
+#include <orbis/octree/cast_ray.hpp>
+#include <orbis/octree/depth_points.hpp>
+#include <orbis/octree/integration.hpp>
+#include <orbis/octree/pruned_tree.hpp>
+#include <orbis/octree/sensor_model.hpp>
+
+namespace orbis::octree {
+
+/// A leaf of the pruned octree: a cube in which everything has the same log-odds.
+template <class T>
+struct octree_leaf {
+  voxel_key key;    ///< its lowest voxel
+  int depth = 0;    ///< tree_depth for a single voxel
+  vec3 center;      ///< metres
+  double size = 0;  ///< edge, metres
+  T log_odds{};
+  bool occupied = false;
+};
+
+/// Numbers of nodes of the pruned octree.
+struct octree_counts {
+  std::size_t nodes = 0;  ///< inner nodes and leaves
+  std::size_t leaves = 0;
+  std::size_t occupied_leaves = 0;
+  std::size_t free_leaves = 0;
+};
+
+/// An axis-aligned box, metres.
+struct bounding_box {
+  vec3 min = vec3::Zero();
+  vec3 max = vec3::Zero();
+};
+
+/// A map of free, occupied and unknown space in voxels of a fixed size, 65536 along each axis and
+/// centred at the world's origin. Coordinates are metres in the world frame.
+///
+/// @code
+///   orbis::octree::occupancy_octree<> map{0.05};
+///   map.integrate(points_world, sensor_origin, {.max_range = 5.0});
+///   if (map.state(p) == orbis::octree::occupancy::occupied) ...
+/// @endcode
+///
+/// Const members may be called from several threads at once.
+template <sensor_model Model = log_odds<>>
+class occupancy_octree {
+ public:
+  using model = Model;
+  using value_type = typename Model::value_type;
+  using leaf = octree_leaf<value_type>;
+
+  /// `resolution`: the edge of a voxel, metres. @pre finite and > 0
+  explicit occupancy_octree(double resolution) : grid_{resolution} {}
+
+  [[nodiscard]] double resolution() const noexcept { return grid_.resolution(); }
+  [[nodiscard]] const voxel_grid& grid() const noexcept { return grid_; }
+
+  // -- insertion
+
+  /// Takes in a scan: points in the world frame, seen from `origin`. Every voxel that a ray crosses
+  /// is observed free once, every voxel that holds a point is observed occupied once, however many
+  /// rays and points there are; where both is the case, occupied wins. Coordinates are rounded to
+  /// float first. The map comes out the same under every policy.
+  template <execution_policy Policy, point_range Points, point_like Origin>
+  integration_summary integrate(const Policy& policy, const Points& points, const Origin& origin,
+                                const integration_options& options = {}) {
+    const auto first = std::ranges::begin(points);
+    const auto point = [&](std::size_t i) {
+      return coordinates<float>(first[static_cast<std::ranges::range_difference_t<const Points>>(i)]);
+    };
+    const auto count = static_cast<std::size_t>(std::ranges::size(points));
+    integration_summary summary = marker_.mark(policy, grid_, count, point, coordinates<float>(origin), options);
+    apply(marker_.masks(), summary);
+    return summary;
+  }
+  template <point_range Points, point_like Origin>
+  integration_summary integrate(const Points& points, const Origin& origin, const integration_options& options = {}) {
+    return integrate(seq, points, origin, options);
+  }
+  /// Takes in a depth image: the same as its points in the world (see append_world_points), seen
+  /// from the camera's centre. @pre depth and camera have the same size
+  template <execution_policy Policy, camera::depth_source Depth, camera::camera_model Camera>
+  integration_summary integrate(const Policy& policy, const Depth& depth, const Camera& camera,
+                                const se3& T_world_camera, const integration_options& options = {}) {
+    points_.clear();
+    append_world_points(depth, camera, T_world_camera, points_);
+    return integrate(policy, points_, T_world_camera.translation(), options);
+  }
+  template <camera::depth_source Depth, camera::camera_model Camera>
+  integration_summary integrate(const Depth& depth, const Camera& camera, const se3& T_world_camera,
+                                const integration_options& options = {}) {
+    return integrate(seq, depth, camera, T_world_camera, options);
+  }
+
+  /// Gives the node at `depth` (tree_depth: one voxel) whose lowest voxel is `key` one value.
+  /// @pre nothing is known inside it yet; key is a multiple of the node's size
+  void set_unknown_node(const voxel_key& key, int depth, value_type value) { store_.set_node(key, depth, value); }
+
+  /// Forgets everything but the resolution.
+  void clear() {
+    store_.clear();
+    marker_ = {};
+    points_ = {};
+  }
+
+  // -- queries
+
+  /// The log-odds at `p`, empty where unknown or outside the grid.
+  template <point_like P>
+  [[nodiscard]] std::optional<value_type> log_odds(const P& p) const {
+    const auto key = grid_.key(p);
+    return key ? log_odds(*key) : std::nullopt;
+  }
+  [[nodiscard]] std::optional<value_type> log_odds(const voxel_key& key) const {
+    const value_type* value = store_.value(key);
+    return value != nullptr ? std::optional<value_type>{*value} : std::nullopt;
+  }
+  /// The probability that `p` is occupied, empty where unknown or outside the grid.
+  template <class P>
+  requires point_like<P> || std::same_as<P, voxel_key>
+  [[nodiscard]] std::optional<double> probability(const P& p) const {
+    const auto value = log_odds(p);
+    return value ? std::optional{probability_of(static_cast<double>(*value))} : std::nullopt;
+  }
+  /// What is known about `p`.
+  template <class P>
+  requires point_like<P> || std::same_as<P, voxel_key>
+  [[nodiscard]] occupancy state(const P& p) const {
+    const auto value = log_odds(p);
+    if (!value) return occupancy::unknown;
+    return is_occupied<Model>(*value) ? occupancy::occupied : occupancy::free;
+  }
+
+  /// The first voxel along a ray that is occupied, or unknown unless `ignore_unknown`; a range that
+  /// is infinite or <= 0 is no limit. See ray_hit. O(voxels along the ray).
+  template <point_like Origin, point_like Direction>
+  [[nodiscard]] ray_hit cast_ray(const Origin& origin, const Direction& direction,
+                                 double max_range = std::numeric_limits<double>::infinity(),
+                                 bool ignore_unknown = false) const {
+    return octree::cast_ray<Model>(store_, grid_, coordinates<float>(origin), coordinates<float>(direction), max_range,
+                                   ignore_unknown);
+  }
+
+  /// Calls `visit(const leaf&)` for every leaf of the pruned octree, depth first.
+  /// O(bricks log bricks + known voxels).
+  template <std::invocable<const leaf&> Visit>
+  void for_each_leaf(Visit&& visit) const {
+    visit_tree(on_leaf([&](const voxel_key& key, int depth, value_type v) {
+      visit(leaf{key, depth, grid_.center(key, depth), grid_.node_size(depth), v, is_occupied<Model>(v)});
+    }));
+  }
+  /// Visits the nodes of the pruned octree in preorder, see pruned_tree::visit.
+  template <class Visitor>
+  void visit_tree(Visitor&& visitor) const {
+    visit_tree([](value_type v) { return v; }, visitor);
+  }
+  /// The same, of the octree whose voxels hold `value(log-odds)`.
+  template <class Value, class Visitor>
+  void visit_tree(Value&& value, Visitor&& visitor) const {
+    pruned_tree<value_type, std::remove_cvref_t<Value>>{store_, value}.visit(visitor);
+  }
+
+  /// Counts nodes. O(bricks log bricks + known voxels), as are the four after it.
+  [[nodiscard]] octree_counts counts() const {
+    octree_counts n;
+    visit_tree(counter{n});
+    return n;
+  }
+  /// Leaves of the pruned octree, of any size.
+  [[nodiscard]] std::size_t num_leaves() const { return counts().leaves; }
+  [[nodiscard]] std::size_t num_occupied_leaves() const { return counts().occupied_leaves; }
+  [[nodiscard]] std::size_t num_free_leaves() const { return counts().free_leaves; }
+  /// Nodes of the pruned octree, inner nodes and leaves.
+  [[nodiscard]] std::size_t size() const { return counts().nodes; }
+  [[nodiscard]] bool empty() const noexcept { return store_.empty(); }
+
+  /// The smallest box around everything known; empty if nothing is.
+  [[nodiscard]] std::optional<bounding_box> bounds() const {
+    std::optional<bounding_box> box;
+    for_each_leaf([&](const leaf& l) {
+      const vec3 low = l.center.array() - l.size / 2.0;
+      const vec3 high = low.array() + l.size;
+      if (!box) box = bounding_box{low, high};
+      box->min = box->min.cwiseMin(low);
+      box->max = box->max.cwiseMax(high);
+    });
+    return box;
+  }
+
+  /// Bytes on the heap: the map's own, and the buffers kept for the next scan.
+  [[nodiscard]] std::size_t memory_bytes() const noexcept { return store_.memory_bytes(); }
+  [[nodiscard]] std::size_t buffer_bytes() const noexcept {
+    return marker_.memory_bytes() + points_.capacity() * sizeof(vec3f);
+  }
+
+ private:
+  template <class OnLeaf>
+  struct leaf_visitor {
+    OnLeaf visit;
+    void leaf(const voxel_key& key, int depth, value_type v) { visit(key, depth, v); }
+    template <class Children>
+    void inner(const voxel_key&, int, value_type, const Children&) {}
+  };
+  template <class OnLeaf>
+  static leaf_visitor<OnLeaf> on_leaf(OnLeaf visit) {
+    return {std::move(visit)};
+  }
+  struct counter {
+    octree_counts& n;
+    void leaf(const voxel_key&, int, value_type v) {
+      ++n.nodes;
+      ++n.leaves;
+      ++(is_occupied<Model>(v) ? n.occupied_leaves : n.free_leaves);
+    }
+    template <class Children>
+    void inner(const voxel_key&, int, value_type, const Children&) {
+      ++n.nodes;
+    }
+  };
+
+  void apply(const scan_masks& scan, integration_summary& summary) {
+    for (const scan_brick& s : scan.bricks()) {
+      brick<value_type>& b = store_.make(named_key(s.name));
+      for (std::uint32_t i = 0; i != 8; ++i) {
+        const std::uint64_t occupied = s.occupied[i];
+        const std::uint64_t free = s.free[i] & ~occupied;
+        summary.occupied += static_cast<std::size_t>(std::popcount(occupied));
+        summary.free += static_cast<std::size_t>(std::popcount(free));
+        if ((occupied | free) != 0) apply(b, i, occupied, free);
+      }
+    }
+  }
+  void apply(brick<value_type>& b, std::uint32_t octant, std::uint64_t occupied, std::uint64_t free) {
+    if ((b.uniform >> octant & 1U) != 0) {
+      // Most of a room is at its bound already: nothing can change, so nothing is unpacked.
+      const value_type v = b.value[octant];
+      if ((occupied == 0 || v >= Model::clamp_max) && (free == 0 || v <= Model::clamp_min)) return;
+    }
+    block<value_type>& voxels = store_.make_block(b, octant);
+    for (std::uint64_t bits = free; bits != 0; bits &= bits - 1) {
+      value_type& v = voxels.value[static_cast<std::size_t>(std::countr_zero(bits))];
+      v = after_miss<Model>(v);
+    }
+    for (std::uint64_t bits = occupied; bits != 0; bits &= bits - 1) {
+      value_type& v = voxels.value[static_cast<std::size_t>(std::countr_zero(bits))];
+      v = after_hit<Model>(v);
+    }
+    voxels.known |= occupied | free;
+    if (voxels.is_uniform()) store_.make_uniform(b, octant, voxels.value[0]);
+  }
+
+  voxel_grid grid_;
+  brick_store<value_type> store_;
+  scan_marker marker_;
+  std::vector<vec3f> points_;
+};
+
+}  // namespace orbis::octree

@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// One scan as sets of voxels: which were crossed, which were hit. Bit masks per brick, so that
+/// marking a voxel a thousand times costs a thousand `or`s and no memory.
+#pragma once
+
+#include <array>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include <orbis/octree/brick.hpp>
+#include <orbis/octree/ray_walk.hpp>
+
+namespace orbis::octree {
+
+/// What a scan says about one brick; word i is octant i.
+struct scan_brick {
+  std::uint64_t name = 0;
+  std::array<std::uint64_t, 8> free{};
+  std::array<std::uint64_t, 8> occupied{};
+};
+
+/// The voxels a scan touches. Reused from scan to scan without giving memory back.
+class scan_masks {
+ public:
+  [[nodiscard]] const std::vector<scan_brick>& bricks() const noexcept { return bricks_; }
+  void clear() noexcept {
+    index_.clear();
+    bricks_.clear();
+  }
+  /// The masks of the brick that contains `k`; valid until the next call.
+  [[nodiscard]] scan_brick& at(const voxel_key& k) { return named(node_name(k, brick_depth)); }
+
+  void mark_occupied(const voxel_key& k) {
+    const std::uint32_t place = place_in_brick(k);
+    at(k).occupied[place >> 6U] |= std::uint64_t{1} << (place & 63U);
+  }
+  /// Marks the voxels that the ray crosses as free, see walk_ray.
+  void mark_ray(const voxel_grid& grid, const float3& origin, const voxel_key& from, const float3& end,
+                const voxel_key& to) {
+    voxel_key last{~std::uint32_t{0}, 0, 0};  // in no brick
+    std::uint64_t* free = nullptr;
+    walk_ray(grid, origin, from, end, to, [&](const voxel_key& k) {
+      if ((((k.x ^ last.x) | (k.y ^ last.y) | (k.z ^ last.z)) >> 3U) != 0) {
+        free = at(k).free.data();
+        last = k;
+      }
+      const std::uint32_t place = place_in_brick(k);
+      free[place >> 6U] |= std::uint64_t{1} << (place & 63U);
+    });
+  }
+  /// Adds what `other` marked.
+  void merge(const scan_masks& other) {
+    for (const scan_brick& from : other.bricks_) {
+      scan_brick& to = named(from.name);
+      for (std::size_t i = 0; i != 8; ++i) {
+        to.free[i] |= from.free[i];
+        to.occupied[i] |= from.occupied[i];
+      }
+    }
+  }
+  [[nodiscard]] std::size_t memory_bytes() const noexcept {
+    return index_.memory_bytes() + bricks_.capacity() * sizeof(scan_brick);
+  }
+
+ private:
+  [[nodiscard]] scan_brick& named(std::uint64_t name) {
+    const std::uint32_t i = index_.find(name);
+    if (i != hash_index::none) return bricks_[i];
+    index_.set(name, static_cast<std::uint32_t>(bricks_.size()));
+    return bricks_.emplace_back(scan_brick{.name = name});
+  }
+
+  hash_index index_;
+  std::vector<scan_brick> bricks_;
+};
+
+/// Calls `visit(place)` for the place in the brick of every bit set in `masks`.
+template <class Visit>
+void for_each_place(const std::array<std::uint64_t, 8>& masks, Visit&& visit) {
+  for (std::uint32_t octant = 0; octant != 8; ++octant)
+    for (std::uint64_t bits = masks[octant]; bits != 0; bits &= bits - 1)
+      visit(octant << 6U | static_cast<std::uint32_t>(std::countr_zero(bits)));
+}
+
+}  // namespace orbis::octree
