@@ -37,39 +37,39 @@ namespace orbis {
 }
 
 /// Calls `write(std::ostream&)` on a temporary file beside `path` and renames it to `path` when
-/// everything, the closing included, succeeded; otherwise removes it and leaves `path` as it was.
-/// `write` may return `void`, or `result<void>` to give up. Errors: write_failed, or `write`'s own.
+/// everything, the closing included, succeeded; otherwise (an exception from `write` included)
+/// removes it and leaves `path` as it was. `write` may return `void`, or `result<void>` to give up.
+/// Errors: write_failed, or `write`'s own.
 template <class Write>
 [[nodiscard]] result<void> write_file_atomically(const std::filesystem::path& path, Write&& write) {
   namespace fs = std::filesystem;
-  fs::path temporary = path;
-  temporary += ".part";
-  const auto give_up = [&](std::string why) -> result<void> {
-    std::error_code ignored;
-    fs::remove(temporary, ignored);
-    return fail(errc::write_failed, path.string(), std::move(why));
+  struct temporary_file {
+    fs::path path;
+    bool in_place = false;
+    ~temporary_file() {
+      std::error_code ignored;
+      if (!in_place) fs::remove(path, ignored);
+    }
   };
+  const auto reason = [] { return std::generic_category().message(errno != 0 ? errno : EIO); };
 
+  fs::path beside = path;
+  beside += ".part";
   errno = 0;
-  std::ofstream out{temporary, std::ios::binary | std::ios::trunc};
-  if (!out)
-    return fail(errc::write_failed, path.string(), "cannot be created: " + std::generic_category().message(errno));
+  std::ofstream out{beside, std::ios::binary | std::ios::trunc};
+  if (!out) return fail(errc::write_failed, path.string(), "cannot be created: " + reason());
+  temporary_file temporary{std::move(beside)};
   if constexpr (std::is_void_v<std::invoke_result_t<Write&, std::ostream&>>) {
     write(static_cast<std::ostream&>(out));
   } else {
-    result<void> done = write(static_cast<std::ostream&>(out));
-    if (!done) {
-      out.close();
-      std::error_code ignored;
-      fs::remove(temporary, ignored);
-      return fail(std::move(done.error()));
-    }
+    if (result<void> done = write(static_cast<std::ostream&>(out)); !done) return fail(std::move(done.error()));
   }
   out.close();
-  if (!out) return give_up("cannot be written: " + std::generic_category().message(errno != 0 ? errno : EIO));
+  if (!out) return fail(errc::write_failed, path.string(), "cannot be written: " + reason());
   std::error_code ec;
-  fs::rename(temporary, path, ec);
-  if (ec) return give_up("cannot be put in place: " + ec.message());
+  fs::rename(temporary.path, path, ec);
+  if (ec) return fail(errc::write_failed, path.string(), "cannot be put in place: " + ec.message());
+  temporary.in_place = true;
   return {};
 }
 

@@ -45,7 +45,10 @@ class random_bits {
   }
   /// Mean 0, standard deviation 1, close to normal out to four sigma: a centred binomial of 64
   /// coin flips, smoothed by a uniform of its own step width. Uses no function of libm.
-  [[nodiscard]] constexpr double normal() noexcept { return normal_of((*this)(), (*this)()); }
+  [[nodiscard]] constexpr double normal() noexcept {
+    const result_type first = (*this)();  // named, since the order of arguments is the compiler's choice
+    return normal_of(first, (*this)());
+  }
 
   /// `normal()` of two given random words, for counter-based noise.
   [[nodiscard]] static constexpr double normal_of(std::uint64_t a, std::uint64_t b) noexcept {

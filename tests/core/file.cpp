@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <filesystem>
+#include <fstream>
+#include <ostream>
+#include <stdexcept>
+#include <string>
+
+#include <unistd.h>
+
+#include <orbis/core/file.hpp>
+
+#include "support/catch.hpp"
+
+namespace fs = std::filesystem;
+using namespace orbis;
+
+namespace {
+
+/// A folder of one's own that goes away again.
+struct scratch_folder {
+  fs::path path = fs::temp_directory_path() / ("orbis_core_file_" + std::to_string(::getpid()));
+  scratch_folder() { fs::create_directories(path); }
+  ~scratch_folder() { fs::remove_all(path); }
+  scratch_folder(const scratch_folder&) = delete;
+  scratch_folder& operator=(const scratch_folder&) = delete;
+  [[nodiscard]] std::ptrdiff_t files() const {
+    return std::distance(fs::directory_iterator{path}, fs::directory_iterator{});
+  }
+};
+
+result<void> write_text(const fs::path& path, const std::string& text) {
+  return write_file_atomically(path, [&](std::ostream& out) { out << text; });
+}
+
+}  // namespace
+
+TEST_CASE("what was written is read again whatever the bytes") {
+  const scratch_folder folder;
+  std::string bytes;
+  for (int i = 0; i != 200000; ++i) bytes += static_cast<char>(i * 7);
+  for (const std::string& text : {std::string{}, std::string{"a\r\n\0b", 5}, bytes}) {
+    REQUIRE(write_text(folder.path / "file", text));
+    const auto again = read_file(folder.path / "file");
+    REQUIRE(again);
+    CHECK(*again == text);
+    CHECK(folder.files() == 1);
+  }
+}
+
+TEST_CASE("files that are not there or not readable are told apart") {
+  const scratch_folder folder;
+  const auto absent = read_file(folder.path / "absent");
+  REQUIRE(!absent);
+  CHECK(absent.error().code == errc::not_found);
+  CHECK(absent.error().where == (folder.path / "absent").string());
+  const auto directory = read_file(folder.path);
+  REQUIRE(!directory);
+  CHECK(directory.error().code == errc::unreadable);
+  if (fs::exists("/proc/self/mem")) {  // opens, but its first page cannot be read
+    const auto broken = read_file("/proc/self/mem");
+    REQUIRE(!broken);
+    CHECK(broken.error().code == errc::unreadable);
+  }
+  if (fs::exists("/proc/self/stat")) CHECK(!read_file("/proc/self/stat").value().empty());  // says it has size 0
+}
+
+TEST_CASE("a writer that gives up or throws leaves the old file and nothing else") {
+  const scratch_folder folder;
+  const fs::path path = folder.path / "kept.txt";
+  REQUIRE(write_text(path, "old"));
+
+  const auto given_up = write_file_atomically(path, [](std::ostream& out) -> result<void> {
+    out << "half of it";
+    return fail(errc::cancelled, "writer", "was asked to stop");
+  });
+  REQUIRE(!given_up);
+  CHECK(given_up.error().code == errc::cancelled);
+  CHECK(read_file(path).value() == "old");
+  CHECK(folder.files() == 1);
+
+  CHECK_THROWS_AS((void)write_file_atomically(path,
+                                              [](std::ostream& out) {
+                                                out << "half of it";
+                                                throw std::runtime_error{"no more"};
+                                              }),
+                  std::runtime_error);
+  CHECK(read_file(path).value() == "old");
+  CHECK(folder.files() == 1);
+
+  const auto broken = write_file_atomically(path, [](std::ostream& out) { out.setstate(std::ios::badbit); });
+  REQUIRE(!broken);
+  CHECK(broken.error().code == errc::write_failed);
+  CHECK(read_file(path).value() == "old");
+  CHECK(folder.files() == 1);
+
+  const auto good = write_file_atomically(path, [](std::ostream& out) -> result<void> {
+    out << "new";
+    return {};
+  });
+  CHECK(good);
+  CHECK(read_file(path).value() == "new");
+}
+
+TEST_CASE("a full disk is an error whether it shows in writing or in closing") {
+  if (!fs::exists("/dev/full")) return;
+  const scratch_folder folder;
+  const fs::path path = folder.path / "map.bt";
+  REQUIRE(write_text(path, "old"));
+  for (const std::size_t size : {std::size_t{10}, std::size_t{1} << 20U}) {  // buffered, and beyond the buffer
+    fs::create_symlink("/dev/full", folder.path / "map.bt.part");
+    const auto full = write_text(path, std::string(size, 'x'));
+    REQUIRE(!full);
+    CHECK(full.error().code == errc::write_failed);
+    CHECK(full.error().where == path.string());
+    CHECK(full.error().message.find("No space left") != std::string::npos);
+    CHECK(read_file(path).value() == "old");
+    CHECK(folder.files() == 1);
+  }
+}
+
+TEST_CASE("a file that cannot be created says so and names the file") {
+  const scratch_folder folder;
+  REQUIRE(write_text(folder.path / "plain", "x"));
+  for (const fs::path& path : {folder.path / "absent" / "file", folder.path / "plain" / "file"}) {
+    const auto r = write_text(path, "text");
+    REQUIRE(!r);
+    CHECK(r.error().code == errc::write_failed);
+    CHECK(r.error().to_string().find(path.string()) == 0);
+  }
+  fs::create_directories(folder.path / "occupied" / "by");
+  const auto r = write_text(folder.path / "occupied", "text");
+  REQUIRE(!r);
+  CHECK(r.error().code == errc::write_failed);
+  CHECK(!fs::exists(folder.path / "occupied.part"));
+}
