@@ -62,13 +62,13 @@ class camera_path {
       return options_.jitter * amplitude *
              (smooth_noise(seed_, stream, 3.0 * time) + 0.4 * smooth_noise(seed_, stream + 50, 9.0 * time));
     };
-    const double reach = 1.0 + sway(0.08, 3, 0.1) + sway(0.03, 7, 0.6);
+    const double reach = 1.0 + sway(0.08, 3, 0.1) + sway(0.015, 7, 0.6);
     camera_pose pose;
     pose.position = {reach * options_.semi_axis_x * cos_turns(turn) + tremble(0.004, 0),
                      reach * options_.semi_axis_y * sin_turns(turn) + tremble(0.004, 1),
                      options_.height + sway(0.10, 2, 0.3) + sway(0.02, 11, 0.8) + tremble(0.004, 2)};
     constexpr double turns_per_radian = 0.15915494309189535;
-    const double yaw = turn + sway(0.035, 2, 0.7) + sway(0.012, 5, 0.2) + turns_per_radian * tremble(0.006, 3);
+    const double yaw = turn + sway(0.035, 2, 0.7) + sway(0.008, 5, 0.2) + turns_per_radian * tremble(0.006, 3);
     const double pitch =
         turns_per_radian * (options_.pitch + sway(0.09, 3, 0.45) + sway(0.02, 8, 0.15) + tremble(0.006, 4));
     const double roll = turns_per_radian * (sway(0.05, 2, 0.55) + sway(0.02, 6, 0.35) + tremble(0.006, 5));

@@ -27,7 +27,7 @@ namespace orbis::io {
 
 /// What to record.
 struct synthetic_options {
-  int frames = 360;           ///< how many
+  int frames = 400;           ///< how many
   double fps = 30.0;          ///< frames per second
   std::uint64_t seed = 1;     ///< of the room, its textures, the path and the noise
   int width = 640;            ///< pixels

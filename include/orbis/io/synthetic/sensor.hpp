@@ -4,7 +4,6 @@
 #pragma once
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -41,7 +40,7 @@ struct sensor_options {
   double disparity_step = 0.125;  ///< resolution of the disparity, pixels of the infrared camera
   double infrared_focal = 580.0;  ///< of the infrared camera, pixels: disparity = focal * baseline / depth
   double baseline = 0.075;        ///< from projector to camera, metres
-  double grazing_angle = 1.40;    ///< radians from the normal: surfaces seen flatter are lost; dropping out
+  double grazing_angle = 1.45;    ///< radians from the normal: surfaces seen flatter are lost; dropping out
                                   ///< begins 0.15 radians before
   bool shadow = true;             ///< no depth where the projector (on the right) does not reach
   double dropouts = 0.002;        ///< share of pixels lost anywhere
@@ -102,16 +101,16 @@ class sensor {
   void measure_depth(const exact_view& exact, int y, std::span<std::uint16_t> out) const {
     const int width = exact.depth.width();
     const std::vector<bool> dark = options_.shadow ? shadow_of(exact.depth.row(y)) : std::vector<bool>{};
+    const std::uint64_t key = noise_word(seed_, 1, static_cast<std::uint64_t>(y)) << 16U;
     for (int x = 0; x != width; ++x) {
       const auto i = static_cast<std::size_t>(x);
       out[i] = 0;
       if (!dark.empty() && dark[i]) continue;
-      const auto pixel = static_cast<std::uint64_t>(y) * 65536U + static_cast<std::uint64_t>(x);
-      const std::uint64_t chance = noise_word(seed_, 1, pixel);
+      const std::uint64_t chance = mix64(key + static_cast<std::uint64_t>(x));
       if (lower_fraction(chance) < options_.dropouts) continue;
       if (is_grazed(exact.cosine(x, y), upper_fraction(chance))) continue;
       const std::uint64_t word = mix64(chance);
-      const double z = perturbed(beside_edge(exact.depth, x, y, word), word);
+      const double z = perturbed(beside_edge(exact, x, y, word), word);
       if (z < options_.min_depth || (options_.max_depth > 0.0 && z > options_.max_depth)) continue;
       const double stored = z * depth_scale_ + 0.5;
       if (stored < 65535.0) out[i] = static_cast<std::uint16_t>(stored);
@@ -122,21 +121,20 @@ class sensor {
   void measure_colour(std::span<rgb8> row, int y, int width, int height, double exposure_gain) const noexcept {
     const bool plain = options_.vignetting == 0.0 && exposure_gain == 1.0;
     if (plain && options_.colour_noise == 0.0) return;
-    const auto sigma = static_cast<float>(options_.colour_noise * 0.4364357804719847);  // 1 / sqrt(21 / 4)
+    const auto sigma = static_cast<float>(options_.colour_noise * 0.015625476858987186);  // of the sum below
+    const std::uint64_t key = noise_word(seed_, 2, static_cast<std::uint64_t>(y)) << 16U;
     const double cx = 0.5 * (width - 1), cy = 0.5 * (height - 1), corner = cx * cx + cy * cy;
     for (int x = 0; x != width; ++x) {
       float gain = 1.0F;
       if (!plain)
         gain = static_cast<float>(exposure_gain *
                                   (1.0 - options_.vignetting * ((x - cx) * (x - cx) + (y - cy) * (y - cy)) / corner));
-      const std::uint64_t a =
-          noise_word(seed_, 2, static_cast<std::uint64_t>(y) * 65536U + static_cast<std::uint64_t>(x));
-      // Of 21 coin flips each, smoothed by a uniform of 21 bits: close enough to normal for colours.
-      const std::uint64_t b = a * 0xd1342543de82ef95ULL;
+      const std::uint64_t word = mix64(key + static_cast<std::uint64_t>(x));
       const auto channel = [&](std::uint8_t value, unsigned shift) {
-        const auto flips = static_cast<float>(std::popcount((a >> shift) & 0x1fffffU));
-        const auto step = static_cast<float>((b >> shift) & 0x1fffffU) * 0x1.0p-21F;
-        const float v = gain * static_cast<float>(value) + sigma * (flips + step - 11.0F);
+        // The sum of three uniforms of 7 bits: close enough to normal for colours.
+        const std::uint64_t w = word >> shift;
+        const auto sum = static_cast<float>(static_cast<int>((w & 127U) + ((w >> 7U) & 127U) + ((w >> 14U) & 127U)));
+        const float v = gain * static_cast<float>(value) + sigma * (sum - 190.5F);
         return static_cast<std::uint8_t>(std::clamp(v, 0.0F, 255.0F) + 0.5F);
       };
       rgb8& p = row[static_cast<std::size_t>(x)];
@@ -164,37 +162,37 @@ class sensor {
     return dark;
   }
 
-  /// Whether two depths side by side belong to different surfaces.
-  [[nodiscard]] static bool is_edge(double a, double b) noexcept {
-    return std::abs(a - b) > 0.03 + 0.02 * std::min(a, b);
-  }
-
   /// The depth a ray through (x, y) ends up with: near a depth edge perhaps a neighbour's, or one in
   /// between.
-  [[nodiscard]] double beside_edge(const image<float>& depth, int x, int y, std::uint64_t word) const noexcept {
-    const double z = static_cast<double>(depth(x, y));
-    if (options_.lateral_noise == 0.0 && options_.flying_pixels == 0.0) return z;
-    const auto at = [&](int dx, int dy) {
-      return static_cast<double>(
-          depth(std::clamp(x + dx, 0, depth.width() - 1), std::clamp(y + dy, 0, depth.height() - 1)));
-    };
-    double other = z;
-    for (const double n : {at(-1, 0), at(1, 0), at(0, -1), at(0, 1)})
-      if (std::abs(n - z) > std::abs(other - z)) other = n;
-    if (!is_edge(z, other)) return z;
+  [[nodiscard]] double beside_edge(const exact_view& exact, int x, int y, std::uint64_t word) const noexcept {
+    const image<float>& depth = exact.depth;
+    const float* here = depth.data() + std::ptrdiff_t{y} * depth.width() + x;
+    const float z = *here;
+    if (options_.lateral_noise == 0.0 && options_.flying_pixels == 0.0) return static_cast<double>(z);
+    const float left = here[x > 0 ? -1 : 0], right = here[x + 1 < depth.width() ? 1 : 0];
+    const float above = here[y > 0 ? -depth.width() : 0], below = here[y + 1 < depth.height() ? depth.width() : 0];
+    const float lowest = std::min(std::min(left, right), std::min(above, below));
+    const float highest = std::max(std::max(left, right), std::max(above, below));
+    const float other = z - lowest > highest - z ? lowest : highest;
+    if (std::abs(z - other) <= 0.03F + 0.02F * std::min(z, other)) return static_cast<double>(z);  // no edge
     const std::uint64_t fresh = mix64(word ^ 0x6564676573ULL);
     if (upper_fraction(fresh) < options_.flying_pixels) {
       // In between in disparity, as a correlation window that sees both surfaces would find.
       const double f = lower_fraction(fresh);
-      return 1.0 / ((1.0 - f) / z + f / other);
+      return 1.0 / ((1.0 - f) / static_cast<double>(z) + f / static_cast<double>(other));
     }
-    const double sideways = options_.lateral_noise * random_bits::normal_of(fresh, word);
-    return std::abs(sideways) > 0.5 ? other : z;
+    const double sideways = options_.lateral_noise * normal_from(mix64(fresh));
+    return static_cast<double>(std::abs(sideways) > 0.5 ? other : z);
+  }
+
+  /// Mean 0, deviation 1, close to normal out to three deviations: the sum of four uniforms.
+  [[nodiscard]] static double normal_from(std::uint64_t word) noexcept {
+    const std::uint64_t sum = (word & 0xffffU) + ((word >> 16U) & 0xffffU) + ((word >> 32U) & 0xffffU) + (word >> 48U);
+    return (static_cast<double>(sum) - 131070.0) * 2.6428997918226276e-05;  // sqrt(3) / 65536
   }
 
   [[nodiscard]] double perturbed(double z, std::uint64_t word) const noexcept {
-    if (options_.axial_noise != 0.0)
-      z += options_.axial_noise * axial_deviation(z) * random_bits::normal_of(mix64(word), word);
+    if (options_.axial_noise != 0.0) z += options_.axial_noise * axial_deviation(z) * normal_from(word);
     if (options_.disparity_step != 0.0 && z > 0.0) {
       const double fb = options_.infrared_focal * options_.baseline;
       const double steps = static_cast<double>(floor_of(fb / (z * options_.disparity_step) + 0.5));
