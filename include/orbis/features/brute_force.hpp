@@ -13,6 +13,7 @@
 #include <orbis/features/hamming.hpp>
 #include <orbis/features/hamming_nearest.hpp>
 #include <orbis/features/match.hpp>
+#include <orbis/features/nearest.hpp>
 
 namespace orbis::features {
 
@@ -38,7 +39,7 @@ struct brute_force_source {
     if constexpr (std::same_as<Distance, hamming> && has_hamming_kernel<Descriptor>) {
       hamming_nearest(level, queries.descriptors, trains.descriptors, nearest, reverse);
     } else {
-      detail::nearest_by(distance, queries.descriptors, trains.descriptors, std::span{nearest}, std::span{reverse});
+      nearest_by(distance, queries.descriptors, trains.descriptors, std::span{nearest}, std::span{reverse});
     }
 
     std::vector<candidate> candidates(query_count);

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// The two nearest neighbours by any distance: the plain definition.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <vector>
+
+namespace orbis::features {
+
+/// The nearest of a set, the lowest index on ties, and the distance of the second nearest; the
+/// largest number where there is none.
+struct nearest_two {
+  std::uint32_t index = std::numeric_limits<std::uint32_t>::max();
+  std::uint32_t distance = std::numeric_limits<std::uint32_t>::max();
+  std::uint32_t second_distance = std::numeric_limits<std::uint32_t>::max();
+  friend constexpr bool operator==(const nearest_two&, const nearest_two&) = default;
+};
+
+/// For each query its nearest and second nearest train; if `reverse` is not empty, for each train
+/// its nearest query (the lowest on ties). O(queries x trains).
+/// @pre nearest.size() == queries.size(); reverse is empty or of the size of trains
+///
+/// Always inlined, so that it is compiled for the instruction set of the function that calls it.
+template <class Distance, class Descriptor>
+[[gnu::always_inline]] inline void nearest_by(const Distance& distance, std::span<const Descriptor> queries,
+                                              std::span<const Descriptor> trains, std::span<nearest_two> nearest,
+                                              std::span<std::uint32_t> reverse) {
+  std::vector<std::uint32_t> reverse_distance(reverse.size(), std::numeric_limits<std::uint32_t>::max());
+  const Descriptor* const train = trains.data();
+  const std::size_t train_count = trains.size();
+  for (std::size_t q = 0; q != queries.size(); ++q) {
+    const Descriptor& query = queries[q];
+    nearest_two best;
+    for (std::size_t t = 0; t != train_count; ++t) {
+      const auto d = static_cast<std::uint32_t>(distance(query, train[t]));
+      if (d < best.distance) {
+        best = {static_cast<std::uint32_t>(t), d, best.distance};
+      } else if (d < best.second_distance) {
+        best.second_distance = d;
+      }
+      if (!reverse.empty() && d < reverse_distance[t]) {
+        reverse_distance[t] = d;
+        reverse[t] = static_cast<std::uint32_t>(q);
+      }
+    }
+    nearest[q] = best;
+  }
+}
+
+}  // namespace orbis::features
