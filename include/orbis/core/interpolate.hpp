@@ -32,7 +32,8 @@ namespace orbis {
   }
   const stamped_pose* nearest = nullptr;
   if (after != poses.end()) nearest = &*after;
-  if (after != poses.begin() && (nearest == nullptr || timestamp - after[-1].timestamp <= nearest->timestamp - timestamp))
+  if (after != poses.begin() &&
+      (nearest == nullptr || timestamp - after[-1].timestamp <= nearest->timestamp - timestamp))
     nearest = &after[-1];
   if (nearest == nullptr || std::abs(nearest->timestamp - timestamp) > max_distance) return std::nullopt;
   return nearest->T_world_camera;

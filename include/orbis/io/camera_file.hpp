@@ -70,8 +70,10 @@ class camera_fields {
   std::string text(const char* name) {
     const auto node = table_[name];
     const std::optional<std::string> value = node.value<std::string>();
-    if (!node) reject(name, "is missing");
-    else if (!value) reject(name, "must be a string");
+    if (!node)
+      reject(name, "is missing");
+    else if (!value)
+      reject(name, "must be a string");
     return value.value_or("");
   }
   std::vector<double> numbers(const char* name) {
@@ -125,8 +127,8 @@ class camera_fields {
       .cx = fields.number("cx", std::nullopt, "a finite number", [](double v) { return std::abs(v) < 1e9; }),
       .cy = fields.number("cy", std::nullopt, "a finite number", [](double v) { return std::abs(v) < 1e9; })};
   const std::vector<double> d = fields.numbers("distortion");
-  camera::camera_settings settings{.model = {}, .depth_scale = fields.positive("depth_scale", 1000.0),
-                                   .fps = fields.positive("fps", 30.0)};
+  camera::camera_settings settings{
+      .model = {}, .depth_scale = fields.positive("depth_scale", 1000.0), .fps = fields.positive("fps", 30.0)};
   if (table.contains("baseline")) settings.baseline = fields.positive("baseline");
   if (fields.failure()) return fail(*fields.failure());
 
@@ -140,8 +142,8 @@ class camera_fields {
     settings.model = camera::pinhole{k};
   } else if (model == "radtan") {
     if (d.size() != 4 && d.size() != 5 && d.size() != 8) return wrong_length("4, 5 or 8");
-    settings.model = camera::radial_tangential{
-        k, {list(0), list(1), list(2), list(3), list(4), list(5), list(6), list(7)}};
+    settings.model =
+        camera::radial_tangential{k, {list(0), list(1), list(2), list(3), list(4), list(5), list(6), list(7)}};
   } else if (model == "kannala_brandt") {
     if (d.size() != 4) return wrong_length("4");
     settings.model = camera::kannala_brandt{k, {list(0), list(1), list(2), list(3)}};
@@ -182,9 +184,9 @@ inline result<void> write_camera(const std::filesystem::path& path, const camera
   }
   return write_file_atomically(path, [&](std::ostream& out) {
     out << "model = \"" << settings.model.model_name() << "\"\n"
-        << "width = " << std::to_string(k.width) << "\nheight = " << std::to_string(k.height) << "\nfx = "
-        << number(k.fx) << "\nfy = " << number(k.fy) << "\ncx = " << number(k.cx) << "\ncy = " << number(k.cy)
-        << "\ndistortion = [" << distortion << "]\n"
+        << "width = " << std::to_string(k.width) << "\nheight = " << std::to_string(k.height)
+        << "\nfx = " << number(k.fx) << "\nfy = " << number(k.fy) << "\ncx = " << number(k.cx)
+        << "\ncy = " << number(k.cy) << "\ndistortion = [" << distortion << "]\n"
         << "depth_scale = " << number(settings.depth_scale) << "  # stored value / depth_scale = metres\n"
         << "fps = " << number(settings.fps) << "\n";
     if (settings.baseline) out << "baseline = " << number(*settings.baseline) << "\n";

@@ -46,8 +46,10 @@ inline std::vector<recording_entry> icl_numbered_frames(const std::filesystem::p
     const std::string extension = color.extension().string();
     if (!parse_number(color.stem().string(), number) || (extension != ".png" && extension != ".jpg")) continue;
     const auto depth = folder / "depth" / color.filename().replace_extension(".png");
-    if (present(depth)) frames.push_back({static_cast<double>(number), color, depth, {}});
-    else ++without_depth;
+    if (present(depth))
+      frames.push_back({static_cast<double>(number), color, depth, {}});
+    else
+      ++without_depth;
   }
   if (without_depth != 0)
     notes.push_back(std::to_string(without_depth) + " colour images have no depth image and are left out");

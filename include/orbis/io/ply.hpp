@@ -59,9 +59,9 @@ struct ply_header {
 inline std::optional<scalar_type> ply_type(std::string_view name) {
   using enum scalar_type;
   constexpr std::pair<std::string_view, scalar_type> names[] = {
-      {"char", int8},     {"int8", int8},       {"uchar", uint8},     {"uint8", uint8},
-      {"short", int16},   {"int16", int16},     {"ushort", uint16},   {"uint16", uint16},
-      {"int", int32},     {"int32", int32},     {"uint", uint32},     {"uint32", uint32},
+      {"char", int8},     {"int8", int8},       {"uchar", uint8},    {"uint8", uint8},
+      {"short", int16},   {"int16", int16},     {"ushort", uint16},  {"uint16", uint16},
+      {"int", int32},     {"int32", int32},     {"uint", uint32},    {"uint32", uint32},
       {"float", float32}, {"float32", float32}, {"double", float64}, {"float64", float64}};
   for (const auto& [known, type] : names)
     if (known == name) return type;
@@ -84,10 +84,14 @@ inline result<ply_header> take_ply_header(std::string_view& bytes, const std::st
     if (word.empty() || word == "comment" || word == "obj_info") continue;
     if (word == "format") {
       const std::string_view name = next_field(line);
-      if (name == "ascii") header.format = ply_format::ascii;
-      else if (name == "binary_little_endian") header.format = ply_format::little;
-      else if (name == "binary_big_endian") header.format = ply_format::big;
-      else return bad("unknown format");
+      if (name == "ascii")
+        header.format = ply_format::ascii;
+      else if (name == "binary_little_endian")
+        header.format = ply_format::little;
+      else if (name == "binary_big_endian")
+        header.format = ply_format::big;
+      else
+        return bad("unknown format");
       has_format = true;
     } else if (word == "element") {
       ply_element element{std::string{next_field(line)}, 0, {}};
@@ -224,11 +228,10 @@ result<void> write_ply(const std::filesystem::path& path, const Points& points, 
   const auto count = static_cast<std::size_t>(std::ranges::size(points));
   assert(colors.empty() || colors.size() == count);
   const bool binary = options.encoding == ply_encoding::binary;
-  std::string bytes = std::string{"ply\nformat "} + (binary ? "binary_little_endian" : "ascii") +
-                      " 1.0\nelement vertex " + std::to_string(count) +
-                      "\nproperty float x\nproperty float y\nproperty float z\n" +
-                      (colors.empty() ? "" : "property uchar red\nproperty uchar green\nproperty uchar blue\n") +
-                      "end_header\n";
+  std::string bytes =
+      std::string{"ply\nformat "} + (binary ? "binary_little_endian" : "ascii") + " 1.0\nelement vertex " +
+      std::to_string(count) + "\nproperty float x\nproperty float y\nproperty float z\n" +
+      (colors.empty() ? "" : "property uchar red\nproperty uchar green\nproperty uchar blue\n") + "end_header\n";
   bytes.reserve(bytes.size() + count * (binary ? 15 : 40));
   std::size_t i = 0;
   for (const auto& point : points) {

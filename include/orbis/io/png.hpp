@@ -6,8 +6,6 @@
 /// trivial locals, so that no destructor is jumped over; whatever owns memory lives in its caller.
 #pragma once
 
-#include <png.h>
-
 #include <bit>
 #include <cassert>
 #include <concepts>
@@ -21,6 +19,8 @@
 #include <string>
 #include <string_view>
 #include <type_traits>
+
+#include <png.h>
 
 #include <orbis/core/file.hpp>
 #include <orbis/core/image.hpp>

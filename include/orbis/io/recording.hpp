@@ -123,8 +123,10 @@ class recording {
       frame_.reset();
       if (i_ == of_->size()) return;
       auto frame = of_->frame(i_);
-      if (frame) frame_ = std::make_shared<const camera::rgbd_frame>(*std::move(frame));
-      else of_->status_ = fail(std::move(frame.error()));
+      if (frame)
+        frame_ = std::make_shared<const camera::rgbd_frame>(*std::move(frame));
+      else
+        of_->status_ = fail(std::move(frame.error()));
     }
 
     recording* of_ = nullptr;

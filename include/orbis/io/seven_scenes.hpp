@@ -41,9 +41,12 @@ namespace orbis::io {
   for_each_line(*text, [&](std::string_view line, std::size_t number) {
     last_line = number;
     for (std::string_view field = next_field(line); !field.empty(); field = next_field(line)) {
-      if (count == 16) problem = "more than 16 numbers in a pose";
-      else if (!parse_number(field, m[count])) problem = "\"" + std::string{field.substr(0, 40)} + "\" is not a number";
-      else if (!std::isfinite(m[count++])) problem = "a pose with NaN or infinity";
+      if (count == 16)
+        problem = "more than 16 numbers in a pose";
+      else if (!parse_number(field, m[count]))
+        problem = "\"" + std::string{field.substr(0, 40)} + "\" is not a number";
+      else if (!std::isfinite(m[count++]))
+        problem = "a pose with NaN or infinity";
       if (!problem.empty()) return false;
     }
     return true;
@@ -53,8 +56,8 @@ namespace orbis::io {
 
   mat3 r;
   r << m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10];
-  const bool last_row = std::abs(m[12]) < 1e-3 && std::abs(m[13]) < 1e-3 && std::abs(m[14]) < 1e-3 &&
-                        std::abs(m[15] - 1.0) < 1e-3;
+  const bool last_row =
+      std::abs(m[12]) < 1e-3 && std::abs(m[13]) < 1e-3 && std::abs(m[14]) < 1e-3 && std::abs(m[15] - 1.0) < 1e-3;
   if (!last_row || r.determinant() < 0.0 || (r.transpose() * r - mat3::Identity()).cwiseAbs().maxCoeff() > 0.05)
     return fail(errc::malformed, path.string(), "the matrix is no rigid transform");
   const auto rotation = nearest_rotation(r);
@@ -173,10 +176,10 @@ inline std::vector<std::filesystem::path> seven_scenes_sequences(const std::file
     if (!k) return fail(k.error());
     const auto first = read_depth(index.frames.front().depth);
     if (!first) return fail(first.error());
-    index.camera = camera::camera_settings{.model = camera::pinhole{first->width(), first->height(), (*k)(0, 0),
-                                                                    (*k)(1, 1), (*k)(0, 2), (*k)(1, 2)},
-                                           .depth_scale = 1000.0,
-                                           .fps = 30.0};
+    index.camera = camera::camera_settings{
+        .model = camera::pinhole{first->width(), first->height(), (*k)(0, 0), (*k)(1, 1), (*k)(0, 2), (*k)(1, 2)},
+        .depth_scale = 1000.0,
+        .fps = 30.0};
   }
   return index;
 }

@@ -22,7 +22,8 @@ namespace orbis::io {
 /// The poses in `text`, sorted by time (stably). `where` names the source in errors; quaternions of
 /// any positive norm are normalised. Text without poses gives an empty trajectory.
 /// Errors: malformed, with the line (not 8 numbers, NaN or infinity, a zero quaternion).
-[[nodiscard]] inline result<trajectory> parse_trajectory(std::string_view text, const std::filesystem::path& where = {}) {
+[[nodiscard]] inline result<trajectory> parse_trajectory(std::string_view text,
+                                                         const std::filesystem::path& where = {}) {
   trajectory poses;
   std::string problem;
   std::size_t problem_line = 0;

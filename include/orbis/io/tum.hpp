@@ -154,8 +154,8 @@ struct stamped_file {
   }
 
   const std::string name = std::filesystem::absolute(folder).lexically_normal().string();
-  for (const auto& [word, preset] : {std::pair{"freiburg1", "tum_fr1"}, std::pair{"freiburg2", "tum_fr2"},
-                                     std::pair{"freiburg3", "tum_fr3"}}) {
+  for (const auto& [word, preset] :
+       {std::pair{"freiburg1", "tum_fr1"}, std::pair{"freiburg2", "tum_fr2"}, std::pair{"freiburg3", "tum_fr3"}}) {
     if (name.find(word) == std::string::npos) continue;
     if (auto camera = camera::preset(preset)) index.camera = *std::move(camera);
   }

@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Bringing an estimated trajectory into the frame of its reference.
+///
+/// Source: S. Umeyama, "Least-squares estimation of transformation parameters between two point
+/// patterns", PAMI 13(4), 1991.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <Eigen/LU>
+#include <Eigen/SVD>
+
+#include <orbis/core/associate.hpp>
+#include <orbis/core/result.hpp>
+#include <orbis/core/se3.hpp>
+#include <orbis/core/trajectory.hpp>
+
+namespace orbis::eval {
+
+/// An estimated pose and the reference pose of the same moment.
+struct pose_pair {
+  double timestamp = 0.0;  ///< of the estimate, seconds
+  se3 estimate;
+  se3 reference;
+};
+
+/// The poses of two trajectories that belong together by their time stamps (nearest first, each used
+/// once). @pre both are sorted by time
+[[nodiscard]] inline std::vector<pose_pair> pair_poses(const trajectory& estimate, const trajectory& reference,
+                                                       double max_time_difference) {
+  const auto stamps = [](const trajectory& poses) {
+    std::vector<double> t;
+    t.reserve(poses.size());
+    for (const stamped_pose& p : poses) t.push_back(p.timestamp);
+    return t;
+  };
+  std::vector<pose_pair> pairs;
+  for (const auto& [e, r] : associate(stamps(estimate), stamps(reference), max_time_difference))
+    pairs.push_back({estimate[e].timestamp, estimate[e].T_world_camera, reference[r].T_world_camera});
+  return pairs;
+}
+
+struct alignment_options {
+  bool with_scale = false;            ///< also estimate a scale, for trajectories without one
+  double max_time_difference = 0.02;  ///< between poses that belong together, seconds
+};
+
+/// `reference ~ scale * rotation * estimate + translation`.
+struct alignment {
+  double scale = 1.0;
+  se3 T_reference_estimate;  ///< the rotation and the translation
+  std::size_t pairs = 0;     ///< poses it was computed from
+
+  /// A position in the estimate's frame, in the reference's.
+  [[nodiscard]] vec3 operator*(const vec3& p) const {
+    return T_reference_estimate.rotation() * vec3(scale * p) + T_reference_estimate.translation();
+  }
+  /// A pose in the estimate's frame, in the reference's.
+  [[nodiscard]] se3 operator*(const se3& pose) const {
+    return {T_reference_estimate.rotation() * pose.rotation(), *this * pose.translation()};
+  }
+};
+
+/// The alignment of pairs of poses that is best for their positions (least squares).
+/// Errors: no_data (fewer than 3 pairs), degenerate (all positions on one line: the rotation about it
+/// is not determined; not finite). O(n).
+[[nodiscard]] inline result<alignment> align(const std::vector<pose_pair>& pairs, bool with_scale = false) {
+  constexpr const char* where = "trajectory alignment";
+  if (pairs.size() < 3)
+    return fail(errc::no_data, where,
+                "only " + std::to_string(pairs.size()) + " poses have a reference pose, at least 3 are needed");
+  const auto n = static_cast<double>(pairs.size());
+  vec3 mean_e = vec3::Zero(), mean_r = vec3::Zero();
+  for (const pose_pair& p : pairs) {
+    mean_e += p.estimate.translation() / n;
+    mean_r += p.reference.translation() / n;
+  }
+  mat3 covariance = mat3::Zero();
+  double variance_e = 0.0, variance_r = 0.0;
+  for (const pose_pair& p : pairs) {
+    const vec3 e = p.estimate.translation() - mean_e;
+    const vec3 r = p.reference.translation() - mean_r;
+    covariance += r * e.transpose() / n;
+    variance_e += e.squaredNorm() / n;
+    variance_r += r.squaredNorm() / n;
+  }
+  if (!covariance.allFinite() || !std::isfinite(variance_e) || !std::isfinite(variance_r))
+    return fail(errc::degenerate, where, "a position is not finite");
+  const Eigen::JacobiSVD<mat3> svd{covariance, Eigen::ComputeFullU | Eigen::ComputeFullV};
+  const vec3 s = svd.singularValues();
+  if (!(s[1] > 1e-9 * std::sqrt(variance_e * variance_r)) || !(s[1] > 0.0))
+    return fail(errc::degenerate, where, "all positions lie on one line, the rotation about it is not determined");
+  // Where the best orthogonal matrix mirrors, the best rotation flips the weakest direction.
+  vec3 sign(1.0, 1.0, 1.0);
+  if (svd.matrixU().determinant() * svd.matrixV().determinant() < 0.0) sign[2] = -1.0;
+  const so3 rotation(mat3(svd.matrixU() * sign.asDiagonal() * svd.matrixV().transpose()));
+  const double scale = with_scale ? s.dot(sign) / variance_e : 1.0;
+  return alignment{scale, se3(rotation, mean_r - rotation * vec3(scale * mean_e)), pairs.size()};
+}
+
+/// The alignment of two trajectories: poses are paired by time, then aligned. Errors: as above.
+/// @pre both are sorted by time
+[[nodiscard]] inline result<alignment> align(const trajectory& estimate, const trajectory& reference,
+                                             const alignment_options& options = {}) {
+  return align(pair_poses(estimate, reference, options.max_time_difference), options.with_scale);
+}
+
+}  // namespace orbis::eval
