@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// What can be set about the SLAM system.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+
+#include <orbis/core/se3.hpp>
+#include <orbis/features/orb.hpp>
+
+namespace orbis::slam {
+
+/// When a frame becomes a keyframe.
+struct keyframe_options {
+  std::size_t max_gap = 30;          ///< frames since the last one, at most (while enough is tracked)
+  double inlier_ratio = 0.75;        ///< of the landmarks that the reference keyframe has: below it, a new one
+  double inlier_ratio_start = 0.4;   ///< the same while there is one keyframe only
+  std::size_t min_inliers = 15;      ///< with fewer the pose is not trusted enough
+  std::size_t close_tracked = 100;   ///< fewer tracked close points than this ...
+  std::size_t close_untracked = 70;  ///< ... and more untracked ones than this: a new one
+};
+
+struct options {
+  /// Of the default extractor. `levels` and `scale_factor` must be those of any other extractor.
+  features::orb_options features{};
+  /// Baseline of the virtual stereo camera times focal length, pixel metres: the noise of the depth
+  /// sensor, in pixels of disparity, is taken to be that of a keypoint's position.
+  double bf = 40.0;
+  double min_depth = 0.1;               ///< metres; measurements outside are not used
+  double max_depth = 10.0;              ///< metres
+  double close_depth = 3.2;             ///< metres; points nearer than this become landmarks at once
+  std::size_t min_new_landmarks = 100;  ///< that many become landmarks even if they are not close
+  std::size_t min_start_points = 100;   ///< keypoints with depth it takes to start
+  std::size_t min_inliers = 20;         ///< of a tracked frame
+  std::size_t min_relocalized = 40;     ///< inliers of a relocalised frame
+  double motion_radius = 15.0;          ///< of the search around a prediction by motion, pixels of a keypoint's level
+  double search_radius = 4.0;           ///< of the search for landmarks around a refined pose, likewise
+  std::size_t local_keyframes = 40;     ///< whose landmarks are searched for in a frame
+  std::size_t relocalization_candidates = 8;  ///< keyframes that pose estimation is tried against, at most
+  keyframe_options keyframes{};
+  std::optional<se3> initial_pose;  ///< `T_world_camera` of the first frame; default: the identity
+  std::uint64_t seed = 1;           ///< of RANSAC
+};
+
+}  // namespace orbis::slam

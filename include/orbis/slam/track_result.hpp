@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// What tracking a frame tells.
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <optional>
+#include <string_view>
+
+#include <orbis/core/se3.hpp>
+#include <orbis/slam/frame.hpp>
+
+namespace orbis::slam {
+
+enum class track_state {
+  not_started,  ///< no frame yet had enough keypoints with depth
+  tracking,
+  lost,        ///< the pose of the last frame is not known
+  relocalized  ///< the last frame was found again in the map by its appearance
+};
+
+[[nodiscard]] constexpr std::string_view to_string(track_state state) noexcept {
+  switch (state) {
+    case track_state::not_started: return "not started";
+    case track_state::tracking: return "tracking";
+    case track_state::lost: return "lost";
+    case track_state::relocalized: return "relocalized";
+  }
+  return "unknown";
+}
+
+/// Wall time of the stages, milliseconds.
+struct track_timings {
+  double features_ms = 0.0;  ///< extraction and depth
+  double tracking_ms = 0.0;  ///< pose
+  double mapping_ms = 0.0;   ///< keyframe and map
+  [[nodiscard]] double total_ms() const noexcept { return features_ms + tracking_ms + mapping_ms; }
+};
+
+struct track_result {
+  track_state state = track_state::not_started;
+  std::optional<se3> T_world_camera;    ///< where tracked
+  std::size_t inliers = 0;              ///< landmarks that agree with the pose
+  std::optional<keyframe_id> keyframe;  ///< the number of the keyframe that the frame became, if it did
+  track_timings timings;
+  [[nodiscard]] bool tracked() const noexcept { return T_world_camera.has_value(); }
+};
+
+/// Over all frames so far. Frames before the start are neither tracked nor lost.
+struct track_counters {
+  std::size_t frames = 0;
+  std::size_t tracked = 0;  ///< relocalised ones included
+  std::size_t lost = 0;
+  std::size_t relocalized = 0;
+};
+
+struct keyframe_pose {
+  double timestamp = 0.0;
+  se3 T_world_camera;
+  std::size_t frame = 0;  ///< index of the frame it was, from 0
+};
+
+/// Time between laps.
+class stopwatch {
+ public:
+  void lap(double& milliseconds) {
+    const auto now = std::chrono::steady_clock::now();
+    milliseconds = std::chrono::duration<double, std::milli>(now - last_).count();
+    last_ = now;
+  }
+
+ private:
+  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
+};
+
+}  // namespace orbis::slam
