@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <cstdio>
+#include <cstdlib>
+#include <string>
+#include <vector>
+
+#include <jpeglib.h>
+
+#include <orbis/io/jpeg.hpp>
+
+#include "io/quiet.hpp"
+#include "io/temporary_folder.hpp"
+#include "support/catch.hpp"
+
+namespace io = orbis::io;
+
+namespace {
+
+/// A smooth picture as JPEG by libjpeg itself; `components` 1 (grey), 3 or 4 (CMYK).
+std::string encode(int width, int height, int components, bool progressive = false) {
+  jpeg_compress_struct info{};
+  jpeg_error_mgr errors{};
+  info.err = jpeg_std_error(&errors);
+  jpeg_create_compress(&info);
+  unsigned char* data = nullptr;
+  unsigned long size = 0;
+  jpeg_mem_dest(&info, &data, &size);
+  info.image_width = static_cast<JDIMENSION>(width);
+  info.image_height = static_cast<JDIMENSION>(height);
+  info.input_components = components;
+  info.in_color_space = components == 1 ? JCS_GRAYSCALE : components == 3 ? JCS_RGB : JCS_CMYK;
+  jpeg_set_defaults(&info);
+  jpeg_set_quality(&info, 98, TRUE);
+  if (progressive) jpeg_simple_progression(&info);
+  jpeg_start_compress(&info, TRUE);
+  std::vector<unsigned char> row(static_cast<std::size_t>(width * components));
+  for (int y = 0; y != height; ++y) {
+    for (int x = 0; x != width; ++x)
+      for (int c = 0; c != components; ++c)
+        row[static_cast<std::size_t>(x * components + c)] =
+            static_cast<unsigned char>(2 * x + (c == 1 ? 3 * y : 40 * c));
+    JSAMPROW p = row.data();
+    jpeg_write_scanlines(&info, &p, 1);
+  }
+  jpeg_finish_compress(&info);
+  std::string bytes(reinterpret_cast<char*>(data), size);
+  jpeg_destroy_compress(&info);
+  std::free(data);
+  return bytes;
+}
+
+}  // namespace
+
+TEST_CASE("a JPEG has its colours in place") {
+  for (const bool progressive : {false, true}) {
+    const auto read = io::decode_jpeg(encode(40, 24, 3, progressive)).value();
+    REQUIRE(read.width() == 40);
+    REQUIRE(read.height() == 24);
+    for (const auto& [x, y] : {std::pair{5, 5}, std::pair{30, 8}, std::pair{20, 20}}) {
+      CHECK(read(x, y).r == Approx(2 * x).margin(6));
+      CHECK(read(x, y).g == Approx(2 * x + 3 * y).margin(6));
+      CHECK(read(x, y).b == Approx(2 * x + 80).margin(6));
+    }
+  }
+}
+
+TEST_CASE("a grey JPEG is spread over the channels") {
+  const auto read = io::decode_jpeg(encode(16, 16, 1)).value();
+  CHECK(read(9, 3).r == Approx(18).margin(3));
+  CHECK(read(9, 3).r == read(9, 3).g);
+  CHECK(read(9, 3).r == read(9, 3).b);
+}
+
+TEST_CASE("a JPEG without a way to RGB is refused") { CHECK_FALSE(io::decode_jpeg(encode(16, 16, 4))); }
+
+TEST_CASE("every truncation of a JPEG is an error and silent") {
+  const orbis::test::temporary_folder folder;
+  for (const bool progressive : {false, true}) {
+    const std::string good = encode(40, 24, 3, progressive);
+    std::size_t wrong = 0;
+    const std::size_t printed = orbis::test::bytes_on_stderr(folder / "stderr", [&] {
+      for (std::size_t n = 0; n < good.size(); ++n) {
+        const auto read = io::decode_jpeg(good.substr(0, n));
+        wrong += read || read.error().code != orbis::errc::malformed || read.error().message.size() < 16 ? 1 : 0;
+      }
+    });
+    CHECK(wrong == 0);
+    CHECK(printed == 0);
+  }
+}
+
+TEST_CASE("a changed byte never crashes the JPEG reader") {
+  const orbis::test::temporary_folder folder;
+  for (const bool progressive : {false, true}) {
+    const std::string good = encode(40, 24, 3, progressive);
+    std::size_t refused = 0;
+    const std::size_t printed = orbis::test::bytes_on_stderr(folder / "stderr", [&] {
+      for (std::size_t i = 0; i != good.size(); ++i)
+        for (const int flip : {0x01, 0x80, 0xFF}) {
+          std::string bad = good;
+          bad[i] = static_cast<char>(bad[i] ^ flip);
+          refused += io::decode_jpeg(bad) ? 0 : 1;
+        }
+    });
+    CHECK(refused > 0);
+    CHECK(printed == 0);
+  }
+}
+
+TEST_CASE("a JPEG header that claims too many pixels allocates nothing") {
+  std::string bytes = encode(40, 24, 3);
+  const std::size_t frame = bytes.find("\xFF\xC0");
+  REQUIRE(frame != std::string::npos);
+  for (const std::size_t k : {5U, 6U, 7U, 8U}) bytes[frame + k] = '\xF0';
+  const auto read = io::decode_jpeg(bytes);
+  REQUIRE_FALSE(read);
+  CHECK(read.error().message == "damaged JPEG: claims more pixels than the file can hold");
+}

@@ -1,0 +1,195 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <csetjmp>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include <png.h>
+
+#include <orbis/core/random.hpp>
+#include <orbis/io/png.hpp>
+
+#include "io/quiet.hpp"
+#include "io/temporary_folder.hpp"
+#include "support/catch.hpp"
+
+namespace io = orbis::io;
+using orbis::image;
+using orbis::rgb8;
+
+namespace {
+
+/// A pattern without symmetry, so that swapped axes, channels or bytes show.
+template <class T>
+image<T> pattern(int width, int height) {
+  image<T> pixels(width, height);
+  for (int y = 0; y != height; ++y)
+    for (int x = 0; x != width; ++x) {
+      if constexpr (std::is_same_v<T, rgb8>)
+        pixels(x, y) = {static_cast<std::uint8_t>(7 * x), static_cast<std::uint8_t>(11 * y + 1),
+                        static_cast<std::uint8_t>(x * y + 5)};
+      else
+        pixels(x, y) = static_cast<T>(x * 259 + y * 7919 + 1);
+    }
+  return pixels;
+}
+
+/// A PNG of any kind by libpng itself; rows are bytes as PNG stores them.
+std::string encode(int width, int height, int bits, int type, int interlace,
+                   const std::vector<std::vector<png_byte>>& rows) {
+  std::string bytes;
+  png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, nullptr, nullptr);
+  png_infop info = png_create_info_struct(png);
+  png_set_write_fn(
+      png, &bytes,
+      [](png_structp p, png_bytep data, std::size_t n) {
+        static_cast<std::string*>(png_get_io_ptr(p))->append(reinterpret_cast<char*>(data), n);
+      },
+      [](png_structp) {});
+  png_set_IHDR(png, info, static_cast<png_uint_32>(width), static_cast<png_uint_32>(height), bits, type, interlace,
+               PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
+  const png_color palette[] = {{1, 2, 3}, {40, 50, 60}, {255, 128, 0}, {9, 8, 7}};
+  const png_byte alpha[] = {0, 128};
+  if (type == PNG_COLOR_TYPE_PALETTE) {
+    png_set_PLTE(png, info, palette, 4);
+    png_set_tRNS(png, info, alpha, 2, nullptr);
+  }
+  png_write_info(png, info);
+  const int passes = png_set_interlace_handling(png);
+  for (int pass = 0; pass != passes; ++pass)
+    for (const auto& row : rows) png_write_row(png, row.data());
+  png_write_end(png, nullptr);
+  png_destroy_write_struct(&png, &info);
+  return bytes;
+}
+
+}  // namespace
+
+TEST_CASE("pixels survive writing and reading a PNG") {
+  const auto color = pattern<rgb8>(37, 23);
+  CHECK(io::decode_png_color(io::encode_png(color)).value() == color);
+  const auto depth = pattern<std::uint16_t>(37, 23);
+  CHECK(io::decode_png_depth(io::encode_png(depth)).value() == depth);
+  const auto grey = pattern<std::uint8_t>(5, 4);
+  const auto read = io::decode_png_color(io::encode_png(grey)).value();
+  for (int y = 0; y != 4; ++y)
+    for (int x = 0; x != 5; ++x) CHECK(read(x, y) == rgb8{grey(x, y), grey(x, y), grey(x, y)});
+}
+
+TEST_CASE("a part of an image is written without its surroundings") {
+  const auto whole = pattern<rgb8>(20, 10);
+  const orbis::image_view<const rgb8> part(whole.data() + 3 * 20 + 4, 6, 5, 20);
+  const auto read = io::decode_png_color(io::encode_png(part)).value();
+  CHECK(read.width() == 6);
+  CHECK(read(0, 0) == whole(4, 3));
+  CHECK(read(5, 4) == whole(9, 7));
+}
+
+TEST_CASE("every compression level gives the same pixels") {
+  const auto depth = pattern<std::uint16_t>(64, 48);
+  for (const int level : {0, 1, 9})
+    CHECK(io::decode_png_depth(io::encode_png(depth, {.compression = level})).value() == depth);
+}
+
+TEST_CASE("PNGs of other kinds become 8-bit colour") {
+  const auto gray_alpha = encode(2, 1, 8, PNG_COLOR_TYPE_GRAY_ALPHA, PNG_INTERLACE_NONE, {{10, 0, 200, 255}});
+  CHECK(io::decode_png_color(gray_alpha).value()(0, 0) == rgb8{10, 10, 10});
+  CHECK(io::decode_png_color(gray_alpha).value()(1, 0) == rgb8{200, 200, 200});
+  const auto rgba = encode(1, 2, 8, PNG_COLOR_TYPE_RGB_ALPHA, PNG_INTERLACE_NONE, {{1, 2, 3, 4}, {5, 6, 7, 8}});
+  CHECK(io::decode_png_color(rgba).value()(0, 1) == rgb8{5, 6, 7});
+  const auto rgb16 = encode(1, 1, 16, PNG_COLOR_TYPE_RGB, PNG_INTERLACE_NONE, {{0x80, 0x80, 0xFF, 0xFF, 0, 0}});
+  CHECK(io::decode_png_color(rgb16).value()(0, 0) == rgb8{0x80, 0xFF, 0});
+  const auto palette = encode(4, 1, 2, PNG_COLOR_TYPE_PALETTE, PNG_INTERLACE_NONE, {{0b00011011}});
+  CHECK(io::decode_png_color(palette).value()(0, 0) == rgb8{1, 2, 3});
+  CHECK(io::decode_png_color(palette).value()(2, 0) == rgb8{255, 128, 0});
+  CHECK(io::decode_png_color(palette).value()(3, 0) == rgb8{9, 8, 7});
+  const auto bits = encode(3, 1, 1, PNG_COLOR_TYPE_GRAY, PNG_INTERLACE_NONE, {{0b10100000}});
+  CHECK(io::decode_png_color(bits).value()(0, 0) == rgb8{255, 255, 255});
+  CHECK(io::decode_png_color(bits).value()(1, 0) == rgb8{0, 0, 0});
+}
+
+TEST_CASE("an interlaced PNG has its pixels in place") {
+  std::vector<std::vector<png_byte>> rows(9, std::vector<png_byte>(11));
+  for (std::size_t y = 0; y != 9; ++y)
+    for (std::size_t x = 0; x != 11; ++x) rows[y][x] = static_cast<png_byte>(13 * y + 3 * x);
+  const auto read = io::decode_png_color(encode(11, 9, 8, PNG_COLOR_TYPE_GRAY, PNG_INTERLACE_ADAM7, rows)).value();
+  for (int y = 0; y != 9; ++y)
+    for (int x = 0; x != 11; ++x) CHECK(read(x, y).g == 13 * y + 3 * x);
+}
+
+TEST_CASE("a depth image that is not 16-bit grey is refused in words") {
+  const auto eight = io::decode_png_depth(io::encode_png(pattern<std::uint8_t>(4, 4)), "d.png");
+  REQUIRE_FALSE(eight);
+  CHECK(eight.error().code == orbis::errc::unsupported);
+  CHECK(eight.error().to_string() == "d.png: a depth image must be a 16-bit grey PNG, this one is 8-bit grey");
+  const auto color = io::decode_png_depth(io::encode_png(pattern<rgb8>(4, 4)));
+  REQUIRE_FALSE(color);
+  CHECK(color.error().message.find("colour") != std::string::npos);
+}
+
+TEST_CASE("every truncation of a PNG is an error and silent") {
+  const orbis::test::temporary_folder folder;
+  const std::string color = io::encode_png(pattern<rgb8>(16, 12));
+  const std::string depth = io::encode_png(pattern<std::uint16_t>(16, 12));
+  std::size_t accepted = 0;
+  const std::size_t printed = orbis::test::bytes_on_stderr(folder / "stderr", [&] {
+    for (std::size_t n = 0; n < color.size(); ++n) accepted += io::decode_png_color(color.substr(0, n)) ? 1 : 0;
+    for (std::size_t n = 0; n < depth.size(); ++n) {
+      const auto read = io::decode_png_depth(depth.substr(0, n));
+      accepted += read || read.error().code != orbis::errc::malformed ? 1 : 0;
+    }
+  });
+  CHECK(accepted == 0);
+  CHECK(printed == 0);
+}
+
+TEST_CASE("a changed byte never crashes the PNG reader and pixels never change silently") {
+  const orbis::test::temporary_folder folder;
+  const auto original = pattern<std::uint16_t>(16, 12);
+  const std::string good = io::encode_png(original);
+  std::size_t changed = 0;
+  const std::size_t printed = orbis::test::bytes_on_stderr(folder / "stderr", [&] {
+    for (std::size_t i = 0; i != good.size(); ++i)
+      for (const int flip : {0x01, 0x80, 0xFF}) {
+        std::string bad = good;
+        bad[i] = static_cast<char>(bad[i] ^ flip);
+        const auto read = io::decode_png_depth(bad);
+        changed += read && *read != original ? 1 : 0;
+        const auto as_color = io::decode_png_color(bad);
+        changed += as_color && as_color->width() != 16 ? 1 : 0;
+      }
+  });
+  CHECK(changed == 0);
+  CHECK(printed == 0);
+}
+
+TEST_CASE("a header that claims too many pixels allocates nothing") {
+  // 100000 x 100000 pixels, by a header whose checksum is right.
+  std::string bytes("\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\1\x86\xA0\0\1\x86\xA0\x10\0\0\0\0", 29);
+  std::uint32_t crc = 0xFFFFFFFFU;
+  for (std::size_t i = 12; i != 29; ++i) {
+    crc ^= static_cast<unsigned char>(bytes[i]);
+    for (int bit = 0; bit != 8; ++bit) crc = (crc >> 1) ^ ((crc & 1U) != 0 ? 0xEDB88320U : 0U);
+  }
+  crc = ~crc;
+  for (const int shift : {24, 16, 8, 0}) bytes += static_cast<char>(crc >> shift);
+  bytes += std::string("\0\0\0\0IDAT\x35\xAF\x06\x1E", 12);
+  const auto read = io::decode_png_depth(bytes);
+  REQUIRE_FALSE(read);
+  CHECK(read.error().message == "damaged PNG: claims more pixels than the file can hold");
+}
+
+TEST_CASE("an image file is written whole or the error says why not") {
+  const orbis::test::temporary_folder folder;
+  const auto depth = pattern<std::uint16_t>(8, 8);
+  REQUIRE(io::write_png(folder / "d.png", depth));
+  CHECK_FALSE(std::filesystem::exists(folder / "d.png.part"));
+  const auto nowhere = io::write_png(folder / "missing" / "d.png", depth);
+  REQUIRE_FALSE(nowhere);
+  CHECK(nowhere.error().code == orbis::errc::write_failed);
+  const auto empty = io::write_png(folder / "e.png", image<rgb8>{});
+  REQUIRE_FALSE(empty);
+  CHECK(empty.error().code == orbis::errc::invalid_argument);
+  CHECK_FALSE(std::filesystem::exists(folder / "e.png"));
+}
