@@ -77,10 +77,10 @@ class nearest_sink {
     // k identical points: nothing can be nearer.
     return out_->size() < k_ || out_->front().distance > 0;
   }
-  /// Sorts, and takes the roots.
+  /// Takes the roots, and sorts (after the roots: different squares can have the same one).
   void finish() {
-    std::sort_heap(out_->begin(), out_->end(), less);
     for (neighbor<S>& n : *out_) n.distance = std::sqrt(n.distance);
+    std::sort(out_->begin(), out_->end(), less);
   }
 
   [[nodiscard]] static bool less(const neighbor<S>& a, const neighbor<S>& b) noexcept {
@@ -103,8 +103,8 @@ class radius_sink {
     return true;
   }
   void finish() {
-    std::sort(out_->begin(), out_->end(), nearest_sink<S>::less);
     for (neighbor<S>& n : *out_) n.distance = std::sqrt(n.distance);
+    std::sort(out_->begin(), out_->end(), nearest_sink<S>::less);
   }
 
  private:

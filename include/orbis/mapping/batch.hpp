@@ -99,7 +99,7 @@ template <class Octree = octree::occupancy_octree<>, execution_policy Policy, ke
         const std::vector<vec3f> points = dense.measurements(policy, k, number++, mask);
         const vec3 origin = se3(k.T_world_camera).translation();
         const auto start = std::chrono::steady_clock::now();
-        octree.integrate(points, origin, options.integration);
+        octree.integrate(policy, points, origin, options.integration);
         const auto time = std::chrono::steady_clock::now() - start;
         milliseconds.push_back(std::chrono::duration<double, std::milli>(time).count());
       }

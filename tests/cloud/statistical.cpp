@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include <orbis/cloud/statistical.hpp>
+
+#include "cloud/clouds.hpp"
+#include "cloud/reference.hpp"
+#include "support/catch.hpp"
+
+using orbis::cloud::non_finite;
+using orbis::cloud::statistical_inliers;
+
+TEST_CASE("the statistical filter keeps the points its definition keeps") {
+  for (const auto& [name, cloud] : orbis::test::all_clouds()) {
+    for (const std::size_t k : {1U, 10U, 50U}) {
+      const auto distances = orbis::test::reference_mean_distances(cloud, k);
+      for (const double alpha : {0.0, 1.0, 2.5}) {
+        for (const auto policy : {non_finite::drop, non_finite::keep}) {
+          INFO(name << " k " << k << " alpha " << alpha);
+          CHECK(statistical_inliers(orbis::par, cloud,
+                                    {.neighbors = k, .sigma_multiplier = alpha, .non_finite = policy}) ==
+                orbis::test::reference_decision(cloud, distances, alpha, policy == non_finite::keep));
+        }
+      }
+    }
+  }
+}
+
+TEST_CASE("the statistical filter gives the same under every policy and number of threads") {
+  for (const auto& [name, cloud] : orbis::test::all_clouds()) {
+    INFO(name);
+    const auto alone = statistical_inliers(orbis::seq, cloud, {.neighbors = 20});
+    for (const unsigned threads : {1U, 2U, 3U, 8U}) {
+      CHECK(statistical_inliers(orbis::par.with(threads), cloud, {.neighbors = 20}) == alone);
+    }
+  }
+}
+
+TEST_CASE("the point itself does not count as its neighbour") {
+  // Three points on a line: with k = 1 the mean distances are 1, 1 and 3.
+  const std::vector<orbis::vec3f> cloud{{0, 0, 0}, {1, 0, 0}, {4, 0, 0}};
+  const auto result = orbis::cloud::statistical_filter(orbis::seq, cloud, {.neighbors = 1, .sigma_multiplier = 1.0});
+  CHECK(result.mean_distance == std::vector<float>{1, 1, 3});
+  CHECK(result.mean == Approx(5.0 / 3.0));
+  CHECK(result.standard_deviation == Approx(std::sqrt(4.0 / 3.0)));
+  CHECK(result.threshold == Approx(result.mean + result.standard_deviation));
+  CHECK(result.inliers == std::vector<std::uint32_t>{0, 1});
+}
+
+TEST_CASE("an empty cloud and a single point are left as they are") {
+  CHECK(statistical_inliers(orbis::par, std::vector<orbis::vec3f>{}).empty());
+  CHECK(statistical_inliers(orbis::par, std::vector<orbis::vec3f>{{1, 2, 3}}) == std::vector<std::uint32_t>{0});
+}
+
+TEST_CASE("the statistical filter takes anyone's points in place") {
+  struct labelled {
+    double x, y, z;
+    int label;
+  };
+  const auto cloud = orbis::test::uniform_cloud(500, 77);
+  std::vector<labelled> structs;
+  std::vector<std::array<float, 3>> arrays;
+  for (const auto& p : cloud) {
+    structs.push_back({p.x(), p.y(), p.z(), 0});
+    arrays.push_back({p.x(), p.y(), p.z()});
+  }
+  const auto expected = statistical_inliers(orbis::seq, cloud, {.neighbors = 8});
+  CHECK(expected.size() < cloud.size());
+  CHECK(statistical_inliers(orbis::seq, structs, {.neighbors = 8}) == expected);
+  CHECK(statistical_inliers(orbis::seq, std::span{arrays}, {.neighbors = 8}) == expected);
+}
+
+TEST_CASE("identical points do not take quadratic time") {
+  // By brute force this is 4 * 10^10 distances, minutes; it takes a fraction of a second.
+  const std::vector<orbis::vec3f> identical(200'000, orbis::vec3f{0.5F, 0.5F, 0.5F});
+  const auto start = std::chrono::steady_clock::now();
+  CHECK(statistical_inliers(orbis::seq, identical).size() == identical.size());
+  CHECK(std::chrono::steady_clock::now() - start < std::chrono::seconds(10));
+}
