@@ -207,20 +207,26 @@ ORBIS_TARGET("avx512f,avx512bw") inline __m512i count_avx512(__m512i x, __m512i 
   return _mm512_add_epi8(_mm512_shuffle_epi8(table, _mm512_and_si512(x, nibble)),
                          _mm512_shuffle_epi8(table, _mm512_and_si512(_mm512_srli_epi16(x, 4), nibble)));
 }
-/// The steps behind the distances, the same for both kernels.
+/// All lanes. g++ 12 warns inside the intrinsics that take no mask; a full one costs nothing.
+inline constexpr __mmask16 all_avx512 = 0xffff;
+
+/// The two nearest of each lane; `keep_avx512` is what follows the distances in both kernels.
 struct keys_avx512 {
   __m512i best, second;
 };
+ORBIS_TARGET("avx512f") inline __m512i smaller_avx512(__m512i a, __m512i b) noexcept {
+  return _mm512_maskz_min_epu32(all_avx512, a, b);
+}
 ORBIS_TARGET("avx512f")
 inline void keep_avx512(keys_avx512& keys, __m512i distance, const lane_group& group, lane_row* reverse,
                         __m512i from) noexcept {
-  const __m512i high = _mm512_slli_epi32(distance, lane_index_bits);
+  const __m512i high = _mm512_maskz_slli_epi32(all_avx512, distance, lane_index_bits);
   const __m512i key = _mm512_or_si512(high, _mm512_load_si512(group.index.lane.data()));
-  keys.second = _mm512_min_epu32(keys.second, _mm512_max_epu32(keys.best, key));
-  keys.best = _mm512_min_epu32(keys.best, key);
+  keys.second = smaller_avx512(keys.second, _mm512_maskz_max_epu32(all_avx512, keys.best, key));
+  keys.best = smaller_avx512(keys.best, key);
   if (reverse != nullptr)
     _mm512_store_si512(reverse->lane.data(),
-                       _mm512_min_epu32(_mm512_load_si512(reverse->lane.data()), _mm512_or_si512(high, from)));
+                       smaller_avx512(_mm512_load_si512(reverse->lane.data()), _mm512_or_si512(high, from)));
 }
 ORBIS_TARGET("avx512f") inline two_keys reduce_avx512(const keys_avx512& keys) noexcept {
   lane_row b, s;

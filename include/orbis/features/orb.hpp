@@ -82,17 +82,16 @@ class orb_extractor {
 
   [[nodiscard]] features extract(const cv::Mat& image, image_view<const std::uint8_t> mask) const {
     const std::vector<cv::Mat> pyramid = pyramid_of(image);
-    std::vector<std::vector<corner>> chosen(pyramid.size());
-    double left = options_.max_features;
-    for (std::size_t level = pyramid.size(); level-- != 0;) {  // what a coarse level cannot fill goes to the finer ones
-      const int quota = static_cast<int>(std::lround(left * share_of_coarsest(level + 1)));
-      chosen[level] = spread(corners_of(pyramid[level], image.size(), mask), quota, pyramid[level].cols,
-                             pyramid[level].rows, static_cast<float>(options_.threshold));
-      left -= static_cast<double>(chosen[level].size());
-    }
+    std::vector<std::vector<corner>> corners;
+    corners.reserve(pyramid.size());
+    for (const cv::Mat& level : pyramid) corners.push_back(corners_of(level, image.size(), mask));
+    const std::vector<int> quotas = quotas_of(corners);
     features found;
     for (std::size_t level = 0; level != pyramid.size(); ++level)
-      describe(found, pyramid[level], image.size(), chosen[level], static_cast<int>(level));
+      describe(found, pyramid[level], image.size(),
+               spread(std::move(corners[level]), quotas[level], pyramid[level].cols, pyramid[level].rows,
+                      static_cast<float>(options_.threshold)),
+               static_cast<int>(level));
     return found;
   }
 
@@ -115,11 +114,24 @@ class orb_extractor {
     return pyramid;
   }
 
-  /// Of the features of `levels` levels, the share of the coarsest: proportional to the side of the image.
-  [[nodiscard]] double share_of_coarsest(std::size_t levels) const {
+  /// How many features each level gives: proportional to the side of its image. What a coarse level
+  /// cannot give goes to the finer ones; what is left then, to any that has more.
+  [[nodiscard]] std::vector<int> quotas_of(const std::vector<std::vector<corner>>& corners) const {
     const double ratio = 1.0 / static_cast<double>(options_.scale_factor);
-    const auto n = static_cast<double>(levels);
-    return std::pow(ratio, n - 1.0) * (1.0 - ratio) / (1.0 - std::pow(ratio, n));
+    std::vector<int> quotas(corners.size());
+    int left = options_.max_features;
+    for (std::size_t level = corners.size(); level-- != 0;) {
+      const auto finer = static_cast<double>(level);  // the number of levels that are still to come
+      const double share = std::pow(ratio, finer) * (1.0 - ratio) / (1.0 - std::pow(ratio, finer + 1.0));
+      quotas[level] = std::min(static_cast<int>(corners[level].size()), static_cast<int>(std::lround(left * share)));
+      left -= quotas[level];
+    }
+    for (std::size_t level = 0; level != corners.size(); ++level) {
+      const int more = std::min(left, static_cast<int>(corners[level].size()) - quotas[level]);
+      quotas[level] += more;
+      left -= more;
+    }
+    return quotas;
   }
 
   [[nodiscard]] std::vector<corner> corners_of(const cv::Mat& level, cv::Size full,

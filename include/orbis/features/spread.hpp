@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <tuple>
+#include <utility>
 #include <vector>
 
 #include <orbis/core/image.hpp>
@@ -24,8 +25,9 @@ struct corner {
 
 /// At most `wanted` of the corners of a `width` x `height` image, evenly spread: the image is cut into
 /// about `wanted` square cells; first every cell gives its strongest corner, then every cell its
-/// second, and so on, stronger ones first within a round. Corners weaker than `strong` are taken
-/// in the first round only: they help where there is nothing else. Sorted by row, then column.
+/// second, and so on, stronger ones first within a round. Corners weaker than `strong` are taken in
+/// the first round, where they help because there is nothing else, or when no strong ones are left.
+/// Sorted by row, then column.
 /// O(n log n); the order of the input does not matter.
 [[nodiscard]] inline std::vector<corner> spread(std::vector<corner> corners, int wanted, int width, int height,
                                                 float strong) {
@@ -53,12 +55,13 @@ struct corner {
   std::sort(all.begin(), all.end(),
             [&](const ranked& a, const ranked& b) { return a.cell != b.cell ? a.cell < b.cell : stronger(a, b); });
   for (std::size_t i = 1; i < all.size(); ++i) all[i].rank = all[i].cell == all[i - 1].cell ? all[i - 1].rank + 1 : 0;
-  std::erase_if(all, [&](const ranked& r) { return r.rank > 0 && r.c.response < strong; });
-
   const std::size_t count = std::min(all.size(), static_cast<std::size_t>(wanted));
-  std::partial_sort(
-      all.begin(), all.begin() + static_cast<std::ptrdiff_t>(count), all.end(),
-      [&](const ranked& a, const ranked& b) { return a.rank != b.rank ? a.rank < b.rank : stronger(a, b); });
+  std::partial_sort(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(count), all.end(),
+                    [&](const ranked& a, const ranked& b) {
+                      const auto weak = [&](const ranked& r) { return r.rank > 0 && r.c.response < strong; };
+                      const auto turn = [&](const ranked& r) { return std::pair(weak(r), r.rank); };
+                      return turn(a) != turn(b) ? turn(a) < turn(b) : stronger(a, b);
+                    });
   std::vector<corner> chosen;
   chosen.reserve(count);
   for (std::size_t i = 0; i != count; ++i) chosen.push_back(all[i].c);

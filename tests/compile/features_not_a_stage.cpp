@@ -1,0 +1,6 @@
+// error: orbis: what follows \| must be a matching stage
+#include <orbis/features.hpp>
+
+using namespace orbis::features;
+
+const auto matcher = brute_force(hamming{}) | 50;

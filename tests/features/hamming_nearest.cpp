@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include <orbis/core/random.hpp>
+#include <orbis/features/hamming_nearest.hpp>
+
+#include "support/catch.hpp"
+
+using namespace orbis;
+using namespace orbis::features;
+
+namespace {
+
+using descriptor = binary_descriptor<256>;
+
+/// `variety` bits of every descriptor are random; few of them make many ties.
+std::vector<descriptor> random_descriptors(std::size_t count, std::uint64_t seed, int variety) {
+  random_bits random{seed};
+  std::vector<descriptor> descriptors(count);
+  for (descriptor& d : descriptors)
+    for (int i = 0; i != variety; ++i) {
+      const std::size_t bit = variety == 256 ? static_cast<std::size_t>(i) : random.below(256);
+      if (random() & 1U) d.words[bit / 64] |= std::uint64_t{1} << (bit % 64);
+    }
+  return descriptors;
+}
+
+std::uint32_t naive_distance(const descriptor& a, const descriptor& b) {
+  std::uint32_t sum = 0;
+  for (std::size_t i = 0; i != 256; ++i) sum += a.bit(i) != b.bit(i) ? 1 : 0;
+  return sum;
+}
+
+struct answer {
+  std::vector<nearest_two> nearest;
+  std::vector<std::uint32_t> reverse;
+  friend bool operator==(const answer&, const answer&) = default;
+};
+
+/// Sorting all distances, stably: no shared idea with the kernels.
+answer naive(const std::vector<descriptor>& queries, const std::vector<descriptor>& trains) {
+  std::vector<std::vector<std::uint32_t>> distances(queries.size(), std::vector<std::uint32_t>(trains.size()));
+  for (std::size_t q = 0; q != queries.size(); ++q)
+    for (std::size_t t = 0; t != trains.size(); ++t) distances[q][t] = naive_distance(queries[q], trains[t]);
+  answer a;
+  for (const auto& row : distances) {
+    nearest_two n;
+    if (!row.empty()) {
+      const auto best = std::min_element(row.begin(), row.end());
+      n.index = static_cast<std::uint32_t>(best - row.begin());
+      n.distance = *best;
+      auto rest = row;
+      rest.erase(rest.begin() + n.index);
+      if (!rest.empty()) n.second_distance = *std::min_element(rest.begin(), rest.end());
+    }
+    a.nearest.push_back(n);
+  }
+  for (std::size_t t = 0; t != trains.size() && !queries.empty(); ++t) {
+    std::size_t best = 0;
+    for (std::size_t q = 1; q != queries.size(); ++q)
+      if (distances[q][t] < distances[best][t]) best = q;
+    a.reverse.push_back(static_cast<std::uint32_t>(best));
+  }
+  return a;
+}
+
+template <class Kernel>
+answer run(Kernel&& kernel, const std::vector<descriptor>& queries, const std::vector<descriptor>& trains,
+           bool reverse) {
+  answer a;
+  a.nearest.resize(queries.size());
+  if (reverse && !queries.empty()) a.reverse.resize(trains.size());
+  kernel(std::span<const descriptor>{queries}, std::span<const descriptor>{trains}, std::span{a.nearest},
+         std::span{a.reverse});
+  return a;
+}
+
+}  // namespace
+
+TEST_CASE("the Hamming distance counts differing bits") {
+  const auto a = random_descriptors(50, 1, 256);
+  for (const descriptor& x : a)
+    for (const descriptor& y : a) REQUIRE(hamming{}(x, y) == naive_distance(x, y));
+  binary_descriptor<512> all;
+  all.words.fill(~std::uint64_t{0});
+  CHECK(hamming{}(all, binary_descriptor<512>{}) == 512);
+}
+
+TEST_CASE("every SIMD level finds the two nearest and the reverse nearest of the definition") {
+  const simd::level level =
+      GENERATE(simd::level::portable, simd::level::popcnt, simd::level::avx2, simd::level::avx512);
+  const int variety = GENERATE(256, 12, 2);  // 2: nearly everything is a tie
+  for (const std::size_t queries : {0U, 1U, 3U, 40U})
+    for (const std::size_t trains : {0U, 1U, 2U, 15U, 16U, 17U, 31U, 33U, 511U, 512U, 513U, 1030U}) {
+      INFO("level " << static_cast<int>(level) << ", " << queries << " x " << trains);
+      const auto q = random_descriptors(queries, 10 + queries, variety);
+      const auto t = random_descriptors(trains, 1000 + trains, variety);
+      answer expected = naive(q, t);
+      const auto kernel = [&](auto... spans) { hamming_nearest(level, spans...); };
+      REQUIRE(run(kernel, q, t, true) == expected);
+      expected.reverse.clear();
+      REQUIRE(run(kernel, q, t, false) == expected);
+    }
+}
+
+TEST_CASE("distances of 0 and 256 come out of every SIMD level") {
+  const simd::level level =
+      GENERATE(simd::level::portable, simd::level::popcnt, simd::level::avx2, simd::level::avx512);
+  descriptor zeros;
+  descriptor ones;
+  ones.words.fill(~std::uint64_t{0});
+  const std::vector<descriptor> q{zeros, ones};
+  const std::vector<descriptor> t{ones, ones};
+  const answer a = run([&](auto... spans) { hamming_nearest(level, spans...); }, q, t, true);
+  CHECK(a.nearest[0] == nearest_two{0, 256, 256});
+  CHECK(a.nearest[1] == nearest_two{0, 0, 0});
+  CHECK(a.reverse == std::vector<std::uint32_t>{1, 1});
+}
+
+#if ORBIS_X86
+TEST_CASE("both AVX-512 kernels agree with the definition where the processor has them") {
+  const auto q = random_descriptors(70, 5, 30);
+  const auto t = random_descriptors(700, 6, 30);
+  const answer expected = naive(q, t);
+  if (simd::detected() >= simd::level::avx512) {
+    CHECK(run([](auto... s) { features::detail::nearest_in_lanes(features::detail::lane_pass_avx512, s...); }, q, t,
+              true) == expected);
+  }
+  if (simd::detected() >= simd::level::avx512 && __builtin_cpu_supports("avx512vpopcntdq")) {
+    CHECK(run([](auto... s) { features::detail::nearest_in_lanes(features::detail::lane_pass_vpopcnt, s...); }, q, t,
+              true) == expected);
+  }
+}
+#endif
