@@ -77,15 +77,15 @@ template <class Visit>
 void walk_ray(const voxel_grid& grid, const float3& origin, const voxel_key& from, const float3& end,
               const voxel_key& to, Visit&& visit) {
   if (from == to) return;
+  visit(from);
   float3 direction = difference(end, origin);
   const auto reach = static_cast<float>(length(direction));
-  if (!(reach > 0.0F && std::isfinite(reach))) return;
+  if (!(reach > 0.0F && std::isfinite(reach))) return;  // too short or too long for a float: no direction
   for (float& d : direction) d /= reach;
 
   ray_cursor cursor{grid, from, origin, direction, [&](std::int32_t step) {
                       return static_cast<double>(static_cast<float>(step * grid.resolution() * 0.5));
                     }};
-  visit(from);
   for (;;) {
     const std::size_t axis = cursor.axis();
     if (!cursor.can_step(axis)) return;

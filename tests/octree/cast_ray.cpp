@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <limits>
+
+#include <orbis/octree/cast_ray.hpp>
+
+#include "octree/support.hpp"
+#include "support/catch.hpp"
+
+using namespace orbis;
+using namespace orbis::octree;
+
+namespace {
+
+struct scene {
+  occupancy_octree<> ours{0.05};
+  octomap::OcTree theirs{0.05};
+
+  scene() {
+    random_bits random{51};
+    for (int i = 0; i != 6; ++i) {
+      const vec3f origin = test::random_points(random, 1, 0.3)[0];
+      const auto scan = test::shell_scan(random, 1500, origin);
+      ours.integrate(scan, origin);
+      test::insert(theirs, scan, origin, {});
+    }
+  }
+  /// Returns whether something was hit.
+  bool check(const vec3f& origin, const vec3f& direction, double max_range, bool ignore_unknown) const {
+    octomap::point3d end;
+    const bool hit =
+        theirs.castRay(test::to_octomap(origin), test::to_octomap(direction), end, ignore_unknown, max_range);
+    const ray_hit got = ours.cast_ray(origin, direction, max_range, ignore_unknown);
+    REQUIRE(static_cast<bool>(got) == hit);
+    if (got.end != ray_end::no_direction && ours.grid().key(origin)) {
+      for (unsigned i = 0; i != 3; ++i) REQUIRE(static_cast<float>(got.point[i]) == end(i));
+    }
+    return hit;
+  }
+};
+
+}  // namespace
+
+TEST_CASE("Rays end in the voxel in which OctoMap's end") {
+  const scene room;
+  random_bits random{52};
+  int hits = 0;
+  for (int i = 0; i != 4000; ++i) {
+    const vec3f origin = test::random_points(random, 1, i % 2 == 0 ? 0.5 : 2.0)[0];
+    const vec3f direction = test::random_points(random, 1, 3.0)[0];
+    const double range = i % 3 == 0 ? 0.8 : 3.0;
+    hits += room.check(origin, direction, range, i % 5 == 0) ? 1 : 0;
+    if (i % 5 != 0) room.check(origin, direction, -1.0, false);
+  }
+  CHECK(hits > 300);
+}
+
+TEST_CASE("Rays along axes and from voxel corners end where OctoMap's end") {
+  const scene room;
+  random_bits random{53};
+  for (int i = 0; i != 3000; ++i) {
+    vec3f origin, direction;
+    for (int axis = 0; axis != 3; ++axis) {
+      origin[axis] = static_cast<float>((static_cast<int>(random.below(21)) - 10) * 0.05);
+      direction[axis] = static_cast<float>(static_cast<int>(random.below(3)) - 1);
+    }
+    if (direction.isZero()) continue;
+    room.check(origin, direction, 2.0, i % 2 == 0);
+  }
+}
+
+TEST_CASE("A ray says why it ended") {
+  occupancy_octree<> map{0.1};
+  map.integrate(std::vector<vec3f>{{1.05F, 0.05F, 0.05F}}, vec3f{0.05F, 0.05F, 0.05F});
+  const vec3 origin{0.05, 0.05, 0.05}, forward{2.0, 0.0, 0.0};
+  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+  CHECK(map.cast_ray(origin, forward).end == ray_end::hit);
+  CHECK(map.cast_ray(origin, forward).point.isApprox(vec3{1.05, 0.05, 0.05}));
+  CHECK(map.cast_ray(origin, forward, 0.5).end == ray_end::out_of_range);
+  CHECK(map.cast_ray(origin, vec3{0.0, 1.0, 0.0}).end == ray_end::unknown);
+  CHECK(map.cast_ray(origin, vec3{0.0, 1.0, 0.0}, 0.0, true).end == ray_end::out_of_grid);
+  CHECK(map.cast_ray(origin, vec3{0.0, 0.0, 0.0}).end == ray_end::no_direction);
+  CHECK(map.cast_ray(origin, vec3{nan, 0.0, 1.0}).end == ray_end::no_direction);
+  CHECK(map.cast_ray(origin, vec3{1e30, 0.0, 1.0}).end == ray_end::no_direction);
+  CHECK(map.cast_ray(vec3{1e9, 0.0, 0.0}, forward).end == ray_end::out_of_grid);
+  CHECK(map.cast_ray(vec3{nan, 0.0, 0.0}, forward).end == ray_end::out_of_grid);
+  CHECK(map.cast_ray(vec3{1.05, 0.05, 0.05}, vec3{0.0, 0.0, 0.0}).end == ray_end::hit);
+}

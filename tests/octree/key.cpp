@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <cmath>
+#include <limits>
+
+#include <orbis/octree/key.hpp>
+
+#include "octree/support.hpp"
+#include "support/catch.hpp"
+
+using namespace orbis;
+using namespace orbis::octree;
+
+TEST_CASE("Keys and centres are OctoMap's") {
+  random_bits random{7};
+  for (const double resolution : {0.02, 0.05, 0.1, 0.3}) {
+    const voxel_grid grid{resolution};
+    const octomap::OcTree tree{resolution};
+    for (int i = 0; i != 20000; ++i) {
+      // Coordinates on and beside voxel faces, where the last bit decides.
+      auto c = static_cast<float>((static_cast<int>(random.below(400)) - 200) * resolution);
+      if (random.below(2) == 0) c = std::nextafter(c, random.below(2) == 0 ? 100.0F : -100.0F);
+      octomap::key_type key = 0;
+      REQUIRE(tree.coordToKeyChecked(static_cast<double>(c), key));
+      REQUIRE(grid.key(static_cast<double>(c)) == std::uint32_t{key});
+      REQUIRE(grid.center(std::uint32_t{key}) == tree.keyToCoord(key));
+    }
+  }
+}
+
+TEST_CASE("Floats just below a face fall where OctoMap lets them fall") {
+  const voxel_grid grid{0.05};
+  CHECK(grid.key(static_cast<double>(0.35F)) == 32768U + 6U);
+  CHECK(grid.key(static_cast<double>(0.7F)) == 32768U + 13U);
+  CHECK(grid.key(static_cast<double>(-0.05F)) == 32768U - 2U);
+}
+
+TEST_CASE("There is no key outside the grid and none for what is not a number") {
+  const voxel_grid grid{0.1};
+  CHECK(grid.key(3276.75));
+  CHECK(grid.key(3276.75) == 65535U);
+  CHECK_FALSE(grid.key(3276.85));
+  CHECK(grid.key(-3276.75) == 0U);
+  CHECK_FALSE(grid.key(-3276.85));
+  CHECK_FALSE(grid.key(1e300));
+  CHECK_FALSE(grid.key(std::numeric_limits<double>::infinity()));
+  CHECK_FALSE(grid.key(-std::numeric_limits<double>::infinity()));
+  CHECK_FALSE(grid.key(std::numeric_limits<double>::quiet_NaN()));
+  CHECK_FALSE(grid.key(vec3f{0.0F, std::numeric_limits<float>::quiet_NaN(), 0.0F}));
+}
+
+TEST_CASE("A node's centre and size at every depth are OctoMap's") {
+  const voxel_grid grid{0.05};
+  const octomap::OcTree tree{0.05};
+  random_bits random{3};
+  for (int i = 0; i != 2000; ++i) {
+    const octomap::OcTreeKey k{static_cast<octomap::key_type>(random.below(65536)),
+                               static_cast<octomap::key_type>(random.below(65536)),
+                               static_cast<octomap::key_type>(random.below(65536))};
+    for (int depth = 0; depth <= tree_depth; ++depth) {
+      const std::uint32_t inside = node_cells(depth) - 1;
+      const vec3 center = grid.center(voxel_key{k[0] & ~inside, k[1] & ~inside, k[2] & ~inside}, depth);
+      for (unsigned axis = 0; axis != 3; ++axis)
+        REQUIRE(center[axis] == Approx(tree.keyToCoord(k[axis], static_cast<unsigned>(depth))).margin(1e-9));
+      REQUIRE(grid.node_size(depth) == tree.getNodeSize(static_cast<unsigned>(depth)));
+    }
+  }
+}
