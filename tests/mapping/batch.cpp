@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <limits>
+#include <tuple>
+#include <vector>
+
+#include <orbis/mapping/batch.hpp>
+
+#include "mapping/keyframes.hpp"
+#include "support/catch.hpp"
+
+using orbis::mapping::build_map;
+using orbis::mapping::filter_kind;
+
+namespace {
+
+using leaf = std::tuple<double, double, double, double, float>;
+
+template <class Octree>
+std::vector<leaf> leaves_of(const Octree& octree) {
+  std::vector<leaf> out;
+  octree.for_each_leaf([&](const auto& l) {
+    out.emplace_back(l.center.x(), l.center.y(), l.center.z(), l.size, static_cast<float>(l.log_odds));
+  });
+  return out;
+}
+
+/// Occupied leaves well before the wall.
+template <class Octree>
+std::size_t floating(const Octree& octree) {
+  std::size_t n = 0;
+  octree.for_each_leaf([&](const auto& l) { n += l.occupied && l.center.z() < 1.8 ? 1 : 0; });
+  return n;
+}
+
+}  // namespace
+
+TEST_CASE("a map is the keyframes' surviving points each seen from its own place") {
+  const auto scene = orbis::test::wall_scene(4, 20);
+  const auto keyframes = scene.keyframes();
+  for (const double voxel : {0.0, 0.03}) {
+    for (const auto kind : {filter_kind::none, filter_kind::statistical, filter_kind::radius, filter_kind::automatic}) {
+      const orbis::mapping::map_options options{.dense = {.stride = 1, .voxel_size = voxel},
+                                                .filter = {.kind = kind, .statistical = {.neighbors = 20}}};
+      const auto map = build_map(orbis::par, keyframes, scene.camera, options);
+      REQUIRE(map.has_value());
+      INFO("voxel " << voxel << ": " << to_string(map->filter.mode) << ", " << map->filter.reason);
+      CHECK(map->filter.points == map->cloud.size());
+      CHECK(map->filter.removed == map->cloud.size() - map->filtered_cloud.size());
+      CHECK(map->insert_ms.size() == keyframes.size());
+      CHECK(map->insert_ms_unfiltered.size() == keyframes.size());
+      CHECK_FALSE(map->filter.reason.empty());
+
+      orbis::mapping::dense_cloud dense{orbis::camera::ray_table{scene.camera}, options.dense};
+      for (const auto& k : keyframes) dense.splice(orbis::seq, k);
+      orbis::octree::occupancy_octree<> unfiltered{options.resolution};
+      for (std::size_t i = 0; i != keyframes.size(); ++i) {
+        unfiltered.integrate(dense.measurements(orbis::seq, keyframes[i], i),
+                             keyframes[i].T_world_camera.translation());
+      }
+      REQUIRE(map->unfiltered_octree.has_value());
+      CHECK(leaves_of(*map->unfiltered_octree) == leaves_of(unfiltered));
+      if (kind == filter_kind::none) {
+        CHECK(leaves_of(map->octree) == leaves_of(unfiltered));
+        CHECK(map->filter.removed == 0);
+      } else {
+        CHECK(map->filter.removed > 0);
+        CHECK(3 * floating(map->octree) < 2 * floating(*map->unfiltered_octree));
+      }
+    }
+  }
+}
+
+TEST_CASE("a map is the same under every policy") {
+  const auto scene = orbis::test::wall_scene(3, 20);
+  const auto alone = build_map(orbis::seq, scene.keyframes(), scene.camera);
+  REQUIRE(alone.has_value());
+  for (const unsigned threads : {2U, 5U}) {
+    const auto together = build_map(orbis::par.with(threads), scene.keyframes(), scene.camera);
+    REQUIRE(together.has_value());
+    CHECK(together->cloud.points == alone->cloud.points);
+    CHECK(together->filtered_cloud.points == alone->filtered_cloud.points);
+    CHECK(together->filtered_cloud.colors == alone->filtered_cloud.colors);
+    CHECK(leaves_of(together->octree) == leaves_of(alone->octree));
+  }
+}
+
+TEST_CASE("bad keyframes are skipped or refused") {
+  auto scene = orbis::test::wall_scene(2);
+  using orbis::errc;
+  CHECK(build_map(orbis::seq, std::vector<orbis::mapping::keyframe<>>{}, scene.camera).error().code == errc::no_data);
+  CHECK(build_map(orbis::seq, scene.keyframes(), scene.camera, {.resolution = 0}).error().code ==
+        errc::invalid_argument);
+  CHECK(build_map(orbis::seq, scene.keyframes(), scene.camera, {.dense = {.stride = 0}}).error().code ==
+        errc::invalid_argument);
+  const orbis::camera::pinhole other{{.width = 32, .height = 24, .fx = 30, .fy = 30, .cx = 16, .cy = 12}};
+  CHECK(build_map(orbis::seq, scene.keyframes(), other).error().code == errc::invalid_argument);
+
+  const auto one = build_map(orbis::seq, orbis::test::wall_scene(1).keyframes(), scene.camera);
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  scene.poses[1] = orbis::se3{orbis::so3{}, orbis::vec3{nan, 0, 0}};
+  const auto map = build_map(orbis::seq, scene.keyframes(), scene.camera);
+  REQUIRE(map.has_value());
+  CHECK(map->skipped == 1);
+  CHECK(map->cloud.points == one->cloud.points);
+}
+
+TEST_CASE("keyframes without any depth make an empty map") {
+  auto scene = orbis::test::wall_scene(1);
+  scene.depth[0] = orbis::image<std::uint16_t>(64, 48, 0);
+  const auto map = build_map(orbis::seq, scene.keyframes(), scene.camera);
+  REQUIRE(map.has_value());
+  CHECK(map->cloud.empty());
+  CHECK(map->filtered_cloud.empty());
+  CHECK(map->octree.empty());
+}
+
+TEST_CASE("building a map can be watched and stopped") {
+  const auto scene = orbis::test::wall_scene(3);
+  std::size_t last = 0;
+  std::size_t calls = 0;
+  const auto watch = [&](std::size_t done, std::size_t total) {
+    last = done;
+    ++calls;
+    return done <= total;
+  };
+  REQUIRE(build_map(orbis::seq, scene.keyframes(), scene.camera, {}, watch).has_value());
+  CHECK(last == 9);
+  CHECK(calls == 9);
+  for (const std::size_t stop : {1U, 4U, 8U}) {
+    const auto until = [&](std::size_t done, std::size_t) { return done < stop; };
+    const auto map = build_map(orbis::seq, scene.keyframes(), scene.camera, {}, until);
+    REQUIRE_FALSE(map.has_value());
+    CHECK(map.error().code == orbis::errc::cancelled);
+  }
+}
