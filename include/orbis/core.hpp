@@ -3,9 +3,11 @@
 /// The vocabulary of all components.
 #pragma once
 
+#include <orbis/core/associate.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/file.hpp>
 #include <orbis/core/image.hpp>
+#include <orbis/core/interpolate.hpp>
 #include <orbis/core/point.hpp>
 #include <orbis/core/point_cloud.hpp>
 #include <orbis/core/progress.hpp>

@@ -32,7 +32,9 @@ struct flat {
   float x, y;
 };
 class hidden {
-  float x = 0, y = 0, z = 0;
+  [[maybe_unused]] float x = 0;
+  [[maybe_unused]] float y = 0;
+  [[maybe_unused]] float z = 0;
 };
 
 }  // namespace
