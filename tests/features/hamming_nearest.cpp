@@ -127,12 +127,18 @@ TEST_CASE("both AVX-512 kernels agree with the definition where the processor ha
   const auto t = random_descriptors(700, 6, 30);
   const answer expected = naive(q, t);
   if (simd::detected() >= simd::level::avx512) {
-    CHECK(run([](auto... s) { features::detail::nearest_in_lanes(features::detail::lane_pass_avx512, s...); }, q, t,
-              true) == expected);
+    CHECK(run(
+              [](auto... s) {
+                orbis::features::detail::nearest_in_lanes(orbis::features::detail::lane_pass_avx512, s...);
+              },
+              q, t, true) == expected);
   }
   if (simd::detected() >= simd::level::avx512 && __builtin_cpu_supports("avx512vpopcntdq")) {
-    CHECK(run([](auto... s) { features::detail::nearest_in_lanes(features::detail::lane_pass_vpopcnt, s...); }, q, t,
-              true) == expected);
+    CHECK(run(
+              [](auto... s) {
+                orbis::features::detail::nearest_in_lanes(orbis::features::detail::lane_pass_vpopcnt, s...);
+              },
+              q, t, true) == expected);
   }
 }
 #endif

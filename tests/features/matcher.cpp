@@ -167,7 +167,7 @@ TEST_CASE("the rotation histogram uses all of its bins") {
 }
 
 TEST_CASE("a chain with rotation consistency takes the keypoints of features") {
-  features::features f;
+  orbis::features::features f;
   f.descriptors = random_descriptors(40, 8);
   f.keypoints.resize(40);
   const auto matcher = brute_force(hamming{}) | rotation_consistency{};

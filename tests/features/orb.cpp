@@ -55,7 +55,7 @@ image<std::uint8_t> moved(const image<std::uint8_t>& from, double angle, double 
 }
 
 /// Of the 32-pixel cells, the share that holds a keypoint.
-double coverage(const features::features& f, int width, int height) {
+double coverage(const orbis::features::features& f, int width, int height) {
   std::set<std::pair<int, int>> cells;
   for (const keypoint& k : f.keypoints)
     cells.emplace(static_cast<int>(k.x + 0.5F) / 32, static_cast<int>(k.y + 0.5F) / 32);
@@ -69,7 +69,7 @@ constexpr auto matcher = brute_force(hamming{}) | ratio_test{0.8f} | cross_check
 TEST_CASE("ORB features are well-formed and the same on every run") {
   const auto im = blocks(320, 240, 1);
   const orb_extractor extract{{.max_features = 500, .levels = 5, .scale_factor = 1.2f}};
-  const features::features f = extract(im);
+  const orbis::features::features f = extract(im);
   CHECK((f.size() > 400 && f.size() <= 500));
   CHECK(f.descriptors.size() == f.size());
   for (const keypoint& k : f.keypoints) {
@@ -110,7 +110,7 @@ TEST_CASE("a strided view and a colour image have the features of the grey copy"
       color(x, y) = {part(x, y), part(x, y), part(x, y)};
     }
   const orb_extractor extract;
-  const features::features f = extract(copy);
+  const orbis::features::features f = extract(copy);
   REQUIRE(f.size() > 200);
   CHECK(extract(part) == f);
   CHECK(extract(color) == f);

@@ -16,9 +16,9 @@ using namespace orbis::features;
 
 namespace {
 
-features::features random_features(std::size_t count, std::uint64_t seed) {
+orbis::features::features random_features(std::size_t count, std::uint64_t seed) {
   random_bits random{seed};
-  features::features f;
+  orbis::features::features f;
   for (std::size_t i = 0; i != count; ++i) {
     keypoint k;
     k.x = static_cast<float>(random.uniform(-10.0, 650.0));
@@ -42,7 +42,7 @@ bool inside(const window& w, const keypoint& k) {
 }  // namespace
 
 TEST_CASE("a keypoint grid finds exactly the keypoints in the disc and the octaves") {
-  const features::features f = random_features(500, 3);
+  const orbis::features::features f = random_features(500, 3);
   random_bits random{4};
   for (const float cell : {1.0F, 20.0F, 10000.0F}) {
     const keypoint_grid grid{f.keypoints, cell};
@@ -79,8 +79,8 @@ TEST_CASE("a keypoint grid survives no keypoints and positions that are not fini
 }
 
 TEST_CASE("windowed matching equals a search through all trains with the windows tested") {
-  const features::features q = random_features(200, 1);
-  const features::features t = random_features(400, 2);
+  const orbis::features::features q = random_features(200, 1);
+  const orbis::features::features t = random_features(400, 2);
   random_bits random{5};
   std::vector<window> windows(q.size());
   for (window& w : windows)
@@ -121,7 +121,7 @@ TEST_CASE("windowed matching equals a search through all trains with the windows
 }
 
 TEST_CASE("a windowed chain takes windows and optionally a grid") {
-  const features::features f = random_features(100, 1);
+  const orbis::features::features f = random_features(100, 1);
   std::vector<window> windows;
   for (const keypoint& k : f.keypoints) windows.push_back({k.x, k.y, 0.5F});
   windows[3] = {};
