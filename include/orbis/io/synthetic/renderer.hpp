@@ -36,7 +36,7 @@ class renderer {
   /// `solids` are those `textures` were painted for, in the same order; the first is the room.
   renderer(const std::vector<solid>& solids, const texture_set& textures, const camera_pose& pose,
            const camera::intrinsics& k)
-      : textures_{&textures}, pose_{pose}, k_{k} {
+      : textures_{&textures}, pose_{pose}, k_{k}, inverse_fx_{1.0 / k.fx}, inverse_fy_{1.0 / k.fy} {
     for (std::size_t i = 0; i != solids.size(); ++i) {
       const solid& s = solids[i];
       const triple b = s.bounds();
@@ -95,7 +95,7 @@ class renderer {
   }
 
   void render_pixel(int x, int y, const std::vector<const candidate*>& near, exact_view& out) const noexcept {
-    const double a = (x - k_.cx) / k_.fx, b = (y - k_.cy) / k_.fy;
+    const double a = (x - k_.cx) * inverse_fx_, b = (y - k_.cy) * inverse_fy_;
     const candidate* best = &seen_.front();
     triple direction = a * best->right + (b * best->down + best->forward);
     hit h = intersect(best->body, best->origin, direction);
@@ -133,7 +133,7 @@ class renderer {
       v = h.axis == 2 ? p.y + half.y : p.z + half.z;
       cosine = std::abs(along) / range_per_depth;
     }
-    const double footprint = h.t / (k_.fx * std::max(cosine, 0.25));
+    const double footprint = h.t * inverse_fx_ / std::max(cosine, 0.25);
     const std::uint32_t colour = textures_->sample(c.index, face, u, v, footprint);
     out.color(x, y) = {static_cast<std::uint8_t>(colour), static_cast<std::uint8_t>(colour >> 8U),
                        static_cast<std::uint8_t>(colour >> 16U)};
@@ -144,6 +144,7 @@ class renderer {
   const texture_set* textures_;
   camera_pose pose_;
   camera::intrinsics k_;
+  double inverse_fx_, inverse_fy_;
   std::vector<candidate> seen_;  // first the room, then by depth
 };
 

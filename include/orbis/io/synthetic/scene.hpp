@@ -88,8 +88,9 @@ class scene {
   }
 
   /// Where the ray `origin + t direction` first meets a surface: `t`, empty if the ray starts outside
-  /// of the room or the direction is not finite. The moving object does not count.
+  /// of the room, or the direction is zero or not finite. The moving object does not count.
   [[nodiscard]] std::optional<double> cast(const vec3& origin, const vec3& direction) const noexcept {
+    if (!origin.allFinite() || !direction.allFinite() || direction.isZero(0.0)) return std::nullopt;
     double t = std::numeric_limits<double>::infinity();
     for (std::size_t i = 0; i != solids_.size(); ++i)
       if (i != moving_ || i == 0)

@@ -224,7 +224,9 @@ class texture_set {
     // The logarithm to base 2, linear between powers of two, in 1/256.
     const auto relative = static_cast<float>(footprint * inverse_texel_);
     const int detail = (std::bit_cast<std::int32_t>(relative) - 0x3f800000) >> 15;
-    const auto a = static_cast<float>(u * inverse_texel_), b = static_cast<float>(v * inverse_texel_);
+    // In 1/256 texel of the finest level.
+    const double scale = 256.0 * inverse_texel_;
+    const int a = static_cast<int>(u * scale), b = static_cast<int>(v * scale);
     if (detail <= 0) return pack(bilinear(p, 0, a, b));
     const int last = p.levels - 1;
     const int level = std::min(detail >> 8, last);
@@ -254,13 +256,12 @@ class texture_set {
     return ((a * (256 - weight) + b * weight + 0x0000008000800080ULL) >> 8U) & 0x000000ff00ff00ffULL;
   }
 
-  [[nodiscard]] static std::uint64_t bilinear(const pyramid& p, int level, float u, float v) noexcept {
+  /// Between the four texel centres of a level around (u, v), in 1/256 texel of the finest level.
+  [[nodiscard]] static std::uint64_t bilinear(const pyramid& p, int level, int u, int v) noexcept {
     const auto l = static_cast<std::size_t>(level);
-    const float scale = std::bit_cast<float>((127 - level) << 23);  // 2^-level
     const int w = p.width[l], h = p.height[l];
-    // In 1/256 texel, measured between texel centres.
-    const int x = std::clamp(static_cast<int>(u * scale * 256.0F) - 128, 0, (w - 1) * 256);
-    const int y = std::clamp(static_cast<int>(v * scale * 256.0F) - 128, 0, (h - 1) * 256);
+    const int x = std::clamp((u >> level) - 128, 0, (w - 1) * 256);
+    const int y = std::clamp((v >> level) - 128, 0, (h - 1) * 256);
     const int i = x >> 8, j = y >> 8;
     const std::uint32_t* row = p.texels.data() + p.begin[l] + j * w + i;
     const int right = i + 1 < w ? 1 : 0, below = j + 1 < h ? w : 0;
