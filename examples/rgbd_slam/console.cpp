@@ -102,5 +102,6 @@ void console::clear_bar() {
 
 bool console::interrupted() { return interrupt_seen != 0; }
 void console::catch_interrupts() { std::signal(SIGINT, on_interrupt); }
+void console::release_interrupts() { std::signal(SIGINT, SIG_DFL); }
 
 }  // namespace app

@@ -35,11 +35,11 @@ class console {
   /// Seconds since the program began.
   [[nodiscard]] double total() const;
 
-  /// A progress callback for a library call of this stage; false once the user pressed Ctrl-C.
+  /// A progress callback for a library call of this stage.
   [[nodiscard]] auto progress() {
     return [this](std::size_t done, std::size_t total) {
       advance(done, total);
-      return !interrupted();
+      return true;
     };
   }
 
@@ -50,9 +50,11 @@ class console {
   void print(const std::string& line);
   [[nodiscard]] bool quiet() const { return quiet_; }
 
-  /// Whether the user pressed Ctrl-C since `catch_interrupts`.
-  [[nodiscard]] static bool interrupted();
+  /// From now on Ctrl-C does not end the program, but sets `interrupted`. A second one does end it.
   static void catch_interrupts();
+  /// From now on Ctrl-C ends the program again.
+  static void release_interrupts();
+  [[nodiscard]] static bool interrupted();
 
  private:
   void clear_bar();

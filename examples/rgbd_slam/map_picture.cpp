@@ -113,7 +113,7 @@ class picture {
     if (here <= 0.0F) return 1.0;
     constexpr int reach = 2 * oversampling;
     double behind = 0.0;
-    for (const auto [dx, dy] : {std::pair{reach, 0}, {-reach, 0}, {0, reach}, {0, -reach}}) {
+    for (const auto& [dx, dy] : {std::pair{reach, 0}, {-reach, 0}, {0, reach}, {0, -reach}}) {
       if (!inverse_depth_.view().contains(x + dx, y + dy)) continue;
       const float there = inverse_depth_(x + dx, y + dy);
       if (there > here) behind += std::min(0.25, std::log2(static_cast<double>(there / here)));

@@ -214,7 +214,7 @@ orbis::result<void> write_map_picture(const std::string& name, const std::string
   s.paste(draw_from_above(voxels, frame, coloring::height, 560, 620), 920, 130);
   s.text(title, {60, 44}, ink, 19, 0.0, true);
   char buffer[160];
-  std::snprintf(buffer, sizeof buffer, "%s occupied of %s known leaves, finest voxel %g cm, %s as map.bt",
+  std::snprintf(buffer, sizeof buffer, "%s occupied of %s known leaves, finest voxel %g cm, %s as .bt",
                 count_text(numbers.occupied).c_str(), count_text(numbers.leaves).c_str(), 100 * r.map->resolution,
                 bytes_text(numbers.bt_bytes).c_str());
   s.text(buffer, {60, 70}, faint, 13);

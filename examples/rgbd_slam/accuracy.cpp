@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "accuracy.hpp"
+
+#include <orbis/eval/ate.hpp>
+#include <orbis/eval/cloud_error.hpp>
+#include <orbis/eval/rpe.hpp>
+
+#include "summary.hpp"
+
+namespace app {
+
+orbis::result<accuracy> compare(const orbis::trajectory& estimate, const orbis::trajectory& truth) {
+  const auto ate = orbis::eval::ate(estimate, truth);
+  if (!ate) return orbis::fail(ate.error());
+  accuracy a;
+  a.ate_rmse_m = ate->translation.rmse;
+  a.ate_mean_m = ate->translation.mean;
+  a.ate_median_m = ate->translation.median;
+  a.ate_max_m = ate->translation.max;
+  a.T_truth_estimate = ate->aligned.T_reference_estimate;
+  if (const auto rpe = orbis::eval::rpe(estimate, truth)) {
+    a.rpe_trans_rmse_m = rpe->translation.rmse;
+    a.rpe_rot_rmse_deg = rpe->rotation.rmse;
+  }
+  const orbis::se3 T_estimate_truth = a.T_truth_estimate.inverse();
+  for (const auto& pair :
+       orbis::eval::pair_poses(estimate, truth, orbis::eval::alignment_options{}.max_time_difference)) {
+    const orbis::vec3 p = pair.estimate.translation();
+    const orbis::vec3 q = T_estimate_truth * pair.reference.translation();
+    a.poses.push_back({pair.timestamp, p, q, (p - q).norm()});
+  }
+  return a;
+}
+
+orbis::result<double> map_error(const orbis::point_cloud& cloud, const std::vector<std::uint32_t>& kept,
+                                const orbis::se3& T_truth_estimate,
+                                const std::function<double(const orbis::vec3&)>& surface_distance) {
+  std::vector<orbis::vec3> points;
+  points.reserve(kept.size());
+  for (const std::uint32_t i : kept) points.push_back(T_truth_estimate * cloud.points[i].cast<double>());
+  const auto error = orbis::eval::cloud_to_surface(orbis::par, points, surface_distance);
+  if (!error) return orbis::fail(error.error());
+  return error->distance.rmse;
+}
+
+void compare_with_truth(results& r, const frame_source& source, console& say) {
+  if (source.ground_truth.empty()) {
+    r.truth_note = "Without ground truth.";
+    return;
+  }
+  say.stage("comparing");
+  auto compared = compare(r.slam->trajectory, source.ground_truth);
+  if (!compared) {
+    r.truth_note = "Not compared with ground truth.";
+    r.warnings.push_back(compared.error().to_string());
+    say.warn(compared.error().to_string());
+    return;
+  }
+  r.truth_note = "Compared with ground truth after aligning the trajectories by a rigid motion.";
+  if (source.surface_distance && r.map) {
+    const auto error = map_error(r.map->cloud, r.map->kept, compared->T_truth_estimate, source.surface_distance);
+    if (error) r.map->error_m = *error;
+    r.truth_note += " The map's error is that of its filtered cloud, brought to the true room by the same motion.";
+  }
+  r.against_truth = *std::move(compared);
+  say.finish("ATE and RPE" + std::string{r.map && r.map->error_m ? ", map error" : ""});
+}
+
+}  // namespace app

@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// The program's commands.
+#pragma once
+
+#include "console.hpp"
+#include "settings.hpp"
+
+namespace app {
+
+[[nodiscard]] exit_code run_slam(const settings& s, console& say);          ///< run, demo
+[[nodiscard]] exit_code evaluate(const settings& s, console& say);          ///< eval
+[[nodiscard]] exit_code map_without_slam(const settings& s, console& say);  ///< map
+
+}  // namespace app

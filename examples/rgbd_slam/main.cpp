@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <exception>
+#include <new>
+
+#include "command_line.hpp"
+#include "commands.hpp"
+
+int main(int argc, char** argv) {
+  const auto asked = app::read_command_line(argc, argv);
+  if (const auto* code = std::get_if<app::exit_code>(&asked)) return *code;
+  const auto& settings = std::get<app::settings>(asked);
+  app::console say{settings.quiet};
+  try {
+    switch (settings.what) {
+      case app::command::run:
+      case app::command::demo: return app::run_slam(settings, say);
+      case app::command::eval: return app::evaluate(settings, say);
+      case app::command::map: return app::map_without_slam(settings, say);
+    }
+  } catch (const std::exception& e) {  // no memory, no threads
+    say.error({orbis::errc::unreadable, {}, std::string{"gave up: "} + e.what()});
+  }
+  return app::bad_input;
+}

@@ -1,0 +1,190 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "map_stage.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <unordered_map>
+
+#include <orbis/cloud/extract.hpp>
+#include <orbis/io/ply.hpp>
+#include <orbis/octree/files.hpp>
+
+#include "summary.hpp"
+#include "view_frame.hpp"
+
+namespace app {
+namespace {
+
+using orbis::result;
+using orbis::vec3f;
+using tree = orbis::octree::occupancy_octree<>;
+
+orbis::mapping::filter_options filter_options(const settings& s) {
+  using orbis::mapping::filter_kind;
+  orbis::mapping::filter_options options;
+  options.kind = s.filter == "none"          ? filter_kind::none
+                 : s.filter == "statistical" ? filter_kind::statistical
+                                             : filter_kind::automatic;
+  options.statistical.neighbors = s.neighbors;
+  options.statistical.sigma_multiplier = s.sigma;
+  return options;
+}
+
+std::string in_words(const built_map& map) {
+  return count_text(map.cloud.size()) + " points, " + count_text(map.filter.removed) + " removed, octree of " +
+         count_text(map.octree.num_leaves()) + " leaves";
+}
+
+/// Marks the voxels of the points as occupied.
+tree occupied_only(const std::vector<vec3f>& points, double resolution) {
+  tree map{resolution};
+  for (const vec3f& p : points)
+    if (const auto key = map.grid().key(p); key && !map.log_odds(*key))
+      map.set_unknown_node(*key, orbis::octree::tree_depth, orbis::octree::after_hit<tree::model>(0.0F));
+  return map;
+}
+
+tree_numbers numbers_of(const tree& map, std::uintmax_t bytes) {
+  const auto n = map.counts();
+  return {n.leaves, n.occupied_leaves, n.free_leaves, bytes};
+}
+
+/// The occupied leaves, in the mean colour of the points in them.
+std::vector<voxel> occupied_voxels(const tree& map, const orbis::point_cloud& cloud) {
+  struct sum {
+    std::uint64_t r = 0, g = 0, b = 0, n = 0;
+  };
+  const auto name = [](const orbis::octree::voxel_key& k) {
+    return std::uint64_t{k.x} << 32U | std::uint64_t{k.y} << 16U | k.z;
+  };
+  std::unordered_map<std::uint64_t, sum> colors;
+  for (std::size_t i = 0; i != cloud.colors.size(); ++i) {
+    const auto key = map.grid().key(cloud.points[i]);
+    if (!key) continue;
+    sum& s = colors[name(*key)];
+    s.r += cloud.colors[i].r;
+    s.g += cloud.colors[i].g;
+    s.b += cloud.colors[i].b;
+    ++s.n;
+  }
+  std::vector<voxel> out;
+  map.for_each_leaf([&](const tree::leaf& leaf) {
+    if (!leaf.occupied) return;
+    voxel v{leaf.center.cast<float>(), static_cast<float>(leaf.size), {176, 178, 182}};
+    sum all;  // a large leaf takes its colour from its lowest voxel's neighbours along the diagonal
+    const auto cells = static_cast<std::uint32_t>(std::lround(leaf.size / map.resolution()));
+    for (std::uint32_t i = 0; i != cells; ++i) {
+      auto key = leaf.key;
+      key.x = static_cast<decltype(key.x)>(key.x + i);
+      key.y = static_cast<decltype(key.y)>(key.y + i);
+      key.z = static_cast<decltype(key.z)>(key.z + i);
+      if (const auto found = colors.find(name(key)); found != colors.end()) {
+        all.r += found->second.r;
+        all.g += found->second.g;
+        all.b += found->second.b;
+        all.n += found->second.n;
+      }
+    }
+    if (all.n != 0)
+      v.color = {static_cast<std::uint8_t>(all.r / all.n), static_cast<std::uint8_t>(all.g / all.n),
+                 static_cast<std::uint8_t>(all.b / all.n)};
+    out.push_back(v);
+  });
+  return out;
+}
+
+/// Which points of `cloud` are in `filtered`, a subsequence of it.
+std::vector<std::uint32_t> kept_points(const orbis::point_cloud& cloud, const orbis::point_cloud& filtered) {
+  std::vector<std::uint32_t> kept;
+  kept.reserve(filtered.size());
+  for (std::size_t i = 0; i != cloud.size() && kept.size() != filtered.size(); ++i)
+    if (cloud.points[i] == filtered.points[kept.size()]) kept.push_back(static_cast<std::uint32_t>(i));
+  return kept;
+}
+
+}  // namespace
+
+result<built_map> map_frames(const posed_frames& frames, const frame_source& source, const settings& s, console& say) {
+  say.stage("mapping");
+  orbis::mapping::map_options options;
+  options.dense.max_depth = static_cast<float>(s.max_depth);
+  options.filter = filter_options(s);
+  options.resolution = s.resolution;
+  // Enough points for the octree's voxels, not more: about a million from an ordinary recording.
+  constexpr std::size_t ample = 1'500'000;
+  const std::size_t pixels = static_cast<std::size_t>(source.camera.model.width()) *
+                             static_cast<std::size_t>(source.camera.model.height()) * frames.size();
+  while (pixels / static_cast<std::size_t>(options.dense.stride * options.dense.stride) > ample) ++options.dense.stride;
+
+  auto map =
+      orbis::mapping::build_map(orbis::par.with(s.threads), frames, source.camera.model, options, say.progress());
+  if (!map && frames.trouble()) return orbis::fail(*frames.trouble());
+  if (map) say.finish(in_words(*map));
+  return map;
+}
+
+built_map map_cloud(orbis::point_cloud cloud, const settings& s, console& say) {
+  say.stage("mapping");
+  built_map map{.octree = tree{s.resolution}};
+  map.cloud = std::move(cloud);
+  orbis::mapping::filter_options options = filter_options(s);
+  options.automatic.sensor_origin = s.origin;
+  orbis::mapping::filtered_indices filtered =
+      orbis::mapping::filter_points(orbis::par.with(s.threads), map.cloud.points, {}, options);
+  map.filter = std::move(filtered.report);
+  map.filtered_cloud = orbis::cloud::extract(map.cloud, filtered.inliers);
+
+  const auto build = [&](const std::vector<vec3f>& points, std::vector<double>& milliseconds) {
+    if (!s.origin) return occupied_only(points, s.resolution);
+    tree scanned{s.resolution};
+    const auto start = console::clock::now();
+    scanned.integrate(orbis::par.with(s.threads), points, *s.origin, {.max_range = s.max_depth});
+    milliseconds.push_back(std::chrono::duration<double, std::milli>(console::clock::now() - start).count());
+    return scanned;
+  };
+  map.unfiltered_octree = build(map.cloud.points, map.insert_ms_unfiltered);
+  map.octree = build(map.filtered_cloud.points, map.insert_ms);
+  say.finish(in_words(map));
+  return map;
+}
+
+result<map_results> write_map(built_map map, const settings& s, console& say) {
+  say.stage("writing");
+  map_results m;
+  const auto write = [&](const char* name, const auto& how, std::uintmax_t& bytes) -> result<void> {
+    const std::filesystem::path path = s.out / name;
+    if (auto done = how(path); !done) return done;
+    std::error_code ignored;
+    bytes = std::filesystem::file_size(path, ignored);
+    return {};
+  };
+  const auto cloud_of = [](const orbis::point_cloud& c) {
+    return [&c](const auto& path) -> result<void> { return orbis::io::write_ply(path, c); };
+  };
+  const auto bt_of = [](const tree& t) { return [&t](const auto& path) { return orbis::octree::write_bt(t, path); }; };
+  std::uintmax_t bt_bytes = 0, bt_bytes_unfiltered = 0;
+  result<void> done = write("cloud.ply", cloud_of(map.cloud), m.cloud_bytes);
+  if (done) done = write("cloud_filtered.ply", cloud_of(map.filtered_cloud), m.filtered_bytes);
+  if (done) done = write("map_unfiltered.bt", bt_of(*map.unfiltered_octree), bt_bytes_unfiltered);
+  if (done) done = write("map.bt", bt_of(map.octree), bt_bytes);
+  if (done)
+    done = write(
+        "map.ot", [&](const auto& path) { return orbis::octree::write_ot(map.octree, path); }, m.ot_bytes);
+  if (!done) return orbis::fail(done.error());
+
+  m.filter_mode = to_string(map.filter.mode);
+  m.filter_reason = map.filter.reason;
+  m.resolution = s.resolution;
+  m.unfiltered = numbers_of(*map.unfiltered_octree, bt_bytes_unfiltered);
+  m.filtered = numbers_of(map.octree, bt_bytes);
+  m.insert_ms = std::move(map.insert_ms);
+  m.voxels_unfiltered = occupied_voxels(*map.unfiltered_octree, map.cloud);
+  m.voxels = occupied_voxels(map.octree, map.filtered_cloud);
+  m.kept = kept_points(map.cloud, map.filtered_cloud);
+  m.cloud = std::move(map.cloud);
+  say.finish("cloud.ply, cloud_filtered.ply, map_unfiltered.bt, map.bt, map.ot");
+  return m;
+}
+
+}  // namespace app

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Posed frames, or a cloud, to a filtered cloud and an octree; and their files.
+#pragma once
+
+#include <optional>
+
+#include <orbis/mapping/batch.hpp>
+
+#include "console.hpp"
+#include "posed_frames.hpp"
+#include "results.hpp"
+#include "settings.hpp"
+
+namespace app {
+
+using built_map = orbis::mapping::built_map<orbis::octree::occupancy_octree<>>;
+
+/// Keyframes -> dense cloud -> filter -> octree.
+[[nodiscard]] orbis::result<built_map> map_frames(const posed_frames& frames, const frame_source& source,
+                                                  const settings& s, console& say);
+/// Cloud -> filter -> octree. With an origin all points are scanned from there; without one their
+/// voxels are occupied and nothing is known of the rest.
+[[nodiscard]] built_map map_cloud(orbis::point_cloud cloud, const settings& s, console& say);
+
+/// Writes the clouds and octrees, and counts what is in them.
+[[nodiscard]] orbis::result<map_results> write_map(built_map map, const settings& s, console& say);
+
+}  // namespace app

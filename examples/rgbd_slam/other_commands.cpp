@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <orbis/io/cloud_file.hpp>
+#include <orbis/io/trajectory_file.hpp>
+
+#include "accuracy.hpp"
+#include "commands.hpp"
+#include "map_stage.hpp"
+#include "output.hpp"
+#include "summary.hpp"
+
+namespace app {
+namespace {
+
+/// All frames whose pose the ground truth knows.
+orbis::result<posed_frames> frames_with_poses(const frame_source& source, const settings& s, console& say) {
+  say.stage("reading");
+  posed_frames posed{source};
+  read_ahead frames{source, s.threads != 1};
+  for (std::size_t i = 0; frames.has_next(); ++i) {
+    const auto frame = frames.next();
+    if (!frame) return orbis::fail(frame.error());
+    if (frame->T_world_camera) posed.add(i, *frame->T_world_camera, *frame);
+    say.advance(i + 1, source.frames);
+  }
+  if (posed.size() == 0)
+    return orbis::fail(orbis::errc::no_data, s.input.string(), "no frame has a pose in the ground truth");
+  say.finish(std::to_string(posed.size()) + " of " + std::to_string(source.frames) + " frames have a pose");
+  return posed;
+}
+
+struct mapped {
+  results r;
+  built_map map;
+  orbis::trajectory cameras;
+};
+
+orbis::result<mapped> map_recording(const settings& s, console& say) {
+  const auto source = open_source(s, say);
+  if (!source) return orbis::fail(source.error());
+  const auto posed = frames_with_poses(*source, s, say);
+  if (!posed) return orbis::fail(posed.error());
+  auto map = map_frames(*posed, *source, s, say);
+  if (!map) return orbis::fail(map.error());
+  results r = begin_results(s, source->title, &*source);
+  r.truth_note = "Mapped with the poses of the ground truth.";
+  return mapped{std::move(r), *std::move(map), posed->trajectory()};
+}
+
+orbis::result<mapped> map_cloud_file(const settings& s, console& say) {
+  say.stage("reading");
+  auto cloud = orbis::io::read_cloud(s.input);
+  if (!cloud) return orbis::fail(cloud.error());
+  if (cloud->empty()) return orbis::fail(orbis::errc::no_data, s.input.string(), "the cloud has no points");
+  const std::string name = s.input.filename().string();
+  say.finish(name + ": " + count_text(cloud->size()) + " points");
+  results r = begin_results(s, name, nullptr);
+  r.truth_note = "A cloud, without SLAM.";
+  return mapped{std::move(r), map_cloud(*std::move(cloud), s, say), {}};
+}
+
+}  // namespace
+
+exit_code evaluate(const settings& s, console& say) {
+  const auto give_up = [&](const orbis::error& e) { return say.error(e), bad_input; };
+  const auto estimate = orbis::io::read_trajectory(s.input);
+  if (!estimate) return give_up(estimate.error());
+  const auto truth = orbis::io::read_trajectory(s.reference);
+  if (!truth) return give_up(truth.error());
+  const auto compared = compare(*estimate, *truth);
+  if (!compared) return give_up({compared.error().code, s.input.string(), compared.error().message});
+  std::string text = s.json ? accuracy_json(*compared) : accuracy_lines(*compared) + "\n";
+  text.pop_back();
+  say.print(text);
+  return done;
+}
+
+exit_code map_without_slam(const settings& s, console& say) {
+  const auto give_up = [&](const orbis::error& e) { return say.error(e), bad_input; };
+  if (auto ready = prepare_output(s.out); !ready) return give_up(ready.error());
+  std::error_code ignored;
+  auto found = std::filesystem::is_directory(s.input, ignored) ? map_recording(s, say) : map_cloud_file(s, say);
+  if (!found) return give_up(found.error());
+
+  remove_old_results(s.out);
+  auto written = write_map(std::move(found->map), s, say);
+  if (!written) return give_up(written.error());
+  found->r.map = *std::move(written);
+  if (auto done = write_report_files(found->r, found->cameras, say); !done) return give_up(done.error());
+  print_results(found->r, say);
+  return done;
+}
+
+}  // namespace app

@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "output.hpp"
+
+#include <cstdio>
+
+#include <orbis/core/file.hpp>
+#include <orbis/io/trajectory_file.hpp>
+
+#include "plots.hpp"
+#include "report.hpp"
+#include "summary.hpp"
+#include "view_frame.hpp"
+
+namespace app {
+
+using orbis::result;
+
+result<void> prepare_output(const std::filesystem::path& out) {
+  std::error_code ec;
+  std::filesystem::create_directories(out, ec);
+  if (ec) return orbis::fail(orbis::errc::write_failed, out.string(), "cannot be made: " + ec.message());
+  const auto probe = out / ".rgbd_slam_probe";
+  if (auto done = orbis::write_file_atomically(probe, [](std::ostream& file) { file << "probe\n"; }); !done)
+    return orbis::fail(orbis::errc::write_failed, out.string(), "no file can be made in it: " + done.error().message);
+  std::filesystem::remove(probe, ec);
+  return {};
+}
+
+void remove_old_results(const std::filesystem::path& out) {
+  std::error_code ignored;
+  for (const char* name :
+       {"trajectory.txt", "keyframes.txt", "cloud.ply", "cloud_filtered.ply", "map_unfiltered.bt", "map.bt", "map.ot",
+        "summary.json", "report.html", "trajectory.png", "map.png", "map_unfiltered.png"})
+    std::filesystem::remove(out / name, ignored);
+}
+
+results begin_results(const settings& s, const std::string& title, const frame_source* source) {
+  constexpr const char* names[] = {"run", "demo", "eval", "map"};
+  results r;
+  r.command = names[static_cast<int>(s.what)];
+  r.title = title;
+  r.out = s.out;
+  const auto number = [](const char* format, double v) {
+    char buffer[64];
+    std::snprintf(buffer, sizeof buffer, format, v);
+    return std::string{buffer};
+  };
+  if (source != nullptr) {
+    const auto& camera = source->camera;
+    const auto& k = camera.model.k();
+    r.setup.emplace_back("input", source->kind);
+    r.setup.emplace_back("camera", std::string{camera.model.model_name()} + ", " + std::to_string(k.width) + " x " +
+                                       std::to_string(k.height) + number(", fx %.1f", k.fx) +
+                                       number(", fy %.1f", k.fy) + number(", cx %.1f", k.cx) +
+                                       number(", cy %.1f", k.cy) + number(", depth / %g = metres", camera.depth_scale));
+    r.setup.emplace_back(
+        "frames", std::to_string(source->frames) + (s.stride > 1 ? ", every " + std::to_string(s.stride) + "th" : ""));
+    r.warnings = source->notes;
+  } else {
+    r.setup.emplace_back("input", s.input.filename().string());
+    r.setup.emplace_back("rays", s.origin ? number("from %g, ", s.origin->x()) + number("%g, ", s.origin->y()) +
+                                                number("%g", s.origin->z())
+                                          : "none: points are marked occupied, nothing is marked free");
+  }
+  r.setup.emplace_back("octree",
+                       number("%g cm voxels", 100 * s.resolution) + number(", measurements up to %g m", s.max_depth));
+  r.setup.emplace_back("filter asked for", s.filter == "statistical" ? "statistical, " + std::to_string(s.neighbors) +
+                                                                           " neighbours" + number(", sigma %g", s.sigma)
+                                                                     : s.filter);
+  return r;
+}
+
+result<void> write_trajectories(const slam_results& slam, const std::filesystem::path& out) {
+  if (auto done = orbis::io::write_trajectory(out / "trajectory.txt", slam.trajectory); !done) return done;
+  return orbis::io::write_trajectory(out / "keyframes.txt", slam.keyframes);
+}
+
+result<void> write_report_files(results& r, const orbis::trajectory& cameras, console& say) {
+  say.stage("report");
+  std::vector<orbis::vec3f> points;
+  if (r.map) {
+    for (const voxel& v : r.map->voxels) points.push_back(v.center);
+  } else if (r.slam) {
+    for (const auto& p : r.slam->trajectory) points.push_back(p.T_world_camera.translation().cast<float>());
+  }
+  const view_frame frame = find_view_frame(points, cameras);
+  if (auto done = write_pictures(r, frame); !done) return done;
+  r.wall_s = say.total();
+  if (auto done = write_report(r, frame); !done) return done;
+  r.wall_s = say.total();
+  if (auto done = write_summary(r); !done) return done;
+  say.finish("pictures, report.html, summary.json");
+  return {};
+}
+
+exit_code report_no_start(results& r, const settings& s, console& say) {
+  r.wall_s = say.total();
+  if (auto done = write_summary(r); !done) return say.error(done.error()), bad_input;
+  say.error({orbis::errc::no_data, s.what == command::demo ? r.title : s.input.string(),
+             "tracking never started: none of " + std::to_string(r.slam->frames) +
+                 " frames shows enough texture with depth"});
+  return never_tracked;
+}
+
+void print_results(const results& r, console& say) {
+  if (r.map) say.print("\n" + size_table(*r.map));
+  if (r.against_truth) say.print("\n" + accuracy_lines(*r.against_truth));
+  if (r.map && r.map->error_m) {
+    char buffer[96];
+    std::snprintf(buffer, sizeof buffer, "  Map  RMS %.4f m to the true surface", *r.map->error_m);
+    say.print(buffer);
+  }
+  say.print("\n  " + (r.out / "report.html").string() + " shows it all; the files are beside it");
+}
+
+}  // namespace app

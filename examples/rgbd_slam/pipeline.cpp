@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// The whole program in one screen; each call stands in a small file beside this one.
+#include "accuracy.hpp"
+#include "commands.hpp"
+#include "map_stage.hpp"
+#include "output.hpp"
+#include "tracking_stage.hpp"
+
+namespace app {
+
+exit_code run_slam(const settings& s, console& say) {
+  const auto give_up = [&](const orbis::error& e) { return say.error(e), bad_input; };
+  if (auto ready = prepare_output(s.out); !ready) return give_up(ready.error());
+
+  // Read.
+  const auto source = open_source(s, say);
+  if (!source) return give_up(source.error());
+  results r = begin_results(s, source->title, &*source);
+
+  // Track; some frames become keyframes.
+  const tracked_frames tracked = track(*source, s, say);
+  if (tracked.stopped && tracked.slam.frames == 0) return give_up(*tracked.stopped);
+  if (tracked.stopped) r.warnings.push_back(explain_stop(tracked, *source).to_string());
+  r.slam = tracked.slam;
+  remove_old_results(s.out);
+  if (r.slam->tracked == 0) return report_no_start(r, s, say);
+  if (auto done = write_trajectories(*r.slam, s.out); !done) return give_up(done.error());
+
+  // Keyframes -> dense cloud -> filter -> octree -> files.
+  auto map = map_frames(tracked.keyframes, *source, s, say);
+  if (!map) return give_up(map.error());
+  auto written = write_map(*std::move(map), s, say);
+  if (!written) return give_up(written.error());
+  r.map = *std::move(written);
+
+  // Evaluation and report.
+  compare_with_truth(r, *source, say);
+  if (auto done = write_report_files(r, r.slam->keyframes, say); !done) return give_up(done.error());
+  print_results(r, say);
+
+  if (tracked.stopped) return give_up(explain_stop(tracked, *source));
+  return console::interrupted() ? interrupted : done;
+}
+
+}  // namespace app

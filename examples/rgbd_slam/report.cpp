@@ -1,0 +1,376 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "report.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+#include <map>
+#include <string_view>
+#include <unordered_map>
+
+#include <nlohmann/json.hpp>
+
+#include <orbis/core/file.hpp>
+
+#include "summary.hpp"
+
+namespace app {
+namespace {
+
+using json = nlohmann::ordered_json;
+using orbis::vec3;
+
+// -- text ------------------------------------------------------------------------------------------
+
+std::string escaped(std::string_view text) {
+  std::string out;
+  for (const char c : text) switch (c) {
+      case '&': out += "&amp;"; break;
+      case '<': out += "&lt;"; break;
+      case '>': out += "&gt;"; break;
+      case '"': out += "&quot;"; break;
+      case '\'': out += "&#39;"; break;
+      default: out += c;
+    }
+  return out;
+}
+
+template <class... Args>
+std::string text(const char* format, Args... args) {
+  char buffer[512];
+  std::snprintf(buffer, sizeof buffer, format, args...);
+  return buffer;
+}
+
+/// JSON for a script element: no "</script>" can occur in it.
+std::string for_script(const json& j) {
+  std::string out;
+  for (const char c : j.dump(-1, ' ', true, json::error_handler_t::replace))
+    out += c == '<' ? "\\u003c" : std::string(1, c);
+  return out;
+}
+
+std::string base64(std::string_view bytes) {
+  constexpr std::string_view digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string out;
+  out.reserve(bytes.size() / 3 * 4 + 4);
+  for (std::size_t i = 0; i < bytes.size(); i += 3) {
+    std::uint32_t group = 0;
+    const std::size_t n = std::min<std::size_t>(3, bytes.size() - i);
+    for (std::size_t k = 0; k != 3; ++k) group = group << 8U | (k < n ? static_cast<unsigned char>(bytes[i + k]) : 0U);
+    for (std::size_t k = 0; k != 4; ++k) out += k <= n ? digits[group >> (18 - 6 * k) & 63U] : '=';
+  }
+  return out;
+}
+
+double rounded(double v, double step) { return std::round(v / step) * step; }
+
+// -- three-dimensional data -------------------------------------------------------------------------
+
+/// Positions as 16 bits for each coordinate within their bounds.
+class packer {
+ public:
+  void add(const vec3& p, orbis::rgb8 color, std::uint8_t extra) {
+    points_.push_back(p);
+    colors_.push_back(color);
+    extras_.push_back(extra);
+  }
+  [[nodiscard]] json pack() const {
+    vec3 low = vec3::Zero(), high = vec3::Zero();
+    if (!points_.empty()) low = high = points_.front();
+    for (const vec3& p : points_) {
+      low = low.cwiseMin(p);
+      high = high.cwiseMax(p);
+    }
+    const vec3 span = (high - low).cwiseMax(1e-6);
+    std::string bytes;
+    for (const vec3& p : points_)
+      for (int i = 0; i != 3; ++i) {
+        const auto q = static_cast<std::uint16_t>(std::lround((p[i] - low[i]) / span[i] * 65535.0));
+        bytes += static_cast<char>(q & 0xffU);
+        bytes += static_cast<char>(q >> 8U);
+      }
+    for (const orbis::rgb8 c : colors_) {
+      bytes += static_cast<char>(c.r);
+      bytes += static_cast<char>(c.g);
+      bytes += static_cast<char>(c.b);
+    }
+    for (const std::uint8_t e : extras_) bytes += static_cast<char>(e);
+    return {{"count", points_.size()},
+            {"low", {low.x(), low.y(), low.z()}},
+            {"span", {span.x(), span.y(), span.z()}},
+            {"packed", base64(bytes)}};
+  }
+
+ private:
+  std::vector<vec3> points_;
+  std::vector<orbis::rgb8> colors_;
+  std::vector<std::uint8_t> extras_;
+};
+
+json packed_points(const map_results& m, const view_frame& frame) {
+  constexpr std::size_t most = 90'000;
+  const std::size_t every = std::max<std::size_t>(1, (m.cloud.size() + most - 1) / most);
+  packer out;
+  auto kept = m.kept.begin();
+  for (std::size_t i = 0; i < m.cloud.size(); i += every) {
+    const vec3 p = frame.T_view_world * m.cloud.points[i].cast<double>();
+    if (!p.allFinite()) continue;
+    kept = std::lower_bound(kept, m.kept.end(), i);
+    const bool is_kept = kept != m.kept.end() && *kept == i;
+    out.add(p, m.cloud.has_colors() ? m.cloud.colors[i] : orbis::rgb8{150, 160, 175}, is_kept ? 1 : 0);
+  }
+  json j = out.pack();
+  j["total"] = m.cloud.size();
+  j["kept"] = m.kept.size();
+  return j;
+}
+
+/// Voxels merged into voxels of twice the size until there are few enough.
+json packed_voxels(std::vector<voxel> voxels, double resolution, const view_frame& frame) {
+  constexpr std::size_t most = 45'000;
+  const std::size_t total = voxels.size();
+  double size = resolution;
+  while (voxels.size() > most) {
+    size *= 2;
+    struct sum {
+      std::size_t r = 0, g = 0, b = 0, n = 0;
+      orbis::vec3f center;
+      float size = 0;
+    };
+    std::map<std::array<long, 3>, sum> merged;  // in an order that does not depend on the machine
+    const auto fsize = static_cast<float>(size);
+    for (const voxel& v : voxels) {
+      const orbis::vec3f cell = (v.center / fsize).array().floor();
+      sum& s = merged[{std::lround(cell.x()), std::lround(cell.y()), std::lround(cell.z())}];
+      s.r += v.color.r;
+      s.g += v.color.g;
+      s.b += v.color.b;
+      ++s.n;
+      s.size = std::max(v.size, fsize);
+      s.center = v.size > fsize ? v.center : orbis::vec3f((cell.array() + 0.5F) * fsize);
+    }
+    voxels.clear();
+    for (const auto& [cell, s] : merged)
+      voxels.push_back({s.center,
+                        s.size,
+                        {static_cast<std::uint8_t>(s.r / s.n), static_cast<std::uint8_t>(s.g / s.n),
+                         static_cast<std::uint8_t>(s.b / s.n)}});
+  }
+  packer out;
+  for (const voxel& v : voxels)
+    out.add(frame.T_view_world * v.center.cast<double>(), v.color,
+            static_cast<std::uint8_t>(std::clamp(std::lround(std::log2(v.size / size)), 0L, 16L)));
+  json j = out.pack();
+  j["total"] = total;
+  j["resolution"] = size;
+  return j;
+}
+
+// -- the script's data -------------------------------------------------------------------------------
+
+std::size_t thinning(std::size_t size, std::size_t most) { return std::max<std::size_t>(1, (size + most - 1) / most); }
+
+void append(json& flat, const vec3& p) {
+  for (int i = 0; i != 3; ++i) flat.push_back(rounded(p[i], 1e-4));
+}
+
+json script_data(const results& r, const view_frame& frame) {
+  json j;
+  if (r.slam && !r.slam->trajectory.empty()) {
+    const auto& poses = r.slam->trajectory;
+    const double start = poses.front().timestamp;
+    json t = json::array(), estimate = json::array(), keyframes = json::array();
+    for (std::size_t i = 0; i < poses.size(); i += thinning(poses.size(), 6000)) {
+      t.push_back(rounded(poses[i].timestamp - start, 1e-3));
+      append(estimate, frame.T_view_world * poses[i].T_world_camera.translation());
+    }
+    for (const auto& k : r.slam->keyframes) append(keyframes, frame.T_view_world * k.T_world_camera.translation());
+    j["path"] = {{"t", t}, {"estimate", estimate}, {"keyframes", keyframes}};
+    if (r.against_truth) {
+      json when = json::array(), at = json::array(), error = json::array();
+      const auto& pairs = r.against_truth->poses;
+      for (std::size_t i = 0; i < pairs.size(); i += thinning(pairs.size(), 6000)) {
+        when.push_back(rounded(pairs[i].timestamp - start, 1e-3));
+        append(at, frame.T_view_world * pairs[i].truth);
+        error.push_back(rounded(100 * pairs[i].error_m, 1e-3));
+      }
+      j["truth"] = {{"t", when}, {"at", at}, {"error", error}};
+    }
+    json ms = json::array();
+    for (std::size_t i = 0; i < r.slam->tracking_ms.size(); i += thinning(r.slam->tracking_ms.size(), 20'000))
+      ms.push_back(rounded(r.slam->tracking_ms[i], 0.01));
+    j["tracking_ms"] = ms;
+  }
+  if (r.map) {
+    const map_results& m = *r.map;
+    json ms = json::array();
+    for (const double v : m.insert_ms) ms.push_back(rounded(v, 0.01));
+    j["insert_ms"] = ms;
+    j["colors"] = m.cloud.has_colors();
+    const orbis::mat3 axes = frame.T_view_world.rotation_matrix();
+    j["axes"] = std::vector<double>(axes.data(), axes.data() + 9);  // column by column, as WebGL wants them
+    double top = frame.high.z();
+    for (const voxel& v : m.voxels_unfiltered) top = std::max(top, (frame.T_view_world * v.center.cast<double>()).z());
+    top = std::min(top, frame.high.z() + 2.0);
+    j["points"] = packed_points(m, frame);
+    // Points as large as to touch each other on a surface.
+    const vec3 size = frame.high - frame.low;
+    const double area = 2 * (size.x() * size.y() + size.x() * size.z() + size.y() * size.z());
+    const double shown = std::max(1.0, j["points"]["count"].get<double>());
+    j["view"] = {{"low", {frame.low.x(), frame.low.y(), frame.low.z()}},
+                 {"high", {frame.high.x(), frame.high.y(), frame.high.z()}},
+                 {"cut", frame.cut},
+                 {"top", top},
+                 {"spacing", std::clamp(0.8 * std::sqrt(area / shown), 0.004, 0.1)}};
+    j["voxels"] = {{"before", packed_voxels(m.voxels_unfiltered, m.resolution, frame)},
+                   {"after", packed_voxels(m.voxels, m.resolution, frame)}};
+  }
+  return j;
+}
+
+// -- the page's static parts -------------------------------------------------------------------------
+
+std::string card(const std::string& value, const std::string& what) {
+  return "<div class=\"card\"><b>" + escaped(value) + "</b><span>" + escaped(what) + "</span></div>\n";
+}
+
+std::string header(const results& r) {
+  std::string h = "<h1>" + escaped(r.title) + "</h1>\n<p class=\"lead\">";
+  h += escaped(r.truth_note.empty() ? std::string{"RGB-D SLAM and mapping"} : r.truth_note) +
+       "</p>\n<div class=\"cards\">\n";
+  if (r.slam) {
+    h += card(std::to_string(r.slam->tracked) + " / " + std::to_string(r.slam->frames), "frames tracked");
+    h += card(std::to_string(r.slam->keyframes.size()), "keyframes");
+  }
+  if (r.against_truth) h += card(text("%.1f mm", 1e3 * r.against_truth->ate_rmse_m), "trajectory error (ATE RMSE)");
+  if (r.map && r.map->error_m) h += card(text("%.1f mm", 1e3 * *r.map->error_m), "map error (RMS to the surface)");
+  if (r.slam) h += card(text("%.1f ms", spread_of(r.slam->tracking_ms).median), "median time to track a frame");
+  if (r.map) {
+    h += card(count_text(r.map->filtered.leaves), "leaves in the octree");
+    h += card(bytes_text(r.map->filtered.bt_bytes), "map on disk");
+  }
+  h += "</div>\n";
+  if (!r.warnings.empty()) {
+    h += "<ul class=\"warnings\">";
+    for (const std::string& w : r.warnings) h += "<li>" + escaped(w) + "</li>";
+    h += "</ul>\n";
+  }
+  return h;
+}
+
+std::string words(const std::vector<std::pair<std::string, std::string>>& rows) {
+  std::string t = "<div class=\"panel\"><table class=\"words\">";
+  for (const auto& [what, value] : rows) t += "<tr><td>" + escaped(what) + "</td><td>" + escaped(value) + "</td></tr>";
+  return t + "</table></div>\n";
+}
+
+std::string tables(const results& r) {
+  std::string t;
+  if (r.map) {
+    const map_results& m = *r.map;
+    const auto row = [](const std::string& what, std::uintmax_t count, const char* unit, std::uintmax_t occupied,
+                        std::uintmax_t bytes) {
+      return "<tr><td>" + escaped(what) + "</td><td>" + count_text(count) + " " + unit + "</td><td>" +
+             (occupied != 0 ? count_text(occupied) : "") + "</td><td>" + bytes_text(bytes) + "</td></tr>";
+    };
+    const std::string octree = text("octree, %g cm, ", 100 * m.resolution);
+    t += "<h2>Sizes</h2>\n<div class=\"panel\"><table><tr><th></th><th>size</th><th>of them occupied</th><th>on "
+         "disk</th></tr>";
+    t += row("point cloud", m.cloud.size(), "points", 0, m.cloud_bytes);
+    t += row("point cloud, filtered", m.kept.size(), "points", 0, m.filtered_bytes);
+    t += row(octree + "before the filter", m.unfiltered.leaves, "leaves", m.unfiltered.occupied, m.unfiltered.bt_bytes);
+    t += row(octree + "after the filter", m.filtered.leaves, "leaves", m.filtered.occupied, m.filtered.bt_bytes);
+    t += "</table></div>\n<h2>The filter</h2>\n";
+    const std::size_t removed = m.cloud.size() - m.kept.size();
+    const double share =
+        m.cloud.empty() ? 0.0 : 100.0 * static_cast<double>(removed) / static_cast<double>(m.cloud.size());
+    t += words({{"mode", m.filter_mode},
+                {"removed", count_text(removed) + text(" points (%.2f %%)", share)},
+                {"why", m.filter_reason}});
+  }
+  if (r.against_truth) {
+    const accuracy& a = *r.against_truth;
+    t += "<h2>Against ground truth</h2>\n<div "
+         "class=\"panel\"><table><tr><th></th><th>RMSE</th><th>mean</th><th>median</th><th>max</th></tr>";
+    t +=
+        text("<tr><td>absolute (ATE), mm, over %zu poses</td><td>%.2f</td><td>%.2f</td><td>%.2f</td><td>%.2f</td></tr>",
+             a.poses.size(), 1e3 * a.ate_rmse_m, 1e3 * a.ate_mean_m, 1e3 * a.ate_median_m, 1e3 * a.ate_max_m);
+    if (a.rpe_trans_rmse_m && a.rpe_rot_rmse_deg) {
+      t += text("<tr><td>relative (RPE), mm, from pose to pose</td><td>%.2f</td><td></td><td></td><td></td></tr>",
+                1e3 * *a.rpe_trans_rmse_m);
+      t += text("<tr><td>relative (RPE), degrees</td><td>%.3f</td><td></td><td></td><td></td></tr>",
+                *a.rpe_rot_rmse_deg);
+    }
+    t += "</table></div>\n";
+  }
+  return t + "<h2>What was used</h2>\n" + words(r.setup);
+}
+
+std::string time_table(const std::vector<double>& values) {
+  if (values.empty()) return "<p class=\"soft\">Not measured: no rays were cast.</p>";
+  const spread s = spread_of(values);
+  return text(
+      "<table><tr><th></th><th>median</th><th>95 %%</th><th>mean</th><th>max</th></tr>"
+      "<tr><td>ms</td><td>%.2f</td><td>%.2f</td><td>%.2f</td><td>%.2f</td></tr></table>",
+      s.median, s.p95, s.mean, *std::max_element(values.begin(), values.end()));
+}
+
+std::string footer(const results& r) {
+  return "<footer>Made by <code>rgbd_slam " + escaped(r.command) + "</code> of orbis, " + text("in %.1f s.", r.wall_s) +
+         " The numbers are in <a href=\"summary.json\">summary.json</a> beside this page.</footer>\n";
+}
+
+// -- filling in ---------------------------------------------------------------------------------------
+
+/// Keeps or drops the parts between {{#name}} and {{/name}}.
+void choose(std::string& page, const std::string& name, bool keep) {
+  const std::string begin = "{{#" + name + "}}", end = "{{/" + name + "}}";
+  for (std::size_t at; (at = page.find(begin)) != std::string::npos;) {
+    const std::size_t stop = page.find(end, at);
+    if (keep) {
+      page.erase(stop, end.size());
+      page.erase(at, begin.size());
+    } else {
+      page.erase(at, stop + end.size() - at);
+    }
+  }
+}
+
+/// Fills the gaps in one pass, so that what is filled in is never searched for gaps.
+std::string filled(std::string_view page, const std::map<std::string, std::string>& values) {
+  std::string out;
+  for (std::size_t at = 0;;) {
+    const std::size_t begin = page.find("{{", at);
+    out += page.substr(at, begin == std::string_view::npos ? begin : begin - at);
+    if (begin == std::string_view::npos) return out;
+    const std::size_t end = page.find("}}", begin);
+    out += values.at(std::string{page.substr(begin + 2, end - begin - 2)});
+    at = end + 2;
+  }
+}
+
+}  // namespace
+
+orbis::result<void> write_report(const results& r, const view_frame& frame) {
+  std::string page = report_page;
+  const bool path = r.slam && !r.slam->trajectory.empty();
+  choose(page, "map", r.map.has_value());
+  choose(page, "slam", path);
+  choose(page, "truth", r.against_truth.has_value());
+  const auto picture = orbis::read_file(r.out / "map.png");
+  const std::string html = filled(page, {{"title", escaped(r.title)},
+                                         {"header", header(r)},
+                                         {"picture", picture ? "data:image/png;base64," + base64(*picture) : "data:,"},
+                                         {"profile_height", r.against_truth ? "185" : "420"},
+                                         {"tables", tables(r)},
+                                         {"tracking_table", r.slam ? time_table(r.slam->tracking_ms) : ""},
+                                         {"insert_table", r.map ? time_table(r.map->insert_ms) : ""},
+                                         {"footer", footer(r)},
+                                         {"data", for_script(script_data(r, frame))}});
+  return orbis::write_file_atomically(r.out / "report.html", [&](std::ostream& out) { out << html; });
+}
+
+}  // namespace app

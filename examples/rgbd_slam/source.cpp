@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "source.hpp"
+
+#include <algorithm>
+#include <memory>
+#include <utility>
+
+#include <orbis/camera/presets.hpp>
+#include <orbis/io/camera_file.hpp>
+#include <orbis/io/recording.hpp>
+#include <orbis/io/synthetic.hpp>
+
+namespace app {
+namespace {
+
+using orbis::fail;
+using orbis::result;
+
+result<orbis::camera::camera_settings> named_camera(const std::string& name) {
+  std::error_code ignored;
+  const bool a_file = std::filesystem::exists(name, ignored) || name.find_first_of("./") != std::string::npos;
+  return a_file ? orbis::io::read_camera(name) : orbis::camera::preset(name);
+}
+
+std::size_t limited(std::size_t available, const settings& s) {
+  const std::size_t every = (available + s.stride - 1) / s.stride;
+  return s.frames == 0 ? every : std::min(every, s.frames);
+}
+
+result<frame_source> open_recording(const settings& s) {
+  using orbis::io::recording_format;
+  orbis::io::recording_options options{.format = s.format == "tum"       ? recording_format::tum
+                                                 : s.format == "7scenes" ? recording_format::seven_scenes
+                                                 : s.format == "icl"     ? recording_format::icl_nuim
+                                                                         : recording_format::automatic};
+  if (!s.camera.empty()) {
+    auto camera = named_camera(s.camera);
+    if (!camera) return fail(camera.error());
+    options.camera = *std::move(camera);
+  }
+  auto opened = orbis::io::open_recording(s.input, options);
+  if (!opened) return fail(opened.error());
+
+  const auto recording = std::make_shared<const orbis::io::recording>(*std::move(opened));
+  frame_source source;
+  source.title = std::filesystem::weakly_canonical(s.input).filename().string();
+  source.kind = "recording (" + std::string{to_string(recording->format())} + ")";
+  source.camera = recording->camera();
+  source.frames = limited(recording->size(), s);
+  source.frame = [recording, stride = s.stride](std::size_t i) { return recording->frame(i * stride); };
+  source.ground_truth = recording->ground_truth();
+  source.notes.assign(recording->notes().begin(), recording->notes().end());
+  return source;
+}
+
+frame_source make_synthetic(const settings& s) {
+  constexpr std::size_t once_round = 360;  // at an unhurried pace: a degree a frame
+  const std::size_t frames = s.frames == 0 ? once_round : s.frames * s.stride;
+  const auto width = static_cast<int>(s.width / 4 * 4);
+  const auto recording = std::make_shared<const orbis::io::synthetic_recording>(
+      orbis::io::synthetic_options{.frames = static_cast<int>(frames),
+                                   .seed = s.seed,
+                                   .width = width,
+                                   .height = width / 4 * 3,
+                                   .frames_around = static_cast<int>(std::max(frames, once_round))});
+  frame_source source;
+  source.title = "synthetic room";
+  source.kind = "rendered on the fly, seed " + std::to_string(s.seed);
+  source.camera = recording->camera();
+  source.frames = limited(recording->size(), s);
+  source.frame = [recording, stride = s.stride](std::size_t i) { return recording->frame(i * stride); };
+  source.ground_truth = recording->ground_truth();
+  source.surface_distance = [recording](const orbis::vec3& p) { return recording->scene().distance(p); };
+  return source;
+}
+
+std::string describe(const frame_source& source) {
+  return source.title + ": " + std::to_string(source.frames) + " frames of " +
+         std::to_string(source.camera.model.width()) + " x " + std::to_string(source.camera.model.height()) +
+         (source.ground_truth.empty() ? "" : ", with ground truth");
+}
+
+}  // namespace
+
+result<frame_source> open_source(const settings& s, console& say) {
+  say.stage("opening");
+  auto source = s.what == command::demo ? result<frame_source>{make_synthetic(s)} : open_recording(s);
+  if (!source) return source;
+  say.finish(describe(*source));
+  for (const std::string& note : source->notes) say.warn(note);
+  return source;
+}
+
+result<orbis::camera::rgbd_frame> read_ahead::next() {
+  if (!background_) return source_.frame(at_++);
+  const auto start = [this](std::size_t i) {
+    return std::async(std::launch::async, [this, i] { return source_.frame(i); });
+  };
+  if (!ahead_.valid()) ahead_ = start(at_);
+  auto frame = ahead_.get();
+  if (++at_ < source_.frames) ahead_ = start(at_);
+  return frame;
+}
+
+}  // namespace app

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Where the frames come from: a recording on disk or a synthetic one.
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <future>
+#include <string>
+#include <vector>
+
+#include <orbis/camera/rgbd_frame.hpp>
+#include <orbis/camera/settings.hpp>
+#include <orbis/core/result.hpp>
+#include <orbis/core/trajectory.hpp>
+
+#include "console.hpp"
+#include "settings.hpp"
+
+namespace app {
+
+struct frame_source {
+  std::string title, kind;
+  orbis::camera::camera_settings camera;
+  std::size_t frames = 0;
+  /// Reads or renders a frame; `--stride` is applied already. May be called from another thread.
+  std::function<orbis::result<orbis::camera::rgbd_frame>(std::size_t)> frame;
+  orbis::trajectory ground_truth;  ///< empty if not known
+  std::vector<std::string> notes;  ///< worth a warning
+  /// Metres from a point of the ground truth's world to the true surface; empty if not known.
+  std::function<double(const orbis::vec3&)> surface_distance;
+};
+
+/// The recording that the settings name; says what it is.
+[[nodiscard]] orbis::result<frame_source> open_source(const settings& s, console& say);
+
+/// Reads the frames of a source in order, one ahead of who asks.
+class read_ahead {
+ public:
+  read_ahead(const frame_source& source, bool in_background) : source_{source}, background_{in_background} {}
+  /// The next frame. @pre has_next()
+  [[nodiscard]] orbis::result<orbis::camera::rgbd_frame> next();
+  [[nodiscard]] bool has_next() const { return at_ < source_.frames; }
+
+ private:
+  const frame_source& source_;
+  bool background_;
+  std::size_t at_ = 0;
+  std::future<orbis::result<orbis::camera::rgbd_frame>> ahead_;
+};
+
+}  // namespace app
