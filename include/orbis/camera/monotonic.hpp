@@ -83,8 +83,9 @@ template <std::invocable<double> F>
     if (value == target) break;
     (value < target ? lo : hi) = x;
     double next = x - (value - target) / slope;
+    // Before the bracket is looked at: at the root Newton's step ends on its border.
+    if (std::abs(next - x) <= 4.0 * std::numeric_limits<double>::epsilon() * x) return std::clamp(next, lo, hi);
     if (!(next > lo && next < hi)) next = 0.5 * (lo + hi);
-    if (std::abs(next - x) <= 4.0 * std::numeric_limits<double>::epsilon() * x) return next;
     x = next;
   }
   return x;

@@ -70,13 +70,25 @@ class radial_tangential {
     }
     return pixel;
   }
-  /// The ray through a pixel, scaled to z = 1. The radial part is inverted within the domain, then
-  /// Newton's method on both coordinates takes the tangential part in. Empty where there is no ray,
-  /// and for NaN.
+  /// The ray through a pixel, scaled to z = 1, by Newton's method: from the distorted position, or
+  /// if that leads nowhere, from where the radial part alone puts it. Empty where there is no ray
+  /// within the domain, and for NaN.
   [[nodiscard]] std::optional<vec3> unproject(const vec2& pixel) const {
     const vec2 target{(pixel.x() - k_.cx) / k_.fx, (pixel.y() - k_.cy) / k_.fy};
     if (!target.allFinite()) return std::nullopt;
-    vec2 m = radial_start(target);
+    if (const auto ray = newton(target, target)) return ray;
+    return newton(target, radial_start(target));
+  }
+
+  friend bool operator==(const radial_tangential&, const radial_tangential&) = default;
+
+ private:
+  static constexpr int max_iterations = 30;
+  /// Squared relative step; Newton's next step would be its square.
+  static constexpr double converged = 1e-20;
+
+  /// The ray that distorts to `target`, from the guess `m`; every step has to stay in the domain.
+  [[nodiscard]] std::optional<vec3> newton(const vec2& target, vec2 m) const {
     for (int i = 0; i != max_iterations; ++i) {
       const vec2 residual = distort(m) - target;
       const mat2 j = distort_derivative(m);
@@ -89,13 +101,6 @@ class radial_tangential {
     }
     return std::nullopt;
   }
-
-  friend bool operator==(const radial_tangential&, const radial_tangential&) = default;
-
- private:
-  static constexpr int max_iterations = 30;
-  /// Squared relative step; Newton's next step would be its square.
-  static constexpr double converged = 1e-20;
 
   [[nodiscard]] std::optional<vec2> pixel_of(const vec2& m) const {
     if (!(m.squaredNorm() < domain_)) return std::nullopt;
