@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <tuple>
 #include <utility>
 #include <vector>
@@ -36,6 +37,7 @@ struct corner {
   const int columns = std::max(1, static_cast<int>(std::lround(width / side)));
   const int rows = std::max(1, static_cast<int>(std::lround(height / side)));
 
+  constexpr std::uint32_t no_corner = std::numeric_limits<std::uint32_t>::max();
   struct ranked {
     corner c;
     int cell;
@@ -52,6 +54,17 @@ struct corner {
     };
     all.push_back({c, part(c.y, height, rows) * columns + part(c.x, width, columns), 0});
   }
+  // Most corners are weak ones that will not be needed: leave them out before anything is sorted.
+  std::vector<std::uint32_t> first(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows), no_corner);
+  for (std::uint32_t i = 0; i != all.size(); ++i) {
+    std::uint32_t& best = first[static_cast<std::size_t>(all[i].cell)];
+    if (best == no_corner || stronger(all[i], all[best])) best = i;
+  }
+  std::vector<ranked> hopeful;
+  for (std::uint32_t i = 0; i != all.size(); ++i)
+    if (all[i].c.response >= strong || first[static_cast<std::size_t>(all[i].cell)] == i) hopeful.push_back(all[i]);
+  if (hopeful.size() >= static_cast<std::size_t>(wanted)) all = std::move(hopeful);
+
   std::sort(all.begin(), all.end(),
             [&](const ranked& a, const ranked& b) { return a.cell != b.cell ? a.cell < b.cell : stronger(a, b); });
   for (std::size_t i = 1; i < all.size(); ++i) all[i].rank = all[i].cell == all[i - 1].cell ? all[i - 1].rank + 1 : 0;
