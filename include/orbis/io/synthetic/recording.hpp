@@ -3,12 +3,14 @@
 /// A recording that is made on the fly.
 #pragma once
 
+#include <algorithm>
 #include <cassert>
 #include <cstddef>
 #include <cstdint>
 #include <iterator>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <orbis/camera/pinhole.hpp>
