@@ -40,10 +40,10 @@ TEST_CASE("ordering keeps every finite point once and joins identical ones") {
     const auto ordered = orbis::cloud::order_along_curve(orbis::par.with(2), cloud);
     std::vector<int> seen(cloud.size(), 0);
     bool in_place = true;
-    ordered.for_each_member([&](std::size_t position, std::uint32_t i) {
+    ordered.for_each_member([&, &points = cloud](std::size_t position, std::uint32_t i) {
       ++seen[i];
       const auto& p = ordered.positions[position];
-      in_place = in_place && cloud[i] == orbis::vec3f{p[0], p[1], p[2]};
+      in_place = in_place && points[i] == orbis::vec3f{p[0], p[1], p[2]};
     });
     CHECK(in_place);
     for (std::size_t i = 0; i != cloud.size(); ++i) CHECK(seen[i] == (orbis::test::finite(cloud[i]) ? 1 : 0));

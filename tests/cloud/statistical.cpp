@@ -7,10 +7,12 @@
 #include <vector>
 
 #include <orbis/cloud/statistical.hpp>
+#include <orbis/io/pcd.hpp>
 
 #include "cloud/clouds.hpp"
 #include "cloud/reference.hpp"
 #include "support/catch.hpp"
+#include "support/data.hpp"
 
 using orbis::cloud::non_finite;
 using orbis::cloud::statistical_inliers;
@@ -81,4 +83,31 @@ TEST_CASE("identical points do not take quadratic time") {
   const auto start = std::chrono::steady_clock::now();
   CHECK(statistical_inliers(orbis::seq, identical).size() == identical.size());
   CHECK(std::chrono::steady_clock::now() - start < std::chrono::seconds(10));
+}
+
+TEST_CASE("a real cloud is filtered by the definition") {
+  ORBIS_NEEDS_DATA("clouds/fragment.pcd");
+  const auto read = orbis::io::read_pcd(orbis::test::data_dir() / "clouds/fragment.pcd");
+  REQUIRE(read.has_value());
+  // Brute force takes its time: a contiguous part of the scene.
+  const orbis::test::points cloud(read->points.begin(), read->points.begin() + 6000);
+  const auto distances = orbis::test::reference_mean_distances(cloud, 50);
+  CHECK(statistical_inliers(orbis::par, cloud, {.neighbors = 50, .non_finite = non_finite::keep}) ==
+        orbis::test::reference_decision(cloud, distances, 1.0, true));
+  const auto all = statistical_inliers(orbis::seq, read->points);
+  CHECK(all == statistical_inliers(orbis::par.with(3), read->points));
+  CHECK(all.size() > read->size() / 2);
+  CHECK(all.size() < read->size());
+}
+
+TEST_CASE("the holes of a real organised cloud are dropped or kept") {
+  ORBIS_NEEDS_DATA("clouds/table_scene_mug_stereo_textured.pcd");
+  const auto read = orbis::io::read_pcd(orbis::test::data_dir() / "clouds/table_scene_mug_stereo_textured.pcd");
+  REQUIRE(read.has_value());
+  std::size_t holes = 0;
+  for (const auto& p : read->points) holes += orbis::is_finite(p) ? 0 : 1;
+  CHECK(holes > 0);
+  const auto dropped = statistical_inliers(orbis::par, read->points, {.neighbors = 10});
+  const auto kept = statistical_inliers(orbis::par, read->points, {.neighbors = 10, .non_finite = non_finite::keep});
+  CHECK(kept.size() == dropped.size() + holes);
 }

@@ -18,34 +18,39 @@
 
 namespace orbis::cloud {
 
-/// The position along a Hilbert curve through a cube of 2^20 cells a side.
-/// Source: J. Skilling, "Programming the Hilbert curve", AIP Conference Proceedings 707, 2004.
-/// @pre every coordinate < 2^20
+/// `x`'s lowest 21 bits, two zeros after each.
+[[nodiscard]] constexpr std::uint64_t spread_bits(std::uint64_t x) noexcept {
+  x &= 0x1fffff;
+  x = (x | x << 32U) & 0x001f00000000ffffULL;
+  x = (x | x << 16U) & 0x001f0000ff0000ffULL;
+  x = (x | x << 8U) & 0x100f00f00f00f00fULL;
+  x = (x | x << 4U) & 0x10c30c30c30c30c3ULL;
+  return (x | x << 2U) & 0x1249249249249249ULL;
+}
+
+/// Cells along a side of the curve's cube: 2^curve_bits.
+inline constexpr std::uint32_t curve_bits = 16;
+
+/// The position along a Hilbert curve through a cube of 2^curve_bits cells a side.
+/// Source: J. Skilling, "Programming the Hilbert curve", AIP Conference Proceedings 707, 2004; here
+/// without branches.
+/// @pre every coordinate < 2^curve_bits
 [[nodiscard]] constexpr std::uint64_t hilbert_key(std::array<std::uint32_t, 3> cell) noexcept {
-  constexpr std::uint32_t bits = 20;
-  for (std::uint32_t level = bits - 1; level > 0; --level) {
+  for (std::uint32_t level = curve_bits - 1; level > 0; --level) {
     const std::uint32_t below = (1U << level) - 1;
     for (std::uint32_t& c : cell) {
-      if (((c >> level) & 1U) != 0) {
-        cell[0] ^= below;
-      } else {
-        const std::uint32_t exchanged = (cell[0] ^ c) & below;
-        cell[0] ^= exchanged;
-        c ^= exchanged;
-      }
+      const std::uint32_t set = 0U - ((c >> level) & 1U);  // all ones where the bit is set
+      const std::uint32_t exchanged = (cell[0] ^ c) & below & ~set;
+      cell[0] ^= (below & set) | exchanged;
+      c ^= exchanged;
     }
   }
   cell[1] ^= cell[0];
   cell[2] ^= cell[1];
-  std::uint32_t flip = 0;
-  for (std::uint32_t level = bits - 1; level > 0; --level) {
-    if (((cell[2] >> level) & 1U) != 0) flip ^= (1U << level) - 1;
-  }
-  std::uint64_t key = 0;
-  for (std::uint32_t level = bits; level-- > 0;) {
-    for (const std::uint32_t c : cell) key = key << 1U | (((c ^ flip) >> level) & 1U);
-  }
-  return key;
+  // Bit i of `flip` is the parity of the bits of cell[2] above i.
+  std::uint32_t flip = cell[2] >> 1U;
+  for (std::uint32_t shift = 1; shift < curve_bits; shift *= 2) flip ^= flip >> shift;
+  return spread_bits(cell[0] ^ flip) << 2U | spread_bits(cell[1] ^ flip) << 1U | spread_bits(cell[2] ^ flip);
 }
 
 /// A cloud copied for a pass over all its points: finite points only, as float, along the curve,
@@ -93,7 +98,7 @@ template <execution_policy Policy, point_range Points>
   }
   double extent = 0;
   for (std::size_t a = 0; a != 3; ++a) extent = std::max(extent, double{high[a]} - double{low[a]});
-  const double scale = extent > 0 ? ((1U << 20U) - 1) / extent : 0.0;
+  const double scale = extent > 0 ? ((1U << curve_bits) - 1) / extent : 0.0;
   for_each_index(policy, entries.size(), 4096, [&](std::size_t i) {
     std::array<std::uint32_t, 3> cell{};
     for (std::size_t a = 0; a != 3; ++a) {

@@ -26,41 +26,50 @@ namespace detail {
 /// The squared distances of the `wanted` nearest points, each counted as often as it occurs.
 class nearest_distances {
  public:
+  /// `multiplicity`: of each point; empty where all are 1.
   nearest_distances(std::size_t wanted, std::span<const std::uint32_t> multiplicity)
-      : wanted_{wanted}, multiplicity_{multiplicity} {
-    found_.reserve(3 * wanted);
-  }
+      : wanted_{wanted}, multiplicity_{multiplicity}, found_(full + 3 * wanted) {}
   /// Starts a search among the points within `bound_squared`.
   void start(float bound_squared) {
-    found_.clear();
+    count_ = 0;
     bound_ = bound_squared;
   }
   [[nodiscard]] float bound_squared() const noexcept { return bound_; }
   bool add(std::uint32_t i, float distance_squared) {
     if (distance_squared > bound_) return true;
-    found_.insert(found_.end(), std::min<std::size_t>(multiplicity_[i], wanted_), distance_squared);
+    if (multiplicity_.empty()) {
+      found_[count_++] = distance_squared;
+    } else {
+      const std::size_t times = std::min<std::size_t>(multiplicity_[i], wanted_);
+      std::fill_n(found_.begin() + static_cast<std::ptrdiff_t>(count_), times, distance_squared);
+      count_ += times;
+    }
     // Selecting now and then is cheaper than keeping a sorted list or a heap.
-    if (found_.size() >= 2 * wanted_) trim();
+    if (count_ >= full + 2 * wanted_) trim();
     return true;
   }
-  /// The nearest, in no order but the furthest last; false if there are fewer than wanted.
+  /// Leaves the wanted ones, in no particular order; false if there are fewer.
   [[nodiscard]] bool finish() {
-    if (found_.size() < wanted_) return false;
+    if (count_ < wanted_) return false;
     trim();
     return true;
   }
-  [[nodiscard]] std::span<float> nearest() noexcept { return found_; }
+  [[nodiscard]] std::span<float> nearest() noexcept { return {found_.data(), count_}; }
 
  private:
+  static constexpr std::size_t full = 8;
+
   void trim() {
-    std::nth_element(found_.begin(), found_.begin() + static_cast<std::ptrdiff_t>(wanted_ - 1), found_.end());
-    found_.resize(wanted_);
-    bound_ = found_.back();
+    const auto last = found_.begin() + static_cast<std::ptrdiff_t>(wanted_ - 1);
+    std::nth_element(found_.begin(), last, found_.begin() + static_cast<std::ptrdiff_t>(count_));
+    count_ = wanted_;
+    bound_ = *last;
   }
 
   std::size_t wanted_;
   std::span<const std::uint32_t> multiplicity_;
   std::vector<float> found_;
+  std::size_t count_ = 0;
   float bound_ = 0;
 };
 
@@ -100,26 +109,33 @@ template <execution_policy Policy, point_range Points>
 
   const nanoflann_search search{cloud.positions};
   std::vector<float> of_position(cloud.positions.size());
+  std::span<const std::uint32_t> multiplicity;
+  if (cloud.positions.size() != cloud.finite) multiplicity = cloud.multiplicity;
   for_each_chunk(policy, cloud.positions.size(), 1024, [&](std::size_t begin, std::size_t end) {
-    detail::nearest_distances nearest{wanted, cloud.multiplicity};
-    float bound = std::numeric_limits<float>::infinity();
+    detail::nearest_distances nearest{wanted, multiplicity};
+    // The previous point's search bounds this one's: all that was near that point is at most the
+    // step further away. Most often a little more than the previous radius is enough.
+    constexpr float none = std::numeric_limits<float>::infinity();
+    constexpr float likely = 1.15F;
+    float certain = none;
+    float hoped = none;
     for (std::size_t i = begin; i != end; ++i) {
-      nearest.start(bound);
-      search.visit(cloud.positions[i], nearest);
-      if (!nearest.finish()) {
-        nearest.start(std::numeric_limits<float>::infinity());
+      bool enough = false;
+      for (const float bound : {std::min(hoped, certain), certain, none}) {
+        nearest.start(bound);
         search.visit(cloud.positions[i], nearest);
-        if (!nearest.finish()) {  // only where squared distances overflow
-          of_position[i] = std::numeric_limits<float>::infinity();
-          bound = std::numeric_limits<float>::infinity();
-          continue;
-        }
+        enough = nearest.finish();
+        if (enough || bound == none) break;
+      }
+      if (!enough) {  // only where squared distances overflow
+        of_position[i] = hoped = certain = none;
+        continue;
       }
       if (i + 1 != end) {
-        // All that is near this point is at most this much further from the next one.
-        const float reach = std::sqrt(nearest.bound_squared()) +
-                            std::sqrt(squared_distance(cloud.positions[i], cloud.positions[i + 1]));
-        bound = reach * reach * 1.00001F;
+        const float radius = std::sqrt(nearest.bound_squared());
+        const float reach = radius + std::sqrt(squared_distance(cloud.positions[i], cloud.positions[i + 1]));
+        certain = reach * reach * 1.00001F;
+        hoped = radius * radius * likely * likely;
       }
       of_position[i] = detail::mean_root(nearest.nearest(), static_cast<double>(wanted - 1));
     }
