@@ -28,8 +28,8 @@ struct eye {
   }
 };
 
-/// Looks at the box from azimuth and elevation (radians), just far enough off to see all of it.
-eye look_at(const vec3& low, const vec3& high, double azimuth, double elevation, double field, int width, int height) {
+/// Looks at the points from azimuth and elevation (radians), just far enough off to see all of them.
+eye look_at(const std::vector<vec3>& points, double azimuth, double elevation, double field, int width, int height) {
   eye e;
   e.forward =
       -vec3(std::cos(elevation) * std::cos(azimuth), std::cos(elevation) * std::sin(azimuth), std::sin(elevation));
@@ -38,17 +38,29 @@ eye look_at(const vec3& low, const vec3& high, double azimuth, double elevation,
   e.focal = 0.5 * height / std::tan(0.5 * field);
   e.cx = 0.5 * width;
   e.cy = 0.5 * height;
-  const vec3 middle = 0.5 * (low + high);
-  double distance = 0.0;
-  for (int corner = 0; corner != 8; ++corner) {
-    const vec3 d = vec3((corner & 1) != 0 ? high.x() : low.x(), (corner & 2) != 0 ? high.y() : low.y(),
-                        (corner & 4) != 0 ? high.z() : low.z()) -
-                   middle;
-    const double across =
-        std::max(std::abs(e.right.dot(d)) / (0.47 * width), std::abs(e.down.dot(d)) / (0.47 * height));
-    distance = std::max(distance, across * e.focal - e.forward.dot(d));
+  // Midway between what is seen farthest left and right, up and down: exact without perspective, and
+  // close enough with it after a few rounds.
+  vec3 middle = vec3::Zero();
+  for (const vec3& p : points) middle += p / static_cast<double>(points.size());
+  for (int round = 0; round != 4; ++round) {
+    double distance = 0.1;
+    for (const vec3& p : points) {
+      const vec3 d = p - middle;
+      const double across =
+          std::max(std::abs(e.right.dot(d)) / (0.47 * width), std::abs(e.down.dot(d)) / (0.47 * height));
+      distance = std::max(distance, across * e.focal - e.forward.dot(d));
+    }
+    e.position = middle - distance * e.forward;
+    double left = width, right = 0.0, top = height, bottom = 0.0;
+    for (const vec3& p : points) {
+      const vec3 pixel = e.see(p);
+      left = std::min(left, pixel.x());
+      right = std::max(right, pixel.x());
+      top = std::min(top, pixel.y());
+      bottom = std::max(bottom, pixel.y());
+    }
+    middle += distance / e.focal * (0.5 * (left + right - width) * e.right + 0.5 * (top + bottom - height) * e.down);
   }
-  e.position = middle - std::max(distance, 0.1) * e.forward;
   return e;
 }
 
@@ -130,6 +142,21 @@ rgb8 lit(rgb8 c, double light) {
   return {byte(c.r), byte(c.g), byte(c.b)};
 }
 
+/// Neither above the cut nor a stray below the floor.
+bool is_shown(const vec3& p, const view_frame& frame) { return p.z() <= frame.cut && p.z() >= frame.low.z() - 0.5; }
+
+/// The voxels that decide what a picture frames: those shown, strays aside.
+std::vector<vec3> framed(const std::vector<voxel>& voxels, const view_frame& frame) {
+  std::vector<vec3> points;
+  for (const voxel& v : voxels) {
+    const vec3 p = frame.T_view_world * v.center.cast<double>();
+    const bool inside = (p.array() >= frame.low.array()).all() && (p.array() <= frame.high.array()).all();
+    if (inside && is_shown(p, frame)) points.push_back(p);
+  }
+  if (points.empty()) points = {frame.low, frame.high};
+  return points;
+}
+
 orbis::image<rgb8> draw(const std::vector<voxel>& voxels, const view_frame& frame, coloring how, const eye& e,
                         int width, int height) {
   picture canvas{width * oversampling, height * oversampling};
@@ -137,8 +164,7 @@ orbis::image<rgb8> draw(const std::vector<voxel>& voxels, const view_frame& fram
   const orbis::mat3 axes = frame.T_view_world.rotation_matrix();
   for (const voxel& v : voxels) {
     const vec3 center = frame.T_view_world * v.center.cast<double>();
-    if (center.z() > frame.cut) continue;
-    if (center.z() < frame.low.z() - 0.5) continue;  // strays below the floor
+    if (!is_shown(center, frame)) continue;
     const rgb8 color =
         how == coloring::camera ? v.color : height_color((center.z() - frame.low.z()) / (frame.cut - frame.low.z()));
     for (int axis = 0; axis != 3; ++axis) {
@@ -158,14 +184,12 @@ orbis::image<rgb8> draw(const std::vector<voxel>& voxels, const view_frame& fram
   return canvas.finish();
 }
 
-vec3 visible_top(const view_frame& frame) { return {frame.high.x(), frame.high.y(), frame.cut}; }
-
 }  // namespace
 
 orbis::image<rgb8> draw_aslant(const std::vector<voxel>& voxels, const view_frame& frame, coloring how, int width,
                                int height) {
   constexpr double degree = std::numbers::pi / 180.0;
-  const eye e = look_at(frame.low, visible_top(frame), -62 * degree, 48 * degree, 38 * degree, width * oversampling,
+  const eye e = look_at(framed(voxels, frame), -62 * degree, 50 * degree, 34 * degree, width * oversampling,
                         height * oversampling);
   return draw(voxels, frame, how, e, width, height);
 }
@@ -173,7 +197,7 @@ orbis::image<rgb8> draw_aslant(const std::vector<voxel>& voxels, const view_fram
 orbis::image<rgb8> draw_from_above(const std::vector<voxel>& voxels, const view_frame& frame, coloring how, int width,
                                    int height) {
   constexpr double degree = std::numbers::pi / 180.0;
-  const eye e = look_at(frame.low, visible_top(frame), -90 * degree, 89.9 * degree, 6 * degree, width * oversampling,
+  const eye e = look_at(framed(voxels, frame), -90 * degree, 89.9 * degree, 6 * degree, width * oversampling,
                         height * oversampling);
   return draw(voxels, frame, how, e, width, height);
 }

@@ -55,6 +55,11 @@ results begin_results(const settings& s, const std::string& title, const frame_s
                                        number(", cy %.1f", k.cy) + number(", depth / %g = metres", camera.depth_scale));
     r.setup.emplace_back(
         "frames", std::to_string(source->frames) + (s.stride > 1 ? ", every " + std::to_string(s.stride) + "th" : ""));
+    if (s.what == command::run || s.what == command::demo)
+      r.setup.emplace_back("world", source->ground_truth.empty()
+                                        ? "the first tracked camera"
+                                        : "the ground truth's, by its pose of the first tracked "
+                                          "frame");
     r.warnings = source->notes;
   } else {
     r.setup.emplace_back("input", s.input.filename().string());
@@ -103,14 +108,16 @@ exit_code report_no_start(results& r, const settings& s, console& say) {
 }
 
 void print_results(const results& r, console& say) {
-  if (r.map) say.print("\n" + size_table(*r.map));
-  if (r.against_truth) say.print("\n" + accuracy_lines(*r.against_truth));
+  std::string text;
+  if (r.map) text.append("\n").append(size_table(*r.map)).append("\n");
+  if (r.against_truth) text.append("\n").append(accuracy_lines(*r.against_truth)).append("\n");
   if (r.map && r.map->error_m) {
     char buffer[96];
-    std::snprintf(buffer, sizeof buffer, "  Map  RMS %.4f m to the true surface", *r.map->error_m);
-    say.print(buffer);
+    std::snprintf(buffer, sizeof buffer, "  Map  RMS %.4f m to the true surface\n", *r.map->error_m);
+    text.append(buffer);
   }
-  say.print("\n  " + (r.out / "report.html").string() + " shows it all; the files are beside it");
+  text.append("\n  ").append((r.out / "report.html").string()).append(" shows it all; the files are beside it");
+  say.print(text);
 }
 
 }  // namespace app
