@@ -98,3 +98,9 @@ TEST_CASE("every kind of failure has a name of its own") {
     for (std::size_t j = 0; j != i; ++j) CHECK(names[i] != names[j]);
   }
 }
+
+TEST_CASE("a result without a value throws when it is asked for it") {
+  const orbis::result<void> bad = orbis::fail(orbis::errc::malformed, "file", "damaged");
+  CHECK_THROWS(bad.value());
+  CHECK_NOTHROW(orbis::result<void>{}.value());
+}

@@ -83,6 +83,11 @@ class [[nodiscard]] result<void> : public tl::expected<void, orbis::error> {
  public:
   using base::base;
   result(base&& other) : base{std::move(other)} {}  // NOLINT(google-explicit-constructor)
+
+  /// Throws `tl::bad_expected_access` unless done, as the other results do.
+  void value() const {
+    if (!has_value()) throw tl::bad_expected_access<orbis::error>(error());
+  }
 };
 
 /// `return fail(errc::malformed, path, "...");` from a function that returns a `result`.
