@@ -12,6 +12,7 @@
 #include <orbis/octree/key.hpp>
 #include <orbis/octree/occupancy_octree.hpp>
 #include <orbis/octree/pruned_tree.hpp>
+#include <orbis/octree/ray_grid.hpp>
 #include <orbis/octree/ray_walk.hpp>
 #include <orbis/octree/scan.hpp>
 #include <orbis/octree/sensor_model.hpp>

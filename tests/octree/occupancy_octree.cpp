@@ -105,6 +105,18 @@ TEST_CASE("Points far outside the grid are truncated to the range or rejected") 
   CHECK(all.rejected == 2);
 }
 
+TEST_CASE("A scan too wide for a dense window gives OctoMap's map") {
+  random_bits random{38};
+  auto points = test::random_points(random, 60, 1.0);
+  for (vec3f& p : points) p *= 60.0F;
+  for (const ray_mode mode : {ray_mode::every_ray, ray_mode::discretized}) {
+    twins maps{0.05};
+    maps.insert(points, {0.3F, 0.1F, -0.2F}, {.mode = mode});
+    maps.insert({{1635.0F, 0.0F, 1.0F}, {0.5F, 0.1F, 0.2F}}, {1630.0F, 0.0F, 0.0F}, {.max_range = 20.0, .mode = mode});
+    CHECK(maps.equal());
+  }
+}
+
 TEST_CASE("A sensor outside the grid marks end points but no rays") {
   twins maps{0.1};
   maps.insert({{1.0F, 0.0F, 0.0F}, {3000.0F, 0.0F, 0.0F}}, {5000.0F, 0.0F, 0.0F}, {});

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include <orbis/core/execution.hpp>
+#include <orbis/octree/ray_grid.hpp>
 #include <orbis/octree/scan.hpp>
 
 namespace orbis::octree {
@@ -54,20 +55,25 @@ class scan_marker {
     prepare(policy.threads(), count);
     if (!is_finite(origin)) return {.used = 0, .truncated = 0, .rejected = count};
     const sensor from{grid, origin, grid.key(origin), options.max_range};
+    choose_windows(from, count, point);
     if (options.mode == ray_mode::every_ray) {
       for_each_with_worker(policy, count, 4096, [&](worker& w, std::size_t i) { w.add(from, point(i)); });
     } else {
       for_each_with_worker(policy, count, 4096, [&](worker& w, std::size_t i) { w.add_end(grid, point(i)); });
       for (std::size_t i = 1; i != workers_.size(); ++i) workers_[0].ends.merge(workers_[i].ends);
       const auto& ends = workers_[0].ends.bricks();
+      for (worker& w : workers_) w.last_end = no_key;  // from now on in masks, not in ends
       for_each_with_worker(policy, ends.size(), 16, [&](worker& w, std::size_t i) { w.add_centers(from, ends[i]); });
     }
+    for_each_index(policy, workers_.size(), 1, [&](std::size_t i) {
+      if (workers_[i].windowed) workers_[i].window.flush(workers_[i].masks);
+    });
     return combine();
   }
 
   [[nodiscard]] std::size_t memory_bytes() const noexcept {
     std::size_t bytes = workers_.capacity() * sizeof(worker);
-    for (const worker& w : workers_) bytes += w.masks.memory_bytes() + w.ends.memory_bytes();
+    for (const worker& w : workers_) bytes += w.masks.memory_bytes() + w.ends.memory_bytes() + w.window.memory_bytes();
     return bytes;
   }
 
@@ -79,16 +85,35 @@ class scan_marker {
     double max_range;
   };
 
+  static constexpr voxel_key no_key{~std::uint32_t{0}, 0, 0};
+
   /// What one thread collects.
   struct worker {
     scan_masks masks;
     scan_masks ends;  ///< mode discretized: the voxels that hold points, as occupied
     integration_summary summary;
+    ray_grid window;
+    bool windowed = false;  ///< rays go through the window
+    voxel_key last_end = no_key;
 
     void clear() noexcept {
+      last_end = no_key;
       masks.clear();
       ends.clear();
       summary = {};
+    }
+    void add_ray(const sensor& from, const float3& end, const voxel_key& to) {
+      if (!from.key) return;
+      if (windowed)
+        window.add(from.grid, from.origin, end, to);
+      else
+        masks.mark_ray(from.grid, from.origin, *from.key, end, to);
+    }
+    /// Neighbouring pixels mostly end in the same voxel.
+    void mark_end(scan_masks& in, const voxel_key& k) {
+      if (k == last_end) return;
+      last_end = k;
+      in.mark_occupied(k);
     }
     void add(const sensor& from, const float3& end) {
       const float3 ray = difference(end, from.origin);
@@ -99,8 +124,8 @@ class scan_marker {
           ++summary.rejected;
           return;
         }
-        if (from.key) masks.mark_ray(from.grid, from.origin, *from.key, end, *key);
-        masks.mark_occupied(*key);
+        add_ray(from, end, *key);
+        mark_end(masks, *key);
         ++summary.used;
       } else {
         add_truncated(from, ray, distance);
@@ -116,12 +141,12 @@ class scan_marker {
         ++summary.rejected;
         return;
       }
-      if (from.key) masks.mark_ray(from.grid, from.origin, *from.key, end, *key);
+      add_ray(from, end, *key);
       ++summary.truncated;
     }
     void add_end(const voxel_grid& grid, const float3& end) {
       if (const auto key = grid.key(end))
-        ends.mark_occupied(*key);
+        mark_end(ends, *key);
       else
         ++summary.rejected;
     }
@@ -140,6 +165,36 @@ class scan_marker {
     const std::size_t useful = 1 + count / 4096;
     workers_.resize(std::clamp<std::size_t>(threads, 1, useful));
     for (worker& w : workers_) w.clear();
+  }
+  /// Gives the workers a window around all rays, if one can be had.
+  template <class Point>
+  void choose_windows(const sensor& from, std::size_t count, Point&& point) {
+    bool windowed = from.key.has_value();
+    if (windowed) {
+      float3 low = from.origin, high = from.origin;
+      for (std::size_t i = 0; i != count; ++i) {
+        const float3 p = point(i);
+        if (!is_finite(p)) continue;
+        for (std::size_t axis = 0; axis != 3; ++axis) {
+          low[axis] = p[axis] < low[axis] ? p[axis] : low[axis];
+          high[axis] = p[axis] > high[axis] ? p[axis] : high[axis];
+        }
+      }
+      voxel_key lowest, highest;
+      const auto bound = [&](std::size_t axis, std::uint32_t& lo, std::uint32_t& hi) {
+        const double o = static_cast<double>(from.origin[axis]);
+        const double reach = from.max_range * 1.000001 + 2.0 * from.grid.resolution();
+        const auto l = from.grid.key(std::max(static_cast<double>(low[axis]), o - reach) - from.grid.resolution());
+        const auto h = from.grid.key(std::min(static_cast<double>(high[axis]), o + reach) + from.grid.resolution());
+        if (!l || !h) return false;
+        lo = *l;
+        hi = *h;
+        return true;
+      };
+      windowed = bound(0, lowest.x, highest.x) && bound(1, lowest.y, highest.y) && bound(2, lowest.z, highest.z);
+      for (worker& w : workers_) windowed = windowed && w.window.fit(*from.key, lowest, highest);
+    }
+    for (worker& w : workers_) w.windowed = windowed;
   }
   /// Calls `body(worker, i)` for i in [0, count), each worker on one thread.
   template <class Policy, class Body>

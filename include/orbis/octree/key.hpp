@@ -47,9 +47,11 @@ class voxel_grid {
 
   /// The key along one axis; empty outside the grid and for NaN.
   [[nodiscard]] std::optional<std::uint32_t> key(double coordinate) const noexcept {
-    const double cell = std::floor(per_metre_ * coordinate);
-    if (!(cell >= -half && cell < half)) return std::nullopt;
-    return static_cast<std::uint32_t>(static_cast<std::int32_t>(cell) + static_cast<std::int32_t>(half));
+    const double cells = per_metre_ * coordinate;
+    if (!(cells >= -half && cells < half)) return std::nullopt;
+    auto cell = static_cast<std::int32_t>(cells);  // towards zero; floor() would be a call
+    cell -= static_cast<double>(cell) > cells ? 1 : 0;
+    return static_cast<std::uint32_t>(cell + static_cast<std::int32_t>(half));
   }
   /// The voxel that `p` (metres) lies in; empty outside the grid and for NaN.
   template <point_like P>

@@ -36,6 +36,7 @@ struct ray_cursor {
   std::array<std::int32_t, 3> step{};
   std::array<double, 3> next{};
   std::array<double, 3> delta{};
+  double reach = 0.0;  ///< length of the ray, where it has an end
 
   /// `half`: from a voxel's centre to its face, as a function of the step's sign.
   template <class Half>
@@ -52,6 +53,21 @@ struct ray_cursor {
         next[i] = delta[i] = std::numeric_limits<double>::max();
       }
     }
+  }
+
+  /// The cursor of a ray from `origin` in voxel `from` to `end`; empty if a float cannot tell its
+  /// direction because it is too short or too long.
+  [[nodiscard]] static std::optional<ray_cursor> between(const voxel_grid& grid, const voxel_key& from,
+                                                         const float3& origin, const float3& end) noexcept {
+    float3 direction = difference(end, origin);
+    const auto reach = static_cast<float>(length(direction));
+    if (!(reach > 0.0F && std::isfinite(reach))) return std::nullopt;
+    for (float& d : direction) d /= reach;
+    const double half = 0.5 * grid.resolution();
+    ray_cursor cursor{grid, from, origin, direction,
+                      [&](std::int32_t step) { return static_cast<double>(static_cast<float>(step * half)); }};
+    cursor.reach = static_cast<double>(reach);
+    return cursor;
   }
 
   /// The axis whose face comes next.
@@ -78,22 +94,16 @@ void walk_ray(const voxel_grid& grid, const float3& origin, const voxel_key& fro
               const voxel_key& to, Visit&& visit) {
   if (from == to) return;
   visit(from);
-  float3 direction = difference(end, origin);
-  const auto reach = static_cast<float>(length(direction));
-  if (!(reach > 0.0F && std::isfinite(reach))) return;  // too short or too long for a float: no direction
-  for (float& d : direction) d /= reach;
-
-  ray_cursor cursor{grid, from, origin, direction, [&](std::int32_t step) {
-                      return static_cast<double>(static_cast<float>(step * grid.resolution() * 0.5));
-                    }};
+  auto cursor = ray_cursor::between(grid, from, origin, end);
+  if (!cursor) return;
   for (;;) {
-    const std::size_t axis = cursor.axis();
-    if (!cursor.can_step(axis)) return;
-    cursor.advance(axis);
-    if (cursor.key() == to) return;
+    const std::size_t axis = cursor->axis();
+    if (!cursor->can_step(axis)) return;
+    cursor->advance(axis);
+    if (cursor->key() == to) return;
     // Rounding may have missed the end voxel; then the length stops the walk.
-    if (std::min(std::min(cursor.next[0], cursor.next[1]), cursor.next[2]) > static_cast<double>(reach)) return;
-    visit(cursor.key());
+    if (std::min(std::min(cursor->next[0], cursor->next[1]), cursor->next[2]) > cursor->reach) return;
+    visit(cursor->key());
   }
 }
 
