@@ -4,6 +4,7 @@
 #pragma once
 
 #include <orbis/optimize/absolute_orientation.hpp>
+#include <orbis/optimize/bundle_adjustment.hpp>
 #include <orbis/optimize/p3p.hpp>
 #include <orbis/optimize/pnp.hpp>
 #include <orbis/optimize/pose_refinement.hpp>

@@ -6,6 +6,7 @@
 #include <orbis/slam/frame.hpp>
 #include <orbis/slam/keyframe_decision.hpp>
 #include <orbis/slam/landmark_search.hpp>
+#include <orbis/slam/local_adjustment.hpp>
 #include <orbis/slam/local_map.hpp>
 #include <orbis/slam/map.hpp>
 #include <orbis/slam/mapping.hpp>

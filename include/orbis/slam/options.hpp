@@ -22,12 +22,21 @@ struct keyframe_options {
   std::size_t close_untracked = 70;  ///< ... and more untracked ones than this: a new one
 };
 
+/// Local bundle adjustment after each keyframe.
+struct adjustment_options {
+  std::size_t keyframes = 12;   ///< that may move: the newest and those that share most with it; 0: no adjustment
+  std::size_t min_shared = 15;  ///< landmarks, to be a neighbour
+  int robust_iterations = 5;    ///< before outliers are taken out
+  int iterations = 5;           ///< after that
+};
+
 struct options {
   /// Of the default extractor. `levels` and `scale_factor` must be those of any other extractor.
   features::orb_options features{};
-  /// Baseline of the virtual stereo camera times focal length, pixel metres: the noise of the depth
-  /// sensor, in pixels of disparity, is taken to be that of a keypoint's position.
-  double bf = 40.0;
+  /// Focal length times the baseline of the virtual stereo camera whose disparity the depth stands
+  /// for, pixel metres: a depth z counts as measured to `z^2 / bf` metres (times the scale of the
+  /// keypoint's level). 400 is close to the noise of a Kinect.
+  double bf = 400.0;
   double min_depth = 0.1;               ///< metres; measurements outside are not used
   double max_depth = 10.0;              ///< metres
   double close_depth = 3.2;             ///< metres; points nearer than this become landmarks at once
@@ -40,8 +49,9 @@ struct options {
   std::size_t local_keyframes = 40;     ///< whose landmarks are searched for in a frame
   std::size_t relocalization_candidates = 8;  ///< keyframes that pose estimation is tried against, at most
   keyframe_options keyframes{};
-  std::optional<se3> initial_pose;  ///< `T_world_camera` of the first frame; default: the identity
-  std::uint64_t seed = 1;           ///< of RANSAC
+  adjustment_options adjustment{};
+  std::optional<se3> initial_pose{};  ///< `T_world_camera` of the first frame; default: the identity
+  std::uint64_t seed = 1;             ///< of RANSAC
 };
 
 }  // namespace orbis::slam

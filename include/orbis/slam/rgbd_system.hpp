@@ -31,6 +31,7 @@
 #include <orbis/optimize/pnp.hpp>
 #include <orbis/slam/keyframe_decision.hpp>
 #include <orbis/slam/landmark_search.hpp>
+#include <orbis/slam/local_adjustment.hpp>
 #include <orbis/slam/local_map.hpp>
 #include <orbis/slam/map.hpp>
 #include <orbis/slam/mapping.hpp>
@@ -54,7 +55,8 @@ class rgbd_system {
         extract_{std::move(extractor)},
         model_{std::move(camera), settings.bf},
         scales_{settings.features.levels, static_cast<double>(settings.features.scale_factor)},
-        map_{scales_.levels, scales_.factor} {}
+        map_{scales_.levels, scales_.factor},
+        adjuster_{model_, optimize::huber{2.8}} {}
 
   /// The next frame. Frames of another size than the camera's are counted as lost.
   track_result track(const camera::rgbd_frame& f) { return track(f.timestamp, f.color, f.depth_metres()); }
@@ -253,6 +255,7 @@ class rgbd_system {
   keyframe_id grow_map(frame& f) {
     reference_ = insert_keyframe(map_, f, options_);
     cull_landmarks(map_, reference_);
+    adjust_locally(map_, reference_, adjuster_, model_, scales_, options_.adjustment);
     f.T_world_camera = map_.at(reference_).T_world_camera;
     f.landmarks = map_.at(reference_).landmarks;
     return reference_;
@@ -306,6 +309,7 @@ class rgbd_system {
   optimize::reprojection<Camera> model_;
   pyramid_scales scales_;
   slam::map map_;
+  optimize::bundle_adjuster<Camera> adjuster_;
   track_state state_ = track_state::not_started;
   track_counters counters_;
   std::vector<tracked_frame> tracked_;

@@ -1,0 +1,195 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <cstring>
+#include <limits>
+#include <vector>
+
+#include <orbis/camera/pinhole.hpp>
+#include <orbis/io/recording.hpp>
+#include <orbis/io/synthetic.hpp>
+#include <orbis/optimize/absolute_orientation.hpp>
+#include <orbis/slam/rgbd_system.hpp>
+
+#include "support/catch.hpp"
+#include "support/data.hpp"
+
+using namespace orbis;
+
+namespace {
+
+using frames = std::vector<camera::rgbd_frame>;
+
+struct room {
+  camera::pinhole camera;
+  frames recorded;
+};
+
+/// Sixty frames of a walk through a synthetic room, rendered once.
+const room& small_room() {
+  static const room r = [] {
+    const io::synthetic_recording recording{
+        {.frames = 60, .seed = 5, .width = 320, .height = 240, .frames_around = 300}};
+    room made{*recording.camera().model.get_if<camera::pinhole>(), {}};
+    for (std::size_t i = 0; i < recording.size(); ++i) made.recorded.push_back(recording.frame(i).value());
+    return made;
+  }();
+  return r;
+}
+
+template <class Poses>
+double ate(const Poses& trajectory, const frames& truth) {
+  std::vector<vec3> estimated, exact;
+  for (const stamped_pose& p : trajectory)
+    for (const auto& f : truth)
+      if (f.timestamp == p.timestamp && f.T_world_camera) {
+        estimated.push_back(p.T_world_camera.translation());
+        exact.push_back(f.T_world_camera->translation());
+      }
+  const auto T = optimize::absolute_orientation(estimated, exact);
+  if (!T || estimated.size() != trajectory.size()) return std::numeric_limits<double>::infinity();
+  double sum = 0.0;
+  for (std::size_t i = 0; i < exact.size(); ++i) sum += (*T * estimated[i] - exact[i]).squaredNorm();
+  return std::sqrt(sum / static_cast<double>(exact.size()));
+}
+
+void check_observations_agree(const slam::map& m) {
+  std::size_t alive = 0;
+  for (slam::landmark_id l = 0; l < m.landmarks().size(); ++l) {
+    alive += m.is_alive(l);
+    for (const auto& o : m.landmark_at(l).observations) REQUIRE(m.at(o.keyframe).landmarks[o.feature] == l);
+  }
+  REQUIRE(alive == m.landmark_count());
+  for (const auto& k : m.keyframes())
+    for (std::size_t i = 0; i < k.size(); ++i)
+      if (k.landmarks[i] != slam::no_id) REQUIRE(m.is_alive(k.landmarks[i]));
+}
+
+}  // namespace
+
+TEST_CASE("A walk through a synthetic room is tracked without a lost frame and within a centimetre") {
+  const auto& [camera, recorded] = small_room();
+  slam::rgbd_system slam{camera, slam::options{}};
+  CHECK(slam.state() == slam::track_state::not_started);
+  std::size_t keyframes = 0;
+  for (const auto& f : recorded) {
+    const auto r = slam.track(f);
+    CHECK(r.tracked());
+    CHECK(r.state == slam::track_state::tracking);
+    CHECK(r.inliers >= 20);
+    if (r.keyframe) CHECK(*r.keyframe == keyframes++);
+  }
+  CHECK(slam.counters().frames == recorded.size());
+  CHECK(slam.counters().tracked == recorded.size());
+  CHECK(slam.counters().lost == 0);
+  CHECK(slam.trajectory().size() == recorded.size());
+  CHECK(ate(slam.trajectory(), recorded) < 0.01);
+  CHECK(ate(slam.keyframe_trajectory(), recorded) < 0.01);
+  CHECK(slam.keyframes().size() == keyframes);
+  CHECK(slam.keyframes().front().frame == 0);
+  CHECK(slam.landmark_count() > 300);
+  check_observations_agree(slam.map());
+}
+
+TEST_CASE("The first pose is the identity unless the caller knows better") {
+  const auto& [camera, recorded] = small_room();
+  slam::rgbd_system at_origin{camera};
+  slam::rgbd_system placed{camera, slam::options{.initial_pose = recorded.front().T_world_camera}};
+  for (std::size_t i = 0; i < 10; ++i) {
+    at_origin.track(recorded[i]);
+    placed.track(recorded[i]);
+  }
+  CHECK(at_origin.trajectory().front().T_world_camera.log().norm() < 1e-12);
+  const vec3 error =
+      placed.trajectory().back().T_world_camera.translation() - recorded[9].T_world_camera->translation();
+  CHECK(error.norm() < 0.02);
+}
+
+TEST_CASE("Two runs over the same frames give the same bytes") {
+  const auto& [camera, recorded] = small_room();
+  const auto run = [&] {
+    slam::rgbd_system slam{camera, slam::options{}};
+    for (std::size_t i = 0; i < 30; ++i) slam.track(recorded[i]);
+    for (std::size_t i = 45; i < 60; ++i) slam.track(recorded[i]);  // a jump, so that RANSAC has its say
+    return slam.trajectory();
+  };
+  const auto a = run(), b = run();
+  REQUIRE(a.size() == b.size());
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    const mat4 first = a[i].T_world_camera.to_matrix(), second = b[i].T_world_camera.to_matrix();
+    CHECK(std::memcmp(first.data(), second.data(), sizeof(double) * 16) == 0);
+  }
+}
+
+TEST_CASE("In the dark tracking is lost and comes back with the light") {
+  const auto& [camera, recorded] = small_room();
+  slam::rgbd_system slam{camera, slam::options{}};
+  frames with_blackout = recorded;
+  for (std::size_t i = 25; i < 35; ++i) {
+    with_blackout[i].color = image<rgb8>(camera.width(), camera.height());
+    with_blackout[i].depth = image<std::uint16_t>(camera.width(), camera.height());
+  }
+  for (std::size_t i = 0; i < with_blackout.size(); ++i) {
+    const auto r = slam.track(with_blackout[i]);
+    const bool dark = i >= 25 && i < 35;
+    CHECK(r.tracked() == !dark);
+    if (dark) {
+      CHECK(r.state == slam::track_state::lost);
+      CHECK_FALSE(r.keyframe.has_value());
+    }
+    if (i == 35) CHECK(r.state == slam::track_state::relocalized);
+    if (i > 35) CHECK(r.state == slam::track_state::tracking);
+  }
+  CHECK(slam.counters().lost == 10);
+  CHECK(slam.counters().relocalized == 1);
+  CHECK(slam.trajectory().size() == recorded.size() - 10);
+  CHECK(ate(slam.trajectory(), recorded) < 0.015);
+}
+
+TEST_CASE("Images without anything to see never start the system and never harm it") {
+  const auto& [camera, recorded] = small_room();
+  slam::rgbd_system slam{camera, slam::options{}};
+  camera::rgbd_frame grey;
+  grey.color = image<rgb8>(camera.width(), camera.height(), rgb8{128, 128, 128});
+  grey.depth = image<std::uint16_t>(camera.width(), camera.height(), 2000);
+  for (int i = 0; i < 3; ++i) CHECK(slam.track(grey).state == slam::track_state::not_started);
+  CHECK(slam.trajectory().empty());
+  CHECK(slam.counters().lost == 0);
+
+  CHECK(slam.track(recorded[0]).tracked());
+  CHECK(slam.track(grey).state == slam::track_state::lost);
+  CHECK(slam.track(camera::rgbd_frame{}).state == slam::track_state::lost);  // no image at all
+  CHECK(slam.track(recorded[1]).state == slam::track_state::relocalized);
+
+  auto no_depth = recorded[2];
+  no_depth.depth = image<std::uint16_t>(camera.width(), camera.height());
+  CHECK(slam.track(no_depth).tracked());  // landmarks need no depth to be seen again
+  auto all_depth = recorded[3];
+  all_depth.depth = image<std::uint16_t>(camera.width(), camera.height(), 1);
+  slam.track(all_depth);
+  for (std::size_t i = 4; i < 8; ++i) CHECK(slam.track(recorded[i]).tracked());
+}
+
+TEST_CASE("A system takes another extractor by type") {
+  struct sparse_extractor {
+    features::orb_extractor inner{{.max_features = 400}};
+    [[nodiscard]] features::features operator()(image_view<const rgb8> image) const { return inner(image); }
+  };
+  const auto& [camera, recorded] = small_room();
+  slam::rgbd_system slam{camera, slam::options{}, sparse_extractor{}};
+  for (std::size_t i = 0; i < 10; ++i) CHECK(slam.track(recorded[i]).tracked());
+  CHECK(slam.map().keyframes().front().size() <= 400);
+}
+
+TEST_CASE("The kitchen is tracked without a lost frame") {
+  ORBIS_NEEDS_DATA("kitchen");
+  auto recording = io::open_recording(test::data_dir() / "kitchen").value();
+  slam::rgbd_system slam{recording.camera().model, slam::options{}};
+  frames truth;
+  for (std::size_t i = 0; i < 300; i += 3) {
+    const auto f = recording.frame(i).value();
+    CHECK(slam.track(f).tracked());
+    truth.emplace_back();
+    truth.back().timestamp = f.timestamp;
+    truth.back().T_world_camera = f.T_world_camera;
+  }
+  CHECK(ate(slam.trajectory(), truth) < 0.05);
+}
