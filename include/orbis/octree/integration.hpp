@@ -5,10 +5,12 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cassert>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <vector>
 
 #include <orbis/core/execution.hpp>
@@ -25,6 +27,7 @@ enum class ray_mode {
 
 struct integration_options {
   /// Metres from the sensor; of a point further away only the ray up to here counts, as free.
+  /// @pre >= 0
   double max_range = std::numeric_limits<double>::infinity();
   ray_mode mode = ray_mode::every_ray;
 };
@@ -52,6 +55,7 @@ class scan_marker {
   template <execution_policy Policy, class Point>
   integration_summary mark(const Policy& policy, const voxel_grid& grid, std::size_t count, Point&& point,
                            const float3& origin, const integration_options& options) {
+    assert(options.max_range >= 0.0);
     prepare(policy.threads(), count);
     if (!is_finite(origin)) return {.used = 0, .truncated = 0, .rejected = count};
     const sensor from{grid, origin, grid.key(origin), options.max_range};
