@@ -12,6 +12,7 @@
 #include <CLI/Formatter.hpp>
 #include <toml++/toml.h>
 
+#include <orbis/camera/presets.hpp>
 #include <orbis/core/file.hpp>
 
 namespace app {
@@ -76,6 +77,13 @@ void add_recording_options(CLI::App& cmd, settings& s) {
       ->capture_default_str()
       ->type_name("F");
   cmd.add_option("--camera", s.camera, "camera.toml, or tum_fr1, tum_fr2, tum_fr3, icl, kinect")
+      ->check(CLI::Validator(
+          [](std::string& name) -> std::string {
+            if (is_file_name(name)) return {};
+            const auto known = orbis::camera::preset(name);
+            return known ? std::string{} : known.error().message;
+          },
+          ""))
       ->type_name("FILE|NAME");
 }
 

@@ -45,4 +45,9 @@ struct settings {
   bool json = false;
 };
 
+/// Whether a camera is named by its file rather than by its name.
+[[nodiscard]] inline bool is_file_name(const std::string& camera) {
+  return camera.find_first_of("./") != std::string::npos;
+}
+
 }  // namespace app

@@ -17,9 +17,7 @@ using orbis::fail;
 using orbis::result;
 
 result<orbis::camera::camera_settings> named_camera(const std::string& name) {
-  std::error_code ignored;
-  const bool a_file = std::filesystem::exists(name, ignored) || name.find_first_of("./") != std::string::npos;
-  return a_file ? orbis::io::read_camera(name) : orbis::camera::preset(name);
+  return is_file_name(name) ? orbis::io::read_camera(name) : orbis::camera::preset(name);
 }
 
 std::size_t limited(std::size_t available, const settings& s) {

@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: BSD-3-Clause
+include(${CMAKE_CURRENT_LIST_DIR}/support.cmake)
+
+app(0 demo --frames 40 --width 320 --resolution 0.1 --out demo)
+set(files trajectory.txt keyframes.txt cloud.ply cloud_filtered.ply map_unfiltered.bt map.bt map.ot summary.json
+          report.html trajectory.png map.png map_unfiltered.png)
+must_exist(${WORK}/demo ${files})
+must_not_be_half_written(${WORK}/demo)
+check(out MATCHES "octree, 10 cm, after the filter")
+check(out MATCHES "ATE")
+
+# Every field of the contract is there.
+set(fields frames tracked lost relocalized keyframes landmarks loops_closed tracking_ms:median tracking_ms:p95
+           tracking_ms:mean wall_s fps peak_rss_mb ate_rmse_m rpe_trans_rmse_m rpe_rot_rmse_deg filter:mode
+           filter:reason filter:removed cloud:points cloud:points_filtered cloud:bytes cloud:bytes_filtered
+           octree:resolution_m octree:leaves_unfiltered octree:leaves octree:occupied octree:free
+           octree:bt_bytes_unfiltered octree:bt_bytes octree:ot_bytes octree:insert_ms_per_frame:median
+           octree:insert_ms_per_frame:p95 map_error_m)
+foreach(field IN LISTS fields)
+  string(REPLACE ":" ";" path ${field})
+  summary(value ${WORK}/demo ${path})
+  string(LENGTH "${value}" length)
+  check(length GREATER 0)
+endforeach()
+summary(tracked ${WORK}/demo tracked)
+check(tracked EQUAL 40)
+summary(ate ${WORK}/demo ate_rmse_m)
+check(ate LESS 0.05)
+summary(map_error ${WORK}/demo map_error_m)
+check(map_error LESS 0.1)
+summary(bytes ${WORK}/demo octree bt_bytes)
+file(SIZE ${WORK}/demo/map.bt size)
+check(bytes EQUAL size)
+summary(occupied ${WORK}/demo octree occupied)
+summary(free ${WORK}/demo octree free)
+summary(leaves ${WORK}/demo octree leaves)
+math(EXPR sum "${occupied} + ${free}")
+check(leaves EQUAL sum)
+
+# The page needs nothing but itself, and no gap in it was left open.
+file(READ ${WORK}/demo/report.html page)
+check(NOT page MATCHES "https?://")
+check(NOT page MATCHES "{{")
+
+# OctoMap's own programs read the maps.
+find_program(BT2VRML bt2vrml)
+find_program(CONVERT_OCTREE convert_octree)
+if(BT2VRML)
+  execute_process(COMMAND ${BT2VRML} map.bt WORKING_DIRECTORY ${WORK}/demo RESULT_VARIABLE result OUTPUT_QUIET ERROR_QUIET)
+  check(result EQUAL 0)
+  must_exist(${WORK}/demo map.bt.wrl)
+endif()
+if(CONVERT_OCTREE)
+  execute_process(COMMAND ${CONVERT_OCTREE} map.ot converted.bt WORKING_DIRECTORY ${WORK}/demo RESULT_VARIABLE result
+                  OUTPUT_QUIET ERROR_QUIET)
+  check(result EQUAL 0)
+  file(SHA256 ${WORK}/demo/converted.bt theirs)
+  file(SHA256 ${WORK}/demo/map.bt ours)
+  check(theirs STREQUAL ours)
+endif()
+
+# --quiet says nothing; the result is the same, to the byte, whatever the threads.
+app(0 demo --frames 40 --width 320 --resolution 0.1 --out again --quiet --threads 1)
+string(LENGTH "${out}${err}" said)
+check(said EQUAL 0)
+foreach(name trajectory.txt keyframes.txt cloud.ply cloud_filtered.ply map_unfiltered.bt map.bt map.ot)
+  file(SHA256 ${WORK}/demo/${name} first)
+  file(SHA256 ${WORK}/again/${name} second)
+  check(first STREQUAL second)
+endforeach()

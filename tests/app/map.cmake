@@ -1,0 +1,36 @@
+# SPDX-License-Identifier: BSD-3-Clause
+include(${CMAKE_CURRENT_LIST_DIR}/support.cmake)
+
+# A square metre of points 10 cm apart, 1 m above the origin.
+set(points "")
+foreach(x RANGE 9)
+  foreach(y RANGE 9)
+    string(APPEND points "0.${x}5 0.${y}5 1.05\n")
+  endforeach()
+endforeach()
+file(WRITE ${WORK}/cloud.ply "ply\nformat ascii 1.0\nelement vertex 100\nproperty float x\nproperty float y\n"
+     "property float z\nend_header\n${points}")
+
+app(0 map cloud.ply --out out --resolution 0.1 --filter none)
+must_exist(${WORK}/out cloud.ply cloud_filtered.ply map_unfiltered.bt map.bt map.ot summary.json report.html map.png)
+summary(occupied ${WORK}/out octree occupied)
+check(occupied EQUAL 100)
+summary(free ${WORK}/out octree free)
+check(free EQUAL 0)
+summary(frames ${WORK}/out frames)
+check(NOT frames)  # null: there was no SLAM
+
+app(0 map cloud.ply --out out --resolution 0.1 --filter none --origin 0.5,0.5,0.05)
+summary(free ${WORK}/out octree free)
+check(free GREATER 100)
+
+app(0 map out/cloud_filtered.ply --out again --resolution 0.1 --filter statistical --neighbors 8 --sigma 3)
+summary(mode ${WORK}/again filter mode)
+check(mode STREQUAL "statistical")
+
+# A recording, with its ground truth for poses.
+make_recording(${WORK}/room 6 160)
+app(0 map room --out out --resolution 0.1)
+summary(free ${WORK}/out octree free)
+check(free GREATER 100)
+check(NOT EXISTS ${WORK}/out/trajectory.txt)

@@ -1,0 +1,32 @@
+# SPDX-License-Identifier: BSD-3-Clause
+include(${CMAKE_CURRENT_LIST_DIR}/support.cmake)
+make_recording(${WORK}/room 30 320)
+
+app(0 run room --out out --resolution 0.1)
+summary(tracked ${WORK}/out tracked)
+check(tracked EQUAL 30)
+summary(map_error_m ${WORK}/out map_error_m)
+check(NOT map_error_m)  # null: a recording on disk knows no surface
+
+# Options from a file; the command line has the last word.
+file(WRITE ${WORK}/options.toml "resolution = 0.2\nstride = 2\nfilter = \"none\"\n")
+app(0 run room --out out --config options.toml --stride 3 --quiet)
+summary(frames ${WORK}/out frames)
+check(frames EQUAL 10)
+summary(resolution ${WORK}/out octree resolution_m)
+check(resolution EQUAL 0.2)
+summary(removed ${WORK}/out filter removed)
+check(removed EQUAL 0)
+
+# Without ground truth there is nothing to compare with, and nothing is invented.
+file(REMOVE ${WORK}/room/groundtruth.txt)
+app(0 run room --out out --frames 10 --resolution 0.1)
+summary(ate ${WORK}/out ate_rmse_m)
+check(NOT ate)
+
+# Names from outside are text in the page, whatever is in them.
+file(RENAME ${WORK}/room "${WORK}/<script>alert(1)<")
+app(0 run "<script>alert(1)<" --out out --frames 5 --resolution 0.2)
+file(READ ${WORK}/out/report.html page)
+string(FIND "${page}" "<script>alert" at)
+check(at EQUAL -1)

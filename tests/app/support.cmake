@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: BSD-3-Clause
+#
+# Included by every script here: an empty folder to work in, and checks.
+cmake_minimum_required(VERSION 3.22)
+file(REMOVE_RECURSE ${WORK})
+file(MAKE_DIRECTORY ${WORK})
+
+function(check)  # condition...
+  if(NOT (${ARGN}))
+    list(JOIN ARGN " " condition)
+    message(FATAL_ERROR "does not hold: ${condition}")
+  endif()
+endfunction()
+
+# Runs the program; its exit code must be `code`. Leaves `out` and `err` behind.
+macro(app code)
+  execute_process(COMMAND ${APP} ${ARGN} WORKING_DIRECTORY ${WORK} RESULT_VARIABLE result OUTPUT_VARIABLE out
+                  ERROR_VARIABLE err)
+  if(NOT result STREQUAL "${code}")
+    message(FATAL_ERROR "rgbd_slam ${ARGN}\nleft with ${result}, not ${code}\n${out}${err}")
+  endif()
+endmacro()
+
+# Must fail with `code` and end with one line that says why and matches `message`.
+macro(app_fails code message)
+  app(${code} ${ARGN})
+  if(NOT err MATCHES "(^|\n)rgbd_slam: [^\n]*${message}[^\n]*\n$" OR err MATCHES "rgbd_slam: [^\n]*\n.*rgbd_slam: ")
+    message(FATAL_ERROR "rgbd_slam ${ARGN}\nsaid\n${err}instead of one line that matches \"${message}\"")
+  endif()
+endmacro()
+
+function(make_recording folder frames width)
+  execute_process(COMMAND ${MAKE_RECORDING} ${folder} ${frames} ${width} RESULT_VARIABLE result)
+  if(NOT result EQUAL 0)
+    message(FATAL_ERROR "no recording: ${result}")
+  endif()
+endfunction()
+
+function(must_exist folder)  # names...
+  foreach(name IN LISTS ARGN)
+    if(NOT EXISTS ${folder}/${name})
+      message(FATAL_ERROR "${folder}/${name} is not there")
+    endif()
+    file(SIZE ${folder}/${name} size)
+    check(size GREATER 0)
+  endforeach()
+endfunction()
+
+function(must_not_be_half_written folder)
+  file(GLOB parts ${folder}/*.part ${folder}/.*)
+  if(parts)
+    message(FATAL_ERROR "left behind: ${parts}")
+  endif()
+endfunction()
+
+# A value of summary.json, e.g. `summary(tracked ${folder} tracking_ms median)`.
+macro(summary variable folder)
+  file(READ ${folder}/summary.json text)
+  string(JSON ${variable} GET "${text}" ${ARGN})
+endmacro()
