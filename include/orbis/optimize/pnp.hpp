@@ -44,8 +44,21 @@ namespace detail {
 template <camera::camera_model Camera>
 class pnp_estimator {
  public:
-  using model = se3;
+  /// A pose, with its inverse as scoring wants it.
+  struct model {
+    se3 T_world_camera;
+    mat3 rotation;     ///< from the world to the camera
+    vec3 translation;  ///< likewise
+  };
   static constexpr std::size_t sample_size = 3;
+
+  /// Up to four models.
+  struct candidates {
+    std::array<model, 4> models;
+    std::size_t size = 0;
+    [[nodiscard]] const model* begin() const noexcept { return models.data(); }
+    [[nodiscard]] const model* end() const noexcept { return models.data() + size; }
+  };
 
   pnp_estimator(std::span<const vec3> points, std::span<const vec2> pixels, const Camera& camera)
       : points_{points}, pixels_{pixels}, residual_{camera, 0.0}, rays_(points.size()) {
@@ -55,29 +68,36 @@ class pnp_estimator {
 
   [[nodiscard]] std::size_t size() const noexcept { return points_.size(); }
 
-  [[nodiscard]] p3p_solutions fit(const std::array<std::uint32_t, 3>& s) const {
-    return p3p({points_[s[0]], points_[s[1]], points_[s[2]]}, {rays_[s[0]], rays_[s[1]], rays_[s[2]]});
+  [[nodiscard]] candidates fit(const std::array<std::uint32_t, 3>& s) const {
+    candidates all;
+    for (const se3& pose : p3p({points_[s[0]], points_[s[1]], points_[s[2]]}, {rays_[s[0]], rays_[s[1]], rays_[s[2]]}))
+      all.models[all.size++] = with_inverse(pose);
+    return all;
   }
 
-  [[nodiscard]] double squared_error(const se3& T_world_camera, std::size_t i) const {
-    const auto& r = T_world_camera.rotation().unit_quaternion();
-    const auto pixel = residual_.camera.project(r.conjugate() * vec3(points_[i] - T_world_camera.translation()));
+  [[nodiscard]] double squared_error(const model& m, std::size_t i) const {
+    const auto pixel = residual_.camera.project(vec3(m.rotation * points_[i] + m.translation));
     return pixel ? (*pixel - pixels_[i]).squaredNorm() : std::numeric_limits<double>::infinity();
   }
 
-  [[nodiscard]] std::optional<se3> refine(const se3& start, std::span<const std::uint32_t> inliers) const {
+  [[nodiscard]] std::optional<model> refine(const model& start, std::span<const std::uint32_t> inliers) const {
     observations_.clear();
     for (const std::uint32_t i : inliers) observations_.push_back({.point = points_[i], .pixel = pixels_[i]});
     outliers_.resize(inliers.size());
     constexpr double everything = std::numeric_limits<double>::infinity();
-    const auto refined = refine_pose(std::span<const pose_observation>(observations_), residual_, start,
+    const auto refined = refine_pose(std::span<const pose_observation>(observations_), residual_, start.T_world_camera,
                                      std::span<std::uint8_t>(outliers_),
                                      {.rounds = 1, .gate_mono = everything, .gate_depth = everything});
     if (!refined.ok()) return std::nullopt;
-    return refined.T_world_camera;
+    return with_inverse(refined.T_world_camera);
   }
 
  private:
+  [[nodiscard]] static model with_inverse(const se3& T_world_camera) {
+    const se3 inverse = T_world_camera.inverse();
+    return {T_world_camera, inverse.rotation_matrix(), inverse.translation()};
+  }
+
   std::span<const vec3> points_;
   std::span<const vec2> pixels_;
   reprojection<Camera> residual_;
@@ -89,8 +109,8 @@ class pnp_estimator {
 }  // namespace detail
 
 /// The pose from which the most of `points_world[i]` appear at `pixels[i]`: P3P in RANSAC, each new
-/// best pose refined on its inliers. Matches that are not finite, or whose pixel the camera cannot
-/// un-project, are outliers. Deterministic by `options.seed`.
+/// best pose refined on its inliers. Matches that are not finite are outliers; a pixel that the camera cannot
+/// un-project is never drawn. Deterministic by `options.seed`.
 /// Errors: `invalid_argument` for spans of different length or options out of range, `no_data` below
 /// three matches, `degenerate` where no pose has `min_inliers` inliers.
 template <camera::camera_model Camera>
@@ -109,7 +129,7 @@ template <camera::camera_model Camera>
   double sum = 0.0;
   for (const std::uint32_t i : found->inliers) sum += estimator.squared_error(found->model, i);
   const double rmse = std::sqrt(sum / static_cast<double>(found->inliers.size()));
-  return pose_estimate{found->model, std::move(found->inliers), rmse, found->iterations};
+  return pose_estimate{found->model.T_world_camera, std::move(found->inliers), rmse, found->iterations};
 }
 
 }  // namespace orbis::optimize
