@@ -22,6 +22,7 @@ exit_code run_slam(const settings& s, console& say) {
   const tracked_frames tracked = track(*source, s, say);
   if (tracked.stopped && tracked.slam.frames == 0) return give_up(*tracked.stopped);
   if (tracked.stopped) r.warnings.push_back(explain_stop(tracked, *source).to_string());
+  if (console::interrupted()) r.warnings.emplace_back("interrupted by the user; what was reached is kept");
   r.slam = tracked.slam;
   remove_old_results(s.out);
   if (r.slam->tracked == 0) return report_no_start(r, s, say);

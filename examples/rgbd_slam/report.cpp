@@ -65,6 +65,9 @@ std::string base64(std::string_view bytes) {
   return out;
 }
 
+/// Every how many of `size` things to take so that at most `most` are taken.
+std::size_t thinning(std::size_t size, std::size_t most) { return std::max<std::size_t>(1, (size + most - 1) / most); }
+
 double rounded(double v, double step) { return std::round(v / step) * step; }
 
 // -- three-dimensional data -------------------------------------------------------------------------
@@ -111,15 +114,18 @@ class packer {
 };
 
 json packed_points(const map_results& m, const view_frame& frame) {
-  constexpr std::size_t most = 90'000;
-  const std::size_t every = std::max<std::size_t>(1, (m.cloud.size() + most - 1) / most);
+  // Removed points are few, and worth seeing: thinned less.
+  const std::size_t every_kept = thinning(m.kept.size(), 80'000);
+  const std::size_t every_removed = thinning(m.cloud.size() - m.kept.size(), 20'000);
   packer out;
   auto kept = m.kept.begin();
-  for (std::size_t i = 0; i < m.cloud.size(); i += every) {
+  std::size_t seen_kept = 0, seen_removed = 0;
+  for (std::size_t i = 0; i < m.cloud.size(); ++i) {
+    const bool is_kept = kept != m.kept.end() && *kept == i;
+    if (is_kept) ++kept;
+    if ((is_kept ? seen_kept++ % every_kept : seen_removed++ % every_removed) != 0) continue;
     const vec3 p = frame.T_view_world * m.cloud.points[i].cast<double>();
     if (!p.allFinite()) continue;
-    kept = std::lower_bound(kept, m.kept.end(), i);
-    const bool is_kept = kept != m.kept.end() && *kept == i;
     out.add(p, m.cloud.has_colors() ? m.cloud.colors[i] : orbis::rgb8{150, 160, 175}, is_kept ? 1 : 0);
   }
   json j = out.pack();
@@ -170,8 +176,6 @@ json packed_voxels(std::vector<voxel> voxels, double resolution, const view_fram
 }
 
 // -- the script's data -------------------------------------------------------------------------------
-
-std::size_t thinning(std::size_t size, std::size_t most) { return std::max<std::size_t>(1, (size + most - 1) / most); }
 
 void append(json& flat, const vec3& p) {
   for (int i = 0; i != 3; ++i) flat.push_back(rounded(p[i], 1e-4));
