@@ -14,7 +14,9 @@ namespace orbis::slam {
 
 /// When a frame becomes a keyframe.
 struct keyframe_options {
-  std::size_t max_gap = 30;          ///< frames since the last one, at most (while enough is tracked)
+  double interval = 0.3;             ///< seconds since the last one, after which having moved is reason enough
+  double moved = 0.06;               ///< metres since the last one that count as having moved ...
+  double turned = 0.06;              ///< ... or radians
   double inlier_ratio = 0.75;        ///< of the landmarks that the reference keyframe has: below it, a new one
   double inlier_ratio_start = 0.4;   ///< the same while there is one keyframe only
   std::size_t min_inliers = 15;      ///< with fewer the pose is not trusted enough
