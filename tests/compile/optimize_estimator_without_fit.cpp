@@ -1,4 +1,4 @@
-// error: model_estimator
+// error: model_estimator[<']
 // RANSAC says what it needs where an estimator cannot fit.
 #include <orbis/optimize/ransac.hpp>
 

@@ -1,4 +1,4 @@
-// error: robust_loss
+// error: robust_loss[<']
 // A loss that has a cost but no weight is refused by name.
 #include <orbis/camera/pinhole.hpp>
 #include <orbis/optimize/pose_refinement.hpp>

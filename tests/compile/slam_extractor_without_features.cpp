@@ -1,4 +1,4 @@
-// error: feature_extractor
+// error: feature_extractor[<']
 // An extractor that does not give features is refused by name.
 #include <orbis/camera/pinhole.hpp>
 #include <orbis/slam/rgbd_system.hpp>
