@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <orbis/cloud/extract.hpp>
+#include <orbis/core/point.hpp>
 #include <orbis/io/cloud_file.hpp>
 #include <orbis/io/trajectory_file.hpp>
 
@@ -46,14 +48,27 @@ orbis::result<mapped> map_recording(const settings& s, console& say) {
   return mapped{std::move(r), *std::move(map), posed->trajectory()};
 }
 
+/// Organised clouds have NaN where nothing was measured; those are not points.
+void keep_finite(orbis::point_cloud& cloud) {
+  std::vector<std::uint32_t> finite;
+  for (std::size_t i = 0; i != cloud.size(); ++i)
+    if (orbis::is_finite(cloud.points[i])) finite.push_back(static_cast<std::uint32_t>(i));
+  if (finite.size() != cloud.size()) cloud = orbis::cloud::extract(cloud, finite);
+}
+
 orbis::result<mapped> map_cloud_file(const settings& s, console& say) {
   say.stage("reading");
   auto cloud = orbis::io::read_cloud(s.input);
   if (!cloud) return orbis::fail(cloud.error());
-  if (cloud->empty()) return orbis::fail(orbis::errc::no_data, s.input.string(), "the cloud has no points");
+  const std::size_t in_file = cloud->size();
+  keep_finite(*cloud);
+  if (cloud->empty()) return orbis::fail(orbis::errc::no_data, s.input.string(), "the cloud has no finite points");
   const std::string name = s.input.filename().string();
-  say.finish(name + ": " + count_text(cloud->size()) + " points");
+  const std::string left_out =
+      in_file == cloud->size() ? "" : ", " + count_text(in_file - cloud->size()) + " without coordinates left out";
+  say.finish(name + ": " + count_text(cloud->size()) + " points" + left_out);
   results r = begin_results(s, name, nullptr);
+  r.setup.emplace_back("points", count_text(cloud->size()) + left_out);
   r.truth_note = "A cloud, without SLAM.";
   return mapped{std::move(r), map_cloud(*std::move(cloud), s, say), {}};
 }

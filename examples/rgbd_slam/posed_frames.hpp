@@ -4,6 +4,7 @@
 /// again: the first ones are kept in memory, the rest is read again when its turn comes.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <iterator>
 #include <memory>
@@ -21,7 +22,7 @@ class posed_frames {
  public:
   explicit posed_frames(const frame_source& source) : source_{&source} {}
 
-  /// Frame number `i` of the source, where the camera was at `T_world_camera`.
+  /// Frame number `i` of the source, where the camera was at `T_world_camera`. @pre `i` ascends
   void add(std::size_t i, const orbis::se3& T_world_camera, const orbis::camera::rgbd_frame& frame) {
     entries_.push_back({i, T_world_camera, nullptr});
     constexpr std::size_t budget = std::size_t{512} << 20U;
@@ -30,8 +31,12 @@ class posed_frames {
     in_memory_ += bytes;
     entries_.back().frame = std::make_shared<const orbis::camera::rgbd_frame>(frame);
   }
-  /// The pose changes, the frame stays.
-  void move(std::size_t number, const orbis::se3& T_world_camera) { entries_[number].T_world_camera = T_world_camera; }
+  /// Frame number `i` of the source is now at `T_world_camera`. @pre it was added
+  void move(std::size_t i, const orbis::se3& T_world_camera) {
+    const auto at = std::lower_bound(entries_.begin(), entries_.end(), i,
+                                     [](const entry& e, std::size_t index) { return e.index < index; });
+    at->T_world_camera = T_world_camera;
+  }
 
   [[nodiscard]] std::size_t size() const { return entries_.size(); }
   [[nodiscard]] orbis::trajectory trajectory() const {

@@ -30,7 +30,6 @@ tracked_frames track(const frame_source& source, const settings& s, console& say
     say.advance(i + 1, source.frames,
                 std::string{to_string(found.state)} + ", " + std::to_string(out.keyframes.size()) + " keyframes");
   }
-
   console::release_interrupts();
 
   // SLAM's world is the first camera's; ours is the ground truth's where that is known. This is a choice
@@ -42,8 +41,8 @@ tracked_frames track(const frame_source& source, const settings& s, console& say
   };
   out.slam.trajectory = in_world(slam.trajectory());
   out.slam.keyframes = in_world(slam.keyframe_trajectory());
-  for (std::size_t k = 0; k != out.slam.keyframes.size(); ++k)
-    out.keyframes.move(k, out.slam.keyframes[k].T_world_camera);
+  for (const orbis::slam::keyframe_pose& k : slam.keyframes())
+    out.keyframes.move(k.frame, T_world_slam * k.T_world_camera);
 
   const auto& counters = slam.counters();
   out.slam.frames = counters.frames;

@@ -95,7 +95,7 @@ app_fails(2 "cloud.ply: no such file" map cloud.ply --out out)
 file(WRITE ${WORK}/cut.ply "ply\nformat ascii 1.0\nelement vertex 5\nproperty float x\nproperty float y\nproperty float z\nend_header\n0 0 0\n")
 app_fails(2 "cut.ply: " map cut.ply --out out --quiet)
 file(WRITE ${WORK}/empty.ply "ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\nproperty float y\nproperty float z\nend_header\n")
-app_fails(2 "empty.ply: .*no points" map empty.ply --out out)
+app_fails(2 "empty.ply: .*no finite points" map empty.ply --out out)
 app_fails(2 "file: " map file --out out)
 
 # Output that cannot be: 2.
