@@ -55,7 +55,7 @@ void add_map_options(CLI::App& cmd, settings& s) {
       ->check(within(0.1, 1000.0, " m"))
       ->capture_default_str()
       ->type_name("M");
-  cmd.add_option("--filter", s.filter, "outliers: auto, none or statistical")
+  cmd.add_option("--filter", s.filter, "how outliers are removed; auto: as the cloud suggests")
       ->check(CLI::IsMember({"auto", "none", "statistical"}))
       ->capture_default_str()
       ->type_name("MODE");
@@ -72,7 +72,7 @@ void add_map_options(CLI::App& cmd, settings& s) {
 }
 
 void add_recording_options(CLI::App& cmd, settings& s) {
-  cmd.add_option("--format", s.format, "auto, tum, 7scenes or icl")
+  cmd.add_option("--format", s.format, "layout of the recording")
       ->check(CLI::IsMember({"auto", "tum", "7scenes", "icl"}))
       ->capture_default_str()
       ->type_name("F");
@@ -164,7 +164,7 @@ std::variant<settings, exit_code> read_command_line(int argc, char** argv) {
       ->required()
       ->type_name("");
   map->add_option("--origin", origin,
-                  "x,y,z of the sensor that saw the cloud: rays from there clear free space. "
+                  "sensor that saw the cloud, metres: rays from there clear free space. "
                   "Without it the points are marked occupied and nothing is marked free")
       ->type_name("X,Y,Z");
   add_recording_options(*map, s);
@@ -178,8 +178,7 @@ std::variant<settings, exit_code> read_command_line(int argc, char** argv) {
   try {
     cli.parse(argc, argv);
   } catch (const CLI::CallForHelp&) {
-    CLI::App* asked = cli.get_subcommands().empty() ? &cli : cli.get_subcommands().front();
-    std::fputs(asked->help().c_str(), stdout);
+    std::fputs(cli.help().c_str(), stdout);
     return done;
   } catch (const CLI::ParseError& e) {
     return complain(std::string{e.what()} + " (--help shows the usage)", bad_usage);

@@ -53,7 +53,7 @@ result<frame_source> open_recording(const settings& s) {
 
 frame_source make_synthetic(const settings& s) {
   constexpr std::size_t once_round = 360;  // at an unhurried pace: a degree a frame
-  const std::size_t frames = s.frames == 0 ? once_round : s.frames * s.stride;
+  const std::size_t frames = s.frames == 0 ? once_round : std::min<std::size_t>(s.frames * s.stride, 1'000'000);
   const auto width = static_cast<int>(s.width / 4 * 4);
   const auto recording = std::make_shared<const orbis::io::synthetic_recording>(
       orbis::io::synthetic_options{.frames = static_cast<int>(frames),
