@@ -31,27 +31,29 @@ while IFS=: read -r file line text; do
     [[ " ${allowed[$component]-} " == *" $target "* ]] || complain "$file:$line: $component includes $included"
   fi
   [[ -n ${allowed[$component]+known} ]] || complain "$file:$line: $component is in no layer"
-done < <(grep -rnE '^ *# *include *<orbis/' --include='*.hpp' . | sed 's|^\./||' | grep '/.*:.*:')
+done <<<"$(grep -rnE '^ *# *include *<orbis/' --include='*.hpp' . | sed 's|^\./||' | grep '/.*:.*:')"
 
 # A neighbour's name, and the only files that may include it.
 only() {
   local pattern=$1 where=$2 hit
   while IFS= read -r hit; do
     hit=${hit#./}
-    [[ ${hit%%:*} =~ $where ]] || complain "$hit: only $where may include this"
-  done < <(grep -rnE "^ *# *include *[<\"]($pattern)" --include='*.hpp' . || true)
+    [[ -z $hit || ${hit%%:*} =~ $where ]] || complain "$hit: only $where may include this"
+  done <<<"$(grep -rnE "^ *# *include *[<\"]($pattern)" --include='*.hpp' . || true)"
 }
 only 'nanoflann' '^cloud/nanoflann\.hpp$'
 only 'octomap/' '^interop/octomap\.hpp$'
 only 'opencv2/' '^(interop/opencv|features/.*)\.hpp$'
 only 'pcl/' '^interop/pcl\.hpp$'
 only 'open3d/' '^interop/open3d\.hpp$'
-while IFS= read -r hit; do complain "${hit#./}: include the parts that are needed instead"; done \
-  < <(grep -rnE 'include *<opencv2/opencv\.hpp>' --include='*.hpp' . || true)
+while IFS= read -r hit; do
+  [[ -z $hit ]] || complain "${hit#./}: include the parts that are needed instead"
+done <<<"$(grep -rnE 'include *<opencv2/opencv\.hpp>' --include='*.hpp' . || true)"
 
 # A header names a component's own macros only with our prefix.
-while IFS= read -r hit; do complain "${hit#./}: a macro without the ORBIS_ prefix"; done \
-  < <(grep -rnE '^ *# *define +' --include='*.hpp' . | grep -vE '# *define +ORBIS_' || true)
+while IFS= read -r hit; do
+  [[ -z $hit ]] || complain "${hit#./}: a macro without the ORBIS_ prefix"
+done <<<"$(grep -rnE '^ *# *define +' --include='*.hpp' . | grep -vE '# *define +ORBIS_' || true)"
 
 ((bad == 0)) && echo "layers hold"
 exit $bad
