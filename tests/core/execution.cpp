@@ -1,7 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <atomic>
 #include <numeric>
 #include <stdexcept>
 #include <vector>
+
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <orbis/core/execution.hpp>
 
@@ -27,6 +32,36 @@ TEST_CASE("chunks do not depend on the number of threads") {
   };
   CHECK(chunks(orbis::seq) == chunks(orbis::par.with(4)));
 }
+
+#if defined(__has_feature)
+#define ORBIS_TEST_SANITIZED (__has_feature(address_sanitizer) || __has_feature(thread_sanitizer))
+#elif defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#define ORBIS_TEST_SANITIZED 1
+#else
+#define ORBIS_TEST_SANITIZED 0
+#endif
+#if !ORBIS_TEST_SANITIZED  // which need their terabytes of addresses
+TEST_CASE("work is done on fewer threads where the system gives no more") {
+  // In a child with an address space that has no room for the stacks of that many threads.
+  const pid_t child = fork();
+  REQUIRE(child >= 0);
+  if (child == 0) {
+    const rlimit limit{rlim_t{512} << 20U, rlim_t{512} << 20U};
+    if (setrlimit(RLIMIT_AS, &limit) != 0) _exit(0);
+    std::atomic<int> visits{0};
+    try {
+      orbis::for_each_index(orbis::par.with(2000), 20000, 1, [&](std::size_t) { ++visits; });
+    } catch (...) {
+      _exit(1);
+    }
+    _exit(visits == 20000 ? 0 : 2);
+  }
+  int status = 0;
+  REQUIRE(waitpid(child, &status, 0) == child);
+  CHECK(WIFEXITED(status));
+  CHECK(WEXITSTATUS(status) == 0);
+}
+#endif
 
 TEST_CASE("an exception reaches the caller") {
   const auto thrower = [](std::size_t i) {

@@ -52,6 +52,7 @@ TEST_CASE("lvalue and const callables are used in place and copies of a progress
   CHECK(ten_steps(constant) == 1);
   auto* function = &stop_at_three;
   CHECK(ten_steps(function) == 3);
+  CHECK(ten_steps(stop_at_three) == 3);
 }
 
 TEST_CASE("what is not a callback is not taken for one") {

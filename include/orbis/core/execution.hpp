@@ -13,6 +13,7 @@
 #include <cstddef>
 #include <exception>
 #include <mutex>
+#include <system_error>
 #include <thread>
 #include <type_traits>
 #include <vector>
@@ -45,7 +46,8 @@ concept execution_policy = requires(const std::remove_cvref_t<P>& p) {
 
 /// Calls `body(begin, end)` on the consecutive chunks `[i * grain, min((i + 1) * grain, count))` of
 /// `[0, count)`, on the policy's threads, in no particular order. An exception thrown by `body`
-/// stops the handing out of chunks and is rethrown on the calling thread.
+/// stops the handing out of chunks and is rethrown on the calling thread. Where the system gives
+/// fewer threads than the policy asks for, those do all of the work.
 /// @pre grain > 0
 template <execution_policy Policy, std::invocable<std::size_t, std::size_t> Body>
 void for_each_chunk(const Policy& policy, std::size_t count, std::size_t grain, Body&& body) {
@@ -72,7 +74,11 @@ void for_each_chunk(const Policy& policy, std::size_t count, std::size_t grain, 
   {
     std::vector<std::jthread> others;
     others.reserve(workers - 1);
-    for (std::size_t i = 1; i != workers; ++i) others.emplace_back(work);
+    try {
+      for (std::size_t i = 1; i != workers; ++i) others.emplace_back(work);
+    } catch (const std::system_error&) {
+      // The system gives no more threads: those there are do the work, with the same result.
+    }
     work();
   }
   if (failure) std::rethrow_exception(failure);

@@ -24,9 +24,8 @@ class progress {
                bool, F&, std::size_t,
                std::size_t>) constexpr progress(F&& callback) noexcept  // NOLINT(google-explicit-constructor):
                                                                         // a callback is one
-      : object_{const_cast<void*>(static_cast<const void*>(std::addressof(callback)))},
-        call_{[](void* object, std::size_t done, std::size_t total) -> bool {
-          return (*static_cast<std::remove_reference_t<F>*>(object))(done, total);
+      : object_{address_of(callback)}, call_{[](void* object, std::size_t done, std::size_t total) -> bool {
+          return (*reinterpret_cast<std::remove_reference_t<F>*>(object))(done, total);
         }} {}
 
   /// Reports `done` of `total`; false if the caller asked to stop.
@@ -37,6 +36,14 @@ class progress {
   [[nodiscard]] explicit operator bool() const noexcept { return call_ != nullptr; }
 
  private:
+  template <class F>
+  [[nodiscard]] static constexpr void* address_of(F& callback) noexcept {
+    if constexpr (std::is_function_v<F>)
+      return reinterpret_cast<void*>(&callback);  // POSIX has them in the same size
+    else
+      return const_cast<void*>(static_cast<const void*>(std::addressof(callback)));
+  }
+
   void* object_ = nullptr;
   bool (*call_)(void*, std::size_t, std::size_t) = nullptr;
 };
