@@ -51,6 +51,12 @@ TEST_CASE("motions across a gap are left out of a delta in seconds") {
   CHECK(eval::rpe(reference, reference, {.delta_seconds = 0.1}).value().translation.count == 38);
 }
 
+TEST_CASE("a delta below the resolution of the time stamps finds no motion") {
+  auto reference = curve(10);
+  for (orbis::stamped_pose& pose : reference) pose.timestamp += 1.3e9;
+  CHECK(eval::rpe(reference, reference, {.delta_seconds = 1e-9}).error().code == orbis::errc::no_data);
+}
+
 TEST_CASE("a relative error of too little is refused") {
   const auto reference = curve(10);
   CHECK(eval::rpe({}, reference).error().code == orbis::errc::no_data);

@@ -50,6 +50,7 @@ struct relative_pose_error {
     const auto after = std::lower_bound(pairs.begin(), pairs.end(), wanted,
                                         [](const pose_pair& p, double t) { return p.timestamp < t; });
     auto j = static_cast<std::size_t>(after - pairs.begin());
+    if (j <= i) return std::nullopt;  // a delta below the resolution of the time stamps
     if (j == pairs.size() || (wanted - pairs[j - 1].timestamp < pairs[j].timestamp - wanted)) --j;
     const bool close = std::abs(pairs[j].timestamp - wanted) <= 0.25 * *options.delta_seconds;
     return j > i && close ? std::optional{j} : std::nullopt;
