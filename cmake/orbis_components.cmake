@@ -98,7 +98,7 @@ function(_orbis_add_component component)
   set_target_properties(orbis_${component} PROPERTIES EXPORT_NAME ${component})
   target_compile_features(orbis_${component} INTERFACE cxx_std_20)
   target_include_directories(orbis_${component} INTERFACE
-    $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/include> $<INSTALL_INTERFACE:include>)
+    $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/include>)
   foreach(need IN LISTS ORBIS_${component}_NEEDS)
     target_link_libraries(orbis_${component} INTERFACE orbis_${need})
   endforeach()

@@ -9,7 +9,8 @@ set(_orbis_cmake_dir ${CMAKE_INSTALL_DATADIR}/cmake/orbis)
 
 install(DIRECTORY include/orbis DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
 foreach(component IN LISTS ORBIS_PROVIDED_COMPONENTS)
-  install(TARGETS orbis_${component} EXPORT orbis-${component})
+  install(TARGETS orbis_${component} EXPORT orbis-${component}
+          INCLUDES DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
   install(EXPORT orbis-${component} NAMESPACE orbis:: DESTINATION ${_orbis_cmake_dir}
           FILE orbis-${component}-targets.cmake)
 endforeach()
@@ -22,6 +23,16 @@ install(FILES ${PROJECT_BINARY_DIR}/orbis-config.cmake ${PROJECT_BINARY_DIR}/orb
               cmake/orbis_components.cmake
         DESTINATION ${_orbis_cmake_dir})
 
+# From the file's own place, so that the installed tree can be moved (or be installed elsewhere
+# than it was configured for).
+file(RELATIVE_PATH _orbis_pc_to_prefix ${CMAKE_INSTALL_FULL_DATADIR}/pkgconfig ${CMAKE_INSTALL_PREFIX})
+string(REGEX REPLACE "/$" "" _orbis_pc_to_prefix "${_orbis_pc_to_prefix}")
+cmake_path(IS_ABSOLUTE CMAKE_INSTALL_INCLUDEDIR _orbis_fixed_include)
+if(_orbis_fixed_include)
+  set(_orbis_pc_include ${CMAKE_INSTALL_INCLUDEDIR})
+else()
+  set(_orbis_pc_include "\${prefix}/${CMAKE_INSTALL_INCLUDEDIR}")
+endif()
 configure_file(cmake/orbis.pc.in ${PROJECT_BINARY_DIR}/orbis.pc @ONLY)
 install(FILES ${PROJECT_BINARY_DIR}/orbis.pc DESTINATION ${CMAKE_INSTALL_DATADIR}/pkgconfig)
 install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/orbis)

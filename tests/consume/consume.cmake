@@ -12,14 +12,28 @@ set(options -G ${GENERATOR} -DCMAKE_CXX_COMPILER=${COMPILER} -DCMAKE_BUILD_TYPE=
 
 if(WAY STREQUAL "find_package")
   run(${CMAKE_COMMAND} -S ${ORBIS_SOURCE} -B ${SCRATCH}/orbis ${options} -DORBIS_BUILD_TESTS=OFF
-      -DORBIS_BUILD_BENCH=OFF -DORBIS_BUILD_EXAMPLES=OFF -DCMAKE_INSTALL_PREFIX=${SCRATCH}/prefix)
+      -DORBIS_BUILD_BENCH=OFF -DORBIS_BUILD_EXAMPLES=OFF -DCMAKE_INSTALL_PREFIX=${SCRATCH}/first
+      -DCMAKE_INSTALL_INCLUDEDIR=include/versioned)
   run(${CMAKE_COMMAND} --install ${SCRATCH}/orbis)
-  foreach(file IN ITEMS include/orbis/orbis.hpp share/cmake/orbis/orbis-config.cmake share/pkgconfig/orbis.pc)
+  file(RENAME ${SCRATCH}/first ${SCRATCH}/prefix)  # what is installed can be moved
+  foreach(file IN ITEMS include/versioned/orbis/orbis.hpp share/cmake/orbis/orbis-config.cmake share/pkgconfig/orbis.pc)
     if(NOT EXISTS ${SCRATCH}/prefix/${file})
       message(FATAL_ERROR "${file} was not installed")
     endif()
   endforeach()
   list(APPEND options -DCMAKE_PREFIX_PATH=${SCRATCH}/prefix)
+  find_program(PKG_CONFIG pkg-config)
+  if(PKG_CONFIG)
+    set(ENV{PKG_CONFIG_PATH} ${SCRATCH}/prefix/share/pkgconfig)
+    execute_process(COMMAND ${PKG_CONFIG} --cflags --libs orbis OUTPUT_VARIABLE flags RESULT_VARIABLE status)
+    if(NOT status EQUAL 0)
+      message(FATAL_ERROR "pkg-config does not know orbis")
+    endif()
+    separate_arguments(flags UNIX_COMMAND "${flags}")
+    file(WRITE ${SCRATCH}/core.cpp "#include <orbis/core.hpp>\nint main() { return orbis::seq.threads() == 1 ? 0 : 1; }\n")
+    run(${COMPILER} -std=c++20 ${SCRATCH}/core.cpp -o ${SCRATCH}/core ${flags})
+    run(${SCRATCH}/core)
+  endif()
 endif()
 
 run(${CMAKE_COMMAND} -S ${PROJECT} -B ${SCRATCH}/build ${options} -DWAY=${WAY} -DORBIS_SOURCE=${ORBIS_SOURCE})
