@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <iostream>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -19,6 +20,16 @@ double median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
   return *middle;
+}
+
+/// Why a run did not measure anything; empty if it did. Google Benchmark 1.8 has renamed the members.
+template <class Run>
+std::string reason_for_skipping(const Run& run) {
+  if constexpr (requires { run.error_occurred; }) {
+    return run.error_occurred ? "failed: " + run.error_message : std::string{};
+  } else {
+    return static_cast<int>(run.skipped) != 0 ? "skipped: " + run.skip_message : std::string{};
+  }
 }
 
 /// Collects the repetitions of every row and prints medians and ratios when all have run.
@@ -34,8 +45,9 @@ class ratio_table final : public benchmark::BenchmarkReporter {
       if (run.run_type != Run::RT_Iteration) continue;
       std::string name = run.run_name.function_name;
       if (!run.run_name.args.empty()) name += "/" + run.run_name.args;
-      if (run.error_occurred) {
-        std::fprintf(stderr, "%s: %s\n", name.c_str(), run.error_message.c_str());
+      if (const std::string why = reason_for_skipping(run); !why.empty()) {
+        std::fprintf(stderr, "%s: %s\n", name.c_str(), why.c_str());
+        failed_ = true;
         continue;
       }
       const double seconds =
@@ -60,6 +72,9 @@ class ratio_table final : public benchmark::BenchmarkReporter {
       }
     }
   }
+
+  /// Whether there are rows, and all of them were measured.
+  [[nodiscard]] bool complete() const { return !rows_.empty() && !failed_; }
 
  private:
   struct row {
@@ -89,6 +104,7 @@ class ratio_table final : public benchmark::BenchmarkReporter {
   }
 
   std::vector<row> rows_;
+  bool failed_ = false;
 };
 
 }  // namespace
@@ -100,11 +116,15 @@ int main(int argc, char** argv) {
   std::string minimum = "--benchmark_min_time=0.2";
   // Defaults first, so that what the user says overrides them.
   arguments.insert(arguments.begin() + 1, {repetitions.data(), interleaved.data(), minimum.data()});
+  const bool listing = std::any_of(arguments.begin(), arguments.end(), [](const char* argument) {
+    return std::string_view{argument}.starts_with("--benchmark_list_tests");
+  });
   int count = static_cast<int>(arguments.size());
   benchmark::Initialize(&count, arguments.data());
   if (benchmark::ReportUnrecognizedArguments(count, arguments.data())) return 1;
   ratio_table table;
   benchmark::RunSpecifiedBenchmarks(&table);
   benchmark::Shutdown();
-  return 0;
+  if (listing) return 0;
+  return table.complete() ? 0 : 1;
 }
