@@ -118,7 +118,7 @@ std::string bytes_text(std::uintmax_t bytes) {
 
 std::string count_text(std::uintmax_t n) {
   std::string digits = std::to_string(n);
-  for (std::size_t i = digits.size(); i > 3; i -= 3) digits.insert(i - 3, ",");
+  for (std::size_t i = digits.size(); i > 3; i -= 3) digits.insert(i - 3, 1, ',');
   return digits;
 }
 
