@@ -10,6 +10,7 @@
 #include <orbis/octree/hash_index.hpp>
 #include <orbis/octree/integration.hpp>
 #include <orbis/octree/key.hpp>
+#include <orbis/octree/leaves.hpp>
 #include <orbis/octree/occupancy_octree.hpp>
 #include <orbis/octree/pruned_tree.hpp>
 #include <orbis/octree/ray_grid.hpp>

@@ -21,6 +21,7 @@
 #include <orbis/octree/cast_ray.hpp>
 #include <orbis/octree/depth_points.hpp>
 #include <orbis/octree/integration.hpp>
+#include <orbis/octree/leaves.hpp>
 #include <orbis/octree/pruned_tree.hpp>
 #include <orbis/octree/sensor_model.hpp>
 
@@ -164,9 +165,9 @@ class occupancy_octree {
   /// O(bricks log bricks + known voxels).
   template <std::invocable<const leaf&> Visit>
   void for_each_leaf(Visit&& visit) const {
-    visit_tree(on_leaf([&](const voxel_key& key, int depth, value_type v) {
+    visit_leaves(store_, [&](const voxel_key& key, int depth, value_type v) {
       visit(leaf{key, depth, grid_.center(key, depth), grid_.node_size(depth), v, is_occupied<Model>(v)});
-    }));
+    });
   }
   /// Visits the nodes of the pruned octree in preorder, see pruned_tree::visit.
   template <class Visitor>
@@ -182,7 +183,11 @@ class occupancy_octree {
   /// Counts nodes. O(bricks log bricks + known voxels), as are the four after it.
   [[nodiscard]] octree_counts counts() const {
     octree_counts n;
-    visit_tree(counter{n});
+    n.nodes = visit_leaves(store_, [&](const voxel_key&, int, value_type v) {
+      ++(is_occupied<Model>(v) ? n.occupied_leaves : n.free_leaves);
+    });
+    n.leaves = n.occupied_leaves + n.free_leaves;
+    n.nodes += n.leaves;
     return n;
   }
   /// Leaves of the pruned octree, of any size.
@@ -213,30 +218,6 @@ class occupancy_octree {
   }
 
  private:
-  template <class OnLeaf>
-  struct leaf_visitor {
-    OnLeaf visit;
-    void leaf(const voxel_key& key, int depth, value_type v) { visit(key, depth, v); }
-    template <class Children>
-    void inner(const voxel_key&, int, value_type, const Children&) {}
-  };
-  template <class OnLeaf>
-  static leaf_visitor<OnLeaf> on_leaf(OnLeaf visit) {
-    return {std::move(visit)};
-  }
-  struct counter {
-    octree_counts& n;
-    void leaf(const voxel_key&, int, value_type v) {
-      ++n.nodes;
-      ++n.leaves;
-      ++(is_occupied<Model>(v) ? n.occupied_leaves : n.free_leaves);
-    }
-    template <class Children>
-    void inner(const voxel_key&, int, value_type, const Children&) {
-      ++n.nodes;
-    }
-  };
-
   void apply(const scan_masks& scan, integration_summary& summary) {
     for (const scan_brick& s : scan.bricks()) {
       brick<value_type>& b = store_.make(named_key(s.name));

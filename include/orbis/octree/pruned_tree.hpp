@@ -39,6 +39,14 @@ template <class T>
   return parent;
 }
 
+/// The place of the brick that starts at `k` along the Morton curve: three bits for each level above it.
+[[nodiscard]] constexpr std::uint64_t morton_order(const voxel_key& k) noexcept {
+  std::uint64_t order = 0;
+  for (unsigned bit = 3; bit != static_cast<unsigned>(tree_depth); ++bit)
+    order |= std::uint64_t{(k.x >> bit & 1U) | (k.y >> bit & 1U) << 1U | (k.z >> bit & 1U) << 2U} << (3 * (bit - 3));
+  return order;
+}
+
 /// A snapshot of the tree's upper part over a store that must outlive it and stay as it is.
 /// `Value` maps a voxel's value to the one the tree is to show. Building it takes
 /// O(bricks log bricks + known voxels).
@@ -52,13 +60,15 @@ class pruned_tree {
     items_.reserve(store.bricks().size());
     for (std::uint32_t i = 0; i != store.bricks().size(); ++i) {
       const std::uint64_t name = store.bricks()[i].name;
-      items_.push_back({order_of(named_key(name)), brick_depth, i, brick_entry(store.bricks()[i])});
+      items_.push_back({morton_order(named_key(name)), brick_depth, i, brick_entry(store.bricks()[i])});
     }
     store.for_each_large([&](std::uint64_t name, T v) {
-      items_.push_back({order_of(named_key(name)), static_cast<int>(name >> 57U), 0, {node_kind::leaf, value_(v)}});
+      items_.push_back({morton_order(named_key(name)), static_cast<int>(name >> 57U), 0, {node_kind::leaf, value_(v)}});
     });
     std::sort(items_.begin(), items_.end(), [](const item& a, const item& b) { return a.order < b.order; });
     root_ = build(0, items_);
+    // The root is never pruned away: files have no way to write a root without children.
+    if (root_.value.kind == node_kind::leaf && items_.size() > 1) root_.value.kind = node_kind::inner;
   }
 
   /// Visits the nodes in preorder, children in the order of `child_key`:
@@ -80,13 +90,6 @@ class pruned_tree {
     entry value;
     std::uint32_t link = 0;  ///< the children's place in nodes_, or the brick's number
   };
-
-  [[nodiscard]] static std::uint64_t order_of(const voxel_key& k) noexcept {
-    std::uint64_t order = 0;
-    for (unsigned bit = 3; bit != static_cast<unsigned>(tree_depth); ++bit)
-      order |= std::uint64_t{(k.x >> bit & 1U) | (k.y >> bit & 1U) << 1U | (k.z >> bit & 1U) << 2U} << (3 * (bit - 3));
-    return order;
-  }
 
   [[nodiscard]] children voxel_entries(const block<T>& b, std::uint32_t group) const noexcept {
     children c;
