@@ -3,8 +3,8 @@
 /// Nearest neighbours by nanoflann's k-d tree, over any range of points, in place.
 ///
 /// Works with nanoflann 1.4 and later: results come through a sink of our own and the search
-/// parameters are written `{}`, so that neither the renaming of `SearchParams` in 1.5 nor the
-/// `sort()` that 1.6 asks of result sets is a difference.
+/// parameters are written `{}`, so that neither the renaming of `SearchParams` in 1.5 nor what 1.6
+/// asks of result sets is a difference.
 #pragma once
 
 #include <array>
@@ -120,6 +120,8 @@ class nanoflann_search {
   /// its own; the slack in the bound makes up for them, so that no neighbour is lost.
   template <class Sink>
   struct result_set {
+    using DistanceType = scalar;  // 1.6 and later ask for these names
+    using IndexType = std::uint32_t;
     [[nodiscard]] scalar worstDist() const {
       constexpr scalar slack = 64 * std::numeric_limits<scalar>::epsilon();
       return static_cast<scalar>(sink->bound_squared()) * (1 + slack) + std::numeric_limits<scalar>::min();
