@@ -5,6 +5,7 @@
 #include <stdexcept>
 #include <string>
 
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <orbis/core/file.hpp>
@@ -56,6 +57,7 @@ TEST_CASE("files that are not there or not readable are told apart") {
   const auto directory = read_file(folder.path);
   REQUIRE(!directory);
   CHECK(directory.error().code == errc::unreadable);
+  CHECK(read_file(std::string(5000, 'n')).error().code == errc::unreadable);  // longer than any name
   if (fs::exists("/proc/self/mem")) {  // opens, but its first page cannot be read
     const auto broken = read_file("/proc/self/mem");
     REQUIRE(!broken);
@@ -116,6 +118,17 @@ TEST_CASE("a full disk is an error whether it shows in writing or in closing") {
     CHECK(read_file(path).value() == "old");
     CHECK(folder.files() == 1);
   }
+}
+
+TEST_CASE("a device or a pipe is not replaced by a file") {
+  const scratch_folder folder;
+  const fs::path pipe = folder.path / "pipe";
+  REQUIRE(::mkfifo(pipe.c_str(), 0600) == 0);
+  const auto r = write_text(pipe, "text");
+  REQUIRE(!r);
+  CHECK(r.error().code == errc::write_failed);
+  CHECK(fs::is_fifo(pipe));
+  CHECK(folder.files() == 1);
 }
 
 TEST_CASE("a file that cannot be created says so and names the file") {

@@ -23,6 +23,8 @@ namespace orbis {
 [[nodiscard]] inline result<std::string> read_file(const std::filesystem::path& path) {
   std::error_code ec;
   const auto status = std::filesystem::status(path, ec);
+  if (status.type() == std::filesystem::file_type::none)  // no permission to look, or no name for a file
+    return fail(errc::unreadable, path.string(), "cannot be looked up: " + ec.message());
   if (!std::filesystem::exists(status)) return fail(errc::not_found, path.string(), "no such file");
   if (std::filesystem::is_directory(status)) return fail(errc::unreadable, path.string(), "is a directory");
   std::ifstream in{path, std::ios::binary};
@@ -38,7 +40,8 @@ namespace orbis {
 
 /// Calls `write(std::ostream&)` on a temporary file beside `path` and renames it to `path` when
 /// everything, the closing included, succeeded; otherwise (an exception from `write` included)
-/// removes it and leaves `path` as it was. `write` may return `void`, or `result<void>` to give up.
+/// removes it and leaves `path` as it was. What is there and no regular file (a device, a folder) is
+/// not replaced; a symbolic link is, not what it points to. `write` may return `void`, or `result<void>` to give up.
 /// Errors: write_failed, or `write`'s own.
 template <class Write>
 [[nodiscard]] result<void> write_file_atomically(const std::filesystem::path& path, Write&& write) {
@@ -53,6 +56,9 @@ template <class Write>
   };
   const auto reason = [] { return std::generic_category().message(errno != 0 ? errno : EIO); };
 
+  std::error_code ec;
+  if (const auto existing = fs::status(path, ec); fs::exists(existing) && !fs::is_regular_file(existing))
+    return fail(errc::write_failed, path.string(), "is not a regular file, and is not replaced by one");
   fs::path beside = path;
   beside += ".part";
   errno = 0;
@@ -66,7 +72,6 @@ template <class Write>
   }
   out.close();
   if (!out) return fail(errc::write_failed, path.string(), "cannot be written: " + reason());
-  std::error_code ec;
   fs::rename(temporary.path, path, ec);
   if (ec) return fail(errc::write_failed, path.string(), "cannot be put in place: " + ec.message());
   temporary.in_place = true;
