@@ -69,6 +69,8 @@ TEST_CASE("coordinates are read from structs and arrays and Eigen vectors and a 
 TEST_CASE("what has no three floating coordinates is not a point") {
   static_assert(point_like<xyz> && point_like<const geographic&>);
   static_assert(!point_like<flat> && !point_like<integers> && !point_like<hidden>);
+  static_assert(!point_like<Eigen::Vector2f> && !point_like<std::array<double, 2>> && !point_like<float[2]>);
+  static_assert(point_like<Eigen::VectorXf> && point_like<std::array<double, 3>> && point_like<float[3]>);
   static_assert(!point_like<int> && !point_like<std::string> && !point_like<std::vector<std::string>>);
 }
 

@@ -21,9 +21,29 @@
 #include <concepts>
 #include <cstddef>
 #include <ranges>
+#include <tuple>
 #include <type_traits>
+#include <utility>
 
 namespace orbis {
+
+namespace detail {
+
+/// Whether the type itself says that it holds fewer than three numbers.
+template <class P>
+[[nodiscard]] consteval bool is_shorter_than_three() {
+  if constexpr (std::is_bounded_array_v<P>) {
+    return std::extent_v<P> < 3;
+  } else if constexpr (requires { P::SizeAtCompileTime; }) {  // Eigen's; -1 where only the run will tell
+    return int{P::SizeAtCompileTime} >= 0 && int{P::SizeAtCompileTime} < 3;
+  } else if constexpr (requires { std::tuple_size<P>::value; }) {
+    return std::tuple_size<P>::value < 3;
+  } else {
+    return false;
+  }
+}
+
+}  // namespace detail
 
 /// The customisation point; the primary template is empty so that `point_like` fails softly.
 template <class P>
@@ -44,7 +64,7 @@ struct point_traits<P> {
 
 template <class P>
 requires(
-    !requires(const P& p) { p.x; } &&
+    !requires(const P& p) { p.x; } && !detail::is_shorter_than_three<P>() &&
     requires(const P& p) {
       { p[0] } -> std::convertible_to<double>;
       { p[2] } -> std::convertible_to<double>;
