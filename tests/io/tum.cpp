@@ -132,7 +132,8 @@ TEST_CASE("the folder's name tells the camera of the benchmark's sequences") {
   const temporary_folder folder;
   for (const auto& [name, fx] :
        {std::pair{"rgbd_dataset_freiburg1_desk", 517.3}, std::pair{"rgbd_dataset_freiburg2_xyz", 520.9},
-        std::pair{"rgbd_dataset_freiburg3_office", 535.4}}) {
+        std::pair{"rgbd_dataset_freiburg3_office", 535.4},
+        std::pair{"freiburg2 and freiburg3/rgbd_dataset_freiburg1_xyz", 517.3}}) {
     const std::filesystem::path sub = name;
     folder.write(sub / "rgb.txt", "1 a.png\n");
     folder.write(sub / "depth.txt", "1 b.png\n");

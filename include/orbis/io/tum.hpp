@@ -153,10 +153,14 @@ struct stamped_file {
     attach_ground_truth(index, max_time_difference);
   }
 
+  // Of several words in the path the last one tells: the sequence may lie in another one's folder.
   const std::string name = std::filesystem::absolute(folder).lexically_normal().string();
+  std::size_t last = 0;
   for (const auto& [word, preset] :
        {std::pair{"freiburg1", "tum_fr1"}, std::pair{"freiburg2", "tum_fr2"}, std::pair{"freiburg3", "tum_fr3"}}) {
-    if (name.find(word) == std::string::npos) continue;
+    const std::size_t at = name.rfind(word);
+    if (at == std::string::npos || at < last) continue;
+    last = at;
     if (auto camera = camera::preset(preset)) index.camera = *std::move(camera);
   }
   return index;
