@@ -51,6 +51,18 @@ TEST_CASE("an association list in the order of ICL-NUIM is understood") {
   CHECK(index.frames[2].depth.parent_path().filename() == "depth");
 }
 
+TEST_CASE("numbered images with an association list and the ground truth of TUM are a TUM recording") {
+  const temporary_folder folder;
+  write_images(folder, 0, 1);
+  folder.write("associations.txt", "0 rgb/0.png 0 depth/0.png\n0.1 rgb/1.png 0.1 depth/1.png\n");
+  CHECK(io::is_icl_nuim(folder.path()));
+  folder.write("groundtruth.txt", "0 0 1 0 0 0 0 1\n");
+  CHECK_FALSE(io::is_icl_nuim(folder.path()));
+  CHECK(io::is_tum(folder.path()));
+  folder.write("livingRoom0.gt.freiburg", "0 0 1 0 0 0 0 1\n");
+  CHECK(io::is_icl_nuim(folder.path()));
+}
+
 TEST_CASE("mirroring turns left-handed poses into the ones our points need") {
   // A point seen in the left-handed camera (y up), mapped to the left-handed world, then mirrored, is
   // the mirrored point mapped by the mirrored pose.

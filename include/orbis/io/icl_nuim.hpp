@@ -68,10 +68,13 @@ inline se3 mirrored_y(const se3& pose) {
 }  // namespace detail
 
 /// Whether `folder` looks like an ICL-NUIM recording: numbered images without a list of their times.
+/// With `associations.txt` and `groundtruth.txt`, which that data set does not have, it is a TUM one:
+/// neither its camera nor its mirrored world may be guessed.
 [[nodiscard]] inline bool is_icl_nuim(const std::filesystem::path& folder) {
   if (present(folder / "rgb.txt") || !present(folder / "rgb") || !present(folder / "depth")) return false;
-  return present(folder / "rgb" / "0.png") || present(folder / "rgb" / "1.png") ||
-         !detail::icl_ground_truth(folder).empty();
+  if (!detail::icl_ground_truth(folder).empty()) return true;
+  if (present(folder / "associations.txt") && present(folder / "groundtruth.txt")) return false;
+  return present(folder / "rgb" / "0.png") || present(folder / "rgb" / "1.png");
 }
 
 /// The index of an ICL-NUIM recording; the camera is the data set's own. Whole-numbered time stamps
