@@ -57,7 +57,7 @@ requires std::is_arithmetic_v<T>
     case scalar_type::uint32: return load<std::uint32_t>(from, order);
     case scalar_type::int64: return static_cast<double>(load<std::int64_t>(from, order));
     case scalar_type::uint64: return static_cast<double>(load<std::uint64_t>(from, order));
-    case scalar_type::float32: return load<float>(from, order);
+    case scalar_type::float32: return static_cast<double>(load<float>(from, order));
     case scalar_type::float64: return load<double>(from, order);
   }
   return 0.0;

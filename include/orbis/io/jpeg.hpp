@@ -30,9 +30,9 @@ class jpeg_decoder {
   explicit jpeg_decoder(std::string_view bytes) : size_{bytes.size()} {
     info_.err = jpeg_std_error(&trouble_.base);
     trouble_.base.error_exit = [](j_common_ptr info) {
-      auto* trouble = reinterpret_cast<struct trouble*>(info->err);
-      info->err->format_message(info, trouble->message);
-      std::longjmp(trouble->jump, 1);
+      auto* own = reinterpret_cast<struct trouble*>(info->err);
+      info->err->format_message(info, own->message);
+      std::longjmp(own->jump, 1);
     };
     // Warnings are counted by hand: a decoder that goes on after a bad code makes up pixels.
     trouble_.base.emit_message = [](j_common_ptr info, int level) {

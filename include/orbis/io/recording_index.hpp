@@ -40,7 +40,7 @@ inline void attach_ground_truth(recording_index& index, double max_distance) {
   std::size_t without = 0;
   for (recording_entry& frame : index.frames) {
     frame.T_world_camera = interpolate(index.ground_truth, frame.timestamp, 0.2, max_distance);
-    without += frame.T_world_camera ? 0 : 1;
+    without += frame.T_world_camera ? 0U : 1U;
   }
   if (!index.ground_truth.empty() && without != 0)
     index.notes.push_back(std::to_string(without) + " of " + std::to_string(index.frames.size()) +

@@ -145,7 +145,8 @@ class sensor {
  private:
   [[nodiscard]] bool is_grazed(float cosine, double chance) const noexcept {
     if (cosine >= safe_cosine_) return false;
-    return cosine <= lost_cosine_ || chance * (safe_cosine_ - lost_cosine_) > cosine - lost_cosine_;
+    return cosine <= lost_cosine_ ||
+           chance * static_cast<double>(safe_cosine_ - lost_cosine_) > static_cast<double>(cosine - lost_cosine_);
   }
 
   /// Pixels that the projector does not light: along the row, something to the right of them lies
