@@ -128,6 +128,16 @@ TEST_CASE("the ground truth is interpolated at the colour images") {
         (folder / "groundtruth.txt").string() + ":2: a pose with NaN or infinity");
 }
 
+TEST_CASE("a time stamp that an association list repeats gives one frame") {
+  const temporary_folder folder;
+  folder.write("associations.txt", "2 rgb/b.png 2 depth/b.png\n1 rgb/a.png 1 depth/a.png\n1 rgb/x.png 1 depth/x.png\n");
+  std::vector<std::string> notes;
+  const auto frames = io::read_associations(folder / "associations.txt", notes).value();
+  REQUIRE(frames.size() == 2);
+  CHECK(frames[0].color.filename() == "a.png");
+  CHECK(notes.back().find("1 lines with a repeated time stamp left out") != std::string::npos);
+}
+
 TEST_CASE("the folder's name tells the camera of the benchmark's sequences") {
   const temporary_folder folder;
   for (const auto& [name, fx] :

@@ -69,7 +69,7 @@ struct stamped_file {
 
 /// Reads `associations.txt`: four fields a line, a time stamp and a file for colour and for depth, in
 /// either order (the file whose path says "depth" is the depth image; colour first if neither or
-/// both do). Unreadable lines are left out and noted. Errors: as `read_image_list`.
+/// both do). Unreadable lines and repeated time stamps are left out and noted. Errors: as `read_image_list`.
 [[nodiscard]] inline result<std::vector<recording_entry>> read_associations(const std::filesystem::path& list,
                                                                             std::vector<std::string>& notes) {
   const auto text = read_file(list);
@@ -98,6 +98,14 @@ struct stamped_file {
   if (!std::is_sorted(frames.begin(), frames.end(), earlier)) {
     std::stable_sort(frames.begin(), frames.end(), earlier);
     notes.push_back(list.string() + ": not in the order of time, sorted");
+  }
+  const auto repeated =
+      std::unique(frames.begin(), frames.end(),
+                  [](const recording_entry& a, const recording_entry& b) { return a.timestamp == b.timestamp; });
+  if (repeated != frames.end()) {
+    notes.push_back(list.string() + ": " + std::to_string(frames.end() - repeated) +
+                    " lines with a repeated time stamp left out");
+    frames.erase(repeated, frames.end());
   }
   if (frames.empty()) return fail(errc::no_data, list.string(), "the list names no image");
   return frames;
