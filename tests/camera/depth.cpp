@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <cstdint>
 #include <limits>
+#include <type_traits>
 
 #include <orbis/camera/depth.hpp>
 #include <orbis/camera/rgbd_frame.hpp>
@@ -56,4 +57,14 @@ TEST_CASE("a frame shows its depth in metres") {
   frame.depth_scale = 5000.0;
   CHECK(frame.depth_metres()(1, 1) == 0.5F);
   CHECK(!frame.T_world_camera);
+}
+
+TEST_CASE("a depth view knows its number type from the image it is made of") {
+  using orbis::camera::depth_view;
+  const orbis::image<float> metres(2, 1, 1.5F);
+  orbis::image<std::uint16_t> millimetres(2, 1, 1500);
+  static_assert(std::is_same_v<decltype(depth_view{metres}), depth_view<float>>);
+  static_assert(std::is_same_v<decltype(depth_view{millimetres.view(), 1000.0}), depth_view<std::uint16_t>>);
+  CHECK(depth_view{metres}(1, 0) == 1.5F);
+  CHECK(depth_view{millimetres.view(), 1000.0}(1, 0) == 1.5F);
 }

@@ -8,6 +8,7 @@
 #include <concepts>
 #include <cstdint>
 #include <limits>
+#include <type_traits>
 
 #include <orbis/core/image.hpp>
 
@@ -61,5 +62,10 @@ class depth_view {
   float min_ = 0.0F;
   float max_ = std::numeric_limits<float>::max();
 };
+
+template <class T, class... Range>
+depth_view(image_view<T>, Range...) -> depth_view<std::remove_const_t<T>>;
+template <class T, class... Range>
+depth_view(const image<T>&, Range...) -> depth_view<T>;
 
 }  // namespace orbis::camera
