@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -114,5 +115,23 @@ TEST_CASE("automatic selection takes any cloud and never removes most of it") {
     CHECK(2 * result.inliers.size() >= finite);
     CHECK(std::is_sorted(result.inliers.begin(), result.inliers.end()));
     if (cloud.size() < 50) CHECK(result.choice.mode == filter_mode::none);
+  }
+}
+
+TEST_CASE("a range that is no number costs its point its judgement and nothing else") {
+  auto cloud = orbis::test::room_cloud(200, 150, 0.002, 5);
+  cloud.emplace_back(0.0F, 0.0F, 9.0F);  // far from everything
+  const auto lone = static_cast<std::uint32_t>(cloud.size() - 1);
+  std::vector<float> ranges;
+  for (const auto& p : cloud) ranges.push_back(p.norm());
+  const auto sane = filter_automatically(orbis::seq, cloud, {.ranges = ranges});
+  REQUIRE(sane.choice.evidence.range_scale.has_value());
+  CHECK_FALSE(std::binary_search(sane.inliers.begin(), sane.inliers.end(), lone));
+  for (const float bad : {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity()}) {
+    ranges.front() = ranges.back() = bad;
+    const auto result = filter_automatically(orbis::seq, cloud, {.ranges = ranges});
+    CHECK(result.choice.evidence.judged == sane.choice.evidence.judged - 2);
+    CHECK(result.choice.evidence.range_scale.has_value());
+    CHECK(std::binary_search(result.inliers.begin(), result.inliers.end(), lone));
   }
 }

@@ -16,6 +16,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstdio>
+#include <limits>
 #include <optional>
 #include <span>
 #include <string>
@@ -54,14 +55,16 @@ enum class filter_mode {
 struct select_options {
   std::size_t neighbors = 8;            ///< over which a point's spacing is averaged; > 0
   std::optional<vec3> sensor_origin{};  ///< where all points were seen from, metres
-  std::span<const float> ranges{};      ///< per point, metres from the sensor that saw it; wins over sensor_origin
+  /// Per point, metres from the sensor that saw it; wins over sensor_origin. A point whose range is not
+  /// finite stays.
+  std::span<const float> ranges{};
   cloud::non_finite non_finite = cloud::non_finite::drop;
 };
 
 /// The numbers behind a choice. Lengths in metres; "log" means natural logarithms.
 struct filter_evidence {
   std::size_t points = 0;             ///< all
-  std::size_t judged = 0;             ///< finite, and not identical to all their neighbours
+  std::size_t judged = 0;             ///< finite, as is their range, and not identical to all their neighbours
   double median_spacing = 0;          ///< median over the points of the mean neighbour distance
   double left_scale = 0;              ///< width of the bulk below its median, log
   double right_scale = 0;             ///< and above
@@ -121,6 +124,7 @@ template <point_range Points>
         const auto p = coordinates<double>(first[static_cast<std::ranges::range_difference_t<const Points>>(i)]);
         range = (vec3{p[0], p[1], p[2]} - *options.sensor_origin).norm();
       }
+      if (!std::isfinite(range)) continue;  // nothing to judge it by
       out.log_range.push_back(std::log(std::max(range, 1e-3)));
     }
     out.index.push_back(static_cast<std::uint32_t>(i));
