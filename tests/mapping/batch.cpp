@@ -92,6 +92,13 @@ TEST_CASE("bad keyframes are skipped or refused") {
         errc::invalid_argument);
   CHECK(build_map(orbis::seq, scene.keyframes(), scene.camera, {.dense = {.stride = 0}}).error().code ==
         errc::invalid_argument);
+  constexpr double inf = std::numeric_limits<double>::infinity();
+  for (const orbis::mapping::map_options& bad :
+       {orbis::mapping::map_options{.resolution = inf}, orbis::mapping::map_options{.integration = {.max_range = -1.0}},
+        orbis::mapping::map_options{.filter = {.statistical = {.neighbors = 0}}},
+        orbis::mapping::map_options{.filter = {.automatic = {.neighbors = 0}}},
+        orbis::mapping::map_options{.filter = {.radius = {.radius = -0.1}}}})
+    CHECK(build_map(orbis::seq, scene.keyframes(), scene.camera, bad).error().code == errc::invalid_argument);
   const orbis::camera::pinhole other{{.width = 32, .height = 24, .fx = 30, .fy = 30, .cx = 16, .cy = 12}};
   CHECK(build_map(orbis::seq, scene.keyframes(), other).error().code == errc::invalid_argument);
 
@@ -102,6 +109,24 @@ TEST_CASE("bad keyframes are skipped or refused") {
   REQUIRE(map.has_value());
   CHECK(map->skipped == 1);
   CHECK(map->cloud.points == one->cloud.points);
+}
+
+TEST_CASE("a keyframe's pose may be anything that converts to one") {
+  struct place {
+    orbis::se3 pose;
+    operator orbis::se3() const { return pose; }  // NOLINT(google-explicit-constructor)
+  };
+  struct placed {
+    orbis::camera::depth_view<std::uint16_t> depth;
+    orbis::image_view<const orbis::rgb8> color;
+    place T_world_camera;
+  };
+  const auto scene = orbis::test::wall_scene(1);
+  const auto plain = scene.keyframe(0);
+  const std::vector<placed> keyframes{{plain.depth, plain.color, {plain.T_world_camera}}};
+  const auto map = build_map(orbis::seq, keyframes, scene.camera);
+  REQUIRE(map.has_value());
+  CHECK(map->cloud.points == build_map(orbis::seq, scene.keyframes(), scene.camera)->cloud.points);
 }
 
 TEST_CASE("keyframes without any depth make an empty map") {

@@ -4,6 +4,8 @@
 #pragma once
 
 #include <chrono>
+#include <cmath>
+#include <concepts>
 #include <cstddef>
 #include <optional>
 #include <span>
@@ -33,6 +35,15 @@ struct map_options {
   bool unfiltered_octree = true;              ///< build the octree of the unfiltered points as well
 };
 
+/// A map that scans can be integrated into, made of its resolution in metres; what
+/// `octree::occupancy_octree` is.
+template <class M>
+concept scan_map = std::constructible_from<M, double> && std::movable<M> &&
+    requires(M& map, const std::vector<vec3f>& points_world, const vec3& origin,
+             const octree::integration_options& options) {
+  map.integrate(seq, points_world, origin, options);
+};
+
 /// The map, and how it came to be.
 template <class Octree>
 struct built_map {
@@ -53,15 +64,20 @@ struct built_map {
 /// Keyframes whose pose is not finite are skipped and counted. Errors: `no_data` if there is no
 /// keyframe; `invalid_argument` if an image's size is not the camera's, or an option is out of range;
 /// `cancelled`. The same result for every policy. `on_progress` counts the keyframes of all passes.
-template <class Octree = octree::occupancy_octree<>, execution_policy Policy, keyframe_range Keyframes,
+template <scan_map Octree = octree::occupancy_octree<>, execution_policy Policy, keyframe_range Keyframes,
           camera::camera_model Camera>
 [[nodiscard]] result<built_map<Octree>> build_map(const Policy& policy, const Keyframes& keyframes,
                                                   const Camera& camera, const map_options& options = {},
                                                   progress on_progress = {}) {
   if (std::ranges::size(keyframes) == 0) return fail(errc::no_data, "keyframes", "there are none");
-  if (!(options.resolution > 0)) return fail(errc::invalid_argument, "resolution", "must be positive");
+  if (!(options.resolution > 0) || !std::isfinite(options.resolution))
+    return fail(errc::invalid_argument, "resolution", "must be positive");
   if (options.dense.stride <= 0) return fail(errc::invalid_argument, "stride", "must be positive");
   if (!(options.dense.voxel_size >= 0)) return fail(errc::invalid_argument, "voxel_size", "must not be negative");
+  if (!(options.integration.max_range >= 0)) return fail(errc::invalid_argument, "max_range", "must not be negative");
+  if (options.filter.automatic.neighbors == 0 || options.filter.statistical.neighbors == 0)
+    return fail(errc::invalid_argument, "neighbors", "must be positive");
+  if (!(options.filter.radius.radius >= 0)) return fail(errc::invalid_argument, "radius", "must not be negative");
   const auto fits = [&](const auto& image) {
     return image.width() == camera.width() && image.height() == camera.height();
   };

@@ -49,7 +49,7 @@ class dense_cloud {
     const camera::unprojected_points seen = unproject(policy, k);
     first_of_frame_.push_back(ranges_.size());
     colored_ = colored_ && !color.empty();
-    const vec3f origin = k.T_world_camera.translation().template cast<float>();
+    const vec3f origin = se3(k.T_world_camera).translation().template cast<float>();
     for (std::size_t i = 0; i != seen.points.size(); ++i) {
       const auto pixel = static_cast<int>(seen.pixels[i]);
       const rgb8 c = color.empty() ? rgb8{} : color(pixel % rays_.width(), pixel / rays_.width());
