@@ -168,6 +168,17 @@ TEST_CASE("Images without anything to see never start the system and never harm 
   for (std::size_t i = 4; i < 8; ++i) CHECK(slam.track(recorded[i]).tracked());
 }
 
+TEST_CASE("A frame without any depth starts nothing whatever the options say") {
+  const auto& [camera, recorded] = small_room();
+  slam::options options;
+  options.min_start_points = 0;
+  slam::rgbd_system slam{camera, options};
+  auto no_depth = recorded[0];
+  no_depth.depth = image<std::uint16_t>(camera.width(), camera.height());
+  CHECK(slam.track(no_depth).state == slam::track_state::not_started);
+  CHECK(slam.track(recorded[1]).tracked());
+}
+
 TEST_CASE("A camera at rest makes no keyframes") {
   const auto& [camera, recorded] = small_room();
   slam::rgbd_system slam{camera};

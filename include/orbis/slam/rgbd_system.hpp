@@ -126,7 +126,7 @@ class rgbd_system {
   std::size_t start(frame& f) {
     std::size_t with_depth = 0;
     for (std::size_t i = 0; i < f.size(); ++i) with_depth += f.has_depth(i);
-    if (with_depth < options_.min_start_points) return 0;
+    if (with_depth == 0 || with_depth < options_.min_start_points) return 0;
     f.T_world_camera = options_.initial_pose.value_or(se3{});
     state_ = track_state::tracking;
     return with_depth;
