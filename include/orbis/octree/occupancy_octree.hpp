@@ -170,12 +170,12 @@ class occupancy_octree {
     });
   }
   /// Visits the nodes of the pruned octree in preorder, see pruned_tree::visit.
-  template <class Visitor>
+  template <tree_visitor<value_type> Visitor>
   void visit_tree(Visitor&& visitor) const {
     visit_tree([](value_type v) { return v; }, visitor);
   }
   /// The same, of the octree whose voxels hold `value(log-odds)`.
-  template <class Value, class Visitor>
+  template <std::regular_invocable<value_type> Value, tree_visitor<value_type> Visitor>
   void visit_tree(Value&& value, Visitor&& visitor) const {
     pruned_tree<value_type, std::remove_cvref_t<Value>>{store_, value}.visit(visitor);
   }

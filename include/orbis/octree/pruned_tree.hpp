@@ -24,6 +24,14 @@ struct node_entry {
   T value{};
 };
 
+/// What `pruned_tree::visit` reports to: `leaf(key, depth, value)` and `inner(key, depth, value, children)`.
+template <class V, class T>
+concept tree_visitor = requires(V& visitor, const voxel_key& key, int depth, T value,
+                                const std::array<node_entry<T>, 8>& children) {
+  visitor.leaf(key, depth, value);
+  visitor.inner(key, depth, value, children);
+};
+
 /// What eight children make of their parent.
 template <class T>
 [[nodiscard]] node_entry<T> parent_of(const std::array<node_entry<T>, 8>& children) noexcept {
@@ -73,7 +81,7 @@ class pruned_tree {
 
   /// Visits the nodes in preorder, children in the order of `child_key`:
   /// `visit.leaf(key, depth, value)`, `visit.inner(key, depth, value, children)`.
-  template <class Visitor>
+  template <tree_visitor<T> Visitor>
   void visit(Visitor&& visitor) const {
     if (root_.value.kind == node_kind::leaf) visitor.leaf(voxel_key{}, 0, root_.value.value);
     if (root_.value.kind == node_kind::inner) visit_upper(visitor, {}, 0, root_);
