@@ -83,6 +83,13 @@ concept match_source = requires {
   typename S::match_source_tag;
 };
 
+/// A source that can search such descriptors when it is told `where`: see the source for what it wants to know.
+template <class S, class Descriptor, class... Where>
+concept searches = match_source<S> &&
+    requires(const S& source, const feature_view<Descriptor>& view, search_needs needs, const Where&... where) {
+  { source.search(view, view, needs, where...) } -> std::same_as<std::vector<candidate>>;
+};
+
 /// A stage that judges each candidate on its own: any callable `bool(const candidate&)`.
 template <class S>
 concept match_predicate = std::predicate<const S&, const candidate&>;

@@ -36,7 +36,8 @@ class match_chain {
   /// wants to know in addition, e.g. the windows of `windowed`.
   /// @pre queries and trains come with keypoints if a stage needs them
   template <describable Queries, describable Trains, class... Where>
-  requires std::same_as<descriptor_of<Queries>, descriptor_of<Trains>>
+  requires std::same_as<descriptor_of<Queries>, descriptor_of<Trains>> &&
+      searches<Source, descriptor_of<Queries>, Where...>
   [[nodiscard]] std::vector<match> operator()(const Queries& queries, const Trains& trains,
                                               const Where&... where) const {
     const auto q = view_of(queries);
