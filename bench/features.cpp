@@ -92,6 +92,7 @@ void orb_opencv(benchmark::State& state) {
 }
 
 const bool registered = [] {
+  cv::setNumThreads(1);  // as ours have
   using features::brute_force, features::cross_check, features::hamming, features::ratio_test;
   for (const std::size_t count : {std::size_t{1000}, std::size_t{2000}}) {
     const std::string group = "matching/" + std::to_string(count) + "x" + std::to_string(count);
