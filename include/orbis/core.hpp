@@ -14,6 +14,7 @@
 #include <orbis/core/random.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/core/rotation.hpp>
+#include <orbis/core/rounded.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/core/sim3.hpp>
 #include <orbis/core/simd.hpp>

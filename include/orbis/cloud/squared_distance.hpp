@@ -6,25 +6,9 @@
 #include <array>
 #include <concepts>
 
-namespace orbis::cloud {
+#include <orbis/core/rounded.hpp>
 
-/// `a * b`, rounded: never the first half of a fused multiply-add, which `-march=native` and ARM
-/// compilers would otherwise make of a product that is summed.
-template <std::floating_point S>
-[[nodiscard]] inline S rounded_product(S a, S b) noexcept {
-#if defined(__clang__)
-#pragma clang fp contract(off)
-  return a * b;
-#elif defined(__has_builtin)
-#if __has_builtin(__builtin_assoc_barrier)
-  return __builtin_assoc_barrier(a * b);
-#else
-  return a * b;
-#endif
-#else
-  return a * b;
-#endif
-}
+namespace orbis::cloud {
 
 /// `(dx^2 + dy^2) + dz^2`, each operation rounded in `S`: the order in which the common k-d trees
 /// sum, so that thresholds on it select the same points.

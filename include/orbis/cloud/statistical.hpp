@@ -13,9 +13,9 @@
 #include <vector>
 
 #include <orbis/cloud/mean_knn_distance.hpp>
-#include <orbis/cloud/squared_distance.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/point.hpp>
+#include <orbis/core/rounded.hpp>
 
 namespace orbis::cloud {
 

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include <orbis/core/execution.hpp>
+#include <orbis/core/rounded.hpp>
 #include <orbis/octree/ray_grid.hpp>
 #include <orbis/octree/scan.hpp>
 
@@ -139,7 +140,7 @@ class scan_marker {
       const auto scale = static_cast<float>(distance);
       const auto range = static_cast<float>(from.max_range);
       float3 end;
-      for (std::size_t i = 0; i != 3; ++i) end[i] = from.origin[i] + ray[i] / scale * range;
+      for (std::size_t i = 0; i != 3; ++i) end[i] = from.origin[i] + rounded_product(ray[i] / scale, range);
       const auto key = from.grid.key(end);
       if (!key || !std::isfinite(scale)) {
         ++summary.rejected;

@@ -10,6 +10,7 @@
 #include <optional>
 
 #include <orbis/core/point.hpp>
+#include <orbis/core/rounded.hpp>
 #include <orbis/core/types.hpp>
 
 namespace orbis::octree {
@@ -66,14 +67,15 @@ class voxel_grid {
 
   /// The centre of voxel `k` along one axis, metres.
   [[nodiscard]] double center(std::uint32_t k) const noexcept {
-    return (static_cast<double>(static_cast<std::int32_t>(k) - static_cast<std::int32_t>(half)) + 0.5) * resolution_;
+    const auto cells = static_cast<double>(static_cast<std::int32_t>(k) - static_cast<std::int32_t>(half));
+    return rounded_product(cells + 0.5, resolution_);
   }
   [[nodiscard]] vec3 center(const voxel_key& k) const noexcept { return {center(k.x), center(k.y), center(k.z)}; }
   /// The centre of the node at `depth` whose lowest voxel is `k`, metres.
   [[nodiscard]] vec3 center(const voxel_key& k, int depth) const noexcept {
     const double cells = node_cells(depth);
     const auto along = [&](std::uint32_t c) {
-      return ((static_cast<double>(c) - half) / cells + 0.5) * (resolution_ * cells);
+      return rounded_product((static_cast<double>(c) - half) / cells + 0.5, resolution_ * cells);
     };
     return depth == 0 ? vec3(vec3::Zero()) : vec3{along(k.x), along(k.y), along(k.z)};
   }

@@ -26,7 +26,7 @@ using float3 = std::array<float, 3>;
 }
 /// The length of `v`: the sum of squares in float, its root in double.
 [[nodiscard]] inline double length(const float3& v) noexcept {
-  const float squares = v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
+  const float squares = rounded_product(v[0], v[0]) + rounded_product(v[1], v[1]) + rounded_product(v[2], v[2]);
   return std::sqrt(static_cast<double>(squares));
 }
 
