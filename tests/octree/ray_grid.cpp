@@ -61,10 +61,10 @@ TEST_CASE("Every instruction set marks the same cells") {
   const voxel_grid grid{0.05};
   for (int run = 0; run != 300; ++run) {
     constexpr std::int64_t n = 128, start = (n * n + n + 1) * (n / 2);
-    detail::ray_lanes lanes{};
+    octree::detail::ray_lanes lanes{};
     const float3 origin{0.01F, 0.02F, 0.03F};
     const voxel_key from = *grid.key(origin);
-    for (std::size_t i = 0; i != detail::ray_lanes::width; ++i) {
+    for (std::size_t i = 0; i != octree::detail::ray_lanes::width; ++i) {
       vec3f end = test::random_points(random, 1, 2.5)[0];
       if (run % 3 == 0) end[static_cast<int>(i % 3)] = origin[i % 3];
       const auto to = *grid.key(end);
@@ -86,10 +86,10 @@ TEST_CASE("Every instruction set marks the same cells") {
       mark(cells.data(), start, lanes);
       return cells;
     };
-    const auto expected = marks(detail::mark_lanes_portable);
+    const auto expected = marks(octree::detail::mark_lanes_portable);
 #if ORBIS_X86
-    if (simd::detected() >= simd::level::avx2) REQUIRE(marks(detail::mark_lanes_avx2) == expected);
-    if (simd::detected() >= simd::level::avx512) REQUIRE(marks(detail::mark_lanes_avx512) == expected);
+    if (simd::detected() >= simd::level::avx2) REQUIRE(marks(octree::detail::mark_lanes_avx2) == expected);
+    if (simd::detected() >= simd::level::avx512) REQUIRE(marks(octree::detail::mark_lanes_avx512) == expected);
 #endif
     REQUIRE(expected[start] == 1);
   }
