@@ -72,9 +72,22 @@ function(orbis_close_components out)
   set(${out} ${ordered} PARENT_SCOPE)
 endfunction()
 
-# One INTERFACE target for each of the wanted components, and orbis::orbis for all of them.
+# One INTERFACE target for each of the wanted components, and orbis::orbis for all of them. With "all",
+# the conversions to other libraries are provided where those libraries are.
 macro(orbis_add_components)
   orbis_close_components(ORBIS_PROVIDED_COMPONENTS ${ARGN})
+  if("all" IN_LIST ORBIS_COMPONENTS)
+    foreach(_orbis_component IN LISTS ORBIS_PROVIDED_COMPONENTS)
+      if(_orbis_component MATCHES "^interop_")
+        foreach(_orbis_package IN LISTS ORBIS_${_orbis_component}_PACKAGES)
+          find_package(${_orbis_package} ${ORBIS_${_orbis_package}_FIND_ARGUMENTS} QUIET)
+          if(NOT ${_orbis_package}_FOUND)
+            list(REMOVE_ITEM ORBIS_PROVIDED_COMPONENTS ${_orbis_component})
+          endif()
+        endforeach()
+      endif()
+    endforeach()
+  endif()
   set(THREADS_PREFER_PTHREAD_FLAG ON)
   foreach(_orbis_component IN LISTS ORBIS_PROVIDED_COMPONENTS)
     foreach(_orbis_package IN LISTS ORBIS_${_orbis_component}_PACKAGES)

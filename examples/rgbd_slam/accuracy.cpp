@@ -22,9 +22,10 @@ orbis::result<accuracy> compare(const orbis::trajectory& estimate, const orbis::
     a.rpe_trans_rmse_m = rpe->translation.rmse;
     a.rpe_rot_rmse_deg = rpe->rotation.rmse;
   }
+  const auto pairs = orbis::eval::pair_poses(estimate, truth, orbis::eval::alignment_options{}.max_time_difference);
+  if (const auto by_pose = orbis::eval::align_poses(pairs)) a.T_truth_map = by_pose->T_reference_estimate;
   const orbis::se3 T_estimate_truth = a.T_truth_estimate.inverse();
-  for (const auto& pair :
-       orbis::eval::pair_poses(estimate, truth, orbis::eval::alignment_options{}.max_time_difference)) {
+  for (const auto& pair : pairs) {
     const orbis::vec3 p = pair.estimate.translation();
     const orbis::vec3 q = T_estimate_truth * pair.reference.translation();
     a.poses.push_back({pair.timestamp, p, q, (p - q).norm()});
@@ -33,11 +34,11 @@ orbis::result<accuracy> compare(const orbis::trajectory& estimate, const orbis::
 }
 
 orbis::result<double> map_error(const orbis::point_cloud& cloud, const std::vector<std::uint32_t>& kept,
-                                const orbis::se3& T_truth_estimate,
+                                const orbis::se3& T_truth_map,
                                 const std::function<double(const orbis::vec3&)>& surface_distance) {
   std::vector<orbis::vec3> points;
   points.reserve(kept.size());
-  for (const std::uint32_t i : kept) points.push_back(T_truth_estimate * cloud.points[i].cast<double>());
+  for (const std::uint32_t i : kept) points.push_back(T_truth_map * cloud.points[i].cast<double>());
   const auto error = orbis::eval::cloud_to_surface(orbis::par, points, surface_distance);
   if (!error) return orbis::fail(error.error());
   return error->distance.rmse;
@@ -58,9 +59,9 @@ void compare_with_truth(results& r, const frame_source& source, console& say) {
   }
   r.truth_note = "Compared with ground truth after aligning the trajectories by a rigid motion.";
   if (source.surface_distance && r.map) {
-    const auto error = map_error(r.map->cloud, r.map->kept, compared->T_truth_estimate, source.surface_distance);
+    const auto error = map_error(r.map->cloud, r.map->kept, compared->T_truth_map, source.surface_distance);
     if (error) r.map->error_m = *error;
-    r.truth_note += " The map's error is that of its filtered cloud, brought to the true room by the same motion.";
+    r.truth_note += " The map's error is that of its filtered cloud, brought to the true room by aligning the poses.";
   }
   r.against_truth = *std::move(compared);
   say.finish("ATE and RPE" + std::string{r.map && r.map->error_m ? ", map error" : ""});

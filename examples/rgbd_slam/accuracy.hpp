@@ -19,7 +19,7 @@ namespace app {
 /// RMS distance of a cloud to the true surface, in metres; the cloud is brought into the truth's
 /// world by the alignment of the trajectories.
 [[nodiscard]] orbis::result<double> map_error(const orbis::point_cloud& cloud, const std::vector<std::uint32_t>& kept,
-                                              const orbis::se3& T_truth_estimate,
+                                              const orbis::se3& T_truth_map,
                                               const std::function<double(const orbis::vec3&)>& surface_distance);
 
 /// Fills in what the source's ground truth tells about `r`; says so where it tells nothing.

@@ -46,7 +46,10 @@ CLI::Option* count(CLI::App& cmd, const std::string& name, std::size_t& value, c
 }
 
 void add_map_options(CLI::App& cmd, settings& s) {
-  cmd.add_option("--out", s.out, "where the files go; made if it is not there")->required()->type_name("DIR");
+  cmd.add_option("--out", s.out, "where the files go; made if it is not there")
+      ->required()
+      ->check([](const std::string& path) { return path.empty() ? std::string{"must not be empty"} : std::string{}; })
+      ->type_name("DIR");
   cmd.add_option("--resolution", s.resolution, "edge of the octree's smallest voxels, metres")
       ->check(within(0.001, 10.0, " m"))
       ->capture_default_str()
@@ -149,7 +152,9 @@ std::variant<settings, exit_code> read_command_line(int argc, char** argv) {
   add_frame_options(*demo, s);
   count(*demo, "--width", s.width, "width of the images, pixels; the height is 3/4 of it", 160, 1920)
       ->capture_default_str();
-  demo->add_option("--seed", s.seed, "of the room, the camera's path and the sensor's noise")->capture_default_str();
+  demo->add_option("--seed", s.seed, "of the room, the camera's path and the sensor's noise")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
   add_map_options(*demo, s);
   demo->add_flag("--deterministic", s.deterministic, "the same bytes on every run (so far always the case)");
 
@@ -175,6 +180,9 @@ std::variant<settings, exit_code> read_command_line(int argc, char** argv) {
     cmd->add_option("--config", config, "options from a TOML file: resolution = 0.02")->type_name("FILE");
   for (CLI::App* cmd : {run, demo, eval, map}) cmd->get_formatter()->column_width(28);
 
+  const auto is_asked_for = [&](const CLI::App* command) { return command->get_name() == argv[1]; };
+  if (argc > 1 && argv[1][0] != '-' && cli.get_subcommands(is_asked_for).empty())
+    return complain("there is no command \"" + std::string{argv[1]} + "\", but run, demo, eval and map", bad_usage);
   try {
     cli.parse(argc, argv);
   } catch (const CLI::CallForHelp&) {

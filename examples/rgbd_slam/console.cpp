@@ -85,12 +85,9 @@ void console::error(const orbis::error& e) {
   log_->error("rgbd_slam: {}", one_line(e.to_string()));
 }
 
-void console::print(const std::string& line) {
+bool console::print(const std::string& line) {
   clear_bar();
-  if (!quiet_) {
-    std::fputs((line + "\n").c_str(), stdout);
-    std::fflush(stdout);
-  }
+  return quiet_ || (std::fputs((line + "\n").c_str(), stdout) >= 0 && std::fflush(stdout) == 0);
 }
 
 void console::clear_bar() {
@@ -101,7 +98,11 @@ void console::clear_bar() {
 }
 
 bool console::interrupted() { return interrupt_seen != 0; }
-void console::catch_interrupts() { std::signal(SIGINT, on_interrupt); }
-void console::release_interrupts() { std::signal(SIGINT, SIG_DFL); }
+void console::catch_interrupts() {
+  for (const int s : {SIGINT, SIGTERM}) std::signal(s, on_interrupt);
+}
+void console::release_interrupts() {
+  for (const int s : {SIGINT, SIGTERM}) std::signal(s, SIG_DFL);
+}
 
 }  // namespace app

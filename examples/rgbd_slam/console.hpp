@@ -47,7 +47,8 @@ class console {
   /// "rgbd_slam: where: message", in one line.
   void error(const orbis::error& e);
   /// A line of the results, to stdout.
-  void print(const std::string& line);
+  /// On standard output, unless quiet; false if it could not be written.
+  bool print(const std::string& line);
   [[nodiscard]] bool quiet() const { return quiet_; }
 
   /// From now on Ctrl-C does not end the program, but sets `interrupted`. A second one does end it.

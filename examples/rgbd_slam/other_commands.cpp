@@ -85,7 +85,7 @@ exit_code evaluate(const settings& s, console& say) {
   if (!compared) return give_up({compared.error().code, s.input.string(), compared.error().message});
   std::string text = s.json ? accuracy_json(*compared) : accuracy_lines(*compared) + "\n";
   text.pop_back();
-  say.print(text);
+  if (!say.print(text)) return give_up({orbis::errc::write_failed, "standard output", "cannot be written"});
   return done;
 }
 

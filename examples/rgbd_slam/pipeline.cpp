@@ -11,11 +11,11 @@ namespace app {
 
 exit_code run_slam(const settings& s, console& say) {
   const auto give_up = [&](const orbis::error& e) { return say.error(e), bad_input; };
-  if (auto ready = prepare_output(s.out); !ready) return give_up(ready.error());
 
   // Read.
   const auto source = open_source(s, say);
   if (!source) return give_up(source.error());
+  if (auto ready = prepare_output(s.out); !ready) return give_up(ready.error());
   results r = begin_results(s, source->title, &*source);
 
   // Track; some frames become keyframes.

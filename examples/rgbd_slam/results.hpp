@@ -58,7 +58,8 @@ struct accuracy {
   double ate_rmse_m, ate_mean_m, ate_median_m, ate_max_m;
   std::optional<double> rpe_trans_rmse_m, rpe_rot_rmse_deg;
   std::vector<compared_pose> poses;
-  orbis::se3 T_truth_estimate;  ///< aligns the estimate's world with the truth's
+  orbis::se3 T_truth_estimate;  ///< aligns the estimate's world with the truth's, by the positions (ATE)
+  orbis::se3 T_truth_map;       ///< the same by the poses: well determined on the shortest path
 };
 
 struct slam_results {

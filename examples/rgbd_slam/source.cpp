@@ -37,7 +37,11 @@ result<frame_source> open_recording(const settings& s) {
     options.camera = *std::move(camera);
   }
   auto opened = orbis::io::open_recording(s.input, options);
-  if (!opened) return fail(opened.error());
+  if (!opened) {
+    orbis::error e = opened.error();
+    if (e.code == orbis::errc::invalid_argument && s.camera.empty()) e.message += " with --camera";
+    return fail(std::move(e));
+  }
 
   const auto recording = std::make_shared<const orbis::io::recording>(*std::move(opened));
   frame_source source;

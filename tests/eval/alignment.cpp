@@ -109,3 +109,30 @@ TEST_CASE("geometry that does not determine the alignment is refused") {
   CHECK(eval::align(point, point).error().code == orbis::errc::degenerate);
   CHECK(eval::align(broken, curve(10)).error().code == orbis::errc::degenerate);
 }
+
+TEST_CASE("poses are aligned even where their positions say nothing about the rotation") {
+  const se3 motion(so3::exp(vec3(0.4, -2.0, 1.0)), vec3(10, -20, 3));
+  for (const int n : {1, 2, 60}) {
+    auto reference = curve(n);
+    const auto estimate = moved(reference, 1.0, motion);
+    const auto found = eval::align_poses(eval::pair_poses(estimate, reference, 0.02)).value();
+    CHECK((found.T_reference_estimate * motion).log().norm() < 1e-9);
+    CHECK(found.pairs == static_cast<std::size_t>(n));
+  }
+  // A millimetre of noise on positions a millimetre apart: the rotation stays.
+  auto still = curve(10);
+  for (auto& p : still) p.T_world_camera = se3(p.T_world_camera.rotation(), vec3(0, 0, 0));
+  auto noisy = still;
+  for (std::size_t i = 0; i != noisy.size(); ++i)
+    noisy[i].T_world_camera = se3(still[i].T_world_camera.rotation(),
+                                  vec3(0.001 * static_cast<double>(i % 2), 0.001 * static_cast<double>(i % 3), 0));
+  const auto found = eval::align_poses(eval::pair_poses(noisy, still, 0.02)).value();
+  CHECK(found.T_reference_estimate.rotation().angle() < 1e-9);
+}
+
+TEST_CASE("poses without an alignment say why") {
+  CHECK(eval::align_poses({}).error().code == orbis::errc::no_data);
+  auto bad = eval::pair_poses(curve(3), curve(3), 0.02);
+  bad[1].estimate = se3(so3{}, vec3(std::numeric_limits<double>::quiet_NaN(), 0, 0));
+  CHECK(eval::align_poses(bad).error().code == orbis::errc::degenerate);
+}

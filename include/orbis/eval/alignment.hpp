@@ -18,6 +18,7 @@
 
 #include <orbis/core/associate.hpp>
 #include <orbis/core/result.hpp>
+#include <orbis/core/rotation.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/core/trajectory.hpp>
 
@@ -102,6 +103,29 @@ struct alignment {
   const so3 rotation(mat3(svd.matrixU() * sign.asDiagonal() * svd.matrixV().transpose()));
   const double scale = with_scale ? s.dot(sign) / variance_e : 1.0;
   return alignment{scale, se3(rotation, mean_r - rotation * vec3(scale * mean_e)), pairs.size()};
+}
+
+/// The rigid alignment that is best for the orientations (chordal mean) and, given that, for the
+/// positions. Determined by a single pair, and well determined where the positions hardly differ or
+/// lie on a line: the way to bring a map into the reference's world. `align` is the one for ATE.
+/// Errors: no_data (no pairs), degenerate (orientations all over the sphere; not finite). O(n).
+///
+/// Source: R. Hartley, J. Trumpf, Y. Dai, H. Li, "Rotation averaging", IJCV 103, 2013, section 5.2.
+[[nodiscard]] inline result<alignment> align_poses(const std::vector<pose_pair>& pairs) {
+  if (pairs.empty()) return fail(errc::no_data, "pose alignment", "no pose has a reference pose");
+  const auto n = static_cast<double>(pairs.size());
+  vec3 mean_e = vec3::Zero(), mean_r = vec3::Zero();
+  mat3 mean_rotation = mat3::Zero();
+  for (const pose_pair& p : pairs) {
+    mean_e += p.estimate.translation() / n;
+    mean_r += p.reference.translation() / n;
+    mean_rotation += (p.reference.rotation() * p.estimate.rotation().inverse()).rotation_matrix() / n;
+  }
+  const auto rotation = nearest_rotation(mean_rotation);
+  if (!rotation) return fail(rotation.error());
+  const vec3 translation = mean_r - *rotation * mean_e;
+  if (!translation.allFinite()) return fail(errc::degenerate, "pose alignment", "a position is not finite");
+  return alignment{1.0, se3(*rotation, translation), pairs.size()};
 }
 
 /// The alignment of two trajectories: poses are paired by time, then aligned. Errors: as above.
