@@ -9,6 +9,7 @@
 #include <iostream>
 #include <string>
 #include <string_view>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -59,6 +60,10 @@ class ratio_table final : public benchmark::BenchmarkReporter {
 
   void Finalize() override {
     std::printf("\n%-64s %12s %10s\n", "median of the repetitions", "ms", "peer/orbis");
+    // Interleaving hands the rows out in any order.
+    std::stable_sort(rows_.begin(), rows_.end(), [](const row& a, const row& b) {
+      return std::tuple(a.group, !a.is_orbis(), a.who) < std::tuple(b.group, !b.is_orbis(), b.who);
+    });
     std::string previous_group;
     for (const row& r : rows_) {
       if (r.group != previous_group) std::printf("%s\n", r.group.c_str());
@@ -91,10 +96,7 @@ class ratio_table final : public benchmark::BenchmarkReporter {
     for (row& r : rows_) {
       if (r.group == group && r.who == who) return r;
     }
-    // Keep the rows of a group together, in the order in which they came.
-    const auto last = std::find_if(rows_.rbegin(), rows_.rend(), [&](const row& r) { return r.group == group; });
-    return *rows_.insert(last.base() == rows_.begin() ? rows_.end() : last.base(),
-                         row{std::move(group), std::move(who), {}});
+    return rows_.emplace_back(row{std::move(group), std::move(who), {}});
   }
 
   [[nodiscard]] const row* our_row(const std::string& group) const {

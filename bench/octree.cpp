@@ -4,14 +4,16 @@
 // The frames come from a synthetic recording at 30 Hz; every row inserts the same ones, in turn, into
 // a map that has seen them, as a camera that moves slowly would.
 #include <cstddef>
-#include <iostream>
+#include <iosfwd>
 #include <memory>
 #include <sstream>
 #include <string>
 #include <vector>
 
 #include <benchmark/benchmark.h>
+#include <fcntl.h>
 #include <octomap/octomap.h>
+#include <unistd.h>
 
 #include <orbis/core/random.hpp>
 #include <orbis/io/synthetic.hpp>
@@ -146,10 +148,30 @@ void bench_leaves(benchmark::State& state, double resolution) {
   }
 }
 
+/// Nothing on standard error while this lives.
+class silence {
+ public:
+  silence() : kept_{dup(STDERR_FILENO)} {
+    if (const int nowhere = open("/dev/null", O_WRONLY); nowhere >= 0) {
+      dup2(nowhere, STDERR_FILENO);
+      close(nowhere);
+    }
+  }
+  silence(const silence&) = delete;
+  silence& operator=(const silence&) = delete;
+  ~silence() {
+    dup2(kept_, STDERR_FILENO);
+    close(kept_);
+  }
+
+ private:
+  int kept_;
+};
+
 template <class Map>
 void bench_write_bt(benchmark::State& state, double resolution) {
   Map map{built_map<Map>(resolution)};
-  std::streambuf* const err = std::cerr.rdbuf(nullptr);  // OctoMap reports there
+  const silence octomap_reports_each_file;
   for (auto _ : state) {
     std::ostringstream out;
     if constexpr (std::is_same_v<Map, octomap::OcTree>) {
@@ -162,7 +184,6 @@ void bench_write_bt(benchmark::State& state, double resolution) {
     }
     benchmark::DoNotOptimize(out);
   }
-  std::cerr.rdbuf(err);
 }
 
 template <class Map>
