@@ -13,11 +13,13 @@
 /// map's landmarks, refine the pose, and make a keyframe where the view has changed.
 #pragma once
 
-#include <chrono>
-#include <cmath>
+#include <algorithm>
+#include <concepts>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <optional>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -261,9 +263,12 @@ class rgbd_system {
     return reference_;
   }
 
+  /// Where the last tracked frame is, now that its keyframe may have moved.
+  [[nodiscard]] se3 last_pose() const { return map_.at(last_reference_).T_world_camera * T_reference_last_; }
+
   /// Where constant motion takes the camera.
   [[nodiscard]] se3 predict(double timestamp) const {
-    const se3 last = map_.at(last_reference_).T_world_camera * T_reference_last_;
+    const se3 last = last_pose();
     if (!velocity_) return last;
     const double ratio = last_interval_ > 0.0 ? (timestamp - last_.timestamp) / last_interval_ : 1.0;
     return last * se3::exp(std::clamp(ratio, 0.0, 3.0) * *velocity_);
@@ -271,14 +276,10 @@ class rgbd_system {
 
   /// Keeps the frame for the next prediction, and its place in the trajectory.
   void remember(frame f) {
-    if (!is_tracking()) {
-      velocity_.reset();
-      return;
-    }
     velocity_.reset();
+    if (!is_tracking()) return;
     if (!tracked_.empty() && last_.index + 1 == f.index) {
-      const se3 last = map_.at(last_reference_).T_world_camera * T_reference_last_;
-      velocity_ = (last.inverse() * f.T_world_camera).log();
+      velocity_ = (last_pose().inverse() * f.T_world_camera).log();
       last_interval_ = f.timestamp - last_.timestamp;
     }
     last_reference_ = reference_;
