@@ -94,15 +94,6 @@ std::vector<voxel> occupied_voxels(const tree& map, const orbis::point_cloud& cl
   return out;
 }
 
-/// Which points of `cloud` are in `filtered`, a subsequence of it.
-std::vector<std::uint32_t> kept_points(const orbis::point_cloud& cloud, const orbis::point_cloud& filtered) {
-  std::vector<std::uint32_t> kept;
-  kept.reserve(filtered.size());
-  for (std::size_t i = 0; i != cloud.size() && kept.size() != filtered.size(); ++i)
-    if (cloud.points[i] == filtered.points[kept.size()]) kept.push_back(static_cast<std::uint32_t>(i));
-  return kept;
-}
-
 }  // namespace
 
 result<built_map> map_frames(const posed_frames& frames, const frame_source& source, const settings& s, console& say) {
@@ -133,7 +124,8 @@ built_map map_cloud(orbis::point_cloud cloud, const settings& s, console& say) {
   orbis::mapping::filtered_indices filtered =
       orbis::mapping::filter_points(orbis::par.with(s.threads), map.cloud.points, {}, options);
   map.filter = std::move(filtered.report);
-  map.filtered_cloud = orbis::cloud::extract(map.cloud, filtered.inliers);
+  map.inliers = std::move(filtered.inliers);
+  map.filtered_cloud = orbis::cloud::extract(map.cloud, map.inliers);
 
   const auto build = [&](const std::vector<vec3f>& points, std::vector<double>& milliseconds) {
     if (!s.origin) return occupied_only(points, s.resolution);
@@ -181,7 +173,7 @@ result<map_results> write_map(built_map map, const settings& s, console& say) {
   m.insert_ms = std::move(map.insert_ms);
   m.voxels_unfiltered = occupied_voxels(*map.unfiltered_octree, map.cloud);
   m.voxels = occupied_voxels(map.octree, map.filtered_cloud);
-  m.kept = kept_points(map.cloud, map.filtered_cloud);
+  m.kept = std::move(map.inliers);
   m.cloud = std::move(map.cloud);
   say.finish("cloud.ply, cloud_filtered.ply, map_unfiltered.bt, map.bt, map.ot");
   return m;

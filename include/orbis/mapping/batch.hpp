@@ -7,6 +7,7 @@
 #include <cmath>
 #include <concepts>
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <span>
 #include <string>
@@ -47,8 +48,9 @@ concept scan_map = std::constructible_from<M, double> && std::movable<M> &&
 /// The map, and how it came to be.
 template <class Octree>
 struct built_map {
-  point_cloud cloud{};           ///< all keyframes' points, in the world
-  point_cloud filtered_cloud{};  ///< those that the filter kept
+  point_cloud cloud{};                   ///< all keyframes' points, in the world
+  std::vector<std::uint32_t> inliers{};  ///< indices into `cloud` of the points that the filter kept, ascending
+  point_cloud filtered_cloud{};          ///< those points
   filter_report filter{};
   std::optional<Octree> unfiltered_octree{};
   Octree octree;                               ///< of the points that the filter kept, each seen from its own keyframe
@@ -104,9 +106,10 @@ template <scan_map Octree = octree::occupancy_octree<>, execution_policy Policy,
   map.cloud = dense.cloud();
   filtered_indices filtered = filter_points(policy, map.cloud.points, dense.ranges(), options.filter);
   map.filter = std::move(filtered.report);
-  map.filtered_cloud = cloud::extract(map.cloud, filtered.inliers);
+  map.inliers = std::move(filtered.inliers);
+  map.filtered_cloud = cloud::extract(map.cloud, map.inliers);
   std::vector<char> kept(map.cloud.size(), 0);
-  for (const std::uint32_t i : filtered.inliers) kept[i] = 1;
+  for (const std::uint32_t i : map.inliers) kept[i] = 1;
 
   const auto integrate_all = [&](Octree& octree, std::span<const char> mask, std::vector<double>& milliseconds) {
     std::size_t number = 0;
