@@ -1,4 +1,4 @@
-// error: sensor_model
+// error: has_constants_of_its_value_type
 #include <orbis/octree.hpp>
 
 struct no_miss {
