@@ -41,7 +41,7 @@ tree occupied_only(const std::vector<vec3f>& points, double resolution) {
   tree map{resolution};
   for (const vec3f& p : points)
     if (const auto key = map.grid().key(p); key && !map.log_odds(*key))
-      map.set_unknown_node(*key, orbis::octree::tree_depth, orbis::octree::after_hit<tree::model>(0.0F));
+      map.set_unknown_node(*key, map.tree_depth(), orbis::octree::after_hit<tree::model>(0.0F));
   return map;
 }
 

@@ -83,7 +83,7 @@ TEST_CASE("An OctoMap tree becomes the same map and comes back as it was") {
 
 TEST_CASE("Leaves of every size survive the conversion") {
   // A pruned leaf at each depth, made by a file, since no scan fills an eighth of the world.
-  for (int depth = 1; depth <= octree::tree_depth; ++depth) {
+  for (int depth = 1; depth <= octree::default_tree_depth; ++depth) {
     std::string file =
         "# Octomap OcTree binary file\nid OcTree\nsize " + std::to_string(depth + 2) + "\nres 0.1\ndata\n";
     for (int d = 1; d != depth; ++d) file += std::string{"\x03\x00", 2};

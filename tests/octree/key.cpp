@@ -56,12 +56,26 @@ TEST_CASE("A node's centre and size at every depth are OctoMap's") {
     const octomap::OcTreeKey k{static_cast<octomap::key_type>(random.below(65536)),
                                static_cast<octomap::key_type>(random.below(65536)),
                                static_cast<octomap::key_type>(random.below(65536))};
-    for (int depth = 0; depth <= tree_depth; ++depth) {
-      const std::uint32_t inside = node_cells(depth) - 1;
-      const vec3 center = grid.center(voxel_key{k[0] & ~inside, k[1] & ~inside, k[2] & ~inside}, depth);
+    for (int depth = 0; depth <= default_tree_depth; ++depth) {
+      const int level = default_tree_depth - depth;
+      const vec3 center = grid.center(node_key({k[0], k[1], k[2]}, level), level);
       for (unsigned axis = 0; axis != 3; ++axis)
         REQUIRE(center[axis] == Approx(tree.keyToCoord(k[axis], static_cast<unsigned>(depth))).margin(1e-9));
-      REQUIRE(grid.node_size(depth) == tree.getNodeSize(static_cast<unsigned>(depth)));
+      REQUIRE(grid.node_size(level) == tree.getNodeSize(static_cast<unsigned>(depth)));
     }
+  }
+}
+
+TEST_CASE("A deeper grid reaches further and has the same voxels") {
+  const voxel_grid usual{0.05}, deep{0.05, 21};
+  CHECK(deep.cells() == 1U << 21U);
+  CHECK_FALSE(usual.key(50000.0));
+  CHECK(deep.key(50000.0));
+  random_bits random{4};
+  for (int i = 0; i != 2000; ++i) {
+    const double c = random.uniform(-1600.0, 1600.0);
+    const std::uint32_t k = *usual.key(c);
+    REQUIRE(*deep.key(c) - deep.cells() / 2 == k - usual.cells() / 2);
+    REQUIRE(deep.center(*deep.key(c)) == usual.center(k));
   }
 }

@@ -21,7 +21,7 @@ using found_leaf = std::tuple<std::uint32_t, std::uint32_t, std::uint32_t, int, 
 struct tree_visitor {
   std::vector<found_leaf>& leaves;
   std::size_t& inner_nodes;
-  void leaf(const voxel_key& k, int depth, float v) { leaves.emplace_back(k.x, k.y, k.z, depth, v); }
+  void leaf(const voxel_key& k, int level, float v) { leaves.emplace_back(k.x, k.y, k.z, level, v); }
   template <class Children>
   void inner(const voxel_key&, int, float, const Children&) {
     ++inner_nodes;
@@ -31,25 +31,26 @@ struct tree_visitor {
 void check_against_tree(const octree::brick_store<float>& store) {
   std::vector<found_leaf> leaves, expected;
   const std::size_t inner = octree::visit_leaves(
-      store, [&](const voxel_key& k, int depth, float v) { leaves.emplace_back(k.x, k.y, k.z, depth, v); });
+      store, octree::default_tree_depth,
+      [&](const voxel_key& k, int level, float v) { leaves.emplace_back(k.x, k.y, k.z, level, v); });
   std::size_t expected_inner = 0;
   const auto identity = [](float v) { return v; };
-  octree::pruned_tree<float, decltype(identity)>{store, identity}.visit(tree_visitor{expected, expected_inner});
+  octree::pruned_tree<float, decltype(identity)>{store, octree::default_tree_depth, identity}.visit(tree_visitor{expected, expected_inner});
   CHECK(leaves == expected);
   CHECK(inner == expected_inner);
 }
 
 /// Eight random children: unknown, leaves, or with children of their own; all leaves `only`, if given.
-void fill(octree::brick_store<float>& store, random_bits& random, const voxel_key& key, int depth,
+void fill(octree::brick_store<float>& store, random_bits& random, const voxel_key& key, int level,
           std::optional<float> only) {
   const std::uint32_t deeper = random.below(8);
   for (unsigned i = 0; i != 8; ++i) {
-    const voxel_key child = octree::child_key(key, i, octree::node_cells(depth + 1));
+    const voxel_key child = octree::child_key(key, i, octree::node_cells(level - 1));
     const auto value = static_cast<float>(random.below(2));
-    if (depth + 1 < octree::tree_depth && (i == deeper || random.below(16) == 0))
-      fill(store, random, child, depth + 1, only || random.below(4) != 0 ? only : std::optional{value});
+    if (level > 1 && (i == deeper || random.below(16) == 0))
+      fill(store, random, child, level - 1, only || random.below(4) != 0 ? only : std::optional{value});
     else if (only || random.below(3) != 0)
-      store.set_node(child, depth + 1, only.value_or(value));
+      store.set_node(child, level - 1, only.value_or(value));
   }
 }
 
@@ -59,7 +60,7 @@ TEST_CASE("Leaves of all sizes come as the tree with its inner nodes has them") 
   random_bits random{7};
   for (int round = 0; round != 50; ++round) {
     octree::brick_store<float> store;
-    fill(store, random, {}, 0, std::nullopt);
+    fill(store, random, {}, octree::default_tree_depth, std::nullopt);
     check_against_tree(store);
   }
 }
@@ -67,17 +68,17 @@ TEST_CASE("Leaves of all sizes come as the tree with its inner nodes has them") 
 TEST_CASE("Sixty-four equal bricks are one leaf and one that differs breaks it up") {
   octree::brick_store<float> store;
   for (std::uint32_t i = 0; i != 64; ++i)
-    store.set_node({(i & 3U) * 8, (i >> 2U & 3U) * 8, (i >> 4U) * 8}, octree::brick_depth, 2.0F);
-  std::vector<int> depths;
-  const auto note = [&](const voxel_key&, int depth, float) { depths.push_back(depth); };
-  CHECK(octree::visit_leaves(store, note) == std::size_t{octree::brick_depth - 2});
-  CHECK(depths == std::vector<int>{octree::brick_depth - 2});
+    store.set_node({(i & 3U) * 8, (i >> 2U & 3U) * 8, (i >> 4U) * 8}, octree::brick_level, 2.0F);
+  std::vector<int> levels;
+  const auto note = [&](const voxel_key&, int level, float) { levels.push_back(level); };
+  CHECK(octree::visit_leaves(store, octree::default_tree_depth, note) == std::size_t{octree::default_tree_depth - octree::chunk_level});
+  CHECK(levels == std::vector<int>{octree::chunk_level});
   check_against_tree(store);
 
   store.make_uniform(store.make({24, 0, 0}), 5, 1.0F);
-  depths.clear();
-  octree::visit_leaves(store, note);
-  CHECK(depths.size() == 7 + 7 + 8);
+  levels.clear();
+  octree::visit_leaves(store, octree::default_tree_depth, note);
+  CHECK(levels.size() == 7 + 7 + 8);
   check_against_tree(store);
 }
 
@@ -90,7 +91,9 @@ TEST_CASE("The leaves of a real map come as the tree with its inner nodes has th
   }
   std::vector<found_leaf> leaves, expected;
   std::size_t inner = 0;
-  map.for_each_leaf([&](const auto& l) { leaves.emplace_back(l.key.x, l.key.y, l.key.z, l.depth, l.log_odds); });
+  map.for_each_leaf([&](const auto& l) {
+    leaves.emplace_back(l.key.x, l.key.y, l.key.z, map.tree_depth() - l.depth, l.log_odds);
+  });
   map.visit_tree(tree_visitor{expected, inner});
   CHECK(leaves.size() > 1000);
   CHECK(leaves == expected);

@@ -233,7 +233,7 @@ TEST_CASE("The leaves are OctoMap's in OctoMap's order") {
     REQUIRE(leaf.center.x() == it.getX());
     REQUIRE(leaf.center.y() == it.getY());
     REQUIRE(leaf.center.z() == it.getZ());
-    some_pruned = some_pruned || leaf.depth < tree_depth;
+    some_pruned = some_pruned || leaf.depth < maps.ours.tree_depth();
     ++it;
   });
   CHECK(it == maps.theirs.end_leafs());

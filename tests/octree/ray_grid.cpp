@@ -40,7 +40,7 @@ TEST_CASE("Rays marked in a window cross the voxels that rays walked one by one 
       ends.emplace_back(origin + vec3f{0.0F, -0.7F, 0.0F});
 
       const voxel_key from = *grid.key(origin);
-      REQUIRE(window.fit(from, *grid.key(vec3f::Constant(-2.0F)), *grid.key(vec3f::Constant(2.0F))));
+      REQUIRE(window.fit(grid, from, *grid.key(vec3f::Constant(-2.0F)), *grid.key(vec3f::Constant(2.0F))));
       scan_masks walked, marked;
       for (const vec3f& end : ends) {
         walked.mark_ray(grid, coordinates<float>(origin), from, coordinates<float>(end), *grid.key(end));
@@ -51,7 +51,7 @@ TEST_CASE("Rays marked in a window cross the voxels that rays walked one by one 
     }
   }
   scan_masks nothing;
-  REQUIRE(window.fit({32768, 32768, 32768}, {32768, 32768, 32768}, {32768, 32768, 32768}));
+  REQUIRE(window.fit(grid, {32768, 32768, 32768}, {32768, 32768, 32768}, {32768, 32768, 32768}));
   window.flush(nothing);
   CHECK(nothing.bricks().empty());
 }
@@ -98,8 +98,8 @@ TEST_CASE("Every instruction set marks the same cells") {
 TEST_CASE("A window that would be too large or reach the border of the grid is refused") {
   ray_grid window;
   const voxel_key from{32768, 32768, 32768};
-  CHECK(window.fit(from, from, {32968, 32968, 32968}));
-  CHECK_FALSE(window.fit(from, from, {65535, 32768, 32768}));
-  CHECK_FALSE(window.fit(from, {1, 32768, 32768}, from));
-  CHECK_FALSE(window.fit(from, {30000, 30000, 30000}, {34000, 34000, 34000}));
+  CHECK(window.fit(grid, from, from, {32968, 32968, 32968}));
+  CHECK_FALSE(window.fit(grid, from, from, {65535, 32768, 32768}));
+  CHECK_FALSE(window.fit(grid, from, {1, 32768, 32768}, from));
+  CHECK_FALSE(window.fit(grid, from, {30000, 30000, 30000}, {34000, 34000, 34000}));
 }

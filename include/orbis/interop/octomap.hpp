@@ -32,25 +32,25 @@ template <octree::octomap_model Model>
     octomap::OcTreeNode* top() { return root; }
     void swap_into(octomap::OcTree& other) { other.swapContent(*this); }
   };
-  /// Follows the preorder visit; `open[d]` is the inner node at depth d that is being filled.
+  /// Follows the preorder visit; `open[l]` is the inner node at level l that is being filled.
   struct builder {
     open_tree& tree;
-    std::array<octomap::OcTreeNode*, octree::tree_depth + 1> open{};
+    std::array<octomap::OcTreeNode*, octree::default_tree_depth + 1> open{};
 
-    octomap::OcTreeNode* node(const octree::voxel_key& key, int depth) {
-      if (depth == 0) {
+    octomap::OcTreeNode* node(const octree::voxel_key& key, int level) {
+      if (level == octree::default_tree_depth) {
         tree.begin();
         return tree.top();
       }
-      const auto bit = static_cast<unsigned>(octree::tree_depth - depth);
+      const auto bit = static_cast<unsigned>(level);
       const unsigned child = (key.x >> bit & 1U) | (key.y >> bit & 1U) << 1U | (key.z >> bit & 1U) << 2U;
-      return tree.createNodeChild(open[static_cast<std::size_t>(depth - 1)], child);
+      return tree.createNodeChild(open[static_cast<std::size_t>(level + 1)], child);
     }
-    void leaf(const octree::voxel_key& key, int depth, float value) { node(key, depth)->setLogOdds(value); }
-    void inner(const octree::voxel_key& key, int depth, float value, const std::array<octree::node_entry<float>, 8>&) {
-      auto* const made = node(key, depth);
+    void leaf(const octree::voxel_key& key, int level, float value) { node(key, level)->setLogOdds(value); }
+    void inner(const octree::voxel_key& key, int level, float value, const std::array<octree::node_entry<float>, 8>&) {
+      auto* const made = node(key, level);
       made->setLogOdds(value);
-      open[static_cast<std::size_t>(depth)] = made;
+      open[static_cast<std::size_t>(level)] = made;
     }
   };
 
@@ -72,14 +72,14 @@ template <octree::octomap_model Model>
 /// another depth than 16.
 template <octree::octomap_model Model = octree::log_odds<>>
 [[nodiscard]] result<octree::occupancy_octree<Model>> from_octomap(const octomap::OcTree& tree) {
-  if (tree.getTreeDepth() != static_cast<unsigned>(octree::tree_depth))
+  if (tree.getTreeDepth() != static_cast<unsigned>(octree::default_tree_depth))
     return fail(errc::unsupported, "octomap::OcTree", "is " + std::to_string(tree.getTreeDepth()) + " levels deep");
   octree::occupancy_octree<Model> map{tree.getResolution()};
   for (auto it = tree.begin_leafs(), end = tree.end_leafs(); it != end; ++it) {
     if (!std::isfinite(it->getLogOdds())) return fail(errc::malformed, "octomap::OcTree", "a value that is not finite");
     // OctoMap names a node by its middle voxel, we by its lowest.
     const auto depth = static_cast<int>(it.getDepth());
-    const std::uint32_t inside = octree::node_cells(depth) - 1;
+    const std::uint32_t inside = octree::node_cells(octree::default_tree_depth - depth) - 1;
     const octomap::OcTreeKey key = it.getKey();
     map.set_unknown_node({key[0] & ~inside, key[1] & ~inside, key[2] & ~inside}, depth, it->getLogOdds());
   }

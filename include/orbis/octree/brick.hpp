@@ -1,247 +1,514 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Where the voxels lie: a hash of bricks of 8x8x8 voxels, each of eight octants of 4x4x4, each of
-/// which is unknown, uniform (one value: this is pruning) or a block of 64 values.
-///
-/// Everything is in Morton order (x lowest, then y, then z): the eight children of a tree node are
-/// eight neighbours in memory, a byte of a 64-bit mask is a node of 2x2x2, a mask is an octant.
-/// Leaves bigger than a brick are kept by their own name and split when something inside changes.
+/// Where the voxels lie: a hash of chunks of 4x4x4 bricks, each of eight octants of 4x4x4 voxels,
+/// each of which is unknown, uniform (one value: this is pruning) or stored as indices into the
+/// values it has. Leaves bigger than a brick are kept by their own name and split when something
+/// inside changes.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cassert>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
+#include <tuple>
 #include <utility>
 #include <vector>
 
+#include <orbis/octree/cow_pages.hpp>
 #include <orbis/octree/hash_index.hpp>
-#include <orbis/octree/key.hpp>
+#include <orbis/octree/node_name.hpp>
+#include <orbis/octree/packed_block.hpp>
 
 namespace orbis::octree {
 
-/// The depth of the nodes that are bricks, octants, and groups of 2x2x2.
-inline constexpr int brick_depth = tree_depth - 3;
-inline constexpr int octant_depth = tree_depth - 2;
-
-/// Bits 0, 1, 2 moved to 0, 3, 6.
-[[nodiscard]] constexpr std::uint32_t spread3(std::uint32_t v) noexcept {
-  return (v & 1U) | (v & 2U) << 2U | (v & 4U) << 4U;
-}
-/// A voxel's place in its brick: bits 0-5 within the octant, bits 6-8 the octant.
-[[nodiscard]] constexpr std::uint32_t place_in_brick(const voxel_key& k) noexcept {
-  return spread3(k.x) | spread3(k.y) << 1U | spread3(k.z) << 2U;
-}
-/// The lowest voxel, relative to the brick's, of a place in a brick.
-[[nodiscard]] constexpr voxel_key voxel_in_brick(std::uint32_t place) noexcept {
-  const auto gather = [](std::uint32_t v) { return (v & 1U) | (v >> 2U & 2U) | (v >> 4U & 4U); };
-  return {gather(place), gather(place >> 1U), gather(place >> 2U)};
-}
-
-/// The name of the node at `depth` that contains `k`, unique among all nodes of all depths.
-[[nodiscard]] constexpr std::uint64_t node_name(const voxel_key& k, int depth) noexcept {
-  const auto s = static_cast<unsigned>(tree_depth - depth);
-  return std::uint64_t{k.x >> s} | std::uint64_t{k.y >> s} << 19U | std::uint64_t{k.z >> s} << 38U |
-         std::uint64_t{static_cast<unsigned>(depth)} << 57U;
-}
-/// The lowest voxel of a named node.
-[[nodiscard]] constexpr voxel_key named_key(std::uint64_t name) noexcept {
-  const auto s = static_cast<unsigned>(tree_depth) - static_cast<unsigned>(name >> 57U);
-  const auto part = [&](unsigned shift) { return static_cast<std::uint32_t>(name >> shift & 0x7ffffU) << s; };
-  return {part(0), part(19), part(38)};
-}
-
-/// An octant that is neither unknown nor uniform.
+/// 8x8x8 voxels.
 template <class T>
-struct block {
-  std::array<T, 64> value{};
-  std::uint64_t known = 0;
+struct brick {
+  std::uint64_t name = 0;                 ///< see node_name
+  std::uint8_t uniform = 0;               ///< bit i: octant i has one value, value[i]
+  std::uint8_t dense = 0;                 ///< bit i: octant i is stored voxel by voxel, in record at[i]
+  std::array<std::uint32_t, 8> at{};
+  std::array<T, 8> value{};               ///< the largest value in octant i, if anything is known there
 
+  [[nodiscard]] bool is_known() const noexcept { return (uniform | dense) != 0; }
+  /// Whether all 512 voxels have the same value.
   [[nodiscard]] bool is_uniform() const noexcept {
-    if (known != ~std::uint64_t{0}) return false;
-    bool same = true;
+    bool same = uniform == 0xff;
     for (const T v : value) same &= v == value[0];
     return same;
   }
 };
 
-/// 8x8x8 voxels.
-template <class T>
-struct brick {
-  std::uint64_t name;        ///< see node_name
-  std::uint8_t uniform = 0;  ///< bit i: octant i has one value, value[i]
-  std::uint8_t dense = 0;    ///< bit i: octant i is block number at[i]
-  std::array<std::uint32_t, 8> at{};
-  std::array<T, 8> value{};
-};
-
-/// A leaf bigger than a brick.
-template <class T>
-struct large_leaf {
-  std::uint64_t name;
-  T value;
-};
-
-/// All the bricks of a map.
+/// All the bricks of a map. A copy shares everything with the original until one of them changes.
 template <class T>
 class brick_store {
  public:
-  [[nodiscard]] const std::vector<brick<T>>& bricks() const noexcept { return bricks_; }
-  [[nodiscard]] const block<T>& block_at(std::uint32_t i) const noexcept { return blocks_[i]; }
-  [[nodiscard]] block<T>& block_at(std::uint32_t i) noexcept { return blocks_[i]; }
+  static constexpr std::uint32_t none = hash_index::none;
 
+  /// 4x4x4 bricks in Morton order; `none` where there is no brick.
+  struct chunk {
+    std::uint64_t name = 0;
+    std::array<std::uint32_t, 64> at{};
+  };
+
+  // -- looking
+
+  [[nodiscard]] bool empty() const noexcept { return brick_count() == 0 && large_count_ == 0; }
+  [[nodiscard]] std::size_t brick_count() const noexcept { return bricks_.size() - free_bricks_.size(); }
+  [[nodiscard]] std::size_t chunk_count() const noexcept { return chunks_.size(); }
+  /// The chunk that contains `k`, or null.
+  [[nodiscard]] const chunk* find_chunk(const voxel_key& k) const noexcept {
+    const std::uint32_t i = index_.find(node_name(k, chunk_level));
+    return i == none ? nullptr : &chunks_[i];
+  }
+  /// The brick in a place of a chunk, or null.
+  [[nodiscard]] const brick<T>* find(const chunk& c, std::uint32_t place) const noexcept {
+    return c.at[place] == none ? nullptr : &bricks_[c.at[place]];
+  }
   /// The brick that contains `k`, or null.
   [[nodiscard]] const brick<T>* find(const voxel_key& k) const noexcept {
-    const std::uint32_t i = index_.find(node_name(k, brick_depth));
-    return i == hash_index::none ? nullptr : &bricks_[i];
+    const chunk* const c = find_chunk(k);
+    return c == nullptr ? nullptr : find(*c, place_in_chunk(k));
   }
-  /// The value of the leaf bigger than a brick that contains `k`, or null.
-  [[nodiscard]] const T* find_large(const voxel_key& k) const noexcept {
-    const std::uint32_t i = find_large_index(k);
-    return i == hash_index::none ? nullptr : &large_[i].value;
+  /// Whether there are leaves bigger than a brick.
+  [[nodiscard]] bool has_large() const noexcept { return large_count_ != 0; }
+  [[nodiscard]] std::size_t large_count() const noexcept { return large_count_; }
+  /// The value and level of the leaf bigger than a brick that contains `k`, if there is one.
+  [[nodiscard]] std::optional<std::pair<T, int>> find_large(const voxel_key& k) const noexcept {
+    const std::uint32_t i = large_count_ == 0 ? none : find_large_index(k);
+    if (i == none) return std::nullopt;
+    return std::pair{large_[i].value, named_level(large_[i].name)};
   }
-  /// The value of voxel `k`, or null where nothing is known.
-  [[nodiscard]] const T* value(const voxel_key& k) const noexcept {
-    const brick<T>* b = find(k);
-    if (b == nullptr) return large_.empty() ? nullptr : find_large(k);
-    const std::uint32_t place = place_in_brick(k);
+  /// The value of a place in a brick, empty where nothing is known.
+  [[nodiscard]] std::optional<T> value(const brick<T>& b, std::uint32_t place) const noexcept {
     const std::uint32_t octant = place >> 6U;
-    if ((b->uniform >> octant & 1U) != 0) return &b->value[octant];
-    if ((b->dense >> octant & 1U) == 0) return nullptr;
-    const block<T>& voxels = blocks_[b->at[octant]];
-    return (voxels.known >> (place & 63U) & 1U) != 0 ? &voxels.value[place & 63U] : nullptr;
+    if ((b.uniform >> octant & 1U) != 0) return b.value[octant];
+    if ((b.dense >> octant & 1U) == 0) return std::nullopt;
+    return with_record(b.at[octant], [&](const auto& r) -> std::optional<T> {
+      const std::uint32_t p = place & 63U;
+      return (r.known >> p & 1U) != 0 ? std::optional{r.at(p)} : std::nullopt;
+    });
+  }
+  /// The value of voxel `k`, empty where nothing is known.
+  [[nodiscard]] std::optional<T> value(const voxel_key& k) const noexcept {
+    const brick<T>* const b = find(k);
+    if (b != nullptr) return value(*b, place_in_brick(k));
+    if (large_count_ == 0) return std::nullopt;
+    const auto large = find_large(k);
+    return large ? std::optional{large->first} : std::nullopt;
+  }
+  /// The known voxels of octant `i` of `b`.
+  [[nodiscard]] std::uint64_t known(const brick<T>& b, std::uint32_t i) const noexcept {
+    if ((b.uniform >> i & 1U) != 0) return ~std::uint64_t{0};
+    if ((b.dense >> i & 1U) == 0) return 0;
+    return with_record(b.at[i], [](const auto& r) { return r.known; });
+  }
+  /// The known voxels of octant `i` of `b` for whose value `wanted` is true.
+  template <std::predicate<T> Wanted>
+  [[nodiscard]] std::uint64_t voxels_where(const brick<T>& b, std::uint32_t i, Wanted&& wanted) const noexcept {
+    if ((b.uniform >> i & 1U) != 0) return wanted(b.value[i]) ? ~std::uint64_t{0} : 0;
+    if ((b.dense >> i & 1U) == 0) return 0;
+    return with_record(b.at[i], [&](const auto& r) { return r.known & r.where(wanted); });
+  }
+  /// Unpacks octant `i` of `b`.
+  void read_octant(const brick<T>& b, std::uint32_t i, block<T>& out) const noexcept {
+    if ((b.uniform >> i & 1U) != 0) {
+      out.value.fill(b.value[i]);
+      out.known = ~std::uint64_t{0};
+    } else if ((b.dense >> i & 1U) != 0) {
+      with_record(b.at[i], [&](const auto& r) { r.unpack(out); });
+    } else {
+      out.value.fill(T{});
+      out.known = 0;
+    }
+  }
+  /// Calls `visit(const chunk&)` for every chunk in Morton order.
+  template <std::invocable<const chunk&> Visit>
+  void for_each_chunk(Visit&& visit) const {
+    for (const auto& [order, i] : sorted_chunks()) visit(chunks_[i]);
+  }
+  /// Calls `visit(const brick<T>&)` for every brick in Morton order.
+  template <std::invocable<const brick<T>&> Visit>
+  void for_each_brick(Visit&& visit) const {
+    for_each_chunk([&](const chunk& c) {
+      for (std::uint32_t place = 0; place != 64; ++place)
+        if (c.at[place] != none) visit(bricks_[c.at[place]]);
+    });
+  }
+  /// Calls `visit(name, value)` for every leaf bigger than a brick, in no particular order.
+  template <class Visit>
+  void for_each_large(Visit&& visit) const {
+    for (std::size_t i = 0; i != large_.size(); ++i)
+      if (large_[i].name != gone) visit(large_[i].name, large_[i].value);
+  }
+  /// Bytes on the heap, those shared with copies included.
+  [[nodiscard]] std::size_t memory_bytes() const noexcept {
+    std::size_t bytes = index_.memory_bytes() + large_index_.memory_bytes() + chunks_.memory_bytes() +
+                        bricks_.memory_bytes() + large_.memory_bytes() + free_bricks_.capacity() * sizeof(std::uint32_t);
+    std::apply([&](const auto&... p) { ((bytes += p.items.memory_bytes() + p.free.capacity() * sizeof(std::uint32_t)), ...); },
+               pools_);
+    return bytes;
   }
 
-  /// The brick that contains `k`, made if need be; splits a larger leaf.
+  // -- changing
+
+  /// The brick that contains `k`, made if need be; splits a larger leaf. Valid until the next change
+  /// to another brick.
   [[nodiscard]] brick<T>& make(const voxel_key& k) {
-    const std::uint32_t i = index_.find(node_name(k, brick_depth));
-    if (i != hash_index::none) return bricks_[i];
-    if (const std::uint32_t large = large_.empty() ? hash_index::none : find_large_index(k);
-        large != hash_index::none) {
+    if (const std::uint32_t i = find_brick_index(k); i != none) return bricks_.writable(i);
+    if (const std::uint32_t large = large_count_ == 0 ? none : find_large_index(k); large != none) {
       split(large, k);
-      return bricks_[index_.find(node_name(k, brick_depth))];
+      return bricks_.writable(find_brick_index(k));
     }
-    return add(node_name(k, brick_depth));
-  }
-  /// Octant `i` of `b` as a block, made if need be.
-  [[nodiscard]] block<T>& make_block(brick<T>& b, std::uint32_t i) {
-    const auto bit = static_cast<std::uint8_t>(1U << i);
-    if ((b.dense & bit) != 0) return blocks_[b.at[i]];
-    if (free_.empty()) {
-      if (blocks_.size() == blocks_.capacity()) blocks_.reserve(blocks_.size() + blocks_.size() / 4 + 16);
-      free_.push_back(static_cast<std::uint32_t>(blocks_.size()));
-      blocks_.emplace_back();
-    }
-    b.at[i] = free_.back();
-    free_.pop_back();
-    b.dense |= bit;
-    block<T>& made = blocks_[b.at[i]];
-    if ((b.uniform & bit) != 0) {
-      made.value.fill(b.value[i]);
-      made.known = ~std::uint64_t{0};
-      b.uniform &= static_cast<std::uint8_t>(~bit);
-    } else {
-      made = {};
-    }
-    return made;
+    return add(k);
   }
   /// Gives octant `i` of `b` one value for all its voxels.
   void make_uniform(brick<T>& b, std::uint32_t i, T value) {
-    const auto bit = static_cast<std::uint8_t>(1U << i);
-    if ((b.dense & bit) != 0) free_.push_back(b.at[i]);
-    b.dense &= static_cast<std::uint8_t>(~bit);
-    b.uniform |= bit;
+    drop_record(b, i);
+    b.uniform |= static_cast<std::uint8_t>(1U << i);
     b.value[i] = value;
   }
-  /// Gives every voxel of the node at `depth` that starts at `k` the same value.
+  /// Stores `voxels` as octant `i` of `b`.
+  void write_octant(brick<T>& b, std::uint32_t i, const block<T>& voxels) {
+    const auto bit = static_cast<std::uint8_t>(1U << i);
+    b.uniform &= static_cast<std::uint8_t>(~bit);
+    if (voxels.known == 0) {
+      drop_record(b, i);
+      return;
+    }
+    palette<T> p;
+    find_palette(voxels, p);
+    if (p.count == 1 && voxels.known == ~std::uint64_t{0}) {
+      make_uniform(b, i, p.value[0]);
+      return;
+    }
+    const unsigned bits = p.count > max_palette ? raw : static_cast<unsigned>(std::bit_width(p.count - 1));
+    if ((b.dense & bit) == 0 || pool_of(b.at[i]) != bits) {
+      drop_record(b, i);
+      b.at[i] = new_record(bits);
+      b.dense |= bit;
+    }
+    with_writable_record(b.at[i], [&](auto& r) { r.pack(voxels, p); });
+    if (bits == raw) {
+      b.value[i] = voxels.value[static_cast<std::size_t>(std::countr_zero(voxels.known))];
+      for (std::uint64_t rest = voxels.known; rest != 0; rest &= rest - 1)
+        b.value[i] = std::max(b.value[i], voxels.value[static_cast<std::size_t>(std::countr_zero(rest))]);
+    } else {
+      b.value[i] = *std::max_element(p.value.begin(), p.value.begin() + p.count);
+    }
+  }
+  /// Gives every voxel of the node at `level` that starts at `k` the same value.
   /// @pre nothing is known inside it
-  void set_node(const voxel_key& k, int depth, T value) {
-    if (depth < brick_depth) {
-      large_index_.set(node_name(k, depth), static_cast<std::uint32_t>(large_.size()));
-      large_.push_back({node_name(k, depth), value});
-      large_depths_ |= 1U << static_cast<unsigned>(depth);
+  void set_node(const voxel_key& k, int level, T value) {
+    if (level > brick_level) {
+      large_index_.set(node_name(k, level), static_cast<std::uint32_t>(large_.size()));
+      large_.push_back({node_name(k, level), value});
+      large_levels_ |= 1U << static_cast<unsigned>(level);
+      ++large_count_;
       return;
     }
     brick<T>& b = make(k);
     const std::uint32_t place = place_in_brick(k);
-    if (depth == brick_depth) {
+    if (level == brick_level) {
       for (std::uint32_t i = 0; i != 8; ++i) make_uniform(b, i, value);
-    } else if (depth == octant_depth) {
+    } else if (level == octant_level) {
       make_uniform(b, place >> 6U, value);
     } else {
-      block<T>& voxels = make_block(b, place >> 6U);
-      const std::uint32_t count = depth == tree_depth ? 1 : 8;
+      block<T> voxels;
+      read_octant(b, place >> 6U, voxels);
+      const std::uint32_t count = level == 0 ? 1 : 8;
       for (std::uint32_t i = 0; i != count; ++i) {
         voxels.value[(place & 63U) + i] = value;
         voxels.known |= std::uint64_t{1} << ((place & 63U) + i);
       }
-      if (voxels.is_uniform()) make_uniform(b, place >> 6U, value);
+      write_octant(b, place >> 6U, voxels);
     }
   }
-  /// Calls `visit(name, value)` for every leaf bigger than a brick.
-  template <class Visit>
-  void for_each_large(Visit&& visit) const {
-    for (const large_leaf<T>& leaf : large_)
-      if (leaf.name != gone) visit(leaf.name, leaf.value);
+  /// Replaces every value by `change(value)`, or by nothing where that is empty: the voxel becomes
+  /// unknown. `change` is called once or more for each value of an octant. O(octants).
+  template <class Change>
+  requires std::is_invocable_r_v<std::optional<T>, Change&, T>
+  void transform(Change&& change) {
+    std::vector<std::uint64_t> empty;
+    block<T> voxels;
+    for (std::uint32_t i = 0; i != bricks_.size(); ++i) {
+      if (!bricks_[i].is_known()) continue;
+      brick<T>& b = bricks_.writable(i);
+      for (std::uint32_t octant = 0; octant != 8; ++octant) {
+        if ((b.uniform >> octant & 1U) != 0) {
+          if (const std::optional<T> v = change(b.value[octant]))
+            b.value[octant] = *v;
+          else
+            b.uniform &= static_cast<std::uint8_t>(~(1U << octant));
+        } else if ((b.dense >> octant & 1U) != 0) {
+          with_record(b.at[octant], [&](const auto& r) { r.transformed(change).unpack(voxels); });
+          write_octant(b, octant, voxels);
+        }
+      }
+      if (!b.is_known()) empty.push_back(b.name);
+    }
+    for (std::size_t i = 0; i < large_.size(); ++i) {  // which becomes empty with the last of them
+      if (large_[i].name == gone) continue;
+      if (const std::optional<T> v = change(large_[i].value))
+        large_.writable(i).value = *v;
+      else
+        drop_large(static_cast<std::uint32_t>(i));
+    }
+    erase_bricks(empty);
   }
-  [[nodiscard]] bool empty() const noexcept { return bricks_.empty() && large_.empty(); }
+  /// Removes bricks. O(bricks removed + chunks).
+  void erase_bricks(const std::vector<std::uint64_t>& names) {
+    for (const std::uint64_t name : names) {
+      const voxel_key k = named_key(name);
+      const std::uint32_t c = index_.find(node_name(k, chunk_level));
+      if (c == none || chunks_[c].at[place_in_chunk(k)] == none) continue;
+      const std::uint32_t i = std::exchange(chunks_.writable(c).at[place_in_chunk(k)], none);
+      brick<T>& b = bricks_.writable(i);
+      for (std::uint32_t octant = 0; octant != 8; ++octant) drop_record(b, octant);
+      b = {};
+      free_bricks_.push_back(i);
+    }
+    if (!names.empty()) erase_empty_chunks();
+  }
+  /// Removes the leaves bigger than a brick whose names are given.
+  void erase_large(const std::vector<std::uint64_t>& names) {
+    for (const std::uint64_t name : names)
+      if (const std::uint32_t i = large_index_.find(name); i != none) drop_large(i);
+  }
   void clear() { *this = {}; }
-  /// Bytes on the heap.
-  [[nodiscard]] std::size_t memory_bytes() const noexcept {
-    return index_.memory_bytes() + large_index_.memory_bytes() + bricks_.capacity() * sizeof(brick<T>) +
-           blocks_.capacity() * sizeof(block<T>) + large_.capacity() * sizeof(large_leaf<T>) +
-           free_.capacity() * sizeof(std::uint32_t);
-  }
 
  private:
   static constexpr std::uint64_t gone = ~std::uint64_t{0};
+  static constexpr unsigned raw = max_palette_bits + 1;
 
-  brick<T>& add(std::uint64_t name) {
-    index_.set(name, static_cast<std::uint32_t>(bricks_.size()));
-    return bricks_.emplace_back(brick<T>{name});
-  }
-  [[nodiscard]] std::uint32_t find_large_index(const voxel_key& k) const noexcept {
-    for (unsigned depths = large_depths_; depths != 0; depths &= depths - 1) {
-      const std::uint32_t i = large_index_.find(node_name(k, std::countr_zero(depths)));
-      if (i != hash_index::none) return i;
+  /// An octant with up to 2^Bits values.
+  template <unsigned Bits>
+  struct packed {
+    std::uint64_t known = 0;
+    std::array<std::uint64_t, Bits> plane{};
+    std::array<T, 1U << Bits> values{};
+
+    [[nodiscard]] T at(std::uint32_t place) const noexcept {
+      unsigned index = 0;
+      for (unsigned j = 0; j != Bits; ++j) index |= static_cast<unsigned>(plane[j] >> place & 1U) << j;
+      return values[index];
     }
-    return hash_index::none;
+    template <class Wanted>
+    [[nodiscard]] std::uint64_t where(Wanted&& wanted) const noexcept {
+      std::uint64_t found = 0;
+      for (unsigned i = 0; i != 1U << Bits; ++i)
+        if (wanted(values[i])) found |= voxels_of_index<Bits>(plane.data(), i);
+      return found;
+    }
+    void unpack(block<T>& out) const noexcept {
+      out.known = known;
+      expand_palette(values.data(), plane.data(), Bits, out);
+    }
+    void pack(const block<T>& voxels, const palette<T>& p) noexcept {
+      known = voxels.known;
+      std::copy_n(p.plane.begin(), Bits, plane.begin());
+      std::copy_n(p.value.begin(), values.size(), values.begin());
+    }
+    template <class Change>
+    [[nodiscard]] packed transformed(Change&& change) const {
+      packed changed = *this;
+      for (unsigned i = 0; i != 1U << Bits; ++i) {
+        const std::uint64_t where = known & voxels_of_index<Bits>(plane.data(), i);
+        if (where == 0) continue;
+        const std::optional<T> v = change(values[i]);
+        if (v) changed.values[i] = *v;
+        if (!v) changed.known &= ~where;
+      }
+      return changed;
+    }
+  };
+  /// An octant of more values than that.
+  struct unpacked {
+    std::uint64_t known = 0;
+    std::array<T, 64> values{};
+
+    [[nodiscard]] T at(std::uint32_t place) const noexcept { return values[place]; }
+    template <class Wanted>
+    [[nodiscard]] std::uint64_t where(Wanted&& wanted) const noexcept {
+      std::uint64_t found = 0;
+      for (unsigned i = 0; i != 64; ++i) found |= std::uint64_t{wanted(values[i])} << i;
+      return found;
+    }
+    void unpack(block<T>& out) const noexcept {
+      out.known = known;
+      out.value = values;
+    }
+    void pack(const block<T>& voxels, const palette<T>&) noexcept {
+      known = voxels.known;
+      values = voxels.value;
+    }
+    template <class Change>
+    [[nodiscard]] unpacked transformed(Change&& change) const {
+      unpacked changed = *this;
+      for (std::uint64_t rest = known; rest != 0; rest &= rest - 1) {
+        const auto i = static_cast<unsigned>(std::countr_zero(rest));
+        const std::optional<T> v = change(values[i]);
+        changed.values[i] = v.value_or(T{});
+        if (!v) changed.known &= ~(std::uint64_t{1} << i);
+      }
+      return changed;
+    }
+  };
+  template <class Record>
+  struct pool {
+    cow_pages<Record> items;
+    std::vector<std::uint32_t> free;
+  };
+  struct large_leaf {
+    std::uint64_t name;
+    T value;
+  };
+
+  // A record's number: 3 bits for the pool, 29 for the place in it.
+  [[nodiscard]] static constexpr unsigned pool_of(std::uint32_t record) noexcept { return record >> 29U; }
+  [[nodiscard]] static constexpr std::uint32_t place_of(std::uint32_t record) noexcept { return record & 0x1fffffffU; }
+
+  template <class Self, class Use>
+  static decltype(auto) with_pool(Self& self, unsigned number, Use&& use) {
+    switch (number) {
+      case 0: return use(std::get<0>(self.pools_));
+      case 1: return use(std::get<1>(self.pools_));
+      case 2: return use(std::get<2>(self.pools_));
+      case 3: return use(std::get<3>(self.pools_));
+      case 4: return use(std::get<4>(self.pools_));
+      case 5: return use(std::get<5>(self.pools_));
+      default: return use(std::get<6>(self.pools_));
+    }
+  }
+  template <class Use>
+  decltype(auto) with_record(std::uint32_t record, Use&& use) const {
+    return with_pool(*this, pool_of(record), [&](const auto& p) { return use(p.items[place_of(record)]); });
+  }
+  template <class Use>
+  void with_writable_record(std::uint32_t record, Use&& use) {
+    with_pool(*this, pool_of(record), [&](auto& p) { use(p.items.writable(place_of(record))); });
+  }
+  [[nodiscard]] std::uint32_t new_record(unsigned number) {
+    return number << 29U | with_pool(*this, number, [](auto& p) {
+             if (p.free.empty()) {
+               p.items.push_back({});
+               return static_cast<std::uint32_t>(p.items.size() - 1);
+             }
+             const std::uint32_t place = p.free.back();
+             p.free.pop_back();
+             return place;
+           });
+  }
+  /// Makes octant `i` of `b` unknown.
+  void drop_record(brick<T>& b, std::uint32_t i) {
+    const auto bit = static_cast<std::uint8_t>(1U << i);
+    if ((b.dense & bit) != 0)
+      with_pool(*this, pool_of(b.at[i]), [&](auto& p) { p.free.push_back(place_of(b.at[i])); });
+    b.dense &= static_cast<std::uint8_t>(~bit);
+    b.uniform &= static_cast<std::uint8_t>(~bit);
+  }
+
+  [[nodiscard]] std::vector<std::pair<std::uint64_t, std::uint32_t>> sorted_chunks() const {
+    std::vector<std::pair<std::uint64_t, std::uint32_t>> order(chunks_.size());
+    for (std::uint32_t i = 0; i != chunks_.size(); ++i) order[i] = {morton_order(named_key(chunks_[i].name)), i};
+    std::sort(order.begin(), order.end());
+    return order;
+  }
+  [[nodiscard]] std::uint32_t find_brick_index(const voxel_key& k) const noexcept {
+    const chunk* const c = find_chunk(k);
+    return c == nullptr ? none : c->at[place_in_chunk(k)];
+  }
+  /// A new brick. @pre there is none that contains `k`
+  brick<T>& add(const voxel_key& k) {
+    const std::uint64_t name = node_name(k, chunk_level);
+    std::uint32_t c = index_.find(name);
+    if (c == none) {
+      c = static_cast<std::uint32_t>(chunks_.size());
+      index_.set(name, c);
+      chunk made{.name = name};
+      made.at.fill(none);
+      chunks_.push_back(made);
+    }
+    std::uint32_t i = 0;
+    if (free_bricks_.empty()) {
+      i = static_cast<std::uint32_t>(bricks_.size());
+      bricks_.push_back({});
+    } else {
+      i = free_bricks_.back();
+      free_bricks_.pop_back();
+    }
+    chunks_.writable(c).at[place_in_chunk(k)] = i;
+    brick<T>& b = bricks_.writable(i);
+    b.name = node_name(k, brick_level);
+    return b;
+  }
+  void erase_empty_chunks() {
+    cow_pages<chunk> kept;
+    for (std::size_t i = 0; i != chunks_.size(); ++i)
+      if (std::any_of(chunks_[i].at.begin(), chunks_[i].at.end(), [](std::uint32_t b) { return b != none; }))
+        kept.push_back(chunks_[i]);
+    if (kept.size() == chunks_.size()) return;
+    chunks_ = std::move(kept);
+    index_ = {};
+    for (std::uint32_t i = 0; i != chunks_.size(); ++i) index_.set(chunks_[i].name, i);
+    if (chunks_.empty() && large_count_ == 0) clear();
+  }
+
+  [[nodiscard]] std::uint32_t find_large_index(const voxel_key& k) const noexcept {
+    for (unsigned levels = large_levels_; levels != 0; levels &= levels - 1) {
+      const std::uint32_t i = large_index_.find(node_name(k, std::countr_zero(levels)));
+      if (i != none) return i;
+    }
+    return none;
+  }
+  void drop_large(std::uint32_t i) {
+    large_index_.set(large_[i].name, none);
+    large_.writable(i).name = gone;
+    if (--large_count_ != 0) return;
+    large_ = {};
+    large_index_ = {};
+    large_levels_ = 0;
   }
   /// Replaces a large leaf by its brick that contains `k` and that brick's siblings on the way down.
   void split(std::uint32_t large, const voxel_key& k) {
-    const auto [name, value] = std::exchange(large_[large], {gone, T{}});
-    large_index_.set(name, hash_index::none);
+    const auto [name, value] = large_[large];
+    drop_large(large);
     voxel_key node = named_key(name);
-    for (int depth = static_cast<int>(name >> 57U) + 1; depth <= brick_depth; ++depth) {
-      const std::uint32_t cells = node_cells(depth);
+    for (int level = named_level(name) - 1; level >= brick_level; --level) {
       const voxel_key parent = node;
       for (unsigned i = 0; i != 8; ++i) {
-        const voxel_key child = child_key(parent, i, cells);
-        if (node_name(child, depth) == node_name(k, depth) && depth != brick_depth)
+        const voxel_key child = child_key(parent, i, node_cells(level));
+        if (level != brick_level && child == node_key(k, level))
           node = child;
         else
-          set_whole(child, depth, value);
+          set_whole(child, level, value);
       }
     }
   }
-  void set_whole(const voxel_key& k, int depth, T value) {
-    if (depth == brick_depth) {
-      brick<T>& b = add(node_name(k, depth));
+  void set_whole(const voxel_key& k, int level, T value) {
+    if (level == brick_level) {
+      brick<T>& b = add(k);
       b.uniform = 0xff;
       b.value.fill(value);
     } else {
-      set_node(k, depth, value);
+      set_node(k, level, value);
     }
   }
 
-  hash_index index_;
+  hash_index index_;  ///< of chunks
+  cow_pages<chunk> chunks_;
+  cow_pages<brick<T>> bricks_;
+  std::vector<std::uint32_t> free_bricks_;
+  std::tuple<pool<packed<0>>, pool<packed<1>>, pool<packed<2>>, pool<packed<3>>, pool<packed<4>>, pool<packed<5>>,
+             pool<unpacked>>
+      pools_;
   hash_index large_index_;
-  std::vector<brick<T>> bricks_;
-  std::vector<block<T>> blocks_;
-  std::vector<std::uint32_t> free_;  ///< blocks not in use
-  std::vector<large_leaf<T>> large_;
-  unsigned large_depths_ = 0;  ///< bit d: there has been a large leaf at depth d
+  cow_pages<large_leaf> large_;
+  std::size_t large_count_ = 0;
+  unsigned large_levels_ = 0;  ///< bit l: there has been a large leaf at level l
 };
 
 }  // namespace orbis::octree

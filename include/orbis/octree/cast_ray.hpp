@@ -41,8 +41,8 @@ template <sensor_model Model>
     for (float& d : direction) d /= static_cast<float>(norm);
 
   const auto stop_at = [&](const voxel_key& k) -> std::optional<ray_end> {
-    const auto* value = store.value(k);
-    if (value == nullptr) return ignore_unknown ? std::nullopt : std::optional{ray_end::unknown};
+    const auto value = store.value(k);
+    if (!value) return ignore_unknown ? std::nullopt : std::optional{ray_end::unknown};
     return is_occupied<Model>(*value) ? std::optional{ray_end::hit} : std::nullopt;
   };
   if (const auto stop = stop_at(*start)) return {*stop, grid.center(*start)};

@@ -52,8 +52,17 @@ struct bt_writer {
   std::string bytes;
   std::size_t nodes = 0;
   float threshold;
+  int root_level;
 
-  void leaf(const voxel_key&, int, float) { ++nodes; }
+  void leaf(const voxel_key& key, int level, float value) {
+    ++nodes;
+    if (level != root_level) return;
+    // A root without children cannot be written: its children are.
+    std::array<node_entry<float>, 8> children;
+    children.fill({node_kind::leaf, value});
+    nodes += children.size() - 1;
+    inner(key, level, value, children);
+  }
   void inner(const voxel_key&, int, float, const std::array<node_entry<float>, 8>& children) {
     ++nodes;
     unsigned bits = 0;
@@ -169,10 +178,10 @@ struct node_reader {
     if (bits == 0) return give_up("an inner node without children");
     using model = typename Map::model;
     for (unsigned i = 0; i != 8; ++i, bits >>= 2U) {
-      const voxel_key child = child_key(key, i, node_cells(depth + 1));
+      const voxel_key child = child_key(key, i, node_cells(default_tree_depth - depth - 1));
       const unsigned code = bits & 3U;
       if (code == 3) {
-        if (depth + 1 == tree_depth) return give_up("nodes below the deepest level");
+        if (depth + 1 == default_tree_depth) return give_up("nodes below the deepest level");
         if (!read_bt(child, depth + 1)) return false;
       } else if (code != 0) {
         ++nodes;
@@ -193,9 +202,9 @@ struct node_reader {
       map.set_unknown_node(key, depth, log_odds);
       return true;
     }
-    if (depth == tree_depth) return give_up("nodes below the deepest level");
+    if (depth == default_tree_depth) return give_up("nodes below the deepest level");
     for (unsigned i = 0; i != 8; ++i)
-      if ((children >> i & 1U) != 0 && !read_ot(child_key(key, i, node_cells(depth + 1)), depth + 1)) return false;
+      if ((children >> i & 1U) != 0 && !read_ot(child_key(key, i, node_cells(default_tree_depth - depth - 1)), depth + 1)) return false;
     return true;
   }
 };
@@ -211,6 +220,8 @@ template <class Model, class Read>
   if (reader.nodes != file->nodes)
     return fail(errc::malformed, where,
                 "holds " + std::to_string(reader.nodes) + " nodes, but declares " + std::to_string(file->nodes));
+  if (!reader.data.empty())
+    return fail(errc::malformed, where, std::to_string(reader.data.size()) + " bytes behind the last node");
   return map;
 }
 
@@ -241,7 +252,7 @@ concept octomap_model = sensor_model<M> && std::same_as<typename M::value_type, 
 /// The bytes of a `.bt` file: every voxel free or occupied, whichever is likelier; pruned.
 template <octomap_model Model>
 [[nodiscard]] std::string bt_bytes(const occupancy_octree<Model>& map) {
-  detail::bt_writer writer{{}, 0, Model::occupancy_threshold};
+  detail::bt_writer writer{{}, 0, Model::occupancy_threshold, map.tree_depth()};
   map.visit_tree([](float v) { return is_occupied<Model>(v) ? Model::clamp_max : Model::clamp_min; }, writer);
   return detail::octomap_header(detail::bt_magic, writer.nodes, map.resolution()) + writer.bytes;
 }

@@ -23,7 +23,7 @@ class hash_index {
   }
   /// Stores `position` for `name`, new or not.
   void set(std::uint64_t name, std::uint32_t position) {
-    if (4 * (used_ + 1) > 3 * slots_.size()) grow();
+    if (2 * (used_ + 1) > slots_.size()) grow();  // absent names are asked for as often as present ones
     slot& s = slots_[place(name)];
     used_ += s.name == no_name ? 1 : 0;
     s = {name, position};

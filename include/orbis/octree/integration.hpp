@@ -197,7 +197,7 @@ class scan_marker {
         return true;
       };
       windowed = bound(0, lowest.x, highest.x) && bound(1, lowest.y, highest.y) && bound(2, lowest.z, highest.z);
-      for (worker& w : workers_) windowed = windowed && w.window.fit(*from.key, lowest, highest);
+      for (worker& w : workers_) windowed = windowed && w.window.fit(from.grid, *from.key, lowest, highest);
     }
     for (worker& w : workers_) w.windowed = windowed;
   }

@@ -24,6 +24,7 @@
 #include <orbis/octree/leaves.hpp>
 #include <orbis/octree/pruned_tree.hpp>
 #include <orbis/octree/sensor_model.hpp>
+#include <orbis/octree/update_block.hpp>
 
 namespace orbis::octree {
 
@@ -31,7 +32,7 @@ namespace orbis::octree {
 template <class T>
 struct octree_leaf {
   voxel_key key;    ///< its lowest voxel
-  int depth = 0;    ///< tree_depth for a single voxel
+  int depth = 0;    ///< the tree's depth for a single voxel
   vec3 center;      ///< metres
   double size = 0;  ///< edge, metres
   T log_odds{};
@@ -52,8 +53,8 @@ struct bounding_box {
   vec3 max = vec3::Zero();
 };
 
-/// A map of free, occupied and unknown space in voxels of a fixed size, 65536 along each axis and
-/// centred at the world's origin. Coordinates are metres in the world frame.
+/// A map of free, occupied and unknown space in voxels of a fixed size, 65536 along each axis unless
+/// told otherwise, and centred at the world's origin. Coordinates are metres in the world frame.
 ///
 /// @code
 ///   orbis::octree::occupancy_octree<> map{0.05};
@@ -61,7 +62,9 @@ struct bounding_box {
 ///   if (map.state(p) == orbis::octree::occupancy::occupied) ...
 /// @endcode
 ///
-/// Const members may be called from several threads at once.
+/// Const members may be called from several threads at once. A copy costs next to nothing, as it
+/// shares everything until one of the two maps changes: readers on other threads take copies between
+/// two insertions and keep them as long as they like, while the writer goes on.
 template <sensor_model Model = log_odds<>>
 class occupancy_octree {
  public:
@@ -69,11 +72,15 @@ class occupancy_octree {
   using value_type = typename Model::value_type;
   using leaf = octree_leaf<value_type>;
 
-  /// `resolution`: the edge of a voxel, metres. @pre finite and > 0
-  explicit occupancy_octree(double resolution) : grid_{resolution} {}
+  /// `resolution`: the edge of a voxel, metres. `tree_depth`: the map is 2^tree_depth voxels wide.
+  /// @pre resolution finite and > 0; 5 <= tree_depth <= max_tree_depth
+  explicit occupancy_octree(double resolution, int tree_depth = default_tree_depth) : grid_{resolution, tree_depth} {}
 
   [[nodiscard]] double resolution() const noexcept { return grid_.resolution(); }
+  [[nodiscard]] int tree_depth() const noexcept { return grid_.depth(); }
   [[nodiscard]] const voxel_grid& grid() const noexcept { return grid_; }
+  /// The bricks, for algorithms that know them.
+  [[nodiscard]] const brick_store<value_type>& store() const noexcept { return store_; }
 
   // -- insertion
 
@@ -112,9 +119,11 @@ class occupancy_octree {
     return integrate(seq, depth, camera, T_world_camera, options);
   }
 
-  /// Gives the node at `depth` (tree_depth: one voxel) whose lowest voxel is `key` one value.
+  /// Gives the node at `depth` (tree_depth(): one voxel) whose lowest voxel is `key` one value.
   /// @pre nothing is known inside it yet; key is a multiple of the node's size
-  void set_unknown_node(const voxel_key& key, int depth, value_type value) { store_.set_node(key, depth, value); }
+  void set_unknown_node(const voxel_key& key, int depth, value_type value) {
+    store_.set_node(key, tree_depth() - depth, value);
+  }
 
   /// Forgets everything but the resolution.
   void clear() {
@@ -132,8 +141,7 @@ class occupancy_octree {
     return key ? log_odds(*key) : std::nullopt;
   }
   [[nodiscard]] std::optional<value_type> log_odds(const voxel_key& key) const {
-    const value_type* value = store_.value(key);
-    return value != nullptr ? std::optional<value_type>{*value} : std::nullopt;
+    return store_.value(key);
   }
   /// The probability that `p` is occupied, empty where unknown or outside the grid.
   template <class P>
@@ -162,11 +170,11 @@ class occupancy_octree {
   }
 
   /// Calls `visit(const leaf&)` for every leaf of the pruned octree, depth first.
-  /// O(bricks log bricks + known voxels).
+  /// O(known voxels).
   template <std::invocable<const leaf&> Visit>
   void for_each_leaf(Visit&& visit) const {
-    visit_leaves(store_, [&](const voxel_key& key, int depth, value_type v) {
-      visit(leaf{key, depth, grid_.center(key, depth), grid_.node_size(depth), v, is_occupied<Model>(v)});
+    visit_leaves(store_, tree_depth(), [&](const voxel_key& key, int level, value_type v) {
+      visit(leaf{key, tree_depth() - level, grid_.center(key, level), grid_.node_size(level), v, is_occupied<Model>(v)});
     });
   }
   /// Visits the nodes of the pruned octree in preorder, see pruned_tree::visit.
@@ -177,13 +185,13 @@ class occupancy_octree {
   /// The same, of the octree whose voxels hold `value(log-odds)`.
   template <std::regular_invocable<value_type> Value, tree_visitor<value_type> Visitor>
   void visit_tree(Value&& value, Visitor&& visitor) const {
-    pruned_tree<value_type, std::remove_cvref_t<Value>>{store_, value}.visit(visitor);
+    pruned_tree<value_type, std::remove_cvref_t<Value>>{store_, tree_depth(), value}.visit(visitor);
   }
 
-  /// Counts nodes. O(bricks log bricks + known voxels), as are the four after it.
+  /// Counts nodes. O(known voxels), as are the four after it.
   [[nodiscard]] octree_counts counts() const {
     octree_counts n;
-    n.nodes = visit_leaves(store_, [&](const voxel_key&, int, value_type v) {
+    n.nodes = visit_leaves(store_, tree_depth(), [&](const voxel_key&, int, value_type v) {
       ++(is_occupied<Model>(v) ? n.occupied_leaves : n.free_leaves);
     });
     n.leaves = n.occupied_leaves + n.free_leaves;
@@ -231,22 +239,16 @@ class occupancy_octree {
     }
   }
   void apply(brick<value_type>& b, std::uint32_t octant, std::uint64_t occupied, std::uint64_t free) {
-    if ((b.uniform >> octant & 1U) != 0) {
-      // Most of a room is at its bound already: nothing can change, so nothing is unpacked.
-      const value_type v = b.value[octant];
-      if ((occupied == 0 || v >= Model::clamp_max) && (free == 0 || v <= Model::clamp_min)) return;
-    }
-    block<value_type>& voxels = store_.make_block(b, octant);
-    for (std::uint64_t bits = free; bits != 0; bits &= bits - 1) {
-      value_type& v = voxels.value[static_cast<std::size_t>(std::countr_zero(bits))];
-      v = after_miss<Model>(v);
-    }
-    for (std::uint64_t bits = occupied; bits != 0; bits &= bits - 1) {
-      value_type& v = voxels.value[static_cast<std::size_t>(std::countr_zero(bits))];
-      v = after_hit<Model>(v);
-    }
-    voxels.known |= occupied | free;
-    if (voxels.is_uniform()) store_.make_uniform(b, octant, voxels.value[0]);
+    // Most of a room is at its bound already: nothing can change, so nothing is unpacked.
+    const auto settled = [](value_type v) { return v <= Model::clamp_min; };
+    const auto certain = [](value_type v) { return v >= Model::clamp_max; };
+    if (free != 0) free &= ~store_.voxels_where(b, octant, settled);
+    if (occupied != 0) occupied &= ~store_.voxels_where(b, octant, certain);
+    if ((free | occupied) == 0) return;
+    block<value_type> voxels;
+    store_.read_octant(b, octant, voxels);
+    update_block<Model>(voxels, free, occupied);
+    store_.write_octant(b, octant, voxels);
   }
 
   voxel_grid grid_;

@@ -24,12 +24,12 @@ struct node_entry {
   T value{};
 };
 
-/// What `pruned_tree::visit` reports to: `leaf(key, depth, value)` and `inner(key, depth, value, children)`.
+/// What `pruned_tree::visit` reports to: `leaf(key, level, value)` and `inner(key, level, value, children)`.
 template <class V, class T>
-concept tree_visitor = requires(V& visitor, const voxel_key& key, int depth, T value,
+concept tree_visitor = requires(V& visitor, const voxel_key& key, int level, T value,
                                 const std::array<node_entry<T>, 8>& children) {
-  visitor.leaf(key, depth, value);
-  visitor.inner(key, depth, value, children);
+  visitor.leaf(key, level, value);
+  visitor.inner(key, level, value, children);
 };
 
 /// What eight children make of their parent.
@@ -47,14 +47,6 @@ template <class T>
   return parent;
 }
 
-/// The place of the brick that starts at `k` along the Morton curve: three bits for each level above it.
-[[nodiscard]] constexpr std::uint64_t morton_order(const voxel_key& k) noexcept {
-  std::uint64_t order = 0;
-  for (unsigned bit = 3; bit != static_cast<unsigned>(tree_depth); ++bit)
-    order |= std::uint64_t{(k.x >> bit & 1U) | (k.y >> bit & 1U) << 1U | (k.z >> bit & 1U) << 2U} << (3 * (bit - 3));
-  return order;
-}
-
 /// A snapshot of the tree's upper part over a store that must outlive it and stay as it is.
 /// `Value` maps a voxel's value to the one the tree is to show. Building it takes
 /// O(bricks log bricks + known voxels).
@@ -64,39 +56,43 @@ class pruned_tree {
   using entry = node_entry<T>;
   using children = std::array<entry, 8>;
 
-  pruned_tree(const brick_store<T>& store, Value value) : store_{store}, value_{value} {
-    items_.reserve(store.bricks().size());
-    for (std::uint32_t i = 0; i != store.bricks().size(); ++i) {
-      const std::uint64_t name = store.bricks()[i].name;
-      items_.push_back({morton_order(named_key(name)), brick_depth, i, brick_entry(store.bricks()[i])});
-    }
-    store.for_each_large([&](std::uint64_t name, T v) {
-      items_.push_back({morton_order(named_key(name)), static_cast<int>(name >> 57U), 0, {node_kind::leaf, value_(v)}});
+  /// `root_level`: the depth of the tree, voxel_grid::depth().
+  pruned_tree(const brick_store<T>& store, int root_level, Value value)
+      : store_{store}, root_level_{root_level}, value_{value} {
+    items_.reserve(store.brick_count() + store.large_count());
+    store.for_each_brick([&](const brick<T>& b) {
+      if (b.is_known()) items_.push_back({morton_order(named_key(b.name)), brick_level, &b, brick_entry(b)});
     });
-    std::sort(items_.begin(), items_.end(), [](const item& a, const item& b) { return a.order < b.order; });
-    root_ = build(0, items_);
+    if (store.has_large()) {
+      store.for_each_large([&](std::uint64_t name, T v) {
+        items_.push_back({morton_order(named_key(name)), named_level(name), nullptr, {node_kind::leaf, value_(v)}});
+      });
+      std::sort(items_.begin(), items_.end(), [](const item& a, const item& b) { return a.order < b.order; });
+    }
+    root_ = build(root_level, items_);
     // The root is never pruned away: files have no way to write a root without children.
     if (root_.value.kind == node_kind::leaf && items_.size() > 1) root_.value.kind = node_kind::inner;
   }
 
   /// Visits the nodes in preorder, children in the order of `child_key`:
-  /// `visit.leaf(key, depth, value)`, `visit.inner(key, depth, value, children)`.
+  /// `visit.leaf(key, level, value)`, `visit.inner(key, level, value, children)`.
   template <tree_visitor<T> Visitor>
   void visit(Visitor&& visitor) const {
-    if (root_.value.kind == node_kind::leaf) visitor.leaf(voxel_key{}, 0, root_.value.value);
-    if (root_.value.kind == node_kind::inner) visit_upper(visitor, {}, 0, root_);
+    if (root_.value.kind == node_kind::leaf) visitor.leaf(voxel_key{}, root_level_, root_.value.value);
+    if (root_.value.kind == node_kind::inner) visit_upper(visitor, {}, root_level_, root_);
   }
 
  private:
   struct item {
     std::uint64_t order;  ///< Morton order of its lowest brick
-    int depth;
-    std::uint32_t brick;
+    int level;
+    const brick<T>* content;
     entry value;
   };
   struct node {
     entry value;
-    std::uint32_t link = 0;  ///< the children's place in nodes_, or the brick's number
+    const brick<T>* content = nullptr;
+    std::uint32_t children = 0;  ///< their place in nodes_
   };
 
   [[nodiscard]] children voxel_entries(const block<T>& b, std::uint32_t group) const noexcept {
@@ -113,74 +109,75 @@ class pruned_tree {
   }
   [[nodiscard]] children octant_entries(const brick<T>& b) const noexcept {
     children c;
+    block<T> voxels;
     for (std::uint32_t i = 0; i != 8; ++i) {
       if ((b.uniform >> i & 1U) != 0) c[i] = {node_kind::leaf, value_(b.value[i])};
-      if ((b.dense >> i & 1U) != 0) c[i] = parent_of(group_entries(store_.block_at(b.at[i])));
+      if ((b.dense >> i & 1U) == 0) continue;
+      store_.read_octant(b, i, voxels);
+      c[i] = parent_of(group_entries(voxels));
     }
     return c;
   }
   [[nodiscard]] entry brick_entry(const brick<T>& b) const noexcept { return parent_of(octant_entries(b)); }
 
-  /// The node at `depth` over `part` of the sorted items.
-  [[nodiscard]] node build(int depth, std::span<const item> part) {
+  /// The node at `level` over `part` of the sorted items.
+  [[nodiscard]] node build(int level, std::span<const item> part) {
     if (part.empty()) return {};
-    if (part.front().depth == depth) return {part.front().value, part.front().brick};
-    const auto link = static_cast<std::uint32_t>(nodes_.size());
+    if (part.front().level == level) return {part.front().value, part.front().content};
+    const auto first = static_cast<std::uint32_t>(nodes_.size());
     nodes_.resize(nodes_.size() + 8);
-    const auto shift = 3 * static_cast<unsigned>(brick_depth - depth - 1);
+    const auto shift = 3 * static_cast<unsigned>(level - 1 - brick_level);
     children c;
     for (std::uint32_t i = 0; i != 8; ++i) {
       const auto end =
           std::find_if(part.begin(), part.end(), [&](const item& it) { return (it.order >> shift & 7U) != i; });
       const auto count = static_cast<std::size_t>(end - part.begin());
-      const node child = build(depth + 1, part.first(count));
+      const node child = build(level - 1, part.first(count));
       part = part.subspan(count);
-      nodes_[link + i] = child;
+      nodes_[first + i] = child;
       c[i] = child.value;
     }
-    return {parent_of(c), link};
+    return {parent_of(c), nullptr, first};
   }
 
   template <class Visitor>
-  void visit_upper(Visitor& visitor, const voxel_key& key, int depth, const node& at) const {
-    if (depth == brick_depth) {
+  void visit_upper(Visitor& visitor, const voxel_key& key, int level, const node& at) const {
+    if (level == brick_level) {
       visit_brick(visitor, key, at);
       return;
     }
     children c;
-    for (std::uint32_t i = 0; i != 8; ++i) c[i] = nodes_[at.link + i].value;
-    visitor.inner(key, depth, at.value.value, c);
-    for (std::uint32_t i = 0; i != 8; ++i) {
-      const voxel_key child = child_key(key, i, node_cells(depth + 1));
-      if (c[i].kind == node_kind::leaf) visitor.leaf(child, depth + 1, c[i].value);
-      if (c[i].kind == node_kind::inner) visit_upper(visitor, child, depth + 1, nodes_[at.link + i]);
-    }
+    for (std::uint32_t i = 0; i != 8; ++i) c[i] = nodes_[at.children + i].value;
+    visit_children(visitor, key, level, at.value.value, c, [&](std::uint32_t i, const voxel_key& child, T) {
+      visit_upper(visitor, child, level - 1, nodes_[at.children + i]);
+    });
   }
   template <class Visitor>
   void visit_brick(Visitor& visitor, const voxel_key& key, const node& at) const {
-    const brick<T>& b = store_.bricks()[at.link];
-    visit_children(visitor, key, brick_depth, at.value.value, octant_entries(b),
-                   [&](std::uint32_t i, const auto& octant, T max) {
-                     const block<T>& voxels = store_.block_at(b.at[i]);
-                     visit_children(visitor, octant, brick_depth + 1, max, group_entries(voxels),
-                                    [&](std::uint32_t j, const auto& group, T m) {
-                                      visit_children(visitor, group, brick_depth + 2, m, voxel_entries(voxels, j),
-                                                     [](auto&&...) {});
+    const brick<T>& b = *at.content;
+    visit_children(visitor, key, brick_level, at.value.value, octant_entries(b),
+                   [&](std::uint32_t i, const voxel_key& octant, T max) {
+                     block<T> voxels;
+                     store_.read_octant(b, i, voxels);
+                     visit_children(visitor, octant, octant_level, max, group_entries(voxels),
+                                    [&](std::uint32_t j, const voxel_key& group, T m) {
+                                      visit_children(visitor, group, 1, m, voxel_entries(voxels, j), [](auto&&...) {});
                                     });
                    });
   }
   template <class Visitor, class Inner>
-  static void visit_children(Visitor& visitor, const voxel_key& key, int depth, T max, const children& c,
+  static void visit_children(Visitor& visitor, const voxel_key& key, int level, T max, const children& c,
                              Inner&& inner) {
-    visitor.inner(key, depth, max, c);
+    visitor.inner(key, level, max, c);
     for (std::uint32_t i = 0; i != 8; ++i) {
-      const voxel_key child = child_key(key, i, node_cells(depth + 1));
-      if (c[i].kind == node_kind::leaf) visitor.leaf(child, depth + 1, c[i].value);
+      const voxel_key child = child_key(key, i, node_cells(level - 1));
+      if (c[i].kind == node_kind::leaf) visitor.leaf(child, level - 1, c[i].value);
       if (c[i].kind == node_kind::inner) inner(i, child, c[i].value);
     }
   }
 
   const brick_store<T>& store_;
+  int root_level_;
   Value value_;
   std::vector<item> items_;
   std::vector<node> nodes_;

@@ -135,12 +135,12 @@ class ray_grid {
  public:
   /// Chooses the window for rays from voxel `from` to voxels between `low` and `high`. False if the
   /// window would be too large, or reach the border of the grid: then walk the rays one by one.
-  [[nodiscard]] bool fit(const voxel_key& from, voxel_key low, voxel_key high) {
+  [[nodiscard]] bool fit(const voxel_grid& grid, const voxel_key& from, voxel_key low, voxel_key high) {
     constexpr std::uint32_t margin = 2;  // rounding may carry a walk past its end, by less than one voxel
     const auto range = [&](std::uint32_t& lo, std::uint32_t& hi, std::uint32_t k) {
       lo = std::min(lo, k);
       hi = std::max(hi, k);
-      if (lo < margin || hi + margin >= keys_per_axis) return false;
+      if (lo < margin || hi + margin >= grid.cells()) return false;
       lo = (lo - margin) & ~7U;
       hi = (hi + margin) | 7U;
       return true;

@@ -36,13 +36,14 @@ struct ray_cursor {
   std::array<std::int32_t, 3> step{};
   std::array<double, 3> next{};
   std::array<double, 3> delta{};
-  double reach = 0.0;  ///< length of the ray, where it has an end
+  double reach = 0.0;     ///< length of the ray, where it has an end
+  std::uint32_t cells{};  ///< of the grid along each axis
 
   /// `half`: from a voxel's centre to its face, as a function of the step's sign.
   template <class Half>
   ray_cursor(const voxel_grid& grid, const voxel_key& start, const float3& origin, const float3& direction,
              Half&& half) noexcept
-      : at{start.x, start.y, start.z} {
+      : at{start.x, start.y, start.z}, cells{grid.cells()} {
     for (std::size_t i = 0; i != 3; ++i) {
       step[i] = direction[i] > 0.0F ? 1 : direction[i] < 0.0F ? -1 : 0;
       if (step[i] != 0) {
@@ -77,7 +78,7 @@ struct ray_cursor {
   }
   /// Whether a step along `axis` stays inside the grid.
   [[nodiscard]] bool can_step(std::size_t axis) const noexcept {
-    return at[axis] + static_cast<std::uint32_t>(step[axis]) < keys_per_axis;
+    return at[axis] + static_cast<std::uint32_t>(step[axis]) < cells;
   }
   void advance(std::size_t axis) noexcept {
     at[axis] += static_cast<std::uint32_t>(step[axis]);

@@ -31,7 +31,7 @@ class scan_masks {
     bricks_.clear();
   }
   /// The masks of the brick that contains `k`; valid until the next call.
-  [[nodiscard]] scan_brick& at(const voxel_key& k) { return named(node_name(k, brick_depth)); }
+  [[nodiscard]] scan_brick& at(const voxel_key& k) { return named(node_name(k, brick_level)); }
 
   void mark_occupied(const voxel_key& k) {
     const std::uint32_t place = place_in_brick(k);
