@@ -1,0 +1,154 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// A sparse layer of payload, one value for each voxel that has any: colours, labels, counts beside
+/// the log-odds of a map with the same keys.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <concepts>
+#include <cstddef>
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include <orbis/octree/key.hpp>
+#include <orbis/octree/morton.hpp>
+#include <orbis/octree/octant_index.hpp>
+#include <orbis/octree/voxel_payload.hpp>
+
+namespace orbis::octree {
+
+/// Values in octants of 4x4x4 voxels, octants in pages that never move, so that a reference to a value
+/// holds until the value is erased or the layer goes. Costs 64 values for each octant that has any.
+///
+/// @code
+///   orbis::octree::voxel_layer<orbis::octree::rgb_mean> colors;
+///   if (const auto key = map.grid().key(p)) colors.make(*key).update({200, 120, 40});
+/// @endcode
+///
+/// Const members may be called from several threads at once. Copies are deep: O(memory_bytes()).
+/// Everywhere: @pre coordinates of keys < 2^21.
+template <voxel_payload T>
+class voxel_layer {
+ public:
+  using value_type = T;
+
+  /// The value of voxel `k`, or null if it has none. O(1), as are those below unless they say more.
+  [[nodiscard]] const T* find(const voxel_key& k) const noexcept {
+    const std::uint64_t code = morton_code(k);
+    const std::uint32_t i = index_.find(code >> 6U);
+    if (i == octant_index::none) return nullptr;
+    const octant& o = at(i);
+    return (o.known >> (code & 63U) & 1U) != 0 ? &o.value[code & 63U] : nullptr;
+  }
+  [[nodiscard]] T* find(const voxel_key& k) noexcept { return const_cast<T*>(std::as_const(*this).find(k)); }
+
+  /// The value of voxel `k`, value-initialised if it had none.
+  [[nodiscard]] T& make(const voxel_key& k) {
+    const std::uint64_t code = morton_code(k);
+    const std::uint32_t i = index_.find(code >> 6U);
+    octant& o = at(i != octant_index::none ? i : add(code >> 6U));
+    o.known |= std::uint64_t{1} << (code & 63U);
+    return o.value[code & 63U];
+  }
+
+  /// Takes its value from voxel `k`. Returns whether it had one.
+  bool erase(const voxel_key& k) {
+    const std::uint64_t code = morton_code(k);
+    return erase_in(code >> 6U, std::uint64_t{1} << (code & 63U)) != 0;
+  }
+  /// Takes their values from the octant, or the brick of 8x8x8 voxels, that contains `k`. Returns how
+  /// many there were.
+  std::size_t erase_octant(const voxel_key& k) { return erase_in(morton_code(k) >> 6U, ~std::uint64_t{0}); }
+  std::size_t erase_brick(const voxel_key& k) {
+    const std::uint64_t brick = morton_code(k) >> 9U;
+    std::size_t erased = 0;
+    for (std::uint64_t i = 0; i != 8; ++i) erased += erase_in(brick << 3U | i, ~std::uint64_t{0});
+    return erased;
+  }
+
+  /// Calls `visit(key, value)` for every voxel that has a value, along the Morton curve: the order
+  /// does not depend on how the layer came about. O(octants log octants + values).
+  template <std::invocable<const voxel_key&, const T&> Visit>
+  void for_each(Visit&& visit) const {
+    std::vector<std::pair<std::uint64_t, const octant*>> order;
+    order.reserve(index_.size());
+    for (const auto& page : pages_)
+      for (const octant& o : page)
+        if (o.known != 0) order.emplace_back(o.code, &o);
+    std::sort(order.begin(), order.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+    for (const auto& [code, o] : order) {
+      const voxel_key low = morton_key(code << 6U);
+      for (std::uint64_t bits = o->known; bits != 0; bits &= bits - 1) {
+        const auto i = static_cast<std::uint32_t>(std::countr_zero(bits));
+        visit(voxel_key{low.x + ((i & 1U) | (i >> 2U & 2U)), low.y + ((i >> 1U & 1U) | (i >> 3U & 2U)),
+                        low.z + ((i >> 2U & 1U) | (i >> 4U & 2U))},
+              o->value[i]);
+      }
+    }
+  }
+
+  /// Forgets everything and gives the memory back.
+  void clear() noexcept { *this = voxel_layer{}; }
+  [[nodiscard]] bool empty() const noexcept { return index_.empty(); }
+  /// The number of voxels that have a value. O(octants).
+  [[nodiscard]] std::size_t size() const noexcept {
+    std::size_t n = 0;
+    for (const auto& page : pages_)
+      for (const octant& o : page) n += static_cast<std::size_t>(std::popcount(o.known));
+    return n;
+  }
+  /// Bytes on the heap, without what the values themselves keep there.
+  [[nodiscard]] std::size_t memory_bytes() const noexcept {
+    return index_.memory_bytes() + pages_.capacity() * sizeof(pages_[0]) + pages_.size() * per_page * sizeof(octant) +
+           free_.capacity() * sizeof(std::uint32_t);
+  }
+
+ private:
+  /// `known` is 0 if and only if the octant is not in use; all values that are not known are T{}.
+  struct octant {
+    std::uint64_t code = 0;
+    std::uint64_t known = 0;
+    std::array<T, 64> value{};
+  };
+  static constexpr std::size_t per_page = std::max<std::size_t>(1, std::bit_floor(std::size_t{16384} / sizeof(octant)));
+
+  [[nodiscard]] const octant& at(std::uint32_t i) const noexcept { return pages_[i / per_page][i % per_page]; }
+  [[nodiscard]] octant& at(std::uint32_t i) noexcept { return pages_[i / per_page][i % per_page]; }
+
+  [[nodiscard]] std::uint32_t add(std::uint64_t code) {
+    if (free_.empty()) {
+      free_.reserve((pages_.size() + 1) * per_page);  // room for all: erasing cannot fail
+      const std::size_t first = pages_.size() * per_page;
+      pages_.emplace_back(per_page);
+      for (std::size_t i = per_page; i-- != 0;) free_.push_back(static_cast<std::uint32_t>(first + i));
+    }
+    const std::uint32_t i = free_.back();
+    index_.set(code, i);
+    free_.pop_back();
+    at(i).code = code;
+    return i;
+  }
+  std::size_t erase_in(std::uint64_t code, std::uint64_t mask) {
+    const std::uint32_t i = index_.find(code);
+    if (i == octant_index::none) return 0;
+    octant& o = at(i);
+    const std::uint64_t gone = o.known & mask;
+    for (std::uint64_t bits = gone; bits != 0; bits &= bits - 1)
+      o.value[static_cast<std::size_t>(std::countr_zero(bits))] = T{};
+    o.known &= ~mask;
+    if (o.known == 0) {
+      index_.erase(code);
+      free_.push_back(i);
+    }
+    return static_cast<std::size_t>(std::popcount(gone));
+  }
+
+  octant_index index_;
+  std::vector<std::vector<octant>> pages_;  ///< each of per_page octants
+  std::vector<std::uint32_t> free_;         ///< octants not in use
+};
+
+}  // namespace orbis::octree
