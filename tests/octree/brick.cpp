@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cstdint>
 #include <map>
 #include <optional>
@@ -135,7 +136,12 @@ TEST_CASE("Octants of any number of values come back as they were written") {
 
     // What changes in a copy does not change in the original, nor the other way round.
     const brick_store<float> before = store;
-    store.transform([](float v) { return v < -1.0F ? std::nullopt : std::optional{v + 1.0F}; });
+    std::size_t told = 0;
+    store.transform([](float v) { return v < -1.0F ? std::nullopt : std::optional{v + 1.0F}; },
+                    [&](std::uint64_t, std::uint32_t, std::uint64_t mask) {
+                      told += static_cast<std::size_t>(std::popcount(mask));
+                    });
+    CHECK(told == expected.voxels.size());
     expected.check(before, 1020, 60);
     reference changed;
     for (const auto& [name, v] : expected.voxels)

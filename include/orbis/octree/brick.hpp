@@ -10,6 +10,7 @@
 #include <array>
 #include <bit>
 #include <cassert>
+#include <concepts>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -228,27 +229,33 @@ class brick_store {
     }
   }
   /// Replaces every value by `change(value)`, or by nothing where that is empty: the voxel becomes
-  /// unknown. `change` is called once or more for each value of an octant. O(octants).
-  template <class Change>
+  /// unknown. `change` is called once or more for each value of an octant. Calls
+  /// `changed(name of the brick, octant, mask of voxels)` for what became different, but not for
+  /// leaves bigger than a brick. O(octants).
+  template <class Change, std::invocable<std::uint64_t, std::uint32_t, std::uint64_t> Changed>
   requires std::is_invocable_r_v<std::optional<T>, Change&, T>
-  void transform(Change&& change) {
+  void transform(Change&& change, Changed&& changed) {
     std::vector<std::uint64_t> empty;
     block<T> voxels;
     for (std::uint32_t i = 0; i != bricks_.size(); ++i) {
       if (!bricks_[i].is_known()) continue;
-      brick<T>& b = bricks_.writable(i);
       for (std::uint32_t octant = 0; octant != 8; ++octant) {
-        if ((b.uniform >> octant & 1U) != 0) {
-          if (const std::optional<T> v = change(b.value[octant]))
-            b.value[octant] = *v;
-          else
-            b.uniform &= static_cast<std::uint8_t>(~(1U << octant));
-        } else if ((b.dense >> octant & 1U) != 0) {
-          with_record(b.at[octant], [&](const auto& r) { r.transformed(change).unpack(voxels); });
-          write_octant(b, octant, voxels);
+        const brick<T>& before = bricks_[i];
+        std::uint64_t different = 0;
+        if ((before.uniform >> octant & 1U) != 0) {
+          const std::optional<T> v = change(before.value[octant]);
+          if (v == before.value[octant]) continue;
+          different = ~std::uint64_t{0};
+          brick<T>& b = bricks_.writable(i);
+          if (v) b.value[octant] = *v;
+          if (!v) drop_record(b, octant);
+        } else if ((before.dense >> octant & 1U) != 0) {
+          with_record(before.at[octant], [&](const auto& r) { r.transformed(change, different).unpack(voxels); });
+          if (different != 0) write_octant(bricks_.writable(i), octant, voxels);
         }
+        if (different != 0) changed(bricks_[i].name, octant, different);
       }
-      if (!b.is_known()) empty.push_back(b.name);
+      if (!bricks_[i].is_known()) empty.push_back(bricks_[i].name);
     }
     for (std::size_t i = 0; i < large_.size(); ++i) {  // which becomes empty with the last of them
       if (large_[i].name == gone) continue;
@@ -313,12 +320,13 @@ class brick_store {
       std::copy_n(p.value.begin(), values.size(), values.begin());
     }
     template <class Change>
-    [[nodiscard]] packed transformed(Change&& change) const {
+    [[nodiscard]] packed transformed(Change&& change, std::uint64_t& different) const {
       packed changed = *this;
       for (unsigned i = 0; i != 1U << Bits; ++i) {
         const std::uint64_t where = known & voxels_of_index<Bits>(plane.data(), i);
         if (where == 0) continue;
         const std::optional<T> v = change(values[i]);
+        if (v != values[i]) different |= where;
         if (v) changed.values[i] = *v;
         if (!v) changed.known &= ~where;
       }
@@ -346,11 +354,12 @@ class brick_store {
       values = voxels.value;
     }
     template <class Change>
-    [[nodiscard]] unpacked transformed(Change&& change) const {
+    [[nodiscard]] unpacked transformed(Change&& change, std::uint64_t& different) const {
       unpacked changed = *this;
       for (std::uint64_t rest = known; rest != 0; rest &= rest - 1) {
         const auto i = static_cast<unsigned>(std::countr_zero(rest));
         const std::optional<T> v = change(values[i]);
+        if (v != values[i]) different |= std::uint64_t{1} << i;
         changed.values[i] = v.value_or(T{});
         if (!v) changed.known &= ~(std::uint64_t{1} << i);
       }

@@ -8,9 +8,11 @@
 
 #include <bit>
 #include <cmath>
+#include <concepts>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -35,7 +37,7 @@ struct octree_leaf {
   int depth = 0;    ///< the tree's depth for a single voxel
   vec3 center;      ///< metres
   double size = 0;  ///< edge, metres
-  T log_odds{};
+  T log_odds{};     ///< in the model's units
   bool occupied = false;
 };
 
@@ -69,7 +71,8 @@ template <sensor_model Model = log_odds<>>
 class occupancy_octree {
  public:
   using model = Model;
-  using value_type = typename Model::value_type;
+  using value_type = typename Model::value_type;  ///< what is stored: log-odds in the model's units
+  using log_odds_type = std::conditional_t<std::floating_point<value_type>, value_type, float>;
   using leaf = octree_leaf<value_type>;
 
   /// `resolution`: the edge of a voxel, metres. `tree_depth`: the map is 2^tree_depth voxels wide.
@@ -96,8 +99,9 @@ class occupancy_octree {
       return coordinates<float>(first[static_cast<std::ranges::range_difference_t<const Points>>(i)]);
     };
     const auto count = static_cast<std::size_t>(std::ranges::size(points));
-    integration_summary summary = marker_.mark(policy, grid_, count, point, coordinates<float>(origin), options);
-    apply(marker_.masks(), summary);
+    integration_summary summary =
+        scratch_.marker.mark(policy, grid_, count, point, coordinates<float>(origin), options);
+    apply(scratch_.marker.masks(), summary);
     return summary;
   }
   template <point_range Points, point_like Origin>
@@ -109,9 +113,9 @@ class occupancy_octree {
   template <execution_policy Policy, camera::depth_source Depth, camera::camera_model Camera>
   integration_summary integrate(const Policy& policy, const Depth& depth, const Camera& camera,
                                 const se3& T_world_camera, const integration_options& options = {}) {
-    points_.clear();
-    append_world_points(depth, camera, T_world_camera, points_);
-    return integrate(policy, points_, T_world_camera.translation(), options);
+    scratch_.points.clear();
+    append_world_points(depth, camera, T_world_camera, scratch_.points);
+    return integrate(policy, scratch_.points, T_world_camera.translation(), options);
   }
   template <camera::depth_source Depth, camera::camera_model Camera>
   integration_summary integrate(const Depth& depth, const Camera& camera, const se3& T_world_camera,
@@ -128,35 +132,90 @@ class occupancy_octree {
   /// Forgets everything but the resolution.
   void clear() {
     store_.clear();
-    marker_ = {};
-    points_ = {};
+    scratch_ = {};
+  }
+
+  // -- changing what is known
+
+  /// Lets `edit` change the octant of 4x4x4 voxels that contains `k`; see block.
+  template <std::invocable<block<value_type>&> Edit>
+  void edit_octant(const voxel_key& k, Edit&& edit) {
+    brick<value_type>& b = store_.make(k);
+    const std::uint32_t octant = place_in_brick(k) >> 6U;
+    block<value_type> voxels;
+    store_.read_octant(b, octant, voxels);
+    edit(voxels);
+    store_.write_octant(b, octant, voxels);
+  }
+  /// Replaces every voxel's log-odds by `change(log-odds)`, a std::optional: empty makes the voxel
+  /// unknown. `change` must depend on its argument alone. O(octants), not voxels.
+  template <class Change>
+  requires std::is_invocable_r_v<std::optional<value_type>, Change&, value_type>
+  void transform(Change&& change) {
+    store_.transform(change, [](std::uint64_t, std::uint32_t, std::uint64_t) {});
+  }
+  /// Makes every voxel as certain as the model allows: what is more likely occupied than free gets the
+  /// upper bound, everything else the lower one. This is what `.bt` files hold.
+  void to_maximum_likelihood() {
+    transform([](value_type v) { return std::optional{is_occupied<Model>(v) ? Model::clamp_max : Model::clamp_min}; });
+  }
+  /// A rolling window: forgets every brick (8x8x8 voxels) and larger leaf that lies outside `box`
+  /// altogether, after `evict(const leaf&)` has seen its leaves. What was evicted comes back by
+  /// `set_unknown_node(leaf.key, leaf.depth, leaf.log_odds)`. Returns the number of bricks and larger
+  /// leaves that went. O(bricks + voxels evicted).
+  template <std::invocable<const leaf&> Evict>
+  std::size_t evict_outside(const bounding_box& box, Evict&& evict) {
+    const auto is_outside = [&](std::uint64_t name) {
+      const double size = grid_.node_size(named_level(name));
+      const vec3 low = grid_.center(named_key(name), named_level(name)).array() - size / 2.0;
+      return (low.array() > box.max.array()).any() || (low.array() + size < box.min.array()).any();
+    };
+    brick_store<value_type> evicted = store_;
+    std::vector<std::uint64_t> kept, gone, kept_large, gone_large;
+    store_.for_each_brick([&](const brick<value_type>& b) { (is_outside(b.name) ? gone : kept).push_back(b.name); });
+    store_.for_each_large(
+        [&](std::uint64_t name, value_type) { (is_outside(name) ? gone_large : kept_large).push_back(name); });
+    evicted.erase_bricks(kept);
+    evicted.erase_large(kept_large);
+    visit_leaves(evicted, tree_depth(), [&](const voxel_key& key, int level, value_type v) { evict(leaf_of(key, level, v)); });
+    store_.erase_bricks(gone);
+    store_.erase_large(gone_large);
+    return gone.size() + gone_large.size();
   }
 
   // -- queries
 
-  /// The log-odds at `p`, empty where unknown or outside the grid.
+  /// What is stored at `p`, in the model's units: empty where unknown or outside the grid.
   template <point_like P>
-  [[nodiscard]] std::optional<value_type> log_odds(const P& p) const {
+  [[nodiscard]] std::optional<value_type> value(const P& p) const {
     const auto key = grid_.key(p);
-    return key ? log_odds(*key) : std::nullopt;
+    return key ? store_.value(*key) : std::nullopt;
   }
-  [[nodiscard]] std::optional<value_type> log_odds(const voxel_key& key) const {
-    return store_.value(key);
+  [[nodiscard]] std::optional<value_type> value(const voxel_key& key) const { return store_.value(key); }
+  /// The log-odds at `p`, empty where unknown or outside the grid.
+  template <class P>
+  requires point_like<P> || std::same_as<P, voxel_key>
+  [[nodiscard]] std::optional<log_odds_type> log_odds(const P& p) const {
+    const auto v = value(p);
+    if constexpr (std::same_as<log_odds_type, value_type>)
+      return v;
+    else
+      return v ? std::optional{static_cast<log_odds_type>(to_log_odds<Model>(*v))} : std::nullopt;
   }
   /// The probability that `p` is occupied, empty where unknown or outside the grid.
   template <class P>
   requires point_like<P> || std::same_as<P, voxel_key>
   [[nodiscard]] std::optional<double> probability(const P& p) const {
-    const auto value = log_odds(p);
-    return value ? std::optional{probability_of(static_cast<double>(*value))} : std::nullopt;
+    const auto v = value(p);
+    return v ? std::optional{probability_of<Model>(*v)} : std::nullopt;
   }
   /// What is known about `p`.
   template <class P>
   requires point_like<P> || std::same_as<P, voxel_key>
   [[nodiscard]] occupancy state(const P& p) const {
-    const auto value = log_odds(p);
-    if (!value) return occupancy::unknown;
-    return is_occupied<Model>(*value) ? occupancy::occupied : occupancy::free;
+    const auto v = value(p);
+    if (!v) return occupancy::unknown;
+    return is_occupied<Model>(*v) ? occupancy::occupied : occupancy::free;
   }
 
   /// The first voxel along a ray that is occupied, or unknown unless `ignore_unknown`; a range that
@@ -174,7 +233,7 @@ class occupancy_octree {
   template <std::invocable<const leaf&> Visit>
   void for_each_leaf(Visit&& visit) const {
     visit_leaves(store_, tree_depth(), [&](const voxel_key& key, int level, value_type v) {
-      visit(leaf{key, tree_depth() - level, grid_.center(key, level), grid_.node_size(level), v, is_occupied<Model>(v)});
+      visit(leaf_of(key, level, v));
     });
   }
   /// Visits the nodes of the pruned octree in preorder, see pruned_tree::visit.
@@ -222,10 +281,26 @@ class occupancy_octree {
   /// Bytes on the heap: the map's own, and the buffers kept for the next scan.
   [[nodiscard]] std::size_t memory_bytes() const noexcept { return store_.memory_bytes(); }
   [[nodiscard]] std::size_t buffer_bytes() const noexcept {
-    return marker_.memory_bytes() + points_.capacity() * sizeof(vec3f);
+    return scratch_.marker.memory_bytes() + scratch_.points.capacity() * sizeof(vec3f);
   }
 
  private:
+  /// Buffers for the next scan: kept from scan to scan, but nothing a copy needs.
+  struct scratch {
+    scan_marker marker;
+    std::vector<vec3f> points;
+
+    scratch() = default;
+    scratch(const scratch&) {}
+    scratch(scratch&&) noexcept = default;
+    scratch& operator=(const scratch&) { return *this; }
+    scratch& operator=(scratch&&) noexcept = default;
+    ~scratch() = default;
+  };
+
+  [[nodiscard]] leaf leaf_of(const voxel_key& key, int level, value_type v) const {
+    return {key, tree_depth() - level, grid_.center(key, level), grid_.node_size(level), v, is_occupied<Model>(v)};
+  }
   void apply(const scan_masks& scan, integration_summary& summary) {
     for (const scan_brick& s : scan.bricks()) {
       brick<value_type>& b = store_.make(named_key(s.name));
@@ -253,8 +328,7 @@ class occupancy_octree {
 
   voxel_grid grid_;
   brick_store<value_type> store_;
-  scan_marker marker_;
-  std::vector<vec3f> points_;
+  scratch scratch_;
 };
 
 }  // namespace orbis::octree

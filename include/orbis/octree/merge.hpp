@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// One map made of two.
+#pragma once
+
+#include <algorithm>
+#include <bit>
+#include <concepts>
+#include <cstddef>
+#include <cstdint>
+#include <type_traits>
+#include <vector>
+
+#include <orbis/core/execution.hpp>
+#include <orbis/core/progress.hpp>
+#include <orbis/core/se3.hpp>
+#include <orbis/octree/occupancy_octree.hpp>
+
+namespace orbis::octree {
+
+struct merge_summary {
+  std::size_t merged = 0;  ///< voxels that got evidence from the other map
+  bool cancelled = false;  ///< by the progress callback; some voxels have been merged, some have not
+};
+
+namespace detail {
+
+/// The sum of two beliefs within the model's bounds.
+template <sensor_model M>
+[[nodiscard]] constexpr typename M::value_type sum_of(typename M::value_type a, typename M::value_type b) noexcept {
+  using T = typename M::value_type;
+  using wide = std::conditional_t<std::integral<T>, std::int64_t, T>;
+  const wide sum = static_cast<wide>(a) + static_cast<wide>(b);
+  return static_cast<T>(std::clamp<wide>(sum, M::clamp_min, M::clamp_max));
+}
+
+/// The octants of `grid` that the axis-aligned box overlaps, appended by their lowest voxels.
+inline void append_octants(const voxel_grid& grid, const vec3& low, const vec3& high, std::vector<voxel_key>& octants) {
+  const double edge = (grid.cells() / 2) * grid.resolution();
+  voxel_key first, last;
+  const auto range = [&](double lo, double hi, std::uint32_t& from, std::uint32_t& to) {
+    if (!(hi >= -edge && lo < edge)) return false;
+    from = grid.key(std::max(lo, -edge)).value_or(0) & ~3U;
+    to = grid.key(hi).value_or(grid.cells() - 1);
+    return true;
+  };
+  if (!range(low.x(), high.x(), first.x, last.x) || !range(low.y(), high.y(), first.y, last.y) ||
+      !range(low.z(), high.z(), first.z, last.z))
+    return;
+  for (std::uint32_t z = first.z; z <= last.z; z += 4)
+    for (std::uint32_t y = first.y; y <= last.y; y += 4)
+      for (std::uint32_t x = first.x; x <= last.x; x += 4) octants.push_back({x, y, z});
+}
+
+/// The octants of `grid` in which something known of `from` may lie, moved by `T`; each once, in a
+/// fixed order.
+template <sensor_model Model, class From>
+[[nodiscard]] std::vector<voxel_key> octants_around(const voxel_grid& grid, const From& from, const se3& T) {
+  std::vector<voxel_key> octants;
+  const mat3 extent = T.rotation_matrix().cwiseAbs();
+  const auto add = [&](const voxel_key& k, int level) {
+    const vec3 center = T * from.grid().center(k, level);
+    const vec3 half = extent * vec3::Constant(from.grid().node_size(level) * 0.5 * (1.0 + 1e-9));
+    append_octants(grid, center - half, center + half, octants);
+  };
+  from.store().for_each_brick([&](const auto& b) {
+    for (unsigned i = 0; i != 8; ++i) {
+      const voxel_key octant = child_key(named_key(b.name), i, node_cells(octant_level));
+      if (((b.uniform | b.dense) >> i & 1U) != 0) add(octant, octant_level);
+    }
+  });
+  from.store().for_each_large([&](std::uint64_t name, auto) { add(named_key(name), named_level(name)); });
+  const auto before = [](const voxel_key& a, const voxel_key& b) {
+    return node_name(a, octant_level) < node_name(b, octant_level);
+  };
+  std::sort(octants.begin(), octants.end(), before);
+  octants.erase(std::unique(octants.begin(), octants.end()), octants.end());
+  return octants;
+}
+
+}  // namespace detail
+
+/// Adds the evidence of `from` to `into`: the log-odds of every voxel of `into` whose centre lies in a
+/// known voxel of `from` grow by that voxel's log-odds, within the model's bounds (the two maps come
+/// from independent observations). `T_into_from` moves points of `from` to the frame of `into`.
+/// Resolutions may differ. With the same grid and the identity, or a shift by whole voxels, it is the
+/// sum of the two maps voxel by voxel; else every voxel takes the value of the nearest, so that
+/// surfaces move by up to half a voxel's diagonal.
+///
+/// The result is the same under every policy. O(volume known to `from`, in octants of `into`).
+template <execution_policy Policy, sensor_model Model, class... Rest>
+merge_summary merge(const Policy& policy, occupancy_octree<Model, Rest...>& into,
+                    const occupancy_octree<Model, Rest...>& from, const se3& T_into_from = {}, progress report = {}) {
+  using value_type = typename Model::value_type;
+  const std::vector<voxel_key> octants = detail::octants_around<Model>(into.grid(), from, T_into_from);
+  const se3 T_from_into = T_into_from.inverse();
+  const mat3 rotation = T_from_into.rotation_matrix();
+  const vec3 translation = T_from_into.translation();
+
+  merge_summary summary;
+  constexpr std::size_t batch = 4096;
+  std::vector<block<value_type>> found(std::min(batch, octants.size()));
+  for (std::size_t begin = 0; begin < octants.size(); begin += batch) {
+    if (!report(begin, octants.size())) {
+      summary.cancelled = true;
+      return summary;
+    }
+    const std::size_t count = std::min(batch, octants.size() - begin);
+    for_each_index(policy, count, 64, [&](std::size_t i) {
+      block<value_type>& b = found[i];
+      b = {};
+      const voxel_key& octant = octants[begin + i];
+      for (std::uint32_t place = 0; place != 64; ++place) {
+        const voxel_key in = voxel_in_brick(place);
+        const voxel_key k{octant.x + in.x, octant.y + in.y, octant.z + in.z};
+        const vec3 p = rotation * into.grid().center(k) + translation;
+        if (const auto v = from.value(p)) {
+          b.value[place] = *v;
+          b.known |= std::uint64_t{1} << place;
+        }
+      }
+    });
+    for (std::size_t i = 0; i != count; ++i) {
+      const block<value_type>& b = found[i];
+      if (b.known == 0) continue;
+      summary.merged += static_cast<std::size_t>(std::popcount(b.known));
+      into.edit_octant(octants[begin + i], [&](block<value_type>& voxels) {
+        for (std::uint64_t rest = b.known; rest != 0; rest &= rest - 1) {
+          const auto place = static_cast<std::size_t>(std::countr_zero(rest));
+          voxels.value[place] = detail::sum_of<Model>(voxels.value[place], b.value[place]);
+        }
+        voxels.known |= b.known;
+      });
+    }
+  }
+  return summary;
+}
+template <sensor_model Model, class... Rest>
+merge_summary merge(occupancy_octree<Model, Rest...>& into, const occupancy_octree<Model, Rest...>& from,
+                    const se3& T_into_from = {}, progress report = {}) {
+  return merge(seq, into, from, T_into_from, report);
+}
+
+}  // namespace orbis::octree

@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Taking an earlier scan out of a map again.
+#pragma once
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <concepts>
+#include <cstddef>
+#include <cstdint>
+#include <ranges>
+
+#include <orbis/core/execution.hpp>
+#include <orbis/octree/merge.hpp>
+#include <orbis/octree/occupancy_octree.hpp>
+
+namespace orbis::octree {
+
+struct subtraction_summary {
+  std::size_t restored = 0;   ///< voxels that are what they would be without the scan
+  std::size_t forgotten = 0;  ///< of these, voxels that only this scan had seen: unknown again
+  std::size_t lost = 0;       ///< voxels at a bound, left as they are: nobody knows where they would be
+};
+
+/// Takes back what `map.integrate(points, origin, options)` added: give it the same arguments.
+///
+/// Clamping forgets: of a voxel at a bound it cannot be told whether the scan made a difference, so
+/// that it stays as it is and counts as lost. Nor can a bound that was touched and left in between be
+/// undone; such voxels come out too certain by at most what was clamped away. In floating point
+/// values come back to within a few rounding errors (1e-5); a value that near to 0 is taken for
+/// nothing at all, and the voxel becomes unknown.
+template <execution_policy Policy, sensor_model Model, class... Rest, point_range Points, point_like Origin>
+subtraction_summary subtract(const Policy& policy, occupancy_octree<Model, Rest...>& map, const Points& points,
+                             const Origin& origin, const integration_options& options = {}) {
+  using value_type = typename Model::value_type;
+  const auto first = std::ranges::begin(points);
+  const auto point = [&](std::size_t i) {
+    return coordinates<float>(first[static_cast<std::ranges::range_difference_t<const Points>>(i)]);
+  };
+  scan_marker marker;
+  marker.mark(policy, map.grid(), static_cast<std::size_t>(std::ranges::size(points)), point,
+              coordinates<float>(origin), options);
+
+  subtraction_summary summary;
+  const auto is_nothing = [](value_type v) {
+    if constexpr (std::floating_point<value_type>)
+      return std::fabs(v) < static_cast<value_type>(1e-5);
+    else
+      return v == 0;
+  };
+  for (const scan_brick& s : marker.masks().bricks()) {
+    if (map.store().find(named_key(s.name)) == nullptr) continue;
+    for (unsigned octant = 0; octant != 8; ++octant) {
+      if ((s.occupied[octant] | s.free[octant]) == 0) continue;
+      map.edit_octant(child_key(named_key(s.name), octant, node_cells(octant_level)), [&](block<value_type>& voxels) {
+        for (std::uint64_t rest = (s.occupied[octant] | s.free[octant]) & voxels.known; rest != 0; rest &= rest - 1) {
+          const auto place = static_cast<std::size_t>(std::countr_zero(rest));
+          const bool hit = (s.occupied[octant] >> place & 1U) != 0;
+          value_type& v = voxels.value[place];
+          if (v <= Model::clamp_min || v >= Model::clamp_max) {
+            ++summary.lost;
+            continue;
+          }
+          v = detail::sum_of<Model>(v, static_cast<value_type>(-(hit ? Model::hit : Model::miss)));
+          ++summary.restored;
+          if (!is_nothing(v)) continue;
+          v = value_type{};
+          voxels.known &= ~(std::uint64_t{1} << place);
+          ++summary.forgotten;
+        }
+      });
+    }
+  }
+  return summary;
+}
+template <sensor_model Model, class... Rest, point_range Points, point_like Origin>
+subtraction_summary subtract(occupancy_octree<Model, Rest...>& map, const Points& points, const Origin& origin,
+                             const integration_options& options = {}) {
+  return subtract(seq, map, points, origin, options);
+}
+
+}  // namespace orbis::octree
