@@ -1,0 +1,155 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// Any bytes as a few scans: resolution, then for each scan options, origin and points, among them NaN,
+// infinities, points far outside the grid and points on the faces of voxels. The map must be OctoMap's,
+// whatever the order of the points, their number of copies, and the number of threads.
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <span>
+#include <vector>
+
+#include <orbis/core/execution.hpp>
+
+#include "fuzz/octree.hpp"
+#include "octree/support.hpp"
+
+namespace {
+
+using namespace orbis;
+using octree::ray_mode;
+
+/// The bytes from first to last; zeros when they are used up.
+class source {
+ public:
+  explicit source(std::span<const std::uint8_t> bytes) : bytes_{bytes} {}
+  [[nodiscard]] bool empty() const { return bytes_.empty(); }
+  [[nodiscard]] unsigned byte() {
+    if (bytes_.empty()) return 0;
+    const unsigned b = bytes_.front();
+    bytes_ = bytes_.subspan(1);
+    return b;
+  }
+  /// Any float: NaN, infinities and denormals too.
+  [[nodiscard]] float any() {
+    const unsigned b = byte() | byte() << 8U;
+    return std::bit_cast<float>(b << 16U | byte() << 8U | byte());
+  }
+  /// Eighths of voxels, so that faces, edges and corners are hit.
+  [[nodiscard]] float near(double resolution) {
+    return static_cast<float>(static_cast<int>(static_cast<std::int8_t>(byte())) * 0.125 * resolution);
+  }
+  [[nodiscard]] vec3f point(double resolution, bool wild) {
+    const auto one = [&] { return wild ? any() : near(resolution); };
+    const float x = one(), y = one();
+    return {x, y, one()};
+  }
+
+ private:
+  std::span<const std::uint8_t> bytes_;
+};
+
+struct scan {
+  octree::integration_options options;
+  vec3f origin;
+  std::vector<vec3f> points;
+  bool tame = true;  ///< everything is near, so that many copies can be afforded
+};
+
+[[nodiscard]] scan next_scan(source& from, double resolution) {
+  constexpr double ranges[] = {std::numeric_limits<double>::infinity(), 0.0, 1.0, 7.25};  // voxels
+  constexpr int most_points = 48, most_wild_points = 4;
+  const unsigned flags = from.byte();
+  scan s;
+  s.options.mode = (flags & 1U) != 0 ? ray_mode::every_ray : ray_mode::discretized;
+  s.options.max_range = ranges[flags >> 1U & 3U] * resolution;
+  s.tame = (flags & 8U) == 0;
+  s.origin = from.point(resolution, (flags & 24U) == 24U);
+  // Everything in a far corner of OctoMap's grid, and beyond it.
+  const vec3f corner = vec3f::Constant((flags & 32U) != 0 ? static_cast<float>(32760.0 * resolution) : 0.0F);
+  s.origin += corner;
+  int wild = 0;
+  for (unsigned count = from.byte() % most_points; count != 0 && !from.empty(); --count) {
+    const bool is_wild = !s.tame && (from.byte() & 3U) == 0 && ++wild <= most_wild_points;
+    vec3f p = from.point(resolution, is_wild) + corner;
+    // Rays right across the grid take OctoMap too long.
+    if (octree::voxel_grid{resolution}.key(p) && !((p - s.origin).norm() < 2000.0 * resolution)) p = s.origin;
+    s.points.push_back(p);
+  }
+  return s;
+}
+
+[[nodiscard]] std::string octomap_file(const octomap::OcTree& tree) {
+  const fuzz::octomap_silence silence;
+  return test::ot_of(tree);
+}
+
+/// OctoMap casts coordinates to int unchecked, knows no NaN, and runs away along a ray that is too short
+/// for a float to tell its direction: it gets what we do not reject. False if it cannot be asked.
+[[nodiscard]] bool insert_into_octomap(octomap::OcTree& tree, const scan& s) {
+  const octree::voxel_grid grid{tree.getResolution()};
+  const auto castable = [&](const vec3f& p) {
+    return p.allFinite() && (p.cast<double>() / tree.getResolution()).cwiseAbs().maxCoeff() < 1e9;
+  };
+  if (!s.origin.allFinite()) return true;  // every point is rejected
+  if (!castable(s.origin)) return false;
+  std::vector<vec3f> points;
+  for (const vec3f& p : s.points) {
+    const double distance = (p - s.origin).cast<double>().norm();
+    if (distance > 0.0 && distance < 1e-18) return false;
+    const bool truncated = p.allFinite() && distance > s.options.max_range;
+    if (s.options.mode == ray_mode::every_ray ? castable(p) || truncated : grid.key(p).has_value()) points.push_back(p);
+  }
+  const fuzz::octomap_silence silence;
+  test::insert(tree, points, s.origin, s.options);
+  return true;
+}
+
+void check_summary(const scan& s, const octree::integration_summary& done) {
+  if (s.options.mode == ray_mode::every_ray)
+    fuzz::require(done.used + done.truncated + done.rejected == s.points.size(), "every point is accounted for");
+  else
+    fuzz::require(done.used + done.truncated + done.rejected <= s.points.size(), "no point is counted twice");
+  fuzz::require(done.occupied <= done.used, "no voxel is occupied without a point");
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  constexpr double resolutions[] = {0.05, 0.1, 0.02, 1.0, 0.0123456789, 1.0 / 3.0, 1e-3, 64.0};
+  source from{{data, size}};
+  const double resolution = resolutions[from.byte() & 7U];
+  fuzz::map ours{resolution}, shuffled{resolution};
+  octomap::OcTree theirs{resolution};
+  bool comparable = true;
+  for (int scans = 0; scans != 4 && !from.empty(); ++scans) {
+    scan s = next_scan(from, resolution);
+    const auto done = ours.integrate(s.points, s.origin, s.options);
+    check_summary(s, done);
+    comparable = insert_into_octomap(theirs, s) && comparable;
+
+    if (scans == 0) {
+      std::size_t voxels = 0;
+      ours.for_each_leaf([&](const fuzz::map::leaf& leaf) {
+        const std::size_t edge = fuzz::edge_in_voxels(ours, leaf);
+        voxels += edge * edge * edge;
+      });
+      fuzz::require(voxels == done.free + done.occupied, "a first scan leaves the voxels it counts, and no more");
+    }
+
+    // Copies, another order, several threads (which take part from some thousand points on).
+    std::reverse(s.points.begin(), s.points.end());
+    const std::size_t once = s.points.size(), copies = s.tame && once != 0 ? 9000 / once : 1;
+    for (std::size_t i = once; i < copies * once; ++i) s.points.push_back(s.points[i - once]);
+    const auto again = shuffled.integrate(par.with(3), s.points, s.origin, s.options);
+    fuzz::require(again.free == done.free && again.occupied == done.occupied, "copies and order change nothing");
+  }
+  const std::string file = ot_bytes(ours);
+  fuzz::require(ot_bytes(shuffled) == file, "the map does not depend on copies, order and threads");
+  fuzz::require(!comparable || octomap_file(theirs) == file, "the map is OctoMap's");
+  fuzz::check_map(ours);
+  return 0;
+}
