@@ -43,6 +43,22 @@ struct brick {
   }
 };
 
+/// An octant where it is stored: its known voxels, and the index of each voxel's value, bit by bit.
+template <class T>
+struct octant_view {
+  std::uint64_t known = 0;
+  const std::uint64_t* plane = nullptr;  ///< `bits` masks: bit j of every voxel's index
+  unsigned bits = 0;
+  const T* value = nullptr;
+
+  /// The value of a place. @pre it is known
+  [[nodiscard]] T at(std::uint32_t place) const noexcept {
+    unsigned index = 0;
+    for (unsigned j = 0; j != bits; ++j) index |= static_cast<unsigned>(plane[j] >> place & 1U) << j;
+    return value[index];
+  }
+};
+
 /// All the bricks of a map. A copy shares everything with the original until one of them changes.
 template <class T>
 class brick_store {
@@ -83,6 +99,11 @@ class brick_store {
     if (i == none) return std::nullopt;
     return std::pair{large_[i].value, named_level(large_[i].name)};
   }
+  /// That leaf's value, valid until the store changes, or null.
+  [[nodiscard]] const T* find_large_value(const voxel_key& k) const noexcept {
+    const std::uint32_t i = large_count_ == 0 ? none : find_large_index(k);
+    return i == none ? nullptr : &large_[i].value;
+  }
   /// The value of a place in a brick, empty where nothing is known.
   [[nodiscard]] std::optional<T> value(const brick<T>& b, std::uint32_t place) const noexcept {
     const std::uint32_t octant = place >> 6U;
@@ -100,6 +121,12 @@ class brick_store {
     if (large_count_ == 0) return std::nullopt;
     const auto large = find_large(k);
     return large ? std::optional{large->first} : std::nullopt;
+  }
+  /// Octant `i` of `b` in place; valid until the store or `b` changes.
+  [[nodiscard]] octant_view<T> view(const brick<T>& b, std::uint32_t i) const noexcept {
+    if ((b.uniform >> i & 1U) != 0) return {~std::uint64_t{0}, nullptr, 0, &b.value[i]};
+    if ((b.dense >> i & 1U) == 0) return {};
+    return with_record(b.at[i], [](const auto& r) { return r.view(); });
   }
   /// The known voxels of octant `i` of `b`.
   [[nodiscard]] std::uint64_t known(const brick<T>& b, std::uint32_t i) const noexcept {
@@ -174,30 +201,30 @@ class brick_store {
   }
   /// Stores `voxels` as octant `i` of `b`.
   void write_octant(brick<T>& b, std::uint32_t i, const block<T>& voxels) {
-    const auto bit = static_cast<std::uint8_t>(1U << i);
-    b.uniform &= static_cast<std::uint8_t>(~bit);
-    if (voxels.known == 0) {
-      drop_record(b, i);
-      return;
-    }
     palette<T> p;
     find_palette(voxels, p);
-    if (p.count == 1 && voxels.known == ~std::uint64_t{0}) {
-      make_uniform(b, i, p.value[0]);
+    if (p.count <= max_palette) {
+      write_octant(b, i, voxels.known, p);
       return;
     }
-    const unsigned bits = p.count > max_palette ? raw : static_cast<unsigned>(std::bit_width(p.count - 1));
-    if ((b.dense & bit) == 0 || pool_of(b.at[i]) != bits) {
+    make_record(b, i, raw);
+    std::get<raw>(pools_).items.writable(place_of(b.at[i])).pack(voxels);
+    b.value[i] = voxels.value[static_cast<std::size_t>(std::countr_zero(voxels.known))];
+    for (std::uint64_t rest = voxels.known; rest != 0; rest &= rest - 1)
+      b.value[i] = std::max(b.value[i], voxels.value[static_cast<std::size_t>(std::countr_zero(rest))]);
+  }
+  /// Stores the voxels `known` with the values that `p` gives them as octant `i` of `b`.
+  /// @pre p.count <= max_palette, its values are distinct and each is some known voxel's
+  void write_octant(brick<T>& b, std::uint32_t i, std::uint64_t known, const palette<T>& p) {
+    if (known == 0) {
       drop_record(b, i);
-      b.at[i] = new_record(bits);
-      b.dense |= bit;
-    }
-    with_writable_record(b.at[i], [&](auto& r) { r.pack(voxels, p); });
-    if (bits == raw) {
-      b.value[i] = voxels.value[static_cast<std::size_t>(std::countr_zero(voxels.known))];
-      for (std::uint64_t rest = voxels.known; rest != 0; rest &= rest - 1)
-        b.value[i] = std::max(b.value[i], voxels.value[static_cast<std::size_t>(std::countr_zero(rest))]);
+    } else if (p.count == 1 && known == ~std::uint64_t{0}) {
+      make_uniform(b, i, p.value[0]);
     } else {
+      make_record(b, i, static_cast<unsigned>(std::bit_width(p.count - 1)));
+      with_writable_record(b.at[i], [&](auto& r) {
+        if constexpr (requires { r.pack(known, p); }) r.pack(known, p);
+      });
       b.value[i] = *std::max_element(p.value.begin(), p.value.begin() + p.count);
     }
   }
@@ -298,6 +325,7 @@ class brick_store {
     std::array<std::uint64_t, Bits> plane{};
     std::array<T, 1U << Bits> values{};
 
+    [[nodiscard]] octant_view<T> view() const noexcept { return {known, plane.data(), Bits, values.data()}; }
     [[nodiscard]] T at(std::uint32_t place) const noexcept {
       unsigned index = 0;
       for (unsigned j = 0; j != Bits; ++j) index |= static_cast<unsigned>(plane[j] >> place & 1U) << j;
@@ -314,8 +342,8 @@ class brick_store {
       out.known = known;
       expand_palette(values.data(), plane.data(), Bits, out);
     }
-    void pack(const block<T>& voxels, const palette<T>& p) noexcept {
-      known = voxels.known;
+    void pack(std::uint64_t voxels, const palette<T>& p) noexcept {
+      known = voxels;
       std::copy_n(p.plane.begin(), Bits, plane.begin());
       std::copy_n(p.value.begin(), values.size(), values.begin());
     }
@@ -333,11 +361,15 @@ class brick_store {
       return changed;
     }
   };
+  /// Bit j of every place.
+  static constexpr std::array<std::uint64_t, 6> place_planes{0xaaaaaaaaaaaaaaaa, 0xcccccccccccccccc, 0xf0f0f0f0f0f0f0f0,
+                                                             0xff00ff00ff00ff00, 0xffff0000ffff0000, 0xffffffff00000000};
   /// An octant of more values than that.
   struct unpacked {
     std::uint64_t known = 0;
     std::array<T, 64> values{};
 
+    [[nodiscard]] octant_view<T> view() const noexcept { return {known, place_planes.data(), 6, values.data()}; }
     [[nodiscard]] T at(std::uint32_t place) const noexcept { return values[place]; }
     template <class Wanted>
     [[nodiscard]] std::uint64_t where(Wanted&& wanted) const noexcept {
@@ -349,7 +381,7 @@ class brick_store {
       out.known = known;
       out.value = values;
     }
-    void pack(const block<T>& voxels, const palette<T>&) noexcept {
+    void pack(const block<T>& voxels) noexcept {
       known = voxels.known;
       values = voxels.value;
     }
@@ -410,6 +442,14 @@ class brick_store {
              p.free.pop_back();
              return place;
            });
+  }
+  /// Gives octant `i` of `b` a record of its own in a pool, in use already or not.
+  void make_record(brick<T>& b, std::uint32_t i, unsigned pool) {
+    const auto bit = static_cast<std::uint8_t>(1U << i);
+    if ((b.dense & bit) != 0 && pool_of(b.at[i]) == pool) return;
+    drop_record(b, i);
+    b.at[i] = new_record(pool);
+    b.dense |= bit;
   }
   /// Makes octant `i` of `b` unknown.
   void drop_record(brick<T>& b, std::uint32_t i) {

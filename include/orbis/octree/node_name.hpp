@@ -25,6 +25,8 @@ inline constexpr int chunk_level = 5;
 [[nodiscard]] constexpr std::uint32_t place_in_brick(const voxel_key& k) noexcept {
   return spread3(k.x) | spread3(k.y) << 1U | spread3(k.z) << 2U;
 }
+/// A voxel's place in its octant.
+[[nodiscard]] constexpr std::uint32_t place_in_octant(const voxel_key& k) noexcept { return place_in_brick(k) & 63U; }
 /// The lowest voxel, relative to the brick's, of a place in a brick.
 [[nodiscard]] constexpr voxel_key voxel_in_brick(std::uint32_t place) noexcept {
   const auto gather = [](std::uint32_t v) { return (v & 1U) | (v >> 2U & 2U) | (v >> 4U & 4U); };
