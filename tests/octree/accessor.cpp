@@ -12,11 +12,11 @@ using namespace orbis::octree;
 
 namespace {
 
-/// Nodes of random size at random places, so that there are voxels, bricks and large leaves side by side.
+/// Nodes of all sizes at random places, the largest first, so that there are voxels, bricks and large leaves side by side.
 [[nodiscard]] brick_store<float> random_store(random_bits& random, std::uint32_t cells) {
   brick_store<float> store;
-  for (int i = 0; i != 400; ++i) {
-    const int level = static_cast<int>(random.below(7));
+  for (int i = 0; i != 420; ++i) {
+    const int level = 6 - i / 60;
     const voxel_key k = node_key({random.below(cells), random.below(cells), random.below(cells)}, level);
     bool empty = true;  // a node may only be set where nothing is known
     const std::uint32_t size = node_cells(level);
