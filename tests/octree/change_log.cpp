@@ -185,4 +185,9 @@ TEST_CASE("A cleared change log goes on counting and has nothing to tell") {
   log.record({8, 4, 0}, 2);
   log.record({9, 5, 1}, 4);  // the same octant
   CHECK(since(log, 50) == masks{{morton_code({8, 4, 0}) / 64, 6}});
+
+  change_log moved = std::move(log);
+  log = change_log{};
+  CHECK(log.revision() == 0);
+  CHECK(since(moved, 50) == masks{{morton_code({8, 4, 0}) / 64, 6}});
 }

@@ -9,10 +9,13 @@
 #include <concepts>
 #include <cstddef>
 #include <cstdint>
+#include <iterator>
+#include <utility>
 #include <vector>
 
 #include <orbis/octree/key.hpp>
 #include <orbis/octree/morton.hpp>
+#include <orbis/octree/octant_index.hpp>
 
 namespace orbis::octree {
 
@@ -25,31 +28,35 @@ namespace orbis::octree {
 ///   log.for_each_since(seen, [&](const voxel_key& octant, std::uint64_t mask) { send(octant, mask); });
 /// @endcode
 ///
-/// 16 bytes for each recorded octant and revision, up to a capacity; then the oldest revisions are
-/// merged, each octant once (24 bytes), so that memory is bounded by the capacity and the number of
-/// octants that have ever changed. Const members may be called from several threads at once.
+/// 24 bytes for each recorded octant and revision, up to a capacity; beyond it the oldest are merged,
+/// one for each octant, a few with each new one, so that memory is bounded by the capacity and the
+/// number of octants that have ever changed and no record() waits for long. Const members may be
+/// called from several threads at once.
 class change_log {
  public:
   /// The current revision; 0 until the first begin_revision().
   [[nodiscard]] std::uint64_t revision() const noexcept { return revision_; }
   /// Begins the next revision, and returns its number.
-  std::uint64_t begin_revision() noexcept { return ++revision_; }
+  std::uint64_t begin_revision() noexcept {
+    if (entries_.size() < 2 * capacity_) limit_ = 2 * capacity_;
+    return ++revision_;
+  }
 
   /// Voxels of the octant that contains `k` have changed in this revision: those whose bits are set, in
-  /// Morton order. Any number of times for the same octant. Amortised O(log capacity), if the octants
-  /// that have changed are not many more than the capacity. @pre revision() != 0; coordinates < 2^21
+  /// Morton order. Any number of times for the same octant. Amortised O(1), as long as no revision
+  /// outgrows twice the capacity. @pre revision() != 0; coordinates < 2^21
   void record(const voxel_key& k, std::uint64_t mask) {
     assert(revision_ != 0);
     if (mask == 0) return;
     const std::uint64_t octant = morton_code(k) >> 6U;
-    if (runs_.empty() || runs_.back().revision != revision_) {
-      runs_.push_back({revision_, entries_.size()});
-    } else if (entries_.back().octant == octant) {
+    if (!entries_.empty() && entries_.back().octant == octant && entries_.back().revision == revision_) {
       entries_.back().mask |= mask;
       return;
     }
-    if (entries_.size() >= limit_) compact();
-    entries_.push_back({octant, mask});
+    // Two old ones for each new one: a log that has grown too long shrinks again.
+    for (int i = 0; i != 2 && entries_.size() >= capacity_; ++i) merge_oldest();
+    if (entries_.size() >= limit_) unite_newest();
+    entries_.push_back({octant, mask, revision_});
   }
 
   /// Calls `visit(lowest voxel of the octant, mask)` once for every octant of which a voxel changed
@@ -63,10 +70,10 @@ class change_log {
     const std::size_t first = first_after(revision);
     changed.reserve((revision < exact_since_ ? merged_.size() : 0) + entries_.size() - first);
     if (revision < exact_since_)
-      for (const merged_entry& m : merged_)
-        if (m.last > revision) changed.push_back({m.octant, m.mask});
-    changed.insert(changed.end(), entries_.begin() + static_cast<std::ptrdiff_t>(first), entries_.end());
-    unite(changed, 0);
+      std::copy_if(merged_.begin(), merged_.end(), std::back_inserter(changed),
+                   [&](const entry& e) { return e.revision > revision; });
+    for (std::size_t i = first; i != entries_.size(); ++i) changed.push_back(entries_[i]);
+    unite(changed);
     for (const entry& e : changed) visit(morton_key(e.octant << 6U), e.mask);
   }
 
@@ -75,8 +82,11 @@ class change_log {
     if (revision <= complete_since_) return;
     complete_since_ = std::min(revision, revision_);
     exact_since_ = std::max(exact_since_, complete_since_);
-    std::erase_if(merged_, [&](const merged_entry& m) { return m.last <= complete_since_; });
-    drop_first(runs_until(complete_since_));
+    while (!entries_.empty() && entries_[0].revision <= complete_since_) entries_.pop_front();
+    std::erase_if(merged_, [&](const entry& e) { return e.revision <= complete_since_; });
+    merged_index_.clear();
+    for (std::size_t i = 0; i != merged_.size(); ++i)
+      merged_index_.set(merged_[i].octant, static_cast<std::uint32_t>(i));
   }
   /// The oldest revision that may be asked about, see forget_before() and clear(): who has seen only an
   /// older one needs the whole map.
@@ -89,8 +99,9 @@ class change_log {
   /// never merged, however much there is of it.
   void set_capacity(std::size_t entries) {
     capacity_ = entries;
-    limit_ = entries;
-    if (entries_.size() > limit_) compact();
+    limit_ = 2 * entries;
+    while (entries_.size() > capacity_ && merge_oldest()) {
+    }
   }
   [[nodiscard]] std::size_t capacity() const noexcept { return capacity_; }
 
@@ -99,107 +110,125 @@ class change_log {
     const std::size_t capacity = capacity_;
     const std::uint64_t revision = revision_;
     *this = {};
-    capacity_ = limit_ = capacity;
+    set_capacity(capacity);
     revision_ = complete_since_ = exact_since_ = revision;
   }
   /// Bytes on the heap.
   [[nodiscard]] std::size_t memory_bytes() const noexcept {
-    return entries_.capacity() * sizeof(entry) + runs_.capacity() * sizeof(run) +
-           merged_.capacity() * sizeof(merged_entry);
+    return entries_.memory_bytes() + merged_.capacity() * sizeof(entry) + merged_index_.memory_bytes();
   }
 
  private:
   struct entry {
     std::uint64_t octant;  ///< its Morton code
     std::uint64_t mask;
-  };
-  /// The entries of one revision: from `first` to where the next run begins.
-  struct run {
-    std::uint64_t revision;
-    std::size_t first;
-  };
-  struct merged_entry {
-    std::uint64_t octant;
-    std::uint64_t mask;
-    std::uint64_t last;  ///< revision in which it changed
+    std::uint64_t revision;  ///< in which it changed; the last one if several are merged
   };
 
-  /// The number of runs of revisions up to `revision`.
-  [[nodiscard]] std::size_t runs_until(std::uint64_t revision) const noexcept {
-    const auto after =
-        std::partition_point(runs_.begin(), runs_.end(), [&](const run& r) { return r.revision <= revision; });
-    return static_cast<std::size_t>(after - runs_.begin());
-  }
-  [[nodiscard]] std::size_t run_begin(std::size_t i) const noexcept {
-    return i == runs_.size() ? entries_.size() : runs_[i].first;
-  }
+  /// First in, first out, in a ring that grows to the longest it has been.
+  class queue {
+   public:
+    queue() = default;
+    queue(const queue&) = default;
+    queue(queue&& other) noexcept
+        : ring_{std::exchange(other.ring_, {})}, first_{other.first_}, size_{std::exchange(other.size_, 0)} {}
+    queue& operator=(queue other) noexcept {
+      std::swap(ring_, other.ring_);
+      std::swap(first_, other.first_);
+      std::swap(size_, other.size_);
+      return *this;
+    }
+    ~queue() = default;
+
+    [[nodiscard]] std::size_t size() const noexcept { return size_; }
+    [[nodiscard]] bool empty() const noexcept { return size_ == 0; }
+    [[nodiscard]] const entry& operator[](std::size_t i) const noexcept { return ring_[place(i)]; }
+    [[nodiscard]] entry& operator[](std::size_t i) noexcept { return ring_[place(i)]; }
+    [[nodiscard]] entry& back() noexcept { return ring_[place(size_ - 1)]; }
+    void push_back(const entry& e) {
+      if (size_ == ring_.size()) {
+        std::vector<entry> longer(std::max<std::size_t>(16, 2 * size_));
+        for (std::size_t i = 0; i != size_; ++i) longer[i] = (*this)[i];
+        ring_ = std::move(longer);
+        first_ = 0;
+      }
+      ring_[place(size_++)] = e;
+    }
+    void pop_front() noexcept {
+      first_ = place(1);
+      --size_;
+    }
+    void truncate(std::size_t n) noexcept { size_ = n; }
+    [[nodiscard]] std::size_t memory_bytes() const noexcept { return ring_.capacity() * sizeof(entry); }
+
+   private:
+    [[nodiscard]] std::size_t place(std::size_t i) const noexcept { return (first_ + i) & (ring_.size() - 1); }
+
+    std::vector<entry> ring_;  ///< as many as a power of two, or none
+    std::size_t first_ = 0;
+    std::size_t size_ = 0;
+  };
+
+  /// The number of entries of revisions up to `revision`.
   [[nodiscard]] std::size_t first_after(std::uint64_t revision) const noexcept {
-    return run_begin(runs_until(revision));
+    std::size_t low = 0, high = entries_.size();
+    while (low != high) {
+      const std::size_t middle = low + (high - low) / 2;
+      if (entries_[middle].revision <= revision)
+        low = middle + 1;
+      else
+        high = middle;
+    }
+    return low;
   }
 
-  /// Sorts the entries from the `first` on, each octant once.
-  static void unite(std::vector<entry>& entries, std::size_t first) {
-    const auto begin = entries.begin() + static_cast<std::ptrdiff_t>(first);
-    std::sort(begin, entries.end(), [](const entry& a, const entry& b) { return a.octant < b.octant; });
-    auto out = begin;
-    for (auto in = begin; in != entries.end(); ++in) {
-      if (out != begin && (out - 1)->octant == in->octant)
-        (out - 1)->mask |= in->mask;
+  /// Sorts entries by octant, each octant once.
+  static void unite(std::vector<entry>& entries) {
+    std::sort(entries.begin(), entries.end(), [](const entry& a, const entry& b) { return a.octant < b.octant; });
+    auto out = entries.begin();
+    for (const entry& e : entries) {
+      if (out != entries.begin() && (out - 1)->octant == e.octant)
+        (out - 1)->mask |= e.mask;
       else
-        *out++ = *in;
+        *out++ = e;
     }
     entries.erase(out, entries.end());
   }
-
-  /// Drops the first `n` runs and their entries.
-  void drop_first(std::size_t n) {
-    const std::size_t dropped = run_begin(n);
-    entries_.erase(entries_.begin(), entries_.begin() + static_cast<std::ptrdiff_t>(dropped));
-    runs_.erase(runs_.begin(), runs_.begin() + static_cast<std::ptrdiff_t>(n));
-    for (run& r : runs_) r.first -= dropped;
+  /// Unites what the current revision has so far, which loses nothing.
+  void unite_newest() {
+    const std::size_t first = first_after(revision_ - 1);
+    std::vector<entry> newest;
+    newest.reserve(entries_.size() - first);
+    for (std::size_t i = first; i != entries_.size(); ++i) newest.push_back(entries_[i]);
+    unite(newest);
+    for (std::size_t i = 0; i != newest.size(); ++i) entries_[first + i] = newest[i];
+    entries_.truncate(first + newest.size());
+    limit_ = std::max(2 * capacity_, 2 * entries_.size());
   }
-
-  /// Unites the newest revision, which loses nothing, then merges the oldest until half of the capacity
-  /// is free or only the newest is left.
-  void compact() {
-    if (runs_.empty()) return;
-    unite(entries_, runs_.back().first);
-    std::size_t n = 0;
-    while (n + 1 < runs_.size() && entries_.size() - run_begin(n) > capacity_ / 2) ++n;
-    if (n != 0) merge_first(n);
-    limit_ = std::max(capacity_, 2 * entries_.size());
-  }
-  void merge_first(std::size_t n) {
-    const std::size_t old = merged_.size();
-    for (std::size_t i = 0; i != n; ++i)
-      for (std::size_t e = run_begin(i); e != run_begin(i + 1); ++e)
-        merged_.push_back({entries_[e].octant, entries_[e].mask, runs_[i].revision});
-    const auto by_octant = [](const merged_entry& a, const merged_entry& b) { return a.octant < b.octant; };
-    const auto added = merged_.begin() + static_cast<std::ptrdiff_t>(old);
-    std::sort(added, merged_.end(), by_octant);
-    std::inplace_merge(merged_.begin(), added, merged_.end(), by_octant);
-    auto out = merged_.begin();
-    for (const merged_entry& m : merged_) {
-      if (out != merged_.begin() && (out - 1)->octant == m.octant) {
-        (out - 1)->mask |= m.mask;
-        (out - 1)->last = std::max((out - 1)->last, m.last);
-      } else {
-        *out++ = m;
-      }
+  /// Merges the oldest entry into what is kept once for each octant, unless it is of this revision.
+  bool merge_oldest() {
+    if (entries_.empty() || entries_[0].revision == revision_) return false;
+    const entry oldest = entries_[0];
+    if (const std::uint32_t i = merged_index_.find(oldest.octant); i != octant_index::none) {
+      merged_[i].mask |= oldest.mask;
+      merged_[i].revision = oldest.revision;
+    } else {
+      merged_.push_back(oldest);
+      merged_index_.set(oldest.octant, static_cast<std::uint32_t>(merged_.size() - 1));
     }
-    merged_.erase(out, merged_.end());
-    exact_since_ = std::max(exact_since_, runs_[n - 1].revision);
-    drop_first(n);
+    exact_since_ = std::max(exact_since_, oldest.revision);
+    entries_.pop_front();
+    return true;
   }
 
-  std::vector<entry> entries_;  ///< in the order of revisions
-  std::vector<run> runs_;
-  std::vector<merged_entry> merged_;  ///< in Morton order
+  queue entries_;              ///< in the order of revisions
+  std::vector<entry> merged_;  ///< each octant once
+  octant_index merged_index_;
   std::uint64_t revision_ = 0;
   std::uint64_t complete_since_ = 0;
   std::uint64_t exact_since_ = 0;
-  std::size_t capacity_ = std::size_t{1} << 20U;
-  std::size_t limit_ = capacity_;  ///< entries at which to compact
+  std::size_t capacity_ = std::size_t{1} << 18U;
+  std::size_t limit_ = 2 * capacity_;  ///< entries at which to unite those of the current revision
 };
 
 }  // namespace orbis::octree
