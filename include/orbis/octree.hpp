@@ -5,15 +5,22 @@
 
 #include <orbis/octree/brick.hpp>
 #include <orbis/octree/cast_ray.hpp>
+#include <orbis/octree/change_log.hpp>
+#include <orbis/octree/constexpr_log.hpp>
+#include <orbis/octree/decay.hpp>
 #include <orbis/octree/depth_points.hpp>
 #include <orbis/octree/files.hpp>
 #include <orbis/octree/hash_index.hpp>
 #include <orbis/octree/integration.hpp>
 #include <orbis/octree/key.hpp>
 #include <orbis/octree/leaves.hpp>
+#include <orbis/octree/morton.hpp>
 #include <orbis/octree/occupancy_octree.hpp>
+#include <orbis/octree/octant_index.hpp>
 #include <orbis/octree/pruned_tree.hpp>
 #include <orbis/octree/ray_grid.hpp>
 #include <orbis/octree/ray_walk.hpp>
 #include <orbis/octree/scan.hpp>
 #include <orbis/octree/sensor_model.hpp>
+#include <orbis/octree/voxel_layer.hpp>
+#include <orbis/octree/voxel_payload.hpp>
