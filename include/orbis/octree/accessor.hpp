@@ -14,6 +14,13 @@
 
 namespace orbis::octree {
 
+/// A map as queries see it: a sensor model, a store and the grid it lies in. See occupancy_octree.
+template <class M>
+concept octree_map = sensor_model<typename M::model> && requires(const M& map) {
+  { map.store() } -> std::same_as<const brick_store<typename M::model::value_type>&>;
+  { map.grid() } -> std::same_as<const voxel_grid&>;
+};
+
 /// Reads octants, bricks and chunks of a store, which must outlive it and stay as it is. One for each
 /// thread.
 template <class T>
@@ -34,6 +41,9 @@ class store_reader {
     const std::uint32_t place = place_in_octant(k);
     return (o.known >> place & 1U) != 0 ? std::optional{o.at(place)} : std::nullopt;
   }
+  /// The edge, in voxels, of the node that the octant asked for last stands for: more than an octant
+  /// where nothing is stored.
+  [[nodiscard]] std::uint32_t cells() const noexcept { return cells_; }
   /// Whether all that is known in the octant asked for last is less than `bound`.
   [[nodiscard]] bool is_below(T bound) const noexcept { return max_ < bound; }
   /// The chunk and the brick that hold the octant asked for last; null where there are none.

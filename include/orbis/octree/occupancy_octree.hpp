@@ -226,13 +226,13 @@ class occupancy_octree {
   }
 
   /// The first voxel along a ray that is occupied, or unknown unless `ignore_unknown`; a range that
-  /// is infinite or <= 0 is no limit. See ray_hit. O(voxels along the ray).
+  /// is infinite or <= 0 is no limit. See ray_hit, and cast_rays for many. O(voxels along the ray).
   template <point_like Origin, point_like Direction>
   [[nodiscard]] ray_hit cast_ray(const Origin& origin, const Direction& direction,
                                  double max_range = std::numeric_limits<double>::infinity(),
                                  bool ignore_unknown = false) const {
-    return octree::cast_ray<Model>(store_, grid_, coordinates<float>(origin), coordinates<float>(direction), max_range,
-                                   ignore_unknown);
+    ray_caster<Model> cast{store_, grid_, {.max_range = max_range, .ignore_unknown = ignore_unknown}};
+    return cast(coordinates<float>(origin), coordinates<float>(direction));
   }
 
   /// Calls `visit(const leaf&)` for every leaf of the pruned octree, depth first.
