@@ -16,7 +16,6 @@
 #include <orbis/octree/leaves.hpp>
 #include <orbis/octree/morton.hpp>
 #include <orbis/octree/occupancy_octree.hpp>
-#include <orbis/octree/octant_index.hpp>
 #include <orbis/octree/pruned_tree.hpp>
 #include <orbis/octree/ray_grid.hpp>
 #include <orbis/octree/ray_walk.hpp>

@@ -514,7 +514,7 @@ class brick_store {
     return none;
   }
   void drop_large(std::uint32_t i) {
-    large_index_.set(large_[i].name, none);
+    large_index_.erase(large_[i].name);
     large_.writable(i).name = gone;
     if (--large_count_ != 0) return;
     large_ = {};

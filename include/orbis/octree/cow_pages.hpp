@@ -4,6 +4,7 @@
 /// each page, and readers keep what they copied while the writer goes on.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <bit>
@@ -22,8 +23,7 @@ template <class T>
 requires std::is_trivially_copyable_v<T>
 class cow_pages {
  public:
-  static constexpr std::size_t per_page = std::bit_floor(std::size_t{4096} / sizeof(T));
-  static_assert(per_page != 0);
+  static constexpr std::size_t per_page = std::max<std::size_t>(1, std::bit_floor(std::size_t{4096} / sizeof(T)));
 
   cow_pages() = default;
   cow_pages(const cow_pages& other) : pages_{other.pages_}, size_{other.size_} {

@@ -8,6 +8,7 @@
 #include <cstdint>
 
 #include <orbis/octree/key.hpp>
+#include <orbis/octree/morton.hpp>
 
 namespace orbis::octree {
 
@@ -56,16 +57,7 @@ inline constexpr int chunk_level = 5;
 }
 
 /// The place of the brick that contains `k` along the Morton curve: three bits for each level above it.
-[[nodiscard]] constexpr std::uint64_t morton_order(const voxel_key& k) noexcept {
-  const auto spread = [](std::uint64_t v) {
-    v = (v | v << 32U) & 0x001f00000000ffffULL;
-    v = (v | v << 16U) & 0x001f0000ff0000ffULL;
-    v = (v | v << 8U) & 0x100f00f00f00f00fULL;
-    v = (v | v << 4U) & 0x10c30c30c30c30c3ULL;
-    return (v | v << 2U) & 0x1249249249249249ULL;
-  };
-  return spread(k.x >> 3U) | spread(k.y >> 3U) << 1U | spread(k.z >> 3U) << 2U;
-}
+[[nodiscard]] constexpr std::uint64_t morton_order(const voxel_key& k) noexcept { return morton_code(k) >> 9U; }
 
 static_assert(max_tree_depth - octant_level <= 19, "a node's name has 19 bits for each axis");
 

@@ -13,22 +13,24 @@
 #include <utility>
 #include <vector>
 
+#include <orbis/octree/cow_pages.hpp>
+#include <orbis/octree/hash_index.hpp>
 #include <orbis/octree/key.hpp>
 #include <orbis/octree/morton.hpp>
-#include <orbis/octree/octant_index.hpp>
 #include <orbis/octree/voxel_payload.hpp>
 
 namespace orbis::octree {
 
-/// Values in octants of 4x4x4 voxels, octants in pages that never move, so that a reference to a value
-/// holds until the value is erased or the layer goes. Costs 64 values for each octant that has any.
+/// Values in octants of 4x4x4 voxels. Costs 64 values for each octant that has any. A copy shares
+/// everything with the original until one of the two changes; a reference to a value holds until the
+/// value is erased, or the layer copied or gone.
 ///
 /// @code
 ///   orbis::octree::voxel_layer<orbis::octree::rgb_mean> colors;
 ///   if (const auto key = map.grid().key(p)) colors.make(*key).update({200, 120, 40});
 /// @endcode
 ///
-/// Const members may be called from several threads at once. Copies are deep: O(memory_bytes()).
+/// Const members may be called from several threads at once.
 /// Everywhere: @pre coordinates of keys < 2^21.
 template <voxel_payload T>
 class voxel_layer {
@@ -39,17 +41,23 @@ class voxel_layer {
   [[nodiscard]] const T* find(const voxel_key& k) const noexcept {
     const std::uint64_t code = morton_code(k);
     const std::uint32_t i = index_.find(code >> 6U);
-    if (i == octant_index::none) return nullptr;
-    const octant& o = at(i);
+    if (i == hash_index::none) return nullptr;
+    const octant& o = octants_[i];
     return (o.known >> (code & 63U) & 1U) != 0 ? &o.value[code & 63U] : nullptr;
   }
-  [[nodiscard]] T* find(const voxel_key& k) noexcept { return const_cast<T*>(std::as_const(*this).find(k)); }
+  /// The same, for writing.
+  [[nodiscard]] T* find_writable(const voxel_key& k) {
+    const std::uint64_t code = morton_code(k);
+    const std::uint32_t i = index_.find(code >> 6U);
+    if (i == hash_index::none || (octants_[i].known >> (code & 63U) & 1U) == 0) return nullptr;
+    return &octants_.writable(i).value[code & 63U];
+  }
 
   /// The value of voxel `k`, value-initialised if it had none.
   [[nodiscard]] T& make(const voxel_key& k) {
     const std::uint64_t code = morton_code(k);
     const std::uint32_t i = index_.find(code >> 6U);
-    octant& o = at(i != octant_index::none ? i : add(code >> 6U));
+    octant& o = octants_.writable(i != hash_index::none ? i : add(code >> 6U));
     o.known |= std::uint64_t{1} << (code & 63U);
     return o.value[code & 63U];
   }
@@ -75,9 +83,8 @@ class voxel_layer {
   void for_each(Visit&& visit) const {
     std::vector<std::pair<std::uint64_t, const octant*>> order;
     order.reserve(index_.size());
-    for (const auto& page : pages_)
-      for (const octant& o : page)
-        if (o.known != 0) order.emplace_back(o.code, &o);
+    for (std::size_t i = 0; i != octants_.size(); ++i)
+      if (octants_[i].known != 0) order.emplace_back(octants_[i].code, &octants_[i]);
     std::sort(order.begin(), order.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
     for (const auto& [code, o] : order) {
       const voxel_key low = morton_key(code << 6U);
@@ -96,14 +103,12 @@ class voxel_layer {
   /// The number of voxels that have a value. O(octants).
   [[nodiscard]] std::size_t size() const noexcept {
     std::size_t n = 0;
-    for (const auto& page : pages_)
-      for (const octant& o : page) n += static_cast<std::size_t>(std::popcount(o.known));
+    for (std::size_t i = 0; i != octants_.size(); ++i) n += static_cast<std::size_t>(std::popcount(octants_[i].known));
     return n;
   }
-  /// Bytes on the heap, without what the values themselves keep there.
+  /// Bytes on the heap, those shared with copies included.
   [[nodiscard]] std::size_t memory_bytes() const noexcept {
-    return index_.memory_bytes() + pages_.capacity() * sizeof(pages_[0]) + pages_.size() * per_page * sizeof(octant) +
-           free_.capacity() * sizeof(std::uint32_t);
+    return index_.memory_bytes() + octants_.memory_bytes() + free_.capacity() * sizeof(std::uint32_t);
   }
 
  private:
@@ -113,29 +118,26 @@ class voxel_layer {
     std::uint64_t known = 0;
     std::array<T, 64> value{};
   };
-  static constexpr std::size_t per_page = std::max<std::size_t>(1, std::bit_floor(std::size_t{16384} / sizeof(octant)));
-
-  [[nodiscard]] const octant& at(std::uint32_t i) const noexcept { return pages_[i / per_page][i % per_page]; }
-  [[nodiscard]] octant& at(std::uint32_t i) noexcept { return pages_[i / per_page][i % per_page]; }
 
   [[nodiscard]] std::uint32_t add(std::uint64_t code) {
+    std::uint32_t i = 0;
     if (free_.empty()) {
-      free_.reserve((pages_.size() + 1) * per_page);  // room for all: erasing cannot fail
-      const std::size_t first = pages_.size() * per_page;
-      pages_.emplace_back(per_page);
-      for (std::size_t i = per_page; i-- != 0;) free_.push_back(static_cast<std::uint32_t>(first + i));
+      i = static_cast<std::uint32_t>(octants_.size());
+      octants_.push_back({});
+    } else {
+      i = free_.back();
+      free_.pop_back();
     }
-    const std::uint32_t i = free_.back();
     index_.set(code, i);
-    free_.pop_back();
-    at(i).code = code;
+    octants_.writable(i).code = code;
     return i;
   }
   std::size_t erase_in(std::uint64_t code, std::uint64_t mask) {
     const std::uint32_t i = index_.find(code);
-    if (i == octant_index::none) return 0;
-    octant& o = at(i);
-    const std::uint64_t gone = o.known & mask;
+    if (i == hash_index::none) return 0;
+    const std::uint64_t gone = octants_[i].known & mask;
+    if (gone == 0) return 0;
+    octant& o = octants_.writable(i);
     for (std::uint64_t bits = gone; bits != 0; bits &= bits - 1)
       o.value[static_cast<std::size_t>(std::countr_zero(bits))] = T{};
     o.known &= ~mask;
@@ -146,9 +148,9 @@ class voxel_layer {
     return static_cast<std::size_t>(std::popcount(gone));
   }
 
-  octant_index index_;
-  std::vector<std::vector<octant>> pages_;  ///< each of per_page octants
-  std::vector<std::uint32_t> free_;         ///< octants not in use
+  hash_index index_;
+  cow_pages<octant> octants_;
+  std::vector<std::uint32_t> free_;  ///< octants not in use
 };
 
 }  // namespace orbis::octree

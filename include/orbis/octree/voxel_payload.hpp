@@ -10,14 +10,16 @@
 #include <cstdint>
 #include <limits>
 #include <optional>
+#include <type_traits>
 
 #include <orbis/core/image.hpp>
 
 namespace orbis::octree {
 
-/// A payload: its default value is that of a voxel that has none yet.
+/// A payload: plain bytes, which copies of a map can share; its default value is that of a voxel that
+/// has none yet.
 template <class T>
-concept voxel_payload = std::copyable<T> && std::default_initializable<T>;
+concept voxel_payload = std::copyable<T> && std::default_initializable<T> && std::is_trivially_copyable_v<T>;
 
 /// The mean of the colours seen; 8 bytes. Exact over the first 257 of them; after that the past counts
 /// as 128 observations or more, so that the mean follows the last two hundred or so.
