@@ -4,6 +4,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cassert>
 #include <cmath>
@@ -11,11 +12,13 @@
 #include <cstdint>
 #include <limits>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include <orbis/core/execution.hpp>
 #include <orbis/core/rounded.hpp>
-#include <orbis/octree/ray_grid.hpp>
+#include <orbis/octree/point_keys.hpp>
+#include <orbis/octree/ray_sweep.hpp>
 #include <orbis/octree/scan.hpp>
 
 namespace orbis::octree {
@@ -26,15 +29,36 @@ enum class ray_mode {
   discretized  ///< from the sensor to the centre of every voxel that holds points (`discretize = true`)
 };
 
+/// A part of the world that a scan may change: the voxels from the one that contains `low` to the one
+/// that contains `high`, metres; infinity is no bound. @pre low <= high, no NaN
+struct integration_bounds {
+  std::array<double, 3> low;
+  std::array<double, 3> high;
+};
+
 struct integration_options {
-  /// Metres from the sensor; of a point further away only the ray up to here counts, as free.
+  /// Metres from the sensor; of a point further away only the ray up to here counts, as free. A point
+  /// at exactly this distance is within range. OctoMap's "no limit", a negative range, is infinity here.
   /// @pre >= 0
   double max_range = std::numeric_limits<double>::infinity();
   ray_mode mode = ray_mode::every_ray;
+  /// False: points mark their voxels as occupied, no ray is walked and nothing is observed free.
+  bool rays = true;
+  /// Voxels outside are left as they are; inside, the result is the same as without bounds. (OctoMap's
+  /// `useBBXLimit` differs: it drops a point outside the box with its whole ray, drops the rays of
+  /// points beyond max_range, and of a ray that enters, leaves and enters the box again keeps the last
+  /// part only.)
+  std::optional<integration_bounds> bounds = std::nullopt;
+  /// One range for each point, metres, used where it is less than max_range, and in both modes before
+  /// points are put together in voxels; in mode `discretized` the ray of such a point ends in the
+  /// centre of the voxel where it is cut off. Infinity is no limit; a point whose range is negative or
+  /// NaN is rejected. OctoMap has nothing like it. @pre empty, or as many as there are points
+  std::span<const float> beam_ranges = {};
 };
 
 /// What became of a scan. In mode `discretized`, `used` and `truncated` count the voxels that hold
-/// points instead of the points, and points that share a voxel count once.
+/// points instead of the points, and points that share a voxel count once. Bounds have an influence on
+/// `free` and `occupied` alone.
 struct integration_summary {
   std::size_t used = 0;       ///< points within range
   std::size_t truncated = 0;  ///< points beyond the range
@@ -50,35 +74,47 @@ class scan_marker {
   /// The voxels of the last scan; a voxel both free and occupied counts as occupied.
   [[nodiscard]] const scan_masks& masks() const noexcept { return workers_.front().masks; }
 
-  /// Marks the scan of `count` points, `point(i)` being the i-th, seen from `origin`. The summary's
-  /// voxel counts stay zero. Nothing is marked if the origin is not finite; rays are not walked if
-  /// it lies outside the grid. O(points x voxels along a ray).
+  /// Marks the scan of `count` points, `point(i)` being the i-th as float3, seen from `origin`. The
+  /// summary's voxel counts stay zero. Nothing is marked if the origin is not finite; rays are not
+  /// walked if it lies outside the grid. O(points x voxels along a ray).
   template <execution_policy Policy, class Point>
   integration_summary mark(const Policy& policy, const voxel_grid& grid, std::size_t count, Point&& point,
                            const float3& origin, const integration_options& options) {
-    assert(options.max_range >= 0.0);
+    assert(options.beam_ranges.empty() || options.beam_ranges.size() == count);
     prepare(policy.threads(), count);
     if (!is_finite(origin)) return {.used = 0, .truncated = 0, .rejected = count};
-    const sensor from{grid, origin, grid.key(origin), options.max_range};
-    choose_windows(from, count, point);
+    const sensor from = start(grid, origin, options);
     if (options.mode == ray_mode::every_ray) {
-      for_each_with_worker(policy, count, 4096, [&](worker& w, std::size_t i) { w.add(from, point(i)); });
+      for_each_with_worker(policy, count, 4096, [&](worker& w, std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i != end; ++i) w.add(from, point(i), from.limit(i));
+      });
     } else {
-      for_each_with_worker(policy, count, 4096, [&](worker& w, std::size_t i) { w.add_end(grid, point(i)); });
+      for_each_with_worker(policy, count, 4096, [&](worker& w, std::size_t begin, std::size_t end) {
+        if (options.beam_ranges.empty())
+          w.add_ends(grid, begin, end, point);
+        else
+          for (std::size_t i = begin; i != end; ++i) w.add_end(from, point(i), options.beam_ranges[i]);
+      });
       for (std::size_t i = 1; i != workers_.size(); ++i) workers_[0].ends.merge(workers_[i].ends);
-      const auto& ends = workers_[0].ends.bricks();
-      for (worker& w : workers_) w.last_end = no_key;  // from now on in masks, not in ends
-      for_each_with_worker(policy, ends.size(), 16, [&](worker& w, std::size_t i) { w.add_centers(from, ends[i]); });
+      add_centers(policy, from, workers_[0].ends);
     }
-    for_each_index(policy, workers_.size(), 1, [&](std::size_t i) {
-      if (workers_[i].windowed) workers_[i].window.flush(workers_[i].masks);
-    });
-    return combine();
+    return finish(policy, grid, options);
+  }
+
+  /// The second half of mode `discretized` alone: marks the rays to the centres of the voxels that are
+  /// occupied in `ends`. @pre `ends` is not this marker's own
+  template <execution_policy Policy>
+  integration_summary mark_centers(const Policy& policy, const voxel_grid& grid, const scan_masks& ends,
+                                   const float3& origin, const integration_options& options) {
+    prepare(policy.threads(), 64 * ends.bricks().size());
+    if (!is_finite(origin)) return {};
+    add_centers(policy, start(grid, origin, options), ends);
+    return finish(policy, grid, options);
   }
 
   [[nodiscard]] std::size_t memory_bytes() const noexcept {
     std::size_t bytes = workers_.capacity() * sizeof(worker);
-    for (const worker& w : workers_) bytes += w.masks.memory_bytes() + w.ends.memory_bytes() + w.window.memory_bytes();
+    for (const worker& w : workers_) bytes += w.masks.memory_bytes() + w.ends.memory_bytes() + w.sweep.memory_bytes();
     return bytes;
   }
 
@@ -86,8 +122,16 @@ class scan_marker {
   struct sensor {
     const voxel_grid& grid;
     float3 origin;
-    std::optional<voxel_key> key;
+    std::optional<voxel_key> key;  ///< empty: no ray is walked
     double max_range;
+    std::span<const float> beam_ranges;
+
+    /// Of the i-th point; negative or NaN if it is to be rejected.
+    [[nodiscard]] double limit(std::size_t i) const noexcept {
+      if (beam_ranges.empty()) return max_range;
+      const auto own = static_cast<double>(beam_ranges[i]);
+      return own > max_range ? max_range : own;
+    }
   };
 
   static constexpr voxel_key no_key{~std::uint32_t{0}, 0, 0};
@@ -95,11 +139,11 @@ class scan_marker {
   /// What one thread collects.
   struct worker {
     scan_masks masks;
-    scan_masks ends;  ///< mode discretized: the voxels that hold points, as occupied
+    scan_masks ends;  ///< mode discretized: voxels that hold points, as occupied, and ends of rays cut off, as free
     integration_summary summary;
-    ray_grid window;
-    bool windowed = false;  ///< rays go through the window
+    ray_sweep sweep;
     voxel_key last_end = no_key;
+    detail::batch_keys keys;
 
     void clear() noexcept {
       last_end = no_key;
@@ -107,61 +151,116 @@ class scan_marker {
       ends.clear();
       summary = {};
     }
-    void add_ray(const sensor& from, const float3& end, const voxel_key& to) {
-      if (!from.key) return;
-      if (windowed)
-        window.add(from.grid, from.origin, end, to);
-      else
-        masks.mark_ray(from.grid, from.origin, *from.key, end, to);
+    void add_ray(const sensor& from, const float3& end, const voxel_key& to, bool hit) {
+      if (from.key) sweep.add(end, to, hit, masks);
     }
-    /// Neighbouring pixels mostly end in the same voxel.
-    void mark_end(scan_masks& in, const voxel_key& k) {
-      if (k == last_end) return;
-      last_end = k;
-      in.mark_occupied(k);
-    }
-    void add(const sensor& from, const float3& end) {
+    void add(const sensor& from, const float3& end, double limit) {
       const float3 ray = difference(end, from.origin);
       const double distance = length(ray);
-      if (distance <= from.max_range) {
+      if (distance <= limit) {
         const auto key = from.grid.key(end);
         if (!key) {
           ++summary.rejected;
           return;
         }
-        add_ray(from, end, *key);
-        mark_end(masks, *key);
+        add_ray(from, end, *key, true);
+        if (*key != last_end) masks.mark_occupied(*key);  // neighbouring pixels mostly end in the same voxel
+        last_end = *key;
         ++summary.used;
+      } else if (const auto cut = cut_off(from, ray, distance, limit)) {
+        add_ray(from, cut->first, cut->second, false);
+        ++summary.truncated;
       } else {
-        add_truncated(from, ray, distance);
+        ++summary.rejected;
       }
     }
-    void add_truncated(const sensor& from, const float3& ray, double distance) {
+    /// Where a ray that is too long ends.
+    [[nodiscard]] static std::optional<std::pair<float3, voxel_key>> cut_off(const sensor& from, const float3& ray,
+                                                                             double distance, double limit) {
       const auto scale = static_cast<float>(distance);
-      const auto range = static_cast<float>(from.max_range);
+      if (!(limit >= 0.0) || !std::isfinite(scale)) return std::nullopt;
+      const auto range = static_cast<float>(limit);
       float3 end;
       for (std::size_t i = 0; i != 3; ++i) end[i] = from.origin[i] + rounded_product(ray[i] / scale, range);
       const auto key = from.grid.key(end);
-      if (!key || !std::isfinite(scale)) {
-        ++summary.rejected;
-        return;
-      }
-      add_ray(from, end, *key);
-      ++summary.truncated;
+      return key ? std::optional{std::pair{end, *key}} : std::nullopt;
     }
-    void add_end(const voxel_grid& grid, const float3& end) {
-      if (const auto key = grid.key(end))
-        mark_end(ends, *key);
-      else
+    /// The points [begin, end) in mode discretized.
+    template <class Point>
+    void add_ends(const voxel_grid& grid, std::size_t begin, std::size_t end, Point&& point) {
+      detail::point_batch batch;
+      auto* const find_keys = simd::select<void(const voxel_grid&, const detail::point_batch&, std::size_t, detail::batch_keys&)>(
+          simd::detected(), {
+        .portable = detail::find_keys_portable,
+#if ORBIS_X86
+        .popcnt = nullptr, .avx2 = nullptr, .avx512 = detail::find_keys_avx512
+#endif
+      });
+      while (begin != end) {
+        const std::size_t n = std::min(end - begin, detail::point_batch::capacity);
+        for (std::size_t i = 0; i != n; ++i) {
+          const float3 p = point(begin + i);
+          batch.x[i] = p[0];
+          batch.y[i] = p[1];
+          batch.z[i] = p[2];
+        }
+        begin += n;
+        find_keys(grid, batch, n, keys);
+        for (std::size_t i = 0; i != keys.count; ++i) ends.mark_occupied({keys.x[i], keys.y[i], keys.z[i]});
+        summary.rejected += keys.outside;
+      }
+    }
+    /// The same of one point that has a range of its own.
+    void add_end(const sensor& from, const float3& end, float own_range) {
+      const auto limit = static_cast<double>(own_range);
+      const float3 ray = difference(end, from.origin);
+      const double distance = length(ray);
+      if (limit >= from.max_range || distance <= limit) {
+        if (const auto key = from.grid.key(end))
+          ends.mark_occupied(*key);
+        else
+          ++summary.rejected;
+      } else if (const auto cut = cut_off(from, ray, distance, limit)) {
+        ends.mark_free(cut->second);
+      } else {
         ++summary.rejected;
+      }
     }
     void add_centers(const sensor& from, const scan_brick& b) {
       const voxel_key base = named_key(b.name);
+      std::array<std::uint64_t, 8> hits{};
+      const auto centre = [&](std::uint32_t place, voxel_key& k) {
+        const voxel_key in = voxel_in_brick(place);
+        k = {base.x + in.x, base.y + in.y, base.z + in.z};
+        const vec3 c = from.grid.center(k);
+        return float3{static_cast<float>(c.x()), static_cast<float>(c.y()), static_cast<float>(c.z())};
+      };
+      voxel_key k;
       for_each_place(b.occupied, [&](std::uint32_t place) {
-        const voxel_key k = voxel_in_brick(place);
-        const vec3 c = from.grid.center(voxel_key{base.x + k.x, base.y + k.y, base.z + k.z});
-        add(from, {static_cast<float>(c.x()), static_cast<float>(c.y()), static_cast<float>(c.z())});
+        const float3 end = centre(place, k);
+        const float3 ray = difference(end, from.origin);
+        const double distance = length(ray);
+        if (distance <= from.max_range) {
+          add_ray(from, end, k, true);
+          hits[place >> 6U] |= std::uint64_t{1} << (place & 63U);
+          ++summary.used;
+        } else if (const auto cut = cut_off(from, ray, distance, from.max_range)) {
+          add_ray(from, cut->first, cut->second, false);
+          ++summary.truncated;
+        } else {
+          ++summary.rejected;
+        }
       });
+      for_each_place(b.free, [&](std::uint32_t place) {
+        const float3 end = centre(place, k);
+        add_ray(from, end, k, false);
+        ++summary.truncated;
+      });
+      std::uint64_t any = 0;
+      for (const std::uint64_t h : hits) any |= h;
+      if (any == 0) return;
+      auto& occupied = masks.at(base).occupied;
+      for (std::size_t i = 0; i != 8; ++i) occupied[i] |= hits[i];
     }
   };
 
@@ -171,46 +270,23 @@ class scan_marker {
     workers_.resize(std::clamp<std::size_t>(threads, 1, useful));
     for (worker& w : workers_) w.clear();
   }
-  /// Gives the workers a window around all rays, if one can be had.
-  template <class Point>
-  void choose_windows(const sensor& from, std::size_t count, Point&& point) {
-    bool windowed = from.key.has_value();
-    if (windowed) {
-      float3 low = from.origin, high = from.origin;
-      for (std::size_t i = 0; i != count; ++i) {
-        const float3 p = point(i);
-        if (!is_finite(p)) continue;
-        for (std::size_t axis = 0; axis != 3; ++axis) {
-          low[axis] = p[axis] < low[axis] ? p[axis] : low[axis];
-          high[axis] = p[axis] > high[axis] ? p[axis] : high[axis];
-        }
-      }
-      voxel_key lowest, highest;
-      const auto bound = [&](std::size_t axis, std::uint32_t& lo, std::uint32_t& hi) {
-        const double o = static_cast<double>(from.origin[axis]);
-        const double reach = from.max_range * 1.000001 + 2.0 * from.grid.resolution();
-        const auto l = from.grid.key(std::max(static_cast<double>(low[axis]), o - reach) - from.grid.resolution());
-        const auto h = from.grid.key(std::min(static_cast<double>(high[axis]), o + reach) + from.grid.resolution());
-        if (!l || !h) return false;
-        lo = *l;
-        hi = *h;
-        return true;
-      };
-      windowed = bound(0, lowest.x, highest.x) && bound(1, lowest.y, highest.y) && bound(2, lowest.z, highest.z);
-      for (worker& w : workers_) windowed = windowed && w.window.fit(from.grid, *from.key, lowest, highest);
-    }
-    for (worker& w : workers_) w.windowed = windowed;
+  sensor start(const voxel_grid& grid, const float3& origin, const integration_options& options) {
+    assert(options.max_range >= 0.0);
+    const sensor from{grid, origin, options.rays ? grid.key(origin) : std::nullopt, options.max_range,
+                      options.beam_ranges};
+    if (from.key)
+      for (worker& w : workers_) w.sweep.start(grid, origin, *from.key);
+    return from;
   }
-  /// Calls `body(worker, i)` for i in [0, count), each worker on one thread.
-  template <class Policy, class Body>
-  void for_each_with_worker(const Policy& policy, std::size_t count, std::size_t grain, Body&& body) {
-    std::atomic<std::size_t> next{0};
-    for_each_index(policy, workers_.size(), 1, [&](std::size_t w) {
-      for (std::size_t begin; (begin = next.fetch_add(grain, std::memory_order_relaxed)) < count;)
-        for (std::size_t i = begin; i != std::min(count, begin + grain); ++i) body(workers_[w], i);
+  template <class Policy>
+  void add_centers(const Policy& policy, const sensor& from, const scan_masks& ends) {
+    for_each_with_worker(policy, ends.bricks().size(), 16, [&](worker& w, std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i != end; ++i) w.add_centers(from, ends.bricks()[i]);
     });
   }
-  integration_summary combine() {
+  template <class Policy>
+  integration_summary finish(const Policy& policy, const voxel_grid& grid, const integration_options& options) {
+    for_each_index(policy, workers_.size(), 1, [&](std::size_t i) { workers_[i].sweep.flush(workers_[i].masks); });
     worker& all = workers_.front();
     for (std::size_t i = 1; i != workers_.size(); ++i) {
       all.masks.merge(workers_[i].masks);
@@ -218,7 +294,30 @@ class scan_marker {
       all.summary.truncated += workers_[i].summary.truncated;
       all.summary.rejected += workers_[i].summary.rejected;
     }
+    if (options.bounds) clip(all.masks, grid, *options.bounds);
     return all.summary;
+  }
+  static void clip(scan_masks& masks, const voxel_grid& grid, const integration_bounds& bounds) {
+    const double half = 0.5 * grid.cells(), per_metre = 1.0 / grid.resolution();
+    std::array<std::int64_t, 3> low, high;
+    for (std::size_t i = 0; i != 3; ++i) {
+      const auto cell = [&](double c) {  // far outside is one voxel outside
+        return static_cast<std::int64_t>(std::clamp(std::floor(per_metre * c), -half - 1.0, half) + half);
+      };
+      assert(bounds.low[i] <= bounds.high[i]);
+      low[i] = cell(bounds.low[i]);
+      high[i] = cell(bounds.high[i]);
+    }
+    masks.clip(low, high);
+  }
+  /// Calls `body(worker, begin, end)` for parts of [0, count), each worker on one thread.
+  template <class Policy, class Body>
+  void for_each_with_worker(const Policy& policy, std::size_t count, std::size_t grain, Body&& body) {
+    std::atomic<std::size_t> next{0};
+    for_each_index(policy, workers_.size(), 1, [&](std::size_t w) {
+      for (std::size_t begin; (begin = next.fetch_add(grain, std::memory_order_relaxed)) < count;)
+        body(workers_[w], begin, std::min(count, begin + grain));
+    });
   }
 
   std::vector<worker> workers_ = std::vector<worker>(1);

@@ -210,7 +210,7 @@ class ray_grid {
   [[nodiscard]] std::size_t memory_bytes() const noexcept { return cells_.capacity(); }
 
  private:
-  static constexpr std::size_t max_cells = std::size_t{1} << 26U;  // bytes
+  static constexpr std::size_t max_cells = std::size_t{1} << 24U;  // bytes
 
   [[nodiscard]] std::int64_t cell(const voxel_key& k) const noexcept {
     return static_cast<std::int64_t>((std::size_t{k.z - low_.z} * size_[1] + (k.y - low_.y)) * size_[0] +

@@ -33,9 +33,19 @@ class scan_masks {
   /// The masks of the brick that contains `k`; valid until the next call.
   [[nodiscard]] scan_brick& at(const voxel_key& k) { return named(node_name(k, brick_level)); }
 
+  /// The masks of a named brick, or null.
+  [[nodiscard]] const scan_brick* find(std::uint64_t name) const noexcept {
+    const std::uint32_t i = index_.find(name);
+    return i == hash_index::none ? nullptr : &bricks_[i];
+  }
+
   void mark_occupied(const voxel_key& k) {
     const std::uint32_t place = place_in_brick(k);
     at(k).occupied[place >> 6U] |= std::uint64_t{1} << (place & 63U);
+  }
+  void mark_free(const voxel_key& k) {
+    const std::uint32_t place = place_in_brick(k);
+    at(k).free[place >> 6U] |= std::uint64_t{1} << (place & 63U);
   }
   /// Marks the voxels that the ray crosses as free, see walk_ray.
   void mark_ray(const voxel_grid& grid, const float3& origin, const voxel_key& from, const float3& end,
@@ -61,11 +71,46 @@ class scan_masks {
       }
     }
   }
+  /// Forgets all voxels but those from `low` to `high`, both included.
+  void clip(const std::array<std::int64_t, 3>& low, const std::array<std::int64_t, 3>& high) {
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i != bricks_.size(); ++i) {
+      scan_brick b = bricks_[i];
+      const voxel_key k = named_key(b.name);
+      const std::array<std::int64_t, 3> at{k.x, k.y, k.z};
+      std::array<std::uint64_t, 8> inside;
+      inside.fill(~std::uint64_t{0});
+      for (std::size_t axis = 0; axis != 3; ++axis) {
+        if (low[axis] <= at[axis] && at[axis] + 7 <= high[axis]) continue;
+        for (std::uint32_t c = 0; c != 8; ++c) {
+          if (low[axis] <= at[axis] + c && at[axis] + c <= high[axis]) continue;
+          for (std::uint32_t octant = 0; octant != 8; ++octant)
+            if ((octant >> axis & 1U) == c >> 2U) inside[octant] &= ~layer_in_octant(axis, c & 3U);
+        }
+      }
+      std::uint64_t any = 0;
+      for (std::size_t octant = 0; octant != 8; ++octant) {
+        b.free[octant] &= inside[octant];
+        b.occupied[octant] &= inside[octant];
+        any |= b.free[octant] | b.occupied[octant];
+      }
+      if (any != 0) bricks_[kept++] = b;
+    }
+    bricks_.resize(kept);
+    index_.clear();
+    for (std::size_t i = 0; i != kept; ++i) index_.set(bricks_[i].name, static_cast<std::uint32_t>(i));
+  }
   [[nodiscard]] std::size_t memory_bytes() const noexcept {
     return index_.memory_bytes() + bricks_.capacity() * sizeof(scan_brick);
   }
 
  private:
+  /// The voxels of an octant whose coordinate along `axis` is `c`.
+  [[nodiscard]] static constexpr std::uint64_t layer_in_octant(std::size_t axis, std::uint32_t c) noexcept {
+    constexpr std::array<std::uint64_t, 3> low{0x5555555555555555, 0x3333333333333333, 0x0f0f0f0f0f0f0f0f};
+    constexpr std::array<std::uint64_t, 3> high{0x00ff00ff00ff00ff, 0x0000ffff0000ffff, 0x00000000ffffffff};
+    return ((c & 1U) != 0 ? ~low[axis] : low[axis]) & ((c & 2U) != 0 ? ~high[axis] : high[axis]);
+  }
   [[nodiscard]] scan_brick& named(std::uint64_t name) {
     const std::uint32_t i = index_.find(name);
     if (i != hash_index::none) return bricks_[i];

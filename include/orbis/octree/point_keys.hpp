@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// The voxels that points lie in, many points at a time.
+#pragma once
+
+#include <array>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+
+#include <orbis/core/simd.hpp>
+#include <orbis/octree/key.hpp>
+
+#if ORBIS_X86
+#include <immintrin.h>
+#endif
+
+namespace orbis::octree::detail {
+
+/// Some points, one array for each coordinate.
+struct point_batch {
+  static constexpr std::size_t capacity = 256;
+  alignas(64) std::array<float, capacity> x, y, z;
+};
+
+/// The voxels of some points, in their order, without those that equal the one before; and the number
+/// of points that lie in none.
+struct batch_keys {
+  alignas(64) std::array<std::uint32_t, point_batch::capacity + 16> x, y, z;
+  std::size_t count = 0;
+  std::size_t outside = 0;
+};
+
+inline void find_keys_portable(const voxel_grid& grid, const point_batch& points, std::size_t begin, std::size_t count,
+                               batch_keys& keys) noexcept {
+  for (std::size_t i = begin; i != count; ++i) {
+    const auto key = grid.key(std::array{points.x[i], points.y[i], points.z[i]});
+    if (!key) {
+      ++keys.outside;
+      continue;
+    }
+    keys.x[keys.count] = key->x;
+    keys.y[keys.count] = key->y;
+    keys.z[keys.count] = key->z;
+    const std::size_t n = keys.count;
+    keys.count += n == 0 || key->x != keys.x[n - 1] || key->y != keys.y[n - 1] || key->z != keys.z[n - 1] ? 1 : 0;
+  }
+}
+inline void find_keys_portable(const voxel_grid& grid, const point_batch& points, std::size_t count,
+                               batch_keys& keys) noexcept {
+  keys.count = keys.outside = 0;
+  find_keys_portable(grid, points, 0, count, keys);
+}
+
+#if ORBIS_X86
+/// What voxel_grid::key does, of sixteen coordinates; clears the bits of those outside in `inside`.
+ORBIS_TARGET("avx512f,avx512dq,avx512vl")
+inline __m512i cells_avx512(const float* at, double per_metre, double half, __mmask16& inside) noexcept {
+  const __m512d scale = _mm512_set1_pd(per_metre), high = _mm512_set1_pd(half), low = _mm512_set1_pd(-half);
+  const __m512d a = _mm512_mul_pd(_mm512_maskz_cvtps_pd(0xff, _mm256_loadu_ps(at)), scale);
+  const __m512d b = _mm512_mul_pd(_mm512_maskz_cvtps_pd(0xff, _mm256_loadu_ps(at + 8)), scale);
+  const auto in_a = static_cast<__mmask8>(_mm512_cmp_pd_mask(a, low, _CMP_GE_OQ) & _mm512_cmp_pd_mask(a, high, _CMP_LT_OQ));
+  const auto in_b = static_cast<__mmask8>(_mm512_cmp_pd_mask(b, low, _CMP_GE_OQ) & _mm512_cmp_pd_mask(b, high, _CMP_LT_OQ));
+  inside &= static_cast<__mmask16>(in_a | in_b << 8U);
+  constexpr int down = _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC;
+  const __m512i cells = _mm512_maskz_inserti64x4(
+      0xff, _mm512_castsi256_si512(_mm512_maskz_cvt_roundpd_epi32(0xff, a, down)),
+      _mm512_maskz_cvt_roundpd_epi32(0xff, b, down), 1);
+  return _mm512_add_epi32(cells, _mm512_set1_epi32(static_cast<int>(half)));
+}
+ORBIS_TARGET("avx512f,avx512dq,avx512vl,popcnt")
+inline void find_keys_avx512(const voxel_grid& grid, const point_batch& points, std::size_t count,
+                             batch_keys& keys) noexcept {
+  const double per_metre = 1.0 / grid.resolution(), half = 0.5 * grid.cells();
+  __m512i x0 = _mm512_set1_epi32(-1), y0 = x0, z0 = x0;  // of the voxel before; no voxel at first
+  const __m512i before = _mm512_setr_epi32(15, 16, 17, 18, 19, 20, 21, 22, 23, 24, 25, 26, 27, 28, 29, 30);
+  std::size_t i = 0, n = 0, outside = 0;
+  for (; i + 16 <= count; i += 16) {
+    __mmask16 inside = 0xffff;
+    const __m512i x = cells_avx512(points.x.data() + i, per_metre, half, inside);
+    const __m512i y = cells_avx512(points.y.data() + i, per_metre, half, inside);
+    const __m512i z = cells_avx512(points.z.data() + i, per_metre, half, inside);
+    const auto fresh = static_cast<__mmask16>(
+        inside & (_mm512_cmpneq_epi32_mask(x, _mm512_permutex2var_epi32(x0, before, x)) |
+                  _mm512_cmpneq_epi32_mask(y, _mm512_permutex2var_epi32(y0, before, y)) |
+                  _mm512_cmpneq_epi32_mask(z, _mm512_permutex2var_epi32(z0, before, z)) |
+                  // The one before lies outside: its cell means nothing.
+                  static_cast<unsigned>(static_cast<__mmask16>(~inside)) << 1U));
+    _mm512_storeu_si512(keys.x.data() + n, _mm512_maskz_compress_epi32(fresh, x));
+    _mm512_storeu_si512(keys.y.data() + n, _mm512_maskz_compress_epi32(fresh, y));
+    _mm512_storeu_si512(keys.z.data() + n, _mm512_maskz_compress_epi32(fresh, z));
+    n += static_cast<std::size_t>(__builtin_popcount(fresh));
+    outside += static_cast<std::size_t>(16 - __builtin_popcount(inside));
+    const __m512i last = _mm512_set1_epi32(-1);
+    x0 = (inside & 0x8000U) != 0 ? x : last;
+    y0 = y;
+    z0 = z;
+  }
+  keys.count = n;
+  keys.outside = outside;
+  find_keys_portable(grid, points, i, count, keys);
+}
+#endif
+
+}  // namespace orbis::octree::detail

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <set>
+#include <tuple>
+#include <vector>
+
+#include <orbis/core/random.hpp>
+#include <orbis/octree/scan.hpp>
+
+#include "support/catch.hpp"
+
+using namespace orbis;
+using namespace orbis::octree;
+
+namespace {
+
+using voxels = std::set<std::tuple<std::uint32_t, std::uint32_t, std::uint32_t>>;
+
+[[nodiscard]] voxels listed(const scan_masks& masks, std::array<std::uint64_t, 8> scan_brick::*which) {
+  voxels all;
+  for (const scan_brick& b : masks.bricks()) {
+    const voxel_key base = named_key(b.name);
+    for_each_place(b.*which, [&](std::uint32_t place) {
+      const voxel_key k = voxel_in_brick(place);
+      all.emplace(base.x + k.x, base.y + k.y, base.z + k.z);
+    });
+  }
+  return all;
+}
+
+}  // namespace
+
+TEST_CASE("What is marked is listed, once") {
+  random_bits random{181};
+  scan_masks masks, other;
+  voxels free, occupied;
+  for (int i = 0; i != 3000; ++i) {
+    const auto at = [&] { return 1000 + static_cast<std::uint32_t>(random.below(40)); };
+    const voxel_key k{at(), at(), at()};
+    (i % 3 == 0 ? free : occupied).emplace(k.x, k.y, k.z);
+    scan_masks& into = i % 2 == 0 ? masks : other;
+    i % 3 == 0 ? into.mark_free(k) : into.mark_occupied(k);
+  }
+  masks.merge(other);
+  CHECK(listed(masks, &scan_brick::free) == free);
+  CHECK(listed(masks, &scan_brick::occupied) == occupied);
+  masks.clear();
+  CHECK(masks.bricks().empty());
+}
+
+TEST_CASE("Clipped masks hold what lies inside and can be marked again") {
+  random_bits random{182};
+  for (int run = 0; run != 20; ++run) {
+    scan_masks masks;
+    voxels expected;
+    std::array<std::int64_t, 3> low, high;
+    for (std::size_t axis = 0; axis != 3; ++axis) {
+      low[axis] = 995 + static_cast<std::int64_t>(random.below(30));
+      high[axis] = low[axis] + static_cast<std::int64_t>(random.below(30));
+    }
+    for (int i = 0; i != 3000; ++i) {
+      const auto at = [&] { return 1000 + static_cast<std::uint32_t>(random.below(40)); };
+      const voxel_key k{at(), at(), at()};
+      masks.mark_free(k);
+      const auto inside = [&](std::uint32_t c, std::size_t axis) { return low[axis] <= c && c <= high[axis]; };
+      if (inside(k.x, 0) && inside(k.y, 1) && inside(k.z, 2)) expected.emplace(k.x, k.y, k.z);
+    }
+    masks.clip(low, high);
+    CHECK(listed(masks, &scan_brick::free) == expected);
+    for (const scan_brick& b : masks.bricks()) CHECK(b.free != decltype(b.free){});
+    masks.mark_free({1003, 1004, 1005});
+    expected.emplace(1003, 1004, 1005);
+    CHECK(listed(masks, &scan_brick::free) == expected);
+  }
+}
