@@ -64,8 +64,8 @@ inline __m512i cells_avx512(const float* at, double per_metre, double half, __mm
   inside &= static_cast<__mmask16>(in_a | in_b << 8U);
   constexpr int down = _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC;
   const __m512i cells = _mm512_maskz_inserti64x4(
-      0xff, _mm512_castsi256_si512(_mm512_maskz_cvt_roundpd_epi32(0xff, a, down)),
-      _mm512_maskz_cvt_roundpd_epi32(0xff, b, down), 1);
+      0xff, _mm512_castsi256_si512(_mm512_maskz_cvt_roundpd_epi32(in_a, a, down)),
+      _mm512_maskz_cvt_roundpd_epi32(in_b, b, down), 1);
   return _mm512_add_epi32(cells, _mm512_set1_epi32(static_cast<int>(half)));
 }
 ORBIS_TARGET("avx512f,avx512dq,avx512vl,popcnt")
