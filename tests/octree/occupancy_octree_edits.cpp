@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <atomic>
+#include <bit>
 #include <cmath>
 #include <mutex>
 #include <optional>
@@ -206,4 +207,55 @@ TEST_CASE("A deeper tree holds what lies further away") {
   int occupied = 0;
   deep.for_each_leaf([&](const auto& leaf) { occupied += leaf.occupied && leaf.depth == 21 ? 1 : 0; });
   CHECK(occupied == 1);
+}
+
+TEST_CASE("A mirror that applies the logged changes stays the same map") {
+  random_bits random{48};
+  occupancy_octree<> map{0.1}, mirror{0.1};
+  std::uint64_t seen = 0;
+  map.track_changes();
+  std::size_t sent = 0, known = 0;
+  const auto update = [&] {
+    map.changes().for_each_since(seen, [&](const voxel_key& octant, std::uint64_t mask) {
+      sent += static_cast<std::size_t>(std::popcount(mask));
+      mirror.edit_octant(octant, [&](block<float>& voxels) {
+        for (std::uint64_t rest = mask; rest != 0; rest &= rest - 1) {
+          const auto i = static_cast<std::uint32_t>(std::countr_zero(rest));
+          const voxel_key in = voxel_in_brick(i);
+          const auto v = map.value(voxel_key{octant.x + in.x, octant.y + in.y, octant.z + in.z});
+          voxels.value[i] = v.value_or(0.0F);
+          voxels.known = (voxels.known & ~(std::uint64_t{1} << i)) | std::uint64_t{v.has_value()} << i;
+        }
+      });
+    });
+    seen = map.changes().revision();
+    map.changes().forget_before(seen);
+    REQUIRE(ot_bytes(mirror) == ot_bytes(map));
+  };
+  for (int round = 0; round != 12; ++round) {
+    switch (round % 4) {
+      case 0: map.transform([](float v) { return v > 2.0F ? std::nullopt : std::optional{v * 0.75F}; }); break;
+      case 1: map.set_unknown_node({32768 + 400, 32768 + 8 * static_cast<std::uint32_t>(round), 32768}, 13, 0.5F); break;
+      default: scan(map, random, 2); break;
+    }
+    update();
+    known += map.num_leaves();
+  }
+  CHECK(sent > 1000);
+  CHECK(known > 1000);
+
+  // In a room that is known already hardly anything changes, and no more than that is sent.
+  const auto points = test::shell_scan(random, 600, vec3f::Zero());
+  for (int i = 0; i != 20; ++i) map.integrate(points, vec3f::Zero());
+  update();
+  sent = 0;
+  CHECK(map.integrate(points, vec3f::Zero()).free > 1000);
+  update();
+  CHECK(sent == 0);
+
+  map.set_unknown_node({0, 0, 0}, 8, 0.5F);
+  CHECK(map.changes().complete_since() > seen);  // too large for the log: fetch the whole map
+  map.track_changes(false);
+  map.integrate(points, vec3f::Ones());
+  CHECK(map.changes().memory_bytes() == 0);
 }

@@ -22,6 +22,7 @@
 #include <orbis/octree/accessor.hpp>
 #include <orbis/octree/brick.hpp>
 #include <orbis/octree/cast_ray.hpp>
+#include <orbis/octree/change_log.hpp>
 #include <orbis/octree/depth_points.hpp>
 #include <orbis/octree/integration.hpp>
 #include <orbis/octree/leaves.hpp>
@@ -103,6 +104,7 @@ class occupancy_octree {
       return coordinates<float>(first[static_cast<std::ranges::range_difference_t<const Points>>(i)]);
     };
     const auto count = static_cast<std::size_t>(std::ranges::size(points));
+    begin_change();
     integration_summary summary =
         scratch_.marker.mark(policy, grid_, count, point, coordinates<float>(origin), options);
     apply(scratch_.marker.masks(), summary);
@@ -130,13 +132,16 @@ class occupancy_octree {
   /// Gives the node at `depth` (tree_depth(): one voxel) whose lowest voxel is `key` one value.
   /// @pre nothing is known inside it yet; key is a multiple of the node's size
   void set_unknown_node(const voxel_key& key, int depth, value_type value) {
+    begin_change();
     store_.set_node(key, tree_depth() - depth, value);
+    note_node(key, tree_depth() - depth);
   }
 
   /// Forgets everything but the resolution.
   void clear() {
     store_.clear();
     scratch_ = {};
+    changes_.clear();
   }
 
   // -- changing what is known
@@ -148,15 +153,26 @@ class occupancy_octree {
     const std::uint32_t octant = place_in_brick(k) >> 6U;
     block<value_type> voxels;
     store_.read_octant(b, octant, voxels);
+    const block<value_type> before = voxels;
     edit(voxels);
     store_.write_octant(b, octant, voxels);
+    if (!tracked_) return;
+    std::uint64_t changed = before.known ^ voxels.known;
+    for (unsigned i = 0; i != 64; ++i) changed |= std::uint64_t{before.value[i] != voxels.value[i]} << i;
+    begin_change();
+    changes_.record(k, changed & (before.known | voxels.known));
   }
-  /// Replaces every voxel's log-odds by `change(log-odds)`, a std::optional: empty makes the voxel
-  /// unknown. `change` must depend on its argument alone. O(octants), not voxels.
+  /// Replaces every voxel's value by `change(value)`, a std::optional: empty makes the voxel unknown.
+  /// `change` must depend on its argument alone; a decay policy does, see decay.hpp. O(octants), not
+  /// voxels.
   template <class Change>
   requires std::is_invocable_r_v<std::optional<value_type>, Change&, value_type>
   void transform(Change&& change) {
-    store_.transform(change, [](std::uint64_t, std::uint32_t, std::uint64_t) {});
+    begin_change();
+    store_.transform(change, [&](std::uint64_t name, std::uint32_t octant, std::uint64_t mask) {
+      if (tracked_) changes_.record(child_key(named_key(name), octant, node_cells(octant_level)), mask);
+    });
+    if (store_.has_large()) changes_.clear();
   }
   /// Makes every voxel as certain as the model allows: what is more likely occupied than free gets the
   /// upper bound, everything else the lower one. This is what `.bt` files hold.
@@ -166,7 +182,7 @@ class occupancy_octree {
   /// A rolling window: forgets every brick (8x8x8 voxels) and larger leaf that lies outside `box`
   /// altogether, after `evict(const leaf&)` has seen its leaves. What was evicted comes back by
   /// `set_unknown_node(leaf.key, leaf.depth, leaf.log_odds)`. Returns the number of bricks and larger
-  /// leaves that went. O(bricks + voxels evicted).
+  /// leaves that went. The log of changes does not mention it. O(bricks + voxels evicted).
   template <std::invocable<const leaf&> Evict>
   std::size_t evict_outside(const bounding_box& box, Evict&& evict) {
     const auto is_outside = [&](std::uint64_t name) {
@@ -186,6 +202,18 @@ class occupancy_octree {
     store_.erase_large(gone_large);
     return gone.size() + gone_large.size();
   }
+
+  /// From now on keeps a log of the voxels whose value changes, or stops doing so and forgets it.
+  /// Whoever mirrors the map elsewhere asks the log what to send, see change_log; where it cannot tell
+  /// (after `clear`, or a change to a leaf bigger than a brick) its `complete_since` moves on, and the
+  /// whole map has to be sent again.
+  void track_changes(bool wanted = true) {
+    if (tracked_ && !wanted) changes_.clear();
+    tracked_ = wanted;
+  }
+  [[nodiscard]] const change_log& changes() const noexcept { return changes_; }
+  /// The same, to forget what all have seen or to limit its length.
+  [[nodiscard]] change_log& changes() noexcept { return changes_; }
 
   // -- queries
 
@@ -286,7 +314,7 @@ class occupancy_octree {
   }
 
   /// Bytes on the heap: the map's own, and the buffers kept for the next scan.
-  [[nodiscard]] std::size_t memory_bytes() const noexcept { return store_.memory_bytes(); }
+  [[nodiscard]] std::size_t memory_bytes() const noexcept { return store_.memory_bytes() + changes_.memory_bytes(); }
   [[nodiscard]] std::size_t buffer_bytes() const noexcept {
     return scratch_.marker.memory_bytes() + scratch_.points.capacity() * sizeof(vec3f);
   }
@@ -316,26 +344,46 @@ class occupancy_octree {
         const std::uint64_t free = s.free[i] & ~occupied;
         summary.occupied += static_cast<std::size_t>(std::popcount(occupied));
         summary.free += static_cast<std::size_t>(std::popcount(free));
-        if ((occupied | free) != 0) apply(b, i, occupied, free);
+        if ((occupied | free) == 0) continue;
+        const std::uint64_t changed = apply(b, i, occupied, free);
+        if (tracked_) changes_.record(child_key(named_key(s.name), i, node_cells(octant_level)), changed);
       }
     }
   }
-  void apply(brick<value_type>& b, std::uint32_t octant, std::uint64_t occupied, std::uint64_t free) {
+  /// Returns the voxels that changed.
+  std::uint64_t apply(brick<value_type>& b, std::uint32_t octant, std::uint64_t occupied, std::uint64_t free) {
     // Most of a room is at its bound already: nothing can change, so nothing is unpacked.
     const auto settled = [](value_type v) { return v <= Model::clamp_min; };
     const auto certain = [](value_type v) { return v >= Model::clamp_max; };
     if (free != 0) free &= ~store_.voxels_where(b, octant, settled);
     if (occupied != 0) occupied &= ~store_.voxels_where(b, octant, certain);
-    if ((free | occupied) == 0) return;
+    if ((free | occupied) == 0) return 0;
     block<value_type> voxels;
     store_.read_octant(b, octant, voxels);
-    update_block<Model>(voxels, free, occupied);
+    const std::uint64_t changed = update_block<Model>(voxels, free, occupied);
     store_.write_octant(b, octant, voxels);
+    return changed;
+  }
+  void begin_change() {
+    if (tracked_) changes_.begin_revision();
+  }
+  void note_node(const voxel_key& k, int level) {
+    if (!tracked_) return;
+    if (level > brick_level) {
+      changes_.clear();
+    } else if (level == brick_level) {
+      for (unsigned i = 0; i != 8; ++i) changes_.record(child_key(k, i, node_cells(octant_level)), ~std::uint64_t{0});
+    } else {
+      const std::uint64_t inside = level == 0 ? 1U : level == 1 ? 0xffU : ~std::uint64_t{0};
+      changes_.record(k, inside << (place_in_brick(k) & 63U));
+    }
   }
 
   voxel_grid grid_;
   brick_store<value_type> store_;
   scratch scratch_;
+  change_log changes_;
+  bool tracked_ = false;
 };
 
 }  // namespace orbis::octree
