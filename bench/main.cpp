@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <iostream>
+#include <map>
 #include <string>
 #include <string_view>
 #include <tuple>
@@ -53,7 +54,10 @@ class ratio_table final : public benchmark::BenchmarkReporter {
       }
       const double seconds =
           run.real_accumulated_time / static_cast<double>(std::max<benchmark::IterationCount>(1, run.iterations));
-      row_named(name).seconds.push_back(seconds);
+      row& r = row_named(name);
+      r.seconds.push_back(seconds);
+      for (const auto& [counter, value] : run.counters)
+        if (counter != "items_per_second") r.counters[counter].push_back(value.value);
       std::fprintf(stderr, "  %-60s %12.4f ms\n", name.c_str(), 1e3 * seconds);
     }
   }
@@ -69,12 +73,16 @@ class ratio_table final : public benchmark::BenchmarkReporter {
       if (r.group != previous_group) std::printf("%s\n", r.group.c_str());
       previous_group = r.group;
       const double ms = 1e3 * median(r.seconds);
-      const row* ours = r.is_orbis() ? nullptr : our_row(r.group);
-      if (ours != nullptr) {
-        std::printf("    %-60s %12.4f %10.2f\n", r.who.c_str(), ms, ms / (1e3 * median(ours->seconds)));
-      } else {
-        std::printf("    %-60s %12.4f\n", r.who.c_str(), ms);
+      std::printf("    %-60s %12.4f", r.who.c_str(), ms);
+      if (const row* ours = our_row(r.group); ours != nullptr && !r.is_orbis()) {
+        std::printf(" %10.2f", ms / (1e3 * median(ours->seconds)));
+      } else if (const row* peer = only_peer(r.group); peer != nullptr && r.is_orbis() && r.who != "orbis") {
+        std::printf(" %10.2f", 1e3 * median(peer->seconds) / ms);  // a second way of ours
+      } else if (!r.counters.empty()) {
+        std::printf(" %10s", "");
       }
+      for (const auto& [counter, values] : r.counters) std::printf("  %s %.4g", counter.c_str(), median(values));
+      std::printf("\n");
     }
   }
 
@@ -86,6 +94,7 @@ class ratio_table final : public benchmark::BenchmarkReporter {
     std::string group;
     std::string who;
     std::vector<double> seconds;
+    std::map<std::string, std::vector<double>> counters;
     [[nodiscard]] bool is_orbis() const { return who.starts_with("orbis"); }
   };
 
@@ -96,13 +105,24 @@ class ratio_table final : public benchmark::BenchmarkReporter {
     for (row& r : rows_) {
       if (r.group == group && r.who == who) return r;
     }
-    return rows_.emplace_back(row{std::move(group), std::move(who), {}});
+    return rows_.emplace_back(row{std::move(group), std::move(who), {}, {}});
   }
 
   [[nodiscard]] const row* our_row(const std::string& group) const {
     const auto found =
         std::find_if(rows_.begin(), rows_.end(), [&](const row& r) { return r.group == group && r.who == "orbis"; });
     return found == rows_.end() ? nullptr : &*found;
+  }
+
+  /// The row of somebody else, if there is just one in the group.
+  [[nodiscard]] const row* only_peer(const std::string& group) const {
+    const row* peer = nullptr;
+    for (const row& r : rows_) {
+      if (r.group != group || r.is_orbis()) continue;
+      if (peer != nullptr) return nullptr;
+      peer = &r;
+    }
+    return peer;
   }
 
   std::vector<row> rows_;

@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// Search, rays and leaves in the map of 50 frames. Both sides answer the same questions, and a row whose
+// answers differ from ours fails.
+#include <algorithm>
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include <orbis/core/random.hpp>
+
+#include "octree_support.hpp"
+
+namespace orbis::bench {
+namespace {
+
+/// Points all over the part of the room that has been seen, in random order or along lines.
+std::vector<vec3f> query_points(bool coherent) {
+  random_bits random{1};
+  const octree::bounding_box seen = room_map(0.05).bounds().value();
+  const auto any = [&] {
+    vec3f p;
+    for (int i = 0; i != 3; ++i) p[i] = static_cast<float>(random.uniform(seen.min[i], seen.max[i]));
+    return p;
+  };
+  std::vector<vec3f> points;
+  while (points.size() < 100000) {
+    const vec3f a = any(), b = any();
+    const int steps = coherent ? 100 : 1;
+    for (int i = 0; i != steps; ++i) points.emplace_back(a + (b - a) * (static_cast<float>(i) * 0.01F));
+  }
+  return points;
+}
+
+struct answer {
+  std::size_t count = 0;
+  double sum = 0.0;
+  friend bool operator==(const answer&, const answer&) = default;
+};
+
+answer search(const map& m, const std::vector<vec3f>& points) {
+  answer all;
+  for (const vec3f& p : points)
+    if (const auto value = m.log_odds(p)) {
+      ++all.count;
+      all.sum += static_cast<double>(*value);
+    }
+  return all;
+}
+answer search(const octomap::OcTree& m, const std::vector<vec3f>& points) {
+  answer all;
+  for (const vec3f& p : points)
+    if (const auto* node = m.search(to_octomap(p))) {
+      ++all.count;
+      all.sum += static_cast<double>(node->getLogOdds());
+    }
+  return all;
+}
+
+/// Rays from a frame's camera through every 97th pixel or so, unknown voxels ignored.
+answer cast_rays(const map& m, const vec3f& origin, const std::vector<vec3f>& directions) {
+  answer all;
+  for (const vec3f& d : directions)
+    if (const auto hit = m.cast_ray(origin, d, 5.0, true)) {
+      ++all.count;
+      all.sum += static_cast<double>(static_cast<float>(hit.point.x()));
+    }
+  return all;
+}
+answer cast_rays(const octomap::OcTree& m, const vec3f& origin, const std::vector<vec3f>& directions) {
+  answer all;
+  octomap::point3d end;
+  for (const vec3f& d : directions)
+    if (m.castRay(to_octomap(origin), to_octomap(d), end, true, 5.0)) {
+      ++all.count;
+      all.sum += static_cast<double>(end.x());
+    }
+  return all;
+}
+
+/// The number of leaves, and the volume of the occupied ones.
+answer leaves(const map& m) {
+  answer all;
+  m.for_each_leaf([&](const auto& leaf) {
+    ++all.count;
+    all.sum += leaf.occupied ? leaf.size * leaf.size * leaf.size : 0.0;
+  });
+  return all;
+}
+answer leaves(const octomap::OcTree& m) {
+  answer all;
+  for (auto it = m.begin_leafs(), end = m.end_leafs(); it != end; ++it) {
+    const double size = it.getSize();
+    ++all.count;
+    all.sum += m.isNodeOccupied(*it) ? size * size * size : 0.0;
+  }
+  return all;
+}
+
+/// Times `ask(map)` and compares the answer with that of our map.
+template <class Map, class Ask>
+void bench_query(benchmark::State& state, double resolution, Ask&& ask) {
+  const Map& m = room_as<Map>(resolution);
+  const answer expected = ask(room_map(resolution));
+  answer got;
+  for (auto _ : state) {
+    got = ask(m);
+    benchmark::DoNotOptimize(got);
+  }
+  if (!(got == expected) || got.count == 0) state.SkipWithError("not our answer");
+  state.SetItemsProcessed(static_cast<std::int64_t>(state.iterations() * got.count));
+}
+
+template <class Map>
+void add_rows(const std::string& who, double r) {
+  const std::string size = in_centimetres(r) + "/";
+  for (const bool coherent : {false, true})
+    add_row("octree_search/" + size + (coherent ? "coherent/" : "random/") + who, [=](auto& state) {
+      const auto points = query_points(coherent);
+      bench_query<Map>(state, r, [&](const auto& m) { return search(m, points); });
+    });
+  add_row("octree_cast_ray/" + size + who, [=](auto& state) {
+    const scan& s = room().front();
+    std::vector<vec3f> directions;
+    const auto points = s.points();
+    for (std::size_t i = 0; i < points.size(); i += 97) directions.push_back(points[i] - s.origin());
+    bench_query<Map>(state, r, [&](const auto& m) { return cast_rays(m, s.origin(), directions); });
+  });
+  add_row("octree_leaves/" + size + who,
+          [=](auto& state) { bench_query<Map>(state, r, [](const auto& m) { return leaves(m); }); });
+}
+
+[[maybe_unused]] const bool registered = [] {
+  for (const double resolution : {0.10, 0.05, 0.02}) {
+    add_rows<map>("orbis", resolution);
+    add_rows<octomap::OcTree>("octomap", resolution);
+  }
+  return true;
+}();
+
+}  // namespace
+}  // namespace orbis::bench
