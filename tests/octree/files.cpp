@@ -190,7 +190,7 @@ TEST_CASE("Headers that lie or lack something are refused with a reason") {
 }
 
 TEST_CASE("A hostile file takes memory in proportion to its size") {
-  // Chains of inner nodes down to one voxel each: the most storage a byte can ask for.
+  // Chains of inner nodes down to one voxel each.
   std::string data;
   std::size_t nodes = 1;
   data += std::string{"\xff\xff", 2};
@@ -203,7 +203,35 @@ TEST_CASE("A hostile file takes memory in proportion to its size") {
   const auto map = read_bt(bytes_of(with_header(bt_line, header + data)));
   REQUIRE(map);
   CHECK(map->num_leaves() == 8);
-  CHECK(map->memory_bytes() < 200 * data.size());
+  CHECK(map->memory_bytes() < 8192 + 400 * data.size());
+
+  // Each node is eight leaves of the size of a brick: the most storage a byte can ask for.
+  std::string bricks{"\xff\xff", 2};
+  std::size_t brick_nodes = 1;
+  const auto fill = [&](auto&& self, int level) -> void {
+    for (int child = 0; child != 8; ++child) {
+      ++brick_nodes;
+      if (level == brick_level + 1) {
+        bricks += std::string{"\x66\x66", 2};
+        brick_nodes += 8;
+      } else if (level < brick_level + 4) {
+        bricks += std::string{"\xff\xff", 2};
+        self(self, level - 1);
+      } else {
+        bricks += std::string{"\x03\x00", 2};
+        for (int l = level - 1; l != brick_level + 3; --l, ++brick_nodes) bricks += std::string{"\x03\x00", 2};
+        ++brick_nodes;
+        bricks += std::string{"\xff\xff", 2};
+        self(self, brick_level + 2);
+      }
+    }
+  };
+  fill(fill, default_tree_depth - 1);
+  const auto wide = read_bt(
+      bytes_of(with_header(bt_line, "id OcTree\nsize " + std::to_string(brick_nodes) + "\nres 0.1\ndata\n" + bricks)));
+  REQUIRE(wide);
+  CHECK(wide->size() == brick_nodes);
+  CHECK(wide->memory_bytes() < 8192 + 400 * bricks.size());
 
   // One leaf that covers an eighth of the world.
   const auto large =
@@ -257,6 +285,89 @@ TEST_CASE("A map that is one leaf is written as eight where a file cannot hold o
     REQUIRE(theirs.readBinary(stream));
     CHECK(test::bt_of(theirs) == bt_bytes(map));
   }
+}
+
+TEST_CASE("What OctoMap leaves unpruned stays unpruned in its files") {
+  // OctoMap prunes from below and stops at the first level at which nothing merges. `merges` are the
+  // levels at which eight leaves differ in their log-odds, but not in what is likelier.
+  const int top = default_tree_depth - 1;
+  for (const auto& merges :
+       {std::vector<int>{}, {1}, {2}, {3}, {4}, {6}, {1, 2}, {1, 3}, {2, 3}, {1, 2, 3}, {1, 2, 4}, {1, 2, 3, 4, 5}, {1, 3, 4}}) {
+    for (const bool occupied : {false, true}) {
+      occupancy_octree<> map{0.1};
+      for (const int level : merges) {
+        // Each in an eighth of the world of its own.
+        const voxel_key base = child_key({}, static_cast<unsigned>(level), node_cells(top));
+        for (unsigned i = 0; i != 8; ++i)
+          map.set_unknown_node(child_key(base, i, node_cells(level - 1)), default_tree_depth - level + 1,
+                               (occupied ? 1.0F : -1.0F) + 0.01F * static_cast<float>(i));
+      }
+      if (merges.empty()) map.set_unknown_node({}, default_tree_depth, 1.0F);
+      std::string levels;
+      for (const int level : merges) levels += std::to_string(level) + ' ';
+      INFO("levels " << levels);
+      const test::quiet silence;
+      std::istringstream ot{ot_bytes(map)};
+      const std::unique_ptr<octomap::AbstractOcTree> theirs{octomap::AbstractOcTree::read(ot)};
+      REQUIRE(theirs);
+      CHECK(test::ot_of(dynamic_cast<const octomap::OcTree&>(*theirs)) == ot_bytes(map));
+      CHECK(test::bt_of(dynamic_cast<const octomap::OcTree&>(*theirs)) == bt_bytes(map));
+    }
+  }
+}
+
+TEST_CASE("Octants of any values are written as OctoMap writes them") {
+  // From few values, of which groups are equal, to a different one for each voxel.
+  random_bits random{411};
+  for (const std::uint32_t values : {2U, 3U, 5U, 16U, 40U, 1000U}) {
+    occupancy_octree<> map{0.1};
+    for (std::uint32_t octant = 0; octant != 32; ++octant) {
+      const voxel_key base{32768 + 4 * (octant & 1U), 32768 + 4 * (octant >> 1U & 1U), 32768 + 4 * (octant >> 2U)};
+      const bool whole = random.below(3) != 0;
+      for (unsigned group = 0; group != 8; ++group) {
+        const bool equal = random.below(2) == 0;
+        const auto value = [&] { return 0.01F * static_cast<float>(static_cast<int>(random.below(values))) - 0.1F; };
+        const float one = value();
+        for (unsigned i = 0; i != 8; ++i)
+          if (whole || random.below(4) != 0)
+            map.set_unknown_node(child_key(child_key(base, group, 2), i, 1), default_tree_depth, equal ? one : value());
+      }
+    }
+    const std::string ot = ot_bytes(map);
+    const auto again = read_ot(bytes_of(ot));
+    REQUIRE(again);
+    CHECK(ot_bytes(*again) == ot);
+    const test::quiet silence;
+    std::istringstream in{ot};
+    const std::unique_ptr<octomap::AbstractOcTree> theirs{octomap::AbstractOcTree::read(in)};
+    REQUIRE(theirs);
+    dynamic_cast<octomap::OcTree&>(*theirs).updateInnerOccupancy();
+    CHECK(test::ot_of(dynamic_cast<const octomap::OcTree&>(*theirs)) == ot);
+    CHECK(test::bt_of(dynamic_cast<const octomap::OcTree&>(*theirs)) == bt_bytes(map));
+  }
+}
+
+TEST_CASE("Maps deeper or shallower than OctoMap's are not written in its formats") {
+  for (const int depth : {8, 18}) {
+    const occupancy_octree<> map{0.1, depth};
+    std::ostringstream out;
+    CHECK(write_bt(map, out).error().code == errc::unsupported);
+    CHECK(write_ot(map, out).error().code == errc::unsupported);
+    CHECK(out.str().empty());
+    const auto path = std::filesystem::temp_directory_path() / "orbis_octree_files_deep.bt";
+    CHECK(write_bt(map, path).error().code == errc::unsupported);
+    CHECK(write_ot(map, path).error().code == errc::unsupported);
+    CHECK_FALSE(std::filesystem::exists(path));
+  }
+}
+
+TEST_CASE("Headers may lack their comments and hold others") {
+  const auto map = some_map(410, 0.2, 1, 30);
+  const std::string bt = bt_bytes(map);
+  const std::string data = bt.substr(bt.find("data\n"));
+  const std::string size = "size " + std::to_string(read_bt(bytes_of(bt))->size()) + "\n";
+  for (const std::string& header : {"id OcTree\n" + size + "res 0.2\n", "#\n" + size + "# more\n\nres 0.2\nid OcTree\n"})
+    CHECK(bt_bytes(read_bt(bytes_of(bt_line + "\n" + header + data)).value()) == bt);
 }
 
 TEST_CASE("A real corridor reads and rewrites to the same bytes") {

@@ -2,22 +2,18 @@
 /// @file
 /// OctoMap's files: `.bt` (free or occupied, 2 bits per child) and `.ot` (log-odds as float32).
 ///
-/// What is written is byte for byte what OctoMap writes for the same map after pruning. Reading
-/// takes memory in proportion to the bytes given, whatever they claim.
+/// What is written is byte for byte what OctoMap writes for the same map, pruned as it prunes. Reading
+/// takes at most 400 bytes for each byte given and 8 KB, whatever they claim.
 #pragma once
 
-#include <array>
-#include <bit>
-#include <cctype>
 #include <charconv>
+#include <cassert>
 #include <cmath>
 #include <cstddef>
-#include <cstdint>
-#include <cstdio>
-#include <cstring>
 #include <filesystem>
 #include <istream>
 #include <iterator>
+#include <optional>
 #include <ostream>
 #include <span>
 #include <string>
@@ -27,6 +23,7 @@
 #include <orbis/core/file.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/octree/occupancy_octree.hpp>
+#include <orbis/octree/octomap_nodes.hpp>
 
 namespace orbis::octree {
 
@@ -46,57 +43,6 @@ inline constexpr std::string_view ot_magic = "# Octomap OcTree file";
   header += "\ndata\n";
   return header;
 }
-
-/// Nodes in `.bt` order: an inner node is two bits for each child.
-struct bt_writer {
-  std::string bytes;
-  std::size_t nodes = 0;
-  float threshold;
-  int root_level;
-
-  void leaf(const voxel_key& key, int level, float value) {
-    ++nodes;
-    if (level != root_level) return;
-    // A root without children cannot be written: its children are.
-    std::array<node_entry<float>, 8> children;
-    children.fill({node_kind::leaf, value});
-    nodes += children.size() - 1;
-    inner(key, level, value, children);
-  }
-  void inner(const voxel_key&, int, float, const std::array<node_entry<float>, 8>& children) {
-    ++nodes;
-    unsigned bits = 0;
-    for (unsigned i = 0; i != 8; ++i) {
-      const node_entry<float>& c = children[i];
-      const unsigned code = c.kind == node_kind::none    ? 0U
-                            : c.kind == node_kind::inner ? 3U
-                            : c.value >= threshold       ? 2U
-                                                         : 1U;
-      bits |= code << (2 * i);
-    }
-    bytes += static_cast<char>(bits & 0xffU);
-    bytes += static_cast<char>(bits >> 8U);
-  }
-};
-
-/// Nodes in `.ot` order: the value, and a bit for each child.
-struct ot_writer {
-  std::string bytes;
-  std::size_t nodes = 0;
-
-  void put(float value, unsigned children) {
-    ++nodes;
-    const auto bits = std::bit_cast<std::uint32_t>(value);
-    for (unsigned shift = 0; shift != 32; shift += 8) bytes += static_cast<char>(bits >> shift & 0xffU);
-    bytes += static_cast<char>(children);
-  }
-  void leaf(const voxel_key&, int, float value) { put(value, 0); }
-  void inner(const voxel_key&, int, float value, const std::array<node_entry<float>, 8>& children) {
-    unsigned bits = 0;
-    for (unsigned i = 0; i != 8; ++i) bits |= static_cast<unsigned>(children[i].kind != node_kind::none) << i;
-    put(value, bits);
-  }
-};
 
 struct octomap_file {
   double resolution = 0.0;
@@ -153,134 +99,90 @@ struct octomap_file {
   return file;
 }
 
-/// Reads the nodes behind the header, in preorder, into a map.
-template <class Map>
-struct node_reader {
-  Map& map;
-  std::string_view data;
-  std::size_t nodes = 0;
-  const char* problem = nullptr;
-
-  [[nodiscard]] bool give_up(const char* why) {
-    problem = why;
-    return false;
-  }
-  [[nodiscard]] unsigned take() {
-    const auto byte = static_cast<unsigned char>(data.front());
-    data.remove_prefix(1);
-    return byte;
-  }
-  [[nodiscard]] bool read_bt(const voxel_key& key, int depth) {
-    ++nodes;
-    if (data.size() < 2) return give_up("the data ends early");
-    unsigned bits = take();
-    bits |= take() << 8U;
-    if (bits == 0) return give_up("an inner node without children");
-    using model = typename Map::model;
-    for (unsigned i = 0; i != 8; ++i, bits >>= 2U) {
-      const voxel_key child = child_key(key, i, node_cells(default_tree_depth - depth - 1));
-      const unsigned code = bits & 3U;
-      if (code == 3) {
-        if (depth + 1 == default_tree_depth) return give_up("nodes below the deepest level");
-        if (!read_bt(child, depth + 1)) return false;
-      } else if (code != 0) {
-        ++nodes;
-        map.set_unknown_node(child, depth + 1, code == 2 ? model::clamp_max : model::clamp_min);
-      }
-    }
-    return true;
-  }
-  [[nodiscard]] bool read_ot(const voxel_key& key, int depth) {
-    ++nodes;
-    if (data.size() < 5) return give_up("the data ends early");
-    std::uint32_t value = 0;
-    for (unsigned shift = 0; shift != 32; shift += 8) value |= std::uint32_t{take()} << shift;
-    const unsigned children = take();
-    if (children == 0) {
-      const auto log_odds = std::bit_cast<float>(value);
-      if (!std::isfinite(log_odds)) return give_up("a value that is not finite");
-      map.set_unknown_node(key, depth, log_odds);
-      return true;
-    }
-    if (depth == default_tree_depth) return give_up("nodes below the deepest level");
-    for (unsigned i = 0; i != 8; ++i)
-      if ((children >> i & 1U) != 0 && !read_ot(child_key(key, i, node_cells(default_tree_depth - depth - 1)), depth + 1)) return false;
-    return true;
-  }
-};
-
-template <class Model, class Read>
+/// Reads a file whose nodes `Reader` knows.
+template <class Model, class Reader>
 [[nodiscard]] result<occupancy_octree<Model>> read_octomap(std::string_view bytes, std::string_view magic,
-                                                           const std::string& where, Read&& read) {
+                                                           const std::string& where) {
   const auto file = parse_header(bytes, magic, where);
   if (!file) return fail(file.error());
-  occupancy_octree<Model> map{file->resolution};
-  node_reader<occupancy_octree<Model>> reader{map, file->data};
-  if (file->nodes != 0 && !read(reader)) return fail(errc::malformed, where, reader.problem);
+  brick_store<float> store;
+  Reader reader{{store, std::as_bytes(std::span{file->data})}};
+  if (file->nodes != 0 && !reader.read({}, default_tree_depth)) return fail(errc::malformed, where, reader.problem);
   if (reader.nodes != file->nodes)
     return fail(errc::malformed, where,
                 "holds " + std::to_string(reader.nodes) + " nodes, but declares " + std::to_string(file->nodes));
-  if (!reader.data.empty())
-    return fail(errc::malformed, where, std::to_string(reader.data.size()) + " bytes behind the last node");
-  return map;
+  if (!reader.left.empty())
+    return fail(errc::malformed, where, std::to_string(reader.left.size()) + " bytes behind the last node");
+  return occupancy_octree<Model>{file->resolution, default_tree_depth, std::move(store)};
 }
 
 [[nodiscard]] inline std::string_view as_chars(std::span<const std::byte> bytes) noexcept {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 [[nodiscard]] inline result<std::string> read_stream(std::istream& in) {
-  std::string bytes{std::istreambuf_iterator<char>{in}, {}};
+  std::string bytes;
+  char buffer[65536];
+  while (in.read(buffer, sizeof buffer) || in.gcount() > 0) bytes.append(buffer, static_cast<std::size_t>(in.gcount()));
   if (in.bad()) return fail(errc::unreadable, "stream", "cannot be read");
   return bytes;
 }
-[[nodiscard]] inline result<void> write_bytes(const std::string& bytes, const std::filesystem::path& path) {
-  return write_file_atomically(
-      path, [&](std::ostream& out) { out.write(bytes.data(), static_cast<std::streamsize>(bytes.size())); });
+[[nodiscard]] inline std::string whole_file(std::string_view magic, const octomap_nodes& nodes, const voxel_grid& grid) {
+  assert(grid.depth() == default_tree_depth);
+  std::string bytes = octomap_header(magic, nodes.nodes, grid.resolution());
+  bytes.reserve(bytes.size() + nodes.bytes.size());
+  return bytes.append(nodes.bytes.view());
 }
-[[nodiscard]] inline result<void> write_bytes(const std::string& bytes, std::ostream& out) {
-  if (!out.write(bytes.data(), static_cast<std::streamsize>(bytes.size())))
-    return fail(errc::write_failed, "stream", "cannot be written");
+template <class Writer, class Map>
+[[nodiscard]] result<void> write_octomap(const Map& map, std::string_view magic, std::ostream& out,
+                                         const std::string& where) {
+  if (map.tree_depth() != default_tree_depth)
+    return fail(errc::unsupported, where, "OctoMap's trees have 16 levels, this one " + std::to_string(map.tree_depth()));
+  const octomap_nodes nodes = Writer{map.store(), map.tree_depth()}.write();
+  const std::string header = octomap_header(magic, nodes.nodes, map.resolution());
+  out.write(header.data(), static_cast<std::streamsize>(header.size()));
+  if (!out.write(nodes.bytes.view().data(), static_cast<std::streamsize>(nodes.bytes.size())))
+    return fail(errc::write_failed, where, "cannot be written");
   return {};
+}
+template <class Writer, class Map>
+[[nodiscard]] result<void> write_octomap(const Map& map, std::string_view magic, const std::filesystem::path& path) {
+  return write_file_atomically(
+      path, [&](std::ostream& out) { return write_octomap<Writer>(map, magic, out, path.string()); });
 }
 
 }  // namespace detail
 
-/// A sensor model whose maps OctoMap's files can hold.
-template <class M>
-concept octomap_model = sensor_model<M> && std::same_as<typename M::value_type, float>;
-
 /// The bytes of a `.bt` file: every voxel free or occupied, whichever is likelier; pruned.
+/// @pre map.tree_depth() == default_tree_depth
 template <octomap_model Model>
 [[nodiscard]] std::string bt_bytes(const occupancy_octree<Model>& map) {
-  detail::bt_writer writer{{}, 0, Model::occupancy_threshold, map.tree_depth()};
-  map.visit_tree([](float v) { return is_occupied<Model>(v) ? Model::clamp_max : Model::clamp_min; }, writer);
-  return detail::octomap_header(detail::bt_magic, writer.nodes, map.resolution()) + writer.bytes;
+  return detail::whole_file(detail::bt_magic, detail::bt_writer<Model>{map.store(), map.tree_depth()}.write(), map.grid());
 }
 /// The bytes of an `.ot` file: the pruned octree with all its log-odds.
+/// @pre map.tree_depth() == default_tree_depth
 template <octomap_model Model>
 [[nodiscard]] std::string ot_bytes(const occupancy_octree<Model>& map) {
-  detail::ot_writer writer;
-  map.visit_tree(writer);
-  return detail::octomap_header(detail::ot_magic, writer.nodes, map.resolution()) + writer.bytes;
+  return detail::whole_file(detail::ot_magic, detail::ot_writer{map.store(), map.tree_depth()}.write(), map.grid());
 }
 
-/// Writes a `.bt` file, whole or not at all. Errors: write_failed.
+/// Writes a `.bt` file, whole or not at all. Errors: write_failed; unsupported for a map of another
+/// depth than OctoMap's.
 template <octomap_model Model>
 [[nodiscard]] result<void> write_bt(const occupancy_octree<Model>& map, const std::filesystem::path& path) {
-  return detail::write_bytes(bt_bytes(map), path);
+  return detail::write_octomap<detail::bt_writer<Model>>(map, detail::bt_magic, path);
 }
 template <octomap_model Model>
 [[nodiscard]] result<void> write_bt(const occupancy_octree<Model>& map, std::ostream& out) {
-  return detail::write_bytes(bt_bytes(map), out);
+  return detail::write_octomap<detail::bt_writer<Model>>(map, detail::bt_magic, out, "stream");
 }
-/// Writes an `.ot` file, whole or not at all. Errors: write_failed.
+/// Writes an `.ot` file, whole or not at all. Errors: those of write_bt.
 template <octomap_model Model>
 [[nodiscard]] result<void> write_ot(const occupancy_octree<Model>& map, const std::filesystem::path& path) {
-  return detail::write_bytes(ot_bytes(map), path);
+  return detail::write_octomap<detail::ot_writer>(map, detail::ot_magic, path);
 }
 template <octomap_model Model>
 [[nodiscard]] result<void> write_ot(const occupancy_octree<Model>& map, std::ostream& out) {
-  return detail::write_bytes(ot_bytes(map), out);
+  return detail::write_octomap<detail::ot_writer>(map, detail::ot_magic, out, "stream");
 }
 
 /// Reads the bytes of a `.bt` file; `where` names them in errors. Leaves get the model's bounds.
@@ -288,15 +190,13 @@ template <octomap_model Model>
 template <octomap_model Model = log_odds<>>
 [[nodiscard]] result<occupancy_octree<Model>> read_bt(std::span<const std::byte> bytes,
                                                       const std::string& where = "bytes") {
-  return detail::read_octomap<Model>(detail::as_chars(bytes), detail::bt_magic, where,
-                                     [](auto& reader) { return reader.read_bt({}, 0); });
+  return detail::read_octomap<Model, detail::bt_reader<Model>>(detail::as_chars(bytes), detail::bt_magic, where);
 }
 /// Reads the bytes of an `.ot` file. Inner values are not read: they follow from the leaves.
 template <octomap_model Model = log_odds<>>
 [[nodiscard]] result<occupancy_octree<Model>> read_ot(std::span<const std::byte> bytes,
                                                       const std::string& where = "bytes") {
-  return detail::read_octomap<Model>(detail::as_chars(bytes), detail::ot_magic, where,
-                                     [](auto& reader) { return reader.read_ot({}, 0); });
+  return detail::read_octomap<Model, detail::ot_reader>(detail::as_chars(bytes), detail::ot_magic, where);
 }
 /// Reads a file. Errors: not_found, unreadable, and those above.
 template <octomap_model Model = log_odds<>>
