@@ -39,6 +39,9 @@ class depth_view {
   [[nodiscard]] int height() const noexcept { return pixels_.height(); }
   [[nodiscard]] image_view<const T> pixels() const noexcept { return pixels_; }
   [[nodiscard]] double scale() const noexcept { return scale_; }
+  /// The range of valid depths, metres.
+  [[nodiscard]] float min_depth() const noexcept { return min_; }
+  [[nodiscard]] float max_depth() const noexcept { return max_; }
   /// The same image with a narrower range of valid depths, in metres.
   [[nodiscard]] depth_view within(float min_depth, float max_depth) const noexcept {
     return depth_view(pixels_, scale_, std::max(min_, min_depth), std::min(max_, max_depth));

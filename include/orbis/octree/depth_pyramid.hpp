@@ -1,0 +1,231 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// The nearest and the farthest ray end in any box of pixels, in four look-ups.
+///
+/// The min/max mipmaps of A. Tevs, I. Ihrke, H.-P. Seidel, "Maximum mipmaps for fast, accurate, and
+/// scalable dynamic height field rendering", I3D 2008, with cells that overlap.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cassert>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include <orbis/core/simd.hpp>
+
+#if ORBIS_X86
+#include <immintrin.h>
+#endif
+
+namespace orbis::octree {
+
+namespace detail {
+
+/// What a cell of the pyramid holds: in the upper half the farthest depth in it, rounded up, and in
+/// the lower half 65535 less the nearest one, rounded down. So both are maxima.
+[[nodiscard]] constexpr std::uint32_t larger_halves(std::uint32_t a, std::uint32_t b) noexcept {
+  return std::max(a & 0xffff0000U, b & 0xffff0000U) | std::max(a & 0xffffU, b & 0xffffU);
+}
+
+/// Two rows of depths to one row of cells of 2x2: `strict` counts a missing depth as 0, `some` leaves
+/// it out (0 if all are missing). Reads up to 16 values past the last cell's.
+inline void first_cells_portable(const float* upper, const float* lower, float scale, int cells, std::uint32_t* strict,
+                                 std::uint32_t* some) noexcept {
+  const auto word = [&](float z) {
+    const auto q = static_cast<std::uint32_t>(static_cast<std::int32_t>(z * scale));
+    return z > 0.0F ? (q + 1U) << 16U | (65535U - q) : 0U;
+  };
+  for (int i = 0; i != cells; ++i) {
+    const std::uint32_t a = word(upper[2 * i]), b = word(upper[2 * i + 1]);
+    const std::uint32_t c = word(lower[2 * i]), d = word(lower[2 * i + 1]);
+    some[i] = larger_halves(larger_halves(a, b), larger_halves(c, d));
+    strict[i] = a == 0 || b == 0 || c == 0 || d == 0 ? some[i] | 0xffffU : some[i];
+  }
+}
+
+/// `out[i]`: the larger halves of `a[i]`, `a[i + 1]`, `b[i]` and `b[i + 1]`. @pre a[count], b[count] readable
+inline void overlap_portable(const std::uint32_t* a, const std::uint32_t* b, int count, std::uint32_t* out) noexcept {
+  for (int i = 0; i != count; ++i) out[i] = larger_halves(larger_halves(a[i], a[i + 1]), larger_halves(b[i], b[i + 1]));
+}
+
+#if ORBIS_X86
+ORBIS_TARGET("avx2")
+inline void first_cells_avx2(const float* upper, const float* lower, float scale, int cells, std::uint32_t* strict,
+                             std::uint32_t* some) noexcept {
+  const __m256 scales = _mm256_set1_ps(scale);
+  const __m256i ones = _mm256_set1_epi32(65535 + 65536);
+  const auto word = [&](const float* p) ORBIS_TARGET("avx2") {
+    const __m256 z = _mm256_loadu_ps(p);
+    const __m256i q = _mm256_cvttps_epi32(_mm256_mul_ps(z, scales));
+    // (q + 1) << 16 | (65535 - q), as one sum
+    const __m256i w = _mm256_add_epi32(_mm256_sub_epi32(_mm256_slli_epi32(q, 16), q), ones);
+    return _mm256_and_si256(w, _mm256_castps_si256(_mm256_cmp_ps(z, _mm256_setzero_ps(), _CMP_GT_OQ)));
+  };
+  for (int i = 0; i < cells; i += 8) {
+    const __m256i a = word(upper + 2 * i), b = word(upper + 2 * i + 8);
+    const __m256i c = word(lower + 2 * i), d = word(lower + 2 * i + 8);
+    const __m256i left = _mm256_max_epu16(a, c), right = _mm256_max_epu16(b, d);
+    const auto pairs = [&](const __m256i x, const __m256i y, const int order) ORBIS_TARGET("avx2") {
+      const __m256 f = _mm256_castsi256_ps(x), g = _mm256_castsi256_ps(y);
+      const __m256 h = order == 0 ? _mm256_shuffle_ps(f, g, 0x88) : _mm256_shuffle_ps(f, g, 0xdd);
+      return _mm256_permute4x64_epi64(_mm256_castps_si256(h), 0xd8);
+    };
+    const __m256i any = _mm256_max_epu16(pairs(left, right, 0), pairs(left, right, 1));
+    const __m256i none = _mm256_setzero_si256();
+    const __m256i gap_l = _mm256_or_si256(_mm256_cmpeq_epi32(a, none), _mm256_cmpeq_epi32(c, none));
+    const __m256i gap_r = _mm256_or_si256(_mm256_cmpeq_epi32(b, none), _mm256_cmpeq_epi32(d, none));
+    const __m256i gap = _mm256_or_si256(pairs(gap_l, gap_r, 0), pairs(gap_l, gap_r, 1));
+    _mm256_storeu_si256(reinterpret_cast<__m256i*>(some + i), any);
+    _mm256_storeu_si256(reinterpret_cast<__m256i*>(strict + i),
+                        _mm256_or_si256(any, _mm256_and_si256(gap, _mm256_set1_epi32(0xffff))));
+  }
+}
+
+ORBIS_TARGET("avx2")
+inline void overlap_avx2(const std::uint32_t* a, const std::uint32_t* b, int count, std::uint32_t* out) noexcept {
+  const auto load = [&](const std::uint32_t* p)
+                        ORBIS_TARGET("avx2") { return _mm256_loadu_si256(reinterpret_cast<const __m256i*>(p)); };
+  int i = 0;
+  for (; i + 8 <= count; i += 8)
+    _mm256_storeu_si256(reinterpret_cast<__m256i*>(out + i),
+                        _mm256_max_epu16(_mm256_max_epu16(load(a + i), load(a + i + 1)),
+                                         _mm256_max_epu16(load(b + i), load(b + i + 1))));
+  overlap_portable(a + i, b + i, count - i, out + i);
+}
+#endif
+
+}  // namespace detail
+
+/// Level k, from 1 on, has cells of 2^k x 2^k pixels; its entry (i, j) covers the cells i, i + 1 of
+/// the rows j, j + 1. A box that touches at most four cells in a row is covered by the entries of its
+/// first cell and of the last but one.
+///
+/// There are three families of entries that differ in what counts as the nearest end. Kind 0: the
+/// nearest pixel, 0 if one is without an end. Kind 1: of every aligned tile of 2x2 pixels those that
+/// have an end count, 0 if none does. Kind 2: the same with tiles of 4x4.
+class depth_pyramid {
+ public:
+  static constexpr int max_levels = 16;
+
+  explicit depth_pyramid(simd::level level = simd::detected()) noexcept
+      : first_{simd::select<first_kernel>(level,
+                                          {
+                                            .portable = detail::first_cells_portable,
+#if ORBIS_X86
+                                            .popcnt = nullptr, .avx2 = detail::first_cells_avx2
+#endif
+                                          })},
+        overlap_{simd::select<overlap_kernel>(level, {
+          .portable = detail::overlap_portable,
+#if ORBIS_X86
+          .popcnt = nullptr, .avx2 = detail::overlap_avx2
+#endif
+        })} {
+  }
+
+  /// `row(v)`: the depths at which the rays of image row v end, 0 where there is none, followed by 16
+  /// zeros. `max_z`: the largest of them. O(pixels).
+  template <class Row>
+  void build(int width, int height, float max_z, Row&& row) {
+    lay_out(width, height);
+    if (width == 0 || height == 0) return;
+    scale_ = max_z > 0.0F ? 65533.0F / max_z : 1.0F;
+    // A tile that sticks out of the image: below, the last row counts twice; on the right, ends are missing.
+    for (int j = 0; j != height_[1]; ++j)
+      first_(row(2 * j), row(std::min(2 * j + 1, height - 1)), scale_, width_[1], strict_.data() + j * row_size_,
+             some_.data() + j * row_size_);
+    raise(0, 1, strict_);
+    for (int j = 0; j != height_[1]; ++j)
+      for (int i = 0; i != width_[1]; ++i) {
+        const std::uint32_t cell = some_[static_cast<std::size_t>(j * row_size_ + i)];
+        strict_[static_cast<std::size_t>(j * row_size_ + i)] = cell == 0 ? 0xffffU : cell;
+      }
+    raise(1, 1, strict_);
+    std::copy_n(entries(1, 1), width_[1] * height_[1], entries(2, 1));
+    if (levels_ < 2) return;
+    overlap(1, some_, scratch_.data());
+    for (int j = 0; j != height_[2]; ++j)
+      for (int i = 0; i != width_[2]; ++i) {
+        const std::uint32_t cell = scratch_[static_cast<std::size_t>(2 * j * width_[1] + 2 * i)];
+        some_[static_cast<std::size_t>(j * row_size_ + i)] = cell == 0 ? 0xffffU : cell;
+      }
+    raise(2, 2, some_);
+  }
+
+  /// Depths times this are what the entries hold.
+  [[nodiscard]] float scale() const noexcept { return scale_; }
+  [[nodiscard]] int levels() const noexcept { return levels_; }
+  /// Where the entries of a level begin within a family, and from row to row.
+  [[nodiscard]] const std::array<std::int32_t, max_levels>& begin() const noexcept { return begin_; }
+  [[nodiscard]] const std::array<std::int32_t, max_levels>& width() const noexcept { return width_; }
+  [[nodiscard]] const std::uint32_t* data() const noexcept { return cells_.data(); }
+  [[nodiscard]] std::size_t family() const noexcept { return family_; }
+  [[nodiscard]] std::size_t memory_bytes() const noexcept {
+    return (cells_.capacity() + strict_.capacity() + some_.capacity() + scratch_.capacity()) * sizeof(std::uint32_t);
+  }
+
+ private:
+  using first_kernel = void(const float*, const float*, float, int, std::uint32_t*, std::uint32_t*);
+  using overlap_kernel = void(const std::uint32_t*, const std::uint32_t*, int, std::uint32_t*);
+  static constexpr std::size_t padding = 16;
+
+  void lay_out(int width, int height) {
+    levels_ = 0;
+    std::int32_t size = 0;
+    int w = width, h = height;
+    do {  // the highest level has at most four cells in a row
+      ++levels_;
+      w = (w + 1) / 2;
+      h = (h + 1) / 2;
+      const auto k = static_cast<std::size_t>(levels_);
+      begin_[k] = size;
+      width_[k] = w;
+      height_[k] = h;
+      size += w * h;
+    } while (std::max(w, h) > 4 && levels_ + 1 < max_levels);
+    family_ = static_cast<std::size_t>(size);
+    cells_.resize(3 * family_ + padding);
+    row_size_ = static_cast<std::ptrdiff_t>(width_[1]) + static_cast<std::ptrdiff_t>(padding);
+    const auto buffer = static_cast<std::size_t>(row_size_) * static_cast<std::size_t>(height_[1] + 1);
+    strict_.resize(buffer);
+    some_.resize(buffer);
+    scratch_.resize(static_cast<std::size_t>(begin_[1] + width_[1] * height_[1]) + padding);
+  }
+  [[nodiscard]] std::uint32_t* entries(std::size_t kind, int level) noexcept {
+    return cells_.data() + kind * family_ + begin_[static_cast<std::size_t>(level)];
+  }
+  /// The entries of a level from its cells.
+  void overlap(int level, std::vector<std::uint32_t>& cells, std::uint32_t* out) {
+    const int w = width_[static_cast<std::size_t>(level)], h = height_[static_cast<std::size_t>(level)];
+    const auto at = [&](int j) { return cells.data() + j * row_size_; };
+    for (int j = 0; j != h; ++j) at(j)[w] = at(j)[w - 1];
+    std::copy_n(at(h - 1), w + 1, at(h));
+    for (int j = 0; j != h; ++j) overlap_(at(j), at(j + 1), w, out + static_cast<std::ptrdiff_t>(j) * w);
+  }
+  /// The entries of all levels from `level` on, from the cells of `level`; `cells` is used up.
+  void raise(std::size_t kind, int level, std::vector<std::uint32_t>& cells) {
+    for (;; ++level) {
+      const std::uint32_t* const out = entries(kind, level);
+      overlap(level, cells, entries(kind, level));
+      if (level == levels_) return;
+      const auto above = static_cast<std::size_t>(level + 1);
+      for (int j = 0; j != height_[above]; ++j)
+        for (int i = 0; i != width_[above]; ++i)  // every other entry is a cell of the level above
+          cells[static_cast<std::size_t>(j * row_size_ + i)] =
+              out[static_cast<std::ptrdiff_t>(2 * j) * width_[above - 1] + 2 * i];
+    }
+  }
+
+  first_kernel* first_;
+  overlap_kernel* overlap_;
+  std::vector<std::uint32_t> cells_, strict_, some_, scratch_;
+  std::array<std::int32_t, max_levels> begin_{}, width_{}, height_{};
+  std::size_t family_ = 0;
+  std::ptrdiff_t row_size_ = 0;
+  int levels_ = 0;
+  float scale_ = 1.0F;
+};
+
+}  // namespace orbis::octree
