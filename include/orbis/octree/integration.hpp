@@ -196,6 +196,7 @@ class scan_marker {
         .popcnt = nullptr, .avx2 = nullptr, .avx512 = detail::find_keys_avx512
 #endif
       });
+      scan_brick* brick = nullptr;  // of the last point; neighbours mostly lie in the same one
       while (begin != end) {
         const std::size_t n = std::min(end - begin, detail::point_batch::capacity);
         for (std::size_t i = 0; i != n; ++i) {
@@ -206,7 +207,13 @@ class scan_marker {
         }
         begin += n;
         find_keys(grid, batch, n, keys);
-        for (std::size_t i = 0; i != keys.count; ++i) ends.mark_occupied({keys.x[i], keys.y[i], keys.z[i]});
+        for (std::size_t i = 0; i != keys.count; ++i) {
+          const voxel_key k{keys.x[i], keys.y[i], keys.z[i]};
+          if (const std::uint64_t name = node_name(k, brick_level); brick == nullptr || name != brick->name)
+            brick = &ends.at(k);
+          const std::uint32_t place = place_in_brick(k);
+          brick->occupied[place >> 6U] |= std::uint64_t{1} << (place & 63U);
+        }
         summary.rejected += keys.outside;
       }
     }

@@ -23,6 +23,7 @@
 #include <orbis/octree/ray_walk.hpp>
 #include <orbis/octree/scan.hpp>
 #include <orbis/octree/sweep_planes.hpp>
+#include <orbis/octree/swept_ray.hpp>
 
 #if ORBIS_X86
 #include <immintrin.h>
@@ -42,6 +43,11 @@ class ray_sweep {
     left_origin_ = false;
     for (face& f : faces_) f.rays.clear();
     walked_.clear();
+    batched_ = 0;
+    source_ = {grid, origin, from};
+#if ORBIS_X86
+    by_eights_ = std::min(level, simd::detected()) >= simd::level::avx512;
+#endif
     sweep_ = simd::select<kernel>(level, {
       .portable = detail::sweep_portable,
 #if ORBIS_X86
@@ -58,27 +64,24 @@ class ray_sweep {
                                           static_cast<std::int32_t>(to.z) - from_[2]};
     if ((way[0] | way[1] | way[2]) == 0) return;
     left_origin_ = true;
-    const auto cursor = ray_cursor::between(*grid_, key(0, 0, 0), origin_, end);
-    if (!cursor) return;
-    const std::size_t axis = main_axis(*cursor);
-    const std::int32_t planes = std::abs(way[axis]);
-    if (planes > max_planes || !ends_for_certain(*cursor, way)) return walk(end, to);
-
-    const std::size_t iu = axis == 0 ? 1 : 0, iv = axis == 2 ? 1 : 2;
-    const double at = cursor->next[axis] - cursor->delta[axis];
-    const line u = across(*cursor, iu, at, cursor->delta[axis]), v = across(*cursor, iv, at, cursor->delta[axis]);
-    // Of a ray that hits nothing the end must stay unmarked; a plane marks the voxels on both sides.
-    const std::int32_t swept = hit || planes == 0 ? planes : planes - 1;
-    if (!finish(*cursor, axis, swept, u, v, way, hit, masks)) return walk(end, to);
-    if (swept == 0) return;
-    face& f = faces_[2 * axis + (cursor->step[axis] < 0 ? 1 : 0)];
-    f.rays.push_back({u.at, u.slope, v.at, v.slope, swept, {end, to}});
-    if (f.rays.size() == max_waiting) sweep(f, masks);
+#if ORBIS_X86
+    if (hit && by_eights_) {
+      for (std::size_t i = 0; i != 3; ++i) {
+        batch_.end[i][batched_] = end[i];
+        batch_.way[i][batched_] = way[i];
+      }
+      if (++batched_ == detail::ray_batch::lanes) prepare(masks);
+      return;
+    }
+#endif
+    add_one(end, to, way, hit, masks);
   }
 
   /// Sweeps and walks the rays that are waiting.
   void flush(scan_masks& masks) {
     if (left_origin_) masks.mark_free(key(0, 0, 0));
+    for (std::size_t i = 0; i != batched_; ++i) add_batched(i, masks);
+    batched_ = 0;
     for (face& f : faces_) sweep(f, masks);
     walk_all(masks);
   }
@@ -162,8 +165,12 @@ class ray_sweep {
     std::array<std::int32_t, 3> at{};
     at[axis] = swept * c.step[axis];
     if (swept != 0) {
-      at[iu] = static_cast<std::int32_t>(std::floor(u.at + swept * u.slope));
-      at[iv] = static_cast<std::int32_t>(std::floor(v.at + swept * v.slope));
+      const auto cell = [&](const line& l, std::int32_t& whole) {
+        const double there = l.at + swept * l.slope, below = std::floor(there);
+        whole = static_cast<std::int32_t>(below);
+        return there - below > doubt && there - below < 1.0 - doubt;
+      };
+      if (!cell(u, at[iu]) || !cell(v, at[iv])) return false;
     }
     const auto left = [&](std::size_t i) { return std::abs(way[i] - at[i]); };
     if (hit && left(0) + left(1) + left(2) <= 1) return true;
@@ -183,6 +190,51 @@ class ray_sweep {
     if (count == crossed.size()) return false;
     for (std::size_t i = 0; i != count; ++i) masks.mark_free(crossed[i]);
     return true;
+  }
+  /// A ray on its own.
+  void add_one(const float3& end, const voxel_key& to, const std::array<std::int32_t, 3>& way, bool hit,
+               scan_masks& masks) {
+    const auto cursor = ray_cursor::between(*grid_, key(0, 0, 0), origin_, end);
+    if (!cursor) return;
+    const std::size_t axis = main_axis(*cursor);
+    const std::int32_t planes = std::abs(way[axis]);
+    if (planes > max_planes || !ends_for_certain(*cursor, way)) return walk(end, to);
+
+    const std::size_t iu = axis == 0 ? 1 : 0, iv = axis == 2 ? 1 : 2;
+    const double at = cursor->next[axis] - cursor->delta[axis];
+    const line u = across(*cursor, iu, at, cursor->delta[axis]), v = across(*cursor, iv, at, cursor->delta[axis]);
+    // Of a ray that hits nothing the end must stay unmarked; a plane marks the voxels on both sides.
+    const std::int32_t swept = hit || planes == 0 ? planes : planes - 1;
+    if (!finish(*cursor, axis, swept, u, v, way, hit, masks)) return walk(end, to);
+    if (swept == 0) return;
+    face& f = faces_[2 * axis + (cursor->step[axis] < 0 ? 1 : 0)];
+    f.rays.push_back({u.at, u.slope, v.at, v.slope, swept, {end, to}});
+    if (f.rays.size() == max_waiting) sweep(f, masks);
+  }
+#if ORBIS_X86
+  /// Rays that hit, as many as there are lanes.
+  void prepare(scan_masks& masks) {
+    detail::prepared_rays rays;
+    const std::uint32_t done = detail::prepare_avx512(source_, batch_, doubt, rays);
+    batched_ = 0;
+    for (std::size_t i = 0; i != detail::ray_batch::lanes; ++i) {
+      if ((done >> i & 1U) == 0) {
+        add_batched(i, masks);
+        continue;
+      }
+      face& f = faces_[static_cast<std::size_t>(rays.face[i])];
+      f.rays.push_back({rays.u[i], rays.du[i], rays.v[i], rays.dv[i], rays.planes[i], batched(i)});
+      if (f.rays.size() == max_waiting) sweep(f, masks);
+    }
+  }
+#endif
+  [[nodiscard]] target batched(std::size_t i) const noexcept {
+    return {{batch_.end[0][i], batch_.end[1][i], batch_.end[2][i]},
+            key(batch_.way[0][i], batch_.way[1][i], batch_.way[2][i])};
+  }
+  void add_batched(std::size_t i, scan_masks& masks) {
+    const target t = batched(i);
+    add_one(t.end, t.to, {batch_.way[0][i], batch_.way[1][i], batch_.way[2][i]}, true, masks);
   }
   void walk(const float3& end, const voxel_key& to) { walked_.push_back({end, to}); }
 
@@ -391,6 +443,10 @@ class ray_sweep {
   std::vector<bounds> bounds_;
   std::vector<std::uint32_t> doubtful_;
   std::vector<target> walked_;
+  detail::ray_source source_;
+  detail::ray_batch batch_;
+  std::size_t batched_ = 0;
+  bool by_eights_ = false;
   ray_grid window_;
   kernel* sweep_ = nullptr;
 };
