@@ -24,8 +24,8 @@
 #include <vector>
 
 #include <orbis/octree/brick.hpp>
-#include <orbis/octree/leaves.hpp>
 #include <orbis/octree/sensor_model.hpp>
+#include <orbis/octree/tree_parts.hpp>
 
 namespace orbis::octree {
 
@@ -95,32 +95,6 @@ inline void put_bytes16(char* out, unsigned v) noexcept {
   out[1] = static_cast<char>(v >> 8U);
 }
 
-/// The part of a tree above its bricks and large leaves, as a walk over them in Morton order.
-/// `content(part)` is called for each, `open()` and `close(level, state, children)` around the
-/// children of an inner node; they return what the parent is to know of its child.
-template <class T, class Writer>
-class upper_nodes {
- public:
-  upper_nodes(const std::vector<leaf_part<T>>& parts, Writer& writer)
-      : next_{parts.data()}, end_{parts.data() + parts.size()}, writer_{writer} {}
-
-  /// @pre the parts that are left are inside one node at `level`, and there are some
-  auto write(int level) {
-    if (next_->level == level) return writer_.content(*next_++);
-    const auto shift = 3 * static_cast<unsigned>(level - 1 - brick_level);
-    const std::uint64_t first = next_->order >> shift & ~std::uint64_t{7};
-    auto open = writer_.open();
-    for (unsigned i = 0; i != 8; ++i)
-      if (next_ != end_ && next_->order >> shift == first + i) open.add(i, write(level - 1));
-    return writer_.close(level, open);
-  }
-
- private:
-  const leaf_part<T>* next_;
-  const leaf_part<T>* end_;
-  Writer& writer_;
-};
-
 /// Writes `.bt` nodes: the tree of what is likelier, free or occupied, pruned as OctoMap prunes it.
 ///
 /// OctoMap prunes level by level from below and stops at the first level where nothing is to be done;
@@ -131,7 +105,7 @@ class bt_writer {
   bt_writer(const brick_store<float>& store, int root_level) : store_{store}, root_level_{root_level} {}
 
   [[nodiscard]] octomap_nodes write() {
-    const auto parts = leaf_parts(store_, root_level_);
+    const auto parts = tree_parts(store_, root_level_);
     if (parts.empty()) return {};
     if (parts.front().level == root_level_) return write_root(parts.front().value);
     write_pass(parts);
@@ -144,7 +118,7 @@ class bt_writer {
     return {std::move(out_), nodes_};
   }
 
-  // -- called by upper_nodes
+  // -- called by upper_walk
 
   struct open_node {
     std::size_t place;
@@ -169,7 +143,7 @@ class bt_writer {
     nodes_ += static_cast<std::size_t>(std::popcount((node.codes | node.codes >> 1U) & 0x5555U));
     return inner;
   }
-  [[nodiscard]] unsigned content(const leaf_part<float>& part) {
+  [[nodiscard]] unsigned content(const tree_part<float>& part) {
     if (part.content == nullptr) return code_of(part.value);
     out_.room(2 * (1 + 8 + 64));
     open_node node = open();
@@ -189,10 +163,10 @@ class bt_writer {
   [[nodiscard]] std::uint64_t occupied(const brick<float>& b, std::uint32_t i) const noexcept {
     return store_.voxels_where(b, i, [](float v) { return is_occupied<Model>(v); });
   }
-  void write_pass(const std::vector<leaf_part<float>>& parts) {
+  void write_pass(const std::vector<tree_part<float>>& parts) {
     out_.set_size(0);
     nodes_ = 1;
-    upper_nodes<float, bt_writer>{parts, *this}.write(root_level_);
+    (void)upper_walk<float, bt_writer>{parts, *this}.walk(root_level_);
   }
   /// A root without children cannot be written: its children are.
   [[nodiscard]] octomap_nodes write_root(float value) {
@@ -231,9 +205,9 @@ class bt_writer {
     return inner;
   }
   /// Whether there is a 2x2x2 node whose voxels differ, but not in what is likelier.
-  [[nodiscard]] bool is_group_pruned(const std::vector<leaf_part<float>>& parts) const {
+  [[nodiscard]] bool is_group_pruned(const std::vector<tree_part<float>>& parts) const {
     block<float> voxels;
-    return std::any_of(parts.begin(), parts.end(), [&](const leaf_part<float>& part) {
+    return std::any_of(parts.begin(), parts.end(), [&](const tree_part<float>& part) {
       if (part.content == nullptr) return false;
       for (std::uint32_t i = 0; i != 8; ++i) {
         if ((part.content->dense >> i & 1U) == 0) continue;
@@ -265,14 +239,14 @@ class ot_writer {
   ot_writer(const brick_store<float>& store, int root_level) : store_{store}, root_level_{root_level} {}
 
   [[nodiscard]] octomap_nodes write() {
-    const auto parts = leaf_parts(store_, root_level_);
+    const auto parts = tree_parts(store_, root_level_);
     if (parts.empty()) return {};
-    upper_nodes<float, ot_writer>{parts, *this}.write(root_level_);
+    (void)upper_walk<float, ot_writer>{parts, *this}.walk(root_level_);
     const std::size_t nodes = out_.size() / node_bytes;
     return {std::move(out_), nodes};
   }
 
-  // -- called by upper_nodes
+  // -- called by upper_walk
 
   struct child {
     float value;
@@ -305,7 +279,7 @@ class ot_writer {
     put(out_.at(node.place), node.max, node.children);
     return {node.max, false};
   }
-  child content(const leaf_part<float>& part) {
+  child content(const tree_part<float>& part) {
     if (part.content == nullptr) return put_leaf(part.value);
     out_.room(node_bytes * (1 + 8 + 64 + 512));
     open_node node = open();
