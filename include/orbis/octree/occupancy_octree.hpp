@@ -43,14 +43,6 @@ struct octree_leaf {
   bool occupied = false;
 };
 
-/// Numbers of nodes of the pruned octree.
-struct octree_counts {
-  std::size_t nodes = 0;  ///< inner nodes and leaves
-  std::size_t leaves = 0;
-  std::size_t occupied_leaves = 0;
-  std::size_t free_leaves = 0;
-};
-
 /// An axis-aligned box, metres.
 struct bounding_box {
   vec3 min = vec3::Zero();
@@ -271,6 +263,27 @@ class occupancy_octree {
       visit(leaf_of(key, level, v));
     });
   }
+  /// The same for those leaves that have a voxel in `box`, both corners' voxels included. Touches only
+  /// the chunks in the box.
+  template <std::invocable<const leaf&> Visit>
+  void for_each_leaf_in(const bounding_box& box, Visit&& visit) const {
+    if (const auto keys = keys_between(grid_, box.min, box.max))
+      visit_leaves_in(store_, tree_depth(), *keys,
+                      [&](const voxel_key& key, int level, value_type v) { visit(leaf_of(key, level, v)); });
+  }
+  /// The same for the tree cut off at `depth` (tree_depth(): all of it): what lies deeper is reported
+  /// as the inner node at `depth`, whose value `Policy` makes of its children.
+  template <node_policy<Model> Policy = max_of_children, std::invocable<const leaf&> Visit>
+  void for_each_leaf_down_to(int depth, Visit&& visit, Policy = {}) const {
+    visit_nodes_down_to<Model, Policy>(
+        store_, tree_depth(), tree_depth() - depth,
+        [&](const voxel_key& key, int level, value_type v, node_kind) { visit(leaf_of(key, level, v)); });
+  }
+  /// Calls `visit(const vec3& center)` for every occupied voxel, whatever the size of its leaf.
+  template <std::invocable<const vec3&> Visit>
+  void for_each_occupied_voxel(Visit&& visit) const {
+    visit_occupied_voxels<Model>(store_, [&](const voxel_key& key, value_type) { visit(grid_.center(key)); });
+  }
   /// Visits the nodes of the pruned octree in preorder, see pruned_tree::visit.
   template <tree_visitor<value_type> Visitor>
   void visit_tree(Visitor&& visitor) const {
@@ -282,16 +295,8 @@ class occupancy_octree {
     pruned_tree<value_type, std::remove_cvref_t<Value>>{store_, tree_depth(), value}.visit(visitor);
   }
 
-  /// Counts nodes. O(known voxels), as are the four after it.
-  [[nodiscard]] octree_counts counts() const {
-    octree_counts n;
-    n.nodes = visit_leaves(store_, tree_depth(), [&](const voxel_key&, int, value_type v) {
-      ++(is_occupied<Model>(v) ? n.occupied_leaves : n.free_leaves);
-    });
-    n.leaves = n.occupied_leaves + n.free_leaves;
-    n.nodes += n.leaves;
-    return n;
-  }
+  /// Counts nodes. O(bricks + octants that are not uniform), as are the four after it.
+  [[nodiscard]] octree_counts counts() const { return count_leaves<Model>(store_, tree_depth()); }
   /// Leaves of the pruned octree, of any size.
   [[nodiscard]] std::size_t num_leaves() const { return counts().leaves; }
   [[nodiscard]] std::size_t num_occupied_leaves() const { return counts().occupied_leaves; }
