@@ -258,6 +258,54 @@ TEST_CASE("A scan of many points is the same for every number of threads") {
   }
 }
 
+TEST_CASE("Points of any type and layout mark the same voxels") {
+  struct survey_point {
+    double z, y, x;
+  };
+  random_bits random{199};
+  const voxel_grid grid{0.05};
+  scan_marker marker;
+  for (const std::size_t count : {0U, 1U, 15U, 16U, 17U, 255U, 256U, 700U, 5000U}) {
+    const auto points = random_scan(random, count, 1.0);
+    std::vector<survey_point> doubles;
+    std::vector<std::array<float, 4>> padded;
+    std::vector<vec3f> vectors;
+    for (const float3& p : points) {
+      doubles.push_back({static_cast<double>(p[2]), static_cast<double>(p[1]), static_cast<double>(p[0])});
+      padded.push_back({p[0], p[1], p[2], not_a_number});
+      vectors.emplace_back(p[0], p[1], p[2]);
+    }
+    for (const ray_mode mode : {ray_mode::every_ray, ray_mode::discretized}) {
+      const integration_options options{.mode = mode};
+      const observation want = marked(seq, marker, grid, points, {}, options);
+      const auto mark = [&](const auto& range) {
+        const auto summary = marker.mark(seq, grid, range, float3{}, options);
+        return observed(marker.masks(), summary);
+      };
+      CHECK((mark(points) == want));
+      CHECK((mark(doubles) == want));
+      CHECK((mark(padded) == want));
+      CHECK((mark(vectors) == want));
+    }
+  }
+}
+
+TEST_CASE("Every instruction set loads the same points") {
+  random_bits random{200};
+  for (std::size_t count = 0; count <= octree::detail::point_batch::capacity; ++count) {
+    const auto points = random_scan(random, count + 1, 1.0);
+    auto want = std::make_unique<octree::detail::point_batch>(), got = std::make_unique<octree::detail::point_batch>();
+    octree::detail::load_triples_portable(points[0].data(), count, *want);
+#if ORBIS_X86
+    if (simd::detected() < simd::level::avx512) return;
+    octree::detail::load_triples_avx512(points[0].data(), count, *got);
+    REQUIRE(std::equal(want->x.begin(), want->x.begin() + static_cast<std::ptrdiff_t>(count), got->x.begin()));
+    REQUIRE(std::equal(want->y.begin(), want->y.begin() + static_cast<std::ptrdiff_t>(count), got->y.begin()));
+    REQUIRE(std::equal(want->z.begin(), want->z.begin() + static_cast<std::ptrdiff_t>(count), got->z.begin()));
+#endif
+  }
+}
+
 TEST_CASE("Every instruction set finds the same voxels of points") {
   random_bits random{197};
   auto batch = std::make_unique<octree::detail::point_batch>();

@@ -101,6 +101,14 @@ class scan_marker {
     return finish(policy, grid, options);
   }
 
+  /// The same of a range of points.
+  template <execution_policy Policy, point_range Points>
+  integration_summary mark(const Policy& policy, const voxel_grid& grid, const Points& points, const float3& origin,
+                           const integration_options& options) {
+    return mark(policy, grid, static_cast<std::size_t>(std::ranges::size(points)), detail::point_source<Points>{points},
+                origin, options);
+  }
+
   /// The second half of mode `discretized` alone: marks the rays to the centres of the voxels that are
   /// occupied in `ends`. @pre `ends` is not this marker's own
   template <execution_policy Policy>
@@ -199,12 +207,7 @@ class scan_marker {
       scan_brick* brick = nullptr;  // of the last point; neighbours mostly lie in the same one
       while (begin != end) {
         const std::size_t n = std::min(end - begin, detail::point_batch::capacity);
-        for (std::size_t i = 0; i != n; ++i) {
-          const float3 p = point(begin + i);
-          batch.x[i] = p[0];
-          batch.y[i] = p[1];
-          batch.z[i] = p[2];
-        }
+        detail::load_points(point, begin, n, batch);
         begin += n;
         find_keys(grid, batch, n, keys);
         for (std::size_t i = 0; i != keys.count; ++i) {

@@ -5,9 +5,13 @@
 
 #include <array>
 #include <bit>
+#include <concepts>
 #include <cstddef>
 #include <cstdint>
+#include <ranges>
+#include <type_traits>
 
+#include <orbis/core/point.hpp>
 #include <orbis/core/simd.hpp>
 #include <orbis/octree/key.hpp>
 
@@ -22,6 +26,80 @@ struct point_batch {
   static constexpr std::size_t capacity = 256;
   alignas(64) std::array<float, capacity> x, y, z;
 };
+
+inline void load_triples_portable(const float* points, std::size_t count, point_batch& batch) noexcept {
+  for (std::size_t i = 0; i != count; ++i) {
+    batch.x[i] = points[3 * i];
+    batch.y[i] = points[3 * i + 1];
+    batch.z[i] = points[3 * i + 2];
+  }
+}
+#if ORBIS_X86
+ORBIS_TARGET("avx512f")
+inline void load_triples_avx512(const float* points, std::size_t count, point_batch& batch) noexcept {
+  // Of each coordinate the first two registers hold eleven, the third the rest.
+  const __m512i every_third = _mm512_setr_epi32(0, 3, 6, 9, 12, 15, 18, 21, 24, 27, 30, 33, 36, 39, 42, 45);
+  std::size_t i = 0;
+  for (; i + 16 <= count; i += 16) {
+    const float* const p = points + 3 * i;
+    const __m512 a = _mm512_loadu_ps(p), b = _mm512_loadu_ps(p + 16), c = _mm512_loadu_ps(p + 32);
+    const auto coordinate = [&](int first, __mmask16 in_c) ORBIS_TARGET("avx512f") {
+      const __m512i at = _mm512_add_epi32(_mm512_set1_epi32(first), every_third);
+      return _mm512_mask_permutexvar_ps(_mm512_permutex2var_ps(a, at, b), in_c, at, c);
+    };
+    _mm512_store_ps(batch.x.data() + i, coordinate(0, 0xf800));  // 33, 36 ... lie in c
+    _mm512_store_ps(batch.y.data() + i, coordinate(1, 0xf800));
+    _mm512_store_ps(batch.z.data() + i, coordinate(2, 0xfc00));
+  }
+  for (; i != count; ++i) {
+    batch.x[i] = points[3 * i];
+    batch.y[i] = points[3 * i + 1];
+    batch.z[i] = points[3 * i + 2];
+  }
+}
+#endif
+
+/// Whether the points of a range are floats x, y, z, x, y, z ... in memory.
+template <class Points>
+concept float_triples = std::ranges::contiguous_range<Points> && requires(const std::ranges::range_value_t<Points>& p) {
+  requires sizeof(p) == 3 * sizeof(float);
+  { p.data() } -> std::same_as<const float*>;
+  { p[0] } -> std::convertible_to<float>;
+};
+
+/// The points of a range as functions of their number; whole batches at once where that is faster.
+template <point_range Points>
+struct point_source {
+  const Points& points;
+
+  [[nodiscard]] std::array<float, 3> operator()(std::size_t i) const {
+    return coordinates<float>(std::ranges::begin(points)[static_cast<std::ranges::range_difference_t<const Points>>(i)]);
+  }
+  void load(std::size_t begin, std::size_t count, point_batch& batch) const requires float_triples<const Points> {
+    auto* const load = simd::select<void(const float*, std::size_t, point_batch&)>(simd::detected(), {
+      .portable = load_triples_portable,
+#if ORBIS_X86
+      .popcnt = nullptr, .avx2 = nullptr, .avx512 = load_triples_avx512
+#endif
+    });
+    load(std::ranges::data(points)[begin].data(), count, batch);
+  }
+};
+
+/// Loads the points [begin, begin + count) of a source, which is any function of their number.
+template <class Source>
+void load_points(Source&& source, std::size_t begin, std::size_t count, point_batch& batch) {
+  if constexpr (requires { source.load(begin, count, batch); }) {
+    source.load(begin, count, batch);
+  } else {
+    for (std::size_t i = 0; i != count; ++i) {
+      const std::array<float, 3> p = source(begin + i);
+      batch.x[i] = p[0];
+      batch.y[i] = p[1];
+      batch.z[i] = p[2];
+    }
+  }
+}
 
 /// The voxels of some points, in their order, without those that equal the one before; and the number
 /// of points that lie in none.
