@@ -91,14 +91,9 @@ class occupancy_octree {
   template <execution_policy Policy, point_range Points, point_like Origin>
   integration_summary integrate(const Policy& policy, const Points& points, const Origin& origin,
                                 const integration_options& options = {}) {
-    const auto first = std::ranges::begin(points);
-    const auto point = [&](std::size_t i) {
-      return coordinates<float>(first[static_cast<std::ranges::range_difference_t<const Points>>(i)]);
-    };
-    const auto count = static_cast<std::size_t>(std::ranges::size(points));
     begin_change();
     integration_summary summary =
-        scratch_.marker.mark(policy, grid_, count, point, coordinates<float>(origin), options);
+        scratch_.marker.mark(policy, grid_, points, coordinates<float>(origin), options);
     apply(scratch_.marker.masks(), summary);
     return summary;
   }
