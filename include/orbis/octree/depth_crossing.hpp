@@ -136,8 +136,12 @@ inline bool cross_box_portable(const depth_scene& s, const voxel_test& t, const 
   return false;
 }
 
-/// The children that the ray nearest to their centre surely crosses. `world`: the parent's centre
-/// relative to the camera's.
+/// Where in a voxel's projection rays are sampled, and how far from its centre, in its edges.
+inline constexpr std::array<std::array<float, 2>, 5> sample_places{{{0, 0}, {-1, -1}, {1, -1}, {-1, 1}, {1, 1}}};
+inline constexpr float sample_spread = 0.3F;
+
+/// The children that are surely crossed by the deepest of a few rays that pass close to their centres.
+/// `world`: the parent's centre relative to the camera's.
 inline unsigned sample_children_portable(const depth_scene& s, const child_offsets& o, const float3& world,
                                          const children& c, unsigned wanted) noexcept {
   unsigned sure = 0;
@@ -147,11 +151,21 @@ inline unsigned sample_children_portable(const depth_scene& s, const child_offse
       const float at = c.near_z[i] > s.near_z ? f * (p / c.z[i]) + centre + 0.5F : 0.0F;
       return static_cast<std::int32_t>(std::clamp(at, static_cast<float>(first), static_cast<float>(last)));
     };
-    const std::int32_t u = nearest(c.x[i], s.fx, s.cx, c.u0[i], c.u1[i]);
-    const std::int32_t v = nearest(c.y[i], s.fy, s.cy, c.v0[i], c.v1[i]);
-    const auto [x, y] = s.rays->rays().at(u, v);
+    const float spread = s.voxel * s.fx / c.z[i] * sample_spread;
+    float best_z = -1.0F;
+    std::int32_t best_u = 0, best_v = 0;
+    for (const auto& [du, dv] : sample_places) {
+      const std::int32_t u = nearest(c.x[i], s.fx, s.cx + du * spread, c.u0[i], c.u1[i]);
+      const std::int32_t v = nearest(c.y[i], s.fy, s.cy + dv * spread, c.v0[i], c.v1[i]);
+      const float z = s.rays->z(v)[u];
+      if (z <= best_z) continue;
+      best_z = z;
+      best_u = u;
+      best_v = v;
+    }
+    const auto [x, y] = s.rays->rays().at(best_u, best_v);
     const voxel_test test{s, {world[0] + o.world_x[i], world[1] + o.world_y[i], world[2] + o.world_z[i]}, o.half};
-    if (test.test(x, y, s.rays->z(v)[u]) == voxel_test::answer::yes) sure |= 1U << i;
+    if (test.test(x, y, best_z) == voxel_test::answer::yes) sure |= 1U << i;
   }
   return sure;
 }
@@ -231,14 +245,27 @@ inline unsigned sample_children_avx2(const depth_scene& s, const child_offsets& 
   const __m256i asked = _mm256_cmpeq_epi32(_mm256_and_si256(_mm256_set1_epi32(static_cast<int>(wanted)), bits), bits);
   const auto nearest = [&](const __m256 p, float f, float centre, const __m256i first,
                            const __m256i last) ORBIS_TARGET("avx2,fma") {
-    const __m256 at = _mm256_fmadd_ps(_mm256_mul_ps(p, per_z), _mm256_set1_ps(f), _mm256_set1_ps(centre));
+    const __m256 at = _mm256_fmadd_ps(p, _mm256_set1_ps(f), _mm256_set1_ps(centre));
     return _mm256_and_si256(_mm256_min_epi32(_mm256_max_epi32(_mm256_cvtps_epi32(at), first), last), asked);
   };
-  const __m256i u = nearest(_mm256_load_ps(c.x.data()), s.fx, s.cx, ints(c.u0), ints(c.u1));
-  const __m256i v = nearest(_mm256_load_ps(c.y.data()), s.fy, s.cy, ints(c.v0), ints(c.v1));
   const pixel_rays& rays = s.rays->rays();
-  const __m256i at = _mm256_add_epi32(_mm256_mullo_epi32(v, _mm256_set1_epi32(static_cast<int>(s.rays->stride()))), u);
-  const __m256 z = _mm256_i32gather_ps(s.rays->z(0), at, 4);
+  const __m256 cx = _mm256_load_ps(c.x.data()), cy = _mm256_load_ps(c.y.data());
+  const __m256 spread = _mm256_mul_ps(set(s.voxel * sample_spread), _mm256_and_ps(per_z, projects));
+  const __m256i row_size = _mm256_set1_epi32(static_cast<int>(s.rays->stride()));
+  __m256 z = set(-1.0F);
+  __m256i u = _mm256_setzero_si256(), v = u;
+  for (const auto& [du, dv] : sample_places) {
+    const __m256i at_u =
+        nearest(_mm256_fmadd_ps(spread, set(du), _mm256_mul_ps(cx, per_z)), s.fx, s.cx, ints(c.u0), ints(c.u1));
+    const __m256i at_v =
+        nearest(_mm256_fmadd_ps(spread, set(dv), _mm256_mul_ps(cy, per_z)), s.fy, s.cy, ints(c.v0), ints(c.v1));
+    const __m256 at_z =
+        _mm256_i32gather_ps(s.rays->z(0), _mm256_add_epi32(_mm256_mullo_epi32(at_v, row_size), at_u), 4);
+    const __m256 deeper = _mm256_cmp_ps(at_z, z, _CMP_GT_OQ);
+    z = _mm256_blendv_ps(z, at_z, deeper);
+    u = _mm256_blendv_epi8(u, at_u, _mm256_castps_si256(deeper));
+    v = _mm256_blendv_epi8(v, at_v, _mm256_castps_si256(deeper));
+  }
   __m256 x, y;
   if (rays.separable()) {
     x = _mm256_i32gather_ps(rays.x(0), u, 4);

@@ -88,7 +88,7 @@ class depth_marker {
     if (sensor.key && ends.leaves) {
       set_scene(sensor);
       const auto bounds = bounds_of(sensor, ends.max_z);
-      if (bounds && is_dense(ends))
+      if (bounds && rays_.rays().separable() && is_dense(ends))
         mark_free(policy, sensor, depth, ends.max_z, *bounds, masks, settled);
       else
         walk_all(policy, sensor, depth, camera, T_world_camera, options, masks);
@@ -477,10 +477,32 @@ class depth_marker {
                                   float near_z) const {
       own.unsure.clear();
       const detail::voxel_test test{of.scene_, at, 0.5F * of.scene_.voxel};
-      if (of.cross_(of.scene_, test, box, near_z, own.unsure)) return true;
+      if (crosses_box(test, box, near_z)) return true;
       for (const auto& [u, v] : own.unsure)
         if (crosses(sensor, of.end_of(sensor, depth, u, v), voxel)) return true;
       return false;
+    }
+    [[nodiscard]] bool crosses_box(const detail::voxel_test& test, const detail::pixel_box& box, float near_z) const {
+      if ((box.u1 - box.u0) * (box.v1 - box.v0) < 1024) return of.cross_(of.scene_, test, box, near_z, own.unsure);
+      // A voxel at the camera: most of its box are rays that pass it by, tile by tile.
+      constexpr std::int32_t size = 128;
+      for (std::int32_t v = box.v0 & -size; v <= box.v1; v += size)
+        for (std::int32_t u = box.u0 & -size; u <= box.u1; u += size)
+          if (crosses_tile(test, box, near_z, u, v, size)) return true;
+      return false;
+    }
+    [[nodiscard]] bool crosses_tile(const detail::voxel_test& test, const detail::pixel_box& box, float near_z,
+                                    std::int32_t u, std::int32_t v, std::int32_t size) const {
+      const detail::pixel_box part{std::max(box.u0, u), std::min(box.u1, u + size - 1), std::max(box.v0, v),
+                                   std::min(box.v1, v + size - 1)};
+      if (part.u0 > part.u1 || part.v0 > part.v1 || !of.pyramid_.reaches(u, v, size, near_z)) return false;
+      const pixel_rays& rays = of.rays_.rays();
+      if (!test.may_cross(rays.x(0)[part.u0], rays.x(0)[part.u1], *rays.y(part.v0), *rays.y(part.v1))) return false;
+      if (size == 16) return of.cross_(of.scene_, test, part, near_z, own.unsure);
+      const std::int32_t half = size / 2;
+      return crosses_tile(test, box, near_z, u, v, half) || crosses_tile(test, box, near_z, u + half, v, half) ||
+             crosses_tile(test, box, near_z, u, v + half, half) ||
+             crosses_tile(test, box, near_z, u + half, v + half, half);
     }
   };
 

@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cassert>
 #include <cstddef>
 #include <cstdint>
@@ -154,6 +155,15 @@ class depth_pyramid {
     raise(2, 2, some_);
   }
 
+  /// Whether a ray of the aligned tile of `size` x `size` pixels from (u, v) on may end at `z` or beyond.
+  /// @pre size is a power of two > 2
+  [[nodiscard]] bool reaches(std::int32_t u, std::int32_t v, std::int32_t size, float z) const noexcept {
+    const int level = std::countr_zero(static_cast<std::uint32_t>(size)) - 1;
+    if (level > levels_) return true;
+    const auto k = static_cast<std::size_t>(level);
+    return static_cast<float>(cells_[static_cast<std::size_t>(begin_[k] + (v >> level) * width_[k] + (u >> level))] >>
+                              16U) >= z * scale_;
+  }
   /// Depths times this are what the entries hold.
   [[nodiscard]] float scale() const noexcept { return scale_; }
   [[nodiscard]] int levels() const noexcept { return levels_; }
