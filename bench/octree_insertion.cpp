@@ -18,8 +18,7 @@ double insert(octomap::OcTree& tree, const scan& s, const octree::integration_op
   const octomap::Pointcloud cloud = to_octomap(s.points());
   const double range = std::isinf(options.max_range) ? -1.0 : options.max_range;
   return seconds_of([&] {
-    tree.insertPointCloud(cloud, to_octomap(s.origin()), range, false,
-                          options.mode == octree::ray_mode::discretized);
+    tree.insertPointCloud(cloud, to_octomap(s.origin()), range, false, options.mode == octree::ray_mode::discretized);
   });
 }
 

@@ -2,9 +2,9 @@
 //
 // The heap that the map of 50 frames takes: `map_MB` as the map itself says, `heap_MB` as the allocator
 // does; for ours without and with the buffers kept for the next scan. The time is that of a copy.
-#include <malloc.h>
-
 #include <memory>
+
+#include <malloc.h>
 
 #include "octree_support.hpp"
 
@@ -19,8 +19,7 @@ namespace {
 [[nodiscard]] std::unique_ptr<map> make_map(double resolution) {
   auto m = std::make_unique<map>(resolution);
   for (std::size_t i = 0; i != 50; ++i)
-    m->integrate(room()[i].points(), room()[i].origin(),
-                 {.max_range = 5.0, .mode = octree::ray_mode::discretized});
+    m->integrate(room()[i].points(), room()[i].origin(), {.max_range = 5.0, .mode = octree::ray_mode::discretized});
   return m;
 }
 
@@ -46,9 +45,12 @@ void bench_octomap_memory(benchmark::State& state, double resolution) {
 
 [[maybe_unused]] const bool registered = [] {
   for (const double r : {0.10, 0.05, 0.02}) {
-    add_row("octree_copy_and_memory/" + in_centimetres(r) + "/orbis", [=](auto& s) { bench_memory(s, r); })->Repetitions(1);
-    add_row("octree_copy_and_memory/" + in_centimetres(r) + "/octomap", [=](auto& s) { bench_octomap_memory(s, r); })
-        ->Repetitions(1);
+    add_row("octree_copy_and_memory/" + in_centimetres(r) + "/orbis", [=](auto& s) {
+      bench_memory(s, r);
+    })->Repetitions(1);
+    add_row("octree_copy_and_memory/" + in_centimetres(r) + "/octomap", [=](auto& s) {
+      bench_octomap_memory(s, r);
+    })->Repetitions(1);
   }
   return true;
 }();

@@ -42,8 +42,7 @@ std::filesystem::path kitchen_folder() {
 
 std::vector<vec3f> scan::points() const {
   std::vector<vec3f> world;
-  camera.visit(
-      [&](const auto& model) { octree::append_world_points(depth_metres(), model, T_world_camera, world); });
+  camera.visit([&](const auto& model) { octree::append_world_points(depth_metres(), model, T_world_camera, world); });
   return world;
 }
 

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // Global operator new and delete that count. Over-aligned ones are left alone: nothing here has any.
-#include <malloc.h>
-
 #include <algorithm>
 #include <cstddef>
 #include <cstdlib>
 #include <new>
+
+#include <malloc.h>
 
 #include "target.hpp"
 

@@ -3,9 +3,6 @@
 // replay_<target> CORPUS [MUTATIONS]: runs a fuzz target, with any compiler and always the same way, on
 // a file, or on every file of a folder and then on mutations of them. If it ends badly, the input is
 // left in failed_input.
-#include <fcntl.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <array>
 #include <csignal>
@@ -16,6 +13,9 @@
 #include <string>
 #include <string_view>
 #include <vector>
+
+#include <fcntl.h>
+#include <unistd.h>
 
 #include <orbis/core/file.hpp>
 #include <orbis/core/random.hpp>
@@ -65,8 +65,8 @@ class mutator {
 
   void change(std::string& s) {
     constexpr std::array<unsigned char, 8> edges{0x00, 0x01, 0x03, 0x55, 0x7f, 0x80, 0xaa, 0xff};
-    constexpr std::array<std::string_view, 8> words{"18446744073709551615", "4294967296", "-1", "nan",
-                                                    "1e-320",               "1e308",      "\n", "data\n"};
+    constexpr std::array<std::string_view, 8> words{
+        "18446744073709551615", "4294967296", "-1", "nan", "1e-320", "1e308", "\n", "data\n"};
     if (s.empty()) {
       s += byte();
       return;

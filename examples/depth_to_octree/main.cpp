@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// depth_to_octree DEPTH.png MAP.bt: a depth image and the camera's pose as an occupancy octree for octovis.
+#include <cstdio>
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+
+#include <orbis/camera.hpp>
+#include <orbis/io.hpp>
+#include <orbis/octree.hpp>
+
+int complain(int code, const std::string& why) {
+  std::fprintf(stderr, "depth_to_octree: %s\n", why.c_str());
+  return code;
+}
+
+orbis::result<orbis::camera::camera_settings> camera_named(const std::string& name, int width, int height) {
+  if (name.find(',') == std::string::npos) return orbis::io::read_camera(name);
+  orbis::camera::intrinsics k{width, height, 0, 0, 0, 0};
+  char rest = 0;
+  if (std::sscanf(name.c_str(), "%lf,%lf,%lf,%lf%c", &k.fx, &k.fy, &k.cx, &k.cy, &rest) != 4 || !is_valid(k))
+    return orbis::fail(orbis::errc::invalid_argument, "--camera", "\"" + name + "\" is not fx,fy,cx,cy in pixels");
+  return orbis::camera::camera_settings{.model = orbis::camera::pinhole{k}};
+}
+
+int main(int argc, char** argv) {
+  std::string input, output, camera_name = "525,525,319.5,239.5";
+  std::vector<double> p{0, 0, 0, 0, 0, 0, 1};
+  double resolution = 0.05, scale = 0.0;  // scale 0: the camera's
+  CLI::App cli{"A depth image and the camera's pose as an occupancy octree", "depth_to_octree"};
+  cli.add_option("DEPTH", input, "16-bit grey PNG")->required();
+  cli.add_option("MAP", output, "the .bt file to write")->required();
+  cli.add_option("--pose", p, "tx ty tz qx qy qz qw, camera to world")->expected(7)->capture_default_str();
+  cli.add_option("--camera", camera_name, "camera.toml, or fx,fy,cx,cy in pixels")->capture_default_str();
+  cli.add_option("--scale", scale, "stored depth / scale = metres; default: the camera file's, or 1000");
+  cli.add_option("--resolution", resolution, "edge of a voxel, metres")->capture_default_str();
+  try {
+    cli.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    return e.get_exit_code() == 0 ? cli.exit(e) : complain(1, e.what() + std::string{" (--help shows the usage)"});
+  }
+  const orbis::so3::quaternion q{p.data() + 3};  // x y z w
+  if (!(q.norm() > 1e-6 && orbis::vec3{p.data()}.norm() + q.norm() < 1e6)) return complain(1, "--pose: is no pose");
+  if (!(resolution >= 1e-4 && resolution <= 1e3)) return complain(1, "--resolution: is not 0.0001 ... 1000");
+  if (!(scale == 0.0 || (scale >= 1e-3 && scale <= 1e9))) return complain(1, "--scale: is not 0.001 ... 1e9");
+  const auto depth = orbis::io::read_depth(input);
+  if (!depth) return complain(2, depth.error().to_string());
+  const auto camera = camera_named(camera_name, depth->width(), depth->height());
+  if (!camera) return complain(camera.error().where == "--camera" ? 1 : 2, camera.error().to_string());
+  if (camera->model.width() != depth->width() || camera->model.height() != depth->height())
+    return complain(2, camera_name + ": the camera's images have another size than " + input);
+  orbis::octree::occupancy_octree<> map{resolution};
+  const orbis::camera::depth_view metres{*depth, scale > 0.0 ? scale : camera->depth_scale};
+  map.integrate(metres, camera->model, orbis::se3{orbis::so3{q}, orbis::vec3{p.data()}});
+  const auto done = write_bt(map, output);
+  return done ? 0 : complain(2, done.error().to_string());
+}

@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: BSD-3-Clause
+#
+# The example depth_to_octree (-DAPP), its map read back by OctoMap (-DREAD_BACK), and what it says to
+# wrong arguments and damaged files.
+include(${CMAKE_CURRENT_LIST_DIR}/support.cmake)
+make_recording(${WORK}/room 1 320)
+set(depth room/depth/000000.png)
+
+# Prints `size resolution occupied free` as OctoMap counts them.
+function(read_back file variable)
+  execute_process(COMMAND ${READ_BACK} ${WORK}/${file} RESULT_VARIABLE result OUTPUT_VARIABLE out)
+  check(result EQUAL 0)
+  string(STRIP "${out}" out)
+  set(${variable} "${out}" PARENT_SCOPE)
+endfunction()
+
+# Usage: 1.
+macro(fails code message)
+  app(${code} ${ARGN})
+  if(NOT err MATCHES "^depth_to_octree: [^\n]*${message}[^\n]*\n$")
+    message(FATAL_ERROR "depth_to_octree ${ARGN}\nsaid\n${err}instead of one line that matches \"${message}\"")
+  endif()
+  check(NOT EXISTS ${WORK}/no.bt)
+endmacro()
+fails(1 "DEPTH")
+fails(1 "MAP" ${depth})
+fails(1 "--pose.*7" ${depth} no.bt --pose 1 2 3)
+fails(1 "--pose" ${depth} no.bt --pose 0 0 0 0 0 0 0)
+fails(1 "--pose" ${depth} no.bt --pose nan 0 0 0 0 0 1)
+fails(1 "--camera" ${depth} no.bt --camera 1,2,3)
+fails(1 "--camera" ${depth} no.bt --camera -1,2,3,4)
+fails(1 "--resolution" ${depth} no.bt --resolution 0)
+fails(1 "--resolution" ${depth} no.bt --resolution nan)
+fails(1 "--scale" ${depth} no.bt --scale -1)
+fails(1 "--nonsense" ${depth} no.bt --nonsense)
+app(0 --help)
+check(out MATCHES "--camera" AND out MATCHES "--pose")
+
+# Input, and output that cannot be: 2.
+fails(2 "nowhere.png: no such file" nowhere.png no.bt)
+file(WRITE ${WORK}/text.png "this is no picture")
+fails(2 "text.png" text.png no.bt)
+fails(2 "none.toml: no such file" ${depth} no.bt --camera none.toml)
+file(WRITE ${WORK}/other.toml "model = \"pinhole\"\nwidth = 640\nheight = 480\nfx = 500\nfy = 500\ncx = 320\ncy = 240\n")
+fails(2 "other.toml: .*size" ${depth} no.bt --camera other.toml)
+fails(2 "no/such/folder" ${depth} no/such/folder/map.bt)
+
+# The same camera, as a file and as numbers.
+app(0 ${depth} map.bt --camera room/camera.toml --pose 1 2 0.5 0 0 0 1)
+app(0 ${depth} again.bt --camera 262.5,262.5,159.5,119.5 --scale 5000 --pose 1 2 0.5 0 0 0 2)
+file(SHA256 ${WORK}/map.bt first)
+file(SHA256 ${WORK}/again.bt second)
+check(first STREQUAL second)
+read_back(map.bt counts)
+check(counts MATCHES "^[0-9]+ 0.05 [1-9][0-9][0-9]+ [1-9][0-9][0-9]+ 1 2 0.5 free$")
+
+# Another resolution, scale and pose make another map: at half the depth there is less free space.
+app(0 ${depth} small.bt --camera room/camera.toml --scale 10000 --resolution 0.1 --pose 0 0 0 0 0 0 1)
+read_back(small.bt counts)
+check(counts MATCHES "^[0-9]+ 0.1 [1-9][0-9]+ [1-9][0-9]+ 1 2 0.5 unknown$")
