@@ -100,6 +100,7 @@ class ray_sweep {
   static constexpr std::size_t max_waiting = 1U << 14U;   ///< rays that are swept at once
   static constexpr double max_width = 448.0;              ///< of a map, in cells, when it is planned
   static constexpr double doubt = 1e-8;                   ///< of a walk of max_planes steps in double, in voxels
+  static constexpr std::size_t many = 256;                ///< rays that are walked together
   static constexpr std::int32_t slab = 16;                ///< layers that are swept at once: two bricks
 
   struct target {
@@ -407,17 +408,21 @@ class ray_sweep {
 
   /// Walks the rays for which there is no other way: many together, those that are few or long alone.
   void walk_all(scan_masks& masks) {
-    constexpr std::uint32_t near = 112;
     const voxel_key from = key(0, 0, 0);
-    voxel_key low = from, high = from;
-    std::size_t count = 0;
-    for (const target& t : walked_) {
-      if (!is_within(t.to, from, near)) continue;
-      ++count;
-      low = {std::min(low.x, t.to.x), std::min(low.y, t.to.y), std::min(low.z, t.to.z)};
-      high = {std::max(high.x, t.to.x), std::max(high.y, t.to.y), std::max(high.z, t.to.z)};
+    auto near = static_cast<std::uint32_t>(max_planes);
+    bool together = false;
+    for (;; near /= 2) {  // all of them, if they fit in a window
+      voxel_key low = from, high = from;
+      std::size_t count = 0;
+      for (const target& t : walked_) {
+        if (!is_within(t.to, from, near)) continue;
+        ++count;
+        low = {std::min(low.x, t.to.x), std::min(low.y, t.to.y), std::min(low.z, t.to.z)};
+        high = {std::max(high.x, t.to.x), std::max(high.y, t.to.y), std::max(high.z, t.to.z)};
+      }
+      together = count >= many && window_.fit(*grid_, from, low, high);
+      if (together || count < many || near == 0) break;
     }
-    const bool together = count > 256 && window_.fit(*grid_, from, low, high);
     for (const target& t : walked_) {
       if (together && is_within(t.to, from, near))
         window_.add(*grid_, origin_, t.end, t.to);
