@@ -16,10 +16,14 @@
 #include <orbis/octree/leaves.hpp>
 #include <orbis/octree/morton.hpp>
 #include <orbis/octree/occupancy_octree.hpp>
+#include <orbis/octree/point_keys.hpp>
 #include <orbis/octree/pruned_tree.hpp>
 #include <orbis/octree/ray_grid.hpp>
+#include <orbis/octree/ray_sweep.hpp>
 #include <orbis/octree/ray_walk.hpp>
 #include <orbis/octree/scan.hpp>
 #include <orbis/octree/sensor_model.hpp>
+#include <orbis/octree/sweep_planes.hpp>
+#include <orbis/octree/swept_ray.hpp>
 #include <orbis/octree/voxel_layer.hpp>
 #include <orbis/octree/voxel_payload.hpp>

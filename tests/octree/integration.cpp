@@ -144,8 +144,8 @@ template <class Policy>
 [[nodiscard]] observation marked(const Policy& policy, scan_marker& marker, const voxel_grid& grid,
                                  const std::vector<float3>& points, const float3& origin,
                                  const integration_options& options) {
-  const auto summary =
-      marker.mark(policy, grid, points.size(), [&](std::size_t i) { return points[i]; }, origin, options);
+  const auto summary = marker.mark(
+      policy, grid, points.size(), [&](std::size_t i) { return points[i]; }, origin, options);
   return observed(marker.masks(), summary);
 }
 
@@ -219,8 +219,9 @@ TEST_CASE("Bounds leave what is outside alone and change nothing inside") {
   const auto points = random_scan(random, 500, 1.0);
   constexpr double inf = std::numeric_limits<double>::infinity();
   for (const integration_bounds& bounds :
-       {integration_bounds{{-0.35, -0.2, -0.51}, {0.4, 0.62, 0.1}}, integration_bounds{{0.5, 0.5, 0.5}, {0.9, 0.9, 0.9}},
-        integration_bounds{{-inf, -inf, -inf}, {inf, 0.05, inf}}, integration_bounds{{0.01, 0.01, 0.01}, {0.02, 0.02, 0.02}},
+       {integration_bounds{{-0.35, -0.2, -0.51}, {0.4, 0.62, 0.1}},
+        integration_bounds{{0.5, 0.5, 0.5}, {0.9, 0.9, 0.9}}, integration_bounds{{-inf, -inf, -inf}, {inf, 0.05, inf}},
+        integration_bounds{{0.01, 0.01, 0.01}, {0.02, 0.02, 0.02}},
         integration_bounds{{1e9, -1.0, -1.0}, {inf, 1.0, 1.0}}})
     check(voxel_grid{0.1}, points, {0.1F, -0.1F, 0.7F}, {.max_range = 1.3, .bounds = bounds});
 }
@@ -353,7 +354,8 @@ TEST_CASE("The second of two equal scans allocates nothing") {
         options.beam_ranges = ranges;
       }
       const auto scan = [&] {
-        return marker.mark(seq, grid, points.size(), [&](std::size_t i) { return points[i]; }, float3{}, options);
+        return marker.mark(
+            seq, grid, points.size(), [&](std::size_t i) { return points[i]; }, float3{}, options);
       };
       scan();
       const std::size_t bytes = marker.memory_bytes();

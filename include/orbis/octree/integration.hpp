@@ -197,13 +197,14 @@ class scan_marker {
     template <class Point>
     void add_ends(const voxel_grid& grid, std::size_t begin, std::size_t end, Point&& point) {
       detail::point_batch batch;
-      auto* const find_keys = simd::select<void(const voxel_grid&, const detail::point_batch&, std::size_t, detail::batch_keys&)>(
-          simd::detected(), {
-        .portable = detail::find_keys_portable,
+      auto* const find_keys =
+          simd::select<void(const voxel_grid&, const detail::point_batch&, std::size_t, detail::batch_keys&)>(
+              simd::detected(), {
+                .portable = detail::find_keys_portable,
 #if ORBIS_X86
-        .popcnt = nullptr, .avx2 = nullptr, .avx512 = detail::find_keys_avx512
+                .popcnt = nullptr, .avx2 = nullptr, .avx512 = detail::find_keys_avx512
 #endif
-      });
+              });
       scan_brick* brick = nullptr;  // of the last point; neighbours mostly lie in the same one
       while (begin != end) {
         const std::size_t n = std::min(end - begin, detail::point_batch::capacity);

@@ -73,7 +73,8 @@ struct point_source {
   const Points& points;
 
   [[nodiscard]] std::array<float, 3> operator()(std::size_t i) const {
-    return coordinates<float>(std::ranges::begin(points)[static_cast<std::ranges::range_difference_t<const Points>>(i)]);
+    return coordinates<float>(
+        std::ranges::begin(points)[static_cast<std::ranges::range_difference_t<const Points>>(i)]);
   }
   void load(std::size_t begin, std::size_t count, point_batch& batch) const requires float_triples<const Points> {
     auto* const load = simd::select<void(const float*, std::size_t, point_batch&)>(simd::detected(), {
@@ -137,13 +138,15 @@ inline __m512i cells_avx512(const float* at, double per_metre, double half, __mm
   const __m512d scale = _mm512_set1_pd(per_metre), high = _mm512_set1_pd(half), low = _mm512_set1_pd(-half);
   const __m512d a = _mm512_mul_pd(_mm512_maskz_cvtps_pd(0xff, _mm256_loadu_ps(at)), scale);
   const __m512d b = _mm512_mul_pd(_mm512_maskz_cvtps_pd(0xff, _mm256_loadu_ps(at + 8)), scale);
-  const auto in_a = static_cast<__mmask8>(_mm512_cmp_pd_mask(a, low, _CMP_GE_OQ) & _mm512_cmp_pd_mask(a, high, _CMP_LT_OQ));
-  const auto in_b = static_cast<__mmask8>(_mm512_cmp_pd_mask(b, low, _CMP_GE_OQ) & _mm512_cmp_pd_mask(b, high, _CMP_LT_OQ));
+  const auto in_a =
+      static_cast<__mmask8>(_mm512_cmp_pd_mask(a, low, _CMP_GE_OQ) & _mm512_cmp_pd_mask(a, high, _CMP_LT_OQ));
+  const auto in_b =
+      static_cast<__mmask8>(_mm512_cmp_pd_mask(b, low, _CMP_GE_OQ) & _mm512_cmp_pd_mask(b, high, _CMP_LT_OQ));
   inside &= static_cast<__mmask16>(in_a | in_b << 8U);
   constexpr int down = _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC;
-  const __m512i cells = _mm512_maskz_inserti64x4(
-      0xff, _mm512_castsi256_si512(_mm512_maskz_cvt_roundpd_epi32(in_a, a, down)),
-      _mm512_maskz_cvt_roundpd_epi32(in_b, b, down), 1);
+  const __m512i cells =
+      _mm512_maskz_inserti64x4(0xff, _mm512_castsi256_si512(_mm512_maskz_cvt_roundpd_epi32(in_a, a, down)),
+                               _mm512_maskz_cvt_roundpd_epi32(in_b, b, down), 1);
   return _mm512_add_epi32(cells, _mm512_set1_epi32(static_cast<int>(half)));
 }
 ORBIS_TARGET("avx512f,avx512dq,avx512vl,popcnt")
@@ -158,12 +161,12 @@ inline void find_keys_avx512(const voxel_grid& grid, const point_batch& points, 
     const __m512i x = cells_avx512(points.x.data() + i, per_metre, half, inside);
     const __m512i y = cells_avx512(points.y.data() + i, per_metre, half, inside);
     const __m512i z = cells_avx512(points.z.data() + i, per_metre, half, inside);
-    const auto fresh = static_cast<__mmask16>(
-        inside & (_mm512_cmpneq_epi32_mask(x, _mm512_permutex2var_epi32(x0, before, x)) |
-                  _mm512_cmpneq_epi32_mask(y, _mm512_permutex2var_epi32(y0, before, y)) |
-                  _mm512_cmpneq_epi32_mask(z, _mm512_permutex2var_epi32(z0, before, z)) |
-                  // The one before lies outside: its cell means nothing.
-                  static_cast<unsigned>(static_cast<__mmask16>(~inside)) << 1U));
+    const auto fresh =
+        static_cast<__mmask16>(inside & (_mm512_cmpneq_epi32_mask(x, _mm512_permutex2var_epi32(x0, before, x)) |
+                                         _mm512_cmpneq_epi32_mask(y, _mm512_permutex2var_epi32(y0, before, y)) |
+                                         _mm512_cmpneq_epi32_mask(z, _mm512_permutex2var_epi32(z0, before, z)) |
+                                         // The one before lies outside: its cell means nothing.
+                                         static_cast<unsigned>(static_cast<__mmask16>(~inside)) << 1U));
     _mm512_storeu_si512(keys.x.data() + n, _mm512_maskz_compress_epi32(fresh, x));
     _mm512_storeu_si512(keys.y.data() + n, _mm512_maskz_compress_epi32(fresh, y));
     _mm512_storeu_si512(keys.z.data() + n, _mm512_maskz_compress_epi32(fresh, z));

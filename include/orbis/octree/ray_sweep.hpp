@@ -96,12 +96,12 @@ class ray_sweep {
  private:
   using kernel = void(const detail::sweep_window&, detail::swept_rays&, std::size_t, std::size_t,
                       std::vector<std::uint32_t>&);
-  static constexpr std::int32_t max_planes = 4096;        ///< rays further than this are walked
-  static constexpr std::size_t max_waiting = 1U << 14U;   ///< rays that are swept at once
-  static constexpr double max_width = 448.0;              ///< of a map, in cells, when it is planned
-  static constexpr double doubt = 1e-8;                   ///< of a walk of max_planes steps in double, in voxels
-  static constexpr std::size_t many = 256;                ///< rays that are walked together
-  static constexpr std::int32_t slab = 16;                ///< layers that are swept at once: two bricks
+  static constexpr std::int32_t max_planes = 4096;       ///< rays further than this are walked
+  static constexpr std::size_t max_waiting = 1U << 14U;  ///< rays that are swept at once
+  static constexpr double max_width = 448.0;             ///< of a map, in cells, when it is planned
+  static constexpr double doubt = 1e-8;                  ///< of a walk of max_planes steps in double, in voxels
+  static constexpr std::size_t many = 256;               ///< rays that are walked together
+  static constexpr std::int32_t slab = 16;               ///< layers that are swept at once: two bricks
 
   struct target {
     float3 end;
@@ -258,10 +258,14 @@ class ray_sweep {
       all.add(slopes(r));
     }
     // Rays that would need a wider map go into tiles of neighbouring directions.
-    const auto tiles = [&](float low, float high) { return 1 + static_cast<std::size_t>((high - low) * static_cast<float>(planes) / max_width); };
+    const auto tiles = [&](float low, float high) {
+      return 1 + static_cast<std::size_t>((high - low) * static_cast<float>(planes) / max_width);
+    };
     const std::size_t tiles_u = tiles(all.low_u, all.high_u), tiles_v = tiles(all.low_v, all.high_v);
     const auto tile = [](float x, float low, float high, std::size_t count) {
-      return count == 1 ? 0 : std::min(count - 1, static_cast<std::size_t>((x - low) / (high - low) * static_cast<float>(count)));
+      return count == 1
+                 ? 0
+                 : std::min(count - 1, static_cast<std::size_t>((x - low) / (high - low) * static_cast<float>(count)));
     };
     const auto slabs = static_cast<std::size_t>(last_slab(origin, step, planes)) + 1;
     // Within a tile the rays that go furthest come first: those in a slab are then the first ones.
@@ -324,7 +328,8 @@ class ray_sweep {
     w.count = last - first + 2;
     const auto range = [&](float low_slope, float high_slope, std::int32_t from, std::int32_t& lowest) {
       const auto a = static_cast<float>(first), z = static_cast<float>(last + 1);
-      const float l = std::min(low_slope * a, low_slope * z) - 2.0F, h = std::max(high_slope * a, high_slope * z) + 3.0F;
+      const float l = std::min(low_slope * a, low_slope * z) - 2.0F,
+                  h = std::max(high_slope * a, high_slope * z) + 3.0F;
       lowest = ((from + static_cast<std::int32_t>(std::floor(l))) & ~7) - from;
       const std::int32_t highest = ((from + static_cast<std::int32_t>(std::floor(h))) | 7) - from;
       return static_cast<std::uint32_t>(highest - lowest + 1);
@@ -359,7 +364,8 @@ class ray_sweep {
             std::uint64_t& layer = layers[static_cast<std::size_t>(i)];
             layer = 0;
             if (brick + i < lowest || brick + i > highest) continue;
-            const std::size_t at = static_cast<std::size_t>((brick + i - from_[axis]) * step - w.first) * w.stride + w.at(u, v);
+            const std::size_t at =
+                static_cast<std::size_t>((brick + i - from_[axis]) * step - w.first) * w.stride + w.at(u, v);
             layer = marks(w.planes + at, w.planes + at + w.stride, w.layers + at);
             any |= layer;
           }
@@ -374,7 +380,8 @@ class ray_sweep {
     }
   }
   /// Bit i: whether any of the i-th bytes is set.
-  [[nodiscard]] static std::uint64_t marks(const std::uint8_t* a, const std::uint8_t* b, const std::uint8_t* c) noexcept {
+  [[nodiscard]] static std::uint64_t marks(const std::uint8_t* a, const std::uint8_t* b,
+                                           const std::uint8_t* c) noexcept {
     std::uint64_t bits = 0;
     for (unsigned i = 0; i != 64; i += ORBIS_X86 ? 16 : 8) {
 #if ORBIS_X86
@@ -382,8 +389,7 @@ class ray_sweep {
       const __m128i any = _mm_or_si128(_mm_or_si128(load(a), load(b)), load(c));
       bits |= std::uint64_t{static_cast<std::uint32_t>(_mm_movemask_epi8(any))} << i;
 #else
-      for (unsigned k = 0; k != 8; ++k)
-        bits |= std::uint64_t{(a[i + k] | b[i + k] | c[i + k]) & 1U} << (i + k);
+      for (unsigned k = 0; k != 8; ++k) bits |= std::uint64_t{(a[i + k] | b[i + k] | c[i + k]) & 1U} << (i + k);
 #endif
     }
     return bits;

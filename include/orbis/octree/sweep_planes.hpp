@@ -47,20 +47,20 @@ struct swept_rays {
 /// through there: the voxels on both sides are crossed. A byte of a layer is a voxel that a ray enters
 /// and leaves between two planes.
 struct sweep_window {
-  static constexpr unsigned fraction = 22;       ///< bits of a coordinate's fraction; ten are left for the cell
-  static constexpr std::uint32_t doubt = 12;     ///< no coordinate is wrong by more, in units of 2^-22 cells
-  static constexpr float order_doubt = 7e-6F;    ///< nor is the order of two crossings, in cells
+  static constexpr unsigned fraction = 22;     ///< bits of a coordinate's fraction; ten are left for the cell
+  static constexpr std::uint32_t doubt = 12;   ///< no coordinate is wrong by more, in units of 2^-22 cells
+  static constexpr float order_doubt = 7e-6F;  ///< nor is the order of two crossings, in cells
   static constexpr std::uint8_t marked = 0xff;
 
   std::uint8_t* planes = nullptr;
   std::uint8_t* layers = nullptr;
-  std::size_t size = 0;      ///< cells of a map
-  std::size_t stride = 0;    ///< from map to map; what lies between is for rays that are not there
-  unsigned log2_width = 0;   ///< of a map, in tiles, u being the fast axis
-  std::int32_t low_u = 0;    ///< the map's first cell
+  std::size_t size = 0;     ///< cells of a map
+  std::size_t stride = 0;   ///< from map to map; what lies between is for rays that are not there
+  unsigned log2_width = 0;  ///< of a map, in tiles, u being the fast axis
+  std::int32_t low_u = 0;   ///< the map's first cell
   std::int32_t low_v = 0;
-  std::int32_t first = 0;    ///< number of the first plane; 0 is where the rays start, and nothing is to be done there
-  std::int32_t count = 0;    ///< planes
+  std::int32_t first = 0;  ///< number of the first plane; 0 is where the rays start, and nothing is to be done there
+  std::int32_t count = 0;  ///< planes
 
   /// The number of the cell (u, v).
   [[nodiscard]] std::uint32_t cell(std::int32_t u, std::int32_t v) const noexcept {
@@ -87,7 +87,8 @@ inline void sweep_portable(const sweep_window& w, swept_rays& rays, std::size_t 
     const double at_u = (rays.u[r] - w.low_u + j * rays.du[r]) * scale + sweep_window::doubt;
     const double at_v = (rays.v[r] - w.low_v + j * rays.dv[r]) * scale + sweep_window::doubt;
     std::uint32_t u = fixed(at_u), v = fixed(at_v);
-    const std::uint32_t du = fixed(std::floor(rays.du[r] * scale + 0.5)), dv = fixed(std::floor(rays.dv[r] * scale + 0.5));
+    const std::uint32_t du = fixed(std::floor(rays.du[r] * scale + 0.5)),
+                        dv = fixed(std::floor(rays.dv[r] * scale + 0.5));
     const auto fu = static_cast<float>(std::fabs(rays.du[r])), fv = static_cast<float>(std::fabs(rays.dv[r]));
     const std::uint32_t flip_u = rays.du[r] < 0.0 ? inside : 0, flip_v = rays.dv[r] < 0.0 ? inside : 0;
     const float order_doubt = sweep_window::order_doubt * (fu + fv) * static_cast<float>(scale);
@@ -171,7 +172,8 @@ inline void sweep_avx512(const sweep_window& w, swept_rays& rays, std::size_t be
     constexpr int select = 0xca;
     __m512i cell = _mm512_ternarylogic_epi32(columns, _mm512_maskz_srli_epi32(0xffff, at_u, sweep_window::fraction),
                                              _mm512_maskz_srli_epi32(0xffff, at_u, sweep_window::fraction - 3), select);
-    cell = _mm512_ternarylogic_epi32(rows, _mm512_maskz_srli_epi32(0xffff, at_v, sweep_window::fraction - 3), cell, select);
+    cell = _mm512_ternarylogic_epi32(rows, _mm512_maskz_srli_epi32(0xffff, at_v, sweep_window::fraction - 3), cell,
+                                     select);
     return _mm512_ternarylogic_epi32(tile_rows, _mm512_maskz_srl_epi32(0xffff, at_v, tile_row), cell, select);
   };
   const __m512i nowhere = _mm512_set1_epi32(static_cast<int>(w.size));
@@ -215,7 +217,8 @@ inline void sweep_avx512(const sweep_window& w, swept_rays& rays, std::size_t be
       map += w.stride;
       alive &= _mm512_cmpge_epi32_mask(planes, _mm512_set1_epi32(1));
     } else {
-      const __m512i low = _mm512_maskz_min_epu32(0xffff, _mm512_maskz_slli_epi32(0xffff, u, to_fraction), _mm512_maskz_slli_epi32(0xffff, v, to_fraction));
+      const __m512i low = _mm512_maskz_min_epu32(0xffff, _mm512_maskz_slli_epi32(0xffff, u, to_fraction),
+                                                 _mm512_maskz_slli_epi32(0xffff, v, to_fraction));
       const __mmask16 unsure = _mm512_mask_cmplt_epu32_mask(alive, low, doubt);
       doubtful_lanes |= unsure;
       alive &= static_cast<__mmask16>(~unsure);
@@ -228,7 +231,8 @@ inline void sweep_avx512(const sweep_window& w, swept_rays& rays, std::size_t be
       alive &= _mm512_cmpge_epi32_mask(planes, _mm512_set1_epi32(j));
     }
     while (j <= stop && alive != 0) {
-      const __m512i frac_u = _mm512_maskz_slli_epi32(0xffff, u, to_fraction), frac_v = _mm512_maskz_slli_epi32(0xffff, v, to_fraction);
+      const __m512i frac_u = _mm512_maskz_slli_epi32(0xffff, u, to_fraction),
+                    frac_v = _mm512_maskz_slli_epi32(0xffff, v, to_fraction);
       __mmask16 unsure = _mm512_mask_cmplt_epu32_mask(alive, _mm512_maskz_min_epu32(0xffff, frac_u, frac_v), doubt);
       const __m512i cell = cell_at(u, v);
       const __m512i changed = _mm512_xor_si512(cell, last);
@@ -236,15 +240,16 @@ inline void sweep_avx512(const sweep_window& w, swept_rays& rays, std::size_t be
       const __m512 behind_u = _mm512_mul_ps(_mm512_maskz_cvtepu32_ps(0xffff, _mm512_xor_si512(frac_u, flip_u)), fv);
       const __m512 behind_v = _mm512_mul_ps(_mm512_maskz_cvtepu32_ps(0xffff, _mm512_xor_si512(frac_v, flip_v)), fu);
       const __m512 order = _mm512_sub_ps(behind_u, behind_v);
-      unsure |= static_cast<__mmask16>(
-          alive & _mm512_mask_cmp_ps_mask(both, _mm512_abs_ps(order), order_doubt, _CMP_LE_OQ));
+      unsure |=
+          static_cast<__mmask16>(alive & _mm512_mask_cmp_ps_mask(both, _mm512_abs_ps(order), order_doubt, _CMP_LE_OQ));
       doubtful_lanes |= unsure;
       alive &= static_cast<__mmask16>(~unsure);
       const __mmask16 u_first = _mm512_cmp_ps_mask(order, _mm512_setzero_ps(), _CMP_GT_OQ);
-      const __m512i corner = _mm512_xor_si512(
-          last, _mm512_and_si512(changed, _mm512_mask_mov_epi32(bits_v, u_first, bits_u)));
+      const __m512i corner =
+          _mm512_xor_si512(last, _mm512_and_si512(changed, _mm512_mask_mov_epi32(bits_v, u_first, bits_u)));
       const auto through = static_cast<__mmask16>(both & alive);
-      _mm512_storeu_si512(between.data() + waiting, _mm512_maskz_compress_epi32(through, _mm512_add_epi32(corner, layer)));
+      _mm512_storeu_si512(between.data() + waiting,
+                          _mm512_maskz_compress_epi32(through, _mm512_add_epi32(corner, layer)));
       waiting += static_cast<std::size_t>(__builtin_popcount(through));
       layer = _mm512_add_epi32(layer, one_map);
       mark(map, _mm512_mask_mov_epi32(nowhere, alive, cell));

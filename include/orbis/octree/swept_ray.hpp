@@ -80,9 +80,11 @@ inline std::uint32_t prepare_avx512(const ray_source& source, const ray_batch& r
     negative[i] = _mm512_cmp_pd_mask(d, zero, _CMP_LT_OQ);
     speed[i] = _mm512_abs_pd(d);
     const __mmask8 still = _mm512_cmp_pd_mask(d, zero, _CMP_EQ_OQ);
-    first[i] = _mm512_mask_mov_pd(_mm512_mask_mov_pd(_mm512_set1_pd(source.up[i]), negative[i], _mm512_set1_pd(source.down[i])),
-                                  still, _mm512_set1_pd(0.5));
-    const __m512d way = _mm512_maskz_cvtepi32_pd(all, _mm256_load_si256(reinterpret_cast<const __m256i*>(rays.way[i].data())));
+    first[i] = _mm512_mask_mov_pd(
+        _mm512_mask_mov_pd(_mm512_set1_pd(source.up[i]), negative[i], _mm512_set1_pd(source.down[i])), still,
+        _mm512_set1_pd(0.5));
+    const __m512d way =
+        _mm512_maskz_cvtepi32_pd(all, _mm256_load_si256(reinterpret_cast<const __m256i*>(rays.way[i].data())));
     expected[i] = _mm512_mask_sub_pd(way, negative[i], zero, way);
     // Whether the walk reaches the end's voxel before the ray's length stops it.
     const __m512d metres = _mm512_mul_pd(length, _mm512_set1_pd(source.per_metre));
@@ -102,8 +104,8 @@ inline std::uint32_t prepare_avx512(const ray_source& source, const ray_batch& r
   const __m512d planes = main_of(expected), first_plane = _mm512_sub_pd(main_of(first), one);
   good &= _mm512_cmp_pd_mask(planes, _mm512_set1_pd(4096.0), _CMP_LE_OQ);
   __m512d left = zero;
-  const auto line = [&](__m512d v_speed, __m512d v_first, __m512d v_expected, __mmask8 down, double* at, double* slope)
-                        ORBIS_TARGET("avx512f,avx512dq") {
+  const auto line = [&](__m512d v_speed, __m512d v_first, __m512d v_expected, __mmask8 down, double* at,
+                        double* slope) ORBIS_TARGET("avx512f,avx512dq") {
     const __m512d b = _mm512_mul_pd(v_speed, per_plane);
     const __m512d a = _mm512_add_pd(_mm512_sub_pd(_mm512_mul_pd(first_plane, b), v_first), one);
     const __m512d last = _mm512_add_pd(a, _mm512_mul_pd(planes, b));
@@ -115,13 +117,17 @@ inline std::uint32_t prepare_avx512(const ray_source& source, const ray_batch& r
     _mm512_store_pd(at, _mm512_mask_sub_pd(a, down, one, a));
     _mm512_store_pd(slope, _mm512_mask_sub_pd(b, down, zero, b));
   };
-  const auto across_u = [&](const __m512d(&a)[3]) ORBIS_TARGET("avx512f") { return _mm512_mask_mov_pd(a[0], x_main, a[1]); };
-  const auto across_v = [&](const __m512d(&a)[3]) ORBIS_TARGET("avx512f") { return _mm512_mask_mov_pd(a[2], z_main, a[1]); };
+  const auto across_u = [&](const __m512d(&a)[3])
+                            ORBIS_TARGET("avx512f") { return _mm512_mask_mov_pd(a[0], x_main, a[1]); };
+  const auto across_v = [&](const __m512d(&a)[3])
+                            ORBIS_TARGET("avx512f") { return _mm512_mask_mov_pd(a[2], z_main, a[1]); };
   const auto chosen = [](__mmask8 from, __mmask8 mask, __mmask8 other) {
     return static_cast<__mmask8>((from & ~mask) | (other & mask));
   };
-  line(across_u(speed), across_u(first), across_u(expected), chosen(negative[0], x_main, negative[1]), out.u.data(), out.du.data());
-  line(across_v(speed), across_v(first), across_v(expected), chosen(negative[2], z_main, negative[1]), out.v.data(), out.dv.data());
+  line(across_u(speed), across_u(first), across_u(expected), chosen(negative[0], x_main, negative[1]), out.u.data(),
+       out.du.data());
+  line(across_v(speed), across_v(first), across_v(expected), chosen(negative[2], z_main, negative[1]), out.v.data(),
+       out.dv.data());
   good &= _mm512_cmp_pd_mask(left, one, _CMP_LE_OQ);
   good &= _mm512_cmp_pd_mask(planes, one, _CMP_GE_OQ);
 
