@@ -7,7 +7,11 @@
 #include <limits>
 #include <vector>
 
+#include <orbis/camera/any.hpp>
+#include <orbis/camera/kannala_brandt.hpp>
 #include <orbis/camera/pinhole.hpp>
+#include <orbis/camera/presets.hpp>
+#include <orbis/camera/radial_tangential.hpp>
 #include <orbis/core/image.hpp>
 #include <orbis/core/random.hpp>
 #include <orbis/core/simd.hpp>
@@ -135,6 +139,49 @@ TEST_CASE("A depth image marks the voxels that walking each of its rays marks") 
     require_walked(resolution, camera::depth_view<float>{depth.view()}, camera_of(width, height, field),
                    random_pose(random, 2.0), options);
   }
+}
+
+TEST_CASE("Cameras with distortion mark what the walk marks") {
+  random_bits random{108};
+  using camera::kannala_brandt;
+  using camera::radial_tangential;
+  const std::array<camera::any_camera, 7> cameras{
+      radial_tangential{{96, 72, 75.0, 76.0, 47.0, 36.5}, {0.2624, -0.9531, -0.0054, 0.0026, 1.1633}},
+      radial_tangential{{96, 72, 60.0, 61.0, 49.0, 33.5}, {-0.35, 0.12, 0.003, -0.004}},
+      radial_tangential{{90, 66, 40.0, 40.0, 44.5, 32.5}, {-0.30, 0.02, 0.01, 0.01}},  // folds inside the image
+      kannala_brandt{{96, 96, 30.0, 30.0, 47.5, 47.5}, {-0.01, 0.02, -0.004, 0.001}},  // sees to the sides and behind
+      kannala_brandt{{100, 60, 60.0, 60.0, 50.0, 29.0}, {0.05, -0.02, 0.01, 0.0}},
+      radial_tangential{{3, 5, 3.0, 3.0, 1.0, 2.0}, {0.1, 0.01, 0.0, 0.0}},
+      camera::pinhole{80, 60, 70.0, 70.0, 39.5, 29.5}};
+  for (const camera::any_camera& camera : cameras)
+    for (int run = 0; run != 3; ++run) {
+      const image<float> depth = random_depth(random, camera.width(), camera.height());
+      const se3 pose = random_pose(random, 1.0);
+      const integration_options options{.max_range = run == 1 ? 1.5 : no_limit};
+      INFO(camera.model_name() << ", run " << run);
+      require_walked(run == 2 ? 0.1 : 0.05, camera::depth_view<float>{depth.view()}, camera, pose, options);
+    }
+}
+
+TEST_CASE("A change of the camera is noticed") {
+  random_bits random{109};
+  const image<float> depth = random_depth(random, 96, 72);
+  const camera::depth_view<float> view{depth.view()};
+  const se3 pose = random_pose(random, 1.0);
+  const voxel_grid grid{0.05};
+  depth_marker marker;
+  scan_masks found;
+  const camera::radial_tangential wide{{96, 72, 70.0, 70.0, 47.0, 36.5}, {-0.2, 0.05}};
+  const camera::radial_tangential narrow{{96, 72, 90.0, 90.0, 47.0, 36.5}, {-0.2, 0.05}};
+  const auto check = [&](const auto& camera) {
+    marker.mark(seq, grid, view, camera, pose, {}, found);
+    CHECK(differences(walked(grid, view, camera, pose, {}).marker.masks(), found, nothing_settled{}) == 0);
+  };
+  check(wide);
+  check(narrow);
+  check(narrow);
+  check(camera::pinhole{96, 72, 90.0, 90.0, 47.0, 36.5});
+  check(camera::any_camera{wide});
 }
 
 TEST_CASE("A camera on a face, an edge or a corner of its voxel marks what the walk marks") {
@@ -268,6 +315,9 @@ TEST_CASE("Frames of a real kitchen mark what the walk marks") {
       for (const double resolution : {0.1, 0.05, 0.02, 0.01})
         require_walked(resolution, frame->depth_metres(), camera, *frame->T_world_camera,
                        {.max_range = resolution < 0.03 ? 2.0 : no_limit});
+      const auto distorted = camera::preset("tum_fr1").value();
+      distorted.model.visit(
+          [&](const auto& other) { require_walked(0.04, frame->depth_metres(), other, *frame->T_world_camera); });
     });
   }
 }

@@ -147,16 +147,22 @@ inline unsigned sample_children_portable(const depth_scene& s, const child_offse
   unsigned sure = 0;
   for (unsigned i = 0; i != 8; ++i) {
     if ((wanted >> i & 1U) == 0) continue;
-    const auto nearest = [&](float p, float f, float centre, std::int32_t first, std::int32_t last) {
-      const float at = c.near_z[i] > s.near_z ? f * (p / c.z[i]) + centre + 0.5F : 0.0F;
-      return static_cast<std::int32_t>(std::clamp(at, static_cast<float>(first), static_cast<float>(last)));
+    const bool projects = c.near_z[i] > s.near_z, mapped = s.map != nullptr || !projects;
+    const float per_z = projects ? 1.0F / c.z[i] : 0.0F;
+    const auto middle = [&](float p, float f, float centre, std::int32_t first, std::int32_t last) {
+      return mapped ? 0.5F * static_cast<float>(first + last) : f * (p * per_z) + centre;
     };
-    const float spread = s.voxel * s.fx / c.z[i] * sample_spread;
+    const float mid_u = middle(c.x[i], s.fx, s.cx, c.u0[i], c.u1[i]);
+    const float mid_v = middle(c.y[i], s.fy, s.cy, c.v0[i], c.v1[i]);
+    const float spread = s.voxel * sample_spread * per_z;
+    const auto nearest = [](float at, std::int32_t first, std::int32_t last) {
+      return static_cast<std::int32_t>(std::clamp(at + 0.5F, static_cast<float>(first), static_cast<float>(last)));
+    };
     float best_z = -1.0F;
     std::int32_t best_u = 0, best_v = 0;
     for (const auto& [du, dv] : sample_places) {
-      const std::int32_t u = nearest(c.x[i], s.fx, s.cx + du * spread, c.u0[i], c.u1[i]);
-      const std::int32_t v = nearest(c.y[i], s.fy, s.cy + dv * spread, c.v0[i], c.v1[i]);
+      const std::int32_t u = nearest(mid_u + du * spread * s.fx, c.u0[i], c.u1[i]);
+      const std::int32_t v = nearest(mid_v + dv * spread * s.fy, c.v0[i], c.v1[i]);
       const float z = s.rays->z(v)[u];
       if (z <= best_z) continue;
       best_z = z;
@@ -243,22 +249,28 @@ inline unsigned sample_children_avx2(const depth_scene& s, const child_offsets& 
   const __m256 per_z = _mm256_and_ps(_mm256_div_ps(set(1.0F), cz), projects);
   const __m256i bits = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
   const __m256i asked = _mm256_cmpeq_epi32(_mm256_and_si256(_mm256_set1_epi32(static_cast<int>(wanted)), bits), bits);
-  const auto nearest = [&](const __m256 p, float f, float centre, const __m256i first,
-                           const __m256i last) ORBIS_TARGET("avx2,fma") {
-    const __m256 at = _mm256_fmadd_ps(p, _mm256_set1_ps(f), _mm256_set1_ps(centre));
+  const __m256 mapped = s.map != nullptr ? set(-1.0F) : _mm256_xor_ps(projects, set(-0.0F));
+  const auto middle = [&](const __m256 p, float f, float centre, const __m256i first,
+                          const __m256i last) ORBIS_TARGET("avx2,fma") {
+    const __m256 at = _mm256_fmadd_ps(_mm256_mul_ps(p, per_z), _mm256_set1_ps(f), _mm256_set1_ps(centre));
+    const __m256 box = _mm256_mul_ps(_mm256_set1_ps(0.5F), _mm256_cvtepi32_ps(_mm256_add_epi32(first, last)));
+    return _mm256_blendv_ps(at, box, mapped);
+  };
+  const auto nearest = [&](const __m256 at, const __m256i first, const __m256i last) ORBIS_TARGET("avx2") {
     return _mm256_and_si256(_mm256_min_epi32(_mm256_max_epi32(_mm256_cvtps_epi32(at), first), last), asked);
   };
+  const __m256i u0 = ints(c.u0), u1 = ints(c.u1), v0 = ints(c.v0), v1 = ints(c.v1);
+  const __m256 mid_u = middle(_mm256_load_ps(c.x.data()), s.fx, s.cx, u0, u1);
+  const __m256 mid_v = middle(_mm256_load_ps(c.y.data()), s.fy, s.cy, v0, v1);
+  const __m256 spread = _mm256_mul_ps(set(s.voxel * sample_spread), per_z);
+  const __m256 spread_u = _mm256_mul_ps(spread, set(s.fx)), spread_v = _mm256_mul_ps(spread, set(s.fy));
   const pixel_rays& rays = s.rays->rays();
-  const __m256 cx = _mm256_load_ps(c.x.data()), cy = _mm256_load_ps(c.y.data());
-  const __m256 spread = _mm256_mul_ps(set(s.voxel * sample_spread), _mm256_and_ps(per_z, projects));
   const __m256i row_size = _mm256_set1_epi32(static_cast<int>(s.rays->stride()));
   __m256 z = set(-1.0F);
   __m256i u = _mm256_setzero_si256(), v = u;
   for (const auto& [du, dv] : sample_places) {
-    const __m256i at_u =
-        nearest(_mm256_fmadd_ps(spread, set(du), _mm256_mul_ps(cx, per_z)), s.fx, s.cx, ints(c.u0), ints(c.u1));
-    const __m256i at_v =
-        nearest(_mm256_fmadd_ps(spread, set(dv), _mm256_mul_ps(cy, per_z)), s.fy, s.cy, ints(c.v0), ints(c.v1));
+    const __m256i at_u = nearest(_mm256_fmadd_ps(spread_u, set(du), mid_u), u0, u1);
+    const __m256i at_v = nearest(_mm256_fmadd_ps(spread_v, set(dv), mid_v), v0, v1);
     const __m256 at_z =
         _mm256_i32gather_ps(s.rays->z(0), _mm256_add_epi32(_mm256_mullo_epi32(at_v, row_size), at_u), 4);
     const __m256 deeper = _mm256_cmp_ps(at_z, z, _CMP_GT_OQ);

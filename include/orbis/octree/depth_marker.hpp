@@ -23,6 +23,7 @@
 #include <orbis/octree/depth_crossing.hpp>
 #include <orbis/octree/depth_nodes.hpp>
 #include <orbis/octree/depth_pyramid.hpp>
+#include <orbis/octree/depth_ray_map.hpp>
 #include <orbis/octree/depth_rays.hpp>
 #include <orbis/octree/integration.hpp>
 #include <orbis/octree/node_name.hpp>
@@ -86,9 +87,10 @@ class depth_marker {
     masks.clear();
     const detail::end_counts ends = rays_.find_ends(policy, sensor, depth, camera, masks);
     if (sensor.key && ends.leaves) {
+      if (!rays_.rays().separable()) map_.fit(rays_.rays());
       set_scene(sensor);
       const auto bounds = bounds_of(sensor, ends.max_z);
-      if (bounds && rays_.rays().separable() && is_dense(ends))
+      if (bounds && is_dense(ends))
         mark_free(policy, sensor, depth, ends.max_z, *bounds, masks, settled);
       else
         walk_all(policy, sensor, depth, camera, T_world_camera, options, masks);
@@ -106,7 +108,7 @@ class depth_marker {
   }
 
   [[nodiscard]] std::size_t memory_bytes() const noexcept {
-    std::size_t bytes = rays_.memory_bytes() + pyramid_.memory_bytes() + walker_.memory_bytes() +
+    std::size_t bytes = rays_.memory_bytes() + pyramid_.memory_bytes() + map_.memory_bytes() + walker_.memory_bytes() +
                         points_.capacity() * sizeof(vec3f) + nodes_.capacity() * sizeof(node) +
                         workers_.capacity() * sizeof(worker) + offsets_.capacity() * sizeof(detail::child_offsets);
     for (const worker& w : workers_)
@@ -144,6 +146,7 @@ class depth_marker {
   void mark_free(const Policy& policy, const depth_sensor& sensor, const Depth& depth, float max_z,
                  const std::pair<voxel_key, voxel_key>& bounds, scan_masks& masks, Settled& settled) {
     const voxel_key& from = *sensor.key;
+    if (scene_.map != nullptr) walk_outer(sensor, depth, masks);
     pyramid_.build(rays_.rays().width(), rays_.rays().height(), max_z, [&](int v) { return rays_.z(v); });
     list_nodes(sensor, bounds.first, bounds.second);
     const bool on_face = is_on_face(sensor);
@@ -157,7 +160,7 @@ class depth_marker {
         p.descend(nodes_[n].key, nodes_[n].center, list_level, nodes_[n].inside);
     });
     for (const worker& w : workers_)
-      for (const free_brick& b : w.bricks) masks.at(named_key(b.name)).free = b.free;
+      for (const free_brick& b : w.bricks) join(masks.at(named_key(b.name)).free, b.free);
     const std::uint32_t place = place_in_brick(from);
     masks.at(from).free[place >> 6U] |= std::uint64_t{1} << (place & 63U);
     if (on_face) walk_first_steps(sensor, depth, masks);
@@ -172,16 +175,19 @@ class depth_marker {
       s.z_axis[i] = rows[i][2];
     }
     const pixel_rays& rays = rays_.rays();
-    s.fx = static_cast<float>(rays.focal().x());
-    s.fy = static_cast<float>(rays.focal().y());
-    s.cx = static_cast<float>(rays.center().x());
-    s.cy = static_cast<float>(rays.center().y());
+    s.map = rays.separable() ? nullptr : &map_;
+    const vec2f focal = s.map != nullptr ? map_.focal() : vec2f(rays.focal().cast<float>());
+    const vec2f center = s.map != nullptr ? map_.center() : vec2f(rays.center().cast<float>());
+    s.fx = focal.x();
+    s.fy = focal.y();
+    s.cx = center.x();
+    s.cy = center.y();
     s.last_u = static_cast<float>(rays.width() - 1);
     s.last_v = static_cast<float>(rays.height() - 1);
-    s.min_x = rays.x(0)[0];
-    s.max_x = rays.x(0)[rays.width() - 1];
-    s.min_y = rays.y(0)[0];
-    s.max_y = rays.y(rays.height() - 1)[0];
+    s.min_x = s.map != nullptr ? map_.min_x() : rays.x(0)[0];
+    s.max_x = s.map != nullptr ? map_.max_x() : rays.x(0)[rays.width() - 1];
+    s.min_y = s.map != nullptr ? map_.min_y() : *rays.y(0);
+    s.max_y = s.map != nullptr ? map_.max_y() : *rays.y(rays.height() - 1);
     constexpr float u = 0x1p-24F;
     float l1 = 0.0F;
     for (const float c : sensor.pose.centre) l1 += std::fabs(c);
@@ -192,12 +198,10 @@ class depth_marker {
     s.near_z = 0.1F * s.voxel;
     const float slope = 2.0F * (1.0F + std::max(std::fabs(s.min_x), std::fabs(s.max_x)) +
                                 std::max(std::fabs(s.min_y), std::fabs(s.max_y)));
-    // Half the diagonal between neighbouring pixels; a ball of this radius at depth 1 holds a pixel's
-    // ray, of three times the radius an aligned tile of 2x2, of seven times a tile of 4x4.
+    s.ball = 0.5F * s.voxel - 2.0F * s.margin_0;
+    s.ball_slope = 2.0F * s.margin_1 * slope;
     const float spacing = 0.5F * std::sqrt(1.0F / (s.fx * s.fx) + 1.0F / (s.fy * s.fy));
-    const std::array<float, 3> factor{1.0F, 3.0F, 7.0F};
-    for (std::size_t i = 0; i != 3; ++i)
-      s.dense_z[i] = (0.5F * s.voxel - 2.0F * s.margin_0) / (1.02F * factor[i] * spacing + 2.0F * s.margin_1 * slope);
+    for (std::size_t kind = 0; kind != 3; ++kind) s.dense_z[kind] = s.dense(kind, spacing);
     s.pyramid = &pyramid_;
     s.rays = &rays_;
   }
@@ -266,6 +270,19 @@ class depth_marker {
     walker_.mark(policy, sensor.grid, points_.size(), point, sensor.pose.centre,
                  {.max_range = options.max_range, .mode = ray_mode::every_ray});
     masks.merge(walker_.masks());
+  }
+  /// Walks the rays that go too far aside for the map, and forgets them.
+  template <class Depth>
+  void walk_outer(const depth_sensor& sensor, const Depth& depth, scan_masks& masks) {
+    for (const auto& [u, v] : map_.outer()) {
+      if (!(rays_.z(v)[u] > 0.0F)) continue;
+      const depth_end e = end_of(sensor, depth, u, v);
+      masks.mark_ray(sensor.grid, sensor.pose.centre, *sensor.key, e.point, e.key);
+      rays_.clear(u, v);
+    }
+  }
+  static void join(words& to, const words& from) noexcept {
+    for (std::size_t i = 0; i != 8; ++i) to[i] |= from[i];
   }
   /// Marks the neighbours of the camera's voxel.
   template <class Depth>
@@ -497,7 +514,9 @@ class depth_marker {
                                    std::min(box.v1, v + size - 1)};
       if (part.u0 > part.u1 || part.v0 > part.v1 || !of.pyramid_.reaches(u, v, size, near_z)) return false;
       const pixel_rays& rays = of.rays_.rays();
-      if (!test.may_cross(rays.x(0)[part.u0], rays.x(0)[part.u1], *rays.y(part.v0), *rays.y(part.v1))) return false;
+      if (rays.separable() &&
+          !test.may_cross(rays.x(0)[part.u0], rays.x(0)[part.u1], *rays.y(part.v0), *rays.y(part.v1)))
+        return false;
       if (size == 16) return of.cross_(of.scene_, test, part, near_z, own.unsure);
       const std::int32_t half = size / 2;
       return crosses_tile(test, box, near_z, u, v, half) || crosses_tile(test, box, near_z, u + half, v, half) ||
@@ -511,6 +530,7 @@ class depth_marker {
   cross_kernel* cross_;
   depth_rays rays_;
   depth_pyramid pyramid_;
+  depth_ray_map map_;
   scan_marker walker_;
   std::vector<vec3f> points_;
   detail::depth_scene scene_;

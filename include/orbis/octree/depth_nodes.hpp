@@ -12,6 +12,7 @@
 
 #include <orbis/core/simd.hpp>
 #include <orbis/octree/depth_pyramid.hpp>
+#include <orbis/octree/depth_ray_map.hpp>
 #include <orbis/octree/depth_rays.hpp>
 
 #if ORBIS_X86
@@ -39,12 +40,21 @@ struct depth_scene {
   float margin_0 = 0, margin_1 = 0;                  ///< metres; and for each metre of |c|_1
   float pixel_margin = 0.01F;                        ///< pixels, for the rounding of pixels
   float near_z = 0;                                  ///< nodes that come closer than this are not projected
-  /// Up to this depth a ball inside a voxel surely holds the ray of a pixel, a tile of 2x2, of 4x4.
+  /// Up to this depth a ball inside a voxel surely holds the ray of a pixel, an aligned tile of 2x2
+  /// pixels' rays, of 4x4; of pinholes, see dense().
   std::array<float, 3> dense_z{};
-  float voxel = 0;  ///< metres
+  float ball = 0, ball_slope = 0;      ///< the ball's radius is more than `ball - ball_slope * z`
+  float voxel = 0;                     ///< metres
+  const depth_ray_map* map = nullptr;  ///< of cameras that are not pinholes
   const depth_pyramid* pyramid = nullptr;
   const depth_rays* rays = nullptr;
 
+  /// The same where every direction has a ray within `spacing` at z = 1: that many times as far off
+  /// are all rays of a tile that contains the nearest one.
+  static constexpr std::array<float, 3> tiles{1.02F, 3.06F, 7.14F};
+  [[nodiscard]] float dense(std::size_t kind, float spacing) const noexcept {
+    return ball / (tiles[kind] * spacing + ball_slope);
+  }
   [[nodiscard]] float margin(float l1) const noexcept { return margin_0 + margin_1 * l1; }
 };
 
@@ -112,7 +122,8 @@ inline void judge_children_portable(const depth_scene& s, const child_offsets& o
       continue;
     const bool projects = near > s.near_z;
     float u0 = 0.0F, u1 = s.last_u, v0 = 0.0F, v1 = s.last_v;
-    bool inner = false;
+    bool inner = false, covered = false;
+    std::array<float, 3> dense_z = s.dense_z;
     if (projects) {
       const float u = x / z, v = y / z;
       float wide = 0, high = 0;
@@ -126,7 +137,17 @@ inline void judge_children_portable(const depth_scene& s, const child_offsets& o
       u1 = s.fx * (u + du) + s.cx + s.pixel_margin;
       v0 = s.fy * (v - dv) + s.cy - s.pixel_margin;
       v1 = s.fy * (v + dv) + s.cy + s.pixel_margin;
-      inner = u0 >= 0.0F && v0 >= 0.0F && u1 <= s.last_u && v1 <= s.last_v;
+      if (s.map != nullptr) {
+        const auto& off = s.map->at(u - du, u + du, v - dv, v + dv);
+        u0 += off.least_u;
+        u1 += off.most_u;
+        v0 += off.least_v;
+        v1 += off.most_v;
+        for (std::size_t kind = 0; kind != 3; ++kind) dense_z[kind] = s.dense(kind, off.spacing);
+        covered = true;
+      } else {
+        covered = inner = u0 >= 0.0F && v0 >= 0.0F && u1 <= s.last_u && v1 <= s.last_v;
+      }
       u0 = std::clamp(u0, 0.0F, s.last_u + 1.0F);
       v0 = std::clamp(v0, 0.0F, s.last_v + 1.0F);
       u1 = std::clamp(u1, -1.0F, s.last_u);
@@ -143,7 +164,7 @@ inline void judge_children_portable(const depth_scene& s, const child_offsets& o
     while (3 << level < std::max(iu1 - iu0, iv1 - iv0) && level < pyramid.levels()) ++level;
     const auto k = static_cast<std::size_t>(level);
     std::size_t kind = 0;
-    while (kind != 2 && far < s.dense_z[kind + 1]) ++kind;
+    while (kind != 2 && far < dense_z[kind + 1]) ++kind;
     const std::uint32_t* const cells = pyramid.data() + kind * pyramid.family() + pyramid.begin()[k];
     const std::int32_t a = iu0 >> level, b = std::max(a, (iu1 >> level) - 1);
     const std::int32_t d = iv0 >> level, e = std::max(d, (iv1 >> level) - 1), w = pyramid.width()[k];
@@ -151,9 +172,8 @@ inline void judge_children_portable(const depth_scene& s, const child_offsets& o
                                              larger_halves(cells[e * w + a], cells[e * w + b]));
     if (ends >> 16U == 0 || static_cast<float>(ends >> 16U) < near * pyramid.scale()) continue;
     out.live |= 1U << i;
-    if (!inner) continue;
-    out.inside |= 1U << i;
-    if (far < s.dense_z[0] && static_cast<float>(65535U - (ends & 0xffffU)) > far * pyramid.scale())
+    if (inner) out.inside |= 1U << i;
+    if (covered && far < dense_z[0] && static_cast<float>(65535U - (ends & 0xffffU)) > far * pyramid.scale())
       out.full |= 1U << i;
   }
 }
@@ -207,13 +227,51 @@ inline void judge_children_avx2(const depth_scene& s, const child_offsets& o, co
     const __m256 slack = _mm256_fmadd_ps(margin, _mm256_andnot_ps(sign, slope), margin);
     return _mm256_mul_ps(_mm256_fmadd_ps(sum, _mm256_set1_ps(o.half), slack), per_near);
   };
-  const __m256 du = _mm256_fmadd_ps(across(s.x_axis, u), set(s.fx), set(s.pixel_margin));
-  const __m256 dv = _mm256_fmadd_ps(across(s.y_axis, v), set(s.fy), set(s.pixel_margin));
+  const __m256 wide = across(s.x_axis, u), high = across(s.y_axis, v);
+  const __m256 du = _mm256_fmadd_ps(wide, set(s.fx), set(s.pixel_margin));
+  const __m256 dv = _mm256_fmadd_ps(high, set(s.fy), set(s.pixel_margin));
   const __m256 cu = _mm256_fmadd_ps(u, set(s.fx), set(s.cx)), cv = _mm256_fmadd_ps(v, set(s.fy), set(s.cy));
   const __m256 last_u = set(s.last_u), last_v = set(s.last_v);
-  const __m256 u0 = _mm256_and_ps(_mm256_sub_ps(cu, du), projects), v0 = _mm256_and_ps(_mm256_sub_ps(cv, dv), projects);
-  const __m256 u1 = _mm256_blendv_ps(last_u, _mm256_add_ps(cu, du), projects);
-  const __m256 v1 = _mm256_blendv_ps(last_v, _mm256_add_ps(cv, dv), projects);
+  __m256 u0 = _mm256_sub_ps(cu, du), u1 = _mm256_add_ps(cu, du), v0 = _mm256_sub_ps(cv, dv), v1 = _mm256_add_ps(cv, dv);
+  __m256 dense_0 = set(s.dense_z[0]), dense_1 = set(s.dense_z[1]), dense_2 = set(s.dense_z[2]);
+  if (s.map != nullptr) {
+    const depth_ray_map& map = *s.map;
+    const auto cell = [&](const __m256 at, float least, float per, std::int32_t count) ORBIS_TARGET("avx2") {
+      const __m256 c = _mm256_mul_ps(_mm256_sub_ps(at, _mm256_set1_ps(least)), _mm256_set1_ps(per));
+      return _mm256_cvttps_epi32(
+          _mm256_min_ps(_mm256_max_ps(c, _mm256_setzero_ps()), _mm256_set1_ps(static_cast<float>(count - 1))));
+    };
+    const __m256i i0 = cell(_mm256_sub_ps(u, wide), map.min_x(), map.per_x(), map.width()[0]);
+    const __m256i i1 = cell(_mm256_add_ps(u, wide), map.min_x(), map.per_x(), map.width()[0]);
+    const __m256i j0 = cell(_mm256_sub_ps(v, high), map.min_y(), map.per_y(), map.height()[0]);
+    const __m256i j1 = cell(_mm256_add_ps(v, high), map.min_y(), map.per_y(), map.height()[0]);
+    const __m256 extent = _mm256_cvtepi32_ps(_mm256_max_epi32(_mm256_sub_epi32(i1, i0), _mm256_sub_epi32(j1, j0)));
+    __m256i k = _mm256_sub_epi32(
+        _mm256_srli_epi32(_mm256_add_epi32(_mm256_castps_si256(extent), _mm256_set1_epi32(0x7fffff)), 23),
+        _mm256_set1_epi32(127));
+    k = _mm256_min_epi32(_mm256_max_epi32(k, _mm256_setzero_si256()), _mm256_set1_epi32(map.levels()));
+    __m256i at = _mm256_mullo_epi32(_mm256_srlv_epi32(j0, k), _mm256_i32gather_epi32(map.width().data(), k, 4));
+    at = _mm256_add_epi32(_mm256_add_epi32(at, _mm256_srlv_epi32(i0, k)),
+                          _mm256_i32gather_epi32(map.begin().data(), k, 4));
+    at = _mm256_slli_epi32(at, 3);
+    const float* const entries = &map.entries()->least_u;
+    u0 = _mm256_add_ps(u0, _mm256_i32gather_ps(entries, at, 4));
+    u1 = _mm256_add_ps(u1, _mm256_i32gather_ps(entries + 1, at, 4));
+    v0 = _mm256_add_ps(v0, _mm256_i32gather_ps(entries + 2, at, 4));
+    v1 = _mm256_add_ps(v1, _mm256_i32gather_ps(entries + 3, at, 4));
+    const __m256 spacing = _mm256_i32gather_ps(entries + 4, at, 4);
+    const auto dense = [&](std::size_t kind) ORBIS_TARGET("avx2,fma") {
+      return _mm256_div_ps(_mm256_set1_ps(s.ball), _mm256_fmadd_ps(_mm256_set1_ps(depth_scene::tiles[kind]), spacing,
+                                                                   _mm256_set1_ps(s.ball_slope)));
+    };
+    dense_0 = dense(0);
+    dense_1 = dense(1);
+    dense_2 = dense(2);
+  }
+  u0 = _mm256_and_ps(u0, projects);
+  v0 = _mm256_and_ps(v0, projects);
+  u1 = _mm256_blendv_ps(last_u, u1, projects);
+  v1 = _mm256_blendv_ps(last_v, v1, projects);
   const __m256 inner = _mm256_and_ps(
       projects,
       _mm256_and_ps(_mm256_and_ps(_mm256_cmp_ps(u0, zero, _CMP_GE_OQ), _mm256_cmp_ps(v0, zero, _CMP_GE_OQ)),
@@ -250,8 +308,8 @@ inline void judge_children_avx2(const depth_scene& s, const child_offsets& o, co
   const __m256i width = _mm256_i32gather_epi32(pyramid.width().data(), level, 4);
   __m256i begin = _mm256_i32gather_epi32(pyramid.begin().data(), level, 4);
   const __m256i family = _mm256_set1_epi32(static_cast<int>(pyramid.family()));
-  const __m256 pairs = _mm256_cmp_ps(far, set(s.dense_z[1]), _CMP_LT_OQ);
-  const __m256 fours = _mm256_cmp_ps(far, set(s.dense_z[2]), _CMP_LT_OQ);  // implies the one before
+  const __m256 pairs = _mm256_cmp_ps(far, dense_1, _CMP_LT_OQ);
+  const __m256 fours = _mm256_cmp_ps(far, dense_2, _CMP_LT_OQ);  // implies the one before
   begin = _mm256_add_epi32(begin, _mm256_and_si256(family, _mm256_castps_si256(pairs)));
   begin = _mm256_add_epi32(begin, _mm256_and_si256(family, _mm256_castps_si256(fours)));
   const auto before_last = [&](const __m256i from, const __m256i to) ORBIS_TARGET("avx2") {
@@ -272,10 +330,13 @@ inline void judge_children_avx2(const depth_scene& s, const child_offsets& o, co
   const __m256 nearest =
       _mm256_cvtepi32_ps(_mm256_sub_epi32(_mm256_set1_epi32(65535), _mm256_and_si256(ends, _mm256_set1_epi32(65535))));
   const __m256 filled = _mm256_and_ps(_mm256_cmp_ps(nearest, _mm256_mul_ps(far, scale), _CMP_GT_OQ),
-                                      _mm256_cmp_ps(far, set(s.dense_z[0]), _CMP_LT_OQ));
+                                      _mm256_cmp_ps(far, dense_0, _CMP_LT_OQ));
   out.live = static_cast<unsigned>(_mm256_movemask_ps(live));
-  out.inside = out.live & static_cast<unsigned>(_mm256_movemask_ps(inner));
-  out.full = out.inside & static_cast<unsigned>(_mm256_movemask_ps(filled));
+  // Where there is a map, it is the spacing that says whether there are rays all over a child.
+  const bool mapped = s.map != nullptr;
+  out.inside = mapped ? 0 : out.live & static_cast<unsigned>(_mm256_movemask_ps(inner));
+  out.full = (mapped ? out.live & static_cast<unsigned>(_mm256_movemask_ps(projects)) : out.inside) &
+             static_cast<unsigned>(_mm256_movemask_ps(filled));
 }
 #endif
 
