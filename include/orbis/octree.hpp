@@ -6,6 +6,7 @@
 #include <orbis/octree/brick.hpp>
 #include <orbis/octree/cast_ray.hpp>
 #include <orbis/octree/change_log.hpp>
+#include <orbis/octree/compact_file.hpp>
 #include <orbis/octree/constexpr_log.hpp>
 #include <orbis/octree/decay.hpp>
 #include <orbis/octree/depth_points.hpp>

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// Any bytes as a compact map file: as they are, and with their checksums put right, so that what lies
+// behind those is tried too.
+#include <orbis/octree/compact_file.hpp>
+
+#include "fuzz/octree.hpp"
+
+namespace {
+
+using namespace orbis;
+
+[[nodiscard]] std::string resealed(std::string file) {
+  constexpr std::size_t frame = 16;
+  for (std::size_t at = 12; at + frame <= file.size();) {
+    std::string_view length{file.data() + at + 4, 8};
+    const auto content = octree::detail::take<std::uint64_t>(length);
+    if (content > file.size() - at - frame) break;
+    const std::size_t end = at + 12 + static_cast<std::size_t>(content);
+    std::string sum;
+    octree::detail::put(sum, octree::crc32c(std::string_view{file}.substr(at, end - at)));
+    file.replace(end, 4, sum);
+    at = end + 4;
+  }
+  return file;
+}
+
+void check(std::span<const std::byte> bytes) {
+  std::optional<result<fuzz::map>> got;
+  const std::size_t peak = fuzz::peak_bytes_of([&] { got.emplace(octree::read_compact(bytes)); });
+  fuzz::require(peak <= 512 * 1024 + 4096 * bytes.size(), "memory in proportion to the file");
+  if (!*got) {
+    const error& e = got->error();
+    fuzz::require(e.code == errc::malformed || e.code == errc::unsupported, "a damaged file is malformed or unsupported");
+    fuzz::require(!e.message.empty() && e.to_string().size() < 300, "the reason is given, and short");
+    return;
+  }
+  const fuzz::map& m = **got;
+  for (const bool occupancy_only : {false, true}) {
+    const std::string file = octree::compact_bytes(m, {.occupancy_only = occupancy_only});
+    const auto again = octree::read_compact(fuzz::bytes_of(file));
+    fuzz::require(again && again->tree_depth() == m.tree_depth() && again->resolution() == m.resolution(),
+                  "what was read can be written and read again");
+    fuzz::require(octree::compact_bytes(*again, {.occupancy_only = occupancy_only}) == file, "to the same bytes");
+    if (m.tree_depth() != octree::default_tree_depth) continue;
+    fuzz::require(octree::bt_bytes(*again) == octree::bt_bytes(m) || occupancy_only, "with the same .bt file");
+    fuzz::require(occupancy_only || octree::ot_bytes(*again) == octree::ot_bytes(m), "with the same .ot file");
+  }
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  check(std::as_bytes(std::span{data, size}));
+  const std::string sealed = resealed(std::string{reinterpret_cast<const char*>(data), size});
+  check(fuzz::bytes_of(sealed));
+  return 0;
+}
