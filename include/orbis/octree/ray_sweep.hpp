@@ -80,6 +80,7 @@ class ray_sweep {
   /// Sweeps and walks the rays that are waiting.
   void flush(scan_masks& masks) {
     if (left_origin_) masks.mark_free(key(0, 0, 0));
+    left_origin_ = false;  // the next scan may have no rays, and not start one
     for (std::size_t i = 0; i != batched_; ++i) add_batched(i, masks);
     batched_ = 0;
     for (face& f : faces_) sweep(f, masks);
