@@ -444,11 +444,11 @@ class brick_store {
            });
   }
   /// Gives octant `i` of `b` a record of its own in a pool, in use already or not.
-  void make_record(brick<T>& b, std::uint32_t i, unsigned pool) {
+  void make_record(brick<T>& b, std::uint32_t i, unsigned number) {
     const auto bit = static_cast<std::uint8_t>(1U << i);
-    if ((b.dense & bit) != 0 && pool_of(b.at[i]) == pool) return;
+    if ((b.dense & bit) != 0 && pool_of(b.at[i]) == number) return;
     drop_record(b, i);
-    b.at[i] = new_record(pool);
+    b.at[i] = new_record(number);
     b.dense |= bit;
   }
   /// Makes octant `i` of `b` unknown.
