@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Boxes of voxels.
+/// Axis-aligned boxes, in metres and in voxels.
 #pragma once
 
 #include <cstdint>
@@ -10,6 +10,19 @@
 #include <orbis/octree/key.hpp>
 
 namespace orbis::octree {
+
+/// An axis-aligned box, metres.
+struct bounding_box {
+  vec3 min = vec3::Zero();
+  vec3 max = vec3::Zero();
+};
+
+/// The cube of the node at `level` whose lowest voxel is `k`, metres.
+[[nodiscard]] inline bounding_box cube_of(const voxel_grid& grid, const voxel_key& k, int level) {
+  const double half = grid.cells() / 2, cells = node_cells(level);
+  const vec3 low = vec3{static_cast<double>(k.x), static_cast<double>(k.y), static_cast<double>(k.z)}.array() - half;
+  return {low * grid.resolution(), vec3(low.array() + cells) * grid.resolution()};
+}
 
 /// The voxels from `low` to `high`, both included.
 struct key_box {

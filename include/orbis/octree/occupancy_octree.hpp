@@ -25,6 +25,7 @@
 #include <orbis/octree/change_log.hpp>
 #include <orbis/octree/depth_points.hpp>
 #include <orbis/octree/integration.hpp>
+#include <orbis/octree/key_box.hpp>
 #include <orbis/octree/leaves.hpp>
 #include <orbis/octree/pruned_tree.hpp>
 #include <orbis/octree/sensor_model.hpp>
@@ -41,12 +42,6 @@ struct octree_leaf {
   double size = 0;  ///< edge, metres
   T log_odds{};     ///< in the model's units
   bool occupied = false;
-};
-
-/// An axis-aligned box, metres.
-struct bounding_box {
-  vec3 min = vec3::Zero();
-  vec3 max = vec3::Zero();
 };
 
 /// A map of free, occupied and unknown space in voxels of a fixed size, 65536 along each axis unless

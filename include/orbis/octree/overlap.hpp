@@ -1,0 +1,189 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Whether boxes, spheres and capsules are free of what the map holds: the question of every planner.
+#pragma once
+
+#include <array>
+#include <bit>
+#include <cassert>
+#include <concepts>
+#include <cstddef>
+#include <cstdint>
+
+#include <orbis/core/types.hpp>
+#include <orbis/octree/accessor.hpp>
+#include <orbis/octree/key_box.hpp>
+#include <orbis/octree/leaves.hpp>
+
+namespace orbis::octree {
+
+/// A ball, metres. @pre radius >= 0
+struct sphere {
+  vec3 center = vec3::Zero();
+  double radius = 0.0;
+};
+/// Everything within `radius` of the segment from `a` to `b`, metres. @pre radius >= 0
+struct capsule {
+  vec3 a = vec3::Zero(), b = vec3::Zero();
+  double radius = 0.0;
+};
+
+[[nodiscard]] inline bounding_box bounds_of(const bounding_box& b) { return b; }
+[[nodiscard]] inline bounding_box bounds_of(const sphere& s) {
+  return {s.center.array() - s.radius, s.center.array() + s.radius};
+}
+[[nodiscard]] inline bounding_box bounds_of(const capsule& c) {
+  return {c.a.cwiseMin(c.b).array() - c.radius, c.a.cwiseMax(c.b).array() + c.radius};
+}
+
+/// Whether a shape and a box have a point in common; faces and corners belong to them.
+[[nodiscard]] inline bool touches(const bounding_box& a, const bounding_box& b) noexcept {
+  return (a.min.array() <= b.max.array()).all() && (a.max.array() >= b.min.array()).all();
+}
+[[nodiscard]] inline bool touches(const sphere& s, const bounding_box& b) noexcept {
+  const vec3 nearest = s.center.cwiseMax(b.min).cwiseMin(b.max);
+  return (s.center - nearest).squaredNorm() <= s.radius * s.radius;
+}
+[[nodiscard]] inline bool touches(const capsule& c, const bounding_box& b) noexcept {
+  // The squared distance of a + t (b - a) from the box is convex in t, its slope is linear between the
+  // parameters at which the segment crosses the planes of the faces: look for the piece where it is 0.
+  const vec3 along = c.b - c.a;
+  const auto away = [&](double t) -> vec3 {
+    const vec3 p = c.a + t * along;
+    return p - p.cwiseMax(b.min).cwiseMin(b.max);
+  };
+  std::array<double, 8> knots{0.0, 1.0};
+  std::size_t count = 2;
+  for (int i = 0; i != 3; ++i)
+    for (const double face : {b.min[i], b.max[i]}) {
+      const double t = (face - c.a[i]) / along[i];
+      if (!(t > 0.0 && t < 1.0)) continue;
+      std::size_t place = count++;
+      for (; knots[place - 1] > t; --place) knots[place] = knots[place - 1];
+      knots[place] = t;
+    }
+  double best = 0.0, slope = away(0.0).dot(along);
+  for (std::size_t i = 1; i != count && slope < 0.0; ++i) {
+    const double next = away(knots[i]).dot(along);
+    const double share = next > 0.0 ? slope / (slope - next) : 1.0;
+    best = knots[i - 1] + share * (knots[i] - knots[i - 1]);
+    slope = next;
+  }
+  return away(best).squaredNorm() <= c.radius * c.radius;
+}
+
+/// A shape that can be looked for: `bounds_of(shape)` is a box around it, `touches(shape, box)` says
+/// whether it has a point in common with a box. Bring your own in your own namespace.
+template <class S>
+concept overlap_shape = requires(const S& shape, const bounding_box& box) {
+  { bounds_of(shape) } -> std::convertible_to<bounding_box>;
+  { touches(shape, box) } -> std::convertible_to<bool>;
+};
+
+struct overlap_options {
+  occupancy unknown = occupancy::free;  ///< what unknown space, and all outside the grid, counts as
+};
+
+namespace detail {
+
+/// Goes down where the shape is, as long as something there may be in its way.
+template <sensor_model Model, overlap_shape Shape>
+class overlap_search {
+ public:
+  using T = typename Model::value_type;
+
+  overlap_search(const brick_store<T>& store, const voxel_grid& grid, const Shape& shape, bool unknown_blocks)
+      : store_{store}, grid_{grid}, shape_{shape}, unknown_blocks_{unknown_blocks} {}
+
+  [[nodiscard]] bool run() const {
+    const bounding_box bounds = bounds_of(shape_);
+    const double edge = grid_.resolution() * (grid_.cells() / 2);
+    const bool is_inside = (bounds.min.array() >= -edge).all() && (bounds.max.array() <= edge).all();
+    if (unknown_blocks_ && !is_inside) return true;
+    // Faces that only touch are found as well.
+    const auto keys = keys_between(grid_, bounds.min.array() - grid_.resolution(), bounds.max.array() + grid_.resolution());
+    if (!keys) return false;
+    bool found = false;
+    store_.for_each_large([&](std::uint64_t name, T v) {
+      found = found || (is_occupied<Model>(v) && meets(named_key(name), named_level(name)));
+    });
+    return found || upper(*keys, {}, grid_.depth());
+  }
+
+ private:
+  [[nodiscard]] bool meets(const voxel_key& k, int level) const { return touches(shape_, cube_of(grid_, k, level)); }
+
+  [[nodiscard]] bool upper(const key_box& keys, const voxel_key& k, int level) const {
+    if (!keys.overlaps(k, level) || !meets(k, level)) return false;
+    if (level == chunk_level) return chunk(k);
+    for (unsigned i = 0; i != 8; ++i)
+      if (upper(keys, child_key(k, i, node_cells(level - 1)), level - 1)) return true;
+    return false;
+  }
+  [[nodiscard]] bool chunk(const voxel_key& k) const {
+    const auto* const c = store_.find_chunk(k);
+    if (c == nullptr && !store_.has_large()) return unknown_blocks_;
+    if (c == nullptr && !unknown_blocks_) return false;
+    for (std::uint32_t place = 0; place != 64; ++place) {
+      const voxel_key offset = brick_in_chunk(place);
+      const voxel_key key{k.x + offset.x, k.y + offset.y, k.z + offset.z};
+      const brick<T>* const b = c == nullptr ? nullptr : store_.find(*c, place);
+      const bool blocks = b != nullptr ? may_block(*b) : unknown_blocks_ && store_.find_large_value(key) == nullptr;
+      if (!blocks || !meets(key, brick_level)) continue;
+      if (b == nullptr || in_brick(*b, key)) return true;
+    }
+    return false;
+  }
+  [[nodiscard]] bool may_block(const brick<T>& b) const noexcept {
+    bool may = unknown_blocks_ && b.uniform != 0xff;
+    for (unsigned i = 0; i != 8; ++i) may = may || (((b.uniform | b.dense) >> i & 1U) != 0 && is_occupied<Model>(b.value[i]));
+    return may;
+  }
+  [[nodiscard]] bool in_brick(const brick<T>& b, const voxel_key& key) const {
+    for (std::uint32_t i = 0; i != 8; ++i) {
+      const bool is_known = ((b.uniform | b.dense) >> i & 1U) != 0;
+      std::uint64_t blocking = 0;
+      if (is_known && is_occupied<Model>(b.value[i])) blocking = store_.voxels_where(b, i, is_occupied<Model>);
+      if (unknown_blocks_) blocking |= ~store_.known(b, i);
+      const voxel_key octant = child_key(key, i, node_cells(octant_level));
+      if (blocking == 0 || !meets(octant, octant_level)) continue;
+      if (blocking == ~std::uint64_t{0}) return true;
+      for (; blocking != 0; blocking &= blocking - 1)
+        if (meets(voxel_in_octant(octant, static_cast<std::uint32_t>(std::countr_zero(blocking))), 0)) return true;
+    }
+    return false;
+  }
+
+  const brick_store<T>& store_;
+  const voxel_grid& grid_;
+  const Shape& shape_;
+  bool unknown_blocks_;
+};
+
+}  // namespace detail
+
+/// Whether the shape has a point in common with an occupied voxel, or with unknown space if that
+/// counts as occupied. The cubes of voxels include their faces, so that touching is overlapping.
+/// Nodes without anything occupied are passed over as a whole. @pre finite coordinates
+template <octree_map Map, overlap_shape Shape>
+[[nodiscard]] bool overlaps(const Map& map, const Shape& shape, const overlap_options& options = {}) {
+  assert(bounds_of(shape).min.allFinite() && bounds_of(shape).max.allFinite());
+  using search = detail::overlap_search<typename Map::model, Shape>;
+  return search{map.store(), map.grid(), shape, options.unknown == occupancy::occupied}.run();
+}
+
+/// Calls `visit(key, level, value)` for every occupied leaf of the pruned octree that the shape has a
+/// point in common with, in Morton order. O(voxels in the chunks around the shape).
+template <octree_map Map, overlap_shape Shape,
+          std::invocable<const voxel_key&, int, typename Map::model::value_type> Visit>
+void for_each_overlapping_leaf(const Map& map, const Shape& shape, Visit&& visit) {
+  const voxel_grid& grid = map.grid();
+  const bounding_box bounds = bounds_of(shape);
+  const auto keys = keys_between(grid, bounds.min.array() - grid.resolution(), bounds.max.array() + grid.resolution());
+  if (!keys) return;
+  visit_leaves_in(map.store(), grid.depth(), *keys, [&](const voxel_key& k, int level, auto v) {
+    if (is_occupied<typename Map::model>(v) && touches(shape, cube_of(grid, k, level))) visit(k, level, v);
+  });
+}
+
+}  // namespace orbis::octree
