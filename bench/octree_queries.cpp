@@ -108,7 +108,7 @@ void bench_query(benchmark::State& state, double resolution, Ask&& ask) {
     benchmark::DoNotOptimize(got);
   }
   if (!(got == expected) || got.count == 0) state.SkipWithError("not our answer");
-  state.SetItemsProcessed(static_cast<std::int64_t>(state.iterations() * got.count));
+  state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(got.count));
 }
 
 template <class Map>
