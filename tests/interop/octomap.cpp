@@ -7,6 +7,7 @@
 #include <orbis/core/random.hpp>
 #include <orbis/core/types.hpp>
 #include <orbis/interop/octomap.hpp>
+#include <orbis/octree/files.hpp>
 
 #include "support/catch.hpp"
 
@@ -105,4 +106,122 @@ TEST_CASE("Empty maps convert and values that are no numbers are refused") {
   const auto refused = interop::from_octomap(tree);
   REQUIRE_FALSE(refused);
   CHECK(refused.error().code == errc::malformed);
+}
+
+namespace {
+
+[[nodiscard]] octree::voxel_layer<octree::rgb_mean> some_colors(const octree::occupancy_octree<>& map) {
+  octree::voxel_layer<octree::rgb_mean> colors;
+  map.for_each_leaf([&](const auto& leaf) {
+    if (!leaf.occupied) return;
+    const std::uint32_t cells = octree::node_cells(map.tree_depth() - leaf.depth);
+    for (std::uint32_t i = 0; i != cells * cells * cells; ++i) {
+      const octree::voxel_key key{leaf.key.x + i % cells, leaf.key.y + i / cells % cells, leaf.key.z + i / cells / cells};
+      // Two colours in patches of 4x4x4, so that some leaves have one colour and others several.
+      const bool red = ((key.x >> 2U ^ key.y >> 2U ^ key.z >> 2U) & 1U) != 0;
+      colors.make(key).update(red ? rgb8{200, 10, 10} : rgb8{static_cast<std::uint8_t>(key.x & 127U), 100, 30});
+    }
+  });
+  return colors;
+}
+
+}  // namespace
+
+TEST_CASE("A map with colours becomes a ColorOcTree in which every voxel has its own") {
+  const auto map = some_map();
+  const auto colors = some_colors(map);
+  REQUIRE(colors.size() > 500);
+  const auto tree = interop::to_octomap(map, colors);
+  REQUIRE(tree);
+  CHECK(tree->size() == tree->calcNumNodes());
+  CHECK(tree->size() >= map.size());
+  std::size_t colored = 0;
+  for (auto it = tree->begin_leafs(), end = tree->end_leafs(); it != end; ++it) {
+    const octree::voxel_key key{it.getKey()[0], it.getKey()[1], it.getKey()[2]};
+    REQUIRE(map.log_odds(key) == it->getLogOdds());
+    const auto* const color = colors.find(key);
+    REQUIRE(it->isColorSet() == (color != nullptr));
+    if (color == nullptr) continue;
+    const auto c = it->getColor();
+    REQUIRE(color->color() == rgb8{c.r, c.g, c.b});
+    const auto cells = std::size_t{1} << (tree->getTreeDepth() - it.getDepth());
+    colored += cells * cells * cells;
+  }
+  CHECK(colored == colors.size());
+  // Without the colours it is the tree without colours.
+  tree->prune();
+  CHECK(tree->size() == map.size());
+  const auto back = interop::from_octomap(*tree);
+  REQUIRE(back);
+  CHECK(octree::ot_bytes(back->map) == octree::ot_bytes(map));
+}
+
+TEST_CASE("Inner nodes of a ColorOcTree average their children's colours") {
+  const auto map = some_map();
+  const auto tree = interop::to_octomap(map, some_colors(map));
+  for (auto it = tree->begin_tree(), end = tree->end_tree(); it != end; ++it) {
+    if (it.isLeaf()) continue;
+    REQUIRE(it->getColor() == it->getAverageChildColor());
+    REQUIRE(it->getLogOdds() == it->getMaxChildLogOdds());
+  }
+}
+
+TEST_CASE("A ColorOcTree comes back as the map and the colours it was made of") {
+  const auto map = some_map();
+  const auto colors = some_colors(map);
+  const auto back = interop::from_octomap(*interop::to_octomap(map, colors));
+  REQUIRE(back);
+  CHECK(octree::ot_bytes(back->map) == octree::ot_bytes(map));
+  CHECK(back->colors.size() == colors.size());
+  colors.for_each([&](const octree::voxel_key& key, const octree::rgb_mean& color) {
+    REQUIRE(back->colors.find(key) != nullptr);
+    REQUIRE(back->colors.find(key)->color() == color.color());
+  });
+}
+
+TEST_CASE("A ColorOcTree that OctoMap made is read as it is") {
+  octomap::ColorOcTree tree{0.1};
+  random_bits random{64};
+  for (int i = 0; i != 3000; ++i) {
+    const float x = static_cast<float>(random.uniform(-1, 1)), y = static_cast<float>(random.uniform(-1, 1)), z = 0.3F;
+    tree.updateNode(x, y, z, random.below(3) != 0);
+    tree.integrateNodeColor(x, y, z, static_cast<std::uint8_t>(random.below(256)), 7, 9);
+  }
+  const auto read = interop::from_octomap(tree);
+  REQUIRE(read);
+  std::size_t voxels = 0;
+  for (auto it = tree.begin_leafs(), end = tree.end_leafs(); it != end; ++it) {
+    const octree::voxel_key key{it.getKey()[0], it.getKey()[1], it.getKey()[2]};
+    REQUIRE(read->map.log_odds(key) == it->getLogOdds());
+    REQUIRE(read->colors.find(key) != nullptr);
+    REQUIRE(read->colors.find(key)->color() == rgb8{it->getColor().r, it->getColor().g, it->getColor().b});
+    voxels += std::size_t{1} << (3 * (tree.getTreeDepth() - it.getDepth()));
+  }
+  CHECK(read->colors.size() == voxels);
+}
+
+TEST_CASE("Colours without a map, maps without colours and coloured leaves of half the world") {
+  const octree::voxel_layer<octree::rgb_mean> none;
+  CHECK(interop::to_octomap(octree::occupancy_octree<>{0.1}, none)->size() == 0);
+  const auto map = some_map();
+  const auto plain = interop::to_octomap(map, none);
+  CHECK(plain->size() == map.size());
+  CHECK(interop::from_octomap(*plain)->colors.empty());
+  CHECK(octree::ot_bytes(interop::from_octomap(*plain)->map) == octree::ot_bytes(map));
+
+  octree::voxel_layer<octree::rgb_mean> elsewhere;
+  elsewhere.make({1, 2, 3}).update({1, 2, 3});
+  CHECK(interop::to_octomap(map, elsewhere)->size() == map.size());
+
+  // One colour in an eighth of the world splits it down to the voxel, and nothing else.
+  octree::occupancy_octree<> large{0.1};
+  large.set_unknown_node({}, 1, 1.0F);
+  const auto split = interop::to_octomap(large, elsewhere);
+  CHECK(split->size() == 1 + 1 + 8 * 15);
+  CHECK(split->search(octomap::OcTreeKey{1, 2, 3})->getColor() == octomap::ColorOcTreeNode::Color{1, 2, 3});
+  auto one = interop::to_octomap(large, none);
+  one->getNodeChild(one->getRoot(), 0)->setColor(1, 2, 3);
+  const auto refused = interop::from_octomap(*one);
+  REQUIRE_FALSE(refused);
+  CHECK(refused.error().code == errc::unsupported);
 }
