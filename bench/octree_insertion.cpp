@@ -54,22 +54,21 @@ void add_rows(const std::string& group, const insertion& what) {
     double resolution;
     std::size_t timed, octomap_every_ray, octomap_discretized;
   };
-  for (const auto& [resolution, timed, every_ray, discretized] :
-       {cost{0.10, 24, 8, 16}, cost{0.05, 24, 6, 12}, cost{0.02, 16, 3, 4}, cost{0.01, 8, 1, 2}}) {
+  for (const cost& c : {cost{0.10, 24, 8, 16}, cost{0.05, 24, 6, 12}, cost{0.02, 16, 3, 4}, cost{0.01, 8, 1, 2}}) {
     const auto rows = [&](const std::string& group, auto scans) {
       add_rows(group + "/every_ray", {.scans = scans,
-                                      .resolution = resolution,
+                                      .resolution = c.resolution,
                                       .options = {.max_range = 5.0, .mode = ray_mode::every_ray},
-                                      .timed = timed,
-                                      .timed_octomap = every_ray});
+                                      .timed = c.timed,
+                                      .timed_octomap = c.octomap_every_ray});
       add_rows(group + "/discretized", {.scans = scans,
-                                        .resolution = resolution,
+                                        .resolution = c.resolution,
                                         .options = {.max_range = 5.0, .mode = ray_mode::discretized},
-                                        .timed = timed,
-                                        .timed_octomap = discretized});
+                                        .timed = c.timed,
+                                        .timed_octomap = c.octomap_discretized});
     };
-    rows("octree_insert/" + in_centimetres(resolution), room);
-    if (resolution < 0.1 && have_kitchen()) rows("octree_insert/kitchen/" + in_centimetres(resolution), kitchen);
+    rows("octree_insert/" + in_centimetres(c.resolution), room);
+    if (c.resolution < 0.1 && have_kitchen()) rows("octree_insert/kitchen/" + in_centimetres(c.resolution), kitchen);
   }
   return true;
 }();
