@@ -3,6 +3,7 @@
 /// Everything in orbis::octree: the log-odds occupancy octree.
 #pragma once
 
+#include <orbis/octree/accessor.hpp>
 #include <orbis/octree/brick.hpp>
 #include <orbis/octree/cast_ray.hpp>
 #include <orbis/octree/change_log.hpp>
@@ -14,16 +15,21 @@
 #include <orbis/octree/hash_index.hpp>
 #include <orbis/octree/integration.hpp>
 #include <orbis/octree/key.hpp>
+#include <orbis/octree/key_box.hpp>
 #include <orbis/octree/leaves.hpp>
 #include <orbis/octree/morton.hpp>
+#include <orbis/octree/nodes.hpp>
 #include <orbis/octree/occupancy_octree.hpp>
+#include <orbis/octree/overlap.hpp>
 #include <orbis/octree/point_keys.hpp>
 #include <orbis/octree/pruned_tree.hpp>
 #include <orbis/octree/ray_grid.hpp>
 #include <orbis/octree/ray_sweep.hpp>
 #include <orbis/octree/ray_walk.hpp>
+#include <orbis/octree/render.hpp>
 #include <orbis/octree/scan.hpp>
 #include <orbis/octree/sensor_model.hpp>
+#include <orbis/octree/surface.hpp>
 #include <orbis/octree/sweep_planes.hpp>
 #include <orbis/octree/swept_ray.hpp>
 #include <orbis/octree/voxel_layer.hpp>
