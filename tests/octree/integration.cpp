@@ -102,8 +102,8 @@ struct reference {
       const std::array<std::uint32_t, 3> k{std::get<0>(v), std::get<1>(v), std::get<2>(v)};
       for (std::size_t i = 0; i != 3; ++i) {
         const double cell = static_cast<double>(k[i]) - 0.5 * grid.cells();
-        if (cell < std::floor(options.bounds->low[i] / grid.resolution()) ||
-            cell > std::floor(options.bounds->high[i] / grid.resolution()))
+        if (cell < std::floor(options.bounds->min[i] / grid.resolution()) ||
+            cell > std::floor(options.bounds->max[i] / grid.resolution()))
           return true;
       }
       return false;
@@ -218,11 +218,11 @@ TEST_CASE("Bounds leave what is outside alone and change nothing inside") {
   random_bits random{194};
   const auto points = random_scan(random, 500, 1.0);
   constexpr double inf = std::numeric_limits<double>::infinity();
-  for (const integration_bounds& bounds :
-       {integration_bounds{{-0.35, -0.2, -0.51}, {0.4, 0.62, 0.1}},
-        integration_bounds{{0.5, 0.5, 0.5}, {0.9, 0.9, 0.9}}, integration_bounds{{-inf, -inf, -inf}, {inf, 0.05, inf}},
-        integration_bounds{{0.01, 0.01, 0.01}, {0.02, 0.02, 0.02}},
-        integration_bounds{{1e9, -1.0, -1.0}, {inf, 1.0, 1.0}}})
+  for (const bounding_box& bounds :
+       {bounding_box{{-0.35, -0.2, -0.51}, {0.4, 0.62, 0.1}},
+        bounding_box{{0.5, 0.5, 0.5}, {0.9, 0.9, 0.9}}, bounding_box{{-inf, -inf, -inf}, {inf, 0.05, inf}},
+        bounding_box{{0.01, 0.01, 0.01}, {0.02, 0.02, 0.02}},
+        bounding_box{{1e9, -1.0, -1.0}, {inf, 1.0, 1.0}}})
     check(voxel_grid{0.1}, points, {0.1F, -0.1F, 0.7F}, {.max_range = 1.3, .bounds = bounds});
 }
 
@@ -350,7 +350,7 @@ TEST_CASE("The second of two equal scans allocates nothing") {
       scan_marker marker;
       integration_options options{.max_range = 2.5, .mode = mode};
       if (with_options) {
-        options.bounds = integration_bounds{{-1.0, -1.0, -1.0}, {1.0, 1.0, 1.0}};
+        options.bounds = bounding_box{{-1.0, -1.0, -1.0}, {1.0, 1.0, 1.0}};
         options.beam_ranges = ranges;
       }
       const auto scan = [&] {

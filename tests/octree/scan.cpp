@@ -52,10 +52,10 @@ TEST_CASE("Clipped masks hold what lies inside and can be marked again") {
   for (int run = 0; run != 20; ++run) {
     scan_masks masks;
     voxels expected;
-    std::array<std::int64_t, 3> low, high;
+    std::array<std::uint32_t, 3> low, high;
     for (std::size_t axis = 0; axis != 3; ++axis) {
-      low[axis] = 995 + static_cast<std::int64_t>(random.below(30));
-      high[axis] = low[axis] + static_cast<std::int64_t>(random.below(30));
+      low[axis] = 995 + random.below(30);
+      high[axis] = low[axis] + random.below(30);
     }
     for (int i = 0; i != 3000; ++i) {
       const auto at = [&] { return 1000 + static_cast<std::uint32_t>(random.below(40)); };
@@ -64,7 +64,7 @@ TEST_CASE("Clipped masks hold what lies inside and can be marked again") {
       const auto inside = [&](std::uint32_t c, std::size_t axis) { return low[axis] <= c && c <= high[axis]; };
       if (inside(k.x, 0) && inside(k.y, 1) && inside(k.z, 2)) expected.emplace(k.x, k.y, k.z);
     }
-    masks.clip(low, high);
+    masks.clip({{low[0], low[1], low[2]}, {high[0], high[1], high[2]}});
     CHECK(listed(masks, &scan_brick::free) == expected);
     for (const scan_brick& b : masks.bricks()) CHECK(b.free != decltype(b.free){});
     masks.mark_free({1003, 1004, 1005});

@@ -17,6 +17,7 @@
 
 #include <orbis/core/execution.hpp>
 #include <orbis/core/rounded.hpp>
+#include <orbis/octree/key_box.hpp>
 #include <orbis/octree/point_keys.hpp>
 #include <orbis/octree/ray_sweep.hpp>
 #include <orbis/octree/scan.hpp>
@@ -29,13 +30,6 @@ enum class ray_mode {
   discretized  ///< from the sensor to the centre of every voxel that holds points (`discretize = true`)
 };
 
-/// A part of the world that a scan may change: the voxels from the one that contains `low` to the one
-/// that contains `high`, metres; infinity is no bound. @pre low <= high, no NaN
-struct integration_bounds {
-  std::array<double, 3> low;
-  std::array<double, 3> high;
-};
-
 struct integration_options {
   /// Metres from the sensor; of a point further away only the ray up to here counts, as free. A point
   /// at exactly this distance is within range. OctoMap's "no limit", a negative range, is infinity here.
@@ -44,11 +38,12 @@ struct integration_options {
   ray_mode mode = ray_mode::every_ray;
   /// False: points mark their voxels as occupied, no ray is walked and nothing is observed free.
   bool rays = true;
-  /// Voxels outside are left as they are; inside, the result is the same as without bounds. (OctoMap's
+  /// Voxels outside, from the one that contains `min` to the one that contains `max`, are left as they
+  /// are; inside, the result is the same as without bounds; infinity is none. (OctoMap's
   /// `useBBXLimit` differs: it drops a point outside the box with its whole ray, drops the rays of
   /// points beyond max_range, and of a ray that enters, leaves and enters the box again keeps the last
   /// part only.)
-  std::optional<integration_bounds> bounds = std::nullopt;
+  std::optional<bounding_box> bounds = std::nullopt;
   /// One range for each point, metres, used where it is less than max_range, and in both modes before
   /// points are put together in voxels; in mode `discretized` the ray of such a point ends in the
   /// centre of the voxel where it is cut off. Infinity is no limit; a point whose range is negative or
@@ -66,6 +61,15 @@ struct integration_summary {
   std::size_t free = 0;       ///< voxels observed free
   std::size_t occupied = 0;   ///< voxels observed occupied
 };
+
+/// Takes from a scan the voxels that lie outside the bounds, if there are any.
+inline void clip(scan_masks& masks, const voxel_grid& grid, const std::optional<bounding_box>& bounds) {
+  if (!bounds) return;
+  if (const auto box = keys_between(grid, bounds->min, bounds->max))
+    masks.clip(*box);
+  else
+    masks.clear();
+}
 
 /// Marks the voxels of one scan. The result depends neither on the order of the points nor on the
 /// number of threads. Keeps its memory from scan to scan.
@@ -305,21 +309,8 @@ class scan_marker {
       all.summary.truncated += workers_[i].summary.truncated;
       all.summary.rejected += workers_[i].summary.rejected;
     }
-    if (options.bounds) clip(all.masks, grid, *options.bounds);
+    clip(all.masks, grid, options.bounds);
     return all.summary;
-  }
-  static void clip(scan_masks& masks, const voxel_grid& grid, const integration_bounds& bounds) {
-    const double half = 0.5 * grid.cells(), per_metre = 1.0 / grid.resolution();
-    std::array<std::int64_t, 3> low, high;
-    for (std::size_t i = 0; i != 3; ++i) {
-      const auto cell = [&](double c) {  // far outside is one voxel outside
-        return static_cast<std::int64_t>(std::clamp(std::floor(per_metre * c), -half - 1.0, half) + half);
-      };
-      assert(bounds.low[i] <= bounds.high[i]);
-      low[i] = cell(bounds.low[i]);
-      high[i] = cell(bounds.high[i]);
-    }
-    masks.clip(low, high);
   }
   /// Calls `body(worker, begin, end)` for parts of [0, count), each worker on one thread.
   template <class Policy, class Body>

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include <orbis/octree/brick.hpp>
+#include <orbis/octree/key_box.hpp>
 #include <orbis/octree/ray_walk.hpp>
 
 namespace orbis::octree {
@@ -72,12 +73,13 @@ class scan_masks {
     }
   }
   /// Forgets all voxels but those from `low` to `high`, both included.
-  void clip(const std::array<std::int64_t, 3>& low, const std::array<std::int64_t, 3>& high) {
+  void clip(const key_box& box) {
+    const std::array<std::uint32_t, 3> low{box.low.x, box.low.y, box.low.z}, high{box.high.x, box.high.y, box.high.z};
     std::size_t kept = 0;
     for (std::size_t i = 0; i != bricks_.size(); ++i) {
       scan_brick b = bricks_[i];
       const voxel_key k = named_key(b.name);
-      const std::array<std::int64_t, 3> at{k.x, k.y, k.z};
+      const std::array<std::uint32_t, 3> at{k.x, k.y, k.z};
       std::array<std::uint64_t, 8> inside;
       inside.fill(~std::uint64_t{0});
       for (std::size_t axis = 0; axis != 3; ++axis) {
