@@ -5,9 +5,11 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include <orbis/core/simd.hpp>
@@ -232,6 +234,64 @@ inline bool cross_box_avx2(const depth_scene& s, const voxel_test& t, const pixe
                         _mm256_and_ps(_mm256_and_ps(well_under(off0, w0), well_under(off1, w1)), well_under(off2, w2)));
       if (_mm256_movemask_ps(sure) != 0) return true;
       for (; bits != 0; bits &= bits - 1) unsure.push_back({u + std::countr_zero(bits), v});
+    }
+  }
+  return false;
+}
+
+/// The same, sixteen pixels at a time.
+ORBIS_TARGET("avx512f,avx512dq,avx512vl")
+inline bool cross_box_avx512(const depth_scene& s, const voxel_test& t, const pixel_box& box, float near_z,
+                             std::vector<std::array<std::int32_t, 2>>& unsure) {
+  const auto set = [&](float v) ORBIS_TARGET("avx512f") { return _mm512_set1_ps(v); };
+  const auto max = [&](const __m512& a, const __m512& b) ORBIS_TARGET("avx512f") {
+    return _mm512_maskz_max_ps(0xffff, a, b);
+  };  // g++ 12 warns of the other
+  const __m512 least_z = set(std::max(near_z, std::numeric_limits<float>::min()));
+  const __m512 half = set(t.half), inner = set(t.inner_half), outer = set(t.outer_half), slack = set(t.slack);
+  const __m512 c0 = set(t.centre[0]), c1 = set(t.centre[1]), c2 = set(t.centre[2]);
+  const __m512 x0 = set(t.x_axis[0]), x1 = set(t.x_axis[1]), x2 = set(t.x_axis[2]);
+  const bool separable = s.rays->rays().separable();
+  for (std::int32_t v = box.v0; v <= box.v1; ++v) {
+    const float* const row_z = s.rays->z(v);
+    const float* const row_x = s.rays->rays().x(v);
+    const float* const row_y = s.rays->rays().y(v);
+    for (std::int32_t u = box.u0; u <= box.u1; u += 16) {
+      const __m512 z = _mm512_loadu_ps(row_z + u);
+      const __mmask16 reaches = _mm512_cmp_ps_mask(z, least_z, _CMP_GE_OQ);
+      if (reaches == 0) continue;
+      const __m512 x = _mm512_loadu_ps(row_x + u), y = separable ? set(*row_y) : _mm512_loadu_ps(row_y + u);
+      const auto along = [&](const __m512& x_axis, std::size_t i) ORBIS_TARGET("avx512f") {
+        return _mm512_fmadd_ps(x_axis, x, _mm512_fmadd_ps(_mm512_set1_ps(t.y_axis[i]), y, _mm512_set1_ps(t.z_axis[i])));
+      };
+      const __m512 g0 = along(x0, 0), g1 = along(x1, 1), g2 = along(x2, 2);
+      const __m512 a0 = _mm512_abs_ps(g0), a1 = _mm512_abs_ps(g1), a2 = _mm512_abs_ps(g2);
+      const __m512 w0 = _mm512_add_ps(a1, a2), w1 = _mm512_add_ps(a2, a0), w2 = _mm512_add_ps(a0, a1);
+      const __m512 length = _mm512_add_ps(a0, w0), loose = _mm512_mul_ps(slack, length);
+      const __m512 off0 = _mm512_abs_ps(_mm512_fmsub_ps(c1, g2, _mm512_mul_ps(c2, g1)));
+      const __m512 off1 = _mm512_abs_ps(_mm512_fmsub_ps(c2, g0, _mm512_mul_ps(c0, g2)));
+      const __m512 off2 = _mm512_abs_ps(_mm512_fmsub_ps(c0, g1, _mm512_mul_ps(c1, g0)));
+      const auto under = [&](__mmask16 of, const __m512& off, const __m512& w) ORBIS_TARGET("avx512f") {
+        return _mm512_mask_cmp_ps_mask(of, off, _mm512_fmadd_ps(w, outer, loose), _CMP_LE_OQ);
+      };
+      __mmask16 may = under(under(under(reaches, off0, w0), off1, w1), off2, w2);
+      if (may == 0) continue;
+      const __m512 d0 = _mm512_fmsub_ps(z, g0, c0), d1 = _mm512_fmsub_ps(z, g1, c1), d2 = _mm512_fmsub_ps(z, g2, c2);
+      const __m512 close = _mm512_fmadd_ps(set(t.margin_1), _mm512_mul_ps(z, length), set(t.margin));
+      const auto reached = [&](__mmask16 of, const __m512& d, float before) ORBIS_TARGET("avx512f") {
+        return _mm512_mask_cmp_ps_mask(of, _mm512_add_ps(_mm512_add_ps(d, close), _mm512_set1_ps(before)),
+                                       _mm512_setzero_ps(), _CMP_GE_OQ);
+      };
+      may = reached(reached(reached(may, d0, t.before[0]), d1, t.before[1]), d2, t.before[2]);
+      const __m512 beyond = max(max(_mm512_abs_ps(d0), _mm512_abs_ps(d1)), _mm512_abs_ps(d2));
+      may = _mm512_mask_cmp_ps_mask(may, beyond, _mm512_sub_ps(half, close), _CMP_GE_OQ);
+      if (may == 0) continue;
+      const auto well_under = [&](__mmask16 of, const __m512& off, const __m512& w) ORBIS_TARGET("avx512f") {
+        return _mm512_mask_cmp_ps_mask(of, off, _mm512_fmsub_ps(w, inner, loose), _CMP_LT_OQ);
+      };
+      const __mmask16 left = _mm512_mask_cmp_ps_mask(may, beyond, _mm512_add_ps(half, close), _CMP_GT_OQ);
+      if (well_under(well_under(well_under(left, off0, w0), off1, w1), off2, w2) != 0) return true;
+      for (unsigned bits = may; bits != 0; bits &= bits - 1) unsure.push_back({u + std::countr_zero(bits), v});
     }
   }
   return false;

@@ -63,7 +63,8 @@ class depth_marker {
                                           {
                                             .portable = detail::cross_box_portable,
 #if ORBIS_X86
-                                            .popcnt = nullptr, .avx2 = detail::cross_box_avx2
+                                            .popcnt = nullptr, .avx2 = detail::cross_box_avx2,
+                                            .avx512 = detail::cross_box_avx512
 #endif
                                           })},
         rays_{level},

@@ -64,7 +64,7 @@ class pixel_rays {
   template <camera::camera_model Camera>
   void fit(const Camera& camera) {
     if constexpr (std::same_as<Camera, camera::any_camera>) {
-      camera.visit([this](const auto& model) { fit(model); });
+      camera.visit([&](const auto& model) { fit(model); });
     } else {
       if constexpr (std::regular<Camera>) {
         const auto* last = std::any_cast<Camera>(&camera_);

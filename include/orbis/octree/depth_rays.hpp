@@ -158,6 +158,19 @@ inline __m256 rounded_mul(__m256 a, __m256 b) noexcept {
   return product;
 }
 
+/// The voxels along one axis as far as float arithmetic can tell; where it cannot, `unsure` is set.
+/// The product errs by two roundings, so that a voxel is certain four of them away from its faces.
+ORBIS_TARGET("avx2")
+inline __m256i likely_keys_avx2(__m256 p, float per_metre, float half, __m256& unsure) noexcept {
+  const __m256 sign = _mm256_set1_ps(-0.0F);
+  const __m256 cells = _mm256_mul_ps(p, _mm256_set1_ps(per_metre)), floor = _mm256_floor_ps(cells);
+  const __m256 above = _mm256_sub_ps(cells, floor), size = _mm256_andnot_ps(sign, cells);
+  const __m256 room = _mm256_min_ps(above, _mm256_sub_ps(_mm256_set1_ps(1.0F), above));
+  const __m256 sure = _mm256_and_ps(_mm256_cmp_ps(room, _mm256_mul_ps(size, _mm256_set1_ps(0x1p-22F)), _CMP_GT_OQ),
+                                    _mm256_cmp_ps(size, _mm256_set1_ps(half - 2.0F), _CMP_LT_OQ));
+  unsure = _mm256_or_ps(unsure, _mm256_xor_ps(sure, _mm256_castsi256_ps(_mm256_set1_epi32(-1))));
+  return _mm256_add_epi32(_mm256_cvttps_epi32(floor), _mm256_set1_epi32(static_cast<int>(half)));
+}
 /// The voxels along one axis, and whether they are in the grid; see voxel_grid::key.
 ORBIS_TARGET("avx2")
 inline __m256i keys_avx2(__m256 p, double per_metre, double half, __m256& inside) noexcept {
@@ -177,6 +190,7 @@ inline __m256i keys_avx2(__m256 p, double per_metre, double half, __m256& inside
 ORBIS_TARGET("avx2,popcnt")
 inline void find_ends_avx2(const depth_sensor& s, const end_row& row, end_counts& counts) noexcept {
   const double per_metre = 1.0 / s.grid.resolution(), half = 0.5 * s.grid.cells();
+  const auto per_metre_f = static_cast<float>(per_metre), half_f = static_cast<float>(half);
   const __m256 zero = _mm256_setzero_ps(), max_square = _mm256_set1_ps(s.max_square);
   const __m256 range = _mm256_set1_ps(static_cast<float>(s.max_range));
   const __m256 infinite = _mm256_set1_ps(std::numeric_limits<float>::infinity());
@@ -215,8 +229,15 @@ inline void find_ends_avx2(const depth_sensor& s, const end_row& row, end_counts
       end_z = _mm256_blendv_ps(_mm256_mul_ps(z, _mm256_div_ps(range, scale)), z, within);
       good = _mm256_and_ps(good, _mm256_or_ps(within, _mm256_cmp_ps(scale, infinite, _CMP_LT_OQ)));
     }
-    const __m256i kx = keys_avx2(px, per_metre, half, good), ky = keys_avx2(py, per_metre, half, good);
-    const __m256i kz = keys_avx2(pz, per_metre, half, good);
+    __m256 unsure = zero;
+    __m256i kx = likely_keys_avx2(px, per_metre_f, half_f, unsure),
+            ky = likely_keys_avx2(py, per_metre_f, half_f, unsure);
+    __m256i kz = likely_keys_avx2(pz, per_metre_f, half_f, unsure);
+    if (_mm256_movemask_ps(_mm256_and_ps(unsure, good)) != 0) {
+      kx = keys_avx2(px, per_metre, half, good);
+      ky = keys_avx2(py, per_metre, half, good);
+      kz = keys_avx2(pz, per_metre, half, good);
+    }
     const __m256 used = _mm256_and_ps(good, within);
     const auto count = [&](__m256 m) ORBIS_TARGET("avx2,popcnt") {
       return static_cast<std::size_t>(_mm_popcnt_u32(static_cast<unsigned>(_mm256_movemask_ps(m))));
