@@ -107,15 +107,27 @@ class overlap_search {
     store_.for_each_large([&](std::uint64_t name, T v) {
       found = found || (is_occupied<Model>(v) && meets(named_key(name), named_level(name)));
     });
-    return found || upper(*keys, {}, grid_.depth());
+    if (found || unknown_blocks_ || chunks_in(*keys) < static_cast<double>(store_.chunk_count()))
+      return found || upper(*keys, {}, grid_.depth());
+    store_.for_each_chunk([&](const auto& c) {
+      const voxel_key k = named_key(c.name);
+      found = found || (keys->overlaps(k, chunk_level) && meets(k, chunk_level) && chunk(k));
+    });
+    return found;
   }
 
  private:
   [[nodiscard]] bool meets(const voxel_key& k, int level) const { return touches(shape_, cube_of(grid_, k, level)); }
 
+  [[nodiscard]] static double chunks_in(const key_box& keys) noexcept {
+    const auto along = [](std::uint32_t a, std::uint32_t b) { return (b >> chunk_level) - (a >> chunk_level) + 1.0; };
+    return along(keys.low.x, keys.high.x) * along(keys.low.y, keys.high.y) * along(keys.low.z, keys.high.z);
+  }
   [[nodiscard]] bool upper(const key_box& keys, const voxel_key& k, int level) const {
     if (!keys.overlaps(k, level) || !meets(k, level)) return false;
     if (level == chunk_level) return chunk(k);
+    // Large leaves that are occupied have been looked at.
+    if (const auto large = store_.find_large(k); large && large->second >= level) return false;
     for (unsigned i = 0; i != 8; ++i)
       if (upper(keys, child_key(k, i, node_cells(level - 1)), level - 1)) return true;
     return false;
