@@ -41,14 +41,10 @@ class store_reader {
     const std::uint32_t place = place_in_octant(k);
     return (o.known >> place & 1U) != 0 ? std::optional{o.at(place)} : std::nullopt;
   }
-  /// The edge, in voxels, of the node that the octant asked for last stands for: more than an octant
-  /// where nothing is stored.
-  [[nodiscard]] std::uint32_t cells() const noexcept { return cells_; }
+  /// The octant asked for last.
+  [[nodiscard]] const octant_view<T>& last() const noexcept { return octant_; }
   /// Whether all that is known in the octant asked for last is less than `bound`.
   [[nodiscard]] bool is_below(T bound) const noexcept { return max_ < bound; }
-  /// The chunk and the brick that hold the octant asked for last; null where there are none.
-  [[nodiscard]] const chunk* last_chunk() const noexcept { return chunk_; }
-  [[nodiscard]] const brick<T>* last_brick() const noexcept { return brick_; }
   [[nodiscard]] const brick_store<T>& store() const noexcept { return *store_; }
 
  private:

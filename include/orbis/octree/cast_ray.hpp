@@ -42,6 +42,105 @@ struct ray_options {
   bool ignore_unknown = false;                                 ///< whether rays go on through unknown space
 };
 
+namespace detail {
+
+/// The walk of `ray_cursor`, able to leave a whole node at once: the parameters of the next steps along
+/// each axis are summed up in advance, in the same order, so that how many of them come before the
+/// node's face can be looked up instead of walked.
+class ray_leaper {
+ public:
+  explicit ray_leaper(const ray_cursor& c) noexcept : at_{c.at}, step_{c.step}, delta_{c.delta}, cells_{c.cells} {
+    for (std::size_t i = 0; i != 3; ++i) per_step_[i] = step_[i] == 0 ? 0.0 : 1.0 / delta_[i];
+    sum_up(c.next[0], c.next[1], c.next[2]);
+  }
+
+  [[nodiscard]] voxel_key key() const noexcept { return {at_[0], at_[1], at_[2]}; }
+  [[nodiscard]] bool is_outside() const noexcept { return (at_[0] | at_[1] | at_[2]) >= cells_; }
+  /// Takes back the last step, along `axis`.
+  void step_back(std::size_t axis) noexcept { at_[axis] -= static_cast<std::uint32_t>(step_[axis]); }
+
+  struct crossing {
+    std::size_t axis;
+    double parameter;  ///< of the ray at the face
+  };
+  /// One step.
+  crossing step() noexcept {
+    const crossing face = first(ahead_[0][used_[0]], ahead_[1][used_[1]], ahead_[2][used_[2]]);
+    at_[face.axis] += static_cast<std::uint32_t>(step_[face.axis]);
+    if (++used_[face.axis] == count - 1) renew();
+    return face;
+  }
+  /// Where the ray leaves the node of edge `cells` that it is in.
+  struct way_out {
+    crossing face;
+    std::array<std::uint32_t, 3> steps;  ///< until outside along each axis, were it alone
+  };
+  /// @pre cells is a power of two, at most 32
+  [[nodiscard]] way_out find_way_out(std::uint32_t cells) noexcept {
+    way_out way{};
+    bool is_short = false;
+    for (std::size_t i = 0; i != 3; ++i) {
+      const std::uint32_t inside = at_[i] & (cells - 1);
+      way.steps[i] = step_[i] > 0 ? cells - inside : inside + 1;
+      is_short |= used_[i] + way.steps[i] >= count;
+    }
+    if (is_short) renew();
+    const auto last = [&](std::size_t i) { return ahead_[i][used_[i] + way.steps[i] - 1]; };
+    way.face = first(last(0), last(1), last(2));
+    return way;
+  }
+  /// Takes all steps up to there.
+  void take(const way_out& way) noexcept {
+    const double end = way.face.parameter;
+    for (std::size_t i = 0; i != 3; ++i) {
+      // Steps are `delta` apart but for rounding: only the one next to the face must be looked at.
+      const double* const next = ahead_[i].data() + used_[i];
+      const double most = way.steps[i] - 1;
+      double near = (end - next[0]) * per_step_[i] + 0.5;
+      near = near > 0.0 ? near : 0.0;
+      near = near < most ? near : most;
+      const auto sure = static_cast<std::uint32_t>(static_cast<std::int32_t>(near));
+      const bool is_before = next[sure] < end || (next[sure] == end && i >= way.face.axis);
+      const std::uint32_t taken = sure + (is_before ? 1 : 0);
+      at_[i] += static_cast<std::uint32_t>(step_[i]) * taken;
+      used_[i] += taken;
+    }
+  }
+
+ private:
+  static constexpr std::uint32_t count = 64;
+
+  /// The face that comes first; of those at the same place the last axis', as in ray_cursor.
+  [[nodiscard]] static crossing first(double x, double y, double z) noexcept {
+    const bool is_x = x < y && x < z, is_z = !(y < z) || (x < y && !is_x);
+    const double parameter = x < y ? x : y;
+    return {is_x ? std::size_t{0} : is_z ? std::size_t{2} : std::size_t{1}, parameter < z ? parameter : z};
+  }
+  void renew() noexcept { sum_up(ahead_[0][used_[0]], ahead_[1][used_[1]], ahead_[2][used_[2]]); }
+  void sum_up(double x, double y, double z) noexcept {
+    const double dx = delta_[0], dy = delta_[1], dz = delta_[2];
+    for (std::size_t i = 0; i != count; ++i) {
+      ahead_[0][i] = x;
+      ahead_[1][i] = y;
+      ahead_[2][i] = z;
+      x += dx;
+      y += dy;
+      z += dz;
+    }
+    used_ = {};
+  }
+
+  std::array<std::uint32_t, 3> at_;
+  std::array<std::int32_t, 3> step_;
+  std::array<double, 3> delta_;
+  std::array<double, 3> per_step_{};
+  std::array<std::uint32_t, 3> used_{};
+  std::uint32_t cells_;
+  std::array<std::array<double, count>, 3> ahead_;
+};
+
+}  // namespace detail
+
 /// Casts rays, one after the other: faster if each passes near the one before. One for each thread;
 /// store and grid must outlive it and stay as they are.
 template <sensor_model Model>
@@ -63,40 +162,55 @@ class ray_caster {
     if (const auto stop = stop_at(*start)) return ended(*stop, *start);
 
     const double half = grid_.resolution() * 0.5;
-    ray_cursor cursor{grid_, *start, origin, direction, [&](std::int32_t step) { return step * half; }};
+    const ray_cursor cursor{grid_, *start, origin, direction, [&](std::int32_t step) { return step * half; }};
     const bool moves = cursor.step[0] != 0 || cursor.step[1] != 0 || cursor.step[2] != 0;
     if (!moves || !std::isfinite(norm)) return ended(ray_end::no_direction, *start);
 
+    detail::ray_leaper ray{cursor};
     const double safe = surely_in_range(origin);
     for (;;) {
-      // Where nothing can stop it, the ray walks to the node's face without a look.
-      const std::uint32_t cells = passable_cells(cursor.key());
+      // Where nothing can stop it, the ray leaps to the node's face.
+      std::uint32_t cells = passable_cells(ray.key());
+      if (cells == 0) {
+        if (const auto stop = stop_at(ray.key())) return ended(*stop, ray.key());
+        cells = is_passable_octant() ? node_cells(octant_level) : 0;
+      }
       if (cells != 0) {
-        ray_cursor ahead = cursor;
-        const auto [axis, parameter] = leave(ahead, cells);
-        if (parameter < safe) {
-          if (ahead.at[axis] >= cursor.cells) {
-            ahead.at[axis] -= static_cast<std::uint32_t>(ahead.step[axis]);
-            return ended(ray_end::out_of_grid, ahead.key());
-          }
-          cursor = ahead;
-          if (const auto stop = stop_at(cursor.key())) return ended(*stop, cursor.key());
-          continue;
+        const auto way = ray.find_way_out(cells);
+        if (way.face.parameter < safe) {
+          ray.take(way);
+          if (!ray.is_outside()) continue;
+          ray.step_back(way.face.axis);
+          return ended(ray_end::out_of_grid, ray.key());
         }
       }
-      const voxel_key octant = node_key(cursor.key(), octant_level);
+      const voxel_key octant = node_key(ray.key(), octant_level);
       do {
-        const std::size_t axis = cursor.axis();
-        if (!cursor.can_step(axis)) return ended(ray_end::out_of_grid, cursor.key());
-        const bool may_be_far = !(cursor.next[axis] < safe);
-        cursor.advance(axis);
-        if (may_be_far && is_out_of_range(origin, cursor.key())) return ended(ray_end::out_of_range, cursor.key());
-        if (const auto stop = stop_at(cursor.key())) return ended(*stop, cursor.key());
-      } while (node_key(cursor.key(), octant_level) == octant);
+        const auto face = ray.step();
+        if (ray.is_outside()) {
+          ray.step_back(face.axis);
+          return ended(ray_end::out_of_grid, ray.key());
+        }
+        if (!(face.parameter < safe) && is_out_of_range(origin, ray.key()))
+          return ended(ray_end::out_of_range, ray.key());
+        if (const auto stop = stop_at(ray.key())) return ended(*stop, ray.key());
+      } while (node_key(ray.key(), octant_level) == octant);
     }
   }
 
  private:
+  using chunk = typename brick_store<value_type>::chunk;
+  /// What is remembered of a chunk, stored or not. Which bricks let rays through is worked out once
+  /// enough rays have come by.
+  struct seen_chunk {
+    std::uint64_t name = ~std::uint64_t{0};
+    std::uint64_t passable = 0;  ///< bricks in Morton order
+    const chunk* content = nullptr;
+    std::uint32_t visits = 0;
+  };
+  static constexpr std::size_t chunks_kept = 64;
+  static constexpr std::uint32_t enough_visits = 4;
+
   [[nodiscard]] ray_hit ended(ray_end end, const voxel_key& key) const noexcept {
     return {end, key, grid_.center(key)};
   }
@@ -107,57 +221,50 @@ class ray_caster {
     const bool occupied = !reader_.is_below(Model::occupancy_threshold) && is_occupied<Model>(o.at(place));
     return occupied ? std::optional{ray_end::hit} : std::nullopt;
   }
-  /// The edge, in voxels, of a node around `k` in which no voxel stops the ray; 0 if there is none.
+  /// Whether no voxel of the octant asked for last stops a ray.
+  [[nodiscard]] bool is_passable_octant() const noexcept {
+    const std::uint64_t known = reader_.last().known;
+    const bool is_free = known == 0 || reader_.is_below(Model::occupancy_threshold);
+    return is_free && (options_.ignore_unknown || known == ~std::uint64_t{0});
+  }
+  /// The edge, in voxels, of a node from a brick to a chunk around `k` in which no voxel stops a ray; 0
+  /// if there is none.
   [[nodiscard]] std::uint32_t passable_cells(const voxel_key& k) noexcept {
-    const octant_view<value_type>& o = reader_.octant(k);
-    const bool is_free = o.known == 0 || reader_.is_below(Model::occupancy_threshold);
-    const bool is_passable = is_free && (options_.ignore_unknown || o.known == ~std::uint64_t{0});
-    if (!is_passable) return 0;
-    const brick<value_type>* const b = reader_.last_brick();
-    return b != nullptr && is_passable_brick(*b) ? node_cells(brick_level) : reader_.cells();
+    const seen_chunk& c = chunk_at(k);
+    const std::uint32_t place = place_in_chunk(k);
+    if (c.visits < enough_visits) return is_passable_brick(c, k, place) ? node_cells(brick_level) : 0;
+    if (c.passable == ~std::uint64_t{0}) return node_cells(chunk_level);
+    if ((c.passable >> (place & 56U) & 0xffU) == 0xff) return node_cells(brick_level + 1);
+    return (c.passable >> place & 1U) != 0 ? node_cells(brick_level) : 0;
   }
-  [[nodiscard]] bool is_passable_brick(const brick<value_type>& b) const noexcept {
-    const unsigned present = b.uniform | b.dense;
-    bool passable = options_.ignore_unknown || b.uniform == 0xff;
-    for (unsigned i = 0; i != 8; ++i)
-      passable &= (present >> i & 1U) == 0 || b.value[i] < Model::occupancy_threshold;
-    return passable;
-  }
-
-  struct step_out {
-    std::size_t axis;
-    double parameter;  ///< of the ray where it leaves
-  };
-  /// Steps out of the node of edge `cells` that the cursor is in.
-  [[nodiscard]] static step_out leave(ray_cursor& c, std::uint32_t cells) noexcept {
-    std::array<std::uint32_t, 3> left{};  // steps until outside
-    for (std::size_t i = 0; i != 3; ++i) {
-      const std::uint32_t inside = c.at[i] & (cells - 1);
-      left[i] = c.step[i] > 0 ? cells - inside : inside + 1;
-    }
-    // By hand for each axis: everything stays in registers.
-    double next0 = c.next[0], next1 = c.next[1], next2 = c.next[2];
-    std::uint32_t left0 = left[0], left1 = left[1], left2 = left[2];
-    step_out out{};
-    for (;;) {
-      if (next0 < next1 && next0 < next2) {
-        out = {0, next0};
-        next0 += c.delta[0];
-        if (--left0 == 0) break;
-      } else if (next1 < next2 && !(next0 < next1)) {
-        out = {1, next1};
-        next1 += c.delta[1];
-        if (--left1 == 0) break;
-      } else {
-        out = {2, next2};
-        next2 += c.delta[2];
-        if (--left2 == 0) break;
+  [[nodiscard]] const seen_chunk& chunk_at(const voxel_key& k) noexcept {
+    const std::uint64_t name = node_name(k, chunk_level);
+    if (seen_[here_].name == name) return seen_[here_];
+    const voxel_key c{k.x >> chunk_level, k.y >> chunk_level, k.z >> chunk_level};
+    here_ = (c.x & 3U) | (c.y & 3U) << 2U | (c.z & 3U) << 4U;
+    seen_chunk& here = seen_[here_];
+    if (here.name != name) here = {name, 0, reader_.store().find_chunk(k), 0};
+    if (++here.visits == enough_visits) {
+      const voxel_key low = node_key(k, chunk_level);
+      for (std::uint32_t place = 0; place != 64; ++place) {
+        const voxel_key offset = brick_in_chunk(place);
+        const bool passable = is_passable_brick(here, {low.x + offset.x, low.y + offset.y, low.z + offset.z}, place);
+        here.passable |= std::uint64_t{passable} << place;
       }
     }
-    c.next = {next0, next1, next2};
-    const std::array<std::uint32_t, 3> rest{left0, left1, left2};
-    for (std::size_t i = 0; i != 3; ++i) c.at[i] += static_cast<std::uint32_t>(c.step[i]) * (left[i] - rest[i]);
-    return out;
+    return here;
+  }
+  [[nodiscard]] bool is_passable_brick(const seen_chunk& c, const voxel_key& k, std::uint32_t place) const noexcept {
+    const brick<value_type>* const b = c.content == nullptr ? nullptr : reader_.store().find(*c.content, place);
+    if (b == nullptr) {
+      const value_type* const large = reader_.store().find_large_value(k);
+      return large == nullptr ? options_.ignore_unknown : !is_occupied<Model>(*large);
+    }
+    const unsigned present = b->uniform | b->dense;
+    bool passable = options_.ignore_unknown || b->uniform == 0xff;
+    for (unsigned i = 0; i != 8; ++i)
+      passable &= (present >> i & 1U) == 0 || b->value[i] < Model::occupancy_threshold;
+    return passable;
   }
 
   /// A ray parameter up to which no voxel's centre is beyond the range. A centre is at most 0.87
@@ -181,6 +288,8 @@ class ray_caster {
   store_reader<value_type> reader_;
   voxel_grid grid_;
   ray_options options_;
+  std::array<seen_chunk, chunks_kept> seen_{};
+  std::size_t here_ = 0;  ///< of the chunk looked at last
 };
 
 /// Casts many rays: `out[i]` becomes where the ray from `origins[i]` along `directions[i]` ends, the
