@@ -126,18 +126,17 @@ void require_walked(double resolution, const Depth& depth, const Camera& camera,
 
 TEST_CASE("A depth image marks the voxels that walking each of its rays marks") {
   random_bits random{101};
-  for (int run = 0; run != 60; ++run) {
+  for (int run = 0; run != 120; ++run) {
     const int width = 1 + static_cast<int>(random.below(run % 4 == 0 ? 5 : 120));
     const int height = 1 + static_cast<int>(random.below(run % 5 == 0 ? 5 : 90));
     const image<float> depth = random_depth(random, width, height);
     const double field = random.uniform(0.3, 2.2);
-    constexpr std::array<double, 6> resolutions{0.005, 0.01, 0.02, 0.05, 0.1, 0.2};
-    const double resolution =
-        resolutions[random.below(width * height > 2000 ? 4 : 6) + (width * height > 2000 ? 2 : 0)];
+    const camera::pinhole camera = camera_of(width, height, field);
+    // From less than a pixel for a voxel, where rays are walked, to many.
+    const double resolution = std::clamp(random.uniform(1.5, 15.0) / camera.k().fx, 0.005, 0.3);
     const integration_options options{.max_range = run % 3 == 0 ? random.uniform(0.2, 2.0) : no_limit};
     INFO("run " << run << ": " << width << " x " << height);
-    require_walked(resolution, camera::depth_view<float>{depth.view()}, camera_of(width, height, field),
-                   random_pose(random, 2.0), options);
+    require_walked(resolution, camera::depth_view<float>{depth.view()}, camera, random_pose(random, 2.0), options);
   }
 }
 
@@ -255,7 +254,7 @@ TEST_CASE("Settled voxels are left out and the others are the walk's") {
     const camera::depth_view<float> view{depth.view()};
     const camera::pinhole camera = camera_of(90, 70);
     const se3 pose = random_pose(random, 1.0);
-    const voxel_grid grid{run % 2 == 0 ? 0.05 : 0.02};
+    const voxel_grid grid{run % 2 == 0 ? 0.1 : 0.06};
     const auto settled = [](std::uint64_t name, std::array<std::uint64_t, 8>& mask) {
       random_bits bits{name};
       if (bits.below(3) == 0) mask.fill(~std::uint64_t{0});
@@ -268,7 +267,7 @@ TEST_CASE("Settled voxels are left out and the others are the walk's") {
     REQUIRE(differences(expected.marker.masks(), found, settled) == 0);
     left_out += count_free(expected.marker.masks()) - count_free(found);
   }
-  CHECK(left_out > 100000);
+  CHECK(left_out > 5000);
 }
 
 TEST_CASE("Every number of threads marks the same voxels") {

@@ -340,8 +340,8 @@ inline unsigned sample_children_avx2(const depth_scene& s, const child_offsets& 
   }
   __m256 x, y;
   if (rays.separable()) {
-    x = _mm256_i32gather_ps(rays.x(0), u, 4);
-    y = _mm256_i32gather_ps(rays.y(0), v, 4);
+    x = _mm256_mul_ps(_mm256_sub_ps(_mm256_cvtepi32_ps(u), set(s.cx)), set(s.per_fx));
+    y = _mm256_mul_ps(_mm256_sub_ps(_mm256_cvtepi32_ps(v), set(s.cy)), set(s.per_fy));
   } else {
     const __m256i i =
         _mm256_add_epi32(_mm256_mullo_epi32(v, _mm256_set1_epi32(static_cast<int>(rays.x(1) - rays.x(0)))), u);

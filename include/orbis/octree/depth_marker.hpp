@@ -181,6 +181,8 @@ class depth_marker {
     const vec2f center = s.map != nullptr ? map_.center() : vec2f(rays.center().cast<float>());
     s.fx = focal.x();
     s.fy = focal.y();
+    s.per_fx = 1.0F / s.fx;
+    s.per_fy = 1.0F / s.fy;
     s.cx = center.x();
     s.cy = center.y();
     s.last_u = static_cast<float>(rays.width() - 1);
@@ -231,10 +233,11 @@ class depth_marker {
     return std::pair{voxel_key{range[0][0], range[1][0], range[2][0]},
                      voxel_key{range[0][1], range[1][1], range[2][1]}};
   }
-  /// Whether there are so many rays that it is better to look at voxels than to walk them.
+  /// Whether there are so many rays that it is better to look at voxels than to walk them: where there
+  /// is less than a pixel for half a voxel's edge, most voxels would have to be tested one by one.
   [[nodiscard]] bool is_dense(const detail::end_counts& ends) const {
     const double mean_z = ends.sum_z / static_cast<double>(ends.used + ends.truncated);
-    return mean_z < static_cast<double>(scene_.voxel) * static_cast<double>(std::max(scene_.fx, scene_.fy));
+    return mean_z < 0.45 * static_cast<double>(scene_.voxel) * static_cast<double>(std::max(scene_.fx, scene_.fy));
   }
   /// Whether the camera's centre is so close to a face of its voxel that the rounding of rays decides
   /// for many of them on which side they leave.

@@ -31,10 +31,12 @@ namespace orbis::octree::detail {
 /// - rotating c with the rotation rounded to float errs by 7 u |c|_1, on top of 2 u |c|_1 with which c
 ///   came, and each step down the octree adds u |c|_1: less than 25 u |c|_1 from a root of 16 levels;
 /// - the walk has its direction in float: u |c|_1; its sums in double are nothing beside.
-/// All in all less than 40 u |c|_1 + 2 u |t|_1: `margin` is 64 u |c|_1 + 8 u |t|_1.
+/// - the ray of a pinhole's pixel may be taken as (pixel - c) / f in float: 5 u |c|_1.
+/// All in all less than 45 u |c|_1 + 2 u |t|_1: `margin` is 64 u |c|_1 + 8 u |t|_1.
 struct depth_scene {
   float3 x_axis{}, y_axis{}, z_axis{};               ///< of the camera, in the world
   float fx = 1, fy = 1, cx = 0, cy = 0;              ///< pixel = f * ray + c
+  float per_fx = 1, per_fy = 1;                      ///< 1 / f
   float last_u = 0, last_v = 0;                      ///< the last column and row
   float min_x = 0, max_x = 0, min_y = 0, max_y = 0;  ///< of all rays
   float margin_0 = 0, margin_1 = 0;                  ///< metres; and for each metre of |c|_1
@@ -305,8 +307,13 @@ inline void judge_children_avx2(const depth_scene& s, const child_offsets& o, co
                        _mm256_set1_epi32(127));
   const depth_pyramid& pyramid = *s.pyramid;
   level = _mm256_min_epi32(_mm256_max_epi32(level, _mm256_set1_epi32(1)), _mm256_set1_epi32(pyramid.levels()));
-  const __m256i width = _mm256_i32gather_epi32(pyramid.width().data(), level, 4);
-  __m256i begin = _mm256_i32gather_epi32(pyramid.begin().data(), level, 4);
+  const auto of_level = [&](const std::int32_t* table) ORBIS_TARGET("avx2") {
+    if (pyramid.levels() > 8) return _mm256_i32gather_epi32(table, level, 4);
+    const __m256i from_1 = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(table + 1));
+    return _mm256_permutevar8x32_epi32(from_1, _mm256_sub_epi32(level, _mm256_set1_epi32(1)));
+  };
+  const __m256i width = of_level(pyramid.width().data());
+  __m256i begin = of_level(pyramid.begin().data());
   const __m256i family = _mm256_set1_epi32(static_cast<int>(pyramid.family()));
   const __m256 pairs = _mm256_cmp_ps(far, dense_1, _CMP_LT_OQ);
   const __m256 fours = _mm256_cmp_ps(far, dense_2, _CMP_LT_OQ);  // implies the one before
