@@ -64,39 +64,6 @@ void check_equal(const Map& a, const Map& b) {
 
 }  // namespace
 
-TEST_CASE("Checksums are those of the standard") {
-  // RFC 3720, appendix B.4, and the common check value.
-  CHECK(crc32c("123456789") == 0xe3069283U);
-  CHECK(crc32c(std::string(32, '\0')) == 0x8a9136aaU);
-  CHECK(crc32c(std::string(32, '\xff')) == 0x62a8ab43U);
-  CHECK(crc32c("56789", crc32c("1234")) == crc32c("123456789"));
-}
-
-TEST_CASE("Bits come back from the range coder whatever was expected") {
-  random_bits random{71};
-  for (const std::uint32_t chance : {1U, 32U, 3000U, 32768U, 65000U, 65504U, 65535U}) {
-    std::vector<bool> bits;
-    range_encoder encoder;
-    for (int i = 0; i != 5000; ++i) {
-      bits.push_back(random.below(65536) < chance || (i > 2000 && i < 2500));  // a stretch of surprises
-      encoder.code(bits.back(), chance);
-    }
-    const std::string coded = encoder.finish();
-    range_decoder decoder{bytes_of(coded)};
-    bool same = true;
-    for (const bool bit : bits) same &= decoder.code(false, chance) == bit;
-    CHECK(same);
-  }
-  // What is expected takes no room.
-  range_encoder encoder;
-  bit_expectation expectation;
-  for (int i = 0; i != 100000; ++i) {
-    encoder.code(true, expectation.set());
-    expectation.learn(true);
-  }
-  CHECK(encoder.finish().size() < 40);
-}
-
 TEMPLATE_TEST_CASE("A compact file holds every value", "", log_odds<>, log_odds<double>, log_odds<std::int16_t>,
                    log_odds<std::int8_t>) {
   for (const double resolution : {0.03, 0.05, 0.1234567890123456}) {
