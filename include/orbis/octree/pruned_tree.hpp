@@ -61,11 +61,13 @@ class pruned_tree {
       : store_{store}, root_level_{root_level}, value_{value} {
     items_.reserve(store.brick_count() + store.large_count());
     store.for_each_brick([&](const brick<T>& b) {
-      if (b.is_known()) items_.push_back({morton_order(named_key(b.name)), brick_level, &b, brick_entry(b)});
+      if (!b.is_known()) return;
+      const children octants = octant_entries(b);
+      items_.push_back({morton_order(named_key(b.name)), brick_level, &b, parent_of(octants), octants});
     });
     if (store.has_large()) {
       store.for_each_large([&](std::uint64_t name, T v) {
-        items_.push_back({morton_order(named_key(name)), named_level(name), nullptr, {node_kind::leaf, value_(v)}});
+        items_.push_back({morton_order(named_key(name)), named_level(name), nullptr, {node_kind::leaf, value_(v)}, {}});
       });
       std::sort(items_.begin(), items_.end(), [](const item& a, const item& b) { return a.order < b.order; });
     }
@@ -88,10 +90,11 @@ class pruned_tree {
     int level;
     const brick<T>* content;
     entry value;
+    children octants;  ///< of a brick
   };
   struct node {
     entry value;
-    const brick<T>* content = nullptr;
+    std::uint32_t content = 0;   ///< a brick's place in items_
     std::uint32_t children = 0;  ///< their place in nodes_
   };
 
@@ -118,12 +121,12 @@ class pruned_tree {
     }
     return c;
   }
-  [[nodiscard]] entry brick_entry(const brick<T>& b) const noexcept { return parent_of(octant_entries(b)); }
 
   /// The node at `level` over `part` of the sorted items.
   [[nodiscard]] node build(int level, std::span<const item> part) {
     if (part.empty()) return {};
-    if (part.front().level == level) return {part.front().value, part.front().content};
+    if (part.front().level == level)
+      return {part.front().value, static_cast<std::uint32_t>(part.data() - items_.data()), 0};
     const auto first = static_cast<std::uint32_t>(nodes_.size());
     nodes_.resize(nodes_.size() + 8);
     const auto shift = 3 * static_cast<unsigned>(level - 1 - brick_level);
@@ -137,7 +140,7 @@ class pruned_tree {
       nodes_[first + i] = child;
       c[i] = child.value;
     }
-    return {parent_of(c), nullptr, first};
+    return {parent_of(c), 0, first};
   }
 
   template <class Visitor>
@@ -154,8 +157,8 @@ class pruned_tree {
   }
   template <class Visitor>
   void visit_brick(Visitor& visitor, const voxel_key& key, const node& at) const {
-    const brick<T>& b = *at.content;
-    visit_children(visitor, key, brick_level, at.value.value, octant_entries(b),
+    const brick<T>& b = *items_[at.content].content;
+    visit_children(visitor, key, brick_level, at.value.value, items_[at.content].octants,
                    [&](std::uint32_t i, const voxel_key& octant, T max) {
                      block<T> voxels;
                      store_.read_octant(b, i, voxels);
