@@ -78,13 +78,13 @@ class ray_leaper {
   /// @pre cells is a power of two, at most 32
   [[nodiscard]] way_out find_way_out(std::uint32_t cells) noexcept {
     way_out way{};
-    bool is_short = false;
-    for (std::size_t i = 0; i != 3; ++i) {
+    const auto steps_along = [&](std::size_t i) {
       const std::uint32_t inside = at_[i] & (cells - 1);
       way.steps[i] = step_[i] > 0 ? cells - inside : inside + 1;
-      is_short |= used_[i] + way.steps[i] >= count;
-    }
-    if (is_short) renew();
+      return used_[i] + way.steps[i] >= count;
+    };
+    const bool short_x = steps_along(0), short_y = steps_along(1), short_z = steps_along(2);
+    if (short_x || short_y || short_z) renew();
     const auto last = [&](std::size_t i) { return ahead_[i][used_[i] + way.steps[i] - 1]; };
     way.face = first(last(0), last(1), last(2));
     return way;
@@ -92,19 +92,20 @@ class ray_leaper {
   /// Takes all steps up to there.
   void take(const way_out& way) noexcept {
     const double end = way.face.parameter;
-    for (std::size_t i = 0; i != 3; ++i) {
-      // Steps are `delta` apart but for rounding: only the one next to the face must be looked at.
+    const auto take_along = [&](std::size_t i) {
+      // Steps are `delta` apart but for rounding, so only the one next to the face must be looked at. The
+      // first is less than a step before the ray, the last not before the face: nothing to clamp.
       const double* const next = ahead_[i].data() + used_[i];
-      const double most = way.steps[i] - 1;
-      double near = (end - next[0]) * per_step_[i] + 0.5;
-      near = near > 0.0 ? near : 0.0;
-      near = near < most ? near : most;
+      const double near = (end - next[0]) * per_step_[i] + 0.5;
       const auto sure = static_cast<std::uint32_t>(static_cast<std::int32_t>(near));
-      const bool is_before = next[sure] < end || (next[sure] == end && i >= way.face.axis);
+      const bool is_before = (next[sure] < end) | ((next[sure] == end) & (i >= way.face.axis));
       const std::uint32_t taken = sure + (is_before ? 1 : 0);
       at_[i] += static_cast<std::uint32_t>(step_[i]) * taken;
       used_[i] += taken;
-    }
+    };
+    take_along(0);
+    take_along(1);
+    take_along(2);
   }
 
  private:
@@ -185,7 +186,7 @@ class ray_caster {
         }
       }
       const voxel_key octant = node_key(ray.key(), octant_level);
-      do {
+      for (;;) {
         const auto face = ray.step();
         if (ray.is_outside()) {
           ray.step_back(face.axis);
@@ -193,8 +194,9 @@ class ray_caster {
         }
         if (!(face.parameter < safe) && is_out_of_range(origin, ray.key()))
           return ended(ray_end::out_of_range, ray.key());
+        if (node_key(ray.key(), octant_level) != octant) break;
         if (const auto stop = stop_at(ray.key())) return ended(*stop, ray.key());
-      } while (node_key(ray.key(), octant_level) == octant);
+      }
     }
   }
 
