@@ -31,7 +31,8 @@ void check(std::span<const std::byte> bytes) {
   fuzz::require(peak <= 512 * 1024 + 4096 * bytes.size(), "memory in proportion to the file");
   if (!*got) {
     const error& e = got->error();
-    fuzz::require(e.code == errc::malformed || e.code == errc::unsupported, "a damaged file is malformed or unsupported");
+    fuzz::require(e.code == errc::malformed || e.code == errc::unsupported,
+                  "a damaged file is malformed or unsupported");
     fuzz::require(!e.message.empty() && e.to_string().size() < 300, "the reason is given, and short");
     return;
   }

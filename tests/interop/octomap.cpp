@@ -116,7 +116,8 @@ namespace {
     if (!leaf.occupied) return;
     const std::uint32_t cells = octree::node_cells(map.tree_depth() - leaf.depth);
     for (std::uint32_t i = 0; i != cells * cells * cells; ++i) {
-      const octree::voxel_key key{leaf.key.x + i % cells, leaf.key.y + i / cells % cells, leaf.key.z + i / cells / cells};
+      const octree::voxel_key key{leaf.key.x + i % cells, leaf.key.y + i / cells % cells,
+                                  leaf.key.z + i / cells / cells};
       // Two colours in patches of 4x4x4, so that some leaves have one colour and others several.
       const bool red = ((key.x >> 2U ^ key.y >> 2U ^ key.z >> 2U) & 1U) != 0;
       colors.make(key).update(red ? rgb8{200, 10, 10} : rgb8{static_cast<std::uint8_t>(key.x & 127U), 100, 30});

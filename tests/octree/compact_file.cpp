@@ -97,7 +97,8 @@ TEST_CASE("A compact file of occupancy is a .bt file in less room") {
 
 TEST_CASE("Trees of any depth and leaves of any size fit a compact file") {
   for (const int depth : {5, 6, 8, default_tree_depth, max_tree_depth}) {
-    check_equal(some_map(74, 0.2, 2, 100, depth), read_compact(bytes_of(compact_bytes(some_map(74, 0.2, 2, 100, depth)))).value());
+    const auto scanned = some_map(74, 0.2, 2, 100, depth);
+    check_equal(scanned, read_compact(bytes_of(compact_bytes(scanned))).value());
     for (int level = 0; level <= depth; ++level) {
       occupancy_octree<> map{0.1, depth};
       map.set_unknown_node({}, depth - level, -0.5F);
@@ -233,7 +234,8 @@ TEST_CASE("A compact file with right checksums and wrong content is refused or r
     }
   }
   CHECK(refused > 5000);
-  for (const double resolution : {0.0, -1.0, std::numeric_limits<double>::infinity(), std::numeric_limits<double>::quiet_NaN()}) {
+  using limits = std::numeric_limits<double>;
+  for (const double resolution : {0.0, -1.0, limits::infinity(), limits::quiet_NaN()}) {
     std::string damaged = file;
     std::memcpy(damaged.data() + head, &resolution, sizeof resolution);
     CHECK(read_compact(bytes_of(resealed(damaged, "head"))).error().code == errc::malformed);

@@ -292,7 +292,8 @@ TEST_CASE("What OctoMap leaves unpruned stays unpruned in its files") {
   // levels at which eight leaves differ in their log-odds, but not in what is likelier.
   const int top = default_tree_depth - 1;
   for (const auto& merges :
-       {std::vector<int>{}, {1}, {2}, {3}, {4}, {6}, {1, 2}, {1, 3}, {2, 3}, {1, 2, 3}, {1, 2, 4}, {1, 2, 3, 4, 5}, {1, 3, 4}}) {
+       {std::vector<int>{}, {1}, {2}, {3}, {4}, {6}, {1, 2}, {1, 3}, {2, 3}, {1, 2, 3}, {1, 2, 4}, {1, 2, 3, 4, 5},
+        {1, 3, 4}}) {
     for (const bool occupied : {false, true}) {
       occupancy_octree<> map{0.1};
       for (const int level : merges) {
@@ -366,7 +367,8 @@ TEST_CASE("Headers may lack their comments and hold others") {
   const std::string bt = bt_bytes(map);
   const std::string data = bt.substr(bt.find("data\n"));
   const std::string size = "size " + std::to_string(read_bt(bytes_of(bt))->size()) + "\n";
-  for (const std::string& header : {"id OcTree\n" + size + "res 0.2\n", "#\n" + size + "# more\n\nres 0.2\nid OcTree\n"})
+  for (const std::string& header :
+       {"id OcTree\n" + size + "res 0.2\n", "#\n" + size + "# more\n\nres 0.2\nid OcTree\n"})
     CHECK(bt_bytes(read_bt(bytes_of(bt_line + "\n" + header + data)).value()) == bt);
 }
 

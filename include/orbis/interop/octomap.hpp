@@ -140,7 +140,8 @@ class tree_reader {
   [[nodiscard]] bool take(const node& n, const octree::voxel_key& key, int level, float& value) {
     value = n.getLogOdds() + 0.0F;  // -0 becomes 0
     if (!std::isfinite(value)) return give_up(errc::malformed, "a value that is not finite");
-    return see_leaf_(n, key, level) || give_up(errc::unsupported, "a leaf of more than 32x32x32 voxels that has a colour");
+    return see_leaf_(n, key, level) ||
+           give_up(errc::unsupported, "a leaf of more than 32x32x32 voxels that has a colour");
   }
   [[nodiscard]] bool read_brick(const node& n, const octree::voxel_key& key) {
     octree::brick<float>& b = store_.make(key);

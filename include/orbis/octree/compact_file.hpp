@@ -25,7 +25,6 @@
 #include <concepts>
 #include <cstddef>
 #include <cstdint>
-#include <cstring>
 #include <filesystem>
 #include <istream>
 #include <optional>
@@ -33,7 +32,9 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <tuple>
 #include <utility>
+#include <vector>
 
 #include <orbis/core/file.hpp>
 #include <orbis/core/result.hpp>
@@ -119,7 +120,8 @@ struct compact_sections {
   bytes.remove_prefix(compact_magic.size());
   if (bytes.size() < 4) return fail(errc::malformed, where, "ends before its version");
   if (const auto version = take<std::uint32_t>(bytes); version != compact_version)
-    return fail(errc::unsupported, where, "is of version " + std::to_string(version) + ", not " + std::to_string(compact_version));
+    return fail(errc::unsupported, where,
+                "is of version " + std::to_string(version) + ", not " + std::to_string(compact_version));
   compact_sections sections;
   for (;;) {
     if (bytes.size() < frame) return fail(errc::malformed, where, "ends within its sections");
@@ -153,7 +155,8 @@ struct compact_head {
 
 [[nodiscard]] inline result<compact_head> read_head(const compact_sections& sections, std::size_t file_size,
                                                     const std::string& where) {
-  if (!sections.head || sections.head->size() != 68) return fail(errc::malformed, where, "has no head that makes sense");
+  if (!sections.head || sections.head->size() != 68)
+    return fail(errc::malformed, where, "has no head that makes sense");
   std::string_view in = *sections.head;
   compact_head head;
   compact_info& info = head.info;
@@ -175,7 +178,8 @@ struct compact_head {
   if (occupancy_only > 1 || root > 3) return fail(errc::malformed, where, "the head contradicts itself");
   head.root = static_cast<coded_state>(root);
   info.occupancy_only = occupancy_only != 0;
-  if ((head.root == coded_state::inner) != (nodes != 0)) return fail(errc::malformed, where, "the head contradicts itself");
+  if ((head.root == coded_state::inner) != (nodes != 0))
+    return fail(errc::malformed, where, "the head contradicts itself");
   if (nodes > inner_nodes_per_byte * file_size)
     return fail(errc::malformed, where, "declares more nodes than a file of its size has");
   info.inner_nodes = static_cast<std::size_t>(nodes);
@@ -187,7 +191,8 @@ template <class T>
   if (!sections.values || sections.values->size() < 8) return fail(errc::malformed, where, "has no list of values");
   std::string_view in = *sections.values;
   const std::uint64_t free = take<std::uint32_t>(in), occupied = take<std::uint32_t>(in);
-  if (in.size() != (free + occupied) * sizeof(T)) return fail(errc::malformed, where, "has another number of values than declared");
+  if (in.size() != (free + occupied) * sizeof(T))
+    return fail(errc::malformed, where, "has another number of values than declared");
   value_lists<T> lists;
   for (const auto& [list, count] : {std::pair{&lists[0], free}, std::pair{&lists[1], occupied}}) {
     list->resize(static_cast<std::size_t>(count));
@@ -293,7 +298,8 @@ template <compact_model Model = log_odds<>>
   if (!decoder.read(head->root)) return fail(errc::malformed, where, decoder.problem());
   if (decoder.inner_nodes() != info.inner_nodes)
     return fail(errc::malformed, where,
-                "holds " + std::to_string(decoder.inner_nodes()) + " inner nodes, but declares " + std::to_string(info.inner_nodes));
+                "holds " + std::to_string(decoder.inner_nodes()) + " inner nodes, but declares " +
+                    std::to_string(info.inner_nodes));
   return occupancy_octree<Model>{info.resolution, info.tree_depth, std::move(decoder.store())};
 }
 /// Reads a file. Errors: not_found, unreadable, and those above.

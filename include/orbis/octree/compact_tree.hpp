@@ -190,7 +190,8 @@ class tree_lists {
 
 /// Codes a map's lists.
 template <sensor_model Model>
-[[nodiscard]] std::string encode_tree(const tree_lists<Model>& lists, int root_level, const std::vector<std::uint32_t>& rank,
+[[nodiscard]] std::string encode_tree(const tree_lists<Model>& lists, int root_level,
+                                      const std::vector<std::uint32_t>& rank,
                                       const value_lists<typename Model::value_type>& values) {
   range_encoder coder;
   tree_coder<range_encoder> tree{coder, root_level};

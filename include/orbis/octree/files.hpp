@@ -6,8 +6,8 @@
 /// takes at most 400 bytes for each byte given and 8 KB, whatever they claim.
 #pragma once
 
-#include <charconv>
 #include <cassert>
+#include <charconv>
 #include <cmath>
 #include <cstddef>
 #include <filesystem>
@@ -126,7 +126,8 @@ template <class Model, class Reader>
   if (in.bad()) return fail(errc::unreadable, "stream", "cannot be read");
   return bytes;
 }
-[[nodiscard]] inline std::string whole_file(std::string_view magic, const octomap_nodes& nodes, const voxel_grid& grid) {
+[[nodiscard]] inline std::string whole_file(std::string_view magic, const octomap_nodes& nodes,
+                                            const voxel_grid& grid) {
   assert(grid.depth() == default_tree_depth);
   std::string bytes = octomap_header(magic, nodes.nodes, grid.resolution());
   bytes.reserve(bytes.size() + nodes.bytes.size());
@@ -136,7 +137,8 @@ template <class Writer, class Map>
 [[nodiscard]] result<void> write_octomap(const Map& map, std::string_view magic, std::ostream& out,
                                          const std::string& where) {
   if (map.tree_depth() != default_tree_depth)
-    return fail(errc::unsupported, where, "OctoMap's trees have 16 levels, this one " + std::to_string(map.tree_depth()));
+    return fail(errc::unsupported, where,
+                "OctoMap's trees have 16 levels, this one " + std::to_string(map.tree_depth()));
   const octomap_nodes nodes = Writer{map.store(), map.tree_depth()}.write();
   const std::string header = octomap_header(magic, nodes.nodes, map.resolution());
   out.write(header.data(), static_cast<std::streamsize>(header.size()));
@@ -156,13 +158,15 @@ template <class Writer, class Map>
 /// @pre map.tree_depth() == default_tree_depth
 template <octomap_model Model>
 [[nodiscard]] std::string bt_bytes(const occupancy_octree<Model>& map) {
-  return detail::whole_file(detail::bt_magic, detail::bt_writer<Model>{map.store(), map.tree_depth()}.write(), map.grid());
+  const detail::octomap_nodes nodes = detail::bt_writer<Model>{map.store(), map.tree_depth()}.write();
+  return detail::whole_file(detail::bt_magic, nodes, map.grid());
 }
 /// The bytes of an `.ot` file: the pruned octree with all its log-odds.
 /// @pre map.tree_depth() == default_tree_depth
 template <octomap_model Model>
 [[nodiscard]] std::string ot_bytes(const occupancy_octree<Model>& map) {
-  return detail::whole_file(detail::ot_magic, detail::ot_writer{map.store(), map.tree_depth()}.write(), map.grid());
+  const detail::octomap_nodes nodes = detail::ot_writer{map.store(), map.tree_depth()}.write();
+  return detail::whole_file(detail::ot_magic, nodes, map.grid());
 }
 
 /// Writes a `.bt` file, whole or not at all. Errors: write_failed; unsupported for a map of another

@@ -159,7 +159,9 @@ class bt_writer {
   static constexpr unsigned free = 1, occupied_leaf = 2, inner = 3;
   static constexpr unsigned free_children = 0x5555, occupied_children = 0xaaaa;
 
-  [[nodiscard]] static unsigned code_of(float value) noexcept { return is_occupied<Model>(value) ? occupied_leaf : free; }
+  [[nodiscard]] static unsigned code_of(float value) noexcept {
+    return is_occupied<Model>(value) ? occupied_leaf : free;
+  }
   [[nodiscard]] std::uint64_t occupied(const brick<float>& b, std::uint32_t i) const noexcept {
     return store_.voxels_where(b, i, [](float v) { return is_occupied<Model>(v); });
   }

@@ -33,7 +33,8 @@ class bit_expectation {
  private:
   static constexpr auto rate = [] {
     std::array<std::int32_t, 160> r{};
-    for (std::size_t n = 0; n != r.size(); ++n) r[n] = static_cast<std::int32_t>(65536.0 / (static_cast<double>(n) + 1.6));
+    for (std::size_t n = 0; n != r.size(); ++n)
+      r[n] = static_cast<std::int32_t>(65536.0 / (static_cast<double>(n) + 1.6));
     return r;
   }();
   std::uint32_t state_ = 1U << 31U;
