@@ -1,5 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <cmath>
 #include <limits>
+#include <vector>
 
 #include <orbis/octree/cast_ray.hpp>
 
@@ -84,4 +87,47 @@ TEST_CASE("A ray says why it ended") {
   CHECK(map.cast_ray(vec3{1e9, 0.0, 0.0}, forward).end == ray_end::out_of_grid);
   CHECK(map.cast_ray(vec3{nan, 0.0, 0.0}, forward).end == ray_end::out_of_grid);
   CHECK(map.cast_ray(vec3{1.05, 0.05, 0.05}, vec3{0.0, 0.0, 0.0}).end == ray_end::hit);
+}
+
+TEST_CASE("Many rays at once end where each of them ends alone, for every number of threads") {
+  const scene room;
+  random_bits random{54};
+  for (const ray_options& options :
+       {ray_options{.max_range = 1.3, .ignore_unknown = true}, ray_options{.max_range = 6.0, .ignore_unknown = true},
+        ray_options{.max_range = 2.0}, ray_options{}}) {
+    const std::vector<vec3f> origins = test::random_points(random, 2000, 0.4);
+    const std::vector<vec3f> directions = test::random_points(random, 2000, 3.0);
+    std::vector<ray_hit> hits(directions.size()), again(directions.size());
+    cast_rays(seq, room.ours, origins, directions, options, hits);
+    const auto equal = [](const ray_hit& a, const ray_hit& b) {
+      return a.end == b.end && a.key == b.key && a.point == b.point;
+    };
+    for (const unsigned threads : {2U, 7U}) {
+      cast_rays(par.with(threads), room.ours, origins, directions, options, again);
+      CHECK(std::equal(hits.begin(), hits.end(), again.begin(), equal));
+    }
+    const double range = std::isinf(options.max_range) ? -1.0 : options.max_range;
+    for (std::size_t i = 0; i != hits.size(); ++i) {
+      octomap::point3d end;
+      const bool hit = room.theirs.castRay(test::to_octomap(origins[i]), test::to_octomap(directions[i]), end,
+                                           options.ignore_unknown, range);
+      REQUIRE(static_cast<bool>(hits[i]) == hit);
+      for (unsigned axis = 0; axis != 3; ++axis) REQUIRE(static_cast<float>(hits[i].point[axis]) == end(axis));
+      REQUIRE(equal(hits[i], room.ours.cast_ray(origins[i], directions[i], options.max_range, options.ignore_unknown)));
+    }
+    cast_rays(seq, room.ours, origins[0], directions, options, hits);
+    REQUIRE(equal(hits[7], room.ours.cast_ray(origins[0], directions[7], options.max_range, options.ignore_unknown)));
+  }
+}
+
+TEST_CASE("A ray without limit through empty space reaches the end of the grid") {
+  occupancy_octree<> map{0.1};
+  map.integrate(std::vector<vec3f>{{1.05F, 0.05F, 0.05F}}, vec3f{0.05F, 0.05F, 0.05F});
+  const std::vector<vec3f> directions{{-1.0F, 0.0F, 0.0F}, {0.1F, -0.7F, 0.2F}, {-1e-20F, 1.0F, 0.0F}};
+  std::vector<ray_hit> hits(3);
+  cast_rays(seq, map, vec3f{0.05F, 0.05F, 0.05F}, directions, {.ignore_unknown = true}, hits);
+  for (const ray_hit& hit : hits) CHECK(hit.end == ray_end::out_of_grid);
+  CHECK(hits[0].key == voxel_key{0, 32768, 32768});
+  CHECK(hits[1].key.y == 0);
+  CHECK(hits[2].key == voxel_key{32768, 65535, 32768});
 }
