@@ -13,6 +13,7 @@
 #include <vector>
 
 #include <orbis/core/simd.hpp>
+#include <orbis/octree/depth_ends.hpp>
 #include <orbis/octree/depth_nodes.hpp>
 #include <orbis/octree/depth_rays.hpp>
 #include <orbis/octree/ray_walk.hpp>

@@ -21,6 +21,7 @@
 #include <orbis/core/se3.hpp>
 #include <orbis/core/simd.hpp>
 #include <orbis/octree/depth_crossing.hpp>
+#include <orbis/octree/depth_ends.hpp>
 #include <orbis/octree/depth_nodes.hpp>
 #include <orbis/octree/depth_pyramid.hpp>
 #include <orbis/octree/depth_ray_map.hpp>
