@@ -519,9 +519,12 @@ class depth_marker {
                                    std::min(box.v1, v + size - 1)};
       if (part.u0 > part.u1 || part.v0 > part.v1 || !of.pyramid_.reaches(u, v, size, near_z)) return false;
       const pixel_rays& rays = of.rays_.rays();
-      if (rays.separable() &&
-          !test.may_cross(rays.x(0)[part.u0], rays.x(0)[part.u1], *rays.y(part.v0), *rays.y(part.v1)))
-        return false;
+      if (rays.separable()) {
+        if (!test.may_cross(rays.x(0)[part.u0], rays.x(0)[part.u1], *rays.y(part.v0), *rays.y(part.v1))) return false;
+      } else {
+        const auto& t = of.map_.tile_at(u, v, size);
+        if (!(t.x0 <= t.x1) || !test.may_cross(t.x0, t.x1, t.y0, t.y1)) return false;
+      }
       if (size == 16) return of.cross_(of.scene_, test, part, near_z, own.unsure);
       const std::int32_t half = size / 2;
       return crosses_tile(test, box, near_z, u, v, half) || crosses_tile(test, box, near_z, u + half, v, half) ||

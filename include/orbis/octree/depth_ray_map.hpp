@@ -45,6 +45,18 @@ class depth_ray_map {
   };
   static_assert(sizeof(entry) == 8 * sizeof(float));
 
+  /// Bounds of the rays of a tile of pixels.
+  struct tile {
+    float x0 = infinity, x1 = -infinity, y0 = infinity, y1 = -infinity;
+
+    void join(const tile& o) noexcept {
+      x0 = std::min(x0, o.x0);
+      x1 = std::max(x1, o.x1);
+      y0 = std::min(y0, o.y0);
+      y1 = std::max(y1, o.y1);
+    }
+  };
+
   /// Does nothing if these are the rays it knows already. O(pixels).
   void fit(const pixel_rays& rays) {
     if (version_ == rays.version()) return;
@@ -58,6 +70,7 @@ class depth_ray_map {
     per_y_ = static_cast<float>(height_[0]) / std::max(max_y_ - min_y_, 1e-6F);
     fill_cells(rays);
     join_cells();
+    fill_tiles(rays);
   }
 
   [[nodiscard]] float min_x() const noexcept { return min_x_; }
@@ -68,6 +81,12 @@ class depth_ray_map {
   [[nodiscard]] const vec2f& center() const noexcept { return center_; }
   /// The pixels whose rays are left out.
   [[nodiscard]] const std::vector<std::array<std::int32_t, 2>>& outer() const noexcept { return outer_; }
+
+  /// The rays of the aligned tile of `size` x `size` pixels at (u, v). @pre size is 16, 32, 64 or 128
+  [[nodiscard]] const tile& tile_at(std::int32_t u, std::int32_t v, std::int32_t size) const noexcept {
+    const auto k = static_cast<std::size_t>(std::countr_zero(static_cast<std::uint32_t>(size)));
+    return tiles_[k - 4][static_cast<std::size_t>((v >> k) * tile_columns(k) + (u >> k))];
+  }
 
   /// Cells per unit of x and y.
   [[nodiscard]] float per_x() const noexcept { return per_x_; }
@@ -89,7 +108,9 @@ class depth_ray_map {
     return entries_[static_cast<std::size_t>(begin_[k] + (j0 >> level) * width_[k] + (i0 >> level))];
   }
   [[nodiscard]] std::size_t memory_bytes() const noexcept {
-    return entries_.capacity() * sizeof(entry) + outer_.capacity() * sizeof(outer_[0]);
+    std::size_t bytes = cells_.capacity() * sizeof(entry);
+    for (const auto& level : tiles_) bytes += level.capacity() * sizeof(tile);
+    return bytes + entries_.capacity() * sizeof(entry) + outer_.capacity() * sizeof(outer_[0]);
   }
 
  private:
@@ -204,6 +225,22 @@ class depth_ray_map {
     return infinity;
   }
 
+  [[nodiscard]] std::int32_t tile_columns(std::size_t k) const noexcept { return (pixels_[0] + (1 << k) - 1) >> k; }
+  void fill_tiles(const pixel_rays& rays) {
+    pixels_ = {rays.width(), rays.height()};
+    for (std::size_t k = 4; k != 8; ++k) {
+      const std::int32_t columns = tile_columns(k), rows = (pixels_[1] + (1 << k) - 1) >> k;
+      auto& level = tiles_[k - 4];
+      level.assign(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows), tile{});
+      for (std::int32_t v = 0; v != pixels_[1]; ++v)
+        for (std::int32_t u = 0; u != pixels_[0]; ++u) {
+          const auto ray = rays.at(u, v);
+          if (is_inner(ray))
+            level[static_cast<std::size_t>((v >> k) * columns + (u >> k))].join(
+                {ray.first, ray.first, ray.second, ray.second});
+        }
+    }
+  }
   void join_cells() {
     entries_.clear();
     for (levels_ = 0;; ++levels_) {
@@ -236,6 +273,8 @@ class depth_ray_map {
   vec2f focal_ = vec2f::Ones(), center_ = vec2f::Zero();
   std::vector<std::array<std::int32_t, 2>> outer_;
   std::vector<entry> cells_, entries_;
+  std::array<std::vector<tile>, 4> tiles_;
+  std::array<std::int32_t, 2> pixels_{};
   std::array<std::int32_t, max_levels> begin_{}, width_{}, height_{};
   int levels_ = 0;
 };
