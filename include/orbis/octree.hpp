@@ -23,6 +23,7 @@
 #include <orbis/octree/overlap.hpp>
 #include <orbis/octree/point_keys.hpp>
 #include <orbis/octree/pruned_tree.hpp>
+#include <orbis/octree/ray_batch.hpp>
 #include <orbis/octree/ray_grid.hpp>
 #include <orbis/octree/ray_sweep.hpp>
 #include <orbis/octree/ray_walk.hpp>
@@ -34,3 +35,4 @@
 #include <orbis/octree/swept_ray.hpp>
 #include <orbis/octree/voxel_layer.hpp>
 #include <orbis/octree/voxel_payload.hpp>
+#include <orbis/octree/window_marks.hpp>

@@ -102,8 +102,8 @@ struct reference {
       const std::array<std::uint32_t, 3> k{std::get<0>(v), std::get<1>(v), std::get<2>(v)};
       for (std::size_t i = 0; i != 3; ++i) {
         const double cell = static_cast<double>(k[i]) - 0.5 * grid.cells();
-        if (cell < std::floor(options.bounds->min[i] / grid.resolution()) ||
-            cell > std::floor(options.bounds->max[i] / grid.resolution()))
+        if (cell < std::floor(options.bounds->min[static_cast<Eigen::Index>(i)] / grid.resolution()) ||
+            cell > std::floor(options.bounds->max[static_cast<Eigen::Index>(i)] / grid.resolution()))
           return true;
       }
       return false;
@@ -298,11 +298,19 @@ TEST_CASE("Every instruction set loads the same points") {
     auto want = std::make_unique<octree::detail::point_batch>(), got = std::make_unique<octree::detail::point_batch>();
     octree::detail::load_triples_portable(points[0].data(), count, *want);
 #if ORBIS_X86
-    if (simd::detected() < simd::level::avx512) return;
-    octree::detail::load_triples_avx512(points[0].data(), count, *got);
-    REQUIRE(std::equal(want->x.begin(), want->x.begin() + static_cast<std::ptrdiff_t>(count), got->x.begin()));
-    REQUIRE(std::equal(want->y.begin(), want->y.begin() + static_cast<std::ptrdiff_t>(count), got->y.begin()));
-    REQUIRE(std::equal(want->z.begin(), want->z.begin() + static_cast<std::ptrdiff_t>(count), got->z.begin()));
+    const auto check_level = [&](simd::level level, auto* load) {
+      if (simd::detected() < level) return;
+      *got = {};
+      load(points[0].data(), count, *got);
+      const auto same = [&](const auto& a, const auto& b) {
+        return std::equal(a.begin(), a.begin() + static_cast<std::ptrdiff_t>(count), b.begin());
+      };
+      REQUIRE(same(want->x, got->x));
+      REQUIRE(same(want->y, got->y));
+      REQUIRE(same(want->z, got->z));
+    };
+    check_level(simd::level::avx2, octree::detail::load_triples_avx2);
+    check_level(simd::level::avx512, octree::detail::load_triples_avx512);
 #endif
   }
 }
@@ -324,19 +332,18 @@ TEST_CASE("Every instruction set finds the same voxels of points") {
         if (random.below(40) == 0) c = 1e30F;
       }
     octree::detail::find_keys_portable(grid, *batch, count, *want);
-#if ORBIS_X86
-    if (simd::detected() < simd::level::avx512) return;
-    octree::detail::find_keys_avx512(grid, *batch, count, *got);
-    REQUIRE(got->outside == want->outside);
-    // Which repetitions are left out may differ behind a point outside.
-    const auto listed = [](const octree::detail::batch_keys& keys) {
-      std::vector<voxel> all;
-      for (std::size_t i = 0; i != keys.count; ++i)
-        if (const voxel v{keys.x[i], keys.y[i], keys.z[i]}; all.empty() || all.back() != v) all.push_back(v);
-      return all;
-    };
-    REQUIRE(listed(*got) == listed(*want));
-#endif
+    for (const auto level : {simd::level::avx2, simd::level::avx512}) {
+      octree::detail::find_keys(level)(grid, *batch, count, *got);
+      REQUIRE(got->outside == want->outside);
+      // Which repetitions are left out may differ behind a point outside.
+      const auto listed = [](const octree::detail::batch_keys& keys) {
+        std::vector<voxel> all;
+        for (std::size_t i = 0; i != keys.count; ++i)
+          if (const voxel v{keys.x[i], keys.y[i], keys.z[i]}; all.empty() || all.back() != v) all.push_back(v);
+        return all;
+      };
+      REQUIRE(listed(*got) == listed(*want));
+    }
   }
 }
 

@@ -19,6 +19,7 @@
 #include <orbis/core/rounded.hpp>
 #include <orbis/octree/key_box.hpp>
 #include <orbis/octree/point_keys.hpp>
+#include <orbis/octree/ray_batch.hpp>
 #include <orbis/octree/ray_sweep.hpp>
 #include <orbis/octree/scan.hpp>
 
@@ -90,7 +91,7 @@ class scan_marker {
     const sensor from = start(grid, origin, options);
     if (options.mode == ray_mode::every_ray) {
       for_each_with_worker(policy, count, 4096, [&](worker& w, std::size_t begin, std::size_t end) {
-        for (std::size_t i = begin; i != end; ++i) w.add(from, point(i), from.limit(i));
+        w.add_points(from, begin, end, point);
       });
     } else {
       for_each_with_worker(policy, count, 4096, [&](worker& w, std::size_t begin, std::size_t end) {
@@ -137,6 +138,7 @@ class scan_marker {
     std::optional<voxel_key> key;  ///< empty: no ray is walked
     double max_range;
     std::span<const float> beam_ranges;
+    detail::ends_kernel* find_ends = detail::find_ends(simd::detected());
 
     /// Of the i-th point; negative or NaN if it is to be rejected.
     [[nodiscard]] double limit(std::size_t i) const noexcept {
@@ -155,7 +157,11 @@ class scan_marker {
     integration_summary summary;
     ray_sweep sweep;
     voxel_key last_end = no_key;
+    detail::point_batch batch;
+    std::size_t batched = 0;  ///< centres that are waiting in the batch
+    std::array<double, detail::point_batch::capacity> limits;
     detail::batch_keys keys;
+    detail::ray_batch rays;
 
     void clear() noexcept {
       last_end = no_key;
@@ -163,52 +169,41 @@ class scan_marker {
       ends.clear();
       summary = {};
     }
-    void add_ray(const sensor& from, const float3& end, const voxel_key& to, bool hit) {
-      if (from.key) sweep.add(end, to, hit, masks);
-    }
-    void add(const sensor& from, const float3& end, double limit) {
-      const float3 ray = difference(end, from.origin);
-      const double distance = length(ray);
-      if (distance <= limit) {
-        const auto key = from.grid.key(end);
-        if (!key) {
-          ++summary.rejected;
-          return;
-        }
-        add_ray(from, end, *key, true);
-        if (*key != last_end) masks.mark_occupied(*key);  // neighbouring pixels mostly end in the same voxel
-        last_end = *key;
-        ++summary.used;
-      } else if (const auto cut = cut_off(from, ray, distance, limit)) {
-        add_ray(from, cut->first, cut->second, false);
-        ++summary.truncated;
-      } else {
-        ++summary.rejected;
+    /// The points [begin, end) in mode every_ray.
+    template <class Point>
+    void add_points(const sensor& from, std::size_t begin, std::size_t end, Point&& point) {
+      if (from.beam_ranges.empty()) limits.fill(from.max_range);
+      while (begin != end) {
+        const std::size_t n = std::min(end - begin, detail::point_batch::capacity);
+        detail::load_points(point, begin, n, batch);
+        if (!from.beam_ranges.empty())
+          for (std::size_t i = 0; i != n; ++i) limits[i] = from.limit(begin + i);
+        begin += n;
+        add_batch(from, n);
       }
     }
-    /// Where a ray that is too long ends.
-    [[nodiscard]] static std::optional<std::pair<float3, voxel_key>> cut_off(const sensor& from, const float3& ray,
-                                                                             double distance, double limit) {
-      const auto scale = static_cast<float>(distance);
-      if (!(limit >= 0.0) || !std::isfinite(scale)) return std::nullopt;
-      const auto range = static_cast<float>(limit);
-      float3 end;
-      for (std::size_t i = 0; i != 3; ++i) end[i] = from.origin[i] + rounded_product(ray[i] / scale, range);
-      const auto key = from.grid.key(end);
-      return key ? std::optional{std::pair{end, *key}} : std::nullopt;
+    /// The first `count` points of the batch, each with its limit.
+    void add_batch(const sensor& from, std::size_t count) {
+      const voxel_key base = from.key.value_or(voxel_key{});
+      from.find_ends({from.grid, from.origin, base}, batch, limits.data(), count, rays);
+      const std::size_t used = detail::ray_batch::count(rays.hit), cut = detail::ray_batch::count(rays.cut);
+      summary.used += used;
+      summary.truncated += cut;
+      summary.rejected += count - used - cut;
+      for (std::size_t word = 0; word != rays.hit.size(); ++word)
+        for (std::uint64_t left = rays.hit[word]; left != 0; left &= left - 1) {
+          const std::size_t i = 64 * word + static_cast<std::size_t>(std::countr_zero(left));
+          const auto at = [&](std::size_t axis) { return static_cast<std::uint32_t>(rays.way[axis][i]); };
+          const voxel_key k{base.x + at(0), base.y + at(1), base.z + at(2)};
+          if (k != last_end) masks.mark_occupied(k);  // neighbouring pixels mostly end in the same voxel
+          last_end = k;
+        }
+      if (from.key) sweep.add(rays, count, masks);
     }
     /// The points [begin, end) in mode discretized.
     template <class Point>
     void add_ends(const voxel_grid& grid, std::size_t begin, std::size_t end, Point&& point) {
-      detail::point_batch batch;
-      auto* const find_keys =
-          simd::select<void(const voxel_grid&, const detail::point_batch&, std::size_t, detail::batch_keys&)>(
-              simd::detected(), {
-                .portable = detail::find_keys_portable,
-#if ORBIS_X86
-                .popcnt = nullptr, .avx2 = nullptr, .avx512 = detail::find_keys_avx512
-#endif
-              });
+      auto* const find_keys = detail::find_keys(simd::detected());
       scan_brick* brick = nullptr;  // of the last point; neighbours mostly lie in the same one
       while (begin != end) {
         const std::size_t n = std::min(end - begin, detail::point_batch::capacity);
@@ -235,47 +230,40 @@ class scan_marker {
           ends.mark_occupied(*key);
         else
           ++summary.rejected;
-      } else if (const auto cut = cut_off(from, ray, distance, limit)) {
-        ends.mark_free(cut->second);
+      } else if (limit >= 0.0 && std::isfinite(static_cast<float>(distance))) {
+        if (const auto key = from.grid.key(cut_off(from.origin, ray, distance, limit)))
+          ends.mark_free(*key);
+        else
+          ++summary.rejected;
       } else {
         ++summary.rejected;
       }
     }
+    /// The centres of a brick's voxels: those occupied like points; to those free there is a ray.
     void add_centers(const sensor& from, const scan_brick& b) {
       const voxel_key base = named_key(b.name);
-      std::array<std::uint64_t, 8> hits{};
-      const auto centre = [&](std::uint32_t place, voxel_key& k) {
+      const auto centre = [&](std::uint32_t place) {
         const voxel_key in = voxel_in_brick(place);
-        k = {base.x + in.x, base.y + in.y, base.z + in.z};
-        const vec3 c = from.grid.center(k);
+        const vec3 c = from.grid.center(voxel_key{base.x + in.x, base.y + in.y, base.z + in.z});
         return float3{static_cast<float>(c.x()), static_cast<float>(c.y()), static_cast<float>(c.z())};
       };
-      voxel_key k;
       for_each_place(b.occupied, [&](std::uint32_t place) {
-        const float3 end = centre(place, k);
-        const float3 ray = difference(end, from.origin);
-        const double distance = length(ray);
-        if (distance <= from.max_range) {
-          add_ray(from, end, k, true);
-          hits[place >> 6U] |= std::uint64_t{1} << (place & 63U);
-          ++summary.used;
-        } else if (const auto cut = cut_off(from, ray, distance, from.max_range)) {
-          add_ray(from, cut->first, cut->second, false);
-          ++summary.truncated;
-        } else {
-          ++summary.rejected;
-        }
+        const float3 c = centre(place);
+        batch.x[batched] = c[0];
+        batch.y[batched] = c[1];
+        batch.z[batched] = c[2];
+        if (++batched == detail::point_batch::capacity) add_batched(from);
       });
       for_each_place(b.free, [&](std::uint32_t place) {
-        const float3 end = centre(place, k);
-        add_ray(from, end, k, false);
+        const voxel_key in = voxel_in_brick(place);
+        if (from.key) sweep.add(centre(place), {base.x + in.x, base.y + in.y, base.z + in.z}, false, masks);
         ++summary.truncated;
       });
-      std::uint64_t any = 0;
-      for (const std::uint64_t h : hits) any |= h;
-      if (any == 0) return;
-      auto& occupied = masks.at(base).occupied;
-      for (std::size_t i = 0; i != 8; ++i) occupied[i] |= hits[i];
+    }
+    void add_batched(const sensor& from) {
+      limits.fill(from.max_range);
+      add_batch(from, batched);
+      batched = 0;
     }
   };
 
@@ -298,6 +286,7 @@ class scan_marker {
     for_each_with_worker(policy, ends.bricks().size(), 16, [&](worker& w, std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i != end; ++i) w.add_centers(from, ends.bricks()[i]);
     });
+    for (worker& w : workers_) w.add_batched(from);
   }
   template <class Policy>
   integration_summary finish(const Policy& policy, const voxel_grid& grid, const integration_options& options) {

@@ -14,6 +14,7 @@
 #include <orbis/core/point.hpp>
 #include <orbis/core/simd.hpp>
 #include <orbis/octree/key.hpp>
+#include <orbis/octree/packed_lanes.hpp>
 
 #if ORBIS_X86
 #include <immintrin.h>
@@ -35,6 +36,25 @@ inline void load_triples_portable(const float* points, std::size_t count, point_
   }
 }
 #if ORBIS_X86
+ORBIS_TARGET("avx2")
+inline void load_triples_avx2(const float* points, std::size_t count, point_batch& batch) noexcept {
+  std::size_t i = 0;
+  for (; i + 8 <= count; i += 8) {
+    const float* const p = points + 3 * i;
+    const __m256 a = _mm256_loadu_ps(p), b = _mm256_loadu_ps(p + 8), c = _mm256_loadu_ps(p + 16);
+    const __m256 x = _mm256_blend_ps(_mm256_blend_ps(a, b, 0x92), c, 0x24);
+    const __m256 y = _mm256_blend_ps(_mm256_blend_ps(a, b, 0x24), c, 0x49);
+    const __m256 z = _mm256_blend_ps(_mm256_blend_ps(a, b, 0x49), c, 0x92);
+    _mm256_store_ps(batch.x.data() + i, _mm256_permutevar8x32_ps(x, _mm256_setr_epi32(0, 3, 6, 1, 4, 7, 2, 5)));
+    _mm256_store_ps(batch.y.data() + i, _mm256_permutevar8x32_ps(y, _mm256_setr_epi32(1, 4, 7, 2, 5, 0, 3, 6)));
+    _mm256_store_ps(batch.z.data() + i, _mm256_permutevar8x32_ps(z, _mm256_setr_epi32(2, 5, 0, 3, 6, 1, 4, 7)));
+  }
+  for (; i != count; ++i) {
+    batch.x[i] = points[3 * i];
+    batch.y[i] = points[3 * i + 1];
+    batch.z[i] = points[3 * i + 2];
+  }
+}
 ORBIS_TARGET("avx512f")
 inline void load_triples_avx512(const float* points, std::size_t count, point_batch& batch) noexcept {
   // Of each coordinate the first two registers hold eleven, the third the rest.
@@ -80,7 +100,7 @@ struct point_source {
     auto* const load = simd::select<void(const float*, std::size_t, point_batch&)>(simd::detected(), {
       .portable = load_triples_portable,
 #if ORBIS_X86
-      .popcnt = nullptr, .avx2 = nullptr, .avx512 = load_triples_avx512
+      .popcnt = nullptr, .avx2 = load_triples_avx2, .avx512 = load_triples_avx512
 #endif
     });
     load(std::ranges::data(points)[begin].data(), count, batch);
@@ -132,6 +152,61 @@ inline void find_keys_portable(const voxel_grid& grid, const point_batch& points
 }
 
 #if ORBIS_X86
+/// What voxel_grid::key does, of eight coordinates; clears the lanes of those outside in `inside`.
+ORBIS_TARGET("avx2")
+inline __m256i cells_avx2(const float* at, double per_metre, double half, __m256i& inside) noexcept {
+  const __m256d scale = _mm256_set1_pd(per_metre), high = _mm256_set1_pd(half), low = _mm256_set1_pd(-half);
+  const __m256d a = _mm256_mul_pd(_mm256_cvtps_pd(_mm_load_ps(at)), scale);
+  const __m256d b = _mm256_mul_pd(_mm256_cvtps_pd(_mm_load_ps(at + 4)), scale);
+  const auto in = [&](__m256d x) ORBIS_TARGET("avx2") {
+    return _mm256_and_pd(_mm256_cmp_pd(x, low, _CMP_GE_OQ), _mm256_cmp_pd(x, high, _CMP_LT_OQ));
+  };
+  const __m256 halves = _mm256_shuffle_ps(_mm256_castpd_ps(in(a)), _mm256_castpd_ps(in(b)), 0x88);
+  inside = _mm256_and_si256(inside, _mm256_permute4x64_epi64(_mm256_castps_si256(halves), 0xd8));
+  const __m256i cells = _mm256_inserti128_si256(_mm256_castsi128_si256(_mm256_cvtpd_epi32(_mm256_floor_pd(a))),
+                                                _mm256_cvtpd_epi32(_mm256_floor_pd(b)), 1);
+  return _mm256_add_epi32(cells, _mm256_set1_epi32(static_cast<int>(half)));
+}
+ORBIS_TARGET("avx2,popcnt")
+inline void find_keys_avx2(const voxel_grid& grid, const point_batch& points, std::size_t count,
+                           batch_keys& keys) noexcept {
+  const double per_metre = 1.0 / grid.resolution(), half = 0.5 * grid.cells();
+  const __m256i none = _mm256_set1_epi32(-1), rotation = _mm256_setr_epi32(7, 0, 1, 2, 3, 4, 5, 6);
+  __m256i x0 = none, y0 = none, z0 = none;  // of the voxel before, rotated; no voxel at first
+  std::size_t i = 0, n = 0, outside = 0;
+  for (; i + 8 <= count; i += 8) {
+    __m256i inside = none;
+    __m256i x = cells_avx2(points.x.data() + i, per_metre, half, inside);
+    const __m256i y = cells_avx2(points.y.data() + i, per_metre, half, inside);
+    const __m256i z = cells_avx2(points.z.data() + i, per_metre, half, inside);
+    x = _mm256_blendv_epi8(none, x, inside);  // what lies outside equals no voxel
+    const auto same = [&](__m256i k, __m256i& before) ORBIS_TARGET("avx2") {
+      const __m256i turned = _mm256_permutevar8x32_epi32(k, rotation);
+      const __m256i equal = _mm256_cmpeq_epi32(k, _mm256_blend_epi32(turned, before, 1));
+      before = turned;
+      return equal;
+    };
+    const __m256i same_x = same(x, x0), same_y = same(y, y0), same_z = same(z, z0);
+    const __m256i repeated = _mm256_and_si256(same_x, _mm256_and_si256(same_y, same_z));
+    const auto bits = [](__m256i mask) ORBIS_TARGET("avx2") {
+      return static_cast<std::uint32_t>(_mm256_movemask_ps(_mm256_castsi256_ps(mask)));
+    };
+    const std::uint32_t fresh = bits(_mm256_andnot_si256(repeated, inside));
+    const __m256i packed = packed_lanes(fresh);
+    const auto store = [&](std::uint32_t* to, __m256i k) ORBIS_TARGET("avx2") {
+      _mm256_storeu_si256(reinterpret_cast<__m256i*>(to + n), _mm256_permutevar8x32_epi32(k, packed));
+    };
+    store(keys.x.data(), x);
+    store(keys.y.data(), y);
+    store(keys.z.data(), z);
+    n += static_cast<std::size_t>(__builtin_popcount(fresh));
+    outside += static_cast<std::size_t>(8 - __builtin_popcount(bits(inside)));
+  }
+  keys.count = n;
+  keys.outside = outside;
+  find_keys_portable(grid, points, i, count, keys);
+}
+
 /// What voxel_grid::key does, of sixteen coordinates; clears the bits of those outside in `inside`.
 ORBIS_TARGET("avx512f,avx512dq,avx512vl")
 inline __m512i cells_avx512(const float* at, double per_metre, double half, __mmask16& inside) noexcept {
@@ -182,5 +257,16 @@ inline void find_keys_avx512(const voxel_grid& grid, const point_batch& points, 
   find_keys_portable(grid, points, i, count, keys);
 }
 #endif
+
+using keys_kernel = void(const voxel_grid&, const point_batch&, std::size_t, batch_keys&);
+
+[[nodiscard]] inline keys_kernel* find_keys(simd::level level) noexcept {
+  return simd::select<keys_kernel>(level, {
+    .portable = find_keys_portable,
+#if ORBIS_X86
+    .popcnt = nullptr, .avx2 = find_keys_avx2, .avx512 = find_keys_avx512
+#endif
+  });
+}
 
 }  // namespace orbis::octree::detail

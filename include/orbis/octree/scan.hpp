@@ -114,14 +114,17 @@ class scan_masks {
     return ((c & 1U) != 0 ? ~low[axis] : low[axis]) & ((c & 2U) != 0 ? ~high[axis] : high[axis]);
   }
   [[nodiscard]] scan_brick& named(std::uint64_t name) {
+    if (last_ < bricks_.size() && bricks_[last_].name == name) return bricks_[last_];
     const std::uint32_t i = index_.find(name);
-    if (i != hash_index::none) return bricks_[i];
-    index_.set(name, static_cast<std::uint32_t>(bricks_.size()));
+    last_ = i != hash_index::none ? i : bricks_.size();
+    if (last_ != bricks_.size()) return bricks_[last_];
+    index_.set(name, static_cast<std::uint32_t>(last_));
     return bricks_.emplace_back(scan_brick{.name = name});
   }
 
   hash_index index_;
   std::vector<scan_brick> bricks_;
+  std::size_t last_ = 0;  ///< the brick asked for last: neighbours mostly lie in the same one
 };
 
 /// Calls `visit(place)` for the place in the brick of every bit set in `masks`.

@@ -3,12 +3,15 @@
 /// A ray as a straight line through planes of voxel faces, eight rays at a time.
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
 
 #include <orbis/core/simd.hpp>
+#include <orbis/octree/ray_batch.hpp>
 #include <orbis/octree/ray_walk.hpp>
 
 #if ORBIS_X86
@@ -18,127 +21,449 @@
 namespace orbis::octree::detail {
 
 /// What all rays of a scan have in common.
+///
+/// An origin on an edge or a corner of its voxel makes rays cross several faces at once, in an order
+/// that only the walk's own arithmetic tells. These first steps are then taken one by one
+/// (`first_steps`), and what is said of a ray here is counted from the voxel it is in afterwards.
 struct ray_source {
   float3 origin{};
+  std::array<std::int32_t, 3> from{};  ///< the origin's voxel
+  double edge = 0.0;                   ///< of a voxel, metres
   double per_metre = 0.0;
-  std::array<double, 3> up{};    ///< from the origin to the first face in the positive direction, in voxels
-  std::array<double, 3> down{};  ///< and in the negative one
+  // Of each axis, in the positive direction and in the negative one:
+  std::array<std::array<double, 3>, 2> face{};           ///< from the origin to the first face, metres
+  std::array<std::array<double, 3>, 2> first{};          ///< to the first face that counts, voxels
+  std::array<std::array<std::int32_t, 3>, 2> skipped{};  ///< steps that do not count: 0 or 1
+  bool on_edge = false;                                  ///< whether there are any
 
   ray_source() = default;
-  ray_source(const voxel_grid& grid, const float3& from, const voxel_key& key) noexcept
-      : origin{from}, per_metre{1.0 / grid.resolution()} {
+  ray_source(const voxel_grid& grid, const float3& at, const voxel_key& key) noexcept
+      : origin{at},
+        from{static_cast<std::int32_t>(key.x), static_cast<std::int32_t>(key.y), static_cast<std::int32_t>(key.z)},
+        edge{grid.resolution()},
+        per_metre{1.0 / grid.resolution()} {
+    constexpr double near = 1e-4;  // voxels; rays that cross another face first are walked
     const std::array<std::uint32_t, 3> k{key.x, key.y, key.z};
-    const auto half = static_cast<double>(static_cast<float>(0.5 * grid.resolution()));
+    const double half = 0.5 * grid.resolution();
+    int on_faces = 0;
     for (std::size_t i = 0; i != 3; ++i) {
-      const double off = static_cast<double>(origin[i]) - grid.center(k[i]);
-      up[i] = (half - off) * per_metre;
-      down[i] = (half + off) * per_metre;
+      bool on_face = false;
+      for (std::size_t down = 0; down != 2; ++down) {
+        const double sign = down == 0 ? 1.0 : -1.0;
+        face[down][i] =
+            grid.center(k[i]) + static_cast<double>(static_cast<float>(sign * half)) - static_cast<double>(origin[i]);
+        first[down][i] = sign * face[down][i] * per_metre;
+        on_face = on_face || first[down][i] < near;
+      }
+      on_faces += on_face ? 1 : 0;
     }
+    if (on_faces < 2) return;
+    for (std::size_t down = 0; down != 2; ++down)
+      for (std::size_t i = 0; i != 3; ++i) {
+        if (!(first[down][i] < near)) continue;
+        skipped[down][i] = 1;
+        first[down][i] += 1.0;
+        on_edge = true;
+      }
   }
 };
 
-/// Rays to be prepared: their ends, and the way there in voxels.
-struct ray_batch {
-  static constexpr std::size_t lanes = 8;
-  alignas(64) std::array<std::array<float, lanes>, 3> end{};
-  alignas(64) std::array<std::array<std::int32_t, lanes>, 3> way{};
+/// Rays prepared, see swept_rays. A ray's kind: eight times the main axis, plus four if it goes down
+/// it, one if it goes down the axis u, two if it goes down v. What follows is counted in steps.
+struct prepared_rays {
+  static constexpr std::size_t lanes = ray_batch::lanes;
+  static constexpr std::int32_t kinds = 24;
+
+  alignas(64) std::array<double, lanes> u, du, v, dv;
+  alignas(64) std::array<std::int32_t, lanes> kind;
+  alignas(64) std::array<std::int32_t, lanes> planes;          ///< that the ray crosses
+  alignas(64) std::array<std::int32_t, lanes> cell_u, cell_v;  ///< behind the last of them
+  // Bit i is of ray i.
+  std::uint32_t done = 0;    ///< of the others nothing is known: they must be walked
+  std::uint32_t step_u = 0;  ///< crosses a face between the last two planes
+  std::uint32_t step_v = 0;
+  std::uint32_t step_u_first = 0;  ///< the one across u comes first
+  std::uint32_t end_u = 0;         ///< the same between the last plane and the end
+  std::uint32_t end_v = 0;
+  std::uint32_t end_u_first = 0;
+
+  [[nodiscard]] static constexpr std::size_t axis(std::int32_t kind) noexcept {
+    return static_cast<std::size_t>(kind >> 3);
+  }
+  [[nodiscard]] static constexpr std::size_t axis_u(std::size_t axis) noexcept { return axis == 0 ? 1 : 0; }
+  [[nodiscard]] static constexpr std::size_t axis_v(std::size_t axis) noexcept { return axis == 2 ? 1 : 2; }
+  /// Whether the rays go down each axis.
+  [[nodiscard]] static constexpr std::array<std::size_t, 3> down(std::int32_t kind) noexcept {
+    std::array<std::size_t, 3> is{};
+    const auto bit = [&](int i) { return static_cast<std::size_t>(kind >> i & 1); };
+    is[axis(kind)] = bit(2);
+    is[axis_u(axis(kind))] = bit(0);
+    is[axis_v(axis(kind))] = bit(1);
+    return is;
+  }
 };
 
-/// Rays prepared, see swept_rays. `face`: twice the main axis, plus one if the ray goes down it.
-struct prepared_rays {
-  alignas(64) std::array<double, ray_batch::lanes> u, du, v, dv;
-  alignas(64) std::array<std::int32_t, ray_batch::lanes> planes, face;
-};
+/// In voxels: more than what a walk's arithmetic and this one's can differ.
+inline constexpr double ray_doubt = 1e-8;
+/// Rays that cross more planes are walked.
+inline constexpr std::int32_t max_ray_planes = 4096;
+
+/// Prepares eight rays of a batch, from the i-th on.
+inline void prepare_portable(const ray_source& source, const ray_batch& rays, std::size_t i,
+                             prepared_rays& out) noexcept {
+  out.done = out.step_u = out.step_v = out.step_u_first = out.end_u = out.end_v = out.end_u_first = 0;
+  const std::uint32_t wanted = ray_batch::eight(rays.hit, i) | ray_batch::eight(rays.cut, i);
+  for (std::size_t lane = 0; lane != ray_batch::lanes; ++lane, ++i) {
+    if ((wanted >> lane & 1U) == 0) continue;
+    const float3 ray = difference({rays.end[0][i], rays.end[1][i], rays.end[2][i]}, source.origin);
+    const auto reach = static_cast<float>(length(ray));
+    if (!(reach > 0.0F && reach < 1e30F)) continue;
+    std::array<double, 3> speed, first, expected;
+    std::array<std::uint32_t, 3> down;
+    const double metres = static_cast<double>(reach) * source.per_metre;
+    bool good = true;
+    for (std::size_t axis = 0; axis != 3; ++axis) {
+      const auto d = static_cast<double>(ray[axis] / reach);
+      down[axis] = d < 0.0 ? 1 : 0;
+      speed[axis] = std::fabs(d);
+      first[axis] = d == 0.0 ? 0.5 : source.first[down[axis]][axis];
+      const std::int32_t way = down[axis] != 0 ? -rays.way[axis][i] : rays.way[axis][i];
+      expected[axis] = way - source.skipped[down[axis]][axis];
+      // Whether the walk reaches the end's voxel before the ray's length stops it.
+      const double over = metres * speed[axis] - first[axis] + 1.0 - expected[axis];
+      good = good && over > ray_doubt && over < 1.0 - ray_doubt;
+    }
+    std::size_t axis = speed[1] > speed[0] ? 1 : 0;
+    axis = speed[2] > speed[axis] ? 2 : axis;
+    const std::size_t iu = prepared_rays::axis_u(axis), iv = prepared_rays::axis_v(axis);
+    const double per_plane = 1.0 / speed[axis], planes = expected[axis];
+    if (!good || !(planes >= 0.0 && planes <= max_ray_planes)) continue;
+
+    struct line {
+      double at, slope, cell, part, cell_before;
+    };
+    const auto along = [&](std::size_t across) {
+      line l;
+      l.slope = speed[across] * per_plane;
+      l.at = (first[axis] - 1.0) * l.slope - first[across] + 1.0;
+      const auto cell = [&](double n, double& part) {
+        const double last = l.at + n * l.slope, whole = n < 0.5 ? 0.0 : std::floor(last);
+        part = last - whole;
+        good = good && (n < 0.5 || (part > ray_doubt && part < 1.0 - ray_doubt));
+        return whole;
+      };
+      double part;
+      l.cell_before = cell(std::max(planes - 1.0, 0.0), part);
+      l.cell = cell(planes, l.part);
+      return l;
+    };
+    const line u = along(iu), v = along(iv);
+    const double end_u = expected[iu] - u.cell, end_v = expected[iv] - v.cell;
+    const double step_u = u.cell - u.cell_before, step_v = v.cell - v.cell_before;
+    good = good && end_u >= 0.0 && end_u <= 1.0 && end_v >= 0.0 && end_v <= 1.0;
+    const double sure = ray_doubt * (u.slope + v.slope);
+    const double end_order = (1.0 - v.part) * u.slope - (1.0 - u.part) * v.slope;
+    const double step_order = u.part * v.slope - v.part * u.slope;
+    if (end_u + end_v > 1.5) good = good && std::fabs(end_order) > sure;
+    if (step_u + step_v > 1.5) good = good && std::fabs(step_order) > sure;
+    if (!good) continue;
+
+    out.u[lane] = down[iu] != 0 ? 1.0 - u.at : u.at;
+    out.du[lane] = down[iu] != 0 ? -u.slope : u.slope;
+    out.v[lane] = down[iv] != 0 ? 1.0 - v.at : v.at;
+    out.dv[lane] = down[iv] != 0 ? -v.slope : v.slope;
+    out.kind[lane] = static_cast<std::int32_t>(8 * axis + 4 * down[axis] + 2 * down[iv] + down[iu]);
+    out.planes[lane] = static_cast<std::int32_t>(planes);
+    out.cell_u[lane] = static_cast<std::int32_t>(u.cell);
+    out.cell_v[lane] = static_cast<std::int32_t>(v.cell);
+    const auto set = [&](std::uint32_t& bits, bool bit) { bits |= (bit ? 1U : 0U) << lane; };
+    set(out.done, true);
+    set(out.step_u, step_u > 0.5);
+    set(out.step_v, step_v > 0.5);
+    set(out.step_u_first, step_order > 0.0);
+    set(out.end_u, end_u > 0.5);
+    set(out.end_v, end_v > 0.5);
+    set(out.end_u_first, end_order > 0.0);
+  }
+}
+
+/// Takes the steps of a ray that do not count. Bit (dx + 1) + 3 (dy + 1) + 9 (dz + 1) of what is
+/// returned: the ray passes through the voxel that lies so far from the origin's; the last voxel is
+/// left out. 0 if the ray crosses another face before.
+[[nodiscard]] inline std::uint32_t first_steps(const ray_source& source, const float3& end,
+                                               const std::array<std::size_t, 3>& down) noexcept {
+  float3 direction = difference(end, source.origin);
+  const auto reach = static_cast<float>(length(direction));
+  std::array<double, 3> next, delta;
+  int left = 0;
+  for (std::size_t i = 0; i != 3; ++i) {
+    direction[i] /= reach;
+    const auto d = static_cast<double>(direction[i]);
+    next[i] = d != 0.0 ? source.face[down[i]][i] / d : std::numeric_limits<double>::max();
+    delta[i] = d != 0.0 ? source.edge / std::fabs(d) : next[i];
+    left += source.skipped[down[i]][i];
+  }
+  constexpr std::array<int, 3> stride{1, 3, 9};
+  std::uint32_t passed = 0;
+  std::array<bool, 3> taken{};
+  for (int at = 13; left != 0; --left) {
+    passed |= 1U << at;
+    const std::size_t axis = next[0] < next[1] ? (next[0] < next[2] ? 0 : 2) : (next[1] < next[2] ? 1 : 2);
+    if (taken[axis] || source.skipped[down[axis]][axis] == 0) return 0;
+    taken[axis] = true;
+    next[axis] += delta[axis];
+    at += down[axis] != 0 ? -stride[axis] : stride[axis];
+  }
+  return passed | 1U << 31U;
+}
 
 #if ORBIS_X86
-/// Prepares the rays of a batch. Bit i of what is returned: ray i is done, and between its last plane
-/// and its end there are no voxels. Of the others nothing is known. `doubt`, in voxels: more than what a
-/// walk's arithmetic and this one's can differ.
-ORBIS_TARGET("avx512f,avx512dq,avx512vl")
-inline std::uint32_t prepare_avx512(const ray_source& source, const ray_batch& rays, double doubt,
-                                    prepared_rays& out) noexcept {
-  constexpr __mmask8 all = 0xff;
-  __m256 ray[3], square[3];
-  for (std::size_t i = 0; i != 3; ++i) {
-    ray[i] = _mm256_sub_ps(_mm256_load_ps(rays.end[i].data()), _mm256_set1_ps(source.origin[i]));
-    square[i] = _mm256_mul_ps(ray[i], ray[i]);
+ORBIS_TARGET("avx2")
+inline void prepare_avx2(const ray_source& source, const ray_batch& rays, std::size_t i, prepared_rays& out) noexcept {
+  out.done = out.step_u = out.step_v = out.step_u_first = out.end_u = out.end_v = out.end_u_first = 0;
+  const std::uint32_t wanted = ray_batch::eight(rays.hit, i) | ray_batch::eight(rays.cut, i);
+  const __m256d zero = _mm256_setzero_pd(), one = _mm256_set1_pd(1.0), half = _mm256_set1_pd(0.5);
+  const __m256d doubt = _mm256_set1_pd(ray_doubt), rest = _mm256_set1_pd(1.0 - ray_doubt);
+  const __m256d sign = _mm256_set1_pd(-0.0);
+  const auto less = [&](__m256d a, __m256d b) ORBIS_TARGET("avx2") { return _mm256_cmp_pd(a, b, _CMP_LT_OQ); };
+  const auto select = [&](__m256d a, __m256d b, __m256d mask)
+                          ORBIS_TARGET("avx2") { return _mm256_blendv_pd(a, b, mask); };
+  const auto bits = [&](__m256d mask)
+                        ORBIS_TARGET("avx2") { return static_cast<std::uint32_t>(_mm256_movemask_pd(mask)); };
+  const auto within = [&](__m256d x) ORBIS_TARGET("avx2") { return _mm256_and_pd(less(doubt, x), less(x, rest)); };
+  for (std::size_t lane = 0; lane != 8; lane += 4, i += 4) {
+    __m128 ray[3], square[3];
+    for (std::size_t axis = 0; axis != 3; ++axis) {
+      ray[axis] = _mm_sub_ps(_mm_load_ps(rays.end[axis].data() + i), _mm_set1_ps(source.origin[axis]));
+      square[axis] = _mm_mul_ps(ray[axis], ray[axis]);
 #if !defined(__clang__)
-    asm("" : "+v"(square[i]));  // rounded: see rounded_product
+      asm("" : "+x"(square[axis]));  // rounded: see rounded_product
+#endif
+    }
+    const __m128 squares = _mm_add_ps(_mm_add_ps(square[0], square[1]), square[2]);
+    const __m128 reach = _mm256_cvtpd_ps(_mm256_sqrt_pd(_mm256_cvtps_pd(squares)));
+    const __m256d length = _mm256_cvtps_pd(reach);
+    const __m256d metres = _mm256_mul_pd(length, _mm256_set1_pd(source.per_metre));
+    __m256d good = _mm256_and_pd(less(zero, length), less(length, _mm256_set1_pd(1e30)));
+    __m256d speed[3], first[3], expected[3], down[3];
+    for (std::size_t axis = 0; axis != 3; ++axis) {
+      const __m256d d = _mm256_cvtps_pd(_mm_div_ps(ray[axis], reach));
+      down[axis] = less(d, zero);
+      speed[axis] = _mm256_andnot_pd(sign, d);
+      const auto either = [&](double up_value, double down_value) ORBIS_TARGET("avx2") {
+        return select(_mm256_set1_pd(up_value), _mm256_set1_pd(down_value), down[axis]);
+      };
+      first[axis] =
+          select(either(source.first[0][axis], source.first[1][axis]), half, _mm256_cmp_pd(d, zero, _CMP_EQ_OQ));
+      const __m256d way =
+          _mm256_cvtepi32_pd(_mm_load_si128(reinterpret_cast<const __m128i*>(rays.way[axis].data() + i)));
+      expected[axis] = _mm256_sub_pd(_mm256_xor_pd(way, _mm256_and_pd(down[axis], sign)),
+                                     either(source.skipped[0][axis], source.skipped[1][axis]));
+      // Whether the walk reaches the end's voxel before the ray's length stops it.
+      const __m256d crossed = _mm256_add_pd(_mm256_sub_pd(_mm256_mul_pd(metres, speed[axis]), first[axis]), one);
+      good = _mm256_and_pd(good, within(_mm256_sub_pd(crossed, expected[axis])));
+    }
+    const __m256d y_main = less(speed[0], speed[1]);
+    const __m256d z_main = less(select(speed[0], speed[1], y_main), speed[2]);
+    const __m256d x_main = _mm256_andnot_pd(_mm256_or_pd(y_main, z_main), _mm256_cmp_pd(zero, zero, _CMP_EQ_OQ));
+    const auto main_of = [&](const __m256d(&a)[3])
+                             ORBIS_TARGET("avx2") { return select(select(a[0], a[1], y_main), a[2], z_main); };
+    const auto across_u = [&](const __m256d(&a)[3]) ORBIS_TARGET("avx2") { return select(a[0], a[1], x_main); };
+    const auto across_v = [&](const __m256d(&a)[3]) ORBIS_TARGET("avx2") { return select(a[2], a[1], z_main); };
+    const __m256d per_plane = _mm256_div_pd(one, main_of(speed)), planes = main_of(expected);
+    const __m256d first_plane = _mm256_sub_pd(main_of(first), one), before = _mm256_sub_pd(planes, one);
+    const __m256d none = less(planes, half), none_before = less(before, half);
+    good = _mm256_and_pd(good, _mm256_cmp_pd(planes, zero, _CMP_GE_OQ));
+    good = _mm256_and_pd(good, _mm256_cmp_pd(planes, _mm256_set1_pd(max_ray_planes), _CMP_LE_OQ));
+
+    struct line {
+      __m256d slope, cell, part, end, step;
+    };
+    const auto along = [&](__m256d l_speed, __m256d l_first, __m256d l_expected, __m256d l_down, double* at,
+                           double* slope, std::int32_t* cells) ORBIS_TARGET("avx2") {
+      line l;
+      l.slope = _mm256_mul_pd(l_speed, per_plane);
+      const __m256d a = _mm256_add_pd(_mm256_sub_pd(_mm256_mul_pd(first_plane, l.slope), l_first), one);
+      const auto cell = [&](__m256d n, __m256d no_planes, __m256d& part) ORBIS_TARGET("avx2") {
+        const __m256d last = _mm256_add_pd(a, _mm256_mul_pd(n, l.slope));
+        const __m256d whole = _mm256_andnot_pd(no_planes, _mm256_floor_pd(last));
+        part = _mm256_sub_pd(last, whole);
+        good = _mm256_and_pd(good, _mm256_or_pd(no_planes, within(part)));
+        return whole;
+      };
+      __m256d part;
+      l.step = cell(before, none_before, part);
+      l.cell = cell(planes, none, l.part);
+      l.step = _mm256_sub_pd(l.cell, l.step);
+      l.end = _mm256_sub_pd(l_expected, l.cell);
+      good = _mm256_and_pd(
+          good, _mm256_and_pd(_mm256_cmp_pd(l.end, zero, _CMP_GE_OQ), _mm256_cmp_pd(l.end, one, _CMP_LE_OQ)));
+      _mm256_store_pd(at + lane, select(a, _mm256_sub_pd(one, a), l_down));
+      _mm256_store_pd(slope + lane, _mm256_xor_pd(l.slope, _mm256_and_pd(l_down, sign)));
+      _mm_store_si128(reinterpret_cast<__m128i*>(cells + lane), _mm256_cvtpd_epi32(l.cell));
+      return l;
+    };
+    const __m256d down_u = across_u(down), down_v = across_v(down);
+    const line u = along(across_u(speed), across_u(first), across_u(expected), down_u, out.u.data(), out.du.data(),
+                         out.cell_u.data());
+    const line v = along(across_v(speed), across_v(first), across_v(expected), down_v, out.v.data(), out.dv.data(),
+                         out.cell_v.data());
+    const __m256d sure = _mm256_mul_pd(doubt, _mm256_add_pd(u.slope, v.slope));
+    const __m256d end_order = _mm256_sub_pd(_mm256_mul_pd(_mm256_sub_pd(one, v.part), u.slope),
+                                            _mm256_mul_pd(_mm256_sub_pd(one, u.part), v.slope));
+    const __m256d step_order = _mm256_sub_pd(_mm256_mul_pd(u.part, v.slope), _mm256_mul_pd(v.part, u.slope));
+    const auto unsure = [&](__m256d a, __m256d b, __m256d order) ORBIS_TARGET("avx2") {
+      return _mm256_andnot_pd(less(sure, _mm256_andnot_pd(sign, order)), _mm256_and_pd(less(half, a), less(half, b)));
+    };
+    good = _mm256_andnot_pd(unsure(u.end, v.end, end_order), good);
+    good = _mm256_andnot_pd(unsure(u.step, v.step, step_order), good);
+
+    const __m256d kind = _mm256_add_pd(
+        _mm256_add_pd(_mm256_and_pd(y_main, _mm256_set1_pd(8.0)), _mm256_and_pd(down_u, one)),
+        _mm256_add_pd(_mm256_and_pd(main_of(down), _mm256_set1_pd(4.0)), _mm256_and_pd(down_v, _mm256_set1_pd(2.0))));
+    const __m256d of_z = _mm256_add_pd(_mm256_and_pd(_mm256_andnot_pd(y_main, z_main), _mm256_set1_pd(16.0)),
+                                       _mm256_and_pd(_mm256_and_pd(y_main, z_main), _mm256_set1_pd(8.0)));
+    _mm_store_si128(reinterpret_cast<__m128i*>(out.kind.data() + lane), _mm256_cvtpd_epi32(_mm256_add_pd(kind, of_z)));
+    _mm_store_si128(reinterpret_cast<__m128i*>(out.planes.data() + lane), _mm256_cvtpd_epi32(planes));
+    out.done |= bits(good) << lane;
+    out.step_u |= bits(less(half, u.step)) << lane;
+    out.step_v |= bits(less(half, v.step)) << lane;
+    out.step_u_first |= bits(less(zero, step_order)) << lane;
+    out.end_u |= bits(less(half, u.end)) << lane;
+    out.end_v |= bits(less(half, v.end)) << lane;
+    out.end_u_first |= bits(less(zero, end_order)) << lane;
+  }
+  out.done &= wanted;
+}
+
+ORBIS_TARGET("avx512f,avx512dq,avx512vl")
+inline void prepare_avx512(const ray_source& source, const ray_batch& rays, std::size_t i,
+                           prepared_rays& out) noexcept {
+  constexpr __mmask8 all = 0xff;
+  const __m512d zero = _mm512_setzero_pd(), one = _mm512_set1_pd(1.0), half = _mm512_set1_pd(0.5);
+  const __m512d doubt = _mm512_set1_pd(ray_doubt), rest = _mm512_set1_pd(1.0 - ray_doubt);
+  const auto less = [&](__m512d a, __m512d b) ORBIS_TARGET("avx512f") { return _mm512_cmp_pd_mask(a, b, _CMP_LT_OQ); };
+  const auto select = [&](__m512d a, __m512d b, __mmask8 mask)
+                          ORBIS_TARGET("avx512f") { return _mm512_mask_mov_pd(a, mask, b); };
+  const auto within = [&](__m512d x)
+                          ORBIS_TARGET("avx512f") { return static_cast<__mmask8>(less(doubt, x) & less(x, rest)); };
+  __m256 ray[3], square[3];
+  for (std::size_t axis = 0; axis != 3; ++axis) {
+    ray[axis] = _mm256_sub_ps(_mm256_load_ps(rays.end[axis].data() + i), _mm256_set1_ps(source.origin[axis]));
+    square[axis] = _mm256_mul_ps(ray[axis], ray[axis]);
+#if !defined(__clang__)
+    asm("" : "+v"(square[axis]));  // rounded: see rounded_product
 #endif
   }
   const __m256 squares = _mm256_add_ps(_mm256_add_ps(square[0], square[1]), square[2]);
   const __m256 reach = _mm512_maskz_cvtpd_ps(all, _mm512_maskz_sqrt_pd(all, _mm512_maskz_cvtps_pd(all, squares)));
   const __m512d length = _mm512_maskz_cvtps_pd(all, reach);
-  const __m512d zero = _mm512_setzero_pd(), one = _mm512_set1_pd(1.0), vdoubt = _mm512_set1_pd(doubt);
-  std::uint32_t good = _mm512_cmp_pd_mask(length, zero, _CMP_GT_OQ);
-  good &= _mm512_cmp_pd_mask(length, _mm512_set1_pd(1e30), _CMP_LT_OQ);
-
-  __m512d speed[3], first[3], expected[3];  // along each axis: of the ray; to the first face; crossings
-  __mmask8 negative[3];
-  for (std::size_t i = 0; i != 3; ++i) {
-    const __m512d d = _mm512_maskz_cvtps_pd(all, _mm256_div_ps(ray[i], reach));
-    negative[i] = _mm512_cmp_pd_mask(d, zero, _CMP_LT_OQ);
-    speed[i] = _mm512_abs_pd(d);
-    const __mmask8 still = _mm512_cmp_pd_mask(d, zero, _CMP_EQ_OQ);
-    first[i] = _mm512_mask_mov_pd(
-        _mm512_mask_mov_pd(_mm512_set1_pd(source.up[i]), negative[i], _mm512_set1_pd(source.down[i])), still,
-        _mm512_set1_pd(0.5));
+  const __m512d metres = _mm512_mul_pd(length, _mm512_set1_pd(source.per_metre));
+  auto good = static_cast<__mmask8>(less(zero, length) & less(length, _mm512_set1_pd(1e30)));
+  __m512d speed[3], first[3], expected[3];
+  __mmask8 down[3];
+  for (std::size_t axis = 0; axis != 3; ++axis) {
+    const __m512d d = _mm512_maskz_cvtps_pd(all, _mm256_div_ps(ray[axis], reach));
+    down[axis] = less(d, zero);
+    speed[axis] = _mm512_abs_pd(d);
+    const auto either = [&](double up_value, double down_value) ORBIS_TARGET("avx512f") {
+      return select(_mm512_set1_pd(up_value), _mm512_set1_pd(down_value), down[axis]);
+    };
+    first[axis] =
+        select(either(source.first[0][axis], source.first[1][axis]), half, _mm512_cmp_pd_mask(d, zero, _CMP_EQ_OQ));
     const __m512d way =
-        _mm512_maskz_cvtepi32_pd(all, _mm256_load_si256(reinterpret_cast<const __m256i*>(rays.way[i].data())));
-    expected[i] = _mm512_mask_sub_pd(way, negative[i], zero, way);
+        _mm512_maskz_cvtepi32_pd(all, _mm256_load_si256(reinterpret_cast<const __m256i*>(rays.way[axis].data() + i)));
+    expected[axis] = _mm512_sub_pd(_mm512_mask_sub_pd(way, down[axis], zero, way),
+                                   either(source.skipped[0][axis], source.skipped[1][axis]));
     // Whether the walk reaches the end's voxel before the ray's length stops it.
-    const __m512d metres = _mm512_mul_pd(length, _mm512_set1_pd(source.per_metre));
-    const __m512d crossed = _mm512_add_pd(_mm512_sub_pd(_mm512_mul_pd(metres, speed[i]), first[i]), one);
-    const __m512d over = _mm512_sub_pd(crossed, expected[i]);
-    good &= _mm512_cmp_pd_mask(over, vdoubt, _CMP_GT_OQ);
-    good &= _mm512_cmp_pd_mask(over, _mm512_sub_pd(one, vdoubt), _CMP_LT_OQ);
+    const __m512d crossed = _mm512_add_pd(_mm512_sub_pd(_mm512_mul_pd(metres, speed[axis]), first[axis]), one);
+    good &= within(_mm512_sub_pd(crossed, expected[axis]));
   }
-  const __mmask8 y_main = _mm512_cmp_pd_mask(speed[1], speed[0], _CMP_GT_OQ);
-  const __m512d most = _mm512_mask_mov_pd(speed[0], y_main, speed[1]);
-  const __mmask8 z_main = _mm512_cmp_pd_mask(speed[2], most, _CMP_GT_OQ);
+  const __mmask8 y_main = less(speed[0], speed[1]);
+  const __mmask8 z_main = less(select(speed[0], speed[1], y_main), speed[2]);
   const auto x_main = static_cast<__mmask8>(~(y_main | z_main));
-  const auto main_of = [&](const __m512d(&a)[3]) ORBIS_TARGET("avx512f") {
-    return _mm512_mask_mov_pd(_mm512_mask_mov_pd(a[0], y_main, a[1]), z_main, a[2]);
-  };
-  const __m512d per_plane = _mm512_div_pd(one, main_of(speed));
-  const __m512d planes = main_of(expected), first_plane = _mm512_sub_pd(main_of(first), one);
-  good &= _mm512_cmp_pd_mask(planes, _mm512_set1_pd(4096.0), _CMP_LE_OQ);
-  __m512d left = zero;
-  const auto line = [&](__m512d v_speed, __m512d v_first, __m512d v_expected, __mmask8 down, double* at,
-                        double* slope) ORBIS_TARGET("avx512f,avx512dq") {
-    const __m512d b = _mm512_mul_pd(v_speed, per_plane);
-    const __m512d a = _mm512_add_pd(_mm512_sub_pd(_mm512_mul_pd(first_plane, b), v_first), one);
-    const __m512d last = _mm512_add_pd(a, _mm512_mul_pd(planes, b));
-    const __m512d whole = _mm512_maskz_roundscale_pd(0xff, last, _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC);
-    const __m512d part = _mm512_sub_pd(last, whole);
-    good &= _mm512_cmp_pd_mask(part, vdoubt, _CMP_GT_OQ);
-    good &= _mm512_cmp_pd_mask(part, _mm512_sub_pd(one, vdoubt), _CMP_LT_OQ);
-    left = _mm512_add_pd(left, _mm512_abs_pd(_mm512_sub_pd(v_expected, whole)));
-    _mm512_store_pd(at, _mm512_mask_sub_pd(a, down, one, a));
-    _mm512_store_pd(slope, _mm512_mask_sub_pd(b, down, zero, b));
-  };
-  const auto across_u = [&](const __m512d(&a)[3])
-                            ORBIS_TARGET("avx512f") { return _mm512_mask_mov_pd(a[0], x_main, a[1]); };
-  const auto across_v = [&](const __m512d(&a)[3])
-                            ORBIS_TARGET("avx512f") { return _mm512_mask_mov_pd(a[2], z_main, a[1]); };
-  const auto chosen = [](__mmask8 from, __mmask8 mask, __mmask8 other) {
+  const auto main_of = [&](const __m512d(&a)[3])
+                           ORBIS_TARGET("avx512f") { return select(select(a[0], a[1], y_main), a[2], z_main); };
+  const auto across_u = [&](const __m512d(&a)[3]) ORBIS_TARGET("avx512f") { return select(a[0], a[1], x_main); };
+  const auto across_v = [&](const __m512d(&a)[3]) ORBIS_TARGET("avx512f") { return select(a[2], a[1], z_main); };
+  const auto chosen = [&](__mmask8 from, __mmask8 mask, __mmask8 other) {
     return static_cast<__mmask8>((from & ~mask) | (other & mask));
   };
-  line(across_u(speed), across_u(first), across_u(expected), chosen(negative[0], x_main, negative[1]), out.u.data(),
-       out.du.data());
-  line(across_v(speed), across_v(first), across_v(expected), chosen(negative[2], z_main, negative[1]), out.v.data(),
-       out.dv.data());
-  good &= _mm512_cmp_pd_mask(left, one, _CMP_LE_OQ);
-  good &= _mm512_cmp_pd_mask(planes, one, _CMP_GE_OQ);
+  const __m512d per_plane = _mm512_div_pd(one, main_of(speed)), planes = main_of(expected);
+  const __m512d first_plane = _mm512_sub_pd(main_of(first), one), before = _mm512_sub_pd(planes, one);
+  const __mmask8 none = less(planes, half), none_before = less(before, half);
+  good &= _mm512_cmp_pd_mask(planes, zero, _CMP_GE_OQ);
+  good &= _mm512_cmp_pd_mask(planes, _mm512_set1_pd(max_ray_planes), _CMP_LE_OQ);
 
-  const __mmask8 down = chosen(chosen(negative[0], y_main, negative[1]), z_main, negative[2]);
-  __m256i face = _mm256_maskz_set1_epi32(y_main, 2);
-  face = _mm256_mask_mov_epi32(face, z_main, _mm256_set1_epi32(4));
-  face = _mm256_mask_add_epi32(face, down, face, _mm256_set1_epi32(1));
-  _mm256_store_si256(reinterpret_cast<__m256i*>(out.face.data()), face);
+  struct line {
+    __m512d slope, cell, part, end, step;
+  };
+  const auto along = [&](__m512d l_speed, __m512d l_first, __m512d l_expected, __mmask8 l_down, double* at,
+                         double* slope, std::int32_t* cells) ORBIS_TARGET("avx512f,avx512dq,avx512vl") {
+    line l;
+    l.slope = _mm512_mul_pd(l_speed, per_plane);
+    const __m512d a = _mm512_add_pd(_mm512_sub_pd(_mm512_mul_pd(first_plane, l.slope), l_first), one);
+    const auto cell = [&](__m512d n, __mmask8 no_planes, __m512d& part) ORBIS_TARGET("avx512f,avx512dq") {
+      const __m512d last = _mm512_add_pd(a, _mm512_mul_pd(n, l.slope));
+      const __m512d whole = _mm512_maskz_roundscale_pd(static_cast<__mmask8>(~no_planes), last,
+                                                       _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC);
+      part = _mm512_sub_pd(last, whole);
+      good &= static_cast<__mmask8>(no_planes | within(part));
+      return whole;
+    };
+    __m512d part;
+    l.step = cell(before, none_before, part);
+    l.cell = cell(planes, none, l.part);
+    l.step = _mm512_sub_pd(l.cell, l.step);
+    l.end = _mm512_sub_pd(l_expected, l.cell);
+    good &= _mm512_cmp_pd_mask(l.end, zero, _CMP_GE_OQ);
+    good &= _mm512_cmp_pd_mask(l.end, one, _CMP_LE_OQ);
+    _mm512_store_pd(at, _mm512_mask_sub_pd(a, l_down, one, a));
+    _mm512_store_pd(slope, _mm512_mask_sub_pd(l.slope, l_down, zero, l.slope));
+    _mm256_store_si256(reinterpret_cast<__m256i*>(cells), _mm512_maskz_cvtpd_epi32(all, l.cell));
+    return l;
+  };
+  const __mmask8 down_u = chosen(down[0], x_main, down[1]), down_v = chosen(down[2], z_main, down[1]);
+  const line u = along(across_u(speed), across_u(first), across_u(expected), down_u, out.u.data(), out.du.data(),
+                       out.cell_u.data());
+  const line v = along(across_v(speed), across_v(first), across_v(expected), down_v, out.v.data(), out.dv.data(),
+                       out.cell_v.data());
+  const __m512d sure = _mm512_mul_pd(doubt, _mm512_add_pd(u.slope, v.slope));
+  const __m512d end_order = _mm512_sub_pd(_mm512_mul_pd(_mm512_sub_pd(one, v.part), u.slope),
+                                          _mm512_mul_pd(_mm512_sub_pd(one, u.part), v.slope));
+  const __m512d step_order = _mm512_sub_pd(_mm512_mul_pd(u.part, v.slope), _mm512_mul_pd(v.part, u.slope));
+  out.step_u = less(half, u.step);
+  out.step_v = less(half, v.step);
+  out.step_u_first = less(zero, step_order);
+  out.end_u = less(half, u.end);
+  out.end_v = less(half, v.end);
+  out.end_u_first = less(zero, end_order);
+  out.done = good & ~(out.end_u & out.end_v & ~static_cast<std::uint32_t>(less(sure, _mm512_abs_pd(end_order)))) &
+             ~(out.step_u & out.step_v & ~static_cast<std::uint32_t>(less(sure, _mm512_abs_pd(step_order)))) &
+             (ray_batch::eight(rays.hit, i) | ray_batch::eight(rays.cut, i));
+
+  __m256i kind = _mm256_maskz_set1_epi32(y_main, 8);
+  kind = _mm256_mask_mov_epi32(kind, z_main, _mm256_set1_epi32(16));
+  const auto add = [&](__mmask8 mask, int bit) ORBIS_TARGET("avx512f,avx512vl") {
+    kind = _mm256_mask_add_epi32(kind, mask, kind, _mm256_set1_epi32(bit));
+  };
+  add(chosen(chosen(down[0], y_main, down[1]), z_main, down[2]), 4);
+  add(down_v, 2);
+  add(down_u, 1);
+  _mm256_store_si256(reinterpret_cast<__m256i*>(out.kind.data()), kind);
   _mm256_store_si256(reinterpret_cast<__m256i*>(out.planes.data()), _mm512_maskz_cvtpd_epi32(all, planes));
-  return good;
 }
 #endif
+
+using prepare_kernel = void(const ray_source&, const ray_batch&, std::size_t, prepared_rays&);
+
+[[nodiscard]] inline prepare_kernel* prepare_rays(simd::level level) noexcept {
+  return simd::select<prepare_kernel>(level, {
+    .portable = prepare_portable,
+#if ORBIS_X86
+    .popcnt = nullptr, .avx2 = prepare_avx2, .avx512 = prepare_avx512
+#endif
+  });
+}
 
 }  // namespace orbis::octree::detail
