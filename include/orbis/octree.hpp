@@ -33,6 +33,7 @@
 #include <orbis/octree/node_name.hpp>
 #include <orbis/octree/nodes.hpp>
 #include <orbis/octree/occupancy_octree.hpp>
+#include <orbis/octree/octant_record.hpp>
 #include <orbis/octree/octomap_nodes.hpp>
 #include <orbis/octree/overlap.hpp>
 #include <orbis/octree/packed_block.hpp>

@@ -21,6 +21,7 @@
 #include <orbis/octree/cow_pages.hpp>
 #include <orbis/octree/hash_index.hpp>
 #include <orbis/octree/node_name.hpp>
+#include <orbis/octree/octant_record.hpp>
 #include <orbis/octree/packed_block.hpp>
 
 namespace orbis::octree {
@@ -28,11 +29,11 @@ namespace orbis::octree {
 /// 8x8x8 voxels.
 template <class T>
 struct brick {
-  std::uint64_t name = 0;                 ///< see node_name
-  std::uint8_t uniform = 0;               ///< bit i: octant i has one value, value[i]
-  std::uint8_t dense = 0;                 ///< bit i: octant i is stored voxel by voxel, in record at[i]
+  std::uint64_t name = 0;    ///< see node_name
+  std::uint8_t uniform = 0;  ///< bit i: octant i has one value, value[i]
+  std::uint8_t dense = 0;    ///< bit i: octant i is stored voxel by voxel, in record at[i]
   std::array<std::uint32_t, 8> at{};
-  std::array<T, 8> value{};               ///< the largest value in octant i, if anything is known there
+  std::array<T, 8> value{};  ///< the largest value in octant i, if anything is known there
 
   [[nodiscard]] bool is_known() const noexcept { return (uniform | dense) != 0; }
   /// Whether all 512 voxels have the same value.
@@ -40,22 +41,6 @@ struct brick {
     bool same = uniform == 0xff;
     for (const T v : value) same &= v == value[0];
     return same;
-  }
-};
-
-/// An octant where it is stored: its known voxels, and the index of each voxel's value, bit by bit.
-template <class T>
-struct octant_view {
-  std::uint64_t known = 0;
-  const std::uint64_t* plane = nullptr;  ///< `bits` masks: bit j of every voxel's index
-  unsigned bits = 0;
-  const T* value = nullptr;
-
-  /// The value of a place. @pre it is known
-  [[nodiscard]] T at(std::uint32_t place) const noexcept {
-    unsigned index = 0;
-    for (unsigned j = 0; j != bits; ++j) index |= static_cast<unsigned>(plane[j] >> place & 1U) << j;
-    return value[index];
   }
 };
 
@@ -175,9 +160,11 @@ class brick_store {
   /// Bytes on the heap, those shared with copies included.
   [[nodiscard]] std::size_t memory_bytes() const noexcept {
     std::size_t bytes = index_.memory_bytes() + large_index_.memory_bytes() + chunks_.memory_bytes() +
-                        bricks_.memory_bytes() + large_.memory_bytes() + free_bricks_.capacity() * sizeof(std::uint32_t);
-    std::apply([&](const auto&... p) { ((bytes += p.items.memory_bytes() + p.free.capacity() * sizeof(std::uint32_t)), ...); },
-               pools_);
+                        bricks_.memory_bytes() + large_.memory_bytes() +
+                        free_bricks_.capacity() * sizeof(std::uint32_t);
+    std::apply(
+        [&](const auto&... p) { ((bytes += p.items.memory_bytes() + p.free.capacity() * sizeof(std::uint32_t)), ...); },
+        pools_);
     return bytes;
   }
 
@@ -260,8 +247,7 @@ class brick_store {
   /// `changed(name of the brick, octant, mask of voxels)` for what became different, but not for
   /// leaves bigger than a brick. O(octants).
   template <class Change, std::invocable<std::uint64_t, std::uint32_t, std::uint64_t> Changed>
-  requires std::is_invocable_r_v<std::optional<T>, Change&, T>
-  void transform(Change&& change, Changed&& changed) {
+  requires std::is_invocable_r_v<std::optional<T>, Change&, T> void transform(Change&& change, Changed&& changed) {
     std::vector<std::uint64_t> empty;
     block<T> voxels;
     for (std::uint32_t i = 0; i != bricks_.size(); ++i) {
@@ -318,86 +304,6 @@ class brick_store {
   static constexpr std::uint64_t gone = ~std::uint64_t{0};
   static constexpr unsigned raw = max_palette_bits + 1;
 
-  /// An octant with up to 2^Bits values.
-  template <unsigned Bits>
-  struct packed {
-    std::uint64_t known = 0;
-    std::array<std::uint64_t, Bits> plane{};
-    std::array<T, 1U << Bits> values{};
-
-    [[nodiscard]] octant_view<T> view() const noexcept { return {known, plane.data(), Bits, values.data()}; }
-    [[nodiscard]] T at(std::uint32_t place) const noexcept {
-      unsigned index = 0;
-      for (unsigned j = 0; j != Bits; ++j) index |= static_cast<unsigned>(plane[j] >> place & 1U) << j;
-      return values[index];
-    }
-    template <class Wanted>
-    [[nodiscard]] std::uint64_t where(Wanted&& wanted) const noexcept {
-      std::uint64_t found = 0;
-      for (unsigned i = 0; i != 1U << Bits; ++i)
-        if (wanted(values[i])) found |= voxels_of_index<Bits>(plane.data(), i);
-      return found;
-    }
-    void unpack(block<T>& out) const noexcept {
-      out.known = known;
-      expand_palette(values.data(), plane.data(), Bits, out);
-    }
-    void pack(std::uint64_t voxels, const palette<T>& p) noexcept {
-      known = voxels;
-      std::copy_n(p.plane.begin(), Bits, plane.begin());
-      std::copy_n(p.value.begin(), values.size(), values.begin());
-    }
-    template <class Change>
-    [[nodiscard]] packed transformed(Change&& change, std::uint64_t& different) const {
-      packed changed = *this;
-      for (unsigned i = 0; i != 1U << Bits; ++i) {
-        const std::uint64_t where = known & voxels_of_index<Bits>(plane.data(), i);
-        if (where == 0) continue;
-        const std::optional<T> v = change(values[i]);
-        if (v != values[i]) different |= where;
-        if (v) changed.values[i] = *v;
-        if (!v) changed.known &= ~where;
-      }
-      return changed;
-    }
-  };
-  /// Bit j of every place.
-  static constexpr std::array<std::uint64_t, 6> place_planes{0xaaaaaaaaaaaaaaaa, 0xcccccccccccccccc, 0xf0f0f0f0f0f0f0f0,
-                                                             0xff00ff00ff00ff00, 0xffff0000ffff0000, 0xffffffff00000000};
-  /// An octant of more values than that.
-  struct unpacked {
-    std::uint64_t known = 0;
-    std::array<T, 64> values{};
-
-    [[nodiscard]] octant_view<T> view() const noexcept { return {known, place_planes.data(), 6, values.data()}; }
-    [[nodiscard]] T at(std::uint32_t place) const noexcept { return values[place]; }
-    template <class Wanted>
-    [[nodiscard]] std::uint64_t where(Wanted&& wanted) const noexcept {
-      std::uint64_t found = 0;
-      for (unsigned i = 0; i != 64; ++i) found |= std::uint64_t{wanted(values[i])} << i;
-      return found;
-    }
-    void unpack(block<T>& out) const noexcept {
-      out.known = known;
-      out.value = values;
-    }
-    void pack(const block<T>& voxels) noexcept {
-      known = voxels.known;
-      values = voxels.value;
-    }
-    template <class Change>
-    [[nodiscard]] unpacked transformed(Change&& change, std::uint64_t& different) const {
-      unpacked changed = *this;
-      for (std::uint64_t rest = known; rest != 0; rest &= rest - 1) {
-        const auto i = static_cast<unsigned>(std::countr_zero(rest));
-        const std::optional<T> v = change(values[i]);
-        if (v != values[i]) different |= std::uint64_t{1} << i;
-        changed.values[i] = v.value_or(T{});
-        if (!v) changed.known &= ~(std::uint64_t{1} << i);
-      }
-      return changed;
-    }
-  };
   template <class Record>
   struct pool {
     cow_pages<Record> items;
@@ -454,8 +360,7 @@ class brick_store {
   /// Makes octant `i` of `b` unknown.
   void drop_record(brick<T>& b, std::uint32_t i) {
     const auto bit = static_cast<std::uint8_t>(1U << i);
-    if ((b.dense & bit) != 0)
-      with_pool(*this, pool_of(b.at[i]), [&](auto& p) { p.free.push_back(place_of(b.at[i])); });
+    if ((b.dense & bit) != 0) with_pool(*this, pool_of(b.at[i]), [&](auto& p) { p.free.push_back(place_of(b.at[i])); });
     b.dense &= static_cast<std::uint8_t>(~bit);
     b.uniform &= static_cast<std::uint8_t>(~bit);
   }
@@ -551,8 +456,8 @@ class brick_store {
   cow_pages<chunk> chunks_;
   cow_pages<brick<T>> bricks_;
   std::vector<std::uint32_t> free_bricks_;
-  std::tuple<pool<packed<0>>, pool<packed<1>>, pool<packed<2>>, pool<packed<3>>, pool<packed<4>>, pool<packed<5>>,
-             pool<unpacked>>
+  std::tuple<pool<packed_octant<T, 0>>, pool<packed_octant<T, 1>>, pool<packed_octant<T, 2>>, pool<packed_octant<T, 3>>,
+             pool<packed_octant<T, 4>>, pool<packed_octant<T, 5>>, pool<plain_octant<T>>>
       pools_;
   hash_index large_index_;
   cow_pages<large_leaf> large_;

@@ -13,6 +13,8 @@
 #include <concepts>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
+#include <memory>
 #include <optional>
 #include <type_traits>
 #include <utility>
@@ -89,9 +91,9 @@ class occupancy_octree {
   integration_summary integrate(const Policy& policy, const Points& points, const Origin& origin,
                                 const integration_options& options = {}) {
     begin_change();
-    integration_summary summary =
-        scratch_.marker.mark(policy, grid_, points, coordinates<float>(origin), options);
-    apply(scratch_.marker.masks(), summary);
+    scan_marker& marker = scratch_.get().marker;
+    integration_summary summary = marker.mark(policy, grid_, points, coordinates<float>(origin), options);
+    apply(marker.masks(), summary);
     return summary;
   }
   template <point_range Points, point_like Origin>
@@ -107,15 +109,16 @@ class occupancy_octree {
                                 const se3& T_world_camera, const integration_options& options = {}) {
     assert(options.beam_ranges.empty());
     begin_change();
-    scan_masks& masks = scratch_.masks;
+    scan_buffers& buffers = scratch_.get();
+    scan_masks& masks = buffers.masks;
     integration_summary summary;
     if (options.mode == ray_mode::every_ray && options.rays) {
-      summary = scratch_.depth.mark(policy, grid_, depth, camera, T_world_camera, options, masks,
-                                    [this](std::uint64_t name, auto& settled) { find_settled(name, settled); });
+      summary = buffers.depth.mark(policy, grid_, depth, camera, T_world_camera, options, masks,
+                                   [this](std::uint64_t name, auto& settled) { find_settled(name, settled); });
       clip(masks, grid_, options.bounds);
       apply(masks, summary);
     } else if (options.mode == ray_mode::every_ray) {
-      summary = scratch_.depth.mark_ends(policy, grid_, depth, camera, T_world_camera, options, masks);
+      summary = buffers.depth.mark_ends(policy, grid_, depth, camera, T_world_camera, options, masks);
       clip(masks, grid_, options.bounds);
       apply(masks, summary);
     } else {
@@ -123,11 +126,11 @@ class occupancy_octree {
       integration_options unlimited = options;
       unlimited.max_range = std::numeric_limits<double>::infinity();
       const std::size_t rejected =
-          scratch_.depth.mark_ends(policy, grid_, depth, camera, T_world_camera, unlimited, masks).rejected;
+          buffers.depth.mark_ends(policy, grid_, depth, camera, T_world_camera, unlimited, masks).rejected;
       const float3 origin = coordinates<float>(T_world_camera.translation());
-      summary = scratch_.marker.mark_centers(policy, grid_, masks, origin, options);
+      summary = buffers.marker.mark_centers(policy, grid_, masks, origin, options);
       summary.rejected += rejected;
-      apply(scratch_.marker.masks(), summary);
+      apply(buffers.marker.masks(), summary);
     }
     return summary;
   }
@@ -174,8 +177,7 @@ class occupancy_octree {
   /// `change` must depend on its argument alone; a decay policy does, see decay.hpp. O(octants), not
   /// voxels.
   template <class Change>
-  requires std::is_invocable_r_v<std::optional<value_type>, Change&, value_type>
-  void transform(Change&& change) {
+  requires std::is_invocable_r_v<std::optional<value_type>, Change&, value_type> void transform(Change&& change) {
     begin_change();
     store_.transform(change, [&](std::uint64_t name, std::uint32_t octant, std::uint64_t mask) {
       if (tracked_) changes_.record(child_key(named_key(name), octant, node_cells(octant_level)), mask);
@@ -205,7 +207,8 @@ class occupancy_octree {
         [&](std::uint64_t name, value_type) { (is_outside(name) ? gone_large : kept_large).push_back(name); });
     evicted.erase_bricks(kept);
     evicted.erase_large(kept_large);
-    visit_leaves(evicted, tree_depth(), [&](const voxel_key& key, int level, value_type v) { evict(leaf_of(key, level, v)); });
+    visit_leaves(evicted, tree_depth(),
+                 [&](const voxel_key& key, int level, value_type v) { evict(leaf_of(key, level, v)); });
     store_.erase_bricks(gone);
     store_.erase_large(gone_large);
     return gone.size() + gone_large.size();
@@ -275,9 +278,8 @@ class occupancy_octree {
   /// O(known voxels).
   template <std::invocable<const leaf&> Visit>
   void for_each_leaf(Visit&& visit) const {
-    visit_leaves(store_, tree_depth(), [&](const voxel_key& key, int level, value_type v) {
-      visit(leaf_of(key, level, v));
-    });
+    visit_leaves(store_, tree_depth(),
+                 [&](const voxel_key& key, int level, value_type v) { visit(leaf_of(key, level, v)); });
   }
   /// The same for those leaves that have a voxel in `box`, both corners' voxels included. Touches only
   /// the chunks in the box.
@@ -336,23 +338,35 @@ class occupancy_octree {
 
   /// Bytes on the heap: the map's own, and the buffers kept for the next scan.
   [[nodiscard]] std::size_t memory_bytes() const noexcept { return store_.memory_bytes() + changes_.memory_bytes(); }
-  [[nodiscard]] std::size_t buffer_bytes() const noexcept {
-    return scratch_.marker.memory_bytes() + scratch_.depth.memory_bytes() + scratch_.masks.memory_bytes();
-  }
+  [[nodiscard]] std::size_t buffer_bytes() const noexcept { return scratch_.memory_bytes(); }
 
  private:
-  /// Buffers for the next scan: kept from scan to scan, but nothing a copy needs.
-  struct scratch {
+  struct scan_buffers {
     scan_marker marker;
     depth_marker depth;
     scan_masks masks;
-
+  };
+  /// Made with the first scan and kept for the next ones, but nothing a copy needs.
+  class scratch {
+   public:
     scratch() = default;
-    scratch(const scratch&) {}
+    scratch(const scratch&) noexcept {}
     scratch(scratch&&) noexcept = default;
-    scratch& operator=(const scratch&) { return *this; }
+    scratch& operator=(const scratch&) noexcept { return *this; }
     scratch& operator=(scratch&&) noexcept = default;
     ~scratch() = default;
+    [[nodiscard]] scan_buffers& get() {
+      if (!buffers_) buffers_ = std::make_unique<scan_buffers>();
+      return *buffers_;
+    }
+    [[nodiscard]] std::size_t memory_bytes() const noexcept {
+      if (!buffers_) return 0;
+      return sizeof(scan_buffers) + buffers_->marker.memory_bytes() + buffers_->depth.memory_bytes() +
+             buffers_->masks.memory_bytes();
+    }
+
+   private:
+    std::unique_ptr<scan_buffers> buffers_;
   };
 
   [[nodiscard]] leaf leaf_of(const voxel_key& key, int level, value_type v) const {
