@@ -43,6 +43,7 @@
 #include <orbis/octree/range_coder.hpp>
 #include <orbis/octree/ray_batch.hpp>
 #include <orbis/octree/ray_grid.hpp>
+#include <orbis/octree/ray_source.hpp>
 #include <orbis/octree/ray_sweep.hpp>
 #include <orbis/octree/ray_walk.hpp>
 #include <orbis/octree/render.hpp>
@@ -51,6 +52,7 @@
 #include <orbis/octree/subtract.hpp>
 #include <orbis/octree/surface.hpp>
 #include <orbis/octree/sweep_planes.hpp>
+#include <orbis/octree/sweep_window.hpp>
 #include <orbis/octree/swept_ray.hpp>
 #include <orbis/octree/tree_coder.hpp>
 #include <orbis/octree/tree_parts.hpp>
@@ -58,4 +60,5 @@
 #include <orbis/octree/value_coder.hpp>
 #include <orbis/octree/voxel_layer.hpp>
 #include <orbis/octree/voxel_payload.hpp>
+#include <orbis/octree/walked_rays.hpp>
 #include <orbis/octree/window_marks.hpp>

@@ -97,6 +97,28 @@ TEST_CASE("Rays that are swept through corners and edges and along faces cross w
   }
 }
 
+TEST_CASE("Rays from a corner, an edge or a face of a voxel, or close to one, cross what walked ones cross") {
+  random_bits random{177};
+  ray_sweep sweep;
+  for (const double resolution : {0.02, 0.05, 0.1})
+    for (int run = 0; run != 24; ++run) {
+      float3 origin = random_point(random, 0.5);
+      for (std::size_t axis = 0; axis != 3; ++axis) {
+        if (run % 8 != 0 && (run >> axis & 1) == 0) continue;
+        origin[axis] = static_cast<float>(std::round(origin[axis] / resolution) * resolution);
+        if (run % 3 == 1) origin[axis] = std::nextafter(origin[axis], run % 2 == 0 ? 9.0F : -9.0F);
+        if (run % 8 == 0) origin[axis] = run % 16 == 0 ? 0.0F : static_cast<float>(1e-5 * resolution);
+      }
+      std::vector<ray> rays(700);
+      for (ray& r : rays) r = {random_point(random, 1.0), random.below(3) != 0};
+      for (std::size_t i = 0; i < rays.size(); i += 20) rays[i].end[i % 3] = origin[i % 3];
+      for (std::size_t i = 1; i < rays.size(); i += 20)  // a voxel or two away
+        for (std::size_t axis = 0; axis != 3; ++axis)
+          rays[i].end[axis] = origin[axis] + static_cast<float>(resolution) * rays[i].end[axis];
+      check(voxel_grid{resolution}, origin, rays, sweep);
+    }
+}
+
 TEST_CASE("A few rays that go far do not change what the others cross") {
   random_bits random{173};
   ray_sweep sweep;

@@ -72,3 +72,16 @@ TEST_CASE("Clipped masks hold what lies inside and can be marked again") {
     CHECK(listed(masks, &scan_brick::free) == expected);
   }
 }
+
+TEST_CASE("The memory of a scan is given back once much less is needed") {
+  scan_masks masks;
+  for (std::uint32_t i = 0; i != 100000; ++i) masks.mark_free({8 * (i % 1000), 8 * (i / 1000), 0});
+  const std::size_t much = masks.memory_bytes();
+  masks.clear();
+  CHECK(masks.memory_bytes() == much);  // the next one may be as large
+  masks.mark_free({1, 2, 3});
+  masks.clear();
+  CHECK(masks.memory_bytes() < much / 100);
+  masks.mark_free({1, 2, 3});
+  CHECK(listed(masks, &scan_brick::free) == voxels{{1, 2, 3}});
+}

@@ -20,11 +20,11 @@
 
 #include <orbis/core/simd.hpp>
 #include <orbis/octree/ray_batch.hpp>
-#include <orbis/octree/ray_grid.hpp>
 #include <orbis/octree/ray_walk.hpp>
 #include <orbis/octree/scan.hpp>
 #include <orbis/octree/sweep_planes.hpp>
 #include <orbis/octree/swept_ray.hpp>
+#include <orbis/octree/walked_rays.hpp>
 #include <orbis/octree/window_marks.hpp>
 
 namespace orbis::octree {
@@ -65,11 +65,11 @@ class ray_sweep {
         const auto lane = static_cast<std::size_t>(std::countr_zero(left));
         const float3 end{rays.end[0][i + lane], rays.end[1][i + lane], rays.end[2][i + lane]};
         if ((prepared_.done >> lane & 1U) == 0)
-          walked_.push_back(end);
+          walked_.add(end);
         else
           take(lane, end, (cut >> lane & 1U) != 0, masks);
       }
-      if (walked_.size() >= max_waiting) walk_all(masks);
+      if (walked_.size() >= max_waiting) walk(masks);
     }
   }
 
@@ -78,16 +78,16 @@ class ray_sweep {
     if (grid_ == nullptr) return;
     add_waiting(masks);
     for (std::size_t kind = 0; kind != queues_.size(); ++kind) sweep(kind, masks);
-    walk_all(masks);
+    walk(masks);
     for (; passed_ != 0; passed_ &= passed_ - 1) {
       const int voxel = std::countr_zero(passed_);
       masks.mark_free(key({voxel % 3 - 1, voxel / 3 % 3 - 1, voxel / 9 - 1}));
     }
   }
   [[nodiscard]] std::size_t memory_bytes() const noexcept {
-    std::size_t bytes = rays_.memory_bytes() + bytes_.capacity() + counts_.capacity() * sizeof(std::uint32_t) +
-                        bounds_.capacity() * sizeof(bounds) + doubtful_.capacity() * sizeof(std::uint32_t) +
-                        walked_.capacity() * sizeof(float3) + window_.memory_bytes();
+    std::size_t bytes =
+        rays_.memory_bytes() + bytes_.capacity() + (counts_.capacity() + buckets_.capacity()) * sizeof(std::uint32_t) +
+        bounds_.capacity() * sizeof(bounds) + doubtful_.capacity() * sizeof(std::uint32_t) + walked_.memory_bytes();
     for (const auto& q : queues_) bytes += q.capacity() * sizeof(waiting_ray);
     return bytes;
   }
@@ -95,7 +95,6 @@ class ray_sweep {
  private:
   static constexpr std::size_t max_waiting = 1U << 14U;  ///< rays that are swept at once
   static constexpr double max_width = 448.0;             ///< of a map, in cells, when it is planned
-  static constexpr std::size_t many = 256;               ///< rays that are walked together
   static constexpr std::int32_t slab = 16;               ///< layers that are swept at once: two bricks
 
   struct waiting_ray {
@@ -121,6 +120,7 @@ class ray_sweep {
             static_cast<std::uint32_t>(source_.from[1] + away[1]),
             static_cast<std::uint32_t>(source_.from[2] + away[2])};
   }
+  void walk(scan_masks& masks) { walked_.flush(*grid_, source_.origin, key({}), masks); }
   void add_waiting(scan_masks& masks) {
     add(batch_, batched_, masks);
     batch_.clear();
@@ -133,7 +133,7 @@ class ray_sweep {
     const std::int32_t kind = r.kind[lane], planes = r.planes[lane];
     if (source_.on_edge) {
       const std::uint32_t passed = detail::first_steps(source_, end, detail::prepared_rays::down(kind));
-      if (passed == 0) return walked_.push_back(end);
+      if (passed == 0) return walked_.add(end);
       passed_ |= passed & ~(1U << 31U);
     }
     const auto is = [lane](std::uint32_t bits) { return (bits >> lane & 1U) != 0; };
@@ -217,16 +217,18 @@ class ray_sweep {
     };
     counts_.assign(tiles_u * tiles_v * slabs + 1, 0);
     bounds_.assign(tiles_u * tiles_v * slabs, {});
-    for (const waiting_ray& r : queue) {
-      const std::size_t b = bucket(r);
+    rays_.fit(queue.size());
+    buckets_.resize(queue.size());
+    for (std::size_t i = 0; i != queue.size(); ++i) {
+      const std::size_t b = bucket(queue[i]);
+      buckets_[i] = static_cast<std::uint32_t>(b);
       ++counts_[b + 1];
-      bounds_[b].add(slopes(r));
+      bounds_[b].add(slopes(queue[i]));
     }
     for (std::size_t i = 1; i != counts_.size(); ++i) counts_[i] += counts_[i - 1];
-    rays_.fit(queue.size());
     for (std::size_t i = 0; i != queue.size(); ++i) {
       const waiting_ray& r = queue[i];
-      const std::size_t to = counts_[bucket(r)]++;
+      const std::size_t to = counts_[buckets_[i]]++;
       rays_.u[to] = r.u;
       rays_.du[to] = r.du;
       rays_.v[to] = r.v;
@@ -246,9 +248,9 @@ class ray_sweep {
         sweep_slab(place, static_cast<std::int32_t>(s), planes, bounds_[b], begin, counts_[b], masks);
       }
     }
-    for (const std::uint32_t i : doubtful_) walked_.push_back(queue[i].end);
+    for (const std::uint32_t i : doubtful_) walked_.add(queue[i].end);
     queue.clear();
-    if (walked_.size() >= max_waiting) walk_all(masks);
+    if (walked_.size() >= max_waiting) walk(masks);
   }
   [[nodiscard]] static bounds slopes(const waiting_ray& r) noexcept {
     const auto u = static_cast<float>(r.du), v = static_cast<float>(r.dv);
@@ -289,39 +291,6 @@ class ray_sweep {
     std::memset(w.planes, 0, 2 * maps * w.stride);
   }
 
-  /// Walks the rays for which there is no other way: many together, those that are few or long alone.
-  void walk_all(scan_masks& masks) {
-    const voxel_key from = key({});
-    auto near = static_cast<std::uint32_t>(detail::max_ray_planes);
-    bool together = false;
-    for (;; near /= 2) {  // all of them, if they fit in a window
-      voxel_key low = from, high = from;
-      std::size_t count = 0;
-      for (const float3& end : walked_) {
-        const voxel_key to = *grid_->key(end);
-        if (!is_within(to, from, near)) continue;
-        ++count;
-        low = {std::min(low.x, to.x), std::min(low.y, to.y), std::min(low.z, to.z)};
-        high = {std::max(high.x, to.x), std::max(high.y, to.y), std::max(high.z, to.z)};
-      }
-      together = count >= many && window_.fit(*grid_, from, low, high);
-      if (together || count < many || near == 0) break;
-    }
-    for (const float3& end : walked_) {
-      const voxel_key to = *grid_->key(end);
-      if (together && is_within(to, from, near))
-        window_.add(*grid_, source_.origin, end, to);
-      else
-        masks.mark_ray(*grid_, source_.origin, from, end, to);
-    }
-    if (together) window_.flush(masks);
-    walked_.clear();
-  }
-  [[nodiscard]] static bool is_within(const voxel_key& a, const voxel_key& b, std::uint32_t distance) noexcept {
-    const auto near = [&](std::uint32_t c, std::uint32_t d) { return (c < d ? d - c : c - d) <= distance; };
-    return near(a.x, b.x) && near(a.y, b.y) && near(a.z, b.z);
-  }
-
   const voxel_grid* grid_ = nullptr;
   detail::ray_source source_;
   detail::ray_batch batch_;
@@ -331,11 +300,10 @@ class ray_sweep {
   std::array<std::vector<waiting_ray>, detail::prepared_rays::kinds> queues_;
   detail::swept_rays rays_;
   std::vector<std::uint8_t> bytes_;  ///< all zero between slabs
-  std::vector<std::uint32_t> counts_;
+  std::vector<std::uint32_t> counts_, buckets_;
   std::vector<bounds> bounds_;
   std::vector<std::uint32_t> doubtful_;
-  std::vector<float3> walked_;  ///< ends of rays that must be walked
-  ray_grid window_;
+  detail::walked_rays walked_;
   detail::prepare_kernel* prepare_ = nullptr;
   detail::sweep_kernel* sweep_ = nullptr;
 };

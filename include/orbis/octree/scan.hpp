@@ -23,11 +23,17 @@ struct scan_brick {
   std::array<std::uint64_t, 8> occupied{};
 };
 
-/// The voxels a scan touches. Reused from scan to scan without giving memory back.
+/// The voxels a scan touches. Reused from scan to scan; memory is given back only if a scan needed much
+/// less than one before it.
 class scan_masks {
  public:
   [[nodiscard]] const std::vector<scan_brick>& bricks() const noexcept { return bricks_; }
   void clear() noexcept {
+    constexpr std::size_t few = 1U << 16U, rarely = 16;
+    if (bricks_.capacity() > few && bricks_.size() < bricks_.capacity() / rarely) {
+      index_ = hash_index{};
+      bricks_ = std::vector<scan_brick>{};
+    }
     index_.clear();
     bricks_.clear();
   }

@@ -10,7 +10,7 @@
 
 #include <orbis/core/simd.hpp>
 #include <orbis/octree/scan.hpp>
-#include <orbis/octree/sweep_planes.hpp>
+#include <orbis/octree/sweep_window.hpp>
 
 #if ORBIS_X86
 #include <immintrin.h>
