@@ -51,7 +51,7 @@ TEST_CASE("Rays marked in a window cross the voxels that rays walked one by one 
     }
   }
   scan_masks nothing;
-  REQUIRE(window.fit(grid, {32768, 32768, 32768}, {32768, 32768, 32768}, {32768, 32768, 32768}));
+  REQUIRE(window.fit(voxel_grid{0.1}, {32768, 32768, 32768}, {32768, 32768, 32768}, {32768, 32768, 32768}));
   window.flush(nothing);
   CHECK(nothing.bricks().empty());
 }
@@ -96,6 +96,7 @@ TEST_CASE("Every instruction set marks the same cells") {
 }
 
 TEST_CASE("A window that would be too large or reach the border of the grid is refused") {
+  const voxel_grid grid{0.1};
   ray_grid window;
   const voxel_key from{32768, 32768, 32768};
   CHECK(window.fit(grid, from, from, {32968, 32968, 32968}));
