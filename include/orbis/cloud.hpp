@@ -3,6 +3,12 @@
 /// Point clouds: neighbours, filters, automatic selection, voxel grids.
 #pragma once
 
+#include <orbis/cloud/all_knn_avx2.hpp>
+#include <orbis/cloud/all_knn_avx512.hpp>
+#include <orbis/cloud/all_knn_bracket.hpp>
+#include <orbis/cloud/all_knn_kernels.hpp>
+#include <orbis/cloud/all_knn_leaves.hpp>
+#include <orbis/cloud/all_knn_search.hpp>
 #include <orbis/cloud/curve_order.hpp>
 #include <orbis/cloud/extract.hpp>
 #include <orbis/cloud/log_density.hpp>
