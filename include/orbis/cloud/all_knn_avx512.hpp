@@ -70,7 +70,8 @@ inline void gather_avx512(const box_row& boxes, std::uint32_t mask, std::uint32_
   const __m512i turn = _mm512_sub_epi32(lanes, _mm512_set1_epi32(static_cast<int>(at)));  // taken modulo 16
   const std::uint32_t places = ((1U << number) - 1) << at;
   const auto put = [&](const float* from, float* to, float* beyond) ORBIS_TARGET("avx512f") {
-    const __m512 turned = _mm512_maskz_permutexvar_ps(all_lanes, turn, _mm512_maskz_compress_ps(wanted, _mm512_load_ps(from)));
+    const __m512 turned =
+        _mm512_maskz_permutexvar_ps(all_lanes, turn, _mm512_maskz_compress_ps(wanted, _mm512_load_ps(from)));
     _mm512_mask_store_ps(to, static_cast<__mmask16>(places), turned);
     _mm512_mask_store_ps(beyond, static_cast<__mmask16>(places >> 16U), turned);
   };
@@ -95,8 +96,7 @@ inline std::size_t keep_within_avx512(const point_row& leaf, const __m512* query
 }
 
 ORBIS_TARGET("avx512f,popcnt")
-inline std::size_t in_leaf_avx512(const point_row& leaf, const std::array<float, 3>& query, float bound,
-                                  float* found) {
+inline std::size_t in_leaf_avx512(const point_row& leaf, const std::array<float, 3>& query, float bound, float* found) {
   const __m512 q[3] = {_mm512_set1_ps(query[0]), _mm512_set1_ps(query[1]), _mm512_set1_ps(query[2])};
   return keep_within_avx512(leaf, q, _mm512_set1_ps(bound), found);
 }
@@ -151,12 +151,13 @@ inline float ranked_avx512(const float* values, std::size_t rank) noexcept {
   __m512i smaller = _mm512_setzero_si512();  // for each value, how many are
   __m512i smaller2 = _mm512_setzero_si512();
   for (std::size_t i = 0; i != leaf_width; i += 2) {
-    smaller = _mm512_mask_add_epi32(smaller, _mm512_cmp_ps_mask(_mm512_set1_ps(values[i]), v, _CMP_LT_OQ), smaller, one);
-    smaller2 =
-        _mm512_mask_add_epi32(smaller2, _mm512_cmp_ps_mask(_mm512_set1_ps(values[i + 1]), v, _CMP_LT_OQ), smaller2, one);
+    smaller =
+        _mm512_mask_add_epi32(smaller, _mm512_cmp_ps_mask(_mm512_set1_ps(values[i]), v, _CMP_LT_OQ), smaller, one);
+    smaller2 = _mm512_mask_add_epi32(smaller2, _mm512_cmp_ps_mask(_mm512_set1_ps(values[i + 1]), v, _CMP_LT_OQ),
+                                     smaller2, one);
   }
-  const __mmask16 up_to = _mm512_cmplt_epi32_mask(_mm512_add_epi32(smaller, smaller2),
-                                                  _mm512_set1_epi32(static_cast<int>(rank)));
+  const __mmask16 up_to =
+      _mm512_cmplt_epi32_mask(_mm512_add_epi32(smaller, smaller2), _mm512_set1_epi32(static_cast<int>(rank)));
   const __m512 low = _mm512_maskz_mov_ps(up_to, v);
   const __m256 m8 = _mm256_max_ps(half_avx512<0>(low), half_avx512<1>(low));
   __m128 m = _mm_max_ps(_mm256_castps256_ps128(m8), _mm256_extractf128_ps(m8, 1));

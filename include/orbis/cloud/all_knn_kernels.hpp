@@ -24,7 +24,8 @@ namespace orbis::cloud::detail {
 
 /// The leaves near a group of queries, and their boxes.
 struct nearby_leaves {
-  explicit nearby_leaves(std::size_t most) : boxes(most / leaf_width + 2), leaves((most / leaf_width + 2) * leaf_width) {}
+  explicit nearby_leaves(std::size_t most)
+      : boxes(most / leaf_width + 2), leaves((most / leaf_width + 2) * leaf_width) {}
   std::vector<box_row> boxes;
   std::vector<std::uint32_t> leaves;
   std::size_t count = 0;

@@ -80,7 +80,8 @@ struct curve_block {
     flip ^= flip >> 2U;
     flip ^= flip >> 4U;
     flip ^= flip >> 8U;
-    cells.key[i] = spread_ten_bits(x[i] ^ flip) << 2U | spread_ten_bits(y[i] ^ flip) << 1U | spread_ten_bits(z[i] ^ flip);
+    cells.key[i] =
+        spread_ten_bits(x[i] ^ flip) << 2U | spread_ten_bits(y[i] ^ flip) << 1U | spread_ten_bits(z[i] ^ flip);
   }
 }
 inline void curve_keys_portable(curve_block& cells) { fill_curve_keys(cells); }
@@ -124,7 +125,8 @@ class leaf_order {
   /// The entries left out, in ascending order. Each has at least `most_copies` copies elsewhere.
   [[nodiscard]] std::span<const range> left_out() const noexcept { return left_out_; }
   [[nodiscard]] std::array<float, 3> position(std::uint32_t i) const {
-    return coordinates<float>(std::ranges::begin(*points_)[static_cast<std::ranges::range_difference_t<const Points>>(i)]);
+    return coordinates<float>(
+        std::ranges::begin(*points_)[static_cast<std::ranges::range_difference_t<const Points>>(i)]);
   }
 
  private:
@@ -160,8 +162,8 @@ class leaf_order {
         for (std::size_t i = 0; i != size; ++i) {
           const std::array<float, 3> p = position(entries_[first + i].index);
           for (std::size_t a = 0; a != 3; ++a) {
-            cells.axis[a][i] = static_cast<std::uint32_t>(
-                static_cast<std::int32_t>((double{p[a]} - double{box.low[a]}) * scale));
+            cells.axis[a][i] =
+                static_cast<std::uint32_t>(static_cast<std::int32_t>((double{p[a]} - double{box.low[a]}) * scale));
           }
         }
         keys_of(cells);
@@ -182,9 +184,8 @@ class leaf_order {
     const auto first = entries_.begin() + static_cast<std::ptrdiff_t>(begin);
     const auto last = entries_.begin() + static_cast<std::ptrdiff_t>(end);
     if (end - begin < 2048) {
-      std::sort(first, last, [](const entry& a, const entry& b) {
-        return a.key < b.key || (a.key == b.key && a.index < b.index);
-      });
+      std::sort(first, last,
+                [](const entry& a, const entry& b) { return a.key < b.key || (a.key == b.key && a.index < b.index); });
       return;
     }
     constexpr std::uint32_t digit = 10;
@@ -278,7 +279,8 @@ template <execution_policy Policy, point_range Points>
     std::vector<box_row> level(rows(below.size()), empty_boxes());
     for (std::size_t i = 0; i != below.size(); ++i) {
       for (std::size_t a = 0; a != 3; ++a) {
-        level[i / leaf_width].low[a][i % leaf_width] = *std::min_element(below[i].low[a].begin(), below[i].low[a].end());
+        level[i / leaf_width].low[a][i % leaf_width] =
+            *std::min_element(below[i].low[a].begin(), below[i].low[a].end());
         level[i / leaf_width].high[a][i % leaf_width] =
             *std::max_element(below[i].high[a].begin(), below[i].high[a].end());
       }

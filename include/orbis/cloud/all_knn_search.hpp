@@ -240,8 +240,8 @@ class nearest_search {
   std::vector<std::uint32_t> chosen_;
   std::vector<float> found_;
   std::vector<pending> pending_;
-  float hoped_;  ///< what of `usual_` should suffice: its scatter falls with the number of neighbours
-  float reach_;  ///< what of `usual_` should suffice in any case
+  float hoped_;       ///< what of `usual_` should suffice: its scatter falls with the number of neighbours
+  float reach_;       ///< what of `usual_` should suffice in any case
   float usual_ = -1;  ///< squared distance to the `wanted`-th nearest; negative where not known yet
 };
 

@@ -44,8 +44,8 @@ struct mean_and_largest {
   float mean;
   float largest_squared;
 };
-[[nodiscard]] inline mean_and_largest mean_of_nearest(const knn_kernels& kernels, std::span<float> found,
-                                                      float bound, std::size_t wanted) {
+[[nodiscard]] inline mean_and_largest mean_of_nearest(const knn_kernels& kernels, std::span<float> found, float bound,
+                                                      std::size_t wanted) {
   constexpr float inf = std::numeric_limits<float>::infinity();
   if (found.size() < wanted) return {inf, inf};
   const auto divisor = static_cast<double>(wanted - 1);
