@@ -27,6 +27,7 @@
 #include <orbis/octree/integration.hpp>
 #include <orbis/octree/key.hpp>
 #include <orbis/octree/key_box.hpp>
+#include <orbis/octree/large_leaves.hpp>
 #include <orbis/octree/leaves.hpp>
 #include <orbis/octree/merge.hpp>
 #include <orbis/octree/morton.hpp>

@@ -14,12 +14,14 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <tuple>
 #include <utility>
 #include <vector>
 
 #include <orbis/octree/cow_pages.hpp>
 #include <orbis/octree/hash_index.hpp>
+#include <orbis/octree/large_leaves.hpp>
 #include <orbis/octree/node_name.hpp>
 #include <orbis/octree/octant_record.hpp>
 #include <orbis/octree/packed_block.hpp>
@@ -58,7 +60,7 @@ class brick_store {
 
   // -- looking
 
-  [[nodiscard]] bool empty() const noexcept { return brick_count() == 0 && large_count_ == 0; }
+  [[nodiscard]] bool empty() const noexcept { return brick_count() == 0 && large_.empty(); }
   [[nodiscard]] std::size_t brick_count() const noexcept { return bricks_.size() - free_bricks_.size(); }
   [[nodiscard]] std::size_t chunk_count() const noexcept { return chunks_.size(); }
   /// The chunk that contains `k`, or null.
@@ -76,18 +78,17 @@ class brick_store {
     return c == nullptr ? nullptr : find(*c, place_in_chunk(k));
   }
   /// Whether there are leaves bigger than a brick.
-  [[nodiscard]] bool has_large() const noexcept { return large_count_ != 0; }
-  [[nodiscard]] std::size_t large_count() const noexcept { return large_count_; }
+  [[nodiscard]] bool has_large() const noexcept { return !large_.empty(); }
+  [[nodiscard]] std::size_t large_count() const noexcept { return large_.size(); }
   /// The value and level of the leaf bigger than a brick that contains `k`, if there is one.
   [[nodiscard]] std::optional<std::pair<T, int>> find_large(const voxel_key& k) const noexcept {
-    const std::uint32_t i = large_count_ == 0 ? none : find_large_index(k);
-    if (i == none) return std::nullopt;
-    return std::pair{large_[i].value, named_level(large_[i].name)};
+    const auto* const leaf = large_.find(k);
+    return leaf != nullptr ? std::optional{std::pair{leaf->value, named_level(leaf->name)}} : std::nullopt;
   }
   /// That leaf's value, valid until the store changes, or null.
   [[nodiscard]] const T* find_large_value(const voxel_key& k) const noexcept {
-    const std::uint32_t i = large_count_ == 0 ? none : find_large_index(k);
-    return i == none ? nullptr : &large_[i].value;
+    const auto* const leaf = large_.find(k);
+    return leaf != nullptr ? &leaf->value : nullptr;
   }
   /// The value of a place in a brick, empty where nothing is known.
   [[nodiscard]] std::optional<T> value(const brick<T>& b, std::uint32_t place) const noexcept {
@@ -103,9 +104,8 @@ class brick_store {
   [[nodiscard]] std::optional<T> value(const voxel_key& k) const noexcept {
     const brick<T>* const b = find(k);
     if (b != nullptr) return value(*b, place_in_brick(k));
-    if (large_count_ == 0) return std::nullopt;
-    const auto large = find_large(k);
-    return large ? std::optional{large->first} : std::nullopt;
+    const auto* const leaf = large_.find(k);
+    return leaf != nullptr ? std::optional{leaf->value} : std::nullopt;
   }
   /// Octant `i` of `b` in place; valid until the store or `b` changes.
   [[nodiscard]] octant_view<T> view(const brick<T>& b, std::uint32_t i) const noexcept {
@@ -154,14 +154,12 @@ class brick_store {
   /// Calls `visit(name, value)` for every leaf bigger than a brick, in no particular order.
   template <class Visit>
   void for_each_large(Visit&& visit) const {
-    for (std::size_t i = 0; i != large_.size(); ++i)
-      if (large_[i].name != gone) visit(large_[i].name, large_[i].value);
+    for (std::size_t i = 0; i != large_.size(); ++i) visit(large_[i].name, large_[i].value);
   }
   /// Bytes on the heap, those shared with copies included.
   [[nodiscard]] std::size_t memory_bytes() const noexcept {
-    std::size_t bytes = index_.memory_bytes() + large_index_.memory_bytes() + chunks_.memory_bytes() +
-                        bricks_.memory_bytes() + large_.memory_bytes() +
-                        free_bricks_.capacity() * sizeof(std::uint32_t);
+    std::size_t bytes = index_.memory_bytes() + chunks_.memory_bytes() + bricks_.memory_bytes() +
+                        large_.memory_bytes() + free_bricks_.capacity() * sizeof(std::uint32_t);
     std::apply(
         [&](const auto&... p) { ((bytes += p.items.memory_bytes() + p.free.capacity() * sizeof(std::uint32_t)), ...); },
         pools_);
@@ -174,8 +172,8 @@ class brick_store {
   /// to another brick.
   [[nodiscard]] brick<T>& make(const voxel_key& k) {
     if (const std::uint32_t i = find_brick_index(k); i != none) return bricks_.writable(i);
-    if (const std::uint32_t large = large_count_ == 0 ? none : find_large_index(k); large != none) {
-      split(large, k);
+    if (const auto* const leaf = large_.find(k)) {
+      split(leaf->name, leaf->value, k);
       return bricks_.writable(find_brick_index(k));
     }
     return add(k);
@@ -219,10 +217,7 @@ class brick_store {
   /// @pre nothing is known inside it
   void set_node(const voxel_key& k, int level, T value) {
     if (level > brick_level) {
-      large_index_.set(node_name(k, level), static_cast<std::uint32_t>(large_.size()));
-      large_.push_back({node_name(k, level), value});
-      large_levels_ |= 1U << static_cast<unsigned>(level);
-      ++large_count_;
+      large_.add(node_name(k, level), value);
       return;
     }
     brick<T>& b = make(k);
@@ -251,7 +246,6 @@ class brick_store {
     std::vector<std::uint64_t> empty;
     block<T> voxels;
     for (std::uint32_t i = 0; i != bricks_.size(); ++i) {
-      if (!bricks_[i].is_known()) continue;
       for (std::uint32_t octant = 0; octant != 8; ++octant) {
         const brick<T>& before = bricks_[i];
         std::uint64_t different = 0;
@@ -268,50 +262,48 @@ class brick_store {
         }
         if (different != 0) changed(bricks_[i].name, octant, different);
       }
-      if (!bricks_[i].is_known()) empty.push_back(bricks_[i].name);
+      if (!bricks_[i].is_known() && bricks_[i].name != 0) empty.push_back(bricks_[i].name);
     }
-    for (std::size_t i = 0; i < large_.size(); ++i) {  // which becomes empty with the last of them
-      if (large_[i].name == gone) continue;
+    std::vector<std::uint64_t> gone;
+    for (std::size_t i = 0; i != large_.size(); ++i) {
       if (const std::optional<T> v = change(large_[i].value))
-        large_.writable(i).value = *v;
+        large_.set_value(i, *v);
       else
-        drop_large(static_cast<std::uint32_t>(i));
+        gone.push_back(large_[i].name);
     }
+    erase_large(gone);
     erase_bricks(empty);
   }
   /// Removes bricks. O(bricks removed + chunks).
-  void erase_bricks(const std::vector<std::uint64_t>& names) {
+  void erase_bricks(std::span<const std::uint64_t> names) {
+    bool emptied = false;
     for (const std::uint64_t name : names) {
       const voxel_key k = named_key(name);
       const std::uint32_t c = index_.find(node_name(k, chunk_level));
       if (c == none || chunks_[c].at[place_in_chunk(k)] == none) continue;
-      const std::uint32_t i = std::exchange(chunks_.writable(c).at[place_in_chunk(k)], none);
+      chunk& from = chunks_.writable(c);
+      const std::uint32_t i = std::exchange(from.at[place_in_chunk(k)], none);
+      emptied = emptied || std::all_of(from.at.begin(), from.at.end(), [](std::uint32_t b) { return b == none; });
       brick<T>& b = bricks_.writable(i);
       for (std::uint32_t octant = 0; octant != 8; ++octant) drop_record(b, octant);
       b = {};
       free_bricks_.push_back(i);
     }
-    if (!names.empty()) erase_empty_chunks();
+    if (emptied) erase_empty_chunks();
   }
   /// Removes the leaves bigger than a brick whose names are given.
-  void erase_large(const std::vector<std::uint64_t>& names) {
-    for (const std::uint64_t name : names)
-      if (const std::uint32_t i = large_index_.find(name); i != none) drop_large(i);
+  void erase_large(std::span<const std::uint64_t> names) {
+    for (const std::uint64_t name : names) large_.erase(name);
   }
   void clear() { *this = {}; }
 
  private:
-  static constexpr std::uint64_t gone = ~std::uint64_t{0};
   static constexpr unsigned raw = max_palette_bits + 1;
 
   template <class Record>
   struct pool {
     cow_pages<Record> items;
     std::vector<std::uint32_t> free;
-  };
-  struct large_leaf {
-    std::uint64_t name;
-    T value;
   };
 
   // A record's number: 3 bits for the pool, 29 for the place in it.
@@ -408,28 +400,12 @@ class brick_store {
     chunks_ = std::move(kept);
     index_ = {};
     for (std::uint32_t i = 0; i != chunks_.size(); ++i) index_.set(chunks_[i].name, i);
-    if (chunks_.empty() && large_count_ == 0) clear();
+    if (empty()) clear();
   }
 
-  [[nodiscard]] std::uint32_t find_large_index(const voxel_key& k) const noexcept {
-    for (unsigned levels = large_levels_; levels != 0; levels &= levels - 1) {
-      const std::uint32_t i = large_index_.find(node_name(k, std::countr_zero(levels)));
-      if (i != none) return i;
-    }
-    return none;
-  }
-  void drop_large(std::uint32_t i) {
-    large_index_.erase(large_[i].name);
-    large_.writable(i).name = gone;
-    if (--large_count_ != 0) return;
-    large_ = {};
-    large_index_ = {};
-    large_levels_ = 0;
-  }
   /// Replaces a large leaf by its brick that contains `k` and that brick's siblings on the way down.
-  void split(std::uint32_t large, const voxel_key& k) {
-    const auto [name, value] = large_[large];
-    drop_large(large);
+  void split(std::uint64_t name, T value, const voxel_key& k) {
+    large_.erase(name);
     voxel_key node = named_key(name);
     for (int level = named_level(name) - 1; level >= brick_level; --level) {
       const voxel_key parent = node;
@@ -459,10 +435,7 @@ class brick_store {
   std::tuple<pool<packed_octant<T, 0>>, pool<packed_octant<T, 1>>, pool<packed_octant<T, 2>>, pool<packed_octant<T, 3>>,
              pool<packed_octant<T, 4>>, pool<packed_octant<T, 5>>, pool<plain_octant<T>>>
       pools_;
-  hash_index large_index_;
-  cow_pages<large_leaf> large_;
-  std::size_t large_count_ = 0;
-  unsigned large_levels_ = 0;  ///< bit l: there has been a large leaf at level l
+  large_leaves<T> large_;
 };
 
 }  // namespace orbis::octree

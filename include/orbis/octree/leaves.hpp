@@ -39,9 +39,9 @@ inline constexpr std::uint64_t low_bits = 0x0101010101010101;  ///< the first vo
 
 /// The leaves of an octant that is not one itself.
 struct octant_leaves {
-  std::uint64_t first;         ///< the lowest voxel of each leaf
-  std::uint64_t large;         ///< of these, the ones of 2x2x2 voxels
-  std::size_t inner_nodes;     ///< the octant, and its groups of 2x2x2 that are no leaves
+  std::uint64_t first;      ///< the lowest voxel of each leaf
+  std::uint64_t large;      ///< of these, the ones of 2x2x2 voxels
+  std::size_t inner_nodes;  ///< the octant, and its groups of 2x2x2 that are no leaves
 };
 template <class T>
 [[nodiscard]] octant_leaves leaves_of(const octant_view<T>& o) noexcept {
@@ -128,8 +128,8 @@ template <class T>
 /// Calls `on_leaf(key, level, value)` for leaves from an octant on and `on_octant(key, brick, i)` for
 /// the other octants, which returns the inner nodes from there on. Returns the number of inner nodes.
 template <class T, class OnLeaf, class OnOctant>
-std::size_t walk_octants(const brick_store<T>& store, int root_level, OnLeaf&& on_leaf, OnOctant&& on_octant) {
-  const std::vector<leaf_part<T>> parts = leaf_parts(store, root_level);
+std::size_t walk_octants(const std::vector<leaf_part<T>>& parts, int root_level, OnLeaf&& on_leaf,
+                         OnOctant&& on_octant) {
   std::size_t inner = 0;
   for (std::size_t i = 0; i != parts.size(); ++i) {
     const leaf_part<T>& part = parts[i];
@@ -171,16 +171,23 @@ std::size_t visit_octant(const voxel_key& key, const octant_view<T>& o, block<T>
   return leaves.inner_nodes;
 }
 
+/// The leaves of some parts of a store.
+template <class T, class Visit>
+std::size_t visit_parts(const brick_store<T>& store, const std::vector<leaf_part<T>>& parts, int root_level,
+                        Visit&& visit) {
+  block<T> scratch;
+  return walk_octants(parts, root_level, visit, [&](const voxel_key& key, const brick<T>& b, std::uint32_t i) {
+    return visit_octant(key, store.view(b, i), scratch, visit);
+  });
+}
+
 }  // namespace detail
 
 /// Calls `visit(key, level, value)` for every leaf of the pruned octree whose root is at `root_level`,
 /// in the order of `pruned_tree::visit`. Returns the number of inner nodes. O(known voxels).
 template <class T, std::invocable<const voxel_key&, int, T> Visit>
 std::size_t visit_leaves(const brick_store<T>& store, int root_level, Visit&& visit) {
-  block<T> scratch;
-  return detail::walk_octants(store, root_level, visit, [&](const voxel_key& key, const brick<T>& b, std::uint32_t i) {
-    return detail::visit_octant(key, store.view(b, i), scratch, visit);
-  });
+  return detail::visit_parts(store, detail::leaf_parts(store, root_level), root_level, visit);
 }
 
 /// Numbers of nodes of the pruned octree.
@@ -199,13 +206,14 @@ template <sensor_model Model>
     ++n.leaves;
     n.occupied_leaves += is_occupied<Model>(v) ? 1 : 0;
   };
-  n.nodes = detail::walk_octants(store, root_level, on_leaf, [&](const voxel_key&, const brick<T>& b, std::uint32_t i) {
+  const auto on_octant = [&](const voxel_key&, const brick<T>& b, std::uint32_t i) {
     const detail::octant_leaves leaves = detail::leaves_of(store.view(b, i));
     n.leaves += detail::count_bits(leaves.first);
     if (is_occupied<Model>(b.value[i]))
       n.occupied_leaves += detail::count_bits(leaves.first & store.voxels_where(b, i, is_occupied<Model>));
     return leaves.inner_nodes;
-  });
+  };
+  n.nodes = detail::walk_octants(detail::leaf_parts(store, root_level), root_level, on_leaf, on_octant);
   n.free_leaves = n.leaves - n.occupied_leaves;
   n.nodes += n.leaves;
   return n;
@@ -314,7 +322,8 @@ void visit_leaves_in(const brick_store<T>& store, int root_level, const key_box&
   store.for_each_large([&](std::uint64_t name, T v) {
     const voxel_key key = named_key(name);
     const int level = std::max(named_level(name), chunk_level);  // with what it may merge with
-    if (box.overlaps(node_key(key, level), level)) parts.push_back({morton_order(key), key, named_level(name), nullptr, v});
+    if (box.overlaps(node_key(key, level), level))
+      parts.push_back({morton_order(key), key, named_level(name), nullptr, v});
   });
   std::sort(parts.begin(), parts.end(), [](const auto& a, const auto& b) { return a.order < b.order; });
   detail::merge_parts(parts, root_level);

@@ -8,12 +8,16 @@
 #include <concepts>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 #include <orbis/core/execution.hpp>
 #include <orbis/core/progress.hpp>
 #include <orbis/core/se3.hpp>
+#include <orbis/octree/hash_index.hpp>
+#include <orbis/octree/key_box.hpp>
 #include <orbis/octree/occupancy_octree.hpp>
 
 namespace orbis::octree {
@@ -36,26 +40,29 @@ template <sensor_model M>
 
 /// The octants of `grid` that the axis-aligned box overlaps, appended by their lowest voxels.
 inline void append_octants(const voxel_grid& grid, const vec3& low, const vec3& high, std::vector<voxel_key>& octants) {
-  const double edge = (grid.cells() / 2) * grid.resolution();
-  voxel_key first, last;
-  const auto range = [&](double lo, double hi, std::uint32_t& from, std::uint32_t& to) {
-    if (!(hi >= -edge && lo < edge)) return false;
-    from = grid.key(std::max(lo, -edge)).value_or(0) & ~3U;
-    to = grid.key(hi).value_or(grid.cells() - 1);
-    return true;
-  };
-  if (!range(low.x(), high.x(), first.x, last.x) || !range(low.y(), high.y(), first.y, last.y) ||
-      !range(low.z(), high.z(), first.z, last.z))
-    return;
-  for (std::uint32_t z = first.z; z <= last.z; z += 4)
-    for (std::uint32_t y = first.y; y <= last.y; y += 4)
-      for (std::uint32_t x = first.x; x <= last.x; x += 4) octants.push_back({x, y, z});
+  const auto box = keys_between(grid, low, high);
+  if (!box) return;
+  const voxel_key first = node_key(box->low, octant_level);
+  for (std::uint32_t z = first.z; z <= box->high.z; z += 4)
+    for (std::uint32_t y = first.y; y <= box->high.y; y += 4)
+      for (std::uint32_t x = first.x; x <= box->high.x; x += 4) octants.push_back({x, y, z});
 }
 
-/// The octants of `grid` in which something known of `from` may lie, moved by `T`; each once, in a
-/// fixed order.
+/// Whether anything is known in a node above bricks, larger leaves that contain it aside.
+template <class T>
+[[nodiscard]] bool knows_inside(const brick_store<T>& store, const voxel_key& k, int level) {
+  bool known = false;
+  const auto is_inside = [&](std::uint64_t name) { return node_key(named_key(name), level) == k; };
+  store.for_each_large([&](std::uint64_t name, T) { known = known || is_inside(name); });
+  if (!known) store.for_each_brick([&](const brick<T>& b) { known = known || is_inside(b.name); });
+  return known;
+}
+
+/// The octants of `grid` in which something known of `from` may lie, moved by `T`, leaves named in
+/// `but` aside; each once, in a fixed order.
 template <sensor_model Model, class From>
-[[nodiscard]] std::vector<voxel_key> octants_around(const voxel_grid& grid, const From& from, const se3& T) {
+[[nodiscard]] std::vector<voxel_key> octants_around(const voxel_grid& grid, const From& from, const se3& T,
+                                                    const hash_index& but) {
   std::vector<voxel_key> octants;
   const mat3 extent = T.rotation_matrix().cwiseAbs();
   const auto add = [&](const voxel_key& k, int level) {
@@ -69,7 +76,9 @@ template <sensor_model Model, class From>
       if (((b.uniform | b.dense) >> i & 1U) != 0) add(octant, octant_level);
     }
   });
-  from.store().for_each_large([&](std::uint64_t name, auto) { add(named_key(name), named_level(name)); });
+  from.store().for_each_large([&](std::uint64_t name, auto) {
+    if (but.find(name) == hash_index::none) add(named_key(name), named_level(name));
+  });
   const auto before = [](const voxel_key& a, const voxel_key& b) {
     return node_name(a, octant_level) < node_name(b, octant_level);
   };
@@ -87,17 +96,35 @@ template <sensor_model Model, class From>
 /// sum of the two maps voxel by voxel; else every voxel takes the value of the nearest, so that
 /// surfaces move by up to half a voxel's diagonal.
 ///
-/// The result is the same under every policy. O(volume known to `from`, in octants of `into`).
-template <execution_policy Policy, sensor_model Model, class... Rest>
-merge_summary merge(const Policy& policy, occupancy_octree<Model, Rest...>& into,
-                    const occupancy_octree<Model, Rest...>& from, const se3& T_into_from = {}, progress report = {}) {
+/// The result is the same under every policy. O(volume known to `from`), time and memory, in octants
+/// of `into`, but for leaves bigger than a brick of which `into`, on the same grid, knows nothing: with
+/// the identity they are taken over whole.
+template <execution_policy Policy, sensor_model Model>
+merge_summary merge(const Policy& policy, occupancy_octree<Model>& into, const occupancy_octree<Model>& from,
+                    const se3& T_into_from = {}, progress report = {}) {
   using value_type = typename Model::value_type;
-  const std::vector<voxel_key> octants = detail::octants_around<Model>(into.grid(), from, T_into_from);
+  const occupancy_octree<Model> source = from;  // costs nothing, and may be `into` itself
+  const bool same_frame = into.grid() == from.grid() && T_into_from.to_matrix().isIdentity(0.0);
+  const auto is_new = [&](const voxel_key& k, int level) {  // a node on the same grid that can be taken over
+    return same_frame && into.store().find_large_value(k) == nullptr && !detail::knows_inside(into.store(), k, level);
+  };
+  merge_summary summary;
+  std::vector<std::pair<std::uint64_t, value_type>> whole;
+  source.store().for_each_large([&](std::uint64_t name, value_type v) {
+    if (is_new(named_key(name), named_level(name))) whole.emplace_back(name, v);
+  });
+  hash_index taken;
+  for (const auto& [name, v] : whole) {
+    taken.set(name, 0);
+    into.set_unknown_node(named_key(name), into.tree_depth() - named_level(name),
+                          std::clamp(v, Model::clamp_min, Model::clamp_max));
+    summary.merged += std::size_t{1} << (3 * static_cast<unsigned>(named_level(name)));
+  }
+  const std::vector<voxel_key> octants = detail::octants_around<Model>(into.grid(), source, T_into_from, taken);
   const se3 T_from_into = T_into_from.inverse();
   const mat3 rotation = T_from_into.rotation_matrix();
   const vec3 translation = T_from_into.translation();
 
-  merge_summary summary;
   constexpr std::size_t batch = 4096;
   std::vector<block<value_type>> found(std::min(batch, octants.size()));
   for (std::size_t begin = 0; begin < octants.size(); begin += batch) {
@@ -114,30 +141,29 @@ merge_summary merge(const Policy& policy, occupancy_octree<Model, Rest...>& into
         const voxel_key in = voxel_in_brick(place);
         const voxel_key k{octant.x + in.x, octant.y + in.y, octant.z + in.z};
         const vec3 p = rotation * into.grid().center(k) + translation;
-        if (const auto v = from.value(p)) {
+        if (const auto v = source.value(p)) {
           b.value[place] = *v;
           b.known |= std::uint64_t{1} << place;
         }
       }
     });
-    for (std::size_t i = 0; i != count; ++i) {
-      const block<value_type>& b = found[i];
-      if (b.known == 0) continue;
+    const std::span<const voxel_key> part{octants.data() + begin, count};
+    std::size_t i = 0;
+    into.edit_octants(part, [&](const voxel_key&, block<value_type>& voxels) {
+      const block<value_type>& b = found[i++];
       summary.merged += static_cast<std::size_t>(std::popcount(b.known));
-      into.edit_octant(octants[begin + i], [&](block<value_type>& voxels) {
-        for (std::uint64_t rest = b.known; rest != 0; rest &= rest - 1) {
-          const auto place = static_cast<std::size_t>(std::countr_zero(rest));
-          voxels.value[place] = detail::sum_of<Model>(voxels.value[place], b.value[place]);
-        }
-        voxels.known |= b.known;
-      });
-    }
+      for (std::uint64_t rest = b.known; rest != 0; rest &= rest - 1) {
+        const auto place = static_cast<std::size_t>(std::countr_zero(rest));
+        voxels.value[place] = detail::sum_of<Model>(voxels.value[place], b.value[place]);
+      }
+      voxels.known |= b.known;
+    });
   }
   return summary;
 }
-template <sensor_model Model, class... Rest>
-merge_summary merge(occupancy_octree<Model, Rest...>& into, const occupancy_octree<Model, Rest...>& from,
-                    const se3& T_into_from = {}, progress report = {}) {
+template <sensor_model Model>
+merge_summary merge(occupancy_octree<Model>& into, const occupancy_octree<Model>& from, const se3& T_into_from = {},
+                    progress report = {}) {
   return merge(seq, into, from, T_into_from, report);
 }
 

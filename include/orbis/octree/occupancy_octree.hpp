@@ -6,6 +6,7 @@
 /// probabilistic 3D mapping framework based on octrees", Autonomous Robots 34, 2013.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cassert>
@@ -16,6 +17,7 @@
 #include <limits>
 #include <memory>
 #include <optional>
+#include <ranges>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -144,7 +146,7 @@ class occupancy_octree {
   /// @pre nothing is known inside it yet; key is a multiple of the node's size
   void set_unknown_node(const voxel_key& key, int depth, value_type value) {
     begin_change();
-    store_.set_node(key, tree_depth() - depth, value);
+    store_.set_node(key, tree_depth() - depth, without_sign_of_zero(value));
     note_node(key, tree_depth() - depth);
   }
 
@@ -152,26 +154,32 @@ class occupancy_octree {
   void clear() {
     store_.clear();
     scratch_ = {};
-    changes_.clear();
+    lose_track();
   }
 
   // -- changing what is known
 
-  /// Lets `edit` change the octant of 4x4x4 voxels that contains `k`; see block.
+  /// Lets `edit(block&)` change the octant of 4x4x4 voxels that contains `k`. What the block says of
+  /// voxels that it does not know is ignored. @pre k lies in the grid
   template <std::invocable<block<value_type>&> Edit>
   void edit_octant(const voxel_key& k, Edit&& edit) {
-    brick<value_type>& b = store_.make(k);
-    const std::uint32_t octant = place_in_brick(k) >> 6U;
-    block<value_type> voxels;
-    store_.read_octant(b, octant, voxels);
-    const block<value_type> before = voxels;
-    edit(voxels);
-    store_.write_octant(b, octant, voxels);
-    if (!tracked_) return;
-    std::uint64_t changed = before.known ^ voxels.known;
-    for (unsigned i = 0; i != 64; ++i) changed |= std::uint64_t{before.value[i] != voxels.value[i]} << i;
+    edit_octants(std::array{k}, [&](const voxel_key&, block<value_type>& voxels) { edit(voxels); });
+  }
+  /// The same for the octants that contain `keys`, one after the other: `edit(key, block&)`.
+  template <std::ranges::input_range Keys, std::invocable<const voxel_key&, block<value_type>&> Edit>
+  void edit_octants(const Keys& keys, Edit&& edit) {
     begin_change();
-    changes_.record(k, changed & (before.known | voxels.known));
+    for (const voxel_key& k : keys) {
+      assert(std::max({k.x, k.y, k.z}) < grid_.cells());
+      block<value_type> before;
+      if (const brick<value_type>* const b = store_.find(k))
+        store_.read_octant(*b, place_in_brick(k) >> 6U, before);
+      else if (const value_type* const large = store_.find_large_value(k))
+        before.value.fill(*large), before.known = ~std::uint64_t{0};
+      block<value_type> after = before;
+      edit(k, after);
+      replace_octant(k, before, after);
+    }
   }
   /// Replaces every voxel's value by `change(value)`, a std::optional: empty makes the voxel unknown.
   /// `change` must depend on its argument alone; a decay policy does, see decay.hpp. O(octants), not
@@ -179,10 +187,15 @@ class occupancy_octree {
   template <class Change>
   requires std::is_invocable_r_v<std::optional<value_type>, Change&, value_type> void transform(Change&& change) {
     begin_change();
-    store_.transform(change, [&](std::uint64_t name, std::uint32_t octant, std::uint64_t mask) {
-      if (tracked_) changes_.record(child_key(named_key(name), octant, node_cells(octant_level)), mask);
+    const bool has_large = store_.has_large();
+    const auto changed = [&](value_type v) -> std::optional<value_type> {
+      const std::optional<value_type> after = change(v);
+      return after ? std::optional{without_sign_of_zero(*after)} : after;
+    };
+    store_.transform(changed, [&](std::uint64_t name, std::uint32_t octant, std::uint64_t mask) {
+      if (track_.on) track_.log.record(child_key(named_key(name), octant, node_cells(octant_level)), mask);
     });
-    if (store_.has_large()) changes_.clear();
+    if (has_large) lose_track();
   }
   /// Makes every voxel as certain as the model allows: what is more likely occupied than free gets the
   /// upper bound, everything else the lower one. This is what `.bt` files hold.
@@ -192,39 +205,75 @@ class occupancy_octree {
   /// A rolling window: forgets every brick (8x8x8 voxels) and larger leaf that lies outside `box`
   /// altogether, after `evict(const leaf&)` has seen its leaves. What was evicted comes back by
   /// `set_unknown_node(leaf.key, leaf.depth, leaf.log_odds)`. Returns the number of bricks and larger
-  /// leaves that went. The log of changes does not mention it. O(bricks + voxels evicted).
+  /// leaves that went. The log of changes does not mention it, and payload layers do not know of it:
+  /// erase there what was evicted. O(bricks + voxels evicted).
   template <std::invocable<const leaf&> Evict>
   std::size_t evict_outside(const bounding_box& box, Evict&& evict) {
     const auto is_outside = [&](std::uint64_t name) {
-      const double size = grid_.node_size(named_level(name));
-      const vec3 low = grid_.center(named_key(name), named_level(name)).array() - size / 2.0;
-      return (low.array() > box.max.array()).any() || (low.array() + size < box.min.array()).any();
+      const bounding_box cube = cube_of(grid_, named_key(name), named_level(name));
+      return (cube.min.array() > box.max.array()).any() || (cube.max.array() < box.min.array()).any();
     };
-    brick_store<value_type> evicted = store_;
-    std::vector<std::uint64_t> kept, gone, kept_large, gone_large;
-    store_.for_each_brick([&](const brick<value_type>& b) { (is_outside(b.name) ? gone : kept).push_back(b.name); });
-    store_.for_each_large(
-        [&](std::uint64_t name, value_type) { (is_outside(name) ? gone_large : kept_large).push_back(name); });
-    evicted.erase_bricks(kept);
-    evicted.erase_large(kept_large);
-    visit_leaves(evicted, tree_depth(),
-                 [&](const voxel_key& key, int level, value_type v) { evict(leaf_of(key, level, v)); });
-    store_.erase_bricks(gone);
-    store_.erase_large(gone_large);
-    return gone.size() + gone_large.size();
+    std::vector<std::uint64_t> bricks, large;
+    std::vector<detail::leaf_part<value_type>> parts = detail::all_parts(store_);
+    std::erase_if(parts, [&](const auto& part) { return !is_outside(node_name(part.key, part.level)); });
+    for (const auto& part : parts)
+      (part.level == brick_level ? bricks : large).push_back(node_name(part.key, part.level));
+    if (parts.empty()) return 0;
+    detail::merge_parts(parts, tree_depth());
+    detail::visit_parts(store_, parts, tree_depth(),
+                        [&](const voxel_key& key, int level, value_type v) { evict(leaf_of(key, level, v)); });
+    store_.erase_bricks(bricks);
+    store_.erase_large(large);
+    return bricks.size() + large.size();
+  }
+  /// Merges equal bricks to larger leaves as far as they go, which saves memory and changes nothing
+  /// else: what lies within bricks is always stored pruned. Leaves are split again where something
+  /// changes. O(bricks).
+  void prune() {
+    std::vector<detail::leaf_part<value_type>> parts = detail::all_parts(store_);
+    detail::merge_parts(parts, tree_depth());
+    hash_index merged;
+    unsigned levels = 0;
+    for (const auto& part : parts)
+      if (part.level > brick_level) {
+        merged.set(node_name(part.key, part.level), 0);
+        levels |= 1U << static_cast<unsigned>(part.level);
+      }
+    const auto is_inside = [&](std::uint64_t name) {
+      const voxel_key k = named_key(name);
+      for (unsigned rest = levels; rest != 0; rest &= rest - 1) {
+        const int level = std::countr_zero(rest);
+        if (level > named_level(name) && merged.find(node_name(k, level)) != hash_index::none) return true;
+      }
+      return false;
+    };
+    std::vector<std::uint64_t> bricks, large;
+    store_.for_each_brick([&](const brick<value_type>& b) {
+      if (is_inside(b.name)) bricks.push_back(b.name);
+    });
+    store_.for_each_large([&](std::uint64_t name, value_type) {
+      if (is_inside(name)) large.push_back(name);
+    });
+    store_.erase_bricks(bricks);
+    store_.erase_large(large);
+    for (const auto& part : parts)
+      if (part.level > brick_level && store_.find_large_value(part.key) == nullptr)
+        store_.set_node(part.key, part.level, part.value);
   }
 
   /// From now on keeps a log of the voxels whose value changes, or stops doing so and forgets it.
   /// Whoever mirrors the map elsewhere asks the log what to send, see change_log; where it cannot tell
-  /// (after `clear`, or a change to a leaf bigger than a brick) its `complete_since` moves on, and the
-  /// whole map has to be sent again.
+  /// (after `clear`, an assignment, a change to a leaf bigger than a brick, or a time without tracking)
+  /// its `complete_since` moves on, and the whole map has to be sent again. Copies are not tracked.
   void track_changes(bool wanted = true) {
-    if (tracked_ && !wanted) changes_.clear();
-    tracked_ = wanted;
+    if (track_.on == wanted) return;
+    track_.on = wanted;
+    if (!wanted) track_.log.clear();
+    if (!store_.empty() || track_.log.revision() != 0) lose_track();
   }
-  [[nodiscard]] const change_log& changes() const noexcept { return changes_; }
+  [[nodiscard]] const change_log& changes() const noexcept { return track_.log; }
   /// The same, to forget what all have seen or to limit its length.
-  [[nodiscard]] change_log& changes() noexcept { return changes_; }
+  [[nodiscard]] change_log& changes() noexcept { return track_.log; }
 
   // -- queries
 
@@ -337,7 +386,7 @@ class occupancy_octree {
   }
 
   /// Bytes on the heap: the map's own, and the buffers kept for the next scan.
-  [[nodiscard]] std::size_t memory_bytes() const noexcept { return store_.memory_bytes() + changes_.memory_bytes(); }
+  [[nodiscard]] std::size_t memory_bytes() const noexcept { return store_.memory_bytes() + track_.log.memory_bytes(); }
   [[nodiscard]] std::size_t buffer_bytes() const noexcept { return scratch_.memory_bytes(); }
 
  private:
@@ -369,22 +418,49 @@ class occupancy_octree {
     std::unique_ptr<scan_buffers> buffers_;
   };
 
+  /// Belongs to one map and not to its copies; a map that is assigned to has changed as a whole.
+  struct tracking {
+    change_log log;
+    bool on = false;
+
+    tracking() = default;
+    tracking(const tracking&) noexcept {}
+    tracking(tracking&&) noexcept = default;
+    tracking& operator=(const tracking&) {
+      if (on) log.begin_revision();
+      log.clear();
+      return *this;
+    }
+    tracking& operator=(tracking&&) noexcept = default;
+    ~tracking() = default;
+  };
+
   [[nodiscard]] leaf leaf_of(const voxel_key& key, int level, value_type v) const {
     return {key, tree_depth() - level, grid_.center(key, level), grid_.node_size(level), v, is_occupied<Model>(v)};
   }
   void apply(const scan_masks& scan, integration_summary& summary) {
     for (const scan_brick& s : scan.bricks()) {
-      brick<value_type>& b = store_.make(named_key(s.name));
+      bool matters = !is_settled_leaf(named_key(s.name));
       for (std::uint32_t i = 0; i != 8; ++i) {
         const std::uint64_t occupied = s.occupied[i];
-        const std::uint64_t free = s.free[i] & ~occupied;
         summary.occupied += static_cast<std::size_t>(std::popcount(occupied));
-        summary.free += static_cast<std::size_t>(std::popcount(free));
-        if ((occupied | free) == 0) continue;
-        const std::uint64_t changed = apply(b, i, occupied, free);
-        if (tracked_) changes_.record(child_key(named_key(s.name), i, node_cells(octant_level)), changed);
+        summary.free += static_cast<std::size_t>(std::popcount(s.free[i] & ~occupied));
+        matters = matters || occupied != 0;
+      }
+      if (!matters) continue;  // a large leaf is not split for nothing
+      brick<value_type>& b = store_.make(named_key(s.name));
+      for (std::uint32_t i = 0; i != 8; ++i) {
+        if ((s.occupied[i] | s.free[i]) == 0) continue;
+        const std::uint64_t changed = apply(b, i, s.occupied[i], s.free[i] & ~s.occupied[i]);
+        if (track_.on) track_.log.record(child_key(named_key(s.name), i, node_cells(octant_level)), changed);
       }
     }
+  }
+  /// Whether a brick is part of a larger leaf that is as free as can be.
+  [[nodiscard]] bool is_settled_leaf(const voxel_key& k) const {
+    if (!store_.has_large()) return false;
+    const value_type* const large = store_.find_large_value(k);
+    return large != nullptr && *large <= Model::clamp_min;
   }
   /// Returns the voxels that changed.
   std::uint64_t apply(brick<value_type>& b, std::uint32_t octant, std::uint64_t occupied, std::uint64_t free) {
@@ -403,30 +479,55 @@ class occupancy_octree {
   /// The voxels of a brick that are as free as can be.
   void find_settled(std::uint64_t name, std::array<std::uint64_t, 8>& settled) const {
     const brick<value_type>* const b = store_.find(named_key(name));
-    if (b == nullptr) return;
+    if (b == nullptr) {
+      if (is_settled_leaf(named_key(name))) settled.fill(~std::uint64_t{0});
+      return;
+    }
     for (std::uint32_t i = 0; i != 8; ++i)
       settled[i] |= store_.voxels_where(*b, i, [](value_type v) { return v <= Model::clamp_min; });
   }
+  /// Stores an octant that has been changed, and forgets its brick if nothing is known there any more.
+  void replace_octant(const voxel_key& k, const block<value_type>& before, block<value_type>& after) {
+    std::uint64_t changed = before.known ^ after.known;
+    for (unsigned i = 0; i != 64; ++i) {
+      after.value[i] = (after.known >> i & 1U) != 0 ? without_sign_of_zero(after.value[i]) : value_type{};
+      changed |= std::uint64_t{before.value[i] != after.value[i]} << i;
+    }
+    if (changed == 0) return;
+    brick<value_type>& b = store_.make(k);
+    store_.write_octant(b, place_in_brick(k) >> 6U, after);
+    if (track_.on) track_.log.record(k, changed);
+    if (!b.is_known()) store_.erase_bricks(std::array{b.name});
+  }
+  /// -0 is 0: values are told apart bit by bit.
+  [[nodiscard]] static constexpr value_type without_sign_of_zero(value_type v) noexcept {
+    return v == value_type{} ? value_type{} : v;
+  }
   void begin_change() {
-    if (tracked_) changes_.begin_revision();
+    if (track_.on) track_.log.begin_revision();
+  }
+  /// Nobody can follow what has just happened.
+  void lose_track() {
+    begin_change();
+    track_.log.clear();
   }
   void note_node(const voxel_key& k, int level) {
-    if (!tracked_) return;
+    if (!track_.on) return;
+    change_log& log = track_.log;
     if (level > brick_level) {
-      changes_.clear();
+      lose_track();
     } else if (level == brick_level) {
-      for (unsigned i = 0; i != 8; ++i) changes_.record(child_key(k, i, node_cells(octant_level)), ~std::uint64_t{0});
+      for (unsigned i = 0; i != 8; ++i) log.record(child_key(k, i, node_cells(octant_level)), ~std::uint64_t{0});
     } else {
       const std::uint64_t inside = level == 0 ? 1U : level == 1 ? 0xffU : ~std::uint64_t{0};
-      changes_.record(k, inside << (place_in_brick(k) & 63U));
+      log.record(k, inside << (place_in_brick(k) & 63U));
     }
   }
 
   voxel_grid grid_;
   brick_store<value_type> store_;
   scratch scratch_;
-  change_log changes_;
-  bool tracked_ = false;
+  tracking track_;
 };
 
 }  // namespace orbis::octree

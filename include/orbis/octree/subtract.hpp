@@ -10,16 +10,18 @@
 #include <cstddef>
 #include <cstdint>
 #include <ranges>
+#include <vector>
 
 #include <orbis/core/execution.hpp>
+#include <orbis/octree/depth_points.hpp>
 #include <orbis/octree/merge.hpp>
 #include <orbis/octree/occupancy_octree.hpp>
 
 namespace orbis::octree {
 
 struct subtraction_summary {
-  std::size_t restored = 0;   ///< voxels that are what they would be without the scan
-  std::size_t forgotten = 0;  ///< of these, voxels that only this scan had seen: unknown again
+  std::size_t restored = 0;   ///< voxels from which the scan's part was taken
+  std::size_t forgotten = 0;  ///< of these, voxels of which nothing remained: unknown again
   std::size_t lost = 0;       ///< voxels at a bound, left as they are: nobody knows where they would be
 };
 
@@ -29,9 +31,9 @@ struct subtraction_summary {
 /// that it stays as it is and counts as lost. Nor can a bound that was touched and left in between be
 /// undone; such voxels come out too certain by at most what was clamped away. In floating point
 /// values come back to within a few rounding errors (1e-5); a value that near to 0 is taken for
-/// nothing at all, and the voxel becomes unknown.
-template <execution_policy Policy, sensor_model Model, class... Rest, point_range Points, point_like Origin>
-subtraction_summary subtract(const Policy& policy, occupancy_octree<Model, Rest...>& map, const Points& points,
+/// nothing at all, and the voxel becomes unknown, even if other scans' hits and misses cancelled out.
+template <execution_policy Policy, sensor_model Model, point_range Points, point_like Origin>
+subtraction_summary subtract(const Policy& policy, occupancy_octree<Model>& map, const Points& points,
                              const Origin& origin, const integration_options& options = {}) {
   using value_type = typename Model::value_type;
   const auto first = std::ranges::begin(points);
@@ -49,35 +51,50 @@ subtraction_summary subtract(const Policy& policy, occupancy_octree<Model, Rest.
     else
       return v == 0;
   };
+  std::vector<voxel_key> octants;
   for (const scan_brick& s : marker.masks().bricks()) {
-    if (map.store().find(named_key(s.name)) == nullptr) continue;
-    for (unsigned octant = 0; octant != 8; ++octant) {
-      if ((s.occupied[octant] | s.free[octant]) == 0) continue;
-      map.edit_octant(child_key(named_key(s.name), octant, node_cells(octant_level)), [&](block<value_type>& voxels) {
-        for (std::uint64_t rest = (s.occupied[octant] | s.free[octant]) & voxels.known; rest != 0; rest &= rest - 1) {
-          const auto place = static_cast<std::size_t>(std::countr_zero(rest));
-          const bool hit = (s.occupied[octant] >> place & 1U) != 0;
-          value_type& v = voxels.value[place];
-          if (v <= Model::clamp_min || v >= Model::clamp_max) {
-            ++summary.lost;
-            continue;
-          }
-          v = detail::sum_of<Model>(v, static_cast<value_type>(-(hit ? Model::hit : Model::miss)));
-          ++summary.restored;
-          if (!is_nothing(v)) continue;
-          v = value_type{};
-          voxels.known &= ~(std::uint64_t{1} << place);
-          ++summary.forgotten;
-        }
-      });
-    }
+    const voxel_key k = named_key(s.name);
+    if (map.store().find(k) == nullptr && map.store().find_large_value(k) == nullptr) continue;
+    for (unsigned i = 0; i != 8; ++i)
+      if ((s.occupied[i] | s.free[i]) != 0) octants.push_back(child_key(k, i, node_cells(octant_level)));
   }
+  map.edit_octants(octants, [&](const voxel_key& k, block<value_type>& voxels) {
+    const scan_brick& s = *marker.masks().find(node_name(k, brick_level));
+    const std::uint32_t octant = place_in_brick(k) >> 6U;
+    for (std::uint64_t rest = (s.occupied[octant] | s.free[octant]) & voxels.known; rest != 0; rest &= rest - 1) {
+      const auto place = static_cast<std::size_t>(std::countr_zero(rest));
+      const bool hit = (s.occupied[octant] >> place & 1U) != 0;
+      value_type& v = voxels.value[place];
+      if (v <= Model::clamp_min || v >= Model::clamp_max) {
+        ++summary.lost;
+        continue;
+      }
+      v = detail::sum_of<Model>(v, static_cast<value_type>(-(hit ? Model::hit : Model::miss)));
+      ++summary.restored;
+      if (!is_nothing(v)) continue;
+      voxels.known &= ~(std::uint64_t{1} << place);
+      ++summary.forgotten;
+    }
+  });
   return summary;
 }
-template <sensor_model Model, class... Rest, point_range Points, point_like Origin>
-subtraction_summary subtract(occupancy_octree<Model, Rest...>& map, const Points& points, const Origin& origin,
+template <sensor_model Model, point_range Points, point_like Origin>
+subtraction_summary subtract(occupancy_octree<Model>& map, const Points& points, const Origin& origin,
                              const integration_options& options = {}) {
   return subtract(seq, map, points, origin, options);
+}
+/// Takes back a depth image.
+template <execution_policy Policy, sensor_model Model, camera::depth_source Depth, camera::camera_model Camera>
+subtraction_summary subtract(const Policy& policy, occupancy_octree<Model>& map, const Depth& depth,
+                             const Camera& camera, const se3& T_world_camera, const integration_options& options = {}) {
+  std::vector<vec3f> points;
+  append_world_points(depth, camera, T_world_camera, points);
+  return subtract(policy, map, points, T_world_camera.translation(), options);
+}
+template <sensor_model Model, camera::depth_source Depth, camera::camera_model Camera>
+subtraction_summary subtract(occupancy_octree<Model>& map, const Depth& depth, const Camera& camera,
+                             const se3& T_world_camera, const integration_options& options = {}) {
+  return subtract(seq, map, depth, camera, T_world_camera, options);
 }
 
 }  // namespace orbis::octree
