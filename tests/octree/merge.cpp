@@ -124,3 +124,22 @@ TEST_CASE("Large leaves are merged and a merge can be stopped") {
   CHECK(summary.cancelled);
   CHECK(summary.merged == 0);
 }
+
+TEST_CASE("A map merged with itself is merged with what it was") {
+  auto a = scanned(7, 0.05, 6);
+  const auto before = a;
+  const se3 T{so3{}, vec3{0.0, 0.0, 0.2}};
+  auto expected = a;
+  merge(expected, before, T);
+  merge(a, a, T);
+  CHECK(ot_bytes(a) == ot_bytes(expected));
+}
+
+TEST_CASE("A huge leaf is taken over whole") {
+  occupancy_octree<> large{0.1}, into{0.1};
+  large.set_unknown_node({32768, 32768, 32768}, 2, -1.0F);  // 1.6 km wide
+  large.set_unknown_node({0, 0, 0}, 16, 2.0F);
+  const auto summary = merge(into, large);
+  CHECK(summary.merged == (std::size_t{1} << 42U) + 1);
+  CHECK(ot_bytes(into) == ot_bytes(large));
+}

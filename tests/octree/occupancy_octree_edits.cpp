@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
 #include <atomic>
 #include <bit>
 #include <cmath>
@@ -8,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include <orbis/octree/annotate.hpp>
 #include <orbis/octree/occupancy_octree.hpp>
 
 #include "octree/support.hpp"
@@ -120,6 +122,13 @@ TEST_CASE("A copy is a snapshot that does not change and costs little memory of 
   const occupancy_octree<> snapshot = map;
   const auto bytes = ot_bytes(snapshot);
   CHECK(snapshot.buffer_bytes() == 0);
+  std::size_t shared = 0;
+  map.for_each_leaf([&](const auto& leaf) {
+    if (leaf.depth <= 13) return;
+    REQUIRE(map.store().find(leaf.key) == snapshot.store().find(leaf.key));  // the same brick, not an equal one
+    ++shared;
+  });
+  CHECK(shared > 100);
   scan(map, random, 4);
   CHECK(ot_bytes(snapshot) == bytes);
   CHECK(ot_bytes(map) != bytes);
@@ -135,32 +144,44 @@ TEST_CASE("Readers on other threads use snapshots while the writer goes on") {
   occupancy_octree<> map{0.05};
   std::mutex guard;
   std::pair<int, occupancy_octree<>> latest{0, map};
-  std::vector<std::size_t> leaves(scans + 1);
+  std::vector<std::size_t> leaves(scans + 1), hits(scans + 1);
   std::atomic<bool> done{false};
-  std::vector<std::pair<int, std::size_t>> seen[3];
+  struct sight {
+    int number;
+    std::size_t leaves, hits;
+  };
+  std::vector<sight> seen[3];
+  const auto rays_that_hit = [](const occupancy_octree<>& view) {
+    std::size_t hit = 0;
+    for (int i = 0; i != 50; ++i)
+      hit += view.cast_ray(vec3f{0.0F, 0.0F, 0.0F}, vec3f{1.0F, 0.02F * static_cast<float>(i), 0.1F}, 3.0, true) ? 1 : 0;
+    return hit;
+  };
   std::vector<std::jthread> readers;
   for (auto& mine : seen)
-    readers.emplace_back([&mine, &guard, &latest, &done] {
+    readers.emplace_back([&mine, &guard, &latest, &done, &rays_that_hit] {
       while (!done) {
         std::unique_lock lock{guard};
         const auto [number, view] = latest;
         lock.unlock();
-        std::size_t hits = 0;
-        for (int i = 0; i != 50; ++i)
-          hits += view.cast_ray(vec3f{0.0F, 0.0F, 0.0F}, vec3f{1.0F, 0.02F * static_cast<float>(i), 0.1F}, 3.0, true) ? 1 : 0;
-        mine.emplace_back(number, view.num_leaves() + (hits > 50 ? 1 : 0));
+        mine.push_back({number, view.num_leaves(), rays_that_hit(view)});
       }
     });
   for (int i = 1; i <= scans; ++i) {
     scan(map, random, 1);
     leaves[static_cast<std::size_t>(i)] = map.num_leaves();
+    hits[static_cast<std::size_t>(i)] = rays_that_hit(map);
     const std::lock_guard lock{guard};
     latest = {i, map};
   }
   done = true;
   readers.clear();
   for (const auto& mine : seen)
-    for (const auto& [number, count] : mine) REQUIRE(count == leaves[static_cast<std::size_t>(number)]);
+    for (const sight& s : mine) {
+      REQUIRE(s.leaves == leaves[static_cast<std::size_t>(s.number)]);
+      REQUIRE(s.hits == hits[static_cast<std::size_t>(s.number)]);
+    }
+  CHECK(hits.back() > 10);
 }
 
 TEST_CASE("Maps of integers are maps too and take less memory") {
@@ -253,9 +274,126 @@ TEST_CASE("A mirror that applies the logged changes stays the same map") {
   update();
   CHECK(sent == 0);
 
+  const auto is_lost = [&] {  // the whole map has to be fetched
+    const bool lost = map.changes().complete_since() > seen;
+    seen = map.changes().revision();
+    return lost;
+  };
   map.set_unknown_node({0, 0, 0}, 8, 0.5F);
-  CHECK(map.changes().complete_since() > seen);  // too large for the log: fetch the whole map
+  CHECK(is_lost());
+  map.transform([](float v) { return v == 0.5F ? std::nullopt : std::optional{v}; });  // the last large leaf goes
+  CHECK(is_lost());
+  CHECK_FALSE(is_lost());
+  map.clear();
+  CHECK(is_lost());
+  map.integrate(points, vec3f::Zero());
+  CHECK_FALSE(is_lost());
+  map = occupancy_octree<>{0.1};
+  CHECK(map.changes().revision() == 0);  // a moved-in map comes with its own log
+  map.track_changes();
+  seen = 0;
+  map.integrate(points, vec3f::Zero());
+  CHECK_FALSE(is_lost());
+  map = mirror;
+  CHECK(is_lost());
   map.track_changes(false);
   map.integrate(points, vec3f::Ones());
   CHECK(map.changes().memory_bytes() == 0);
+  map.track_changes();
+  CHECK(is_lost());
+  const occupancy_octree<> copy = map;
+  CHECK(copy.changes().revision() == 0);
+}
+
+TEST_CASE("What an edit leaves unknown is gone with its brick, and what it does not change is left alone") {
+  occupancy_octree<> map{0.1};
+  const voxel_key k{32768, 32768, 32768};
+  map.edit_octant(k, [](block<float>&) {});
+  CHECK(map.empty());
+  map.edit_octant(k, [](block<float>& voxels) {
+    for (std::size_t i = 0; i != 64; ++i) voxels.value[i] = 0.01F * static_cast<float>(i) - 1.0F;
+    voxels.known = ~std::uint64_t{1};  // what the block says of its first voxel does not count
+  });
+  CHECK_FALSE(map.value(k));
+  map.integrate(std::vector<vec3f>{{0.05F, 0.05F, 0.05F}}, vec3f{0.05F, 0.05F, 0.05F});
+  CHECK(map.value(k) == log_odds<>::hit);
+  map.edit_octant(k, [](block<float>& voxels) {
+    voxels.known = ~std::uint64_t{0};
+    for (std::size_t i = 0; i != 64; ++i) voxels.value[i] = i % 2 == 0 ? 0.0F : -0.0F;
+  });
+  CHECK(map.num_leaves() == 1);
+  map.edit_octant(k, [](block<float>& voxels) { voxels.known = 0; });
+  CHECK(map.empty());
+  CHECK(map.num_leaves() == 0);
+
+  map.set_unknown_node(k, 11, -0.5F);
+  const std::size_t bytes = map.memory_bytes();
+  map.edit_octant({k.x + 8, k.y + 4, k.z}, [](block<float>& voxels) { CHECK(voxels.value[63] == -0.5F); });
+  CHECK(map.memory_bytes() == bytes);
+  map.edit_octant({k.x + 8, k.y + 4, k.z}, [](block<float>& voxels) { voxels.value[63] = 0.5F; });
+  CHECK(map.value(voxel_key{k.x + 11, k.y + 7, k.z + 3}) == 0.5F);
+  CHECK(map.value(voxel_key{k.x + 10, k.y + 7, k.z + 3}) == -0.5F);
+}
+
+TEST_CASE("Pruning merges equal bricks and a scan through a settled leaf does not split it") {
+  occupancy_octree<> map{0.1};
+  for (std::uint32_t i = 0; i != 512; ++i)
+    map.set_unknown_node({32768 + 8 * (i % 8), 32768 + 8 * (i / 8 % 8), 32768 + 8 * (i / 64)}, 13, log_odds<>::clamp_min);
+  const occupancy_octree<> before = map;
+  map.prune();
+  CHECK(ot_bytes(map) == ot_bytes(before));
+  CHECK(map.store().brick_count() == 0);
+  CHECK(map.store().large_count() == 1);
+  CHECK(map.memory_bytes() < before.memory_bytes() / 4);
+  const std::size_t bytes = map.memory_bytes();
+  const vec3f origin{0.5F, 0.5F, 0.5F}, far{1.0F, 6.7F, 1.0F};
+  map.integrate(std::vector<vec3f>{far}, origin, {.max_range = 3.0});
+  CHECK(map.memory_bytes() == bytes);
+  map.integrate(std::vector<vec3f>{{1.0F, 2.0F, 1.0F}}, origin);
+  CHECK(map.state(vec3{1.0, 2.0, 1.0}) == occupancy::free);
+  CHECK(map.value(vec3{1.0, 2.0, 1.0}) == after_hit<log_odds<>>(log_odds<>::clamp_min));
+  map.prune();
+  CHECK(map.store().large_count() > 8);
+
+  random_bits random{49};
+  occupancy_octree<> room{0.1};
+  scan(room, random, 8);
+  const auto bytes_of_room = ot_bytes(room);
+  room.prune();
+  CHECK(ot_bytes(room) == bytes_of_room);
+  room.prune();
+  CHECK(ot_bytes(room) == bytes_of_room);
+}
+
+TEST_CASE("A moved-from map is empty and large leaves that come and go take no more memory") {
+  occupancy_octree<> map{0.1};
+  map.set_unknown_node({32768, 32768, 32768}, 8, 1.0F);
+  occupancy_octree<> other = std::move(map);
+  CHECK(map.empty());  // NOLINT(bugprone-use-after-move): that is what is promised
+  CHECK_FALSE(map.store().has_large());
+  CHECK(other.value(vec3{1.0, 1.0, 1.0}) == 1.0F);
+
+  std::size_t most = 0;
+  for (int i = 0; i != 3000; ++i) {
+    const auto x = static_cast<std::uint32_t>(i % 50 + 1) * 256;
+    other.set_unknown_node({32768 + x, 32768, 32768}, 10, 0.25F);
+    const double left = 0.1 * (x - 10);
+    other.evict_outside({{left, 0.0, 0.0}, {left + 10.0, 1.0, 1.0}}, [](const auto&) {});
+    most = std::max(most, other.memory_bytes());
+  }
+  CHECK(other.store().large_count() == 1);
+  CHECK(most < 20000);
+}
+
+TEST_CASE("Payload is evicted with its voxels by whoever keeps it") {
+  random_bits random{50};
+  occupancy_octree<> map{0.1};
+  voxel_layer<hit_count> layer;
+  const auto points = test::shell_scan(random, 2000, vec3f::Zero());
+  map.integrate(points, vec3f::Zero());
+  annotate(layer, map.grid(), points, vec3f::Zero(), {}, [](hit_count& h, std::size_t) { h.update(); });
+  const std::size_t before = layer.size();
+  map.evict_outside({{-0.5, -0.5, -0.5}, {0.5, 0.5, 0.5}}, [&](const auto& leaf) { layer.erase_brick(leaf.key); });
+  CHECK(layer.size() < before);
+  layer.for_each([&](const voxel_key& k, const hit_count&) { REQUIRE(map.state(k) == occupancy::occupied); });
 }

@@ -82,5 +82,21 @@ TEST_CASE("Taking out what was never there or the only scan there was") {
   CHECK(summary.restored == added.free + added.occupied);
   CHECK(summary.forgotten == summary.restored);
   CHECK(map.num_leaves() == 0);
+  CHECK(map.empty());
   CHECK(map.state(all[0].points[0]) == occupancy::unknown);
+}
+
+TEST_CASE("A scan is taken out of leaves bigger than a brick") {
+  occupancy_octree<> map{0.1}, bricks{0.1};
+  for (std::uint32_t i = 0; i != 8; ++i)
+    bricks.set_unknown_node({32768 + 8 * (i & 1U), 32768 + 8 * (i >> 1U & 1U), 32768 + 8 * (i >> 2U)}, 13, -0.8F);
+  map = bricks;
+  map.prune();
+  REQUIRE(map.store().has_large());
+  const std::vector<vec3f> points{{1.55F, 0.75F, 0.75F}};
+  const vec3f origin{0.05F, 0.75F, 0.75F};
+  const auto expected = subtract(bricks, points, origin), got = subtract(map, points, origin);
+  CHECK(got.restored == 16);
+  CHECK(got.restored == expected.restored);
+  CHECK(ot_bytes(map) == ot_bytes(bricks));
 }

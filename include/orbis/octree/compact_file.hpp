@@ -200,6 +200,7 @@ template <class T>
       value = take<T>(in);
       if constexpr (std::floating_point<T>)
         if (!std::isfinite(value)) return fail(errc::malformed, where, "a value that is not finite");
+      if (value == T{}) value = T{};  // -0 is 0
     }
   }
   return lists;

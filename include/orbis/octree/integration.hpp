@@ -100,7 +100,7 @@ class scan_marker {
         else
           for (std::size_t i = begin; i != end; ++i) w.add_end(from, point(i), options.beam_ranges[i]);
       });
-      for (std::size_t i = 1; i != workers_.size(); ++i) workers_[0].ends.merge(workers_[i].ends);
+      for (std::size_t i = 1; i != active_.size(); ++i) workers_[0].ends.merge(workers_[i].ends);
       add_centers(policy, from, workers_[0].ends);
     }
     return finish(policy, grid, options);
@@ -270,15 +270,17 @@ class scan_marker {
   void prepare(unsigned threads, std::size_t count) {
     // A thread that gets less than this many rays does not pay for the merging of its masks.
     const std::size_t useful = 1 + count / 4096;
-    workers_.resize(std::clamp<std::size_t>(threads, 1, useful));
-    for (worker& w : workers_) w.clear();
+    const std::size_t count_of_workers = std::clamp<std::size_t>(threads, 1, useful);
+    if (workers_.size() < count_of_workers) workers_.resize(count_of_workers);
+    active_ = std::span{workers_}.first(count_of_workers);
+    for (worker& w : active_) w.clear();
   }
   sensor start(const voxel_grid& grid, const float3& origin, const integration_options& options) {
     assert(options.max_range >= 0.0);
     const sensor from{grid, origin, options.rays ? grid.key(origin) : std::nullopt, options.max_range,
                       options.beam_ranges};
     if (from.key)
-      for (worker& w : workers_) w.sweep.start(grid, origin, *from.key);
+      for (worker& w : active_) w.sweep.start(grid, origin, *from.key);
     return from;
   }
   template <class Policy>
@@ -286,13 +288,13 @@ class scan_marker {
     for_each_with_worker(policy, ends.bricks().size(), 16, [&](worker& w, std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i != end; ++i) w.add_centers(from, ends.bricks()[i]);
     });
-    for (worker& w : workers_) w.add_batched(from);
+    for (worker& w : active_) w.add_batched(from);
   }
   template <class Policy>
   integration_summary finish(const Policy& policy, const voxel_grid& grid, const integration_options& options) {
-    for_each_index(policy, workers_.size(), 1, [&](std::size_t i) { workers_[i].sweep.flush(workers_[i].masks); });
+    for_each_index(policy, active_.size(), 1, [&](std::size_t i) { workers_[i].sweep.flush(workers_[i].masks); });
     worker& all = workers_.front();
-    for (std::size_t i = 1; i != workers_.size(); ++i) {
+    for (std::size_t i = 1; i != active_.size(); ++i) {
       all.masks.merge(workers_[i].masks);
       all.summary.used += workers_[i].summary.used;
       all.summary.truncated += workers_[i].summary.truncated;
@@ -305,13 +307,14 @@ class scan_marker {
   template <class Policy, class Body>
   void for_each_with_worker(const Policy& policy, std::size_t count, std::size_t grain, Body&& body) {
     std::atomic<std::size_t> next{0};
-    for_each_index(policy, workers_.size(), 1, [&](std::size_t w) {
+    for_each_index(policy, active_.size(), 1, [&](std::size_t w) {
       for (std::size_t begin; (begin = next.fetch_add(grain, std::memory_order_relaxed)) < count;)
         body(workers_[w], begin, std::min(count, begin + grain));
     });
   }
 
-  std::vector<worker> workers_ = std::vector<worker>(1);
+  std::vector<worker> workers_ = std::vector<worker>(1);  ///< only ever more: their memory is kept
+  std::span<worker> active_;                              ///< those of the current scan
 };
 
 }  // namespace orbis::octree
