@@ -33,12 +33,12 @@ std::vector<std::pair<std::string, points>> hard_clouds() {
     const double scale = std::pow(2.0, -0.1 * i);
     nested.emplace_back((orbis::vec3{random.uniform(), random.uniform(), random.uniform()} * scale).cast<float>());
   }
-  out.emplace_back("nested", nested);
+  out.push_back({"nested", nested});
 
   points mixed = orbis::test::uniform_cloud(700, 12, 0.01);  // dense and thin, alternating along the curve
   const points thin = orbis::test::uniform_cloud(150, 13, 1.0);
   mixed.insert(mixed.end(), thin.begin(), thin.end());
-  out.emplace_back("dense within thin", mixed);
+  out.push_back({"dense within thin", mixed});
 
   points shell;  // all at almost the same distance from the one in the middle
   for (int i = 0; i != 800; ++i) {
@@ -46,7 +46,7 @@ std::vector<std::pair<std::string, points>> hard_clouds() {
     shell.emplace_back(v.normalized().cast<float>());
   }
   shell.emplace_back(0.0F, 0.0F, 0.0F);
-  out.emplace_back("shell", shell);
+  out.push_back({"shell", shell});
 
   points copies;  // many copies of few points, and few copies of many
   for (int i = 0; i != 6; ++i) {
@@ -54,11 +54,11 @@ std::vector<std::pair<std::string, points>> hard_clouds() {
     copies.insert(copies.end(), 120, p);
     copies.push_back(p + orbis::vec3f{1e-3F, 0.0F, 0.0F});
   }
-  out.emplace_back("copies", copies);
+  out.push_back({"copies", copies});
 
   points line;
   for (int i = 0; i != 600; ++i) line.emplace_back(static_cast<float>(i), 0.0F, 0.0F);
-  out.emplace_back("even line", line);
+  out.push_back({"even line", line});
 
   points huge;  // squares overflow between, but not within clusters
   for (int c = 0; c != 4; ++c) {
@@ -66,7 +66,7 @@ std::vector<std::pair<std::string, points>> hard_clouds() {
     for (const orbis::vec3f& p : cluster) huge.push_back(p + orbis::vec3f{1e20F * static_cast<float>(c), 0.0F, 0.0F});
   }
   huge.emplace_back(3e38F, -3e38F, 3e38F);
-  out.emplace_back("overflowing", huge);
+  out.push_back({"overflowing", huge});
   return out;
 }
 
@@ -147,7 +147,7 @@ TEST_CASE("the nearest of some distances are selected and summed alike by all in
     for (const level l : levels) {
       INFO("round " << round << " level " << static_cast<int>(l));
       std::vector<float> found = values;
-      found.resize(count + orbis::cloud::detail::leaf_width);
+      found.resize(count + orbis::cloud::detail::leaf_width, std::numeric_limits<float>::infinity());
       const auto sum =
           orbis::cloud::detail::select_knn_kernels(l).sum_nearest(found.data(), count, wanted, sorted.back());
       CHECK(sum.largest_squared == sorted[wanted - 1]);

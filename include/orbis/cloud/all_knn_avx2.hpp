@@ -123,6 +123,9 @@ inline std::size_t near_points_avx2(const point_row* leaves, const nearby_leaves
     count += keep_within_avx2(leaves[scratch[i]], q, within, found + count);
     if (count > capacity) break;
   }
+  const __m256 none = _mm256_set1_ps(std::numeric_limits<float>::infinity());
+  _mm256_storeu_ps(found + count, none);
+  _mm256_storeu_ps(found + count + 8, none);
   return count;
 }
 
@@ -150,9 +153,7 @@ inline float ranked_avx2(const float* values, std::size_t rank) noexcept {
 
 ORBIS_TARGET("avx2,fma,popcnt")
 inline nearest_sum sum_nearest_avx2(float* found, std::size_t count, std::size_t wanted, float bound) {
-  constexpr std::size_t margin = 6;
   const __m256 inf = _mm256_set1_ps(std::numeric_limits<float>::infinity());
-  _mm256_storeu_ps(found + count, inf);
   const auto count_within = [&](float at) ORBIS_TARGET("avx2,popcnt") {
     const __m256 border = _mm256_set1_ps(at);
     std::size_t n = 0;
@@ -162,18 +163,18 @@ inline nearest_sum sum_nearest_avx2(float* found, std::size_t count, std::size_t
     }
     return n;
   };
-  const auto count_both = [&](float x, float y) ORBIS_TARGET("avx2,popcnt") {
-    const __m256 first = _mm256_set1_ps(x);
-    const __m256 second = _mm256_set1_ps(y);
-    std::array<std::size_t, 2> n{};
+  const auto count_three = [&](const std::array<float, 3>& at) ORBIS_TARGET("avx2,popcnt") {
+    const __m256 border[3] = {_mm256_set1_ps(at[0]), _mm256_set1_ps(at[1]), _mm256_set1_ps(at[2])};
+    std::array<std::size_t, 3> n{};
     for (std::size_t i = 0; i < count; i += 8) {
       const __m256 v = _mm256_loadu_ps(found + i);
-      n[0] += static_cast<std::size_t>(__builtin_popcount(mask_avx2(_mm256_cmp_ps(v, first, _CMP_LE_OQ))));
-      n[1] += static_cast<std::size_t>(__builtin_popcount(mask_avx2(_mm256_cmp_ps(v, second, _CMP_LE_OQ))));
+      n[0] += static_cast<std::size_t>(__builtin_popcount(mask_avx2(_mm256_cmp_ps(v, border[0], _CMP_LE_OQ))));
+      n[1] += static_cast<std::size_t>(__builtin_popcount(mask_avx2(_mm256_cmp_ps(v, border[1], _CMP_LE_OQ))));
+      n[2] += static_cast<std::size_t>(__builtin_popcount(mask_avx2(_mm256_cmp_ps(v, border[2], _CMP_LE_OQ))));
     }
     return n;
   };
-  const rank_bracket bracket = bracket_rank(bound, count, wanted, margin, count_within, count_both);
+  const rank_bracket bracket = bracket_rank(bound, count, wanted, count_within, count_three);
   nearest_sum out;
   out.largest_squared = bracket.high;
   if (bracket.at_high - bracket.at_low <= leaf_width) {

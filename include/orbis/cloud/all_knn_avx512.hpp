@@ -120,6 +120,7 @@ inline std::size_t near_points_avx512(const point_row* leaves, const nearby_leav
     count += keep_within_avx512(leaves[scratch[i]], q, within, found + count);
     if (count > capacity) break;
   }
+  _mm512_storeu_ps(found + count, _mm512_set1_ps(std::numeric_limits<float>::infinity()));
   return count;
 }
 
@@ -167,9 +168,7 @@ inline float ranked_avx512(const float* values, std::size_t rank) noexcept {
 
 ORBIS_TARGET("avx512f,popcnt")
 inline nearest_sum sum_nearest_avx512(float* found, std::size_t count, std::size_t wanted, float bound) {
-  constexpr std::size_t margin = 6;
   const __m512 inf = _mm512_set1_ps(std::numeric_limits<float>::infinity());
-  _mm512_storeu_ps(found + count, inf);
   const auto count_within = [&](float at) ORBIS_TARGET("avx512f,popcnt") {
     const __m512 border = _mm512_set1_ps(at);
     std::size_t n = 0;
@@ -179,18 +178,18 @@ inline nearest_sum sum_nearest_avx512(float* found, std::size_t count, std::size
     }
     return n;
   };
-  const auto count_both = [&](float x, float y) ORBIS_TARGET("avx512f,popcnt") {
-    const __m512 first = _mm512_set1_ps(x);
-    const __m512 second = _mm512_set1_ps(y);
-    std::array<std::size_t, 2> n{};
+  const auto count_three = [&](const std::array<float, 3>& at) ORBIS_TARGET("avx512f,popcnt") {
+    const __m512 border[3] = {_mm512_set1_ps(at[0]), _mm512_set1_ps(at[1]), _mm512_set1_ps(at[2])};
+    std::array<std::size_t, 3> n{};
     for (std::size_t i = 0; i < count; i += leaf_width) {
       const __m512 v = _mm512_loadu_ps(found + i);
-      n[0] += static_cast<std::size_t>(__builtin_popcount(_mm512_cmp_ps_mask(v, first, _CMP_LE_OQ)));
-      n[1] += static_cast<std::size_t>(__builtin_popcount(_mm512_cmp_ps_mask(v, second, _CMP_LE_OQ)));
+      n[0] += static_cast<std::size_t>(__builtin_popcount(_mm512_cmp_ps_mask(v, border[0], _CMP_LE_OQ)));
+      n[1] += static_cast<std::size_t>(__builtin_popcount(_mm512_cmp_ps_mask(v, border[1], _CMP_LE_OQ)));
+      n[2] += static_cast<std::size_t>(__builtin_popcount(_mm512_cmp_ps_mask(v, border[2], _CMP_LE_OQ)));
     }
     return n;
   };
-  const rank_bracket bracket = bracket_rank(bound, count, wanted, margin, count_within, count_both);
+  const rank_bracket bracket = bracket_rank(bound, count, wanted, count_within, count_three);
   nearest_sum out;
   out.largest_squared = bracket.high;
   if (bracket.at_high - bracket.at_low <= leaf_width) {

@@ -51,22 +51,22 @@ struct rank_bracket {
 
 /// Narrows down where the `wanted`-th smallest of `count` values up to `bound` lies, until at most
 /// sixteen are left or all that are left are equal. `count_within(x)`: how many are at most `x`;
-/// `count_both(x, y)`: the same for two.
-template <class Count, class CountBoth>
+/// `count_three(x)`: the same for three.
+template <class Count, class CountThree>
 [[gnu::always_inline]] inline rank_bracket bracket_rank(float bound, std::size_t count, std::size_t wanted,
-                                                        std::size_t margin, const Count& count_within,
-                                                        const CountBoth& count_both) {
+                                                        const Count& count_within, const CountThree& count_three) {
   rank_bracket bracket{-1.0F, bound, 0, count};
   if (count <= 16) return bracket;
-  // Most often two guesses, a little low and a little high, leave few values between them.
-  const float low = guess_ranked(bound, std::max(wanted, margin + 1) - margin, count);
-  const float high = guess_ranked(bound, std::min(wanted + margin, count), count);
-  const std::array<std::size_t, 2> counts = count_both(low, high);
-  bracket.narrow(low, counts[0], wanted);
-  bracket.narrow(high, counts[1], wanted);
-  float at = 0;
-  for (int tries = 0; bracket.at_high - bracket.at_low > 16 && bracket.pick(tries, wanted, at); ++tries) {
-    bracket.narrow(at, count_within(at), wanted);
+  // Most often three guesses, one of them a little low and one a little high, leave few values between.
+  constexpr std::size_t margin = 11;
+  const std::array<float, 3> at{guess_ranked(bound, std::max(wanted, margin + 1) - margin, count),
+                                guess_ranked(bound, wanted, count),
+                                guess_ranked(bound, std::min(wanted + margin, count), count)};
+  const std::array<std::size_t, 3> counts = count_three(at);
+  for (std::size_t i = 0; i != 3; ++i) bracket.narrow(at[i], counts[i], wanted);
+  float next = 0;
+  for (int tries = 0; bracket.at_high - bracket.at_low > 16 && bracket.pick(tries, wanted, next); ++tries) {
+    bracket.narrow(next, count_within(next), wanted);
   }
   return bracket;
 }

@@ -61,14 +61,15 @@ struct knn_kernels {
   std::uint32_t (*near_boxes)(const box_row& boxes, const box3& query, float bound, float* distance);
   /// Adds to `near` the boxes with bits in `mask`; the first one is that of leaf `first`.
   void (*gather)(const box_row& boxes, std::uint32_t mask, std::uint32_t first, nearby_leaves& near);
-  /// Writes the squared distances within `bound` from `query` to the points of `near`, and returns
-  /// their number. Ends early with more than `capacity` of them; writes up to `capacity + 2 * leaf_width`.
-  /// `scratch`: as long as `near.leaves`.
+  /// Writes the squared distances within `bound` from `query` to the points of `near`, then sixteen
+  /// times infinity, and returns the number of the former. Ends early with more than `capacity` of
+  /// them; touches no more than `capacity + 3 * leaf_width`. `scratch`: longer by sixteen than
+  /// `near.leaves`.
   std::size_t (*near_points)(const point_row* leaves, const nearby_leaves& near, const std::array<float, 3>& query,
                              float bound, std::uint32_t* scratch, float* found, std::size_t capacity);
-  /// The same for one leaf, whatever its box.
+  /// The same for one leaf, whatever its box, and without infinity at the end.
   std::size_t (*in_leaf)(const point_row& leaf, const std::array<float, 3>& query, float bound, float* found);
-  /// @pre 0 < wanted <= count, no distance above `bound`, room for sixteen more
+  /// @pre 0 < wanted <= count, no distance above `bound`, and sixteen times infinity after them
   nearest_sum (*sum_nearest)(float* found, std::size_t count, std::size_t wanted, float bound);
 };
 
@@ -122,9 +123,11 @@ inline std::size_t near_points_portable(const point_row* leaves, const nearby_le
     for (; mask != 0; mask &= mask - 1) {
       const std::uint32_t leaf = near.leaves[first + static_cast<std::size_t>(std::countr_zero(mask))];
       count += in_leaf_portable(leaves[leaf], query, bound, found + count);
-      if (count > capacity) return count;
+      if (count > capacity) break;
     }
+    if (count > capacity) break;
   }
+  std::fill_n(found + count, leaf_width, std::numeric_limits<float>::infinity());
   return count;
 }
 

@@ -68,8 +68,8 @@ class nearest_search {
 
   /// Searches for the points of one leaf, then calls `f(i, found, bound)` for the i-th of them in any
   /// order. `found`: squared distances up to `bound`, the nearest among them; fewer than `wanted` where
-  /// squared distances overflow. `f` may reorder them, write 16 floats beyond them, and returns the
-  /// `wanted`-th smallest.
+  /// squared distances overflow; sixteen times infinity stands after them. `f` may reorder them, and
+  /// returns the `wanted`-th smallest.
   template <class F>
   void visit_leaf(std::size_t l, F&& f) {
     const std::size_t size = tree_->size_of(l);
@@ -78,6 +78,7 @@ class nearest_search {
       usual_ = first.count < wanted_ ? 0.0F : first.bound;
     }
     std::array<float, 2 * leaf_width> largest;
+    largest.fill(infinity);
     for (std::size_t first = 0; first != size;) {
       box3 box{query(l, first), query(l, first)};
       std::size_t last = first + 1;
@@ -96,6 +97,7 @@ class nearest_search {
     std::size_t count;
     float bound;
   };
+  static constexpr float infinity = std::numeric_limits<float>::infinity();
   static constexpr float most = std::numeric_limits<float>::max();
 
   [[nodiscard]] std::array<float, 3> query(std::size_t l, std::size_t i) const noexcept {
@@ -176,6 +178,7 @@ class nearest_search {
       result.count += kernels_.in_leaf(tree_->leaves[n], q, most, found + result.count);
     }
     if (result.count < wanted_) return search_outwards(q, found);
+    std::fill_n(found + result.count, leaf_width, infinity);
     float bound = kernels_.sum_nearest(found, result.count, wanted_, most).largest_squared;
     if (!gather_near({q, q}, bound, own_)) return search_outwards(q, found);
     for (;;) {
@@ -220,6 +223,7 @@ class nearest_search {
       count = wanted_;
       enough = wanted_ + std::max(wanted_ / 2, leaf_width);
     }
+    std::fill_n(found + count, leaf_width, infinity);
     return {count, bound};
   }
 
