@@ -9,6 +9,7 @@
 #include <deque>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <benchmark/benchmark.h>
@@ -64,6 +65,18 @@ const points& room(std::size_t n) {
   return made.emplace_back(std::move(out));
 }
 
+/// The same points in no order, as a k-d tree or a hash may hand them out.
+const points& shuffled_room(std::size_t n) {
+  static std::deque<points> made;
+  for (const points& p : made) {
+    if (p.size() == n) return p;
+  }
+  points out = room(n);
+  orbis::random_bits random{n + 1};
+  for (std::size_t i = n; i-- > 1;) std::swap(out[i], out[random.below(static_cast<std::uint32_t>(i + 1))]);
+  return made.emplace_back(std::move(out));
+}
+
 struct adaptor {
   const points* cloud;
   std::size_t kdtree_get_point_count() const { return cloud->size(); }
@@ -115,44 +128,52 @@ std::vector<std::uint32_t> by_pcl(const pcl::PointCloud<pcl::PointXYZ>::Ptr& clo
 
 /// Measures `filter()`, after checking that it selects what ours selects.
 template <class Filter>
-void measure(benchmark::State& state, std::size_t n, std::size_t k, Filter&& filter) {
-  if (filter() != orbis::cloud::statistical_inliers(orbis::par, room(n), {.neighbors = k})) {
+void measure(benchmark::State& state, const points& cloud, std::size_t k, Filter&& filter) {
+  if (filter() != orbis::cloud::statistical_inliers(orbis::par, cloud, {.neighbors = k})) {
     state.SkipWithError("selects other points");
     return;
   }
   for (auto _ : state) benchmark::DoNotOptimize(filter());
 }
 
-const bool registered = [] {
-  for (const std::size_t n : {100'000U, 300'000U}) {
-    for (const std::size_t k : {8U, 50U}) {
-      const std::string group = "statistical_filter/n:" + std::to_string(n) + "/k:" + std::to_string(k) + "/";
-      const auto add = [&](const std::string& who, auto filter) {
-        benchmark::RegisterBenchmark(
-            (group + who).c_str(), [=](benchmark::State& state) { measure(state, n, k, [&] { return filter(n, k); }); })
-            ->Unit(benchmark::kMillisecond)
-            ->UseRealTime();
-      };
-      add("orbis", [](std::size_t count, std::size_t neighbors) {
-        return orbis::cloud::statistical_inliers(orbis::seq, room(count), {.neighbors = neighbors});
-      });
-      add("orbis_par2", [](std::size_t count, std::size_t neighbors) {
-        return orbis::cloud::statistical_inliers(orbis::par.with(2), room(count), {.neighbors = neighbors});
-      });
-      add("nanoflann",
-          [](std::size_t count, std::size_t neighbors) { return plain_nanoflann(room(count), neighbors, 1.0); });
+/// One size of cloud and neighbourhood, everyone's filter.
+void add_statistical(std::size_t n, std::size_t k, bool shuffled) {
+  auto* const make = shuffled ? shuffled_room : room;
+  const std::string group = std::string{shuffled ? "statistical_filter_shuffled" : "statistical_filter"} +
+                            "/n:" + std::to_string(n) + "/k:" + std::to_string(k) + "/";
+  const auto add = [&](const std::string& who, auto filter) {
+    benchmark::RegisterBenchmark(
+        (group + who).c_str(),
+        [=](benchmark::State& state) { measure(state, make(n), k, [&] { return filter(make(n)); }); })
+        ->Unit(benchmark::kMillisecond)
+        ->UseRealTime();
+  };
+  add("orbis",
+      [k](const points& cloud) { return orbis::cloud::statistical_inliers(orbis::seq, cloud, {.neighbors = k}); });
+  add("orbis_par2", [k](const points& cloud) {
+    return orbis::cloud::statistical_inliers(orbis::par.with(2), cloud, {.neighbors = k});
+  });
+  add("nanoflann", [k](const points& cloud) { return plain_nanoflann(cloud, k, 1.0); });
 #ifdef ORBIS_BENCH_WITH_PCL
-      add("pcl", [](std::size_t count, std::size_t neighbors) {
-        static pcl::PointCloud<pcl::PointXYZ>::Ptr cloud;
-        if (cloud == nullptr || cloud->size() != count) {
-          cloud = std::make_shared<pcl::PointCloud<pcl::PointXYZ>>();
-          for (const auto& p : room(count)) cloud->push_back({p.x(), p.y(), p.z()});
-        }
-        return by_pcl(cloud, neighbors, 1.0);
-      });
-#endif
+  add("pcl", [k](const points& cloud) {
+    static const points* copied = nullptr;
+    static pcl::PointCloud<pcl::PointXYZ>::Ptr copy;
+    if (copied != &cloud) {
+      copied = &cloud;
+      copy = std::make_shared<pcl::PointCloud<pcl::PointXYZ>>();
+      for (const auto& p : cloud) copy->push_back({p.x(), p.y(), p.z()});
     }
+    return by_pcl(copy, k, 1.0);
+  });
+#endif
+}
+
+const bool registered = [] {
+  for (const std::size_t n : {10'000U, 100'000U, 300'000U, 1'000'000U}) {
+    for (const std::size_t k : {8U, 20U, 50U, 100U}) add_statistical(n, k, false);
+    add_statistical(n, 50, true);
   }
+  for (const std::size_t k : {5U, 200U}) add_statistical(100'000, k, false);
   benchmark::RegisterBenchmark("select_filter/n:300000/orbis",
                                [](benchmark::State& state) {
                                  for (auto _ : state)
