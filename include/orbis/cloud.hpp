@@ -3,6 +3,7 @@
 /// Point clouds: neighbours, filters, automatic selection, voxel grids.
 #pragma once
 
+#include <orbis/cloud/all_knn.hpp>
 #include <orbis/cloud/all_knn_avx2.hpp>
 #include <orbis/cloud/all_knn_avx512.hpp>
 #include <orbis/cloud/all_knn_bracket.hpp>

@@ -97,6 +97,21 @@ inline std::size_t keep_within_avx2(const point_row& leaf, const __m256* query, 
   return count;
 }
 
+ORBIS_TARGET("avx2")
+inline std::uint32_t distances_avx2(const point_row& leaf, const std::array<float, 3>& query, float bound,
+                                    float* distance) {
+  std::uint32_t mask = 0;
+  for (std::size_t at = 0; at != leaf_width; at += 8) {
+    const auto difference = [&](std::size_t a) ORBIS_TARGET("avx2") {
+      return _mm256_sub_ps(_mm256_set1_ps(query[a]), _mm256_load_ps(leaf.axis[a].data() + at));
+    };
+    const __m256 d = sum_of_squares_avx2(difference(0), difference(1), difference(2));
+    _mm256_storeu_ps(distance + at, d);
+    mask |= mask_avx2(_mm256_cmp_ps(d, _mm256_set1_ps(bound), _CMP_LE_OQ)) << at;
+  }
+  return mask;
+}
+
 ORBIS_TARGET("avx2,popcnt")
 inline std::size_t in_leaf_avx2(const point_row& leaf, const std::array<float, 3>& query, float bound, float* found) {
   const __m256 q[3] = {_mm256_set1_ps(query[0]), _mm256_set1_ps(query[1]), _mm256_set1_ps(query[2])};

@@ -95,6 +95,17 @@ inline std::size_t keep_within_avx512(const point_row& leaf, const __m512* query
   return static_cast<std::size_t>(__builtin_popcount(within));
 }
 
+ORBIS_TARGET("avx512f")
+inline std::uint32_t distances_avx512(const point_row& leaf, const std::array<float, 3>& query, float bound,
+                                      float* distance) {
+  const auto difference = [&](std::size_t a) ORBIS_TARGET("avx512f") {
+    return _mm512_sub_ps(_mm512_set1_ps(query[a]), _mm512_load_ps(leaf.axis[a].data()));
+  };
+  const __m512 d = sum_of_squares_avx512(difference(0), difference(1), difference(2));
+  _mm512_storeu_ps(distance, d);
+  return _mm512_cmp_ps_mask(d, _mm512_set1_ps(bound), _CMP_LE_OQ);
+}
+
 ORBIS_TARGET("avx512f,popcnt")
 inline std::size_t in_leaf_avx512(const point_row& leaf, const std::array<float, 3>& query, float bound, float* found) {
   const __m512 q[3] = {_mm512_set1_ps(query[0]), _mm512_set1_ps(query[1]), _mm512_set1_ps(query[2])};

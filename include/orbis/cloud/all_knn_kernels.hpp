@@ -69,6 +69,8 @@ struct knn_kernels {
                              float bound, std::uint32_t* scratch, float* found, std::size_t capacity);
   /// The same for one leaf, whatever its box, and without infinity at the end.
   std::size_t (*in_leaf)(const point_row& leaf, const std::array<float, 3>& query, float bound, float* found);
+  /// The squared distances from `query` to the points of a leaf; returns those within `bound` as bits.
+  std::uint32_t (*distances)(const point_row& leaf, const std::array<float, 3>& query, float bound, float* distance);
   /// @pre 0 < wanted <= count, no distance above `bound`, and sixteen times infinity after them
   nearest_sum (*sum_nearest)(float* found, std::size_t count, std::size_t wanted, float bound);
 };
@@ -99,6 +101,16 @@ inline void gather_portable(const box_row& boxes, std::uint32_t mask, std::uint3
     }
     near.leaves[near.count++] = first + static_cast<std::uint32_t>(i);
   }
+}
+
+inline std::uint32_t distances_portable(const point_row& leaf, const std::array<float, 3>& query, float bound,
+                                        float* distance) {
+  std::uint32_t mask = 0;
+  for (std::size_t i = 0; i != leaf_width; ++i) {
+    distance[i] = squared_distance<float>(query, {leaf.axis[0][i], leaf.axis[1][i], leaf.axis[2][i]});
+    mask |= (distance[i] <= bound ? 1U : 0U) << i;
+  }
+  return mask;
 }
 
 inline std::size_t in_leaf_portable(const point_row& leaf, const std::array<float, 3>& query, float bound,

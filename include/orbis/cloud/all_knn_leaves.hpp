@@ -215,12 +215,18 @@ class leaf_order {
   std::vector<range> left_out_;
 };
 
+/// A point that is in no leaf because enough identical ones are.
+struct surplus_copy {
+  std::uint32_t index;
+  std::uint32_t kept;  ///< position in `members` of the first of those that are
+};
+
 /// The leaves of a cloud and the boxes around them. About 18 bytes per point; 16 more while it is made.
 struct leaf_hierarchy {
   std::vector<point_row> leaves;
   std::vector<std::vector<box_row>> levels;  ///< [0]: boxes of the leaves; the last one is a single row
   std::vector<std::uint32_t> members;        ///< indices of the points, leaf after leaf
-  std::vector<std::uint32_t> left_out;       ///< indices of surplus copies
+  std::vector<surplus_copy> left_out;        ///< identical points beyond `most_copies`, in no leaf
   std::size_t finite = 0;                    ///< points that are in the leaves or left out
 
   /// How many points the leaf holds.
@@ -253,7 +259,8 @@ template <execution_policy Policy, point_range Points>
   };
   for (const auto& range : order.left_out()) {
     take(range.begin);
-    for (; next != range.end; ++next) out.left_out.push_back(entries[next].index);
+    const auto kept = static_cast<std::uint32_t>(out.members.size() - most_copies);
+    for (; next != range.end; ++next) out.left_out.push_back({entries[next].index, kept});
   }
   take(entries.size());
   if (out.members.empty()) return out;

@@ -27,15 +27,16 @@ namespace orbis::cloud::detail {
 #if ORBIS_X86
   const simd::level best = std::min(wanted, simd::detected());
   if (best >= simd::level::avx512) {
-    return {near_boxes_avx512, gather_avx512, near_points_avx512, in_leaf_avx512, sum_nearest_avx512};
+    return {near_boxes_avx512, gather_avx512, near_points_avx512, in_leaf_avx512, distances_avx512, sum_nearest_avx512};
   }
   if (best >= simd::level::avx2) {
-    return {near_boxes_avx2, gather_portable, near_points_avx2, in_leaf_avx2, sum_nearest_avx2};
+    return {near_boxes_avx2, gather_portable, near_points_avx2, in_leaf_avx2, distances_avx2, sum_nearest_avx2};
   }
 #else
   static_cast<void>(wanted);
 #endif
-  return {near_boxes_portable, gather_portable, near_points_portable, in_leaf_portable, sum_nearest_portable};
+  return {near_boxes_portable, gather_portable,    near_points_portable,
+          in_leaf_portable,    distances_portable, sum_nearest_portable};
 }
 
 /// Finds, for one point after another along the curve, the squared distances to its `wanted` nearest
@@ -89,6 +90,35 @@ class nearest_search {
     // The median: an outlier says nothing about its neighbours.
     const float median = kernels_.sum_nearest(largest.data(), size, size / 2 + 1, most).largest_squared;
     if (median <= most) usual_ = median;
+  }
+
+  /// Calls `f(member, squared distance)` for every point within `bound` of the i-th of a leaf.
+  template <class F>
+  void visit_within(std::size_t l, std::size_t i, float bound, F&& f) {
+    const std::array<float, 3> q = query(l, i);
+    const box3 box{q, q};
+    std::array<float, leaf_width> distance;
+    pending_.clear();
+    pending_.push_back({0, static_cast<std::uint32_t>(tree_->levels.size() - 1), 0});
+    while (!pending_.empty()) {
+      const pending next = pending_.back();
+      pending_.pop_back();
+      const std::size_t children = next.level == 0 ? tree_->leaves.size() : tree_->levels[next.level - 1].size();
+      std::uint32_t mask = kernels_.near_boxes(tree_->levels[next.level][next.index], box, bound, distance.data());
+      for (; mask != 0; mask &= mask - 1) {
+        const std::size_t child = next.index * leaf_width + static_cast<std::size_t>(std::countr_zero(mask));
+        if (child >= children) break;  // where the bound is infinite
+        if (next.level != 0) {
+          pending_.push_back({0, next.level - 1, static_cast<std::uint32_t>(child)});
+          continue;
+        }
+        std::uint32_t within = kernels_.distances(tree_->leaves[child], q, bound, distance.data());
+        for (const std::size_t size = tree_->size_of(child); within != 0; within &= within - 1) {
+          const auto n = static_cast<std::size_t>(std::countr_zero(within));
+          if (n < size) f(tree_->members[child * leaf_width + n], distance[n]);
+        }
+      }
+    }
   }
 
  private:

@@ -66,7 +66,7 @@ template <execution_policy Policy, point_range Points>
   const leaf_hierarchy tree = make_leaves(policy, points, std::min(k, means.size()) + 1);
   const std::size_t wanted = std::min(k, std::max<std::size_t>(tree.finite, 1) - 1) + 1;  // with the point itself
   if (wanted < 2) return means;
-  for (const std::uint32_t i : tree.left_out) means[i] = 0;
+  for (const surplus_copy& copy : tree.left_out) means[copy.index] = 0;
   const knn_kernels kernels = select_knn_kernels(level);
   for_each_chunk(policy, tree.leaves.size(), 128, [&](std::size_t begin, std::size_t end) {
     nearest_search search{tree, kernels, wanted};

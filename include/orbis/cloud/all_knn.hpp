@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// The k nearest neighbours of every point of a cloud.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cassert>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <vector>
+
+#include <orbis/cloud/all_knn_leaves.hpp>
+#include <orbis/cloud/all_knn_search.hpp>
+#include <orbis/cloud/neighbors.hpp>
+#include <orbis/core/execution.hpp>
+#include <orbis/core/point.hpp>
+#include <orbis/core/simd.hpp>
+
+namespace orbis::cloud {
+
+/// The neighbours of every point of a cloud, nearest first.
+struct neighbor_table {
+  static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
+
+  std::size_t width = 0;              ///< neighbours of each finite point
+  std::vector<neighbor<float>> rows;  ///< `width` per point; index `none` in rows of points that are not finite
+
+  /// The neighbours of point `i`; none if it is not finite.
+  [[nodiscard]] std::span<const neighbor<float>> operator[](std::size_t i) const noexcept {
+    if (width == 0 || rows[i * width].index == none) return {};
+    return std::span{rows}.subspan(i * width, width);
+  }
+};
+
+namespace detail {
+
+/// Gathers the points within a distance and writes the nearest of them, the point itself left out.
+class neighbor_row {
+ public:
+  void start() { keys_.clear(); }
+  /// Squared distances are not negative: their bits are ordered as they are.
+  void add(std::uint32_t index, float distance_squared) {
+    keys_.push_back(std::uint64_t{std::bit_cast<std::uint32_t>(distance_squared)} << 32U | index);
+  }
+  void write(std::uint32_t self, std::span<neighbor<float>> row) {
+    std::sort(keys_.begin(), keys_.end());
+    std::size_t n = 0;
+    for (auto key = keys_.begin(); n != row.size(); ++key) {
+      const auto index = static_cast<std::uint32_t>(*key & 0xffffffffU);
+      if (index == self) continue;
+      row[n++] = {index, std::sqrt(std::bit_cast<float>(static_cast<std::uint32_t>(*key >> 32U)))};
+    }
+    // Different squares can have the same root.
+    std::sort(row.begin(), row.end(), nearest_sink<float>::less);
+  }
+
+ private:
+  std::vector<std::uint64_t> keys_;
+};
+
+/// `all_knn` with the inner loops for `level`.
+template <execution_policy Policy, point_range Points>
+[[nodiscard]] neighbor_table all_knn_at(simd::level level, const Policy& policy, const Points& points, std::size_t k) {
+  const std::size_t count = std::ranges::size(points);
+  const leaf_hierarchy tree = make_leaves(policy, points, std::min(k, count) + 1);
+  neighbor_table out;
+  out.width = std::min(k, std::max<std::size_t>(tree.finite, 1) - 1);
+  out.rows.assign(count * out.width, {neighbor_table::none, std::numeric_limits<float>::quiet_NaN()});
+  if (out.width == 0) return out;
+  const knn_kernels kernels = select_knn_kernels(level);
+  const std::size_t wanted = out.width + 1;  // with the point itself
+  const auto row_of = [&](std::uint32_t i) { return std::span{out.rows}.subspan(i * out.width, out.width); };
+  for_each_chunk(policy, tree.leaves.size(), 128, [&](std::size_t begin, std::size_t end) {
+    nearest_search search{tree, kernels, wanted};
+    neighbor_row row;
+    for (std::size_t l = begin; l != end; ++l) {
+      search.visit_leaf(l, [&](std::size_t i, std::span<float> found, float bound) {
+        const float largest = found.size() < wanted
+                                  ? std::numeric_limits<float>::infinity()
+                                  : kernels.sum_nearest(found.data(), found.size(), wanted, bound).largest_squared;
+        row.start();
+        search.visit_within(l, i, largest, [&](std::uint32_t member, float d) { row.add(member, d); });
+        const std::uint32_t self = tree.members[l * leaf_width + i];
+        row.write(self, row_of(self));
+        return largest;
+      });
+    }
+  });
+  // Those left out have the first of their copies for neighbours.
+  for (const surplus_copy& copy : tree.left_out) {
+    const auto row = row_of(copy.index);
+    for (std::size_t n = 0; n != row.size(); ++n) row[n] = {tree.members[copy.kept + n], 0.0F};
+  }
+  return out;
+}
+
+}  // namespace detail
+
+/// The `min(k, finite points - 1)` nearest other points of every finite point, nearest first; points
+/// at equal squared distances by index, so that the result is one and the same for every policy and
+/// processor. Identical points are neighbours of each other.
+///
+/// Coordinates are taken as float, distances are computed in float. O(n (log n + k log k)), also where
+/// many points are identical. Memory: 8 k bytes per point for the result, 40 per point meanwhile.
+/// @pre k > 0, fewer than 2^32 - 1 points
+template <execution_policy Policy, point_range Points>
+[[nodiscard]] neighbor_table all_knn(const Policy& policy, const Points& points, std::size_t k) {
+  assert(k > 0);
+  return detail::all_knn_at(simd::detected(), policy, points, k);
+}
+
+}  // namespace orbis::cloud

@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include <orbis/cloud/all_knn.hpp>
+
+#include "cloud/clouds.hpp"
+#include "cloud/reference.hpp"
+#include "support/catch.hpp"
+
+using orbis::cloud::neighbor;
+using orbis::cloud::neighbor_table;
+using orbis::test::points;
+
+namespace {
+
+/// The neighbours of point `i` by definition.
+std::vector<neighbor<float>> reference_neighbors(const points& cloud, std::size_t i, std::size_t k) {
+  std::vector<std::pair<float, std::uint32_t>> others;
+  if (!orbis::test::finite(cloud[i])) return {};
+  for (std::size_t j = 0; j != cloud.size(); ++j) {
+    if (j == i || !orbis::test::finite(cloud[j])) continue;
+    others.emplace_back(orbis::test::squared(cloud[i], cloud[j]), static_cast<std::uint32_t>(j));
+  }
+  std::sort(others.begin(), others.end());
+  others.resize(std::min(k, others.size()));
+  std::vector<neighbor<float>> out;
+  for (const auto& [squared, j] : others) out.push_back({j, std::sqrt(squared)});
+  std::sort(out.begin(), out.end(), orbis::cloud::nearest_sink<float>::less);
+  return out;
+}
+
+}  // namespace
+
+TEST_CASE("the neighbours of all points are those that brute force finds, ties by index") {
+  auto clouds = orbis::test::all_clouds();
+  points copies;  // many copies of few points among others, in no order
+  orbis::random_bits random{1};
+  const points some = orbis::test::uniform_cloud(60, 2);
+  for (int i = 0; i != 700; ++i) copies.push_back(some[random.below(random.below(60) + 1)]);
+  clouds.emplace_back("many copies", copies);
+  points overflowing = orbis::test::uniform_cloud(20, 3, 1e17);
+  for (int i = 0; i != 20; ++i) overflowing.emplace_back(1e20F * static_cast<float>(i), 0.0F, 0.0F);
+  clouds.emplace_back("overflowing", overflowing);
+  for (const auto& [name, cloud] : clouds) {
+    for (const std::size_t k : {1U, 6U, 40U}) {
+      using orbis::simd::level;
+      for (const level l : {level::portable, level::avx2, level::avx512}) {
+        INFO(name << " k " << k << " level " << static_cast<int>(l));
+        const neighbor_table found = orbis::cloud::detail::all_knn_at(l, orbis::par.with(2), cloud, k);
+        std::size_t different = 0;
+        for (std::size_t i = 0; i < cloud.size(); i += 1 + cloud.size() / 150) {
+          const auto row = found[i];
+          const auto expected = reference_neighbors(cloud, i, k);
+          different += std::equal(row.begin(), row.end(), expected.begin(), expected.end()) ? 0 : 1;
+        }
+        CHECK(different == 0);
+      }
+    }
+  }
+}
+
+TEST_CASE("neighbours come in plain metres, identical points among them") {
+  const std::vector<orbis::vec3> cloud{{0, 0, 0}, {0, 3, 4}, {0, 0, 0}, {0, 0, 10}};
+  const neighbor_table found = orbis::cloud::all_knn(orbis::seq, cloud, 2);
+  CHECK(found.width == 2);
+  CHECK(std::vector(found[0].begin(), found[0].end()) == std::vector<neighbor<float>>{{2, 0.0F}, {1, 5.0F}});
+  CHECK(std::vector(found[1].begin(), found[1].end()) == std::vector<neighbor<float>>{{0, 5.0F}, {2, 5.0F}});
+  CHECK(orbis::cloud::all_knn(orbis::seq, cloud, 9)[3].size() == 3);
+  CHECK(orbis::cloud::all_knn(orbis::seq, points{}, 9).rows.empty());
+  CHECK(orbis::cloud::all_knn(orbis::seq, points(1), 9)[0].empty());
+}
