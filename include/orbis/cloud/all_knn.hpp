@@ -56,7 +56,9 @@ class neighbor_row {
       row[n++] = {index, std::sqrt(std::bit_cast<float>(static_cast<std::uint32_t>(*key >> 32U)))};
     }
     // Different squares can have the same root.
-    std::sort(row.begin(), row.end(), nearest_sink<float>::less);
+    if (!std::is_sorted(row.begin(), row.end(), nearest_sink<float>::less)) {
+      std::sort(row.begin(), row.end(), nearest_sink<float>::less);
+    }
   }
 
  private:

@@ -89,7 +89,7 @@ template <execution_policy Policy, point_range Points>
 /// Coordinates are taken as float. Squared distances are float, roots and sums double in ascending
 /// order, the mean float: bit for bit the mean distances of the usual statistical outlier filter.
 /// O(n log n) for fixed k, also where many points are identical; the same result for every policy and
-/// processor. Memory: about 40 bytes per point, and 100 k bytes per thread.
+/// processor. Memory: about 40 bytes per point, and 0.3 k + 20 kilobytes per thread.
 /// @pre k > 0, fewer than 2^32 points
 template <execution_policy Policy, point_range Points>
 [[nodiscard]] std::vector<float> all_mean_knn_distance(const Policy& policy, const Points& points, std::size_t k) {
