@@ -18,6 +18,7 @@
 #include <orbis/octree/key_box.hpp>
 #include <orbis/octree/nodes.hpp>
 #include <orbis/octree/pruned_tree.hpp>
+#include <orbis/octree/tree_parts.hpp>
 
 namespace orbis::octree {
 
@@ -71,68 +72,14 @@ inline constexpr auto octant_offsets = [] {
   return {octant.x + k.x, octant.y + k.y, octant.z + k.z};
 }
 
-/// The bricks and larger leaves of a store in Morton order.
-template <class T>
-[[nodiscard]] std::vector<leaf_part<T>> all_parts(const brick_store<T>& store) {
-  std::vector<leaf_part<T>> parts;
-  parts.reserve(store.brick_count() + store.large_count());
-  store.for_each_brick([&](const brick<T>& b) {
-    if (!b.is_known()) return;
-    const voxel_key key = named_key(b.name);
-    parts.push_back({morton_order(key), key, brick_level, b.is_uniform() ? nullptr : &b, b.value[0]});
-  });
-  if (store.has_large()) {
-    store.for_each_large([&](std::uint64_t name, T v) {
-      const voxel_key key = named_key(name);
-      parts.push_back({morton_order(key), key, named_level(name), nullptr, v});
-    });
-    std::sort(parts.begin(), parts.end(),
-              [](const leaf_part<T>& a, const leaf_part<T>& b) { return a.order < b.order; });
-  }
-  return parts;
-}
-
-/// Merges equal ones of parts in Morton order as far as they go.
-template <class T>
-void merge_parts(std::vector<leaf_part<T>>& parts, int root_level) {
-  // The merged ones take the place of those read already. Eight leaves of one size that end with a
-  // parent's last child are its children.
-  std::size_t size = 0;
-  for (std::size_t i = 0; i != parts.size(); ++i) {
-    parts[size++] = parts[i];
-    for (;;) {
-      const leaf_part<T>& last = parts[size - 1];
-      const std::uint64_t cells = std::uint64_t{1} << (3 * static_cast<unsigned>(last.level - brick_level));
-      if (last.content != nullptr || last.level >= root_level - 1 || size < 8 || (last.order / cells & 7U) != 7) break;
-      const auto first = parts.begin() + static_cast<std::ptrdiff_t>(size - 8);
-      const bool equal = std::all_of(first, first + 8, [&](const leaf_part<T>& p) {
-        return p.content == nullptr && p.level == last.level && p.value == last.value &&
-               p.order / (8 * cells) == last.order / (8 * cells);
-      });
-      if (!equal) break;
-      ++first->level;
-      size -= 7;
-    }
-  }
-  parts.resize(size);
-}
-
-/// Both: the leaves from a brick on, and the bricks that have smaller ones.
-template <class T>
-[[nodiscard]] std::vector<leaf_part<T>> leaf_parts(const brick_store<T>& store, int root_level) {
-  std::vector<leaf_part<T>> parts = all_parts(store);
-  merge_parts(parts, root_level);
-  return parts;
-}
-
 /// Calls `on_leaf(key, level, value)` for leaves from an octant on and `on_octant(key, brick, i)` for
 /// the other octants, which returns the inner nodes from there on. Returns the number of inner nodes.
 template <class T, class OnLeaf, class OnOctant>
-std::size_t walk_octants(const std::vector<leaf_part<T>>& parts, int root_level, OnLeaf&& on_leaf,
+std::size_t walk_octants(const std::vector<tree_part<T>>& parts, int root_level, OnLeaf&& on_leaf,
                          OnOctant&& on_octant) {
   std::size_t inner = 0;
   for (std::size_t i = 0; i != parts.size(); ++i) {
-    const leaf_part<T>& part = parts[i];
+    const tree_part<T>& part = parts[i];
     // Its ancestors, but for those it has in common with the part before it.
     const auto differing = static_cast<int>(i == 0 ? 0 : std::bit_width(part.order ^ parts[i - 1].order));
     const int lowest_common = i == 0 ? root_level + 1 : brick_level + (differing + 2) / 3;
@@ -173,7 +120,7 @@ std::size_t visit_octant(const voxel_key& key, const octant_view<T>& o, block<T>
 
 /// The leaves of some parts of a store.
 template <class T, class Visit>
-std::size_t visit_parts(const brick_store<T>& store, const std::vector<leaf_part<T>>& parts, int root_level,
+std::size_t visit_parts(const brick_store<T>& store, const std::vector<tree_part<T>>& parts, int root_level,
                         Visit&& visit) {
   block<T> scratch;
   return walk_octants(parts, root_level, visit, [&](const voxel_key& key, const brick<T>& b, std::uint32_t i) {
@@ -187,7 +134,7 @@ std::size_t visit_parts(const brick_store<T>& store, const std::vector<leaf_part
 /// in the order of `pruned_tree::visit`. Returns the number of inner nodes. O(known voxels).
 template <class T, std::invocable<const voxel_key&, int, T> Visit>
 std::size_t visit_leaves(const brick_store<T>& store, int root_level, Visit&& visit) {
-  return detail::visit_parts(store, detail::leaf_parts(store, root_level), root_level, visit);
+  return detail::visit_parts(store, tree_parts(store, root_level), root_level, visit);
 }
 
 /// Numbers of nodes of the pruned octree.
@@ -213,7 +160,7 @@ template <sensor_model Model>
       n.occupied_leaves += detail::count_bits(leaves.first & store.voxels_where(b, i, is_occupied<Model>));
     return leaves.inner_nodes;
   };
-  n.nodes = detail::walk_octants(detail::leaf_parts(store, root_level), root_level, on_leaf, on_octant);
+  n.nodes = detail::walk_octants(tree_parts(store, root_level), root_level, on_leaf, on_octant);
   n.free_leaves = n.leaves - n.occupied_leaves;
   n.nodes += n.leaves;
   return n;
@@ -230,10 +177,10 @@ void visit_nodes_down_to(const brick_store<typename Model::value_type>& store, i
   const auto report = [&](const voxel_key& key, int level, const auto& entry) {
     if (entry.kind != node_kind::none) visit(key, level, entry.value(), entry.kind);
   };
-  const std::vector<detail::leaf_part<T>> parts = detail::leaf_parts(store, root_level);
+  const std::vector<tree_part<T>> parts = tree_parts(store, root_level);
   block<T> scratch;
   for (std::size_t i = 0; i != parts.size();) {
-    const detail::leaf_part<T>& part = parts[i];
+    const tree_part<T>& part = parts[i];
     if (part.content == nullptr && part.level >= lowest_level) {
       visit(part.key, part.level, part.value, node_kind::leaf);
       ++i;
@@ -295,7 +242,7 @@ template <class T>
 template <class T, std::invocable<const voxel_key&, int, T> Visit>
 void visit_leaves_in(const brick_store<T>& store, int root_level, const key_box& box, Visit&& visit) {
   const auto& [low, high] = box;
-  std::vector<detail::leaf_part<T>> parts;
+  std::vector<tree_part<T>> parts;
   const auto add = [&](const typename brick_store<T>::chunk& c) {
     for (std::uint32_t place = 0; place != 64; ++place)
       if (const brick<T>* const b = store.find(c, place); b != nullptr && b->is_known()) {
@@ -326,11 +273,11 @@ void visit_leaves_in(const brick_store<T>& store, int root_level, const key_box&
       parts.push_back({morton_order(key), key, named_level(name), nullptr, v});
   });
   std::sort(parts.begin(), parts.end(), [](const auto& a, const auto& b) { return a.order < b.order; });
-  detail::merge_parts(parts, root_level);
+  merge_parts(parts, root_level);
 
   block<T> scratch;
   std::uint64_t done = 0;  // the order up to which everything has been visited
-  for (detail::leaf_part<T>& part : parts) {
+  for (tree_part<T>& part : parts) {
     if (part.order < done) continue;
     if (part.content == nullptr) {
       // Its siblings may lie outside the box.

@@ -20,6 +20,7 @@
 #include <orbis/octree/brick.hpp>
 #include <orbis/octree/pruned_tree.hpp>
 #include <orbis/octree/sensor_model.hpp>
+#include <orbis/octree/tree_parts.hpp>
 
 namespace orbis::octree {
 
@@ -63,16 +64,6 @@ concept node_policy = sensor_model<M> && requires(typename M::value_type v) {
 
 namespace detail {
 
-/// A brick, or a leaf at least as large as one.
-template <class T>
-struct leaf_part {
-  std::uint64_t order;      ///< Morton order of its lowest brick
-  voxel_key key;            ///< its lowest voxel
-  int level;                ///< brick_level or more
-  const brick<T>* content;  ///< null: a leaf
-  T value;
-};
-
 /// Nodes under a policy, each made of what is below it.
 template <sensor_model Model, node_policy<Model> Policy>
 class node_maker {
@@ -110,7 +101,7 @@ class node_maker {
     return parent([&](std::uint32_t i) { return octant(b, i); });
   }
   /// The node at `level` over its parts, in Morton order.
-  [[nodiscard]] entry over(int level, std::span<const leaf_part<T>> parts) const {
+  [[nodiscard]] entry over(int level, std::span<const tree_part<T>> parts) const {
     if (parts.empty()) return {};
     if (parts.front().content == nullptr && parts.front().level >= level) return leaf(parts.front().value);
     if (level == brick_level) return whole(*parts.front().content);
@@ -153,8 +144,8 @@ class node_maker {
 /// The bricks and larger leaves inside the node at `level` >= chunk_level that contains `k`, or the
 /// leaf it lies in, in Morton order.
 template <class T>
-[[nodiscard]] std::vector<leaf_part<T>> parts_inside(const brick_store<T>& store, const voxel_key& k, int level) {
-  std::vector<leaf_part<T>> parts;
+[[nodiscard]] std::vector<tree_part<T>> parts_inside(const brick_store<T>& store, const voxel_key& k, int level) {
+  std::vector<tree_part<T>> parts;
   const auto add = [&](const typename brick_store<T>::chunk& c) {
     for (std::uint32_t place = 0; place != 64; ++place)
       if (const brick<T>* const b = store.find(c, place); b != nullptr && b->is_known()) {
@@ -201,7 +192,7 @@ template <sensor_model Model, class Policy>
     case brick_level: return make.whole(*b);
     default: break;
   }
-  std::vector<leaf_part<T>> parts = parts_inside(store, k, std::max(level, chunk_level));
+  std::vector<tree_part<T>> parts = parts_inside(store, k, std::max(level, chunk_level));
   if (level < chunk_level)
     std::erase_if(parts, [&](const auto& p) {
       const int larger = std::max(level, p.level);

@@ -35,6 +35,7 @@
 #include <orbis/octree/leaves.hpp>
 #include <orbis/octree/pruned_tree.hpp>
 #include <orbis/octree/sensor_model.hpp>
+#include <orbis/octree/tree_parts.hpp>
 #include <orbis/octree/update_block.hpp>
 
 namespace orbis::octree {
@@ -214,12 +215,12 @@ class occupancy_octree {
       return (cube.min.array() > box.max.array()).any() || (cube.max.array() < box.min.array()).any();
     };
     std::vector<std::uint64_t> bricks, large;
-    std::vector<detail::leaf_part<value_type>> parts = detail::all_parts(store_);
+    std::vector<tree_part<value_type>> parts = stored_parts(store_);
     std::erase_if(parts, [&](const auto& part) { return !is_outside(node_name(part.key, part.level)); });
     for (const auto& part : parts)
       (part.level == brick_level ? bricks : large).push_back(node_name(part.key, part.level));
     if (parts.empty()) return 0;
-    detail::merge_parts(parts, tree_depth());
+    merge_parts(parts, tree_depth());
     detail::visit_parts(store_, parts, tree_depth(),
                         [&](const voxel_key& key, int level, value_type v) { evict(leaf_of(key, level, v)); });
     store_.erase_bricks(bricks);
@@ -230,8 +231,7 @@ class occupancy_octree {
   /// else: what lies within bricks is always stored pruned. Leaves are split again where something
   /// changes. O(bricks).
   void prune() {
-    std::vector<detail::leaf_part<value_type>> parts = detail::all_parts(store_);
-    detail::merge_parts(parts, tree_depth());
+    const std::vector<tree_part<value_type>> parts = tree_parts(store_, tree_depth());
     hash_index merged;
     unsigned levels = 0;
     for (const auto& part : parts)

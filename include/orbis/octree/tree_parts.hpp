@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A pruned octree down to its bricks, as a sorted list; for writers that visit all of it.
+/// A pruned octree down to its bricks, as a sorted list; for whoever visits all of it.
 #pragma once
 
 #include <algorithm>
@@ -16,28 +16,35 @@ namespace orbis::octree {
 template <class T>
 struct tree_part {
   std::uint64_t order;      ///< Morton order of its lowest brick
+  voxel_key key;            ///< its lowest voxel
   int level;                ///< brick_level or more
   const brick<T>* content;  ///< null: a leaf
   T value;                  ///< of a leaf
 };
 
-/// The parts of a store's octree in Morton order, equal ones merged as far as they go, except into a
-/// root of eight parts. O(bricks).
+/// The bricks and larger leaves of a store in Morton order. O(bricks).
 template <class T>
-[[nodiscard]] std::vector<tree_part<T>> tree_parts(const brick_store<T>& store, int root_level) {
+[[nodiscard]] std::vector<tree_part<T>> stored_parts(const brick_store<T>& store) {
   std::vector<tree_part<T>> parts;
   parts.reserve(store.brick_count() + store.large_count());
   store.for_each_brick([&](const brick<T>& b) {
-    if (b.is_known())
-      parts.push_back({morton_order(named_key(b.name)), brick_level, b.is_uniform() ? nullptr : &b, b.value[0]});
+    if (!b.is_known()) return;
+    const voxel_key key = named_key(b.name);
+    parts.push_back({morton_order(key), key, brick_level, b.is_uniform() ? nullptr : &b, b.value[0]});
   });
   if (store.has_large()) {
     store.for_each_large([&](std::uint64_t name, T v) {
-      parts.push_back({morton_order(named_key(name)), named_level(name), nullptr, v});
+      const voxel_key key = named_key(name);
+      parts.push_back({morton_order(key), key, named_level(name), nullptr, v});
     });
     std::sort(parts.begin(), parts.end(), [](const auto& a, const auto& b) { return a.order < b.order; });
   }
+  return parts;
+}
 
+/// Merges equal ones of parts in Morton order as far as they go, except into a root of eight parts.
+template <class T>
+void merge_parts(std::vector<tree_part<T>>& parts, int root_level) {
   // The merged ones take the place of those read already. Eight leaves of one size that end with a
   // parent's last child are its children.
   std::size_t size = 0;
@@ -58,6 +65,14 @@ template <class T>
     }
   }
   parts.erase(parts.begin() + static_cast<std::ptrdiff_t>(size), parts.end());
+}
+
+/// The parts of a store's pruned octree: its leaves from a brick on, and the bricks that have smaller
+/// ones. O(bricks).
+template <class T>
+[[nodiscard]] std::vector<tree_part<T>> tree_parts(const brick_store<T>& store, int root_level) {
+  std::vector<tree_part<T>> parts = stored_parts(store);
+  merge_parts(parts, root_level);
   return parts;
 }
 
