@@ -4,53 +4,21 @@
 // infinities, points far outside the grid and points on the faces of voxels. The map must be OctoMap's,
 // whatever the order of the points, their number of copies, and the number of threads.
 #include <algorithm>
-#include <array>
-#include <bit>
 #include <cmath>
-#include <cstring>
 #include <limits>
-#include <span>
 #include <vector>
 
 #include <orbis/core/execution.hpp>
 
 #include "fuzz/octree.hpp"
+#include "fuzz/source.hpp"
 #include "octree/support.hpp"
 
 namespace {
 
 using namespace orbis;
+using fuzz::source;
 using octree::ray_mode;
-
-/// The bytes from first to last; zeros when they are used up.
-class source {
- public:
-  explicit source(std::span<const std::uint8_t> bytes) : bytes_{bytes} {}
-  [[nodiscard]] bool empty() const { return bytes_.empty(); }
-  [[nodiscard]] unsigned byte() {
-    if (bytes_.empty()) return 0;
-    const unsigned b = bytes_.front();
-    bytes_ = bytes_.subspan(1);
-    return b;
-  }
-  /// Any float: NaN, infinities and denormals too.
-  [[nodiscard]] float any() {
-    const unsigned b = byte() | byte() << 8U;
-    return std::bit_cast<float>(b << 16U | byte() << 8U | byte());
-  }
-  /// Eighths of voxels, so that faces, edges and corners are hit.
-  [[nodiscard]] float near(double resolution) {
-    return static_cast<float>(static_cast<int>(static_cast<std::int8_t>(byte())) * 0.125 * resolution);
-  }
-  [[nodiscard]] vec3f point(double resolution, bool wild) {
-    const auto one = [&] { return wild ? any() : near(resolution); };
-    const float x = one(), y = one();
-    return {x, y, one()};
-  }
-
- private:
-  std::span<const std::uint8_t> bytes_;
-};
 
 struct scan {
   octree::integration_options options;

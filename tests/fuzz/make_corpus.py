@@ -140,6 +140,81 @@ def scans():
         write("integrate", f"far_origin_{mode}", bytes([0]) + scan(mode | 24, calm, swap(wild(5e3, 0, 0))))
 
 
+SET, EDIT, TRANSFORM, EVICT, SCAN, SUBTRACT, MERGE, DOUBLE, FILE, COPY, CLEAR, TRACK = 0, 3, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14
+FORGET_BEFORE, CAPACITY, FOLLOW, TRACK_OFF, TRACK_AGAIN, TRACK_ON = 3, 4, 5, 0, 1, 6
+MIN, MISS, HIT, MAX, ZERO, MINUS_ZERO = range(6)
+
+
+def edits():
+    """See edit.cpp for the layout."""
+    rng = random.Random(3)
+    key = lambda: bytes(rng.randrange(256) for _ in range(3))
+    node = lambda level, value, at=b"\0\0\0": bytes([SET, level]) + at + bytes([value])
+    edit = lambda kind, value, number, at=b"\0\0\0": bytes([EDIT]) + at + bytes([kind, value, number])
+    scan = lambda what, flags, origin, points: (bytes([what, flags]) + origin + bytes([len(points)]) + b"".join(points))
+    track = lambda what: bytes([TRACK, what])
+    transform = lambda kind, value=ZERO: bytes([TRANSFORM, kind, value])
+    some = [key() for _ in range(11)]
+
+    # Nothing known is left of an octant, in a map that had nothing else.
+    write("edit", "octant_forgotten", bytes([0]) + edit(0, HIT, 5) + edit(2, HIT, 5) + edit(2, HIT, 7, key()))
+    write("edit", "large_leaves", bytes([0]) + node(5, MISS) + edit(2, HIT, 9) + edit(0, MISS, 9) + edit(4, 0, 0, key()))
+    write("edit", "minus_zero", bytes([1]) + edit(5, ZERO, 0) + edit(1, MINUS_ZERO, 3) + edit(7, MINUS_ZERO, 1)
+          + node(3, MINUS_ZERO, b"\x10\0\0") + transform(4) + transform(3, MINUS_ZERO))
+    write("edit", "log_and_clear", bytes([0]) + track(TRACK_ON) + node(2, HIT) + track(FOLLOW) + bytes([CLEAR])
+          + track(FOLLOW) + node(2, MISS) + track(FOLLOW) + track(TRACK_OFF) + node(1, HIT, b"\x14\0\0") + track(TRACK_ON))
+    write("edit", "log_off_and_on", bytes([1]) + track(TRACK_ON) + track(CAPACITY | 3 << 3)
+          + scan(SCAN, 0, key(), some) + track(FOLLOW) + track(TRACK_AGAIN) + edit(2, HIT, 4, some[0]) + track(FOLLOW)
+          + track(FORGET_BEFORE) + scan(SCAN, 1, key(), some) + track(FOLLOW) + transform(1, MISS))
+    write("edit", "with_itself", bytes([1]) + track(TRACK_ON) + scan(SCAN, 0, some[0], some) + bytes([DOUBLE])
+          + track(FOLLOW) + bytes([DOUBLE, FILE, DOUBLE]))
+    write("edit", "merges", bytes([2]) + node(4, MISS, key()) + b"".join(
+        bytes([MERGE, level]) + key() + scan(HIT, 0, key(), some[:level]) + bytes([16, 240, 32]) for level in (0, 3, 5)))
+    write("edit", "scan_taken_out", bytes([3]) + node(4, MISS, some[0]) + scan(SCAN, 0, some[1], some)
+          + scan(SUBTRACT, 0, some[1], some) + scan(SCAN, 1, some[2], some) + scan(SUBTRACT, 1, some[2], some))
+    write("edit", "window_rolls", bytes([0]) + b"".join(
+        scan(SCAN, 2, k, some) + bytes([EVICT]) + k + bytes([6, i % 2]) for i, k in enumerate(some[:5])))
+    write("edit", "palette_overflows", bytes([5]) + track(TRACK_ON) + b"".join(edit(6, HIT, i, some[i]) for i in range(4))
+          + edit(5, HIT, 0, some[0]) + edit(6, HIT, 60, some[0]) + edit(3, HIT, 2, some[1]) + track(FOLLOW))
+    write("edit", "decay", bytes([4]) + node(4, MISS, some[0]) + scan(SCAN, 0, some[1], some)
+          + b"".join(transform(kind, MISS) for kind in (6, 6, 1, 0, 7, 2, 5)))
+    for i in range(3):
+        write("edit", f"random_{i}", bytes([i]) + bytes(rng.randrange(256) for _ in range(300)))
+
+
+def depth_images():
+    """See integrate_depth.cpp for the layout."""
+    rng = random.Random(4)
+    some = lambda n: bytes(rng.randrange(256) for _ in range(n))
+    PLAIN = 1  # before: nothing
+
+    def start(resolution=0, depth=0, size=0, focal=0, model=b"\0", base=0, flags=0, range_=0, bounds=b"", before=PLAIN):
+        return bytes([resolution, depth, size, size, focal, 0, 0, 0]) + model + bytes([base, flags, range_]) + bounds + bytes([before])
+
+    def shot(kind, how=1, where=5, more=b"", rotation=b"", pattern=None):
+        pattern = some(24) if pattern is None else pattern
+        near = bytes([3, 250, 9]) if where < 48 else b"\0\0\0"
+        return (bytes([where]) + near + more + (rotation or some(4)) + bytes([kind, len(pattern) - 1]) + pattern + bytes([how]))
+
+    write("integrate_depth", "wall", start() + shot(0) + shot(0, how=0))
+    write("integrate_depth", "noisy", start(1, 0, 1) + shot(1) + shot(2, how=9) + shot(3))
+    write("integrate_depth", "absurd_depths", start() + shot(4) + shot(5) + shot(4, how=4))
+    write("integrate_depth", "on_corner", start(3) + shot(2, where=53, rotation=bytes([0, 0, 0, 0])) + shot(1, where=53))
+    write("integrate_depth", "settled", start(1, base=3, before=32 | 128) + shot(1, how=0) + shot(3, how=8))
+    write("integrate_depth", "discretized", start(0, flags=3, range_=1) + shot(2) + shot(3, how=9))
+    write("integrate_depth", "no_rays", start(0, flags=28, range_=2) + shot(4))
+    write("integrate_depth", "bounded", start(1, flags=96, bounds=some(6), base=3) + shot(1) + shot(3))
+    write("integrate_depth", "at_border", start(1, 3, base=4) + b"".join(shot(2, where=w) for w in (0, 1, 2)))
+    write("integrate_depth", "far_away", start(0) + shot(1, where=4, more=b"\1") + shot(1, where=3, more=some(4)))
+    write("integrate_depth", "wide", start(7, focal=5, base=2) + shot(3) + shot(1))
+    write("integrate_depth", "narrow", start(2, 1, focal=4, base=4) + shot(1) + shot(0, how=0))
+    write("integrate_depth", "distorted", start(0, model=bytes([2, 200, 5, 9])) + shot(1) + shot(3))
+    write("integrate_depth", "fisheye", start(0, 2, focal=1, model=bytes([3, 12, 250])) + shot(2, how=8) + shot(1))
+    write("integrate_depth", "one_pixel", start(0, 0, 4, base=3) + shot(0) + shot(3))
+
+
 if __name__ == "__main__":
     readers()
     scans()
+    edits()
+    depth_images()
