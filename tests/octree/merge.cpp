@@ -143,3 +143,11 @@ TEST_CASE("A huge leaf is taken over whole") {
   CHECK(summary.merged == (std::size_t{1} << 42U) + 1);
   CHECK(ot_bytes(into) == ot_bytes(large));
 }
+
+TEST_CASE("A leaf that is taken over whole gets nothing twice from its neighbours") {
+  occupancy_octree<> from{0.1}, into{0.1};
+  from.set_unknown_node({32768 + 16, 32768, 32768 + 32}, 12, -0.4F);  // 16 voxels wide
+  from.set_unknown_node({32768 + 16, 32768, 32768 + 28}, 14, 0.8F);   // 4 voxels wide, below it
+  merge(into, from);
+  CHECK(ot_bytes(into) == ot_bytes(from));
+}

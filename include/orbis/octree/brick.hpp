@@ -398,7 +398,7 @@ class brick_store {
         kept.push_back(chunks_[i]);
     if (kept.size() == chunks_.size()) return;
     chunks_ = std::move(kept);
-    index_ = {};
+    index_ = hash_index{};
     for (std::uint32_t i = 0; i != chunks_.size(); ++i) index_.set(chunks_[i].name, i);
     if (empty()) clear();
   }

@@ -74,7 +74,7 @@ class large_leaves {
       index_.set(last.name, i);
     }
     leaves_.resize(leaves_.size() - 1);
-    if (leaves_.empty()) *this = {};
+    if (leaves_.empty()) *this = large_leaves{};
   }
   /// Bytes on the heap, those shared with copies included.
   [[nodiscard]] std::size_t memory_bytes() const noexcept { return index_.memory_bytes() + leaves_.memory_bytes(); }

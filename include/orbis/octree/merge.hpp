@@ -120,7 +120,12 @@ merge_summary merge(const Policy& policy, occupancy_octree<Model>& into, const o
                           std::clamp(v, Model::clamp_min, Model::clamp_max));
     summary.merged += std::size_t{1} << (3 * static_cast<unsigned>(named_level(name)));
   }
-  const std::vector<voxel_key> octants = detail::octants_around<Model>(into.grid(), source, T_into_from, taken);
+  std::vector<voxel_key> octants = detail::octants_around<Model>(into.grid(), source, T_into_from, taken);
+  // The neighbours of a leaf that has been taken over touch octants inside it.
+  std::erase_if(octants, [&](const voxel_key& k) {
+    const auto large = source.store().find_large(k);
+    return same_frame && large && taken.find(node_name(k, large->second)) != hash_index::none;
+  });
   const se3 T_from_into = T_into_from.inverse();
   const mat3 rotation = T_from_into.rotation_matrix();
   const vec3 translation = T_from_into.translation();
