@@ -10,7 +10,6 @@
 #include <cstdint>
 #include <span>
 #include <type_traits>
-#include <utility>
 #include <vector>
 
 #include <orbis/core/execution.hpp>
@@ -18,6 +17,7 @@
 #include <orbis/core/se3.hpp>
 #include <orbis/octree/hash_index.hpp>
 #include <orbis/octree/key_box.hpp>
+#include <orbis/octree/large_leaves.hpp>
 #include <orbis/octree/occupancy_octree.hpp>
 
 namespace orbis::octree {
@@ -48,21 +48,40 @@ inline void append_octants(const voxel_grid& grid, const vec3& low, const vec3& 
       for (std::uint32_t x = first.x; x <= box->high.x; x += 4) octants.push_back({x, y, z});
 }
 
-/// Whether anything is known in a node above bricks, larger leaves that contain it aside.
+/// The names of the nodes above bricks inside which something is stored. O(bricks).
 template <class T>
-[[nodiscard]] bool knows_inside(const brick_store<T>& store, const voxel_key& k, int level) {
-  bool known = false;
-  const auto is_inside = [&](std::uint64_t name) { return node_key(named_key(name), level) == k; };
-  store.for_each_large([&](std::uint64_t name, T) { known = known || is_inside(name); });
-  if (!known) store.for_each_brick([&](const brick<T>& b) { known = known || is_inside(b.name); });
-  return known;
+[[nodiscard]] hash_index inner_nodes(const brick_store<T>& store, int root_level) {
+  hash_index nodes;
+  const auto add_above = [&](std::uint64_t name) {
+    for (int level = named_level(name) + 1; level <= root_level; ++level) {
+      const std::uint64_t above = node_name(named_key(name), level);
+      if (nodes.find(above) != hash_index::none) return;  // and so are those above it
+      nodes.set(above, 0);
+    }
+  };
+  store.for_each_brick([&](const brick<T>& b) { add_above(b.name); });
+  store.for_each_large([&](std::uint64_t name, T) { add_above(name); });
+  return nodes;
 }
 
-/// The octants of `grid` in which something known of `from` may lie, moved by `T`, leaves named in
-/// `but` aside; each once, in a fixed order.
-template <sensor_model Model, class From>
-[[nodiscard]] std::vector<voxel_key> octants_around(const voxel_grid& grid, const From& from, const se3& T,
-                                                    const hash_index& but) {
+/// The leaves above bricks of `from` in whose place `into`, on the same grid, knows nothing.
+template <class T>
+[[nodiscard]] large_leaves<T> new_leaves(const brick_store<T>& into, const brick_store<T>& from, int root_level) {
+  large_leaves<T> found;
+  if (!from.has_large()) return found;
+  const hash_index inner = inner_nodes(into, root_level);
+  from.for_each_large([&](std::uint64_t name, T v) {
+    if (into.find_large_value(named_key(name)) == nullptr && inner.find(name) == hash_index::none) found.add(name, v);
+  });
+  return found;
+}
+
+/// The octants of `grid` in which something known of `from` may lie, moved by `T`, but none inside the
+/// leaves `taken`; each once, in a fixed order.
+template <sensor_model Model>
+[[nodiscard]] std::vector<voxel_key> octants_around(const voxel_grid& grid, const occupancy_octree<Model>& from,
+                                                    const se3& T,
+                                                    const large_leaves<typename Model::value_type>& taken) {
   std::vector<voxel_key> octants;
   const mat3 extent = T.rotation_matrix().cwiseAbs();
   const auto add = [&](const voxel_key& k, int level) {
@@ -77,8 +96,10 @@ template <sensor_model Model, class From>
     }
   });
   from.store().for_each_large([&](std::uint64_t name, auto) {
-    if (but.find(name) == hash_index::none) add(named_key(name), named_level(name));
+    if (taken.find(named_key(name)) == nullptr) add(named_key(name), named_level(name));
   });
+  // The neighbours of a leaf touch octants inside it.
+  std::erase_if(octants, [&](const voxel_key& k) { return taken.find(k) != nullptr; });
   const auto before = [](const voxel_key& a, const voxel_key& b) {
     return node_name(a, octant_level) < node_name(b, octant_level);
   };
@@ -105,27 +126,16 @@ merge_summary merge(const Policy& policy, occupancy_octree<Model>& into, const o
   using value_type = typename Model::value_type;
   const occupancy_octree<Model> source = from;  // costs nothing, and may be `into` itself
   const bool same_frame = into.grid() == from.grid() && T_into_from.to_matrix().isIdentity(0.0);
-  const auto is_new = [&](const voxel_key& k, int level) {  // a node on the same grid that can be taken over
-    return same_frame && into.store().find_large_value(k) == nullptr && !detail::knows_inside(into.store(), k, level);
-  };
   merge_summary summary;
-  std::vector<std::pair<std::uint64_t, value_type>> whole;
-  source.store().for_each_large([&](std::uint64_t name, value_type v) {
-    if (is_new(named_key(name), named_level(name))) whole.emplace_back(name, v);
-  });
-  hash_index taken;
-  for (const auto& [name, v] : whole) {
-    taken.set(name, 0);
+  const auto taken =
+      same_frame ? detail::new_leaves(into.store(), source.store(), into.tree_depth()) : large_leaves<value_type>{};
+  for (std::size_t i = 0; i != taken.size(); ++i) {
+    const auto& [name, v] = taken[i];
     into.set_unknown_node(named_key(name), into.tree_depth() - named_level(name),
                           std::clamp(v, Model::clamp_min, Model::clamp_max));
     summary.merged += std::size_t{1} << (3 * static_cast<unsigned>(named_level(name)));
   }
-  std::vector<voxel_key> octants = detail::octants_around<Model>(into.grid(), source, T_into_from, taken);
-  // The neighbours of a leaf that has been taken over touch octants inside it.
-  std::erase_if(octants, [&](const voxel_key& k) {
-    const auto large = source.store().find_large(k);
-    return same_frame && large && taken.find(node_name(k, large->second)) != hash_index::none;
-  });
+  const std::vector<voxel_key> octants = detail::octants_around(into.grid(), source, T_into_from, taken);
   const se3 T_from_into = T_into_from.inverse();
   const mat3 rotation = T_from_into.rotation_matrix();
   const vec3 translation = T_from_into.translation();
