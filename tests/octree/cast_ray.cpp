@@ -14,19 +14,8 @@ using namespace orbis::octree;
 
 namespace {
 
-struct scene {
-  occupancy_octree<> ours{0.05};
-  octomap::OcTree theirs{0.05};
-
-  scene() {
-    random_bits random{51};
-    for (int i = 0; i != 6; ++i) {
-      const vec3f origin = test::random_points(random, 1, 0.3)[0];
-      const auto scan = test::shell_scan(random, 1500, origin);
-      ours.integrate(scan, origin);
-      test::insert(theirs, scan, origin, {});
-    }
-  }
+struct scene : test::twin_maps {
+  scene() : twin_maps{51, 6} {}
   /// Returns whether something was hit.
   bool check(const vec3f& origin, const vec3f& direction, double max_range, bool ignore_unknown) const {
     octomap::point3d end;

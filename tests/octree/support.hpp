@@ -77,4 +77,20 @@ inline void insert(octomap::OcTree& tree, const std::vector<vec3f>& points, cons
   return points;
 }
 
+/// A map of shell scans and its reference.
+struct twin_maps {
+  octree::occupancy_octree<> ours{0.05};
+  octomap::OcTree theirs{0.05};
+
+  twin_maps(std::uint64_t seed, int scans) {
+    random_bits random{seed};
+    for (int i = 0; i != scans; ++i) {
+      const vec3f origin = random_points(random, 1, 0.3)[0];
+      const auto scan = shell_scan(random, 1500, origin);
+      ours.integrate(scan, origin);
+      insert(theirs, scan, origin, {});
+    }
+  }
+};
+
 }  // namespace orbis::test

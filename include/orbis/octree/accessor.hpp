@@ -55,8 +55,7 @@ class store_reader {
   void move(const voxel_key& k, std::uint32_t far) noexcept {
     at_ = k;
     if (far >= node_cells(chunk_level)) chunk_ = store_->find_chunk(k);
-    if (far >= node_cells(brick_level))
-      brick_ = chunk_ == nullptr ? nullptr : store_->find(*chunk_, place_in_chunk(k));
+    if (far >= node_cells(brick_level)) brick_ = chunk_ == nullptr ? nullptr : store_->find(*chunk_, place_in_chunk(k));
     if (brick_ != nullptr) {
       octant_ = store_->view(*brick_, place_in_brick(k) >> 6U);
       max_ = brick_->value[place_in_brick(k) >> 6U];
@@ -78,6 +77,24 @@ class store_reader {
   T max_{};  ///< the largest value in the octant, if anything is known there
 };
 
+/// How log-odds are answered: as they are stored, or in float for models of integers.
+template <sensor_model Model>
+using log_odds_type =
+    std::conditional_t<std::floating_point<typename Model::value_type>, typename Model::value_type, float>;
+
+/// The log-odds and the probability that a stored value stands for; empty if there is none.
+template <sensor_model Model>
+[[nodiscard]] std::optional<log_odds_type<Model>> log_odds_at(std::optional<typename Model::value_type> v) noexcept {
+  if constexpr (std::floating_point<typename Model::value_type>)
+    return v;
+  else
+    return v ? std::optional{static_cast<float>(to_log_odds<Model>(*v))} : std::nullopt;
+}
+template <sensor_model Model>
+[[nodiscard]] std::optional<double> probability_at(std::optional<typename Model::value_type> v) noexcept {
+  return v ? std::optional{probability_of<Model>(*v)} : std::nullopt;
+}
+
 /// The queries of a map for points or voxels of which each lies near the one before: along a ray, on
 /// a surface, in a scan. Those are found without a search. The map must outlive it and stay as it is;
 /// one for each thread.
@@ -90,7 +107,7 @@ template <sensor_model Model>
 class octree_accessor {
  public:
   using value_type = typename Model::value_type;
-  using log_odds_type = std::conditional_t<std::floating_point<value_type>, value_type, float>;
+  using log_odds_type = octree::log_odds_type<Model>;
 
   octree_accessor(const brick_store<value_type>& store, const voxel_grid& grid) noexcept
       : reader_{store}, grid_{grid} {}
@@ -106,20 +123,11 @@ class octree_accessor {
   /// The log-odds at `p`, empty where unknown or outside the grid.
   template <class P>
   requires point_like<P> || std::same_as<P, voxel_key>
-  [[nodiscard]] std::optional<log_odds_type> log_odds(const P& p) noexcept {
-    const auto v = value(p);
-    if constexpr (std::same_as<log_odds_type, value_type>)
-      return v;
-    else
-      return v ? std::optional{static_cast<log_odds_type>(to_log_odds<Model>(*v))} : std::nullopt;
-  }
+  [[nodiscard]] std::optional<log_odds_type> log_odds(const P& p) noexcept { return log_odds_at<Model>(value(p)); }
   /// The probability that `p` is occupied, empty where unknown or outside the grid.
   template <class P>
   requires point_like<P> || std::same_as<P, voxel_key>
-  [[nodiscard]] std::optional<double> probability(const P& p) noexcept {
-    const auto v = value(p);
-    return v ? std::optional{probability_of<Model>(*v)} : std::nullopt;
-  }
+  [[nodiscard]] std::optional<double> probability(const P& p) noexcept { return probability_at<Model>(value(p)); }
   /// What is known about `p`.
   template <class P>
   requires point_like<P> || std::same_as<P, voxel_key>

@@ -32,6 +32,7 @@
 #include <orbis/octree/depth_marker.hpp>
 #include <orbis/octree/integration.hpp>
 #include <orbis/octree/key_box.hpp>
+#include <orbis/octree/large_leaves.hpp>
 #include <orbis/octree/leaves.hpp>
 #include <orbis/octree/pruned_tree.hpp>
 #include <orbis/octree/sensor_model.hpp>
@@ -68,7 +69,7 @@ class occupancy_octree {
  public:
   using model = Model;
   using value_type = typename Model::value_type;  ///< what is stored: log-odds in the model's units
-  using log_odds_type = std::conditional_t<std::floating_point<value_type>, value_type, float>;
+  using log_odds_type = octree::log_odds_type<Model>;
   using leaf = octree_leaf<value_type>;
 
   /// `resolution`: the edge of a voxel, metres. `tree_depth`: the map is 2^tree_depth voxels wide.
@@ -173,10 +174,12 @@ class occupancy_octree {
     for (const voxel_key& k : keys) {
       assert(std::max({k.x, k.y, k.z}) < grid_.cells());
       block<value_type> before;
-      if (const brick<value_type>* const b = store_.find(k))
+      if (const brick<value_type>* const b = store_.find(k)) {
         store_.read_octant(*b, place_in_brick(k) >> 6U, before);
-      else if (const value_type* const large = store_.find_large_value(k))
-        before.value.fill(*large), before.known = ~std::uint64_t{0};
+      } else if (const value_type* const large = store_.find_large_value(k)) {
+        before.value.fill(*large);
+        before.known = ~std::uint64_t{0};
+      }
       block<value_type> after = before;
       edit(k, after);
       replace_octant(k, before, after);
@@ -232,20 +235,12 @@ class occupancy_octree {
   /// changes. O(bricks).
   void prune() {
     const std::vector<tree_part<value_type>> parts = tree_parts(store_, tree_depth());
-    hash_index merged;
-    unsigned levels = 0;
+    large_leaves<value_type> merged;
     for (const auto& part : parts)
-      if (part.level > brick_level) {
-        merged.set(node_name(part.key, part.level), 0);
-        levels |= 1U << static_cast<unsigned>(part.level);
-      }
+      if (part.level > brick_level) merged.add(node_name(part.key, part.level), part.value);
     const auto is_inside = [&](std::uint64_t name) {
-      const voxel_key k = named_key(name);
-      for (unsigned rest = levels; rest != 0; rest &= rest - 1) {
-        const int level = std::countr_zero(rest);
-        if (level > named_level(name) && merged.find(node_name(k, level)) != hash_index::none) return true;
-      }
-      return false;
+      const auto* const leaf = merged.find(named_key(name));
+      return leaf != nullptr && leaf->name != name;
     };
     std::vector<std::uint64_t> bricks, large;
     store_.for_each_brick([&](const brick<value_type>& b) {
@@ -256,9 +251,10 @@ class occupancy_octree {
     });
     store_.erase_bricks(bricks);
     store_.erase_large(large);
-    for (const auto& part : parts)
-      if (part.level > brick_level && store_.find_large_value(part.key) == nullptr)
-        store_.set_node(part.key, part.level, part.value);
+    for (std::size_t i = 0; i != merged.size(); ++i) {
+      const auto& [name, v] = merged[i];
+      if (store_.find_large_value(named_key(name)) == nullptr) store_.set_node(named_key(name), named_level(name), v);
+    }
   }
 
   /// From now on keeps a log of the voxels whose value changes, or stops doing so and forgets it.
@@ -287,20 +283,11 @@ class occupancy_octree {
   /// The log-odds at `p`, empty where unknown or outside the grid.
   template <class P>
   requires point_like<P> || std::same_as<P, voxel_key>
-  [[nodiscard]] std::optional<log_odds_type> log_odds(const P& p) const {
-    const auto v = value(p);
-    if constexpr (std::same_as<log_odds_type, value_type>)
-      return v;
-    else
-      return v ? std::optional{static_cast<log_odds_type>(to_log_odds<Model>(*v))} : std::nullopt;
-  }
+  [[nodiscard]] std::optional<log_odds_type> log_odds(const P& p) const { return log_odds_at<Model>(value(p)); }
   /// The probability that `p` is occupied, empty where unknown or outside the grid.
   template <class P>
   requires point_like<P> || std::same_as<P, voxel_key>
-  [[nodiscard]] std::optional<double> probability(const P& p) const {
-    const auto v = value(p);
-    return v ? std::optional{probability_of<Model>(*v)} : std::nullopt;
-  }
+  [[nodiscard]] std::optional<double> probability(const P& p) const { return probability_at<Model>(value(p)); }
   /// The same queries for places near each other, several times as fast: one accessor for each
   /// thread, good until the map changes.
   [[nodiscard]] octree_accessor<Model> accessor() const noexcept { return {store_, grid_}; }
