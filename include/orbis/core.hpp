@@ -19,5 +19,6 @@
 #include <orbis/core/sim3.hpp>
 #include <orbis/core/simd.hpp>
 #include <orbis/core/so3.hpp>
+#include <orbis/core/strided_points.hpp>
 #include <orbis/core/trajectory.hpp>
 #include <orbis/core/types.hpp>
