@@ -3,6 +3,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -52,6 +53,56 @@ TEST_CASE("the point itself does not count as its neighbour") {
   CHECK(result.standard_deviation == Approx(std::sqrt(4.0 / 3.0)));
   CHECK(result.threshold == Approx(result.mean + result.standard_deviation));
   CHECK(result.inliers == std::vector<std::uint32_t>{0, 1});
+}
+
+TEST_CASE("a variance that rounding makes negative is none, and everything stays") {
+  // Nearly equal distances: the sums of squares cancel to less than nothing. The products are rounded to
+  // float, so that their sum can fall short by more than the spread.
+  bool met = false;
+  for (int i = 0; i != 200; ++i) {
+    const float value = 0.1F + 0.001F * static_cast<float>(i);
+    std::vector<float> distances(1000, value);
+    distances[7] = std::nextafter(value, 1.0F);
+    double sum = 0;
+    double squares = 0;
+    for (const float d : distances) {
+      sum += d;
+      volatile float product = d * d;
+      squares += product;
+    }
+    const double variance = (squares - sum * sum / 1000) / 999;
+    const auto result = orbis::cloud::statistical_decision(distances, {.sigma_multiplier = 1.0});
+    if (variance < 0) {
+      met = true;
+      CHECK(result.standard_deviation == 0);
+      CHECK(result.threshold == std::numeric_limits<double>::infinity());
+      CHECK(result.inliers.size() == distances.size());
+    } else {
+      CHECK(result.standard_deviation == std::sqrt(variance));
+    }
+  }
+  CHECK(met);
+}
+
+TEST_CASE("distances whose squares overflow keep everything") {
+  constexpr float inf = std::numeric_limits<float>::infinity();
+  for (const float far : {inf, 1e30F}) {
+    const auto result = orbis::cloud::statistical_decision({1, 2, far, 1});
+    CHECK(result.inliers.size() == 4);
+    CHECK(result.standard_deviation == std::numeric_limits<double>::infinity());
+    CHECK(result.threshold == std::numeric_limits<double>::infinity());
+    CHECK(orbis::cloud::statistical_decision({1, 2, far, 1}, {.sigma_multiplier = 0.0}).inliers.size() == 4);
+  }
+}
+
+TEST_CASE("a decision on known distances keeps or drops those that are none") {
+  constexpr float nan = std::numeric_limits<float>::quiet_NaN();
+  const std::vector<float> distances{1, nan, 1, 1, 1, 9, nan};
+  CHECK(orbis::cloud::statistical_decision(distances).inliers == std::vector<std::uint32_t>{0, 2, 3, 4});
+  CHECK(orbis::cloud::statistical_decision(distances, {.non_finite = non_finite::keep}).inliers ==
+        std::vector<std::uint32_t>{0, 1, 2, 3, 4, 6});
+  CHECK(orbis::cloud::statistical_decision({nan, nan}).inliers.empty());
+  CHECK(orbis::cloud::statistical_decision({}).inliers.empty());
 }
 
 TEST_CASE("an empty cloud and a single point are left as they are") {

@@ -28,6 +28,7 @@ struct neighbor_table {
   static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
 
   std::size_t width = 0;              ///< neighbours of each finite point
+  std::size_t points = 0;             ///< of the cloud, finite or not: as many rows
   std::vector<neighbor<float>> rows;  ///< `width` per point; index `none` in rows of points that are not finite
 
   /// The neighbours of point `i`; none if it is not finite.
@@ -71,6 +72,7 @@ template <execution_policy Policy, point_range Points>
   const std::size_t count = std::ranges::size(points);
   const leaf_hierarchy tree = make_leaves(policy, points, std::min(k, count) + 1);
   neighbor_table out;
+  out.points = count;
   out.width = std::min(k, std::max<std::size_t>(tree.finite, 1) - 1);
   out.rows.assign(count * out.width, {neighbor_table::none, std::numeric_limits<float>::quiet_NaN()});
   if (out.width == 0) return out;

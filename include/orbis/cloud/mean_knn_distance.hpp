@@ -12,6 +12,7 @@
 #include <span>
 #include <vector>
 
+#include <orbis/cloud/all_knn.hpp>
 #include <orbis/cloud/all_knn_leaves.hpp>
 #include <orbis/cloud/all_knn_search.hpp>
 #include <orbis/core/execution.hpp>
@@ -94,6 +95,31 @@ template <execution_policy Policy, point_range Points>
 template <execution_policy Policy, point_range Points>
 [[nodiscard]] std::vector<float> all_mean_knn_distance(const Policy& policy, const Points& points, std::size_t k) {
   return detail::all_mean_knn_distance_at(simd::detected(), policy, points, k);
+}
+
+/// For each point the mean distance in metres to the first `k` neighbours of its row, or to all of a
+/// shorter row; NaN where there are none. So one table serves every k up to its width. The table holds
+/// rounded roots: the means are those of `all_mean_knn_distance` to within a rounding, not bit for bit.
+/// O(n k). @pre k > 0
+template <execution_policy Policy>
+[[nodiscard]] std::vector<float> mean_knn_distance(const Policy& policy, const neighbor_table& table, std::size_t k) {
+  assert(k > 0);
+  const std::size_t width = std::min(k, table.width);
+  std::vector<float> means(table.points, std::numeric_limits<float>::quiet_NaN());
+  if (width == 0) return means;
+  for_each_index(policy, table.points, 4096, [&](std::size_t i) {
+    const neighbor<float>* const row = table.rows.data() + i * table.width;
+    if (row->index == neighbor_table::none) return;
+    double sum = 0;
+    for (std::size_t n = 0; n != width; ++n) sum += row[n].distance;
+    means[i] = static_cast<float>(sum / static_cast<double>(width));
+  });
+  return means;
+}
+
+/// The same on the calling thread.
+[[nodiscard]] inline std::vector<float> mean_knn_distance(const neighbor_table& table, std::size_t k) {
+  return mean_knn_distance(seq, table, k);
 }
 
 }  // namespace orbis::cloud

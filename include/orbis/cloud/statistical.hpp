@@ -6,24 +6,22 @@
 /// object maps for household environments", Robotics and Autonomous Systems 56, 2008.
 #pragma once
 
+#include <algorithm>
 #include <cassert>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
+#include <utility>
 #include <vector>
 
+#include <orbis/cloud/decision.hpp>
 #include <orbis/cloud/mean_knn_distance.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/point.hpp>
 #include <orbis/core/rounded.hpp>
 
 namespace orbis::cloud {
-
-/// What a filter does with points that are not finite. They never count in its statistics.
-enum class non_finite {
-  drop,  ///< they are outliers
-  keep   ///< they are inliers, so that an organised cloud keeps its holes
-};
 
 struct statistical_options {
   std::size_t neighbors = 50;     ///< k, the point itself not counted; > 0
@@ -40,9 +38,16 @@ struct statistical_result {
   double threshold = 0;                ///< mu + alpha sigma; points beyond it are outliers
 };
 
-/// Decides on mean distances that are known already: see `statistical_inliers`. O(n).
+/// Decides on mean distances that are known already: see `statistical_inliers`. Points that have none
+/// (NaN) are kept or dropped as `non_finite` says. O(n).
+///
+/// The variance is a difference of sums, as others compute it, and where all distances are nearly equal
+/// it can come out below zero. Such a cloud has no spread that could be measured: sigma is reported as 0
+/// and the threshold as infinite, everything stays (as in PCL, where both are NaN and no distance is
+/// larger). The same goes, with an infinite sigma, where distances or their squares overflow.
 [[nodiscard]] inline statistical_result statistical_decision(std::vector<float> mean_distance,
                                                              const statistical_options& options = {}) {
+  constexpr double infinity = std::numeric_limits<double>::infinity();
   double sum = 0;
   double sum_of_squares = 0;
   std::size_t n = 0;
@@ -55,8 +60,15 @@ struct statistical_result {
   statistical_result out;
   const auto count = static_cast<double>(n);
   if (n > 0) out.mean = sum / count;
-  if (n > 1) out.standard_deviation = std::sqrt((sum_of_squares - sum * sum / count) / (count - 1));
-  out.threshold = out.mean + rounded_product(options.sigma_multiplier, out.standard_deviation);
+  const double variance = n > 1 ? (sum_of_squares - sum * sum / count) / (count - 1) : 0.0;
+  out.standard_deviation = std::isnan(variance) ? infinity : std::sqrt(std::max(variance, 0.0));
+  out.threshold =
+      variance >= 0 ? out.mean + rounded_product(options.sigma_multiplier, out.standard_deviation) : infinity;
+  if (std::isnan(out.threshold)) out.threshold = infinity;
+  out.inliers = detail::indices_where(mean_distance.size(), [&](std::size_t i) {
+    if (std::isnan(mean_distance[i])) return options.non_finite == non_finite::keep;
+    return !(mean_distance[i] > out.threshold);
+  });
   out.mean_distance = std::move(mean_distance);
   return out;
 }
@@ -67,14 +79,8 @@ template <execution_policy Policy, point_range Points>
                                                     const statistical_options& options = {}) {
   assert(options.neighbors > 0);
   statistical_result out = statistical_decision(all_mean_knn_distance(policy, points, options.neighbors), options);
-  const auto first = std::ranges::begin(points);
-  for (std::size_t i = 0; i != out.mean_distance.size(); ++i) {
-    const bool finite =
-        is_finite(coordinates<float>(first[static_cast<std::ranges::range_difference_t<const Points>>(i)]));
-    const bool inlier =
-        finite ? !(out.mean_distance[i] > out.threshold) : options.non_finite == cloud::non_finite::keep;
-    if (inlier) out.inliers.push_back(static_cast<std::uint32_t>(i));
-  }
+  out.inliers = detail::inliers_by_score(points, out.mean_distance, options.non_finite,
+                                         [&](float d) { return d > out.threshold; });
   return out;
 }
 

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// What decisions on scores have in common: points that are not finite, and indices out of a mask.
+#pragma once
+
+#include <cmath>
+#include <concepts>
+#include <cstddef>
+#include <cstdint>
+#include <ranges>
+#include <span>
+#include <vector>
+
+#include <orbis/core/point.hpp>
+
+namespace orbis::cloud {
+
+/// What a filter does with points that are not finite. They never count in its statistics.
+enum class non_finite {
+  drop,  ///< they are outliers
+  keep   ///< they are inliers, so that an organised cloud keeps its holes
+};
+
+namespace detail {
+
+/// The indices, ascending, below `count` for which `keep` is true.
+template <std::predicate<std::size_t> Keep>
+[[nodiscard]] std::vector<std::uint32_t> indices_where(std::size_t count, Keep&& keep) {
+  std::vector<std::uint32_t> out(count);
+  std::size_t n = 0;
+  for (std::size_t i = 0; i != count; ++i) {
+    out[n] = static_cast<std::uint32_t>(i);
+    n += keep(i) ? 1 : 0;
+  }
+  out.resize(n);
+  return out;
+}
+
+/// The i-th point of a cloud.
+template <point_range Points>
+[[nodiscard]] decltype(auto) point_at(const Points& points, std::size_t i) {
+  return std::ranges::begin(points)[static_cast<std::ranges::range_difference_t<const Points>>(i)];
+}
+
+/// The indices, ascending, of the points that are not outliers by their score; those that have none
+/// (NaN) by what `policy` says, unless they are finite: a point that is alone stays.
+template <point_range Points, std::predicate<float> Outlier>
+[[nodiscard]] std::vector<std::uint32_t> inliers_by_score(const Points& points, std::span<const float> score,
+                                                          non_finite policy, Outlier&& outlier) {
+  return indices_where(score.size(), [&](std::size_t i) {
+    if (!std::isnan(score[i])) return !outlier(score[i]);
+    return policy == non_finite::keep || is_finite(coordinates<float>(point_at(points, i)));
+  });
+}
+
+}  // namespace detail
+
+}  // namespace orbis::cloud

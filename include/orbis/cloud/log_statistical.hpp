@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Points whose surroundings are so many times sparser than usual.
+///
+/// Mean distances to neighbours are spread over orders of magnitude, with a long tail of outliers that
+/// drags mean and standard deviation along. Their logarithms against the median are not dragged, and
+/// the threshold is a factor: what counts as sparse does not depend on the unit or the size of the scene.
+/// Source of the scale: P. J. Rousseeuw, C. Croux, "Alternatives to the median absolute deviation",
+/// JASA 88, 1993; taken from the lower half, which outliers do not reach.
+#pragma once
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include <orbis/cloud/decision.hpp>
+#include <orbis/cloud/mean_knn_distance.hpp>
+#include <orbis/core/execution.hpp>
+#include <orbis/core/point.hpp>
+
+namespace orbis::cloud {
+
+struct log_statistical_options {
+  std::size_t neighbors = 8;       ///< k, the point itself not counted; > 0
+  double threshold = 1.6;          ///< natural logarithm: outliers are exp(threshold) times sparser than the median
+  std::optional<double> sigmas{};  ///< if given, the threshold is this many scales of the bulk instead
+  double least_scale = 0.01;       ///< such a scale is at least this: that of a regular grid is rounding alone
+  cloud::non_finite non_finite = cloud::non_finite::drop;
+};
+
+/// The filter's decision, and what it is based on.
+struct log_statistical_result {
+  std::vector<std::uint32_t> inliers;  ///< indices, ascending
+  std::vector<float> mean_distance;    ///< per point, metres; NaN where not finite or alone
+  std::size_t judged = 0;              ///< points with a positive, finite mean distance: those that have a logarithm
+  double median = 0;                   ///< of their logarithms
+  double scale = 0;                    ///< 1.4826 times the median distance to it of those below; no less than given
+  double threshold = 0;                ///< log(mean distance) - median beyond this makes an outlier
+  double threshold_distance = std::numeric_limits<double>::infinity();  ///< the same as a mean distance, metres
+};
+
+/// Decides on mean distances that are known already: see `log_statistical_inliers`. Points that have none
+/// (NaN) are kept or dropped as `non_finite` says. O(n).
+[[nodiscard]] inline log_statistical_result log_statistical_decision(std::vector<float> mean_distance,
+                                                                     const log_statistical_options& options = {}) {
+  log_statistical_result out;
+  std::vector<float> values;
+  values.reserve(mean_distance.size());
+  for (const float d : mean_distance) {
+    if (d > 0 && std::isfinite(d)) values.push_back(d);
+  }
+  out.judged = values.size();
+  out.threshold = options.threshold;
+  if (!values.empty()) {
+    // Order is kept by the logarithm: only two values need theirs.
+    const auto middle = values.begin() + static_cast<std::ptrdiff_t>((values.size() - 1) / 2);
+    std::nth_element(values.begin(), middle, values.end());
+    out.median = std::log(double{*middle});
+    // The median of the distances to it of those below it, and itself, lies at their own median.
+    const auto quarter = values.begin() + (middle - values.begin()) / 2;
+    std::nth_element(values.begin(), quarter, middle + 1);
+    out.scale = std::max(1.4826 * (out.median - std::log(double{*quarter})), options.least_scale);
+    if (options.sigmas.has_value()) out.threshold = *options.sigmas * out.scale;
+    out.threshold_distance = std::exp(out.median + out.threshold);
+  }
+  out.inliers = detail::indices_where(mean_distance.size(), [&](std::size_t i) {
+    const float d = mean_distance[i];
+    return std::isnan(d) ? options.non_finite == non_finite::keep : !(double{d} > out.threshold_distance);
+  });
+  out.mean_distance = std::move(mean_distance);
+  return out;
+}
+
+/// The same as `log_statistical_inliers`, with the scores and the threshold.
+template <execution_policy Policy, point_range Points>
+[[nodiscard]] log_statistical_result log_statistical_filter(const Policy& policy, const Points& points,
+                                                            const log_statistical_options& options = {}) {
+  assert(options.neighbors > 0);
+  log_statistical_result out =
+      log_statistical_decision(all_mean_knn_distance(policy, points, options.neighbors), options);
+  out.inliers = detail::inliers_by_score(points, out.mean_distance, options.non_finite,
+                                         [&](float d) { return double{d} > out.threshold_distance; });
+  return out;
+}
+
+/// The indices, ascending, of the points whose mean distance to their `neighbors` nearest neighbours is
+/// at most exp(`threshold`) times the median over the cloud; or, if `sigmas` is given, whose logarithm is
+/// at most `sigmas` robust scales above the median's. Points identical to all their neighbours stay; so
+/// does a point that is alone. O(n log n) for fixed k; the same result for every policy.
+/// @pre neighbors > 0, fewer than 2^32 points
+template <execution_policy Policy, point_range Points>
+[[nodiscard]] std::vector<std::uint32_t> log_statistical_inliers(const Policy& policy, const Points& points,
+                                                                 const log_statistical_options& options = {}) {
+  return log_statistical_filter(policy, points, options).inliers;
+}
+
+}  // namespace orbis::cloud

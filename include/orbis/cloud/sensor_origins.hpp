@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Where the points of a cloud were seen from.
+#pragma once
+
+#include <cassert>
+#include <cmath>
+#include <concepts>
+#include <cstddef>
+#include <limits>
+#include <optional>
+#include <ranges>
+#include <span>
+#include <type_traits>
+#include <vector>
+
+#include <orbis/core/execution.hpp>
+#include <orbis/core/point.hpp>
+#include <orbis/core/types.hpp>
+
+namespace orbis::cloud {
+
+/// What else a type of cloud knows than its points: a customisation point whose primary template is
+/// empty. A specialisation may have `static std::optional<vec3> sensor_origin(const C&)`: where all its
+/// points were seen from, metres, in the frame of the points.
+template <class C>
+struct cloud_traits {};
+
+/// A cloud that may know where it was seen from.
+template <class C>
+concept cloud_with_sensor_origin = requires(const std::remove_cvref_t<C>& cloud) {
+  { cloud_traits<std::remove_cvref_t<C>>::sensor_origin(cloud) } -> std::same_as<std::optional<vec3>>;
+};
+
+/// Where a cloud was seen from, in the frame of its points. Of what is given, the most specific counts:
+/// `ranges`, else `per_point`, else `common`, else what the cloud itself says (`cloud_traits`).
+struct sensor_origins {
+  std::optional<vec3> common{};        ///< of all points, metres
+  std::span<const vec3f> per_point{};  ///< of each point, metres; empty or as long as the cloud
+  std::span<const float> ranges{};     ///< of each point, metres from its sensor; empty or as long as the cloud
+};
+
+/// The origin that a cloud itself states.
+template <class C>
+[[nodiscard]] std::optional<vec3> stated_sensor_origin([[maybe_unused]] const C& cloud) {
+  if constexpr (cloud_with_sensor_origin<C>) {
+    return cloud_traits<C>::sensor_origin(cloud);
+  } else {
+    return std::nullopt;
+  }
+}
+
+/// For each point its distance in metres from where it was seen; NaN where that is not known, and for
+/// points, origins and given ranges that are not finite or, as a range, negative. O(n); the same result
+/// for every policy.
+/// @pre the spans of `origins` are empty or as long as `points`
+template <execution_policy Policy, point_range Points>
+[[nodiscard]] std::vector<float> sensor_ranges(const Policy& policy, const Points& points,
+                                               const sensor_origins& origins = {}) {
+  constexpr float unknown = std::numeric_limits<float>::quiet_NaN();
+  const std::size_t count = std::ranges::size(points);
+  assert(origins.ranges.empty() || origins.ranges.size() == count);
+  assert(origins.per_point.empty() || origins.per_point.size() == count);
+  std::vector<float> out(count, unknown);
+  const std::optional<vec3> common = origins.common.has_value() ? origins.common : stated_sensor_origin(points);
+  if (origins.ranges.empty() && origins.per_point.empty() && !common.has_value()) return out;
+  const auto first = std::ranges::begin(points);
+  for_each_index(policy, count, 4096, [&](std::size_t i) {
+    const auto p = coordinates<double>(first[static_cast<std::ranges::range_difference_t<const Points>>(i)]);
+    const vec3 position{p[0], p[1], p[2]};
+    if (!position.allFinite()) return;
+    float range = unknown;
+    if (!origins.ranges.empty()) {
+      range = origins.ranges[i];
+    } else {
+      const vec3 origin = origins.per_point.empty() ? *common : vec3{origins.per_point[i].cast<double>()};
+      range = static_cast<float>((position - origin).norm());
+    }
+    if (std::isfinite(range) && range >= 0) out[i] = range;
+  });
+  return out;
+}
+
+}  // namespace orbis::cloud
