@@ -5,7 +5,7 @@
 
 # In an order in which everything a component needs stands before it.
 set(ORBIS_ALL_COMPONENTS core camera features optimize cloud octree io eval slam mapping
-                         interop_opencv interop_octomap)
+                         interop_opencv interop_octomap interop_pcl interop_open3d)
 
 set(ORBIS_core_PACKAGES Eigen3 tl-expected Threads)
 set(ORBIS_core_LIBRARIES Eigen3::Eigen tl::expected Threads::Threads)
@@ -41,8 +41,17 @@ set(ORBIS_interop_octomap_NEEDS octree)
 set(ORBIS_interop_octomap_PACKAGES octomap)
 set(ORBIS_interop_octomap_LIBRARIES octomap octomath)
 
+set(ORBIS_interop_pcl_NEEDS cloud)
+set(ORBIS_interop_pcl_PACKAGES PCL)
+set(ORBIS_interop_pcl_LIBRARIES pcl_common)
+
+set(ORBIS_interop_open3d_NEEDS cloud)
+set(ORBIS_interop_open3d_PACKAGES Open3D)
+set(ORBIS_interop_open3d_LIBRARIES Open3D::Open3D)
+
 # What to ask find_package for beside the package's name.
 set(ORBIS_OpenCV_FIND_ARGUMENTS COMPONENTS core imgproc features2d)
+set(ORBIS_PCL_FIND_ARGUMENTS COMPONENTS common)
 
 # orbis_close_components(<out> <component>...): the components and all they need, in order.
 function(orbis_close_components out)

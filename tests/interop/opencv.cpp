@@ -1,10 +1,18 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <array>
 #include <cstdint>
+#include <limits>
 #include <numbers>
+#include <string>
 #include <vector>
 
+#include <orbis/cloud/radius.hpp>
+#include <orbis/cloud/select.hpp>
+#include <orbis/cloud/statistical.hpp>
+#include <orbis/core/point.hpp>
 #include <orbis/interop/opencv.hpp>
 
+#include "cloud/clouds.hpp"
 #include "support/catch.hpp"
 
 using namespace orbis;
@@ -84,4 +92,72 @@ TEST_CASE("keypoints and descriptors go to OpenCV and back") {
   d[1].words[0] = 0x0102;
   const cv::Mat rows = mat_over(std::span<const features::binary_descriptor<256>>{d});
   CHECK((rows.rows == 2 && rows.cols == 32 && rows.at<std::uint8_t>(1, 0) == 2 && rows.at<std::uint8_t>(1, 1) == 1));
+}
+
+namespace {
+
+/// What the filters keep of the points in the matrix.
+template <class S>
+[[nodiscard]] std::vector<std::vector<std::uint32_t>> kept_of(const cv::Mat& mat) {
+  const auto points = points_in<S>(mat).value();
+  return {cloud::statistical_inliers(par, points, {.neighbors = 12}),
+          cloud::radius_inliers(par, points, {.radius = 0.1, .min_neighbors = 8}),
+          cloud::filter_automatically(par, points).inliers};
+}
+
+}  // namespace
+
+TEST_CASE("points in a matrix of every shape go through every filter where they are") {
+  auto ours = test::uniform_cloud(2400, 53);
+  ours[100].x() = std::numeric_limits<float>::quiet_NaN();
+  const std::vector expected{cloud::statistical_inliers(par, ours, {.neighbors = 12}),
+                             cloud::radius_inliers(par, ours, {.radius = 0.1, .min_neighbors = 8}),
+                             cloud::filter_automatically(par, ours).inliers};
+  CHECK(expected[0].size() < ours.size());
+
+  const cv::Mat column(2400, 1, CV_32FC3, ours.data());
+  CHECK(points_in<float>(column)->begin()[7] == std::array{ours[7].x(), ours[7].y(), ours[7].z()});
+  CHECK(kept_of<float>(column) == expected);
+  CHECK(kept_of<float>(column.reshape(3, 40)) == expected);  // organised, 60 x 40
+  CHECK(kept_of<float>(column.reshape(3, 1)) == expected);   // one row
+  CHECK(kept_of<float>(column.reshape(1)) == expected);      // CV_32FC1, 2400 x 3
+  cv::Mat doubles;
+  column.convertTo(doubles, CV_64F);
+  CHECK(kept_of<double>(doubles) == expected);
+  CHECK(kept_of<double>(doubles.reshape(1)) == expected);
+
+  // Parts of larger matrices: rows that are farther apart than they are long.
+  cv::Mat frame(44, 70, CV_32FC3, cv::Scalar(-9, -9, -9));
+  column.reshape(3, 40).copyTo(frame(cv::Rect(5, 2, 60, 40)));
+  CHECK(kept_of<float>(frame(cv::Rect(5, 2, 60, 40))) == expected);
+  cv::Mat records(2400, 7, CV_32FC1, cv::Scalar(5));  // x, y, z among other fields
+  column.reshape(1).copyTo(records.colRange(2, 5));
+  CHECK(kept_of<float>(records.colRange(2, 5)) == expected);
+  cv::Mat narrow(2400, 3, CV_32FC3, cv::Scalar(-9, -9, -9));
+  column.copyTo(narrow.col(1));
+  CHECK(kept_of<float>(narrow.col(1)) == expected);
+}
+
+TEST_CASE("points in a matrix are the matrix's own") {
+  cv::Mat mat(4, 5, CV_32FC3, cv::Scalar(1, 2, 3));
+  const auto points = points_in<float>(mat).value();
+  mat.at<cv::Vec3f>(2, 3) = {7, 8, 9};
+  CHECK(points[13] == std::array{7.0F, 8.0F, 9.0F});
+  const auto image = view_as<vec3f>(mat).value();  // organised, as pixels
+  CHECK(image(3, 2) == vec3f{7, 8, 9});
+  CHECK(image.data()->data() == mat.ptr<float>());
+  CHECK(view_as<vec3>(cv::Mat(2, 2, CV_64FC3, cv::Scalar(1, 2, 3))).value()(1, 1) == vec3{1, 2, 3});
+}
+
+TEST_CASE("what holds no points is refused with a reason") {
+  const auto message = [](const cv::Mat& mat) {
+    const auto points = points_in<float>(mat);
+    return points ? std::string{} : points.error().message;
+  };
+  CHECK(message(cv::Mat(4, 3, CV_64FC1)) == "has type CV_64FC1, not CV_32FC3 or CV_32FC1");
+  CHECK(message(cv::Mat(4, 3, CV_32FC2)) == "has type CV_32FC2, not CV_32FC3 or CV_32FC1");
+  CHECK(message(cv::Mat(4, 4, CV_32FC1)) == "has 4 columns, not x, y and z");
+  const int sizes[] = {2, 2, 3};
+  CHECK(message(cv::Mat(3, sizes, CV_32FC1)) == "has 3 dimensions, not 2");
+  CHECK(points_in<float>(cv::Mat{})->empty());
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// OpenCV's images and keypoints as ours, and ours as OpenCV's; pixels stay where they are.
+/// OpenCV's images, points and keypoints as ours, and ours as OpenCV's; pixels and points stay where they
+/// are.
 #pragma once
 
 #include <concepts>
@@ -16,6 +17,8 @@
 
 #include <orbis/core/image.hpp>
 #include <orbis/core/result.hpp>
+#include <orbis/core/strided_points.hpp>
+#include <orbis/core/types.hpp>
 #include <orbis/features/descriptor.hpp>
 
 namespace orbis::interop {
@@ -30,13 +33,16 @@ static_assert(sizeof(bgr8) == 3);
 /// Pixels that a `cv::Mat` and an `image_view` can share.
 template <class T>
 concept shared_pixel = std::same_as<T, std::uint8_t> || std::same_as<T, rgb8> || std::same_as<T, bgr8> ||
-    std::same_as<T, std::uint16_t> || std::same_as<T, float>;
+    std::same_as<T, std::uint16_t> || std::same_as<T, float> || std::same_as<T, vec3f> || std::same_as<T, vec3>;
 
-/// OpenCV's type number for a pixel: CV_8UC1, CV_8UC3, CV_16UC1 or CV_32FC1.
+/// OpenCV's type number for a pixel: CV_8UC1, CV_8UC3, CV_16UC1, CV_32FC1, and CV_32FC3 or CV_64FC3 for
+/// organised points.
 template <shared_pixel T>
 inline constexpr int cv_type = std::same_as<T, std::uint8_t>    ? CV_8UC1
                                : std::same_as<T, std::uint16_t> ? CV_16UC1
                                : std::same_as<T, float>         ? CV_32FC1
+                               : std::same_as<T, vec3f>         ? CV_32FC3
+                               : std::same_as<T, vec3>          ? CV_64FC3
                                                                 : CV_8UC3;
 
 /// The pixels of `mat` in place; `mat` (or another header of its data) must outlive the view. Three
@@ -56,6 +62,32 @@ template <shared_pixel T>
     return fail(errc::unsupported, "cv::Mat", "has rows that are not a whole number of pixels apart");
   const std::ptrdiff_t stride = mat.rows > 1 ? static_cast<std::ptrdiff_t>(step / sizeof(T)) : mat.cols;
   return image_view<const T>{mat.ptr<T>(), mat.cols, mat.rows, stride};
+}
+
+/// The points of `mat` in place, row after row: S = float: CV_32FC3 of any shape (an organised cloud, a
+/// row, a column) or CV_32FC1 with three columns, a point in each row; S = double: CV_64FC3, CV_64FC1.
+/// `mat` (or another header of its data) must outlive the points. Of rows with more than x, y and z,
+/// `mat.colRange(0, 3)` are the points. An empty matrix has none.
+/// Errors: unsupported, if the type or the shape is another.
+template <std::floating_point S>
+requires(sizeof(S) == 4 || sizeof(S) == 8) [[nodiscard]] result<strided_points<S>> points_in(const cv::Mat& mat) {
+  constexpr int depth = sizeof(S) == 4 ? CV_32F : CV_64F;
+  if (mat.empty()) return strided_points<S>{};
+  if (mat.dims != 2)
+    return fail(errc::unsupported, "cv::Mat", "has " + std::to_string(mat.dims) + " dimensions, not 2");
+  if (mat.depth() != depth || (mat.channels() != 3 && mat.channels() != 1))
+    return fail(errc::unsupported, "cv::Mat",
+                "has type " + cv::typeToString(mat.type()) + ", not " + cv::typeToString(CV_MAKETYPE(depth, 3)) +
+                    " or " + cv::typeToString(CV_MAKETYPE(depth, 1)));
+  if (mat.channels() == 1 && mat.cols != 3)
+    return fail(errc::unsupported, "cv::Mat", "has " + std::to_string(mat.cols) + " columns, not x, y and z");
+  const auto step = static_cast<std::ptrdiff_t>(mat.step[0] / sizeof(S));
+  const auto rows = static_cast<std::size_t>(mat.rows);
+  const auto cols = static_cast<std::size_t>(mat.cols);
+  if (mat.channels() == 1) return strided_points<S>{mat.ptr<S>(), rows, {.point_stride = step}};
+  if (mat.isContinuous()) return strided_points<S>{mat.ptr<S>(), rows * cols};
+  if (cols == 1) return strided_points<S>{mat.ptr<S>(), rows, {.point_stride = step}};
+  return strided_points<S>{mat.ptr<S>(), rows * cols, {.row_length = cols, .row_stride = step}};
 }
 
 /// A `cv::Mat` header over the pixels of a view; the pixels must outlive it.

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Open3D's clouds (`open3d::geometry::PointCloud`). Their `points_` are a range of points as they are,
+/// for every algorithm here, and no point is copied; indices go into the cloud, so that colours,
+/// normals and covariances ride along:
+///
+/// @code
+///   const auto keep = orbis::cloud::statistical_inliers(orbis::par, cloud.points_);
+///   const open3d::geometry::PointCloud clean = orbis::interop::extract(cloud, keep);
+/// @endcode
+#pragma once
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include <open3d/geometry/PointCloud.h>
+
+#include <orbis/core/image.hpp>
+#include <orbis/core/point_cloud.hpp>
+#include <orbis/core/types.hpp>
+
+namespace orbis::interop {
+
+/// Open3D's colours are 0 ... 1; what lies outside, or is not a number, is clamped.
+[[nodiscard]] inline rgb8 color_from_open3d(const vec3& color) noexcept {
+  const auto byte = [](double v) {
+    return v > 0 ? static_cast<std::uint8_t>(std::lround(255.0 * std::min(v, 1.0))) : std::uint8_t{0};
+  };
+  return {byte(color.x()), byte(color.y()), byte(color.z())};
+}
+[[nodiscard]] inline vec3 color_to_open3d(const rgb8& color) noexcept {
+  return vec3{static_cast<double>(color.r), static_cast<double>(color.g), static_cast<double>(color.b)} / 255.0;
+}
+
+/// The points with the given indices, in their order, with their colours, normals and covariances.
+/// @pre every index < cloud.points_.size()
+[[nodiscard]] inline open3d::geometry::PointCloud extract(const open3d::geometry::PointCloud& cloud,
+                                                          std::span<const std::uint32_t> indices) {
+  open3d::geometry::PointCloud out;
+  const auto take = [&](const auto& from, auto& to) {
+    if (from.size() != cloud.points_.size()) return;  // as Open3D counts: all have one, or none has
+    to.reserve(indices.size());
+    for (const std::uint32_t i : indices) {
+      assert(i < from.size());
+      to.push_back(from[i]);
+    }
+  };
+  take(cloud.points_, out.points_);
+  take(cloud.colors_, out.colors_);
+  take(cloud.normals_, out.normals_);
+  take(cloud.covariances_, out.covariances_);
+  return out;
+}
+
+/// A copy of the points, as float, and of the colours if every point has one.
+[[nodiscard]] inline point_cloud from_open3d(const open3d::geometry::PointCloud& cloud) {
+  point_cloud out;
+  out.points.reserve(cloud.points_.size());
+  for (const vec3& p : cloud.points_) out.points.push_back(p.cast<float>());
+  if (!cloud.HasColors()) return out;
+  out.colors.reserve(cloud.colors_.size());
+  for (const vec3& c : cloud.colors_) out.colors.push_back(color_from_open3d(c));
+  return out;
+}
+
+/// A copy as Open3D's, with the colours if there are any.
+[[nodiscard]] inline open3d::geometry::PointCloud to_open3d(const point_cloud& cloud) {
+  open3d::geometry::PointCloud out;
+  out.points_.reserve(cloud.size());
+  for (const vec3f& p : cloud.points) out.points_.push_back(p.cast<double>());
+  out.colors_.reserve(cloud.colors.size());
+  for (const rgb8& c : cloud.colors) out.colors_.push_back(color_to_open3d(c));
+  return out;
+}
+
+}  // namespace orbis::interop

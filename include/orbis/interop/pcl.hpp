@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// PCL's clouds. A `pcl::PointCloud` is a range of points as it is, for every algorithm here, and no
+/// point is copied; indices go into the cloud, so that colours and all other fields ride along:
+///
+/// @code
+///   const auto keep = orbis::cloud::statistical_inliers(orbis::par, cloud);   // cloud: pcl::PointCloud<P>
+///   const pcl::PointCloud<P> clean = orbis::interop::extract(cloud, keep);
+/// @endcode
+#pragma once
+
+#include <cassert>
+#include <concepts>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+
+#include <pcl/point_cloud.h>
+#include <pcl/point_types.h>
+
+#include <orbis/cloud/sensor_origins.hpp>
+#include <orbis/core/image.hpp>
+#include <orbis/core/point.hpp>
+#include <orbis/core/point_cloud.hpp>
+#include <orbis/core/result.hpp>
+#include <orbis/core/types.hpp>
+
+namespace orbis::interop {
+
+/// A point of PCL's with a colour.
+template <class P>
+concept colored_pcl_point = point_like<P> && requires(P& p, const P& constant) {
+  { constant.r } -> std::convertible_to<std::uint8_t>;
+  { constant.g } -> std::convertible_to<std::uint8_t>;
+  { constant.b } -> std::convertible_to<std::uint8_t>;
+  p.r = p.g = p.b = std::uint8_t{};
+};
+
+/// A point's colour.
+template <colored_pcl_point P>
+[[nodiscard]] constexpr rgb8 color_of(const P& point) noexcept {
+  return {point.r, point.g, point.b};
+}
+
+/// Where the cloud's points were seen from, metres in its frame: `sensor_origin_`. PCL leaves zeros
+/// where nobody said; they count for an organised cloud, which one sensor took, and mean nothing for
+/// another.
+template <point_like P>
+[[nodiscard]] std::optional<vec3> sensor_origin(const pcl::PointCloud<P>& cloud) {
+  const vec3 origin = cloud.sensor_origin_.template head<3>().template cast<double>();
+  if (!origin.allFinite() || (origin.isZero(0) && !cloud.isOrganized())) return std::nullopt;
+  return origin;
+}
+
+/// The points of an organised cloud as an image, in place.
+/// Errors: unsupported, if the cloud is not organised. An empty cloud is an empty view.
+template <point_like P>
+[[nodiscard]] result<image_view<const P>> image_of(const pcl::PointCloud<P>& cloud) {
+  if (cloud.empty()) return image_view<const P>{};
+  if (!cloud.isOrganized() || cloud.size() != std::size_t{cloud.width} * cloud.height)
+    return fail(errc::unsupported, "pcl::PointCloud",
+                "is not organised: " + std::to_string(cloud.size()) + " points, " + std::to_string(cloud.width) + "x" +
+                    std::to_string(cloud.height));
+  return image_view<const P>{cloud.points.data(), static_cast<int>(cloud.width), static_cast<int>(cloud.height)};
+}
+
+/// The points with the given indices, in their order, with all of their fields; header and sensor pose
+/// are the cloud's. @pre every index < cloud.size()
+template <point_like P>
+[[nodiscard]] pcl::PointCloud<P> extract(const pcl::PointCloud<P>& cloud, std::span<const std::uint32_t> indices) {
+  pcl::PointCloud<P> out;
+  out.header = cloud.header;
+  out.sensor_origin_ = cloud.sensor_origin_;
+  out.sensor_orientation_ = cloud.sensor_orientation_;
+  out.reserve(indices.size());
+  for (const std::uint32_t i : indices) {
+    assert(i < cloud.size());
+    out.points.push_back(cloud.points[i]);
+  }
+  out.width = static_cast<std::uint32_t>(indices.size());
+  out.height = 1;
+  out.is_dense = true;
+  for (const P& p : out.points) out.is_dense = out.is_dense && is_finite(p);
+  return out;
+}
+
+/// A copy of the points, and of their colours where they have some.
+template <point_like P>
+[[nodiscard]] point_cloud from_pcl(const pcl::PointCloud<P>& cloud) {
+  point_cloud out;
+  out.points.reserve(cloud.size());
+  for (const P& p : cloud.points) {
+    const auto c = coordinates<float>(p);
+    out.points.emplace_back(c[0], c[1], c[2]);
+  }
+  if constexpr (colored_pcl_point<P>) {
+    out.colors.reserve(cloud.size());
+    for (const P& p : cloud.points) out.colors.push_back(color_of(p));
+  }
+  return out;
+}
+
+/// A copy as PCL's; colours where both sides have some, PCL's defaults for all other fields.
+template <point_like P = pcl::PointXYZRGB>
+[[nodiscard]] pcl::PointCloud<P> to_pcl(const point_cloud& cloud) {
+  pcl::PointCloud<P> out;
+  out.points.resize(cloud.size());
+  out.width = static_cast<std::uint32_t>(cloud.size());
+  out.height = 1;
+  out.is_dense = true;
+  for (std::size_t i = 0; i != cloud.size(); ++i) {
+    P& p = out.points[i];
+    p.x = cloud.points[i].x();
+    p.y = cloud.points[i].y();
+    p.z = cloud.points[i].z();
+    out.is_dense = out.is_dense && is_finite(cloud.points[i]);
+    if constexpr (colored_pcl_point<P>) {
+      if (!cloud.has_colors()) continue;
+      p.r = cloud.colors[i].r;
+      p.g = cloud.colors[i].g;
+      p.b = cloud.colors[i].b;
+    }
+  }
+  return out;
+}
+
+}  // namespace orbis::interop
+
+/// So that filters that ask for ranges find the origin in the cloud.
+template <orbis::point_like P>
+struct orbis::cloud::cloud_traits<pcl::PointCloud<P>> {
+  [[nodiscard]] static std::optional<vec3> sensor_origin(const pcl::PointCloud<P>& cloud) {
+    return interop::sensor_origin(cloud);
+  }
+};
