@@ -13,6 +13,7 @@
 #include <orbis/cloud/cluster.hpp>
 #include <orbis/cloud/curve_order.hpp>
 #include <orbis/cloud/decision.hpp>
+#include <orbis/cloud/depth_windows.hpp>
 #include <orbis/cloud/extract.hpp>
 #include <orbis/cloud/log_density.hpp>
 #include <orbis/cloud/log_statistical.hpp>
@@ -20,8 +21,13 @@
 #include <orbis/cloud/nanoflann.hpp>
 #include <orbis/cloud/neighbors.hpp>
 #include <orbis/cloud/pass_through.hpp>
+#include <orbis/cloud/point_blocks.hpp>
 #include <orbis/cloud/radius.hpp>
 #include <orbis/cloud/range_statistical.hpp>
+#include <orbis/cloud/ray_evidence.hpp>
+#include <orbis/cloud/ray_evidence_kernels.hpp>
+#include <orbis/cloud/ray_evidence_simd.hpp>
+#include <orbis/cloud/ray_view.hpp>
 #include <orbis/cloud/select.hpp>
 #include <orbis/cloud/sensor_origins.hpp>
 #include <orbis/cloud/squared_distance.hpp>
