@@ -25,6 +25,7 @@
 #include <orbis/cloud/radius.hpp>
 #include <orbis/cloud/range_statistical.hpp>
 #include <orbis/cloud/ray_evidence.hpp>
+#include <orbis/cloud/ray_evidence_counter.hpp>
 #include <orbis/cloud/ray_evidence_kernels.hpp>
 #include <orbis/cloud/ray_evidence_simd.hpp>
 #include <orbis/cloud/ray_view.hpp>

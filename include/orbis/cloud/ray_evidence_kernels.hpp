@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -29,6 +30,16 @@ struct block_verdict {
   static constexpr std::size_t words = point_blocks::block_size / 16;
   std::array<std::uint16_t, words> through;
   std::array<std::uint16_t, words> supported;
+  /// `f(i, supported)` for the points of which the view says something.
+  template <class F>
+  void for_each(F&& f) const {
+    for (std::size_t w = 0; w != words; ++w) {
+      for (std::uint32_t left = through[w] | supported[w]; left != 0; left &= left - 1) {
+        const auto bit = static_cast<std::uint32_t>(std::countr_zero(left));
+        f(16 * w + bit, (supported[w] >> bit & 1U) != 0);
+      }
+    }
+  }
 };
 
 /// A block's points, axis by axis.
