@@ -1,194 +1,147 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// The statistical filter beside a plain nanoflann loop and PCL, all with the same result.
-#include <algorithm>
-#include <array>
+// Neighbours of all points, the radius filter, the voxel grid and the choice of a filter.
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <deque>
-#include <span>
 #include <string>
-#include <utility>
 #include <vector>
 
-#include <benchmark/benchmark.h>
-#include <nanoflann.hpp>
-
 #ifdef ORBIS_BENCH_WITH_PCL
-#include <pcl/filters/statistical_outlier_removal.h>
-#include <pcl/point_cloud.h>
-#include <pcl/point_types.h>
+#include <pcl/filters/radius_outlier_removal.h>
+#include <pcl/filters/voxel_grid.h>
 #endif
 
+#include <orbis/cloud/all_knn.hpp>
+#include <orbis/cloud/radius.hpp>
 #include <orbis/cloud/select.hpp>
-#include <orbis/cloud/statistical.hpp>
 #include <orbis/cloud/voxel_grid.hpp>
 #include <orbis/core/execution.hpp>
-#include <orbis/core/random.hpp>
-#include <orbis/core/types.hpp>
 
+#include "cloud_support.hpp"
+
+namespace orbis::bench {
 namespace {
 
-using points = std::vector<orbis::vec3f>;
+using indices = std::vector<std::uint32_t>;
 
-/// A room seen by a depth camera from several places, image after image: walls, floor, boxes, noise
-/// that grows with range, one point in a hundred anywhere.
-const points& room(std::size_t n) {
-  static std::deque<points> made;
-  for (const points& p : made) {
-    if (p.size() == n) return p;
-  }
-  orbis::random_bits random{n};
-  constexpr std::size_t views = 6;
-  const auto width = static_cast<int>(std::sqrt(static_cast<double>(n) / views * 4 / 3)) + 1;
-  points out;
-  out.reserve(n);
-  for (std::size_t view = 0; out.size() != n; ++view) {
-    const double angle = 0.35 * static_cast<double>(view);
-    const orbis::vec3 origin{0.2 * std::cos(angle), 0.1 * std::sin(2 * angle), 0.2 * std::sin(angle)};
-    for (int i = 0; i < width * width * 3 / 4 && out.size() != n; ++i) {
-      const double u = (i % width - 0.5 * width) / (0.82 * width);
-      const double v = (static_cast<double>(i) / width - 0.375 * width) / (0.82 * width);
-      orbis::vec3 ray{u * std::cos(angle) + std::sin(angle), v, std::cos(angle) - u * std::sin(angle)};
-      double t = 1e9;
-      const orbis::vec3 half{2.5, 1.3, 2.0};
-      for (int a = 0; a != 3; ++a) {
-        if (ray[a] != 0) t = std::min(t, (std::copysign(half[a], ray[a]) - origin[a]) / ray[a]);
-      }
-      if (std::sin(5 * angle + 9 * u) > 0.8 && v > 0) t *= 0.7;  // furniture
-      t += 0.002 * t * t * random.normal();
-      if (random.below(100) == 0) t *= random.uniform();
-      out.emplace_back((origin + t * ray).cast<float>());
+// -- the k nearest neighbours of every point ----------------------------------------------------------
+
+/// Row after row, nearest first, the point itself left out.
+using neighbor_rows = std::vector<cloud::neighbor<float>>;
+
+[[nodiscard]] neighbor_rows neighbors_by_nanoflann(const points& cloud, std::size_t k, unsigned threads) {
+  const nanoflann_points data{&cloud};
+  const nanoflann_tree index(3, data, nanoflann::KDTreeSingleIndexAdaptorParams(10));
+  neighbor_rows rows(cloud.size() * k);
+  for_each_chunk(par.with(threads), cloud.size(), 4096, [&](std::size_t begin, std::size_t end) {
+    std::vector<std::uint32_t> found(k + 1);
+    std::vector<float> squared(k + 1);
+    for (std::size_t i = begin; i != end; ++i) {
+      index.knnSearch(cloud[i].data(), k + 1, found.data(), squared.data());
+      for (std::size_t j = 0; j != k; ++j) rows[i * k + j] = {found[j + 1], std::sqrt(squared[j + 1])};
     }
-  }
-  return made.emplace_back(std::move(out));
+  });
+  return rows;
 }
 
-/// The same points in no order, as a k-d tree or a hash may hand them out.
-const points& shuffled_room(std::size_t n) {
-  static std::deque<points> made;
-  for (const points& p : made) {
-    if (p.size() == n) return p;
-  }
-  points out = room(n);
-  orbis::random_bits random{n + 1};
-  for (std::size_t i = n; i-- > 1;) std::swap(out[i], out[random.below(static_cast<std::uint32_t>(i + 1))]);
-  return made.emplace_back(std::move(out));
+void add_neighbors(std::size_t n, std::size_t k) {
+  const auto add = [&](const std::string& row, const std::function<neighbor_rows(const points&)>& search) {
+    add_cloud_row<neighbor_rows>(
+        "all_knn/n:" + std::to_string(n) + "/k:" + std::to_string(k) + "/" + row,
+        [n]() -> const points& { return room_cloud(n); }, search,
+        [k](const points& in, const neighbor_rows& rows) {
+          const auto ours = cloud::all_knn(par, in, k).rows;  // the same distances; ties may go another way
+          bool same = rows.size() == ours.size();
+          for (std::size_t i = 0; same && i != rows.size(); ++i) same = rows[i].distance == ours[i].distance;
+          return same;
+        });
+  };
+  add("orbis", [k](const points& in) { return cloud::all_knn(seq, in, k).rows; });
+  add("orbis_par2", [k](const points& in) { return cloud::all_knn(par.with(2), in, k).rows; });
+  add("nanoflann", [k](const points& in) { return neighbors_by_nanoflann(in, k, 1); });
+  add("nanoflann_par2", [k](const points& in) { return neighbors_by_nanoflann(in, k, 2); });
 }
 
-struct adaptor {
-  const points* cloud;
-  std::size_t kdtree_get_point_count() const { return cloud->size(); }
-  float kdtree_get_pt(std::size_t i, std::size_t a) const { return (*cloud)[i][static_cast<Eigen::Index>(a)]; }
-  template <class Box>
-  bool kdtree_get_bbox(Box&) const {
-    return false;
-  }
-};
-
-/// As a user of nanoflann would write it.
-std::vector<std::uint32_t> plain_nanoflann(const points& cloud, std::size_t k, double alpha) {
-  const adaptor data{&cloud};
-  using tree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<float, adaptor>, adaptor, 3>;
-  const tree index(3, data, nanoflann::KDTreeSingleIndexAdaptorParams(10));
-  std::vector<std::uint32_t> found(k + 1);
-  std::vector<float> squared(k + 1);
-  std::vector<float> means(cloud.size());
-  double sum = 0;
-  double squares = 0;
-  for (std::size_t i = 0; i != cloud.size(); ++i) {
-    const std::size_t n = index.knnSearch(cloud[i].data(), k + 1, found.data(), squared.data());
-    double d = 0;
-    for (std::size_t j = 1; j < n; ++j) d += std::sqrt(static_cast<double>(squared[j]));
-    means[i] = static_cast<float>(d / static_cast<double>(n - 1));
-    sum += means[i];
-    squares += means[i] * means[i];
-  }
-  const auto n = static_cast<double>(cloud.size());
-  const double threshold = sum / n + alpha * std::sqrt((squares - sum * sum / n) / (n - 1));
-  std::vector<std::uint32_t> inliers;
-  for (std::size_t i = 0; i != means.size(); ++i) {
-    if (!(means[i] > threshold)) inliers.push_back(static_cast<std::uint32_t>(i));
-  }
-  return inliers;
-}
+// -- the radius filter ----------------------------------------------------------------------------------
 
 #ifdef ORBIS_BENCH_WITH_PCL
-std::vector<std::uint32_t> by_pcl(const pcl::PointCloud<pcl::PointXYZ>::Ptr& cloud, std::size_t k, double alpha) {
-  pcl::StatisticalOutlierRemoval<pcl::PointXYZ> filter;
-  filter.setInputCloud(cloud);
-  filter.setMeanK(static_cast<int>(k));
-  filter.setStddevMulThresh(alpha);
+[[nodiscard]] indices radius_by_pcl(const points& cloud, const cloud::radius_options& options) {
+  pcl::RadiusOutlierRemoval<pcl::PointXYZ> filter;
+  filter.setInputCloud(pcl_cloud(cloud));
+  filter.setRadiusSearch(options.radius);
+  filter.setMinNeighborsInRadius(static_cast<int>(options.min_neighbors));
   std::vector<int> kept;
   filter.filter(kept);
   return {kept.begin(), kept.end()};
 }
 #endif
 
-/// Measures `filter()`, after checking that it selects what ours selects.
-template <class Filter>
-void measure(benchmark::State& state, const points& cloud, std::size_t k, Filter&& filter) {
-  if (filter() != orbis::cloud::statistical_inliers(orbis::par, cloud, {.neighbors = k})) {
-    state.SkipWithError("selects other points");
-    return;
-  }
-  for (auto _ : state) benchmark::DoNotOptimize(filter());
+void add_radius(std::size_t n, bool shuffled, const cloud::radius_options& options) {
+  const auto add = [&](const std::string& row, const std::function<indices(const points&)>& filter) {
+    add_cloud_row<indices>(
+        std::string{shuffled ? "radius_filter_shuffled" : "radius_filter"} + "/n:" + std::to_string(n) + "/" +
+            std::to_string(options.min_neighbors) + "_within_" + std::to_string(std::lround(100 * options.radius)) +
+            "cm/" + row,
+        [=]() -> const points& { return shuffled ? shuffled_cloud(n) : room_cloud(n); }, filter,
+        [options](const points& in, const indices& kept) { return kept == cloud::radius_inliers(par, in, options); });
+  };
+  add("orbis", [options](const points& in) { return cloud::radius_inliers(seq, in, options); });
+  add("orbis_par2", [options](const points& in) { return cloud::radius_inliers(par.with(2), in, options); });
+#ifdef ORBIS_BENCH_WITH_PCL
+  add("pcl", [options](const points& in) { return radius_by_pcl(in, options); });
+#endif
 }
 
-/// One size of cloud and neighbourhood, everyone's filter.
-void add_statistical(std::size_t n, std::size_t k, bool shuffled) {
-  auto* const make = shuffled ? shuffled_room : room;
-  const std::string group = std::string{shuffled ? "statistical_filter_shuffled" : "statistical_filter"} +
-                            "/n:" + std::to_string(n) + "/k:" + std::to_string(k) + "/";
-  const auto add = [&](const std::string& who, auto filter) {
-    benchmark::RegisterBenchmark(
-        (group + who).c_str(),
-        [=](benchmark::State& state) { measure(state, make(n), k, [&] { return filter(make(n)); }); })
-        ->Unit(benchmark::kMillisecond)
-        ->UseRealTime();
+// -- the voxel grid -------------------------------------------------------------------------------------
+
+void add_voxel_grid(std::size_t n, double size) {
+  const auto add = [&](const std::string& row, const std::function<std::size_t(const points&)>& count) {
+    add_cloud_row<std::size_t>(
+        "voxel_grid/n:" + std::to_string(n) + "/" + std::to_string(std::lround(100 * size)) + "cm/" + row,
+        [n]() -> const points& { return room_cloud(n); }, count,
+        // Points within a rounding error of a border may fall to either side of it.
+        [size](const points& in, std::size_t found) {
+          const auto ours = static_cast<double>(cloud::voxel_grid(in, {.size = size}).size());
+          return std::abs(static_cast<double>(found) - ours) < 1e-3 * ours;
+        });
   };
-  add("orbis",
-      [k](const points& cloud) { return orbis::cloud::statistical_inliers(orbis::seq, cloud, {.neighbors = k}); });
-  add("orbis_par2", [k](const points& cloud) {
-    return orbis::cloud::statistical_inliers(orbis::par.with(2), cloud, {.neighbors = k});
-  });
-  add("nanoflann", [k](const points& cloud) { return plain_nanoflann(cloud, k, 1.0); });
+  add("orbis", [size](const points& in) { return cloud::voxel_grid(in, {.size = size}).size(); });
 #ifdef ORBIS_BENCH_WITH_PCL
-  add("pcl", [k](const points& cloud) {
-    static const points* copied = nullptr;
-    static pcl::PointCloud<pcl::PointXYZ>::Ptr copy;
-    if (copied != &cloud) {
-      copied = &cloud;
-      copy = std::make_shared<pcl::PointCloud<pcl::PointXYZ>>();
-      for (const auto& p : cloud) copy->push_back({p.x(), p.y(), p.z()});
-    }
-    return by_pcl(copy, k, 1.0);
+  add("pcl", [size](const points& in) {
+    pcl::VoxelGrid<pcl::PointXYZ> grid;
+    const auto leaf = static_cast<float>(size);
+    grid.setLeafSize(leaf, leaf, leaf);
+    grid.setInputCloud(pcl_cloud(in));
+    pcl::PointCloud<pcl::PointXYZ> out;
+    grid.filter(out);
+    return out.size();
   });
 #endif
 }
 
-const bool registered = [] {
-  for (const std::size_t n : {10'000U, 100'000U, 300'000U, 1'000'000U}) {
-    for (const std::size_t k : {8U, 20U, 50U, 100U}) add_statistical(n, k, false);
-    add_statistical(n, 50, true);
+// -- the choice of a filter -----------------------------------------------------------------------------
+
+void add_select(std::size_t n) {
+  const auto add = [&](const std::string& row, const std::function<std::string(const points&)>& choose) {
+    add_cloud_row<std::string>(
+        "select_filter/n:" + std::to_string(n) + "/" + row, [n]() -> const points& { return room_cloud(n); }, choose,
+        [](const points& in, const std::string& reason) { return reason == cloud::select_filter(seq, in).reason; });
+  };
+  add("orbis", [](const points& in) { return cloud::select_filter(seq, in).reason; });
+  add("orbis_par2", [](const points& in) { return cloud::select_filter(par.with(2), in).reason; });
+}
+
+[[maybe_unused]] const bool registered = [] {
+  for (const std::size_t k : {8U, 50U}) add_neighbors(100'000, k);
+  for (const bool shuffled : {false, true}) {
+    add_radius(300'000, shuffled, {.radius = 0.02, .min_neighbors = 5});
+    add_radius(300'000, shuffled, {.radius = 0.05, .min_neighbors = 50});
   }
-  for (const std::size_t k : {5U, 200U}) add_statistical(100'000, k, false);
-  benchmark::RegisterBenchmark("select_filter/n:300000/orbis",
-                               [](benchmark::State& state) {
-                                 for (auto _ : state)
-                                   benchmark::DoNotOptimize(orbis::cloud::select_filter(orbis::seq, room(300'000)));
-                               })
-      ->Unit(benchmark::kMillisecond)
-      ->UseRealTime();
-  benchmark::RegisterBenchmark("voxel_grid/n:300000/5cm/orbis",
-                               [](benchmark::State& state) {
-                                 for (auto _ : state)
-                                   benchmark::DoNotOptimize(orbis::cloud::voxel_grid(room(300'000), {.size = 0.05}));
-                               })
-      ->Unit(benchmark::kMillisecond)
-      ->UseRealTime();
+  for (const double size : {0.01, 0.05}) add_voxel_grid(300'000, size);
+  for (const std::size_t n : {10'000U, 300'000U}) add_select(n);
   return true;
 }();
 
 }  // namespace
+}  // namespace orbis::bench
