@@ -27,8 +27,8 @@ namespace orbis::bench {
 using points = std::vector<vec3f>;
 
 /// A room seen by a depth camera from several places, image after image: walls, floor, boxes, noise
-/// that grows with range, one point in a hundred anywhere. Clouds are made when first asked for; the
-/// last ones are kept.
+/// that grows with range, one point in a hundred anywhere. Clouds are made when first asked for,
+/// and kept.
 [[nodiscard]] const points& room_cloud(std::size_t n);
 /// The same points in no order, as a k-d tree or a hash may hand them out.
 [[nodiscard]] const points& shuffled_cloud(std::size_t n);
