@@ -5,9 +5,11 @@
 
 #include <array>
 #include <cassert>
+#include <concepts>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <ranges>
 #include <span>
 #include <vector>
 
@@ -15,6 +17,7 @@
 #include <orbis/core/image.hpp>
 #include <orbis/core/point.hpp>
 #include <orbis/core/point_cloud.hpp>
+#include <orbis/core/random.hpp>
 
 namespace orbis::cloud {
 
@@ -83,13 +86,65 @@ struct voxel_grid_options {
   double size = 0.01;  ///< edge of a voxel, metres; > 0
 };
 
-/// The centroid of the points in each occupied voxel, in the order in which the voxels are first
-/// seen, with the mean of their colours where `colors` is not empty. Points that are not finite are
-/// left out, as are those more than 2^31 voxels from the origin. O(n).
+/// What stands for the points of a voxel: their centroid, with the mean of their colours.
+struct voxel_centroid {};
+/// The first of them.
+struct voxel_first {
+  [[nodiscard]] static constexpr bool replaces(std::uint32_t /*kept*/, std::uint32_t /*candidate*/) noexcept {
+    return false;
+  }
+};
+/// Any of them with the same probability; which one depends on the seed and the indices alone.
+struct voxel_random {
+  std::uint64_t seed = 1;
+  [[nodiscard]] constexpr bool replaces(std::uint32_t kept, std::uint32_t candidate) const noexcept {
+    return rank(candidate) < rank(kept);
+  }
+
+ private:
+  [[nodiscard]] constexpr std::uint64_t rank(std::uint32_t i) const noexcept { return mix64(seed ^ mix64(i)); }
+};
+
+/// Chooses one of a voxel's points: `replaces(kept, candidate)`, indices into the cloud, says whether a point
+/// that comes later takes the place of the one chosen so far.
+template <class C>
+concept voxel_choice = requires(const C& choice, std::uint32_t i) {
+  { choice.replaces(i, i) } -> std::convertible_to<bool>;
+};
+
+/// The index of one point for each occupied voxel, in the order in which the voxels are first seen; with
+/// `voxel_first` that is ascending. Whatever belongs to the points rides along by index. Points that are not
+/// finite are left out, as are those more than 2^31 voxels from the origin. O(n).
+/// @pre size > 0, fewer than 2^32 points
+template <point_range Points, voxel_choice Choice = voxel_first>
+[[nodiscard]] std::vector<std::uint32_t> voxel_grid_indices(const Points& points,
+                                                            const voxel_grid_options& options = {},
+                                                            const Choice& choice = {}) {
+  voxel_hash voxels{options.size};
+  std::vector<std::uint32_t> chosen;
+  std::uint32_t i = 0;
+  for (const auto& p : points) {
+    if (const auto key = voxels.key_of(p)) {
+      const std::uint32_t number = voxels.insert(*key);
+      if (number == chosen.size()) {
+        chosen.push_back(i);
+      } else if (choice.replaces(chosen[number], i)) {
+        chosen[number] = i;
+      }
+    }
+    ++i;
+  }
+  return chosen;
+}
+
+/// One point for each occupied voxel, in the order in which the voxels are first seen, with its colour where
+/// `colors` is not empty: by default the centroid, with `voxel_first`, `voxel_random` or another
+/// `voxel_choice` one of the points. Points that are not finite are left out, as are those more than 2^31
+/// voxels from the origin. O(n).
 /// @pre size > 0; colors is empty or as long as points
 template <point_range Points>
 [[nodiscard]] point_cloud voxel_grid(const Points& points, std::span<const rgb8> colors,
-                                     const voxel_grid_options& options = {}) {
+                                     const voxel_grid_options& options = {}, voxel_centroid /*tag*/ = {}) {
   assert(colors.empty() || colors.size() == std::ranges::size(points));
   voxel_accumulator voxels{options.size};
   std::size_t i = 0;
@@ -99,16 +154,32 @@ template <point_range Points>
   }
   return voxels.centroids(!colors.empty());
 }
+template <point_range Points, voxel_choice Choice>
+[[nodiscard]] point_cloud voxel_grid(const Points& points, std::span<const rgb8> colors,
+                                     const voxel_grid_options& options, const Choice& choice) {
+  assert(colors.empty() || colors.size() == std::ranges::size(points));
+  const auto first = std::ranges::begin(points);
+  point_cloud out;
+  for (const std::uint32_t i : voxel_grid_indices(points, options, choice)) {
+    const auto p = coordinates<float>(first[static_cast<std::ranges::range_difference_t<const Points>>(i)]);
+    out.points.emplace_back(p[0], p[1], p[2]);
+    if (!colors.empty()) out.colors.push_back(colors[i]);
+  }
+  return out;
+}
 
 /// The same for a cloud without colours.
-template <point_range Points>
-[[nodiscard]] point_cloud voxel_grid(const Points& points, const voxel_grid_options& options = {}) {
-  return voxel_grid(points, {}, options);
+template <point_range Points, class Choice = voxel_centroid>
+requires(voxel_choice<Choice> || std::same_as<Choice, voxel_centroid>) [[nodiscard]] point_cloud
+    voxel_grid(const Points& points, const voxel_grid_options& options = {}, const Choice& choice = {}) {
+  return voxel_grid(points, std::span<const rgb8>{}, options, choice);
 }
 
 /// The same for a cloud of our own, colours included.
-[[nodiscard]] inline point_cloud voxel_grid(const point_cloud& cloud, const voxel_grid_options& options = {}) {
-  return voxel_grid(cloud.points, cloud.colors, options);
+template <class Choice = voxel_centroid>
+requires(voxel_choice<Choice> || std::same_as<Choice, voxel_centroid>) [[nodiscard]] point_cloud
+    voxel_grid(const point_cloud& cloud, const voxel_grid_options& options = {}, const Choice& choice = {}) {
+  return voxel_grid(cloud.points, cloud.colors, options, choice);
 }
 
 }  // namespace orbis::cloud
