@@ -34,5 +34,7 @@
 #include <orbis/cloud/sensor_origins.hpp>
 #include <orbis/cloud/squared_distance.hpp>
 #include <orbis/cloud/statistical.hpp>
+#include <orbis/cloud/voxel_brick.hpp>
 #include <orbis/cloud/voxel_grid.hpp>
 #include <orbis/cloud/voxel_hash.hpp>
+#include <orbis/cloud/voxel_sums.hpp>

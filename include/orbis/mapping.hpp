@@ -7,3 +7,4 @@
 #include <orbis/mapping/dense_cloud.hpp>
 #include <orbis/mapping/filter.hpp>
 #include <orbis/mapping/keyframe.hpp>
+#include <orbis/mapping/keyframe_points.hpp>

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <array>
 #include <cmath>
 #include <cstdint>
+#include <map>
 #include <vector>
 
 #include <orbis/camera/pinhole.hpp>
@@ -10,6 +12,27 @@
 #include "support/catch.hpp"
 
 using orbis::mapping::dense_cloud;
+using orbis::mapping::dense_options;
+
+namespace {
+
+bool same(const dense_cloud& a, const dense_cloud& b) {
+  const orbis::point_cloud p = a.cloud();
+  const orbis::point_cloud q = b.cloud();
+  return p.points == q.points && p.colors == q.colors && a.ranges() == b.ranges() && a.size() == b.size();
+}
+
+/// The scene with poses that have drifted, more and more.
+orbis::test::scene drifted(orbis::test::scene scene) {
+  for (std::size_t i = 0; i != scene.poses.size(); ++i) {
+    const double t = 0.01 * static_cast<double>(i);
+    const orbis::vec6 xi = orbis::vec6{{t, -0.7 * t, 0.4 * t, 0.3 * t, 0.2 * t, -t}};
+    scene.poses[i] = scene.poses[i] * orbis::se3::exp(xi);
+  }
+  return scene;
+}
+
+}  // namespace
 
 TEST_CASE("every valid depth becomes a coloured point in the world") {
   const auto scene = orbis::test::wall_scene(1);
@@ -65,9 +88,13 @@ TEST_CASE("a keyframe's measurements are those whose point of the cloud is kept"
     std::size_t found = 0;
     for (std::size_t i = 0; i != 3; ++i) {
       const auto every = dense.measurements(orbis::seq, scene.keyframe(i), i);
-      CHECK(dense.measurements(orbis::seq, scene.keyframe(i), i, all) == every);
-      CHECK(dense.measurements(orbis::seq, scene.keyframe(i), i, none).empty());
-      for (const auto& p : dense.measurements(orbis::seq, scene.keyframe(i), i, half)) CHECK(p.x() < 0.04F);
+      CHECK(dense.measurements(orbis::seq, scene.keyframe(i), i, dense.select(all)) == every);
+      CHECK(dense.measurements(orbis::par.with(3), scene.keyframe(i), i, dense.select(all)) == every);
+      CHECK(dense.measurements(orbis::seq, scene.keyframe(i), i, dense.select(none)).empty());
+      const auto left = dense.measurements(orbis::seq, scene.keyframe(i), i, dense.select(half));
+      CHECK(left.size() > every.size() / 4);
+      CHECK(left.size() < every.size());
+      for (const auto& p : left) CHECK(p.x() < 0.04F);
       found += every.size();
     }
     CHECK(found == measured);
@@ -83,4 +110,181 @@ TEST_CASE("without colour images the cloud has no colours") {
   k.color = {};
   dense.splice(orbis::seq, k);
   CHECK_FALSE(dense.cloud().has_colors());
+  dense.remove(orbis::seq, k, 1);
+  CHECK(dense.cloud().has_colors());
+}
+
+TEST_CASE("keyframes that are moved leave no trace where they were") {
+  const auto right = orbis::test::wall_scene(6, 20);
+  const auto wrong = drifted(right);
+  const orbis::camera::ray_table rays{right.camera};
+  for (const dense_options& options :
+       {dense_options{.stride = 1}, dense_options{.stride = 2, .voxel_size = 0.02},
+        dense_options{.stride = 1, .voxel_size = 0.3},
+        dense_options{.stride = 1, .voxel_size = 0.01, .flying_pixels = orbis::cloud::flying_pixel_options{}}}) {
+    INFO("voxel size " << options.voxel_size);
+    dense_cloud wanted{rays, options};
+    for (std::size_t i = 0; i != 6; ++i) wanted.splice(orbis::seq, right.keyframe(i));
+    REQUIRE(wanted.size() > 0);
+
+    for (const unsigned threads : {1U, 2U, 5U}) {
+      const auto policy = orbis::par.with(threads);
+      dense_cloud dense{rays, options};
+      for (std::size_t i = 0; i != 6; ++i) dense.splice(policy, wrong.keyframe(i));
+      CHECK_FALSE(same(dense, wanted));
+      CHECK(dense.reassemble(policy, right.keyframes()) == 5);  // the first had not drifted
+      CHECK(same(dense, wanted));
+      CHECK(dense.reassemble(policy, right.keyframes()) == 0);
+
+      // There and back again.
+      const auto k = wrong.keyframe(3);
+      dense.move(policy, k, 3);
+      CHECK_FALSE(same(dense, wanted));
+      CHECK(dense.measurements(policy, k, 3) != wanted.measurements(policy, k, 3));
+      dense.move(policy, right.keyframe(3), 3);
+      CHECK(same(dense, wanted));
+      CHECK(dense.measurements(policy, k, 3) == wanted.measurements(policy, k, 3));
+
+      // All of them gone.
+      for (const std::size_t i : {4U, 0U, 5U, 2U, 1U, 3U}) {
+        CHECK(dense.contains(i));
+        dense.remove(policy, wrong.keyframe(i), i);
+        CHECK_FALSE(dense.contains(i));
+      }
+      CHECK(dense.size() == 0);
+      CHECK(dense.cloud().empty());
+      CHECK(same(dense, dense_cloud{rays, options}));
+      CHECK(dense.reassemble(policy, right.keyframes()) == 0);
+      for (std::size_t i = 0; i != 6; ++i) dense.splice(policy, right.keyframe(i));
+      CHECK(same(dense, wanted));
+    }
+  }
+}
+
+TEST_CASE("with a voxel size the order of the keyframes does not matter") {
+  const auto scene = orbis::test::wall_scene(4, 20);
+  const orbis::camera::ray_table rays{scene.camera};
+  const dense_options options{.stride = 1, .voxel_size = 0.03};
+  dense_cloud forth{rays, options};
+  dense_cloud back{rays, options};
+  for (std::size_t i = 0; i != 4; ++i) forth.splice(orbis::par, scene.keyframe(i));
+  for (std::size_t i = 4; i-- > 0;) back.splice(orbis::seq, scene.keyframe(i));
+  CHECK(same(forth, back));
+}
+
+TEST_CASE("a removed keyframe is as if it had never been there") {
+  const auto scene = orbis::test::wall_scene(4, 20);
+  const orbis::camera::ray_table rays{scene.camera};
+  for (const double voxel : {0.0, 0.02}) {
+    const dense_options options{.stride = 1, .voxel_size = voxel};
+    dense_cloud without{rays, options};
+    dense_cloud dense{rays, options};
+    for (std::size_t i = 0; i != 4; ++i) dense.splice(orbis::seq, scene.keyframe(i));
+    for (std::size_t i = 0; i != 4; ++i) {
+      if (i != 1) without.splice(orbis::seq, scene.keyframe(i));
+    }
+    dense.remove(orbis::seq, scene.keyframe(1), 1);
+    CHECK(same(dense, without));
+    // Numbers stay what they were.
+    CHECK(dense.measurements(orbis::seq, scene.keyframe(2), 2) ==
+          without.measurements(orbis::seq, scene.keyframe(2), 1));
+    dense.splice(orbis::seq, scene.keyframe(1));
+    CHECK(dense.contains(4));
+  }
+}
+
+TEST_CASE("memory follows the surface, whatever moves over it") {
+  const auto scene = orbis::test::wall_scene(8);
+  const auto elsewhere = drifted(drifted(drifted(scene)));
+  const orbis::camera::ray_table rays{scene.camera};
+  dense_cloud dense{rays, {.stride = 1, .voxel_size = 0.01}};
+  for (std::size_t i = 0; i != 8; ++i) dense.splice(orbis::seq, scene.keyframe(i));
+  dense.reassemble(orbis::seq, elsewhere.keyframes());
+  dense.reassemble(orbis::seq, scene.keyframes());
+  const std::size_t voxels = dense.size();
+  const std::size_t before = dense.memory_bytes();
+  for (int pass = 0; pass != 50; ++pass) {
+    dense.reassemble(orbis::par.with(2), elsewhere.keyframes());
+    dense.reassemble(orbis::par.with(2), scene.keyframes());
+  }
+  CHECK(dense.size() == voxels);
+  CHECK(dense.memory_bytes() <= before + before / 20);
+  // And whatever is added on top.
+  for (int pass = 0; pass != 50; ++pass) dense.splice(orbis::seq, scene.keyframe(0));
+  CHECK(dense.size() == voxels);
+  CHECK(dense.memory_bytes() <= before + before / 10);
+}
+
+TEST_CASE("a voxel holds the mean of what was measured in it") {
+  const auto scene = orbis::test::wall_scene(3, 20);
+  const orbis::camera::ray_table rays{scene.camera};
+  const double size = 0.05;
+  dense_cloud every{rays, {.stride = 1}};
+  dense_cloud merged{rays, {.stride = 1, .voxel_size = size}};
+  struct sum {
+    orbis::vec3 position = orbis::vec3::Zero();
+    double r = 0, range = 0, n = 0;
+  };
+  std::map<std::array<int, 3>, sum> voxels;
+  for (std::size_t i = 0; i != 3; ++i) {
+    CHECK(every.splice(orbis::seq, scene.keyframe(i)) == merged.splice(orbis::seq, scene.keyframe(i)));
+  }
+  const auto cell = [&](const orbis::vec3f& p) {
+    std::array<int, 3> out{};
+    for (Eigen::Index a = 0; a != 3; ++a)
+      out[static_cast<std::size_t>(a)] = static_cast<int>(std::floor(double{p[a]} / size));
+    return out;
+  };
+  const auto points = every.cloud();
+  const auto ranges = every.ranges();
+  for (std::size_t i = 0; i != points.size(); ++i) {
+    sum& s = voxels[cell(points.points[i])];
+    s.position += points.points[i].cast<double>();
+    s.r += points.colors[i].r;
+    s.range += double{ranges[i]};
+    s.n += 1;
+  }
+  const auto means = merged.cloud();
+  const auto mean_ranges = merged.ranges();
+  std::size_t compared = 0;
+  for (std::size_t i = 0; i != means.size(); ++i) {
+    const auto found = voxels.find(cell(means.points[i]));
+    if (found == voxels.end()) continue;  // rounded across a border
+    const sum& s = found->second;
+    if ((means.points[i].cast<double>() - s.position / s.n).norm() > 1e-4) continue;  // a point there was, too
+    ++compared;
+    CHECK(std::abs(means.colors[i].r - s.r / s.n) < 0.51);
+    CHECK(std::abs(double{mean_ranges[i]} - s.range / s.n) < 1e-3);
+  }
+  CHECK(merged.size() + 2 >= voxels.size());
+  CHECK(compared + 5 >= voxels.size());
+}
+
+TEST_CASE("flying pixels never become points") {
+  const auto scene = orbis::test::wall_scene(2, 30);
+  const orbis::camera::ray_table rays{scene.camera};
+  for (const double voxel : {0.0, 0.02}) {
+    dense_cloud all{rays, {.stride = 1, .voxel_size = voxel}};
+    dense_cloud fewer{rays, {.stride = 1, .voxel_size = voxel, .flying_pixels = orbis::cloud::flying_pixel_options{}}};
+    const auto k = scene.keyframe(0);
+    orbis::image<float> filtered{64, 48};
+    const auto count = orbis::cloud::remove_flying_pixels(orbis::seq, k.depth, filtered.view());
+    const std::size_t measured = all.splice(orbis::seq, k);
+    CHECK(measured == count.valid);
+    CHECK(fewer.splice(orbis::par, k) == count.valid - count.removed);
+    CHECK(fewer.measurements(orbis::seq, k, 0).size() == count.valid - count.removed);
+  }
+}
+
+TEST_CASE("an image without depth adds nothing") {
+  auto scene = orbis::test::wall_scene(1);
+  scene.depth[0] = orbis::image<std::uint16_t>(64, 48, 0);
+  for (const double voxel : {0.0, 0.02}) {
+    dense_cloud dense{orbis::camera::ray_table{scene.camera}, {.voxel_size = voxel}};
+    CHECK(dense.splice(orbis::par, scene.keyframe(0)) == 0);
+    CHECK(dense.size() == 0);
+    CHECK(dense.measurements(orbis::par, scene.keyframe(0), 0).empty());
+    dense.remove(orbis::par, scene.keyframe(0), 0);
+    CHECK(dense.cloud().empty());
+  }
 }

@@ -103,15 +103,16 @@ template <scan_map Octree = octree::occupancy_octree<>, execution_policy Policy,
     if (!on_progress(++done, total)) return fail(errc::cancelled, {}, "cancelled");
   }
 
-  map.cloud = dense.cloud();
-  filtered_indices filtered = filter_points(policy, map.cloud.points, dense.ranges(), options.filter);
+  map.cloud = dense.cloud(policy);
+  filtered_indices filtered = filter_points(policy, map.cloud.points, dense.ranges(policy), options.filter);
   map.filter = std::move(filtered.report);
   map.inliers = std::move(filtered.inliers);
   map.filtered_cloud = cloud::extract(map.cloud, map.inliers);
   std::vector<char> kept(map.cloud.size(), 0);
   for (const std::uint32_t i : map.inliers) kept[i] = 1;
 
-  const auto integrate_all = [&](Octree& octree, std::span<const char> mask, std::vector<double>& milliseconds) {
+  const auto integrate_all = [&](Octree& octree, const dense_cloud::selection& mask,
+                                 std::vector<double>& milliseconds) {
     std::size_t number = 0;
     for (const auto& k : keyframes) {
       if (finite_pose(k)) {
@@ -132,7 +133,7 @@ template <scan_map Octree = octree::occupancy_octree<>, execution_policy Policy,
       return fail(errc::cancelled, {}, "cancelled");
     }
   }
-  if (!integrate_all(map.octree, kept, map.insert_ms)) return fail(errc::cancelled, {}, "cancelled");
+  if (!integrate_all(map.octree, dense.select(kept), map.insert_ms)) return fail(errc::cancelled, {}, "cancelled");
   return map;
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Keyframes' depth images spliced into one cloud in the world.
+/// Keyframes' depth images spliced into one cloud in the world, and moved in it when their poses are
+/// corrected.
 #pragma once
 
 #include <algorithm>
@@ -8,18 +9,19 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
+#include <optional>
 #include <span>
 #include <utility>
 #include <vector>
 
-#include <orbis/camera/cloud.hpp>
 #include <orbis/camera/rays.hpp>
-#include <orbis/cloud/voxel_grid.hpp>
+#include <orbis/cloud/flying_pixels.hpp>
+#include <orbis/cloud/voxel_sums.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/point_cloud.hpp>
 #include <orbis/core/types.hpp>
 #include <orbis/mapping/keyframe.hpp>
+#include <orbis/mapping/keyframe_points.hpp>
 
 namespace orbis::mapping {
 
@@ -28,10 +30,16 @@ struct dense_options {
   float min_depth = 0.0F;   ///< metres along the optical axis
   float max_depth = 4.0F;   ///< metres along the optical axis
   double voxel_size = 0.0;  ///< metres; points in one voxel become their centroid. 0: every point stays
+  /// Pixels between two surfaces are left out before they become points; empty: they are not looked for.
+  std::optional<cloud::flying_pixel_options> flying_pixels{};
 };
 
-/// A cloud that grows by keyframes. With a voxel size its memory follows the surface that was seen
-/// (about 60 bytes for each voxel), without one the number of measurements.
+/// A cloud that grows by keyframes, and follows them when their poses change.
+///
+/// With a voxel size, memory follows the surface that is seen (about 50 bytes for each voxel), without
+/// one the number of measurements. Either way the cloud is a function of the keyframes and the poses they
+/// have now: after corrections it is, byte for byte, the one that would have been built with the corrected
+/// poses from the start. With a voxel size not even the order of the keyframes matters.
 class dense_cloud {
  public:
   /// @pre options.stride > 0, options.voxel_size >= 0
@@ -40,78 +48,239 @@ class dense_cloud {
     assert(options.stride > 0 && options.voxel_size >= 0);
   }
 
-  /// Adds a keyframe's points; returns how many measurements there were. Colours are kept if every
-  /// keyframe has them. O(pixels / stride^2). @pre the images have the size of the ray table
+  /// Adds a keyframe's points; returns how many measurements there were. The keyframe's number is that of
+  /// those spliced before it. Colours are kept if every keyframe has them.
+  /// O(pixels). @pre the images have the size of the ray table; the pose is finite
   template <execution_policy Policy, keyframe_like Keyframe>
   std::size_t splice(const Policy& policy, const Keyframe& k) {
-    const image_view<const rgb8> color = k.color;
-    assert(color.empty() || (color.width() == rays_.width() && color.height() == rays_.height()));
-    const camera::unprojected_points seen = unproject(policy, k);
-    first_of_frame_.push_back(ranges_.size());
-    colored_ = colored_ && !color.empty();
-    const vec3f origin = se3(k.T_world_camera).translation().template cast<float>();
-    for (std::size_t i = 0; i != seen.points.size(); ++i) {
-      const auto pixel = static_cast<int>(seen.pixels[i]);
-      const rgb8 c = color.empty() ? rgb8{} : color(pixel % rays_.width(), pixel / rays_.width());
-      const float range = (seen.points[i] - origin).norm();
-      if (!merging()) {
-        every_.points.push_back(seen.points[i]);
-        every_.colors.push_back(c);
-        ranges_.push_back(range);
-      } else if (const auto number = voxels_.add(seen.points[i], c)) {
-        if (*number == ranges_.size()) ranges_.push_back(range);
-        ranges_[*number] = std::min(ranges_[*number], range);
+    frames_.push_back({});
+    return put(policy, k, frames_.size() - 1);
+  }
+  /// Takes back keyframe `number`. Only the images of `k` are looked at.
+  /// O(pixels). @pre it was spliced with the same images and has not been removed
+  template <execution_policy Policy, keyframe_like Keyframe>
+  void remove(const Policy& policy, const Keyframe& k, std::size_t number) {
+    assert(contains(number));
+    frame& f = frames_[number];
+    if (merging()) {
+      measure(policy, k, f.T_world_camera);
+      voxels_.remove(policy, parts_);
+    } else {
+      size_ -= f.cloud.size();
+    }
+    present_ -= 1;
+    colored_ -= f.colored ? 1 : 0;
+    f = {};
+  }
+  /// Moves keyframe `number` to the pose that `k` has now. O(pixels).
+  /// @pre it was spliced with the same images and has not been removed; the pose is finite
+  template <execution_policy Policy, keyframe_like Keyframe>
+  void move(const Policy& policy, const Keyframe& k, std::size_t number) {
+    remove(policy, k, number);
+    put(policy, k, number);
+  }
+  /// Moves all keyframes whose pose has changed in any bit; returns how many. `keyframes`: all that were
+  /// spliced, in that order; those that were removed are passed over. O(pixels of those that moved).
+  template <execution_policy Policy, keyframe_range Keyframes>
+  std::size_t reassemble(const Policy& policy, const Keyframes& keyframes) {
+    assert(std::ranges::size(keyframes) == frames_.size());
+    std::size_t moved = 0;
+    std::size_t number = 0;
+    for (const auto& k : keyframes) {
+      if (contains(number) && se3(k.T_world_camera).to_matrix() != frames_[number].T_world_camera.to_matrix()) {
+        move(policy, k, number);
+        ++moved;
+      }
+      ++number;
+    }
+    return moved;
+  }
+
+  /// Whether keyframe `number` was spliced and not removed.
+  [[nodiscard]] bool contains(std::size_t number) const noexcept {
+    return number < frames_.size() && frames_[number].present;
+  }
+  /// The number of points.
+  [[nodiscard]] std::size_t size() const noexcept { return merging() ? voxels_.size() : size_; }
+  /// The cloud so far, in the world: voxel by voxel in the order of `cloud::voxel_sums`, or keyframe by
+  /// keyframe. O(size()), and O(bricks log bricks) with a voxel size.
+  template <execution_policy Policy = sequential_policy>
+  [[nodiscard]] point_cloud cloud(const Policy& policy = {}) const {
+    const bool with_colors = colored_ == present_;
+    if (merging()) return voxels_.cloud(policy, voxels_.in_order(), with_colors);
+    point_cloud out;
+    for (const frame& f : frames_) {
+      out.points.insert(out.points.end(), f.cloud.points.begin(), f.cloud.points.end());
+      if (with_colors) out.colors.insert(out.colors.end(), f.cloud.colors.begin(), f.cloud.colors.end());
+    }
+    return out;
+  }
+  /// For each point of the cloud the distance in metres that it was seen from; with a voxel size, the mean
+  /// of the measurements in the voxel, to the millimetre. (A mean can be taken back; a shortest one, whose
+  /// keyframe is removed, could not.) O(size())
+  template <execution_policy Policy = sequential_policy>
+  [[nodiscard]] std::vector<float> ranges(const Policy& policy = {}) const {
+    if (merging()) return voxels_.ranges(policy, voxels_.in_order());
+    std::vector<float> out;
+    for (const frame& f : frames_) out.insert(out.end(), f.ranges.begin(), f.ranges.end());
+    return out;
+  }
+  /// All memory that is held beside the ray table, bytes.
+  [[nodiscard]] std::size_t memory_bytes() const noexcept {
+    std::size_t bytes = voxels_.memory_bytes() + frames_.capacity() * sizeof(frame);
+    for (const cloud::voxel_measurements& part : parts_) bytes += part.memory_bytes();
+    for (const frame& f : frames_) {
+      bytes += f.cloud.points.capacity() * sizeof(vec3f) + f.cloud.colors.capacity() * sizeof(rgb8) +
+               f.ranges.capacity() * sizeof(float);
+    }
+    return bytes;
+  }
+
+  /// Which points of the cloud are kept, in a form made for questions. Valid until the cloud changes.
+  class selection {
+   public:
+    /// Everything.
+    selection() = default;
+
+   private:
+    friend class dense_cloud;
+    std::vector<char> kept_;
+    std::optional<cloud::voxel_sums::order> places_;
+    std::vector<std::size_t> first_of_frame_;
+  };
+  /// `kept`: one entry for each point of the cloud, not 0 where it is kept.
+  [[nodiscard]] selection select(std::span<const char> kept) const {
+    assert(kept.size() == size());
+    selection out;
+    out.kept_.assign(kept.begin(), kept.end());
+    if (merging()) {
+      out.places_ = voxels_.in_order();
+    } else {
+      std::size_t first = 0;
+      for (const frame& f : frames_) {
+        out.first_of_frame_.push_back(first);
+        first += f.cloud.size();
       }
     }
-    return seen.points.size();
+    return out;
   }
-
-  [[nodiscard]] std::size_t size() const noexcept { return ranges_.size(); }
-  /// The cloud so far, in the world.
-  [[nodiscard]] point_cloud cloud() const {
-    if (merging()) return voxels_.centroids(colored_);
-    return {every_.points, colored_ ? every_.colors : std::vector<rgb8>{}};
-  }
-  /// For each point of the cloud the distance in metres from which it was seen, the shortest one if
-  /// there are several.
-  [[nodiscard]] std::span<const float> ranges() const noexcept { return ranges_; }
-
-  /// A keyframe's own measurements in the world, of those alone whose point of the cloud is `kept`
-  /// (one entry for each point; empty: all are). `number`: how many keyframes were spliced before it.
-  /// @pre the same keyframe was spliced
+  /// The measurements of keyframe `number` in the world, where it was spliced or moved to last, of those
+  /// alone whose point of the cloud is in `kept`. Only the images of `k` are looked at. O(pixels).
+  /// @pre contains(number), and its images are those of `k`
   template <execution_policy Policy, keyframe_like Keyframe>
   [[nodiscard]] std::vector<vec3f> measurements(const Policy& policy, const Keyframe& k, std::size_t number,
-                                                std::span<const char> kept = {}) const {
-    assert(number < first_of_frame_.size() && (kept.empty() || kept.size() == size()));
-    std::vector<vec3f> points = unproject(policy, k).points;
-    if (kept.empty()) return points;
-    std::size_t in_cloud = first_of_frame_[number];
-    std::erase_if(points, [&](const vec3f& p) {
-      if (!merging()) return kept[in_cloud++] == 0;
-      const auto voxel = voxels_.find(p);
-      return !voxel || kept[*voxel] == 0;
-    });
-    return points;
+                                                const selection& kept = {}) const {
+    assert(contains(number));
+    const bool all = !kept.places_ && kept.first_of_frame_.empty();
+    std::vector<vec3f> out;
+    if (!merging()) {
+      const std::vector<vec3f>& points = frames_[number].cloud.points;
+      if (all) return points;
+      const std::size_t first = kept.first_of_frame_[number];
+      for (std::size_t i = 0; i != points.size(); ++i) {
+        if (kept.kept_[first + i] != 0) out.push_back(points[i]);
+      }
+      return out;
+    }
+    keyframe_points reader;  // const functions share no memory
+    std::vector<std::vector<vec3f>> parts(reader.parts(rays_, options_.stride));
+    reader.read(policy, k.depth, rays_, point_options(), frames_[number].T_world_camera,
+                [&](std::size_t part, int, int, const vec3& point, float) {
+                  if (!all) {
+                    const auto place = kept.places_->find(point);
+                    if (!place || kept.kept_[*place] == 0) return;
+                  }
+                  parts[part].push_back(point.cast<float>());
+                });
+    for (const auto& part : parts) out.insert(out.end(), part.begin(), part.end());
+    return out;
   }
 
  private:
+  struct frame {
+    se3 T_world_camera{};
+    bool present = false;
+    bool colored = false;
+    point_cloud cloud{};  ///< where points are not merged
+    std::vector<float> ranges{};
+  };
+
   [[nodiscard]] bool merging() const noexcept { return options_.voxel_size > 0; }
+  [[nodiscard]] keyframe_point_options point_options() const {
+    return {options_.stride, options_.min_depth, options_.max_depth, options_.flying_pixels};
+  }
 
   template <execution_policy Policy, keyframe_like Keyframe>
-  [[nodiscard]] camera::unprojected_points unproject(const Policy& policy, const Keyframe& k) const {
-    return camera::unproject_depth(
-        policy, k.depth, rays_,
-        {.stride = options_.stride, .min_depth = options_.min_depth, .max_depth = options_.max_depth},
-        k.T_world_camera);
+  std::size_t put(const Policy& policy, const Keyframe& k, std::size_t number) {
+    frame& f = frames_[number];
+    f.T_world_camera = k.T_world_camera;
+    f.present = true;
+    f.colored = !image_view<const rgb8>(k.color).empty();
+    present_ += 1;
+    colored_ += f.colored ? 1 : 0;
+    std::size_t measured = 0;
+    measure(policy, k, f.T_world_camera);
+    if (merging()) {
+      voxels_.add(policy, parts_);
+      for (const auto& part : parts_) measured += part.size() + part.without_voxel();
+      return measured;
+    }
+    for (const plain_points& part : plain_) {
+      f.cloud.points.insert(f.cloud.points.end(), part.cloud.points.begin(), part.cloud.points.end());
+      f.cloud.colors.insert(f.cloud.colors.end(), part.cloud.colors.begin(), part.cloud.colors.end());
+      f.ranges.insert(f.ranges.end(), part.ranges.begin(), part.ranges.end());
+    }
+    size_ += f.cloud.size();
+    return f.cloud.size();
   }
+
+  /// Fills `parts_`, or `plain_` where points are not merged.
+  template <execution_policy Policy, keyframe_like Keyframe>
+  void measure(const Policy& policy, const Keyframe& k, const se3& T_world_camera) {
+    const image_view<const rgb8> color = k.color;
+    assert(color.empty() || (color.width() == rays_.width() && color.height() == rays_.height()));
+    const std::size_t parts = reader_.parts(rays_, options_.stride);
+    const auto color_at = [&](int x, int y) { return color.empty() ? rgb8{} : color(x, y); };
+    if (merging()) {
+      parts_.resize(parts, cloud::voxel_measurements{options_.voxel_size});
+      for (auto& part : parts_) part.clear();
+      reader_.read(policy, k.depth, rays_, point_options(), T_world_camera,
+                   [&](std::size_t part, int x, int y, const vec3& point, float range) {
+                     parts_[part].push(point, color_at(x, y), range);
+                   });
+    } else {
+      plain_.resize(parts);
+      for (auto& part : plain_) part.clear();
+      reader_.read(policy, k.depth, rays_, point_options(), T_world_camera,
+                   [&](std::size_t part, int x, int y, const vec3& point, float range) {
+                     plain_[part].cloud.points.push_back(point.cast<float>());
+                     plain_[part].cloud.colors.push_back(color_at(x, y));
+                     plain_[part].ranges.push_back(range);
+                   });
+    }
+  }
+
+  struct plain_points {
+    point_cloud cloud;
+    std::vector<float> ranges;
+    void clear() {
+      cloud.points.clear();
+      cloud.colors.clear();
+      ranges.clear();
+    }
+  };
 
   camera::ray_table rays_;
   dense_options options_;
-  cloud::voxel_accumulator voxels_;  ///< where points are merged
-  point_cloud every_;                ///< where they are not
-  std::vector<float> ranges_;
-  std::vector<std::size_t> first_of_frame_;
-  bool colored_ = true;
+  cloud::voxel_sums voxels_;
+  std::vector<frame> frames_;
+  std::size_t size_ = 0;     ///< points, where they are not merged
+  std::size_t present_ = 0;  ///< keyframes,
+  std::size_t colored_ = 0;  ///< and how many of them have colours
+  // Kept for their memory.
+  keyframe_points reader_;
+  std::vector<cloud::voxel_measurements> parts_;
+  std::vector<plain_points> plain_;
 };
 
 }  // namespace orbis::mapping

@@ -1,0 +1,322 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Sums of measurements in voxels from which measurements can be taken back without a trace.
+///
+/// Everything is summed in integers: where in its voxel a measurement lies, to 1/1024 of the edge; its
+/// colour; its range in millimetres. Such sums do not depend on any order, and what was added can be
+/// subtracted exactly. The surfaces that depth cameras see are thin, so that voxels are stored in bricks
+/// of 8^3, each with the sums of its occupied voxels only.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cassert>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <numeric>
+#include <optional>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include <orbis/cloud/voxel_brick.hpp>
+#include <orbis/cloud/voxel_hash.hpp>
+#include <orbis/core/execution.hpp>
+#include <orbis/core/image.hpp>
+#include <orbis/core/point_cloud.hpp>
+#include <orbis/core/rounded.hpp>
+#include <orbis/core/types.hpp>
+
+namespace orbis::cloud {
+
+namespace detail {
+
+/// A place in a grid of bricks.
+struct brick_cell {
+  voxel_key brick{};
+  std::uint32_t cell = 0;
+  vec3 within{};  ///< the voxel, of its edge
+};
+
+/// Where a point lies; empty where it is not finite or more than 2^31 voxels from the origin.
+[[nodiscard]] inline std::optional<brick_cell> brick_cell_of(const vec3& point, double per_metre) noexcept {
+  brick_cell out;
+  for (std::size_t a = 0; a != 3; ++a) {
+    const auto axis = static_cast<Eigen::Index>(a);
+    const double scaled = rounded_product(point[axis], per_metre);
+    const double whole = std::floor(scaled);
+    if (!(std::abs(whole) < 2147483647.0)) return std::nullopt;
+    const auto voxel = static_cast<std::int32_t>(whole);
+    out.brick[a] = voxel >> 3;
+    out.cell |= static_cast<std::uint32_t>(voxel & 7) << (3 * a);
+    out.within[axis] = scaled - whole;
+  }
+  return out;
+}
+
+}  // namespace detail
+
+/// Measurements sorted into runs that lie in one brick each, for `voxel_sums`; a part of a larger set.
+/// Memory is kept from one use to the next.
+class voxel_measurements {
+ public:
+  /// @pre size > 0, metres
+  explicit voxel_measurements(double size) : per_metre_{1.0 / size} { assert(size > 0); }
+
+  void clear() {
+    items_.clear();
+    runs_.clear();
+    without_voxel_ = 0;
+  }
+  /// Adds a measurement (metres, in the world), with the distance in metres that it was made from.
+  /// Those that are not finite, and those more than 2^31 voxels from the origin, have no voxel and are
+  /// only counted.
+  void push(const vec3& point, const rgb8& color, float range) {
+    const auto at = detail::brick_cell_of(point, per_metre_);
+    if (!at) {
+      ++without_voxel_;
+      return;
+    }
+    detail::voxel_item item{static_cast<std::uint16_t>(at->cell), {}, color, 0};
+    for (std::size_t a = 0; a != 3; ++a)
+      item.offset[a] = static_cast<std::uint16_t>(1024.0 * at->within[static_cast<Eigen::Index>(a)]);
+    constexpr float longest = 4e6F;  // metres; what fits, and more than any sensor reaches
+    item.range = range > 0 ? static_cast<std::uint32_t>(1000.0F * std::min(range, longest) + 0.5F) : 0;
+    if (runs_.empty() || runs_.back().brick != at->brick) {
+      runs_.push_back({at->brick, static_cast<std::uint32_t>(items_.size()), 0, 0});
+    }
+    items_.push_back(item);
+    runs_.back().end = static_cast<std::uint32_t>(items_.size());
+  }
+  /// How many have a voxel.
+  [[nodiscard]] std::size_t size() const noexcept { return items_.size(); }
+  [[nodiscard]] std::size_t without_voxel() const noexcept { return without_voxel_; }
+  [[nodiscard]] std::size_t memory_bytes() const noexcept {
+    return items_.capacity() * sizeof(detail::voxel_item) + runs_.capacity() * sizeof(run);
+  }
+
+ private:
+  friend class voxel_sums;
+  struct run {
+    voxel_key brick;
+    std::uint32_t begin, end;
+    std::uint32_t next;  ///< of the same brick, in a list over all parts
+  };
+  double per_metre_;
+  std::vector<detail::voxel_item> items_;
+  std::vector<run> runs_;
+  std::size_t without_voxel_ = 0;
+};
+
+/// The mean of the measurements in each voxel, as a function of what was added and not yet removed, and
+/// of nothing else: not of the order, nor of the number of threads, nor of what was there before. About
+/// 50 bytes for each voxel.
+class voxel_sums {
+  [[nodiscard]] auto key_of() const {
+    return [this](std::uint32_t number) -> const voxel_key& { return bricks_[number].key; };
+  }
+
+ public:
+  /// @pre size > 0, metres
+  explicit voxel_sums(double size) : size_{size} { assert(size > 0); }
+
+  /// Adds measurements. O(n). @pre fewer than 2^22 measurements in a voxel
+  template <execution_policy Policy>
+  void add(const Policy& policy, std::span<voxel_measurements> parts) {
+    apply<true>(policy, parts);
+  }
+  /// Takes back measurements that were added; voxels without any, and bricks without voxels, are freed.
+  /// O(n). @pre they were added, and not removed since
+  template <execution_policy Policy>
+  void remove(const Policy& policy, std::span<voxel_measurements> parts) {
+    apply<false>(policy, parts);
+  }
+
+  /// The number of occupied voxels.
+  [[nodiscard]] std::size_t size() const noexcept { return occupied_; }
+  /// All memory that is held, bytes.
+  [[nodiscard]] std::size_t memory_bytes() const noexcept {
+    std::size_t bytes = bricks_.capacity() * sizeof(brick) + free_.capacity() * sizeof(std::uint32_t) +
+                        touched_.capacity() * sizeof(std::uint32_t) + chained_.capacity() * sizeof(chained_run) +
+                        index_.memory_bytes();
+    for (const brick& b : bricks_) bytes += b.voxels.memory_bytes();
+    return bytes;
+  }
+
+  /// Gives every voxel its place in the order of `cloud`: by brick, then by voxel, along z, y, x. Valid
+  /// until the next change. O(bricks log bricks).
+  class order {
+   public:
+    /// The place of the voxel a point (metres, in the world) lies in; empty where nothing is.
+    [[nodiscard]] std::optional<std::size_t> find(const vec3& point) const {
+      const auto at = detail::brick_cell_of(point, 1.0 / sums_->size_);
+      if (!at) return std::nullopt;
+      const auto number = sums_->index_.find(at->brick, sums_->key_of());
+      if (!number || !sums_->bricks_[*number].voxels.contains(at->cell)) return std::nullopt;
+      return first_[*number] + sums_->bricks_[*number].voxels.rank(at->cell);
+    }
+
+   private:
+    friend class voxel_sums;
+    const voxel_sums* sums_ = nullptr;
+    std::vector<std::uint32_t> bricks_;  ///< numbers, in order
+    std::vector<std::size_t> first_;     ///< for each brick's number the place of its first voxel
+  };
+  [[nodiscard]] order in_order() const {
+    order out;
+    out.sums_ = this;
+    for (std::uint32_t b = 0; b != bricks_.size(); ++b) {
+      if (bricks_[b].voxels.size() != 0) out.bricks_.push_back(b);
+    }
+    std::ranges::sort(out.bricks_, [&](std::uint32_t a, std::uint32_t b) {
+      const voxel_key& i = bricks_[a].key;
+      const voxel_key& j = bricks_[b].key;
+      return std::array{i[2], i[1], i[0]} < std::array{j[2], j[1], j[0]};
+    });
+    out.first_.resize(bricks_.size());
+    std::size_t place = 0;
+    for (const std::uint32_t b : out.bricks_) {
+      out.first_[b] = place;
+      place += bricks_[b].voxels.size();
+    }
+    return out;
+  }
+
+  /// The mean of each voxel's measurements, with their mean colours. O(voxels)
+  template <execution_policy Policy>
+  [[nodiscard]] point_cloud cloud(const Policy& policy, const order& places, bool with_colors = true) const {
+    point_cloud out;
+    out.points.resize(occupied_);
+    if (with_colors) out.colors.resize(occupied_);
+    for_each_voxel(policy, places, [&](std::size_t place, const voxel_key& voxel, const detail::voxel_sum& sum) {
+      for (std::size_t a = 0; a != 3; ++a) {
+        // An offset stands for the middle of its 1/1024.
+        const double within = (sum.offset[a] / static_cast<double>(sum.count) + 0.5) / 1024.0;
+        out.points[place][static_cast<Eigen::Index>(a)] = static_cast<float>((voxel[a] + within) * size_);
+      }
+      const auto channel = [&](std::size_t c) {
+        return static_cast<std::uint8_t>((sum.color[c] + sum.count / 2) / sum.count);  // rounded
+      };
+      if (with_colors) out.colors[place] = {channel(0), channel(1), channel(2)};
+    });
+    return out;
+  }
+  /// The mean of the distances that each voxel was measured from, metres. O(voxels)
+  template <execution_policy Policy>
+  [[nodiscard]] std::vector<float> ranges(const Policy& policy, const order& places) const {
+    std::vector<float> out(occupied_);
+    for_each_voxel(policy, places, [&](std::size_t place, const voxel_key&, const detail::voxel_sum& sum) {
+      out[place] = static_cast<float>(static_cast<double>(sum.range) / (1000.0 * sum.count));
+    });
+    return out;
+  }
+
+ private:
+  static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
+  struct brick {
+    voxel_key key{};
+    std::uint32_t first_run = none;  ///< while measurements are applied
+    detail::voxel_brick voxels{};
+  };
+
+  template <execution_policy Policy, class F>
+  void for_each_voxel(const Policy& policy, const order& places, F&& f) const {
+    for_each_index(policy, places.bricks_.size(), 64, [&](std::size_t i) {
+      const brick& b = bricks_[places.bricks_[i]];
+      std::size_t place = places.first_[places.bricks_[i]];
+      b.voxels.for_each([&](std::uint32_t cell, const detail::voxel_sum& sum) {
+        f(place++,
+          voxel_key{b.key[0] * 8 + static_cast<std::int32_t>(cell & 7U),
+                    b.key[1] * 8 + static_cast<std::int32_t>(cell >> 3U & 7U),
+                    b.key[2] * 8 + static_cast<std::int32_t>(cell >> 6U)},
+          sum);
+      });
+    });
+  }
+
+  /// The brick with this key, a new one if there is none.
+  std::uint32_t brick_at(const voxel_key& key) {
+    if (const auto found = index_.find(key, key_of())) return *found;
+    std::uint32_t number = static_cast<std::uint32_t>(bricks_.size());
+    if (free_.empty()) {
+      bricks_.emplace_back();
+    } else {
+      number = free_.back();
+      free_.pop_back();
+    }
+    bricks_[number].key = key;
+    index_.insert(number, key_of());
+    return number;
+  }
+
+  template <bool Add, execution_policy Policy>
+  void apply(const Policy& policy, std::span<voxel_measurements> parts) {
+    // Runs are chained brick by brick, then every brick is one thread's.
+    std::size_t total = 0;
+    for (const auto& part : parts) total += part.runs_.size();
+    chained_.clear();
+    chained_.reserve(total);
+    touched_.clear();
+    for (auto& part : parts) {
+      for (auto& run : part.runs_) {
+        std::uint32_t number = 0;
+        if constexpr (Add) {
+          number = brick_at(run.brick);
+        } else {
+          const auto found = index_.find(run.brick, key_of());
+          assert(found && "removed without having been added");
+          if (!found) continue;
+          number = *found;
+        }
+        std::uint32_t& first = bricks_[number].first_run;
+        if (first == none) touched_.push_back(number);
+        run.next = std::exchange(first, static_cast<std::uint32_t>(chained_.size()));
+        chained_.push_back({part.items_.data(), &run});
+      }
+    }
+    std::atomic<std::size_t> more{0};  // modulo 2^64: also where there are fewer
+    for_each_index(policy, touched_.size(), 8, [&](std::size_t i) {
+      brick& b = bricks_[touched_[i]];
+      const std::size_t before = b.voxels.size();
+      const auto for_each_run = [&](auto&& f) {
+        for (std::uint32_t r = b.first_run; r != none; r = chained_[r].run->next) {
+          const auto& [items, run] = chained_[r];
+          f(std::span{items + run->begin, items + run->end});
+        }
+      };
+      if constexpr (Add) {
+        b.voxels.add(for_each_run);
+      } else {
+        b.voxels.remove(for_each_run);
+      }
+      b.first_run = none;
+      more.fetch_add(b.voxels.size() - before, std::memory_order_relaxed);
+    });
+    occupied_ += more.load(std::memory_order_relaxed);
+    if constexpr (!Add) {
+      for (const std::uint32_t number : touched_) {
+        if (bricks_[number].voxels.size() != 0) continue;
+        index_.erase(bricks_[number].key, key_of());
+        bricks_[number].voxels = {};
+        free_.push_back(number);
+      }
+    }
+  }
+
+  struct chained_run {
+    const detail::voxel_item* items;
+    const voxel_measurements::run* run;
+  };
+  double size_;
+  std::size_t occupied_ = 0;
+  std::vector<brick> bricks_;
+  std::vector<std::uint32_t> free_;  ///< numbers of bricks that are not in use
+  detail::brick_index index_;
+  std::vector<std::uint32_t> touched_;  ///< kept for their memory
+  std::vector<chained_run> chained_;
+};
+
+}  // namespace orbis::cloud

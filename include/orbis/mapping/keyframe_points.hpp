@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// The points of a keyframe's depth image in the world, filtered before they become points.
+#pragma once
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <cstddef>
+#include <optional>
+
+#include <orbis/camera/depth.hpp>
+#include <orbis/camera/rays.hpp>
+#include <orbis/cloud/flying_pixels.hpp>
+#include <orbis/core/execution.hpp>
+#include <orbis/core/image.hpp>
+#include <orbis/core/rounded.hpp>
+#include <orbis/core/se3.hpp>
+#include <orbis/core/types.hpp>
+
+namespace orbis::mapping {
+
+/// Which pixels become points.
+struct keyframe_point_options {
+  int stride = 1;          ///< every stride-th pixel of every stride-th row; > 0
+  float min_depth = 0.0F;  ///< metres along the optical axis
+  float max_depth = 4.0F;  ///< metres along the optical axis
+  /// Pixels between two surfaces are left out; empty: they are not looked for.
+  std::optional<cloud::flying_pixel_options> flying_pixels{};
+};
+
+/// Reads depth images. Keeps the memory that it needs for the filter.
+class keyframe_points {
+ public:
+  /// In how many parts an image is read.
+  [[nodiscard]] static std::size_t parts(const camera::ray_table& rays, int stride) noexcept {
+    return static_cast<std::size_t>((rays.height() + stride * rows_of_part - 1) / (stride * rows_of_part));
+  }
+
+  /// Calls `f(part, x, y, point, range)` for the pixels with a valid depth and a ray: the point in the
+  /// world, and its distance from the camera, metres. Within a part in the order of the pixels; parts may
+  /// be on different threads. The same image, options and pose give the same bits, however they are
+  /// compiled. O(pixels).
+  /// @pre depth and rays have the same size; options.stride > 0
+  template <execution_policy Policy, camera::depth_source Depth, class F>
+  void read(const Policy& policy, const Depth& depth, const camera::ray_table& rays,
+            const keyframe_point_options& options, const se3& T_world_camera, F&& f) {
+    assert(depth.width() == rays.width() && depth.height() == rays.height() && options.stride > 0);
+    if (options.flying_pixels) {
+      if (filtered_.width() != rays.width() || filtered_.height() != rays.height())
+        filtered_ = image<float>(rays.width(), rays.height());
+      cloud::remove_flying_pixels(policy, depth, filtered_.view(), *options.flying_pixels, workspace_);
+      read_all(policy, camera::depth_view<float>(filtered_.view()), rays, options, T_world_camera, f);
+    } else {
+      read_all(policy, depth, rays, options, T_world_camera, f);
+    }
+  }
+
+ private:
+  static constexpr int rows_of_part = 8;
+
+  template <execution_policy Policy, camera::depth_source Depth, class F>
+  static void read_all(const Policy& policy, const Depth& depth, const camera::ray_table& rays,
+                       const keyframe_point_options& options, const se3& T_world_camera, F&& f) {
+    const mat3 r = T_world_camera.rotation_matrix();
+    const vec3 t = T_world_camera.translation();
+    const auto in_world = [&](const vec3f& p, Eigen::Index a) {
+      return (rounded_product(r(a, 0), double{p[0]}) + rounded_product(r(a, 1), double{p[1]})) +
+             (rounded_product(r(a, 2), double{p[2]}) + t[a]);
+    };
+    for_each_index(policy, parts(rays, options.stride), 1, [&](std::size_t part) {
+      const int first = static_cast<int>(part) * rows_of_part * options.stride;
+      for (int y = first; y < std::min(rays.height(), first + rows_of_part * options.stride); y += options.stride) {
+        for (int x = 0; x < rays.width(); x += options.stride) {
+          const float z = depth(x, y);
+          if (!(z > 0.0F && z >= options.min_depth && z <= options.max_depth)) continue;
+          const vec3f p = rays.at(x, y, z);
+          const float squared =
+              (rounded_product(p[0], p[0]) + rounded_product(p[1], p[1])) + rounded_product(p[2], p[2]);
+          if (!std::isfinite(squared)) continue;  // a pixel without a ray
+          f(part, x, y, vec3{in_world(p, 0), in_world(p, 1), in_world(p, 2)}, std::sqrt(squared));
+        }
+      }
+    });
+  }
+
+  image<float> filtered_;
+  cloud::flying_pixel_workspace workspace_;
+};
+
+}  // namespace orbis::mapping
