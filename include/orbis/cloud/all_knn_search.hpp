@@ -39,6 +39,68 @@ namespace orbis::cloud::detail {
           in_leaf_portable,    distances_portable, sum_nearest_portable};
 }
 
+/// A row of boxes that is still to be looked at.
+struct open_row {
+  std::uint32_t level;
+  std::uint32_t row;
+};
+
+/// Gathers the leaves within `bound`, squared, of a box; false if they are too many. `open` is scratch.
+[[nodiscard]] inline bool gather_near_leaves(const leaf_hierarchy& tree, const knn_kernels& kernels, const box3& box,
+                                             float bound, std::vector<open_row>& open, nearby_leaves& near) {
+  near.count = 0;
+  open.clear();
+  open.push_back({static_cast<std::uint32_t>(tree.levels.size() - 1), 0});
+  std::array<float, leaf_width> distance;
+  while (!open.empty()) {
+    const open_row next = open.back();
+    open.pop_back();
+    const box_row& boxes = tree.levels[next.level][next.row];
+    std::uint32_t mask = kernels.near_boxes(boxes, box, bound, distance.data());
+    const auto child = static_cast<std::uint32_t>(next.row * leaf_width);
+    if (next.level == 0) {
+      if (!near.has_room()) return false;
+      kernels.gather(boxes, mask, child, near);
+    } else {
+      for (; mask != 0; mask &= mask - 1) {
+        open.push_back({next.level - 1, child + static_cast<std::uint32_t>(std::countr_zero(mask))});
+      }
+    }
+  }
+  near.finish();
+  return true;
+}
+
+/// Calls `f(member, squared distance)` for every point within `bound`, squared, of `q`, until it returns false.
+/// `open` is scratch.
+template <class F>
+void for_each_within(const leaf_hierarchy& tree, const knn_kernels& kernels, const std::array<float, 3>& q, float bound,
+                     std::vector<open_row>& open, F&& f) {
+  const box3 box{q, q};
+  std::array<float, leaf_width> distance;
+  open.clear();
+  open.push_back({static_cast<std::uint32_t>(tree.levels.size() - 1), 0});
+  while (!open.empty()) {
+    const open_row next = open.back();
+    open.pop_back();
+    const std::size_t children = next.level == 0 ? tree.leaves.size() : tree.levels[next.level - 1].size();
+    std::uint32_t mask = kernels.near_boxes(tree.levels[next.level][next.row], box, bound, distance.data());
+    for (; mask != 0; mask &= mask - 1) {
+      const std::size_t child = next.row * leaf_width + static_cast<std::size_t>(std::countr_zero(mask));
+      if (child >= children) break;  // where the bound is infinite
+      if (next.level != 0) {
+        open.push_back({next.level - 1, static_cast<std::uint32_t>(child)});
+        continue;
+      }
+      std::uint32_t within = kernels.distances(tree.leaves[child], q, bound, distance.data());
+      for (const std::size_t size = tree.size_of(child); within != 0; within &= within - 1) {
+        const auto n = static_cast<std::size_t>(std::countr_zero(within));
+        if (n < size && !f(tree.members[child * leaf_width + n], distance[n])) return;
+      }
+    }
+  }
+}
+
 /// Finds, for one point after another along the curve, the squared distances to its `wanted` nearest
 /// points, itself included.
 ///
@@ -95,30 +157,10 @@ class nearest_search {
   /// Calls `f(member, squared distance)` for every point within `bound` of the i-th of a leaf.
   template <class F>
   void visit_within(std::size_t l, std::size_t i, float bound, F&& f) {
-    const std::array<float, 3> q = query(l, i);
-    const box3 box{q, q};
-    std::array<float, leaf_width> distance;
-    pending_.clear();
-    pending_.push_back({0, static_cast<std::uint32_t>(tree_->levels.size() - 1), 0});
-    while (!pending_.empty()) {
-      const pending next = pending_.back();
-      pending_.pop_back();
-      const std::size_t children = next.level == 0 ? tree_->leaves.size() : tree_->levels[next.level - 1].size();
-      std::uint32_t mask = kernels_.near_boxes(tree_->levels[next.level][next.index], box, bound, distance.data());
-      for (; mask != 0; mask &= mask - 1) {
-        const std::size_t child = next.index * leaf_width + static_cast<std::size_t>(std::countr_zero(mask));
-        if (child >= children) break;  // where the bound is infinite
-        if (next.level != 0) {
-          pending_.push_back({0, next.level - 1, static_cast<std::uint32_t>(child)});
-          continue;
-        }
-        std::uint32_t within = kernels_.distances(tree_->leaves[child], q, bound, distance.data());
-        for (const std::size_t size = tree_->size_of(child); within != 0; within &= within - 1) {
-          const auto n = static_cast<std::size_t>(std::countr_zero(within));
-          if (n < size) f(tree_->members[child * leaf_width + n], distance[n]);
-        }
-      }
-    }
+    for_each_within(*tree_, kernels_, query(l, i), bound, open_, [&](std::uint32_t member, float d) {
+      f(member, d);
+      return true;
+    });
   }
 
  private:
@@ -172,29 +214,8 @@ class nearest_search {
     return kernels_.near_points(tree_->leaves.data(), near, q, bound, chosen_.data(), found, capacity_);
   }
 
-  /// Gathers the leaves within `bound` of a box; false if they are too many.
   [[nodiscard]] bool gather_near(const box3& box, float bound, nearby_leaves& near) {
-    near.count = 0;
-    pending_.clear();
-    pending_.push_back({0, static_cast<std::uint32_t>(tree_->levels.size() - 1), 0});
-    std::array<float, leaf_width> distance;
-    while (!pending_.empty()) {
-      const pending next = pending_.back();
-      pending_.pop_back();
-      const box_row& boxes = tree_->levels[next.level][next.index];
-      std::uint32_t mask = kernels_.near_boxes(boxes, box, bound, distance.data());
-      const auto child = static_cast<std::uint32_t>(next.index * leaf_width);
-      if (next.level == 0) {
-        if (!near.has_room()) return false;
-        kernels_.gather(boxes, mask, child, near);
-      } else {
-        for (; mask != 0; mask &= mask - 1) {
-          pending_.push_back({0, next.level - 1, child + static_cast<std::uint32_t>(std::countr_zero(mask))});
-        }
-      }
-    }
-    near.finish();
-    return true;
+    return gather_near_leaves(*tree_, kernels_, box, bound, open_, near);
   }
 
   /// The `wanted` nearest and perhaps some more; fewer where squared distances overflow.
@@ -274,6 +295,7 @@ class nearest_search {
   std::vector<std::uint32_t> chosen_;
   std::vector<float> found_;
   std::vector<pending> pending_;
+  std::vector<open_row> open_;
   float hoped_;       ///< what of `usual_` should suffice: its scatter falls with the number of neighbours
   float reach_;       ///< what of `usual_` should suffice in any case
   float usual_ = -1;  ///< squared distance to the `wanted`-th nearest; negative where not known yet

@@ -7,6 +7,7 @@
 #include <array>
 #include <bit>
 #include <cassert>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -36,7 +37,13 @@ class crowd_search {
  public:
   /// `enough`: with the point itself.
   crowd_search(const leaf_hierarchy& tree, const knn_kernels& kernels, float radius, std::size_t enough)
-      : tree_{&tree}, kernels_{kernels}, bound_{radius * radius}, enough_{enough} {}
+      : tree_{&tree}, kernels_{kernels}, bound_{radius * radius}, enough_{enough}, near_{most_leaves} {
+    // Enough are too many for this, which ends as soon as they are found.
+    if (std::isfinite(bound_) && enough <= most_found) {
+      chosen_.resize(near_.leaves.size() + leaf_width);
+      found_.resize(enough + 4 * leaf_width);
+    }
+  }
 
   /// Calls `f(i, has_enough)` for the points of one leaf.
   template <class F>
@@ -44,42 +51,40 @@ class crowd_search {
     const std::size_t size = tree_->size_of(l);
     const box_row& boxes = tree_->levels[0][l / leaf_width];
     const std::size_t place = l % leaf_width;
+    box3 box;
+    for (std::size_t a = 0; a != 3; ++a) {
+      box.low[a] = boxes.low[a][place];
+      box.high[a] = boxes.high[a][place];
+    }
     // No two points of a box are further apart than its corners, rounding included.
-    const bool all_near =
-        squared_distance<float>({boxes.low[0][place], boxes.low[1][place], boxes.low[2][place]},
-                                {boxes.high[0][place], boxes.high[1][place], boxes.high[2][place]}) <= bound_;
-    for (std::size_t i = 0; i != size; ++i)
-      f(i, (all_near && size >= enough_) || has_enough(l, i, all_near ? size : 0));
+    const bool all_near = squared_distance(box.low, box.high) <= bound_;
+    bool gathered = false;
+    bool usable = !found_.empty();
+    for (std::size_t i = 0; i != size; ++i) {
+      const point_row& leaf = tree_->leaves[l];
+      const std::array<float, 3> q{leaf.axis[0][i], leaf.axis[1][i], leaf.axis[2][i]};
+      bool has_enough = (all_near ? size : within(l, q)) >= enough_;
+      if (!has_enough && usable && !gathered) {
+        usable = gather_near_leaves(*tree_, kernels_, box, bound_, open_, near_);
+        gathered = usable;
+      }
+      if (!has_enough) has_enough = usable ? enough_near(q) : enough_anywhere(q);
+      f(i, has_enough);
+    }
   }
 
  private:
-  /// `own`: how many of its own leaf are known to be near; 0: not known.
-  [[nodiscard]] bool has_enough(std::size_t l, std::size_t i, std::size_t own) {
-    const point_row& leaf = tree_->leaves[l];
-    const std::array<float, 3> q{leaf.axis[0][i], leaf.axis[1][i], leaf.axis[2][i]};
-    std::size_t count = own != 0 ? own : within(l, q);
-    if (count >= enough_) return true;
-    const box3 box{q, q};
-    std::array<float, leaf_width> distance;
-    pending_.clear();
-    pending_.push_back({static_cast<std::uint32_t>(tree_->levels.size() - 1), 0});
-    while (!pending_.empty()) {
-      const node next = pending_.back();
-      pending_.pop_back();
-      const std::size_t children = next.level == 0 ? tree_->leaves.size() : tree_->levels[next.level - 1].size();
-      std::uint32_t mask = kernels_.near_boxes(tree_->levels[next.level][next.row], box, bound_, distance.data());
-      for (; mask != 0; mask &= mask - 1) {
-        const std::size_t child = next.row * leaf_width + static_cast<std::size_t>(std::countr_zero(mask));
-        if (child >= children) break;  // where the bound is infinite
-        if (next.level != 0) {
-          pending_.push_back({next.level - 1, static_cast<std::uint32_t>(child)});
-        } else if (child != l) {
-          count += within(child, q);
-          if (count >= enough_) return true;
-        }
-      }
-    }
-    return false;
+  static constexpr std::size_t most_leaves = 512;
+  static constexpr std::size_t most_found = 4096;
+
+  [[nodiscard]] bool enough_near(const std::array<float, 3>& q) {
+    return kernels_.near_points(tree_->leaves.data(), near_, q, bound_, chosen_.data(), found_.data(), enough_ - 1) >=
+           enough_;
+  }
+  [[nodiscard]] bool enough_anywhere(const std::array<float, 3>& q) {
+    std::size_t count = 0;
+    for_each_within(*tree_, kernels_, q, bound_, open_, [&](std::uint32_t, float) { return ++count < enough_; });
+    return count >= enough_;
   }
   [[nodiscard]] std::size_t within(std::size_t l, const std::array<float, 3>& q) const {
     std::array<float, leaf_width> distance;
@@ -88,15 +93,14 @@ class crowd_search {
     return static_cast<std::size_t>(std::popcount(mask & there));
   }
 
-  struct node {
-    std::uint32_t level;
-    std::uint32_t row;
-  };
   const leaf_hierarchy* tree_;
   knn_kernels kernels_;
   float bound_;
   std::size_t enough_;
-  std::vector<node> pending_;
+  nearby_leaves near_;
+  std::vector<open_row> open_;
+  std::vector<std::uint32_t> chosen_;
+  std::vector<float> found_;
 };
 
 /// `radius_inliers` with the inner loops for `level`.
