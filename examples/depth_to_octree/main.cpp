@@ -16,12 +16,12 @@ int complain(int code, const std::string& why) {
   return code;
 }
 
-orbis::result<orbis::camera::camera_settings> camera_named(const std::string& name, int width, int height) {
-  if (name.find(',') == std::string::npos) return orbis::io::read_camera(name);
+orbis::result<orbis::camera::camera_settings> camera_named(const std::string& s, int width, int height) {
+  if (s.find(',') == s.npos) return orbis::camera::preset(s).or_else([&](auto) { return orbis::io::read_camera(s); });
   orbis::camera::intrinsics k{width, height, 0, 0, 0, 0};
   char rest = 0;
-  if (std::sscanf(name.c_str(), "%lf,%lf,%lf,%lf%c", &k.fx, &k.fy, &k.cx, &k.cy, &rest) != 4 || !is_valid(k))
-    return orbis::fail(orbis::errc::invalid_argument, "--camera", "\"" + name + "\" is not fx,fy,cx,cy in pixels");
+  if (std::sscanf(s.c_str(), "%lf,%lf,%lf,%lf%c", &k.fx, &k.fy, &k.cx, &k.cy, &rest) != 4 || !is_valid(k))
+    return orbis::fail(orbis::errc::invalid_argument, "--camera", "\"" + s + "\" is not fx,fy,cx,cy in pixels");
   return orbis::camera::camera_settings{.model = orbis::camera::pinhole{k}};
 }
 
@@ -33,7 +33,7 @@ int main(int argc, char** argv) {
   cli.add_option("DEPTH", input, "16-bit grey PNG")->required();
   cli.add_option("MAP", output, "the .bt file to write")->required();
   cli.add_option("--pose", p, "tx ty tz qx qy qz qw, camera to world")->expected(7)->capture_default_str();
-  cli.add_option("--camera", camera_name, "camera.toml, or fx,fy,cx,cy in pixels")->capture_default_str();
+  cli.add_option("--camera", camera_name, "camera.toml, tum_fr1 ..., or fx,fy,cx,cy")->capture_default_str();
   cli.add_option("--scale", scale, "stored depth / scale = metres; default: the camera file's, or 1000");
   cli.add_option("--resolution", resolution, "edge of a voxel, metres")->capture_default_str();
   try {
@@ -53,7 +53,7 @@ int main(int argc, char** argv) {
     return complain(2, camera_name + ": the camera's images have another size than " + input);
   orbis::octree::occupancy_octree<> map{resolution};
   const orbis::camera::depth_view metres{*depth, scale > 0.0 ? scale : camera->depth_scale};
-  map.integrate(metres, camera->model, orbis::se3{orbis::so3{q}, orbis::vec3{p.data()}});
-  const auto done = write_bt(map, output);
-  return done ? 0 : complain(2, done.error().to_string());
+  const auto scan = map.integrate(metres, camera->model, orbis::se3{orbis::so3{q}, orbis::vec3{p.data()}});
+  if (scan.used == 0) return complain(2, input + ": no depth in it lies in the map");
+  if (const auto done = write_bt(map, output); !done) return complain(2, done.error().to_string());
 }

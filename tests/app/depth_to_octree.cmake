@@ -45,6 +45,13 @@ file(WRITE ${WORK}/other.toml "model = \"pinhole\"\nwidth = 640\nheight = 480\nf
 fails(2 "other.toml: .*size" ${depth} no.bt --camera other.toml)
 fails(2 "no/such/folder" ${depth} no/such/folder/map.bt)
 
+file(WRITE ${WORK}/misspelt.toml "model = \"pinhole\"\nwidth = 320\nheight = 240\nfx = 262.5\nfy = 262.5\ncx = 159.5\ncy = 119.5\ndepth_skale = 5000\n")
+fails(2 "misspelt.toml: depth_skale is not a setting" ${depth} no.bt --camera misspelt.toml)
+fails(2 "tum_fr1: .*size" ${depth} no.bt --camera tum_fr1)  # known, but of 640 x 480
+fails(2 "nikon: no such file" ${depth} no.bt --camera nikon)
+# Nothing of it ends up in the map: too far away to have a key.
+fails(2 "000000.png: no depth" ${depth} no.bt --pose 0 0 90000 0 0 0 1)
+
 # The same camera, as a file and as numbers.
 app(0 ${depth} map.bt --camera room/camera.toml --pose 1 2 0.5 0 0 0 1)
 app(0 ${depth} again.bt --camera 262.5,262.5,159.5,119.5 --scale 5000 --pose 1 2 0.5 0 0 0 2)

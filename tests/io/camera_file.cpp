@@ -60,6 +60,13 @@ TEST_CASE("what may be left out of a camera file has its default") {
   CHECK_FALSE(settings.baseline.has_value());
 }
 
+TEST_CASE("a key that is no setting of a camera is named, lest a misspelt one gets its default") {
+  CHECK(message(camera_text() + "depth_scal = 1000.0\n")
+            .starts_with("camera.toml: depth_scal is not a setting of a camera; those are model, width, "));
+  CHECK(message(camera_text() + "[left]\nfx = 1.0\n").starts_with("camera.toml: left is not a setting"));
+  CHECK(message(camera_text("fx") + "f_x = 1.0\n") == "camera.toml: fx is missing");  // the first that is wrong
+}
+
 TEST_CASE("a bad field of a camera file is named") {
   CHECK(message(camera_text("fx", "-1.0")) == "camera.toml: fx must be a number above zero");
   for (const char* field : {"fx", "fy", "depth_scale", "fps", "baseline"})

@@ -23,6 +23,7 @@
 #include <cmath>
 #include <cstddef>
 #include <filesystem>
+#include <initializer_list>
 #include <optional>
 #include <ostream>
 #include <string>
@@ -92,6 +93,15 @@ class camera_fields {
     }
     return values;
   }
+  /// Rejects a key that is none of `known`: a setting that was meant and misspelt must not get its default.
+  void accept_only(std::initializer_list<std::string_view> known) {
+    for (const auto& [key, value] : table_) {
+      if (std::find(known.begin(), known.end(), key.str()) != known.end()) continue;
+      std::string names;
+      for (const std::string_view name : known) names += (names.empty() ? "" : ", ") + std::string{name};
+      reject(std::string{key.str()}.c_str(), "is not a setting of a camera; those are " + names);
+    }
+  }
   void reject(const char* name, const std::string& why) {
     if (!failure_) failure_ = error{errc::malformed, where_, std::string{name} + " " + why};
   }
@@ -107,7 +117,8 @@ class camera_fields {
 
 /// The camera that `text` in TOML describes. `where` names the source in errors.
 /// Errors: malformed, naming the field (missing, of the wrong type, NaN, out of range, a distortion
-/// list of a length the model does not have); unsupported (a model we do not know).
+/// list of a length the model does not have, a key that is no setting); unsupported (a model we do not
+/// know).
 [[nodiscard]] inline result<camera::camera_settings> parse_camera(std::string_view text,
                                                                   const std::filesystem::path& where = {}) {
   toml::table table;
@@ -129,6 +140,8 @@ class camera_fields {
   const std::vector<double> d = fields.numbers("distortion");
   camera::camera_settings settings{
       .model = {}, .depth_scale = fields.positive("depth_scale", 1000.0), .fps = fields.positive("fps", 30.0)};
+  fields.accept_only(
+      {"model", "width", "height", "fx", "fy", "cx", "cy", "distortion", "depth_scale", "fps", "baseline"});
   if (table.contains("baseline")) settings.baseline = fields.positive("baseline");
   if (fields.failure()) return fail(*fields.failure());
 
