@@ -6,6 +6,7 @@
 #include <orbis/io/bytes.hpp>
 #include <orbis/io/camera_file.hpp>
 #include <orbis/io/cloud_file.hpp>
+#include <orbis/io/g2o.hpp>
 #include <orbis/io/icl_nuim.hpp>
 #include <orbis/io/image.hpp>
 #include <orbis/io/jpeg.hpp>

@@ -12,6 +12,7 @@
 #include <orbis/io/synthetic/arithmetic.hpp>
 #include <orbis/io/synthetic/canvas.hpp>
 #include <orbis/io/synthetic/path.hpp>
+#include <orbis/io/synthetic/pose_graph.hpp>
 #include <orbis/io/synthetic/recording.hpp>
 #include <orbis/io/synthetic/renderer.hpp>
 #include <orbis/io/synthetic/scene.hpp>

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// What the tests of pose graphs share.
+#pragma once
+
+#include <algorithm>
+#include <cstring>
+#include <span>
+#include <vector>
+
+#include <orbis/core/execution.hpp>
+#include <orbis/core/se3.hpp>
+#include <orbis/io/synthetic/pose_graph.hpp>
+#include <orbis/optimize/pose_graph.hpp>
+
+namespace orbis::test {
+
+/// A few hundred poses of each shape; odometry goes astray, but not beyond recovery.
+inline std::vector<io::synthetic_graph> small_graphs(double noise = 1.0) {
+  std::vector<io::synthetic_graph> graphs;
+  const auto add = [&](io::graph_shape shape, int poses, int turns) {
+    graphs.push_back(io::make_pose_graph({.shape = shape,
+                                          .poses_per_turn = poses,
+                                          .turns = turns,
+                                          .radius = 10.0,
+                                          .translation_sigma = 0.05 * noise,
+                                          .rotation_sigma = 0.02 * noise,
+                                          .closure_probability = 0.8,
+                                          .seed = 17}));
+  };
+  add(io::graph_shape::sphere, 20, 15);
+  add(io::graph_shape::torus, 16, 20);
+  add(io::graph_shape::grid, 7, 0);
+  return graphs;
+}
+
+template <class Damping = optimize::levenberg_marquardt, class Loss = optimize::trivial, class Policy, class Edges>
+optimize::pose_graph_summary solve(const Policy& policy, std::vector<se3>& vertices, const Edges& edges,
+                                   const optimize::pose_graph_options& options = {}, Loss loss = {},
+                                   Damping damping = {}) {
+  return optimize::solve_pose_graph(policy, vertices, edges, options, {}, loss, damping);
+}
+
+/// Root mean square of the distances between the poses' positions.
+inline double position_error(const std::vector<se3>& a, const std::vector<se3>& b) {
+  double sum = 0.0;
+  for (std::size_t i = 0; i != a.size(); ++i) sum += (a[i].translation() - b[i].translation()).squaredNorm();
+  return std::sqrt(sum / static_cast<double>(a.size()));
+}
+
+inline bool same_bits(const std::vector<se3>& a, const std::vector<se3>& b) {
+  const auto equal = [](const se3& p, const se3& q) {
+    return p.translation() == q.translation() &&
+           p.rotation().unit_quaternion().coeffs() == q.rotation().unit_quaternion().coeffs();
+  };
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(), equal);
+}
+
+}  // namespace orbis::test
