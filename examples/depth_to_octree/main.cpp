@@ -17,7 +17,7 @@ int complain(int code, const std::string& why) {
 }
 
 orbis::result<orbis::camera::camera_settings> camera_named(const std::string& s, int width, int height) {
-  if (s.find(',') == s.npos) return orbis::camera::preset(s).or_else([&](auto) { return orbis::io::read_camera(s); });
+  if (s.find(',') == s.npos) return orbis::camera::preset(s) ? orbis::camera::preset(s) : orbis::io::read_camera(s);
   orbis::camera::intrinsics k{width, height, 0, 0, 0, 0};
   char rest = 0;
   if (std::sscanf(s.c_str(), "%lf,%lf,%lf,%lf%c", &k.fx, &k.fy, &k.cx, &k.cy, &rest) != 4 || !is_valid(k))
