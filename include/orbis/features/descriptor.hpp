@@ -35,13 +35,15 @@ struct keypoint {
 };
 
 /// What an extractor finds: `descriptors[i]` describes `keypoints[i]`.
-struct features {
+template <class Descriptor>
+struct basic_features {
   std::vector<keypoint> keypoints;
-  std::vector<binary_descriptor<256>> descriptors;
+  std::vector<Descriptor> descriptors;
 
   [[nodiscard]] std::size_t size() const noexcept { return keypoints.size(); }
   [[nodiscard]] bool empty() const noexcept { return keypoints.empty(); }
-  friend bool operator==(const features&, const features&) = default;
+  friend bool operator==(const basic_features&, const basic_features&) = default;
 };
+using features = basic_features<binary_descriptor<256>>;
 
 }  // namespace orbis::features

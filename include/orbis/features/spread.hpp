@@ -7,80 +7,135 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
-#include <tuple>
+#include <span>
 #include <utility>
 #include <vector>
 
-#include <orbis/core/image.hpp>
+#include <orbis/features/corner.hpp>
 
 namespace orbis::features {
 
-/// A corner of one pyramid level: integer pixel and strength.
-struct corner {
-  int x = 0;
-  int y = 0;
-  float response = 0.0F;
-  friend constexpr bool operator==(const corner&, const corner&) = default;
-};
+namespace detail {
 
-/// At most `wanted` of the corners of a `width` x `height` image, evenly spread: the image is cut into
-/// about `wanted` square cells; first every cell gives its strongest corner, then every cell its
-/// second, and so on, stronger ones first within a round. Corners weaker than `strong` are taken in
-/// the first round, where they help because there is nothing else, or when no strong ones are left.
-/// Sorted by row, then column.
-/// O(n log n); the order of the input does not matter.
-[[nodiscard]] inline std::vector<corner> spread(std::vector<corner> corners, int wanted, int width, int height,
-                                                float strong) {
-  if (wanted <= 0 || corners.empty()) return {};
-  const double side = std::max(1.0, std::sqrt(static_cast<double>(width) * height / wanted));
-  const int columns = std::max(1, static_cast<int>(std::lround(width / side)));
-  const int rows = std::max(1, static_cast<int>(std::lround(height / side)));
-
-  constexpr std::uint32_t no_corner = std::numeric_limits<std::uint32_t>::max();
-  struct ranked {
-    corner c;
-    int cell;
-    int rank;
-  };
-  const auto stronger = [](const ranked& a, const ranked& b) {
-    return std::tuple(-a.c.response, a.c.y, a.c.x) < std::tuple(-b.c.response, b.c.y, b.c.x);
-  };
-  std::vector<ranked> all;
-  all.reserve(corners.size());
-  for (const corner& c : corners) {
-    const auto part = [](int at, int size, int parts) {
-      return std::clamp(static_cast<int>(static_cast<std::int64_t>(at) * parts / std::max(1, size)), 0, parts - 1);
-    };
-    all.push_back({c, part(c.y, height, rows) * columns + part(c.x, width, columns), 0});
+/// How many features each level gives: proportional to the side of its image. What a coarse level
+/// cannot give goes to the finer ones; what is left then, to any that has more.
+inline void share_out(std::span<const level_corners> levels, int wanted, std::vector<int>& quotas) {
+  quotas.resize(levels.size());
+  double sides = 0.0;
+  for (const level_corners& level : levels) sides += 1.0 / level.scale;
+  int left = wanted;
+  for (std::size_t i = levels.size(); i-- != 0;) {
+    const double share = 1.0 / levels[i].scale / sides;
+    const int most = static_cast<int>(levels[i].corners.size());
+    quotas[i] = i == 0 ? std::min(most, left) : std::min(most, static_cast<int>(std::lround(left * share)));
+    left -= quotas[i];
+    sides -= 1.0 / levels[i].scale;
   }
-  // Most corners are weak ones that will not be needed: leave them out before anything is sorted.
-  std::vector<std::uint32_t> first(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows), no_corner);
-  for (std::uint32_t i = 0; i != all.size(); ++i) {
-    std::uint32_t& best = first[static_cast<std::size_t>(all[i].cell)];
-    if (best == no_corner || stronger(all[i], all[best])) best = i;
+  for (std::size_t i = 0; i != levels.size(); ++i) {
+    const int more = std::min(left, static_cast<int>(levels[i].corners.size()) - quotas[i]);
+    quotas[i] += more;
+    left -= more;
   }
-  std::vector<ranked> hopeful;
-  for (std::uint32_t i = 0; i != all.size(); ++i)
-    if (all[i].c.response >= strong || first[static_cast<std::size_t>(all[i].cell)] == i) hopeful.push_back(all[i]);
-  if (hopeful.size() >= static_cast<std::size_t>(wanted)) all = std::move(hopeful);
-
-  std::sort(all.begin(), all.end(),
-            [&](const ranked& a, const ranked& b) { return a.cell != b.cell ? a.cell < b.cell : stronger(a, b); });
-  for (std::size_t i = 1; i < all.size(); ++i) all[i].rank = all[i].cell == all[i - 1].cell ? all[i - 1].rank + 1 : 0;
-  const std::size_t count = std::min(all.size(), static_cast<std::size_t>(wanted));
-  std::partial_sort(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(count), all.end(),
-                    [&](const ranked& a, const ranked& b) {
-                      const auto weak = [&](const ranked& r) { return r.rank > 0 && r.c.response < strong; };
-                      const auto turn = [&](const ranked& r) { return std::pair(weak(r), r.rank); };
-                      return turn(a) != turn(b) ? turn(a) < turn(b) : stronger(a, b);
-                    });
-  std::vector<corner> chosen;
-  chosen.reserve(count);
-  for (std::size_t i = 0; i != count; ++i) chosen.push_back(all[i].c);
-  std::sort(chosen.begin(), chosen.end(),
-            [](const corner& a, const corner& b) { return std::tuple(a.y, a.x) < std::tuple(b.y, b.x); });
-  return chosen;
 }
+
+/// Leaves the `wanted` strongest.
+inline void keep_strongest(std::vector<corner>& corners, int wanted) {
+  const auto count = std::min(corners.size(), static_cast<std::size_t>(std::max(0, wanted)));
+  std::nth_element(corners.begin(), corners.begin() + static_cast<std::ptrdiff_t>(count), corners.end(), stronger);
+  corners.resize(count);
+  std::sort(corners.begin(), corners.end(), before_in_image);
+}
+
+}  // namespace detail
+
+/// Cuts the area into about `wanted / per_cell` square cells. First every cell gives its strongest corner, then
+/// every cell its second, and so on; the last round takes the strongest. O(n log n), in most images O(n).
+struct even_cells {
+  double per_cell = 1.0;
+
+  struct workspace {
+    std::vector<int> quotas;
+    std::vector<std::uint32_t> first;  ///< of each cell, in `sorted`
+    std::vector<std::uint32_t> cell;   ///< of each corner
+    std::vector<corner> sorted;
+    std::vector<std::uint32_t> in_round;
+    std::vector<corner> last;
+  };
+
+  /// @pre per_cell > 0
+  void operator()(std::span<level_corners> levels, int wanted, workspace& memory) const {
+    detail::share_out(levels, wanted, memory.quotas);
+    for (std::size_t i = 0; i != levels.size(); ++i)
+      choose(levels[i].corners, memory.quotas[i], levels[i].area, memory);
+  }
+
+ private:
+  void choose(std::vector<corner>& corners, int wanted, const region& area, workspace& memory) const {
+    if (wanted <= 0) return corners.clear();
+    if (corners.size() <= static_cast<std::size_t>(wanted)) {
+      std::sort(corners.begin(), corners.end(), before_in_image);
+      return;
+    }
+    const double side = std::sqrt(per_cell * area.width * area.height / wanted);
+    const int columns = std::max(1, static_cast<int>(std::lround(area.width / side)));
+    const int rows = std::max(1, static_cast<int>(std::lround(area.height / side)));
+    sort_into_cells(corners, area, columns, rows, memory);
+
+    // How many corners the first, second, ... of their cells there are.
+    memory.in_round.clear();
+    const std::size_t cells = memory.first.size() - 1;
+    for (std::size_t c = 0; c != cells; ++c) {
+      const std::uint32_t count = memory.first[c + 1] - memory.first[c];
+      std::sort(memory.sorted.begin() + memory.first[c], memory.sorted.begin() + memory.first[c + 1], stronger);
+      if (count > memory.in_round.size()) memory.in_round.resize(count, 0);
+      for (std::uint32_t i = 0; i != count; ++i) ++memory.in_round[i];
+    }
+    std::uint32_t whole_rounds = 0;
+    auto left = static_cast<std::size_t>(wanted);
+    while (memory.in_round[whole_rounds] <= left) left -= memory.in_round[whole_rounds++];
+
+    corners.clear();
+    memory.last.clear();
+    for (std::size_t c = 0; c != cells; ++c)
+      for (std::uint32_t i = memory.first[c]; i != memory.first[c + 1] && i - memory.first[c] <= whole_rounds; ++i)
+        (i - memory.first[c] < whole_rounds ? corners : memory.last).push_back(memory.sorted[i]);
+    const auto cut = memory.last.begin() + static_cast<std::ptrdiff_t>(left);
+    std::nth_element(memory.last.begin(), cut, memory.last.end(), stronger);
+    corners.insert(corners.end(), memory.last.begin(), cut);
+    std::sort(corners.begin(), corners.end(), before_in_image);
+  }
+
+  static void sort_into_cells(const std::vector<corner>& corners, const region& area, int columns, int rows,
+                              workspace& memory) {
+    const auto part = [](int at, int size, int parts) {
+      return static_cast<std::uint32_t>(static_cast<std::uint64_t>(at) * static_cast<std::uint64_t>(parts) /
+                                        static_cast<std::uint64_t>(size));
+    };
+    memory.first.assign(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows) + 2, 0);
+    memory.cell.clear();
+    for (const corner& c : corners) {
+      memory.cell.push_back(part(c.y - area.y, area.height, rows) * static_cast<std::uint32_t>(columns) +
+                            part(c.x - area.x, area.width, columns));
+      ++memory.first[memory.cell.back() + 2];
+    }
+    for (std::size_t c = 2; c != memory.first.size(); ++c) memory.first[c] += memory.first[c - 1];
+    memory.sorted.resize(corners.size());
+    for (std::size_t i = 0; i != corners.size(); ++i) memory.sorted[memory.first[memory.cell[i] + 1]++] = corners[i];
+    memory.first.pop_back();
+  }
+};
+static_assert(corner_distribution<even_cells>);
+
+/// The strongest ones of each level, wherever they are: no spread at all. O(n).
+struct strongest {
+  struct workspace {
+    std::vector<int> quotas;
+  };
+  void operator()(std::span<level_corners> levels, int wanted, workspace& memory) const {
+    detail::share_out(levels, wanted, memory.quotas);
+    for (std::size_t i = 0; i != levels.size(); ++i) detail::keep_strongest(levels[i].corners, memory.quotas[i]);
+  }
+};
+static_assert(corner_distribution<strongest>);
 
 }  // namespace orbis::features

@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// 8-bit grey images of other ones.
+#pragma once
+
+#include <algorithm>
+#include <cassert>
+#include <cstddef>
+#include <cstdint>
+
+#include <orbis/core/image.hpp>
+#include <orbis/core/simd.hpp>
+
+#if ORBIS_X86
+#include <immintrin.h>
+#endif
+
+namespace orbis::features {
+
+namespace detail {
+
+/// Rec. 601 luma, in 1/32768.
+inline constexpr int luma_red = 9798, luma_green = 19235, luma_blue = 3735;
+
+using luma_row = void(const rgb8* from, int count, std::uint8_t* to);
+
+inline void luma_row_portable(const rgb8* from, int count, std::uint8_t* to) {
+  for (int x = 0; x < count; ++x)
+    to[x] = static_cast<std::uint8_t>(
+        (from[x].r * luma_red + from[x].g * luma_green + from[x].b * luma_blue + (1 << 14)) >> 15);
+}
+
+#if ORBIS_X86
+ORBIS_TARGET("avx2")
+inline void luma_row_avx2(const rgb8* from, int count, std::uint8_t* to) {
+  const auto* bytes = reinterpret_cast<const std::uint8_t*>(from);
+  constexpr char o = -128;  // zero
+  const __m256i red_green = _mm256_broadcastsi128_si256(_mm_setr_epi8(0, o, 1, o, 3, o, 4, o, 6, o, 7, o, 9, o, 10, o));
+  const __m256i blue = _mm256_broadcastsi128_si256(_mm_setr_epi8(2, o, o, o, 5, o, o, o, 8, o, o, o, 11, o, o, o));
+  const __m256i red_green_weights = _mm256_set1_epi32(luma_red | luma_green << 16);
+  const __m256i blue_weight = _mm256_set1_epi32(luma_blue), half = _mm256_set1_epi32(1 << 14);
+  // Eight pixels; reads four bytes beyond them.
+  const auto eight = [&](const std::uint8_t* p) ORBIS_TARGET("avx2") {
+    const __m256i v =
+        _mm256_inserti128_si256(_mm256_castsi128_si256(_mm_loadu_si128(reinterpret_cast<const __m128i*>(p))),
+                                _mm_loadu_si128(reinterpret_cast<const __m128i*>(p + 12)), 1);
+    const __m256i rg = _mm256_madd_epi16(_mm256_shuffle_epi8(v, red_green), red_green_weights);
+    const __m256i b = _mm256_madd_epi16(_mm256_shuffle_epi8(v, blue), blue_weight);
+    return _mm256_srli_epi32(_mm256_add_epi32(_mm256_add_epi32(rg, b), half), 15);
+  };
+  const __m256i in_order = _mm256_setr_epi32(0, 4, 1, 5, 2, 6, 3, 7);
+  int x = 0;
+  for (; x <= count - 34; x += 32) {
+    const std::uint8_t* p = bytes + 3 * static_cast<std::ptrdiff_t>(x);
+    const __m256i words = _mm256_packus_epi16(_mm256_packus_epi32(eight(p), eight(p + 24)),
+                                              _mm256_packus_epi32(eight(p + 48), eight(p + 72)));
+    _mm256_storeu_si256(reinterpret_cast<__m256i*>(to + x), _mm256_permutevar8x32_epi32(words, in_order));
+  }
+  luma_row_portable(from + x, count - x, to + x);
+}
+#endif
+
+}  // namespace detail
+
+/// The luma (Rec. 601, to the nearest) of a colour image: the same bits as OpenCV's COLOR_RGB2GRAY.
+/// @pre the images have one size
+inline void luma(simd::level level, image_view<const rgb8> from, image_view<std::uint8_t> to) {
+  assert(from.width() == to.width() && from.height() == to.height());
+#if ORBIS_X86
+  const auto row =
+      simd::select<detail::luma_row>(level, {.portable = detail::luma_row_portable, .avx2 = detail::luma_row_avx2});
+#else
+  (void)level;
+  const auto row = detail::luma_row_portable;
+#endif
+  for (int y = 0; y < from.height(); ++y) row(from.row(y).data(), from.width(), to.row(y).data());
+}
+
+/// A 16-bit image (infrared, thermal, raw) as 8 bits: `low` and what is below becomes 0, `high` and what is
+/// above 255, linear and rounded between. Which values hold the scene only the caller knows; keep
+/// the two fixed over a recording, or brightness will flicker.
+/// @pre low < high; the images have one size
+inline void narrow(image_view<const std::uint16_t> from, image_view<std::uint8_t> to, std::uint16_t low,
+                   std::uint16_t high) {
+  assert(low < high && from.width() == to.width() && from.height() == to.height());
+  const std::uint32_t range = std::uint32_t{high} - low;
+  for (int y = 0; y < from.height(); ++y)
+    for (int x = 0; x < from.width(); ++x) {
+      const std::uint32_t above = std::uint32_t{std::clamp(from(x, y), low, high)} - low;
+      to(x, y) = static_cast<std::uint8_t>((above * 255 + range / 2) / range);
+    }
+}
+
+}  // namespace orbis::features

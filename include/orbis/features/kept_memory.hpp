@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Memory that is used again by the next call.
+#pragma once
+
+#include <memory>
+#include <mutex>
+#include <utility>
+#include <vector>
+
+namespace orbis::features {
+
+/// A stock of workspaces: a call takes one and gives it back, so that calls that run at the same time have one
+/// each and calls that follow each other share one. What is not given back (after an exception) is
+/// freed. Copies begin empty.
+template <class Workspace>
+class kept_memory {
+ public:
+  kept_memory() = default;
+  kept_memory(const kept_memory&) noexcept : kept_memory{} {}
+  kept_memory& operator=(const kept_memory&) noexcept { return *this; }
+  ~kept_memory() = default;
+
+  [[nodiscard]] std::unique_ptr<Workspace> take() {
+    {
+      const std::lock_guard lock{mutex_};
+      if (!stock_.empty()) {
+        auto last = std::move(stock_.back());
+        stock_.pop_back();
+        return last;
+      }
+    }
+    return std::make_unique<Workspace>();
+  }
+  void give(std::unique_ptr<Workspace> workspace) {
+    const std::lock_guard lock{mutex_};
+    stock_.push_back(std::move(workspace));
+  }
+
+ private:
+  std::mutex mutex_;
+  std::vector<std::unique_ptr<Workspace>> stock_;
+};
+
+}  // namespace orbis::features
