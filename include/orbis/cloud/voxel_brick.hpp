@@ -79,9 +79,10 @@ class voxel_brick {
       for (const voxel_item& item : items) mask[item.cell / 64] |= std::uint64_t{1} << (item.cell % 64);
     });
     if (mask != mask_) widen(mask);
+    const rank_table ranks = all_ranks();
     for_each_run([&](std::span<const voxel_item> items) {
       for (const voxel_item& item : items) {
-        voxel_sum& sum = sums_[rank(item.cell)];
+        voxel_sum& sum = sums_[ranks[item.cell]];
         assert(sum.count < most);
         sum.add(item);
       }
@@ -90,12 +91,13 @@ class voxel_brick {
   template <class Runs>
   void remove(Runs&& for_each_run) {
     bool emptied = false;
+    const rank_table ranks = all_ranks();
     for_each_run([&](std::span<const voxel_item> items) {
       for (const voxel_item& item : items) {
-        const bool known = contains(item.cell) && sums_[rank(item.cell)].count != 0;
+        const bool known = contains(item.cell) && sums_[ranks[item.cell]].count != 0;
         assert(known && "removed without having been added");
         if (!known) continue;
-        voxel_sum& sum = sums_[rank(item.cell)];
+        voxel_sum& sum = sums_[ranks[item.cell]];
         sum.remove(item);
         emptied = emptied || sum.count == 0;
       }
@@ -114,6 +116,15 @@ class voxel_brick {
   using cell_mask = std::array<std::uint64_t, 8>;
   static constexpr std::uint32_t most = 1U << 22U;
   static constexpr std::size_t slack = 16;
+
+  /// The ranks of the occupied cells; the other entries mean nothing. Counting bits measurement by
+  /// measurement is slow on processors without an instruction for it.
+  using rank_table = std::array<std::uint16_t, 512>;
+  [[nodiscard]] rank_table all_ranks() const {
+    rank_table out;  // NOLINT: not all of it is needed
+    for_each_cell(mask_, [&, i = std::uint16_t{0}](std::uint32_t cell) mutable { out[cell] = i++; });
+    return out;
+  }
 
   template <class F>
   static void for_each_cell(const cell_mask& mask, F&& f) {

@@ -35,26 +35,31 @@ namespace orbis::cloud {
 namespace detail {
 
 /// A place in a grid of bricks.
-struct brick_cell {
-  voxel_key brick{};
-  std::uint32_t cell = 0;
-  vec3 within{};  ///< the voxel, of its edge
+struct brick_place {
+  voxel_key brick;
+  std::uint16_t cell;                   ///< x + 8 y + 64 z
+  std::array<std::uint16_t, 3> offset;  ///< within the voxel, of 1024
 };
 
-/// Where a point lies; empty where it is not finite or more than 2^31 voxels from the origin.
-[[nodiscard]] inline std::optional<brick_cell> brick_cell_of(const vec3& point, double per_metre) noexcept {
-  brick_cell out;
+/// Where a point lies, in one conversion to fixed point; false where it is not finite or more than 2^31
+/// voxels from the origin. `steps_per_metre`: 1024 for each voxel.
+[[nodiscard]] inline bool locate(const vec3& point, double steps_per_metre, brick_place& out) noexcept {
+  std::array<double, 3> scaled;
+  for (std::size_t a = 0; a != 3; ++a)
+    scaled[a] = rounded_product(point[static_cast<Eigen::Index>(a)], steps_per_metre);
+  constexpr double end = 0x1p31 * 1024 - 1024;
+  if (!(std::abs(scaled[0]) < end && std::abs(scaled[1]) < end && std::abs(scaled[2]) < end)) return false;
+  std::uint32_t cell = 0;
   for (std::size_t a = 0; a != 3; ++a) {
-    const auto axis = static_cast<Eigen::Index>(a);
-    const double scaled = rounded_product(point[axis], per_metre);
-    const double whole = std::floor(scaled);
-    if (!(std::abs(whole) < 2147483647.0)) return std::nullopt;
-    const auto voxel = static_cast<std::int32_t>(whole);
-    out.brick[a] = voxel >> 3;
-    out.cell |= static_cast<std::uint32_t>(voxel & 7) << (3 * a);
-    out.within[axis] = scaled - whole;
+    const auto toward_zero = static_cast<std::int64_t>(scaled[a]);
+    // std::floor is a call without SSE4.
+    const std::int64_t step = toward_zero - (scaled[a] < static_cast<double>(toward_zero) ? 1 : 0);
+    out.brick[a] = static_cast<std::int32_t>(step >> 13);
+    out.offset[a] = static_cast<std::uint16_t>(step & 1023);
+    cell |= static_cast<std::uint32_t>(step >> 10 & 7) << (3 * a);
   }
-  return out;
+  out.cell = static_cast<std::uint16_t>(cell);
+  return true;
 }
 
 }  // namespace detail
@@ -64,7 +69,7 @@ struct brick_cell {
 class voxel_measurements {
  public:
   /// @pre size > 0, metres
-  explicit voxel_measurements(double size) : per_metre_{1.0 / size} { assert(size > 0); }
+  explicit voxel_measurements(double size) : steps_per_metre_{1024.0 / size} { assert(size > 0); }
 
   void clear() {
     items_.clear();
@@ -75,21 +80,21 @@ class voxel_measurements {
   /// Those that are not finite, and those more than 2^31 voxels from the origin, have no voxel and are
   /// only counted.
   void push(const vec3& point, const rgb8& color, float range) {
-    const auto at = detail::brick_cell_of(point, per_metre_);
-    if (!at) {
+    detail::brick_place at;
+    if (!detail::locate(point, steps_per_metre_, at)) {
       ++without_voxel_;
       return;
     }
-    detail::voxel_item item{static_cast<std::uint16_t>(at->cell), {}, color, 0};
-    for (std::size_t a = 0; a != 3; ++a)
-      item.offset[a] = static_cast<std::uint16_t>(1024.0 * at->within[static_cast<Eigen::Index>(a)]);
     constexpr float longest = 4e6F;  // metres; what fits, and more than any sensor reaches
-    item.range = range > 0 ? static_cast<std::uint32_t>(1000.0F * std::min(range, longest) + 0.5F) : 0;
-    if (runs_.empty() || runs_.back().brick != at->brick) {
-      runs_.push_back({at->brick, static_cast<std::uint32_t>(items_.size()), 0, 0});
+    const auto millimetres =
+        range > 0 ? static_cast<std::uint32_t>(static_cast<std::int64_t>(1000.0F * std::min(range, longest) + 0.5F))
+                  : 0;
+    const auto differs = [&](std::size_t a) { return last_[a] ^ at.brick[a]; };
+    if ((differs(0) | differs(1) | differs(2)) != 0 || items_.empty()) {
+      runs_.push_back({at.brick, static_cast<std::uint32_t>(items_.size())});
+      last_ = at.brick;
     }
-    items_.push_back(item);
-    runs_.back().end = static_cast<std::uint32_t>(items_.size());
+    items_.push_back({at.cell, at.offset, color, millimetres});
   }
   /// How many have a voxel.
   [[nodiscard]] std::size_t size() const noexcept { return items_.size(); }
@@ -102,12 +107,12 @@ class voxel_measurements {
   friend class voxel_sums;
   struct run {
     voxel_key brick;
-    std::uint32_t begin, end;
-    std::uint32_t next;  ///< of the same brick, in a list over all parts
+    std::uint32_t begin;  ///< to where the next one begins
   };
-  double per_metre_;
+  double steps_per_metre_;
   std::vector<detail::voxel_item> items_;
   std::vector<run> runs_;
+  voxel_key last_{};  ///< of the last run
   std::size_t without_voxel_ = 0;
 };
 
@@ -152,11 +157,11 @@ class voxel_sums {
    public:
     /// The place of the voxel a point (metres, in the world) lies in; empty where nothing is.
     [[nodiscard]] std::optional<std::size_t> find(const vec3& point) const {
-      const auto at = detail::brick_cell_of(point, 1.0 / sums_->size_);
-      if (!at) return std::nullopt;
-      const auto number = sums_->index_.find(at->brick, sums_->key_of());
-      if (!number || !sums_->bricks_[*number].voxels.contains(at->cell)) return std::nullopt;
-      return first_[*number] + sums_->bricks_[*number].voxels.rank(at->cell);
+      detail::brick_place at;
+      if (!detail::locate(point, 1024.0 / sums_->size_, at)) return std::nullopt;
+      const auto number = sums_->index_.find(at.brick, sums_->key_of());
+      if (!number || !sums_->bricks_[*number].voxels.contains(at.cell)) return std::nullopt;
+      return first_[*number] + sums_->bricks_[*number].voxels.rank(at.cell);
     }
 
    private:
@@ -261,7 +266,9 @@ class voxel_sums {
     chained_.reserve(total);
     touched_.clear();
     for (auto& part : parts) {
-      for (auto& run : part.runs_) {
+      for (std::size_t r = 0; r != part.runs_.size(); ++r) {
+        const auto& run = part.runs_[r];
+        const std::size_t end = r + 1 != part.runs_.size() ? part.runs_[r + 1].begin : part.items_.size();
         std::uint32_t number = 0;
         if constexpr (Add) {
           number = brick_at(run.brick);
@@ -273,8 +280,8 @@ class voxel_sums {
         }
         std::uint32_t& first = bricks_[number].first_run;
         if (first == none) touched_.push_back(number);
-        run.next = std::exchange(first, static_cast<std::uint32_t>(chained_.size()));
-        chained_.push_back({part.items_.data(), &run});
+        const std::uint32_t next = std::exchange(first, static_cast<std::uint32_t>(chained_.size()));
+        chained_.push_back({{part.items_.data() + run.begin, part.items_.data() + end}, next});
       }
     }
     std::atomic<std::size_t> more{0};  // modulo 2^64: also where there are fewer
@@ -282,10 +289,7 @@ class voxel_sums {
       brick& b = bricks_[touched_[i]];
       const std::size_t before = b.voxels.size();
       const auto for_each_run = [&](auto&& f) {
-        for (std::uint32_t r = b.first_run; r != none; r = chained_[r].run->next) {
-          const auto& [items, run] = chained_[r];
-          f(std::span{items + run->begin, items + run->end});
-        }
+        for (std::uint32_t r = b.first_run; r != none; r = chained_[r].next) f(chained_[r].items);
       };
       if constexpr (Add) {
         b.voxels.add(for_each_run);
@@ -307,8 +311,8 @@ class voxel_sums {
   }
 
   struct chained_run {
-    const detail::voxel_item* items;
-    const voxel_measurements::run* run;
+    std::span<const detail::voxel_item> items;
+    std::uint32_t next;  ///< of the same brick
   };
   double size_;
   std::size_t occupied_ = 0;
