@@ -15,6 +15,8 @@
 #include <orbis/camera/presets.hpp>
 #include <orbis/core/file.hpp>
 
+#include "filters.hpp"
+
 namespace app {
 namespace {
 
@@ -59,11 +61,16 @@ void add_map_options(CLI::App& cmd, settings& s) {
       ->capture_default_str()
       ->type_name("M");
   cmd.add_option("--filter", s.filter, "how outliers are removed; auto: as the cloud suggests")
-      ->check(CLI::IsMember({"auto", "none", "statistical"}))
+      ->check(CLI::IsMember(filter_names()))
       ->capture_default_str()
       ->type_name("MODE");
-  count(cmd, "--neighbors", s.neighbors, "statistical filter: neighbours of a point", 1, 100'000)
-      ->capture_default_str();
+  cmd.add_option("--neighbors", s.neighbors, "neighbours of a point, e.g. 50 of the statistical filter, 5 of radius")
+      ->check(within<std::size_t>(1, 100'000))
+      ->type_name("N");
+  cmd.add_option("--radius", s.radius, "radius filter: where so many neighbours must lie, metres")
+      ->check(within(1e-6, 1000.0, " m"))
+      ->capture_default_str()
+      ->type_name("M");
   cmd.add_option("--sigma", s.sigma, "statistical filter: how many deviations above the mean a point may lie")
       ->check(within(0.0, 1000.0))
       ->capture_default_str()

@@ -186,18 +186,18 @@ orbis::image<rgb8> draw(const std::vector<voxel>& voxels, const view_frame& fram
 
 }  // namespace
 
-orbis::image<rgb8> draw_aslant(const std::vector<voxel>& voxels, const view_frame& frame, coloring how, int width,
-                               int height) {
+orbis::image<rgb8> draw_aslant(const std::vector<voxel>& voxels, const std::vector<voxel>& in_view,
+                               const view_frame& frame, coloring how, int width, int height) {
   constexpr double degree = std::numbers::pi / 180.0;
-  const eye e = look_at(framed(voxels, frame), -62 * degree, 50 * degree, 34 * degree, width * oversampling,
+  const eye e = look_at(framed(in_view, frame), -62 * degree, 50 * degree, 34 * degree, width * oversampling,
                         height * oversampling);
   return draw(voxels, frame, how, e, width, height);
 }
 
-orbis::image<rgb8> draw_from_above(const std::vector<voxel>& voxels, const view_frame& frame, coloring how, int width,
-                                   int height) {
+orbis::image<rgb8> draw_from_above(const std::vector<voxel>& voxels, const std::vector<voxel>& in_view,
+                                   const view_frame& frame, coloring how, int width, int height) {
   constexpr double degree = std::numbers::pi / 180.0;
-  const eye e = look_at(framed(voxels, frame), -90 * degree, 89.9 * degree, 6 * degree, width * oversampling,
+  const eye e = look_at(framed(in_view, frame), -90 * degree, 89.9 * degree, 6 * degree, width * oversampling,
                         height * oversampling);
   return draw(voxels, frame, how, e, width, height);
 }

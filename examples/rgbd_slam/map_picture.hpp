@@ -14,11 +14,13 @@ namespace app {
 
 enum class coloring { camera, height };
 
-/// From above and aside, in perspective. What lies above `frame.cut` is left away.
-[[nodiscard]] orbis::image<orbis::rgb8> draw_aslant(const std::vector<voxel>& voxels, const view_frame& frame,
-                                                    coloring how, int width, int height);
-/// From straight above, north up.
-[[nodiscard]] orbis::image<orbis::rgb8> draw_from_above(const std::vector<voxel>& voxels, const view_frame& frame,
+/// From above and aside, in perspective. What lies above `frame.cut` is left away. The picture is as large
+/// as to hold `in_view`: where that is the same, so is the view.
+[[nodiscard]] orbis::image<orbis::rgb8> draw_aslant(const std::vector<voxel>& voxels, const std::vector<voxel>& in_view,
+                                                    const view_frame& frame, coloring how, int width, int height);
+/// From straight above, the frame's y axis up.
+[[nodiscard]] orbis::image<orbis::rgb8> draw_from_above(const std::vector<voxel>& voxels,
+                                                        const std::vector<voxel>& in_view, const view_frame& frame,
                                                         coloring how, int width, int height);
 
 }  // namespace app

@@ -10,6 +10,7 @@
 #include <orbis/io/ply.hpp>
 #include <orbis/octree/files.hpp>
 
+#include "filters.hpp"
 #include "summary.hpp"
 #include "view_frame.hpp"
 
@@ -20,20 +21,9 @@ using orbis::result;
 using orbis::vec3f;
 using tree = orbis::octree::occupancy_octree<>;
 
-orbis::mapping::filter_options filter_options(const settings& s) {
-  using orbis::mapping::filter_kind;
-  orbis::mapping::filter_options options;
-  options.kind = s.filter == "none"          ? filter_kind::none
-                 : s.filter == "statistical" ? filter_kind::statistical
-                                             : filter_kind::automatic;
-  options.statistical.neighbors = s.neighbors;
-  options.statistical.sigma_multiplier = s.sigma;
-  return options;
-}
-
 std::string in_words(const built_map& map) {
-  return count_text(map.cloud.size()) + " points, " + count_text(map.filter.removed) + " removed, octree of " +
-         count_text(map.octree.num_leaves()) + " leaves";
+  return count_text(map.cloud.size()) + " points, " + count_text(map.filter.removed) + " removed by filter " +
+         std::string{to_string(map.filter.mode)} + ", octree of " + count_text(map.octree.num_leaves()) + " leaves";
 }
 
 /// Marks the voxels of the points as occupied.

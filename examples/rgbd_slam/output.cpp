@@ -6,6 +6,7 @@
 #include <orbis/core/file.hpp>
 #include <orbis/io/trajectory_file.hpp>
 
+#include "filters.hpp"
 #include "plots.hpp"
 #include "report.hpp"
 #include "summary.hpp"
@@ -30,7 +31,7 @@ void remove_old_results(const std::filesystem::path& out) {
   std::error_code ignored;
   for (const char* name :
        {"trajectory.txt", "keyframes.txt", "cloud.ply", "cloud_filtered.ply", "map_unfiltered.bt", "map.bt", "map.ot",
-        "summary.json", "report.html", "trajectory.png", "map.png", "map_unfiltered.png"})
+        "summary.json", "report.html", "trajectory.png", "map.png", "map_unfiltered.png", "filter.png"})
     std::filesystem::remove(out / name, ignored);
 }
 
@@ -69,9 +70,7 @@ results begin_results(const settings& s, const std::string& title, const frame_s
   }
   r.setup.emplace_back("octree",
                        number("%g cm voxels", 100 * s.resolution) + number(", measurements up to %g m", s.max_depth));
-  r.setup.emplace_back("filter asked for", s.filter == "statistical" ? "statistical, " + std::to_string(s.neighbors) +
-                                                                           " neighbours" + number(", sigma %g", s.sigma)
-                                                                     : s.filter);
+  r.setup.emplace_back("filter asked for", filter_in_words(s));
   return r;
 }
 
@@ -109,7 +108,7 @@ exit_code report_no_start(results& r, const settings& s, console& say) {
 
 void print_results(const results& r, console& say) {
   std::string text;
-  if (r.map) text.append("\n").append(size_table(*r.map)).append("\n");
+  if (r.map) text.append("\n").append(size_table(*r.map)).append("\n\n").append(filter_lines(*r.map)).append("\n");
   if (r.against_truth) text.append("\n").append(accuracy_lines(*r.against_truth)).append("\n");
   if (r.map && r.map->error_m) {
     char buffer[96];

@@ -180,6 +180,7 @@ orbis::result<void> write_trajectory_picture(const results& r, const view_frame&
   }
 
   axes plan{s, 80, 125, 640, 630, x.padded(0.06, 0.2), y.padded(0.06, 0.2), true};
+  s.text(view_frame_note, {60, 806}, faint, 11);
   plan.frame("from above", "x, m", "y, m");
   plan.curve(true_above, truth_color, 2.6);
   plan.curve(above, estimate_color, 1.5);
@@ -210,8 +211,8 @@ orbis::result<void> write_map_picture(const std::string& name, const std::string
                                       const std::vector<voxel>& voxels, bool colors, const results& r,
                                       const view_frame& frame) {
   sheet s{1500, 820};
-  s.paste(draw_aslant(voxels, frame, colors ? coloring::camera : coloring::height, 880, 700), 20, 100);
-  s.paste(draw_from_above(voxels, frame, coloring::height, 560, 620), 920, 130);
+  s.paste(draw_aslant(voxels, r.map->voxels, frame, colors ? coloring::camera : coloring::height, 880, 700), 20, 100);
+  s.paste(draw_from_above(voxels, r.map->voxels, frame, coloring::height, 560, 620), 920, 130);
   s.text(title, {60, 44}, ink, 19, 0.0, true);
   char buffer[160];
   std::snprintf(buffer, sizeof buffer, "%s occupied of %s known leaves, finest voxel %g cm, %s as .bt",
@@ -224,9 +225,32 @@ orbis::result<void> write_map_picture(const std::string& name, const std::string
     const orbis::rgb8 c = height_color(i / 199.0);
     s.line({1100.0 + i, 785}, {1100.0 + i, 793}, cv::Scalar(c.r, c.g, c.b), 1.0);
   }
+  s.text(view_frame_note, {60, 806}, faint, 11);
   s.text("0", {1092, 794}, faint, 11, 1.0);
   s.text(buffer, {1308, 794}, faint, 11);
   return s.write(r.out / name);
+}
+
+/// The octree before the filter and after it, side by side in the same view, with the sizes below.
+orbis::result<void> write_filter_picture(const results& r, const view_frame& frame) {
+  const map_results& m = *r.map;
+  const coloring how = m.cloud.has_colors() ? coloring::camera : coloring::height;
+  sheet s{1500, 820};
+  s.text(r.title + ": the octree before and after the filter", {60, 44}, ink, 19, 0.0, true);
+  s.text("filter: " + m.filter_mode + ", removed " + removed_text(m), {60, 70}, faint, 13);
+  const auto panel = [&](int x, const std::string& name, const std::vector<voxel>& voxels, const tree_numbers& numbers,
+                         std::size_t points, std::uintmax_t bytes) {
+    s.paste(draw_aslant(voxels, m.voxels, frame, how, 720, 600), x, 112);
+    s.text(name, {x + 360.0, 106}, ink, 14, 0.5, true);
+    s.text("cloud: " + count_text(points) + " points, " + bytes_text(bytes), {x + 360.0, 738}, ink, 13, 0.5);
+    s.text("octree: " + count_text(numbers.leaves) + " leaves, " + count_text(numbers.occupied) + " occupied, " +
+               bytes_text(numbers.bt_bytes) + " as .bt",
+           {x + 360.0, 762}, ink, 13, 0.5);
+  };
+  panel(20, "before", m.voxels_unfiltered, m.unfiltered, m.cloud.size(), m.cloud_bytes);
+  panel(760, "after", m.voxels, m.filtered, m.kept.size(), m.filtered_bytes);
+  s.text(view_frame_note, {60, 806}, faint, 11);
+  return s.write(r.out / "filter.png");
 }
 
 }  // namespace
@@ -240,6 +264,7 @@ orbis::result<void> write_pictures(const results& r, const view_frame& frame) {
                                     m.voxels_unfiltered, colors, r, frame);
       !done)
     return done;
+  if (auto done = write_filter_picture(r, frame); !done) return done;
   return write_map_picture("map.png", r.title + ": the map", m.filtered, m.voxels, colors, r, frame);
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The pictures: trajectory.png, map.png and map_unfiltered.png.
+/// The pictures: trajectory.png, map.png, map_unfiltered.png and filter.png (both maps side by side).
 #pragma once
 
 #include <orbis/core/result.hpp>

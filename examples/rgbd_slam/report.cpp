@@ -271,7 +271,7 @@ std::string words(const std::vector<std::pair<std::string, std::string>>& rows) 
   return t + "</table></div>\n";
 }
 
-std::string tables(const results& r) {
+std::string tables(const results& r, const view_frame& frame) {
   std::string t;
   if (r.map) {
     const map_results& m = *r.map;
@@ -288,12 +288,11 @@ std::string tables(const results& r) {
     t += row(octree + "before the filter", m.unfiltered.leaves, "leaves", m.unfiltered.occupied, m.unfiltered.bt_bytes);
     t += row(octree + "after the filter", m.filtered.leaves, "leaves", m.filtered.occupied, m.filtered.bt_bytes);
     t += "</table></div>\n<h2>The filter</h2>\n";
-    const std::size_t removed = m.cloud.size() - m.kept.size();
-    const double share =
-        m.cloud.empty() ? 0.0 : 100.0 * static_cast<double>(removed) / static_cast<double>(m.cloud.size());
-    t += words({{"mode", m.filter_mode},
-                {"removed", count_text(removed) + text(" points (%.2f %%)", share)},
-                {"why", m.filter_reason}});
+    t += words({{"mode", m.filter_mode}, {"removed", removed_text(m)}, {"why", m.filter_reason}});
+    if (const auto picture = orbis::read_file(r.out / "filter.png"))
+      t += "<figure class=\"panel\"><img alt=\"The octree before the filter and after it, in the same view\" "
+           "src=\"data:image/png;base64," +
+           base64(*picture) + "\"></figure>\n";
   }
   if (r.against_truth) {
     const accuracy& a = *r.against_truth;
@@ -310,7 +309,9 @@ std::string tables(const results& r) {
     }
     t += "</table></div>\n";
   }
-  return t + "<h2>What was used</h2>\n" + words(r.setup);
+  auto setup = r.setup;
+  setup.emplace_back("pictures", std::string{view_frame_note} + "; T_view_world " + view_frame_text(frame));
+  return t + "<h2>What was used</h2>\n" + words(setup);
 }
 
 std::string time_table(const std::vector<double>& values) {
@@ -367,9 +368,10 @@ orbis::result<void> write_report(const results& r, const view_frame& frame) {
   const auto picture = orbis::read_file(r.out / "map.png");
   const std::string html = filled(page, {{"title", escaped(r.title)},
                                          {"header", header(r)},
+                                         {"frame_note", std::string{"Everything is "} + view_frame_note + "."},
                                          {"picture", picture ? "data:image/png;base64," + base64(*picture) : "data:,"},
                                          {"profile_height", r.against_truth ? "185" : "420"},
-                                         {"tables", tables(r)},
+                                         {"tables", tables(r, frame)},
                                          {"tracking_table", r.slam ? time_table(r.slam->tracking_ms) : ""},
                                          {"insert_table", r.map ? time_table(r.map->insert_ms) : ""},
                                          {"footer", footer(r)},

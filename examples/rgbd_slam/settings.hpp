@@ -33,11 +33,12 @@ struct settings {
   std::uint64_t seed = 1;             ///< of the synthetic recording
   std::optional<orbis::vec3> origin;  ///< of the rays to a cloud's points (map)
 
-  double resolution = 0.05;  ///< octree, metres
-  double max_depth = 4.0;    ///< depth beyond this is left out of the map, metres
-  std::string filter = "auto";
-  std::size_t neighbors = 50;
+  double resolution = 0.05;              ///< octree, metres
+  double max_depth = 4.0;                ///< depth beyond this is left out of the map, metres
+  std::string filter = "auto";           ///< one of `filter_names`
+  std::optional<std::size_t> neighbors;  ///< empty: the filter's own number
   double sigma = 1.0;
+  double radius = 0.05;  ///< of the radius filter, metres
 
   unsigned threads = 0;  ///< 0: all
   bool deterministic = false;

@@ -137,6 +137,17 @@ std::string size_table(const map_results& m) {
   return table;
 }
 
+std::string removed_text(const map_results& m) {
+  const std::size_t removed = m.cloud.size() - m.kept.size();
+  const double share =
+      m.cloud.empty() ? 0.0 : 100.0 * static_cast<double>(removed) / static_cast<double>(m.cloud.size());
+  return count_text(removed) + " of " + count_text(m.cloud.size()) + text(" points (%.2f %%)", share);
+}
+
+std::string filter_lines(const map_results& m) {
+  return "  Filter  " + m.filter_mode + ", removed " + removed_text(m) + "\n          " + m.filter_reason;
+}
+
 std::string accuracy_lines(const accuracy& a) {
   std::string lines = text("  ATE  RMSE %.4f m, mean %.4f, median %.4f, max %.4f, over %zu poses", a.ate_rmse_m,
                            a.ate_mean_m, a.ate_median_m, a.ate_max_m, a.poses.size());

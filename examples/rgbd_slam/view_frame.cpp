@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdio>
 #include <numbers>
 
 namespace app {
@@ -108,6 +109,15 @@ view_frame find_view_frame(const std::vector<orbis::vec3f>& points, const orbis:
     frame.cut = std::clamp(highest + 0.3, 0.5 * frame.high.z(), frame.high.z());
   }
   return frame;
+}
+
+std::string view_frame_text(const view_frame& frame) {
+  const vec3 t = frame.T_view_world.translation();
+  const auto q = frame.T_view_world.rotation().unit_quaternion();
+  char text[160];
+  std::snprintf(text, sizeof text, "%.4f %.4f %.4f %.6f %.6f %.6f %.6f", t.x(), t.y(), t.z(), q.x(), q.y(), q.z(),
+                q.w());
+  return text;
 }
 
 orbis::rgb8 height_color(double t) {

@@ -3,6 +3,8 @@
 /// A frame to look at a map in: z up, walls along the axes, the floor at zero.
 #pragma once
 
+#include <string>
+
 #include <orbis/core/se3.hpp>
 #include <orbis/core/types.hpp>
 
@@ -19,6 +21,12 @@ struct view_frame {
 /// Guesses which way is up from how the cameras were held, then turns the frame so that floors and
 /// walls fall into few, full bins. For pictures only; nothing is measured in this frame.
 [[nodiscard]] view_frame find_view_frame(const std::vector<orbis::vec3f>& points, const orbis::trajectory& cameras);
+
+/// What pictures say about it, since it is not the world's frame, in which the files are.
+inline constexpr const char* view_frame_note =
+    "drawn upright, z up, walls along x and y, floor at 0: turned against the world frame of the files";
+/// The transform from the world, `tx ty tz qx qy qz qw`.
+[[nodiscard]] std::string view_frame_text(const view_frame& frame);
 
 /// A colour for a height within the bounds, `t` in [0, 1].
 [[nodiscard]] orbis::rgb8 height_color(double t);

@@ -3,11 +3,32 @@ include(${CMAKE_CURRENT_LIST_DIR}/support.cmake)
 
 app(0 demo --frames 40 --width 320 --resolution 0.1 --out demo)
 set(files trajectory.txt keyframes.txt cloud.ply cloud_filtered.ply map_unfiltered.bt map.bt map.ot summary.json
-          report.html trajectory.png map.png map_unfiltered.png)
+          report.html trajectory.png map.png map_unfiltered.png filter.png)
 must_exist(${WORK}/demo ${files})
 must_not_be_half_written(${WORK}/demo)
 check(out MATCHES "octree, 10 cm, after the filter")
 check(out MATCHES "ATE")
+
+# What was chosen, and why, where people look: the terminal, the summary and the page.
+summary(mode ${WORK}/demo filter mode)
+summary(reason ${WORK}/demo filter reason)
+summary(removed ${WORK}/demo filter removed)
+string(LENGTH "${reason}" length)
+check(length GREATER 20)
+string(FIND "${out}" "Filter  ${mode}, removed " at)
+check(at GREATER -1)
+string(FIND "${out}" "${reason}" at)
+check(at GREATER -1)
+file(READ ${WORK}/demo/report.html page)
+string(REPLACE "&" "&amp;" escaped "${reason}")
+string(REPLACE "'" "&#39;" escaped "${escaped}")
+string(FIND "${page}" "${escaped}" at)
+check(at GREATER -1)
+check(page MATCHES "T_view_world")  # the pictures' frame is not the world's, and they say so
+summary(points ${WORK}/demo cloud points)
+summary(kept ${WORK}/demo cloud points_filtered)
+math(EXPR difference "${points} - ${kept}")
+check(removed EQUAL difference)
 
 # Every field of the contract is there.
 set(fields frames tracked lost relocalized keyframes landmarks loops_closed tracking_ms:median tracking_ms:p95

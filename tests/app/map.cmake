@@ -28,6 +28,17 @@ app(0 map out/cloud_filtered.ply --out again --resolution 0.1 --filter statistic
 summary(mode ${WORK}/again filter mode)
 check(mode STREQUAL "statistical")
 
+app(0 map cloud.ply --out again --resolution 0.1 --filter radius --radius 0.11 --neighbors 4)
+summary(mode ${WORK}/again filter mode)
+check(mode STREQUAL "radius")
+summary(kept ${WORK}/again cloud points_filtered)
+check(kept EQUAL 64)  # all but the border
+check(out MATCHES "Filter  radius, removed 36 of 100 points .36.00 %.")
+app(0 map cloud.ply --out again --resolution 0.1 --filter radius --radius 0.02)
+summary(kept ${WORK}/again cloud points_filtered)
+check(kept EQUAL 0)
+must_exist(${WORK}/again filter.png map.bt)
+
 # A recording, with its ground truth for poses.
 make_recording(${WORK}/room 6 160)
 app(0 map room --out out --resolution 0.1)
