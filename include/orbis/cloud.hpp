@@ -13,6 +13,7 @@
 #include <orbis/cloud/cluster.hpp>
 #include <orbis/cloud/curve_order.hpp>
 #include <orbis/cloud/decision.hpp>
+#include <orbis/cloud/depth_rows.hpp>
 #include <orbis/cloud/depth_windows.hpp>
 #include <orbis/cloud/extract.hpp>
 #include <orbis/cloud/flying_pixels.hpp>

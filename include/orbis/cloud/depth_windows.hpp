@@ -10,7 +10,9 @@
 #include <vector>
 
 #include <orbis/camera/depth.hpp>
+#include <orbis/cloud/depth_rows.hpp>
 #include <orbis/core/execution.hpp>
+#include <orbis/core/simd.hpp>
 
 namespace orbis::cloud {
 
@@ -27,7 +29,7 @@ class depth_windows {
   /// where any pixel of the window lies outside the image or has no depth: what hides there may be
   /// nearer than all. O(width * height * radius). @pre radius >= 0
   template <execution_policy Policy, camera::depth_source Depth>
-  void take(const Policy& policy, const Depth& depth, int radius) {
+  void take(const Policy& policy, const Depth& depth, int radius, simd::level level = simd::detected()) {
     assert(radius >= 0);
     width_ = depth.width();
     height_ = depth.height();
@@ -35,20 +37,20 @@ class depth_windows {
     const auto height = static_cast<std::size_t>(height_);
     const auto r = static_cast<std::size_t>(radius);
     for (auto* plane : {&nearest_, &farthest_, &middle_, &row_nearest_, &row_farthest_}) plane->resize(width * height);
-    for_each_chunk(policy, height, 16, [&](std::size_t begin, std::size_t end) {
+    const detail::depth_row_kernels kernels = detail::depth_row_kernels_at(level);
+    for_each_chunk(policy, height, 32, [&](std::size_t begin, std::size_t end) {
       std::vector<float> padded(width + 2 * r, 0.0F);  // beyond the borders there is no depth
       for (std::size_t y = begin; y != end; ++y) {
-        float* const middle = middle_.data() + y * width;
-        for (std::size_t x = 0; x != width; ++x) {
-          const float z = depth(static_cast<int>(x), static_cast<int>(y));
-          padded[r + x] = z > 0.0F && z <= std::numeric_limits<float>::max() ? z : 0.0F;
-        }
+        detail::read_depth_row(kernels, depth, static_cast<int>(y), padded.data() + r);
         float* const low = row_nearest_.data() + y * width;
         float* const high = row_farthest_.data() + y * width;
         std::copy_n(padded.data(), width, low);
         std::copy_n(padded.data(), width, high);
-        for (std::size_t d = 1; d <= 2 * r; ++d) narrow(low, high, padded.data() + d, padded.data() + d, width);
-        for (std::size_t x = 0; x != width; ++x) middle[x] = padded[r + x] > 0.0F ? padded[r + x] : none;
+        for (std::size_t d = 1; d <= 2 * r; ++d)
+          kernels.widen_range(low, high, padded.data() + d, padded.data() + d, width);
+        float* const middle = middle_.data() + y * width;
+        std::copy_n(padded.data() + r, width, middle);
+        kernels.replace_zeros(middle, none, width);
       }
     });
     tiles_across_ = (width_ + tile - 1) / tile;
@@ -56,7 +58,8 @@ class depth_windows {
     tile_farthest_.assign(static_cast<std::size_t>(tiles_across_ * tiles_down), none);
     static_assert(tile == 16, "a chunk of rows is a row of tiles");
     for_each_chunk(policy, height, tile, [&](std::size_t begin, std::size_t end) {
-      float* const tiles = tile_farthest_.data() + begin / tile * static_cast<std::size_t>(tiles_across_);
+      std::vector<float> farthest(width, none);  // of each column
+      std::vector<float> unused(width, none);
       for (std::size_t y = begin; y != end; ++y) {
         float* const low = nearest_.data() + y * width;
         float* const high = farthest_.data() + y * width;
@@ -64,15 +67,18 @@ class depth_windows {
         const std::size_t bottom = std::min(height - 1, y + r);
         std::copy_n(row_nearest_.data() + top * width, width, low);
         std::copy_n(row_farthest_.data() + top * width, width, high);
-        for (std::size_t from = top + 1; from <= bottom; ++from)
-          narrow(low, high, row_nearest_.data() + from * width, row_farthest_.data() + from * width, width);
-        const bool whole = y >= r && y + r < height;
-        for (std::size_t x = 0; x != width; ++x) {
-          low[x] = whole && low[x] > 0.0F ? low[x] : none;
-          high[x] = high[x] > 0.0F ? high[x] : none;
+        for (std::size_t from = top + 1; from <= bottom; ++from) {
+          kernels.widen_range(low, high, row_nearest_.data() + from * width, row_farthest_.data() + from * width,
+                              width);
         }
-        for (std::size_t x = 0; x != width; ++x) tiles[x / tile] = std::max(tiles[x / tile], high[x]);
+        const bool whole = y >= r && y + r < height;
+        if (!whole) std::fill_n(low, width, 0.0F);
+        kernels.replace_zeros(low, none, width);
+        kernels.replace_zeros(high, none, width);
+        kernels.widen_range(unused.data(), farthest.data(), unused.data(), high, width);
       }
+      float* const tiles = tile_farthest_.data() + begin / tile * static_cast<std::size_t>(tiles_across_);
+      for (std::size_t x = 0; x != width; ++x) tiles[x / tile] = std::max(tiles[x / tile], farthest[x]);
     });
   }
 
@@ -97,12 +103,6 @@ class depth_windows {
   }
 
  private:
-  /// Written for the vectoriser.
-  static void narrow(float* low, float* high, const float* other_low, const float* other_high, std::size_t n) {
-    for (std::size_t i = 0; i != n; ++i) low[i] = other_low[i] < low[i] ? other_low[i] : low[i];
-    for (std::size_t i = 0; i != n; ++i) high[i] = other_high[i] > high[i] ? other_high[i] : high[i];
-  }
-
   int width_ = 0;
   int height_ = 0;
   int tiles_across_ = 0;

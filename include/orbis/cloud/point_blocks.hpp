@@ -103,26 +103,20 @@ template <execution_policy Policy, point_range Points>
   point_blocks out;
   if (entries.empty()) return out;
 
-  // Morton order: a coarse one will do, and one wild point far away makes it coarser still, so it
-  // runs through the cube that holds the middle of the cloud and clamps what lies outside.
-  std::array<double, 3> sum{};
-  std::array<double, 3> squares{};
-  for (const detail::keyed_index& e : entries) {
-    const auto p = at(e.index);
-    for (std::size_t a = 0; a != 3; ++a) {
-      const double x = double{p[a]} - double{low[a]};
-      sum[a] += x;
-      squares[a] += x * x;
-    }
-  }
+  // Morton order: a coarse one will do. Wild points far away would make it coarser still, so it runs
+  // through the cube that holds most of some sample, and clamps what lies outside.
   double extent = 0;
   std::array<double, 3> start{};
   for (std::size_t a = 0; a != 3; ++a) {
-    const auto n = static_cast<double>(entries.size());
-    const double mean = sum[a] / n;
-    const double reach = 4 * std::sqrt(std::max(0.0, squares[a] / n - mean * mean));
-    start[a] = double{low[a]} + std::max(0.0, mean - reach);
-    extent = std::max(extent, std::min(double{high[a]}, double{low[a]} + mean + reach) - start[a]);
+    constexpr std::size_t sample = 1024;
+    std::vector<float> some;
+    for (std::size_t i = 0; i < entries.size(); i += entries.size() / sample + 1)
+      some.push_back(at(entries[i].index)[a]);
+    std::ranges::sort(some);
+    const double from = some[some.size() / 16];
+    const double to = some[some.size() - 1 - some.size() / 16];
+    start[a] = std::max(double{low[a]}, from - (to - from));
+    extent = std::max(extent, std::min(double{high[a]}, to + (to - from)) - start[a]);
   }
   const double scale = extent > 0 ? 1023.0 / extent : 0.0;
   for_each_index(policy, entries.size(), 16384, [&](std::size_t i) {

@@ -79,6 +79,7 @@ class ray_evidence_counter {
         options_{options},
         size_{std::ranges::size(points)},
         blocks_{make_point_blocks(policy, points)},
+        level_{level},
         kernels_{detail::ray_kernels_at(level)},
         through_(blocks_.axis[0].size(), 0),
         supported_(blocks_.axis[0].size(), 0),
@@ -95,7 +96,7 @@ class ray_evidence_counter {
     assert(view.depth.width() == camera_.width() && view.depth.height() == camera_.height());
     const se3 pose = view.T_world_camera;
     if (!pose.to_matrix().allFinite() || blocks_.index.empty()) return;
-    windows_.take(policy, view.depth, options_.window);
+    windows_.take(policy, view.depth, options_.window, level_);
     const detail::ray_view placed = view_at(pose);
     test_.place(pose, placed, windows_);
     for_each_seen_block(policy, placed, [&](std::size_t first, const auto&, const detail::block_verdict& verdict) {
@@ -115,7 +116,7 @@ class ray_evidence_counter {
     const se3 pose = view.T_world_camera;
     if (!pose.to_matrix().allFinite() || blocks_.index.empty()) return;
     for (auto* counters : {&through_dropped_, &refuted_}) counters->resize(through_.size(), 0);
-    windows_.take(policy, view.depth, options_.window);
+    windows_.take(policy, view.depth, options_.window, level_);
     const detail::ray_view placed = view_at(pose);
     test_.place(pose, placed, windows_);
 
@@ -218,6 +219,7 @@ class ray_evidence_counter {
   ray_evidence_options options_;
   std::size_t size_;
   point_blocks blocks_;
+  simd::level level_;
   detail::ray_kernels kernels_;
   std::vector<std::uint16_t> through_;  ///< in the order of the blocks
   std::vector<std::uint16_t> supported_;

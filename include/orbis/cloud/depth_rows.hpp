@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Loops over rows of depths for `depth_windows.hpp`, written for the vectoriser and compiled for several
+/// instruction sets. Nothing in them is rounded but a division, so that all give the same bits.
+#pragma once
+
+#include <concepts>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+
+#include <orbis/camera/depth.hpp>
+#include <orbis/core/simd.hpp>
+
+namespace orbis::cloud::detail {
+
+/// `f(i)` for the first `n` numbers, sixteen at a time as far as possible: loops of known length are what
+/// compilers turn into vector instructions at -O2.
+template <class F>
+[[gnu::always_inline]] inline void in_sixteens(std::size_t n, F&& f) {
+  std::size_t i = 0;
+  for (; i + 16 <= n; i += 16) {
+    for (std::size_t lane = 0; lane != 16; ++lane) f(i + lane);
+  }
+  for (; i != n; ++i) f(i);
+}
+
+/// `low[i] = min(low[i], other_low[i])`, `high[i] = max(high[i], other_high[i])`
+[[gnu::always_inline]] inline void widen_range(float* __restrict low, float* __restrict high, const float* other_low,
+                                               const float* other_high, std::size_t n) {
+  in_sixteens(
+      n, [&](std::size_t i) __attribute__((always_inline)) {
+        low[i] = other_low[i] < low[i] ? other_low[i] : low[i];
+        high[i] = other_high[i] > high[i] ? other_high[i] : high[i];
+      });
+}
+/// `x[i] = value` where it is not positive.
+[[gnu::always_inline]] inline void replace_zeros(float* __restrict x, float value, std::size_t n) {
+  in_sixteens(
+      n, [&](std::size_t i) __attribute__((always_inline)) { x[i] = x[i] > 0.0F ? x[i] : value; });
+}
+/// A row of stored depths in metres, 0 where there is none: what `camera::depth_view` says of each.
+[[gnu::always_inline]] inline void to_metres(const std::uint16_t* stored, double scale, float least, float most,
+                                             float* __restrict out, std::size_t n) {
+  in_sixteens(
+      n, [&](std::size_t i) __attribute__((always_inline)) {
+        const auto metres = static_cast<float>(static_cast<double>(stored[i]) / scale);
+        const bool valid = (stored[i] != 0) & (stored[i] != std::numeric_limits<std::uint16_t>::max()) &
+                           (metres > 0.0F) & (metres >= least) & (metres <= most);
+        out[i] = valid ? metres : 0.0F;
+      });
+}
+
+/// The loops for one instruction set.
+struct depth_row_kernels {
+  void (*widen_range)(float* low, float* high, const float* other_low, const float* other_high, std::size_t n);
+  void (*replace_zeros)(float* x, float value, std::size_t n);
+  void (*to_metres)(const std::uint16_t* stored, double scale, float least, float most, float* out, std::size_t n);
+};
+
+#define ORBIS_DEPTH_ROWS(name, target)                                                                                \
+  target inline void widen_range_##name(float* low, float* high, const float* other_low, const float* other_high,     \
+                                        std::size_t n) {                                                              \
+    widen_range(low, high, other_low, other_high, n);                                                                 \
+  }                                                                                                                   \
+  target inline void replace_zeros_##name(float* x, float value, std::size_t n) { replace_zeros(x, value, n); }       \
+  target inline void to_metres_##name(const std::uint16_t* stored, double scale, float least, float most, float* out, \
+                                      std::size_t n) {                                                                \
+    to_metres(stored, scale, least, most, out, n);                                                                    \
+  }
+ORBIS_DEPTH_ROWS(portable, )
+ORBIS_DEPTH_ROWS(avx2, ORBIS_TARGET("avx2"))
+#undef ORBIS_DEPTH_ROWS
+
+/// The fastest that neither `wanted` nor the processor excludes.
+[[nodiscard]] inline depth_row_kernels depth_row_kernels_at(simd::level wanted) noexcept {
+  if (wanted >= simd::level::avx2 && simd::detected() >= simd::level::avx2)
+    return {widen_range_avx2, replace_zeros_avx2, to_metres_avx2};
+  return {widen_range_portable, replace_zeros_portable, to_metres_portable};
+}
+
+/// A row of any depth image in metres, 0 where there is none.
+template <camera::depth_source Depth>
+void read_depth_row(const depth_row_kernels& kernels, const Depth& depth, int y, float* out) {
+  const auto width = static_cast<std::size_t>(depth.width());
+  if constexpr (std::same_as<Depth, camera::depth_view<std::uint16_t>>) {
+    kernels.to_metres(depth.pixels().row(y).data(), depth.scale(), depth.min_depth(), depth.max_depth(), out, width);
+  } else {
+    static_cast<void>(kernels);
+    for (std::size_t x = 0; x != width; ++x) {
+      const float z = depth(static_cast<int>(x), y);
+      out[x] = z > 0.0F && z <= std::numeric_limits<float>::max() ? z : 0.0F;
+    }
+  }
+}
+
+}  // namespace orbis::cloud::detail
