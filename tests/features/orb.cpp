@@ -7,7 +7,6 @@
 #include <cstdlib>
 #include <new>
 #include <numbers>
-#include <set>
 #include <thread>
 #include <tuple>
 #include <vector>
@@ -19,6 +18,7 @@
 #include <orbis/io/image.hpp>
 
 #include "features/images.hpp"
+#include "features/repeatability.hpp"
 #include "support/catch.hpp"
 #include "support/data.hpp"
 
@@ -29,14 +29,6 @@ using test::blocks, test::moved;
 namespace {
 
 std::atomic<std::size_t> allocations{0};
-
-/// Of the 32-pixel cells, the share that holds a keypoint.
-double coverage(const orbis::features::features& f, int width, int height) {
-  std::set<std::pair<int, int>> cells;
-  for (const keypoint& k : f.keypoints)
-    cells.emplace(static_cast<int>(k.x + 0.5F) / 32, static_cast<int>(k.y + 0.5F) / 32);
-  return static_cast<double>(cells.size()) / ((width / 32) * (height / 32));
-}
 
 constexpr auto matcher = brute_force(hamming{}) | ratio_test{0.8f} | cross_check{} | max_distance{64};
 
@@ -67,7 +59,7 @@ TEST_CASE("ORB features are well-formed and the same on every run") {
     CHECK((k.angle >= 0.0F && k.angle < 2.0F * std::numbers::pi_v<float>));
     CHECK((k.octave >= 0 && k.octave < 5));
     CHECK(k.size == Approx(31.0 * std::pow(1.2, k.octave)).epsilon(0.01));
-    CHECK(k.response >= 5.0F);
+    CHECK(k.response >= 3.0F);
   }
   CHECK(std::is_sorted(f.keypoints.begin(), f.keypoints.end(),
                        [](const keypoint& a, const keypoint& b) { return a.octave < b.octave; }));
@@ -264,7 +256,7 @@ TEST_CASE("an extractor is assembled from parts") {
   const auto im = moved(blocks(320, 240, 10), 0.3, 0, 0);
   const basic_orb_extractor<fast9, strongest> clustered{{.max_features = 200}};
   const basic_orb_extractor<fast9, cover_first> covering{{.max_features = 200}, {}, {.share = 1.0}};
-  CHECK(coverage(covering(im), 320, 240) > coverage(clustered(im), 320, 240));
+  CHECK(test::coverage(covering(im), 320, 240) > test::coverage(clustered(im), 320, 240));
   const basic_orb_extractor<fast9, cover_first, upright> level_camera{{.max_features = 200}};
   for (const keypoint& k : level_camera(im).keypoints) CHECK(k.angle == 0.0F);
   const auto turned = orb_extractor{{.max_features = 200}}(im), straight = level_camera(im);
@@ -285,7 +277,7 @@ TEST_CASE("ORB features cover the kitchen and match from frame to frame") {
     const auto f = extract(io::read_color(files[i]).value());
     const auto g = extract(io::read_color(files[i + 1]).value());
     CHECK(f.size() == 1000);
-    covered += coverage(f, 640, 480) / 5.0;
+    covered += test::coverage(f, 640, 480) / 5.0;
     const auto matches = matcher(f, g);
     INFO(matches.size() << " matches in frame " << i);
     CHECK(matches.size() > 200);
@@ -305,5 +297,5 @@ TEST_CASE("ORB features cover the kitchen and match from frame to frame") {
     CHECK(static_cast<double>(agree) > 0.9 * static_cast<double>(dx.size()));
   }
   INFO("coverage " << covered);
-  CHECK(covered > 0.5);
+  CHECK(covered > 0.55);
 }

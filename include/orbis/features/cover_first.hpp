@@ -20,7 +20,7 @@ namespace orbis::features {
 /// their levels, wherever they are, because strong corners are found again. That a cell needs one corner and
 /// not one on each level is what leaves room for them. O(n) but for sorting what is chosen.
 struct cover_first {
-  double share = 0.34;  ///< of the wanted corners, for covering; 0 ... 1: from best found again to best spread
+  double share = 0.25;  ///< of the wanted corners, for covering; 0 ... 1: from best found again to best spread
 
   struct workspace {
     struct candidate {

@@ -34,7 +34,7 @@ struct orb_options {
   int levels = 8;             ///< of the image pyramid; levels too small for a patch are left out
   float scale_factor = 1.2F;  ///< between two levels, > 1
   int threshold = 14;         ///< brightness step of a corner (of the slightly smoothed image)
-  int min_threshold = 5;      ///< where nothing reaches `threshold`; the same as it to have only strong ones
+  int min_threshold = 3;      ///< where nothing reaches `threshold`; the same as it to have only strong ones
   simd::level simd = simd::level::avx512;  ///< the best instructions to use if there are such; no result depends on it
 };
 
