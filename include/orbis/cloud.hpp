@@ -17,6 +17,7 @@
 #include <orbis/cloud/depth_windows.hpp>
 #include <orbis/cloud/extract.hpp>
 #include <orbis/cloud/flying_pixels.hpp>
+#include <orbis/cloud/leaf_search.hpp>
 #include <orbis/cloud/log_density.hpp>
 #include <orbis/cloud/log_statistical.hpp>
 #include <orbis/cloud/mean_knn_distance.hpp>

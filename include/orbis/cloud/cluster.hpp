@@ -22,8 +22,8 @@
 
 #include <orbis/cloud/all_knn.hpp>
 #include <orbis/cloud/decision.hpp>
+#include <orbis/cloud/leaf_search.hpp>
 #include <orbis/cloud/mean_knn_distance.hpp>
-#include <orbis/cloud/nanoflann.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/point.hpp>
 
@@ -171,7 +171,7 @@ template <execution_policy Policy, point_range Points>
     std::vector<std::array<float, 3>> surface;
     surface.reserve(main_points.size());
     for (const std::uint32_t i : main_points) surface.push_back(coordinates<float>(detail::point_at(points, i)));
-    const nanoflann_search search{surface};
+    const leaf_search search{policy, surface};
     std::vector<char> apart(small_points.size(), 0);
     for_each_chunk(policy, small_points.size(), 64, [&](std::size_t begin, std::size_t end) {
       std::vector<neighbor<float>> nearest;

@@ -25,6 +25,14 @@ struct neighbor {
   friend bool operator==(const neighbor&, const neighbor&) = default;
 };
 
+/// The same with the square of the distance, which is what searches compute.
+template <std::floating_point S>
+struct squared_neighbor {
+  std::uint32_t index = 0;
+  S distance_squared = 0;  ///< metres squared
+  friend bool operator==(const squared_neighbor&, const squared_neighbor&) = default;
+};
+
 /// What a search reports to. `bound_squared()`: points further than this need not be reported (it
 /// may shrink while the search goes on). `add(index, distance_squared)`: one found point; returns
 /// false to end the search.
@@ -39,33 +47,64 @@ concept neighbor_sink = requires(T& sink, const T& constant, std::uint32_t index
 /// - `size()`: how many points are searched (non-finite ones are not).
 /// - `knn(query, k, out)`: the `min(k, size())` nearest points.
 /// - `radius(query, r, out)`: all points within `r` metres, the border included.
+/// - `knn_squared(query, k, out)`, `radius_squared(query, r_squared, out)`: the same without taking roots;
+///   the radius that is passed, like the distances that come back, is a square.
 ///
-/// Both replace the contents of `out`, nearest first, equal distances by index. Which of several
+/// All replace the contents of `out`, nearest first, equal distances by index. Which of several
 /// points at exactly the k-th distance is reported is deterministic but up to the backend. Queries
 /// are finite; the query itself, if it is a point of the cloud, is found as well.
 template <class T>
 concept neighbor_search = requires(const T& search, const std::array<typename T::scalar, 3>& query, std::size_t k,
-                                   typename T::scalar r, std::vector<neighbor<typename T::scalar>>& out) {
+                                   typename T::scalar r, std::vector<neighbor<typename T::scalar>>& out,
+                                   std::vector<squared_neighbor<typename T::scalar>>& squared_out) {
   requires std::floating_point<typename T::scalar>;
   { search.size() } -> std::convertible_to<std::size_t>;
   search.knn(query, k, out);
   search.radius(query, r, out);
+  search.knn_squared(query, k, squared_out);
+  search.radius_squared(query, r, squared_out);
 };
 
-/// Keeps the `k` nearest of what it is given, in a max-heap. @pre k > 0
+namespace detail {
+
+/// What a neighbour is ordered by: its distance or the square.
 template <std::floating_point S>
+[[nodiscard]] constexpr S measure(const neighbor<S>& n) noexcept {
+  return n.distance;
+}
+template <std::floating_point S>
+[[nodiscard]] constexpr S measure(const squared_neighbor<S>& n) noexcept {
+  return n.distance_squared;
+}
+
+/// From what was gathered, squares in no order, to what is handed out.
+template <class Neighbor>
+void finish_neighbors(std::vector<Neighbor>& found) {
+  if constexpr (requires { found.front().distance; }) {
+    for (Neighbor& n : found) n.distance = std::sqrt(n.distance);
+  }
+  // After the roots: different squares can have the same one.
+  std::sort(found.begin(), found.end(), [](const Neighbor& a, const Neighbor& b) {
+    return measure(a) < measure(b) || (measure(a) == measure(b) && a.index < b.index);
+  });
+}
+
+}  // namespace detail
+
+/// Keeps the `k` nearest of what it is given, in a max-heap, as plain or as squared neighbours. @pre k > 0
+template <std::floating_point S, class Neighbor = neighbor<S>>
 class nearest_sink {
  public:
-  /// Gathers into `out`, whose `distance` holds squares until `finish`.
-  nearest_sink(std::size_t k, std::vector<neighbor<S>>& out) : k_{k}, out_{&out} {
+  /// Gathers into `out`, which holds squares until `finish`.
+  nearest_sink(std::size_t k, std::vector<Neighbor>& out) : k_{k}, out_{&out} {
     assert(k > 0);
     out.clear();
   }
   [[nodiscard]] S bound_squared() const noexcept {
-    return out_->size() < k_ ? std::numeric_limits<S>::infinity() : out_->front().distance;
+    return out_->size() < k_ ? std::numeric_limits<S>::infinity() : detail::measure(out_->front());
   }
   bool add(std::uint32_t index, S distance_squared) {
-    const neighbor<S> found{index, distance_squared};
+    const Neighbor found{index, distance_squared};
     if (out_->size() == k_) {
       if (!less(found, out_->front())) return true;
       std::pop_heap(out_->begin(), out_->end(), less);
@@ -75,41 +114,45 @@ class nearest_sink {
     }
     std::push_heap(out_->begin(), out_->end(), less);
     // k identical points: nothing can be nearer.
-    return out_->size() < k_ || out_->front().distance > 0;
+    return out_->size() < k_ || detail::measure(out_->front()) > 0;
   }
-  /// Takes the roots, and sorts (after the roots: different squares can have the same one).
-  void finish() {
-    for (neighbor<S>& n : *out_) n.distance = std::sqrt(n.distance);
-    std::sort(out_->begin(), out_->end(), less);
-  }
+  /// Takes the roots, if plain distances are wanted, and sorts.
+  void finish() { detail::finish_neighbors(*out_); }
 
-  [[nodiscard]] static bool less(const neighbor<S>& a, const neighbor<S>& b) noexcept {
-    return a.distance < b.distance || (a.distance == b.distance && a.index < b.index);
+  [[nodiscard]] static bool less(const Neighbor& a, const Neighbor& b) noexcept {
+    return detail::measure(a) < detail::measure(b) || (detail::measure(a) == detail::measure(b) && a.index < b.index);
   }
 
  private:
   std::size_t k_;
-  std::vector<neighbor<S>>* out_;
+  std::vector<Neighbor>* out_;
 };
-
-/// Keeps everything within a radius.
 template <std::floating_point S>
+nearest_sink(std::size_t, std::vector<neighbor<S>>&) -> nearest_sink<S>;
+template <std::floating_point S>
+nearest_sink(std::size_t, std::vector<squared_neighbor<S>>&) -> nearest_sink<S, squared_neighbor<S>>;
+
+/// Keeps everything within a radius, as plain or as squared neighbours.
+template <std::floating_point S, class Neighbor = neighbor<S>>
 class radius_sink {
  public:
-  radius_sink(S radius, std::vector<neighbor<S>>& out) : bound_{radius * radius}, out_{&out} { out.clear(); }
+  radius_sink(S radius, std::vector<Neighbor>& out) : bound_{radius * radius}, out_{&out} { out.clear(); }
+  /// The same of a squared radius.
+  [[nodiscard]] static radius_sink within_squared(S radius_squared, std::vector<Neighbor>& out) {
+    radius_sink sink{0, out};
+    sink.bound_ = radius_squared;
+    return sink;
+  }
   [[nodiscard]] S bound_squared() const noexcept { return bound_; }
   bool add(std::uint32_t index, S distance_squared) {
     if (distance_squared <= bound_) out_->push_back({index, distance_squared});
     return true;
   }
-  void finish() {
-    for (neighbor<S>& n : *out_) n.distance = std::sqrt(n.distance);
-    std::sort(out_->begin(), out_->end(), nearest_sink<S>::less);
-  }
+  void finish() { detail::finish_neighbors(*out_); }
 
  private:
   S bound_;
-  std::vector<neighbor<S>>* out_;
+  std::vector<Neighbor>* out_;
 };
 
 }  // namespace orbis::cloud

@@ -1,0 +1,151 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// What every search promises, for each of them.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include <orbis/cloud/leaf_search.hpp>
+#include <orbis/cloud/nanoflann.hpp>
+#include <orbis/cloud/neighbors.hpp>
+
+#include "cloud/clouds.hpp"
+#include "cloud/reference.hpp"
+#include "support/catch.hpp"
+
+using orbis::cloud::leaf_search;
+using orbis::cloud::nanoflann_search;
+using orbis::cloud::neighbor;
+using orbis::cloud::squared_neighbor;
+using orbis::test::points;
+
+static_assert(orbis::cloud::neighbor_search<leaf_search>);
+static_assert(orbis::cloud::neighbor_search<nanoflann_search<points>>);
+
+namespace {
+
+std::vector<squared_neighbor<float>> all_squared(const points& cloud, const std::array<float, 3>& q) {
+  std::vector<squared_neighbor<float>> all;
+  for (std::uint32_t j = 0; j != cloud.size(); ++j) {
+    if (!orbis::test::finite(cloud[j])) continue;
+    all.push_back({j, orbis::test::squared({q[0], q[1], q[2]}, cloud[j])});
+  }
+  std::sort(all.begin(), all.end(), orbis::cloud::nearest_sink<float, squared_neighbor<float>>::less);
+  return all;
+}
+
+/// The roots of squares, in the order that plain neighbours come in.
+std::vector<neighbor<float>> plain(const std::vector<squared_neighbor<float>>& squared) {
+  std::vector<neighbor<float>> out;
+  for (const auto& n : squared) out.push_back({n.index, std::sqrt(n.distance_squared)});
+  std::sort(out.begin(), out.end(), orbis::cloud::nearest_sink<float>::less);
+  return out;
+}
+
+/// Checks all verbs of a search at points of the cloud and elsewhere. `ties_by_index`: at exactly the k-th
+/// distance the lowest indices are reported.
+template <orbis::cloud::neighbor_search Search>
+void check(const Search& search, const points& cloud, bool ties_by_index) {
+  std::vector<std::array<float, 3>> queries{{0.5F, 0.4F, 0.3F}, {-3.0F, 100.0F, 0.0F}};
+  for (std::size_t i = 0; i < cloud.size(); i += 1 + cloud.size() / 30) {
+    if (orbis::test::finite(cloud[i])) queries.push_back({cloud[i].x(), cloud[i].y(), cloud[i].z()});
+  }
+  for (const auto& q : queries) {
+    const auto all = all_squared(cloud, q);
+    CHECK(search.size() == all.size());
+    std::vector<squared_neighbor<float>> squared;
+    std::vector<neighbor<float>> found;
+    for (const std::size_t k : {std::size_t{0}, std::size_t{1}, std::size_t{7}, std::size_t{12}, std::size_t{40},
+                                cloud.size(), cloud.size() + 1}) {
+      search.knn_squared(q, k, squared);
+      search.knn(q, k, found);
+      const std::size_t wanted = std::min(k, all.size());
+      REQUIRE(squared.size() == wanted);
+      CHECK(found == plain(squared));
+      bool distances = true;
+      bool ordered = true;
+      for (std::size_t n = 0; n != wanted; ++n) {
+        distances = distances && squared[n].distance_squared == all[n].distance_squared;
+        const auto& p = cloud[squared[n].index];
+        distances = distances && orbis::test::squared({q[0], q[1], q[2]}, p) == squared[n].distance_squared;
+        ordered = ordered && (n == 0 || orbis::cloud::nearest_sink<float, squared_neighbor<float>>::less(squared[n - 1],
+                                                                                                         squared[n]));
+      }
+      CHECK(distances);
+      CHECK(ordered);
+      if (ties_by_index && (wanted == 0 || all[wanted - 1].distance_squared > 0)) {
+        CHECK(std::equal(squared.begin(), squared.end(), all.begin()));
+      }
+    }
+    for (const std::size_t rank : {std::size_t{0}, std::size_t{5}, std::size_t{60}}) {
+      if (rank >= all.size()) continue;
+      const float r_squared = all[rank].distance_squared;  // the border is included
+      auto expected = all;
+      std::erase_if(expected, [&](const auto& n) { return n.distance_squared > r_squared; });
+      search.radius_squared(q, r_squared, squared);
+      CHECK(squared == expected);
+      const float r = std::sqrt(r_squared);
+      expected = all;
+      std::erase_if(expected, [&](const auto& n) { return n.distance_squared > r * r; });
+      search.radius(q, r, found);
+      CHECK(found == plain(expected));
+    }
+  }
+}
+
+}  // namespace
+
+TEST_CASE("every search finds what brute force finds, with plain and with squared distances") {
+  for (const auto& [name, cloud] : orbis::test::all_clouds()) {
+    INFO(name);
+    check(nanoflann_search{cloud}, cloud, false);
+    check(nanoflann_search{cloud, orbis::cloud::reordered}, cloud, false);
+    check(leaf_search{cloud}, cloud, true);
+    check(leaf_search{orbis::par.with(3), cloud, orbis::simd::level::portable}, cloud, true);
+    check(leaf_search{orbis::par.with(2), cloud, orbis::simd::level::avx2}, cloud, true);
+  }
+}
+
+TEST_CASE("searches over copies outlive the cloud") {
+  points cloud = orbis::test::uniform_cloud(500, 1);
+  const points kept = cloud;
+  const nanoflann_search reordered{cloud, orbis::cloud::reordered};
+  const leaf_search leaves{cloud};
+  cloud.assign(500, orbis::vec3f{0, 0, 0});
+  check(reordered, kept, false);
+  check(leaves, kept, true);
+}
+
+TEST_CASE("searches take shuffled clouds, more than one level of boxes and more neighbours than a leaf") {
+  points cloud = orbis::test::room_cloud(120, 90, 0.002, 3);
+  orbis::random_bits random{4};
+  for (std::size_t i = cloud.size(); i-- > 1;) {
+    std::swap(cloud[i], cloud[random.below(static_cast<std::uint32_t>(i + 1))]);
+  }
+  check(leaf_search{orbis::par, cloud}, cloud, true);
+  check(nanoflann_search{cloud, orbis::cloud::reordered}, cloud, false);
+}
+
+TEST_CASE("identical points do not take quadratic time in searches") {
+  const points identical(100'000, orbis::vec3f{0.5F, 0.5F, 0.5F});
+  const leaf_search search{identical};
+  std::vector<neighbor<float>> found;
+  std::size_t total = 0;
+  for (int i = 0; i != 20'000; ++i) {
+    search.knn({0.5F, 0.5F, 0.5F}, 10, found);
+    total += found.size();
+  }
+  CHECK(total == 200'000);
+}
+
+TEST_CASE("doubles are searched as doubles in a reordered tree") {
+  const std::vector<orbis::vec3> cloud{{1e9, 0, 0}, {1e9 + 3, 4, 0}, {1e9 + 1, 0, 0}};
+  const nanoflann_search search{cloud, orbis::cloud::reordered};
+  std::vector<neighbor<double>> found;
+  search.knn({1e9, 0, 0}, 3, found);
+  CHECK(found == std::vector<neighbor<double>>{{0, 0.0}, {2, 1.0}, {1, 5.0}});
+}
