@@ -10,6 +10,7 @@
 #include <orbis/optimize/block_ordering.hpp>
 #include <orbis/optimize/block_symbolic.hpp>
 #include <orbis/optimize/bundle_adjustment.hpp>
+#include <orbis/optimize/chordal_initialization.hpp>
 #include <orbis/optimize/damping.hpp>
 #include <orbis/optimize/manifold.hpp>
 #include <orbis/optimize/p3p.hpp>

@@ -102,7 +102,7 @@ class pose_graph_solver {
         progress callback = {}, Report&& report = {}) {
     pose_graph_summary summary;
     const std::span all{std::ranges::data(edges), std::ranges::size(edges)};
-    if (!set_up(policy, std::span<const T>{vertices}, all, options, summary)) return summary;
+    if (!set_up(std::span<const T>{vertices}, all, options, summary)) return summary;
     problem<Policy, std::remove_cvref_t<decltype(all)>> graph{*this, policy, all, summary};
     graph.linearize();
     summary.initial_cost = summary.final_cost = cost_;
@@ -204,9 +204,9 @@ class pose_graph_solver {
     return pose_graph_status::iteration_limit;
   }
 
-  template <class Policy, class Edges>
-  [[nodiscard]] bool set_up(const Policy& policy, std::span<const T> vertices, const Edges& edges,
-                            const pose_graph_options& options, pose_graph_summary& summary) {
+  template <class Edges>
+  [[nodiscard]] bool set_up(std::span<const T> vertices, const Edges& edges, const pose_graph_options& options,
+                            pose_graph_summary& summary) {
     assert(options.fixed.empty() || options.fixed.size() == vertices.size());
     const stopwatch watch{summary.seconds.set_up};
     const auto fails = [&](const detail::pose_graph_finding& finding) {
@@ -214,7 +214,8 @@ class pose_graph_solver {
       summary.where = finding.where;
       return is_failure(finding.status);
     };
-    if (fails(check(policy, vertices, edges, options))) return false;
+    if (fails(detail::check_pose_graph<Between::dimension>(vertices, edges, options.semidefinite_information)))
+      return false;
     bool changed = false;
     if (fails(structure_.update(vertices.size(), edges, options.fixed, options.hold, changed))) return false;
     if (structure_.vertices.empty()) {
@@ -233,25 +234,6 @@ class pose_graph_solver {
     diagonal_.resize(gradient_.size());
     return true;
   }
-
-  /// The first vertex or edge that cannot be worked with.
-  template <class Policy, class Edges>
-  [[nodiscard]] detail::pose_graph_finding check(const Policy& policy, std::span<const T> vertices, const Edges& edges,
-                                                 const pose_graph_options& options) const {
-    for (std::size_t i = 0; i != vertices.size(); ++i)
-      if (!is_finite(vertices[i])) return {pose_graph_status::bad_vertex, i};
-    static_cast<void>(policy);
-    for (std::size_t k = 0; k != edges.size(); ++k) {
-      const auto& e = edges[k];
-      if (e.from >= vertices.size() || e.to >= vertices.size()) return {pose_graph_status::missing_vertex, k};
-      if (e.from == e.to) return {pose_graph_status::self_edge, k};
-      if (!is_finite(e.measurement)) return {pose_graph_status::bad_measurement, k};
-      if (!detail::is_information<Between::dimension>(e.information, options.semidefinite_information))
-        return {pose_graph_status::bad_information, k};
-    }
-    return {};
-  }
-  [[nodiscard]] bool is_finite(const T& pose) const { return pose.to_matrix().allFinite(); }
 
   /// Residuals, weights and normal equations at the estimate.
   template <class Policy, class Edges>

@@ -122,6 +122,29 @@ template <int N>
   return true;
 }
 
+/// The first vertex or edge that cannot be worked with.
+template <int Dimension, class T, class Edges>
+[[nodiscard]] pose_graph_finding check_pose_graph(std::span<const T> vertices, const Edges& edges,
+                                                  bool semidefinite_information) {
+  const auto is_finite = [](const T& pose) {
+    if constexpr (requires { pose.to_matrix(); })
+      return pose.to_matrix().allFinite();
+    else
+      return pose.rotation_matrix().allFinite();
+  };
+  for (std::size_t i = 0; i != vertices.size(); ++i)
+    if (!is_finite(vertices[i])) return {pose_graph_status::bad_vertex, i};
+  for (std::size_t k = 0; k != edges.size(); ++k) {
+    const auto& e = edges[k];
+    if (e.from >= vertices.size() || e.to >= vertices.size()) return {pose_graph_status::missing_vertex, k};
+    if (e.from == e.to) return {pose_graph_status::self_edge, k};
+    if (!is_finite(e.measurement)) return {pose_graph_status::bad_measurement, k};
+    if (!is_information<Dimension>(e.information, semidefinite_information))
+      return {pose_graph_status::bad_information, k};
+  }
+  return {};
+}
+
 /// All edges between the same two vertices, at least one of which may move.
 struct edge_bundle {
   std::uint32_t from = 0, to = 0;      ///< vertices, as the bundle's first edge has them

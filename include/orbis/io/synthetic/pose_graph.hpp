@@ -100,6 +100,7 @@ namespace detail {
     made.wrong.push_back(wrong ? 1 : 0);
   };
   const auto close = [&](std::size_t from, std::size_t to) {
+    if (from + 1 == to) return;  // odometry has seen it
     if (random.uniform() < o.closure_probability) join(from, to, random.uniform() < o.outlier_share);
   };
 

@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// pose_graph FILE.g2o: optimises the poses of a g2o file; iteration table, or --json.
+#include <cstdio>
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+
+#include <orbis/io/g2o.hpp>
+#include <orbis/optimize/chordal_initialization.hpp>
+#include <orbis/optimize/pose_graph.hpp>
+
+namespace optimize = orbis::optimize;
+
+struct settings {
+  std::string input, output, loss = "none", damping = "dogleg";
+  double width = 1.0;
+  int max_iterations = 100;
+  unsigned threads = 1;
+  bool chordal = false, json = false;
+};
+
+int complain(int code, const std::string& why) {
+  std::fprintf(stderr, "pose_graph: %s\n", why.c_str());
+  return code;
+}
+
+void print_json(const settings& s, const orbis::io::g2o_graph& graph, const optimize::pose_graph_summary& r) {
+  const auto& t = r.seconds;
+  std::printf(
+      "{\"status\": \"%s\", \"vertices\": %zu, \"edges\": %zu, \"initial_cost\": %.17g, \"final_cost\": %.17g, ",
+      to_string(r).c_str(), graph.vertices.size(), graph.edges.size(), r.initial_cost, r.final_cost);
+  if (s.loss == "none")
+    std::printf("\"chi2\": %.17g, ", 2.0 * r.final_cost);
+  else
+    std::printf("\"chi2\": null, ");
+  std::printf(
+      "\"iterations\": %d, \"factorizations\": %d, \"seconds\": {\"set_up\": %.6f, \"linearize\": %.6f, "
+      "\"factor\": %.6f, \"solve\": %.6f, \"evaluate\": %.6f}}\n",
+      r.iterations, r.factorizations, t.set_up, t.linearize, t.factor, t.solve, t.evaluate);
+}
+
+template <class Loss, class Damping>
+int run(const settings& s, orbis::io::g2o_graph& graph, Loss loss, Damping damping) {
+  optimize::pose_graph_solver<orbis::se3, Loss, Damping> solver{loss, damping};
+  if (!s.json) std::printf("%9s %20s %15s\n", "iteration", "cost", "factorizations");
+  const auto summary = solver.solve(
+      orbis::par.with(s.threads), std::span{graph.vertices}, graph.edges,
+      {.max_iterations = s.max_iterations, .fixed = graph.fixed, .hold = optimize::gauge::first_of_each_piece}, {},
+      [&](const optimize::pose_graph_summary& now) {
+        if (!s.json) std::printf("%9d %20.10g %15d\n", now.iterations, now.final_cost, now.factorizations);
+      });
+  if (is_failure(summary.status)) return complain(2, s.input + ": " + to_string(summary));
+  if (!s.output.empty())
+    if (const auto done = write_g2o(s.output, graph); !done) return complain(2, done.error().to_string());
+  if (s.json)
+    print_json(s, graph, summary);
+  else
+    std::printf("%s; half the sum of squares over %zu vertices and %zu edges\n", to_string(summary).c_str(),
+                graph.vertices.size(), graph.edges.size());
+  return 0;
+}
+
+template <class Loss>
+int run(const settings& s, orbis::io::g2o_graph& graph, Loss loss) {
+  if (s.damping == "gauss-newton") return run(s, graph, loss, optimize::gauss_newton{});
+  if (s.damping == "dogleg") return run(s, graph, loss, optimize::dogleg{});
+  return run(s, graph, loss, optimize::levenberg_marquardt{});
+}
+
+int main(int argc, char** argv) {
+  settings s;
+  CLI::App cli{"Optimises the poses of a g2o file (VERTEX_SE3:QUAT, EDGE_SE3:QUAT, FIX)", "pose_graph"};
+  cli.add_option("FILE", s.input, "the graph")->required();
+  cli.add_option("--output", s.output, "where to write the graph with its new poses");
+  cli.add_option("--loss", s.loss, "robust loss")->check(CLI::IsMember({"none", "huber", "cauchy", "tukey"}));
+  cli.add_option("--width", s.width, "of the loss, in sigmas")->check(CLI::PositiveNumber)->capture_default_str();
+  cli.add_option("--damping", s.damping, "how to step")
+      ->check(CLI::IsMember({"gauss-newton", "levenberg-marquardt", "dogleg"}))
+      ->capture_default_str();
+  cli.add_option("--max-iterations", s.max_iterations)->check(CLI::NonNegativeNumber)->capture_default_str();
+  cli.add_option("--threads", s.threads, "0: all there are")->capture_default_str();
+  cli.add_flag("--chordal", s.chordal, "start from the edges alone, not from the file's poses");
+  cli.add_flag("--json", s.json, "print the summary as JSON");
+  try {
+    cli.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    return e.get_exit_code() == 0 ? cli.exit(e) : complain(1, e.what() + std::string{" (--help shows the usage)"});
+  }
+  auto graph = orbis::io::read_g2o(s.input);
+  if (!graph) return complain(2, graph.error().to_string());
+  if (s.chordal) {
+    const auto start =
+        optimize::initialize_chordally(std::span{graph->vertices}, graph->edges,
+                                       {.fixed = graph->fixed, .hold = optimize::gauge::first_of_each_piece});
+    if (is_failure(start.status)) return complain(2, s.input + ": " + to_string(start));
+  }
+  if (s.loss == "huber") return run(s, *graph, optimize::huber{s.width});
+  if (s.loss == "cauchy") return run(s, *graph, optimize::cauchy{s.width});
+  if (s.loss == "tukey") return run(s, *graph, optimize::tukey{s.width});
+  return run(s, *graph, optimize::trivial{});
+}
