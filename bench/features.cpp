@@ -1,18 +1,26 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // Feature extraction and matching beside OpenCV's.
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
+#include <filesystem>
 #include <string>
+#include <system_error>
 #include <vector>
 
 #include <benchmark/benchmark.h>
 #include <opencv2/core.hpp>
 #include <opencv2/features2d.hpp>
+#include <opencv2/imgproc.hpp>
 
 #include <orbis/core/random.hpp>
 #include <orbis/features.hpp>
 #include <orbis/interop/opencv.hpp>
+#include <orbis/io/image.hpp>
+
+#include "../tests/features/repeatability.hpp"
 
 namespace {
 
@@ -74,14 +82,63 @@ image<std::uint8_t> picture() {
   return im;
 }
 
-void orb_orbis(benchmark::State& state) {
-  const auto im = picture();
-  const features::orb_extractor extract{{.max_features = 1000, .levels = 8, .scale_factor = 1.2f}};
-  for (auto _ : state) benchmark::DoNotOptimize(extract(im));
+/// A frame of the kitchen, where the recording is; else none.
+image<std::uint8_t> kitchen() {
+  std::vector<std::filesystem::path> files;
+  std::error_code none;
+  for (const auto& entry : std::filesystem::directory_iterator(ORBIS_DATA_DIR "/kitchen/rgb", none))
+    files.push_back(entry.path());
+  if (files.size() < 200) return {};
+  std::sort(files.begin(), files.end());
+  const auto color = io::read_color(files[199]);
+  if (!color) return {};
+  image<std::uint8_t> grey(color->width(), color->height());
+  features::luma(simd::level::avx512, *color, grey);
+  return grey;
 }
 
-void orb_opencv(benchmark::State& state) {
-  const auto im = picture();
+features::features found_by_orbis(const image<std::uint8_t>& im, std::size_t count) {
+  return features::orb_extractor{{.max_features = static_cast<int>(count)}}(im);
+}
+
+features::features found_by_opencv(const image<std::uint8_t>& im, std::size_t count) {
+  std::vector<cv::KeyPoint> keypoints;
+  cv::Mat rows;
+  cv::ORB::create(static_cast<int>(count), 1.2F, 8)
+      ->detectAndCompute(interop::mat_over(im.view()), {}, keypoints, rows);
+  features::features f;
+  f.keypoints = interop::from_cv(keypoints);
+  f.descriptors.resize(keypoints.size());
+  for (std::size_t i = 0; i != keypoints.size(); ++i)
+    std::memcpy(f.descriptors[i].words.data(), rows.ptr(static_cast<int>(i)), sizeof f.descriptors[i]);
+  return f;
+}
+
+/// Coverage of the image, and means over its changes, at the number of features that OpenCV finds.
+template <class Find>
+void count_quality(benchmark::State& state, const image<std::uint8_t>& im, const Find& find) {
+  const auto f = find(im, found_by_opencv(im, 1000).size());
+  const auto changes = test::changes_of(im);
+  double repeatability = 0.0, matching_score = 0.0;
+  for (const auto& c : changes) {
+    const auto g = find(c.pixels, found_by_opencv(c.pixels, 1000).size());
+    const auto again = test::compared(f, g, c.map, im.width(), im.height());
+    repeatability += again.repeatability / static_cast<double>(changes.size());
+    matching_score += again.matching_score / static_cast<double>(changes.size());
+  }
+  state.counters["features"] = static_cast<double>(f.size());
+  state.counters["coverage"] = test::coverage(f, im.width(), im.height());
+  state.counters["repeatability"] = repeatability;
+  state.counters["matching_score"] = matching_score;
+}
+
+void orb_orbis(benchmark::State& state, const image<std::uint8_t>& im) {
+  const features::orb_extractor extract{{.max_features = 1000, .levels = 8, .scale_factor = 1.2f}};
+  for (auto _ : state) benchmark::DoNotOptimize(extract(im));
+  count_quality(state, im, found_by_orbis);
+}
+
+void orb_opencv(benchmark::State& state, const image<std::uint8_t>& im) {
   const auto orb = cv::ORB::create(1000, 1.2F, 8);
   for (auto _ : state) {
     std::vector<cv::KeyPoint> keypoints;
@@ -89,6 +146,131 @@ void orb_opencv(benchmark::State& state) {
     orb->detectAndCompute(interop::mat_over(im.view()), {}, keypoints, descriptors);
     benchmark::DoNotOptimize(keypoints);
   }
+  count_quality(state, im, found_by_opencv);
+}
+
+/// The stages of extraction, each with what the ones before it left.
+struct stages {
+  explicit stages(const image<std::uint8_t>& im, simd::level simd) : level{simd} {
+    pyramid.build(level, im, 8, 1.2, 39);
+    levels.resize(pyramid.size());
+    for (std::size_t i = 0; i != pyramid.size(); ++i) {
+      levels[i].area = {19, 19, pyramid[i].width() - 38, pyramid[i].height() - 38};
+      levels[i].scale = static_cast<double>(im.width()) / pyramid[i].width();
+      detect(i);
+    }
+    chosen = levels;
+    choose(chosen, 1000, distribution);
+  }
+  void detect(std::size_t i) { fast(level, pyramid[i], levels[i].area, {14, 3}, corners, levels[i].corners); }
+
+  simd::level level;
+  features::image_pyramid pyramid;
+  features::fast9 fast;
+  features::fast9::workspace corners;
+  features::cover_first choose;
+  features::cover_first::workspace distribution;
+  std::vector<features::level_corners> levels, chosen;
+};
+
+void pyramid_orbis(benchmark::State& state, const image<std::uint8_t>& im, simd::level level) {
+  stages s{im, level};
+  for (auto _ : state) {
+    s.pyramid.build(level, im, 8, 1.2, 39);
+    benchmark::ClobberMemory();
+  }
+}
+
+void pyramid_opencv(benchmark::State& state, const image<std::uint8_t>& im) {
+  std::vector<cv::Mat> levels(8);
+  levels[0] = interop::mat_over(im.view());
+  for (auto _ : state) {
+    double scale = 1.0;
+    for (std::size_t i = 1; i != levels.size(); ++i) {
+      scale *= 1.2;
+      const cv::Size size(cvRound(im.width() / scale), cvRound(im.height() / scale));
+      cv::resize(levels[i - 1], levels[i], size, 0, 0, cv::INTER_LINEAR_EXACT);
+    }
+    benchmark::ClobberMemory();
+  }
+}
+
+void fast_orbis(benchmark::State& state, const image<std::uint8_t>& im, simd::level level) {
+  stages s{im, level};
+  for (auto _ : state)
+    for (std::size_t i = 0; i != s.pyramid.size(); ++i) s.detect(i);
+}
+
+void fast_opencv(benchmark::State& state, const image<std::uint8_t>& im) {
+  stages s{im, simd::level::avx512};
+  std::vector<cv::KeyPoint> keypoints;
+  for (auto _ : state)
+    for (std::size_t i = 0; i != s.pyramid.size(); ++i) cv::FAST(interop::mat_over(s.pyramid[i]), keypoints, 7, true);
+}
+
+void distribution_orbis(benchmark::State& state, const image<std::uint8_t>& im, simd::level level) {
+  stages s{im, level};
+  for (auto _ : state) {
+    s.chosen = s.levels;
+    s.choose(s.chosen, 1000, s.distribution);
+  }
+}
+
+void orientation_orbis(benchmark::State& state, const image<std::uint8_t>& im, simd::level level) {
+  stages s{im, level};
+  for (auto _ : state)
+    for (std::size_t i = 0; i != s.pyramid.size(); ++i)
+      for (const features::corner& c : s.chosen[i].corners)
+        benchmark::DoNotOptimize(features::intensity_centroid{}(level, s.pyramid[i], c.x, c.y));
+}
+
+void smooth_orbis(benchmark::State& state, const image<std::uint8_t>& im, simd::level level) {
+  stages s{im, level};
+  features::steered_brief::workspace memory;
+  for (auto _ : state)
+    for (std::size_t i = 0; i != s.pyramid.size(); ++i)
+      features::steered_brief{}.prepare(level, s.pyramid[i], 0, s.pyramid[i].height(), memory);
+}
+
+void smooth_opencv(benchmark::State& state, const image<std::uint8_t>& im) {
+  stages s{im, simd::level::avx512};
+  cv::Mat smoothed;
+  for (auto _ : state)
+    for (std::size_t i = 0; i != s.pyramid.size(); ++i)
+      cv::GaussianBlur(interop::mat_over(s.pyramid[i]), smoothed, {7, 7}, 2, 2, cv::BORDER_REFLECT_101);
+}
+
+void brief_orbis(benchmark::State& state, const image<std::uint8_t>& im, simd::level level) {
+  stages s{im, level};
+  std::vector<features::steered_brief::workspace> memory(s.pyramid.size());
+  for (std::size_t i = 0; i != s.pyramid.size(); ++i)
+    features::steered_brief{}.prepare(level, s.pyramid[i], 0, s.pyramid[i].height(), memory[i]);
+  const features::orientation direction{0.5F, 0.87758F, 0.47943F};
+  for (auto _ : state)
+    for (std::size_t i = 0; i != s.pyramid.size(); ++i)
+      for (const features::corner& c : s.chosen[i].corners)
+        benchmark::DoNotOptimize(features::steered_brief{}(level, memory[i], c.x, c.y, direction));
+}
+
+void register_extraction(const std::string& scene, const image<std::uint8_t>& im) {
+  const auto add = [](const std::string& name, auto function) {
+    benchmark::RegisterBenchmark(name.c_str(), function)->Unit(benchmark::kMillisecond);
+  };
+  add("orb/" + scene + "/whole/orbis", [im](auto& s) { orb_orbis(s, im); });
+  add("orb/" + scene + "/whole/opencv", [im](auto& s) { orb_opencv(s, im); });
+  const auto stage = [&](const std::string& name, auto function) {
+    add("orb/" + scene + "/" + name + "/orbis", [=](auto& s) { function(s, im, simd::level::avx512); });
+    add("orb/" + scene + "/" + name + "/orbis_portable", [=](auto& s) { function(s, im, simd::level::portable); });
+  };
+  stage("pyramid", pyramid_orbis);
+  add("orb/" + scene + "/pyramid/opencv", [im](auto& s) { pyramid_opencv(s, im); });
+  stage("fast", fast_orbis);
+  add("orb/" + scene + "/fast/opencv", [im](auto& s) { fast_opencv(s, im); });
+  stage("distribution", distribution_orbis);
+  stage("orientation", orientation_orbis);
+  stage("smooth", smooth_orbis);
+  add("orb/" + scene + "/smooth/opencv", [im](auto& s) { smooth_opencv(s, im); });
+  stage("brief", brief_orbis);
 }
 
 const bool registered = [] {
@@ -106,8 +288,8 @@ const bool registered = [] {
     add("/cross_check/orbis", orbis_cross);
     add("/cross_check/opencv", [count](auto& s) { match_opencv_cross_check(s, count); });
   }
-  benchmark::RegisterBenchmark("orb/640x480/1000/orbis", orb_orbis)->Unit(benchmark::kMillisecond);
-  benchmark::RegisterBenchmark("orb/640x480/1000/opencv", orb_opencv)->Unit(benchmark::kMillisecond);
+  register_extraction("640x480", picture());
+  if (const auto im = kitchen(); !im.empty()) register_extraction("kitchen", im);
   return true;
 }();
 
