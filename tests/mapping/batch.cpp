@@ -95,6 +95,8 @@ TEST_CASE("bad keyframes are skipped or refused") {
   constexpr double inf = std::numeric_limits<double>::infinity();
   for (const orbis::mapping::map_options& bad :
        {orbis::mapping::map_options{.resolution = inf}, orbis::mapping::map_options{.integration = {.max_range = -1.0}},
+        orbis::mapping::map_options{.dense = {.flying_pixels = orbis::cloud::flying_pixel_options{.reach = 9}}},
+        orbis::mapping::map_options{.dense = {.voxel_size = -0.1}},
         orbis::mapping::map_options{.filter = {.statistical = {.neighbors = 0}}},
         orbis::mapping::map_options{.filter = {.automatic = {.neighbors = 0}}},
         orbis::mapping::map_options{.filter = {.radius = {.radius = -0.1}}}})
@@ -109,6 +111,30 @@ TEST_CASE("bad keyframes are skipped or refused") {
   REQUIRE(map.has_value());
   CHECK(map->skipped == 1);
   CHECK(map->cloud.points == one->cloud.points);
+}
+
+TEST_CASE("a map without flying pixels says how many there were") {
+  const auto scene = orbis::test::edge_scene(3);
+  const orbis::mapping::map_options plain{.dense = {.stride = 1}, .filter = {.kind = filter_kind::none}};
+  auto options = plain;
+  options.dense.flying_pixels.emplace();
+  const auto map = build_map(orbis::par, scene.keyframes(), scene.camera, options);
+  const auto all = build_map(orbis::par, scene.keyframes(), scene.camera, plain);
+  REQUIRE(map.has_value());
+  REQUIRE(all.has_value());
+  CHECK(map->flying_pixels.removed > 150);
+  CHECK(map->flying_pixels.removed < 300);
+  CHECK(map->flying_pixels.valid == all->cloud.size());
+  CHECK(map->cloud.size() == map->flying_pixels.valid - map->flying_pixels.removed);
+  CHECK(map->filter.removed == 0);
+  CHECK(all->flying_pixels.valid == 0);
+  const auto between = [](const auto& octree) {
+    std::size_t n = 0;
+    octree.for_each_leaf([&](const auto& l) { n += l.occupied && l.center.z() > 1.2 && l.center.z() < 1.7 ? 1 : 0; });
+    return n;
+  };
+  CHECK(between(all->octree) > 20);
+  CHECK(between(map->octree) == 0);
 }
 
 TEST_CASE("a keyframe's pose may be anything that converts to one") {

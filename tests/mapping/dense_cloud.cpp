@@ -261,7 +261,7 @@ TEST_CASE("a voxel holds the mean of what was measured in it") {
 }
 
 TEST_CASE("flying pixels never become points") {
-  const auto scene = orbis::test::wall_scene(2, 30);
+  const auto scene = orbis::test::edge_scene(2);
   const orbis::camera::ray_table rays{scene.camera};
   for (const double voxel : {0.0, 0.02}) {
     dense_cloud all{rays, {.stride = 1, .voxel_size = voxel}};
@@ -273,6 +273,11 @@ TEST_CASE("flying pixels never become points") {
     CHECK(measured == count.valid);
     CHECK(fewer.splice(orbis::par, k) == count.valid - count.removed);
     CHECK(fewer.measurements(orbis::seq, k, 0).size() == count.valid - count.removed);
+    CHECK(count.removed > 50);
+    CHECK(fewer.flying_pixels() == count);
+    CHECK(all.flying_pixels() == orbis::cloud::flying_pixel_count{});
+    fewer.remove(orbis::seq, k, 0);
+    CHECK(fewer.flying_pixels() == orbis::cloud::flying_pixel_count{});
   }
 }
 

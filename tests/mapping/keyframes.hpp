@@ -59,4 +59,16 @@ inline scene wall_scene(std::size_t frames, std::uint32_t wild = 0) {
   return out;
 }
 
+/// The wall with a board before it, and along the board's sides pixels that measure something between
+/// the two.
+inline scene edge_scene(std::size_t frames) {
+  scene out = wall_scene(frames);
+  for (auto& depth : out.depth) {
+    for (int y = 8; y != 40; ++y) {
+      for (int x = 20; x <= 44; ++x) depth(x, y) = x == 20 || x == 44 ? 1500 : 1000;
+    }
+  }
+  return out;
+}
+
 }  // namespace orbis::test

@@ -48,9 +48,10 @@ concept scan_map = std::constructible_from<M, double> && std::movable<M> &&
 /// The map, and how it came to be.
 template <class Octree>
 struct built_map {
-  point_cloud cloud{};                   ///< all keyframes' points, in the world
-  std::vector<std::uint32_t> inliers{};  ///< indices into `cloud` of the points that the filter kept, ascending
-  point_cloud filtered_cloud{};          ///< those points
+  point_cloud cloud{};                        ///< all keyframes' points, in the world
+  cloud::flying_pixel_count flying_pixels{};  ///< left out before they became points, if that was asked for
+  std::vector<std::uint32_t> inliers{};       ///< indices into `cloud` of the points that the filter kept, ascending
+  point_cloud filtered_cloud{};               ///< those points
   filter_report filter{};
   std::optional<Octree> unfiltered_octree{};
   Octree octree;                               ///< of the points that the filter kept, each seen from its own keyframe
@@ -75,6 +76,8 @@ template <scan_map Octree = octree::occupancy_octree<>, execution_policy Policy,
   if (!(options.resolution > 0) || !std::isfinite(options.resolution))
     return fail(errc::invalid_argument, "resolution", "must be positive");
   if (options.dense.stride <= 0) return fail(errc::invalid_argument, "stride", "must be positive");
+  if (const auto& flying = options.dense.flying_pixels; flying && (flying->reach < 1 || flying->reach > 8))
+    return fail(errc::invalid_argument, "flying_pixels.reach", "must be from 1 to 8");
   if (!(options.dense.voxel_size >= 0)) return fail(errc::invalid_argument, "voxel_size", "must not be negative");
   if (!(options.integration.max_range >= 0)) return fail(errc::invalid_argument, "max_range", "must not be negative");
   if (options.filter.automatic.neighbors == 0 || options.filter.statistical.neighbors == 0)
@@ -104,6 +107,7 @@ template <scan_map Octree = octree::occupancy_octree<>, execution_policy Policy,
   }
 
   map.cloud = dense.cloud(policy);
+  map.flying_pixels = dense.flying_pixels();
   filtered_indices filtered = filter_points(policy, map.cloud.points, dense.ranges(policy), options.filter);
   map.filter = std::move(filtered.report);
   map.inliers = std::move(filtered.inliers);

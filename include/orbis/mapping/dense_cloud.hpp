@@ -63,7 +63,7 @@ class dense_cloud {
     assert(contains(number));
     frame& f = frames_[number];
     if (merging()) {
-      measure(policy, k, f.T_world_camera);
+      static_cast<void>(measure(policy, k, f.T_world_camera));
       voxels_.remove(policy, parts_);
     } else {
       size_ -= f.cloud.size();
@@ -124,6 +124,15 @@ class dense_cloud {
     std::vector<float> out;
     for (const frame& f : frames_) out.insert(out.end(), f.ranges.begin(), f.ranges.end());
     return out;
+  }
+  /// How many pixels of the keyframes' whole images were looked at, and how many of them were left out.
+  [[nodiscard]] cloud::flying_pixel_count flying_pixels() const noexcept {
+    cloud::flying_pixel_count sum;
+    for (const frame& f : frames_) {
+      sum.valid += f.flying.valid;
+      sum.removed += f.flying.removed;
+    }
+    return sum;
   }
   /// All memory that is held beside the ray table, bytes.
   [[nodiscard]] std::size_t memory_bytes() const noexcept {
@@ -201,6 +210,7 @@ class dense_cloud {
     se3 T_world_camera{};
     bool present = false;
     bool colored = false;
+    cloud::flying_pixel_count flying{};
     point_cloud cloud{};  ///< where points are not merged
     std::vector<float> ranges{};
   };
@@ -219,7 +229,7 @@ class dense_cloud {
     present_ += 1;
     colored_ += f.colored ? 1 : 0;
     std::size_t measured = 0;
-    measure(policy, k, f.T_world_camera);
+    f.flying = measure(policy, k, f.T_world_camera);
     if (merging()) {
       voxels_.add(policy, parts_);
       for (const auto& part : parts_) measured += part.size() + part.without_voxel();
@@ -236,7 +246,7 @@ class dense_cloud {
 
   /// Fills `parts_`, or `plain_` where points are not merged.
   template <execution_policy Policy, keyframe_like Keyframe>
-  void measure(const Policy& policy, const Keyframe& k, const se3& T_world_camera) {
+  [[nodiscard]] cloud::flying_pixel_count measure(const Policy& policy, const Keyframe& k, const se3& T_world_camera) {
     const image_view<const rgb8> color = k.color;
     assert(color.empty() || (color.width() == rays_.width() && color.height() == rays_.height()));
     const std::size_t parts = reader_.parts(rays_, options_.stride);
@@ -244,20 +254,19 @@ class dense_cloud {
     if (merging()) {
       parts_.resize(parts, cloud::voxel_measurements{options_.voxel_size});
       for (auto& part : parts_) part.clear();
-      reader_.read(policy, k.depth, rays_, point_options(), T_world_camera,
-                   [&](std::size_t part, int x, int y, const vec3& point, float range) {
-                     parts_[part].push(point, color_at(x, y), range);
-                   });
-    } else {
-      plain_.resize(parts);
-      for (auto& part : plain_) part.clear();
-      reader_.read(policy, k.depth, rays_, point_options(), T_world_camera,
-                   [&](std::size_t part, int x, int y, const vec3& point, float range) {
-                     plain_[part].cloud.points.push_back(point.cast<float>());
-                     plain_[part].cloud.colors.push_back(color_at(x, y));
-                     plain_[part].ranges.push_back(range);
-                   });
+      return reader_.read(policy, k.depth, rays_, point_options(), T_world_camera,
+                          [&](std::size_t part, int x, int y, const vec3& point, float range) {
+                            parts_[part].push(point, color_at(x, y), range);
+                          });
     }
+    plain_.resize(parts);
+    for (auto& part : plain_) part.clear();
+    return reader_.read(policy, k.depth, rays_, point_options(), T_world_camera,
+                        [&](std::size_t part, int x, int y, const vec3& point, float range) {
+                          plain_[part].cloud.points.push_back(point.cast<float>());
+                          plain_[part].cloud.colors.push_back(color_at(x, y));
+                          plain_[part].ranges.push_back(range);
+                        });
   }
 
   struct plain_points {

@@ -40,20 +40,22 @@ class keyframe_points {
   /// Calls `f(part, x, y, point, range)` for the pixels with a valid depth and a ray: the point in the
   /// world, and its distance from the camera, metres. Within a part in the order of the pixels; parts may
   /// be on different threads. The same image, options and pose give the same bits, however they are
-  /// compiled. O(pixels).
+  /// compiled. Returns how many pixels of the whole image the filter has looked at and left out. O(pixels).
   /// @pre depth and rays have the same size; options.stride > 0
   template <execution_policy Policy, camera::depth_source Depth, class F>
-  void read(const Policy& policy, const Depth& depth, const camera::ray_table& rays,
-            const keyframe_point_options& options, const se3& T_world_camera, F&& f) {
+  cloud::flying_pixel_count read(const Policy& policy, const Depth& depth, const camera::ray_table& rays,
+                                 const keyframe_point_options& options, const se3& T_world_camera, F&& f) {
     assert(depth.width() == rays.width() && depth.height() == rays.height() && options.stride > 0);
     if (options.flying_pixels) {
       if (filtered_.width() != rays.width() || filtered_.height() != rays.height())
         filtered_ = image<float>(rays.width(), rays.height());
-      cloud::remove_flying_pixels(policy, depth, filtered_.view(), *options.flying_pixels, workspace_);
+      const auto count =
+          cloud::remove_flying_pixels(policy, depth, filtered_.view(), *options.flying_pixels, workspace_);
       read_all(policy, camera::depth_view<float>(filtered_.view()), rays, options, T_world_camera, f);
-    } else {
-      read_all(policy, depth, rays, options, T_world_camera, f);
+      return count;
     }
+    read_all(policy, depth, rays, options, T_world_camera, f);
+    return {};
   }
 
  private:
