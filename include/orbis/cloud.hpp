@@ -32,6 +32,7 @@
 #include <orbis/cloud/ray_evidence_kernels.hpp>
 #include <orbis/cloud/ray_evidence_simd.hpp>
 #include <orbis/cloud/ray_view.hpp>
+#include <orbis/cloud/reported_chunks.hpp>
 #include <orbis/cloud/select.hpp>
 #include <orbis/cloud/sensor_origins.hpp>
 #include <orbis/cloud/squared_distance.hpp>

@@ -17,8 +17,11 @@
 #include <orbis/cloud/all_knn_leaves.hpp>
 #include <orbis/cloud/all_knn_search.hpp>
 #include <orbis/cloud/neighbors.hpp>
+#include <orbis/cloud/reported_chunks.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/point.hpp>
+#include <orbis/core/progress.hpp>
+#include <orbis/core/result.hpp>
 #include <orbis/core/simd.hpp>
 
 namespace orbis::cloud {
@@ -68,7 +71,8 @@ class neighbor_row {
 
 /// `all_knn` with the inner loops for `level`.
 template <execution_policy Policy, point_range Points>
-[[nodiscard]] neighbor_table all_knn_at(simd::level level, const Policy& policy, const Points& points, std::size_t k) {
+[[nodiscard]] neighbor_table all_knn_at(simd::level level, const Policy& policy, const Points& points, std::size_t k,
+                                        const progress& report = {}, bool* finished = nullptr) {
   const std::size_t count = std::ranges::size(points);
   const leaf_hierarchy tree = make_leaves(policy, points, std::min(k, count) + 1);
   neighbor_table out;
@@ -79,7 +83,7 @@ template <execution_policy Policy, point_range Points>
   const knn_kernels kernels = select_knn_kernels(level);
   const std::size_t wanted = out.width + 1;  // with the point itself
   const auto row_of = [&](std::uint32_t i) { return std::span{out.rows}.subspan(i * out.width, out.width); };
-  for_each_chunk(policy, tree.leaves.size(), 128, [&](std::size_t begin, std::size_t end) {
+  const bool whole = for_each_reported_chunk(policy, tree.leaves.size(), 128, report, [&](auto begin, auto end) {
     nearest_search search{tree, kernels, wanted};
     neighbor_row row;
     for (std::size_t l = begin; l != end; ++l) {
@@ -95,6 +99,7 @@ template <execution_policy Policy, point_range Points>
       });
     }
   });
+  if (finished != nullptr) *finished = whole;
   // Those left out have the first of their copies for neighbours.
   for (const surplus_copy& copy : tree.left_out) {
     const auto row = row_of(copy.index);
@@ -116,6 +121,18 @@ template <execution_policy Policy, point_range Points>
 [[nodiscard]] neighbor_table all_knn(const Policy& policy, const Points& points, std::size_t k) {
   assert(k > 0);
   return detail::all_knn_at(simd::detected(), policy, points, k);
+}
+
+/// The same with reports of progress, in leaves of sixteen points; an error (`cancelled`) if the callback asks
+/// to stop.
+template <execution_policy Policy, point_range Points>
+[[nodiscard]] result<neighbor_table> all_knn(const Policy& policy, const Points& points, std::size_t k,
+                                             progress on_progress) {
+  assert(k > 0);
+  bool finished = true;
+  neighbor_table table = detail::all_knn_at(simd::detected(), policy, points, k, on_progress, &finished);
+  if (!finished) return detail::fail_cancelled();
+  return table;
 }
 
 }  // namespace orbis::cloud

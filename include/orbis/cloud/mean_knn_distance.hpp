@@ -15,8 +15,11 @@
 #include <orbis/cloud/all_knn.hpp>
 #include <orbis/cloud/all_knn_leaves.hpp>
 #include <orbis/cloud/all_knn_search.hpp>
+#include <orbis/cloud/reported_chunks.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/point.hpp>
+#include <orbis/core/progress.hpp>
+#include <orbis/core/result.hpp>
 #include <orbis/core/simd.hpp>
 
 namespace orbis::cloud {
@@ -61,7 +64,8 @@ struct mean_and_largest {
 /// `all_mean_knn_distance` with the inner loops for `level`.
 template <execution_policy Policy, point_range Points>
 [[nodiscard]] std::vector<float> all_mean_knn_distance_at(simd::level level, const Policy& policy, const Points& points,
-                                                          std::size_t k) {
+                                                          std::size_t k, const progress& report = {},
+                                                          bool* finished = nullptr) {
   assert(k > 0);
   std::vector<float> means(std::ranges::size(points), std::numeric_limits<float>::quiet_NaN());
   const leaf_hierarchy tree = make_leaves(policy, points, std::min(k, means.size()) + 1);
@@ -69,7 +73,7 @@ template <execution_policy Policy, point_range Points>
   if (wanted < 2) return means;
   for (const surplus_copy& copy : tree.left_out) means[copy.index] = 0;
   const knn_kernels kernels = select_knn_kernels(level);
-  for_each_chunk(policy, tree.leaves.size(), 128, [&](std::size_t begin, std::size_t end) {
+  const bool whole = for_each_reported_chunk(policy, tree.leaves.size(), 128, report, [&](auto begin, auto end) {
     nearest_search search{tree, kernels, wanted};
     for (std::size_t l = begin; l != end; ++l) {
       search.visit_leaf(l, [&](std::size_t i, std::span<float> found, float bound) {
@@ -79,6 +83,7 @@ template <execution_policy Policy, point_range Points>
       });
     }
   });
+  if (finished != nullptr) *finished = whole;
   return means;
 }
 
@@ -95,6 +100,18 @@ template <execution_policy Policy, point_range Points>
 template <execution_policy Policy, point_range Points>
 [[nodiscard]] std::vector<float> all_mean_knn_distance(const Policy& policy, const Points& points, std::size_t k) {
   return detail::all_mean_knn_distance_at(simd::detected(), policy, points, k);
+}
+
+/// The same with reports of progress, in leaves of sixteen points; an error (`cancelled`) if the callback asks
+/// to stop.
+template <execution_policy Policy, point_range Points>
+[[nodiscard]] result<std::vector<float>> all_mean_knn_distance(const Policy& policy, const Points& points,
+                                                               std::size_t k, progress on_progress) {
+  bool finished = true;
+  std::vector<float> means =
+      detail::all_mean_knn_distance_at(simd::detected(), policy, points, k, on_progress, &finished);
+  if (!finished) return detail::fail_cancelled();
+  return means;
 }
 
 /// For each point the mean distance in metres to the first `k` neighbours of its row, or to all of a

@@ -17,9 +17,12 @@
 #include <orbis/cloud/all_knn_leaves.hpp>
 #include <orbis/cloud/all_knn_search.hpp>
 #include <orbis/cloud/decision.hpp>
+#include <orbis/cloud/reported_chunks.hpp>
 #include <orbis/cloud/squared_distance.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/point.hpp>
+#include <orbis/core/progress.hpp>
+#include <orbis/core/result.hpp>
 #include <orbis/core/simd.hpp>
 
 namespace orbis::cloud {
@@ -106,20 +109,22 @@ class crowd_search {
 /// `radius_inliers` with the inner loops for `level`.
 template <execution_policy Policy, point_range Points>
 [[nodiscard]] std::vector<std::uint32_t> radius_inliers_at(simd::level level, const Policy& policy,
-                                                           const Points& points, const radius_options& options) {
+                                                           const Points& points, const radius_options& options,
+                                                           const progress& report = {}, bool* finished = nullptr) {
   assert(options.radius >= 0);
   const std::size_t count = std::ranges::size(points);
   const std::size_t enough = std::min(options.min_neighbors, count) + 1;  // with the point itself
   const leaf_hierarchy tree = make_leaves(policy, points, enough);
   std::vector<char> kept(count, options.non_finite == cloud::non_finite::keep ? 1 : 0);
   const knn_kernels kernels = select_knn_kernels(level);
-  for_each_chunk(policy, tree.leaves.size(), 128, [&](std::size_t begin, std::size_t end) {
+  const bool whole = for_each_reported_chunk(policy, tree.leaves.size(), 128, report, [&](auto begin, auto end) {
     crowd_search search{tree, kernels, static_cast<float>(options.radius), enough};
     for (std::size_t l = begin; l != end; ++l) {
       search.visit_leaf(
           l, [&](std::size_t i, bool has_enough) { kept[tree.members[l * leaf_width + i]] = has_enough ? 1 : 0; });
     }
   });
+  if (finished != nullptr) *finished = whole;
   // Enough copies of those left out are in the leaves.
   for (const surplus_copy& copy : tree.left_out) kept[copy.index] = 1;
   return indices_where(count, [&](std::size_t i) { return kept[i] != 0; });
@@ -135,6 +140,18 @@ template <execution_policy Policy, point_range Points>
 [[nodiscard]] std::vector<std::uint32_t> radius_inliers(const Policy& policy, const Points& points,
                                                         const radius_options& options = {}) {
   return detail::radius_inliers_at(simd::detected(), policy, points, options);
+}
+
+/// The same with reports of progress, in leaves of sixteen points; an error (`cancelled`) if the callback asks
+/// to stop.
+template <execution_policy Policy, point_range Points>
+[[nodiscard]] result<std::vector<std::uint32_t>> radius_inliers(const Policy& policy, const Points& points,
+                                                                const radius_options& options, progress on_progress) {
+  bool finished = true;
+  std::vector<std::uint32_t> inliers =
+      detail::radius_inliers_at(simd::detected(), policy, points, options, on_progress, &finished);
+  if (!finished) return detail::fail_cancelled();
+  return inliers;
 }
 
 }  // namespace orbis::cloud

@@ -19,6 +19,8 @@
 #include <orbis/cloud/mean_knn_distance.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/point.hpp>
+#include <orbis/core/progress.hpp>
+#include <orbis/core/result.hpp>
 #include <orbis/core/rounded.hpp>
 
 namespace orbis::cloud {
@@ -73,15 +75,37 @@ struct statistical_result {
   return out;
 }
 
+namespace detail {
+
+template <point_range Points>
+[[nodiscard]] statistical_result decide_statistically(const Points& points, std::vector<float> mean_distance,
+                                                      const statistical_options& options) {
+  statistical_result out = statistical_decision(std::move(mean_distance), options);
+  out.inliers =
+      inliers_by_score(points, out.mean_distance, options.non_finite, [&](float d) { return d > out.threshold; });
+  return out;
+}
+
+}  // namespace detail
+
 /// The same as `statistical_inliers`, with the scores and the threshold.
 template <execution_policy Policy, point_range Points>
 [[nodiscard]] statistical_result statistical_filter(const Policy& policy, const Points& points,
                                                     const statistical_options& options = {}) {
   assert(options.neighbors > 0);
-  statistical_result out = statistical_decision(all_mean_knn_distance(policy, points, options.neighbors), options);
-  out.inliers = detail::inliers_by_score(points, out.mean_distance, options.non_finite,
-                                         [&](float d) { return d > out.threshold; });
-  return out;
+  return detail::decide_statistically(points, all_mean_knn_distance(policy, points, options.neighbors), options);
+}
+
+/// The same with reports of progress, in leaves of sixteen points; an error (`cancelled`) if the callback asks
+/// to stop. For other filters give the callback to `all_mean_knn_distance` or `all_knn`, which take all the
+/// time, and decide on their results.
+template <execution_policy Policy, point_range Points>
+[[nodiscard]] result<statistical_result> statistical_filter(const Policy& policy, const Points& points,
+                                                            const statistical_options& options, progress on_progress) {
+  assert(options.neighbors > 0);
+  auto mean_distance = all_mean_knn_distance(policy, points, options.neighbors, on_progress);
+  if (!mean_distance) return fail(mean_distance.error());
+  return detail::decide_statistically(points, *std::move(mean_distance), options);
 }
 
 /// The indices, ascending, of the points whose mean distance to their `neighbors` nearest neighbours
