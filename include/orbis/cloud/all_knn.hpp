@@ -4,8 +4,6 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
-#include <bit>
 #include <cassert>
 #include <cmath>
 #include <cstddef>
@@ -17,6 +15,7 @@
 #include <orbis/cloud/all_knn_leaves.hpp>
 #include <orbis/cloud/all_knn_search.hpp>
 #include <orbis/cloud/neighbors.hpp>
+#include <orbis/cloud/rank_sort.hpp>
 #include <orbis/cloud/reported_chunks.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/point.hpp>
@@ -43,31 +42,17 @@ struct neighbor_table {
 
 namespace detail {
 
-/// Gathers the points within a distance and writes the nearest of them, the point itself left out.
-class neighbor_row {
- public:
-  void start() { keys_.clear(); }
-  /// Squared distances are not negative: their bits are ordered as they are.
-  void add(std::uint32_t index, float distance_squared) {
-    keys_.push_back(std::uint64_t{std::bit_cast<std::uint32_t>(distance_squared)} << 32U | index);
+/// Writes the nearest of what was gathered as a row, the point itself left out already.
+inline void write_row(rank_sorter& gathered, std::span<neighbor<float>> row) {
+  gathered.for_each([&](std::size_t rank, std::uint32_t index, float distance_squared) {
+    row[rank] = {index, std::sqrt(distance_squared)};
+    return rank + 1 != row.size();
+  });
+  // Different squares can have the same root.
+  if (!std::is_sorted(row.begin(), row.end(), nearest_sink<float>::less)) {
+    std::sort(row.begin(), row.end(), nearest_sink<float>::less);
   }
-  void write(std::uint32_t self, std::span<neighbor<float>> row) {
-    std::sort(keys_.begin(), keys_.end());
-    std::size_t n = 0;
-    for (auto key = keys_.begin(); n != row.size(); ++key) {
-      const auto index = static_cast<std::uint32_t>(*key & 0xffffffffU);
-      if (index == self) continue;
-      row[n++] = {index, std::sqrt(std::bit_cast<float>(static_cast<std::uint32_t>(*key >> 32U)))};
-    }
-    // Different squares can have the same root.
-    if (!std::is_sorted(row.begin(), row.end(), nearest_sink<float>::less)) {
-      std::sort(row.begin(), row.end(), nearest_sink<float>::less);
-    }
-  }
-
- private:
-  std::vector<std::uint64_t> keys_;
-};
+}
 
 /// `all_knn` with the inner loops for `level`.
 template <execution_policy Policy, point_range Points>
@@ -85,16 +70,18 @@ template <execution_policy Policy, point_range Points>
   const auto row_of = [&](std::uint32_t i) { return std::span{out.rows}.subspan(i * out.width, out.width); };
   const bool whole = for_each_reported_chunk(policy, tree.leaves.size(), 128, report, [&](auto begin, auto end) {
     nearest_search search{tree, kernels, wanted};
-    neighbor_row row;
+    rank_sorter gathered{level};
     for (std::size_t l = begin; l != end; ++l) {
       search.visit_leaf(l, [&](std::size_t i, std::span<float> found, float bound) {
         const float largest = found.size() < wanted
                                   ? std::numeric_limits<float>::infinity()
                                   : kernels.sum_nearest(found.data(), found.size(), wanted, bound).largest_squared;
-        row.start();
-        search.visit_within(l, i, largest, [&](std::uint32_t member, float d) { row.add(member, d); });
         const std::uint32_t self = tree.members[l * leaf_width + i];
-        row.write(self, row_of(self));
+        gathered.clear();
+        search.visit_within(l, i, largest, [&](std::uint32_t member, float d) {
+          if (member != self) gathered.add(member, d);
+        });
+        write_row(gathered, row_of(self));
         return largest;
       });
     }

@@ -154,13 +154,31 @@ class nearest_search {
     if (median <= most) usual_ = median;
   }
 
-  /// Calls `f(member, squared distance)` for every point within `bound` of the i-th of a leaf.
+  /// Calls `f(member, squared distance)` for every point within `bound` of the i-th of the leaf that is being
+  /// visited.
   template <class F>
   void visit_within(std::size_t l, std::size_t i, float bound, F&& f) {
-    for_each_within(*tree_, kernels_, query(l, i), bound, open_, [&](std::uint32_t member, float d) {
-      f(member, d);
-      return true;
-    });
+    const std::array<float, 3> q = query(l, i);
+    if (!(bound <= shared_reach_)) {
+      for_each_within(*tree_, kernels_, q, bound, open_, [&](std::uint32_t member, float d) {
+        f(member, d);
+        return true;
+      });
+      return;
+    }
+    const box3 box{q, q};
+    std::array<float, leaf_width> distance;
+    for (std::size_t first = 0; first < shared_.count; first += leaf_width) {
+      std::uint32_t mask = kernels_.near_boxes(shared_.boxes[first / leaf_width], box, bound, distance.data());
+      for (; mask != 0; mask &= mask - 1) {
+        const std::size_t leaf = shared_.leaves[first + static_cast<std::size_t>(std::countr_zero(mask))];
+        std::uint32_t within = kernels_.distances(tree_->leaves[leaf], q, bound, distance.data());
+        for (; within != 0; within &= within - 1) {
+          const auto n = static_cast<std::size_t>(std::countr_zero(within));
+          f(tree_->members[leaf * leaf_width + n], distance[n]);
+        }
+      }
+    }
   }
 
  private:
@@ -194,6 +212,7 @@ class nearest_search {
     const float hoped = std::min(usual_ * hoped_, most);
     const float reach = std::min(usual_ * reach_, most);
     const bool shared = gather_near(box, reach, shared_);
+    shared_reach_ = shared ? reach : -1.0F;
     std::array<found_within, leaf_width> results;
     for (std::size_t i = first; i != last; ++i) {
       float* const found = found_.data() + i * stride_;
@@ -296,9 +315,10 @@ class nearest_search {
   std::vector<float> found_;
   std::vector<pending> pending_;
   std::vector<open_row> open_;
-  float hoped_;       ///< what of `usual_` should suffice: its scatter falls with the number of neighbours
-  float reach_;       ///< what of `usual_` should suffice in any case
-  float usual_ = -1;  ///< squared distance to the `wanted`-th nearest; negative where not known yet
+  float hoped_;              ///< what of `usual_` should suffice: its scatter falls with the number of neighbours
+  float reach_;              ///< what of `usual_` should suffice in any case
+  float shared_reach_ = -1;  ///< squared distance from the run's box within which `shared_` is all there is
+  float usual_ = -1;         ///< squared distance to the `wanted`-th nearest; negative where not known yet
 };
 
 }  // namespace orbis::cloud::detail
