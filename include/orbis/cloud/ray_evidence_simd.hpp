@@ -74,19 +74,28 @@ inline void judge_avx2(const ray_view& view, const seen_block& seen, block_verdi
       if (_mm256_movemask_ps(inside) == 0) continue;
       const __m256 z = _mm256_load_ps(seen.depth.data() + i);
       const __m256 nearest = _mm256_mask_i32gather_ps(none, view.nearest, pixel, inside, 4);
-      const __m256 farthest = _mm256_mask_i32gather_ps(none, view.farthest, pixel, inside, 4);
-      const __m256 middle = _mm256_mask_i32gather_ps(none, view.middle, pixel, inside, 4);
       const __m256 margin = _mm256_add_ps(_mm256_set1_ps(view.margin),
                                           product_avx2(_mm256_set1_ps(view.margin_growth), product_avx2(z, z)));
       const auto near = [&](__m256 depth) ORBIS_TARGET("avx2") {
         return _mm256_cmp_ps(_mm256_andnot_ps(sign, _mm256_sub_ps(depth, z)), margin, _CMP_LE_OQ);
       };
-      const __m256 slack =
-          _mm256_add_ps(margin, product_avx2(_mm256_set1_ps(view.slant), _mm256_sub_ps(farthest, nearest)));
-      const __m256 beyond = _mm256_cmp_ps(_mm256_sub_ps(nearest, z), slack, _CMP_GT_OQ);
-      const __m256 measured = _mm256_or_ps(_mm256_or_ps(near(nearest), near(farthest)), near(middle));
-      through |= static_cast<std::uint32_t>(_mm256_movemask_ps(_mm256_and_ps(inside, beyond))) << (8 * half);
-      supported |= static_cast<std::uint32_t>(_mm256_movemask_ps(_mm256_and_ps(inside, measured))) << (8 * half);
+      // Mostly the nearest says it all, since rays do not pass through what it is near to.
+      __m256 measured = _mm256_and_ps(inside, near(nearest));
+      __m256 open = _mm256_andnot_ps(measured, inside);
+      if (_mm256_movemask_ps(open) != 0) {
+        const __m256 farthest = _mm256_mask_i32gather_ps(none, view.farthest, pixel, open, 4);
+        const __m256 slack =
+            _mm256_add_ps(margin, product_avx2(_mm256_set1_ps(view.slant), _mm256_sub_ps(farthest, nearest)));
+        const __m256 beyond = _mm256_and_ps(open, _mm256_cmp_ps(_mm256_sub_ps(nearest, z), slack, _CMP_GT_OQ));
+        through |= static_cast<std::uint32_t>(_mm256_movemask_ps(beyond)) << (8 * half);
+        measured = _mm256_or_ps(measured, _mm256_and_ps(open, near(farthest)));
+        open = _mm256_andnot_ps(_mm256_or_ps(measured, beyond), open);
+        if (_mm256_movemask_ps(open) != 0) {
+          const __m256 middle = _mm256_mask_i32gather_ps(none, view.middle, pixel, open, 4);
+          measured = _mm256_or_ps(measured, _mm256_and_ps(open, near(middle)));
+        }
+      }
+      supported |= static_cast<std::uint32_t>(_mm256_movemask_ps(measured)) << (8 * half);
     }
     verdict.through[w] = static_cast<std::uint16_t>(through);
     verdict.supported[w] = static_cast<std::uint16_t>(supported);
@@ -160,20 +169,27 @@ inline void judge_avx512(const ray_view& view, const seen_block& seen, block_ver
     if (inside == 0) continue;
     const __m512 z = _mm512_load_ps(seen.depth.data() + 16 * w);
     const __m512 nearest = _mm512_mask_i32gather_ps(none, inside, pixel, view.nearest, 4);
-    const __m512 farthest = _mm512_mask_i32gather_ps(none, inside, pixel, view.farthest, 4);
-    const __m512 middle = _mm512_mask_i32gather_ps(none, inside, pixel, view.middle, 4);
     const __m512 margin = _mm512_add_ps(_mm512_set1_ps(view.margin),
                                         product_avx512(_mm512_set1_ps(view.margin_growth), product_avx512(z, z)));
-    const auto near = [&](__m512 depth) ORBIS_TARGET("avx512f,avx512dq") {
-      const __m512 difference = _mm512_sub_ps(depth, z);
-      return static_cast<unsigned>(_mm512_mask_cmp_ps_mask(
-          inside, _mm512_castsi512_ps(_mm512_and_si512(_mm512_castps_si512(difference), _mm512_set1_epi32(0x7fffffff))),
-          margin, _CMP_LE_OQ));
+    const auto near = [&](__mmask16 lanes, __m512 depth) ORBIS_TARGET("avx512f,avx512dq") {
+      const __m512i difference = _mm512_castps_si512(_mm512_sub_ps(depth, z));
+      const __m512 absolute = _mm512_castsi512_ps(_mm512_and_si512(difference, _mm512_set1_epi32(0x7fffffff)));
+      return static_cast<unsigned>(_mm512_mask_cmp_ps_mask(lanes, absolute, margin, _CMP_LE_OQ));
     };
-    const __m512 slack =
-        _mm512_add_ps(margin, product_avx512(_mm512_set1_ps(view.slant), _mm512_sub_ps(farthest, nearest)));
-    verdict.through[w] = _mm512_mask_cmp_ps_mask(inside, _mm512_sub_ps(nearest, z), slack, _CMP_GT_OQ);
-    verdict.supported[w] = static_cast<std::uint16_t>(near(nearest) | near(farthest) | near(middle));
+    // Mostly the nearest says it all, since rays do not pass through what it is near to.
+    unsigned measured = near(inside, nearest);
+    auto open = static_cast<__mmask16>(inside & ~measured);
+    if (open != 0) {
+      const __m512 farthest = _mm512_mask_i32gather_ps(none, open, pixel, view.farthest, 4);
+      const __m512 slack =
+          _mm512_add_ps(margin, product_avx512(_mm512_set1_ps(view.slant), _mm512_sub_ps(farthest, nearest)));
+      const unsigned beyond = _mm512_mask_cmp_ps_mask(open, _mm512_sub_ps(nearest, z), slack, _CMP_GT_OQ);
+      verdict.through[w] = static_cast<std::uint16_t>(beyond);
+      measured |= near(open, farthest);
+      open = static_cast<__mmask16>(open & ~(measured | beyond));
+      if (open != 0) measured |= near(open, _mm512_mask_i32gather_ps(none, open, pixel, view.middle, 4));
+    }
+    verdict.supported[w] = static_cast<std::uint16_t>(measured);
   }
 }
 
