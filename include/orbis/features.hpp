@@ -14,8 +14,8 @@
 #include <orbis/features/grey.hpp>
 #include <orbis/features/grid.hpp>
 #include <orbis/features/hamming.hpp>
-#include <orbis/features/hamming_lanes.hpp>
 #include <orbis/features/hamming_nearest.hpp>
+#include <orbis/features/hamming_slices.hpp>
 #include <orbis/features/kept_memory.hpp>
 #include <orbis/features/match.hpp>
 #include <orbis/features/matcher.hpp>

@@ -1,19 +1,19 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The two nearest neighbours of many binary descriptors at once, by run-time dispatched kernels.
+/// The nearest neighbours of many binary descriptors at once, by run-time dispatched kernels.
 #pragma once
 
 #include <algorithm>
+#include <bit>
 #include <concepts>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <span>
 #include <vector>
 
 #include <orbis/core/simd.hpp>
 #include <orbis/features/hamming.hpp>
-#include <orbis/features/hamming_lanes.hpp>
+#include <orbis/features/hamming_slices.hpp>
 #include <orbis/features/nearest.hpp>
 
 namespace orbis::features {
@@ -22,69 +22,223 @@ namespace orbis::features {
 template <class Descriptor>
 concept has_hamming_kernel = std::same_as<Descriptor, binary_descriptor<256>>;
 
+/// Memory of `hamming_nearest`, which the next call uses again.
+struct hamming_workspace {
+  std::vector<detail::slice_query> queries;
+  std::vector<detail::slice_table> table;  ///< of the trains at hand
+  std::vector<std::uint32_t> reverse_distance;
+};
+
 namespace detail {
 
-using hamming_kernel = void(std::span<const binary_descriptor<256>>, std::span<const binary_descriptor<256>>,
-                            std::span<nearest_two>, std::span<std::uint32_t>);
+template <class Keep>
+using hamming_kernel = void(std::span<const binary_descriptor<256>>, std::span<const binary_descriptor<256>>, Keep&,
+                            std::span<std::uint32_t>, hamming_workspace&);
 
-inline void hamming_nearest_portable(std::span<const binary_descriptor<256>> queries,
-                                     std::span<const binary_descriptor<256>> trains, std::span<nearest_two> nearest,
-                                     std::span<std::uint32_t> reverse) {
-  nearest_by(hamming{}, queries, trains, nearest, reverse);
-}
-
-#if ORBIS_X86
-/// `hamming`, for functions compiled with the POPCNT instruction.
-struct hamming_builtin {
-  [[gnu::always_inline]] std::uint32_t operator()(const binary_descriptor<256>& a,
-                                                  const binary_descriptor<256>& b) const noexcept {
-    return static_cast<std::uint32_t>(
-        __builtin_popcountll(a.words[0] ^ b.words[0]) + __builtin_popcountll(a.words[1] ^ b.words[1]) +
-        __builtin_popcountll(a.words[2] ^ b.words[2]) + __builtin_popcountll(a.words[3] ^ b.words[3]));
+/// What a search found of each query so far, for any number of neighbours: rows of `k`, ascending.
+struct keep_k {
+  neighbor* rows;
+  std::size_t k;
+  [[nodiscard]] std::size_t rank() const noexcept { return k; }
+  [[nodiscard]] std::uint32_t limit(std::size_t q) const noexcept { return rows[q * k + k - 1].distance; }
+  /// @pre distance < limit(q); indices arrive ascending
+  [[gnu::always_inline]] void insert(std::size_t q, std::uint32_t index, std::uint32_t distance) const noexcept {
+    neighbor* const row = rows + q * k;
+    std::size_t at = k - 1;
+    for (; at != 0 && row[at - 1].distance > distance; --at) row[at] = row[at - 1];
+    row[at] = {index, distance};
   }
 };
 
+/// Likewise for the nearest and the distance of the second.
+struct keep_two {
+  nearest_two* nearest;
+  [[nodiscard]] static std::size_t rank() noexcept { return 2; }
+  [[nodiscard]] std::uint32_t limit(std::size_t q) const noexcept { return nearest[q].second_distance; }
+  [[gnu::always_inline]] void insert(std::size_t q, std::uint32_t index, std::uint32_t distance) const noexcept {
+    nearest_two& n = nearest[q];
+    if (distance < n.distance) {
+      n = {index, distance, n.distance};
+    } else {
+      n.second_distance = distance;
+    }
+  }
+};
+
+template <class Ops>
+[[gnu::always_inline]] inline std::uint32_t hamming_by(const binary_descriptor<256>& a,
+                                                       const binary_descriptor<256>& b) noexcept {
+  return Ops::ones(a.words[0] ^ b.words[0]) + Ops::ones(a.words[1] ^ b.words[1]) + Ops::ones(a.words[2] ^ b.words[2]) +
+         Ops::ones(a.words[3] ^ b.words[3]);
+}
+
+/// Pair by pair: for so few that slicing does not pay.
+template <class Ops, class Keep>
+[[gnu::always_inline]] inline void hamming_pairs(std::span<const binary_descriptor<256>> queries,
+                                                 std::span<const binary_descriptor<256>> trains, const Keep& keep,
+                                                 std::span<std::uint32_t> reverse, hamming_workspace& workspace) {
+  workspace.reverse_distance.assign(reverse.size(), no_neighbor);
+  for (std::size_t q = 0; q != queries.size(); ++q) {
+    const binary_descriptor<256> query = queries[q];
+    std::uint32_t limit = keep.limit(q);
+    for (std::size_t t = 0; t != trains.size(); ++t) {
+      const std::uint32_t distance = hamming_by<Ops>(query, trains[t]);
+      if (distance < limit) {
+        keep.insert(q, static_cast<std::uint32_t>(t), distance);
+        limit = keep.limit(q);
+      }
+      if (!reverse.empty() && distance < workspace.reverse_distance[t]) {
+        workspace.reverse_distance[t] = distance;
+        reverse[t] = static_cast<std::uint32_t>(q);
+      }
+    }
+  }
+}
+
+/// Calls `visit(index)` for every bit that is set in both, ascending.
+template <class Visit>
+[[gnu::always_inline]] inline void for_each_bit(const slice& bits, const slice& valid, Visit&& visit) {
+  for (std::size_t w = 0; w != 4; ++w)
+    for (std::uint64_t rest = bits.words[w] & valid.words[w]; rest != 0; rest &= rest - 1)
+      visit(64 * w + static_cast<std::size_t>(std::countr_zero(rest)));
+}
+
+/// 256 trains after 256 trains, each block against all queries while its table is in the first-level cache.
+template <class Ops, class Keep>
+[[gnu::always_inline]] inline void hamming_slices(std::span<const binary_descriptor<256>> queries,
+                                                  std::span<const binary_descriptor<256>> trains, const Keep& keep,
+                                                  std::span<std::uint32_t> reverse, hamming_workspace& workspace) {
+  workspace.table.resize(1);
+  workspace.queries.resize(queries.size());
+  for (std::size_t q = 0; q != queries.size(); ++q) make_slice_query(queries[q], workspace.queries[q]);
+  slice_table& table = workspace.table.front();
+  for (std::size_t begin = 0; begin < trains.size(); begin += slice_trains) {
+    const auto block = trains.subspan(begin, std::min(slice_trains, trains.size() - begin));
+    make_slice_table(block, table);
+    slice valid;
+    for (std::size_t t = 0; t != block.size(); ++t) valid.words[t / 64] |= std::uint64_t{1} << (t % 64);
+    slice_distances least;
+    for (slice& plane : least) plane.words.fill(~std::uint64_t{0});
+    const std::size_t rank = std::min(keep.rank(), block.size());
+    std::uint32_t guess = 0;
+
+    for (std::size_t q = 0; q != queries.size(); ++q) {
+      slice_distances distances;
+      slice below;
+      std::uint32_t limit = keep.limit(q);
+      const bool first = limit == no_neighbor;
+      slice_count<Ops>(table, workspace.queries[q], first ? guess : limit, distances, below);
+      if (first) {
+        // The last queries tell about where the nearest lie; the exact limit costs more.
+        std::size_t found = 0;
+        for (std::size_t w = 0; w != 4; ++w) found += Ops::ones(below.words[w] & valid.words[w]);
+        if (found < rank || found > 4 * rank + 8) {
+          limit = slice_ranked<Ops>(distances, valid, rank) + 1;
+          slice_below<Ops>(distances, limit, below);
+          guess = limit + 3;
+        }
+      }
+      for_each_bit(
+          below, valid, [&](std::size_t t) __attribute__((always_inline)) {
+            const std::uint32_t distance = hamming_by<Ops>(queries[q], block[t]);
+            if (distance < keep.limit(q)) keep.insert(q, static_cast<std::uint32_t>(begin + t), distance);
+          });
+      if (reverse.empty()) continue;
+      slice_lower<Ops>(distances, least, below);
+      for_each_bit(
+          below, valid, [&](std::size_t t) __attribute__((always_inline)) {
+            reverse[begin + t] = static_cast<std::uint32_t>(q);
+          });
+    }
+  }
+}
+
+template <class Ops, class Keep>
+[[gnu::always_inline]] inline void hamming_search(std::span<const binary_descriptor<256>> queries,
+                                                  std::span<const binary_descriptor<256>> trains, const Keep& keep,
+                                                  std::span<std::uint32_t> reverse, hamming_workspace& workspace) {
+  // A table costs about as much as a dozen queries save; a block costs the same however few trains it holds.
+  if (queries.size() < 16 || trains.size() < 64) {
+    hamming_pairs<Ops>(queries, trains, keep, reverse, workspace);
+  } else {
+    hamming_slices<Ops>(queries, trains, keep, reverse, workspace);
+  }
+}
+
+template <class Keep>
+void hamming_search_portable(std::span<const binary_descriptor<256>> queries,
+                             std::span<const binary_descriptor<256>> trains, Keep& keep,
+                             std::span<std::uint32_t> reverse, hamming_workspace& workspace) {
+  hamming_search<slice_ops_portable>(queries, trains, keep, reverse, workspace);
+}
+#if ORBIS_X86
+template <class Keep>
 ORBIS_TARGET("popcnt")
-inline void hamming_nearest_popcnt(std::span<const binary_descriptor<256>> queries,
-                                   std::span<const binary_descriptor<256>> trains, std::span<nearest_two> nearest,
-                                   std::span<std::uint32_t> reverse) {
-  nearest_by(hamming_builtin{}, queries, trains, nearest, reverse);
+void hamming_search_popcnt(std::span<const binary_descriptor<256>> queries,
+                           std::span<const binary_descriptor<256>> trains, Keep& keep, std::span<std::uint32_t> reverse,
+                           hamming_workspace& workspace) {
+  hamming_search<slice_ops_popcnt>(queries, trains, keep, reverse, workspace);
 }
-
-inline void hamming_nearest_avx2(std::span<const binary_descriptor<256>> queries,
-                                 std::span<const binary_descriptor<256>> trains, std::span<nearest_two> nearest,
-                                 std::span<std::uint32_t> reverse) {
-  nearest_in_lanes(lane_pass_avx2, queries, trains, nearest, reverse);
+template <class Keep>
+ORBIS_TARGET("avx2,popcnt,bmi,bmi2")
+void hamming_search_avx2(std::span<const binary_descriptor<256>> queries,
+                         std::span<const binary_descriptor<256>> trains, Keep& keep, std::span<std::uint32_t> reverse,
+                         hamming_workspace& workspace) {
+  hamming_search<slice_ops_avx2>(queries, trains, keep, reverse, workspace);
 }
-
-inline void hamming_nearest_avx512(std::span<const binary_descriptor<256>> queries,
-                                   std::span<const binary_descriptor<256>> trains, std::span<nearest_two> nearest,
-                                   std::span<std::uint32_t> reverse) {
-  nearest_in_lanes(__builtin_cpu_supports("avx512vpopcntdq") ? lane_pass_vpopcnt : lane_pass_avx512, queries, trains,
-                   nearest, reverse);
+template <class Keep>
+ORBIS_TARGET("avx2,popcnt,bmi,bmi2,avx512f,avx512vl")
+void hamming_search_avx512(std::span<const binary_descriptor<256>> queries,
+                           std::span<const binary_descriptor<256>> trains, Keep& keep, std::span<std::uint32_t> reverse,
+                           hamming_workspace& workspace) {
+  hamming_search<slice_ops_avx512>(queries, trains, keep, reverse, workspace);
 }
 #endif
+
+template <class Keep>
+void hamming_dispatch(simd::level level, std::span<const binary_descriptor<256>> queries,
+                      std::span<const binary_descriptor<256>> trains, Keep keep, std::span<std::uint32_t> reverse,
+                      hamming_workspace& workspace) {
+#if ORBIS_X86
+  simd::select<hamming_kernel<Keep>>(level, {.portable = hamming_search_portable<Keep>,
+                                             .popcnt = hamming_search_popcnt<Keep>,
+                                             .avx2 = hamming_search_avx2<Keep>,
+                                             .avx512 = hamming_search_avx512<Keep>})(queries, trains, keep, reverse,
+                                                                                     workspace);
+#else
+  static_cast<void>(level);
+  hamming_search_portable<Keep>(queries, trains, keep, reverse, workspace);
+#endif
+}
 
 }  // namespace detail
 
 /// For each query its nearest and second nearest train; if `reverse` is not empty, for each train
-/// its nearest query (the lowest on ties). Every level gives the same answer. O(queries x trains)
-/// time, O(queries + trains) memory.
+/// its nearest query (the lowest on ties), in the same pass. Every level gives the same answer.
+/// O(queries x trains) time, O(queries + trains) memory, all of it in `workspace`.
 /// @pre nearest.size() == queries.size(); reverse is empty or of the size of trains
 inline void hamming_nearest(simd::level level, std::span<const binary_descriptor<256>> queries,
                             std::span<const binary_descriptor<256>> trains, std::span<nearest_two> nearest,
+                            std::span<std::uint32_t> reverse, hamming_workspace& workspace) {
+  std::fill(nearest.begin(), nearest.end(), nearest_two{});
+  detail::hamming_dispatch(level, queries, trains, detail::keep_two{nearest.data()}, reverse, workspace);
+}
+/// The same, with memory of its own.
+inline void hamming_nearest(simd::level level, std::span<const binary_descriptor<256>> queries,
+                            std::span<const binary_descriptor<256>> trains, std::span<nearest_two> nearest,
                             std::span<std::uint32_t> reverse) {
-  // The vector kernels pack distance and index into 32 bits.
-  if (std::max(queries.size(), trains.size()) > detail::most_in_lanes) level = std::min(level, simd::level::popcnt);
-#if ORBIS_X86
-  simd::select<detail::hamming_kernel>(level, {.portable = detail::hamming_nearest_portable,
-                                               .popcnt = detail::hamming_nearest_popcnt,
-                                               .avx2 = detail::hamming_nearest_avx2,
-                                               .avx512 = detail::hamming_nearest_avx512})(queries, trains, nearest,
-                                                                                          reverse);
-#else
-  detail::hamming_nearest_portable(queries, trains, nearest, reverse);
-#endif
+  hamming_workspace workspace;
+  hamming_nearest(level, queries, trains, nearest, reverse, workspace);
+}
+
+/// For each query its `k` nearest trains by ascending distance, then index: row `q` begins at
+/// `nearest[q * k]`, and what there are too few trains for is left at the default.
+/// @pre k > 0; nearest.size() == queries.size() * k
+inline void hamming_k_nearest(simd::level level, std::span<const binary_descriptor<256>> queries,
+                              std::span<const binary_descriptor<256>> trains, std::size_t k,
+                              std::span<neighbor> nearest, hamming_workspace& workspace) {
+  std::fill(nearest.begin(), nearest.end(), neighbor{});
+  detail::hamming_dispatch(level, queries, trains, detail::keep_k{nearest.data(), k}, {}, workspace);
 }
 
 }  // namespace orbis::features

@@ -11,6 +11,16 @@
 
 namespace orbis::features {
 
+/// In place of an index or a distance that does not exist.
+inline constexpr std::uint32_t no_neighbor = std::numeric_limits<std::uint32_t>::max();
+
+/// One of the nearest.
+struct neighbor {
+  std::uint32_t index = no_neighbor;
+  std::uint32_t distance = no_neighbor;
+  friend constexpr bool operator==(const neighbor&, const neighbor&) = default;
+};
+
 /// The nearest of a set, the lowest index on ties, and the distance of the second nearest; the
 /// largest number where there is none.
 struct nearest_two {
