@@ -213,8 +213,38 @@ def depth_images():
     write("integrate_depth", "one_pixel", start(0, 0, 4, base=3) + shot(0) + shot(3))
 
 
+def pose_graphs():
+    def vertex(i, pose="0 0 0 0 0 0 1"):
+        return f"VERTEX_SE3:QUAT {i} {pose}\n"
+
+    def edge(a, b, pose="1 0 0 0 0 0 1", information="1 0 0 0 0 0 1 0 0 0 0 1 0 0 0 4 0 0 4 0 4"):
+        return f"EDGE_SE3:QUAT {a} {b} {pose} {information}\n"
+
+    def graph(name, *lines):
+        write("read_g2o", name, "".join(lines).encode())
+
+    ring = [vertex(i, f"{i} {i % 3} 0 0 0 0.{i} 1") for i in range(8)]
+    ring += [edge(i, (i + 1) % 8, "1 0 0 0 0 0.38 0.92") for i in range(8)]
+    graph("empty")
+    graph("ring", *ring)
+    graph("fixed", "FIX 3 5\n", *ring, "FIX 0\n")
+    graph("clique", *[vertex(i) for i in range(7)], *[edge(a, b) for a in range(7) for b in range(a)])
+    graph("twice_and_back", vertex(1), vertex(2), edge(1, 2), edge(2, 1, "-2 0 0 0 0 0 1"), edge(1, 2, "1.1 0 0 0 0 0 -1"))
+    graph("two_pieces", *map(vertex, range(5)), edge(0, 1), edge(2, 3), edge(3, 4))
+    graph("loose", vertex(0), vertex(1), edge(0, 1, information="0 " * 6 + "1 0 0 0 0 1 0 0 0 4 0 0 4 0 4"))
+    graph("half_turns", vertex(0), vertex(1), edge(0, 1, "0 0 0 0 0 1 0"), edge(0, 1, "0 0 0 0 0 0 1"))
+    graph("huge", vertex(0, "1e300 0 0 0 0 0 1"), vertex(1, "-1e300 0 0 0 0 0 1"), edge(0, 1, "1e308 0 0 0 0 0 1"))
+    graph("tiny", vertex(0), vertex(1), edge(0, 1, information="1e-300 0 0 0 0 0 " + "1e-300 0 0 0 0 1e-300 0 0 0 1 0 0 1 0 1"))
+    graph("itself", vertex(0), vertex(1), edge(1, 1))
+    graph("nowhere", vertex(0), edge(0, 7))
+    graph("cut", vertex(0), vertex(1), edge(0, 1)[:-9])
+    graph("many_fixed", vertex(0), "FIX" + " 0" * 2000)
+    graph("others", "# comment\r\n", vertex(0), "PARAMS_SE3OFFSET 0 0 0 0 0 0 0 1\n", "VERTEX_SE2 1 0 0 0\n")
+
+
 if __name__ == "__main__":
     readers()
+    pose_graphs()
     scans()
     edits()
     depth_images()
