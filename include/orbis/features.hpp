@@ -4,6 +4,7 @@
 #pragma once
 
 #include <orbis/features/binomial.hpp>
+#include <orbis/features/box_difference.hpp>
 #include <orbis/features/brute_force.hpp>
 #include <orbis/features/corner.hpp>
 #include <orbis/features/cover_first.hpp>

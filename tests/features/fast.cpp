@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <tuple>
 #include <vector>
@@ -53,7 +54,7 @@ image<std::uint8_t> smoothed(const image<std::uint8_t>& im) {
 }  // namespace
 
 TEST_CASE("FAST corners without smoothing and ties are OpenCV's, at every level") {
-  const fast9 plain{.smooth = false, .ties = false};
+  const fast9 plain{.smooth = false, .ties = false, .subpixel = false};
   const auto level = GENERATE(simd::level::portable, simd::level::popcnt, simd::level::avx2, simd::level::avx512);
   for (const auto& [width, height] : {std::pair{320, 240}, {7, 7}, {8, 30}, {21, 22}, {38, 39}, {70, 50}, {133, 61}})
     for (const int threshold : {1, 2, 7, 20, 100}) {
@@ -96,8 +97,8 @@ TEST_CASE("smoothing before the segment test is a binomial, at every level") {
     const auto im = test::noise(width, height, 4);
     const test::embedded_image embedded{im};
     const auto expected = opencv(smoothed(im), 5);
-    CHECK(found({.ties = false}, level, im, whole(im), {5, 5}) == expected);
-    CHECK(found({.ties = false}, level, embedded.view(), whole(im), {5, 5}) == expected);
+    CHECK(found({.ties = false, .subpixel = false}, level, im, whole(im), {5, 5}) == expected);
+    CHECK(found({.ties = false, .subpixel = false}, level, embedded.view(), whole(im), {5, 5}) == expected);
   }
 }
 
@@ -107,21 +108,38 @@ TEST_CASE("of equal neighbours the last is a corner") {
   im(20, 20) = im(21, 20) = 200;
   im(10, 30) = im(10, 31) = 200;
   for (const auto level : test::simd_levels) {
-    CHECK(found({.smooth = false, .ties = false}, level, im, whole(im), {20, 20}).empty());
-    const std::vector<corner> last{{21, 20, 149.0F}, {10, 31, 149.0F}};
+    CHECK(found({.smooth = false, .ties = false, .subpixel = false}, level, im, whole(im), {20, 20}).empty());
+    const std::vector<corner> last{{21, 20, 149.0F, -0.5F, 0.0F}, {10, 31, 149.0F, 0.0F, -0.5F}};
     CHECK(found({.smooth = false}, level, im, whole(im), {20, 20}) == last);
   }
 }
 
 TEST_CASE("ties kept are peaks that no neighbour exceeds, one of each run of equals") {
   const auto im = test::blocks(200, 150, 5);  // steps of few sizes: many ties
-  const auto strict = found({.smooth = false, .ties = false}, simd::level::portable, im, whole(im), {7, 7});
+  const auto strict =
+      found({.smooth = false, .ties = false, .subpixel = false}, simd::level::portable, im, whole(im), {7, 7});
   const auto kept = found({.smooth = false}, simd::level::portable, im, whole(im), {7, 7});
   for (const auto level : test::simd_levels) CHECK(found({.smooth = false}, level, im, whole(im), {7, 7}) == kept);
   CHECK(kept.size() > strict.size());
   CHECK(std::includes(kept.begin(), kept.end(), strict.begin(), strict.end(), before_in_image));
   for (std::size_t i = 1; i < kept.size(); ++i)
     CHECK_FALSE((kept[i].y == kept[i - 1].y && kept[i].x == kept[i - 1].x + 1));
+}
+
+TEST_CASE("corners are located within the pixel, at every level alike") {
+  const auto im = test::moved(test::blocks(200, 150, 8), 0.3, 0, 0);
+  const auto corners = found({}, simd::level::portable, im, whole(im), {9, 9});
+  const auto whole_pixels = found({.subpixel = false}, simd::level::portable, im, whole(im), {9, 9});
+  REQUIRE(corners.size() == whole_pixels.size());
+  std::size_t moved = 0;
+  for (std::size_t i = 0; i != corners.size(); ++i) {
+    CHECK((corners[i].x == whole_pixels[i].x && corners[i].y == whole_pixels[i].y));
+    CHECK((whole_pixels[i].dx == 0.0F && whole_pixels[i].dy == 0.0F));
+    CHECK((std::abs(corners[i].dx) <= 0.5F && std::abs(corners[i].dy) <= 0.5F));
+    moved += corners[i].dx != 0.0F || corners[i].dy != 0.0F ? 1 : 0;
+  }
+  CHECK(moved > corners.size() / 2);
+  for (const auto level : test::simd_levels) CHECK(found({}, level, im, whole(im), {9, 9}) == corners);
 }
 
 TEST_CASE("a cell with a strong corner has no weak ones, the others keep theirs") {

@@ -245,6 +245,34 @@ TEST_CASE("noise, saturated and very large images have ORB features like any oth
   CHECK((corners[0][0] && corners[0][1] && corners[1][0] && corners[1][1]));
 }
 
+TEST_CASE("positions within the pixel are better than whole pixels") {
+  // The same picture, shifted by parts of a pixel: by how much do equal features miss each other?
+  struct whole_pixels : fast9 {
+    whole_pixels() { subpixel = false; }
+  };
+  const auto im = moved(blocks(400, 300, 11), 0.3, 0, 0);
+  const auto error = [&](const auto& extract) {
+    const auto f = extract(im);
+    double sum = 0.0;
+    std::size_t count = 0;
+    for (const auto& [dx, dy] : {std::pair{0.5, 0.25}, {0.3, -0.4}, {-0.25, 0.75}}) {
+      const auto g = extract(moved(im, 0.0, dx, dy));
+      for (const match& m : matcher(f, g)) {
+        const keypoint &a = f.keypoints[m.query], &b = g.keypoints[m.train];
+        const double off = std::hypot(static_cast<double>(b.x - a.x) - dx, static_cast<double>(b.y - a.y) - dy);
+        if (off > 3.0 || a.octave != b.octave) continue;
+        sum += off / static_cast<double>(a.size / 31.0F);
+        ++count;
+      }
+    }
+    REQUIRE(count > 300);
+    return sum / static_cast<double>(count);
+  };
+  const double within = error(orb_extractor{}), whole = error(basic_orb_extractor<whole_pixels>{});
+  INFO("mean error " << within << " pixels against " << whole);
+  CHECK(within < 0.7 * whole);
+}
+
 TEST_CASE("16-bit images must be narrowed first") {
   STATIC_REQUIRE(std::invocable<const orb_extractor&, image_view<const std::uint8_t>>);
   STATIC_REQUIRE(std::invocable<const orb_extractor&, image_view<const rgb8>>);

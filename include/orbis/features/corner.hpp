@@ -14,11 +14,13 @@
 
 namespace orbis::features {
 
-/// A corner of one pyramid level: integer pixel and strength.
+/// A corner of one pyramid level: pixel and strength, and where in the pixel it lies.
 struct corner {
   int x = 0;
   int y = 0;
   float response = 0.0F;
+  float dx = 0.0F;  ///< from the pixel's centre, at most half a pixel
+  float dy = 0.0F;
   friend constexpr bool operator==(const corner&, const corner&) = default;
 };
 

@@ -29,13 +29,16 @@ namespace orbis::features {
 /// such ones; the others keep all down to `weak`. As a response does not depend on the threshold, one
 /// pass finds both.
 ///
-/// Two things differ from other implementations by default, because they make corners come again
-/// (by several per cent, under noise and shifts most): a slight smoothing, and that a corner whose
-/// neighbour happens to be equal is not lost. Without both, the corners are OpenCV's.
+/// Three things differ from other implementations by default. A slight smoothing, and that a corner whose
+/// neighbour happens to be equal is not lost, make corners come again (by several per cent, under noise and shifts
+/// most). A parabola through the scores of the pixel and its neighbours tells where the peak is (a third less
+/// error). Without them the corners are OpenCV's.
 struct fast9 {
   int cell = 35;       ///< side, pixels; about the reach of a descriptor
   bool smooth = true;  ///< look at the image convolved with the binomial (1, 2, 1) / 4 in x and y
   bool ties = true;    ///< of equal neighbours the last by row, then column, is a corner; false: none of them
+
+  bool subpixel = true;  ///< fill in `dx` and `dy`
 
   struct workspace {
     std::vector<std::uint8_t> band;  ///< rows of the smoothed image
@@ -103,9 +106,14 @@ struct fast9 {
       const std::uint8_t* above = row_of(inner + 2);  // the slot before, cyclically; zero above the first row
       const std::size_t found = peaks_of(above, row, row_of(y), count, ties, memory.columns.data());
       for (std::size_t i = 0; i != found; ++i) {
-        const int x = left + static_cast<int>(memory.columns[i]);
-        if (x >= area.x && x < area.x + area.width)
-          corners.push_back({x, inner, static_cast<float>(row[memory.columns[i]] - 1)});
+        const std::uint32_t column = memory.columns[i];
+        const int x = left + static_cast<int>(column);
+        if (x < area.x || x >= area.x + area.width) continue;
+        corners.push_back({x, inner, static_cast<float>(row[column] - 1)});
+        if (!subpixel) continue;
+        const std::uint8_t* here = row + column;  // at column 0, what lies before is margin
+        corners.back().dx = peak_of(here[-1], here[0], here[1]);
+        corners.back().dy = peak_of(above[column], here[0], row_of(y)[column]);
       }
     }
   }
@@ -139,6 +147,11 @@ struct fast9 {
           memory.band.data() + static_cast<std::size_t>(y - first + circle_radius) * pitch + margin - circle_radius;
       mix(line - 1, line, line + 1, columns, to);
     }
+  }
+
+  /// Where the parabola through three values at -1, 0 and 1 is highest. @pre the middle one is, and not all are equal
+  static float peak_of(int before, int middle, int after) {
+    return static_cast<float>(before - after) / static_cast<float>(2 * (before - 2 * middle + after));
   }
 
   void drop_weak(const region& area, int strong, workspace& memory, std::vector<corner>& corners) const {

@@ -154,7 +154,7 @@ class basic_orb_extractor {
         }
       }
       const auto to_level = [&](double at) { return image_pyramid::full_coordinate(at, full_size, level_size); };
-      // Half a pixel further on both sides: a keypoint is asked where it lies rounded to a pixel.
+      // Half a pixel further on both sides: a keypoint is asked where it lies, rounded to a pixel.
       const double begin = std::clamp(std::floor(to_level(first - 0.5)), static_cast<double>(border), 1e9);
       const double end =
           std::clamp(std::ceil(to_level(last + 0.5)) + 1.0, 0.0, static_cast<double>(level_size - border));
@@ -169,12 +169,14 @@ class basic_orb_extractor {
                             image_view<const std::uint8_t> image, image_view<const std::uint8_t> mask,
                             std::span<const region> regions) {
     if (mask.empty() && regions.empty()) return;
-    const auto pixel = [](int at, int level_size, int full_size) {
-      return std::clamp(static_cast<int>(std::lround(image_pyramid::full_coordinate(at, level_size, full_size))), 0,
-                        full_size - 1);
+    const auto pixel = [](int at, float within, int level_size, int full_size) {
+      return std::clamp(static_cast<int>(std::lround(
+                            image_pyramid::full_coordinate(at + static_cast<double>(within), level_size, full_size))),
+                        0, full_size - 1);
     };
     std::erase_if(corners, [&](const corner& c) {
-      const int x = pixel(c.x, level.width(), image.width()), y = pixel(c.y, level.height(), image.height());
+      const int x = pixel(c.x, c.dx, level.width(), image.width());
+      const int y = pixel(c.y, c.dy, level.height(), image.height());
       if (!mask.empty() && mask(x, y) == 0) return true;
       return !regions.empty() &&
              std::none_of(regions.begin(), regions.end(), [&](const region& r) { return r.contains(x, y); });
@@ -192,13 +194,14 @@ class basic_orb_extractor {
     for (const corner& c : corners) {
       const orientation o = orient_(options_.simd, level, c.x, c.y);
       found.descriptors.push_back(describe_(options_.simd, memory.descriptor, c.x, c.y, o));
-      found.keypoints.push_back(
-          {.x = static_cast<float>(image_pyramid::full_coordinate(c.x, level.width(), image.width())),
-           .y = static_cast<float>(image_pyramid::full_coordinate(c.y, level.height(), image.height())),
-           .size = size,
-           .angle = o.angle,
-           .response = c.response,
-           .octave = octave});
+      found.keypoints.push_back({.x = static_cast<float>(image_pyramid::full_coordinate(c.x + static_cast<double>(c.dx),
+                                                                                        level.width(), image.width())),
+                                 .y = static_cast<float>(image_pyramid::full_coordinate(
+                                     c.y + static_cast<double>(c.dy), level.height(), image.height())),
+                                 .size = size,
+                                 .angle = o.angle,
+                                 .response = c.response,
+                                 .octave = octave});
     }
   }
 
