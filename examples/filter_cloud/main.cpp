@@ -53,7 +53,7 @@ int main(int argc, char** argv) {
                     : filter == "range-statistical" ? range_statistical_inliers(par, p, {eye}, {k.value_or(50), sigma})
                     : filter == "cluster"           ? cluster_inliers(par, p, {k.value_or(12)})
                                           : (best = filter_automatically(par, p, {k.value_or(8), eye})).inliers;
-  const auto why = filter == "auto" ? std::string{to_string(best.choice.mode)} + ": " + best.choice.reason : filter;
+  const auto why = filter == "auto" ? to_string(best.choice.chain) + ": " + best.choice.reason : filter;
   if (auto ok = orbis::io::write_ply(output, extract(cloud, kept)); !ok) return complain(2, ok.error().to_string());
   std::printf("%zu points, %zu to filter, %zu kept; %s\n", read->size(), cloud.size(), kept.size(), why.c_str());
 }

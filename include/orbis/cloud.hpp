@@ -16,8 +16,11 @@
 #include <orbis/cloud/depth_rows.hpp>
 #include <orbis/cloud/depth_windows.hpp>
 #include <orbis/cloud/extract.hpp>
+#include <orbis/cloud/filter_chain.hpp>
+#include <orbis/cloud/filter_mode.hpp>
 #include <orbis/cloud/flying_pixels.hpp>
 #include <orbis/cloud/leaf_search.hpp>
+#include <orbis/cloud/local_shape.hpp>
 #include <orbis/cloud/log_density.hpp>
 #include <orbis/cloud/log_statistical.hpp>
 #include <orbis/cloud/mean_knn_distance.hpp>
@@ -27,6 +30,7 @@
 #include <orbis/cloud/point_blocks.hpp>
 #include <orbis/cloud/radius.hpp>
 #include <orbis/cloud/range_statistical.hpp>
+#include <orbis/cloud/rank_sort.hpp>
 #include <orbis/cloud/ray_evidence.hpp>
 #include <orbis/cloud/ray_evidence_counter.hpp>
 #include <orbis/cloud/ray_evidence_kernels.hpp>
@@ -34,9 +38,14 @@
 #include <orbis/cloud/ray_view.hpp>
 #include <orbis/cloud/reported_chunks.hpp>
 #include <orbis/cloud/select.hpp>
+#include <orbis/cloud/select_density.hpp>
+#include <orbis/cloud/select_evidence.hpp>
+#include <orbis/cloud/select_surroundings.hpp>
+#include <orbis/cloud/select_views.hpp>
 #include <orbis/cloud/sensor_origins.hpp>
 #include <orbis/cloud/squared_distance.hpp>
 #include <orbis/cloud/statistical.hpp>
+#include <orbis/cloud/view_trust.hpp>
 #include <orbis/cloud/voxel_brick.hpp>
 #include <orbis/cloud/voxel_grid.hpp>
 #include <orbis/cloud/voxel_hash.hpp>

@@ -3,11 +3,17 @@
 #include <cstdint>
 #include <limits>
 #include <string>
+#include <variant>
 #include <vector>
 
+#include <orbis/camera/any.hpp>
+#include <orbis/cloud/radius.hpp>
 #include <orbis/cloud/select.hpp>
+#include <orbis/cloud/statistical.hpp>
+#include <orbis/cloud/voxel_grid.hpp>
 
 #include "cloud/clouds.hpp"
+#include "cloud/views.hpp"
 #include "support/catch.hpp"
 
 using orbis::cloud::filter_automatically;
@@ -40,6 +46,18 @@ void add_uniform(orbis::test::points& cloud, std::size_t n, std::uint64_t seed) 
   }
 }
 
+bool has_step(const orbis::cloud::filter_chain& chain, filter_mode mode) {
+  return std::any_of(chain.begin(), chain.end(), [&](const auto& step) { return mode_of(step) == mode; });
+}
+
+std::vector<double> thresholds(const orbis::cloud::filter_choice& choice) {
+  std::vector<double> out;
+  for (const auto& step : choice.chain) {
+    if (const auto* density = std::get_if<orbis::cloud::density_step>(&step)) out.push_back(density->threshold);
+  }
+  return out;
+}
+
 }  // namespace
 
 TEST_CASE("a clean cloud is left nearly whole") {
@@ -62,7 +80,7 @@ TEST_CASE("uniform outliers are found") {
     add_uniform(cloud, outliers, 6);
     const auto result = filter_automatically(orbis::par, cloud, {.sensor_origin = orbis::vec3{0, 0, 0}});
     INFO(percent << " %: " << result.choice.reason);
-    CHECK(result.choice.mode != filter_mode::none);
+    CHECK_FALSE(result.choice.chain.empty());
     const score s = score_of(result.inliers, cloud.size(), outliers);
     CHECK(s.found > 0.85);
     CHECK(s.lost < 0.01);
@@ -77,11 +95,10 @@ TEST_CASE("the choice is the same under every policy and comes with its reason")
   for (const unsigned threads : {2U, 5U}) {
     const auto together = filter_automatically(orbis::par.with(threads), cloud);
     CHECK(together.inliers == alone.inliers);
-    CHECK(together.choice.threshold == alone.choice.threshold);
+    CHECK(to_string(together.choice.chain) == to_string(alone.choice.chain));
     CHECK(together.choice.reason == alone.choice.reason);
     const auto choice = orbis::cloud::select_filter(orbis::par.with(threads), cloud);
-    CHECK(choice.mode == alone.choice.mode);
-    CHECK(choice.threshold == alone.choice.threshold);
+    CHECK(thresholds(choice) == thresholds(alone.choice));
     CHECK(choice.reason == alone.choice.reason);
   }
 }
@@ -96,13 +113,13 @@ TEST_CASE("a reference over range wins where spacing depends on range") {
   const auto choice = orbis::cloud::select_filter(orbis::seq, cloud, {.sensor_origin = orbis::vec3{0, 0, 0}});
   REQUIRE(choice.evidence.range_scale.has_value());
   CHECK(*choice.evidence.range_scale < choice.evidence.global_scale);
-  CHECK(choice.reference.slope > 0.5);
+  CHECK(choice.evidence.density.front().mode == filter_mode::range_log_statistical);
 
   std::vector<float> ranges;
   for (const auto& p : cloud) ranges.push_back(p.norm());
   const auto given = orbis::cloud::select_filter(orbis::seq, cloud, {.ranges = ranges});
-  CHECK(given.mode == choice.mode);
-  CHECK(given.threshold == Approx(choice.threshold).epsilon(1e-4));
+  CHECK(to_string(given.chain) == to_string(choice.chain));
+  CHECK(given.evidence.density.front().threshold == Approx(choice.evidence.density.front().threshold).epsilon(1e-4));
 }
 
 TEST_CASE("automatic selection takes any cloud and never removes most of it") {
@@ -114,11 +131,12 @@ TEST_CASE("automatic selection takes any cloud and never removes most of it") {
     CHECK(result.inliers.size() <= finite);
     CHECK(2 * result.inliers.size() >= finite);
     CHECK(std::is_sorted(result.inliers.begin(), result.inliers.end()));
-    if (cloud.size() < 50) CHECK(result.choice.mode == filter_mode::none);
+    if (cloud.size() < 50) CHECK(result.choice.chain.empty());
+    CHECK(orbis::cloud::apply_filter(orbis::seq, cloud, result.choice.chain) == result.inliers);
   }
 }
 
-TEST_CASE("a range that is no number costs its point its judgement and nothing else") {
+TEST_CASE("a range that is no number costs its point its judgement by range and nothing else") {
   auto cloud = orbis::test::room_cloud(200, 150, 0.002, 5);
   cloud.emplace_back(0.0F, 0.0F, 9.0F);  // far from everything
   const auto lone = static_cast<std::uint32_t>(cloud.size() - 1);
@@ -132,6 +150,169 @@ TEST_CASE("a range that is no number costs its point its judgement and nothing e
     const auto result = filter_automatically(orbis::seq, cloud, {.ranges = ranges});
     CHECK(result.choice.evidence.judged == sane.choice.evidence.judged - 2);
     CHECK(result.choice.evidence.range_scale.has_value());
-    CHECK(std::binary_search(result.inliers.begin(), result.inliers.end(), lone));
+    CHECK(std::binary_search(result.inliers.begin(), result.inliers.end(), 0U));
+    CHECK_FALSE(std::binary_search(result.inliers.begin(), result.inliers.end(), lone));  // its surroundings say so
+  }
+}
+
+TEST_CASE("each kind of cloud gets the steps that suit it") {
+  const auto clean = orbis::test::room_cloud(200, 150, 0.002, 5);
+  SECTION("nothing for a plane grid") {
+    orbis::test::points grid;
+    for (int y = 0; y != 60; ++y)
+      for (int x = 0; x != 60; ++x)
+        grid.emplace_back(0.01F * static_cast<float>(x), 0.01F * static_cast<float>(y), 1.0F);
+    const auto result = filter_automatically(orbis::seq, grid);
+    CHECK(result.choice.chain.empty());
+    CHECK(result.inliers.size() == grid.size());
+    CHECK(result.choice.reason.find("no point stands out") != std::string::npos);
+  }
+  SECTION("a test of density for uniform outliers") {
+    auto cloud = clean;
+    add_uniform(cloud, 1500, 9);
+    const auto choice = orbis::cloud::select_filter(orbis::seq, cloud);
+    CHECK(has_step(choice.chain, filter_mode::log_statistical));
+    CHECK(choice.reason.find("a population apart") != std::string::npos);
+  }
+  SECTION("clusters for what hangs in the air") {
+    auto cloud = clean;
+    const auto good = cloud.size();
+    orbis::random_bits random{3};
+    for (int c = 0; c != 5; ++c) {
+      const orbis::vec3 middle{0.25 * c - 0.5, -0.3, 1.2 + 0.3 * c};
+      for (int i = 0; i != 60; ++i) {
+        const double x = random.uniform(-0.02, 0.02);
+        const double y = random.uniform(-0.02, 0.02);
+        cloud.emplace_back((middle + orbis::vec3{x, y, random.uniform(-0.02, 0.02)}).cast<float>());
+      }
+    }
+    const auto result = filter_automatically(orbis::seq, cloud);
+    INFO(result.choice.reason);
+    CHECK(has_step(result.choice.chain, filter_mode::cluster));
+    const score s = score_of(result.inliers, cloud.size(), cloud.size() - good);
+    CHECK(s.found > 0.95);
+    CHECK(s.lost < 0.005);
+  }
+  SECTION("regions of another density stay") {
+    orbis::test::points cloud;
+    orbis::random_bits random{4};
+    for (const auto& p : clean) {  // a tenth, but all of the middle
+      if (p.head<2>().norm() < 0.5F || random.below(10) == 0) cloud.push_back(p);
+    }
+    const auto result = filter_automatically(orbis::seq, cloud, {.sensor_origin = orbis::vec3{0, 0, 0}});
+    INFO(result.choice.reason);
+    CHECK(score_of(result.inliers, cloud.size(), 0).lost < 0.005);
+  }
+}
+
+TEST_CASE("outliers are found whatever the sensor, and the bounds can fail") {
+  double found = 0;
+  double lost = 0;
+  int cases = 0;
+  for (const double noise : {0.001, 0.004}) {
+    for (const double percent : {2.0, 10.0}) {
+      for (const bool voxels : {false, true}) {
+        for (const bool known : {false, true}) {
+          auto cloud = orbis::test::room_cloud(160, 120, noise, 31);
+          if (voxels) cloud = orbis::cloud::voxel_grid(cloud, {.size = 0.02}).points;
+          const auto outliers = static_cast<std::size_t>(percent / 100 * static_cast<double>(cloud.size()));
+          add_uniform(cloud, outliers, 32);
+          orbis::cloud::select_options options;
+          if (known) options.sensor_origin = orbis::vec3{0, 0, 0};
+          const auto result = filter_automatically(orbis::par, cloud, options);
+          const score s = score_of(result.inliers, cloud.size(), outliers);
+          INFO(noise << ' ' << percent << ' ' << voxels << known << ' ' << result.choice.reason);
+          CHECK(s.found > 0.8);
+          CHECK(s.lost < 0.02);
+          found += s.found;
+          lost += s.lost;
+          ++cases;
+        }
+      }
+    }
+  }
+  CHECK(found / cases > 0.92);
+  CHECK(lost / cases < 0.003);
+}
+
+TEST_CASE("a chain does the same when it is applied, and can be changed") {
+  auto cloud = orbis::test::room_cloud(160, 120, 0.002, 11);
+  add_uniform(cloud, 900, 12);
+  cloud.emplace_back(std::numeric_limits<float>::quiet_NaN(), 0.0F, 1.0F);
+  const orbis::cloud::select_options options{.sensor_origin = orbis::vec3{0, 0, 0}};
+  const auto automatic = filter_automatically(orbis::par, cloud, options);
+  REQUIRE_FALSE(automatic.choice.chain.empty());
+  CHECK(orbis::cloud::apply_filter(orbis::seq, cloud, automatic.choice.chain, options) == automatic.inliers);
+  CHECK(orbis::cloud::apply_filter(orbis::par.with(3), cloud, automatic.choice.chain, options) == automatic.inliers);
+
+  auto keeping = options;
+  keeping.non_finite = orbis::cloud::non_finite::keep;
+  const auto with_hole = orbis::cloud::apply_filter(orbis::seq, cloud, automatic.choice.chain, keeping);
+  CHECK(with_hole.size() == automatic.inliers.size() + 1);
+
+  SECTION("a threshold") {
+    auto lenient = automatic.choice.chain;
+    for (auto& step : lenient) {
+      if (auto* density = std::get_if<orbis::cloud::density_step>(&step)) density->threshold = 100;
+      if (auto* isolation = std::get_if<orbis::cloud::isolation_step>(&step)) isolation->min_size = 1;
+      if (auto* cluster = std::get_if<orbis::cloud::cluster_options>(&step)) cluster->min_gap = 1e9;
+    }
+    CHECK(orbis::cloud::apply_filter(orbis::seq, cloud, lenient, options).size() == cloud.size() - 1);
+  }
+  SECTION("a mode that is not wanted") {
+    auto without = options;
+    without.forbidden = {filter_mode::isolation, filter_mode::cluster, filter_mode::local_log_statistical};
+    const auto choice = orbis::cloud::select_filter(orbis::par, cloud, without);
+    REQUIRE_FALSE(choice.chain.empty());
+    for (const auto mode : without.forbidden) CHECK_FALSE(has_step(choice.chain, mode));
+    without.forbidden = {filter_mode::isolation, filter_mode::cluster, filter_mode::log_statistical,
+                         filter_mode::range_log_statistical, filter_mode::local_log_statistical};
+    CHECK(orbis::cloud::select_filter(orbis::par, cloud, without).chain.empty());
+  }
+  SECTION("filters of one's own") {
+    const orbis::cloud::statistical_options sor{.neighbors = 20, .sigma_multiplier = 1.5};
+    CHECK(orbis::cloud::apply_filter(orbis::par, cloud, {sor}) ==
+          orbis::cloud::statistical_inliers(orbis::par, cloud, sor));
+    const auto twice =
+        orbis::cloud::apply_filter(orbis::par, cloud, {sor, orbis::cloud::radius_options{.radius = 0.1}});
+    CHECK(twice.size() < orbis::cloud::apply_filter(orbis::par, cloud, {sor}).size());
+  }
+}
+
+TEST_CASE("views show what no density can") {
+  // Somebody crosses in front of a wall; one of eight views is where it does not say.
+  const auto seen = orbis::test::walked_past_wall();
+  const auto alone = filter_automatically(orbis::par, seen.points, {.ranges = seen.ranges});
+  const auto result = filter_automatically(orbis::par, seen.points, seen.views(), seen.camera, {.ranges = seen.ranges});
+  INFO(result.choice.reason);
+  REQUIRE(has_step(result.choice.chain, filter_mode::ray_evidence));
+  const auto f1 = [&](const std::vector<std::uint32_t>& inliers) { return seen.f1_of_removal(inliers); };
+  CHECK(f1(alone.inliers) < 0.3);
+  CHECK(f1(result.inliers) > 0.9);
+  const auto& step = std::get<orbis::cloud::ray_step>(result.choice.chain.front());
+  CHECK(step.distrusted == std::vector<std::uint32_t>{5});
+  CHECK(step.need_support);
+  CHECK(result.choice.evidence.views == 8);
+
+  CHECK(orbis::cloud::apply_filter(orbis::seq, seen.points, result.choice.chain, seen.views(), seen.camera,
+                                   {.ranges = seen.ranges}) == result.inliers);
+  const auto again = filter_automatically(orbis::seq, seen.points, seen.views(), orbis::camera::any_camera{seen.camera},
+                                          {.ranges = seen.ranges});
+  CHECK(again.inliers == result.inliers);
+  CHECK(again.choice.reason == result.choice.reason);
+
+  SECTION("unless they must not be asked") {
+    const auto silent = filter_automatically(orbis::par, seen.points, seen.views(), seen.camera,
+                                             {.ranges = seen.ranges, .forbidden = {filter_mode::ray_evidence}});
+    CHECK(silent.inliers == alone.inliers);
+  }
+  SECTION("or it is cancelled") {
+    int calls = 0;
+    const auto stopped = filter_automatically(orbis::par, seen.points, seen.views(), seen.camera, {},
+                                              [&](std::size_t, std::size_t) { return ++calls < 5; });
+    CHECK(calls == 5);
+    CHECK(stopped.choice.chain.empty());
+    CHECK(stopped.choice.reason == "cancelled");
+    CHECK(stopped.inliers.size() == seen.points.size());
   }
 }

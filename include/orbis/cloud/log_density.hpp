@@ -30,8 +30,26 @@ struct log_line {
   [[nodiscard]] double at(double log_range) const noexcept { return intercept + slope * log_range; }
 };
 
-/// The Theil-Sen line through the 40 % quantiles of log spacing in 24 bins of log range; empty where
-/// fewer than four bins are populated. Range can only thin a cloud out, and no faster than its noise
+namespace detail {
+
+/// A value that half of the weight does not exceed; 0 for none. Entries are value and weight.
+[[nodiscard]] inline double weighted_median(std::vector<std::array<double, 2>> entries) {
+  std::sort(entries.begin(), entries.end());
+  double total = 0;
+  for (const auto& e : entries) total += e[1];
+  double sum = 0;
+  for (const auto& e : entries) {
+    sum += e[1];
+    if (2 * sum >= total) return e[0];
+  }
+  return 0;
+}
+
+}  // namespace detail
+
+/// The Theil-Sen line through the 40 % quantiles of log spacing in 24 bins of log range, weighted by the
+/// numbers of their points, so that ranges at which there are few points but outliers do not bend it; empty
+/// where fewer than four bins are populated. Range can only thin a cloud out, and no faster than its noise
 /// grows: the slope is clipped to 0 ... 2.5. O(n).
 /// Source: P. K. Sen, "Estimates of the regression coefficient based on Kendall's tau", JASA 63, 1968.
 [[nodiscard]] inline std::optional<log_line> fit_log_line(std::span<const double> log_spacing,
@@ -39,31 +57,36 @@ struct log_line {
   constexpr std::size_t bins = 24;
   constexpr std::size_t enough = 20;  // points for a usable quantile
   if (log_spacing.empty()) return std::nullopt;
-  const auto [low, high] = std::minmax_element(log_range.begin(), log_range.end());
-  const double width = (*high - *low) / bins;
+  std::vector<double> sorted(log_range.begin(), log_range.end());
+  const double low = quantile(sorted, 0.01);
+  const double width = (quantile(sorted, 0.99) - low) / bins;
   if (!(width > 1e-6)) return std::nullopt;
   std::array<std::vector<double>, bins> members;
   for (std::size_t i = 0; i != log_range.size(); ++i) {
-    const auto bin = static_cast<std::size_t>((log_range[i] - *low) / width);
-    members[std::min(bin, bins - 1)].push_back(log_spacing[i]);
+    const double bin = (log_range[i] - low) / width;
+    if (bin >= 0 && bin < bins) members[static_cast<std::size_t>(bin)].push_back(log_spacing[i]);
   }
-  std::vector<std::array<double, 2>> knots;
+  struct knot {
+    double x, y, weight;
+  };
+  std::vector<knot> knots;
   for (std::size_t b = 0; b != bins; ++b) {
     if (members[b].size() < enough) continue;
-    knots.push_back({*low + (static_cast<double>(b) + 0.5) * width, quantile(members[b], 0.4)});
+    knots.push_back({low + (static_cast<double>(b) + 0.5) * width, quantile(members[b], 0.4),
+                     static_cast<double>(members[b].size())});
   }
   if (knots.size() < 4) return std::nullopt;
-  std::vector<double> slopes;
+  std::vector<std::array<double, 2>> slopes;
   for (std::size_t i = 0; i != knots.size(); ++i) {
     for (std::size_t j = i + 1; j != knots.size(); ++j) {
-      slopes.push_back((knots[j][1] - knots[i][1]) / (knots[j][0] - knots[i][0]));
+      slopes.push_back({(knots[j].y - knots[i].y) / (knots[j].x - knots[i].x), knots[i].weight * knots[j].weight});
     }
   }
   log_line line;
-  line.slope = std::clamp(quantile(slopes, 0.5), 0.0, 2.5);
-  std::vector<double> intercepts;
-  for (const auto& [x, y] : knots) intercepts.push_back(y - line.slope * x);
-  line.intercept = quantile(intercepts, 0.5);
+  line.slope = std::clamp(detail::weighted_median(std::move(slopes)), 0.0, 2.5);
+  std::vector<std::array<double, 2>> intercepts;
+  for (const knot& k : knots) intercepts.push_back({k.y - line.slope * k.x, k.weight});
+  line.intercept = detail::weighted_median(std::move(intercepts));
   return line;
 }
 

@@ -2,89 +2,50 @@
 /// @file
 /// A filter that chooses itself: the cloud is judged, and the choice comes with its evidence.
 ///
-/// The measure of a point is how much sparser its surroundings are than usual: the logarithm of its
-/// mean distance to a few neighbours, less a reference that is either the same for all points or a
-/// line over the logarithm of the range at which the sensor saw them (a depth camera's points thin
-/// out, and its noise grows, with range). Outliers show as a second population, apart from the bulk:
-/// the threshold goes where the histogram has a valley before a later peak. Where there is none, only
-/// points far outside the bulk go: a clean cloud stays as it is.
+/// 1. *Views*, where there are any, know best: what their rays pass through is not there, and what only
+///    a stray pixel or a view that contradicts all others has measured is not either.
+/// 2. *Density*: a point's measure is how much sparser its surroundings are than usual, the logarithm of
+///    its mean distance to a few neighbours less a reference: one for all points, or a line over the
+///    logarithm of the range (a depth camera's points thin out with range); and the surroundings', where the
+///    cloud itself is of uneven density. Outliers show as a second population of points that lie on no
+///    surface; the threshold goes into the valley before it. Where there is none, only points far
+///    outside the bulk go: a clean cloud stays as it is.
+/// 3. *Connection*: groups of a few points with nothing around, and small clusters far from the surface.
+///
+/// Every step is part of the chosen chain only if it removes something.
 #pragma once
 
-#include <algorithm>
 #include <cassert>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <cstdio>
-#include <limits>
 #include <optional>
+#include <ranges>
 #include <span>
 #include <string>
-#include <string_view>
+#include <type_traits>
+#include <utility>
+#include <variant>
 #include <vector>
 
-#include <orbis/cloud/log_density.hpp>
-#include <orbis/cloud/mean_knn_distance.hpp>
+#include <orbis/camera/model.hpp>
+#include <orbis/camera/pinhole.hpp>
+#include <orbis/cloud/decision.hpp>
+#include <orbis/cloud/filter_chain.hpp>
+#include <orbis/cloud/radius.hpp>
+#include <orbis/cloud/ray_evidence.hpp>
+#include <orbis/cloud/select_density.hpp>
+#include <orbis/cloud/select_evidence.hpp>
+#include <orbis/cloud/select_surroundings.hpp>
+#include <orbis/cloud/select_views.hpp>
+#include <orbis/cloud/sensor_origins.hpp>
 #include <orbis/cloud/statistical.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/point.hpp>
-#include <orbis/core/types.hpp>
+#include <orbis/core/progress.hpp>
+#include <orbis/core/se3.hpp>
 
 namespace orbis::cloud {
-
-/// The kinds of filter.
-enum class filter_mode {
-  none,                  ///< everything (finite) stays
-  statistical,           ///< mu + alpha sigma of the mean neighbour distance
-  radius,                ///< a number of neighbours within a radius
-  log_statistical,       ///< log mean neighbour distance against its median over the cloud
-  range_log_statistical  ///< log mean neighbour distance against a line over log range
-};
-
-[[nodiscard]] constexpr std::string_view to_string(filter_mode mode) noexcept {
-  switch (mode) {
-    case filter_mode::none: return "none";
-    case filter_mode::statistical: return "statistical";
-    case filter_mode::radius: return "radius";
-    case filter_mode::log_statistical: return "log-statistical";
-    case filter_mode::range_log_statistical: return "range-log-statistical";
-  }
-  return "unknown";
-}
-
-struct select_options {
-  std::size_t neighbors = 8;            ///< over which a point's spacing is averaged; > 0
-  std::optional<vec3> sensor_origin{};  ///< where all points were seen from, metres
-  /// Per point, metres from the sensor that saw it; wins over sensor_origin. A point whose range is not
-  /// finite stays.
-  std::span<const float> ranges{};
-  cloud::non_finite non_finite = cloud::non_finite::drop;
-};
-
-/// The numbers behind a choice. Lengths in metres; "log" means natural logarithms.
-struct filter_evidence {
-  std::size_t points = 0;             ///< all
-  std::size_t judged = 0;             ///< finite, as is their range, and not identical to all their neighbours
-  double median_spacing = 0;          ///< median over the points of the mean neighbour distance
-  double left_scale = 0;              ///< width of the bulk below its median, log
-  double right_scale = 0;             ///< and above
-  double global_scale = 0;            ///< width with the global reference, log
-  std::optional<double> range_scale;  ///< width with the reference over range, where ranges are known
-  double valley_position = 0;         ///< above the bulk's median, log
-  double valley_ratio = 0;            ///< later peak over valley; 1.6 and more counts as two populations
-  double shoulder = 0;                ///< fraction of points between the bulk and the valley's threshold
-  double beyond = 0;                  ///< fraction of points beyond the threshold chosen
-};
-
-/// What was chosen, with which parameters, and why.
-struct filter_choice {
-  filter_mode mode = filter_mode::none;
-  std::size_t neighbors = 8;  ///< over which the spacing is averaged
-  log_line reference;         ///< usual log spacing at a log range; slope 0 for `log_statistical`
-  double threshold = 0;       ///< outliers: log spacing - reference > threshold
-  filter_evidence evidence;
-  std::string reason;  ///< one or two sentences
-};
 
 /// The inliers' indices, ascending, and the choice that led to them.
 struct automatic_result {
@@ -94,173 +55,215 @@ struct automatic_result {
 
 namespace detail {
 
-[[nodiscard]] inline std::string in_words(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.3g", value);
-  return text;
-}
-
-/// The points that can be judged, and what they are judged on.
-struct judged_points {
-  std::vector<std::uint32_t> index;
-  std::vector<double> log_spacing;
-  std::vector<double> log_range;  ///< empty where ranges are not known
+/// A view for clouds that have none.
+struct absent_view {
+  camera::depth_view<float> depth;
+  se3 T_world_camera;
 };
 
 template <point_range Points>
-[[nodiscard]] judged_points points_to_judge(const Points& points, std::span<const float> spacing,
-                                            const select_options& options) {
-  judged_points out;
-  const auto first = std::ranges::begin(points);
-  const bool ranged = !options.ranges.empty() || options.sensor_origin.has_value();
-  for (std::size_t i = 0; i != spacing.size(); ++i) {
-    // Identical points are not outliers, and have no logarithm.
-    if (!(spacing[i] > 0) || !std::isfinite(spacing[i])) continue;
-    if (ranged) {
-      double range = 0;
-      if (!options.ranges.empty()) {
-        range = options.ranges[i];
-      } else {
-        const auto p = coordinates<double>(first[static_cast<std::ranges::range_difference_t<const Points>>(i)]);
-        range = (vec3{p[0], p[1], p[2]} - *options.sensor_origin).norm();
-      }
-      if (!std::isfinite(range)) continue;  // nothing to judge it by
-      out.log_range.push_back(std::log(std::max(range, 1e-3)));
-    }
-    out.index.push_back(static_cast<std::uint32_t>(i));
-    out.log_spacing.push_back(std::log(double{spacing[i]}));
-  }
+[[nodiscard]] std::vector<char> finite_points(const Points& points) {
+  std::vector<char> out(std::ranges::size(points));
+  for (std::size_t i = 0; i != out.size(); ++i) out[i] = is_finite(coordinates<float>(point_at(points, i))) ? 1 : 0;
   return out;
 }
 
-/// Log spacing less the reference.
-[[nodiscard]] inline std::vector<double> residuals(const judged_points& judged, const log_line& reference) {
-  std::vector<double> out = judged.log_spacing;
-  for (std::size_t i = 0; i != out.size(); ++i) {
-    out[i] -= reference.slope != 0 ? reference.at(judged.log_range[i]) : reference.intercept;
-  }
-  return out;
+template <execution_policy Policy, point_range Points>
+[[nodiscard]] std::vector<float> ranges_of(const Policy& policy, const Points& points, const select_options& options) {
+  return sensor_ranges(policy, points, {.common = options.sensor_origin, .ranges = options.ranges});
 }
 
-/// Width of the bulk as it counts in the comparison of references.
-[[nodiscard]] inline double width(const bulk& b) noexcept { return std::max(b.left_scale, 0.5 * b.right_scale); }
+/// Points left, and with `non_finite::keep` those that are not finite.
+template <point_range Points>
+[[nodiscard]] std::vector<std::uint32_t> kept_points(const Points& points, std::span<const char> left,
+                                                     const select_options& options) {
+  return indices_where(left.size(), [&](std::size_t i) {
+    return left[i] != 0 ||
+           (options.non_finite == non_finite::keep && !is_finite(coordinates<float>(point_at(points, i))));
+  });
+}
 
-[[nodiscard]] inline filter_choice judge(const judged_points& judged, std::size_t points,
-                                         const select_options& options) {
-  constexpr std::size_t enough = 50;
-  filter_choice choice;
-  choice.neighbors = options.neighbors;
-  filter_evidence& evidence = choice.evidence;
-  evidence.points = points;
-  evidence.judged = judged.index.size();
-  if (judged.index.size() < enough) {
-    choice.reason = "too few points (" + std::to_string(judged.index.size()) + ") to judge";
-    return choice;
+inline void remove_gone(const surroundings& around, std::span<char> left) {
+  for (std::size_t i = 0; i != around.size(); ++i) {
+    if (around.gone()[i] != 0) left[around.index(i)] = 0;
   }
+}
 
-  // The reference: the narrower bulk wins, the simpler one with a head start.
-  std::vector<double> sorted = judged.log_spacing;
-  choice.reference = {quantile(sorted, 0.5), 0};
-  evidence.median_spacing = std::exp(choice.reference.intercept);
-  std::vector<double> u = residuals(judged, choice.reference);
-  bulk center = bulk_of(u);
-  evidence.global_scale = width(center);
-  bool by_range = false;
-  if (!judged.log_range.empty()) {
-    if (const auto line = fit_log_line(judged.log_spacing, judged.log_range)) {
-      std::vector<double> ranged = residuals(judged, *line);
-      const bulk ranged_center = bulk_of(ranged);
-      evidence.range_scale = width(ranged_center);
-      if (line->slope > 0 && *evidence.range_scale < 0.85 * evidence.global_scale) {
-        by_range = true;
-        choice.reference = *line;
-        u = std::move(ranged);
-        center = ranged_center;
-      }
-    }
+/// Runs a filter of its own on what is left, and clears `left` where it removes a point.
+template <point_range Points, class Filter>
+void apply_alone(const Points& points, std::span<char> left, Filter&& inliers_of) {
+  std::vector<std::uint32_t> index;
+  std::vector<std::array<float, 3>> rest;
+  for (std::size_t i = 0; i != left.size(); ++i) {
+    if (left[i] == 0) continue;
+    index.push_back(static_cast<std::uint32_t>(i));
+    rest.push_back(coordinates<float>(point_at(points, i)));
+    left[i] = 0;
   }
-  evidence.left_scale = center.left_scale;
-  evidence.right_scale = center.right_scale;
-  const auto fraction_between = [&](double low, double high) {
-    const auto n = std::count_if(u.begin(), u.end(),
-                                 [&](double x) { return x - center.median > low && x - center.median <= high; });
-    return static_cast<double>(n) / static_cast<double>(u.size());
+  for (const std::uint32_t i : inliers_of(rest)) left[index[i]] = 1;
+}
+
+/// @pre every ray_step finds views
+template <execution_policy Policy, point_range Points, posed_depth_range Views, camera::camera_model Camera>
+[[nodiscard]] std::vector<std::uint32_t> apply_chain(const Policy& policy, const Points& points,
+                                                     const filter_chain& chain, const Views& views,
+                                                     const Camera& camera, const select_options& options,
+                                                     progress on_progress) {
+  std::vector<char> left = finite_points(points);
+  const std::vector<float> ranges = ranges_of(policy, points, options);
+  std::optional<surroundings> around;
+  std::size_t averaged = 0;  // neighbours, in `around`
+  const auto settle = [&] {
+    if (around) remove_gone(*around, left);
+    around.reset();
   };
-
-  // The threshold: in the valley between two populations, else far outside the only one.
-  const valley v = deepest_valley(u, center.median, std::max(0.55, std::min(2.5 * center.left_scale, 1.4)));
-  evidence.valley_position = v.position;
-  evidence.valley_ratio = v.ratio;
-  const bool two_populations = v.ratio > 1.6;
-  double threshold = two_populations ? v.position : std::max(1.6, 6 * center.left_scale);
-
-  // Flying pixels make a shoulder on the bulk rather than a population apart.
-  const double shoulder_start = std::max(0.75, 5 * center.left_scale);
-  evidence.shoulder = shoulder_start < threshold ? fraction_between(shoulder_start, threshold) : 0;
-  const bool shoulder = evidence.shoulder > (v.ratio > 3 ? 0.025 : 0.01);
-  if (shoulder) threshold = shoulder_start;
-  evidence.beyond = fraction_between(threshold, std::numeric_limits<double>::infinity());
-  choice.threshold = threshold + center.median;
-
-  const std::string percent = in_words(100 * evidence.beyond) + " %";
-  const std::string times = in_words(std::exp(threshold)) + " times";
-  if (evidence.beyond == 0) {
-    choice.reason = "one population, and no point lies " + times + " sparser than usual";
-  } else {
-    choice.mode = by_range ? filter_mode::range_log_statistical : filter_mode::log_statistical;
-    if (shoulder) {
-      choice.reason = "a shoulder of " + in_words(100 * evidence.shoulder) + " % of the points just outside the bulk";
-    } else if (two_populations) {
-      choice.reason = "two populations, the valley between them " + in_words(v.ratio) + " times lower than the peak";
-    } else {
-      choice.reason = "one population";
-    }
-    choice.reason += "; " + percent + " of the points lie more than " + times + " sparser than usual";
+  const auto look_around = [&](std::size_t neighbors) -> surroundings& {
+    if (around && averaged != neighbors) settle();
+    if (!around) around.emplace(policy, points, left, ranges, averaged = neighbors);
+    return *around;
+  };
+  for (const filter_step& any : chain) {
+    std::visit(
+        [&](const auto& step) {
+          using Step = std::remove_cvref_t<decltype(step)>;
+          if constexpr (std::is_same_v<Step, ray_step>) {
+            settle();
+            assert(std::ranges::size(views) != 0);
+            bool cancelled = false;
+            apply_rays(policy, points, step, views, camera, left, cancelled, on_progress);
+          } else if constexpr (std::is_same_v<Step, density_step> || std::is_same_v<Step, isolation_step>) {
+            look_around(step.neighbors).apply(policy, step);
+          } else if constexpr (std::is_same_v<Step, cluster_options>) {
+            look_around(around ? averaged : step.neighbors).apply(policy, step);
+          } else if constexpr (std::is_same_v<Step, statistical_options>) {
+            settle();
+            apply_alone(points, left, [&](const auto& rest) { return statistical_inliers(policy, rest, step); });
+          } else {
+            settle();
+            apply_alone(points, left, [&](const auto& rest) { return radius_inliers(policy, rest, step); });
+          }
+        },
+        any);
   }
-  choice.reason += by_range ? " at their range" : "";
-  choice.reason += " (median spacing " + in_words(1e3 * evidence.median_spacing) + " mm)";
-  return choice;
+  settle();
+  return kept_points(points, left, options);
+}
+
+[[nodiscard]] inline std::string sentence_of(const filter_choice& choice, std::span<const std::string> reasons,
+                                             bool by_range) {
+  std::string out;
+  for (const std::string& r : reasons) out += (out.empty() ? "" : "; ") + r;
+  if (out.empty()) out = "no point stands out";
+  out += " (median spacing " + in_words(1e3 * choice.evidence.median_spacing) + " mm";
+  return out + (by_range ? ", which grows with range)" : ")");
+}
+
+template <execution_policy Policy, point_range Points, posed_depth_range Views, camera::camera_model Camera>
+[[nodiscard]] automatic_result judge(const Policy& policy, const Points& points, const Views& views,
+                                     const Camera& camera, const select_options& options, progress on_progress) {
+  assert(options.neighbors > 0);
+  assert(options.ranges.empty() || options.ranges.size() == std::ranges::size(points));
+  constexpr std::size_t enough = 50;
+  automatic_result out;
+  filter_choice& choice = out.choice;
+  choice.evidence.points = std::ranges::size(points);
+  std::vector<char> left = finite_points(points);
+  const std::vector<float> ranges = ranges_of(policy, points, options);
+  std::vector<std::string> reasons;
+  if (!judge_views(policy, points, views, camera, options, left, choice, reasons, on_progress)) {
+    choice.chain.clear();
+    choice.reason = "cancelled";
+    out.inliers = kept_points(points, left, options);
+    return out;
+  }
+  surroundings around{policy, points, left, ranges, options.neighbors};
+  const bool ranged = std::ranges::any_of(around.log_range(), [](float r) { return std::isfinite(r); });
+  for (std::size_t i = 0; i != around.size(); ++i) {
+    const bool judged = std::isfinite(around.log_spacing()[i]) && (!ranged || std::isfinite(around.log_range()[i]));
+    choice.evidence.judged += judged ? 1 : 0;
+  }
+  if (choice.evidence.judged < enough) {
+    if (reasons.empty()) reasons.push_back("too few points (" + std::to_string(choice.evidence.judged) + ") to judge");
+    choice.reason = reasons.front();
+  } else {
+    judge_points(policy, around, options, choice, reasons);
+    remove_gone(around, left);
+    const bool by_range = std::ranges::any_of(
+        choice.evidence.density, [](const auto& d) { return d.mode == filter_mode::range_log_statistical; });
+    choice.reason = sentence_of(choice, reasons, by_range);
+  }
+  out.inliers = kept_points(points, left, options);
+  return out;
+}
+
+/// `f` with the camera, of the kind that it is where that is known at run time.
+template <camera::camera_model Camera, class F>
+decltype(auto) with_model(const Camera& camera, F&& f) {
+  if constexpr (requires { camera.visit([](const auto&) {}); }) {
+    return camera.visit(f);
+  } else {
+    return f(camera);
+  }
 }
 
 }  // namespace detail
 
-/// Judges the cloud and says which filter suits it. Deterministic; O(n log n). An empty cloud, or one
-/// too small to judge, gets `filter_mode::none`.
-/// @pre neighbors > 0; ranges is empty or as long as points
-template <execution_policy Policy, point_range Points>
-[[nodiscard]] filter_choice select_filter(const Policy& policy, const Points& points,
-                                          const select_options& options = {}) {
-  assert(options.ranges.empty() || options.ranges.size() == std::ranges::size(points));
-  const std::vector<float> spacing = all_mean_knn_distance(policy, points, options.neighbors);
-  return detail::judge(detail::points_to_judge(points, spacing, options), spacing.size(), options);
+/// Judges the cloud by its points and by the depth images that it was made of, or that saw the same
+/// place, and returns the points that the chosen filters keep. The images testify against points in
+/// front of what they measured, which no density can show: moving objects, wrong poses.
+///
+/// Deterministic, the same for every policy. `on_progress` counts the views, twice; if it cancels, the
+/// chain is empty, the reason "cancelled", and all points stay. O(n log n + views (pixels + n)).
+/// @pre neighbors > 0; ranges is empty or as long as points; views' images have the camera's size
+template <execution_policy Policy, point_range Points, posed_depth_range Views, camera::camera_model Camera>
+[[nodiscard]] automatic_result filter_automatically(const Policy& policy, const Points& points, const Views& views,
+                                                    const Camera& camera, const select_options& options = {},
+                                                    progress on_progress = {}) {
+  return detail::with_model(
+      camera, [&](const auto& model) { return detail::judge(policy, points, views, model, options, on_progress); });
 }
 
-/// `select_filter`, and the points that the chosen filter keeps.
+/// The same by the points alone. An empty cloud, or one too small to judge, gets an empty chain. O(n log n).
 /// @pre neighbors > 0; ranges is empty or as long as points
 template <execution_policy Policy, point_range Points>
 [[nodiscard]] automatic_result filter_automatically(const Policy& policy, const Points& points,
                                                     const select_options& options = {}) {
-  assert(options.ranges.empty() || options.ranges.size() == std::ranges::size(points));
-  const std::vector<float> spacing = all_mean_knn_distance(policy, points, options.neighbors);
-  const detail::judged_points judged = detail::points_to_judge(points, spacing, options);
-  automatic_result out;
-  out.choice = detail::judge(judged, spacing.size(), options);
+  return detail::judge(policy, points, std::span<const detail::absent_view>{}, camera::pinhole{}, options, {});
+}
 
-  std::vector<char> outlier(spacing.size(), 0);
-  const auto first = std::ranges::begin(points);
-  if (options.non_finite == cloud::non_finite::drop) {
-    for (std::size_t i = 0; i != outlier.size(); ++i) {
-      outlier[i] = !is_finite(coordinates<float>(first[static_cast<std::ranges::range_difference_t<const Points>>(i)]));
-    }
-  }
-  if (out.choice.mode != filter_mode::none) {
-    const std::vector<double> u = detail::residuals(judged, out.choice.reference);
-    for (std::size_t i = 0; i != u.size(); ++i) outlier[judged.index[i]] = u[i] > out.choice.threshold;
-  }
-  for (std::size_t i = 0; i != outlier.size(); ++i) {
-    if (outlier[i] == 0) out.inliers.push_back(static_cast<std::uint32_t>(i));
-  }
-  return out;
+/// Judges the cloud and says which filters suit it: `filter_automatically` without its inliers.
+template <execution_policy Policy, point_range Points>
+[[nodiscard]] filter_choice select_filter(const Policy& policy, const Points& points,
+                                          const select_options& options = {}) {
+  return filter_automatically(policy, points, options).choice;
+}
+/// The same with views.
+template <execution_policy Policy, point_range Points, posed_depth_range Views, camera::camera_model Camera>
+[[nodiscard]] filter_choice select_filter(const Policy& policy, const Points& points, const Views& views,
+                                          const Camera& camera, const select_options& options = {},
+                                          progress on_progress = {}) {
+  return filter_automatically(policy, points, views, camera, options, on_progress).choice;
+}
+
+/// The indices, ascending, of the points that the steps of a chain leave, whoever made it. A chain from
+/// `select_filter` leaves what `filter_automatically` does, point for point, if the ranges are given here as well.
+/// `options`: where the cloud was seen from, and what becomes of points that are not finite.
+/// @pre the chain has no `ray_step`; its steps' own preconditions
+template <execution_policy Policy, point_range Points>
+[[nodiscard]] std::vector<std::uint32_t> apply_filter(const Policy& policy, const Points& points,
+                                                      const filter_chain& chain, const select_options& options = {}) {
+  return detail::apply_chain(policy, points, chain, std::span<const detail::absent_view>{}, camera::pinhole{}, options,
+                             {});
+}
+/// The same with views. If `on_progress`, which counts the views, cancels, what they say is left out.
+template <execution_policy Policy, point_range Points, posed_depth_range Views, camera::camera_model Camera>
+[[nodiscard]] std::vector<std::uint32_t> apply_filter(const Policy& policy, const Points& points,
+                                                      const filter_chain& chain, const Views& views,
+                                                      const Camera& camera, const select_options& options = {},
+                                                      progress on_progress = {}) {
+  return detail::with_model(camera, [&](const auto& model) {
+    return detail::apply_chain(policy, points, chain, views, model, options, on_progress);
+  });
 }
 
 }  // namespace orbis::cloud

@@ -8,15 +8,21 @@
 #include <cstdint>
 #include <numeric>
 #include <optional>
+#include <ranges>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include <orbis/camera/model.hpp>
+#include <orbis/cloud/filter_chain.hpp>
 #include <orbis/cloud/radius.hpp>
+#include <orbis/cloud/ray_evidence.hpp>
 #include <orbis/cloud/select.hpp>
 #include <orbis/cloud/statistical.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/point.hpp>
+#include <orbis/core/progress.hpp>
 
 namespace orbis::mapping {
 
@@ -36,7 +42,7 @@ struct filter_options {
 
 /// What a filter did, and why.
 struct filter_report {
-  cloud::filter_mode mode = cloud::filter_mode::none;
+  cloud::filter_chain mode{};  ///< its steps; `to_string` gives their names, such as "log-statistical+cluster"
   std::string reason{};
   std::size_t points = 0;  ///< before
   std::size_t removed = 0;
@@ -49,11 +55,12 @@ struct filtered_indices {
   filter_report report;
 };
 
-/// Runs the filter. `ranges`: for each point the distance from which it was seen, metres, or empty.
-/// O(n log n).
-template <execution_policy Policy, point_range Points>
-[[nodiscard]] filtered_indices filter_points(const Policy& policy, const Points& points, std::span<const float> ranges,
-                                             const filter_options& options = {}) {
+namespace detail {
+
+/// `automatically(select_options)` is the automatic filter.
+template <execution_policy Policy, point_range Points, class Automatic>
+[[nodiscard]] filtered_indices filter_by_kind(const Policy& policy, const Points& points, std::span<const float> ranges,
+                                              const filter_options& options, Automatic&& automatically) {
   const auto start = std::chrono::steady_clock::now();
   filtered_indices out;
   filter_report& report = out.report;
@@ -62,9 +69,9 @@ template <execution_policy Policy, point_range Points>
     case filter_kind::automatic: {
       cloud::select_options select = options.automatic;
       select.ranges = ranges;
-      cloud::automatic_result result = cloud::filter_automatically(policy, points, select);
+      cloud::automatic_result result = automatically(select);
       out.inliers = std::move(result.inliers);
-      report.mode = result.choice.mode;
+      report.mode = result.choice.chain;
       report.reason = result.choice.reason;
       report.choice = std::move(result.choice);
       break;
@@ -77,14 +84,14 @@ template <execution_policy Policy, point_range Points>
     case filter_kind::statistical: {
       cloud::statistical_result result = cloud::statistical_filter(policy, points, options.statistical);
       out.inliers = std::move(result.inliers);
-      report.mode = cloud::filter_mode::statistical;
+      report.mode = {options.statistical};
       report.reason = "asked for; mean distance to " + std::to_string(options.statistical.neighbors) +
                       " neighbors at most " + cloud::detail::in_words(1e3 * result.threshold) + " mm";
       break;
     }
     case filter_kind::radius:
       out.inliers = cloud::radius_inliers(policy, points, options.radius);
-      report.mode = cloud::filter_mode::radius;
+      report.mode = {options.radius};
       report.reason = "asked for; at least " + std::to_string(options.radius.min_neighbors) + " neighbors within " +
                       cloud::detail::in_words(1e3 * options.radius.radius) + " mm";
       break;
@@ -92,6 +99,29 @@ template <execution_policy Policy, point_range Points>
   report.removed = report.points - out.inliers.size();
   report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return out;
+}
+
+}  // namespace detail
+
+/// Runs the filter. `ranges`: for each point the distance from which it was seen, metres, or empty.
+/// O(n log n).
+template <execution_policy Policy, point_range Points>
+[[nodiscard]] filtered_indices filter_points(const Policy& policy, const Points& points, std::span<const float> ranges,
+                                             const filter_options& options = {}) {
+  return detail::filter_by_kind(policy, points, ranges, options, [&](const cloud::select_options& select) {
+    return cloud::filter_automatically(policy, points, select);
+  });
+}
+
+/// The same, and the automatic filter listens to the views that the points come from, too.
+/// `on_progress` counts the views, twice; if it cancels, all points stay. @pre the images have the camera's size
+template <execution_policy Policy, point_range Points, cloud::posed_depth_range Views, camera::camera_model Camera>
+[[nodiscard]] filtered_indices filter_points(const Policy& policy, const Points& points, std::span<const float> ranges,
+                                             const Views& views, const Camera& camera,
+                                             const filter_options& options = {}, progress on_progress = {}) {
+  return detail::filter_by_kind(policy, points, ranges, options, [&](const cloud::select_options& select) {
+    return cloud::filter_automatically(policy, points, views, camera, select, on_progress);
+  });
 }
 
 }  // namespace orbis::mapping

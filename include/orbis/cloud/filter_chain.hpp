@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Several filters in order, with their parameters: what the automatic selection chooses, and what
+/// anyone can write down or change.
+///
+/// @code
+///   auto choice = select_filter(par, points);
+///   for (auto& step : choice.chain)
+///     if (auto* density = std::get_if<density_step>(&step)) density->threshold += 0.5;  // more lenient
+///   auto inliers = apply_filter(par, points, choice.chain);
+/// @endcode
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <type_traits>
+#include <variant>
+#include <vector>
+
+#include <orbis/cloud/cluster.hpp>
+#include <orbis/cloud/filter_mode.hpp>
+#include <orbis/cloud/log_density.hpp>
+#include <orbis/cloud/radius.hpp>
+#include <orbis/cloud/ray_evidence.hpp>
+#include <orbis/cloud/statistical.hpp>
+
+namespace orbis::cloud {
+
+/// Removes what the views exclude: points that rays pass through, and with `need_support` points that
+/// no view measured, stray pixels (`settled_depth`) not counted. Needs the views.
+struct ray_step {
+  ray_evidence_options evidence{.resolve_ghosts = false, .ratio = 0.5};
+  std::vector<std::uint32_t> distrusted{};  ///< views, by number, that count as no evidence
+  bool need_support = false;                ///< the cloud was made of these views: each point is in one at least
+};
+
+/// When neighbours count as a surface: points on one are spared by the tests of density.
+struct surface_test {
+  double flatness = 0.15;   ///< `off_plane` up to here is a plane
+  double same_scale = 0.7;  ///< neighbours denser by more, log, do not speak for a point,
+  std::size_t support = 3;  ///< and so many of the nearest 8 have to, unless it lies in a plane itself
+};
+
+/// Removes points whose log spacing exceeds what is usual by more than the threshold, unless they lie on a surface.
+struct density_step {
+  filter_mode mode = filter_mode::log_statistical;  ///< or range_log_statistical, local_log_statistical
+  std::size_t neighbors = 8;                        ///< over which the spacing is averaged; > 0
+  log_line usual;                                   ///< log spacing of the bulk at a log range; slope 0: at any
+  double offset = 0;                                ///< of the local mode's bulk from its surroundings
+  double threshold = 0;                             ///< outliers: log spacing - usual > threshold
+  surface_test surface{};
+};
+
+/// Removes groups of fewer than `min_size` points that are further from others than `reach` times the
+/// usual spacing, that of the surroundings if it is larger.
+struct isolation_step {
+  std::size_t neighbors = 8;  ///< over which the spacing is averaged; > 0
+  log_line usual;             ///< log spacing of the bulk at a log range; slope 0: at any
+  double offset = 0;          ///< of the bulk from its surroundings, log
+  double reach = 2.5;
+  std::size_t min_size = 30;
+};
+
+using filter_step =
+    std::variant<ray_step, density_step, isolation_step, cluster_options, statistical_options, radius_options>;
+/// Each step judges what the ones before it left. The tests of density, isolation and clusters share one
+/// pass over the neighbours of what there was before the first of them.
+using filter_chain = std::vector<filter_step>;
+
+[[nodiscard]] inline filter_mode mode_of(const filter_step& step) noexcept {
+  return std::visit(
+      [](const auto& s) {
+        using S = std::remove_cvref_t<decltype(s)>;
+        if constexpr (std::is_same_v<S, ray_step>) return filter_mode::ray_evidence;
+        if constexpr (std::is_same_v<S, density_step>) return s.mode;
+        if constexpr (std::is_same_v<S, isolation_step>) return filter_mode::isolation;
+        if constexpr (std::is_same_v<S, cluster_options>) return filter_mode::cluster;
+        if constexpr (std::is_same_v<S, statistical_options>) return filter_mode::statistical;
+        return filter_mode::radius;
+      },
+      step);
+}
+
+/// The names of the steps with a plus between them, such as "range-log-statistical+cluster"; "none" for no step.
+[[nodiscard]] inline std::string to_string(const filter_chain& chain) {
+  if (chain.empty()) return std::string{to_string(filter_mode::none)};
+  std::string out;
+  for (const filter_step& step : chain) out += (out.empty() ? "" : "+") + std::string{to_string(mode_of(step))};
+  return out;
+}
+
+}  // namespace orbis::cloud

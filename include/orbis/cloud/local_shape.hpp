@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// What a point's neighbours say beside their distance: what is usual around it, and whether it lies
+/// on a surface with them.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include <Eigen/Eigenvalues>
+
+#include <orbis/cloud/all_knn.hpp>
+#include <orbis/cloud/decision.hpp>
+#include <orbis/core/execution.hpp>
+#include <orbis/core/point.hpp>
+#include <orbis/core/types.hpp>
+
+namespace orbis::cloud {
+
+struct smoothing_options {
+  std::size_t neighbors = 12;  ///< of each point, in each round
+  int rounds = 4;
+  double quantile = 0.35;  ///< of the neighbours' values, 0 to 1
+};
+
+/// For each point the value that is usual in its surroundings: the quantile over its neighbours, round
+/// after round, so that they reach further than the neighbours. Values that are not finite (NaN) stay and
+/// do not count; so do those of points without neighbours. O(n rounds neighbors), the same for every policy.
+/// @pre values has an entry for each point of the table
+template <execution_policy Policy>
+[[nodiscard]] std::vector<float> smoothed_over_neighbors(const Policy& policy, const neighbor_table& table,
+                                                         std::vector<float> values,
+                                                         const smoothing_options& options = {}) {
+  std::vector<float> next(values.size());
+  for (int round = 0; round != options.rounds; ++round) {
+    for_each_chunk(policy, values.size(), 4096, [&](std::size_t begin, std::size_t end) {
+      std::vector<float> around;
+      for (std::size_t i = begin; i != end; ++i) {
+        around.clear();
+        const auto row = table[i];
+        for (const auto& n : row.first(std::min(options.neighbors, row.size()))) {
+          if (std::isfinite(values[n.index])) around.push_back(values[n.index]);
+        }
+        next[i] = values[i];
+        if (around.empty() || !std::isfinite(values[i])) continue;
+        const auto rank = static_cast<std::ptrdiff_t>(options.quantile * static_cast<double>(around.size() - 1) + 0.5);
+        std::nth_element(around.begin(), around.begin() + rank, around.end());
+        next[i] = around[static_cast<std::size_t>(rank)];
+      }
+    });
+    values.swap(next);
+  }
+  return values;
+}
+
+/// How far a point and its neighbours are from lying in one plane, in units of their mean distance: the
+/// root of the sum of two squares, the neighbours' deviation from the plane that fits them best and the
+/// point's own distance to it. 0 in a plane, some 0.2 at an edge, 0.4 and more in a volume or beside a
+/// surface; infinity with fewer than four neighbours. @pre the neighbours are points of the cloud
+template <point_range Points>
+[[nodiscard]] double off_plane(const Points& points, std::size_t i, std::span<const neighbor<float>> neighbors) {
+  if (neighbors.size() < 4) return std::numeric_limits<double>::infinity();
+  const auto at = [&](std::size_t j) {
+    const auto p = coordinates<double>(detail::point_at(points, j));
+    return vec3{p[0], p[1], p[2]};
+  };
+  const vec3 own = at(i);
+  const auto count = static_cast<double>(neighbors.size());
+  vec3 mean = vec3::Zero();
+  mat3 squares = mat3::Zero();
+  double distance = 0;
+  for (const auto& n : neighbors) {
+    const vec3 d = at(n.index) - own;
+    mean += d;
+    squares += d * d.transpose();
+    distance += static_cast<double>(n.distance);
+  }
+  mean /= count;
+  distance /= count;
+  if (!(distance > 0)) return 0;
+  Eigen::SelfAdjointEigenSolver<mat3> solver;
+  solver.computeDirect((squares / count - mean * mean.transpose()) / (distance * distance));
+  const double thickness = std::max(0.0, solver.eigenvalues()[0]);
+  const double height = solver.eigenvectors().col(0).dot(mean) / distance;
+  return std::sqrt(thickness + height * height);
+}
+
+}  // namespace orbis::cloud
