@@ -167,7 +167,9 @@ TEST_CASE("boxes and leaves are measured alike by all instruction sets") {
   using orbis::cloud::detail::box3;
   const auto cloud = orbis::test::uniform_cloud(2000, 7, 3.0);
   const auto tree = orbis::cloud::detail::make_leaves(orbis::seq, cloud, 51);
-  const auto reference = orbis::cloud::detail::select_knn_kernels(level::portable);
+  using namespace orbis::cloud::detail;
+  const knn_kernels reference{near_boxes_portable, gather_portable,    near_points_portable,
+                              in_leaf_portable,    distances_portable, sum_nearest_portable};
   for (const level l : levels) {
     const auto kernels = orbis::cloud::detail::select_knn_kernels(l);
     orbis::cloud::detail::nearby_leaves near{400};
@@ -184,6 +186,29 @@ TEST_CASE("boxes and leaves are measured alike by all instruction sets") {
     }
     near.finish();
     near_reference.finish();
+    for (const auto& leaf : tree.leaves) {
+      const std::array<float, 3> q{leaf.axis[0][3], leaf.axis[1][0], leaf.axis[2][0]};
+      if (!std::isfinite(q[0])) continue;
+      std::array<float, 64> found{};
+      std::array<float, 64> expected{};
+      CHECK(kernels.distances(leaf, q, 0.05F, found.data()) == reference.distances(leaf, q, 0.05F, expected.data()));
+      CHECK(found == expected);
+      const std::size_t n = kernels.in_leaf(leaf, q, 0.05F, found.data());
+      CHECK(n == reference.in_leaf(leaf, q, 0.05F, expected.data()));
+      CHECK(std::equal(found.begin(), found.begin() + static_cast<std::ptrdiff_t>(n), expected.begin()));
+    }
+    const std::array<float, 3> middle{1.2F, 1.1F, 1.0F};
+    std::vector<std::uint32_t> scratch(near.leaves.size() + 16);
+    std::vector<float> found(4000);
+    std::vector<float> found_reference(4000);
+    const std::size_t n =
+        kernels.near_points(tree.leaves.data(), near, middle, 0.2F, scratch.data(), found.data(), 3000);
+    CHECK(n > 16);
+    CHECK(n == reference.near_points(tree.leaves.data(), near_reference, middle, 0.2F, scratch.data(),
+                                     found_reference.data(), 3000));
+    found.resize(n + 16);
+    found_reference.resize(n + 16);
+    CHECK(found == found_reference);
     REQUIRE(near.count == near_reference.count);
     CHECK(near.count > 16);
     near.leaves.resize(near.count);

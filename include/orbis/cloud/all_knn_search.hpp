@@ -16,6 +16,7 @@
 #include <orbis/cloud/all_knn_avx2.hpp>
 #include <orbis/cloud/all_knn_avx512.hpp>
 #include <orbis/cloud/all_knn_kernels.hpp>
+#include <orbis/cloud/all_knn_lanes.hpp>
 #include <orbis/cloud/all_knn_leaves.hpp>
 #include <orbis/cloud/squared_distance.hpp>
 #include <orbis/core/simd.hpp>
@@ -35,8 +36,12 @@ namespace orbis::cloud::detail {
 #else
   static_cast<void>(wanted);
 #endif
+#if ORBIS_HAS_LANES
+  return {near_boxes_lanes, gather_portable, near_points_lanes, in_leaf_lanes, distances_lanes, sum_nearest_lanes};
+#else
   return {near_boxes_portable, gather_portable,    near_points_portable,
           in_leaf_portable,    distances_portable, sum_nearest_portable};
+#endif
 }
 
 /// A row of boxes that is still to be looked at.
