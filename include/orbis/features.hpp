@@ -15,6 +15,7 @@
 #include <orbis/features/grey.hpp>
 #include <orbis/features/grid.hpp>
 #include <orbis/features/hamming.hpp>
+#include <orbis/features/hamming_listed.hpp>
 #include <orbis/features/hamming_nearest.hpp>
 #include <orbis/features/hamming_slices.hpp>
 #include <orbis/features/kept_memory.hpp>
@@ -26,6 +27,7 @@
 #include <orbis/features/orientation.hpp>
 #include <orbis/features/pyramid.hpp>
 #include <orbis/features/resize.hpp>
+#include <orbis/features/search_among.hpp>
 #include <orbis/features/smooth.hpp>
 #include <orbis/features/spread.hpp>
 #include <orbis/features/square_covering.hpp>

@@ -25,30 +25,37 @@ struct brute_force_source {
   Distance distance{};
   simd::level level = simd::level::avx512;  ///< the best instruction set to use, if the processor has it
 
+  struct workspace {
+    std::vector<nearest_two> nearest;
+    std::vector<std::uint32_t> reverse;
+    hamming_workspace search;
+  };
+
   /// One candidate for each query; none if there are no trains. O(queries x trains).
   template <class Descriptor>
   requires descriptor_distance<Distance, Descriptor>
-  [[nodiscard]] std::vector<candidate> search(const feature_view<Descriptor>& queries,
-                                              const feature_view<Descriptor>& trains, search_needs needs) const {
+  void search(std::vector<candidate>& candidates, workspace& memory, const feature_view<Descriptor>& queries,
+              const feature_view<Descriptor>& trains, search_needs needs) const {
     const std::size_t query_count = queries.descriptors.size();
     const std::size_t train_count = trains.descriptors.size();
-    if (query_count == 0 || train_count == 0) return {};
+    candidates.clear();
+    if (query_count == 0 || train_count == 0) return;
 
-    std::vector<nearest_two> nearest(query_count);
-    std::vector<std::uint32_t> reverse(needs.reverse ? train_count : 0);
+    memory.nearest.resize(query_count);
+    memory.reverse.resize(needs.reverse ? train_count : 0);
     if constexpr (std::same_as<Distance, hamming> && has_hamming_kernel<Descriptor>) {
-      hamming_nearest(level, queries.descriptors, trains.descriptors, nearest, reverse);
+      hamming_nearest(level, queries.descriptors, trains.descriptors, memory.nearest, memory.reverse, memory.search);
     } else {
-      nearest_by(distance, queries.descriptors, trains.descriptors, std::span{nearest}, std::span{reverse});
+      nearest_by(distance, queries.descriptors, trains.descriptors, std::span{memory.nearest},
+                 std::span{memory.reverse}, memory.search.reverse_distance);
     }
 
-    std::vector<candidate> candidates(query_count);
+    candidates.resize(query_count);
     for (std::size_t i = 0; i != query_count; ++i) {
-      const nearest_two& n = nearest[i];
+      const nearest_two& n = memory.nearest[i];
       candidates[i] = {static_cast<std::uint32_t>(i), n.index, n.distance, n.second_distance,
-                       needs.reverse ? reverse[n.index] : none};
+                       needs.reverse ? memory.reverse[n.index] : none};
     }
-    return candidates;
   }
 };
 

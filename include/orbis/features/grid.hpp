@@ -24,8 +24,16 @@ class keypoint_grid {
 
   /// Keypoints whose position is not finite are never found. O(n).
   /// @pre cell_size > 0 (pixels)
-  explicit keypoint_grid(std::span<const keypoint> keypoints, float cell_size = 20.0F) {
+  explicit keypoint_grid(std::span<const keypoint> keypoints, float cell_size = 20.0F) { assign(keypoints, cell_size); }
+
+  /// The same in the memory of the grid before. O(n).
+  /// @pre cell_size > 0 (pixels)
+  void assign(std::span<const keypoint> keypoints, float cell_size = 20.0F) {
     assert(cell_size > 0.0F);
+    entries_.clear();
+    first_.clear();
+    columns_ = rows_ = 0;
+    left_ = top_ = 0.0F;
     float right = 0.0F;
     float bottom = 0.0F;
     std::size_t finite = 0;
@@ -48,16 +56,15 @@ class keypoint_grid {
     columns_ = static_cast<int>(std::floor(width * inverse_cell_)) + 1;
     rows_ = static_cast<int>(std::floor(height * inverse_cell_)) + 1;
 
-    // Counting sort by cell: first_[c] is where cell c begins in entries_.
+    // Counting sort by cell, from the back: first_[c] is where cell c ends, in the end where it begins in entries_.
     first_.assign(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_) + 1, 0);
     for (const keypoint& k : keypoints)
-      if (is_finite(k)) ++first_[cell_of(k) + 1];
+      if (is_finite(k)) ++first_[cell_of(k)];
     for (std::size_t c = 1; c != first_.size(); ++c) first_[c] += first_[c - 1];
-    std::vector<std::uint32_t> next(first_.begin(), first_.end() - 1);
     entries_.resize(finite);
-    for (std::size_t i = 0; i != keypoints.size(); ++i) {
+    for (std::size_t i = keypoints.size(); i-- != 0;) {
       const keypoint& k = keypoints[i];
-      if (is_finite(k)) entries_[next[cell_of(k)]++] = {k.x, k.y, static_cast<std::uint32_t>(i), k.octave};
+      if (is_finite(k)) entries_[--first_[cell_of(k)]] = {k.x, k.y, static_cast<std::uint32_t>(i), k.octave};
     }
   }
 

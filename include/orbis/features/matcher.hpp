@@ -7,14 +7,22 @@
 ///   std::vector<match> matches = matcher(f1.descriptors, f2.descriptors);
 /// @endcode
 ///
-/// A chain begins with one source (`brute_force`, `windowed`); a stage is anything that satisfies
-/// `match_stage`, a lambda `bool(const candidate&)` for example. Stages judge candidates in their
-/// order; each knows the nearest neighbour, the second distance and the reverse neighbour as the
-/// source found them among *all* descriptors, not among what earlier stages left over.
+/// A chain begins with one source (`brute_force`, `windowed`, `projected`, `epipolar`, `node_guided`); a stage is
+/// anything that satisfies `match_stage`, a lambda `bool(const candidate&)` for example. Stages judge candidates in
+/// their order; each knows the nearest neighbour, the second distance and the reverse neighbour as the source found
+/// them among *all* descriptors, not among what earlier stages left over.
+///
+/// Called every frame, a matcher keeps its memory in a workspace:
+///
+/// @code
+///   decltype(matcher)::workspace memory;
+///   matcher.match_into(matches, memory, f1.descriptors, f2.descriptors);
+/// @endcode
 #pragma once
 
 #include <cassert>
 #include <concepts>
+#include <cstddef>
 #include <span>
 #include <tuple>
 #include <utility>
@@ -32,6 +40,13 @@ class match_chain {
 
   constexpr match_chain(Source source, std::tuple<Stages...> stages) : source_{source}, stages_{std::move(stages)} {}
 
+  /// Memory for `match_into`, which a later call uses again.
+  struct workspace {
+    std::vector<candidate> candidates;
+    workspace_of<Source> source;
+    std::tuple<workspace_of<Stages>...> stages;
+  };
+
   /// The matches in ascending order of their query, at most one for each. `where`: what the source
   /// wants to know in addition, e.g. the windows of `windowed`.
   /// @pre queries and trains come with keypoints if a stage needs them
@@ -40,18 +55,34 @@ class match_chain {
       searches<Source, descriptor_of<Queries>, Where...>
   [[nodiscard]] std::vector<match> operator()(const Queries& queries, const Trains& trains,
                                               const Where&... where) const {
+    std::vector<match> matches;
+    workspace memory;
+    match_into(matches, memory, queries, trains, where...);
+    return matches;
+  }
+
+  /// The same into `matches`, which it replaces: with memory that has served for a call of this size
+  /// before, nothing is allocated (by our own parts).
+  template <describable Queries, describable Trains, class... Where>
+  requires std::same_as<descriptor_of<Queries>, descriptor_of<Trains>> &&
+      searches<Source, descriptor_of<Queries>, Where...>
+  void match_into(std::vector<match>& matches, workspace& memory, const Queries& queries, const Trains& trains,
+                  const Where&... where) const {
     const auto q = view_of(queries);
     const auto t = view_of(trains);
     if constexpr (needs.keypoints) {
       assert(q.keypoints.size() == q.descriptors.size() && t.keypoints.size() == t.descriptors.size());
     }
-    std::vector<candidate> candidates = source_.search(q, t, needs, where...);
-    std::apply([&](const auto&... stage) { (run(stage, candidates, q.keypoints, t.keypoints), ...); }, stages_);
+    if constexpr (searches_in_place<Source, descriptor_of<Queries>, Where...>) {
+      source_.search(memory.candidates, memory.source, q, t, needs, where...);
+    } else {
+      memory.candidates = source_.search(q, t, needs, where...);
+    }
+    run_all(memory, q.keypoints, t.keypoints, std::index_sequence_for<Stages...>{});
 
-    std::vector<match> matches;
-    matches.reserve(candidates.size());
-    for (const candidate& c : candidates) matches.push_back({c.query, c.train, c.distance});
-    return matches;
+    matches.clear();
+    matches.reserve(memory.candidates.size());
+    for (const candidate& c : memory.candidates) matches.push_back({c.query, c.train, c.distance});
   }
 
   /// The same chain with one more stage.
@@ -61,11 +92,19 @@ class match_chain {
   }
 
  private:
+  template <std::size_t... I>
+  void run_all(workspace& memory, std::span<const keypoint> queries, std::span<const keypoint> trains,
+               std::index_sequence<I...>) const {
+    (run(std::get<I>(stages_), memory.candidates, queries, trains, std::get<I>(memory.stages)), ...);
+  }
   template <class Stage>
   static void run(const Stage& stage, std::vector<candidate>& candidates, std::span<const keypoint> queries,
-                  std::span<const keypoint> trains) {
+                  std::span<const keypoint> trains, workspace_of<Stage>& memory) {
     if constexpr (match_predicate<Stage>) {
       std::erase_if(candidates, [&](const candidate& c) { return !stage(c); });
+    } else if constexpr (std::invocable<const Stage&, std::vector<candidate>&, std::span<const keypoint>,
+                                        std::span<const keypoint>, workspace_of<Stage>&>) {
+      stage(candidates, queries, trains, memory);
     } else {
       stage(candidates, queries, trains);
     }

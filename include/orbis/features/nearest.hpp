@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The two nearest neighbours by any distance: the plain definition.
+/// The nearest neighbours by any distance: the plain definition.
 #pragma once
 
+#include <algorithm>
+#include <cassert>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -33,13 +35,11 @@ struct nearest_two {
 /// For each query its nearest and second nearest train; if `reverse` is not empty, for each train
 /// its nearest query (the lowest on ties). O(queries x trains).
 /// @pre nearest.size() == queries.size(); reverse is empty or of the size of trains
-///
-/// Always inlined, so that it is compiled for the instruction set of the function that calls it.
 template <class Distance, class Descriptor>
-[[gnu::always_inline]] inline void nearest_by(const Distance& distance, std::span<const Descriptor> queries,
-                                              std::span<const Descriptor> trains, std::span<nearest_two> nearest,
-                                              std::span<std::uint32_t> reverse) {
-  std::vector<std::uint32_t> reverse_distance(reverse.size(), std::numeric_limits<std::uint32_t>::max());
+void nearest_by(const Distance& distance, std::span<const Descriptor> queries, std::span<const Descriptor> trains,
+                std::span<nearest_two> nearest, std::span<std::uint32_t> reverse,
+                std::vector<std::uint32_t>& reverse_distance) {
+  reverse_distance.assign(reverse.size(), no_neighbor);
   const Descriptor* const train = trains.data();
   const std::size_t train_count = trains.size();
   for (std::size_t q = 0; q != queries.size(); ++q) {
@@ -58,6 +58,27 @@ template <class Distance, class Descriptor>
       }
     }
     nearest[q] = best;
+  }
+}
+
+/// For each query its `k` nearest trains by ascending distance, then index: row `q` begins at
+/// `nearest[q * k]`, and what there are too few trains for is left at the default.
+/// O(queries x trains) distances.
+/// @pre k > 0; nearest.size() == queries.size() * k
+template <class Distance, class Descriptor>
+void k_nearest_by(const Distance& distance, std::span<const Descriptor> queries, std::span<const Descriptor> trains,
+                  std::size_t k, std::span<neighbor> nearest) {
+  assert(k > 0 && nearest.size() == queries.size() * k);
+  std::fill(nearest.begin(), nearest.end(), neighbor{});
+  for (std::size_t q = 0; q != queries.size(); ++q) {
+    const auto row = nearest.subspan(q * k, k);
+    for (std::size_t t = 0; t != trains.size(); ++t) {
+      const auto d = static_cast<std::uint32_t>(distance(queries[q], trains[t]));
+      if (d >= row.back().distance) continue;
+      std::size_t at = k - 1;
+      for (; at != 0 && row[at - 1].distance > d; --at) row[at] = row[at - 1];
+      row[at] = {static_cast<std::uint32_t>(t), d};
+    }
   }
 }
 

@@ -4,12 +4,13 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <cassert>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <numbers>
+#include <numeric>
 #include <span>
-#include <unordered_map>
 #include <vector>
 
 #include <orbis/features/match.hpp>
@@ -41,19 +42,24 @@ struct max_distance {
 /// Keeps, of the candidates that share a train, the nearest (the lowest query on ties). Unlike
 /// `cross_check`, only those that earlier stages left over compete.
 struct unique {
-  void operator()(std::vector<candidate>& candidates, std::span<const keypoint>, std::span<const keypoint>) const {
-    std::unordered_map<std::uint32_t, std::uint32_t> nearest;  // train -> distance, of the best so far
-    nearest.reserve(candidates.size());
-    for (const candidate& c : candidates) {
-      const auto [at, inserted] = nearest.try_emplace(c.train, c.distance);
-      if (!inserted) at->second = std::min(at->second, c.distance);
-    }
+  using workspace = std::vector<std::uint32_t>;  ///< by train: the distance of the best
+
+  void operator()(std::vector<candidate>& candidates, std::span<const keypoint>, std::span<const keypoint>,
+                  workspace& nearest) const {
+    std::size_t trains = 0;
+    for (const candidate& c : candidates) trains = std::max(trains, std::size_t{c.train} + 1);
+    nearest.assign(trains, none);
+    for (const candidate& c : candidates) nearest[c.train] = std::min(nearest[c.train], c.distance);
     std::erase_if(candidates, [&](const candidate& c) {
-      std::uint32_t& distance = nearest.find(c.train)->second;
-      if (c.distance != distance) return true;
-      distance = none;  // taken: equally near ones that follow lose
+      if (c.distance != nearest[c.train]) return true;
+      nearest[c.train] = none;  // taken: equally near ones that follow lose
       return false;
     });
+  }
+  void operator()(std::vector<candidate>& candidates, std::span<const keypoint> queries,
+                  std::span<const keypoint> trains) const {
+    workspace memory;
+    (*this)(candidates, queries, trains, memory);
   }
 };
 
@@ -66,10 +72,14 @@ struct rotation_consistency {
   int bins = 30;
   int peaks = 3;
   float weakest = 0.1F;
+  struct workspace {
+    std::vector<std::uint32_t> counts, order;
+    std::vector<char> kept;
+  };
 
   /// @pre one keypoint for each descriptor on both sides; bins > 0
   void operator()(std::vector<candidate>& candidates, std::span<const keypoint> queries,
-                  std::span<const keypoint> trains) const {
+                  std::span<const keypoint> trains, workspace& memory) const {
     assert(bins > 0);
     const auto bin_of = [&](const candidate& c) {
       constexpr float turn = 2.0F * std::numbers::pi_v<float>;
@@ -79,17 +89,25 @@ struct rotation_consistency {
       // Bins are centred on their angle, so that "not turned" lies in the middle of one.
       return static_cast<std::size_t>(fraction * static_cast<float>(bins) + 0.5F) % static_cast<std::size_t>(bins);
     };
-    std::vector<std::size_t> counts(static_cast<std::size_t>(bins), 0);
+    auto& [counts, order, kept] = memory;
+    counts.assign(static_cast<std::size_t>(bins), 0);
     for (const candidate& c : candidates) ++counts[bin_of(c)];
 
-    std::vector<std::size_t> order(counts.size());
-    for (std::size_t i = 0; i != order.size(); ++i) order[i] = i;
-    std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return counts[a] > counts[b]; });
+    order.resize(counts.size());
+    std::iota(order.begin(), order.end(), 0U);
+    std::sort(order.begin(), order.end(), [&counts = counts](std::uint32_t a, std::uint32_t b) {
+      return counts[a] != counts[b] ? counts[a] > counts[b] : a < b;
+    });
     const auto floor = weakest * static_cast<float>(counts[order.front()]);
-    std::vector<char> kept(counts.size(), 0);
+    kept.assign(counts.size(), 0);
     for (std::size_t i = 0; i != order.size() && static_cast<int>(i) < peaks; ++i)
       kept[order[i]] = static_cast<float>(counts[order[i]]) >= floor ? 1 : 0;
-    std::erase_if(candidates, [&](const candidate& c) { return kept[bin_of(c)] == 0; });
+    std::erase_if(candidates, [&](const candidate& c) { return memory.kept[bin_of(c)] == 0; });
+  }
+  void operator()(std::vector<candidate>& candidates, std::span<const keypoint> queries,
+                  std::span<const keypoint> trains) const {
+    workspace memory;
+    (*this)(candidates, queries, trains, memory);
   }
 };
 

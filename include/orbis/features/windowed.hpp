@@ -8,12 +8,13 @@
 #include <cstdint>
 #include <limits>
 #include <span>
-#include <tuple>
 #include <vector>
 
+#include <orbis/core/simd.hpp>
 #include <orbis/features/grid.hpp>
 #include <orbis/features/hamming.hpp>
 #include <orbis/features/match.hpp>
+#include <orbis/features/search_among.hpp>
 
 namespace orbis::features {
 
@@ -40,59 +41,42 @@ template <class Distance>
 struct windowed_source {
   using match_source_tag = void;
   Distance distance{};
+  simd::level level = simd::level::avx512;  ///< the best instruction set to use, if the processor has it
+
+  struct workspace {
+    search_among_workspace search;
+    keypoint_grid grid;
+  };
 
   /// One candidate for each query that has a train in its window.
   /// @pre one window for each query; one keypoint for each train; `grid` is made of these keypoints
   template <class Descriptor>
   requires descriptor_distance<Distance, Descriptor>
-  [[nodiscard]] std::vector<candidate> search(const feature_view<Descriptor>& queries,
-                                              const feature_view<Descriptor>& trains, search_needs needs,
-                                              std::span<const window> windows, const keypoint_grid& grid) const {
+  void search(std::vector<candidate>& candidates, workspace& memory, const feature_view<Descriptor>& queries,
+              const feature_view<Descriptor>& trains, search_needs needs, std::span<const window> windows,
+              const keypoint_grid& grid) const {
     assert(windows.size() == queries.descriptors.size());
     assert(trains.keypoints.size() == trains.descriptors.size());
-    struct nearest_query {
-      std::uint32_t distance = none;
-      std::uint32_t query = none;
-    };
-    std::vector<nearest_query> reverse(needs.reverse ? trains.descriptors.size() : 0);
-    std::vector<candidate> candidates;
-    candidates.reserve(queries.descriptors.size());
-    for (std::size_t q = 0; q != queries.descriptors.size(); ++q) {
+    search_among(distance, level, candidates, memory.search, queries, trains, needs, [&](std::size_t q, auto&& add) {
       const window& w = windows[q];
-      candidate best{static_cast<std::uint32_t>(q), none, none, none, none};
-      grid.for_each_near(w.x, w.y, w.radius, w.min_octave, w.max_octave, [&](std::uint32_t t) {
-        const auto d = static_cast<std::uint32_t>(distance(queries.descriptors[q], trains.descriptors[t]));
-        // The grid does not visit in the order of the indices: ties are told apart here.
-        if (std::tie(d, t) < std::tie(best.distance, best.train)) {
-          best.second_distance = best.distance;
-          best.distance = d;
-          best.train = t;
-        } else if (d < best.second_distance) {
-          best.second_distance = d;
-        }
-        if (needs.reverse && d < reverse[t].distance) reverse[t] = {d, best.query};
-      });
-      if (best.train != none) candidates.push_back(best);
-    }
-    if (needs.reverse)
-      for (candidate& c : candidates) c.reverse_query = reverse[c.train].query;
-    return candidates;
+      grid.for_each_near(w.x, w.y, w.radius, w.min_octave, w.max_octave, add);
+    });
   }
 
   /// The same, with a grid made for this one search.
   template <class Descriptor>
   requires descriptor_distance<Distance, Descriptor>
-  [[nodiscard]] std::vector<candidate> search(const feature_view<Descriptor>& queries,
-                                              const feature_view<Descriptor>& trains, search_needs needs,
-                                              std::span<const window> windows) const {
-    return search(queries, trains, needs, windows, keypoint_grid{trains.keypoints});
+  void search(std::vector<candidate>& candidates, workspace& memory, const feature_view<Descriptor>& queries,
+              const feature_view<Descriptor>& trains, search_needs needs, std::span<const window> windows) const {
+    memory.grid.assign(trains.keypoints);
+    search(candidates, memory, queries, trains, needs, windows, memory.grid);
   }
 };
 
 /// A source that compares within windows: `windowed(hamming{})`.
 template <class Distance>
-[[nodiscard]] constexpr windowed_source<Distance> windowed(Distance distance) {
-  return {distance};
+[[nodiscard]] constexpr windowed_source<Distance> windowed(Distance distance, simd::level level = simd::level::avx512) {
+  return {distance, level};
 }
 
 }  // namespace orbis::features
