@@ -62,7 +62,8 @@ struct built_map {
 
 /// Splices the keyframes into a cloud, filters it, and integrates each keyframe's own measurements,
 /// those whose point of the cloud survived, with rays from where that keyframe was. Filtering the
-/// whole cloud lets one keyframe's points judge another's.
+/// whole cloud lets one keyframe's points judge another's; the automatic filter asks the keyframes'
+/// depth images as well which points their rays pass through.
 ///
 /// Keyframes whose pose is not finite are skipped and counted. Errors: `no_data` if there is no
 /// keyframe; `invalid_argument` if an image's size is not the camera's, or an option is out of range;
@@ -87,7 +88,9 @@ template <scan_map Octree = octree::occupancy_octree<>, execution_policy Policy,
     return image.width() == camera.width() && image.height() == camera.height();
   };
   const auto finite_pose = [](const auto& k) { return se3(k.T_world_camera).to_matrix().allFinite(); };
-  const std::size_t passes = options.unfiltered_octree ? 3 : 2;
+  // The automatic filter looks at every keyframe twice.
+  const bool listening = options.filter.kind == filter_kind::automatic;
+  const std::size_t passes = (options.unfiltered_octree ? 3U : 2U) + (listening ? 2U : 0U);
   const std::size_t total = passes * std::ranges::size(keyframes);
   std::size_t done = 0;
 
@@ -108,7 +111,15 @@ template <scan_map Octree = octree::occupancy_octree<>, execution_policy Policy,
 
   map.cloud = dense.cloud(policy);
   map.flying_pixels = dense.flying_pixels();
-  filtered_indices filtered = filter_points(policy, map.cloud.points, dense.ranges(policy), options.filter);
+  bool cancelled = false;
+  const auto while_filtering = [&](std::size_t views_done, std::size_t) {
+    cancelled = cancelled || !on_progress(done + views_done, total);
+    return !cancelled;
+  };
+  filtered_indices filtered =
+      filter_points(policy, map.cloud.points, dense.ranges(policy), keyframes, camera, options.filter, while_filtering);
+  if (cancelled) return fail(errc::cancelled, {}, "cancelled");
+  if (listening) done += 2 * std::ranges::size(keyframes);
   map.filter = std::move(filtered.report);
   map.inliers = std::move(filtered.inliers);
   map.filtered_cloud = cloud::extract(map.cloud, map.inliers);
