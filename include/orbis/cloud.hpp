@@ -8,6 +8,7 @@
 #include <orbis/cloud/all_knn_avx512.hpp>
 #include <orbis/cloud/all_knn_bracket.hpp>
 #include <orbis/cloud/all_knn_kernels.hpp>
+#include <orbis/cloud/all_knn_lanes.hpp>
 #include <orbis/cloud/all_knn_leaves.hpp>
 #include <orbis/cloud/all_knn_search.hpp>
 #include <orbis/cloud/cluster.hpp>

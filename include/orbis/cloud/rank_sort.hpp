@@ -20,21 +20,36 @@ namespace orbis::cloud::detail {
 using int_lanes4 [[gnu::vector_size(16)]] = std::int32_t;
 using int_lanes8 [[gnu::vector_size(32)]] = std::int32_t;
 
-/// For each of `count` values, the number of smaller ones. @pre sixteen more values can be read and written
+/// For each of `count` values, the number of smaller ones. @pre 32 more values can be read and written
 template <class Lanes>
 [[gnu::always_inline]] inline void count_smaller(const std::int32_t* values, std::size_t count,
                                                  std::int32_t* smaller) noexcept {
   constexpr std::size_t lanes = sizeof(Lanes) / sizeof(std::int32_t);
-  for (std::size_t i = 0; i < count; i += 2 * lanes) {
-    Lanes v[2];
-    Lanes n[2] = {};
-    std::memcpy(v, values + i, sizeof v);
+  // In variables of their own, not in arrays: those would be kept in memory.
+  for (std::size_t i = 0; i < count; i += 4 * lanes) {
+    Lanes v0;
+    Lanes v1;
+    Lanes v2;
+    Lanes v3;
+    std::memcpy(&v0, values + i, sizeof v0);
+    std::memcpy(&v1, values + i + lanes, sizeof v1);
+    std::memcpy(&v2, values + i + 2 * lanes, sizeof v2);
+    std::memcpy(&v3, values + i + 3 * lanes, sizeof v3);
+    Lanes n0{};
+    Lanes n1{};
+    Lanes n2{};
+    Lanes n3{};
     for (std::size_t j = 0; j != count; ++j) {
       const Lanes other = Lanes{} + values[j];
-      n[0] -= other < v[0];
-      n[1] -= other < v[1];
+      n0 -= other < v0;
+      n1 -= other < v1;
+      n2 -= other < v2;
+      n3 -= other < v3;
     }
-    std::memcpy(smaller + i, n, sizeof n);
+    std::memcpy(smaller + i, &n0, sizeof n0);
+    std::memcpy(smaller + i + lanes, &n1, sizeof n1);
+    std::memcpy(smaller + i + 2 * lanes, &n2, sizeof n2);
+    std::memcpy(smaller + i + 3 * lanes, &n3, sizeof n3);
   }
 }
 inline void count_smaller_portable(const std::int32_t* values, std::size_t count, std::int32_t* smaller) {
@@ -96,7 +111,7 @@ class rank_sorter {
   }
 
  private:
-  static constexpr std::size_t room = 16;          // read and written beyond the last
+  static constexpr std::size_t room = 32;          // read and written beyond the last
   static constexpr std::size_t most_ranked = 384;  // beyond this n log n wins
 
   [[nodiscard]] std::uint64_t pack(std::size_t i) const noexcept {
