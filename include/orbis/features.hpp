@@ -10,6 +10,8 @@
 #include <orbis/features/cover_first.hpp>
 #include <orbis/features/depth.hpp>
 #include <orbis/features/descriptor.hpp>
+#include <orbis/features/epipolar.hpp>
+#include <orbis/features/epipolar_geometry.hpp>
 #include <orbis/features/fast.hpp>
 #include <orbis/features/fast_lanes.hpp>
 #include <orbis/features/grey.hpp>
@@ -19,12 +21,17 @@
 #include <orbis/features/hamming_nearest.hpp>
 #include <orbis/features/hamming_slices.hpp>
 #include <orbis/features/kept_memory.hpp>
+#include <orbis/features/lanes16.hpp>
 #include <orbis/features/match.hpp>
 #include <orbis/features/matcher.hpp>
+#include <orbis/features/motion_statistics.hpp>
 #include <orbis/features/nearest.hpp>
+#include <orbis/features/node_guided.hpp>
 #include <orbis/features/orb.hpp>
 #include <orbis/features/orb_pattern.hpp>
 #include <orbis/features/orientation.hpp>
+#include <orbis/features/project_points.hpp>
+#include <orbis/features/projected.hpp>
 #include <orbis/features/pyramid.hpp>
 #include <orbis/features/resize.hpp>
 #include <orbis/features/search_among.hpp>

@@ -15,6 +15,7 @@
 #include <cstring>
 
 #include <orbis/core/simd.hpp>
+#include <orbis/features/lanes16.hpp>
 
 #if ORBIS_X86
 #include <immintrin.h>
@@ -70,22 +71,6 @@ inline void fast_scores_one_by_one(const std::uint8_t* centre, std::ptrdiff_t st
   }
 }
 
-#if defined(__GNUC__)
-/// Sixteen bytes in a register of whatever kind the machine has.
-using bytes16 [[gnu::vector_size(16)]] = std::uint8_t;
-[[nodiscard]] inline bytes16 load16(const std::uint8_t* from) noexcept {
-  bytes16 v;
-  std::memcpy(&v, from, sizeof v);
-  return v;
-}
-[[nodiscard]] inline bytes16 min16(bytes16 a, bytes16 b) noexcept { return a < b ? a : b; }
-[[nodiscard]] inline bytes16 max16(bytes16 a, bytes16 b) noexcept { return a > b ? a : b; }
-[[nodiscard]] inline bool any16(bytes16 v) noexcept {
-  std::array<std::uint64_t, 2> words;
-  std::memcpy(words.data(), &v, sizeof v);
-  return (words[0] | words[1]) != 0;
-}
-
 inline void fast_scores_portable(const std::uint8_t* centre, std::ptrdiff_t stride, int count, std::uint8_t threshold,
                                  std::uint8_t* scores) {
   const auto circle = circle_offsets(stride);
@@ -120,18 +105,12 @@ inline void fast_scores_portable(const std::uint8_t* centre, std::ptrdiff_t stri
       score = max16(max16(brightest, c) - c, c - min16(c, darkest));
       score = (score > least) ? score : bytes16{};
     }
-    std::memcpy(scores + x, &score, sizeof score);
+    store16(scores + x, score);
   };
   if (count < 16) return fast_scores_one_by_one(centre, stride, count, threshold, scores);
   for (int x = 0; x <= count - 16; x += 16) block(x);
   if (count % 16 != 0) block(count - 16);  // overlaps the one before it
 }
-#else
-inline void fast_scores_portable(const std::uint8_t* centre, std::ptrdiff_t stride, int count, std::uint8_t threshold,
-                                 std::uint8_t* scores) {
-  fast_scores_one_by_one(centre, stride, count, threshold, scores);
-}
-#endif
 
 inline std::size_t fast_peaks_portable(const std::uint8_t* above, const std::uint8_t* row, const std::uint8_t* below,
                                        int count, bool ties, std::uint32_t* columns) {

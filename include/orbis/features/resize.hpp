@@ -14,6 +14,7 @@
 
 #include <orbis/core/image.hpp>
 #include <orbis/core/simd.hpp>
+#include <orbis/features/lanes16.hpp>
 
 #if ORBIS_X86
 #include <immintrin.h>
@@ -105,8 +106,12 @@ inline void resize_along_portable(const resize_plan& plan, const std::uint8_t* f
 
 inline void resize_across_portable(const std::uint16_t* first, const std::uint16_t* second, int weight, int count,
                                    std::uint8_t* to) {
-  const auto w1 = static_cast<std::uint32_t>(weight), w0 = 256 - w1;
-  for (int x = 0; x < count; ++x) to[x] = static_cast<std::uint8_t>((first[x] * w0 + second[x] * w1 + 0x8000U) >> 16U);
+  const auto w1 = static_cast<std::uint16_t>(weight), w0 = static_cast<std::uint16_t>(256 - weight);
+  for (int x = 0; x < count; x += 8) {
+    const words8 a = load8_words(first + x), b = load8_words(second + x);
+    const words8 high = (a >> 8) * w0 + (b >> 8) * w1, low = (a & 255) * w0 + (b & 255) * w1;
+    store8_narrowed(to + x, rounded_high(high, low));
+  }
 }
 
 #if ORBIS_X86

@@ -13,6 +13,7 @@
 
 #include <orbis/core/image.hpp>
 #include <orbis/core/simd.hpp>
+#include <orbis/features/lanes16.hpp>
 
 #if ORBIS_X86
 #include <immintrin.h>
@@ -38,22 +39,29 @@ using smooth_along = void(const std::uint8_t* line, int count, std::uint16_t* su
 /// Weighted sum of seven such rows, rounded, in the pixels' order.
 using smooth_across = void(const std::array<const std::uint16_t*, 7>& rows, int count, std::uint8_t* to);
 
+[[nodiscard]] inline words8 gaussian_sum(const std::array<words8, 7>& v) noexcept {
+  const auto weight = [](std::size_t i) { return static_cast<std::uint16_t>(gaussian_weights[i]); };
+  return (v[0] + v[6]) * weight(0) + (v[1] + v[5]) * weight(1) + (v[2] + v[4]) * weight(2) + v[3] * weight(3);
+}
+
 inline void smooth_along_portable(const std::uint8_t* line, int count, std::uint16_t* sums) {
-  for (int x = 0; x < count; ++x) {
-    const int sum = (line[x - 3] + line[x + 3]) * gaussian_weights[0] +
-                    (line[x - 2] + line[x + 2]) * gaussian_weights[1] +
-                    (line[x - 1] + line[x + 1]) * gaussian_weights[2] + line[x] * gaussian_weights[3];
-    sums[x] = static_cast<std::uint16_t>(sum);
+  for (int x = 0; x < count; x += 8) {
+    std::array<words8, 7> v;
+    for (int i = 0; i != 7; ++i) v[static_cast<std::size_t>(i)] = load8_widened(line + x + i - 3);
+    store8(sums + x, gaussian_sum(v));
   }
 }
 
 inline void smooth_across_portable(const std::array<const std::uint16_t*, 7>& rows, int count, std::uint8_t* to) {
-  for (int x = 0; x < count; ++x) {
-    const auto weight = [](std::size_t i) { return static_cast<std::uint32_t>(gaussian_weights[i]); };
-    const std::uint32_t sum = (std::uint32_t{rows[0][x]} + rows[6][x]) * weight(0) +
-                              (std::uint32_t{rows[1][x]} + rows[5][x]) * weight(1) +
-                              (std::uint32_t{rows[2][x]} + rows[4][x]) * weight(2) + rows[3][x] * weight(3);
-    to[x] = static_cast<std::uint8_t>((sum + 0x8000U) >> 16U);
+  for (int x = 0; x < count; x += 8) {
+    // The bytes of the words apart, so that their sums fit into words.
+    std::array<words8, 7> low, high;
+    for (std::size_t i = 0; i != 7; ++i) {
+      const words8 v = load8_words(rows[i] + x);
+      low[i] = v & 255;
+      high[i] = v >> 8;
+    }
+    store8_narrowed(to + x, rounded_high(gaussian_sum(high), gaussian_sum(low)));
   }
 }
 

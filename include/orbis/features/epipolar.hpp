@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// The source that looks along epipolar lines.
+#pragma once
+
+#include <array>
+#include <cassert>
+#include <cmath>
+#include <concepts>
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+#include <limits>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include <orbis/core/simd.hpp>
+#include <orbis/core/types.hpp>
+#include <orbis/features/epipolar_geometry.hpp>
+#include <orbis/features/hamming.hpp>
+#include <orbis/features/match.hpp>
+#include <orbis/features/search_among.hpp>
+
+namespace orbis::features {
+
+/// How far from its line a match may lie.
+struct epipolar_rule {
+  float distance = 1.96F;       ///< at the finest level, pixels: 95 % where positions are good to a pixel
+  float scale_factor = 1.2F;    ///< of the pyramid: by so much per level of the train the distance grows
+  float epipole_radius = 0.0F;  ///< trains so close to the epipole (grows likewise) show no parallax: left out
+  int max_octave_difference = std::numeric_limits<int>::max();  ///< between query and train
+};
+
+/// Finds for each query the nearest and the second nearest of the trains close to its epipolar line: the search for
+/// new landmarks to triangulate between two images of known pose. Made by `epipolar(distance, rule)`;
+/// a chain that begins with it is called with the geometry of the two images:
+///
+/// @code
+///   constexpr auto matcher = epipolar(hamming{}, {.epipole_radius = 10.0F}) | ratio_test{0.8f} | cross_check{};
+///   std::vector<match> a = matcher(f1, f2, fundamental_geometry{F});                         // pinhole images
+///   std::vector<match> b = matcher(f1, f2, ray_geometry{rays1, rays2, T_camera2_camera1, focal});  // any camera
+/// @endcode
+///
+/// The reverse neighbour of a train is the nearest of the queries whose line it lies close to.
+template <class Distance>
+struct epipolar_source {
+  using match_source_tag = void;
+  Distance distance{};
+  epipolar_rule rule{};
+  simd::level level = simd::level::avx512;  ///< the best instruction set to use, if the processor has it
+
+  struct workspace {
+    search_among_workspace search;
+    std::vector<float> x, y, limit;  ///< of the trains, in whole blocks
+  };
+
+  /// One candidate for each query that has a train close to its line. O(queries x trains) distances to lines.
+  /// @pre one keypoint for each descriptor on both sides
+  template <class Descriptor, epipolar_geometry Geometry>
+  requires descriptor_distance<Distance, Descriptor>
+  void search(std::vector<candidate>& candidates, workspace& memory, const feature_view<Descriptor>& queries,
+              const feature_view<Descriptor>& trains, search_needs needs, const Geometry& geometry) const {
+    assert(queries.keypoints.size() == queries.descriptors.size());
+    assert(trains.keypoints.size() == trains.descriptors.size());
+    place_trains(memory, trains.keypoints, geometry);
+    search_among(distance, level, candidates, memory.search, queries, trains, needs, [&](std::size_t q, auto&& add) {
+      const keypoint& query = queries.keypoints[q];
+      const std::optional<epipolar_line> line = geometry.line(q, query);
+      if (!line) return;
+      for (std::size_t begin = 0; begin < memory.x.size(); begin += block) {
+        std::array<std::uint32_t, block> close;
+        if (!any_close(*line, memory.x.data() + begin, memory.y.data() + begin, memory.limit.data() + begin, close))
+          continue;
+        for (std::size_t i = 0; i != block; ++i) {
+          if (close[i] == 0) continue;
+          const auto t = static_cast<std::uint32_t>(begin + i);
+          const std::int64_t step = std::int64_t{trains.keypoints[t].octave} - query.octave;
+          if (std::abs(step) <= rule.max_octave_difference) add(t);
+        }
+      }
+    });
+  }
+
+ private:
+  static constexpr std::size_t block = 16;
+
+  /// A limit that is not a number, or negative, is close to no line.
+  template <class Geometry>
+  void place_trains(workspace& memory, std::span<const keypoint> keypoints, const Geometry& geometry) const {
+    constexpr float nowhere = std::numeric_limits<float>::quiet_NaN();
+    const std::size_t size = (keypoints.size() + block - 1) / block * block;
+    memory.x.assign(size, nowhere);
+    memory.y.assign(size, nowhere);
+    memory.limit.assign(size, nowhere);
+    const std::optional<vec2f> epipole = geometry.epipole();
+    for (std::size_t t = 0; t != keypoints.size(); ++t) {
+      const vec2f p = geometry.point(t, keypoints[t]);
+      const float scale = std::pow(rule.scale_factor, static_cast<float>(keypoints[t].octave));
+      if (epipole && (p - *epipole).norm() < rule.epipole_radius * scale) continue;
+      memory.x[t] = p.x();
+      memory.y[t] = p.y();
+      memory.limit[t] = rule.distance * scale;
+    }
+  }
+
+  /// A loop of fixed length without branches, for the vector unit.
+  [[nodiscard]] static bool any_close(const epipolar_line& line, const float* x, const float* y, const float* limit,
+                                      std::array<std::uint32_t, block>& close) noexcept {
+    std::uint32_t any = 0;
+    for (std::size_t i = 0; i != block; ++i) {
+      close[i] = std::abs(line.a * x[i] + line.b * y[i] + line.c) <= limit[i] ? 1U : 0U;
+      any |= close[i];
+    }
+    return any != 0;
+  }
+};
+
+/// A source that looks along epipolar lines: `epipolar(hamming{})`.
+template <class Distance>
+[[nodiscard]] constexpr epipolar_source<Distance> epipolar(Distance distance, epipolar_rule rule = {},
+                                                           simd::level level = simd::level::avx512) {
+  return {distance, rule, level};
+}
+
+}  // namespace orbis::features

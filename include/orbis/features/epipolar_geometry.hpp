@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Epipolar lines: where the match of a keypoint must lie when the relative pose of two images is known.
+#pragma once
+
+#include <cassert>
+#include <cmath>
+#include <concepts>
+#include <cstddef>
+#include <limits>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include <Eigen/Geometry>
+
+#include <orbis/camera/model.hpp>
+#include <orbis/core/se3.hpp>
+#include <orbis/core/types.hpp>
+#include <orbis/features/descriptor.hpp>
+
+namespace orbis::features {
+
+/// The points with `a x + b y + c = 0`, where `a^2 + b^2 = 1`: the left side is the distance of others.
+struct epipolar_line {
+  float a = 0.0F, b = 0.0F, c = 0.0F;
+};
+
+/// What relates the keypoints of two images:
+/// - `line(i, k)`: the line in the train image that belongs to query `i` with keypoint `k`, if it has one;
+/// - `point(i, k)`: where train `i` with keypoint `k` lies, pixels; NaN where nowhere;
+/// - `epipole()`: where all lines of the train image meet, if they do.
+/// Lines and points are of one plane, which need not be the image itself.
+template <class G>
+concept epipolar_geometry = requires(const G& geometry, std::size_t i, const keypoint& k) {
+  { geometry.line(i, k) } -> std::same_as<std::optional<epipolar_line>>;
+  { geometry.point(i, k) } -> std::same_as<vec2f>;
+  { geometry.epipole() } -> std::same_as<std::optional<vec2f>>;
+};
+
+/// The line of a homogeneous vector, if it is one.
+[[nodiscard]] inline std::optional<epipolar_line> line_of(const vec3& l) noexcept {
+  const double norm = std::hypot(l.x(), l.y());
+  if (!(norm > 0.0) || !std::isfinite(norm) || !std::isfinite(l.z())) return std::nullopt;
+  return epipolar_line{static_cast<float>(l.x() / norm), static_cast<float>(l.y() / norm),
+                       static_cast<float>(l.z() / norm)};
+}
+
+/// The pixel of a homogeneous vector, if it is not at infinity.
+[[nodiscard]] inline std::optional<vec2f> pixel_of(const vec3& p) noexcept {
+  if (!(std::abs(p.z()) > 1e-12 * p.norm())) return std::nullopt;
+  return vec2f{static_cast<float>(p.x() / p.z()), static_cast<float>(p.y() / p.z())};
+}
+
+/// Two pinhole images, by their fundamental matrix: `x_train^T F x_query = 0` for matching pixels.
+class fundamental_geometry {
+ public:
+  explicit fundamental_geometry(const mat3& F) : F_{F} {
+    // The epipole is orthogonal to every column; the two that span most give it best.
+    for (int i = 0; i != 3; ++i) {
+      const vec3 normal = vec3{F.col(i)}.cross(vec3{F.col((i + 1) % 3)});
+      if (normal.norm() > epipole_.norm()) epipole_ = normal;
+    }
+  }
+  /// From the intrinsic matrices (pixels) and the pose of the query's camera in the train's.
+  fundamental_geometry(const mat3& K_query, const mat3& K_train, const se3& T_train_query)
+      : fundamental_geometry{mat3{K_train.inverse().transpose() * essential(T_train_query) * K_query.inverse()}} {}
+
+  [[nodiscard]] std::optional<epipolar_line> line(std::size_t, const keypoint& k) const noexcept {
+    return line_of(F_ * vec3{k.x, k.y, 1.0});
+  }
+  [[nodiscard]] vec2f point(std::size_t, const keypoint& k) const noexcept { return {k.x, k.y}; }
+  [[nodiscard]] std::optional<vec2f> epipole() const noexcept { return pixel_of(epipole_); }
+  [[nodiscard]] const mat3& matrix() const noexcept { return F_; }
+
+  /// `[t]x R`: `r_train^T E r_query = 0` for the rays of matching keypoints.
+  [[nodiscard]] static mat3 essential(const se3& T_train_query) {
+    const vec3 t = T_train_query.translation();
+    mat3 cross;
+    cross << 0.0, -t.z(), t.y(), t.z(), 0.0, -t.x(), -t.y(), t.x(), 0.0;
+    return cross * T_train_query.rotation().matrix();
+  }
+
+ private:
+  mat3 F_;
+  vec3 epipole_ = vec3::Zero();
+};
+
+/// Two images of any central camera, by the rays through their keypoints: lines and points are of
+/// the plane z = 1 of the train's camera, in pixels of a pinhole camera with this focal length.
+/// Refers to the rays; one that is NaN, or does not point forward, has no match.
+class ray_geometry {
+ public:
+  /// @pre one ray for each keypoint of its side; focal > 0 (pixels)
+  ray_geometry(std::span<const vec3> query_rays, std::span<const vec3> train_rays, const se3& T_train_query,
+               double focal)
+      : query_rays_{query_rays},
+        train_rays_{train_rays},
+        E_{fundamental_geometry::essential(T_train_query)},
+        centre_{T_train_query.translation()},
+        focal_{focal} {
+    assert(focal > 0.0);
+  }
+
+  [[nodiscard]] std::optional<epipolar_line> line(std::size_t i, const keypoint&) const noexcept {
+    const vec3 l = E_ * query_rays_[i];
+    return line_of({l.x(), l.y(), focal_ * l.z()});
+  }
+  [[nodiscard]] vec2f point(std::size_t i, const keypoint&) const noexcept {
+    const vec3& r = train_rays_[i];
+    if (!(r.z() > 0.0)) return vec2f::Constant(std::numeric_limits<float>::quiet_NaN());
+    return {static_cast<float>(focal_ * r.x() / r.z()), static_cast<float>(focal_ * r.y() / r.z())};
+  }
+  [[nodiscard]] std::optional<vec2f> epipole() const noexcept {
+    return pixel_of({focal_ * centre_.x(), focal_ * centre_.y(), centre_.z()});
+  }
+
+ private:
+  std::span<const vec3> query_rays_, train_rays_;
+  mat3 E_;
+  vec3 centre_;
+  double focal_;
+};
+
+/// The ray through each keypoint, scaled to z = 1; NaN where the camera has none.
+template <camera::camera_model Camera>
+[[nodiscard]] std::vector<vec3> rays_through(const Camera& camera, std::span<const keypoint> keypoints) {
+  std::vector<vec3> rays;
+  rays.reserve(keypoints.size());
+  for (const keypoint& k : keypoints)
+    rays.push_back(camera.unproject(vec2{k.x, k.y}).value_or(vec3::Constant(std::numeric_limits<double>::quiet_NaN())));
+  return rays;
+}
+
+static_assert(epipolar_geometry<fundamental_geometry> && epipolar_geometry<ray_geometry>);
+
+}  // namespace orbis::features

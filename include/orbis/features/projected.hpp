@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// The source that looks for known points where they project into the image.
+#pragma once
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <concepts>
+#include <cstddef>
+#include <limits>
+#include <optional>
+#include <ranges>
+#include <span>
+#include <vector>
+
+#include <orbis/core/simd.hpp>
+#include <orbis/features/grid.hpp>
+#include <orbis/features/match.hpp>
+#include <orbis/features/windowed.hpp>
+
+namespace orbis::features {
+
+/// Where and how a point should appear in an image.
+struct projection {
+  float x = 0.0F, y = 0.0F;   ///< pixels
+  float distance = 1.0F;      ///< from the camera, metres
+  float cosine = 1.0F;        ///< of the angle between the line of sight and the one the point was seen along before
+  float min_distance = 0.0F;  ///< from which the descriptor was or could be seen, metres
+  float max_distance = std::numeric_limits<float>::infinity();  ///< from which it appears at the finest level
+};
+
+/// How wide to look around a projection, and at which levels.
+struct projection_rule {
+  float radius = 4.0F;            ///< of the window around what should appear at the finest level, pixels
+  float slanted = 1.6F;           ///< times as wide where the view differs from the earlier one:
+  float frontal_cosine = 0.998F;  ///< cosine of the angle from which on it does
+  float min_cosine = 0.5F;        ///< below it, the point is not looked for; -1: always
+  float range_tolerance = 0.2F;   ///< share by which the distance may leave the point's range
+  int levels = 8;                 ///< of the extractor's pyramid
+  float scale_factor = 1.2F;      ///< between them
+  int finer = 1, coarser = 1;     ///< levels to look at around the predicted one
+};
+
+/// The pyramid level at which a point appears that is at the finest from `max_distance`: the
+/// nearest to log(max_distance / distance) / log(scale_factor).
+[[nodiscard]] inline int predicted_octave(float distance, float max_distance, int levels, float scale_factor) noexcept {
+  assert(levels > 0 && scale_factor > 1.0F);
+  const double octave = std::round(std::log(static_cast<double>(max_distance) / static_cast<double>(distance)) /
+                                   std::log(static_cast<double>(scale_factor)));
+  return static_cast<int>(std::clamp(octave, 0.0, static_cast<double>(levels - 1)));
+}
+
+/// The window in which to look for a point; one of negative radius where it should not be visible:
+/// out of its range of distances, from too different a side, or with values that are not finite. The radius grows with
+/// the predicted level. A point of unknown range (`max_distance` infinite) is looked for at all levels.
+[[nodiscard]] inline window window_of(const projection& p, const projection_rule& rule) noexcept {
+  const float most = p.max_distance * (1.0F + rule.range_tolerance);
+  const float least = p.min_distance * (1.0F - rule.range_tolerance);
+  if (!std::isfinite(p.x) || !std::isfinite(p.y) || !(p.distance > 0.0F && p.distance >= least && p.distance <= most) ||
+      !std::isfinite(p.distance) || !(p.cosine >= rule.min_cosine))
+    return {};
+  const float radius = rule.radius * (p.cosine < rule.frontal_cosine ? rule.slanted : 1.0F);
+  if (std::isinf(p.max_distance)) return {p.x, p.y, radius, 0, rule.levels - 1};
+  const int octave = predicted_octave(p.distance, p.max_distance, rule.levels, rule.scale_factor);
+  return {p.x, p.y, radius * std::pow(rule.scale_factor, static_cast<float>(octave)), std::max(0, octave - rule.finer),
+          std::min(rule.levels - 1, octave + rule.coarser)};
+}
+
+/// Tells for a point where it should appear; nothing where it does not. See `project_points.hpp` for one made of
+/// a camera and its pose.
+template <class F, class Points>
+concept projects = std::ranges::random_access_range<const Points> && std::ranges::sized_range<const Points> &&
+    requires(const F& project, std::ranges::range_reference_t<const Points> point) {
+  { project(point) } -> std::convertible_to<std::optional<projection>>;
+};
+
+namespace detail {
+template <class Points, class Project>
+void predict_windows(std::vector<window>& windows, const Points& points, const Project& project,
+                     const projection_rule& rule) {
+  windows.clear();
+  windows.reserve(std::ranges::size(points));
+  for (auto&& point : points) {
+    const std::optional<projection> p = project(point);
+    windows.push_back(p ? window_of(*p, rule) : window{});
+  }
+}
+}  // namespace detail
+
+/// Finds for each query, the descriptor of a known point, the nearest and the second nearest train
+/// where the point should appear. Made by `projected(distance, rule)`; a chain that begins with it is
+/// called with the points, one for each query, with what projects them, and if one is at hand with the
+/// grid over the trains' keypoints:
+///
+/// @code
+///   constexpr auto matcher = projected(hamming{}, {.radius = 3.0F}) | max_distance{100} | unique{};
+///   std::vector<match> found = matcher(descriptors, frame, landmarks, camera_projection{camera, T_world_camera});
+/// @endcode
+///
+/// Source of the rules: Mur-Artal, Montiel, Tardos, "ORB-SLAM: a versatile and accurate monocular SLAM system",
+/// IEEE T-RO 2015, section V.D.
+template <class Distance>
+struct projected_source {
+  using match_source_tag = void;
+  Distance distance{};
+  projection_rule rule{};
+  simd::level level = simd::level::avx512;  ///< the best instruction set to use, if the processor has it
+
+  struct workspace {
+    std::vector<window> windows;
+    typename windowed_source<Distance>::workspace search;
+  };
+
+  /// One candidate for each query that has a train in its window.
+  /// @pre one point for each query; one keypoint for each train; `grid` is made of these keypoints
+  template <class Descriptor, class Points, class Project>
+  requires descriptor_distance<Distance, Descriptor> && projects<Project, Points>
+  void search(std::vector<candidate>& candidates, workspace& memory, const feature_view<Descriptor>& queries,
+              const feature_view<Descriptor>& trains, search_needs needs, const Points& points, const Project& project,
+              const keypoint_grid& grid) const {
+    detail::predict_windows(memory.windows, points, project, rule);
+    windowed(distance, level).search(candidates, memory.search, queries, trains, needs, memory.windows, grid);
+  }
+
+  /// The same, with a grid made for this one search.
+  template <class Descriptor, class Points, class Project>
+  requires descriptor_distance<Distance, Descriptor> && projects<Project, Points>
+  void search(std::vector<candidate>& candidates, workspace& memory, const feature_view<Descriptor>& queries,
+              const feature_view<Descriptor>& trains, search_needs needs, const Points& points,
+              const Project& project) const {
+    detail::predict_windows(memory.windows, points, project, rule);
+    windowed(distance, level).search(candidates, memory.search, queries, trains, needs, memory.windows);
+  }
+};
+
+/// A source that looks where points project to: `projected(hamming{})`.
+template <class Distance>
+[[nodiscard]] constexpr projected_source<Distance> projected(Distance distance, projection_rule rule = {},
+                                                             simd::level level = simd::level::avx512) {
+  return {distance, rule, level};
+}
+
+}  // namespace orbis::features
