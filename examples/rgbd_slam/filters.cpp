@@ -15,9 +15,13 @@ struct named_filter {
   std::string_view name;
   filter_kind kind;
 };
-constexpr std::array filters{named_filter{"auto", filter_kind::automatic}, named_filter{"none", filter_kind::none},
+constexpr std::array filters{named_filter{"auto", filter_kind::automatic},
+                             named_filter{"none", filter_kind::none},
                              named_filter{"statistical", filter_kind::statistical},
-                             named_filter{"radius", filter_kind::radius}};
+                             named_filter{"radius", filter_kind::radius},
+                             named_filter{"log-statistical", filter_kind::log_statistical},
+                             named_filter{"cluster", filter_kind::cluster},
+                             named_filter{"ray-evidence", filter_kind::ray_evidence}};
 
 }  // namespace
 
@@ -36,6 +40,8 @@ orbis::mapping::filter_options filter_options(const settings& s) {
     options.automatic.neighbors = *s.neighbors;
     options.statistical.neighbors = *s.neighbors;
     options.radius.min_neighbors = *s.neighbors;
+    options.log_statistical.neighbors = *s.neighbors;
+    options.cluster.neighbors = *s.neighbors;
   }
   options.statistical.sigma_multiplier = s.sigma;
   options.radius.radius = s.radius;

@@ -6,6 +6,7 @@
 
 #include "accuracy.hpp"
 #include "commands.hpp"
+#include "filters.hpp"
 #include "map_stage.hpp"
 #include "output.hpp"
 #include "summary.hpp"
@@ -57,6 +58,9 @@ void keep_finite(orbis::point_cloud& cloud) {
 }
 
 orbis::result<mapped> map_cloud_file(const settings& s, console& say) {
+  if (filter_options(s).kind == orbis::mapping::filter_kind::ray_evidence)
+    return orbis::fail(orbis::errc::invalid_argument, s.input.string(),
+                       "the filter ray-evidence wants a recording: a cloud has no depth images");
   say.stage("reading");
   auto cloud = orbis::io::read_cloud(s.input);
   if (!cloud) return orbis::fail(cloud.error());

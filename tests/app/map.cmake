@@ -45,3 +45,10 @@ app(0 map room --out out --resolution 0.1)
 summary(free ${WORK}/out octree free)
 check(free GREATER 100)
 check(NOT EXISTS ${WORK}/out/trajectory.txt)
+
+# Every filter by its name; its name in the summary.
+foreach(filter none statistical radius log-statistical cluster ray-evidence)
+  app(0 map room --out named --resolution 0.2 --quiet --filter ${filter})
+  summary(mode ${WORK}/named filter mode)
+  check(mode STREQUAL filter)
+endforeach()

@@ -3,6 +3,7 @@
 /// The outlier filter of a map, as a choice at run time, with a report of what it did.
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
@@ -15,7 +16,9 @@
 #include <vector>
 
 #include <orbis/camera/model.hpp>
+#include <orbis/cloud/cluster.hpp>
 #include <orbis/cloud/filter_chain.hpp>
+#include <orbis/cloud/log_statistical.hpp>
 #include <orbis/cloud/radius.hpp>
 #include <orbis/cloud/ray_evidence.hpp>
 #include <orbis/cloud/select.hpp>
@@ -30,7 +33,10 @@ enum class filter_kind {
   automatic,  ///< chosen by the cloud: `cloud::filter_automatically`
   none,
   statistical,
-  radius
+  radius,
+  log_statistical,
+  cluster,
+  ray_evidence  ///< by the keyframes' depth images; where there are none every point stays
 };
 
 struct filter_options {
@@ -38,6 +44,9 @@ struct filter_options {
   cloud::select_options automatic{};  ///< its `ranges` are set from the map
   cloud::statistical_options statistical{};
   cloud::radius_options radius{};
+  cloud::log_statistical_options log_statistical{};
+  cloud::cluster_options cluster{};
+  cloud::ray_evidence_options ray_evidence{};
 };
 
 /// What a filter did, and why.
@@ -57,10 +66,18 @@ struct filtered_indices {
 
 namespace detail {
 
-/// `automatically(select_options)` is the automatic filter.
-template <execution_policy Policy, point_range Points, class Automatic>
+[[nodiscard]] inline std::vector<std::uint32_t> all_indices(std::size_t count) {
+  std::vector<std::uint32_t> all(count);
+  std::iota(all.begin(), all.end(), 0U);
+  return all;
+}
+
+/// `automatically(select_options)` is the automatic filter, `by_rays(ray_evidence_options)` gives the
+/// inliers by ray evidence.
+template <execution_policy Policy, point_range Points, class Automatic, class ByRays>
 [[nodiscard]] filtered_indices filter_by_kind(const Policy& policy, const Points& points, std::span<const float> ranges,
-                                              const filter_options& options, Automatic&& automatically) {
+                                              const filter_options& options, Automatic&& automatically,
+                                              ByRays&& by_rays) {
   const auto start = std::chrono::steady_clock::now();
   filtered_indices out;
   filter_report& report = out.report;
@@ -77,8 +94,7 @@ template <execution_policy Policy, point_range Points, class Automatic>
       break;
     }
     case filter_kind::none:
-      out.inliers.resize(report.points);
-      std::iota(out.inliers.begin(), out.inliers.end(), 0U);
+      out.inliers = all_indices(report.points);
       report.reason = "asked for";
       break;
     case filter_kind::statistical: {
@@ -95,6 +111,32 @@ template <execution_policy Policy, point_range Points, class Automatic>
       report.reason = "asked for; at least " + std::to_string(options.radius.min_neighbors) + " neighbors within " +
                       cloud::detail::in_words(1e3 * options.radius.radius) + " mm";
       break;
+    case filter_kind::log_statistical: {
+      cloud::log_statistical_result result = cloud::log_statistical_filter(policy, points, options.log_statistical);
+      out.inliers = std::move(result.inliers);
+      report.mode = {cloud::density_step{.mode = cloud::filter_mode::log_statistical,
+                                         .neighbors = options.log_statistical.neighbors,
+                                         .usual = {result.median, 0},
+                                         .threshold = result.threshold}};
+      report.reason = "asked for; mean distance to " + std::to_string(options.log_statistical.neighbors) +
+                      " neighbors at most " + cloud::detail::in_words(1e3 * result.threshold_distance) + " mm";
+      break;
+    }
+    case filter_kind::cluster: {
+      cloud::cluster_result result = cloud::cluster_filter(policy, points, options.cluster);
+      out.inliers = std::move(result.inliers);
+      report.mode = {options.cluster};
+      report.reason = "asked for; " +
+                      std::to_string(std::count(result.removed.begin(), result.removed.end(), char{1})) + " of " +
+                      std::to_string(result.sizes.size()) + " components are smaller than " +
+                      std::to_string(result.min_size) + " points and apart from the others";
+      break;
+    }
+    case filter_kind::ray_evidence:
+      out.inliers = by_rays(options.ray_evidence);
+      report.mode = {cloud::ray_step{.evidence = options.ray_evidence}};
+      report.reason = "asked for; points that the rays of other keyframes pass through";
+      break;
   }
   report.removed = report.points - out.inliers.size();
   report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -108,9 +150,10 @@ template <execution_policy Policy, point_range Points, class Automatic>
 template <execution_policy Policy, point_range Points>
 [[nodiscard]] filtered_indices filter_points(const Policy& policy, const Points& points, std::span<const float> ranges,
                                              const filter_options& options = {}) {
-  return detail::filter_by_kind(policy, points, ranges, options, [&](const cloud::select_options& select) {
-    return cloud::filter_automatically(policy, points, select);
-  });
+  return detail::filter_by_kind(
+      policy, points, ranges, options,
+      [&](const cloud::select_options& select) { return cloud::filter_automatically(policy, points, select); },
+      [&](const cloud::ray_evidence_options&) { return detail::all_indices(std::ranges::size(points)); });
 }
 
 /// The same, and the automatic filter listens to the views that the points come from, too.
@@ -119,9 +162,14 @@ template <execution_policy Policy, point_range Points, cloud::posed_depth_range 
 [[nodiscard]] filtered_indices filter_points(const Policy& policy, const Points& points, std::span<const float> ranges,
                                              const Views& views, const Camera& camera,
                                              const filter_options& options = {}, progress on_progress = {}) {
-  return detail::filter_by_kind(policy, points, ranges, options, [&](const cloud::select_options& select) {
-    return cloud::filter_automatically(policy, points, views, camera, select, on_progress);
-  });
+  return detail::filter_by_kind(
+      policy, points, ranges, options,
+      [&](const cloud::select_options& select) {
+        return cloud::filter_automatically(policy, points, views, camera, select, on_progress);
+      },
+      [&](const cloud::ray_evidence_options& rays) {
+        return cloud::ray_evidence_inliers(policy, points, views, camera, rays);
+      });
 }
 
 }  // namespace orbis::mapping
