@@ -18,6 +18,7 @@
 #include <orbis/optimize/pnp.hpp>
 #include <orbis/optimize/pose_graph.hpp>
 #include <orbis/optimize/pose_graph_structure.hpp>
+#include <orbis/optimize/pose_graph_summary.hpp>
 #include <orbis/optimize/pose_refinement.hpp>
 #include <orbis/optimize/ransac.hpp>
 #include <orbis/optimize/reprojection.hpp>

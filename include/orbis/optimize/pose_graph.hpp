@@ -16,7 +16,6 @@
 #include <limits>
 #include <ranges>
 #include <span>
-#include <string>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -28,38 +27,10 @@
 #include <orbis/optimize/damping.hpp>
 #include <orbis/optimize/manifold.hpp>
 #include <orbis/optimize/pose_graph_structure.hpp>
+#include <orbis/optimize/pose_graph_summary.hpp>
 #include <orbis/optimize/robust_loss.hpp>
 
 namespace orbis::optimize {
-
-struct pose_graph_options {
-  int max_iterations = 100;
-  double relative_tolerance = 1e-6;       ///< ends when a step changes the cost by less than this share
-  std::span<const std::uint8_t> fixed{};  ///< empty, or one for each vertex: not 0 keeps it where it is
-  gauge hold = gauge::automatic;
-  bool semidefinite_information = false;  ///< whether edges may say nothing about some direction
-};
-
-/// Seconds.
-struct pose_graph_times {
-  double set_up = 0.0;     ///< checks, order of elimination, structure of the factor
-  double linearize = 0.0;  ///< residuals, Jacobians, normal equations
-  double factor = 0.0;
-  double solve = 0.0;
-  double evaluate = 0.0;  ///< costs of steps tried
-};
-
-struct pose_graph_summary {
-  pose_graph_status status = pose_graph_status::nothing_to_do;
-  std::size_t where = 0;      ///< the edge or vertex that a failure is about
-  double initial_cost = 0.0;  ///< half the sum of the robust loss over the edges
-  double final_cost = 0.0;    ///< never above `initial_cost`
-  int iterations = 0;         ///< steps taken
-  int factorizations = 0;     ///< those of steps not taken included
-  pose_graph_times seconds;
-};
-
-[[nodiscard]] inline std::string to_string(const pose_graph_summary& s) { return describe(s.status, s.where); }
 
 /// The residual by which graphs of `T` are solved unless another is asked for. For `se3` it is g2o's.
 template <class T>
