@@ -36,10 +36,11 @@ struct dense_options {
 
 /// A cloud that grows by keyframes, and follows them when their poses change.
 ///
-/// With a voxel size, memory follows the surface that is seen (about 50 bytes for each voxel), without
-/// one the number of measurements. Either way the cloud is a function of the keyframes and the poses they
-/// have now: after corrections it is, byte for byte, the one that would have been built with the corrected
-/// poses from the start. With a voxel size not even the order of the keyframes matters.
+/// With a voxel size, memory follows the surface that is seen (about 50 bytes for each voxel, and 20 for
+/// each measurement of the largest keyframe), without one the number of measurements. Either way the cloud is a
+/// function of the keyframes and the poses they have now: after corrections it is, byte for byte, the one that would
+/// have been built with the corrected poses from the start. With a voxel size not even the order of the keyframes
+/// matters.
 class dense_cloud {
  public:
   /// @pre options.stride > 0, options.voxel_size >= 0
