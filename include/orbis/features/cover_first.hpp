@@ -51,8 +51,10 @@ struct cover_first {
   void take_covering(std::span<level_corners> levels, int wanted, workspace& memory) const {
     if (memory.covering.size() < levels.size()) memory.covering.resize(levels.size());
     for (auto& corners : memory.covering) corners.clear();
+    std::size_t all = 0;
+    for (const level_corners& level : levels) all += level.corners.size();
     const double cells = share * wanted;
-    if (levels.empty() || cells < 1.0) return;
+    if (cells < 1.0 || all <= static_cast<std::size_t>(wanted)) return;
     const region& area = levels[0].area;
     const double side = std::max(1.0, std::sqrt(static_cast<double>(area.width) * area.height / cells));
     const int columns = static_cast<int>(area.width / side) + 1, rows = static_cast<int>(area.height / side) + 1;

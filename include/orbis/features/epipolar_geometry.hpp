@@ -75,10 +75,7 @@ class fundamental_geometry {
 
   /// `[t]x R`: `r_train^T E r_query = 0` for the rays of matching keypoints.
   [[nodiscard]] static mat3 essential(const se3& T_train_query) {
-    const vec3 t = T_train_query.translation();
-    mat3 cross;
-    cross << 0.0, -t.z(), t.y(), t.z(), 0.0, -t.x(), -t.y(), t.x(), 0.0;
-    return cross * T_train_query.rotation().matrix();
+    return hat(T_train_query.translation()) * T_train_query.rotation_matrix();
   }
 
  private:

@@ -3,7 +3,7 @@
 /// ORB features, spread evenly over the image.
 ///
 /// Source: Rublee, Rabaud, Konolige, Bradski, "ORB: an efficient alternative to SIFT or SURF", ICCV
-/// 2011. Their choice is ours: ORB takes the strongest corners, which cluster.
+/// 2011. Which corners are taken is our own choice: theirs are the strongest, which cluster.
 #pragma once
 
 #include <algorithm>
@@ -68,7 +68,8 @@ class basic_orb_extractor {
 
   /// The features of a grey image, ordered by level, then from top to bottom. `mask`: empty, or of the image's
   /// size, 0 where no keypoint may lie. `regions`: empty, or the only places where keypoints may lie; they may
-  /// overlap and reach beyond the image. An image too small for a patch (37 pixels) has no features.
+  /// overlap and reach beyond the image. An image with a side of less than 2 `border` + 1 pixels
+  /// (39 by default) has no features. O(pixels + features).
   [[nodiscard]] features_type operator()(image_view<const std::uint8_t> image, image_view<const std::uint8_t> mask = {},
                                          std::span<const region> regions = {}) const {
     features_type found;
@@ -88,7 +89,8 @@ class basic_orb_extractor {
   features_type operator()(image_view<const std::uint16_t> image, image_view<const std::uint8_t> mask = {},
                            std::span<const region> regions = {}) const = delete;
 
-  /// The same, replacing the contents of `found`: from the second image of a size on, nothing is allocated.
+  /// The same, replacing the contents of `found`: once there was an image of this size with as many corners,
+  /// nothing is allocated.
   void into(features_type& found, image_view<const std::uint8_t> image, image_view<const std::uint8_t> mask = {},
             std::span<const region> regions = {}) const {
     auto memory = kept_.take();
