@@ -145,7 +145,12 @@ std::string removed_text(const map_results& m) {
 }
 
 std::string filter_lines(const map_results& m) {
-  return "  Filter  " + m.filter_mode + ", removed " + removed_text(m) + "\n          " + m.filter_reason;
+  std::string lines = "  Filter  " + m.filter_mode + ", removed " + removed_text(m) + "\n          ";
+  for (std::size_t i = 0; i != m.filter_reason.size(); ++i) {  // a line for each step
+    lines += m.filter_reason[i];
+    if (m.filter_reason.compare(i, 2, "; ") == 0) lines += "\n         ";
+  }
+  return lines;
 }
 
 std::string accuracy_lines(const accuracy& a) {
