@@ -1,0 +1,6 @@
+// error: orbis: a matcher has one source, and it stands first
+#include <orbis/features.hpp>
+
+using namespace orbis::features;
+
+const auto matcher = node_guided(hamming{}) | motion_statistics{} | projected(hamming{});

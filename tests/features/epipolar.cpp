@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include <orbis/camera/pinhole.hpp>
+#include <orbis/features/epipolar.hpp>
+#include <orbis/features/matcher.hpp>
+#include <orbis/features/stages.hpp>
+
+#include "features/sources.hpp"
+#include "support/catch.hpp"
+
+using namespace orbis;
+using namespace orbis::features;
+
+namespace {
+
+const mat3 K1 = (mat3{} << 500.0, 0.0, 320.0, 0.0, 510.0, 240.0, 0.0, 0.0, 1.0).finished();
+const mat3 K2 = (mat3{} << 450.0, 0.0, 310.0, 0.0, 455.0, 250.0, 0.0, 0.0, 1.0).finished();
+/// The second camera looks sideways at what the first sees, or goes straight ahead.
+se3 sideways() { return {so3::exp(vec3{0.05, -0.2, 0.1}), vec3{0.4, 0.05, 0.1}}; }
+se3 ahead() { return {so3{}, vec3{0.02, 0.01, -0.5}}; }
+
+vec3 pixel(const mat3& K, const vec3& p) { return K * p / p.z(); }
+
+}  // namespace
+
+TEST_CASE("a point lies on its epipolar line and the epipole on all of them") {
+  random_bits random{2};
+  for (const se3& T : {sideways(), ahead()}) {
+    const fundamental_geometry geometry{K1, K2, T};
+    const auto epipole = geometry.epipole();
+    REQUIRE(epipole);
+    const vec3 centre = pixel(K2, T.translation());
+    CHECK(double{epipole->x()} == Approx(centre.x()).epsilon(1e-4));
+    CHECK(double{epipole->y()} == Approx(centre.y()).epsilon(1e-4));
+    for (int i = 0; i != 100; ++i) {
+      const vec3 p{random.uniform(-1.0, 1.0), random.uniform(-1.0, 1.0), random.uniform(1.5, 4.0)};
+      const vec3 a = pixel(K1, p), b = pixel(K2, T * p);
+      const auto line = geometry.line(0, {.x = static_cast<float>(a.x()), .y = static_cast<float>(a.y())});
+      REQUIRE(line);
+      const auto off = [&](double x, double y) {
+        return std::abs(double{line->a} * x + double{line->b} * y + double{line->c});
+      };
+      CHECK(off(b.x(), b.y()) < 1e-3);
+      CHECK(off(centre.x(), centre.y()) < 1e-2);
+      // A unit normal: three pixels off is three pixels off.
+      CHECK(off(b.x() + 3.0 * double{line->a}, b.y() + 3.0 * double{line->b}) == Approx(3.0).margin(2e-3));
+    }
+  }
+}
+
+TEST_CASE("without a baseline there are no lines") {
+  const fundamental_geometry geometry{K1, K2, se3{so3::exp(vec3{0.1, 0.0, 0.0}), vec3::Zero()}};
+  CHECK_FALSE(geometry.line(0, {.x = 10.0F, .y = 20.0F}));
+  const auto f = test::random_features(30, 1);
+  CHECK((epipolar(hamming{}) | max_distance{256})(f, f, geometry).empty());
+}
+
+TEST_CASE("matching along lines equals a search through all trains with the distance tested") {
+  const auto level = GENERATE(simd::level::portable, simd::level::avx512);
+  const std::size_t trains = GENERATE(0U, 1U, 15U, 16U, 17U, 400U);
+  const auto q = test::random_features(200, 1);
+  const auto t = test::random_features(trains, 2);
+  for (const se3& T : {sideways(), ahead()}) {
+    const fundamental_geometry geometry{K1, K2, T};
+    const epipolar_rule rule{.distance = 5.0F, .epipole_radius = 60.0F, .max_octave_difference = 3};
+    const vec3 centre = pixel(K2, T.translation());
+    const auto may = [&](std::uint32_t i, std::uint32_t j) {
+      const keypoint &a = q.keypoints[i], &b = t.keypoints[j];
+      const vec3 l = geometry.matrix() * vec3{a.x, a.y, 1.0};
+      const double off = std::abs(l.dot(vec3{b.x, b.y, 1.0})) / std::hypot(l.x(), l.y());
+      const double scale = std::pow(1.2, b.octave);
+      return off <= 5.0 * scale && std::hypot(double{b.x} - centre.x(), double{b.y} - centre.y()) >= 60.0 * scale &&
+             std::abs(a.octave - b.octave) <= 3;
+    };
+    const auto expected = test::naive_candidates(q, t, may);
+    if (trains == 400) CHECK(expected.size() > 50);
+    CHECK(candidates_of(epipolar(hamming{}, rule, level), view_of(q), view_of(t), {.reverse = true}, geometry) ==
+          expected);
+  }
+}
+
+TEST_CASE("lines of rays are those of pixels, for a camera that has both") {
+  const camera::pinhole camera{640, 480, 500.0, 500.0, 320.0, 240.0};
+  mat3 K;
+  K << 500.0, 0.0, 320.0, 0.0, 500.0, 240.0, 0.0, 0.0, 1.0;
+  const auto q = test::random_features(200, 3);
+  const auto t = test::random_features(300, 4);
+  const auto q_rays = rays_through(camera, q.keypoints);
+  auto t_rays = rays_through(camera, t.keypoints);
+  constexpr auto matcher = epipolar(hamming{}, {.epipole_radius = 20.0F}) | cross_check{};
+  const auto by_pixels = matcher(q, t, fundamental_geometry{K, K, sideways()});
+  CHECK(by_pixels.size() > 20);
+  CHECK(matcher(q, t, ray_geometry{q_rays, t_rays, sideways(), 500.0}) == by_pixels);
+
+  t_rays.assign(t_rays.size(), vec3::Constant(std::numeric_limits<double>::quiet_NaN()));
+  CHECK(matcher(q, t, ray_geometry{q_rays, t_rays, sideways(), 500.0}).empty());
+}
