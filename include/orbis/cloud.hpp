@@ -12,7 +12,6 @@
 #include <orbis/cloud/all_knn_leaves.hpp>
 #include <orbis/cloud/all_knn_search.hpp>
 #include <orbis/cloud/cluster.hpp>
-#include <orbis/cloud/curve_order.hpp>
 #include <orbis/cloud/decision.hpp>
 #include <orbis/cloud/depth_rows.hpp>
 #include <orbis/cloud/depth_windows.hpp>

@@ -14,7 +14,6 @@
 #include <utility>
 #include <vector>
 
-#include <orbis/cloud/curve_order.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/point.hpp>
 #include <orbis/core/types.hpp>
@@ -39,6 +38,15 @@ struct point_blocks {
 };
 
 namespace detail {
+
+/// `x`'s lowest 10 bits, two zeros after each.
+[[nodiscard]] constexpr std::uint32_t spread_bits(std::uint32_t x) noexcept {
+  x &= 0x3ffU;
+  x = (x | x << 16U) & 0x030000ffU;
+  x = (x | x << 8U) & 0x0300f00fU;
+  x = (x | x << 4U) & 0x030c30c3U;
+  return (x | x << 2U) & 0x09249249U;
+}
 
 struct keyed_index {
   std::uint32_t key;
@@ -121,12 +129,12 @@ template <execution_policy Policy, point_range Points>
   const double scale = extent > 0 ? 1023.0 / extent : 0.0;
   for_each_index(policy, entries.size(), 16384, [&](std::size_t i) {
     const auto p = at(entries[i].index);
-    std::uint64_t key = 0;
+    std::uint32_t key = 0;
     for (std::size_t a = 0; a != 3; ++a) {
       const double cell = std::clamp((double{p[a]} - start[a]) * scale, 0.0, 1023.0);
-      key |= spread_bits(static_cast<std::uint64_t>(cell)) << a;
+      key |= detail::spread_bits(static_cast<std::uint32_t>(cell)) << a;
     }
-    entries[i].key = static_cast<std::uint32_t>(key);
+    entries[i].key = key;
   });
   detail::sort_by_key(entries);
 
