@@ -1,0 +1,201 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// Matchers: brute force at every SIMD level beside OpenCV's and beside a plain loop of POPCNT, and the
+// sources that compare only some pairs.
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <benchmark/benchmark.h>
+#include <opencv2/core.hpp>
+#include <opencv2/features2d.hpp>
+
+#include <orbis/camera/pinhole.hpp>
+#include <orbis/core/random.hpp>
+#include <orbis/features.hpp>
+#include <orbis/interop/opencv.hpp>
+
+namespace {
+
+using namespace orbis;
+using namespace orbis::features;
+using descriptor = binary_descriptor<256>;
+
+const std::array<std::pair<const char*, simd::level>, 4> levels{{{"portable", simd::level::portable},
+                                                                 {"popcnt", simd::level::popcnt},
+                                                                 {"avx2", simd::level::avx2},
+                                                                 {"avx512", simd::level::avx512}}};
+
+/// Features of a 640x480 image.
+orbis::features::features random_features(std::size_t count, std::uint64_t seed) {
+  random_bits random{seed};
+  orbis::features::features f;
+  for (std::size_t i = 0; i != count; ++i) {
+    f.keypoints.push_back({.x = static_cast<float>(random.uniform(0.0, 640.0)),
+                           .y = static_cast<float>(random.uniform(0.0, 480.0)),
+                           .octave = static_cast<int>(random.below(8))});
+    descriptor d;
+    for (auto& word : d.words) word = random();
+    f.descriptors.push_back(d);
+  }
+  return f;
+}
+
+cv::Mat rows_of(const orbis::features::features& f) {
+  return interop::mat_over(std::span<const descriptor>{f.descriptors});
+}
+
+/// What anyone would write first.
+ORBIS_TARGET("popcnt")
+void popcnt_loop(const std::vector<descriptor>& queries, const std::vector<descriptor>& trains,
+                 std::vector<nearest_two>& nearest) {
+  for (std::size_t i = 0; i != queries.size(); ++i) {
+    const auto q = queries[i].words;
+    nearest_two best;
+    for (std::size_t j = 0; j != trains.size(); ++j) {
+      const auto& t = trains[j].words;
+      const auto d = static_cast<std::uint32_t>(__builtin_popcountll(q[0] ^ t[0]) + __builtin_popcountll(q[1] ^ t[1]) +
+                                                __builtin_popcountll(q[2] ^ t[2]) + __builtin_popcountll(q[3] ^ t[3]));
+      if (d < best.distance) {
+        best = {static_cast<std::uint32_t>(j), d, best.distance};
+      } else if (d < best.second_distance) {
+        best.second_distance = d;
+      }
+    }
+    nearest[i] = best;
+  }
+}
+
+template <class Function>
+void add_row(const std::string& name, Function function) {
+  benchmark::RegisterBenchmark(name.c_str(), function)->Unit(benchmark::kMillisecond);
+}
+
+/// A row for a matcher, with its memory kept, as a caller does it for every frame.
+template <class Matcher, class... Where>
+void add_matcher(const std::string& name, const Matcher& matcher, std::size_t count, Where... where) {
+  add_row(name, [=](benchmark::State& state) {
+    const auto a = random_features(count, 1), b = random_features(count, 2);
+    std::vector<match> matches;
+    typename Matcher::workspace memory;
+    for (auto _ : state) {
+      matcher.match_into(matches, memory, a, b, where...);
+      benchmark::DoNotOptimize(matches.data());
+    }
+    state.counters["matches"] = static_cast<double>(matches.size());
+  });
+}
+
+void add_brute_force(std::size_t count) {
+  const std::string group = "brute_force/" + std::to_string(count) + "x" + std::to_string(count);
+  for (const auto& [name, level] : levels) {
+    add_matcher(group + "/knn2/orbis_" + name, brute_force(hamming{}, level) | ratio_test{1.0F}, count);
+    add_matcher(group + "/cross_check/orbis_" + name, brute_force(hamming{}, level) | cross_check{}, count);
+    add_row(group + "/knn10/orbis_" + name, [count, level = level](benchmark::State& state) {
+      const auto a = random_features(count, 1), b = random_features(count, 2);
+      std::vector<neighbor> nearest(10 * count);
+      hamming_workspace memory;
+      for (auto _ : state) {
+        hamming_k_nearest(level, a.descriptors, b.descriptors, 10, nearest, memory);
+        benchmark::DoNotOptimize(nearest.data());
+      }
+    });
+  }
+  add_row(group + "/knn2/popcnt64_loop", [count](benchmark::State& state) {
+    const auto a = random_features(count, 1), b = random_features(count, 2);
+    std::vector<nearest_two> nearest(count);
+    for (auto _ : state) {
+      popcnt_loop(a.descriptors, b.descriptors, nearest);
+      benchmark::DoNotOptimize(nearest.data());
+    }
+  });
+  for (const int k : {2, 10})
+    add_row(group + "/knn" + std::to_string(k) + "/opencv", [count, k](benchmark::State& state) {
+      const auto a = random_features(count, 1), b = random_features(count, 2);
+      const cv::BFMatcher matcher(cv::NORM_HAMMING);
+      for (auto _ : state) {
+        std::vector<std::vector<cv::DMatch>> matches;
+        matcher.knnMatch(rows_of(a), rows_of(b), matches, k);
+        benchmark::DoNotOptimize(matches.data());
+      }
+    });
+  for (const bool crossed : {false, true})
+    add_row(group + (crossed ? "/cross_check/opencv" : "/match/opencv"), [count, crossed](benchmark::State& state) {
+      const auto a = random_features(count, 1), b = random_features(count, 2);
+      const cv::BFMatcher matcher(cv::NORM_HAMMING, crossed);
+      for (auto _ : state) {
+        std::vector<cv::DMatch> matches;
+        matcher.match(rows_of(a), rows_of(b), matches);
+        benchmark::DoNotOptimize(matches.data());
+      }
+    });
+}
+
+void add_guided(std::size_t count) {
+  const std::string group = "guided_matching/" + std::to_string(count) + "x" + std::to_string(count);
+  const auto queries = random_features(count, 1);
+  std::vector<window> windows;
+  std::vector<vec3> points;
+  for (const keypoint& k : queries.keypoints) {
+    windows.push_back({k.x, k.y, 20.0F, k.octave - 1, k.octave + 1});
+    points.push_back(vec3{2.0 * (k.x - 320.0) / 500.0, 2.0 * (k.y - 240.0) / 500.0, 2.0});
+  }
+  const camera::pinhole camera{640, 480, 500.0, 500.0, 320.0, 240.0};
+  const camera_projection project{camera, se3{}};
+  mat3 K;
+  K << 500.0, 0.0, 320.0, 0.0, 500.0, 240.0, 0.0, 0.0, 1.0;
+  const fundamental_geometry geometry{K, K, se3{so3::exp(vec3{0.0, 0.05, 0.0}), vec3{0.2, 0.02, 0.03}}};
+  std::vector<std::uint32_t> nodes(count);
+  for (std::size_t i = 0; i != count; ++i) nodes[i] = static_cast<std::uint32_t>(i % 100);
+
+  for (const auto& [name, level] : {levels[0], levels[1]}) {  // the others take the second
+    const std::string who = std::string("/orbis_") + name;
+    add_matcher(group + "/windowed_20px" + who, windowed(hamming{}, level) | unique{}, count, windows);
+    add_matcher(group + "/projected_20px" + who, projected(hamming{}, {.radius = 20.0F}, level) | unique{}, count,
+                points, project);
+    add_matcher(group + "/epipolar" + who, epipolar(hamming{}, {}, level) | unique{}, count, geometry);
+    add_row(group + "/node_guided_100" + who, [=, level = level](benchmark::State& state) {
+      const auto a = random_features(count, 1), b = random_features(count, 2);
+      const auto matcher = node_guided(hamming{}, level) | unique{};
+      std::vector<match> matches;
+      decltype(matcher)::workspace memory;
+      const node_index query_nodes{nodes}, train_nodes{nodes};
+      for (auto _ : state) {
+        matcher.match_into(matches, memory, a, b, query_nodes, train_nodes);
+        benchmark::DoNotOptimize(matches.data());
+      }
+    });
+  }
+
+  add_row("motion_statistics/" + std::to_string(count) + "/orbis", [count](benchmark::State& state) {
+    // Half of the candidates move alike.
+    const auto a = random_features(count, 1), b = random_features(count, 2);
+    auto trains = b.keypoints;
+    std::vector<candidate> all, candidates;
+    for (std::uint32_t i = 0; i != count; ++i) {
+      if (i % 2 == 0) trains[i].x = a.keypoints[i].x + 10.0F, trains[i].y = a.keypoints[i].y - 5.0F;
+      all.push_back({i, i, 30});
+    }
+    motion_statistics::workspace memory;
+    for (auto _ : state) {
+      candidates = all;
+      motion_statistics{}(candidates, a.keypoints, trains, memory);
+      benchmark::DoNotOptimize(candidates.data());
+    }
+    state.counters["kept"] = static_cast<double>(candidates.size());
+  });
+}
+
+const bool registered = [] {
+  cv::setNumThreads(1);  // as ours have
+  for (const std::size_t count : {std::size_t{1000}, std::size_t{2000}}) {
+    add_brute_force(count);
+    add_guided(count);
+  }
+  return true;
+}();
+
+}  // namespace
