@@ -217,7 +217,6 @@ problem& named(const std::string& name) {
     if (name == "torus_5000") options.shape = io::graph_shape::torus, options.turns = 100;
     if (name == "grid_2744")
       options.shape = io::graph_shape::grid, options.poses_per_turn = 14, options.closure_probability = 0.3;
-    if (name == "sphere_40000") options.poses_per_turn = options.turns = 200;
     p.graph = io::make_pose_graph(options).measured;
     if (is_failure(initialize_chordally(std::span{p.graph.vertices}, p.graph.edges).status)) std::abort();
   }
@@ -268,7 +267,7 @@ std::function<bool()> eigen_factor(problem& p) {
 }
 
 [[maybe_unused]] const bool registered = [] {
-  std::vector<std::string> graphs{"sphere_2500", "torus_5000", "grid_2744", "sphere_40000"};
+  std::vector<std::string> graphs{"sphere_2500", "torus_5000", "grid_2744"};
   if (std::FILE* file = std::fopen((std::string{ORBIS_DATA_DIR} + "/pose_graph/sphere.g2o").c_str(), "rb")) {
     std::fclose(file);
     graphs.insert(graphs.begin(), "sphere.g2o");

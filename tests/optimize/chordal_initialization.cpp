@@ -44,7 +44,7 @@ TEST_CASE("Noisy graphs converge from it to the best minimum, and from odometry 
   };
   int lost = 0;
   for (const io::graph_shape shape : {io::graph_shape::torus, io::graph_shape::sphere})
-    for (const std::uint64_t seed : {1, 2}) {
+    for (const std::uint64_t seed : {1U, 2U}) {
       const auto made = io::make_pose_graph({.shape = shape,
                                              .poses_per_turn = 20,
                                              .turns = 25,

@@ -51,10 +51,10 @@ struct no_report {
 }  // namespace detail
 
 /// Made of a residual, a robust loss, a damping policy and a manifold, e.g.
-/// `pose_graph_solver<se3, huber, dogleg> solver{huber{1.0}}`. Keeps its memory: solving a graph with
+/// `pose_graph_solver<se3, huber, levenberg_marquardt> solver{huber{1.0}}`. Keeps its memory: solving a graph with
 /// the same edges again allocates nothing (with `orbis::seq`). Not for several threads at once.
-template <class T, robust_loss Loss = trivial, class Damping = levenberg_marquardt,
-          between_factor<T> Between = default_between_t<T>, manifold Manifold = lie_group<T>>
+template <class T, robust_loss Loss = trivial, class Damping = dogleg, between_factor<T> Between = default_between_t<T>,
+          manifold Manifold = lie_group<T>>
 requires std::same_as<typename Manifold::point, T>
 class pose_graph_solver {
  public:
@@ -63,7 +63,9 @@ class pose_graph_solver {
 
   /// Moves `vertices` so that half the sum of the robust loss of the edges falls; never leaves them
   /// worse than they were, and untouched where the status is a failure of the input. Vertices without
-  /// edges stay where they are. The same result for every policy. One step is O(blocks of the factor).
+  /// edges stay where they are; so do directions that the edges say nothing about, but for
+  /// `gauss_newton`, which stops there with `singular`. The same result for every policy. One step is O(blocks of the
+  /// factor).
   ///
   /// `report(summary)` is called before the first and after every step.
   /// @pre `options.fixed` is empty or has one entry for each vertex
@@ -327,7 +329,7 @@ class pose_graph_solver {
 
 /// Solves a pose graph once; see `pose_graph_solver::solve`.
 template <execution_policy Policy, std::ranges::contiguous_range Vertices, std::ranges::contiguous_range Edges,
-          robust_loss Loss = trivial, class Damping = levenberg_marquardt>
+          robust_loss Loss = trivial, class Damping = dogleg>
 pose_graph_summary solve_pose_graph(const Policy& policy, Vertices&& vertices, const Edges& edges,
                                     const pose_graph_options& options = {}, progress callback = {},
                                     const Loss& loss = {}, const Damping& damping = {}) {
