@@ -37,21 +37,35 @@ template <execution_policy Policy>
 [[nodiscard]] std::vector<float> smoothed_over_neighbors(const Policy& policy, const neighbor_table& table,
                                                          std::vector<float> values,
                                                          const smoothing_options& options = {}) {
+  constexpr float inf = std::numeric_limits<float>::infinity();
+  const auto rank_of = [&](std::size_t count) {
+    return static_cast<std::size_t>(options.quantile * static_cast<double>(count - 1) + 0.5);
+  };
+  const std::size_t width = std::min(options.neighbors, table.width);
+  if (width == 0) return values;
+  const std::size_t most = rank_of(width) + 1;
   std::vector<float> next(values.size());
   for (int round = 0; round != options.rounds; ++round) {
     for_each_chunk(policy, values.size(), 4096, [&](std::size_t begin, std::size_t end) {
-      std::vector<float> around;
+      std::vector<float> smallest(most);  // ascending
       for (std::size_t i = begin; i != end; ++i) {
-        around.clear();
-        const auto row = table[i];
-        for (const auto& n : row.first(std::min(options.neighbors, row.size()))) {
-          if (std::isfinite(values[n.index])) around.push_back(values[n.index]);
-        }
         next[i] = values[i];
-        if (around.empty() || !std::isfinite(values[i])) continue;
-        const auto rank = static_cast<std::ptrdiff_t>(options.quantile * static_cast<double>(around.size() - 1) + 0.5);
-        std::nth_element(around.begin(), around.begin() + rank, around.end());
-        next[i] = around[static_cast<std::size_t>(rank)];
+        const auto row = table[i];
+        if (row.empty() || !std::isfinite(values[i])) continue;
+        std::fill(smallest.begin(), smallest.end(), inf);
+        std::size_t count = 0;
+        for (const auto& n : row.first(width)) {
+          float v = values[n.index];
+          const bool counts = std::isfinite(v);
+          count += counts ? 1 : 0;
+          v = counts ? v : inf;
+          for (float& s : smallest) {  // without branches: pushes the larger ones out
+            const float low = v < s ? v : s;
+            v = v < s ? s : v;
+            s = low;
+          }
+        }
+        if (count > 0) next[i] = smallest[rank_of(count)];
       }
     });
     values.swap(next);
