@@ -45,7 +45,8 @@ struct fast9 {
     std::vector<std::uint8_t> line;
     std::vector<std::uint8_t> scores;  ///< of three rows
     std::vector<std::uint32_t> columns;
-    std::vector<float> strongest;  ///< of each cell
+    std::vector<std::uint32_t> cell_of;  ///< of each corner
+    std::vector<float> strongest;        ///< of each cell
   };
 
   /// The same corners at every level. Circles that leave the image are no corners'. O(pixels of the area).
@@ -158,14 +159,29 @@ struct fast9 {
     const int columns = std::max(1, (area.width + cell / 2) / cell),
               rows = std::max(1, (area.height + cell / 2) / cell);
     memory.strongest.assign(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows), 0.0F);
-    const auto cell_of = [&](const corner& c) -> float& {
-      const int column = std::min((c.x - area.x) / cell, columns - 1), row = std::min((c.y - area.y) / cell, rows - 1);
-      return memory.strongest[static_cast<std::size_t>(row) * static_cast<std::size_t>(columns) +
-                              static_cast<std::size_t>(column)];
-    };
-    for (const corner& c : corners) cell_of(c) = std::max(cell_of(c), c.response);
+    if (memory.cell_of.size() < corners.size()) memory.cell_of.resize(corners.size());
+    int y = -1;
+    std::size_t first_of_row = 0;
+    for (std::size_t i = 0; i != corners.size(); ++i) {
+      const corner& c = corners[i];
+      if (c.y != y) {
+        y = c.y;
+        first_of_row =
+            static_cast<std::size_t>(std::min((y - area.y) / cell, rows - 1)) * static_cast<std::size_t>(columns);
+      }
+      const std::size_t at = first_of_row + static_cast<std::size_t>(std::min((c.x - area.x) / cell, columns - 1));
+      memory.cell_of[i] = static_cast<std::uint32_t>(at);
+      memory.strongest[at] = std::max(memory.strongest[at], c.response);
+    }
+    // Without a branch: which corners stay is hard to predict.
     const auto bound = static_cast<float>(strong);
-    std::erase_if(corners, [&](const corner& c) { return c.response < bound && cell_of(c) >= bound; });
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i != corners.size(); ++i) {
+      const bool weak = corners[i].response < bound, strong_near = memory.strongest[memory.cell_of[i]] >= bound;
+      corners[kept] = corners[i];
+      kept += static_cast<std::size_t>(!(weak & strong_near));
+    }
+    corners.resize(kept);
   }
 };
 static_assert(corner_detector<fast9>);
