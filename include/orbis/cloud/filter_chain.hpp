@@ -50,6 +50,7 @@ struct density_step {
   double offset = 0;                                ///< of the local mode's bulk from its surroundings
   double threshold = 0;                             ///< outliers: log spacing - usual > threshold
   surface_test surface{};
+  log_line surface_spacing;  ///< log spacing of surfaces at a log range, by which neighbours count as one
 };
 
 /// Removes groups of fewer than `min_size` points that are further from others than `reach` times the

@@ -71,7 +71,7 @@ template <execution_policy Policy>
   constexpr double most_surface = 0.4;
   constexpr double chance = 10;  // points: fewer say nothing
   const std::vector<float> residual = around.residuals(policy, r.step);
-  around.look_at_shapes(policy, residual, r.step.usual);
+  around.look_at_shapes(policy, residual, r.step.surface_spacing);
   std::vector<double> loose;  // residuals of points that are not on surfaces
   loose.reserve(residual.size());
   std::array<double, bins> all{};
@@ -80,7 +80,7 @@ template <execution_policy Policy>
     const double x = residual[i];
     if (std::isnan(x)) continue;
     const bool sparse = x >= first;
-    const bool on_surface = sparse && around.on_surface(i, r.step.surface, r.step.usual);
+    const bool on_surface = sparse && around.on_surface(i, r.step.surface, r.step.surface_spacing);
     if (!on_surface) loose.push_back(x);
     if (!sparse) continue;
     const auto bin = static_cast<std::size_t>(std::min((x - first) / bin_width, bins - 1.0));
@@ -189,8 +189,9 @@ void judge_points(const Policy& policy, surroundings& around, const select_optio
     if (share > 0) choice.chain.emplace_back(step);
     return share;
   };
-  const auto test = [&](const reference& r, const test_manner& manner) {
+  const auto test = [&](reference r, const test_manner& manner) {
     if (!options.allows(r.step.mode)) return;
+    r.step.surface_spacing = usual.step.usual;
     density_evidence found = find_threshold(policy, around, r, manner);
     if (std::isfinite(found.threshold)) {
       density_step step = r.step;
