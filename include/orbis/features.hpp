@@ -35,6 +35,7 @@
 #include <orbis/features/pyramid.hpp>
 #include <orbis/features/resize.hpp>
 #include <orbis/features/search_among.hpp>
+#include <orbis/features/slice_ops.hpp>
 #include <orbis/features/smooth.hpp>
 #include <orbis/features/spread.hpp>
 #include <orbis/features/square_covering.hpp>

@@ -94,9 +94,9 @@ TEST_CASE("every SIMD level finds the two nearest and the reverse nearest of the
   const simd::level level =
       GENERATE(simd::level::portable, simd::level::popcnt, simd::level::avx2, simd::level::avx512);
   const int variety = GENERATE(256, 12, 2);  // 2: nearly everything is a tie
-  // Few are compared pair by pair, more in slices of 256 trains.
+  // Few are compared pair by pair, more in blocks of 256 or 512 trains.
   for (const std::size_t queries : {0U, 1U, 3U, 15U, 16U, 40U})
-    for (const std::size_t trains : {0U, 1U, 2U, 63U, 64U, 65U, 255U, 256U, 257U, 513U, 1030U}) {
+    for (const std::size_t trains : {0U, 1U, 2U, 63U, 64U, 65U, 255U, 256U, 257U, 511U, 512U, 513U, 1030U}) {
       INFO("level " << static_cast<int>(level) << ", " << queries << " x " << trains);
       const auto q = random_descriptors(queries, 10 + queries, variety);
       const auto t = random_descriptors(trains, 1000 + trains, variety);
@@ -114,7 +114,7 @@ TEST_CASE("every SIMD level finds any number of nearest neighbours, lower indice
   const int variety = GENERATE(256, 12, 2);
   hamming_workspace workspace;
   for (const std::size_t queries : {1U, 30U})
-    for (const std::size_t trains : {0U, 3U, 70U, 256U, 300U, 600U}) {
+    for (const std::size_t trains : {0U, 3U, 70U, 256U, 300U, 1100U}) {
       const auto q = random_descriptors(queries, 20 + queries, variety);
       const auto t = random_descriptors(trains, 2000 + trains, variety);
       std::vector<std::vector<neighbor>> sorted(queries);

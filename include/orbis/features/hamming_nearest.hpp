@@ -25,7 +25,8 @@ concept has_hamming_kernel = std::same_as<Descriptor, binary_descriptor<256>>;
 /// Memory of `hamming_nearest`, which the next call uses again.
 struct hamming_workspace {
   std::vector<detail::slice_query> queries;
-  std::vector<detail::slice_table> table;  ///< of the trains at hand
+  std::vector<detail::slice_table<4>> table4;  ///< of the trains at hand, for registers of up to 256 bits
+  std::vector<detail::slice_table<8>> table8;  ///< likewise, of 512 bits
   std::vector<std::uint32_t> reverse_distance;
 };
 
@@ -96,42 +97,51 @@ template <class Ops, class Keep>
 }
 
 /// Calls `visit(index)` for every bit that is set in both, ascending.
-template <class Visit>
-[[gnu::always_inline]] inline void for_each_bit(const slice& bits, const slice& valid, Visit&& visit) {
-  for (std::size_t w = 0; w != 4; ++w)
+template <std::size_t Words, class Visit>
+[[gnu::always_inline]] inline void for_each_bit(const slice<Words>& bits, const slice<Words>& valid, Visit&& visit) {
+  for (std::size_t w = 0; w != Words; ++w)
     for (std::uint64_t rest = bits.words[w] & valid.words[w]; rest != 0; rest &= rest - 1)
       visit(64 * w + static_cast<std::size_t>(std::countr_zero(rest)));
 }
 
-/// 256 trains after 256 trains, each block against all queries while its table is in the first-level cache.
+/// Block after block of trains, each against all queries while its table is in the first-level cache.
 template <class Ops, class Keep>
 [[gnu::always_inline]] inline void hamming_slices(std::span<const binary_descriptor<256>> queries,
                                                   std::span<const binary_descriptor<256>> trains, const Keep& keep,
                                                   std::span<std::uint32_t> reverse, hamming_workspace& workspace) {
-  workspace.table.resize(1);
+  constexpr std::size_t Words = Ops::words;
+  auto& tables = [&]() -> auto& {
+    if constexpr (Words == 4) {
+      return workspace.table4;
+    } else {
+      return workspace.table8;
+    }
+  }
+  ();
+  tables.resize(1);
   workspace.queries.resize(queries.size());
   for (std::size_t q = 0; q != queries.size(); ++q) make_slice_query(queries[q], workspace.queries[q]);
-  slice_table& table = workspace.table.front();
-  for (std::size_t begin = 0; begin < trains.size(); begin += slice_trains) {
-    const auto block = trains.subspan(begin, std::min(slice_trains, trains.size() - begin));
+  slice_table<Words>& table = tables.front();
+  for (std::size_t begin = 0; begin < trains.size(); begin += 64 * Words) {
+    const auto block = trains.subspan(begin, std::min<std::size_t>(64 * Words, trains.size() - begin));
     make_slice_table(block, table);
-    slice valid;
+    slice<Words> valid;
     for (std::size_t t = 0; t != block.size(); ++t) valid.words[t / 64] |= std::uint64_t{1} << (t % 64);
-    slice_distances least;
-    for (slice& plane : least) plane.words.fill(~std::uint64_t{0});
+    slice_distances<Words> least;
+    for (slice<Words>& plane : least) plane.words.fill(~std::uint64_t{0});
     const std::size_t rank = std::min(keep.rank(), block.size());
     std::uint32_t guess = 0;
 
     for (std::size_t q = 0; q != queries.size(); ++q) {
-      slice_distances distances;
-      slice below;
+      slice_distances<Words> distances;
+      slice<Words> below;
       std::uint32_t limit = keep.limit(q);
       const bool first = limit == no_neighbor;
       slice_count<Ops>(table, workspace.queries[q], first ? guess : limit, distances, below);
       if (first) {
         // The last queries tell about where the nearest lie; the exact limit costs more.
         std::size_t found = 0;
-        for (std::size_t w = 0; w != 4; ++w) found += Ops::ones(below.words[w] & valid.words[w]);
+        for (std::size_t w = 0; w != Words; ++w) found += Ops::ones(below.words[w] & valid.words[w]);
         if (found < rank || found > 4 * rank + 8) {
           limit = slice_ranked<Ops>(distances, valid, rank) + 1;
           slice_below<Ops>(distances, limit, below);
@@ -187,7 +197,7 @@ void hamming_search_avx2(std::span<const binary_descriptor<256>> queries,
   hamming_search<slice_ops_avx2>(queries, trains, keep, reverse, workspace);
 }
 template <class Keep>
-ORBIS_TARGET("avx2,popcnt,bmi,bmi2,avx512f,avx512vl")
+ORBIS_TARGET("avx2,popcnt,bmi,bmi2,avx512f")
 void hamming_search_avx512(std::span<const binary_descriptor<256>> queries,
                            std::span<const binary_descriptor<256>> trains, Keep& keep, std::span<std::uint32_t> reverse,
                            hamming_workspace& workspace) {
@@ -213,9 +223,9 @@ void hamming_dispatch(simd::level level, std::span<const binary_descriptor<256>>
 
 }  // namespace detail
 
-/// For each query its nearest and second nearest train; if `reverse` is not empty, for each train
-/// its nearest query (the lowest on ties), in the same pass. Every level gives the same answer.
-/// O(queries x trains) time, O(queries + trains) memory, all of it in `workspace`.
+/// For each query its nearest and second nearest train; if `reverse` is not empty, for each train its nearest
+/// query (the lowest on ties), in the same pass. Every level gives the same answer. O(queries x trains) time,
+/// O(queries + trains) memory, all of it in `workspace`.
 /// @pre nearest.size() == queries.size(); reverse is empty or of the size of trains
 inline void hamming_nearest(simd::level level, std::span<const binary_descriptor<256>> queries,
                             std::span<const binary_descriptor<256>> trains, std::span<nearest_two> nearest,
@@ -231,8 +241,8 @@ inline void hamming_nearest(simd::level level, std::span<const binary_descriptor
   hamming_nearest(level, queries, trains, nearest, reverse, workspace);
 }
 
-/// For each query its `k` nearest trains by ascending distance, then index: row `q` begins at
-/// `nearest[q * k]`, and what there are too few trains for is left at the default.
+/// For each query its `k` nearest trains by ascending distance, then index: row `q` begins at `nearest[q * k]`,
+/// and what there are too few trains for is left at the default.
 /// @pre k > 0; nearest.size() == queries.size() * k
 inline void hamming_k_nearest(simd::level level, std::span<const binary_descriptor<256>> queries,
                               std::span<const binary_descriptor<256>> trains, std::size_t k,

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Hamming distances of one query to 256 trains at once, bit-sliced; the insides of `hamming_nearest`.
+/// Hamming distances of one query to 256 or 512 trains at once, bit-sliced; the insides of `hamming_nearest`.
 ///
-/// Trains are stored by bit: a slice holds one bit of 256 trains. A query selects for every three of its
-/// bits (a group, as pattern of 0 to 7) two slices from a table: the parity and the majority of the three
-/// differing bits, which together are their count. The counts of all groups are added in vertical counters, bit
-/// planes, by full adders: a logic instruction works on as many trains as the register has bits,
-/// and nothing is ever xor-ed, shifted or summed across lanes. The table is made once per 256 trains
-/// for all queries. The adders follow Harley and Seal (Mula, Kurz, Lemire, "Faster population counts
-/// using AVX2 instructions", 2018), the selection by groups is the method of four Russians.
+/// Trains are stored by bit: a slice holds one bit of 256 trains, or of 512 where registers are as wide. A query
+/// selects for every three of its bits (a group, as pattern of 0 to 7) two slices from a table: the parity and the
+/// majority of the three differing bits, which together are their count. The counts of all groups are added in vertical
+/// counters, bit planes, by full adders: a logic instruction works on as many trains as the register has bits, and
+/// nothing is ever xor-ed, shifted or summed across lanes. The table is made once per block of trains for all queries.
+/// The adders follow Harley and Seal (Mula, Kurz, Lemire, "Faster population counts using AVX2 instructions", 2018),
+/// the selection by groups is the method of four Russians.
 #pragma once
 
 #include <array>
@@ -19,43 +19,46 @@
 #include <span>
 #include <type_traits>
 
-#include <orbis/core/simd.hpp>
 #include <orbis/features/descriptor.hpp>
-#include <orbis/features/hamming.hpp>
-
-#if ORBIS_X86
-#include <immintrin.h>
-#endif
+#include <orbis/features/slice_ops.hpp>
 
 namespace orbis::features::detail {
 
-inline constexpr std::size_t slice_trains = 256;
 inline constexpr std::size_t slice_planes = 9;  // a distance has 9 bits: 0 to 256
 inline constexpr std::size_t slice_groups = 88;
 inline constexpr std::size_t slice_rounds = slice_groups / 8;
 
-/// One bit of 256 trains.
-struct alignas(32) slice {
-  std::array<std::uint64_t, 4> words{};
+/// One bit of `64 * Words` trains.
+template <std::size_t Words>
+struct alignas(8 * Words) slice {
+  std::array<std::uint64_t, Words> words{};
 };
 
-inline constexpr std::array<slice, 2> constant_slices{{{}, {{~0ULL, ~0ULL, ~0ULL, ~0ULL}}}};
+template <std::size_t Words>
+inline constexpr std::array<slice<Words>, 2> constant_slices = [] {
+  std::array<slice<Words>, 2> zeros_and_ones{};
+  zeros_and_ones[1].words.fill(~std::uint64_t{0});
+  return zeros_and_ones;
+}();
 
 /// What a group of three bits can give, by the pattern of the query's bits.
+template <std::size_t Words>
 struct slice_group {
-  std::array<slice, 8> majority;  ///< whether at least two of the three bits differ
-  std::array<slice, 2> parity;    ///< whether one or three do, by the parity of the pattern
+  std::array<slice<Words>, 8> majority;  ///< whether at least two of the three bits differ
+  std::array<slice<Words>, 2> parity;    ///< whether one or three do, by the parity of the pattern
 };
-using slice_table = std::array<slice_group, slice_groups>;
+template <std::size_t Words>
+using slice_table = std::array<slice_group<Words>, slice_groups>;
 
-/// Where a query's slices lie: offsets in bytes into the two arrays of each group.
+/// Where a query's slices lie: offsets into the two arrays of each group, in units of a 32nd of a slice.
 struct slice_query {
   std::array<std::uint8_t, slice_groups> majority;
   std::array<std::uint8_t, slice_groups> parity;
 };
 
-/// The bit planes of 256 distances, the lowest first.
-using slice_distances = std::array<slice, slice_planes>;
+/// The bit planes of the distances, the lowest first.
+template <std::size_t Words>
+using slice_distances = std::array<slice<Words>, slice_planes>;
 
 /// Transposes a matrix of 64x64 bits: bit `j` of word `i` becomes bit `i` of word `j`.
 inline void transpose_bits(std::array<std::uint64_t, 64>& m) noexcept {
@@ -77,9 +80,10 @@ inline void transpose_bits(std::array<std::uint64_t, 64>& m) noexcept {
 }
 
 /// Group `g` is made of bits `g`, `88 + g` and `176 + g`; the last eight lack the third, which counts as zero.
-/// @pre at most 256 trains
-inline void make_slice_table(std::span<const binary_descriptor<256>> trains, slice_table& table) noexcept {
-  std::array<slice, 3 * slice_groups> rows{};
+/// @pre at most 64 * Words trains
+template <std::size_t Words>
+void make_slice_table(std::span<const binary_descriptor<256>> trains, slice_table<Words>& table) noexcept {
+  std::array<slice<Words>, 3 * slice_groups> rows{};
   for (std::size_t begin = 0; begin < trains.size(); begin += 64)
     for (std::size_t w = 0; w != 4; ++w) {
       std::array<std::uint64_t, 64> block{};
@@ -88,7 +92,7 @@ inline void make_slice_table(std::span<const binary_descriptor<256>> trains, sli
       for (std::size_t b = 0; b != 64; ++b) rows[64 * w + b].words[begin / 64] = block[b];
     }
   for (std::size_t g = 0; g != slice_groups; ++g)
-    for (std::size_t w = 0; w != 4; ++w) {
+    for (std::size_t w = 0; w != Words; ++w) {
       const std::uint64_t a = rows[g].words[w];
       const std::uint64_t b = rows[slice_groups + g].words[w];
       const std::uint64_t c = rows[2 * slice_groups + g].words[w];
@@ -104,12 +108,11 @@ inline void make_slice_table(std::span<const binary_descriptor<256>> trains, sli
     }
 }
 
-/// Bit `i` of a byte as byte `i` of a word, 0x20 (the size of a slice) where it is set.
+/// Bit `i` of a byte as byte `i` of a word, 0x20 where it is set.
 [[nodiscard]] constexpr std::uint64_t spread_bits(std::uint64_t byte) noexcept {
   const std::uint64_t each = (byte * 0x0101010101010101ULL) & 0x8040201008040201ULL;
   return ((each + 0x7f7f7f7f7f7f7f7fULL) & 0x8080808080808080ULL) >> 2U;
 }
-static_assert(sizeof(slice) == 0x20);
 
 /// Stores the bytes of a word, the lowest first.
 inline void store_bytes(std::uint8_t* to, std::uint64_t word) noexcept {
@@ -132,98 +135,15 @@ inline void make_slice_query(const binary_descriptor<256>& query, slice_query& t
   }
 }
 
-// What the search is compiled for: a plane is a register, and all functions take theirs by reference, so that none
-// of them is called with a register that the baseline does not have.
-
-/// Registers every 64-bit machine has: SSE2, NEON, or the vectors of another machine.
-struct slice_ops_portable {
-#if defined(__GNUC__)
-  using plane = std::uint64_t __attribute__((vector_size(16), may_alias));
-#else
-  using plane = std::uint64_t;
-#endif
-  static void load(plane& x, const char* from) noexcept { x = *reinterpret_cast<const plane*>(from); }
-  static void store(char* to, const plane& x) noexcept { *reinterpret_cast<plane*>(to) = x; }
-  /// sum, carry = sum + a + b
-  static void add(plane& sum, plane& carry, const plane& a, const plane& b) noexcept {
-    const plane either = a ^ b;
-    carry = (a & b) | (either & sum);
-    sum ^= either;
-  }
-  /// sum, a = sum + a
-  static void add(plane& sum, plane& a) noexcept {
-    const plane carry = sum & a;
-    sum ^= a;
-    a = carry;
-  }
-  /// below = whether x < y, given the same of the lower bits
-  static void compare(plane& below, const plane& x, const plane& y) noexcept { below = (~x & y) | (~(x ^ y) & below); }
-  /// to = where ? from : to
-  static void replace(plane& to, const plane& from, const plane& where) noexcept { to ^= (to ^ from) & where; }
-  static std::uint32_t ones(std::uint64_t x) noexcept { return count_ones(x); }
-};
-
-#if ORBIS_X86
-struct slice_ops_popcnt : slice_ops_portable {
-  ORBIS_TARGET("popcnt") static std::uint32_t ones(std::uint64_t x) noexcept {
-    return static_cast<std::uint32_t>(__builtin_popcountll(x));
-  }
-};
-
-struct slice_ops_avx2 : slice_ops_popcnt {
-  using plane = __m256i;
-  ORBIS_TARGET("avx2") static void load(plane& x, const char* from) noexcept {
-    x = _mm256_load_si256(reinterpret_cast<const __m256i*>(from));
-  }
-  ORBIS_TARGET("avx2") static void store(char* to, const plane& x) noexcept {
-    _mm256_store_si256(reinterpret_cast<__m256i*>(to), x);
-  }
-  ORBIS_TARGET("avx2") static void add(plane& sum, plane& carry, const plane& a, const plane& b) noexcept {
-    const __m256i either = _mm256_xor_si256(a, b);
-    carry = _mm256_or_si256(_mm256_and_si256(a, b), _mm256_and_si256(either, sum));
-    sum = _mm256_xor_si256(sum, either);
-  }
-  ORBIS_TARGET("avx2") static void add(plane& sum, plane& a) noexcept {
-    const __m256i carry = _mm256_and_si256(sum, a);
-    sum = _mm256_xor_si256(sum, a);
-    a = carry;
-  }
-  ORBIS_TARGET("avx2") static void compare(plane& below, const plane& x, const plane& y) noexcept {
-    below = _mm256_or_si256(_mm256_andnot_si256(x, y), _mm256_andnot_si256(_mm256_xor_si256(x, y), below));
-  }
-  ORBIS_TARGET("avx2") static void replace(plane& to, const plane& from, const plane& where) noexcept {
-    to = _mm256_or_si256(_mm256_and_si256(where, from), _mm256_andnot_si256(where, to));
-  }
-};
-
-/// Registers of 256 bits still: what counts is the ternary logic, which makes a full adder of two
-/// instructions, and thirty-two registers; a table of twice the width would not stay in the
-/// first-level cache.
-struct slice_ops_avx512 : slice_ops_avx2 {
-  ORBIS_TARGET("avx2,avx512f,avx512vl")
-  static void add(plane& sum, plane& carry, const plane& a, const plane& b) noexcept {
-    carry = _mm256_ternarylogic_epi64(sum, a, b, 0xe8);
-    sum = _mm256_ternarylogic_epi64(sum, a, b, 0x96);
-  }
-  ORBIS_TARGET("avx2,avx512f,avx512vl") static void add(plane& sum, plane& a) noexcept { slice_ops_avx2::add(sum, a); }
-  ORBIS_TARGET("avx2,avx512f,avx512vl")
-  static void compare(plane& below, const plane& x, const plane& y) noexcept {
-    below = _mm256_ternarylogic_epi64(below, x, y, 0xb2);
-  }
-  ORBIS_TARGET("avx2,avx512f,avx512vl")
-  static void replace(plane& to, const plane& from, const plane& where) noexcept {
-    to = _mm256_ternarylogic_epi64(to, from, where, 0xd8);
-  }
-};
-#endif
-
-/// The distances of a query to the trains of a table, and which of them lie below `limit`. Sixteen slices a
-/// round: parities count one, majorities two.
+/// The distances of a query to the trains of a table, and which of them lie below `limit`. Sixteen slices a round:
+/// parities count one, majorities two.
 template <class Ops>
-[[gnu::always_inline]] inline void slice_count(const slice_table& table, const slice_query& query, std::uint32_t limit,
-                                               slice_distances& distances, slice& below) noexcept {
+[[gnu::always_inline]] inline void slice_count(const slice_table<Ops::words>& table, const slice_query& query,
+                                               std::uint32_t limit, slice_distances<Ops::words>& distances,
+                                               slice<Ops::words>& below) noexcept {
   using plane = typename Ops::plane;
-  for (std::size_t part = 0; part != sizeof(slice); part += sizeof(plane)) {
+  constexpr std::size_t unit = sizeof(slice<Ops::words>) / 32;
+  for (std::size_t part = 0; part != sizeof(slice<Ops::words>); part += sizeof(plane)) {
     plane one{}, two{}, four{}, eight{}, s16{};
     plane c32[slice_rounds];  // added up after the rounds
     for (std::size_t g = 0; g != slice_groups; g += 8) {
@@ -231,10 +151,11 @@ template <class Ops>
       plane a, b, c2, d2, c4, d4, e4, c8, d8, e8, c16, d16;
       // Two parities and a majority of each of the first four pairs, then the majorities left over.
       const auto parity = [&](plane & x, std::size_t i) __attribute__((always_inline)) {
-        Ops::load(x, group + i * sizeof(slice_group) + sizeof(slice_group::majority) + query.parity[g + i]);
+        Ops::load(x, group + i * sizeof(slice_group<Ops::words>) + sizeof(slice_group<Ops::words>::majority) +
+                         unit * query.parity[g + i]);
       };
       const auto majority = [&](plane & x, std::size_t i) __attribute__((always_inline)) {
-        Ops::load(x, group + i * sizeof(slice_group) + query.majority[g + i]);
+        Ops::load(x, group + i * sizeof(slice_group<Ops::words>) + unit * query.majority[g + i]);
       };
       parity(a, 0), parity(b, 1);
       Ops::add(one, c2, a, b);
@@ -275,7 +196,7 @@ template <class Ops>
     plane result{};
     const auto keep = [&](const plane& x, std::size_t i) __attribute__((always_inline)) {
       plane bit;
-      Ops::load(bit, reinterpret_cast<const char*>(&constant_slices[(limit >> i) & 1U]));
+      Ops::load(bit, reinterpret_cast<const char*>(&constant_slices<Ops::words>[(limit >> i) & 1U]));
       Ops::compare(result, x, bit);
       Ops::store(reinterpret_cast<char*>(&distances[i]) + part, x);
     };
@@ -287,15 +208,15 @@ template <class Ops>
 
 /// Which distances lie below `limit`.
 template <class Ops>
-[[gnu::always_inline]] inline void slice_below(const slice_distances& distances, std::uint32_t limit,
-                                               slice& below) noexcept {
+[[gnu::always_inline]] inline void slice_below(const slice_distances<Ops::words>& distances, std::uint32_t limit,
+                                               slice<Ops::words>& below) noexcept {
   using plane = typename Ops::plane;
-  for (std::size_t part = 0; part != sizeof(slice); part += sizeof(plane)) {
+  for (std::size_t part = 0; part != sizeof(slice<Ops::words>); part += sizeof(plane)) {
     plane result{};
     for (std::size_t i = 0; i != slice_planes; ++i) {
       plane x, y;
       Ops::load(x, reinterpret_cast<const char*>(&distances[i]) + part);
-      Ops::load(y, reinterpret_cast<const char*>(&constant_slices[(limit >> i) & 1U]));
+      Ops::load(y, reinterpret_cast<const char*>(&constant_slices<Ops::words>[(limit >> i) & 1U]));
       Ops::compare(result, x, y);
     }
     Ops::store(reinterpret_cast<char*>(&below) + part, result);
@@ -304,10 +225,10 @@ template <class Ops>
 
 /// Which distances lie below those in `least`, which takes them over.
 template <class Ops>
-[[gnu::always_inline]] inline void slice_lower(const slice_distances& distances, slice_distances& least,
-                                               slice& below) noexcept {
+[[gnu::always_inline]] inline void slice_lower(const slice_distances<Ops::words>& distances,
+                                               slice_distances<Ops::words>& least, slice<Ops::words>& below) noexcept {
   using plane = typename Ops::plane;
-  for (std::size_t part = 0; part != sizeof(slice); part += sizeof(plane)) {
+  for (std::size_t part = 0; part != sizeof(slice<Ops::words>); part += sizeof(plane)) {
     plane result{};
     for (std::size_t i = 0; i != slice_planes; ++i) {
       plane x, y;
@@ -329,14 +250,15 @@ template <class Ops>
 /// The `rank`-th smallest distance among the trains in `candidates`, bit by bit from the highest.
 /// @pre 0 < rank <= the number of bits in `candidates`
 template <class Ops>
-[[gnu::always_inline]] inline std::uint32_t slice_ranked(const slice_distances& distances, const slice& candidates,
+[[gnu::always_inline]] inline std::uint32_t slice_ranked(const slice_distances<Ops::words>& distances,
+                                                         const slice<Ops::words>& candidates,
                                                          std::size_t rank) noexcept {
-  slice among = candidates;
+  slice<Ops::words> among = candidates;
   std::uint32_t value = 0;
   for (std::size_t i = slice_planes; i-- != 0;) {
-    slice low;
+    slice<Ops::words> low;
     std::size_t count = 0;
-    for (std::size_t w = 0; w != 4; ++w) {
+    for (std::size_t w = 0; w != Ops::words; ++w) {
       low.words[w] = among.words[w] & ~distances[i].words[w];
       count += Ops::ones(low.words[w]);
     }
@@ -345,7 +267,7 @@ template <class Ops>
     } else {
       rank -= count;
       value |= 1U << i;
-      for (std::size_t w = 0; w != 4; ++w) among.words[w] &= distances[i].words[w];
+      for (std::size_t w = 0; w != Ops::words; ++w) among.words[w] &= distances[i].words[w];
     }
   }
   return value;
