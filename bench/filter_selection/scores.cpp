@@ -109,6 +109,7 @@ std::string score_table::report() const {
     };
     const auto count = std::count_if(cases.begin(), cases.end(), belongs);
     const double oracle = over([&](const case_scores& c) {
+      if (is_clean(c.kind)) return nan;
       double f1 = 0;
       for (std::size_t s = 1; s != settings.size(); ++s) f1 = std::max(f1, c.row[s].f1);
       return f1;
@@ -116,10 +117,16 @@ std::string score_table::report() const {
     const auto f1 = [&](std::size_t s) { return over([&](const case_scores& c) { return c.row[s].f1; }); };
     const auto wrong = [&](std::size_t s) { return 100 * over([&](const case_scores& c) { return c.row[s].wrong; }); };
     const auto rms = [&](std::size_t s) { return 1e3 * over([&](const case_scores& c) { return c.row[s].rms; }); };
-    out += text("%-19s %5td | %5.3f %5.3f %5.3f %5.3f | %7.3f %7.3f %7.3f | %5.3f %-25s | %6.1f %6.1f %6.1f\n",
-                name.c_str(), count, f1(0), f1(base), f1(best), oracle, wrong(0), wrong(base), wrong(best), f1(best),
-                settings[best].c_str(), 1e3 * over([](const case_scores& c) { return c.untouched.rms; }), rms(base),
-                rms(0));
+    const std::string beside = text(" | %7.3f %7.3f %7.3f | ", wrong(0), wrong(base), wrong(best));
+    const std::string map = text(" | %6.1f %6.1f %6.1f\n",
+                                 1e3 * over([](const case_scores& c) { return c.untouched.rms; }), rms(base), rms(0));
+    out += text("%-19s %5td | ", name.c_str(), count);
+    if (std::isnan(oracle)) {  // nothing to find
+      out += text("%23s", "") + beside + text("%31s", "") + map;
+    } else {
+      out += text("%5.3f %5.3f %5.3f %5.3f", f1(0), f1(base), f1(best), oracle) + beside +
+             text("%5.3f %-25s", f1(best), settings[best].c_str()) + map;
+    }
   };
   for (const bool clean : {false, true}) {
     for (const trouble kind : all_troubles) {

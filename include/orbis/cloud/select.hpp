@@ -15,6 +15,7 @@
 /// Every step is part of the chosen chain only if it removes something.
 #pragma once
 
+#include <array>
 #include <cassert>
 #include <cmath>
 #include <cstddef>
