@@ -13,8 +13,6 @@ set(ORBIS_core_LIBRARIES Eigen3::Eigen tl::expected Threads::Threads)
 set(ORBIS_camera_NEEDS core)
 
 set(ORBIS_features_NEEDS camera)
-set(ORBIS_features_PACKAGES OpenCV)
-set(ORBIS_features_LIBRARIES opencv_core opencv_imgproc opencv_features2d)
 
 set(ORBIS_optimize_NEEDS camera)
 
@@ -33,7 +31,7 @@ set(ORBIS_eval_NEEDS core)
 set(ORBIS_slam_NEEDS features optimize cloud)
 set(ORBIS_mapping_NEEDS cloud octree)
 
-set(ORBIS_interop_opencv_NEEDS camera)
+set(ORBIS_interop_opencv_NEEDS features)
 set(ORBIS_interop_opencv_PACKAGES OpenCV)
 set(ORBIS_interop_opencv_LIBRARIES opencv_core)
 
@@ -50,7 +48,7 @@ set(ORBIS_interop_open3d_PACKAGES Open3D)
 set(ORBIS_interop_open3d_LIBRARIES Open3D::Open3D)
 
 # What to ask find_package for beside the package's name.
-set(ORBIS_OpenCV_FIND_ARGUMENTS COMPONENTS core imgproc features2d)
+set(ORBIS_OpenCV_FIND_ARGUMENTS COMPONENTS core)
 set(ORBIS_PCL_FIND_ARGUMENTS COMPONENTS common)
 
 # orbis_close_components(<out> <component>...): the components and all they need, in order.

@@ -43,7 +43,7 @@ only() {
 }
 only 'nanoflann' '^cloud/nanoflann\.hpp$'
 only 'octomap/' '^interop/octomap\.hpp$'
-only 'opencv2/' '^(interop/opencv|features/.*)\.hpp$'
+only 'opencv2/' '^interop/opencv\.hpp$'
 only 'pcl/' '^interop/pcl\.hpp$'
 only 'open3d/' '^interop/open3d\.hpp$'
 while IFS= read -r hit; do

@@ -46,18 +46,18 @@ struct surface_test {
 struct density_step {
   filter_mode mode = filter_mode::log_statistical;  ///< or range_log_statistical, local_log_statistical
   std::size_t neighbors = 8;                        ///< over which the spacing is averaged; > 0
-  log_line usual;                                   ///< log spacing of the bulk at a log range; slope 0: at any
+  log_line usual{};                                 ///< log spacing of the bulk at a log range; slope 0: at any
   double offset = 0;                                ///< of the local mode's bulk from its surroundings
   double threshold = 0;                             ///< outliers: log spacing - usual > threshold
   surface_test surface{};
-  log_line surface_spacing;  ///< log spacing of surfaces at a log range, by which neighbours count as one
+  log_line surface_spacing{};  ///< log spacing of surfaces at a log range, by which neighbours count as one
 };
 
 /// Removes groups of fewer than `min_size` points that are further from others than `reach` times the
 /// usual spacing, that of the surroundings if it is larger.
 struct isolation_step {
   std::size_t neighbors = 8;  ///< over which the spacing is averaged; > 0
-  log_line usual;             ///< log spacing of the bulk at a log range; slope 0: at any
+  log_line usual{};           ///< log spacing of the bulk at a log range; slope 0: at any
   double offset = 0;          ///< of the bulk from its surroundings, log
   double reach = 2.5;
   std::size_t min_size = 30;
