@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <limits>
 
+#include <orbis/core/random.hpp>
 #include <orbis/features/depth.hpp>
 
 #include "support/catch.hpp"
@@ -56,6 +57,76 @@ TEST_CASE("invalid depths around a keypoint do not count") {
   REQUIRE(depth_at(view, 2, 2));
   CHECK(depth_at(view, 2, 2)->z == Approx(1.002));
   CHECK_FALSE(depth_at(camera::depth_view<float>{}, 0, 0));
+}
+
+namespace {
+
+/// A plane seen by a pinhole camera: 1 / z is linear in the pixel.
+image<float> plane_image(double z, double du, double dv) {
+  image<float> depth(41, 41);
+  for (int y = 0; y != 41; ++y)
+    for (int x = 0; x != 41; ++x) depth(x, y) = static_cast<float>(1.0 / (1.0 / z + du * (x - 20) + dv * (y - 20)));
+  return depth;
+}
+
+}  // namespace
+
+TEST_CASE("depth on a slanted plane is that at the keypoint, between the pixels, and less certain") {
+  const double du = 0.002, dv = -0.001;  // 8 mm a pixel at 2 m
+  const auto depth = plane_image(2.0, du, dv);
+  const camera::depth_view<float> view{depth.view()};
+  const auto truth = [&](double x, double y) { return 1.0 / (0.5 + du * (x - 20.0) + dv * (y - 20.0)); };
+  for (const int radius : {1, 2, 3})
+    for (const float x : {20.0F, 20.3F, 19.51F})
+      for (const float y : {20.0F, 20.49F, 19.8F}) {
+        const auto d = depth_at(view, x, y, {.radius = radius});
+        REQUIRE(d);
+        CHECK(std::abs(d->z - truth(double{x}, double{y})) < 0.0006);  // its curvature: a pixel is 9 mm
+        CHECK(d->sigma > std::hypot(depth_noise{}(d->z), 0.5 * 0.0085));
+        CHECK(d->sigma < std::hypot(depth_noise{}(d->z), 0.5 * 0.0095) + 0.001);
+      }
+}
+
+TEST_CASE("a hole on one side of a slope does not pull the depth to the other") {
+  auto depth = plane_image(2.0, 0.003, 0.0);
+  for (int y = 0; y != 41; ++y) depth(21, y) = 0.0F;
+  const camera::depth_view<float> view{depth.view()};
+  const auto d = depth_at(view, 20.0F, 20.0F);
+  REQUIRE(d);
+  CHECK(d->z == Approx(2.0).margin(0.0005));  // a median of what is left says 2.006
+  // Beyond what is valid it does not guess.
+  depth(20, 19) = depth(20, 20) = depth(20, 21) = 0.0F;
+  const auto edge = depth_at(view, 20.4F, 20.0F, {.radius = 2});
+  REQUIRE(edge);
+  CHECK(edge->z <= 2.04);
+  CHECK(edge->z >= 1.95);
+}
+
+TEST_CASE("the deviation says how far the depth is off, under the sensor's noise") {
+  random_bits random{11};
+  const auto clean = plane_image(1.5, 0.001, 0.0015);
+  double squared = 0.0;
+  int count = 0;
+  for (int trial = 0; trial != 2000; ++trial) {
+    auto depth = clean;
+    for (int y = 17; y <= 23; ++y)
+      for (int x = 17; x <= 23; ++x) {
+        double normal = -6.0;
+        for (int i = 0; i != 12; ++i) normal += random.uniform(0.0, 1.0);
+        depth(x, y) += static_cast<float>(depth_noise{}(1.5) * normal);
+      }
+    // The keypoint itself is half a pixel off.
+    const double off = random.uniform(-0.8, 0.8);
+    const auto d = depth_at(camera::depth_view<float>{depth.view()}, static_cast<float>(20.0 + off), 20.0F);
+    if (!d) continue;
+    ++count;
+    squared += (d->z - 1.5) * (d->z - 1.5) / (d->sigma * d->sigma);
+  }
+  CHECK(count > 1900);
+  const double ratio = std::sqrt(squared / count);
+  INFO("error / sigma " << ratio);
+  CHECK(ratio < 1.0);
+  CHECK(ratio > 0.2);
 }
 
 TEST_CASE("the virtual right column is that of a camera a baseline to the right") {

@@ -30,6 +30,7 @@ struct keypoint_depth_options {
   float edge_sigmas = 4.0F;     ///< a gap of more than this many sigma ...
   float edge_relative = 0.02F;  ///< ... and more than this share of the depth is an edge
   float min_share = 0.7F;       ///< of the valid pixels on one side of every edge; > 0.5
+  double position_sigma = 0.5;  ///< of the keypoint, pixels: on a slope it is a deviation of the depth
   depth_noise noise{};
 };
 
@@ -39,7 +40,45 @@ struct keypoint_depth {
   double sigma = 0.0;
 };
 
-/// Depth along the optical axis at pixel `(x, y)`: the median of the valid depths around it.
+/// The depth of a plane through the pixels of a window, by least squares; the insides of `depth_at`.
+class depth_plane {
+ public:
+  /// A pixel, relative to where the depth is wanted.
+  void add(double u, double v, double z) noexcept {
+    ++n_;
+    u_ += u, v_ += v, z_ += z;
+    uu_ += u * u, uv_ += u * v, vv_ += v * v;
+    uz_ += u * z, vz_ += v * z, zz_ += z * z;
+  }
+  /// Whether the pixels say how the plane lies: at least six that are not all in a row.
+  [[nodiscard]] bool determined() const noexcept {
+    return n_ >= 6 && spread_uu() * spread_vv() - sq(spread_uv()) > 1.0;
+  }
+
+  /// The plane's depth, the variance around it, and its slope, metres per pixel. @pre determined()
+  struct fit {
+    double z, variance, slope;
+  };
+  [[nodiscard]] fit solve() const noexcept {
+    const double det = spread_uu() * spread_vv() - sq(spread_uv());
+    const double uz = uz_ - u_ * z_ / n_, vz = vz_ - v_ * z_ / n_;
+    const double a = (spread_vv() * uz - spread_uv() * vz) / det;
+    const double b = (spread_uu() * vz - spread_uv() * uz) / det;
+    const double rest = std::max(0.0, zz_ - z_ * z_ / n_ - a * uz - b * vz);
+    return {(z_ - a * u_ - b * v_) / n_, rest / (n_ - 3.0), std::hypot(a, b)};
+  }
+
+ private:
+  [[nodiscard]] static double sq(double x) noexcept { return x * x; }
+  [[nodiscard]] double spread_uu() const noexcept { return uu_ - u_ * u_ / n_; }
+  [[nodiscard]] double spread_uv() const noexcept { return uv_ - u_ * v_ / n_; }
+  [[nodiscard]] double spread_vv() const noexcept { return vv_ - v_ * v_ / n_; }
+  double n_ = 0.0, u_ = 0.0, v_ = 0.0, z_ = 0.0, uu_ = 0.0, uv_ = 0.0, vv_ = 0.0, uz_ = 0.0, vz_ = 0.0, zz_ = 0.0;
+};
+
+/// Depth along the optical axis at pixel `(x, y)`, between pixels as well: that of a plane through the valid
+/// depths around it, or where these are too few for a plane their median. Its deviation is made of
+/// the sensor's noise, what the surface departs from the plane, and on a slope the keypoint's own position.
 ///
 /// Empty where too little is valid, where `(x, y)` lies outside the image or is not finite, and where the
 /// window straddles a depth edge: there the pixel belongs to either side, and to which one would be
@@ -58,9 +97,12 @@ template <camera::depth_source Depth>
 
   std::array<float, (2 * max_radius + 1) * (2 * max_radius + 1)> z;
   std::size_t count = 0;
-  for (int v = std::max(0, cy - options.radius); v <= std::min(depth.height() - 1, cy + options.radius); ++v)
-    for (int u = std::max(0, cx - options.radius); u <= std::min(depth.width() - 1, cx + options.radius); ++u)
-      if (const float metres = depth(u, v); metres > 0.0F) z[count++] = metres;
+  const auto for_each_depth = [&](auto&& visit) {
+    for (int v = std::max(0, cy - options.radius); v <= std::min(depth.height() - 1, cy + options.radius); ++v)
+      for (int u = std::max(0, cx - options.radius); u <= std::min(depth.width() - 1, cx + options.radius); ++u)
+        if (const float metres = depth(u, v); metres > 0.0F) visit(u, v, metres);
+  };
+  for_each_depth([&](int, int, float metres) { z[count++] = metres; });
   if (count == 0 || static_cast<int>(count) < options.min_valid) return std::nullopt;
   std::sort(z.begin(), z.begin() + static_cast<std::ptrdiff_t>(count));
 
@@ -82,10 +124,23 @@ template <camera::depth_source Depth>
   }
   if (static_cast<float>(end - begin) < options.min_share * static_cast<float>(count)) return std::nullopt;
 
+  const auto nearest = static_cast<double>(z[begin]), farthest = static_cast<double>(z[end - 1]);
+  depth_plane plane;
+  for_each_depth([&](int u, int v, float metres) {
+    const auto m = static_cast<double>(metres);
+    if (m < nearest || m > farthest) return;
+    plane.add(static_cast<double>(u) - static_cast<double>(x), static_cast<double>(v) - static_cast<double>(y), m);
+  });
+  if (plane.determined()) {
+    const auto fit = plane.solve();
+    const double at = std::clamp(fit.z, nearest, farthest);  // a hole must not make it guess far
+    const double noise = options.noise(at), shift = fit.slope * options.position_sigma;
+    return keypoint_depth{at, std::sqrt(noise * noise + fit.variance + shift * shift)};
+  }
   const std::size_t middle = begin + (end - begin) / 2;
   const auto upper = static_cast<double>(z[middle]);
   const double median = (end - begin) % 2 == 1 ? upper : 0.5 * (upper + static_cast<double>(z[middle - 1]));
-  return keypoint_depth{median, options.noise(median)};
+  return keypoint_depth{median, std::hypot(options.noise(median), 0.5 * (farthest - nearest))};
 }
 
 /// The column at which a second camera to the right would see a point: `u - bf / z`, pixels, where
