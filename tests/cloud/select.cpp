@@ -7,6 +7,7 @@
 #include <vector>
 
 #include <orbis/camera/any.hpp>
+#include <orbis/cloud/log_statistical.hpp>
 #include <orbis/cloud/radius.hpp>
 #include <orbis/cloud/select.hpp>
 #include <orbis/cloud/statistical.hpp>
@@ -120,6 +121,21 @@ TEST_CASE("a reference over range wins where spacing depends on range") {
   const auto given = orbis::cloud::select_filter(orbis::seq, cloud, {.ranges = ranges});
   CHECK(to_string(given.chain) == to_string(choice.chain));
   CHECK(given.evidence.density.front().threshold == Approx(choice.evidence.density.front().threshold).epsilon(1e-4));
+}
+
+TEST_CASE("holes in a cloud change neither the choice nor the shares it is explained with") {
+  auto cloud = orbis::test::room_cloud(80, 60, 0.002, 7);
+  add_uniform(cloud, 200, 8);
+  const auto whole = filter_automatically(orbis::seq, cloud);
+  REQUIRE(whole.choice.evidence.density.front().removed > 0.03);
+  auto holed = cloud;
+  holed.resize(5 * cloud.size(), orbis::vec3f::Constant(std::numeric_limits<float>::quiet_NaN()));
+  const auto result = filter_automatically(orbis::seq, holed);
+  CHECK(result.inliers == whole.inliers);
+  CHECK(result.choice.reason == whole.choice.reason);
+  CHECK(result.choice.evidence.density.front().removed == whole.choice.evidence.density.front().removed);
+  CHECK(result.choice.evidence.points == holed.size());
+  CHECK(result.choice.evidence.finite == cloud.size());
 }
 
 TEST_CASE("automatic selection takes any cloud and never removes most of it") {
@@ -268,6 +284,15 @@ TEST_CASE("a chain does the same when it is applied, and can be changed") {
     without.forbidden = {filter_mode::isolation, filter_mode::cluster, filter_mode::log_statistical,
                          filter_mode::range_log_statistical, filter_mode::local_log_statistical};
     CHECK(orbis::cloud::select_filter(orbis::par, cloud, without).chain.empty());
+  }
+  SECTION("a test of density of one's own") {
+    const auto judged = orbis::cloud::log_statistical_filter(orbis::seq, cloud, {.neighbors = 8, .threshold = 1.0});
+    const orbis::cloud::density_step own{.usual = {judged.median, 0}, .threshold = judged.threshold};
+    const auto left = orbis::cloud::apply_filter(orbis::par, cloud, {own});
+    CHECK(left.size() >= judged.inliers.size());  // surfaces are spared
+    const auto stray = static_cast<std::uint32_t>(cloud.size() - 900);
+    const auto kept_bad = std::count_if(left.begin(), left.end(), [&](auto i) { return i >= stray; });
+    CHECK(kept_bad < 200);
   }
   SECTION("filters of one's own") {
     const orbis::cloud::statistical_options sor{.neighbors = 20, .sigma_multiplier = 1.5};

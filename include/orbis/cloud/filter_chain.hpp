@@ -13,6 +13,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <type_traits>
 #include <variant>
@@ -50,7 +51,10 @@ struct density_step {
   double offset = 0;                                ///< of the local mode's bulk from its surroundings
   double threshold = 0;                             ///< outliers: log spacing - usual > threshold
   surface_test surface{};
-  log_line surface_spacing{};  ///< log spacing of surfaces at a log range, by which neighbours count as one
+  /// Log spacing of surfaces at a log range, by which neighbours count as one; empty: what is `usual`.
+  std::optional<log_line> surface_spacing{};
+
+  [[nodiscard]] const log_line& surface_line() const noexcept { return surface_spacing ? *surface_spacing : usual; }
 };
 
 /// Removes groups of fewer than `min_size` points that are further from others than `reach` times the

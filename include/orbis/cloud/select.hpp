@@ -15,6 +15,7 @@
 /// Every step is part of the chosen chain only if it removes something.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cassert>
 #include <cmath>
@@ -169,6 +170,7 @@ template <execution_policy Policy, point_range Points, posed_depth_range Views, 
   filter_choice& choice = out.choice;
   choice.evidence.points = std::ranges::size(points);
   std::vector<char> left = finite_points(points);
+  choice.evidence.finite = static_cast<std::size_t>(std::ranges::count(left, char{1}));
   const std::vector<float> ranges = ranges_of(policy, points, options);
   std::vector<std::string> reasons;
   if (!judge_views(policy, points, views, camera, options, left, choice, reasons, on_progress)) {

@@ -71,7 +71,7 @@ template <execution_policy Policy>
   constexpr double most_surface = 0.4;
   constexpr double chance = 10;  // points: fewer say nothing
   const std::vector<float> residual = around.residuals(policy, r.step);
-  around.look_at_shapes(policy, residual, r.step.surface_spacing);
+  around.look_at_shapes(policy, residual, r.step.surface_line());
   std::vector<double> loose;  // residuals of points that are not on surfaces
   loose.reserve(residual.size());
   std::array<double, bins> all{};
@@ -80,7 +80,7 @@ template <execution_policy Policy>
     const double x = residual[i];
     if (std::isnan(x)) continue;
     const bool sparse = x >= first;
-    const bool on_surface = sparse && around.on_surface(i, r.step.surface, r.step.surface_spacing);
+    const bool on_surface = sparse && around.on_surface(i, r.step.surface, r.step.surface_line());
     if (!on_surface) loose.push_back(x);
     if (!sparse) continue;
     const auto bin = static_cast<std::size_t>(std::min((x - first) / bin_width, bins - 1.0));
@@ -181,7 +181,7 @@ void judge_points(const Policy& policy, surroundings& around, const select_optio
       return static_cast<double>(std::ranges::count(gone, char{1}));
     };
     around.apply(policy, step);
-    const double share = (count(around.gone()) - count(before)) / static_cast<double>(evidence.points);
+    const double share = (count(around.gone()) - count(before)) / static_cast<double>(evidence.finite);
     if (share > most) {
       around.restore(std::move(before));
       return 0.0;

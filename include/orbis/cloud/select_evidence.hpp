@@ -47,6 +47,7 @@ struct density_evidence {
 /// The numbers behind a choice. Lengths in metres; shares are of all finite points.
 struct filter_evidence {
   std::size_t points = 0;             ///< all
+  std::size_t finite = 0;             ///< of these
   std::size_t judged = 0;             ///< finite, as is their range if any is, and not identical to all neighbours
   double median_spacing = 0;          ///< median over the points of the mean neighbour distance
   double left_scale = 0;              ///< width of the bulk below its median with the chosen reference, log

@@ -107,9 +107,9 @@ class surroundings {
   template <execution_policy Policy>
   void apply(const Policy& policy, const density_step& step) {
     const std::vector<float> residual = residuals(policy, step);
-    look_at_shapes(policy, residual, step.surface_spacing);
+    look_at_shapes(policy, residual, step.surface_line());
     for_each_index(policy, size(), 1024, [&](std::size_t i) {
-      if (gone_[i] == 0 && double{residual[i]} > step.threshold && !on_surface(i, step.surface, step.surface_spacing))
+      if (gone_[i] == 0 && double{residual[i]} > step.threshold && !on_surface(i, step.surface, step.surface_line()))
         gone_[i] = 1;
     });
   }

@@ -96,7 +96,7 @@ template <execution_policy Policy, point_range Points, posed_depth_range Views, 
   const auto second_half = [&](std::size_t done, std::size_t) { return on_progress(count + done, 2 * count); };
   const ray_removals removed = apply_rays(policy, points, step, views, camera, left, cancelled, second_half);
   if (cancelled) return false;
-  const auto total = static_cast<double>(std::max<std::size_t>(evidence.points, 1));
+  const auto total = static_cast<double>(std::max<std::size_t>(evidence.finite, 1));
   evidence.passed_through = static_cast<double>(removed.passed_through) / total;
   evidence.unsupported = static_cast<double>(removed.unsupported) / total;
   if (removed.passed_through + removed.unsupported == 0) return true;
