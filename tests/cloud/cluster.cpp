@@ -148,6 +148,15 @@ TEST_CASE("points that are gone link nothing and stay gone") {
   CHECK(cluster_decision(orbis::par, cloud, table, gone, wide).inliers.size() == cloud.size() - 30);
 }
 
+TEST_CASE("spacings that are not known for lack of any link what they like, and with no gap nothing is close") {
+  const points cloud = wall_and_ball(25, 0.3);
+  const auto table = orbis::cloud::all_knn(orbis::seq, cloud, 12);
+  std::vector<float> spacing(cloud.size(), 0.01F);
+  std::fill_n(spacing.begin(), 3600, std::numeric_limits<float>::infinity());
+  CHECK(cluster_decision(orbis::seq, cloud, table, {}, spacing, {.min_gap = 0}).inliers.size() == 3600);
+  CHECK(cluster_decision(orbis::seq, cloud, table, {}, spacing, {.min_gap = 1}).inliers.size() == cloud.size());
+}
+
 TEST_CASE("points that are not finite are in no component") {
   constexpr float nan = std::numeric_limits<float>::quiet_NaN();
   points cloud = wall_and_ball(25, 0.3);

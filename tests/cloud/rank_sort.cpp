@@ -50,3 +50,10 @@ TEST_CASE("ranks sort by distance, then by index, with every instruction set") {
     CHECK(seen == 4);
   }
 }
+
+TEST_CASE("nothing is sorted as well") {
+  orbis::cloud::detail::rank_sorter sorter{orbis::simd::detected()};
+  bool called = false;
+  sorter.for_each([&](std::size_t, std::uint32_t, float) { return called = true; });
+  CHECK_FALSE(called);
+}

@@ -178,10 +178,6 @@ template <execution_policy Policy, point_range Points>
       for (std::size_t s = begin; s != end; ++s) {
         const std::uint32_t i = small_points[s];
         search.knn(coordinates<float>(detail::point_at(points, i)), 1, nearest);
-        if (nearest.empty()) {  // so far that squares overflow
-          apart[s] = 1;
-          continue;
-        }
         double within = 0;  // mean length of its links
         double links = 0;
         for_each_link(i, [&](const neighbor<float>& n) {
@@ -190,7 +186,8 @@ template <execution_policy Policy, point_range Points>
         });
         if (links > 0) within /= links;
         const double local = std::max(within, double{spacing[main_points[nearest.front().index]]});
-        apart[s] = nearest.front().distance > options.min_gap * local ? 1 : 0;
+        const double gap = options.min_gap > 0 ? options.min_gap * local : 0;  // spacings may be infinite
+        apart[s] = nearest.front().distance > gap ? 1 : 0;
       }
     });
     for (const std::uint32_t i : small_points) out.removed[out.component[i]] = 1;

@@ -75,7 +75,7 @@ class depth_windows {
         if (!whole) std::fill_n(low, width, 0.0F);
         kernels.replace_zeros(low, none, width);
         kernels.replace_zeros(high, none, width);
-        kernels.widen_range(unused.data(), farthest.data(), unused.data(), high, width);
+        kernels.widen_range(unused.data(), farthest.data(), high, high, width);
       }
       float* const tiles = tile_farthest_.data() + begin / tile * static_cast<std::size_t>(tiles_across_);
       for (std::size_t x = 0; x != width; ++x) tiles[x / tile] = std::max(tiles[x / tile], farthest[x]);

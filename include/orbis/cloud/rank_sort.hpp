@@ -87,6 +87,7 @@ class rank_sorter {
   /// Calls `f(rank, index, distance_squared)` for all, nearest first, until it returns false.
   template <class F>
   void for_each(F&& f) {
+    if (count_ == 0) return;
     if (count_ <= most_ranked) {
       std::fill_n(keys_.begin() + static_cast<std::ptrdiff_t>(count_), room, std::numeric_limits<std::int32_t>::max());
       std::fill_n(taken_.begin(), count_, std::uint16_t{0});
