@@ -99,6 +99,11 @@ TEST_CASE("bad keyframes are skipped or refused") {
         orbis::mapping::map_options{.dense = {.voxel_size = -0.1}},
         orbis::mapping::map_options{.filter = {.statistical = {.neighbors = 0}}},
         orbis::mapping::map_options{.filter = {.automatic = {.neighbors = 0}}},
+        orbis::mapping::map_options{.filter = {.log_statistical = {.neighbors = 0}}},
+        orbis::mapping::map_options{.filter = {.cluster = {.neighbors = 0}}},
+        orbis::mapping::map_options{.filter = {.cluster = {.min_gap = -1}}},
+        orbis::mapping::map_options{.filter = {.ray_evidence = {.window = -1}}},
+        orbis::mapping::map_options{.dense = {.voxel_size = inf}},
         orbis::mapping::map_options{.filter = {.radius = {.radius = -0.1}}}})
     CHECK(build_map(orbis::seq, scene.keyframes(), scene.camera, bad).error().code == errc::invalid_argument);
   const orbis::camera::pinhole other{{.width = 32, .height = 24, .fx = 30, .fy = 30, .cx = 16, .cy = 12}};
@@ -184,5 +189,29 @@ TEST_CASE("building a map can be watched and stopped") {
     const auto map = build_map(orbis::seq, scene.keyframes(), scene.camera, {}, until);
     REQUIRE_FALSE(map.has_value());
     CHECK(map.error().code == orbis::errc::cancelled);
+  }
+}
+
+TEST_CASE("a filter by rays is watched and stopped like the rest") {
+  const auto scene = orbis::test::wall_scene(3);
+  for (const bool ghosts : {false, true}) {
+    const orbis::mapping::map_options options{
+        .filter = {.kind = filter_kind::ray_evidence, .ray_evidence = {.resolve_ghosts = ghosts}}};
+    std::size_t calls = 0;
+    const auto watch = [&](std::size_t done, std::size_t total) {
+      CHECK(done == ++calls);
+      CHECK(total == (ghosts ? 15U : 12U));
+      return true;
+    };
+    REQUIRE(build_map(orbis::seq, scene.keyframes(), scene.camera, options, watch).has_value());
+    CHECK(calls == (ghosts ? 15U : 12U));
+    for (const std::size_t stop : {4U, 6U}) {
+      calls = 0;
+      const auto until = [&](std::size_t, std::size_t) { return ++calls < stop; };
+      const auto map = build_map(orbis::seq, scene.keyframes(), scene.camera, options, until);
+      REQUIRE_FALSE(map.has_value());
+      CHECK(map.error().code == orbis::errc::cancelled);
+      CHECK(calls == stop);
+    }
   }
 }

@@ -93,12 +93,14 @@ struct ray_evidence_result {
 }
 
 /// The indices, ascending, of the finite points that rays do not pass through: see
-/// `ray_evidence_scores`.
+/// `ray_evidence_scores`, also for `on_progress`.
 template <execution_policy Policy, point_range Points, posed_depth_range Views, camera::camera_model Camera>
 [[nodiscard]] std::vector<std::uint32_t> ray_evidence_inliers(const Policy& policy, const Points& points,
                                                               const Views& views, const Camera& camera,
-                                                              const ray_evidence_options& options = {}) {
-  auto decided = ray_evidence_decision(ray_evidence_scores(policy, points, views, camera, options), options);
+                                                              const ray_evidence_options& options = {},
+                                                              progress on_progress = {}) {
+  auto decided =
+      ray_evidence_decision(ray_evidence_scores(policy, points, views, camera, options, on_progress), options);
   const auto first = std::ranges::begin(points);
   std::erase_if(decided.inliers, [&](std::uint32_t i) {
     return !is_finite(coordinates<float>(first[static_cast<std::ranges::range_difference_t<const Points>>(i)]));

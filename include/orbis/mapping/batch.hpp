@@ -79,18 +79,25 @@ template <scan_map Octree = octree::occupancy_octree<>, execution_policy Policy,
   if (options.dense.stride <= 0) return fail(errc::invalid_argument, "stride", "must be positive");
   if (const auto& flying = options.dense.flying_pixels; flying && (flying->reach < 1 || flying->reach > 8))
     return fail(errc::invalid_argument, "flying_pixels.reach", "must be from 1 to 8");
-  if (!(options.dense.voxel_size >= 0)) return fail(errc::invalid_argument, "voxel_size", "must not be negative");
+  if (!(options.dense.voxel_size >= 0) || !std::isfinite(options.dense.voxel_size))
+    return fail(errc::invalid_argument, "voxel_size", "must be finite and not negative");
   if (!(options.integration.max_range >= 0)) return fail(errc::invalid_argument, "max_range", "must not be negative");
-  if (options.filter.automatic.neighbors == 0 || options.filter.statistical.neighbors == 0)
+  const filter_options& filter = options.filter;
+  if (filter.automatic.neighbors == 0 || filter.statistical.neighbors == 0 || filter.log_statistical.neighbors == 0 ||
+      filter.cluster.neighbors == 0)
     return fail(errc::invalid_argument, "neighbors", "must be positive");
-  if (!(options.filter.radius.radius >= 0)) return fail(errc::invalid_argument, "radius", "must not be negative");
+  if (!(filter.radius.radius >= 0)) return fail(errc::invalid_argument, "radius", "must not be negative");
+  if (!(filter.cluster.reach >= 0 && filter.cluster.min_gap >= 0))
+    return fail(errc::invalid_argument, "cluster", "reach and min_gap must not be negative");
+  if (const auto& rays = filter.ray_evidence;
+      !(rays.window >= 0 && rays.margin >= 0 && rays.margin_growth >= 0 && rays.slant >= 0))
+    return fail(errc::invalid_argument, "ray_evidence", "window, margins and slant must not be negative");
   const auto fits = [&](const auto& image) {
     return image.width() == camera.width() && image.height() == camera.height();
   };
   const auto finite_pose = [](const auto& k) { return se3(k.T_world_camera).to_matrix().allFinite(); };
-  // The automatic filter looks at every keyframe twice.
-  const bool listening = options.filter.kind == filter_kind::automatic;
-  const std::size_t passes = (options.unfiltered_octree ? 3U : 2U) + (listening ? 2U : 0U);
+  const std::size_t looks = looks_at_views(options.filter);
+  const std::size_t passes = (options.unfiltered_octree ? 3U : 2U) + looks;
   const std::size_t total = passes * std::ranges::size(keyframes);
   std::size_t done = 0;
 
@@ -119,7 +126,7 @@ template <scan_map Octree = octree::occupancy_octree<>, execution_policy Policy,
   filtered_indices filtered =
       filter_points(policy, map.cloud.points, dense.ranges(policy), keyframes, camera, options.filter, while_filtering);
   if (cancelled) return fail(errc::cancelled, {}, "cancelled");
-  if (listening) done += 2 * std::ranges::size(keyframes);
+  done += looks * std::ranges::size(keyframes);
   map.filter = std::move(filtered.report);
   map.inliers = std::move(filtered.inliers);
   map.filtered_cloud = cloud::extract(map.cloud, map.inliers);

@@ -51,7 +51,8 @@ class dense_cloud {
 
   /// Adds a keyframe's points; returns how many measurements there were. The keyframe's number is that of
   /// those spliced before it. Colours are kept if every keyframe has them.
-  /// O(pixels). @pre the images have the size of the ray table; the pose is finite
+  /// O(pixels). @pre the images have the size of the ray table; the pose is finite; with a voxel size, fewer than
+  /// 2^22 measurements in a voxel
   template <execution_policy Policy, keyframe_like Keyframe>
   std::size_t splice(const Policy& policy, const Keyframe& k) {
     frames_.push_back({});

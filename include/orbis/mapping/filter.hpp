@@ -156,8 +156,15 @@ template <execution_policy Policy, point_range Points>
       [&](const cloud::ray_evidence_options&) { return detail::all_indices(std::ranges::size(points)); });
 }
 
+/// How often `filter_points` looks at each view.
+[[nodiscard]] constexpr std::size_t looks_at_views(const filter_options& options) noexcept {
+  if (options.kind == filter_kind::ray_evidence) return options.ray_evidence.resolve_ghosts ? 2 : 1;
+  return options.kind == filter_kind::automatic ? 2 : 0;
+}
+
 /// The same, and the automatic filter listens to the views that the points come from, too.
-/// `on_progress` counts the views, twice; if it cancels, all points stay. @pre the images have the camera's size
+/// `on_progress` counts the views, as often as they are looked at (`looks_at_views`); if it cancels, all points
+/// stay. @pre the images have the camera's size
 template <execution_policy Policy, point_range Points, cloud::posed_depth_range Views, camera::camera_model Camera>
 [[nodiscard]] filtered_indices filter_points(const Policy& policy, const Points& points, std::span<const float> ranges,
                                              const Views& views, const Camera& camera,
@@ -168,7 +175,13 @@ template <execution_policy Policy, point_range Points, cloud::posed_depth_range 
         return cloud::filter_automatically(policy, points, views, camera, select, on_progress);
       },
       [&](const cloud::ray_evidence_options& rays) {
-        return cloud::ray_evidence_inliers(policy, points, views, camera, rays);
+        bool cancelled = false;
+        const auto watched = [&](std::size_t done, std::size_t total) {
+          cancelled = cancelled || !on_progress(done, total);
+          return !cancelled;
+        };
+        auto inliers = cloud::ray_evidence_inliers(policy, points, views, camera, rays, watched);
+        return cancelled ? detail::all_indices(std::ranges::size(points)) : std::move(inliers);
       });
 }
 
