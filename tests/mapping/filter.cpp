@@ -63,5 +63,7 @@ TEST_CASE("rays cannot judge where there are no views, and none removes nothing"
     const auto filtered = mapping::filter_points(seq, s.points, {}, {.kind = kind});
     CHECK(filtered.inliers.size() == s.points.size());
     CHECK(filtered.report.removed == 0);
+    CHECK(filtered.report.mode.empty());
+    CHECK(filtered.report.reason.starts_with("asked for"));
   }
 }

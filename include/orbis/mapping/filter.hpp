@@ -150,10 +150,15 @@ template <execution_policy Policy, point_range Points, class Automatic, class By
 template <execution_policy Policy, point_range Points>
 [[nodiscard]] filtered_indices filter_points(const Policy& policy, const Points& points, std::span<const float> ranges,
                                              const filter_options& options = {}) {
-  return detail::filter_by_kind(
+  filtered_indices out = detail::filter_by_kind(
       policy, points, ranges, options,
       [&](const cloud::select_options& select) { return cloud::filter_automatically(policy, points, select); },
       [&](const cloud::ray_evidence_options&) { return detail::all_indices(std::ranges::size(points)); });
+  if (options.kind == filter_kind::ray_evidence) {
+    out.report.mode.clear();
+    out.report.reason = "asked for ray evidence, but there are no depth images whose rays could give any";
+  }
+  return out;
 }
 
 /// How often `filter_points` looks at each view.
