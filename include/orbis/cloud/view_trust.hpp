@@ -142,7 +142,7 @@ struct view_verdict {
 /// tested by all others (`ray_evidence`), tile by tile: a wrong pose is contradicted all over the
 /// image, a moving object in a part of it alone, so the median over the tiles counts. The worst view is left
 /// out until none stands out; if that would be half of them, all are trusted. Deterministic.
-/// O(views (pixels + samples)). @pre views' images have the camera's size
+/// O(views (pixels + samples of all views)). @pre views' images have the camera's size
 template <execution_policy Policy, posed_depth_range Views, camera::camera_model Camera>
 [[nodiscard]] view_trust find_distrusted_views(const Policy& policy, const Views& views, const Camera& camera,
                                                const ray_evidence_options& evidence = {},
@@ -178,18 +178,19 @@ template <execution_policy Policy, posed_depth_range Views, camera::camera_model
   }
 
   std::vector<std::vector<detail::view_verdict>> verdicts(count);  // for each view that has a part in them
+  ray_evidence_counter<Camera> counter{policy, samples, camera, evidence};
+  std::vector<ray_evidence> before = counter.scores();
   const bool finished = for_each_settled_view(policy, views, evidence, [&](std::uint32_t by, const auto& view) {
-    ray_evidence_counter<Camera> counter{policy, samples, camera, evidence};
     counter.add(policy, view);
-    const std::vector<ray_evidence> scores = counter.scores();
+    std::vector<ray_evidence> scores = counter.scores();  // of all views so far
     for (std::size_t begin = 0; begin != place.size();) {
       std::size_t end = begin;
       const std::uint32_t of = place[begin] / (tiles * tiles);
       std::array<int, tiles * tiles> through{};
       std::array<int, tiles * tiles> supported{};
       for (; end != place.size() && place[end] / (tiles * tiles) == of; ++end) {
-        through[place[end] % (tiles * tiles)] += scores[end].through;
-        supported[place[end] % (tiles * tiles)] += scores[end].supported;
+        through[place[end] % (tiles * tiles)] += scores[end].through - before[end].through;
+        supported[place[end] % (tiles * tiles)] += scores[end].supported - before[end].supported;
       }
       begin = end;
       if (of == by) continue;
@@ -201,6 +202,7 @@ template <execution_policy Policy, posed_depth_range Views, camera::camera_model
         verdicts[by].push_back(verdict);
       }
     }
+    before.swap(scores);
     return on_progress(by + 1, count);
   });
   if (!finished) return out;
