@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include <orbis/cloud/all_knn_leaves.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/point.hpp>
 #include <orbis/core/types.hpp>
@@ -38,15 +39,6 @@ struct point_blocks {
 };
 
 namespace detail {
-
-/// `x`'s lowest 10 bits, two zeros after each.
-[[nodiscard]] constexpr std::uint32_t spread_bits(std::uint32_t x) noexcept {
-  x &= 0x3ffU;
-  x = (x | x << 16U) & 0x030000ffU;
-  x = (x | x << 8U) & 0x0300f00fU;
-  x = (x | x << 4U) & 0x030c30c3U;
-  return (x | x << 2U) & 0x09249249U;
-}
 
 struct keyed_index {
   std::uint32_t key;
@@ -132,7 +124,7 @@ template <execution_policy Policy, point_range Points>
     std::uint32_t key = 0;
     for (std::size_t a = 0; a != 3; ++a) {
       const double cell = std::clamp((double{p[a]} - start[a]) * scale, 0.0, 1023.0);
-      key |= detail::spread_bits(static_cast<std::uint32_t>(cell)) << a;
+      key |= detail::spread_ten_bits(static_cast<std::uint32_t>(cell)) << a;
     }
     entries[i].key = key;
   });
