@@ -92,11 +92,10 @@ result<built_map> map_frames(const posed_frames& frames, const frame_source& sou
   options.dense.max_depth = static_cast<float>(s.max_depth);
   options.filter = filter_options(s);
   options.resolution = s.resolution;
-  // Enough points for the octree's voxels, not more: about a million from an ordinary recording.
-  constexpr std::size_t ample = 1'500'000;
-  const std::size_t pixels = static_cast<std::size_t>(source.camera.model.width()) *
-                             static_cast<std::size_t>(source.camera.model.height()) * frames.size();
-  while (pixels / static_cast<std::size_t>(options.dense.stride * options.dense.stride) > ample) ++options.dense.stride;
+  // Finer than the octree's voxels, so that these see every surface; memory follows what there is to
+  // see, not how long it was looked at.
+  options.dense.voxel_size = s.resolution / 5;
+  options.dense.flying_pixels.emplace();
 
   auto map =
       orbis::mapping::build_map(orbis::par.with(s.threads), frames, source.camera.model, options, say.progress());
