@@ -55,6 +55,17 @@ struct epipolar_source {
     std::vector<float> x, y, limit;  ///< of the trains, in whole blocks
   };
 
+  /// Says in one sentence what is asked for where something else is given.
+  template <class Descriptor, class Other>
+  requires descriptor_distance<Distance, Descriptor> &&
+      (!epipolar_geometry<Other>)void search(std::vector<candidate>& /*candidates*/, workspace& /*memory*/,
+                                             const feature_view<Descriptor>& /*queries*/,
+                                             const feature_view<Descriptor>& /*trains*/, search_needs /*needs*/,
+                                             const Other& /*geometry*/) const {
+    static_assert(epipolar_geometry<Other>,
+                  "orbis: epipolar(...) wants an epipolar_geometry, such as fundamental_geometry or ray_geometry");
+  }
+
   /// One candidate for each query that has a train close to its line. O(queries x trains) distances to lines.
   /// @pre one keypoint for each descriptor on both sides
   template <class Descriptor, epipolar_geometry Geometry>
