@@ -11,10 +11,7 @@
 #include <orbis/cloud.hpp>
 #include <orbis/io.hpp>
 
-int complain(int code, const std::string& why) {
-  std::fprintf(stderr, "filter_cloud: %s\n", why.c_str());
-  return code;
-}
+int complain(int code, const std::string& why) { return std::fprintf(stderr, "filter_cloud: %s\n", why.c_str()), code; }
 
 int main(int argc, char** argv) {
   using namespace orbis::cloud;
@@ -37,16 +34,18 @@ int main(int argc, char** argv) {
   } catch (const CLI::ParseError& e) {
     return e.get_exit_code() == 0 ? cli.exit(e) : complain(1, e.what() + std::string{" (--help shows the usage)"});
   }
-  if (!(sigma >= 0 && voxel >= 0 && sigma + voxel < 1e6)) return complain(1, "--sigma, --voxel: are 0 ... 1000000");
+  if (!(sigma >= 0 && sigma < 1e6)) return complain(1, "--sigma: is not 0 ... 1000000");
+  if (voxel != 0 && !(voxel >= 1e-6 && voxel < 1e6)) return complain(1, "--voxel: is not 0, nor a micrometre or more");
   const auto eye = xyz.empty() ? std::nullopt : std::optional{orbis::vec3{xyz.data()}};
-  if (eye ? !eye->allFinite() : filter == "range-statistical") return complain(1, "--origin: no place is given");
+  if (eye ? !eye->allFinite() : filter == "range-statistical") return complain(1, "--origin: wants a finite place");
   const auto read = orbis::io::read_cloud(input);
   if (!read) return complain(2, read.error().to_string());
   const auto cloud = voxel > 0 ? voxel_grid(*read, {.size = voxel}) : *read;
   const auto& p = cloud.points;
-  if (pass_through_inliers(p).empty()) return complain(2, input + ": has no finite points");
+  const auto finite = pass_through_inliers(p);
+  if (finite.empty()) return complain(2, input + ": has no finite points");
   automatic_result best;
-  const auto kept = filter == "none"                ? pass_through_inliers(p)
+  const auto kept = filter == "none"                ? finite
                     : filter == "statistical"       ? statistical_inliers(par, p, {k.value_or(50), sigma})
                     : filter == "radius"            ? radius_inliers(par, p, {.min_neighbors = k.value_or(5)})
                     : filter == "log-statistical"   ? log_statistical_inliers(par, p, {k.value_or(8)})
@@ -55,5 +54,5 @@ int main(int argc, char** argv) {
                                           : (best = filter_automatically(par, p, {k.value_or(8), eye})).inliers;
   const auto why = filter == "auto" ? to_string(best.choice.chain) + ": " + best.choice.reason : filter;
   if (auto ok = orbis::io::write_ply(output, extract(cloud, kept)); !ok) return complain(2, ok.error().to_string());
-  std::printf("%zu points, %zu to filter, %zu kept; %s\n", read->size(), cloud.size(), kept.size(), why.c_str());
+  std::printf("%zu points, %zu to filter, %zu kept; %s\n", read->size(), finite.size(), kept.size(), why.c_str());
 }
