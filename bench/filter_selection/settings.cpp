@@ -96,9 +96,6 @@ removal either(removal a, const removal& b) {
 removal rays(const neighborhoods& n) {
   return n.passed_through.empty() ? removal(n.of->points.size()) : n.passed_through;
 }
-removal near_rays(const neighborhoods& n) {
-  return n.passed_through_near.empty() ? removal(n.of->points.size()) : n.passed_through_near;
-}
 
 }  // namespace
 
@@ -107,13 +104,8 @@ neighborhoods::neighborhoods(const labelled_case& c) : of{&c}, table{cloud::all_
   for (std::size_t i = 0; i != c.points.size(); ++i) sixth.push_back(table[i][5].distance);
   spacing = cloud::quantile(sixth, 0.5);
   if (c.views.empty()) return;
-  const auto evidence = [&](const cloud::ray_evidence_options& options) {
-    std::vector<char> out(c.points.size(), 1);
-    for (const std::uint32_t i : cloud::ray_evidence_inliers(par, c.points, c.views, c.camera, options)) out[i] = 0;
-    return out;
-  };
-  passed_through = evidence({});
-  passed_through_near = evidence({.window = 1});
+  passed_through.assign(c.points.size(), 1);
+  for (const std::uint32_t i : cloud::ray_evidence_inliers(par, c.points, c.views, c.camera)) passed_through[i] = 0;
 }
 
 std::vector<double> neighborhoods::mean_distance(std::size_t k) const {
@@ -166,7 +158,6 @@ std::vector<setting> fixed_settings() {
     }
   }
   out.push_back({"rays", rays});
-  out.push_back({"near-rays", near_rays});
   for (const double alpha : {1.0, 2.0, 3.0}) {
     for (const std::size_t k : {8U, 50U}) {
       out.push_back({format("rays+SOR(%g,%g)", static_cast<double>(k), alpha),
@@ -181,11 +172,7 @@ std::vector<setting> fixed_settings() {
                    return either(rays(n), beyond_median(logarithm(at_one_metre(n.mean_distance(8), *n.of, 1)), 5));
                  }});
   out.push_back({"rays+radius(4x,8)", [](N n) { return either(rays(n), lonely(n, 4, 8, false)); }});
-  out.push_back({"near-rays+SOR(50,1)", [](N n) { return either(near_rays(n), beyond_mean(n.mean_distance(50), 1)); }});
-  out.push_back({"near-rays+log-SOR(8,6)",
-                 [](N n) { return either(near_rays(n), beyond_median(logarithm(n.mean_distance(8)), 6)); }});
-  out.push_back({"near-rays+cluster(4x,200)", [](N n) { return either(near_rays(n), small_components(n, 4, 200)); }});
-  out.push_back({"near-rays+cluster(2x,30)", [](N n) { return either(near_rays(n), small_components(n, 2, 30)); }});
+  out.push_back({"rays+cluster(2x,30)", [](N n) { return either(rays(n), small_components(n, 2, 30)); }});
   out.push_back({"rays+cluster(4x,200)", [](N n) { return either(rays(n), small_components(n, 4, 200)); }});
   out.push_back({"SOR(50,1)+cluster(4x,200)",
                  [](N n) { return either(beyond_mean(n.mean_distance(50), 1), small_components(n, 4, 200)); }});

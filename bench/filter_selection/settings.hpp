@@ -21,9 +21,8 @@ struct neighborhoods {
 
   const labelled_case* of;
   cloud::neighbor_table table;
-  double spacing = 0;                     ///< median distance to the sixth neighbour, metres
-  std::vector<char> passed_through;       ///< what ray evidence removes; empty without views
-  std::vector<char> passed_through_near;  ///< the same where only the neighbouring pixels are looked at
+  double spacing = 0;                ///< median distance to the sixth neighbour, metres
+  std::vector<char> passed_through;  ///< what ray evidence removes; empty without views
 };
 
 /// A mask of the points to remove.
