@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include <orbis/cloud/decision.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/point.hpp>
 #include <orbis/core/simd.hpp>
@@ -125,8 +126,7 @@ class leaf_order {
   /// The entries left out, in ascending order. Each has at least `most_copies` copies elsewhere.
   [[nodiscard]] std::span<const range> left_out() const noexcept { return left_out_; }
   [[nodiscard]] std::array<float, 3> position(std::uint32_t i) const {
-    return coordinates<float>(
-        std::ranges::begin(*points_)[static_cast<std::ranges::range_difference_t<const Points>>(i)]);
+    return coordinates<float>(point_at(*points_, i));
   }
 
  private:

@@ -18,6 +18,7 @@
 #include <nanoflann.hpp>
 
 #include <orbis/cloud/all_knn_leaves.hpp>
+#include <orbis/cloud/decision.hpp>
 #include <orbis/cloud/neighbors.hpp>
 #include <orbis/cloud/squared_distance.hpp>
 #include <orbis/core/execution.hpp>
@@ -117,9 +118,7 @@ class nanoflann_search {
       }
       points = nullptr;
     }
-    [[nodiscard]] decltype(auto) at(std::uint32_t i) const {
-      return std::ranges::begin(*points)[static_cast<std::ranges::range_difference_t<const Points>>(i)];
-    }
+    [[nodiscard]] decltype(auto) at(std::uint32_t i) const { return detail::point_at(*points, i); }
     [[nodiscard]] std::uint32_t original(std::uint32_t i) const noexcept { return some_left_out ? finite[i] : i; }
     [[nodiscard]] query position(std::uint32_t i) const {
       return points == nullptr ? copies[i] : coordinates<scalar>(at(original(i)));

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include <orbis/cloud/all_knn_leaves.hpp>
+#include <orbis/cloud/decision.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/point.hpp>
 #include <orbis/core/types.hpp>
@@ -82,10 +83,7 @@ template <execution_policy Policy, point_range Points>
 [[nodiscard]] point_blocks make_point_blocks(const Policy& policy, const Points& points) {
   constexpr std::size_t size = point_blocks::block_size;
   constexpr float nan = std::numeric_limits<float>::quiet_NaN();
-  const auto first = std::ranges::begin(points);
-  const auto at = [&](std::size_t i) {
-    return coordinates<float>(first[static_cast<std::ranges::range_difference_t<const Points>>(i)]);
-  };
+  const auto at = [&](std::size_t i) { return coordinates<float>(detail::point_at(points, i)); };
   std::vector<detail::keyed_index> entries;
   entries.reserve(std::ranges::size(points));
   constexpr float inf = std::numeric_limits<float>::infinity();

@@ -16,12 +16,27 @@
 #include <vector>
 
 #include <orbis/camera/model.hpp>
+#include <orbis/cloud/decision.hpp>
 #include <orbis/cloud/ray_evidence_counter.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/point.hpp>
 #include <orbis/core/progress.hpp>
 
 namespace orbis::cloud {
+
+namespace detail {
+
+/// `f` with the camera, of the kind that it is where that is known at run time.
+template <camera::camera_model Camera, class F>
+decltype(auto) with_model(const Camera& camera, F&& f) {
+  if constexpr (requires { camera.visit([](const auto&) {}); }) {
+    return camera.visit(f);
+  } else {
+    return f(camera);
+  }
+}
+
+}  // namespace detail
 
 /// How many views pass through each point, and how many support it.
 ///
@@ -46,11 +61,8 @@ template <execution_policy Policy, point_range Points, posed_depth_range Views, 
                                                             const Views& views, const Camera& camera,
                                                             const ray_evidence_options& options = {},
                                                             progress on_progress = {}) {
-  if constexpr (requires { camera.visit([](const auto&) {}); }) {  // a camera of a kind known at run time
-    return camera.visit(
-        [&](const auto& model) { return ray_evidence_scores(policy, points, views, model, options, on_progress); });
-  } else {
-    ray_evidence_counter<Camera> counter{policy, points, camera, options};
+  return detail::with_model(camera, [&](const auto& model) {
+    ray_evidence_counter counter{policy, points, model, options};
     std::size_t done = 0;
     const std::size_t total = (options.resolve_ghosts ? 2 : 1) * std::ranges::size(views);
     for (const auto& view : views) {
@@ -64,7 +76,7 @@ template <execution_policy Policy, point_range Points, posed_depth_range Views, 
       }
     }
     return counter.scores();
-  }
+  });
 }
 
 /// The filter's decision, and what it is based on.
@@ -101,10 +113,8 @@ template <execution_policy Policy, point_range Points, posed_depth_range Views, 
                                                               progress on_progress = {}) {
   auto decided =
       ray_evidence_decision(ray_evidence_scores(policy, points, views, camera, options, on_progress), options);
-  const auto first = std::ranges::begin(points);
-  std::erase_if(decided.inliers, [&](std::uint32_t i) {
-    return !is_finite(coordinates<float>(first[static_cast<std::ranges::range_difference_t<const Points>>(i)]));
-  });
+  std::erase_if(decided.inliers,
+                [&](std::uint32_t i) { return !is_finite(coordinates<float>(detail::point_at(points, i))); });
   return std::move(decided.inliers);
 }
 

@@ -199,16 +199,6 @@ template <execution_policy Policy, point_range Points, posed_depth_range Views, 
   return out;
 }
 
-/// `f` with the camera, of the kind that it is where that is known at run time.
-template <camera::camera_model Camera, class F>
-decltype(auto) with_model(const Camera& camera, F&& f) {
-  if constexpr (requires { camera.visit([](const auto&) {}); }) {
-    return camera.visit(f);
-  } else {
-    return f(camera);
-  }
-}
-
 }  // namespace detail
 
 /// Judges the cloud by its points and by the depth images that it was made of, or that saw the same

@@ -14,6 +14,7 @@
 #include <type_traits>
 #include <vector>
 
+#include <orbis/cloud/decision.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/point.hpp>
 #include <orbis/core/types.hpp>
@@ -64,9 +65,8 @@ template <execution_policy Policy, point_range Points>
   std::vector<float> out(count, unknown);
   const std::optional<vec3> common = origins.common.has_value() ? origins.common : stated_sensor_origin(points);
   if (origins.ranges.empty() && origins.per_point.empty() && !common.has_value()) return out;
-  const auto first = std::ranges::begin(points);
   for_each_index(policy, count, 4096, [&](std::size_t i) {
-    const auto p = coordinates<double>(first[static_cast<std::ranges::range_difference_t<const Points>>(i)]);
+    const auto p = coordinates<double>(detail::point_at(points, i));
     const vec3 position{p[0], p[1], p[2]};
     if (!position.allFinite()) return;
     float range = unknown;

@@ -13,6 +13,7 @@
 #include <span>
 #include <vector>
 
+#include <orbis/cloud/decision.hpp>
 #include <orbis/cloud/voxel_hash.hpp>
 #include <orbis/core/image.hpp>
 #include <orbis/core/point.hpp>
@@ -158,10 +159,9 @@ template <point_range Points, voxel_choice Choice>
 [[nodiscard]] point_cloud voxel_grid(const Points& points, std::span<const rgb8> colors,
                                      const voxel_grid_options& options, const Choice& choice) {
   assert(colors.empty() || colors.size() == std::ranges::size(points));
-  const auto first = std::ranges::begin(points);
   point_cloud out;
   for (const std::uint32_t i : voxel_grid_indices(points, options, choice)) {
-    const auto p = coordinates<float>(first[static_cast<std::ranges::range_difference_t<const Points>>(i)]);
+    const auto p = coordinates<float>(detail::point_at(points, i));
     out.points.emplace_back(p[0], p[1], p[2]);
     if (!colors.empty()) out.colors.push_back(colors[i]);
   }
