@@ -4,10 +4,13 @@
 #pragma once
 
 #include <orbis/core/associate.hpp>
+#include <orbis/core/crc32c.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/file.hpp>
 #include <orbis/core/image.hpp>
 #include <orbis/core/interpolate.hpp>
+#include <orbis/core/jacobi.hpp>
+#include <orbis/core/lanes.hpp>
 #include <orbis/core/point.hpp>
 #include <orbis/core/point_cloud.hpp>
 #include <orbis/core/progress.hpp>

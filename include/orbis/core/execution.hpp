@@ -44,18 +44,14 @@ concept execution_policy = requires(const std::remove_cvref_t<P>& p) {
   { p.threads() } -> std::convertible_to<unsigned>;
 };
 
-/// Calls `body(begin, end)` on the consecutive chunks `[i * grain, min((i + 1) * grain, count))` of
-/// `[0, count)`, on the policy's threads, in no particular order. An exception thrown by `body`
-/// stops the handing out of chunks and is rethrown on the calling thread. Where the system gives
-/// fewer threads than the policy asks for, those do all of the work.
-/// @pre grain > 0
-template <execution_policy Policy, std::invocable<std::size_t, std::size_t> Body>
-void for_each_chunk(const Policy& policy, std::size_t count, std::size_t grain, Body&& body) {
-  const std::size_t chunks = count / grain + (count % grain != 0 ? 1 : 0);
-  const auto run = [&](std::size_t chunk) { body(chunk * grain, std::min(count, (chunk + 1) * grain)); };
-  const std::size_t workers = std::min<std::size_t>(policy.threads(), chunks);
+namespace detail {
+
+/// Calls `run(context, i)` for every i in [0, count), on the calling thread and `workers - 1` others. A function and
+/// not a template, so that not every loop of a program brings the handling of threads with it.
+inline void hand_out(std::size_t count, std::size_t workers, void (*run)(const void*, std::size_t),
+                     const void* context) {
   if (workers <= 1) {
-    for (std::size_t chunk = 0; chunk != chunks; ++chunk) run(chunk);
+    for (std::size_t i = 0; i != count; ++i) run(context, i);
     return;
   }
 
@@ -64,9 +60,9 @@ void for_each_chunk(const Policy& policy, std::size_t count, std::size_t grain, 
   std::mutex failure_guard;
   const auto work = [&] {
     try {
-      for (std::size_t chunk; (chunk = next.fetch_add(1, std::memory_order_relaxed)) < chunks;) run(chunk);
+      for (std::size_t i; (i = next.fetch_add(1, std::memory_order_relaxed)) < count;) run(context, i);
     } catch (...) {
-      next.store(chunks, std::memory_order_relaxed);
+      next.store(count, std::memory_order_relaxed);
       const std::lock_guard lock{failure_guard};
       if (!failure) failure = std::current_exception();
     }
@@ -82,6 +78,27 @@ void for_each_chunk(const Policy& policy, std::size_t count, std::size_t grain, 
     work();
   }
   if (failure) std::rethrow_exception(failure);
+}
+
+}  // namespace detail
+
+/// Calls `body(begin, end)` on the consecutive chunks `[i * grain, min((i + 1) * grain, count))` of
+/// `[0, count)`, on the policy's threads, in no particular order. An exception thrown by `body`
+/// stops the handing out of chunks and is rethrown on the calling thread. Where the system gives
+/// fewer threads than the policy asks for, those do all of the work.
+/// @pre grain > 0
+template <execution_policy Policy, std::invocable<std::size_t, std::size_t> Body>
+void for_each_chunk(const Policy& policy, std::size_t count, std::size_t grain, Body&& body) {
+  const std::size_t chunks = count / grain + (count % grain != 0 ? 1 : 0);
+  const auto run = [&](std::size_t chunk) { body(chunk * grain, std::min(count, (chunk + 1) * grain)); };
+  if constexpr (std::is_same_v<Policy, sequential_policy>) {
+    for (std::size_t chunk = 0; chunk != chunks; ++chunk) run(chunk);
+  } else {
+    const auto run_one = [](const void* context, std::size_t chunk) {
+      (*static_cast<const decltype(run)*>(context))(chunk);
+    };
+    detail::hand_out(chunks, std::min<std::size_t>(policy.threads(), chunks), run_one, &run);
+  }
 }
 
 /// Calls `body(i)` for every `i` in `[0, count)`.

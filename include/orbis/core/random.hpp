@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <utility>
 
 namespace orbis {
 
@@ -62,5 +63,13 @@ class random_bits {
  private:
   std::uint64_t state_;
 };
+
+/// Puts the entries of `list` (of fewer than 2^32) in any order, all orders as likely. Source: R. Durstenfeld,
+/// "Algorithm 235: random permutation", CACM 7(7), 1964.
+template <class List>
+constexpr void shuffle(List& list, random_bits& random) noexcept {
+  for (std::size_t i = list.size(); i > 1; --i)
+    std::swap(list[i - 1], list[random.below(static_cast<std::uint32_t>(i))]);
+}
 
 }  // namespace orbis

@@ -6,8 +6,8 @@
 #include <limits>
 
 #include <Eigen/LU>
-#include <Eigen/SVD>
 
+#include <orbis/core/jacobi.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/core/so3.hpp>
 #include <orbis/core/types.hpp>
@@ -26,8 +26,8 @@ namespace orbis {
   if (determinant < 0.0) return fail(errc::degenerate, "rotation matrix", "mirrors: its determinant is negative");
   if (!(determinant > 16.0 * std::numeric_limits<double>::epsilon()))
     return fail(errc::degenerate, "rotation matrix", "is singular");
-  const Eigen::JacobiSVD<mat3> svd{m / size, Eigen::ComputeFullU | Eigen::ComputeFullV};
-  return so3{mat3(svd.matrixU() * svd.matrixV().transpose())};
+  const auto [u, values, v] = singular_values_of<3>(m);
+  return so3{mat3(u * v.transpose())};
 }
 
 }  // namespace orbis

@@ -46,6 +46,12 @@ class basic_so3 {
   /// From a quaternion of any positive norm; normalises it.
   explicit basic_so3(const Eigen::Quaternion<S>& q) : q_{q.normalized()} {}
   explicit basic_so3(const quaternion& q) : q_{q.normalized()} {}
+  /// From a quaternion that is of unit norm already, up to rounding: bit for bit, as `unit_quaternion()` gave it.
+  [[nodiscard]] static basic_so3 from_unit_quaternion(const quaternion& q) {
+    basic_so3 r;
+    r.q_ = q;
+    return r;
+  }
   /// From a matrix that is a rotation up to rounding. For matrices that are further off use
   /// `nearest_rotation`.
   explicit basic_so3(const matrix<3, 3, S>& r) : q_{quaternion(r).normalized()} {}

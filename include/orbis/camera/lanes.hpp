@@ -1,0 +1,195 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Projection of eight points at a time.
+///
+/// `lanes_of<Camera>` says how. It exists for every camera model; for those without a specialisation,
+/// a user's own, it calls `project` eight times.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <limits>
+
+#include <orbis/camera/kannala_brandt.hpp>
+#include <orbis/camera/model.hpp>
+#include <orbis/camera/pinhole.hpp>
+#include <orbis/camera/radial_tangential.hpp>
+#include <orbis/core/lanes.hpp>
+
+namespace orbis::camera {
+
+/// Pixels of eight points and their derivatives by the point, `j[row][column]`; of no meaning where not
+/// `valid`.
+template <simd::lane_vector L>
+struct lane_projection {
+  L u, v;
+  typename L::mask valid;
+  L j[2][3];
+};
+
+namespace detail {
+
+/// Values of the lanes one after the other.
+using lane_array = std::array<double, simd::lane_count>;
+
+struct projected_lanes {
+  lane_array u, v, valid;
+  std::array<lane_array, 6> j;
+};
+
+/// Kept out of the kernels, which are compiled for instruction sets that might round it otherwise.
+template <camera_model Camera>
+[[gnu::noinline]] void project_each(const Camera& camera, const lane_array& x, const lane_array& y, const lane_array& z,
+                                    bool with_jacobian, projected_lanes& out) {
+  matrix<2, 3> j = matrix<2, 3>::Zero();
+  for (std::size_t i = 0; i != x.size(); ++i) {
+    const vec3 p(x[i], y[i], z[i]);
+    const auto pixel = with_jacobian ? camera.project(p, j) : camera.project(p);
+    out.valid[i] = pixel ? 1.0 : 0.0;
+    out.u[i] = pixel ? pixel->x() : 0.0;
+    out.v[i] = pixel ? pixel->y() : 0.0;
+    for (std::size_t k = 0; k != 6; ++k)
+      out.j[k][i] = pixel ? j(static_cast<Eigen::Index>(k / 3), static_cast<Eigen::Index>(k % 3)) : 0.0;
+  }
+}
+
+/// Whether all of a pixel is finite.
+template <simd::lane_vector L>
+[[nodiscard]] ORBIS_ALWAYS_INLINE typename L::mask is_finite(const L& u, const L& v) {
+  constexpr double most = std::numeric_limits<double>::max();
+  return (u <= L(most)) & (L(-most) <= u) & (v <= L(most)) & (L(-most) <= v);
+}
+
+/// The angle of (z, r), for z > 0 and r >= 0, not both near the ends of the range of double: halved
+/// three times, then by its power series.
+template <simd::lane_vector L>
+[[nodiscard]] ORBIS_ALWAYS_INLINE L angle_off_axis(const L& r, const L& z) {
+  L t = r / (z + simd::square_root(r * r + z * z));  // tan(angle / 2), at most 1
+  for (int halving = 0; halving != 2; ++halving) t = t / (1.0 + simd::square_root(1.0 + t * t));
+  const L s = t * t;  // below 0.04
+  L series(1.0 / 23.0);
+  for (int n = 21; n > 0; n -= 2) series = 1.0 / n - s * series;
+  return 8.0 * t * series;
+}
+
+}  // namespace detail
+
+/// `project<Jacobian>(camera, x, y, z, out)`: what `camera.project` says of eight points in the camera
+/// frame, up to rounding; derivatives only with `Jacobian`. Where `axis_aligned`, u does not depend on y
+/// nor v on x.
+template <camera_model Camera>
+struct lanes_of {
+  static constexpr bool axis_aligned = false;
+
+  template <bool Jacobian, simd::lane_vector L>
+  static ORBIS_ALWAYS_INLINE void project(const Camera& camera, const L& x, const L& y, const L& z,
+                                          lane_projection<L>& out) {
+    detail::lane_array px, py, pz;
+    x.store(px.data()), y.store(py.data()), z.store(pz.data());
+    detail::projected_lanes p;
+    detail::project_each(camera, px, py, pz, Jacobian, p);
+    out.u = L::load(p.u.data());
+    out.v = L::load(p.v.data());
+    out.valid = (L(0.0) < L::load(p.valid.data())) & detail::is_finite(out.u, out.v);
+    if constexpr (Jacobian)
+      for (std::size_t k = 0; k != 6; ++k) out.j[k / 3][k % 3] = L::load(p.j[k].data());
+  }
+};
+
+template <>
+struct lanes_of<pinhole> {
+  static constexpr bool axis_aligned = true;
+
+  template <bool Jacobian, simd::lane_vector L>
+  static ORBIS_ALWAYS_INLINE void project(const pinhole& camera, const L& x, const L& y, const L& z,
+                                          lane_projection<L>& out) {
+    const intrinsics& k = camera.k();
+    const L inverse = 1.0 / z, a = k.fx * inverse, b = k.fy * inverse;
+    const L du = a * x, dv = b * y;
+    out.u = du + k.cx;
+    out.v = dv + k.cy;
+    out.valid = (L(0.0) < z) & detail::is_finite(out.u, out.v);
+    if constexpr (Jacobian) {
+      out.j[0][0] = a;
+      out.j[0][1] = 0.0;
+      out.j[0][2] = L(0.0) - du * inverse;
+      out.j[1][0] = 0.0;
+      out.j[1][1] = b;
+      out.j[1][2] = L(0.0) - dv * inverse;
+    }
+  }
+};
+
+template <>
+struct lanes_of<radial_tangential> {
+  static constexpr bool axis_aligned = false;
+
+  template <bool Jacobian, simd::lane_vector L>
+  static ORBIS_ALWAYS_INLINE void project(const radial_tangential& camera, const L& px, const L& py, const L& z,
+                                          lane_projection<L>& out) {
+    const intrinsics& k = camera.k();
+    const radial_tangential::coefficients& d = camera.distortion();
+    const L inverse = 1.0 / z, x = px * inverse, y = py * inverse;
+    const L xx = x * x, yy = y * y, xy = x * y, s = xx + yy;
+    const L numerator = 1.0 + s * (d.k1 + s * (d.k2 + s * d.k3));
+    const L reciprocal = 1.0 / (1.0 + s * (d.k4 + s * (d.k5 + s * d.k6)));
+    const L g = numerator * reciprocal;
+    const double p1 = d.p1, p2 = d.p2;
+    out.u = k.cx + k.fx * (g * x + 2.0 * p1 * xy + p2 * (s + 2.0 * xx));
+    out.v = k.cy + k.fy * (g * y + p1 * (s + 2.0 * yy) + 2.0 * p2 * xy);
+    out.valid = (L(0.0) < z) & (s < L(camera.max_squared_radius())) & detail::is_finite(out.u, out.v);
+    if constexpr (Jacobian) {
+      const L dn = d.k1 + s * (2.0 * d.k2 + s * (3.0 * d.k3));
+      const L dq = d.k4 + s * (2.0 * d.k5 + s * (3.0 * d.k6));
+      const L dg = 2.0 * ((dn - g * dq) * reciprocal);
+      const L mixed = dg * xy + 2.0 * p1 * x + 2.0 * p2 * y;
+      const L a = k.fx * inverse, b = k.fy * inverse;
+      out.j[0][0] = a * (g + dg * xx + 2.0 * p1 * y + 6.0 * p2 * x);
+      out.j[0][1] = a * mixed;
+      out.j[0][2] = L(0.0) - (out.j[0][0] * x + out.j[0][1] * y);
+      out.j[1][0] = b * mixed;
+      out.j[1][1] = b * (g + dg * yy + 6.0 * p1 * y + 2.0 * p2 * x);
+      out.j[1][2] = L(0.0) - (out.j[1][0] * x + out.j[1][1] * y);
+    }
+  }
+};
+
+template <>
+struct lanes_of<kannala_brandt> {
+  static constexpr bool axis_aligned = false;
+
+  template <bool Jacobian, simd::lane_vector L>
+  static ORBIS_ALWAYS_INLINE void project(const kannala_brandt& camera, const L& x, const L& y, const L& z,
+                                          lane_projection<L>& out) {
+    const intrinsics& k = camera.k();
+    const kannala_brandt::coefficients& d = camera.distortion();
+    const L rr = x * x + y * y, zz = z * z;
+    const auto on_axis = rr <= 1e-18 * zz;  // a pinhole there
+    const L root = simd::reciprocal_root(select(on_axis, L(1.0), rr));
+    const L r = select(on_axis, L(0.0), rr * root);
+    const L theta = detail::angle_off_axis(r, z), s = theta * theta;
+    const L inverse_z = 1.0 / z;
+    const L distorted = theta * (1.0 + s * (d.k1 + s * (d.k2 + s * (d.k3 + s * d.k4))));
+    const L scale = select(on_axis, inverse_z, distorted * root);
+    out.u = k.fx * (scale * x) + k.cx;
+    out.v = k.fy * (scale * y) + k.cy;
+    out.valid = (L(0.0) < z) & (theta < L(camera.max_angle())) & detail::is_finite(out.u, out.v);
+    if constexpr (Jacobian) {
+      const L slope = 1.0 + s * (3.0 * d.k1 + s * (5.0 * d.k2 + s * (7.0 * d.k3 + s * (9.0 * d.k4))));
+      const L per_norm = slope / (rr + zz);
+      const L along = select(on_axis, inverse_z, per_norm * z);  // d theta_d / d r
+      const L by_z = select(on_axis, L(0.0) - inverse_z * inverse_z, L(0.0) - per_norm);
+      const L c = select(on_axis, L(0.0), x * root), t = select(on_axis, L(0.0), y * root);
+      const L across = (along - scale) * c;
+      // Along the radius `along`, across it `scale`: their difference times the direction's square.
+      out.j[0][0] = k.fx * (scale + across * c);
+      out.j[0][1] = k.fx * (across * t);
+      out.j[0][2] = k.fx * (by_z * x);
+      out.j[1][0] = k.fy * (across * t);
+      out.j[1][1] = k.fy * (scale + (along - scale) * t * t);
+      out.j[1][2] = k.fy * (by_z * y);
+    }
+  }
+};
+
+}  // namespace orbis::camera
