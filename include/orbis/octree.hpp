@@ -12,7 +12,6 @@
 #include <orbis/octree/compact_tree.hpp>
 #include <orbis/octree/constexpr_log.hpp>
 #include <orbis/octree/cow_pages.hpp>
-#include <orbis/octree/crc32c.hpp>
 #include <orbis/octree/decay.hpp>
 #include <orbis/octree/depth_crossing.hpp>
 #include <orbis/octree/depth_ends.hpp>

@@ -1,2 +1,2 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "optimize/allocations.cpp"  // counts for this executable
+#include "support/count_allocations.hpp"  // counts for this executable

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <span>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include <orbis/core/random.hpp>
@@ -167,4 +168,32 @@ TEST_CASE("distances of 0 and 256 come out of every SIMD level") {
   many_q[7] = ones;
   many_t[299] = zeros;
   CHECK(run([&](auto... spans) { hamming_nearest(level, spans...); }, many_q, many_t, true) == naive(many_q, many_t));
+}
+
+TEST_CASE("descriptors of other lengths have the neighbours of the definition, at every level") {
+  const simd::level level =
+      GENERATE(simd::level::portable, simd::level::popcnt, simd::level::avx2, simd::level::avx512);
+  const auto check = [&]<std::size_t Bits>(std::integral_constant<std::size_t, Bits>) {
+    using other = binary_descriptor<Bits>;
+    random_bits random{Bits};
+    std::vector<other> q(33), t(129);
+    for (auto* all : {&q, &t})
+      for (other& d : *all)
+        for (std::uint64_t& word : d.words) word = random() & random() & random();
+    std::vector<nearest_two> nearest(q.size()), expected(q.size());
+    std::vector<std::uint32_t> reverse(t.size()), expected_reverse(t.size()), distances;
+    hamming_nearest<Bits>(level, q, t, nearest, reverse);
+    nearest_by(hamming{}, std::span<const other>{q}, std::span<const other>{t}, std::span{expected},
+               std::span{expected_reverse}, distances);
+    CHECK(nearest == expected);
+    CHECK(reverse == expected_reverse);
+    std::vector<neighbor> found(5 * q.size()), wanted(5 * q.size());
+    hamming_workspace memory;
+    hamming_k_nearest<Bits>(level, q, t, 5, found, memory);
+    k_nearest_by(hamming{}, std::span<const other>{q}, std::span<const other>{t}, 5, std::span{wanted});
+    CHECK(found == wanted);
+  };
+  check(std::integral_constant<std::size_t, 64>{});
+  check(std::integral_constant<std::size_t, 128>{});
+  check(std::integral_constant<std::size_t, 512>{});
 }

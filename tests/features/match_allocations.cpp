@@ -16,7 +16,7 @@
 #include <orbis/features/windowed.hpp>
 
 #include "features/sources.hpp"
-#include "optimize/allocations.hpp"
+#include "support/allocations.hpp"
 #include "support/catch.hpp"
 
 using namespace orbis;

@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <concepts>
 #include <cstdint>
 #include <cstdlib>
-#include <new>
 #include <numbers>
 #include <thread>
 #include <tuple>
@@ -19,6 +17,7 @@
 
 #include "features/images.hpp"
 #include "features/repeatability.hpp"
+#include "support/allocations.hpp"
 #include "support/catch.hpp"
 #include "support/data.hpp"
 
@@ -28,25 +27,9 @@ using test::blocks, test::moved;
 
 namespace {
 
-std::atomic<std::size_t> allocations{0};
-
 constexpr auto matcher = brute_force(hamming{}) | ratio_test{0.8f} | cross_check{} | max_distance{64};
 
 }  // namespace
-
-// What every form of `new` and `delete` comes to; counted for one test below. Not inlined, or g++ takes the
-// pair for a mismatch.
-[[gnu::noinline]] void* operator new(std::size_t size) {
-  allocations.fetch_add(1, std::memory_order_relaxed);
-  if (void* p = std::malloc(size)) return p;
-  throw std::bad_alloc{};
-}
-[[gnu::noinline]] void* operator new(std::size_t size, const std::nothrow_t&) noexcept {
-  ++allocations;
-  return std::malloc(size);
-}
-[[gnu::noinline]] void operator delete(void* p) noexcept { std::free(p); }
-[[gnu::noinline]] void operator delete(void* p, std::size_t) noexcept { std::free(p); }
 
 TEST_CASE("ORB features are well-formed and the same on every run") {
   const auto im = blocks(320, 240, 1);
@@ -79,6 +62,27 @@ TEST_CASE("images without room or texture have no ORB features") {
   for (const int count : {7, 100, 333})
     CHECK(orb_extractor{{.max_features = count}}(blocks(320, 240, 1)).size() == static_cast<std::size_t>(count));
   CHECK(orb_extractor{{.max_features = 1}}(blocks(320, 240, 1)).size() == 1);
+}
+
+TEST_CASE("any number of levels and any factor between them give features inside the image, at every level") {
+  for (const auto& [width, height] : {std::pair{39, 39}, {40, 200}, {65, 47}, {150, 101}}) {
+    const auto im = test::noise(width, height, 12);
+    const test::embedded_image embedded{im};
+    for (const float factor : {1.0001F, 1.01F, 1.2F, 2.0F, 3.0F})
+      for (const int levels : {1, 2, 16})
+        for (const int most : {1, 60}) {
+          const auto found = [&](simd::level level) {
+            return orb_extractor{{.max_features = most, .levels = levels, .scale_factor = factor, .simd = level}}(
+                embedded.view());
+          };
+          const auto f = found(simd::level::portable);
+          CHECK(f.size() <= static_cast<std::size_t>(most));
+          for (const keypoint& k : f.keypoints)
+            CHECK((k.x > 15.0F && k.y > 15.0F && k.x < static_cast<float>(width) - 16.0F &&
+                   k.y < static_cast<float>(height) - 16.0F && k.octave < levels));
+          for (const auto level : test::simd_levels) CHECK(found(level) == f);
+        }
+  }
 }
 
 TEST_CASE("a strided view and a colour image have the features of the grey copy") {
@@ -200,10 +204,10 @@ TEST_CASE("from the second image of its kind on, extraction allocates nothing") 
   const orb_extractor extract;
   orbis::features::features f, expected = extract(im);
   extract.into(f, color, mask, regions);
-  const std::size_t before = allocations.load();
+  const std::size_t before = test::allocations();
   extract.into(f, im);
   extract.into(f, color, mask, regions);
-  CHECK(allocations.load() == before);
+  if (test::counts_allocations()) CHECK(test::allocations() == before);
   CHECK(f == expected);
 }
 

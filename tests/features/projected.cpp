@@ -37,13 +37,13 @@ struct landmark {
 
 }  // namespace
 
-TEST_CASE("the predicted level is that of the ratio of distances") {
+TEST_CASE("the predicted level is that of the ratio of distances, rounded up") {
   for (int level = 0; level != 8; ++level) {
     const float far = 4.0F;
     const float at = far / std::pow(1.2F, static_cast<float>(level));
-    CHECK(predicted_octave(at, far, 8, 1.2F) == level);
-    CHECK(predicted_octave(at * 1.08F, far, 8, 1.2F) == level);
-    CHECK(predicted_octave(at * 0.93F, far, 8, 1.2F) == level);
+    CHECK(predicted_octave(at * 1.01F, far, 8, 1.2F) == level);
+    CHECK(predicted_octave(at * 1.19F, far, 8, 1.2F) == level);
+    CHECK(predicted_octave(at * 0.99F, far, 8, 1.2F) == std::min(level + 1, 7));
   }
   CHECK(predicted_octave(1e-9F, 4.0F, 8, 1.2F) == 7);
   CHECK(predicted_octave(100.0F, 4.0F, 8, 1.2F) == 0);
@@ -51,7 +51,7 @@ TEST_CASE("the predicted level is that of the ratio of distances") {
 
 TEST_CASE("a window grows with the level and the angle, and there is none out of range") {
   const projection_rule rule{};
-  const projection p{100.0F, 50.0F, 2.0F, 1.0F, 1.0F, 2.0F * 1.2F * 1.2F};
+  const projection p{100.0F, 50.0F, 2.1F, 1.0F, 1.0F, 2.0F * 1.2F * 1.2F};
   const window w = window_of(p, rule);
   CHECK(w.x == 100.0F);
   CHECK(w.y == 50.0F);
@@ -97,7 +97,7 @@ TEST_CASE("projected matching equals a search through all trains with every rule
     if (i % 7 == 0 || p.cosine < 0.5F || p.distance < 0.8F * p.min_distance || p.distance > 1.2F * p.max_distance)
       return false;
     const double octave =
-        std::clamp(std::round(std::log(double{p.max_distance} / double{p.distance}) / std::log(1.2)), 0.0, 7.0);
+        std::clamp(std::ceil(std::log(double{p.max_distance} / double{p.distance}) / std::log(1.2)), 0.0, 7.0);
     const double radius = 25.0 * std::pow(1.2, octave) * (p.cosine < 0.998F ? 1.6 : 1.0);
     const keypoint& k = t.keypoints[j];
     return std::hypot(double{k.x} - double{p.x}, double{k.y} - double{p.y}) <= radius && k.octave >= octave - 2 &&

@@ -2,19 +2,15 @@
 #include "features/repeatability.hpp"
 
 #include <cstdint>
-#include <cstring>
 #include <filesystem>
 #include <vector>
 
-#include <opencv2/core.hpp>
-#include <opencv2/features2d.hpp>
-
 #include <orbis/features/grey.hpp>
 #include <orbis/features/orb.hpp>
-#include <orbis/interop/opencv.hpp>
 #include <orbis/io/image.hpp>
 
 #include "features/images.hpp"
+#include "features/opencv_orb.hpp"
 #include "support/catch.hpp"
 #include "support/data.hpp"
 
@@ -22,18 +18,6 @@ using namespace orbis;
 using namespace orbis::features;
 
 namespace {
-
-orbis::features::features opencv(const image<std::uint8_t>& im) {
-  std::vector<cv::KeyPoint> keypoints;
-  cv::Mat rows;
-  cv::ORB::create(1000, 1.2F, 8)->detectAndCompute(interop::mat_over(im.view()), {}, keypoints, rows);
-  orbis::features::features f;
-  f.keypoints = interop::from_cv(keypoints);
-  f.descriptors.resize(keypoints.size());
-  for (std::size_t i = 0; i != keypoints.size(); ++i)
-    std::memcpy(f.descriptors[i].words.data(), rows.ptr(static_cast<int>(i)), sizeof f.descriptors[i]);
-  return f;
-}
 
 /// As many features as OpenCV's ORB finds in the image.
 orbis::features::features ours(const image<std::uint8_t>& im, std::size_t count) {
@@ -50,7 +34,7 @@ std::pair<result, result> means(const std::vector<image<std::uint8_t>>& images) 
   std::pair<result, result> mean;
   for (const auto& im : images) {
     const auto changes = test::changes_of(im);
-    const auto theirs = opencv(im), own = ours(im, theirs.size());
+    const auto theirs = test::found_by_opencv(im), own = ours(im, theirs.size());
     const auto add = [&](result& to, const auto& f, const auto& g, const test::changed_image& c) {
       const auto n = static_cast<double>(images.size() * changes.size());
       const test::found_again again = test::compared(f, g, c.map, im.width(), im.height());
@@ -59,7 +43,7 @@ std::pair<result, result> means(const std::vector<image<std::uint8_t>>& images) 
       to.coverage += test::coverage(f, im.width(), im.height()) / n;
     };
     for (const auto& c : changes) {
-      const auto theirs_there = opencv(c.pixels);
+      const auto theirs_there = test::found_by_opencv(c.pixels);
       add(mean.first, own, ours(c.pixels, theirs_there.size()), c);
       add(mean.second, theirs, theirs_there, c);
     }

@@ -154,3 +154,10 @@ TEST_CASE("levels share by the sides of their images, and what one cannot give t
   CHECK(fill(1, 2, 3) == std::vector<int>{1, 2, 3});
   CHECK(fill(0, 0, 0) == std::vector<int>{0, 0, 0});
 }
+
+TEST_CASE("cells are no smaller than a pixel and no larger than the area") {
+  const region area{0, 0, 100, 80};
+  const auto corners = random_corners(500, area, 5);
+  for (const double per_cell : {1e-9, 1e-3, 1e3, 1e9})
+    CHECK(chosen(even_cells{.per_cell = per_cell}, corners, 50, area).size() == 50);
+}

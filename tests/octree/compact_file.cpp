@@ -57,7 +57,7 @@ void check_equal(const Map& a, const Map& b) {
 }
 [[nodiscard]] std::string resealed(std::string file, const char* tag) {
   const std::size_t content = section(file, tag), size = static_cast<std::size_t>(length_of(file, content));
-  const std::uint32_t sum = crc32c(std::string_view{file}.substr(content - 12, 12 + size));
+  const std::uint32_t sum = orbis::crc32c(std::as_bytes(std::span{file}).subspan(content - 12, 12 + size));
   for (std::size_t i = 0; i != 4; ++i) file[content + size + i] = static_cast<char>(sum >> (8 * i) & 0xffU);
   return file;
 }

@@ -91,7 +91,10 @@ using filter_chain = std::vector<filter_step>;
 [[nodiscard]] inline std::string to_string(const filter_chain& chain) {
   if (chain.empty()) return std::string{to_string(filter_mode::none)};
   std::string out;
-  for (const filter_step& step : chain) out += (out.empty() ? "" : "+") + std::string{to_string(mode_of(step))};
+  for (const filter_step& step : chain) {
+    if (!out.empty()) out += '+';
+    out += to_string(mode_of(step));
+  }
   return out;
 }
 

@@ -3,6 +3,7 @@
 /// The inner loops of `ray_evidence_kernels.hpp`, eight and sixteen points at a time.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>

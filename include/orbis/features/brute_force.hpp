@@ -44,7 +44,8 @@ struct brute_force_source {
     memory.nearest.resize(query_count);
     memory.reverse.resize(needs.reverse ? train_count : 0);
     if constexpr (std::same_as<Distance, hamming> && has_hamming_kernel<Descriptor>) {
-      hamming_nearest(level, queries.descriptors, trains.descriptors, memory.nearest, memory.reverse, memory.search);
+      hamming_nearest<Descriptor::bits>(level, queries.descriptors, trains.descriptors, memory.nearest, memory.reverse,
+                                        memory.search);
     } else {
       nearest_by(distance, queries.descriptors, trains.descriptors, std::span{memory.nearest},
                  std::span{memory.reverse}, memory.search.reverse_distance);

@@ -114,17 +114,19 @@ inline void fast_scores_portable(const std::uint8_t* centre, std::ptrdiff_t stri
 
 inline std::size_t fast_peaks_portable(const std::uint8_t* above, const std::uint8_t* row, const std::uint8_t* below,
                                        int count, bool ties, std::uint32_t* columns) {
+  const std::uint8_t lower = ties ? 1 : 0;
+  const bytes16 allowed = bytes16{} + lower;
   std::size_t found = 0;
-  for (int x = 0; x < count; x += 8) {
-    std::uint64_t eight = 0;
-    std::memcpy(&eight, row + x, sizeof eight);
-    if (eight == 0) continue;
-    for (int i = x; i != x + 8; ++i) {
-      const int s = row[i], least = ties ? s : s - 1;
-      if (s > 0 && s > row[i + 1] && s > below[i - 1] && s > below[i] && s > below[i + 1] && least >= row[i - 1] &&
-          least >= above[i - 1] && least >= above[i] && least >= above[i + 1])
-        columns[found++] = static_cast<std::uint32_t>(i);
-    }
+  for (int x = 0; x < count; x += 16) {
+    const bytes16 s = load16(row + x);
+    if (!any16(s)) continue;
+    const bytes16 before =
+        max16(max16(load16(above + x - 1), load16(above + x)), max16(load16(above + x + 1), load16(row + x - 1)));
+    const bytes16 after =
+        max16(max16(load16(below + x - 1), load16(below + x)), max16(load16(below + x + 1), load16(row + x + 1)));
+    const bytes16 bound = max16(after, max16(before, allowed) - allowed);  // s >= before: s > before - 1
+    std::uint32_t peaks = bits16(std::bit_cast<bytes16>(s > bound));
+    for (; peaks != 0; peaks &= peaks - 1) columns[found++] = static_cast<std::uint32_t>(x + std::countr_zero(peaks));
   }
   return found;
 }
@@ -186,10 +188,7 @@ inline std::size_t fast_peaks_avx2(const std::uint8_t* above, const std::uint8_t
                                    int count, bool ties, std::uint32_t* columns) {
   const auto load = [&](const std::uint8_t* p)
                         ORBIS_TARGET("avx2,bmi") { return _mm256_loadu_si256(reinterpret_cast<const __m256i*>(p)); };
-  // Zeros where a is larger than b by `least` or more.
-  const auto lacks = [&](__m256i a, __m256i b, __m256i least)
-                         ORBIS_TARGET("avx2,bmi") { return _mm256_subs_epu8(least, _mm256_subs_epu8(a, b)); };
-  const __m256i zero = _mm256_setzero_si256(), one = _mm256_set1_epi8(1);
+  const __m256i zero = _mm256_setzero_si256(), allowed = _mm256_set1_epi8(ties ? 1 : 0);
   std::size_t found = 0;
   for (int x = 0; x < count; x += 32) {
     const __m256i s = load(row + x);
@@ -198,9 +197,9 @@ inline std::size_t fast_peaks_avx2(const std::uint8_t* above, const std::uint8_t
                                            _mm256_max_epu8(load(above + x + 1), load(row + x - 1)));
     const __m256i after = _mm256_max_epu8(_mm256_max_epu8(load(below + x - 1), load(below + x)),
                                           _mm256_max_epu8(load(below + x + 1), load(row + x + 1)));
-    const __m256i smaller = ties ? _mm256_subs_epu8(before, s) : lacks(s, before, one);
-    const __m256i lacking = _mm256_or_si256(smaller, lacks(s, after, one));
-    auto peaks = static_cast<std::uint32_t>(_mm256_movemask_epi8(_mm256_cmpeq_epi8(lacking, zero)));
+    const __m256i bound = _mm256_max_epu8(after, _mm256_subs_epu8(before, allowed));
+    const __m256i larger = _mm256_subs_epu8(s, bound);
+    auto peaks = ~static_cast<std::uint32_t>(_mm256_movemask_epi8(_mm256_cmpeq_epi8(larger, zero)));
     for (; peaks != 0; peaks &= peaks - 1) columns[found++] = static_cast<std::uint32_t>(x + std::countr_zero(peaks));
   }
   return found;
@@ -209,14 +208,14 @@ inline std::size_t fast_peaks_avx2(const std::uint8_t* above, const std::uint8_t
 ORBIS_TARGET("avx2,avx512f,avx512bw,avx512vl")
 inline void fast_scores_avx512(const std::uint8_t* centre, std::ptrdiff_t stride, int count, std::uint8_t threshold,
                                std::uint8_t* scores) {
-#define ORBIS_TARGET_AVX512 ORBIS_TARGET("avx2,avx512f,avx512bw,avx512vl")
+#define ORBIS_FAST_AVX512 ORBIS_TARGET("avx2,avx512f,avx512bw,avx512vl")
   // g++ 12 warns of an uninitialised value in the variants without a mask.
-  const auto load = [&](const std::uint8_t* p) ORBIS_TARGET_AVX512 { return _mm512_loadu_si512(p); };
-  const auto min = [&](__m512i a, __m512i b) ORBIS_TARGET_AVX512 { return _mm512_maskz_min_epu8(~__mmask64{}, a, b); };
-  const auto max = [&](__m512i a, __m512i b) ORBIS_TARGET_AVX512 { return _mm512_maskz_max_epu8(~__mmask64{}, a, b); };
+  const auto load = [&](const std::uint8_t* p) ORBIS_FAST_AVX512 { return _mm512_loadu_si512(p); };
+  const auto min = [&](__m512i a, __m512i b) ORBIS_FAST_AVX512 { return _mm512_maskz_min_epu8(~__mmask64{}, a, b); };
+  const auto max = [&](__m512i a, __m512i b) ORBIS_FAST_AVX512 { return _mm512_maskz_max_epu8(~__mmask64{}, a, b); };
   const auto circle = circle_offsets(stride);
   const __m512i least = _mm512_set1_epi8(static_cast<char>(threshold));
-  const auto block = [&](int x) ORBIS_TARGET_AVX512 {
+  const auto block = [&](int x) ORBIS_FAST_AVX512 {
     const std::uint8_t* at = centre + x;
     const __m512i c = load(at);
     __m512i pair_max = _mm512_set1_epi8(-1), pair_min = _mm512_setzero_si512();
@@ -255,7 +254,7 @@ inline void fast_scores_avx512(const std::uint8_t* centre, std::ptrdiff_t stride
   if (count < 64) return fast_scores_avx2(centre, stride, count, threshold, scores);
   for (int x = 0; x <= count - 64; x += 64) block(x);
   if (count % 64 != 0) block(count - 64);
-#undef ORBIS_TARGET_AVX512
+#undef ORBIS_FAST_AVX512
 }
 #endif
 

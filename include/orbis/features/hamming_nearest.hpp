@@ -5,10 +5,11 @@
 
 #include <algorithm>
 #include <bit>
-#include <concepts>
+#include <cassert>
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <type_traits>
 #include <vector>
 
 #include <orbis/core/simd.hpp>
@@ -18,9 +19,16 @@
 
 namespace orbis::features {
 
-/// Descriptors that `hamming_nearest` knows.
+namespace detail {
+template <class T>
+inline constexpr bool is_binary_descriptor = false;
+template <std::size_t Bits>
+inline constexpr bool is_binary_descriptor<binary_descriptor<Bits>> = true;
+}  // namespace detail
+
+/// Descriptors that `hamming_nearest` knows. Those of 256 bits have kernels of their own.
 template <class Descriptor>
-concept has_hamming_kernel = std::same_as<Descriptor, binary_descriptor<256>>;
+concept has_hamming_kernel = detail::is_binary_descriptor<Descriptor>;
 
 /// Memory of `hamming_nearest`, which the next call uses again.
 struct hamming_workspace {
@@ -32,9 +40,11 @@ struct hamming_workspace {
 
 namespace detail {
 
-template <class Keep>
-using hamming_kernel = void(std::span<const binary_descriptor<256>>, std::span<const binary_descriptor<256>>, Keep&,
-                            std::span<std::uint32_t>, hamming_workspace&);
+template <std::size_t Bits>
+using descriptor_span = std::span<const binary_descriptor<Bits>>;
+template <std::size_t Bits, class Keep>
+using hamming_kernel = void(descriptor_span<Bits>, descriptor_span<Bits>, const Keep&, std::span<std::uint32_t>,
+                            hamming_workspace&);
 
 /// What a search found of each query so far, for any number of neighbours: rows of `k`, ascending.
 struct keep_k {
@@ -66,21 +76,23 @@ struct keep_two {
   }
 };
 
-template <class Ops>
-[[gnu::always_inline]] inline std::uint32_t hamming_by(const binary_descriptor<256>& a,
-                                                       const binary_descriptor<256>& b) noexcept {
-  return Ops::ones(a.words[0] ^ b.words[0]) + Ops::ones(a.words[1] ^ b.words[1]) + Ops::ones(a.words[2] ^ b.words[2]) +
-         Ops::ones(a.words[3] ^ b.words[3]);
+template <class Ops, std::size_t Bits>
+[[gnu::always_inline]] inline std::uint32_t hamming_by(const binary_descriptor<Bits>& a,
+                                                       const binary_descriptor<Bits>& b) noexcept {
+  std::uint32_t sum = 0;
+#pragma GCC unroll 8
+  for (std::size_t w = 0; w != Bits / 64; ++w) sum += Ops::ones(a.words[w] ^ b.words[w]);
+  return sum;
 }
 
 /// Pair by pair: for so few that slicing does not pay.
-template <class Ops, class Keep>
-[[gnu::always_inline]] inline void hamming_pairs(std::span<const binary_descriptor<256>> queries,
-                                                 std::span<const binary_descriptor<256>> trains, const Keep& keep,
-                                                 std::span<std::uint32_t> reverse, hamming_workspace& workspace) {
+template <class Ops, std::size_t Bits, class Keep>
+[[gnu::always_inline]] inline void hamming_pairs(descriptor_span<Bits> queries, descriptor_span<Bits> trains,
+                                                 const Keep& keep, std::span<std::uint32_t> reverse,
+                                                 hamming_workspace& workspace) {
   workspace.reverse_distance.assign(reverse.size(), no_neighbor);
   for (std::size_t q = 0; q != queries.size(); ++q) {
-    const binary_descriptor<256> query = queries[q];
+    const binary_descriptor<Bits> query = queries[q];
     std::uint32_t limit = keep.limit(q);
     for (std::size_t t = 0; t != trains.size(); ++t) {
       const std::uint32_t distance = hamming_by<Ops>(query, trains[t]);
@@ -106,9 +118,9 @@ template <std::size_t Words, class Visit>
 
 /// Block after block of trains, each against all queries while its table is in the first-level cache.
 template <class Ops, class Keep>
-[[gnu::always_inline]] inline void hamming_slices(std::span<const binary_descriptor<256>> queries,
-                                                  std::span<const binary_descriptor<256>> trains, const Keep& keep,
-                                                  std::span<std::uint32_t> reverse, hamming_workspace& workspace) {
+[[gnu::always_inline]] inline void hamming_slices(descriptor_span<256> queries, descriptor_span<256> trains,
+                                                  const Keep& keep, std::span<std::uint32_t> reverse,
+                                                  hamming_workspace& workspace) {
   constexpr std::size_t Words = Ops::words;
   auto& tables = [&]() -> auto& {
     if constexpr (Words == 4) {
@@ -131,10 +143,10 @@ template <class Ops, class Keep>
     for (slice<Words>& plane : least) plane.words.fill(~std::uint64_t{0});
     const std::size_t rank = std::min(keep.rank(), block.size());
     std::uint32_t guess = 0;
+    slice_distances<Words> distances;  // of the query at hand; here, as clearing them for each would cost a twelfth
+    slice<Words> below;
 
     for (std::size_t q = 0; q != queries.size(); ++q) {
-      slice_distances<Words> distances;
-      slice<Words> below;
       std::uint32_t limit = keep.limit(q);
       const bool first = limit == no_neighbor;
       slice_count<Ops>(table, workspace.queries[q], first ? guess : limit, distances, below);
@@ -163,62 +175,57 @@ template <class Ops, class Keep>
   }
 }
 
-template <class Ops, class Keep>
-[[gnu::always_inline]] inline void hamming_search(std::span<const binary_descriptor<256>> queries,
-                                                  std::span<const binary_descriptor<256>> trains, const Keep& keep,
-                                                  std::span<std::uint32_t> reverse, hamming_workspace& workspace) {
+template <class Ops, std::size_t Bits, class Keep>
+[[gnu::always_inline]] inline void hamming_search(descriptor_span<Bits> queries, descriptor_span<Bits> trains,
+                                                  const Keep& keep, std::span<std::uint32_t> reverse,
+                                                  hamming_workspace& workspace) {
   // A table costs about as much as a dozen queries save; a block costs the same however few trains it holds.
-  if (queries.size() < 16 || trains.size() < 64) {
-    hamming_pairs<Ops>(queries, trains, keep, reverse, workspace);
-  } else {
-    hamming_slices<Ops>(queries, trains, keep, reverse, workspace);
+  if constexpr (Bits == 256) {
+    if (queries.size() >= 16 && trains.size() >= 64)
+      return hamming_slices<Ops>(queries, trains, keep, reverse, workspace);
   }
+  hamming_pairs<Ops, Bits>(queries, trains, keep, reverse, workspace);
 }
 
-template <class Keep>
-void hamming_search_portable(std::span<const binary_descriptor<256>> queries,
-                             std::span<const binary_descriptor<256>> trains, Keep& keep,
+template <std::size_t Bits, class Keep>
+void hamming_search_portable(descriptor_span<Bits> queries, descriptor_span<Bits> trains, const Keep& keep,
                              std::span<std::uint32_t> reverse, hamming_workspace& workspace) {
-  hamming_search<slice_ops_portable>(queries, trains, keep, reverse, workspace);
+  hamming_search<slice_ops_portable, Bits>(queries, trains, keep, reverse, workspace);
 }
 #if ORBIS_X86
-template <class Keep>
+template <std::size_t Bits, class Keep>
 ORBIS_TARGET("popcnt")
-void hamming_search_popcnt(std::span<const binary_descriptor<256>> queries,
-                           std::span<const binary_descriptor<256>> trains, Keep& keep, std::span<std::uint32_t> reverse,
-                           hamming_workspace& workspace) {
-  hamming_search<slice_ops_popcnt>(queries, trains, keep, reverse, workspace);
+void hamming_search_popcnt(descriptor_span<Bits> queries, descriptor_span<Bits> trains, const Keep& keep,
+                           std::span<std::uint32_t> reverse, hamming_workspace& workspace) {
+  hamming_search<slice_ops_popcnt, Bits>(queries, trains, keep, reverse, workspace);
 }
-template <class Keep>
+template <std::size_t Bits, class Keep>
 ORBIS_TARGET("avx2,popcnt,bmi,bmi2")
-void hamming_search_avx2(std::span<const binary_descriptor<256>> queries,
-                         std::span<const binary_descriptor<256>> trains, Keep& keep, std::span<std::uint32_t> reverse,
-                         hamming_workspace& workspace) {
-  hamming_search<slice_ops_avx2>(queries, trains, keep, reverse, workspace);
+void hamming_search_avx2(descriptor_span<Bits> queries, descriptor_span<Bits> trains, const Keep& keep,
+                         std::span<std::uint32_t> reverse, hamming_workspace& workspace) {
+  hamming_search<slice_ops_avx2, Bits>(queries, trains, keep, reverse, workspace);
 }
-template <class Keep>
+template <std::size_t Bits, class Keep>
 ORBIS_TARGET("avx2,popcnt,bmi,bmi2,avx512f")
-void hamming_search_avx512(std::span<const binary_descriptor<256>> queries,
-                           std::span<const binary_descriptor<256>> trains, Keep& keep, std::span<std::uint32_t> reverse,
-                           hamming_workspace& workspace) {
-  hamming_search<slice_ops_avx512>(queries, trains, keep, reverse, workspace);
+void hamming_search_avx512(descriptor_span<Bits> queries, descriptor_span<Bits> trains, const Keep& keep,
+                           std::span<std::uint32_t> reverse, hamming_workspace& workspace) {
+  hamming_search<slice_ops_avx512, Bits>(queries, trains, keep, reverse, workspace);
 }
 #endif
 
-template <class Keep>
-void hamming_dispatch(simd::level level, std::span<const binary_descriptor<256>> queries,
-                      std::span<const binary_descriptor<256>> trains, Keep keep, std::span<std::uint32_t> reverse,
-                      hamming_workspace& workspace) {
+template <std::size_t Bits, class Keep>
+void hamming_dispatch(simd::level level, descriptor_span<Bits> queries, descriptor_span<Bits> trains, const Keep& keep,
+                      std::span<std::uint32_t> reverse, hamming_workspace& workspace) {
 #if ORBIS_X86
-  simd::select<hamming_kernel<Keep>>(level, {.portable = hamming_search_portable<Keep>,
-                                             .popcnt = hamming_search_popcnt<Keep>,
-                                             .avx2 = hamming_search_avx2<Keep>,
-                                             .avx512 = hamming_search_avx512<Keep>})(queries, trains, keep, reverse,
-                                                                                     workspace);
+  const auto search = simd::select<hamming_kernel<Bits, Keep>>(level, {.portable = hamming_search_portable<Bits, Keep>,
+                                                                       .popcnt = hamming_search_popcnt<Bits, Keep>,
+                                                                       .avx2 = hamming_search_avx2<Bits, Keep>,
+                                                                       .avx512 = hamming_search_avx512<Bits, Keep>});
 #else
   static_cast<void>(level);
-  hamming_search_portable<Keep>(queries, trains, keep, reverse, workspace);
+  const auto search = hamming_search_portable<Bits, Keep>;
 #endif
+  search(queries, trains, keep, reverse, workspace);
 }
 
 }  // namespace detail
@@ -227,28 +234,33 @@ void hamming_dispatch(simd::level level, std::span<const binary_descriptor<256>>
 /// query (the lowest on ties), in the same pass. Every level gives the same answer. O(queries x trains) time,
 /// O(queries + trains) memory, all of it in `workspace`.
 /// @pre nearest.size() == queries.size(); reverse is empty or of the size of trains
-inline void hamming_nearest(simd::level level, std::span<const binary_descriptor<256>> queries,
-                            std::span<const binary_descriptor<256>> trains, std::span<nearest_two> nearest,
-                            std::span<std::uint32_t> reverse, hamming_workspace& workspace) {
+template <std::size_t Bits = 256>
+void hamming_nearest(simd::level level, std::type_identity_t<detail::descriptor_span<Bits>> queries,
+                     std::type_identity_t<detail::descriptor_span<Bits>> trains, std::span<nearest_two> nearest,
+                     std::span<std::uint32_t> reverse, hamming_workspace& workspace) {
+  assert(nearest.size() == queries.size() && (reverse.empty() || reverse.size() == trains.size()));
   std::fill(nearest.begin(), nearest.end(), nearest_two{});
-  detail::hamming_dispatch(level, queries, trains, detail::keep_two{nearest.data()}, reverse, workspace);
+  detail::hamming_dispatch<Bits>(level, queries, trains, detail::keep_two{nearest.data()}, reverse, workspace);
 }
 /// The same, with memory of its own.
-inline void hamming_nearest(simd::level level, std::span<const binary_descriptor<256>> queries,
-                            std::span<const binary_descriptor<256>> trains, std::span<nearest_two> nearest,
-                            std::span<std::uint32_t> reverse) {
+template <std::size_t Bits = 256>
+void hamming_nearest(simd::level level, std::type_identity_t<detail::descriptor_span<Bits>> queries,
+                     std::type_identity_t<detail::descriptor_span<Bits>> trains, std::span<nearest_two> nearest,
+                     std::span<std::uint32_t> reverse) {
   hamming_workspace workspace;
-  hamming_nearest(level, queries, trains, nearest, reverse, workspace);
+  hamming_nearest<Bits>(level, queries, trains, nearest, reverse, workspace);
 }
 
 /// For each query its `k` nearest trains by ascending distance, then index: row `q` begins at `nearest[q * k]`,
 /// and what there are too few trains for is left at the default.
 /// @pre k > 0; nearest.size() == queries.size() * k
-inline void hamming_k_nearest(simd::level level, std::span<const binary_descriptor<256>> queries,
-                              std::span<const binary_descriptor<256>> trains, std::size_t k,
-                              std::span<neighbor> nearest, hamming_workspace& workspace) {
+template <std::size_t Bits = 256>
+void hamming_k_nearest(simd::level level, std::type_identity_t<detail::descriptor_span<Bits>> queries,
+                       std::type_identity_t<detail::descriptor_span<Bits>> trains, std::size_t k,
+                       std::span<neighbor> nearest, hamming_workspace& workspace) {
+  assert(k > 0 && nearest.size() == queries.size() * k);
   std::fill(nearest.begin(), nearest.end(), neighbor{});
-  detail::hamming_dispatch(level, queries, trains, detail::keep_k{nearest.data(), k}, {}, workspace);
+  detail::hamming_dispatch<Bits>(level, queries, trains, detail::keep_k{nearest.data(), k}, {}, workspace);
 }
 
 }  // namespace orbis::features

@@ -18,7 +18,7 @@ namespace orbis::features {
 
 /// Grid motion statistics: keeps a candidate if enough of those around it, in cells of a grid, go to
 /// the cells around where it goes. True matches have neighbours that move alike, false ones are
-/// alone: so many candidates survive without a strict ratio test. O(candidates + cells^2) in time.
+/// alone: so many candidates survive without a strict ratio test. O(candidates + cells^2) time, O(cells^4) memory.
 ///
 /// Of each cell of the query image the cell of the train image is judged that most of its candidates go
 /// to (the lowest on ties): the sum over the nine cells around both must exceed

@@ -23,12 +23,11 @@ struct neighbor {
   friend constexpr bool operator==(const neighbor&, const neighbor&) = default;
 };
 
-/// The nearest of a set, the lowest index on ties, and the distance of the second nearest; the
-/// largest number where there is none.
+/// The nearest of a set, the lowest index on ties, and the distance of the second nearest.
 struct nearest_two {
-  std::uint32_t index = std::numeric_limits<std::uint32_t>::max();
-  std::uint32_t distance = std::numeric_limits<std::uint32_t>::max();
-  std::uint32_t second_distance = std::numeric_limits<std::uint32_t>::max();
+  std::uint32_t index = no_neighbor;
+  std::uint32_t distance = no_neighbor;
+  std::uint32_t second_distance = no_neighbor;
   friend constexpr bool operator==(const nearest_two&, const nearest_two&) = default;
 };
 
@@ -39,6 +38,7 @@ template <class Distance, class Descriptor>
 void nearest_by(const Distance& distance, std::span<const Descriptor> queries, std::span<const Descriptor> trains,
                 std::span<nearest_two> nearest, std::span<std::uint32_t> reverse,
                 std::vector<std::uint32_t>& reverse_distance) {
+  assert(nearest.size() == queries.size() && (reverse.empty() || reverse.size() == trains.size()));
   reverse_distance.assign(reverse.size(), no_neighbor);
   const Descriptor* const train = trains.data();
   const std::size_t train_count = trains.size();

@@ -13,6 +13,7 @@
 
 #include <orbis/core/image.hpp>
 #include <orbis/core/simd.hpp>
+#include <orbis/features/lanes16.hpp>
 
 #if ORBIS_X86
 #include <immintrin.h>
@@ -58,17 +59,38 @@ struct image_moments {
 };
 using disc_moments = image_moments(const std::uint8_t* centre, std::ptrdiff_t stride);
 
+/// Which of the 32 pixels of a row from -15 to 16 lie in the disc, by distance of the row from its centre.
+inline constexpr auto disc_masks = [] {
+  std::array<std::array<std::uint8_t, 32>, disc_radius + 1> masks{};
+  for (std::size_t dy = 0; dy != masks.size(); ++dy)
+    for (int dx = -disc_half_width[dy]; dx <= disc_half_width[dy]; ++dx)
+      masks[dy][static_cast<std::size_t>(dx + disc_radius)] = 255;
+  return masks;
+}();
+
 inline image_moments disc_moments_portable(const std::uint8_t* centre, std::ptrdiff_t stride) {
   image_moments m;
-  for (int dy = -disc_radius; dy <= disc_radius; ++dy) {
-    const std::uint8_t* row = centre + dy * stride;
-    const int reach = disc_half_width[static_cast<std::size_t>(dy < 0 ? -dy : dy)];
-    int sum = 0;
-    for (int dx = -reach; dx <= reach; ++dx) {
-      sum += row[dx];
-      m.x += dx * row[dx];
+  for (int left = -disc_radius; left <= 1; left += 16) {
+    const auto pixels = [&](int dy) {
+      const auto& mask = disc_masks[static_cast<std::size_t>(dy < 0 ? -dy : dy)];
+      return load16(centre + dy * stride + left) & load16(mask.data() + left + disc_radius);
+    };
+    // Of each column the sum, and the sum of dy times brightness: at most 31 * 255 and 120 * 255, so that words do.
+    words8 sum_low = low_bytes(pixels(0)), sum_high = high_bytes(pixels(0)), y_low{}, y_high{};
+    for (int dy = 1; dy <= disc_radius; ++dy) {
+      const bytes16 above = pixels(-dy), below = pixels(dy);
+      const auto times = static_cast<std::uint16_t>(dy);
+      sum_low += low_bytes(below) + low_bytes(above);
+      sum_high += high_bytes(below) + high_bytes(above);
+      y_low += (low_bytes(below) - low_bytes(above)) * times;
+      y_high += (high_bytes(below) - high_bytes(above)) * times;
     }
-    m.y += dy * sum;
+    constexpr bytes16 order{0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
+    const words8 at_low = low_bytes(order), at_high = high_bytes(order);
+    for (std::size_t i = 0; i != 8; ++i) {
+      m.x += (left + at_low[i]) * sum_low[i] + (left + at_high[i]) * sum_high[i];
+      m.y += static_cast<std::int16_t>(y_low[i]) + static_cast<std::int16_t>(y_high[i]);
+    }
   }
   return m;
 }

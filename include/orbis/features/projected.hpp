@@ -42,12 +42,13 @@ struct projection_rule {
   int finer = 1, coarser = 1;     ///< levels to look at around the predicted one
 };
 
-/// The pyramid level at which a point appears that is at the finest from `max_distance`: the
-/// nearest to log(max_distance / distance) / log(scale_factor).
+/// The pyramid level at which to look for a point that is at the finest from `max_distance`:
+/// log(max_distance / distance) / log(scale_factor), rounded up, which tracks real recordings better than to the
+/// nearest.
 [[nodiscard]] inline int predicted_octave(float distance, float max_distance, int levels, float scale_factor) noexcept {
   assert(levels > 0 && scale_factor > 1.0F);
-  const double octave = std::round(std::log(static_cast<double>(max_distance) / static_cast<double>(distance)) /
-                                   std::log(static_cast<double>(scale_factor)));
+  const double octave = std::ceil(std::log(static_cast<double>(max_distance) / static_cast<double>(distance)) /
+                                  std::log(static_cast<double>(scale_factor)));
   return static_cast<int>(std::clamp(octave, 0.0, static_cast<double>(levels - 1)));
 }
 

@@ -5,11 +5,13 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cassert>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <utility>
 #include <vector>
 
 #include <orbis/core/image.hpp>
@@ -45,7 +47,6 @@ struct resize_tap {
 struct alignas(16) resize_group {
   std::array<std::uint8_t, 16> first;  ///< byte shuffle, each to the low half of a word
   std::array<std::uint8_t, 16> second;
-  std::array<std::uint16_t, 8> weight;
   std::int32_t base = 0;  ///< where the sixteen begin
 };
 
@@ -54,7 +55,9 @@ struct alignas(16) resize_group {
 /// How to get from one width to another; made once, used for any number of images.
 struct resize_plan {
   int from = 0, to = 0;  ///< widths
-  std::vector<detail::resize_tap> taps;
+  // Of each pixel of the result, up to a whole number of vectors: between `first` and the pixel after it.
+  std::vector<std::int32_t> first;
+  std::vector<std::uint16_t> weight;         ///< of the pixel after it, in 1/256
   std::vector<detail::resize_group> groups;  ///< empty if the step is too large for them
 };
 
@@ -76,31 +79,45 @@ inline void make_plan(resize_plan& plan, int from, int to) {
   if (plan.from == from && plan.to == to) return;
   plan.from = from;
   plan.to = to;
-  plan.taps.clear();
-  for (int i = 0; i != to; ++i) plan.taps.push_back(tap_at(i, from, to));
+  plan.first.clear();
+  plan.weight.clear();
   plan.groups.clear();
+  if (from < 2) return;
+  const int padded = (to + resize_lanes - 1) / resize_lanes * resize_lanes;
+  for (int i = 0; i != padded; ++i) {
+    const resize_tap t = tap_at(std::min(i, to - 1), from, to);
+    const bool last = t.first == from - 1;  // as one before it, with all the weight on the second
+    plan.first.push_back(last ? from - 2 : t.first);
+    plan.weight.push_back(last ? std::uint16_t{256} : t.weight);
+  }
   if (from < 16) return;
-  const int count = (to + resize_lanes - 1) / resize_lanes * 2;
-  for (int g = 0; g != count; ++g) {
+  for (std::size_t g = 0; g != plan.first.size(); g += 8) {
     resize_group group;
-    const auto tap = [&](int i) { return plan.taps[static_cast<std::size_t>(std::min(8 * g + i, to - 1))]; };
-    group.base = std::min(tap(0).first, from - 16);
-    if (tap(7).second - group.base > 15) return plan.groups.clear();
-    for (int i = 0; i != 8; ++i) {
-      const auto word = static_cast<std::size_t>(i);
-      group.first[2 * word] = static_cast<std::uint8_t>(tap(i).first - group.base);
-      group.second[2 * word] = static_cast<std::uint8_t>(tap(i).second - group.base);
-      group.first[2 * word + 1] = group.second[2 * word + 1] = 0x80;  // zero
-      group.weight[word] = tap(i).weight;
+    group.base = std::min(plan.first[g], from - 16);
+    if (plan.first[g + 7] + 1 - group.base > 15) return plan.groups.clear();
+    for (std::size_t i = 0; i != 8; ++i) {
+      const int at = plan.first[g + i] - group.base;
+      group.first[2 * i] = static_cast<std::uint8_t>(at);
+      group.second[2 * i] = static_cast<std::uint8_t>(at + 1);
+      group.first[2 * i + 1] = group.second[2 * i + 1] = 0x80;  // zero
     }
     plan.groups.push_back(group);
   }
 }
 
 inline void resize_along_portable(const resize_plan& plan, const std::uint8_t* from, std::uint16_t* to) {
-  for (std::size_t i = 0; i != plan.taps.size(); ++i) {
-    const resize_tap& t = plan.taps[i];
-    to[i] = static_cast<std::uint16_t>(from[t.first] * (256 - t.weight) + from[t.second] * t.weight);
+  if (plan.from == 1) return static_cast<void>(std::fill_n(to, plan.to, static_cast<std::uint16_t>(from[0] * 256)));
+  for (std::size_t x = 0; x != plan.first.size(); x += 8) {
+    words8 pairs;
+    for (std::size_t i = 0; i != 8; ++i) {
+      std::uint16_t pair;
+      std::memcpy(&pair, from + plan.first[x + i], sizeof pair);
+      pairs[i] = pair;
+    }
+    words8 first = pairs & 255, second = pairs >> 8;
+    if constexpr (std::endian::native == std::endian::big) std::swap(first, second);
+    // Modulo 2^16, in which the result fits: the difference may be negative.
+    store(to + x, (first << 8) + (second - first) * loaded<words8>(plan.weight.data() + x));
   }
 }
 
@@ -108,7 +125,7 @@ inline void resize_across_portable(const std::uint16_t* first, const std::uint16
                                    std::uint8_t* to) {
   const auto w1 = static_cast<std::uint16_t>(weight), w0 = static_cast<std::uint16_t>(256 - weight);
   for (int x = 0; x < count; x += 8) {
-    const words8 a = load8_words(first + x), b = load8_words(second + x);
+    const auto a = loaded<words8>(first + x), b = loaded<words8>(second + x);
     const words8 high = (a >> 8) * w0 + (b >> 8) * w1, low = (a & 255) * w0 + (b & 255) * w1;
     store8_narrowed(to + x, rounded_high(high, low));
   }
@@ -127,8 +144,8 @@ inline void resize_along_avx2(const resize_plan& plan, const std::uint8_t* from,
     const __m256i pixels = both(from + a.base, from + b.base);
     const __m256i first = _mm256_shuffle_epi8(pixels, both(a.first.data(), b.first.data()));
     const __m256i second = _mm256_shuffle_epi8(pixels, both(a.second.data(), b.second.data()));
-    // Modulo 2^16, in which the result fits: the difference may be negative.
-    const __m256i step = _mm256_mullo_epi16(_mm256_sub_epi16(second, first), both(a.weight.data(), b.weight.data()));
+    const __m256i weight = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(plan.weight.data() + 8 * g));
+    const __m256i step = _mm256_mullo_epi16(_mm256_sub_epi16(second, first), weight);
     _mm256_storeu_si256(reinterpret_cast<__m256i*>(to + 8 * g), _mm256_add_epi16(_mm256_slli_epi16(first, 8), step));
   }
 }

@@ -45,24 +45,30 @@ using smooth_across = void(const std::array<const std::uint16_t*, 7>& rows, int 
 }
 
 inline void smooth_along_portable(const std::uint8_t* line, int count, std::uint16_t* sums) {
-  for (int x = 0; x < count; x += 8) {
-    std::array<words8, 7> v;
-    for (int i = 0; i != 7; ++i) v[static_cast<std::size_t>(i)] = load8_widened(line + x + i - 3);
-    store8(sums + x, gaussian_sum(v));
+  for (int x = 0; x < count; x += 16) {
+    std::array<words8, 7> low, high;
+    for (int i = 0; i != 7; ++i) {
+      const bytes16 v = load16(line + x + i - 3);
+      low[static_cast<std::size_t>(i)] = low_bytes(v);
+      high[static_cast<std::size_t>(i)] = high_bytes(v);
+    }
+    store(sums + x, gaussian_sum(low));
+    store(sums + x + 8, gaussian_sum(high));
   }
 }
 
 inline void smooth_across_portable(const std::array<const std::uint16_t*, 7>& rows, int count, std::uint8_t* to) {
-  for (int x = 0; x < count; x += 8) {
+  const auto eight = [&](int x) {
     // The bytes of the words apart, so that their sums fit into words.
     std::array<words8, 7> low, high;
     for (std::size_t i = 0; i != 7; ++i) {
-      const words8 v = load8_words(rows[i] + x);
+      const auto v = loaded<words8>(rows[i] + x);
       low[i] = v & 255;
       high[i] = v >> 8;
     }
-    store8_narrowed(to + x, rounded_high(gaussian_sum(high), gaussian_sum(low)));
-  }
+    return rounded_high(gaussian_sum(high), gaussian_sum(low));
+  };
+  for (int x = 0; x < count; x += 16) store16(to + x, joined(eight(x), eight(x + 8)));
 }
 
 #if ORBIS_X86

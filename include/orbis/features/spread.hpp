@@ -76,7 +76,7 @@ struct even_cells {
       std::sort(corners.begin(), corners.end(), before_in_image);
       return;
     }
-    const double side = std::sqrt(per_cell * area.width * area.height / wanted);
+    const double side = std::max(1.0, std::sqrt(per_cell * area.width * area.height / wanted));
     const int columns = std::max(1, static_cast<int>(std::lround(area.width / side)));
     const int rows = std::max(1, static_cast<int>(std::lround(area.height / side)));
     sort_into_cells(corners, area, columns, rows, memory);

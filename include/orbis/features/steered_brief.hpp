@@ -3,6 +3,7 @@
 /// Binary descriptors by comparing brightness in a rotated pattern.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cassert>
@@ -15,6 +16,7 @@
 #include <orbis/core/rounded.hpp>
 #include <orbis/core/simd.hpp>
 #include <orbis/features/descriptor.hpp>
+#include <orbis/features/lanes16.hpp>
 #include <orbis/features/orb_pattern.hpp>
 #include <orbis/features/orientation.hpp>
 #include <orbis/features/smooth.hpp>
@@ -71,16 +73,25 @@ inline constexpr float rounder = 12582912.0F;
 
 inline void steered_pixels_portable(const split_pattern& points, const orientation& o, const std::uint8_t* centre,
                                     std::ptrdiff_t stride, std::uint8_t* brightness) {
-  for (std::size_t i = 0; i != points.x.size(); ++i) {
-    const float x = rounded_product(points.x[i], o.cosine) - rounded_product(points.y[i], o.sine);
-    const float y = rounded_product(points.x[i], o.sine) + rounded_product(points.y[i], o.cosine);
-    brightness[i] = centre[nearest_integer(y) * stride + nearest_integer(x)];
+  const floats4 cosine = floats4{} + o.cosine, sine = floats4{} + o.sine;
+  const auto step = static_cast<std::int32_t>(stride), bias = std::bit_cast<std::int32_t>(rounder);
+  const auto nearest = [&](floats4 v) { return std::bit_cast<ints4>(v + rounder) - bias; };
+  std::array<std::int32_t, 512> at;
+  for (std::size_t i = 0; i != at.size(); i += 4) {
+    const auto px = loaded<floats4>(points.x.data() + i), py = loaded<floats4>(points.y.data() + i);
+    const floats4 x = rounded_products(px, cosine) - rounded_products(py, sine);
+    const floats4 y = rounded_products(px, sine) + rounded_products(py, cosine);
+    store(at.data() + i, nearest(y) * step + nearest(x));
   }
+  for (std::size_t i = 0; i != at.size(); ++i) brightness[i] = centre[at[i]];
 }
 
 inline binary_descriptor<256> compare_halves_portable(const std::uint8_t* bytes) {
   binary_descriptor<256> d;
-  for (std::size_t i = 0; i != 256; ++i) d.words[i / 64] |= std::uint64_t{bytes[i] < bytes[256 + i]} << (i % 64);
+  for (std::size_t i = 0; i != 256; i += 16) {
+    const auto less = std::bit_cast<bytes16>(load16(bytes + i) < load16(bytes + 256 + i));
+    d.words[i / 64] |= std::uint64_t{bits16(less)} << (i % 64);
+  }
   return d;
 }
 

@@ -9,6 +9,8 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <optional>
+#include <ranges>
 #include <span>
 
 #include <orbis/core/execution.hpp>

@@ -36,10 +36,10 @@
 #include <utility>
 #include <vector>
 
+#include <orbis/core/crc32c.hpp>
 #include <orbis/core/file.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/octree/compact_tree.hpp>
-#include <orbis/octree/crc32c.hpp>
 #include <orbis/octree/files.hpp>
 #include <orbis/octree/occupancy_octree.hpp>
 
@@ -51,7 +51,7 @@ enum class compact_value : std::uint8_t { float32 = 1, float64 = 2, int8 = 3, in
 /// A sensor model whose maps these files can hold: values of 64 bits only if floating-point.
 template <class M>
 concept compact_model = sensor_model<M> && sizeof(typename M::value_type) <= 8 &&
-    (std::floating_point<typename M::value_type> || sizeof(typename M::value_type) <= 4);
+                        (std::floating_point<typename M::value_type> || sizeof(typename M::value_type) <= 4);
 
 struct compact_options {
   /// Keep only which voxels are free and which occupied, as `.bt` does. Reading gives them the model's
@@ -94,8 +94,7 @@ void put(std::string& out, T number) {
 template <class T>
 [[nodiscard]] T take(std::string_view& in) noexcept {
   std::uint64_t bits = 0;
-  for (std::size_t i = 0; i != sizeof(T); ++i)
-    bits |= std::uint64_t{static_cast<unsigned char>(in[i])} << (8 * i);
+  for (std::size_t i = 0; i != sizeof(T); ++i) bits |= std::uint64_t{static_cast<unsigned char>(in[i])} << (8 * i);
   in.remove_prefix(sizeof(T));
   return std::bit_cast<T>(static_cast<bits_of<T>>(bits));
 }
@@ -105,7 +104,7 @@ inline void put_section(std::string& out, std::string_view tag, std::string_view
   out += tag;
   put(out, std::uint64_t{content.size()});
   out += content;
-  put(out, crc32c(std::string_view{out}.substr(begin)));
+  put(out, crc32c(std::as_bytes(std::span{out}).subspan(begin)));
 }
 
 /// The sections we know, empty where there are none.
@@ -130,7 +129,8 @@ struct compact_sections {
     if (length > bytes.size() - frame) return fail(errc::malformed, where, "a section is longer than the file");
     const std::string_view section = bytes.substr(0, static_cast<std::size_t>(length) + frame - 4);
     std::string_view sum = bytes.substr(section.size(), 4);
-    if (take<std::uint32_t>(sum) != crc32c(section)) return fail(errc::malformed, where, "a checksum does not match");
+    if (take<std::uint32_t>(sum) != crc32c(std::as_bytes(std::span{section})))
+      return fail(errc::malformed, where, "a checksum does not match");
     bytes.remove_prefix(section.size() + 4);
     const std::string_view tag = section.substr(0, 4);
     if (tag == "end ") break;

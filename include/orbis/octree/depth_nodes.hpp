@@ -4,6 +4,7 @@
 /// voxel in them is crossed.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cmath>

@@ -6,6 +6,7 @@
 /// takes at most 400 bytes for each byte given and 8 KB, whatever they claim.
 #pragma once
 
+#include <algorithm>
 #include <cassert>
 #include <charconv>
 #include <cmath>

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 
 #include <orbis/core/simd.hpp>
 #include <orbis/octree/point_keys.hpp>
