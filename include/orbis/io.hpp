@@ -3,6 +3,7 @@
 /// Reading and writing: images, cameras, recordings, trajectories, clouds.
 #pragma once
 
+#include <orbis/io/bal.hpp>
 #include <orbis/io/bytes.hpp>
 #include <orbis/io/camera_file.hpp>
 #include <orbis/io/cloud_file.hpp>

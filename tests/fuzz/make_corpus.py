@@ -242,8 +242,205 @@ def pose_graphs():
     graph("others", "# comment\r\n", vertex(0), "PARAMS_SE3OFFSET 0 0 0 0 0 0 0 1\n", "VERTEX_SE2 1 0 0 0\n")
 
 
+def bundles():
+    def camera(i, more="500 -1e-2 1e-3"):
+        return f"0.0{i} -0.1 0 {i} 0.5 -1 {more}\n".replace(" ", "\n")
+
+    def problem(name, cameras, points, observations, header=None, more=""):
+        counts = header or f"{len(cameras)} {len(points)} {len(observations)}"
+        write("read_bal", name, "".join([counts, "\n", *observations, *cameras, *points, more]).encode())
+
+    cameras = [camera(i) for i in range(4)]
+    points = [f"{i}\n{i % 3 - 1}\n-{5 + i % 4}\n" for i in range(9)]
+    seen = [f"{c} {p}     {-100 * c + 60 * p - 3:e} {40 * (p % 3) - c:e}\n" for p in range(9) for c in range(4)]
+    problem("good", cameras, points, seen)
+    problem("empty", [], [], [], "0 0 0")
+    problem("nothing", [], [], [], " ")
+    problem("unseen", cameras, points, [])
+    problem("once", cameras[:1], points, seen[::4])
+    problem("twice_the_same", cameras, points, seen + seen)
+    problem("coincident", cameras[:1] * 3, points[:1] * 5, [f"{c} {p} 1 2\n" for c in range(3) for p in range(5)])
+    problem("in_plane_of_centre", ["0 0 0 0 0 0 500 0 0\n"] * 2, ["0 0 0\n", "1 1 0\n"], ["0 0 1 1\n", "1 1 2 2\n"])
+    problem("behind", ["0 0 0 0 0 0 500 0 0\n"] * 2, ["0 0 5\n", "1 1 7\n"], ["0 0 1 1\n", "1 1 2 2\n"])
+    problem("no_focal_length", [camera(i, "0 0 0") for i in range(4)], points, seen)
+    problem("huge", [camera(i, "1e200 1e100 1e300") for i in range(4)], points, seen)
+    problem("tiny", cameras, ["1e-320 -5e-324 0\n"] * 9, seen)
+    problem("big_angle", ["1e8 -1e8 1e9 0 0 0 5 0 0\n"] * 4, points, seen)
+    problem("declares_more", cameras, points, seen, "4 9 4000")
+    problem("declares_huge", cameras, points, seen, "4294967295 18446744073709551615 9223372036854775807")
+    problem("out_of_range", cameras, points, seen + ["4 0 1 1\n"])
+    problem("negative", cameras, points, seen + ["-1 0 1 1\n"])
+    problem("not_finite", cameras, points, seen + ["0 0 nan -inf\n"])
+    problem("more_than_declared", cameras, points, seen, more="1 2 3\n")
+    problem("crlf", cameras, [p.replace("\n", "\r\n") for p in points], seen)
+    problem("cut", cameras, points[:-1] + ["1 2"], seen)
+    write("read_bal", "bzip2", b"BZh91AY&SY\x93")
+
+
+def crc32c(data):
+    c = 0xffffffff
+    for byte in data:
+        c ^= byte
+        for _ in range(8):
+            c = (c >> 1) ^ (0x82f63b78 if c & 1 else 0)
+    return c ^ 0xffffffff
+
+
+def vocabularies():
+    """Of descriptors of 64 bits."""
+    rng = random.Random(5)
+
+    def compact(name, counts, words, nodes=None, bits=64, weighting=0, version=1, weights=None, cut=0):
+        nodes = nodes if nodes is not None else 1 + sum(counts)
+        weights = weights if weights is not None else [1.0 + i for i in range(words)]
+        body = struct.pack("<5I28x", bits, weighting, nodes, len(counts), words)
+        body += bytes(rng.randrange(256) for _ in range(8 * (nodes - 1))) if nodes < 1000 else b""
+        body += b"".join(struct.pack("<f", w) for w in weights) + b"".join(struct.pack("<H", c) for c in counts)
+        data = b"orbisvoc" + struct.pack("<II", version, crc32c(body)) + body
+        write("read_vocabulary", "own_" + name, data[:len(data) - cut])
+
+    compact("empty", [], 0)
+    compact("flat", [5], 5)
+    compact("two_levels", [3, 2, 2, 2], 6)
+    compact("uneven", [3, 0, 2, 0, 0, 4], 7)
+    compact("chain", [1] * 20, 1)
+    compact("own_ancestor", [1, 0, 2], 2, nodes=4)
+    compact("huge", [65535], 5, nodes=0xffffffff)
+    compact("words_missing", [3], 2)
+    compact("not_a_number", [2], 2, weights=[float("nan"), -1.0])
+    compact("other_bits", [2], 2, bits=256)
+    compact("version_2", [2], 2, version=2)
+    compact("cut", [3, 2], 4, cut=3)
+
+    bits = lambda: " ".join(str(rng.randrange(256)) for _ in range(8))
+    tree = [(0, 0), (0, 0), (1, 1), (1, 1), (2, 1), (2, 1), (2, 1)]
+
+    def text(name, lines, head="3 2 0 0"):
+        write("read_vocabulary", "text_" + name, (head + "\n" + "".join(lines)).encode())
+
+    nodes = [f"{p} {w} {bits()} {1.25 * w}\n" for p, w in tree]
+    text("good", nodes)
+    text("crlf", [n.replace("\n", "\r\n") for n in nodes], "3 2 0 3\r")
+    text("empty", [])
+    text("blank_end", nodes + ["\n \n"])
+    text("later_parent", nodes[::-1])
+    text("word_with_child", ["0 1 " + bits() + " 1\n", "1 1 " + bits() + " 1\n"])
+    text("cut", nodes[:-1] + ["2 1 7 7"])
+    text("huge_weight", ["0 1 " + bits() + " 1e308\n"])
+
+    def yaml(name, items, words=None, head="%YAML:1.0\n---\n", more=""):
+        body = "vocabulary:\n   k: 3\n   L: 2\n   scoringType: 0\n   weightingType: 0\n   nodes:\n" + "".join(items)
+        if words is not None:
+            body += "   words:\n" + "".join(f"      - {{ wordId:{i}, nodeId:{n} }}\n" for i, n in enumerate(words))
+        write("read_vocabulary", "yaml_" + name, (head + body + more).encode())
+
+    def item(i, parent, weight="1.5", before="", quote='"'):
+        return f"      - {{ nodeId:{i}, parentId:{parent}, weight:{weight},\n" \
+               f"          descriptor:{quote}{before}{bits()} {quote} }}\n"
+
+    good = [item(i + 1, p, str(1.25 * w)) for i, (p, w) in enumerate(tree)]
+    yaml("good", good, [3, 4, 5, 6, 7])
+    yaml("no_words", good)
+    yaml("dbow3", [item(i + 1, p, "0.", "dbw3 0 8 ", "") for i, (p, w) in enumerate(tree)], [3, 4, 5, 6, 7])
+    yaml("backwards", good[::-1], [7, 6, 5, 4, 3])
+    yaml("circle", [item(1, 2), item(2, 1), item(3, 0)])
+    yaml("beyond", [item(9, 0)])
+    yaml("cut", good[:-1] + ["      - { nodeId:7, parentId:2, weight:"])
+    yaml("brackets", ["      []\n"])
+
+
+def slam_maps():
+    """Keyframes of a few keypoints; a landmark is a list of (keyframe, keypoint), or what it became."""
+    NONE = 0xffffffff
+    here_pose = struct.pack("<7d", 0, 0, 0, 0, 0, 0, 1)
+
+    def section(name, content):
+        data = name.encode() + struct.pack("<Q", len(content)) + content
+        return data + struct.pack("<I", crc32c(data))
+
+    def keypoint(i, octave=0, depth=2.0, ray=(0.1, 0.2)):
+        return struct.pack("<5fif2d4Q", 10.0 * i, 20.0, 31.0, 0.5, 7.0, octave, depth, *ray, int(i) & 255, 2, 3, 4)
+
+    def keyframe(keypoints, pose=here_pose, count=None):
+        count = len(keypoints) if count is None else count
+        return b"\1" + struct.pack("<dQ", 1.5, 3) + pose + struct.pack("<I", count) + b"".join(keypoints)
+
+    def erased(heir, pose=here_pose):
+        return b"\0" + struct.pack("<I", heir) + pose
+
+    def parent(k, *loops):
+        return struct.pack("<II", k, len(loops)) + b"".join(struct.pack("<I", l) for l in loops)
+
+    def landmark(seen, created=0, position=(1.0, 2.0, 3.0), count=None):
+        if not isinstance(seen, list):
+            return struct.pack("<II", 0, seen)
+        count = len(seen) if count is None else count
+        return (struct.pack("<I8d4Q3IB", count, *position, 0, 0, -1, 0.5, 2.0, 1, 2, 3, 4, created, 2, 1, 1)
+                + b"".join(struct.pack("<II", *o) for o in seen))
+
+    def slam_map(name, keyframes, parents, landmarks, size=None, sections=("size", "kfrm", "tree", "land"), version=1,
+                 cut=0, more=b""):
+        size = size or struct.pack("<IIdII", 8, 15, 1.2, len(keyframes), len(landmarks))
+        content = dict(size=size, kfrm=b"".join(keyframes), tree=b"".join(parents), land=b"".join(landmarks))
+        data = b"orbismap" + struct.pack("<I", version) + b"".join(section(s, content[s]) for s in sections) + more
+        write("read_map", name, data[:len(data) - cut])
+
+    def sizes(levels=8, shared=15, factor=1.2, keyframes=3, landmarks=4):
+        return struct.pack("<IIdII", levels, shared, factor, keyframes, landmarks)
+
+    three = [keyframe([keypoint(i, i) for i in range(4)]) for _ in range(3)]
+    line = [parent(NONE), parent(0), parent(1)]
+    seen = [landmark([(0, 0), (1, 1)]), landmark([(1, 0), (2, 3)], 1), landmark(0), landmark([(2, 0)], 2)]
+    slam_map("good", three, line, seen)
+    slam_map("empty", [], [], [])
+    slam_map("all_erased", [erased(1), erased(NONE)], [], [landmark(NONE)])
+    slam_map("heirs", [erased(2), three[0], erased(1)], [parent(NONE)], [landmark([(1, 0)])])
+    slam_map("own_heir", [erased(2), three[0], erased(0)], [parent(NONE)], [landmark([(1, 0)])])
+    slam_map("loops", three, [parent(NONE, 2), parent(0), parent(1, 0)], seen)
+    slam_map("loop_one_way", three, [parent(NONE, 2), parent(0), parent(1)], seen)
+    slam_map("loop_one_way_back", three, [parent(NONE), parent(0), parent(1, 0)], seen)
+    slam_map("loop_with_itself", three, [parent(NONE, 0), parent(0), parent(1)], seen)
+    slam_map("two_roots", three, [parent(NONE), parent(NONE), parent(1)], seen)
+    slam_map("no_root", three, [parent(1), parent(2), parent(0)], seen)
+    slam_map("circle_apart", three, [parent(NONE), parent(2), parent(1)], seen)
+    slam_map("own_parent", three, [parent(NONE), parent(1), parent(0)], seen)
+    slam_map("parent_missing", three, [parent(NONE), parent(9), parent(0)], seen)
+    slam_map("younger_parents", three, [parent(1), parent(2), parent(NONE)], seen)
+    slam_map("seen_twice", three, line, seen + [landmark([(0, 0)])])
+    slam_map("seen_by_none", three, line, seen + [landmark([(7, 0)])])
+    slam_map("no_keypoint", three, line, seen + [landmark([(0, 4)])])
+    slam_map("no_order", three, line, [landmark([(1, 1), (0, 0)])])
+    slam_map("became_dead", three, line, [landmark([(0, 0)]), landmark(2), landmark(NONE)])
+    slam_map("became_itself", three, line, [landmark(0)])
+    slam_map("far_away", three, line, [landmark([(0, 0)], position=(1e300, 0.0, 0.0))])
+    slam_map("farthest", [keyframe([keypoint(0)], struct.pack("<7d", 9e11, -9e11, 0, 0, 0, 0, 1))] * 2, line[:2],
+             [landmark([(0, 0), (1, 0)], position=(9e11, 0.0, -9e11))])
+    slam_map("not_a_number", three, line, [landmark([(0, 0)], position=(float("nan"), 0.0, 0.0))])
+    slam_map("no_rotation", [keyframe([], struct.pack("<7d", 0, 0, 0, 0, 0, 0, 0))], [parent(NONE)], [])
+    slam_map("level_9", [keyframe([keypoint(0, 9)])], [parent(NONE)], [])
+    slam_map("no_ray", [keyframe([keypoint(0, 0, 0.0, (float("nan"),) * 2)])], [parent(NONE)], [])
+    slam_map("keypoints_apart", [keyframe([keypoint(0), keypoint(1e30)])], [parent(NONE)], [])
+    slam_map("many_keypoints", [keyframe([], count=0xffffffff)], [parent(NONE)], [])
+    slam_map("many_observations", three, line, [landmark([(0, 0)], count=0xffffffff)])
+    slam_map("many_keyframes", three, line, seen, sizes(keyframes=0xffffffff))
+    slam_map("many_landmarks", three, line, seen, sizes(landmarks=0xffffffff))
+    slam_map("fewer_landmarks", three, line, seen, sizes(landmarks=2))
+    slam_map("no_levels", three, line, seen, sizes(levels=0))
+    slam_map("scale_factor_1", three, line, seen, sizes(factor=1.0))
+    slam_map("all_see_one", [keyframe([keypoint(0)])] * 12, [parent(NONE)] + [parent(0)] * 11,
+             [landmark([(k, 0) for k in range(12)])], sizes(shared=0, keyframes=12, landmarks=1))
+    slam_map("no_land", three, line, seen, sections=("size", "kfrm", "tree"))
+    slam_map("other_order", three, line, seen, sections=("size", "tree", "kfrm", "land"))
+    slam_map("version_2", three, line, seen, version=2)
+    slam_map("cut", three, line, seen, cut=40)
+    slam_map("surplus", three, line, seen, more=b"more")
+
+
 if __name__ == "__main__":
+    slam_maps()
+    vocabularies()
     readers()
+    bundles()
     pose_graphs()
     scans()
     edits()

@@ -18,7 +18,7 @@ using namespace orbis;
     if (content > file.size() - at - frame) break;
     const std::size_t end = at + 12 + static_cast<std::size_t>(content);
     std::string sum;
-    octree::detail::put(sum, octree::crc32c(std::string_view{file}.substr(at, end - at)));
+    octree::detail::put(sum, crc32c(std::as_bytes(std::span{file}).subspan(at, end - at)));
     file.replace(end, 4, sum);
     at = end + 4;
   }

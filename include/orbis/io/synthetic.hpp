@@ -10,6 +10,7 @@
 #pragma once
 
 #include <orbis/io/synthetic/arithmetic.hpp>
+#include <orbis/io/synthetic/bundle.hpp>
 #include <orbis/io/synthetic/canvas.hpp>
 #include <orbis/io/synthetic/path.hpp>
 #include <orbis/io/synthetic/pose_graph.hpp>

@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// Any bytes as a vocabulary: our own format as it is and with its checksum put right, and the formats of others.
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <orbis/core/crc32c.hpp>
+#include <orbis/places/dbow_text.hpp>
+#include <orbis/places/dbow_yaml.hpp>
+#include <orbis/places/vocabulary_file.hpp>
+
+#include "fuzz/target.hpp"
+
+namespace {
+
+using namespace orbis;
+using namespace orbis::places;
+
+// Short descriptors: more nodes for as many bytes.
+using words = basic_vocabulary<64>;
+
+void use(const words& read) {
+  const std::string bytes = vocabulary_bytes(read);
+  const auto again = parse_vocabulary<64>(std::as_bytes(std::span{bytes}));
+  fuzz::require(again && *again == read, "what was read can be written and read again");
+  fuzz::require(vocabulary_bytes(*again) == bytes, "to the same bytes");
+  std::vector<std::uint64_t> image;
+  for (std::uint64_t i = 0; i != 40; ++i) image.push_back(i * 0x9e3779b97f4a7c15ULL);
+  bag_of_words bag;
+  transform_workspace memory;
+  std::vector<std::uint32_t> nodes, plain_nodes;
+  read.transform(image, bag, nodes, memory);
+  for (const word_value& w : bag.words) fuzz::require(w.word < read.size(), "words are words");
+  for (const std::uint32_t n : nodes) fuzz::require(n < read.nodes(), "nodes are nodes");
+  const bag_of_words with = bag;
+  read.transform(image, bag, plain_nodes, memory, {.simd = simd::level::portable});
+  fuzz::require(bag == with && nodes == plain_nodes, "levels make no difference");
+}
+
+template <class Parse>
+void check(Parse&& parse, std::size_t size, std::size_t times) {
+  std::optional<result<words>> got;
+  const std::size_t peak = fuzz::peak_bytes_of([&] { got.emplace(parse()); });
+  fuzz::require(peak <= times * size + 8192, "memory in proportion to the file");
+  if (*got) return use(**got);
+  const error& e = got->error();
+  fuzz::require(e.code == errc::malformed || e.code == errc::unsupported, "a damaged file is malformed or unsupported");
+  fuzz::require(!e.message.empty() && e.to_string().size() < 300, "the reason is given, and short");
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  std::string bytes{reinterpret_cast<const char*>(data), size};
+  check([&] { return parse_dbow_text<64>(bytes); }, size, 16);
+  check([&] { return parse_dbow_yaml<64>(bytes); }, size, 16);
+  check([&] { return parse_vocabulary<64>(std::as_bytes(std::span{bytes})); }, size, 8);
+  if (size < 16) return 0;
+  const std::uint32_t sum = crc32c(std::as_bytes(std::span{bytes}).subspan(16));
+  for (unsigned i = 0; i != 4; ++i) bytes[12 + i] = static_cast<char>((sum >> (8 * i)) & 0xffU);
+  check([&] { return parse_vocabulary<64>(std::as_bytes(std::span{bytes})); }, size, 8);
+  return 0;
+}
