@@ -37,8 +37,8 @@ TEST_CASE("Absolute orientation finds the rigid transform and agrees with Eigen'
     CHECK((optimize::absolute_orientation(from, noisy)->to_matrix() - rigid).norm() < 1e-9);
     const auto s = optimize::absolute_orientation_with_scale(from, noisy);
     REQUIRE(s.has_value());
-    CHECK((s->scale * s->rotation.rotation_matrix() - scaled.topLeftCorner<3, 3>()).norm() < 1e-9);
-    CHECK((s->translation - scaled.topRightCorner<3, 1>()).norm() < 1e-9);
+    CHECK((s->scale() * s->rotation_matrix() - scaled.topLeftCorner<3, 3>()).norm() < 1e-9);
+    CHECK((s->translation() - scaled.topRightCorner<3, 1>()).norm() < 1e-9);
   }
 }
 

@@ -8,8 +8,8 @@
 
 #include <orbis/optimize/block_cholesky.hpp>
 
-#include "allocations.hpp"
 #include "block_matrices.hpp"
+#include "support/allocations.hpp"
 #include "support/catch.hpp"
 
 using namespace orbis;

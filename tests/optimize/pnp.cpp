@@ -1,9 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <numeric>
+
+#include <orbis/camera/kannala_brandt.hpp>
 #include <orbis/camera/pinhole.hpp>
 #include <orbis/camera/radial_tangential.hpp>
 #include <orbis/optimize/pnp.hpp>
 
 #include "support.hpp"
+#include "support/allocations.hpp"
 #include "support/catch.hpp"
 
 using namespace orbis;
@@ -87,6 +92,98 @@ TEST_CASE("PnP is deterministic by seed") {
   CHECK(a->inliers == b->inliers);
 }
 
+TEST_CASE("PnP recovers the pose to rounding from exact matches in hundreds of scenes") {
+  double worst = 0.0;
+  for (std::uint64_t seed = 1; seed <= 300; ++seed) {
+    const scene s = random_scene(pinhole_camera, seed, 100, 0.0, 0.0);
+    const auto pose = optimize::estimate_pose(s.points, s.pixels, pinhole_camera, {.seed = seed});
+    REQUIRE(pose.has_value());
+    CHECK(pose->inliers.size() == 100);
+    worst = std::max({worst, test::distance_between(pose->T_world_camera, s.T_world_camera),
+                      test::angle_between(pose->T_world_camera, s.T_world_camera), 1e-3 * pose->rmse});
+  }
+  CHECK(worst < 1e-11);
+}
+
+TEST_CASE("PnP gives the same bits under every instruction set") {
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    const scene s = random_scene(pinhole_camera, seed, 333, 0.6, 1.0);
+    const auto portable = optimize::estimate_pose(s.points, s.pixels, pinhole_camera, {.level = simd::level::portable});
+    REQUIRE(portable.has_value());
+    for (const simd::level level : {simd::level::avx2, simd::level::avx512}) {
+      const auto wide = optimize::estimate_pose(s.points, s.pixels, pinhole_camera, {.level = level});
+      REQUIRE(wide.has_value());
+      CHECK(wide->T_world_camera.to_matrix() == portable->T_world_camera.to_matrix());
+      CHECK(wide->inliers == portable->inliers);
+      CHECK(wide->iterations == portable->iterations);
+    }
+  }
+}
+
+TEST_CASE("PnP moves with the world, far away as well") {
+  const scene s = random_scene(pinhole_camera, 8, 200, 0.4, 0.5);
+  const auto pose = optimize::estimate_pose(s.points, s.pixels, pinhole_camera);
+  REQUIRE(pose.has_value());
+  random_bits random(77);
+  for (const double distance : {1.0, 1e5}) {
+    const se3 motion = test::random_pose(random, distance);
+    std::vector<vec3> moved;
+    for (const vec3& p : s.points) moved.push_back(motion * p);
+    const auto again = optimize::estimate_pose(moved, s.pixels, pinhole_camera);
+    REQUIRE(again.has_value());
+    CHECK((again->T_world_camera.to_matrix() - (motion * pose->T_world_camera).to_matrix()).norm() <
+          1e-7 * std::max(1.0, 1e-2 * distance));
+    CHECK(again->inliers == pose->inliers);
+  }
+}
+
+TEST_CASE("PnP takes the matches in the order of their promise") {
+  const scene s = random_scene(pinhole_camera, 14, 500, 0.9, 0.5);  // the first 50 are right
+  std::vector<std::uint32_t> order(500);
+  std::iota(order.begin(), order.end(), 0U);
+  const auto found =
+      optimize::estimate_pose(s.points, s.pixels, pinhole_camera, {.max_iterations = 10, .best_first = order});
+  REQUIRE(found.has_value());
+  CHECK(test::distance_between(found->T_world_camera, s.T_world_camera) < 0.05);
+  order[3] = 4;  // 3 is not named
+  CHECK(optimize::estimate_pose(s.points, s.pixels, pinhole_camera, {.best_first = order}).error().code ==
+        errc::invalid_argument);
+  order.resize(7);
+  CHECK(optimize::estimate_pose(s.points, s.pixels, pinhole_camera, {.best_first = order}).error().code ==
+        errc::invalid_argument);
+}
+
+TEST_CASE("PnP leaves out what is not finite and works through a fisheye") {
+  const camera::kannala_brandt camera{{.width = 640, .height = 480, .fx = 280, .fy = 280, .cx = 320, .cy = 240},
+                                      {.k1 = -0.02, .k2 = 0.006, .k3 = -0.005, .k4 = 0.001}};
+  scene s = random_scene(camera, 12, 200, 0.3, 0.3);
+  s.points[3].x() = std::numeric_limits<double>::quiet_NaN();
+  s.pixels[5].y() = std::numeric_limits<double>::infinity();
+  const auto pose = optimize::estimate_pose(s.points, s.pixels, camera);
+  REQUIRE(pose.has_value());
+  CHECK(test::distance_between(pose->T_world_camera, s.T_world_camera) < 0.02);
+  CHECK(pose->inliers.size() > 130);
+  CHECK(std::find(pose->inliers.begin(), pose->inliers.end(), 3U) == pose->inliers.end());
+  CHECK(std::find(pose->inliers.begin(), pose->inliers.end(), 5U) == pose->inliers.end());
+}
+
+TEST_CASE("PnP with a workspace allocates nothing but the inliers of its answer") {
+  if (!test::counts_allocations()) return;
+  const scene s = random_scene(pinhole_camera, 21, 300, 0.7, 1.0);
+  optimize::pnp_workspace workspace;
+  const auto allocated = [&](std::size_t iterations) {
+    const std::size_t before = test::allocations();
+    const auto pose =
+        optimize::estimate_pose(s.points, s.pixels, pinhole_camera, {.min_iterations = iterations}, workspace);
+    const std::size_t after = test::allocations();
+    CHECK(pose.has_value());
+    return after - before;
+  };
+  allocated(10);
+  CHECK(allocated(10) <= 2);
+  CHECK(allocated(3000) <= 2);
+}
+
 TEST_CASE("PnP says why it has no pose") {
   scene s = random_scene(pinhole_camera, 2, 100, 1.0, 0.0);
   CHECK(optimize::estimate_pose(s.points, s.pixels, pinhole_camera, {.max_iterations = 200, .min_inliers = 30})
@@ -101,6 +198,11 @@ TEST_CASE("PnP says why it has no pose") {
   for (std::size_t i = 0; i < s.points.size(); ++i) s.points[i] = vec3(0.1 * static_cast<double>(i), 0, 3);
   CHECK(optimize::estimate_pose(s.points, s.pixels, pinhole_camera, {.max_iterations = 200}).error().code ==
         errc::degenerate);
+  CHECK(optimize::estimate_pose(s.points, s.pixels, pinhole_camera, {.max_iterations = 200}).error().message ==
+        "the points all lie on one line");
+  for (auto& p : s.points) p = vec3(1, 2, 3);
+  CHECK(optimize::estimate_pose(s.points, s.pixels, pinhole_camera, {.max_iterations = 200}).error().message ==
+        "the points all lie in one place");
   for (auto& p : s.points) p.setConstant(std::numeric_limits<double>::quiet_NaN());
   CHECK(optimize::estimate_pose(s.points, s.pixels, pinhole_camera, {.max_iterations = 200}).error().code ==
         errc::degenerate);

@@ -5,9 +5,9 @@
 
 #include <orbis/optimize/pose_graph.hpp>
 
-#include "allocations.hpp"
 #include "pose_graphs.hpp"
 #include "support.hpp"
+#include "support/allocations.hpp"
 #include "support/catch.hpp"
 #include "support/data.hpp"
 

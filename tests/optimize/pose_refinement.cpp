@@ -1,9 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <cstring>
+
+#include <orbis/camera/any.hpp>
+#include <orbis/camera/kannala_brandt.hpp>
 #include <orbis/camera/pinhole.hpp>
 #include <orbis/camera/radial_tangential.hpp>
 #include <orbis/optimize/pose_refinement.hpp>
 
 #include "support.hpp"
+#include "support/allocations.hpp"
 #include "support/catch.hpp"
 
 using namespace orbis;
@@ -16,6 +21,24 @@ const camera::pinhole pinhole_camera{{.width = 640, .height = 480, .fx = 525, .f
 const camera::radial_tangential distorted_camera{
     {.width = 640, .height = 480, .fx = 517.3, .fy = 516.5, .cx = 318.6, .cy = 255.3},
     {.k1 = 0.2624, .k2 = -0.9531, .p1 = -0.0054, .p2 = 0.0026, .k3 = 1.1633}};
+
+const camera::kannala_brandt fisheye_camera{{.width = 640, .height = 480, .fx = 300, .fy = 302, .cx = 322, .cy = 236},
+                                            {.k1 = -0.02, .k2 = 0.01, .k3 = -0.005, .k4 = 0.001}};
+
+/// A camera that nobody has written lanes for.
+struct own_camera {
+  int width() const { return pinhole_camera.width(); }
+  int height() const { return pinhole_camera.height(); }
+  std::optional<vec2> project(const vec3& p) const { return pinhole_camera.project(p); }
+  std::optional<vec2> project(const vec3& p, matrix<2, 3>& j) const { return pinhole_camera.project(p, j); }
+  std::optional<vec3> unproject(const vec2& pixel) const { return pinhole_camera.unproject(pixel); }
+};
+
+/// A loss that nobody has written lanes for.
+struct own_loss {
+  double cost(double squared) const { return optimize::huber{2.0}.cost(squared); }
+  double weight(double squared) const { return optimize::huber{2.0}.weight(squared); }
+};
 
 template <class Camera>
 std::vector<pose_observation> observe(const optimize::reprojection<Camera>& model, const se3& T_world_camera, int n,
@@ -171,4 +194,200 @@ TEST_CASE("Pose refinement gives a status and the starting pose for degenerate i
   for (auto& o : seen) o.pixel = vec2(random.uniform(0, 640), random.uniform(0, 480));
   for (auto& o : seen) o.information = 100.0;
   CHECK(run(seen, start) == refinement_status::too_few_observations);
+}
+
+namespace {
+
+/// Every fifth observation is wrong.
+template <class Camera>
+std::vector<pose_observation> observe_with_outliers(const optimize::reprojection<Camera>& model, const se3& truth,
+                                                    int n, std::uint64_t seed) {
+  auto seen = observe(model, truth, n, 0.5, seed, 1.0);
+  random_bits random(seed + 1);
+  for (std::size_t i = 4; i < seen.size(); i += 5) {
+    seen[i].pixel = vec2(random.uniform(0, 640), random.uniform(0, 480));
+    seen[i].right = seen[i].pixel.x() - random.uniform(5, 50);
+  }
+  return seen;
+}
+
+template <class Camera, class Loss>
+void check_levels(const Camera& camera, const Loss& loss, int n) {
+  const optimize::reprojection model{camera, 40.0};
+  random_bits random(static_cast<std::uint64_t>(n));
+  const se3 truth = test::random_pose(random);
+  vec6 off;
+  off << 0.05, -0.03, 0.04, 0.03, -0.02, 0.02;
+  auto seen = observe_with_outliers(model, truth, n, 5);
+  for (std::size_t i = 2; i < seen.size(); i += 7) seen[i].right = std::numeric_limits<double>::quiet_NaN();
+  seen[1].point.setConstant(std::numeric_limits<double>::quiet_NaN());
+  seen[3].point = truth * vec3(0.1, 0.1, -2.0);
+  seen[6].point.setConstant(1e200);
+  std::vector<std::uint8_t> expected(seen.size()), outliers(seen.size());
+  const auto run = [&](simd::level level, std::vector<std::uint8_t>& out) {
+    return optimize::refine_pose(std::span<const pose_observation>(seen), model, truth * se3::exp(off),
+                                 std::span<std::uint8_t>(out), {.simd = level}, loss);
+  };
+  const auto reference = run(simd::level::portable, expected);
+  REQUIRE(reference.ok());
+  CHECK(test::distance_between(reference.T_world_camera, truth) < 0.01);
+  CHECK(expected[1] == 1);
+  CHECK(expected[3] == 1);
+  CHECK(expected[6] == 1);
+  for (const auto level : {simd::level::avx2, simd::level::avx512}) {
+    const auto r = run(level, outliers);
+    CHECK(r.T_world_camera.to_matrix() == reference.T_world_camera.to_matrix());
+    CHECK(r.cost == reference.cost);
+    CHECK(r.iterations == reference.iterations);
+    CHECK(r.status == reference.status);
+    CHECK(outliers == expected);
+  }
+}
+
+}  // namespace
+
+TEST_CASE("Pose refinement gives the same bits for every instruction set") {
+  for (const int n : {20, 63, 500, 1024, 1025, 3001}) check_levels(pinhole_camera, optimize::huber{2.447}, n);
+  check_levels(distorted_camera, optimize::huber{2.447}, 300);
+  check_levels(fisheye_camera, optimize::huber{2.447}, 300);
+  check_levels(own_camera{}, optimize::huber{2.447}, 300);
+  check_levels(pinhole_camera, own_loss{}, 300);
+  check_levels(pinhole_camera, optimize::cauchy{2.0}, 300);
+  check_levels(pinhole_camera, optimize::tukey{40.0}, 300);
+  check_levels(pinhole_camera, optimize::geman_mcclure{20.0}, 300);
+  check_levels(pinhole_camera, optimize::graduated{optimize::truncated{2.8}, 64.0}, 300);
+}
+
+TEST_CASE("Pose refinement of 500 stereo observations finds all inliers and the pose to half a millimetre") {
+  const optimize::reprojection model{pinhole_camera, 40.0};
+  random_bits random(12);
+  double squared = 0.0;
+  for (std::uint64_t trial = 0; trial != 20; ++trial) {
+    const se3 truth = test::random_pose(random);
+    const auto seen = observe_with_outliers(model, truth, 500, 100 + trial);
+    std::size_t inliers = 0;
+    for (const auto& o : seen) {
+      const auto r = model.residual(truth.inverse() * o.point, o);
+      inliers += r && r->squaredNorm() <= 7.815;
+    }
+    REQUIRE(inliers >= 395);
+    vec6 off;
+    off << test::random_vector(random, 0.06), test::random_vector(random, 0.03);
+    std::vector<std::uint8_t> outliers(seen.size());
+    const auto refined = optimize::refine_pose(std::span<const pose_observation>(seen), model, truth * se3::exp(off),
+                                               std::span<std::uint8_t>(outliers));
+    REQUIRE(refined.ok());
+    CHECK(refined.inliers + 2 >= inliers);
+    CHECK(refined.inliers <= inliers + 2);
+    squared += std::pow(test::distance_between(refined.T_world_camera, truth), 2);
+    double at_truth = 0.0;  // the noise itself has a say in where the best pose is: no other is better
+    for (std::size_t i = 0; i != seen.size(); ++i)
+      if (outliers[i] == 0) at_truth += 0.5 * model.residual(truth.inverse() * seen[i].point, seen[i])->squaredNorm();
+    CHECK(refined.cost <= at_truth);
+  }
+  CHECK(std::sqrt(squared / 20.0) < 5e-4);
+}
+
+TEST_CASE("Pose refinement of a camera known at run time is that of its model, and a camera of one's own works") {
+  const se3 truth = se3::exp((vec6() << 0.3, 0.2, -0.1, 0.4, 0.1, -0.3).finished());
+  const auto seen = observe_with_outliers(optimize::reprojection{pinhole_camera, 40.0}, truth, 200, 3);
+  const auto run = [&](const auto& camera) {
+    std::vector<std::uint8_t> outliers(seen.size());
+    return optimize::refine_pose(std::span<const pose_observation>(seen), optimize::reprojection{camera, 40.0},
+                                 truth * se3(so3{}, vec3(0.03, 0.0, 0.02)), std::span<std::uint8_t>(outliers));
+  };
+  const auto plain = run(pinhole_camera);
+  REQUIRE(plain.ok());
+  CHECK(run(camera::any_camera{pinhole_camera}).T_world_camera.to_matrix() == plain.T_world_camera.to_matrix());
+  const auto own = run(own_camera{});
+  CHECK(test::distance_between(own.T_world_camera, plain.T_world_camera) < 1e-9);
+  CHECK(own.inliers == plain.inliers);
+}
+
+TEST_CASE("Pose refinement does not depend on the order of the observations") {
+  const optimize::reprojection model{pinhole_camera, 40.0};
+  const se3 truth;
+  auto seen = observe_with_outliers(model, truth, 1500, 8);
+  std::vector<std::uint8_t> outliers(seen.size()), reversed(seen.size());
+  const se3 start(so3{}, vec3(0.02, 0.01, 0.03));
+  const auto a = optimize::refine_pose(std::span<const pose_observation>(seen), model, start, std::span(outliers));
+  std::reverse(seen.begin(), seen.end());
+  const auto b = optimize::refine_pose(std::span<const pose_observation>(seen), model, start, std::span(reversed));
+  std::reverse(reversed.begin(), reversed.end());
+  CHECK(test::distance_between(a.T_world_camera, b.T_world_camera) < 1e-8);
+  CHECK(outliers == reversed);
+}
+
+TEST_CASE("Pose refinement with a narrowing loss survives outliers that agree with each other") {
+  const optimize::reprojection model{pinhole_camera, 40.0};
+  auto seen = observe(model, se3{}, 300, 0.5, 77, 1.0);
+  const se3 false_pose = se3::exp((vec6() << 0.25, 0.1, 0.0, 0.0, 0.05, 0.0).finished());
+  for (std::size_t i = 0; i < 90; ++i) {  // 30 % follow another motion
+    const vec3 p = false_pose.inverse() * seen[i].point;
+    const auto pixel = pinhole_camera.project(p);
+    REQUIRE(pixel.has_value());
+    seen[i].pixel = *pixel;
+    seen[i].right = model.right(pixel->x(), p.z());
+  }
+  std::vector<std::uint8_t> outliers(seen.size());
+  const auto refined = optimize::refine_pose(
+      std::span<const pose_observation>(seen), model, se3(so3{}, vec3(0.1, 0.05, 0.0)), std::span(outliers),
+      {.rounds = 10, .gate_mono = 1e4, .gate_depth = 1e4}, optimize::graduated{optimize::geman_mcclure{2.8}, 128.0});
+  REQUIRE(refined.ok());
+  const auto last = optimize::refine_pose(std::span<const pose_observation>(seen), model, refined.T_world_camera,
+                                          std::span(outliers));
+  REQUIRE(last.ok());
+  CHECK(test::distance_between(last.T_world_camera, se3{}) < 1e-3);
+}
+
+TEST_CASE("Pose refinement without rounds judges the starting pose") {
+  const optimize::reprojection model{pinhole_camera, 40.0};
+  const auto seen = observe_with_outliers(model, se3{}, 100, 31);
+  std::vector<std::uint8_t> outliers(seen.size());
+  const auto judged =
+      optimize::refine_pose(std::span<const pose_observation>(seen), model, se3{}, std::span(outliers), {.rounds = 0});
+  CHECK(judged.status == refinement_status::iteration_limit);
+  CHECK(judged.T_world_camera.to_matrix() == mat4::Identity());
+  CHECK(judged.inliers >= 78);
+  CHECK(judged.inliers <= 82);
+}
+
+TEST_CASE("Pose refinement allocates nothing") {
+  if (!test::counts_allocations()) return;
+  const optimize::reprojection model{pinhole_camera, 40.0};
+  for (const int n : {500, 3000}) {
+    const auto seen = observe_with_outliers(model, se3{}, n, 6);
+    std::vector<std::uint8_t> outliers(seen.size());
+    const std::size_t before = test::allocations();
+    const auto refined = optimize::refine_pose(std::span<const pose_observation>(seen), model,
+                                               se3(so3{}, vec3(0.02, 0, 0)), std::span(outliers));
+    const std::size_t after = test::allocations();
+    CHECK(refined.ok());
+    CHECK(after == before);
+  }
+}
+
+TEST_CASE("Pose refinement never makes the cost of its inliers worse when nothing may be rejected") {
+  const optimize::reprojection model{distorted_camera, 40.0};
+  random_bits random(3);
+  constexpr double everything = std::numeric_limits<double>::infinity();
+  for (std::uint64_t trial = 0; trial != 30; ++trial) {
+    auto seen = observe(model, se3{}, 40, 3.0, trial);
+    for (int i = 0; i != 8; ++i) seen[static_cast<std::size_t>(i)].pixel = vec2(random.uniform(-1e3, 1e3), 1e3);
+    const auto cost = [&](const se3& T_world_camera) {
+      double sum = 0.0;
+      for (const auto& o : seen) {
+        const auto r = model.residual(T_world_camera.inverse() * o.point, o);
+        sum += r ? r->squaredNorm() : 1e9;
+      }
+      return sum;
+    };
+    std::vector<std::uint8_t> outliers(seen.size());
+    const se3 start =
+        se3::exp((vec6() << test::random_vector(random, 0.2), test::random_vector(random, 0.1)).finished());
+    const auto refined =
+        optimize::refine_pose(std::span<const pose_observation>(seen), model, start, std::span(outliers),
+                              {.rounds = 1, .gate_mono = everything, .gate_depth = everything});
+    CHECK(cost(refined.T_world_camera) <= cost(start));
+  }
 }

@@ -13,11 +13,12 @@
 #include <optional>
 #include <ranges>
 #include <span>
+#include <string>
 #include <vector>
 
 #include <Eigen/LU>
-#include <Eigen/SVD>
 
+#include <orbis/core/jacobi.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/core/so3.hpp>
 #include <orbis/core/types.hpp>
@@ -44,11 +45,11 @@ namespace detail {
 
 /// The rotation closest to a matrix that may even mirror, after so much noise; none for one of rank 1.
 [[nodiscard]] inline std::optional<so3> proper_rotation(const mat3& m) {
-  const Eigen::JacobiSVD<mat3> svd{m, Eigen::ComputeFullU | Eigen::ComputeFullV};
-  if (!(svd.singularValues()[1] > 1e-9 * svd.singularValues()[0])) return std::nullopt;
-  mat3 u = svd.matrixU();
-  if (u.determinant() * svd.matrixV().determinant() < 0.0) u.col(2) = -u.col(2);
-  return so3{mat3(u * svd.matrixV().transpose())};
+  if (!m.allFinite()) return std::nullopt;
+  auto [u, values, v] = singular_values_of<3>(m);
+  if (!(values[1] > 1e-9 * values[0])) return std::nullopt;
+  if (u.determinant() * v.determinant() < 0.0) u.col(2) = -u.col(2);
+  return so3{mat3(u * v.transpose())};
 }
 
 /// Linear least squares in vectors of three, one or several at each vertex, over the edges of a graph.

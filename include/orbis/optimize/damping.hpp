@@ -16,9 +16,21 @@
 
 namespace orbis::optimize {
 
+namespace detail {
+template <class P>
+concept solves_newton = requires(P& problem, Eigen::VectorXd& out) {
+  {problem.newton_step(out)};
+};
+template <class P>
+concept solves = solves_newton<P> || requires(P& problem, Eigen::VectorXd& out) {
+  {problem.solve(out)};
+};
+}  // namespace detail
+
 /// A problem linearised at its current estimate: the cost there, its gradient `g` and the positive
 /// semidefinite `H` of the model `cost + g^T s + s^T H s / 2`. `factor(d)` prepares `H + diag(d)` (an
-/// empty `d` is 0) and says whether that is positive definite; `solve(x)` then replaces `x`.
+/// empty `d` is 0) and says whether that is positive definite; `solve(x)` then replaces `x`. Instead of
+/// `solve` a problem may have `newton_step(x)`, which makes `x` the solution for the right-hand side `-g`.
 /// `try_step(s)` is the true cost one step away, not finite where there is none.
 template <class P>
 concept stepped_problem = requires(P& problem, const Eigen::VectorXd& in, Eigen::VectorXd& out) {
@@ -27,7 +39,7 @@ concept stepped_problem = requires(P& problem, const Eigen::VectorXd& in, Eigen:
   { problem.diagonal() } -> std::same_as<const Eigen::VectorXd&>;
   { problem.curvature(in) } -> std::same_as<double>;
   { problem.factor(in) } -> std::same_as<bool>;
-  {problem.solve(out)};
+  requires detail::solves<P>;
   { problem.try_step(in) } -> std::same_as<double>;
 };
 
@@ -57,6 +69,23 @@ concept damping_policy = std::copyable<D> && std::default_initializable<typename
 };
 
 namespace detail {
+/// The least that a policy may count on; never made.
+struct any_stepped_problem {
+  double cost() const;
+  const Eigen::VectorXd& gradient() const;
+  const Eigen::VectorXd& diagonal() const;
+  double curvature(const Eigen::VectorXd&) const;
+  bool factor(const Eigen::VectorXd&);
+  void newton_step(Eigen::VectorXd&);
+  double try_step(const Eigen::VectorXd&);
+};
+}  // namespace detail
+
+/// One for every problem: what the solvers take.
+template <class D>
+concept general_damping_policy = damping_policy<D, detail::any_stepped_problem>;
+
+namespace detail {
 
 /// A decrease that no rounding of a sum of squares resolves.
 [[nodiscard]] inline bool is_rounding(double decrease, double cost) { return decrease <= 1e-14 * cost; }
@@ -69,6 +98,17 @@ template <class P>
   for (Eigen::Index i = 0; i != problem.gradient().size(); ++i)
     if (const double g = problem.gradient()[i]; g != 0.0) promise += 0.5 * g * g / problem.diagonal()[i];
   return promise <= 1e-12 * problem.cost() ? step_outcome::stationary : step_outcome::exhausted;
+}
+
+/// `out = -(H + D)^-1 g` for the D last factored.
+template <class P>
+void newton_step(P& problem, Eigen::VectorXd& out) {
+  if constexpr (solves_newton<P>) {
+    problem.newton_step(out);
+  } else {
+    out = -problem.gradient();
+    problem.solve(out);
+  }
 }
 
 template <class P>
@@ -92,8 +132,7 @@ struct gauss_newton {
   [[nodiscard]] step_outcome advance(state&, P& problem, step_workspace& w) const {
     const Eigen::VectorXd none;
     if (!problem.factor(none)) return step_outcome::singular;
-    w.step = -problem.gradient();
-    problem.solve(w.step);
+    detail::newton_step(problem, w.step);
     if (detail::is_rounding(-0.5 * problem.gradient().dot(w.step), problem.cost())) return step_outcome::stationary;
     return std::isfinite(problem.try_step(w.step)) ? step_outcome::taken : step_outcome::exhausted;
   }
@@ -117,8 +156,7 @@ struct levenberg_marquardt {
     for (int attempt = 0; attempt != max_attempts; ++attempt) {
       w.damping = s.lambda * w.metric;
       if (problem.factor(w.damping)) {
-        w.step = -problem.gradient();
-        problem.solve(w.step);
+        detail::newton_step(problem, w.step);
         w.scratch = w.step.cwiseProduct(w.damping);
         const double predicted = 0.5 * (w.scratch.dot(w.step) - problem.gradient().dot(w.step));
         if (detail::is_rounding(predicted, problem.cost())) return detail::bottom_or_stuck(problem);
@@ -200,10 +238,12 @@ struct dogleg {
       definite = problem.factor(w.damping);
     }
     if (!definite) return false;
-    w.newton = -problem.gradient();
-    problem.solve(w.newton);
+    detail::newton_step(problem, w.newton);
     return true;
   }
 };
+
+static_assert(general_damping_policy<gauss_newton> && general_damping_policy<levenberg_marquardt> &&
+              general_damping_policy<dogleg>);
 
 }  // namespace orbis::optimize

@@ -111,6 +111,13 @@ struct unit_sphere {
 template <class M, int... Free>
 struct subset {
   static_assert(((Free >= 0 && Free < M::dimension) && ...), "a coordinate that the manifold does not have");
+  static_assert(
+      [](auto... i) {
+        std::array<int, M::dimension> times{};
+        (++times[static_cast<std::size_t>(i)], ...);
+        return std::all_of(times.begin(), times.end(), [](int n) { return n <= 1; });
+      }(Free...),
+      "a coordinate that is named twice");
 
   using point = typename M::point;
   using tangent = matrix<static_cast<int>(sizeof...(Free))>;

@@ -1,24 +1,34 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
 /// The camera pose from matches between known points and pixels, most of which may be wrong.
+///
+/// Sources: M. Fischler, R. Bolles, CACM 24 (1981); the parts as named in `ransac_policies.hpp` and `p3p.hpp`.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <concepts>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <optional>
 #include <span>
+#include <string>
 #include <utility>
 #include <vector>
 
+#include <Eigen/Eigenvalues>
+
 #include <orbis/camera/model.hpp>
+#include <orbis/camera/pinhole.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/core/se3.hpp>
+#include <orbis/core/simd.hpp>
 #include <orbis/optimize/p3p.hpp>
-#include <orbis/optimize/pose_refinement.hpp>
+#include <orbis/optimize/pnp_matches.hpp>
 #include <orbis/optimize/ransac.hpp>
+#include <orbis/optimize/small_cholesky.hpp>
 
 namespace orbis::optimize {
 
@@ -29,6 +39,10 @@ struct pnp_options {
   std::size_t max_iterations = 10000;
   std::size_t min_inliers = 6;  ///< fewer than this is a failure
   std::uint64_t seed = 1;
+  /// The matches from the best to the worst: samples are drawn in PROSAC's order. Every index once; empty where
+  /// nothing is known.
+  std::span<const std::uint32_t> best_first = {};
+  simd::level level = simd::level::avx512;  ///< at most; the outcome does not depend on it
 };
 
 struct pose_estimate {
@@ -38,17 +52,60 @@ struct pose_estimate {
   std::size_t iterations = 0;
 };
 
+/// Memory that can be used again: estimates allocate nothing but their inliers, once there is enough.
+struct pnp_workspace {
+  detail::pnp_matches matches;
+  ransac_workspace ransac;
+  std::vector<std::uint32_t> order, place, part;
+};
+
 namespace detail {
 
+/// Of half the sum of squares, for a motion on the left of the pose; `cost` is the sum itself.
+struct pose_equations {
+  mat6 h;
+  vec6 g;
+  double cost;
+};
+
+/// Gauss-Newton from `start`, as long as the cost falls; empty where it is not finite. `sum_up(pose, equations)`.
+template <class SumUp>
+[[nodiscard]] std::optional<centred_pose> descend(const centred_pose& start, int steps, SumUp&& sum_up) {
+  so3 rotation(start.rotation);  // samples give rotations up to rounding and a little more
+  centred_pose pose{rotation.rotation_matrix(), start.translation};
+  pose_equations e;
+  sum_up(pose, e);
+  for (int k = 0; k != steps; ++k) {
+    if (!std::isfinite(e.cost)) return std::nullopt;
+    // The slightest damping: enough to leave alone what the matches do not determine.
+    mat6 damped = e.h;
+    damped.diagonal() *= 1.0 + 1e-9;
+    damped.diagonal().array() += 1e-12 * e.h.diagonal().maxCoeff();
+    small_cholesky<6> factors;
+    if (!factors.set(damped) || !(factors.factor(0.0) > 0.0)) break;
+    const vec6 step = -factors.solve(e.g);
+    if (!(step.tail<3>().norm() < 1.0)) break;  // also where it is not a number
+    const se3 motion = se3::exp(step);
+    const so3 next_rotation = motion.rotation() * rotation;
+    const centred_pose next{next_rotation.rotation_matrix(), motion * pose.translation};
+    pose_equations at_next;
+    sum_up(next, at_next);
+    if (!(at_next.cost < e.cost)) break;
+    const bool small = e.cost - at_next.cost <= 1e-12 * e.cost;
+    rotation = next_rotation;
+    pose = next;
+    e = at_next;
+    if (small) break;
+  }
+  return pose;
+}
+
 /// P3P with reprojection errors in pixels, as `ransac` wants it.
-template <camera::camera_model Camera>
 class pnp_estimator {
  public:
-  /// A pose, with its inverse as scoring wants it.
   struct model {
-    se3 T_world_camera;
-    mat3 rotation;     ///< from the world to the camera
-    vec3 translation;  ///< likewise
+    centred_pose pose;
+    std::array<float, 12> rows{};  ///< the same, as the errors want it
   };
   static constexpr std::size_t sample_size = 3;
 
@@ -60,76 +117,236 @@ class pnp_estimator {
     [[nodiscard]] const model* end() const noexcept { return models.data() + size; }
   };
 
-  pnp_estimator(std::span<const vec3> points, std::span<const vec2> pixels, const Camera& camera)
-      : points_{points}, pixels_{pixels}, residual_{camera, 0.0}, rays_(points.size()) {
-    for (std::size_t i = 0; i < points.size(); ++i)
-      rays_[i] = camera.unproject(pixels[i]).value_or(vec3::Constant(std::numeric_limits<double>::quiet_NaN()));
-  }
+  pnp_estimator(pnp_matches& matches, simd::level level) : matches_{matches}, kernels_{match_kernels::at(level)} {}
 
-  [[nodiscard]] std::size_t size() const noexcept { return points_.size(); }
+  [[nodiscard]] std::size_t size() const noexcept { return matches_.size(); }
 
   [[nodiscard]] candidates fit(const std::array<std::uint32_t, 3>& s) const {
     candidates all;
-    for (const se3& pose : p3p({points_[s[0]], points_[s[1]], points_[s[2]]}, {rays_[s[0]], rays_[s[1]], rays_[s[2]]}))
-      all.models[all.size++] = with_inverse(pose);
+    for_each_p3p({matches_.points[s[0]], matches_.points[s[1]], matches_.points[s[2]]},
+                 {matches_.rays[s[0]], matches_.rays[s[1]], matches_.rays[s[2]]},
+                 [&](const mat3& rotation, const vec3& translation) {
+                   if (all.size != 4) all.models[all.size++] = made_of({rotation, translation});
+                 });
     return all;
   }
 
-  [[nodiscard]] double squared_error(const model& m, std::size_t i) const {
-    const auto pixel = residual_.camera.project(vec3(m.rotation * points_[i] + m.translation));
-    return pixel ? (*pixel - pixels_[i]).squaredNorm() : std::numeric_limits<double>::infinity();
+  void squared_errors(const model& m, std::size_t first, std::span<float, consensus_block> out) const {
+    kernels_.errors(matches_.float_columns.data() + first, matches_.stride, m.rows.data(), out.data());
   }
 
+  [[nodiscard]] double squared_error(const model& m, std::size_t i) const {
+    const vec3 p = m.pose.rotation * matches_.points[i] + m.pose.translation;
+    if (!(p.z() > 0.0)) return std::numeric_limits<double>::infinity();
+    const double* const c = matches_.columns.data() + i;
+    const std::size_t s = matches_.stride;
+    const double dx = p.x() / p.z() - c[3 * s], dy = p.y() / p.z() - c[4 * s];
+    const double u = c[5 * s] * dx + c[6 * s] * dy, v = c[7 * s] * dy;
+    return u * u + v * v;
+  }
+
+  /// A few steps of Gauss and Newton.
   [[nodiscard]] std::optional<model> refine(const model& start, std::span<const std::uint32_t> inliers) const {
-    observations_.clear();
-    for (const std::uint32_t i : inliers) observations_.push_back({.point = points_[i], .pixel = pixels_[i]});
-    outliers_.resize(inliers.size());
-    constexpr double everything = std::numeric_limits<double>::infinity();
-    const auto refined = refine_pose(std::span<const pose_observation>(observations_), residual_, start.T_world_camera,
-                                     std::span<std::uint8_t>(outliers_),
-                                     {.rounds = 1, .gate_mono = everything, .gate_depth = everything});
-    if (!refined.ok()) return std::nullopt;
-    return with_inverse(refined.T_world_camera);
+    return refine(start, inliers, 3);
+  }
+  [[nodiscard]] std::optional<model> refine(const model& start, std::span<const std::uint32_t> inliers,
+                                            int steps) const {
+    const std::size_t groups = gather(inliers);
+    const auto pose =
+        descend(start.pose, steps, [&](const centred_pose& at, pose_equations& e) { sum_up(groups, at, e); });
+    if (!pose) return std::nullopt;
+    return made_of(*pose);
+  }
+
+  [[nodiscard]] static model made_of(const centred_pose& pose) {
+    model m{pose, {}};
+    for (int row = 0; row != 3; ++row) {
+      for (int column = 0; column != 3; ++column)
+        m.rows[static_cast<std::size_t>(4 * row + column)] = static_cast<float>(pose.rotation(row, column));
+      m.rows[static_cast<std::size_t>(4 * row + 3)] = static_cast<float>(pose.translation[row]);
+    }
+    return m;
   }
 
  private:
-  [[nodiscard]] static model with_inverse(const se3& T_world_camera) {
-    const se3 inverse = T_world_camera.inverse();
-    return {T_world_camera, inverse.rotation_matrix(), inverse.translation()};
+  /// The named matches side by side, filled up with ones of no weight; returns the number of groups of four.
+  [[nodiscard]] std::size_t gather(std::span<const std::uint32_t> inliers) const {
+    const std::size_t groups = (inliers.size() + 3) / 4;
+    auto& g = matches_.gathered;
+    g.resize(match_coordinates * matches_.stride);
+    for (std::size_t k = 0; k != match_coordinates; ++k) {
+      const double* const from = matches_.columns.data() + k * matches_.stride;
+      double* const to = g.data() + k * matches_.stride;
+      for (std::size_t i = 0; i != inliers.size(); ++i) to[i] = from[inliers[i]];
+      for (std::size_t i = inliers.size(); i != 4 * groups; ++i) to[i] = k < 5 ? from[inliers[0]] : 0.0;
+    }
+    return groups;
   }
 
-  std::span<const vec3> points_;
-  std::span<const vec2> pixels_;
-  reprojection<Camera> residual_;
-  std::vector<vec3> rays_;
-  mutable std::vector<pose_observation> observations_;  // room that each refinement uses again
-  mutable std::vector<std::uint8_t> outliers_;
+  void sum_up(std::size_t groups, const centred_pose& pose, pose_equations& e) const {
+    std::array<double, 12> rows;
+    for (int row = 0; row != 3; ++row) {
+      for (int column = 0; column != 3; ++column)
+        rows[static_cast<std::size_t>(4 * row + column)] = pose.rotation(row, column);
+      rows[static_cast<std::size_t>(4 * row + 3)] = pose.translation[row];
+    }
+    std::array<double, 4 * equation_sums> sums;
+    kernels_.equations(matches_.gathered.data(), matches_.stride, groups, rows.data(), sums.data());
+    const auto total = [&](std::size_t k) {
+      return (sums[4 * k] + sums[4 * k + 2]) + (sums[4 * k + 1] + sums[4 * k + 3]);
+    };
+    std::size_t at = 0;
+    for (int a = 0; a != 6; ++a)
+      for (int b = 0; b <= a; ++b) e.h(a, b) = e.h(b, a) = total(at++);
+    for (int a = 0; a != 6; ++a) e.g[a] = total(at++);
+    e.cost = total(at);
+  }
+
+  pnp_matches& matches_;
+  match_kernels kernels_;
 };
+
+/// Why there is no pose, by the points alone; empty if they are not to blame.
+[[nodiscard]] inline std::string pnp_degeneracy(const pnp_matches& matches) {
+  mat3 covariance = mat3::Zero();
+  for (const vec3& p : matches.points) covariance += p * p.transpose();
+  const vec3 spread = Eigen::SelfAdjointEigenSolver<mat3>(covariance, Eigen::EigenvaluesOnly).eigenvalues();
+  // Up to the rounding of the points as they were, about the world's origin.
+  const double rounding = 1e-30 * matches.centre.squaredNorm() * static_cast<double>(matches.size());
+  if (!(spread[2] > rounding)) return "the points all lie in one place";
+  if (!(spread[1] > 1e-12 * spread[2])) return "the points all lie on one line";
+  return {};
+}
 
 }  // namespace detail
 
-/// The pose from which the most of `points_world[i]` appear at `pixels[i]`: P3P in RANSAC, each new
-/// best pose refined on its inliers. Matches that are not finite are outliers; a pixel that the camera cannot
-/// un-project is never drawn. Deterministic by `options.seed`.
-/// Errors: `invalid_argument` for spans of different length or options out of range, `no_data` below
-/// three matches, `degenerate` where no pose has `min_inliers` inliers.
+/// The pose from which the most of `points_world[i]` (metres) appear at `pixels[i]`: P3P in RANSAC with a sequential
+/// test of its models, each new best one refined on its inliers. Matches that are not finite are outliers, as are
+/// pixels that the camera cannot un-project. Deterministic by `options.seed`. `workspace` holds no state.
+/// Errors: `invalid_argument` for spans of different length or options out of range, `no_data` below three matches,
+/// `degenerate` where fewer than three can be used, where all points lie on a line or in one place, or where no pose
+/// has `min_inliers` inliers; the message says which.
+template <camera::camera_model Camera>
+[[nodiscard]] result<pose_estimate> estimate_pose(std::span<const vec3> points_world, std::span<const vec2> pixels,
+                                                  const Camera& camera, const pnp_options& options,
+                                                  pnp_workspace& workspace) {
+  constexpr const char* where = "pnp";
+  const std::size_t n = points_world.size();
+  if (n != pixels.size()) return fail(errc::invalid_argument, where, "the lists of points and pixels differ in length");
+  if (!options.best_first.empty() && options.best_first.size() != n)
+    return fail(errc::invalid_argument, where, "the order of the matches names not each of them once");
+  if (n < 3) return fail(errc::no_data, where, "fewer than three matches");
+
+  detail::pnp_matches& matches = workspace.matches;
+  matches.assign(points_world, pixels, camera, options.seed);
+  if (matches.size() < 3)
+    return fail(errc::degenerate, where,
+                "of " + std::to_string(n) + " matches " + std::to_string(matches.size()) +
+                    " are finite and in the camera's view, three are needed");
+  const detail::pnp_estimator estimator(matches, options.level);
+  const ransac_options asked{.threshold = options.threshold,
+                             .confidence = options.confidence,
+                             .min_iterations = options.min_iterations,
+                             .max_iterations = options.max_iterations,
+                             .seed = options.seed};
+  const auto search = [&](const auto& sampling) {
+    return ransac(estimator, asked, ransac_policies{msac{}, sampling, sprt{}, iterated_refinement{}}, workspace.ransac);
+  };
+  result<ransac_estimate<detail::pnp_estimator::model>> found = [&] {
+    if (options.best_first.empty()) return search(uniform_sampling{});
+    auto& place = workspace.place;
+    auto& order = workspace.order;
+    place.assign(n, std::numeric_limits<std::uint32_t>::max());
+    for (std::size_t i = 0; i != matches.size(); ++i) place[matches.original[i]] = static_cast<std::uint32_t>(i);
+    order.clear();
+    order.reserve(n);
+    for (const std::uint32_t i : options.best_first)
+      if (i < n && place[i] < n) order.push_back(std::exchange(place[i], std::numeric_limits<std::uint32_t>::max()));
+    if (order.size() != matches.size())
+      return result<ransac_estimate<detail::pnp_estimator::model>>(
+          fail(errc::invalid_argument, where, "the order of the matches names not each of them once"));
+    return search(prosac{order});
+  }();
+  if (!found) {
+    if (found.error().code != errc::degenerate) return fail(found.error());
+    const std::string why = detail::pnp_degeneracy(matches);
+    return fail(errc::degenerate, where, why.empty() ? found.error().message : why);
+  }
+
+  // From here on with the camera as it is: the pose of the least truncated squared error, and its inliers.
+  const double squared_threshold = options.threshold * options.threshold;
+  const auto error_at = [&](const se3& T_camera_world, std::size_t i) {
+    const auto pixel = camera.project(T_camera_world * points_world[i]);
+    return pixel ? (*pixel - pixels[i]).squaredNorm() : std::numeric_limits<double>::infinity();
+  };
+  std::vector<std::uint32_t> inliers;
+  inliers.reserve(n);
+  double sum = 0.0;
+  const auto judge = [&](const se3& T_world_camera) {  // the score; the inliers and their sum of squares
+    const se3 T_camera_world = T_world_camera.inverse();
+    inliers.clear();
+    sum = 0.0;
+    for (std::size_t i = 0; i != n; ++i) {
+      const double e = error_at(T_camera_world, i);
+      if (!(e < squared_threshold)) continue;
+      inliers.push_back(static_cast<std::uint32_t>(i));
+      sum += e;
+    }
+    return sum + squared_threshold * static_cast<double>(n - inliers.size());
+  };
+  const auto in_world = [&](const detail::centred_pose& p) {
+    const so3 rotation(p.rotation);
+    return se3(rotation, p.translation - rotation * matches.centre).inverse();
+  };
+  detail::pnp_estimator::model model = found->model;
+  if (const auto polished = estimator.refine(model, found->inliers, 10)) model = *polished;
+  se3 pose = in_world(model.pose);
+  double score = judge(pose);
+  if constexpr (!std::same_as<Camera, camera::pinhole>) {  // for which the loops above are exact
+    for (int k = 0; k != 3 && inliers.size() >= 3; ++k) {
+      workspace.part.assign(inliers.begin(), inliers.end());
+      const auto sum_up = [&](const detail::centred_pose& at, detail::pose_equations& e) {
+        e = {mat6::Zero(), vec6::Zero(), 0.0};
+        for (const std::uint32_t i : workspace.part) {
+          const vec3 p = at.rotation * (points_world[i] - matches.centre) + at.translation;
+          matrix<2, 3> j;
+          const auto pixel = camera.project(p, j);
+          if (!pixel) {
+            e.cost = std::numeric_limits<double>::infinity();
+            return;
+          }
+          matrix<2, 6> by_motion;
+          by_motion << j, -(j * hat<double>(p));
+          const vec2 r = *pixel - pixels[i];
+          e.h.noalias() += by_motion.transpose() * by_motion;
+          e.g.noalias() += by_motion.transpose() * r;
+          e.cost += r.squaredNorm();
+        }
+      };
+      const auto refined = detail::descend(model.pose, 10, sum_up);
+      if (!refined) break;
+      const double next = judge(in_world(*refined));
+      if (!(next < score)) break;
+      score = next;
+      model.pose = *refined;
+      pose = in_world(model.pose);
+    }
+  }
+  if (const double again = judge(pose); !(again <= score)) score = again;
+  const std::size_t needed = std::max<std::size_t>(3, options.min_inliers);
+  if (inliers.size() < needed)
+    return fail(errc::degenerate, where,
+                "no pose has enough inliers: " + std::to_string(inliers.size()) + " of " + std::to_string(n) +
+                    " matches, " + std::to_string(needed) + " are wanted");
+  const double rmse = std::sqrt(sum / static_cast<double>(inliers.size()));
+  return pose_estimate{pose, std::move(inliers), rmse, found->iterations};
+}
+
 template <camera::camera_model Camera>
 [[nodiscard]] result<pose_estimate> estimate_pose(std::span<const vec3> points_world, std::span<const vec2> pixels,
                                                   const Camera& camera, const pnp_options& options = {}) {
-  if (points_world.size() != pixels.size())
-    return fail(errc::invalid_argument, "pnp", "the lists of points and pixels differ in length");
-  const detail::pnp_estimator<Camera> estimator(points_world, pixels, camera);
-  auto found = ransac(estimator, {.threshold = options.threshold,
-                                  .confidence = options.confidence,
-                                  .min_iterations = options.min_iterations,
-                                  .max_iterations = options.max_iterations,
-                                  .min_inliers = options.min_inliers,
-                                  .seed = options.seed});
-  if (!found) return fail(found.error());
-  double sum = 0.0;
-  for (const std::uint32_t i : found->inliers) sum += estimator.squared_error(found->model, i);
-  const double rmse = std::sqrt(sum / static_cast<double>(found->inliers.size()));
-  return pose_estimate{found->model.T_world_camera, std::move(found->inliers), rmse, found->iterations};
+  pnp_workspace workspace;
+  return estimate_pose(points_world, pixels, camera, options, workspace);
 }
 
 }  // namespace orbis::optimize

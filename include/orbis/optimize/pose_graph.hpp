@@ -9,7 +9,6 @@
 
 #include <algorithm>
 #include <cassert>
-#include <chrono>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -29,6 +28,7 @@
 #include <orbis/optimize/pose_graph_structure.hpp>
 #include <orbis/optimize/pose_graph_summary.hpp>
 #include <orbis/optimize/robust_loss.hpp>
+#include <orbis/optimize/stage_watch.hpp>
 
 namespace orbis::optimize {
 
@@ -44,17 +44,11 @@ struct default_between<se3> {
 template <class T>
 using default_between_t = typename default_between<T>::type;
 
-namespace detail {
-struct no_report {
-  void operator()(const pose_graph_summary&) const noexcept {}
-};
-}  // namespace detail
-
 /// Made of a residual, a robust loss, a damping policy and a manifold, e.g.
 /// `pose_graph_solver<se3, huber, levenberg_marquardt> solver{huber{1.0}}`. Keeps its memory: solving a graph with
 /// the same edges again allocates nothing (with `orbis::seq`). Not for several threads at once.
-template <class T, robust_loss Loss = trivial, class Damping = dogleg, between_factor<T> Between = default_between_t<T>,
-          manifold Manifold = lie_group<T>>
+template <class T, robust_loss Loss = trivial, general_damping_policy Damping = dogleg,
+          between_factor<T> Between = default_between_t<T>, manifold Manifold = lie_group<T>>
 requires std::same_as<typename Manifold::point, T>
 class pose_graph_solver {
  public:
@@ -93,26 +87,12 @@ class pose_graph_solver {
   static constexpr int size = Manifold::dimension;
   using block = matrix<size, size>;
   using vector = matrix<size>;
-  using clock = std::chrono::steady_clock;
   static constexpr std::size_t grain = 256;  ///< of loops over bundles and vertices
 
   /// What the edges of a bundle add to the normal equations.
   struct share {
     block from, to;
     vector gradient_from, gradient_to;
-  };
-
-  /// Adds the time from its making to its end.
-  class stopwatch {
-   public:
-    explicit stopwatch(double& total) : total_{total}, start_{clock::now()} {}
-    stopwatch(const stopwatch&) = delete;
-    stopwatch& operator=(const stopwatch&) = delete;
-    ~stopwatch() { total_ += std::chrono::duration<double>(clock::now() - start_).count(); }
-
-   private:
-    double& total_;
-    clock::time_point start_;
   };
 
   /// The graph as the damping policies see it.
@@ -124,7 +104,7 @@ class pose_graph_solver {
     pose_graph_summary& summary;
 
     void linearize() {
-      const stopwatch watch{summary.seconds.linearize};
+      const detail::stage_watch watch{summary.seconds.linearize};
       solver.linearize(policy, edges);
     }
     [[nodiscard]] double cost() const { return solver.cost_; }
@@ -132,17 +112,17 @@ class pose_graph_solver {
     [[nodiscard]] const Eigen::VectorXd& diagonal() const { return solver.diagonal_; }
     [[nodiscard]] double curvature(const Eigen::VectorXd& x) const { return solver.curvature(x); }
     [[nodiscard]] bool factor(const Eigen::VectorXd& damping) {
-      const stopwatch watch{summary.seconds.factor};
+      const detail::stage_watch watch{summary.seconds.factor};
       ++summary.factorizations;
       return solver.cholesky_.factor(solver.on_diagonal_, solver.off_diagonal_,
                                      {damping.data(), static_cast<std::size_t>(damping.size())});
     }
     void solve(Eigen::VectorXd& x) {
-      const stopwatch watch{summary.seconds.solve};
+      const detail::stage_watch watch{summary.seconds.solve};
       solver.cholesky_.solve({x.data(), static_cast<std::size_t>(x.size())});
     }
     [[nodiscard]] double try_step(const Eigen::VectorXd& step) {
-      const stopwatch watch{summary.seconds.evaluate};
+      const detail::stage_watch watch{summary.seconds.evaluate};
       return solver.tried_cost_ = solver.evaluate(policy, edges, step);
     }
   };
@@ -181,7 +161,7 @@ class pose_graph_solver {
   [[nodiscard]] bool set_up(std::span<const T> vertices, const Edges& edges, const pose_graph_options& options,
                             pose_graph_summary& summary) {
     assert(options.fixed.empty() || options.fixed.size() == vertices.size());
-    const stopwatch watch{summary.seconds.set_up};
+    const detail::stage_watch watch{summary.seconds.set_up};
     const auto fails = [&](const detail::pose_graph_finding& finding) {
       summary.status = finding.status;
       summary.where = finding.where;
@@ -329,7 +309,7 @@ class pose_graph_solver {
 
 /// Solves a pose graph once; see `pose_graph_solver::solve`.
 template <execution_policy Policy, std::ranges::contiguous_range Vertices, std::ranges::contiguous_range Edges,
-          robust_loss Loss = trivial, class Damping = dogleg>
+          robust_loss Loss = trivial, general_damping_policy Damping = dogleg>
 pose_graph_summary solve_pose_graph(const Policy& policy, Vertices&& vertices, const Edges& edges,
                                     const pose_graph_options& options = {}, progress callback = {},
                                     const Loss& loss = {}, const Damping& damping = {}) {

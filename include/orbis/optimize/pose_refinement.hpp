@@ -3,8 +3,10 @@
 /// Pose-only refinement: the camera pose that best explains observations of known points.
 ///
 /// Levenberg-Marquardt on SE(3) in rounds; after each round every observation is judged anew by its
-/// chi-squared at the current pose, and the last round goes without the robust loss. Works on the
-/// caller's arrays and the stack; never allocates.
+/// chi-squared at the current pose, and the last round goes without the robust loss. Eight observations
+/// go through the same arithmetic at once. Works on the stack (about 80 kB); never allocates.
+///
+/// Source of the rounds: R. Mur-Artal, J. D. Tardos, "ORB-SLAM2", T-RO 33 (2017).
 #pragma once
 
 #include <algorithm>
@@ -17,10 +19,13 @@
 #include <span>
 #include <string_view>
 
-#include <Eigen/Cholesky>
-
+#include <orbis/core/simd.hpp>
+#include <orbis/optimize/graduated.hpp>
+#include <orbis/optimize/pose_kernels.hpp>
+#include <orbis/optimize/pose_pieces.hpp>
 #include <orbis/optimize/reprojection.hpp>
 #include <orbis/optimize/robust_loss.hpp>
+#include <orbis/optimize/small_cholesky.hpp>
 
 namespace orbis::optimize {
 
@@ -45,9 +50,10 @@ enum class refinement_status {
 
 struct pose_refinement_options {
   int rounds = 4;
-  int iterations = 10;        ///< per round
-  double gate_mono = 5.991;   ///< chi-squared, 95 %, two degrees of freedom
-  double gate_depth = 7.815;  ///< three degrees of freedom
+  int iterations = 10;                     ///< per round
+  double gate_mono = 5.991;                ///< chi-squared, 95 %, two degrees of freedom
+  double gate_depth = 7.815;               ///< three degrees of freedom
+  simd::level simd = simd::level::avx512;  ///< the best instructions to use if there are such; no result depends on it
 };
 
 struct pose_refinement {
@@ -64,151 +70,201 @@ struct pose_refinement {
 namespace detail {
 
 struct pose_normal_equations {
-  mat6 h = mat6::Zero();
-  vec6 g = vec6::Zero();
-  double cost = 0.0;  ///< half the robust sum
+  mat6 h;  ///< the lower triangle
+  vec6 g;
+  double cost;  ///< half the robust sum
 };
 
-/// Whether the six directions of the pose are determined: the pivots of the equations scaled to a
-/// unit diagonal are well above rounding.
-[[nodiscard]] inline bool is_determined(const mat6& h) {
-  vec6 scale = h.diagonal();
-  if (!(scale.minCoeff() > 0.0) || !scale.allFinite()) return false;
-  scale = scale.cwiseSqrt().cwiseInverse();
-  const Eigen::LDLT<mat6> scaled(mat6(scale.asDiagonal() * h * scale.asDiagonal()));
-  return scaled.vectorD().minCoeff() > 1e-11;
+/// A refinement under way, for a camera that is one model.
+template <class Camera>
+class pose_refiner {
+ public:
+  pose_refiner(std::span<const pose_observation> observations, const Camera& camera, double bf, const se3& start,
+               std::span<std::uint8_t> outliers, const pose_refinement_options& options)
+      : observations_{observations},
+        camera_{camera},
+        bf_{bf},
+        T_camera_world_{start.inverse()},
+        outliers_{outliers},
+        options_{options},
+        pieces_{observations, outliers} {}
+
+  /// Steps downhill until a step gains no more than `enough` of the cost.
+  template <class Loss>
+  [[nodiscard]] refinement_status run_round(const Loss& loss, double enough) {
+    double lambda = 1e-6;
+    pose_normal_equations now = linearize(T_camera_world_, loss);
+    for (int k = 0; k < options_.iterations; ++k) {
+      small_cholesky<6> cholesky;
+      if (!cholesky.set(now.h) || !(cholesky.factor(0.0) > cholesky.determined)) return refinement_status::degenerate;
+      bool accepted = false;
+      double gain = 0.0;
+      for (int attempt = 0; attempt < 8 && !accepted; ++attempt, lambda *= accepted ? 1.0 : 10.0) {
+        if (!(cholesky.factor(lambda) > 0.0)) continue;
+        const vec6 step = cholesky.solve(-now.g);
+        if (!step.allFinite()) continue;
+        // What the step gains by the model is at least half of this.
+        if (-now.g.dot(step) <= negligible * now.cost || step.squaredNorm() < 1e-20)
+          return refinement_status::converged;
+        const se3 there = se3::exp(step) * T_camera_world_;
+        const pose_normal_equations then = linearize(there, loss);
+        if (!(then.cost < now.cost)) continue;
+        accepted = true;
+        gain = now.cost - then.cost;
+        now = then;
+        T_camera_world_ = there;
+      }
+      if (!accepted) return refinement_status::converged;
+      ++steps_;
+      lambda = std::max(1e-9, lambda * 0.1);
+      if (gain <= enough * now.cost) return refinement_status::converged;
+    }
+    return refinement_status::iteration_limit;
+  }
+
+  /// Judges every observation at the current pose. Returns whether any changed sides.
+  bool apply_gates() {
+    bool changed = false;
+    inliers_ = 0;
+    cost_ = 0.0;
+    std::array<double, pose_lanes::capacity> chi2;
+    const pose_at at = at_pose(T_camera_world_);
+    auto* judge = pose_kernels<Camera, trivial>::judge(options_.simd);
+    pieces_.for_each([&](const pose_lanes& lanes, std::size_t first, std::size_t count, std::size_t padded) {
+      judge(lanes, padded, camera_, at, chi2.data());
+      for (std::size_t i = 0; i != count; ++i) {
+        const double gate = observations_[first + i].has_depth() ? options_.gate_depth : options_.gate_mono;
+        const bool inside = chi2[i] <= gate && chi2[i] < std::numeric_limits<double>::infinity();
+        changed = changed || (outliers_[first + i] == 0) != inside;
+        outliers_[first + i] = inside ? 0 : 1;
+        inliers_ += inside ? 1U : 0U;
+        cost_ += inside ? 0.5 * chi2[i] : 0.0;
+      }
+    });
+    if (changed) pieces_.update();
+    return changed;
+  }
+
+  [[nodiscard]] se3 T_world_camera() const { return T_camera_world_.inverse(); }
+  [[nodiscard]] std::size_t inliers() const noexcept { return inliers_; }
+  [[nodiscard]] double cost() const noexcept { return cost_; }
+  [[nodiscard]] int steps() const noexcept { return steps_; }
+
+ private:
+  /// Relative to the cost, below what a sum of squares resolves in practice.
+  static constexpr double negligible = 1e-13;
+
+  [[nodiscard]] pose_at at_pose(const se3& pose) const {
+    return {pose.rotation_matrix(), pose.translation(), bf_, options_.gate_depth};
+  }
+
+  template <class Loss>
+  [[nodiscard]] pose_normal_equations linearize(const se3& pose, const Loss& loss) {
+    pose_normal_equations e{mat6::Zero(), vec6::Zero(), 0.0};
+    const pose_at at = at_pose(pose);
+    auto* sum = pose_kernels<Camera, Loss>::sum(options_.simd);
+    pieces_.for_each([&](const pose_lanes& lanes, std::size_t, std::size_t, std::size_t padded) {
+      pose_sums s;
+      sum(lanes, padded, camera_, at, loss, s);
+      for (int row = 0, k = 0; row != 3; ++row)
+        for (int column = 0; column <= row; ++column, ++k) {
+          e.h(row, column) += s.translation[static_cast<std::size_t>(k)];
+          e.h(3 + row, 3 + column) += s.rotation[static_cast<std::size_t>(k)];
+        }
+      for (int i = 0; i != 9; ++i) e.h(3 + i % 3, i / 3) += s.corner[static_cast<std::size_t>(i)];
+      for (int i = 0; i != 6; ++i) e.g[i] += s.gradient[static_cast<std::size_t>(i)];
+      e.cost += s.cost;
+    });
+    return e;
+  }
+
+  std::span<const pose_observation> observations_;
+  const Camera& camera_;
+  double bf_;
+  se3 T_camera_world_;
+  std::span<std::uint8_t> outliers_;
+  const pose_refinement_options& options_;
+  pose_pieces pieces_;
+  std::size_t inliers_ = 0;
+  double cost_ = 0.0;
+  int steps_ = 0;
+};
+
+/// A camera whose model is known at run time only.
+template <class Camera>
+concept holds_a_model = requires(const Camera& camera) {
+  {camera.visit([](const auto&) {})};
+};
+
+template <class Camera, class Loss>
+[[nodiscard]] pose_refinement refine_pose(std::span<const pose_observation> observations, const Camera& camera,
+                                          double bf, const se3& T_world_camera, std::span<std::uint8_t> outliers,
+                                          const pose_refinement_options& options, const Loss& loss) {
+  pose_refinement out;
+  out.T_world_camera = T_world_camera;
+  const auto give_up = [&](refinement_status status) {
+    std::fill(outliers.begin(), outliers.end(), std::uint8_t{1});
+    out.status = status;
+    return out;
+  };
+  if (!(T_world_camera.to_matrix().cwiseAbs().maxCoeff<Eigen::PropagateNaN>() < 1e100))
+    return give_up(refinement_status::invalid_start);
+
+  std::size_t active = 0;
+  for (std::size_t i = 0; i < observations.size(); ++i) {
+    outliers[i] = pose_pieces::usable(observations[i]) ? 0 : 1;
+    active += outliers[i] == 0;
+  }
+  if (active < 3) return give_up(refinement_status::too_few_observations);
+
+  pose_refiner<Camera> refiner(observations, camera, bf, T_world_camera, outliers, options);
+  bool changed = true;
+  for (int round = 0; round < options.rounds; ++round) {
+    const bool last = round + 1 == options.rounds;
+    if (last)
+      out.status = refiner.run_round(trivial{}, 1e-9);
+    else if (changed || loss_schedule<Loss> || out.status != refinement_status::converged)
+      out.status = refiner.run_round(stage_of(loss, round), 1e-6);  // it only has to tell the outliers
+    else
+      continue;  // the same problem as the last round solved
+    if (out.status == refinement_status::degenerate) return give_up(out.status);
+    changed = refiner.apply_gates();
+    if (refiner.inliers() < 3) return give_up(refinement_status::too_few_observations);
+  }
+  if (options.rounds <= 0) {  // judged only
+    out.status = refinement_status::iteration_limit;
+    refiner.apply_gates();
+    if (refiner.inliers() < 3) return give_up(refinement_status::too_few_observations);
+  }
+  out.inliers = refiner.inliers();
+  out.cost = refiner.cost();
+  out.iterations = refiner.steps();
+  out.T_world_camera = refiner.T_world_camera();
+  return out;
 }
 
 }  // namespace detail
 
 /// Refines `T_world_camera` and writes for each observation whether it is an outlier (1) or not (0).
-/// Observations that are not finite, of no information, or without a projection are outliers.
+/// Observations that are not finite, of no information, or without a projection are outliers. A
+/// `loss_schedule` gives each round its own loss.
+///
+/// O(observations) for every step. The result is the same for every instruction set; among cameras,
+/// those with a `camera::lanes_of` of their own are the fastest.
 /// @pre outliers.size() == observations.size()
-template <camera::camera_model Camera, robust_loss Loss = huber>
+template <camera::camera_model Camera, loss_or_schedule Loss = huber>
 [[nodiscard]] pose_refinement refine_pose(std::span<const pose_observation> observations,
                                           const reprojection<Camera>& model, const se3& T_world_camera,
                                           std::span<std::uint8_t> outliers, const pose_refinement_options& options = {},
                                           const Loss& loss = Loss{2.447}) {
   assert(outliers.size() == observations.size());
-  pose_refinement out;
-  out.T_world_camera = T_world_camera;
-  std::fill(outliers.begin(), outliers.end(), std::uint8_t{1});
-  if (!T_world_camera.to_matrix().allFinite()) {
-    out.status = refinement_status::invalid_start;
-    return out;
-  }
-  const auto usable = [](const pose_observation& o) {
-    return o.point.allFinite() && o.pixel.allFinite() && !std::isinf(o.right) && o.information > 0.0 &&
-           std::isfinite(o.information);
+  const auto refine = [&](const auto& camera) {
+    return detail::refine_pose(observations, camera, model.bf, T_world_camera, outliers, options, loss);
   };
-  std::size_t active = 0;
-  for (std::size_t i = 0; i < observations.size(); ++i) {
-    outliers[i] = usable(observations[i]) ? 0 : 1;
-    active += outliers[i] == 0;
-  }
-
-  se3 T_camera_world = T_world_camera.inverse();
-
-  // A point behind the camera costs as much as one at the edge of the gate, so that a step cannot
-  // gain by losing points.
-  const auto linearize = [&](const se3& pose, const auto& rho) {
-    detail::pose_normal_equations e;
-    const mat3 rotation = pose.rotation_matrix();
-    for (std::size_t i = 0; i < observations.size(); ++i) {
-      if (outliers[i] != 0) continue;
-      const pose_observation& o = observations[i];
-      const vec3 p = rotation * o.point + pose.translation();
-      mat3 j;
-      const auto r = model.residual(p, o, j);
-      if (!r) {
-        e.cost += 0.5 * rho.cost(options.gate_depth);
-        continue;
-      }
-      const double chi2 = o.information * r->squaredNorm();
-      e.cost += 0.5 * rho.cost(chi2);
-      const double w = rho.weight(chi2) * o.information;
-      // Left perturbation, exp(xi) * T: the point moves by rho + phi x p.
-      matrix<3, 6> full;
-      full.leftCols<3>() = j;
-      for (int row = 0; row < 3; ++row) full.row(row).tail<3>() = p.cross(vec3(j.row(row).transpose())).transpose();
-      e.h.noalias() += w * full.transpose() * full;
-      e.g.noalias() += w * full.transpose() * *r;
-    }
-    return e;
-  };
-  const auto cost_at = [&](const se3& pose, const auto& rho) {
-    double cost = 0.0;
-    const mat3 rotation = pose.rotation_matrix();
-    for (std::size_t i = 0; i < observations.size(); ++i) {
-      if (outliers[i] != 0) continue;
-      const pose_observation& o = observations[i];
-      const auto r = model.residual(rotation * o.point + pose.translation(), o);
-      cost += 0.5 * rho.cost(r ? o.information * r->squaredNorm() : options.gate_depth);
-    }
-    return cost;
-  };
-  const auto give_up = [&](refinement_status status) {
-    out.status = status;
-    out.T_world_camera = T_world_camera;
-    std::fill(outliers.begin(), outliers.end(), std::uint8_t{1});
-    out.inliers = 0;
-    out.cost = 0.0;
-    return out;
-  };
-
-  const auto run_round = [&](const auto& rho) {
-    double lambda = 1e-6;
-    auto equations = linearize(T_camera_world, rho);
-    for (int k = 0; k < options.iterations; ++k) {
-      if (!detail::is_determined(equations.h)) return refinement_status::degenerate;
-      bool accepted = false;
-      double gain = 0.0;
-      for (int attempt = 0; attempt < 8 && !accepted; ++attempt, lambda *= accepted ? 1.0 : 10.0) {
-        mat6 damped = equations.h;
-        damped.diagonal() *= 1.0 + lambda;
-        const vec6 step = damped.ldlt().solve(vec6(-equations.g));
-        if (!step.allFinite()) continue;
-        if (step.squaredNorm() < 1e-20) return refinement_status::converged;
-        const se3 candidate = se3::exp(step) * T_camera_world;
-        const double cost = cost_at(candidate, rho);
-        if (!(cost < equations.cost)) continue;
-        accepted = true;
-        gain = equations.cost - cost;
-        T_camera_world = candidate;
-      }
-      if (!accepted) return refinement_status::converged;
-      ++out.iterations;
-      lambda = std::max(1e-9, lambda * 0.1);
-      if (gain <= 1e-9 * equations.cost) return refinement_status::converged;
-      equations = linearize(T_camera_world, rho);
-    }
-    return refinement_status::iteration_limit;
-  };
-
-  for (int round = 0; round < options.rounds; ++round) {
-    if (active < 3) return give_up(refinement_status::too_few_observations);
-    const bool last = round + 1 == options.rounds;
-    out.status = last ? run_round(trivial{}) : run_round(loss);
-    if (out.status == refinement_status::degenerate) return give_up(out.status);
-    active = 0;
-    out.cost = 0.0;
-    for (std::size_t i = 0; i < observations.size(); ++i) {
-      const pose_observation& o = observations[i];
-      outliers[i] = 1;
-      if (!usable(o)) continue;
-      const auto r = model.residual(T_camera_world * o.point, o);
-      if (!r) continue;
-      const double chi2 = o.information * r->squaredNorm();
-      if (!(chi2 <= (o.has_depth() ? options.gate_depth : options.gate_mono))) continue;
-      outliers[i] = 0;
-      out.cost += 0.5 * chi2;
-      ++active;
-    }
-  }
-  if (active < 3) return give_up(refinement_status::too_few_observations);
-  out.inliers = active;
-  out.T_world_camera = T_camera_world.inverse();
-  return out;
+  if constexpr (detail::holds_a_model<Camera>)
+    return model.camera.visit(refine);
+  else
+    return refine(model.camera);
 }
 
 }  // namespace orbis::optimize

@@ -1,24 +1,27 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// RANSAC over any model: deterministic by seed, scored by MSAC, with a local-optimisation hook.
+/// RANSAC over any model: deterministic by seed; scoring, order of samples, preemption and local optimisation are
+/// types (see `ransac_policies.hpp`).
 ///
-/// Sources: M. Fischler, R. Bolles, CACM 24 (1981); P. Torr, A. Zisserman, "MLESAC", CVIU 78 (2000)
-/// for the truncated score; O. Chum, J. Matas, J. Kittler, "Locally optimized RANSAC", DAGM 2003.
+/// Sources: M. Fischler, R. Bolles, CACM 24 (1981); R. Raguram et al., "USAC: a universal framework for random sample
+/// consensus", PAMI 35 (2013), for the parts and how they go together.
 #pragma once
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <concepts>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <optional>
 #include <span>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include <orbis/core/random.hpp>
 #include <orbis/core/result.hpp>
+#include <orbis/optimize/ransac_policies.hpp>
 
 namespace orbis::optimize {
 
@@ -42,6 +45,18 @@ concept model_estimator = requires(const E& estimator, const typename E::model& 
   { estimator.refine(model, indices) } -> std::same_as<std::optional<typename E::model>>;
 };
 
+/// So many data are scored at a time.
+inline constexpr std::size_t consensus_block = 32;
+
+/// An estimator that can tell the errors of many data at once: `squared_errors(model, first, out)` writes those of
+/// `consensus_block` data from `first` on, a multiple of it; what it writes for data beyond the last does not matter.
+/// They decide in which order models rank; that an inlier is within the threshold is by `squared_error`.
+template <class E>
+concept block_estimator = model_estimator<E> && requires(const E& estimator, const typename E::model& model,
+                                                         std::size_t first, std::span<float, consensus_block> out) {
+  estimator.squared_errors(model, first, out);
+};
+
 struct ransac_options {
   double threshold = 1.0;  ///< largest error of an inlier, in the estimator's units (not squared)
   double confidence = 0.9999;
@@ -52,28 +67,34 @@ struct ransac_options {
   std::uint64_t seed = 1;
 };
 
+/// What RANSAC is made of, beside the estimator.
+template <consensus_score Score = msac, sampling_order Sampling = uniform_sampling,
+          preemption_test Preemption = bail_out, local_optimization LocalOptimization = iterated_refinement>
+struct ransac_policies {
+  Score score{};
+  Sampling sampling{};
+  Preemption preemption{};
+  LocalOptimization optimization{};
+};
+template <class Score, class Sampling, class Preemption, class LocalOptimization>
+ransac_policies(Score, Sampling, Preemption, LocalOptimization)
+    -> ransac_policies<Score, Sampling, Preemption, LocalOptimization>;
+
+/// Memory that can be used again; with it, nothing is allocated but the inliers of the answer.
+struct ransac_workspace {
+  std::vector<std::uint32_t> inliers, part;
+};
+
 template <class Model>
 struct ransac_estimate {
   Model model;
   std::vector<std::uint32_t> inliers;  ///< exactly the data within the threshold of `model`, ascending
-  double score = 0.0;                  ///< sum over all data of min(squared error, squared threshold)
+  double score = 0.0;                  ///< sum over all data of what the scoring says; with `msac` that of
+                                       ///< min(squared error, squared threshold)
   std::size_t iterations = 0;
 };
 
 namespace detail {
-
-/// The truncated sum of squared errors, given up as soon as it exceeds `limit`.
-template <model_estimator E>
-[[nodiscard]] double msac_score(const E& estimator, const typename E::model& model, double squared_threshold,
-                                double limit) {
-  double score = 0.0;
-  const std::size_t n = estimator.size();
-  for (std::size_t i = 0; i < n && score < limit; ++i) {
-    const double e = estimator.squared_error(model, i);
-    score += e < squared_threshold ? e : squared_threshold;  // NaN counts as an outlier
-  }
-  return score;
-}
 
 template <model_estimator E>
 void collect_inliers(const E& estimator, const typename E::model& model, double squared_threshold,
@@ -84,36 +105,159 @@ void collect_inliers(const E& estimator, const typename E::model& model, double 
     if (estimator.squared_error(model, i) < squared_threshold) inliers.push_back(static_cast<std::uint32_t>(i));
 }
 
-/// `N` distinct numbers below `n`. @pre n >= N
-template <std::size_t N>
-[[nodiscard]] std::array<std::uint32_t, N> draw_sample(random_bits& random, std::size_t n) {
-  std::array<std::uint32_t, N> sample{};
-  for (std::size_t k = 0; k < N; ++k) {
-    do {
-      sample[k] = random.below(static_cast<std::uint32_t>(n));
-    } while (std::find(sample.begin(), sample.begin() + static_cast<std::ptrdiff_t>(k), sample[k]) !=
-             sample.begin() + static_cast<std::ptrdiff_t>(k));
-  }
-  return sample;
-}
+/// The state of one RANSAC.
+template <model_estimator E, class Policies>
+class ransac_run {
+ public:
+  using model = typename E::model;
+  static constexpr std::size_t sample_size = E::sample_size;
 
-/// How many samples it takes to draw, with the wanted confidence, one without an outlier.
-[[nodiscard]] inline double wanted_iterations(double confidence, double inlier_ratio, std::size_t sample_size) {
-  const double clean = std::pow(inlier_ratio, static_cast<double>(sample_size));
-  if (clean >= 1.0) return 0.0;
-  if (clean < 1e-12) return std::numeric_limits<double>::infinity();
-  return std::log(1.0 - confidence) / std::log1p(-clean);
+  ransac_run(const E& estimator, const ransac_options& options, const Policies& policies, ransac_workspace& workspace)
+      : estimator_{estimator},
+        options_{options},
+        score_{policies.score},
+        preemption_{policies.preemption},
+        workspace_{workspace},
+        squared_threshold_{options.threshold * options.threshold} {
+    for (auto* list : {&workspace.inliers, &workspace.part}) {
+      list->clear();
+      list->reserve(estimator.size());
+    }
+  }
+
+  /// Whether the candidate has become the best.
+  bool propose(const model& candidate) {
+    const double score = score_of(candidate);
+    if (!(score < best_score_)) return false;
+    adopt(candidate, score);
+    return true;
+  }
+  [[nodiscard]] std::span<const std::uint32_t> inliers() const noexcept { return workspace_.inliers; }
+  [[nodiscard]] std::size_t refinements() const noexcept { return options_.refinements; }
+  bool refine(std::span<const std::uint32_t> indices) {
+    if (indices.size() <= sample_size) return false;
+    const std::optional<model> refined = estimator_.refine(*best_, indices);
+    return refined && propose(*refined);
+  }
+  /// `count` distinct inliers.
+  [[nodiscard]] std::span<const std::uint32_t> draw_inliers(std::size_t count, random_bits& random) {
+    auto& part = workspace_.part;
+    part.assign(workspace_.inliers.begin(), workspace_.inliers.end());
+    for (std::size_t k = 0; k != count; ++k)
+      std::swap(part[k], part[k + random.below(static_cast<std::uint32_t>(part.size() - k))]);
+    return std::span<const std::uint32_t>(part).first(count);
+  }
+  [[nodiscard]] const std::optional<model>& best() const noexcept { return best_; }
+  [[nodiscard]] double recognised() const { return preemption_.recognised(); }
+
+  /// The score of the best by `squared_error`.
+  [[nodiscard]] double exact_score() const {
+    double sum = 0.0;
+    for (std::size_t i = 0; i < estimator_.size(); ++i)
+      sum += score_.cost(static_cast<double>(estimator_.squared_error(*best_, i)), squared_threshold_);
+    return sum;
+  }
+
+ private:
+  void adopt(const model& candidate, double score) {
+    best_ = candidate;
+    best_score_ = score;
+    collect_inliers(estimator_, candidate, squared_threshold_, workspace_.inliers);
+    preemption_.adopted(static_cast<double>(workspace_.inliers.size()) / static_cast<double>(estimator_.size()));
+  }
+
+  /// Infinite for a model that was given up.
+  [[nodiscard]] double score_of(const model& candidate) {
+    const std::size_t n = estimator_.size();
+    double score = 0.0;
+    std::size_t inliers = 0, seen = 0;
+    preemption_.begin();
+    while (seen < n) {
+      const std::size_t count = std::min(consensus_block, n - seen);
+      const auto [cost, inside] = score_block(candidate, seen, count);
+      score += cost;
+      inliers += inside;
+      seen += count;
+      if (score > best_score_ || (seen < n && preemption_.hopeless(inside, count))) {
+        preemption_.end(false, inliers, seen);
+        return std::numeric_limits<double>::infinity();
+      }
+    }
+    preemption_.end(true, inliers, seen);
+    return score;
+  }
+
+  struct block_score {
+    double cost = 0.0;
+    std::size_t inside = 0;
+  };
+  [[nodiscard]] block_score score_block(const model& candidate, std::size_t first, std::size_t count) const {
+    block_score sum;
+    if constexpr (block_estimator<E>) {
+      std::array<float, consensus_block> errors;
+      estimator_.squared_errors(candidate, first, std::span<float, consensus_block>(errors));
+      const auto limit = static_cast<float>(squared_threshold_);
+      if (count == consensus_block) {  // eight sums side by side, so that they can be made in registers
+        std::array<float, 8> cost{};
+        std::array<std::int32_t, 8> inside{};
+        for (std::size_t i = 0; i != consensus_block; i += 8)
+          for (std::size_t k = 0; k != 8; ++k) {
+            cost[k] += score_.cost(errors[i + k], limit);
+            inside[k] += errors[i + k] < limit ? 1 : 0;
+          }
+        sum.cost =
+            double{(cost[0] + cost[4]) + (cost[2] + cost[6])} + double{(cost[1] + cost[5]) + (cost[3] + cost[7])};
+        for (const std::int32_t i : inside) sum.inside += static_cast<std::size_t>(i);
+        return sum;
+      }
+      for (std::size_t i = 0; i != count; ++i) {
+        sum.cost += double{score_.cost(errors[i], limit)};
+        sum.inside += errors[i] < limit ? 1U : 0U;
+      }
+    } else {
+      for (std::size_t i = first; i != first + count; ++i) {
+        const double e = estimator_.squared_error(candidate, i);
+        sum.cost += score_.cost(e, squared_threshold_);
+        sum.inside += e < squared_threshold_ ? 1U : 0U;
+      }
+    }
+    return sum;
+  }
+
+  const E& estimator_;
+  const ransac_options& options_;
+  const decltype(Policies::score)& score_;
+  decltype(Policies::preemption) preemption_;
+  ransac_workspace& workspace_;
+  double squared_threshold_;
+  std::optional<model> best_;
+  double best_score_ = std::numeric_limits<double>::infinity();
+};
+
+/// The model of `found`, or what ten steps down from it on its inliers lead to where that is better by its score.
+template <class E>
+[[nodiscard]] typename E::model polished(const E& estimator, const ransac_estimate<typename E::model>& found,
+                                         double squared_threshold) {
+  const auto refined = estimator.refine(found.model, found.inliers, 10);
+  if (!refined) return found.model;
+  double score = 0.0;
+  for (std::size_t i = 0; i != estimator.size(); ++i)
+    score += msac::cost(estimator.squared_error(*refined, i), squared_threshold);
+  return score < found.score ? *refined : found.model;
 }
 
 }  // namespace detail
 
 /// The model that most of the data agree with. The same data, options and seed give the same answer.
+/// With `sprt` the data must be in no particular order.
 /// Errors: `invalid_argument` for options out of range, `no_data` where there are fewer data than a
-/// sample, `degenerate` where no sample gives a model with `min_inliers` (and at least a sample's
+/// sample, `degenerate` where no sample gives a model, or none has `min_inliers` (and at least a sample's
 /// number of) inliers.
-template <model_estimator E>
-[[nodiscard]] result<ransac_estimate<typename E::model>> ransac(const E& estimator, const ransac_options& options) {
-  using model = typename E::model;
+template <model_estimator E, consensus_score Score = msac, sampling_order Sampling = uniform_sampling,
+          preemption_test Preemption = bail_out, local_optimization LocalOptimization = iterated_refinement>
+[[nodiscard]] result<ransac_estimate<typename E::model>> ransac(
+    const E& estimator, const ransac_options& options,
+    const ransac_policies<Score, Sampling, Preemption, LocalOptimization>& policies, ransac_workspace& workspace) {
   constexpr const char* where = "ransac";
   if (!(options.threshold > 0.0)) return fail(errc::invalid_argument, where, "the threshold must be positive");
   if (!(options.confidence > 0.0 && options.confidence < 1.0))
@@ -121,43 +265,39 @@ template <model_estimator E>
   const std::size_t n = estimator.size();
   if (n < E::sample_size) return fail(errc::no_data, where, "fewer data than one sample needs");
 
-  const double squared_threshold = options.threshold * options.threshold;
   random_bits random(options.seed);
-  std::optional<model> best;
-  double best_score = std::numeric_limits<double>::infinity();
-  std::vector<std::uint32_t> inliers;
-  std::size_t best_inliers = 0;
-
-  const auto adopt_if_better = [&](const model& candidate) {
-    const double score = detail::msac_score(estimator, candidate, squared_threshold, best_score);
-    if (!(score < best_score)) return false;
-    best = candidate;
-    best_score = score;
-    detail::collect_inliers(estimator, candidate, squared_threshold, inliers);
-    best_inliers = inliers.size();
-    return true;
-  };
-
+  auto sampler = policies.sampling.template over<E::sample_size>(n);
+  detail::ransac_run<E, ransac_policies<Score, Sampling, Preemption, LocalOptimization>> run(estimator, options,
+                                                                                             policies, workspace);
   double wanted = static_cast<double>(options.max_iterations);
   std::size_t iteration = 0;
   for (; iteration < options.max_iterations &&
          (iteration < options.min_iterations || static_cast<double>(iteration) < wanted);
        ++iteration) {
     bool improved = false;
-    for (const model& candidate : estimator.fit(detail::draw_sample<E::sample_size>(random, n)))
-      improved |= adopt_if_better(candidate);
+    for (const auto& candidate : estimator.fit(sampler.draw(random))) improved |= run.propose(candidate);
     if (!improved) continue;
-    for (std::size_t k = 0; k < options.refinements && best_inliers > E::sample_size; ++k) {
-      const std::optional<model> refined = estimator.refine(*best, inliers);
-      if (!refined || !adopt_if_better(*refined)) break;
-    }
-    wanted = detail::wanted_iterations(options.confidence, static_cast<double>(best_inliers) / static_cast<double>(n),
-                                       E::sample_size);
+    policies.optimization.operate(run, random);
+    wanted = sampler.wanted(options.confidence, run.inliers(), run.recognised());
   }
 
-  if (!best || best_inliers < std::max(options.min_inliers, E::sample_size))
-    return fail(errc::degenerate, where, "no model has enough inliers");
-  return ransac_estimate<model>{*best, std::move(inliers), best_score, iteration};
+  if (!run.best()) return fail(errc::degenerate, where, "no sample of the data gives a model");
+  const std::size_t needed = std::max(options.min_inliers, E::sample_size);
+  if (run.inliers().size() < needed)
+    return fail(errc::degenerate, where,
+                "no model has enough inliers: " + std::to_string(run.inliers().size()) + " of " + std::to_string(n) +
+                    ", " + std::to_string(needed) + " are wanted");
+  return ransac_estimate<typename E::model>{
+      *run.best(), {run.inliers().begin(), run.inliers().end()}, run.exact_score(), iteration};
+}
+
+template <model_estimator E, consensus_score Score = msac, sampling_order Sampling = uniform_sampling,
+          preemption_test Preemption = bail_out, local_optimization LocalOptimization = iterated_refinement>
+[[nodiscard]] result<ransac_estimate<typename E::model>> ransac(
+    const E& estimator, const ransac_options& options,
+    const ransac_policies<Score, Sampling, Preemption, LocalOptimization>& policies = {}) {
+  ransac_workspace workspace;
+  return ransac(estimator, options, policies, workspace);
 }
 
 }  // namespace orbis::optimize

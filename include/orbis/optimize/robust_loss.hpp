@@ -4,11 +4,12 @@
 ///
 /// A loss maps the *squared* norm `s` of a whitened residual to `rho(s)`, with `rho(s) ~ s` near 0;
 /// the cost of a problem is half the sum of `rho`. Widths are in units of the residual itself, not
-/// of its square: `huber{2.0}` turns linear where the residual is 2. In iteratively reweighted
+/// of its square: `huber{2.0}` turns linear where the residual is 2; they are positive. In iteratively reweighted
 /// least squares a residual is weighted by `rho'(s)`.
 ///
-/// Source: Z. Zhang, "Parameter estimation techniques: a tutorial with application to conic
-/// fitting", Image and Vision Computing 15 (1997).
+/// Sources: Z. Zhang, "Parameter estimation techniques: a tutorial with application to conic
+/// fitting", Image and Vision Computing 15 (1997); M. J. Black, A. Rangarajan, "On the unification of
+/// line processes, outlier rejection, and robust statistics", IJCV 19(1), 1996.
 #pragma once
 
 #include <cmath>
@@ -67,6 +68,26 @@ struct tukey {
   }
 };
 
-static_assert(robust_loss<trivial> && robust_loss<huber> && robust_loss<cauchy> && robust_loss<tukey>);
+/// Saturates as a rational function; half way to its bound where the residual is `width`.
+struct geman_mcclure {
+  double width = 1.0;
+  [[nodiscard]] double cost(double squared) const noexcept { return squared * share(squared); }
+  [[nodiscard]] double weight(double squared) const noexcept { return share(squared) * share(squared); }
+
+ private:
+  [[nodiscard]] double share(double squared) const noexcept { return width * width / (width * width + squared); }
+};
+
+/// Least squares within `width`, a constant beyond it: a hard decision, differentiable but at the width.
+struct truncated {
+  double width = 1.0;
+  [[nodiscard]] double cost(double squared) const noexcept {
+    return squared <= width * width ? squared : width * width;
+  }
+  [[nodiscard]] double weight(double squared) const noexcept { return squared <= width * width ? 1.0 : 0.0; }
+};
+
+static_assert(robust_loss<trivial> && robust_loss<huber> && robust_loss<cauchy> && robust_loss<tukey> &&
+              robust_loss<geman_mcclure> && robust_loss<truncated>);
 
 }  // namespace orbis::optimize

@@ -1,0 +1,359 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// How one image was taken relative to another, up to the length of the way between them, from matches of pixels many
+/// of which may be wrong.
+///
+/// Sources: D. Nister, PAMI 26(6), 2004, for the samples and the choice among four decompositions; P. Sampson,
+/// "Fitting conic sections to very scattered data", CGIP 18 (1982), for the error, here in pixels of either image.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <Eigen/LU>
+
+#include <orbis/camera/model.hpp>
+#include <orbis/core/jacobi.hpp>
+#include <orbis/core/result.hpp>
+#include <orbis/core/se3.hpp>
+#include <orbis/optimize/absolute_orientation.hpp>
+#include <orbis/optimize/five_point.hpp>
+#include <orbis/optimize/image_matches.hpp>
+#include <orbis/optimize/manifold.hpp>
+#include <orbis/optimize/ransac.hpp>
+#include <orbis/optimize/small_cholesky.hpp>
+#include <orbis/optimize/triangulation.hpp>
+#include <orbis/optimize/wide.hpp>
+
+namespace orbis::optimize {
+
+struct essential_options {
+  double threshold = 1.5;  ///< largest Sampson distance of an inlier, pixels
+  double confidence = 0.9999;
+  std::size_t min_iterations = 10;
+  std::size_t max_iterations = 10000;
+  std::size_t min_inliers = 15;  ///< fewer than this is a failure
+  std::uint64_t seed = 1;
+};
+
+struct relative_pose_estimate {
+  se3 T_first_second;                  ///< the second camera in the first; the translation has length 1
+  mat3 essential;                      ///< `second^T E first = 0` for rays, of norm sqrt(2)
+  std::vector<std::uint32_t> inliers;  ///< exactly the matches within the threshold, ascending
+  std::size_t in_front = 0;            ///< inliers whose rays meet in front of both cameras
+  double parallax = 0.0;               ///< the median angle between the inliers' rays, radians
+  double rmse = 0.0;                   ///< of the inliers' Sampson distances, pixels
+  std::size_t iterations = 0;
+};
+
+/// The four poses `T_second_first` (translations of length 1) that an essential matrix may stand for.
+[[nodiscard]] inline std::array<se3, 4> decompose_essential(const mat3& essential) {
+  auto [u, values, v] = singular_values_of(essential);
+  if (u.determinant() < 0.0) u.col(2) = -u.col(2).eval();
+  if (v.determinant() < 0.0) v.col(2) = -v.col(2).eval();
+  mat3 quarter;
+  quarter << 0, -1, 0, 1, 0, 0, 0, 0, 1;
+  const so3 one(mat3(u * quarter * v.transpose())), other(mat3(u * quarter.transpose() * v.transpose()));
+  const vec3 t = u.col(2);
+  return {se3(one, t), se3(one, -t), se3(other, t), se3(other, -t)};
+}
+
+namespace detail {
+
+/// A ray's part in Sampson distances: gradients at z = 1 become gradients by pixel.
+struct pixel_gradient {
+  double xx, yx, yy;
+  explicit pixel_gradient(const metric_ray& r) : xx{1.0 / r.xx}, yx{-r.xy / (r.xx * r.yy)}, yy{1.0 / r.yy} {}
+  [[nodiscard]] vec2 operator()(double gx, double gy) const { return {xx * gx, yx * gx + yy * gy}; }
+  /// The transpose.
+  [[nodiscard]] vec2 back(const vec2& g) const { return {xx * g.x() + yx * g.y(), yy * g.y()}; }
+};
+
+class essential_estimator {
+ public:
+  using model = mat3;
+  static constexpr std::size_t sample_size = 5;
+
+  explicit essential_estimator(const std::vector<image_match>& matches) : matches_{matches} {
+    stride_ = (matches.size() + consensus_block - 1) / consensus_block * consensus_block;
+    columns_.assign(10 * stride_, 0.0F);
+    for (std::size_t i = 0; i != matches.size(); ++i) {
+      const image_match& m = matches[i];
+      const pixel_gradient a(m.first), b(m.second);
+      const std::array values{m.first.x, m.first.y, m.second.x, m.second.y, a.xx, a.yx, a.yy, b.xx, b.yx, b.yy};
+      for (std::size_t k = 0; k != values.size(); ++k) columns_[k * stride_ + i] = static_cast<float>(values[k]);
+    }
+  }
+
+  [[nodiscard]] std::size_t size() const noexcept { return matches_.size(); }
+  [[nodiscard]] five_point_solutions fit(const std::array<std::uint32_t, 5>& sample) const {
+    std::array<vec3, 5> first, second;
+    for (std::size_t i = 0; i != 5; ++i) {
+      first[i] = matches_[sample[i]].first.direction();
+      second[i] = matches_[sample[i]].second.direction();
+    }
+    return five_point(first, second);
+  }
+
+  [[nodiscard]] double squared_error(const mat3& e, std::size_t i) const {
+    const image_match& m = matches_[i];
+    const vec3 first = m.first.direction(), second = m.second.direction();
+    const vec3 line = e * first, other = e.transpose() * second;
+    const double c = second.dot(line);
+    return c * c /
+           (pixel_gradient(m.second)(line.x(), line.y()).squaredNorm() +
+            pixel_gradient(m.first)(other.x(), other.y()).squaredNorm());
+  }
+
+  void squared_errors(const mat3& e, std::size_t first, std::span<float, consensus_block> out) const {
+    using namespace wide;
+    using V = numbers<float, 4>;
+    V m[9];
+    unrolled<9>([&](auto k) { fill(m[k], static_cast<float>(e(static_cast<int>(k / 3), static_cast<int>(k % 3)))); });
+    for (std::size_t i = 0; i != consensus_block; i += 4) {
+      const float* const at = columns_.data() + first + i;
+      V v[10];
+      unrolled<10>([&](auto k) { load(v[k], at + k * stride_); });
+      V line[3] = {m[2], m[5], m[8]}, other[2] = {m[6], m[7]}, c;
+      unrolled<3>([&](auto k) {
+        add_product(line[k], m[3 * k], v[0]);
+        add_product(line[k], m[3 * k + 1], v[1]);
+      });
+      unrolled<2>([&](auto k) {
+        add_product(other[k], m[k], v[2]);
+        add_product(other[k], m[3 + k], v[3]);
+      });
+      c = line[2];
+      add_product(c, line[0], v[2]);
+      add_product(c, line[1], v[3]);
+      V g, sum{}, cc;
+      const auto add_gradient = [&](const V& gx, const V& gy, const V& xx, const V& yx, const V& yy) {
+        multiply(g, xx, gx);
+        add_product(sum, g, g);
+        multiply(g, yx, gx);
+        add_product(g, yy, gy);
+        add_product(sum, g, g);
+      };
+      add_gradient(other[0], other[1], v[4], v[5], v[6]);
+      add_gradient(line[0], line[1], v[7], v[8], v[9]);
+      multiply(cc, c, c);
+      const V squared = cc / sum;
+      store(out.data() + i, squared);
+    }
+  }
+
+  /// Gauss-Newton on rotation and direction.
+  [[nodiscard]] std::optional<mat3> refine(const mat3& start, std::span<const std::uint32_t> inliers) const {
+    return refine(start, inliers, 4);
+  }
+  [[nodiscard]] std::optional<mat3> refine(const mat3& start, std::span<const std::uint32_t> inliers, int steps) const {
+    if (inliers.size() < 6) return std::nullopt;
+    const se3 pose = decompose_essential(start)[0];
+    so3 rotation = pose.rotation();
+    vec3 direction = pose.translation();
+    mat3 e = hat<double>(direction) * rotation.rotation_matrix();
+    matrix<9, 9> h;
+    matrix<9> g;
+    double cost = equations(e, inliers, h, g);
+    for (int k = 0; k != steps; ++k) {
+      if (!std::isfinite(cost)) return std::nullopt;
+      // How the entries of E = [t]x R (row by row) move with exp(phi) R and with t on the sphere.
+      matrix<9, 5> by_step;
+      const matrix<3, 2> basis = unit_sphere::basis(direction);
+      for (int j = 0; j != 5; ++j) {
+        const mat3 d =
+            j < 3 ? mat3(hat<double>(direction) * hat<double>(vec3(vec3::Unit(j))) * rotation.rotation_matrix())
+                  : mat3(hat<double>(vec3(basis.col(j - 3))) * rotation.rotation_matrix());
+        for (int entry = 0; entry != 9; ++entry) by_step(entry, j) = d(entry / 3, entry % 3);
+      }
+      const matrix<9, 5> h_by_step = h.lazyProduct(by_step);
+      matrix<5, 5> a = by_step.transpose().lazyProduct(h_by_step);
+      a.diagonal() *= 1.0 + 1e-9;
+      a.diagonal().array() += 1e-12 * a.diagonal().maxCoeff();
+      small_cholesky<5> factors;
+      if (!factors.set(a) || !(factors.factor(0.0) > 0.0)) break;
+      const matrix<5> step = -factors.solve(matrix<5>(by_step.transpose().lazyProduct(g)));
+      if (!(step.norm() < 1.0)) break;
+      const so3 next_rotation = so3::exp(vec3(step.head<3>())) * rotation;
+      const vec3 next_direction = unit_sphere::retract(direction, step.tail<2>());
+      const mat3 next = hat<double>(next_direction) * next_rotation.rotation_matrix();
+      matrix<9, 9> next_h;
+      matrix<9> next_g;
+      const double next_cost = equations(next, inliers, next_h, next_g);
+      if (!(next_cost < cost)) break;
+      const bool small = cost - next_cost <= 1e-12 * cost;
+      rotation = next_rotation;
+      direction = next_direction;
+      e = next;
+      h = next_h;
+      g = next_g;
+      cost = next_cost;
+      if (small) break;
+    }
+    return e;
+  }
+
+ private:
+  /// For the nine entries of E, row by row; returns the sum of squares.
+  double equations(const mat3& e, std::span<const std::uint32_t> inliers, matrix<9, 9>& h, matrix<9>& g) const {
+    h.setZero();
+    g.setZero();
+    double cost = 0.0;
+    for (const std::uint32_t i : inliers) {
+      const image_match& m = matches_[i];
+      const pixel_gradient by_first(m.first), by_second(m.second);
+      const vec3 first = m.first.direction(), second = m.second.direction();
+      const vec3 line = e * first, other = e.transpose() * second;
+      const double c = second.dot(line);
+      const vec2 p = by_second(line.x(), line.y()), q = by_first(other.x(), other.y());
+      const double inverse = 1.0 / std::sqrt(p.squaredNorm() + q.squaredNorm());
+      const double r = c * inverse;
+      // r = c / s: dr = (dc - r ds) / s, and s ds = p dp + q dq.
+      vec3 dp = vec3::Zero(), dq = vec3::Zero();
+      dp.head<2>() = by_second.back(p) * (r * inverse);
+      dq.head<2>() = by_first.back(q) * (r * inverse);
+      matrix<9> d;
+      for (int row = 0; row != 3; ++row)
+        for (int column = 0; column != 3; ++column)
+          d[3 * row + column] =
+              inverse * (second[row] * first[column] - dp[row] * first[column] - second[row] * dq[column]);
+      for (int a = 0; a != 9; ++a) {
+        for (int b = 0; b <= a; ++b) h(a, b) += d[a] * d[b];
+        g[a] += r * d[a];
+      }
+      cost += r * r;
+    }
+    for (int a = 0; a != 9; ++a)
+      for (int b = a + 1; b != 9; ++b) h(a, b) = h(b, a);
+    return cost;
+  }
+
+  const std::vector<image_match>& matches_;
+  std::vector<float> columns_;
+  std::size_t stride_ = 0;
+};
+
+/// How many of the matches a turn of the camera alone explains. The turn is found with weights that fall with the
+/// error, since wrong matches that happen to lie near their epipolar lines are among the inliers.
+[[nodiscard]] inline std::size_t explained_by_rotation(const std::vector<image_match>& matches,
+                                                       std::span<const std::uint32_t> inliers,
+                                                       double squared_threshold) {
+  mat3 rotation = mat3::Identity();
+  std::size_t explained = 0;
+  for (int round = 0; round != 10; ++round) {
+    mat3 products = mat3::Zero();
+    explained = 0;
+    for (const std::uint32_t i : inliers) {
+      const metric_ray& to = matches[i].second;
+      const vec3 from = matches[i].first.direction(), p = rotation * from;
+      const double dx = p.x() / p.z() - to.x, dy = p.y() / p.z() - to.y;
+      const double u = to.xx * dx + to.xy * dy, v = to.yy * dy;
+      const double squared = p.z() > 0.0 ? u * u + v * v : std::numeric_limits<double>::infinity();
+      explained += squared < 2.0 * squared_threshold ? 1U : 0U;
+      const double weight = round == 0 ? 1.0 : 1.0 / (1.0 + squared / squared_threshold);
+      products += weight * from.normalized() * to.direction().normalized().transpose();
+    }
+    const auto turn = find_best_turn(products, 1e-10);
+    if (!turn) break;
+    rotation = so3(turn->quaternion).rotation_matrix();
+  }
+  return explained;
+}
+
+}  // namespace detail
+
+/// The relative pose that the most matches agree with: five points in RANSAC, each new best matrix refined on its
+/// inliers. Matches that are not finite or cannot be un-projected are outliers. Deterministic by `options.seed`.
+/// Errors: `invalid_argument` for spans of different length or options out of range, `no_data` below five matches,
+/// `degenerate` where fewer than five can be used, no matrix has `min_inliers` inliers, or a rotation alone explains
+/// (nearly) all inliers, so that there is no parallax to tell a translation by; the message says which.
+template <camera::camera_model First, camera::camera_model Second>
+[[nodiscard]] result<relative_pose_estimate> estimate_essential(std::span<const vec2> first_pixels,
+                                                                std::span<const vec2> second_pixels,
+                                                                const First& first_camera, const Second& second_camera,
+                                                                const essential_options& options = {}) {
+  constexpr const char* where = "essential matrix";
+  const std::size_t n = first_pixels.size();
+  if (n != second_pixels.size()) return fail(errc::invalid_argument, where, "the lists of pixels differ in length");
+  if (n < 5) return fail(errc::no_data, where, "fewer than five matches");
+  const std::vector<detail::image_match> matches =
+      detail::read_matches(first_pixels, second_pixels, first_camera, second_camera, options.seed);
+  if (matches.size() < 5)
+    return fail(errc::degenerate, where,
+                "of " + std::to_string(n) + " matches " + std::to_string(matches.size()) +
+                    " are finite and in the cameras' views, five are needed");
+  const detail::essential_estimator estimator(matches);
+  auto found = ransac(estimator,
+                      {.threshold = options.threshold,
+                       .confidence = options.confidence,
+                       .min_iterations = options.min_iterations,
+                       .max_iterations = options.max_iterations,
+                       .min_inliers = options.min_inliers,
+                       .seed = options.seed},
+                      ransac_policies{msac{}, uniform_sampling{}, sprt(2000.0), iterated_refinement{}});
+  if (!found) return fail(found.error().code, where, found.error().message);
+  const double squared_threshold = options.threshold * options.threshold;
+  const std::size_t by_rotation = detail::explained_by_rotation(matches, found->inliers, squared_threshold);
+  if (10 * by_rotation >= 9 * found->inliers.size())
+    return fail(errc::degenerate, where,
+                "no parallax: a rotation alone explains " + std::to_string(by_rotation) + " of " +
+                    std::to_string(found->inliers.size()) + " inliers");
+
+  mat3 essential = detail::polished(estimator, *found, squared_threshold);
+  essential *= std::sqrt(2.0) / essential.norm();
+  relative_pose_estimate out;
+  out.essential = essential;
+  out.iterations = found->iterations;
+  std::vector<std::uint32_t> inside;
+  double sum = 0.0;
+  for (std::size_t i = 0; i != matches.size(); ++i) {
+    const double e = estimator.squared_error(essential, i);
+    if (!(e < squared_threshold)) continue;
+    sum += e;
+    inside.push_back(static_cast<std::uint32_t>(i));
+    out.inliers.push_back(matches[i].original);
+  }
+  std::sort(out.inliers.begin(), out.inliers.end());
+  if (!inside.empty()) out.rmse = std::sqrt(sum / static_cast<double>(inside.size()));
+  // Of the four poses, the one from which the most points are in front of both cameras.
+  std::vector<double> angles;
+  for (const se3& T_second_first : decompose_essential(essential)) {
+    std::size_t in_front = 0;
+    angles.clear();
+    const se3 T_first_second = T_second_first.inverse();
+    for (const std::uint32_t i : inside) {
+      const triangulation t = triangulate(se3(), matches[i].first.direction(), T_first_second,
+                                          matches[i].second.direction(), {.min_parallax = 0.0});
+      in_front += t.ok() ? 1U : 0U;
+      angles.push_back(t.parallax);
+    }
+    if (in_front <= out.in_front && out.in_front != 0) continue;
+    out.in_front = in_front;
+    out.T_first_second = T_first_second;
+    if (angles.empty()) continue;
+    const auto middle = angles.begin() + static_cast<std::ptrdiff_t>(angles.size() / 2);
+    std::nth_element(angles.begin(), middle, angles.end());
+    out.parallax = *middle;
+  }
+  return out;
+}
+
+/// The same for two images of one camera.
+template <camera::camera_model Camera>
+[[nodiscard]] result<relative_pose_estimate> estimate_essential(std::span<const vec2> first_pixels,
+                                                                std::span<const vec2> second_pixels,
+                                                                const Camera& camera,
+                                                                const essential_options& options = {}) {
+  return estimate_essential(first_pixels, second_pixels, camera, camera, options);
+}
+
+}  // namespace orbis::optimize

@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Matches between the pixels of two images as two-view geometry wants them: by coordinate, at z = 1, in random order.
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include <orbis/camera/model.hpp>
+#include <orbis/core/random.hpp>
+#include <orbis/core/types.hpp>
+
+namespace orbis::optimize::detail {
+
+/// Where a pixel lies at z = 1, and by how many pixels it moves with it: the derivative of the pixel, made upper
+/// triangular by a rotation.
+struct metric_ray {
+  double x = 0.0, y = 0.0;
+  double xx = 1.0, xy = 0.0, yy = 1.0;
+  [[nodiscard]] vec3 direction() const { return {x, y, 1.0}; }
+};
+
+/// False where the camera cannot un-project the pixel.
+template <camera::camera_model Camera>
+[[nodiscard]] bool read_ray(const Camera& camera, const vec2& pixel, metric_ray& out) {
+  if (!pixel.allFinite()) return false;
+  matrix<2, 3> j;
+  const auto ray = camera.unproject(pixel);
+  if (!ray || !camera.project(*ray, j)) return false;
+  out.x = ray->x();
+  out.y = ray->y();
+  out.xx = std::hypot(j(0, 0), j(1, 0));
+  out.xy = (j(0, 0) * j(0, 1) + j(1, 0) * j(1, 1)) / out.xx;
+  out.yy = (j(0, 0) * j(1, 1) - j(1, 0) * j(0, 1)) / out.xx;
+  return out.xx > 0.0 && std::isfinite(out.xy + out.yy) && out.yy != 0.0;
+}
+
+struct image_match {
+  metric_ray first, second;
+  std::uint32_t original = 0;
+};
+
+/// The usable matches, in an order that depends on the seed alone.
+template <camera::camera_model First, camera::camera_model Second>
+[[nodiscard]] std::vector<image_match> read_matches(std::span<const vec2> first, std::span<const vec2> second,
+                                                    const First& first_camera, const Second& second_camera,
+                                                    std::uint64_t seed) {
+  std::vector<image_match> matches;
+  matches.reserve(first.size());
+  for (std::size_t i = 0; i != first.size(); ++i) {
+    image_match m;
+    m.original = static_cast<std::uint32_t>(i);
+    if (read_ray(first_camera, first[i], m.first) && read_ray(second_camera, second[i], m.second)) matches.push_back(m);
+  }
+  random_bits random(mix64(seed));
+  shuffle(matches, random);
+  return matches;
+}
+
+}  // namespace orbis::optimize::detail

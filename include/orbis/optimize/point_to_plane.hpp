@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// The distance of a measured point from a plane: what a depth image says about a pose.
+///
+/// Source: Y. Chen, G. Medioni, "Object modelling by registration of multiple range images", Image and
+/// Vision Computing 10(3), 1992.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <optional>
+
+#include <orbis/core/se3.hpp>
+#include <orbis/core/types.hpp>
+#include <orbis/optimize/manifold.hpp>
+
+namespace orbis::optimize {
+
+/// A point in the camera frame that lies on a plane of the world, metres: the residual of the pose
+/// `T_world_camera` is `sqrt(information) * n . (T_world_camera * q - p)`. Whether it says anything is
+/// `is_usable()`.
+struct point_to_plane {
+  using point = se3;
+  static constexpr int dimension = 1;
+
+  vec3 measured = vec3::Zero();  ///< q, in the camera frame
+  vec3 on_plane = vec3::Zero();  ///< p, in the world
+  vec3 normal = vec3::UnitZ();   ///< n, in the world, of unit length
+  double information = 1.0;      ///< 1 / sigma^2 along the normal, 1 / m^2
+
+  [[nodiscard]] bool is_usable() const {
+    return measured.allFinite() && on_plane.allFinite() && std::abs(normal.squaredNorm() - 1.0) < 1e-6 &&
+           information > 0.0 && std::isfinite(information);
+  }
+  /// Empty where it is not finite.
+  [[nodiscard]] std::optional<matrix<1>> residual(const se3& T_world_camera) const {
+    const matrix<1> r(std::sqrt(information) * normal.dot(T_world_camera * measured - on_plane));
+    if (!std::isfinite(r[0])) return std::nullopt;
+    return r;
+  }
+  /// The same with its derivative by a step on the right of the pose; untouched where empty.
+  [[nodiscard]] std::optional<matrix<1>> linearize(const se3& T_world_camera, matrix<1, 6>& jacobian) const {
+    const auto r = residual(T_world_camera);
+    if (!r) return r;
+    const vec3 turned = std::sqrt(information) * (T_world_camera.rotation().inverse() * normal);
+    jacobian << turned.transpose(), measured.cross(turned).transpose();
+    return r;
+  }
+};
+
+/// Plane `point` (an index, as bundle adjustment has them) touched by a depth measurement of camera `pose`.
+struct plane_observation {
+  std::uint32_t pose = 0;
+  std::uint32_t point = 0;
+  vec3 measured = vec3::Zero();  ///< in the camera frame, metres
+  vec3 normal = vec3::UnitZ();   ///< of the plane, in the world, of unit length
+  double information = 1.0;      ///< 1 / sigma^2 along the normal, 1 / m^2
+};
+
+/// `point_to_plane` for bundle adjustment: the point through which the plane goes is estimated, its normal
+/// is given. Only what moves that point along its normal is determined. Satisfies `bundle_residual`.
+struct point_to_plane_adjustment {
+  using camera_state = se3;
+  using camera_manifold = lie_group<se3>;
+  using observation = plane_observation;
+  static constexpr int dimension = 1;
+  struct view {
+    mat3 rotation;  ///< from the camera to the world
+    vec3 translation;
+  };
+
+  [[nodiscard]] static view prepare(const se3& T_world_camera) {
+    return {T_world_camera.rotation_matrix(), T_world_camera.translation()};
+  }
+  [[nodiscard]] static bool is_usable(const observation& o) {
+    return o.information > 0.0 && std::isfinite(o.information) && o.measured.allFinite() &&
+           std::abs(o.normal.squaredNorm() - 1.0) < 1e-6;
+  }
+  [[nodiscard]] static std::optional<matrix<1>> residual(const view& v, const vec3& point, const observation& o) {
+    const matrix<1> r(o.normal.dot(v.rotation * o.measured + v.translation - point));
+    if (!std::isfinite(r[0])) return std::nullopt;
+    return r;
+  }
+  [[nodiscard]] static std::optional<matrix<1>> linearize(const view& v, const vec3& point, const observation& o,
+                                                          matrix<1, 6>& by_camera, matrix<1, 3>& by_point) {
+    const auto r = residual(v, point, o);
+    if (!r) return r;
+    const vec3 turned = v.rotation.transpose() * o.normal;
+    by_camera << turned.transpose(), o.measured.cross(turned).transpose();
+    by_point = -o.normal.transpose();
+    return r;
+  }
+};
+
+}  // namespace orbis::optimize

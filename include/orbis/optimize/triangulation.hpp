@@ -1,0 +1,213 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Points from the rays of two or more cameras whose poses are known.
+///
+/// Rays are in the camera frame, scaled to z = 1, as cameras un-project pixels; errors are distances at z = 1.
+///
+/// Sources: P. Lindstrom, "Triangulation made easy", CVPR 2010, for two views; R. Hartley, P. Sturm, "Triangulation",
+/// CVIU 68 (1997), for what is best.
+#pragma once
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <cstddef>
+#include <span>
+#include <string_view>
+
+#include <Eigen/LU>
+
+#include <orbis/core/se3.hpp>
+#include <orbis/optimize/small_cholesky.hpp>
+
+namespace orbis::optimize {
+
+enum class triangulation_status {
+  ok,
+  too_few_views,  ///< fewer than two
+  not_finite,     ///< a pose or a ray
+  no_parallax,    ///< the rays are parallel, or nearly, or start in one place: the depth is not determined
+  behind_camera   ///< the rays meet behind a camera
+};
+
+[[nodiscard]] constexpr std::string_view to_string(triangulation_status status) noexcept {
+  switch (status) {
+    case triangulation_status::ok: return "ok";
+    case triangulation_status::too_few_views: return "too few views";
+    case triangulation_status::not_finite: return "not finite";
+    case triangulation_status::no_parallax: return "no parallax";
+    case triangulation_status::behind_camera: return "behind a camera";
+  }
+  return "unknown";
+}
+
+struct triangulation_options {
+  double min_parallax = 1e-4;  ///< smallest angle between rays, radians
+};
+
+struct triangulation {
+  triangulation_status status = triangulation_status::too_few_views;
+  vec3 point = vec3::Zero();  ///< in the world, metres; of use only if `ok()`
+  double parallax = 0.0;      ///< the angle between the rays, for many views that of two that are far apart, radians
+  double error = 0.0;         ///< root mean square distance from the rays at z = 1
+  [[nodiscard]] bool ok() const noexcept { return status == triangulation_status::ok; }
+};
+
+namespace detail {
+
+[[nodiscard]] inline double angle_between_directions(const vec3& a, const vec3& b) {
+  return std::atan2(a.cross(b).norm(), a.dot(b));
+}
+
+/// The matrix E with `second^T E first = 0` for rays of one point: translation x rotation of `T_second_first`.
+[[nodiscard]] inline mat3 essential_of(const se3& T_second_first) {
+  return hat<double>(T_second_first.translation()) * T_second_first.rotation_matrix();
+}
+
+/// Moves two rays at z = 1 by the least sum of squares so that they meet. (Two steps, which is as good as many.)
+inline void make_rays_meet(const mat3& essential, vec3& first, vec3& second) {
+  // `second` is x and `first` is x' in the paper.
+  const mat2 e = essential.topLeftCorner<2, 2>();
+  vec2 n = (essential * first).head<2>(), m = (essential.transpose() * second).head<2>();
+  const double a = n.dot(e * m), b = 0.5 * (n.squaredNorm() + m.squaredNorm());
+  const double c = second.dot(essential * first);
+  const double d = std::sqrt(std::fmax(0.0, b * b - a * c));
+  if (!(b + d > 0.0)) return;  // along the baseline: they meet anyway
+  double lambda = c / (b + d);
+  const vec2 moved_second = lambda * n, moved_first = lambda * m;
+  n -= e * moved_first;
+  m -= e.transpose() * moved_second;
+  const double size = n.squaredNorm() + m.squaredNorm();
+  if (!(size > 0.0)) return;
+  lambda *= 2.0 * d / size;
+  second.head<2>() -= lambda * n;
+  first.head<2>() -= lambda * m;
+}
+
+}  // namespace detail
+
+/// The point whose projections at z = 1 are nearest to the two rays (least sum of squares). Constant time.
+[[nodiscard]] inline triangulation triangulate(const se3& T_world_first, const vec3& first_ray,
+                                               const se3& T_world_second, const vec3& second_ray,
+                                               const triangulation_options& options = {}) {
+  triangulation out;
+  const se3 T_second_first = T_world_second.inverse() * T_world_first;
+  vec3 first = first_ray / first_ray.z(), second = second_ray / second_ray.z();
+  if (!first.allFinite() || !second.allFinite() || !T_second_first.to_matrix().allFinite()) {
+    out.status = triangulation_status::not_finite;
+    return out;
+  }
+  out.parallax = detail::angle_between_directions(T_second_first.rotation() * first, second);
+  out.status = triangulation_status::no_parallax;
+  if (!(out.parallax >= options.min_parallax)) return out;
+  detail::make_rays_meet(detail::essential_of(T_second_first), first, second);
+  // In the second camera: t + depth_1 u = depth_2 v.
+  const vec3 u = T_second_first.rotation() * first;
+  const vec3& t = T_second_first.translation();
+  const vec3 normal = u.cross(second);
+  const double size = normal.squaredNorm();
+  if (!(size > 0.0) || !(t.squaredNorm() > 0.0)) return out;
+  const double first_depth = second.cross(t).dot(normal) / size;
+  const double second_depth = u.cross(t).dot(normal) / size;
+  out.point = T_world_first * vec3(first_depth * first);
+  out.error = std::sqrt(
+      0.5 * ((first - first_ray / first_ray.z()).squaredNorm() + (second - second_ray / second_ray.z()).squaredNorm()));
+  out.status = !out.point.allFinite()                    ? triangulation_status::no_parallax
+               : first_depth > 0.0 && second_depth > 0.0 ? triangulation_status::ok
+                                                         : triangulation_status::behind_camera;
+  return out;
+}
+
+/// The same for any number of views: from the point nearest to all rays, Levenberg's and Marquardt's way down.
+/// O(views) for each of a few steps. @pre T_world_camera.size() == rays.size()
+[[nodiscard]] inline triangulation triangulate(std::span<const se3> T_world_camera, std::span<const vec3> rays,
+                                               const triangulation_options& options = {}) {
+  assert(T_world_camera.size() == rays.size());
+  triangulation out;
+  const std::size_t n = rays.size();
+  if (n < 2) return out;
+  const auto direction = [&](std::size_t i) { return vec3((T_world_camera[i].rotation() * rays[i]).normalized()); };
+  // The point nearest to all rays, about their first camera for the sake of digits.
+  const vec3 origin = T_world_camera[0].translation();
+  mat3 a = mat3::Zero();
+  vec3 b = vec3::Zero();
+  double baseline = 0.0;
+  out.status = triangulation_status::not_finite;
+  for (std::size_t i = 0; i != n; ++i) {
+    if (!rays[i].allFinite() || rays[i].z() == 0.0 || !T_world_camera[i].to_matrix().allFinite()) return out;
+    const vec3 d = direction(i);
+    const mat3 across = mat3::Identity() - d * d.transpose();
+    a += across;
+    b += across * (T_world_camera[i].translation() - origin);
+    baseline = std::max(baseline, (T_world_camera[i].translation() - origin).norm());
+  }
+  // Two rays that are far apart: the one farthest from the first, and the one farthest from that.
+  const auto farthest_from = [&](std::size_t k) {
+    std::size_t farthest = k;
+    double angle = 0.0;
+    for (std::size_t i = 0; i != n; ++i)
+      if (const double to_i = detail::angle_between_directions(direction(k), direction(i)); to_i > angle) {
+        angle = to_i;
+        farthest = i;
+      }
+    out.parallax = std::max(out.parallax, angle);
+    return farthest;
+  };
+  farthest_from(farthest_from(0));
+  out.status = triangulation_status::no_parallax;
+  if (!(out.parallax >= options.min_parallax) || !(baseline > 0.0)) return out;
+  small_cholesky<3> factors;
+  if (!factors.set(a) || !(factors.factor(0.0) > 0.0)) return out;
+  vec3 point = factors.solve(b);
+  if (!point.allFinite()) return out;
+
+  const auto error_at = [&](const vec3& p, mat3* h, vec3* g) {
+    double sum = 0.0;
+    for (std::size_t i = 0; i != n; ++i) {
+      const vec3 seen = T_world_camera[i].rotation().inverse() * vec3(p + (origin - T_world_camera[i].translation()));
+      const double inverse_z = 1.0 / seen.z();
+      const vec2 xy = seen.head<2>() * inverse_z;
+      const vec2 r = xy - rays[i].head<2>() / rays[i].z();
+      sum += r.squaredNorm();
+      if (h == nullptr) continue;
+      matrix<2, 3> j;
+      j << inverse_z, 0.0, -xy.x() * inverse_z, 0.0, inverse_z, -xy.y() * inverse_z;
+      j = (j * T_world_camera[i].rotation_matrix().transpose()).eval();
+      *h += j.transpose() * j;
+      *g += j.transpose() * r;
+    }
+    return sum;
+  };
+  double lambda = 1e-6;
+  double error = error_at(point, nullptr, nullptr);
+  for (int k = 0; k != 20; ++k) {
+    mat3 h = mat3::Zero();
+    vec3 g = vec3::Zero();
+    error_at(point, &h, &g);
+    if (!factors.set(h)) break;
+    bool better = false;
+    double gain = 0.0;
+    for (int attempt = 0; attempt != 6 && !better; ++attempt, lambda *= better ? 0.1 : 10.0) {
+      if (!(factors.factor(lambda) > 0.0)) continue;
+      const vec3 next = point - factors.solve(g);
+      const double at_next = error_at(next, nullptr, nullptr);
+      better = at_next < error;
+      if (!better) continue;
+      gain = error - at_next;
+      point = next;
+      error = at_next;
+    }
+    if (!better || gain <= 1e-15 * error) break;
+  }
+  out.point = origin + point;
+  out.error = std::sqrt(error / static_cast<double>(n));
+  if (!out.point.allFinite()) return out;
+  out.status = triangulation_status::ok;
+  for (std::size_t i = 0; i != n; ++i) {
+    const vec3 seen = T_world_camera[i].rotation().inverse() * vec3(point + (origin - T_world_camera[i].translation()));
+    if (!(seen.z() > 0.0)) out.status = triangulation_status::behind_camera;
+  }
+  return out;
+}
+
+}  // namespace orbis::optimize

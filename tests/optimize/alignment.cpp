@@ -1,0 +1,139 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <limits>
+#include <vector>
+
+#include <orbis/optimize/alignment.hpp>
+
+#include "support.hpp"
+#include "support/catch.hpp"
+
+using namespace orbis;
+
+namespace {
+
+struct pairs {
+  std::vector<vec3> from, to;
+};
+
+template <class Transform>
+pairs make_pairs(std::uint64_t seed, const Transform& truth, std::size_t n, double outliers, double noise) {
+  random_bits random(seed);
+  pairs p;
+  for (std::size_t i = 0; i != n; ++i) {
+    p.from.push_back(test::random_vector(random, 2.0));
+    if (static_cast<double>(i) < (1.0 - outliers) * static_cast<double>(n))
+      p.to.push_back(truth * p.from.back() + test::random_vector(random, noise));
+    else
+      p.to.push_back(test::random_vector(random, 4.0));
+  }
+  return p;
+}
+
+template <class Transform>
+double difference(const Transform& a, const Transform& b) {
+  return (a.to_matrix() - b.to_matrix()).norm();
+}
+
+}  // namespace
+
+TEST_CASE("Alignment finds a rigid transform among 80 percent wrong pairs, and exactly its inliers") {
+  for (std::uint64_t seed = 1; seed <= 50; ++seed) {
+    random_bits random(seed + 1000);
+    const se3 truth = test::random_pose(random);
+    const pairs p = make_pairs(seed, truth, 200, 0.8, 0.01);
+    const auto found = optimize::estimate_alignment(p.from, p.to, {.threshold = 0.05, .seed = seed});
+    REQUIRE(found.has_value());
+    CHECK(difference(found->T_to_from, truth) < 0.03);
+    CHECK(found->inliers.size() >= 40);
+    std::vector<std::uint32_t> expected;
+    for (std::uint32_t i = 0; i != p.from.size(); ++i)
+      if ((found->T_to_from * p.from[i] - p.to[i]).norm() < 0.05) expected.push_back(i);
+    CHECK(found->inliers == expected);
+  }
+}
+
+TEST_CASE("Alignment finds a similarity among wrong pairs") {
+  for (std::uint64_t seed = 1; seed <= 50; ++seed) {
+    random_bits random(seed + 2000);
+    const sim3 truth(test::random_pose(random).rotation(), test::random_vector(random, 3.0), random.uniform(0.5, 2.0));
+    const pairs p = make_pairs(seed, truth, 200, 0.7, 0.0);
+    const auto found = optimize::estimate_alignment<sim3>(p.from, p.to, {.threshold = 0.05, .seed = seed});
+    REQUIRE(found.has_value());
+    CHECK(difference(found->T_to_from, truth) < 1e-2);  // a wrong pair may be near by chance
+    CHECK(found->inliers.size() >= 60);
+  }
+}
+
+TEST_CASE("Alignment moves with its points") {
+  random_bits random(5);
+  const se3 truth = test::random_pose(random), before = test::random_pose(random), after = test::random_pose(random);
+  const pairs p = make_pairs(17, truth, 100, 0.5, 0.01);
+  pairs moved;
+  for (const vec3& x : p.from) moved.from.push_back(before * x);
+  for (const vec3& x : p.to) moved.to.push_back(after * x);
+  const auto a = optimize::estimate_alignment(p.from, p.to);
+  const auto b = optimize::estimate_alignment(moved.from, moved.to);
+  REQUIRE(a.has_value());
+  REQUIRE(b.has_value());
+  CHECK(difference(b->T_to_from, after * a->T_to_from * before.inverse()) < 1e-9);
+  CHECK(a->inliers == b->inliers);
+  // Twice the same is the same.
+  const auto again = optimize::estimate_alignment(p.from, p.to);
+  REQUIRE(again.has_value());
+  CHECK(difference(a->T_to_from, again->T_to_from) == 0.0);
+}
+
+TEST_CASE("Alignment weighs pairs by their deviations") {
+  random_bits random(3);
+  const se3 truth = test::random_pose(random);
+  std::vector<vec3> from, to;
+  std::vector<double> deviations;
+  for (int i = 0; i != 400; ++i) {
+    from.push_back(test::random_vector(random, 2.0));
+    deviations.push_back(i % 2 == 0 ? 0.001 : 0.05);
+    to.push_back(truth * from.back() + deviations.back() * vec3(random.normal(), random.normal(), random.normal()));
+  }
+  const auto plain = optimize::estimate_alignment(from, to, {.threshold = 0.15});
+  const auto weighted = optimize::estimate_alignment(from, to, {.threshold = 4.0, .deviations = deviations});
+  REQUIRE(plain.has_value());
+  REQUIRE(weighted.has_value());
+  CHECK(difference(weighted->T_to_from, truth) < 0.2 * difference(plain->T_to_from, truth));
+  CHECK(weighted->inliers.size() > 390);
+}
+
+TEST_CASE("Alignment takes pairs without a deviation for outliers") {
+  const pairs p = make_pairs(7, se3(so3::exp(vec3(0.1, 0.2, 0.3)), vec3(1, 2, 3)), 40, 0.0, 0.001);
+  std::vector<double> deviations(40, 0.01);
+  deviations[3] = std::numeric_limits<double>::infinity();
+  deviations[5] = std::numeric_limits<double>::quiet_NaN();
+  deviations[9] = 0.0;
+  const auto found = optimize::estimate_alignment(p.from, p.to, {.threshold = 3.0, .deviations = deviations});
+  REQUIRE(found.has_value());
+  std::vector<std::uint32_t> expected;
+  for (std::uint32_t i = 0; i != 40; ++i)
+    if (i != 3 && i != 5 && i != 9) expected.push_back(i);
+  CHECK(found->inliers == expected);
+}
+
+TEST_CASE("Alignment says why it has no answer") {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const auto why = [](const auto& from, const auto& to) {
+    return optimize::estimate_alignment(from, to, {.max_iterations = 200}).error();
+  };
+  std::vector<vec3> line, place(20, vec3(1, 2, 3)), nans(20, vec3(nan, 0, 0));
+  for (int i = 0; i != 20; ++i) line.emplace_back(1.0 + i, 2.0 - i, 0.5 * i);
+  CHECK(why(line, line).code == errc::degenerate);
+  CHECK(why(line, line).message == "the points all lie on one line or in one place");
+  CHECK(why(place, place).message == "the points all lie on one line or in one place");
+  CHECK(why(nans, line).message == "of 20 pairs 0 are finite, three are needed");
+  CHECK(why(std::vector<vec3>(2, vec3::Zero()), std::vector<vec3>(2, vec3::Zero())).code == errc::no_data);
+  CHECK(why(std::vector<vec3>(3, vec3::Zero()), line).code == errc::invalid_argument);
+  random_bits random(1);
+  std::vector<vec3> a, b;
+  for (int i = 0; i != 50; ++i) {
+    a.push_back(test::random_vector(random, 2.0));
+    b.push_back(test::random_vector(random, 2.0));
+  }
+  CHECK(optimize::estimate_alignment(a, b, {.max_iterations = 200, .min_inliers = 20}).error().code ==
+        errc::degenerate);
+}
