@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Vocabularies in the text format of DBoW2, in which the widespread vocabulary of ORB-SLAM comes.
+///
+/// The first line has branching, depth, a number of the score (0 to 5; scores are types here, so it is passed over) and
+/// a number of the weighting (0 tf-idf, 1 tf, 2 idf, 3 binary). Each further line is a node, which is called by its
+/// number from 1: the number of its parent (0: the root), 1 for a word and 0 for an inner node, the bytes of its
+/// descriptor, its weight.
+#pragma once
+
+#include <charconv>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include <orbis/core/file.hpp>
+#include <orbis/core/result.hpp>
+#include <orbis/places/bag_of_words.hpp>
+#include <orbis/places/bit_string.hpp>
+#include <orbis/places/parent_list.hpp>
+#include <orbis/places/vocabulary.hpp>
+#include <orbis/places/vocabulary_tree.hpp>
+
+namespace orbis::places {
+
+namespace detail {
+
+[[nodiscard]] constexpr bool is_blank(char c) noexcept { return c == ' ' || c == '\t' || c == '\r' || c == '\n'; }
+
+/// Takes the next field, up to a blank, off the front.
+[[nodiscard]] inline std::string_view take_field(std::string_view& text) noexcept {
+  std::size_t begin = 0;
+  while (begin != text.size() && is_blank(text[begin])) ++begin;
+  std::size_t end = begin;
+  while (end != text.size() && !is_blank(text[end])) ++end;
+  const std::string_view field = text.substr(begin, end - begin);
+  text.remove_prefix(end);
+  return field;
+}
+
+/// Takes a number off the front; false if there is none.
+template <class T>
+[[nodiscard]] bool take_number(std::string_view& text, T& value) noexcept {
+  const std::string_view field = take_field(text);
+  const auto [end, failure] = std::from_chars(field.data(), field.data() + field.size(), value);
+  return failure == std::errc{} && end == field.data() + field.size() && !field.empty();
+}
+
+/// Sets byte `i` of a descriptor, as it lies in a row of OpenCV's.
+template <std::size_t Bits>
+constexpr void set_byte(bit_words<Bits>& descriptor, std::size_t i, std::uint8_t byte) noexcept {
+  descriptor[i / 8] |= std::uint64_t{byte} << (8 * (i % 8));
+}
+
+/// A weight that words may have.
+[[nodiscard]] inline bool good_weight(double weight) noexcept {
+  return weight >= 0.0 && weight <= static_cast<double>(largest_weight);
+}
+
+}  // namespace detail
+
+/// The vocabulary in `text`; `where` names it in errors. Words are numbered by our own order; bags and scores are those
+/// of DBoW2. Errors, with the line: malformed.
+template <std::size_t Bits = 256>
+[[nodiscard]] result<basic_vocabulary<Bits>> parse_dbow_text(std::string_view text, const std::string& where = "text") {
+  std::size_t line_number = 0;
+  const auto bad = [&](std::size_t line, std::string why) {
+    return fail(errc::malformed, where + ":" + std::to_string(line), std::move(why));
+  };
+  const auto next_line = [&] {
+    ++line_number;
+    const std::size_t end = text.find('\n');
+    const std::string_view line = text.substr(0, end);
+    text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
+    return line;
+  };
+
+  std::string_view head = next_line();
+  std::int64_t branching = 0, depth = 0, score = 0, weights_are = 0;
+  if (!detail::take_number(head, branching) || !detail::take_number(head, depth) || !detail::take_number(head, score) ||
+      !detail::take_number(head, weights_are) || !detail::take_field(head).empty())
+    return bad(1, "the first line is not branching, depth, score and weighting");
+  if (branching < 1 || depth < 1) return bad(1, "branching and depth are at least 1");
+  if (score < 0 || score > 5) return bad(1, "the score is not one of 0 to 5");
+  if (weights_are < 0 || weights_are > 3) return bad(1, "the weighting is not one of 0 to 3");
+
+  detail::parent_list<Bits> list;
+  std::vector<bool> is_word{false};
+  while (!text.empty()) {
+    std::string_view line = next_line();
+    std::uint32_t parent = 0;
+    int leaf = 0;
+    double weight = 0.0;
+    if (std::string_view rest = line; detail::take_field(rest).empty()) {
+      if (detail::take_field(text).empty()) break;  // blanks up to the end
+      return bad(line_number, "a blank line between nodes");
+    }
+    if (!detail::take_number(line, parent)) return bad(line_number, "does not begin with the number of a parent");
+    if (parent > list.size()) return bad(line_number, "a parent that does not stand before its child");
+    if (!detail::take_number(line, leaf) || leaf < 0 || leaf > 1)
+      return bad(line_number, "the second field is not 1 for a word or 0");
+    bit_words<Bits> descriptor{};
+    for (std::size_t i = 0; i != Bits / 8; ++i) {
+      std::uint8_t byte = 0;
+      if (!detail::take_number(line, byte))
+        return bad(line_number, "a descriptor of fewer than " + std::to_string(Bits / 8) + " bytes from 0 to 255");
+      detail::set_byte<Bits>(descriptor, i, byte);
+    }
+    if (!detail::take_number(line, weight) || !detail::good_weight(weight))
+      return bad(line_number, "no weight from 0 to 1e20 behind " + std::to_string(Bits / 8) + " bytes");
+    if (!detail::take_field(line).empty()) return bad(line_number, "there is more on the line than a node");
+    list.parents.push_back(parent);
+    list.descriptors.push_back(descriptor);
+    list.weights.push_back(static_cast<float>(weight));
+    is_word.push_back(leaf == 1);
+  }
+
+  detail::vocabulary_tree<Bits> tree;
+  tree.weights_are = static_cast<weighting>(weights_are);
+  const auto problem = detail::order_by_level(
+      list, [&](std::uint32_t node) { return is_word[node]; }, tree);
+  if (!problem.what.empty())  // node i stands on line i + 1
+    return bad(problem.node + 1, "node " + std::to_string(problem.node) + " " + problem.what);
+  return basic_vocabulary<Bits>{std::move(tree)};
+}
+
+/// Reads a file. Errors: not_found, unreadable, malformed.
+template <std::size_t Bits = 256>
+[[nodiscard]] result<basic_vocabulary<Bits>> read_dbow_text(const std::filesystem::path& path) {
+  const auto text = read_file(path);
+  if (!text) return fail(text.error());
+  return parse_dbow_text<Bits>(*text, path.string());
+}
+
+}  // namespace orbis::places

@@ -1,0 +1,284 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Keyframes by the words they show, and which of them a new image may show again.
+#pragma once
+
+#include <algorithm>
+#include <cassert>
+#include <concepts>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <ranges>
+#include <span>
+#include <type_traits>
+#include <unordered_map>
+#include <utility>
+#include <vector>
+
+#include <orbis/places/bag_of_words.hpp>
+#include <orbis/places/inverted_index.hpp>
+#include <orbis/places/score.hpp>
+
+namespace orbis::places {
+
+/// What names a keyframe.
+template <class Id>
+concept keyframe_id = std::totally_ordered<Id> && std::copyable<Id> && std::default_initializable<Id> &&
+    requires(const Id& id) {
+  { std::hash<Id>{}(id) } -> std::convertible_to<std::size_t>;
+};
+
+struct query_options {
+  double shared_words =
+      0.8;                 ///< a candidate shares more words with the image than this part of the most that one shares
+  double min_score = 0.0;  ///< and reaches this score
+  double group_score = 0.75;  ///< and the scores of its group add up to more than this part of the best group's sum
+};
+
+/// A keyframe that may show what the image shows.
+template <class Id>
+struct place_candidate {
+  Id id{};
+  std::uint32_t shared_words = 0;
+  double score = 0.0;
+  double group_score = 0.0;  ///< the sum over its group
+  friend bool operator==(const place_candidate&, const place_candidate&) = default;
+};
+
+/// Memory of queries, which the next one uses again: of as much as the most keyframes there ever were, and the most
+/// candidates.
+template <class Id>
+struct query_workspace {
+  std::vector<std::uint32_t> shared;   ///< words, by slot
+  std::vector<std::uint32_t> touched;  ///< slots that share a word
+  std::vector<double> scores;          ///< by slot, of those scored in the query at hand
+  std::vector<std::uint32_t> scored;
+  std::vector<place_candidate<Id>> groups;
+};
+
+/// Callables for queries that leave nothing out and know no groups.
+struct none_excluded {
+  template <class Id>
+  [[nodiscard]] constexpr bool operator()(const Id&) const noexcept {
+    return false;
+  }
+};
+template <class Id>
+struct no_neighbors {
+  [[nodiscard]] std::span<const Id> operator()(const Id&) const noexcept { return {}; }
+};
+
+/// Keyframes with their bags, in an inverted index. Ids are the caller's; results depend on what is in the database
+/// alone, not on the order or history of additions and erasures. Queries on a const object may run at the same
+/// time, each with memory of its own; adding and erasing needs the object alone.
+///
+/// Source of the criteria: R. Mur-Artal, J. D. Tardos, "ORB-SLAM: a versatile and accurate monocular SLAM system",
+/// IEEE T-RO 2015, sections III.E and VII.A.
+template <keyframe_id Id = std::uint32_t, bag_score Score = l1_score>
+class basic_keyframe_database {
+ public:
+  using id_type = Id;
+  using candidate = place_candidate<Id>;
+  using workspace = query_workspace<Id>;
+
+  [[nodiscard]] std::size_t size() const noexcept { return slots_.size(); }
+  [[nodiscard]] bool empty() const noexcept { return slots_.empty(); }
+  [[nodiscard]] bool contains(const Id& id) const { return slots_.contains(id); }
+  /// The bag of a keyframe. @pre contains(id)
+  [[nodiscard]] const bag_of_words& bag(const Id& id) const {
+    const auto at = slots_.find(id);
+    assert(at != slots_.end());
+    return keyframes_[at->second].bag;
+  }
+
+  /// Takes a keyframe in; false, and nothing changes, if it is there already. O(words).
+  /// @pre the bag is scaled as the score wants it, by the same vocabulary as all others
+  bool add(const Id& id, const bag_of_words& bag) {
+    const bool reuse = !free_.empty();
+    const auto slot = reuse ? free_.back() : static_cast<std::uint32_t>(keyframes_.size());
+    if (!slots_.try_emplace(id, slot).second) return false;
+    if (reuse) {
+      free_.pop_back();
+    } else {
+      keyframes_.emplace_back();
+    }
+    keyframes_[slot].id = id;
+    keyframes_[slot].bag.words.assign(bag.words.begin(), bag.words.end());
+    index_.add(slot, bag);
+    return true;
+  }
+
+  /// Takes a keyframe out; false if it is not there. O(keyframes that share its words).
+  bool erase(const Id& id) {
+    const auto at = slots_.find(id);
+    if (at == slots_.end()) return false;
+    const std::uint32_t slot = at->second;
+    index_.erase(slot, keyframes_[slot].bag);
+    keyframes_[slot].bag.words.clear();
+    free_.push_back(slot);
+    slots_.erase(at);
+    return true;
+  }
+
+  void clear() {
+    slots_.clear();
+    keyframes_.clear();
+    free_.clear();
+    index_.clear();
+  }
+
+  /// How alike an image and a keyframe are. @pre contains(id)
+  [[nodiscard]] double score(const bag_of_words& image, const Id& id) const { return Score{}(image, bag(id)); }
+
+  /// The keyframes that may show what an image shows, the best group first, by id where groups are equal.
+  ///
+  /// Considered are the keyframes that share words with the image, but for those that `exclude(id)` names (the
+  /// image's own surroundings, when a loop is to be closed). Of those that share enough words the scores are
+  /// computed, and a score that is high enough makes a group: the keyframe and those of its neighbours
+  /// (`neighbors(id)`, a range of ids: the keyframes that see most of the same landmarks) that were scored as well. A
+  /// group stands for a place; from each group whose scores add up to enough, its best keyframe becomes a candidate,
+  /// once. Neighbours that are not in the database are passed over.
+  ///
+  /// O(keyframes + keyframes that share a word, word by word + candidates x words); in steady state nothing is
+  /// allocated, but by the callables.
+  template <std::predicate<const Id&> Exclude = none_excluded, class Neighbors = no_neighbors<Id>>
+  requires std::ranges::input_range<std::invoke_result_t<Neighbors&, const Id&>> &&
+      std::convertible_to<std::ranges::range_reference_t<std::invoke_result_t<Neighbors&, const Id&>>, Id>
+  void query(const bag_of_words& image, std::vector<candidate>& found, workspace& memory,
+             const query_options& options = {}, Exclude&& exclude = {}, Neighbors&& neighbors = {}) const {
+    found.clear();
+    count_shared(image, memory, exclude);
+    score_those_with_most(image, memory, options);
+    gather_groups(memory, options, neighbors);
+    keep_best(memory, options, found);
+  }
+  /// The same, with memory of its own.
+  template <std::predicate<const Id&> Exclude = none_excluded, class Neighbors = no_neighbors<Id>>
+  [[nodiscard]] std::vector<candidate> query(const bag_of_words& image, const query_options& options = {},
+                                             Exclude&& exclude = {}, Neighbors&& neighbors = {}) const {
+    std::vector<candidate> found;
+    workspace memory;
+    query(image, found, memory, options, exclude, neighbors);
+    return found;
+  }
+
+  /// The `count` keyframes of the highest score, by id where scores are equal; fewer, if fewer share a word with the
+  /// image. O(keyframes that share a word x words).
+  template <std::predicate<const Id&> Exclude = none_excluded>
+  void best(const bag_of_words& image, std::size_t count, std::vector<candidate>& found, workspace& memory,
+            Exclude&& exclude = {}) const {
+    found.clear();
+    count_shared(image, memory, exclude);
+    for (const std::uint32_t slot : memory.touched) {
+      const double score = Score{}(image, keyframes_[slot].bag);
+      found.push_back({keyframes_[slot].id, memory.shared[slot], score, score});
+    }
+    const auto end = found.begin() + static_cast<std::ptrdiff_t>(std::min(count, found.size()));
+    std::partial_sort(found.begin(), end, found.end(), better);
+    found.erase(end, found.end());
+  }
+  template <std::predicate<const Id&> Exclude = none_excluded>
+  [[nodiscard]] std::vector<candidate> best(const bag_of_words& image, std::size_t count,
+                                            Exclude&& exclude = {}) const {
+    std::vector<candidate> found;
+    workspace memory;
+    best(image, count, found, memory, exclude);
+    return found;
+  }
+
+  /// Bytes held, about.
+  [[nodiscard]] std::size_t memory() const noexcept {
+    std::size_t bytes = index_.memory() + keyframes_.capacity() * sizeof(keyframe) +
+                        slots_.size() * (sizeof(Id) + 3 * sizeof(void*)) + slots_.bucket_count() * sizeof(void*);
+    for (const keyframe& k : keyframes_) bytes += k.bag.words.capacity() * sizeof(word_value);
+    return bytes;
+  }
+
+ private:
+  static constexpr double unscored = -1.0;
+  struct keyframe {
+    Id id{};
+    bag_of_words bag;
+  };
+
+  [[nodiscard]] static bool better(const candidate& a, const candidate& b) {
+    return a.group_score != b.group_score ? a.group_score > b.group_score : a.id < b.id;
+  }
+
+  template <class Exclude>
+  void count_shared(const bag_of_words& image, workspace& memory, Exclude& exclude) const {
+    memory.shared.assign(keyframes_.size(), 0);
+    memory.touched.clear();
+    for (std::size_t i = 0; i != image.size(); ++i) {
+#if defined(__GNUC__)
+      // The next list is on its way while this one is counted.
+      if (i + 1 != image.size()) __builtin_prefetch(index_.images_with(image.words[i + 1].word).data());
+#endif
+      for (const std::uint32_t slot : index_.images_with(image.words[i].word))
+        if (memory.shared[slot]++ == 0) memory.touched.push_back(slot);
+    }
+    std::erase_if(memory.touched, [&](std::uint32_t slot) {
+      return static_cast<bool>(std::invoke(exclude, std::as_const(keyframes_[slot].id)));
+    });
+  }
+
+  void score_those_with_most(const bag_of_words& image, workspace& memory, const query_options& options) const {
+    memory.scores.assign(keyframes_.size(), unscored);
+    memory.scored.clear();
+    std::uint32_t most = 0;
+    for (const std::uint32_t slot : memory.touched) most = std::max(most, memory.shared[slot]);
+    const double enough = options.shared_words * most;
+    for (const std::uint32_t slot : memory.touched) {
+      if (!(memory.shared[slot] > enough)) continue;
+      memory.scores[slot] = Score{}(image, keyframes_[slot].bag);
+      memory.scored.push_back(slot);
+    }
+  }
+
+  template <class Neighbors>
+  void gather_groups(workspace& memory, const query_options& options, Neighbors& neighbors) const {
+    memory.groups.clear();
+    for (const std::uint32_t slot : memory.scored) {
+      if (!(memory.scores[slot] >= options.min_score)) continue;
+      const Id& id = keyframes_[slot].id;
+      candidate group{id, memory.shared[slot], memory.scores[slot], memory.scores[slot]};
+      for (auto&& neighbor : std::invoke(neighbors, id)) {
+        const auto at = slots_.find(static_cast<Id>(neighbor));
+        if (at == slots_.end() || at->second == slot || memory.scores[at->second] == unscored) continue;
+        const double score = memory.scores[at->second];
+        group.group_score += score;
+        if (score < group.score || (score == group.score && !(at->first < group.id))) continue;
+        group.id = at->first;
+        group.score = score;
+        group.shared_words = memory.shared[at->second];
+      }
+      memory.groups.push_back(group);
+    }
+  }
+
+  void keep_best(workspace& memory, const query_options& options, std::vector<candidate>& found) const {
+    double most = 0.0;
+    for (const candidate& group : memory.groups) most = std::max(most, group.group_score);
+    for (const candidate& group : memory.groups)
+      if (group.group_score > options.group_score * most) found.push_back(group);
+    // Each keyframe once, with its best group.
+    std::sort(found.begin(), found.end(), [](const candidate& a, const candidate& b) {
+      return a.id != b.id ? a.id < b.id : a.group_score > b.group_score;
+    });
+    found.erase(
+        std::unique(found.begin(), found.end(), [](const candidate& a, const candidate& b) { return a.id == b.id; }),
+        found.end());
+    std::sort(found.begin(), found.end(), better);
+  }
+
+  std::unordered_map<Id, std::uint32_t> slots_;
+  std::vector<keyframe> keyframes_;
+  std::vector<std::uint32_t> free_;
+  inverted_index index_;
+};
+
+/// Of keyframes that are numbered.
+using keyframe_database = basic_keyframe_database<>;
+
+}  // namespace orbis::places

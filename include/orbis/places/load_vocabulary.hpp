@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// A vocabulary from a file of any of the formats that are known.
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <string_view>
+
+#include <orbis/core/result.hpp>
+#include <orbis/places/dbow_text.hpp>
+#include <orbis/places/dbow_yaml.hpp>
+#include <orbis/places/vocabulary.hpp>
+#include <orbis/places/vocabulary_file.hpp>
+
+namespace orbis::places {
+
+/// Reads a vocabulary of our own format, or of DBoW2's text or DBoW3's YAML, told apart by how the file begins.
+/// Errors: not_found, unreadable, malformed, unsupported (gzip among them).
+template <std::size_t Bits = 256>
+[[nodiscard]] result<basic_vocabulary<Bits>> load_vocabulary(const std::filesystem::path& path) {
+  char head[8] = {};
+  std::ifstream in{path, std::ios::binary};
+  in.read(head, sizeof head);
+  const std::string_view begins{head, static_cast<std::size_t>(in.gcount())};
+  in.close();
+  if (begins.starts_with("\x1f\x8b")) return fail(errc::unsupported, path.string(), "is compressed: unpack it first");
+  if (begins == detail::vocabulary_magic) return read_vocabulary<Bits>(path);
+  if (begins.starts_with('%') || begins.starts_with("vocab")) return read_dbow_yaml<Bits>(path);
+  return read_dbow_text<Bits>(path);
+}
+
+}  // namespace orbis::places

@@ -1,0 +1,195 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// A vocabulary: descriptors that look alike are one word.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cassert>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <ranges>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include <orbis/core/simd.hpp>
+#include <orbis/places/bag_of_words.hpp>
+#include <orbis/places/bit_string.hpp>
+#include <orbis/places/descent.hpp>
+#include <orbis/places/vocabulary_tree.hpp>
+
+namespace orbis::places {
+
+struct transform_options {
+  bag_norm norm = bag_norm::l1;            ///< as the score wants it
+  std::uint32_t node_depth = 2;            ///< of the direct index's nodes, levels below the root
+  simd::level simd = simd::level::avx512;  ///< the best instructions to use if there are such; no result depends on it
+};
+
+/// Memory of a transform, which the next one uses again.
+struct transform_workspace {
+  std::vector<std::uint32_t> words, sorted;
+};
+
+/// A tree of descriptors of `Bits` bits: each node's children stand for parts of what it stands for, and a
+/// descriptor goes down from the root to the nearest child each time. The leaves are the words.
+///
+/// Immutable, and cheap to copy: copies share the tree. Made by `train`, `read_vocabulary`, `default_vocabulary`
+/// and the readers of other formats. One that is made of nothing has no words.
+///
+/// Source: D. Nister, H. Stewenius, "Scalable recognition with a vocabulary tree", CVPR 2006; D. Galvez-Lopez,
+/// J. D. Tardos, "Bags of binary words for fast place recognition in image sequences", IEEE T-RO 2012.
+template <std::size_t Bits>
+class basic_vocabulary {
+ public:
+  static constexpr std::size_t bits = Bits;
+  using tree_type = detail::vocabulary_tree<Bits>;
+
+  basic_vocabulary() : tree_{std::make_shared<tree_type>(empty_tree())} {}
+  /// @pre a connected tree, see `detail::connect_tree`
+  explicit basic_vocabulary(tree_type&& tree) : tree_{std::make_shared<tree_type>(std::move(tree))} {}
+  // Moving is copying: what was moved from still has its words.
+  basic_vocabulary(const basic_vocabulary&) noexcept = default;
+  basic_vocabulary& operator=(const basic_vocabulary&) noexcept = default;
+  ~basic_vocabulary() = default;
+
+  /// The number of words.
+  [[nodiscard]] std::size_t size() const noexcept { return tree_->word_count(); }
+  [[nodiscard]] bool empty() const noexcept { return size() == 0; }
+  /// The number of nodes, the root among them.
+  [[nodiscard]] std::size_t nodes() const noexcept { return tree_->node_count; }
+  /// Levels below the root.
+  [[nodiscard]] std::uint32_t depth() const noexcept { return tree_->depth; }
+  /// The most children that a node has.
+  [[nodiscard]] std::uint32_t branching() const noexcept { return tree_->branching; }
+  [[nodiscard]] places::weighting weighting() const noexcept { return tree_->weights_are; }
+  /// How much a word counts (the part that does not depend on the image). @pre word < size()
+  [[nodiscard]] float weight(std::uint32_t word) const noexcept { return tree_->weights[word]; }
+  [[nodiscard]] const tree_type& tree() const noexcept { return *tree_; }
+
+  /// The word of a descriptor. @pre !empty()
+  template <bit_string D>
+  requires(8 * sizeof(D) == Bits) [[nodiscard]] std::uint32_t
+      word_of(const D& descriptor, simd::level level = simd::level::avx512) const noexcept {
+    assert(!empty());
+    std::uint32_t leaf = 0;
+    detail::find_leaves(level, *tree_, {reinterpret_cast<const std::byte*>(&descriptor), 1, 0, &leaf, nullptr});
+    return tree_->word_of_leaf(leaf);
+  }
+
+  /// The words of an image's descriptors as a bag. Once there was an image of as many descriptors, nothing is
+  /// allocated. O(descriptors x depth x branching); safe to call from several threads, each with its own memory.
+  template <bit_string_range_of<Bits> Descriptors>
+  void transform(const Descriptors& descriptors, bag_of_words& bag, transform_workspace& memory,
+                 const transform_options& options = {}) const {
+    transform_span(std::span{std::ranges::data(descriptors), std::ranges::size(descriptors)}, bag, nullptr, memory,
+                   options);
+  }
+
+  /// The same, and the direct index: `nodes[i]` becomes descriptor `i`'s node at `options.node_depth` (or its
+  /// leaf, where that is higher), as `features::node_index` takes it.
+  template <bit_string_range_of<Bits> Descriptors>
+  void transform(const Descriptors& descriptors, bag_of_words& bag, std::vector<std::uint32_t>& nodes,
+                 transform_workspace& memory, const transform_options& options = {}) const {
+    nodes.resize(std::ranges::size(descriptors));
+    transform_span(std::span{std::ranges::data(descriptors), std::ranges::size(descriptors)}, bag, nodes.data(), memory,
+                   options);
+  }
+
+  /// The same, with memory of its own.
+  template <bit_string_range_of<Bits> Descriptors>
+  [[nodiscard]] bag_of_words transform(const Descriptors& descriptors, const transform_options& options = {}) const {
+    bag_of_words bag;
+    transform_workspace memory;
+    transform(descriptors, bag, memory, options);
+    return bag;
+  }
+
+  /// The same tree with other weights, one for each word: of another kind of images, or without the words that
+  /// tell nothing. Shares nothing with this one. O(nodes).
+  /// @pre one weight for each word, all from 0 to `largest_weight`
+  [[nodiscard]] basic_vocabulary with_weights(std::vector<float> weights, places::weighting kind) const {
+    assert(weights.size() == size());
+    tree_type copy;
+    copy.descriptors = detail::table_memory<bit_words<Bits>>(tree_->descriptors.values().size());
+    std::ranges::copy(tree_->descriptors.values(), copy.descriptors.values().begin());
+    copy.nodes = tree_->nodes;
+    copy.weights = std::move(weights);
+    copy.node_count = tree_->node_count;
+    copy.branching = tree_->branching;
+    copy.depth = tree_->depth;
+    copy.weights_are = kind;
+    return basic_vocabulary{std::move(copy)};
+  }
+
+  friend bool operator==(const basic_vocabulary& a, const basic_vocabulary& b) {
+    const auto same_node = [](const detail::tree_node& x, const detail::tree_node& y) {
+      return x.first_child == y.first_child;
+    };
+    return a.weighting() == b.weighting() && a.tree_->weights == b.tree_->weights &&
+           std::ranges::equal(a.tree_->nodes, b.tree_->nodes, same_node) &&
+           std::ranges::equal(a.tree_->descriptors.values(), b.tree_->descriptors.values());
+  }
+
+ private:
+  [[nodiscard]] static tree_type empty_tree() {
+    tree_type tree;
+    tree.nodes.assign(1, {1, 0});
+    return tree;
+  }
+
+  template <class D>
+  void transform_span(std::span<const D> descriptors, bag_of_words& bag, std::uint32_t* nodes,
+                      transform_workspace& memory, const transform_options& options) const {
+    bag.words.clear();
+    memory.words.resize(descriptors.size());
+    if (empty()) {
+      if (nodes != nullptr) std::fill_n(nodes, descriptors.size(), 0U);
+      return;
+    }
+    detail::find_leaves(
+        options.simd, *tree_,
+        {std::as_bytes(descriptors).data(), descriptors.size(), options.node_depth, memory.words.data(), nodes});
+    for (std::uint32_t& leaf : memory.words) leaf = tree_->word_of_leaf(leaf);
+    sort(memory);
+    count(memory.words, bag);
+    normalize(bag, options.norm);
+  }
+
+  /// By digits: a comparison sort would take a quarter of a transform's time.
+  void sort(transform_workspace& memory) const {
+    if (memory.words.size() < 64) return std::sort(memory.words.begin(), memory.words.end());
+    constexpr unsigned digit = 8;
+    const auto digits = (static_cast<unsigned>(std::bit_width(size() - 1)) + digit - 1) / digit;
+    memory.sorted.resize(memory.words.size());
+    for (unsigned shift = 0; shift != digits * digit; shift += digit) {
+      const auto digit_of = [shift](std::uint32_t word) { return (word >> shift) & 0xffU; };
+      std::array<std::uint32_t, 256> begin{};
+      for (const std::uint32_t word : memory.words) ++begin[digit_of(word)];
+      std::uint32_t before = 0;
+      for (std::uint32_t& at : begin) before += std::exchange(at, before);
+      for (const std::uint32_t word : memory.words) memory.sorted[begin[digit_of(word)]++] = word;
+      memory.words.swap(memory.sorted);
+    }
+  }
+
+  void count(std::span<const std::uint32_t> sorted, bag_of_words& bag) const {
+    const bool counted = weighting() == places::weighting::tf_idf || weighting() == places::weighting::tf;
+    for (std::size_t i = 0; i != sorted.size();) {
+      const std::size_t first = i;
+      while (i != sorted.size() && sorted[i] == sorted[first]) ++i;
+      const float w = weight(sorted[first]);
+      if (w > 0.0F) bag.words.push_back({sorted[first], counted ? w * static_cast<float>(i - first) : w});
+    }
+  }
+
+  std::shared_ptr<const tree_type> tree_;
+};
+
+/// For the descriptors of ORB.
+using vocabulary = basic_vocabulary<256>;
+
+}  // namespace orbis::places

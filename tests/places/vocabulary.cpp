@@ -1,0 +1,196 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <map>
+#include <vector>
+
+#include <orbis/features/descriptor.hpp>
+#include <orbis/features/node_guided.hpp>
+#include <orbis/places/vocabulary.hpp>
+
+#include "places/images.hpp"
+#include "support/allocations.hpp"
+#include "support/catch.hpp"
+
+using namespace orbis;
+using namespace orbis::places;
+using orbis::test::naive_way;
+
+static_assert(bit_string<features::binary_descriptor<256>> && bit_string<features::binary_descriptor<512>>);
+static_assert(bit_string<std::array<unsigned char, 32>> && !bit_string<double> && !bit_string<std::array<char, 33>>);
+static_assert(!bit_string<std::vector<std::uint64_t>>);
+
+namespace {
+
+constexpr std::array levels{simd::level::portable, simd::level::popcnt, simd::level::avx2, simd::level::avx512};
+
+/// Words and nodes as the plainest descent finds them, counted in a map.
+template <std::size_t Bits>
+void check_transform(const basic_vocabulary<Bits>& words, const test::descriptors<Bits>& image) {
+  for (const std::uint32_t node_depth : {0U, 1U, 2U, 9U}) {
+    std::map<std::uint32_t, int> counts;
+    std::vector<std::uint32_t> expected_nodes;
+    for (const auto& d : image) {
+      const auto way = naive_way(words, d);
+      ++counts[words.tree().word_of_leaf(way.back())];
+      expected_nodes.push_back(way[std::min<std::size_t>(node_depth, way.size() - 1)]);
+    }
+    for (const simd::level level : levels) {
+      transform_workspace memory;
+      bag_of_words bag;
+      std::vector<std::uint32_t> nodes;
+      words.transform(image, bag, nodes, memory, {.norm = bag_norm::none, .node_depth = node_depth, .simd = level});
+      CHECK(nodes == expected_nodes);
+      std::map<std::uint32_t, int> found;
+      for (const auto& [word, value] : bag.words)
+        found[word] = static_cast<int>(std::lround(value / words.weight(word)));
+      std::erase_if(counts, [&](const auto& entry) { return words.weight(entry.first) == 0.0F; });
+      CHECK(found == counts);
+      CHECK(std::is_sorted(bag.words.begin(), bag.words.end(),
+                           [](const word_value& a, const word_value& b) { return a.word < b.word; }));
+      bag_of_words alone;
+      words.transform(image, alone, memory, {.norm = bag_norm::none, .simd = level});
+      CHECK(alone == bag);
+    }
+  }
+}
+
+}  // namespace
+
+TEST_CASE("a transform equals the plainest descent, at every level of instructions") {
+  const auto branching = GENERATE(2U, 6U, 33U);
+  const auto words = test::small_vocabulary(branching, 4);
+  REQUIRE(words.size() > 14);
+  for (const std::size_t features : {0U, 1U, 15U, 16U, 17U, 63U, 64U, 500U})
+    check_transform(words, test::make_images(1, features, 8, 300, 40)[0]);
+}
+
+TEST_CASE("descriptors of any length of whole words have a vocabulary") {
+  check_transform(test::small_vocabulary<64>(5, 3), test::make_images<64>(1, 300, 8)[0]);
+  check_transform(test::small_vocabulary<512>(10, 3), test::make_images<512>(1, 300, 8)[0]);
+}
+
+TEST_CASE("leaves above the deepest level are words") {
+  // A root with three children, of which the middle one has two: words 0 and 1 are nodes 1 and 3.
+  places::detail::vocabulary_tree<64> tree;
+  tree.node_count = 6;
+  tree.descriptors = places::detail::table_memory<bit_words<64>>(5);
+  const std::array<std::uint64_t, 5> bits{0x0, 0xff, ~std::uint64_t{0}, 0x0f, 0xf0};
+  for (std::size_t i = 0; i != 5; ++i) tree.descriptors.values()[i] = {bits[i]};
+  tree.weights = {1.0F, 2.0F, 3.0F, 4.0F};
+  const std::vector<std::uint16_t> child_counts{3, 0, 2};
+  REQUIRE(places::detail::connect_tree(tree, child_counts).empty());
+  const basic_vocabulary<64> words{std::move(tree)};
+  CHECK(words.size() == 4);
+  CHECK(words.depth() == 2);
+  CHECK(words.branching() == 3);
+  for (const simd::level level : levels) {
+    CHECK(words.word_of(std::uint64_t{0x1}, level) == 0);
+    CHECK(words.word_of(~std::uint64_t{0x1}, level) == 1);
+    CHECK(words.word_of(std::uint64_t{0x1f}, level) == 2);
+    CHECK(words.word_of(std::uint64_t{0xf1}, level) == 3);
+    CHECK(words.word_of(std::uint64_t{0x77}, level) == 2);  // as near to one as to the other: the first
+  }
+  check_transform(words, test::make_images<64>(1, 200, 3)[0]);
+}
+
+TEST_CASE("trees that hang together badly are refused") {
+  places::detail::vocabulary_tree<64> tree;
+  const auto problem_of = [&](std::uint32_t nodes, std::vector<std::uint16_t> counts, std::vector<float> weights) {
+    tree.node_count = nodes;
+    tree.weights = std::move(weights);
+    return places::detail::connect_tree(tree, counts);
+  };
+  CHECK(problem_of(3, {2}, {1, 1}).empty());
+  CHECK(problem_of(1, {}, {}).empty());
+  CHECK_FALSE(problem_of(3, {1}, {1, 1}).empty());        // fewer children
+  CHECK_FALSE(problem_of(3, {3}, {1, 1}).empty());        // more children
+  CHECK_FALSE(problem_of(3, {0, 2}, {1, 1}).empty());     // a root without children, and a node of nobody
+  CHECK_FALSE(problem_of(4, {1, 0, 2}, {1, 1}).empty());  // a node that would be its own ancestor
+  CHECK_FALSE(problem_of(3, {2, 0}, {1, 1}).empty());     // a tail
+  CHECK_FALSE(problem_of(3, {2}, {1}).empty());           // a word too few
+  CHECK_FALSE(problem_of(3, {2}, {1, -1}).empty());
+  CHECK_FALSE(problem_of(3, {2}, {1, 1e21F}).empty());
+  CHECK_FALSE(problem_of(3, {2}, {1, std::nanf("")}).empty());
+  CHECK_FALSE(problem_of(0xffffffffU, std::vector<std::uint16_t>(70000, 65535), {}).empty());
+}
+
+TEST_CASE("weights count as their kind says") {
+  const auto image = test::make_images(1, 400, 8)[0];
+  for (const weighting kind : {weighting::tf_idf, weighting::tf, weighting::idf, weighting::binary}) {
+    const auto words = test::small_vocabulary(6, 3, kind);
+    const bool rarity = kind == weighting::tf_idf || kind == weighting::idf;
+    const bool counted = kind == weighting::tf_idf || kind == weighting::tf;
+    std::map<std::uint32_t, float> expected;
+    for (const auto& d : image) {
+      const std::uint32_t word = words.word_of(d);
+      if (!rarity) CHECK(words.weight(word) == 1.0F);
+      expected[word] = counted ? expected[word] + words.weight(word) : words.weight(word);
+    }
+    std::erase_if(expected, [](const auto& e) { return e.second == 0.0F; });
+    const auto bag = words.transform(image, {.norm = bag_norm::none});
+    REQUIRE(bag.size() == expected.size());
+    for (const auto& [word, value] : bag.words) CHECK(value == Approx(expected[word]));
+  }
+}
+
+TEST_CASE("a vocabulary with other weights is the same tree; words of no weight are left out") {
+  const auto words = test::small_vocabulary();
+  std::vector<float> weights(words.size(), 2.0F);
+  weights[7] = 0.0F;
+  const auto other = words.with_weights(weights, weighting::binary);
+  CHECK(other != words);
+  CHECK(other.size() == words.size());
+  const auto image = test::make_images(1, 2000, 8)[0];
+  bool had = false;
+  for (const auto& d : image) {
+    CHECK(other.word_of(d) == words.word_of(d));
+    had = had || words.word_of(d) == 7;
+  }
+  REQUIRE(had);
+  for (const auto& [word, value] : other.transform(image, {.norm = bag_norm::none}).words) {
+    CHECK(word != 7);
+    CHECK(value == 2.0F);
+  }
+}
+
+TEST_CASE("a vocabulary of nothing has no words") {
+  const vocabulary none;
+  CHECK(none.empty());
+  CHECK(none.nodes() == 1);
+  bag_of_words bag{{{1, 1.0F}}};
+  std::vector<std::uint32_t> nodes;
+  transform_workspace memory;
+  none.transform(test::make_images(1, 3, 1)[0], bag, nodes, memory);
+  CHECK(bag.empty());
+  CHECK(nodes == std::vector<std::uint32_t>(3, 0));
+}
+
+TEST_CASE("the nodes of a transform are what matching under common nodes takes") {
+  const auto words = test::small_vocabulary();
+  const auto image = test::make_images(1, 200, 8)[0];
+  bag_of_words bag;
+  std::vector<std::uint32_t> nodes;
+  transform_workspace memory;
+  words.transform(image, bag, nodes, memory, {.node_depth = 1});
+  const features::node_index index{nodes};
+  CHECK(index.groups().size() <= words.branching());
+  std::size_t features = 0;
+  for (const auto& group : index.groups()) features += group.features.size();
+  CHECK(features == image.size());
+}
+
+TEST_CASE("a transform in memory that has been used allocates nothing") {
+  const auto words = test::small_vocabulary();
+  const auto images = test::make_images(2, 1000, 8);
+  bag_of_words bag;
+  std::vector<std::uint32_t> nodes;
+  transform_workspace memory;
+  for (const auto& image : images) words.transform(image, bag, nodes, memory);
+  const std::size_t before = test::allocations();
+  for (const auto& image : images) words.transform(image, bag, nodes, memory);
+  if (test::counts_allocations()) CHECK(test::allocations() == before);
+  CHECK(bag == words.transform(images[1]));
+}
