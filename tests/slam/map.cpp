@@ -1,99 +1,38 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <utility>
+#include <vector>
+
 #include <orbis/core/random.hpp>
-#include <orbis/slam/local_map.hpp>
 #include <orbis/slam/map.hpp>
 #include <orbis/slam/mapping.hpp>
 
+#include "slam/random_map.hpp"
 #include "support/catch.hpp"
 
 using namespace orbis;
+using test::fault_of;
+using test::random_frame;
 
-namespace {
-
-/// A frame of `n` keypoints with random descriptors, all two metres away.
-slam::frame random_frame(random_bits& random, std::size_t n, std::size_t index) {
-  slam::frame f;
-  f.index = index;
-  f.T_world_camera = se3(so3{}, vec3(0.1 * static_cast<double>(index), 0, 0));
-  for (std::size_t i = 0; i < n; ++i) {
-    features::keypoint k;
-    k.x = static_cast<float>(random.uniform(0, 640));
-    k.y = static_cast<float>(random.uniform(0, 480));
-    f.features.keypoints.push_back(k);
-    features::binary_descriptor<256> d;
-    for (auto& w : d.words) w = random();
-    f.features.descriptors.push_back(d);
-    f.depth.push_back(2.0F);
-    f.rays.emplace_back((static_cast<double>(k.x) - 320) / 525, (static_cast<double>(k.y) - 240) / 525, 1.0);
-    f.landmarks.push_back(slam::no_id);
+TEST_CASE("A map is whole after any sequence of operations") {
+  for (const std::uint64_t seed : {17U, 18U, 19U}) {
+    random_bits random(seed);
+    slam::map m(8, 1.2, 3);
+    std::map<slam::landmark_id, slam::landmark_id> fused;
+    for (int step = 0; step < 4000; ++step) {
+      if (step == 2500)  // down to nothing, and up again
+        for (slam::keyframe_id k = 0; k != m.keyframe_end(); ++k)
+          if (m.has_keyframe(k)) m.erase_keyframe(k);
+      test::change_somehow(random, m, 12);
+      if (step % 5 == 0) REQUIRE(fault_of(m) == "");
+    }
+    REQUIRE(fault_of(m) == "");
+    CHECK(m.keyframe_end() > 100);
+    CHECK(m.keyframes().size() > 5);
+    CHECK(m.landmark_end() > 1000);
   }
-  return f;
-}
-
-void check_consistent(const slam::map& m) {
-  std::size_t alive = 0, observations = 0, seen = 0;
-  for (slam::landmark_id l = 0; l < m.landmarks().size(); ++l) {
-    const auto& landmark = m.landmark_at(l);
-    if (!landmark.alive) {
-      REQUIRE(landmark.observations.empty());
-      continue;
-    }
-    ++alive;
-    REQUIRE_FALSE(landmark.observations.empty());
-    for (std::size_t i = 0; i < landmark.observations.size(); ++i) {
-      const auto& o = landmark.observations[i];
-      REQUIRE(m.at(o.keyframe).landmarks[o.feature] == l);
-      if (i > 0) REQUIRE(landmark.observations[i - 1].keyframe < o.keyframe);
-      ++observations;
-    }
-  }
-  for (const auto& k : m.keyframes())
-    for (const auto l : k.landmarks) {
-      if (l == slam::no_id) continue;
-      REQUIRE(m.is_alive(l));
-      ++seen;
-    }
-  REQUIRE(alive == m.landmark_count());
-  REQUIRE(observations == seen);
-}
-
-}  // namespace
-
-TEST_CASE("Both sides of every observation agree after any sequence of operations") {
-  random_bits random(17);
-  slam::map m(8, 1.2);
-  const auto any_landmark = [&] { return random.below(static_cast<std::uint32_t>(m.landmarks().size())); };
-  const auto any_keyframe = [&] { return random.below(static_cast<std::uint32_t>(m.keyframes().size())); };
-  slam::insert_keyframe(m, random_frame(random, 30, 0), {});
-  for (int step = 0; step < 2000; ++step) {
-    const auto l = any_landmark();
-    switch (random.below(6)) {
-      case 0: {
-        if (m.keyframes().size() >= 30) break;
-        auto f = random_frame(random, 30, m.keyframes().size());
-        for (int i = 0; i < 12; ++i) f.landmarks[random.below(30)] = any_landmark();
-        slam::insert_keyframe(m, std::move(f), {});
-        break;
-      }
-      case 1:
-        if (m.is_alive(l)) m.observe(l, any_keyframe(), random.below(30));
-        break;
-      case 2: m.forget(l, any_keyframe()); break;
-      case 3:
-        if (random.below(20) == 0) m.remove_landmark(l);
-        break;
-      case 4:
-        if (const auto into = any_landmark(); into != l && m.is_alive(l) && m.is_alive(into)) m.merge(l, into);
-        break;
-      default:
-        if (m.is_alive(l)) m.update(l);
-    }
-    if (step % 20 == 0) check_consistent(m);
-  }
-  check_consistent(m);
-  CHECK(m.keyframes().size() == 30);
-  slam::cull_landmarks(m, 29);
-  check_consistent(m);
 }
 
 TEST_CASE("Keyframes that share landmarks come most shared first") {
@@ -110,10 +49,6 @@ TEST_CASE("Keyframes that share landmarks come most shared first") {
   REQUIRE(order.size() == 2);
   CHECK(order[0] == std::pair<slam::keyframe_id, std::size_t>(1, 25));
   CHECK(order[1] == std::pair<slam::keyframe_id, std::size_t>(0, 10));
-  CHECK(slam::most_shared(m, query, 7) == 1);
-  CHECK(slam::most_shared(m, random_frame(random, 5, 3), 7) == 7);
-  CHECK(slam::local_landmarks(m, query, 0, 40).size() == 70);
-  CHECK(slam::local_keyframes(m, query, 0, 1).size() == 1);
 }
 
 TEST_CASE("A landmark's descriptor is the most typical of those observed") {
@@ -127,15 +62,180 @@ TEST_CASE("A landmark's descriptor is the most typical of those observed") {
     g.features.descriptors[0] = typical;
     g.features.descriptors[0].words[0] ^= flipped;
     g.landmarks[0] = 0;
-    slam::insert_keyframe(m, std::move(g), {});
+    return slam::insert_keyframe(m, std::move(g), {});
   };
   add(0xff00);
   add(0x00ff0000);
-  add(0x1);
+  const auto near = add(0x1);
   add(0xffffffffffffffffULL);
   const auto chosen = m.landmark_at(0).descriptor;
   CHECK(m.landmark_at(0).observations.size() == 5);
   CHECK(features::hamming{}(chosen, typical) <= 1);
+  // Without these two the others have nothing in common with it.
+  m.forget(0, 0);
+  m.forget(0, near);
+  CHECK_FALSE(m.landmark_at(0).has_current_descriptor);
+  m.update(0);
+  CHECK(m.landmark_at(0).has_current_descriptor);
+  CHECK(features::hamming{}(m.landmark_at(0).descriptor, typical) >= 8);
+}
+
+TEST_CASE("The most typical of many descriptors is chosen among some, and is one of them") {
+  random_bits random(10);
+  std::vector<features::binary_descriptor<256>> all(500);
+  for (std::size_t i = 0; i < all.size(); ++i)
+    for (auto& w : all[i].words) w = i % 10 == 0 ? random() : random() & random() & random();
+  const auto best = slam::most_typical(
+      all.size(), [&](std::size_t i) -> const auto& { return all[i]; });
+  REQUIRE(best < all.size());
+  CHECK(best % 10 != 0);  // not one of the outliers
+  for (const std::size_t n : {1U, 2U})
+    CHECK(slam::most_typical(
+              n, [&](std::size_t i) -> const auto& { return all[i]; }) == n - 1);
+}
+
+TEST_CASE("A fused landmark leads to what it became, and frames that show it join in") {
+  random_bits random(12);
+  slam::map m(8, 1.2);
+  const auto first = slam::insert_keyframe(m, random_frame(random, 4, 0), {});
+  const auto second = slam::insert_keyframe(m, random_frame(random, 4, 1), {});
+  const auto a = m.at(first).landmarks[0], b = m.at(second).landmarks[0], c = m.at(second).landmarks[1];
+  m.count_visible(a);
+  CHECK(m.covisibility().shared(first, second) == 0);
+  m.fuse(a, b);
+  CHECK(m.covisibility().shared(first, second) == 1);
+  CHECK(m.became(a) == b);
+  CHECK(m.at(first).landmarks[0] == b);
+  CHECK(m.landmark_at(b).visible == 3);
+  CHECK(m.landmark_at(b).found == 2);
+  m.fuse(b, c);  // the second keyframe sees both: its keypoint 0 shows nothing now
+  CHECK(m.became(a) == c);
+  CHECK(m.at(second).landmarks[0] == slam::no_id);
+  CHECK(m.landmark_at(c).observations == std::vector<slam::observation>{{first, 0}, {second, 1}});
+
+  auto f = random_frame(random, 4, 2);
+  f.landmarks[3] = a;
+  const auto third = m.add_keyframe(std::move(f));
+  CHECK(m.at(third).landmarks[3] == c);
+  CHECK(m.covisibility().shared(first, third) == 1);
+  m.remove_landmark(c);
+  CHECK(m.became(a) == slam::no_id);
+  CHECK(fault_of(m) == "");
+}
+
+TEST_CASE("A keyframe hangs on the one that it shares most with, else on the newest") {
+  random_bits random(13);
+  slam::map m(8, 1.2);
+  for (std::size_t i = 0; i < 3; ++i) slam::insert_keyframe(m, random_frame(random, 40, i), {});
+  CHECK(m.tree().root() == 0);
+  CHECK(m.tree().parent(1) == 0);
+  CHECK(m.tree().parent(2) == 1);
+  auto f = random_frame(random, 40, 3);
+  for (std::uint32_t i = 0; i < 10; ++i) f.landmarks[i] = m.at(1).landmarks[i];
+  for (std::uint32_t i = 10; i < 18; ++i) f.landmarks[i] = m.at(2).landmarks[i];
+  slam::insert_keyframe(m, f, {});
+  CHECK(m.tree().parent(3) == 1);
+  CHECK(m.covisibility().neighbors(3) == std::vector<slam::covisible>{{1, 10}, {2, 8}});  // the best of 2
+}
+
+TEST_CASE("An erased keyframe leaves its landmarks to others, its children to its parent, and its pose to its heir") {
+  random_bits random(14);
+  slam::map m(8, 1.2);
+  slam::insert_keyframe(m, random_frame(random, 30, 0), {});
+  auto f = random_frame(random, 30, 1);
+  for (std::uint32_t i = 0; i < 20; ++i) f.landmarks[i] = m.at(0).landmarks[i];
+  slam::insert_keyframe(m, f, {});
+  f = random_frame(random, 30, 2);
+  f.landmarks[4] = m.at(1).landmarks[25];
+  slam::insert_keyframe(m, f, {});
+  const auto shared = m.at(0).landmarks[3], own = m.at(1).landmarks[29];
+  const se3 before = m.at(1).T_world_camera;
+
+  m.erase_keyframe(1);
+  REQUIRE(fault_of(m) == "");
+  CHECK_FALSE(m.has_keyframe(1));
+  CHECK(m.keyframes().size() == 2);
+  CHECK(m.keyframe_end() == 3);
+  CHECK(m.is_alive(shared));
+  CHECK_FALSE(m.is_alive(own));
+  CHECK(m.tree().parent(2) == 0);
+  CHECK(m.heir(1) == 0);
+  CHECK((m.pose_of(1).inverse() * before).log().norm() < 1e-12);
+
+  const se3 moved = test::random_motion(random);
+  m.set_pose(0, moved * m.at(0).T_world_camera);
+  CHECK((m.pose_of(1).inverse() * (moved * before)).log().norm() < 1e-12);
+  m.erase_keyframe(0);  // the root; the heir of the heir
+  CHECK(m.heir(1) == 2);
+  CHECK(m.tree().root() == 2);
+  CHECK((m.pose_of(1).inverse() * (moved * before)).log().norm() < 1e-12);
+  m.erase_keyframe(2);
+  CHECK(m.heir(1) == slam::no_id);
+  CHECK(m.landmark_count() == 0);
+  CHECK((m.pose_of(1).inverse() * (moved * before)).log().norm() < 1e-12);
+  m.transform(moved);
+  CHECK((m.pose_of(1).inverse() * (moved * moved * before)).log().norm() < 1e-12);
+  CHECK(slam::insert_keyframe(m, random_frame(random, 5, 3), {}) == 3);
+  CHECK(m.tree().root() == 3);
+  CHECK(fault_of(m) == "");
+}
+
+TEST_CASE("A map put together from its parts is the same map") {
+  const slam::map m = test::random_map(15, 3000);
+  slam::map_content parts = m.content();
+  const slam::map again{std::move(parts)};
+  REQUIRE(fault_of(again) == "");
+  CHECK(again.landmark_count() == m.landmark_count());
+  for (const slam::keyframe& k : m.keyframes()) {
+    REQUIRE(again.at(k.id).landmarks == k.landmarks);
+    REQUIRE(again.covisibility().neighbors(k.id) == m.covisibility().neighbors(k.id));
+  }
+}
+
+TEST_CASE("A map absorbs another, which hangs on it where the caller says") {
+  random_bits random(16);
+  for (int round = 0; round < 10; ++round) {
+    slam::map a = test::random_map(20 + static_cast<std::uint64_t>(round), 600);
+    slam::map b = test::random_map(40 + static_cast<std::uint64_t>(round), 600);
+    const slam::map a_before = a, b_before = b;
+    slam::keyframe_id into = test::any_keyframe(random, a), from = test::any_keyframe(random, b);
+    while (!a.has_keyframe(into)) into = test::any_keyframe(random, a);
+    while (!b.has_keyframe(from)) from = test::any_keyframe(random, b);
+    const se3 T = test::random_motion(random);
+
+    const auto offsets = a.absorb(std::move(b), T, {into, from});
+    REQUIRE(fault_of(a) == "");
+    CHECK(fault_of(b) == "");  // NOLINT(bugprone-use-after-move): an empty map
+    CHECK(b.keyframes().empty());
+    CHECK(offsets.keyframes == a_before.keyframe_end());
+    CHECK(a.keyframe_end() == a_before.keyframe_end() + b_before.keyframe_end());
+    CHECK(a.landmark_count() == a_before.landmark_count() + b_before.landmark_count());
+    CHECK(a.tree().parent(from + offsets.keyframes) == into);
+    for (slam::keyframe_id k = 0; k != b_before.keyframe_end(); ++k)
+      REQUIRE((a.pose_of(k + offsets.keyframes).inverse() * (T * b_before.pose_of(k))).log().norm() < 1e-9);
+    for (slam::keyframe_id k = 0; k != a_before.keyframe_end(); ++k)
+      REQUIRE((a.pose_of(k).inverse() * a_before.pose_of(k)).log().norm() == 0.0);
+    for (slam::landmark_id l = 0; l != b_before.landmark_end(); ++l) {
+      const auto now = b_before.became(l);
+      REQUIRE(a.became(l + offsets.landmarks) == (now == slam::no_id ? now : now + offsets.landmarks));
+      if (!b_before.is_alive(l)) continue;
+      const auto& moved = a.landmark_at(l + offsets.landmarks);
+      REQUIRE((moved.position - T * b_before.landmark_at(l).position).norm() < 1e-9);
+    }
+    for (int step = 0; step < 300; ++step) test::change_somehow(random, a, 20);
+    REQUIRE(fault_of(a) == "");
+  }
+}
+
+TEST_CASE("Nothing absorbed changes nothing, and what nothing absorbs is what it was") {
+  slam::map m = test::random_map(50, 500);
+  const auto count = m.landmark_count();
+  CHECK(m.absorb(slam::map(8, 1.2), se3{}, {}).keyframes == m.keyframe_end());
+  CHECK(m.landmark_count() == count);
+  slam::map empty(8, 1.2, 3);
+  CHECK(empty.absorb(std::move(m), se3{}, {}).landmarks == 0);
+  CHECK(empty.landmark_count() == count);
+  CHECK(fault_of(empty) == "");
 }
 
 TEST_CASE("Close points become landmarks first and far ones fill up to the minimum") {

@@ -20,6 +20,7 @@
 #include <orbis/features/depth.hpp>
 #include <orbis/features/descriptor.hpp>
 #include <orbis/features/grid.hpp>
+#include <orbis/slam/ids.hpp>
 #include <orbis/slam/options.hpp>
 
 namespace orbis::slam {
@@ -29,11 +30,6 @@ template <class E>
 concept feature_extractor = requires(const E& extract, image_view<const rgb8> image) {
   { extract(image) } -> std::same_as<features::features>;
 };
-
-/// Landmarks and keyframes are numbered in the order of their creation; numbers are never used again.
-using landmark_id = std::uint32_t;
-using keyframe_id = std::uint32_t;
-inline constexpr std::uint32_t no_id = std::numeric_limits<std::uint32_t>::max();
 
 struct frame {
   double timestamp = 0.0;

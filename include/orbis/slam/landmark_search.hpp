@@ -14,6 +14,8 @@
 
 #include <orbis/camera/model.hpp>
 #include <orbis/features/hamming.hpp>
+#include <orbis/features/project_points.hpp>
+#include <orbis/features/projected.hpp>
 #include <orbis/features/stages.hpp>
 #include <orbis/features/windowed.hpp>
 #include <orbis/slam/map.hpp>
@@ -50,45 +52,28 @@ struct pyramid_scales {
   [[nodiscard]] double scale(int octave) const { return std::pow(factor, octave); }
   /// 1 / sigma^2 of a keypoint's position, sigma being one pixel of its level.
   [[nodiscard]] double information(int octave) const { return 1.0 / (scale(octave) * scale(octave)); }
-  /// The level at which a landmark should appear from a distance.
-  [[nodiscard]] int predicted_octave(const landmark& l, double distance) const {
-    const double octave = std::ceil(std::log(l.max_distance / distance) / std::log(factor));
-    return static_cast<int>(std::clamp(octave, 0.0, levels - 1.0));
-  }
 };
 
 /// A window around the projection of what the last frame saw, if it projects into the image.
 template <camera::camera_model Camera>
-void add_seen_point(search_list& list, const Camera& camera, const pyramid_scales& scales, const se3& T_camera_world,
+void add_seen_point(search_list& list, const features::camera_projection<Camera>& project, const pyramid_scales& scales,
                     const candidate_point& point, const features::binary_descriptor<256>& descriptor,
                     const features::keypoint& seen, double radius) {
-  const auto pixel = camera.project(T_camera_world * point.position);
-  if (!pixel || pixel->x() < 0.0 || pixel->y() < 0.0 || pixel->x() >= camera.width() || pixel->y() >= camera.height())
-    return;
-  list.add(point, descriptor, seen,
-           {static_cast<float>(pixel->x()), static_cast<float>(pixel->y()),
-            static_cast<float>(radius * scales.scale(seen.octave)), seen.octave - 1, seen.octave + 1});
+  if (const auto at = project(point.position))
+    list.add(point, descriptor, seen,
+             {at->x, at->y, static_cast<float>(radius * scales.scale(seen.octave)), seen.octave - 1, seen.octave + 1});
 }
 
-/// A window around the projection of a landmark, if the frame should show it: inside the image, at
-/// a distance from which its size suits the pyramid, seen from less than 60 degrees off. Returns
-/// whether it should.
+/// A window around the projection of a landmark, if the frame should show it: inside the image, at a distance and
+/// from a side from which `rule` says that its descriptor is of use. Returns whether it should.
 template <camera::camera_model Camera>
-bool add_landmark(search_list& list, const Camera& camera, const pyramid_scales& scales, const se3& T_world_camera,
-                  const se3& T_camera_world, const landmark& l, landmark_id id, double radius) {
-  const vec3 towards = T_world_camera.translation() - l.position;
-  const double distance = towards.norm();
-  if (!(distance > 0.8 * l.min_distance && distance < 1.2 * l.max_distance)) return false;
-  const double cosine = towards.dot(l.normal) / distance;
-  if (!(cosine > 0.5)) return false;
-  const auto pixel = camera.project(T_camera_world * l.position);
-  if (!pixel || pixel->x() < 0.0 || pixel->y() < 0.0 || pixel->x() >= camera.width() || pixel->y() >= camera.height())
-    return false;
-  const int octave = scales.predicted_octave(l, distance);
-  const double sideways = cosine > 0.998 ? 1.0 : 1.6;  // the pose predicts a slanted view less well
-  list.add({l.position, id}, l.descriptor, {},
-           {static_cast<float>(pixel->x()), static_cast<float>(pixel->y()),
-            static_cast<float>(radius * sideways * scales.scale(octave)), octave - 1, octave + 1});
+bool add_landmark(search_list& list, const features::camera_projection<Camera>& project,
+                  const features::projection_rule& rule, const landmark& l, landmark_id id) {
+  const auto appears = project(l);
+  if (!appears) return false;
+  const features::window where = features::window_of(*appears, rule);
+  if (where.radius < 0.0F) return false;
+  list.add({l.position, id}, l.descriptor, {}, where);
   return true;
 }
 

@@ -14,6 +14,7 @@
 #include <orbis/camera/model.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/optimize/bundle_adjustment.hpp>
+#include <orbis/optimize/reprojection.hpp>
 #include <orbis/slam/landmark_search.hpp>
 #include <orbis/slam/local_map.hpp>
 #include <orbis/slam/map.hpp>
@@ -23,10 +24,10 @@
 namespace orbis::slam {
 
 /// Moves the keyframes around `newest` and their landmarks to where the observations agree best.
-/// Other keyframes that see these landmarks hold the whole in place, as does the first keyframe.
+/// Other keyframes that see these landmarks hold the whole in place, as does the root of the map.
 /// Observations that disagree afterwards are forgotten.
 template <camera::camera_model Camera>
-void adjust_locally(map& m, keyframe_id newest, optimize::bundle_adjuster<Camera>& adjuster,
+void adjust_locally(map& m, keyframe_id newest, optimize::bundle_adjuster<optimize::reprojection<Camera>>& adjuster,
                     const optimize::reprojection<Camera>& model, const pyramid_scales& scales,
                     const adjustment_options& o) {
   if (m.keyframes().size() < 2 || o.keyframes == 0) return;
@@ -35,11 +36,11 @@ void adjust_locally(map& m, keyframe_id newest, optimize::bundle_adjuster<Camera
     if (k != newest && shared >= o.min_shared && keyframes.size() < o.keyframes) keyframes.push_back(k);
   const std::vector<landmark_id> landmarks = landmarks_of(m, keyframes);
 
-  std::vector<std::uint32_t> index(m.keyframes().size(), no_id);
+  std::vector<std::uint32_t> index(m.keyframe_end(), no_id);
   std::vector<std::uint8_t> is_fixed;
   for (std::uint32_t i = 0; i < keyframes.size(); ++i) {
     index[keyframes[i]] = i;
-    is_fixed.push_back(keyframes[i] == 0 ? 1 : 0);
+    is_fixed.push_back(keyframes[i] == m.tree().root() ? 1 : 0);
   }
   std::vector<vec3> points;
   std::vector<optimize::bundle_observation> observations;
@@ -64,18 +65,19 @@ void adjust_locally(map& m, keyframe_id newest, optimize::bundle_adjuster<Camera
   std::vector<se3> poses;
   for (const keyframe_id k : keyframes) poses.push_back(m.at(k).T_world_camera);
   std::vector<std::uint8_t> outliers(observations.size(), 0);
-  const auto solve = [&](int iterations) {
-    (void)adjuster.solve(seq, std::span<se3>(poses), std::span<vec3>(points),
-                         std::span<const optimize::bundle_observation>(observations),
-                         {.max_iterations = iterations, .fixed_poses = is_fixed, .ignored = outliers});
-    for (std::size_t i = 0; i < observations.size(); ++i) {
-      const auto& seen = observations[i];
-      const double gate = std::isnan(seen.right) ? 5.991 : 7.815;
-      outliers[i] = adjuster.chi2(poses[seen.pose], points[seen.point], seen) > gate ? 1 : 0;
-    }
+  std::vector<double> squared(observations.size());
+  const auto find_outliers = [&] {
+    adjuster.chi2(poses, points, observations, squared);
+    for (std::size_t i = 0; i < observations.size(); ++i)
+      outliers[i] = squared[i] > (std::isnan(observations[i].right) ? 5.991 : 7.815) ? 1 : 0;
   };
-  solve(o.robust_iterations);
-  solve(o.iterations);
+  (void)adjuster.solve(seq, std::span<se3>(poses), std::span<vec3>(points),
+                       std::span<const optimize::bundle_observation>(observations),
+                       {.max_iterations = o.robust_iterations, .fixed_poses = is_fixed});
+  find_outliers();
+  (void)adjuster.solve_again(seq, std::span<se3>(poses), std::span<vec3>(points),
+                             {.max_iterations = o.iterations, .fixed_poses = is_fixed, .ignored = outliers});
+  find_outliers();
 
   for (std::size_t i = 0; i < keyframes.size(); ++i)
     if (is_fixed[i] == 0) m.set_pose(keyframes[i], poses[i]);

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include <orbis/slam/map.hpp>
+#include <orbis/slam/tally.hpp>
 
 namespace orbis::slam {
 
@@ -18,37 +19,37 @@ namespace orbis::slam {
   return order.empty() ? otherwise : order.front().first;
 }
 
-/// The keyframes around a frame: those that share landmarks with it, then the neighbours of the
-/// nearest of these, then the reference; at most `limit`.
+/// The keyframes around a frame: the reference, those that share landmarks with the frame, most first, then the
+/// neighbours in both graphs of the nearest of these; at most `limit`. Costs what the frame's landmarks are seen and
+/// what neighbours there are, whatever the size of the map.
 [[nodiscard]] inline std::vector<keyframe_id> local_keyframes(const map& m, const frame& f, keyframe_id reference,
                                                               std::size_t limit) {
-  std::vector<std::uint8_t> taken(m.keyframes().size(), 0);
+  tally taken;
   std::vector<keyframe_id> around;
   const auto take = [&](keyframe_id k) {
-    if (taken[k] != 0 || around.size() >= limit) return;
-    taken[k] = 1;
-    around.push_back(k);
+    if (k != no_id && around.size() < limit && taken.add(k)) around.push_back(k);
   };
-  take(reference);
-  const auto direct = m.sharing(f.landmarks);
-  for (const auto& [k, shared] : direct) take(k);
+  take(m.heir(reference));
+  for (const auto& [k, shared] : m.sharing(f.landmarks)) take(k);
   constexpr std::size_t nearest = 5, neighbors = 10;
   const std::size_t first = std::min(nearest, around.size());
-  for (std::size_t i = 0; i < first; ++i) {
-    const auto second = m.sharing(m.at(around[i]).landmarks);
-    for (std::size_t j = 0; j < std::min(neighbors, second.size()); ++j) take(second[j].first);
+  for (std::size_t i = 0; i < first && around.size() < limit; ++i) {
+    const keyframe_id k = around[i];
+    for (const covisible& n : m.covisibility().neighbors(k, neighbors)) take(n.keyframe);
+    take(m.tree().parent(k));
+    for (const keyframe_id child : m.tree().children(k)) take(child);
   }
   return around;
 }
 
 /// The landmarks of these keyframes, each once, in ascending order.
 [[nodiscard]] inline std::vector<landmark_id> landmarks_of(const map& m, const std::vector<keyframe_id>& keyframes) {
+  tally seen;
   std::vector<landmark_id> all;
   for (const keyframe_id k : keyframes)
     for (const landmark_id l : m.at(k).landmarks)
-      if (l != no_id) all.push_back(l);
+      if (l != no_id && seen.add(l)) all.push_back(l);
   std::sort(all.begin(), all.end());
-  all.erase(std::unique(all.begin(), all.end()), all.end());
   return all;
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// How the map grows: keyframes, the landmarks their depth gives, and which of these stay.
+/// How the map grows: keyframes, and the landmarks their depth gives.
 #pragma once
 
 #include <algorithm>
@@ -37,19 +37,6 @@ inline keyframe_id insert_keyframe(map& m, frame f, const options& o) {
     if (l != no_id) m.update(l);
   for (const std::uint32_t i : new_landmark_keypoints(m.at(id), o)) m.add_landmark(id, i);
   return id;
-}
-
-/// Drops landmarks that proved useless: found in less than a quarter of the frames that should show
-/// them, or seen by no second keyframe although three have followed.
-inline void cull_landmarks(map& m, keyframe_id newest) {
-  for (landmark_id id = 0; id < m.landmarks().size(); ++id) {
-    const landmark& l = m.landmark_at(id);
-    if (!l.alive || l.created == newest) continue;
-    const bool rarely_found = l.visible >= 8 && l.found * 4 < l.visible;
-    const keyframe_id age = newest - l.created;
-    const bool single = age == 3 && l.observations.size() < 2;
-    if (rarely_found || single) m.remove_landmark(id);
-  }
 }
 
 }  // namespace orbis::slam

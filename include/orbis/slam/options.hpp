@@ -32,6 +32,18 @@ struct adjustment_options {
   int iterations = 5;           ///< after that
 };
 
+/// What the map drops again.
+struct culling_options {
+  double found_ratio = 0.25;            ///< of the frames that should show a landmark: it stays if found in so many ...
+  std::uint32_t min_visible = 8;        ///< ... or while fewer frames than this should have shown it
+  std::uint32_t age = 2;                ///< keyframes after its own, when a landmark must have ...
+  std::uint32_t min_support = 4;        ///< ... observations, those with depth counted twice
+  std::size_t neighborhood = 20;        ///< keyframes around the newest one in which is looked for what can go
+  double redundant = 0.9;               ///< a keyframe goes when this part of its close landmarks is seen ...
+  std::size_t redundant_observers = 3;  ///< ... by so many others ...
+  int coarser_levels = 1;               ///< ... at most that many levels coarser
+};
+
 struct options {
   /// Of the default extractor. `levels` and `scale_factor` must be those of any other extractor.
   features::orb_options features{};
@@ -52,6 +64,7 @@ struct options {
   std::size_t relocalization_candidates = 8;  ///< keyframes that pose estimation is tried against, at most
   keyframe_options keyframes{};
   adjustment_options adjustment{};
+  culling_options culling{};
   std::optional<se3> initial_pose{};  ///< `T_world_camera` of the first frame; default: the identity
   std::uint64_t seed = 1;             ///< of RANSAC
 };

@@ -12,21 +12,9 @@
 #include <orbis/features/match.hpp>
 #include <orbis/optimize/pose_refinement.hpp>
 #include <orbis/slam/landmark_search.hpp>
+#include <orbis/slam/observed_point.hpp>
 
 namespace orbis::slam {
-
-/// The observation of `point` by keypoint `i` of a frame.
-template <camera::camera_model Camera>
-[[nodiscard]] optimize::pose_observation observation_of(const optimize::reprojection<Camera>& model,
-                                                        const pyramid_scales& scales, const frame& f, std::size_t i,
-                                                        const vec3& point) {
-  optimize::pose_observation o;
-  o.point = point;
-  o.pixel = f.pixel(i);
-  if (f.has_depth(i)) o.right = model.right(o.pixel.x(), static_cast<double>(f.depth[i]));
-  o.information = scales.information(f.features.keypoints[i].octave);
-  return o;
-}
 
 /// Refines the pose of `f` on matches of `list` (query) with its keypoints (train), and notes the
 /// landmarks of those that agree with it in `f.landmarks`. Returns how many matches agree; 0 and an

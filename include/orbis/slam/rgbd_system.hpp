@@ -32,6 +32,7 @@
 #include <orbis/features/stages.hpp>
 #include <orbis/optimize/pnp.hpp>
 #include <orbis/slam/keyframe_decision.hpp>
+#include <orbis/slam/landmark_culling.hpp>
 #include <orbis/slam/landmark_search.hpp>
 #include <orbis/slam/local_adjustment.hpp>
 #include <orbis/slam/local_map.hpp>
@@ -86,7 +87,7 @@ class rgbd_system {
   [[nodiscard]] orbis::trajectory trajectory() const {
     orbis::trajectory all;
     for (const tracked_frame& f : tracked_)
-      all.push_back({f.timestamp, map_.at(f.reference).T_world_camera * f.T_reference_camera});
+      all.push_back({f.timestamp, map_.pose_of(f.reference) * f.T_reference_camera});
     return all;
   }
   /// Time stamp, pose and frame index of each keyframe.
@@ -157,18 +158,18 @@ class rgbd_system {
     const se3 predicted = predict(f.timestamp);
     for (const double widening : {1.0, 2.0}) {
       f.T_world_camera = predicted;
-      const se3 T_camera_world = predicted.inverse();
+      const features::camera_projection project{model_.camera, predicted};
       search_list list;
       for (std::size_t i = 0; i < last_.size(); ++i) {
-        candidate_point p{.landmark = last_.landmarks[i]};
-        if (map_.is_alive(p.landmark))
+        candidate_point p{.landmark = map_.became(last_.landmarks[i])};
+        if (p.landmark != no_id)
           p.position = map_.landmark_at(p.landmark).position;
         else if (last_.has_depth(i))
           p = {last_.point_world(i), no_id};
         else
           continue;
-        add_seen_point(list, model_.camera, scales_, T_camera_world, p, last_.features.descriptors[i],
-                       last_.features.keypoints[i], widening * options_.motion_radius);
+        add_seen_point(list, project, scales_, p, last_.features.descriptors[i], last_.features.keypoints[i],
+                       widening * options_.motion_radius);
       }
       const auto matches = motion_matcher(features::feature_view<descriptor>{list.keypoints, list.descriptors},
                                           f.features, list.windows, f.grid);
@@ -209,13 +210,14 @@ class rgbd_system {
 
   /// Finds the landmarks around in the frame and refines its pose on all of them.
   std::size_t track_local_map(frame& f, double radius) {
-    const se3 T_camera_world = f.T_world_camera.inverse();
+    const features::camera_projection project{model_.camera, f.T_world_camera};
+    const features::projection_rule rule{.radius = static_cast<float>(radius),
+                                         .levels = scales_.levels,
+                                         .scale_factor = static_cast<float>(scales_.factor)};
     const std::vector<landmark_id> around = local_landmarks(map_, f, reference_, options_.local_keyframes);
     search_list list;
     for (const landmark_id id : around)
-      if (add_landmark(list, model_.camera, scales_, f.T_world_camera, T_camera_world, map_.landmark_at(id), id,
-                       radius))
-        map_.count_visible(id);
+      if (add_landmark(list, project, rule, map_.landmark_at(id), id)) map_.count_visible(id);
     const auto matches = landmark_matcher(list.descriptors, f.features, list.windows, f.grid);
     const std::size_t inliers = refine_on_matches(f, list, matches, model_, scales_);
     for (const landmark_id l : f.landmarks)
@@ -256,7 +258,7 @@ class rgbd_system {
 
   keyframe_id grow_map(frame& f) {
     reference_ = insert_keyframe(map_, f, options_);
-    cull_landmarks(map_, reference_);
+    cull_landmarks(map_, reference_, options_.culling);
     adjust_locally(map_, reference_, adjuster_, model_, scales_, options_.adjustment);
     f.T_world_camera = map_.at(reference_).T_world_camera;
     f.landmarks = map_.at(reference_).landmarks;
@@ -264,7 +266,7 @@ class rgbd_system {
   }
 
   /// Where the last tracked frame is, now that its keyframe may have moved.
-  [[nodiscard]] se3 last_pose() const { return map_.at(last_reference_).T_world_camera * T_reference_last_; }
+  [[nodiscard]] se3 last_pose() const { return map_.pose_of(last_reference_) * T_reference_last_; }
 
   /// Where constant motion takes the camera.
   [[nodiscard]] se3 predict(double timestamp) const {
@@ -310,7 +312,7 @@ class rgbd_system {
   optimize::reprojection<Camera> model_;
   pyramid_scales scales_;
   slam::map map_;
-  optimize::bundle_adjuster<Camera> adjuster_;
+  optimize::bundle_adjuster<optimize::reprojection<Camera>> adjuster_;
   track_state state_ = track_state::not_started;
   track_counters counters_;
   std::vector<tracked_frame> tracked_;

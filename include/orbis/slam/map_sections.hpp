@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Files in sections, each with a name, a length and a checksum: what is damaged can be named.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include <orbis/core/crc32c.hpp>
+#include <orbis/io/bytes.hpp>
+
+namespace orbis::slam::detail {
+
+/// Appends numbers, little-endian.
+template <class... T>
+void put(std::string& to, T... values) {
+  (io::append_little_endian(to, values), ...);
+}
+
+inline constexpr std::size_t section_head = 12, section_tail = 4;  ///< name and length; checksum
+
+/// Appends a section; `write(std::string&)` appends its content.
+template <class Write>
+void put_section(std::string& to, std::string_view name, Write&& write) {
+  const std::size_t begin = to.size();
+  to += name;
+  put(to, std::uint64_t{0});
+  write(to);
+  std::string length;
+  put(length, std::uint64_t{to.size() - begin - section_head});
+  to.replace(begin + name.size(), length.size(), length);
+  put(to, crc32c(std::as_bytes(std::span{to}).subspan(begin)));
+}
+
+/// Numbers out of a section's content. At its end come zeros, and `ended`.
+class section_reader {
+ public:
+  explicit section_reader(std::string_view content) : content_{content} {}
+
+  template <class T>
+  [[nodiscard]] T take() {
+    if (content_.size() < sizeof(T)) {
+      end();
+      return T{};
+    }
+    const T value = io::load<T>(content_.data());
+    content_.remove_prefix(sizeof(T));
+    return value;
+  }
+  [[nodiscard]] std::size_t left() const noexcept { return content_.size(); }
+  /// Whether more was taken than there is.
+  [[nodiscard]] bool ended() const noexcept { return ended_; }
+  /// As if that had happened.
+  bool end() {
+    content_ = {};
+    ended_ = true;
+    return false;
+  }
+
+ private:
+  std::string_view content_;
+  bool ended_ = false;
+};
+
+/// Goes from section to section.
+class section_finder {
+ public:
+  section_finder(std::string_view file, std::size_t begin) : file_{file}, at_{begin} {}
+
+  /// The content of the next section, if that is `name` and whole.
+  [[nodiscard]] std::optional<section_reader> find(std::string_view name) {
+    const auto wrong = [&](const std::string& what) {
+      problem_ = "section \"" + std::string(name) + "\" " + what;
+      return std::nullopt;
+    };
+    const std::size_t left = file_.size() - at_;
+    if (left < section_head) return wrong("is missing: the file ends at byte " + std::to_string(file_.size()));
+    if (file_.substr(at_, name.size()) != name) return wrong("does not begin at byte " + std::to_string(at_));
+    const auto length = io::load<std::uint64_t>(file_.data() + at_ + name.size());
+    if (left - section_head < section_tail || length > left - section_head - section_tail)
+      return wrong("from byte " + std::to_string(at_) + " is cut off: the file ends at byte " +
+                   std::to_string(file_.size()));
+    const std::size_t size = section_head + static_cast<std::size_t>(length);
+    const std::string_view whole = file_.substr(at_, size);
+    if (crc32c(std::as_bytes(std::span{whole})) != io::load<std::uint32_t>(file_.data() + at_ + size))
+      return wrong("from byte " + std::to_string(at_) + " is damaged: its checksum does not fit");
+    at_ += size + section_tail;
+    return section_reader{whole.substr(section_head)};
+  }
+
+  /// Whether nothing follows.
+  [[nodiscard]] bool at_end() {
+    if (at_ == file_.size()) return true;
+    problem_ = "goes on after its end at byte " + std::to_string(at_);
+    return false;
+  }
+  [[nodiscard]] const std::string& problem() const noexcept { return problem_; }
+
+ private:
+  std::string_view file_;
+  std::size_t at_;
+  std::string problem_;
+};
+
+}  // namespace orbis::slam::detail

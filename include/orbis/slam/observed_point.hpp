@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// What a keypoint of a frame says about the point that it shows.
+#pragma once
+
+#include <cstddef>
+
+#include <orbis/camera/model.hpp>
+#include <orbis/optimize/reprojection.hpp>
+#include <orbis/slam/landmark_search.hpp>
+
+namespace orbis::slam {
+
+/// The observation of `point` by keypoint `i` of a frame.
+template <camera::camera_model Camera>
+[[nodiscard]] optimize::pose_observation observation_of(const optimize::reprojection<Camera>& model,
+                                                        const pyramid_scales& scales, const frame& f, std::size_t i,
+                                                        const vec3& point) {
+  optimize::pose_observation o;
+  o.point = point;
+  o.pixel = f.pixel(i);
+  if (f.has_depth(i)) o.right = model.right(o.pixel.x(), static_cast<double>(f.depth[i]));
+  o.information = scales.information(f.features.keypoints[i].octave);
+  return o;
+}
+
+/// Whether keypoint `i` of a frame may show `point` (in the world): the reprojection error is one that 95 % of the true
+/// ones stay below, with depth or without.
+template <camera::camera_model Camera>
+[[nodiscard]] bool agrees(const optimize::reprojection<Camera>& model, const pyramid_scales& scales, const frame& f,
+                          const se3& T_camera_world, std::size_t i, const vec3& point) {
+  const optimize::pose_observation o = observation_of(model, scales, f, i, point);
+  const auto error = model.residual(T_camera_world * point, o);
+  return error && error->squaredNorm() * o.information <= (o.has_depth() ? 7.815 : 5.991);
+}
+
+}  // namespace orbis::slam

@@ -1,0 +1,185 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Whether everything in a map fits together.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <orbis/core/result.hpp>
+#include <orbis/slam/map.hpp>
+#include <orbis/slam/tally.hpp>
+
+namespace orbis::slam {
+
+namespace detail {
+
+/// One check after the other; each gives the first thing that is wrong, in words, or done.
+class map_check {
+ public:
+  explicit map_check(const map& m) : m_{m} {}
+
+  [[nodiscard]] result<void> run() const {
+    for (const auto check : {&map_check::keyframes, &map_check::landmarks, &map_check::covisibility, &map_check::tree,
+                             &map_check::lineage})
+      if (auto done = (this->*check)(); !done) return done;
+    return {};
+  }
+
+ private:
+  [[nodiscard]] static auto wrong_keyframe(keyframe_id k, std::string what) {
+    return fail(errc::malformed, "keyframe " + std::to_string(k), std::move(what));
+  }
+  [[nodiscard]] static auto wrong_landmark(landmark_id l, std::string what) {
+    return fail(errc::malformed, "landmark " + std::to_string(l), std::move(what));
+  }
+  [[nodiscard]] static bool is_finite(const se3& pose) {
+    return pose.translation().allFinite() && pose.rotation().unit_quaternion().coeffs().allFinite();
+  }
+
+  [[nodiscard]] result<void> keyframes() const {
+    std::size_t count = 0;
+    for (keyframe_id id = 0; id != m_.keyframe_end(); ++id) {
+      if (!m_.has_keyframe(id)) continue;
+      ++count;
+      const keyframe& k = m_.at(id);
+      if (k.id != id) return wrong_keyframe(id, "calls itself " + std::to_string(k.id));
+      const std::size_t n = k.features.keypoints.size();
+      if (k.features.descriptors.size() != n || k.depth.size() != n || k.rays.size() != n || k.landmarks.size() != n)
+        return wrong_keyframe(id, "does not have one descriptor, depth, ray and landmark for each keypoint");
+      if (!is_finite(k.T_world_camera)) return wrong_keyframe(id, "has a pose that is not finite");
+      for (std::size_t i = 0; i != n; ++i) {
+        const landmark_id l = k.landmarks[i];
+        const auto at = "keypoint " + std::to_string(i) + " shows landmark " + std::to_string(l);
+        if (l == no_id) continue;
+        if (!m_.is_alive(l)) return wrong_keyframe(id, at + ", which is dead");
+        const observation* o = m_.landmark_at(l).seen_by(id);
+        if (o == nullptr || o->feature != i) return wrong_keyframe(id, at + ", which does not know of it");
+      }
+    }
+    if (count != m_.keyframes().size()) return fail(errc::malformed, "keyframes", "are not as many as are counted");
+    return {};
+  }
+
+  [[nodiscard]] result<void> landmarks() const {
+    std::size_t count = 0;
+    for (landmark_id id = 0; id != m_.landmark_end(); ++id) {
+      if (!m_.is_alive(id)) continue;
+      ++count;
+      const landmark& l = m_.landmark_at(id);
+      if (l.id != id) return wrong_landmark(id, "calls itself " + std::to_string(l.id));
+      if (l.observations.empty()) return wrong_landmark(id, "is seen by no keyframe");
+      if (l.created >= m_.keyframe_end()) return wrong_landmark(id, "comes from a keyframe that never was");
+      if (!l.position.allFinite() || !l.normal.allFinite()) return wrong_landmark(id, "is at no finite place");
+      for (std::size_t i = 0; i != l.observations.size(); ++i) {
+        const observation& o = l.observations[i];
+        const std::string by = "keyframe " + std::to_string(o.keyframe);
+        if (i != 0 && l.observations[i - 1].keyframe >= o.keyframe)
+          return wrong_landmark(id, "lists its observations in no order at " + by);
+        if (!m_.has_keyframe(o.keyframe)) return wrong_landmark(id, "is seen by " + by + ", which is not there");
+        const keyframe& k = m_.at(o.keyframe);
+        if (o.feature >= k.size() || k.landmarks[o.feature] != id)
+          return wrong_landmark(id, "is seen by " + by + ", which does not know of it");
+      }
+    }
+    if (count != m_.landmark_count()) return fail(errc::malformed, "landmarks", "are not as many as are counted");
+    return {};
+  }
+
+  /// Against a recount.
+  [[nodiscard]] result<void> covisibility() const {
+    const covisibility_graph& graph = m_.covisibility();
+    for (keyframe_id id = 0; id != m_.keyframe_end(); ++id) {
+      tally counted;
+      if (m_.has_keyframe(id))
+        for (const landmark_id l : m_.at(id).landmarks)
+          if (l != no_id)
+            for (const observation& o : m_.landmark_at(l).observations)
+              if (o.keyframe != id) counted.add(o.keyframe);
+      std::vector<covisible> shared;
+      covisible most;
+      for (const tally::entry& e : counted.entries()) {
+        shared.push_back({e.number, e.count});
+        if (stronger(shared.back(), most)) most = shared.back();
+      }
+      std::sort(shared.begin(), shared.end(),
+                [](const covisible& a, const covisible& b) { return a.keyframe < b.keyframe; });
+      if (!std::ranges::equal(shared, graph.sharing(id)))
+        return wrong_keyframe(id, "shares other landmarks than the covisibility graph counts");
+      if (most != graph.strongest(id)) return wrong_keyframe(id, "does not share most with whom the graph says");
+      for (const covisible& n : graph.neighbors(id))
+        if (!graph.connected(n.keyframe, id))
+          return wrong_keyframe(id, "has an edge to keyframe " + std::to_string(n.keyframe) + ", but not back");
+      if (!shared.empty() && graph.neighbors(id).empty()) return wrong_keyframe(id, "shares landmarks but has no edge");
+    }
+    return {};
+  }
+
+  [[nodiscard]] result<void> tree() const {
+    const spanning_tree& tree = m_.tree();
+    if (tree.size() != m_.keyframes().size()) return fail(errc::malformed, "tree", "does not have all keyframes");
+    if (m_.keyframes().empty()) {
+      if (tree.root() != no_id) return fail(errc::malformed, "tree", "has a root but no keyframe");
+      return {};
+    }
+    if (!m_.has_keyframe(tree.root())) return fail(errc::malformed, "tree", "has a root that is not there");
+    if (tree.parent(tree.root()) != no_id) return fail(errc::malformed, "tree", "has a root with a parent");
+    // Whatever the edges are, each keyframe is met at most once on the way down.
+    std::vector<keyframe_id> open{tree.root()};
+    std::size_t reached = 0;
+    while (!open.empty()) {
+      const keyframe_id id = open.back();
+      open.pop_back();
+      if (++reached > tree.size()) return wrong_keyframe(id, "is met twice in the tree");
+      keyframe_id last = no_id;
+      for (const keyframe_id child : tree.children(id)) {
+        if (!m_.has_keyframe(child) || !tree.contains(child))
+          return wrong_keyframe(id, "has the child " + std::to_string(child) + ", which is not there");
+        if (tree.parent(child) != id)
+          return wrong_keyframe(child, "is a child of " + std::to_string(id) + " only there");
+        if (last != no_id && last >= child) return wrong_keyframe(id, "lists its children in no order");
+        open.push_back(last = child);
+      }
+      for (const keyframe_id other : tree.loop_edges(id)) {
+        if (other == id || !tree.contains(other)) return wrong_keyframe(id, "closes a loop with no keyframe");
+        const auto& back = tree.loop_edges(other);
+        if (!std::binary_search(back.begin(), back.end(), id))
+          return wrong_keyframe(id, "closes a loop with " + std::to_string(other) + ", but not back");
+      }
+    }
+    if (reached != tree.size()) return fail(errc::malformed, "tree", "does not hold all keyframes together");
+    return {};
+  }
+
+  /// What was erased leads to what is there.
+  [[nodiscard]] result<void> lineage() const {
+    for (keyframe_id id = 0; id != m_.keyframe_end(); ++id) {
+      const keyframe_id heir = m_.heir(id);
+      if (heir != no_id && !m_.has_keyframe(heir)) return wrong_keyframe(id, "became one that is not there");
+      if (m_.has_keyframe(id)) continue;
+      if (!m_.content().erased.contains(id)) return wrong_keyframe(id, "is gone, and where it was is not known");
+      if (!is_finite(m_.pose_of(id))) return wrong_keyframe(id, "was at no finite place");
+    }
+    if (m_.content().erased.size() + m_.keyframes().size() != m_.keyframe_end())
+      return fail(errc::malformed, "keyframes", "are remembered as erased that never were");
+    for (landmark_id id = 0; id != m_.landmark_end(); ++id)
+      if (const landmark_id now = m_.became(id); now != no_id && !m_.is_alive(now))
+        return wrong_landmark(id, "became one that is not there");
+    return {};
+  }
+
+  const map& m_;
+};
+
+}  // namespace detail
+
+/// Done if both sides of every observation agree, the covisibility graph is what a recount gives, the tree holds all
+/// keyframes together, and what was erased leads to what is there; else the first thing that is wrong, and where. For
+/// tests and debugging: O(map).
+[[nodiscard]] inline result<void> validate(const map& m) { return detail::map_check{m}.run(); }
+
+}  // namespace orbis::slam

@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <cstddef>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <span>
+#include <string>
+
+#include <orbis/core/random.hpp>
+#include <orbis/slam/map_file.hpp>
+
+#include "slam/random_map.hpp"
+#include "support/catch.hpp"
+
+using namespace orbis;
+
+namespace {
+
+[[nodiscard]] result<slam::map> parsed(const std::string& bytes) {
+  return slam::parse_map(std::as_bytes(std::span{bytes}), "some.map");
+}
+[[nodiscard]] std::string fault_of(const std::string& bytes) {
+  const auto m = parsed(bytes);
+  return m ? "" : m.error().to_string();
+}
+
+}  // namespace
+
+TEST_CASE("A map that is written and read is the same map, and stays it whatever is done to both") {
+  for (std::uint64_t seed = 100; seed < 106; ++seed) {
+    random_bits random(seed);
+    slam::map m = test::random_map(seed, 1200);
+    const se3 T = test::random_motion(random);
+    m.transform(T);  // poses with digits
+    const std::string bytes = slam::map_bytes(m);
+    auto again = parsed(bytes);
+    REQUIRE(again.has_value());
+    REQUIRE(test::fault_of(*again) == "");
+    REQUIRE(slam::map_bytes(*again) == bytes);
+    for (const auto& k : m.keyframes()) REQUIRE(again->at(k.id).rays == k.rays);
+    random_bits same = random;
+    for (int step = 0; step < 500; ++step) {
+      test::change_somehow(random, m, 10);
+      test::change_somehow(same, *again, 10);
+    }
+    REQUIRE(slam::map_bytes(*again) == slam::map_bytes(m));
+  }
+}
+
+TEST_CASE("Small maps: nothing, nothing left, a keyframe without keypoints, a keypoint without a ray") {
+  const auto round_trip = [](const slam::map& m) {
+    const auto again = parsed(slam::map_bytes(m));
+    REQUIRE(again.has_value());
+    CHECK(slam::map_bytes(*again) == slam::map_bytes(m));
+    CHECK(test::fault_of(*again) == "");
+  };
+  random_bits random(1);
+  slam::map m(5, 1.3, 7);
+  round_trip(m);
+  slam::insert_keyframe(m, test::random_frame(random, 0, 0), {});
+  round_trip(m);
+  CHECK(parsed(slam::map_bytes(m))->content().levels == 5);
+  CHECK(parsed(slam::map_bytes(m))->content().min_shared == 7);
+  m.erase_keyframe(0);
+  round_trip(m);
+  slam::map other(8, 1.2);
+  auto f = test::random_frame(random, 2, 0);
+  f.rays[1] = vec3::Constant(std::numeric_limits<double>::quiet_NaN());
+  f.depth[1] = 0.0F;
+  slam::insert_keyframe(other, f, {});
+  round_trip(other);
+}
+
+TEST_CASE("A file that is cut off says in which section") {
+  const std::string bytes = slam::map_bytes(test::random_map(2, 60, 3));
+  CHECK(fault_of("") == "some.map: not a map of orbis: it does not begin with \"orbismap\"");
+  CHECK(fault_of(bytes.substr(0, 10)) == "some.map: ends before its version");
+  CHECK(fault_of(bytes.substr(0, 20)) == "some.map: section \"size\" is missing: the file ends at byte 20");
+  CHECK(fault_of(bytes.substr(0, 100)) ==
+        "some.map: section \"kfrm\" from byte 52 is cut off: the file ends at byte 100");
+  for (std::size_t size = 0; size < bytes.size(); size += 1 + size / 100) {
+    const auto cut = parsed(bytes.substr(0, size));
+    REQUIRE_FALSE(cut.has_value());
+    REQUIRE(cut.error().code == errc::malformed);
+  }
+  CHECK(fault_of(bytes + "x") == "some.map: goes on after its end at byte " + std::to_string(bytes.size()));
+}
+
+TEST_CASE("A file with one wrong bit says in which section") {
+  const std::string bytes = slam::map_bytes(test::random_map(3, 60, 3));
+  for (std::size_t at = 0; at < bytes.size(); at += 1 + at / 200) {
+    std::string damaged = bytes;
+    damaged[at] = static_cast<char>(damaged[at] ^ (1 << (at % 8)));
+    const auto m = parsed(damaged);
+    REQUIRE_FALSE(m.has_value());
+    if (at >= 12) REQUIRE(m.error().message.find("section \"") == 0);
+  }
+  std::string damaged = bytes;
+  damaged[100] = static_cast<char>(damaged[100] ^ 1);
+  CHECK(fault_of(damaged) == "some.map: section \"kfrm\" from byte 52 is damaged: its checksum does not fit");
+  std::string newer = bytes;
+  newer[8] = 2;
+  const auto m = parsed(newer);
+  REQUIRE_FALSE(m.has_value());
+  CHECK(m.error().code == errc::unsupported);
+  CHECK(m.error().message == "version 2, this reads version 1");
+}
+
+TEST_CASE("Maps go to files and come back") {
+  const auto path = std::filesystem::temp_directory_path() / "orbis_map_file_test.map";
+  const slam::map m = test::random_map(4, 300);
+  REQUIRE(slam::write_map(path, m).has_value());
+  const auto again = slam::read_map(path);
+  REQUIRE(again.has_value());
+  CHECK(slam::map_bytes(*again) == slam::map_bytes(m));
+  std::filesystem::resize_file(path, 1000);
+  const auto cut = slam::read_map(path);
+  REQUIRE_FALSE(cut.has_value());
+  CHECK(cut.error().where == path.string());
+  std::filesystem::remove(path);
+  CHECK(slam::read_map(path).error().code == errc::not_found);
+  CHECK(slam::write_map(path / "no" / "folder", m).error().code == errc::write_failed);
+}
+
+TEST_CASE("A rotation is read as it was written, bit for bit") {
+  random_bits random(5);
+  for (int i = 0; i < 1000; ++i) {
+    const so3 r = test::random_motion(random).rotation() * test::random_motion(random).rotation();
+    CHECK(so3::from_unit_quaternion(r.unit_quaternion()).unit_quaternion().coeffs() == r.unit_quaternion().coeffs());
+  }
+}
