@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// Feature extraction and matching beside OpenCV's.
+// Feature extraction beside OpenCV's: time, stage by stage, and how well the features are found again.
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
-#include <cstring>
 #include <filesystem>
 #include <string>
 #include <system_error>
+#include <utility>
 #include <vector>
 
 #include <benchmark/benchmark.h>
@@ -20,52 +20,12 @@
 #include <orbis/interop/opencv.hpp>
 #include <orbis/io/image.hpp>
 
+#include "../tests/features/opencv_orb.hpp"
 #include "../tests/features/repeatability.hpp"
 
 namespace {
 
 using namespace orbis;
-using descriptor = features::binary_descriptor<256>;
-
-std::vector<descriptor> random_descriptors(std::size_t count, std::uint64_t seed) {
-  random_bits random{seed};
-  std::vector<descriptor> descriptors(count);
-  for (descriptor& d : descriptors)
-    for (auto& word : d.words) word = random();
-  return descriptors;
-}
-
-cv::Mat rows_of(const std::vector<descriptor>& d) { return interop::mat_over(std::span<const descriptor>{d}); }
-
-template <class Matcher>
-void match_orbis(benchmark::State& state, std::size_t count, const Matcher& matcher) {
-  const auto a = random_descriptors(count, 1);
-  const auto b = random_descriptors(count, 2);
-  for (auto _ : state) benchmark::DoNotOptimize(matcher(a, b));
-}
-
-void match_opencv_knn2(benchmark::State& state, std::size_t count) {
-  const auto a = random_descriptors(count, 1);
-  const auto b = random_descriptors(count, 2);
-  const cv::BFMatcher matcher(cv::NORM_HAMMING);
-  for (auto _ : state) {
-    std::vector<std::vector<cv::DMatch>> matches;
-    matcher.knnMatch(rows_of(a), rows_of(b), matches, 2);
-    benchmark::DoNotOptimize(matches);
-  }
-}
-
-void match_opencv_cross_check(benchmark::State& state, std::size_t count) {
-  const auto a = random_descriptors(count, 1);
-  const auto b = random_descriptors(count, 2);
-  const cv::BFMatcher matcher(cv::NORM_HAMMING, true);
-  for (auto _ : state) {
-    std::vector<cv::DMatch> matches;
-    matcher.match(rows_of(a), rows_of(b), matches);
-    benchmark::DoNotOptimize(matches);
-  }
-}
-
 /// A 640x480 picture with blocks and gradients at several scales, some parts of it poor: about as
 /// many corners as a room.
 image<std::uint8_t> picture() {
@@ -77,7 +37,8 @@ image<std::uint8_t> picture() {
       };
       const bool rich = at(80, 1) < 50;
       const auto noise = mix64(static_cast<std::uint64_t>(y * 640 + x)) % 5;
-      im(x, y) = static_cast<std::uint8_t>(x / 16 + y / 16 + at(53, 2) / 2 + (rich ? at(9, 3) / 2 : 0) + noise);
+      im(x, y) = static_cast<std::uint8_t>(static_cast<std::uint64_t>(x / 16 + y / 16) + at(53, 2) / 2 +
+                                           (rich ? at(9, 3) / 2 : 0) + noise);
     }
   return im;
 }
@@ -97,31 +58,20 @@ image<std::uint8_t> kitchen() {
   return grey;
 }
 
+/// As many features as OpenCV's ORB finds, for the comparison at equal numbers.
 features::features found_by_orbis(const image<std::uint8_t>& im, std::size_t count) {
   return features::orb_extractor{{.max_features = static_cast<int>(count)}}(im);
 }
 
-features::features found_by_opencv(const image<std::uint8_t>& im, std::size_t count) {
-  std::vector<cv::KeyPoint> keypoints;
-  cv::Mat rows;
-  cv::ORB::create(static_cast<int>(count), 1.2F, 8)
-      ->detectAndCompute(interop::mat_over(im.view()), {}, keypoints, rows);
-  features::features f;
-  f.keypoints = interop::from_cv(keypoints);
-  f.descriptors.resize(keypoints.size());
-  for (std::size_t i = 0; i != keypoints.size(); ++i)
-    std::memcpy(f.descriptors[i].words.data(), rows.ptr(static_cast<int>(i)), sizeof f.descriptors[i]);
-  return f;
-}
-
-/// Coverage of the image, and means over its changes, at the number of features that OpenCV finds.
+/// Coverage of the image, and means over its changes (turns, scales, perspective, blur, noise, light), at the
+/// number of features that OpenCV finds.
 template <class Find>
 void count_quality(benchmark::State& state, const image<std::uint8_t>& im, const Find& find) {
-  const auto f = find(im, found_by_opencv(im, 1000).size());
+  const auto f = find(im, test::found_by_opencv(im).size());
   const auto changes = test::changes_of(im);
   double repeatability = 0.0, matching_score = 0.0;
   for (const auto& c : changes) {
-    const auto g = find(c.pixels, found_by_opencv(c.pixels, 1000).size());
+    const auto g = find(c.pixels, test::found_by_opencv(c.pixels).size());
     const auto again = test::compared(f, g, c.map, im.width(), im.height());
     repeatability += again.repeatability / static_cast<double>(changes.size());
     matching_score += again.matching_score / static_cast<double>(changes.size());
@@ -132,10 +82,10 @@ void count_quality(benchmark::State& state, const image<std::uint8_t>& im, const
   state.counters["matching_score"] = matching_score;
 }
 
-void orb_orbis(benchmark::State& state, const image<std::uint8_t>& im) {
-  const features::orb_extractor extract{{.max_features = 1000, .levels = 8, .scale_factor = 1.2f}};
+void orb_orbis(benchmark::State& state, const image<std::uint8_t>& im, simd::level level) {
+  const features::orb_extractor extract{{.max_features = 1000, .levels = 8, .scale_factor = 1.2f, .simd = level}};
   for (auto _ : state) benchmark::DoNotOptimize(extract(im));
-  count_quality(state, im, found_by_orbis);
+  if (level == simd::level::avx512) count_quality(state, im, found_by_orbis);  // the same at every level
 }
 
 void orb_opencv(benchmark::State& state, const image<std::uint8_t>& im) {
@@ -146,7 +96,7 @@ void orb_opencv(benchmark::State& state, const image<std::uint8_t>& im) {
     orb->detectAndCompute(interop::mat_over(im.view()), {}, keypoints, descriptors);
     benchmark::DoNotOptimize(keypoints);
   }
-  count_quality(state, im, found_by_opencv);
+  count_quality(state, im, [](const auto& each, std::size_t) { return test::found_by_opencv(each); });
 }
 
 /// The stages of extraction, each with what the ones before it left.
@@ -256,7 +206,10 @@ void register_extraction(const std::string& scene, const image<std::uint8_t>& im
   const auto add = [](const std::string& name, auto function) {
     benchmark::RegisterBenchmark(name.c_str(), function)->Unit(benchmark::kMillisecond);
   };
-  add("orb/" + scene + "/whole/orbis", [im](auto& s) { orb_orbis(s, im); });
+  for (const auto& [who, level] : {std::pair{"orbis_portable", simd::level::portable},
+                                   {"orbis_avx2", simd::level::avx2},
+                                   {"orbis", simd::level::avx512}})
+    add("orb/" + scene + "/whole/" + who, [im, level = level](auto& s) { orb_orbis(s, im, level); });
   add("orb/" + scene + "/whole/opencv", [im](auto& s) { orb_opencv(s, im); });
   const auto stage = [&](const std::string& name, auto function) {
     add("orb/" + scene + "/" + name + "/orbis", [=](auto& s) { function(s, im, simd::level::avx512); });
@@ -275,19 +228,6 @@ void register_extraction(const std::string& scene, const image<std::uint8_t>& im
 
 const bool registered = [] {
   cv::setNumThreads(1);  // as ours have
-  using features::brute_force, features::cross_check, features::hamming, features::ratio_test;
-  for (const std::size_t count : {std::size_t{1000}, std::size_t{2000}}) {
-    const std::string group = "matching/" + std::to_string(count) + "x" + std::to_string(count);
-    const auto add = [&](const std::string& name, auto function) {
-      benchmark::RegisterBenchmark((group + name).c_str(), function)->Unit(benchmark::kMillisecond);
-    };
-    const auto orbis_knn2 = [count](auto& s) { match_orbis(s, count, brute_force(hamming{}) | ratio_test{1.0F}); };
-    const auto orbis_cross = [count](auto& s) { match_orbis(s, count, brute_force(hamming{}) | cross_check{}); };
-    add("/knn2/orbis", orbis_knn2);
-    add("/knn2/opencv", [count](auto& s) { match_opencv_knn2(s, count); });
-    add("/cross_check/orbis", orbis_cross);
-    add("/cross_check/opencv", [count](auto& s) { match_opencv_cross_check(s, count); });
-  }
   register_extraction("640x480", picture());
   if (const auto im = kitchen(); !im.empty()) register_extraction("kitchen", im);
   return true;

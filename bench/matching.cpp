@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// Matchers: brute force at every SIMD level beside OpenCV's and beside a plain loop of POPCNT, and the
-// sources that compare only some pairs.
+// Matchers: brute force at every SIMD level beside OpenCV's and beside a plain loop of POPCNT, the sources that compare
+// only some pairs, and how many matches are right between frames of a real recording.
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <string>
 #include <utility>
 #include <vector>
@@ -18,16 +19,19 @@
 #include <orbis/features.hpp>
 #include <orbis/interop/opencv.hpp>
 
+#include "../tests/features/opencv_orb.hpp"
+#include "../tests/features/two_frames.hpp"
+
 namespace {
 
 using namespace orbis;
 using namespace orbis::features;
 using descriptor = binary_descriptor<256>;
 
-const std::array<std::pair<const char*, simd::level>, 4> levels{{{"portable", simd::level::portable},
-                                                                 {"popcnt", simd::level::popcnt},
-                                                                 {"avx2", simd::level::avx2},
-                                                                 {"avx512", simd::level::avx512}}};
+const std::array<std::pair<const char*, simd::level>, 4> levels{{{"orbis_portable", simd::level::portable},
+                                                                 {"orbis_popcnt", simd::level::popcnt},
+                                                                 {"orbis_avx2", simd::level::avx2},
+                                                                 {"orbis", simd::level::avx512}}};  // the best there is
 
 /// Features of a 640x480 image.
 orbis::features::features random_features(std::size_t count, std::uint64_t seed) {
@@ -90,11 +94,11 @@ void add_matcher(const std::string& name, const Matcher& matcher, std::size_t co
 }
 
 void add_brute_force(std::size_t count) {
-  const std::string group = "brute_force/" + std::to_string(count) + "x" + std::to_string(count);
+  const std::string group = "matching/" + std::to_string(count) + "x" + std::to_string(count);
   for (const auto& [name, level] : levels) {
-    add_matcher(group + "/knn2/orbis_" + name, brute_force(hamming{}, level) | ratio_test{1.0F}, count);
-    add_matcher(group + "/cross_check/orbis_" + name, brute_force(hamming{}, level) | cross_check{}, count);
-    add_row(group + "/knn10/orbis_" + name, [count, level = level](benchmark::State& state) {
+    add_matcher(group + "/knn2/" + name, brute_force(hamming{}, level) | ratio_test{1.0F}, count);
+    add_matcher(group + "/cross_check/" + name, brute_force(hamming{}, level) | cross_check{}, count);
+    add_row(group + "/knn10/" + name, [count, level = level](benchmark::State& state) {
       const auto a = random_features(count, 1), b = random_features(count, 2);
       std::vector<neighbor> nearest(10 * count);
       hamming_workspace memory;
@@ -151,8 +155,8 @@ void add_guided(std::size_t count) {
   std::vector<std::uint32_t> nodes(count);
   for (std::size_t i = 0; i != count; ++i) nodes[i] = static_cast<std::uint32_t>(i % 100);
 
-  for (const auto& [name, level] : {levels[0], levels[1]}) {  // the others take the second
-    const std::string who = std::string("/orbis_") + name;
+  for (const auto& [name, level] : {levels[0], levels[3]}) {  // there are two kernels
+    const std::string who = std::string("/") + name;
     add_matcher(group + "/windowed_20px" + who, windowed(hamming{}, level) | unique{}, count, windows);
     add_matcher(group + "/projected_20px" + who, projected(hamming{}, {.radius = 20.0F}, level) | unique{}, count,
                 points, project);
@@ -189,8 +193,46 @@ void add_guided(std::size_t count) {
   });
 }
 
+/// Pairs of frames of the kitchen: time for a pair, the share of the matches (with depth) that are right, and how many
+/// these are. OpenCV's: the features of cv::ORB by the first of our matchers.
+void add_two_frames(std::size_t gap) {
+  const auto row = [gap](std::size_t which, bool opencv) {
+    return [=](benchmark::State& state) {
+      const auto recording = io::open_recording(ORBIS_DATA_DIR "/kitchen").value();
+      const orb_extractor extract{{.max_features = 1000}};
+      const auto found = [&](image_view<const rgb8> color) {
+        image<std::uint8_t> grey(color.width(), color.height());
+        luma(simd::level::avx512, color, grey);
+        return opencv ? test::found_by_opencv(grey) : extract(grey);
+      };
+      std::vector<std::pair<test::seen_frame, test::seen_frame>> pairs;
+      for (const std::size_t i : {0U, 100U, 200U, 300U, 400U})
+        pairs.emplace_back(test::look(recording, i, found), test::look(recording, i + gap, found));
+      std::size_t next = 0;
+      for (auto _ : state) {
+        const auto& [a, b] = pairs[next++ % pairs.size()];
+        benchmark::DoNotOptimize(test::matches_by(which, a, b, gap));
+      }
+      test::match_rate sum;
+      for (const auto& [a, b] : pairs) {
+        const test::match_rate r = test::judge(test::matches_by(which, a, b, gap), a, b);
+        sum.right += r.right;
+        sum.judged += r.judged;
+      }
+      state.counters["share_right"] = sum.share();
+      state.counters["right"] = sum.right / static_cast<double>(pairs.size());
+    };
+  };
+  const std::string group = "two_frames/kitchen_gap_" + std::to_string(gap);
+  for (std::size_t which = 0; which != test::matcher_names.size(); ++which)
+    add_row(group + "/" + test::matcher_names[which] + "/orbis", row(which, false));
+  add_row(group + "/" + test::matcher_names[0] + "/opencv_features", row(0, true));
+}
+
 const bool registered = [] {
   cv::setNumThreads(1);  // as ours have
+  if (std::filesystem::exists(ORBIS_DATA_DIR "/kitchen"))
+    for (const std::size_t gap : {1U, 5U, 15U}) add_two_frames(gap);
   for (const std::size_t count : {std::size_t{1000}, std::size_t{2000}}) {
     add_brute_force(count);
     add_guided(count);

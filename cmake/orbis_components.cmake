@@ -4,7 +4,7 @@
 # `find_package(orbis COMPONENTS octree)` looks for exactly what `octree` needs.
 
 # In an order in which everything a component needs stands before it.
-set(ORBIS_ALL_COMPONENTS core camera features optimize cloud octree io eval slam mapping
+set(ORBIS_ALL_COMPONENTS core camera features places optimize cloud octree io eval slam mapping
                          interop_opencv interop_octomap interop_pcl interop_open3d)
 
 set(ORBIS_core_PACKAGES Eigen3 tl-expected Threads)
@@ -13,6 +13,8 @@ set(ORBIS_core_LIBRARIES Eigen3::Eigen tl::expected Threads::Threads)
 set(ORBIS_camera_NEEDS core)
 
 set(ORBIS_features_NEEDS camera)
+
+set(ORBIS_places_NEEDS core)
 
 set(ORBIS_optimize_NEEDS camera)
 

@@ -12,4 +12,5 @@
 #include <orbis/mapping.hpp>
 #include <orbis/octree.hpp>
 #include <orbis/optimize.hpp>
+#include <orbis/places.hpp>
 #include <orbis/slam.hpp>

@@ -1,0 +1,173 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// train_vocabulary train OUT | convert IN OUT | recall [VOCABULARY...]
+//
+// Learns a vocabulary from made-up pictures and rooms, and from recordings if any are named; turns vocabularies of
+// DBoW2 and DBoW3 into ours; measures how well vocabularies recognise places. OUT that ends in .hpp becomes a header
+// with the vocabulary as text, as orbis/places/default_vocabulary_data.hpp is.
+#include <algorithm>
+#include <cstdint>
+#include <cstdio>
+#include <iterator>
+#include <ostream>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+
+#include <orbis/core/file.hpp>
+#include <orbis/places.hpp>
+
+#include "recall.hpp"
+#include "sources.hpp"
+
+namespace places = orbis::places;
+
+struct settings {
+  std::vector<std::string> inputs, recordings;
+  std::string input, output;
+  std::size_t textures = 2000, rooms = 50, stride = 5;
+  int features = 500, views = 12;
+  places::training_options training{};
+};
+
+int complain(int code, const std::string& why) {
+  std::fprintf(stderr, "train_vocabulary: %s\n", why.c_str());
+  return code;
+}
+
+/// A header with the bytes of a vocabulary as text. String literals stay shorter than what compilers are required to
+/// support.
+std::string header_of(const std::string& bytes, const std::string& made_by) {
+  constexpr std::size_t row = 115, literal = 560 * row;
+  const std::string text = places::to_base85(bytes);
+  // Pointers, not views: a compiler would have to count the characters.
+  std::string out =
+      "// SPDX-License-Identifier: BSD-3-Clause\n/// @file\n/// The default vocabulary as text. Made by\n///\n" +
+      made_by +
+      "#pragma once\n\n#include <array>\n#include <cstddef>\n\nnamespace orbis::places::detail {\n\n"
+      "// clang-format off\ninline constexpr std::size_t default_vocabulary_size = " +
+      std::to_string(bytes.size()) + ";\ninline constexpr std::array<const char*, " +
+      std::to_string((text.size() + literal - 1) / literal) + "> default_vocabulary_text{{";
+  for (std::size_t i = 0; i < text.size(); i += row) {
+    out += i % literal == 0 && i != 0 ? ",\n" : "\n";
+    out += '"' + text.substr(i, row) + '"';
+  }
+  return out + "}};\n// clang-format on\n\n}  // namespace orbis::places::detail\n";
+}
+
+int write(const settings& s, const places::vocabulary& words, const std::string& made_by) {
+  std::string bytes = places::vocabulary_bytes(words);
+  const std::size_t size = bytes.size();
+  if (s.output.ends_with(".hpp")) bytes = header_of(bytes, made_by);
+  const auto done = orbis::write_file_atomically(
+      s.output, [&](std::ostream& out) { out.write(bytes.data(), static_cast<std::streamsize>(bytes.size())); });
+  if (!done) return complain(2, done.error().to_string());
+  std::printf("%zu words, %zu nodes, %u levels, %zu bytes\n", words.size(), words.nodes(), words.depth(), size);
+  return 0;
+}
+
+int train(const settings& s) {
+  std::vector<sources::descriptors> images = sources::of_textures(s.textures, s.training.seed, s.features);
+  for (std::size_t room = 0; room != s.rooms; ++room)
+    for (sources::view& v : sources::of_room(1000 * s.training.seed + room, s.views, s.features, room).views)
+      images.push_back(std::move(v.found));
+  for (const std::string& folder : s.recordings) {
+    auto seen = sources::of_recording(folder, s.stride, s.features, 0);
+    if (!seen) return complain(2, seen.error().to_string());
+    for (sources::view& v : seen->views) images.push_back(std::move(v.found));
+  }
+  const auto words = places::train(orbis::par, images, s.training);
+  if (!words) return complain(2, words.error().to_string());
+  const std::string made_by = "///     train_vocabulary train --textures " + std::to_string(s.textures) + " --rooms " +
+                              std::to_string(s.rooms) + " --views " + std::to_string(s.views) + " --features " +
+                              std::to_string(s.features) + "\n///         --branching " +
+                              std::to_string(s.training.branching) + " --depth " + std::to_string(s.training.depth) +
+                              " --seed " + std::to_string(s.training.seed) +
+                              (s.recordings.empty() ? "" : " --recording ...") + " default_vocabulary_data.hpp\n";
+  return write(s, *words, made_by);
+}
+
+int convert(const settings& s) {
+  const auto words = places::load_vocabulary(s.input);
+  if (!words) return complain(2, words.error().to_string());
+  return write(s, *words, "///     train_vocabulary convert\n");
+}
+
+int judge(const settings& s) {
+  std::vector<recall::task> tasks;
+  if (s.rooms != 0) {
+    recall::task rooms{.name = "rooms"};
+    for (std::size_t room = 0; room != s.rooms; ++room) {
+      const std::uint64_t seed = 500'000 + room;  // none of those that are trained on
+      auto first = sources::of_room(seed, 60, 1000, room), again = sources::of_room(seed, 60, 1000, room, true);
+      rooms.camera = first.camera;
+      std::ranges::move(first.views, std::back_inserter(rooms.map));
+      std::ranges::move(again.views, std::back_inserter(rooms.queries));
+    }
+    tasks.push_back(std::move(rooms));
+  }
+  for (const std::string& folder : s.recordings) {
+    auto seen = sources::of_recording(folder, s.stride, 1000, 0);
+    if (!seen) return complain(2, seen.error().to_string());
+    tasks.push_back({.name = folder.substr(folder.find_last_of('/') + 1),
+                     .camera = seen->camera,
+                     .map = std::move(seen->views),
+                     .within = true,
+                     .apart = std::max<std::size_t>(2, 60 / s.stride)});
+  }
+  std::printf("%-32s %8s %-12s %8s %8s %8s %10s %13s\n", "vocabulary", "words", "views", "queries", "first", "in ten",
+              "candidate", "transform, ms");
+  std::vector<std::pair<std::string, places::vocabulary>> all{{"(default)", places::default_vocabulary()}};
+  for (const std::string& file : s.inputs) {
+    auto words = places::load_vocabulary(file);
+    if (!words) return complain(2, words.error().to_string());
+    all.emplace_back(file.substr(file.find_last_of('/') + 1), *std::move(words));
+  }
+  for (const auto& [name, words] : all)
+    for (const recall::task& t : tasks) {
+      const auto o = recall::measure(t, words);
+      std::printf("%-32s %8zu %-12s %8zu %8.3f %8.3f %10.3f %13.3f\n", name.c_str(), words.size(), t.name.c_str(),
+                  o.queries, o.first, o.among_ten, o.candidate, o.transform_ms);
+    }
+  return 0;
+}
+
+int main(int argc, char** argv) {
+  settings s;
+  CLI::App cli{"Vocabularies of visual words: learns, converts and measures them", "train_vocabulary"};
+  cli.require_subcommand(1);
+  auto* const train_command = cli.add_subcommand("train", "learns a vocabulary");
+  train_command->add_option("OUT", s.output, "the file to write; .hpp: as a header")->required();
+  train_command->add_option("--textures", s.textures, "pictures made up")->capture_default_str();
+  train_command->add_option("--rooms", s.rooms, "rooms made up")->capture_default_str();
+  train_command->add_option("--views", s.views, "of each room")->capture_default_str()->check(CLI::Range(1, 1000));
+  train_command->add_option("--features", s.features, "of each image")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 100'000));
+  train_command->add_option("--recording", s.recordings, "folders of recordings to learn from as well");
+  train_command->add_option("--branching", s.training.branching)->capture_default_str()->check(CLI::Range(2, 65535));
+  train_command->add_option("--depth", s.training.depth)->capture_default_str()->check(CLI::Range(1, 16));
+  train_command->add_option("--seed", s.training.seed)->capture_default_str();
+  auto* const convert_command = cli.add_subcommand("convert", "reads DBoW2's text, DBoW3's YAML or our own format");
+  convert_command->add_option("IN", s.input, "the vocabulary to read")->required();
+  convert_command->add_option("OUT", s.output, "the file to write; .hpp: as a header")->required();
+  auto* const recall_command = cli.add_subcommand("recall", "how often places are recognised that are seen again");
+  recall_command->add_option("VOCABULARY", s.inputs, "files to compare with the default vocabulary");
+  recall_command->add_option("--rooms", s.rooms, "rooms made up, each gone through twice")->capture_default_str();
+  recall_command->add_option("--recording", s.recordings, "folders of recordings with ground truth");
+  for (auto* const command : {train_command, recall_command})
+    command->add_option("--stride", s.stride, "every which frame of a recording")
+        ->capture_default_str()
+        ->check(CLI::Range(1, 10'000));
+  try {
+    cli.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    return e.get_exit_code() == 0 ? cli.exit(e) : complain(1, e.what() + std::string{" (--help shows the usage)"});
+  }
+  if (train_command->parsed()) return train(s);
+  return convert_command->parsed() ? convert(s) : judge(s);
+}

@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// How well a vocabulary recognises places: views seen again, among all others.
+#pragma once
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include <orbis/places/keyframe_database.hpp>
+#include <orbis/places/vocabulary.hpp>
+
+#include "sources.hpp"
+
+namespace recall {
+
+using sources::view;
+
+/// Views to look among, views to look for, and what counts as seen again.
+struct task {
+  std::string name;
+  orbis::camera::camera_settings camera{};
+  std::vector<view> map{}, queries{};
+  double overlap = 0.6;   ///< of what the two views show, each in the other's picture
+  double turned = 0.6;    ///< radians between the two, at most
+  bool within = false;    ///< the queries are the map's own views
+  std::size_t apart = 0;  ///< then: at least so many views from the query
+};
+
+struct outcome {
+  std::size_t queries = 0;    ///< those whose place is in the map
+  double first = 0.0;         ///< share whose best view is a right one
+  double among_ten = 0.0;     ///< share with a right one among the best ten
+  double candidate = 0.0;     ///< share whose first candidate, by the criteria of a query, is a right one
+  double transform_ms = 0.0;  ///< median
+};
+
+[[nodiscard]] inline bool same_place(const task& t, const view& a, const view& b) {
+  if (a.place != b.place) return false;
+  if ((a.T_world_camera.inverse() * b.T_world_camera).rotation().angle() > t.turned) return false;
+  return sources::overlap(a, b, t.camera) > t.overlap && sources::overlap(b, a, t.camera) > t.overlap;
+}
+
+[[nodiscard]] inline outcome measure(const task& t, const orbis::places::vocabulary& words) {
+  using namespace orbis::places;
+  keyframe_database database;
+  transform_workspace memory;
+  std::vector<double> times;
+  std::vector<bag_of_words> bags(t.map.size());
+  for (std::size_t i = 0; i != t.map.size(); ++i) {
+    words.transform(t.map[i].found, bags[i], memory);
+    database.add(static_cast<std::uint32_t>(i), bags[i]);
+  }
+  outcome o;
+  bag_of_words bag;
+  const auto& queries = t.within ? t.map : t.queries;
+  for (std::size_t q = 0; q != queries.size(); ++q) {
+    const auto excluded = [&](std::uint32_t i) { return t.within && (i > q ? i - q : q - i) < t.apart; };
+    const auto right = [&](std::uint32_t i) { return !excluded(i) && same_place(t, queries[q], t.map[i]); };
+    bool known = false;
+    for (std::uint32_t i = 0; i != t.map.size() && !known; ++i) known = right(i);
+    if (!known) continue;
+    const auto begin = std::chrono::steady_clock::now();
+    words.transform(queries[q].found, bag, memory);
+    times.push_back(std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count());
+    ++o.queries;
+    const auto best = database.best(bag, 10, excluded);
+    o.first += !best.empty() && right(best.front().id) ? 1.0 : 0.0;
+    o.among_ten += std::ranges::any_of(best, [&](const auto& c) { return right(c.id); }) ? 1.0 : 0.0;
+    // The neighbours of a view in time stand for its covisible keyframes.
+    const auto neighbors = [&](std::uint32_t i) {
+      std::vector<std::uint32_t> near;
+      for (std::uint32_t j = i < 5 ? 0 : i - 5; j != std::min<std::size_t>(i + 6, t.map.size()); ++j)
+        if (j != i && t.map[j].place == t.map[i].place) near.push_back(j);
+      return near;
+    };
+    const auto candidates = database.query(bag, {}, excluded, neighbors);
+    o.candidate += !candidates.empty() && right(candidates.front().id) ? 1.0 : 0.0;
+  }
+  for (double* share : {&o.first, &o.among_ten, &o.candidate})
+    *share /= std::max<double>(1.0, static_cast<double>(o.queries));
+  std::ranges::sort(times);
+  if (!times.empty()) o.transform_ms = times[times.size() / 2];
+  return o;
+}
+
+}  // namespace recall

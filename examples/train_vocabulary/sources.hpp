@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Where descriptors come from: pictures made up, rooms made up, recordings.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <orbis/core/execution.hpp>
+#include <orbis/core/random.hpp>
+#include <orbis/core/result.hpp>
+#include <orbis/core/se3.hpp>
+#include <orbis/features/orb.hpp>
+#include <orbis/io/recording.hpp>
+#include <orbis/io/synthetic.hpp>
+
+#include "textures.hpp"
+
+namespace sources {
+
+using descriptors = std::vector<orbis::features::binary_descriptor<256>>;
+
+/// A view of a place, as its descriptors.
+struct view {
+  std::size_t place = 0;  ///< views of different places never show the same
+  orbis::se3 T_world_camera;
+  std::vector<orbis::vec3> surface{};  ///< some points that it shows, in the world
+  descriptors found{};
+};
+
+/// A frame as a view.
+[[nodiscard]] inline view view_of(const orbis::features::orb_extractor& extract, const orbis::camera::rgbd_frame& frame,
+                                  const orbis::camera::camera_settings& camera, std::size_t place) {
+  view v{.place = place, .T_world_camera = frame.T_world_camera.value_or(orbis::se3{})};
+  const auto depth = frame.depth_metres();
+  constexpr int step = 32;
+  for (int y = step / 2; y < frame.depth.height(); y += step)
+    for (int x = step / 2; x < frame.depth.width(); x += step) {
+      const auto z = static_cast<double>(depth(x, y));
+      const auto ray = camera.model.unproject(orbis::vec2(x, y));
+      if (ray && z > 0.0 && z < 10.0) v.surface.push_back(v.T_world_camera * (z * *ray));
+    }
+  v.found = extract(orbis::image_view<const orbis::rgb8>{frame.color.view()}).descriptors;
+  return v;
+}
+
+/// The share of what `a` shows that lies in the picture of `b`.
+[[nodiscard]] inline double overlap(const view& a, const view& b, const orbis::camera::camera_settings& camera) {
+  if (a.surface.empty()) return 0.0;
+  const orbis::se3 T_b_world = b.T_world_camera.inverse();
+  std::size_t inside = 0;
+  for (const orbis::vec3& p : a.surface) {
+    const auto pixel = camera.model.project(T_b_world * p);
+    inside += pixel && pixel->x() >= 0.0 && pixel->y() >= 0.0 && pixel->x() < camera.model.width() &&
+                      pixel->y() < camera.model.height()
+                  ? 1
+                  : 0;
+  }
+  return static_cast<double>(inside) / static_cast<double>(a.surface.size());
+}
+
+/// Views that one camera took.
+struct tour {
+  orbis::camera::camera_settings camera;
+  std::vector<view> views{};
+};
+
+/// `count` pictures that show nothing in particular.
+[[nodiscard]] inline std::vector<descriptors> of_textures(std::size_t count, std::uint64_t seed, int features) {
+  const orbis::features::orb_extractor extract{{.max_features = features}};
+  std::vector<descriptors> images(count);
+  orbis::for_each_index(orbis::par, count, 1, [&](std::size_t i) {
+    images[i] = extract(textures::paint(640, 480, orbis::mix64(seed) + i)).descriptors;
+  });
+  return images;
+}
+
+/// Once round a room that `seed` stands for, `views` times; `again`: another way round the same room, in other
+/// light and with other errors of the sensor.
+[[nodiscard]] inline tour of_room(std::uint64_t seed, int views, int features, std::size_t place, bool again = false) {
+  orbis::io::synthetic_options options{.frames = views, .seed = seed};
+  if (again) {
+    options.path.semi_axis_x = 0.55;
+    options.path.semi_axis_y = 0.75;
+    options.path.height = 1.5;
+    options.path.pitch = -0.27;
+    options.path.wobble = -1.0;
+  }
+  const orbis::io::synthetic_recording room{options};
+  const orbis::features::orb_extractor extract{{.max_features = features}};
+  tour seen{.camera = room.camera()};
+  seen.views.resize(room.size());
+  orbis::for_each_index(orbis::par, room.size(), 1, [&](std::size_t i) {
+    auto frame = room.render(orbis::seq, i).value();
+    if (again)  // darker
+      for (orbis::rgb8& c : frame.color.pixels())
+        c = {static_cast<std::uint8_t>(c.r * 3 / 4), static_cast<std::uint8_t>(c.g * 3 / 4),
+             static_cast<std::uint8_t>(c.b * 3 / 4)};
+    seen.views[i] = view_of(extract, frame, seen.camera, place);
+  });
+  return seen;
+}
+
+/// Every `stride`-th frame of a recording; poses where the recording knows them.
+[[nodiscard]] inline orbis::result<tour> of_recording(const std::string& folder, std::size_t stride, int features,
+                                                      std::size_t place) {
+  const auto recording = orbis::io::open_recording(folder);
+  if (!recording) return orbis::fail(recording.error());
+  const orbis::features::orb_extractor extract{{.max_features = features}};
+  tour seen{.camera = recording->camera()};
+  for (std::size_t i = 0; i < recording->size(); i += stride) {
+    const auto frame = recording->frame(i);
+    if (!frame) return orbis::fail(frame.error());
+    seen.views.push_back(view_of(extract, *frame, seen.camera, place));
+  }
+  return seen;
+}
+
+}  // namespace sources

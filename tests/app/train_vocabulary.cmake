@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: BSD-3-Clause
+#
+# The example train_vocabulary (-DAPP): the same seed gives the same bytes, what it writes it can read, and what it says
+# to wrong arguments and damaged files.
+include(${CMAKE_CURRENT_LIST_DIR}/support.cmake)
+
+macro(fails code message)
+  app(${code} ${ARGN})
+  if(NOT err MATCHES "^train_vocabulary: [^\n]*${message}[^\n]*\n$")
+    message(FATAL_ERROR "train_vocabulary ${ARGN}\nsaid\n${err}instead of one line that matches \"${message}\"")
+  endif()
+  check(NOT EXISTS ${WORK}/no.voc)
+endmacro()
+
+# Usage: 1.
+fails(1 "subcommand")
+fails(1 "OUT" train)
+fails(1 "--branching" train no.voc --branching 1)
+fails(1 "--depth" train no.voc --depth 0)
+fails(1 "--stride" recall --stride 0)
+fails(1 "--nonsense" train no.voc --nonsense)
+app(0 --help)
+check(out MATCHES "train" AND out MATCHES "convert" AND out MATCHES "recall")
+
+# Input, and output that cannot be: 2.
+fails(2 "nowhere.voc: no such file" convert nowhere.voc no.voc)
+file(WRITE ${WORK}/text.txt "3 2 0 0\n0 1 2 3\n")
+fails(2 "text.txt:2: .*descriptor" convert text.txt no.voc)
+set(small --textures 4 --rooms 1 --views 3 --features 150 --branching 5 --depth 2)
+fails(2 "no/folder" train no/folder/no.voc ${small})
+fails(2 "nowhere" train no.voc ${small} --recording nowhere)
+
+# The same again, and another seed.
+app(0 train first.voc ${small})
+check(out MATCHES "^25 words, 31 nodes, 2 levels")
+app(0 train again.voc ${small})
+app(0 train other.voc ${small} --seed 2)
+file(SHA256 ${WORK}/first.voc first)
+file(SHA256 ${WORK}/again.voc again)
+file(SHA256 ${WORK}/other.voc other)
+check(first STREQUAL again)
+check(NOT first STREQUAL other)
+app(0 convert first.voc converted.voc)
+file(SHA256 ${WORK}/converted.voc converted)
+check(first STREQUAL converted)
+app(0 train first.hpp ${small})
+file(READ ${WORK}/first.hpp header)
+check(header MATCHES "--textures 4 --rooms 1 --views 3 --features 150\n///         --branching 5 --depth 2 --seed 1 ")
+check(header MATCHES "default_vocabulary_text")
+app(0 recall first.voc --rooms 1)
+check(out MATCHES "first.voc +25 rooms")
