@@ -5,11 +5,14 @@
 ///
 /// Sources: R. Hartley, A. Zisserman, "Multiple View Geometry in Computer Vision", 2003, chapter 4; Y. Ma, S. Soatto,
 /// J. Kosecka, S. Sastry, "An Invitation to 3-D Vision", 2003, section 5.3, for the decomposition.
+///
+/// `S` is always double: the functions are templates so that only who calls them has them compiled.
 #pragma once
 
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <concepts>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -19,9 +22,9 @@
 #include <utility>
 #include <vector>
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 
+#include <orbis/core/jacobi.hpp>
 #include <orbis/core/random.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/core/so3.hpp>
@@ -60,15 +63,17 @@ namespace detail {
 
 /// The homography of four points each, by projective bases; false where three of them are on a line, or where points
 /// would have to change sides.
-[[nodiscard]] inline bool homography_of_four(const std::array<vec2, 4>& first, const std::array<vec2, 4>& second,
-                                             mat3& out) {
+template <std::same_as<double> S = double>
+[[nodiscard]] bool homography_of_four(const std::array<vec2, 4>& first, const std::array<vec2, 4>& second,
+                                      matrix<3, 3, S>& out) {
+  using vec3 = matrix<3, 1, S>;
+  using mat3 = matrix<3, 3, S>;
   mat3 bases[2];
   vec3 weights[2];
   for (int k = 0; k != 2; ++k) {
-    const auto& p = k == 0 ? first : second;
+    const std::array<matrix<2, 1, S>, 4>& p = k == 0 ? first : second;
     const auto cross = [&](std::size_t a, std::size_t b, std::size_t c) {
-      const vec2 u = p[b] - p[a], v = p[c] - p[a];
-      return u.x() * v.y() - u.y() * v.x();
+      return (p[b].x() - p[a].x()) * (p[c].y() - p[a].y()) - (p[b].y() - p[a].y()) * (p[c].x() - p[a].x());
     };
     // The fourth point in terms of the other three, by the areas of triangles.
     weights[k] = vec3(cross(3, 1, 2), cross(0, 3, 2), cross(0, 1, 3));
@@ -85,7 +90,12 @@ namespace detail {
   return out.allFinite();
 }
 
+template <std::same_as<double> S = double>
 class homography_estimator {
+  using vec2 = matrix<2, 1, S>;
+  using vec3 = matrix<3, 1, S>;
+  using mat3 = matrix<3, 3, S>;
+
  public:
   struct model {
     mat3 forward, backward;
@@ -115,7 +125,7 @@ class homography_estimator {
   };
   [[nodiscard]] candidates fit(const std::array<std::uint32_t, 4>& s) const {
     mat3 h;
-    if (!homography_of_four(
+    if (!homography_of_four<S>(
             {matches_[s[0]].first, matches_[s[1]].first, matches_[s[2]].first, matches_[s[3]].first},
             {matches_[s[0]].second, matches_[s[1]].second, matches_[s[2]].second, matches_[s[3]].second}, h))
       return {};
@@ -125,7 +135,7 @@ class homography_estimator {
   [[nodiscard]] double squared_error(const model& m, std::size_t i) const {
     const match& x = matches_[i];
     const vec3 p = m.forward * x.first.homogeneous(), q = m.backward * x.second.homogeneous();
-    return 0.5 * ((p.head<2>() / p.z() - x.second).squaredNorm() + (q.head<2>() / q.z() - x.first).squaredNorm());
+    return 0.5 * ((p.template head<2>() / p.z() - x.second).squaredNorm() + (q.template head<2>() / q.z() - x.first).squaredNorm());
   }
 
   void squared_errors(const model& m, std::size_t first, std::span<float, consensus_block> out) const {
@@ -157,20 +167,20 @@ class homography_estimator {
   [[nodiscard]] std::optional<model> refine(const model& start, std::span<const std::uint32_t> inliers,
                                             int steps) const {
     model m = start;
-    matrix<8, 8> h;
-    matrix<8> g;
+    matrix<8, 8, S> h;
+    matrix<8, 1, S> g;
     double cost = equations(m, inliers, h, g);
     for (int k = 0; k != steps; ++k) {
       if (!std::isfinite(cost)) return std::nullopt;
       small_cholesky<8> factors;
       if (!factors.set(h) || !(factors.factor(1e-9) > 0.0)) break;
-      const matrix<8> step = -factors.solve(g);
+      const matrix<8, 1, S> step = -factors.solve(g);
       if (!step.allFinite()) break;
       mat3 d = mat3::Identity();
       for (int j = 0; j != 8; ++j) d(j / 3, j % 3) += step[j];
       const model next = made_of(d * m.forward);
-      matrix<8, 8> next_h;
-      matrix<8> next_g;
+      matrix<8, 8, S> next_h;
+      matrix<8, 1, S> next_g;
       const double next_cost = equations(next, inliers, next_h, next_g);
       if (!(next_cost < cost)) break;
       const bool small = cost - next_cost <= 1e-12 * cost;
@@ -191,7 +201,8 @@ class homography_estimator {
   }
 
   /// For D in (I + D) H, its last entry held, the lower triangle of `h`; returns the sum of squares of all transfers.
-  double equations(const model& m, std::span<const std::uint32_t> inliers, matrix<8, 8>& h, matrix<8>& g) const {
+  double equations(const model& m, std::span<const std::uint32_t> inliers, matrix<8, 8, S>& h,
+                   matrix<8, 1, S>& g) const {
     h.setZero();
     g.setZero();
     double cost = 0.0;
@@ -200,11 +211,11 @@ class homography_estimator {
       const auto add = [&](const vec3& p, const vec2& seen, const mat3& by_d, const vec3& moved) {
         // p moves by by_d * D * moved.
         const double inverse = 1.0 / p.z();
-        const vec2 xy = p.head<2>() * inverse;
-        matrix<2, 3> projection;
+        const vec2 xy = p.template head<2>() * inverse;
+        matrix<2, 3, S> projection;
         projection << inverse, 0.0, -xy.x() * inverse, 0.0, inverse, -xy.y() * inverse;
-        const matrix<2, 3> a = projection * by_d;
-        matrix<2, 8> j;
+        const matrix<2, 3, S> a = projection * by_d;
+        matrix<2, 8, S> j;
         for (int k = 0; k != 8; ++k) j.col(k) = a.col(k / 3) * moved[k % 3];
         const vec2 r = xy - seen;
         for (int k = 0; k != 8; ++k) {
@@ -228,11 +239,13 @@ class homography_estimator {
 
 /// The homography that takes `first[i]` to `second[i]`; empty where three of either four are on one line, or where no
 /// plane in front of a camera could do it.
-[[nodiscard]] inline std::optional<mat3> homography_of_four(const std::array<vec2, 4>& first,
-                                                            const std::array<vec2, 4>& second) {
-  mat3 h;
-  if (!detail::homography_of_four(first, second, h)) return std::nullopt;
-  return h(2, 2) != 0.0 ? mat3(h / h(2, 2)) : h;
+template <std::same_as<double> S = double>
+[[nodiscard]] std::optional<mat3> homography_of_four(const std::array<vec2, 4>& first,
+                                                     const std::array<vec2, 4>& second) {
+  matrix<3, 3, S> h;
+  if (!detail::homography_of_four<S>(first, second, h)) return std::nullopt;
+  if (h(2, 2) != 0.0) h /= S(h(2, 2));
+  return h;
 }
 
 /// The homography that the most matches agree with: four points in RANSAC, each new best one refined on its inliers
@@ -241,15 +254,18 @@ class homography_estimator {
 /// Errors: `invalid_argument` for spans of different length or options out of range, `no_data` below four matches,
 /// `degenerate` where fewer than four are finite, all points of an image lie on one line, or no homography has
 /// `min_inliers` inliers; the message says which.
-[[nodiscard]] inline result<homography_estimate> estimate_homography(std::span<const vec2> first,
-                                                                     std::span<const vec2> second,
-                                                                     const homography_options& options = {}) {
+template <std::same_as<double> S = double>
+[[nodiscard]] result<homography_estimate> estimate_homography(std::span<const vec2> first, std::span<const vec2> second,
+                                                              const homography_options& options = {}) {
+  using vec2 = matrix<2, 1, S>;
+  using mat2 = matrix<2, 2, S>;
+  using mat3 = matrix<3, 3, S>;
   constexpr const char* where = "homography";
-  using estimator_type = detail::homography_estimator;
+  using estimator_type = detail::homography_estimator<S>;
   const std::size_t n = first.size();
   if (n != second.size()) return fail(errc::invalid_argument, where, "the lists of pixels differ in length");
   if (n < 4) return fail(errc::no_data, where, "fewer than four matches");
-  std::vector<estimator_type::match> matches;
+  std::vector<typename estimator_type::match> matches;
   matches.reserve(n);
   vec2 first_centre = vec2::Zero(), second_centre = vec2::Zero();
   for (std::size_t i = 0; i != n; ++i) {
@@ -301,7 +317,7 @@ class homography_estimator {
       return fail(errc::degenerate, where, "the points all lie on one line or in one place");
     return fail(found.error().code, where, found.error().message);
   }
-  const estimator_type::model model = detail::polished(estimator, *found, threshold * threshold);
+  const typename estimator_type::model model = detail::polished(estimator, *found, threshold * threshold);
   homography_estimate out;
   out.iterations = found->iterations;
   double sum = 0.0;
@@ -315,12 +331,14 @@ class homography_estimator {
   if (!out.inliers.empty()) out.rmse = size * std::sqrt(sum / static_cast<double>(out.inliers.size()));
   // Back from the centres.
   mat3 to_centre = mat3::Identity(), from_centre = mat3::Identity();
-  to_centre.topRightCorner<2, 1>() = -first_centre;
-  to_centre.topRows<2>() /= size;
-  from_centre.topLeftCorner<2, 2>() *= size;
-  from_centre.topRightCorner<2, 1>() = second_centre;
-  out.H_second_first = from_centre * model.forward * to_centre;
-  out.H_second_first /= out.H_second_first(2, 2) != 0.0 ? out.H_second_first(2, 2) : out.H_second_first.norm();
+  for (int i = 0; i != 2; ++i) {
+    to_centre(i, i) = 1.0 / size;
+    to_centre(i, 2) = -first_centre[i] / size;
+    from_centre(i, i) = size;
+    from_centre(i, 2) = second_centre[i];
+  }
+  const mat3 whole = from_centre * model.forward * to_centre;
+  out.H_second_first = whole / (whole(2, 2) != 0.0 ? whole(2, 2) : whole.norm());
   return out;
 }
 
@@ -328,23 +346,28 @@ class homography_estimator {
 /// translation. (Two more would have the plane behind the first camera.) `ray`, one of the first camera that was
 /// matched, tells front from behind.
 /// Errors: degenerate where H is singular or not finite.
-[[nodiscard]] inline result<std::vector<plane_motion>> decompose_homography(const mat3& homography,
-                                                                            const vec3& ray = vec3::UnitZ()) {
+template <std::same_as<double> S = double>
+[[nodiscard]] result<std::vector<plane_motion>> decompose_homography(const mat3& homography,
+                                                                     const vec3& ray = vec3::UnitZ()) {
+  using vec3 = matrix<3, 1, S>;
+  using mat3 = matrix<3, 3, S>;
   constexpr const char* where = "homography";
-  if (!homography.allFinite()) return fail(errc::degenerate, where, "is not finite");
-  Eigen::SelfAdjointEigenSolver<mat3> eigen(mat3(homography.transpose() * homography));
-  const double middle = std::sqrt(std::fmax(0.0, eigen.eigenvalues()[1]));
-  if (!(eigen.eigenvalues()[0] > 1e-20 * eigen.eigenvalues()[2])) return fail(errc::degenerate, where, "is singular");
+  mat3 h = homography;
+  if (!h.allFinite()) return fail(errc::degenerate, where, "is not finite");
+  const auto [squares, vectors] = eigen_of_symmetric<3>(mat3(h.transpose() * h));
+  const double middle = std::sqrt(std::fmax(0.0, squares[1]));
+  if (!(squares[0] > 1e-20 * squares[2])) return fail(errc::degenerate, where, "is singular");
   // R + t n^T has the middle singular value 1, and a positive determinant where camera and plane are on proper sides.
-  mat3 h = homography / middle;
+  h /= middle;
   if (h.determinant() < 0.0) h = -h;
-  const double s1 = eigen.eigenvalues()[2] / (middle * middle), s3 = eigen.eigenvalues()[0] / (middle * middle);
+  const double s1 = squares[2] / (middle * middle), s3 = squares[0] / (middle * middle);
   std::vector<plane_motion> motions;
   if (!(s1 - s3 > 1e-12)) {
-    motions.push_back({so3(h), vec3::Zero(), ray.normalized()});
+    motions.push_back({so3(h), vec3::Zero(), vec3(ray).normalized()});
     return motions;
   }
-  mat3 v = eigen.eigenvectors().rowwise().reverse();
+  mat3 v;
+  for (int k = 0; k != 3; ++k) v.col(k) = vectors.col(2 - k);
   if (v.determinant() < 0.0) v = -v;
   const double a = std::sqrt(std::fmax(0.0, 1.0 - s3) / (s1 - s3)), b = std::sqrt(std::fmax(0.0, s1 - 1.0) / (s1 - s3));
   for (const double sign : {1.0, -1.0}) {
