@@ -5,11 +5,14 @@
 ///
 /// Sources: D. Nister, PAMI 26(6), 2004, for the samples and the choice among four decompositions; P. Sampson,
 /// "Fitting conic sections to very scattered data", CGIP 18 (1982), for the error, here in pixels of either image.
+///
+/// `S` is always double: the functions are templates so that only who calls them has them compiled.
 #pragma once
 
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <concepts>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -56,8 +59,11 @@ struct relative_pose_estimate {
 };
 
 /// The four poses `T_second_first` (translations of length 1) that an essential matrix may stand for.
-[[nodiscard]] inline std::array<se3, 4> decompose_essential(const mat3& essential) {
-  auto [u, values, v] = singular_values_of(essential);
+template <std::same_as<double> S = double>
+[[nodiscard]] std::array<se3, 4> decompose_essential(const mat3& essential) {
+  using vec3 = matrix<3, 1, S>;
+  using mat3 = matrix<3, 3, S>;
+  auto [u, values, v] = singular_values_of<3>(mat3(essential));
   if (u.determinant() < 0.0) u.col(2) = -u.col(2).eval();
   if (v.determinant() < 0.0) v.col(2) = -v.col(2).eval();
   mat3 quarter;
@@ -78,7 +84,11 @@ struct pixel_gradient {
   [[nodiscard]] vec2 back(const vec2& g) const { return {xx * g.x() + yx * g.y(), yy * g.y()}; }
 };
 
+template <std::same_as<double> S = double>
 class essential_estimator {
+  using vec3 = matrix<3, 1, S>;
+  using mat3 = matrix<3, 3, S>;
+
  public:
   using model = mat3;
   static constexpr std::size_t sample_size = 5;
@@ -101,7 +111,7 @@ class essential_estimator {
       first[i] = matches_[sample[i]].first.direction();
       second[i] = matches_[sample[i]].second.direction();
     }
-    return five_point(first, second);
+    return five_point<S>(first, second);
   }
 
   [[nodiscard]] double squared_error(const mat3& e, std::size_t i) const {
@@ -161,33 +171,33 @@ class essential_estimator {
     so3 rotation = pose.rotation();
     vec3 direction = pose.translation();
     mat3 e = hat<double>(direction) * rotation.rotation_matrix();
-    matrix<9, 9> h;
-    matrix<9> g;
+    matrix<9, 9, S> h;
+    matrix<9, 1, S> g;
     double cost = equations(e, inliers, h, g);
     for (int k = 0; k != steps; ++k) {
       if (!std::isfinite(cost)) return std::nullopt;
       // How the entries of E = [t]x R (row by row) move with exp(phi) R and with t on the sphere.
-      matrix<9, 5> by_step;
-      const matrix<3, 2> basis = unit_sphere::basis(direction);
+      matrix<9, 5, S> by_step;
+      const matrix<3, 2, S> basis = unit_sphere::basis(direction);
       for (int j = 0; j != 5; ++j) {
         const mat3 d =
             j < 3 ? mat3(hat<double>(direction) * hat<double>(vec3(vec3::Unit(j))) * rotation.rotation_matrix())
                   : mat3(hat<double>(vec3(basis.col(j - 3))) * rotation.rotation_matrix());
         for (int entry = 0; entry != 9; ++entry) by_step(entry, j) = d(entry / 3, entry % 3);
       }
-      const matrix<9, 5> h_by_step = h.lazyProduct(by_step);
-      matrix<5, 5> a = by_step.transpose().lazyProduct(h_by_step);
+      const matrix<9, 5, S> h_by_step = h.lazyProduct(by_step);
+      matrix<5, 5, S> a = by_step.transpose().lazyProduct(h_by_step);
       a.diagonal() *= 1.0 + 1e-9;
       a.diagonal().array() += 1e-12 * a.diagonal().maxCoeff();
       small_cholesky<5> factors;
       if (!factors.set(a) || !(factors.factor(0.0) > 0.0)) break;
-      const matrix<5> step = -factors.solve(matrix<5>(by_step.transpose().lazyProduct(g)));
+      const matrix<5, 1, S> step = -factors.solve(matrix<5, 1, S>(by_step.transpose().lazyProduct(g)));
       if (!(step.norm() < 1.0)) break;
-      const so3 next_rotation = so3::exp(vec3(step.head<3>())) * rotation;
-      const vec3 next_direction = unit_sphere::retract(direction, step.tail<2>());
+      const so3 next_rotation = so3::exp(vec3(step.template head<3>())) * rotation;
+      const vec3 next_direction = unit_sphere::retract(direction, step.template tail<2>());
       const mat3 next = hat<double>(next_direction) * next_rotation.rotation_matrix();
-      matrix<9, 9> next_h;
-      matrix<9> next_g;
+      matrix<9, 9, S> next_h;
+      matrix<9, 1, S> next_g;
       const double next_cost = equations(next, inliers, next_h, next_g);
       if (!(next_cost < cost)) break;
       const bool small = cost - next_cost <= 1e-12 * cost;
@@ -204,7 +214,8 @@ class essential_estimator {
 
  private:
   /// For the nine entries of E, row by row; returns the sum of squares.
-  double equations(const mat3& e, std::span<const std::uint32_t> inliers, matrix<9, 9>& h, matrix<9>& g) const {
+  double equations(const mat3& e, std::span<const std::uint32_t> inliers, matrix<9, 9, S>& h,
+                   matrix<9, 1, S>& g) const {
     h.setZero();
     g.setZero();
     double cost = 0.0;
@@ -219,9 +230,9 @@ class essential_estimator {
       const double r = c * inverse;
       // r = c / s: dr = (dc - r ds) / s, and s ds = p dp + q dq.
       vec3 dp = vec3::Zero(), dq = vec3::Zero();
-      dp.head<2>() = by_second.back(p) * (r * inverse);
-      dq.head<2>() = by_first.back(q) * (r * inverse);
-      matrix<9> d;
+      dp.template head<2>() = by_second.back(p) * (r * inverse);
+      dq.template head<2>() = by_first.back(q) * (r * inverse);
+      matrix<9, 1, S> d;
       for (int row = 0; row != 3; ++row)
         for (int column = 0; column != 3; ++column)
           d[3 * row + column] =
@@ -244,9 +255,11 @@ class essential_estimator {
 
 /// How many of the matches a turn of the camera alone explains. The turn is found with weights that fall with the
 /// error, since wrong matches that happen to lie near their epipolar lines are among the inliers.
-[[nodiscard]] inline std::size_t explained_by_rotation(const std::vector<image_match>& matches,
-                                                       std::span<const std::uint32_t> inliers,
-                                                       double squared_threshold) {
+template <std::same_as<double> S = double>
+[[nodiscard]] std::size_t explained_by_rotation(const std::vector<image_match>& matches,
+                                                std::span<const std::uint32_t> inliers, double squared_threshold) {
+  using vec3 = matrix<3, 1, S>;
+  using mat3 = matrix<3, 3, S>;
   mat3 rotation = mat3::Identity();
   std::size_t explained = 0;
   for (int round = 0; round != 10; ++round) {
@@ -291,7 +304,7 @@ template <camera::camera_model First, camera::camera_model Second>
     return fail(errc::degenerate, where,
                 "of " + std::to_string(n) + " matches " + std::to_string(matches.size()) +
                     " are finite and in the cameras' views, five are needed");
-  const detail::essential_estimator estimator(matches);
+  const detail::essential_estimator<> estimator(matches);
   auto found = ransac(estimator,
                       {.threshold = options.threshold,
                        .confidence = options.confidence,

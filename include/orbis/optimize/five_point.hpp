@@ -7,10 +7,13 @@
 /// polynomial of degree ten in z; Newton's method on the cubics gives back the digits that this costs.
 ///
 /// Source: D. Nister, "An efficient solution to the five-point relative pose problem", PAMI 26(6), 2004.
+///
+/// `S` is always double: the functions are templates so that only who calls them has them compiled.
 #pragma once
 
 #include <array>
 #include <cmath>
+#include <concepts>
 #include <cstddef>
 #include <cstdint>
 #include <utility>
@@ -111,7 +114,10 @@ inline void add_product(cubic& sum, const quadric& a, const linear& b) noexcept 
 }
 
 /// Gauss-Newton on the cubics; false where that does not lead to a common root.
-[[nodiscard]] inline bool polish(const std::array<cubic, 10>& cubics, vec3& p) {
+template <std::same_as<double> S = double>
+[[nodiscard]] bool polish(const std::array<cubic, 10>& cubics, matrix<3, 1, S>& p) {
+  using vec3 = matrix<3, 1, S>;
+  using mat3 = matrix<3, 3, S>;
   double last = 0.0;
   vec3 previous = p;
   for (int step = 0; step != 10; ++step) {
@@ -217,13 +223,15 @@ inline void add_product(cubic& sum, const quadric& a, const linear& b) noexcept 
 /// not determine them up to ten (all in one plane through the centre, the same ray twice, say) or are not finite. Rays
 /// that differ by a rotation alone, or by nothing, are no failure here: there is a matrix for every translation.
 /// Constant time, no allocation.
-[[nodiscard]] inline five_point_solutions five_point(const std::array<vec3, 5>& first,
-                                                     const std::array<vec3, 5>& second) {
+template <std::same_as<double> S = double>
+[[nodiscard]] five_point_solutions five_point(const std::array<vec3, 5>& first, const std::array<vec3, 5>& second) {
+  using vec3 = matrix<3, 1, S>;
+  using mat3 = matrix<3, 3, S>;
   namespace poly = detail::epipolar_cubics;
   five_point_solutions solutions;
   std::array<std::array<double, 9>, 5> rows;
   for (std::size_t i = 0; i != 5; ++i) {
-    const vec3 a = first[i].normalized(), b = second[i].normalized();
+    const vec3 a = vec3(first[i]).normalized(), b = vec3(second[i]).normalized();
     if (!std::isfinite(a.sum() + b.sum())) return solutions;
     for (int row = 0; row != 3; ++row)
       for (int column = 0; column != 3; ++column)

@@ -6,11 +6,14 @@
 ///
 /// Sources: P. Lindstrom, "Triangulation made easy", CVPR 2010, for two views; R. Hartley, P. Sturm, "Triangulation",
 /// CVIU 68 (1997), for what is best.
+///
+/// `S` is always double: the functions are templates so that only who calls them has them compiled.
 #pragma once
 
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <concepts>
 #include <cstddef>
 #include <span>
 #include <string_view>
@@ -56,7 +59,8 @@ struct triangulation {
 namespace detail {
 
 [[nodiscard]] inline double angle_between_directions(const vec3& a, const vec3& b) {
-  return std::atan2(a.cross(b).norm(), a.dot(b));
+  const double x = a.y() * b.z() - a.z() * b.y(), y = a.z() * b.x() - a.x() * b.z(), z = a.x() * b.y() - a.y() * b.x();
+  return std::atan2(std::sqrt(x * x + (y * y + z * z)), a.x() * b.x() + (a.y() * b.y() + a.z() * b.z()));
 }
 
 /// The matrix E with `second^T E first = 0` for rays of one point: translation x rotation of `T_second_first`.
@@ -65,10 +69,13 @@ namespace detail {
 }
 
 /// Moves two rays at z = 1 by the least sum of squares so that they meet. (Two steps, which is as good as many.)
-inline void make_rays_meet(const mat3& essential, vec3& first, vec3& second) {
+template <std::same_as<double> S = double>
+void make_rays_meet(const matrix<3, 3, S>& essential, matrix<3, 1, S>& first, matrix<3, 1, S>& second) {
+  using vec2 = matrix<2, 1, S>;
+  using mat2 = matrix<2, 2, S>;
   // `second` is x and `first` is x' in the paper.
-  const mat2 e = essential.topLeftCorner<2, 2>();
-  vec2 n = (essential * first).head<2>(), m = (essential.transpose() * second).head<2>();
+  const mat2 e = essential.template topLeftCorner<2, 2>();
+  vec2 n = (essential * first).template head<2>(), m = (essential.transpose() * second).template head<2>();
   const double a = n.dot(e * m), b = 0.5 * (n.squaredNorm() + m.squaredNorm());
   const double c = second.dot(essential * first);
   const double d = std::sqrt(std::fmax(0.0, b * b - a * c));
@@ -80,19 +87,21 @@ inline void make_rays_meet(const mat3& essential, vec3& first, vec3& second) {
   const double size = n.squaredNorm() + m.squaredNorm();
   if (!(size > 0.0)) return;
   lambda *= 2.0 * d / size;
-  second.head<2>() -= lambda * n;
-  first.head<2>() -= lambda * m;
+  second.template head<2>() -= lambda * n;
+  first.template head<2>() -= lambda * m;
 }
 
 }  // namespace detail
 
 /// The point whose projections at z = 1 are nearest to the two rays (least sum of squares). Constant time.
-[[nodiscard]] inline triangulation triangulate(const se3& T_world_first, const vec3& first_ray,
-                                               const se3& T_world_second, const vec3& second_ray,
-                                               const triangulation_options& options = {}) {
+template <std::same_as<double> S = double>
+[[nodiscard]] triangulation triangulate(const se3& T_world_first, const vec3& first_ray, const se3& T_world_second,
+                                        const vec3& second_ray, const triangulation_options& options = {}) {
+  using vec3 = matrix<3, 1, S>;
   triangulation out;
   const se3 T_second_first = T_world_second.inverse() * T_world_first;
-  vec3 first = first_ray / first_ray.z(), second = second_ray / second_ray.z();
+  const vec3 seen_first = vec3(first_ray) / first_ray.z(), seen_second = vec3(second_ray) / second_ray.z();
+  vec3 first = seen_first, second = seen_second;
   if (!first.allFinite() || !second.allFinite() || !T_second_first.to_matrix().allFinite()) {
     out.status = triangulation_status::not_finite;
     return out;
@@ -100,7 +109,7 @@ inline void make_rays_meet(const mat3& essential, vec3& first, vec3& second) {
   out.parallax = detail::angle_between_directions(T_second_first.rotation() * first, second);
   out.status = triangulation_status::no_parallax;
   if (!(out.parallax >= options.min_parallax)) return out;
-  detail::make_rays_meet(detail::essential_of(T_second_first), first, second);
+  detail::make_rays_meet<S>(detail::essential_of(T_second_first), first, second);
   // In the second camera: t + depth_1 u = depth_2 v.
   const vec3 u = T_second_first.rotation() * first;
   const vec3& t = T_second_first.translation();
@@ -111,7 +120,7 @@ inline void make_rays_meet(const mat3& essential, vec3& first, vec3& second) {
   const double second_depth = u.cross(t).dot(normal) / size;
   out.point = T_world_first * vec3(first_depth * first);
   out.error = std::sqrt(
-      0.5 * ((first - first_ray / first_ray.z()).squaredNorm() + (second - second_ray / second_ray.z()).squaredNorm()));
+      0.5 * (vec3(first - seen_first).squaredNorm() + vec3(second - seen_second).squaredNorm()));
   out.status = !out.point.allFinite()                    ? triangulation_status::no_parallax
                : first_depth > 0.0 && second_depth > 0.0 ? triangulation_status::ok
                                                          : triangulation_status::behind_camera;
@@ -120,8 +129,12 @@ inline void make_rays_meet(const mat3& essential, vec3& first, vec3& second) {
 
 /// The same for any number of views: from the point nearest to all rays, Levenberg's and Marquardt's way down.
 /// O(views) for each of a few steps. @pre T_world_camera.size() == rays.size()
-[[nodiscard]] inline triangulation triangulate(std::span<const se3> T_world_camera, std::span<const vec3> rays,
-                                               const triangulation_options& options = {}) {
+template <std::same_as<double> S = double>
+[[nodiscard]] triangulation triangulate(std::span<const se3> T_world_camera, std::span<const vec3> rays,
+                                        const triangulation_options& options = {}) {
+  using vec2 = matrix<2, 1, S>;
+  using vec3 = matrix<3, 1, S>;
+  using mat3 = matrix<3, 3, S>;
   assert(T_world_camera.size() == rays.size());
   triangulation out;
   const std::size_t n = rays.size();
@@ -138,8 +151,9 @@ inline void make_rays_meet(const mat3& essential, vec3& first, vec3& second) {
     const vec3 d = direction(i);
     const mat3 across = mat3::Identity() - d * d.transpose();
     a += across;
-    b += across * (T_world_camera[i].translation() - origin);
-    baseline = std::max(baseline, (T_world_camera[i].translation() - origin).norm());
+    const vec3 from_origin = T_world_camera[i].translation() - origin;
+    b += across * from_origin;
+    baseline = std::max(baseline, S(from_origin.norm()));
   }
   // Two rays that are far apart: the one farthest from the first, and the one farthest from that.
   const auto farthest_from = [&](std::size_t k) {
@@ -166,11 +180,11 @@ inline void make_rays_meet(const mat3& essential, vec3& first, vec3& second) {
     for (std::size_t i = 0; i != n; ++i) {
       const vec3 seen = T_world_camera[i].rotation().inverse() * vec3(p + (origin - T_world_camera[i].translation()));
       const double inverse_z = 1.0 / seen.z();
-      const vec2 xy = seen.head<2>() * inverse_z;
-      const vec2 r = xy - rays[i].head<2>() / rays[i].z();
+      const vec2 xy = seen.template head<2>() * inverse_z;
+      const vec2 r = xy - vec2(rays[i].x() / rays[i].z(), rays[i].y() / rays[i].z());
       sum += r.squaredNorm();
       if (h == nullptr) continue;
-      matrix<2, 3> j;
+      matrix<2, 3, S> j;
       j << inverse_z, 0.0, -xy.x() * inverse_z, 0.0, inverse_z, -xy.y() * inverse_z;
       j = (j * T_world_camera[i].rotation_matrix().transpose()).eval();
       *h += j.transpose() * j;
