@@ -10,6 +10,7 @@
 
 #include <array>
 #include <cmath>
+#include <concepts>
 #include <cstddef>
 #include <iterator>
 #include <optional>
@@ -35,7 +36,10 @@ struct best_turn {
   double trace = 0.0;
 };
 
-[[nodiscard]] inline std::optional<best_turn> find_best_turn(const mat3& m, double relative_gap) {
+template <std::same_as<double> S = double>  // so that only who calls it has it compiled
+[[nodiscard]] std::optional<best_turn> find_best_turn(const matrix<3, 3, S>& m, double relative_gap) {
+  using vec4 = matrix<4, 1, S>;
+  using mat3 = matrix<3, 3, S>;
   const double size = m.norm();
   if (!(size > 0.0) || !std::isfinite(size)) return std::nullopt;
   const mat3 s = m / size;
@@ -87,11 +91,11 @@ struct best_turn {
     const vec4& q = columns[best];
     return best_turn{so3::quaternion(q[0], q[1], q[2], q[3]).normalized(), x * size};
   }
-  matrix<4, 4> a;
+  matrix<4, 4, S> a;
   a << a00, a10, a20, a30, a10, a11, a21, a31, a20, a21, a22, a32, a30, a31, a32, a33;
-  const symmetric_eigen<4> eigen = eigen_of_symmetric(a);
+  const auto eigen = eigen_of_symmetric<4>(a);
   if (!(eigen.values[3] - eigen.values[2] > relative_gap)) return std::nullopt;
-  const matrix<4, 4>& q = eigen.vectors;
+  const matrix<4, 4, S>& q = eigen.vectors;
   return best_turn{so3::quaternion(q(0, 3), q(1, 3), q(2, 3), q(3, 3)).normalized(), eigen.values[3] * size};
 }
 

@@ -20,8 +20,7 @@
 #include <utility>
 #include <vector>
 
-#include <Eigen/Eigenvalues>
-
+#include <orbis/core/jacobi.hpp>
 #include <orbis/core/point.hpp>
 #include <orbis/core/random.hpp>
 #include <orbis/core/result.hpp>
@@ -222,7 +221,7 @@ requires(std::same_as<Transform, se3> || std::same_as<Transform, sim3>)
   if (!found) {
     if (found.error().code == errc::degenerate)
       for (const mat3& s : {spread, spread_to}) {
-        const vec3 sizes = Eigen::SelfAdjointEigenSolver<mat3>(s, Eigen::EigenvaluesOnly).eigenvalues();
+        const vec3 sizes = eigen_of_symmetric<3>(s).values;
         if (!(sizes[1] > 1e-12 * sizes[2]))
           return fail(errc::degenerate, where, "the points all lie on one line or in one place");
       }

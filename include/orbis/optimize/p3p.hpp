@@ -16,6 +16,7 @@
 
 #include <array>
 #include <cmath>
+#include <concepts>
 #include <cstddef>
 #include <utility>
 
@@ -231,9 +232,12 @@ void for_each_p3p(const std::array<vec3, 3>& points_world, const std::array<vec3
 /// All poses `T_world_camera` from which `points_world[i]` lies on the ray `rays[i]` (camera frame,
 /// any positive length, in front of the camera along the ray). Empty where the points are collinear
 /// or anything is not finite. Constant time, no allocation.
-[[nodiscard]] inline p3p_solutions p3p(const std::array<vec3, 3>& points_world, const std::array<vec3, 3>& rays) {
+template <std::same_as<double> S = double>  // so that only who calls it has it compiled
+[[nodiscard]] p3p_solutions p3p(const std::array<vec3, 3>& points_world, const std::array<vec3, 3>& rays) {
+  using vec3 = matrix<3, 1, S>;
+  using mat3 = matrix<3, 3, S>;
   p3p_solutions solutions;
-  detail::for_each_p3p(points_world, {rays[0].normalized(), rays[1].normalized(), rays[2].normalized()},
+  detail::for_each_p3p(points_world, {vec3(rays[0]).normalized(), vec3(rays[1]).normalized(), vec3(rays[2]).normalized()},
                        [&](const mat3& rotation, const vec3& translation) {
                          const se3 pose = se3(so3(rotation), translation).inverse();
                          if (pose.translation().allFinite()) solutions.push_back(pose);

@@ -3,6 +3,8 @@
 /// The camera pose from matches between known points and pixels, most of which may be wrong.
 ///
 /// Sources: M. Fischler, R. Bolles, CACM 24 (1981); the parts as named in `ransac_policies.hpp` and `p3p.hpp`.
+///
+/// `S` is always double: what has it is a template so that only who uses it has it compiled.
 #pragma once
 
 #include <algorithm>
@@ -18,10 +20,9 @@
 #include <utility>
 #include <vector>
 
-#include <Eigen/Eigenvalues>
-
 #include <orbis/camera/model.hpp>
 #include <orbis/camera/pinhole.hpp>
+#include <orbis/core/jacobi.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/core/simd.hpp>
@@ -101,7 +102,11 @@ template <class SumUp>
 }
 
 /// P3P with reprojection errors in pixels, as `ransac` wants it.
+template <std::same_as<double> S = double>
 class pnp_estimator {
+  using vec3 = matrix<3, 1, S>;
+  using mat3 = matrix<3, 3, S>;
+
  public:
   struct model {
     centred_pose pose;
@@ -207,10 +212,13 @@ class pnp_estimator {
 };
 
 /// Why there is no pose, by the points alone; empty if they are not to blame.
-[[nodiscard]] inline std::string pnp_degeneracy(const pnp_matches& matches) {
+template <std::same_as<double> S = double>
+[[nodiscard]] std::string pnp_degeneracy(const pnp_matches& matches) {
+  using vec3 = matrix<3, 1, S>;
+  using mat3 = matrix<3, 3, S>;
   mat3 covariance = mat3::Zero();
   for (const vec3& p : matches.points) covariance += p * p.transpose();
-  const vec3 spread = Eigen::SelfAdjointEigenSolver<mat3>(covariance, Eigen::EigenvaluesOnly).eigenvalues();
+  const vec3 spread = eigen_of_symmetric<3>(covariance).values;
   // Up to the rounding of the points as they were, about the world's origin.
   const double rounding = 1e-30 * matches.centre.squaredNorm() * static_cast<double>(matches.size());
   if (!(spread[2] > rounding)) return "the points all lie in one place";
@@ -243,7 +251,8 @@ template <camera::camera_model Camera>
     return fail(errc::degenerate, where,
                 "of " + std::to_string(n) + " matches " + std::to_string(matches.size()) +
                     " are finite and in the camera's view, three are needed");
-  const detail::pnp_estimator estimator(matches, options.level);
+  using estimator_type = detail::pnp_estimator<>;
+  const estimator_type estimator(matches, options.level);
   const ransac_options asked{.threshold = options.threshold,
                              .confidence = options.confidence,
                              .min_iterations = options.min_iterations,
@@ -252,7 +261,7 @@ template <camera::camera_model Camera>
   const auto search = [&](const auto& sampling) {
     return ransac(estimator, asked, ransac_policies{msac{}, sampling, sprt{}, iterated_refinement{}}, workspace.ransac);
   };
-  result<ransac_estimate<detail::pnp_estimator::model>> found = [&] {
+  result<ransac_estimate<estimator_type::model>> found = [&] {
     if (options.best_first.empty()) return search(uniform_sampling{});
     auto& place = workspace.place;
     auto& order = workspace.order;
@@ -263,7 +272,7 @@ template <camera::camera_model Camera>
     for (const std::uint32_t i : options.best_first)
       if (i < n && place[i] < n) order.push_back(std::exchange(place[i], std::numeric_limits<std::uint32_t>::max()));
     if (order.size() != matches.size())
-      return result<ransac_estimate<detail::pnp_estimator::model>>(
+      return result<ransac_estimate<estimator_type::model>>(
           fail(errc::invalid_argument, where, "the order of the matches names not each of them once"));
     return search(prosac{order});
   }();
@@ -298,7 +307,7 @@ template <camera::camera_model Camera>
     const so3 rotation(p.rotation);
     return se3(rotation, p.translation - rotation * matches.centre).inverse();
   };
-  detail::pnp_estimator::model model = found->model;
+  estimator_type::model model = found->model;
   if (const auto polished = estimator.refine(model, found->inliers, 10)) model = *polished;
   se3 pose = in_world(model.pose);
   double score = judge(pose);
