@@ -11,6 +11,7 @@
 #include <orbis/camera/lanes.hpp>
 #include <orbis/camera/model.hpp>
 #include <orbis/camera/monotonic.hpp>
+#include <orbis/camera/parameters.hpp>
 #include <orbis/camera/pinhole.hpp>
 #include <orbis/camera/presets.hpp>
 #include <orbis/camera/radial_tangential.hpp>

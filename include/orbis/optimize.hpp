@@ -51,6 +51,7 @@
 #include <orbis/optimize/ransac_policies.hpp>
 #include <orbis/optimize/real_roots.hpp>
 #include <orbis/optimize/reprojection.hpp>
+#include <orbis/optimize/reprojection_with_intrinsics.hpp>
 #include <orbis/optimize/residual.hpp>
 #include <orbis/optimize/robust_loss.hpp>
 #include <orbis/optimize/schur_kernels.hpp>

@@ -1,0 +1,227 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <numeric>
+#include <span>
+#include <vector>
+
+#include <orbis/core/execution.hpp>
+#include <orbis/optimize/bundle_adjustment.hpp>
+#include <orbis/optimize/dual.hpp>
+#include <orbis/optimize/reprojection_with_intrinsics.hpp>
+#include <orbis/optimize/robust_loss.hpp>
+
+#include "support.hpp"
+#include "support/catch.hpp"
+
+using namespace orbis;
+using camera::parameters_of;
+using optimize::posed_camera;
+using optimize::reprojection_with_intrinsics;
+
+namespace {
+
+constexpr camera::intrinsics k{.width = 640, .height = 480, .fx = 517.3, .fy = 510.5, .cx = 318.6, .cy = 255.3};
+
+// The models once more, straight from their definitions, with parameters of any type of number.
+template <class S>
+matrix<2, 1, S> project(const camera::pinhole&, const matrix<4, 1, S>& a, const matrix<3, 1, S>& p) {
+  return {a[0] * p.x() / p.z() + a[2], a[1] * p.y() / p.z() + a[3]};
+}
+template <class S>
+matrix<2, 1, S> project(const camera::radial_tangential&, const matrix<12, 1, S>& a, const matrix<3, 1, S>& p) {
+  const S x = p.x() / p.z(), y = p.y() / p.z(), s = x * x + y * y;
+  const S g = (1.0 + a[4] * s + a[5] * s * s + a[8] * s * s * s) / (1.0 + a[9] * s + a[10] * s * s + a[11] * s * s * s);
+  const S u = g * x + 2.0 * a[6] * x * y + a[7] * (s + 2.0 * x * x);
+  const S v = g * y + a[6] * (s + 2.0 * y * y) + 2.0 * a[7] * x * y;
+  return {a[0] * u + a[2], a[1] * v + a[3]};
+}
+template <class S>
+matrix<2, 1, S> project(const camera::kannala_brandt&, const matrix<8, 1, S>& a, const matrix<3, 1, S>& p) {
+  using std::atan2, std::sqrt, std::pow;
+  const S r = sqrt(p.x() * p.x() + p.y() * p.y()), theta = atan2(r, p.z());
+  const S t = theta + a[4] * pow(theta, 3.0) + a[5] * pow(theta, 5.0) + a[6] * pow(theta, 7.0) + a[7] * pow(theta, 9.0);
+  return {a[0] * t * p.x() / r + a[2], a[1] * t * p.y() / r + a[3]};
+}
+
+/// Whether two columns agree to `share` of their size, or of what there is to see in pixels.
+bool agree(const vec3& a, const vec3& b, double share) { return (a - b).norm() <= share * (1.0 + b.norm()); }
+
+/// The derivatives by the intrinsics against dual numbers, all of them against central differences.
+template <class Camera, int... Free>
+void check_jacobians(const Camera& truth) {
+  using model_type = reprojection_with_intrinsics<Camera, Free...>;
+  using manifold = typename model_type::camera_manifold;
+  constexpr int count = parameters_of<Camera>::count, size = manifold::dimension;
+  using number = optimize::dual<count + 3>;
+  static_assert(optimize::camera_frame_residual<model_type>);
+  random_bits random(21);
+  const model_type model{.bf = 40.0};
+  for (int trial = 0; trial != 30; ++trial) {
+    const posed_camera<Camera> state{test::random_pose(random), truth};
+    const vec3 point = state.T_world_camera * test::random_point_in_view(random);
+    optimize::bundle_observation o{.pixel = vec2(random.uniform(0, 640), random.uniform(0, 480))};
+    if (trial % 2 == 0) o.right = random.uniform(0, 640);
+
+    matrix<3, size> by_camera;
+    mat3 by_point;
+    const auto view = model.prepare(state);
+    const vec3 q = view.rotation * point + view.translation;
+    const auto r = model.linearize(view, point, o, by_camera, by_point);
+    REQUIRE(r);
+    CHECK((*r - *model.residual(view, point, o)).norm() <= 1e-12 * (1.0 + r->norm()));
+
+    matrix<count, 1, number> a;
+    matrix<3, 1, number> p;
+    const auto values = parameters_of<Camera>::get(truth);
+    for (int i = 0; i != count; ++i) a[i] = number::variable(values[i], i);
+    for (int i = 0; i != 3; ++i) p[i] = number::variable(q[i], count + i);
+    const matrix<2, 1, number> pixel = project<number>(truth, a, p);
+    const number shifted = pixel.x() - 40.0 / p.z();
+    mat3 by_q;
+    matrix<3, model_type::intrinsic_dimension> by_intrinsics;
+    REQUIRE(model.linearize_in_camera(view, q, o, by_q, by_intrinsics));
+    for (int i = 0; i != model_type::intrinsic_dimension; ++i) {
+      const int at = manifold::free[static_cast<std::size_t>(i)];
+      const vec3 exact(pixel.x().slope[at], pixel.y().slope[at], trial % 2 == 0 ? shifted.slope[at] : 0.0);
+      CHECK(agree(by_intrinsics.col(i), exact, 1e-10));
+      CHECK(by_intrinsics.col(i) == by_camera.col(6 + i));
+    }
+    for (int i = 0; i != 3; ++i) {
+      const vec3 exact(pixel.x().slope[count + i], pixel.y().slope[count + i],
+                       trial % 2 == 0 ? shifted.slope[count + i] : 0.0);
+      CHECK(agree(by_q.col(i), exact, 1e-10));
+    }
+
+    for (int i = 0; i != size; ++i) {
+      const double h = i < 6 ? 1e-5 : manifold::free[static_cast<std::size_t>(i - 6)] < 4 ? 1e-2 : 1e-5;
+      const auto at = [&](double step) {
+        const auto moved = manifold::retract(state, matrix<size>(step * matrix<size>::Unit(i)));
+        return *model.residual(model.prepare(moved), point, o);
+      };
+      const vec3 numeric = (8.0 * (at(h) - at(-h)) - (at(2 * h) - at(-2 * h))) / (12.0 * h);
+      CHECK((by_camera.col(i) - numeric).norm() <= 1e-6 * (1e-2 + by_camera.col(i).norm()));
+    }
+
+    matrix<size> d;
+    for (int i = 0; i != size; ++i) d[i] = 0.01 * random.normal();
+    CHECK((manifold::local(state, manifold::retract(state, d)) - d).norm() < 1e-9);
+  }
+}
+
+}  // namespace
+
+TEST_CASE("Residuals with intrinsics have the derivatives they claim, for every camera model") {
+  check_jacobians(camera::pinhole{k});
+  check_jacobians(camera::radial_tangential{
+      k, {.k1 = 0.26, .k2 = -0.55, .p1 = -0.005, .p2 = 0.003, .k3 = 0.66, .k4 = 0.03, .k5 = 0.02, .k6 = 0.01}});
+  check_jacobians<camera::radial_tangential, 0, 1, 4, 11>(camera::radial_tangential{k, {.k1 = 0.1, .k2 = 0.05}});
+  check_jacobians(camera::kannala_brandt{k, {.k1 = -0.03, .k2 = 0.01, .k3 = -0.02, .k4 = 0.004}});
+}
+
+TEST_CASE("A step that would leave no camera goes as far as there is one") {
+  using model = reprojection_with_intrinsics<camera::pinhole, 0>;
+  const posed_camera<camera::pinhole> state{se3{}, camera::pinhole{k}};
+  matrix<7> d = matrix<7>::Zero();
+  d[0] = 0.5;
+  d[6] = -3.0 * k.fx;
+  const auto there = model::camera_manifold::retract(state, d);
+  CHECK(there.camera.k().fx == Approx(k.fx - 0.75 * k.fx));
+  CHECK(there.camera.k().fy == k.fy);
+  CHECK(there.T_world_camera.translation().x() == Approx(0.5));
+  d[6] = std::numeric_limits<double>::quiet_NaN();
+  CHECK(model::camera_manifold::retract(state, d).camera == state.camera);
+}
+
+TEST_CASE("Bundle adjustment recovers the intrinsics of every camera along with its pose") {
+  // Of fx, fy, cx, cy, k1, k2 and of each camera its own; p1 to k6 known. Every image sees all depths.
+  using model_type = reprojection_with_intrinsics<camera::radial_tangential, 0, 1, 2, 3, 4, 5>;
+  using state = model_type::camera_state;
+  using parameters = parameters_of<camera::radial_tangential>;
+  const model_type model{.bf = 40.0};
+  random_bits random(23);
+  constexpr std::size_t cameras = 6, points = 250;
+  std::vector<state> truth, start;
+  for (std::size_t c = 0; c != cameras; ++c) {
+    const double s = static_cast<double>(c);
+    const camera::intrinsics own{640, 480, 500.0 + 9.0 * s, 505.0 + 8.0 * s, 318.0 + s, 243.0 - s};
+    const camera::radial_tangential lens{own, {.k1 = -0.2 + 0.02 * s, .k2 = 0.06, .p1 = 0.001, .p2 = -0.0005}};
+    truth.push_back({se3{so3::exp(vec3(0.02, -0.04 * s, 0.02 * s)), vec3(0.15 * s, 0.03 * s, 0.0)}, lens});
+    auto off = parameters::get(lens);
+    vec6 xi;
+    xi << test::random_vector(random, 0.03), test::random_vector(random, 0.02);
+    for (int i = 0; i != 2; ++i) off[i] *= 1.0 + 0.04 * random.uniform(-1.0, 1.0);
+    for (int i = 2; i != 4; ++i) off[i] += 6.0 * random.uniform(-1.0, 1.0);
+    for (int i = 4; i != 6; ++i) off[i] = 0.0;
+    if (c == 0)
+      start.push_back(truth[0]);
+    else
+      start.push_back({truth[c].T_world_camera * se3::exp(xi), *parameters::with(lens, off)});
+  }
+  std::vector<vec3> true_points, near;
+  std::vector<optimize::bundle_observation> observations;
+  for (std::uint32_t p = 0; p != points; ++p) {
+    true_points.push_back(test::random_point_in_view(random));
+    near.push_back(true_points.back() + test::random_vector(random, 0.04));
+    for (std::uint32_t c = 0; c != cameras; ++c) {
+      const vec3 q = truth[c].T_world_camera.inverse() * true_points.back();
+      const auto pixel = truth[c].camera.project(q);
+      if (!pixel) continue;
+      observations.push_back({.pose = c, .point = p, .pixel = *pixel});
+      if (p % 3 != 0) observations.back().right = model.right(pixel->x(), q.z());
+    }
+  }
+  const std::vector<std::uint8_t> fixed{1, 0, 0, 0, 0, 0};  // with its intrinsics
+  optimize::bundle_adjuster adjuster{model, optimize::trivial{}};
+  const auto solve = [&](std::vector<state>& estimate, std::vector<vec3>& map) {
+    return adjuster.solve(seq, std::span<state>(estimate), std::span<vec3>(map),
+                          std::span<const optimize::bundle_observation>(observations),
+                          {.max_iterations = 50, .relative_tolerance = 1e-14, .fixed_poses = fixed});
+  };
+  auto estimate = start;
+  auto map = near;
+  const auto exact = solve(estimate, map);
+  REQUIRE_FALSE(is_failure(exact.status));
+  CHECK(exact.final_cost < 1e-12 * exact.initial_cost);
+  for (std::size_t c = 0; c != cameras; ++c) {
+    const auto p = parameters::get(estimate[c].camera), expected = parameters::get(truth[c].camera);
+    for (int i = 0; i != 4; ++i) CHECK(std::abs(p[i] - expected[i]) < 1e-5);
+    for (int i = 4; i != 6; ++i) CHECK(std::abs(p[i] - expected[i]) < 1e-7);
+    for (int i = 6; i != parameters::count; ++i) CHECK(p[i] == expected[i]);
+    CHECK(test::distance_between(estimate[c].T_world_camera, truth[c].T_world_camera) < 1e-7);
+  }
+  CHECK(estimate[0].camera == truth[0].camera);
+
+  // With half a pixel of noise: what is left is noise, the unknowns explain as much of it as so many may (the
+  // distance of the estimate from the truth in units of its own uncertainty), and all intrinsics are better.
+  constexpr double sigma = 0.5;
+  std::size_t rows = 0;
+  for (auto& o : observations) {
+    o.pixel += sigma * vec2(random.normal(), random.normal());
+    o.right += sigma * random.normal();
+    rows += std::isnan(o.right) ? 2 : 3;
+  }
+  estimate = start;
+  map = near;
+  const auto noisy = solve(estimate, map);
+  REQUIRE_FALSE(is_failure(noisy.status));
+  const auto unknowns = static_cast<double>(3 * points + 12 * (cameras - 1));
+  const double freedom = static_cast<double>(rows) - unknowns, chi2 = 2.0 * noisy.final_cost / (sigma * sigma);
+  CHECK(std::abs(chi2 - freedom) < 4.0 * std::sqrt(2.0 * freedom));
+  std::vector<double> at_truth(observations.size());
+  adjuster.chi2(truth, true_points, observations, at_truth);
+  const double explained = std::accumulate(at_truth.begin(), at_truth.end(), 0.0) / (sigma * sigma) - chi2;
+  CHECK(std::abs(explained - unknowns) < 4.0 * std::sqrt(2.0 * unknowns));
+  double before[6] = {}, after[6] = {};
+  for (std::size_t c = 0; c != cameras; ++c) {
+    const auto p = parameters::get(estimate[c].camera), from = parameters::get(start[c].camera),
+               expected = parameters::get(truth[c].camera);
+    for (int i = 0; i != 6; ++i) {
+      before[i] += std::abs(from[i] - expected[i]);
+      after[i] += std::abs(p[i] - expected[i]);
+    }
+  }
+  for (int i = 0; i != 6; ++i) CHECK(after[i] < 0.5 * before[i]);
+}
