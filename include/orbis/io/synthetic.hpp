@@ -10,13 +10,20 @@
 #pragma once
 
 #include <orbis/io/synthetic/arithmetic.hpp>
+#include <orbis/io/synthetic/building.hpp>
 #include <orbis/io/synthetic/bundle.hpp>
 #include <orbis/io/synthetic/canvas.hpp>
+#include <orbis/io/synthetic/effects.hpp>
 #include <orbis/io/synthetic/path.hpp>
 #include <orbis/io/synthetic/pose_graph.hpp>
+#include <orbis/io/synthetic/read_ahead.hpp>
 #include <orbis/io/synthetic/recording.hpp>
 #include <orbis/io/synthetic/renderer.hpp>
 #include <orbis/io/synthetic/scene.hpp>
 #include <orbis/io/synthetic/sensor.hpp>
+#include <orbis/io/synthetic/sequence.hpp>
 #include <orbis/io/synthetic/solid.hpp>
+#include <orbis/io/synthetic/studio.hpp>
 #include <orbis/io/synthetic/texture.hpp>
+#include <orbis/io/synthetic/walk.hpp>
+#include <orbis/io/synthetic/world.hpp>

@@ -36,9 +36,14 @@ class canvas {
   /// Sizes in metres, `texel` metres each.
   canvas(double width, double height, double texel)
       : texel_{texel},
-        width_{std::max(1, static_cast<int>(width / texel + 0.999))},
-        height_{std::max(1, static_cast<int>(height / texel + 0.999))},
+        width_{texels(width, texel)},
+        height_{texels(height, texel)},
         texels_(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_)) {}
+
+  /// How many texels cover a length, both in metres.
+  [[nodiscard]] static int texels(double length, double texel) noexcept {
+    return std::max(1, static_cast<int>(length / texel + 0.999));
+  }
 
   [[nodiscard]] int width() const noexcept { return width_; }
   [[nodiscard]] int height() const noexcept { return height_; }

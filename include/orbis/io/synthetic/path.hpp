@@ -43,6 +43,38 @@ struct camera_pose {
   [[nodiscard]] se3 T_world_camera() const { return {so3{so3::quaternion(qw, q.x, q.y, q.z)}, to_vec3(position)}; }
 };
 
+namespace detail {
+
+struct quaternion {
+  double w;
+  triple v;
+  [[nodiscard]] friend quaternion operator*(quaternion a, quaternion b) noexcept {
+    return {a.w * b.w - dot(a.v, b.v), a.w * b.v + b.w * a.v + cross(a.v, b.v)};
+  }
+};
+
+/// The rotation of `pose` by its unit quaternion.
+inline void set_rotation(camera_pose& pose, quaternion r) noexcept {
+  const double w = r.w, x = r.v.x, y = r.v.y, z = r.v.z;
+  pose.right = {1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)};
+  pose.down = {2.0 * (x * y - w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + w * x)};
+  pose.forward = {2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)};
+  pose.qw = w;
+  pose.q = r.v;
+}
+
+}  // namespace detail
+
+/// Turns a camera: `yaw` from the world's x axis towards y, `pitch` upward, `roll` about the view; all in turns.
+inline void orient(camera_pose& pose, double yaw, double pitch, double roll) noexcept {
+  using detail::quaternion;
+  const quaternion about_up{cos_turns(0.5 * yaw), {0.0, 0.0, sin_turns(0.5 * yaw)}};
+  const quaternion about_side{cos_turns(0.5 * pitch), {0.0, -sin_turns(0.5 * pitch), 0.0}};
+  const quaternion axes{0.5, {-0.5, 0.5, -0.5}};  // camera z forward -> world x, camera y down -> world -z
+  const quaternion about_view{cos_turns(0.5 * roll), {0.0, 0.0, sin_turns(0.5 * roll)}};
+  detail::set_rotation(pose, about_up * about_side * axes * about_view);
+}
+
 /// The path: poses by time.
 class camera_path {
  public:
@@ -51,6 +83,9 @@ class camera_path {
       : options_{options}, seed_{mix64(seed ^ 0x70617468ULL)}, duration_{duration} {
     start_ = upper_fraction(noise_word(seed_, 99, 0));
   }
+
+  /// Seconds.
+  [[nodiscard]] double duration() const noexcept { return duration_; }
 
   /// The pose `time` seconds after the beginning. World: z up, the floor at z = 0.
   [[nodiscard]] camera_pose at(double time) const noexcept {
@@ -86,29 +121,6 @@ class camera_path {
     if (t < ramp) return 0.5 * speed * t * t / ramp;
     if (t > 1.0 - ramp) return 1.0 - 0.5 * speed * (1.0 - t) * (1.0 - t) / ramp;
     return speed * (t - 0.5 * ramp);
-  }
-
-  struct quaternion {
-    double w;
-    triple v;
-    [[nodiscard]] friend quaternion operator*(quaternion a, quaternion b) noexcept {
-      return {a.w * b.w - dot(a.v, b.v), a.w * b.v + b.w * a.v + cross(a.v, b.v)};
-    }
-  };
-
-  /// Angles in turns.
-  static void orient(camera_pose& pose, double yaw, double pitch, double roll) noexcept {
-    const quaternion about_up{cos_turns(0.5 * yaw), {0.0, 0.0, sin_turns(0.5 * yaw)}};
-    const quaternion about_side{cos_turns(0.5 * pitch), {0.0, -sin_turns(0.5 * pitch), 0.0}};
-    const quaternion axes{0.5, {-0.5, 0.5, -0.5}};  // camera z forward -> world x, camera y down -> world -z
-    const quaternion about_view{cos_turns(0.5 * roll), {0.0, 0.0, sin_turns(0.5 * roll)}};
-    const quaternion r = about_up * about_side * axes * about_view;
-    const double w = r.w, x = r.v.x, y = r.v.y, z = r.v.z;
-    pose.right = {1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)};
-    pose.down = {2.0 * (x * y - w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + w * x)};
-    pose.forward = {2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)};
-    pose.qw = w;
-    pose.q = r.v;
   }
 
   path_options options_;

@@ -20,9 +20,9 @@
 #include <orbis/core/result.hpp>
 #include <orbis/core/trajectory.hpp>
 #include <orbis/io/synthetic/path.hpp>
-#include <orbis/io/synthetic/renderer.hpp>
 #include <orbis/io/synthetic/scene.hpp>
 #include <orbis/io/synthetic/sensor.hpp>
+#include <orbis/io/synthetic/studio.hpp>
 #include <orbis/io/synthetic/texture.hpp>
 
 namespace orbis::io {
@@ -56,15 +56,11 @@ class synthetic_recording {
       : options_{options},
         path_{options.path, options.seed,
               (options.frames_around > 0 ? options.frames_around : options.frames) / options.fps},
-        k_{options.width,
-           options.height,
-           focal(options),
-           focal(options),
-           0.5 * (options.width - 1),
-           0.5 * (options.height - 1)},
+        k_{synthetic::usual_intrinsics(options.width, options.height)},
         scene_{std::make_shared<synthetic::scene>(options.scene, options.seed)},
-        textures_{std::make_shared<synthetic::texture_set>(par, *scene_, texel(options))} {
-    assert(options.frames >= 0 && options.fps > 0.0 && options.depth_scale > 0.0);
+        studio_{std::make_shared<synthetic::texture_set>(par, *scene_, texel(k_)), k_, options.depth_scale,
+                options.sensor, options.seed} {
+    assert(options.frames >= 0 && options.fps > 0.0);
   }
 
   [[nodiscard]] std::size_t size() const noexcept { return static_cast<std::size_t>(options_.frames); }
@@ -98,24 +94,8 @@ class synthetic_recording {
   template <execution_policy Policy>
   [[nodiscard]] result<camera::rgbd_frame> render(const Policy& policy, std::size_t i) const {
     if (i >= size()) return no_such_frame(i);
-    const synthetic::sensor_options& s = options_.sensor;
-    synthetic::exact_view exact = exact_view_at(policy, timestamp(i));
-    if (s.motion_blur > 1) blur(policy, timestamp(i), exact.color);
-
-    camera::rgbd_frame f;
-    f.timestamp = timestamp(i);
-    f.depth_scale = options_.depth_scale;
-    f.T_world_camera = T_world_camera(i);
-    f.depth = image<std::uint16_t>(options_.width, options_.height);
-    const synthetic::sensor sensor{s, k_.fx, options_.depth_scale, options_.seed, i};
-    const double gain = synthetic::exposure_gain(s, options_.seed, f.timestamp);
-    for_each_index(policy, static_cast<std::size_t>(options_.height), synthetic::renderer::tile, [&](std::size_t row) {
-      const int y = static_cast<int>(row);
-      sensor.measure_depth(exact, y, f.depth.row(y));
-      sensor.measure_colour(exact.color.row(y), y, options_.width, options_.height, gain);
-    });
-    f.color = std::move(exact.color);
-    return f;
+    return studio_.frame(
+        policy, [this](double time) { return moment_at(time); }, timestamp(i), i);
   }
 
   /// Colour, depth (metres) and angles of frame `i` without any error of the sensor.
@@ -123,7 +103,7 @@ class synthetic_recording {
   template <execution_policy Policy>
   [[nodiscard]] result<synthetic::exact_view> exact(const Policy& policy, std::size_t i) const {
     if (i >= size()) return no_such_frame(i);
-    return exact_view_at(policy, timestamp(i));
+    return studio_.exact(policy, moment_at(timestamp(i)));
   }
 
   /// Iteration renders one frame after the other.
@@ -131,50 +111,19 @@ class synthetic_recording {
   [[nodiscard]] iterator end() const;
 
  private:
-  [[nodiscard]] static double focal(const synthetic_options& o) noexcept { return 525.0 * o.width / 640.0; }
   /// Texels are about the size of a pixel at 2 m.
-  [[nodiscard]] static double texel(const synthetic_options& o) noexcept { return std::max(0.003, 2.0 / focal(o)); }
+  [[nodiscard]] static double texel(const camera::intrinsics& k) noexcept { return std::max(0.003, 2.0 / k.fx); }
+  [[nodiscard]] synthetic::moment moment_at(double time) const { return {scene_->solids_at(time), path_.at(time)}; }
   [[nodiscard]] tl::unexpected<error> no_such_frame(std::size_t i) const {
     return fail(errc::invalid_argument, "frame",
                 "there is no frame " + std::to_string(i) + " among " + std::to_string(size()));
-  }
-
-  template <execution_policy Policy>
-  [[nodiscard]] synthetic::exact_view exact_view_at(const Policy& policy, double time) const {
-    const synthetic::renderer picture{scene_->solids_at(time), *textures_, path_.at(time), k_};
-    synthetic::exact_view out{image<rgb8>(k_.width, k_.height), image<float>(k_.width, k_.height),
-                              image<float>(k_.width, k_.height)};
-    for_each_index(policy, static_cast<std::size_t>(picture.tile_rows()), 1,
-                   [&](std::size_t row) { picture.render_tile_row(static_cast<int>(row), out); });
-    return out;
-  }
-
-  /// Averages pictures spread evenly over the exposure time, which is centred on `time`.
-  template <execution_policy Policy>
-  void blur(const Policy& policy, double time, image<rgb8>& color) const {
-    const int count = options_.sensor.motion_blur;
-    std::vector<std::uint32_t> sums(3 * color.pixels().size());
-    for (int k = 0; k != count; ++k) {
-      const double when = time + options_.sensor.exposure * ((k + 0.5) / count - 0.5);
-      const auto part = exact_view_at(policy, when);
-      for (std::size_t i = 0; i != color.pixels().size(); ++i) {
-        const rgb8 c = part.color.pixels()[i];
-        sums[3 * i] += c.r;
-        sums[3 * i + 1] += c.g;
-        sums[3 * i + 2] += c.b;
-      }
-    }
-    const auto n = static_cast<std::uint32_t>(count);
-    const auto mean = [&](std::size_t i) { return static_cast<std::uint8_t>((sums[i] + n / 2) / n); };
-    for (std::size_t i = 0; i != color.pixels().size(); ++i)
-      color.pixels()[i] = {mean(3 * i), mean(3 * i + 1), mean(3 * i + 2)};
   }
 
   synthetic_options options_;
   synthetic::camera_path path_;
   camera::intrinsics k_;
   std::shared_ptr<const synthetic::scene> scene_;
-  std::shared_ptr<const synthetic::texture_set> textures_;
+  synthetic::studio studio_;
 };
 
 /// A single pass over the frames; a frame lives until the iterator moves on.

@@ -36,6 +36,7 @@ struct scene_options {
   int poor_walls = 1;            ///< how many of the four walls are nearly without texture, 0..4
   double texture_density = 1.0;  ///< scales the number of patches painted on every surface; 0: none
   bool moving_object = false;    ///< a box that walks through the room
+  double wall_period = 0.0;      ///< metres; above 0 all walls bear one picture that repeats itself at this distance
 };
 
 /// A room with its floor at z = 0 and its middle at the origin, furnished along its walls. The seed

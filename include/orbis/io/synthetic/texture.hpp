@@ -22,6 +22,7 @@
 #include <orbis/io/synthetic/canvas.hpp>
 #include <orbis/io/synthetic/scene.hpp>
 #include <orbis/io/synthetic/solid.hpp>
+#include <orbis/io/synthetic/world.hpp>
 
 #if defined(__clang__)
 #pragma float_control(push)
@@ -33,25 +34,27 @@
 
 namespace orbis::io::synthetic {
 
-/// All faces of a scene, painted and lit, in pyramids.
+/// All faces of a world, painted and lit, in pyramids.
 class texture_set {
  public:
   /// Paints every face with `texel` metres for each texel. O(surface / texel^2).
   template <execution_policy Policy>
-  texture_set(const Policy& policy, const scene& room, double texel)
-      : inverse_texel_{1.0 / texel}, faces_(6 * room.solids().size()) {
-    for_each_index(policy, faces_.size(), 1, [&](std::size_t i) { paint(room, i, texel); });
+  texture_set(const Policy& policy, const world& place, double texel) : faces_(6 * place.solids().size()) {
+    for_each_index(policy, faces_.size(), 1, [&](std::size_t i) { paint(place, i, texel); });
   }
+  /// The same of a furnished room, its moving object included.
+  template <execution_policy Policy>
+  texture_set(const Policy& policy, const scene& room, double texel) : texture_set(policy, world_of(room), texel) {}
 
   /// The colour (red in the lowest byte) at (u, v) metres from the corner of face `face` of solid
   /// `of`, where a pixel covers `footprint` metres.
   [[nodiscard]] std::uint32_t sample(std::size_t of, int face, double u, double v, double footprint) const noexcept {
     const pyramid& p = faces_[6 * of + static_cast<std::size_t>(face)];
     // The logarithm to base 2, linear between powers of two, in 1/256.
-    const auto relative = static_cast<float>(footprint * inverse_texel_);
+    const auto relative = static_cast<float>(footprint * p.inverse_texel);
     const int detail = (std::bit_cast<std::int32_t>(relative) - 0x3f800000) >> 15;
     // In 1/256 texel of the finest level.
-    const double scale = 256.0 * inverse_texel_;
+    const double scale = 256.0 * p.inverse_texel;
     const int a = static_cast<int>(u * scale), b = static_cast<int>(v * scale);
     if (detail <= 0) return pack(bilinear(p, 0, a, b));
     const int last = p.levels - 1;
@@ -68,6 +71,7 @@ class texture_set {
     std::array<std::uint32_t, most_levels> begin{};
     std::array<std::int32_t, most_levels> width{}, height{};
     int levels = 0;
+    double inverse_texel = 1.0;  // of the finest level
   };
 
   // Three channels side by side in one word, 16 bits apart.
@@ -97,65 +101,50 @@ class texture_set {
     return blend(top, bottom, g);
   }
 
-  struct look {
-    material surface;
-    double patches;   ///< for each square metre
-    double contrast;  ///< of the patches
-  };
-
-  [[nodiscard]] static look look_of(const scene& room, std::size_t of, int face) noexcept {
-    material m = room.solids()[of].surface;
-    if (of == 0) {
-      if (face == 4) m = material::tile;   // floor
-      if (face == 5) m = material::plain;  // ceiling
-      if (face == 1 && !room.is_poor_wall(1)) m = material::brick;
-      if (room.is_poor_wall(face)) m = material::plain;
-    }
-    look l{m, 0.0, 0.8};
-    switch (m) {
-      case material::plain: l.patches = of == 0 ? 10.0 : 6.0; break;
-      case material::wallpaper: l.patches = 160.0; break;
-      case material::brick: l.patches = 120.0; break;
-      case material::tile: l.patches = 120.0; break;
-      case material::wood: l.patches = 160.0; break;
-      case material::fabric: l.patches = 300.0; break;
-      case material::books: l.patches = 250.0; break;
-      case material::clutter: l.patches = 700.0, l.contrast = 1.0; break;
-    }
-    if (of == 0 && face == 5) l.patches = 60.0;
-    l.patches *= room.options().texture_density;
-    return l;
+  /// With the moving object as one more solid at rest, so that it is lit as in the middle of its way.
+  [[nodiscard]] static world world_of(const scene& room) {
+    world place{room};
+    if (room.options().moving_object)
+      place.add(room.solids().back(), usual_looks(room.solids().back(), room.options().texture_density));
+    return place;
   }
 
-  /// The light that falls on a place of the room: some from everywhere, some from under the ceiling.
-  [[nodiscard]] static float light(const scene& room, triple p, triple normal) noexcept {
-    const triple to_lamp = triple{0.0, 0.0, room.options().height - 0.5} - p;
-    const double d = std::max(length(to_lamp), 0.3);
-    const double facing = std::max(0.0, dot(normal, to_lamp) / d);
+  /// The light that falls on a surface: some from everywhere, some from a lamp, some through a window.
+  [[nodiscard]] static float light(const world& place, triple p, triple normal) noexcept {
+    double lamp = 0.0;
+    for (const triple at : place.lamps()) {
+      const triple to_lamp = at - p;
+      const double d = std::max(length(to_lamp), 0.3);
+      const double facing = std::max(0.0, dot(normal, to_lamp) / d);
+      lamp = std::max(lamp, 0.55 * facing / (0.6 + 0.15 * d * d));
+    }
     const double window = std::max(0.0, 0.6 * normal.x + 0.48 * normal.y + 0.64 * normal.z);
-    return static_cast<float>(0.46 + 0.55 * facing / (0.6 + 0.15 * d * d) + 0.16 * window);
+    return static_cast<float>(0.46 + lamp + 0.16 * window);
   }
 
-  void paint(const scene& room, std::size_t index, double texel) {
+  void paint(const world& place, std::size_t index, double finest) {
     const std::size_t of = index / 6;
     const int face = static_cast<int>(index % 6);
-    const solid& s = room.solids()[of];
+    const solid& s = place.solids()[of];
     const std::array<double, 3> half{s.half.x, s.half.y, s.half.z};
     const int axis = face / 2;
     const auto ua = static_cast<std::size_t>(axis == 0 ? 1 : 0), va = static_cast<std::size_t>(axis == 2 ? 1 : 2);
-    const std::uint64_t seed = noise_word(s.seed, 7, static_cast<std::uint64_t>(face));
-    const look l = look_of(room, of, face);
-    canvas c{2.0 * half[ua], 2.0 * half[va], texel};
-    c.prime(l.surface, seed);
-    c.scatter(l.patches, l.contrast, mix64(seed));
+    const face_look& look = place.looks()[of][static_cast<std::size_t>(face)];
+    const double texel = finest * look.coarseness;
+    const double across = 2.0 * half[ua], up = 2.0 * half[va];
+    const bool repeats = look.period > 0.0;
+    canvas c{repeats ? std::min(look.period, across) : across, repeats ? std::min(look.period, up) : up, texel};
+    c.prime(look.surface, look.seed);
+    c.scatter(look.patches, look.contrast, mix64(look.seed));
 
     pyramid& p = faces_[index];
-    p.width[0] = c.width();
-    p.height[0] = c.height();
-    p.texels.reserve(static_cast<std::size_t>(c.width()) * static_cast<std::size_t>(c.height()) * 4 / 3 + 32);
+    p.inverse_texel = 1.0 / texel;
+    p.width[0] = repeats ? canvas::texels(across, texel) : c.width();
+    p.height[0] = repeats ? canvas::texels(up, texel) : c.height();
+    p.texels.reserve(static_cast<std::size_t>(p.width[0]) * static_cast<std::size_t>(p.height[0]) * 4 / 3 + 32);
     const bool round = s.kind == shape::sphere || s.kind == shape::cylinder;
-    for (int y = 0; y != c.height(); ++y)
-      for (int x = 0; x != c.width(); ++x) {
+    for (int y = 0; y != p.height[0]; ++y)
+      for (int x = 0; x != p.width[0]; ++x) {
         std::array<double, 3> at{}, normal{};
         at[ua] = (x + 0.5) * texel - half[ua];
         at[va] = (y + 0.5) * texel - half[va];
@@ -170,8 +159,8 @@ class texture_set {
           n = {normal[0], normal[1], normal[2]};
         }
         const float brightness =
-            light(room, s.centre + s.to_world_direction({at[0], at[1], at[2]}), s.to_world_direction(n));
-        const tint t = c(x, y);
+            light(place, s.centre + s.to_world_direction({at[0], at[1], at[2]}), s.to_world_direction(n));
+        const tint t = c(x % c.width(), y % c.height());
         const auto byte = [&](float v) {
           return static_cast<std::uint32_t>(std::clamp(v * brightness, 0.0F, 1.0F) * 255.0F + 0.5F);
         };
@@ -203,7 +192,6 @@ class texture_set {
     ++p.levels;
   }
 
-  double inverse_texel_;
   std::vector<pyramid> faces_;
 };
 
