@@ -27,14 +27,16 @@ class basic_se3 {
   basic_se3(const basic_so3<S>& rotation, const point& translation) : r_{rotation}, t_{translation} {}
 
   [[nodiscard]] static basic_se3 exp(const tangent& xi) {
-    const point rho = xi.template head<3>();
-    const point phi = xi.template tail<3>();
+    const point rho(xi[0], xi[1], xi[2]), phi(xi[3], xi[4], xi[5]);
     return {basic_so3<S>::exp(phi), basic_so3<S>::left_jacobian(phi) * rho};
   }
   [[nodiscard]] tangent log() const {
-    const point phi = r_.log();
+    const point phi = r_.log(), rho = basic_so3<S>::left_jacobian_inverse(phi) * t_;
     tangent xi;
-    xi << basic_so3<S>::left_jacobian_inverse(phi) * t_, phi;
+    for (int i = 0; i != 3; ++i) {
+      xi[i] = rho[i];
+      xi[3 + i] = phi[i];
+    }
     return xi;
   }
   [[nodiscard]] basic_se3 inverse() const {
@@ -51,9 +53,14 @@ class basic_se3 {
   [[nodiscard]] matrix<3, 3, S> rotation_matrix() const { return r_.rotation_matrix(); }
   /// The homogeneous 4x4 matrix.
   [[nodiscard]] matrix<4, 4, S> to_matrix() const {
-    matrix<4, 4, S> m = matrix<4, 4, S>::Identity();
-    m.template topLeftCorner<3, 3>() = rotation_matrix();
-    m.template topRightCorner<3, 1>() = t_;
+    const matrix<3, 3, S> r = rotation_matrix();
+    matrix<4, 4, S> m;
+    for (int i = 0; i != 3; ++i) {
+      for (int k = 0; k != 3; ++k) m(i, k) = r(i, k);
+      m(i, 3) = t_[i];
+      m(3, i) = S(0);
+    }
+    m(3, 3) = S(1);
     return m;
   }
   /// `exp(adjoint() * xi) == T exp(xi) T^-1`.

@@ -20,7 +20,9 @@ namespace orbis {
 template <class S>
 [[nodiscard]] matrix<3, 3, S> hat(const matrix<3, 1, S>& v) {
   matrix<3, 3, S> m;
-  m << S(0), -v.z(), v.y(), v.z(), S(0), -v.x(), -v.y(), v.x(), S(0);
+  m(0, 0) = m(1, 1) = m(2, 2) = S(0);
+  m(0, 1) = -v.z(), m(0, 2) = v.y(), m(1, 2) = -v.x();
+  m(1, 0) = v.z(), m(2, 0) = -v.y(), m(2, 1) = v.x();
   return m;
 }
 
@@ -44,8 +46,8 @@ class basic_so3 {
   /// The identity.
   basic_so3() : q_{quaternion::Identity()} {}
   /// From a quaternion of any positive norm; normalises it.
-  explicit basic_so3(const Eigen::Quaternion<S>& q) : q_{q.normalized()} {}
-  explicit basic_so3(const quaternion& q) : q_{q.normalized()} {}
+  explicit basic_so3(const Eigen::Quaternion<S>& q) : q_{unit(q.x(), q.y(), q.z(), q.w())} {}
+  explicit basic_so3(const quaternion& q) : q_{unit(q.x(), q.y(), q.z(), q.w())} {}
   /// From a quaternion that is of unit norm already, up to rounding: bit for bit, as `unit_quaternion()` gave it.
   [[nodiscard]] static basic_so3 from_unit_quaternion(const quaternion& q) {
     basic_so3 r;
@@ -54,11 +56,11 @@ class basic_so3 {
   }
   /// From a matrix that is a rotation up to rounding. For matrices that are further off use
   /// `nearest_rotation`.
-  explicit basic_so3(const matrix<3, 3, S>& r) : q_{quaternion(r).normalized()} {}
+  explicit basic_so3(const matrix<3, 3, S>& r) : basic_so3(quaternion(r)) {}
 
   /// The rotation by `|phi|` radians about `phi`.
   [[nodiscard]] static basic_so3 exp(const tangent& phi) {
-    const S theta2 = phi.squaredNorm();
+    const S theta2 = square_of(phi.x(), phi.y(), phi.z());
     S real, factor;  // cos(theta / 2), sin(theta / 2) / theta
     if (theta2 < small) {
       real = S(1) - theta2 / S(8);
@@ -73,13 +75,17 @@ class basic_so3 {
 
   /// The rotation vector, of norm at most pi.
   [[nodiscard]] tangent log() const {
-    const tangent v = q_.vec();
-    const S n2 = v.squaredNorm();
+    const S n2 = square_of(q_.x(), q_.y(), q_.z());
     const S w = q_.w();
-    if (n2 < small) return (S(2) / w - S(2) * n2 / (S(3) * w * w * w)) * v;
-    const S n = std::sqrt(n2);
-    // atan2 with both signs flipped where w < 0 picks the shorter way round.
-    return (S(2) * (w < S(0) ? std::atan2(-n, -w) : std::atan2(n, w)) / n) * v;
+    S factor;
+    if (n2 < small) {
+      factor = S(2) / w - S(2) * n2 / (S(3) * w * w * w);
+    } else {
+      const S n = std::sqrt(n2);
+      // atan2 with both signs flipped where w < 0 picks the shorter way round.
+      factor = S(2) * (w < S(0) ? std::atan2(-n, -w) : std::atan2(n, w)) / n;
+    }
+    return {factor * q_.x(), factor * q_.y(), factor * q_.z()};
   }
 
   [[nodiscard]] basic_so3 inverse() const {
@@ -105,8 +111,7 @@ class basic_so3 {
 
   /// `exp(phi + delta) ~ exp(left_jacobian(phi) * delta) * exp(phi)`.
   [[nodiscard]] static matrix<3, 3, S> left_jacobian(const tangent& phi) {
-    const S theta2 = phi.squaredNorm();
-    const matrix<3, 3, S> k = hat<S>(phi);
+    const S theta2 = square_of(phi.x(), phi.y(), phi.z());
     S a, b;  // (1 - cos t) / t^2, (t - sin t) / t^3
     if (theta2 < small) {
       a = S(0.5) - theta2 / S(24);
@@ -117,11 +122,10 @@ class basic_so3 {
       a = S(2) * half * half;
       b = (theta - std::sin(theta)) / (theta2 * theta);
     }
-    return matrix<3, 3, S>::Identity() + a * k + b * k * k;
+    return polynomial_of_hat(phi, a, b);
   }
   [[nodiscard]] static matrix<3, 3, S> left_jacobian_inverse(const tangent& phi) {
-    const S theta2 = phi.squaredNorm();
-    const matrix<3, 3, S> k = hat<S>(phi);
+    const S theta2 = square_of(phi.x(), phi.y(), phi.z());
     S c;  // 1 / t^2 - (1 + cos t) / (2 t sin t)
     if (theta2 < small) {
       c = S(1) / S(12) + theta2 / S(720);
@@ -129,7 +133,7 @@ class basic_so3 {
       const S half = std::sqrt(theta2) / S(2);
       c = (S(1) - half * std::cos(half) / std::sin(half)) / theta2;
     }
-    return matrix<3, 3, S>::Identity() - S(0.5) * k + c * k * k;
+    return polynomial_of_hat(phi, S(-0.5), c);
   }
   /// `exp(phi + delta) ~ exp(phi) * exp(right_jacobian(phi) * delta)`.
   [[nodiscard]] static matrix<3, 3, S> right_jacobian(const tangent& phi) { return left_jacobian(-phi); }
@@ -140,6 +144,28 @@ class basic_so3 {
  private:
   /// Below this squared angle the series is exact to rounding.
   static constexpr S small = std::same_as<S, float> ? S(1e-4) : S(1e-8);
+
+  // By hand: what every includer has compiled should not cost expression templates.
+  [[nodiscard]] static S square_of(S x, S y, S z) { return x * x + y * y + z * z; }
+  [[nodiscard]] static quaternion unit(S x, S y, S z, S w) {
+    const S square = (x * x + z * z) + (y * y + w * w);
+    if (!(square > S(0))) return quaternion(w, x, y, z);
+    const S norm = std::sqrt(square);
+    return quaternion(w / norm, x / norm, y / norm, z / norm);
+  }
+  /// `I + a hat(phi) + b hat(phi)^2`.
+  [[nodiscard]] static matrix<3, 3, S> polynomial_of_hat(const tangent& phi, S a, S b) {
+    const S x = phi.x(), y = phi.y(), z = phi.z();
+    const S ax = a * x, ay = a * y, az = a * z, bx = b * x, by = b * y, bz = b * z;
+    matrix<3, 3, S> m;
+    m(0, 0) = S(1) - (bz * z + by * y);
+    m(1, 1) = S(1) - (bz * z + bx * x);
+    m(2, 2) = S(1) - (by * y + bx * x);
+    m(0, 1) = by * x - az, m(1, 0) = bx * y + az;
+    m(0, 2) = bz * x + ay, m(2, 0) = bx * z - ay;
+    m(1, 2) = bz * y - ax, m(2, 1) = by * z + ax;
+    return m;
+  }
   quaternion q_;
 };
 

@@ -55,11 +55,7 @@ struct quaternion_between {
   static constexpr int dimension = 6;
 
   [[nodiscard]] static vec6 residual(const se3& T_world_a, const se3& T_world_b, const se3& T_a_b) {
-    const se3 d = T_a_b.inverse() * (T_world_a.inverse() * T_world_b);
-    const auto& q = d.rotation().unit_quaternion();
-    vec6 r;
-    r << d.translation(), (q.w() < 0.0 ? -1.0 : 1.0) * q.vec();
-    return r;
+    return residual_of(T_a_b.inverse() * (T_world_a.inverse() * T_world_b));
   }
   [[nodiscard]] static vec6 linearize(const se3& T_world_a, const se3& T_world_b, const se3& T_a_b, mat6& by_a,
                                       mat6& by_b) {
@@ -67,21 +63,32 @@ struct quaternion_between {
     const se3 inverse = T_a_b.inverse();
     const se3 d = inverse * between;
     const auto& q = d.rotation().unit_quaternion();
+    const double half = q.w() < 0.0 ? -0.5 : 0.5, real = half * q.w();
+    const mat3 cross = hat<double>(vec3(half * q.x(), half * q.y(), half * q.z()));
+    const mat3 back = inverse.rotation_matrix(), turn = d.rotation_matrix();
+    const mat3 lever = back * hat<double>(between.translation()), by_turn = cross * back;
+    for (int k = 0; k != 3; ++k)
+      for (int i = 0; i != 3; ++i) {
+        by_b(i, k) = turn(i, k);
+        by_b(i, 3 + k) = 0.0;
+        by_b(3 + i, k) = 0.0;
+        by_b(3 + i, 3 + k) = (i == k ? real : 0.0) + cross(i, k);
+        by_a(i, k) = -back(i, k);
+        by_a(i, 3 + k) = lever(i, k);
+        by_a(3 + i, k) = 0.0;
+        by_a(3 + i, 3 + k) = by_turn(i, k) - real * back(i, k);
+      }
+    return residual_of(d);
+  }
+
+ private:
+  [[nodiscard]] static vec6 residual_of(const se3& d) {
+    const auto& q = d.rotation().unit_quaternion();
+    const vec3& t = d.translation();
     const double sign = q.w() < 0.0 ? -1.0 : 1.0;
-    const vec3 v = sign * q.vec();
-    const mat3 real = (0.5 * sign * q.w()) * mat3::Identity();
-    const mat3 cross = hat<double>(0.5 * v);
-    const mat3 back = inverse.rotation_matrix();
-    by_b.topLeftCorner<3, 3>() = d.rotation_matrix();
-    by_b.topRightCorner<3, 3>().setZero();
-    by_b.bottomLeftCorner<3, 3>().setZero();
-    by_b.bottomRightCorner<3, 3>() = real + cross;
-    by_a.topLeftCorner<3, 3>() = -back;
-    by_a.topRightCorner<3, 3>() = back * hat<double>(between.translation());
-    by_a.bottomLeftCorner<3, 3>().setZero();
-    by_a.bottomRightCorner<3, 3>() = (cross - real) * back;
     vec6 r;
-    r << d.translation(), v;
+    r[0] = t.x(), r[1] = t.y(), r[2] = t.z();
+    r[3] = sign * q.x(), r[4] = sign * q.y(), r[5] = sign * q.z();
     return r;
   }
 };

@@ -83,21 +83,39 @@ struct unit_sphere {
     const double a = -1.0 / (sign + p.z());
     const double b = p.x() * p.y() * a;
     matrix<3, 2> columns;
-    columns << 1.0 + sign * p.x() * p.x() * a, b, sign * b, sign + p.y() * p.y() * a, -sign * p.x(), -p.y();
+    columns(0, 0) = 1.0 + sign * p.x() * p.x() * a;
+    columns(1, 0) = sign * b;
+    columns(2, 0) = -sign * p.x();
+    columns(0, 1) = b;
+    columns(1, 1) = sign + p.y() * p.y() * a;
+    columns(2, 1) = -p.y();
     return columns;
   }
   [[nodiscard]] static point retract(const point& p, const tangent& d) {
-    const double angle = d.norm();
-    const double factor = angle < 1e-8 ? 1.0 : std::sin(angle) / angle;
-    return (std::cos(angle) * p + factor * (basis(p) * d)).normalized();
+    const double angle = std::sqrt(d.x() * d.x() + d.y() * d.y());
+    const double factor = angle < 1e-8 ? 1.0 : std::sin(angle) / angle, along = std::cos(angle);
+    const matrix<3, 2> b = basis(p);
+    double q[3], square = 0.0;
+    for (int i = 0; i != 3; ++i) {
+      q[i] = along * p[i] + factor * (b(i, 0) * d[0] + b(i, 1) * d[1]);
+      square += q[i] * q[i];
+    }
+    const double length = std::sqrt(square);
+    return {q[0] / length, q[1] / length, q[2] / length};
   }
   /// Of length at most pi; one of many for the opposite direction.
   [[nodiscard]] static tangent local(const point& p, const point& q) {
-    const tangent across = basis(p).transpose() * q;
-    const double sine = across.norm();
-    const double angle = std::atan2(sine, p.dot(q));
-    if (sine < 1e-12) return angle < 1.0 ? across : tangent(angle, 0.0);
-    return (angle / sine) * across;
+    const matrix<3, 2> b = basis(p);
+    double x = 0.0, y = 0.0, cosine = 0.0;
+    for (int i = 0; i != 3; ++i) {
+      x += b(i, 0) * q[i];
+      y += b(i, 1) * q[i];
+      cosine += p[i] * q[i];
+    }
+    const double sine = std::sqrt(x * x + y * y);
+    const double angle = std::atan2(sine, cosine);
+    if (sine < 1e-12) return angle < 1.0 ? tangent(x, y) : tangent(angle, 0.0);
+    return {angle / sine * x, angle / sine * y};
   }
   template <int R>
   [[nodiscard]] static const matrix<R, 2>& reduce(const matrix<R, 2>& j) {

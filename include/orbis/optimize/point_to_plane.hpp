@@ -34,7 +34,8 @@ struct point_to_plane {
   }
   /// Empty where it is not finite.
   [[nodiscard]] std::optional<matrix<1>> residual(const se3& T_world_camera) const {
-    const matrix<1> r(std::sqrt(information) * normal.dot(T_world_camera * measured - on_plane));
+    const vec3 off = T_world_camera * measured - on_plane;
+    const matrix<1> r(std::sqrt(information) * normal.dot(off));
     if (!std::isfinite(r[0])) return std::nullopt;
     return r;
   }
@@ -42,8 +43,13 @@ struct point_to_plane {
   [[nodiscard]] std::optional<matrix<1>> linearize(const se3& T_world_camera, matrix<1, 6>& jacobian) const {
     const auto r = residual(T_world_camera);
     if (!r) return r;
-    const vec3 turned = std::sqrt(information) * (T_world_camera.rotation().inverse() * normal);
-    jacobian << turned.transpose(), measured.cross(turned).transpose();
+    vec3 turned = T_world_camera.rotation().inverse() * normal;
+    turned *= std::sqrt(information);
+    const vec3 lever = measured.cross(turned);
+    for (int k = 0; k != 3; ++k) {
+      jacobian[k] = turned[k];
+      jacobian[3 + k] = lever[k];
+    }
     return r;
   }
 };
@@ -77,7 +83,10 @@ struct point_to_plane_adjustment {
            std::abs(o.normal.squaredNorm() - 1.0) < 1e-6;
   }
   [[nodiscard]] static std::optional<matrix<1>> residual(const view& v, const vec3& point, const observation& o) {
-    const matrix<1> r(o.normal.dot(v.rotation * o.measured + v.translation - point));
+    vec3 off = v.rotation * o.measured;
+    off += v.translation;
+    off -= point;
+    const matrix<1> r(o.normal.dot(off));
     if (!std::isfinite(r[0])) return std::nullopt;
     return r;
   }
@@ -86,8 +95,12 @@ struct point_to_plane_adjustment {
     const auto r = residual(v, point, o);
     if (!r) return r;
     const vec3 turned = v.rotation.transpose() * o.normal;
-    by_camera << turned.transpose(), o.measured.cross(turned).transpose();
-    by_point = -o.normal.transpose();
+    const vec3 lever = o.measured.cross(turned);
+    for (int k = 0; k != 3; ++k) {
+      by_camera[k] = turned[k];
+      by_camera[3 + k] = lever[k];
+      by_point[k] = -o.normal[k];
+    }
     return r;
   }
 };

@@ -60,7 +60,7 @@ namespace detail {
 
 [[nodiscard]] inline double angle_between_directions(const vec3& a, const vec3& b) {
   const double x = a.y() * b.z() - a.z() * b.y(), y = a.z() * b.x() - a.x() * b.z(), z = a.x() * b.y() - a.y() * b.x();
-  return std::atan2(std::sqrt(x * x + (y * y + z * z)), a.x() * b.x() + (a.y() * b.y() + a.z() * b.z()));
+  return std::atan2(std::sqrt(x * x + y * y + z * z), a.x() * b.x() + a.y() * b.y() + a.z() * b.z());
 }
 
 /// The matrix E with `second^T E first = 0` for rays of one point: translation x rotation of `T_second_first`.
