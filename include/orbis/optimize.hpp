@@ -24,6 +24,7 @@
 #include <orbis/optimize/conjugate_gradients.hpp>
 #include <orbis/optimize/damping.hpp>
 #include <orbis/optimize/dense_cholesky.hpp>
+#include <orbis/optimize/descent.hpp>
 #include <orbis/optimize/dual.hpp>
 #include <orbis/optimize/essential.hpp>
 #include <orbis/optimize/five_point.hpp>

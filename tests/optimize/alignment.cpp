@@ -115,6 +115,14 @@ TEST_CASE("Alignment takes pairs without a deviation for outliers") {
   CHECK(found->inliers == expected);
 }
 
+TEST_CASE("Alignment has as many inliers as are asked for, or no answer") {
+  CHECK(test::keeps_to_min_inliers([](std::size_t asked, std::size_t seed) {
+    const pairs p = make_pairs(seed, se3(), 60, 0.3, 0.05);
+    return optimize::estimate_alignment(p.from, p.to,
+                                        {.threshold = 0.05, .max_iterations = 200, .min_inliers = asked, .seed = seed});
+  }));
+}
+
 TEST_CASE("Alignment says why it has no answer") {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const auto why = [](const auto& from, const auto& to) {
@@ -128,6 +136,8 @@ TEST_CASE("Alignment says why it has no answer") {
   CHECK(why(nans, line).message == "of 20 pairs 0 are finite, three are needed");
   CHECK(why(std::vector<vec3>(2, vec3::Zero()), std::vector<vec3>(2, vec3::Zero())).code == errc::no_data);
   CHECK(why(std::vector<vec3>(3, vec3::Zero()), line).code == errc::invalid_argument);
+  for (const double bad : test::bad_thresholds)
+    CHECK(optimize::estimate_alignment(line, line, {.threshold = bad}).error().code == errc::invalid_argument);
   random_bits random(1);
   std::vector<vec3> a, b;
   for (int i = 0; i != 50; ++i) {

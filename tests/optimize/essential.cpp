@@ -109,6 +109,14 @@ TEST_CASE("The relative pose is found through a distorting camera and is the sam
   CHECK(a->inliers == b->inliers);
 }
 
+TEST_CASE("The relative pose has as many inliers as are asked for, or there is none") {
+  CHECK(test::keeps_to_min_inliers([](std::size_t asked, std::size_t seed) {
+    const two_images s = make_images(pinhole_camera, seed, 60, 0.3, 1.5);
+    return optimize::estimate_essential(s.first, s.second, pinhole_camera,
+                                        {.threshold = 1.5, .max_iterations = 100, .min_inliers = asked, .seed = seed});
+  }));
+}
+
 TEST_CASE("The relative pose says why there is none") {
   const auto why = [](const two_images& s, const optimize::essential_options& options = {}) {
     const auto found = optimize::estimate_essential(s.first, s.second, pinhole_camera, options);
@@ -117,6 +125,7 @@ TEST_CASE("The relative pose says why there is none") {
   two_images turned = make_images(pinhole_camera, 4, 200, 0.2, 0.3, 0.0);
   CHECK(why(turned).code == errc::degenerate);
   CHECK(why(turned).message.find("no parallax") == 0);
+  for (const double bad : test::bad_thresholds) CHECK(why(turned, {.threshold = bad}).code == errc::invalid_argument);
   two_images same = turned;
   same.second = same.first;
   CHECK(why(same).message.find("no parallax") == 0);

@@ -163,6 +163,14 @@ TEST_CASE("A homography decomposes into the motion it was made of and another on
   CHECK_FALSE(optimize::decompose_homography(mat3::Constant(std::numeric_limits<double>::quiet_NaN())).has_value());
 }
 
+TEST_CASE("The homography has as many inliers as are asked for, or there is none") {
+  CHECK(test::keeps_to_min_inliers([](std::size_t asked, std::size_t seed) {
+    const matches m = make_matches(seed, 60, 0.3, 2.0);
+    return optimize::estimate_homography(m.first, m.second,
+                                         {.threshold = 2.0, .max_iterations = 200, .min_inliers = asked, .seed = seed});
+  }));
+}
+
 TEST_CASE("The homography says why there is none") {
   const auto why = [](const std::vector<vec2>& first, const std::vector<vec2>& second) {
     const auto found = optimize::estimate_homography(first, second, {.max_iterations = 200, .min_inliers = 40});
@@ -171,6 +179,8 @@ TEST_CASE("The homography says why there is none") {
   const matches m = make_matches(3, 50, 1.0, 0.0);
   CHECK(why(m.first, m.second).code == errc::degenerate);
   CHECK(why(m.first, m.second).message.find("no model has enough inliers") == 0);
+  for (const double bad : test::bad_thresholds)
+    CHECK(optimize::estimate_homography(m.first, m.second, {.threshold = bad}).error().code == errc::invalid_argument);
   std::vector<vec2> line, nans(50, vec2::Constant(std::numeric_limits<double>::quiet_NaN()));
   for (int i = 0; i != 50; ++i) line.emplace_back(10.0 + i, 20.0 - 2.0 * i);
   CHECK(why(line, m.second).message == "the points all lie on one line or in one place");

@@ -195,6 +195,9 @@ TEST_CASE("PnP says why it has no pose") {
             .code == errc::no_data);
   CHECK(optimize::estimate_pose(std::span<const vec3>(s.points).first(5), s.pixels, pinhole_camera).error().code ==
         errc::invalid_argument);
+  for (const double bad : test::bad_thresholds)
+    CHECK(optimize::estimate_pose(s.points, s.pixels, pinhole_camera, {.threshold = bad}).error().code ==
+          errc::invalid_argument);
   for (std::size_t i = 0; i < s.points.size(); ++i) s.points[i] = vec3(0.1 * static_cast<double>(i), 0, 3);
   CHECK(optimize::estimate_pose(s.points, s.pixels, pinhole_camera, {.max_iterations = 200}).error().code ==
         errc::degenerate);

@@ -88,7 +88,8 @@ TEST_CASE("RANSAC gives the same answer for the same seed and stops early on cle
 
 TEST_CASE("RANSAC says why it has no answer") {
   CHECK(optimize::ransac(noisy_line(1, 1, 0), {}).error().code == errc::no_data);
-  CHECK(optimize::ransac(noisy_line(1, 9, 0), {.threshold = 0.0}).error().code == errc::invalid_argument);
+  for (const double bad : test::bad_thresholds)
+    CHECK(optimize::ransac(noisy_line(1, 9, 0), {.threshold = bad}).error().code == errc::invalid_argument);
   CHECK(optimize::ransac(noisy_line(1, 9, 0), {.confidence = 1.0}).error().code == errc::invalid_argument);
   CHECK(optimize::ransac(noisy_line(1, 0, 60), {.threshold = 0.01, .max_iterations = 100, .min_inliers = 40})
             .error()

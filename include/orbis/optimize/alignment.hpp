@@ -174,6 +174,8 @@ requires(std::same_as<Transform, se3> || std::same_as<Transform, sim3>)
     return fail(errc::invalid_argument, where, "the two lists of points differ in length");
   if (!options.deviations.empty() && options.deviations.size() != n)
     return fail(errc::invalid_argument, where, "there are not as many deviations as pairs");
+  const ransac_options asked = detail::ransac_part(options);
+  if (const char* const fault = detail::fault_of(asked)) return fail(errc::invalid_argument, where, fault);
   if (n < 3) return fail(errc::no_data, where, "fewer than three pairs of points");
   const auto read = [](const auto& points, std::size_t i) {
     using range = std::remove_cvref_t<decltype(points)>;
@@ -210,14 +212,7 @@ requires(std::same_as<Transform, se3> || std::same_as<Transform, sim3>)
   shuffle(pairs, random);
 
   const estimator_type estimator(std::move(pairs));
-  auto found = ransac(estimator,
-                      {.threshold = options.threshold,
-                       .confidence = options.confidence,
-                       .min_iterations = options.min_iterations,
-                       .max_iterations = options.max_iterations,
-                       .min_inliers = options.min_inliers,
-                       .seed = options.seed},
-                      ransac_policies{msac{}, uniform_sampling{}, sprt{}, iterated_refinement{}});
+  auto found = ransac(estimator, asked, ransac_policies{msac{}, uniform_sampling{}, sprt{}, iterated_refinement{}});
   if (!found) {
     if (found.error().code == errc::degenerate)
       for (const mat3& s : {spread, spread_to}) {
@@ -245,7 +240,9 @@ requires(std::same_as<Transform, se3> || std::same_as<Transform, sim3>)
     out.inliers.push_back(static_cast<std::uint32_t>(i));
     sum += e;
   }
-  if (!out.inliers.empty()) out.rmse = std::sqrt(sum / static_cast<double>(out.inliers.size()));
+  if (auto enough = detail::enough_inliers(where, out.inliers.size(), n, options.min_inliers, 3); !enough)
+    return fail(std::move(enough.error()));
+  out.rmse = std::sqrt(sum / static_cast<double>(out.inliers.size()));
   return out;
 }
 

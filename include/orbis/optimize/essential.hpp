@@ -29,6 +29,7 @@
 #include <orbis/core/result.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/optimize/absolute_orientation.hpp>
+#include <orbis/optimize/descent.hpp>
 #include <orbis/optimize/five_point.hpp>
 #include <orbis/optimize/image_matches.hpp>
 #include <orbis/optimize/manifold.hpp>
@@ -168,57 +169,51 @@ class essential_estimator {
   [[nodiscard]] std::optional<mat3> refine(const mat3& start, std::span<const std::uint32_t> inliers, int steps) const {
     if (inliers.size() < 6) return std::nullopt;
     const se3 pose = decompose_essential(start)[0];
-    so3 rotation = pose.rotation();
-    vec3 direction = pose.translation();
-    mat3 e = hat<double>(direction) * rotation.rotation_matrix();
-    matrix<9, 9, S> h;
-    matrix<9, 1, S> g;
-    double cost = equations(e, inliers, h, g);
-    for (int k = 0; k != steps; ++k) {
-      if (!std::isfinite(cost)) return std::nullopt;
+    const auto step = [](const motion& m, const equations& at) -> std::optional<motion> {
       // How the entries of E = [t]x R (row by row) move with exp(phi) R and with t on the sphere.
       matrix<9, 5, S> by_step;
-      const matrix<3, 2, S> basis = unit_sphere::basis(direction);
+      const matrix<3, 2, S> basis = unit_sphere::basis(m.direction);
       for (int j = 0; j != 5; ++j) {
         const mat3 d =
-            j < 3 ? mat3(hat<double>(direction) * hat<double>(vec3(vec3::Unit(j))) * rotation.rotation_matrix())
-                  : mat3(hat<double>(vec3(basis.col(j - 3))) * rotation.rotation_matrix());
+            j < 3 ? mat3(hat<double>(m.direction) * hat<double>(vec3(vec3::Unit(j))) * m.rotation.rotation_matrix())
+                  : mat3(hat<double>(vec3(basis.col(j - 3))) * m.rotation.rotation_matrix());
         for (int entry = 0; entry != 9; ++entry) by_step(entry, j) = d(entry / 3, entry % 3);
       }
-      const matrix<9, 5, S> h_by_step = h.lazyProduct(by_step);
+      const matrix<9, 5, S> h_by_step = at.h.lazyProduct(by_step);
       matrix<5, 5, S> a = by_step.transpose().lazyProduct(h_by_step);
       a.diagonal() *= 1.0 + 1e-9;
       a.diagonal().array() += 1e-12 * a.diagonal().maxCoeff();
       small_cholesky<5> factors;
-      if (!factors.set(a) || !(factors.factor(0.0) > 0.0)) break;
-      const matrix<5, 1, S> step = -factors.solve(matrix<5, 1, S>(by_step.transpose().lazyProduct(g)));
-      if (!(step.norm() < 1.0)) break;
-      const so3 next_rotation = so3::exp(vec3(step.template head<3>())) * rotation;
-      const vec3 next_direction = unit_sphere::retract(direction, step.template tail<2>());
-      const mat3 next = hat<double>(next_direction) * next_rotation.rotation_matrix();
-      matrix<9, 9, S> next_h;
-      matrix<9, 1, S> next_g;
-      const double next_cost = equations(next, inliers, next_h, next_g);
-      if (!(next_cost < cost)) break;
-      const bool small = cost - next_cost <= 1e-12 * cost;
-      rotation = next_rotation;
-      direction = next_direction;
-      e = next;
-      h = next_h;
-      g = next_g;
-      cost = next_cost;
-      if (small) break;
-    }
-    return e;
+      if (!factors.set(a) || !(factors.factor(0.0) > 0.0)) return std::nullopt;
+      const matrix<5, 1, S> d = -factors.solve(matrix<5, 1, S>(by_step.transpose().lazyProduct(at.g)));
+      if (!(d.norm() < 1.0)) return std::nullopt;
+      return motion(so3::exp(vec3(d.template head<3>())) * m.rotation,
+                    unit_sphere::retract(m.direction, d.template tail<2>()));
+    };
+    const auto found = descend(
+        motion(pose.rotation(), pose.translation()), steps, [&](const motion& m) { return sum_up(m.e, inliers); },
+        step);
+    if (!found) return std::nullopt;
+    return found->e;
   }
 
  private:
-  /// For the nine entries of E, row by row; returns the sum of squares.
-  double equations(const mat3& e, std::span<const std::uint32_t> inliers, matrix<9, 9, S>& h,
-                   matrix<9, 1, S>& g) const {
-    h.setZero();
-    g.setZero();
+  /// An essential matrix by what it is made of.
+  struct motion {
+    so3 rotation;
+    vec3 direction;
+    mat3 e;
+    motion(const so3& r, const vec3& t) : rotation{r}, direction{t}, e{hat<double>(t) * r.rotation_matrix()} {}
+  };
+
+  /// For the nine entries of E, row by row; `cost` is the sum of squares.
+  struct equations {
+    matrix<9, 9, S> h = matrix<9, 9, S>::Zero();
+    matrix<9, 1, S> g = matrix<9, 1, S>::Zero();
     double cost = 0.0;
+  };
+  [[nodiscard]] equations sum_up(const mat3& e, std::span<const std::uint32_t> inliers) const {
+    equations sum;
     for (const std::uint32_t i : inliers) {
       const image_match& m = matches_[i];
       const pixel_gradient by_first(m.first), by_second(m.second);
@@ -238,14 +233,14 @@ class essential_estimator {
           d[3 * row + column] =
               inverse * (second[row] * first[column] - dp[row] * first[column] - second[row] * dq[column]);
       for (int a = 0; a != 9; ++a) {
-        for (int b = 0; b <= a; ++b) h(a, b) += d[a] * d[b];
-        g[a] += r * d[a];
+        for (int b = 0; b <= a; ++b) sum.h(a, b) += d[a] * d[b];
+        sum.g[a] += r * d[a];
       }
-      cost += r * r;
+      sum.cost += r * r;
     }
     for (int a = 0; a != 9; ++a)
-      for (int b = a + 1; b != 9; ++b) h(a, b) = h(b, a);
-    return cost;
+      for (int b = a + 1; b != 9; ++b) sum.h(a, b) = sum.h(b, a);
+    return sum;
   }
 
   const std::vector<image_match>& matches_;
@@ -297,6 +292,8 @@ template <camera::camera_model First, camera::camera_model Second>
   constexpr const char* where = "essential matrix";
   const std::size_t n = first_pixels.size();
   if (n != second_pixels.size()) return fail(errc::invalid_argument, where, "the lists of pixels differ in length");
+  const ransac_options asked = detail::ransac_part(options);
+  if (const char* const fault = detail::fault_of(asked)) return fail(errc::invalid_argument, where, fault);
   if (n < 5) return fail(errc::no_data, where, "fewer than five matches");
   const std::vector<detail::image_match> matches =
       detail::read_matches(first_pixels, second_pixels, first_camera, second_camera, options.seed);
@@ -305,14 +302,8 @@ template <camera::camera_model First, camera::camera_model Second>
                 "of " + std::to_string(n) + " matches " + std::to_string(matches.size()) +
                     " are finite and in the cameras' views, five are needed");
   const detail::essential_estimator<> estimator(matches);
-  auto found = ransac(estimator,
-                      {.threshold = options.threshold,
-                       .confidence = options.confidence,
-                       .min_iterations = options.min_iterations,
-                       .max_iterations = options.max_iterations,
-                       .min_inliers = options.min_inliers,
-                       .seed = options.seed},
-                      ransac_policies{msac{}, uniform_sampling{}, sprt(2000.0), iterated_refinement{}});
+  auto found =
+      ransac(estimator, asked, ransac_policies{msac{}, uniform_sampling{}, sprt(2000.0), iterated_refinement{}});
   if (!found) return fail(found.error().code, where, found.error().message);
   const double squared_threshold = options.threshold * options.threshold;
   const std::size_t by_rotation = detail::explained_by_rotation(matches, found->inliers, squared_threshold);
@@ -321,7 +312,7 @@ template <camera::camera_model First, camera::camera_model Second>
                 "no parallax: a rotation alone explains " + std::to_string(by_rotation) + " of " +
                     std::to_string(found->inliers.size()) + " inliers");
 
-  mat3 essential = detail::polished(estimator, *found, squared_threshold);
+  mat3 essential = detail::polished(estimator, *found, squared_threshold, options.min_inliers);
   essential *= std::sqrt(2.0) / essential.norm();
   relative_pose_estimate out;
   out.essential = essential;
@@ -336,7 +327,9 @@ template <camera::camera_model First, camera::camera_model Second>
     out.inliers.push_back(matches[i].original);
   }
   std::sort(out.inliers.begin(), out.inliers.end());
-  if (!inside.empty()) out.rmse = std::sqrt(sum / static_cast<double>(inside.size()));
+  if (auto enough = detail::enough_inliers(where, inside.size(), n, options.min_inliers, 5); !enough)
+    return fail(std::move(enough.error()));
+  out.rmse = std::sqrt(sum / static_cast<double>(inside.size()));
   // Of the four poses, the one from which the most points are in front of both cameras.
   std::vector<double> angles;
   for (const se3& T_second_first : decompose_essential(essential)) {

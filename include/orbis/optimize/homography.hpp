@@ -29,6 +29,7 @@
 #include <orbis/core/result.hpp>
 #include <orbis/core/so3.hpp>
 #include <orbis/core/types.hpp>
+#include <orbis/optimize/descent.hpp>
 #include <orbis/optimize/ransac.hpp>
 #include <orbis/optimize/small_cholesky.hpp>
 
@@ -135,7 +136,8 @@ class homography_estimator {
   [[nodiscard]] double squared_error(const model& m, std::size_t i) const {
     const match& x = matches_[i];
     const vec3 p = m.forward * x.first.homogeneous(), q = m.backward * x.second.homogeneous();
-    return 0.5 * ((p.template head<2>() / p.z() - x.second).squaredNorm() + (q.template head<2>() / q.z() - x.first).squaredNorm());
+    return 0.5 * ((p.template head<2>() / p.z() - x.second).squaredNorm() +
+                  (q.template head<2>() / q.z() - x.first).squaredNorm());
   }
 
   void squared_errors(const model& m, std::size_t first, std::span<float, consensus_block> out) const {
@@ -166,31 +168,17 @@ class homography_estimator {
   }
   [[nodiscard]] std::optional<model> refine(const model& start, std::span<const std::uint32_t> inliers,
                                             int steps) const {
-    model m = start;
-    matrix<8, 8, S> h;
-    matrix<8, 1, S> g;
-    double cost = equations(m, inliers, h, g);
-    for (int k = 0; k != steps; ++k) {
-      if (!std::isfinite(cost)) return std::nullopt;
+    const auto step = [](const model& m, const equations& e) -> std::optional<model> {
       small_cholesky<8> factors;
-      if (!factors.set(h) || !(factors.factor(1e-9) > 0.0)) break;
-      const matrix<8, 1, S> step = -factors.solve(g);
-      if (!step.allFinite()) break;
+      if (!factors.set(e.h) || !(factors.factor(1e-9) > 0.0)) return std::nullopt;
+      const matrix<8, 1, S> entries = -factors.solve(e.g);
+      if (!entries.allFinite()) return std::nullopt;
       mat3 d = mat3::Identity();
-      for (int j = 0; j != 8; ++j) d(j / 3, j % 3) += step[j];
-      const model next = made_of(d * m.forward);
-      matrix<8, 8, S> next_h;
-      matrix<8, 1, S> next_g;
-      const double next_cost = equations(next, inliers, next_h, next_g);
-      if (!(next_cost < cost)) break;
-      const bool small = cost - next_cost <= 1e-12 * cost;
-      m = next;
-      h = next_h;
-      g = next_g;
-      cost = next_cost;
-      if (small) break;
-    }
-    return m;
+      for (int j = 0; j != 8; ++j) d(j / 3, j % 3) += entries[j];
+      return made_of(d * m.forward);
+    };
+    return descend(
+        start, steps, [&](const model& m) { return sum_up(m, inliers); }, step);
   }
 
  private:
@@ -200,12 +188,14 @@ class homography_estimator {
     return m;
   }
 
-  /// For D in (I + D) H, its last entry held, the lower triangle of `h`; returns the sum of squares of all transfers.
-  double equations(const model& m, std::span<const std::uint32_t> inliers, matrix<8, 8, S>& h,
-                   matrix<8, 1, S>& g) const {
-    h.setZero();
-    g.setZero();
+  /// For D in (I + D) H, its last entry held; of `h` the lower triangle. `cost`: the sum of squares of all transfers.
+  struct equations {
+    matrix<8, 8, S> h = matrix<8, 8, S>::Zero();
+    matrix<8, 1, S> g = matrix<8, 1, S>::Zero();
     double cost = 0.0;
+  };
+  [[nodiscard]] equations sum_up(const model& m, std::span<const std::uint32_t> inliers) const {
+    equations e;
     for (const std::uint32_t i : inliers) {
       const match& x = matches_[i];
       const auto add = [&](const vec3& p, const vec2& seen, const mat3& by_d, const vec3& moved) {
@@ -219,16 +209,16 @@ class homography_estimator {
         for (int k = 0; k != 8; ++k) j.col(k) = a.col(k / 3) * moved[k % 3];
         const vec2 r = xy - seen;
         for (int k = 0; k != 8; ++k) {
-          for (int l = k; l != 8; ++l) h(l, k) += j(0, l) * j(0, k) + j(1, l) * j(1, k);
-          g[k] += j(0, k) * r[0] + j(1, k) * r[1];
+          for (int l = k; l != 8; ++l) e.h(l, k) += j(0, l) * j(0, k) + j(1, l) * j(1, k);
+          e.g[k] += j(0, k) * r[0] + j(1, k) * r[1];
         }
-        cost += r.squaredNorm();
+        e.cost += r.squaredNorm();
       };
       const vec3 p = m.forward * x.first.homogeneous();
       add(p, x.second, mat3::Identity(), p);
       add(m.backward * x.second.homogeneous(), x.first, -m.backward, x.second.homogeneous());
     }
-    return cost;
+    return e;
   }
 
   const std::vector<match>& matches_;
@@ -264,6 +254,8 @@ template <std::same_as<double> S = double>
   using estimator_type = detail::homography_estimator<S>;
   const std::size_t n = first.size();
   if (n != second.size()) return fail(errc::invalid_argument, where, "the lists of pixels differ in length");
+  ransac_options asked = detail::ransac_part(options);
+  if (const char* const fault = detail::fault_of(asked)) return fail(errc::invalid_argument, where, fault);
   if (n < 4) return fail(errc::no_data, where, "fewer than four matches");
   std::vector<typename estimator_type::match> matches;
   matches.reserve(n);
@@ -291,7 +283,9 @@ template <std::same_as<double> S = double>
     second_spread += m.second * m.second.transpose();
   }
   size = std::sqrt((first_spread.trace() + second_spread.trace()) / static_cast<double>(2 * matches.size()));
-  if (!(size > 0.0)) return fail(errc::degenerate, where, "the points all lie on one line or in one place");
+  const double threshold = options.threshold / size;
+  if (!(size > 0.0) || !std::isfinite(threshold))
+    return fail(errc::degenerate, where, "the points all lie on one line or in one place");
   for (auto& m : matches) {
     m.first /= size;
     m.second /= size;
@@ -300,15 +294,8 @@ template <std::same_as<double> S = double>
   shuffle(matches, random);
 
   const estimator_type estimator(matches);
-  const double threshold = options.threshold / size;
-  auto found = ransac(estimator,
-                      {.threshold = threshold,
-                       .confidence = options.confidence,
-                       .min_iterations = options.min_iterations,
-                       .max_iterations = options.max_iterations,
-                       .min_inliers = options.min_inliers,
-                       .seed = options.seed},
-                      ransac_policies{msac{}, uniform_sampling{}, sprt{}, iterated_refinement{}});
+  asked.threshold = threshold;
+  auto found = ransac(estimator, asked, ransac_policies{msac{}, uniform_sampling{}, sprt{}, iterated_refinement{}});
   if (!found) {
     const auto is_line = [](const mat2& spread) {
       return !(spread.determinant() > 1e-12 * spread.trace() * spread.trace());
@@ -317,7 +304,8 @@ template <std::same_as<double> S = double>
       return fail(errc::degenerate, where, "the points all lie on one line or in one place");
     return fail(found.error().code, where, found.error().message);
   }
-  const typename estimator_type::model model = detail::polished(estimator, *found, threshold * threshold);
+  const typename estimator_type::model model =
+      detail::polished(estimator, *found, threshold * threshold, options.min_inliers);
   homography_estimate out;
   out.iterations = found->iterations;
   double sum = 0.0;
@@ -328,7 +316,9 @@ template <std::same_as<double> S = double>
     out.inliers.push_back(matches[i].original);
   }
   std::sort(out.inliers.begin(), out.inliers.end());
-  if (!out.inliers.empty()) out.rmse = size * std::sqrt(sum / static_cast<double>(out.inliers.size()));
+  if (auto enough = detail::enough_inliers(where, out.inliers.size(), n, options.min_inliers, 4); !enough)
+    return fail(std::move(enough.error()));
+  out.rmse = size * std::sqrt(sum / static_cast<double>(out.inliers.size()));
   // Back from the centres.
   mat3 to_centre = mat3::Identity(), from_centre = mat3::Identity();
   for (int i = 0; i != 2; ++i) {

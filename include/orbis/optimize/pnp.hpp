@@ -26,6 +26,7 @@
 #include <orbis/core/result.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/core/simd.hpp>
+#include <orbis/optimize/descent.hpp>
 #include <orbis/optimize/p3p.hpp>
 #include <orbis/optimize/pnp_matches.hpp>
 #include <orbis/optimize/ransac.hpp>
@@ -69,36 +70,35 @@ struct pose_equations {
   double cost;
 };
 
-/// Gauss-Newton from `start`, as long as the cost falls; empty where it is not finite. `sum_up(pose, equations)`.
+/// As `descend` in general, by motions of the camera; `sum_up(pose, equations)`.
 template <class SumUp>
-[[nodiscard]] std::optional<centred_pose> descend(const centred_pose& start, int steps, SumUp&& sum_up) {
-  so3 rotation(start.rotation);  // samples give rotations up to rounding and a little more
-  centred_pose pose{rotation.rotation_matrix(), start.translation};
-  pose_equations e;
-  sum_up(pose, e);
-  for (int k = 0; k != steps; ++k) {
-    if (!std::isfinite(e.cost)) return std::nullopt;
+[[nodiscard]] std::optional<centred_pose> descend_pose(const centred_pose& start, int steps, const SumUp& sum_up) {
+  struct state {
+    so3 rotation;
+    centred_pose pose;
+  };
+  const so3 rotation(start.rotation);  // samples give rotations up to rounding and a little more
+  const auto equations = [&](const state& s) {
+    pose_equations e;
+    sum_up(s.pose, e);
+    return e;
+  };
+  const auto step = [](const state& s, const pose_equations& e) -> std::optional<state> {
     // The slightest damping: enough to leave alone what the matches do not determine.
     mat6 damped = e.h;
     damped.diagonal() *= 1.0 + 1e-9;
     damped.diagonal().array() += 1e-12 * e.h.diagonal().maxCoeff();
     small_cholesky<6> factors;
-    if (!factors.set(damped) || !(factors.factor(0.0) > 0.0)) break;
-    const vec6 step = -factors.solve(e.g);
-    if (!(step.tail<3>().norm() < 1.0)) break;  // also where it is not a number
-    const se3 motion = se3::exp(step);
-    const so3 next_rotation = motion.rotation() * rotation;
-    const centred_pose next{next_rotation.rotation_matrix(), motion * pose.translation};
-    pose_equations at_next;
-    sum_up(next, at_next);
-    if (!(at_next.cost < e.cost)) break;
-    const bool small = e.cost - at_next.cost <= 1e-12 * e.cost;
-    rotation = next_rotation;
-    pose = next;
-    e = at_next;
-    if (small) break;
-  }
-  return pose;
+    if (!factors.set(damped) || !(factors.factor(0.0) > 0.0)) return std::nullopt;
+    const vec6 d = -factors.solve(e.g);
+    if (!(d.tail<3>().norm() < 1.0)) return std::nullopt;  // also where it is not a number
+    const se3 motion = se3::exp(d);
+    const so3 turned = motion.rotation() * s.rotation;
+    return state{turned, {turned.rotation_matrix(), motion * s.pose.translation}};
+  };
+  const auto found = descend(state{rotation, {rotation.rotation_matrix(), start.translation}}, steps, equations, step);
+  if (!found) return std::nullopt;
+  return found->pose;
 }
 
 /// P3P with reprojection errors in pixels, as `ransac` wants it.
@@ -158,7 +158,7 @@ class pnp_estimator {
                                             int steps) const {
     const std::size_t groups = gather(inliers);
     const auto pose =
-        descend(start.pose, steps, [&](const centred_pose& at, pose_equations& e) { sum_up(groups, at, e); });
+        descend_pose(start.pose, steps, [&](const centred_pose& at, pose_equations& e) { sum_up(groups, at, e); });
     if (!pose) return std::nullopt;
     return made_of(*pose);
   }
@@ -243,6 +243,9 @@ template <camera::camera_model Camera>
   if (n != pixels.size()) return fail(errc::invalid_argument, where, "the lists of points and pixels differ in length");
   if (!options.best_first.empty() && options.best_first.size() != n)
     return fail(errc::invalid_argument, where, "the order of the matches names not each of them once");
+  ransac_options asked = detail::ransac_part(options);
+  if (const char* const fault = detail::fault_of(asked)) return fail(errc::invalid_argument, where, fault);
+  asked.min_inliers = 0;  // they are counted at the end, with the camera as it is
   if (n < 3) return fail(errc::no_data, where, "fewer than three matches");
 
   detail::pnp_matches& matches = workspace.matches;
@@ -253,11 +256,6 @@ template <camera::camera_model Camera>
                     " are finite and in the camera's view, three are needed");
   using estimator_type = detail::pnp_estimator<>;
   const estimator_type estimator(matches, options.level);
-  const ransac_options asked{.threshold = options.threshold,
-                             .confidence = options.confidence,
-                             .min_iterations = options.min_iterations,
-                             .max_iterations = options.max_iterations,
-                             .seed = options.seed};
   const auto search = [&](const auto& sampling) {
     return ransac(estimator, asked, ransac_policies{msac{}, sampling, sprt{}, iterated_refinement{}}, workspace.ransac);
   };
@@ -332,7 +330,7 @@ template <camera::camera_model Camera>
           e.cost += r.squaredNorm();
         }
       };
-      const auto refined = detail::descend(model.pose, 10, sum_up);
+      const auto refined = detail::descend_pose(model.pose, 10, sum_up);
       if (!refined) break;
       const double next = judge(in_world(*refined));
       if (!(next < score)) break;
@@ -342,11 +340,8 @@ template <camera::camera_model Camera>
     }
   }
   if (const double again = judge(pose); !(again <= score)) score = again;
-  const std::size_t needed = std::max<std::size_t>(3, options.min_inliers);
-  if (inliers.size() < needed)
-    return fail(errc::degenerate, where,
-                "no pose has enough inliers: " + std::to_string(inliers.size()) + " of " + std::to_string(n) +
-                    " matches, " + std::to_string(needed) + " are wanted");
+  if (auto enough = detail::enough_inliers(where, inliers.size(), n, options.min_inliers, 3); !enough)
+    return fail(std::move(enough.error()));
   const double rmse = std::sqrt(sum / static_cast<double>(inliers.size()));
   return pose_estimate{pose, std::move(inliers), rmse, found->iterations};
 }

@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <concepts>
 #include <cstddef>
 #include <cstdint>
@@ -58,7 +59,7 @@ concept block_estimator = model_estimator<E> && requires(const E& estimator, con
 };
 
 struct ransac_options {
-  double threshold = 1.0;  ///< largest error of an inlier, in the estimator's units (not squared)
+  double threshold = 1.0;  ///< largest error of an inlier, in the estimator's units (not squared); positive, finite
   double confidence = 0.9999;
   std::size_t min_iterations = 10;
   std::size_t max_iterations = 10000;
@@ -234,16 +235,50 @@ class ransac_run {
   double best_score_ = std::numeric_limits<double>::infinity();
 };
 
-/// The model of `found`, or what ten steps down from it on its inliers lead to where that is better by its score.
+/// Those of an estimator's options that are RANSAC's, which all estimators name alike.
+template <class Options>
+[[nodiscard]] ransac_options ransac_part(const Options& options) {
+  return {.threshold = options.threshold,
+          .confidence = options.confidence,
+          .min_iterations = options.min_iterations,
+          .max_iterations = options.max_iterations,
+          .min_inliers = options.min_inliers,
+          .seed = options.seed};
+}
+
+/// What is wrong with the options; null where nothing is.
+[[nodiscard]] inline const char* fault_of(const ransac_options& options) noexcept {
+  if (!(options.threshold > 0.0) || !std::isfinite(options.threshold))
+    return "the threshold must be positive and finite";
+  if (!(options.confidence > 0.0 && options.confidence < 1.0)) return "the confidence must lie between 0 and 1";
+  return nullptr;
+}
+
+/// Whether `have` inliers of `n` data are as many as were asked for, and no fewer than a sample; else why not.
+[[nodiscard]] inline result<void> enough_inliers(const char* where, std::size_t have, std::size_t n,
+                                                 std::size_t min_inliers, std::size_t sample_size) {
+  const std::size_t needed = std::max(min_inliers, sample_size);
+  if (have >= needed) return {};
+  return fail(errc::degenerate, where,
+              "no model has enough inliers: " + std::to_string(have) + " of " + std::to_string(n) + ", " +
+                  std::to_string(needed) + " are wanted");
+}
+
+/// The model of `found`, or what ten steps down from it on its inliers lead to where that is better by its score and
+/// still has `min_inliers`.
 template <class E>
 [[nodiscard]] typename E::model polished(const E& estimator, const ransac_estimate<typename E::model>& found,
-                                         double squared_threshold) {
+                                         double squared_threshold, std::size_t min_inliers) {
   const auto refined = estimator.refine(found.model, found.inliers, 10);
   if (!refined) return found.model;
   double score = 0.0;
-  for (std::size_t i = 0; i != estimator.size(); ++i)
-    score += msac::cost(estimator.squared_error(*refined, i), squared_threshold);
-  return score < found.score ? *refined : found.model;
+  std::size_t inside = 0;
+  for (std::size_t i = 0; i != estimator.size(); ++i) {
+    const double e = estimator.squared_error(*refined, i);
+    score += msac::cost(e, squared_threshold);
+    inside += e < squared_threshold ? 1U : 0U;
+  }
+  return score < found.score && inside >= min_inliers ? *refined : found.model;
 }
 
 }  // namespace detail
@@ -259,9 +294,7 @@ template <model_estimator E, consensus_score Score = msac, sampling_order Sampli
     const E& estimator, const ransac_options& options,
     const ransac_policies<Score, Sampling, Preemption, LocalOptimization>& policies, ransac_workspace& workspace) {
   constexpr const char* where = "ransac";
-  if (!(options.threshold > 0.0)) return fail(errc::invalid_argument, where, "the threshold must be positive");
-  if (!(options.confidence > 0.0 && options.confidence < 1.0))
-    return fail(errc::invalid_argument, where, "the confidence must lie between 0 and 1");
+  if (const char* const fault = detail::fault_of(options)) return fail(errc::invalid_argument, where, fault);
   const std::size_t n = estimator.size();
   if (n < E::sample_size) return fail(errc::no_data, where, "fewer data than one sample needs");
 
@@ -282,11 +315,9 @@ template <model_estimator E, consensus_score Score = msac, sampling_order Sampli
   }
 
   if (!run.best()) return fail(errc::degenerate, where, "no sample of the data gives a model");
-  const std::size_t needed = std::max(options.min_inliers, E::sample_size);
-  if (run.inliers().size() < needed)
-    return fail(errc::degenerate, where,
-                "no model has enough inliers: " + std::to_string(run.inliers().size()) + " of " + std::to_string(n) +
-                    ", " + std::to_string(needed) + " are wanted");
+  if (auto enough = detail::enough_inliers(where, run.inliers().size(), n, options.min_inliers, E::sample_size);
+      !enough)
+    return fail(std::move(enough.error()));
   return ransac_estimate<typename E::model>{
       *run.best(), {run.inliers().begin(), run.inliers().end()}, run.exact_score(), iteration};
 }
