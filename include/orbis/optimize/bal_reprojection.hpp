@@ -8,6 +8,7 @@
 
 #include <array>
 #include <cmath>
+#include <concepts>
 #include <optional>
 #include <span>
 
@@ -46,12 +47,15 @@ struct bal_manifold {
   static constexpr int dimension = 9;
 
   [[nodiscard]] static point retract(const point& p, const tangent& d) {
-    const vec6 back = -d.head<6>();
+    vec6 back;
+    for (int i = 0; i != 6; ++i) back[i] = -d[i];
     return {se3::exp(back) * p.T_camera_world, p.focal + d[6], p.k1 + d[7], p.k2 + d[8]};
   }
   [[nodiscard]] static tangent local(const point& p, const point& q) {
+    const vec6 back = (q.T_camera_world * p.T_camera_world.inverse()).log();
     tangent d;
-    d << -(q.T_camera_world * p.T_camera_world.inverse()).log(), q.focal - p.focal, q.k1 - p.k1, q.k2 - p.k2;
+    for (int i = 0; i != 6; ++i) d[i] = -back[i];
+    d[6] = q.focal - p.focal, d[7] = q.k1 - p.k1, d[8] = q.k2 - p.k2;
     return d;
   }
 };
@@ -74,33 +78,42 @@ struct bal_reprojection {
     return {{c.T_camera_world.rotation_matrix(), c.T_camera_world.translation()}, c.focal, c.k1, c.k2};
   }
   [[nodiscard]] static bool is_usable(const observation& o) {
-    return o.information > 0.0 && std::isfinite(o.information) && o.pixel.allFinite();
+    return o.information > 0.0 && std::isfinite(o.information) && std::isfinite(o.pixel.x()) &&
+           std::isfinite(o.pixel.y());
   }
   [[nodiscard]] static std::optional<vec2> residual(const view& v, const vec3& point, const observation& o) {
     return residual_in_camera(v, v.rotation * point + v.translation, o);
   }
+  template <std::same_as<double> S = double>  // so that only who calls it has it compiled
   [[nodiscard]] static std::optional<vec2> linearize(const view& v, const vec3& point, const observation& o,
-                                                     matrix<2, 9>& by_camera, matrix<2, 3>& by_point) {
+                                                     matrix<2, 9, S>& by_camera, matrix<2, 3, S>& by_point) {
     return detail::linearize_through_camera(bal_reprojection{}, v, point, o, by_camera, by_point);
   }
   [[nodiscard]] static std::optional<vec2> residual_in_camera(const view& c, const vec3& q, const observation& o) {
-    const vec2 m = q.head<2>() / -q.z();
-    const double s = m.squaredNorm();
-    const vec2 r = c.focal * (1.0 + s * (c.k1 + s * c.k2)) * m - o.pixel;
-    if (!r.allFinite()) return std::nullopt;
+    const double x = q.x() / -q.z(), y = q.y() / -q.z();
+    const double s = x * x + y * y;
+    const double scale = c.focal * (1.0 + s * (c.k1 + s * c.k2));
+    const vec2 r(scale * x - o.pixel.x(), scale * y - o.pixel.y());
+    if (!std::isfinite(r.x()) || !std::isfinite(r.y())) return std::nullopt;
     return r;
   }
   [[nodiscard]] static std::optional<vec2> linearize_in_camera(const view& c, const vec3& q, const observation& o,
                                                                matrix<2, 3>& by_q, matrix<2, 3>& by_intrinsics) {
     const auto r = residual_in_camera(c, q, o);
     if (!r) return r;
-    const vec2 m = q.head<2>() / -q.z();
-    const double s = m.squaredNorm();
-    const double radial = 1.0 + s * (c.k1 + s * c.k2);
-    const mat2 by_m = c.focal * (radial * mat2::Identity() + 2.0 * (c.k1 + 2.0 * c.k2 * s) * m * m.transpose());
-    by_q << -by_m, -by_m * m;
-    by_q /= q.z();
-    by_intrinsics << radial * m, c.focal * s * m, c.focal * s * s * m;
+    const double m[2] = {q.x() / -q.z(), q.y() / -q.z()};
+    const double s = m[0] * m[0] + m[1] * m[1];
+    const double radial = 1.0 + s * (c.k1 + s * c.k2), slope = 2.0 * (c.k1 + 2.0 * c.k2 * s);
+    for (int i = 0; i != 2; ++i) {
+      double by_m[2];
+      for (int k = 0; k != 2; ++k) by_m[k] = c.focal * ((i == k ? radial : 0.0) + slope * m[i] * m[k]);
+      by_q(i, 0) = -by_m[0] / q.z();
+      by_q(i, 1) = -by_m[1] / q.z();
+      by_q(i, 2) = -(by_m[0] * m[0] + by_m[1] * m[1]) / q.z();
+      by_intrinsics(i, 0) = radial * m[i];
+      by_intrinsics(i, 1) = c.focal * s * m[i];
+      by_intrinsics(i, 2) = c.focal * s * s * m[i];
+    }
     return r;
   }
 

@@ -53,6 +53,13 @@ class atlas {
     maps_.try_emplace(active_, levels_, scale_factor_, min_shared_);
     return active_;
   }
+  /// A map that was made elsewhere becomes the active one. @pre it has the pyramid of the others
+  map_id create(slam::map m) {
+    assert(m.content().levels == levels_ && m.content().scale_factor == scale_factor_);
+    active_ = next_++;
+    maps_.try_emplace(active_, std::move(m));
+    return active_;
+  }
   /// @pre contains(id)
   void activate(map_id id) {
     assert(contains(id));
@@ -97,6 +104,14 @@ class atlas {
     for (auto to = merged_.find(k.map); to != merged_.end(); to = merged_.find(k.map))
       k = {to->second.into, k.keyframe + to->second.offsets.keyframes};
     return k;
+  }
+  /// The same for a landmark of a map. @pre l != no_id
+  [[nodiscard]] landmark_id current(map_id map, landmark_id l) const {
+    for (auto to = merged_.find(map); to != merged_.end(); to = merged_.find(map)) {
+      map = to->second.into;
+      l += to->second.offsets.landmarks;
+    }
+    return l;
   }
 
  private:

@@ -111,8 +111,8 @@ class global_adjustment {
                                          std::span<const optimize::bundle_observation>(observations_),
                                          {.max_iterations = options_.robust_iterations,
                                           .relative_tolerance = options_.relative_tolerance,
-                                          .fixed_poses = fixed_,
-                                          .callback = go_on});
+                                          .fixed_poses = fixed_},
+                                         go_on);
     if (!is_usable(robust)) return false;
     find_outliers();
     before = static_cast<std::size_t>(std::max(0, options_.robust_iterations));
@@ -120,8 +120,8 @@ class global_adjustment {
                                              {.max_iterations = options_.iterations,
                                               .relative_tolerance = options_.relative_tolerance,
                                               .fixed_poses = fixed_,
-                                              .ignored = outliers_,
-                                              .callback = go_on});
+                                              .ignored = outliers_},
+                                             go_on);
     if (!is_usable(last)) return false;
     find_outliers();
     report_.observations = observations_.size();

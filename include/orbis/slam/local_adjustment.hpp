@@ -82,15 +82,15 @@ class local_adjustment {
     if (!go_on(0, static_cast<std::size_t>(std::max(0, options_.robust_iterations)))) return false;
     const auto first = adjuster_->solve(
         seq, poses, points, std::span<const optimize::bundle_observation>(observations_),
-        {.max_iterations = options_.robust_iterations, .fixed_poses = is_fixed_, .callback = go_on});
+        {.max_iterations = options_.robust_iterations, .fixed_poses = is_fixed_}, go_on);
     if (is_failure(first.status)) stage_ = stage::empty;
     if (is_failure(first.status) || first.status == optimize::bundle_status::cancelled) return false;
     find_outliers();
     const auto second = adjuster_->solve_again(seq, poses, points,
                                                {.max_iterations = options_.iterations,
                                                 .fixed_poses = is_fixed_,
-                                                .ignored = outliers_,
-                                                .callback = go_on});
+                                                .ignored = outliers_},
+                                               go_on);
     if (is_failure(second.status)) stage_ = stage::empty;
     if (is_failure(second.status)) return false;
     find_outliers();

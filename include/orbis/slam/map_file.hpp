@@ -153,11 +153,15 @@ inline void put_landmark(std::string& to, const landmark& l) {
   return parse_map(std::as_bytes(std::span{*bytes}), path.string());
 }
 
-/// Writes a file, whole or not at all. Errors: write_failed.
-[[nodiscard]] inline result<void> write_map(const std::filesystem::path& path, const map& m) {
-  const std::string bytes = map_bytes(m);
+/// Writes what `map_bytes` gave into a file, whole or not at all. Errors: write_failed.
+[[nodiscard]] inline result<void> write_map_bytes(const std::filesystem::path& path, const std::string& bytes) {
   return write_file_atomically(
       path, [&](std::ostream& out) { out.write(bytes.data(), static_cast<std::streamsize>(bytes.size())); });
+}
+
+/// Writes a file, whole or not at all. Errors: write_failed.
+[[nodiscard]] inline result<void> write_map(const std::filesystem::path& path, const map& m) {
+  return write_map_bytes(path, map_bytes(m));
 }
 
 }  // namespace orbis::slam

@@ -9,57 +9,95 @@
 /// @endcode
 ///
 /// The scheme is that of R. Mur-Artal, J. D. Tardos, "ORB-SLAM2: an open-source SLAM system for
-/// monocular, stereo and RGB-D cameras", T-RO 33 (2017): predict by constant motion, find the local
-/// map's landmarks, refine the pose, and make a keyframe where the view has changed.
+/// monocular, stereo and RGB-D cameras", T-RO 33 (2017): predict by constant motion, find the local map's landmarks,
+/// refine the pose, and make a keyframe where the view has changed; adjust the map around it; close loops where a
+/// place is recognised. That a lost camera begins a new map, and maps become one where they meet, is after R. Elvira,
+/// J. D. Tardos, J. M. M. Montiel, "ORBSLAM-Atlas", IROS 2019.
 #pragma once
 
 #include <algorithm>
+#include <atomic>
+#include <cassert>
+#include <chrono>
 #include <concepts>
 #include <cstddef>
 #include <cstdint>
-#include <functional>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <mutex>
 #include <optional>
-#include <span>
+#include <string>
 #include <utility>
 #include <vector>
 
 #include <orbis/camera/model.hpp>
 #include <orbis/camera/rgbd_frame.hpp>
+#include <orbis/core/result.hpp>
 #include <orbis/core/trajectory.hpp>
-#include <orbis/features/brute_force.hpp>
-#include <orbis/features/matcher.hpp>
 #include <orbis/features/orb.hpp>
-#include <orbis/features/stages.hpp>
-#include <orbis/optimize/pnp.hpp>
+#include <orbis/optimize/reprojection.hpp>
+#include <orbis/slam/atlas.hpp>
+#include <orbis/slam/events.hpp>
 #include <orbis/slam/keyframe_decision.hpp>
-#include <orbis/slam/landmark_culling.hpp>
-#include <orbis/slam/landmark_search.hpp>
-#include <orbis/slam/local_adjustment.hpp>
-#include <orbis/slam/local_map.hpp>
-#include <orbis/slam/map.hpp>
+#include <orbis/slam/local_mapper.hpp>
+#include <orbis/slam/loop_closer.hpp>
+#include <orbis/slam/map_file.hpp>
 #include <orbis/slam/mapping.hpp>
 #include <orbis/slam/options.hpp>
-#include <orbis/slam/pose_tracker.hpp>
+#include <orbis/slam/place_recognition.hpp>
+#include <orbis/slam/shared_state.hpp>
 #include <orbis/slam/track_result.hpp>
+#include <orbis/slam/tracker.hpp>
+#include <orbis/slam/worker.hpp>
 
 namespace orbis::slam {
 
-/// Tracks the frames of one camera and builds a map of landmarks. Everything happens in `track`, in
-/// the caller's thread: the same frames and options give the same bytes. Images are not kept; a
-/// caller who needs those of keyframes keeps them when `track` says that a frame became one.
-template <camera::camera_model Camera, feature_extractor Extractor = features::orb_extractor>
+/// Tracks the frames of one camera and builds a map of landmarks. Images are not kept; a caller who needs those of
+/// keyframes keeps them when `track` says that a frame became one.
+///
+/// Without threads (the default) everything happens in `track`, and the same frames and options give the same bytes.
+/// With them (`options.threads`) mapping, loop closing and global adjustment go on while frames are tracked. `track`
+/// is for one thread; everything else may be called from any.
+template <camera::camera_model Camera, feature_extractor Extractor = features::orb_extractor,
+          tracking_matchers Matchers = orb_matchers, place_recognizer Places = bag_of_words_places>
 class rgbd_system {
  public:
   explicit rgbd_system(Camera camera, const options& settings = {}) requires
-      std::constructible_from<Extractor, const features::orb_options&>
+      std::constructible_from<Extractor, const features::orb_options&> && std::default_initializable<Places>
       : rgbd_system(std::move(camera), settings, Extractor(settings.features)) {}
-  rgbd_system(Camera camera, const options& settings, Extractor extractor)
+  rgbd_system(Camera camera, const options& settings, Extractor extractor, Places places = Places{})
       : options_{settings},
         extract_{std::move(extractor)},
-        model_{std::move(camera), settings.bf},
-        scales_{settings.features.levels, static_cast<double>(settings.features.scale_factor)},
-        map_{scales_.levels, scales_.factor},
-        adjuster_{model_, optimize::huber{2.8}} {}
+        shared_{optimize::reprojection<Camera>{std::move(camera), settings.bf},
+                {settings.features.levels, static_cast<double>(settings.features.scale_factor)},
+                options_,
+                std::move(places)},
+        track_{shared_.model, shared_.scales, options_},
+        mapper_{shared_},
+        closer_{shared_} {
+    if (!options_.threads.enabled) return;
+    global_worker_ = std::make_unique<worker<map_id>>([this](map_id m) { closer_.adjust_globally(m); });
+    loop_worker_ = std::make_unique<worker<map_keyframe>>([this](map_keyframe k) {
+      if (closer_.close(k)) global_worker_->push(shared_.locked([&] { return shared_.atlas.current(k).map; }));
+    });
+    map_worker_ = std::make_unique<worker<map_keyframe>>([this](map_keyframe k) {
+      mapper_.process(k, [this] { return map_worker_->waiting() != 0; });
+      loop_worker_->push(k);
+    });
+  }
+  rgbd_system(const rgbd_system&) = delete;
+  rgbd_system& operator=(const rgbd_system&) = delete;
+  /// Lets what is at hand end, and drops what waits.
+  ~rgbd_system() {
+    closer_.stop();
+    map_worker_.reset();
+    loop_worker_.reset();
+    global_worker_.reset();
+  }
+
+  /// Who is told what happens. @pre no frame was tracked yet
+  void listen(listeners all) { shared_.listening = std::move(all); }
 
   /// The next frame. Frames of another size than the camera's are counted as lost.
   track_result track(const camera::rgbd_frame& f) { return track(f.timestamp, f.color, f.depth_metres()); }
@@ -71,45 +109,137 @@ class rgbd_system {
     stopwatch clock;
     frame current = observe(timestamp, color, depth);
     clock.lap(result.timings.features_ms);
-    const std::size_t inliers = state_ == track_state::not_started ? start(current) : locate(current);
-    clock.lap(result.timings.tracking_ms);
-    if (inliers > 0 && needs_keyframe(current, inliers)) result.keyframe = grow_map(current);
+    if (map_worker_ && options_.threads.wait) map_worker_->wait_for_room(options_.threads.max_waiting);
+    const track_state before = state_;
+    std::optional<map_keyframe> made;
+    {
+      const auto lock = shared_.lock();
+      bring_up_to_date();
+      result.inliers = find(current);
+      clock.lap(result.timings.tracking_ms);
+      if (result.inliers > 0 && needs_keyframe(current, result.inliers)) made = insert(current);
+      remember(std::move(current));
+    }
+    if (made) hand_on(*made);
+    report(result, before, made);
     clock.lap(result.timings.mapping_ms);
-    remember(std::move(current));
-    report(result, inliers);
     return result;
   }
 
-  [[nodiscard]] track_state state() const noexcept { return state_; }
-
-  /// Every tracked frame, where the keyframe it hangs on is now: later corrections of keyframes
-  /// move it along.
-  [[nodiscard]] orbis::trajectory trajectory() const {
-    orbis::trajectory all;
-    for (const tracked_frame& f : tracked_)
-      all.push_back({f.timestamp, map_.pose_of(f.reference) * f.T_reference_camera});
-    return all;
+  [[nodiscard]] track_state state() const {
+    return shared_.locked([&] { return state_; });
   }
-  /// Time stamp, pose and frame index of each keyframe.
+  [[nodiscard]] bool localizes_only() const noexcept { return localization_only_; }
+  /// Whether the map is left as it is from the next frame on.
+  void set_localization_only(bool on) noexcept { localization_only_ = on; }
+
+  /// Returns when the threads have nothing to do.
+  void wait() const {
+    for (const auto* w : {&map_worker_, &loop_worker_})
+      if (*w) (*w)->wait();
+    if (global_worker_) global_worker_->wait();
+  }
+
+  /// Every frame that was tracked in the active map, where the keyframe it hangs on is now: later corrections of
+  /// keyframes move it along.
+  [[nodiscard]] orbis::trajectory trajectory() const {
+    return shared_.locked([&] { return trajectory_in(shared_.atlas.active_id()); });
+  }
+  /// ... or in another one; empty, if there is none of this number.
+  [[nodiscard]] orbis::trajectory trajectory(map_id map) const {
+    return shared_.locked([&] { return trajectory_in(map); });
+  }
+  /// Time stamp, pose and frame index of each keyframe of the active map.
   [[nodiscard]] std::vector<keyframe_pose> keyframes() const {
-    std::vector<keyframe_pose> all;
-    for (const keyframe& k : map_.keyframes()) all.push_back({k.timestamp, k.T_world_camera, k.index});
-    return all;
+    return shared_.locked([&] {
+      std::vector<keyframe_pose> all;
+      for (const keyframe& k : shared_.atlas.active().keyframes())
+        all.push_back({k.timestamp, k.T_world_camera, k.index});
+      return all;
+    });
   }
   [[nodiscard]] orbis::trajectory keyframe_trajectory() const {
     orbis::trajectory all;
-    for (const keyframe& k : map_.keyframes()) all.push_back({k.timestamp, k.T_world_camera});
+    for (const keyframe_pose& k : keyframes()) all.push_back({k.timestamp, k.T_world_camera});
     return all;
   }
-  [[nodiscard]] std::size_t landmark_count() const noexcept { return map_.landmark_count(); }
-  [[nodiscard]] const track_counters& counters() const noexcept { return counters_; }
-  [[nodiscard]] const slam::map& map() const noexcept { return map_; }
-  [[nodiscard]] const Camera& camera() const noexcept { return model_.camera; }
+  [[nodiscard]] std::size_t landmark_count() const {
+    return shared_.locked([&] { return shared_.atlas.active().landmark_count(); });
+  }
+  [[nodiscard]] track_counters counters() const {
+    return shared_.locked([&] {
+      track_counters all = counters_;
+      all.loops_closed = shared_.loops_closed;
+      all.maps_merged = shared_.maps_merged;
+      all.keyframes_culled = shared_.keyframes_culled;
+      return all;
+    });
+  }
+  /// The number of the active map, and of the one in which most frames were tracked.
+  [[nodiscard]] map_id active_map() const {
+    return shared_.locked([&] { return shared_.atlas.active_id(); });
+  }
+  [[nodiscard]] map_id largest_map() const {
+    return shared_.locked([&] {
+      std::map<map_id, std::size_t> frames;
+      for (const tracked_frame& f : tracked_) ++frames[shared_.atlas.current(f.reference).map];
+      const auto most = std::max_element(frames.begin(), frames.end(),
+                                         [](const auto& a, const auto& b) { return a.second < b.second; });
+      return most == frames.end() ? shared_.atlas.active_id() : most->first;
+    });
+  }
+  /// Goes on in another map, of which the camera is looked for. False if there is none of this number.
+  bool activate(map_id map) {
+    return shared_.locked([&] {
+      if (!shared_.atlas.contains(map)) return false;
+      if (map != shared_.atlas.active_id()) {
+        shared_.atlas.activate(map);
+        state_ = track_state::lost;
+      }
+      return true;
+    });
+  }
+
+  /// Calls `read(const atlas&)` while nothing changes; what it takes, tracking waits.
+  template <std::invocable<const slam::atlas&> Read>
+  decltype(auto) inspect(Read&& read) const {
+    const auto lock = shared_.lock();
+    return std::forward<Read>(read)(std::as_const(shared_.atlas));
+  }
+  /// The active map. @pre as long as it is looked at, no frame is tracked and the threads have nothing to do (`wait`)
+  [[nodiscard]] const slam::map& map() const { return shared_.atlas.active(); }
+  [[nodiscard]] const Camera& camera() const noexcept { return shared_.model.camera; }
+
+  /// Writes the active map into a file. Errors: `write_failed`.
+  [[nodiscard]] result<void> save_map(const std::filesystem::path& path) const {
+    const std::string bytes = inspect([](const slam::atlas& all) { return map_bytes(all.active()); });
+    return write_map_bytes(path, bytes);
+  }
+  /// Makes a map from a file the active one, in which the camera is looked for. The map so far stays, and becomes a
+  /// part of the loaded one where it is recognised; without keyframes it goes. Errors: those of `read_map`,
+  /// `unsupported` for a map of another image pyramid, `no_data` for one without keyframes.
+  [[nodiscard]] result<void> load_map(const std::filesystem::path& path) {
+    auto loaded = read_map(path);
+    if (!loaded) return fail(loaded.error());
+    const map_content& content = loaded->content();
+    if (content.levels != shared_.scales.levels || !(content.scale_factor == shared_.scales.factor))
+      return fail(errc::unsupported, path.string(), "the map was made with another image pyramid");
+    if (loaded->keyframes().empty()) return fail(errc::no_data, path.string(), "the map has no keyframes");
+    const auto lock = shared_.lock();
+    const map_id before = shared_.atlas.active_id();
+    const bool drop = shared_.atlas.active().keyframes().empty();
+    const map_id id = shared_.atlas.create(*std::move(loaded));
+    if (drop) shared_.atlas.remove(before);
+    for (const keyframe& k : shared_.atlas.active().keyframes())
+      shared_.places.add({id, k.id}, shared_.places.describe(k.features));
+    state_ = track_state::lost;
+    return {};
+  }
 
  private:
   struct tracked_frame {
     double timestamp;
-    keyframe_id reference;
+    map_keyframe reference;
     se3 T_reference_camera;
   };
 
@@ -117,16 +247,41 @@ class rgbd_system {
   [[nodiscard]] frame observe(double timestamp, image_view<const rgb8> color, const Depth& depth) {
     frame f;
     const auto fits = [&](const auto& image) {
-      return image.width() == model_.camera.width() && image.height() == model_.camera.height();
+      return image.width() == camera().width() && image.height() == camera().height();
     };
-    if (fits(color) && fits(depth)) f = make_frame(model_.camera, extract_, color, depth, options_);
+    if (fits(color) && fits(depth)) f = make_frame(camera(), extract_, color, depth, options_);
     f.timestamp = timestamp;
-    f.index = counters_.frames++;
+    f.index = counters_.frames;
     return f;
+  }
+
+  [[nodiscard]] slam::map& active() { return shared_.atlas.active(); }
+
+  /// Keyframes may have got other names since the last frame, or have been culled, and landmarks have been fused.
+  void bring_up_to_date() {
+    const map_keyframe now = shared_.atlas.current(reference_);
+    if (now.map != reference_.map)
+      for (landmark_id& l : last_.landmarks)
+        if (l != no_id) l = shared_.atlas.current(reference_.map, l);
+    reference_ = now;
+    if (!shared_.atlas.contains(now.map)) return;
+    last_.T_world_camera = last_pose();
+    reference_.keyframe = shared_.atlas.at(now.map).heir(now.keyframe);
+  }
+
+  /// The pose of a frame: returns the number of landmarks that agree, 0 if it has none.
+  std::size_t find(frame& f) {
+    if (state_ == track_state::not_started) return start(f);
+    if (const std::size_t inliers = locate(f); inliers > 0) return inliers;
+    if (is_tracking()) lost_since_ = last_.timestamp;
+    state_ = track_state::lost;
+    if (localization_only_ || f.timestamp - lost_since_ < options_.recovery.new_map_after) return 0;
+    return start_afresh(f);
   }
 
   /// The first frame with enough depth defines the world.
   std::size_t start(frame& f) {
+    if (localization_only_) return 0;
     std::size_t with_depth = 0;
     for (std::size_t i = 0; i < f.size(); ++i) with_depth += f.has_depth(i);
     if (with_depth == 0 || with_depth < options_.min_start_points) return 0;
@@ -134,194 +289,164 @@ class rgbd_system {
     state_ = track_state::tracking;
     return with_depth;
   }
+  /// ... of a new map, where the camera has been lost for long.
+  std::size_t start_afresh(frame& f) {
+    const std::size_t with_depth = start(f);
+    if (with_depth == 0) return 0;
+    const map_id before = shared_.atlas.active_id();
+    shared_.atlas.create();
+    // Not while mapping works on it: then it stays, which does no harm.
+    if (shared_.atlas.at(before).keyframes().size() < options_.recovery.min_map_keyframes)
+      if (const auto edit = shared_.try_edit()) shared_.remove_map(before);
+    last_ = {};
+    velocity_.reset();
+    return with_depth;
+  }
 
-  /// The pose of a frame: by motion, else against the reference keyframe, else against any keyframe;
-  /// refined on the local map. Returns the number of landmarks that agree, 0 if lost.
+  /// By motion, else against the reference keyframe, else by looks; refined on the local map.
   std::size_t locate(frame& f) {
-    if (is_tracking() && (track_by_motion(f) || track_against(f, reference_))) {
+    if (is_tracking() && (track_.by_motion(f, active(), last_, predict(f.timestamp)) > 0 ||
+                          track_.against(f, active(), reference_.keyframe) > 0)) {
       if (const std::size_t inliers = track_local_map(f, options_.search_radius); inliers >= options_.min_inliers) {
         state_ = track_state::tracking;
         return inliers;
       }
     }
-    const std::size_t inliers = relocalize(f);
-    state_ = inliers > 0 ? track_state::relocalized : track_state::lost;
-    return inliers;
+    return relocalize(f);
   }
-
   [[nodiscard]] bool is_tracking() const {
     return state_ == track_state::tracking || state_ == track_state::relocalized;
   }
 
-  /// Looks for what the last frame saw where constant motion takes it.
-  bool track_by_motion(frame& f) {
-    const se3 predicted = predict(f.timestamp);
-    for (const double widening : {1.0, 2.0}) {
-      f.T_world_camera = predicted;
-      const features::camera_projection project{model_.camera, predicted};
-      search_list list;
-      for (std::size_t i = 0; i < last_.size(); ++i) {
-        candidate_point p{.landmark = map_.became(last_.landmarks[i])};
-        if (p.landmark != no_id)
-          p.position = map_.landmark_at(p.landmark).position;
-        else if (last_.has_depth(i))
-          p = {last_.point_world(i), no_id};
-        else
-          continue;
-        add_seen_point(list, project, scales_, p, last_.features.descriptors[i], last_.features.keypoints[i],
-                       widening * options_.motion_radius);
-      }
-      const auto matches = motion_matcher(features::feature_view<descriptor>{list.keypoints, list.descriptors},
-                                          f.features, list.windows, f.grid);
-      if (matches.size() >= options_.min_inliers && refine_on_matches(f, list, matches, model_, scales_) >= 10)
-        return true;
-    }
-    return false;
-  }
-
-  /// Matches a frame with a keyframe by appearance alone.
-  bool track_against(frame& f, keyframe_id id) {
-    const keyframe& k = map_.at(id);
-    const auto matches = appearance_matcher(k.features, f.features);
-    search_list list;
-    std::vector<features::match> usable;
-    std::vector<vec3> points;
-    std::vector<vec2> pixels;
-    for (const auto& m : matches) {
-      candidate_point p{.landmark = k.landmarks[m.query]};
-      if (p.landmark != no_id)
-        p.position = map_.landmark_at(p.landmark).position;
-      else if (k.has_depth(m.query))
-        p.position = k.point_world(m.query);
-      else
-        continue;
-      usable.push_back({static_cast<std::uint32_t>(list.size()), m.train, m.distance});
-      list.points.push_back(p);
-      points.push_back(p.position);
-      pixels.push_back(f.pixel(m.train));
-    }
-    const auto pose =
-        optimize::estimate_pose(std::span<const vec3>(points), std::span<const vec2>(pixels), model_.camera,
-                                {.threshold = 5.0, .max_iterations = 500, .min_inliers = 12, .seed = options_.seed});
-    if (!pose) return false;
-    f.T_world_camera = pose->T_world_camera;
-    return refine_on_matches(f, list, usable, model_, scales_) >= 12;
-  }
-
-  /// Finds the landmarks around in the frame and refines its pose on all of them.
   std::size_t track_local_map(frame& f, double radius) {
-    const features::camera_projection project{model_.camera, f.T_world_camera};
-    const features::projection_rule rule{.radius = static_cast<float>(radius),
-                                         .levels = scales_.levels,
-                                         .scale_factor = static_cast<float>(scales_.factor)};
-    const std::vector<landmark_id> around = local_landmarks(map_, f, reference_, options_.local_keyframes);
-    search_list list;
-    for (const landmark_id id : around)
-      if (add_landmark(list, project, rule, map_.landmark_at(id), id)) map_.count_visible(id);
-    const auto matches = landmark_matcher(list.descriptors, f.features, list.windows, f.grid);
-    const std::size_t inliers = refine_on_matches(f, list, matches, model_, scales_);
-    for (const landmark_id l : f.landmarks)
-      if (l != no_id) map_.count_found(l);
-    return inliers;
+    slam::map& m = active();
+    const bool counts = !localization_only_;
+    return track_.on_local_map(
+        f, m, reference_.keyframe, radius, [&](landmark_id l) { counts ? m.count_visible(l) : void(); },
+        [&](landmark_id l) { counts ? m.count_found(l) : void(); });
   }
 
-  /// Tries the keyframes that look most like the frame.
+  /// Tries the last reference, and the keyframes that look most like the frame, in whichever map they are.
   std::size_t relocalize(frame& f) {
-    for (const keyframe_id k : similar_keyframes(f)) {
-      if (!track_against(f, k)) continue;
+    std::vector<map_keyframe> candidates = shared_.similar(
+        shared_.places.describe(f.features), options_.recovery.candidates, [](map_keyframe) { return false; });
+    if (reference_.map == shared_.atlas.active_id() && active().has_keyframe(reference_.keyframe) &&
+        std::find(candidates.begin(), candidates.end(), reference_) == candidates.end())
+      candidates.insert(candidates.begin(), reference_);
+    const map_id active_before = shared_.atlas.active_id();
+    const map_keyframe reference_before = reference_;
+    for (const map_keyframe& k : candidates) {
+      if (track_.against(f, shared_.atlas.at(k.map), k.keyframe) == 0) continue;
+      shared_.atlas.activate(k.map);
       reference_ = k;
       if (const std::size_t inliers = track_local_map(f, 3.0 * options_.search_radius);
-          inliers >= options_.min_relocalized)
+          inliers >= options_.recovery.min_inliers) {
+        state_ = track_state::relocalized;
         return inliers;
+      }
     }
+    shared_.atlas.activate(active_before);
+    reference_ = reference_before;
     return 0;
   }
 
-  [[nodiscard]] std::vector<keyframe_id> similar_keyframes(const frame& f) const {
-    std::vector<std::pair<std::size_t, keyframe_id>> order;
-    for (const keyframe& k : map_.keyframes()) {
-      const std::size_t alike = appearance_matcher(k.features, f.features).size();
-      if (alike >= 15) order.emplace_back(alike, k.id);
-    }
-    std::sort(order.begin(), order.end(), std::greater<>{});
-    if (order.size() > options_.relocalization_candidates) order.resize(options_.relocalization_candidates);
-    std::vector<keyframe_id> best;
-    for (const auto& [alike, id] : order) best.push_back(id);
-    return best;
-  }
-
   [[nodiscard]] bool needs_keyframe(const frame& f, std::size_t inliers) {
-    if (map_.keyframes().empty()) return true;
-    reference_ = most_shared(map_, f, reference_);
-    return is_keyframe_due(gather_evidence(map_, f, reference_, inliers, options_), options_.keyframes);
+    if (localization_only_) return false;
+    if (active().keyframes().empty()) return true;
+    reference_ = {shared_.atlas.active_id(), most_shared(active(), f, reference_.keyframe)};
+    if (map_worker_ && map_worker_->waiting() >= options_.threads.max_waiting) return false;
+    return is_keyframe_due(gather_evidence(active(), f, reference_.keyframe, inliers, options_), options_.keyframes);
   }
 
-  keyframe_id grow_map(frame& f) {
-    reference_ = insert_keyframe(map_, f, options_);
-    cull_landmarks(map_, reference_, options_.culling);
-    adjust_locally(map_, reference_, adjuster_, model_, scales_, options_.adjustment);
-    f.T_world_camera = map_.at(reference_).T_world_camera;
-    f.landmarks = map_.at(reference_).landmarks;
-    return reference_;
+  map_keyframe insert(frame& f) {
+    const keyframe_id id = insert_keyframe(active(), f, options_);
+    f.landmarks = active().at(id).landmarks;
+    return reference_ = {shared_.atlas.active_id(), id};
+  }
+
+  /// Mapping and loop closing, now or by their threads.
+  void hand_on(map_keyframe k) {
+    if (const auto& tell = shared_.listening.keyframe_made) tell(shared_.locked([&] { return shared_.event_of(k); }));
+    if (map_worker_) return map_worker_->push(k);
+    mapper_.process(k, [] { return false; });
+    if (closer_.close(k)) closer_.adjust_globally(shared_.atlas.current(k).map);
   }
 
   /// Where the last tracked frame is, now that its keyframe may have moved.
-  [[nodiscard]] se3 last_pose() const { return map_.pose_of(last_reference_) * T_reference_last_; }
+  [[nodiscard]] se3 last_pose() const {
+    const map_keyframe k = shared_.atlas.current(last_reference_);
+    return shared_.atlas.contains(k.map) && k.keyframe < shared_.atlas.at(k.map).keyframe_end()
+               ? shared_.atlas.at(k.map).pose_of(k.keyframe) * T_reference_last_
+               : last_.T_world_camera;
+  }
 
   /// Where constant motion takes the camera.
   [[nodiscard]] se3 predict(double timestamp) const {
-    const se3 last = last_pose();
-    if (!velocity_) return last;
+    if (!velocity_) return last_.T_world_camera;
     const double ratio = last_interval_ > 0.0 ? (timestamp - last_.timestamp) / last_interval_ : 1.0;
-    return last * se3::exp(std::clamp(ratio, 0.0, 3.0) * *velocity_);
+    return last_.T_world_camera * se3::exp(std::clamp(ratio, 0.0, 3.0) * *velocity_);
   }
 
   /// Keeps the frame for the next prediction, and its place in the trajectory.
   void remember(frame f) {
+    ++counters_.frames;
+    counters_.tracked += is_tracking();
+    counters_.relocalized += state_ == track_state::relocalized;
+    counters_.lost += state_ == track_state::lost;
     velocity_.reset();
     if (!is_tracking()) return;
-    if (!tracked_.empty() && last_.index + 1 == f.index) {
-      velocity_ = (last_pose().inverse() * f.T_world_camera).log();
+    if (last_.index + 1 == f.index && state_ == track_state::tracking && last_.size() != 0) {
+      velocity_ = (last_.T_world_camera.inverse() * f.T_world_camera).log();
       last_interval_ = f.timestamp - last_.timestamp;
     }
     last_reference_ = reference_;
-    T_reference_last_ = map_.at(reference_).T_world_camera.inverse() * f.T_world_camera;
+    T_reference_last_ = active().at(reference_.keyframe).T_world_camera.inverse() * f.T_world_camera;
     tracked_.push_back({f.timestamp, last_reference_, T_reference_last_});
     last_ = std::move(f);
   }
 
-  void report(track_result& result, std::size_t inliers) {
+  void report(track_result& result, track_state before, const std::optional<map_keyframe>& made) {
+    auto lock = shared_.lock();
     result.state = state_;
-    result.inliers = inliers;
-    if (is_tracking()) result.T_world_camera = last_.T_world_camera;
-    counters_.tracked += is_tracking();
-    counters_.relocalized += state_ == track_state::relocalized;
-    counters_.lost += state_ == track_state::lost;
+    result.map = shared_.atlas.active_id();
+    if (made) result.keyframe = made->keyframe;
+    if (is_tracking()) result.T_world_camera = last_pose();
+    const state_event changed{before, state_, counters_.frames - 1};
+    lock.unlock();
+    if (changed.from != changed.to && shared_.listening.state_changed) shared_.listening.state_changed(changed);
   }
 
-  using descriptor = features::binary_descriptor<256>;
-  static constexpr auto motion_matcher = features::windowed(features::hamming{}) | features::max_distance{100} |
-                                         features::unique{} | features::rotation_consistency{};
-  static constexpr auto landmark_matcher =
-      features::windowed(features::hamming{}) | features::max_distance{80} | features::unique{};
-  static constexpr auto appearance_matcher = features::brute_force(features::hamming{}) | features::ratio_test{0.8F} |
-                                             features::cross_check{} | features::max_distance{80};
+  [[nodiscard]] orbis::trajectory trajectory_in(map_id map) const {
+    orbis::trajectory all;
+    for (const tracked_frame& f : tracked_) {
+      const map_keyframe k = shared_.atlas.current(f.reference);
+      if (k.map == map && shared_.atlas.contains(map))
+        all.push_back({f.timestamp, shared_.atlas.at(map).pose_of(k.keyframe) * f.T_reference_camera});
+    }
+    return all;
+  }
 
   options options_;
   Extractor extract_;
-  optimize::reprojection<Camera> model_;
-  pyramid_scales scales_;
-  slam::map map_;
-  optimize::bundle_adjuster<optimize::reprojection<Camera>> adjuster_;
+  shared_state<Camera, Places> shared_;
+  tracker<Camera, Matchers> track_;
+  local_mapper<Camera, Places> mapper_;
+  loop_closer<Camera, Places> closer_;
+
   track_state state_ = track_state::not_started;
+  std::atomic<bool> localization_only_{options_.localization_only};
   track_counters counters_;
   std::vector<tracked_frame> tracked_;
-  keyframe_id reference_ = 0;  ///< that the current frame shares most with
+  map_keyframe reference_;  ///< that the current frame shares most with
   frame last_;
-  keyframe_id last_reference_ = 0;
+  map_keyframe last_reference_;
   se3 T_reference_last_;
   std::optional<vec6> velocity_;  ///< of the camera in its own frame, per last interval
   double last_interval_ = 0.0;
+  double lost_since_ = 0.0;
+
+  std::unique_ptr<worker<map_id>> global_worker_;
+  std::unique_ptr<worker<map_keyframe>> loop_worker_, map_worker_;
 };
 
 template <class Camera>

@@ -9,7 +9,8 @@
 #include <string_view>
 
 #include <orbis/core/se3.hpp>
-#include <orbis/slam/frame.hpp>
+#include <orbis/slam/atlas.hpp>
+#include <orbis/slam/ids.hpp>
 
 namespace orbis::slam {
 
@@ -41,6 +42,7 @@ struct track_timings {
 struct track_result {
   track_state state = track_state::not_started;
   std::optional<se3> T_world_camera;    ///< where tracked
+  map_id map = 0;                       ///< that this pose is in
   std::size_t inliers = 0;              ///< landmarks that agree with the pose
   std::optional<keyframe_id> keyframe;  ///< the number of the keyframe that the frame became, if it did
   track_timings timings;
@@ -53,6 +55,9 @@ struct track_counters {
   std::size_t tracked = 0;  ///< relocalised ones included
   std::size_t lost = 0;
   std::size_t relocalized = 0;
+  std::size_t loops_closed = 0;
+  std::size_t maps_merged = 0;
+  std::size_t keyframes_culled = 0;
 };
 
 struct keyframe_pose {
