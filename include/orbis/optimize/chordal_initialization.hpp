@@ -8,6 +8,7 @@
 /// T. Pajdla, "Robust rotation and translation estimation in multiview reconstruction", CVPR 2007.
 #pragma once
 
+#include <concepts>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -44,7 +45,9 @@ struct chordal_summary {
 namespace detail {
 
 /// The rotation closest to a matrix that may even mirror, after so much noise; none for one of rank 1.
-[[nodiscard]] inline std::optional<so3> proper_rotation(const mat3& m) {
+template <std::same_as<double> S = double>
+[[nodiscard]] std::optional<so3> proper_rotation(const matrix<3, 3, S>& m) {
+  using mat3 = matrix<3, 3, S>;
   if (!m.allFinite()) return std::nullopt;
   auto [u, values, v] = singular_values_of<3>(m);
   if (!(values[1] > 1e-9 * values[0])) return std::nullopt;
@@ -53,7 +56,11 @@ namespace detail {
 }
 
 /// Linear least squares in vectors of three, one or several at each vertex, over the edges of a graph.
+template <std::same_as<double> S = double>  // so that only who initialises has it compiled
 class vertex_vectors {
+  using vec3 = matrix<3, 1, S>;
+  using mat3 = matrix<3, 3, S>;
+
  public:
   vertex_vectors(const pose_graph_structure& structure, std::size_t right_sides)
       : structure_{structure}, right_(right_sides) {
@@ -103,7 +110,7 @@ class vertex_vectors {
   }
 
   const pose_graph_structure& structure_;
-  block_cholesky<3> cholesky_;
+  block_cholesky<std::same_as<S, double> ? 3 : 0> cholesky_;
   std::vector<mat3> diagonal_, off_diagonal_;
   std::vector<std::vector<double>> right_;
 };
@@ -135,7 +142,7 @@ initialize_chordally(std::span<se3> vertices, const Edges& edges, const chordal_
   };
 
   // Rotations: R_to = R_from * R_from_to, row by row.
-  detail::vertex_vectors rows{structure, 3};
+  detail::vertex_vectors<> rows{structure, 3};
   for_each_edge([&](std::size_t bundle, const auto& e) {
     const mat3 turn = e.measurement.rotation_matrix().transpose();
     const double weight = e.information.template bottomRightCorner<3, 3>().trace() / 3.0;
@@ -161,7 +168,7 @@ initialize_chordally(std::span<se3> vertices, const Edges& edges, const chordal_
   }
 
   // Positions: t_to = t_from + R_from * t_from_to.
-  detail::vertex_vectors positions{structure, 1};
+  detail::vertex_vectors<> positions{structure, 1};
   for_each_edge([&](std::size_t bundle, const auto& e) {
     const mat3 r = rotations[e.from].rotation_matrix();
     const mat3 turned = r * e.measurement.rotation_matrix();

@@ -206,7 +206,7 @@ struct dogleg {
       } else {
         w.scratch = w.newton - w.cauchy;  // where does the leg leave the region?
         const double a = square(w.scratch, w);
-        const double b = w.scratch.cwiseProduct(w.metric).dot(w.cauchy);
+        const double b = weighted_dot(w.scratch, w.metric, w.cauchy);
         const double c = cauchy * cauchy - s.radius * s.radius;
         w.step = w.cauchy + (-c / (b + std::sqrt(b * b - a * c))) * w.scratch;
       }
@@ -222,11 +222,17 @@ struct dogleg {
   }
 
  private:
-  [[nodiscard]] static double square(const Eigen::VectorXd& x, const step_workspace& w) {
-    return x.cwiseProduct(w.metric).dot(x);
+  template <class Vector>
+  [[nodiscard]] static double weighted_dot(const Vector& a, const Vector& weights, const Vector& b) {
+    return a.cwiseProduct(weights).dot(b);
   }
+  template <std::same_as<double> S = double>  // so that only who steps so has it compiled
+  [[nodiscard]] static double square(const Eigen::VectorXd& x, const step_workspace& w) {
+    return weighted_dot(x, w.metric, x);
+  }
+  template <std::same_as<double> S = double>
   [[nodiscard]] static double length(const Eigen::VectorXd& x, const step_workspace& w) {
-    return std::sqrt(square(x, w));
+    return std::sqrt(square<S>(x, w));
   }
   /// With as little damping as makes H positive definite.
   template <stepped_problem P>

@@ -5,6 +5,7 @@
 
 #include <cassert>
 #include <cmath>
+#include <concepts>
 #include <cstddef>
 #include <span>
 #include <vector>
@@ -74,14 +75,16 @@ class dense_cholesky {
   [[nodiscard]] std::size_t failed_row() const { return failed_row_; }
 
   /// Replaces the right-hand side in `x` by the solution. @pre the last `factor` returned true
+  template <std::same_as<double> S = double>  // so that only who calls it has it compiled
   void solve(std::span<double> x) const {
     assert(x.size() == size_);
     const auto n = static_cast<Eigen::Index>(size_);
-    const Eigen::Map<const Eigen::MatrixXd, Eigen::Unaligned, Eigen::OuterStride<>> l(
+    using MatrixXd = Eigen::Matrix<S, Eigen::Dynamic, Eigen::Dynamic>;
+    const Eigen::Map<const MatrixXd, Eigen::Unaligned, Eigen::OuterStride<>> l(
         values_.data(), n, n, Eigen::OuterStride<>(static_cast<Eigen::Index>(stride_)));
-    Eigen::Map<Eigen::VectorXd> y(x.data(), n);
-    l.triangularView<Eigen::Lower>().solveInPlace(y);
-    l.triangularView<Eigen::Lower>().transpose().solveInPlace(y);
+    Eigen::Map<Eigen::Matrix<S, Eigen::Dynamic, 1>> y(x.data(), n);
+    l.template triangularView<Eigen::Lower>().solveInPlace(y);
+    l.template triangularView<Eigen::Lower>().transpose().solveInPlace(y);
   }
 
  private:

@@ -11,6 +11,7 @@
 
 #include <array>
 #include <cmath>
+#include <concepts>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -199,6 +200,7 @@ struct match_kernels {
   match_errors* errors;
   match_equations* equations;
 
+  template <std::same_as<double> S = double>  // so that only who estimates poses has the kernels compiled
   [[nodiscard]] static match_kernels at(simd::level level) {
 #if ORBIS_X86
     return {simd::select<match_errors>(

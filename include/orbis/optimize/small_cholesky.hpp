@@ -25,7 +25,7 @@ class small_cholesky {
       scale_[i] = 1.0 / std::sqrt(h(i, i));
     }
     for (int j = 0; j != N; ++j)
-      for (int i = j + 1; i != N; ++i) scaled_(i, j) = h(i, j) * scale_[i] * scale_[j];
+      for (int i = j + 1; i != N; ++i) scaled_[i][j] = h(i, j) * scale_[i] * scale_[j];
     return true;
   }
 
@@ -36,14 +36,14 @@ class small_cholesky {
     double least = 1.0 + damping;
     for (int j = 0; j != N; ++j) {
       double pivot = 1.0 + damping;
-      for (int k = 0; k != j; ++k) pivot -= l_(j, k) * l_(j, k) * pivots_[k];
+      for (int k = 0; k != j; ++k) pivot -= l_[j][k] * l_[j][k] * pivots_[k];
       pivots_[j] = pivot;
       inverse_[j] = 1.0 / pivot;
       if (!(pivot > least)) least = pivot;
       for (int i = j + 1; i != N; ++i) {
-        double sum = scaled_(i, j);
-        for (int k = 0; k != j; ++k) sum -= l_(i, k) * l_(j, k) * pivots_[k];
-        l_(i, j) = sum * inverse_[j];
+        double sum = scaled_[i][j];
+        for (int k = 0; k != j; ++k) sum -= l_[i][k] * l_[j][k] * pivots_[k];
+        l_[i][j] = sum * inverse_[j];
       }
     }
     return least;
@@ -54,13 +54,13 @@ class small_cholesky {
     vector x;
     for (int i = 0; i != N; ++i) {
       double sum = b[i] * scale_[i];
-      for (int k = 0; k != i; ++k) sum -= l_(i, k) * x[k];
+      for (int k = 0; k != i; ++k) sum -= l_[i][k] * x[k];
       x[i] = sum;
     }
     for (int i = 0; i != N; ++i) x[i] *= inverse_[i];
     for (int i = N - 1; i >= 0; --i) {
       double sum = x[i];
-      for (int k = i + 1; k != N; ++k) sum -= l_(k, i) * x[k];
+      for (int k = i + 1; k != N; ++k) sum -= l_[k][i] * x[k];
       x[i] = sum;
     }
     for (int i = 0; i != N; ++i) x[i] *= scale_[i];
@@ -71,8 +71,8 @@ class small_cholesky {
   static constexpr double determined = 1e-11;
 
  private:
-  vector scale_ = vector::Zero(), pivots_ = vector::Zero(), inverse_ = vector::Zero();
-  square scaled_ = square::Zero(), l_ = square::Zero();
+  double scale_[N] = {}, pivots_[N] = {}, inverse_[N] = {};
+  double scaled_[N][N] = {}, l_[N][N] = {};  // the lower triangles
 };
 
 }  // namespace orbis::optimize
