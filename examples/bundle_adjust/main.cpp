@@ -92,15 +92,21 @@ int run(const settings& s, orbis::io::bal_problem& problem, Loss loss) {
   bundle b{problem};
   optimize::bundle_adjuster adjuster{optimize::bal_reprojection{}, loss, chosen_damping{s.damping == "dogleg"},
                                      solver_named(s.solver)};
-  if (!s.json) std::printf("%9s %20s %14s %12s\n", "iteration", "cost", "gradient", "steps tried");
-  const auto summary = adjuster.solve(orbis::par.with(s.threads), std::span{b.cameras}, std::span{b.points},
-                                      std::span<const optimize::bundle_observation>{b.observations},
-                                      {.max_iterations = s.max_iterations, .relative_tolerance = s.tolerance},
-                                      [&](const optimize::bundle_summary& now) {
-                                        if (!s.json)
-                                          std::printf("%9d %20.10g %14.4g %12d\n", now.iterations, now.final_cost,
-                                                      now.gradient, now.steps_tried);
-                                      });
+  // Of the gradient a step tells where it began: it ends the line before its own. Of the last estimate it is not known.
+  bool in_line = false;
+  const auto print = [&](const optimize::bundle_summary& now) {
+    if (s.json) return;
+    if (in_line) std::printf(" %14.4g\n", now.gradient);
+    std::printf("%9d %20.10g %12d", now.iterations, now.final_cost, now.steps_tried);
+    std::fflush(stdout);
+    in_line = true;
+  };
+  if (!s.json) std::printf("%9s %20s %12s %14s\n", "iteration", "cost", "steps tried", "gradient");
+  const auto summary =
+      adjuster.solve(orbis::par.with(s.threads), std::span{b.cameras}, std::span{b.points},
+                     std::span<const optimize::bundle_observation>{b.observations},
+                     {.max_iterations = s.max_iterations, .relative_tolerance = s.tolerance}, {}, print);
+  if (in_line) std::printf("\n");
   if (is_failure(summary.status)) return complain(2, s.input + ": " + to_string(summary));
   if (!s.output.empty()) {
     b.write_to(problem);

@@ -365,7 +365,7 @@ TEST_CASE("An observer sees every step, and a callback can stop them") {
   const auto two = [](std::size_t done, std::size_t) { return done < 2; };
   const auto summary = ba.solve(
       seq, std::span<se3>(p.poses), std::span<vec3>(p.points), std::span<const bundle_observation>(p.observations),
-      {.fixed_poses = p.fixed, .callback = two}, [&](const bundle_summary& s) { seen.push_back(s); });
+      {.fixed_poses = p.fixed}, two, [&](const bundle_summary& s) { seen.push_back(s); });
   CHECK(summary.status == bundle_status::cancelled);
   CHECK(summary.iterations == 2);
   REQUIRE(seen.size() == 3);
@@ -451,7 +451,7 @@ TEST_CASE("Bundle adjustment survives what cannot be adjusted and never makes it
   optimize::bundle_adjuster ba{model, optimize::huber{2.45}};
   const auto refuse = [](std::size_t, std::size_t) { return false; };
   const auto cancelled = ba.solve(seq, std::span<se3>(stopped.poses), std::span<vec3>(stopped.points),
-                                  std::span<const bundle_observation>(stopped.observations), {.callback = refuse});
+                                  std::span<const bundle_observation>(stopped.observations), {}, refuse);
   CHECK(cancelled.status == bundle_status::cancelled);
   CHECK(stopped.points == before);
 }

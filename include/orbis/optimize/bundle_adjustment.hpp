@@ -18,6 +18,7 @@
 #include <vector>
 
 #include <orbis/core/execution.hpp>
+#include <orbis/core/progress.hpp>
 #include <orbis/core/simd.hpp>
 #include <orbis/optimize/bundle_equations.hpp>
 #include <orbis/optimize/bundle_summary.hpp>
@@ -88,19 +89,20 @@ class bundle_adjuster {
   /// and untouched where the status is a failure of the input. Observations that are not finite, or have
   /// no projection at the start, take no part and are counted in the summary.
   ///
-  /// `report(summary)` is called before the first and after every step.
+  /// `callback` is asked with (iteration, max_iterations) before every step whether to go on; `report(summary)` is
+  /// called before the first and after every step.
   /// @pre the options' spans are empty or of matching length
   template <execution_policy Policy, class Report = detail::no_report>
   bundle_summary solve(const Policy& policy, std::span<camera_state> cameras, std::span<vec3> points,
                        std::span<const observation> observations, const bundle_options& options = {},
-                       Report&& report = {}) {
+                       progress callback = {}, Report&& report = {}) {
     bundle_summary summary;
     {
       const detail::stage_watch watch{summary.seconds.set_up};
       if (!check(cameras.size(), points.size(), observations, summary)) return summary;
       set_up(cameras.size(), points.size(), observations, options);
     }
-    return run(policy, cameras, points, options, report, summary);
+    return run(policy, cameras, points, options, callback, report, summary);
   }
 
   /// Solves for the observations of the last call of `solve` again, from these estimates and with these
@@ -108,7 +110,7 @@ class bundle_adjuster {
   /// @pre as many cameras and points as then, and the same observations still where they were
   template <execution_policy Policy, class Report = detail::no_report>
   bundle_summary solve_again(const Policy& policy, std::span<camera_state> cameras, std::span<vec3> points,
-                             const bundle_options& options = {}, Report&& report = {}) {
+                             const bundle_options& options = {}, progress callback = {}, Report&& report = {}) {
     assert(cameras.size() == equations_.structure().count.size());
     bundle_summary summary;
     if (!std::equal(fixed_.begin(), fixed_.end(), options.fixed_poses.begin(), options.fixed_poses.end()) ||
@@ -116,7 +118,7 @@ class bundle_adjuster {
       const detail::stage_watch watch{summary.seconds.set_up};
       set_up(cameras.size(), points.size(), observations_, options);
     }
-    return run(policy, cameras, points, options, report, summary);
+    return run(policy, cameras, points, options, callback, report, summary);
   }
 
   /// The normal equations at the last estimate that was linearised.
@@ -212,7 +214,7 @@ class bundle_adjuster {
 
   template <class Policy, class Report>
   bundle_summary run(const Policy& policy, std::span<camera_state> cameras, std::span<vec3> points,
-                     const bundle_options& options, Report& report, bundle_summary& summary) {
+                     const bundle_options& options, const progress& callback, Report& report, bundle_summary& summary) {
     assert(options.fixed_points.empty() || options.fixed_points.size() == points.size());
     assert(options.ignored.empty() || options.ignored.size() == observations_.size());
     {
@@ -228,19 +230,19 @@ class bundle_adjuster {
     summary.initial_cost = summary.final_cost = equations_.cost();
     summary.status = bundle_status::iteration_limit;
     report(std::as_const(summary));
-    summary.status = iterate(view, options, summary, report);
+    summary.status = iterate(view, options, callback, summary, report);
     summary.linear_iterations = equations_.reduced().iterations() - linear_before;
     if (summary.iterations != 0) equations_.write(cameras, points);
     return summary;
   }
 
   template <class View, class Report>
-  [[nodiscard]] bundle_status iterate(View& view, const bundle_options& options, bundle_summary& summary,
-                                      Report& report) {
+  [[nodiscard]] bundle_status iterate(View& view, const bundle_options& options, const progress& callback,
+                                      bundle_summary& summary, Report& report) {
     typename Damping::state state;
     const auto limit = static_cast<std::size_t>(std::max(0, options.max_iterations));
     for (std::size_t k = 0; k != limit; ++k) {
-      if (!options.callback(k, limit)) return bundle_status::cancelled;
+      if (!callback(k, limit)) return bundle_status::cancelled;
       if (summary.gradient <= options.gradient_tolerance) return bundle_status::converged;
       switch (damping_.advance(state, view, workspace_)) {
         case step_outcome::taken: break;

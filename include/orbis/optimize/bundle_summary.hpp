@@ -10,7 +10,6 @@
 #include <string>
 #include <string_view>
 
-#include <orbis/core/progress.hpp>
 #include <orbis/core/types.hpp>
 
 namespace orbis::optimize {
@@ -39,7 +38,6 @@ struct bundle_options {
   std::span<const std::uint8_t> fixed_points{};  ///< empty, or one for each point, likewise
   std::span<const std::uint8_t> ignored{};       ///< empty, or one for each observation: not 0 leaves it out
   bundle_gauge hold = bundle_gauge::damped;
-  progress callback{};  ///< called with (iteration, max_iterations)
 };
 
 enum class bundle_status {
