@@ -60,6 +60,7 @@ TEST_CASE("The solution is that of the dense matrix, with the same bits for ever
   check_solution<6>(random, 3, {});
   check_solution<6>(random, 144, test::grid_places(12, 12));
   check_solution<3>(random, 144, test::grid_places(12, 12));
+  check_solution<14>(random, 36, test::grid_places(6, 6));
   for (int trial = 0; trial != 20; ++trial) {
     const std::uint32_t size = 2 + random.below(40);
     const auto places = test::random_places(random, size, random.below(std::min(4 * size, size * (size - 1) / 2)));

@@ -60,7 +60,8 @@ TEST_CASE("Every solver of reduced systems solves them, and refuses what is not 
   check<6>(optimize::iterative_reduced_solver{.relative_tolerance = 1e-10}, 40, 3, 1e-9);
   check<9>(optimize::dense_reduced_solver{}, 7, 6, 1e-12);
   check<9>(optimize::sparse_reduced_solver{}, 30, 2, 1e-12);
-  check<10>(optimize::dense_reduced_solver{}, 9, 4, 1e-12);
+  check<12>(optimize::dense_reduced_solver{}, 9, 4, 1e-12);
+  check<12>(optimize::sparse_reduced_solver{}, 30, 2, 1e-12);
 }
 
 TEST_CASE("The automatic solver goes by size and fill") {

@@ -70,4 +70,6 @@ TEST_CASE("Products and triangular solves are right, with the same bits for ever
   check_kernels<3>();
   check_kernels<6>();
   check_kernels<7>();
+  check_kernels<12>();
+  check_kernels<18>();
 }

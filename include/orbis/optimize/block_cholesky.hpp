@@ -26,7 +26,7 @@ namespace orbis::optimize {
 /// Analyse once, factor and solve as often as the numbers change: nothing is allocated then. The
 /// results have the same bits on every processor. Not for several threads at once.
 template <int B>
-requires(B >= 1 && B <= 9) class block_cholesky {
+requires(B >= 1) class block_cholesky {
  public:
   using block = matrix<B, B>;
 

@@ -75,8 +75,7 @@ struct dense_reduced_solver {
   };
 };
 
-/// Block-sparse Cholesky in a fill-reducing order: hundreds to thousands of cameras along a way. For
-/// blocks up to 9 x 9.
+/// Block-sparse Cholesky in a fill-reducing order: hundreds to thousands of cameras along a way.
 struct sparse_reduced_solver {
   template <int C>
   class solver : private block_cholesky<C> {
@@ -130,15 +129,14 @@ struct automatic_reduced_solver {
 
     void analyze(std::size_t size, std::span<const block_place> places) {
       kind_ = kind::dense;
-      if (size > dense_limit_) kind_ = C <= 9 ? kind::sparse : size > 2000 ? kind::iterative : kind::dense;
-      if constexpr (C <= 9)
-        if (kind_ == kind::sparse) {
-          sparse_.analyze(size, places);
-          std::size_t blocks = 0;
-          for (const supernode& s : sparse_.symbolic().supernodes)
-            blocks += std::size_t{s.columns} * (std::size_t{s.columns} + s.rows);
-          if (blocks > fill_limit_) kind_ = kind::iterative;
-        }
+      if (size > dense_limit_) {
+        kind_ = kind::sparse;
+        sparse_.analyze(size, places);
+        std::size_t blocks = 0;
+        for (const supernode& s : sparse_.symbolic().supernodes)
+          blocks += std::size_t{s.columns} * (std::size_t{s.columns} + s.rows);
+        if (blocks > fill_limit_) kind_ = kind::iterative;
+      }
       if (kind_ == kind::dense) dense_.analyze(size, places);
       if (kind_ == kind::iterative) iterative_.analyze(size, places);
     }
@@ -161,15 +159,14 @@ struct automatic_reduced_solver {
     template <class F>
     void with(const F& f) {
       if (kind_ == kind::dense) f(dense_);
-      if constexpr (C <= 9)
-        if (kind_ == kind::sparse) f(sparse_);
+      if (kind_ == kind::sparse) f(sparse_);
       if (kind_ == kind::iterative) f(iterative_);
     }
 
     std::size_t dense_limit_, fill_limit_;
     kind kind_ = kind::dense;
     dense_reduced_solver::solver<C> dense_;
-    sparse_reduced_solver::solver<(C <= 9 ? C : 9)> sparse_;
+    sparse_reduced_solver::solver<C> sparse_;
     iterative_reduced_solver::solver<C> iterative_;
   };
 };

@@ -26,6 +26,10 @@ inline constexpr std::size_t panel_slack = 16;
 using panel_product = void(const double* a, const double* b, std::size_t stride, std::size_t rows, std::size_t depth,
                            double* out, std::size_t out_stride);
 
+/// So many columns of a product are made at once, as sums in registers; what is left of the N comes after them.
+template <std::size_t N>
+inline constexpr std::size_t product_columns = N <= 9 ? N : 8;
+
 /// `X = X L^-T` for the `rows` rows of X below the N x N lower triangle L, both in columns `stride`
 /// apart; `inverse_diagonal` has 1 / L(j, j). Beyond `rows` nothing is written.
 using panel_solve = void(const double* l, const double* inverse_diagonal, std::size_t stride, double* x,
@@ -91,7 +95,9 @@ template <std::size_t N>
 ORBIS_TARGET("avx2")
 void panel_product_avx2(const double* a, const double* b, std::size_t stride, std::size_t rows, std::size_t depth,
                         double* out, std::size_t out_stride) {
-  product_strips_avx2(std::make_index_sequence<N>{}, a, b, stride, rows, depth, out, out_stride);
+  product_strips_avx2(std::make_index_sequence<product_columns<N>>{}, a, b, stride, rows, depth, out, out_stride);
+  if constexpr (constexpr std::size_t done = product_columns<N>; done != N)
+    panel_product_avx2<N - done>(a, b + done, stride, rows, depth, out + done * out_stride, out_stride);
 }
 
 template <std::size_t N>
@@ -144,7 +150,9 @@ template <std::size_t N>
 ORBIS_TARGET("avx512f")
 void panel_product_avx512(const double* a, const double* b, std::size_t stride, std::size_t rows, std::size_t depth,
                           double* out, std::size_t out_stride) {
-  product_strips_avx512(std::make_index_sequence<N>{}, a, b, stride, rows, depth, out, out_stride);
+  product_strips_avx512(std::make_index_sequence<product_columns<N>>{}, a, b, stride, rows, depth, out, out_stride);
+  if constexpr (constexpr std::size_t done = product_columns<N>; done != N)
+    panel_product_avx512<N - done>(a, b + done, stride, rows, depth, out + done * out_stride, out_stride);
 }
 #endif
 
