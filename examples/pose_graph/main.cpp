@@ -45,12 +45,14 @@ template <class Loss, class Damping>
 int run(const settings& s, orbis::io::g2o_graph& graph, Loss loss, Damping damping) {
   optimize::pose_graph_solver<orbis::se3, Loss, Damping> solver{loss, damping};
   if (!s.json) std::printf("%9s %20s %15s\n", "iteration", "cost", "factorizations");
-  const auto summary = solver.solve(
-      orbis::par.with(s.threads), std::span{graph.vertices}, graph.edges,
-      {.max_iterations = s.max_iterations, .fixed = graph.fixed, .hold = optimize::gauge::first_of_each_piece}, {},
-      [&](const optimize::pose_graph_summary& now) {
-        if (!s.json) std::printf("%9d %20.10g %15d\n", now.iterations, now.final_cost, now.factorizations);
-      });
+  const auto summary =
+      solver.solve(orbis::par.with(s.threads), std::span{graph.vertices}, graph.edges,
+                   {.max_iterations = s.max_iterations,
+                    .fixed = graph.fixed,
+                    .hold = optimize::pose_graph_gauge::first_of_each_piece},
+                   {}, [&](const optimize::pose_graph_summary& now) {
+                     if (!s.json) std::printf("%9d %20.10g %15d\n", now.iterations, now.final_cost, now.factorizations);
+                   });
   if (is_failure(summary.status)) return complain(2, s.input + ": " + to_string(summary));
   if (!s.output.empty())
     if (const auto done = write_g2o(s.output, graph); !done) return complain(2, done.error().to_string());
@@ -91,9 +93,9 @@ int main(int argc, char** argv) {
   auto graph = orbis::io::read_g2o(s.input);
   if (!graph) return complain(2, graph.error().to_string());
   if (s.chordal) {
-    const auto start =
-        optimize::initialize_chordally(std::span{graph->vertices}, graph->edges,
-                                       {.fixed = graph->fixed, .hold = optimize::gauge::first_of_each_piece});
+    const auto start = optimize::initialize_chordally(
+        std::span{graph->vertices}, graph->edges,
+        {.fixed = graph->fixed, .hold = optimize::pose_graph_gauge::first_of_each_piece});
     if (is_failure(start.status)) return complain(2, s.input + ": " + to_string(start));
   }
   if (s.loss == "huber") return run(s, *graph, optimize::huber{s.width});

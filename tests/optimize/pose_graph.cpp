@@ -281,7 +281,7 @@ TEST_CASE("Input that cannot be solved is refused with what and where, and left 
   refused(vertices, two_pieces, pose_graph_status::no_gauge, 0);
   const std::vector<std::uint8_t> first{1, 0, 0, 0, 0, 0};
   refused(vertices, two_pieces, pose_graph_status::no_gauge, 3, {.fixed = first});
-  refused(vertices, edges, pose_graph_status::no_gauge, 0, {.hold = gauge::as_given});
+  refused(vertices, edges, pose_graph_status::no_gauge, 0, {.hold = pose_graph_gauge::as_given});
   // Nothing says how far along x vertex 5 is.
   const auto loose = with(4, [&](edge& e) { e.information(0, 0) = 0; });
   refused(vertices, loose, pose_graph_status::bad_information, 4);
@@ -292,7 +292,7 @@ TEST_CASE("Pieces without a fixed vertex can be held by their first") {
   auto edges = chain(6);
   edges.erase(edges.begin() + 2);
   std::vector<se3> vertices(6);
-  const auto s = solve_pose_graph(seq, vertices, edges, {.hold = gauge::first_of_each_piece});
+  const auto s = solve_pose_graph(seq, vertices, edges, {.hold = pose_graph_gauge::first_of_each_piece});
   CHECK(s.status == pose_graph_status::converged);
   for (int i = 0; i != 6; ++i)
     CHECK(vertices[static_cast<std::size_t>(i)].translation().x() == Approx(i % 3).margin(1e-9));

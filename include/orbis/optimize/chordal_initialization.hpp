@@ -30,7 +30,7 @@ namespace orbis::optimize {
 
 struct chordal_options {
   std::span<const std::uint8_t> fixed{};  ///< empty, or one for each vertex: not 0 keeps it where it is
-  gauge hold = gauge::automatic;
+  pose_graph_gauge hold = pose_graph_gauge::automatic;
   bool semidefinite_information = false;  ///< whether edges may say nothing about some direction
 };
 

@@ -117,7 +117,7 @@ class pose_graph_structure {
   /// Finds out what moves. True in `changed` if anything is not as it was. @pre edges name vertices
   template <class Edges>
   [[nodiscard]] pose_graph_finding update(std::size_t vertex_count, const Edges& edges,
-                                          std::span<const std::uint8_t> fixed, gauge policy, bool& changed) {
+                                          std::span<const std::uint8_t> fixed, pose_graph_gauge policy, bool& changed) {
     if (pose_graph_finding finding = find_unknowns(vertex_count, edges, fixed, policy); is_failure(finding.status))
       return finding;
     const auto same = [](const block_place& p, const auto& e) { return p.row == e.from && p.column == e.to; };
@@ -135,7 +135,7 @@ class pose_graph_structure {
  private:
   template <class Edges>
   [[nodiscard]] pose_graph_finding find_unknowns(std::size_t vertex_count, const Edges& edges,
-                                                 std::span<const std::uint8_t> fixed, gauge policy) {
+                                                 std::span<const std::uint8_t> fixed, pose_graph_gauge policy) {
     const auto is_fixed = [&](std::uint32_t v) { return !fixed.empty() && fixed[v] != 0; };
     root_.resize(vertex_count);
     std::iota(root_.begin(), root_.end(), 0U);
@@ -151,7 +151,8 @@ class pose_graph_structure {
       if (is_fixed(v)) anchored_[root_of(v)] = 1;
     std::size_t pieces = 0;
     for (std::uint32_t v = 0; v != vertex_count; ++v) pieces += touched_[v] != 0 && root_of(v) == v ? 1 : 0;
-    const bool hold_first = policy == gauge::first_of_each_piece || (policy == gauge::automatic && pieces == 1);
+    const bool hold_first =
+        policy == pose_graph_gauge::first_of_each_piece || (policy == pose_graph_gauge::automatic && pieces == 1);
 
     unknown.assign(vertex_count, held);
     vertices.clear();

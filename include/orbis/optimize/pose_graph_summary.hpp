@@ -12,7 +12,7 @@ namespace orbis::optimize {
 
 /// Which vertices stay where they are, so that the rest is determined: a graph of relative poses does
 /// not say where it is in the world.
-enum class gauge {
+enum class pose_graph_gauge {
   automatic,            ///< the fixed ones; in a graph in one piece without any, its first vertex
   first_of_each_piece,  ///< the fixed ones; in every piece of the graph without any, its first vertex
   as_given              ///< the fixed ones alone
@@ -63,7 +63,7 @@ struct pose_graph_options {
   int max_iterations = 100;
   double relative_tolerance = 1e-6;       ///< ends when a step changes the cost by less than this share
   std::span<const std::uint8_t> fixed{};  ///< empty, or one for each vertex: not 0 keeps it where it is
-  gauge hold = gauge::automatic;
+  pose_graph_gauge hold = pose_graph_gauge::automatic;
   bool semidefinite_information = false;  ///< whether edges may say nothing about some direction
 };
 
