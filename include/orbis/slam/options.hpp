@@ -56,9 +56,9 @@ struct recovery_options {
 struct triangulation_options {
   std::size_t neighbors = 10;    ///< keyframes around the new one that are searched
   double min_baseline = 0.03;    ///< metres between two keyframes; nearer ones show too little parallax
-  double min_parallax = 0.02;    ///< radians between two rays that make a point: one in 50 of the distance
+  double min_parallax = 0.05;    ///< radians between two rays that make a point: one in 20 of the distance
   std::uint32_t distance = 50;   ///< bits by which descriptors may differ
-  float ratio = 0.8F;            ///< of that to the second best along the line
+  float ratio = 0.6F;            ///< of that to the second best along the line
   float line_distance = 1.96F;   ///< from the epipolar line, pixels of a keypoint's level
   float epipole_radius = 10.0F;  ///< around the epipole nothing is matched, likewise
   double scale_tolerance = 1.5;  ///< by this, and one level, the ratio of levels may differ from that of distances
