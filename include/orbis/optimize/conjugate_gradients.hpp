@@ -91,7 +91,6 @@ class block_conjugate_gradients {
 
  private:
   using part = Eigen::Map<vector>;
-  using const_part = Eigen::Map<const vector>;
   [[nodiscard]] static part at(std::vector<double>& v, std::size_t i) { return part(v.data() + B * i); }
 
   [[nodiscard]] static double dot(const std::vector<double>& a, const std::vector<double>& b) {

@@ -7,7 +7,6 @@
 /// `S` is always double: what has it is a template so that only who uses it has it compiled.
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <concepts>
@@ -339,7 +338,7 @@ template <camera::camera_model Camera>
       pose = in_world(model.pose);
     }
   }
-  if (const double again = judge(pose); !(again <= score)) score = again;
+  judge(pose);  // again: the last pose judged may not be the one that was kept
   if (auto enough = detail::enough_inliers(where, inliers.size(), n, options.min_inliers, 3); !enough)
     return fail(std::move(enough.error()));
   const double rmse = std::sqrt(sum / static_cast<double>(inliers.size()));
