@@ -56,7 +56,7 @@ class kannala_brandt {
     // theta_d / r, which is 1 / z on the axis
     const double scale = r > 0.0 ? radial(theta).first / r : 1.0 / p.z();
     const vec2 pixel{k_.fx * scale * p.x() + k_.cx, k_.fy * scale * p.y() + k_.cy};
-    if (!pixel.allFinite()) return std::nullopt;
+    if (!std::isfinite(pixel.x()) || !std::isfinite(pixel.y())) return std::nullopt;
     return pixel;
   }
   /// The same, with the derivative of the pixel by the point; `jacobian` is untouched if empty.
@@ -66,7 +66,8 @@ class kannala_brandt {
     const double r = std::hypot(p.x(), p.y());
     const double z = p.z();
     if (!(r > 1e-9 * z)) {  // on the axis the model is a pinhole
-      jacobian << k_.fx / z, 0.0, -k_.fx * p.x() / (z * z), 0.0, k_.fy / z, -k_.fy * p.y() / (z * z);
+      jacobian(0, 0) = k_.fx / z, jacobian(0, 1) = 0.0, jacobian(0, 2) = -k_.fx * p.x() / (z * z);
+      jacobian(1, 0) = 0.0, jacobian(1, 1) = k_.fy / z, jacobian(1, 2) = -k_.fy * p.y() / (z * z);
       return pixel;
     }
     const auto [distorted, slope] = radial(std::atan2(r, z));
@@ -75,15 +76,19 @@ class kannala_brandt {
     const double along = slope * z / norm2;  // d theta_d / d r
     const double across = distorted / r;
     const double by_z = -slope * r / norm2;
-    jacobian << k_.fx * (along * c * c + across * s * s), k_.fx * (along - across) * c * s, k_.fx * by_z * c,
-        k_.fy * (along - across) * c * s, k_.fy * (along * s * s + across * c * c), k_.fy * by_z * s;
+    jacobian(0, 0) = k_.fx * (along * c * c + across * s * s);
+    jacobian(0, 1) = k_.fx * (along - across) * c * s;
+    jacobian(0, 2) = k_.fx * by_z * c;
+    jacobian(1, 0) = k_.fy * (along - across) * c * s;
+    jacobian(1, 1) = k_.fy * (along * s * s + across * c * c);
+    jacobian(1, 2) = k_.fy * by_z * s;
     return pixel;
   }
   /// The ray through a pixel, scaled to z = 1, by Newton's method on the angle. Empty outside the
   /// domain, and for NaN.
   [[nodiscard]] std::optional<vec3> unproject(const vec2& pixel) const {
     const vec2 target{(pixel.x() - k_.cx) / k_.fx, (pixel.y() - k_.cy) / k_.fy};
-    const double distorted = target.norm();
+    const double distorted = std::sqrt(target.x() * target.x() + target.y() * target.y());
     if (distorted == 0.0) return vec3{0.0, 0.0, 1.0};
     const auto theta = detail::invert_growing([this](double t) { return radial(t); }, distorted, max_angle_);
     if (!theta || !(*theta < max_angle_)) return std::nullopt;

@@ -30,7 +30,7 @@ class pinhole {
   [[nodiscard]] std::optional<vec2> project(const vec3& p) const {
     if (!(p.z() > 0.0)) return std::nullopt;
     const vec2 pixel{k_.fx * (p.x() / p.z()) + k_.cx, k_.fy * (p.y() / p.z()) + k_.cy};
-    if (!pixel.allFinite()) return std::nullopt;
+    if (!std::isfinite(pixel.x()) || !std::isfinite(pixel.y())) return std::nullopt;
     return pixel;
   }
   /// The same, with the derivative of the pixel by the point; `jacobian` is untouched if empty.
@@ -38,14 +38,16 @@ class pinhole {
     const auto pixel = project(p);
     if (pixel) {
       const double inverse_z = 1.0 / p.z();
-      jacobian << k_.fx * inverse_z, 0.0, -k_.fx * p.x() * inverse_z * inverse_z,  //
-          0.0, k_.fy * inverse_z, -k_.fy * p.y() * inverse_z * inverse_z;
+      jacobian(0, 0) = k_.fx * inverse_z, jacobian(0, 1) = 0.0;
+      jacobian(0, 2) = -k_.fx * p.x() * inverse_z * inverse_z;
+      jacobian(1, 0) = 0.0, jacobian(1, 1) = k_.fy * inverse_z;
+      jacobian(1, 2) = -k_.fy * p.y() * inverse_z * inverse_z;
     }
     return pixel;
   }
   /// The ray through a pixel, scaled to z = 1; empty for NaN and infinity.
   [[nodiscard]] std::optional<vec3> unproject(const vec2& pixel) const {
-    if (!pixel.allFinite()) return std::nullopt;
+    if (!std::isfinite(pixel.x()) || !std::isfinite(pixel.y())) return std::nullopt;
     return vec3{(pixel.x() - k_.cx) / k_.fx, (pixel.y() - k_.cy) / k_.fy, 1.0};
   }
 

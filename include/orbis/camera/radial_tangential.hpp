@@ -63,10 +63,14 @@ class radial_tangential {
     if (pixel) {
       const double inverse_z = 1.0 / p.z();
       const vec2 m{p.x() * inverse_z, p.y() * inverse_z};
-      mat2 j = distort_derivative(m) * inverse_z;
-      j.row(0) *= k_.fx;
-      j.row(1) *= k_.fy;
-      jacobian << j, -(j * m);
+      const mat2 j = distort_derivative(m);
+      for (int i = 0; i != 2; ++i) {
+        const double focal = i == 0 ? k_.fx : k_.fy;
+        const double by_x = j(i, 0) * inverse_z * focal, by_y = j(i, 1) * inverse_z * focal;
+        jacobian(i, 0) = by_x;
+        jacobian(i, 1) = by_y;
+        jacobian(i, 2) = -(by_x * m.x() + by_y * m.y());
+      }
     }
     return pixel;
   }
@@ -75,7 +79,7 @@ class radial_tangential {
   /// within the domain, and for NaN.
   [[nodiscard]] std::optional<vec3> unproject(const vec2& pixel) const {
     const vec2 target{(pixel.x() - k_.cx) / k_.fx, (pixel.y() - k_.cy) / k_.fy};
-    if (!target.allFinite()) return std::nullopt;
+    if (!std::isfinite(target.x()) || !std::isfinite(target.y())) return std::nullopt;
     if (const auto ray = newton(target, target)) return ray;
     return newton(target, radial_start(target));
   }
@@ -90,23 +94,24 @@ class radial_tangential {
   /// The ray that distorts to `target`, from the guess `m`; every step has to stay in the domain.
   [[nodiscard]] std::optional<vec3> newton(const vec2& target, vec2 m) const {
     for (int i = 0; i != max_iterations; ++i) {
-      const vec2 residual = distort(m) - target;
+      const vec2 d = distort(m);
+      const double u = d.x() - target.x(), v = d.y() - target.y();
       const mat2 j = distort_derivative(m);
       const double determinant = j(0, 0) * j(1, 1) - j(0, 1) * j(1, 0);
-      const vec2 step{(j(1, 1) * residual.x() - j(0, 1) * residual.y()) / determinant,
-                      (j(0, 0) * residual.y() - j(1, 0) * residual.x()) / determinant};
-      m -= step;
-      if (!(determinant > 0.0) || !(m.squaredNorm() < domain_)) return std::nullopt;
-      if (step.squaredNorm() <= converged * (1.0 + m.squaredNorm())) return vec3{m.x(), m.y(), 1.0};
+      const double dx = (j(1, 1) * u - j(0, 1) * v) / determinant, dy = (j(0, 0) * v - j(1, 0) * u) / determinant;
+      m = {m.x() - dx, m.y() - dy};
+      const double squared = m.x() * m.x() + m.y() * m.y();
+      if (!(determinant > 0.0) || !(squared < domain_)) return std::nullopt;
+      if (dx * dx + dy * dy <= converged * (1.0 + squared)) return vec3{m.x(), m.y(), 1.0};
     }
     return std::nullopt;
   }
 
   [[nodiscard]] std::optional<vec2> pixel_of(const vec2& m) const {
-    if (!(m.squaredNorm() < domain_)) return std::nullopt;
+    if (!(m.x() * m.x() + m.y() * m.y() < domain_)) return std::nullopt;
     const vec2 d = distort(m);
     const vec2 pixel{k_.fx * d.x() + k_.cx, k_.fy * d.y() + k_.cy};
-    if (!pixel.allFinite()) return std::nullopt;
+    if (!std::isfinite(pixel.x()) || !std::isfinite(pixel.y())) return std::nullopt;
     return pixel;
   }
 
@@ -132,14 +137,15 @@ class radial_tangential {
     const auto [g, dg] = radial(x * x + y * y);
     const double mixed = 2.0 * (dg * x * y + d_.p1 * x + d_.p2 * y);
     mat2 j;
-    j << g + 2.0 * dg * x * x + 2.0 * d_.p1 * y + 6.0 * d_.p2 * x, mixed,  //
-        mixed, g + 2.0 * dg * y * y + 6.0 * d_.p1 * y + 2.0 * d_.p2 * x;
+    j(0, 0) = g + 2.0 * dg * x * x + 2.0 * d_.p1 * y + 6.0 * d_.p2 * x;
+    j(0, 1) = j(1, 0) = mixed;
+    j(1, 1) = g + 2.0 * dg * y * y + 6.0 * d_.p1 * y + 2.0 * d_.p2 * x;
     return j;
   }
 
   /// The ray that `target` has without tangential distortion, or one on the rim of the domain.
   [[nodiscard]] vec2 radial_start(const vec2& target) const {
-    const double distorted = target.norm();
+    const double distorted = std::sqrt(target.x() * target.x() + target.y() * target.y());
     if (distorted == 0.0) return target;
     const double end = std::sqrt(domain_);
     const auto scaled = [&](double r) {
@@ -147,7 +153,8 @@ class radial_tangential {
       return std::pair{r * g, g + 2.0 * r * r * dg};
     };
     const double r = detail::invert_growing(scaled, distorted, end).value_or(0.99 * std::min(end, distorted));
-    return target * (r / distorted);
+    const double scale = r / distorted;
+    return {target.x() * scale, target.y() * scale};
   }
 
   /// The squared radius at which `r g(r^2)` stops growing: with `g = n / q` the first sign change of
