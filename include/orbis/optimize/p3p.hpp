@@ -150,9 +150,11 @@ inline void polish_depths(vec3& l, const std::array<double, 3>& cosines, const s
 
 /// `solution(R, t)` for each pose with `R * points_world[i] + t` on the ray `rays[i]` (unit vectors): a
 /// rotation up to rounding, as a matrix, from the world to the camera.
-template <class Solution>
+template <class Solution, std::same_as<double> S = double>
 void for_each_p3p(const std::array<vec3, 3>& points_world, const std::array<vec3, 3>& rays, Solution&& solution) {
-  const auto& [y1, y2, y3] = rays;
+  using vec3 = matrix<3, 1, S>;
+  using mat3 = matrix<3, 3, S>;
+  const vec3 &y1 = rays[0], &y2 = rays[1], &y3 = rays[2];
   const vec3 d12 = points_world[0] - points_world[1], d13 = points_world[0] - points_world[2];
   const vec3 normal = d12.cross(d13);
   double a12 = d12.squaredNorm(), a13 = d13.squaredNorm();
@@ -237,7 +239,8 @@ template <std::same_as<double> S = double>  // so that only who calls it has it 
   using vec3 = matrix<3, 1, S>;
   using mat3 = matrix<3, 3, S>;
   p3p_solutions solutions;
-  detail::for_each_p3p(points_world, {vec3(rays[0]).normalized(), vec3(rays[1]).normalized(), vec3(rays[2]).normalized()},
+  detail::for_each_p3p(points_world,
+                       {vec3(rays[0]).normalized(), vec3(rays[1]).normalized(), vec3(rays[2]).normalized()},
                        [&](const mat3& rotation, const vec3& translation) {
                          const se3 pose = se3(so3(rotation), translation).inverse();
                          if (pose.translation().allFinite()) solutions.push_back(pose);

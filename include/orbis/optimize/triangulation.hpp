@@ -119,8 +119,7 @@ template <std::same_as<double> S = double>
   const double first_depth = second.cross(t).dot(normal) / size;
   const double second_depth = u.cross(t).dot(normal) / size;
   out.point = T_world_first * vec3(first_depth * first);
-  out.error = std::sqrt(
-      0.5 * (vec3(first - seen_first).squaredNorm() + vec3(second - seen_second).squaredNorm()));
+  out.error = std::sqrt(0.5 * (vec3(first - seen_first).squaredNorm() + vec3(second - seen_second).squaredNorm()));
   out.status = !out.point.allFinite()                    ? triangulation_status::no_parallax
                : first_depth > 0.0 && second_depth > 0.0 ? triangulation_status::ok
                                                          : triangulation_status::behind_camera;
