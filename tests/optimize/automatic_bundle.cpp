@@ -8,6 +8,7 @@
 #include <orbis/optimize/bundle_adjustment.hpp>
 #include <orbis/optimize/reprojection.hpp>
 
+#include "bundle_instances.hpp"
 #include "support.hpp"
 #include "support/catch.hpp"
 #include "templated_residuals.hpp"

@@ -15,6 +15,7 @@
 #include <orbis/optimize/bundle_adjustment.hpp>
 #include <orbis/optimize/bundle_covariance.hpp>
 
+#include "bundle_instances.hpp"
 #include "support.hpp"
 #include "support/catch.hpp"
 

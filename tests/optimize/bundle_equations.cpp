@@ -3,6 +3,7 @@
 #include <orbis/optimize/bal_reprojection.hpp>
 #include <orbis/optimize/bundle_equations.hpp>
 
+#include "bundle_instances.hpp"
 #include "bundles.hpp"
 #include "support/catch.hpp"
 

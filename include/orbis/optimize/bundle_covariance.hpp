@@ -104,6 +104,9 @@ class covariance_computation {
   using observation = typename R::observation;
   using output = bundle_covariance<R>;
   using camera_block = typename output::camera_block;
+  // By way of R: what is done with them is compiled only where there is a computation.
+  using dense = Eigen::Matrix<typename camera_block::Scalar, Eigen::Dynamic, Eigen::Dynamic>;
+  using dense_column = Eigen::Matrix<typename camera_block::Scalar, Eigen::Dynamic, 1>;
 
   covariance_computation(const R& residual, const Loss& loss, const Reduced& reduced)
       : equations_{residual, loss, reduced, simd::detected()} {}
@@ -128,7 +131,7 @@ class covariance_computation {
       return out;
     }
     // Any entries that hold the whole give the same covariances once the gauge is changed.
-    const Eigen::VectorXd damping =
+    const dense_column damping =
         holding_entries(gauge_, static_cast<Eigen::Index>(camera_size * unknowns_), equations_.diagonal());
     out.status = covariance_status::undetermined_camera;
     if (!equations_.eliminate(policy, damping) || !equations_.factor()) {
@@ -199,7 +202,7 @@ class covariance_computation {
   /// Which ways to move, turn and scale the whole leave all residuals as they are: `gauge_`, orthonormal.
   void find_free_directions(std::span<const camera_state> cameras, std::span<const vec3> points) {
     const auto rows = static_cast<Eigen::Index>(camera_size * unknowns_ + 3 * points_);
-    Eigen::MatrixXd all = Eigen::MatrixXd::Zero(rows, 7);  // shift, turn, scale, about the middle of the cameras
+    dense all = dense::Zero(rows, 7);  // shift, turn, scale, about the middle of the cameras
     centres_.resize(unknowns_);
     rotations_.resize(unknowns_);
     vec3 middle = vec3::Zero();
@@ -234,8 +237,8 @@ class covariance_computation {
       block.template block<3, 3>(0, 3) = -hat<double>(from_middle);
       block.col(6) = from_middle;
     }
-    Eigen::MatrixXd energy(7, 7);
-    Eigen::VectorXd alone(7);
+    dense energy(7, 7);
+    dense_column alone(7);
     for (Eigen::Index i = 0; i != 7; ++i) {
       alone[i] = all.col(i).cwiseAbs2().dot(equations_.diagonal());
       energy(i, i) = equations_.curvature(all.col(i));
@@ -297,7 +300,7 @@ class covariance_computation {
   }
 
   /// What the matrix that was factored makes of `right`, whole.
-  void solve(Eigen::Ref<Eigen::VectorXd> x) {
+  void solve(Eigen::Ref<dense_column> x) {
     std::vector<double> cameras(camera_size * unknowns_);
     std::copy_n(x.data(), cameras.size(), cameras.data());
     std::vector<vec3> solved(points_);
@@ -327,21 +330,21 @@ class covariance_computation {
   }
 
   void change_gauge(covariance_gauge gauge) {
-    const Eigen::MatrixXd constraints = gauge == covariance_gauge::first_camera ? first_camera_constraints() : gauge_;
-    Eigen::MatrixXd solved = constraints;
+    const dense constraints = gauge == covariance_gauge::first_camera ? first_camera_constraints() : gauge_;
+    dense solved = constraints;
     for (Eigen::Index k = 0; k != solved.cols(); ++k) solve(solved.col(k));
     change_.set(constraints, gauge_, std::move(solved));
   }
   /// The first camera that moves, as far as the free directions move it; where they can leave it in place,
   /// its distance to the farthest one besides.
-  [[nodiscard]] Eigen::MatrixXd first_camera_constraints() const {
+  [[nodiscard]] dense first_camera_constraints() const {
     std::size_t first = 0;
     while (first + 1 != unknowns_ && is_blind(first)) ++first;
     std::size_t farthest = first;
     for (std::size_t u = first; u != unknowns_; ++u)
       if (!is_blind(u) && (centres_[u] - centres_[first]).norm() > (centres_[farthest] - centres_[first]).norm())
         farthest = u;
-    Eigen::MatrixXd candidates = Eigen::MatrixXd::Zero(gauge_.rows(), 7);
+    dense candidates = dense::Zero(gauge_.rows(), 7);
     for (int i = 0; i != 6; ++i) candidates(camera_row(first) + i, i) = 1.0;
     const vec3 away = centres_[farthest] - centres_[first];
     if (away.norm() > 0.0)
@@ -414,7 +417,7 @@ class covariance_computation {
   std::vector<vec3> centres_;
   std::vector<mat3> rotations_;
   std::vector<camera_block> block_at_, pair_blocks_;  // of the inverse
-  Eigen::MatrixXd gauge_;                             ///< what is free of the whole, by columns
+  dense gauge_;                                       ///< what is free of the whole, by columns
   gauge_change change_;
 };
 
