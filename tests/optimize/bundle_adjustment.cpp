@@ -8,6 +8,7 @@
 #include <orbis/optimize/bal_reprojection.hpp>
 #include <orbis/optimize/bundle_adjustment.hpp>
 
+#include "bundle_instances.hpp"
 #include "bundles.hpp"
 #include "support/allocations.hpp"
 #include "support/catch.hpp"
