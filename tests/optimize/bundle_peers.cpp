@@ -20,6 +20,7 @@
 #include <orbis/optimize/bal_reprojection.hpp>
 #include <orbis/optimize/bundle_adjustment.hpp>
 
+#include "bundle_instances.hpp"
 #include "support.hpp"
 #include "support/catch.hpp"
 #include "support/data.hpp"
