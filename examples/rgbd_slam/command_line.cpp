@@ -47,10 +47,12 @@ CLI::Option* count(CLI::App& cmd, const std::string& name, std::size_t& value, c
   return cmd.add_option(name, value, what)->check(within<std::size_t>(low, high))->type_name("N");
 }
 
+std::string not_empty(const std::string& path) { return path.empty() ? "must not be empty" : ""; }
+
 void add_map_options(CLI::App& cmd, settings& s) {
   cmd.add_option("--out", s.out, "where the files go; made if it is not there")
       ->required()
-      ->check([](const std::string& path) { return path.empty() ? std::string{"must not be empty"} : std::string{}; })
+      ->check(not_empty)
       ->type_name("DIR");
   cmd.add_option("--resolution", s.resolution, "edge of the octree's smallest voxels, metres")
       ->check(within(0.001, 10.0, " m"))
@@ -75,7 +77,7 @@ void add_map_options(CLI::App& cmd, settings& s) {
       ->check(within(0.0, 1000.0))
       ->capture_default_str()
       ->type_name("A");
-  cmd.add_option("--threads", s.threads, "threads for filter and map; the result does not depend on it")
+  cmd.add_option("--threads", s.threads, "threads for filter and octree; 1: for all, as --deterministic")
       ->check(within(1U, 1024U))
       ->type_name("N");
   cmd.add_flag("--quiet", s.quiet, "say nothing but errors");
@@ -100,6 +102,28 @@ void add_recording_options(CLI::App& cmd, settings& s) {
 void add_frame_options(CLI::App& cmd, settings& s) {
   count(cmd, "--frames", s.frames, "use at most N frames");
   count(cmd, "--stride", s.stride, "use every N-th frame")->capture_default_str();
+}
+
+void add_slam_options(CLI::App& cmd, settings& s) {
+  cmd.add_flag("--deterministic", s.deterministic,
+               "the same bytes on every run: mapping and loop closing take place between the frames, not beside them");
+  cmd.add_option("--save-map", s.save_map, "write the map of landmarks when all is tracked")
+      ->check(not_empty)
+      ->type_name("FILE");
+  cmd.add_option("--load-map", s.load_map, "begin with a map of landmarks that was saved, and go on in its world")
+      ->check(not_empty)
+      ->type_name("FILE");
+  cmd.add_flag("--localize-only", s.localize_only,
+               "only find the camera in the loaded map, which stays as it is: no keyframes, no cloud, no octree");
+}
+
+/// What of the options does not go together; empty if all does.
+std::string contradiction(const settings& s) {
+  if (s.localize_only && s.load_map.empty())
+    return "--localize-only wants a map to find the camera in: --load-map FILE";
+  if (s.localize_only && !s.save_map.empty())
+    return "--localize-only leaves the map as it is: there is nothing to save with --save-map";
+  return {};
 }
 
 /// Fills what the command line left open from a TOML file whose keys are the options' long names.
@@ -146,14 +170,15 @@ std::variant<settings, exit_code> read_command_line(int argc, char** argv) {
   cli.require_subcommand(1);
   cli.footer(
       "Exit codes: 0 done, 1 bad usage, 2 unreadable or damaged input (or output that cannot be\n"
-      "written), 3 tracking never started. Interrupting a run keeps what it has reached (130).");
+      "written), 3 tracking never started, or the camera was never found in the loaded map.\n"
+      "Interrupting a run keeps what it has reached (130).");
 
   CLI::App* run = cli.add_subcommand("run", "SLAM on a recording (TUM, 7-Scenes, ICL-NUIM)");
   run->add_option("DATASET", s.input, "the recording's folder")->required()->type_name("");
   add_recording_options(*run, s);
   add_frame_options(*run, s);
   add_map_options(*run, s);
-  run->add_flag("--deterministic", s.deterministic, "the same bytes on every run (so far always the case)");
+  add_slam_options(*run, s);
 
   CLI::App* demo = cli.add_subcommand("demo", "SLAM on a synthetic room made on the fly, with ground truth");
   add_frame_options(*demo, s);
@@ -163,7 +188,7 @@ std::variant<settings, exit_code> read_command_line(int argc, char** argv) {
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
   add_map_options(*demo, s);
-  demo->add_flag("--deterministic", s.deterministic, "the same bytes on every run (so far always the case)");
+  add_slam_options(*demo, s);
 
   CLI::App* eval = cli.add_subcommand("eval", "compare a trajectory with ground truth (TUM format): ATE and RPE");
   eval->add_option("TRAJECTORY", s.input, "the estimate")->required()->type_name("");
@@ -213,6 +238,7 @@ std::variant<settings, exit_code> read_command_line(int argc, char** argv) {
       return complain("--origin: \"" + origin + "\" is not x,y,z in metres", bad_usage);
     s.origin = p;
   }
+  if (const std::string what = contradiction(s); !what.empty()) return complain(what, bad_usage);
   return s;
 }
 

@@ -95,7 +95,7 @@ exit_code evaluate(const settings& s, console& say) {
 
 exit_code map_without_slam(const settings& s, console& say) {
   const auto give_up = [&](const orbis::error& e) { return say.error(e), bad_input; };
-  if (auto ready = prepare_output(s.out); !ready) return give_up(ready.error());
+  if (auto ready = prepare_output(s); !ready) return give_up(ready.error());
   std::error_code ignored;
   auto found = std::filesystem::is_directory(s.input, ignored) ? map_recording(s, say) : map_cloud_file(s, say);
   if (!found) return give_up(found.error());

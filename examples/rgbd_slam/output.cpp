@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "output.hpp"
 
+#include <array>
 #include <cstdio>
 
 #include <orbis/core/file.hpp>
@@ -16,23 +17,48 @@ namespace app {
 
 using orbis::result;
 
-result<void> prepare_output(const std::filesystem::path& out) {
+namespace {
+
+constexpr std::array result_names = {"trajectory.txt",    "keyframes.txt",  "cloud.ply", "cloud_filtered.ply",
+                                     "map_unfiltered.bt", "map.bt",         "map.ot",    "summary.json",
+                                     "report.html",       "trajectory.png", "map.png",   "map_unfiltered.png",
+                                     "filter.png"};
+
+result<void> prepare_folder(const std::filesystem::path& folder) {
   std::error_code ec;
-  std::filesystem::create_directories(out, ec);
-  if (ec) return orbis::fail(orbis::errc::write_failed, out.string(), "cannot be made: " + ec.message());
-  const auto probe = out / ".rgbd_slam_probe";
+  std::filesystem::create_directories(folder, ec);
+  if (ec) return orbis::fail(orbis::errc::write_failed, folder.string(), "cannot be made: " + ec.message());
+  const auto probe = folder / ".rgbd_slam_probe";
   if (auto done = orbis::write_file_atomically(probe, [](std::ostream& file) { file << "probe\n"; }); !done)
-    return orbis::fail(orbis::errc::write_failed, out.string(), "no file can be made in it: " + done.error().message);
+    return orbis::fail(orbis::errc::write_failed, folder.string(),
+                       "no file can be made in it: " + done.error().message);
   std::filesystem::remove(probe, ec);
+  return {};
+}
+
+}  // namespace
+
+result<void> prepare_output(const settings& s) {
+  if (auto ready = prepare_folder(s.out); !ready || s.save_map.empty()) return ready;
+  std::error_code ec;
+  const auto fail = [&](const char* why) {
+    return orbis::fail(orbis::errc::write_failed, s.save_map.string(), std::string{"the map cannot be saved: "} + why);
+  };
+  if (!s.save_map.has_filename()) return fail("this is no name for a file");
+  if (const auto there = std::filesystem::status(s.save_map, ec);
+      std::filesystem::exists(there) && !std::filesystem::is_regular_file(there))
+    return fail("it is not a regular file, and is not replaced by one");
+  const std::filesystem::path folder = s.save_map.has_parent_path() ? s.save_map.parent_path() : ".";
+  if (auto ready = prepare_folder(folder); !ready) return ready;
+  for (const char* name : result_names)
+    if (s.save_map.filename() == name && std::filesystem::equivalent(folder, s.out, ec))
+      return fail("another result has this name");
   return {};
 }
 
 void remove_old_results(const std::filesystem::path& out) {
   std::error_code ignored;
-  for (const char* name :
-       {"trajectory.txt", "keyframes.txt", "cloud.ply", "cloud_filtered.ply", "map_unfiltered.bt", "map.bt", "map.ot",
-        "summary.json", "report.html", "trajectory.png", "map.png", "map_unfiltered.png", "filter.png"})
-    std::filesystem::remove(out / name, ignored);
+  for (const char* name : result_names) std::filesystem::remove(out / name, ignored);
 }
 
 results begin_results(const settings& s, const std::string& title, const frame_source* source) {
@@ -56,11 +82,18 @@ results begin_results(const settings& s, const std::string& title, const frame_s
                                        number(", cy %.1f", k.cy) + number(", depth / %g = metres", camera.depth_scale));
     r.setup.emplace_back(
         "frames", std::to_string(source->frames) + (s.stride > 1 ? ", every " + std::to_string(s.stride) + "th" : ""));
-    if (s.what == command::run || s.what == command::demo)
-      r.setup.emplace_back("world", source->ground_truth.empty()
-                                        ? "the first tracked camera"
-                                        : "the ground truth's, by its pose of the first tracked "
-                                          "frame");
+    if (s.what == command::run || s.what == command::demo) {
+      r.setup.emplace_back("world", !s.load_map.empty()            ? "the loaded map's, where the camera is found in it"
+                                    : source->ground_truth.empty() ? "the first tracked camera"
+                                                                   : "the ground truth's, by its pose of the first "
+                                                                     "tracked frame");
+      if (!s.load_map.empty())
+        r.setup.emplace_back("map of landmarks", "begun with " + s.load_map.filename().string() +
+                                                     (s.localize_only ? ", which stays as it is" : ""));
+      r.setup.emplace_back("mapping of landmarks", s.localize_only                     ? "none"
+                                                   : s.deterministic || s.threads == 1 ? "between the frames"
+                                                                                       : "beside tracking");
+    }
     r.warnings = source->notes;
   } else {
     r.setup.emplace_back("input", s.input.filename().string());
@@ -97,12 +130,16 @@ result<void> write_report_files(results& r, const orbis::trajectory& cameras, co
   return {};
 }
 
-exit_code report_no_start(results& r, const settings& s, console& say) {
+orbis::error explain_no_start(const results& r, const settings& s) {
+  return {
+      orbis::errc::no_data, s.what == command::demo ? r.title : s.input.string(),
+      "tracking never started: none of " + std::to_string(r.slam->frames) + " frames shows enough texture with depth"};
+}
+
+exit_code report_no_start(results& r, const orbis::error& why, console& say) {
   r.wall_s = say.total();
   if (auto done = write_summary(r); !done) return say.error(done.error()), bad_input;
-  say.error({orbis::errc::no_data, s.what == command::demo ? r.title : s.input.string(),
-             "tracking never started: none of " + std::to_string(r.slam->frames) +
-                 " frames shows enough texture with depth"});
+  say.error(why);
   return never_tracked;
 }
 

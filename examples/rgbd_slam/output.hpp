@@ -12,8 +12,8 @@
 
 namespace app {
 
-/// Makes the folder and sees whether files can be made in it, before any work is done.
-[[nodiscard]] orbis::result<void> prepare_output(const std::filesystem::path& out);
+/// Makes the folders of what will be written and sees whether files can be made in them, before any work is done.
+[[nodiscard]] orbis::result<void> prepare_output(const settings& s);
 /// Takes away what an earlier run left there, so that no file contradicts another.
 void remove_old_results(const std::filesystem::path& out);
 
@@ -24,8 +24,10 @@ void remove_old_results(const std::filesystem::path& out);
 [[nodiscard]] orbis::result<void> write_trajectories(const slam_results& slam, const std::filesystem::path& out);
 /// Writes pictures, report.html and summary.json.
 [[nodiscard]] orbis::result<void> write_report_files(results& r, const orbis::trajectory& cameras, console& say);
-/// Where not a single frame was tracked: summary.json, a line on stderr, and the code for it.
-[[nodiscard]] exit_code report_no_start(results& r, const settings& s, console& say);
+/// That no frame had what it takes.
+[[nodiscard]] orbis::error explain_no_start(const results& r, const settings& s);
+/// Where not a single frame was tracked: summary.json, `why` as a line on stderr, and the code for it.
+[[nodiscard]] exit_code report_no_start(results& r, const orbis::error& why, console& say);
 /// The tables, and where the files are, on the terminal.
 void print_results(const results& r, console& say);
 

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include <orbis/mapping/keyframe.hpp>
+#include <orbis/slam/atlas.hpp>
 
 #include "source.hpp"
 
@@ -22,20 +23,22 @@ class posed_frames {
  public:
   explicit posed_frames(const frame_source& source) : source_{&source} {}
 
-  /// Frame number `i` of the source, where the camera was at `T_world_camera`. @pre `i` ascends
+  /// Frame number `i` of the source, where the camera was at `T_world_camera`.
   void add(std::size_t i, const orbis::se3& T_world_camera, const orbis::camera::rgbd_frame& frame) {
-    entries_.push_back({i, T_world_camera, nullptr});
-    constexpr std::size_t budget = std::size_t{512} << 20U;
-    const std::size_t bytes = frame.color.pixels().size_bytes() + frame.depth.pixels().size_bytes();
-    if (in_memory_ + bytes > budget) return;
-    in_memory_ += bytes;
-    entries_.back().frame = std::make_shared<const orbis::camera::rgbd_frame>(frame);
+    entries_.push_back({i, {}, T_world_camera, kept_of(frame)});
   }
-  /// Frame number `i` of the source is now at `T_world_camera`. @pre it was added
-  void move(std::size_t i, const orbis::se3& T_world_camera) {
-    const auto at = std::lower_bound(entries_.begin(), entries_.end(), i,
-                                     [](const entry& e, std::size_t index) { return e.index < index; });
-    at->T_world_camera = T_world_camera;
+  /// Frame number `i` of the source, which has become a keyframe; where it was is said in the end (`place`).
+  void add(std::size_t i, orbis::slam::map_keyframe keyframe, const orbis::camera::rgbd_frame& frame) {
+    entries_.push_back({i, keyframe, {}, kept_of(frame)});
+  }
+  /// Puts each frame where `where(keyframe)` says; those of which it says nothing are dropped.
+  template <class Where>
+  void place(const Where& where) {
+    std::erase_if(entries_, [&](entry& e) {
+      const std::optional<orbis::se3> T_world_camera = where(e.keyframe);
+      if (T_world_camera) e.T_world_camera = *T_world_camera;
+      return !T_world_camera;
+    });
   }
 
   [[nodiscard]] std::size_t size() const { return entries_.size(); }
@@ -85,9 +88,19 @@ class posed_frames {
  private:
   struct entry {
     std::size_t index;
+    orbis::slam::map_keyframe keyframe;
     orbis::se3 T_world_camera;
     std::shared_ptr<const orbis::camera::rgbd_frame> frame;
   };
+
+  /// A copy, while there is room for it.
+  [[nodiscard]] std::shared_ptr<const orbis::camera::rgbd_frame> kept_of(const orbis::camera::rgbd_frame& frame) {
+    constexpr std::size_t budget = std::size_t{512} << 20U;
+    const std::size_t bytes = frame.color.pixels().size_bytes() + frame.depth.pixels().size_bytes();
+    if (in_memory_ + bytes > budget) return nullptr;
+    in_memory_ += bytes;
+    return std::make_shared<const orbis::camera::rgbd_frame>(frame);
+  }
 
   [[nodiscard]] std::shared_ptr<const orbis::camera::rgbd_frame> load(std::size_t number) const {
     if (entries_[number].frame) return entries_[number].frame;

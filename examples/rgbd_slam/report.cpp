@@ -271,8 +271,36 @@ std::string words(const std::vector<std::pair<std::string, std::string>>& rows) 
   return t + "</table></div>\n";
 }
 
+/// "4, 100 ... 120": the first stretches, and how many more there are.
+std::string stretches(const std::vector<frame_range>& ranges) {
+  constexpr std::size_t most = 12;
+  std::string list;
+  for (std::size_t i = 0; i != std::min(ranges.size(), most); ++i) {
+    const frame_range& f = ranges[i];
+    list += (i == 0 ? "" : ", ") + std::to_string(f.first);
+    if (f.count > 1) list += " ... " + std::to_string(f.first + f.count - 1);
+  }
+  if (ranges.size() > most) list += " and " + std::to_string(ranges.size() - most) + " stretches more";
+  return list;
+}
+
+std::string tracking_words(const slam_results& s) {
+  std::vector<std::pair<std::string, std::string>> rows;
+  rows.emplace_back("map of landmarks", count_text(s.landmarks) + " landmarks in " + count_text(s.keyframes.size()) +
+                                            " keyframes; " + count_text(s.keyframes_culled) +
+                                            " keyframes were culled, as others show the same");
+  rows.emplace_back("loops closed", count_text(s.loops_closed));
+  if (s.maps_merged != 0) rows.emplace_back("maps merged", count_text(s.maps_merged));
+  rows.emplace_back("lost", s.lost == 0 ? std::string{"never"}
+                                        : count_text(s.lost) + " frames (" + stretches(s.lost_stretches) + ")");
+  if (s.relocalized != 0)
+    rows.emplace_back("found by looks", count_text(s.relocalized) + " frames, without a pose before");
+  return "<h2>Tracking</h2>\n" + words(rows);
+}
+
 std::string tables(const results& r, const view_frame& frame) {
   std::string t;
+  if (r.slam) t += tracking_words(*r.slam);
   if (r.map) {
     const map_results& m = *r.map;
     const auto row = [](const std::string& what, std::uintmax_t count, const char* unit, std::uintmax_t occupied,

@@ -62,8 +62,15 @@ struct accuracy {
   orbis::se3 T_truth_map;       ///< the same by the poses: well determined on the shortest path
 };
 
+/// Frames one after the other.
+struct frame_range {
+  std::size_t first = 0, count = 0;
+};
+
 struct slam_results {
-  std::size_t frames = 0, tracked = 0, lost = 0, relocalized = 0, landmarks = 0, loops_closed = 0;
+  std::size_t frames = 0, tracked = 0, lost = 0, relocalized = 0, landmarks = 0;
+  std::size_t loops_closed = 0, maps_merged = 0, keyframes_culled = 0;
+  std::vector<frame_range> lost_stretches;
   std::vector<double> tracking_ms;
   double seconds = 0.0;  ///< reading and tracking
   orbis::trajectory trajectory, keyframes;

@@ -40,6 +40,10 @@ struct settings {
   double sigma = 1.0;
   double radius = 0.05;  ///< of the radius filter, metres
 
+  std::filesystem::path load_map;  ///< of landmarks, to begin with; empty: none
+  std::filesystem::path save_map;  ///< of landmarks, in the end; empty: nowhere
+  bool localize_only = false;      ///< the loaded map stays as it is
+
   unsigned threads = 0;  ///< 0: all
   bool deterministic = false;
   bool quiet = false;

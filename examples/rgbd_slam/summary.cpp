@@ -64,6 +64,8 @@ std::string summary_json(const results& r) {
   j["keyframes"] = s ? json(s->keyframes.size()) : null;
   j["landmarks"] = s ? json(s->landmarks) : null;
   j["loops_closed"] = s ? json(s->loops_closed) : null;
+  j["maps_merged"] = s ? json(s->maps_merged) : null;
+  j["keyframes_culled"] = s ? json(s->keyframes_culled) : null;
   const spread tracking = spread_of(s ? s->tracking_ms : std::vector<double>{});
   j["tracking_ms"] = {{"median", tracking.median}, {"p95", tracking.p95}, {"mean", tracking.mean}};
   j["wall_s"] = r.wall_s;

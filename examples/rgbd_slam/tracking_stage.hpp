@@ -4,6 +4,10 @@
 #pragma once
 
 #include <optional>
+#include <string>
+#include <vector>
+
+#include <orbis/core/result.hpp>
 
 #include "console.hpp"
 #include "posed_frames.hpp"
@@ -17,12 +21,18 @@ struct tracked_frames {
   slam_results slam;
   posed_frames keyframes;               ///< with their images, for the map
   std::optional<orbis::error> stopped;  ///< why not all frames were read
+  std::optional<orbis::error> unsaved;  ///< why the map of landmarks could not be saved
+  bool missed_map = false;              ///< a map was loaded, and the camera never found in it
 };
 
-/// Tracks the source's frames, up to the first that cannot be read, or to Ctrl-C.
-[[nodiscard]] tracked_frames track(const frame_source& source, const settings& s, console& say);
+/// Tracks the source's frames, up to the first that cannot be read, or to Ctrl-C. Errors: a map that cannot be loaded.
+[[nodiscard]] orbis::result<tracked_frames> track(const frame_source& source, const settings& s, console& say);
 
 /// The error that stopped the tracking, with what was reached. @pre tracked.stopped
 [[nodiscard]] orbis::error explain_stop(const tracked_frames& tracked, const frame_source& source);
+/// That the camera was never found in the loaded map, and what that means.
+[[nodiscard]] orbis::error explain_miss(const tracked_frames& tracked, const settings& s);
+/// What else the user should know of.
+[[nodiscard]] std::vector<std::string> tracking_notes(const tracked_frames& tracked, const settings& s);
 
 }  // namespace app
