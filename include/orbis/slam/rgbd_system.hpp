@@ -195,6 +195,7 @@ class rgbd_system {
       if (map != shared_.atlas.active_id()) {
         shared_.atlas.activate(map);
         state_ = track_state::lost;
+        lost_since_.reset();
       }
       return true;
     });
@@ -233,6 +234,7 @@ class rgbd_system {
     for (const keyframe& k : shared_.atlas.active().keyframes())
       shared_.places.add({id, k.id}, shared_.places.describe(k.features));
     state_ = track_state::lost;
+    lost_since_.reset();
     return {};
   }
 
@@ -274,8 +276,9 @@ class rgbd_system {
     if (state_ == track_state::not_started) return start(f);
     if (const std::size_t inliers = locate(f); inliers > 0) return inliers;
     if (is_tracking()) lost_since_ = last_.timestamp;
+    if (!lost_since_) lost_since_ = f.timestamp;
     state_ = track_state::lost;
-    if (localization_only_ || f.timestamp - lost_since_ < options_.recovery.new_map_after) return 0;
+    if (localization_only_ || f.timestamp - *lost_since_ < options_.recovery.new_map_after) return 0;
     return start_afresh(f);
   }
 
@@ -443,7 +446,7 @@ class rgbd_system {
   se3 T_reference_last_;
   std::optional<vec6> velocity_;  ///< of the camera in its own frame, per last interval
   double last_interval_ = 0.0;
-  double lost_since_ = 0.0;
+  std::optional<double> lost_since_;  ///< time stamp; none: since the next frame
 
   std::unique_ptr<worker<map_id>> global_worker_;
   std::unique_ptr<worker<map_keyframe>> loop_worker_, map_worker_;
