@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 include(${CMAKE_CURRENT_LIST_DIR}/support.cmake)
 
-app(0 demo --frames 40 --width 320 --resolution 0.1 --out demo)
+app(0 demo --frames 40 --width 320 --resolution 0.1 --deterministic --save-map room.map --out demo)
 set(files trajectory.txt keyframes.txt cloud.ply cloud_filtered.ply map_unfiltered.bt map.bt map.ot summary.json
           report.html trajectory.png map.png map_unfiltered.png filter.png)
 must_exist(${WORK}/demo ${files})
@@ -32,7 +32,7 @@ math(EXPR difference "${points} - ${kept}")
 check(removed EQUAL difference)
 
 # Every field of the contract is there.
-set(fields frames tracked lost relocalized keyframes landmarks loops_closed tracking_ms:median tracking_ms:p95
+set(fields frames tracked lost relocalized keyframes landmarks loops_closed maps_merged keyframes_culled tracking_ms:median tracking_ms:p95
            tracking_ms:mean wall_s fps peak_rss_mb ate_rmse_m rpe_trans_rmse_m rpe_rot_rmse_deg filter:mode
            filter:reason filter:removed cloud:points cloud:points_filtered cloud:bytes cloud:bytes_filtered
            octree:resolution_m octree:leaves_unfiltered octree:leaves octree:occupied octree:free
@@ -81,12 +81,21 @@ if(CONVERT_OCTREE)
   check(theirs STREQUAL ours)
 endif()
 
-# --quiet says nothing; the result is the same, to the byte, whatever the threads.
-app(0 demo --frames 40 --width 320 --resolution 0.1 --out again --quiet --threads 1)
+# --quiet says nothing; one thread means the same bytes as --deterministic.
+app(0 demo --frames 40 --width 320 --resolution 0.1 --out again --save-map again.map --quiet --threads 1)
 string(LENGTH "${out}${err}" said)
 check(said EQUAL 0)
-foreach(name trajectory.txt keyframes.txt cloud.ply cloud_filtered.ply map_unfiltered.bt map.bt map.ot)
+foreach(name trajectory.txt keyframes.txt cloud.ply cloud_filtered.ply map_unfiltered.bt map.bt map.ot trajectory.png
+             map.png map_unfiltered.png filter.png)
   file(SHA256 ${WORK}/demo/${name} first)
   file(SHA256 ${WORK}/again/${name} second)
   check(first STREQUAL second)
+endforeach()
+file(SHA256 ${WORK}/room.map first)
+file(SHA256 ${WORK}/again.map second)
+check(first STREQUAL second)
+foreach(field frames tracked keyframes landmarks loops_closed maps_merged keyframes_culled ate_rmse_m map_error_m)
+  summary(one ${WORK}/demo ${field})
+  summary(other ${WORK}/again ${field})
+  check(one STREQUAL other)
 endforeach()
