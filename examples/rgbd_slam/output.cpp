@@ -101,6 +101,7 @@ results begin_results(const settings& s, const std::string& title, const frame_s
                                                 number("%g", s.origin->z())
                                           : "none: points are marked occupied, nothing is marked free");
   }
+  if (s.localize_only) return r;
   r.setup.emplace_back("octree",
                        number("%g cm voxels", 100 * s.resolution) + number(", measurements up to %g m", s.max_depth));
   r.setup.emplace_back("filter asked for", filter_in_words(s));

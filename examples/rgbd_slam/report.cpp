@@ -286,9 +286,10 @@ std::string stretches(const std::vector<frame_range>& ranges) {
 
 std::string tracking_words(const slam_results& s) {
   std::vector<std::pair<std::string, std::string>> rows;
-  rows.emplace_back("map of landmarks", count_text(s.landmarks) + " landmarks in " + count_text(s.keyframes.size()) +
-                                            " keyframes; " + count_text(s.keyframes_culled) +
-                                            " keyframes were culled, as others show the same");
+  rows.emplace_back("map of landmarks",
+                    count_text(s.landmarks) + " landmarks in " + count_text(s.keyframes.size()) + " keyframes");
+  if (s.keyframes_culled != 0)
+    rows.emplace_back("keyframes culled", count_text(s.keyframes_culled) + ", as others show the same landmarks");
   rows.emplace_back("loops closed", count_text(s.loops_closed));
   if (s.maps_merged != 0) rows.emplace_back("maps merged", count_text(s.maps_merged));
   rows.emplace_back("lost", s.lost == 0 ? std::string{"never"}
