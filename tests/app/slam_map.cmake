@@ -56,6 +56,20 @@ app_fails(3 "maps/first.map: the camera was never found.*was not saved over it" 
 must_exist(${WORK}/other trajectory.txt cloud.ply)
 must_equal(maps/first.map maps/copy.map)
 
+# A loaded map is given up after a second, not at the first frame, whatever the clock says.
+app(0 ${room} --seed 2 --frames 2 --save-map maps/elsewhere.map --out elsewhere)
+make_recording(${WORK}/late 6 320)
+foreach(list rgb depth)
+  file(READ ${WORK}/late/${list}.txt lines)
+  string(REGEX REPLACE "(^|\n)0" "\\11300000000" lines "${lines}")
+  file(WRITE ${WORK}/late/${list}.txt "${lines}")
+endforeach()
+file(REMOVE ${WORK}/late/groundtruth.txt)
+app_fails(3 "maps/elsewhere.map: the camera was never found in this map: none of 6 frames"
+          run late --quiet --load-map maps/elsewhere.map --out late_out)
+summary(tracked ${WORK}/late_out tracked)
+check(tracked EQUAL 0)
+
 # What was reached is saved though the run is cut short.
 execute_process(COMMAND timeout --preserve-status --signal=TERM 2 ${APP} ${room} --frames 100000 --out cut
                         --save-map maps/cut.map
