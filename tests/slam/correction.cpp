@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <cstddef>
 #include <set>
 #include <vector>
 
@@ -78,5 +79,33 @@ TEST_CASE("Landmarks go with the oldest of the keyframes that are moved") {
              before.at(by->keyframe).T_world_camera.inverse() * l.position)
                 .norm() < 1e-9);
     }
+  }
+}
+
+TEST_CASE("All keyframes at once move as one by one; landmarks may be updated part by part") {
+  random_bits random(7);
+  slam::map one = test::random_map(8, 1500, 25), all = one;
+  std::vector<se3> motion, poses;
+  std::vector<slam::keyframe_id> moved;
+  for (slam::keyframe_id k = 0; k != one.keyframe_end(); ++k) motion.push_back(test::random_motion(random));
+  for (const auto& k : one.keyframes()) {
+    moved.push_back(k.id);
+    poses.push_back(motion[k.id] * k.T_world_camera);
+  }
+  slam::move_keyframes(one, moved, poses);
+  slam::move_all(all, motion);
+  for (const auto& k : one.keyframes()) CHECK(distance(all.at(k.id).T_world_camera, k.T_world_camera) < 1e-12);
+  for (const auto& l : one.landmarks()) CHECK((all.landmark_at(l.id).position - l.position).norm() < 1e-9);
+
+  slam::map parts = all;
+  CHECK_FALSE(slam::update_landmarks(all, 0, all.landmark_end()));
+  slam::landmark_id at = 0;
+  std::size_t steps = 1;
+  for (; slam::update_landmarks(parts, at, 100); at += 100) ++steps;
+  CHECK(steps == (parts.landmark_end() + 99) / 100);
+  CHECK_FALSE(slam::update_landmarks(parts, parts.landmark_end() + 5, 100));
+  for (const auto& l : all.landmarks()) {
+    CHECK(parts.landmark_at(l.id).normal == l.normal);
+    CHECK(parts.landmark_at(l.id).max_distance == l.max_distance);
   }
 }

@@ -139,3 +139,31 @@ TEST_CASE("Adjustment is the same every time, and may be stopped") {
   world.walk(single, 0, 1, world.truth(0));
   CHECK(slam::adjust_globally(single, world.model, world.scales).keyframes == 0);
 }
+
+TEST_CASE("A map may be gathered part by part; what is added in between takes no part") {
+  test::ring_world world({.steps = 60});
+  const slam::map before = closed_ring(world);
+  slam::map whole = before, parts = before;
+  slam::global_adjustment<camera::pinhole> at_once, adjustment;
+  REQUIRE(at_once.gather(whole, world.model, world.scales));
+  slam::frame next = before.at(63);
+  for (std::size_t i = 0; i < next.size(); i += 2) next.landmarks[i] = slam::no_id;
+  slam::insert_keyframe(whole, next, {});
+
+  std::size_t steps = 1;
+  REQUIRE(adjustment.gather_keyframes(parts, world.model, world.scales));
+  for (; adjustment.gather_landmarks(parts, 500); ++steps)
+    if (steps == 1) slam::insert_keyframe(parts, next, {});
+  CHECK(steps == (before.landmark_end() + 499) / 500);
+  REQUIRE(steps > 2);
+  REQUIRE(adjustment.has_gathered());
+  REQUIRE((at_once.solve() && adjustment.solve()));
+  at_once.apply(whole);
+  adjustment.apply(parts);
+  CHECK(test::fault_of(parts) == "");
+  REQUIRE(parts.keyframes().size() == whole.keyframes().size());
+  for (const auto& k : whole.keyframes())
+    CHECK(parts.at(k.id).T_world_camera.to_matrix() == k.T_world_camera.to_matrix());
+  REQUIRE(parts.landmark_count() == whole.landmark_count());
+  for (const auto& l : whole.landmarks()) CHECK(parts.landmark_at(l.id).position == l.position);
+}

@@ -20,6 +20,7 @@
 #include <orbis/optimize/reprojection.hpp>
 #include <orbis/optimize/robust_loss.hpp>
 #include <orbis/slam/carried_motion.hpp>
+#include <orbis/slam/correction.hpp>
 #include <orbis/slam/landmark_search.hpp>
 #include <orbis/slam/map.hpp>
 #include <orbis/slam/options.hpp>
@@ -51,6 +52,14 @@ class global_adjustment {
   /// False if there is nothing to adjust. O(observations).
   bool gather(const map& m, const optimize::reprojection<Camera>& model, const pyramid_scales& scales,
               const global_adjustment_options& o = {}) {
+    for (bool more = gather_keyframes(m, model, scales, o); more;) more = gather_landmarks(m, m.landmark_end());
+    return has_gathered();
+  }
+  /// The same part by part, for whoever shares the map: first the keyframes, then so many landmarks at a time. False if
+  /// nothing follows; then `has_gathered` is what `gather` would say. Keyframes, landmarks and observations may be
+  /// added in between, and take no part.
+  bool gather_keyframes(const map& m, const optimize::reprojection<Camera>& model, const pyramid_scales& scales,
+                        const global_adjustment_options& o = {}) {
     options_ = o;
     adjuster_.emplace(model, optimize::huber{2.447});
     keyframes_.clear();
@@ -62,40 +71,52 @@ class global_adjustment {
     sources_.clear();
     if (m.keyframes().size() < 2) return false;
 
-    std::vector<double> information;
-    for (int level = 0; level < std::max(1, scales.levels); ++level) information.push_back(scales.information(level));
-    std::vector<std::uint32_t> index(m.keyframe_end(), no_id);
+    model_.emplace(model);
+    scales_ = scales;
+    information_.clear();
+    for (int level = 0; level < std::max(1, scales.levels); ++level) information_.push_back(scales.information(level));
+    index_.assign(m.keyframe_end(), no_id);
+    next_landmark_ = 0;
+    end_landmark_ = m.landmark_end();
     for (const keyframe& k : m.keyframes()) {
       std::size_t shared = 0;
-      for (const landmark_id l : k.landmarks) shared += l != no_id && m.landmark_at(l).observations.size() > 1;
+      for (auto l = k.landmarks.begin(); l != k.landmarks.end() && shared < o.min_observations; ++l)
+        shared += *l != no_id && m.landmark_at(*l).observations.size() > 1;
       if (shared < o.min_observations && k.id != m.tree().root()) continue;
-      index[k.id] = static_cast<std::uint32_t>(keyframes_.size());
+      index_[k.id] = static_cast<std::uint32_t>(keyframes_.size());
       keyframes_.push_back(k.id);
       poses_.push_back(k.T_world_camera);
       fixed_.push_back(k.id == m.tree().root() ? 1 : 0);
     }
-    for (const landmark& l : m.landmarks()) {
+    return next_landmark_ != end_landmark_;
+  }
+  bool gather_landmarks(const map& m, landmark_id count) {
+    const landmark_id stop = next_landmark_ + std::min(count, end_landmark_ - next_landmark_);
+    for (; next_landmark_ != stop; ++next_landmark_) {
+      if (!m.is_alive(next_landmark_)) continue;
+      const landmark& l = m.landmark_at(next_landmark_);
       std::size_t seen = 0;
-      for (const observation& by : l.observations) seen += index[by.keyframe] != no_id;
+      for (const observation& by : l.observations) seen += takes_part(by.keyframe);
       if (seen < 2) continue;
       const auto point = static_cast<std::uint32_t>(points_.size());
       landmarks_.push_back(l.id);
       points_.push_back(l.position);
       for (const observation& by : l.observations) {
-        if (index[by.keyframe] == no_id) continue;
+        if (!takes_part(by.keyframe)) continue;
         const keyframe& k = m.at(by.keyframe);
         const vec2 pixel = k.pixel(by.feature);
-        optimize::bundle_observation seen_at{index[by.keyframe], point, pixel};
-        if (k.has_depth(by.feature)) seen_at.right = model.right(pixel.x(), static_cast<double>(k.depth[by.feature]));
+        optimize::bundle_observation seen_at{index_[by.keyframe], point, pixel};
+        if (k.has_depth(by.feature)) seen_at.right = model_->right(pixel.x(), static_cast<double>(k.depth[by.feature]));
         const auto level = static_cast<std::size_t>(std::max(0, k.features.keypoints[by.feature].octave));
         seen_at.information =
-            level < information.size() ? information[level] : scales.information(static_cast<int>(level));
+            level < information_.size() ? information_[level] : scales_.information(static_cast<int>(level));
         observations_.push_back(seen_at);
         sources_.push_back(by);
       }
     }
-    return !observations_.empty();
+    return next_landmark_ != end_landmark_;
   }
+  [[nodiscard]] bool has_gathered() const noexcept { return !observations_.empty(); }
 
   /// False if it was stopped (`callback(iteration, iterations)` returned false), or the problem cannot be solved: there
   /// is nothing to apply then. The result is the same for every policy. @pre `gather` was true
@@ -133,6 +154,12 @@ class global_adjustment {
 
   /// @pre `solve` was true, and the map is that of `gather`, with what was added since
   global_adjustment_report apply(map& m) {
+    const global_adjustment_report report = move(m);
+    update_landmarks(m, 0, m.landmark_end());
+    return report;
+  }
+  /// The same, but for `update_landmarks`, which is left to the caller.
+  global_adjustment_report move(map& m) {
     const std::vector<se3> motion = carried_motion(m, keyframes_, poses_);
     // Whatever takes no part goes with a keyframe, and only then do the others go where they should.
     std::size_t next = 0;
@@ -159,12 +186,11 @@ class global_adjustment {
       m.forget(l, sources_[i].keyframe);
       ++report.forgotten;
     }
-    for (landmark_id l = 0; l != m.landmark_end(); ++l)
-      if (m.is_alive(l)) m.update(l);
     return report;
   }
 
  private:
+  [[nodiscard]] bool takes_part(keyframe_id k) const { return k < index_.size() && index_[k] != no_id; }
   [[nodiscard]] static bool is_usable(const optimize::bundle_summary& s) {
     return !optimize::is_failure(s.status) && s.status != optimize::bundle_status::cancelled;
   }
@@ -176,6 +202,11 @@ class global_adjustment {
   }
 
   global_adjustment_options options_;
+  std::optional<optimize::reprojection<Camera>> model_;
+  pyramid_scales scales_;
+  std::vector<double> information_;   // by level
+  std::vector<std::uint32_t> index_;  // by keyframe, among those that take part
+  landmark_id next_landmark_ = 0, end_landmark_ = 0;
   std::optional<optimize::bundle_adjuster<optimize::reprojection<Camera>>> adjuster_;
   std::vector<keyframe_id> keyframes_;
   std::vector<se3> poses_;

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include <orbis/camera/model.hpp>
+#include <orbis/slam/correction.hpp>
 #include <orbis/slam/global_adjustment.hpp>
 #include <orbis/slam/loop_correction.hpp>
 #include <orbis/slam/loop_detection.hpp>
@@ -48,18 +49,29 @@ class loop_closer {
   void adjust_globally(map_id id) {
     if (!shared_.settings.places.adjusts_globally) return;
     const auto start = clock::now();
-    const std::uint64_t before = corrections_;
-    const bool any = shared_.locked([&] {
-      return shared_.atlas.contains(id) && adjustment_.gather(shared_.atlas.at(id), shared_.model, shared_.scales,
-                                                              shared_.settings.places.adjustment);
-    });
-    const auto go_on = [&](std::size_t, std::size_t) { return !stopped_ && corrections_ == before; };
-    if (!any || !adjustment_.solve(go_on)) return;
+    std::uint64_t before = 0;
     {
       const auto edit = shared_.edit();
-      const auto lock = shared_.lock();
-      if (corrections_ != before || !shared_.atlas.contains(id)) return;
-      adjustment_.apply(shared_.atlas.at(id));
+      before = corrections_;
+      bool more = shared_.locked([&] {
+        return shared_.atlas.contains(id) &&
+               adjustment_.gather_keyframes(shared_.atlas.at(id), shared_.model, shared_.scales,
+                                            shared_.settings.places.adjustment);
+      });
+      if (!more) return;
+      while (more) more = shared_.locked([&] { return adjustment_.gather_landmarks(shared_.atlas.at(id), at_once); });
+    }
+    const auto go_on = [&](std::size_t, std::size_t) { return !stopped_ && corrections_ == before; };
+    if (!adjustment_.has_gathered() || !adjustment_.solve(go_on)) return;
+    {
+      const auto edit = shared_.edit();
+      if (!shared_.locked([&] {
+            if (corrections_ != before || !shared_.atlas.contains(id)) return false;
+            adjustment_.move(shared_.atlas.at(id));
+            return true;
+          }))
+        return;
+      update(id);
     }
     tell({.kind = correction_kind::global_adjustment, .map = id}, start);
   }
@@ -69,6 +81,7 @@ class loop_closer {
 
  private:
   using clock = std::chrono::steady_clock;
+  static constexpr landmark_id at_once = 4096;  ///< that are looked at while tracking waits: a millisecond or so
 
   /// The places that keyframe `k`, which is given its present name, may show again: in its own map those alone that it
   /// is not connected with, and that it has left for a while.
@@ -120,13 +133,17 @@ class loop_closer {
           }))
         return false;
       if (!correction_.solve([&](std::size_t, std::size_t) { return !stopped_.load(); })) return false;
-      const auto lock = shared_.lock();
-      slam::map& m = shared_.atlas.at(k.map);
-      if (!correction_.apply(m).corrected) return false;
-      event.T_corrected_before = m.at(k.keyframe).T_world_camera * before.inverse();
-      ++shared_.loops_closed;
-      ++corrections_;
+      if (!shared_.locked([&] {
+            slam::map& m = shared_.atlas.at(k.map);
+            if (!correction_.move(m).corrected) return false;
+            event.T_corrected_before = m.at(k.keyframe).T_world_camera * before.inverse();
+            ++shared_.loops_closed;
+            ++corrections_;
+            return true;
+          }))
+        return false;
       last_closed_ = k;
+      update(k.map);
     }
     tell(std::move(event), start);
     return true;
@@ -163,6 +180,13 @@ class loop_closer {
     }
     tell(std::move(event), start);
     return true;
+  }
+
+  /// What follows from where keyframes and landmarks are, part by part, so that tracking need not wait for all of it.
+  /// @pre edit() is held, and the map is there
+  void update(map_id id) {
+    for (landmark_id at = 0; shared_.locked([&] { return update_landmarks(shared_.atlas.at(id), at, at_once); });)
+      at += at_once;
   }
 
   void tell(correction_event event, clock::time_point start) const {

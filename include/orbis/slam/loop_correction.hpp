@@ -90,29 +90,27 @@ class loop_correction {
 
   /// @pre `solve` was true, and the map is that of `gather`, with what was added since
   loop_report apply(map& m) {
+    const loop_report report = move(m);
+    if (report.corrected) update_landmarks(m, 0, m.landmark_end());
+    return report;
+  }
+  /// The same, but for `update_landmarks`, which is left to the caller where the report says that it was corrected.
+  loop_report move(map& m) {
     loop_report report;
     report.iterations = iterations_;
     std::vector<se3> solved;
     for (const keyframe_id k : keyframes_) solved.push_back(poses_[k]);
     const std::vector<se3> motion = carried_motion(m, keyframes_, solved);
-    std::vector<keyframe_id> moved;
-    std::vector<se3> to;
-    for (const keyframe& k : m.keyframes()) {
-      moved.push_back(k.id);
-      to.push_back(motion[k.id] * k.T_world_camera);
-    }
     const keyframe_id a = m.heir(match_.keyframe), b = m.heir(match_.candidate);
     if (a == no_id || b == no_id) return report;
     const se3 before = m.at(a).T_world_camera;
-    move_keyframes(m, moved, to);
+    move_all(m, motion);
     if (a != b) m.add_loop_edge(a, b);
     report.fusion = seam_.sew(m);
     report.corrected = true;
-    report.keyframes = moved.size();
+    report.keyframes = m.keyframes().size();
     report.moved = (m.at(a).T_world_camera.translation() - before.translation()).norm();
     report.turned = (before.rotation().inverse() * m.at(a).T_world_camera.rotation()).log().norm();
-    for (landmark_id l = 0; l != m.landmark_end(); ++l)
-      if (m.is_alive(l)) m.update(l);
     return report;
   }
 
