@@ -4,13 +4,13 @@
 #include <string>
 #include <vector>
 
-#include <orbis/camera/pinhole.hpp>
+#include <orbis/camera/any.hpp>
 #include <orbis/io/recording.hpp>
 #include <orbis/io/synthetic.hpp>
 #include <orbis/optimize/absolute_orientation.hpp>
-#include <orbis/slam/rgbd_system.hpp>
 #include <orbis/slam/validate.hpp>
 
+#include "slam/tested_system.hpp"
 #include "support/catch.hpp"
 #include "support/data.hpp"
 
@@ -21,7 +21,7 @@ namespace {
 using frames = std::vector<camera::rgbd_frame>;
 
 struct room {
-  camera::pinhole camera;
+  camera::any_camera camera;
   frames recorded;
 };
 
@@ -30,7 +30,7 @@ const room& small_room() {
   static const room r = [] {
     const io::synthetic_recording recording{
         {.frames = 60, .seed = 5, .width = 320, .height = 240, .frames_around = 300}};
-    room made{*recording.camera().model.get_if<camera::pinhole>(), {}};
+    room made{recording.camera().model, {}};
     for (std::size_t i = 0; i < recording.size(); ++i) made.recorded.push_back(recording.frame(i).value());
     return made;
   }();
@@ -57,7 +57,7 @@ double ate(const Poses& trajectory, const frames& truth) {
 
 TEST_CASE("A walk through a synthetic room is tracked without a lost frame and within a centimetre") {
   const auto& [camera, recorded] = small_room();
-  slam::rgbd_system slam{camera, slam::options{}};
+  test::slam_system slam{camera, slam::options{}};
   CHECK(slam.state() == slam::track_state::not_started);
   std::size_t keyframes = 0;
   for (const auto& f : recorded) {
@@ -82,8 +82,8 @@ TEST_CASE("A walk through a synthetic room is tracked without a lost frame and w
 
 TEST_CASE("The first pose is the identity unless the caller knows better") {
   const auto& [camera, recorded] = small_room();
-  slam::rgbd_system at_origin{camera};
-  slam::rgbd_system placed{camera, slam::options{.initial_pose = recorded.front().T_world_camera}};
+  test::slam_system at_origin{camera};
+  test::slam_system placed{camera, slam::options{.initial_pose = recorded.front().T_world_camera}};
   for (std::size_t i = 0; i < 10; ++i) {
     at_origin.track(recorded[i]);
     placed.track(recorded[i]);
@@ -97,7 +97,7 @@ TEST_CASE("The first pose is the identity unless the caller knows better") {
 TEST_CASE("Two runs over the same frames give the same bytes") {
   const room& r = small_room();
   const auto run = [&] {
-    slam::rgbd_system slam{r.camera, slam::options{}};
+    test::slam_system slam{r.camera, slam::options{}};
     for (std::size_t i = 0; i < 30; ++i) slam.track(r.recorded[i]);
     for (std::size_t i = 45; i < 60; ++i) slam.track(r.recorded[i]);  // a jump, so that RANSAC has its say
     return slam.trajectory();
@@ -112,7 +112,7 @@ TEST_CASE("Two runs over the same frames give the same bytes") {
 
 TEST_CASE("In the dark tracking is lost and comes back with the light") {
   const auto& [camera, recorded] = small_room();
-  slam::rgbd_system slam{camera, slam::options{}};
+  test::slam_system slam{camera, slam::options{}};
   frames with_blackout = recorded;
   for (std::size_t i = 25; i < 35; ++i) {
     with_blackout[i].color = image<rgb8>(camera.width(), camera.height());
@@ -137,7 +137,7 @@ TEST_CASE("In the dark tracking is lost and comes back with the light") {
 
 TEST_CASE("Images without anything to see never start the system and never harm it") {
   const auto& [camera, recorded] = small_room();
-  slam::rgbd_system slam{camera, slam::options{}};
+  test::slam_system slam{camera, slam::options{}};
   camera::rgbd_frame grey;
   grey.color = image<rgb8>(camera.width(), camera.height(), rgb8{128, 128, 128});
   grey.depth = image<std::uint16_t>(camera.width(), camera.height(), 2000);
@@ -163,7 +163,7 @@ TEST_CASE("A frame without any depth starts nothing whatever the options say") {
   const auto& [camera, recorded] = small_room();
   slam::options options;
   options.min_start_points = 0;
-  slam::rgbd_system slam{camera, options};
+  test::slam_system slam{camera, options};
   auto no_depth = recorded[0];
   no_depth.depth = image<std::uint16_t>(camera.width(), camera.height());
   CHECK(slam.track(no_depth).state == slam::track_state::not_started);
@@ -172,7 +172,7 @@ TEST_CASE("A frame without any depth starts nothing whatever the options say") {
 
 TEST_CASE("A camera at rest makes no keyframes") {
   const auto& [camera, recorded] = small_room();
-  slam::rgbd_system slam{camera};
+  test::slam_system slam{camera};
   auto f = recorded[0];
   for (int i = 0; i < 20; ++i) {
     CHECK(slam.track(f).tracked());
@@ -196,7 +196,7 @@ TEST_CASE("A system takes another extractor by type") {
 TEST_CASE("The kitchen is tracked without a lost frame") {
   ORBIS_NEEDS_DATA("kitchen");
   auto recording = io::open_recording(test::data_dir() / "kitchen").value();
-  slam::rgbd_system slam{recording.camera().model, slam::options{}};
+  test::slam_system slam{recording.camera().model, slam::options{}};
   frames truth;
   for (std::size_t i = 0; i < 300; i += 3) {
     const auto f = recording.frame(i).value();

@@ -96,15 +96,15 @@ struct seam_options {
 
 struct loop_correction_options {
   std::uint32_t strong = 100;  ///< landmarks that both see, from which on a pair is an edge of the essential graph
-  double loop_weight = 10.0;   ///< of the new edge, relative to that of a pair that shares `strong` landmarks
+  double loop_weight = 100.0;  ///< of the new edge, relative to that of a pair that shares `strong` landmarks
   int iterations = 20;         ///< of the pose graph, at most
   seam_options seam{};
 };
 
 struct global_adjustment_options {
   int robust_iterations = 10;         ///< before outliers are taken out, at most
-  int iterations = 10;                ///< after that, at most
-  double relative_tolerance = 1e-4;   ///< either ends when a step lowers the cost by less than this share
+  int iterations = 20;                ///< after that, at most
+  double relative_tolerance = 1e-6;   ///< either ends when a step lowers the cost by less than this share
   std::size_t min_observations = 10;  ///< of a keyframe; one with fewer goes with its parent in the tree
 };
 

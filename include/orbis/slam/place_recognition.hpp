@@ -40,8 +40,9 @@ class bag_of_words_places {
  public:
   using signature = places::bag_of_words;
 
-  explicit bag_of_words_places(places::vocabulary words = places::default_vocabulary(),
-                               const places::query_options& options = {})
+  bag_of_words_places() : bag_of_words_places(places::default_vocabulary()) {}
+  explicit bag_of_words_places(places::vocabulary words) : words_{std::move(words)} {}
+  bag_of_words_places(places::vocabulary words, const places::query_options& options)
       : words_{std::move(words)}, options_{options} {}
 
   [[nodiscard]] const places::vocabulary& vocabulary() const noexcept { return words_; }

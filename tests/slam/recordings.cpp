@@ -1,0 +1,190 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// What recordings do to SLAM systems: loops, cuts, darkness, people, light, blur, low rates, walls that repeat. All are
+// made up, with exact poses.
+#include <algorithm>
+#include <cstddef>
+#include <vector>
+
+#include <orbis/eval/ate.hpp>
+#include <orbis/io/synthetic/effects.hpp>
+#include <orbis/io/synthetic/sequence.hpp>
+#include <orbis/slam/validate.hpp>
+
+#include "slam/tested_system.hpp"
+#include "support/catch.hpp"
+
+using namespace orbis;
+namespace syn = io::synthetic;
+
+namespace {
+
+struct outcome {
+  slam::track_counters counters;
+  std::vector<slam::track_state> states;  ///< by frame
+  std::size_t in_map = 0;                 ///< frames whose pose is known in the active map
+  std::size_t maps = 0;
+  double ate = -1.0;  ///< metres, RMSE
+  double end = -1.0;  ///< metres: where the last frame should be and is, in the world of the first
+};
+
+/// The poses as they are after the last frame.
+template <class Sequence>
+outcome judge(const test::slam_system& slam, const Sequence& frames, std::vector<slam::track_state> states) {
+  outcome o{slam.counters(), std::move(states), 0, slam.inspect([](const slam::atlas& a) { return a.size(); })};
+  const trajectory found = slam.trajectory();
+  o.in_map = found.size();
+  if (const auto ate = eval::ate(found, syn::ground_truth_of(frames))) o.ate = ate->translation.rmse;
+  const std::size_t last = frames.size() - 1;
+  if (!found.empty() && found.back().timestamp == frames.timestamp(last))
+    o.end = (found.back().T_world_camera.translation() - frames.T_world_camera(last).translation()).norm();
+  const auto valid = slam::validate(slam.map());
+  CHECK((valid ? "" : valid.error().to_string()) == "");
+  return o;
+}
+
+template <class Sequence>
+slam::options options_for(const Sequence& frames) {
+  slam::options o;
+  o.initial_pose = frames.T_world_camera(0);
+  return o;
+}
+
+template <class Sequence>
+outcome run(const Sequence& frames) {
+  test::slam_system slam{frames.camera().model, options_for(frames)};
+  std::vector<slam::track_state> states;
+  for (std::size_t i = 0; i != frames.size(); ++i) states.push_back(slam.track(frames.frame(i).value()).state);
+  return judge(slam, frames, std::move(states));
+}
+
+/// Frames cost time: few of them, and small ones.
+syn::sequence_options small(double fps) { return {.width = 320, .height = 240, .fps = fps}; }
+
+}  // namespace
+
+TEST_CASE("A round through a building comes out where it began once the loop is closed, and not without") {
+  syn::loop_options o;
+  o.sequence = small(10);
+  const auto frames = syn::corridor_loop(o);
+  test::slam_system closing{frames.camera().model, options_for(frames)};
+  slam::options without = options_for(frames);
+  without.places.enabled = false;
+  test::slam_system drifting{frames.camera().model, without};
+  std::vector<slam::track_state> states, others;
+  for (std::size_t i = 0; i != frames.size(); ++i) {
+    const auto f = frames.frame(i).value();
+    states.push_back(closing.track(f).state);
+    others.push_back(drifting.track(f).state);
+  }
+  const outcome closed = judge(closing, frames, states), drifted = judge(drifting, frames, others);
+  CHECK(closed.counters.lost == 0);
+  CHECK(closed.counters.loops_closed >= 1);
+  CHECK(closed.maps == 1);
+  CHECK(closed.in_map == frames.size());
+  CHECK(closed.end < 0.01);
+  CHECK(closed.ate < 0.02);
+  CHECK(drifted.counters.loops_closed == 0);
+  CHECK(drifted.end > 0.02);
+  CHECK(drifted.ate > 2 * closed.ate);
+}
+
+TEST_CASE("Walls that all look the same close no loop where there is none, and the true one") {
+  syn::loop_options o;
+  o.sequence = small(10);
+  o.building.wall_period = 0.8;
+  const auto frames = syn::corridor_loop(o);
+  const outcome seen = run(frames);
+  CHECK(seen.counters.lost == 0);
+  CHECK(seen.counters.loops_closed >= 1);
+  CHECK(seen.end < 0.02);
+  CHECK(seen.ate < 0.03);
+}
+
+TEST_CASE("A camera that is carried off is found again as soon as it sees what it knows") {
+  syn::room_options o;
+  o.sequence = small(10);
+  const auto room = syn::room_round(o);
+  // Five seconds, then at once three seconds back, and on from there.
+  std::vector<syn::selection<std::remove_const_t<decltype(room)>>::pick> picks;
+  for (std::size_t i = 0; i != 50; ++i) picks.push_back({i, room.timestamp(i)});
+  for (std::size_t i = 20; i != 50; ++i) picks.push_back({i, room.timestamp(i + 30)});
+  const syn::selection frames{room, picks, 10.0};
+  const outcome seen = run(frames);
+  const auto found = std::find_if(seen.states.begin() + 50, seen.states.end(),
+                                  [](slam::track_state s) { return s != slam::track_state::lost; });
+  CHECK(found - (seen.states.begin() + 50) < 5);
+  CHECK(seen.counters.relocalized >= 1);
+  CHECK(seen.counters.lost < 5);
+  CHECK(seen.maps == 1);
+  CHECK(seen.ate < 0.015);
+}
+
+TEST_CASE("A camera that is carried to where nothing is known begins a map, which becomes part of the first one") {
+  syn::room_options o;
+  o.sequence = small(10);
+  const auto frames = syn::without(syn::room_round(o), {4.0, 8.0});
+  const outcome seen = run(frames);
+  CHECK(seen.counters.lost == 0);
+  CHECK(seen.counters.maps_merged == 1);
+  CHECK(seen.maps == 1);
+  CHECK(seen.in_map == frames.size());
+  CHECK(seen.ate < 0.015);
+  CHECK(seen.end < 0.01);
+}
+
+TEST_CASE("Two seconds in the dark cost these two seconds") {
+  syn::room_options o;
+  o.sequence = small(10);
+  const auto frames = syn::blacked_out(syn::room_round(o), {4.0, 6.0});
+  const outcome seen = run(frames);
+  CHECK(seen.counters.lost == 20);
+  for (std::size_t i = 0; i != frames.size(); ++i)
+    CHECK((seen.states[i] == slam::track_state::lost) == (i >= 40 && i < 60));
+  CHECK(seen.maps == 1);
+  CHECK(seen.in_map == frames.size() - 20);
+  CHECK(seen.ate < 0.015);
+  CHECK(seen.end < 0.01);
+}
+
+TEST_CASE("Who walks through the view does not carry the map along") {
+  syn::room_options o;
+  o.sequence = small(10);
+  o.people = {{.begin = 3.0, .end = 7.0, .from = {2.0, 1.6}, .to = {2.0, -1.6}}};
+  const outcome seen = run(syn::room_round(o));
+  CHECK(seen.counters.lost == 0);
+  CHECK(seen.ate < 0.02);
+  CHECK(seen.end < 0.02);
+}
+
+TEST_CASE("Jumps of exposure, motion blur and low rates are tracked through") {
+  syn::room_options o;
+  o.sequence = small(10);
+  const auto check = [](const outcome& seen, double ate) {
+    CHECK(seen.counters.lost == 0);
+    CHECK(seen.ate < ate);
+    CHECK(seen.end < 0.01);
+  };
+  SECTION("exposure") { check(run(syn::with_exposure(syn::room_round(o))), 0.02); }
+  SECTION("15 frames a second") {
+    o.sequence.fps = 15;
+    check(run(syn::room_round(o)), 0.015);
+  }
+  SECTION("10 frames a second") { check(run(syn::room_round(o)), 0.015); }
+  SECTION("motion blur") {
+    o.sequence.sensor.motion_blur = 4;
+    o.sequence.sensor.exposure = 0.03;
+    check(run(syn::room_round(o)), 0.025);
+  }
+}
+
+TEST_CASE("Walls that all look the same, and walls with little on them, are told apart by what stands before them") {
+  syn::room_options o;
+  o.sequence = small(10);
+  SECTION("the same") { o.scene.wall_period = 0.8; }
+  SECTION("bare") { o.scene.poor_walls = 4; }
+  const outcome seen = run(syn::room_round(o));
+  CHECK(seen.counters.lost == 0);
+  CHECK(seen.ate < 0.02);
+  CHECK(seen.end < 0.02);
+}

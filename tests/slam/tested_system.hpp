@@ -1,0 +1,13 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// The SLAM system that the tests run, compiled once for all of them (tested_system.cpp).
+#pragma once
+
+#include <orbis/camera/any.hpp>
+#include <orbis/slam/rgbd_system.hpp>
+
+extern template class orbis::slam::rgbd_system<orbis::camera::any_camera>;
+
+namespace test {
+using slam_system = orbis::slam::rgbd_system<orbis::camera::any_camera>;
+}
