@@ -26,12 +26,7 @@ namespace orbis::slam {
 struct candidate_point {
   vec3 position = vec3::Zero();  ///< in the world, metres
   landmark_id landmark = no_id;  ///< or none, for a point that only the last frame's depth gave
-  bool is_founded = false;       ///< a landmark that has proved to stay where it is
 };
-
-/// Whether a landmark has proved to stay where it is: nearly every frame that should show it did. One on something that
-/// moves is found for a frame or two, and then no more where it should be.
-[[nodiscard]] inline bool is_founded(const landmark& l) { return l.visible >= 5 && 5 * l.found >= 4 * l.visible; }
 
 /// Candidates with their descriptors and windows, index by index.
 struct search_list {
@@ -78,7 +73,7 @@ bool add_landmark(search_list& list, const features::camera_projection<Camera>& 
   if (!appears) return false;
   const features::window where = features::window_of(*appears, rule);
   if (where.radius < 0.0F) return false;
-  list.add({l.position, id, is_founded(l)}, l.descriptor, {}, where);
+  list.add({l.position, id}, l.descriptor, {}, where);
   return true;
 }
 

@@ -25,13 +25,13 @@ template <camera::camera_model Camera>
 }
 
 /// Whether keypoint `i` of a frame may show `point` (in the world): the reprojection error is one that 95 % of the true
-/// ones stay below, with depth or without (its square, times `gate`).
+/// ones stay below, with depth or without.
 template <camera::camera_model Camera>
 [[nodiscard]] bool agrees(const optimize::reprojection<Camera>& model, const pyramid_scales& scales, const frame& f,
-                          const se3& T_camera_world, std::size_t i, const vec3& point, double gate = 1.0) {
+                          const se3& T_camera_world, std::size_t i, const vec3& point) {
   const optimize::pose_observation o = observation_of(model, scales, f, i, point);
   const auto error = model.residual(T_camera_world * point, o);
-  return error && error->squaredNorm() * o.information <= gate * (o.has_depth() ? 7.815 : 5.991);
+  return error && error->squaredNorm() * o.information <= (o.has_depth() ? 7.815 : 5.991);
 }
 
 }  // namespace orbis::slam

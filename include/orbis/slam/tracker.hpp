@@ -71,9 +71,9 @@ class tracker {
       for (std::size_t i = 0; i < last.size(); ++i) {
         candidate_point p{.landmark = m.became(last.landmarks[i])};
         if (p.landmark != no_id)
-          p = {m.landmark_at(p.landmark).position, p.landmark, is_founded(m.landmark_at(p.landmark))};
+          p.position = m.landmark_at(p.landmark).position;
         else if (last.has_depth(i))
-          p = {last.point_world(i), no_id, false};
+          p = {last.point_world(i), no_id};
         else
           continue;
         add_seen_point(list, project, scales_, p, last.features.descriptors[i], last.features.keypoints[i],
