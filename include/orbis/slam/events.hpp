@@ -49,12 +49,13 @@ struct correction_event {
 };
 
 struct state_event {
-  track_state from{}, to{};
+  track_state from{};  ///< what was told last
+  track_state to{};
   std::size_t frame = 0;
 };
 
 /// Called without any lock held, so that they may ask the system for what they want; those of mapping and corrections
-/// from the system's own threads, if it has any: they must not wait for the system. May be left empty.
+/// from the system's own threads, if it has any: they must not wait for the system, nor throw. May be left empty.
 struct listeners {
   std::function<void(const keyframe_event&)> keyframe_made{};
   std::function<void(const keyframe_event&)> keyframe_culled{};

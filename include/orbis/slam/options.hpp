@@ -124,7 +124,7 @@ struct thread_options {
   /// Off: `track` does everything, and the same frames give the same bytes. On: mapping, loop closing and global
   /// adjustment have a thread each, and `track` returns as soon as the pose is known.
   bool enabled = false;
-  std::size_t max_waiting = 3;  ///< keyframes that may wait for mapping; with so many no further one is made, ...
+  std::size_t max_waiting = 3;  ///< keyframes that may wait, 1 at least; with so many no further one is made, ...
   bool wait = false;            ///< ... or `track` waits: for recordings, which must not outrun the mapping
 };
 

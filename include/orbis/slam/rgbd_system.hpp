@@ -19,6 +19,7 @@
 #include <atomic>
 #include <cassert>
 #include <chrono>
+#include <cmath>
 #include <concepts>
 #include <cstddef>
 #include <cstdint>
@@ -76,6 +77,7 @@ class rgbd_system {
         track_{shared_.model, shared_.scales, options_},
         mapper_{shared_},
         closer_{shared_} {
+    options_.threads.max_waiting = std::max<std::size_t>(1, options_.threads.max_waiting);
     if (!options_.threads.enabled) return;
     global_worker_ = std::make_unique<worker<map_id>>([this](map_id m) { closer_.adjust_globally(m); });
     loop_worker_ = std::make_unique<worker<map_keyframe>>([this](map_keyframe k) {
@@ -91,15 +93,16 @@ class rgbd_system {
   /// Lets what is at hand end, and drops what waits.
   ~rgbd_system() {
     closer_.stop();
-    map_worker_.reset();
-    loop_worker_.reset();
-    global_worker_.reset();
+    // Each hands on to the next, and asks itself what waits: all are there until all have stopped.
+    if (map_worker_) map_worker_->stop();
+    if (loop_worker_) loop_worker_->stop();
+    if (global_worker_) global_worker_->stop();
   }
 
   /// Who is told what happens. @pre no frame was tracked yet
   void listen(listeners all) { shared_.listening = std::move(all); }
 
-  /// The next frame. Frames of another size than the camera's are counted as lost.
+  /// The next frame. Frames of another size than the camera's, or without a time, are counted as lost.
   track_result track(const camera::rgbd_frame& f) { return track(f.timestamp, f.color, f.depth_metres()); }
 
   /// The next frame, in place. @pre time stamps ascend
@@ -110,10 +113,10 @@ class rgbd_system {
     frame current = observe(timestamp, color, depth);
     clock.lap(result.timings.features_ms);
     if (map_worker_ && options_.threads.wait) map_worker_->wait_for_room(options_.threads.max_waiting);
-    const track_state before = state_;
     std::optional<map_keyframe> made;
     {
       const auto lock = shared_.lock();
+      leaves_map_ = localization_only_;
       bring_up_to_date();
       result.inliers = find(current);
       clock.lap(result.timings.tracking_ms);
@@ -121,7 +124,7 @@ class rgbd_system {
       remember(std::move(current));
     }
     if (made) hand_on(*made);
-    report(result, before, made);
+    report(result, made);
     clock.lap(result.timings.mapping_ms);
     return result;
   }
@@ -182,7 +185,8 @@ class rgbd_system {
   [[nodiscard]] map_id largest_map() const {
     return shared_.locked([&] {
       std::map<map_id, std::size_t> frames;
-      for (const tracked_frame& f : tracked_) ++frames[shared_.atlas.current(f.reference).map];
+      for (const tracked_frame& f : tracked_)
+        if (const map_id m = shared_.atlas.current(f.reference).map; shared_.atlas.contains(m)) ++frames[m];
       const auto most = std::max_element(frames.begin(), frames.end(),
                                          [](const auto& a, const auto& b) { return a.second < b.second; });
       return most == frames.end() ? shared_.atlas.active_id() : most->first;
@@ -201,7 +205,7 @@ class rgbd_system {
     });
   }
 
-  /// Calls `read(const atlas&)` while nothing changes; what it takes, tracking waits.
+  /// Calls `read(const atlas&)` while nothing changes; what it takes, tracking waits. `read` must not call the system.
   template <std::invocable<const slam::atlas&> Read>
   decltype(auto) inspect(Read&& read) const {
     const auto lock = shared_.lock();
@@ -226,13 +230,14 @@ class rgbd_system {
     if (content.levels != shared_.scales.levels || !(content.scale_factor == shared_.scales.factor))
       return fail(errc::unsupported, path.string(), "the map was made with another image pyramid");
     if (loaded->keyframes().empty()) return fail(errc::no_data, path.string(), "the map has no keyframes");
+    std::vector<std::pair<keyframe_id, typename Places::signature>> looks;  // before tracking has to wait
+    for (const keyframe& k : loaded->keyframes()) looks.emplace_back(k.id, shared_.places.describe(k.features));
     const auto lock = shared_.lock();
     const map_id before = shared_.atlas.active_id();
     const bool drop = shared_.atlas.active().keyframes().empty();
     const map_id id = shared_.atlas.create(*std::move(loaded));
     if (drop) shared_.atlas.remove(before);
-    for (const keyframe& k : shared_.atlas.active().keyframes())
-      shared_.places.add({id, k.id}, shared_.places.describe(k.features));
+    for (const auto& [k, seen] : looks) shared_.places.add({id, k}, seen);
     state_ = track_state::lost;
     lost_since_.reset();
     return {};
@@ -251,8 +256,9 @@ class rgbd_system {
     const auto fits = [&](const auto& image) {
       return image.width() == camera().width() && image.height() == camera().height();
     };
-    if (fits(color) && fits(depth)) f = make_frame(camera(), extract_, color, depth, options_);
-    f.timestamp = timestamp;
+    const bool timed = std::isfinite(timestamp);
+    if (timed && fits(color) && fits(depth)) f = make_frame(camera(), extract_, color, depth, options_);
+    f.timestamp = timed ? timestamp : last_.timestamp;
     f.index = counters_.frames;
     return f;
   }
@@ -278,13 +284,13 @@ class rgbd_system {
     if (is_tracking()) lost_since_ = last_.timestamp;
     if (!lost_since_) lost_since_ = f.timestamp;
     state_ = track_state::lost;
-    if (localization_only_ || f.timestamp - *lost_since_ < options_.recovery.new_map_after) return 0;
+    if (leaves_map_ || f.timestamp - *lost_since_ < options_.recovery.new_map_after) return 0;
     return start_afresh(f);
   }
 
   /// The first frame with enough depth defines the world.
   std::size_t start(frame& f) {
-    if (localization_only_) return 0;
+    if (leaves_map_) return 0;
     std::size_t with_depth = 0;
     for (std::size_t i = 0; i < f.size(); ++i) with_depth += f.has_depth(i);
     if (with_depth == 0 || with_depth < options_.min_start_points) return 0;
@@ -323,7 +329,7 @@ class rgbd_system {
 
   std::size_t track_local_map(frame& f, double radius) {
     slam::map& m = active();
-    const bool counts = !localization_only_;
+    const bool counts = !leaves_map_;
     return track_.on_local_map(
         f, m, reference_.keyframe, radius, [&](landmark_id l) { counts ? m.count_visible(l) : void(); },
         [&](landmark_id l) { counts ? m.count_found(l) : void(); });
@@ -354,9 +360,9 @@ class rgbd_system {
   }
 
   [[nodiscard]] bool needs_keyframe(const frame& f, std::size_t inliers) {
-    if (localization_only_) return false;
     if (active().keyframes().empty()) return true;
     reference_ = {shared_.atlas.active_id(), most_shared(active(), f, reference_.keyframe)};
+    if (leaves_map_) return false;
     if (map_worker_ && map_worker_->waiting() >= options_.threads.max_waiting) return false;
     return is_keyframe_due(gather_evidence(active(), f, reference_.keyframe, inliers, options_), options_.keyframes);
   }
@@ -369,7 +375,8 @@ class rgbd_system {
 
   /// Mapping and loop closing, now or by their threads.
   void hand_on(map_keyframe k) {
-    if (const auto& tell = shared_.listening.keyframe_made) tell(shared_.locked([&] { return shared_.event_of(k); }));
+    if (const auto& tell = shared_.listening.keyframe_made)  // its map may have become a part of another since
+      tell(shared_.locked([&] { return shared_.event_of(shared_.atlas.current(k)); }));
     if (map_worker_) return map_worker_->push(k);
     mapper_.process(k, [] { return false; });
     if (closer_.close(k)) closer_.adjust_globally(shared_.atlas.current(k).map);
@@ -408,13 +415,13 @@ class rgbd_system {
     last_ = std::move(f);
   }
 
-  void report(track_result& result, track_state before, const std::optional<map_keyframe>& made) {
+  void report(track_result& result, const std::optional<map_keyframe>& made) {
     auto lock = shared_.lock();
     result.state = state_;
     result.map = shared_.atlas.active_id();
-    if (made) result.keyframe = made->keyframe;
+    if (made) result.keyframe = shared_.atlas.current(*made).keyframe;
     if (is_tracking()) result.T_world_camera = last_pose();
-    const state_event changed{before, state_, counters_.frames - 1};
+    const state_event changed{std::exchange(told_, state_), state_, counters_.frames - 1};
     lock.unlock();
     if (changed.from != changed.to && shared_.listening.state_changed) shared_.listening.state_changed(changed);
   }
@@ -437,7 +444,9 @@ class rgbd_system {
   loop_closer<Camera, Places> closer_;
 
   track_state state_ = track_state::not_started;
+  track_state told_ = track_state::not_started;  ///< to the listener
   std::atomic<bool> localization_only_{options_.localization_only};
+  bool leaves_map_ = false;  ///< `localization_only_` as it was when the frame came
   track_counters counters_;
   std::vector<tracked_frame> tracked_;
   map_keyframe reference_;  ///< that the current frame shares most with

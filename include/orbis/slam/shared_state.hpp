@@ -25,6 +25,8 @@ namespace orbis::slam {
 ///    adjustment), so that only tracking adds to a map in between;
 ///  - `lock()`: held by whoever reads or changes anything here, for a short time; never while solving, nor while
 ///    listeners are called.
+///
+/// Both are given in turn: who gives a lock back and wants it again at once, part by part, comes after who waits.
 template <camera::camera_model Camera, place_recognizer Places>
 struct shared_state {
   shared_state(optimize::reprojection<Camera> model_, pyramid_scales scales_, const options& settings_, Places places_)
@@ -45,8 +47,8 @@ struct shared_state {
   std::size_t maps_merged = 0;
   std::size_t keyframes_culled = 0;
 
-  [[nodiscard]] std::unique_lock<std::mutex> lock() const { return std::unique_lock{map_mutex_}; }
-  [[nodiscard]] std::unique_lock<std::mutex> edit() const { return std::unique_lock{edit_mutex_}; }
+  [[nodiscard]] std::unique_lock<std::mutex> lock() const { return in_turn(next_map_mutex_, map_mutex_); }
+  [[nodiscard]] std::unique_lock<std::mutex> edit() const { return in_turn(next_edit_mutex_, edit_mutex_); }
   /// As `edit`, unless somebody has it.
   [[nodiscard]] std::unique_lock<std::mutex> try_edit() const {
     return std::unique_lock{edit_mutex_, std::try_to_lock};
@@ -85,7 +87,13 @@ struct shared_state {
   }
 
  private:
-  mutable std::mutex map_mutex_, edit_mutex_;
+  /// Whoever is next holds `next` while it waits: a plain mutex may be taken again before those that wait wake up.
+  [[nodiscard]] static std::unique_lock<std::mutex> in_turn(std::mutex& next, std::mutex& mutex) {
+    const std::lock_guard first{next};
+    return std::unique_lock{mutex};
+  }
+
+  mutable std::mutex map_mutex_, edit_mutex_, next_map_mutex_, next_edit_mutex_;
 };
 
 }  // namespace orbis::slam

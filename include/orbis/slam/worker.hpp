@@ -14,7 +14,8 @@
 
 namespace orbis::slam {
 
-/// Jobs are done in the order in which they come. The destructor lets the job at hand end, and drops those that wait.
+/// Jobs are done in the order in which they come. `stop` and the destructor let the job at hand end, and drop those
+/// that wait. A job that asks its own worker by a pointer finds none while that is reset: stop the worker before.
 /// @pre `work` does not throw
 template <std::movable Job>
 class worker {
@@ -22,18 +23,23 @@ class worker {
   explicit worker(std::function<void(Job)> work) : work_{std::move(work)}, thread_{[this] { run(); }} {}
   worker(const worker&) = delete;
   worker& operator=(const worker&) = delete;
-  ~worker() {
+  ~worker() { stop(); }
+
+  /// Returns when the job at hand is done; no other one is begun any more. Not to be called by a job.
+  void stop() {
     {
       const std::lock_guard lock(mutex_);
       ends_ = true;
     }
     changed_.notify_all();
-    thread_.join();
+    if (thread_.joinable()) thread_.join();
   }
 
+  /// Once it is stopped, jobs are dropped.
   void push(Job job) {
     {
       const std::lock_guard lock(mutex_);
+      if (ends_) return;
       jobs_.push_back(std::move(job));
     }
     changed_.notify_all();
@@ -65,7 +71,11 @@ class worker {
     std::unique_lock lock(mutex_);
     for (;;) {
       changed_.wait(lock, [&] { return ends_ || !jobs_.empty(); });
-      if (ends_) return;
+      if (ends_) {
+        jobs_.clear();  // so that nobody waits for them
+        changed_.notify_all();
+        return;
+      }
       Job job = std::move(jobs_.front());
       jobs_.pop_front();
       busy_ = true;
