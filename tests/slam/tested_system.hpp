@@ -8,6 +8,6 @@
 
 extern template class orbis::slam::rgbd_system<orbis::camera::any_camera>;
 
-namespace test {
-using slam_system = orbis::slam::rgbd_system<orbis::camera::any_camera>;
+namespace orbis::test {
+using slam_system = slam::rgbd_system<camera::any_camera>;
 }
