@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <cmath>
 #include <cstring>
 #include <limits>
 #include <string>
@@ -180,6 +181,39 @@ TEST_CASE("A camera at rest makes no keyframes") {
   }
   CHECK(slam.keyframes().size() == 1);
   CHECK(slam.trajectory().back().T_world_camera.log().norm() < 1e-3);
+}
+
+TEST_CASE("A frame without a time is lost, and the clock goes on as before") {
+  const auto& [camera, recorded] = small_room();
+  for (const double time : {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
+    test::slam_system slam{camera};
+    auto timeless = recorded[2];
+    timeless.timestamp = time;
+    CHECK_FALSE(slam.track(timeless).tracked());
+    for (std::size_t i = 0; i < 2; ++i) CHECK(slam.track(recorded[i]).state == slam::track_state::tracking);
+    CHECK(slam.track(timeless).state == slam::track_state::lost);
+    CHECK(slam.track(recorded[3]).state == slam::track_state::relocalized);
+    CHECK(slam.track(recorded[4]).state == slam::track_state::tracking);
+    CHECK(slam.active_map() == 0);
+    for (const stamped_pose& p : slam.trajectory()) CHECK(std::isfinite(p.timestamp));
+  }
+}
+
+TEST_CASE("The largest map is one of those there are") {
+  const auto& [camera, recorded] = small_room();
+  slam::options o;
+  o.recovery.min_inliers = 1'000'000;  // nothing is ever found again
+  test::slam_system slam{camera, o};
+  auto f = recorded[0];
+  for (int i = 0; i < 6; ++i, f.timestamp += 0.1) CHECK(slam.track(f).tracked());  // one keyframe: a map that will go
+  camera::rgbd_frame dark;
+  dark.timestamp = f.timestamp;
+  CHECK(slam.track(dark).state == slam::track_state::lost);
+  f.timestamp += 2.0;
+  CHECK(slam.track(f).tracked());
+  CHECK(slam.active_map() == 1);
+  CHECK(slam.largest_map() == 1);
+  CHECK(slam.trajectory(slam.largest_map()).size() == 1);
 }
 
 TEST_CASE("A system takes another extractor by type") {
