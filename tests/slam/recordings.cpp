@@ -54,7 +54,12 @@ template <class Sequence>
 outcome run(const Sequence& frames) {
   test::slam_system slam{frames.camera().model, options_for(frames)};
   std::vector<slam::track_state> states;
-  for (std::size_t i = 0; i != frames.size(); ++i) states.push_back(slam.track(frames.frame(i).value()).state);
+  for (std::size_t i = 0; i != frames.size(); ++i) {
+    const slam::track_result r = slam.track(frames.frame(i).value());
+    states.push_back(r.state);
+    if (r.keyframe)  // by the name it has now, even if its map has just become a part of another
+      CHECK(slam.inspect([&](const slam::atlas& a) { return a.at(r.map).has_keyframe(*r.keyframe); }));
+  }
   return judge(slam, frames, std::move(states));
 }
 
