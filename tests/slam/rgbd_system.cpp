@@ -216,17 +216,6 @@ TEST_CASE("The largest map is one of those there are") {
   CHECK(slam.trajectory(slam.largest_map()).size() == 1);
 }
 
-TEST_CASE("A system takes another extractor by type") {
-  struct sparse_extractor {
-    features::orb_extractor inner{{.max_features = 400}};
-    [[nodiscard]] features::features operator()(image_view<const rgb8> image) const { return inner(image); }
-  };
-  const auto& [camera, recorded] = small_room();
-  slam::rgbd_system slam{camera, slam::options{}, sparse_extractor{}};
-  for (std::size_t i = 0; i < 10; ++i) CHECK(slam.track(recorded[i]).tracked());
-  CHECK(slam.map().keyframes().front().size() <= 400);
-}
-
 TEST_CASE("The kitchen is tracked without a lost frame") {
   ORBIS_NEEDS_DATA("kitchen");
   auto recording = io::open_recording(test::data_dir() / "kitchen").value();

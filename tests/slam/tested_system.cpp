@@ -1,4 +1,52 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "slam/tested_system.hpp"
 
-template class orbis::slam::rgbd_system<orbis::camera::any_camera>;
+#include <utility>
+
+#include <orbis/features/orb.hpp>
+#include <orbis/io/synthetic.hpp>
+#include <orbis/slam/rgbd_system.hpp>
+
+#include "support/catch.hpp"
+
+namespace orbis::test {
+
+struct slam_system::held {
+  held(const camera::any_camera& camera, const slam::options& settings) : system{camera, settings} {}
+  slam::rgbd_system<camera::any_camera> system;
+};
+
+slam_system::slam_system(const camera::any_camera& camera, const slam::options& settings)
+    : held_{std::make_unique<held>(camera, settings)} {}
+slam_system::~slam_system() = default;
+
+void slam_system::listen(slam::listeners all) { held_->system.listen(std::move(all)); }
+slam::track_result slam_system::track(const camera::rgbd_frame& f) { return held_->system.track(f); }
+void slam_system::wait() const { held_->system.wait(); }
+slam::track_state slam_system::state() const { return held_->system.state(); }
+bool slam_system::localizes_only() const { return held_->system.localizes_only(); }
+void slam_system::set_localization_only(bool on) { held_->system.set_localization_only(on); }
+orbis::trajectory slam_system::trajectory() const { return held_->system.trajectory(); }
+orbis::trajectory slam_system::trajectory(slam::map_id map) const { return held_->system.trajectory(map); }
+std::vector<slam::keyframe_pose> slam_system::keyframes() const { return held_->system.keyframes(); }
+orbis::trajectory slam_system::keyframe_trajectory() const { return held_->system.keyframe_trajectory(); }
+std::size_t slam_system::landmark_count() const { return held_->system.landmark_count(); }
+slam::track_counters slam_system::counters() const { return held_->system.counters(); }
+slam::map_id slam_system::active_map() const { return held_->system.active_map(); }
+slam::map_id slam_system::largest_map() const { return held_->system.largest_map(); }
+const slam::map& slam_system::map() const { return held_->system.map(); }
+void slam_system::look(const std::function<void(const slam::atlas&)>& read) const { held_->system.inspect(read); }
+
+}  // namespace orbis::test
+
+TEST_CASE("A system takes another extractor by type") {
+  using namespace orbis;
+  struct sparse_extractor {
+    features::orb_extractor inner{{.max_features = 400}};
+    [[nodiscard]] features::features operator()(image_view<const rgb8> image) const { return inner(image); }
+  };
+  const io::synthetic_recording recorded{{.frames = 10, .seed = 5, .width = 320, .height = 240, .frames_around = 300}};
+  slam::rgbd_system slam{recorded.camera().model, slam::options{}, sparse_extractor{}};
+  for (const auto& f : recorded) CHECK(slam.track(f).tracked());
+  CHECK(slam.map().keyframes().front().size() <= 400);
+}
