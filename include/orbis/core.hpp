@@ -4,6 +4,7 @@
 #pragma once
 
 #include <orbis/core/associate.hpp>
+#include <orbis/core/bits.hpp>
 #include <orbis/core/crc32c.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/file.hpp>

@@ -82,7 +82,7 @@ class ring_world {
       const vec3 at = T_camera_world * w.position;
       if (!(at.z() > 0.5)) continue;
       features::keypoint k;
-      k.octave = std::clamp(static_cast<int>(std::ceil(std::log(w.size / at.norm()) / std::log(scales.factor))), 0, 7);
+      k.octave = std::clamp(static_cast<int>(std::ceil(std::log(w.size / at.norm()) / std::log(scales.factor()))), 0, 7);
       const double sigma = 0.5 * scales.scale(k.octave);
       const auto exact = camera.project(at);
       if (!exact) continue;

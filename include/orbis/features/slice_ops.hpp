@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include <orbis/core/bits.hpp>
 #include <orbis/core/simd.hpp>
 #include <orbis/features/hamming.hpp>
 

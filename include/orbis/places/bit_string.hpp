@@ -10,6 +10,8 @@
 #include <ranges>
 #include <type_traits>
 
+#include <orbis/core/bits.hpp>
+
 namespace orbis::places {
 
 /// A binary descriptor of anybody's making: trivially copyable, without padding, of whole 64-bit words. Its bits
@@ -36,15 +38,6 @@ requires(Bits > 0 && Bits % 64 == 0 && Bits < 65536) using bit_words = std::arra
 template <bit_string D>
 [[nodiscard]] constexpr bit_words<8 * sizeof(D)> words_of(const D& descriptor) noexcept {
   return std::bit_cast<bit_words<8 * sizeof(D)>>(descriptor);
-}
-
-/// The number of ones in `x`, by adding neighbouring fields in parallel: without the POPCNT instruction
-/// `std::popcount` is a call into the compiler's library.
-[[nodiscard]] constexpr std::uint32_t count_ones(std::uint64_t x) noexcept {
-  x -= (x >> 1U) & 0x5555555555555555ULL;
-  x = (x & 0x3333333333333333ULL) + ((x >> 2U) & 0x3333333333333333ULL);
-  x = (x + (x >> 4U)) & 0x0f0f0f0f0f0f0f0fULL;
-  return static_cast<std::uint32_t>((x * 0x0101010101010101ULL) >> 56U);
 }
 
 /// The number of bits in which two strings differ.

@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include <orbis/core/bits.hpp>
 #include <orbis/core/simd.hpp>
 #include <orbis/places/bit_string.hpp>
 

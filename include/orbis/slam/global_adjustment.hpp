@@ -73,8 +73,6 @@ class global_adjustment {
 
     model_.emplace(model);
     scales_ = scales;
-    information_.clear();
-    for (int level = 0; level < std::max(1, scales.levels); ++level) information_.push_back(scales.information(level));
     index_.assign(m.keyframe_end(), no_id);
     next_landmark_ = 0;
     end_landmark_ = m.landmark_end();
@@ -103,14 +101,8 @@ class global_adjustment {
       points_.push_back(l.position);
       for (const observation& by : l.observations) {
         if (!takes_part(by.keyframe)) continue;
-        const keyframe& k = m.at(by.keyframe);
-        const vec2 pixel = k.pixel(by.feature);
-        optimize::bundle_observation seen_at{index_[by.keyframe], point, pixel};
-        if (k.has_depth(by.feature)) seen_at.right = model_->right(pixel.x(), static_cast<double>(k.depth[by.feature]));
-        const auto level = static_cast<std::size_t>(std::max(0, k.features.keypoints[by.feature].octave));
-        seen_at.information =
-            level < information_.size() ? information_[level] : scales_.information(static_cast<int>(level));
-        observations_.push_back(seen_at);
+        const auto at = observation_of(*model_, scales_, m.at(by.keyframe), by.feature, l.position);
+        observations_.push_back({index_[by.keyframe], point, at.pixel, at.right, at.information});
         sources_.push_back(by);
       }
     }
@@ -177,15 +169,8 @@ class global_adjustment {
     global_adjustment_report report = report_;
     report.keyframes = keyframes_.size();
     report.landmarks = landmarks_.size();
-    for (std::size_t i = 0; i != observations_.size(); ++i) {
-      if (outliers_[i] == 0) continue;
-      const landmark_id l = landmarks_[observations_[i].point];
-      if (!m.is_alive(l)) continue;
-      const observation* now = m.landmark_at(l).seen_by(sources_[i].keyframe);
-      if (now == nullptr || now->feature != sources_[i].feature) continue;
-      m.forget(l, sources_[i].keyframe);
-      ++report.forgotten;
-    }
+    for (std::size_t i = 0; i != observations_.size(); ++i)
+      if (outliers_[i] != 0 && m.forget(landmarks_[observations_[i].point], sources_[i])) ++report.forgotten;
     return report;
   }
 
@@ -194,17 +179,11 @@ class global_adjustment {
   [[nodiscard]] static bool is_usable(const optimize::bundle_summary& s) {
     return !optimize::is_failure(s.status) && s.status != optimize::bundle_status::cancelled;
   }
-  void find_outliers() {
-    squared_.resize(observations_.size());
-    adjuster_->chi2(poses_, points_, observations_, squared_);
-    for (std::size_t i = 0; i != observations_.size(); ++i)
-      outliers_[i] = squared_[i] > (std::isnan(observations_[i].right) ? 5.991 : 7.815) ? 1 : 0;
-  }
+  void find_outliers() { slam::find_outliers(*adjuster_, poses_, points_, observations_, squared_, outliers_); }
 
   global_adjustment_options options_;
   std::optional<optimize::reprojection<Camera>> model_;
   pyramid_scales scales_;
-  std::vector<double> information_;   // by level
   std::vector<std::uint32_t> index_;  // by keyframe, among those that take part
   landmark_id next_landmark_ = 0, end_landmark_ = 0;
   std::optional<optimize::bundle_adjuster<optimize::reprojection<Camera>>> adjuster_;

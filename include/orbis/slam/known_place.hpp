@@ -63,8 +63,7 @@ template <camera::camera_model Camera>
                                                           const pyramid_scales& scales, double radius,
                                                           std::uint32_t distance) {
   const features::camera_projection project{camera, T_world_camera};
-  const features::projection_rule rule{
-      .radius = static_cast<float>(radius), .levels = scales.levels, .scale_factor = static_cast<float>(scales.factor)};
+  const features::projection_rule rule = rule_of(scales, radius);
   std::vector<features::window> windows;
   windows.reserve(place.landmarks.size());
   for (const known_landmark& l : place.landmarks) {

@@ -48,9 +48,7 @@ fusion_counts fuse_into(map& m, keyframe_id id, std::span<const landmark_id> lan
   const keyframe& k = m.at(id);
   const se3 T_camera_world = k.T_world_camera.inverse();
   const features::camera_projection project{model.camera, k.T_world_camera};
-  const features::projection_rule rule{.radius = static_cast<float>(o.radius),
-                                       .levels = scales.levels,
-                                       .scale_factor = static_cast<float>(scales.factor)};
+  const features::projection_rule rule = rule_of(scales, o.radius);
   search_list list;
   for (const landmark_id l : landmarks)
     if (m.is_alive(l) && m.landmark_at(l).seen_by(id) == nullptr)

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -46,13 +47,35 @@ struct search_list {
 };
 
 /// What the pyramid of the extractor looks like.
-struct pyramid_scales {
-  int levels = 8;
-  double factor = 1.2;
-  [[nodiscard]] double scale(int octave) const { return std::pow(factor, octave); }
+class pyramid_scales {
+ public:
+  pyramid_scales() : pyramid_scales(8, 1.2) {}
+  pyramid_scales(int levels, double factor) : levels_{levels}, factor_{factor} {
+    for (int octave = 0; octave != tabled; ++octave)
+      scales_[static_cast<std::size_t>(octave)] = std::pow(factor, octave);
+  }
+
+  [[nodiscard]] int levels() const noexcept { return levels_; }
+  [[nodiscard]] double factor() const noexcept { return factor_; }
+  [[nodiscard]] double scale(int octave) const {
+    return octave >= 0 && octave < tabled ? scales_[static_cast<std::size_t>(octave)] : std::pow(factor_, octave);
+  }
   /// 1 / sigma^2 of a keypoint's position, sigma being one pixel of its level.
   [[nodiscard]] double information(int octave) const { return 1.0 / (scale(octave) * scale(octave)); }
+
+ private:
+  static constexpr int tabled = 16;  // asked for with every observation
+  int levels_;
+  double factor_;
+  std::array<double, tabled> scales_;
 };
+
+/// Landmarks are searched for within `radius` pixels of a keypoint's level.
+[[nodiscard]] inline features::projection_rule rule_of(const pyramid_scales& scales, double radius) {
+  return {.radius = static_cast<float>(radius),
+          .levels = scales.levels(),
+          .scale_factor = static_cast<float>(scales.factor())};
+}
 
 /// A window around the projection of what the last frame saw, if it projects into the image.
 template <camera::camera_model Camera>

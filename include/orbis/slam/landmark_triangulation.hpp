@@ -83,12 +83,11 @@ struct view_pair {
     if (!p) return std::nullopt;
     const vec3 in_a = T_a_world * *p, in_b = T_b_world * *p;
     if (!(in_a.z() > 0.0 && in_b.z() > 0.0)) return std::nullopt;
-    if (!agrees(model, scales, a, T_a_world, i, *p) || !agrees(model, scales, b, T_b_world, j, *p))
-      return std::nullopt;
+    if (!agrees(model, scales, a, T_a_world, i, *p) || !agrees(model, scales, b, T_b_world, j, *p)) return std::nullopt;
     // A point that is twice as far appears half as large.
     const double factor = in_b.norm() * scales.scale(b.features.keypoints[j].octave) /
                           (in_a.norm() * scales.scale(a.features.keypoints[i].octave));
-    const double limit = options.scale_tolerance * scales.factor;
+    const double limit = options.scale_tolerance * scales.factor();
     return factor <= limit && factor * limit >= 1.0 ? p : std::nullopt;
   }
 
@@ -123,7 +122,7 @@ std::size_t triangulate_landmarks(map& m, keyframe_id newest, const optimize::re
   const double focal = detail::focal_length(model.camera);
   if (!(focal > 0.0)) return 0;
   const auto matcher = features::epipolar(features::hamming{}, {.distance = o.line_distance,
-                                                                .scale_factor = static_cast<float>(scales.factor),
+                                                                .scale_factor = static_cast<float>(scales.factor()),
                                                                 .epipole_radius = o.epipole_radius}) |
                        features::max_distance{o.distance} | features::ratio_test{o.ratio} | features::unique{} |
                        features::rotation_consistency{};

@@ -77,20 +77,17 @@ class local_adjustment {
     const std::span<se3> poses{poses_};
     const std::span<vec3> points{points_};
     outliers_.assign(observations_.size(), 0);
-    squared_.resize(observations_.size());
     stage_ = stage::solved;
     if (!go_on(0, static_cast<std::size_t>(std::max(0, options_.robust_iterations)))) return false;
-    const auto first = adjuster_->solve(
-        seq, poses, points, std::span<const optimize::bundle_observation>(observations_),
-        {.max_iterations = options_.robust_iterations, .fixed_poses = is_fixed_}, go_on);
+    const auto first =
+        adjuster_->solve(seq, poses, points, std::span<const optimize::bundle_observation>(observations_),
+                         {.max_iterations = options_.robust_iterations, .fixed_poses = is_fixed_}, go_on);
     if (is_failure(first.status)) stage_ = stage::empty;
     if (is_failure(first.status) || first.status == optimize::bundle_status::cancelled) return false;
     find_outliers();
-    const auto second = adjuster_->solve_again(seq, poses, points,
-                                               {.max_iterations = options_.iterations,
-                                                .fixed_poses = is_fixed_,
-                                                .ignored = outliers_},
-                                               go_on);
+    const auto second = adjuster_->solve_again(
+        seq, poses, points, {.max_iterations = options_.iterations, .fixed_poses = is_fixed_, .ignored = outliers_},
+        go_on);
     if (is_failure(second.status)) stage_ = stage::empty;
     if (is_failure(second.status)) return false;
     find_outliers();
@@ -174,11 +171,7 @@ class local_adjustment {
     adjuster_.emplace(model);
   }
 
-  void find_outliers() {
-    adjuster_->chi2(poses_, points_, observations_, squared_);
-    for (std::size_t i = 0; i != observations_.size(); ++i)  // 95 % of the true ones are below
-      outliers_[i] = squared_[i] > (std::isnan(observations_[i].right) ? 5.991 : 7.815) ? 1 : 0;
-  }
+  void find_outliers() { slam::find_outliers(*adjuster_, poses_, points_, observations_, squared_, outliers_); }
 
   /// Where a keyframe is in the arrays. @pre it takes part
   [[nodiscard]] std::uint32_t place_of(keyframe_id k) const {
@@ -209,11 +202,7 @@ class local_adjustment {
   }
 
   static void forget(map& m, landmark_id l, const observation& source) {
-    if (!m.is_alive(l)) return;
-    const observation* seen = m.landmark_at(l).seen_by(source.keyframe);
-    if (seen == nullptr || seen->feature != source.feature) return;
-    m.forget(l, source.keyframe);
-    if (!m.is_alive(l) || m.landmark_at(l).observations.size() > 1) return;
+    if (!m.forget(l, source) || !m.is_alive(l) || m.landmark_at(l).observations.size() > 1) return;
     const observation& last = m.landmark_at(l).observations.front();
     if (!m.at(last.keyframe).has_depth(last.feature)) m.remove_landmark(l);
   }

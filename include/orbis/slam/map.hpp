@@ -168,6 +168,14 @@ class map {
     detach(l, k);
   }
 
+  /// The same of an observation that was noted earlier; false if it is not there any more.
+  bool forget(landmark_id l, const observation& noted) {
+    const observation* const now = is_alive(l) ? landmark_at(l).seen_by(noted.keyframe) : nullptr;
+    if (now == nullptr || !(*now == noted)) return false;
+    forget(l, noted.keyframe);
+    return true;
+  }
+
   /// O(n^2).
   void remove_landmark(landmark_id id) { remove(id, no_id); }
 

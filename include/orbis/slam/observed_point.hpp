@@ -3,7 +3,11 @@
 /// What a keypoint of a frame says about the point that it shows.
 #pragma once
 
+#include <cmath>
 #include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
 
 #include <orbis/camera/model.hpp>
 #include <orbis/optimize/reprojection.hpp>
@@ -24,6 +28,21 @@ template <camera::camera_model Camera>
   return o;
 }
 
+/// What 95 % of the true squared errors stay below, in deviations: those of two coordinates, or of three with depth.
+[[nodiscard]] constexpr double error_limit(bool has_depth) noexcept { return has_depth ? 7.815 : 5.991; }
+
+/// Notes which observations of an adjustment disagree with what it has come to. `squared` is memory for it.
+template <class Adjuster>
+void find_outliers(Adjuster& adjuster, std::span<const se3> poses, std::span<const vec3> points,
+                   std::span<const optimize::bundle_observation> observations, std::vector<double>& squared,
+                   std::vector<std::uint8_t>& outliers) {
+  squared.resize(observations.size());
+  outliers.resize(observations.size());
+  adjuster.chi2(poses, points, observations, squared);
+  for (std::size_t i = 0; i != observations.size(); ++i)
+    outliers[i] = squared[i] > error_limit(!std::isnan(observations[i].right)) ? 1 : 0;
+}
+
 /// Whether keypoint `i` of a frame may show `point` (in the world): the reprojection error is one that 95 % of the true
 /// ones stay below, with depth or without.
 template <camera::camera_model Camera>
@@ -31,7 +50,7 @@ template <camera::camera_model Camera>
                           const se3& T_camera_world, std::size_t i, const vec3& point) {
   const optimize::pose_observation o = observation_of(model, scales, f, i, point);
   const auto error = model.residual(T_camera_world * point, o);
-  return error && error->squaredNorm() * o.information <= (o.has_depth() ? 7.815 : 5.991);
+  return error && error->squaredNorm() * o.information <= error_limit(o.has_depth());
 }
 
 }  // namespace orbis::slam

@@ -227,7 +227,7 @@ class rgbd_system {
     auto loaded = read_map(path);
     if (!loaded) return fail(loaded.error());
     const map_content& content = loaded->content();
-    if (content.levels != shared_.scales.levels || !(content.scale_factor == shared_.scales.factor))
+    if (content.levels != shared_.scales.levels() || !(content.scale_factor == shared_.scales.factor()))
       return fail(errc::unsupported, path.string(), "the map was made with another image pyramid");
     if (loaded->keyframes().empty()) return fail(errc::no_data, path.string(), "the map has no keyframes");
     std::vector<std::pair<keyframe_id, typename Places::signature>> looks;  // before tracking has to wait

@@ -33,7 +33,7 @@ struct shared_state {
       : model{std::move(model_)},
         scales{scales_},
         settings{settings_},
-        atlas{scales.levels, scales.factor},
+        atlas{scales.levels(), scales.factor()},
         places{std::move(places_)} {}
 
   const optimize::reprojection<Camera> model;

@@ -125,9 +125,7 @@ class tracker {
   std::size_t on_local_map(frame& f, const map& m, keyframe_id reference, double radius, Seen&& seen,
                            Found&& found) const {
     const features::camera_projection project{model_.camera, f.T_world_camera};
-    const features::projection_rule rule{.radius = static_cast<float>(radius),
-                                         .levels = scales_.levels,
-                                         .scale_factor = static_cast<float>(scales_.factor)};
+    const features::projection_rule rule = rule_of(scales_, radius);
     search_list list;
     for (const landmark_id id : local_landmarks(m, f, reference, options_.local_keyframes))
       if (add_landmark(list, project, rule, m.landmark_at(id), id)) seen(id);
