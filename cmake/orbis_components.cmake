@@ -30,7 +30,7 @@ set(ORBIS_io_LIBRARIES PNG::PNG JPEG::JPEG tomlplusplus::tomlplusplus)
 
 set(ORBIS_eval_NEEDS core)
 
-set(ORBIS_slam_NEEDS features optimize places io)
+set(ORBIS_slam_NEEDS features optimize places)
 set(ORBIS_mapping_NEEDS cloud octree)
 
 set(ORBIS_interop_opencv_NEEDS features)

@@ -7,7 +7,7 @@
 #include <numeric>
 #include <span>
 
-#include <orbis/cloud/log_density.hpp>
+#include <orbis/cloud/detail/select/log_density.hpp>
 #include <orbis/cloud/ray_evidence.hpp>
 
 namespace orbis::bench {

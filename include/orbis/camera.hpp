@@ -8,9 +8,7 @@
 #include <orbis/camera/depth.hpp>
 #include <orbis/camera/intrinsics.hpp>
 #include <orbis/camera/kannala_brandt.hpp>
-#include <orbis/camera/lanes.hpp>
 #include <orbis/camera/model.hpp>
-#include <orbis/camera/monotonic.hpp>
 #include <orbis/camera/parameters.hpp>
 #include <orbis/camera/pinhole.hpp>
 #include <orbis/camera/presets.hpp>

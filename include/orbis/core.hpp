@@ -5,6 +5,7 @@
 
 #include <orbis/core/associate.hpp>
 #include <orbis/core/bits.hpp>
+#include <orbis/core/bytes.hpp>
 #include <orbis/core/crc32c.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/file.hpp>

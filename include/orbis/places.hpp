@@ -14,23 +14,14 @@
 #pragma once
 
 #include <orbis/places/bag_of_words.hpp>
-#include <orbis/places/base85.hpp>
 #include <orbis/places/bit_string.hpp>
-#include <orbis/places/bit_votes.hpp>
 #include <orbis/places/dbow_text.hpp>
 #include <orbis/places/dbow_yaml.hpp>
 #include <orbis/places/default_vocabulary.hpp>
-#include <orbis/places/default_vocabulary_data.hpp>
-#include <orbis/places/descent.hpp>
 #include <orbis/places/inverted_index.hpp>
-#include <orbis/places/k_majority.hpp>
 #include <orbis/places/keyframe_database.hpp>
 #include <orbis/places/load_vocabulary.hpp>
-#include <orbis/places/nearest_child.hpp>
-#include <orbis/places/parent_list.hpp>
 #include <orbis/places/score.hpp>
-#include <orbis/places/table_memory.hpp>
 #include <orbis/places/train.hpp>
 #include <orbis/places/vocabulary.hpp>
 #include <orbis/places/vocabulary_file.hpp>
-#include <orbis/places/vocabulary_tree.hpp>

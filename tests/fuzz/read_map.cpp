@@ -20,7 +20,7 @@ using namespace orbis;
 [[nodiscard]] std::string resealed(std::string file) {
   constexpr std::size_t head = slam::detail::section_head, tail = slam::detail::section_tail;
   for (std::size_t at = 12; at + head + tail <= file.size();) {
-    const auto length = io::load<std::uint64_t>(file.data() + at + 4);
+    const auto length = load_number<std::uint64_t>(file.data() + at + 4);
     if (length > file.size() - at - head - tail) break;
     const std::size_t size = head + static_cast<std::size_t>(length);
     std::string sum;

@@ -13,7 +13,7 @@
 
 #include <orbis/core/random.hpp>
 #include <orbis/core/types.hpp>
-#include <orbis/optimize/block_ordering.hpp>
+#include <orbis/optimize/detail/sparse/block_ordering.hpp>
 
 namespace orbis::test {
 

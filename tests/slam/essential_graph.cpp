@@ -5,7 +5,7 @@
 #include <vector>
 
 #include <orbis/core/random.hpp>
-#include <orbis/optimize/pose_graph_structure.hpp>
+#include <orbis/optimize/detail/pose/pose_graph_structure.hpp>
 #include <orbis/slam/essential_graph.hpp>
 
 #include "slam/random_map.hpp"

@@ -16,8 +16,8 @@
 #include <optional>
 #include <utility>
 
+#include <orbis/camera/detail/monotonic.hpp>
 #include <orbis/camera/intrinsics.hpp>
-#include <orbis/camera/monotonic.hpp>
 #include <orbis/core/types.hpp>
 
 namespace orbis::camera {

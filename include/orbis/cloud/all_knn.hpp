@@ -13,11 +13,11 @@
 #include <span>
 #include <vector>
 
-#include <orbis/cloud/all_knn_leaves.hpp>
-#include <orbis/cloud/all_knn_search.hpp>
+#include <orbis/cloud/detail/knn/all_knn_leaves.hpp>
+#include <orbis/cloud/detail/knn/all_knn_search.hpp>
+#include <orbis/cloud/detail/knn/rank_sort.hpp>
+#include <orbis/cloud/detail/knn/reported_chunks.hpp>
 #include <orbis/cloud/neighbors.hpp>
-#include <orbis/cloud/rank_sort.hpp>
-#include <orbis/cloud/reported_chunks.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/point.hpp>
 #include <orbis/core/progress.hpp>

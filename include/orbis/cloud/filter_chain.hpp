@@ -20,8 +20,8 @@
 #include <vector>
 
 #include <orbis/cloud/cluster.hpp>
+#include <orbis/cloud/detail/select/log_density.hpp>
 #include <orbis/cloud/filter_mode.hpp>
-#include <orbis/cloud/log_density.hpp>
 #include <orbis/cloud/radius.hpp>
 #include <orbis/cloud/ray_evidence.hpp>
 #include <orbis/cloud/statistical.hpp>

@@ -14,9 +14,9 @@
 #include <utility>
 #include <vector>
 
-#include <orbis/cloud/all_knn_kernels.hpp>
-#include <orbis/cloud/all_knn_leaves.hpp>
-#include <orbis/cloud/all_knn_search.hpp>
+#include <orbis/cloud/detail/knn/all_knn_kernels.hpp>
+#include <orbis/cloud/detail/knn/all_knn_leaves.hpp>
+#include <orbis/cloud/detail/knn/all_knn_search.hpp>
 #include <orbis/cloud/neighbors.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/point.hpp>

@@ -14,9 +14,9 @@
 #include <vector>
 
 #include <orbis/cloud/all_knn.hpp>
-#include <orbis/cloud/all_knn_leaves.hpp>
-#include <orbis/cloud/all_knn_search.hpp>
-#include <orbis/cloud/reported_chunks.hpp>
+#include <orbis/cloud/detail/knn/all_knn_leaves.hpp>
+#include <orbis/cloud/detail/knn/all_knn_search.hpp>
+#include <orbis/cloud/detail/knn/reported_chunks.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/point.hpp>
 #include <orbis/core/progress.hpp>

@@ -17,10 +17,10 @@
 
 #include <nanoflann.hpp>
 
-#include <orbis/cloud/all_knn_leaves.hpp>
 #include <orbis/cloud/decision.hpp>
+#include <orbis/cloud/detail/knn/all_knn_leaves.hpp>
+#include <orbis/cloud/detail/knn/squared_distance.hpp>
 #include <orbis/cloud/neighbors.hpp>
-#include <orbis/cloud/squared_distance.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/point.hpp>
 

@@ -33,13 +33,13 @@
 #include <orbis/camera/model.hpp>
 #include <orbis/camera/pinhole.hpp>
 #include <orbis/cloud/decision.hpp>
+#include <orbis/cloud/detail/select/select_density.hpp>
+#include <orbis/cloud/detail/select/select_evidence.hpp>
+#include <orbis/cloud/detail/select/select_surroundings.hpp>
+#include <orbis/cloud/detail/select/select_views.hpp>
 #include <orbis/cloud/filter_chain.hpp>
 #include <orbis/cloud/radius.hpp>
 #include <orbis/cloud/ray_evidence.hpp>
-#include <orbis/cloud/select_density.hpp>
-#include <orbis/cloud/select_evidence.hpp>
-#include <orbis/cloud/select_surroundings.hpp>
-#include <orbis/cloud/select_views.hpp>
 #include <orbis/cloud/sensor_origins.hpp>
 #include <orbis/cloud/statistical.hpp>
 #include <orbis/core/execution.hpp>

@@ -14,7 +14,7 @@
 #include <vector>
 
 #include <orbis/cloud/decision.hpp>
-#include <orbis/cloud/voxel_hash.hpp>
+#include <orbis/cloud/detail/voxels/voxel_hash.hpp>
 #include <orbis/core/image.hpp>
 #include <orbis/core/point.hpp>
 #include <orbis/core/point_cloud.hpp>

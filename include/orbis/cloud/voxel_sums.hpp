@@ -22,8 +22,8 @@
 #include <utility>
 #include <vector>
 
-#include <orbis/cloud/voxel_brick.hpp>
-#include <orbis/cloud/voxel_hash.hpp>
+#include <orbis/cloud/detail/voxels/voxel_brick.hpp>
+#include <orbis/cloud/detail/voxels/voxel_hash.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/image.hpp>
 #include <orbis/core/point_cloud.hpp>

@@ -10,10 +10,10 @@
 #include <vector>
 
 #include <orbis/core/simd.hpp>
+#include <orbis/features/detail/match/hamming_nearest.hpp>
+#include <orbis/features/detail/match/nearest.hpp>
 #include <orbis/features/hamming.hpp>
-#include <orbis/features/hamming_nearest.hpp>
 #include <orbis/features/match.hpp>
-#include <orbis/features/nearest.hpp>
 
 namespace orbis::features {
 

@@ -17,10 +17,10 @@
 
 #include <orbis/core/simd.hpp>
 #include <orbis/core/types.hpp>
+#include <orbis/features/detail/match/search_among.hpp>
 #include <orbis/features/epipolar_geometry.hpp>
 #include <orbis/features/hamming.hpp>
 #include <orbis/features/match.hpp>
-#include <orbis/features/search_among.hpp>
 
 namespace orbis::features {
 

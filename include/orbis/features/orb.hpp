@@ -17,15 +17,15 @@
 
 #include <orbis/core/image.hpp>
 #include <orbis/core/simd.hpp>
-#include <orbis/features/corner.hpp>
-#include <orbis/features/cover_first.hpp>
 #include <orbis/features/descriptor.hpp>
-#include <orbis/features/fast.hpp>
-#include <orbis/features/grey.hpp>
-#include <orbis/features/kept_memory.hpp>
-#include <orbis/features/orientation.hpp>
-#include <orbis/features/pyramid.hpp>
-#include <orbis/features/steered_brief.hpp>
+#include <orbis/features/detail/extract/corner.hpp>
+#include <orbis/features/detail/extract/cover_first.hpp>
+#include <orbis/features/detail/extract/fast.hpp>
+#include <orbis/features/detail/extract/grey.hpp>
+#include <orbis/features/detail/extract/kept_memory.hpp>
+#include <orbis/features/detail/extract/orientation.hpp>
+#include <orbis/features/detail/extract/pyramid.hpp>
+#include <orbis/features/detail/extract/steered_brief.hpp>
 
 namespace orbis::features {
 

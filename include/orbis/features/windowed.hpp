@@ -11,10 +11,10 @@
 #include <vector>
 
 #include <orbis/core/simd.hpp>
+#include <orbis/features/detail/match/search_among.hpp>
 #include <orbis/features/grid.hpp>
 #include <orbis/features/hamming.hpp>
 #include <orbis/features/match.hpp>
-#include <orbis/features/search_among.hpp>
 
 namespace orbis::features {
 

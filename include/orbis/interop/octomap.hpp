@@ -21,9 +21,9 @@
 
 #include <orbis/core/image.hpp>
 #include <orbis/core/result.hpp>
+#include <orbis/octree/detail/files/octomap_nodes.hpp>
 #include <orbis/octree/morton.hpp>
 #include <orbis/octree/occupancy_octree.hpp>
-#include <orbis/octree/octomap_nodes.hpp>
 #include <orbis/octree/voxel_layer.hpp>
 #include <orbis/octree/voxel_payload.hpp>
 

@@ -35,7 +35,7 @@
 #include <orbis/core/result.hpp>
 #include <orbis/core/so3.hpp>
 #include <orbis/core/types.hpp>
-#include <orbis/io/text.hpp>
+#include <orbis/io/detail/text.hpp>
 
 namespace orbis::io {
 
@@ -73,8 +73,7 @@ class bal_parser {
 
   [[nodiscard]] result<bal_problem> parse() {
     bal_problem problem;
-    if (read_header(problem) && read_observations(problem) && read_parameters(problem) && ends())
-      return problem;
+    if (read_header(problem) && read_observations(problem) && read_parameters(problem) && ends()) return problem;
     return fail(code_, at_line(where_, line_), std::move(problem_));
   }
 

@@ -26,7 +26,7 @@
 #include <orbis/core/result.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/core/types.hpp>
-#include <orbis/io/text.hpp>
+#include <orbis/io/detail/text.hpp>
 
 namespace orbis::io {
 

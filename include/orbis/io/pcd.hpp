@@ -22,12 +22,13 @@
 #include <utility>
 #include <vector>
 
+#include <orbis/core/bytes.hpp>
 #include <orbis/core/file.hpp>
 #include <orbis/core/point_cloud.hpp>
 #include <orbis/core/result.hpp>
-#include <orbis/io/bytes.hpp>
-#include <orbis/io/lzf.hpp>
-#include <orbis/io/text.hpp>
+#include <orbis/io/detail/lzf.hpp>
+#include <orbis/io/detail/scalar_type.hpp>
+#include <orbis/io/detail/text.hpp>
 
 namespace orbis::io {
 
@@ -217,7 +218,7 @@ point_cloud read_pcd_binary(const pcd_header& header, const pcd_columns& columns
       xyz[k] = static_cast<float>(load_as_double(at(*columns.xyz[k], i), types[k], std::endian::little));
     cloud.points.emplace_back(xyz[0], xyz[1], xyz[2]);
     if (columns.color != nullptr)
-      cloud.colors.push_back(unpacked_rgb(load<std::uint32_t>(at(*columns.color, i), std::endian::little)));
+      cloud.colors.push_back(unpacked_rgb(load_number<std::uint32_t>(at(*columns.color, i), std::endian::little)));
   }
   return cloud;
 }
@@ -256,8 +257,8 @@ point_cloud read_pcd_binary(const pcd_header& header, const pcd_columns& columns
   }
   // Compressed: all x, then all y, ...
   if (bytes.size() < 8) return ends_early();
-  const auto compressed_size = load<std::uint32_t>(bytes.data());
-  const auto size = load<std::uint32_t>(bytes.data() + 4);
+  const auto compressed_size = load_number<std::uint32_t>(bytes.data());
+  const auto size = load_number<std::uint32_t>(bytes.data() + 4);
   bytes.remove_prefix(8);
   if (compressed_size > bytes.size() || size % header->point_size != 0 || size / header->point_size != header->points)
     return ends_early();

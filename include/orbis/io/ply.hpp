@@ -23,12 +23,13 @@
 #include <utility>
 #include <vector>
 
+#include <orbis/core/bytes.hpp>
 #include <orbis/core/file.hpp>
 #include <orbis/core/point.hpp>
 #include <orbis/core/point_cloud.hpp>
 #include <orbis/core/result.hpp>
-#include <orbis/io/bytes.hpp>
-#include <orbis/io/text.hpp>
+#include <orbis/io/detail/scalar_type.hpp>
+#include <orbis/io/detail/text.hpp>
 
 namespace orbis::io {
 

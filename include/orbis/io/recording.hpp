@@ -24,9 +24,9 @@
 #include <orbis/core/result.hpp>
 #include <orbis/core/trajectory.hpp>
 #include <orbis/io/camera_file.hpp>
+#include <orbis/io/detail/recording_index.hpp>
 #include <orbis/io/icl_nuim.hpp>
 #include <orbis/io/image.hpp>
-#include <orbis/io/recording_index.hpp>
 #include <orbis/io/seven_scenes.hpp>
 #include <orbis/io/tum.hpp>
 

@@ -22,9 +22,9 @@
 #include <orbis/core/result.hpp>
 #include <orbis/core/rotation.hpp>
 #include <orbis/core/se3.hpp>
+#include <orbis/io/detail/recording_index.hpp>
+#include <orbis/io/detail/text.hpp>
 #include <orbis/io/image.hpp>
-#include <orbis/io/recording_index.hpp>
-#include <orbis/io/text.hpp>
 
 namespace orbis::io {
 

@@ -16,7 +16,7 @@
 #include <orbis/core/file.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/core/trajectory.hpp>
-#include <orbis/io/text.hpp>
+#include <orbis/io/detail/text.hpp>
 
 namespace orbis::io {
 

@@ -20,8 +20,8 @@
 #include <orbis/core/associate.hpp>
 #include <orbis/core/file.hpp>
 #include <orbis/core/result.hpp>
-#include <orbis/io/recording_index.hpp>
-#include <orbis/io/text.hpp>
+#include <orbis/io/detail/recording_index.hpp>
+#include <orbis/io/detail/text.hpp>
 #include <orbis/io/trajectory_file.hpp>
 
 namespace orbis::io {

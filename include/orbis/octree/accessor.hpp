@@ -9,7 +9,7 @@
 #include <type_traits>
 
 #include <orbis/core/point.hpp>
-#include <orbis/octree/brick.hpp>
+#include <orbis/octree/detail/storage/brick.hpp>
 #include <orbis/octree/sensor_model.hpp>
 
 namespace orbis::octree {

@@ -16,7 +16,7 @@
 #include <orbis/core/execution.hpp>
 #include <orbis/core/point.hpp>
 #include <orbis/octree/accessor.hpp>
-#include <orbis/octree/ray_walk.hpp>
+#include <orbis/octree/detail/points/ray_walk.hpp>
 #include <orbis/octree/sensor_model.hpp>
 
 namespace orbis::octree {
@@ -266,8 +266,7 @@ class ray_caster {
     }
     const unsigned present = b->uniform | b->dense;
     bool passable = options_.ignore_unknown || b->uniform == 0xff;
-    for (unsigned i = 0; i != 8; ++i)
-      passable &= (present >> i & 1U) == 0 || b->value[i] < Model::occupancy_threshold;
+    for (unsigned i = 0; i != 8; ++i) passable &= (present >> i & 1U) == 0 || b->value[i] < Model::occupancy_threshold;
     return passable;
   }
 

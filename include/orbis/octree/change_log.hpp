@@ -13,7 +13,7 @@
 #include <utility>
 #include <vector>
 
-#include <orbis/octree/hash_index.hpp>
+#include <orbis/octree/detail/storage/hash_index.hpp>
 #include <orbis/octree/key.hpp>
 #include <orbis/octree/morton.hpp>
 

@@ -39,7 +39,7 @@
 #include <orbis/core/crc32c.hpp>
 #include <orbis/core/file.hpp>
 #include <orbis/core/result.hpp>
-#include <orbis/octree/compact_tree.hpp>
+#include <orbis/octree/detail/files/compact_tree.hpp>
 #include <orbis/octree/files.hpp>
 #include <orbis/octree/occupancy_octree.hpp>
 

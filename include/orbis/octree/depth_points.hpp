@@ -21,7 +21,7 @@
 #include <orbis/camera/rays.hpp>
 #include <orbis/core/rounded.hpp>
 #include <orbis/core/se3.hpp>
-#include <orbis/octree/ray_walk.hpp>
+#include <orbis/octree/detail/points/ray_walk.hpp>
 
 namespace orbis::octree {
 

@@ -23,8 +23,8 @@
 
 #include <orbis/core/file.hpp>
 #include <orbis/core/result.hpp>
+#include <orbis/octree/detail/files/octomap_nodes.hpp>
 #include <orbis/octree/occupancy_octree.hpp>
-#include <orbis/octree/octomap_nodes.hpp>
 
 namespace orbis::octree {
 

@@ -19,10 +19,10 @@
 
 #include <orbis/core/execution.hpp>
 #include <orbis/core/rounded.hpp>
+#include <orbis/octree/detail/points/point_keys.hpp>
+#include <orbis/octree/detail/points/ray_batch.hpp>
+#include <orbis/octree/detail/points/ray_sweep.hpp>
 #include <orbis/octree/key_box.hpp>
-#include <orbis/octree/point_keys.hpp>
-#include <orbis/octree/ray_batch.hpp>
-#include <orbis/octree/ray_sweep.hpp>
 #include <orbis/octree/scan.hpp>
 
 namespace orbis::octree {

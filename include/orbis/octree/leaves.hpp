@@ -14,11 +14,11 @@
 #include <span>
 #include <vector>
 
-#include <orbis/octree/brick.hpp>
+#include <orbis/octree/detail/files/pruned_tree.hpp>
+#include <orbis/octree/detail/storage/brick.hpp>
+#include <orbis/octree/detail/storage/tree_parts.hpp>
 #include <orbis/octree/key_box.hpp>
 #include <orbis/octree/nodes.hpp>
-#include <orbis/octree/pruned_tree.hpp>
-#include <orbis/octree/tree_parts.hpp>
 
 namespace orbis::octree {
 

@@ -15,9 +15,9 @@
 #include <orbis/core/execution.hpp>
 #include <orbis/core/progress.hpp>
 #include <orbis/core/se3.hpp>
-#include <orbis/octree/hash_index.hpp>
+#include <orbis/octree/detail/storage/hash_index.hpp>
+#include <orbis/octree/detail/storage/large_leaves.hpp>
 #include <orbis/octree/key_box.hpp>
-#include <orbis/octree/large_leaves.hpp>
 #include <orbis/octree/occupancy_octree.hpp>
 
 namespace orbis::octree {

@@ -17,10 +17,10 @@
 #include <vector>
 
 #include <orbis/octree/accessor.hpp>
-#include <orbis/octree/brick.hpp>
-#include <orbis/octree/pruned_tree.hpp>
+#include <orbis/octree/detail/files/pruned_tree.hpp>
+#include <orbis/octree/detail/storage/brick.hpp>
+#include <orbis/octree/detail/storage/tree_parts.hpp>
 #include <orbis/octree/sensor_model.hpp>
-#include <orbis/octree/tree_parts.hpp>
 
 namespace orbis::octree {
 

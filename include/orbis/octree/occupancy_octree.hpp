@@ -26,18 +26,18 @@
 #include <orbis/core/point.hpp>
 #include <orbis/core/types.hpp>
 #include <orbis/octree/accessor.hpp>
-#include <orbis/octree/brick.hpp>
 #include <orbis/octree/cast_ray.hpp>
 #include <orbis/octree/change_log.hpp>
-#include <orbis/octree/depth_marker.hpp>
+#include <orbis/octree/detail/depth/depth_marker.hpp>
+#include <orbis/octree/detail/files/pruned_tree.hpp>
+#include <orbis/octree/detail/storage/brick.hpp>
+#include <orbis/octree/detail/storage/large_leaves.hpp>
+#include <orbis/octree/detail/storage/tree_parts.hpp>
+#include <orbis/octree/detail/storage/update_block.hpp>
 #include <orbis/octree/integration.hpp>
 #include <orbis/octree/key_box.hpp>
-#include <orbis/octree/large_leaves.hpp>
 #include <orbis/octree/leaves.hpp>
-#include <orbis/octree/pruned_tree.hpp>
 #include <orbis/octree/sensor_model.hpp>
-#include <orbis/octree/tree_parts.hpp>
-#include <orbis/octree/update_block.hpp>
 
 namespace orbis::octree {
 

@@ -10,9 +10,9 @@
 #include <cstdint>
 #include <vector>
 
-#include <orbis/octree/brick.hpp>
+#include <orbis/octree/detail/points/ray_walk.hpp>
+#include <orbis/octree/detail/storage/brick.hpp>
 #include <orbis/octree/key_box.hpp>
-#include <orbis/octree/ray_walk.hpp>
 
 namespace orbis::octree {
 

@@ -17,7 +17,7 @@
 #include <limits>
 #include <type_traits>
 
-#include <orbis/octree/constexpr_log.hpp>
+#include <orbis/octree/detail/storage/constexpr_log.hpp>
 
 namespace orbis::octree {
 

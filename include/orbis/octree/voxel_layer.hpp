@@ -13,8 +13,8 @@
 #include <utility>
 #include <vector>
 
-#include <orbis/octree/cow_pages.hpp>
-#include <orbis/octree/hash_index.hpp>
+#include <orbis/octree/detail/storage/cow_pages.hpp>
+#include <orbis/octree/detail/storage/hash_index.hpp>
 #include <orbis/octree/key.hpp>
 #include <orbis/octree/morton.hpp>
 #include <orbis/octree/voxel_payload.hpp>

@@ -26,8 +26,8 @@
 #include <orbis/core/se3.hpp>
 #include <orbis/core/sim3.hpp>
 #include <orbis/optimize/absolute_orientation.hpp>
+#include <orbis/optimize/detail/sparse/wide.hpp>
 #include <orbis/optimize/ransac.hpp>
-#include <orbis/optimize/wide.hpp>
 
 namespace orbis::optimize {
 

@@ -12,7 +12,7 @@
 #include <optional>
 #include <span>
 
-#include <orbis/camera/lanes.hpp>
+#include <orbis/camera/detail/lanes.hpp>
 #include <orbis/core/lanes.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/optimize/bundle_summary.hpp>

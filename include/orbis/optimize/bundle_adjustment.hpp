@@ -20,14 +20,14 @@
 #include <orbis/core/execution.hpp>
 #include <orbis/core/progress.hpp>
 #include <orbis/core/simd.hpp>
-#include <orbis/optimize/bundle_equations.hpp>
 #include <orbis/optimize/bundle_summary.hpp>
 #include <orbis/optimize/damping.hpp>
+#include <orbis/optimize/detail/bundle/bundle_equations.hpp>
+#include <orbis/optimize/detail/bundle/stage_watch.hpp>
 #include <orbis/optimize/linear_solver.hpp>
 #include <orbis/optimize/reprojection.hpp>
 #include <orbis/optimize/residual.hpp>
 #include <orbis/optimize/robust_loss.hpp>
-#include <orbis/optimize/stage_watch.hpp>
 
 namespace orbis::optimize {
 

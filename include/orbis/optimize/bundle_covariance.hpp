@@ -24,9 +24,9 @@
 #include <orbis/core/execution.hpp>
 #include <orbis/core/simd.hpp>
 #include <orbis/core/so3.hpp>
-#include <orbis/optimize/bundle_equations.hpp>
 #include <orbis/optimize/bundle_gauge.hpp>
 #include <orbis/optimize/bundle_summary.hpp>
+#include <orbis/optimize/detail/bundle/bundle_equations.hpp>
 #include <orbis/optimize/linear_solver.hpp>
 #include <orbis/optimize/residual.hpp>
 #include <orbis/optimize/robust_loss.hpp>

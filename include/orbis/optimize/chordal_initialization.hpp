@@ -23,8 +23,8 @@
 #include <orbis/core/se3.hpp>
 #include <orbis/core/so3.hpp>
 #include <orbis/core/types.hpp>
-#include <orbis/optimize/block_cholesky.hpp>
-#include <orbis/optimize/pose_graph_structure.hpp>
+#include <orbis/optimize/detail/pose/pose_graph_structure.hpp>
+#include <orbis/optimize/detail/sparse/block_cholesky.hpp>
 
 namespace orbis::optimize {
 

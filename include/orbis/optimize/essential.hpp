@@ -29,14 +29,14 @@
 #include <orbis/core/result.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/optimize/absolute_orientation.hpp>
-#include <orbis/optimize/descent.hpp>
-#include <orbis/optimize/five_point.hpp>
-#include <orbis/optimize/image_matches.hpp>
+#include <orbis/optimize/detail/minimal/five_point.hpp>
+#include <orbis/optimize/detail/minimal/image_matches.hpp>
+#include <orbis/optimize/detail/pose/descent.hpp>
+#include <orbis/optimize/detail/sparse/small_cholesky.hpp>
+#include <orbis/optimize/detail/sparse/wide.hpp>
 #include <orbis/optimize/manifold.hpp>
 #include <orbis/optimize/ransac.hpp>
-#include <orbis/optimize/small_cholesky.hpp>
 #include <orbis/optimize/triangulation.hpp>
-#include <orbis/optimize/wide.hpp>
 
 namespace orbis::optimize {
 

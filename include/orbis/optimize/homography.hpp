@@ -28,9 +28,9 @@
 #include <orbis/core/result.hpp>
 #include <orbis/core/so3.hpp>
 #include <orbis/core/types.hpp>
-#include <orbis/optimize/descent.hpp>
+#include <orbis/optimize/detail/pose/descent.hpp>
+#include <orbis/optimize/detail/sparse/small_cholesky.hpp>
 #include <orbis/optimize/ransac.hpp>
-#include <orbis/optimize/small_cholesky.hpp>
 
 namespace orbis::optimize {
 

@@ -11,10 +11,10 @@
 #include <vector>
 
 #include <orbis/core/types.hpp>
-#include <orbis/optimize/block_cholesky.hpp>
-#include <orbis/optimize/block_ordering.hpp>
-#include <orbis/optimize/conjugate_gradients.hpp>
-#include <orbis/optimize/dense_cholesky.hpp>
+#include <orbis/optimize/detail/sparse/block_cholesky.hpp>
+#include <orbis/optimize/detail/sparse/block_ordering.hpp>
+#include <orbis/optimize/detail/sparse/conjugate_gradients.hpp>
+#include <orbis/optimize/detail/sparse/dense_cholesky.hpp>
 
 namespace orbis::optimize {
 

@@ -18,10 +18,10 @@
 #include <type_traits>
 
 #include <orbis/core/types.hpp>
+#include <orbis/optimize/detail/sparse/small_cholesky.hpp>
 #include <orbis/optimize/graduated.hpp>
 #include <orbis/optimize/manifold.hpp>
 #include <orbis/optimize/robust_loss.hpp>
-#include <orbis/optimize/small_cholesky.hpp>
 
 namespace orbis::optimize {
 

@@ -25,11 +25,11 @@
 #include <orbis/core/result.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/core/simd.hpp>
-#include <orbis/optimize/descent.hpp>
+#include <orbis/optimize/detail/minimal/pnp_matches.hpp>
+#include <orbis/optimize/detail/pose/descent.hpp>
+#include <orbis/optimize/detail/sparse/small_cholesky.hpp>
 #include <orbis/optimize/p3p.hpp>
-#include <orbis/optimize/pnp_matches.hpp>
 #include <orbis/optimize/ransac.hpp>
-#include <orbis/optimize/small_cholesky.hpp>
 
 namespace orbis::optimize {
 

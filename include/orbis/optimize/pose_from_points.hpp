@@ -28,7 +28,7 @@
 #include <orbis/core/jacobi.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/core/se3.hpp>
-#include <orbis/optimize/small_cholesky.hpp>
+#include <orbis/optimize/detail/sparse/small_cholesky.hpp>
 
 namespace orbis::optimize {
 

@@ -22,13 +22,13 @@
 #include <orbis/core/execution.hpp>
 #include <orbis/core/progress.hpp>
 #include <orbis/optimize/between_factor.hpp>
-#include <orbis/optimize/block_cholesky.hpp>
 #include <orbis/optimize/damping.hpp>
+#include <orbis/optimize/detail/bundle/stage_watch.hpp>
+#include <orbis/optimize/detail/pose/pose_graph_structure.hpp>
+#include <orbis/optimize/detail/sparse/block_cholesky.hpp>
 #include <orbis/optimize/manifold.hpp>
-#include <orbis/optimize/pose_graph_structure.hpp>
 #include <orbis/optimize/pose_graph_summary.hpp>
 #include <orbis/optimize/robust_loss.hpp>
-#include <orbis/optimize/stage_watch.hpp>
 
 namespace orbis::optimize {
 

@@ -20,12 +20,12 @@
 #include <string_view>
 
 #include <orbis/core/simd.hpp>
+#include <orbis/optimize/detail/pose/pose_kernels.hpp>
+#include <orbis/optimize/detail/pose/pose_pieces.hpp>
+#include <orbis/optimize/detail/sparse/small_cholesky.hpp>
 #include <orbis/optimize/graduated.hpp>
-#include <orbis/optimize/pose_kernels.hpp>
-#include <orbis/optimize/pose_pieces.hpp>
 #include <orbis/optimize/reprojection.hpp>
 #include <orbis/optimize/robust_loss.hpp>
-#include <orbis/optimize/small_cholesky.hpp>
 
 namespace orbis::optimize {
 

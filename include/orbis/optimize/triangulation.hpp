@@ -21,7 +21,7 @@
 #include <Eigen/LU>
 
 #include <orbis/core/se3.hpp>
-#include <orbis/optimize/small_cholesky.hpp>
+#include <orbis/optimize/detail/sparse/small_cholesky.hpp>
 
 namespace orbis::optimize {
 

@@ -22,9 +22,9 @@
 #include <orbis/core/result.hpp>
 #include <orbis/places/bag_of_words.hpp>
 #include <orbis/places/bit_string.hpp>
-#include <orbis/places/parent_list.hpp>
+#include <orbis/places/detail/parent_list.hpp>
+#include <orbis/places/detail/vocabulary_tree.hpp>
 #include <orbis/places/vocabulary.hpp>
-#include <orbis/places/vocabulary_tree.hpp>
 
 namespace orbis::places {
 

@@ -32,9 +32,9 @@
 #include <orbis/core/file.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/places/dbow_text.hpp>
-#include <orbis/places/parent_list.hpp>
+#include <orbis/places/detail/parent_list.hpp>
+#include <orbis/places/detail/vocabulary_tree.hpp>
 #include <orbis/places/vocabulary.hpp>
-#include <orbis/places/vocabulary_tree.hpp>
 
 namespace orbis::places {
 

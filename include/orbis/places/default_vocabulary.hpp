@@ -8,8 +8,8 @@
 #include <string>
 #include <string_view>
 
-#include <orbis/places/base85.hpp>
-#include <orbis/places/default_vocabulary_data.hpp>
+#include <orbis/places/detail/base85.hpp>
+#include <orbis/places/detail/default_vocabulary_data.hpp>
 #include <orbis/places/vocabulary.hpp>
 #include <orbis/places/vocabulary_file.hpp>
 

@@ -18,8 +18,8 @@
 #include <orbis/core/simd.hpp>
 #include <orbis/places/bag_of_words.hpp>
 #include <orbis/places/bit_string.hpp>
-#include <orbis/places/descent.hpp>
-#include <orbis/places/vocabulary_tree.hpp>
+#include <orbis/places/detail/descent.hpp>
+#include <orbis/places/detail/vocabulary_tree.hpp>
 
 namespace orbis::places {
 

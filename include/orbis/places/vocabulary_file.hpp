@@ -36,8 +36,8 @@
 #include <orbis/core/file.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/places/bag_of_words.hpp>
+#include <orbis/places/detail/vocabulary_tree.hpp>
 #include <orbis/places/vocabulary.hpp>
-#include <orbis/places/vocabulary_tree.hpp>
 
 namespace orbis::places {
 

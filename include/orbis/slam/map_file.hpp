@@ -36,9 +36,9 @@
 #include <string_view>
 #include <utility>
 
+#include <orbis/core/bytes.hpp>
 #include <orbis/core/file.hpp>
 #include <orbis/core/result.hpp>
-#include <orbis/io/bytes.hpp>
 #include <orbis/slam/map.hpp>
 #include <orbis/slam/map_reader.hpp>
 #include <orbis/slam/map_sections.hpp>
@@ -127,7 +127,7 @@ inline void put_landmark(std::string& to, const landmark& l) {
   if (text.substr(0, detail::map_magic.size()) != detail::map_magic)
     return fail(errc::malformed, where, "not a map of orbis: it does not begin with \"orbismap\"");
   if (text.size() < head) return fail(errc::malformed, where, "ends before its version");
-  if (const auto version = io::load<std::uint32_t>(text.data() + detail::map_magic.size());
+  if (const auto version = load_number<std::uint32_t>(text.data() + detail::map_magic.size());
       version != detail::map_version)
     return fail(errc::unsupported, where, "version " + std::to_string(version) + ", this reads version 1");
 

@@ -10,15 +10,15 @@
 #include <string>
 #include <string_view>
 
+#include <orbis/core/bytes.hpp>
 #include <orbis/core/crc32c.hpp>
-#include <orbis/io/bytes.hpp>
 
 namespace orbis::slam::detail {
 
 /// Appends numbers, little-endian.
 template <class... T>
 void put(std::string& to, T... values) {
-  (io::append_little_endian(to, values), ...);
+  (append_little_endian(to, values), ...);
 }
 
 inline constexpr std::size_t section_head = 12, section_tail = 4;  ///< name and length; checksum
@@ -47,7 +47,7 @@ class section_reader {
       end();
       return T{};
     }
-    const T value = io::load<T>(content_.data());
+    const T value = load_number<T>(content_.data());
     content_.remove_prefix(sizeof(T));
     return value;
   }
@@ -80,13 +80,13 @@ class section_finder {
     const std::size_t left = file_.size() - at_;
     if (left < section_head) return wrong("is missing: the file ends at byte " + std::to_string(file_.size()));
     if (file_.substr(at_, name.size()) != name) return wrong("does not begin at byte " + std::to_string(at_));
-    const auto length = io::load<std::uint64_t>(file_.data() + at_ + name.size());
+    const auto length = load_number<std::uint64_t>(file_.data() + at_ + name.size());
     if (left - section_head < section_tail || length > left - section_head - section_tail)
       return wrong("from byte " + std::to_string(at_) + " is cut off: the file ends at byte " +
                    std::to_string(file_.size()));
     const std::size_t size = section_head + static_cast<std::size_t>(length);
     const std::string_view whole = file_.substr(at_, size);
-    if (crc32c(std::as_bytes(std::span{whole})) != io::load<std::uint32_t>(file_.data() + at_ + size))
+    if (crc32c(std::as_bytes(std::span{whole})) != load_number<std::uint32_t>(file_.data() + at_ + size))
       return wrong("from byte " + std::to_string(at_) + " is damaged: its checksum does not fit");
     at_ += size + section_tail;
     return section_reader{whole.substr(section_head)};

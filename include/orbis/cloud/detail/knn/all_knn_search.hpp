@@ -1,0 +1,329 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// The search for the nearest neighbours of all points of a cloud, leaf by leaf.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <vector>
+
+#include <orbis/cloud/detail/knn/all_knn_avx2.hpp>
+#include <orbis/cloud/detail/knn/all_knn_avx512.hpp>
+#include <orbis/cloud/detail/knn/all_knn_kernels.hpp>
+#include <orbis/cloud/detail/knn/all_knn_lanes.hpp>
+#include <orbis/cloud/detail/knn/all_knn_leaves.hpp>
+#include <orbis/cloud/detail/knn/squared_distance.hpp>
+#include <orbis/core/simd.hpp>
+
+namespace orbis::cloud::detail {
+
+/// The best set of inner loops that neither `wanted` nor the processor excludes.
+[[nodiscard]] inline knn_kernels select_knn_kernels(simd::level wanted) noexcept {
+#if ORBIS_X86
+  const simd::level best = std::min(wanted, simd::detected());
+  if (best >= simd::level::avx512) {
+    return {near_boxes_avx512, gather_avx512, near_points_avx512, in_leaf_avx512, distances_avx512, sum_nearest_avx512};
+  }
+  if (best >= simd::level::avx2) {
+    return {near_boxes_avx2, gather_portable, near_points_avx2, in_leaf_avx2, distances_avx2, sum_nearest_avx2};
+  }
+#else
+  static_cast<void>(wanted);
+#endif
+#if ORBIS_HAS_LANES
+  return {near_boxes_lanes, gather_portable, near_points_lanes, in_leaf_lanes, distances_lanes, sum_nearest_lanes};
+#else
+  return {near_boxes_portable, gather_portable,    near_points_portable,
+          in_leaf_portable,    distances_portable, sum_nearest_portable};
+#endif
+}
+
+/// A row of boxes that is still to be looked at.
+struct open_row {
+  std::uint32_t level;
+  std::uint32_t row;
+};
+
+/// Gathers the leaves within `bound`, squared, of a box; false if they are too many. `open` is scratch.
+[[nodiscard]] inline bool gather_near_leaves(const leaf_hierarchy& tree, const knn_kernels& kernels, const box3& box,
+                                             float bound, std::vector<open_row>& open, nearby_leaves& near) {
+  near.count = 0;
+  open.clear();
+  open.push_back({static_cast<std::uint32_t>(tree.levels.size() - 1), 0});
+  std::array<float, leaf_width> distance;
+  while (!open.empty()) {
+    const open_row next = open.back();
+    open.pop_back();
+    const box_row& boxes = tree.levels[next.level][next.row];
+    std::uint32_t mask = kernels.near_boxes(boxes, box, bound, distance.data());
+    const auto child = static_cast<std::uint32_t>(next.row * leaf_width);
+    if (next.level == 0) {
+      if (!near.has_room()) return false;
+      kernels.gather(boxes, mask, child, near);
+    } else {
+      for (; mask != 0; mask &= mask - 1) {
+        open.push_back({next.level - 1, child + static_cast<std::uint32_t>(std::countr_zero(mask))});
+      }
+    }
+  }
+  near.finish();
+  return true;
+}
+
+/// Calls `f(member, squared distance)` for every point within `bound`, squared, of `q`, until it returns false.
+/// `open` is scratch.
+template <class F>
+void for_each_within(const leaf_hierarchy& tree, const knn_kernels& kernels, const std::array<float, 3>& q, float bound,
+                     std::vector<open_row>& open, F&& f) {
+  const box3 box{q, q};
+  std::array<float, leaf_width> distance;
+  open.clear();
+  open.push_back({static_cast<std::uint32_t>(tree.levels.size() - 1), 0});
+  while (!open.empty()) {
+    const open_row next = open.back();
+    open.pop_back();
+    const std::size_t children = next.level == 0 ? tree.leaves.size() : tree.levels[next.level - 1].size();
+    std::uint32_t mask = kernels.near_boxes(tree.levels[next.level][next.row], box, bound, distance.data());
+    for (; mask != 0; mask &= mask - 1) {
+      const std::size_t child = next.row * leaf_width + static_cast<std::size_t>(std::countr_zero(mask));
+      if (child >= children) break;  // where the bound is infinite
+      if (next.level != 0) {
+        open.push_back({next.level - 1, static_cast<std::uint32_t>(child)});
+        continue;
+      }
+      std::uint32_t within = kernels.distances(tree.leaves[child], q, bound, distance.data());
+      for (const std::size_t size = tree.size_of(child); within != 0; within &= within - 1) {
+        const auto n = static_cast<std::size_t>(std::countr_zero(within));
+        if (n < size && !f(tree.members[child * leaf_width + n], distance[n])) return;
+      }
+    }
+  }
+}
+
+/// Finds, for one point after another along the curve, the squared distances to its `wanted` nearest
+/// points, itself included.
+///
+/// Points that follow each other share their candidates: the leaves within a little more than the
+/// distance that sufficed for the points before. Each point then takes what lies within a little less
+/// than that, which is verified by counting: it holds all of the nearest if it holds enough. Where it
+/// does not, as for outliers and where the density leaps, the point is searched for by itself, within
+/// the distance that suffices among its neighbours on the curve. Where that is too far to be of use,
+/// it is searched for leaf by leaf from the nearest on. So a bad guess costs time at worst.
+///
+/// Source of the search from the nearest box on: G. R. Hjaltason, H. Samet, "Distance browsing in
+/// spatial databases", ACM TODS 24, 1999.
+class nearest_search {
+ public:
+  /// @pre 0 < wanted <= points in the leaves
+  nearest_search(const leaf_hierarchy& tree, const knn_kernels& kernels, std::size_t wanted)
+      : tree_{&tree},
+        kernels_{kernels},
+        wanted_{wanted},
+        capacity_{3 * wanted + 64},
+        stride_{capacity_ + 4 * leaf_width},
+        shared_{192 + 2 * wanted},
+        own_{192 + 2 * wanted},
+        chosen_(own_.leaves.size() + leaf_width),
+        found_(leaf_width * stride_),
+        hoped_{1.0F + 2.1F / std::sqrt(static_cast<float>(wanted))},
+        reach_{1.35F * hoped_} {}
+
+  /// Searches for the points of one leaf, then calls `f(i, found, bound)` for the i-th of them in any
+  /// order. `found`: squared distances up to `bound`, the nearest among them; fewer than `wanted` where
+  /// squared distances overflow; sixteen times infinity stands after them. `f` may reorder them, and
+  /// returns the `wanted`-th smallest.
+  template <class F>
+  void visit_leaf(std::size_t l, F&& f) {
+    const std::size_t size = tree_->size_of(l);
+    if (!(usual_ >= 0)) {
+      const found_within first = search_alone(l, 0, found_.data());
+      usual_ = first.count < wanted_ ? 0.0F : first.bound;
+    }
+    std::array<float, 2 * leaf_width> largest;
+    largest.fill(infinity);
+    for (std::size_t first = 0; first != size;) {
+      box3 box{query(l, first), query(l, first)};
+      std::size_t last = first + 1;
+      while (last != size && grow(box, query(l, last))) ++last;
+      visit_run(l, first, last, box, largest, f);
+      first = last;
+    }
+    // The median: an outlier says nothing about its neighbours.
+    const float median = kernels_.sum_nearest(largest.data(), size, size / 2 + 1, most).largest_squared;
+    if (median <= most) usual_ = median;
+  }
+
+  /// Calls `f(member, squared distance)` for every point within `bound` of the i-th of the leaf that is being
+  /// visited.
+  template <class F>
+  void visit_within(std::size_t l, std::size_t i, float bound, F&& f) {
+    const std::array<float, 3> q = query(l, i);
+    if (!(bound <= shared_reach_)) {
+      for_each_within(*tree_, kernels_, q, bound, open_, [&](std::uint32_t member, float d) {
+        f(member, d);
+        return true;
+      });
+      return;
+    }
+    const box3 box{q, q};
+    std::array<float, leaf_width> distance;
+    for (std::size_t first = 0; first < shared_.count; first += leaf_width) {
+      std::uint32_t mask = kernels_.near_boxes(shared_.boxes[first / leaf_width], box, bound, distance.data());
+      for (; mask != 0; mask &= mask - 1) {
+        const std::size_t leaf = shared_.leaves[first + static_cast<std::size_t>(std::countr_zero(mask))];
+        std::uint32_t within = kernels_.distances(tree_->leaves[leaf], q, bound, distance.data());
+        for (; within != 0; within &= within - 1) {
+          const auto n = static_cast<std::size_t>(std::countr_zero(within));
+          f(tree_->members[leaf * leaf_width + n], distance[n]);
+        }
+      }
+    }
+  }
+
+ private:
+  /// How many squared distances were found, all of those up to a bound.
+  struct found_within {
+    std::size_t count;
+    float bound;
+  };
+  static constexpr float infinity = std::numeric_limits<float>::infinity();
+  static constexpr float most = std::numeric_limits<float>::max();
+
+  [[nodiscard]] std::array<float, 3> query(std::size_t l, std::size_t i) const noexcept {
+    const point_row& leaf = tree_->leaves[l];
+    return {leaf.axis[0][i], leaf.axis[1][i], leaf.axis[2][i]};
+  }
+  /// Takes a point into a box unless that makes the box so large that sharing candidates does not pay.
+  [[nodiscard]] bool grow(box3& box, const std::array<float, 3>& p) const noexcept {
+    box3 grown;
+    for (std::size_t a = 0; a != 3; ++a) {
+      grown.low[a] = std::min(box.low[a], p[a]);
+      grown.high[a] = std::max(box.high[a], p[a]);
+    }
+    if (squared_distance(grown.low, grown.high) > 16.0F * usual_) return false;
+    box = grown;
+    return true;
+  }
+
+  template <class F>
+  void visit_run(std::size_t l, std::size_t first, std::size_t last, const box3& box,
+                 std::array<float, 2 * leaf_width>& largest, F&& f) {
+    const float hoped = std::min(usual_ * hoped_, most);
+    const float reach = std::min(usual_ * reach_, most);
+    const bool shared = gather_near(box, reach, shared_);
+    shared_reach_ = shared ? reach : -1.0F;
+    std::array<found_within, leaf_width> results;
+    for (std::size_t i = first; i != last; ++i) {
+      float* const found = found_.data() + i * stride_;
+      found_within result{0, hoped};
+      if (shared) {
+        result.count = search_near(shared_, query(l, i), hoped, found);
+        if (result.count < wanted_) result = {search_near(shared_, query(l, i), reach, found), reach};
+      }
+      if (result.count < wanted_ || result.count > capacity_) result = search_alone(l, i, found);
+      results[i] = result;
+    }
+    for (std::size_t i = first; i != last; ++i) {
+      largest[i] = f(i, std::span{found_.data() + i * stride_, results[i].count}, results[i].bound);
+    }
+  }
+  [[nodiscard]] std::size_t search_near(const nearby_leaves& near, const std::array<float, 3>& q, float bound,
+                                        float* found) {
+    return kernels_.near_points(tree_->leaves.data(), near, q, bound, chosen_.data(), found, capacity_);
+  }
+
+  [[nodiscard]] bool gather_near(const box3& box, float bound, nearby_leaves& near) {
+    return gather_near_leaves(*tree_, kernels_, box, bound, open_, near);
+  }
+
+  /// The `wanted` nearest and perhaps some more; fewer where squared distances overflow.
+  [[nodiscard]] found_within search_alone(std::size_t l, std::size_t i, float* found) {
+    const std::array<float, 3> q = query(l, i);
+    const std::size_t side = wanted_ / leaf_width + 1;
+    const std::size_t begin = l - std::min(l, side);
+    const std::size_t end = std::min(l + side + 1, tree_->leaves.size());
+    found_within result{0, most};
+    for (std::size_t n = begin; n != end && result.count <= capacity_; ++n) {
+      result.count += kernels_.in_leaf(tree_->leaves[n], q, most, found + result.count);
+    }
+    if (result.count < wanted_) return search_outwards(q, found);
+    std::fill_n(found + result.count, leaf_width, infinity);
+    float bound = kernels_.sum_nearest(found, result.count, wanted_, most).largest_squared;
+    if (!gather_near({q, q}, bound, own_)) return search_outwards(q, found);
+    for (;;) {
+      result = {search_near(own_, q, bound, found), bound};
+      if (result.count <= capacity_) return result;
+      // Too many: of those seen so far, enough are nearer.
+      bound = kernels_.sum_nearest(found, result.count, wanted_, bound).largest_squared;
+      if (bound == result.bound) return search_outwards(q, found);
+    }
+  }
+
+  /// The same, nearest leaf first.
+  [[nodiscard]] found_within search_outwards(const std::array<float, 3>& q, float* found) {
+    float bound = most;
+    std::size_t count = 0;
+    std::size_t enough = wanted_;
+    const box3 box{q, q};
+    const auto expand = [&](std::uint32_t level, std::uint32_t row) {
+      std::array<float, leaf_width> distance;
+      std::uint32_t mask = kernels_.near_boxes(tree_->levels[level][row], box, bound, distance.data());
+      for (; mask != 0; mask &= mask - 1) {
+        const auto i = static_cast<std::uint32_t>(std::countr_zero(mask));
+        pending_.push_back({distance[i], level, static_cast<std::uint32_t>(row * leaf_width) + i});
+        std::push_heap(pending_.begin(), pending_.end(), later);
+      }
+    };
+    pending_.clear();
+    expand(static_cast<std::uint32_t>(tree_->levels.size() - 1), 0);
+    while (!pending_.empty()) {
+      std::pop_heap(pending_.begin(), pending_.end(), later);
+      const pending next = pending_.back();
+      pending_.pop_back();
+      if (next.distance > bound) break;
+      if (next.level != 0) {
+        expand(next.level - 1, next.index);
+        continue;
+      }
+      count += kernels_.in_leaf(tree_->leaves[next.index], q, bound, found + count);
+      if (count < enough) continue;
+      std::nth_element(found, found + (wanted_ - 1), found + count);
+      bound = found[wanted_ - 1];
+      count = wanted_;
+      enough = wanted_ + std::max(wanted_ / 2, leaf_width);
+    }
+    std::fill_n(found + count, leaf_width, infinity);
+    return {count, bound};
+  }
+
+  struct pending {
+    float distance;
+    std::uint32_t level;
+    std::uint32_t index;
+  };
+  static bool later(const pending& a, const pending& b) noexcept { return a.distance > b.distance; }
+
+  const leaf_hierarchy* tree_;
+  knn_kernels kernels_;
+  std::size_t wanted_;
+  std::size_t capacity_;
+  std::size_t stride_;
+  nearby_leaves shared_;  ///< of a run of points
+  nearby_leaves own_;     ///< of one point
+  std::vector<std::uint32_t> chosen_;
+  std::vector<float> found_;
+  std::vector<pending> pending_;
+  std::vector<open_row> open_;
+  float hoped_;              ///< what of `usual_` should suffice: its scatter falls with the number of neighbours
+  float reach_;              ///< what of `usual_` should suffice in any case
+  float shared_reach_ = -1;  ///< squared distance from the run's box within which `shared_` is all there is
+  float usual_ = -1;         ///< squared distance to the `wanted`-th nearest; negative where not known yet
+};
+
+}  // namespace orbis::cloud::detail

@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// One posed depth image as `ray_evidence.hpp` asks it, and which blocks of points it cannot judge.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <concepts>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <optional>
+
+#include <orbis/camera/model.hpp>
+#include <orbis/camera/pinhole.hpp>
+#include <orbis/cloud/detail/knn/point_blocks.hpp>
+#include <orbis/cloud/detail/rays/depth_windows.hpp>
+#include <orbis/core/se3.hpp>
+#include <orbis/core/types.hpp>
+
+namespace orbis::cloud::detail {
+
+/// A view in the numbers that its kernels use.
+struct ray_view {
+  std::array<std::array<float, 3>, 3> rotation{};  ///< camera from world, row by row
+  std::array<float, 3> origin{};                   ///< of the camera in the world, metres, as the nearest float,
+  std::array<float, 3> origin_rest{};              ///< and what that leaves: coordinates may be large
+  float fx = 0, fy = 0, cx = 0, cy = 0;            ///< of a pinhole; half a pixel is added to cx and cy
+  int width = 0;
+  int height = 0;
+  float min_depth = 0;  ///< of points that are judged, metres; they have to be beyond it
+  float max_depth = 0;
+  float margin = 0;  ///< margin + margin_growth z^2, metres
+  float margin_growth = 0;
+  float slant = 0;  ///< how much of a window's depth range is added to the margin of rays that pass through
+  const float* nearest = nullptr;
+  const float* farthest = nullptr;
+  const float* middle = nullptr;
+};
+
+/// Sets everything but the camera's and the windows' numbers. @pre the pose is finite
+inline void place(ray_view& view, const se3& T_world_camera) {
+  const mat3 rotation = T_world_camera.rotation_matrix();
+  for (std::size_t a = 0; a != 3; ++a) {
+    const auto row = static_cast<Eigen::Index>(a);
+    for (std::size_t b = 0; b != 3; ++b)
+      view.rotation[a][b] = static_cast<float>(rotation(static_cast<Eigen::Index>(b), row));
+    view.origin[a] = static_cast<float>(T_world_camera.translation()[row]);
+    view.origin_rest[a] = static_cast<float>(T_world_camera.translation()[row] - double{view.origin[a]});
+  }
+}
+
+/// The angle between the optical axis and the ray farthest from it, with some to spare, radians;
+/// empty where that is not known.
+template <camera::camera_model Camera>
+[[nodiscard]] std::optional<double> view_angle(const Camera& camera) {
+  constexpr int steps = 32;
+  double angle = 0;
+  for (int j = 0; j <= steps; ++j) {
+    for (int i = 0; i <= steps; ++i) {
+      const auto ray = camera.unproject({-0.5 + camera.width() * (i / double{steps}),  //
+                                         -0.5 + camera.height() * (j / double{steps})});
+      if (!ray || !ray->allFinite()) return std::nullopt;
+      angle = std::max(angle, std::atan2(ray->template head<2>().norm(), ray->z()));
+    }
+  }
+  return 1.02 * angle + 0.02;
+}
+
+/// Tells blocks of points about which a view says nothing, by their bounding boxes. Errs on the side
+/// of asking.
+template <camera::camera_model Camera>
+class block_test {
+ public:
+  explicit block_test(const Camera& camera) : camera_{&camera} {
+    if constexpr (!std::same_as<Camera, camera::pinhole>) angle_ = view_angle(camera);
+  }
+
+  /// For the next questions. @pre the pose is finite
+  void place(const se3& T_world_camera, const ray_view& view, const depth_windows& windows) {
+    rotation_ = T_world_camera.rotation_matrix().transpose();
+    absolute_ = rotation_.cwiseAbs();
+    origin_ = T_world_camera.translation();
+    view_ = &view;
+    windows_ = &windows;
+  }
+
+  [[nodiscard]] bool says_nothing(const point_blocks::box& box) const {
+    vec3 middle;
+    vec3 half;
+    for (Eigen::Index a = 0; a != 3; ++a) {
+      const double low = box.low[static_cast<std::size_t>(a)];
+      const double high = box.high[static_cast<std::size_t>(a)];
+      middle[a] = 0.5 * (low + high);
+      half[a] = 0.5 * (high - low);
+    }
+    const vec3 c = rotation_ * (middle - origin_);
+    // The kernels' rounding is some 1e-6 of the distance.
+    const double slack = 1e-5 * (c.norm() + half.norm());
+    if constexpr (std::same_as<Camera, camera::pinhole>) {
+      const vec3 h = absolute_ * half + vec3::Constant(slack);
+      return pinhole_says_nothing(c - h, c + h);
+    } else {
+      if (!angle_) return false;
+      const double radius = half.norm() + slack;
+      const double distance = c.norm();
+      if (distance <= radius) return false;
+      return std::atan2(c.head<2>().norm(), c.z()) - std::asin(radius / distance) > *angle_;
+    }
+  }
+
+ private:
+  [[nodiscard]] bool pinhole_says_nothing(const vec3& low, const vec3& high) const {
+    if (!(high.z() > double{view_->min_depth}) || low.z() > double{view_->max_depth}) return true;
+    if (!(low.z() > 1e-3)) return false;
+    const camera::intrinsics& k = camera_->k();
+    const auto pixels = [&](double from, double to, double focal, double center) {
+      const double least = focal * (from / (from < 0 ? low.z() : high.z())) + center;
+      const double most = focal * (to / (to < 0 ? high.z() : low.z())) + center;
+      return std::array{least - 0.55 - 1e-5 * std::abs(least), most + 0.55 + 1e-5 * std::abs(most)};
+    };
+    const auto [left, right] = pixels(low.x(), high.x(), k.fx, k.cx);
+    const auto [top, bottom] = pixels(low.y(), high.y(), k.fy, k.cy);
+    if (right < 0 || bottom < 0 || left > k.width - 1 || top > k.height - 1) return true;
+    // Hidden behind everything around?
+    const auto tile_of = [](double pixel, int size) {
+      return static_cast<int>(std::clamp(pixel, 0.0, size - 1.0)) / depth_windows::tile;
+    };
+    const int x0 = tile_of(left, k.width), x1 = tile_of(std::ceil(right), k.width);
+    const int y0 = tile_of(top, k.height), y1 = tile_of(std::ceil(bottom), k.height);
+    constexpr int worth_it = 64;
+    if ((x1 - x0 + 1) * (y1 - y0 + 1) > worth_it) return false;
+    const double margin = double{view_->margin} + double{view_->margin_growth} * high.z() * high.z();
+    return double{windows_->farthest_of_tiles(x0, y0, x1, y1)} < low.z() - 1.001 * margin;
+  }
+
+  const Camera* camera_;
+  std::optional<double> angle_;
+  mat3 rotation_;  ///< camera from world
+  mat3 absolute_;
+  vec3 origin_;
+  const ray_view* view_ = nullptr;
+  const depth_windows* windows_ = nullptr;
+};
+
+}  // namespace orbis::cloud::detail

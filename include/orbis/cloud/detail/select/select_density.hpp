@@ -1,0 +1,236 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Where the threshold of a test of density lies: in a valley between two populations of points that
+/// do not lie on surfaces.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <orbis/cloud/detail/select/log_density.hpp>
+#include <orbis/cloud/detail/select/select_evidence.hpp>
+#include <orbis/cloud/detail/select/select_surroundings.hpp>
+#include <orbis/cloud/filter_chain.hpp>
+#include <orbis/core/execution.hpp>
+
+namespace orbis::cloud::detail {
+
+/// A way to say what spacing is usual, and how well the cloud keeps to it.
+struct reference {
+  density_step step;
+  bulk width;  ///< of the residuals; the median is 0
+};
+
+/// Width of the bulk as it counts in the comparison of references.
+[[nodiscard]] inline double width_of(const bulk& b) noexcept { return std::max(b.left_scale, 0.5 * b.right_scale); }
+
+[[nodiscard]] inline std::vector<double> finite_of(std::span<const float> values) {
+  std::vector<double> out;
+  out.reserve(values.size());
+  for (const float v : values) {
+    if (std::isfinite(v)) out.push_back(v);
+  }
+  return out;
+}
+
+/// Moves the reference to the bulk's median, and measures the bulk.
+template <execution_policy Policy>
+void center(const Policy& policy, surroundings& around, reference& r) {
+  r.width = bulk_of(finite_of(around.residuals(policy, r.step)));
+  (r.step.mode == filter_mode::local_log_statistical ? r.step.offset : r.step.usual.intercept) += r.width.median;
+  r.width.median = 0;
+}
+
+/// How eager a test is.
+struct test_manner {
+  double lowest = 0.55;         ///< threshold
+  double without_valley = 1.6;  ///< threshold for one population, if its bulk is not wider
+  bool shoulders = true;        ///< flying pixels make a shoulder on the bulk rather than a population apart
+  double least_ratio = 1.6;     ///< of a valley
+  bool needs_valley = false;    ///< without one nothing goes
+};
+
+/// Sparse points that lie on surfaces are no outliers, however many there are: regions seen from afar or
+/// at a grazing angle. So only the others make the histogram, and no threshold lies where the sparser
+/// points are surfaces by more than 40 %.
+template <execution_policy Policy>
+[[nodiscard]] density_evidence find_threshold(const Policy& policy, surroundings& around, const reference& r,
+                                              const test_manner& manner) {
+  constexpr double first = 0.3;
+  constexpr double bin_width = 0.08;
+  constexpr std::size_t bins = 64;
+  constexpr double most_surface = 0.4;
+  constexpr double chance = 10;  // points: fewer say nothing
+  const std::vector<float> residual = around.residuals(policy, r.step);
+  around.look_at_shapes(policy, residual, r.step.surface_line());
+  std::vector<double> loose;  // residuals of points that are not on surfaces
+  loose.reserve(residual.size());
+  std::array<double, bins> all{};
+  std::array<double, bins> surface{};
+  for (std::size_t i = 0; i != residual.size(); ++i) {
+    const double x = residual[i];
+    if (std::isnan(x)) continue;
+    const bool sparse = x >= first;
+    const bool on_surface = sparse && around.on_surface(i, r.step.surface, r.step.surface_line());
+    if (!on_surface) loose.push_back(x);
+    if (!sparse) continue;
+    const auto bin = static_cast<std::size_t>(std::min((x - first) / bin_width, bins - 1.0));
+    all[bin] += 1;
+    surface[bin] += on_surface ? 1 : 0;
+  }
+  density_evidence out;
+  out.mode = r.step.mode;
+  out.left_scale = r.width.left_scale;
+  out.right_scale = r.width.right_scale;
+  out.surface_end = first;
+  double beyond = 0;
+  double surface_beyond = 0;
+  for (std::size_t b = bins; b-- > 0;) {
+    beyond += all[b];
+    surface_beyond += surface[b];
+    if (surface_beyond <= most_surface * beyond + chance) continue;
+    out.surface_end = first + bin_width * static_cast<double>(b + 1);
+    break;
+  }
+  const double scale = r.width.left_scale;
+  const valley v = deepest_valley(loose, 0, std::max({manner.lowest, std::min(2.5 * scale, 1.4), out.surface_end}));
+  out.valley_position = v.position;
+  out.valley_ratio = v.ratio;
+  const bool two_populations = v.ratio > manner.least_ratio;
+  if (!two_populations && manner.needs_valley) {
+    out.threshold = std::numeric_limits<double>::infinity();
+    return out;
+  }
+  out.threshold = two_populations ? v.position : std::max({manner.without_valley, 6 * scale, out.surface_end});
+  const double shoulder_start = std::max({0.75, 5 * scale, out.surface_end});
+  if (manner.shoulders && shoulder_start < out.threshold) {
+    const auto n = std::ranges::count_if(loose, [&](double x) { return x > shoulder_start && x <= out.threshold; });
+    out.shoulder = static_cast<double>(n) / static_cast<double>(residual.size());
+    if (out.shoulder > (v.ratio > 3 ? 0.025 : 0.01)) out.threshold = shoulder_start;
+  }
+  return out;
+}
+
+[[nodiscard]] inline std::string in_words(const density_evidence& e) {
+  std::string out = percent(e.removed) + " of the points lie more than " + in_words(std::exp(e.threshold)) +
+                    " times sparser than usual";
+  if (e.mode == filter_mode::range_log_statistical) out += " at their range";
+  if (e.mode == filter_mode::local_log_statistical) out += " around them";
+  out += " and on no surface";
+  if (e.threshold == e.valley_position) {
+    out += " (a population apart: the valley before it is " + in_words(e.valley_ratio) + " times lower than its peak)";
+  } else if (e.shoulder > 0.01) {
+    out += " (" + percent(e.shoulder) + " make a shoulder just outside the bulk, as flying pixels do)";
+  }
+  return out;
+}
+
+/// Judges what is left of a cloud by its points alone, adds the steps that follow, and their reasons.
+/// The tests leave their removals in `around`.
+template <execution_policy Policy>
+void judge_points(const Policy& policy, surroundings& around, const select_options& options, filter_choice& choice,
+                  std::vector<std::string>& reasons) {
+  filter_evidence& evidence = choice.evidence;
+  // The references: the narrower bulk wins, the simpler one with a head start.
+  reference global;
+  global.step.neighbors = options.neighbors;
+  center(policy, around, global);
+  evidence.median_spacing = std::exp(global.step.usual.intercept);
+  evidence.global_scale = width_of(global.width);
+  std::optional<reference> ranged;
+  {
+    std::vector<double> spacing;
+    std::vector<double> range;
+    for (std::size_t i = 0; i != around.size(); ++i) {
+      if (!std::isfinite(around.log_spacing()[i]) || !std::isfinite(around.log_range()[i])) continue;
+      spacing.push_back(around.log_spacing()[i]);
+      range.push_back(around.log_range()[i]);
+    }
+    const auto line = fit_log_line(spacing, range);
+    if (line) {
+      ranged = global;
+      ranged->step.mode = filter_mode::range_log_statistical;
+      ranged->step.usual = *line;
+      center(policy, around, *ranged);
+      evidence.range_scale = width_of(ranged->width);
+    }
+  }
+  const bool by_range = ranged && ranged->step.usual.slope > 0 && *evidence.range_scale < 0.85 * evidence.global_scale;
+  const reference& usual = by_range ? *ranged : global;
+  evidence.left_scale = usual.width.left_scale;
+  evidence.right_scale = usual.width.right_scale;
+  reference local = usual;
+  local.step.mode = filter_mode::local_log_statistical;
+  center(policy, around, local);
+  evidence.local_scale = width_of(local.width);
+
+  // Applies a step; returns the share that it removes. Outliers are the fewer: what would take more is undone.
+  const auto try_step = [&](const auto& step) {
+    constexpr double most = 0.4;
+    std::vector<char> before(around.gone().begin(), around.gone().end());
+    const auto count = [](std::span<const char> gone) {
+      return static_cast<double>(std::ranges::count(gone, char{1}));
+    };
+    around.apply(policy, step);
+    const double share = (count(around.gone()) - count(before)) / static_cast<double>(evidence.finite);
+    if (share > most) {
+      around.restore(std::move(before));
+      return 0.0;
+    }
+    if (share > 0) choice.chain.emplace_back(step);
+    return share;
+  };
+  const auto test = [&](reference r, const test_manner& manner) {
+    if (!options.allows(r.step.mode)) return;
+    r.step.surface_spacing = usual.step.usual;
+    density_evidence found = find_threshold(policy, around, r, manner);
+    if (std::isfinite(found.threshold)) {
+      density_step step = r.step;
+      step.threshold = found.threshold;
+      found.removed = try_step(step);
+      if (found.removed > 0) reasons.push_back(in_words(found));
+    }
+    evidence.density.push_back(found);
+  };
+  test(usual, {});
+  // A sensor's range can explain away outliers that are spread over all ranges: one reference for all sees them.
+  if (by_range) {
+    test(global, {.shoulders = false, .least_ratio = 3, .needs_valley = true});
+  } else if (ranged && ranged->step.usual.slope > 0) {
+    test(*ranged, {.shoulders = false, .least_ratio = 3, .needs_valley = true});
+  }
+  test(local, {.lowest = 1.0, .shoulders = false});
+
+  if (options.allows(filter_mode::isolation)) {
+    isolation_step step;
+    step.neighbors = options.neighbors;
+    step.usual = usual.step.usual;
+    step.offset = local.step.offset;
+    evidence.isolated = try_step(step);
+    if (evidence.isolated > 0) {
+      reasons.push_back(percent(evidence.isolated) + " are groups of fewer than " + std::to_string(step.min_size) +
+                        " points further than " + in_words(step.reach) + " usual spacings from all others");
+    }
+  }
+  if (options.allows(filter_mode::cluster)) {
+    cluster_options step;
+    step.min_size = std::clamp<std::size_t>(around.size() / 125, 30, 300);
+    step.min_gap = 4;
+    evidence.clustered = try_step(step);
+    if (evidence.clustered > 0) {
+      reasons.push_back(percent(evidence.clustered) + " are clusters of fewer than " + std::to_string(step.min_size) +
+                        " points that hang " + in_words(step.min_gap) + " spacings or more from the surface");
+    }
+  }
+}
+
+}  // namespace orbis::cloud::detail

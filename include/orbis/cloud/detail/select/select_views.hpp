@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// What views say of a cloud, as a step of a chain.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <ranges>
+#include <span>
+#include <string>
+#include <vector>
+
+#include <orbis/camera/model.hpp>
+#include <orbis/cloud/detail/rays/view_trust.hpp>
+#include <orbis/cloud/detail/select/select_evidence.hpp>
+#include <orbis/cloud/filter_chain.hpp>
+#include <orbis/cloud/ray_evidence.hpp>
+#include <orbis/core/execution.hpp>
+#include <orbis/core/point.hpp>
+#include <orbis/core/progress.hpp>
+
+namespace orbis::cloud::detail {
+
+/// How many points a step removed, and why.
+struct ray_removals {
+  std::size_t passed_through = 0;
+  std::size_t unsupported = 0;
+};
+
+/// Clears `left` where the views exclude a point. If cancelled, nothing is removed.
+template <execution_policy Policy, point_range Points, posed_depth_range Views, camera::camera_model Camera>
+ray_removals apply_rays(const Policy& policy, const Points& points, const ray_step& step, const Views& views,
+                        const Camera& camera, std::span<char> left, bool& cancelled, progress on_progress) {
+  ray_evidence_counter<Camera> counter{policy, points, camera, step.evidence};
+  const std::size_t count = std::ranges::size(views);
+  cancelled = !for_each_settled_view(policy, views, step.evidence, [&](std::uint32_t number, const auto& view) {
+    if (!std::ranges::binary_search(step.distrusted, number)) counter.add(policy, view);
+    return on_progress(number + 1, count);
+  });
+  ray_removals out;
+  if (cancelled) return out;
+  const std::vector<ray_evidence> scores = counter.scores();
+  for (std::size_t i = 0; i != left.size(); ++i) {
+    if (left[i] == 0) continue;
+    const bool passed = is_passed_through(scores[i], step.evidence);
+    const bool unsupported = !passed && step.need_support && scores[i].supported == 0;
+    out.passed_through += passed ? 1 : 0;
+    out.unsupported += unsupported ? 1 : 0;
+    if (passed || unsupported) left[i] = 0;
+  }
+  return out;
+}
+
+/// Whether the cloud was made of these views: nearly every point of a sample is in one of them.
+template <execution_policy Policy, point_range Points, posed_depth_range Views, camera::camera_model Camera>
+[[nodiscard]] bool is_made_of(const Policy& policy, const Points& points, const Views& views, const Camera& camera,
+                              const ray_evidence_options& options) {
+  constexpr std::size_t most = 4096;
+  std::vector<std::array<float, 3>> sample;
+  const std::size_t size = std::ranges::size(points);
+  for (std::size_t i = 0; i < size; i += size / most + 1) {
+    const auto p = coordinates<float>(point_at(points, i));
+    if (is_finite(p)) sample.push_back(p);
+  }
+  ray_evidence_counter<Camera> counter{policy, sample, camera, options};
+  for (const auto& view : views) counter.add(policy, view);
+  const std::vector<ray_evidence> scores = counter.scores();
+  const auto supported = std::ranges::count_if(scores, [](const ray_evidence& e) { return e.supported > 0; });
+  return static_cast<double>(supported) >= 0.98 * static_cast<double>(sample.size());
+}
+
+/// Judges a cloud by its views, clears `left` where they exclude a point, and adds the step and its
+/// reason. False if cancelled.
+template <execution_policy Policy, point_range Points, posed_depth_range Views, camera::camera_model Camera>
+[[nodiscard]] bool judge_views(const Policy& policy, const Points& points, const Views& views, const Camera& camera,
+                               const select_options& options, std::span<char> left, filter_choice& choice,
+                               std::vector<std::string>& reasons, progress on_progress) {
+  filter_evidence& evidence = choice.evidence;
+  evidence.views = std::ranges::size(views);
+  if (evidence.views == 0 || !options.allows(filter_mode::ray_evidence)) return true;
+  ray_step step;
+  bool cancelled = false;
+  const std::size_t count = evidence.views;
+  const auto first_half = [&](std::size_t done, std::size_t) {
+    cancelled = cancelled || !on_progress(done, 2 * count);
+    return !cancelled;
+  };
+  view_trust trust = find_distrusted_views(policy, views, camera, step.evidence, {}, first_half);
+  if (cancelled) return false;
+  evidence.worst_conflict = trust.worst_conflict;
+  evidence.usual_conflict = trust.usual_conflict;
+  step.distrusted = std::move(trust.distrusted);
+  step.need_support = is_made_of(policy, points, views, camera, step.evidence);
+  const auto second_half = [&](std::size_t done, std::size_t) { return on_progress(count + done, 2 * count); };
+  const ray_removals removed = apply_rays(policy, points, step, views, camera, left, cancelled, second_half);
+  if (cancelled) return false;
+  const auto total = static_cast<double>(std::max<std::size_t>(evidence.finite, 1));
+  evidence.passed_through = static_cast<double>(removed.passed_through) / total;
+  evidence.unsupported = static_cast<double>(removed.unsupported) / total;
+  if (removed.passed_through + removed.unsupported == 0) return true;
+  std::string why;
+  if (!step.distrusted.empty()) {
+    why = std::to_string(step.distrusted.size()) + " of " + std::to_string(count) +
+          (step.distrusted.size() == 1 ? " views contradicts" : " views contradict") + " the others (by up to " +
+          percent(trust.worst_conflict) + ") and " + (step.distrusted.size() == 1 ? "does" : "do") + " not count; ";
+  }
+  why += "the rays of " + std::to_string(count) + " views pass through " + percent(evidence.passed_through) +
+         " of the points";
+  if (removed.unsupported > 0)
+    why += ", and " + percent(evidence.unsupported) + " are in no trusted view but as stray pixels";
+  reasons.push_back(std::move(why));
+  choice.chain.emplace_back(std::move(step));
+  return true;
+}
+
+}  // namespace orbis::cloud::detail

@@ -1,0 +1,231 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// The parts of `voxel_sums.hpp`: a brick of 8^3 voxels, and the index of bricks.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cassert>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include <orbis/cloud/detail/voxels/voxel_hash.hpp>
+#include <orbis/core/image.hpp>
+#include <orbis/core/random.hpp>
+
+namespace orbis::cloud::detail {
+
+/// A measurement in its brick.
+struct voxel_item {
+  std::uint16_t cell;                   ///< x + 8 y + 64 z
+  std::array<std::uint16_t, 3> offset;  ///< within the voxel, of 1024
+  rgb8 color;
+  std::uint32_t range;  ///< millimetres
+};
+
+/// The measurements of a voxel.
+struct voxel_sum {
+  std::uint64_t range = 0;
+  std::array<std::uint32_t, 3> offset{};
+  std::array<std::uint32_t, 3> color{};
+  std::uint32_t count = 0;
+
+  void add(const voxel_item& item) noexcept {
+    range += item.range;
+    for (std::size_t a = 0; a != 3; ++a) offset[a] += item.offset[a];
+    color[0] += item.color.r;
+    color[1] += item.color.g;
+    color[2] += item.color.b;
+    ++count;
+  }
+  void remove(const voxel_item& item) noexcept {
+    range -= item.range;
+    for (std::size_t a = 0; a != 3; ++a) offset[a] -= item.offset[a];
+    color[0] -= item.color.r;
+    color[1] -= item.color.g;
+    color[2] -= item.color.b;
+    --count;
+  }
+};
+
+/// The occupied voxels of a brick, in the order of their cells.
+class voxel_brick {
+ public:
+  [[nodiscard]] std::size_t size() const noexcept { return sums_.size(); }
+  [[nodiscard]] std::size_t memory_bytes() const noexcept { return sums_.capacity() * sizeof(voxel_sum); }
+  [[nodiscard]] bool contains(std::uint32_t cell) const noexcept { return (mask_[cell / 64] >> (cell % 64) & 1U) != 0; }
+  /// How many occupied cells come before this one.
+  [[nodiscard]] std::size_t rank(std::uint32_t cell) const noexcept {
+    const std::uint64_t below = mask_[cell / 64] & ((std::uint64_t{1} << (cell % 64)) - 1);
+    return before_[cell / 64] + static_cast<std::size_t>(std::popcount(below));
+  }
+  /// `f(cell, sum)`
+  template <class F>
+  void for_each(F&& f) const {
+    for_each_cell(mask_, [&, i = std::size_t{0}](std::uint32_t cell) mutable { f(cell, sums_[i++]); });
+  }
+
+  /// `for_each_run(f)` calls `f` with spans of items.
+  template <class Runs>
+  void add(Runs&& for_each_run) {
+    auto mask = mask_;
+    for_each_run([&](std::span<const voxel_item> items) {
+      for (const voxel_item& item : items) mask[item.cell / 64] |= std::uint64_t{1} << (item.cell % 64);
+    });
+    if (mask != mask_) widen(mask);
+    const rank_table ranks = all_ranks();
+    for_each_run([&](std::span<const voxel_item> items) {
+      for (const voxel_item& item : items) {
+        voxel_sum& sum = sums_[ranks[item.cell]];
+        assert(sum.count < most);
+        sum.add(item);
+      }
+    });
+  }
+  template <class Runs>
+  void remove(Runs&& for_each_run) {
+    bool emptied = false;
+    const rank_table ranks = all_ranks();
+    for_each_run([&](std::span<const voxel_item> items) {
+      for (const voxel_item& item : items) {
+        const bool known = contains(item.cell) && sums_[ranks[item.cell]].count != 0;
+        assert(known && "removed without having been added");
+        if (!known) continue;
+        voxel_sum& sum = sums_[ranks[item.cell]];
+        sum.remove(item);
+        emptied = emptied || sum.count == 0;
+      }
+    });
+    if (!emptied) return;
+    auto mask = mask_;
+    for_each([&](std::uint32_t cell, const voxel_sum& sum) {
+      if (sum.count == 0) mask[cell / 64] &= ~(std::uint64_t{1} << (cell % 64));
+    });
+    std::erase_if(sums_, [](const voxel_sum& sum) { return sum.count == 0; });
+    if (2 * sums_.size() + slack < sums_.capacity()) sums_.shrink_to_fit();
+    set(mask);
+  }
+
+ private:
+  using cell_mask = std::array<std::uint64_t, 8>;
+  static constexpr std::uint32_t most = 1U << 22U;
+  static constexpr std::size_t slack = 16;
+
+  /// The ranks of the occupied cells; the other entries mean nothing. Counting bits measurement by
+  /// measurement is slow on processors without an instruction for it.
+  using rank_table = std::array<std::uint16_t, 512>;
+  [[nodiscard]] rank_table all_ranks() const {
+    rank_table out;  // NOLINT: not all of it is needed
+    for_each_cell(mask_, [&, i = std::uint16_t{0}](std::uint32_t cell) mutable { out[cell] = i++; });
+    return out;
+  }
+
+  template <class F>
+  static void for_each_cell(const cell_mask& mask, F&& f) {
+    for (std::uint32_t w = 0; w != mask.size(); ++w) {
+      for (std::uint64_t left = mask[w]; left != 0; left &= left - 1)
+        f(64 * w + static_cast<std::uint32_t>(std::countr_zero(left)));
+    }
+  }
+  void set(const cell_mask& mask) {
+    mask_ = mask;
+    std::size_t count = 0;
+    for (std::size_t w = 0; w != mask.size(); ++w) {
+      before_[w] = static_cast<std::uint16_t>(count);
+      count += static_cast<std::size_t>(std::popcount(mask[w]));
+    }
+  }
+  /// Makes room for further cells, from behind, in place.
+  void widen(const cell_mask& mask) {
+    const cell_mask old = mask_;
+    std::size_t from = sums_.size();
+    set(mask);
+    const std::size_t count = before_[7] + static_cast<std::size_t>(std::popcount(mask[7]));
+    if (count > sums_.capacity()) sums_.reserve(count + count / 8 + 4);
+    sums_.resize(count);
+    std::size_t to = count;
+    for (std::size_t w = mask.size(); w-- > 0;) {
+      for (std::uint64_t left = mask[w]; left != 0;) {
+        const auto bit = 63U - static_cast<unsigned>(std::countl_zero(left));
+        left &= ~(std::uint64_t{1} << bit);
+        sums_[--to] = (old[w] >> bit & 1U) != 0 ? sums_[--from] : voxel_sum{};
+      }
+    }
+  }
+
+  cell_mask mask_{};
+  std::array<std::uint16_t, 8> before_{};  ///< how many cells come before each word of the mask
+  std::vector<voxel_sum> sums_;
+};
+
+/// Finds the numbers of bricks by their keys, which are kept elsewhere. Open addressing; erasing leaves
+/// no marks behind.
+class brick_index {
+ public:
+  template <class KeyOf>
+  [[nodiscard]] std::optional<std::uint32_t> find(const voxel_key& key, const KeyOf& key_of) const {
+    if (slots_.empty()) return std::nullopt;
+    const std::uint32_t number = slots_[slot_of(key, key_of)];
+    return number == none ? std::nullopt : std::optional{number};
+  }
+  /// @pre its key is not here
+  template <class KeyOf>
+  void insert(std::uint32_t number, const KeyOf& key_of) {
+    if (2 * (count_ + 1) > slots_.size()) resize(std::max<std::size_t>(64, 2 * slots_.size()), key_of);
+    slots_[slot_of(key_of(number), key_of)] = number;
+    ++count_;
+  }
+  /// @pre it is here
+  template <class KeyOf>
+  void erase(const voxel_key& key, const KeyOf& key_of) {
+    const std::size_t mask = slots_.size() - 1;
+    std::size_t hole = slot_of(key, key_of);
+    assert(slots_[hole] != none);
+    for (std::size_t next = (hole + 1) & mask; slots_[next] != none; next = (next + 1) & mask) {
+      // Whoever would be looked for at the hole moves there.
+      const std::size_t home = hash(key_of(slots_[next])) & mask;
+      if (((next - home) & mask) < ((next - hole) & mask)) continue;
+      slots_[hole] = slots_[next];
+      hole = next;
+    }
+    slots_[hole] = none;
+    --count_;
+    if (slots_.size() > 64 && 8 * count_ < slots_.size()) resize(slots_.size() / 2, key_of);
+  }
+  [[nodiscard]] std::size_t memory_bytes() const noexcept { return slots_.capacity() * sizeof(std::uint32_t); }
+
+ private:
+  static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
+
+  [[nodiscard]] static std::size_t hash(const voxel_key& key) noexcept {
+    const std::uint64_t low = std::bit_cast<std::uint32_t>(key[0]) | std::uint64_t{std::bit_cast<std::uint32_t>(key[1])}
+                                                                         << 32U;
+    return mix64(low ^ mix64(std::bit_cast<std::uint32_t>(key[2])));
+  }
+  /// Where the key is, or would be.
+  template <class KeyOf>
+  [[nodiscard]] std::size_t slot_of(const voxel_key& key, const KeyOf& key_of) const {
+    const std::size_t mask = slots_.size() - 1;
+    std::size_t slot = hash(key) & mask;
+    while (slots_[slot] != none && key_of(slots_[slot]) != key) slot = (slot + 1) & mask;
+    return slot;
+  }
+  template <class KeyOf>
+  void resize(std::size_t size, const KeyOf& key_of) {
+    const std::vector<std::uint32_t> old = std::exchange(slots_, std::vector<std::uint32_t>(size, none));
+    for (const std::uint32_t number : old) {
+      if (number != none) slots_[slot_of(key_of(number), key_of)] = number;
+    }
+  }
+
+  std::vector<std::uint32_t> slots_;
+  std::size_t count_ = 0;
+};
+
+}  // namespace orbis::cloud::detail

@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Choosing corners: some that cover the image, for the rest the best.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include <orbis/features/detail/extract/corner.hpp>
+#include <orbis/features/detail/extract/spread.hpp>
+
+namespace orbis::features {
+
+/// First the image is covered: it is cut into square cells, as many as a share of the wanted corners, and
+/// every cell gives the strongest corner that it has on any level. The rest are the strongest of
+/// their levels, wherever they are, because strong corners are found again. That a cell needs one corner and
+/// not one on each level is what leaves room for them. O(n) but for sorting what is chosen.
+struct cover_first {
+  double share = 0.25;  ///< of the wanted corners, for covering; 0 ... 1: from best found again to best spread
+
+  struct workspace {
+    struct candidate {
+      float response = -1.0F;
+      std::uint32_t level = 0;
+      std::uint32_t index = 0;
+    };
+    std::vector<int> quotas;
+    std::vector<candidate> best;  ///< of each cell
+    std::vector<std::vector<corner>> covering;
+  };
+
+  /// @pre 0 <= share <= 1
+  void operator()(std::span<level_corners> levels, int wanted, workspace& memory) const {
+    detail::share_out(levels, wanted, memory.quotas);
+    take_covering(levels, wanted, memory);
+    for (std::size_t l = 0; l != levels.size(); ++l) {
+      std::vector<corner>&corners = levels[l].corners, &covering = memory.covering[l];
+      detail::keep_strongest(covering, memory.quotas[l]);
+      detail::keep_strongest(corners, memory.quotas[l] - static_cast<int>(covering.size()));
+      corners.insert(corners.end(), covering.begin(), covering.end());
+      std::sort(corners.begin(), corners.end(), before_in_image);
+    }
+  }
+
+ private:
+  /// Moves the strongest corner of each cell to `memory.covering`.
+  void take_covering(std::span<level_corners> levels, int wanted, workspace& memory) const {
+    if (memory.covering.size() < levels.size()) memory.covering.resize(levels.size());
+    for (auto& corners : memory.covering) corners.clear();
+    std::size_t all = 0;
+    for (const level_corners& level : levels) all += level.corners.size();
+    const double cells = share * wanted;
+    if (cells < 1.0 || all <= static_cast<std::size_t>(wanted)) return;
+    const region& area = levels[0].area;
+    const double side = std::max(1.0, std::sqrt(static_cast<double>(area.width) * area.height / cells));
+    const int columns = static_cast<int>(area.width / side) + 1, rows = static_cast<int>(area.height / side) + 1;
+    memory.best.assign(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows), {});
+    for (std::uint32_t l = 0; l != levels.size(); ++l) {
+      // A corner's cell by one product and one sum; what lies outside belongs to the cell at the edge.
+      const double step = levels[l].scale / side, left = area.x / side, top = area.y / side;
+      for (std::uint32_t i = 0; i != levels[l].corners.size(); ++i) {
+        const corner& c = levels[l].corners[i];
+        const int column = std::clamp(static_cast<int>(c.x * step - left), 0, columns - 1);
+        const int row = std::clamp(static_cast<int>(c.y * step - top), 0, rows - 1);
+        auto& best = memory.best[static_cast<std::size_t>(row) * static_cast<std::size_t>(columns) +
+                                 static_cast<std::size_t>(column)];
+        const bool tie = c.response == best.response && best.level == l;
+        if (c.response > best.response || (tie && before_in_image(c, levels[l].corners[best.index])))
+          best = {c.response, l, i};
+      }
+    }
+    constexpr float taken = -1.0F;
+    for (const auto& best : memory.best) {
+      if (best.response < 0.0F) continue;
+      corner& c = levels[best.level].corners[best.index];
+      memory.covering[best.level].push_back(c);
+      c.response = taken;
+    }
+    for (level_corners& level : levels)
+      std::erase_if(level.corners, [](const corner& c) { return c.response == taken; });
+  }
+};
+static_assert(corner_distribution<cover_first>);
+
+}  // namespace orbis::features

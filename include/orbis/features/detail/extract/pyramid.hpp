@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// The same image at several scales.
+#pragma once
+
+#include <cassert>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include <orbis/core/image.hpp>
+#include <orbis/core/simd.hpp>
+#include <orbis/features/detail/extract/resize.hpp>
+
+namespace orbis::features {
+
+/// An image and its shrunk copies, each made of the one before it (`resize`). Level k is `scale_factor`^k
+/// times smaller than the image, sides rounded to whole pixels. Keeps its memory from image to image.
+class image_pyramid {
+ public:
+  /// Level 0 is `image` itself, not a copy: it must live as long as the levels are used. Levels with a side
+  /// of less than `min_side` pixels, and what follows them, are left out. O(pixels).
+  /// @pre levels >= 0, scale_factor > 1, min_side >= 1
+  void build(simd::level simd, image_view<const std::uint8_t> image, int levels, double scale_factor, int min_side) {
+    assert(levels >= 0 && scale_factor > 1.0 && min_side >= 1);
+    views_.clear();
+    double scale = 1.0;
+    for (int level = 0; level < levels; ++level, scale *= scale_factor) {
+      const int width = static_cast<int>(std::lround(image.width() / scale));
+      const int height = static_cast<int>(std::lround(image.height() / scale));
+      if (width < min_side || height < min_side) break;
+      if (level == 0) {
+        views_.push_back(image);
+        continue;
+      }
+      if (shrunk_.size() < views_.size()) shrunk_.resize(views_.size());
+      shrunk_level& to = shrunk_[views_.size() - 1];
+      const std::ptrdiff_t stride = (static_cast<std::ptrdiff_t>(width) + 63) / 64 * 64;
+      const std::size_t needed = static_cast<std::size_t>(stride) * static_cast<std::size_t>(height);
+      if (to.pixels.size() < needed) to.pixels.resize(needed);
+      const image_view<std::uint8_t> view{to.pixels.data(), width, height, stride};
+      resize(simd, views_.back(), view, to.memory);
+      views_.push_back(view);
+    }
+  }
+
+  [[nodiscard]] std::size_t size() const noexcept { return views_.size(); }
+  /// @pre level < size()
+  [[nodiscard]] image_view<const std::uint8_t> operator[](std::size_t level) const {
+    assert(level < views_.size());
+    return views_[level];
+  }
+
+  /// From a pixel of a level to the image: pixels are areas whose centres lie at integers, so that
+  /// plain multiplication would shift coarse keypoints by up to a pixel.
+  [[nodiscard]] static double full_coordinate(double at, int level_size, int full_size) noexcept {
+    return (at + 0.5) * full_size / level_size - 0.5;
+  }
+
+ private:
+  struct shrunk_level {
+    std::vector<std::uint8_t> pixels;
+    resize_workspace memory;
+  };
+  std::vector<image_view<const std::uint8_t>> views_;
+  std::vector<shrunk_level> shrunk_;
+};
+
+}  // namespace orbis::features

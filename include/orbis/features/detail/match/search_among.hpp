@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// The search of a source that compares each query with some of the trains.
+#pragma once
+
+#include <concepts>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <tuple>
+#include <vector>
+
+#include <orbis/core/simd.hpp>
+#include <orbis/features/detail/match/hamming_listed.hpp>
+#include <orbis/features/hamming.hpp>
+#include <orbis/features/match.hpp>
+
+namespace orbis::features {
+
+/// Memory of `search_among`, which the next call uses again.
+struct search_among_workspace {
+  struct nearest_query {
+    std::uint32_t distance = none;
+    std::uint32_t query = none;
+  };
+  std::vector<std::uint32_t> indices, distances;  ///< of the trains that the query at hand is compared with
+  std::vector<nearest_query> reverse;             ///< by train
+};
+
+/// One candidate for each query that has a train: `list(q, add)` calls `add(t)` for every train to compare query `q`
+/// with, once for each, in any order; the result does not depend on the order. The reverse
+/// neighbour of a train is the nearest of the queries that it was compared with. For sources; any
+/// distance may be used, the Hamming distance of many pairs is fast.
+template <class Distance, class Descriptor, class List>
+requires descriptor_distance<Distance, Descriptor>
+void search_among(const Distance& distance, simd::level level, std::vector<candidate>& candidates,
+                  search_among_workspace& memory, const feature_view<Descriptor>& queries,
+                  const feature_view<Descriptor>& trains, search_needs needs, List&& list) {
+  auto& [indices, distances, reverse] = memory;
+  reverse.assign(needs.reverse ? trains.descriptors.size() : 0, {});
+  candidates.clear();
+  candidates.reserve(queries.descriptors.size());
+  // The lists are short but of changing lengths: what all of them could need is reserved once.
+  indices.reserve(trains.descriptors.size());
+  distances.resize(trains.descriptors.size());
+  for (std::size_t q = 0; q != queries.descriptors.size(); ++q) {
+    indices.clear();
+    list(q, [&indices = indices](std::uint32_t t) { indices.push_back(t); });
+    const auto found = std::span{distances}.first(indices.size());
+    if constexpr (std::same_as<Distance, hamming>) {
+      hamming_listed(level, queries.descriptors[q], trains.descriptors, indices, found);
+    } else {
+      for (std::size_t i = 0; i != indices.size(); ++i)
+        found[i] = static_cast<std::uint32_t>(distance(queries.descriptors[q], trains.descriptors[indices[i]]));
+    }
+    candidate best{static_cast<std::uint32_t>(q), none, none, none, none};
+    for (std::size_t i = 0; i != indices.size(); ++i) {
+      const std::uint32_t t = indices[i];
+      const std::uint32_t d = found[i];
+      if (std::tie(d, t) < std::tie(best.distance, best.train)) {
+        best.second_distance = best.distance;
+        best.distance = d;
+        best.train = t;
+      } else if (d < best.second_distance) {
+        best.second_distance = d;
+      }
+      if (needs.reverse && d < reverse[t].distance) reverse[t] = {d, best.query};
+    }
+    if (best.train != none) candidates.push_back(best);
+  }
+  if (needs.reverse)
+    for (candidate& c : candidates) c.reverse_query = reverse[c.train].query;
+}
+
+}  // namespace orbis::features

@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// A pruned octree down to its bricks, as a sorted list; for whoever visits all of it.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include <orbis/octree/detail/storage/brick.hpp>
+
+namespace orbis::octree {
+
+/// A brick that is no leaf, or a leaf at least as large as one.
+template <class T>
+struct tree_part {
+  std::uint64_t order;      ///< Morton order of its lowest brick
+  voxel_key key;            ///< its lowest voxel
+  int level;                ///< brick_level or more
+  const brick<T>* content;  ///< null: a leaf
+  T value;                  ///< of a leaf
+};
+
+/// The bricks and larger leaves of a store in Morton order. O(bricks).
+template <class T>
+[[nodiscard]] std::vector<tree_part<T>> stored_parts(const brick_store<T>& store) {
+  std::vector<tree_part<T>> parts;
+  parts.reserve(store.brick_count() + store.large_count());
+  store.for_each_brick([&](const brick<T>& b) {
+    if (!b.is_known()) return;
+    const voxel_key key = named_key(b.name);
+    parts.push_back({morton_order(key), key, brick_level, b.is_uniform() ? nullptr : &b, b.value[0]});
+  });
+  if (store.has_large()) {
+    store.for_each_large([&](std::uint64_t name, T v) {
+      const voxel_key key = named_key(name);
+      parts.push_back({morton_order(key), key, named_level(name), nullptr, v});
+    });
+    std::sort(parts.begin(), parts.end(), [](const auto& a, const auto& b) { return a.order < b.order; });
+  }
+  return parts;
+}
+
+/// Merges equal ones of parts in Morton order as far as they go, except into a root of eight parts.
+template <class T>
+void merge_parts(std::vector<tree_part<T>>& parts, int root_level) {
+  // The merged ones take the place of those read already. Eight leaves of one size that end with a
+  // parent's last child are its children.
+  std::size_t size = 0;
+  for (std::size_t i = 0; i != parts.size(); ++i) {
+    parts[size++] = parts[i];
+    for (;;) {
+      const tree_part<T>& last = parts[size - 1];
+      const auto shift = 3 * static_cast<unsigned>(last.level - brick_level);
+      if (last.content != nullptr || last.level >= root_level - 1 || size < 8 || (last.order >> shift & 7U) != 7) break;
+      const auto first = parts.begin() + static_cast<std::ptrdiff_t>(size - 8);
+      const bool equal = std::all_of(first, first + 8, [&](const tree_part<T>& p) {
+        return p.content == nullptr && p.level == last.level && p.value == last.value &&
+               p.order >> (shift + 3) == last.order >> (shift + 3);
+      });
+      if (!equal) break;
+      ++first->level;
+      size -= 7;
+    }
+  }
+  parts.erase(parts.begin() + static_cast<std::ptrdiff_t>(size), parts.end());
+}
+
+/// The parts of a store's pruned octree: its leaves from a brick on, and the bricks that have smaller
+/// ones. O(bricks).
+template <class T>
+[[nodiscard]] std::vector<tree_part<T>> tree_parts(const brick_store<T>& store, int root_level) {
+  std::vector<tree_part<T>> parts = stored_parts(store);
+  merge_parts(parts, root_level);
+  return parts;
+}
+
+/// Walks the part of a tree above its bricks, children before parents: `Visitor` has `open()`, which
+/// begins an inner node and returns what collects its children by `add(i, child)`; `close(level,
+/// collected)`, which returns what its parent is to `add`; and `content(part)`, which does so for a part.
+template <class T, class Visitor>
+class upper_walk {
+ public:
+  upper_walk(const std::vector<tree_part<T>>& parts, Visitor& visitor)
+      : next_{parts.data()}, end_{parts.data() + parts.size()}, visitor_{visitor} {}
+
+  /// @pre the parts that are left begin with some inside one node at `level`, which are visited
+  auto walk(int level) {
+    if (next_->level == level) return visitor_.content(*next_++);
+    const auto shift = 3 * static_cast<unsigned>(level - 1 - brick_level);
+    const std::uint64_t first = next_->order >> shift & ~std::uint64_t{7};
+    auto open = visitor_.open();
+    for (unsigned i = 0; i != 8; ++i)
+      if (next_ != end_ && next_->order >> shift == first + i) open.add(i, walk(level - 1));
+    return visitor_.close(level, open);
+  }
+
+ private:
+  const tree_part<T>* next_;
+  const tree_part<T>* end_;
+  Visitor& visitor_;
+};
+
+}  // namespace orbis::octree

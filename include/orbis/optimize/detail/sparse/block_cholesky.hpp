@@ -1,0 +1,279 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Cholesky factorisation of a sparse symmetric positive definite matrix of `B x B` blocks.
+///
+/// Left-looking and supernodal: columns of the factor with the same structure are one dense panel, and
+/// all the work is products of panels. E. Ng, B. W. Peyton, "Block sparse Cholesky algorithms on
+/// advanced uniprocessor computers", SIAM J. Sci. Comput. 14(5), 1993.
+#pragma once
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include <orbis/core/simd.hpp>
+#include <orbis/core/types.hpp>
+#include <orbis/optimize/detail/bundle/panel_kernels.hpp>
+#include <orbis/optimize/detail/sparse/block_ordering.hpp>
+#include <orbis/optimize/detail/sparse/block_symbolic.hpp>
+
+namespace orbis::optimize {
+
+/// Analyse once, factor and solve as often as the numbers change: nothing is allocated then. The
+/// results have the same bits on every processor. Not for several threads at once.
+template <int B>
+requires(B >= 1) class block_cholesky {
+ public:
+  using block = matrix<B, B>;
+
+  block_cholesky() : block_cholesky(simd::detected()) {}
+  /// With the inner loops for `level`, as far as the processor has it.
+  explicit block_cholesky(simd::level level) : kernels_{detail::panel_kernels<width>::at(level)} {}
+
+  /// Prepares for matrices of `size` blocks a side with blocks on the diagonal and at `places`.
+  /// @pre every place is below `size` and off the diagonal, and none is given twice
+  void analyze(std::size_t size, std::span<const block_place> places) {
+    symbolic_ = analyze_blocks(size, places);
+    panels_.clear();
+    std::size_t total = 0, tallest = 0;
+    for (const supernode& s : symbolic_.supernodes) {
+      const std::size_t height = width * (std::size_t{s.columns} + s.rows);
+      panels_.push_back({total, (height + 7) / 8 * 8});
+      total += panels_.back().stride * width * s.columns;
+      tallest = std::max(tallest, height);
+    }
+    values_.assign(total + 2 * detail::panel_slack, 0.0);
+    product_.assign((tallest + 2 * detail::panel_slack) * width, 0.0);
+    product_stride_ = (tallest + detail::panel_slack) / detail::panel_slack * detail::panel_slack;
+    inverse_diagonal_.assign(width * size, 0.0);
+    ordered_.assign(width * size, 0.0);
+    place_of_row_.assign(size, 0);
+
+    targets_.clear();
+    for (const block_place& p : places) {
+      const std::uint32_t row = symbolic_.position[p.row], column = symbolic_.position[p.column];
+      const std::uint32_t lower = std::max(row, column), upper = std::min(row, column);
+      targets_.push_back({at(lower, upper), panels_[symbolic_.supernode_of[upper]].stride, row < column});
+    }
+  }
+
+  [[nodiscard]] const block_symbolic& symbolic() const { return symbolic_; }
+
+  /// Factors the matrix with `diagonal[i]` at (i, i), `damping` added to its diagonal, and
+  /// `off_diagonal[k]` at `places[k]`. False where the matrix is not positive definite: a pivot is not
+  /// above `tolerance` times what stands there in the matrix, or not finite; see `failed_block`.
+  /// @pre sizes as analysed; `damping` empty or one for each row
+  [[nodiscard]] bool factor(std::span<const block> diagonal, std::span<const block> off_diagonal,
+                            std::span<const double> damping = {}, double tolerance = 1e-14) {
+    assert(diagonal.size() == symbolic_.size() && off_diagonal.size() == targets_.size());
+    assert(damping.empty() || damping.size() == width * symbolic_.size());
+    fill(diagonal, off_diagonal, damping);
+    for (std::size_t s = 0; s != symbolic_.supernodes.size(); ++s) {
+      find_places(s);
+      for (const supernode_update& u : symbolic_.updates_of(s)) apply(u, s);
+      if (!factor_panel(s, diagonal, damping, tolerance)) return false;
+    }
+    return true;
+  }
+
+  /// The block whose pivot was not positive, after `factor` has returned false.
+  [[nodiscard]] std::uint32_t failed_block() const { return failed_block_; }
+
+  /// Replaces the right-hand side in `x` by the solution. @pre the last `factor` returned true
+  void solve(std::span<double> x) {
+    assert(x.size() == ordered_.size());
+    for (std::size_t k = 0; k != symbolic_.size(); ++k)
+      std::copy_n(x.begin() + offset(symbolic_.order[k]), B, ordered_.begin() + offset(k));
+    for (std::size_t s = 0; s != symbolic_.supernodes.size(); ++s) forward(s);
+    for (std::size_t s = symbolic_.supernodes.size(); s != 0; --s) backward(s - 1);
+    for (std::size_t k = 0; k != symbolic_.size(); ++k)
+      std::copy_n(ordered_.begin() + offset(k), B, x.begin() + offset(symbolic_.order[k]));
+  }
+
+ private:
+  static constexpr std::size_t width = static_cast<std::size_t>(B);
+
+  struct panel {
+    std::size_t begin = 0;
+    std::size_t stride = 0;  ///< between columns
+  };
+  /// Where a block off the diagonal belongs.
+  struct target {
+    std::size_t begin = 0, stride = 0;
+    bool transposed = false;
+  };
+
+  [[nodiscard]] static std::ptrdiff_t offset(std::size_t k) { return static_cast<std::ptrdiff_t>(width * k); }
+  [[nodiscard]] double* panel_of(std::size_t s) { return values_.data() + panels_[s].begin; }
+
+  /// Where block (row, column) of the factor begins in `values_`, in the order of elimination.
+  [[nodiscard]] std::size_t at(std::uint32_t row, std::uint32_t column) const {
+    const std::uint32_t s = symbolic_.supernode_of[column];
+    const supernode& node = symbolic_.supernodes[s];
+    std::size_t place = row - node.first;
+    if (place >= node.columns) {
+      const std::span<const std::uint32_t> rows = symbolic_.rows_of(node);
+      place = node.columns + static_cast<std::size_t>(std::lower_bound(rows.begin(), rows.end(), row) - rows.begin());
+    }
+    return panels_[s].begin + width * (place + (column - node.first) * panels_[s].stride);
+  }
+
+  using unaligned = Eigen::Map<block, Eigen::Unaligned, Eigen::OuterStride<>>;
+
+  void fill(std::span<const block> diagonal, std::span<const block> off_diagonal, std::span<const double> damping) {
+    std::fill(values_.begin(), values_.end(), 0.0);
+    for (std::uint32_t k = 0; k != symbolic_.size(); ++k) {
+      const std::uint32_t i = symbolic_.order[k];
+      const auto stride = static_cast<Eigen::Index>(panels_[symbolic_.supernode_of[k]].stride);
+      unaligned to{values_.data() + at(k, k), Eigen::OuterStride<>{stride}};
+      to = diagonal[i];
+      if (!damping.empty()) to.diagonal() += Eigen::Map<const matrix<B, 1>>{damping.data() + offset(i)};
+    }
+    for (std::size_t k = 0; k != targets_.size(); ++k) {
+      const target& t = targets_[k];
+      unaligned to{values_.data() + t.begin, Eigen::OuterStride<>{static_cast<Eigen::Index>(t.stride)}};
+      if (t.transposed)
+        to = off_diagonal[k].transpose();
+      else
+        to = off_diagonal[k];
+    }
+  }
+
+  /// Which block row of the panel of `s` each row of the factor is.
+  void find_places(std::size_t s) {
+    const supernode& node = symbolic_.supernodes[s];
+    for (std::uint32_t c = 0; c != node.columns; ++c) place_of_row_[node.first + c] = c;
+    std::uint32_t place = node.columns;
+    for (const std::uint32_t row : symbolic_.rows_of(node)) place_of_row_[row] = place++;
+  }
+
+  /// Subtracts from the panel of `s` what its columns share with those of an earlier supernode.
+  void apply(const supernode_update& u, std::size_t s) {
+    const supernode& source = symbolic_.supernodes[u.source];
+    const supernode& node = symbolic_.supernodes[s];
+    const std::span<const std::uint32_t> rows = symbolic_.rows_of(source);
+    const double* const from = panel_of(u.source) + width * source.columns;
+    for (std::uint32_t j = u.begin; j != u.end; ++j) {
+      const double* const a = from + width * j;
+      kernels_.product(a, a, panels_[u.source].stride, width * (source.rows - j), width * source.columns,
+                       product_.data(), product_stride_);
+      double* const column = panel_of(s) + width * (rows[j] - node.first) * panels_[s].stride;
+      for (std::uint32_t i = j; i != source.rows; ++i)
+        subtract(product_.data() + width * (i - j), width, column + width * place_of_row_[rows[i]], panels_[s].stride);
+    }
+  }
+
+  /// `to -= from`, N columns of `height` rows.
+  void subtract(const double* from, std::size_t height, double* to, std::size_t stride) const {
+    for (std::size_t c = 0; c != width; ++c)
+      for (std::size_t r = 0; r != height; ++r) to[c * stride + r] -= from[c * product_stride_ + r];
+  }
+
+  [[nodiscard]] bool factor_panel(std::size_t s, std::span<const block> diagonal, std::span<const double> damping,
+                                  double tolerance) {
+    const supernode& node = symbolic_.supernodes[s];
+    const std::size_t stride = panels_[s].stride;
+    for (std::size_t c = 0; c != node.columns; ++c) {
+      double* const top = panel_of(s) + width * (c * stride + c);
+      const std::size_t height = width * (node.columns - c + node.rows);
+      if (c != 0) {
+        const double* const a = panel_of(s) + width * c;
+        kernels_.product(a, a, stride, height, width * c, product_.data(), product_stride_);
+        subtract(product_.data(), height, top, stride);
+      }
+      const std::uint32_t i = symbolic_.order[node.first + c];
+      double* const inverse = inverse_diagonal_.data() + width * (node.first + c);
+      for (std::size_t j = 0; j != width; ++j) {
+        const auto index = static_cast<Eigen::Index>(j);
+        const double given = diagonal[i](index, index) + (damping.empty() ? 0.0 : damping[width * i + j]);
+        if (!factor_column(top, stride, j, tolerance * given, inverse[j])) {
+          failed_block_ = i;
+          return false;
+        }
+      }
+      kernels_.solve(top, inverse, stride, top + width, height - width);
+    }
+    return true;
+  }
+
+  /// Column j of a diagonal block; false where its pivot is not above `least`.
+  [[nodiscard]] static bool factor_column(double* top, std::size_t stride, std::size_t j, double least,
+                                          double& inverse) {
+    for (std::size_t i = j; i != width; ++i)
+      for (std::size_t k = 0; k != j; ++k)
+        top[j * stride + i] -= rounded_product(top[k * stride + i], top[k * stride + j]);
+    const double pivot = top[j * stride + j];
+    if (!(pivot > 0.0 && pivot > least) || !std::isfinite(pivot)) return false;
+    top[j * stride + j] = std::sqrt(pivot);
+    inverse = 1.0 / top[j * stride + j];
+    for (std::size_t i = j + 1; i != width; ++i) top[j * stride + i] *= inverse;
+    return true;
+  }
+
+  void forward(std::size_t s) {
+    const supernode& node = symbolic_.supernodes[s];
+    const std::size_t stride = panels_[s].stride;
+    const std::size_t height = width * (node.columns + node.rows);
+    double* const x = ordered_.data() + offset(node.first);
+    double* const change = product_.data();  // of everything below the column at work
+    std::fill_n(change, height, 0.0);
+    for (std::size_t c = 0; c != node.columns; ++c) {
+      const double* const top = panel_of(s) + width * c * stride;
+      double solved[width];
+      for (std::size_t j = 0; j != width; ++j) {
+        const std::size_t row = width * c + j;
+        double value = x[row] - change[row];
+        for (std::size_t k = 0; k != j; ++k) value -= rounded_product(top[k * stride + row], solved[k]);
+        x[row] = solved[j] = value * inverse_diagonal_[width * node.first + row];
+      }
+      for (std::size_t i = width * (c + 1); i != height; ++i)
+        for (std::size_t j = 0; j != width; ++j) change[i] += rounded_product(top[j * stride + i], solved[j]);
+    }
+    const std::span<const std::uint32_t> rows = symbolic_.rows_of(node);
+    for (std::size_t i = 0; i != rows.size(); ++i)
+      for (std::size_t r = 0; r != width; ++r) ordered_[width * rows[i] + r] -= change[width * (node.columns + i) + r];
+  }
+
+  void backward(std::size_t s) {
+    const supernode& node = symbolic_.supernodes[s];
+    const std::size_t stride = panels_[s].stride;
+    const std::size_t height = width * (node.columns + node.rows);
+    double* const x = product_.data();  // of the panel's rows
+    std::copy_n(ordered_.begin() + offset(node.first), width * node.columns, x);
+    const std::span<const std::uint32_t> rows = symbolic_.rows_of(node);
+    for (std::size_t i = 0; i != rows.size(); ++i)
+      std::copy_n(ordered_.begin() + offset(rows[i]), B, x + width * (node.columns + i));
+    for (std::size_t c = node.columns; c-- != 0;) {
+      const double* const top = panel_of(s) + width * c * stride;
+      double sum[width] = {};
+      for (std::size_t i = width * (c + 1); i != height; ++i)
+        for (std::size_t j = 0; j != width; ++j) sum[j] += rounded_product(top[j * stride + i], x[i]);
+      for (std::size_t j = width; j-- != 0;) {
+        const std::size_t row = width * c + j;
+        double value = x[row] - sum[j];
+        for (std::size_t k = j + 1; k != width; ++k)
+          value -= rounded_product(top[j * stride + width * c + k], x[width * c + k]);
+        x[row] = value * inverse_diagonal_[width * node.first + row];
+      }
+    }
+    std::copy_n(x, width * node.columns, ordered_.begin() + offset(node.first));
+  }
+
+  detail::panel_kernels<width> kernels_;
+  block_symbolic symbolic_;
+  std::vector<panel> panels_;
+  std::vector<target> targets_;
+  std::vector<double> values_;   // the panels, column-major
+  std::vector<double> product_;  // of panels, before it is subtracted
+  std::size_t product_stride_ = 0;
+  std::vector<double> inverse_diagonal_;  // of the factor
+  std::vector<double> ordered_;           // the right-hand side in the order of elimination
+  std::vector<std::uint32_t> place_of_row_;
+  std::uint32_t failed_block_ = 0;
+};
+
+}  // namespace orbis::optimize

@@ -1,0 +1,243 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Where the Cholesky factor of a block-sparse matrix has its blocks: everything about a
+/// factorisation that does not depend on the numbers.
+///
+/// Sources: J. W. H. Liu, "The role of elimination trees in sparse factorization", SIAM J. Matrix
+/// Anal. Appl. 11(1), 1990; C. Ashcraft, R. Grimes, "The influence of relaxed supernode partitions on
+/// the multifrontal method", ACM TOMS 15(4), 1989.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include <orbis/optimize/detail/sparse/block_ordering.hpp>
+
+namespace orbis::optimize {
+
+/// Consecutive block columns of the factor with the same rows below them, kept as one dense panel.
+struct supernode {
+  std::uint32_t first = 0;     ///< first block column, in the order of elimination
+  std::uint32_t columns = 0;   ///< how many
+  std::size_t rows_begin = 0;  ///< into `block_symbolic::rows`: the block rows below the panel's own, ascending
+  std::uint32_t rows = 0;      ///< how many
+};
+
+/// The rows `[begin, end)` of a supernode's panel lie in the columns of another, which it changes.
+struct supernode_update {
+  std::uint32_t source = 0;
+  std::uint32_t begin = 0, end = 0;  ///< positions in the source's rows
+};
+
+/// The structure of a factor `L` with `P A P^T = L L^T`.
+struct block_symbolic {
+  std::vector<std::uint32_t> order;     ///< `order[k]`: which block of A is the k-th of the factor
+  std::vector<std::uint32_t> position;  ///< its inverse
+  std::vector<supernode> supernodes;    ///< in the order of elimination
+  std::vector<std::uint32_t> rows;
+  std::vector<std::uint32_t> supernode_of;  ///< of each block column of the factor
+  std::vector<supernode_update> updates;    ///< by target, then by source
+  std::vector<std::size_t> first_update;    ///< of each supernode, as target; one more at the end
+  std::size_t factor_blocks = 0;            ///< blocks in the lower triangle of the panels, explicit zeros included
+
+  [[nodiscard]] std::size_t size() const { return order.size(); }
+  [[nodiscard]] std::span<const std::uint32_t> rows_of(const supernode& s) const {
+    return std::span{rows}.subspan(s.rows_begin, s.rows);
+  }
+  [[nodiscard]] std::span<const supernode_update> updates_of(std::size_t target) const {
+    return std::span{updates}.subspan(first_update[target], first_update[target + 1] - first_update[target]);
+  }
+};
+
+namespace detail {
+
+inline constexpr std::uint32_t no_block = std::numeric_limits<std::uint32_t>::max();
+
+/// The parent of each column: the first row below it that is filled.
+[[nodiscard]] inline std::vector<std::uint32_t> elimination_tree(const block_adjacency& graph,
+                                                                 const std::vector<std::uint32_t>& order,
+                                                                 const std::vector<std::uint32_t>& position) {
+  std::vector<std::uint32_t> parent(order.size(), no_block), ancestor(order.size(), no_block);
+  for (std::uint32_t k = 0; k != order.size(); ++k)
+    for (const std::uint32_t neighbor : graph.neighbors(order[k])) {
+      std::uint32_t i = position[neighbor];
+      while (i < k) {
+        const std::uint32_t up = ancestor[i];
+        ancestor[i] = k;  // the path is short the next time
+        if (up == no_block) parent[i] = k;
+        if (up == no_block || up == k) break;
+        i = up;
+      }
+    }
+  return parent;
+}
+
+/// The columns so that every subtree is consecutive and children come before their parent.
+[[nodiscard]] inline std::vector<std::uint32_t> postorder(const std::vector<std::uint32_t>& parent) {
+  const std::size_t n = parent.size();
+  std::vector<std::uint32_t> child(n, no_block), sibling(n, no_block), stack, result;
+  result.reserve(n);
+  for (std::size_t i = n; i != 0; --i)
+    if (const std::uint32_t p = parent[i - 1]; p != no_block) {
+      sibling[i - 1] = child[p];
+      child[p] = static_cast<std::uint32_t>(i - 1);
+    }
+  for (std::uint32_t root = 0; root != n; ++root) {
+    if (parent[root] != no_block) continue;
+    stack.push_back(root);
+    while (!stack.empty()) {
+      const std::uint32_t i = stack.back();
+      if (child[i] != no_block) {
+        stack.push_back(child[i]);
+        child[i] = sibling[child[i]];
+      } else {
+        result.push_back(i);
+        stack.pop_back();
+      }
+    }
+  }
+  return result;
+}
+
+/// Blocks in each column of the factor, the diagonal included.
+[[nodiscard]] inline std::vector<std::uint32_t> column_counts(const block_adjacency& graph,
+                                                              const block_symbolic& symbolic,
+                                                              const std::vector<std::uint32_t>& parent) {
+  std::vector<std::uint32_t> count(parent.size(), 1), seen(parent.size(), no_block);
+  for (std::uint32_t k = 0; k != parent.size(); ++k) {
+    seen[k] = k;
+    for (const std::uint32_t neighbor : graph.neighbors(symbolic.order[k]))
+      for (std::uint32_t i = symbolic.position[neighbor]; i < k && seen[i] != k; i = parent[i]) {
+        seen[i] = k;
+        ++count[i];
+      }
+  }
+  return count;
+}
+
+/// Whether a panel that `zeros` of `blocks` blocks are wasted in is still faster than two.
+[[nodiscard]] inline bool worth_merging(std::size_t columns, std::size_t zeros, std::size_t blocks) {
+  const double share = static_cast<double>(zeros) / static_cast<double>(blocks);
+  return zeros == 0 || (columns <= 4 && share < 0.4) || (columns <= 12 && share < 0.15) || share < 0.05;
+}
+
+/// Groups columns; sets everything of the supernodes but their rows.
+inline void group_columns(block_symbolic& symbolic, const std::vector<std::uint32_t>& parent,
+                          const std::vector<std::uint32_t>& count) {
+  struct group {
+    std::uint32_t first, last;
+    std::size_t rows;  ///< below the last column
+    std::size_t zeros;
+  };
+  const auto blocks = [](std::size_t columns, std::size_t rows) {
+    return columns * (columns + 1) / 2 + columns * rows;
+  };
+  std::vector<group> groups;
+  for (std::uint32_t k = 0; k != parent.size(); ++k) {
+    groups.push_back({k, k, count[k] - std::size_t{1}, 0});
+    while (groups.size() > 1) {  // with the last child, which ends where this begins
+      const group& top = groups.back();
+      const group& child = groups[groups.size() - 2];
+      if (parent[child.last] == no_block || parent[child.last] > top.last) break;
+      const std::size_t columns = top.last - child.first + std::size_t{1};
+      const std::size_t all = blocks(columns, top.rows);
+      const std::size_t used = blocks(child.last - child.first + std::size_t{1}, child.rows) - child.zeros +
+                               blocks(top.last - top.first + std::size_t{1}, top.rows) - top.zeros;
+      if (!worth_merging(columns, all - used, all)) break;
+      const group merged{child.first, top.last, top.rows, all - used};
+      groups.pop_back();
+      groups.back() = merged;
+    }
+  }
+  symbolic.supernode_of.resize(parent.size());
+  for (const group& g : groups) {
+    for (std::uint32_t k = g.first; k <= g.last; ++k)
+      symbolic.supernode_of[k] = static_cast<std::uint32_t>(symbolic.supernodes.size());
+    symbolic.supernodes.push_back({g.first, g.last - g.first + 1, 0, 0});
+  }
+}
+
+/// The rows of every supernode: those of its columns and of its children.
+inline void find_rows(block_symbolic& symbolic, const block_adjacency& graph) {
+  std::vector<std::uint32_t> seen(symbolic.size(), no_block), child(symbolic.supernodes.size(), no_block),
+      sibling(symbolic.supernodes.size(), no_block);
+  for (std::uint32_t s = 0; s != symbolic.supernodes.size(); ++s) {
+    supernode& node = symbolic.supernodes[s];
+    const std::uint32_t end = node.first + node.columns;
+    node.rows_begin = symbolic.rows.size();
+    const auto add = [&](std::uint32_t row) {
+      if (row < end || seen[row] == s) return;
+      seen[row] = s;
+      symbolic.rows.push_back(row);
+    };
+    for (std::uint32_t k = node.first; k != end; ++k)
+      for (const std::uint32_t neighbor : graph.neighbors(symbolic.order[k])) add(symbolic.position[neighbor]);
+    for (std::uint32_t c = child[s]; c != no_block; c = sibling[c]) {
+      const supernode& below = symbolic.supernodes[c];
+      for (std::size_t at = below.rows_begin; at != below.rows_begin + below.rows; ++at) add(symbolic.rows[at]);
+    }
+    node.rows = static_cast<std::uint32_t>(symbolic.rows.size() - node.rows_begin);
+    std::sort(symbolic.rows.begin() + static_cast<std::ptrdiff_t>(node.rows_begin), symbolic.rows.end());
+    if (node.rows != 0) {
+      const std::uint32_t up = symbolic.supernode_of[symbolic.rows[node.rows_begin]];
+      sibling[s] = child[up];
+      child[up] = s;
+    }
+    symbolic.factor_blocks +=
+        std::size_t{node.columns} * (node.columns + 1) / 2 + std::size_t{node.columns} * node.rows;
+  }
+}
+
+/// Which supernode changes which.
+inline void find_updates(block_symbolic& symbolic) {
+  const auto for_each = [&](auto&& visit) {
+    for (std::uint32_t s = 0; s != symbolic.supernodes.size(); ++s) {
+      const std::span<const std::uint32_t> rows = symbolic.rows_of(symbolic.supernodes[s]);
+      for (std::uint32_t begin = 0, end = 0; begin != rows.size(); begin = end) {
+        const std::uint32_t target = symbolic.supernode_of[rows[begin]];
+        while (end != rows.size() && symbolic.supernode_of[rows[end]] == target) ++end;
+        visit(target, supernode_update{s, begin, end});
+      }
+    }
+  };
+  symbolic.first_update.assign(symbolic.supernodes.size() + 1, 0);
+  for_each([&](std::uint32_t target, const supernode_update&) { ++symbolic.first_update[target + 1]; });
+  for (std::size_t s = 0; s != symbolic.supernodes.size(); ++s)
+    symbolic.first_update[s + 1] += symbolic.first_update[s];
+  symbolic.updates.resize(symbolic.first_update.back());
+  std::vector<std::size_t> next(symbolic.first_update.begin(), symbolic.first_update.end() - 1);
+  for_each([&](std::uint32_t target, const supernode_update& u) { symbolic.updates[next[target]++] = u; });
+}
+
+}  // namespace detail
+
+/// The structure of the factor of a matrix with blocks at `places` and on the diagonal.
+/// @pre every place is below `size` and off the diagonal
+[[nodiscard]] inline block_symbolic analyze_blocks(std::size_t size, std::span<const block_place> places) {
+  const block_adjacency graph{size, places};
+  block_symbolic symbolic;
+  const auto invert = [&] {
+    symbolic.position.resize(size);
+    for (std::uint32_t k = 0; k != size; ++k) symbolic.position[symbolic.order[k]] = k;
+  };
+  symbolic.order = minimum_degree_order(graph);
+  invert();
+  const auto tree = detail::elimination_tree(graph, symbolic.order, symbolic.position);
+  std::vector<std::uint32_t> renumbered;
+  renumbered.reserve(size);
+  for (const std::uint32_t k : detail::postorder(tree)) renumbered.push_back(symbolic.order[k]);
+  symbolic.order = std::move(renumbered);
+  invert();
+  const auto parent = detail::elimination_tree(graph, symbolic.order, symbolic.position);
+  detail::group_columns(symbolic, parent, detail::column_counts(graph, symbolic, parent));
+  detail::find_rows(symbolic, graph);
+  detail::find_updates(symbolic);
+  return symbolic;
+}
+
+}  // namespace orbis::optimize

@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Conjugate gradients on a sparse symmetric matrix of blocks.
+///
+/// Source: S. Agarwal, N. Snavely, S. M. Seitz, R. Szeliski, "Bundle adjustment in the large", ECCV 2010.
+#pragma once
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include <Eigen/Cholesky>
+
+#include <orbis/core/types.hpp>
+#include <orbis/optimize/detail/sparse/block_ordering.hpp>
+
+namespace orbis::optimize {
+
+/// Preconditioned with the inverses of the diagonal blocks. One iteration is O(blocks). Keeps its
+/// memory, and the blocks it was given until they are solved for. Not for several threads at once.
+template <int B>
+class block_conjugate_gradients {
+ public:
+  using block = matrix<B, B>;
+  using vector = matrix<B>;
+
+  /// Ends where the residual's norm is `relative_tolerance` times that of the right-hand side.
+  block_conjugate_gradients(double relative_tolerance, int max_iterations)
+      : tolerance_{relative_tolerance}, max_iterations_{max_iterations} {}
+
+  void analyze(std::size_t size, std::span<const block_place> places) {
+    size_ = size;
+    places_.assign(places.begin(), places.end());
+    inverse_.resize(size);
+    for (auto* v : {&residual_, &direction_, &image_, &preconditioned_, &solution_}) v->assign(B * size, 0.0);
+  }
+
+  /// False where a diagonal block is not positive definite.
+  /// @pre the spans outlive the calls of `solve`
+  [[nodiscard]] bool factor(std::span<const block> diagonal, std::span<const block> off_diagonal) {
+    assert(diagonal.size() == size_ && off_diagonal.size() == places_.size());
+    diagonal_ = diagonal;
+    off_diagonal_ = off_diagonal;
+    for (std::size_t i = 0; i != size_; ++i) {
+      const Eigen::LLT<block> llt(diagonal[i]);
+      inverse_[i] = llt.solve(block::Identity());
+      if (llt.info() != Eigen::Success || !inverse_[i].allFinite()) {
+        failed_block_ = static_cast<std::uint32_t>(i);
+        return false;
+      }
+    }
+    return true;
+  }
+  [[nodiscard]] std::uint32_t failed_block() const { return failed_block_; }
+
+  /// Replaces the right-hand side by an approximate solution: the last one at which the matrix had shown
+  /// itself positive definite.
+  void solve(std::span<double> x) {
+    assert(x.size() == B * size_);
+    residual_.assign(x.begin(), x.end());
+    solution_.assign(x.size(), 0.0);
+    const double wanted = tolerance_ * tolerance_ * dot(residual_, residual_);
+    precondition();
+    direction_ = preconditioned_;
+    double along = dot(residual_, preconditioned_);
+    for (int k = 0; k != max_iterations_ && along > 0.0; ++k) {
+      ++iterations_;
+      multiply();
+      const double curvature = dot(direction_, image_);
+      if (!(curvature > 0.0)) break;
+      const double length = along / curvature;
+      for (std::size_t i = 0; i != x.size(); ++i) {
+        solution_[i] += length * direction_[i];
+        residual_[i] -= length * image_[i];
+      }
+      if (dot(residual_, residual_) <= wanted) break;
+      precondition();
+      const double next = dot(residual_, preconditioned_);
+      const double turn = next / along;
+      along = next;
+      for (std::size_t i = 0; i != x.size(); ++i) direction_[i] = preconditioned_[i] + turn * direction_[i];
+    }
+    std::copy(solution_.begin(), solution_.end(), x.begin());
+  }
+
+  [[nodiscard]] int iterations() const { return iterations_; }
+
+ private:
+  using part = Eigen::Map<vector>;
+  [[nodiscard]] static part at(std::vector<double>& v, std::size_t i) { return part(v.data() + B * i); }
+
+  [[nodiscard]] static double dot(const std::vector<double>& a, const std::vector<double>& b) {
+    const auto n = static_cast<Eigen::Index>(a.size());
+    return Eigen::Map<const Eigen::VectorXd>(a.data(), n).dot(Eigen::Map<const Eigen::VectorXd>(b.data(), n));
+  }
+  void precondition() {
+    for (std::size_t i = 0; i != size_; ++i) at(preconditioned_, i).noalias() = inverse_[i] * at(residual_, i);
+  }
+  void multiply() {
+    for (std::size_t i = 0; i != size_; ++i) at(image_, i).noalias() = diagonal_[i] * at(direction_, i);
+    for (std::size_t k = 0; k != places_.size(); ++k) {
+      const auto& [row, column] = places_[k];
+      at(image_, row).noalias() += off_diagonal_[k] * at(direction_, column);
+      at(image_, column).noalias() += off_diagonal_[k].transpose() * at(direction_, row);
+    }
+  }
+
+  double tolerance_;
+  int max_iterations_;
+  int iterations_ = 0;
+  std::uint32_t failed_block_ = 0;
+  std::size_t size_ = 0;
+  std::vector<block_place> places_;
+  std::span<const block> diagonal_, off_diagonal_;
+  std::vector<block> inverse_;
+  std::vector<double> residual_, direction_, image_, preconditioned_, solution_;
+};
+
+}  // namespace orbis::optimize

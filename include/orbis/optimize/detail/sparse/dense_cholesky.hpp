@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Cholesky factorisation of a dense symmetric positive definite matrix.
+#pragma once
+
+#include <cassert>
+#include <cmath>
+#include <concepts>
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include <orbis/core/rounded.hpp>
+#include <orbis/core/simd.hpp>
+#include <orbis/optimize/detail/bundle/panel_kernels.hpp>
+
+namespace orbis::optimize {
+
+/// Left-looking in panels of eight columns, in the instruction set that the processor has. A third of
+/// n^3 multiplications; a matrix of a size seen before allocates nothing. The factor has the same bits
+/// on every processor. Not for several threads at once.
+class dense_cholesky {
+ public:
+  dense_cholesky() : dense_cholesky(simd::detected()) {}
+  /// With the inner loops for `level`, as far as the processor has it.
+  explicit dense_cholesky(simd::level level) : kernels_{detail::panel_kernels<width>::at(level)} {}
+
+  /// Room for an n x n matrix, all of it 0.
+  void resize(std::size_t n) {
+    size_ = n;
+    stride_ = (n + width - 1) / width * width;
+    values_.assign(stride_ * stride_ + 2 * detail::panel_slack, 0.0);
+    product_stride_ = stride_ + detail::panel_slack;
+    product_.resize(product_stride_ * width);
+    inverse_diagonal_.resize(stride_);
+    given_.resize(stride_);
+  }
+  [[nodiscard]] std::size_t size() const { return size_; }
+
+  /// Entry (row, column) of the matrix, of which only the lower triangle is looked at; after `factor`
+  /// that of the factor.
+  [[nodiscard]] double& operator()(std::size_t row, std::size_t column) { return values_[column * stride_ + row]; }
+  [[nodiscard]] double* column(std::size_t c) { return values_.data() + c * stride_; }
+
+  /// Replaces the matrix by its factor. False where it is not positive definite: a pivot is not above
+  /// `tolerance` times what stood there, or not finite; see `failed_row`.
+  [[nodiscard]] bool factor(double tolerance = 1e-14) {
+    for (std::size_t i = size_; i != stride_; ++i) (*this)(i, i) = 1.0;
+    for (std::size_t i = 0; i != stride_; ++i) given_[i] = (*this)(i, i);
+    for (std::size_t c = 0; c != stride_; c += width) {
+      double* const top = column(c) + c;
+      const std::size_t height = stride_ - c;
+      if (c != 0) {
+        const double* const left = values_.data() + c;
+        kernels_.product(left, left, stride_, height, c, product_.data(), product_stride_);
+        for (std::size_t j = 0; j != width; ++j) {
+          double* const to = top + j * stride_;
+          const double* const from = product_.data() + j * product_stride_;
+          for (std::size_t i = 0; i != height; ++i) to[i] -= from[i];
+        }
+      }
+      for (std::size_t j = 0; j != width; ++j)
+        if (!factor_column(top, j, tolerance * given_[c + j], inverse_diagonal_[c + j])) {
+          failed_row_ = c + j;
+          return false;
+        }
+      kernels_.solve(top, inverse_diagonal_.data() + c, stride_, top + width, height - width);
+    }
+    return true;
+  }
+
+  /// The row whose pivot was not positive, after `factor` has returned false.
+  [[nodiscard]] std::size_t failed_row() const { return failed_row_; }
+
+  /// Replaces the right-hand side in `x` by the solution. @pre the last `factor` returned true
+  template <std::same_as<double> S = double>  // so that only who calls it has it compiled
+  void solve(std::span<double> x) const {
+    assert(x.size() == size_);
+    const auto n = static_cast<Eigen::Index>(size_);
+    using MatrixXd = Eigen::Matrix<S, Eigen::Dynamic, Eigen::Dynamic>;
+    const Eigen::Map<const MatrixXd, Eigen::Unaligned, Eigen::OuterStride<>> l(
+        values_.data(), n, n, Eigen::OuterStride<>(static_cast<Eigen::Index>(stride_)));
+    Eigen::Map<Eigen::Matrix<S, Eigen::Dynamic, 1>> y(x.data(), n);
+    l.template triangularView<Eigen::Lower>().solveInPlace(y);
+    l.template triangularView<Eigen::Lower>().transpose().solveInPlace(y);
+  }
+
+ private:
+  static constexpr std::size_t width = 8;
+
+  [[nodiscard]] bool factor_column(double* top, std::size_t j, double least, double& inverse) const {
+    for (std::size_t i = j; i != width; ++i)
+      for (std::size_t k = 0; k != j; ++k)
+        top[j * stride_ + i] -= rounded_product(top[k * stride_ + i], top[k * stride_ + j]);
+    const double pivot = top[j * stride_ + j];
+    if (!(pivot > 0.0 && pivot > least) || !std::isfinite(pivot)) return false;
+    top[j * stride_ + j] = std::sqrt(pivot);
+    inverse = 1.0 / top[j * stride_ + j];
+    for (std::size_t i = j + 1; i != width; ++i) top[j * stride_ + i] *= inverse;
+    return true;
+  }
+
+  detail::panel_kernels<width> kernels_;
+  std::size_t size_ = 0, stride_ = 0, product_stride_ = 0, failed_row_ = 0;
+  std::vector<double> values_, product_, inverse_diagonal_, given_;
+};
+
+}  // namespace orbis::optimize

@@ -1,0 +1,160 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Clusters of binary descriptors about centres that are the majority of their members, bit by bit.
+#pragma once
+
+#include <algorithm>
+#include <cassert>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include <orbis/core/execution.hpp>
+#include <orbis/core/random.hpp>
+#include <orbis/core/simd.hpp>
+#include <orbis/places/bit_string.hpp>
+#include <orbis/places/detail/bit_votes.hpp>
+#include <orbis/places/detail/nearest_child.hpp>
+
+namespace orbis::places {
+
+struct k_majority_options {
+  std::uint32_t clusters = 10;  ///< at most; fewer where there are fewer different descriptors
+  int max_iterations = 10;
+  std::uint64_t seed = 1;
+  simd::level simd = simd::level::avx512;  ///< the best instructions to use if there are such; no result depends on it
+};
+
+/// Centres, each with at least one member, and the nearest centre of each descriptor (the first of equals).
+template <std::size_t Bits>
+struct clustering {
+  std::vector<bit_words<Bits>> centres;
+  std::vector<std::uint16_t> cluster_of;
+};
+
+namespace detail {
+
+/// Lloyd's algorithm under the Hamming distance, whose median is the majority. All sums are of whole numbers, so
+/// that neither the number of threads nor the order matters.
+template <std::size_t Bits>
+class k_majority_solver {
+  static constexpr std::size_t grain = 4096;
+  using words = bit_words<Bits>;
+
+ public:
+  k_majority_solver(std::span<const words> descriptors, const k_majority_options& options)
+      : descriptors_{descriptors}, options_{options}, random_{options.seed} {}
+
+  template <execution_policy Policy>
+  [[nodiscard]] clustering<Bits> solve(const Policy& policy) {
+    if (descriptors_.empty()) return {};
+    choose_seeds(policy);
+    result_.cluster_of.assign(descriptors_.size(), 0);
+    std::vector<std::uint16_t> before;
+    for (int iteration = 0;; ++iteration) {
+      before.swap(result_.cluster_of);
+      result_.cluster_of.resize(descriptors_.size());
+      assign(policy);
+      // The last step is an assignment: every descriptor is with the nearest of the centres as they stay.
+      if (iteration >= options_.max_iterations || (iteration != 0 && before == result_.cluster_of)) break;
+      move_centres(policy);
+    }
+    drop_empty();
+    return std::move(result_);
+  }
+
+ private:
+  /// The next seed is a descriptor drawn with a probability that is proportional to the square of its distance to
+  /// the seeds so far: D. Arthur, S. Vassilvitskii, "k-means++: the advantages of careful seeding", SODA 2007.
+  template <execution_policy Policy>
+  void choose_seeds(const Policy& policy) {
+    const std::size_t n = descriptors_.size();
+    std::vector<std::uint32_t> nearest(n, ~std::uint32_t{0});
+    std::vector<std::uint64_t> sums((n + grain - 1) / grain);
+    std::size_t chosen = random_.below(static_cast<std::uint32_t>(n));
+    for (;;) {
+      result_.centres.push_back(descriptors_[chosen]);
+      if (result_.centres.size() == options_.clusters) return;
+      const words centre = result_.centres.back();
+      for_each_chunk(policy, n, grain, [&](std::size_t begin, std::size_t end) {
+        std::uint64_t sum = 0;
+        for (std::size_t i = begin; i != end; ++i) {
+          const std::uint32_t distance = hamming_distance(descriptors_[i], centre);
+          nearest[i] = std::min(nearest[i], distance * distance);
+          sum += nearest[i];
+        }
+        sums[begin / grain] = sum;
+      });
+      std::uint64_t total = 0;
+      for (const std::uint64_t sum : sums) total += sum;
+      if (total == 0) return;  // each is one of the seeds
+      std::uint64_t left = static_cast<std::uint64_t>(random_.uniform() * static_cast<double>(total));
+      left = std::min(left, total - 1);
+      std::size_t chunk = 0;
+      while (left >= sums[chunk]) left -= sums[chunk++];
+      for (chosen = chunk * grain; left >= nearest[chosen]; ++chosen) left -= nearest[chosen];
+    }
+  }
+
+  template <execution_policy Policy>
+  void assign(const Policy& policy) {
+    for_each_chunk(policy, descriptors_.size(), grain, [&](std::size_t begin, std::size_t end) {
+      assign_nearest<Bits>(options_.simd,
+                           {result_.centres.data(), static_cast<std::uint32_t>(result_.centres.size()),
+                            descriptors_.data() + begin, end - begin, result_.cluster_of.data() + begin});
+    });
+  }
+
+  template <execution_policy Policy>
+  void move_centres(const Policy& policy) {
+    const std::size_t k = result_.centres.size();
+    // A few long pieces: each has counters of its own for every cluster.
+    const std::size_t pieces = std::clamp<std::size_t>(descriptors_.size() / (16 * k * grain / 8 + 1), 1, 16);
+    const std::size_t piece = (descriptors_.size() + pieces - 1) / pieces;
+    std::vector<bit_votes<Bits>> votes(pieces * k);
+    for_each_chunk(policy, descriptors_.size(), piece, [&](std::size_t begin, std::size_t end) {
+      bit_votes<Bits>* const of_piece = votes.data() + begin / piece * k;
+      for (std::size_t i = begin; i != end; ++i) of_piece[result_.cluster_of[i]].add(descriptors_[i]);
+    });
+    for (std::size_t c = 0; c != k; ++c) {
+      for (std::size_t p = 1; p != pieces; ++p) votes[c].add(votes[p * k + c]);
+      // One that lost all its members stays where it is: others may come near again.
+      if (votes[c].total() != 0) result_.centres[c] = votes[c].majority(result_.centres[c]);
+    }
+  }
+
+  void drop_empty() {
+    std::vector<std::uint32_t> members(result_.centres.size());
+    for (const std::uint16_t c : result_.cluster_of) ++members[c];
+    std::vector<std::uint16_t> renamed(members.size());
+    std::size_t kept = 0;
+    for (std::size_t c = 0; c != members.size(); ++c) {
+      renamed[c] = static_cast<std::uint16_t>(kept);
+      if (members[c] != 0) result_.centres[kept++] = result_.centres[c];
+    }
+    result_.centres.resize(kept);
+    for (std::uint16_t& c : result_.cluster_of) c = renamed[c];
+  }
+
+  std::span<const words> descriptors_;
+  k_majority_options options_;
+  random_bits random_;
+  clustering<Bits> result_;
+};
+
+}  // namespace detail
+
+/// Clusters `descriptors`. The same seed gives the same clusters, under every policy. O(descriptors x clusters x
+/// iterations). Nothing in, nothing out.
+/// Source: C. Grana, D. Borghesani, M. Manfredi, R. Cucchiara, "A fast approach for integrating ORB descriptors in
+/// the bag of words model", SPIE 2013.
+/// @pre 0 < clusters < 65536, max_iterations >= 0, fewer than 2^32 descriptors
+template <std::size_t Bits, execution_policy Policy>
+[[nodiscard]] clustering<Bits> k_majority(const Policy& policy, std::span<const bit_words<Bits>> descriptors,
+                                          const k_majority_options& options = {}) {
+  assert(options.clusters > 0 && options.clusters < 65536 && options.max_iterations >= 0);
+  return detail::k_majority_solver<Bits>{descriptors, options}.solve(policy);
+}
+
+}  // namespace orbis::places

@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// A tree from a list of nodes that name their parents, as other programs' files have it.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <orbis/places/bag_of_words.hpp>
+#include <orbis/places/bit_string.hpp>
+#include <orbis/places/detail/vocabulary_tree.hpp>
+
+namespace orbis::places::detail {
+
+/// Node `i` of the list is called `i + 1`; 0 is the root, which is not listed.
+template <std::size_t Bits>
+struct parent_list {
+  std::vector<std::uint32_t> parents;  ///< at most the number of nodes
+  std::vector<bit_words<Bits>> descriptors;
+  std::vector<float> weights;
+
+  [[nodiscard]] std::size_t size() const noexcept { return parents.size(); }
+};
+
+/// What is wrong with a list, and with which node (0: with none of them).
+struct list_problem {
+  std::string what;
+  std::size_t node = 0;
+};
+
+/// Numbers the nodes level by level; children stay in the order of the list. `is_word(node)` says what the file
+/// says. O(nodes).
+/// @pre one parent, not beyond the number of nodes, one descriptor and one weight for each node
+template <std::size_t Bits, class IsWord>
+[[nodiscard]] list_problem order_by_level(const parent_list<Bits>& list, IsWord&& is_word,
+                                          vocabulary_tree<Bits>& tree) {
+  const std::size_t n = list.size() + 1;
+  std::vector<std::uint32_t> begin(n + 1, 0), children(list.size());
+  for (const std::uint32_t parent : list.parents) ++begin[parent + 1U];
+  for (std::size_t i = 1; i != begin.size(); ++i) begin[i] += begin[i - 1];
+  for (std::size_t i = 0; i != list.size(); ++i) {
+    // The end of each parent's children moves up to where the next one's begin.
+    children[begin[list.parents[i]]++] = static_cast<std::uint32_t>(i + 1);
+  }
+  const auto first_of = [&](std::uint32_t node) { return node == 0 ? 0U : begin[node - 1]; };
+
+  tree.node_count = static_cast<std::uint32_t>(n);
+  tree.descriptors = table_memory<bit_words<Bits>>(list.size());
+  std::vector<std::uint32_t> order{0};
+  order.reserve(n);
+  std::vector<std::uint16_t> child_counts;
+  for (std::size_t i = 0; i != order.size(); ++i) {
+    const std::uint32_t node = order[i];
+    const std::uint32_t count = begin[node] - first_of(node);
+    if (count > std::numeric_limits<std::uint16_t>::max()) return {"has more than 65535 children", node};
+    if (node != 0 && is_word(node) != (count == 0))
+      return {count == 0 ? "is neither a word nor has it children" : "is a word, but has children", node};
+    child_counts.push_back(static_cast<std::uint16_t>(count));
+    if (node != 0) tree.descriptors.values()[i - 1] = list.descriptors[node - 1];
+    if (node != 0 && count == 0) tree.weights.push_back(list.weights[node - 1]);
+    for (std::uint32_t c = 0; c != count; ++c) order.push_back(children[first_of(node) + c]);
+  }
+  if (order.size() != n) {
+    std::vector<bool> seen(n);
+    for (const std::uint32_t node : order) seen[node] = true;
+    return {"is its own ancestor, or below one that is",
+            static_cast<std::size_t>(std::ranges::find(seen, false) - seen.begin())};
+  }
+  while (!child_counts.empty() && child_counts.back() == 0) child_counts.pop_back();
+  return {connect_tree(tree, child_counts), 0};
+}
+
+}  // namespace orbis::places::detail

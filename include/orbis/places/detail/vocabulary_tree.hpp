@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// A vocabulary's tree in memory: level after level, the children of a node side by side.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <orbis/core/result.hpp>
+#include <orbis/places/bag_of_words.hpp>
+#include <orbis/places/bit_string.hpp>
+#include <orbis/places/detail/table_memory.hpp>
+
+namespace orbis::places::detail {
+
+/// What the search has to know of a node besides its descriptor.
+struct tree_node {
+  std::uint32_t first_child = 0;   ///< the next node's is one past the last child
+  std::uint32_t inner_before = 0;  ///< how many nodes before this one have children
+};
+
+/// Nodes are numbered level by level from the root, 0; those of a level in the order of their parents. Words are
+/// the leaves in that order.
+template <std::size_t Bits>
+struct vocabulary_tree {
+  table_memory<bit_words<Bits>> descriptors;  ///< of node i at i - 1: the root has none
+  std::vector<tree_node> nodes;               ///< up to the last with children, and one more; the others are leaves
+  std::vector<float> weights;                 ///< of the words
+  std::uint32_t node_count = 1;
+  std::uint32_t branching = 0;  ///< the most children of a node
+  std::uint32_t depth = 0;      ///< levels below the root
+  weighting weights_are = weighting::tf_idf;
+
+  [[nodiscard]] std::uint32_t word_count() const noexcept { return static_cast<std::uint32_t>(weights.size()); }
+  /// Nodes from this one on are leaves.
+  [[nodiscard]] std::uint32_t inner_end() const noexcept { return static_cast<std::uint32_t>(nodes.size() - 1); }
+  [[nodiscard]] bool is_leaf(std::uint32_t node) const noexcept {
+    return node >= inner_end() || nodes[node].first_child == nodes[node + 1].first_child;
+  }
+  /// @pre is_leaf(leaf)
+  [[nodiscard]] std::uint32_t word_of_leaf(std::uint32_t leaf) const noexcept {
+    return leaf - nodes[std::min(leaf, inner_end())].inner_before;
+  }
+};
+
+/// Completes `tree`, whose descriptors and weights are there, by the numbers of children of its nodes in order, up to
+/// the last that has any. Returns what is wrong with them, or nothing. O(nodes).
+template <std::size_t Bits>
+[[nodiscard]] std::string connect_tree(vocabulary_tree<Bits>& tree, std::span<const std::uint16_t> child_counts) {
+  tree.nodes.assign(child_counts.size() + 1, {});
+  tree.branching = tree.depth = 0;
+  std::uint64_t next = 1;
+  std::uint32_t inner = 0;
+  std::uint64_t level_end = 1;  // of the level that is being passed through
+  for (std::size_t i = 0; i != child_counts.size(); ++i) {
+    if (i >= next) return "node " + std::to_string(i) + " is nobody's child";
+    if (i == level_end) level_end = next;
+    if (child_counts[i] != 0 && next == level_end) ++tree.depth;  // the first child of a new level
+    tree.nodes[i] = {static_cast<std::uint32_t>(next), inner};
+    next += child_counts[i];
+    inner += child_counts[i] != 0 ? 1U : 0U;
+    tree.branching = std::max<std::uint32_t>(tree.branching, child_counts[i]);
+    if (next > tree.node_count) return "more children than nodes";
+  }
+  tree.nodes.back() = {static_cast<std::uint32_t>(next), inner};
+  if (next != tree.node_count) return "fewer children than nodes";
+  if (!child_counts.empty() && child_counts.back() == 0) return "the last of the inner nodes has no children";
+  if (tree.node_count - inner != (tree.word_count() == 0 ? 1 : tree.word_count()))
+    return std::to_string(tree.node_count - inner) + " leaves, but " + std::to_string(tree.word_count()) + " words";
+  for (const float weight : tree.weights)
+    if (!(weight >= 0.0F && weight <= largest_weight)) return "a weight that is negative, beyond 1e20 or no number";
+  return {};
+}
+
+}  // namespace orbis::places::detail

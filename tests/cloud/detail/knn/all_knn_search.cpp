@@ -1,0 +1,222 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <orbis/cloud/detail/knn/all_knn_search.hpp>
+#include <orbis/cloud/mean_knn_distance.hpp>
+#include <orbis/cloud/nanoflann.hpp>
+
+#include "cloud/clouds.hpp"
+#include "cloud/reference.hpp"
+#include "support/catch.hpp"
+
+using orbis::simd::level;
+using orbis::test::points;
+
+namespace {
+
+constexpr std::array levels{level::portable, level::avx2, level::avx512};
+
+/// Clouds that are hard on guesses: density that leaps, ties, magnitudes from one end to the other.
+std::vector<std::pair<std::string, points>> hard_clouds() {
+  std::vector<std::pair<std::string, points>> out;
+  orbis::random_bits random{11};
+  points nested;  // clusters within clusters
+  for (int i = 0; i != 900; ++i) {
+    const double scale = std::pow(2.0, -0.1 * i);
+    nested.emplace_back((orbis::vec3{random.uniform(), random.uniform(), random.uniform()} * scale).cast<float>());
+  }
+  out.push_back({"nested", nested});
+
+  points mixed = orbis::test::uniform_cloud(700, 12, 0.01);  // dense and thin, alternating along the curve
+  const points thin = orbis::test::uniform_cloud(150, 13, 1.0);
+  mixed.insert(mixed.end(), thin.begin(), thin.end());
+  out.push_back({"dense within thin", mixed});
+
+  points shell;  // all at almost the same distance from the one in the middle
+  for (int i = 0; i != 800; ++i) {
+    const orbis::vec3 v{random.normal(), random.normal(), random.normal()};
+    shell.emplace_back(v.normalized().cast<float>());
+  }
+  shell.emplace_back(0.0F, 0.0F, 0.0F);
+  out.push_back({"shell", shell});
+
+  points copies;  // many copies of few points, and few copies of many
+  for (int i = 0; i != 6; ++i) {
+    const orbis::vec3f p{0.1F * static_cast<float>(i), 0.0F, 0.0F};
+    copies.insert(copies.end(), 120, p);
+    copies.push_back(p + orbis::vec3f{1e-3F, 0.0F, 0.0F});
+  }
+  out.push_back({"copies", copies});
+
+  points line;
+  for (int i = 0; i != 600; ++i) line.emplace_back(static_cast<float>(i), 0.0F, 0.0F);
+  out.push_back({"even line", line});
+
+  points huge;  // squares overflow between, but not within clusters
+  for (int c = 0; c != 4; ++c) {
+    const points cluster = orbis::test::uniform_cloud(30, 14 + static_cast<std::uint64_t>(c), 1e17);
+    for (const orbis::vec3f& p : cluster) huge.push_back(p + orbis::vec3f{1e20F * static_cast<float>(c), 0.0F, 0.0F});
+  }
+  huge.emplace_back(3e38F, -3e38F, 3e38F);
+  out.push_back({"overflowing", huge});
+  return out;
+}
+
+std::size_t differences(const std::vector<float>& found, const std::vector<float>& expected) {
+  if (found.size() != expected.size()) return found.size() + expected.size();
+  std::size_t different = 0;
+  for (std::size_t i = 0; i != found.size(); ++i) {
+    const bool same = std::isnan(expected[i]) ? std::isnan(found[i]) : found[i] == expected[i];
+    different += same ? 0 : 1;
+  }
+  return different;
+}
+
+}  // namespace
+
+TEST_CASE("mean distances equal brute force with every instruction set and number of threads") {
+  auto clouds = orbis::test::all_clouds();
+  for (auto& hard : hard_clouds()) clouds.push_back(std::move(hard));
+  for (const auto& [name, cloud] : clouds) {
+    for (const std::size_t k : {1U, 2U, 15U, 16U, 50U, 200U}) {
+      const auto expected = orbis::test::reference_mean_distances(cloud, k);
+      for (const level l : levels) {
+        INFO(name << " k " << k << " level " << static_cast<int>(l));
+        CHECK(differences(orbis::cloud::detail::all_mean_knn_distance_at(l, orbis::seq, cloud, k), expected) == 0);
+      }
+      CHECK(differences(orbis::cloud::all_mean_knn_distance(orbis::par.with(3), cloud, k), expected) == 0);
+    }
+  }
+}
+
+TEST_CASE("mean distances of larger clouds equal those of a k-d tree") {
+  points scattered = orbis::test::room_cloud(240, 160, 0.002, 3);
+  orbis::random_bits random{4};
+  for (std::size_t i = 0; i < scattered.size(); i += 50) scattered[i] *= static_cast<float>(random.uniform());
+  for (std::size_t i = scattered.size(); i-- > 1;)
+    std::swap(scattered[i], scattered[random.below(static_cast<std::uint32_t>(i + 1))]);
+  for (const points& cloud : {scattered, orbis::test::uniform_cloud(20'000, 5, 10.0, 1000.0)}) {
+    const orbis::cloud::nanoflann_search search{cloud};
+    for (const std::size_t k : {8U, 50U}) {
+      std::vector<float> expected;
+      for (const orbis::vec3f& p : cloud) {
+        std::vector<orbis::cloud::neighbor<float>> nearest;
+        orbis::cloud::nearest_sink<float> sink{k + 1, nearest};
+        search.visit({p.x(), p.y(), p.z()}, sink);  // squares, in a heap
+        std::sort_heap(nearest.begin(), nearest.end(), orbis::cloud::nearest_sink<float>::less);
+        double sum = 0;
+        for (const auto& n : nearest) sum += std::sqrt(double{n.distance});
+        expected.push_back(static_cast<float>(sum / static_cast<double>(k)));
+      }
+      for (const level l : levels) {
+        CHECK(differences(orbis::cloud::detail::all_mean_knn_distance_at(l, orbis::seq, cloud, k), expected) == 0);
+        CHECK(differences(orbis::cloud::detail::all_mean_knn_distance_at(l, orbis::par.with(2), cloud, k), expected) ==
+              0);
+      }
+    }
+  }
+}
+
+TEST_CASE("the nearest of some distances are selected and summed alike by all instruction sets") {
+  orbis::random_bits random{6};
+  for (int round = 0; round != 3000; ++round) {
+    const std::size_t count = 1 + random.below(round % 3 == 0 ? 400 : 40);
+    const std::size_t wanted = 1 + random.below(static_cast<std::uint32_t>(count));
+    std::vector<float> values(count);
+    const int kind = round % 6;
+    for (float& v : values) {
+      v = static_cast<float>(random.uniform());
+      if (kind == 1) v = static_cast<float>(random.below(4));                           // ties
+      if (kind == 2) v = static_cast<float>(std::pow(2.0, random.uniform(-140, 120)));  // all magnitudes
+      if (kind == 3) v = v < 0.9F ? v * 1e-6F : v;                                      // a tail
+      if (kind == 4) v = 0;
+      if (kind == 5 && v < 0.5F) v = 0;
+    }
+    std::vector<float> sorted = values;
+    std::sort(sorted.begin(), sorted.end());
+    double roots = 0;
+    for (std::size_t i = 0; i != wanted; ++i) roots += std::sqrt(double{sorted[i]});
+    for (const level l : levels) {
+      INFO("round " << round << " level " << static_cast<int>(l));
+      std::vector<float> found = values;
+      found.resize(count + orbis::cloud::detail::leaf_width, std::numeric_limits<float>::infinity());
+      const auto sum =
+          orbis::cloud::detail::select_knn_kernels(l).sum_nearest(found.data(), count, wanted, sorted.back());
+      CHECK(sum.largest_squared == sorted[wanted - 1]);
+      if (sum.roots >= 0) {
+        CHECK(std::abs(sum.roots - roots) <= roots * orbis::cloud::detail::roots_slack(wanted));
+      } else {
+        CHECK(kind == 2);  // only where roots are too small for the fast way
+      }
+      found.resize(count);
+      std::sort(found.begin(), found.end());
+      CHECK(found == sorted);  // they are still there
+    }
+  }
+}
+
+TEST_CASE("boxes and leaves are measured alike by all instruction sets") {
+  using orbis::cloud::detail::box3;
+  const auto cloud = orbis::test::uniform_cloud(2000, 7, 3.0);
+  const auto tree = orbis::cloud::detail::make_leaves(orbis::seq, cloud, 51);
+  using namespace orbis::cloud::detail;
+  const knn_kernels reference{near_boxes_portable, gather_portable,    near_points_portable,
+                              in_leaf_portable,    distances_portable, sum_nearest_portable};
+  for (const level l : levels) {
+    const auto kernels = orbis::cloud::detail::select_knn_kernels(l);
+    orbis::cloud::detail::nearby_leaves near{400};
+    orbis::cloud::detail::nearby_leaves near_reference{400};
+    const box3 box{{1.0F, 1.0F, 1.0F}, {1.5F, 1.25F, 1.0F}};
+    for (std::uint32_t row = 0; row != tree.levels[0].size(); ++row) {
+      std::array<float, 16> distance{};
+      std::array<float, 16> expected{};
+      const auto mask = kernels.near_boxes(tree.levels[0][row], box, 0.3F, distance.data());
+      CHECK(mask == reference.near_boxes(tree.levels[0][row], box, 0.3F, expected.data()));
+      CHECK(distance == expected);
+      kernels.gather(tree.levels[0][row], mask, row * 16, near);
+      reference.gather(tree.levels[0][row], mask, row * 16, near_reference);
+    }
+    near.finish();
+    near_reference.finish();
+    for (const auto& leaf : tree.leaves) {
+      const std::array<float, 3> q{leaf.axis[0][3], leaf.axis[1][0], leaf.axis[2][0]};
+      if (!std::isfinite(q[0])) continue;
+      std::array<float, 64> found{};
+      std::array<float, 64> expected{};
+      CHECK(kernels.distances(leaf, q, 0.05F, found.data()) == reference.distances(leaf, q, 0.05F, expected.data()));
+      CHECK(found == expected);
+      const std::size_t n = kernels.in_leaf(leaf, q, 0.05F, found.data());
+      CHECK(n == reference.in_leaf(leaf, q, 0.05F, expected.data()));
+      CHECK(std::equal(found.begin(), found.begin() + static_cast<std::ptrdiff_t>(n), expected.begin()));
+    }
+    const std::array<float, 3> middle{1.2F, 1.1F, 1.0F};
+    std::vector<std::uint32_t> scratch(near.leaves.size() + 16);
+    std::vector<float> found(4000);
+    std::vector<float> found_reference(4000);
+    const std::size_t n =
+        kernels.near_points(tree.leaves.data(), near, middle, 0.2F, scratch.data(), found.data(), 3000);
+    CHECK(n > 16);
+    CHECK(n == reference.near_points(tree.leaves.data(), near_reference, middle, 0.2F, scratch.data(),
+                                     found_reference.data(), 3000));
+    found.resize(n + 16);
+    found_reference.resize(n + 16);
+    CHECK(found == found_reference);
+    REQUIRE(near.count == near_reference.count);
+    CHECK(near.count > 16);
+    near.leaves.resize(near.count);
+    near_reference.leaves.resize(near.count);
+    CHECK(near.leaves == near_reference.leaves);
+    for (std::size_t i = 0; i != (near.count + 15) / 16; ++i) {
+      CHECK(near.boxes[i].low == near_reference.boxes[i].low);
+      CHECK(near.boxes[i].high == near_reference.boxes[i].high);
+    }
+  }
+}

@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include <orbis/cloud/detail/select/local_shape.hpp>
+
+#include "cloud/clouds.hpp"
+#include "support/catch.hpp"
+
+using orbis::cloud::all_knn;
+using orbis::cloud::off_plane;
+
+TEST_CASE("a point in a plane, at an edge, in a volume and beside a surface") {
+  orbis::random_bits random{1};
+  const auto mean_off_plane = [](const orbis::test::points& cloud, std::size_t n) {
+    const auto table = all_knn(orbis::seq, cloud, 8);
+    double sum = 0;
+    for (std::size_t i = 0; i != n; ++i) sum += off_plane(cloud, i, table[i]);
+    return sum / static_cast<double>(n);
+  };
+  orbis::test::points plane;
+  for (int i = 0; i != 2000; ++i) {
+    const double x = random.uniform();
+    const double y = random.uniform();
+    plane.push_back(orbis::vec3{x, y, 0.3 * x - 0.2 * y}.cast<float>());
+  }
+  CHECK(mean_off_plane(plane, 100) < 1e-3);
+  CHECK(mean_off_plane(orbis::test::uniform_cloud(2000, 2), 100) > 0.3);
+  auto above = plane;
+  above.insert(above.begin(), orbis::vec3f{0.5F, 0.5F, 0.6F});
+  const auto table = all_knn(orbis::seq, above, 8);
+  CHECK(off_plane(above, 0, table[0]) > 0.9);
+  CHECK(off_plane(above, 0, table[0].first(3)) == std::numeric_limits<double>::infinity());
+  CHECK(off_plane(orbis::test::points(20, orbis::vec3f{1, 2, 3}), 0, table[0].first(0)) > 1);
+}
+
+TEST_CASE("what is usual around is a quantile over neighbours, and of any policy") {
+  const auto cloud = orbis::test::uniform_cloud(3000, 3);
+  const auto table = all_knn(orbis::seq, cloud, 12);
+  orbis::random_bits random{4};
+  std::vector<float> values(cloud.size());
+  for (float& v : values) v = static_cast<float>(random.uniform());
+  values[7] = std::numeric_limits<float>::quiet_NaN();
+  const orbis::cloud::smoothing_options once{.neighbors = 12, .rounds = 1, .quantile = 0.35};
+  const auto smooth = orbis::cloud::smoothed_over_neighbors(orbis::seq, table, values, once);
+  for (std::size_t i = 0; i != cloud.size(); ++i) {
+    if (i == 7) {
+      CHECK(std::isnan(smooth[i]));
+      continue;
+    }
+    std::vector<float> around;
+    for (const auto& n : table[i]) {
+      if (n.index != 7) around.push_back(values[n.index]);
+    }
+    std::sort(around.begin(), around.end());
+    const auto rank = static_cast<std::size_t>(0.35 * static_cast<double>(around.size() - 1) + 0.5);
+    REQUIRE(smooth[i] == around[rank]);
+  }
+  const auto spread = [](const std::vector<float>& v) {
+    double sum = 0, squares = 0;
+    for (std::size_t i = 10; i != v.size(); ++i) sum += v[i], squares += v[i] * v[i];
+    const auto n = static_cast<double>(v.size() - 10);
+    return squares / n - sum / n * (sum / n);
+  };
+  const auto smoother = orbis::cloud::smoothed_over_neighbors(orbis::par.with(3), table, values);
+  CHECK(spread(smoother) < 0.5 * spread(smooth));
+  auto again = orbis::cloud::smoothed_over_neighbors(orbis::seq, table, values);
+  again[7] = smoother[7];
+  for (std::size_t i = 0; i != again.size(); ++i) {
+    if (i != 7) REQUIRE(again[i] == smoother[i]);
+  }
+  CHECK(orbis::cloud::smoothed_over_neighbors(orbis::seq, {}, {}).empty());
+}
