@@ -23,6 +23,7 @@
 #include <orbis/slam/correction.hpp>
 #include <orbis/slam/landmark_search.hpp>
 #include <orbis/slam/map.hpp>
+#include <orbis/slam/observed_point.hpp>
 #include <orbis/slam/options.hpp>
 
 namespace orbis::slam {
