@@ -1,10 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <atomic>
+#include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <ostream>
 #include <stdexcept>
 #include <string>
+#include <thread>
+#include <vector>
 
+#include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -103,21 +108,57 @@ TEST_CASE("a writer that gives up or throws leaves the old file and nothing else
   CHECK(read_file(path).value() == "new");
 }
 
-TEST_CASE("a full disk is an error whether it shows in writing or in closing") {
-  if (!fs::exists("/dev/full")) return;
+TEST_CASE("a file that finds no room is an error whether it shows in writing or in closing") {
   const scratch_folder folder;
   const fs::path path = folder.path / "map.bt";
   REQUIRE(write_text(path, "old"));
+  rlimit before{};
+  REQUIRE(::getrlimit(RLIMIT_FSIZE, &before) == 0);
+  const auto handler = std::signal(SIGXFSZ, SIG_IGN);
   for (const std::size_t size : {std::size_t{10}, std::size_t{1} << 20U}) {  // buffered, and beyond the buffer
-    fs::create_symlink("/dev/full", folder.path / "map.bt.part");
+    const rlimit none{4, before.rlim_max};                                   // a file may have four bytes
+    ::setrlimit(RLIMIT_FSIZE, &none);
     const auto full = write_text(path, std::string(size, 'x'));
+    ::setrlimit(RLIMIT_FSIZE, &before);
     REQUIRE(!full);
     CHECK(full.error().code == errc::write_failed);
     CHECK(full.error().where == path.string());
-    CHECK(full.error().message.find("No space left") != std::string::npos);
+    CHECK(full.error().message.find("File too large") != std::string::npos);
     CHECK(read_file(path).value() == "old");
     CHECK(folder.files() == 1);
   }
+  std::signal(SIGXFSZ, handler);
+}
+
+TEST_CASE("threads that write the same file leave one of their files and nothing else") {
+  const scratch_folder folder;
+  const fs::path path = folder.path / "shared";
+  std::atomic<int> failures{0};
+  std::vector<std::thread> writers;
+  for (char name = 'a'; name != 'e'; ++name)
+    writers.emplace_back([&, name] {
+      for (int i = 0; i != 20; ++i) failures += write_text(path, std::string(100000, name)) ? 0 : 1;
+    });
+  for (std::thread& writer : writers) writer.join();
+  CHECK(failures == 0);
+  const std::string left = read_file(path).value();
+  CHECK(left == std::string(100000, left.at(0)));
+  CHECK(folder.files() == 1);
+}
+
+TEST_CASE("a temporary file that an ended process left does not stop the next one") {
+  const scratch_folder folder;
+  for (int i = 0; i != 4; ++i) {  // the names that this process would use next
+    orbis::detail::temporary_file probe{folder.path / "x"};
+    REQUIRE(probe.exists());
+    const std::string name = probe.path().filename().string();
+    const auto number = std::stoul(name.substr(name.rfind('-') + 1));
+    std::ofstream{folder.path / (name.substr(0, name.rfind('-') + 1) + std::to_string(number + 1) + ".part")} << "left";
+  }
+  const std::ptrdiff_t left = folder.files();
+  CHECK(write_text(folder.path / "file", "text"));
+  CHECK(read_file(folder.path / "file").value() == "text");
+  CHECK(folder.files() == left + 1);
 }
 
 TEST_CASE("a device or a pipe is not replaced by a file") {
@@ -144,5 +185,5 @@ TEST_CASE("a file that cannot be created says so and names the file") {
   const auto r = write_text(folder.path / "occupied", "text");
   REQUIRE(!r);
   CHECK(r.error().code == errc::write_failed);
-  CHECK(!fs::exists(folder.path / "occupied.part"));
+  CHECK(folder.files() == 2);
 }

@@ -15,6 +15,7 @@
 #include <type_traits>
 #include <utility>
 
+#include <orbis/core/detail/temporary_file.hpp>
 #include <orbis/core/result.hpp>
 
 namespace orbis {
@@ -38,43 +39,37 @@ namespace orbis {
   return bytes;
 }
 
-/// Calls `write(std::ostream&)` on a temporary file beside `path` and renames it to `path` when
-/// everything, the closing included, succeeded; otherwise (an exception from `write` included)
-/// removes it and leaves `path` as it was. What is there and no regular file (a device, a folder) is
-/// not replaced; a symbolic link is, not what it points to. `write` may return `void`, or `result<void>` to give up.
-/// Errors: write_failed, or `write`'s own.
+/// Calls `write(std::ostream&)` on a temporary file beside `path`, brings it to the disk (fsync) and renames it to
+/// `path`. If anything fails (an exception from `write` included), the temporary file is removed and `path` stays as it
+/// was. A reader, and the next start after a crash, finds the old file or the new one, never a part of it.
+///
+/// The temporary file has a unique name: two threads or two programs may write the same file at once; the last one
+/// wins. What exists at `path` and is no regular file (a device, a folder) is not replaced; a symbolic link is replaced
+/// itself, not what it points to. `write` returns `void`, or `result<void>` to give up. Errors: write_failed, or
+/// `write`'s own.
 template <class Write>
 [[nodiscard]] result<void> write_file_atomically(const std::filesystem::path& path, Write&& write) {
-  namespace fs = std::filesystem;
-  struct temporary_file {
-    fs::path path;
-    bool in_place = false;
-    ~temporary_file() {
-      std::error_code ignored;
-      if (!in_place) fs::remove(path, ignored);
-    }
-  };
   const auto reason = [] { return std::generic_category().message(errno != 0 ? errno : EIO); };
+  const auto cannot = [&](const std::string& what) { return fail(errc::write_failed, path.string(), what); };
 
   std::error_code ec;
-  if (const auto existing = fs::status(path, ec); fs::exists(existing) && !fs::is_regular_file(existing))
-    return fail(errc::write_failed, path.string(), "is not a regular file, and is not replaced by one");
-  fs::path beside = path;
-  beside += ".part";
+  if (const auto existing = std::filesystem::status(path, ec);
+      std::filesystem::exists(existing) && !std::filesystem::is_regular_file(existing))
+    return cannot("is not a regular file, and is not replaced by one");
+  detail::temporary_file temporary{path};
+  if (!temporary.exists()) return cannot("cannot be created: " + reason());
   errno = 0;
-  std::ofstream out{beside, std::ios::binary | std::ios::trunc};
-  if (!out) return fail(errc::write_failed, path.string(), "cannot be created: " + reason());
-  temporary_file temporary{std::move(beside)};
+  std::ofstream out{temporary.path(), std::ios::binary | std::ios::trunc};
+  if (!out) return cannot("cannot be created: " + reason());
   if constexpr (std::is_void_v<std::invoke_result_t<Write&, std::ostream&>>) {
     write(static_cast<std::ostream&>(out));
   } else {
     if (result<void> done = write(static_cast<std::ostream&>(out)); !done) return fail(std::move(done.error()));
   }
   out.close();
-  if (!out) return fail(errc::write_failed, path.string(), "cannot be written: " + reason());
-  fs::rename(temporary.path, path, ec);
-  if (ec) return fail(errc::write_failed, path.string(), "cannot be put in place: " + ec.message());
-  temporary.in_place = true;
+  if (!out || !temporary.sync()) return cannot("cannot be written: " + reason());
+  if (const std::error_code failure = temporary.rename_to(path))
+    return cannot("cannot be put in place: " + failure.message());
   return {};
 }
 
