@@ -1,10 +1,11 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
 #
-# Holds the layers: which component may include which, and who may name a neighbour library.
-# usage: layering.sh INCLUDE_DIR
+# Holds the layers: which component may include which, who may include a component's detail/, and who may name a
+# neighbour library.
+# usage: layering.sh PROJECT_DIR
 set -euo pipefail
-cd "$1/orbis"
+cd "$1/include/orbis"
 bad=0
 complain() { echo "$1"; bad=1; }
 
@@ -32,6 +33,26 @@ while IFS=: read -r file line text; do
   fi
   [[ -n ${allowed[$component]+known} ]] || complain "$file:$line: $component is in no layer"
 done <<<"$(grep -rnE '^ *# *include *<orbis/' --include='*.hpp' . | sed 's|^\./||' | grep '/.*:.*:')"
+
+# The detail/ of a component is its own: no umbrella, no sibling, no document and no example includes it, and no document
+# names it.
+declare -A known=(  # exceptions, to become none
+  ["include/orbis/optimize/bal_reprojection.hpp camera"]=1
+  ["include/orbis/interop/octomap.hpp octree"]=1
+  ["include/orbis/optimize/detail/pose/pose_kernels.hpp camera"]=1
+  ["include/orbis/optimize/reprojection.hpp camera"]=1
+)
+private() {  # <pattern, whose first group is the component> <where>...
+  local pattern=$1 hit file component
+  while IFS= read -r hit; do
+    [[ $hit =~ $pattern ]] || continue
+    component=${BASH_REMATCH[1]} file=${hit%%:*}
+    [[ $file == include/orbis/$component/* || -n ${known["$file $component"]-} ]] && continue
+    complain "$hit: the detail/ of $component is used outside of it"
+  done <<<"$(cd ../.. && grep -rnE "$pattern" "${@:2}" 2>/dev/null)"
+}
+private '# *include *[<"]orbis/([a-z]+)/([a-z]+/)*detail/' include/orbis README.md docs examples
+private 'orbis::([a-z]+)::detail' README.md docs
 
 # A neighbour's name, and the only files that may include it.
 only() {
