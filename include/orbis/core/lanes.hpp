@@ -24,16 +24,6 @@
 
 #include <orbis/core/simd.hpp>
 
-#define ORBIS_ALWAYS_INLINE __attribute__((always_inline)) inline
-#define ORBIS_TARGET_AVX2 ORBIS_TARGET("avx2,fma,bmi,bmi2")
-#define ORBIS_TARGET_AVX512 ORBIS_TARGET("avx512f,avx512bw,avx512dq,avx512vl,avx2,fma,bmi,bmi2")
-/// A function whose products are rounded before they are summed, with all that is inlined into it.
-#if defined(__clang__)
-#define ORBIS_UNFUSED  // clang fuses within one expression only, and operators on lanes are functions
-#else
-#define ORBIS_UNFUSED __attribute__((optimize("fp-contract=off")))
-#endif
-
 namespace orbis::simd {
 
 inline constexpr int lane_count = 8;

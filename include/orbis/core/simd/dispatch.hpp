@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Compiles a kernel once for every instruction set and chooses one of them at run time.
+#pragma once
+
+#include <cstddef>
+#include <type_traits>
+#include <utility>
+
+#include <orbis/core/simd/level.hpp>
+
+/// A kernel and everything that it calls with vectors: inlined into the function that is compiled for a target.
+#define ORBIS_ALWAYS_INLINE __attribute__((always_inline)) inline
+/// Behind the parameters of a lambda in a kernel.
+#define ORBIS_INLINE_LAMBDA __attribute__((always_inline))
+#define ORBIS_TARGET_POPCNT ORBIS_TARGET("sse4.2,popcnt")
+#define ORBIS_TARGET_AVX2 ORBIS_TARGET("avx2,fma,bmi,bmi2,popcnt")
+#define ORBIS_TARGET_AVX512 ORBIS_TARGET("avx512f,avx512bw,avx512dq,avx512vl,avx2,fma,bmi,bmi2,popcnt")
+/// A function whose products are rounded before they are summed, with all that is inlined into it. Vectors do so
+/// anyway; this is for the scalars beside them.
+#if defined(__clang__)
+#define ORBIS_UNFUSED  // clang fuses within one expression only, where rounded_product serves
+#else
+#define ORBIS_UNFUSED __attribute__((optimize("fp-contract=off")))
+#endif
+
+namespace orbis::simd {
+
+// What a kernel is compiled for: the template argument `Target` of kernels and of `vec`.
+
+/// What the compiler was told to assume: SSE2, NEON.
+struct portable {
+  static constexpr std::size_t bytes = 16;  ///< of a register
+  static constexpr level needs = level::portable;
+};
+/// SSE4.2 and POPCNT, for kernels that count bits.
+struct popcnt {
+  static constexpr std::size_t bytes = 16;
+  static constexpr level needs = level::popcnt;
+};
+struct avx2 {
+  static constexpr std::size_t bytes = 32;
+  static constexpr level needs = level::avx2;
+};
+struct avx512 {
+  static constexpr std::size_t bytes = 64;
+  static constexpr level needs = level::avx512;
+};
+
+template <class T>
+concept target = requires {
+  T::bytes;
+  T::needs;
+};
+
+namespace detail {
+
+/// The functions that hold the code of `Kernel` for each target.
+template <class Kernel, class Signature>
+struct compiled;
+template <class Kernel, class R, class... Args>
+struct compiled<Kernel, R(Args...)> {
+  static ORBIS_UNFUSED R on_portable(Args... args) {
+    return Kernel::template run<portable>(static_cast<Args&&>(args)...);
+  }
+#if ORBIS_X86
+  static ORBIS_UNFUSED ORBIS_TARGET_POPCNT R on_popcnt(Args... args) {
+    return Kernel::template run<popcnt>(static_cast<Args&&>(args)...);
+  }
+  static ORBIS_UNFUSED ORBIS_TARGET_AVX2 R on_avx2(Args... args) {
+    return Kernel::template run<avx2>(static_cast<Args&&>(args)...);
+  }
+  static ORBIS_UNFUSED ORBIS_TARGET_AVX512 R on_avx512(Args... args) {
+    return Kernel::template run<avx512>(static_cast<Args&&>(args)...);
+  }
+#endif
+};
+
+template <class T, class... List>
+inline constexpr bool is_one_of = (std::is_same_v<T, List> || ...);
+
+}  // namespace detail
+
+/// The code of a kernel for the best of `Targets` that neither `highest` nor the processor excludes.
+///
+/// `Kernel` has a static member template `run<Target>`, declared ORBIS_ALWAYS_INLINE, that can be called as
+/// `Signature` says; no parameter is a vector. It is compiled for `portable` always and for every other one of
+/// `Targets`; where none is named: `avx2` and `avx512`.
+template <class Kernel, class Signature, target... Targets>
+[[nodiscard]] Signature* kernel(level highest = level::avx512) noexcept {
+  if constexpr (sizeof...(Targets) == 0) {
+    return kernel<Kernel, Signature, avx2, avx512>(highest);
+  } else {
+    using code = detail::compiled<Kernel, Signature>;
+#if ORBIS_X86
+    const level best = std::min(highest, best_level());
+    if constexpr (detail::is_one_of<avx512, Targets...>)
+      if (best >= level::avx512) return code::on_avx512;
+    if constexpr (detail::is_one_of<avx2, Targets...>)
+      if (best >= level::avx2) return code::on_avx2;
+    if constexpr (detail::is_one_of<popcnt, Targets...>)
+      if (best >= level::popcnt) return code::on_popcnt;
+#else
+    static_cast<void>(highest);
+#endif
+    return code::on_portable;
+  }
+}
+
+}  // namespace orbis::simd

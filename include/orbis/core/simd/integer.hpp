@@ -1,0 +1,242 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Functions of integer vectors: saturated sums, averages, sums of products, narrowing in blocks, counts of bits.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <type_traits>
+
+#include <orbis/core/simd/convert.hpp>
+#include <orbis/core/simd/shuffle.hpp>
+#include <orbis/core/simd/vec.hpp>
+
+namespace orbis::simd {
+
+namespace detail {
+
+#if ORBIS_X86
+// One intrinsic for registers of 16, 32 and 64 bytes. SSE2 is the baseline, so that 16 bytes need no attribute.
+#define ORBIS_SIMD_BINARY(name, intrinsic)                                                                       \
+  template <class Out, class A, class B>                                                                         \
+  ORBIS_ALWAYS_INLINE void name##_16(Out& out, const A& a, const B& b) noexcept {                                \
+    out = reinterpret_cast<Out>(_mm_##intrinsic(reinterpret_cast<__m128i>(a), reinterpret_cast<__m128i>(b)));    \
+  }                                                                                                              \
+  template <class Out, class A, class B>                                                                         \
+  ORBIS_TARGET_AVX2 inline void name##_32(Out& out, const A& a, const B& b) noexcept {                           \
+    out = reinterpret_cast<Out>(_mm256_##intrinsic(reinterpret_cast<__m256i>(a), reinterpret_cast<__m256i>(b))); \
+  }                                                                                                              \
+  template <class Out, class A, class B>                                                                         \
+  ORBIS_TARGET_AVX512 inline void name##_64(Out& out, const A& a, const B& b) noexcept {                         \
+    out = reinterpret_cast<Out>(_mm512_##intrinsic(reinterpret_cast<__m512i>(a), reinterpret_cast<__m512i>(b))); \
+  }                                                                                                              \
+  template <class Out, class A, class B>                                                                         \
+  ORBIS_ALWAYS_INLINE void name(Out& out, const A& a, const B& b) noexcept {                                     \
+    if constexpr (sizeof(a) == 64)                                                                               \
+      name##_64(out, a, b);                                                                                      \
+    else if constexpr (sizeof(a) == 32)                                                                          \
+      name##_32(out, a, b);                                                                                      \
+    else                                                                                                         \
+      name##_16(out, a, b);                                                                                      \
+  }
+ORBIS_SIMD_BINARY(add_bytes, adds_epu8)
+ORBIS_SIMD_BINARY(add_words, adds_epu16)
+ORBIS_SIMD_BINARY(subtract_bytes, subs_epu8)
+ORBIS_SIMD_BINARY(subtract_words, subs_epu16)
+ORBIS_SIMD_BINARY(average_bytes, avg_epu8)
+ORBIS_SIMD_BINARY(average_words, avg_epu16)
+ORBIS_SIMD_BINARY(add_products, madd_epi16)
+ORBIS_SIMD_BINARY(pack_words, packus_epi16)
+#undef ORBIS_SIMD_BINARY
+template <class Out, class A, class B>
+ORBIS_TARGET_POPCNT inline void byte_products_16(Out& out, const A& a, const B& b) noexcept {
+  out = reinterpret_cast<Out>(_mm_maddubs_epi16(reinterpret_cast<__m128i>(a), reinterpret_cast<__m128i>(b)));
+}
+template <class Out, class A, class B>
+ORBIS_TARGET_AVX2 inline void byte_products_32(Out& out, const A& a, const B& b) noexcept {
+  out = reinterpret_cast<Out>(_mm256_maddubs_epi16(reinterpret_cast<__m256i>(a), reinterpret_cast<__m256i>(b)));
+}
+template <class Out, class A, class B>
+ORBIS_TARGET_AVX512 inline void byte_products_64(Out& out, const A& a, const B& b) noexcept {
+  out = reinterpret_cast<Out>(_mm512_maddubs_epi16(reinterpret_cast<__m512i>(a), reinterpret_cast<__m512i>(b)));
+}
+template <class V>
+ORBIS_TARGET_AVX2 inline void count_bits_32(V& out, const V& v) noexcept {
+  const auto x = reinterpret_cast<__m256i>(v);
+  const __m256i table =
+      _mm256_setr_epi8(0, 1, 1, 2, 1, 2, 2, 3, 1, 2, 2, 3, 2, 3, 3, 4, 0, 1, 1, 2, 1, 2, 2, 3, 1, 2, 2, 3, 2, 3, 3, 4);
+  const __m256i low = _mm256_set1_epi8(0x0f);
+  const __m256i a = _mm256_shuffle_epi8(table, _mm256_and_si256(x, low));
+  const __m256i b = _mm256_shuffle_epi8(table, _mm256_and_si256(_mm256_srli_epi16(x, 4), low));
+  out = reinterpret_cast<V>(_mm256_sad_epu8(_mm256_add_epi8(a, b), _mm256_setzero_si256()));
+}
+template <class V>
+ORBIS_TARGET_AVX512 inline void count_bits_64(V& out, const V& v) noexcept {
+  const auto x = reinterpret_cast<__m512i>(v);
+  const __m512i table = _mm512_broadcast_i32x4(_mm_setr_epi8(0, 1, 1, 2, 1, 2, 2, 3, 1, 2, 2, 3, 2, 3, 3, 4));
+  const __m512i low = _mm512_set1_epi8(0x0f);
+  const __m512i a = _mm512_shuffle_epi8(table, _mm512_and_si512(x, low));
+  const __m512i b = _mm512_shuffle_epi8(table, _mm512_and_si512(_mm512_srli_epi16(x, 4), low));
+  out = reinterpret_cast<V>(_mm512_sad_epu8(_mm512_add_epi8(a, b), _mm512_setzero_si512()));
+}
+#endif
+
+template <class T>
+concept small_unsigned = std::same_as<T, std::uint8_t> || std::same_as<T, std::uint16_t>;
+
+}  // namespace detail
+
+/// a + b, at most the largest number.
+template <detail::small_unsigned T, std::size_t N, target Target>
+[[nodiscard]] ORBIS_ALWAYS_INLINE vec<T, N, Target> add_saturated(const vec<T, N, Target>& a,
+                                                                  const vec<T, N, Target>& b) noexcept {
+  using V = vec<T, N, Target>;
+  if constexpr (!V::is_native) {
+    return {add_saturated(a.v.low, b.v.low), add_saturated(a.v.high, b.v.high)};
+  } else if constexpr (ORBIS_X86 && sizeof(a.v) >= 16) {
+    V out;
+#if ORBIS_X86
+    if constexpr (sizeof(T) == 1)
+      detail::add_bytes(out.v, a.v, b.v);
+    else
+      detail::add_words(out.v, a.v, b.v);
+#endif
+    return out;
+  } else {
+    return a + min(b, ~a);
+  }
+}
+/// a - b, at least zero.
+template <detail::small_unsigned T, std::size_t N, target Target>
+[[nodiscard]] ORBIS_ALWAYS_INLINE vec<T, N, Target> subtract_saturated(const vec<T, N, Target>& a,
+                                                                       const vec<T, N, Target>& b) noexcept {
+  using V = vec<T, N, Target>;
+  if constexpr (!V::is_native) {
+    return {subtract_saturated(a.v.low, b.v.low), subtract_saturated(a.v.high, b.v.high)};
+  } else if constexpr (ORBIS_X86 && sizeof(a.v) >= 16) {
+    V out;
+#if ORBIS_X86
+    if constexpr (sizeof(T) == 1)
+      detail::subtract_bytes(out.v, a.v, b.v);
+    else
+      detail::subtract_words(out.v, a.v, b.v);
+#endif
+    return out;
+  } else {
+    return max(a, b) - b;
+  }
+}
+/// (a + b + 1) / 2, rounded down, without overflow.
+template <detail::small_unsigned T, std::size_t N, target Target>
+[[nodiscard]] ORBIS_ALWAYS_INLINE vec<T, N, Target> average(const vec<T, N, Target>& a,
+                                                            const vec<T, N, Target>& b) noexcept {
+  using V = vec<T, N, Target>;
+  if constexpr (!V::is_native) {
+    return {average(a.v.low, b.v.low), average(a.v.high, b.v.high)};
+  } else if constexpr (ORBIS_X86 && sizeof(a.v) >= 16) {
+    V out;
+#if ORBIS_X86
+    if constexpr (sizeof(T) == 1)
+      detail::average_bytes(out.v, a.v, b.v);
+    else
+      detail::average_words(out.v, a.v, b.v);
+#endif
+    return out;
+  } else {
+    return (a | b) - ((a ^ b) >> 1);
+  }
+}
+
+/// Lane i is a[2 i] * b[2 i] + a[2 i + 1] * b[2 i + 1]. Vectors of at least 16 bytes.
+template <std::size_t N, target Target>
+[[nodiscard]] ORBIS_ALWAYS_INLINE vec<std::int32_t, N / 2, Target> multiply_add_pairs(
+    const vec<std::int16_t, N, Target>& a, const vec<std::int16_t, N, Target>& b) noexcept {
+  using out = vec<std::int32_t, N / 2, Target>;
+  if constexpr (!vec<std::int16_t, N, Target>::is_native) {
+    return {multiply_add_pairs(a.v.low, b.v.low), multiply_add_pairs(a.v.high, b.v.high)};
+#if ORBIS_X86
+  } else if constexpr (sizeof(a.v) >= 16) {
+    out r;
+    detail::add_products(r.v, a.v, b.v);
+    return r;
+#endif
+  } else {
+    const auto x = bits_as<std::int32_t>(a), y = bits_as<std::int32_t>(b);
+    const out low = ((x << 16) >> 16) * ((y << 16) >> 16), high = (x >> 16) * (y >> 16);
+    return low + high;
+  }
+}
+/// Lane i is a[2 i] * b[2 i] + a[2 i + 1] * b[2 i + 1]. Vectors of at least 16 bytes. @pre this fits into 16 bits
+template <std::size_t N, target Target>
+[[nodiscard]] ORBIS_ALWAYS_INLINE vec<std::int16_t, N / 2, Target> multiply_add_pairs(
+    const vec<std::uint8_t, N, Target>& a, const vec<std::int8_t, N, Target>& b) noexcept {
+  using out = vec<std::int16_t, N / 2, Target>;
+  if constexpr (!vec<std::uint8_t, N, Target>::is_native) {
+    return {multiply_add_pairs(a.v.low, b.v.low), multiply_add_pairs(a.v.high, b.v.high)};
+#if ORBIS_X86
+  } else if constexpr (sizeof(a.v) >= 16 && Target::needs >= level::popcnt) {
+    out r;
+    if constexpr (sizeof(a.v) == 64)
+      detail::byte_products_64(r.v, a.v, b.v);
+    else if constexpr (sizeof(a.v) == 32)
+      detail::byte_products_32(r.v, a.v, b.v);
+    else
+      detail::byte_products_16(r.v, a.v, b.v);
+    return r;
+#endif
+  } else {
+    const auto x = bits_as<std::int16_t>(a), y = bits_as<std::int16_t>(b);
+    const out low = (x & 255) * ((y << 8) >> 8),
+              high = bits_as<std::int16_t>(bits_as<std::uint16_t>(x) >> 8) * (y >> 8);
+    return low + high;
+  }
+}
+
+/// In each 16 bytes: the eight lanes of a, then the eight of b, as bytes between 0 and 255. One instruction. Undoes
+/// zip_low_in_blocks and zip_high_in_blocks. Vectors of at least 16 bytes.
+template <std::size_t N, target Target>
+[[nodiscard]] ORBIS_ALWAYS_INLINE vec<std::uint8_t, 2 * N, Target> narrow_in_blocks(
+    const vec<std::int16_t, N, Target>& a, const vec<std::int16_t, N, Target>& b) noexcept {
+  using words = vec<std::int16_t, N, Target>;
+  using out = vec<std::uint8_t, 2 * N, Target>;
+  if constexpr (!words::is_native) {
+    return {narrow_in_blocks(a.v.low, b.v.low), narrow_in_blocks(a.v.high, b.v.high)};
+  } else {
+    out r;
+#if ORBIS_X86
+    detail::pack_words(r.v, a.v, b.v);
+#else
+    static_assert(N == 8);
+    const auto bytes = [](const words& w)
+                           ORBIS_INLINE_LAMBDA { return convert<std::uint8_t>(min(max(w, words(0)), words(255))); };
+    r = out(bytes(a), bytes(b));
+#endif
+    return r;
+  }
+}
+
+/// For each lane the number of its ones (W. Mula, N. Kurz, D. Lemire, "Faster population counts using AVX2
+/// instructions", The Computer Journal 2018). A few instructions for each register.
+template <std::size_t N, target Target>
+[[nodiscard]] ORBIS_ALWAYS_INLINE vec<std::uint64_t, N, Target> count_bits(
+    const vec<std::uint64_t, N, Target>& a) noexcept {
+  using V = vec<std::uint64_t, N, Target>;
+  if constexpr (!V::is_native) {
+    return {count_bits(a.v.low), count_bits(a.v.high)};
+#if ORBIS_X86
+  } else if constexpr (sizeof(a.v) == 64) {
+    V out;
+    detail::count_bits_64(out.v, a.v);
+    return out;
+  } else if constexpr (sizeof(a.v) == 32) {
+    V out;
+    detail::count_bits_32(out.v, a.v);
+    return out;
+#endif
+  } else {
+    return V::generate([&](std::size_t i) ORBIS_INLINE_LAMBDA { return std::uint64_t{ones<Target>(a.v[i])}; });
+  }
+}
+
+}  // namespace orbis::simd

@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Which instruction sets the processor has, and how a test forces a lower one.
+///
+/// Public interfaces do not name a level: every kernel runs at `simd::best_level()`, and all levels give the same
+/// bits. A test of a component checks that by running the same public call under a `simd::level_limit`:
+///
+/// @code
+///   for (const simd::level l : simd::available_levels()) {
+///     const simd::level_limit limit{l};  // while it lives, kernels chosen in any thread use at most l
+///     CHECK(extract(image) == expected);
+///   }
+/// @endcode
+///
+/// An object that chooses its kernels when it is constructed must be constructed under the limit. The limit is the
+/// only thing that is shared between threads here; the library itself never sets it.
+#pragma once
+
+#include <algorithm>
+#include <atomic>
+#include <vector>
+
+#if defined(__x86_64__) && (defined(__GNUC__) || defined(__clang__))
+#define ORBIS_X86 1
+/// Compiles one function for more than the baseline instruction set.
+#define ORBIS_TARGET(features) __attribute__((target(features)))
+#else
+#define ORBIS_X86 0
+#define ORBIS_TARGET(features)
+#endif
+
+namespace orbis::simd {
+
+/// Instruction sets that kernels are compiled for, each including the ones before it.
+enum class level {
+  portable,  ///< what the compiler was told to assume; SSE2 on x86-64, NEON on ARM
+  popcnt,    ///< + SSE4.2, POPCNT
+  avx2,      ///< + AVX2, FMA, BMI
+  avx512     ///< + AVX-512 F, BW, DQ, VL
+};
+
+/// The best level that this processor has. Cheap (a few loads) after the first call.
+[[nodiscard]] inline level detected() noexcept {
+#if ORBIS_X86
+  static const level best = [] {
+    __builtin_cpu_init();
+    if (!__builtin_cpu_supports("popcnt") || !__builtin_cpu_supports("sse4.2")) return level::portable;
+    if (!__builtin_cpu_supports("avx2") || !__builtin_cpu_supports("fma") || !__builtin_cpu_supports("bmi2"))
+      return level::popcnt;
+    if (!__builtin_cpu_supports("avx512f") || !__builtin_cpu_supports("avx512bw") ||
+        !__builtin_cpu_supports("avx512dq") || !__builtin_cpu_supports("avx512vl"))
+      return level::avx2;
+    return level::avx512;
+  }();
+  return best;
+#else
+  return level::portable;
+#endif
+}
+
+namespace detail {
+inline std::atomic<level> highest_level{level::avx512};
+}  // namespace detail
+
+/// The level that kernels run at: the processor's best one, unless a test limits it.
+[[nodiscard]] inline level best_level() noexcept {
+  return std::min(detected(), detail::highest_level.load(std::memory_order_relaxed));
+}
+
+/// For tests: while it lives, `best_level()` is at most `highest`, in all threads. Limits nest; they must end in the
+/// reverse order.
+class level_limit {
+ public:
+  explicit level_limit(level highest) noexcept : before_{detail::highest_level.exchange(highest)} {}
+  ~level_limit() { detail::highest_level.store(before_); }
+  level_limit(const level_limit&) = delete;
+  level_limit& operator=(const level_limit&) = delete;
+
+ private:
+  level before_;
+};
+
+/// For tests: all levels that this processor has, from `portable` up.
+[[nodiscard]] inline std::vector<level> available_levels() {
+  std::vector<level> levels;
+  for (const level l : {level::portable, level::popcnt, level::avx2, level::avx512})
+    if (l <= detected()) levels.push_back(l);
+  return levels;
+}
+
+/// The variants of one kernel; those that do not exist are null.
+template <class Signature>
+struct variants {
+  Signature* portable;
+  Signature* popcnt = nullptr;
+  Signature* avx2 = nullptr;
+  Signature* avx512 = nullptr;
+};
+
+/// The best existing variant that neither `wanted` nor the processor nor a test's limit excludes.
+template <class Signature>
+[[nodiscard]] Signature* select(level wanted, const variants<Signature>& v) noexcept {
+  const level best = std::min(wanted, best_level());
+  if (best >= level::avx512 && v.avx512 != nullptr) return v.avx512;
+  if (best >= level::avx2 && v.avx2 != nullptr) return v.avx2;
+  if (best >= level::popcnt && v.popcnt != nullptr) return v.popcnt;
+  return v.portable;
+}
+
+}  // namespace orbis::simd
