@@ -36,9 +36,9 @@ removal beyond_mean(const std::vector<double>& score, double alpha) {
 /// Above the median by `times` the deviation that the median distance to it suggests.
 removal beyond_median(const std::vector<double>& score, double times) {
   std::vector<double> v = score;
-  const double median = cloud::quantile(v, 0.5);
+  const double median = cloud::detail::quantile(v, 0.5);
   for (double& x : v) x = std::abs(x - median);
-  const double limit = median + times * 1.4826 * cloud::quantile(v, 0.5);
+  const double limit = median + times * 1.4826 * cloud::detail::quantile(v, 0.5);
   removal out(score.size());
   for (std::size_t i = 0; i != score.size(); ++i) out[i] = score[i] > limit;
   return out;
@@ -58,7 +58,7 @@ std::vector<double> at_one_metre(std::vector<double> score, const labelled_case&
 removal lonely(const neighborhoods& n, double times, std::size_t enough, bool by_range) {
   const auto& ranges = n.of->ranges;
   std::vector<double> sorted(ranges.begin(), ranges.end());
-  const double middle = ranges.empty() ? 1 : cloud::quantile(sorted, 0.5);
+  const double middle = ranges.empty() ? 1 : cloud::detail::quantile(sorted, 0.5);
   removal out(n.of->points.size());
   for (std::size_t i = 0; i != out.size(); ++i) {
     const double scale = by_range && !ranges.empty() ? ranges[i] / middle : 1;
@@ -102,7 +102,7 @@ removal rays(const neighborhoods& n) {
 neighborhoods::neighborhoods(const labelled_case& c) : of{&c}, table{cloud::all_knn(par, c.points, table_width)} {
   std::vector<double> sixth;
   for (std::size_t i = 0; i != c.points.size(); ++i) sixth.push_back(table[i][5].distance);
-  spacing = cloud::quantile(sixth, 0.5);
+  spacing = cloud::detail::quantile(sixth, 0.5);
   if (c.views.empty()) return;
   passed_through.assign(c.points.size(), 1);
   for (const std::uint32_t i : cloud::ray_evidence_inliers(par, c.points, c.views, c.camera)) passed_through[i] = 0;

@@ -1,24 +1,41 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Point clouds: neighbours, filters, automatic selection, voxel grids.
+/// Point clouds: neighbours, outlier filters, automatic selection of filters, voxel grids.
+///
+/// | header                     | what it is for                                                              |
+/// | -------------------------- | --------------------------------------------------------------------------- |
+/// | `all_knn.hpp`              | k nearest neighbours of every point, and the mean distance to them          |
+/// | `cluster.hpp`              | filter: small groups of points far from the surface                         |
+/// | `extract.hpp`              | copy points by index; points inside a box; what happens to non-finite points |
+/// | `filter_chain.hpp`         | several filters in order, as data                                           |
+/// | `filter_choice.hpp`        | options and result of the automatic selection, with its evidence            |
+/// | `flying_pixels.hpp`        | depth images without the wrong pixels at edges                              |
+/// | `leaf_search.hpp`          | nearest neighbours of single points, without further libraries              |
+/// | `log_statistical.hpp`      | filter: mean neighbour distance relative to its median                      |
+/// | `nanoflann.hpp`            | the same by nanoflann's k-d tree; to be included by name, needs nanoflann   |
+/// | `neighbors.hpp`            | concepts of a nearest-neighbour search and of what gathers its results      |
+/// | `radius.hpp`               | filter: points with too few neighbours within a radius                      |
+/// | `ray_evidence.hpp`         | filter: points that the rays of depth images pass through                   |
+/// | `ray_evidence_counter.hpp` | the counts behind that filter, image by image                               |
+/// | `select.hpp`               | choose and apply filters automatically                                      |
+/// | `sensor_origins.hpp`       | where points were seen from                                                 |
+/// | `statistical.hpp`          | filter: mean neighbour distance above mu + alpha sigma; also relative to range |
+/// | `voxel_grid.hpp`           | one point for each voxel                                                    |
+/// | `voxel_sums.hpp`           | centroids of voxels from which measurements can be removed again            |
 #pragma once
 
 #include <orbis/cloud/all_knn.hpp>
 #include <orbis/cloud/cluster.hpp>
-#include <orbis/cloud/decision.hpp>
 #include <orbis/cloud/extract.hpp>
 #include <orbis/cloud/filter_chain.hpp>
-#include <orbis/cloud/filter_mode.hpp>
+#include <orbis/cloud/filter_choice.hpp>
 #include <orbis/cloud/flying_pixels.hpp>
 #include <orbis/cloud/leaf_search.hpp>
 #include <orbis/cloud/log_statistical.hpp>
-#include <orbis/cloud/mean_knn_distance.hpp>
-#include <orbis/cloud/nanoflann.hpp>
 #include <orbis/cloud/neighbors.hpp>
-#include <orbis/cloud/pass_through.hpp>
 #include <orbis/cloud/radius.hpp>
-#include <orbis/cloud/range_statistical.hpp>
 #include <orbis/cloud/ray_evidence.hpp>
+#include <orbis/cloud/ray_evidence_counter.hpp>
 #include <orbis/cloud/select.hpp>
 #include <orbis/cloud/sensor_origins.hpp>
 #include <orbis/cloud/statistical.hpp>

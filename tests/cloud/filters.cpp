@@ -13,7 +13,6 @@
 #include <orbis/cloud/cluster.hpp>
 #include <orbis/cloud/log_statistical.hpp>
 #include <orbis/cloud/radius.hpp>
-#include <orbis/cloud/range_statistical.hpp>
 #include <orbis/cloud/statistical.hpp>
 
 #include "cloud/clouds.hpp"

@@ -275,7 +275,7 @@ TEST_CASE("ray evidence can be watched and stopped") {
 
 TEST_CASE("counts end at their largest number") {
   for (const auto level : {orbis::simd::level::portable, orbis::simd::level::avx2, orbis::simd::level::avx512}) {
-    std::vector<std::uint16_t> counters(orbis::cloud::point_blocks::block_size, 65534);
+    std::vector<std::uint16_t> counters(orbis::cloud::detail::point_blocks::block_size, 65534);
     std::array<std::uint16_t, orbis::cloud::detail::block_verdict::words> words{};
     words.fill(0xa5c3);
     const auto kernels = orbis::cloud::detail::ray_kernels_at(level);

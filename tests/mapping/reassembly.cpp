@@ -95,7 +95,7 @@ TEST_CASE("rays leave a real kitchen its surfaces") {
   CHECK(removed > 0.005);
   CHECK(removed < 0.05);
 
-  orbis::cloud::voxel_hash left{0.02};
+  orbis::cloud::detail::voxel_hash left{0.02};
   for (const std::uint32_t i : inliers) left.insert(*left.key_of(cloud.points[i]));
   const auto is_covered = [&](const orbis::vec3& p) {
     const auto key = *left.key_of(p);

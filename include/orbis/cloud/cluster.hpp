@@ -22,9 +22,8 @@
 #include <vector>
 
 #include <orbis/cloud/all_knn.hpp>
-#include <orbis/cloud/decision.hpp>
+#include <orbis/cloud/detail/select/decision.hpp>
 #include <orbis/cloud/leaf_search.hpp>
-#include <orbis/cloud/mean_knn_distance.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/point.hpp>
 

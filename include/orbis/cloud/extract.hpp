@@ -1,15 +1,27 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The part of a cloud that a filter kept.
+/// Parts of a cloud: the points with given indices, the points inside a box, and what filters do with points
+/// that are not finite.
 #pragma once
 
 #include <cassert>
+#include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <span>
+#include <vector>
 
+#include <orbis/core/point.hpp>
 #include <orbis/core/point_cloud.hpp>
+#include <orbis/core/types.hpp>
 
 namespace orbis::cloud {
+
+/// What a filter does with points that are not finite. They never count in its statistics.
+enum class non_finite {
+  drop,  ///< they are outliers
+  keep   ///< they are inliers, so that an organised cloud keeps its holes
+};
 
 /// A copy of the points, and colours if there are any, with the given indices, in their order.
 /// @pre every index < cloud.size()
@@ -23,6 +35,28 @@ namespace orbis::cloud {
     if (cloud.has_colors()) out.colors.push_back(cloud.colors[i]);
   }
   return out;
+}
+
+/// A box along the axes, its faces included; unlimited by default.
+struct pass_through_options {
+  vec3 low = vec3::Constant(-std::numeric_limits<double>::infinity());  ///< metres
+  vec3 high = vec3::Constant(std::numeric_limits<double>::infinity());  ///< metres
+};
+
+/// The indices, ascending, of the finite points inside the box. O(n).
+template <point_range Points>
+[[nodiscard]] std::vector<std::uint32_t> pass_through_inliers(const Points& points,
+                                                              const pass_through_options& options = {}) {
+  std::vector<std::uint32_t> inliers;
+  std::uint32_t i = 0;
+  for (const auto& point : points) {
+    const auto p = coordinates<double>(point);
+    const bool inside = p[0] >= options.low.x() && p[0] <= options.high.x() && p[1] >= options.low.y() &&
+                        p[1] <= options.high.y() && p[2] >= options.low.z() && p[2] <= options.high.z();
+    if (inside && is_finite(point)) inliers.push_back(i);
+    ++i;
+  }
+  return inliers;
 }
 
 }  // namespace orbis::cloud

@@ -14,9 +14,9 @@
 #include <utility>
 #include <vector>
 
-#include <orbis/cloud/detail/knn/all_knn_kernels.hpp>
-#include <orbis/cloud/detail/knn/all_knn_leaves.hpp>
-#include <orbis/cloud/detail/knn/all_knn_search.hpp>
+#include <orbis/cloud/detail/knn/knn_kernels.hpp>
+#include <orbis/cloud/detail/knn/leaf_hierarchy.hpp>
+#include <orbis/cloud/detail/knn/nearest_search.hpp>
 #include <orbis/cloud/neighbors.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/point.hpp>

@@ -19,8 +19,8 @@
 #include <utility>
 #include <vector>
 
-#include <orbis/cloud/decision.hpp>
-#include <orbis/cloud/mean_knn_distance.hpp>
+#include <orbis/cloud/all_knn.hpp>
+#include <orbis/cloud/detail/select/decision.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/point.hpp>
 

@@ -17,9 +17,9 @@
 
 #include <nanoflann.hpp>
 
-#include <orbis/cloud/decision.hpp>
-#include <orbis/cloud/detail/knn/all_knn_leaves.hpp>
+#include <orbis/cloud/detail/knn/leaf_hierarchy.hpp>
 #include <orbis/cloud/detail/knn/squared_distance.hpp>
+#include <orbis/cloud/detail/select/decision.hpp>
 #include <orbis/cloud/neighbors.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/point.hpp>
@@ -147,7 +147,7 @@ class nanoflann_search {
     using DistanceType = scalar;
     explicit metric(const dataset& d) : data{&d} {}
     [[nodiscard]] scalar evalMetric(const scalar* a, std::uint32_t b, std::size_t /*dimension*/) const {
-      return squared_distance<scalar>({a[0], a[1], a[2]}, data->position(b));
+      return detail::squared_distance<scalar>({a[0], a[1], a[2]}, data->position(b));
     }
     template <class A, class B>
     [[nodiscard]] scalar accum_dist(A a, B b, std::size_t /*axis*/) const {

@@ -14,12 +14,12 @@
 #include <ranges>
 #include <vector>
 
-#include <orbis/cloud/decision.hpp>
-#include <orbis/cloud/detail/knn/all_knn_kernels.hpp>
-#include <orbis/cloud/detail/knn/all_knn_leaves.hpp>
-#include <orbis/cloud/detail/knn/all_knn_search.hpp>
+#include <orbis/cloud/detail/knn/knn_kernels.hpp>
+#include <orbis/cloud/detail/knn/leaf_hierarchy.hpp>
+#include <orbis/cloud/detail/knn/nearest_search.hpp>
 #include <orbis/cloud/detail/knn/reported_chunks.hpp>
 #include <orbis/cloud/detail/knn/squared_distance.hpp>
+#include <orbis/cloud/detail/select/decision.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/point.hpp>
 #include <orbis/core/progress.hpp>

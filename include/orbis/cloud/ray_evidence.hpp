@@ -16,8 +16,8 @@
 #include <vector>
 
 #include <orbis/camera/model.hpp>
-#include <orbis/cloud/decision.hpp>
-#include <orbis/cloud/detail/rays/ray_evidence_counter.hpp>
+#include <orbis/cloud/detail/select/decision.hpp>
+#include <orbis/cloud/ray_evidence_counter.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/point.hpp>
 #include <orbis/core/progress.hpp>

@@ -32,12 +32,13 @@
 
 #include <orbis/camera/model.hpp>
 #include <orbis/camera/pinhole.hpp>
-#include <orbis/cloud/decision.hpp>
-#include <orbis/cloud/detail/select/select_density.hpp>
-#include <orbis/cloud/detail/select/select_evidence.hpp>
-#include <orbis/cloud/detail/select/select_surroundings.hpp>
-#include <orbis/cloud/detail/select/select_views.hpp>
+#include <orbis/cloud/detail/select/decision.hpp>
+#include <orbis/cloud/detail/select/density_judge.hpp>
+#include <orbis/cloud/detail/select/in_words.hpp>
+#include <orbis/cloud/detail/select/surroundings.hpp>
+#include <orbis/cloud/detail/select/view_judge.hpp>
 #include <orbis/cloud/filter_chain.hpp>
+#include <orbis/cloud/filter_choice.hpp>
 #include <orbis/cloud/radius.hpp>
 #include <orbis/cloud/ray_evidence.hpp>
 #include <orbis/cloud/sensor_origins.hpp>

@@ -13,7 +13,7 @@
 #include <span>
 #include <vector>
 
-#include <orbis/cloud/decision.hpp>
+#include <orbis/cloud/detail/select/decision.hpp>
 #include <orbis/cloud/detail/voxels/voxel_hash.hpp>
 #include <orbis/core/image.hpp>
 #include <orbis/core/point.hpp>
@@ -79,7 +79,7 @@ class voxel_accumulator {
     std::array<std::uint64_t, 3> color{};
     std::uint32_t count = 0;
   };
-  voxel_hash voxels_;
+  detail::voxel_hash voxels_;
   std::vector<sum> sums_;
 };
 
@@ -121,7 +121,7 @@ template <point_range Points, voxel_choice Choice = voxel_first>
 [[nodiscard]] std::vector<std::uint32_t> voxel_grid_indices(const Points& points,
                                                             const voxel_grid_options& options = {},
                                                             const Choice& choice = {}) {
-  voxel_hash voxels{options.size};
+  detail::voxel_hash voxels{options.size};
   std::vector<std::uint32_t> chosen;
   std::uint32_t i = 0;
   for (const auto& p : points) {

@@ -106,13 +106,13 @@ class voxel_measurements {
  private:
   friend class voxel_sums;
   struct run {
-    voxel_key brick;
+    detail::voxel_key brick;
     std::uint32_t begin;  ///< to where the next one begins
   };
   double steps_per_metre_;
   std::vector<detail::voxel_item> items_;
   std::vector<run> runs_;
-  voxel_key last_{};  ///< of the last run
+  detail::voxel_key last_{};  ///< of the last run
   std::size_t without_voxel_ = 0;
 };
 
@@ -121,7 +121,7 @@ class voxel_measurements {
 /// 50 bytes for each voxel.
 class voxel_sums {
   [[nodiscard]] auto key_of() const {
-    return [this](std::uint32_t number) -> const voxel_key& { return bricks_[number].key; };
+    return [this](std::uint32_t number) -> const detail::voxel_key& { return bricks_[number].key; };
   }
 
  public:
@@ -177,8 +177,8 @@ class voxel_sums {
       if (bricks_[b].voxels.size() != 0) out.bricks_.push_back(b);
     }
     std::ranges::sort(out.bricks_, [&](std::uint32_t a, std::uint32_t b) {
-      const voxel_key& i = bricks_[a].key;
-      const voxel_key& j = bricks_[b].key;
+      const detail::voxel_key& i = bricks_[a].key;
+      const detail::voxel_key& j = bricks_[b].key;
       return std::array{i[2], i[1], i[0]} < std::array{j[2], j[1], j[0]};
     });
     out.first_.resize(bricks_.size());
@@ -196,24 +196,25 @@ class voxel_sums {
     point_cloud out;
     out.points.resize(occupied_);
     if (with_colors) out.colors.resize(occupied_);
-    for_each_voxel(policy, places, [&](std::size_t place, const voxel_key& voxel, const detail::voxel_sum& sum) {
-      for (std::size_t a = 0; a != 3; ++a) {
-        // An offset stands for the middle of its 1/1024.
-        const double within = (sum.offset[a] / static_cast<double>(sum.count) + 0.5) / 1024.0;
-        out.points[place][static_cast<Eigen::Index>(a)] = static_cast<float>((voxel[a] + within) * size_);
-      }
-      const auto channel = [&](std::size_t c) {
-        return static_cast<std::uint8_t>((sum.color[c] + sum.count / 2) / sum.count);  // rounded
-      };
-      if (with_colors) out.colors[place] = {channel(0), channel(1), channel(2)};
-    });
+    for_each_voxel(
+        policy, places, [&](std::size_t place, const detail::voxel_key& voxel, const detail::voxel_sum& sum) {
+          for (std::size_t a = 0; a != 3; ++a) {
+            // An offset stands for the middle of its 1/1024.
+            const double within = (sum.offset[a] / static_cast<double>(sum.count) + 0.5) / 1024.0;
+            out.points[place][static_cast<Eigen::Index>(a)] = static_cast<float>((voxel[a] + within) * size_);
+          }
+          const auto channel = [&](std::size_t c) {
+            return static_cast<std::uint8_t>((sum.color[c] + sum.count / 2) / sum.count);  // rounded
+          };
+          if (with_colors) out.colors[place] = {channel(0), channel(1), channel(2)};
+        });
     return out;
   }
   /// The mean of the distances that each voxel was measured from, metres. O(voxels)
   template <execution_policy Policy>
   [[nodiscard]] std::vector<float> ranges(const Policy& policy, const order& places) const {
     std::vector<float> out(occupied_);
-    for_each_voxel(policy, places, [&](std::size_t place, const voxel_key&, const detail::voxel_sum& sum) {
+    for_each_voxel(policy, places, [&](std::size_t place, const detail::voxel_key&, const detail::voxel_sum& sum) {
       out[place] = static_cast<float>(static_cast<double>(sum.range) / (1000.0 * sum.count));
     });
     return out;
@@ -222,7 +223,7 @@ class voxel_sums {
  private:
   static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
   struct brick {
-    voxel_key key{};
+    detail::voxel_key key{};
     std::uint32_t first_run = none;  ///< while measurements are applied
     detail::voxel_brick voxels{};
   };
@@ -234,16 +235,16 @@ class voxel_sums {
       std::size_t place = places.first_[places.bricks_[i]];
       b.voxels.for_each([&](std::uint32_t cell, const detail::voxel_sum& sum) {
         f(place++,
-          voxel_key{b.key[0] * 8 + static_cast<std::int32_t>(cell & 7U),
-                    b.key[1] * 8 + static_cast<std::int32_t>(cell >> 3U & 7U),
-                    b.key[2] * 8 + static_cast<std::int32_t>(cell >> 6U)},
+          detail::voxel_key{b.key[0] * 8 + static_cast<std::int32_t>(cell & 7U),
+                            b.key[1] * 8 + static_cast<std::int32_t>(cell >> 3U & 7U),
+                            b.key[2] * 8 + static_cast<std::int32_t>(cell >> 6U)},
           sum);
       });
     });
   }
 
   /// The brick with this key, a new one if there is none.
-  std::uint32_t brick_at(const voxel_key& key) {
+  std::uint32_t brick_at(const detail::voxel_key& key) {
     if (const auto found = index_.find(key, key_of())) return *found;
     std::uint32_t number = static_cast<std::uint32_t>(bricks_.size());
     if (free_.empty()) {

@@ -7,6 +7,7 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <cstdio>
 #include <numeric>
 #include <optional>
 #include <ranges>
@@ -66,6 +67,12 @@ struct filtered_indices {
 
 namespace detail {
 
+[[nodiscard]] inline std::string in_millimetres(double metres) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.3g mm", 1e3 * metres);
+  return text;
+}
+
 [[nodiscard]] inline std::vector<std::uint32_t> all_indices(std::size_t count) {
   std::vector<std::uint32_t> all(count);
   std::iota(all.begin(), all.end(), 0U);
@@ -102,14 +109,14 @@ template <execution_policy Policy, point_range Points, class Automatic, class By
       out.inliers = std::move(result.inliers);
       report.mode = {options.statistical};
       report.reason = "asked for; mean distance to " + std::to_string(options.statistical.neighbors) +
-                      " neighbors at most " + cloud::detail::in_words(1e3 * result.threshold) + " mm";
+                      " neighbors at most " + in_millimetres(result.threshold);
       break;
     }
     case filter_kind::radius:
       out.inliers = cloud::radius_inliers(policy, points, options.radius);
       report.mode = {options.radius};
       report.reason = "asked for; at least " + std::to_string(options.radius.min_neighbors) + " neighbors within " +
-                      cloud::detail::in_words(1e3 * options.radius.radius) + " mm";
+                      in_millimetres(options.radius.radius);
       break;
     case filter_kind::log_statistical: {
       cloud::log_statistical_result result = cloud::log_statistical_filter(policy, points, options.log_statistical);
@@ -119,7 +126,7 @@ template <execution_policy Policy, point_range Points, class Automatic, class By
                                          .usual = {result.median, 0},
                                          .threshold = result.threshold}};
       report.reason = "asked for; mean distance to " + std::to_string(options.log_statistical.neighbors) +
-                      " neighbors at most " + cloud::detail::in_words(1e3 * result.threshold_distance) + " mm";
+                      " neighbors at most " + in_millimetres(result.threshold_distance);
       break;
     }
     case filter_kind::cluster: {

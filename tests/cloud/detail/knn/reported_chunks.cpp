@@ -6,7 +6,6 @@
 
 #include <orbis/cloud/all_knn.hpp>
 #include <orbis/cloud/detail/knn/reported_chunks.hpp>
-#include <orbis/cloud/mean_knn_distance.hpp>
 #include <orbis/cloud/radius.hpp>
 #include <orbis/cloud/statistical.hpp>
 

@@ -12,7 +12,7 @@ TEST_CASE("squared distances round after every operation") {
   std::size_t different = 0;
   for (std::size_t i = 0; i != a.size(); ++i) {
     const float d =
-        orbis::cloud::squared_distance<float>({a[i].x(), a[i].y(), a[i].z()}, {b[i].x(), b[i].y(), b[i].z()});
+        orbis::cloud::detail::squared_distance<float>({a[i].x(), a[i].y(), a[i].z()}, {b[i].x(), b[i].y(), b[i].z()});
     if (d != orbis::test::squared(a[i], b[i])) ++different;
   }
   CHECK(different == 0);

@@ -9,7 +9,7 @@
 
 #include "support/catch.hpp"
 
-using orbis::cloud::depth_windows;
+using orbis::cloud::detail::depth_windows;
 
 namespace {
 

@@ -11,7 +11,7 @@
 #include "support/catch.hpp"
 
 using orbis::cloud::all_knn;
-using orbis::cloud::off_plane;
+using orbis::cloud::detail::off_plane;
 
 TEST_CASE("a point in a plane, at an edge, in a volume and beside a surface") {
   orbis::random_bits random{1};
@@ -44,8 +44,8 @@ TEST_CASE("what is usual around is a quantile over neighbours, and of any policy
   std::vector<float> values(cloud.size());
   for (float& v : values) v = static_cast<float>(random.uniform());
   values[7] = std::numeric_limits<float>::quiet_NaN();
-  const orbis::cloud::smoothing_options once{.neighbors = 12, .rounds = 1, .quantile = 0.35};
-  const auto smooth = orbis::cloud::smoothed_over_neighbors(orbis::seq, table, values, once);
+  const orbis::cloud::detail::smoothing_options once{.neighbors = 12, .rounds = 1, .quantile = 0.35};
+  const auto smooth = orbis::cloud::detail::smoothed_over_neighbors(orbis::seq, table, values, once);
   for (std::size_t i = 0; i != cloud.size(); ++i) {
     if (i == 7) {
       CHECK(std::isnan(smooth[i]));
@@ -65,12 +65,12 @@ TEST_CASE("what is usual around is a quantile over neighbours, and of any policy
     const auto n = static_cast<double>(v.size() - 10);
     return squares / n - sum / n * (sum / n);
   };
-  const auto smoother = orbis::cloud::smoothed_over_neighbors(orbis::par.with(3), table, values);
+  const auto smoother = orbis::cloud::detail::smoothed_over_neighbors(orbis::par.with(3), table, values);
   CHECK(spread(smoother) < 0.5 * spread(smooth));
-  auto again = orbis::cloud::smoothed_over_neighbors(orbis::seq, table, values);
+  auto again = orbis::cloud::detail::smoothed_over_neighbors(orbis::seq, table, values);
   again[7] = smoother[7];
   for (std::size_t i = 0; i != again.size(); ++i) {
     if (i != 7) REQUIRE(again[i] == smoother[i]);
   }
-  CHECK(orbis::cloud::smoothed_over_neighbors(orbis::seq, {}, {}).empty());
+  CHECK(orbis::cloud::detail::smoothed_over_neighbors(orbis::seq, {}, {}).empty());
 }

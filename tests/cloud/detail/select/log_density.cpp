@@ -16,23 +16,23 @@ TEST_CASE("the line over log range is found through outliers") {
     const bool outlier = i % 10 == 0;
     spacing.push_back(-5.0 + 1.3 * range.back() + 0.1 * random.normal() + (outlier ? 2.0 : 0.0));
   }
-  const auto line = orbis::cloud::fit_log_line(spacing, range);
+  const auto line = orbis::cloud::detail::fit_log_line(spacing, range);
   REQUIRE(line.has_value());
   CHECK(line->slope == Approx(1.3).margin(0.05));
   CHECK(line->intercept == Approx(-5.0).margin(0.05));
 }
 
 TEST_CASE("a line needs points at several ranges and a slope within reason") {
-  CHECK_FALSE(orbis::cloud::fit_log_line({}, {}).has_value());
+  CHECK_FALSE(orbis::cloud::detail::fit_log_line({}, {}).has_value());
   const std::vector<double> spacing(500, -4.0);
-  CHECK_FALSE(orbis::cloud::fit_log_line(spacing, std::vector<double>(500, 0.3)).has_value());
+  CHECK_FALSE(orbis::cloud::detail::fit_log_line(spacing, std::vector<double>(500, 0.3)).has_value());
   std::vector<double> range;
   std::vector<double> falling;
   for (int i = 0; i != 500; ++i) {
     range.push_back(0.01 * i);
     falling.push_back(-0.02 * i);
   }
-  const auto line = orbis::cloud::fit_log_line(falling, range);
+  const auto line = orbis::cloud::detail::fit_log_line(falling, range);
   REQUIRE(line.has_value());
   CHECK(line->slope == 0.0);
 }
@@ -41,7 +41,7 @@ TEST_CASE("scales of a normal distribution are its standard deviation") {
   orbis::random_bits random{2};
   std::vector<double> values;
   for (int i = 0; i != 20'000; ++i) values.push_back(3.0 + 0.2 * random.normal());
-  const auto b = orbis::cloud::bulk_of(values);
+  const auto b = orbis::cloud::detail::bulk_of(values);
   CHECK(b.median == Approx(3.0).margin(0.01));
   CHECK(b.left_scale == Approx(0.2).epsilon(0.05));
   CHECK(b.right_scale == Approx(0.2).epsilon(0.05));
@@ -51,9 +51,9 @@ TEST_CASE("a valley is seen between two populations and not beside one") {
   orbis::random_bits random{3};
   std::vector<double> values;
   for (int i = 0; i != 10'000; ++i) values.push_back(0.25 * random.normal());
-  CHECK(orbis::cloud::deepest_valley(values, 0.0, 0.6).ratio < 1.6);
+  CHECK(orbis::cloud::detail::deepest_valley(values, 0.0, 0.6).ratio < 1.6);
   for (int i = 0; i != 1000; ++i) values.push_back(2.6 + 0.2 * random.normal());
-  const auto v = orbis::cloud::deepest_valley(values, 0.0, 0.6);
+  const auto v = orbis::cloud::detail::deepest_valley(values, 0.0, 0.6);
   CHECK(v.ratio > 10);
   CHECK(v.position > 0.9);
   CHECK(v.position < 2.0);

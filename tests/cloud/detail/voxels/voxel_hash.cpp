@@ -9,13 +9,13 @@
 #include "support/catch.hpp"
 
 TEST_CASE("voxels are numbered as they come and found again") {
-  orbis::cloud::voxel_hash hash{0.1};
-  std::map<orbis::cloud::voxel_key, std::uint32_t> expected;
+  orbis::cloud::detail::voxel_hash hash{0.1};
+  std::map<orbis::cloud::detail::voxel_key, std::uint32_t> expected;
   orbis::random_bits random{1};
   for (int i = 0; i != 20'000; ++i) {
-    const orbis::cloud::voxel_key key{static_cast<std::int32_t>(random.below(30)) - 15,
-                                      static_cast<std::int32_t>(random.below(30)) - 15,
-                                      static_cast<std::int32_t>(random.below(30)) * 70'000'000};
+    const orbis::cloud::detail::voxel_key key{static_cast<std::int32_t>(random.below(30)) - 15,
+                                              static_cast<std::int32_t>(random.below(30)) - 15,
+                                              static_cast<std::int32_t>(random.below(30)) * 70'000'000};
     const auto number = expected.try_emplace(key, static_cast<std::uint32_t>(expected.size())).first->second;
     CHECK(hash.insert(key) == number);
   }
@@ -25,6 +25,6 @@ TEST_CASE("voxels are numbered as they come and found again") {
 }
 
 TEST_CASE("the voxel of a point is found by rounding down") {
-  const orbis::cloud::voxel_hash hash{0.5};
-  CHECK(hash.key_of(std::vector<double>{-0.1, 0.0, 1.2}) == orbis::cloud::voxel_key{-1, 0, 2});
+  const orbis::cloud::detail::voxel_hash hash{0.5};
+  CHECK(hash.key_of(std::vector<double>{-0.1, 0.0, 1.2}) == orbis::cloud::detail::voxel_key{-1, 0, 2});
 }

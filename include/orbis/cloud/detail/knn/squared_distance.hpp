@@ -8,7 +8,7 @@
 
 #include <orbis/core/rounded.hpp>
 
-namespace orbis::cloud {
+namespace orbis::cloud::detail {
 
 /// `(dx^2 + dy^2) + dz^2`, each operation rounded in `S`: the order in which the common k-d trees
 /// sum, so that thresholds on it select the same points.
@@ -20,4 +20,4 @@ template <std::floating_point S>
   return (rounded_product(dx, dx) + rounded_product(dy, dy)) + rounded_product(dz, dz);
 }
 
-}  // namespace orbis::cloud
+}  // namespace orbis::cloud::detail

@@ -14,7 +14,7 @@
 #include <orbis/core/execution.hpp>
 #include <orbis/core/simd.hpp>
 
-namespace orbis::cloud {
+namespace orbis::cloud::detail {
 
 /// For every pixel the extremes of the measured depths in the square window around it, and the depth
 /// in its middle, metres along the optical axis; and for every tile of `tile` x `tile` pixels the
@@ -37,11 +37,11 @@ class depth_windows {
     const auto height = static_cast<std::size_t>(height_);
     const auto r = static_cast<std::size_t>(radius);
     for (auto* plane : {&nearest_, &farthest_, &middle_, &row_nearest_, &row_farthest_}) plane->resize(width * height);
-    const detail::depth_row_kernels kernels = detail::depth_row_kernels_at(level);
+    const depth_row_kernels kernels = depth_row_kernels_at(level);
     for_each_chunk(policy, height, 32, [&](std::size_t begin, std::size_t end) {
       std::vector<float> padded(width + 2 * r, 0.0F);  // beyond the borders there is no depth
       for (std::size_t y = begin; y != end; ++y) {
-        detail::read_depth_row(kernels, depth, static_cast<int>(y), padded.data() + r);
+        read_depth_row(kernels, depth, static_cast<int>(y), padded.data() + r);
         float* const low = row_nearest_.data() + y * width;
         float* const high = row_farthest_.data() + y * width;
         std::copy_n(padded.data(), width, low);
@@ -114,4 +114,4 @@ class depth_windows {
   std::vector<float> tile_farthest_;
 };
 
-}  // namespace orbis::cloud
+}  // namespace orbis::cloud::detail

@@ -14,8 +14,8 @@
 
 #include <orbis/camera/model.hpp>
 #include <orbis/camera/pinhole.hpp>
-#include <orbis/cloud/detail/knn/point_blocks.hpp>
 #include <orbis/cloud/detail/rays/depth_windows.hpp>
+#include <orbis/cloud/detail/rays/point_blocks.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/core/types.hpp>
 

@@ -23,9 +23,7 @@
 #include <orbis/core/se3.hpp>
 #include <orbis/core/types.hpp>
 
-namespace orbis::cloud {
-
-namespace detail {
+namespace orbis::cloud::detail {
 
 /// The depths of the eight pixels around one, opposite ones at i and 7 - i; 0 outside of the image.
 template <camera::depth_source Depth>
@@ -58,8 +56,6 @@ template <camera::depth_source Depth>
   return false;
 }
 
-}  // namespace detail
-
 /// The depth image in metres with stray pixels replaced: one with which fewer than two of those around it
 /// agree, within `margin + margin_growth z^2`, gets their median, or none where fewer than five have a
 /// depth. A stray pixel would testify for itself, and silence the rays of all pixels around it. O(pixels).
@@ -73,8 +69,8 @@ void settled_depth(const Policy& policy, const Depth& depth, float margin, float
       const float z = depth(x, y);
       out(x, y) = z;
       if (!(z > 0)) continue;
-      std::array<float, 8> around = detail::depths_around(depth, x, y);
-      if (detail::is_settled(z, around, margin + margin_growth * z * z)) continue;
+      std::array<float, 8> around = depths_around(depth, x, y);
+      if (is_settled(z, around, margin + margin_growth * z * z)) continue;
       const auto end = std::remove_if(around.begin(), around.end(), [](float d) { return !(d > 0); });
       const auto count = end - around.begin();
       out(x, y) = 0;
@@ -116,8 +112,6 @@ struct view_trust {
   double usual_conflict = 0;  ///< the median over the trusted views
 };
 
-namespace detail {
-
 /// What one view says of a tile of another: how many of its samples it passes through and how many it supports.
 struct view_verdict {
   std::uint32_t of;
@@ -135,8 +129,6 @@ struct view_verdict {
   if (values.size() < 10) return 0;
   return quantile(values, 0.5);
 }
-
-}  // namespace detail
 
 /// Finds views whose pose is wrong by what they say of each other. A sample of the pixels of each is
 /// tested by all others (`ray_evidence`), tile by tile: a wrong pose is contradicted all over the
@@ -165,8 +157,8 @@ template <execution_policy Policy, posed_depth_range Views, camera::camera_model
         const int x = (2 * i + 1) * camera.width() / (2 * options.samples);
         const int y = (2 * j + 1) * camera.height() / (2 * options.samples);
         const float z = view.depth(x, y);
-        if (!(z > 0) || !detail::is_settled(z, detail::depths_around(view.depth, x, y),
-                                            evidence.margin + evidence.margin_growth * z * z))
+        if (!(z > 0) ||
+            !is_settled(z, depths_around(view.depth, x, y), evidence.margin + evidence.margin_growth * z * z))
           continue;
         const auto ray = camera.unproject({x, y});
         if (!ray) continue;
@@ -177,7 +169,7 @@ template <execution_policy Policy, posed_depth_range Views, camera::camera_model
     }
   }
 
-  std::vector<std::vector<detail::view_verdict>> verdicts(count);  // for each view that has a part in them
+  std::vector<std::vector<view_verdict>> verdicts(count);  // for each view that has a part in them
   ray_evidence_counter<Camera> counter{policy, samples, camera, evidence};
   std::vector<ray_evidence> before = counter.scores();
   const bool finished = for_each_settled_view(policy, views, evidence, [&](std::uint32_t by, const auto& view) {
@@ -197,7 +189,7 @@ template <execution_policy Policy, posed_depth_range Views, camera::camera_model
       for (std::size_t t = 0; t != tiles * tiles; ++t) {
         const int all = through[t] + supported[t];
         if (all < enough) continue;
-        const detail::view_verdict verdict{of, by, static_cast<double>(through[t]) / all};
+        const view_verdict verdict{of, by, static_cast<double>(through[t]) / all};
         verdicts[of].push_back(verdict);
         verdicts[by].push_back(verdict);
       }
@@ -213,7 +205,7 @@ template <execution_policy Policy, posed_depth_range Views, camera::camera_model
     std::vector<double> trusted;
     std::uint32_t worst = 0;
     for (std::uint32_t v = 0; v != count; ++v) {
-      conflicts[v] = left_out[v] != 0 ? 0 : detail::conflict_of(verdicts[v], left_out);
+      conflicts[v] = left_out[v] != 0 ? 0 : conflict_of(verdicts[v], left_out);
       if (left_out[v] == 0) trusted.push_back(conflicts[v]);
       if (conflicts[v] > conflicts[worst]) worst = v;
     }
@@ -231,4 +223,4 @@ template <execution_policy Policy, posed_depth_range Views, camera::camera_model
   return out;
 }
 
-}  // namespace orbis::cloud
+}  // namespace orbis::cloud::detail

@@ -16,12 +16,12 @@
 #include <Eigen/Eigenvalues>
 
 #include <orbis/cloud/all_knn.hpp>
-#include <orbis/cloud/decision.hpp>
+#include <orbis/cloud/detail/select/decision.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/point.hpp>
 #include <orbis/core/types.hpp>
 
-namespace orbis::cloud {
+namespace orbis::cloud::detail {
 
 struct smoothing_options {
   std::size_t neighbors = 12;  ///< of each point, in each round
@@ -81,7 +81,7 @@ template <point_range Points>
 [[nodiscard]] double off_plane(const Points& points, std::size_t i, std::span<const neighbor<float>> neighbors) {
   if (neighbors.size() < 4) return std::numeric_limits<double>::infinity();
   const auto at = [&](std::size_t j) {
-    const auto p = coordinates<double>(detail::point_at(points, j));
+    const auto p = coordinates<double>(point_at(points, j));
     return vec3{p[0], p[1], p[2]};
   };
   const vec3 own = at(i);
@@ -105,4 +105,4 @@ template <point_range Points>
   return std::sqrt(thickness + height * height);
 }
 
-}  // namespace orbis::cloud
+}  // namespace orbis::cloud::detail

@@ -13,7 +13,9 @@
 #include <span>
 #include <vector>
 
-namespace orbis::cloud {
+#include <orbis/cloud/filter_chain.hpp>
+
+namespace orbis::cloud::detail {
 
 /// A value that the fraction `q` of `values` does not exceed; 0 for none. Reorders them. O(n).
 [[nodiscard]] inline double quantile(std::span<double> values, double q) {
@@ -22,15 +24,6 @@ namespace orbis::cloud {
   std::nth_element(values.begin(), values.begin() + rank, values.end());
   return values[static_cast<std::size_t>(rank)];
 }
-
-/// `intercept + slope * log(range)`: the log spacing that is usual at a range.
-struct log_line {
-  double intercept = 0;
-  double slope = 0;
-  [[nodiscard]] double at(double log_range) const noexcept { return intercept + slope * log_range; }
-};
-
-namespace detail {
 
 /// A value that half of the weight does not exceed; 0 for none. Entries are value and weight.
 [[nodiscard]] inline double weighted_median(std::vector<std::array<double, 2>> entries) {
@@ -44,8 +37,6 @@ namespace detail {
   }
   return 0;
 }
-
-}  // namespace detail
 
 /// The Theil-Sen line through the 40 % quantiles of log spacing in 24 bins of log range, weighted by the
 /// numbers of their points, so that ranges at which there are few points but outliers do not bend it; empty
@@ -83,10 +74,10 @@ namespace detail {
     }
   }
   log_line line;
-  line.slope = std::clamp(detail::weighted_median(std::move(slopes)), 0.0, 2.5);
+  line.slope = std::clamp(weighted_median(std::move(slopes)), 0.0, 2.5);
   std::vector<std::array<double, 2>> intercepts;
   for (const knot& k : knots) intercepts.push_back({k.y - line.slope * k.x, k.weight});
-  line.intercept = detail::weighted_median(std::move(intercepts));
+  line.intercept = weighted_median(std::move(intercepts));
   return line;
 }
 
@@ -147,4 +138,4 @@ struct valley {
   return best;
 }
 
-}  // namespace orbis::cloud
+}  // namespace orbis::cloud::detail

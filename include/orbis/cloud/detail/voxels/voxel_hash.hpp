@@ -16,7 +16,7 @@
 #include <orbis/core/point.hpp>
 #include <orbis/core/random.hpp>
 
-namespace orbis::cloud {
+namespace orbis::cloud::detail {
 
 /// A cell of a grid through the origin.
 using voxel_key = std::array<std::int32_t, 3>;
@@ -81,4 +81,4 @@ class voxel_hash {
   std::vector<voxel_key> keys_;
 };
 
-}  // namespace orbis::cloud
+}  // namespace orbis::cloud::detail

@@ -6,7 +6,7 @@
 #include <memory>
 #include <vector>
 
-#include <orbis/cloud/detail/knn/all_knn_leaves.hpp>
+#include <orbis/cloud/detail/knn/leaf_hierarchy.hpp>
 
 #include "cloud/clouds.hpp"
 #include "cloud/reference.hpp"

@@ -14,8 +14,9 @@
 
 #include <orbis/camera/model.hpp>
 #include <orbis/cloud/detail/rays/view_trust.hpp>
-#include <orbis/cloud/detail/select/select_evidence.hpp>
+#include <orbis/cloud/detail/select/in_words.hpp>
 #include <orbis/cloud/filter_chain.hpp>
+#include <orbis/cloud/filter_choice.hpp>
 #include <orbis/cloud/ray_evidence.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/point.hpp>

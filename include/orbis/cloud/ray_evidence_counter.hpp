@@ -19,10 +19,10 @@
 #include <orbis/camera/depth.hpp>
 #include <orbis/camera/model.hpp>
 #include <orbis/camera/pinhole.hpp>
-#include <orbis/cloud/detail/knn/point_blocks.hpp>
 #include <orbis/cloud/detail/rays/depth_windows.hpp>
-#include <orbis/cloud/detail/rays/ray_evidence_kernels.hpp>
-#include <orbis/cloud/detail/rays/ray_evidence_simd.hpp>
+#include <orbis/cloud/detail/rays/point_blocks.hpp>
+#include <orbis/cloud/detail/rays/ray_kernels.hpp>
+#include <orbis/cloud/detail/rays/ray_kernels_simd.hpp>
 #include <orbis/cloud/detail/rays/ray_view.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/point.hpp>
@@ -78,7 +78,7 @@ class ray_evidence_counter {
       : camera_{camera},
         options_{options},
         size_{std::ranges::size(points)},
-        blocks_{make_point_blocks(policy, points)},
+        blocks_{detail::make_point_blocks(policy, points)},
         level_{level},
         kernels_{detail::ray_kernels_at(level)},
         through_(blocks_.axis[0].size(), 0),
@@ -196,10 +196,10 @@ class ray_evidence_counter {
   void for_each_seen_block(const Policy& policy, const detail::ray_view& view, F&& f) {
     for_each_index(policy, blocks_.groups.size(), 2, [&](std::size_t group) {
       if (test_.says_nothing(blocks_.groups[group])) return;
-      const std::size_t begin = group * point_blocks::group_size;
-      for (std::size_t b = begin; b != std::min(blocks_.blocks.size(), begin + point_blocks::group_size); ++b) {
+      const std::size_t begin = group * detail::point_blocks::group_size;
+      for (std::size_t b = begin; b != std::min(blocks_.blocks.size(), begin + detail::point_blocks::group_size); ++b) {
         if (test_.says_nothing(blocks_.blocks[b])) continue;
-        const std::size_t first = b * point_blocks::block_size;
+        const std::size_t first = b * detail::point_blocks::block_size;
         const detail::block_axes points{blocks_.axis[0].data() + first, blocks_.axis[1].data() + first,
                                         blocks_.axis[2].data() + first};
         detail::seen_block seen;
@@ -218,14 +218,14 @@ class ray_evidence_counter {
   Camera camera_;
   ray_evidence_options options_;
   std::size_t size_;
-  point_blocks blocks_;
+  detail::point_blocks blocks_;
   simd::level level_;
   detail::ray_kernels kernels_;
   std::vector<std::uint16_t> through_;  ///< in the order of the blocks
   std::vector<std::uint16_t> supported_;
   std::vector<std::uint16_t> through_dropped_;  ///< by parts of views that are contradicted; empty before any review
   std::vector<std::uint16_t> refuted_;
-  depth_windows windows_;
+  detail::depth_windows windows_;
   detail::block_test<Camera> test_;
 };
 

@@ -6,15 +6,13 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
-#include <cstdio>
 #include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
-#include <orbis/cloud/decision.hpp>
+#include <orbis/cloud/extract.hpp>
 #include <orbis/cloud/filter_chain.hpp>
-#include <orbis/cloud/filter_mode.hpp>
 #include <orbis/core/types.hpp>
 
 namespace orbis::cloud {
@@ -71,16 +69,5 @@ struct filter_choice {
   filter_evidence evidence{};
   std::string reason{};  ///< what was seen and what follows, in words
 };
-
-namespace detail {
-
-[[nodiscard]] inline std::string in_words(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.3g", value);
-  return text;
-}
-[[nodiscard]] inline std::string percent(double share) { return in_words(100 * share) + " %"; }
-
-}  // namespace detail
 
 }  // namespace orbis::cloud

@@ -4,13 +4,13 @@
 #include <cstdint>
 #include <vector>
 
-#include <orbis/cloud/detail/knn/point_blocks.hpp>
+#include <orbis/cloud/detail/rays/point_blocks.hpp>
 
 #include "cloud/clouds.hpp"
 #include "support/catch.hpp"
 
-using orbis::cloud::make_point_blocks;
-using orbis::cloud::point_blocks;
+using orbis::cloud::detail::make_point_blocks;
+using orbis::cloud::detail::point_blocks;
 
 TEST_CASE("blocks hold every finite point once, within their boxes") {
   for (const auto& [name, cloud] : orbis::test::all_clouds()) {

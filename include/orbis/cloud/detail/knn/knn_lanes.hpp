@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The inner loops of `all_knn_kernels.hpp`, four distances at a time, in the compiler's own vectors: SSE2,
+/// The inner loops of `knn_kernels.hpp`, four distances at a time, in the compiler's own vectors: SSE2,
 /// NEON, or whatever the processor is known to have.
 #pragma once
 
@@ -13,8 +13,8 @@
 #include <cstring>
 #include <limits>
 
-#include <orbis/cloud/detail/knn/all_knn_bracket.hpp>
-#include <orbis/cloud/detail/knn/all_knn_kernels.hpp>
+#include <orbis/cloud/detail/knn/knn_kernels.hpp>
+#include <orbis/cloud/detail/knn/rank_bracket.hpp>
 
 #if defined(__clang__) || (defined(__GNUC__) && (defined(__x86_64__) || defined(__aarch64__)))
 #define ORBIS_HAS_LANES 1

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// What decisions on scores have in common: points that are not finite, and indices out of a mask.
+/// Indices of the points that a filter keeps.
 #pragma once
 
 #include <cmath>
@@ -11,17 +11,10 @@
 #include <span>
 #include <vector>
 
+#include <orbis/cloud/extract.hpp>
 #include <orbis/core/point.hpp>
 
-namespace orbis::cloud {
-
-/// What a filter does with points that are not finite. They never count in its statistics.
-enum class non_finite {
-  drop,  ///< they are outliers
-  keep   ///< they are inliers, so that an organised cloud keeps its holes
-};
-
-namespace detail {
+namespace orbis::cloud::detail {
 
 /// The indices, ascending, below `count` for which `keep` is true.
 template <std::predicate<std::size_t> Keep>
@@ -53,6 +46,4 @@ template <point_range Points, std::predicate<float> Outlier>
   });
 }
 
-}  // namespace detail
-
-}  // namespace orbis::cloud
+}  // namespace orbis::cloud::detail

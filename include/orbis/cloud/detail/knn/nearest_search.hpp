@@ -13,11 +13,11 @@
 #include <span>
 #include <vector>
 
-#include <orbis/cloud/detail/knn/all_knn_avx2.hpp>
-#include <orbis/cloud/detail/knn/all_knn_avx512.hpp>
-#include <orbis/cloud/detail/knn/all_knn_kernels.hpp>
-#include <orbis/cloud/detail/knn/all_knn_lanes.hpp>
-#include <orbis/cloud/detail/knn/all_knn_leaves.hpp>
+#include <orbis/cloud/detail/knn/knn_avx2.hpp>
+#include <orbis/cloud/detail/knn/knn_avx512.hpp>
+#include <orbis/cloud/detail/knn/knn_kernels.hpp>
+#include <orbis/cloud/detail/knn/knn_lanes.hpp>
+#include <orbis/cloud/detail/knn/leaf_hierarchy.hpp>
 #include <orbis/cloud/detail/knn/squared_distance.hpp>
 #include <orbis/core/simd.hpp>
 

@@ -17,7 +17,7 @@
 #include <limits>
 #include <vector>
 
-#include <orbis/cloud/detail/knn/all_knn_leaves.hpp>
+#include <orbis/cloud/detail/knn/leaf_hierarchy.hpp>
 #include <orbis/cloud/detail/knn/squared_distance.hpp>
 
 namespace orbis::cloud::detail {

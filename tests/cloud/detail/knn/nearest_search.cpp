@@ -9,8 +9,8 @@
 #include <utility>
 #include <vector>
 
-#include <orbis/cloud/detail/knn/all_knn_search.hpp>
-#include <orbis/cloud/mean_knn_distance.hpp>
+#include <orbis/cloud/all_knn.hpp>
+#include <orbis/cloud/detail/knn/nearest_search.hpp>
 #include <orbis/cloud/nanoflann.hpp>
 
 #include "cloud/clouds.hpp"

@@ -12,7 +12,7 @@
 #include <cstdint>
 #include <limits>
 
-#include <orbis/cloud/detail/knn/point_blocks.hpp>
+#include <orbis/cloud/detail/rays/point_blocks.hpp>
 #include <orbis/cloud/detail/rays/ray_view.hpp>
 #include <orbis/core/rounded.hpp>
 

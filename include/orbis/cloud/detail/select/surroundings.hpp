@@ -18,7 +18,6 @@
 #include <orbis/cloud/cluster.hpp>
 #include <orbis/cloud/detail/select/local_shape.hpp>
 #include <orbis/cloud/filter_chain.hpp>
-#include <orbis/cloud/mean_knn_distance.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/point.hpp>
 

@@ -16,10 +16,11 @@
 #include <utility>
 #include <vector>
 
+#include <orbis/cloud/detail/select/in_words.hpp>
 #include <orbis/cloud/detail/select/log_density.hpp>
-#include <orbis/cloud/detail/select/select_evidence.hpp>
-#include <orbis/cloud/detail/select/select_surroundings.hpp>
+#include <orbis/cloud/detail/select/surroundings.hpp>
 #include <orbis/cloud/filter_chain.hpp>
+#include <orbis/cloud/filter_choice.hpp>
 #include <orbis/core/execution.hpp>
 
 namespace orbis::cloud::detail {

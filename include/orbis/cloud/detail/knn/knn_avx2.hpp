@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The inner loops of `all_knn_kernels.hpp`, eight distances at a time.
+/// The inner loops of `knn_kernels.hpp`, eight distances at a time.
 #pragma once
 
 #include <algorithm>
@@ -11,8 +11,8 @@
 #include <cstdint>
 #include <limits>
 
-#include <orbis/cloud/detail/knn/all_knn_bracket.hpp>
-#include <orbis/cloud/detail/knn/all_knn_kernels.hpp>
+#include <orbis/cloud/detail/knn/knn_kernels.hpp>
+#include <orbis/cloud/detail/knn/rank_bracket.hpp>
 #include <orbis/core/simd.hpp>
 
 #if ORBIS_X86

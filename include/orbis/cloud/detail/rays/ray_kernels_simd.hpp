@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The inner loops of `ray_evidence_kernels.hpp`, eight and sixteen points at a time.
+/// The inner loops of `ray_kernels.hpp`, eight and sixteen points at a time.
 #pragma once
 
 #include <algorithm>
@@ -8,7 +8,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include <orbis/cloud/detail/rays/ray_evidence_kernels.hpp>
+#include <orbis/cloud/detail/rays/ray_kernels.hpp>
 #include <orbis/core/simd.hpp>
 
 #if ORBIS_X86

@@ -14,13 +14,13 @@
 #include <utility>
 #include <vector>
 
-#include <orbis/cloud/decision.hpp>
-#include <orbis/cloud/detail/knn/all_knn_leaves.hpp>
+#include <orbis/cloud/detail/knn/leaf_hierarchy.hpp>
+#include <orbis/cloud/detail/select/decision.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/point.hpp>
 #include <orbis/core/types.hpp>
 
-namespace orbis::cloud {
+namespace orbis::cloud::detail {
 
 /// The finite points of a cloud, along a space-filling curve, axis by axis; `block_size` consecutive
 /// ones make a block, `group_size` blocks a group. The last block is filled up with NaN.
@@ -38,8 +38,6 @@ struct point_blocks {
   std::vector<box> blocks{};
   std::vector<box> groups{};
 };
-
-namespace detail {
 
 struct keyed_index {
   std::uint32_t key;
@@ -75,16 +73,14 @@ inline void sort_by_key(std::vector<keyed_index>& entries) {
   return hull;
 }
 
-}  // namespace detail
-
 /// O(n), 20 bytes for each point while at work and 16 afterwards; the same for every policy.
 /// Coordinates are taken as float. @pre fewer than 2^32 points
 template <execution_policy Policy, point_range Points>
 [[nodiscard]] point_blocks make_point_blocks(const Policy& policy, const Points& points) {
   constexpr std::size_t size = point_blocks::block_size;
   constexpr float nan = std::numeric_limits<float>::quiet_NaN();
-  const auto at = [&](std::size_t i) { return coordinates<float>(detail::point_at(points, i)); };
-  std::vector<detail::keyed_index> entries;
+  const auto at = [&](std::size_t i) { return coordinates<float>(point_at(points, i)); };
+  std::vector<keyed_index> entries;
   entries.reserve(std::ranges::size(points));
   constexpr float inf = std::numeric_limits<float>::infinity();
   std::array<float, 3> low{inf, inf, inf};
@@ -122,11 +118,11 @@ template <execution_policy Policy, point_range Points>
     std::uint32_t key = 0;
     for (std::size_t a = 0; a != 3; ++a) {
       const double cell = std::clamp((double{p[a]} - start[a]) * scale, 0.0, 1023.0);
-      key |= detail::spread_ten_bits(static_cast<std::uint32_t>(cell)) << a;
+      key |= spread_ten_bits(static_cast<std::uint32_t>(cell)) << a;
     }
     entries[i].key = key;
   });
-  detail::sort_by_key(entries);
+  sort_by_key(entries);
 
   const std::size_t count = (entries.size() + size - 1) / size;
   for (auto& axis : out.axis) axis.resize(count * size, nan);
@@ -147,9 +143,9 @@ template <execution_policy Policy, point_range Points>
   });
   for (std::size_t b = 0; b < count; b += point_blocks::group_size) {
     const std::size_t end = std::min(count, b + point_blocks::group_size);
-    out.groups.push_back(detail::hull_of(std::span{out.blocks}.subspan(b, end - b)));
+    out.groups.push_back(hull_of(std::span{out.blocks}.subspan(b, end - b)));
   }
   return out;
 }
 
-}  // namespace orbis::cloud
+}  // namespace orbis::cloud::detail
