@@ -5,7 +5,9 @@
 
 # In an order in which everything a component needs stands before it.
 set(ORBIS_ALL_COMPONENTS core camera features places optimize cloud octree io eval slam mapping
-                         interop_opencv interop_octomap interop_pcl interop_open3d)
+                         cloud_nanoflann interop_opencv interop_octomap interop_pcl interop_open3d)
+# One header each, for another library: provided where that library is, and asked for by name.
+set(ORBIS_OPTIONAL_COMPONENTS "^(cloud_nanoflann|interop_.*)$")
 
 set(ORBIS_core_PACKAGES Eigen3 tl-expected Threads)
 set(ORBIS_core_LIBRARIES Eigen3::Eigen tl::expected Threads::Threads)
@@ -19,8 +21,10 @@ set(ORBIS_places_NEEDS core)
 set(ORBIS_optimize_NEEDS camera)
 
 set(ORBIS_cloud_NEEDS camera)
-set(ORBIS_cloud_PACKAGES nanoflann)
-set(ORBIS_cloud_LIBRARIES nanoflann::nanoflann)
+
+set(ORBIS_cloud_nanoflann_NEEDS cloud)
+set(ORBIS_cloud_nanoflann_PACKAGES nanoflann)
+set(ORBIS_cloud_nanoflann_LIBRARIES nanoflann::nanoflann)
 
 set(ORBIS_octree_NEEDS camera)
 
@@ -82,12 +86,12 @@ function(orbis_close_components out)
 endfunction()
 
 # One INTERFACE target for each of the wanted components, and orbis::orbis for all of them. With "all",
-# the conversions to other libraries are provided where those libraries are.
+# the optional components are provided where their libraries are.
 macro(orbis_add_components)
   orbis_close_components(ORBIS_PROVIDED_COMPONENTS ${ARGN})
   if("all" IN_LIST ORBIS_COMPONENTS)
     foreach(_orbis_component IN LISTS ORBIS_PROVIDED_COMPONENTS)
-      if(_orbis_component MATCHES "^interop_")
+      if(_orbis_component MATCHES "${ORBIS_OPTIONAL_COMPONENTS}")
         foreach(_orbis_package IN LISTS ORBIS_${_orbis_component}_PACKAGES)
           find_package(${_orbis_package} ${ORBIS_${_orbis_package}_FIND_ARGUMENTS} QUIET)
           if(NOT ${_orbis_package}_FOUND)
@@ -108,7 +112,7 @@ macro(orbis_add_components)
   add_library(orbis::orbis ALIAS orbis_orbis)
   set_target_properties(orbis_orbis PROPERTIES EXPORT_NAME orbis)
   foreach(_orbis_component IN LISTS ORBIS_PROVIDED_COMPONENTS)
-    if(NOT _orbis_component MATCHES "^interop_")
+    if(NOT _orbis_component MATCHES "${ORBIS_OPTIONAL_COMPONENTS}")
       target_link_libraries(orbis_orbis INTERFACE orbis_${_orbis_component})
     endif()
   endforeach()
