@@ -55,10 +55,10 @@ cv::Mat rows_of(const orbis::features::features& f) {
 /// What anyone would write first.
 ORBIS_TARGET("popcnt")
 void popcnt_loop(const std::vector<descriptor>& queries, const std::vector<descriptor>& trains,
-                 std::vector<nearest_two>& nearest) {
+                 std::vector<orbis::features::detail::nearest_two>& nearest) {
   for (std::size_t i = 0; i != queries.size(); ++i) {
     const auto q = queries[i].words;
-    nearest_two best;
+    orbis::features::detail::nearest_two best;
     for (std::size_t j = 0; j != trains.size(); ++j) {
       const auto& t = trains[j].words;
       const auto d = static_cast<std::uint32_t>(__builtin_popcountll(q[0] ^ t[0]) + __builtin_popcountll(q[1] ^ t[1]) +
@@ -100,17 +100,17 @@ void add_brute_force(std::size_t count) {
     add_matcher(group + "/cross_check/" + name, brute_force(hamming{}, level) | cross_check{}, count);
     add_row(group + "/knn10/" + name, [count, level = level](benchmark::State& state) {
       const auto a = random_features(count, 1), b = random_features(count, 2);
-      std::vector<neighbor> nearest(10 * count);
-      hamming_workspace memory;
+      std::vector<orbis::features::detail::neighbor> nearest(10 * count);
+      orbis::features::detail::hamming_workspace memory;
       for (auto _ : state) {
-        hamming_k_nearest(level, a.descriptors, b.descriptors, 10, nearest, memory);
+        orbis::features::detail::hamming_k_nearest(level, a.descriptors, b.descriptors, 10, nearest, memory);
         benchmark::DoNotOptimize(nearest.data());
       }
     });
   }
   add_row(group + "/knn2/popcnt64_loop", [count](benchmark::State& state) {
     const auto a = random_features(count, 1), b = random_features(count, 2);
-    std::vector<nearest_two> nearest(count);
+    std::vector<orbis::features::detail::nearest_two> nearest(count);
     for (auto _ : state) {
       popcnt_loop(a.descriptors, b.descriptors, nearest);
       benchmark::DoNotOptimize(nearest.data());

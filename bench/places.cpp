@@ -45,9 +45,8 @@ vocabulary complete_tree(std::uint32_t depth) {
     level *= branching;
     nodes += level;
   }
-  places::detail::vocabulary_tree<256> tree;
-  tree.node_count = nodes;
-  tree.descriptors = places::detail::table_memory<descriptor>(nodes - 1);
+  vocabulary_tree<256> tree;
+  tree.resize(nodes);
   random_bits random{1};
   const auto all = tree.descriptors.values();
   for (std::uint32_t i = 1; i != nodes; ++i) {
@@ -55,7 +54,7 @@ vocabulary complete_tree(std::uint32_t depth) {
     all[i - 1] = parent == 0 ? noisy({}, 180, random) : noisy(all[parent - 1], 40, random);
   }
   for (std::uint32_t w = 0; w != level; ++w) tree.weights.push_back(static_cast<float>(random.uniform(1.0, 9.0)));
-  static_cast<void>(places::detail::connect_tree(tree, std::vector<std::uint16_t>(inner, branching)));
+  static_cast<void>(connect_tree(tree, std::vector<std::uint16_t>(inner, branching)));
   return vocabulary{std::move(tree)};
 }
 const vocabulary& tree_of(std::uint32_t depth) {

@@ -4,7 +4,7 @@
 //
 // Learns a vocabulary from made-up pictures and rooms, and from recordings if any are named; turns vocabularies of
 // DBoW2 and DBoW3 into ours; measures how well vocabularies recognise places. OUT that ends in .hpp becomes a header
-// with the vocabulary as text, as orbis/places/default_vocabulary_data.hpp is.
+// with the vocabulary as text, as orbis/places/detail/default_vocabulary_data.hpp is.
 #include <algorithm>
 #include <cstdint>
 #include <cstdio>
@@ -21,6 +21,7 @@
 #include <orbis/core/file.hpp>
 #include <orbis/places.hpp>
 
+#include "load_vocabulary.hpp"
 #include "recall.hpp"
 #include "sources.hpp"
 
@@ -43,7 +44,7 @@ int complain(int code, const std::string& why) {
 /// support.
 std::string header_of(const std::string& bytes, const std::string& made_by) {
   constexpr std::size_t row = 115, literal = 560 * row;
-  const std::string text = places::to_base85(bytes);
+  const std::string text = orbis::to_base85(bytes);
   // Pointers, not views: a compiler would have to count the characters.
   std::string out =
       "// SPDX-License-Identifier: BSD-3-Clause\n/// @file\n/// The default vocabulary as text. Made by\n///\n" +
@@ -92,7 +93,7 @@ int train(const settings& s) {
 }
 
 int convert(const settings& s) {
-  const auto words = places::load_vocabulary(s.input);
+  const auto words = dbow::load_vocabulary(s.input);
   if (!words) return complain(2, words.error().to_string());
   return write(s, *words, "///     train_vocabulary convert\n");
 }
@@ -123,7 +124,7 @@ int judge(const settings& s) {
               "candidate", "transform, ms");
   std::vector<std::pair<std::string, places::vocabulary>> all{{"(default)", places::default_vocabulary()}};
   for (const std::string& file : s.inputs) {
-    auto words = places::load_vocabulary(file);
+    auto words = dbow::load_vocabulary(file);
     if (!words) return complain(2, words.error().to_string());
     all.emplace_back(file.substr(file.find_last_of('/') + 1), *std::move(words));
   }

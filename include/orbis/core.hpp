@@ -4,6 +4,8 @@
 #pragma once
 
 #include <orbis/core/associate.hpp>
+#include <orbis/core/base85.hpp>
+#include <orbis/core/bit_string.hpp>
 #include <orbis/core/bits.hpp>
 #include <orbis/core/bytes.hpp>
 #include <orbis/core/crc32c.hpp>

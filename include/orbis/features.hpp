@@ -1,6 +1,27 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
 /// Keypoints, descriptors and matching.
+///
+/// | header | what it is for |
+/// | --- | --- |
+/// | `features/descriptor.hpp` | `keypoint`, `binary_descriptor`, `features` |
+/// | `features/extractor.hpp` | concepts of extractors and of their parts |
+/// | `features/orb.hpp` | `orb_extractor`: ORB features, spread evenly |
+/// | `features/grey.hpp` | grey images of colour and 16-bit images |
+/// | `features/hamming.hpp` | `hamming`, the distance of binary descriptors |
+/// | `features/match.hpp` | `match`, `candidate`, concepts of sources and stages |
+/// | `features/matcher.hpp` | matchers composed of a source and stages with `\|` |
+/// | `features/stages.hpp` | stages: ratio test, cross check, distance, uniqueness, rotation |
+/// | `features/motion_statistics.hpp` | the stage that keeps matches whose neighbours move alike |
+/// | `features/brute_force.hpp` | the source that compares all pairs |
+/// | `features/windowed.hpp` | the source that looks near predicted positions |
+/// | `features/projected.hpp` | the source that looks where known points project to |
+/// | `features/project_points.hpp` | projections by a camera and its pose, for `projected` |
+/// | `features/epipolar.hpp` | the source that looks along epipolar lines |
+/// | `features/epipolar_geometry.hpp` | epipolar lines of two pinhole images, or of any two cameras |
+/// | `features/node_guided.hpp` | the source that compares under common vocabulary nodes |
+/// | `features/grid.hpp` | an index of keypoints by position |
+/// | `features/depth.hpp` | the depth at a keypoint and its standard deviation |
 #pragma once
 
 #include <orbis/features/brute_force.hpp>
@@ -8,6 +29,8 @@
 #include <orbis/features/descriptor.hpp>
 #include <orbis/features/epipolar.hpp>
 #include <orbis/features/epipolar_geometry.hpp>
+#include <orbis/features/extractor.hpp>
+#include <orbis/features/grey.hpp>
 #include <orbis/features/grid.hpp>
 #include <orbis/features/hamming.hpp>
 #include <orbis/features/match.hpp>

@@ -1,6 +1,18 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Visual words, and keyframes found by them.
+/// Place recognition: images as bags of visual words, and keyframes found by them.
+///
+/// | header | what it is for |
+/// | --- | --- |
+/// | `places/vocabulary.hpp` | `vocabulary`: descriptors to words, images to bags |
+/// | `places/default_vocabulary.hpp` | a vocabulary for ORB that needs no file |
+/// | `places/train.hpp` | `train`: a vocabulary of your own images |
+/// | `places/vocabulary_file.hpp` | vocabularies in files |
+/// | `places/vocabulary_tree.hpp` | the tree inside, for readers of other formats |
+/// | `places/bag_of_words.hpp` | `bag_of_words`: the words of an image and their values |
+/// | `places/score.hpp` | how alike two bags are |
+/// | `places/keyframe_database.hpp` | `keyframe_database`: keyframes that may show the same place |
+/// | `places/inverted_index.hpp` | the images that have a word |
 ///
 /// @code
 ///   const auto words = orbis::places::default_vocabulary();
@@ -14,14 +26,11 @@
 #pragma once
 
 #include <orbis/places/bag_of_words.hpp>
-#include <orbis/places/bit_string.hpp>
-#include <orbis/places/dbow_text.hpp>
-#include <orbis/places/dbow_yaml.hpp>
 #include <orbis/places/default_vocabulary.hpp>
 #include <orbis/places/inverted_index.hpp>
 #include <orbis/places/keyframe_database.hpp>
-#include <orbis/places/load_vocabulary.hpp>
 #include <orbis/places/score.hpp>
 #include <orbis/places/train.hpp>
 #include <orbis/places/vocabulary.hpp>
 #include <orbis/places/vocabulary_file.hpp>
+#include <orbis/places/vocabulary_tree.hpp>

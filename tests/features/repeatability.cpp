@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <vector>
 
-#include <orbis/features/detail/extract/grey.hpp>
+#include <orbis/features/grey.hpp>
 #include <orbis/features/orb.hpp>
 #include <orbis/io/image.hpp>
 

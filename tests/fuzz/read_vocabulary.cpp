@@ -10,11 +10,11 @@
 #include <vector>
 
 #include <orbis/core/crc32c.hpp>
-#include <orbis/places/dbow_text.hpp>
-#include <orbis/places/dbow_yaml.hpp>
 #include <orbis/places/vocabulary_file.hpp>
 
 #include "fuzz/target.hpp"
+#include "train_vocabulary/dbow_text.hpp"
+#include "train_vocabulary/dbow_yaml.hpp"
 
 namespace {
 
@@ -57,8 +57,8 @@ void check(Parse&& parse, std::size_t size, std::size_t times) {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   std::string bytes{reinterpret_cast<const char*>(data), size};
-  check([&] { return parse_dbow_text<64>(bytes); }, size, 16);
-  check([&] { return parse_dbow_yaml<64>(bytes); }, size, 16);
+  check([&] { return dbow::parse_dbow_text<64>(bytes); }, size, 16);
+  check([&] { return dbow::parse_dbow_yaml<64>(bytes); }, size, 16);
   check([&] { return parse_vocabulary<64>(std::as_bytes(std::span{bytes})); }, size, 8);
   if (size < 16) return 0;
   const std::uint32_t sum = crc32c(std::as_bytes(std::span{bytes}).subspan(16));

@@ -33,26 +33,20 @@ template <class Score>
   std::map<std::uint32_t, std::pair<double, double>> both;
   for (const auto& [word, value] : a.words) both[word].first = static_cast<double>(value);
   for (const auto& [word, value] : b.words) both[word].second = static_cast<double>(value);
-  double l1 = 0, l2 = 0, chi = 0, dot = 0, roots = 0;
+  double l1 = 0, dot = 0;
   for (const auto& [word, v] : both) {
     const auto [x, y] = v;
     l1 += std::abs(x - y);
-    l2 += (x - y) * (x - y);
-    chi += (x - y) * (x - y) / (x + y);
     dot += x * y;
-    roots += std::sqrt(x * y);
   }
   if constexpr (std::is_same_v<Score, l1_score>) return 1 - l1 / 2;
-  if constexpr (std::is_same_v<Score, l2_score>) return 1 - std::sqrt(l2 / 2);
-  if constexpr (std::is_same_v<Score, chi_square_score>) return 1 - chi / 2;
-  if constexpr (std::is_same_v<Score, cosine_score>) return dot;
-  return roots;
+  return dot;
 }
 
 }  // namespace
 
 TEMPLATE_TEST_CASE("scores are what they are defined to be, from 0 to 1, symmetric, and 1 for the same", "", l1_score,
-                   l2_score, cosine_score, chi_square_score, bhattacharyya_score) {
+                   cosine_score) {
   constexpr TestType score{};
   random_bits random{1};
   for (int i = 0; i != 200; ++i) {
@@ -64,7 +58,7 @@ TEMPLATE_TEST_CASE("scores are what they are defined to be, from 0 to 1, symmetr
     CHECK(s <= 1.0);
     CHECK(s == score(b, a));
     CHECK(s == Approx(by_definition<TestType>(a, b)).margin(2e-4));
-    CHECK(score(a, a) == Approx(1.0).margin(std::is_same_v<TestType, l2_score> ? 1e-3 : 1e-6));
+    CHECK(score(a, a) == Approx(1.0).margin(1e-6));
     auto elsewhere = a;
     for (auto& w : elsewhere.words) w.word += 100000;
     CHECK(score(a, elsewhere) == 0.0);

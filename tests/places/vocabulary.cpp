@@ -74,14 +74,13 @@ TEST_CASE("descriptors of any length of whole words have a vocabulary") {
 
 TEST_CASE("leaves above the deepest level are words") {
   // A root with three children, of which the middle one has two: words 0 and 1 are nodes 1 and 3.
-  places::detail::vocabulary_tree<64> tree;
-  tree.node_count = 6;
-  tree.descriptors = places::detail::table_memory<bit_words<64>>(5);
+  vocabulary_tree<64> tree;
+  tree.resize(6);
   const std::array<std::uint64_t, 5> bits{0x0, 0xff, ~std::uint64_t{0}, 0x0f, 0xf0};
   for (std::size_t i = 0; i != 5; ++i) tree.descriptors.values()[i] = {bits[i]};
   tree.weights = {1.0F, 2.0F, 3.0F, 4.0F};
   const std::vector<std::uint16_t> child_counts{3, 0, 2};
-  REQUIRE(places::detail::connect_tree(tree, child_counts).empty());
+  REQUIRE(connect_tree(tree, child_counts).empty());
   const basic_vocabulary<64> words{std::move(tree)};
   CHECK(words.size() == 4);
   CHECK(words.depth() == 2);
@@ -97,11 +96,11 @@ TEST_CASE("leaves above the deepest level are words") {
 }
 
 TEST_CASE("trees that hang together badly are refused") {
-  places::detail::vocabulary_tree<64> tree;
+  vocabulary_tree<64> tree;
   const auto problem_of = [&](std::uint32_t nodes, std::vector<std::uint16_t> counts, std::vector<float> weights) {
     tree.node_count = nodes;
     tree.weights = std::move(weights);
-    return places::detail::connect_tree(tree, counts);
+    return connect_tree(tree, counts);
   };
   CHECK(problem_of(3, {2}, {1, 1}).empty());
   CHECK(problem_of(1, {}, {}).empty());
@@ -133,26 +132,6 @@ TEST_CASE("weights count as their kind says") {
     const auto bag = words.transform(image, {.norm = bag_norm::none});
     REQUIRE(bag.size() == expected.size());
     for (const auto& [word, value] : bag.words) CHECK(value == Approx(expected[word]));
-  }
-}
-
-TEST_CASE("a vocabulary with other weights is the same tree; words of no weight are left out") {
-  const auto words = test::small_vocabulary();
-  std::vector<float> weights(words.size(), 2.0F);
-  weights[7] = 0.0F;
-  const auto other = words.with_weights(weights, weighting::binary);
-  CHECK(other != words);
-  CHECK(other.size() == words.size());
-  const auto image = test::make_images(1, 2000, 8)[0];
-  bool had = false;
-  for (const auto& d : image) {
-    CHECK(other.word_of(d) == words.word_of(d));
-    had = had || words.word_of(d) == 7;
-  }
-  REQUIRE(had);
-  for (const auto& [word, value] : other.transform(image, {.norm = bag_norm::none}).words) {
-    CHECK(word != 7);
-    CHECK(value == 2.0F);
   }
 }
 

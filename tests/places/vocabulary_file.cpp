@@ -10,7 +10,6 @@
 #include <orbis/core/crc32c.hpp>
 #include <orbis/core/file.hpp>
 #include <orbis/core/random.hpp>
-#include <orbis/places/load_vocabulary.hpp>
 #include <orbis/places/vocabulary_file.hpp>
 
 #include "io/temporary_folder.hpp"
@@ -36,7 +35,8 @@ TEST_CASE("a vocabulary comes back from a file as it was, of every weighting and
   for (const weighting kind : {weighting::tf_idf, weighting::tf, weighting::idf, weighting::binary}) {
     const auto words = test::small_vocabulary(6, 4, kind);
     REQUIRE(write_vocabulary(folder / "words.voc", words));
-    for (const auto& again : {read_vocabulary(folder / "words.voc"), load_vocabulary(folder / "words.voc")}) {
+    {
+      const auto again = read_vocabulary(folder / "words.voc");
       REQUIRE(again);
       CHECK(*again == words);
       CHECK(again->depth() == words.depth());
@@ -55,14 +55,13 @@ TEST_CASE("a vocabulary comes back from a file as it was, of every weighting and
 }
 
 TEST_CASE("the bytes of a file are fixed") {
-  places::detail::vocabulary_tree<256> tree;
-  tree.node_count = 3;
-  tree.descriptors = places::detail::table_memory<bit_words<256>>(2);
+  vocabulary_tree<256> tree;
+  tree.resize(3);
   tree.descriptors.values()[0] = {0x0706050403020100ULL, 1, 2, 3};
   tree.descriptors.values()[1] = {4, 5, 6, ~std::uint64_t{0}};
   tree.weights = {1.0F, 0.5F};
   tree.weights_are = weighting::idf;
-  REQUIRE(places::detail::connect_tree(tree, std::array<std::uint16_t, 1>{2}).empty());
+  REQUIRE(connect_tree(tree, std::array<std::uint16_t, 1>{2}).empty());
   const std::string bytes = vocabulary_bytes(vocabulary{std::move(tree)});
   REQUIRE(bytes.size() == 64 + 2 * 32 + 2 * 4 + 2);
   CHECK(bytes.substr(0, 12) == std::string("orbisvoc\1\0\0\0", 12));
@@ -113,15 +112,9 @@ TEST_CASE("what a file with the right checksum declares is checked all the same"
   CHECK(message_of(bytes.size() - 2, "\xff\xff"sv).find("children") != std::string::npos);
 }
 
-TEST_CASE("files that are not there, are no files or are compressed say so") {
+TEST_CASE("files that do not exist or are no files are refused") {
   const test::temporary_folder folder;
   CHECK(read_vocabulary(folder / "none").error().code == errc::not_found);
-  CHECK(load_vocabulary(folder / "none").error().code == errc::not_found);
   CHECK(read_vocabulary(folder.path()).error().code == errc::unreadable);
-  CHECK(load_vocabulary(folder.path()).error().code == errc::unreadable);
-  const auto zipped = load_vocabulary(folder.write("words.yml.gz", "\x1f\x8b\x08"));
-  CHECK(zipped.error().code == errc::unsupported);
-  CHECK(load_vocabulary(folder.write("words.txt", "10 6 0 0\n")).value().empty());
-  CHECK(load_vocabulary(folder.write("words.yml", "%YAML:1.0\nvocabulary:\n   nodes: []\n")).value().empty());
   CHECK_FALSE(write_vocabulary(folder / "no" / "such" / "folder", vocabulary{}));
 }

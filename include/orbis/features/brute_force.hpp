@@ -26,9 +26,9 @@ struct brute_force_source {
   simd::level level = simd::level::avx512;  ///< the best instruction set to use, if the processor has it
 
   struct workspace {
-    std::vector<nearest_two> nearest;
+    std::vector<detail::nearest_two> nearest;
     std::vector<std::uint32_t> reverse;
-    hamming_workspace search;
+    detail::hamming_workspace search;
   };
 
   /// One candidate for each query; none if there are no trains. O(queries x trains).
@@ -43,17 +43,17 @@ struct brute_force_source {
 
     memory.nearest.resize(query_count);
     memory.reverse.resize(needs.reverse ? train_count : 0);
-    if constexpr (std::same_as<Distance, hamming> && has_hamming_kernel<Descriptor>) {
-      hamming_nearest<Descriptor::bits>(level, queries.descriptors, trains.descriptors, memory.nearest, memory.reverse,
-                                        memory.search);
+    if constexpr (std::same_as<Distance, hamming> && detail::has_hamming_kernel<Descriptor>) {
+      detail::hamming_nearest<Descriptor::bits>(level, queries.descriptors, trains.descriptors, memory.nearest,
+                                                memory.reverse, memory.search);
     } else {
-      nearest_by(distance, queries.descriptors, trains.descriptors, std::span{memory.nearest},
-                 std::span{memory.reverse}, memory.search.reverse_distance);
+      detail::nearest_by(distance, queries.descriptors, trains.descriptors, std::span{memory.nearest},
+                         std::span{memory.reverse}, memory.search.reverse_distance);
     }
 
     candidates.resize(query_count);
     for (std::size_t i = 0; i != query_count; ++i) {
-      const nearest_two& n = memory.nearest[i];
+      const detail::nearest_two& n = memory.nearest[i];
       candidates[i] = {static_cast<std::uint32_t>(i), n.index, n.distance, n.second_distance,
                        needs.reverse ? memory.reverse[n.index] : none};
     }

@@ -1,15 +1,21 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Keypoints, binary descriptors, and the two together.
+/// Keypoints, descriptors, and the two together.
 #pragma once
 
 #include <array>
+#include <concepts>
 #include <cstddef>
 #include <cstdint>
 #include <type_traits>
 #include <vector>
 
 namespace orbis::features {
+
+/// A descriptor of a keypoint: any value that can be copied. A `descriptor_distance` says how alike two of them are.
+/// Place recognition wants a `bit_string`, and for these `hamming` is fast.
+template <class D>
+concept feature_descriptor = std::semiregular<D>;
 
 /// A string of bits that describes the neighbourhood of a keypoint. Bit `i` is bit `i % 64` of word
 /// `i / 64`; on a little-endian machine these are the bytes OpenCV stores in a descriptor's row.
@@ -24,7 +30,7 @@ requires(Bits > 0 && Bits % 64 == 0) struct binary_descriptor {
 };
 static_assert(sizeof(binary_descriptor<256>) == 32 && std::is_trivially_copyable_v<binary_descriptor<256>>);
 
-/// A point of an image that can be found again.
+/// A point of an image that can be found again in other images.
 struct keypoint {
   float x = 0.0F, y = 0.0F;  ///< pixels of the full image, pixel centres at integers
   float size = 0.0F;         ///< diameter of the described neighbourhood, pixels of the full image
@@ -35,7 +41,7 @@ struct keypoint {
 };
 
 /// What an extractor finds: `descriptors[i]` describes `keypoints[i]`.
-template <class Descriptor>
+template <feature_descriptor Descriptor>
 struct basic_features {
   std::vector<keypoint> keypoints;
   std::vector<Descriptor> descriptors;
@@ -44,6 +50,8 @@ struct basic_features {
   [[nodiscard]] bool empty() const noexcept { return keypoints.empty(); }
   friend bool operator==(const basic_features&, const basic_features&) = default;
 };
+
+/// The features of ORB.
 using features = basic_features<binary_descriptor<256>>;
 
 }  // namespace orbis::features

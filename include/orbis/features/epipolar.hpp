@@ -51,7 +51,7 @@ struct epipolar_source {
   simd::level level = simd::level::avx512;  ///< the best instruction set to use, if the processor has it
 
   struct workspace {
-    search_among_workspace search;
+    detail::search_among_workspace search;
     std::vector<float> x, y, limit;  ///< of the trains, in whole blocks
   };
 
@@ -75,22 +75,23 @@ struct epipolar_source {
     assert(queries.keypoints.size() == queries.descriptors.size());
     assert(trains.keypoints.size() == trains.descriptors.size());
     place_trains(memory, trains.keypoints, geometry);
-    search_among(distance, level, candidates, memory.search, queries, trains, needs, [&](std::size_t q, auto&& add) {
-      const keypoint& query = queries.keypoints[q];
-      const std::optional<epipolar_line> line = geometry.line(q, query);
-      if (!line) return;
-      for (std::size_t begin = 0; begin < memory.x.size(); begin += block) {
-        std::array<std::uint32_t, block> close;
-        if (!any_close(*line, memory.x.data() + begin, memory.y.data() + begin, memory.limit.data() + begin, close))
-          continue;
-        for (std::size_t i = 0; i != block; ++i) {
-          if (close[i] == 0) continue;
-          const auto t = static_cast<std::uint32_t>(begin + i);
-          const std::int64_t step = std::int64_t{trains.keypoints[t].octave} - query.octave;
-          if (std::abs(step) <= rule.max_octave_difference) add(t);
-        }
-      }
-    });
+    detail::search_among(
+        distance, level, candidates, memory.search, queries, trains, needs, [&](std::size_t q, auto&& add) {
+          const keypoint& query = queries.keypoints[q];
+          const std::optional<epipolar_line> line = geometry.line(q, query);
+          if (!line) return;
+          for (std::size_t begin = 0; begin < memory.x.size(); begin += block) {
+            std::array<std::uint32_t, block> close;
+            if (!any_close(*line, memory.x.data() + begin, memory.y.data() + begin, memory.limit.data() + begin, close))
+              continue;
+            for (std::size_t i = 0; i != block; ++i) {
+              if (close[i] == 0) continue;
+              const auto t = static_cast<std::uint32_t>(begin + i);
+              const std::int64_t step = std::int64_t{trains.keypoints[t].octave} - query.octave;
+              if (std::abs(step) <= rule.max_octave_difference) add(t);
+            }
+          }
+        });
   }
 
  private:

@@ -46,8 +46,9 @@ struct feature_view {
   std::span<const Descriptor> descriptors;
 };
 
-/// Something a matcher can be called with: `features`, a `feature_view`, a range of descriptors.
-[[nodiscard]] inline feature_view<binary_descriptor<256>> view_of(const features& f) noexcept {
+/// A view of what a matcher can be called with: `basic_features`, a `feature_view`, a contiguous range of descriptors.
+template <class Descriptor>
+[[nodiscard]] feature_view<Descriptor> view_of(const basic_features<Descriptor>& f) noexcept {
   return {f.keypoints, f.descriptors};
 }
 template <class Descriptor>

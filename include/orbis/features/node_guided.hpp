@@ -78,7 +78,7 @@ struct node_guided_source {
   simd::level level = simd::level::avx512;  ///< the best instruction set to use, if the processor has it
 
   struct workspace {
-    search_among_workspace search;
+    detail::search_among_workspace search;
     std::vector<std::span<const std::uint32_t>> trains_of;  ///< by query
   };
 
@@ -107,9 +107,10 @@ struct node_guided_source {
         memory.trains_of[q] = t->features;
       }
     }
-    search_among(distance, level, candidates, memory.search, queries, trains, needs, [&](std::size_t q, auto&& add) {
-      for (const std::uint32_t train : memory.trains_of[q]) add(train);
-    });
+    detail::search_among(distance, level, candidates, memory.search, queries, trains, needs,
+                         [&](std::size_t q, auto&& add) {
+                           for (const std::uint32_t train : memory.trains_of[q]) add(train);
+                         });
   }
   template <class Descriptor>
   requires descriptor_distance<Distance, Descriptor>

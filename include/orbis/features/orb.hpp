@@ -18,16 +18,25 @@
 #include <orbis/core/image.hpp>
 #include <orbis/core/simd.hpp>
 #include <orbis/features/descriptor.hpp>
-#include <orbis/features/detail/extract/corner.hpp>
 #include <orbis/features/detail/extract/cover_first.hpp>
 #include <orbis/features/detail/extract/fast.hpp>
-#include <orbis/features/detail/extract/grey.hpp>
 #include <orbis/features/detail/extract/kept_memory.hpp>
 #include <orbis/features/detail/extract/orientation.hpp>
 #include <orbis/features/detail/extract/pyramid.hpp>
+#include <orbis/features/detail/extract/spread.hpp>
 #include <orbis/features/detail/extract/steered_brief.hpp>
+#include <orbis/features/extractor.hpp>
+#include <orbis/features/grey.hpp>
 
 namespace orbis::features {
+
+/// The parts of `orb_extractor` and those that can stand in for them; see `extractor.hpp` for the concepts.
+/// - `fast9` finds FAST-9/16 corners;
+/// - `cover_first` chooses corners that cover the image, then the strongest; `strongest` the strongest of each level;
+/// - `intensity_centroid` turns keypoints towards the centre of brightness; `upright` does not turn them;
+/// - `steered_brief` describes keypoints by ORB's pattern, turned to their direction.
+using detail::fast9, detail::cover_first, detail::strongest, detail::intensity_centroid, detail::upright,
+    detail::steered_brief;
 
 struct orb_options {
   int max_features = 1000;
@@ -41,8 +50,8 @@ struct orb_options {
 /// Finds keypoints on the levels of an image pyramid and describes them. What finds corners, chooses among
 /// them, turns and describes them are types. Calls on a const object may run at the same time. Between
 /// calls it keeps the memory it works in, one portion for each of the calls that ever ran at once.
-template <corner_detector Detector = fast9, corner_distribution Distribution = cover_first,
-          orientation_estimator Orientation = intensity_centroid, keypoint_descriptor Descriptor = steered_brief>
+template <corner_detector Detector = fast9, corner_selection Distribution = cover_first,
+          orientation_estimator Orientation = intensity_centroid, patch_descriptor Descriptor = steered_brief>
 class basic_orb_extractor {
  public:
   using descriptor = typename Descriptor::descriptor;
@@ -111,7 +120,7 @@ class basic_orb_extractor {
  private:
   struct workspace {
     std::vector<std::uint8_t> grey;
-    image_pyramid pyramid;
+    detail::image_pyramid pyramid;
     std::vector<level_corners> levels;
     typename Detector::workspace detector;
     typename Distribution::workspace distribution;
@@ -155,7 +164,9 @@ class basic_orb_extractor {
           last = std::max(last, static_cast<double>(r.*from) + r.*size - 1.0);
         }
       }
-      const auto to_level = [&](double at) { return image_pyramid::full_coordinate(at, full_size, level_size); };
+      const auto to_level = [&](double at) {
+        return detail::image_pyramid::full_coordinate(at, full_size, level_size);
+      };
       // Half a pixel further on both sides: a keypoint is asked where it lies, rounded to a pixel.
       const double begin = std::clamp(std::floor(to_level(first - 0.5)), static_cast<double>(border), 1e9);
       const double end =
@@ -172,8 +183,8 @@ class basic_orb_extractor {
                             std::span<const region> regions) {
     if (mask.empty() && regions.empty()) return;
     const auto pixel = [](int at, float within, int level_size, int full_size) {
-      return std::clamp(static_cast<int>(std::lround(
-                            image_pyramid::full_coordinate(at + static_cast<double>(within), level_size, full_size))),
+      return std::clamp(static_cast<int>(std::lround(detail::image_pyramid::full_coordinate(
+                            at + static_cast<double>(within), level_size, full_size))),
                         0, full_size - 1);
     };
     std::erase_if(corners, [&](const corner& c) {
@@ -196,9 +207,9 @@ class basic_orb_extractor {
     for (const corner& c : corners) {
       const orientation o = orient_(options_.simd, level, c.x, c.y);
       found.descriptors.push_back(describe_(options_.simd, memory.descriptor, c.x, c.y, o));
-      found.keypoints.push_back({.x = static_cast<float>(image_pyramid::full_coordinate(c.x + static_cast<double>(c.dx),
-                                                                                        level.width(), image.width())),
-                                 .y = static_cast<float>(image_pyramid::full_coordinate(
+      found.keypoints.push_back({.x = static_cast<float>(detail::image_pyramid::full_coordinate(
+                                     c.x + static_cast<double>(c.dx), level.width(), image.width())),
+                                 .y = static_cast<float>(detail::image_pyramid::full_coordinate(
                                      c.y + static_cast<double>(c.dy), level.height(), image.height())),
                                  .size = size,
                                  .angle = o.angle,
@@ -212,7 +223,7 @@ class basic_orb_extractor {
   [[no_unique_address]] Distribution choose_{};
   [[no_unique_address]] Orientation orient_{};
   [[no_unique_address]] Descriptor describe_{};
-  mutable kept_memory<workspace> kept_;
+  mutable detail::kept_memory<workspace> kept_;
 };
 
 /// ORB as the field knows it, but evenly spread.

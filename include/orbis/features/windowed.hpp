@@ -44,7 +44,7 @@ struct windowed_source {
   simd::level level = simd::level::avx512;  ///< the best instruction set to use, if the processor has it
 
   struct workspace {
-    search_among_workspace search;
+    detail::search_among_workspace search;
     keypoint_grid grid;
   };
 
@@ -57,10 +57,11 @@ struct windowed_source {
               const keypoint_grid& grid) const {
     assert(windows.size() == queries.descriptors.size());
     assert(trains.keypoints.size() == trains.descriptors.size());
-    search_among(distance, level, candidates, memory.search, queries, trains, needs, [&](std::size_t q, auto&& add) {
-      const window& w = windows[q];
-      grid.for_each_near(w.x, w.y, w.radius, w.min_octave, w.max_octave, add);
-    });
+    detail::search_among(distance, level, candidates, memory.search, queries, trains, needs,
+                         [&](std::size_t q, auto&& add) {
+                           const window& w = windows[q];
+                           grid.for_each_near(w.x, w.y, w.radius, w.min_octave, w.max_octave, add);
+                         });
   }
 
   /// The same, with a grid made for this one search.

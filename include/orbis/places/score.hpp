@@ -61,28 +61,4 @@ struct cosine_score {
   }
 };
 
-/// 1 - |a - b| / sqrt(2) in the Euclidean norm.
-struct l2_score {
-  static constexpr bag_norm norm = bag_norm::l2;
-  [[nodiscard]] double operator()(const bag_of_words& a, const bag_of_words& b) const noexcept {
-    return 1.0 - std::sqrt(1.0 - cosine_score{}(a, b));
-  }
-};
-
-/// 1 - chi^2 / 2, the sum of 2 x y / (x + y).
-struct chi_square_score {
-  static constexpr bag_norm norm = bag_norm::l1;
-  [[nodiscard]] double operator()(const bag_of_words& a, const bag_of_words& b) const noexcept {
-    return detail::sum_over_common(a, b, [](double x, double y) { return 2.0 * (x * y) / (x + y); });
-  }
-};
-
-/// The coefficient of Bhattacharyya, the sum of sqrt(x y).
-struct bhattacharyya_score {
-  static constexpr bag_norm norm = bag_norm::l1;
-  [[nodiscard]] double operator()(const bag_of_words& a, const bag_of_words& b) const noexcept {
-    return detail::sum_over_common(a, b, [](double x, double y) { return std::sqrt(x * y); });
-  }
-};
-
 }  // namespace orbis::places

@@ -15,16 +15,16 @@
 #include <utility>
 #include <vector>
 
+#include <orbis/core/bit_string.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/progress.hpp>
 #include <orbis/core/random.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/core/simd.hpp>
 #include <orbis/places/bag_of_words.hpp>
-#include <orbis/places/bit_string.hpp>
 #include <orbis/places/detail/k_majority.hpp>
-#include <orbis/places/detail/vocabulary_tree.hpp>
 #include <orbis/places/vocabulary.hpp>
+#include <orbis/places/vocabulary_tree.hpp>
 
 namespace orbis::places {
 
@@ -151,9 +151,8 @@ class vocabulary_trainer {
 
   [[nodiscard]] result<basic_vocabulary<Bits>> finish() {
     vocabulary_tree<Bits> tree;
-    tree.node_count = static_cast<std::uint32_t>(child_counts_.size());
+    tree.resize(static_cast<std::uint32_t>(child_counts_.size()));
     tree.weights_are = options_.weighting;
-    tree.descriptors = table_memory<words>(centres_.size());
     std::ranges::copy(centres_, tree.descriptors.values().begin());
     for (const auto& [node, part] : leaves_) tree.weights.push_back(weight_of(part));  // by ascending node
     while (!child_counts_.empty() && child_counts_.back() == 0) child_counts_.pop_back();

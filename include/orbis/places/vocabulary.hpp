@@ -15,11 +15,11 @@
 #include <utility>
 #include <vector>
 
+#include <orbis/core/bit_string.hpp>
 #include <orbis/core/simd.hpp>
 #include <orbis/places/bag_of_words.hpp>
-#include <orbis/places/bit_string.hpp>
 #include <orbis/places/detail/descent.hpp>
-#include <orbis/places/detail/vocabulary_tree.hpp>
+#include <orbis/places/vocabulary_tree.hpp>
 
 namespace orbis::places {
 
@@ -46,10 +46,10 @@ template <std::size_t Bits>
 class basic_vocabulary {
  public:
   static constexpr std::size_t bits = Bits;
-  using tree_type = detail::vocabulary_tree<Bits>;
+  using tree_type = vocabulary_tree<Bits>;
 
   basic_vocabulary() : tree_{std::make_shared<tree_type>(empty_tree())} {}
-  /// @pre a connected tree, see `detail::connect_tree`
+  /// @pre a connected tree, see `connect_tree`
   explicit basic_vocabulary(tree_type&& tree) : tree_{std::make_shared<tree_type>(std::move(tree))} {}
   // Moving is copying: what was moved from still has its words.
   basic_vocabulary(const basic_vocabulary&) noexcept = default;
@@ -108,27 +108,8 @@ class basic_vocabulary {
     return bag;
   }
 
-  /// The same tree with other weights, one for each word: of another kind of images, or without the words that
-  /// tell nothing. Shares nothing with this one. O(nodes).
-  /// @pre one weight for each word, all from 0 to `largest_weight`
-  [[nodiscard]] basic_vocabulary with_weights(std::vector<float> weights, places::weighting kind) const {
-    assert(weights.size() == size());
-    tree_type copy;
-    copy.descriptors = detail::table_memory<bit_words<Bits>>(tree_->descriptors.values().size());
-    std::ranges::copy(tree_->descriptors.values(), copy.descriptors.values().begin());
-    copy.nodes = tree_->nodes;
-    copy.weights = std::move(weights);
-    copy.node_count = tree_->node_count;
-    copy.branching = tree_->branching;
-    copy.depth = tree_->depth;
-    copy.weights_are = kind;
-    return basic_vocabulary{std::move(copy)};
-  }
-
   friend bool operator==(const basic_vocabulary& a, const basic_vocabulary& b) {
-    const auto same_node = [](const detail::tree_node& x, const detail::tree_node& y) {
-      return x.first_child == y.first_child;
-    };
+    const auto same_node = [](const tree_node& x, const tree_node& y) { return x.first_child == y.first_child; };
     return a.weighting() == b.weighting() && a.tree_->weights == b.tree_->weights &&
            std::ranges::equal(a.tree_->nodes, b.tree_->nodes, same_node) &&
            std::ranges::equal(a.tree_->descriptors.values(), b.tree_->descriptors.values());

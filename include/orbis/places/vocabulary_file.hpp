@@ -36,14 +36,16 @@
 #include <orbis/core/file.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/places/bag_of_words.hpp>
-#include <orbis/places/detail/vocabulary_tree.hpp>
 #include <orbis/places/vocabulary.hpp>
+#include <orbis/places/vocabulary_tree.hpp>
 
 namespace orbis::places {
 
+/// The first eight bytes of such a file.
+inline constexpr std::string_view vocabulary_magic = "orbisvoc";
+
 namespace detail {
 
-inline constexpr std::string_view vocabulary_magic = "orbisvoc";
 inline constexpr std::uint32_t vocabulary_version = 1;
 inline constexpr std::size_t vocabulary_header = 64, vocabulary_checked_from = 16;
 
@@ -96,7 +98,7 @@ template <std::size_t Bits, class Read>
     return bad(std::to_string(size) + " bytes, but what it declares takes " + std::to_string(expected));
 
   vocabulary_tree<Bits> tree;
-  tree.node_count = nodes;
+  tree.resize(nodes);
   tree.weights_are = static_cast<weighting>(field(20));
   std::uint32_t sum = crc32c(std::span{header}.subspan(vocabulary_checked_from));
   const auto read_all = [&](auto values) -> result<void> {
@@ -106,7 +108,6 @@ template <std::size_t Bits, class Read>
     swap_if_big_endian(values);
     return {};
   };
-  tree.descriptors = table_memory<bit_words<Bits>>(nodes - 1);
   if (auto done = read_all(all_words<Bits>(tree.descriptors.values())); !done) return fail(done.error());
   tree.weights.resize(words);
   if (auto done = read_all(std::span{tree.weights}); !done) return fail(done.error());
@@ -123,7 +124,7 @@ template <std::size_t Bits, class Read>
 template <std::size_t Bits>
 [[nodiscard]] std::string vocabulary_bytes(const basic_vocabulary<Bits>& vocabulary) {
   const auto& tree = vocabulary.tree();
-  std::string bytes(detail::vocabulary_magic);
+  std::string bytes(vocabulary_magic);
   const auto put = [&]<class T>(std::span<const T> values) {
     std::vector<T> swapped(values.begin(), values.end());
     detail::swap_if_big_endian(std::span{swapped});

@@ -13,6 +13,7 @@
 
 using namespace orbis;
 using namespace orbis::places;
+using orbis::places::detail::k_majority;
 
 TEST_CASE("votes are counted bit by bit, beyond where a byte runs over, and ties go as told") {
   random_bits random{1};

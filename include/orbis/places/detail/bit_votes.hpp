@@ -8,7 +8,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include <orbis/places/bit_string.hpp>
+#include <orbis/core/bit_string.hpp>
 
 namespace orbis::places::detail {
 

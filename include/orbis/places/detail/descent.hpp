@@ -12,10 +12,10 @@
 #include <cstdint>
 #include <cstring>
 
+#include <orbis/core/bit_string.hpp>
 #include <orbis/core/simd.hpp>
-#include <orbis/places/bit_string.hpp>
 #include <orbis/places/detail/nearest_child.hpp>
-#include <orbis/places/detail/vocabulary_tree.hpp>
+#include <orbis/places/vocabulary_tree.hpp>
 
 namespace orbis::places::detail {
 

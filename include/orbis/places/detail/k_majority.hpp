@@ -10,14 +10,14 @@
 #include <span>
 #include <vector>
 
+#include <orbis/core/bit_string.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/random.hpp>
 #include <orbis/core/simd.hpp>
-#include <orbis/places/bit_string.hpp>
 #include <orbis/places/detail/bit_votes.hpp>
 #include <orbis/places/detail/nearest_child.hpp>
 
-namespace orbis::places {
+namespace orbis::places::detail {
 
 struct k_majority_options {
   std::uint32_t clusters = 10;  ///< at most; fewer where there are fewer different descriptors
@@ -32,8 +32,6 @@ struct clustering {
   std::vector<bit_words<Bits>> centres;
   std::vector<std::uint16_t> cluster_of;
 };
-
-namespace detail {
 
 /// Lloyd's algorithm under the Hamming distance, whose median is the majority. All sums are of whole numbers, so
 /// that neither the number of threads nor the order matters.
@@ -143,8 +141,6 @@ class k_majority_solver {
   clustering<Bits> result_;
 };
 
-}  // namespace detail
-
 /// Clusters `descriptors`. The same seed gives the same clusters, under every policy. O(descriptors x clusters x
 /// iterations). Nothing in, nothing out.
 /// Source: C. Grana, D. Borghesani, M. Manfredi, R. Cucchiara, "A fast approach for integrating ORB descriptors in
@@ -154,7 +150,7 @@ template <std::size_t Bits, execution_policy Policy>
 [[nodiscard]] clustering<Bits> k_majority(const Policy& policy, std::span<const bit_words<Bits>> descriptors,
                                           const k_majority_options& options = {}) {
   assert(options.clusters > 0 && options.clusters < 65536 && options.max_iterations >= 0);
-  return detail::k_majority_solver<Bits>{descriptors, options}.solve(policy);
+  return k_majority_solver<Bits>{descriptors, options}.solve(policy);
 }
 
-}  // namespace orbis::places
+}  // namespace orbis::places::detail

@@ -7,9 +7,9 @@
 #include <cstddef>
 #include <cstdint>
 
+#include <orbis/core/bit_string.hpp>
 #include <orbis/core/bits.hpp>
 #include <orbis/core/simd.hpp>
-#include <orbis/places/bit_string.hpp>
 
 #if ORBIS_X86
 #include <immintrin.h>

@@ -16,6 +16,7 @@
 
 using namespace orbis;
 using namespace orbis::features;
+using namespace orbis::features::detail;
 
 namespace {
 

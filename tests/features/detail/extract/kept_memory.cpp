@@ -6,6 +6,7 @@
 #include "support/catch.hpp"
 
 using namespace orbis::features;
+using namespace orbis::features::detail;
 
 TEST_CASE("memory given back is taken again, copies have their own") {
   kept_memory<std::vector<int>> kept;

@@ -11,6 +11,7 @@
 
 using namespace orbis;
 using namespace orbis::features;
+using namespace orbis::features::detail;
 
 TEST_CASE("moments are the sums of the definition, at every level") {
   // The disc's rows as the ORB paper's authors published them.

@@ -13,6 +13,7 @@
 
 using namespace orbis;
 using namespace orbis::features;
+using namespace orbis::features::detail;
 
 TEST_CASE("each level of a pyramid is made of the one before it") {
   image_pyramid pyramid;

@@ -13,6 +13,7 @@
 
 using namespace orbis;
 using namespace orbis::features;
+using namespace orbis::features::detail;
 
 TEST_CASE("the Gaussian is OpenCV's, at every level and for every part of the rows") {
   const auto level = GENERATE(simd::level::portable, simd::level::popcnt, simd::level::avx2, simd::level::avx512);

@@ -8,12 +8,12 @@
 #include <orbis/core/random.hpp>
 #include <orbis/features/detail/extract/cover_first.hpp>
 #include <orbis/features/detail/extract/spread.hpp>
-#include <orbis/features/detail/extract/square_covering.hpp>
 
 #include "support/catch.hpp"
 
 using namespace orbis;
 using namespace orbis::features;
+using namespace orbis::features::detail;
 
 namespace {
 
@@ -46,8 +46,8 @@ bool in_image_order(const std::vector<corner>& corners) {
 
 }  // namespace
 
-TEMPLATE_TEST_CASE("every distribution leaves as many as wanted, in order, whatever the order before", "", even_cells,
-                   strongest, square_covering, cover_first) {
+TEMPLATE_TEST_CASE("every distribution leaves as many as wanted, in order, whatever the order before", "", strongest,
+                   cover_first) {
   const region area{20, 30, 150, 97};
   const auto corners = random_corners(600, area, 1);
   for (const int wanted : {0, 1, 2, 7, 100, 599, 600, 601, 5000}) {
@@ -72,41 +72,6 @@ TEST_CASE("the strongest are the strongest") {
   corners.resize(123);
   std::sort(corners.begin(), corners.end(), before_in_image);
   CHECK(some == corners);
-}
-
-TEST_CASE("corners are spread over cells before any cell gives a second") {
-  std::vector<corner> corners;
-  for (int y = 0; y != 40; ++y)
-    for (int x = 0; x != 40; ++x) corners.push_back({x, y, 100.0F});  // a cluster of strong ones
-  corners.push_back({150, 150, 10.0F});                               // a weak one, alone
-  corners.push_back({152, 150, 9.0F});                                // its weaker neighbour
-  const auto some = chosen(even_cells{}, corners, 16, {0, 0, 200, 200});
-  CHECK(some.size() == 16);
-  CHECK(std::count(some.begin(), some.end(), corner{150, 150, 10.0F}) == 1);
-  CHECK(std::count(some.begin(), some.end(), corner{0, 0, 100.0F}) == 1);
-  // 50-pixel cells: one corner of the cluster, one alone, its neighbour; the rest from the cluster again.
-  CHECK(std::count(some.begin(), some.end(), corner{152, 150, 9.0F}) == 1);
-  CHECK(chosen(even_cells{}, corners, 2, {0, 0, 200, 200}).size() == 2);
-}
-
-TEST_CASE("square covering keeps a distance that no larger one could") {
-  const region area{0, 0, 200, 200};
-  std::vector<corner> corners;
-  for (int y = 0; y != 200; y += 2)
-    for (int x = 0; x != 200; x += 2) corners.push_back({x, y, static_cast<float>((x * 7 + y * 13) % 50)});
-  const auto some = chosen(square_covering{}, corners, 100, area);
-  REQUIRE(some.size() == 100);
-  int nearest = 1000;
-  for (std::size_t i = 0; i != some.size(); ++i)
-    for (std::size_t j = 0; j != i; ++j)
-      nearest = std::min(nearest, std::max(std::abs(some[i].x - some[j].x), std::abs(some[i].y - some[j].y)));
-  CHECK(nearest >= 8);  // a regular grid of 100 has 20; the strongest would touch
-  const auto plain = chosen(strongest{}, corners, 100, area);
-  int closest = 1000;
-  for (std::size_t i = 0; i != plain.size(); ++i)
-    for (std::size_t j = 0; j != i; ++j)
-      closest = std::min(closest, std::max(std::abs(plain[i].x - plain[j].x), std::abs(plain[i].y - plain[j].y)));
-  CHECK(closest < nearest);
 }
 
 TEST_CASE("covering takes the strongest of each cell on any level, then the strongest of the levels") {
@@ -153,11 +118,4 @@ TEST_CASE("levels share by the sides of their images, and what one cannot give t
   CHECK(fill(10, 10, 1000) == std::vector<int>{10, 10, 50});
   CHECK(fill(1, 2, 3) == std::vector<int>{1, 2, 3});
   CHECK(fill(0, 0, 0) == std::vector<int>{0, 0, 0});
-}
-
-TEST_CASE("cells are no smaller than a pixel and no larger than the area") {
-  const region area{0, 0, 100, 80};
-  const auto corners = random_corners(500, area, 5);
-  for (const double per_cell : {1e-9, 1e-3, 1e3, 1e9})
-    CHECK(chosen(even_cells{.per_cell = per_cell}, corners, 50, area).size() == 50);
 }

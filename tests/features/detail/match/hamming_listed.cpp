@@ -10,6 +10,7 @@
 
 using namespace orbis;
 using namespace orbis::features;
+using namespace orbis::features::detail;
 
 TEMPLATE_TEST_CASE("distances to listed descriptors are those of the definition, at every level", "",
                    binary_descriptor<64>, binary_descriptor<256>, binary_descriptor<512>) {

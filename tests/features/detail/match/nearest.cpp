@@ -11,6 +11,7 @@
 
 using namespace orbis;
 using namespace orbis::features;
+using namespace orbis::features::detail;
 
 TEST_CASE("the nearest by any distance are those of sorting, lower indices first") {
   const auto distance = [](int a, int b) { return static_cast<std::uint32_t>(a > b ? a - b : b - a); };

@@ -10,10 +10,10 @@
 #include <span>
 #include <vector>
 
-#include <orbis/features/detail/extract/corner.hpp>
 #include <orbis/features/detail/extract/spread.hpp>
+#include <orbis/features/extractor.hpp>
 
-namespace orbis::features {
+namespace orbis::features::detail {
 
 /// First the image is covered: it is cut into square cells, as many as a share of the wanted corners, and
 /// every cell gives the strongest corner that it has on any level. The rest are the strongest of
@@ -35,12 +35,12 @@ struct cover_first {
 
   /// @pre 0 <= share <= 1
   void operator()(std::span<level_corners> levels, int wanted, workspace& memory) const {
-    detail::share_out(levels, wanted, memory.quotas);
+    share_out(levels, wanted, memory.quotas);
     take_covering(levels, wanted, memory);
     for (std::size_t l = 0; l != levels.size(); ++l) {
       std::vector<corner>&corners = levels[l].corners, &covering = memory.covering[l];
-      detail::keep_strongest(covering, memory.quotas[l]);
-      detail::keep_strongest(corners, memory.quotas[l] - static_cast<int>(covering.size()));
+      keep_strongest(covering, memory.quotas[l]);
+      keep_strongest(corners, memory.quotas[l] - static_cast<int>(covering.size()));
       corners.insert(corners.end(), covering.begin(), covering.end());
       std::sort(corners.begin(), corners.end(), before_in_image);
     }
@@ -84,6 +84,6 @@ struct cover_first {
       std::erase_if(level.corners, [](const corner& c) { return c.response == taken; });
   }
 };
-static_assert(corner_distribution<cover_first>);
+static_assert(corner_selection<cover_first>);
 
-}  // namespace orbis::features
+}  // namespace orbis::features::detail

@@ -17,10 +17,10 @@
 #include <orbis/core/image.hpp>
 #include <orbis/core/simd.hpp>
 #include <orbis/features/detail/extract/binomial.hpp>
-#include <orbis/features/detail/extract/corner.hpp>
 #include <orbis/features/detail/extract/fast_lanes.hpp>
+#include <orbis/features/extractor.hpp>
 
-namespace orbis::features {
+namespace orbis::features::detail {
 
 /// Finds FAST-9/16 corners: nine contiguous pixels of the circle of radius 3 are all brighter or all
 /// darker than the centre by more than a threshold. The response is the largest threshold at which
@@ -67,7 +67,6 @@ struct fast9 {
 
   void find_peaks(simd::level level, image_view<const std::uint8_t> image, const region& area, int threshold,
                   workspace& memory, std::vector<corner>& corners) const {
-    using namespace detail;
     // Scores are needed one pixel around the area, to see whether its outermost pixels are peaks.
     const int left = std::max(circle_radius, area.x - 1);
     const int right = std::min(image.width() - circle_radius, area.x + area.width + 1);
@@ -123,7 +122,6 @@ struct fast9 {
   /// the circles look.
   static void smooth_band(simd::level level, image_view<const std::uint8_t> image, int left, int count, int first,
                           int last, workspace& memory) {
-    using namespace detail;
     const std::size_t pitch = static_cast<std::size_t>(count) + 2 * margin;
     const int from = left - circle_radius, columns = count + 2 * circle_radius;  // all of them in the image
     const int from_more = std::max(0, from - 1), to_more = std::min(image.width(), from + columns + 1);
@@ -186,4 +184,4 @@ struct fast9 {
 };
 static_assert(corner_detector<fast9>);
 
-}  // namespace orbis::features
+}  // namespace orbis::features::detail

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-namespace orbis::features {
+namespace orbis::features::detail {
 
 /// A stock of workspaces: a call takes one and gives it back, so that calls that run at the same time have one
 /// each and calls that follow each other share one. What is not given back (after an exception) is
@@ -42,4 +42,4 @@ class kept_memory {
   std::vector<std::unique_ptr<Workspace>> stock_;
 };
 
-}  // namespace orbis::features
+}  // namespace orbis::features::detail

@@ -6,7 +6,7 @@
 #include <array>
 #include <cstdint>
 
-namespace orbis::features {
+namespace orbis::features::detail {
 
 /// Two pixels relative to a keypoint: a test asks whether the second is brighter than the first.
 struct brightness_test {
@@ -63,4 +63,4 @@ inline constexpr std::array<brightness_test, 256> orb_pattern{{
 }};
 // clang-format on
 
-}  // namespace orbis::features
+}  // namespace orbis::features::detail

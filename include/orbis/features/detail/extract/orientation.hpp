@@ -6,7 +6,6 @@
 #include <array>
 #include <cassert>
 #include <cmath>
-#include <concepts>
 #include <cstddef>
 #include <cstdint>
 #include <numbers>
@@ -14,30 +13,13 @@
 #include <orbis/core/image.hpp>
 #include <orbis/core/simd.hpp>
 #include <orbis/features/detail/extract/lanes16.hpp>
+#include <orbis/features/extractor.hpp>
 
 #if ORBIS_X86
 #include <immintrin.h>
 #endif
 
-namespace orbis::features {
-
-/// A direction in the image: angle in radians, [0, 2 pi), from x (right) towards y (down).
-struct orientation {
-  float angle = 0.0F;
-  float cosine = 1.0F;
-  float sine = 0.0F;
-};
-
-/// Finds the direction at a pixel of a pyramid level, at least `radius` pixels from its edge (on the right
-/// one pixel more).
-template <class O>
-concept orientation_estimator = requires(const O& orient, simd::level level, image_view<const std::uint8_t> image,
-                                         int at) {
-  { O::radius } -> std::convertible_to<int>;
-  { orient(level, image, at, at) } -> std::same_as<orientation>;
-};
-
-namespace detail {
+namespace orbis::features::detail {
 
 inline constexpr int disc_radius = 15;
 
@@ -161,28 +143,26 @@ inline image_moments disc_moments_avx2(const std::uint8_t* centre, std::ptrdiff_
   return rounded < 2.0F * std::numbers::pi_v<float> ? rounded : 0.0F;
 }
 
-}  // namespace detail
-
 /// The direction from a pixel to the centre of brightness of the disc of radius 15 around it
 /// (Rosin, "Measuring corner properties", 1999, as in the ORB paper); 0 where there is none.
 struct intensity_centroid {
-  static constexpr int radius = detail::disc_radius;
+  static constexpr int radius = disc_radius;
 
   /// @pre at least `radius` pixels from the image's edge, on the right one more
   [[nodiscard]] orientation operator()(simd::level level, image_view<const std::uint8_t> image, int x, int y) const {
     assert(x >= radius && y >= radius && x + radius + 1 < image.width() && y + radius < image.height());
 #if ORBIS_X86
-    const auto moments = simd::select<detail::disc_moments>(
-        level, {.portable = detail::disc_moments_portable, .avx2 = detail::disc_moments_avx2});
+    const auto moments =
+        simd::select<disc_moments>(level, {.portable = disc_moments_portable, .avx2 = disc_moments_avx2});
 #else
     (void)level;
-    const auto moments = detail::disc_moments_portable;
+    const auto moments = disc_moments_portable;
 #endif
-    const detail::image_moments m = moments(image.data() + y * image.stride() + x, image.stride());
+    const image_moments m = moments(image.data() + y * image.stride() + x, image.stride());
     if (m.x == 0 && m.y == 0) return {};
     const double mx = m.x, my = m.y;
     const double inverse = 1.0 / std::sqrt(mx * mx + my * my);  // exact below the root: 2^53 is not reached
-    return {detail::angle_of(mx, my), static_cast<float>(mx * inverse), static_cast<float>(my * inverse)};
+    return {angle_of(mx, my), static_cast<float>(mx * inverse), static_cast<float>(my * inverse)};
   }
 };
 
@@ -194,4 +174,4 @@ struct upright {
   }
 };
 
-}  // namespace orbis::features
+}  // namespace orbis::features::detail

@@ -14,7 +14,7 @@
 #include <orbis/core/simd.hpp>
 #include <orbis/features/detail/extract/resize.hpp>
 
-namespace orbis::features {
+namespace orbis::features::detail {
 
 /// An image and its shrunk copies, each made of the one before it (`resize`). Level k is `scale_factor`^k
 /// times smaller than the image, sides rounded to whole pixels. Keeps its memory from image to image.
@@ -68,4 +68,4 @@ class image_pyramid {
   std::vector<shrunk_level> shrunk_;
 };
 
-}  // namespace orbis::features
+}  // namespace orbis::features::detail

@@ -22,9 +22,7 @@
 #include <immintrin.h>
 #endif
 
-namespace orbis::features {
-
-namespace detail {
+namespace orbis::features::detail {
 
 /// Between which two pixels a pixel of the result lies; `weight` of the second in 1/256.
 struct resize_tap {
@@ -50,15 +48,13 @@ struct alignas(16) resize_group {
   std::int32_t base = 0;  ///< where the sixteen begin
 };
 
-}  // namespace detail
-
 /// How to get from one width to another; made once, used for any number of images.
 struct resize_plan {
   int from = 0, to = 0;  ///< widths
   // Of each pixel of the result, up to a whole number of vectors: between `first` and the pixel after it.
   std::vector<std::int32_t> first;
-  std::vector<std::uint16_t> weight;         ///< of the pixel after it, in 1/256
-  std::vector<detail::resize_group> groups;  ///< empty if the step is too large for them
+  std::vector<std::uint16_t> weight;  ///< of the pixel after it, in 1/256
+  std::vector<resize_group> groups;   ///< empty if the step is too large for them
 };
 
 /// Memory that `resize` uses again and again.
@@ -66,8 +62,6 @@ struct resize_workspace {
   resize_plan plan;
   std::vector<std::uint16_t> rows;  ///< two of the source, shrunk horizontally
 };
-
-namespace detail {
 
 using resize_along = void(const resize_plan& plan, const std::uint8_t* from, std::uint16_t* to);
 using resize_across = void(const std::uint16_t* first, const std::uint16_t* second, int weight, int count,
@@ -170,8 +164,6 @@ inline void resize_across_avx2(const std::uint16_t* first, const std::uint16_t* 
 }
 #endif
 
-}  // namespace detail
-
 /// Shrinks (or enlarges) an image to the size of `to` by bilinear interpolation: weights in 1/256, one
 /// rounding at the end. The same bits as OpenCV's INTER_LINEAR_EXACT, at every level. Fast for
 /// factors up to 1.8. Shrinking by more than 2 leaves pixels out. O(pixels of both).
@@ -179,7 +171,6 @@ inline void resize_across_avx2(const std::uint16_t* first, const std::uint16_t* 
 ///      the end of the last one, too)
 inline void resize(simd::level level, image_view<const std::uint8_t> from, image_view<std::uint8_t> to,
                    resize_workspace& memory) {
-  using namespace detail;
   assert(!from.empty() && !to.empty());
 #if ORBIS_X86
   const auto along = simd::select<resize_along>(level, {.portable = resize_along_portable, .avx2 = resize_along_avx2});
@@ -207,4 +198,4 @@ inline void resize(simd::level level, image_view<const std::uint8_t> from, image
   }
 }
 
-}  // namespace orbis::features
+}  // namespace orbis::features::detail

@@ -19,15 +19,13 @@
 #include <immintrin.h>
 #endif
 
-namespace orbis::features {
+namespace orbis::features::detail {
 
 /// Memory that `smooth` uses again and again.
 struct smooth_workspace {
   std::vector<std::uint8_t> line;   ///< a row with its reflections
   std::vector<std::uint16_t> sums;  ///< the last eight rows, smoothed horizontally
 };
-
-namespace detail {
 
 /// A Gaussian of sigma 2 at -3 ... 3, in 1/256; their sum is exactly one.
 inline constexpr std::array<int, 7> gaussian_weights{18, 34, 48, 56, 48, 34, 18};
@@ -124,8 +122,6 @@ inline void smooth_across_avx2(const std::array<const std::uint16_t*, 7>& rows, 
 }
 #endif
 
-}  // namespace detail
-
 /// Convolves rows `[first, last)` of an image with the 7x7 Gaussian of sigma 2, weights in 1/256, with one
 /// rounding at the end; beyond the edge the image is its reflection (without the edge itself). The same bits
 /// as OpenCV's GaussianBlur with these parameters, at every level. O(pixels).
@@ -133,7 +129,6 @@ inline void smooth_across_avx2(const std::array<const std::uint16_t*, 7>& rows, 
 ///      multiple of 32 pixels (at the end of the last one, too)
 inline void smooth(simd::level level, image_view<const std::uint8_t> from, image_view<std::uint8_t> to, int first,
                    int last, smooth_workspace& memory) {
-  using namespace detail;
   const int width = from.width(), height = from.height();
   assert(width >= 4 && height >= 4 && to.width() == width && to.height() == height);
   assert(first >= 0 && last <= height);
@@ -168,4 +163,4 @@ inline void smooth(simd::level level, image_view<const std::uint8_t> from, image
   }
 }
 
-}  // namespace orbis::features
+}  // namespace orbis::features::detail

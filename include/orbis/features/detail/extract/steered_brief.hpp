@@ -7,7 +7,6 @@
 #include <array>
 #include <bit>
 #include <cassert>
-#include <concepts>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -20,27 +19,13 @@
 #include <orbis/features/detail/extract/orb_pattern.hpp>
 #include <orbis/features/detail/extract/orientation.hpp>
 #include <orbis/features/detail/extract/smooth.hpp>
+#include <orbis/features/extractor.hpp>
 
 #if ORBIS_X86
 #include <immintrin.h>
 #endif
 
-namespace orbis::features {
-
-/// Describes keypoints of a pyramid level. `prepare` sees the level (and the rows that will be asked
-/// for) once, then the call operator describes pixels at least `reach` from its edge.
-template <class D>
-concept keypoint_descriptor = std::default_initializable<typename D::workspace> &&
-    requires(const D& describe, simd::level level, image_view<const std::uint8_t> image, typename D::workspace& memory,
-             const typename D::workspace& prepared, int at, const orientation& o) {
-  typename D::descriptor;
-  { D::reach } -> std::convertible_to<int>;
-  { D::diameter } -> std::convertible_to<int>;
-  describe.prepare(level, image, at, at, memory);
-  { describe(level, prepared, at, at, o) } -> std::same_as<typename D::descriptor>;
-};
-
-namespace detail {
+namespace orbis::features::detail {
 
 /// The coordinates of the tests' first pixels, then those of their second ones.
 struct alignas(64) split_pattern {
@@ -138,8 +123,6 @@ inline binary_descriptor<256> compare_halves_avx2(const std::uint8_t* bytes) {
 }
 #endif
 
-}  // namespace detail
-
 /// ORB's descriptor: the standard pattern, turned to the keypoint's direction and rounded to pixels,
 /// on the image smoothed by a Gaussian (7x7, sigma 2). The same bits at every level; those of
 /// OpenCV's ORB wherever the direction is the same.
@@ -170,19 +153,19 @@ struct steered_brief {
     const image_view<const std::uint8_t>& image = prepared.smoothed;
     assert(x >= reach && y >= reach && x + reach < image.width() && y + reach < image.height());
 #if ORBIS_X86
-    const auto pixels = simd::select<detail::steered_pixels>(
-        level, {.portable = detail::steered_pixels_portable, .avx2 = detail::steered_pixels_avx2});
-    const auto compare = simd::select<detail::compare_halves>(
-        level, {.portable = detail::compare_halves_portable, .avx2 = detail::compare_halves_avx2});
+    const auto pixels =
+        simd::select<steered_pixels>(level, {.portable = steered_pixels_portable, .avx2 = steered_pixels_avx2});
+    const auto compare =
+        simd::select<compare_halves>(level, {.portable = compare_halves_portable, .avx2 = compare_halves_avx2});
 #else
     (void)level;
-    const auto pixels = detail::steered_pixels_portable;
-    const auto compare = detail::compare_halves_portable;
+    const auto pixels = steered_pixels_portable;
+    const auto compare = compare_halves_portable;
 #endif
     std::array<std::uint8_t, 512> brightness;
-    pixels(detail::orb_points, o, image.data() + y * image.stride() + x, image.stride(), brightness.data());
+    pixels(orb_points, o, image.data() + y * image.stride() + x, image.stride(), brightness.data());
     return compare(brightness.data());
   }
 };
 
-}  // namespace orbis::features
+}  // namespace orbis::features::detail

@@ -13,9 +13,7 @@
 #include <orbis/features/descriptor.hpp>
 #include <orbis/features/hamming.hpp>
 
-namespace orbis::features {
-
-namespace detail {
+namespace orbis::features::detail {
 
 template <std::size_t Bits>
 using listed_kernel = void(const binary_descriptor<Bits>&, std::span<const binary_descriptor<Bits>>,
@@ -40,8 +38,6 @@ void hamming_listed_popcnt(const binary_descriptor<Bits>& query, std::span<const
 }
 #endif
 
-}  // namespace detail
-
 /// `distances[i]` becomes the Hamming distance between `query` and `trains[indices[i]]`.
 /// @pre distances.size() == indices.size(); indices are of trains
 template <std::size_t Bits>
@@ -50,13 +46,12 @@ void hamming_listed(simd::level level, const binary_descriptor<Bits>& query,
                     std::span<std::uint32_t> distances) {
   assert(distances.size() == indices.size());
 #if ORBIS_X86
-  simd::select<detail::listed_kernel<Bits>>(
-      level, {.portable = detail::hamming_listed_portable<Bits>, .popcnt = detail::hamming_listed_popcnt<Bits>})(
-      query, trains, indices, distances);
+  simd::select<listed_kernel<Bits>>(level, {.portable = hamming_listed_portable<Bits>,
+                                            .popcnt = hamming_listed_popcnt<Bits>})(query, trains, indices, distances);
 #else
   static_cast<void>(level);
-  detail::hamming_listed_portable(query, trains, indices, distances);
+  hamming_listed_portable(query, trains, indices, distances);
 #endif
 }
 
-}  // namespace orbis::features
+}  // namespace orbis::features::detail

@@ -17,28 +17,24 @@
 #include <orbis/features/detail/match/nearest.hpp>
 #include <orbis/features/hamming.hpp>
 
-namespace orbis::features {
+namespace orbis::features::detail {
 
-namespace detail {
 template <class T>
 inline constexpr bool is_binary_descriptor = false;
 template <std::size_t Bits>
 inline constexpr bool is_binary_descriptor<binary_descriptor<Bits>> = true;
-}  // namespace detail
 
 /// Descriptors that `hamming_nearest` knows. Those of 256 bits have kernels of their own.
 template <class Descriptor>
-concept has_hamming_kernel = detail::is_binary_descriptor<Descriptor>;
+concept has_hamming_kernel = is_binary_descriptor<Descriptor>;
 
 /// Memory of `hamming_nearest`, which the next call uses again.
 struct hamming_workspace {
-  std::vector<detail::slice_query> queries;
-  std::vector<detail::slice_table<4>> table4;  ///< of the trains at hand, for registers of up to 256 bits
-  std::vector<detail::slice_table<8>> table8;  ///< likewise, of 512 bits
+  std::vector<slice_query> queries;
+  std::vector<slice_table<4>> table4;  ///< of the trains at hand, for registers of up to 256 bits
+  std::vector<slice_table<8>> table8;  ///< likewise, of 512 bits
   std::vector<std::uint32_t> reverse_distance;
 };
-
-namespace detail {
 
 template <std::size_t Bits>
 using descriptor_span = std::span<const binary_descriptor<Bits>>;
@@ -228,24 +224,22 @@ void hamming_dispatch(simd::level level, descriptor_span<Bits> queries, descript
   search(queries, trains, keep, reverse, workspace);
 }
 
-}  // namespace detail
-
 /// For each query its nearest and second nearest train; if `reverse` is not empty, for each train its nearest
 /// query (the lowest on ties), in the same pass. Every level gives the same answer. O(queries x trains) time,
 /// O(queries + trains) memory, all of it in `workspace`.
 /// @pre nearest.size() == queries.size(); reverse is empty or of the size of trains
 template <std::size_t Bits = 256>
-void hamming_nearest(simd::level level, std::type_identity_t<detail::descriptor_span<Bits>> queries,
-                     std::type_identity_t<detail::descriptor_span<Bits>> trains, std::span<nearest_two> nearest,
+void hamming_nearest(simd::level level, std::type_identity_t<descriptor_span<Bits>> queries,
+                     std::type_identity_t<descriptor_span<Bits>> trains, std::span<nearest_two> nearest,
                      std::span<std::uint32_t> reverse, hamming_workspace& workspace) {
   assert(nearest.size() == queries.size() && (reverse.empty() || reverse.size() == trains.size()));
   std::fill(nearest.begin(), nearest.end(), nearest_two{});
-  detail::hamming_dispatch<Bits>(level, queries, trains, detail::keep_two{nearest.data()}, reverse, workspace);
+  hamming_dispatch<Bits>(level, queries, trains, keep_two{nearest.data()}, reverse, workspace);
 }
 /// The same, with memory of its own.
 template <std::size_t Bits = 256>
-void hamming_nearest(simd::level level, std::type_identity_t<detail::descriptor_span<Bits>> queries,
-                     std::type_identity_t<detail::descriptor_span<Bits>> trains, std::span<nearest_two> nearest,
+void hamming_nearest(simd::level level, std::type_identity_t<descriptor_span<Bits>> queries,
+                     std::type_identity_t<descriptor_span<Bits>> trains, std::span<nearest_two> nearest,
                      std::span<std::uint32_t> reverse) {
   hamming_workspace workspace;
   hamming_nearest<Bits>(level, queries, trains, nearest, reverse, workspace);
@@ -255,12 +249,12 @@ void hamming_nearest(simd::level level, std::type_identity_t<detail::descriptor_
 /// and what there are too few trains for is left at the default.
 /// @pre k > 0; nearest.size() == queries.size() * k
 template <std::size_t Bits = 256>
-void hamming_k_nearest(simd::level level, std::type_identity_t<detail::descriptor_span<Bits>> queries,
-                       std::type_identity_t<detail::descriptor_span<Bits>> trains, std::size_t k,
-                       std::span<neighbor> nearest, hamming_workspace& workspace) {
+void hamming_k_nearest(simd::level level, std::type_identity_t<descriptor_span<Bits>> queries,
+                       std::type_identity_t<descriptor_span<Bits>> trains, std::size_t k, std::span<neighbor> nearest,
+                       hamming_workspace& workspace) {
   assert(k > 0 && nearest.size() == queries.size() * k);
   std::fill(nearest.begin(), nearest.end(), neighbor{});
-  detail::hamming_dispatch<Bits>(level, queries, trains, detail::keep_k{nearest.data(), k}, {}, workspace);
+  hamming_dispatch<Bits>(level, queries, trains, keep_k{nearest.data(), k}, {}, workspace);
 }
 
-}  // namespace orbis::features
+}  // namespace orbis::features::detail

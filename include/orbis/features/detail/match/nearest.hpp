@@ -11,7 +11,7 @@
 #include <span>
 #include <vector>
 
-namespace orbis::features {
+namespace orbis::features::detail {
 
 /// In place of an index or a distance that does not exist.
 inline constexpr std::uint32_t no_neighbor = std::numeric_limits<std::uint32_t>::max();
@@ -82,4 +82,4 @@ void k_nearest_by(const Distance& distance, std::span<const Descriptor> queries,
   }
 }
 
-}  // namespace orbis::features
+}  // namespace orbis::features::detail

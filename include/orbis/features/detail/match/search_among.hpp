@@ -15,7 +15,7 @@
 #include <orbis/features/hamming.hpp>
 #include <orbis/features/match.hpp>
 
-namespace orbis::features {
+namespace orbis::features::detail {
 
 /// Memory of `search_among`, which the next call uses again.
 struct search_among_workspace {
@@ -72,4 +72,4 @@ void search_among(const Distance& distance, simd::level level, std::vector<candi
     for (candidate& c : candidates) c.reverse_query = reverse[c.train].query;
 }
 
-}  // namespace orbis::features
+}  // namespace orbis::features::detail

@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// 8-bit grey images of other ones.
+/// The luma of a row of colour pixels.
 #pragma once
 
-#include <algorithm>
-#include <cassert>
 #include <cstddef>
 #include <cstdint>
 
@@ -15,9 +13,7 @@
 #include <immintrin.h>
 #endif
 
-namespace orbis::features {
-
-namespace detail {
+namespace orbis::features::detail {
 
 /// Rec. 601 luma, in 1/32768.
 inline constexpr int luma_red = 9798, luma_green = 19235, luma_blue = 3735;
@@ -60,35 +56,4 @@ inline void luma_row_avx2(const rgb8* from, int count, std::uint8_t* to) {
 }
 #endif
 
-}  // namespace detail
-
-/// The luma (Rec. 601, to the nearest) of a colour image: the same bits as OpenCV's COLOR_RGB2GRAY.
-/// @pre the images have one size
-inline void luma(simd::level level, image_view<const rgb8> from, image_view<std::uint8_t> to) {
-  assert(from.width() == to.width() && from.height() == to.height());
-#if ORBIS_X86
-  const auto row =
-      simd::select<detail::luma_row>(level, {.portable = detail::luma_row_portable, .avx2 = detail::luma_row_avx2});
-#else
-  (void)level;
-  const auto row = detail::luma_row_portable;
-#endif
-  for (int y = 0; y < from.height(); ++y) row(from.row(y).data(), from.width(), to.row(y).data());
-}
-
-/// A 16-bit image (infrared, thermal, raw) as 8 bits: `low` and what is below becomes 0, `high` and what is
-/// above 255, linear and rounded between. Which values hold the scene only the caller knows; keep
-/// the two fixed over a recording, or brightness will flicker.
-/// @pre low < high; the images have one size
-inline void narrow(image_view<const std::uint16_t> from, image_view<std::uint8_t> to, std::uint16_t low,
-                   std::uint16_t high) {
-  assert(low < high && from.width() == to.width() && from.height() == to.height());
-  const std::uint32_t range = std::uint32_t{high} - low;
-  for (int y = 0; y < from.height(); ++y)
-    for (int x = 0; x < from.width(); ++x) {
-      const std::uint32_t above = std::uint32_t{std::clamp(from(x, y), low, high)} - low;
-      to(x, y) = static_cast<std::uint8_t>((above * 255 + range / 2) / range);
-    }
-}
-
-}  // namespace orbis::features
+}  // namespace orbis::features::detail

@@ -9,7 +9,7 @@
 #include <string>
 #include <string_view>
 
-namespace orbis::places {
+namespace orbis {
 
 namespace detail {
 
@@ -60,4 +60,4 @@ inline constexpr auto base85_digits = [] {
   return true;
 }
 
-}  // namespace orbis::places
+}  // namespace orbis

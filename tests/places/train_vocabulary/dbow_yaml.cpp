@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include "train_vocabulary/dbow_yaml.hpp"
+
 #include <string>
 
-#include <orbis/places/dbow_yaml.hpp>
-
-#include "places/foreign_files.hpp"
 #include "places/images.hpp"
+#include "places/train_vocabulary/foreign_files.hpp"
 #include "support/catch.hpp"
 
 using namespace orbis;
 using namespace orbis::places;
+using dbow::parse_dbow_yaml;
 using orbis::test::byte_list;
 
 TEST_CASE("a vocabulary in YAML gives the same words and bags, in each way that descriptors are written") {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A vocabulary from a file of any of the formats that are known.
+/// Reads a vocabulary of any known format.
 #pragma once
 
 #include <cstddef>
@@ -10,12 +10,16 @@
 #include <string_view>
 
 #include <orbis/core/result.hpp>
-#include <orbis/places/dbow_text.hpp>
-#include <orbis/places/dbow_yaml.hpp>
 #include <orbis/places/vocabulary.hpp>
 #include <orbis/places/vocabulary_file.hpp>
 
-namespace orbis::places {
+#include "dbow_text.hpp"
+#include "dbow_yaml.hpp"
+
+namespace dbow {
+
+using namespace orbis;
+using namespace orbis::places;
 
 /// Reads a vocabulary of our own format, or of DBoW2's text or DBoW3's YAML, told apart by how the file begins.
 /// Errors: not_found, unreadable, malformed, unsupported (gzip among them).
@@ -27,9 +31,9 @@ template <std::size_t Bits = 256>
   const std::string_view begins{head, static_cast<std::size_t>(in.gcount())};
   in.close();
   if (begins.starts_with("\x1f\x8b")) return fail(errc::unsupported, path.string(), "is compressed: unpack it first");
-  if (begins == detail::vocabulary_magic) return read_vocabulary<Bits>(path);
+  if (begins == vocabulary_magic) return read_vocabulary<Bits>(path);
   if (begins.starts_with('%') || begins.starts_with("vocab")) return read_dbow_yaml<Bits>(path);
   return read_dbow_text<Bits>(path);
 }
 
-}  // namespace orbis::places
+}  // namespace dbow

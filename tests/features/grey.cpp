@@ -4,7 +4,7 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include <orbis/features/detail/extract/grey.hpp>
+#include <orbis/features/grey.hpp>
 #include <orbis/interop/opencv.hpp>
 
 #include "features/images.hpp"
@@ -12,6 +12,7 @@
 
 using namespace orbis;
 using namespace orbis::features;
+using namespace orbis::features::detail;
 
 TEST_CASE("luma is OpenCV's, at every level") {
   const auto level = GENERATE(simd::level::portable, simd::level::popcnt, simd::level::avx2, simd::level::avx512);

@@ -11,11 +11,14 @@
 #include <utility>
 #include <vector>
 
+#include <orbis/core/bit_string.hpp>
 #include <orbis/places/bag_of_words.hpp>
-#include <orbis/places/bit_string.hpp>
-#include <orbis/places/detail/vocabulary_tree.hpp>
+#include <orbis/places/vocabulary_tree.hpp>
 
-namespace orbis::places::detail {
+namespace dbow {
+
+using namespace orbis;
+using namespace orbis::places;
 
 /// Node `i` of the list is called `i + 1`; 0 is the root, which is not listed.
 template <std::size_t Bits>
@@ -49,8 +52,7 @@ template <std::size_t Bits, class IsWord>
   }
   const auto first_of = [&](std::uint32_t node) { return node == 0 ? 0U : begin[node - 1]; };
 
-  tree.node_count = static_cast<std::uint32_t>(n);
-  tree.descriptors = table_memory<bit_words<Bits>>(list.size());
+  tree.resize(static_cast<std::uint32_t>(n));
   std::vector<std::uint32_t> order{0};
   order.reserve(n);
   std::vector<std::uint16_t> child_counts;
@@ -75,4 +77,4 @@ template <std::size_t Bits, class IsWord>
   return {connect_tree(tree, child_counts), 0};
 }
 
-}  // namespace orbis::places::detail
+}  // namespace dbow

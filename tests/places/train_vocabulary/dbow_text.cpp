@@ -1,19 +1,19 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include "train_vocabulary/dbow_text.hpp"
+
 #include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <string>
 #include <vector>
 
-#include <orbis/places/dbow_text.hpp>
-#include <orbis/places/dbow_yaml.hpp>
-
-#include "places/foreign_files.hpp"
 #include "places/images.hpp"
+#include "places/train_vocabulary/foreign_files.hpp"
 #include "support/catch.hpp"
 
 using namespace orbis;
 using namespace orbis::places;
+using dbow::parse_dbow_text;
 using orbis::test::byte_list;
 
 TEST_CASE("a vocabulary in DBoW2's text gives the same words and bags, whatever the order of its nodes") {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A vocabulary's tree in memory: level after level, the children of a node side by side.
+/// The tree of a vocabulary: what readers of other formats fill in.
 #pragma once
 
 #include <algorithm>
@@ -11,54 +11,62 @@
 #include <utility>
 #include <vector>
 
+#include <orbis/core/bit_string.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/places/bag_of_words.hpp>
-#include <orbis/places/bit_string.hpp>
 #include <orbis/places/detail/table_memory.hpp>
 
-namespace orbis::places::detail {
+namespace orbis::places {
 
-/// What the search has to know of a node besides its descriptor.
+/// What the search needs to know of a node besides its descriptor.
 struct tree_node {
-  std::uint32_t first_child = 0;   ///< the next node's is one past the last child
-  std::uint32_t inner_before = 0;  ///< how many nodes before this one have children
+  std::uint32_t first_child = 0;   ///< the children end where those of the next node begin
+  std::uint32_t inner_before = 0;  ///< number of nodes before this one that have children
 };
 
-/// Nodes are numbered level by level from the root, 0; those of a level in the order of their parents. Words are
-/// the leaves in that order.
+/// A tree of descriptors of `Bits` bits. Nodes are numbered level by level from the root, 0; those of a level in the
+/// order of their parents, so that the children of a node stand side by side. Words are the leaves in that order.
+///
+/// To make one: `resize`, fill in `descriptors` and `weights`, then call `connect_tree`.
 template <std::size_t Bits>
 struct vocabulary_tree {
-  table_memory<bit_words<Bits>> descriptors;  ///< of node i at i - 1: the root has none
-  std::vector<tree_node> nodes;               ///< up to the last with children, and one more; the others are leaves
-  std::vector<float> weights;                 ///< of the words
+  detail::table_memory<bit_words<Bits>> descriptors;  ///< that of node i at i - 1: the root has none
+  std::vector<tree_node> nodes;  ///< up to the last that has children, and one more; all others are leaves
+  std::vector<float> weights;    ///< of the words
   std::uint32_t node_count = 1;
   std::uint32_t branching = 0;  ///< the most children of a node
   std::uint32_t depth = 0;      ///< levels below the root
   weighting weights_are = weighting::tf_idf;
 
+  /// Makes room for so many nodes, the root among them. Their descriptors have no values yet. @pre > 0
+  void resize(std::uint32_t nodes_with_root) {
+    node_count = nodes_with_root;
+    descriptors = detail::table_memory<bit_words<Bits>>(nodes_with_root - 1);
+  }
+
   [[nodiscard]] std::uint32_t word_count() const noexcept { return static_cast<std::uint32_t>(weights.size()); }
-  /// Nodes from this one on are leaves.
+  /// All nodes from this one on are leaves.
   [[nodiscard]] std::uint32_t inner_end() const noexcept { return static_cast<std::uint32_t>(nodes.size() - 1); }
   [[nodiscard]] bool is_leaf(std::uint32_t node) const noexcept {
     return node >= inner_end() || nodes[node].first_child == nodes[node + 1].first_child;
   }
-  /// @pre is_leaf(leaf)
+  /// The word of a leaf. @pre is_leaf(leaf)
   [[nodiscard]] std::uint32_t word_of_leaf(std::uint32_t leaf) const noexcept {
     return leaf - nodes[std::min(leaf, inner_end())].inner_before;
   }
 };
 
-/// Completes `tree`, whose descriptors and weights are there, by the numbers of children of its nodes in order, up to
-/// the last that has any. Returns what is wrong with them, or nothing. O(nodes).
+/// Completes a tree that has its descriptors and weights: `child_counts[i]` is the number of children of node i, for
+/// the nodes up to the last that has any. Returns what is wrong, or an empty string. O(nodes).
 template <std::size_t Bits>
 [[nodiscard]] std::string connect_tree(vocabulary_tree<Bits>& tree, std::span<const std::uint16_t> child_counts) {
   tree.nodes.assign(child_counts.size() + 1, {});
   tree.branching = tree.depth = 0;
   std::uint64_t next = 1;
   std::uint32_t inner = 0;
-  std::uint64_t level_end = 1;  // of the level that is being passed through
+  std::uint64_t level_end = 1;  // first node behind the level of node i
   for (std::size_t i = 0; i != child_counts.size(); ++i) {
-    if (i >= next) return "node " + std::to_string(i) + " is nobody's child";
+    if (i >= next) return "node " + std::to_string(i) + " has no parent";
     if (i == level_end) level_end = next;
     if (child_counts[i] != 0 && next == level_end) ++tree.depth;  // the first child of a new level
     tree.nodes[i] = {static_cast<std::uint32_t>(next), inner};
@@ -77,4 +85,4 @@ template <std::size_t Bits>
   return {};
 }
 
-}  // namespace orbis::places::detail
+}  // namespace orbis::places

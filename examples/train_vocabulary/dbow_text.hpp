@@ -18,17 +18,19 @@
 #include <utility>
 #include <vector>
 
+#include <orbis/core/bit_string.hpp>
 #include <orbis/core/file.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/places/bag_of_words.hpp>
-#include <orbis/places/bit_string.hpp>
-#include <orbis/places/detail/parent_list.hpp>
-#include <orbis/places/detail/vocabulary_tree.hpp>
 #include <orbis/places/vocabulary.hpp>
+#include <orbis/places/vocabulary_tree.hpp>
 
-namespace orbis::places {
+#include "parent_list.hpp"
 
-namespace detail {
+namespace dbow {
+
+using namespace orbis;
+using namespace orbis::places;
 
 [[nodiscard]] constexpr bool is_blank(char c) noexcept { return c == ' ' || c == '\t' || c == '\r' || c == '\n'; }
 
@@ -62,8 +64,6 @@ constexpr void set_byte(bit_words<Bits>& descriptor, std::size_t i, std::uint8_t
   return weight >= 0.0 && weight <= static_cast<double>(largest_weight);
 }
 
-}  // namespace detail
-
 /// The vocabulary in `text`; `where` names it in errors. Words are numbered by our own order; bags and scores are those
 /// of DBoW2. Errors, with the line: malformed.
 template <std::size_t Bits = 256>
@@ -82,47 +82,47 @@ template <std::size_t Bits = 256>
 
   std::string_view head = next_line();
   std::int64_t branching = 0, depth = 0, score = 0, weights_are = 0;
-  if (!detail::take_number(head, branching) || !detail::take_number(head, depth) || !detail::take_number(head, score) ||
-      !detail::take_number(head, weights_are) || !detail::take_field(head).empty())
+  if (!take_number(head, branching) || !take_number(head, depth) || !take_number(head, score) ||
+      !take_number(head, weights_are) || !take_field(head).empty())
     return bad(1, "the first line is not branching, depth, score and weighting");
   if (branching < 1 || depth < 1) return bad(1, "branching and depth are at least 1");
   if (score < 0 || score > 5) return bad(1, "the score is not one of 0 to 5");
   if (weights_are < 0 || weights_are > 3) return bad(1, "the weighting is not one of 0 to 3");
 
-  detail::parent_list<Bits> list;
+  parent_list<Bits> list;
   std::vector<bool> is_word{false};
   while (!text.empty()) {
     std::string_view line = next_line();
     std::uint32_t parent = 0;
     int leaf = 0;
     double weight = 0.0;
-    if (std::string_view rest = line; detail::take_field(rest).empty()) {
-      if (detail::take_field(text).empty()) break;  // blanks up to the end
+    if (std::string_view rest = line; take_field(rest).empty()) {
+      if (take_field(text).empty()) break;  // blanks up to the end
       return bad(line_number, "a blank line between nodes");
     }
-    if (!detail::take_number(line, parent)) return bad(line_number, "does not begin with the number of a parent");
+    if (!take_number(line, parent)) return bad(line_number, "does not begin with the number of a parent");
     if (parent > list.size()) return bad(line_number, "a parent that does not stand before its child");
-    if (!detail::take_number(line, leaf) || leaf < 0 || leaf > 1)
+    if (!take_number(line, leaf) || leaf < 0 || leaf > 1)
       return bad(line_number, "the second field is not 1 for a word or 0");
     bit_words<Bits> descriptor{};
     for (std::size_t i = 0; i != Bits / 8; ++i) {
       std::uint8_t byte = 0;
-      if (!detail::take_number(line, byte))
+      if (!take_number(line, byte))
         return bad(line_number, "a descriptor of fewer than " + std::to_string(Bits / 8) + " bytes from 0 to 255");
-      detail::set_byte<Bits>(descriptor, i, byte);
+      set_byte<Bits>(descriptor, i, byte);
     }
-    if (!detail::take_number(line, weight) || !detail::good_weight(weight))
+    if (!take_number(line, weight) || !good_weight(weight))
       return bad(line_number, "no weight from 0 to 1e20 behind " + std::to_string(Bits / 8) + " bytes");
-    if (!detail::take_field(line).empty()) return bad(line_number, "there is more on the line than a node");
+    if (!take_field(line).empty()) return bad(line_number, "there is more on the line than a node");
     list.parents.push_back(parent);
     list.descriptors.push_back(descriptor);
     list.weights.push_back(static_cast<float>(weight));
     is_word.push_back(leaf == 1);
   }
 
-  detail::vocabulary_tree<Bits> tree;
+  vocabulary_tree<Bits> tree;
   tree.weights_are = static_cast<weighting>(weights_are);
-  const auto problem = detail::order_by_level(
+  const auto problem = order_by_level(
       list, [&](std::uint32_t node) { return is_word[node]; }, tree);
   if (!problem.what.empty())  // node i stands on line i + 1
     return bad(problem.node + 1, "node " + std::to_string(problem.node) + " " + problem.what);
@@ -137,4 +137,4 @@ template <std::size_t Bits = 256>
   return parse_dbow_text<Bits>(*text, path.string());
 }
 
-}  // namespace orbis::places
+}  // namespace dbow

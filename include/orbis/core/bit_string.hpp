@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// What the places ask of a descriptor: that it is a string of bits.
+/// Strings of bits, such as binary descriptors: what they are, their words, their Hamming distance.
 #pragma once
 
 #include <array>
@@ -12,32 +12,37 @@
 
 #include <orbis/core/bits.hpp>
 
-namespace orbis::places {
+namespace orbis {
 
-/// A binary descriptor of anybody's making: trivially copyable, without padding, of whole 64-bit words. Its bits
-/// are those of its bytes in memory; `features::binary_descriptor`, `std::array<std::uint64_t, 4>` and, on a
-/// little-endian machine, `std::array<unsigned char, 32>` over a row of OpenCV's mean the same.
+/// A string of bits of any type: trivially copyable, without padding, a whole number of 64-bit words long. Its bits are
+/// those of its bytes in memory. `features::binary_descriptor<256>`, `std::array<std::uint64_t, 4>` and, on a
+/// little-endian machine, a row of 32 bytes of OpenCV's are the same string.
 template <class D>
 concept bit_string = std::is_trivially_copyable_v<D> && std::has_unique_object_representations_v<D> && sizeof(D) % 8 ==
                      0;
 
-/// Descriptors side by side in memory.
+/// The number of bits of such a type.
+template <bit_string D>
+inline constexpr std::size_t bits_of = 8 * sizeof(D);
+
+/// Bit strings side by side in memory.
 template <class R>
 concept bit_string_range =
     std::ranges::contiguous_range<R> && std::ranges::sized_range<R> && bit_string<std::ranges::range_value_t<R>>;
 
-/// Such a range, of descriptors of `Bits` bits.
+/// A range of strings of `Bits` bits.
 template <class R, std::size_t Bits>
-concept bit_string_range_of = bit_string_range<R> && 8 * sizeof(std::ranges::range_value_t<R>) == Bits;
+concept bit_string_range_of = bit_string_range<R> && bits_of<std::ranges::range_value_t<R>>
+== Bits;
 
 /// `Bits` bits: bit `i` is bit `i % 64` of word `i / 64`.
 template <std::size_t Bits>
 requires(Bits > 0 && Bits % 64 == 0 && Bits < 65536) using bit_words = std::array<std::uint64_t, Bits / 64>;
 
-/// A descriptor's bits.
+/// The bits of a string as words.
 template <bit_string D>
-[[nodiscard]] constexpr bit_words<8 * sizeof(D)> words_of(const D& descriptor) noexcept {
-  return std::bit_cast<bit_words<8 * sizeof(D)>>(descriptor);
+[[nodiscard]] constexpr bit_words<bits_of<D>> words_of(const D& string) noexcept {
+  return std::bit_cast<bit_words<bits_of<D>>>(string);
 }
 
 /// The number of bits in which two strings differ.
@@ -49,4 +54,4 @@ template <std::size_t Words>
   return sum;
 }
 
-}  // namespace orbis::places
+}  // namespace orbis

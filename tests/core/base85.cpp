@@ -2,13 +2,12 @@
 #include <cstdint>
 #include <string>
 
+#include <orbis/core/base85.hpp>
 #include <orbis/core/random.hpp>
-#include <orbis/places/detail/base85.hpp>
 
 #include "support/catch.hpp"
 
 using namespace orbis;
-using namespace orbis::places;
 
 TEST_CASE("bytes come back from text, and the text can stand in a literal") {
   random_bits random{1};

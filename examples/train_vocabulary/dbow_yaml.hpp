@@ -31,14 +31,16 @@
 
 #include <orbis/core/file.hpp>
 #include <orbis/core/result.hpp>
-#include <orbis/places/dbow_text.hpp>
-#include <orbis/places/detail/parent_list.hpp>
-#include <orbis/places/detail/vocabulary_tree.hpp>
 #include <orbis/places/vocabulary.hpp>
+#include <orbis/places/vocabulary_tree.hpp>
 
-namespace orbis::places {
+#include "dbow_text.hpp"
+#include "parent_list.hpp"
 
-namespace detail {
+namespace dbow {
+
+using namespace orbis;
+using namespace orbis::places;
 
 /// The text from front to back, and the line that has been reached.
 class yaml_scanner {
@@ -299,13 +301,11 @@ class dbow_yaml_parser {
   std::size_t line_ = 1;
 };
 
-}  // namespace detail
-
 /// The vocabulary in `text`; `where` names it in errors. Words are numbered by our own order.
 /// Errors, with the line: malformed; unsupported (descriptors that are not of `Bits` bits).
 template <std::size_t Bits = 256>
 [[nodiscard]] result<basic_vocabulary<Bits>> parse_dbow_yaml(std::string_view text, const std::string& where = "text") {
-  return detail::dbow_yaml_parser<Bits>{text, where}.parse();
+  return dbow_yaml_parser<Bits>{text, where}.parse();
 }
 
 /// Reads a file that is not compressed. Errors: not_found, unreadable, malformed, unsupported.
@@ -316,4 +316,4 @@ template <std::size_t Bits = 256>
   return parse_dbow_yaml<Bits>(*text, path.string());
 }
 
-}  // namespace orbis::places
+}  // namespace dbow

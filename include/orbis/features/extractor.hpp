@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// What a feature extractor is, and the parts that `basic_orb_extractor` is made of.
+///
+/// | concept | what it does | ours |
+/// | --- | --- | --- |
+/// | `feature_extractor` | finds and describes the keypoints of an image | `orb_extractor` |
+/// | `corner_detector` | finds the corners of a pyramid level | `fast9` |
+/// | `corner_selection` | chooses among the corners of all levels | `cover_first`, `strongest` |
+/// | `orientation_estimator` | gives a keypoint its direction | `intensity_centroid`, `upright` |
+/// | `patch_descriptor` | describes the pixels around a keypoint | `steered_brief` |
+#pragma once
+
+#include <concepts>
+#include <cstdint>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include <orbis/core/image.hpp>
+#include <orbis/core/simd.hpp>
+#include <orbis/features/descriptor.hpp>
+
+namespace orbis::features {
+
+namespace detail {
+template <class T>
+inline constexpr bool is_features = false;
+template <class D>
+inline constexpr bool is_features<basic_features<D>> = true;
+}  // namespace detail
+
+/// Finds features in a colour image: a callable that returns `basic_features<D>` for any `feature_descriptor` D. Calls
+/// on a const object may run at the same time.
+template <class E>
+concept feature_extractor = requires(const E& extract, image_view<const rgb8> image) {
+  requires detail::is_features<decltype(extract(image))>;
+};
+
+/// The type of the descriptors that an extractor makes.
+template <feature_extractor E>
+using extracted_descriptor =
+    typename decltype(std::declval<const E&>()(std::declval<image_view<const rgb8>>()).descriptors)::value_type;
+
+/// A corner of one pyramid level: a pixel, its strength, and where in the pixel the corner lies.
+struct corner {
+  int x = 0;              ///< column, pixels of the level
+  int y = 0;              ///< row
+  float response = 0.0F;  ///< strength, >= 0
+  float dx = 0.0F;        ///< from the pixel's centre, in [-0.5, 0.5]
+  float dy = 0.0F;
+  friend constexpr bool operator==(const corner&, const corner&) = default;
+};
+
+/// The order in which corners are stored: by row, then by column.
+[[nodiscard]] constexpr bool before_in_image(const corner& a, const corner& b) noexcept {
+  return a.y != b.y ? a.y < b.y : a.x < b.x;
+}
+/// Stronger corners first, equal ones by place: a total order, so that no choice depends on the order of the input.
+[[nodiscard]] constexpr bool stronger(const corner& a, const corner& b) noexcept {
+  return a.response != b.response ? a.response > b.response : before_in_image(a, b);
+}
+
+/// A rectangle of pixels: columns [x, x + width), rows [y, y + height).
+struct region {
+  int x = 0, y = 0, width = 0, height = 0;
+  [[nodiscard]] constexpr bool empty() const noexcept { return width <= 0 || height <= 0; }
+  [[nodiscard]] constexpr bool contains(int px, int py) const noexcept {
+    return px >= x && py >= y && std::int64_t{px} - x < width && std::int64_t{py} - y < height;
+  }
+  friend constexpr bool operator==(const region&, const region&) = default;
+};
+
+/// Brightness steps: a detector returns the corners of at least `strong`, and where a neighbourhood has none of these,
+/// those of at least `weak`. 0 <= weak <= strong <= 254.
+struct corner_thresholds {
+  int strong = 20;
+  int weak = 7;
+};
+
+/// `detect(level, image, area, thresholds, memory, corners)` replaces `corners` by those of `image` that lie in `area`,
+/// ordered by `before_in_image`. `memory` is a `D::workspace` that later calls use again.
+template <class D>
+concept corner_detector = std::default_initializable<typename D::workspace> &&
+    requires(const D& detect, simd::level level, image_view<const std::uint8_t> image, const region& area,
+             const corner_thresholds& thresholds, typename D::workspace& memory, std::vector<corner>& corners) {
+  detect(level, image, area, thresholds, memory, corners);
+};
+
+/// The corners of one pyramid level.
+struct level_corners {
+  std::vector<corner> corners;
+  region area;         ///< in which they lie, pixels of the level
+  double scale = 1.0;  ///< pixels of the full image per pixel of the level
+};
+
+/// `choose(levels, wanted, memory)` erases corners until at most `wanted` are left on all levels together, on each
+/// ordered by `before_in_image`. Level 0 is the finest.
+template <class D>
+concept corner_selection = std::default_initializable<typename D::workspace> &&
+    requires(const D& choose, std::span<level_corners> levels, int wanted, typename D::workspace& memory) {
+  choose(levels, wanted, memory);
+};
+
+/// A direction in the image: angle in radians, [0, 2 pi), from x (right) towards y (down).
+struct orientation {
+  float angle = 0.0F;
+  float cosine = 1.0F;
+  float sine = 0.0F;
+};
+
+/// `orient(level, image, x, y)` gives the direction at a pixel of a pyramid level that lies at least `O::radius` pixels
+/// from the left, upper and lower edges and `O::radius` + 1 pixels from the right one.
+template <class O>
+concept orientation_estimator = requires(const O& orient, simd::level level, image_view<const std::uint8_t> image,
+                                         int at) {
+  { O::radius } -> std::convertible_to<int>;
+  { orient(level, image, at, at) } -> std::same_as<orientation>;
+};
+
+/// Describes the pixels around a keypoint. `describe.prepare(level, image, first, last, memory)` sees a pyramid level
+/// and the rows [first, last) of its keypoints once; then `describe(level, memory, x, y, orientation)` returns a
+/// `D::descriptor` of a pixel that lies at least `D::reach` pixels from the edge. `D::diameter` (pixels) becomes
+/// `keypoint::size`.
+template <class D>
+concept patch_descriptor = std::default_initializable<typename D::workspace> &&
+    requires(const D& describe, simd::level level, image_view<const std::uint8_t> image, typename D::workspace& memory,
+             const typename D::workspace& prepared, int at, const orientation& o) {
+  requires feature_descriptor<typename D::descriptor>;
+  { D::reach } -> std::convertible_to<int>;
+  { D::diameter } -> std::convertible_to<int>;
+  describe.prepare(level, image, at, at, memory);
+  { describe(level, prepared, at, at, o) } -> std::same_as<typename D::descriptor>;
+};
+
+}  // namespace orbis::features

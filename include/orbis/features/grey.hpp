@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Grey images of 8 bits, which extractors look at, made of colour and of 16-bit images.
+#pragma once
+
+#include <algorithm>
+#include <cassert>
+#include <cstdint>
+
+#include <orbis/core/image.hpp>
+#include <orbis/core/simd.hpp>
+#include <orbis/features/detail/extract/luma_row.hpp>
+
+namespace orbis::features {
+
+/// Writes the luma of a colour image (Rec. 601, rounded to the nearest): the same bits as OpenCV's COLOR_RGB2GRAY.
+/// O(pixels).
+/// @pre both images have the same size
+inline void luma(simd::level level, image_view<const rgb8> from, image_view<std::uint8_t> to) {
+  assert(from.width() == to.width() && from.height() == to.height());
+#if ORBIS_X86
+  const auto row =
+      simd::select<detail::luma_row>(level, {.portable = detail::luma_row_portable, .avx2 = detail::luma_row_avx2});
+#else
+  (void)level;
+  const auto row = detail::luma_row_portable;
+#endif
+  for (int y = 0; y < from.height(); ++y) row(from.row(y).data(), from.width(), to.row(y).data());
+}
+
+/// Writes a 16-bit image (infrared, thermal, raw) as 8 bits: values up to `low` become 0, values from `high` on become
+/// 255, those between are scaled linearly and rounded. Use the same `low` and `high` for a whole recording; otherwise
+/// the brightness flickers. O(pixels).
+/// @pre low < high; both images have the same size
+inline void narrow(image_view<const std::uint16_t> from, image_view<std::uint8_t> to, std::uint16_t low,
+                   std::uint16_t high) {
+  assert(low < high && from.width() == to.width() && from.height() == to.height());
+  const std::uint32_t range = std::uint32_t{high} - low;
+  for (int y = 0; y < from.height(); ++y)
+    for (int x = 0; x < from.width(); ++x) {
+      const std::uint32_t above = std::uint32_t{std::clamp(from(x, y), low, high)} - low;
+      to(x, y) = static_cast<std::uint8_t>((above * 255 + range / 2) / range);
+    }
+}
+
+}  // namespace orbis::features
