@@ -15,10 +15,10 @@
 #include <benchmark/benchmark.h>
 
 #include <orbis/core/random.hpp>
-#include <orbis/slam/essential_graph.hpp>
-#include <orbis/slam/keyframe_culling.hpp>
-#include <orbis/slam/landmark_culling.hpp>
-#include <orbis/slam/local_map.hpp>
+#include <orbis/slam/detail/loops/essential_graph.hpp>
+#include <orbis/slam/detail/map/local_map.hpp>
+#include <orbis/slam/detail/mapping/keyframe_culling.hpp>
+#include <orbis/slam/detail/mapping/landmark_culling.hpp>
 #include <orbis/slam/map.hpp>
 #include <orbis/slam/map_file.hpp>
 
@@ -82,7 +82,7 @@ void add_row(const std::string& what, std::size_t length, Work&& work) {
       random_bits random(2);
       const slam::frame f = next_frame(m, random);
       const auto reference = m.keyframes().back().id;
-      for (auto _ : state) benchmark::DoNotOptimize(slam::local_landmarks(m, f, reference, 40));
+      for (auto _ : state) benchmark::DoNotOptimize(slam::detail::local_landmarks(m, f, reference, 40));
     });
     add_row("neighbors", length, [](benchmark::State& state, const slam::map& m) {
       const auto k = m.keyframes().back().id;
@@ -107,12 +107,12 @@ void add_row(const std::string& what, std::size_t length, Work&& work) {
       for (auto _ : state) {
         add_keyframe(grown, random);
         const auto newest = grown.keyframes().back().id;
-        slam::cull_landmarks(grown, newest, {});
-        slam::cull_keyframes(grown, newest, 3.2, {});
+        slam::detail::cull_landmarks(grown, newest, {});
+        slam::detail::cull_keyframes(grown, newest, 3.2, {});
       }
     });
     add_row("essential_graph", length, [](benchmark::State& state, const slam::map& m) {
-      for (auto _ : state) benchmark::DoNotOptimize(slam::essential_graph(m));
+      for (auto _ : state) benchmark::DoNotOptimize(slam::detail::essential_graph(m));
     });
     add_row("file", length, [](benchmark::State& state, const slam::map& m) {
       for (auto _ : state) {

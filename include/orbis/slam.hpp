@@ -1,49 +1,38 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
 /// RGB-D SLAM, assembled from the other components.
+///
+/// | header | what it is for |
+/// | --- | --- |
+/// | `rgbd_system.hpp` | the SLAM system: give it frames, ask it for poses and the map |
+/// | `options.hpp` | all settings of the system |
+/// | `track_result.hpp` | what tracking a frame returns: state, pose, timings, counters |
+/// | `events.hpp` | callbacks for new keyframes, corrections of the map and changes of state |
+/// | `ids.hpp` | the ids of landmarks, keyframes and maps |
+/// | `frame.hpp` | a frame and a keyframe: features, depth and the landmarks they show |
+/// | `landmark.hpp` | a point of the map and its observations |
+/// | `map.hpp` | keyframes, landmarks, who observes what, and the graphs that follow |
+/// | `covisibility_graph.hpp` | which keyframes observe the same landmarks |
+/// | `spanning_tree.hpp` | the tree of keyframes, and the loops closed between them |
+/// | `atlas.hpp` | several maps, one of them active |
+/// | `map_file.hpp` | saving and loading a map |
+/// | `validate.hpp` | whether a map is consistent |
+/// | `matchers.hpp` | how tracking matches features, replaceable |
+/// | `place_recognition.hpp` | how similar keyframes are found, replaceable |
 #pragma once
 
 #include <orbis/slam/atlas.hpp>
-#include <orbis/slam/carried_motion.hpp>
-#include <orbis/slam/correction.hpp>
 #include <orbis/slam/covisibility_graph.hpp>
-#include <orbis/slam/essential_graph.hpp>
 #include <orbis/slam/events.hpp>
 #include <orbis/slam/frame.hpp>
-#include <orbis/slam/global_adjustment.hpp>
 #include <orbis/slam/ids.hpp>
-#include <orbis/slam/keyframe_culling.hpp>
-#include <orbis/slam/keyframe_decision.hpp>
-#include <orbis/slam/known_place.hpp>
 #include <orbis/slam/landmark.hpp>
-#include <orbis/slam/landmark_culling.hpp>
-#include <orbis/slam/landmark_fusion.hpp>
-#include <orbis/slam/landmark_search.hpp>
-#include <orbis/slam/landmark_triangulation.hpp>
-#include <orbis/slam/local_adjustment.hpp>
-#include <orbis/slam/local_map.hpp>
-#include <orbis/slam/local_mapper.hpp>
-#include <orbis/slam/loop_closer.hpp>
-#include <orbis/slam/loop_correction.hpp>
-#include <orbis/slam/loop_detection.hpp>
 #include <orbis/slam/map.hpp>
-#include <orbis/slam/map_content.hpp>
 #include <orbis/slam/map_file.hpp>
-#include <orbis/slam/map_merging.hpp>
-#include <orbis/slam/map_reader.hpp>
-#include <orbis/slam/map_sections.hpp>
-#include <orbis/slam/mapping.hpp>
-#include <orbis/slam/numbered.hpp>
-#include <orbis/slam/observed_point.hpp>
+#include <orbis/slam/matchers.hpp>
 #include <orbis/slam/options.hpp>
 #include <orbis/slam/place_recognition.hpp>
-#include <orbis/slam/pose_tracker.hpp>
 #include <orbis/slam/rgbd_system.hpp>
-#include <orbis/slam/seam.hpp>
-#include <orbis/slam/shared_state.hpp>
 #include <orbis/slam/spanning_tree.hpp>
-#include <orbis/slam/tally.hpp>
 #include <orbis/slam/track_result.hpp>
-#include <orbis/slam/tracker.hpp>
 #include <orbis/slam/validate.hpp>
-#include <orbis/slam/worker.hpp>

@@ -85,7 +85,7 @@ TEST_CASE("Maps are whole, and keyframes found again, after any sequence of maps
       case 6: {
         auto f = test::random_frame(random, 20, frames++);
         for (auto& l : f.landmarks) l = random.below(2) == 0 ? test::any_landmark(random, atlas.active()) : slam::no_id;
-        const auto k = slam::insert_keyframe(atlas.active(), std::move(f), {});
+        const auto k = slam::detail::insert_keyframe(atlas.active(), std::move(f), {});
         all.push_back({{atlas.active_id(), k}, frames - 1});
         break;
       }
@@ -96,7 +96,7 @@ TEST_CASE("Maps are whole, and keyframes found again, after any sequence of maps
       default: {
         slam::map& m = atlas.at(a);
         const auto l = test::any_landmark(random, m), into = test::any_landmark(random, m);
-        if (l != into && m.is_alive(l) && m.is_alive(into)) m.fuse(l, into);
+        if (l != into && m.has_landmark(l) && m.has_landmark(into)) m.fuse(l, into);
       }
     }
     if (step % 10 != 0) continue;

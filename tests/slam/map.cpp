@@ -6,8 +6,8 @@
 #include <vector>
 
 #include <orbis/core/random.hpp>
+#include <orbis/slam/detail/mapping/keyframe_insertion.hpp>
 #include <orbis/slam/map.hpp>
-#include <orbis/slam/mapping.hpp>
 
 #include "slam/random_map.hpp"
 #include "support/catch.hpp"
@@ -38,10 +38,10 @@ TEST_CASE("A map is whole after any sequence of operations") {
 TEST_CASE("Keyframes that share landmarks come most shared first") {
   random_bits random(3);
   slam::map m(8, 1.2);
-  slam::insert_keyframe(m, random_frame(random, 40, 0), {});
+  slam::detail::insert_keyframe(m, random_frame(random, 40, 0), {});
   auto second = random_frame(random, 40, 1);
   for (std::uint32_t i = 0; i < 10; ++i) second.landmarks[i] = m.at(0).landmarks[i];
-  slam::insert_keyframe(m, second, {});
+  slam::detail::insert_keyframe(m, second, {});
   auto query = random_frame(random, 40, 2);
   for (std::uint32_t i = 0; i < 25; ++i) query.landmarks[i] = m.at(1).landmarks[i];
 
@@ -56,13 +56,13 @@ TEST_CASE("A landmark's descriptor is the most typical of those observed") {
   slam::map m(8, 1.2);
   auto f = random_frame(random, 1, 0);
   const auto typical = f.features.descriptors[0];
-  slam::insert_keyframe(m, f, {});
+  slam::detail::insert_keyframe(m, f, {});
   const auto add = [&](std::uint64_t flipped) {
     auto g = random_frame(random, 1, m.keyframes().size());
     g.features.descriptors[0] = typical;
     g.features.descriptors[0].words[0] ^= flipped;
     g.landmarks[0] = 0;
-    return slam::insert_keyframe(m, std::move(g), {});
+    return slam::detail::insert_keyframe(m, std::move(g), {});
   };
   add(0xff00);
   add(0x00ff0000);
@@ -85,20 +85,20 @@ TEST_CASE("The most typical of many descriptors is chosen among some, and is one
   std::vector<features::binary_descriptor<256>> all(500);
   for (std::size_t i = 0; i < all.size(); ++i)
     for (auto& w : all[i].words) w = i % 10 == 0 ? random() : random() & random() & random();
-  const auto best = slam::most_typical(
+  const auto best = slam::detail::most_typical(
       all.size(), [&](std::size_t i) -> const auto& { return all[i]; });
   REQUIRE(best < all.size());
   CHECK(best % 10 != 0);  // not one of the outliers
   for (const std::size_t n : {1U, 2U})
-    CHECK(slam::most_typical(
+    CHECK(slam::detail::most_typical(
               n, [&](std::size_t i) -> const auto& { return all[i]; }) == n - 1);
 }
 
 TEST_CASE("A fused landmark leads to what it became, and frames that show it join in") {
   random_bits random(12);
   slam::map m(8, 1.2);
-  const auto first = slam::insert_keyframe(m, random_frame(random, 4, 0), {});
-  const auto second = slam::insert_keyframe(m, random_frame(random, 4, 1), {});
+  const auto first = slam::detail::insert_keyframe(m, random_frame(random, 4, 0), {});
+  const auto second = slam::detail::insert_keyframe(m, random_frame(random, 4, 1), {});
   const auto a = m.at(first).landmarks[0], b = m.at(second).landmarks[0], c = m.at(second).landmarks[1];
   m.count_visible(a);
   CHECK(m.covisibility().shared(first, second) == 0);
@@ -126,14 +126,14 @@ TEST_CASE("A fused landmark leads to what it became, and frames that show it joi
 TEST_CASE("A keyframe hangs on the one that it shares most with, else on the newest") {
   random_bits random(13);
   slam::map m(8, 1.2);
-  for (std::size_t i = 0; i < 3; ++i) slam::insert_keyframe(m, random_frame(random, 40, i), {});
+  for (std::size_t i = 0; i < 3; ++i) slam::detail::insert_keyframe(m, random_frame(random, 40, i), {});
   CHECK(m.tree().root() == 0);
   CHECK(m.tree().parent(1) == 0);
   CHECK(m.tree().parent(2) == 1);
   auto f = random_frame(random, 40, 3);
   for (std::uint32_t i = 0; i < 10; ++i) f.landmarks[i] = m.at(1).landmarks[i];
   for (std::uint32_t i = 10; i < 18; ++i) f.landmarks[i] = m.at(2).landmarks[i];
-  slam::insert_keyframe(m, f, {});
+  slam::detail::insert_keyframe(m, f, {});
   CHECK(m.tree().parent(3) == 1);
   CHECK(m.covisibility().neighbors(3) == std::vector<slam::covisible>{{1, 10}, {2, 8}});  // the best of 2
 }
@@ -141,13 +141,13 @@ TEST_CASE("A keyframe hangs on the one that it shares most with, else on the new
 TEST_CASE("An erased keyframe leaves its landmarks to others, its children to its parent, and its pose to its heir") {
   random_bits random(14);
   slam::map m(8, 1.2);
-  slam::insert_keyframe(m, random_frame(random, 30, 0), {});
+  slam::detail::insert_keyframe(m, random_frame(random, 30, 0), {});
   auto f = random_frame(random, 30, 1);
   for (std::uint32_t i = 0; i < 20; ++i) f.landmarks[i] = m.at(0).landmarks[i];
-  slam::insert_keyframe(m, f, {});
+  slam::detail::insert_keyframe(m, f, {});
   f = random_frame(random, 30, 2);
   f.landmarks[4] = m.at(1).landmarks[25];
-  slam::insert_keyframe(m, f, {});
+  slam::detail::insert_keyframe(m, f, {});
   const auto shared = m.at(0).landmarks[3], own = m.at(1).landmarks[29];
   const se3 before = m.at(1).T_world_camera;
 
@@ -156,8 +156,8 @@ TEST_CASE("An erased keyframe leaves its landmarks to others, its children to it
   CHECK_FALSE(m.has_keyframe(1));
   CHECK(m.keyframes().size() == 2);
   CHECK(m.keyframe_end() == 3);
-  CHECK(m.is_alive(shared));
-  CHECK_FALSE(m.is_alive(own));
+  CHECK(m.has_landmark(shared));
+  CHECK_FALSE(m.has_landmark(own));
   CHECK(m.tree().parent(2) == 0);
   CHECK(m.heir(1) == 0);
   CHECK((m.pose_of(1).inverse() * before).log().norm() < 1e-12);
@@ -175,14 +175,14 @@ TEST_CASE("An erased keyframe leaves its landmarks to others, its children to it
   CHECK((m.pose_of(1).inverse() * (moved * before)).log().norm() < 1e-12);
   m.transform(moved);
   CHECK((m.pose_of(1).inverse() * (moved * moved * before)).log().norm() < 1e-12);
-  CHECK(slam::insert_keyframe(m, random_frame(random, 5, 3), {}) == 3);
+  CHECK(slam::detail::insert_keyframe(m, random_frame(random, 5, 3), {}) == 3);
   CHECK(m.tree().root() == 3);
   CHECK(fault_of(m) == "");
 }
 
 TEST_CASE("A map put together from its parts is the same map") {
   const slam::map m = test::random_map(15, 3000);
-  slam::map_content parts = m.content();
+  slam::detail::map_content parts = m.content();
   const slam::map again{std::move(parts)};
   REQUIRE(fault_of(again) == "");
   CHECK(again.landmark_count() == m.landmark_count());
@@ -218,7 +218,7 @@ TEST_CASE("A map absorbs another, which hangs on it where the caller says") {
     for (slam::landmark_id l = 0; l != b_before.landmark_end(); ++l) {
       const auto now = b_before.became(l);
       REQUIRE(a.became(l + offsets.landmarks) == (now == slam::no_id ? now : now + offsets.landmarks));
-      if (!b_before.is_alive(l)) continue;
+      if (!b_before.has_landmark(l)) continue;
       const auto& moved = a.landmark_at(l + offsets.landmarks);
       REQUIRE((moved.position - T * b_before.landmark_at(l).position).norm() < 1e-9);
     }
@@ -243,9 +243,9 @@ TEST_CASE("Close points become landmarks first and far ones fill up to the minim
   auto f = random_frame(random, 50, 0);
   for (std::size_t i = 0; i < 30; ++i) f.depth[i] = 5.0F + static_cast<float>(i) * 0.1F;
   for (std::size_t i = 45; i < 50; ++i) f.depth[i] = 0.0F;
-  CHECK(slam::new_landmark_keypoints(f, {.min_new_landmarks = 10}).size() == 15);
-  CHECK(slam::new_landmark_keypoints(f, {.min_new_landmarks = 20}).size() == 20);
-  const auto all = slam::new_landmark_keypoints(f, {.min_new_landmarks = 100});
+  CHECK(slam::detail::new_landmark_keypoints(f, {.min_new_landmarks = 10}).size() == 15);
+  CHECK(slam::detail::new_landmark_keypoints(f, {.min_new_landmarks = 20}).size() == 20);
+  const auto all = slam::detail::new_landmark_keypoints(f, {.min_new_landmarks = 100});
   CHECK(all.size() == 45);
   CHECK(all.back() == 29);
 }

@@ -57,7 +57,7 @@ TEST_CASE("Small maps: nothing, nothing left, a keyframe without keypoints, a ke
   random_bits random(1);
   slam::map m(5, 1.3, 7);
   round_trip(m);
-  slam::insert_keyframe(m, test::random_frame(random, 0, 0), {});
+  slam::detail::insert_keyframe(m, test::random_frame(random, 0, 0), {});
   round_trip(m);
   CHECK(parsed(slam::map_bytes(m))->content().levels == 5);
   CHECK(parsed(slam::map_bytes(m))->content().min_shared == 7);
@@ -67,7 +67,7 @@ TEST_CASE("Small maps: nothing, nothing left, a keyframe without keypoints, a ke
   auto f = test::random_frame(random, 2, 0);
   f.rays[1] = vec3::Constant(std::numeric_limits<double>::quiet_NaN());
   f.depth[1] = 0.0F;
-  slam::insert_keyframe(other, f, {});
+  slam::detail::insert_keyframe(other, f, {});
   round_trip(other);
 }
 

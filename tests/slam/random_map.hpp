@@ -9,8 +9,8 @@
 #include <utility>
 
 #include <orbis/core/random.hpp>
+#include <orbis/slam/detail/mapping/keyframe_insertion.hpp>
 #include <orbis/slam/map.hpp>
-#include <orbis/slam/mapping.hpp>
 #include <orbis/slam/validate.hpp>
 
 namespace orbis::test {
@@ -68,7 +68,7 @@ inline slam::keyframe_id add_random_keyframe(random_bits& random, slam::map& m, 
   auto f = random_frame(random, keypoints, m.keyframe_end());
   const auto n = static_cast<std::uint32_t>(keypoints);
   for (std::size_t i = 0; i < known; ++i) f.landmarks[random.below(n)] = any_landmark(random, m);
-  return slam::insert_keyframe(m, std::move(f), {});
+  return slam::detail::insert_keyframe(m, std::move(f), {});
 }
 
 /// One of all the things that can be done to a map; about `keyframes` remain in it.
@@ -83,14 +83,14 @@ inline void change_somehow(random_bits& random, slam::map& m, std::size_t keyfra
     case 1:
     case 2:
     case 3:
-      if (m.is_alive(l) && m.has_keyframe(k)) m.observe(l, k, feature);
+      if (m.has_landmark(l) && m.has_keyframe(k)) m.observe(l, k, feature);
       break;
     case 4: m.forget(l, k); break;
     case 5:
-      if (m.is_alive(l) && random.below(10) == 0) m.remove_landmark(l);
+      if (m.has_landmark(l) && random.below(10) == 0) m.remove_landmark(l);
       break;
     case 6:
-      if (l != into && m.is_alive(l) && m.is_alive(into)) m.fuse(l, into);
+      if (l != into && m.has_landmark(l) && m.has_landmark(into)) m.fuse(l, into);
       break;
     case 7:
       if (m.has_keyframe(k) && random.below(static_cast<std::uint32_t>(3 * keyframes)) < m.keyframes().size())
@@ -103,7 +103,7 @@ inline void change_somehow(random_bits& random, slam::map& m, std::size_t keyfra
       if (k != other && m.has_keyframe(k) && m.has_keyframe(other) && random.below(10) == 0) m.add_loop_edge(k, other);
       break;
     default:
-      if (m.is_alive(l)) m.update(l);
+      if (m.has_landmark(l)) m.update(l);
   }
 }
 

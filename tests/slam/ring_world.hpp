@@ -16,9 +16,9 @@
 #include <orbis/core/random.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/optimize/reprojection.hpp>
-#include <orbis/slam/landmark_search.hpp>
+#include <orbis/slam/detail/map/landmark_search.hpp>
+#include <orbis/slam/detail/mapping/keyframe_insertion.hpp>
 #include <orbis/slam/map.hpp>
-#include <orbis/slam/mapping.hpp>
 
 namespace orbis::test {
 
@@ -36,7 +36,7 @@ class ring_world {
  public:
   camera::pinhole camera{640, 480, 525.0, 525.0, 320.0, 240.0};
   optimize::reprojection<camera::pinhole> model{camera, 400.0};
-  slam::pyramid_scales scales{};
+  slam::detail::pyramid_scales scales{};
 
   explicit ring_world(const ring_options& o = {}) : o_{o}, radius_{0.15 * o.steps / (2 * std::numbers::pi)} {
     random_bits random(o.seed);
@@ -82,7 +82,8 @@ class ring_world {
       const vec3 at = T_camera_world * w.position;
       if (!(at.z() > 0.5)) continue;
       features::keypoint k;
-      k.octave = std::clamp(static_cast<int>(std::ceil(std::log(w.size / at.norm()) / std::log(scales.factor()))), 0, 7);
+      k.octave =
+          std::clamp(static_cast<int>(std::ceil(std::log(w.size / at.norm()) / std::log(scales.factor()))), 0, 7);
       const double sigma = 0.5 * scales.scale(k.octave);
       const auto exact = camera.project(at);
       if (!exact) continue;
@@ -122,7 +123,7 @@ class ring_world {
         const std::size_t p = shown_[i][k];
         if (known[p] != slam::no_id && i - last[p] <= o_.memory) f.landmarks[k] = known[p];
       }
-      const slam::keyframe_id id = slam::insert_keyframe(m, std::move(f), {});
+      const slam::keyframe_id id = slam::detail::insert_keyframe(m, std::move(f), {});
       for (std::uint32_t k = 0; k < m.at(id).size(); ++k) {
         const std::size_t p = shown_[i][k];
         known[p] = m.at(id).landmarks[k];
@@ -178,8 +179,8 @@ class ring_world {
       return false;
   }
   for (slam::landmark_id l = 0; l != a.landmark_end(); ++l) {
-    if (a.is_alive(l) != b.is_alive(l)) return false;
-    if (a.is_alive(l) && a.landmark_at(l).position != b.landmark_at(l).position) return false;
+    if (a.has_landmark(l) != b.has_landmark(l)) return false;
+    if (a.has_landmark(l) && a.landmark_at(l).position != b.landmark_at(l).position) return false;
   }
   return true;
 }

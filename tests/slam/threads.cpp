@@ -12,8 +12,8 @@
 
 #include <orbis/eval/ate.hpp>
 #include <orbis/io/synthetic/sequence.hpp>
+#include <orbis/slam/detail/system/worker.hpp>
 #include <orbis/slam/validate.hpp>
-#include <orbis/slam/worker.hpp>
 
 #include "slam/tested_system.hpp"
 #include "support/catch.hpp"
@@ -121,9 +121,9 @@ TEST_CASE("Room for no keyframe is room for one: nothing waits for ever") {
 TEST_CASE("A worker does its jobs in order, lets the one at hand end when stopped, and drops the others") {
   std::vector<int> done;
   std::atomic<bool> begun{false}, may_end{false};
-  std::unique_ptr<slam::worker<int>> worker;
+  std::unique_ptr<slam::detail::worker<int>> worker;
   std::size_t waiting = 0;
-  worker = std::make_unique<slam::worker<int>>([&](int job) {
+  worker = std::make_unique<slam::detail::worker<int>>([&](int job) {
     begun = true;
     while (!may_end) std::this_thread::yield();
     waiting = worker->waiting();  // it is there as long as a job is at hand
@@ -147,7 +147,7 @@ TEST_CASE("A worker does its jobs in order, lets the one at hand end when stoppe
   worker.reset();
 
   may_end = true;
-  worker = std::make_unique<slam::worker<int>>([&](int job) { done.push_back(job); });
+  worker = std::make_unique<slam::detail::worker<int>>([&](int job) { done.push_back(job); });
   for (const int job : {2, 3, 4}) worker->push(job);
   worker->wait();
   CHECK(worker->idle());

@@ -21,7 +21,7 @@ template <class Damage>
   for (int i = 0; i < 5; ++i) test::add_random_keyframe(random, m, 20, 8);
   m.fuse(m.at(4).landmarks[0], m.at(0).landmarks[0]);
   m.erase_keyframe(2);
-  slam::map_content parts = m.content();
+  slam::detail::map_content parts = m.content();
   damage(parts);
   return test::fault_of(slam::map{std::move(parts)});
 }
@@ -36,7 +36,7 @@ TEST_CASE("A whole map has no fault") {
 }
 
 TEST_CASE("What is wrong is said in words") {
-  using parts = slam::map_content;
+  using parts = slam::detail::map_content;
   CHECK(fault_after([](parts& p) { p.keyframes[1].id = 3; }) == "keyframe 1: calls itself 3");
   CHECK(fault_after([](parts& p) { p.keyframes[1].depth.pop_back(); }) ==
         "keyframe 1: does not have one descriptor, depth, ray and landmark for each keypoint");
@@ -62,8 +62,9 @@ TEST_CASE("What is wrong is said in words") {
 
 TEST_CASE("Observations that disagree are found") {
   // Of a keypoint that shows another landmark, of a keyframe twice.
-  CHECK_FALSE(fault_after([](slam::map_content& p) { p.landmarks[1].observations.front().feature ^= 1U; }) == "");
-  CHECK_FALSE(fault_after([](slam::map_content& p) {
+  CHECK_FALSE(fault_after([](slam::detail::map_content& p) { p.landmarks[1].observations.front().feature ^= 1U; }) ==
+              "");
+  CHECK_FALSE(fault_after([](slam::detail::map_content& p) {
                 auto& all = p.landmarks[1].observations;
                 all.insert(all.begin(), all.front());
               }) == "");

@@ -13,19 +13,10 @@
 #include <utility>
 
 #include <orbis/core/se3.hpp>
+#include <orbis/slam/ids.hpp>
 #include <orbis/slam/map.hpp>
 
 namespace orbis::slam {
-
-/// Maps are numbered in the order of their creation; numbers are never used again.
-using map_id = std::uint32_t;
-
-/// A keyframe of an atlas.
-struct map_keyframe {
-  map_id map = 0;
-  keyframe_id keyframe = no_id;
-  friend bool operator==(const map_keyframe&, const map_keyframe&) = default;
-};
 
 /// Maps in frames of their own, one of them active. There is always an active one. References to maps stay valid until
 /// the map is merged into another or removed.

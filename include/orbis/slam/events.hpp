@@ -9,7 +9,7 @@
 #include <string_view>
 
 #include <orbis/core/se3.hpp>
-#include <orbis/slam/atlas.hpp>
+#include <orbis/slam/ids.hpp>
 #include <orbis/slam/track_result.hpp>
 
 namespace orbis::slam {

@@ -49,6 +49,11 @@ struct frame {
   [[nodiscard]] vec2 pixel(std::size_t i) const { return {features.keypoints[i].x, features.keypoints[i].y}; }
 };
 
+/// A frame that the map keeps. `landmarks` of the frame are its observations.
+struct keyframe : frame {
+  keyframe_id id = no_id;
+};
+
 /// Extracts features and reads their depth.
 template <camera::camera_model Camera, feature_extractor Extractor, camera::depth_source Depth>
 [[nodiscard]] frame make_frame(const Camera& camera, const Extractor& extract, image_view<const rgb8> color,

@@ -14,13 +14,14 @@
 
 #include <orbis/core/se3.hpp>
 #include <orbis/slam/covisibility_graph.hpp>
+#include <orbis/slam/detail/map/counter.hpp>
+#include <orbis/slam/detail/map/map_content.hpp>
+#include <orbis/slam/detail/map/slot_map.hpp>
+#include <orbis/slam/detail/map/typical_descriptor.hpp>
 #include <orbis/slam/frame.hpp>
 #include <orbis/slam/ids.hpp>
 #include <orbis/slam/landmark.hpp>
-#include <orbis/slam/map_content.hpp>
-#include <orbis/slam/numbered.hpp>
 #include <orbis/slam/spanning_tree.hpp>
-#include <orbis/slam/tally.hpp>
 
 namespace orbis::slam {
 
@@ -39,7 +40,7 @@ class map {
   }
   /// From its parts. `keyframe.landmarks` are set by the landmarks' observations.
   /// @pre the parts fit each other: numbers name what is there, and no keypoint shows two landmarks
-  explicit map(map_content parts) : all_{std::move(parts)}, covisibility_{all_.min_shared} {
+  explicit map(detail::map_content parts) : all_{std::move(parts)}, covisibility_{all_.min_shared} {
     for (keyframe_id k = 0; k != keyframe_end(); ++k)
       if (has_keyframe(k)) all_.keyframes[k].landmarks.assign(all_.keyframes[k].size(), no_id);
     for (const landmark& l : all_.landmarks)
@@ -48,17 +49,17 @@ class map {
   }
 
   /// Those there are, by ascending number: a range with `size()`, `front()` and `back()`.
-  [[nodiscard]] const numbered<keyframe>& keyframes() const noexcept { return all_.keyframes; }
-  [[nodiscard]] const numbered<landmark>& landmarks() const noexcept { return all_.landmarks; }
+  [[nodiscard]] const detail::slot_map<keyframe>& keyframes() const noexcept { return all_.keyframes; }
+  [[nodiscard]] const detail::slot_map<landmark>& landmarks() const noexcept { return all_.landmarks; }
   [[nodiscard]] std::size_t landmark_count() const noexcept { return all_.landmarks.size(); }
   /// The numbers that the next ones will have.
   [[nodiscard]] keyframe_id keyframe_end() const noexcept { return all_.keyframes.end_id(); }
   [[nodiscard]] landmark_id landmark_end() const noexcept { return all_.landmarks.end_id(); }
   [[nodiscard]] bool has_keyframe(keyframe_id id) const noexcept { return all_.keyframes.contains(id); }
-  [[nodiscard]] bool is_alive(landmark_id id) const noexcept { return all_.landmarks.contains(id); }
+  [[nodiscard]] bool has_landmark(landmark_id id) const noexcept { return all_.landmarks.contains(id); }
   /// @pre has_keyframe(id)
   [[nodiscard]] const keyframe& at(keyframe_id id) const { return all_.keyframes[id]; }
-  /// @pre is_alive(id)
+  /// @pre has_landmark(id)
   [[nodiscard]] const landmark& landmark_at(landmark_id id) const { return all_.landmarks[id]; }
 
   /// What a landmark is now: itself while alive, else the one it was fused into; `no_id` if it is gone.
@@ -69,7 +70,7 @@ class map {
   [[nodiscard]] se3 pose_of(keyframe_id id) const {
     se3 T_below_camera;
     while (!has_keyframe(id)) {
-      const erased_keyframe& e = all_.erased.at(id);
+      const detail::erased_keyframe& e = all_.erased.at(id);
       T_below_camera = e.T_heir_camera * T_below_camera;
       if (e.heir == no_id) return T_below_camera;
       id = e.heir;
@@ -79,7 +80,7 @@ class map {
 
   [[nodiscard]] const covisibility_graph& covisibility() const noexcept { return covisibility_; }
   [[nodiscard]] const spanning_tree& tree() const noexcept { return all_.tree; }
-  [[nodiscard]] const map_content& content() const noexcept { return all_; }
+  [[nodiscard]] const detail::map_content& content() const noexcept { return all_; }
 
   void count_visible(landmark_id id) { ++all_.landmarks[id].visible; }
   void count_found(landmark_id id) { ++all_.landmarks[id].found; }
@@ -96,7 +97,7 @@ class map {
     for (keyframe_id k = 0; k != keyframe_end(); ++k)
       if (has_keyframe(k)) set_pose(k, T_new_old * at(k).T_world_camera);
     for (landmark_id l = 0; l != landmark_end(); ++l)
-      if (is_alive(l)) move_landmark(l, T_new_old);
+      if (has_landmark(l)) move_landmark(l, T_new_old);
     for (auto& [id, e] : all_.erased)
       if (e.heir == no_id) e.T_heir_camera = T_new_old * e.T_heir_camera;
   }
@@ -162,7 +163,7 @@ class map {
 
   /// Takes one observation back; a landmark that nobody sees any more dies.
   void forget(landmark_id l, keyframe_id k) {
-    if (!is_alive(l) || landmark_at(l).seen_by(k) == nullptr) return;
+    if (!has_landmark(l) || landmark_at(l).seen_by(k) == nullptr) return;
     for (const observation& o : landmark_at(l).observations)
       if (o.keyframe != k) covisibility_.unshare(k, o.keyframe);
     detach(l, k);
@@ -170,7 +171,7 @@ class map {
 
   /// The same of an observation that was noted earlier; false if it is not there any more.
   bool forget(landmark_id l, const observation& noted) {
-    const observation* const now = is_alive(l) ? landmark_at(l).seen_by(noted.keyframe) : nullptr;
+    const observation* const now = has_landmark(l) ? landmark_at(l).seen_by(noted.keyframe) : nullptr;
     if (now == nullptr || !(*now == noted)) return false;
     forget(l, noted.keyframe);
     return true;
@@ -182,7 +183,7 @@ class map {
   /// The observations of `from` become those of `into`, as far as no keyframe sees both; `from` dies, and what asks
   /// for it is led to `into`. O(n^2). @pre from != into, and both are alive
   void fuse(landmark_id from, landmark_id into) {
-    assert(from != into && is_alive(into));
+    assert(from != into && has_landmark(into));
     const landmark l = remove(from, into);
     for (const observation& o : l.observations) observe(into, o.keyframe, o.feature);
     all_.landmarks[into].found += l.found;
@@ -206,7 +207,7 @@ class map {
     const auto of = [&](std::size_t i) -> const auto& {
       return at(l.observations[i].keyframe).features.descriptors[l.observations[i].feature];
     };
-    l.descriptor = of(most_typical(l.observations.size(), of));
+    l.descriptor = of(detail::most_typical(l.observations.size(), of));
   }
 
   /// Takes over another map, whose world is moved by `T_this_other`, and hangs it on this one at `link`. Nothing is
@@ -230,7 +231,7 @@ class map {
         if (l != no_id) l += offsets.landmarks;
     }
     for (landmark_id id = offsets.landmarks; id != landmark_end(); ++id) {
-      if (!is_alive(id)) continue;
+      if (!has_landmark(id)) continue;
       landmark& l = all_.landmarks[id];
       l.id = id;
       l.created += offsets.keyframes;
@@ -243,12 +244,12 @@ class map {
   /// The keyframes that share the most landmarks with the given ones, most first (older first where
   /// equal), with the number they share. Costs what these landmarks' observations are.
   [[nodiscard]] std::vector<std::pair<keyframe_id, std::size_t>> sharing(const std::vector<landmark_id>& seen) const {
-    tally shared;
+    detail::counter shared;
     for (const landmark_id l : seen)
-      if (is_alive(l))
+      if (has_landmark(l))
         for (const observation& o : landmark_at(l).observations) shared.add(o.keyframe);
     std::vector<std::pair<keyframe_id, std::size_t>> order;
-    for (const tally::entry& e : shared.entries()) order.emplace_back(e.number, e.count);
+    for (const detail::counter::entry& e : shared.entries()) order.emplace_back(e.number, e.count);
     std::sort(order.begin(), order.end(), [](const auto& a, const auto& b) {
       return a.second != b.second ? a.second > b.second : a.first < b.first;
     });
@@ -289,17 +290,17 @@ class map {
   }
   /// Enters what a keyframe shares with others, all at once: with those of lower number than `below`.
   void count_covisible(const keyframe& k, keyframe_id below) {
-    tally shared;
+    detail::counter shared;
     for (const landmark_id l : k.landmarks)
       if (l != no_id)
         for (const observation& o : landmark_at(l).observations)
           if (o.keyframe != k.id && o.keyframe < below) shared.add(o.keyframe);
-    std::vector<tally::entry> entries = std::move(shared).take();
+    std::vector<detail::counter::entry> entries = std::move(shared).take();
     std::sort(entries.begin(), entries.end(), [](const auto& a, const auto& b) { return a.number < b.number; });
-    for (const tally::entry& e : entries) covisibility_.share(k.id, e.number, e.count);
+    for (const detail::counter::entry& e : entries) covisibility_.share(k.id, e.number, e.count);
   }
 
-  map_content all_;
+  detail::map_content all_;
   covisibility_graph covisibility_;
 };
 

@@ -39,9 +39,9 @@
 #include <orbis/core/bytes.hpp>
 #include <orbis/core/file.hpp>
 #include <orbis/core/result.hpp>
+#include <orbis/slam/detail/map/file_sections.hpp>
+#include <orbis/slam/detail/map/map_reader.hpp>
 #include <orbis/slam/map.hpp>
-#include <orbis/slam/map_reader.hpp>
-#include <orbis/slam/map_sections.hpp>
 
 namespace orbis::slam {
 
@@ -83,7 +83,7 @@ inline void put_landmark(std::string& to, const landmark& l) {
   std::string bytes(detail::map_magic);
   put(bytes, detail::map_version);
   detail::put_section(bytes, "size", [&](std::string& to) {
-    const map_content& all = m.content();
+    const detail::map_content& all = m.content();
     put(to, static_cast<std::uint32_t>(all.levels), all.min_shared, all.scale_factor, m.keyframe_end(),
         m.landmark_end());
   });
@@ -93,7 +93,7 @@ inline void put_landmark(std::string& to, const landmark& l) {
       if (m.has_keyframe(id)) {
         detail::put_keyframe(to, m.at(id));
       } else {
-        const erased_keyframe& e = m.content().erased.at(id);
+        const detail::erased_keyframe& e = m.content().erased.at(id);
         put(to, e.heir);
         detail::put_pose(to, e.T_heir_camera);
       }
@@ -108,7 +108,7 @@ inline void put_landmark(std::string& to, const landmark& l) {
   });
   detail::put_section(bytes, "land", [&](std::string& to) {
     for (landmark_id id = 0; id != m.landmark_end(); ++id) {
-      if (m.is_alive(id)) {
+      if (m.has_landmark(id)) {
         put(to, static_cast<std::uint32_t>(m.landmark_at(id).observations.size()));
         detail::put_landmark(to, m.landmark_at(id));
       } else {
@@ -131,7 +131,7 @@ inline void put_landmark(std::string& to, const landmark& l) {
       version != detail::map_version)
     return fail(errc::unsupported, where, "version " + std::to_string(version) + ", this reads version 1");
 
-  map_content parts;
+  detail::map_content parts;
   detail::map_reader read{parts};
   detail::section_finder next{text, head};
   using section = std::pair<std::string_view, bool (detail::map_reader::*)(detail::section_reader)>;

@@ -68,7 +68,7 @@ struct triangulation_options {
 struct loop_options {
   std::uint32_t distance = 64;           ///< bits by which descriptors of the two keyframes may differ, ...
   float ratio = 0.85F;                   ///< ... and of the distance to the second best match
-  std::size_t min_matches = 20;          ///< by looks, between the two keyframes
+  std::size_t min_matches = 20;          ///< by bow_vector, between the two keyframes
   double alignment_threshold = 3.0;      ///< of an inlier among these, standard deviations of the depth
   std::size_t min_aligned = 12;          ///< inliers among these
   std::size_t neighbors = 10;            ///< of the candidate, whose landmarks are looked for as well
@@ -87,7 +87,7 @@ struct loop_options {
 };
 
 /// How the two sides of a loop are sewn together.
-struct seam_options {
+struct loop_fusion_options {
   std::size_t keyframes = 15;   ///< around the keyframe, in which the candidate's landmarks are looked for
   std::size_t neighbors = 15;   ///< of the candidate, whose landmarks these are
   double radius = 4.0;          ///< of the search around a projection, pixels of a keypoint's level
@@ -98,7 +98,7 @@ struct loop_correction_options {
   std::uint32_t strong = 100;  ///< landmarks that both see, from which on a pair is an edge of the essential graph
   double loop_weight = 100.0;  ///< of the new edge, relative to that of a pair that shares `strong` landmarks
   int iterations = 20;         ///< of the pose graph, at most
-  seam_options seam{};
+  loop_fusion_options fusion{};
 };
 
 struct global_adjustment_options {

@@ -15,7 +15,7 @@
 #include <orbis/places/default_vocabulary.hpp>
 #include <orbis/places/keyframe_database.hpp>
 #include <orbis/places/vocabulary.hpp>
-#include <orbis/slam/atlas.hpp>
+#include <orbis/slam/ids.hpp>
 
 namespace orbis::slam {
 
@@ -25,14 +25,14 @@ namespace orbis::slam {
 /// same. The same additions and removals give the same answers.
 template <class P>
 concept place_recognizer = std::movable<P> &&
-    requires(P& places, const P& known, const features::features& seen, const typename P::signature& looks,
+    requires(P& places, const P& known, const features::features& seen, const typename P::signature& bow_vector,
              map_keyframe k, std::size_t count, bool (*exclude)(map_keyframe),
              std::vector<map_keyframe> (*neighbors)(map_keyframe)) {
   { known.describe(seen) } -> std::convertible_to<typename P::signature>;
-  { places.add(k, looks) } -> std::same_as<bool>;
+  { places.add(k, bow_vector) } -> std::same_as<bool>;
   { places.erase(k) } -> std::same_as<bool>;
   { places.rename(k, k) } -> std::same_as<bool>;
-  { places.similar(looks, count, exclude, neighbors) } -> std::convertible_to<std::vector<map_keyframe>>;
+  { places.similar(bow_vector, count, exclude, neighbors) } -> std::convertible_to<std::vector<map_keyframe>>;
 };
 
 /// By the words of a vocabulary tree; see orbis/places.hpp. Without a vocabulary of the caller's, the built-in one.
@@ -51,23 +51,23 @@ class bag_of_words_places {
   [[nodiscard]] signature describe(const features::features& f) const { return words_.transform(f.descriptors); }
 
   /// False if it is known already.
-  bool add(map_keyframe k, const signature& looks) { return seen_.add(packed(k), looks); }
+  bool add(map_keyframe k, const signature& bow_vector) { return seen_.add(packed(k), bow_vector); }
   /// False if it is not known.
   bool erase(map_keyframe k) { return seen_.erase(packed(k)); }
   /// A keyframe has another name now. False if it is not known by the old one, or another is by the new one.
   bool rename(map_keyframe from, map_keyframe to) {
     if (!seen_.contains(packed(from)) || seen_.contains(packed(to))) return false;
-    const signature looks = seen_.bag(packed(from));
+    const signature bow_vector = seen_.bag(packed(from));
     seen_.erase(packed(from));
-    return seen_.add(packed(to), looks);
+    return seen_.add(packed(to), bow_vector);
   }
 
   template <std::predicate<map_keyframe> Exclude, std::invocable<map_keyframe> Neighbors>
-  [[nodiscard]] std::vector<map_keyframe> similar(const signature& looks, std::size_t count, Exclude&& exclude,
+  [[nodiscard]] std::vector<map_keyframe> similar(const signature& bow_vector, std::size_t count, Exclude&& exclude,
                                                   Neighbors&& neighbors) {
     std::vector<std::uint64_t> around;
     seen_.query(
-        looks, found_, memory_, options_, [&](std::uint64_t k) { return exclude(unpacked(k)); },
+        bow_vector, found_, memory_, options_, [&](std::uint64_t k) { return exclude(unpacked(k)); },
         [&](std::uint64_t k) -> const std::vector<std::uint64_t>& {
           around.clear();
           for (const map_keyframe& n : neighbors(unpacked(k))) around.push_back(packed(n));

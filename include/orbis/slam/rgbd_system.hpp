@@ -39,18 +39,20 @@
 #include <orbis/features/orb.hpp>
 #include <orbis/optimize/reprojection.hpp>
 #include <orbis/slam/atlas.hpp>
+#include <orbis/slam/detail/loops/loop_closer.hpp>
+#include <orbis/slam/detail/mapping/keyframe_insertion.hpp>
+#include <orbis/slam/detail/mapping/local_mapper.hpp>
+#include <orbis/slam/detail/system/shared_state.hpp>
+#include <orbis/slam/detail/system/stopwatch.hpp>
+#include <orbis/slam/detail/system/worker.hpp>
+#include <orbis/slam/detail/tracking/keyframe_decision.hpp>
+#include <orbis/slam/detail/tracking/tracker.hpp>
 #include <orbis/slam/events.hpp>
-#include <orbis/slam/keyframe_decision.hpp>
-#include <orbis/slam/local_mapper.hpp>
-#include <orbis/slam/loop_closer.hpp>
 #include <orbis/slam/map_file.hpp>
-#include <orbis/slam/mapping.hpp>
+#include <orbis/slam/matchers.hpp>
 #include <orbis/slam/options.hpp>
 #include <orbis/slam/place_recognition.hpp>
-#include <orbis/slam/shared_state.hpp>
 #include <orbis/slam/track_result.hpp>
-#include <orbis/slam/tracker.hpp>
-#include <orbis/slam/worker.hpp>
 
 namespace orbis::slam {
 
@@ -79,11 +81,11 @@ class rgbd_system {
         closer_{shared_} {
     options_.threads.max_waiting = std::max<std::size_t>(1, options_.threads.max_waiting);
     if (!options_.threads.enabled) return;
-    global_worker_ = std::make_unique<worker<map_id>>([this](map_id m) { closer_.adjust_globally(m); });
-    loop_worker_ = std::make_unique<worker<map_keyframe>>([this](map_keyframe k) {
+    global_worker_ = std::make_unique<detail::worker<map_id>>([this](map_id m) { closer_.adjust_globally(m); });
+    loop_worker_ = std::make_unique<detail::worker<map_keyframe>>([this](map_keyframe k) {
       if (closer_.close(k)) global_worker_->push(shared_.locked([&] { return shared_.atlas.current(k).map; }));
     });
-    map_worker_ = std::make_unique<worker<map_keyframe>>([this](map_keyframe k) {
+    map_worker_ = std::make_unique<detail::worker<map_keyframe>>([this](map_keyframe k) {
       mapper_.process(k, [this] { return map_worker_->waiting() != 0; });
       loop_worker_->push(k);
     });
@@ -109,21 +111,21 @@ class rgbd_system {
   template <camera::depth_source Depth>
   track_result track(double timestamp, image_view<const rgb8> color, const Depth& depth) {
     track_result result;
-    stopwatch clock;
+    detail::stopwatch clock;
     frame current = observe(timestamp, color, depth);
     clock.lap(result.timings.features_ms);
     if (map_worker_ && options_.threads.wait) map_worker_->wait_for_room(options_.threads.max_waiting);
     std::optional<map_keyframe> made;
     {
       const auto lock = shared_.lock();
-      leaves_map_ = localization_only_;
-      bring_up_to_date();
+      map_is_frozen_ = localization_only_;
+      sync_with_map();
       result.inliers = find(current);
       clock.lap(result.timings.tracking_ms);
       if (result.inliers > 0 && needs_keyframe(current, result.inliers)) made = insert(current);
       remember(std::move(current));
     }
-    if (made) hand_on(*made);
+    if (made) dispatch_keyframe(*made);
     report(result, made);
     clock.lap(result.timings.mapping_ms);
     return result;
@@ -226,18 +228,18 @@ class rgbd_system {
   [[nodiscard]] result<void> load_map(const std::filesystem::path& path) {
     auto loaded = read_map(path);
     if (!loaded) return fail(loaded.error());
-    const map_content& content = loaded->content();
+    const detail::map_content& content = loaded->content();
     if (content.levels != shared_.scales.levels() || !(content.scale_factor == shared_.scales.factor()))
       return fail(errc::unsupported, path.string(), "the map was made with another image pyramid");
     if (loaded->keyframes().empty()) return fail(errc::no_data, path.string(), "the map has no keyframes");
-    std::vector<std::pair<keyframe_id, typename Places::signature>> looks;  // before tracking has to wait
-    for (const keyframe& k : loaded->keyframes()) looks.emplace_back(k.id, shared_.places.describe(k.features));
+    std::vector<std::pair<keyframe_id, typename Places::signature>> bow_vectors;  // before tracking has to wait
+    for (const keyframe& k : loaded->keyframes()) bow_vectors.emplace_back(k.id, shared_.places.describe(k.features));
     const auto lock = shared_.lock();
     const map_id before = shared_.atlas.active_id();
     const bool drop = shared_.atlas.active().keyframes().empty();
     const map_id id = shared_.atlas.create(*std::move(loaded));
     if (drop) shared_.atlas.remove(before);
-    for (const auto& [k, seen] : looks) shared_.places.add({id, k}, seen);
+    for (const auto& [k, seen] : bow_vectors) shared_.places.add({id, k}, seen);
     state_ = track_state::lost;
     lost_since_.reset();
     return {};
@@ -266,7 +268,7 @@ class rgbd_system {
   [[nodiscard]] slam::map& active() { return shared_.atlas.active(); }
 
   /// Keyframes may have got other names since the last frame, or have been culled, and landmarks have been fused.
-  void bring_up_to_date() {
+  void sync_with_map() {
     const map_keyframe now = shared_.atlas.current(reference_);
     if (now.map != reference_.map)
       for (landmark_id& l : last_.landmarks)
@@ -284,13 +286,13 @@ class rgbd_system {
     if (is_tracking()) lost_since_ = last_.timestamp;
     if (!lost_since_) lost_since_ = f.timestamp;
     state_ = track_state::lost;
-    if (leaves_map_ || f.timestamp - *lost_since_ < options_.recovery.new_map_after) return 0;
-    return start_afresh(f);
+    if (map_is_frozen_ || f.timestamp - *lost_since_ < options_.recovery.new_map_after) return 0;
+    return start_new_map(f);
   }
 
   /// The first frame with enough depth defines the world.
   std::size_t start(frame& f) {
-    if (leaves_map_) return 0;
+    if (map_is_frozen_) return 0;
     std::size_t with_depth = 0;
     for (std::size_t i = 0; i < f.size(); ++i) with_depth += f.has_depth(i);
     if (with_depth == 0 || with_depth < options_.min_start_points) return 0;
@@ -299,7 +301,7 @@ class rgbd_system {
     return with_depth;
   }
   /// ... of a new map, where the camera has been lost for long.
-  std::size_t start_afresh(frame& f) {
+  std::size_t start_new_map(frame& f) {
     const std::size_t with_depth = start(f);
     if (with_depth == 0) return 0;
     const map_id before = shared_.atlas.active_id();
@@ -312,7 +314,7 @@ class rgbd_system {
     return with_depth;
   }
 
-  /// By motion, else against the reference keyframe, else by looks; refined on the local map.
+  /// By motion, else against the reference keyframe, else by bow_vector; refined on the local map.
   std::size_t locate(frame& f) {
     if (is_tracking() && (track_.by_motion(f, active(), last_, predict(f.timestamp)) > 0 ||
                           track_.against(f, active(), reference_.keyframe) > 0)) {
@@ -329,7 +331,7 @@ class rgbd_system {
 
   std::size_t track_local_map(frame& f, double radius) {
     slam::map& m = active();
-    const bool counts = !leaves_map_;
+    const bool counts = !map_is_frozen_;
     return track_.on_local_map(
         f, m, reference_.keyframe, radius, [&](landmark_id l) { counts ? m.count_visible(l) : void(); },
         [&](landmark_id l) { counts ? m.count_found(l) : void(); });
@@ -361,20 +363,21 @@ class rgbd_system {
 
   [[nodiscard]] bool needs_keyframe(const frame& f, std::size_t inliers) {
     if (active().keyframes().empty()) return true;
-    reference_ = {shared_.atlas.active_id(), most_shared(active(), f, reference_.keyframe)};
-    if (leaves_map_) return false;
+    reference_ = {shared_.atlas.active_id(), detail::most_shared(active(), f, reference_.keyframe)};
+    if (map_is_frozen_) return false;
     if (map_worker_ && map_worker_->waiting() >= options_.threads.max_waiting) return false;
-    return is_keyframe_due(gather_evidence(active(), f, reference_.keyframe, inliers, options_), options_.keyframes);
+    return detail::is_keyframe_due(detail::gather_evidence(active(), f, reference_.keyframe, inliers, options_),
+                                   options_.keyframes);
   }
 
   map_keyframe insert(frame& f) {
-    const keyframe_id id = insert_keyframe(active(), f, options_);
+    const keyframe_id id = detail::insert_keyframe(active(), f, options_);
     f.landmarks = active().at(id).landmarks;
     return reference_ = {shared_.atlas.active_id(), id};
   }
 
   /// Mapping and loop closing, now or by their threads.
-  void hand_on(map_keyframe k) {
+  void dispatch_keyframe(map_keyframe k) {
     if (const auto& tell = shared_.listening.keyframe_made)  // its map may have become a part of another since
       tell(shared_.locked([&] { return shared_.event_of(shared_.atlas.current(k)); }));
     if (map_worker_) return map_worker_->push(k);
@@ -421,7 +424,7 @@ class rgbd_system {
     result.map = shared_.atlas.active_id();
     if (made) result.keyframe = shared_.atlas.current(*made).keyframe;
     if (is_tracking()) result.T_world_camera = last_pose();
-    const state_event changed{std::exchange(told_, state_), state_, counters_.frames - 1};
+    const state_event changed{std::exchange(reported_state_, state_), state_, counters_.frames - 1};
     lock.unlock();
     if (changed.from != changed.to && shared_.listening.state_changed) shared_.listening.state_changed(changed);
   }
@@ -438,15 +441,15 @@ class rgbd_system {
 
   options options_;
   Extractor extract_;
-  shared_state<Camera, Places> shared_;
-  tracker<Camera, Matchers> track_;
-  local_mapper<Camera, Places> mapper_;
-  loop_closer<Camera, Places> closer_;
+  detail::shared_state<Camera, Places> shared_;
+  detail::tracker<Camera, Matchers> track_;
+  detail::local_mapper<Camera, Places> mapper_;
+  detail::loop_closer<Camera, Places> closer_;
 
   track_state state_ = track_state::not_started;
-  track_state told_ = track_state::not_started;  ///< to the listener
+  track_state reported_state_ = track_state::not_started;  ///< to the listener
   std::atomic<bool> localization_only_{options_.localization_only};
-  bool leaves_map_ = false;  ///< `localization_only_` as it was when the frame came
+  bool map_is_frozen_ = false;  ///< `localization_only_` as it was when the frame came
   track_counters counters_;
   std::vector<tracked_frame> tracked_;
   map_keyframe reference_;  ///< that the current frame shares most with
@@ -457,8 +460,8 @@ class rgbd_system {
   double last_interval_ = 0.0;
   std::optional<double> lost_since_;  ///< time stamp; none: since the next frame
 
-  std::unique_ptr<worker<map_id>> global_worker_;
-  std::unique_ptr<worker<map_keyframe>> loop_worker_, map_worker_;
+  std::unique_ptr<detail::worker<map_id>> global_worker_;
+  std::unique_ptr<detail::worker<map_keyframe>> loop_worker_, map_worker_;
 };
 
 template <class Camera>

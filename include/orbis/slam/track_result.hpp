@@ -3,13 +3,11 @@
 /// What tracking a frame tells.
 #pragma once
 
-#include <chrono>
 #include <cstddef>
 #include <optional>
 #include <string_view>
 
 #include <orbis/core/se3.hpp>
-#include <orbis/slam/atlas.hpp>
 #include <orbis/slam/ids.hpp>
 
 namespace orbis::slam {
@@ -64,19 +62,6 @@ struct keyframe_pose {
   double timestamp = 0.0;
   se3 T_world_camera;
   std::size_t frame = 0;  ///< index of the frame it was, from 0
-};
-
-/// Time between laps.
-class stopwatch {
- public:
-  void lap(double& milliseconds) {
-    const auto now = std::chrono::steady_clock::now();
-    milliseconds = std::chrono::duration<double, std::milli>(now - last_).count();
-    last_ = now;
-  }
-
- private:
-  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
 };
 
 }  // namespace orbis::slam

@@ -11,8 +11,8 @@
 #include <vector>
 
 #include <orbis/core/result.hpp>
+#include <orbis/slam/detail/map/counter.hpp>
 #include <orbis/slam/map.hpp>
-#include <orbis/slam/tally.hpp>
 
 namespace orbis::slam {
 
@@ -56,7 +56,7 @@ class map_check {
         const landmark_id l = k.landmarks[i];
         const auto at = "keypoint " + std::to_string(i) + " shows landmark " + std::to_string(l);
         if (l == no_id) continue;
-        if (!m_.is_alive(l)) return wrong_keyframe(id, at + ", which is dead");
+        if (!m_.has_landmark(l)) return wrong_keyframe(id, at + ", which is dead");
         const observation* o = m_.landmark_at(l).seen_by(id);
         if (o == nullptr || o->feature != i) return wrong_keyframe(id, at + ", which does not know of it");
       }
@@ -68,7 +68,7 @@ class map_check {
   [[nodiscard]] result<void> landmarks() const {
     std::size_t count = 0;
     for (landmark_id id = 0; id != m_.landmark_end(); ++id) {
-      if (!m_.is_alive(id)) continue;
+      if (!m_.has_landmark(id)) continue;
       ++count;
       const landmark& l = m_.landmark_at(id);
       if (l.id != id) return wrong_landmark(id, "calls itself " + std::to_string(l.id));
@@ -94,7 +94,7 @@ class map_check {
   [[nodiscard]] result<void> covisibility() const {
     const covisibility_graph& graph = m_.covisibility();
     for (keyframe_id id = 0; id != m_.keyframe_end(); ++id) {
-      tally counted;
+      counter counted;
       if (m_.has_keyframe(id))
         for (const landmark_id l : m_.at(id).landmarks)
           if (l != no_id)
@@ -102,7 +102,7 @@ class map_check {
               if (o.keyframe != id) counted.add(o.keyframe);
       std::vector<covisible> shared;
       covisible most;
-      for (const tally::entry& e : counted.entries()) {
+      for (const counter::entry& e : counted.entries()) {
         shared.push_back({e.number, e.count});
         if (stronger(shared.back(), most)) most = shared.back();
       }
@@ -167,7 +167,7 @@ class map_check {
     if (m_.content().erased.size() + m_.keyframes().size() != m_.keyframe_end())
       return fail(errc::malformed, "keyframes", "are remembered as erased that never were");
     for (landmark_id id = 0; id != m_.landmark_end(); ++id)
-      if (const landmark_id now = m_.became(id); now != no_id && !m_.is_alive(now))
+      if (const landmark_id now = m_.became(id); now != no_id && !m_.has_landmark(now))
         return wrong_landmark(id, "became one that is not there");
     return {};
   }

@@ -1,0 +1,246 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// The sections of a map's file, read and found to fit together. See `map_file.hpp` for what they hold.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include <orbis/core/se3.hpp>
+#include <orbis/slam/detail/map/file_sections.hpp>
+#include <orbis/slam/detail/map/map_content.hpp>
+
+namespace orbis::slam::detail {
+
+/// No coordinate is as large, metres: sums and products stay finite.
+inline constexpr double farthest = 1e12;
+inline constexpr std::size_t bytes_of_keypoint = 76, bytes_of_observation = 8;
+
+/// The pose as it was written, bit for bit; none if it is not one.
+[[nodiscard]] inline std::optional<se3> take_pose(section_reader& from) {
+  std::array<double, 7> v{};
+  for (double& x : v) x = from.take<double>();
+  const basic_so3<double>::quaternion q(v[6], v[3], v[4], v[5]);
+  const vec3 t(v[0], v[1], v[2]);
+  if (!(t.array().abs() < farthest).all() || !(std::abs(q.squaredNorm() - 1.0) < 1e-6)) return std::nullopt;
+  return se3(so3::from_unit_quaternion(q), t);
+}
+[[nodiscard]] inline features::binary_descriptor<256> take_descriptor(section_reader& from) {
+  features::binary_descriptor<256> d;
+  for (std::uint64_t& w : d.words) w = from.take<std::uint64_t>();
+  return d;
+}
+[[nodiscard]] inline vec3 take_vec3(section_reader& from) {
+  const double x = from.take<double>(), y = from.take<double>();
+  return {x, y, from.take<double>()};
+}
+
+/// Reads section by section; `problem` has what is wrong, in words, and everything fits together where nothing is.
+class map_reader {
+ public:
+  explicit map_reader(map_content& to) : to_{to} {}
+
+  std::string problem;
+
+  bool sizes(section_reader in) {
+    const auto levels = in.take<std::uint32_t>();
+    to_.min_shared = in.take<std::uint32_t>();
+    to_.scale_factor = in.take<double>();
+    keyframe_numbers_ = in.take<std::uint32_t>();
+    landmark_numbers_ = in.take<std::uint32_t>();
+    to_.levels = static_cast<int>(levels);
+    if (levels == 0 || levels > 64) return wrong("a pyramid of " + std::to_string(levels) + " levels");
+    if (!(to_.scale_factor > 1.0 && to_.scale_factor < 100.0)) return wrong("a scale factor that is none");
+    return ends(in, "size");
+  }
+
+  bool keyframes(section_reader in) {
+    for (keyframe_id id = 0; id != keyframe_numbers_; ++id) {
+      const std::string name = "keyframe " + std::to_string(id);
+      const auto state = in.take<std::uint8_t>();
+      if (in.ended()) return wrong(name + ": the section ends before it");
+      if (state > 1) return wrong(name + ": neither there nor erased");
+      if (!(state == 0 ? erased(in, id) : keyframe_at(in, id))) return wrong(name + ": " + problem);
+    }
+    return lead_somewhere() && ends(in, "kfrm");
+  }
+
+  bool tree(section_reader in) {
+    std::vector<std::vector<keyframe_id>> children(keyframe_numbers_);
+    std::vector<std::pair<keyframe_id, keyframe_id>> loops;
+    keyframe_id root = no_id;
+    for (const keyframe& k : to_.keyframes) {
+      const std::string name = "keyframe " + std::to_string(k.id);
+      const auto parent = in.take<std::uint32_t>();
+      const auto count = in.take<std::uint32_t>();
+      if (in.ended() || in.left() / sizeof(keyframe_id) < count) return wrong(name + ": the section ends within it");
+      if (parent != no_id && !to_.keyframes.contains(parent)) return wrong(name + ": its parent is not there");
+      if (parent == no_id && std::exchange(root, k.id) != no_id) return wrong(name + ": a second root");
+      if (parent != no_id) children[parent].push_back(k.id);
+      for (std::uint32_t i = 0, last = no_id; i != count; ++i) {
+        const auto other = in.take<std::uint32_t>();
+        if (other == k.id || !to_.keyframes.contains(other) || (last != no_id && other <= last))
+          return wrong(name + ": a loop edge to keyframe " + std::to_string(other));
+        loops.emplace_back(k.id, last = other);
+      }
+    }
+    if (root != no_id) to_.tree.add(root, no_id);
+    std::vector<keyframe_id> open(root != no_id ? 1 : 0, root);
+    while (!open.empty()) {
+      const keyframe_id parent = open.back();
+      open.pop_back();
+      for (const keyframe_id child : children[parent]) {
+        to_.tree.add(child, parent);
+        open.push_back(child);
+      }
+    }
+    if (to_.tree.size() != to_.keyframes.size()) return wrong("the tree does not hold all keyframes together");
+    for (const auto& [a, b] : loops)
+      if (a < b) to_.tree.add_loop_edge(a, b);
+    for (const auto& [a, b] : loops)
+      if (const auto& ends = to_.tree.loop_edges(a); !std::binary_search(ends.begin(), ends.end(), b))
+        return wrong("keyframe " + std::to_string(a) + ": a loop edge that does not lead back");
+    std::size_t both_ways = 0;
+    for (const keyframe& k : to_.keyframes) both_ways += to_.tree.loop_edges(k.id).size();
+    if (both_ways != loops.size()) return wrong("a loop edge that does not lead back");
+    return ends(in, "tree");
+  }
+
+  bool landmarks(section_reader in) {
+    for (landmark_id id = 0; id != landmark_numbers_; ++id) {
+      const auto count = in.take<std::uint32_t>();
+      const bool whole = count == 0 ? dead(in) : landmark_at(in, id, count);
+      if (in.ended()) problem = "the section ends within it";
+      if (!whole || in.ended()) return wrong("landmark " + std::to_string(id) + ": " + problem);
+    }
+    for (landmark_id id = 0; id != landmark_numbers_; ++id)
+      if (!to_.landmarks.contains(id) && successors_[id] != no_id && !to_.landmarks.contains(successors_[id]))
+        return wrong("landmark " + std::to_string(id) + ": became one that is not there");
+    return ends(in, "land");
+  }
+
+ private:
+  bool wrong(std::string what) {
+    problem = std::move(what);
+    return false;
+  }
+  bool ends(const section_reader& in, std::string_view name) {
+    if (in.ended() || in.left() != 0)
+      return wrong("section \"" + std::string(name) + "\" is " + (in.ended() ? "shorter" : "longer") +
+                   " than what it holds");
+    return true;
+  }
+
+  bool erased(section_reader& in, keyframe_id id) {
+    const auto heir = in.take<std::uint32_t>();
+    const auto pose = take_pose(in);
+    if (in.ended()) return wrong("the section ends within it");
+    if (!pose) return wrong("its pose is none");
+    if (heir != no_id && heir >= keyframe_numbers_) return wrong("its heir never was");
+    to_.erased[id] = {heir, *pose};
+    to_.keyframes.add_erased(heir);
+    return true;
+  }
+
+  bool keyframe_at(section_reader& in, keyframe_id id) {
+    keyframe k;
+    k.id = id;
+    k.timestamp = in.take<double>();
+    k.index = static_cast<std::size_t>(in.take<std::uint64_t>());
+    const auto pose = take_pose(in);
+    const auto n = in.take<std::uint32_t>();
+    if (in.ended() || in.left() / bytes_of_keypoint < n) return wrong("the section ends within it");
+    if (!pose || !std::isfinite(k.timestamp)) return wrong("its pose or time is none");
+    k.T_world_camera = *pose;
+    k.features.keypoints.reserve(n);
+    k.features.descriptors.reserve(n);
+    k.depth.reserve(n);
+    k.rays.reserve(n);
+    for (std::uint32_t i = 0; i != n; ++i) {
+      features::keypoint p;
+      for (float* v : {&p.x, &p.y, &p.size, &p.angle, &p.response}) *v = in.take<float>();
+      p.octave = in.take<std::int32_t>();
+      k.depth.push_back(in.take<float>());
+      const double x = in.take<double>(), y = in.take<double>();
+      k.rays.emplace_back(x, y, std::isnan(x) || std::isnan(y) ? std::numeric_limits<double>::quiet_NaN() : 1.0);
+      k.features.descriptors.push_back(take_descriptor(in));
+      k.features.keypoints.push_back(p);
+      if (!std::isfinite(p.x) || !std::isfinite(p.y) || p.octave < 0 || p.octave >= to_.levels ||
+          !(k.depth.back() >= 0.0F && std::isfinite(k.depth.back())))
+        return wrong("keypoint " + std::to_string(i) + " has a place, level or depth that is none");
+    }
+    k.landmarks.assign(n, no_id);
+    k.grid = features::keypoint_grid(k.features.keypoints);
+    to_.keyframes.add(std::move(k));
+    return true;
+  }
+
+  /// Heirs of heirs come to an end.
+  bool lead_somewhere() {
+    std::vector<std::uint32_t> met(keyframe_numbers_, no_id);
+    for (keyframe_id id = 0; id != keyframe_numbers_; ++id)
+      for (keyframe_id k = id; k != no_id && !to_.keyframes.contains(k); k = to_.erased.at(k).heir) {
+        if (met[k] == id) return wrong("keyframe " + std::to_string(id) + ": is its own heir");
+        if (std::exchange(met[k], id) != no_id) break;  // from here on it has been followed before
+      }
+    return true;
+  }
+
+  bool dead(section_reader& in) {
+    successors_.push_back(in.take<std::uint32_t>());
+    if (successors_.back() != no_id && successors_.back() >= landmark_numbers_)
+      return wrong("became one that never was");
+    to_.landmarks.add_erased(successors_.back());
+    return true;
+  }
+
+  bool landmark_at(section_reader& in, landmark_id id, std::uint32_t count) {
+    landmark l;
+    l.id = id;
+    l.position = take_vec3(in);
+    l.normal = take_vec3(in);
+    l.min_distance = in.take<double>();
+    l.max_distance = in.take<double>();
+    l.descriptor = take_descriptor(in);
+    l.created = in.take<std::uint32_t>();
+    l.visible = in.take<std::uint32_t>();
+    l.found = in.take<std::uint32_t>();
+    l.has_current_descriptor = in.take<std::uint8_t>() != 0;
+    if (in.ended() || in.left() / bytes_of_observation < count) return in.end();
+    if (!(l.position.array().abs() < farthest).all() || !l.normal.allFinite() || !(l.min_distance >= 0.0) ||
+        !(l.max_distance >= 0.0) || !std::isfinite(l.max_distance))
+      return wrong("is at no finite place");
+    if (l.created >= keyframe_numbers_) return wrong("comes from a keyframe that never was");
+    l.observations.reserve(count);
+    for (std::uint32_t i = 0; i != count; ++i) {
+      observation o;
+      o.keyframe = in.take<std::uint32_t>();
+      o.feature = in.take<std::uint32_t>();
+      const std::string by = "keypoint " + std::to_string(o.feature) + " of keyframe " + std::to_string(o.keyframe);
+      if (!to_.keyframes.contains(o.keyframe) || o.feature >= to_.keyframes[o.keyframe].size())
+        return wrong("is seen by " + by + ", which is not there");
+      if (i != 0 && o.keyframe <= l.observations.back().keyframe) return wrong("lists its observations in no order");
+      if (std::exchange(to_.keyframes[o.keyframe].landmarks[o.feature], id) != no_id)
+        return wrong("is seen by " + by + ", which shows another");
+      l.observations.push_back(o);
+    }
+    successors_.push_back(no_id);
+    to_.landmarks.add(std::move(l));
+    return true;
+  }
+
+  map_content& to_;
+  std::uint32_t keyframe_numbers_ = 0, landmark_numbers_ = 0;
+  std::vector<landmark_id> successors_;
+};
+
+}  // namespace orbis::slam::detail

@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// New landmarks from keypoints of two keyframes that show the same point: the only way where there is no depth.
+///
+/// Sources: R. Mur-Artal, J. M. M. Montiel, J. D. Tardos, "ORB-SLAM: a versatile and accurate monocular SLAM system",
+/// T-RO 31 (2015), section VI.C; R. Mur-Artal, J. D. Tardos, "ORB-SLAM2", T-RO 33 (2017), section III.A, for what depth
+/// is worth against parallax.
+#pragma once
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <vector>
+
+#include <orbis/camera/model.hpp>
+#include <orbis/core/se3.hpp>
+#include <orbis/core/types.hpp>
+#include <orbis/features/descriptor.hpp>
+#include <orbis/features/epipolar.hpp>
+#include <orbis/features/epipolar_geometry.hpp>
+#include <orbis/features/hamming.hpp>
+#include <orbis/features/match.hpp>
+#include <orbis/features/matcher.hpp>
+#include <orbis/features/stages.hpp>
+#include <orbis/optimize/reprojection.hpp>
+#include <orbis/optimize/triangulation.hpp>
+#include <orbis/slam/covisibility_graph.hpp>
+#include <orbis/slam/detail/map/landmark_search.hpp>
+#include <orbis/slam/detail/map/point_observation.hpp>
+#include <orbis/slam/map.hpp>
+#include <orbis/slam/options.hpp>
+
+namespace orbis::slam::detail {
+
+/// The keypoints of a keyframe that show no landmark.
+struct free_keypoints {
+  features::features features;
+  std::vector<vec3> rays;
+  std::vector<std::uint32_t> index;  ///< in the keyframe
+
+  void assign(const keyframe& k) {
+    features.keypoints.clear();
+    features.descriptors.clear();
+    rays.clear();
+    index.clear();
+    for (std::uint32_t i = 0; i != k.size(); ++i) {
+      if (k.landmarks[i] != no_id) continue;
+      features.keypoints.push_back(k.features.keypoints[i]);
+      features.descriptors.push_back(k.features.descriptors[i]);
+      rays.push_back(k.rays[i]);
+      index.push_back(i);
+    }
+  }
+};
+
+/// Pixels per radian about the middle of the image.
+template <camera::camera_model Camera>
+[[nodiscard]] double focal_length(const Camera& camera) {
+  matrix<2, 3> j = matrix<2, 3>::Zero();
+  return camera.project(vec3(0.0, 0.0, 1.0), j) ? std::sqrt(std::abs(j(0, 0) * j(1, 1))) : 0.0;
+}
+
+/// Two keyframes, and whether a keypoint of each can be one point.
+template <camera::camera_model Camera>
+struct view_pair {
+  const optimize::reprojection<Camera>& model;
+  const pyramid_scales& scales;
+  const triangulation_options& options;
+  const keyframe& a;
+  const keyframe& b;
+  double focal;
+  se3 T_a_world = a.T_world_camera.inverse(), T_b_world = b.T_world_camera.inverse();
+
+  /// The point that keypoint `i` of `a` and `j` of `b` show, if it passes all checks.
+  [[nodiscard]] std::optional<vec3> point(std::uint32_t i, std::uint32_t j) const {
+    const auto p = place(i, j);
+    if (!p) return std::nullopt;
+    const vec3 in_a = T_a_world * *p, in_b = T_b_world * *p;
+    if (!(in_a.z() > 0.0 && in_b.z() > 0.0)) return std::nullopt;
+    if (!agrees(model, scales, a, T_a_world, i, *p) || !agrees(model, scales, b, T_b_world, j, *p)) return std::nullopt;
+    // A point that is twice as far appears half as large.
+    const double factor = in_b.norm() * scales.scale(b.features.keypoints[j].octave) /
+                          (in_a.norm() * scales.scale(a.features.keypoints[i].octave));
+    const double limit = options.scale_tolerance * scales.factor();
+    return factor <= limit && factor * limit >= 1.0 ? p : std::nullopt;
+  }
+
+ private:
+  /// Where parallax says, or depth, whichever knows better: depth is worth the parallax of the virtual stereo camera.
+  [[nodiscard]] std::optional<vec3> place(std::uint32_t i, std::uint32_t j) const {
+    const double of_a = stereo_parallax(a, i), of_b = stereo_parallax(b, j);
+    const auto met = optimize::triangulate<double>(a.T_world_camera, a.rays[i], b.T_world_camera, b.rays[j],
+                                                   {.min_parallax = options.min_parallax});
+    if (std::max(of_a, of_b) > met.parallax) return of_a >= of_b ? a.point_world(i) : b.point_world(j);
+    return met.ok() ? std::optional{met.point} : std::nullopt;
+  }
+  [[nodiscard]] double stereo_parallax(const keyframe& k, std::uint32_t i) const {
+    return k.has_depth(i) ? model.bf / (focal * static_cast<double>(k.depth[i])) : 0.0;
+  }
+};
+
+/// Makes landmarks of keypoints of a keyframe that show none, and look like keypoints of its best neighbours that show
+/// none: both lie on each other's epipolar line. Such a point is where the rays meet, or, where either keypoint has
+/// depth that is worth more than the parallax, where that says. It becomes a landmark with both observations if
+///  - it lies in front of both cameras;
+///  - the rays enclose enough of an angle (but where depth is used);
+///  - it projects to where both keypoints are (chi-square, 95 %), at their depth where they have it;
+///  - the keypoints' pyramid levels differ as its distances do.
+/// Returns how many it made. O(neighbours x keypoints^2) distances to lines. @pre m.has_keyframe(newest)
+template <camera::camera_model Camera>
+std::size_t triangulate_landmarks(map& m, keyframe_id newest, const optimize::reprojection<Camera>& model,
+                                  const pyramid_scales& scales, const triangulation_options& o = {}) {
+  assert(m.has_keyframe(newest));
+  const double focal = detail::focal_length(model.camera);
+  if (!(focal > 0.0)) return 0;
+  const auto matcher = features::epipolar(features::hamming{}, {.distance = o.line_distance,
+                                                                .scale_factor = static_cast<float>(scales.factor()),
+                                                                .epipole_radius = o.epipole_radius}) |
+                       features::max_distance{o.distance} | features::ratio_test{o.ratio} | features::unique{} |
+                       features::rotation_consistency{};
+  typename decltype(matcher)::workspace memory;
+  std::vector<features::match> matches;
+  detail::free_keypoints own, others;
+  std::size_t made = 0;
+  const keyframe& k = m.at(newest);
+  for (const covisible& n : m.covisibility().neighbors(newest, o.neighbors)) {
+    const keyframe& other = m.at(n.keyframe);
+    const se3 T_other_k = other.T_world_camera.inverse() * k.T_world_camera;
+    if (!(T_other_k.translation().norm() >= o.min_baseline)) continue;
+    own.assign(k);
+    others.assign(other);
+    const detail::view_pair<Camera> pair{model, scales, o, k, other, focal};
+    matcher.match_into(matches, memory, own.features, others.features,
+                       features::ray_geometry{own.rays, others.rays, T_other_k, focal});
+    for (const features::match& found : matches) {
+      const std::uint32_t i = own.index[found.query], j = others.index[found.train];
+      const auto point = pair.point(i, j);
+      if (!point) continue;
+      const landmark_id l = m.add_landmark(newest, i, *point);
+      m.observe(l, n.keyframe, j);
+      m.update(l);
+      ++made;
+    }
+  }
+  return made;
+}
+
+}  // namespace orbis::slam::detail

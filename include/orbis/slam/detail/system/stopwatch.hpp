@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Wall time of stages.
+#pragma once
+
+#include <chrono>
+
+namespace orbis::slam::detail {
+
+/// Time between laps.
+class stopwatch {
+ public:
+  void lap(double& milliseconds) {
+    const auto now = std::chrono::steady_clock::now();
+    milliseconds = std::chrono::duration<double, std::milli>(now - last_).count();
+    last_ = now;
+  }
+
+ private:
+  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
+};
+
+}  // namespace orbis::slam::detail

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Whether a frame should become a keyframe.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+
+#include <orbis/slam/map.hpp>
+#include <orbis/slam/options.hpp>
+
+namespace orbis::slam::detail {
+
+/// What the decision rests on.
+struct keyframe_evidence {
+  double since = 0.0;               ///< the last keyframe, seconds
+  double moved = 0.0;               ///< metres since then
+  double turned = 0.0;              ///< radians since then
+  std::size_t inliers = 0;          ///< landmarks tracked in the frame
+  std::size_t reference = 0;        ///< landmarks of the reference keyframe that others see as well
+  std::size_t close_tracked = 0;    ///< close keypoints that show a landmark
+  std::size_t close_untracked = 0;  ///< close keypoints that could become one
+  std::size_t keyframes = 0;        ///< in the map
+};
+
+[[nodiscard]] inline keyframe_evidence gather_evidence(const map& m, const frame& f, keyframe_id reference,
+                                                       std::size_t inliers, const options& o) {
+  keyframe_evidence e;
+  const keyframe& last = m.keyframes().back();
+  e.since = f.timestamp - last.timestamp;
+  const se3 motion = last.T_world_camera.inverse() * f.T_world_camera;
+  e.moved = motion.translation().norm();
+  e.turned = motion.rotation().angle();
+  e.inliers = inliers;
+  e.keyframes = m.keyframes().size();
+  const std::size_t seen_by_others = std::min<std::size_t>(2, e.keyframes);
+  for (const landmark_id l : m.at(reference).landmarks)
+    if (l != no_id && m.landmark_at(l).observations.size() >= seen_by_others) ++e.reference;
+  for (std::size_t i = 0; i < f.size(); ++i) {
+    if (!f.has_depth(i) || static_cast<double>(f.depth[i]) > o.close_depth) continue;
+    ++(f.landmarks[i] != no_id ? e.close_tracked : e.close_untracked);
+  }
+  return e;
+}
+
+/// A keyframe is due when the view has changed much, when too little of what is close is in the map,
+/// or when the last one is a while ago and the camera has moved; never where the pose itself is in
+/// doubt. A camera at rest makes no keyframes.
+[[nodiscard]] inline bool is_keyframe_due(const keyframe_evidence& e, const keyframe_options& o) {
+  if (e.inliers <= o.min_inliers) return false;
+  const double ratio = e.keyframes < 2 ? o.inlier_ratio_start : o.inlier_ratio;
+  const bool view_changed = static_cast<double>(e.inliers) < ratio * static_cast<double>(e.reference);
+  const bool needs_close = e.close_tracked < o.close_tracked && e.close_untracked > o.close_untracked;
+  const bool has_moved = e.since >= o.interval && (e.moved >= o.moved || e.turned >= o.turned);
+  return view_changed || needs_close || has_moved;
+}
+
+}  // namespace orbis::slam::detail

@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <cstddef>
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include <orbis/slam/detail/loops/global_adjustment.hpp>
+#include <orbis/slam/detail/loops/loop_correction.hpp>
+
+#include "slam/random_map.hpp"
+#include "slam/ring_world.hpp"
+#include "support/catch.hpp"
+
+using namespace orbis;
+
+namespace {
+
+/// A map whose loop was closed, and is still bent.
+[[nodiscard]] slam::map closed_ring(test::ring_world& world) {
+  slam::map m = world.round(4);
+  const auto last = m.keyframes().back().id;
+  const auto check = slam::detail::verify_loop(m, last, m, 3, world.model, world.scales);
+  slam::detail::close_loop(m, check.match, world.model, world.scales);
+  return m;
+}
+
+}  // namespace
+
+TEST_CASE("Adjusting a whole map takes out what closing its loop has left, and finds what is wrong") {
+  test::ring_world world({.steps = 60});
+  slam::map m = closed_ring(world);
+  // Two keypoints of keyframe 20 are said to show the landmarks of two others.
+  std::vector<slam::landmark_id> swapped;
+  std::vector<std::uint32_t> keypoints;
+  for (std::uint32_t i = 0; i < m.at(20).size() && swapped.size() < 2; ++i)
+    if (m.landmark_at(m.at(20).landmarks[i]).observations.size() > 6 &&
+        (swapped.empty() || (m.at(20).pixel(i) - m.at(20).pixel(keypoints[0])).norm() > 200)) {
+      swapped.push_back(m.at(20).landmarks[i]);
+      keypoints.push_back(i);
+    }
+  REQUIRE(swapped.size() == 2);
+  for (const auto l : swapped) m.forget(l, 20);
+  REQUIRE(m.observe(swapped[0], 20, keypoints[1]));
+  REQUIRE(m.observe(swapped[1], 20, keypoints[0]));
+  m.erase_keyframe(30);
+  const slam::map before = m;
+
+  const auto report = slam::detail::adjust_globally(m, world.model, world.scales);
+  CHECK(test::fault_of(m) == "");
+  CHECK(report.keyframes == 63);
+  CHECK(report.landmarks > 1000);
+  CHECK(report.iterations > 2);
+  CHECK(report.final_cost < 0.5 * report.initial_cost);
+  const auto [worst_before, mean_before] = world.errors(before);
+  const auto [worst, mean] = world.errors(m);
+  CHECK(worst < 0.5 * worst_before);
+  CHECK(mean < 0.5 * mean_before);
+  CHECK(m.at(0).T_world_camera.to_matrix() == before.at(0).T_world_camera.to_matrix());
+
+  double now = 0.0, then = 0.0;
+  for (const auto& l : m.landmarks()) {
+    const auto& o = l.observations.front();
+    const vec3& truth = world.point(world.point_of(o.keyframe, o.feature));
+    now += (l.position - truth).norm();
+    then += (before.landmark_at(l.id).position - truth).norm();
+  }
+  CHECK(now < 0.5 * then);
+  for (const auto l : swapped) CHECK((!m.has_landmark(l) || m.landmark_at(l).seen_by(20) == nullptr));
+  CHECK(report.forgotten >= 2);
+  CHECK(report.forgotten < report.observations / 10);
+}
+
+TEST_CASE("What is added while a map is adjusted goes along, and what is gone is left alone") {
+  test::ring_world world({.steps = 60});
+  slam::map m = closed_ring(world);
+  slam::map alone = m;
+  slam::detail::adjust_globally(alone, world.model, world.scales);
+
+  slam::detail::global_adjustment<camera::pinhole> adjustment;
+  REQUIRE(adjustment.gather(m, world.model, world.scales));
+  slam::frame next = m.at(63);
+  for (std::size_t i = 0; i < next.size(); i += 2) next.landmarks[i] = slam::no_id;
+  const auto first_new = m.landmark_end();
+  const auto added = slam::detail::insert_keyframe(m, next, {});
+  const auto below = slam::detail::insert_keyframe(m, next, {});
+  REQUIRE(m.landmark_end() > first_new);
+  const auto removed = m.at(25).landmarks[0], fused = m.at(40).landmarks[0], into = m.at(40).landmarks[1];
+  m.remove_landmark(removed);
+  m.fuse(fused, into);
+  m.erase_keyframe(50);
+  const slam::map before = m;
+  REQUIRE(adjustment.solve());
+  adjustment.apply(m);
+  CHECK(test::fault_of(m) == "");
+  for (slam::keyframe_id k = 0; k < 64; ++k)
+    if (k != 50) CHECK(m.at(k).T_world_camera.to_matrix() == alone.at(k).T_world_camera.to_matrix());
+  const auto parent = before.tree().parent(added);
+  REQUIRE(parent < 64);
+  for (const auto k : {added, below}) {
+    const se3 rigid = before.at(parent).T_world_camera.inverse() * before.at(k).T_world_camera;
+    CHECK((m.at(parent).T_world_camera * rigid * m.at(k).T_world_camera.inverse()).log().norm() < 1e-9);
+  }
+  std::size_t went_along = 0;
+  for (auto l = first_new; l < before.landmark_end(); ++l) {
+    const auto by = before.landmark_at(l).created;
+    const vec3 seen = before.at(by).T_world_camera.inverse() * before.landmark_at(l).position;
+    CHECK((m.at(by).T_world_camera * seen - m.landmark_at(l).position).norm() < 1e-9);
+    went_along += (m.landmark_at(l).position - before.landmark_at(l).position).norm() > 1e-4;
+  }
+  CHECK(went_along > 10);
+}
+
+TEST_CASE("Adjustment is the same every time, and may be stopped") {
+  test::ring_world world({.steps = 60, .density = 12.0});
+  slam::map m(8, 1.2);
+  slam::detail::global_adjustment<camera::pinhole> adjustment;
+  CHECK_FALSE(adjustment.gather(m, world.model, world.scales));
+  world.walk(m, 0, 12, world.truth(0));
+  const slam::map before = m;
+  slam::map again = m;
+
+  REQUIRE(adjustment.gather(m, world.model, world.scales));
+  std::size_t calls = 0;
+  const auto third = [&](std::size_t done, std::size_t total) {
+    CHECK(done < total);
+    return ++calls < 3;
+  };
+  CHECK_FALSE(adjustment.solve(third));
+  CHECK(calls == 3);
+  CHECK(test::same(before, m));
+
+  REQUIRE(adjustment.gather(m, world.model, world.scales));
+  REQUIRE(adjustment.solve());
+  adjustment.apply(m);
+  slam::detail::adjust_globally(again, world.model, world.scales);
+  CHECK(test::same(m, again));
+  CHECK_FALSE(test::same(m, before));
+  slam::map single(8, 1.2);
+  world.walk(single, 0, 1, world.truth(0));
+  CHECK(slam::detail::adjust_globally(single, world.model, world.scales).keyframes == 0);
+}
+
+TEST_CASE("A map may be gathered part by part; what is added in between takes no part") {
+  test::ring_world world({.steps = 60});
+  const slam::map before = closed_ring(world);
+  slam::map whole = before, parts = before;
+  slam::detail::global_adjustment<camera::pinhole> at_once, adjustment;
+  REQUIRE(at_once.gather(whole, world.model, world.scales));
+  slam::frame next = before.at(63);
+  for (std::size_t i = 0; i < next.size(); i += 2) next.landmarks[i] = slam::no_id;
+  slam::detail::insert_keyframe(whole, next, {});
+
+  std::size_t steps = 1;
+  REQUIRE(adjustment.gather_keyframes(parts, world.model, world.scales));
+  for (; adjustment.gather_landmarks(parts, 500); ++steps)
+    if (steps == 1) slam::detail::insert_keyframe(parts, next, {});
+  CHECK(steps == (before.landmark_end() + 499) / 500);
+  REQUIRE(steps > 2);
+  REQUIRE(adjustment.has_gathered());
+  REQUIRE((at_once.solve() && adjustment.solve()));
+  at_once.apply(whole);
+  adjustment.apply(parts);
+  CHECK(test::fault_of(parts) == "");
+  REQUIRE(parts.keyframes().size() == whole.keyframes().size());
+  for (const auto& k : whole.keyframes())
+    CHECK(parts.at(k.id).T_world_camera.to_matrix() == k.T_world_camera.to_matrix());
+  REQUIRE(parts.landmark_count() == whole.landmark_count());
+  for (const auto& l : whole.landmarks()) CHECK(parts.landmark_at(l.id).position == l.position);
+}

@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <cstddef>
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include <orbis/core/random.hpp>
+#include <orbis/slam/detail/mapping/keyframe_culling.hpp>
+
+#include "slam/random_map.hpp"
+#include "support/catch.hpp"
+
+using namespace orbis;
+using test::random_frame;
+
+namespace {
+
+constexpr double close_depth = 3.2;
+
+/// Shows the first `known` landmarks of keyframe 1 again, at levels `coarser` than it does.
+slam::keyframe_id add(random_bits& random, slam::map& m, std::uint32_t known, int coarser = 0) {
+  auto f = random_frame(random, 40, m.keyframe_end());
+  for (std::uint32_t i = 0; i < known; ++i) {
+    f.landmarks[i] = m.at(1).landmarks[i];
+    f.features.keypoints[i].octave = m.at(1).features.keypoints[i].octave + coarser;
+  }
+  return slam::detail::insert_keyframe(m, std::move(f), {});
+}
+
+/// A keyframe that nothing else is about, then keyframe 1.
+[[nodiscard]] slam::map start(random_bits& random) {
+  slam::map m(8, 1.2);
+  for (std::size_t i = 0; i < 2; ++i) slam::detail::insert_keyframe(m, random_frame(random, 40, i), {});
+  return m;
+}
+
+}  // namespace
+
+TEST_CASE("A keyframe is redundant when three others see nine tenths of its close landmarks") {
+  random_bits random(1);
+  slam::map m = start(random);
+  for (int i = 0; i < 2; ++i) add(random, m, 40);
+  CHECK_FALSE(slam::detail::is_redundant(m, 1, close_depth, {}));
+  add(random, m, 35);
+  CHECK_FALSE(slam::detail::is_redundant(m, 1, close_depth, {}));
+  add(random, m, 36);
+  CHECK(slam::detail::is_redundant(m, 1, close_depth, {}));
+  CHECK_FALSE(slam::detail::is_redundant(m, 1, close_depth, {.redundant = 0.95}));
+  CHECK_FALSE(slam::detail::is_redundant(m, 1, close_depth, {.redundant_observers = 4}));
+  CHECK_FALSE(slam::detail::is_redundant(m, 0, close_depth, {}));
+  CHECK_FALSE(slam::detail::is_redundant(m, 1, 1.0, {}));  // nothing is close
+}
+
+TEST_CASE("Those that see it worse do not make a keyframe redundant") {
+  random_bits random(2);
+  slam::map m = start(random);
+  for (int i = 0; i < 3; ++i) add(random, m, 40, 2);
+  CHECK_FALSE(slam::detail::is_redundant(m, 1, close_depth, {}));
+  CHECK(slam::detail::is_redundant(m, 1, close_depth, {.coarser_levels = 2}));
+  for (int i = 0; i < 3; ++i) add(random, m, 40, 1);
+  CHECK(slam::detail::is_redundant(m, 1, close_depth, {}));
+}
+
+TEST_CASE("Redundant neighbours go as long as they are redundant, but those that are wanted") {
+  random_bits random(3);
+  slam::map m = start(random);
+  // Keyframes 2 to 7 see the same as 1 and nothing else: of these seven three stay.
+  for (int i = 0; i < 6; ++i) {
+    auto f = random_frame(random, 40, m.keyframe_end());
+    f.features.keypoints = m.at(1).features.keypoints;
+    f.landmarks = m.at(1).landmarks;
+    m.add_keyframe(std::move(f));
+  }
+  slam::map kept = m, looped = m;
+  const auto erased = slam::detail::cull_keyframes(m, 7, close_depth, {});
+  CHECK(erased == std::vector<slam::keyframe_id>{1, 2, 3, 4});
+  CHECK(m.keyframes().size() == 4);
+  CHECK(test::fault_of(m) == "");
+  CHECK(m.heir(3) == 0);
+
+  CHECK(slam::detail::cull_keyframes(kept, 7, close_depth, {}, [](slam::keyframe_id k) { return k != 6; }) ==
+        std::vector<slam::keyframe_id>{6});
+  looped.add_loop_edge(0, 2);
+  CHECK(slam::detail::cull_keyframes(looped, 7, close_depth, {}) == std::vector<slam::keyframe_id>{1, 3, 4, 5});
+  CHECK(test::fault_of(looped) == "");
+}
+
+TEST_CASE("The root stays") {
+  random_bits random(4);
+  slam::map m(8, 1.2);
+  slam::detail::insert_keyframe(m, random_frame(random, 40, 0), {});
+  for (int i = 0; i < 5; ++i) {
+    auto f = random_frame(random, 40, m.keyframe_end());
+    f.features.keypoints = m.at(0).features.keypoints;
+    f.landmarks = m.at(0).landmarks;
+    m.add_keyframe(std::move(f));
+  }
+  CHECK(slam::detail::is_redundant(m, 0, close_depth, {}));
+  slam::detail::cull_keyframes(m, 5, close_depth, {});
+  CHECK(m.has_keyframe(0));
+  CHECK(m.keyframes().size() == 3);
+}
