@@ -24,7 +24,6 @@
 #include <orbis/slam/detail/map/motion_propagation.hpp>
 #include <orbis/slam/detail/map/point_observation.hpp>
 #include <orbis/slam/map.hpp>
-#include <orbis/slam/observed_point.hpp>
 #include <orbis/slam/options.hpp>
 
 namespace orbis::slam::detail {
