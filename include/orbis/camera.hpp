@@ -17,3 +17,4 @@
 #include <orbis/camera/rgbd_frame.hpp>
 #include <orbis/camera/settings.hpp>
 #include <orbis/camera/undistort.hpp>
+#include <orbis/camera/world_point.hpp>

@@ -5,8 +5,10 @@
 #include <tuple>
 #include <vector>
 
+#include <orbis/camera/cloud.hpp>
 #include <orbis/camera/kannala_brandt.hpp>
 #include <orbis/mapping/keyframe_points.hpp>
+#include <orbis/octree/depth_points.hpp>
 
 #include "mapping/keyframes.hpp"
 #include "support/catch.hpp"
@@ -24,7 +26,7 @@ std::vector<seen_point> read(const Policy& policy, const Depth& depth, const orb
   keyframe_points reader;
   std::vector<std::vector<seen_point>> parts(reader.parts(rays, options.stride));
   reader.read(policy, depth, rays, options, pose,
-              [&](std::size_t part, int x, int y, const orbis::vec3& p, float range) {
+              [&](std::size_t part, int x, int y, const orbis::vec3f& p, float range) {
                 REQUIRE(part < parts.size());
                 parts[part].emplace_back(x, y, p.x(), p.y(), p.z(), range);
               });
@@ -59,6 +61,21 @@ TEST_CASE("a keyframe's points are those of its valid pixels, in their order") {
     }
     CHECK(i == seen.size());
   }
+}
+
+TEST_CASE("the points of a keyframe, of an un-projected image and of the octree are the same bits") {
+  const auto scene = orbis::test::wall_scene(2, 100);
+  const auto k = scene.keyframe(1);
+  const auto seen =
+      read(orbis::seq, k.depth, orbis::camera::ray_table{scene.camera}, {.max_depth = 100.0F}, k.T_world_camera);
+  std::vector<orbis::vec3f> of_keyframe, of_octree;
+  for (const auto& s : seen)
+    of_keyframe.emplace_back(static_cast<float>(std::get<2>(s)), static_cast<float>(std::get<3>(s)),
+                             static_cast<float>(std::get<4>(s)));
+  orbis::octree::append_world_points(k.depth, scene.camera, k.T_world_camera, of_octree);
+  REQUIRE(of_keyframe.size() > 1000);
+  CHECK(of_keyframe == of_octree);
+  CHECK(orbis::camera::unproject_depth(orbis::seq, k.depth, scene.camera, {}, k.T_world_camera).points == of_octree);
 }
 
 TEST_CASE("pixels without a ray, or a depth that is none, give no points") {

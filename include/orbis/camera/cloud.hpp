@@ -14,6 +14,7 @@
 #include <orbis/camera/depth.hpp>
 #include <orbis/camera/model.hpp>
 #include <orbis/camera/rays.hpp>
+#include <orbis/camera/world_point.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/core/types.hpp>
@@ -80,11 +81,13 @@ template <execution_policy Policy, depth_source Depth>
   unprojected_points out;
   out.points.resize(first[rows]);
   out.pixels.resize(first[rows]);
-  const mat3 rotation = T_world_camera.rotation_matrix();
+  const float_pose pose{T_world_camera};
   for_each_index(policy, rows, grain, [&](std::size_t i) {
     std::size_t at = first[i];
     detail::for_each_point_of_row(depth, rays, row_of(i), options, [&](int x, int y, const vec3f& point) {
-      out.points[at] = (rotation * point.cast<double>() + T_world_camera.translation()).cast<float>();
+      const vec2f& ray = rays(x, y);
+      const auto p = world_point(pose, ray.x(), ray.y(), point.z());
+      out.points[at] = {p[0], p[1], p[2]};
       out.pixels[at] =
           static_cast<std::uint32_t>(y) * static_cast<std::uint32_t>(rays.width()) + static_cast<std::uint32_t>(x);
       ++at;

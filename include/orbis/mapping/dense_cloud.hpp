@@ -197,12 +197,12 @@ class dense_cloud {
     keyframe_points reader;  // const functions share no memory
     std::vector<std::vector<vec3f>> parts(reader.parts(rays_, options_.stride));
     reader.read(policy, k.depth, rays_, point_options(), frames_[number].T_world_camera,
-                [&](std::size_t part, int, int, const vec3& point, float) {
+                [&](std::size_t part, int, int, const vec3f& point, float) {
                   if (!all) {
-                    const auto place = kept.places_->find(point);
+                    const auto place = kept.places_->find(point.cast<double>());
                     if (!place || kept.kept_[*place] == 0) return;
                   }
-                  parts[part].push_back(point.cast<float>());
+                  parts[part].push_back(point);
                 });
     for (const auto& part : parts) out.insert(out.end(), part.begin(), part.end());
     return out;
@@ -258,15 +258,15 @@ class dense_cloud {
       parts_.resize(parts, cloud::voxel_measurements{options_.voxel_size});
       for (auto& part : parts_) part.clear();
       return reader_.read(policy, k.depth, rays_, point_options(), T_world_camera,
-                          [&](std::size_t part, int x, int y, const vec3& point, float range) {
-                            parts_[part].push(point, color_at(x, y), range);
+                          [&](std::size_t part, int x, int y, const vec3f& point, float range) {
+                            parts_[part].push(point.cast<double>(), color_at(x, y), range);
                           });
     }
     plain_.resize(parts);
     for (auto& part : plain_) part.clear();
     return reader_.read(policy, k.depth, rays_, point_options(), T_world_camera,
-                        [&](std::size_t part, int x, int y, const vec3& point, float range) {
-                          plain_[part].cloud.points.push_back(point.cast<float>());
+                        [&](std::size_t part, int x, int y, const vec3f& point, float range) {
+                          plain_[part].cloud.points.push_back(point);
                           plain_[part].cloud.colors.push_back(color_at(x, y));
                           plain_[part].ranges.push_back(range);
                         });

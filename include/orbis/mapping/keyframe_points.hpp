@@ -11,6 +11,7 @@
 
 #include <orbis/camera/depth.hpp>
 #include <orbis/camera/rays.hpp>
+#include <orbis/camera/world_point.hpp>
 #include <orbis/cloud/flying_pixels.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/image.hpp>
@@ -38,9 +39,9 @@ class keyframe_points {
   }
 
   /// Calls `f(part, x, y, point, range)` for the pixels with a valid depth and a ray: the point in the
-  /// world, and its distance from the camera, metres. Within a part in the order of the pixels; parts may
-  /// be on different threads. The same image, options and pose give the same bits, however they are
-  /// compiled. Returns how many pixels of the whole image the filter has looked at and left out. O(pixels).
+  /// world (`camera::world_point`, a `vec3f`), and its distance from the camera, metres. Within a part in the order of
+  /// the pixels; parts may be on different threads. The same image, options and pose give the same bits, however they
+  /// are compiled. Returns how many pixels of the whole image the filter has looked at and left out. O(pixels).
   /// @pre depth and rays have the same size; options.stride > 0
   template <execution_policy Policy, camera::depth_source Depth, class F>
   cloud::flying_pixel_count read(const Policy& policy, const Depth& depth, const camera::ray_table& rays,
@@ -64,23 +65,21 @@ class keyframe_points {
   template <execution_policy Policy, camera::depth_source Depth, class F>
   static void read_all(const Policy& policy, const Depth& depth, const camera::ray_table& rays,
                        const keyframe_point_options& options, const se3& T_world_camera, F&& f) {
-    const mat3 r = T_world_camera.rotation_matrix();
-    const vec3 t = T_world_camera.translation();
-    const auto in_world = [&](const vec3f& p, Eigen::Index a) {
-      return (rounded_product(r(a, 0), double{p[0]}) + rounded_product(r(a, 1), double{p[1]})) +
-             (rounded_product(r(a, 2), double{p[2]}) + t[a]);
-    };
+    const camera::float_pose pose{T_world_camera};
     for_each_index(policy, parts(rays, options.stride), 1, [&](std::size_t part) {
       const int first = static_cast<int>(part) * rows_of_part * options.stride;
       for (int y = first; y < std::min(rays.height(), first + rows_of_part * options.stride); y += options.stride) {
         for (int x = 0; x < rays.width(); x += options.stride) {
           const float z = depth(x, y);
           if (!(z > 0.0F && z >= options.min_depth && z <= options.max_depth)) continue;
-          const vec3f p = rays.at(x, y, z);
-          const float squared =
-              (rounded_product(p[0], p[0]) + rounded_product(p[1], p[1])) + rounded_product(p[2], p[2]);
+          const vec3f in_camera = rays.at(x, y, z);
+          const float squared = (rounded_product(in_camera[0], in_camera[0]) +  //
+                                 rounded_product(in_camera[1], in_camera[1])) +
+                                rounded_product(in_camera[2], in_camera[2]);
           if (!std::isfinite(squared)) continue;  // a pixel without a ray
-          f(part, x, y, vec3{in_world(p, 0), in_world(p, 1), in_world(p, 2)}, std::sqrt(squared));
+          const vec2f& ray = rays(x, y);
+          const auto p = camera::world_point(pose, ray.x(), ray.y(), z);
+          f(part, x, y, vec3f{p[0], p[1], p[2]}, std::sqrt(squared));
         }
       }
     });

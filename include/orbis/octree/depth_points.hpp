@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A depth image as points in the world: the one place that says where the point of a pixel lies.
+/// A depth image as points in the world.
 #pragma once
 
 #include <algorithm>
@@ -18,40 +18,11 @@
 #include <orbis/camera/depth.hpp>
 #include <orbis/camera/model.hpp>
 #include <orbis/camera/pinhole.hpp>
-#include <orbis/camera/rays.hpp>
-#include <orbis/core/rounded.hpp>
+#include <orbis/camera/world_point.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/octree/detail/points/ray_walk.hpp>
 
 namespace orbis::octree {
-
-/// `T_world_camera` in float: the rows of its rotation, and the camera's centre (metres).
-struct float_pose {
-  std::array<float3, 3> rows{};
-  float3 centre{};
-
-  explicit float_pose(const se3& T_world_camera) {
-    const mat3 r = T_world_camera.rotation_matrix();
-    for (int i = 0; i != 3; ++i) {
-      centre[static_cast<std::size_t>(i)] = static_cast<float>(T_world_camera.translation()[i]);
-      for (int j = 0; j != 3; ++j)
-        rows[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)] = static_cast<float>(r(i, j));
-    }
-  }
-};
-
-/// The world point (metres) at depth `z` on the ray through (x, y, 1) in the camera frame. Float
-/// arithmetic in this order, rounded after every operation, so that every compiler and every
-/// instruction set gives the same bits. Off by less than 1 um in a room.
-[[nodiscard]] inline float3 world_point(const float_pose& pose, float x, float y, float z) noexcept {
-  const float cx = rounded_product(x, z), cy = rounded_product(y, z);
-  float3 p;
-  for (std::size_t i = 0; i != 3; ++i)
-    p[i] = ((rounded_product(pose.rows[i][0], cx) + rounded_product(pose.rows[i][1], cy)) +
-            rounded_product(pose.rows[i][2], z)) +
-           pose.centre[i];
-  return p;
-}
 
 /// The rays of a camera's pixels, as camera::ray_table has them, x and y apart. A pinhole's x depends
 /// on the column alone and its y on the row alone, so that it needs no table. Kept from frame to
@@ -141,7 +112,7 @@ void append_world_points(const Depth& depth, const Camera& camera, const se3& T_
                          std::vector<vec3f>& points) {
   assert(static_cast<int>(depth.width()) == static_cast<int>(camera.width()) &&
          static_cast<int>(depth.height()) == static_cast<int>(camera.height()));
-  const float_pose pose{T_world_camera};
+  const camera::float_pose pose{T_world_camera};
   pixel_rays rays;
   rays.fit(camera);
   for (int v = 0; v < rays.height(); ++v)
@@ -149,7 +120,7 @@ void append_world_points(const Depth& depth, const Camera& camera, const se3& T_
       const float z = depth(u, v);
       const auto [x, y] = rays.at(u, v);
       if (!(z > 0.0F) || std::isnan(x)) continue;
-      const float3 p = world_point(pose, x, y, z);
+      const float3 p = camera::world_point(pose, x, y, z);
       points.emplace_back(p[0], p[1], p[2]);
     }
 }

@@ -38,7 +38,7 @@ struct depth_end {
 /// The sensor of one depth image.
 struct depth_sensor {
   voxel_grid grid;
-  float_pose pose;
+  camera::float_pose pose;
   std::optional<voxel_key> key;  ///< the voxel of the camera's centre
   double max_range;
   float max_square;  ///< the largest squared distance that is within range
@@ -51,7 +51,7 @@ struct depth_sensor {
   /// What becomes of the ray through (x, y, 1) that was measured to be `z` deep: the rules of scan_marker.
   [[nodiscard]] depth_end end(float x, float y, float z) const noexcept {
     if (!(z > 0.0F) || std::isnan(x)) return {};
-    depth_end e{.what = depth_end::fate::used, .point = world_point(pose, x, y, z), .key = {}, .z = z};
+    depth_end e{.what = depth_end::fate::used, .point = camera::world_point(pose, x, y, z), .key = {}, .z = z};
     const float3 ray = difference(e.point, pose.centre);
     const double distance = length(ray);
     if (!(distance <= max_range)) {
