@@ -1,10 +1,30 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
 /// Everything in orbis::octree: the log-odds occupancy octree.
+///
+/// | header | what it is for |
+/// | --- | --- |
+/// | occupancy_octree.hpp | the map: insertion, queries, snapshots, rolling window |
+/// | integration.hpp | options of an insertion, and what became of a scan's points |
+/// | sensor_model.hpp | what a hit and a miss do to a voxel; models in float, int16 and int8, or your own |
+/// | key.hpp | voxel keys, the grid, boxes, Morton order |
+/// | accessor.hpp | many look-ups near each other; the concept of a map |
+/// | nodes.hpp | nodes of any size, inner nodes made of their children by a policy |
+/// | cast_ray.hpp | what a ray meets first, one ray or many |
+/// | overlap.hpp | whether boxes, spheres and capsules are free |
+/// | render.hpp | depth images and labels that a camera would see |
+/// | surface.hpp | centres and normals of occupied voxels |
+/// | change_log.hpp | which voxels changed since a revision |
+/// | decay.hpp | what time does to voxels that are not observed |
+/// | merge.hpp | adds one map to another |
+/// | subtract.hpp | takes a scan out again |
+/// | voxel_layer.hpp | colours, labels or counts beside the map |
+/// | files.hpp | OctoMap's `.bt` and `.ot` |
+/// | compact_file.hpp | small files with every value and checksums |
+/// | depth_points.hpp | world points of a depth image |
 #pragma once
 
 #include <orbis/octree/accessor.hpp>
-#include <orbis/octree/annotate.hpp>
 #include <orbis/octree/cast_ray.hpp>
 #include <orbis/octree/change_log.hpp>
 #include <orbis/octree/compact_file.hpp>
@@ -13,17 +33,12 @@
 #include <orbis/octree/files.hpp>
 #include <orbis/octree/integration.hpp>
 #include <orbis/octree/key.hpp>
-#include <orbis/octree/key_box.hpp>
-#include <orbis/octree/leaves.hpp>
 #include <orbis/octree/merge.hpp>
-#include <orbis/octree/morton.hpp>
 #include <orbis/octree/nodes.hpp>
 #include <orbis/octree/occupancy_octree.hpp>
 #include <orbis/octree/overlap.hpp>
 #include <orbis/octree/render.hpp>
-#include <orbis/octree/scan.hpp>
 #include <orbis/octree/sensor_model.hpp>
 #include <orbis/octree/subtract.hpp>
 #include <orbis/octree/surface.hpp>
 #include <orbis/octree/voxel_layer.hpp>
-#include <orbis/octree/voxel_payload.hpp>

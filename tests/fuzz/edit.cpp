@@ -185,7 +185,7 @@ void check_box(const map& m, const voxels& v, const std::vector<tree_node>& leav
 
   std::vector<tree_node> inside = leaves, found;
   std::erase_if(inside, [&](const tree_node& n) { return !box.overlaps(n.key, n.level); });
-  octree::visit_leaves_in(m.store(), m.tree_depth(), box,
+  octree::detail::visit_leaves_in(m.store(), m.tree_depth(), box,
                           [&](const voxel_key& k, int level, float value) { found.push_back({k, level, value}); });
   require(found == inside, "a box has those of the leaves that overlap it");
 
@@ -267,7 +267,7 @@ class mirror {
       });
     } else {
       log.for_each_since(seen_, [&](const voxel_key& octant, std::uint64_t mask) {
-        const auto voxels = voxels_.node(octant, octree::octant_level);
+        const auto voxels = voxels_.node(octant, octree::detail::octant_level);
         for (std::uint32_t i = 0; i != 64; ++i)
           if ((mask >> i & 1U) != 0) voxels[i] = m.value(octree::detail::voxel_in_octant(octant, i));
       });
@@ -385,7 +385,7 @@ class session {
     std::ranges::fill(inside, voxel{v});
   }
   void edit_octant() {
-    const voxel_key k = octree::node_key(key(), octree::octant_level);
+    const voxel_key k = octree::node_key(key(), octree::detail::octant_level);
     const unsigned kind = from_.byte() % 8;
     const float v = value();
     const unsigned number = from_.byte();
@@ -412,7 +412,7 @@ class session {
     };
     map_.edit_octant(k, edit);
     block<float> expected;
-    const auto voxels = expected_.node(k, octree::octant_level);
+    const auto voxels = expected_.node(k, octree::detail::octant_level);
     for (unsigned i = 0; i != 64; ++i) {
       expected.value[i] = voxels[i].value_or(0.0F);
       expected.known |= std::uint64_t{voxels[i].has_value()} << i;
@@ -466,10 +466,10 @@ class session {
       std::ranges::fill(inside, voxel{});
       mirror_.forget(l.key, at);
     }
-    const double brick = map_.grid().node_size(octree::brick_level);
+    const double brick = map_.grid().node_size(octree::detail::brick_level);
     map_.for_each_leaf([&](const map::leaf& l) {
       map::leaf around = l;
-      const int at = std::max(where().tree_depth - l.depth, octree::brick_level);
+      const int at = std::max(where().tree_depth - l.depth, octree::detail::brick_level);
       around.center = map_.grid().center(octree::node_key(l.key, at), at);
       require(!is_outside(around, std::max(l.size, brick), -1e-6), "what stays touches the box, or its brick does");
     });

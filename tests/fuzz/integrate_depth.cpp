@@ -186,7 +186,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
                 "what becomes of the pixels is what becomes of their points");
         require(done.occupied == expected.occupied, "pixels hit the voxels that their points hit");
         require(done.free <= expected.free && (!is_first || done.free == expected.free),
-                "rays cross the voxels that the rays to the points cross, but for those that are settled");
+                "rays cross the voxels that the rays to the points cross, but for those that are saturated");
         return done;
       });
     }

@@ -9,10 +9,12 @@
 
 using namespace orbis;
 using namespace orbis::octree;
+using namespace orbis::octree::detail;
 
 namespace {
 
-/// Nodes of all sizes at random places, the largest first, so that there are voxels, bricks and large leaves side by side.
+/// Nodes of all sizes at random places, the largest first, so that there are voxels, bricks and large leaves side by
+/// side.
 [[nodiscard]] brick_store<float> random_store(random_bits& random, std::uint32_t cells) {
   brick_store<float> store;
   for (int i = 0; i != 420; ++i) {

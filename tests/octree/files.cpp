@@ -16,6 +16,7 @@
 
 using namespace orbis;
 using namespace orbis::octree;
+using namespace orbis::octree::detail;
 
 namespace {
 
@@ -291,9 +292,19 @@ TEST_CASE("What OctoMap leaves unpruned stays unpruned in its files") {
   // OctoMap prunes from below and stops at the first level at which nothing merges. `merges` are the
   // levels at which eight leaves differ in their log-odds, but not in what is likelier.
   const int top = default_tree_depth - 1;
-  for (const auto& merges :
-       {std::vector<int>{}, {1}, {2}, {3}, {4}, {6}, {1, 2}, {1, 3}, {2, 3}, {1, 2, 3}, {1, 2, 4}, {1, 2, 3, 4, 5},
-        {1, 3, 4}}) {
+  for (const auto& merges : {std::vector<int>{},
+                             {1},
+                             {2},
+                             {3},
+                             {4},
+                             {6},
+                             {1, 2},
+                             {1, 3},
+                             {2, 3},
+                             {1, 2, 3},
+                             {1, 2, 4},
+                             {1, 2, 3, 4, 5},
+                             {1, 3, 4}}) {
     for (const bool occupied : {false, true}) {
       occupancy_octree<> map{0.1};
       for (const int level : merges) {

@@ -14,6 +14,7 @@
 
 using namespace orbis;
 using namespace orbis::octree;
+using namespace orbis::octree::detail;
 
 namespace {
 
@@ -41,7 +42,7 @@ struct reference {
   void walk(const float3& end, const voxel_key& to) {
     const auto from = grid.key(origin);
     if (from && options.rays)
-      walk_ray(grid, origin, *from, end, to, [&](const voxel_key& k) { seen.free.insert(tuple_of(k)); });
+      traverse_ray(grid, origin, *from, end, to, [&](const voxel_key& k) { seen.free.insert(tuple_of(k)); });
   }
   /// Where a ray that is too long ends.
   [[nodiscard]] float3 cut(const float3& p, double limit) const {
@@ -137,7 +138,7 @@ struct reference {
 }
 
 template <class Policy>
-[[nodiscard]] observation marked(const Policy& policy, scan_marker& marker, const voxel_grid& grid,
+[[nodiscard]] observation marked(const Policy& policy, point_integrator& marker, const voxel_grid& grid,
                                  const std::vector<float3>& points, const float3& origin,
                                  const integration_options& options) {
   const auto summary = marker.mark(
@@ -155,7 +156,7 @@ template <class Policy>
 /// All options, in both modes and with several numbers of threads, against the reference.
 void check(const voxel_grid& grid, const std::vector<float3>& points, const float3& origin,
            integration_options options) {
-  scan_marker marker;
+  point_integrator marker;
   for (const ray_mode mode : {ray_mode::every_ray, ray_mode::discretized}) {
     options.mode = mode;
     const observation want = expected(grid, points, origin, options);
@@ -185,7 +186,7 @@ TEST_CASE("Points that are no numbers or absurd are rejected wherever they are")
   check(voxel_grid{0.1}, std::vector<float3>{}, float3{}, {});
   check(voxel_grid{0.1}, {float3{not_a_number, not_a_number, not_a_number}}, float3{}, {});
 
-  scan_marker marker;
+  point_integrator marker;
   const auto nowhere = marked(seq, marker, voxel_grid{0.1}, points, {not_a_number, 0.0F, 0.0F}, {});
   CHECK(nowhere.rejected == points.size());
   CHECK(nowhere.free.empty());
@@ -196,7 +197,7 @@ TEST_CASE("Without rays points mark their voxels and nothing is free") {
   random_bits random{193};
   const auto points = random_scan(random, 500, 1.0);
   check(voxel_grid{0.1}, points, {0.1F, 0.1F, 0.1F}, {.max_range = 1.2, .rays = false});
-  scan_marker marker;
+  point_integrator marker;
   const auto seen = marked(seq, marker, voxel_grid{0.1}, points, {}, {.rays = false});
   CHECK(seen.free.empty());
   CHECK(seen.occupied.size() > 100);
@@ -207,9 +208,8 @@ TEST_CASE("Bounds leave what is outside alone and change nothing inside") {
   const auto points = random_scan(random, 500, 1.0);
   constexpr double inf = std::numeric_limits<double>::infinity();
   for (const bounding_box& bounds :
-       {bounding_box{{-0.35, -0.2, -0.51}, {0.4, 0.62, 0.1}},
-        bounding_box{{0.5, 0.5, 0.5}, {0.9, 0.9, 0.9}}, bounding_box{{-inf, -inf, -inf}, {inf, 0.05, inf}},
-        bounding_box{{0.01, 0.01, 0.01}, {0.02, 0.02, 0.02}},
+       {bounding_box{{-0.35, -0.2, -0.51}, {0.4, 0.62, 0.1}}, bounding_box{{0.5, 0.5, 0.5}, {0.9, 0.9, 0.9}},
+        bounding_box{{-inf, -inf, -inf}, {inf, 0.05, inf}}, bounding_box{{0.01, 0.01, 0.01}, {0.02, 0.02, 0.02}},
         bounding_box{{1e9, -1.0, -1.0}, {inf, 1.0, 1.0}}})
     check(voxel_grid{0.1}, points, {0.1F, -0.1F, 0.7F}, {.max_range = 1.3, .bounds = bounds});
 }
@@ -237,7 +237,7 @@ TEST_CASE("A scan of many points is the same for every number of threads") {
   random_bits random{196};
   const auto points = random_scan(random, 40000, 1.5);
   const voxel_grid grid{0.05};
-  scan_marker marker;
+  point_integrator marker;
   for (const ray_mode mode : {ray_mode::every_ray, ray_mode::discretized}) {
     const integration_options options{.max_range = 1.6, .mode = mode};
     const auto one = marked(seq, marker, grid, points, {}, options);
@@ -253,7 +253,7 @@ TEST_CASE("Points of any type and layout mark the same voxels") {
   };
   random_bits random{199};
   const voxel_grid grid{0.05};
-  scan_marker marker;
+  point_integrator marker;
   for (const std::size_t count : {0U, 1U, 15U, 16U, 17U, 255U, 256U, 700U, 5000U}) {
     const auto points = random_scan(random, count, 1.0);
     std::vector<survey_point> doubles;
@@ -342,7 +342,7 @@ TEST_CASE("The second of two equal scans allocates nothing") {
   const std::vector<float> ranges(points.size(), 1.7F);
   for (const ray_mode mode : {ray_mode::every_ray, ray_mode::discretized})
     for (const bool with_options : {false, true}) {
-      scan_marker marker;
+      point_integrator marker;
       integration_options options{.max_range = 2.5, .mode = mode};
       if (with_options) {
         options.bounds = bounding_box{{-1.0, -1.0, -1.0}, {1.0, 1.0, 1.0}};

@@ -40,7 +40,8 @@ std::vector<small_frame> small_frames(const Recording& recording, std::size_t co
     const auto frame = recording.frame(i * stride).value();
     const auto depth = frame.depth_metres();
     small_frame f{image<float>(width, height),
-                  camera::pinhole{width, height, k.fx / step, k.fy / step, k.cx / step, k.cy / step}, *frame.T_world_camera};
+                  camera::pinhole{width, height, k.fx / step, k.fy / step, k.cx / step, k.cy / step},
+                  *frame.T_world_camera};
     for (int y = 0; y != height; ++y)
       for (int x = 0; x != width; ++x) f.depth(x, y) = depth(step * x, step * y);
     frames.push_back(std::move(f));
@@ -76,9 +77,9 @@ void check_recording(const Recording& recording, std::size_t stride) {
     for (const double resolution : {0.01, 0.02})
       check_against_octomap(few_rays, resolution, {.max_range = 5.0, .mode = mode});
     for (const double resolution : {0.05, 0.1}) {
-      auto settled = frames;  // over and over, until most voxels are at their bounds
-      for (int i = 0; i != 3; ++i) settled.insert(settled.end(), frames.begin(), frames.end());
-      check_against_octomap(settled, resolution, {.max_range = 5.0, .mode = mode});
+      auto saturated = frames;  // over and over, until most voxels are at their bounds
+      for (int i = 0; i != 3; ++i) saturated.insert(saturated.end(), frames.begin(), frames.end());
+      check_against_octomap(saturated, resolution, {.max_range = 5.0, .mode = mode});
     }
   }
   for (const double range : {1.2, no_limit}) {

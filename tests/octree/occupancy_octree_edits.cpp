@@ -9,14 +9,15 @@
 #include <utility>
 #include <vector>
 
-#include <orbis/octree/annotate.hpp>
 #include <orbis/octree/occupancy_octree.hpp>
+#include <orbis/octree/voxel_layer.hpp>
 
 #include "octree/support.hpp"
 #include "support/catch.hpp"
 
 using namespace orbis;
 using namespace orbis::octree;
+using namespace orbis::octree::detail;
 
 namespace {
 
@@ -154,7 +155,8 @@ TEST_CASE("Readers on other threads use snapshots while the writer goes on") {
   const auto rays_that_hit = [](const occupancy_octree<>& view) {
     std::size_t hit = 0;
     for (int i = 0; i != 50; ++i)
-      hit += view.cast_ray(vec3f{0.0F, 0.0F, 0.0F}, vec3f{1.0F, 0.02F * static_cast<float>(i), 0.1F}, 3.0, true) ? 1 : 0;
+      hit +=
+          view.cast_ray(vec3f{0.0F, 0.0F, 0.0F}, vec3f{1.0F, 0.02F * static_cast<float>(i), 0.1F}, 3.0, true) ? 1 : 0;
     return hit;
   };
   std::vector<std::jthread> readers;
@@ -256,7 +258,9 @@ TEST_CASE("A mirror that applies the logged changes stays the same map") {
   for (int round = 0; round != 12; ++round) {
     switch (round % 4) {
       case 0: map.transform([](float v) { return v > 2.0F ? std::nullopt : std::optional{v * 0.75F}; }); break;
-      case 1: map.set_unknown_node({32768 + 400, 32768 + 8 * static_cast<std::uint32_t>(round), 32768}, 13, 0.5F); break;
+      case 1:
+        map.set_unknown_node({32768 + 400, 32768 + 8 * static_cast<std::uint32_t>(round), 32768}, 13, 0.5F);
+        break;
       default: scan(map, random, 2); break;
     }
     update();
@@ -335,10 +339,11 @@ TEST_CASE("What an edit leaves unknown is gone with its brick, and what it does 
   CHECK(map.value(voxel_key{k.x + 10, k.y + 7, k.z + 3}) == -0.5F);
 }
 
-TEST_CASE("Pruning merges equal bricks and a scan through a settled leaf does not split it") {
+TEST_CASE("Pruning merges equal bricks and a scan through a saturated leaf does not split it") {
   occupancy_octree<> map{0.1};
   for (std::uint32_t i = 0; i != 512; ++i)
-    map.set_unknown_node({32768 + 8 * (i % 8), 32768 + 8 * (i / 8 % 8), 32768 + 8 * (i / 64)}, 13, log_odds<>::clamp_min);
+    map.set_unknown_node({32768 + 8 * (i % 8), 32768 + 8 * (i / 8 % 8), 32768 + 8 * (i / 64)}, 13,
+                         log_odds<>::clamp_min);
   const occupancy_octree<> before = map;
   map.prune();
   CHECK(ot_bytes(map) == ot_bytes(before));

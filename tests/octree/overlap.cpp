@@ -9,6 +9,7 @@
 
 using namespace orbis;
 using namespace orbis::octree;
+using namespace orbis::octree::detail;
 
 namespace {
 
@@ -39,7 +40,8 @@ double gap(const bounding_box& b, const vec3& center, double half) {
 /// By nested intervals: the distance is convex along the segment.
 double gap(const capsule& c, const vec3& center, double half) {
   const double length = (c.b - c.a).norm();
-  if (const double least = distance((c.a + c.b) / 2.0, center, half) - length / 2.0 - c.radius; least > 1e-6) return least;
+  if (const double least = distance((c.a + c.b) / 2.0, center, half) - length / 2.0 - c.radius; least > 1e-6)
+    return least;
   double low = 0.0, high = 1.0;
   const auto at = [&](double t) { return distance(c.a + t * (c.b - c.a), center, half); };
   for (int i = 0; i != 45; ++i) {
@@ -114,7 +116,7 @@ TEST_CASE("Boxes, spheres and capsules overlap what they overlap voxel by voxel"
 }
 
 TEST_CASE("Touching is overlapping, and outside the grid nothing is known") {
-  occupancy_octree<> map{0.125};  // exact in binary
+  occupancy_octree<> map{0.125};                          // exact in binary
   map.set_unknown_node({32768, 32768, 32768}, 16, 1.0F);  // from 0 to 0.125
   CHECK(overlaps(map, bounding_box{{0.125, 0.125, 0.125}, {0.2, 0.2, 0.2}}));
   CHECK(overlaps(map, sphere{{-0.5, 0.1, 0.1}, 0.5}));

@@ -12,6 +12,7 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -21,11 +22,10 @@
 
 #include <orbis/core/image.hpp>
 #include <orbis/core/result.hpp>
-#include <orbis/octree/detail/files/octomap_nodes.hpp>
-#include <orbis/octree/morton.hpp>
+#include <orbis/octree/files.hpp>
+#include <orbis/octree/key.hpp>
 #include <orbis/octree/occupancy_octree.hpp>
 #include <orbis/octree/voxel_layer.hpp>
-#include <orbis/octree/voxel_payload.hpp>
 
 namespace orbis::interop {
 
@@ -86,11 +86,13 @@ class tree_builder {
 template <class Tree, octree::octomap_model Model, class FinishLeaf>
 [[nodiscard]] std::unique_ptr<Tree> make_tree(const octree::occupancy_octree<Model>& map, FinishLeaf finish_leaf) {
   assert(map.tree_depth() == octree::default_tree_depth);
-  const octree::detail::octomap_nodes nodes = octree::detail::ot_writer{map.store(), map.tree_depth()}.write();
+  // The `.ot` format holds every node with its value in preorder, behind a text header.
+  const std::string file = octree::ot_bytes(map);
+  constexpr std::string_view end_of_header = "\ndata\n";
+  const std::size_t nodes = file.find(end_of_header) + end_of_header.size();
   open_tree<Tree> built{map.resolution()};
-  if (nodes.nodes != 0)
-    tree_builder<Tree, FinishLeaf>{built, nodes.bytes.view().data(), finish_leaf}.build(built.begin(), 0,
-                                                                                        map.tree_depth());
+  if (nodes != file.size())
+    tree_builder<Tree, FinishLeaf>{built, file.data() + nodes, finish_leaf}.build(built.begin(), 0, map.tree_depth());
   auto tree = std::make_unique<Tree>(map.resolution());
   tree->swapContent(built);
   const auto probability = [](float log_odds) { return octree::probability_of(static_cast<double>(log_odds)); };
@@ -102,29 +104,36 @@ template <class Tree, octree::octomap_model Model, class FinishLeaf>
   return tree;
 }
 
-/// Makes bricks of OctoMap's nodes. `see_leaf(node, key, level)` is called for each leaf and returns
-/// whether to go on.
-template <class Tree, class SeeLeaf>
+/// The level of an octant, the largest node that occupancy_octree::edit_octant changes in one call.
+inline constexpr int octant_level = 2;
+
+/// Makes a map of OctoMap's nodes. `see_leaf(node, key, level)` is called for each leaf and returns whether to
+/// go on.
+template <class Tree, class Model, class SeeLeaf>
 class tree_reader {
  public:
   using node = typename Tree::NodeType;
-  tree_reader(const Tree& tree, SeeLeaf& see_leaf) : tree_{tree}, see_leaf_{see_leaf} {}
+  tree_reader(const Tree& tree, octree::occupancy_octree<Model>& map, SeeLeaf& see_leaf)
+      : tree_{tree}, map_{map}, see_leaf_{see_leaf} {}
 
   /// Reads a node at `level`; false: see problem().
   [[nodiscard]] bool read(const node& n, const octree::voxel_key& key, int level) {
     if (!tree_.nodeHasChildren(&n)) {
       float value = 0;
       if (!take(n, key, level, value)) return false;
-      store_.set_node(key, level, value);
+      map_.set_unknown_node(key, map_.tree_depth() - level, value);
       return true;
     }
-    if (level == octree::brick_level) return read_brick(n, key);
+    if (level == octant_level) {
+      bool good = true;
+      map_.edit_octant(key, [&](octree::block<float>& voxels) { good = read_octant(n, key, voxels); });
+      return good;
+    }
     return for_each_child(n, [&](unsigned i, const node& child) {
       return read(child, octree::child_key(key, i, octree::node_cells(level - 1)), level - 1);
     });
   }
   [[nodiscard]] const error& problem() const noexcept { return problem_; }
-  [[nodiscard]] octree::brick_store<float>& store() noexcept { return store_; }
 
  private:
   template <class Visit>
@@ -142,22 +151,6 @@ class tree_reader {
     if (!std::isfinite(value)) return give_up(errc::malformed, "a value that is not finite");
     return see_leaf_(n, key, level) ||
            give_up(errc::unsupported, "a leaf of more than 32x32x32 voxels that has a colour");
-  }
-  [[nodiscard]] bool read_brick(const node& n, const octree::voxel_key& key) {
-    octree::brick<float>& b = store_.make(key);
-    return for_each_child(n, [&](unsigned i, const node& octant) {
-      const octree::voxel_key octant_key = octree::child_key(key, i, octree::node_cells(octree::octant_level));
-      if (!tree_.nodeHasChildren(&octant)) {
-        float value = 0;
-        if (!take(octant, octant_key, octree::octant_level, value)) return false;
-        store_.make_uniform(b, i, value);
-        return true;
-      }
-      octree::block<float> voxels;
-      if (!read_octant(octant, octant_key, voxels)) return false;
-      store_.write_octant(b, i, voxels);
-      return true;
-    });
   }
   [[nodiscard]] bool read_octant(const node& n, const octree::voxel_key& key, octree::block<float>& voxels) {
     return for_each_child(n, [&](unsigned g, const node& group) {
@@ -178,19 +171,20 @@ class tree_reader {
   }
 
   const Tree& tree_;
+  octree::occupancy_octree<Model>& map_;
   SeeLeaf& see_leaf_;
   error problem_;
-  octree::brick_store<float> store_;
 };
 
 template <octree::octomap_model Model, class Tree, class SeeLeaf>
 [[nodiscard]] result<octree::occupancy_octree<Model>> read_tree(const Tree& tree, SeeLeaf see_leaf) {
   if (tree.getTreeDepth() != static_cast<unsigned>(octree::default_tree_depth))
     return fail(errc::unsupported, "octomap tree", "is " + std::to_string(tree.getTreeDepth()) + " levels deep");
-  tree_reader<Tree, SeeLeaf> reader{tree, see_leaf};
+  octree::occupancy_octree<Model> map{tree.getResolution(), octree::default_tree_depth};
+  tree_reader<Tree, Model, SeeLeaf> reader{tree, map, see_leaf};
   if (tree.getRoot() != nullptr && !reader.read(*tree.getRoot(), {}, octree::default_tree_depth))
     return fail(reader.problem());
-  return octree::occupancy_octree<Model>{tree.getResolution(), octree::default_tree_depth, std::move(reader.store())};
+  return map;
 }
 
 /// Gives leaves the colours of their voxels, in Morton order.
@@ -268,7 +262,8 @@ template <octree::octomap_model Model = octree::log_odds<>, color_payload Color 
   octree::voxel_layer<Color> colors;
   const auto paint = [&](const octomap::ColorOcTreeNode& node, const octree::voxel_key& key, int level) {
     if (!node.isColorSet()) return true;
-    if (level > octree::chunk_level) return false;
+    constexpr int largest = 5;  // of 32x32x32 voxels
+    if (level > largest) return false;
     const octomap::ColorOcTreeNode::Color c = node.getColor();
     const std::uint32_t cells = octree::node_cells(level);
     for (std::uint32_t z = 0; z != cells; ++z)

@@ -20,7 +20,7 @@
 #include <orbis/camera/pinhole.hpp>
 #include <orbis/camera/world_point.hpp>
 #include <orbis/core/se3.hpp>
-#include <orbis/octree/detail/points/ray_walk.hpp>
+#include <orbis/octree/detail/points/ray_traversal.hpp>
 
 namespace orbis::octree {
 
@@ -120,7 +120,7 @@ void append_world_points(const Depth& depth, const Camera& camera, const se3& T_
       const float z = depth(u, v);
       const auto [x, y] = rays.at(u, v);
       if (!(z > 0.0F) || std::isnan(x)) continue;
-      const float3 p = camera::world_point(pose, x, y, z);
+      const detail::float3 p = camera::world_point(pose, x, y, z);
       points.emplace_back(p[0], p[1], p[2]);
     }
 }

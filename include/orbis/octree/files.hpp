@@ -23,7 +23,8 @@
 
 #include <orbis/core/file.hpp>
 #include <orbis/core/result.hpp>
-#include <orbis/octree/detail/files/octomap_nodes.hpp>
+#include <orbis/octree/detail/files/octomap_readers.hpp>
+#include <orbis/octree/detail/files/octomap_writers.hpp>
 #include <orbis/octree/occupancy_octree.hpp>
 
 namespace orbis::octree {

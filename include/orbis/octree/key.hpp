@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Voxel keys: which voxel a coordinate lies in, to the last bit as OctoMap computes it.
+/// Voxel keys: which voxel a coordinate lies in, to the last bit as OctoMap computes it; boxes of voxels; and
+/// the order of voxels along the Morton curve.
 #pragma once
 
 #include <array>
@@ -104,5 +105,81 @@ class voxel_grid {
   int depth_;
   double half_;  ///< of the grid's width, in voxels
 };
+
+// -- the Morton curve
+
+/// The place of voxel `k` along the Morton curve: the bits of x, y and z in turn, x lowest; 63 bits. The six
+/// lowest bits are the voxel's place in its octant of 4x4x4 voxels, the others are the octant's code.
+///
+/// G. M. Morton, "A computer oriented geodetic data base and a new technique in file sequencing", IBM, 1966.
+/// @pre coordinates < 2^21
+[[nodiscard]] constexpr std::uint64_t morton_code(const voxel_key& k) noexcept {
+  assert(((k.x | k.y | k.z) >> 21U) == 0);
+  const auto spread = [](std::uint64_t v) {  // two zeros after each bit
+    v = (v | v << 32U) & 0x001f00000000ffffULL;
+    v = (v | v << 16U) & 0x001f0000ff0000ffULL;
+    v = (v | v << 8U) & 0x100f00f00f00f00fULL;
+    v = (v | v << 4U) & 0x10c30c30c30c30c3ULL;
+    return (v | v << 2U) & 0x1249249249249249ULL;
+  };
+  return spread(k.x) | spread(k.y) << 1U | spread(k.z) << 2U;
+}
+
+/// The voxel at a place of the curve. @pre code < 2^63
+[[nodiscard]] constexpr voxel_key morton_key(std::uint64_t code) noexcept {
+  const auto gather = [](std::uint64_t v) {
+    v &= 0x1249249249249249ULL;
+    v = (v | v >> 2U) & 0x10c30c30c30c30c3ULL;
+    v = (v | v >> 4U) & 0x100f00f00f00f00fULL;
+    v = (v | v >> 8U) & 0x001f0000ff0000ffULL;
+    v = (v | v >> 16U) & 0x001f00000000ffffULL;
+    return static_cast<std::uint32_t>((v | v >> 32U) & 0x1fffffULL);
+  };
+  return {gather(code), gather(code >> 1U), gather(code >> 2U)};
+}
+
+// -- boxes
+
+/// An axis-aligned box, metres.
+struct bounding_box {
+  vec3 min = vec3::Zero();
+  vec3 max = vec3::Zero();
+};
+
+/// The cube of the node at `level` whose lowest voxel is `k`, metres.
+[[nodiscard]] inline bounding_box cube_of(const voxel_grid& grid, const voxel_key& k, int level) {
+  const double half = grid.cells() / 2, cells = node_cells(level);
+  const vec3 low = vec3{static_cast<double>(k.x), static_cast<double>(k.y), static_cast<double>(k.z)}.array() - half;
+  return {low * grid.resolution(), vec3(low.array() + cells) * grid.resolution()};
+}
+
+/// The voxels from `low` to `high`, both included.
+struct key_box {
+  voxel_key low, high;
+
+  /// Whether the node at `level` whose lowest voxel is `k` has a voxel in the box.
+  [[nodiscard]] constexpr bool overlaps(const voxel_key& k, int level) const noexcept {
+    const std::uint32_t last = node_cells(level) - 1;
+    return k.x <= high.x && k.y <= high.y && k.z <= high.z && k.x + last >= low.x && k.y + last >= low.y &&
+           k.z + last >= low.z;
+  }
+};
+
+/// The voxels of the box from `min` to `max` (metres), as far as it lies in the grid; empty if none of
+/// it does, if min > max along an axis, and for NaN.
+[[nodiscard]] inline std::optional<key_box> keys_between(const voxel_grid& grid, const vec3& min, const vec3& max) {
+  const double half = grid.resolution() * (grid.cells() / 2);
+  const auto clamped = [&](double c, std::uint32_t beyond) { return grid.key(c).value_or(c < 0.0 ? 0 : beyond); };
+  const auto axis = [&](int i, std::uint32_t& low, std::uint32_t& high) {
+    if (!(min[i] <= max[i] && min[i] < half && max[i] >= -half)) return false;
+    low = clamped(min[i], grid.cells() - 1);
+    high = clamped(max[i], grid.cells() - 1);
+    return true;
+  };
+  key_box box;
+  if (!axis(0, box.low.x, box.high.x) || !axis(1, box.low.y, box.high.y) || !axis(2, box.low.z, box.high.z))
+    return std::nullopt;
+  return box;
+}
 
 }  // namespace orbis::octree

@@ -17,7 +17,7 @@
 #include <orbis/core/se3.hpp>
 #include <orbis/octree/detail/storage/hash_index.hpp>
 #include <orbis/octree/detail/storage/large_leaves.hpp>
-#include <orbis/octree/key_box.hpp>
+#include <orbis/octree/key.hpp>
 #include <orbis/octree/occupancy_octree.hpp>
 
 namespace orbis::octree {
@@ -127,13 +127,13 @@ merge_summary merge(const Policy& policy, occupancy_octree<Model>& into, const o
   const occupancy_octree<Model> source = from;  // costs nothing, and may be `into` itself
   const bool same_frame = into.grid() == from.grid() && T_into_from.to_matrix().isIdentity(0.0);
   merge_summary summary;
-  const auto taken =
-      same_frame ? detail::new_leaves(into.store(), source.store(), into.tree_depth()) : large_leaves<value_type>{};
+  const auto taken = same_frame ? detail::new_leaves(into.store(), source.store(), into.tree_depth())
+                                : detail::large_leaves<value_type>{};
   for (std::size_t i = 0; i != taken.size(); ++i) {
     const auto& [name, v] = taken[i];
-    into.set_unknown_node(named_key(name), into.tree_depth() - named_level(name),
+    into.set_unknown_node(detail::named_key(name), into.tree_depth() - detail::named_level(name),
                           std::clamp(v, Model::clamp_min, Model::clamp_max));
-    summary.merged += std::size_t{1} << (3 * static_cast<unsigned>(named_level(name)));
+    summary.merged += std::size_t{1} << (3 * static_cast<unsigned>(detail::named_level(name)));
   }
   const std::vector<voxel_key> octants = detail::octants_around(into.grid(), source, T_into_from, taken);
   const se3 T_from_into = T_into_from.inverse();
@@ -153,7 +153,7 @@ merge_summary merge(const Policy& policy, occupancy_octree<Model>& into, const o
       b = {};
       const voxel_key& octant = octants[begin + i];
       for (std::uint32_t place = 0; place != 64; ++place) {
-        const voxel_key in = voxel_in_brick(place);
+        const voxel_key in = detail::voxel_in_brick(place);
         const voxel_key k{octant.x + in.x, octant.y + in.y, octant.z + in.z};
         const vec3 p = rotation * into.grid().center(k) + translation;
         if (const auto v = source.value(p)) {

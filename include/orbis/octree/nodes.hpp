@@ -17,12 +17,22 @@
 #include <vector>
 
 #include <orbis/octree/accessor.hpp>
-#include <orbis/octree/detail/files/pruned_tree.hpp>
 #include <orbis/octree/detail/storage/brick.hpp>
 #include <orbis/octree/detail/storage/tree_parts.hpp>
 #include <orbis/octree/sensor_model.hpp>
 
 namespace orbis::octree {
+
+/// What a node of the pruned octree is: nothing is known there, one value for all of it, or children.
+enum class node_kind : std::uint8_t { none, leaf, inner };
+
+/// Numbers of nodes of the pruned octree.
+struct octree_counts {
+  std::size_t nodes = 0;  ///< inner nodes and leaves
+  std::size_t leaves = 0;
+  std::size_t occupied_leaves = 0;
+  std::size_t free_leaves = 0;
+};
 
 /// An inner node has the largest of its children's values: what may be hit is not overlooked. OctoMap
 /// stores this.

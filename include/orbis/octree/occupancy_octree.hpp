@@ -28,18 +28,23 @@
 #include <orbis/octree/accessor.hpp>
 #include <orbis/octree/cast_ray.hpp>
 #include <orbis/octree/change_log.hpp>
-#include <orbis/octree/detail/depth/depth_marker.hpp>
-#include <orbis/octree/detail/files/pruned_tree.hpp>
+#include <orbis/octree/detail/depth/depth_integrator.hpp>
+#include <orbis/octree/detail/points/point_integrator.hpp>
+#include <orbis/octree/detail/storage/apply_scan.hpp>
 #include <orbis/octree/detail/storage/brick.hpp>
 #include <orbis/octree/detail/storage/large_leaves.hpp>
+#include <orbis/octree/detail/storage/leaves.hpp>
 #include <orbis/octree/detail/storage/tree_parts.hpp>
-#include <orbis/octree/detail/storage/update_block.hpp>
 #include <orbis/octree/integration.hpp>
-#include <orbis/octree/key_box.hpp>
-#include <orbis/octree/leaves.hpp>
+#include <orbis/octree/key.hpp>
 #include <orbis/octree/sensor_model.hpp>
 
 namespace orbis::octree {
+
+/// The voxels of an octant (a node of 4x4x4 voxels, aligned) in the open, see occupancy_octree::edit_octant:
+/// `value[i]` is what is stored of voxel i, in Morton order (morton_code(key) & 63), and bit i of `known` says
+/// whether anything is known about it.
+using detail::block;
 
 /// A leaf of the pruned octree: a cube in which everything has the same log-odds.
 template <class T>
@@ -76,14 +81,14 @@ class occupancy_octree {
   /// @pre resolution finite and > 0; 5 <= tree_depth <= max_tree_depth
   explicit occupancy_octree(double resolution, int tree_depth = default_tree_depth) : grid_{resolution, tree_depth} {}
   /// A map of bricks that were made elsewhere, by a reader for example. @pre none lies outside the grid
-  occupancy_octree(double resolution, int tree_depth, brick_store<value_type> store)
+  occupancy_octree(double resolution, int tree_depth, detail::brick_store<value_type> store)
       : grid_{resolution, tree_depth}, store_{std::move(store)} {}
 
   [[nodiscard]] double resolution() const noexcept { return grid_.resolution(); }
   [[nodiscard]] int tree_depth() const noexcept { return grid_.depth(); }
   [[nodiscard]] const voxel_grid& grid() const noexcept { return grid_; }
   /// The bricks, for algorithms that know them.
-  [[nodiscard]] const brick_store<value_type>& store() const noexcept { return store_; }
+  [[nodiscard]] const detail::brick_store<value_type>& store() const noexcept { return store_; }
 
   // -- insertion
 
@@ -95,9 +100,9 @@ class occupancy_octree {
   integration_summary integrate(const Policy& policy, const Points& points, const Origin& origin,
                                 const integration_options& options = {}) {
     begin_change();
-    scan_marker& marker = scratch_.get().marker;
+    detail::point_integrator& marker = scratch_.get().marker;
     integration_summary summary = marker.mark(policy, grid_, points, coordinates<float>(origin), options);
-    apply(marker.masks(), summary);
+    apply_scan(marker.masks(), summary);
     return summary;
   }
   template <point_range Points, point_like Origin>
@@ -114,27 +119,28 @@ class occupancy_octree {
     assert(options.beam_ranges.empty());
     begin_change();
     scan_buffers& buffers = scratch_.get();
-    scan_masks& masks = buffers.masks;
+    detail::scan_masks& masks = buffers.masks;
     integration_summary summary;
     if (options.mode == ray_mode::every_ray && options.rays) {
-      summary = buffers.depth.mark(policy, grid_, depth, camera, T_world_camera, options, masks,
-                                   [this](std::uint64_t name, auto& settled) { find_settled(name, settled); });
-      clip(masks, grid_, options.bounds);
-      apply(masks, summary);
+      summary = buffers.depth.mark(
+          policy, grid_, depth, camera, T_world_camera, options, masks,
+          [this](std::uint64_t name, auto& saturated) { detail::find_saturated<Model>(store_, name, saturated); });
+      detail::clip(masks, grid_, options.bounds);
+      apply_scan(masks, summary);
     } else if (options.mode == ray_mode::every_ray) {
       summary = buffers.depth.mark_ends(policy, grid_, depth, camera, T_world_camera, options, masks);
-      clip(masks, grid_, options.bounds);
-      apply(masks, summary);
+      detail::clip(masks, grid_, options.bounds);
+      apply_scan(masks, summary);
     } else {
       // Whether a voxel is within range is decided at its centre, not at its points.
       integration_options unlimited = options;
       unlimited.max_range = std::numeric_limits<double>::infinity();
       const std::size_t rejected =
           buffers.depth.mark_ends(policy, grid_, depth, camera, T_world_camera, unlimited, masks).rejected;
-      const float3 origin = coordinates<float>(T_world_camera.translation());
+      const detail::float3 origin = coordinates<float>(T_world_camera.translation());
       summary = buffers.marker.mark_centers(policy, grid_, masks, origin, options);
       summary.rejected += rejected;
-      apply(buffers.marker.masks(), summary);
+      apply_scan(buffers.marker.masks(), summary);
     }
     return summary;
   }
@@ -174,8 +180,8 @@ class occupancy_octree {
     for (const voxel_key& k : keys) {
       assert(std::max({k.x, k.y, k.z}) < grid_.cells());
       block<value_type> before;
-      if (const brick<value_type>* const b = store_.find(k)) {
-        store_.read_octant(*b, place_in_brick(k) >> 6U, before);
+      if (const detail::brick<value_type>* const b = store_.find(k)) {
+        store_.read_octant(*b, detail::place_in_brick(k) >> 6U, before);
       } else if (const value_type* const large = store_.find_large_value(k)) {
         before.value.fill(*large);
         before.known = ~std::uint64_t{0};
@@ -197,7 +203,8 @@ class occupancy_octree {
       return after ? std::optional{without_sign_of_zero(*after)} : after;
     };
     store_.transform(changed, [&](std::uint64_t name, std::uint32_t octant, std::uint64_t mask) {
-      if (track_.on) track_.log.record(child_key(named_key(name), octant, node_cells(octant_level)), mask);
+      if (track_.on)
+        track_.log.record(child_key(detail::named_key(name), octant, node_cells(detail::octant_level)), mask);
     });
     if (has_large) lose_track();
   }
@@ -214,16 +221,16 @@ class occupancy_octree {
   template <std::invocable<const leaf&> Evict>
   std::size_t evict_outside(const bounding_box& box, Evict&& evict) {
     const auto is_outside = [&](std::uint64_t name) {
-      const bounding_box cube = cube_of(grid_, named_key(name), named_level(name));
+      const bounding_box cube = cube_of(grid_, detail::named_key(name), detail::named_level(name));
       return (cube.min.array() > box.max.array()).any() || (cube.max.array() < box.min.array()).any();
     };
     std::vector<std::uint64_t> bricks, large;
-    std::vector<tree_part<value_type>> parts = stored_parts(store_);
-    std::erase_if(parts, [&](const auto& part) { return !is_outside(node_name(part.key, part.level)); });
+    std::vector<detail::tree_part<value_type>> parts = detail::stored_parts(store_);
+    std::erase_if(parts, [&](const auto& part) { return !is_outside(detail::node_name(part.key, part.level)); });
     for (const auto& part : parts)
-      (part.level == brick_level ? bricks : large).push_back(node_name(part.key, part.level));
+      (part.level == detail::brick_level ? bricks : large).push_back(detail::node_name(part.key, part.level));
     if (parts.empty()) return 0;
-    merge_parts(parts, tree_depth());
+    detail::merge_parts(parts, tree_depth());
     detail::visit_parts(store_, parts, tree_depth(),
                         [&](const voxel_key& key, int level, value_type v) { evict(leaf_of(key, level, v)); });
     store_.erase_bricks(bricks);
@@ -234,16 +241,16 @@ class occupancy_octree {
   /// else: what lies within bricks is always stored pruned. Leaves are split again where something
   /// changes. O(bricks).
   void prune() {
-    const std::vector<tree_part<value_type>> parts = tree_parts(store_, tree_depth());
-    large_leaves<value_type> merged;
+    const std::vector<detail::tree_part<value_type>> parts = detail::tree_parts(store_, tree_depth());
+    detail::large_leaves<value_type> merged;
     for (const auto& part : parts)
-      if (part.level > brick_level) merged.add(node_name(part.key, part.level), part.value);
+      if (part.level > detail::brick_level) merged.add(detail::node_name(part.key, part.level), part.value);
     const auto is_inside = [&](std::uint64_t name) {
-      const auto* const leaf = merged.find(named_key(name));
+      const auto* const leaf = merged.find(detail::named_key(name));
       return leaf != nullptr && leaf->name != name;
     };
     std::vector<std::uint64_t> bricks, large;
-    store_.for_each_brick([&](const brick<value_type>& b) {
+    store_.for_each_brick([&](const detail::brick<value_type>& b) {
       if (is_inside(b.name)) bricks.push_back(b.name);
     });
     store_.for_each_large([&](std::uint64_t name, value_type) {
@@ -253,7 +260,8 @@ class occupancy_octree {
     store_.erase_large(large);
     for (std::size_t i = 0; i != merged.size(); ++i) {
       const auto& [name, v] = merged[i];
-      if (store_.find_large_value(named_key(name)) == nullptr) store_.set_node(named_key(name), named_level(name), v);
+      if (store_.find_large_value(detail::named_key(name)) == nullptr)
+        store_.set_node(detail::named_key(name), detail::named_level(name), v);
     }
   }
 
@@ -314,43 +322,32 @@ class occupancy_octree {
   /// O(known voxels).
   template <std::invocable<const leaf&> Visit>
   void for_each_leaf(Visit&& visit) const {
-    visit_leaves(store_, tree_depth(),
-                 [&](const voxel_key& key, int level, value_type v) { visit(leaf_of(key, level, v)); });
+    detail::visit_leaves(store_, tree_depth(),
+                         [&](const voxel_key& key, int level, value_type v) { visit(leaf_of(key, level, v)); });
   }
   /// The same for those leaves that have a voxel in `box`, both corners' voxels included. Touches only
   /// the chunks in the box.
   template <std::invocable<const leaf&> Visit>
   void for_each_leaf_in(const bounding_box& box, Visit&& visit) const {
     if (const auto keys = keys_between(grid_, box.min, box.max))
-      visit_leaves_in(store_, tree_depth(), *keys,
-                      [&](const voxel_key& key, int level, value_type v) { visit(leaf_of(key, level, v)); });
+      detail::visit_leaves_in(store_, tree_depth(), *keys,
+                              [&](const voxel_key& key, int level, value_type v) { visit(leaf_of(key, level, v)); });
   }
   /// The same for the tree cut off at `depth` (tree_depth(): all of it): what lies deeper is reported
   /// as the inner node at `depth`, whose value `Policy` makes of its children.
   template <node_policy<Model> Policy = max_of_children, std::invocable<const leaf&> Visit>
   void for_each_leaf_down_to(int depth, Visit&& visit, Policy = {}) const {
-    visit_nodes_down_to<Model, Policy>(
+    detail::visit_nodes_down_to<Model, Policy>(
         store_, tree_depth(), tree_depth() - depth,
         [&](const voxel_key& key, int level, value_type v, node_kind) { visit(leaf_of(key, level, v)); });
   }
   /// Calls `visit(const vec3& center)` for every occupied voxel, whatever the size of its leaf.
   template <std::invocable<const vec3&> Visit>
   void for_each_occupied_voxel(Visit&& visit) const {
-    visit_occupied_voxels<Model>(store_, [&](const voxel_key& key, value_type) { visit(grid_.center(key)); });
+    detail::visit_occupied_voxels<Model>(store_, [&](const voxel_key& key, value_type) { visit(grid_.center(key)); });
   }
-  /// Visits the nodes of the pruned octree in preorder, see pruned_tree::visit.
-  template <tree_visitor<value_type> Visitor>
-  void visit_tree(Visitor&& visitor) const {
-    visit_tree([](value_type v) { return v; }, visitor);
-  }
-  /// The same, of the octree whose voxels hold `value(log-odds)`.
-  template <std::regular_invocable<value_type> Value, tree_visitor<value_type> Visitor>
-  void visit_tree(Value&& value, Visitor&& visitor) const {
-    pruned_tree<value_type, std::remove_cvref_t<Value>>{store_, tree_depth(), value}.visit(visitor);
-  }
-
   /// Counts nodes. O(bricks + octants that are not uniform), as are the four after it.
-  [[nodiscard]] octree_counts counts() const { return count_leaves<Model>(store_, tree_depth()); }
+  [[nodiscard]] octree_counts counts() const { return detail::count_leaves<Model>(store_, tree_depth()); }
   /// Leaves of the pruned octree, of any size.
   [[nodiscard]] std::size_t num_leaves() const { return counts().leaves; }
   [[nodiscard]] std::size_t num_occupied_leaves() const { return counts().occupied_leaves; }
@@ -378,9 +375,9 @@ class occupancy_octree {
 
  private:
   struct scan_buffers {
-    scan_marker marker;
-    depth_marker depth;
-    scan_masks masks;
+    detail::point_integrator marker;
+    detail::depth_integrator depth;
+    detail::scan_masks masks;
   };
   /// Made with the first scan and kept for the next ones, but nothing a copy needs.
   class scratch {
@@ -425,53 +422,8 @@ class occupancy_octree {
   [[nodiscard]] leaf leaf_of(const voxel_key& key, int level, value_type v) const {
     return {key, tree_depth() - level, grid_.center(key, level), grid_.node_size(level), v, is_occupied<Model>(v)};
   }
-  void apply(const scan_masks& scan, integration_summary& summary) {
-    for (const scan_brick& s : scan.bricks()) {
-      bool matters = !is_settled_leaf(named_key(s.name));
-      for (std::uint32_t i = 0; i != 8; ++i) {
-        const std::uint64_t occupied = s.occupied[i];
-        summary.occupied += static_cast<std::size_t>(std::popcount(occupied));
-        summary.free += static_cast<std::size_t>(std::popcount(s.free[i] & ~occupied));
-        matters = matters || occupied != 0;
-      }
-      if (!matters) continue;  // a large leaf is not split for nothing
-      brick<value_type>& b = store_.make(named_key(s.name));
-      for (std::uint32_t i = 0; i != 8; ++i) {
-        if ((s.occupied[i] | s.free[i]) == 0) continue;
-        const std::uint64_t changed = apply(b, i, s.occupied[i], s.free[i] & ~s.occupied[i]);
-        if (track_.on) track_.log.record(child_key(named_key(s.name), i, node_cells(octant_level)), changed);
-      }
-    }
-  }
-  /// Whether a brick is part of a larger leaf that is as free as can be.
-  [[nodiscard]] bool is_settled_leaf(const voxel_key& k) const {
-    if (!store_.has_large()) return false;
-    const value_type* const large = store_.find_large_value(k);
-    return large != nullptr && *large <= Model::clamp_min;
-  }
-  /// Returns the voxels that changed.
-  std::uint64_t apply(brick<value_type>& b, std::uint32_t octant, std::uint64_t occupied, std::uint64_t free) {
-    // Most of a room is at its bound already: nothing can change, so nothing is unpacked.
-    const auto settled = [](value_type v) { return v <= Model::clamp_min; };
-    const auto certain = [](value_type v) { return v >= Model::clamp_max; };
-    if (free != 0) free &= ~store_.voxels_where(b, octant, settled);
-    if (occupied != 0) occupied &= ~store_.voxels_where(b, octant, certain);
-    if ((free | occupied) == 0) return 0;
-    block<value_type> voxels;
-    store_.read_octant(b, octant, voxels);
-    const std::uint64_t changed = update_block<Model>(voxels, free, occupied);
-    store_.write_octant(b, octant, voxels);
-    return changed;
-  }
-  /// The voxels of a brick that are as free as can be.
-  void find_settled(std::uint64_t name, std::array<std::uint64_t, 8>& settled) const {
-    const brick<value_type>* const b = store_.find(named_key(name));
-    if (b == nullptr) {
-      if (is_settled_leaf(named_key(name))) settled.fill(~std::uint64_t{0});
-      return;
-    }
-    for (std::uint32_t i = 0; i != 8; ++i)
-      settled[i] |= store_.voxels_where(*b, i, [](value_type v) { return v <= Model::clamp_min; });
+  void apply_scan(const detail::scan_masks& scan, integration_summary& summary) {
+    detail::apply_scan<Model>(store_, scan, summary, track_.on ? &track_.log : nullptr);
   }
   /// Stores an octant that has been changed, and forgets its brick if nothing is known there any more.
   void replace_octant(const voxel_key& k, const block<value_type>& before, block<value_type>& after) {
@@ -481,8 +433,8 @@ class occupancy_octree {
       changed |= std::uint64_t{before.value[i] != after.value[i]} << i;
     }
     if (changed == 0) return;
-    brick<value_type>& b = store_.make(k);
-    store_.write_octant(b, place_in_brick(k) >> 6U, after);
+    detail::brick<value_type>& b = store_.make(k);
+    store_.write_octant(b, detail::place_in_brick(k) >> 6U, after);
     if (track_.on) track_.log.record(k, changed);
     if (!b.is_known()) store_.erase_bricks(std::array{b.name});
   }
@@ -501,18 +453,19 @@ class occupancy_octree {
   void note_node(const voxel_key& k, int level) {
     if (!track_.on) return;
     change_log& log = track_.log;
-    if (level > brick_level) {
+    if (level > detail::brick_level) {
       lose_track();
-    } else if (level == brick_level) {
-      for (unsigned i = 0; i != 8; ++i) log.record(child_key(k, i, node_cells(octant_level)), ~std::uint64_t{0});
+    } else if (level == detail::brick_level) {
+      for (unsigned i = 0; i != 8; ++i)
+        log.record(child_key(k, i, node_cells(detail::octant_level)), ~std::uint64_t{0});
     } else {
       const std::uint64_t inside = level == 0 ? 1U : level == 1 ? 0xffU : ~std::uint64_t{0};
-      log.record(k, inside << (place_in_brick(k) & 63U));
+      log.record(k, inside << (detail::place_in_brick(k) & 63U));
     }
   }
 
   voxel_grid grid_;
-  brick_store<value_type> store_;
+  detail::brick_store<value_type> store_;
   scratch scratch_;
   tracking track_;
 };

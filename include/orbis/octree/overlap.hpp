@@ -12,8 +12,8 @@
 
 #include <orbis/core/types.hpp>
 #include <orbis/octree/accessor.hpp>
-#include <orbis/octree/key_box.hpp>
-#include <orbis/octree/leaves.hpp>
+#include <orbis/octree/detail/storage/leaves.hpp>
+#include <orbis/octree/key.hpp>
 
 namespace orbis::octree {
 
@@ -101,7 +101,8 @@ class overlap_search {
     const bool is_inside = (bounds.min.array() >= -edge).all() && (bounds.max.array() <= edge).all();
     if (unknown_blocks_ && !is_inside) return true;
     // Faces that only touch are found as well.
-    const auto keys = keys_between(grid_, bounds.min.array() - grid_.resolution(), bounds.max.array() + grid_.resolution());
+    const auto keys =
+        keys_between(grid_, bounds.min.array() - grid_.resolution(), bounds.max.array() + grid_.resolution());
     if (!keys) return false;
     bool found = false;
     store_.for_each_large([&](std::uint64_t name, T v) {
@@ -148,7 +149,8 @@ class overlap_search {
   }
   [[nodiscard]] bool may_block(const brick<T>& b) const noexcept {
     bool may = unknown_blocks_ && b.uniform != 0xff;
-    for (unsigned i = 0; i != 8; ++i) may = may || (((b.uniform | b.dense) >> i & 1U) != 0 && is_occupied<Model>(b.value[i]));
+    for (unsigned i = 0; i != 8; ++i)
+      may = may || (((b.uniform | b.dense) >> i & 1U) != 0 && is_occupied<Model>(b.value[i]));
     return may;
   }
   [[nodiscard]] bool in_brick(const brick<T>& b, const voxel_key& key) const {
@@ -193,7 +195,7 @@ void for_each_overlapping_leaf(const Map& map, const Shape& shape, Visit&& visit
   const bounding_box bounds = bounds_of(shape);
   const auto keys = keys_between(grid, bounds.min.array() - grid.resolution(), bounds.max.array() + grid.resolution());
   if (!keys) return;
-  visit_leaves_in(map.store(), grid.depth(), *keys, [&](const voxel_key& k, int level, auto v) {
+  detail::visit_leaves_in(map.store(), grid.depth(), *keys, [&](const voxel_key& k, int level, auto v) {
     if (is_occupied<typename Map::model>(v) && touches(shape, cube_of(grid, k, level))) visit(k, level, v);
   });
 }

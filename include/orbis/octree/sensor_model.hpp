@@ -27,7 +27,7 @@ enum class occupancy { unknown, free, occupied };
 /// The log-odds of a probability in (0, 1).
 [[nodiscard]] constexpr float log_odds_of(double probability) noexcept {
   const double odds = probability / (1.0 - probability);
-  return static_cast<float>(std::is_constant_evaluated() ? constexpr_log(odds) : std::log(odds));
+  return static_cast<float>(std::is_constant_evaluated() ? detail::constexpr_log(odds) : std::log(odds));
 }
 /// The probability of log-odds.
 [[nodiscard]] inline double probability_of(double log_odds) noexcept { return 1.0 - 1.0 / (1.0 + std::exp(log_odds)); }
@@ -67,6 +67,10 @@ concept scale_is_positive = (std::floating_point<typename M::value_type> && !req
 template <class M>
 concept sensor_model = has_constants_of_its_value_type<M> && hit_raises_and_miss_lowers<M> && clamps_are_ordered<M> &&
     threshold_is_between_clamps<M> && sums_fit_value_type<M> && scale_is_positive<M>;
+
+/// A sensor model whose maps OctoMap's files can hold.
+template <class M>
+concept octomap_model = sensor_model<M> && std::same_as<typename M::value_type, float>;
 
 /// The model OctoMap uses unless told otherwise: P(hit) = 0.7, P(miss) = 0.4, beliefs kept within
 /// [0.1192, 0.971], occupied from 0.5 on. Derive from it, or write your own, to change constants:

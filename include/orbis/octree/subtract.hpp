@@ -14,6 +14,7 @@
 
 #include <orbis/core/execution.hpp>
 #include <orbis/octree/depth_points.hpp>
+#include <orbis/octree/detail/points/point_integrator.hpp>
 #include <orbis/octree/merge.hpp>
 #include <orbis/octree/occupancy_octree.hpp>
 
@@ -40,7 +41,7 @@ subtraction_summary subtract(const Policy& policy, occupancy_octree<Model>& map,
   const auto point = [&](std::size_t i) {
     return coordinates<float>(first[static_cast<std::ranges::range_difference_t<const Points>>(i)]);
   };
-  scan_marker marker;
+  detail::point_integrator marker;
   marker.mark(policy, map.grid(), static_cast<std::size_t>(std::ranges::size(points)), point,
               coordinates<float>(origin), options);
 
@@ -52,15 +53,15 @@ subtraction_summary subtract(const Policy& policy, occupancy_octree<Model>& map,
       return v == 0;
   };
   std::vector<voxel_key> octants;
-  for (const scan_brick& s : marker.masks().bricks()) {
-    const voxel_key k = named_key(s.name);
+  for (const detail::scan_brick& s : marker.masks().bricks()) {
+    const voxel_key k = detail::named_key(s.name);
     if (map.store().find(k) == nullptr && map.store().find_large_value(k) == nullptr) continue;
     for (unsigned i = 0; i != 8; ++i)
-      if ((s.occupied[i] | s.free[i]) != 0) octants.push_back(child_key(k, i, node_cells(octant_level)));
+      if ((s.occupied[i] | s.free[i]) != 0) octants.push_back(child_key(k, i, node_cells(detail::octant_level)));
   }
   map.edit_octants(octants, [&](const voxel_key& k, block<value_type>& voxels) {
-    const scan_brick& s = *marker.masks().find(node_name(k, brick_level));
-    const std::uint32_t octant = place_in_brick(k) >> 6U;
+    const detail::scan_brick& s = *marker.masks().find(detail::node_name(k, detail::brick_level));
+    const std::uint32_t octant = detail::place_in_brick(k) >> 6U;
     for (std::uint64_t rest = (s.occupied[octant] | s.free[octant]) & voxels.known; rest != 0; rest &= rest - 1) {
       const auto place = static_cast<std::size_t>(std::countr_zero(rest));
       const bool hit = (s.occupied[octant] >> place & 1U) != 0;

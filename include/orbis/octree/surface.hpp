@@ -12,7 +12,7 @@
 
 #include <orbis/core/types.hpp>
 #include <orbis/octree/accessor.hpp>
-#include <orbis/octree/leaves.hpp>
+#include <orbis/octree/detail/storage/leaves.hpp>
 
 namespace orbis::octree {
 
@@ -20,7 +20,7 @@ namespace orbis::octree {
 template <octree_map Map>
 [[nodiscard]] std::vector<vec3f> occupied_centers(const Map& map) {
   std::vector<vec3f> centers;
-  visit_occupied_voxels<typename Map::model>(
+  detail::visit_occupied_voxels<typename Map::model>(
       map.store(), [&](const voxel_key& k, auto) { centers.push_back(map.grid().center(k).template cast<float>()); });
   return centers;
 }
@@ -72,13 +72,15 @@ class normal_estimator {
   [[nodiscard]] static double value_of(occupancy o) noexcept {
     return o == occupancy::free ? 0.0 : o == occupancy::occupied ? 1.0 : 0.5;
   }
-  [[nodiscard]] static std::uint32_t moved(std::uint32_t c, int by) noexcept { return c + static_cast<std::uint32_t>(by); }
+  [[nodiscard]] static std::uint32_t moved(std::uint32_t c, int by) noexcept {
+    return c + static_cast<std::uint32_t>(by);
+  }
   [[nodiscard]] double occupied_at(const voxel_key& k) noexcept {
     const auto v = reader_.value(k);
     return v ? probability_of<model>(*v) : unknown_;
   }
 
-  store_reader<typename model::value_type> reader_;
+  detail::store_reader<typename model::value_type> reader_;
   voxel_grid grid_;
   double unknown_;
 };
@@ -88,8 +90,8 @@ class normal_estimator {
 template <octree_map Map, std::invocable<const voxel_key&, const vec3&, const std::optional<vec3>&> Visit>
 void for_each_surface_voxel(const Map& map, Visit&& visit, const normal_options& options = {}) {
   normal_estimator<Map> normal{map, options};
-  visit_occupied_voxels<typename Map::model>(map.store(),
-                                             [&](const voxel_key& k, auto) { visit(k, map.grid().center(k), normal(k)); });
+  detail::visit_occupied_voxels<typename Map::model>(
+      map.store(), [&](const voxel_key& k, auto) { visit(k, map.grid().center(k), normal(k)); });
 }
 
 }  // namespace orbis::octree

@@ -1,25 +1,107 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A sparse layer of payload, one value for each voxel that has any: colours, labels, counts beside
-/// the log-odds of a map with the same keys.
+/// A sparse layer of payload beside a map: colours, labels or counts, one value for each voxel that has any,
+/// under the keys of the map. All payloads here count in integers: the same observations in the same order
+/// give the same bits on every machine.
 #pragma once
 
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cassert>
 #include <concepts>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
+#include <optional>
+#include <ranges>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
+#include <orbis/core/image.hpp>
+#include <orbis/core/point.hpp>
 #include <orbis/octree/detail/storage/cow_pages.hpp>
 #include <orbis/octree/detail/storage/hash_index.hpp>
+#include <orbis/octree/integration.hpp>
 #include <orbis/octree/key.hpp>
-#include <orbis/octree/morton.hpp>
-#include <orbis/octree/voxel_payload.hpp>
 
 namespace orbis::octree {
+
+/// A payload: plain bytes, which copies of a map can share; its default value is that of a voxel that
+/// has none yet.
+template <class T>
+concept voxel_payload = std::copyable<T> && std::default_initializable<T> && std::is_trivially_copyable_v<T>;
+
+/// The mean of the colours seen; 8 bytes. Exact over the first 257 of them; after that the past counts
+/// as 128 observations or more, so that the mean follows the last two hundred or so.
+class rgb_mean {
+ public:
+  void update(const rgb8& color) noexcept {
+    if (count_ == full) halve();
+    sum_[0] = static_cast<std::uint16_t>(sum_[0] + color.r);
+    sum_[1] = static_cast<std::uint16_t>(sum_[1] + color.g);
+    sum_[2] = static_cast<std::uint16_t>(sum_[2] + color.b);
+    ++count_;
+  }
+  /// How many observations the mean is of, 257 at most.
+  [[nodiscard]] std::uint32_t count() const noexcept { return count_; }
+  /// The mean, rounded; black if nothing has been seen.
+  [[nodiscard]] rgb8 color() const noexcept {
+    const std::uint32_t n = count_ == 0 ? 1U : count_;
+    const auto mean = [&](std::uint32_t sum) { return static_cast<std::uint8_t>((sum + n / 2) / n); };
+    return {mean(sum_[0]), mean(sum_[1]), mean(sum_[2])};
+  }
+  friend bool operator==(const rgb_mean&, const rgb_mean&) = default;
+
+ private:
+  static constexpr std::uint32_t full = std::numeric_limits<std::uint16_t>::max() / 255;
+  void halve() noexcept {
+    for (std::uint16_t& s : sum_) s = static_cast<std::uint16_t>((s * (full / 2) + full / 2) / full);
+    count_ = full / 2;
+  }
+
+  std::array<std::uint16_t, 3> sum_{};
+  std::uint16_t count_ = 0;
+};
+
+/// The label that most observations agree on, without counting each: if more than half of them say
+/// the same, it is that one (as long as the counter does not saturate).
+///
+/// R. S. Boyer, J S. Moore, "MJRTY: a fast majority vote algorithm", in: Automated Reasoning, 1991.
+template <std::unsigned_integral Label = std::uint16_t>
+class label_votes {
+ public:
+  void update(Label seen) noexcept {
+    if (votes_ == 0) label_ = seen;
+    if (seen != label_)
+      --votes_;
+    else if (votes_ != std::numeric_limits<Label>::max())
+      ++votes_;
+  }
+  /// The label ahead; empty if there is none.
+  [[nodiscard]] std::optional<Label> label() const noexcept {
+    return votes_ == 0 ? std::nullopt : std::optional{label_};
+  }
+  /// By how many votes it is ahead, at least.
+  [[nodiscard]] Label votes() const noexcept { return votes_; }
+  friend bool operator==(const label_votes&, const label_votes&) = default;
+
+ private:
+  Label label_ = 0;
+  Label votes_ = 0;
+};
+
+/// How often something was seen; stops at 2^32 - 1.
+class hit_count {
+ public:
+  void update() noexcept { count_ += count_ != std::numeric_limits<std::uint32_t>::max() ? 1U : 0U; }
+  [[nodiscard]] std::uint32_t count() const noexcept { return count_; }
+  friend bool operator==(const hit_count&, const hit_count&) = default;
+
+ private:
+  std::uint32_t count_ = 0;
+};
 
 /// Values in octants of 4x4x4 voxels. Costs 64 values for each octant that has any. A copy shares
 /// everything with the original until one of the two changes; a reference to a value holds until the
@@ -41,7 +123,7 @@ class voxel_layer {
   [[nodiscard]] const T* find(const voxel_key& k) const noexcept {
     const std::uint64_t code = morton_code(k);
     const std::uint32_t i = index_.find(code >> 6U);
-    if (i == hash_index::none) return nullptr;
+    if (i == detail::hash_index::none) return nullptr;
     const octant& o = octants_[i];
     return (o.known >> (code & 63U) & 1U) != 0 ? &o.value[code & 63U] : nullptr;
   }
@@ -49,7 +131,7 @@ class voxel_layer {
   [[nodiscard]] T* find_writable(const voxel_key& k) {
     const std::uint64_t code = morton_code(k);
     const std::uint32_t i = index_.find(code >> 6U);
-    if (i == hash_index::none || (octants_[i].known >> (code & 63U) & 1U) == 0) return nullptr;
+    if (i == detail::hash_index::none || (octants_[i].known >> (code & 63U) & 1U) == 0) return nullptr;
     return &octants_.writable(i).value[code & 63U];
   }
 
@@ -57,7 +139,7 @@ class voxel_layer {
   [[nodiscard]] T& make(const voxel_key& k) {
     const std::uint64_t code = morton_code(k);
     const std::uint32_t i = index_.find(code >> 6U);
-    octant& o = octants_.writable(i != hash_index::none ? i : add(code >> 6U));
+    octant& o = octants_.writable(i != detail::hash_index::none ? i : add(code >> 6U));
     o.known |= std::uint64_t{1} << (code & 63U);
     return o.value[code & 63U];
   }
@@ -134,7 +216,7 @@ class voxel_layer {
   }
   std::size_t erase_in(std::uint64_t code, std::uint64_t mask) {
     const std::uint32_t i = index_.find(code);
-    if (i == hash_index::none) return 0;
+    if (i == detail::hash_index::none) return 0;
     const std::uint64_t gone = octants_[i].known & mask;
     if (gone == 0) return 0;
     octant& o = octants_.writable(i);
@@ -148,9 +230,40 @@ class voxel_layer {
     return static_cast<std::size_t>(std::popcount(gone));
   }
 
-  hash_index index_;
-  cow_pages<octant> octants_;
+  detail::hash_index index_;
+  detail::cow_pages<octant> octants_;
   std::vector<std::uint32_t> free_;  ///< octants not in use
 };
+
+/// Calls `update(payload, i)` with the payload of the voxel that holds point i, made if need be, for
+/// every point that is finite, within range of `origin` (`max_range`, `beam_ranges`) and within
+/// `bounds`, in their order. Give it what `integrate` got. Returns the number of those points.
+///
+/// @code
+///   map.integrate(points, origin, options);
+///   annotate(colors, map.grid(), points, origin, options, [&](rgb_mean& c, std::size_t i) { c.update(rgb[i]); });
+/// @endcode
+template <voxel_payload T, point_range Points, point_like Origin, std::invocable<T&, std::size_t> Update>
+std::size_t annotate(voxel_layer<T>& layer, const voxel_grid& grid, const Points& points, const Origin& origin,
+                     const integration_options& options, Update&& update) {
+  assert(options.beam_ranges.empty() || options.beam_ranges.size() == std::ranges::size(points));
+  const detail::float3 from = coordinates<float>(origin);
+  const auto box = options.bounds ? keys_between(grid, options.bounds->min, options.bounds->max)
+                                  : std::optional{key_box{{}, {~0U, ~0U, ~0U}}};
+  if (!box) return 0;
+  std::size_t i = 0, used = 0;
+  for (const auto& p : points) {
+    const std::size_t number = i++;
+    const detail::float3 end = coordinates<float>(p);
+    const double distance = detail::length(detail::difference(end, from));
+    const bool within = distance <= options.max_range &&
+                        (options.beam_ranges.empty() || distance <= static_cast<double>(options.beam_ranges[number]));
+    const auto key = within ? grid.key(end) : std::nullopt;
+    if (!key || !box->overlaps(*key, 0)) continue;
+    update(layer.make(*key), number);
+    ++used;
+  }
+  return used;
+}
 
 }  // namespace orbis::octree

@@ -8,12 +8,13 @@
 
 #include <orbis/core/random.hpp>
 #include <orbis/octree/detail/files/range_coder.hpp>
-#include <orbis/octree/detail/storage/value_coder.hpp>
+#include <orbis/octree/detail/files/rank_coder.hpp>
 
 #include "support/catch.hpp"
 
 using namespace orbis;
 using namespace orbis::octree;
+using namespace orbis::octree::detail;
 
 namespace {
 

@@ -8,12 +8,13 @@
 
 #include <orbis/core/random.hpp>
 #include <orbis/octree/detail/files/tree_coder.hpp>
-#include <orbis/octree/morton.hpp>
+#include <orbis/octree/key.hpp>
 
 #include "support/catch.hpp"
 
 using namespace orbis;
 using namespace orbis::octree;
+using namespace orbis::octree::detail;
 
 namespace {
 

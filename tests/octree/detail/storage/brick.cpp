@@ -14,6 +14,7 @@
 
 using namespace orbis;
 using namespace orbis::octree;
+using namespace orbis::octree::detail;
 
 TEST_CASE("Places in a brick are a bijection and children are neighbours") {
   for (std::uint32_t place = 0; place != 512; ++place) {

@@ -7,7 +7,7 @@
 
 #include "support/catch.hpp"
 
-using orbis::octree::constexpr_log;
+using orbis::octree::detail::constexpr_log;
 
 static_assert(constexpr_log(1.0) == 0.0);
 static_assert(static_cast<float>(constexpr_log(2.0)) == 0.693147181F);

@@ -10,7 +10,7 @@
 #include "support/catch.hpp"
 
 using namespace orbis;
-using octree::cow_pages;
+using octree::detail::cow_pages;
 
 TEST_CASE("A paged array and its copies hold what vectors would hold") {
   random_bits random{9};

@@ -6,7 +6,7 @@
 
 #include "support/catch.hpp"
 
-using orbis::octree::hash_index;
+using orbis::octree::detail::hash_index;
 
 TEST_CASE("A hash index remembers and forgets what a standard map does") {
   orbis::random_bits random{11};

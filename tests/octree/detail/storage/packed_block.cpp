@@ -6,6 +6,7 @@
 
 using namespace orbis;
 using namespace orbis::octree;
+using namespace orbis::octree::detail;
 
 namespace {
 
@@ -25,7 +26,7 @@ void check_round_trip(simd::level level) {
     const block<T> b = random_block<T>(random, 1 + random.below(40));
     palette<T> p, reference;
     find_palette(b, p, level);
-    detail::find_palette_portable(b, reference);
+    find_palette_portable(b, reference);
     REQUIRE(p.count == reference.count);
     if (p.count > max_palette) continue;
     REQUIRE(p.plane == reference.plane);

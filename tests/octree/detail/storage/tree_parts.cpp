@@ -8,6 +8,7 @@
 #include "support/catch.hpp"
 
 using namespace orbis::octree;
+using namespace orbis::octree::detail;
 
 TEST_CASE("Equal bricks and leaves merge as far as they go, but not into the root") {
   for (const bool differing : {false, true}) {

@@ -20,9 +20,7 @@
 #include <immintrin.h>
 #endif
 
-namespace orbis::octree {
-
-namespace detail {
+namespace orbis::octree::detail {
 
 /// What a cell of the pyramid holds: in the upper half the farthest depth in it, rounded up, and in
 /// the lower half 65535 less the nearest one, rounded down. So both are maxima.
@@ -97,8 +95,6 @@ inline void overlap_avx2(const std::uint32_t* a, const std::uint32_t* b, int cou
 }
 #endif
 
-}  // namespace detail
-
 /// Level k, from 1 on, has cells of 2^k x 2^k pixels; its entry (i, j) covers the cells i, i + 1 of
 /// the rows j, j + 1. A box that touches at most four cells in a row is covered by the entries of its
 /// first cell and of the last but one.
@@ -113,15 +109,15 @@ class depth_pyramid {
   explicit depth_pyramid(simd::level level = simd::detected()) noexcept
       : first_{simd::select<first_kernel>(level,
                                           {
-                                            .portable = detail::first_cells_portable,
+                                            .portable = first_cells_portable,
 #if ORBIS_X86
-                                            .popcnt = nullptr, .avx2 = detail::first_cells_avx2
+                                            .popcnt = nullptr, .avx2 = first_cells_avx2
 #endif
                                           })},
         overlap_{simd::select<overlap_kernel>(level, {
-          .portable = detail::overlap_portable,
+          .portable = overlap_portable,
 #if ORBIS_X86
-          .popcnt = nullptr, .avx2 = detail::overlap_avx2
+          .popcnt = nullptr, .avx2 = overlap_avx2
 #endif
         })} {
   }
@@ -238,4 +234,4 @@ class depth_pyramid {
   float scale_ = 1.0F;
 };
 
-}  // namespace orbis::octree
+}  // namespace orbis::octree::detail

@@ -16,12 +16,12 @@
 #include <utility>
 #include <vector>
 
+#include <orbis/octree/detail/files/rank_coder.hpp>
 #include <orbis/octree/detail/files/tree_coder.hpp>
 #include <orbis/octree/detail/storage/brick.hpp>
 #include <orbis/octree/detail/storage/hash_index.hpp>
 #include <orbis/octree/detail/storage/tree_parts.hpp>
-#include <orbis/octree/detail/storage/value_coder.hpp>
-#include <orbis/octree/morton.hpp>
+#include <orbis/octree/key.hpp>
 #include <orbis/octree/sensor_model.hpp>
 
 namespace orbis::octree::detail {

@@ -13,7 +13,7 @@
 #include <span>
 #include <string>
 
-namespace orbis::octree {
+namespace orbis::octree::detail {
 
 /// The expectation that a bit is set, learnt from those seen: their mean at first, later the mean of
 /// the last hundred or so.
@@ -105,4 +105,4 @@ class range_decoder {
   std::uint32_t code_ = 0;
 };
 
-}  // namespace orbis::octree
+}  // namespace orbis::octree::detail

@@ -14,7 +14,7 @@
 #include <orbis/octree/detail/files/range_coder.hpp>
 #include <orbis/octree/detail/storage/hash_index.hpp>
 
-namespace orbis::octree {
+namespace orbis::octree::detail {
 
 /// What a node can be. Two bits: whether it is known to be a leaf, and which.
 enum class coded_state : unsigned { unknown = 0, inner = 1, free = 2, occupied = 3 };
@@ -184,4 +184,4 @@ class tree_coder {
   std::vector<std::array<expectation, 4096>> expectations_{4};
 };
 
-}  // namespace orbis::octree
+}  // namespace orbis::octree::detail

@@ -26,7 +26,7 @@
 #include <orbis/octree/detail/storage/octant_record.hpp>
 #include <orbis/octree/detail/storage/packed_block.hpp>
 
-namespace orbis::octree {
+namespace orbis::octree::detail {
 
 /// 8x8x8 voxels.
 template <class T>
@@ -438,4 +438,4 @@ class brick_store {
   large_leaves<T> large_;
 };
 
-}  // namespace orbis::octree
+}  // namespace orbis::octree::detail

@@ -7,7 +7,7 @@
 #include <cassert>
 #include <cstdint>
 
-namespace orbis::octree {
+namespace orbis::octree::detail {
 
 /// The natural logarithm of `x`, within three units in the last place of a double, so that its float is
 /// std::log's (but for one value in some ten million, where the two round apart).
@@ -32,4 +32,4 @@ namespace orbis::octree {
   return exponent * log2_high + (2.0 * s + (2.0 * s * series + exponent * log2_low));
 }
 
-}  // namespace orbis::octree
+}  // namespace orbis::octree::detail

@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-namespace orbis::octree {
+namespace orbis::octree::detail {
 
 /// Open addressing with linear probing; erasing moves back what follows, so that a window that rolls
 /// on for ever needs no more memory than it holds at a time.
@@ -96,4 +96,4 @@ class hash_index {
   unsigned shift_ = 60;
 };
 
-}  // namespace orbis::octree
+}  // namespace orbis::octree::detail

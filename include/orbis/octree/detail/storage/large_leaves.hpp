@@ -13,7 +13,7 @@
 #include <orbis/octree/detail/storage/hash_index.hpp>
 #include <orbis/octree/detail/storage/node_name.hpp>
 
-namespace orbis::octree {
+namespace orbis::octree::detail {
 
 /// A set of disjoint nodes above bricks, each with one value.
 template <class T>
@@ -86,4 +86,4 @@ class large_leaves {
   unsigned levels_ = 0;  ///< bit l: there is a leaf at level l
 };
 
-}  // namespace orbis::octree
+}  // namespace orbis::octree::detail

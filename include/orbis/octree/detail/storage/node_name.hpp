@@ -8,9 +8,8 @@
 #include <cstdint>
 
 #include <orbis/octree/key.hpp>
-#include <orbis/octree/morton.hpp>
 
-namespace orbis::octree {
+namespace orbis::octree::detail {
 
 /// The levels at which storage changes its form: an octant of 4x4x4 voxels, a brick of eight octants,
 /// a chunk of 4x4x4 bricks.
@@ -61,4 +60,4 @@ inline constexpr int chunk_level = 5;
 
 static_assert(max_tree_depth - octant_level <= 19, "a node's name has 19 bits for each axis");
 
-}  // namespace orbis::octree
+}  // namespace orbis::octree::detail

@@ -12,7 +12,7 @@
 
 #include <orbis/octree/detail/storage/packed_block.hpp>
 
-namespace orbis::octree {
+namespace orbis::octree::detail {
 
 /// An octant where it is stored: its known voxels, and the index of each voxel's value, bit by bit.
 template <class T>
@@ -112,4 +112,4 @@ struct plain_octant {
   }
 };
 
-}  // namespace orbis::octree
+}  // namespace orbis::octree::detail

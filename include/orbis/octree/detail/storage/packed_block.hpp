@@ -18,7 +18,7 @@
 #include <immintrin.h>
 #endif
 
-namespace orbis::octree {
+namespace orbis::octree::detail {
 
 /// An octant of 4x4x4 voxels in the open, in Morton order. Unknown voxels hold 0.
 template <class T>
@@ -61,8 +61,6 @@ template <unsigned Bits>
   for (unsigned j = 0; j != Bits; ++j) where &= (i >> j & 1U) != 0 ? plane[j] : ~plane[j];
   return where;
 }
-
-namespace detail {
 
 template <class T>
 using bits_of =
@@ -179,20 +177,18 @@ inline void expand_palette_avx512(const float* values, const std::uint64_t* plan
 }
 #endif
 
-}  // namespace detail
-
 /// Finds the distinct values of the known voxels of `b`. Every level gives the same.
 template <class T>
 void find_palette(const block<T>& b, palette<T>& p, simd::level level = simd::detected()) noexcept {
   if constexpr (std::is_same_v<T, float>) {
     simd::select<void(const block<float>&, palette<float>&)>(level, {
-      .portable = detail::find_palette_portable<float>,
+      .portable = find_palette_portable<float>,
 #if ORBIS_X86
-      .popcnt = nullptr, .avx2 = detail::find_palette_avx2, .avx512 = detail::find_palette_avx512
+      .popcnt = nullptr, .avx2 = find_palette_avx2, .avx512 = find_palette_avx512
 #endif
     })(b, p);
   } else {
-    detail::find_palette_portable(b, p);
+    find_palette_portable(b, p);
   }
 }
 
@@ -203,14 +199,14 @@ void expand_palette(const T* values, const std::uint64_t* plane, unsigned bits, 
                     simd::level level = simd::detected()) noexcept {
   if constexpr (std::is_same_v<T, float>) {
     simd::select<void(const float*, const std::uint64_t*, unsigned, block<float>&)>(level, {
-      .portable = detail::expand_palette_portable<float>,
+      .portable = expand_palette_portable<float>,
 #if ORBIS_X86
-      .popcnt = nullptr, .avx2 = detail::expand_palette_avx2, .avx512 = detail::expand_palette_avx512
+      .popcnt = nullptr, .avx2 = expand_palette_avx2, .avx512 = expand_palette_avx512
 #endif
     })(values, plane, bits, out);
   } else {
-    detail::expand_palette_portable(values, plane, bits, out);
+    expand_palette_portable(values, plane, bits, out);
   }
 }
 
-}  // namespace orbis::octree
+}  // namespace orbis::octree::detail

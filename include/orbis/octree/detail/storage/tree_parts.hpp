@@ -10,7 +10,7 @@
 
 #include <orbis/octree/detail/storage/brick.hpp>
 
-namespace orbis::octree {
+namespace orbis::octree::detail {
 
 /// A brick that is no leaf, or a leaf at least as large as one.
 template <class T>
@@ -102,4 +102,4 @@ class upper_walk {
   Visitor& visitor_;
 };
 
-}  // namespace orbis::octree
+}  // namespace orbis::octree::detail

@@ -16,9 +16,7 @@
 #include <immintrin.h>
 #endif
 
-namespace orbis::octree {
-
-namespace detail {
+namespace orbis::octree::detail {
 
 template <sensor_model M>
 std::uint64_t update_block_portable(block<typename M::value_type>& b, std::uint64_t free,
@@ -85,8 +83,6 @@ std::uint64_t update_block_avx512(block<float>& b, std::uint64_t free, std::uint
 }
 #endif
 
-}  // namespace detail
-
 /// Gives the voxels `free` of `b` a miss and the voxels `occupied` a hit, see after_miss and
 /// after_hit. Returns those whose value changed or became known. Every level does the same.
 /// @pre free and occupied are disjoint
@@ -95,14 +91,14 @@ std::uint64_t update_block(block<typename M::value_type>& b, std::uint64_t free,
                            simd::level level = simd::detected()) noexcept {
   if constexpr (std::is_same_v<typename M::value_type, float>) {
     return simd::select<std::uint64_t(block<float>&, std::uint64_t, std::uint64_t)>(level, {
-      .portable = detail::update_block_portable<M>,
+      .portable = update_block_portable<M>,
 #if ORBIS_X86
-      .popcnt = nullptr, .avx2 = detail::update_block_avx2<M>, .avx512 = detail::update_block_avx512<M>
+      .popcnt = nullptr, .avx2 = update_block_avx2<M>, .avx512 = update_block_avx512<M>
 #endif
     })(b, free, occupied);
   } else {
-    return detail::update_block_portable<M>(b, free, occupied);
+    return update_block_portable<M>(b, free, occupied);
   }
 }
 
-}  // namespace orbis::octree
+}  // namespace orbis::octree::detail

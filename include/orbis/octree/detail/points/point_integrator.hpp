@@ -1,0 +1,285 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// From a point cloud to the voxels that it observes free and occupied.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <bit>
+#include <cassert>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <ranges>
+#include <span>
+#include <vector>
+
+#include <orbis/core/execution.hpp>
+#include <orbis/core/rounded.hpp>
+#include <orbis/octree/detail/points/limit_rays.hpp>
+#include <orbis/octree/detail/points/point_keys.hpp>
+#include <orbis/octree/detail/points/ray_rasterizer.hpp>
+#include <orbis/octree/detail/storage/scan_masks.hpp>
+#include <orbis/octree/integration.hpp>
+#include <orbis/octree/key.hpp>
+
+namespace orbis::octree::detail {
+
+/// Takes from a scan the voxels that lie outside the bounds, if there are any.
+inline void clip(scan_masks& masks, const voxel_grid& grid, const std::optional<bounding_box>& bounds) {
+  if (!bounds) return;
+  if (const auto box = keys_between(grid, bounds->min, bounds->max))
+    masks.clip(*box);
+  else
+    masks.clear();
+}
+
+/// Marks the voxels of one scan. The result depends neither on the order of the points nor on the
+/// number of threads. Keeps its memory from scan to scan.
+class point_integrator {
+ public:
+  /// The voxels of the last scan; a voxel both free and occupied counts as occupied.
+  [[nodiscard]] const scan_masks& masks() const noexcept { return workers_.front().masks; }
+
+  /// Marks the scan of `count` points, `point(i)` being the i-th as float3, seen from `origin`. The
+  /// summary's voxel counts stay zero. Nothing is marked if the origin is not finite; rays are not
+  /// walked if it lies outside the grid. O(points x voxels along a ray).
+  template <execution_policy Policy, class Point>
+  integration_summary mark(const Policy& policy, const voxel_grid& grid, std::size_t count, Point&& point,
+                           const float3& origin, const integration_options& options) {
+    assert(options.beam_ranges.empty() || options.beam_ranges.size() == count);
+    prepare(policy.threads(), count);
+    if (!is_finite(origin)) return {.used = 0, .truncated = 0, .rejected = count};
+    const sensor from = start(grid, origin, options);
+    if (options.mode == ray_mode::every_ray) {
+      for_each_with_worker(policy, count, 4096, [&](worker& w, std::size_t begin, std::size_t end) {
+        w.add_points(from, begin, end, point);
+      });
+    } else {
+      for_each_with_worker(policy, count, 4096, [&](worker& w, std::size_t begin, std::size_t end) {
+        if (options.beam_ranges.empty())
+          w.add_ends(grid, begin, end, point);
+        else
+          for (std::size_t i = begin; i != end; ++i) w.add_end(from, point(i), options.beam_ranges[i]);
+      });
+      for (std::size_t i = 1; i != active_.size(); ++i) workers_[0].ends.merge(workers_[i].ends);
+      add_centers(policy, from, workers_[0].ends);
+    }
+    return finish(policy, grid, options);
+  }
+
+  /// The same of a range of points.
+  template <execution_policy Policy, point_range Points>
+  integration_summary mark(const Policy& policy, const voxel_grid& grid, const Points& points, const float3& origin,
+                           const integration_options& options) {
+    return mark(policy, grid, static_cast<std::size_t>(std::ranges::size(points)), point_source<Points>{points}, origin,
+                options);
+  }
+
+  /// The second half of mode `discretized` alone: marks the rays to the centres of the voxels that are
+  /// occupied in `ends`. @pre `ends` is not this marker's own
+  template <execution_policy Policy>
+  integration_summary mark_centers(const Policy& policy, const voxel_grid& grid, const scan_masks& ends,
+                                   const float3& origin, const integration_options& options) {
+    prepare(policy.threads(), 64 * ends.bricks().size());
+    if (!is_finite(origin)) return {};
+    add_centers(policy, start(grid, origin, options), ends);
+    return finish(policy, grid, options);
+  }
+
+  [[nodiscard]] std::size_t memory_bytes() const noexcept {
+    std::size_t bytes = workers_.capacity() * sizeof(worker);
+    for (const worker& w : workers_) bytes += w.masks.memory_bytes() + w.ends.memory_bytes() + w.sweep.memory_bytes();
+    return bytes;
+  }
+
+ private:
+  struct sensor {
+    const voxel_grid& grid;
+    float3 origin;
+    std::optional<voxel_key> key;  ///< empty: no ray is walked
+    double max_range;
+    std::span<const float> beam_ranges;
+    limit_kernel* limit_batch = limit_rays(simd::detected());
+
+    /// Of the i-th point; negative or NaN if it is to be rejected.
+    [[nodiscard]] double limit(std::size_t i) const noexcept {
+      if (beam_ranges.empty()) return max_range;
+      const auto own = static_cast<double>(beam_ranges[i]);
+      return own > max_range ? max_range : own;
+    }
+  };
+
+  static constexpr voxel_key no_key{~std::uint32_t{0}, 0, 0};
+
+  /// What one thread collects.
+  struct worker {
+    scan_masks masks;
+    scan_masks ends;  ///< mode discretized: voxels that hold points, as occupied, and ends of rays cut off, as free
+    integration_summary summary;
+    ray_rasterizer sweep;
+    voxel_key last_end = no_key;
+    point_batch batch;
+    std::size_t batched = 0;  ///< centres that are waiting in the batch
+    std::array<double, point_batch::capacity> limits;
+    batch_keys keys;
+    ray_batch rays;
+
+    void clear() noexcept {
+      last_end = no_key;
+      masks.clear();
+      ends.clear();
+      summary = {};
+    }
+    /// The points [begin, end) in mode every_ray.
+    template <class Point>
+    void add_points(const sensor& from, std::size_t begin, std::size_t end, Point&& point) {
+      if (from.beam_ranges.empty()) limits.fill(from.max_range);
+      while (begin != end) {
+        const std::size_t n = std::min(end - begin, point_batch::capacity);
+        load_points(point, begin, n, batch);
+        if (!from.beam_ranges.empty())
+          for (std::size_t i = 0; i != n; ++i) limits[i] = from.limit(begin + i);
+        begin += n;
+        add_batch(from, n);
+      }
+    }
+    /// The first `count` points of the batch, each with its limit.
+    void add_batch(const sensor& from, std::size_t count) {
+      const voxel_key base = from.key.value_or(voxel_key{});
+      from.limit_batch({from.grid, from.origin, base}, batch, limits.data(), count, rays);
+      const std::size_t used = ray_batch::count(rays.hit), cut = ray_batch::count(rays.cut);
+      summary.used += used;
+      summary.truncated += cut;
+      summary.rejected += count - used - cut;
+      for (std::size_t word = 0; word != rays.hit.size(); ++word)
+        for (std::uint64_t left = rays.hit[word]; left != 0; left &= left - 1) {
+          const std::size_t i = 64 * word + static_cast<std::size_t>(std::countr_zero(left));
+          const auto at = [&](std::size_t axis) { return static_cast<std::uint32_t>(rays.way[axis][i]); };
+          const voxel_key k{base.x + at(0), base.y + at(1), base.z + at(2)};
+          if (k != last_end) masks.mark_occupied(k);  // neighbouring pixels mostly end in the same voxel
+          last_end = k;
+        }
+      if (from.key) sweep.add(rays, count, masks);
+    }
+    /// The points [begin, end) in mode discretized.
+    template <class Point>
+    void add_ends(const voxel_grid& grid, std::size_t begin, std::size_t end, Point&& point) {
+      auto* const keys_of = find_keys(simd::detected());
+      scan_brick* brick = nullptr;  // of the last point; neighbours mostly lie in the same one
+      while (begin != end) {
+        const std::size_t n = std::min(end - begin, point_batch::capacity);
+        load_points(point, begin, n, batch);
+        begin += n;
+        keys_of(grid, batch, n, keys);
+        for (std::size_t i = 0; i != keys.count; ++i) {
+          const voxel_key k{keys.x[i], keys.y[i], keys.z[i]};
+          if (const std::uint64_t name = node_name(k, brick_level); brick == nullptr || name != brick->name)
+            brick = &ends.at(k);
+          const std::uint32_t place = place_in_brick(k);
+          brick->occupied[place >> 6U] |= std::uint64_t{1} << (place & 63U);
+        }
+        summary.rejected += keys.outside;
+      }
+    }
+    /// The same of one point that has a range of its own.
+    void add_end(const sensor& from, const float3& end, float own_range) {
+      const auto limit = static_cast<double>(own_range);
+      const float3 ray = difference(end, from.origin);
+      const double distance = length(ray);
+      if (limit >= from.max_range || distance <= limit) {
+        if (const auto key = from.grid.key(end))
+          ends.mark_occupied(*key);
+        else
+          ++summary.rejected;
+      } else if (limit >= 0.0 && std::isfinite(static_cast<float>(distance))) {
+        if (const auto key = from.grid.key(cut_off(from.origin, ray, distance, limit)))
+          ends.mark_free(*key);
+        else
+          ++summary.rejected;
+      } else {
+        ++summary.rejected;
+      }
+    }
+    /// The centres of a brick's voxels: those occupied like points; to those free there is a ray.
+    void add_centers(const sensor& from, const scan_brick& b) {
+      const voxel_key base = named_key(b.name);
+      const auto centre = [&](std::uint32_t place) {
+        const voxel_key in = voxel_in_brick(place);
+        const vec3 c = from.grid.center(voxel_key{base.x + in.x, base.y + in.y, base.z + in.z});
+        return float3{static_cast<float>(c.x()), static_cast<float>(c.y()), static_cast<float>(c.z())};
+      };
+      for_each_place(b.occupied, [&](std::uint32_t place) {
+        const float3 c = centre(place);
+        batch.x[batched] = c[0];
+        batch.y[batched] = c[1];
+        batch.z[batched] = c[2];
+        if (++batched == point_batch::capacity) add_batched(from);
+      });
+      for_each_place(b.free, [&](std::uint32_t place) {
+        const voxel_key in = voxel_in_brick(place);
+        if (from.key) sweep.add(centre(place), {base.x + in.x, base.y + in.y, base.z + in.z}, false, masks);
+        ++summary.truncated;
+      });
+    }
+    void add_batched(const sensor& from) {
+      limits.fill(from.max_range);
+      add_batch(from, batched);
+      batched = 0;
+    }
+  };
+
+  void prepare(unsigned threads, std::size_t count) {
+    // A thread that gets less than this many rays does not pay for the merging of its masks.
+    const std::size_t useful = 1 + count / 4096;
+    const std::size_t count_of_workers = std::clamp<std::size_t>(threads, 1, useful);
+    if (workers_.size() < count_of_workers) workers_.resize(count_of_workers);
+    active_ = std::span{workers_}.first(count_of_workers);
+    for (worker& w : active_) w.clear();
+  }
+  sensor start(const voxel_grid& grid, const float3& origin, const integration_options& options) {
+    assert(options.max_range >= 0.0);
+    const sensor from{grid, origin, options.rays ? grid.key(origin) : std::nullopt, options.max_range,
+                      options.beam_ranges};
+    if (from.key)
+      for (worker& w : active_) w.sweep.start(grid, origin, *from.key);
+    return from;
+  }
+  template <class Policy>
+  void add_centers(const Policy& policy, const sensor& from, const scan_masks& ends) {
+    for_each_with_worker(policy, ends.bricks().size(), 16, [&](worker& w, std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i != end; ++i) w.add_centers(from, ends.bricks()[i]);
+    });
+    for (worker& w : active_) w.add_batched(from);
+  }
+  template <class Policy>
+  integration_summary finish(const Policy& policy, const voxel_grid& grid, const integration_options& options) {
+    for_each_index(policy, active_.size(), 1, [&](std::size_t i) { workers_[i].sweep.flush(workers_[i].masks); });
+    worker& all = workers_.front();
+    for (std::size_t i = 1; i != active_.size(); ++i) {
+      all.masks.merge(workers_[i].masks);
+      all.summary.used += workers_[i].summary.used;
+      all.summary.truncated += workers_[i].summary.truncated;
+      all.summary.rejected += workers_[i].summary.rejected;
+    }
+    clip(all.masks, grid, options.bounds);
+    return all.summary;
+  }
+  /// Calls `body(worker, begin, end)` for parts of [0, count), each worker on one thread.
+  template <class Policy, class Body>
+  void for_each_with_worker(const Policy& policy, std::size_t count, std::size_t grain, Body&& body) {
+    std::atomic<std::size_t> next{0};
+    for_each_index(policy, active_.size(), 1, [&](std::size_t w) {
+      for (std::size_t begin; (begin = next.fetch_add(grain, std::memory_order_relaxed)) < count;)
+        body(workers_[w], begin, std::min(count, begin + grain));
+    });
+  }
+
+  std::vector<worker> workers_ = std::vector<worker>(1);  ///< only ever more: their memory is kept
+  std::span<worker> active_;                              ///< those of the current scan
+};
+
+}  // namespace orbis::octree::detail

@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Applies the masks of one scan to the bricks of a map.
+#pragma once
+
+#include <array>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+
+#include <orbis/octree/change_log.hpp>
+#include <orbis/octree/detail/storage/brick.hpp>
+#include <orbis/octree/detail/storage/scan_masks.hpp>
+#include <orbis/octree/detail/storage/update_block.hpp>
+#include <orbis/octree/integration.hpp>
+#include <orbis/octree/sensor_model.hpp>
+
+namespace orbis::octree::detail {
+
+/// Whether a miss cannot lower this value any more.
+template <sensor_model Model>
+[[nodiscard]] constexpr bool is_saturated_free(typename Model::value_type v) noexcept {
+  return v <= Model::clamp_min;
+}
+
+/// Whether the brick that contains `k` is part of a larger leaf that is saturated free.
+template <sensor_model Model>
+[[nodiscard]] bool is_saturated_leaf(const brick_store<typename Model::value_type>& store, const voxel_key& k) {
+  if (!store.has_large()) return false;
+  const auto* const large = store.find_large_value(k);
+  return large != nullptr && is_saturated_free<Model>(*large);
+}
+
+/// Adds the saturated free voxels of the named brick to `saturated` (word i: octant i).
+template <sensor_model Model>
+void find_saturated(const brick_store<typename Model::value_type>& store, std::uint64_t name,
+                    std::array<std::uint64_t, 8>& saturated) {
+  const auto* const b = store.find(named_key(name));
+  if (b == nullptr) {
+    if (is_saturated_leaf<Model>(store, named_key(name))) saturated.fill(~std::uint64_t{0});
+    return;
+  }
+  for (std::uint32_t i = 0; i != 8; ++i) saturated[i] |= store.voxels_where(*b, i, is_saturated_free<Model>);
+}
+
+/// Gives the voxels `occupied` of octant `octant` of `b` a hit and the voxels `free` a miss. Returns the
+/// voxels that changed. @pre the two are disjoint
+template <sensor_model Model>
+std::uint64_t apply_octant(brick_store<typename Model::value_type>& store, brick<typename Model::value_type>& b,
+                           std::uint32_t octant, std::uint64_t occupied, std::uint64_t free) {
+  using T = typename Model::value_type;
+  // Most of a room is saturated already: where nothing can change, nothing is unpacked.
+  if (free != 0) free &= ~store.voxels_where(b, octant, is_saturated_free<Model>);
+  if (occupied != 0) occupied &= ~store.voxels_where(b, octant, [](T v) { return v >= Model::clamp_max; });
+  if ((free | occupied) == 0) return 0;
+  block<T> voxels;
+  store.read_octant(b, octant, voxels);
+  const std::uint64_t changed = update_block<Model>(voxels, free, occupied);
+  store.write_octant(b, octant, voxels);
+  return changed;
+}
+
+/// Applies a scan: every voxel marked occupied gets a hit, every other one marked free a miss. Counts them in
+/// `summary`, and records what changed in `log` unless that is null.
+template <sensor_model Model>
+void apply_scan(brick_store<typename Model::value_type>& store, const scan_masks& scan, integration_summary& summary,
+                change_log* log) {
+  for (const scan_brick& s : scan.bricks()) {
+    const voxel_key key = named_key(s.name);
+    bool matters = !is_saturated_leaf<Model>(store, key);
+    for (std::uint32_t i = 0; i != 8; ++i) {
+      const std::uint64_t occupied = s.occupied[i];
+      summary.occupied += static_cast<std::size_t>(std::popcount(occupied));
+      summary.free += static_cast<std::size_t>(std::popcount(s.free[i] & ~occupied));
+      matters = matters || occupied != 0;
+    }
+    if (!matters) continue;  // a large leaf is split only where something changes
+    auto& b = store.make(key);
+    for (std::uint32_t i = 0; i != 8; ++i) {
+      if ((s.occupied[i] | s.free[i]) == 0) continue;
+      const std::uint64_t changed = apply_octant<Model>(store, b, i, s.occupied[i], s.free[i] & ~s.occupied[i]);
+      if (log != nullptr) log->record(child_key(key, i, node_cells(octant_level)), changed);
+    }
+  }
+}
+
+}  // namespace orbis::octree::detail

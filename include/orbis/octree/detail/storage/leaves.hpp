@@ -1,0 +1,329 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// The leaves of the pruned octree, straight from the bricks: all of them, those in a box, those of
+/// the tree cut off at a depth, and single voxels.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <concepts>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <vector>
+
+#include <orbis/octree/detail/storage/brick.hpp>
+#include <orbis/octree/detail/storage/tree_parts.hpp>
+#include <orbis/octree/key.hpp>
+#include <orbis/octree/nodes.hpp>
+
+namespace orbis::octree::detail {
+
+inline constexpr std::uint64_t low_bits = 0x0101010101010101;  ///< the first voxel of each group of eight
+
+/// Bit 8 i: byte i of `mask` is not zero.
+[[nodiscard]] constexpr std::uint64_t bytes_with_any(std::uint64_t mask) noexcept {
+  constexpr std::uint64_t rest = 0x7f * low_bits;
+  return (((mask & rest) + rest) | mask) >> 7U & low_bits;
+}
+/// The number of set bits; std::popcount is a call where the processor is not known to have it.
+[[nodiscard]] constexpr std::size_t count_bits(std::uint64_t mask) noexcept {
+  mask -= mask >> 1U & 0x5555555555555555;
+  mask = (mask & 0x3333333333333333) + (mask >> 2U & 0x3333333333333333);
+  return static_cast<std::size_t>(((mask + (mask >> 4U)) & 0x0f0f0f0f0f0f0f0f) * low_bits >> 56U);
+}
+
+/// The leaves of an octant that is not one itself.
+struct octant_leaves {
+  std::uint64_t first;      ///< the lowest voxel of each leaf
+  std::uint64_t large;      ///< of these, the ones of 2x2x2 voxels
+  std::size_t inner_nodes;  ///< the octant, and its groups of 2x2x2 that are no leaves
+};
+template <class T>
+[[nodiscard]] octant_leaves leaves_of(const octant_view<T>& o) noexcept {
+  std::uint64_t large = 0;
+  if (o.bits <= max_palette_bits) {  // equal values have equal indices
+    std::uint64_t differs = ~o.known;
+    for (unsigned j = 0; j != o.bits; ++j) differs |= (o.plane[j] ^ o.plane[j] >> 1U) & 0x7f * low_bits;
+    large = low_bits & ~bytes_with_any(differs);
+  } else {
+    for (unsigned g = 0; g != 64; g += 8) {
+      bool equal = (o.known >> g & 0xffU) == 0xff;
+      for (unsigned i = 1; i != 8; ++i) equal &= o.value[g + i] == o.value[g];
+      large |= std::uint64_t{equal} << g;
+    }
+  }
+  const std::uint64_t inner = bytes_with_any(o.known) & ~large;
+  return {(o.known & inner * 0xff) | large, large, 1 + count_bits(inner)};
+}
+/// The lowest voxel of each place of an octant.
+inline constexpr auto octant_offsets = [] {
+  std::array<voxel_key, 64> offsets{};
+  for (std::uint32_t i = 0; i != 64; ++i) offsets[i] = voxel_in_brick(i);
+  return offsets;
+}();
+[[nodiscard]] constexpr voxel_key voxel_in_octant(const voxel_key& octant, std::uint32_t place) noexcept {
+  const voxel_key& k = octant_offsets[place];
+  return {octant.x + k.x, octant.y + k.y, octant.z + k.z};
+}
+
+/// Calls `on_leaf(key, level, value)` for leaves from an octant on and `on_octant(key, brick, i)` for
+/// the other octants, which returns the inner nodes from there on. Returns the number of inner nodes.
+template <class T, class OnLeaf, class OnOctant>
+std::size_t walk_octants(const std::vector<tree_part<T>>& parts, int root_level, OnLeaf&& on_leaf,
+                         OnOctant&& on_octant) {
+  std::size_t inner = 0;
+  for (std::size_t i = 0; i != parts.size(); ++i) {
+    const tree_part<T>& part = parts[i];
+    // Its ancestors, but for those it has in common with the part before it.
+    const auto differing = static_cast<int>(i == 0 ? 0 : std::bit_width(part.order ^ parts[i - 1].order));
+    const int lowest_common = i == 0 ? root_level + 1 : brick_level + (differing + 2) / 3;
+    inner += static_cast<std::size_t>(lowest_common - 1 - part.level);
+    if (part.content == nullptr) {
+      on_leaf(part.key, part.level, part.value);
+      continue;
+    }
+    ++inner;
+    const brick<T>& b = *part.content;
+    for (std::uint32_t o = 0; o != 8; ++o) {
+      const voxel_key octant = child_key(part.key, o, node_cells(octant_level));
+      if ((b.uniform >> o & 1U) != 0)
+        on_leaf(octant, octant_level, b.value[o]);
+      else if ((b.dense >> o & 1U) != 0)
+        inner += on_octant(octant, b, o);
+    }
+  }
+  return inner;
+}
+
+/// Calls `visit(key, level, value)` for the leaves of a dense octant. Returns the number of inner nodes.
+template <class T, class Visit>
+std::size_t visit_octant(const voxel_key& key, const octant_view<T>& o, block<T>& scratch, Visit&& visit) {
+  const T* value = o.value;
+  if (o.bits <= max_palette_bits) {
+    scratch.known = o.known;
+    expand_palette(o.value, o.plane, o.bits, scratch);
+    value = scratch.value.data();
+  }
+  const octant_leaves leaves = leaves_of(o);
+  for (std::uint64_t rest = leaves.first; rest != 0; rest &= rest - 1) {
+    const auto i = static_cast<std::uint32_t>(std::countr_zero(rest));
+    visit(voxel_in_octant(key, i), static_cast<int>(leaves.large >> i & 1U), value[i]);
+  }
+  return leaves.inner_nodes;
+}
+
+/// The leaves of some parts of a store.
+template <class T, class Visit>
+std::size_t visit_parts(const brick_store<T>& store, const std::vector<tree_part<T>>& parts, int root_level,
+                        Visit&& visit) {
+  block<T> scratch;
+  return walk_octants(parts, root_level, visit, [&](const voxel_key& key, const brick<T>& b, std::uint32_t i) {
+    return visit_octant(key, store.view(b, i), scratch, visit);
+  });
+}
+
+/// Calls `visit(key, level, value)` for every leaf of the pruned octree whose root is at `root_level`,
+/// in the order of `pruned_tree::visit`. Returns the number of inner nodes. O(known voxels).
+template <class T, std::invocable<const voxel_key&, int, T> Visit>
+std::size_t visit_leaves(const brick_store<T>& store, int root_level, Visit&& visit) {
+  return visit_parts(store, tree_parts(store, root_level), root_level, visit);
+}
+
+/// Counts the nodes of the pruned octree. O(bricks + octants that are not uniform).
+template <sensor_model Model>
+[[nodiscard]] octree_counts count_leaves(const brick_store<typename Model::value_type>& store, int root_level) {
+  using T = typename Model::value_type;
+  octree_counts n;
+  const auto on_leaf = [&](const voxel_key&, int, T v) {
+    ++n.leaves;
+    n.occupied_leaves += is_occupied<Model>(v) ? 1 : 0;
+  };
+  const auto on_octant = [&](const voxel_key&, const brick<T>& b, std::uint32_t i) {
+    const octant_leaves leaves = leaves_of(store.view(b, i));
+    n.leaves += count_bits(leaves.first);
+    if (is_occupied<Model>(b.value[i]))
+      n.occupied_leaves += count_bits(leaves.first & store.voxels_where(b, i, is_occupied<Model>));
+    return leaves.inner_nodes;
+  };
+  n.nodes = walk_octants(tree_parts(store, root_level), root_level, on_leaf, on_octant);
+  n.free_leaves = n.leaves - n.occupied_leaves;
+  n.nodes += n.leaves;
+  return n;
+}
+
+/// Calls `visit(key, level, value, kind)` for every node of the tree cut off at `lowest_level`: its
+/// leaves from there on, and for everything below the inner node at that level, made by `Policy`. In
+/// Morton order. O(bricks log bricks) from bricks on with max_of_children, O(known voxels) otherwise.
+template <sensor_model Model, node_policy<Model> Policy, class Visit>
+void visit_nodes_down_to(const brick_store<typename Model::value_type>& store, int root_level, int lowest_level,
+                         Visit&& visit) {
+  using T = typename Model::value_type;
+  const node_maker<Model, Policy> make{store};
+  const auto report = [&](const voxel_key& key, int level, const auto& entry) {
+    if (entry.kind != node_kind::none) visit(key, level, entry.value(), entry.kind);
+  };
+  const std::vector<tree_part<T>> parts = tree_parts(store, root_level);
+  block<T> scratch;
+  for (std::size_t i = 0; i != parts.size();) {
+    const tree_part<T>& part = parts[i];
+    if (part.content == nullptr && part.level >= lowest_level) {
+      visit(part.key, part.level, part.value, node_kind::leaf);
+      ++i;
+    } else if (lowest_level >= brick_level) {
+      const voxel_key low = node_key(part.key, lowest_level);
+      std::size_t end = i + 1;
+      while (end != parts.size() && node_key(parts[end].key, lowest_level) == low) ++end;
+      report(low, lowest_level, make.over(lowest_level, std::span{parts}.subspan(i, end - i)));
+      i = end;
+    } else {
+      for (std::uint32_t o = 0; o != 8; ++o) {
+        const brick<T>& b = *part.content;
+        const voxel_key octant = child_key(part.key, o, node_cells(octant_level));
+        if ((b.dense >> o & 1U) == 0 || lowest_level == octant_level)
+          report(octant, octant_level, make.octant(b, o));
+        else if (lowest_level == 1)
+          for (std::uint32_t g = 0; g != 64; g += 8)
+            report(voxel_in_octant(octant, g), 1, make.group(store.view(b, o), g));
+        else
+          visit_octant(octant, store.view(b, o), scratch,
+                       [&](const voxel_key& k, int level, T v) { visit(k, level, v, node_kind::leaf); });
+      }
+      ++i;
+    }
+  }
+}
+
+/// Whether everything in the node at `level` >= chunk_level has this value.
+template <class T>
+[[nodiscard]] bool is_one_value(const brick_store<T>& store, const voxel_key& k, int level, T value) {
+  if (const T* const large = store.find_large_value(k)) {
+    const auto found = store.find_large(k);
+    if (found->second >= level) return *large == value;
+  }
+  if (level == chunk_level) {
+    const auto* const c = store.find_chunk(k);
+    for (std::uint32_t place = 0; place != 64; ++place) {
+      const voxel_key offset = brick_in_chunk(place);
+      const brick<T>* const b = c == nullptr ? nullptr : store.find(*c, place);
+      if (b != nullptr && !(b->is_uniform() && b->value[0] == value)) return false;
+      if (b != nullptr) continue;
+      const T* const large = store.find_large_value({k.x + offset.x, k.y + offset.y, k.z + offset.z});
+      if (large == nullptr || *large != value) return false;
+    }
+    return true;
+  }
+  for (unsigned i = 0; i != 8; ++i)
+    if (!is_one_value(store, child_key(k, i, node_cells(level - 1)), level - 1, value)) return false;
+  return true;
+}
+
+/// Calls `visit(key, level, value)` for every leaf of the pruned octree that has a voxel in
+/// `box`, in Morton order. Touches only the chunks in the box.
+/// O(voxels of these chunks + the smaller of chunks of the box and of the store + large leaves).
+template <class T, std::invocable<const voxel_key&, int, T> Visit>
+void visit_leaves_in(const brick_store<T>& store, int root_level, const key_box& box, Visit&& visit) {
+  const auto& [low, high] = box;
+  std::vector<tree_part<T>> parts;
+  const auto add = [&](const typename brick_store<T>::chunk& c) {
+    for (std::uint32_t place = 0; place != 64; ++place)
+      if (const brick<T>* const b = store.find(c, place); b != nullptr && b->is_known()) {
+        const voxel_key key = named_key(b->name);
+        parts.push_back({morton_order(key), key, brick_level, b->is_uniform() ? nullptr : b, b->value[0]});
+      }
+  };
+  const auto chunks_along = [](std::uint32_t a, std::uint32_t b) {
+    return std::uint64_t{(b >> chunk_level) - (a >> chunk_level) + 1};
+  };
+  const std::uint64_t wide = chunks_along(low.x, high.x) * chunks_along(low.y, high.y);  // 2^32 at most
+  if (wide <= store.chunk_count() && wide * chunks_along(low.z, high.z) <= store.chunk_count()) {
+    const std::uint32_t size = node_cells(chunk_level);
+    const voxel_key first = node_key(low, chunk_level);
+    for (std::uint32_t z = first.z; z <= high.z; z += size)
+      for (std::uint32_t y = first.y; y <= high.y; y += size)
+        for (std::uint32_t x = first.x; x <= high.x; x += size)
+          if (const auto* const c = store.find_chunk({x, y, z})) add(*c);
+  } else {
+    store.for_each_chunk([&](const auto& c) {
+      if (box.overlaps(named_key(c.name), chunk_level)) add(c);
+    });
+  }
+  store.for_each_large([&](std::uint64_t name, T v) {
+    const voxel_key key = named_key(name);
+    const int level = std::max(named_level(name), chunk_level);  // with what it may merge with
+    if (box.overlaps(node_key(key, level), level))
+      parts.push_back({morton_order(key), key, named_level(name), nullptr, v});
+  });
+  std::sort(parts.begin(), parts.end(), [](const auto& a, const auto& b) { return a.order < b.order; });
+  merge_parts(parts, root_level);
+
+  block<T> scratch;
+  std::uint64_t done = 0;  // the order up to which everything has been visited
+  for (tree_part<T>& part : parts) {
+    if (part.order < done) continue;
+    if (part.content == nullptr) {
+      // Its siblings may lie outside the box.
+      while (part.level >= chunk_level && part.level < root_level - 1 &&
+             is_one_value(store, node_key(part.key, part.level + 1), part.level + 1, part.value)) {
+        ++part.level;
+        part.key = node_key(part.key, part.level);
+      }
+      done = morton_order(part.key) + (std::uint64_t{1} << 3 * static_cast<unsigned>(part.level - brick_level));
+      if (box.overlaps(part.key, part.level)) visit(part.key, part.level, part.value);
+      continue;
+    }
+    if (!box.overlaps(part.key, brick_level)) continue;
+    for (std::uint32_t o = 0; o != 8; ++o) {
+      const brick<T>& b = *part.content;
+      const voxel_key octant = child_key(part.key, o, node_cells(octant_level));
+      if (!box.overlaps(octant, octant_level)) continue;
+      if ((b.uniform >> o & 1U) != 0) visit(octant, octant_level, b.value[o]);
+      if ((b.dense >> o & 1U) == 0) continue;
+      visit_octant(octant, store.view(b, o), scratch, [&](const voxel_key& k, int level, T v) {
+        if (box.overlaps(k, level)) visit(k, level, v);
+      });
+    }
+  }
+}
+
+/// Calls `visit(key, value)` for every known voxel whose value is `wanted`, however large the leaf that
+/// it lies in; leaves larger than a brick come last. O(bricks + voxels visited).
+/// `may_be_wanted(largest value of an octant)`: false if none there is.
+template <class T, std::predicate<T> Wanted, std::predicate<T> MayBeWanted, std::invocable<const voxel_key&, T> Visit>
+void visit_voxels(const brick_store<T>& store, Wanted&& wanted, MayBeWanted&& may_be_wanted, Visit&& visit) {
+  store.for_each_brick([&](const brick<T>& b) {
+    const voxel_key key = named_key(b.name);
+    for (std::uint32_t o = 0; o != 8; ++o) {
+      if (((b.uniform | b.dense) >> o & 1U) == 0 || !may_be_wanted(b.value[o])) continue;
+      const octant_view<T> view = store.view(b, o);
+      const voxel_key octant = child_key(key, o, node_cells(octant_level));
+      for (std::uint64_t rest = store.voxels_where(b, o, wanted); rest != 0; rest &= rest - 1) {
+        const auto i = static_cast<std::uint32_t>(std::countr_zero(rest));
+        visit(voxel_in_octant(octant, i), view.at(i));
+      }
+    }
+  });
+  store.for_each_large([&](std::uint64_t name, T v) {
+    if (!wanted(v)) return;
+    const voxel_key k = named_key(name);
+    const std::uint32_t size = node_cells(named_level(name));
+    for (std::uint32_t z = 0; z != size; ++z)
+      for (std::uint32_t y = 0; y != size; ++y)
+        for (std::uint32_t x = 0; x != size; ++x) visit(voxel_key{k.x + x, k.y + y, k.z + z}, v);
+  });
+}
+/// The occupied ones.
+template <sensor_model Model, std::invocable<const voxel_key&, typename Model::value_type> Visit>
+void visit_occupied_voxels(const brick_store<typename Model::value_type>& store, Visit&& visit) {
+  visit_voxels(store, is_occupied<Model>, is_occupied<Model>, visit);
+}
+/// All that are known.
+template <class T, std::invocable<const voxel_key&, T> Visit>
+void visit_known_voxels(const brick_store<T>& store, Visit&& visit) {
+  const auto any = [](T) { return true; };
+  visit_voxels(store, any, any, visit);
+}
+
+}  // namespace orbis::octree::detail

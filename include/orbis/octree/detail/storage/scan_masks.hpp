@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// One scan as sets of voxels: which were crossed, which were hit. Bit masks per brick, so that
+/// marking a voxel a thousand times costs a thousand `or`s and no memory.
+#pragma once
+
+#include <array>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include <orbis/octree/detail/points/ray_traversal.hpp>
+#include <orbis/octree/detail/storage/brick.hpp>
+#include <orbis/octree/key.hpp>
+
+namespace orbis::octree::detail {
+
+/// What a scan says about one brick; word i is octant i.
+struct scan_brick {
+  std::uint64_t name = 0;
+  std::array<std::uint64_t, 8> free{};
+  std::array<std::uint64_t, 8> occupied{};
+};
+
+/// The voxels a scan touches. Reused from scan to scan; memory is given back only if a scan needed much
+/// less than one before it.
+class scan_masks {
+ public:
+  [[nodiscard]] const std::vector<scan_brick>& bricks() const noexcept { return bricks_; }
+  void clear() noexcept {
+    constexpr std::size_t few = 1U << 16U, rarely = 16;
+    if (bricks_.capacity() > few && bricks_.size() < bricks_.capacity() / rarely) {
+      index_ = hash_index{};
+      bricks_ = std::vector<scan_brick>{};
+    }
+    index_.clear();
+    bricks_.clear();
+  }
+  /// The masks of the brick that contains `k`; valid until the next call.
+  [[nodiscard]] scan_brick& at(const voxel_key& k) { return named(node_name(k, brick_level)); }
+
+  /// The masks of a named brick, or null.
+  [[nodiscard]] const scan_brick* find(std::uint64_t name) const noexcept {
+    const std::uint32_t i = index_.find(name);
+    return i == hash_index::none ? nullptr : &bricks_[i];
+  }
+
+  void mark_occupied(const voxel_key& k) {
+    const std::uint32_t place = place_in_brick(k);
+    at(k).occupied[place >> 6U] |= std::uint64_t{1} << (place & 63U);
+  }
+  void mark_free(const voxel_key& k) {
+    const std::uint32_t place = place_in_brick(k);
+    at(k).free[place >> 6U] |= std::uint64_t{1} << (place & 63U);
+  }
+  /// Marks the voxels that the ray crosses as free, see traverse_ray.
+  void mark_ray(const voxel_grid& grid, const float3& origin, const voxel_key& from, const float3& end,
+                const voxel_key& to) {
+    voxel_key last{~std::uint32_t{0}, 0, 0};  // in no brick
+    std::uint64_t* free = nullptr;
+    traverse_ray(grid, origin, from, end, to, [&](const voxel_key& k) {
+      if ((((k.x ^ last.x) | (k.y ^ last.y) | (k.z ^ last.z)) >> 3U) != 0) {
+        free = at(k).free.data();
+        last = k;
+      }
+      const std::uint32_t place = place_in_brick(k);
+      free[place >> 6U] |= std::uint64_t{1} << (place & 63U);
+    });
+  }
+  /// Adds what `other` marked.
+  void merge(const scan_masks& other) {
+    for (const scan_brick& from : other.bricks_) {
+      scan_brick& to = named(from.name);
+      for (std::size_t i = 0; i != 8; ++i) {
+        to.free[i] |= from.free[i];
+        to.occupied[i] |= from.occupied[i];
+      }
+    }
+  }
+  /// Forgets all voxels but those from `low` to `high`, both included.
+  void clip(const key_box& box) {
+    const std::array<std::uint32_t, 3> low{box.low.x, box.low.y, box.low.z}, high{box.high.x, box.high.y, box.high.z};
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i != bricks_.size(); ++i) {
+      scan_brick b = bricks_[i];
+      const voxel_key k = named_key(b.name);
+      const std::array<std::uint32_t, 3> at{k.x, k.y, k.z};
+      std::array<std::uint64_t, 8> inside;
+      inside.fill(~std::uint64_t{0});
+      for (std::size_t axis = 0; axis != 3; ++axis) {
+        if (low[axis] <= at[axis] && at[axis] + 7 <= high[axis]) continue;
+        for (std::uint32_t c = 0; c != 8; ++c) {
+          if (low[axis] <= at[axis] + c && at[axis] + c <= high[axis]) continue;
+          for (std::uint32_t octant = 0; octant != 8; ++octant)
+            if ((octant >> axis & 1U) == c >> 2U) inside[octant] &= ~layer_in_octant(axis, c & 3U);
+        }
+      }
+      std::uint64_t any = 0;
+      for (std::size_t octant = 0; octant != 8; ++octant) {
+        b.free[octant] &= inside[octant];
+        b.occupied[octant] &= inside[octant];
+        any |= b.free[octant] | b.occupied[octant];
+      }
+      if (any != 0) bricks_[kept++] = b;
+    }
+    bricks_.resize(kept);
+    index_.clear();
+    for (std::size_t i = 0; i != kept; ++i) index_.set(bricks_[i].name, static_cast<std::uint32_t>(i));
+  }
+  [[nodiscard]] std::size_t memory_bytes() const noexcept {
+    return index_.memory_bytes() + bricks_.capacity() * sizeof(scan_brick);
+  }
+
+ private:
+  /// The voxels of an octant whose coordinate along `axis` is `c`.
+  [[nodiscard]] static constexpr std::uint64_t layer_in_octant(std::size_t axis, std::uint32_t c) noexcept {
+    constexpr std::array<std::uint64_t, 3> low{0x5555555555555555, 0x3333333333333333, 0x0f0f0f0f0f0f0f0f};
+    constexpr std::array<std::uint64_t, 3> high{0x00ff00ff00ff00ff, 0x0000ffff0000ffff, 0x00000000ffffffff};
+    return ((c & 1U) != 0 ? ~low[axis] : low[axis]) & ((c & 2U) != 0 ? ~high[axis] : high[axis]);
+  }
+  [[nodiscard]] scan_brick& named(std::uint64_t name) {
+    if (last_ < bricks_.size() && bricks_[last_].name == name) return bricks_[last_];
+    const std::uint32_t i = index_.find(name);
+    last_ = i != hash_index::none ? i : bricks_.size();
+    if (last_ != bricks_.size()) return bricks_[last_];
+    index_.set(name, static_cast<std::uint32_t>(last_));
+    return bricks_.emplace_back(scan_brick{.name = name});
+  }
+
+  hash_index index_;
+  std::vector<scan_brick> bricks_;
+  std::size_t last_ = 0;  ///< the brick asked for last: neighbours mostly lie in the same one
+};
+
+/// Calls `visit(place)` for the place in the brick of every bit set in `masks`.
+template <class Visit>
+void for_each_place(const std::array<std::uint64_t, 8>& masks, Visit&& visit) {
+  for (std::uint32_t octant = 0; octant != 8; ++octant)
+    for (std::uint64_t bits = masks[octant]; bits != 0; bits &= bits - 1)
+      visit(octant << 6U | static_cast<std::uint32_t>(std::countr_zero(bits)));
+}
+
+}  // namespace orbis::octree::detail

@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <array>
+#include <cmath>
+#include <limits>
+#include <memory>
+
+#include <orbis/core/random.hpp>
+#include <orbis/octree/detail/points/limit_rays.hpp>
+
+#include "support/catch.hpp"
+
+using namespace orbis;
+using namespace orbis::octree;
+using namespace orbis::octree::detail;
+using octree::detail::point_batch;
+using octree::detail::ray_batch;
+
+namespace {
+
+constexpr float not_a_number = std::numeric_limits<float>::quiet_NaN();
+constexpr float infinite = std::numeric_limits<float>::infinity();
+
+[[nodiscard]] bool has(const ray_batch::bits& bits, std::size_t i) { return (bits[i >> 6U] >> (i & 63U) & 1U) != 0; }
+
+}  // namespace
+
+TEST_CASE("Every instruction set finds the same ends of rays, bit for bit") {
+  random_bits random{211};
+  auto points = std::make_unique<point_batch>();
+  auto want = std::make_unique<ray_batch>(), got = std::make_unique<ray_batch>();
+  std::size_t hits = 0, cuts = 0, none = 0;
+  for (int run = 0; run != 300; ++run) {
+    const voxel_grid grid{0.1, 8};  // 25.6 m wide
+    const std::size_t count = random.below(point_batch::capacity + 1);
+    std::array<double, point_batch::capacity> limits{};
+    for (std::size_t i = 0; i != count; ++i) {
+      limits[i] = random.uniform(0.0, 20.0);
+      if (random.below(3) == 0) limits[i] = std::numeric_limits<double>::infinity();
+      if (random.below(30) == 0) limits[i] = random.below(2) == 0 ? -1.0 : std::numeric_limits<double>::quiet_NaN();
+      for (auto* axis : {&points->x, &points->y, &points->z}) {
+        float& c = (*axis)[i];
+        c = static_cast<float>(random.uniform(-13.5, 13.5));
+        if (random.below(4) == 0) c = std::round(c * 10.0F) * 0.1F;
+        if (random.below(60) == 0) c = random.below(2) == 0 ? not_a_number : infinite;
+        if (random.below(60) == 0) c = 1e30F;
+      }
+    }
+    const float3 origin{static_cast<float>(random.uniform(-2.0, 2.0)), 0.05F, run % 3 == 0 ? 0.0F : 0.3F};
+    const octree::detail::ray_frame frame{grid, origin, *grid.key(origin)};
+    octree::detail::limit_rays(simd::level::portable)(frame, *points, limits.data(), count, *want);
+    for (const auto level : {simd::level::avx2, simd::level::avx512}) {
+      octree::detail::limit_rays(level)(frame, *points, limits.data(), count, *got);
+      REQUIRE(got->hit == want->hit);
+      REQUIRE(got->cut == want->cut);
+      for (std::size_t i = 0; i != count; ++i) {
+        if (!has(want->hit, i) && !has(want->cut, i)) continue;
+        for (std::size_t axis = 0; axis != 3; ++axis) {
+          REQUIRE(got->end[axis][i] == want->end[axis][i]);
+          REQUIRE(got->way[axis][i] == want->way[axis][i]);
+        }
+      }
+    }
+    hits += ray_batch::count(want->hit);
+    cuts += ray_batch::count(want->cut);
+    none += count - ray_batch::count(want->hit) - ray_batch::count(want->cut);
+  }
+  CHECK(hits > 5000);
+  CHECK(cuts > 5000);
+  CHECK(none > 1000);
+}
+
+TEST_CASE("A ray ends at its point or at its limit") {
+  const voxel_grid grid{0.1};
+  auto points = std::make_unique<point_batch>();
+  points->x = {1.05F, 2.05F, 3.05F, not_a_number};
+  points->y = points->z = {};
+  std::array<double, point_batch::capacity> limits{2.0, 2.0, -1.0, 2.0};
+  const octree::detail::ray_frame frame{grid, {0.05F, 0.0F, 0.0F}, *grid.key(float3{0.05F, 0.0F, 0.0F})};
+  auto rays = std::make_unique<ray_batch>();
+  for (const auto level : {simd::level::portable, simd::level::avx2, simd::level::avx512}) {
+    limits[1] = 1.51;
+    octree::detail::limit_rays(level)(frame, *points, limits.data(), 4, *rays);
+    CHECK(rays->hit == ray_batch::bits{1});
+    CHECK(rays->cut == ray_batch::bits{2});
+    CHECK(rays->way[0][0] == 10);
+    CHECK(rays->way[0][1] == 15);
+    CHECK(std::abs(rays->end[0][1] - 1.56F) < 1e-6F);
+  }
+}
