@@ -21,6 +21,7 @@
 
 #include <orbis/core/image.hpp>
 #include <orbis/core/point.hpp>
+#include <orbis/octree/detail/points/ray_traversal.hpp>
 #include <orbis/octree/detail/storage/cow_pages.hpp>
 #include <orbis/octree/detail/storage/hash_index.hpp>
 #include <orbis/octree/integration.hpp>

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include <orbis/core/random.hpp>
-#include <orbis/octree/integration.hpp>
+#include <orbis/octree/detail/points/point_integrator.hpp>
 
 #include "support/allocations.hpp"
 #include "support/catch.hpp"
