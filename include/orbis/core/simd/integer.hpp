@@ -74,7 +74,8 @@ ORBIS_TARGET_AVX2 inline void count_bits_32(V& out, const V& v) noexcept {
 template <class V>
 ORBIS_TARGET_AVX512 inline void count_bits_64(V& out, const V& v) noexcept {
   const auto x = reinterpret_cast<__m512i>(v);
-  const __m512i table = _mm512_broadcast_i32x4(_mm_setr_epi8(0, 1, 1, 2, 1, 2, 2, 3, 1, 2, 2, 3, 2, 3, 3, 4));
+  const __m512i table =
+      _mm512_maskz_broadcast_i32x4(0xffff, _mm_setr_epi8(0, 1, 1, 2, 1, 2, 2, 3, 1, 2, 2, 3, 2, 3, 3, 4));
   const __m512i low = _mm512_set1_epi8(0x0f);
   const __m512i a = _mm512_shuffle_epi8(table, _mm512_and_si512(x, low));
   const __m512i b = _mm512_shuffle_epi8(table, _mm512_and_si512(_mm512_srli_epi16(x, 4), low));
