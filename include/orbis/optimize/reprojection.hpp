@@ -8,7 +8,7 @@
 #include <limits>
 #include <optional>
 
-#include <orbis/camera/detail/lanes.hpp>
+#include <orbis/camera/project_lanes.hpp>
 #include <orbis/camera/model.hpp>
 #include <orbis/core/lanes.hpp>
 #include <orbis/core/se3.hpp>

@@ -9,7 +9,7 @@
 #include <cstddef>
 #include <limits>
 
-#include <orbis/camera/detail/lanes.hpp>
+#include <orbis/camera/project_lanes.hpp>
 #include <orbis/core/lanes.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/optimize/detail/bundle/loss_lanes.hpp>

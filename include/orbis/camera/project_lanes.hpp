@@ -1,36 +1,56 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Projection of eight points at a time.
+/// Projects eight points at a time, in vectors of doubles (`core/simd/vec.hpp`): the inner loop of adjustments.
 ///
-/// `lanes_of<Camera>` says how. It exists for every camera model; for those without a specialisation,
-/// a user's own, it calls `project` eight times.
+/// `lanes_of<Camera>` exists for every camera model. Our models have specialisations that give the same bits on every
+/// instruction set; for any other model, `project` is called eight times.
 #pragma once
 
 #include <array>
+#include <concepts>
 #include <cstddef>
 #include <limits>
+#include <utility>
 
 #include <orbis/camera/kannala_brandt.hpp>
 #include <orbis/camera/model.hpp>
 #include <orbis/camera/pinhole.hpp>
 #include <orbis/camera/radial_tangential.hpp>
-#include <orbis/core/lanes.hpp>
+#include <orbis/core/simd/math.hpp>
 
 namespace orbis::camera {
 
-/// Pixels of eight points and their derivatives by the point, `j[row][column]`; of no meaning where not
-/// `valid`.
-template <simd::lane_vector L>
+/// Vectors of doubles that projection works on: `simd::vec<double, 8, Target>`.
+template <class L>
+concept double_lanes = requires(const L& x, const double* p) {
+  { L::load(p) } -> std::same_as<L>;
+  { x* x + 1.0 / x } -> std::same_as<L>;
+  select(x < x, x, x);
+};
+/// What comparing them gives.
+template <double_lanes L>
+using mask_of = decltype(std::declval<L>() < std::declval<L>());
+
+/// The pixels of eight points in the camera frame, and their derivatives by the point, `j[row][column]`, in pixels per
+/// metre. Of no meaning in lanes that are not `valid`.
+template <double_lanes L>
 struct lane_projection {
   L u, v;
-  typename L::mask valid;
+  mask_of<L> valid;
   L j[2][3];
 };
+
+/// Whether both numbers of a lane are finite.
+template <double_lanes L>
+[[nodiscard]] ORBIS_ALWAYS_INLINE mask_of<L> is_finite(const L& u, const L& v) {
+  constexpr double most = std::numeric_limits<double>::max();
+  return (u <= L(most)) & (L(-most) <= u) & (v <= L(most)) & (L(-most) <= v);
+}
 
 namespace detail {
 
 /// Values of the lanes one after the other.
-using lane_array = std::array<double, simd::lane_count>;
+using lane_array = std::array<double, 8>;
 
 struct projected_lanes {
   lane_array u, v, valid;
@@ -53,16 +73,9 @@ template <camera_model Camera>
   }
 }
 
-/// Whether all of a pixel is finite.
-template <simd::lane_vector L>
-[[nodiscard]] ORBIS_ALWAYS_INLINE typename L::mask is_finite(const L& u, const L& v) {
-  constexpr double most = std::numeric_limits<double>::max();
-  return (u <= L(most)) & (L(-most) <= u) & (v <= L(most)) & (L(-most) <= v);
-}
-
 /// The angle of (z, r), for z > 0 and r >= 0, not both near the ends of the range of double: halved
 /// three times, then by its power series.
-template <simd::lane_vector L>
+template <double_lanes L>
 [[nodiscard]] ORBIS_ALWAYS_INLINE L angle_off_axis(const L& r, const L& z) {
   L t = r / (z + simd::square_root(r * r + z * z));  // tan(angle / 2), at most 1
   for (int halving = 0; halving != 2; ++halving) t = t / (1.0 + simd::square_root(1.0 + t * t));
@@ -81,7 +94,7 @@ template <camera_model Camera>
 struct lanes_of {
   static constexpr bool axis_aligned = false;
 
-  template <bool Jacobian, simd::lane_vector L>
+  template <bool Jacobian, double_lanes L>
   static ORBIS_ALWAYS_INLINE void project(const Camera& camera, const L& x, const L& y, const L& z,
                                           lane_projection<L>& out) {
     detail::lane_array px, py, pz;
@@ -90,7 +103,7 @@ struct lanes_of {
     detail::project_each(camera, px, py, pz, Jacobian, p);
     out.u = L::load(p.u.data());
     out.v = L::load(p.v.data());
-    out.valid = (L(0.0) < L::load(p.valid.data())) & detail::is_finite(out.u, out.v);
+    out.valid = (L(0.0) < L::load(p.valid.data())) & is_finite(out.u, out.v);
     if constexpr (Jacobian)
       for (std::size_t k = 0; k != 6; ++k) out.j[k / 3][k % 3] = L::load(p.j[k].data());
   }
@@ -100,7 +113,7 @@ template <>
 struct lanes_of<pinhole> {
   static constexpr bool axis_aligned = true;
 
-  template <bool Jacobian, simd::lane_vector L>
+  template <bool Jacobian, double_lanes L>
   static ORBIS_ALWAYS_INLINE void project(const pinhole& camera, const L& x, const L& y, const L& z,
                                           lane_projection<L>& out) {
     const intrinsics& k = camera.k();
@@ -108,7 +121,7 @@ struct lanes_of<pinhole> {
     const L du = a * x, dv = b * y;
     out.u = du + k.cx;
     out.v = dv + k.cy;
-    out.valid = (L(0.0) < z) & detail::is_finite(out.u, out.v);
+    out.valid = (L(0.0) < z) & is_finite(out.u, out.v);
     if constexpr (Jacobian) {
       out.j[0][0] = a;
       out.j[0][1] = 0.0;
@@ -124,7 +137,7 @@ template <>
 struct lanes_of<radial_tangential> {
   static constexpr bool axis_aligned = false;
 
-  template <bool Jacobian, simd::lane_vector L>
+  template <bool Jacobian, double_lanes L>
   static ORBIS_ALWAYS_INLINE void project(const radial_tangential& camera, const L& px, const L& py, const L& z,
                                           lane_projection<L>& out) {
     const intrinsics& k = camera.k();
@@ -137,7 +150,7 @@ struct lanes_of<radial_tangential> {
     const double p1 = d.p1, p2 = d.p2;
     out.u = k.cx + k.fx * (g * x + 2.0 * p1 * xy + p2 * (s + 2.0 * xx));
     out.v = k.cy + k.fy * (g * y + p1 * (s + 2.0 * yy) + 2.0 * p2 * xy);
-    out.valid = (L(0.0) < z) & (s < L(camera.max_squared_radius())) & detail::is_finite(out.u, out.v);
+    out.valid = (L(0.0) < z) & (s < L(camera.max_squared_radius())) & is_finite(out.u, out.v);
     if constexpr (Jacobian) {
       const L dn = d.k1 + s * (2.0 * d.k2 + s * (3.0 * d.k3));
       const L dq = d.k4 + s * (2.0 * d.k5 + s * (3.0 * d.k6));
@@ -158,7 +171,7 @@ template <>
 struct lanes_of<kannala_brandt> {
   static constexpr bool axis_aligned = false;
 
-  template <bool Jacobian, simd::lane_vector L>
+  template <bool Jacobian, double_lanes L>
   static ORBIS_ALWAYS_INLINE void project(const kannala_brandt& camera, const L& x, const L& y, const L& z,
                                           lane_projection<L>& out) {
     const intrinsics& k = camera.k();
@@ -173,7 +186,7 @@ struct lanes_of<kannala_brandt> {
     const L scale = select(on_axis, inverse_z, distorted * root);
     out.u = k.fx * (scale * x) + k.cx;
     out.v = k.fy * (scale * y) + k.cy;
-    out.valid = (L(0.0) < z) & (theta < L(camera.max_angle())) & detail::is_finite(out.u, out.v);
+    out.valid = (L(0.0) < z) & (theta < L(camera.max_angle())) & is_finite(out.u, out.v);
     if constexpr (Jacobian) {
       const L slope = 1.0 + s * (3.0 * d.k1 + s * (5.0 * d.k2 + s * (7.0 * d.k3 + s * (9.0 * d.k4))));
       const L per_norm = slope / (rr + zz);

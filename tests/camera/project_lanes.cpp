@@ -3,8 +3,9 @@
 #include <cmath>
 #include <limits>
 
-#include <orbis/camera/detail/lanes.hpp>
+#include <orbis/camera/project_lanes.hpp>
 #include <orbis/core/random.hpp>
+#include <orbis/core/simd.hpp>
 
 #include "support/catch.hpp"
 
@@ -40,38 +41,22 @@ struct projected {
   double value[9][8];  // u, v, valid, j
 };
 
-template <int Native, class Camera>
-ORBIS_ALWAYS_INLINE void project(const Camera& camera, const eight& p, projected& out) {
-  using L = simd::lanes<Native>;
-  camera::lane_projection<L> l;
-  camera::lanes_of<Camera>::template project<true>(camera, L::load(p.x), L::load(p.y), L::load(p.z), l);
-  l.u.store(out.value[0]);
-  l.v.store(out.value[1]);
-  select(l.valid, L(1.0), L(0.0)).store(out.value[2]);
-  for (int i = 0; i != 6; ++i) l.j[i / 3][i % 3].store(out.value[3 + i]);
+struct kernel {
+  template <simd::target Target, class Camera>
+  static ORBIS_ALWAYS_INLINE void run(const Camera& camera, const eight& p, projected& out) {
+    using L = simd::vec<double, 8, Target>;
+    camera::lane_projection<L> l;
+    camera::lanes_of<Camera>::template project<true>(camera, L::load(p.x), L::load(p.y), L::load(p.z), l);
+    l.u.store(out.value[0]);
+    l.v.store(out.value[1]);
+    select(l.valid, L(1.0), L(0.0)).store(out.value[2]);
+    for (int i = 0; i != 6; ++i) l.j[i / 3][i % 3].store(out.value[3 + i]);
+  }
+};
+template <class Camera>
+void project_at(simd::level level, const Camera& camera, const eight& p, projected& out) {
+  simd::kernel<kernel, void(const Camera&, const eight&, projected&)>(level)(camera, p, out);
 }
-template <class Camera>
-using kernel = void(const Camera&, const eight&, projected&);
-template <class Camera>
-ORBIS_UNFUSED void project_portable(const Camera& c, const eight& p, projected& out) {
-  project<2>(c, p, out);
-}
-#if ORBIS_X86
-template <class Camera>
-ORBIS_UNFUSED ORBIS_TARGET_AVX2 void project_avx2(const Camera& c, const eight& p, projected& out) {
-  project<4>(c, p, out);
-}
-template <class Camera>
-ORBIS_UNFUSED ORBIS_TARGET_AVX512 void project_avx512(const Camera& c, const eight& p, projected& out) {
-  project<8>(c, p, out);
-}
-template <class Camera>
-constexpr simd::variants<kernel<Camera>> all{project_portable<Camera>, nullptr, project_avx2<Camera>,
-                                             project_avx512<Camera>};
-#else
-template <class Camera>
-constexpr simd::variants<kernel<Camera>> all{project_portable<Camera>};
-#endif
 
 template <class Camera>
 void check(const Camera& camera) {
@@ -91,7 +76,7 @@ void check(const Camera& camera) {
       if (random.uniform() < 0.02) p.z[i] = 0.0;
     }
     projected expected;
-    simd::select<kernel<Camera>>(simd::level::portable, all<Camera>)(camera, p, expected);
+    project_at(simd::level::portable, camera, p, expected);
     for (int i = 0; i != 8; ++i) {
       matrix<2, 3> j;
       const auto pixel = camera.project(vec3(p.x[i], p.y[i], p.z[i]), j);
@@ -106,9 +91,9 @@ void check(const Camera& camera) {
         CHECK(j(1, 0) == 0.0);
       }
     }
-    for (const auto level : {simd::level::avx2, simd::level::avx512}) {
+    for (const auto level : simd::available_levels()) {
       projected out;
-      simd::select<kernel<Camera>>(level, all<Camera>)(camera, p, out);
+      project_at(level, camera, p, out);
       for (int e = 0; e != 9; ++e)
         for (int i = 0; i != 8; ++i)
           if (expected.value[2][i] == 1.0) REQUIRE(out.value[e][i] == expected.value[e][i]);
