@@ -15,8 +15,16 @@ foreach(component IN LISTS ORBIS_PROVIDED_COMPONENTS)
           FILE orbis-${component}-targets.cmake)
 endforeach()
 
+set(_orbis_arch_independent ARCH_INDEPENDENT)
+if(TARGET orbis_compiled)
+  install(TARGETS orbis_compiled EXPORT orbis-compiled ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR}
+          INCLUDES DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
+  install(EXPORT orbis-compiled NAMESPACE orbis:: DESTINATION ${_orbis_cmake_dir} FILE orbis-compiled-targets.cmake)
+  set(_orbis_arch_independent "")
+endif()
+
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/orbis-config-version.cmake
-  COMPATIBILITY SameMinorVersion ARCH_INDEPENDENT)
+  COMPATIBILITY SameMinorVersion ${_orbis_arch_independent})
 configure_package_config_file(cmake/orbis-config.cmake.in ${PROJECT_BINARY_DIR}/orbis-config.cmake
   INSTALL_DESTINATION ${_orbis_cmake_dir})
 install(FILES ${PROJECT_BINARY_DIR}/orbis-config.cmake ${PROJECT_BINARY_DIR}/orbis-config-version.cmake
@@ -35,4 +43,9 @@ else()
 endif()
 configure_file(cmake/orbis.pc.in ${PROJECT_BINARY_DIR}/orbis.pc @ONLY)
 install(FILES ${PROJECT_BINARY_DIR}/orbis.pc DESTINATION ${CMAKE_INSTALL_DATADIR}/pkgconfig)
+if(TARGET orbis_compiled)
+  file(RELATIVE_PATH _orbis_pc_to_lib ${CMAKE_INSTALL_FULL_DATADIR}/pkgconfig ${CMAKE_INSTALL_FULL_LIBDIR})
+  configure_file(cmake/orbis-compiled.pc.in ${PROJECT_BINARY_DIR}/orbis-compiled.pc @ONLY)
+  install(FILES ${PROJECT_BINARY_DIR}/orbis-compiled.pc DESTINATION ${CMAKE_INSTALL_DATADIR}/pkgconfig)
+endif()
 install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/orbis)

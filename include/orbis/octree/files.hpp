@@ -232,3 +232,7 @@ template <octomap_model Model = log_odds<>>
 }
 
 }  // namespace orbis::octree
+
+#ifdef ORBIS_COMPILED
+#include <orbis/octree/detail/compiled/files.hpp>
+#endif

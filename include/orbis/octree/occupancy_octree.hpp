@@ -99,11 +99,7 @@ class occupancy_octree {
   template <execution_policy Policy, point_range Points, point_like Origin>
   integration_summary integrate(const Policy& policy, const Points& points, const Origin& origin,
                                 const integration_options& options = {}) {
-    begin_change();
-    detail::point_integrator& marker = scratch_.get().marker;
-    integration_summary summary = marker.mark(policy, grid_, points, coordinates<float>(origin), options);
-    apply_scan(marker.masks(), summary);
-    return summary;
+    return integrate_points(policy, points, coordinates<float>(origin), options);
   }
   template <point_range Points, point_like Origin>
   integration_summary integrate(const Points& points, const Origin& origin, const integration_options& options = {}) {
@@ -115,35 +111,7 @@ class occupancy_octree {
   /// @pre depth and camera have the same size; options.beam_ranges is empty
   template <execution_policy Policy, camera::depth_source Depth, camera::camera_model Camera>
   integration_summary integrate(const Policy& policy, const Depth& depth, const Camera& camera,
-                                const se3& T_world_camera, const integration_options& options = {}) {
-    assert(options.beam_ranges.empty());
-    begin_change();
-    scan_buffers& buffers = scratch_.get();
-    detail::scan_masks& masks = buffers.masks;
-    integration_summary summary;
-    if (options.mode == ray_mode::every_ray && options.rays) {
-      summary = buffers.depth.mark(
-          policy, grid_, depth, camera, T_world_camera, options, masks,
-          [this](std::uint64_t name, auto& saturated) { detail::find_saturated<Model>(store_, name, saturated); });
-      detail::clip(masks, grid_, options.bounds);
-      apply_scan(masks, summary);
-    } else if (options.mode == ray_mode::every_ray) {
-      summary = buffers.depth.mark_ends(policy, grid_, depth, camera, T_world_camera, options, masks);
-      detail::clip(masks, grid_, options.bounds);
-      apply_scan(masks, summary);
-    } else {
-      // Whether a voxel is within range is decided at its centre, not at its points.
-      integration_options unlimited = options;
-      unlimited.max_range = std::numeric_limits<double>::infinity();
-      const std::size_t rejected =
-          buffers.depth.mark_ends(policy, grid_, depth, camera, T_world_camera, unlimited, masks).rejected;
-      const detail::float3 origin = coordinates<float>(T_world_camera.translation());
-      summary = buffers.marker.mark_centers(policy, grid_, masks, origin, options);
-      summary.rejected += rejected;
-      apply_scan(buffers.marker.masks(), summary);
-    }
-    return summary;
-  }
+                                const se3& T_world_camera, const integration_options& options = {});
   template <camera::depth_source Depth, camera::camera_model Camera>
   integration_summary integrate(const Depth& depth, const Camera& camera, const se3& T_world_camera,
                                 const integration_options& options = {}) {
@@ -374,6 +342,10 @@ class occupancy_octree {
   [[nodiscard]] std::size_t buffer_bytes() const noexcept { return scratch_.memory_bytes(); }
 
  private:
+  template <class Policy, class Points>
+  integration_summary integrate_points(const Policy& policy, const Points& points, const detail::float3& origin,
+                                       const integration_options& options);
+
   struct scan_buffers {
     detail::point_integrator marker;
     detail::depth_integrator depth;
@@ -470,4 +442,53 @@ class occupancy_octree {
   tracking track_;
 };
 
+template <sensor_model Model>
+template <class Policy, class Points>
+integration_summary occupancy_octree<Model>::integrate_points(const Policy& policy, const Points& points,
+                                                              const detail::float3& origin,
+                                                              const integration_options& options) {
+  begin_change();
+  detail::point_integrator& marker = scratch_.get().marker;
+  integration_summary summary = marker.mark(policy, grid_, points, origin, options);
+  apply_scan(marker.masks(), summary);
+  return summary;
+}
+
+template <sensor_model Model>
+template <execution_policy Policy, camera::depth_source Depth, camera::camera_model Camera>
+integration_summary occupancy_octree<Model>::integrate(const Policy& policy, const Depth& depth, const Camera& camera,
+                                                       const se3& T_world_camera, const integration_options& options) {
+  assert(options.beam_ranges.empty());
+  begin_change();
+  scan_buffers& buffers = scratch_.get();
+  detail::scan_masks& masks = buffers.masks;
+  integration_summary summary;
+  if (options.mode == ray_mode::every_ray && options.rays) {
+    summary = buffers.depth.mark(
+        policy, grid_, depth, camera, T_world_camera, options, masks,
+        [this](std::uint64_t name, auto& saturated) { detail::find_saturated<Model>(store_, name, saturated); });
+    detail::clip(masks, grid_, options.bounds);
+    apply_scan(masks, summary);
+  } else if (options.mode == ray_mode::every_ray) {
+    summary = buffers.depth.mark_ends(policy, grid_, depth, camera, T_world_camera, options, masks);
+    detail::clip(masks, grid_, options.bounds);
+    apply_scan(masks, summary);
+  } else {
+    // Whether a voxel is within range is decided at its centre, not at its points.
+    integration_options unlimited = options;
+    unlimited.max_range = std::numeric_limits<double>::infinity();
+    const std::size_t rejected =
+        buffers.depth.mark_ends(policy, grid_, depth, camera, T_world_camera, unlimited, masks).rejected;
+    const detail::float3 origin = coordinates<float>(T_world_camera.translation());
+    summary = buffers.marker.mark_centers(policy, grid_, masks, origin, options);
+    summary.rejected += rejected;
+    apply_scan(buffers.marker.masks(), summary);
+  }
+  return summary;
+}
+
 }  // namespace orbis::octree
+
+#ifdef ORBIS_COMPILED
+#include <orbis/octree/detail/compiled/occupancy_octree.hpp>
+#endif

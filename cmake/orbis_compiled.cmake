@@ -1,0 +1,28 @@
+# SPDX-License-Identifier: BSD-3-Clause
+#
+# orbis::compiled: a static library of what most programs instantiate, so that they need not compile it themselves. Its
+# sources, cmake/compiled/<component>*.cpp, only instantiate templates of the headers. Who links it compiles with
+# ORBIS_COMPILED, which makes the headers declare these instantiations (include/orbis/<component>/detail/compiled) and
+# changes nothing else: programs with and without it can be linked together.
+if(PROJECT_IS_TOP_LEVEL AND NOT CMAKE_BUILD_TYPE AND NOT CMAKE_CONFIGURATION_TYPES)
+  set(CMAKE_BUILD_TYPE Release)
+endif()
+set(ORBIS_COMPILED_COMPONENTS)
+set(_orbis_sources)
+foreach(_orbis_component IN LISTS ORBIS_PROVIDED_COMPONENTS)
+  file(GLOB _orbis_found CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/cmake/compiled/${_orbis_component}.cpp
+       ${PROJECT_SOURCE_DIR}/cmake/compiled/${_orbis_component}_*.cpp)
+  if(_orbis_found)
+    list(APPEND ORBIS_COMPILED_COMPONENTS ${_orbis_component})
+    list(APPEND _orbis_sources ${_orbis_found})
+  endif()
+endforeach()
+
+add_library(orbis_compiled STATIC ${_orbis_sources})
+add_library(orbis::compiled ALIAS orbis_compiled)
+set_target_properties(orbis_compiled PROPERTIES EXPORT_NAME compiled OUTPUT_NAME orbis POSITION_INDEPENDENT_CODE ON)
+target_compile_definitions(orbis_compiled PUBLIC ORBIS_COMPILED)
+target_compile_options(orbis_compiled PRIVATE -ffp-contract=off)  # the same bits as everywhere
+foreach(_orbis_component IN LISTS ORBIS_COMPILED_COMPONENTS)
+  target_link_libraries(orbis_compiled PUBLIC orbis_${_orbis_component})
+endforeach()
