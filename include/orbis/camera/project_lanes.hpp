@@ -77,8 +77,8 @@ template <camera_model Camera>
 /// three times, then by its power series.
 template <double_lanes L>
 [[nodiscard]] ORBIS_ALWAYS_INLINE L angle_off_axis(const L& r, const L& z) {
-  L t = r / (z + simd::square_root(r * r + z * z));  // tan(angle / 2), at most 1
-  for (int halving = 0; halving != 2; ++halving) t = t / (1.0 + simd::square_root(1.0 + t * t));
+  L t = r / (z + square_root(r * r + z * z));  // tan(angle / 2), at most 1
+  for (int halving = 0; halving != 2; ++halving) t = t / (1.0 + square_root(1.0 + t * t));
   const L s = t * t;  // below 0.04
   L series(1.0 / 23.0);
   for (int n = 21; n > 0; n -= 2) series = 1.0 / n - s * series;
@@ -178,7 +178,7 @@ struct lanes_of<kannala_brandt> {
     const kannala_brandt::coefficients& d = camera.distortion();
     const L rr = x * x + y * y, zz = z * z;
     const auto on_axis = rr <= 1e-18 * zz;  // a pinhole there
-    const L root = simd::reciprocal_root(select(on_axis, L(1.0), rr));
+    const L root = reciprocal_root(select(on_axis, L(1.0), rr));
     const L r = select(on_axis, L(0.0), rr * root);
     const L theta = detail::angle_off_axis(r, z), s = theta * theta;
     const L inverse_z = 1.0 / z;
