@@ -22,11 +22,17 @@ namespace detail {
 
 // Registers go in and out by reference: a function that returns one is called otherwise with AVX than without.
 
-/// Keeps a product from being fused with a sum, see rounded_product.
-template <class V>
+/// Keeps a product from being fused with a sum, where the target could; see rounded_product.
+template <target Target, class V>
 ORBIS_ALWAYS_INLINE void round_product([[maybe_unused]] V& product) noexcept {
+#if defined(__FMA__)
+  [[maybe_unused]] constexpr bool can_fuse = true;
+#else
+  [[maybe_unused]] constexpr bool can_fuse =
+      Target::needs >= level::avx2;  // where it could not, the barrier costs a copy
+#endif
 #if !defined(__clang__) && defined(__x86_64__)
-  if constexpr (std::is_floating_point_v<element_of<V>>) asm("" : "+v"(product));
+  if constexpr (can_fuse && std::is_floating_point_v<element_of<V>>) asm("" : "+v"(product));
 #elif !defined(__clang__) && defined(__aarch64__)
   if constexpr (std::is_floating_point_v<element_of<V>>) asm("" : "+w"(product));
 #endif
@@ -196,7 +202,7 @@ struct vec {
     vec out;
     if constexpr (is_native) {
       out.v = reinterpret_cast<native>(reinterpret_cast<modular>(a.v) * reinterpret_cast<modular>(b.v));
-      detail::round_product(out.v);
+      detail::round_product<Target>(out.v);
     } else {
       out.v.low = a.v.low * b.v.low, out.v.high = a.v.high * b.v.high;
     }
