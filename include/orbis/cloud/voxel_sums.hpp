@@ -159,9 +159,9 @@ class voxel_sums {
     [[nodiscard]] std::optional<std::size_t> find(const vec3& point) const {
       detail::brick_place at;
       if (!detail::locate(point, 1024.0 / sums_->size_, at)) return std::nullopt;
-      const auto number = sums_->index_.find(at.brick, sums_->key_of());
-      if (!number || !sums_->bricks_[*number].voxels.contains(at.cell)) return std::nullopt;
-      return first_[*number] + sums_->bricks_[*number].voxels.rank(at.cell);
+      const std::uint32_t number = sums_->index_.find(at.brick, sums_->key_of());
+      if (number == none || !sums_->bricks_[number].voxels.contains(at.cell)) return std::nullopt;
+      return first_[number] + sums_->bricks_[number].voxels.rank(at.cell);
     }
 
    private:
@@ -245,16 +245,13 @@ class voxel_sums {
 
   /// The brick with this key, a new one if there is none.
   std::uint32_t brick_at(const detail::voxel_key& key) {
-    if (const auto found = index_.find(key, key_of())) return *found;
-    std::uint32_t number = static_cast<std::uint32_t>(bricks_.size());
-    if (free_.empty()) {
+    const auto number = free_.empty() ? static_cast<std::uint32_t>(bricks_.size()) : free_.back();
+    if (const std::uint32_t found = index_.find_or_insert(key, number, key_of()); found != number) return found;
+    if (free_.empty())
       bricks_.emplace_back();
-    } else {
-      number = free_.back();
+    else
       free_.pop_back();
-    }
     bricks_[number].key = key;
-    index_.insert(number, key_of());
     return number;
   }
 
@@ -274,10 +271,9 @@ class voxel_sums {
         if constexpr (Add) {
           number = brick_at(run.brick);
         } else {
-          const auto found = index_.find(run.brick, key_of());
-          assert(found && "removed without having been added");
-          if (!found) continue;
-          number = *found;
+          number = index_.find(run.brick, key_of());
+          assert(number != none && "removed without having been added");
+          if (number == none) continue;
         }
         std::uint32_t& first = bricks_[number].first_run;
         if (first == none) touched_.push_back(number);
@@ -318,9 +314,9 @@ class voxel_sums {
   double size_;
   std::size_t occupied_ = 0;
   std::vector<brick> bricks_;
-  std::vector<std::uint32_t> free_;  ///< numbers of bricks that are not in use
-  detail::brick_index index_;
-  std::vector<std::uint32_t> touched_;  ///< kept for their memory
+  std::vector<std::uint32_t> free_;                                ///< numbers of bricks that are not in use
+  number_index<detail::voxel_key, detail::voxel_key_hash> index_;  ///< of bricks
+  std::vector<std::uint32_t> touched_;                             ///< kept for their memory
   std::vector<chained_run> chained_;
 };
 

@@ -13,7 +13,7 @@
 #include <utility>
 #include <vector>
 
-#include <orbis/octree/detail/storage/hash_index.hpp>
+#include <orbis/core/hash_index.hpp>
 #include <orbis/octree/key.hpp>
 
 namespace orbis::octree {
@@ -208,7 +208,7 @@ class change_log {
   bool merge_oldest() {
     if (entries_.empty() || entries_[0].revision == revision_) return false;
     const entry oldest = entries_[0];
-    if (const std::uint32_t i = merged_index_.find(oldest.octant); i != detail::hash_index::none) {
+    if (const std::uint32_t i = merged_index_.find(oldest.octant); i != hash_index::none) {
       merged_[i].mask |= oldest.mask;
       merged_[i].revision = oldest.revision;
     } else {
@@ -222,7 +222,7 @@ class change_log {
 
   queue entries_;              ///< in the order of revisions
   std::vector<entry> merged_;  ///< each octant once
-  detail::hash_index merged_index_;
+  hash_index merged_index_;
   std::uint64_t revision_ = 0;
   std::uint64_t complete_since_ = 0;
   std::uint64_t exact_since_ = 0;

@@ -13,9 +13,9 @@
 #include <vector>
 
 #include <orbis/core/execution.hpp>
+#include <orbis/core/hash_index.hpp>
 #include <orbis/core/progress.hpp>
 #include <orbis/core/se3.hpp>
-#include <orbis/octree/detail/storage/hash_index.hpp>
 #include <orbis/octree/detail/storage/large_leaves.hpp>
 #include <orbis/octree/key.hpp>
 #include <orbis/octree/occupancy_octree.hpp>

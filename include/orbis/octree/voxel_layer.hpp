@@ -19,11 +19,11 @@
 #include <utility>
 #include <vector>
 
+#include <orbis/core/hash_index.hpp>
 #include <orbis/core/image.hpp>
 #include <orbis/core/point.hpp>
 #include <orbis/octree/detail/points/ray_traversal.hpp>
 #include <orbis/octree/detail/storage/cow_pages.hpp>
-#include <orbis/octree/detail/storage/hash_index.hpp>
 #include <orbis/octree/integration.hpp>
 #include <orbis/octree/key.hpp>
 
@@ -124,7 +124,7 @@ class voxel_layer {
   [[nodiscard]] const T* find(const voxel_key& k) const noexcept {
     const std::uint64_t code = morton_code(k);
     const std::uint32_t i = index_.find(code >> 6U);
-    if (i == detail::hash_index::none) return nullptr;
+    if (i == hash_index::none) return nullptr;
     const octant& o = octants_[i];
     return (o.known >> (code & 63U) & 1U) != 0 ? &o.value[code & 63U] : nullptr;
   }
@@ -132,7 +132,7 @@ class voxel_layer {
   [[nodiscard]] T* find_writable(const voxel_key& k) {
     const std::uint64_t code = morton_code(k);
     const std::uint32_t i = index_.find(code >> 6U);
-    if (i == detail::hash_index::none || (octants_[i].known >> (code & 63U) & 1U) == 0) return nullptr;
+    if (i == hash_index::none || (octants_[i].known >> (code & 63U) & 1U) == 0) return nullptr;
     return &octants_.writable(i).value[code & 63U];
   }
 
@@ -140,7 +140,7 @@ class voxel_layer {
   [[nodiscard]] T& make(const voxel_key& k) {
     const std::uint64_t code = morton_code(k);
     const std::uint32_t i = index_.find(code >> 6U);
-    octant& o = octants_.writable(i != detail::hash_index::none ? i : add(code >> 6U));
+    octant& o = octants_.writable(i != hash_index::none ? i : add(code >> 6U));
     o.known |= std::uint64_t{1} << (code & 63U);
     return o.value[code & 63U];
   }
@@ -217,7 +217,7 @@ class voxel_layer {
   }
   std::size_t erase_in(std::uint64_t code, std::uint64_t mask) {
     const std::uint32_t i = index_.find(code);
-    if (i == detail::hash_index::none) return 0;
+    if (i == hash_index::none) return 0;
     const std::uint64_t gone = octants_[i].known & mask;
     if (gone == 0) return 0;
     octant& o = octants_.writable(i);
@@ -231,7 +231,7 @@ class voxel_layer {
     return static_cast<std::size_t>(std::popcount(gone));
   }
 
-  detail::hash_index index_;
+  hash_index index_;
   detail::cow_pages<octant> octants_;
   std::vector<std::uint32_t> free_;  ///< octants not in use
 };

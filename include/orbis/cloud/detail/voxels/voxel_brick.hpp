@@ -10,14 +10,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
-#include <optional>
 #include <span>
 #include <utility>
 #include <vector>
 
 #include <orbis/cloud/detail/voxels/voxel_hash.hpp>
 #include <orbis/core/image.hpp>
-#include <orbis/core/random.hpp>
 
 namespace orbis::cloud::detail {
 
@@ -162,70 +160,6 @@ class voxel_brick {
   cell_mask mask_{};
   std::array<std::uint16_t, 8> before_{};  ///< how many cells come before each word of the mask
   std::vector<voxel_sum> sums_;
-};
-
-/// Finds the numbers of bricks by their keys, which are kept elsewhere. Open addressing; erasing leaves
-/// no marks behind.
-class brick_index {
- public:
-  template <class KeyOf>
-  [[nodiscard]] std::optional<std::uint32_t> find(const voxel_key& key, const KeyOf& key_of) const {
-    if (slots_.empty()) return std::nullopt;
-    const std::uint32_t number = slots_[slot_of(key, key_of)];
-    return number == none ? std::nullopt : std::optional{number};
-  }
-  /// @pre its key is not here
-  template <class KeyOf>
-  void insert(std::uint32_t number, const KeyOf& key_of) {
-    if (2 * (count_ + 1) > slots_.size()) resize(std::max<std::size_t>(64, 2 * slots_.size()), key_of);
-    slots_[slot_of(key_of(number), key_of)] = number;
-    ++count_;
-  }
-  /// @pre it is here
-  template <class KeyOf>
-  void erase(const voxel_key& key, const KeyOf& key_of) {
-    const std::size_t mask = slots_.size() - 1;
-    std::size_t hole = slot_of(key, key_of);
-    assert(slots_[hole] != none);
-    for (std::size_t next = (hole + 1) & mask; slots_[next] != none; next = (next + 1) & mask) {
-      // Whoever would be looked for at the hole moves there.
-      const std::size_t home = hash(key_of(slots_[next])) & mask;
-      if (((next - home) & mask) < ((next - hole) & mask)) continue;
-      slots_[hole] = slots_[next];
-      hole = next;
-    }
-    slots_[hole] = none;
-    --count_;
-    if (slots_.size() > 64 && 8 * count_ < slots_.size()) resize(slots_.size() / 2, key_of);
-  }
-  [[nodiscard]] std::size_t memory_bytes() const noexcept { return slots_.capacity() * sizeof(std::uint32_t); }
-
- private:
-  static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
-
-  [[nodiscard]] static std::size_t hash(const voxel_key& key) noexcept {
-    const std::uint64_t low = std::bit_cast<std::uint32_t>(key[0]) | std::uint64_t{std::bit_cast<std::uint32_t>(key[1])}
-                                                                         << 32U;
-    return mix64(low ^ mix64(std::bit_cast<std::uint32_t>(key[2])));
-  }
-  /// Where the key is, or would be.
-  template <class KeyOf>
-  [[nodiscard]] std::size_t slot_of(const voxel_key& key, const KeyOf& key_of) const {
-    const std::size_t mask = slots_.size() - 1;
-    std::size_t slot = hash(key) & mask;
-    while (slots_[slot] != none && key_of(slots_[slot]) != key) slot = (slot + 1) & mask;
-    return slot;
-  }
-  template <class KeyOf>
-  void resize(std::size_t size, const KeyOf& key_of) {
-    const std::vector<std::uint32_t> old = std::exchange(slots_, std::vector<std::uint32_t>(size, none));
-    for (const std::uint32_t number : old) {
-      if (number != none) slots_[slot_of(key_of(number), key_of)] = number;
-    }
-  }
-
-  std::vector<std::uint32_t> slots_;
-  std::size_t count_ = 0;
 };
 
 }  // namespace orbis::cloud::detail

@@ -9,10 +9,10 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <optional>
 #include <vector>
 
+#include <orbis/core/hash_index.hpp>
 #include <orbis/core/point.hpp>
 #include <orbis/core/random.hpp>
 
@@ -21,12 +21,25 @@ namespace orbis::cloud::detail {
 /// A cell of a grid through the origin.
 using voxel_key = std::array<std::int32_t, 3>;
 
-/// Maps points to the numbers 0, 1, 2, ... of their voxels. Open addressing; O(1) per point, 12
-/// bytes for each voxel and 8 to 16 for its place in the table.
+/// 64 well-mixed bits of a voxel's key.
+struct voxel_key_hash {
+  [[nodiscard]] std::uint64_t operator()(const voxel_key& key) const noexcept {
+    const std::uint64_t low = std::bit_cast<std::uint32_t>(key[0]) | std::uint64_t{std::bit_cast<std::uint32_t>(key[1])}
+                                                                         << 32U;
+    return mix64(low ^ mix64(std::bit_cast<std::uint32_t>(key[2])));
+  }
+};
+
+/// Maps points to the numbers 0, 1, 2, ... of their voxels. O(1) per point; 12 bytes for each voxel and 8 to 16 for its
+/// place in the table.
 class voxel_hash {
+  [[nodiscard]] auto key_of_number() const {
+    return [this](std::uint32_t number) -> const voxel_key& { return keys_[number]; };
+  }
+
  public:
   /// @pre size > 0, metres
-  explicit voxel_hash(double size) : inverse_size_{1.0 / size}, slots_(1024, none) { assert(size > 0); }
+  explicit voxel_hash(double size) : inverse_size_{1.0 / size} { assert(size > 0); }
 
   /// The voxel of a point; empty where it is not finite or more than 2^31 voxels from the origin.
   template <point_like P>
@@ -42,42 +55,23 @@ class voxel_hash {
   }
   /// The number of a voxel, a new one if it has none. @pre fewer than 2^32 - 1 voxels
   std::uint32_t insert(const voxel_key& key) {
-    if (2 * (keys_.size() + 1) > slots_.size()) grow();
-    std::uint32_t& slot = slots_[slot_of(key)];
-    if (slot == none) {
-      slot = static_cast<std::uint32_t>(keys_.size());
-      keys_.push_back(key);
-    }
-    return slot;
+    const auto next = static_cast<std::uint32_t>(keys_.size());
+    const std::uint32_t number = numbers_.find_or_insert(key, next, key_of_number());
+    if (number == next) keys_.push_back(key);
+    return number;
   }
   /// The number of a voxel, if it has one.
   [[nodiscard]] std::optional<std::uint32_t> find(const voxel_key& key) const {
-    const std::uint32_t number = slots_[slot_of(key)];
-    return number == none ? std::nullopt : std::optional{number};
+    const std::uint32_t number = numbers_.find(key, key_of_number());
+    return number == numbers_.none ? std::nullopt : std::optional{number};
   }
   [[nodiscard]] std::size_t size() const noexcept { return keys_.size(); }
   /// The voxels in the order of their numbers.
   [[nodiscard]] const std::vector<voxel_key>& keys() const noexcept { return keys_; }
 
  private:
-  static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
-
-  /// Where the voxel is, or would be.
-  [[nodiscard]] std::size_t slot_of(const voxel_key& key) const {
-    const std::uint64_t low =
-        std::bit_cast<std::uint32_t>(key[0]) | static_cast<std::uint64_t>(std::bit_cast<std::uint32_t>(key[1])) << 32U;
-    const std::size_t mask = slots_.size() - 1;
-    std::size_t slot = mix64(low ^ mix64(std::bit_cast<std::uint32_t>(key[2]))) & mask;
-    while (slots_[slot] != none && keys_[slots_[slot]] != key) slot = (slot + 1) & mask;
-    return slot;
-  }
-  void grow() {
-    slots_.assign(2 * slots_.size(), none);
-    for (std::uint32_t i = 0; i != keys_.size(); ++i) slots_[slot_of(keys_[i])] = i;
-  }
-
   double inverse_size_;
-  std::vector<std::uint32_t> slots_;
+  number_index<voxel_key, voxel_key_hash> numbers_;
   std::vector<voxel_key> keys_;
 };
 

@@ -16,10 +16,10 @@
 #include <utility>
 #include <vector>
 
+#include <orbis/core/hash_index.hpp>
 #include <orbis/octree/detail/files/rank_coder.hpp>
 #include <orbis/octree/detail/files/tree_coder.hpp>
 #include <orbis/octree/detail/storage/brick.hpp>
-#include <orbis/octree/detail/storage/hash_index.hpp>
 #include <orbis/octree/detail/storage/tree_parts.hpp>
 #include <orbis/octree/key.hpp>
 #include <orbis/octree/sensor_model.hpp>

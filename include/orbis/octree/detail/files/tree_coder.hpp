@@ -11,8 +11,8 @@
 #include <span>
 #include <vector>
 
+#include <orbis/core/hash_index.hpp>
 #include <orbis/octree/detail/files/range_coder.hpp>
-#include <orbis/octree/detail/storage/hash_index.hpp>
 
 namespace orbis::octree::detail {
 

@@ -19,8 +19,8 @@
 #include <utility>
 #include <vector>
 
+#include <orbis/core/hash_index.hpp>
 #include <orbis/octree/detail/storage/cow_pages.hpp>
-#include <orbis/octree/detail/storage/hash_index.hpp>
 #include <orbis/octree/detail/storage/large_leaves.hpp>
 #include <orbis/octree/detail/storage/node_name.hpp>
 #include <orbis/octree/detail/storage/octant_record.hpp>

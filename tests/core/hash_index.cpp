@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <unordered_map>
+#include <vector>
 
+#include <orbis/core/hash_index.hpp>
 #include <orbis/core/random.hpp>
-#include <orbis/octree/detail/storage/hash_index.hpp>
 
 #include "support/catch.hpp"
 
-using orbis::octree::detail::hash_index;
+using orbis::hash_index;
 
 TEST_CASE("A hash index remembers and forgets what a standard map does") {
   orbis::random_bits random{11};
@@ -58,4 +59,33 @@ TEST_CASE("A window of names that rolls on for ever needs no more memory than it
   CHECK(index.empty());
   CHECK(index.find(199000) == hash_index::none);
   CHECK(index.memory_bytes() == bytes);
+}
+
+TEST_CASE("numbers are found by keys that are kept elsewhere, also after others were erased") {
+  struct hash {
+    std::uint64_t operator()(std::uint32_t key) const { return orbis::mix64(key & 7U); }  // many alike
+  };
+  orbis::number_index<std::uint32_t, hash> index;
+  std::vector<std::uint32_t> keys;
+  const auto key_of = [&](std::uint32_t number) -> const std::uint32_t& { return keys[number]; };
+  CHECK(index.find(3, key_of) == index.none);
+  for (std::uint32_t i = 0; i != 300; ++i) {
+    CHECK(index.find_or_insert(2 * i, i, key_of) == i);
+    keys.push_back(2 * i);
+  }
+  for (std::uint32_t i = 0; i != 300; ++i) {
+    CHECK(index.find_or_insert(2 * i, 1000, key_of) == i);
+    CHECK(index.find(2 * i + 1, key_of) == index.none);
+  }
+  CHECK(index.size() == 300);
+  const std::size_t bytes = index.memory_bytes();
+  for (std::uint32_t i = 0; i != 300; i += 3) index.erase(2 * i, key_of);
+  index.erase(1, key_of);  // it is not there
+  CHECK(index.size() == 200);
+  for (std::uint32_t i = 0; i != 300; ++i) CHECK(index.find(2 * i, key_of) == (i % 3 == 0 ? index.none : i));
+  for (std::uint32_t i = 0; i != 300; ++i)
+    if (i % 3 != 0 && i > 5) index.erase(2 * i, key_of);
+  CHECK(index.size() == 4);
+  CHECK(index.memory_bytes() < bytes);
+  CHECK(index.find(2 * 5, key_of) == 5);
 }
