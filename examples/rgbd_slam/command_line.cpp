@@ -163,7 +163,6 @@ std::optional<exit_code> read_config(CLI::App& cmd, const std::string& path) {
 
 std::variant<settings, exit_code> read_command_line(int argc, char** argv) {
   settings s;
-  std::string config;
   std::string origin;
 
   CLI::App cli{"RGB-D SLAM and mapping: from a recording to a trajectory, a cloud and an octree map", "rgbd_slam"};
@@ -209,7 +208,7 @@ std::variant<settings, exit_code> read_command_line(int argc, char** argv) {
   add_map_options(*map, s);
 
   for (CLI::App* cmd : {run, demo, map})
-    cmd->add_option("--config", config, "options from a TOML file: resolution = 0.02")->type_name("FILE");
+    cmd->add_option("--config", s.config, "options from a TOML file: resolution = 0.02")->type_name("FILE");
   for (CLI::App* cmd : {run, demo, eval, map}) cmd->get_formatter()->column_width(28);
 
   const auto is_asked_for = [&](const CLI::App* command) { return command->get_name() == argv[1]; };
@@ -229,8 +228,8 @@ std::variant<settings, exit_code> read_command_line(int argc, char** argv) {
            : chosen == demo ? command::demo
            : chosen == eval ? command::eval
                             : command::map;
-  if (!config.empty())
-    if (const auto failed = read_config(*chosen, config)) return *failed;
+  if (!s.config.empty())
+    if (const auto failed = read_config(*chosen, s.config.string())) return *failed;
   if (!origin.empty()) {
     orbis::vec3 p;
     char rest = 0;

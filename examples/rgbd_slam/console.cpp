@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "console.hpp"
 
-#include <csignal>
 #include <cstdio>
 
 #include <spdlog/sinks/stdout_color_sinks.h>
@@ -10,13 +9,6 @@
 
 namespace app {
 namespace {
-
-volatile std::sig_atomic_t interrupt_seen = 0;
-
-extern "C" void on_interrupt(int) {
-  interrupt_seen = 1;
-  std::signal(SIGINT, SIG_DFL);  // a second Ctrl-C ends the program at once
-}
 
 std::string one_line(std::string text) {
   for (char& c : text)
@@ -95,14 +87,6 @@ void console::clear_bar() {
   std::fputs("\r\033[2K", stderr);
   std::fflush(stderr);
   bar_shown_ = false;
-}
-
-bool console::interrupted() { return interrupt_seen != 0; }
-void console::catch_interrupts() {
-  for (const int s : {SIGINT, SIGTERM}) std::signal(s, on_interrupt);
-}
-void console::release_interrupts() {
-  for (const int s : {SIGINT, SIGTERM}) std::signal(s, SIG_DFL);
 }
 
 }  // namespace app

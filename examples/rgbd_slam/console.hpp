@@ -46,16 +46,9 @@ class console {
   void warn(const std::string& what);
   /// "rgbd_slam: where: message", in one line.
   void error(const orbis::error& e);
-  /// A line of the results, to stdout.
-  /// On standard output, unless quiet; false if it could not be written.
+  /// Prints a line of the results on stdout, unless quiet; false if it could not be written.
   bool print(const std::string& line);
   [[nodiscard]] bool quiet() const { return quiet_; }
-
-  /// From now on Ctrl-C does not end the program, but sets `interrupted`. A second one does end it.
-  static void catch_interrupts();
-  /// From now on Ctrl-C ends the program again.
-  static void release_interrupts();
-  [[nodiscard]] static bool interrupted();
 
  private:
   void clear_bar();

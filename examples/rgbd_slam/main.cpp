@@ -4,10 +4,12 @@
 
 #include "command_line.hpp"
 #include "commands.hpp"
+#include "interrupts.hpp"
 
 int main(int argc, char** argv) {
   const auto asked = app::read_command_line(argc, argv);
   if (const auto* code = std::get_if<app::exit_code>(&asked)) return *code;
+  app::interrupts::listen();
   const auto& settings = std::get<app::settings>(asked);
   app::console say{settings.quiet};
   try {

@@ -130,7 +130,7 @@ class picture {
       const float there = inverse_depth_(x + dx, y + dy);
       if (there > here) behind += std::min(0.25, std::log2(static_cast<double>(there / here)));
     }
-    return std::exp(-6.0 * behind / 4.0);
+    return behind == 0.0 ? 1.0 : std::exp(-6.0 * behind / 4.0);
   }
 
   orbis::image<rgb8> color_;

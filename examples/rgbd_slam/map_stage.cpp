@@ -130,11 +130,11 @@ built_map map_cloud(orbis::point_cloud cloud, const settings& s, console& say) {
   return map;
 }
 
-result<map_results> write_map(built_map map, const settings& s, console& say) {
+result<map_results> write_map(built_map map, const settings& s, const std::filesystem::path& folder, console& say) {
   say.stage("writing");
   map_results m;
   const auto write = [&](const char* name, const auto& how, std::uintmax_t& bytes) -> result<void> {
-    const std::filesystem::path path = s.out / name;
+    const std::filesystem::path path = folder / name;
     if (auto done = how(path); !done) return done;
     std::error_code ignored;
     bytes = std::filesystem::file_size(path, ignored);

@@ -23,7 +23,8 @@ using built_map = orbis::mapping::built_map<orbis::octree::occupancy_octree<>>;
 /// voxels are occupied and nothing is known of the rest.
 [[nodiscard]] built_map map_cloud(orbis::point_cloud cloud, const settings& s, console& say);
 
-/// Writes the clouds and octrees, and counts what is in them.
-[[nodiscard]] orbis::result<map_results> write_map(built_map map, const settings& s, console& say);
+/// Writes the clouds and octrees into `folder`, and counts what is in them.
+[[nodiscard]] orbis::result<map_results> write_map(built_map map, const settings& s,
+                                                   const std::filesystem::path& folder, console& say);
 
 }  // namespace app

@@ -1,4 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <optional>
+#include <vector>
+
 #include <orbis/cloud/extract.hpp>
 #include <orbis/core/point.hpp>
 #include <orbis/io/cloud_file.hpp>
@@ -9,6 +12,7 @@
 #include "filters.hpp"
 #include "map_stage.hpp"
 #include "output.hpp"
+#include "result_files.hpp"
 #include "summary.hpp"
 
 namespace app {
@@ -37,14 +41,13 @@ struct mapped {
   orbis::trajectory cameras;
 };
 
-orbis::result<mapped> map_recording(const settings& s, console& say) {
-  const auto source = open_source(s, say);
-  if (!source) return orbis::fail(source.error());
-  const auto posed = frames_with_poses(*source, s, say);
+orbis::result<mapped> map_recording(const frame_source& source, const settings& s, const std::filesystem::path& folder,
+                                    console& say) {
+  const auto posed = frames_with_poses(source, s, say);
   if (!posed) return orbis::fail(posed.error());
-  auto map = map_frames(*posed, *source, s, say);
+  auto map = map_frames(*posed, source, s, say);
   if (!map) return orbis::fail(map.error());
-  results r = begin_results(s, source->title, &*source);
+  results r = begin_results(s, source.title, &source, folder);
   r.truth_note = "Mapped with the poses of the ground truth.";
   return mapped{std::move(r), *std::move(map), posed->trajectory()};
 }
@@ -57,7 +60,7 @@ void keep_finite(orbis::point_cloud& cloud) {
   if (finite.size() != cloud.size()) cloud = orbis::cloud::extract(cloud, finite);
 }
 
-orbis::result<mapped> map_cloud_file(const settings& s, console& say) {
+orbis::result<mapped> map_cloud_file(const settings& s, const std::filesystem::path& folder, console& say) {
   if (filter_options(s).kind == orbis::mapping::filter_kind::ray_evidence)
     return orbis::fail(orbis::errc::invalid_argument, s.input.string(),
                        "the filter ray-evidence wants a recording: a cloud has no depth images");
@@ -71,7 +74,7 @@ orbis::result<mapped> map_cloud_file(const settings& s, console& say) {
   const std::string left_out =
       in_file == cloud->size() ? "" : ", " + count_text(in_file - cloud->size()) + " without coordinates left out";
   say.finish(name + ": " + count_text(cloud->size()) + " points" + left_out);
-  results r = begin_results(s, name, nullptr);
+  results r = begin_results(s, name, nullptr, folder);
   r.setup.emplace_back("points", count_text(cloud->size()) + left_out);
   r.truth_note = "A cloud, without SLAM.";
   return mapped{std::move(r), map_cloud(*std::move(cloud), s, say), {}};
@@ -95,16 +98,24 @@ exit_code evaluate(const settings& s, console& say) {
 
 exit_code map_without_slam(const settings& s, console& say) {
   const auto give_up = [&](const orbis::error& e) { return say.error(e), bad_input; };
-  if (auto ready = prepare_output(s); !ready) return give_up(ready.error());
   std::error_code ignored;
-  auto found = std::filesystem::is_directory(s.input, ignored) ? map_recording(s, say) : map_cloud_file(s, say);
-  if (!found) return give_up(found.error());
+  std::optional<frame_source> recording;
+  if (std::filesystem::is_directory(s.input, ignored)) {
+    auto source = open_source(s, say);
+    if (!source) return give_up(source.error());
+    recording = *std::move(source);
+  }
+  const auto inputs = inputs_of(s, recording ? recording->files : std::vector<std::filesystem::path>{});
+  if (const auto lost = find_overwritten(s, inputs)) return say.error(*lost), bad_usage;
+  auto files = result_files::begin(s);
+  if (!files) return give_up(files.error());
 
-  remove_old_results(s.out);
-  auto written = write_map(std::move(found->map), s, say);
+  auto found = recording ? map_recording(*recording, s, files->folder(), say) : map_cloud_file(s, files->folder(), say);
+  if (!found) return give_up(found.error());
+  auto written = write_map(std::move(found->map), s, files->folder(), say);
   if (!written) return give_up(written.error());
   found->r.map = *std::move(written);
-  if (auto done = write_report_files(found->r, found->cameras, say); !done) return give_up(done.error());
+  if (auto done = write_report_files(found->r, found->cameras, *files, say); !done) return give_up(done.error());
   print_results(found->r, say);
   return done;
 }

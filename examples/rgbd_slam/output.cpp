@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "output.hpp"
 
-#include <array>
 #include <cstdio>
 
-#include <orbis/core/file.hpp>
 #include <orbis/io/trajectory_file.hpp>
 
 #include "filters.hpp"
@@ -19,53 +17,25 @@ using orbis::result;
 
 namespace {
 
-constexpr std::array result_names = {"trajectory.txt",    "keyframes.txt",  "cloud.ply", "cloud_filtered.ply",
-                                     "map_unfiltered.bt", "map.bt",         "map.ot",    "summary.json",
-                                     "report.html",       "trajectory.png", "map.png",   "map_unfiltered.png",
-                                     "filter.png"};
-
-result<void> prepare_folder(const std::filesystem::path& folder) {
-  std::error_code ec;
-  std::filesystem::create_directories(folder, ec);
-  if (ec) return orbis::fail(orbis::errc::write_failed, folder.string(), "cannot be made: " + ec.message());
-  const auto probe = folder / ".rgbd_slam_probe";
-  if (auto done = orbis::write_file_atomically(probe, [](std::ostream& file) { file << "probe\n"; }); !done)
-    return orbis::fail(orbis::errc::write_failed, folder.string(),
-                       "no file can be made in it: " + done.error().message);
-  std::filesystem::remove(probe, ec);
-  return {};
+/// Notes which files this run makes and which ones of earlier runs stay beside them. `coming`: still to be written.
+void list_files(results& r, const result_files& files, const file_names& coming, console& say) {
+  r.files = files.made(coming);
+  r.files_of_earlier_runs = files.of_earlier_runs(r.files);
+  if (r.files_of_earlier_runs.empty()) return;
+  std::string names;
+  for (const std::string& name : r.files_of_earlier_runs) names += (names.empty() ? "" : ", ") + name;
+  say.warn(r.warnings.emplace_back("of an earlier run, and left as they are: " + names));
 }
 
 }  // namespace
 
-result<void> prepare_output(const settings& s) {
-  if (auto ready = prepare_folder(s.out); !ready || s.save_map.empty()) return ready;
-  std::error_code ec;
-  const auto fail = [&](const char* why) {
-    return orbis::fail(orbis::errc::write_failed, s.save_map.string(), std::string{"the map cannot be saved: "} + why);
-  };
-  if (!s.save_map.has_filename()) return fail("this is no name for a file");
-  if (const auto there = std::filesystem::status(s.save_map, ec);
-      std::filesystem::exists(there) && !std::filesystem::is_regular_file(there))
-    return fail("it is not a regular file, and is not replaced by one");
-  const std::filesystem::path folder = s.save_map.has_parent_path() ? s.save_map.parent_path() : ".";
-  if (auto ready = prepare_folder(folder); !ready) return ready;
-  for (const char* name : result_names)
-    if (s.save_map.filename() == name && std::filesystem::equivalent(folder, s.out, ec))
-      return fail("another result has this name");
-  return {};
-}
-
-void remove_old_results(const std::filesystem::path& out) {
-  std::error_code ignored;
-  for (const char* name : result_names) std::filesystem::remove(out / name, ignored);
-}
-
-results begin_results(const settings& s, const std::string& title, const frame_source* source) {
+results begin_results(const settings& s, const std::string& title, const frame_source* source,
+                      const std::filesystem::path& folder) {
   constexpr const char* names[] = {"run", "demo", "eval", "map"};
   results r;
   r.command = names[static_cast<int>(s.what)];
   r.title = title;
+  r.folder = folder;
   r.out = s.out;
   const auto number = [](const char* format, double v) {
     char buffer[64];
@@ -108,12 +78,12 @@ results begin_results(const settings& s, const std::string& title, const frame_s
   return r;
 }
 
-result<void> write_trajectories(const slam_results& slam, const std::filesystem::path& out) {
-  if (auto done = orbis::io::write_trajectory(out / "trajectory.txt", slam.trajectory); !done) return done;
-  return orbis::io::write_trajectory(out / "keyframes.txt", slam.keyframes);
+result<void> write_trajectories(const slam_results& slam, const std::filesystem::path& folder) {
+  if (auto done = orbis::io::write_trajectory(folder / "trajectory.txt", slam.trajectory); !done) return done;
+  return orbis::io::write_trajectory(folder / "keyframes.txt", slam.keyframes);
 }
 
-result<void> write_report_files(results& r, const orbis::trajectory& cameras, console& say) {
+result<void> write_report_files(results& r, const orbis::trajectory& cameras, result_files& files, console& say) {
   say.stage("report");
   std::vector<orbis::vec3f> points;
   if (r.map) {
@@ -123,10 +93,12 @@ result<void> write_report_files(results& r, const orbis::trajectory& cameras, co
   }
   const view_frame frame = find_view_frame(points, cameras);
   if (auto done = write_pictures(r, frame); !done) return done;
+  list_files(r, files, {"summary.json", "report.html"}, say);
   r.wall_s = say.total();
   if (auto done = write_report(r, frame); !done) return done;
   r.wall_s = say.total();
   if (auto done = write_summary(r); !done) return done;
+  if (auto done = files.put_in_place(); !done) return done;
   say.finish("pictures, report.html, summary.json");
   return {};
 }
@@ -137,9 +109,12 @@ orbis::error explain_no_start(const results& r, const settings& s) {
       "tracking never started: none of " + std::to_string(r.slam->frames) + " frames shows enough texture with depth"};
 }
 
-exit_code report_no_start(results& r, const orbis::error& why, console& say) {
+exit_code report_no_start(results& r, const orbis::error& why, result_files& files, console& say) {
+  list_files(r, files, {"summary.json"}, say);
   r.wall_s = say.total();
-  if (auto done = write_summary(r); !done) return say.error(done.error()), bad_input;
+  auto done = write_summary(r);
+  if (done) done = files.put_in_place();
+  if (!done) return say.error(done.error()), bad_input;
   say.error(why);
   return never_tracked;
 }

@@ -204,7 +204,7 @@ orbis::result<void> write_trajectory_picture(const results& r, const view_frame&
     off.curve({{time.low, rmse}, {time.high, rmse}}, faint, 1.0);
     s.text("RMSE", off.place(time.low, rmse) + vec2(6, -5), faint, 11);
   }
-  return s.write(r.out / "trajectory.png");
+  return s.write(r.folder / "trajectory.png");
 }
 
 orbis::result<void> write_map_picture(const std::string& name, const std::string& title, const tree_numbers& numbers,
@@ -228,7 +228,7 @@ orbis::result<void> write_map_picture(const std::string& name, const std::string
   s.text(view_frame_note, {60, 806}, faint, 11);
   s.text("0", {1092, 794}, faint, 11, 1.0);
   s.text(buffer, {1308, 794}, faint, 11);
-  return s.write(r.out / name);
+  return s.write(r.folder / name);
 }
 
 /// The octree before the filter and after it, side by side in the same view, with the sizes below.
@@ -250,7 +250,7 @@ orbis::result<void> write_filter_picture(const results& r, const view_frame& fra
   panel(20, "before", m.voxels_unfiltered, m.unfiltered, m.cloud.size(), m.cloud_bytes);
   panel(760, "after", m.voxels, m.filtered, m.kept.size(), m.filtered_bytes);
   s.text(view_frame_note, {60, 806}, faint, 11);
-  return s.write(r.out / "filter.png");
+  return s.write(r.folder / "filter.png");
 }
 
 }  // namespace

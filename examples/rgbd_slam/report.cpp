@@ -318,7 +318,7 @@ std::string tables(const results& r, const view_frame& frame) {
     t += row(octree + "after the filter", m.filtered.leaves, "leaves", m.filtered.occupied, m.filtered.bt_bytes);
     t += "</table></div>\n<h2>The filter</h2>\n";
     t += words({{"mode", m.filter_mode}, {"removed", removed_text(m)}, {"why", m.filter_reason}});
-    if (const auto picture = orbis::read_file(r.out / "filter.png"))
+    if (const auto picture = orbis::read_file(r.folder / "filter.png"))
       t += "<figure class=\"panel\"><img alt=\"The octree before the filter and after it, in the same view\" "
            "src=\"data:image/png;base64," +
            base64(*picture) + "\"></figure>\n";
@@ -394,7 +394,7 @@ orbis::result<void> write_report(const results& r, const view_frame& frame) {
   choose(page, "map", r.map.has_value());
   choose(page, "slam", path);
   choose(page, "truth", r.against_truth.has_value());
-  const auto picture = orbis::read_file(r.out / "map.png");
+  const auto picture = orbis::read_file(r.folder / "map.png");
   const std::string html = filled(page, {{"title", escaped(r.title)},
                                          {"header", header(r)},
                                          {"frame_note", std::string{"Everything is "} + view_frame_note + "."},
@@ -405,7 +405,7 @@ orbis::result<void> write_report(const results& r, const view_frame& frame) {
                                          {"insert_table", r.map ? time_table(r.map->insert_ms) : ""},
                                          {"footer", footer(r)},
                                          {"data", for_script(script_data(r, frame))}});
-  return orbis::write_file_atomically(r.out / "report.html", [&](std::ostream& out) { out << html; });
+  return orbis::write_file_atomically(r.folder / "report.html", [&](std::ostream& out) { out << html; });
 }
 
 }  // namespace app

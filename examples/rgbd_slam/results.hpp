@@ -78,7 +78,9 @@ struct slam_results {
 
 struct results {
   std::string command, title;
-  std::filesystem::path out;
+  std::filesystem::path folder;                            ///< where the files are made
+  std::filesystem::path out;                               ///< where they are in the end
+  std::vector<std::string> files, files_of_earlier_runs;   ///< names of what is in `out` in the end
   std::vector<std::pair<std::string, std::string>> setup;  ///< what was used, in words
   std::optional<slam_results> slam;
   std::optional<map_results> map;

@@ -24,6 +24,7 @@ struct settings {
   std::filesystem::path input;      ///< recording, cloud or estimated trajectory
   std::filesystem::path reference;  ///< ground truth (eval)
   std::filesystem::path out;        ///< where the files go
+  std::filesystem::path config;     ///< file with options; empty: none
 
   std::string format = "auto";
   std::string camera;                 ///< file or preset; empty: as the recording says

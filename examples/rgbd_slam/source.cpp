@@ -51,6 +51,7 @@ result<frame_source> open_recording(const settings& s) {
   source.frames = limited(recording->size(), s);
   source.frame = [recording, stride = s.stride](std::size_t i) { return recording->frame(i * stride); };
   source.ground_truth = recording->ground_truth();
+  source.files = recording->files();
   source.notes.assign(recording->notes().begin(), recording->notes().end());
   return source;
 }

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstddef>
+#include <filesystem>
 #include <functional>
 #include <future>
 #include <string>
@@ -25,8 +26,9 @@ struct frame_source {
   std::size_t frames = 0;
   /// Reads or renders a frame; `--stride` is applied already. May be called from another thread.
   std::function<orbis::result<orbis::camera::rgbd_frame>(std::size_t)> frame;
-  orbis::trajectory ground_truth;  ///< empty if not known
-  std::vector<std::string> notes;  ///< worth a warning
+  orbis::trajectory ground_truth;            ///< empty if not known
+  std::vector<std::filesystem::path> files;  ///< that it is read from
+  std::vector<std::string> notes;            ///< worth a warning
   /// Metres from a point of the ground truth's world to the true surface; empty if not known.
   std::function<double(const orbis::vec3&)> surface_distance;
 };

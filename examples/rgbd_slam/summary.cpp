@@ -93,6 +93,8 @@ std::string summary_json(const results& r) {
                  {"ot_bytes", m ? json(m->ot_bytes) : null},
                  {"insert_ms_per_frame", {{"median", insertion.median}, {"p95", insertion.p95}}}};
   j["map_error_m"] = m ? or_null(m->error_m) : null;
+  j["files"] = r.files;
+  j["files_of_earlier_runs"] = r.files_of_earlier_runs;
   return j.dump(2, ' ', false, json::error_handler_t::replace) + "\n";
 }
 
@@ -108,7 +110,7 @@ std::string accuracy_json(const accuracy& a) {
 }
 
 orbis::result<void> write_summary(const results& r) {
-  return orbis::write_file_atomically(r.out / "summary.json", [&](std::ostream& out) { out << summary_json(r); });
+  return orbis::write_file_atomically(r.folder / "summary.json", [&](std::ostream& out) { out << summary_json(r); });
 }
 
 std::string bytes_text(std::uintmax_t bytes) {

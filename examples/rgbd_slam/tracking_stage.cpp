@@ -7,6 +7,8 @@
 
 #include <orbis/slam/rgbd_system.hpp>
 
+#include "interrupts.hpp"
+
 namespace app {
 namespace {
 
@@ -30,7 +32,7 @@ known_poses track_frames(slam_system& slam, const frame_source& source, const se
                          console& say) {
   known_poses truth;
   read_ahead frames{source, s.threads != 1};
-  for (std::size_t i = 0; frames.has_next() && !console::interrupted(); ++i) {
+  for (std::size_t i = 0; frames.has_next() && !interrupts::requested(); ++i) {
     const auto frame = frames.next();
     if (!frame) {
       out.stopped = frame.error();
@@ -102,7 +104,8 @@ std::string in_words(const slam_results& slam) {
 
 }  // namespace
 
-orbis::result<tracked_frames> track(const frame_source& source, const settings& s, console& say) {
+orbis::result<tracked_frames> track(const frame_source& source, const settings& s,
+                                    const std::filesystem::path& landmark_map, console& say) {
   say.stage("tracking");
   slam_system slam{source.camera.model, options_for(source, s)};
   if (!s.load_map.empty())
@@ -110,7 +113,10 @@ orbis::result<tracked_frames> track(const frame_source& source, const settings& 
   const map_id first_map = slam.active_map();
 
   tracked_frames out{.slam = {}, .keyframes = posed_frames{source}, .stopped = {}, .unsaved = {}};
-  console::catch_interrupts();
+  interrupts::keep_results(s.quiet
+                               ? ""
+                               : "\nrgbd_slam: stopping; what was reached is mapped and written. Once more: stop at "
+                                 "once, and leave the folder as it was\n");
   const known_poses truth = track_frames(slam, source, s, out, say);
   slam.wait();
 
@@ -134,12 +140,11 @@ orbis::result<tracked_frames> track(const frame_source& source, const settings& 
   const bool spares_loaded = out.missed_map && is_same_file(s.load_map, s.save_map);
   if (!s.save_map.empty() && !out.slam.trajectory.empty() && !spares_loaded) {
     say.stage("saving");
-    if (auto saved = save_map(slam, T_world_slam, s.save_map))
+    if (auto saved = save_map(slam, T_world_slam, landmark_map))
       say.finish(s.save_map.string());
     else
       out.unsaved = saved.error();
   }
-  console::release_interrupts();
   return out;
 }
 

@@ -86,6 +86,7 @@ inline se3 mirrored_y(const se3& pose) {
     auto frames = read_associations(list, index.notes);
     if (!frames) return fail(frames.error());
     index.frames = *std::move(frames);
+    index.files = {list};
   } else {
     if (!present(folder / "rgb")) return fail(errc::not_found, (folder / "rgb").string(), "no such folder");
     index.frames = detail::icl_numbered_frames(folder, index.notes);
@@ -96,6 +97,7 @@ inline se3 mirrored_y(const se3& pose) {
     auto truth = read_trajectory(file);
     if (!truth) return fail(truth.error());
     index.ground_truth = *std::move(truth);
+    index.files.push_back(file);
     for (stamped_pose& pose : index.ground_truth) pose.T_world_camera = detail::mirrored_y(pose.T_world_camera);
     index.notes.push_back(file.string() + ": left-handed poses with y up, mirrored to right-handed ones with y down");
   }

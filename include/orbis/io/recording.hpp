@@ -72,6 +72,12 @@ class recording {
   [[nodiscard]] recording_format format() const noexcept { return format_; }
   /// What is worth a warning: images without a partner, lines left out, depth that is not registered.
   [[nodiscard]] std::span<const std::string> notes() const noexcept { return index_.notes; }
+  /// Every file that the recording is read from: lists, poses, camera, and all images.
+  [[nodiscard]] std::vector<std::filesystem::path> files() const {
+    std::vector<std::filesystem::path> all = index_.files;
+    for (const recording_entry& entry : index_.frames) all.insert(all.end(), {entry.color, entry.depth});
+    return all;
+  }
 
   /// Reads frame `i`. Colour and depth have the camera's size. Errors: not_found, unreadable,
   /// malformed (damaged, or of another size than the camera's), unsupported. @pre i < size()
@@ -194,6 +200,7 @@ class recording {
     auto read = read_camera(file);
     if (!read) return fail(read.error());
     camera = *std::move(read);
+    index->files.push_back(file);
   }
   if (!camera) camera = index->camera;
   if (!camera)

@@ -156,6 +156,7 @@ inline std::vector<std::filesystem::path> seven_scenes_sequences(const std::file
       const auto pose = read_pose_matrix(file);
       if (!pose) return fail(pose.error());
       frame.T_world_camera = *pose;
+      index.files.push_back(file);
       index.ground_truth.push_back({frame.timestamp, *pose});
     }
     index.frames.push_back(std::move(frame));
@@ -174,6 +175,7 @@ inline std::vector<std::filesystem::path> seven_scenes_sequences(const std::file
   if (present(intrinsics)) {
     const auto k = read_camera_matrix(intrinsics);
     if (!k) return fail(k.error());
+    index.files.push_back(intrinsics);
     const auto first = read_depth(index.frames.front().depth);
     if (!first) return fail(first.error());
     index.camera = camera::camera_settings{

@@ -129,7 +129,9 @@ struct stamped_file {
     auto frames = read_associations(list, index.notes);
     if (!frames) return fail(frames.error());
     index.frames = *std::move(frames);
+    index.files = {list};
   } else {
+    index.files = {folder / "rgb.txt", folder / "depth.txt"};
     const auto color = read_image_list(folder / "rgb.txt", index.notes);
     if (!color) return fail(color.error());
     const auto depth = read_image_list(folder / "depth.txt", index.notes);
@@ -158,6 +160,7 @@ struct stamped_file {
     auto truth = read_trajectory(file);
     if (!truth) return fail(truth.error());
     index.ground_truth = *std::move(truth);
+    index.files.push_back(file);
     attach_ground_truth(index, max_time_difference);
   }
 

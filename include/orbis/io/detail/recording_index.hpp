@@ -32,6 +32,7 @@ struct recording_index {
   trajectory ground_truth;
   std::optional<camera::camera_settings> camera;  ///< where the format's own files tell
   std::vector<std::string> notes;                 ///< what a user should be warned about
+  std::vector<std::filesystem::path> files;       ///< that were read for this; images are not among them
 };
 
 /// Gives every frame the ground truth's pose at its time: interpolated where poses are at most 0.2 s

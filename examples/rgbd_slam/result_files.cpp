@@ -1,0 +1,204 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "result_files.hpp"
+
+#include <algorithm>
+#include <array>
+#include <mutex>
+#include <string_view>
+#include <system_error>
+#include <utility>
+
+#include <nlohmann/json.hpp>
+#include <sys/stat.h>
+
+#include <orbis/core/file.hpp>
+
+#include "interrupts.hpp"
+
+namespace app {
+
+namespace fs = std::filesystem;
+using orbis::result;
+
+namespace {
+
+constexpr std::array trajectory_names = {"trajectory.txt", "keyframes.txt", "trajectory.png"};
+constexpr std::array map_names = {"cloud.ply", "cloud_filtered.ply", "map_unfiltered.bt", "map.bt", "map.ot",
+                                  "map.png",   "map_unfiltered.png", "filter.png"};
+constexpr std::array report_names = {"summary.json", "report.html"};
+
+file_names all_names() {
+  return {"trajectory.txt",    "keyframes.txt",  "cloud.ply", "cloud_filtered.ply",
+          "map_unfiltered.bt", "map.bt",         "map.ot",    "summary.json",
+          "report.html",       "trajectory.png", "map.png",   "map_unfiltered.png",
+          "filter.png"};
+}
+
+template <class Names>
+bool is_among(const std::string& name, const Names& names) {
+  return std::find(names.begin(), names.end(), name) != names.end();
+}
+
+bool is_there(const fs::path& path) {
+  std::error_code ignored;
+  return fs::exists(fs::symlink_status(path, ignored));
+}
+
+/// The result files in `folder` that this program made, as its summary.json says.
+file_names recorded(const fs::path& folder) {
+  const auto text = orbis::read_file(folder / "summary.json");
+  if (!text) return {};
+  const auto summary = nlohmann::json::parse(*text, nullptr, false);
+  if (!summary.is_object() || !summary.contains("tracked") || !summary.contains("octree")) return {};
+  if (!summary.contains("files")) return all_names();  // of a version that kept no list
+  file_names names;
+  for (const char* list : {"files", "files_of_earlier_runs"})
+    if (const auto found = summary.find(list); found != summary.end() && found->is_array())
+      for (const auto& name : *found)
+        if (name.is_string()) names.push_back(name.get<std::string>());
+  return names;
+}
+
+fs::path folder_of(const fs::path& file) { return file.has_parent_path() ? file.parent_path() : fs::path{"."}; }
+
+bool are_one_file(const fs::path& a, const fs::path& b) {
+  std::error_code ignored;
+  return fs::equivalent(a, b, ignored);
+}
+
+using identity = std::pair<dev_t, ino_t>;
+std::optional<identity> identity_of(const fs::path& path) {
+  struct stat status {};
+  if (::stat(path.c_str(), &status) != 0) return std::nullopt;
+  return identity{status.st_dev, status.st_ino};
+}
+
+/// Held while files are put in place, and while an interrupt removes what is not.
+std::mutex& end_of_run() {
+  static std::mutex& mutex = *new std::mutex;
+  return mutex;
+}
+
+}  // namespace
+
+file_names result_names(const settings& s) {
+  file_names names;
+  for (std::string& name : all_names()) {
+    const bool made = is_among(name, report_names) || (s.what != command::map && is_among(name, trajectory_names)) ||
+                      (!s.localize_only && is_among(name, map_names));
+    if (made) names.push_back(std::move(name));
+  }
+  return names;
+}
+
+std::vector<fs::path> inputs_of(const settings& s, std::vector<fs::path> source_files) {
+  std::vector<fs::path> inputs = std::move(source_files);
+  inputs.push_back(s.input);
+  inputs.push_back(s.config);
+  if (is_file_name(s.camera)) inputs.emplace_back(s.camera);
+  return inputs;
+}
+
+std::optional<orbis::error> find_overwritten(const settings& s, const std::vector<fs::path>& inputs) {
+  std::vector<std::pair<identity, fs::path>> targets;
+  const auto add = [&](const fs::path& path) {
+    if (const auto id = identity_of(path)) targets.emplace_back(*id, path);
+  };
+  for (const std::string& name : result_names(s)) add(s.out / name);
+  const std::size_t results = targets.size();
+  if (!s.save_map.empty()) add(s.save_map);
+  if (targets.empty()) return std::nullopt;
+
+  const auto complain = [](const fs::path& path, const std::string& what) {
+    return orbis::error{orbis::errc::invalid_argument, path.string(), what};
+  };
+  const auto find = [&](const fs::path& input, std::size_t count) -> std::optional<orbis::error> {
+    const auto id = identity_of(input);
+    for (std::size_t i = 0; id && i != count; ++i)
+      if (targets[i].first == *id)
+        return complain(targets[i].second, "is an input of this run (" + input.string() +
+                                               ") and would be written over: give another place for the results");
+    return std::nullopt;
+  };
+  for (const fs::path& input : inputs)
+    if (auto found = find(input, targets.size())) return found;
+  // A map of landmarks may be written over the one that it has grown from, if that is what was asked for.
+  if (auto found = find(s.load_map, results)) return found;
+
+  const file_names ours = recorded(s.out);
+  for (const std::string& name : result_names(s))
+    if (is_there(s.out / name) && !is_among(name, ours))
+      return complain(s.out / name,
+                      "is there already, and no summary.json beside it says that rgbd_slam made it: it is not "
+                      "replaced; move it, or give another --out");
+  return std::nullopt;
+}
+
+result<result_files> result_files::begin(const settings& s) {
+  result_files files;
+  files.out_ = s.out;
+  file_names names = result_names(s);
+  const auto fail = [&](const std::string& why) {
+    return orbis::fail(orbis::errc::write_failed, s.save_map.string(), "the map cannot be saved: " + why);
+  };
+  bool beside = false;  // the map of landmarks lies in the output folder
+  if (!s.save_map.empty()) {
+    files.map_name_ = s.save_map.filename().string();
+    if (files.map_name_.empty() || files.map_name_ == "." || files.map_name_ == "..")
+      return fail("this is no name for a file");
+    std::error_code ec;
+    for (const fs::path& folder : {s.out, folder_of(s.save_map)})
+      if (fs::create_directories(folder, ec); ec)
+        return orbis::fail(orbis::errc::write_failed, folder.string(), "cannot be made: " + ec.message());
+    beside = are_one_file(s.out, folder_of(s.save_map));
+    if (beside && is_among(files.map_name_, all_names())) return fail("another result has this name");
+    if (const auto there = fs::status(s.save_map, ec); fs::exists(there) && !fs::is_regular_file(there))
+      return fail("it is not a regular file, and is not replaced by one");
+  }
+  if (beside) names.push_back(files.map_name_);
+  auto folder = staged_folder::open(s.out, std::move(names));
+  if (!folder) return orbis::fail(folder.error());
+  files.folders_.push_back(*std::move(folder));
+  if (!s.save_map.empty() && !beside) {
+    auto other = staged_folder::open(folder_of(s.save_map), {files.map_name_});
+    if (!other) return orbis::fail(other.error());
+    files.folders_.push_back(*std::move(other));
+  }
+  std::vector<fs::path> temporary;
+  for (const staged_folder& f : files.folders_) temporary.push_back(f.path());
+  interrupts::before_end([temporary] {
+    const std::lock_guard lock{end_of_run()};
+    std::error_code ignored;
+    for (const fs::path& path : temporary) fs::remove_all(path, ignored);
+  });
+  return files;
+}
+
+result_files::~result_files() {
+  if (!folders_.empty()) interrupts::before_end({});
+}
+
+file_names result_files::made(const file_names& coming) const {
+  const file_names there = folders_.front().made();
+  file_names names;
+  for (std::string& name : all_names())
+    if (is_among(name, there) || is_among(name, coming)) names.push_back(std::move(name));
+  return names;
+}
+
+file_names result_files::of_earlier_runs(const file_names& made) const {
+  file_names names = recorded(out_);
+  std::erase_if(names, [&](const std::string& name) {
+    return is_among(name, made) || !is_among(name, all_names()) || !is_there(out_ / name);
+  });
+  return names;
+}
+
+result<void> result_files::put_in_place() {
+  const std::lock_guard lock{end_of_run()};
+  std::vector<staged_folder*> folders;
+  for (staged_folder& f : folders_) folders.push_back(&f);
+  return staged_folder::put_in_place(folders);
+}
+
+}  // namespace app

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// The files that a run writes, and how they come into the folder that was asked for.
+///
+/// A run replaces the files that it makes, all together and at its end, and deletes nothing. Files of an earlier run
+/// that it does not make stay; `summary.json` tells which are whose. What is in the folder under a result's name and
+/// was not made by this program is not replaced, nor is any input of the run.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <orbis/core/result.hpp>
+
+#include "settings.hpp"
+#include "staged_folder.hpp"
+
+namespace app {
+
+/// Names of files, in the order in which the documentation lists them.
+using file_names = std::vector<std::string>;
+
+/// The files that the command may make in the output folder.
+[[nodiscard]] file_names result_names(const settings& s);
+
+/// Every file that the run reads; `source_files`: those of the recording.
+[[nodiscard]] std::vector<std::filesystem::path> inputs_of(const settings& s,
+                                                           std::vector<std::filesystem::path> source_files);
+/// Whether the run would write over a file that is not its to replace: one of `inputs` (compared as files, so that
+/// links do not matter), or one that was not made by this program. Nothing if not. Cost: a look at each input's entry
+/// in its folder, where there is anything that might be replaced.
+[[nodiscard]] std::optional<orbis::error> find_overwritten(const settings& s,
+                                                           const std::vector<std::filesystem::path>& inputs);
+
+class result_files {
+ public:
+  /// Makes the folders, and sees whether files can be made in them. Errors: write_failed.
+  [[nodiscard]] static orbis::result<result_files> begin(const settings& s);
+  result_files(result_files&&) noexcept = default;
+  result_files& operator=(result_files&&) = delete;
+  ~result_files();
+
+  /// Where the files of the output folder are made.
+  [[nodiscard]] const std::filesystem::path& folder() const { return folders_.front().path(); }
+  /// Where the map of landmarks is made. @pre settings name one
+  [[nodiscard]] std::filesystem::path landmark_map() const { return folders_.back().path() / map_name_; }
+
+  /// The files of the output folder: those made so far, with those of `coming` ...
+  [[nodiscard]] file_names made(const file_names& coming) const;
+  /// ... and those of earlier runs that will stay beside them.
+  [[nodiscard]] file_names of_earlier_runs(const file_names& made) const;
+
+  /// Replaces the old files by those that were made: all, or none if this fails. Errors: write_failed.
+  [[nodiscard]] orbis::result<void> put_in_place();
+
+ private:
+  result_files() = default;
+
+  std::filesystem::path out_;
+  std::string map_name_;
+  std::vector<staged_folder> folders_;  ///< the output folder; that of the map of landmarks if it is another one
+};
+
+}  // namespace app

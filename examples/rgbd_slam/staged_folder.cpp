@@ -1,0 +1,216 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "staged_folder.hpp"
+
+#include <algorithm>
+#include <cerrno>
+#include <csignal>
+#include <cstdio>
+#include <cstdlib>
+#include <memory>
+#include <string_view>
+#include <system_error>
+#include <utility>
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+namespace app {
+
+namespace fs = std::filesystem;
+using orbis::result;
+
+descriptor::descriptor(descriptor&& other) noexcept : number_{std::exchange(other.number_, -1)} {}
+descriptor& descriptor::operator=(descriptor&& other) noexcept {
+  std::swap(number_, other.number_);
+  return *this;
+}
+descriptor::~descriptor() {
+  if (number_ >= 0) ::close(number_);
+}
+
+namespace {
+
+constexpr std::string_view prefix = ".rgbd_slam-", ready = ".ready", backup = "old";
+
+auto failure(const fs::path& path, const std::string& what) {
+  return orbis::fail(orbis::errc::write_failed, path.string(), what);
+}
+std::string reason(int code) { return std::generic_category().message(code); }
+
+descriptor open_folder(const fs::path& folder) {
+  return descriptor{::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)};
+}
+
+/// A lock on a folder as long as this lives. File systems without locks let everybody in.
+class folder_lock {
+ public:
+  explicit folder_lock(int folder) : folder_{folder} {
+    while (::flock(folder_, LOCK_EX) != 0 && errno == EINTR) {
+    }
+  }
+  ~folder_lock() { ::flock(folder_, LOCK_UN); }
+  folder_lock(const folder_lock&) = delete;
+  folder_lock& operator=(const folder_lock&) = delete;
+
+ private:
+  int folder_;
+};
+
+/// A file to be put in place. Strings, as a child process may not allocate memory.
+struct move {
+  std::string from, to, old;
+  bool replaces = false;  ///< there is a file at `to`
+  bool has_old = false;   ///< and it is at `old` as well
+};
+
+/// Puts all files in place, or none: returns 0 or why not. Calls nothing but the system.
+int rename_all(const std::vector<move>& moves) {
+  for (std::size_t i = 0; i != moves.size(); ++i) {
+    if (::rename(moves[i].from.c_str(), moves[i].to.c_str()) == 0) continue;
+    const int why = errno;
+    if (why == ENOENT && ::access(moves[i].from.c_str(), F_OK) != 0 && ::access(moves[i].to.c_str(), F_OK) == 0)
+      continue;  // a child process that was killed had done it
+    while (i-- != 0)
+      if (const move& m = moves[i]; m.has_old)
+        ::rename(m.old.c_str(), m.to.c_str());
+      else if (!m.replaces)
+        ::rename(m.to.c_str(), m.from.c_str());
+    return why;
+  }
+  return 0;
+}
+
+/// `rename_all` in a process that signals to this one, or its end, do not reach.
+int rename_all_whatever_happens(const std::vector<move>& moves) {
+  sigset_t all, before;
+  sigfillset(&all);
+  pthread_sigmask(SIG_SETMASK, &all, &before);
+  const pid_t child = ::fork();
+  if (child == 0) {
+    ::setsid();
+    ::_exit(rename_all(moves));
+  }
+  int status = 0;
+  bool finished = child > 0;
+  if (child > 0)
+    while (::waitpid(child, &status, 0) < 0 && finished) finished = errno == EINTR;
+  const int why = !finished || !WIFEXITED(status) ? rename_all(moves) : WEXITSTATUS(status);
+  pthread_sigmask(SIG_SETMASK, &before, nullptr);
+  return why;
+}
+
+bool may_be_replaced(const fs::path& path) {
+  std::error_code ignored;
+  const fs::file_status there = fs::symlink_status(path, ignored);
+  return !fs::exists(there) || fs::is_regular_file(there) || fs::is_symlink(there);
+}
+
+/// Of the files in `from` those that have one of the names.
+std::vector<move> moves_to(const fs::path& folder, const fs::path& from, const std::vector<std::string>& names) {
+  std::vector<move> moves;
+  for (const std::string& name : names) {
+    std::error_code ignored;
+    if (!fs::is_regular_file(fs::symlink_status(from / name, ignored))) continue;
+    const fs::path to = folder / name, old = from / backup / name;
+    moves.push_back({(from / name).string(), to.string(), old.string(), fs::exists(fs::symlink_status(to, ignored))});
+  }
+  return moves;
+}
+
+/// Finishes or removes what processes that are gone have left in `folder`. @pre it is locked
+void clear_leftovers(const fs::path& folder, const std::vector<std::string>& names) {
+  std::vector<fs::path> found;
+  std::error_code ec;
+  for (fs::directory_iterator it{folder, ec}, end; !ec && it != end; it.increment(ec))
+    if (it->path().filename().string().starts_with(prefix) && it->symlink_status(ec).type() == fs::file_type::directory)
+      found.push_back(it->path());
+  for (const fs::path& left : found) {
+    const descriptor lock = open_folder(left);
+    if (lock.get() < 0 || ::flock(lock.get(), LOCK_EX | LOCK_NB) != 0) continue;  // of a process that lives
+    if (left.filename().string().ends_with(ready) && rename_all(moves_to(folder, left, names)) != 0) continue;
+    fs::remove_all(left, ec);
+  }
+}
+
+}  // namespace
+
+result<staged_folder> staged_folder::open(const fs::path& folder, std::vector<std::string> names) {
+  std::error_code ec;
+  fs::create_directories(folder, ec);
+  if (ec) return failure(folder, "cannot be made: " + ec.message());
+  staged_folder made;
+  made.folder_ = fs::absolute(folder, ec);
+  made.names_ = std::move(names);
+  made.folder_lock_ = open_folder(made.folder_);
+  if (made.folder_lock_.get() < 0) return failure(folder, "cannot be opened: " + reason(errno));
+  for (const std::string& name : made.names_)
+    if (!may_be_replaced(made.folder_ / name))
+      return failure(folder / name, "is not a regular file, and is not replaced by one");
+
+  const folder_lock lock{made.folder_lock_.get()};
+  clear_leftovers(made.folder_, made.names_);
+  std::string name = (made.folder_ / (std::string{prefix} + "XXXXXX")).string();
+  if (::mkdtemp(name.data()) == nullptr) return failure(folder, "no file can be made in it: " + reason(errno));
+  made.staging_ = name;
+  made.staging_lock_ = open_folder(made.staging_);
+  ::flock(made.staging_lock_.get(), LOCK_EX);
+  return made;
+}
+
+std::vector<std::string> staged_folder::made() const {
+  std::vector<std::string> found;
+  std::error_code ignored;
+  for (const std::string& name : names_)
+    if (fs::is_regular_file(fs::symlink_status(staging_ / name, ignored))) found.push_back(name);
+  return found;
+}
+
+void staged_folder::discard() noexcept {
+  std::error_code ignored;
+  if (!staging_.empty()) fs::remove_all(staging_, ignored);
+  staging_.clear();
+}
+
+result<void> staged_folder::put_in_place(std::span<staged_folder* const> folders) {
+  // In the order of their numbers, so that two programs never wait for each other.
+  std::vector<staged_folder*> ordered(folders.begin(), folders.end());
+  const auto number = [](const staged_folder* f) {
+    struct stat status {};
+    ::fstat(f->folder_lock_.get(), &status);
+    return std::pair{status.st_dev, status.st_ino};
+  };
+  std::sort(ordered.begin(), ordered.end(), [&](const auto* a, const auto* b) { return number(a) < number(b); });
+  std::vector<std::unique_ptr<folder_lock>> locks;
+  for (const staged_folder* f : ordered) locks.push_back(std::make_unique<folder_lock>(f->folder_lock_.get()));
+
+  std::error_code ec;
+  std::vector<move> moves;
+  for (staged_folder* f : folders) {
+    for (const std::string& name : f->made())
+      if (!may_be_replaced(f->folder_ / name))
+        return failure(f->folder_ / name, "is not a regular file, and is not replaced by one");
+    const fs::path marked = f->staging_.string() + std::string{ready};
+    fs::create_directory(f->staging_ / backup, ec);
+    ::fsync(f->staging_lock_.get());
+    fs::rename(f->staging_, marked, ec);
+    if (ec) return failure(f->folder_, "the new files cannot be put in place: " + ec.message());
+    f->staging_ = marked;
+    for (move& m : moves_to(f->folder_, marked, f->names_)) {
+      m.has_old = m.replaces && ::link(m.to.c_str(), m.old.c_str()) == 0;
+      moves.push_back(std::move(m));
+    }
+    ::fsync(f->folder_lock_.get());
+  }
+  const int why = rename_all_whatever_happens(moves);
+  if (why != 0) return failure(folders.front()->folder_, "the new files cannot be put in place: " + reason(why));
+  for (staged_folder* f : folders) {
+    ::fsync(f->folder_lock_.get());
+    f->discard();
+  }
+  return {};
+}
+
+}  // namespace app
