@@ -261,3 +261,7 @@ template <execution_policy Policy, point_range Points, posed_depth_range Views, 
 }
 
 }  // namespace orbis::cloud
+
+#ifdef ORBIS_COMPILED
+#include <orbis/cloud/detail/compiled/select.hpp>
+#endif

@@ -229,3 +229,7 @@ template <execution_policy Policy, point_range Points>
 }
 
 }  // namespace orbis::cloud
+
+#ifdef ORBIS_COMPILED
+#include <orbis/cloud/detail/compiled/statistical.hpp>
+#endif
