@@ -3,16 +3,13 @@
 /// The vocabulary of all components.
 #pragma once
 
-#include <orbis/core/associate.hpp>
 #include <orbis/core/base85.hpp>
 #include <orbis/core/bit_string.hpp>
 #include <orbis/core/bits.hpp>
-#include <orbis/core/bytes.hpp>
 #include <orbis/core/crc32c.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/file.hpp>
 #include <orbis/core/image.hpp>
-#include <orbis/core/interpolate.hpp>
 #include <orbis/core/jacobi.hpp>
 #include <orbis/core/lanes.hpp>
 #include <orbis/core/point.hpp>

@@ -16,7 +16,6 @@
 #include <Eigen/LU>
 #include <Eigen/SVD>
 
-#include <orbis/core/associate.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/core/rotation.hpp>
 #include <orbis/core/se3.hpp>

@@ -17,9 +17,9 @@
 #include <vector>
 
 #include <orbis/camera/presets.hpp>
-#include <orbis/core/associate.hpp>
 #include <orbis/core/file.hpp>
 #include <orbis/core/result.hpp>
+#include <orbis/core/trajectory.hpp>
 #include <orbis/io/detail/recording_index.hpp>
 #include <orbis/io/detail/text.hpp>
 #include <orbis/io/trajectory_file.hpp>

@@ -12,7 +12,6 @@
 #include <vector>
 
 #include <orbis/camera/settings.hpp>
-#include <orbis/core/interpolate.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/core/trajectory.hpp>
 

@@ -7,7 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include <orbis/core/bytes.hpp>
+#include <orbis/core/bits.hpp>
 
 namespace orbis::io {
 

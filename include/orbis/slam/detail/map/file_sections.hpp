@@ -10,7 +10,7 @@
 #include <string>
 #include <string_view>
 
-#include <orbis/core/bytes.hpp>
+#include <orbis/core/bits.hpp>
 #include <orbis/core/crc32c.hpp>
 
 namespace orbis::slam::detail {
