@@ -29,7 +29,7 @@
 #include <orbis/core/execution.hpp>
 #include <orbis/io/bal.hpp>
 #include <orbis/io/synthetic/bundle.hpp>
-#include <orbis/optimize/bal_reprojection.hpp>
+#include <orbis/optimize/reprojection_with_intrinsics.hpp>
 #include <orbis/optimize/bundle_adjustment.hpp>
 
 namespace orbis::bench {

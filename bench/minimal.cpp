@@ -21,10 +21,8 @@
 #include <orbis/camera/pinhole.hpp>
 #include <orbis/core/random.hpp>
 #include <orbis/core/se3.hpp>
-#include <orbis/optimize/absolute_orientation.hpp>
-#include <orbis/optimize/essential.hpp>
-#include <orbis/optimize/homography.hpp>
-#include <orbis/optimize/p3p.hpp>
+#include <orbis/optimize/alignment.hpp>
+#include <orbis/optimize/two_view.hpp>
 #include <orbis/optimize/pnp.hpp>
 
 namespace orbis::bench {

@@ -32,7 +32,6 @@
 #include <orbis/core/simd.hpp>
 #include <orbis/io/g2o.hpp>
 #include <orbis/io/synthetic/pose_graph.hpp>
-#include <orbis/optimize/chordal_initialization.hpp>
 #include <orbis/optimize/pose_graph.hpp>
 
 namespace orbis::bench {

@@ -12,7 +12,7 @@
 #include <CLI/CLI.hpp>
 
 #include <orbis/io/bal.hpp>
-#include <orbis/optimize/bal_reprojection.hpp>
+#include <orbis/optimize/reprojection_with_intrinsics.hpp>
 #include <orbis/optimize/bundle_adjustment.hpp>
 
 namespace optimize = orbis::optimize;

@@ -1,39 +1,43 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Estimation: manifolds, robust losses, closed-form and minimal solvers, RANSAC, pose refinement, bundle adjustment,
-/// sparse factorisation, pose graphs.
+/// Estimation: camera poses, structure and transforms from measurements with noise and outliers.
+///
+/// | header | what it is for |
+/// | --- | --- |
+/// | alignment.hpp | rigid or similarity transform between two lists of points, closed form or with outliers |
+/// | automatic_residual.hpp | a residual of your own whose Jacobians are computed with dual numbers |
+/// | bundle_adjustment.hpp | bundle adjustment: cameras and points from observations |
+/// | bundle_covariance.hpp | covariances of the cameras and points of a bundle adjustment |
+/// | bundle_problem.hpp | observations, residual concepts, options and summary of bundle adjustment |
+/// | pnp.hpp | camera pose from known points and pixels with outliers (P3P in RANSAC); P3P |
+/// | point_to_plane.hpp | distance of a measured point from a plane, as a residual |
+/// | pose_graph.hpp | pose graph optimisation and chordal initialisation |
+/// | pose_graph_problem.hpp | edges, residuals, options and summary of pose graphs |
+/// | pose_refinement.hpp | camera pose from known points, refined from a start, with outlier rejection |
+/// | ransac.hpp | RANSAC for any model |
+/// | ransac_policies.hpp | scoring, sampling, preemption and local optimisation for RANSAC |
+/// | reprojection.hpp | reprojection error for any camera model |
+/// | reprojection_with_intrinsics.hpp | reprojection error with intrinsics among the unknowns; the camera of BAL files
+/// | | robust_loss.hpp | robust losses (Huber, Cauchy, Tukey, Geman-McClure), chi-squared gates | | solver_policies.hpp
+/// | damping (Gauss-Newton, Levenberg-Marquardt, dogleg), solvers of the reduced system | | triangulation.hpp | points
+/// from two or more rays | | two_view.hpp | essential matrix, homography and relative pose of two images |
 #pragma once
 
-#include <orbis/optimize/absolute_orientation.hpp>
 #include <orbis/optimize/alignment.hpp>
-#include <orbis/optimize/automatic.hpp>
-#include <orbis/optimize/bal_reprojection.hpp>
-#include <orbis/optimize/between_factor.hpp>
+#include <orbis/optimize/automatic_residual.hpp>
 #include <orbis/optimize/bundle_adjustment.hpp>
 #include <orbis/optimize/bundle_covariance.hpp>
-#include <orbis/optimize/bundle_gauge.hpp>
-#include <orbis/optimize/bundle_summary.hpp>
-#include <orbis/optimize/chordal_initialization.hpp>
-#include <orbis/optimize/damping.hpp>
-#include <orbis/optimize/dual.hpp>
-#include <orbis/optimize/essential.hpp>
-#include <orbis/optimize/graduated.hpp>
-#include <orbis/optimize/homography.hpp>
-#include <orbis/optimize/linear_solver.hpp>
-#include <orbis/optimize/manifold.hpp>
-#include <orbis/optimize/minimize.hpp>
-#include <orbis/optimize/p3p.hpp>
+#include <orbis/optimize/bundle_problem.hpp>
 #include <orbis/optimize/pnp.hpp>
 #include <orbis/optimize/point_to_plane.hpp>
-#include <orbis/optimize/pose_from_points.hpp>
 #include <orbis/optimize/pose_graph.hpp>
-#include <orbis/optimize/pose_graph_summary.hpp>
+#include <orbis/optimize/pose_graph_problem.hpp>
 #include <orbis/optimize/pose_refinement.hpp>
-#include <orbis/optimize/prior.hpp>
 #include <orbis/optimize/ransac.hpp>
 #include <orbis/optimize/ransac_policies.hpp>
 #include <orbis/optimize/reprojection.hpp>
 #include <orbis/optimize/reprojection_with_intrinsics.hpp>
-#include <orbis/optimize/residual.hpp>
 #include <orbis/optimize/robust_loss.hpp>
+#include <orbis/optimize/solver_policies.hpp>
 #include <orbis/optimize/triangulation.hpp>
+#include <orbis/optimize/two_view.hpp>

@@ -17,7 +17,7 @@
 
 namespace orbis::test {
 
-using places = std::vector<optimize::block_place>;
+using places = std::vector<optimize::detail::block_place>;
 
 /// The edges of a `width` x `height` grid, either way round.
 inline places grid_places(std::uint32_t width, std::uint32_t height) {
@@ -54,7 +54,7 @@ struct block_matrix {
       for (int i = 0; i != B * B; ++i) m(i / B, i % B) = random.normal();
       return m;
     };
-    for (const optimize::block_place& p : at) {
+    for (const optimize::detail::block_place& p : at) {
       const matrix<B, B> a = draw(), b = draw();
       diagonal[p.row] += a.transpose() * a;
       diagonal[p.column] += b.transpose() * b;

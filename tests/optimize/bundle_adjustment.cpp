@@ -5,8 +5,8 @@
 
 #include <orbis/io/bal.hpp>
 #include <orbis/io/synthetic/bundle.hpp>
-#include <orbis/optimize/bal_reprojection.hpp>
 #include <orbis/optimize/bundle_adjustment.hpp>
+#include <orbis/optimize/reprojection_with_intrinsics.hpp>
 
 #include "bundle_instances.hpp"
 #include "bundles.hpp"
@@ -143,8 +143,7 @@ TEST_CASE("Every damping policy and every reduced solver ends at the same cost")
     costs.push_back(summary.final_cost);
   };
   with(optimize::levenberg_marquardt{}, optimize::automatic_reduced_solver{});
-  with(optimize::levenberg_marquardt{.initial = 1e-7, .metric = optimize::step_metric::identity},
-       optimize::dense_reduced_solver{});
+  with(optimize::levenberg_marquardt{.initial = 1e-7}, optimize::dense_reduced_solver{});
   with(optimize::dogleg{}, optimize::sparse_reduced_solver{});
   with(optimize::gauss_newton{}, optimize::iterative_reduced_solver{});
   for (const double cost : costs) CHECK(cost == Approx(costs.front()).epsilon(1e-7));
@@ -364,9 +363,9 @@ TEST_CASE("An observer sees every step, and a callback can stop them") {
   optimize::bundle_adjuster ba{model, optimize::huber{2.45}};
   std::vector<bundle_summary> seen;
   const auto two = [](std::size_t done, std::size_t) { return done < 2; };
-  const auto summary = ba.solve(
-      seq, std::span<se3>(p.poses), std::span<vec3>(p.points), std::span<const bundle_observation>(p.observations),
-      {.fixed_poses = p.fixed}, two, [&](const bundle_summary& s) { seen.push_back(s); });
+  const auto summary = ba.solve(seq, std::span<se3>(p.poses), std::span<vec3>(p.points),
+                                std::span<const bundle_observation>(p.observations), {.fixed_poses = p.fixed}, two,
+                                [&](const bundle_summary& s) { seen.push_back(s); });
   CHECK(summary.status == bundle_status::cancelled);
   CHECK(summary.iterations == 2);
   REQUIRE(seen.size() == 3);

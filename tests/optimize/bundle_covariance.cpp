@@ -11,17 +11,17 @@
 
 #include <orbis/camera/pinhole.hpp>
 #include <orbis/io/synthetic/bundle.hpp>
-#include <orbis/optimize/bal_reprojection.hpp>
 #include <orbis/optimize/bundle_adjustment.hpp>
 #include <orbis/optimize/bundle_covariance.hpp>
+#include <orbis/optimize/reprojection_with_intrinsics.hpp>
 
 #include "bundle_instances.hpp"
 #include "support.hpp"
 #include "support/catch.hpp"
 
 using namespace orbis;
+using optimize::bundle_gauge;
 using optimize::bundle_observation;
-using optimize::covariance_gauge;
 using optimize::covariance_options;
 using optimize::covariance_status;
 
@@ -116,26 +116,21 @@ double difference(const Block& block, const Eigen::MatrixXd& whole, Eigen::Index
   return worst;
 }
 
-/// All blocks of cameras and points, and some pairs, are those of `expected`.
+/// All blocks of cameras and points are those of `expected`.
 template <class R, class Loss = optimize::trivial>
-void compare(const problem<R>& p, covariance_gauge gauge, const Eigen::MatrixXd& expected, int free_directions,
-             double tolerance = 1e-8, const Loss& loss = {}) {
+void compare(const problem<R>& p, const Eigen::MatrixXd& expected, const Loss& loss = {},
+             bundle_gauge hold = bundle_gauge::damped) {
   constexpr int c = R::camera_manifold::dimension;
-  std::vector<std::pair<std::uint32_t, std::uint32_t>> pairs;
-  for (std::uint32_t i = 0; i != p.cameras.size(); ++i) pairs.emplace_back(i, (3 * i + 1) % p.cameras.size());
-  covariance_options options{
-      .gauge = gauge, .fixed_poses = p.fixed_poses, .fixed_points = p.fixed_points, .pairs = pairs};
+  constexpr double tolerance = 1e-8;
+  const covariance_options options{.fixed_poses = p.fixed_poses, .fixed_points = p.fixed_points, .hold = hold};
   const auto got = optimize::covariance_of(seq, p.residual, std::span{p.cameras}, std::span{p.points},
                                            std::span{p.observations}, options, loss);
   REQUIRE(got.status == covariance_status::done);
-  CHECK(got.free_directions == free_directions);
   REQUIRE(got.cameras.size() == p.cameras.size());
   REQUIRE(got.points.size() == p.points.size());
   const auto at_camera = [](std::size_t i) { return static_cast<Eigen::Index>(c * i); };
   for (std::size_t i = 0; i != p.cameras.size(); ++i)
     CHECK(difference(got.cameras[i], expected, at_camera(i), at_camera(i)) < tolerance);
-  for (std::size_t k = 0; k != pairs.size(); ++k)
-    CHECK(difference(got.pairs[k], expected, at_camera(pairs[k].first), at_camera(pairs[k].second)) < tolerance);
   for (std::size_t j = 0; j != p.points.size(); ++j) {
     const auto at = static_cast<Eigen::Index>(c * p.cameras.size() + 3 * j);
     CHECK(difference(got.points[j], expected, at, at) < tolerance);
@@ -147,59 +142,6 @@ Eigen::MatrixXd inverse_of(const problem<R>& p, const Loss& loss = {}) {
   const Eigen::MatrixXd h = normal_matrix(p, loss);
   const auto rows = moving_rows(p);
   return with_zeros(h(rows, rows).inverse(), rows, h.rows());
-}
-
-se3 moved(const se3& T_world_camera, const se3& by, double scale) {
-  return by * se3{T_world_camera.rotation(), scale * T_world_camera.translation()};
-}
-optimize::bal_camera moved(const optimize::bal_camera& c, const se3& by, double scale) {
-  optimize::bal_camera to = c;
-  to.T_camera_world = moved(c.T_camera_world.inverse(), by, scale).inverse();
-  return to;
-}
-
-/// How everything changes when the whole is shifted, turned and scaled, by differences.
-template <class R>
-Eigen::MatrixXd directions_of_the_whole(const problem<R>& p) {
-  constexpr int c = R::camera_manifold::dimension;
-  const typename R::camera_manifold manifold{};
-  Eigen::MatrixXd g(static_cast<Eigen::Index>(c * p.cameras.size() + 3 * p.points.size()), 7);
-  const double h = 1e-4;
-  for (int k = 0; k != 7; ++k)
-    for (const double sign : {-1.0, 1.0}) {
-      const se3 by = k == 6 ? se3{} : se3::exp(vec6(sign * h * vec6::Unit(k)));
-      const double scale = k == 6 ? 1.0 + sign * h : 1.0;
-      Eigen::VectorXd change(g.rows());
-      for (std::size_t i = 0; i != p.cameras.size(); ++i)
-        change.segment<c>(static_cast<Eigen::Index>(c * i)) =
-            manifold.local(p.cameras[i], moved(p.cameras[i], by, scale));
-      for (std::size_t j = 0; j != p.points.size(); ++j)
-        change.segment<3>(static_cast<Eigen::Index>(c * p.cameras.size() + 3 * j)) =
-            by * vec3(scale * p.points[j]) - p.points[j];
-      if (sign < 0.0)
-        g.col(k) = -change / (2.0 * h);
-      else
-        g.col(k) += change / (2.0 * h);
-    }
-  return g;
-}
-
-/// The inverse where the free directions, columns of `g`, are held: the block of the inverse of the
-/// bordered matrix.
-Eigen::MatrixXd bordered_inverse(const Eigen::MatrixXd& h, const Eigen::MatrixXd& g) {
-  const Eigen::VectorXd scale = h.diagonal().cwiseSqrt().cwiseInverse();
-  Eigen::MatrixXd constraints = scale.asDiagonal() * g;
-  for (Eigen::Index k = 0; k != constraints.cols(); ++k) constraints.col(k).normalize();
-  const auto n = h.rows(), free = g.cols();
-  Eigen::MatrixXd bordered = Eigen::MatrixXd::Zero(n + free, n + free);
-  bordered.topLeftCorner(n, n) = scale.asDiagonal() * h * scale.asDiagonal();
-  bordered.topRightCorner(n, free) = constraints;
-  bordered.bottomLeftCorner(free, n) = constraints.transpose();
-  return scale.asDiagonal() * Eigen::MatrixXd(bordered.inverse()).topLeftCorner(n, n) * scale.asDiagonal();
-}
-template <class R>
-Eigen::MatrixXd pseudo_inverse_of(const problem<R>& p, int free) {
-  return bordered_inverse(normal_matrix(p, optimize::trivial{}), directions_of_the_whole(p).leftCols(free));
 }
 
 template <class R>
@@ -214,87 +156,40 @@ auto covariance(const problem<R>& p, covariance_options options) {
 
 TEST_CASE("Covariances are the blocks of the dense inverse") {
   const auto with_depth = local_map(0.6, 2);
-  compare(with_depth, covariance_gauge::as_given, inverse_of(with_depth), 0);
+  compare(with_depth, inverse_of(with_depth));
   const auto without = local_map(0.0, 2);
-  compare(without, covariance_gauge::as_given, inverse_of(without), 0);
-  // Where nothing is free, the gauge makes no difference.
-  compare(with_depth, covariance_gauge::inner, inverse_of(with_depth), 0);
+  compare(without, inverse_of(without));
 
   auto robust = local_map(0.6, 2, 0.1);
-  compare(robust, covariance_gauge::as_given, inverse_of(robust, optimize::huber{2.0}), 0, 1e-8, optimize::huber{2.0});
+  compare(robust, inverse_of(robust, optimize::huber{2.0}), optimize::huber{2.0});
 
   // Known points hold the whole as well, and a camera may see a point twice.
   auto known = local_map(0.5, 0);
   for (std::size_t j = 0; j < known.points.size(); j += 3) known.fixed_points[j] = 1;
   known.observations.push_back(known.observations.front());
   known.observations.back().pixel.x() += 0.3;
-  compare(known, covariance_gauge::as_given, inverse_of(known), 0);
+  compare(known, inverse_of(known));
 
   auto nine = photographs();
   nine.fixed_poses[0] = nine.fixed_poses[4] = 1;
-  compare(nine, covariance_gauge::as_given, inverse_of(nine), 0);
+  compare(nine, inverse_of(nine));
 }
 
-TEST_CASE("What is free of the whole is counted, and settled by the gauge asked for") {
-  // With depth: six directions.
+TEST_CASE("Where nothing holds the whole there are no covariances, unless the first camera does") {
   auto p = local_map(1.0, 0);
-  auto free = covariance(p, {});
-  CHECK(free.status == covariance_status::gauge_free);
-  CHECK(free.free_directions == 6);
+  const auto free = covariance(p, {});
+  CHECK(free.status == covariance_status::undetermined_camera);
   CHECK(free.cameras.empty());
-  compare(p, covariance_gauge::inner, pseudo_inverse_of(p, 6), 6);
-  // The first camera holds them: as if it were known.
   auto held = p;
   held.fixed_poses[0] = 1;
-  compare(p, covariance_gauge::first_camera, inverse_of(held), 6);
+  compare(p, inverse_of(held), optimize::trivial{}, bundle_gauge::first_camera);
+  CHECK(covariance(p, {.hold = bundle_gauge::first_camera}).cameras[0].isZero(0.0));
 
-  // Without: the scale too.
+  // Without depth one camera leaves the scale free.
   p = local_map(0.0, 0);
-  CHECK(covariance(p, {}).free_directions == 7);
-  compare(p, covariance_gauge::inner, pseudo_inverse_of(p, 7), 7);
-  const auto scaled = covariance(p, {.gauge = covariance_gauge::first_camera});
-  REQUIRE(scaled.status == covariance_status::done);
-  CHECK(scaled.cameras[0].norm() < 1e-12);
-  const vec3 away = (p.cameras.back().translation() - p.cameras[0].translation()).normalized();
-  const vec3 seen = p.cameras.back().rotation().inverse() * away;
-  const mat3 last = scaled.cameras.back().topLeftCorner<3, 3>();
-  CHECK(seen.dot(last * seen) < 1e-9 * last.trace());  // its distance is the unit
-  CHECK(last.trace() > 0.0);
-
-  // One known camera leaves the scale alone.
-  p.fixed_poses[0] = 1;
-  CHECK(covariance(p, {}).status == covariance_status::gauge_free);
-  CHECK(covariance(p, {}).free_directions == 1);
-  {
-    // It scales about that camera: the direction among the seven that leaves it where it is.
-    const Eigen::MatrixXd all = directions_of_the_whole(p);
-    matrix<7> about = matrix<7>::Unit(6);
-    about.head<3>() = -p.cameras[0].translation();
-    const auto rows = moving_rows(p);
-    const Eigen::MatrixXd direction = all * about, h = normal_matrix(p, optimize::trivial{});
-    CHECK(direction.topRows(6).norm() < 1e-7);
-    compare(p, covariance_gauge::inner, with_zeros(bordered_inverse(h(rows, rows), direction(rows, 0)), rows, h.rows()),
-            1);
-  }
-  CHECK(covariance(p, {.gauge = covariance_gauge::first_camera}).status == covariance_status::done);
-
-  // Cameras with intrinsics of their own.
-  const auto nine = photographs();
-  CHECK(covariance(nine, {}).free_directions == 7);
-  compare(nine, covariance_gauge::inner, pseudo_inverse_of(nine, 7), 7);
-  // No gauge has a smaller trace.
-  const auto inner = covariance(p, {.gauge = covariance_gauge::inner});
-  const auto first = covariance(p, {.gauge = covariance_gauge::first_camera});
-  double inner_trace = 0.0, first_trace = 0.0;
-  for (std::size_t i = 0; i != p.cameras.size(); ++i) {
-    inner_trace += inner.cameras[i].trace();
-    first_trace += first.cameras[i].trace();
-  }
-  for (std::size_t j = 0; j != p.points.size(); ++j) {
-    inner_trace += inner.points[j].trace();
-    first_trace += first.points[j].trace();
-  }
-  CHECK(inner_trace < first_trace);
+  CHECK(covariance(p, {}).status == covariance_status::undetermined_camera);
+  CHECK(covariance(p, {.hold = bundle_gauge::first_camera}).status == covariance_status::undetermined_camera);
+  CHECK(covariance(photographs(), {}).status == covariance_status::undetermined_camera);
 }
 
 TEST_CASE("What observations do not determine has no covariance, or is named") {
@@ -349,24 +244,20 @@ TEST_CASE("What observations do not determine has no covariance, or is named") {
   REQUIRE(got.status == covariance_status::done);
   CHECK(std::isnan(got.points[11](0, 0)));
   CHECK(got.cameras[4].allFinite());
-  for (const auto gauge : {covariance_gauge::inner, covariance_gauge::first_camera}) {
-    auto lost = p;
-    std::fill(lost.fixed_poses.begin(), lost.fixed_poses.end(), std::uint8_t{0});
-    auto without = lost;
-    std::erase_if(without.observations, [](const auto& o) { return o.pose == 5; });
-    lost.cameras[5] = se3(so3(), vec3(std::numeric_limits<double>::quiet_NaN(), 0, 0));
-    got = covariance(lost, {.gauge = gauge});
-    const auto expected_of_rest = covariance(without, {.gauge = gauge});
-    REQUIRE(got.status == covariance_status::done);
-    CHECK(got.free_directions == 7);
-    CHECK(std::isnan(got.cameras[5](0, 0)));
-    CHECK((got.cameras[4] - expected_of_rest.cameras[4]).norm() <= 1e-6 * expected_of_rest.cameras[4].norm());
-  }
+  auto lost = p;
+  lost.cameras[5] = se3(so3(), vec3(std::numeric_limits<double>::quiet_NaN(), 0, 0));
+  auto blind = p;
+  std::erase_if(blind.observations, [](const auto& o) { return o.pose == 5; });
+  got = covariance(lost, {});
+  const auto expected_of_rest = covariance(blind, {});
+  REQUIRE(got.status == covariance_status::done);
+  CHECK(std::isnan(got.cameras[5](0, 0)));
+  CHECK((got.cameras[4] - expected_of_rest.cameras[4]).norm() <= 1e-6 * expected_of_rest.cameras[4].norm());
 }
 
 TEST_CASE("Covariances have the same bits with any number of threads") {
   const auto p = local_map(0.4, 0);
-  const covariance_options options{.gauge = covariance_gauge::inner};
+  const covariance_options options{.hold = bundle_gauge::first_camera};
   const auto one = optimize::covariance_of(seq, p.residual, std::span{p.cameras}, std::span{p.points},
                                            std::span{p.observations}, options);
   const auto three = optimize::covariance_of(par.with(3), p.residual, std::span{p.cameras}, std::span{p.points},

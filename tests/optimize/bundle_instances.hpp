@@ -7,10 +7,10 @@
 
 #include <orbis/camera/pinhole.hpp>
 #include <orbis/core/simd.hpp>
-#include <orbis/optimize/bal_reprojection.hpp>
 #include <orbis/optimize/detail/bundle/bundle_kernels.hpp>
 #include <orbis/optimize/detail/bundle/schur_kernels.hpp>
 #include <orbis/optimize/reprojection.hpp>
+#include <orbis/optimize/reprojection_with_intrinsics.hpp>
 #include <orbis/optimize/robust_loss.hpp>
 
 #ifndef ORBIS_TEST_INSTANCES

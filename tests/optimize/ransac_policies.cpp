@@ -107,7 +107,6 @@ TEST_CASE("Every way to score is between zero and the threshold, and there for o
   };
   check(msac{});
   check(inlier_count{});
-  check(biweight_score{});
 }
 
 TEMPLATE_TEST_CASE("RANSAC finds the line by whatever it is made of", "", line_estimator, line_by_blocks) {
@@ -117,11 +116,8 @@ TEMPLATE_TEST_CASE("RANSAC finds the line by whatever it is made of", "", line_e
     const auto exact = ransac(data, options);
     CHECK(is_the_line(exact));
     CHECK(is_the_line(ransac(data, options, ransac_policies<inlier_count>{})));
-    CHECK(is_the_line(ransac(data, options, ransac_policies<biweight_score>{})));
     CHECK(is_the_line(
         ransac(data, options, ransac_policies{msac{}, uniform_sampling{}, bail_out{}, no_local_optimization{}})));
-    const auto inner = ransac(data, options, ransac_policies{msac{}, uniform_sampling{}, bail_out{}, inner_sampling{}});
-    CHECK(is_the_line(inner));
     const auto tested =
         ransac(data, options, ransac_policies{msac{}, uniform_sampling{}, sprt{}, iterated_refinement{}});
     CHECK(is_the_line(tested));

@@ -8,11 +8,12 @@
 #include <vector>
 
 #include <orbis/core/execution.hpp>
+#include <orbis/optimize/automatic_residual.hpp>
 #include <orbis/optimize/bundle_adjustment.hpp>
-#include <orbis/optimize/dual.hpp>
 #include <orbis/optimize/reprojection_with_intrinsics.hpp>
 #include <orbis/optimize/robust_loss.hpp>
 
+#include "residual_checks.hpp"
 #include "support.hpp"
 #include "support/catch.hpp"
 
@@ -107,7 +108,11 @@ void check_jacobians(const Camera& truth) {
 
     matrix<size> d;
     for (int i = 0; i != size; ++i) d[i] = 0.01 * random.normal();
-    CHECK((manifold::local(state, manifold::retract(state, d)) - d).norm() < 1e-9);
+    const auto there = manifold::retract(state, d);
+    CHECK(((state.T_world_camera.inverse() * there.T_world_camera).log() - d.template head<6>()).norm() < 1e-9);
+    const auto from = parameters_of<Camera>::get(state.camera), to = parameters_of<Camera>::get(there.camera);
+    for (std::size_t i = 0; i != manifold::free.size(); ++i)
+      CHECK(std::abs(to[manifold::free[i]] - from[manifold::free[i]] - d[6 + static_cast<int>(i)]) < 1e-9);
   }
 }
 
@@ -224,4 +229,32 @@ TEST_CASE("Bundle adjustment recovers the intrinsics of every camera along with 
     }
   }
   for (int i = 0; i != 6; ++i) CHECK(after[i] < 0.5 * before[i]);
+}
+
+TEST_CASE("BAL residuals have the derivatives they claim and follow the format's formula") {
+  random_bits random(12);
+  const optimize::bal_reprojection model;
+  for (int trial = 0; trial != 50; ++trial) {
+    std::array<double, 9> p{};
+    for (std::size_t i = 0; i != 3; ++i) p[i] = random.uniform(-1.5, 1.5), p[3 + i] = random.uniform(-2, 2);
+    p[6] = random.uniform(300, 1000);
+    p[7] = random.uniform(-0.1, 0.1);
+    p[8] = random.uniform(-0.02, 0.02);
+    const auto state = optimize::bal_camera::from_parameters(p);
+    for (std::size_t i = 0; i != 9; ++i) CHECK(state.parameters()[i] == Approx(p[i]).epsilon(1e-12).margin(1e-12));
+    vec3 q = test::random_point_in_view(random);
+    if (trial % 4 != 0) q = -q;  // in front of this camera; the format does not ask
+    const vec3 point = state.T_camera_world.inverse() * q;
+    const optimize::bundle_observation o{.pixel = vec2(random.uniform(-300, 300), random.uniform(-300, 300))};
+    test::check_jacobians(model, state, point, o);
+    const double s = (q.x() * q.x() + q.y() * q.y()) / (q.z() * q.z());
+    const vec2 expected = -p[6] * (1.0 + p[7] * s + p[8] * s * s) * q.head<2>() / q.z();
+    CHECK((*model.residual(model.prepare(state), point, o) + o.pixel - expected).norm() < 1e-9 * (1 + expected.norm()));
+    const matrix<9> d = 0.1 * matrix<9>::Random();
+    const auto there = optimize::bal_manifold::retract(state, d);
+    CHECK(((there.T_camera_world * state.T_camera_world.inverse()).log() + d.head<6>()).norm() < 1e-9);
+    CHECK((vec3(there.focal - state.focal, there.k1 - state.k1, there.k2 - state.k2) - d.tail<3>()).norm() < 1e-9);
+  }
+  const optimize::bal_camera straight;
+  CHECK_FALSE(model.residual(model.prepare(straight), vec3(1, 1, 0), {}));
 }

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <cmath>
+
 #include <orbis/optimize/robust_loss.hpp>
 
 #include "support/catch.hpp"
@@ -31,7 +33,6 @@ TEST_CASE("The weight of every loss is the slope of its cost and never grows") {
   check_loss(orbis::optimize::cauchy{1.5});
   check_loss(orbis::optimize::tukey{4.0});
   check_loss(orbis::optimize::geman_mcclure{3.0});
-  check_loss(orbis::optimize::truncated{2.0});
 }
 
 TEST_CASE("Widths of losses are in unsquared units") {
@@ -46,7 +47,13 @@ TEST_CASE("Widths of losses are in unsquared units") {
   CHECK(orbis::optimize::cauchy{2.0}.weight(4.0) == Approx(0.5));
   CHECK(orbis::optimize::geman_mcclure{3.0}.cost(9.0) == Approx(4.5));
   CHECK(orbis::optimize::geman_mcclure{3.0}.cost(1e12) == Approx(9.0));
-  CHECK(orbis::optimize::truncated{3.0}.weight(8.99) == 1.0);
-  CHECK(orbis::optimize::truncated{3.0}.weight(9.01) == 0.0);
-  CHECK(orbis::optimize::truncated{3.0}.cost(1e300) == Approx(9.0));
+}
+
+TEST_CASE("Gates are the quantiles of 95 percent of chi-squared") {
+  // Of one degree of freedom the distribution is that of a squared normal, of two it is 1 - exp(-x / 2).
+  CHECK(std::erf(std::sqrt(0.5 * orbis::optimize::chi_squared_gate(1))) == Approx(0.95).margin(1e-4));
+  CHECK(1.0 - std::exp(-0.5 * orbis::optimize::chi_squared_gate(2)) == Approx(0.95).margin(1e-4));
+  const double x = orbis::optimize::chi_squared_gate(3);
+  const double three = std::erf(std::sqrt(0.5 * x)) - std::sqrt(2.0 * x / std::acos(-1.0)) * std::exp(-0.5 * x);
+  CHECK(three == Approx(0.95).margin(1e-4));
 }

@@ -1,17 +1,104 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The residuals of the component written once more, straight from their definitions, for any type of
-/// number: what analytic Jacobians are held against.
+/// The residuals of the component, written again from their definitions for any number type, and their derivatives by
+/// dual numbers: the reference for analytic Jacobians.
 #pragma once
 
 #include <cmath>
+#include <concepts>
+#include <cstddef>
+#include <optional>
+#include <tuple>
+#include <utility>
 
 #include <orbis/camera/kannala_brandt.hpp>
 #include <orbis/camera/pinhole.hpp>
 #include <orbis/camera/radial_tangential.hpp>
-#include <orbis/optimize/automatic.hpp>
+#include <orbis/core/se3.hpp>
+#include <orbis/core/sim3.hpp>
+#include <orbis/core/so3.hpp>
+#include <orbis/optimize/automatic_residual.hpp>
 
 namespace orbis::test {
+
+/// A similarity transform with entries of any number type.
+template <class S>
+struct similarity {
+  matrix<3, 3, S> rotation;
+  matrix<3, 1, S> translation;
+  S scale = S(1);
+
+  [[nodiscard]] friend matrix<3, 1, S> operator*(const similarity& t, const matrix<3, 1, S>& p) {
+    return t.scale * (t.rotation * p) + t.translation;
+  }
+  [[nodiscard]] friend similarity operator*(const similarity& a, const similarity& b) {
+    return {a.rotation * b.rotation, a * b.translation, a.scale * b.scale};
+  }
+  [[nodiscard]] similarity inverse() const {
+    const matrix<3, 3, S> back = rotation.transpose();
+    const S shrink = S(1) / scale;
+    return {back, -(shrink * (back * translation)), shrink};
+  }
+};
+
+}  // namespace orbis::test
+
+/// A rotation matrix.
+template <>
+struct orbis::optimize::lift<orbis::optimize::lie_group<orbis::so3>> {
+  template <class S>
+  static matrix<3, 3, S> at(const lie_group<so3>&, const so3& p, const matrix<3, 1, S>& d) {
+    return p.rotation_matrix().cast<S>() * (matrix<3, 3, S>::Identity() + hat<S>(d));
+  }
+};
+/// A `similarity`.
+template <>
+struct orbis::optimize::lift<orbis::optimize::lie_group<orbis::sim3>> {
+  template <class S>
+  static test::similarity<S> at(const lie_group<sim3>&, const sim3& p, const matrix<7, 1, S>& d) {
+    const matrix<3, 1, S> rho = d.template head<3>(), phi = d.template segment<3>(3);
+    const S scale(p.scale());
+    const matrix<3, 3, S> rotation = p.rotation_matrix().cast<S>();
+    return {rotation * (matrix<3, 3, S>::Identity() + hat<S>(phi)),
+            p.translation().template cast<S>() + scale * (rotation * rho), scale * (S(1) + d[6])};
+  }
+};
+
+namespace orbis::test {
+
+/// A residual of several points on manifolds: `linearize(points..., jacobians...)` by one evaluation on dual numbers.
+template <class F, class... M>
+struct automatic {
+  F f;
+
+  automatic(F function, M...) : f{std::move(function)} {}
+
+  template <class... J>
+  auto linearize(const typename M::point&... p, J&... jacobians) const {
+    constexpr int n = (0 + ... + M::dimension);
+    int next = 0;
+    const auto r = std::apply(f, std::tuple{seeded<n, M>(p, next)...});
+    constexpr int rows = decltype(r)::RowsAtCompileTime;
+    matrix<rows> values;
+    matrix<rows, n> all;
+    for (int i = 0; i != rows; ++i) {
+      values[i] = r[i].value;
+      all.row(i) = r[i].slope.transpose();
+    }
+    int first = 0;
+    ((jacobians = all.template middleCols<J::ColsAtCompileTime>(first), first += J::ColsAtCompileTime), ...);
+    return std::optional<matrix<rows>>{values};
+  }
+
+ private:
+  /// The point `p` whose step has the variables `first`, `first + 1`, ...
+  template <int N, class Manifold>
+  static auto seeded(const typename Manifold::point& p, int& first) {
+    matrix<Manifold::dimension, 1, optimize::dual<N>> d;
+    for (int i = 0; i != Manifold::dimension; ++i) d[i] = optimize::dual<N>::variable(0.0, first++);
+    return optimize::lift<Manifold>::template at<optimize::dual<N>>(Manifold{}, p, d);
+  }
+};
 
 template <class S>
 matrix<2, 1, S> project(const camera::pinhole& c, const matrix<3, 1, S>& p) {
@@ -78,7 +165,7 @@ matrix<6, 1, S> logarithm(const optimize::rigid<S>& t) {
   return xi;
 }
 template <class S>
-matrix<7, 1, S> logarithm(const optimize::similarity<S>& t) {
+matrix<7, 1, S> logarithm(const similarity<S>& t) {
   using std::log;
   const matrix<3, 1, S> phi = logarithm<S>(t.rotation);
   const S sigma = log(t.scale);

@@ -8,7 +8,7 @@
 #include <orbis/camera/any.hpp>
 #include <orbis/io/recording.hpp>
 #include <orbis/io/synthetic.hpp>
-#include <orbis/optimize/absolute_orientation.hpp>
+#include <orbis/optimize/alignment.hpp>
 #include <orbis/slam/validate.hpp>
 
 #include "slam/tested_system.hpp"

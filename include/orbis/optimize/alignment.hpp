@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The rigid or similarity transform between two lists of points, many pairs of which may be wrong: two views of the
-/// same landmarks at a loop, say.
+/// The rigid or similarity transform between two lists of points: in closed form, or robustly where many pairs may be
+/// wrong.
+///
+/// Sources: B. K. P. Horn, "Closed-form solution of absolute orientation using unit quaternions", JOSA A 4 (1987);
+/// S. Umeyama, PAMI 13 (1991) for the scale.
 #pragma once
 
-#include <algorithm>
-#include <array>
 #include <cmath>
 #include <concepts>
 #include <cstddef>
 #include <cstdint>
 #include <iterator>
-#include <optional>
 #include <ranges>
 #include <span>
 #include <string>
@@ -25,23 +25,41 @@
 #include <orbis/core/result.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/core/sim3.hpp>
-#include <orbis/optimize/absolute_orientation.hpp>
-#include <orbis/optimize/detail/sparse/wide.hpp>
+#include <orbis/core/types.hpp>
+#include <orbis/optimize/detail/minimal/alignment_estimator.hpp>
+#include <orbis/optimize/detail/minimal/horn.hpp>
 #include <orbis/optimize/ransac.hpp>
 
 namespace orbis::optimize {
 
+/// Absolute orientation: the `T_to_from` that minimises the sum of `|T_to_from * from[i] - to[i]|^2`, in closed form.
+/// Every pair counts; see `estimate_alignment` for pairs that may be wrong. O(n).
+/// Errors: `invalid_argument` for lists of different length; `no_data` below three pairs; `degenerate` for collinear,
+/// coincident or non-finite points.
+template <point_range From, point_range To>
+[[nodiscard]] result<se3> absolute_orientation(const From& from, const To& to) {
+  const auto s = detail::align(from, to, false);
+  if (!s) return fail(s.error());
+  return se3(s->rotation(), s->translation());
+}
+
+/// Absolute orientation with a free scale: minimises the sum of `|s R from[i] + t - to[i]|^2`. O(n). Errors as above.
+template <point_range From, point_range To>
+[[nodiscard]] result<sim3> absolute_orientation_with_scale(const From& from, const To& to) {
+  return detail::align(from, to, true);
+}
+
 struct alignment_options {
-  /// Largest distance of an inlier between where it is and where the transform takes its partner: metres, or in units
-  /// of `deviations` where those are given.
+  /// Largest distance between the transformed point and its partner for an inlier: metres, or units of `deviations`
+  /// where those are given.
   double threshold = 0.05;
   double confidence = 0.9999;
   std::size_t min_iterations = 10;
   std::size_t max_iterations = 10000;
   std::size_t min_inliers = 6;  ///< fewer than this is a failure
   std::uint64_t seed = 1;
-  /// Of the distance of each pair, metres: that of a depth camera grows with the square of the depth. Weighs the pairs
-  /// as well. Empty: all pairs alike.
+  /// Standard deviation of the distance of each pair, metres; for a depth camera it grows with the square of the depth.
+  /// Pairs weigh by 1 / deviation^2. Empty: all pairs are equal.
   std::span<const double> deviations = {};
 };
 
@@ -53,115 +71,11 @@ struct alignment_estimate {
   std::size_t iterations = 0;
 };
 
-namespace detail {
-
-/// Pairs of points as `ransac` wants them, about their centres and in random order.
-template <class Transform>
-class alignment_estimator {
- public:
-  struct model {
-    Transform transform;           ///< between the centred points
-    std::array<float, 12> rows{};  ///< the same
-  };
-  static constexpr std::size_t sample_size = 3;
-  static constexpr bool with_scale = std::same_as<Transform, sim3>;
-
-  struct pair {
-    vec3 from, to;
-    double weight;  ///< 1 / deviation^2
-    std::uint32_t original;
-  };
-
-  explicit alignment_estimator(std::vector<pair> pairs) : pairs_{std::move(pairs)} {
-    stride_ = (pairs_.size() + consensus_block - 1) / consensus_block * consensus_block;
-    columns_.assign(7 * stride_, 0.0F);
-    for (std::size_t i = 0; i != pairs_.size(); ++i) {
-      for (std::size_t k = 0; k != 3; ++k) {
-        columns_[k * stride_ + i] = static_cast<float>(pairs_[i].from[static_cast<Eigen::Index>(k)]);
-        columns_[(3 + k) * stride_ + i] = static_cast<float>(pairs_[i].to[static_cast<Eigen::Index>(k)]);
-      }
-      columns_[6 * stride_ + i] = static_cast<float>(pairs_[i].weight);
-    }
-  }
-
-  [[nodiscard]] std::size_t size() const noexcept { return pairs_.size(); }
-  [[nodiscard]] const pair& operator[](std::size_t i) const noexcept { return pairs_[i]; }
-
-  [[nodiscard]] std::optional<model> fit_to(std::span<const std::uint32_t> indices) const {
-    const auto found = align_pairs(
-        indices.size(),
-        [&](std::size_t i, double* a, double* b) {
-          const pair& p = pairs_[indices[i]];
-          std::copy_n(p.from.data(), 3, a);
-          std::copy_n(p.to.data(), 3, b);
-          return p.weight;
-        },
-        with_scale);
-    if (!found || !(found->scale() > 0.0)) return std::nullopt;
-    if constexpr (with_scale)
-      return made_of(*found);
-    else
-      return made_of(se3(found->rotation(), found->translation()));
-  }
-  struct candidates {
-    std::optional<model> found;
-    [[nodiscard]] const model* begin() const noexcept { return found ? &*found : nullptr; }
-    [[nodiscard]] const model* end() const noexcept { return found ? &*found + 1 : nullptr; }
-  };
-  [[nodiscard]] candidates fit(const std::array<std::uint32_t, 3>& sample) const { return {fit_to(sample)}; }
-  [[nodiscard]] std::optional<model> refine(const model&, std::span<const std::uint32_t> inliers) const {
-    return fit_to(inliers);
-  }
-
-  [[nodiscard]] double squared_error(const model& m, std::size_t i) const {
-    return pairs_[i].weight * (m.transform * pairs_[i].from - pairs_[i].to).squaredNorm();
-  }
-  void squared_errors(const model& m, std::size_t first, std::span<float, consensus_block> out) const {
-    using namespace wide;
-    using V = numbers<float, 4>;
-    for (std::size_t i = 0; i != consensus_block; i += 4) {
-      const float* const at = columns_.data() + first + i;
-      V from[3], sum{}, weight;
-      unrolled<3>([&](auto k) { load(from[k], at + k * stride_); });
-      unrolled<3>([&](auto k) {
-        V d, r;
-        fill(d, m.rows[4 * k + 3]);
-        unrolled<3>([&](auto j) {
-          fill(r, m.rows[4 * k + j]);
-          add_product(d, r, from[j]);
-        });
-        load(r, at + (3 + k) * stride_);
-        d -= r;
-        add_product(sum, d, d);
-      });
-      load(weight, at + 6 * stride_);
-      multiply(sum, sum, weight);
-      store(out.data() + i, sum);
-    }
-  }
-
- private:
-  [[nodiscard]] static model made_of(const Transform& t) {
-    const auto matrix = t.to_matrix();
-    model m{t, {}};
-    for (int row = 0; row != 3; ++row)
-      for (int column = 0; column != 4; ++column)
-        m.rows[static_cast<std::size_t>(4 * row + column)] = static_cast<float>(matrix(row, column));
-    return m;
-  }
-
-  std::vector<pair> pairs_;
-  std::vector<float> columns_;  ///< from, to, weight
-  std::size_t stride_ = 0;
-};
-
-}  // namespace detail
-
-/// The `Transform` (`se3` or `sim3`) with the most pairs `Transform * from[i]` near `to[i]`. Pairs that are not finite,
-/// and those whose deviation is 0 or not finite, are outliers. Deterministic by `options.seed`.
-/// Errors: `invalid_argument` for lists of different length or options out of range, `no_data` below three pairs,
-/// `degenerate` where all points lie on a line or in one place, or no transform has `min_inliers` inliers; the message
-/// says which.
+/// The transform `T_to_from` (`se3` or `sim3`) that takes most of `from[i]` near `to[i]`: three pairs in RANSAC, each
+/// new best transform refined on its inliers. Pairs that are not finite, and those with a deviation of 0 or one that is
+/// not finite, are outliers. Deterministic by `options.seed`. Errors: `invalid_argument` for lists of different length
+/// or options out of range; `no_data` below three pairs; `degenerate` if all points lie on a line or in one place, or
+/// no transform has `min_inliers` inliers. The message says which.
 template <class Transform = se3, point_range From, point_range To>
 requires(std::same_as<Transform, se3> || std::same_as<Transform, sim3>)
     [[nodiscard]] result<alignment_estimate<Transform>> estimate_alignment(const From& from, const To& to,

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Bundle adjustment: cameras and points that together explain all observations best.
+/// Bundle adjustment: the cameras and points that together best explain all observations.
 ///
 /// Source: B. Triggs, P. McLauchlan, R. Hartley, A. Fitzgibbon, "Bundle adjustment - a modern
 /// synthesis", Vision Algorithms 2000.
@@ -20,19 +20,17 @@
 #include <orbis/core/execution.hpp>
 #include <orbis/core/progress.hpp>
 #include <orbis/core/simd.hpp>
-#include <orbis/optimize/bundle_summary.hpp>
-#include <orbis/optimize/damping.hpp>
+#include <orbis/optimize/bundle_problem.hpp>
 #include <orbis/optimize/detail/bundle/bundle_equations.hpp>
-#include <orbis/optimize/detail/bundle/stage_watch.hpp>
-#include <orbis/optimize/linear_solver.hpp>
+#include <orbis/optimize/detail/stage_watch.hpp>
 #include <orbis/optimize/reprojection.hpp>
-#include <orbis/optimize/residual.hpp>
 #include <orbis/optimize/robust_loss.hpp>
+#include <orbis/optimize/solver_policies.hpp>
 
 namespace orbis::optimize {
 
 namespace detail {
-/// Steps far from the minimum are bold enough with more damping than pose graphs need.
+/// Bundle adjustment starts with more damping than pose graphs.
 template <class Damping>
 [[nodiscard]] Damping default_bundle_damping() {
   Damping damping{};
@@ -41,18 +39,17 @@ template <class Damping>
 }
 }  // namespace detail
 
-/// Made of a residual, a robust loss, a damping policy and a solver of the reduced system, each a type:
+/// A solver made of a residual, a robust loss, a damping policy and a solver of the reduced system, each a type:
 ///
 /// @code
 ///   bundle_adjuster ba{reprojection{camera}, huber{2.45}};
 ///   auto summary = ba.solve(par, poses, points, observations, {.max_iterations = 10});
 /// @endcode
 ///
-/// Points are eliminated by the Schur complement. One step is O(observations + sum over the points of
-/// the square of how many cameras see them), and what the reduced system of the cameras takes.
-/// Keeps its memory: solving a problem of the same size again allocates nothing (with `orbis::seq` and a
-/// dense or iterative reduced solver), a smaller one a few vectors. The same result for every policy, number of threads
-/// and instruction set. Not for several threads at once.
+/// The points are eliminated by the Schur complement. One step costs O(observations + sum over the points of the square
+/// of the number of cameras that see them), and the solution of the reduced system of the cameras. Keeps its memory: a
+/// second problem of the same size allocates nothing (with `orbis::seq` and a dense or iterative reduced solver). Every
+/// policy, number of threads and instruction set gives the same bits. Not thread-safe.
 template <bundle_residual Residual, robust_loss Loss = huber, general_damping_policy Damping = levenberg_marquardt,
           reduced_solver ReducedSolver = automatic_reduced_solver>
 class bundle_adjuster {
@@ -69,12 +66,13 @@ class bundle_adjuster {
   bundle_adjuster(Residual residual, Loss loss, Damping damping, ReducedSolver reduced, simd::level level)
       : equations_{std::move(residual), std::move(loss), reduced, level}, damping_{std::move(damping)} {}
 
-  /// Whitened squared residual of one observation; infinite without a projection.
+  /// The chi-squared error of an observation: `information` times the squared norm of its residual; infinite without a
+  /// projection.
   [[nodiscard]] double chi2(const camera_state& camera, const vec3& point, const observation& o) const {
     return chi2_in(equations_.residual().prepare(camera), point, o);
   }
 
-  /// The same of all observations: `out[k]` of `observations[k]`. The cameras are prepared once.
+  /// The chi-squared errors of all observations: `out[k]` of `observations[k]`.
   /// @pre the observations' indices are in range; `out` has room for all
   void chi2(std::span<const camera_state> cameras, std::span<const vec3> points,
             std::span<const observation> observations, std::span<double> out) {
@@ -85,12 +83,12 @@ class bundle_adjuster {
       out[k] = chi2_in(chi2_views_[observations[k].pose], points[observations[k].point], observations[k]);
   }
 
-  /// Moves `cameras` and `points` so that the robust cost falls; never leaves them worse than they were,
-  /// and untouched where the status is a failure of the input. Observations that are not finite, or have
-  /// no projection at the start, take no part and are counted in the summary.
+  /// Moves `cameras` and `points` so that the robust cost falls. They are never left with a higher cost than they had,
+  /// and are unchanged if the status is a failure of the input. Observations that are not finite, or have no projection
+  /// at the start, take no part; the summary counts them.
   ///
-  /// `callback` is asked with (iteration, max_iterations) before every step whether to go on; `report(summary)` is
-  /// called before the first and after every step.
+  /// `callback(iteration, max_iterations)` is asked before each step whether to go on. `report(summary)` is called
+  /// before the first step and after each one.
   /// @pre the options' spans are empty or of matching length
   template <execution_policy Policy, class Report = detail::no_report>
   bundle_summary solve(const Policy& policy, std::span<camera_state> cameras, std::span<vec3> points,
@@ -105,9 +103,10 @@ class bundle_adjuster {
     return run(policy, cameras, points, options, callback, report, summary);
   }
 
-  /// Solves for the observations of the last call of `solve` again, from these estimates and with these
-  /// options: others ignored, others fixed. Orders and blocks are kept (but for other fixed poses).
-  /// @pre as many cameras and points as then, and the same observations still where they were
+  /// Solves for the observations of the last call of `solve` again, from these estimates and with these options; other
+  /// observations may be ignored, and other poses or points fixed. Ordering and structure are reused unless other poses
+  /// are fixed.
+  /// @pre as many cameras and points as in that call, and its observations unchanged and still in the same memory
   template <execution_policy Policy, class Report = detail::no_report>
   bundle_summary solve_again(const Policy& policy, std::span<camera_state> cameras, std::span<vec3> points,
                              const bundle_options& options = {}, progress callback = {}, Report&& report = {}) {
@@ -121,7 +120,7 @@ class bundle_adjuster {
     return run(policy, cameras, points, options, callback, report, summary);
   }
 
-  /// The normal equations at the last estimate that was linearised.
+  /// The normal equations at the estimate that was linearised last.
   [[nodiscard]] const auto& equations() const { return equations_; }
 
  private:
@@ -192,7 +191,7 @@ class bundle_adjuster {
                              options.hold == bundle_gauge::first_camera);
   }
 
-  /// Counts what is not usable at all.
+  /// Counts the observations that cannot be used at all.
   void count_unusable(std::span<const std::uint8_t> ignored, bundle_summary& summary) const {
     for (std::size_t k = 0; k != observations_.size(); ++k)
       if ((ignored.empty() || ignored[k] == 0) && !equations_.residual().is_usable(observations_[k]))

@@ -12,7 +12,7 @@
 
 #include <orbis/core/se3.hpp>
 #include <orbis/core/types.hpp>
-#include <orbis/optimize/manifold.hpp>
+#include <orbis/optimize/bundle_problem.hpp>
 
 namespace orbis::optimize {
 

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Pose graphs: poses that agree best with measured relative poses between them.
+/// Pose graph optimisation: the poses that agree best with measured relative poses, and a start for them.
 ///
-/// Sources: F. Lu, E. Milios, "Globally consistent range scan alignment for environment mapping",
-/// Autonomous Robots 4, 1997; G. Grisetti, R. Kuemmerle, C. Stachniss, W. Burgard, "A tutorial on
-/// graph-based SLAM", IEEE ITS Magazine 2(4), 2010.
+/// Sources: F. Lu, E. Milios, "Globally consistent range scan alignment for environment mapping", Autonomous Robots 4,
+/// 1997; G. Grisetti, R. Kuemmerle, C. Stachniss, W. Burgard, "A tutorial on graph-based SLAM", IEEE ITS Magazine 2(4),
+/// 2010.
 #pragma once
 
 #include <algorithm>
@@ -12,27 +12,27 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <ranges>
 #include <span>
+#include <string>
 #include <type_traits>
 #include <utility>
 #include <vector>
 
 #include <orbis/core/execution.hpp>
 #include <orbis/core/progress.hpp>
-#include <orbis/optimize/between_factor.hpp>
-#include <orbis/optimize/damping.hpp>
-#include <orbis/optimize/detail/bundle/stage_watch.hpp>
-#include <orbis/optimize/detail/pose/pose_graph_structure.hpp>
-#include <orbis/optimize/detail/sparse/block_cholesky.hpp>
-#include <orbis/optimize/manifold.hpp>
-#include <orbis/optimize/pose_graph_summary.hpp>
+#include <orbis/core/se3.hpp>
+#include <orbis/core/types.hpp>
+#include <orbis/optimize/detail/pose/chordal_system.hpp>
+#include <orbis/optimize/detail/pose/pose_graph_equations.hpp>
+#include <orbis/optimize/detail/stage_watch.hpp>
+#include <orbis/optimize/pose_graph_problem.hpp>
 #include <orbis/optimize/robust_loss.hpp>
+#include <orbis/optimize/solver_policies.hpp>
 
 namespace orbis::optimize {
 
-/// The residual by which graphs of `T` are solved unless another is asked for. For `se3` it is g2o's.
+/// The residual that graphs of `T` are solved with by default. For `se3` it is that of g2o.
 template <class T>
 struct default_between {
   using type = logarithm_between<T>;
@@ -44,24 +44,23 @@ struct default_between<se3> {
 template <class T>
 using default_between_t = typename default_between<T>::type;
 
-/// Made of a residual, a robust loss, a damping policy and a manifold, e.g.
-/// `pose_graph_solver<se3, huber, levenberg_marquardt> solver{huber{1.0}}`. Keeps its memory: solving a graph with
-/// the same edges again allocates nothing (with `orbis::seq`). Not for several threads at once.
+/// Solver of pose graphs with vertices of type T (`se3`, `sim3`, `so3`), made of a robust loss, a damping policy and a
+/// residual, for example `pose_graph_solver<se3, huber, levenberg_marquardt> solver{huber{1.0}}`. Keeps its memory:
+/// solving a graph with the same edges again allocates nothing (with `orbis::seq`). Not thread-safe.
 template <class T, robust_loss Loss = trivial, general_damping_policy Damping = dogleg,
-          between_factor<T> Between = default_between_t<T>, manifold Manifold = lie_group<T>>
-requires std::same_as<typename Manifold::point, T>
+          between_factor<T> Between = default_between_t<T>>
 class pose_graph_solver {
  public:
-  explicit pose_graph_solver(Loss loss = {}, Damping damping = {}, Between between = {}, Manifold on = {})
-      : loss_{loss}, damping_{damping}, between_{between}, manifold_{on} {}
+  explicit pose_graph_solver(Loss loss = {}, Damping damping = {}, Between between = {})
+      : equations_{loss, between}, damping_{damping} {}
 
-  /// Moves `vertices` so that half the sum of the robust loss of the edges falls; never leaves them
-  /// worse than they were, and untouched where the status is a failure of the input. Vertices without
-  /// edges stay where they are; so do directions that the edges say nothing about, but for
-  /// `gauss_newton`, which stops there with `singular`. The same result for every policy. One step is O(blocks of the
-  /// factor).
+  /// Moves `vertices` so that half the sum of the robust loss over the edges falls. The vertices are never left with a
+  /// higher cost than they had, and are unchanged if the status is a failure. Vertices without edges stay; so do
+  /// directions that the edges do not determine, except with `gauss_newton`, which stops there with `singular`. Every
+  /// execution policy gives the same result. One step costs O(blocks of the factor).
   ///
-  /// `report(summary)` is called before the first and after every step.
+  /// `callback(iteration, max_iterations)` is asked before each step whether to go on. `report(summary)` is called
+  /// before the first step and after each one.
   /// @pre `options.fixed` is empty or has one entry for each vertex
   template <execution_policy Policy, std::ranges::contiguous_range Edges, class Report = detail::no_report>
   requires relative_measurement<std::ranges::range_value_t<Edges>, T> pose_graph_summary
@@ -70,62 +69,64 @@ class pose_graph_solver {
     pose_graph_summary summary;
     const std::span all{std::ranges::data(edges), std::ranges::size(edges)};
     if (!set_up(std::span<const T>{vertices}, all, options, summary)) return summary;
-    problem<Policy, std::remove_cvref_t<decltype(all)>> graph{*this, policy, all, summary};
+    problem<Policy, std::remove_cvref_t<decltype(all)>> graph{equations_, policy, all, summary};
     graph.linearize();
-    summary.initial_cost = summary.final_cost = cost_;
-    best_ = estimate_;
+    summary.initial_cost = summary.final_cost = graph.cost();
+    best_ = equations_.estimate();
     report(std::as_const(summary));
     summary.status = run(graph, options, callback, summary, report);
-    for (const std::uint32_t v : structure_.vertices) vertices[v] = best_[v];
+    for (const std::uint32_t v : equations_.structure().vertices) vertices[v] = best_[v];
     return summary;
   }
 
-  /// The structure of the factor of the last graph.
-  [[nodiscard]] const block_symbolic& symbolic() const { return cholesky_.symbolic(); }
-
  private:
-  static constexpr int size = Manifold::dimension;
-  using block = matrix<size, size>;
-  using vector = matrix<size>;
-  static constexpr std::size_t grain = 256;  ///< of loops over bundles and vertices
-
-  /// What the edges of a bundle add to the normal equations.
-  struct share {
-    block from, to;
-    vector gradient_from, gradient_to;
-  };
+  using equations_type = detail::pose_graph_equations<T, Loss, Between>;
 
   /// The graph as the damping policies see it.
   template <class Policy, class Edges>
   struct problem {
-    pose_graph_solver& solver;
+    equations_type& equations;
     const Policy& policy;
     Edges edges;
     pose_graph_summary& summary;
 
     void linearize() {
       const detail::stage_watch watch{summary.seconds.linearize};
-      solver.linearize(policy, edges);
+      equations.linearize(policy, edges);
     }
-    [[nodiscard]] double cost() const { return solver.cost_; }
-    [[nodiscard]] const Eigen::VectorXd& gradient() const { return solver.gradient_; }
-    [[nodiscard]] const Eigen::VectorXd& diagonal() const { return solver.diagonal_; }
-    [[nodiscard]] double curvature(const Eigen::VectorXd& x) const { return solver.curvature(x); }
+    [[nodiscard]] double cost() const { return equations.cost(); }
+    [[nodiscard]] const Eigen::VectorXd& gradient() const { return equations.gradient(); }
+    [[nodiscard]] const Eigen::VectorXd& diagonal() const { return equations.diagonal(); }
+    [[nodiscard]] double curvature(const Eigen::VectorXd& x) const { return equations.curvature(x); }
     [[nodiscard]] bool factor(const Eigen::VectorXd& damping) {
       const detail::stage_watch watch{summary.seconds.factor};
       ++summary.factorizations;
-      return solver.cholesky_.factor(solver.on_diagonal_, solver.off_diagonal_,
-                                     {damping.data(), static_cast<std::size_t>(damping.size())});
+      return equations.factor(damping);
     }
     void solve(Eigen::VectorXd& x) {
       const detail::stage_watch watch{summary.seconds.solve};
-      solver.cholesky_.solve({x.data(), static_cast<std::size_t>(x.size())});
+      equations.solve(x);
     }
     [[nodiscard]] double try_step(const Eigen::VectorXd& step) {
       const detail::stage_watch watch{summary.seconds.evaluate};
-      return solver.tried_cost_ = solver.evaluate(policy, edges, step);
+      return equations.try_step(policy, edges, step);
     }
   };
+
+  template <class Edges>
+  [[nodiscard]] bool set_up(std::span<const T> vertices, const Edges& edges, const pose_graph_options& options,
+                            pose_graph_summary& summary) {
+    assert(options.fixed.empty() || options.fixed.size() == vertices.size());
+    const detail::stage_watch watch{summary.seconds.set_up};
+    auto finding = detail::check_pose_graph<Between::dimension>(vertices, edges, options.semidefinite_information);
+    if (!is_failure(finding.status)) finding = equations_.begin(vertices, edges, options);
+    summary.where = finding.where;
+    summary.status = finding.status;
+    if (is_failure(finding.status)) return false;
+    if (!equations_.structure().vertices.empty()) return true;
+    summary.status = pose_graph_status::nothing_to_do;
+    return false;
+  }
 
   template <class Graph, class Report>
   [[nodiscard]] pose_graph_status run(Graph& graph, const pose_graph_options& options, const progress& callback,
@@ -138,176 +139,30 @@ class pose_graph_solver {
         case step_outcome::taken: break;
         case step_outcome::stationary: return pose_graph_status::converged;
         case step_outcome::exhausted: return pose_graph_status::no_progress;
-        case step_outcome::singular:
-          summary.where = structure_.vertices[cholesky_.failed_block()];
-          return pose_graph_status::singular;
+        case step_outcome::singular: summary.where = equations_.failed_vertex(); return pose_graph_status::singular;
       }
-      const double before = cost_;
-      estimate_.swap(tried_);
-      cost_ = tried_cost_;
+      const double before = equations_.cost();
+      equations_.accept();
+      const double cost = equations_.cost();
       ++summary.iterations;
-      if (cost_ <= summary.final_cost) {
-        summary.final_cost = cost_;
-        best_ = estimate_;
+      if (cost <= summary.final_cost) {
+        summary.final_cost = cost;
+        best_ = equations_.estimate();
       }
       report(std::as_const(summary));
-      if (std::abs(before - cost_) <= options.relative_tolerance * before) return pose_graph_status::converged;
+      if (std::abs(before - cost) <= options.relative_tolerance * before) return pose_graph_status::converged;
       if (k + 1 != limit) graph.linearize();
     }
     return pose_graph_status::iteration_limit;
   }
 
-  template <class Edges>
-  [[nodiscard]] bool set_up(std::span<const T> vertices, const Edges& edges, const pose_graph_options& options,
-                            pose_graph_summary& summary) {
-    assert(options.fixed.empty() || options.fixed.size() == vertices.size());
-    const detail::stage_watch watch{summary.seconds.set_up};
-    const auto fails = [&](const detail::pose_graph_finding& finding) {
-      summary.status = finding.status;
-      summary.where = finding.where;
-      return is_failure(finding.status);
-    };
-    if (fails(detail::check_pose_graph<Between::dimension>(vertices, edges, options.semidefinite_information)))
-      return false;
-    bool changed = false;
-    if (fails(structure_.update(vertices.size(), edges, options.fixed, options.hold, changed))) return false;
-    if (structure_.vertices.empty()) {
-      summary.status = pose_graph_status::nothing_to_do;
-      return false;
-    }
-    if (changed) cholesky_.analyze(structure_.vertices.size(), structure_.places);
-    estimate_.assign(vertices.begin(), vertices.end());
-    tried_ = estimate_;
-    const std::size_t unknowns = structure_.vertices.size();
-    on_diagonal_.resize(unknowns);
-    off_diagonal_.resize(structure_.places.size());
-    shares_.resize(structure_.bundles.size());
-    chunk_costs_.resize((structure_.bundles.size() + grain - 1) / grain);
-    gradient_.resize(static_cast<Eigen::Index>(size * unknowns));
-    diagonal_.resize(gradient_.size());
-    return true;
-  }
-
-  /// Residuals, weights and normal equations at the estimate.
-  template <class Policy, class Edges>
-  void linearize(const Policy& policy, const Edges& edges) {
-    for_each_chunk(policy, structure_.bundles.size(), grain, [&](std::size_t begin, std::size_t end) {
-      double cost = 0.0;
-      for (std::size_t b = begin; b != end; ++b) cost += linearize_bundle(b, edges);
-      chunk_costs_[begin / grain] = cost;
-    });
-    cost_ = sum_of_chunks();
-    for_each_chunk(policy, structure_.vertices.size(), grain, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t u = begin; u != end; ++u) gather(u);
-    });
-  }
-
-  template <class Edges>
-  [[nodiscard]] double linearize_bundle(std::size_t b, const Edges& edges) {
-    const detail::edge_bundle& bundle = structure_.bundles[b];
-    share& sum = shares_[b];
-    sum.from.setZero();
-    sum.to.setZero();
-    sum.gradient_from.setZero();
-    sum.gradient_to.setZero();
-    block mixed = block::Zero();
-    double cost = 0.0;
-    for (std::uint32_t at = bundle.begin; at != bundle.begin + bundle.count; ++at) {
-      const auto& e = edges[structure_.bundled[at]];
-      matrix<Between::dimension, T::dof> whole_from, whole_to;
-      const matrix<Between::dimension> r =
-          between_.linearize(estimate_[e.from], estimate_[e.to], e.measurement, whole_from, whole_to);
-      const matrix<Between::dimension, size> by_from = manifold_.reduce(whole_from);
-      const matrix<Between::dimension, size> by_to = manifold_.reduce(whole_to);
-      const matrix<Between::dimension> pull = e.information * r;
-      const double squared = r.dot(pull);
-      const double weight = loss_.weight(squared);
-      cost += 0.5 * loss_.cost(squared);
-      const matrix<Between::dimension, Between::dimension> information = weight * e.information;
-      const bool along = e.from == bundle.from;
-      const auto& from = along ? by_from : by_to;
-      const auto& to = along ? by_to : by_from;
-      const matrix<Between::dimension, size> weighted = information * to;
-      sum.to.noalias() += to.transpose() * weighted;
-      mixed.noalias() += from.transpose() * weighted;
-      sum.from.noalias() += from.transpose() * (information * from);
-      sum.gradient_from.noalias() += weight * (from.transpose() * pull);
-      sum.gradient_to.noalias() += weight * (to.transpose() * pull);
-    }
-    if (b < off_diagonal_.size()) off_diagonal_[b] = mixed;
-    return cost;
-  }
-
-  /// Adds up what the bundles at an unknown have to say.
-  void gather(std::size_t u) {
-    block hessian = block::Zero();
-    vector gradient = vector::Zero();
-    for (std::uint32_t at = structure_.first_touch[u]; at != structure_.first_touch[u + 1]; ++at) {
-      const share& s = shares_[structure_.touches[at] / 2];
-      const bool is_to = structure_.touches[at] % 2 != 0;
-      hessian += is_to ? s.to : s.from;
-      gradient += is_to ? s.gradient_to : s.gradient_from;
-    }
-    on_diagonal_[u] = hessian;
-    const auto row = static_cast<Eigen::Index>(size * u);
-    gradient_.template segment<size>(row) = gradient;
-    diagonal_.template segment<size>(row) = hessian.diagonal();
-  }
-
-  /// The cost one step away from the estimate, which is left in `tried_`.
-  template <class Policy, class Edges>
-  [[nodiscard]] double evaluate(const Policy& policy, const Edges& edges, const Eigen::VectorXd& step) {
-    for_each_chunk(policy, structure_.vertices.size(), grain, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t u = begin; u != end; ++u) {
-        const std::uint32_t v = structure_.vertices[u];
-        tried_[v] = manifold_.retract(estimate_[v], step.template segment<size>(static_cast<Eigen::Index>(size * u)));
-      }
-    });
-    for_each_chunk(policy, structure_.bundles.size(), grain, [&](std::size_t begin, std::size_t end) {
-      double cost = 0.0;
-      const detail::edge_bundle& last = structure_.bundles[end - 1];
-      for (std::uint32_t at = structure_.bundles[begin].begin; at != last.begin + last.count; ++at) {
-        const auto& e = edges[structure_.bundled[at]];
-        const matrix<Between::dimension> r = between_.residual(tried_[e.from], tried_[e.to], e.measurement);
-        cost += 0.5 * loss_.cost(r.dot(e.information * r));
-      }
-      chunk_costs_[begin / grain] = cost;
-    });
-    return sum_of_chunks();
-  }
-  [[nodiscard]] double sum_of_chunks() const {
-    double sum = 0.0;
-    for (const double cost : chunk_costs_) sum += cost;
-    return sum;
-  }
-
-  [[nodiscard]] double curvature(const Eigen::VectorXd& x) const {
-    const auto part = [&](std::size_t u) { return x.template segment<size>(static_cast<Eigen::Index>(size * u)); };
-    double sum = 0.0;
-    for (std::size_t u = 0; u != on_diagonal_.size(); ++u) sum += part(u).dot(on_diagonal_[u] * part(u));
-    for (std::size_t k = 0; k != off_diagonal_.size(); ++k)
-      sum += 2.0 * part(structure_.places[k].row).dot(off_diagonal_[k] * part(structure_.places[k].column));
-    return sum;
-  }
-
-  Loss loss_;
+  equations_type equations_;
   Damping damping_;
-  Between between_;
-  Manifold manifold_;
-
-  detail::pose_graph_structure structure_;
-  block_cholesky<size> cholesky_;
-  std::vector<T> estimate_, tried_, best_;
-  double cost_ = 0.0, tried_cost_ = 0.0;
-  std::vector<share> shares_;        // of each bundle
-  std::vector<double> chunk_costs_;  // added in order, so that every policy adds alike
-  std::vector<block> on_diagonal_;   // the normal equations
-  std::vector<block> off_diagonal_;  // of the bundles between two unknowns
-  Eigen::VectorXd gradient_, diagonal_;
+  std::vector<T> best_;
   step_workspace workspace_;
 };
 
-/// Solves a pose graph once; see `pose_graph_solver::solve`.
+/// Solves a pose graph once, with a solver that is made for it; see `pose_graph_solver::solve`.
 template <execution_policy Policy, std::ranges::contiguous_range Vertices, std::ranges::contiguous_range Edges,
           robust_loss Loss = trivial, general_damping_policy Damping = dogleg>
 pose_graph_summary solve_pose_graph(const Policy& policy, Vertices&& vertices, const Edges& edges,
@@ -317,6 +172,90 @@ pose_graph_summary solve_pose_graph(const Policy& policy, Vertices&& vertices, c
   pose_graph_solver<pose, Loss, Damping> solver{loss, damping};
   return solver.solve(policy, std::span<pose>{std::ranges::data(vertices), std::ranges::size(vertices)}, edges, options,
                       callback);
+}
+
+/// Result of a chordal initialisation: `converged`, `nothing_to_do` or a failure.
+struct chordal_summary {
+  pose_graph_status status = pose_graph_status::nothing_to_do;
+  std::size_t where = 0;  ///< the edge or vertex that a failure is about
+};
+
+/// The status in words.
+[[nodiscard]] inline std::string to_string(const chordal_summary& s) { return describe(s.status, s.where); }
+
+/// A start for a solver, for graphs whose odometry is too far off: computes all vertices that are not fixed from the
+/// edges alone; where they were does not matter. Two linear least-squares problems: first the rotations without their
+/// constraints, each projected to the nearest rotation, then the positions. Edges weigh by their information. Of the
+/// options `fixed`, `hold` and `semidefinite_information` count. Vertices that are fixed or held stay; on failure all
+/// do
+/// (`singular`: vertex `where` is not determined, or has no nearest rotation). O(blocks of the factor), about two steps
+/// of a solver.
+///
+/// Source: L. Carlone, R. Tron, K. Daniilidis, F. Dellaert, "Initialization techniques for 3D SLAM: a survey on
+/// rotation estimation and its use in pose graph optimization", ICRA 2015.
+/// @pre `options.fixed` is empty or has one entry for each vertex
+template <std::ranges::contiguous_range Edges>
+requires relative_measurement<std::ranges::range_value_t<Edges>, se3> chordal_summary
+initialize_chordally(std::span<se3> vertices, const Edges& edges, const pose_graph_options& options = {}) {
+  const std::span all{std::ranges::data(edges), std::ranges::size(edges)};
+  const auto found = detail::check_pose_graph<6>(std::span<const se3>{vertices}, all, options.semidefinite_information);
+  if (is_failure(found.status)) return {found.status, found.where};
+  detail::pose_graph_structure structure;
+  bool changed = false;
+  const auto held = structure.update(vertices.size(), all, options.fixed, options.hold, changed);
+  if (is_failure(held.status)) return {held.status, held.where};
+  if (structure.vertices.empty()) return {};
+
+  const auto for_each_edge = [&](auto&& visit) {
+    for (std::size_t b = 0; b != structure.bundles.size(); ++b)
+      for (std::uint32_t k = 0; k != structure.bundles[b].count; ++k)
+        visit(b, all[structure.bundled[structure.bundles[b].begin + k]]);
+  };
+
+  // Rotations: R_to = R_from * R_from_to, row by row.
+  detail::chordal_system rows{structure, 3};
+  for_each_edge([&](std::size_t bundle, const auto& e) {
+    const mat3 turn = e.measurement.rotation_matrix().transpose();
+    const double weight = e.information.template bottomRightCorner<3, 3>().trace() / 3.0;
+    rows.add(
+        bundle, e.from, e.to, turn, weight * mat3::Identity(),
+        [&](std::uint32_t v, std::size_t side) {
+          return vec3(vertices[v].rotation_matrix().row(static_cast<Eigen::Index>(side)).transpose());
+        },
+        [](std::size_t) { return vec3(vec3::Zero()); });
+  });
+  if (!rows.solve()) return {pose_graph_status::singular, rows.failed_vertex()};
+  std::vector<so3> rotations(vertices.size());
+  for (std::size_t v = 0; v != vertices.size(); ++v) {
+    const std::uint32_t u = structure.unknown[v];
+    rotations[v] = vertices[v].rotation();
+    if (u == detail::pose_graph_structure::held) continue;
+    mat3 relaxed;
+    for (std::size_t side = 0; side != 3; ++side)
+      relaxed.row(static_cast<Eigen::Index>(side)) = rows.solution(side, u).transpose();
+    const auto nearest = detail::nearest_rotation(relaxed);
+    if (!nearest) return {pose_graph_status::singular, v};
+    rotations[v] = *nearest;
+  }
+
+  // Positions: t_to = t_from + R_from * t_from_to.
+  detail::chordal_system positions{structure, 1};
+  for_each_edge([&](std::size_t bundle, const auto& e) {
+    const mat3 r = rotations[e.from].rotation_matrix();
+    const mat3 turned = r * e.measurement.rotation_matrix();
+    // The information is about the translation in the measured frame of `to`.
+    const mat3 weight = turned * e.information.template topLeftCorner<3, 3>() * turned.transpose();
+    positions.add(
+        bundle, e.from, e.to, mat3::Identity(), weight,
+        [&](std::uint32_t v, std::size_t) { return vertices[v].translation(); },
+        [&](std::size_t) { return vec3(r * e.measurement.translation()); });
+  });
+  if (!positions.solve()) return {pose_graph_status::singular, positions.failed_vertex()};
+  for (std::uint32_t u = 0; u != structure.vertices.size(); ++u) {
+    const std::uint32_t v = structure.vertices[u];
+    vertices[v] = se3{rotations[v], positions.solution(0, u)};
+  }
+  return {pose_graph_status::converged, 0};
 }
 
 }  // namespace orbis::optimize

@@ -2,9 +2,9 @@
 /// @file
 /// Pose-only refinement: the camera pose that best explains observations of known points.
 ///
-/// Levenberg-Marquardt on SE(3) in rounds; after each round every observation is judged anew by its
-/// chi-squared at the current pose, and the last round goes without the robust loss. Eight observations
-/// go through the same arithmetic at once. Works on the stack (about 80 kB); never allocates.
+/// Levenberg-Marquardt on SE(3) in rounds. After each round every observation becomes an inlier or an outlier by its
+/// chi-squared error at the current pose; the last round is without the robust loss. Eight observations are processed
+/// at once. Needs about 80 kB of stack and never allocates.
 ///
 /// Source of the rounds: R. Mur-Artal, J. D. Tardos, "ORB-SLAM2", T-RO 33 (2017).
 #pragma once
@@ -20,17 +20,16 @@
 #include <string_view>
 
 #include <orbis/core/simd.hpp>
+#include <orbis/optimize/detail/minimal/small_cholesky.hpp>
 #include <orbis/optimize/detail/pose/pose_kernels.hpp>
 #include <orbis/optimize/detail/pose/pose_pieces.hpp>
-#include <orbis/optimize/detail/sparse/small_cholesky.hpp>
-#include <orbis/optimize/graduated.hpp>
 #include <orbis/optimize/reprojection.hpp>
 #include <orbis/optimize/robust_loss.hpp>
 
 namespace orbis::optimize {
 
 enum class refinement_status {
-  converged,             ///< the last round ended because no step improved the pose any further
+  converged,             ///< the last round ended because no step improved the pose
   iteration_limit,       ///< the last round ended by its number of iterations
   too_few_observations,  ///< fewer than three usable observations, from the start or after the gates
   degenerate,            ///< the observations leave a direction of the pose free (collinear points, say)
@@ -50,9 +49,9 @@ enum class refinement_status {
 
 struct pose_refinement_options {
   int rounds = 4;
-  int iterations = 10;                     ///< per round
-  double gate_mono = 5.991;                ///< chi-squared, 95 %, two degrees of freedom
-  double gate_depth = 7.815;               ///< three degrees of freedom
+  int iterations = 10;  ///< per round
+  /// Largest chi-squared error of an inlier without depth, and with depth.
+  double gate_mono = chi_squared_gate(2), gate_depth = chi_squared_gate(3);
   simd::level simd = simd::level::avx512;  ///< the best instructions to use if there are such; no result depends on it
 };
 
@@ -75,7 +74,7 @@ struct pose_normal_equations {
   double cost;  ///< half the robust sum
 };
 
-/// A refinement under way, for a camera that is one model.
+/// One refinement, for one camera model.
 template <class Camera>
 class pose_refiner {
  public:
@@ -89,7 +88,7 @@ class pose_refiner {
         options_{options},
         pieces_{observations, outliers} {}
 
-  /// Steps downhill until a step gains no more than `enough` of the cost.
+  /// Steps until a step lowers the cost by less than the fraction `enough`.
   template <class Loss>
   [[nodiscard]] refinement_status run_round(const Loss& loss, double enough) {
     double lambda = 1e-6;
@@ -122,7 +121,7 @@ class pose_refiner {
     return refinement_status::iteration_limit;
   }
 
-  /// Judges every observation at the current pose. Returns whether any changed sides.
+  /// Decides for every observation at the current pose whether it is an outlier. Returns whether any decision changed.
   bool apply_gates() {
     bool changed = false;
     inliers_ = 0;
@@ -190,7 +189,7 @@ class pose_refiner {
   int steps_ = 0;
 };
 
-/// A camera whose model is known at run time only.
+/// A camera whose model is known only at run time.
 template <class Camera>
 concept holds_a_model = requires(const Camera& camera) {
   {camera.visit([](const auto&) {})};
@@ -223,8 +222,8 @@ template <class Camera, class Loss>
     const bool last = round + 1 == options.rounds;
     if (last)
       out.status = refiner.run_round(trivial{}, 1e-9);
-    else if (changed || loss_schedule<Loss> || out.status != refinement_status::converged)
-      out.status = refiner.run_round(stage_of(loss, round), 1e-6);  // it only has to tell the outliers
+    else if (changed || out.status != refinement_status::converged)
+      out.status = refiner.run_round(loss, 1e-6);  // it only has to tell the outliers
     else
       continue;  // the same problem as the last round solved
     if (out.status == refinement_status::degenerate) return give_up(out.status);
@@ -245,14 +244,11 @@ template <class Camera, class Loss>
 
 }  // namespace detail
 
-/// Refines `T_world_camera` and writes for each observation whether it is an outlier (1) or not (0).
-/// Observations that are not finite, of no information, or without a projection are outliers. A
-/// `loss_schedule` gives each round its own loss.
-///
-/// O(observations) for every step. The result is the same for every instruction set; among cameras,
-/// those with a `camera::lanes_of` of their own are the fastest.
+/// Refines `T_world_camera`, starting there, and writes for each observation whether it is an outlier (1) or not (0).
+/// Observations that are not finite, have no information or no projection are outliers. O(observations) for each step.
+/// Every instruction set gives the same bits. The camera models of the library are faster than models of your own.
 /// @pre outliers.size() == observations.size()
-template <camera::camera_model Camera, loss_or_schedule Loss = huber>
+template <camera::camera_model Camera, robust_loss Loss = huber>
 [[nodiscard]] pose_refinement refine_pose(std::span<const pose_observation> observations,
                                           const reprojection<Camera>& model, const se3& T_world_camera,
                                           std::span<std::uint8_t> outliers, const pose_refinement_options& options = {},

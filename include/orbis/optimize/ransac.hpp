@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// RANSAC over any model: deterministic by seed; scoring, order of samples, preemption and local optimisation are
-/// types (see `ransac_policies.hpp`).
+/// RANSAC for any model. Deterministic by seed; scoring, order of samples, preemption and local optimisation are
+/// policies (see `ransac_policies.hpp`).
 ///
 /// Sources: M. Fischler, R. Bolles, CACM 24 (1981); R. Raguram et al., "USAC: a universal framework for random sample
 /// consensus", PAMI 35 (2013), for the parts and how they go together.
@@ -26,15 +26,17 @@
 
 namespace orbis::optimize {
 
-/// What RANSAC needs to know about a model and its data.
+/// A model and its data, as RANSAC needs them.
 ///
-/// - `E::sample_size`: how many data determine the model up to a few solutions.
-/// - `size()`: how many data there are.
-/// - `fit(sample)`: a range of candidate models from `sample_size` data; empty where degenerate.
-/// - `squared_error(model, i)`: of datum `i`, in squared units of the threshold; infinite (or NaN)
-///   where it cannot be told.
-/// - `refine(model, inliers)`: a better model from many data, starting at `model`; empty if that
-///   fails. Return the model itself to go without local optimisation.
+/// - `E::sample_size`: the number of data that determine the model up to a few solutions.
+/// - `size()`: the number of data.
+/// - `fit(sample)`: a range of candidate models from `sample_size` data; empty where these are degenerate.
+/// - `squared_error(model, i)`: the squared error of datum `i`, in squared units of the threshold; infinite or NaN if
+/// it
+///   has none.
+/// - `refine(model, inliers)`: a better model from many data, starting at `model`; empty if that fails. Return the
+/// model
+///   itself to go without local optimisation.
 template <class E>
 concept model_estimator = requires(const E& estimator, const typename E::model& model,
                                    std::span<const std::uint32_t> indices, std::size_t i,
@@ -46,12 +48,12 @@ concept model_estimator = requires(const E& estimator, const typename E::model& 
   { estimator.refine(model, indices) } -> std::same_as<std::optional<typename E::model>>;
 };
 
-/// So many data are scored at a time.
+/// The number of data that are scored at a time.
 inline constexpr std::size_t consensus_block = 32;
 
-/// An estimator that can tell the errors of many data at once: `squared_errors(model, first, out)` writes those of
-/// `consensus_block` data from `first` on, a multiple of it; what it writes for data beyond the last does not matter.
-/// They decide in which order models rank; that an inlier is within the threshold is by `squared_error`.
+/// An estimator with errors of many data at once: `squared_errors(model, first, out)` writes those of `consensus_block`
+/// data from `first` on, a multiple of it; what it writes for data beyond the last does not matter. Models are ranked
+/// by these; whether a datum is an inlier is decided by `squared_error`.
 template <class E>
 concept block_estimator = model_estimator<E> && requires(const E& estimator, const typename E::model& model,
                                                          std::size_t first, std::span<float, consensus_block> out) {
@@ -64,11 +66,11 @@ struct ransac_options {
   std::size_t min_iterations = 10;
   std::size_t max_iterations = 10000;
   std::size_t min_inliers = 0;  ///< fewer than this is a failure
-  std::size_t refinements = 4;  ///< of each new best model, at most
+  std::size_t refinements = 4;  ///< largest number, for each new best model
   std::uint64_t seed = 1;
 };
 
-/// What RANSAC is made of, beside the estimator.
+/// The policies of RANSAC.
 template <consensus_score Score = msac, sampling_order Sampling = uniform_sampling,
           preemption_test Preemption = bail_out, local_optimization LocalOptimization = iterated_refinement>
 struct ransac_policies {
@@ -81,16 +83,16 @@ template <class Score, class Sampling, class Preemption, class LocalOptimization
 ransac_policies(Score, Sampling, Preemption, LocalOptimization)
     -> ransac_policies<Score, Sampling, Preemption, LocalOptimization>;
 
-/// Memory that can be used again; with it, nothing is allocated but the inliers of the answer.
+/// Memory that calls may share one after the other: with it only the inliers of the result are allocated.
 struct ransac_workspace {
-  std::vector<std::uint32_t> inliers, part;
+  std::vector<std::uint32_t> inliers;
 };
 
 template <class Model>
 struct ransac_estimate {
   Model model;
   std::vector<std::uint32_t> inliers;  ///< exactly the data within the threshold of `model`, ascending
-  double score = 0.0;                  ///< sum over all data of what the scoring says; with `msac` that of
+  double score = 0.0;                  ///< sum of the costs of all data; with `msac` of
                                        ///< min(squared error, squared threshold)
   std::size_t iterations = 0;
 };
@@ -120,13 +122,11 @@ class ransac_run {
         preemption_{policies.preemption},
         workspace_{workspace},
         squared_threshold_{options.threshold * options.threshold} {
-    for (auto* list : {&workspace.inliers, &workspace.part}) {
-      list->clear();
-      list->reserve(estimator.size());
-    }
+    workspace.inliers.clear();
+    workspace.inliers.reserve(estimator.size());
   }
 
-  /// Whether the candidate has become the best.
+  /// Scores a candidate; whether it is the new best.
   bool propose(const model& candidate) {
     const double score = score_of(candidate);
     if (!(score < best_score_)) return false;
@@ -139,14 +139,6 @@ class ransac_run {
     if (indices.size() <= sample_size) return false;
     const std::optional<model> refined = estimator_.refine(*best_, indices);
     return refined && propose(*refined);
-  }
-  /// `count` distinct inliers.
-  [[nodiscard]] std::span<const std::uint32_t> draw_inliers(std::size_t count, random_bits& random) {
-    auto& part = workspace_.part;
-    part.assign(workspace_.inliers.begin(), workspace_.inliers.end());
-    for (std::size_t k = 0; k != count; ++k)
-      std::swap(part[k], part[k + random.below(static_cast<std::uint32_t>(part.size() - k))]);
-    return std::span<const std::uint32_t>(part).first(count);
   }
   [[nodiscard]] const std::optional<model>& best() const noexcept { return best_; }
   [[nodiscard]] double recognised() const { return preemption_.recognised(); }
@@ -167,7 +159,7 @@ class ransac_run {
     preemption_.adopted(static_cast<double>(workspace_.inliers.size()) / static_cast<double>(estimator_.size()));
   }
 
-  /// Infinite for a model that was given up.
+  /// Infinite for a model whose scoring stopped early.
   [[nodiscard]] double score_of(const model& candidate) {
     const std::size_t n = estimator_.size();
     double score = 0.0;
@@ -198,7 +190,7 @@ class ransac_run {
       std::array<float, consensus_block> errors;
       estimator_.squared_errors(candidate, first, std::span<float, consensus_block>(errors));
       const auto limit = static_cast<float>(squared_threshold_);
-      if (count == consensus_block) {  // eight sums side by side, so that they can be made in registers
+      if (count == consensus_block) {  // eight sums side by side, which stay in registers
         std::array<float, 8> cost{};
         std::array<std::int32_t, 8> inside{};
         for (std::size_t i = 0; i != consensus_block; i += 8)
@@ -235,7 +227,7 @@ class ransac_run {
   double best_score_ = std::numeric_limits<double>::infinity();
 };
 
-/// Those of an estimator's options that are RANSAC's, which all estimators name alike.
+/// The options of RANSAC among those of an estimator, which have the same names everywhere.
 template <class Options>
 [[nodiscard]] ransac_options ransac_part(const Options& options) {
   return {.threshold = options.threshold,
@@ -246,7 +238,7 @@ template <class Options>
           .seed = options.seed};
 }
 
-/// What is wrong with the options; null where nothing is.
+/// What is wrong with the options; null if nothing is.
 [[nodiscard]] inline const char* fault_of(const ransac_options& options) noexcept {
   if (!(options.threshold > 0.0) || !std::isfinite(options.threshold))
     return "the threshold must be positive and finite";
@@ -254,7 +246,7 @@ template <class Options>
   return nullptr;
 }
 
-/// Whether `have` inliers of `n` data are as many as were asked for, and no fewer than a sample; else why not.
+/// An error if `have` inliers of `n` data are fewer than asked for, or fewer than a sample.
 [[nodiscard]] inline result<void> enough_inliers(const char* where, std::size_t have, std::size_t n,
                                                  std::size_t min_inliers, std::size_t sample_size) {
   const std::size_t needed = std::max(min_inliers, sample_size);
@@ -264,8 +256,8 @@ template <class Options>
                   std::to_string(needed) + " are wanted");
 }
 
-/// The model of `found`, or what ten steps down from it on its inliers lead to where that is better by its score and
-/// still has `min_inliers`.
+/// The model of `found` after ten refinement steps on its inliers, if that improves its score and keeps `min_inliers`;
+/// else the model itself.
 template <class E>
 [[nodiscard]] typename E::model polished(const E& estimator, const ransac_estimate<typename E::model>& found,
                                          double squared_threshold, std::size_t min_inliers) {
@@ -283,11 +275,10 @@ template <class E>
 
 }  // namespace detail
 
-/// The model that most of the data agree with. The same data, options and seed give the same answer.
-/// With `sprt` the data must be in no particular order.
-/// Errors: `invalid_argument` for options out of range, `no_data` where there are fewer data than a
-/// sample, `degenerate` where no sample gives a model, or none has `min_inliers` (and at least a sample's
-/// number of) inliers.
+/// The model that most of the data agree with. The same data, options and seed give the same result. With `sprt` the
+/// data must be in random order. O(data) for each model that is scored to the end. Errors: `invalid_argument` for
+/// options out of range; `no_data` for fewer data than a sample; `degenerate` if no sample gives a model, or no model
+/// has `min_inliers` inliers and at least as many as a sample.
 template <model_estimator E, consensus_score Score = msac, sampling_order Sampling = uniform_sampling,
           preemption_test Preemption = bail_out, local_optimization LocalOptimization = iterated_refinement>
 [[nodiscard]] result<ransac_estimate<typename E::model>> ransac(
@@ -322,6 +313,7 @@ template <model_estimator E, consensus_score Score = msac, sampling_order Sampli
       *run.best(), {run.inliers().begin(), run.inliers().end()}, run.exact_score(), iteration};
 }
 
+/// As above, with memory of its own.
 template <model_estimator E, consensus_score Score = msac, sampling_order Sampling = uniform_sampling,
           preemption_test Preemption = bail_out, local_optimization LocalOptimization = iterated_refinement>
 [[nodiscard]] result<ransac_estimate<typename E::model>> ransac(

@@ -1,10 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// What RANSAC can be made of: how a model is scored, in which order samples are drawn, when the scoring
-/// of a bad model is given up, and how a new best model is made better.
-///
-/// Each is a small struct; where RANSAC needs something to keep between its iterations, the struct makes
-/// it with `over(...)`. See `ransac.hpp`.
+/// The policies of RANSAC: how a model is scored, in which order samples are drawn, when the scoring of a bad model
+/// stops early, and how a new best model is refined. Each is a small struct; see `ransac.hpp`.
 #pragma once
 
 #include <algorithm>
@@ -23,8 +20,9 @@ namespace orbis::optimize {
 
 // -- scoring ----------------------------------------------------------------------------------------------------------
 
-/// `S::cost(squared_error, squared_threshold)`: what a datum adds to the score, which is to be small. Between 0 and
-/// the squared threshold, which it is for every error at or beyond the threshold, and NaN. For float and double.
+/// `S::cost(squared_error, squared_threshold)` is what a datum adds to the score, of which the least is the best. It
+/// lies between 0 and the squared threshold; errors at or beyond the threshold, and NaN, cost the squared threshold.
+/// For float and double.
 template <class S>
 concept consensus_score = requires(const S& score, float f, double d) {
   { score.cost(f, f) } -> std::same_as<float>;
@@ -39,7 +37,7 @@ struct msac {
   }
 };
 
-/// Outliers count, inliers do not. M. Fischler, R. Bolles, CACM 24 (1981).
+/// Counts the outliers. M. Fischler, R. Bolles, CACM 24 (1981).
 struct inlier_count {
   template <std::floating_point S>
   [[nodiscard]] static constexpr S cost(S squared, S limit) noexcept {
@@ -47,18 +45,9 @@ struct inlier_count {
   }
 };
 
-/// Tukey's biweight, which is flat where inliers end: errors near the threshold matter less than with `msac`.
-struct biweight_score {
-  template <std::floating_point S>
-  [[nodiscard]] static constexpr S cost(S squared, S limit) noexcept {
-    const S rest = squared < limit ? S(1) - squared / limit : S(0);
-    return limit * (S(1) - rest * rest * rest);
-  }
-};
+static_assert(consensus_score<msac> && consensus_score<inlier_count>);
 
-static_assert(consensus_score<msac> && consensus_score<inlier_count> && consensus_score<biweight_score>);
-
-// -- the order of samples ---------------------------------------------------------------------------------------------
+// -- order of samples -------------------------------------------------------------------------------------------------
 
 namespace detail {
 
@@ -75,8 +64,8 @@ template <std::size_t N>
   return sample;
 }
 
-/// How many samples it takes to find, with the wanted confidence, one without an outlier, if such a sample is
-/// recognised with probability `recognised`.
+/// The number of samples after which one of them is without outliers, with probability `confidence`; `recognised` is
+/// the probability that such a sample is recognised.
 [[nodiscard]] inline double wanted_iterations(double confidence, double inlier_ratio, std::size_t sample_size,
                                               double recognised = 1.0) {
   const double clean = std::pow(inlier_ratio, static_cast<double>(sample_size)) * recognised;
@@ -87,7 +76,8 @@ template <std::size_t N>
 
 }  // namespace detail
 
-/// `s.over<N>(n)`: something that draws N out of n data, time after time, and knows when it has drawn enough.
+/// `s.over<N>(n)` is a sampler: `draw(random)` draws N of n data, `wanted(confidence, inliers, recognised)` is the
+/// number of samples that are enough if these are the inliers.
 template <class S>
 concept sampling_order = requires(const S& s, random_bits& random, std::span<const std::uint32_t> inliers) {
   { s.template over<3>(std::size_t{}).draw(random) } -> std::same_as<std::array<std::uint32_t, 3>>;
@@ -102,7 +92,6 @@ struct uniform_sampling {
     [[nodiscard]] std::array<std::uint32_t, N> draw(random_bits& random) {
       return detail::draw_sample<N>(random, size);
     }
-    /// How many samples to draw if these are the inliers (ascending).
     [[nodiscard]] double wanted(double confidence, std::span<const std::uint32_t> inliers, double recognised) const {
       return detail::wanted_iterations(confidence, static_cast<double>(inliers.size()) / static_cast<double>(size), N,
                                        recognised);
@@ -114,13 +103,13 @@ struct uniform_sampling {
   }
 };
 
-/// Samples of promising data first: from a set of the best data that grows until it is all of them.
+/// Reliable data first: draws from a set of the best data, which grows until it contains all.
 /// O. Chum, J. Matas, "Matching with PROSAC: progressive sample consensus", CVPR 2005.
 struct prosac {
-  /// All data, from the most to the least promising (smallest descriptor distance first, say).
-  /// @pre a permutation of 0 ... n - 1; it must live as long as RANSAC runs
+  /// All data, from the most to the least reliable (for example by descriptor distance).
+  /// @pre a permutation of 0 ... n - 1 that outlives the call of RANSAC
   std::span<const std::uint32_t> best_first;
-  /// After so many samples drawing is as with `uniform_sampling`.
+  /// After this many samples all data are drawn from, as with `uniform_sampling`.
   double samples_until_uniform = 200000.0;
 
   template <std::size_t N>
@@ -153,7 +142,8 @@ struct prosac {
       for (std::uint32_t& i : sample) i = order_[i];
       return sample;
     }
-    /// Enough once all data say so. (The stop by a prefix of the data needs ranks that can be trusted; this does not.)
+    /// By the inliers among all data. (To stop by a prefix of the data, as the paper does, takes ranks that are
+    /// reliable.)
     [[nodiscard]] double wanted(double confidence, std::span<const std::uint32_t> inliers, double recognised) const {
       return detail::wanted_iterations(
           confidence, static_cast<double>(inliers.size()) / static_cast<double>(order_.size()), N, recognised);
@@ -174,11 +164,12 @@ struct prosac {
 
 static_assert(sampling_order<uniform_sampling> && sampling_order<prosac>);
 
-// -- giving up on bad models ------------------------------------------------------------------------------------------
+// -- preemption -------------------------------------------------------------------------------------------------------
 
-/// While a model is scored, block by block: `begin()`, then `hopeless(inliers, data)` after each block (those of the
-/// block), and `end(complete, inliers, data)` with the numbers of all blocks seen. `adopted(ratio)`: a new best model
-/// has this ratio of inliers. `recognised()`: the probability that a model as good as the best is scored to its end.
+/// Is asked while a model is scored, block by block: `begin()`, then `hopeless(inliers, data)` with the numbers of each
+/// block, true to stop, and `end(complete, inliers, data)` with the numbers of all blocks seen. `adopted(ratio)` tells
+/// the inlier ratio of a new best model. `recognised()` is the probability that a model as good as the best is scored
+/// to the end.
 template <class P>
 concept preemption_test = std::copyable<P> && requires(P p, std::size_t n) {
   {p.begin()};
@@ -188,8 +179,7 @@ concept preemption_test = std::copyable<P> && requires(P p, std::size_t n) {
   { p.recognised() } -> std::same_as<double>;
 };
 
-/// Scoring ends as soon as the score is worse than the best: nothing is lost, and little gained where there are many
-/// outliers.
+/// Scoring stops only when the score is worse than the best: no good model is lost.
 struct bail_out {
   static void begin() noexcept {}
   [[nodiscard]] static bool hopeless(std::size_t, std::size_t) noexcept { return false; }
@@ -198,14 +188,14 @@ struct bail_out {
   [[nodiscard]] static double recognised() noexcept { return 1.0; }
 };
 
-/// Wald's sequential test: a model goes as soon as what has been seen of it is much likelier for a bad model than for
-/// one as good as the best so far. The data must be in no particular order. Rejects a good model now and then; the
-/// number of iterations makes up for it.
+/// Sequential probability ratio test: scoring stops as soon as the data seen are much more likely for a bad model than
+/// for one as good as the best so far. The data must be in random order. Sometimes rejects a good model, which the
+/// number of iterations accounts for.
 ///
 /// Source: J. Matas, O. Chum, "Randomized RANSAC with sequential probability ratio test", ICCV 2005.
 struct sprt {
   sprt() = default;
-  /// The time to make a model from a sample, in times to score one datum.
+  /// `model_cost`: the time to compute a model from a sample, divided by the time to score one datum.
   explicit sprt(double model_cost) noexcept : model_cost_{model_cost} {}
 
   void begin() noexcept { log_ratio_ = 0.0; }
@@ -260,35 +250,32 @@ struct sprt {
 
 static_assert(preemption_test<bail_out> && preemption_test<sprt>);
 
-// -- making the best better -------------------------------------------------------------------------------------------
+// -- local optimisation -----------------------------------------------------------------------------------------------
 
 namespace detail {
-/// What RANSAC shows of itself; never made.
+/// The members of RANSAC that a local optimisation may use, for the concept below; never constructed.
 struct any_ransac_run {
-  static constexpr std::size_t sample_size = 1;
   std::span<const std::uint32_t> inliers() const;
   std::size_t refinements() const;
   bool refine(std::span<const std::uint32_t>);
-  std::span<const std::uint32_t> draw_inliers(std::size_t, random_bits&);
 };
 }  // namespace detail
 
-/// `o.operate(run, random)` is called whenever a model has become the best: `run.inliers()` are its inliers,
-/// `run.refine(indices)` makes a model of those data, starting at the best, and says whether it has become the best,
-/// `run.refinements()` is how often that is wanted at most, `run.draw_inliers(count, random)` are so many of the
-/// inliers.
+/// `o.operate(run, random)` is called whenever a model has become the best: `run.inliers()` are its inliers;
+/// `run.refine(indices)` refines the best model on these data and returns whether the outcome is the new best;
+/// `run.refinements()` is the largest number of refinements asked for.
 template <class O>
 concept local_optimization = requires(const O& o, detail::any_ransac_run& run, random_bits& random) {
   o.operate(run, random);
 };
 
-/// None: the best is what a sample gives.
+/// None: the best model is one that comes from a sample.
 struct no_local_optimization {
   template <class Run>
   static void operate(Run&, random_bits&) noexcept {}
 };
 
-/// On the inliers, then on those of the outcome, as long as that helps.
+/// Refines on the inliers, then on the inliers of the outcome, as long as the score improves.
 struct iterated_refinement {
   template <class Run>
   static void operate(Run& run, random_bits&) {
@@ -297,23 +284,6 @@ struct iterated_refinement {
   }
 };
 
-/// The same after refinements on random parts of the inliers, for estimators whose `refine` is led astray by few bad
-/// inliers. O. Chum, J. Matas, J. Kittler, "Locally optimized RANSAC", DAGM 2003.
-struct inner_sampling {
-  std::size_t rounds = 10;
-  std::size_t samples = 7;  ///< data in a part, in samples
-
-  template <class Run>
-  void operate(Run& run, random_bits& random) const {
-    for (std::size_t k = 0; k != rounds; ++k) {
-      const std::size_t part = std::min(samples * Run::sample_size, run.inliers().size() / 2);
-      if (part > Run::sample_size) run.refine(run.draw_inliers(part, random));
-    }
-    iterated_refinement::operate(run, random);
-  }
-};
-
-static_assert(local_optimization<no_local_optimization> && local_optimization<iterated_refinement> &&
-              local_optimization<inner_sampling>);
+static_assert(local_optimization<no_local_optimization> && local_optimization<iterated_refinement>);
 
 }  // namespace orbis::optimize

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The reprojection residual of one observation, for any camera model, in two or three dimensions.
+/// The reprojection error of an observation, for any camera model, in the image and, with depth, in a virtual right
+/// image.
 #pragma once
 
 #include <cmath>
-#include <concepts>
 #include <limits>
 #include <optional>
 
@@ -12,35 +12,33 @@
 #include <orbis/camera/model.hpp>
 #include <orbis/core/lanes.hpp>
 #include <orbis/core/se3.hpp>
-#include <orbis/optimize/bundle_summary.hpp>
-#include <orbis/optimize/manifold.hpp>
-#include <orbis/optimize/residual.hpp>
+#include <orbis/core/types.hpp>
+#include <orbis/optimize/bundle_problem.hpp>
+#include <orbis/optimize/detail/bundle/through_camera.hpp>
 
 namespace orbis::optimize {
 
-/// One known point, seen in an image.
+/// Observation of a known point in an image.
 struct pose_observation {
   vec3 point = vec3::Zero();  ///< in the world, metres
   vec2 pixel = vec2::Zero();
-  /// The virtual right coordinate `u - bf / depth` of an RGB-D or stereo camera; NaN where the depth
-  /// is not known.
+  /// The virtual right coordinate `u - bf / depth` of an RGB-D or stereo camera, pixels; NaN where the depth is
+  /// unknown.
   double right = std::numeric_limits<double>::quiet_NaN();
   double information = 1.0;  ///< 1 / sigma^2 of the pixel, 1 / pixel^2
   [[nodiscard]] bool has_depth() const noexcept { return !std::isnan(right); }
 };
 
-/// A pose as the residuals of bundle adjustment want it: world to camera.
+/// A pose in the form that residuals use: from the world to the camera.
 struct camera_view {
   mat3 rotation = mat3::Identity();
   vec3 translation = vec3::Zero();
 };
 
-/// Projected minus observed: pixels, and with depth a third coordinate `u - bf / z` that a camera
-/// displaced by the baseline would see. In that unit the error of a disparity-based depth sensor is
-/// about constant, as that of the pixel is.
-/// Source of the parametrisation: R. Mur-Artal, J. D. Tardos, "ORB-SLAM2", T-RO 33 (2017).
-/// Satisfies `camera_frame_residual`: what bundle adjustment estimates for a camera is its pose
-/// `T_world_camera`.
+/// The reprojection error, projected minus observed, in pixels: two coordinates, and with depth a third, `u - bf / z`,
+/// which a camera displaced by the baseline would see. In this unit the error of a disparity-based depth sensor is
+/// nearly constant, as the error of the pixel is. Satisfies `camera_frame_residual`; what is estimated for a camera is
+/// its pose `T_world_camera`. Source: R. Mur-Artal, J. D. Tardos, "ORB-SLAM2", T-RO 33 (2017).
 template <camera::camera_model Camera>
 struct reprojection {
   Camera camera;
@@ -53,18 +51,18 @@ struct reprojection {
   static constexpr int dimension = 3;
   static constexpr int intrinsic_dimension = 0;
 
-  /// The virtual right coordinate of a pixel at `depth` metres.
+  /// The virtual right coordinate of a pixel with the coordinate `u`, at `depth` metres.
   [[nodiscard]] double right(double u, double depth) const noexcept { return u - bf / depth; }
 
-  /// The residual at a point in the camera frame: the first two entries, and the third where the
-  /// observation has depth (0 where not). Empty where the point has no projection.
+  /// The residual at a point in the camera frame. The third entry is 0 without depth. Empty where the point has no
+  /// projection.
   [[nodiscard]] std::optional<vec3> residual(const vec3& point_camera, const pose_observation& o) const {
     const auto pixel = camera.project(point_camera);
     if (!pixel) return std::nullopt;
     return difference(*pixel, point_camera.z(), o);
   }
 
-  /// The same with its derivative by the point in the camera frame; the third row is 0 without depth.
+  /// The residual and its derivative `j` by the point in the camera frame; the third row is 0 without depth.
   [[nodiscard]] std::optional<vec3> residual(const vec3& point_camera, const pose_observation& o, mat3& j) const {
     matrix<2, 3> projection;
     const auto pixel = camera.project(point_camera, projection);
@@ -78,6 +76,7 @@ struct reprojection {
     return difference(*pixel, point_camera.z(), o);
   }
 
+  // As `bundle_residual` and `camera_frame_residual` describe.
   [[nodiscard]] static view prepare(const se3& T_world_camera) {
     const se3 inverse = T_world_camera.inverse();
     return {inverse.rotation_matrix(), inverse.translation()};
@@ -100,7 +99,7 @@ struct reprojection {
     return residual(q, as_pose_observation(o), by_q);
   }
 
-  /// Eight observations at once; see `detail::lane_residual`.
+  // Eight observations at once; see detail/bundle/lane_residual.hpp.
   static constexpr int measured = 4;
   static void measure(const observation& o, double* to) {
     to[0] = o.pixel.x();
@@ -136,25 +135,6 @@ struct reprojection {
     return {pixel.x() - o.pixel.x(), pixel.y() - o.pixel.y(), o.has_depth() ? right(pixel.x(), z) - o.right : 0.0};
   }
 };
-
-namespace detail {
-
-/// A `camera_frame_residual` that can do eight observations of one camera at once. `measure(o, to)`
-/// writes what it needs of an observation to `to[8 * i]`, i < `R::measured`;
-/// `lanes_in_camera<Derive>(view, measurements, q, r, by_q, by_intrinsics)` is `linearize_in_camera`
-/// (without `Derive`: `residual_in_camera`) on all of them, and returns where there is a projection.
-template <class R>
-concept lane_residual = camera_frame_residual<R> &&
-    requires(const R& r, const typename R::observation& o, const typename R::view& view, double* to,
-             simd::lanes<2>* lanes, simd::lanes<2> (*by_q)[3],
-             simd::lanes<2> (*by_intrinsics)[R::intrinsic_dimension == 0 ? 1 : R::intrinsic_dimension]) {
-  {r.measure(o, to)};
-  {
-    r.template lanes_in_camera<true>(view, to, lanes, lanes, by_q, by_intrinsics)
-    } -> std::same_as<simd::lanes<2>::mask>;
-};
-
-}  // namespace detail
 
 template <class Camera>
 reprojection(Camera, double) -> reprojection<Camera>;

@@ -1,20 +1,24 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The reprojection residual of a camera whose intrinsic parameters are estimated along with its pose.
+/// Reprojection errors of cameras whose intrinsic parameters are estimated together with their poses: for any camera
+/// model with parameters, and for the model of "Bundle adjustment in the large".
 #pragma once
 
 #include <array>
 #include <cmath>
 #include <cstddef>
 #include <optional>
+#include <span>
 #include <utility>
 
+#include <orbis/camera/detail/lanes.hpp>
 #include <orbis/camera/parameters.hpp>
+#include <orbis/core/lanes.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/core/types.hpp>
-#include <orbis/optimize/bundle_summary.hpp>
+#include <orbis/optimize/bundle_problem.hpp>
+#include <orbis/optimize/detail/bundle/through_camera.hpp>
 #include <orbis/optimize/reprojection.hpp>
-#include <orbis/optimize/residual.hpp>
 
 namespace orbis::optimize {
 
@@ -27,7 +31,7 @@ struct posed_camera {
 
 namespace detail {
 
-/// Which of a camera's parameters are estimated; all where none is named.
+/// The parameters of a camera that are estimated; all if none is named.
 template <class Camera, int... Free>
 inline constexpr auto estimated_parameters = [] {
   constexpr int count = camera::parameters_of<Camera>::count;
@@ -37,7 +41,7 @@ inline constexpr auto estimated_parameters = [] {
   return which;
 }();
 
-/// Within the range and ascending, so none twice.
+/// Whether the numbers are in range and ascending.
 template <class Camera, int... Free>
 [[nodiscard]] consteval bool names_parameters() {
   int last = -1;
@@ -50,9 +54,9 @@ template <class Camera, int... Free>
 
 }  // namespace detail
 
-/// A step moves the pose in its own frame, as `T_world_camera * exp(d)`, then adds to the parameters named
-/// (in the order of `camera::parameters_of`; to all where none is). A step to parameters of which there is no
-/// camera, such as a focal length below 0, is halved as far as the parameters go until there is one.
+/// A step moves the pose in its own frame, as `T_world_camera * exp(d)`, and adds to the parameters named (in the order
+/// of `camera::parameters_of`; to all if none is named). If no camera has the new parameters, a focal length below 0
+/// for example, the step of the parameters is halved until one has.
 template <camera::parametric_camera Camera, int... Free>
 struct posed_camera_manifold {
   static_assert(detail::names_parameters<Camera, Free...>(),
@@ -75,19 +79,10 @@ struct posed_camera_manifold {
     }
     return {p.T_world_camera * se3::exp(move), p.camera};
   }
-  [[nodiscard]] static tangent local(const point& p, const point& q) {
-    using parameters = camera::parameters_of<Camera>;
-    const vec6 move = (p.T_world_camera.inverse() * q.T_world_camera).log();
-    const auto from = parameters::get(p.camera), to = parameters::get(q.camera);
-    tangent d;
-    d.template head<6>() = move;
-    for (std::size_t i = 0; i != free.size(); ++i) d[6 + static_cast<int>(i)] = to[free[i]] - from[free[i]];
-    return d;
-  }
 };
 
-/// Projected minus observed as in `reprojection`, with the intrinsic parameters of every camera among the
-/// unknowns: what bundle adjustment estimates for a camera is a `posed_camera<Camera>`.
+/// The reprojection error as in `reprojection`, with the intrinsic parameters of every camera among the unknowns: what
+/// is estimated for a camera is a `posed_camera<Camera>`. Satisfies `camera_frame_residual`.
 ///
 /// @code
 ///   using model = reprojection_with_intrinsics<camera::radial_tangential, 0, 1, 4, 5>;  // fx, fy, k1, k2
@@ -95,17 +90,16 @@ struct posed_camera_manifold {
 ///   ba.solve(seq, cameras, points, observations);  // cameras: a span of model::camera_state
 /// @endcode
 ///
-/// The numbers name the parameters that are estimated, in the order of `camera::parameters_of<Camera>`;
-/// the others stay as they are in each camera. Without numbers all are estimated, which determines the
-/// numerator and the denominator of `radial_tangential` only together: name fewer there.
+/// The numbers name the parameters that are estimated, in the order of `camera::parameters_of<Camera>`; the others keep
+/// their values. Without numbers all are estimated. For `radial_tangential` name fewer: its numerator and denominator
+/// are determined only together.
 ///
-/// Each camera has intrinsics of its own, as photographs of unknown origin have: bundle adjustment has no
-/// block that several cameras share. `bundle_options::fixed_poses` holds a camera's intrinsics with its
-/// pose. For images that one known camera took, `reprojection` is the residual.
+/// Each camera has its own intrinsics, as photographs of unknown origin have; several cameras cannot share them.
+/// `bundle_options::fixed_poses` fixes the intrinsics of a camera together with its pose. For images of one known
+/// camera use `reprojection`.
 ///
-/// `bf` is what depth was turned into `bundle_observation::right` with, and is held: right for sensors
-/// that measure depth, where it is a matter of units, not for a stereo pair whose focal length is estimated.
-/// Satisfies `camera_frame_residual`.
+/// `bf` must be the value that `bundle_observation::right` was computed with. It stays constant, which is correct for
+/// sensors that measure depth, but not for a stereo pair whose focal length is estimated.
 template <camera::parametric_camera Camera, int... Free>
 struct reprojection_with_intrinsics {
   double bf = 40.0;  ///< baseline times focal length, pixel metres
@@ -119,7 +113,7 @@ struct reprojection_with_intrinsics {
   static constexpr int dimension = 3;
   static constexpr int intrinsic_dimension = camera_manifold::dimension - 6;
 
-  /// The virtual right coordinate of a pixel at `depth` metres.
+  /// The virtual right coordinate of a pixel with the coordinate `u`, at `depth` metres.
   [[nodiscard]] double right(double u, double depth) const noexcept { return u - bf / depth; }
 
   [[nodiscard]] static view prepare(const camera_state& c) {
@@ -166,6 +160,133 @@ struct reprojection_with_intrinsics {
   [[nodiscard]] vec3 difference(const vec2& pixel, double z, const observation& o) const {
     return {pixel.x() - o.pixel.x(), pixel.y() - o.pixel.y(),
             std::isnan(o.right) ? 0.0 : right(pixel.x(), z) - o.right};
+  }
+};
+
+/// The camera of "Bundle adjustment in the large": a pose, a focal length and two radial distortions. With p = R X + t
+/// the pixel of a point is `-f (1 + k1 r^2 + k2 r^4) (p.x, p.y) / p.z`, r^2 = (p.x^2 + p.y^2) / p.z^2, from the centre
+/// of the image, x right, y up: the camera looks along -z. Source: S. Agarwal, N. Snavely, S. M. Seitz, R. Szeliski,
+/// "Bundle adjustment in the large", ECCV 2010.
+struct bal_camera {
+  se3 T_camera_world;
+  double focal = 1.0;  ///< pixels
+  double k1 = 0.0, k2 = 0.0;
+
+  /// Rotation vector, translation, focal length, k1, k2, as in the files of the data set.
+  [[nodiscard]] static bal_camera from_parameters(std::span<const double, 9> p) {
+    return {se3{so3::exp(vec3{p[0], p[1], p[2]}), vec3{p[3], p[4], p[5]}}, p[6], p[7], p[8]};
+  }
+  [[nodiscard]] std::array<double, 9> parameters() const {
+    const vec3 r = T_camera_world.rotation().log();
+    const vec3& t = T_camera_world.translation();
+    return {r.x(), r.y(), r.z(), t.x(), t.y(), t.z(), focal, k1, k2};
+  }
+};
+
+/// A step moves and turns the camera in its own frame, and adds to focal length, k1 and k2.
+struct bal_manifold {
+  using point = bal_camera;
+  using tangent = matrix<9>;
+  static constexpr int dimension = 9;
+
+  [[nodiscard]] static point retract(const point& p, const tangent& d) {
+    vec6 back;
+    for (int i = 0; i != 6; ++i) back[i] = -d[i];
+    return {se3::exp(back) * p.T_camera_world, p.focal + d[6], p.k1 + d[7], p.k2 + d[8]};
+  }
+};
+
+struct bal_view : camera_view {
+  double focal = 1.0, k1 = 0.0, k2 = 0.0;
+};
+
+/// The reprojection error of a `bal_camera`, projected minus observed, pixels. `right` of the observations is ignored.
+/// Points behind the camera are projected by the formula, too. Satisfies `camera_frame_residual`.
+struct bal_reprojection {
+  using camera_state = bal_camera;
+  using camera_manifold = bal_manifold;
+  using observation = bundle_observation;
+  using view = bal_view;
+  static constexpr int dimension = 2;
+  static constexpr int intrinsic_dimension = 3;
+
+  [[nodiscard]] static view prepare(const bal_camera& c) {
+    return {{c.T_camera_world.rotation_matrix(), c.T_camera_world.translation()}, c.focal, c.k1, c.k2};
+  }
+  [[nodiscard]] static bool is_usable(const observation& o) {
+    return o.information > 0.0 && std::isfinite(o.information) && std::isfinite(o.pixel.x()) &&
+           std::isfinite(o.pixel.y());
+  }
+  [[nodiscard]] static std::optional<vec2> residual(const view& v, const vec3& point, const observation& o) {
+    return residual_in_camera(v, v.rotation * point + v.translation, o);
+  }
+  [[nodiscard]] static std::optional<vec2> linearize(const view& v, const vec3& point, const observation& o,
+                                                     matrix<2, 9>& by_camera, matrix<2, 3>& by_point) {
+    return detail::linearize_through_camera(bal_reprojection{}, v, point, o, by_camera, by_point);
+  }
+  [[nodiscard]] static std::optional<vec2> residual_in_camera(const view& c, const vec3& q, const observation& o) {
+    const double x = q.x() / -q.z(), y = q.y() / -q.z();
+    const double s = x * x + y * y;
+    const double scale = c.focal * (1.0 + s * (c.k1 + s * c.k2));
+    const vec2 r(scale * x - o.pixel.x(), scale * y - o.pixel.y());
+    if (!std::isfinite(r.x()) || !std::isfinite(r.y())) return std::nullopt;
+    return r;
+  }
+  [[nodiscard]] static std::optional<vec2> linearize_in_camera(const view& c, const vec3& q, const observation& o,
+                                                               matrix<2, 3>& by_q, matrix<2, 3>& by_intrinsics) {
+    const auto r = residual_in_camera(c, q, o);
+    if (!r) return r;
+    const double m[2] = {q.x() / -q.z(), q.y() / -q.z()};
+    const double s = m[0] * m[0] + m[1] * m[1];
+    const double radial = 1.0 + s * (c.k1 + s * c.k2), slope = 2.0 * (c.k1 + 2.0 * c.k2 * s);
+    for (int i = 0; i != 2; ++i) {
+      double by_m[2];
+      for (int k = 0; k != 2; ++k) by_m[k] = c.focal * ((i == k ? radial : 0.0) + slope * m[i] * m[k]);
+      by_q(i, 0) = -by_m[0] / q.z();
+      by_q(i, 1) = -by_m[1] / q.z();
+      by_q(i, 2) = -(by_m[0] * m[0] + by_m[1] * m[1]) / q.z();
+      by_intrinsics(i, 0) = radial * m[i];
+      by_intrinsics(i, 1) = c.focal * s * m[i];
+      by_intrinsics(i, 2) = c.focal * s * s * m[i];
+    }
+    return r;
+  }
+
+  // Eight observations at once; see detail/bundle/lane_residual.hpp.
+  static constexpr int measured = 2;
+  static void measure(const observation& o, double* to) {
+    to[0] = o.pixel.x();
+    to[8] = o.pixel.y();
+  }
+  template <bool Derive, simd::lane_vector L>
+  ORBIS_ALWAYS_INLINE typename L::mask lanes_in_camera(const view& c, const double* measurements, const L* q, L* r,
+                                                       L (*by_q)[3], L (*by_intrinsics)[3]) const {
+    const L f = c.focal, k1 = c.k1, k2 = c.k2;
+    const L inverse = -1.0 / q[2];
+    const L x = q[0] * inverse, y = q[1] * inverse;
+    const L s = x * x + y * y;
+    const L radial = 1.0 + s * (k1 + s * k2);
+    const L scale = f * radial;
+    r[0] = scale * x - L::load(measurements);
+    r[1] = scale * y - L::load(measurements + 8);
+    if constexpr (Derive) {
+      const L slope = 2.0 * f * (k1 + 2.0 * k2 * s);
+      const L xx = scale + slope * x * x, xy = slope * x * y, yy = scale + slope * y * y;
+      by_q[0][0] = xx * inverse;
+      by_q[0][1] = by_q[1][0] = xy * inverse;
+      by_q[1][1] = yy * inverse;
+      by_q[0][2] = (xx * x + xy * y) * inverse;
+      by_q[1][2] = (xy * x + yy * y) * inverse;
+      const L fs = f * s;
+      by_intrinsics[0][0] = radial * x;
+      by_intrinsics[1][0] = radial * y;
+      by_intrinsics[0][1] = fs * x;
+      by_intrinsics[1][1] = fs * y;
+      by_intrinsics[0][2] = fs * s * x;
+      by_intrinsics[1][2] = fs * s * y;
+    }
+    const auto off_plane = !(q[2] == L(0.0));
+    return off_plane & camera::detail::is_finite(r[0], r[1]);
   }
 };
 

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Robust losses: how much a residual may still pull on the estimate when it is large.
+/// Robust losses, which limit the influence of large residuals, and chi-squared gates against outliers.
 ///
-/// A loss maps the *squared* norm `s` of a whitened residual to `rho(s)`, with `rho(s) ~ s` near 0;
-/// the cost of a problem is half the sum of `rho`. Widths are in units of the residual itself, not
-/// of its square: `huber{2.0}` turns linear where the residual is 2; they are positive. In iteratively reweighted
-/// least squares a residual is weighted by `rho'(s)`.
+/// A loss maps the *squared* norm `s` of a whitened residual to `rho(s)`, with `rho(s) ~ s` near 0. The cost of a
+/// problem is half the sum of `rho`. Widths are positive and in units of the residual, not of its square: `huber{2.0}`
+/// becomes linear where the norm of the residual is 2. Iteratively reweighted least squares weighs a residual by
+/// `rho'(s)`.
 ///
 /// Sources: Z. Zhang, "Parameter estimation techniques: a tutorial with application to conic
 /// fitting", Image and Vision Computing 15 (1997); M. J. Black, A. Rangarajan, "On the unification of
@@ -17,7 +17,7 @@
 
 namespace orbis::optimize {
 
-/// `loss.cost(s)` is rho(s) >= 0, `loss.weight(s)` its derivative, in [0, 1], for s >= 0.
+/// For s >= 0 `loss.cost(s)` is rho(s) >= 0, and `loss.weight(s)` its derivative, in [0, 1].
 template <class L>
 concept robust_loss = std::copyable<L> && requires(const L& loss, double squared) {
   { loss.cost(squared) } -> std::same_as<double>;
@@ -30,7 +30,7 @@ struct trivial {
   [[nodiscard]] constexpr double weight(double) const noexcept { return 1.0; }
 };
 
-/// Quadratic up to `width`, linear beyond it. Convex.
+/// Quadratic up to `width`, linear beyond. Convex.
 struct huber {
   double width = 1.0;
   [[nodiscard]] double cost(double squared) const noexcept {
@@ -41,7 +41,7 @@ struct huber {
   }
 };
 
-/// Grows as the logarithm: far residuals lose their pull, never quite all of it.
+/// Logarithmic: the influence of large residuals goes to zero, but never reaches it.
 struct cauchy {
   double width = 1.0;
   [[nodiscard]] double cost(double squared) const noexcept {
@@ -50,7 +50,7 @@ struct cauchy {
   [[nodiscard]] double weight(double squared) const noexcept { return 1.0 / (1.0 + squared / (width * width)); }
 };
 
-/// Tukey's biweight: residuals beyond `width` have no pull at all.
+/// Tukey's biweight: residuals beyond `width` have no influence.
 struct tukey {
   double width = 1.0;
   [[nodiscard]] double cost(double squared) const noexcept {
@@ -68,7 +68,7 @@ struct tukey {
   }
 };
 
-/// Saturates as a rational function; half way to its bound where the residual is `width`.
+/// Bounded: approaches `width^2` as a rational function, and is half of that where the residual is `width`.
 struct geman_mcclure {
   double width = 1.0;
   [[nodiscard]] double cost(double squared) const noexcept { return squared * share(squared); }
@@ -78,16 +78,14 @@ struct geman_mcclure {
   [[nodiscard]] double share(double squared) const noexcept { return width * width / (width * width + squared); }
 };
 
-/// Least squares within `width`, a constant beyond it: a hard decision, differentiable but at the width.
-struct truncated {
-  double width = 1.0;
-  [[nodiscard]] double cost(double squared) const noexcept {
-    return squared <= width * width ? squared : width * width;
-  }
-  [[nodiscard]] double weight(double squared) const noexcept { return squared <= width * width ? 1.0 : 0.0; }
-};
-
 static_assert(robust_loss<trivial> && robust_loss<huber> && robust_loss<cauchy> && robust_loss<tukey> &&
-              robust_loss<geman_mcclure> && robust_loss<truncated>);
+              robust_loss<geman_mcclure>);
+
+/// The 95 % quantile of the chi-squared distribution: 95 % of the correct whitened residuals with `dimension` entries
+/// have a squared norm below it. For a reprojection error `dimension` is 2, with depth 3. @pre 1 <= dimension <= 3
+[[nodiscard]] constexpr double chi_squared_gate(int dimension) noexcept {
+  constexpr double quantiles[] = {3.841, 5.991, 7.815};
+  return quantiles[dimension - 1];
+}
 
 }  // namespace orbis::optimize

@@ -6,8 +6,6 @@
 ///
 /// Sources: P. Lindstrom, "Triangulation made easy", CVPR 2010, for two views; R. Hartley, P. Sturm, "Triangulation",
 /// CVIU 68 (1997), for what is best.
-///
-/// `S` is always double: the functions are templates so that only who calls them has them compiled.
 #pragma once
 
 #include <algorithm>
@@ -21,7 +19,7 @@
 #include <Eigen/LU>
 
 #include <orbis/core/se3.hpp>
-#include <orbis/optimize/detail/sparse/small_cholesky.hpp>
+#include <orbis/optimize/detail/minimal/small_cholesky.hpp>
 
 namespace orbis::optimize {
 
@@ -69,10 +67,7 @@ namespace detail {
 }
 
 /// Moves two rays at z = 1 by the least sum of squares so that they meet. (Two steps, which is as good as many.)
-template <std::same_as<double> S = double>
-void make_rays_meet(const matrix<3, 3, S>& essential, matrix<3, 1, S>& first, matrix<3, 1, S>& second) {
-  using vec2 = matrix<2, 1, S>;
-  using mat2 = matrix<2, 2, S>;
+inline void make_rays_meet(const mat3& essential, vec3& first, vec3& second) {
   // `second` is x and `first` is x' in the paper.
   const mat2 e = essential.template topLeftCorner<2, 2>();
   vec2 n = (essential * first).template head<2>(), m = (essential.transpose() * second).template head<2>();
@@ -94,10 +89,9 @@ void make_rays_meet(const matrix<3, 3, S>& essential, matrix<3, 1, S>& first, ma
 }  // namespace detail
 
 /// The point whose projections at z = 1 are nearest to the two rays (least sum of squares). Constant time.
-template <std::same_as<double> S = double>
-[[nodiscard]] triangulation triangulate(const se3& T_world_first, const vec3& first_ray, const se3& T_world_second,
-                                        const vec3& second_ray, const triangulation_options& options = {}) {
-  using vec3 = matrix<3, 1, S>;
+[[nodiscard]] inline triangulation triangulate(const se3& T_world_first, const vec3& first_ray,
+                                               const se3& T_world_second, const vec3& second_ray,
+                                               const triangulation_options& options = {}) {
   triangulation out;
   const se3 T_second_first = T_world_second.inverse() * T_world_first;
   const vec3 seen_first = vec3(first_ray) / first_ray.z(), seen_second = vec3(second_ray) / second_ray.z();
@@ -109,7 +103,7 @@ template <std::same_as<double> S = double>
   out.parallax = detail::angle_between_directions(T_second_first.rotation() * first, second);
   out.status = triangulation_status::no_parallax;
   if (!(out.parallax >= options.min_parallax)) return out;
-  detail::make_rays_meet<S>(detail::essential_of(T_second_first), first, second);
+  detail::make_rays_meet(detail::essential_of(T_second_first), first, second);
   // In the second camera: t + depth_1 u = depth_2 v.
   const vec3 u = T_second_first.rotation() * first;
   const vec3& t = T_second_first.translation();
@@ -128,12 +122,8 @@ template <std::same_as<double> S = double>
 
 /// The same for any number of views: from the point nearest to all rays, Levenberg's and Marquardt's way down.
 /// O(views) for each of a few steps. @pre T_world_camera.size() == rays.size()
-template <std::same_as<double> S = double>
-[[nodiscard]] triangulation triangulate(std::span<const se3> T_world_camera, std::span<const vec3> rays,
-                                        const triangulation_options& options = {}) {
-  using vec2 = matrix<2, 1, S>;
-  using vec3 = matrix<3, 1, S>;
-  using mat3 = matrix<3, 3, S>;
+[[nodiscard]] inline triangulation triangulate(std::span<const se3> T_world_camera, std::span<const vec3> rays,
+                                               const triangulation_options& options = {}) {
   assert(T_world_camera.size() == rays.size());
   triangulation out;
   const std::size_t n = rays.size();
@@ -152,7 +142,7 @@ template <std::same_as<double> S = double>
     a += across;
     const vec3 from_origin = T_world_camera[i].translation() - origin;
     b += across * from_origin;
-    baseline = std::max(baseline, S(from_origin.norm()));
+    baseline = std::max(baseline, from_origin.norm());
   }
   // Two rays that are far apart: the one farthest from the first, and the one farthest from that.
   const auto farthest_from = [&](std::size_t k) {
@@ -169,7 +159,7 @@ template <std::same_as<double> S = double>
   farthest_from(farthest_from(0));
   out.status = triangulation_status::no_parallax;
   if (!(out.parallax >= options.min_parallax) || !(baseline > 0.0)) return out;
-  small_cholesky<3> factors;
+  detail::small_cholesky<3> factors;
   if (!factors.set(a) || !(factors.factor(0.0) > 0.0)) return out;
   vec3 point = factors.solve(b);
   if (!point.allFinite()) return out;
@@ -183,7 +173,7 @@ template <std::same_as<double> S = double>
       const vec2 r = xy - vec2(rays[i].x() / rays[i].z(), rays[i].y() / rays[i].z());
       sum += r.squaredNorm();
       if (h == nullptr) continue;
-      matrix<2, 3, S> j;
+      matrix<2, 3> j;
       j << inverse_z, 0.0, -xy.x() * inverse_z, 0.0, inverse_z, -xy.y() * inverse_z;
       j = (j * T_world_camera[i].rotation_matrix().transpose()).eval();
       *h += j.transpose() * j;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <orbis/camera/radial_tangential.hpp>
-#include <orbis/optimize/bal_reprojection.hpp>
 #include <orbis/optimize/detail/bundle/bundle_equations.hpp>
+#include <orbis/optimize/reprojection_with_intrinsics.hpp>
 
 #include "optimize/bundle_instances.hpp"
 #include "optimize/bundles.hpp"

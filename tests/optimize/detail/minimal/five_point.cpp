@@ -36,37 +36,6 @@ double distance(const mat3& a, const mat3& b) { return std::min((a - b).norm(), 
 
 }  // namespace
 
-TEST_CASE("The real roots of polynomials are found, wherever they lie") {
-  random_bits random(1);
-  for (int trial = 0; trial != 2000; ++trial) {
-    // Three pairs of complex roots and four real ones, some of them large.
-    std::array<double, 11> c{1.0};
-    std::size_t degree = 0;
-    std::vector<double> expected;
-    const auto times = [&](std::vector<double> factor) {
-      std::array<double, 11> product{};
-      for (std::size_t i = 0; i <= degree; ++i)
-        for (std::size_t j = 0; j != factor.size(); ++j) product[i + j] += c[i] * factor[j];
-      c = product;
-      degree += factor.size() - 1;
-    };
-    for (int k = 0; k != 3; ++k) {
-      const double re = random.uniform(-2, 2), im = random.uniform(0.3, 2);
-      times({re * re + im * im, -2.0 * re, 1.0});
-    }
-    for (int k = 0; k != 4; ++k) {
-      expected.push_back((k == 0 ? 30.0 : 1.0) * random.uniform(0.1, 1.0) + (k - 2.0) * 2.0);
-      times({-expected.back(), 1.0});
-    }
-    std::array<double, 10> roots{};
-    const std::size_t count = optimize::detail::real_roots<10>(c, roots);
-    std::sort(expected.begin(), expected.end());
-    std::sort(roots.begin(), roots.begin() + static_cast<std::ptrdiff_t>(count));
-    REQUIRE(count == 4);
-    for (std::size_t k = 0; k != 4; ++k) CHECK(roots[k] == Approx(expected[k]).epsilon(1e-5));
-  }
-}
-
 TEST_CASE("The five-point method finds the true essential matrix, and others that are ones") {
   random_bits random(7);
   std::vector<double> errors;
@@ -75,7 +44,7 @@ TEST_CASE("The five-point method finds the true essential matrix, and others tha
   for (int trial = 0; trial != 3000; ++trial) {
     const five f = random_five(random, trial % 3 == 0);
     double nearest = std::numeric_limits<double>::infinity();
-    for (const mat3& e : optimize::five_point(f.first, f.second)) {
+    for (const mat3& e : optimize::detail::five_point(f.first, f.second)) {
       ++number;
       nearest = std::min(nearest, distance(e, f.essential));
       for (std::size_t i = 0; i != 5; ++i)
@@ -98,11 +67,11 @@ TEST_CASE("The five-point method has nothing to say about bad rays") {
   random_bits random(2);
   five f = random_five(random, false);
   f.first[2].x() = std::numeric_limits<double>::quiet_NaN();
-  CHECK(optimize::five_point(f.first, f.second).empty());
+  CHECK(optimize::detail::five_point(f.first, f.second).empty());
   f = random_five(random, false);
   f.first[3] = f.first[1];
   f.second[3] = f.second[1];
-  CHECK(optimize::five_point(f.first, f.second).empty());
+  CHECK(optimize::detail::five_point(f.first, f.second).empty());
   for (std::size_t i = 0; i != 5; ++i) f.first[i] = f.second[i] = vec3(0.1, 0.2, 1.0);
-  CHECK(optimize::five_point(f.first, f.second).empty());
+  CHECK(optimize::detail::five_point(f.first, f.second).empty());
 }

@@ -9,7 +9,7 @@
 #include "support/catch.hpp"
 
 using namespace orbis;
-using namespace orbis::optimize;
+using namespace orbis::optimize::detail;
 
 namespace {
 

@@ -10,7 +10,7 @@
 #include "support/catch.hpp"
 
 using namespace orbis;
-using namespace orbis::optimize;
+using namespace orbis::optimize::detail;
 
 namespace {
 

@@ -17,7 +17,7 @@ Eigen::MatrixXd random_definite(Eigen::Index n, std::uint64_t seed) {
   for (Eigen::Index i = 0; i != a.size(); ++i) a.data()[i] = random.normal();
   return a * a.transpose() + Eigen::MatrixXd::Identity(n, n);
 }
-void fill(optimize::dense_cholesky& c, const Eigen::MatrixXd& a) {
+void fill(optimize::detail::dense_cholesky& c, const Eigen::MatrixXd& a) {
   const auto n = static_cast<std::size_t>(a.rows());
   c.resize(n);
   for (std::size_t j = 0; j != n; ++j)
@@ -32,7 +32,7 @@ TEST_CASE("Dense Cholesky solves as Eigen's does, for every size and with the sa
     const Eigen::VectorXd b = Eigen::VectorXd::LinSpaced(n, -1.0, 2.0);
     std::vector<Eigen::VectorXd> solutions;
     for (const auto level : {simd::level::portable, simd::level::avx2, simd::level::avx512}) {
-      optimize::dense_cholesky c{level};
+      optimize::detail::dense_cholesky c{level};
       fill(c, a);
       REQUIRE(c.factor());
       solutions.push_back(b);
@@ -46,7 +46,7 @@ TEST_CASE("Dense Cholesky solves as Eigen's does, for every size and with the sa
 }
 
 TEST_CASE("Dense Cholesky says where a matrix is not positive definite") {
-  optimize::dense_cholesky c;
+  optimize::detail::dense_cholesky c;
   Eigen::MatrixXd a = random_definite(20, 3);
   a.row(13).setZero();
   a.col(13).setZero();
@@ -64,7 +64,7 @@ TEST_CASE("Dense Cholesky says where a matrix is not positive definite") {
 }
 
 TEST_CASE("Dense Cholesky of a size seen before allocates nothing") {
-  optimize::dense_cholesky c;
+  optimize::detail::dense_cholesky c;
   const Eigen::MatrixXd a = random_definite(60, 4);
   Eigen::VectorXd b = Eigen::VectorXd::Ones(60);
   fill(c, a);

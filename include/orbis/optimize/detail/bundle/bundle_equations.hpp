@@ -19,13 +19,12 @@
 
 #include <orbis/core/execution.hpp>
 #include <orbis/core/simd.hpp>
-#include <orbis/optimize/bundle_summary.hpp>
+#include <orbis/optimize/bundle_problem.hpp>
 #include <orbis/optimize/detail/bundle/bundle_kernels.hpp>
 #include <orbis/optimize/detail/bundle/bundle_structure.hpp>
 #include <orbis/optimize/detail/bundle/schur_kernels.hpp>
-#include <orbis/optimize/linear_solver.hpp>
-#include <orbis/optimize/residual.hpp>
 #include <orbis/optimize/robust_loss.hpp>
+#include <orbis/optimize/solver_policies.hpp>
 
 namespace orbis::optimize::detail {
 

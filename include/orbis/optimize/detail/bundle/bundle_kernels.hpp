@@ -14,10 +14,10 @@
 
 #include <orbis/core/lanes.hpp>
 #include <orbis/core/types.hpp>
+#include <orbis/optimize/bundle_problem.hpp>
 #include <orbis/optimize/detail/bundle/bundle_lanes.hpp>
-#include <orbis/optimize/detail/bundle/loss_lanes.hpp>
-#include <orbis/optimize/reprojection.hpp>
-#include <orbis/optimize/residual.hpp>
+#include <orbis/optimize/detail/bundle/lane_residual.hpp>
+#include <orbis/optimize/detail/loss_lanes.hpp>
 
 namespace orbis::optimize::detail {
 

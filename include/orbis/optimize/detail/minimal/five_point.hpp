@@ -7,13 +7,10 @@
 /// polynomial of degree ten in z; Newton's method on the cubics gives back the digits that this costs.
 ///
 /// Source: D. Nister, "An efficient solution to the five-point relative pose problem", PAMI 26(6), 2004.
-///
-/// `S` is always double: the functions are templates so that only who calls them has them compiled.
 #pragma once
 
 #include <array>
 #include <cmath>
-#include <concepts>
 #include <cstddef>
 #include <cstdint>
 #include <utility>
@@ -23,7 +20,7 @@
 #include <orbis/core/types.hpp>
 #include <orbis/optimize/detail/minimal/real_roots.hpp>
 
-namespace orbis::optimize {
+namespace orbis::optimize::detail {
 
 /// Up to ten essential matrices, each of Frobenius norm the square root of 2.
 class five_point_solutions {
@@ -41,8 +38,6 @@ class five_point_solutions {
   std::array<mat3, 10> matrices_;
   std::size_t size_ = 0;
 };
-
-namespace detail {
 
 /// Polynomials in x, y, z: of degree 1 as coefficients of x y z 1, of degrees 2 and 3 in the order of these tables.
 namespace epipolar_cubics {
@@ -114,10 +109,7 @@ inline void add_product(cubic& sum, const quadric& a, const linear& b) noexcept 
 }
 
 /// Gauss-Newton on the cubics; false where that does not lead to a common root.
-template <std::same_as<double> S = double>
-[[nodiscard]] bool polish(const std::array<cubic, 10>& cubics, matrix<3, 1, S>& p) {
-  using vec3 = matrix<3, 1, S>;
-  using mat3 = matrix<3, 3, S>;
+[[nodiscard]] inline bool polish(const std::array<cubic, 10>& cubics, vec3& p) {
   double last = 0.0;
   vec3 previous = p;
   for (int step = 0; step != 10; ++step) {
@@ -217,17 +209,14 @@ template <std::same_as<double> S = double>
 }
 
 }  // namespace epipolar_cubics
-}  // namespace detail
 
 /// All essential matrices with `second[i]^T E first[i] = 0`; rays at z = 1 or of any length. Empty where the rays do
 /// not determine them up to ten (all in one plane through the centre, the same ray twice, say) or are not finite. Rays
 /// that differ by a rotation alone, or by nothing, are no failure here: there is a matrix for every translation.
 /// Constant time, no allocation.
-template <std::same_as<double> S = double>
-[[nodiscard]] five_point_solutions five_point(const std::array<vec3, 5>& first, const std::array<vec3, 5>& second) {
-  using vec3 = matrix<3, 1, S>;
-  using mat3 = matrix<3, 3, S>;
-  namespace poly = detail::epipolar_cubics;
+[[nodiscard]] inline five_point_solutions five_point(const std::array<vec3, 5>& first,
+                                                     const std::array<vec3, 5>& second) {
+  namespace poly = epipolar_cubics;
   five_point_solutions solutions;
   std::array<std::array<double, 9>, 5> rows;
   for (std::size_t i = 0; i != 5; ++i) {
@@ -270,7 +259,7 @@ template <std::same_as<double> S = double>
         if (i + j <= 10) determinant[i + j] += minor[i] * b[0][k][j];
   }
   std::array<double, 10> roots{};
-  const std::size_t count = detail::real_roots<10>(determinant, roots);
+  const std::size_t count = real_roots<10>(determinant, roots);
   for (std::size_t r = 0; r != count; ++r) {
     const double z = roots[r];
     mat3 at;
@@ -286,7 +275,7 @@ template <std::same_as<double> S = double>
         null = other;
     vec3 p(null.x() / null.z(), null.y() / null.z(), z);
     if (!p.allFinite()) continue;
-    if (!detail::epipolar_cubics::polish(cubics, p)) continue;
+    if (!epipolar_cubics::polish(cubics, p)) continue;
     mat3 essential;
     for (std::size_t row = 0; row != 3; ++row)
       for (std::size_t column = 0; column != 3; ++column) {
@@ -300,4 +289,4 @@ template <std::same_as<double> S = double>
   return solutions;
 }
 
-}  // namespace orbis::optimize
+}  // namespace orbis::optimize::detail

@@ -11,7 +11,6 @@
 
 #include <array>
 #include <cmath>
-#include <concepts>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -23,7 +22,7 @@
 #include <orbis/core/random.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/core/simd.hpp>
-#include <orbis/optimize/detail/sparse/wide.hpp>
+#include <orbis/optimize/detail/minimal/wide.hpp>
 
 namespace orbis::optimize::detail {
 
@@ -200,7 +199,6 @@ struct match_kernels {
   match_errors* errors;
   match_equations* equations;
 
-  template <std::same_as<double> S = double>  // so that only who estimates poses has the kernels compiled
   [[nodiscard]] static match_kernels at(simd::level level) {
 #if ORBIS_X86
     return {simd::select<match_errors>(

@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
-#include <concepts>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -15,33 +14,11 @@
 #include <span>
 #include <vector>
 
-#include <orbis/core/se3.hpp>
 #include <orbis/core/types.hpp>
 #include <orbis/optimize/detail/sparse/block_ordering.hpp>
-#include <orbis/optimize/pose_graph_summary.hpp>
+#include <orbis/optimize/pose_graph_problem.hpp>
 
-namespace orbis::optimize {
-
-/// A measured relative pose `T_from_to` between two vertices, both indices into the caller's array,
-/// with the information (inverse covariance) of the residual that the graph is solved with.
-template <class T, int Dimension = T::dof>
-struct pose_graph_edge {
-  std::uint32_t from = 0;
-  std::uint32_t to = 0;
-  T measurement{};
-  matrix<Dimension, Dimension> information = matrix<Dimension, Dimension>::Identity();
-};
-
-/// Anything with the members of `pose_graph_edge` between vertices `T`.
-template <class E, class T>
-concept relative_measurement = requires(const E& e) {
-  { e.from } -> std::convertible_to<std::uint32_t>;
-  { e.to } -> std::convertible_to<std::uint32_t>;
-  { e.measurement } -> std::convertible_to<const T&>;
-  { e.information(0, 0) } -> std::convertible_to<double>;
-};
-
-namespace detail {
+namespace orbis::optimize::detail {
 
 /// Where a check ended.
 struct pose_graph_finding {
@@ -221,6 +198,4 @@ class pose_graph_structure {
   std::vector<std::uint8_t> touched_, anchored_;
 };
 
-}  // namespace detail
-
-}  // namespace orbis::optimize
+}  // namespace orbis::optimize::detail

@@ -12,7 +12,7 @@
 #include <orbis/camera/project_lanes.hpp>
 #include <orbis/core/lanes.hpp>
 #include <orbis/core/se3.hpp>
-#include <orbis/optimize/detail/bundle/loss_lanes.hpp>
+#include <orbis/optimize/detail/loss_lanes.hpp>
 #include <orbis/optimize/reprojection.hpp>
 
 namespace orbis::optimize::detail {

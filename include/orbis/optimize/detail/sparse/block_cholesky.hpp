@@ -17,11 +17,11 @@
 
 #include <orbis/core/simd.hpp>
 #include <orbis/core/types.hpp>
-#include <orbis/optimize/detail/bundle/panel_kernels.hpp>
 #include <orbis/optimize/detail/sparse/block_ordering.hpp>
 #include <orbis/optimize/detail/sparse/block_symbolic.hpp>
+#include <orbis/optimize/detail/sparse/panel_kernels.hpp>
 
-namespace orbis::optimize {
+namespace orbis::optimize::detail {
 
 /// Analyse once, factor and solve as often as the numbers change: nothing is allocated then. The
 /// results have the same bits on every processor. Not for several threads at once.
@@ -32,7 +32,7 @@ requires(B >= 1) class block_cholesky {
 
   block_cholesky() : block_cholesky(simd::detected()) {}
   /// With the inner loops for `level`, as far as the processor has it.
-  explicit block_cholesky(simd::level level) : kernels_{detail::panel_kernels<width>::at(level)} {}
+  explicit block_cholesky(simd::level level) : kernels_{panel_kernels<width>::at(level)} {}
 
   /// Prepares for matrices of `size` blocks a side with blocks on the diagonal and at `places`.
   /// @pre every place is below `size` and off the diagonal, and none is given twice
@@ -46,9 +46,9 @@ requires(B >= 1) class block_cholesky {
       total += panels_.back().stride * width * s.columns;
       tallest = std::max(tallest, height);
     }
-    values_.assign(total + 2 * detail::panel_slack, 0.0);
-    product_.assign((tallest + 2 * detail::panel_slack) * width, 0.0);
-    product_stride_ = (tallest + detail::panel_slack) / detail::panel_slack * detail::panel_slack;
+    values_.assign(total + 2 * panel_slack, 0.0);
+    product_.assign((tallest + 2 * panel_slack) * width, 0.0);
+    product_stride_ = (tallest + panel_slack) / panel_slack * panel_slack;
     inverse_diagonal_.assign(width * size, 0.0);
     ordered_.assign(width * size, 0.0);
     place_of_row_.assign(size, 0);
@@ -263,7 +263,7 @@ requires(B >= 1) class block_cholesky {
     std::copy_n(x, width * node.columns, ordered_.begin() + offset(node.first));
   }
 
-  detail::panel_kernels<width> kernels_;
+  panel_kernels<width> kernels_;
   block_symbolic symbolic_;
   std::vector<panel> panels_;
   std::vector<target> targets_;
@@ -276,4 +276,4 @@ requires(B >= 1) class block_cholesky {
   std::uint32_t failed_block_ = 0;
 };
 
-}  // namespace orbis::optimize
+}  // namespace orbis::optimize::detail

@@ -14,7 +14,7 @@
 #include <span>
 #include <vector>
 
-namespace orbis::optimize {
+namespace orbis::optimize::detail {
 
 /// The place of one block off the diagonal. Of a symmetric matrix only one of (row, column) and
 /// (column, row) is given.
@@ -52,8 +52,6 @@ class block_adjacency {
   std::vector<std::size_t> first_{0};
   std::vector<std::uint32_t> neighbors_;
 };
-
-namespace detail {
 
 /// The quotient graph of an elimination under way. A node is a variable (not yet eliminated; it may
 /// stand for several that have the same neighbours), an element (eliminated; its list is the clique it
@@ -290,12 +288,10 @@ class quotient_graph {
   std::uint32_t lowest_ = 0;
 };
 
-}  // namespace detail
-
 /// An order of elimination by approximate minimum degree: `order[k]` is the block to eliminate as the
 /// k-th. Deterministic; about O(places) for meshes and graphs of poses.
 [[nodiscard]] inline std::vector<std::uint32_t> minimum_degree_order(const block_adjacency& graph) {
-  return detail::quotient_graph{graph}.eliminate_all();
+  return quotient_graph{graph}.eliminate_all();
 }
 
-}  // namespace orbis::optimize
+}  // namespace orbis::optimize::detail

@@ -18,7 +18,7 @@
 
 #include <orbis/optimize/detail/sparse/block_ordering.hpp>
 
-namespace orbis::optimize {
+namespace orbis::optimize::detail {
 
 /// Consecutive block columns of the factor with the same rows below them, kept as one dense panel.
 struct supernode {
@@ -53,8 +53,6 @@ struct block_symbolic {
     return std::span{updates}.subspan(first_update[target], first_update[target + 1] - first_update[target]);
   }
 };
-
-namespace detail {
 
 inline constexpr std::uint32_t no_block = std::numeric_limits<std::uint32_t>::max();
 
@@ -214,8 +212,6 @@ inline void find_updates(block_symbolic& symbolic) {
   for_each([&](std::uint32_t target, const supernode_update& u) { symbolic.updates[next[target]++] = u; });
 }
 
-}  // namespace detail
-
 /// The structure of the factor of a matrix with blocks at `places` and on the diagonal.
 /// @pre every place is below `size` and off the diagonal
 [[nodiscard]] inline block_symbolic analyze_blocks(std::size_t size, std::span<const block_place> places) {
@@ -227,17 +223,17 @@ inline void find_updates(block_symbolic& symbolic) {
   };
   symbolic.order = minimum_degree_order(graph);
   invert();
-  const auto tree = detail::elimination_tree(graph, symbolic.order, symbolic.position);
+  const auto tree = elimination_tree(graph, symbolic.order, symbolic.position);
   std::vector<std::uint32_t> renumbered;
   renumbered.reserve(size);
-  for (const std::uint32_t k : detail::postorder(tree)) renumbered.push_back(symbolic.order[k]);
+  for (const std::uint32_t k : postorder(tree)) renumbered.push_back(symbolic.order[k]);
   symbolic.order = std::move(renumbered);
   invert();
-  const auto parent = detail::elimination_tree(graph, symbolic.order, symbolic.position);
-  detail::group_columns(symbolic, parent, detail::column_counts(graph, symbolic, parent));
-  detail::find_rows(symbolic, graph);
-  detail::find_updates(symbolic);
+  const auto parent = elimination_tree(graph, symbolic.order, symbolic.position);
+  group_columns(symbolic, parent, column_counts(graph, symbolic, parent));
+  find_rows(symbolic, graph);
+  find_updates(symbolic);
   return symbolic;
 }
 
-}  // namespace orbis::optimize
+}  // namespace orbis::optimize::detail

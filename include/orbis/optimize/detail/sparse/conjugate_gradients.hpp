@@ -18,7 +18,7 @@
 #include <orbis/core/types.hpp>
 #include <orbis/optimize/detail/sparse/block_ordering.hpp>
 
-namespace orbis::optimize {
+namespace orbis::optimize::detail {
 
 /// Preconditioned with the inverses of the diagonal blocks. One iteration is O(blocks). Keeps its
 /// memory, and the blocks it was given until they are solved for. Not for several threads at once.
@@ -120,4 +120,4 @@ class block_conjugate_gradients {
   std::vector<double> residual_, direction_, image_, preconditioned_, solution_;
 };
 
-}  // namespace orbis::optimize
+}  // namespace orbis::optimize::detail

@@ -5,7 +5,6 @@
 
 #include <cassert>
 #include <cmath>
-#include <concepts>
 #include <cstddef>
 #include <span>
 #include <vector>
@@ -14,9 +13,9 @@
 
 #include <orbis/core/rounded.hpp>
 #include <orbis/core/simd.hpp>
-#include <orbis/optimize/detail/bundle/panel_kernels.hpp>
+#include <orbis/optimize/detail/sparse/panel_kernels.hpp>
 
-namespace orbis::optimize {
+namespace orbis::optimize::detail {
 
 /// Left-looking in panels of eight columns, in the instruction set that the processor has. A third of
 /// n^3 multiplications; a matrix of a size seen before allocates nothing. The factor has the same bits
@@ -25,14 +24,14 @@ class dense_cholesky {
  public:
   dense_cholesky() : dense_cholesky(simd::detected()) {}
   /// With the inner loops for `level`, as far as the processor has it.
-  explicit dense_cholesky(simd::level level) : kernels_{detail::panel_kernels<width>::at(level)} {}
+  explicit dense_cholesky(simd::level level) : kernels_{panel_kernels<width>::at(level)} {}
 
   /// Room for an n x n matrix, all of it 0.
   void resize(std::size_t n) {
     size_ = n;
     stride_ = (n + width - 1) / width * width;
-    values_.assign(stride_ * stride_ + 2 * detail::panel_slack, 0.0);
-    product_stride_ = stride_ + detail::panel_slack;
+    values_.assign(stride_ * stride_ + 2 * panel_slack, 0.0);
+    product_stride_ = stride_ + panel_slack;
     product_.resize(product_stride_ * width);
     inverse_diagonal_.resize(stride_);
     given_.resize(stride_);
@@ -75,16 +74,14 @@ class dense_cholesky {
   [[nodiscard]] std::size_t failed_row() const { return failed_row_; }
 
   /// Replaces the right-hand side in `x` by the solution. @pre the last `factor` returned true
-  template <std::same_as<double> S = double>  // so that only who calls it has it compiled
   void solve(std::span<double> x) const {
     assert(x.size() == size_);
     const auto n = static_cast<Eigen::Index>(size_);
-    using MatrixXd = Eigen::Matrix<S, Eigen::Dynamic, Eigen::Dynamic>;
-    const Eigen::Map<const MatrixXd, Eigen::Unaligned, Eigen::OuterStride<>> l(
+    const Eigen::Map<const Eigen::MatrixXd, Eigen::Unaligned, Eigen::OuterStride<>> l(
         values_.data(), n, n, Eigen::OuterStride<>(static_cast<Eigen::Index>(stride_)));
-    Eigen::Map<Eigen::Matrix<S, Eigen::Dynamic, 1>> y(x.data(), n);
-    l.template triangularView<Eigen::Lower>().solveInPlace(y);
-    l.template triangularView<Eigen::Lower>().transpose().solveInPlace(y);
+    Eigen::Map<Eigen::VectorXd> y(x.data(), n);
+    l.triangularView<Eigen::Lower>().solveInPlace(y);
+    l.triangularView<Eigen::Lower>().transpose().solveInPlace(y);
   }
 
  private:
@@ -102,9 +99,9 @@ class dense_cholesky {
     return true;
   }
 
-  detail::panel_kernels<width> kernels_;
+  panel_kernels<width> kernels_;
   std::size_t size_ = 0, stride_ = 0, product_stride_ = 0, failed_row_ = 0;
   std::vector<double> values_, product_, inverse_diagonal_, given_;
 };
 
-}  // namespace orbis::optimize
+}  // namespace orbis::optimize::detail

@@ -1,0 +1,271 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Automatic Jacobians: a bundle adjustment residual that is written once, for any number type.
+///
+/// @code
+///   struct bearing {  // the direction from the camera to the point against the one observed
+///     template <class S>
+///     matrix<3, 1, S> operator()(const optimize::rigid<S>& T_world_camera, const matrix<3, 1, S>& point,
+///                                const bearing_observation& o) const {
+///       return (T_world_camera.inverse() * point).normalized() - o.direction.cast<S>();
+///     }
+///   };
+///   optimize::automatic_bundle_residual<bearing, optimize::lie_group<se3>, bearing_observation> residual{bearing{}};
+///   optimize::bundle_adjuster ba{residual, optimize::huber{2.0}};
+/// @endcode
+#pragma once
+
+#include <cmath>
+#include <concepts>
+#include <limits>
+#include <optional>
+#include <utility>
+
+#include <Eigen/Core>
+
+#include <orbis/core/se3.hpp>
+#include <orbis/core/types.hpp>
+#include <orbis/optimize/bundle_problem.hpp>
+
+namespace orbis::optimize {
+
+/// A dual number: a value together with its derivatives by N variables. Every operation carries both, exactly up to
+/// rounding. Mathematical functions are found by argument-dependent lookup: write `using std::sqrt; sqrt(x)`.
+/// Comparisons compare the values only.
+/// Source: A. Griewank, A. Walther, "Evaluating Derivatives", 2nd edition, SIAM 2008, chapter 3 (forward mode).
+template <int N>
+struct dual {
+  double value = 0.0;
+  matrix<N> slope = matrix<N>::Zero();  ///< the derivatives of `value`
+
+  dual() = default;
+  /// A constant.
+  dual(double x) : value{x} {}  // NOLINT(google-explicit-constructor)
+  dual(double x, const matrix<N>& derivatives) : value{x}, slope{derivatives} {}
+  /// The i-th of the N variables, at the value `x`. @pre 0 <= i < N
+  [[nodiscard]] static dual variable(double x, int i) { return {x, matrix<N>::Unit(i)}; }
+
+  dual& operator+=(const dual& b) { return *this = *this + b; }
+  dual& operator-=(const dual& b) { return *this = *this - b; }
+  dual& operator*=(const dual& b) { return *this = *this * b; }
+  dual& operator/=(const dual& b) { return *this = *this / b; }
+
+  friend dual operator+(const dual& a) { return a; }
+  friend dual operator-(const dual& a) { return {-a.value, -a.slope}; }
+  friend dual operator+(const dual& a, const dual& b) { return {a.value + b.value, a.slope + b.slope}; }
+  friend dual operator-(const dual& a, const dual& b) { return {a.value - b.value, a.slope - b.slope}; }
+  friend dual operator*(const dual& a, const dual& b) {
+    return {a.value * b.value, a.value * b.slope + b.value * a.slope};
+  }
+  friend dual operator/(const dual& a, const dual& b) {
+    const double quotient = a.value / b.value;
+    return {quotient, (a.slope - quotient * b.slope) / b.value};
+  }
+
+  friend bool operator==(const dual& a, const dual& b) { return a.value == b.value; }
+  friend auto operator<=>(const dual& a, const dual& b) { return a.value <=> b.value; }
+
+  friend bool isfinite(const dual& a) { return std::isfinite(a.value) && a.slope.allFinite(); }
+  friend bool isnan(const dual& a) { return std::isnan(a.value) || a.slope.hasNaN(); }
+  friend bool isinf(const dual& a) { return std::isinf(a.value); }
+
+  friend dual abs(const dual& a) { return a.value < 0.0 ? -a : a; }
+  friend dual sqrt(const dual& a) {
+    const double root = std::sqrt(a.value);
+    return {root, a.slope * (0.5 / root)};
+  }
+  friend dual exp(const dual& a) {
+    const double e = std::exp(a.value);
+    return {e, e * a.slope};
+  }
+  friend dual log(const dual& a) { return {std::log(a.value), a.slope / a.value}; }
+  friend dual log1p(const dual& a) { return {std::log1p(a.value), a.slope / (1.0 + a.value)}; }
+  friend dual sin(const dual& a) { return {std::sin(a.value), std::cos(a.value) * a.slope}; }
+  friend dual cos(const dual& a) { return {std::cos(a.value), -std::sin(a.value) * a.slope}; }
+  friend dual tan(const dual& a) {
+    const double t = std::tan(a.value);
+    return {t, (1.0 + t * t) * a.slope};
+  }
+  friend dual asin(const dual& a) { return {std::asin(a.value), a.slope / std::sqrt(1.0 - a.value * a.value)}; }
+  friend dual acos(const dual& a) { return {std::acos(a.value), -a.slope / std::sqrt(1.0 - a.value * a.value)}; }
+  friend dual atan(const dual& a) { return {std::atan(a.value), a.slope / (1.0 + a.value * a.value)}; }
+  friend dual sinh(const dual& a) { return {std::sinh(a.value), std::cosh(a.value) * a.slope}; }
+  friend dual cosh(const dual& a) { return {std::cosh(a.value), std::sinh(a.value) * a.slope}; }
+  friend dual tanh(const dual& a) {
+    const double t = std::tanh(a.value);
+    return {t, (1.0 - t * t) * a.slope};
+  }
+  friend dual atan2(const dual& y, const dual& x) {
+    const double square = x.value * x.value + y.value * y.value;
+    return {std::atan2(y.value, x.value), (x.value * y.slope - y.value * x.slope) / square};
+  }
+  friend dual hypot(const dual& a, const dual& b) {
+    const double h = std::hypot(a.value, b.value);
+    return {h, (a.value / h) * a.slope + (b.value / h) * b.slope};
+  }
+  friend dual pow(const dual& a, double b) {
+    return {std::pow(a.value, b), (b == 0.0 ? 0.0 : b * std::pow(a.value, b - 1.0)) * a.slope};
+  }
+  friend dual pow(const dual& a, const dual& b) {
+    const double p = std::pow(a.value, b.value);
+    return {p, b.value * std::pow(a.value, b.value - 1.0) * a.slope + p * std::log(a.value) * b.slope};
+  }
+  friend dual min(const dual& a, const dual& b) { return b.value < a.value ? b : a; }
+  friend dual max(const dual& a, const dual& b) { return a.value < b.value ? b : a; }
+};
+
+/// The value without its derivatives, for comparisons in code that is written for any number type.
+[[nodiscard]] inline double value_of(double x) noexcept { return x; }
+template <int N>
+[[nodiscard]] double value_of(const dual<N>& x) noexcept {
+  return x.value;
+}
+
+}  // namespace orbis::optimize
+
+template <int N>
+struct Eigen::NumTraits<orbis::optimize::dual<N>> : Eigen::NumTraits<double> {
+  using Real = orbis::optimize::dual<N>;
+  using NonInteger = orbis::optimize::dual<N>;
+  using Nested = orbis::optimize::dual<N>;
+  using Literal = orbis::optimize::dual<N>;
+  enum {
+    IsComplex = 0,
+    IsInteger = 0,
+    IsSigned = 1,
+    RequireInitialization = 1,
+    ReadCost = 1 + N,
+    AddCost = 1 + N,
+    MulCost = 3 + 2 * N
+  };
+};
+template <int N, class Operation>
+struct Eigen::ScalarBinaryOpTraits<orbis::optimize::dual<N>, double, Operation> {
+  using ReturnType = orbis::optimize::dual<N>;
+};
+template <int N, class Operation>
+struct Eigen::ScalarBinaryOpTraits<double, orbis::optimize::dual<N>, Operation> {
+  using ReturnType = orbis::optimize::dual<N>;
+};
+
+namespace orbis::optimize {
+
+/// A rigid transform with entries of any number type.
+template <class S>
+struct rigid {
+  matrix<3, 3, S> rotation;
+  matrix<3, 1, S> translation;
+
+  [[nodiscard]] friend matrix<3, 1, S> operator*(const rigid& t, const matrix<3, 1, S>& p) {
+    return t.rotation * p + t.translation;
+  }
+  [[nodiscard]] friend rigid operator*(const rigid& a, const rigid& b) {
+    return {a.rotation * b.rotation, a * b.translation};
+  }
+  [[nodiscard]] rigid inverse() const {
+    const matrix<3, 3, S> back = rotation.transpose();
+    return {back, -(back * translation)};
+  }
+};
+
+/// How an estimate on the manifold M is written with any number type: `lift<M>::at(m, p, d)` is what a residual gets
+/// for the estimate a step `d` away from `p`. It must be correct to first order in `d`, which has `M::dimension`
+/// entries. Specialise it for camera manifolds of your own.
+template <class M>
+struct lift;
+
+/// Poses become a `rigid<S>`.
+template <>
+struct lift<lie_group<se3>> {
+  template <class S>
+  [[nodiscard]] static rigid<S> at(const lie_group<se3>&, const se3& p, const matrix<6, 1, S>& d) {
+    const matrix<3, 1, S> rho = d.template head<3>(), phi = d.template tail<3>();
+    const matrix<3, 3, S> rotation = p.rotation_matrix().template cast<S>();
+    return {rotation * (matrix<3, 3, S>::Identity() + hat<S>(phi)),
+            p.translation().template cast<S>() + rotation * rho};
+  }
+};
+
+/// Vectors become vectors.
+template <int N>
+struct lift<euclidean<N>> {
+  template <class S>
+  [[nodiscard]] static matrix<N, 1, S> at(const euclidean<N>&, const matrix<N>& p, const matrix<N, 1, S>& d) {
+    return p.template cast<S>() + d;
+  }
+};
+
+/// A camera manifold for which `lift` is specialised.
+template <class M>
+concept liftable = camera_manifold<M> &&
+    requires(const M& m, const typename M::point& p, const matrix<M::dimension>& d) {
+  lift<M>::template at<double>(m, p, d);
+};
+
+namespace detail {
+
+/// How many numbers a vector, or an `optional` of one, has.
+template <class R>
+inline constexpr int residual_size = R::RowsAtCompileTime;
+template <class R>
+inline constexpr int residual_size<std::optional<R>> = R::RowsAtCompileTime;
+
+}  // namespace detail
+
+/// A residual for `bundle_adjuster` made of `f(camera, point, observation)`; satisfies `bundle_residual`. `camera` is
+/// what `lift` makes of a `M::point`, `point` a vector of the same number type, in the world frame. `f` returns a
+/// vector of fixed size, not yet whitened, or an `optional` of one (empty: no projection). One evaluation of `f` on
+/// dual numbers gives all derivatives. Costs several times an analytic residual.
+template <std::copyable F, liftable M, class Observation = bundle_observation>
+struct automatic_bundle_residual {
+  F f;
+  M manifold{};
+
+  automatic_bundle_residual(F function, M space = {}) : f{std::move(function)}, manifold{std::move(space)} {}
+
+  using camera_state = typename M::point;
+  using camera_manifold = M;
+  using observation = Observation;
+  using view = camera_state;
+  static constexpr int dimension = detail::residual_size<decltype(std::declval<const F&>()(
+      lift<M>::template at<double>(std::declval<const M&>(), std::declval<const camera_state&>(),
+                                   std::declval<const matrix<M::dimension>&>()),
+      std::declval<const vec3&>(), std::declval<const Observation&>()))>;
+  using value_type = std::optional<matrix<dimension>>;
+
+  [[nodiscard]] static view prepare(const camera_state& state) { return state; }
+  [[nodiscard]] static bool is_usable(const observation& o) {
+    return o.information > 0.0 && std::isfinite(o.information);
+  }
+  /// Empty where `f` says so, and where a value is not finite.
+  [[nodiscard]] value_type residual(const view& v, const vec3& point, const observation& o) const {
+    const value_type r = f(lift<M>::template at<double>(manifold, v, matrix<M::dimension>::Zero()), point, o);
+    return r && r->allFinite() ? r : std::nullopt;
+  }
+  /// The residual and its derivatives, which are unchanged where it is empty.
+  [[nodiscard]] value_type linearize(const view& v, const vec3& point, const observation& o,
+                                     matrix<dimension, M::dimension>& by_camera, matrix<dimension, 3>& by_point) const {
+    constexpr int n = M::dimension + 3;
+    using number = dual<n>;
+    matrix<M::dimension, 1, number> step;
+    for (int i = 0; i != M::dimension; ++i) step[i] = number::variable(0.0, i);
+    matrix<3, 1, number> p;
+    for (int i = 0; i != 3; ++i) p[i] = number::variable(point[i], M::dimension + i);
+    const std::optional<matrix<dimension, 1, number>> r = f(lift<M>::template at<number>(manifold, v, step), p, o);
+    if (!r) return std::nullopt;
+    matrix<dimension> values;
+    matrix<dimension, n> all;
+    for (int i = 0; i != dimension; ++i) {
+      values[i] = (*r)[i].value;
+      all.row(i) = (*r)[i].slope.transpose();
+    }
+    if (!values.allFinite() || !all.allFinite()) return std::nullopt;
+    by_camera = all.template leftCols<M::dimension>();
+    by_point = all.template rightCols<3>();
+    return values;
+  }
+};
+template <class F, class M>
+automatic_bundle_residual(F, M) -> automatic_bundle_residual<F, M>;
+
+}  // namespace orbis::optimize

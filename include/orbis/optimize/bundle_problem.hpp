@@ -1,0 +1,189 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// The parts of a bundle adjustment problem: observations, the concept of a residual, options and summary.
+#pragma once
+
+#include <concepts>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include <orbis/core/types.hpp>
+
+namespace orbis::optimize {
+
+/// Observation of the point `point` by the camera `pose`; both are indices into the caller's arrays.
+struct bundle_observation {
+  std::uint32_t pose = 0;
+  std::uint32_t point = 0;
+  vec2 pixel = vec2::Zero();
+  double right = std::numeric_limits<double>::quiet_NaN();  ///< as in `pose_observation`; NaN without depth
+  double information = 1.0;                                 ///< 1 / sigma^2 of the pixel, 1 / pixel^2
+};
+
+/// The type of what is estimated for a camera, and how a step changes it: `m.retract(p, d)` is the estimate that the
+/// step `d` leads to from `p`, with `retract(p, 0) == p`. A step has `M::dimension` entries.
+template <class M>
+concept camera_manifold = std::copyable<M> &&
+    requires(const M& m, const typename M::point& p, const typename M::tangent& d) {
+  { m.retract(p, d) } -> std::same_as<typename M::point>;
+  requires std::same_as<typename M::tangent, matrix<M::dimension>>;
+};
+
+/// A Lie group whose steps act on the right: `T * exp(d)`. For a pose `T_world_camera` the step is in the camera frame.
+template <class T>
+struct lie_group {
+  using point = T;
+  using tangent = typename T::tangent;
+  static constexpr int dimension = T::dof;
+  [[nodiscard]] static point retract(const point& p, const tangent& d) { return p * T::exp(d); }
+};
+
+/// Vectors of N numbers; a step is added.
+template <int N>
+struct euclidean {
+  using point = matrix<N>;
+  using tangent = matrix<N>;
+  static constexpr int dimension = N;
+  [[nodiscard]] static point retract(const point& p, const tangent& d) { return p + d; }
+};
+
+/// An observation names its camera `pose` and its `point` by index. `information` is 1 / sigma^2, the weight of its
+/// squared residual.
+template <class O>
+concept observation_of_a_point = std::copyable<O> && requires(const O& o) {
+  { o.pose } -> std::convertible_to<std::uint32_t>;
+  { o.point } -> std::convertible_to<std::uint32_t>;
+  { o.information } -> std::convertible_to<double>;
+};
+
+/// The residual of one observation of a point by a camera.
+///
+/// - `R::camera_state` is what is estimated for each camera (a pose, or a pose with intrinsics);
+///   `R::camera_manifold` says how steps change it;
+/// - `r.prepare(state)` computes what all observations by one camera share, an `R::view`; it is called once per
+///   camera and linearisation;
+/// - `r.is_usable(o)` is false for an observation that must be left out, for example one that is not finite;
+/// - `r.residual(view, point, o)` is a vector of `R::dimension` numbers, not yet whitened, or empty where the point has
+///   no projection. `point` is in the world frame;
+/// - `r.linearize(view, point, o, by_camera, by_point)` returns the same vector and writes its derivatives by a step
+///   of the camera and by the point.
+template <class R>
+concept bundle_residual = std::copyable<R> && camera_manifold<typename R::camera_manifold> &&
+    observation_of_a_point<typename R::observation> &&
+    std::same_as<typename R::camera_manifold::point, typename R::camera_state> &&
+    requires(const R& r, const typename R::camera_state& state, const typename R::view& view, const vec3& point,
+             const typename R::observation& o, matrix<R::dimension, R::camera_manifold::dimension>& by_camera,
+             matrix<R::dimension, 3>& by_point) {
+  { r.prepare(state) } -> std::same_as<typename R::view>;
+  { r.is_usable(o) } -> std::same_as<bool>;
+  { r.residual(view, point, o) } -> std::same_as<std::optional<matrix<R::dimension>>>;
+  { r.linearize(view, point, o, by_camera, by_point) } -> std::same_as<std::optional<matrix<R::dimension>>>;
+};
+
+/// A residual that depends on the point only through its coordinates q in the camera frame. Its camera is a pose
+/// with steps `T_world_camera * exp(d)`, followed by `R::intrinsic_dimension` more parameters. All derivatives are
+/// then products of the derivative by q with R_camera_world and with (-I, hat(q)), and the solver needs half the
+/// arithmetic. The view has the members `rotation` (R_camera_world) and `translation`.
+template <class R>
+concept camera_frame_residual =
+    bundle_residual<R> && R::camera_manifold::dimension ==
+    6 + R::intrinsic_dimension&& requires(const R& r, const typename R::view& view, const vec3& q,
+                                          const typename R::observation& o, matrix<R::dimension, 3>& by_q,
+                                          matrix<R::dimension, R::intrinsic_dimension>& by_intrinsics) {
+  { view.rotation } -> std::convertible_to<mat3>;
+  { view.translation } -> std::convertible_to<vec3>;
+  { r.residual_in_camera(view, q, o) } -> std::same_as<std::optional<matrix<R::dimension>>>;
+  { r.linearize_in_camera(view, q, o, by_q, by_intrinsics) } -> std::same_as<std::optional<matrix<R::dimension>>>;
+};
+
+/// What fixes the directions that no observation determines: position and rotation of the whole and, without depth,
+/// its scale.
+enum class bundle_gauge {
+  damped,       ///< the fixed poses; the damping of the steps holds what they leave free
+  first_camera  ///< the fixed poses; without any, the first camera with observations, its intrinsics included
+};
+
+struct bundle_options {
+  int max_iterations = 10;
+  double relative_tolerance = 1e-6;              ///< stop when a step lowers the cost by less than this fraction
+  double gradient_tolerance = 0.0;               ///< stop when no entry of the gradient is larger
+  std::span<const std::uint8_t> fixed_poses{};   ///< empty, or one entry per pose: nonzero keeps the pose fixed
+  std::span<const std::uint8_t> fixed_points{};  ///< empty, or one entry per point: nonzero keeps the point fixed
+  std::span<const std::uint8_t> ignored{};       ///< empty, or one entry per observation: nonzero leaves it out
+  bundle_gauge hold = bundle_gauge::damped;
+};
+
+enum class bundle_status {
+  converged,
+  iteration_limit,
+  cancelled,
+  no_progress,       ///< no step lowers the cost, although the model predicts that one should
+  nothing_to_do,     ///< no usable observation, or nothing that may move
+  missing_pose,      ///< observation `where` names a pose that does not exist
+  missing_point,     ///< observation `where` names a point that does not exist
+  bad_pose,          ///< pose `where` has observations and is not finite
+  undetermined_pose  ///< pose `where`, or a point it sees, is not determined by the observations and not damped
+};
+
+/// Whether the input was at fault. The caller's arrays are then unchanged, except for the steps taken before a pose
+/// proved to be `undetermined_pose`.
+[[nodiscard]] constexpr bool is_failure(bundle_status status) noexcept { return status >= bundle_status::missing_pose; }
+
+/// The status in words.
+[[nodiscard]] constexpr std::string_view to_string(bundle_status status) noexcept {
+  switch (status) {
+    case bundle_status::converged: return "converged";
+    case bundle_status::iteration_limit: return "iteration limit";
+    case bundle_status::cancelled: return "cancelled";
+    case bundle_status::no_progress: return "no progress";
+    case bundle_status::nothing_to_do: return "nothing to do";
+    case bundle_status::missing_pose: return "an observation names a pose that there is not";
+    case bundle_status::missing_point: return "an observation names a point that there is not";
+    case bundle_status::bad_pose: return "a pose is not finite";
+    case bundle_status::undetermined_pose: return "a pose is not determined by the observations";
+  }
+  return "unknown";
+}
+
+/// Time spent in each stage, seconds.
+struct bundle_times {
+  double set_up = 0.0;           ///< checks, ordering, structure of the reduced system
+  double linearize = 0.0;        ///< residuals, Jacobians, normal equations
+  double schur = 0.0;            ///< elimination of the points
+  double factor = 0.0;           ///< factorisation of the reduced system
+  double solve = 0.0;            ///< solution of the reduced system
+  double back_substitute = 0.0;  ///< steps of the points
+  double evaluate = 0.0;         ///< cost of each step that was tried
+};
+
+struct bundle_summary {
+  bundle_status status = bundle_status::nothing_to_do;
+  std::size_t where = 0;           ///< the observation or pose that a failure is about
+  double initial_cost = 0.0;       ///< half the sum of the robust loss over the observations
+  double final_cost = 0.0;         ///< never above `initial_cost`
+  double gradient = 0.0;           ///< largest entry of the gradient where the last step began
+  int iterations = 0;              ///< steps taken
+  int steps_tried = 0;             ///< steps taken and steps rejected
+  int linear_iterations = 0;       ///< iterations of an iterative solver of the reduced system
+  std::size_t observations = 0;    ///< observations that took part
+  std::size_t left_out = 0;        ///< not ignored, but not finite or without a projection at the start
+  std::size_t first_left_out = 0;  ///< the first of these
+  bundle_times seconds;
+};
+
+/// The status in words, for a failure with the number of the observation or pose.
+[[nodiscard]] inline std::string to_string(const bundle_summary& s) {
+  std::string text{to_string(s.status)};
+  if (is_failure(s.status)) {
+    const bool of_observation = s.status == bundle_status::missing_pose || s.status == bundle_status::missing_point;
+    text += (of_observation ? ": observation " : ": pose ") + std::to_string(s.where);
+  }
+  return text;
+}
+
+}  // namespace orbis::optimize

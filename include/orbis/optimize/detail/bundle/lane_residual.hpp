@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Residuals that the kernels of bundle adjustment evaluate for eight observations at a time.
+#pragma once
+
+#include <concepts>
+
+#include <orbis/core/lanes.hpp>
+#include <orbis/optimize/bundle_problem.hpp>
+
+namespace orbis::optimize::detail {
+
+/// A `camera_frame_residual` that evaluates eight observations by one camera at once. `measure(o, to)` writes what it
+/// needs of an observation to `to[8 * i]`, i < `R::measured`. `lanes_in_camera<Derive>(view, measurements, q, r, by_q,
+/// by_intrinsics)` is `linearize_in_camera` on all eight (without `Derive`: `residual_in_camera`) and returns which of
+/// them have a projection.
+template <class R>
+concept lane_residual = camera_frame_residual<R> &&
+    requires(const R& r, const typename R::observation& o, const typename R::view& view, double* to,
+             simd::lanes<2>* lanes, simd::lanes<2> (*by_q)[3],
+             simd::lanes<2> (*by_intrinsics)[R::intrinsic_dimension == 0 ? 1 : R::intrinsic_dimension]) {
+  {r.measure(o, to)};
+  {
+    r.template lanes_in_camera<true>(view, to, lanes, lanes, by_q, by_intrinsics)
+    } -> std::same_as<simd::lanes<2>::mask>;
+};
+
+}  // namespace orbis::optimize::detail

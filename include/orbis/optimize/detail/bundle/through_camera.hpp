@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Derivatives of a `camera_frame_residual` by the camera and by the point in the world.
+#pragma once
+
+#include <optional>
+
+#include <orbis/core/types.hpp>
+#include <orbis/optimize/bundle_problem.hpp>
+
+namespace orbis::optimize::detail {
+
+/// `linearize`, derived from `linearize_in_camera`.
+template <class R>
+[[nodiscard]] std::optional<matrix<R::dimension>> linearize_through_camera(
+    const R& residual, const typename R::view& view, const vec3& point, const typename R::observation& o,
+    matrix<R::dimension, 6 + R::intrinsic_dimension>& by_camera, matrix<R::dimension, 3>& by_point) {
+  const vec3 q = view.rotation * point + view.translation;
+  matrix<R::dimension, 3> by_q;
+  matrix<R::dimension, R::intrinsic_dimension> by_intrinsics;
+  const auto r = residual.linearize_in_camera(view, q, o, by_q, by_intrinsics);
+  if (!r) return r;
+  by_camera.template leftCols<3>() = -by_q;
+  by_camera.template middleCols<3>(3) = by_q * hat<double>(q);
+  if constexpr (R::intrinsic_dimension != 0) by_camera.template rightCols<R::intrinsic_dimension>() = by_intrinsics;
+  by_point = by_q * view.rotation;
+  return r;
+}
+
+}  // namespace orbis::optimize::detail

@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Robust losses on eight residuals at a time.
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+#include <orbis/core/lanes.hpp>
+#include <orbis/optimize/robust_loss.hpp>
+
+namespace orbis::optimize::detail {
+
+/// `lanes_of_loss<Loss>::weigh(loss, s, cost, weight)`: rho(s) and its derivative, up to rounding, for
+/// finite s >= 0. It exists for every loss; for those without a specialisation it asks them eight times.
+template <robust_loss Loss>
+struct lanes_of_loss {
+  template <simd::lane_vector L>
+  static ORBIS_ALWAYS_INLINE void weigh(const Loss& loss, const L& squared, L& cost, L& weight) {
+    values s, c, w;
+    squared.store(s.data());
+    weigh_each(loss, s, c, w);
+    cost = L::load(c.data());
+    weight = L::load(w.data());
+  }
+
+ private:
+  using values = std::array<double, simd::lane_count>;
+  /// Kept out of the kernels, which are compiled for instruction sets that might round it otherwise.
+  [[gnu::noinline]] static void weigh_each(const Loss& loss, const values& squared, values& cost, values& weight) {
+    for (std::size_t i = 0; i != squared.size(); ++i) {
+      cost[i] = loss.cost(squared[i]);
+      weight[i] = loss.weight(squared[i]);
+    }
+  }
+};
+
+template <>
+struct lanes_of_loss<trivial> {
+  template <simd::lane_vector L>
+  static ORBIS_ALWAYS_INLINE void weigh(const trivial&, const L& squared, L& cost, L& weight) {
+    cost = squared;
+    weight = 1.0;
+  }
+};
+
+template <>
+struct lanes_of_loss<huber> {
+  template <simd::lane_vector L>
+  static ORBIS_ALWAYS_INLINE void weigh(const huber& loss, const L& squared, L& cost, L& weight) {
+    const double bound = loss.width * loss.width;
+    const auto inside = squared <= L(bound);
+    const L pull = loss.width * simd::reciprocal_root(select(inside, L(1.0), squared));
+    cost = select(inside, squared, 2.0 * (squared * pull) - bound);
+    weight = select(inside, L(1.0), pull);
+  }
+};
+
+template <>
+struct lanes_of_loss<tukey> {
+  template <simd::lane_vector L>
+  static ORBIS_ALWAYS_INLINE void weigh(const tukey& loss, const L& squared, L& cost, L& weight) {
+    const double bound = loss.width * loss.width;
+    const L rest = select(squared < L(bound), 1.0 - squared * (1.0 / bound), L(0.0));
+    weight = rest * rest;
+    cost = (bound / 3.0) * (1.0 - weight * rest);
+  }
+};
+
+template <>
+struct lanes_of_loss<geman_mcclure> {
+  template <simd::lane_vector L>
+  static ORBIS_ALWAYS_INLINE void weigh(const geman_mcclure& loss, const L& squared, L& cost, L& weight) {
+    const double bound = loss.width * loss.width;
+    const L share = bound / (bound + squared);
+    cost = squared * share;
+    weight = share * share;
+  }
+};
+
+}  // namespace orbis::optimize::detail

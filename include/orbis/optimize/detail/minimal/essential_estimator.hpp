@@ -1,0 +1,239 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// The estimator of RANSAC for essential matrices.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include <Eigen/LU>
+
+#include <orbis/core/jacobi.hpp>
+#include <orbis/core/se3.hpp>
+#include <orbis/core/types.hpp>
+#include <orbis/optimize/detail/minimal/descent.hpp>
+#include <orbis/optimize/detail/minimal/five_point.hpp>
+#include <orbis/optimize/detail/minimal/horn.hpp>
+#include <orbis/optimize/detail/minimal/image_matches.hpp>
+#include <orbis/optimize/detail/minimal/small_cholesky.hpp>
+#include <orbis/optimize/detail/minimal/unit_sphere.hpp>
+#include <orbis/optimize/detail/minimal/wide.hpp>
+#include <orbis/optimize/ransac.hpp>
+
+namespace orbis::optimize::detail {
+
+/// The four poses `T_second_first` (translations of length 1) that an essential matrix may stand for.
+[[nodiscard]] inline std::array<se3, 4> decompose_essential(const mat3& essential) {
+  auto [u, values, v] = singular_values_of<3>(mat3(essential));
+  if (u.determinant() < 0.0) u.col(2) = -u.col(2).eval();
+  if (v.determinant() < 0.0) v.col(2) = -v.col(2).eval();
+  mat3 quarter;
+  quarter << 0, -1, 0, 1, 0, 0, 0, 0, 1;
+  const so3 one(mat3(u * quarter * v.transpose())), other(mat3(u * quarter.transpose() * v.transpose()));
+  const vec3 t = u.col(2);
+  return {se3(one, t), se3(one, -t), se3(other, t), se3(other, -t)};
+}
+
+/// A ray's part in Sampson distances: gradients at z = 1 become gradients by pixel.
+struct pixel_gradient {
+  double xx, yx, yy;
+  explicit pixel_gradient(const metric_ray& r) : xx{1.0 / r.xx}, yx{-r.xy / (r.xx * r.yy)}, yy{1.0 / r.yy} {}
+  [[nodiscard]] vec2 operator()(double gx, double gy) const { return {xx * gx, yx * gx + yy * gy}; }
+  /// The transpose.
+  [[nodiscard]] vec2 back(const vec2& g) const { return {xx * g.x() + yx * g.y(), yy * g.y()}; }
+};
+
+class essential_estimator {
+ public:
+  using model = mat3;
+  static constexpr std::size_t sample_size = 5;
+
+  explicit essential_estimator(const std::vector<image_match>& matches) : matches_{matches} {
+    stride_ = (matches.size() + consensus_block - 1) / consensus_block * consensus_block;
+    columns_.assign(10 * stride_, 0.0F);
+    for (std::size_t i = 0; i != matches.size(); ++i) {
+      const image_match& m = matches[i];
+      const pixel_gradient a(m.first), b(m.second);
+      const std::array values{m.first.x, m.first.y, m.second.x, m.second.y, a.xx, a.yx, a.yy, b.xx, b.yx, b.yy};
+      for (std::size_t k = 0; k != values.size(); ++k) columns_[k * stride_ + i] = static_cast<float>(values[k]);
+    }
+  }
+
+  [[nodiscard]] std::size_t size() const noexcept { return matches_.size(); }
+  [[nodiscard]] five_point_solutions fit(const std::array<std::uint32_t, 5>& sample) const {
+    std::array<vec3, 5> first, second;
+    for (std::size_t i = 0; i != 5; ++i) {
+      first[i] = matches_[sample[i]].first.direction();
+      second[i] = matches_[sample[i]].second.direction();
+    }
+    return five_point(first, second);
+  }
+
+  [[nodiscard]] double squared_error(const mat3& e, std::size_t i) const {
+    const image_match& m = matches_[i];
+    const vec3 first = m.first.direction(), second = m.second.direction();
+    const vec3 line = e * first, other = e.transpose() * second;
+    const double c = second.dot(line);
+    return c * c /
+           (pixel_gradient(m.second)(line.x(), line.y()).squaredNorm() +
+            pixel_gradient(m.first)(other.x(), other.y()).squaredNorm());
+  }
+
+  void squared_errors(const mat3& e, std::size_t first, std::span<float, consensus_block> out) const {
+    using namespace wide;
+    using V = numbers<float, 4>;
+    V m[9];
+    unrolled<9>([&](auto k) { fill(m[k], static_cast<float>(e(static_cast<int>(k / 3), static_cast<int>(k % 3)))); });
+    for (std::size_t i = 0; i != consensus_block; i += 4) {
+      const float* const at = columns_.data() + first + i;
+      V v[10];
+      unrolled<10>([&](auto k) { load(v[k], at + k * stride_); });
+      V line[3] = {m[2], m[5], m[8]}, other[2] = {m[6], m[7]}, c;
+      unrolled<3>([&](auto k) {
+        add_product(line[k], m[3 * k], v[0]);
+        add_product(line[k], m[3 * k + 1], v[1]);
+      });
+      unrolled<2>([&](auto k) {
+        add_product(other[k], m[k], v[2]);
+        add_product(other[k], m[3 + k], v[3]);
+      });
+      c = line[2];
+      add_product(c, line[0], v[2]);
+      add_product(c, line[1], v[3]);
+      V g, sum{}, cc;
+      const auto add_gradient = [&](const V& gx, const V& gy, const V& xx, const V& yx, const V& yy) {
+        multiply(g, xx, gx);
+        add_product(sum, g, g);
+        multiply(g, yx, gx);
+        add_product(g, yy, gy);
+        add_product(sum, g, g);
+      };
+      add_gradient(other[0], other[1], v[4], v[5], v[6]);
+      add_gradient(line[0], line[1], v[7], v[8], v[9]);
+      multiply(cc, c, c);
+      const V squared = cc / sum;
+      store(out.data() + i, squared);
+    }
+  }
+
+  /// Gauss-Newton on rotation and direction.
+  [[nodiscard]] std::optional<mat3> refine(const mat3& start, std::span<const std::uint32_t> inliers) const {
+    return refine(start, inliers, 4);
+  }
+  [[nodiscard]] std::optional<mat3> refine(const mat3& start, std::span<const std::uint32_t> inliers, int steps) const {
+    if (inliers.size() < 6) return std::nullopt;
+    const se3 pose = decompose_essential(start)[0];
+    const auto step = [](const motion& m, const equations& at) -> std::optional<motion> {
+      // How the entries of E = [t]x R (row by row) move with exp(phi) R and with t on the sphere.
+      matrix<9, 5> by_step;
+      const matrix<3, 2> basis = tangent_basis(m.direction);
+      for (int j = 0; j != 5; ++j) {
+        const mat3 d =
+            j < 3 ? mat3(hat<double>(m.direction) * hat<double>(vec3(vec3::Unit(j))) * m.rotation.rotation_matrix())
+                  : mat3(hat<double>(vec3(basis.col(j - 3))) * m.rotation.rotation_matrix());
+        for (int entry = 0; entry != 9; ++entry) by_step(entry, j) = d(entry / 3, entry % 3);
+      }
+      const matrix<9, 5> h_by_step = at.h.lazyProduct(by_step);
+      matrix<5, 5> a = by_step.transpose().lazyProduct(h_by_step);
+      a.diagonal() *= 1.0 + 1e-9;
+      a.diagonal().array() += 1e-12 * a.diagonal().maxCoeff();
+      small_cholesky<5> factors;
+      if (!factors.set(a) || !(factors.factor(0.0) > 0.0)) return std::nullopt;
+      const matrix<5> d = -factors.solve(matrix<5>(by_step.transpose().lazyProduct(at.g)));
+      if (!(d.norm() < 1.0)) return std::nullopt;
+      return motion(so3::exp(vec3(d.template head<3>())) * m.rotation,
+                    step_on_sphere(m.direction, d.template tail<2>()));
+    };
+    const auto found = descend(
+        motion(pose.rotation(), pose.translation()), steps, [&](const motion& m) { return sum_up(m.e, inliers); },
+        step);
+    if (!found) return std::nullopt;
+    return found->e;
+  }
+
+ private:
+  /// An essential matrix by what it is made of.
+  struct motion {
+    so3 rotation;
+    vec3 direction;
+    mat3 e;
+    motion(const so3& r, const vec3& t) : rotation{r}, direction{t}, e{hat<double>(t) * r.rotation_matrix()} {}
+  };
+
+  /// For the nine entries of E, row by row; `cost` is the sum of squares.
+  struct equations {
+    matrix<9, 9> h = matrix<9, 9>::Zero();
+    matrix<9> g = matrix<9>::Zero();
+    double cost = 0.0;
+  };
+  [[nodiscard]] equations sum_up(const mat3& e, std::span<const std::uint32_t> inliers) const {
+    equations sum;
+    for (const std::uint32_t i : inliers) {
+      const image_match& m = matches_[i];
+      const pixel_gradient by_first(m.first), by_second(m.second);
+      const vec3 first = m.first.direction(), second = m.second.direction();
+      const vec3 line = e * first, other = e.transpose() * second;
+      const double c = second.dot(line);
+      const vec2 p = by_second(line.x(), line.y()), q = by_first(other.x(), other.y());
+      const double inverse = 1.0 / std::sqrt(p.squaredNorm() + q.squaredNorm());
+      const double r = c * inverse;
+      // r = c / s: dr = (dc - r ds) / s, and s ds = p dp + q dq.
+      vec3 dp = vec3::Zero(), dq = vec3::Zero();
+      dp.template head<2>() = by_second.back(p) * (r * inverse);
+      dq.template head<2>() = by_first.back(q) * (r * inverse);
+      matrix<9> d;
+      for (int row = 0; row != 3; ++row)
+        for (int column = 0; column != 3; ++column)
+          d[3 * row + column] =
+              inverse * (second[row] * first[column] - dp[row] * first[column] - second[row] * dq[column]);
+      for (int a = 0; a != 9; ++a) {
+        for (int b = 0; b <= a; ++b) sum.h(a, b) += d[a] * d[b];
+        sum.g[a] += r * d[a];
+      }
+      sum.cost += r * r;
+    }
+    for (int a = 0; a != 9; ++a)
+      for (int b = a + 1; b != 9; ++b) sum.h(a, b) = sum.h(b, a);
+    return sum;
+  }
+
+  const std::vector<image_match>& matches_;
+  std::vector<float> columns_;
+  std::size_t stride_ = 0;
+};
+
+/// How many of the matches a turn of the camera alone explains. The turn is found with weights that fall with the
+/// error, since wrong matches that happen to lie near their epipolar lines are among the inliers.
+[[nodiscard]] inline std::size_t explained_by_rotation(const std::vector<image_match>& matches,
+                                                       std::span<const std::uint32_t> inliers,
+                                                       double squared_threshold) {
+  mat3 rotation = mat3::Identity();
+  std::size_t explained = 0;
+  for (int round = 0; round != 10; ++round) {
+    mat3 products = mat3::Zero();
+    explained = 0;
+    for (const std::uint32_t i : inliers) {
+      const metric_ray& to = matches[i].second;
+      const vec3 from = matches[i].first.direction(), p = rotation * from;
+      const double dx = p.x() / p.z() - to.x, dy = p.y() / p.z() - to.y;
+      const double u = to.xx * dx + to.xy * dy, v = to.yy * dy;
+      const double squared = p.z() > 0.0 ? u * u + v * v : std::numeric_limits<double>::infinity();
+      explained += squared < 2.0 * squared_threshold ? 1U : 0U;
+      const double weight = round == 0 ? 1.0 : 1.0 / (1.0 + squared / squared_threshold);
+      products += weight * from.normalized() * to.direction().normalized().transpose();
+    }
+    const auto turn = find_best_turn(products, 1e-10);
+    if (!turn) break;
+    rotation = so3(turn->quaternion).rotation_matrix();
+  }
+  return explained;
+}
+
+}  // namespace orbis::optimize::detail

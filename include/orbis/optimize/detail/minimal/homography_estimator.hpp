@@ -1,0 +1,179 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// The estimator of RANSAC for homographies.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include <Eigen/LU>
+
+#include <orbis/core/types.hpp>
+#include <orbis/optimize/detail/minimal/descent.hpp>
+#include <orbis/optimize/detail/minimal/small_cholesky.hpp>
+#include <orbis/optimize/ransac.hpp>
+
+namespace orbis::optimize::detail {
+
+/// The homography of four points each, by projective bases; false where three of them are on a line, or where points
+/// would have to change sides.
+[[nodiscard]] inline bool homography_of_four(const std::array<vec2, 4>& first, const std::array<vec2, 4>& second,
+                                             mat3& out) {
+  mat3 bases[2];
+  vec3 weights[2];
+  for (int k = 0; k != 2; ++k) {
+    const std::array<vec2, 4>& p = k == 0 ? first : second;
+    const auto cross = [&](std::size_t a, std::size_t b, std::size_t c) {
+      return (p[b].x() - p[a].x()) * (p[c].y() - p[a].y()) - (p[b].y() - p[a].y()) * (p[c].x() - p[a].x());
+    };
+    // The fourth point in terms of the other three, by the areas of triangles.
+    weights[k] = vec3(cross(3, 1, 2), cross(0, 3, 2), cross(0, 1, 3));
+    const double area = cross(0, 1, 2);
+    const double extent = (p[1] - p[0]).squaredNorm() + (p[2] - p[0]).squaredNorm() + (p[3] - p[0]).squaredNorm();
+    if (!(std::min(std::fabs(area), weights[k].cwiseAbs().minCoeff()) > 1e-6 * extent)) return false;
+    weights[k] /= area;
+    for (int i = 0; i != 3; ++i) bases[k].col(i) = weights[k][i] * p[static_cast<std::size_t>(i)].homogeneous();
+  }
+  const vec3 ratio = weights[1].cwiseQuotient(weights[0]);
+  if (!(ratio.minCoeff() > 0.0)) return false;  // the plane would be seen from behind by some of the points
+  out = bases[1] * bases[0].inverse();
+  out /= out.norm();
+  return out.allFinite();
+}
+
+class homography_estimator {
+ public:
+  struct model {
+    mat3 forward, backward;
+  };
+  static constexpr std::size_t sample_size = 4;
+
+  struct match {
+    vec2 first, second;
+    std::uint32_t original;
+  };
+
+  explicit homography_estimator(const std::vector<match>& matches) : matches_{matches} {
+    for (const match& m : matches) {
+      const std::array values{m.first.x(), m.first.y(), m.second.x(), m.second.y()};
+      for (std::size_t k = 0; k != 4; ++k) columns_[k].push_back(static_cast<float>(values[k]));
+    }
+    for (auto& column : columns_)
+      column.resize((matches.size() + consensus_block - 1) / consensus_block * consensus_block);
+  }
+
+  [[nodiscard]] std::size_t size() const noexcept { return matches_.size(); }
+
+  struct candidates {
+    std::optional<model> found;
+    [[nodiscard]] const model* begin() const noexcept { return found ? &*found : nullptr; }
+    [[nodiscard]] const model* end() const noexcept { return found ? &*found + 1 : nullptr; }
+  };
+  [[nodiscard]] candidates fit(const std::array<std::uint32_t, 4>& s) const {
+    mat3 h;
+    if (!homography_of_four(
+            {matches_[s[0]].first, matches_[s[1]].first, matches_[s[2]].first, matches_[s[3]].first},
+            {matches_[s[0]].second, matches_[s[1]].second, matches_[s[2]].second, matches_[s[3]].second}, h))
+      return {};
+    return {made_of(h)};
+  }
+
+  [[nodiscard]] double squared_error(const model& m, std::size_t i) const {
+    const match& x = matches_[i];
+    const vec3 p = m.forward * x.first.homogeneous(), q = m.backward * x.second.homogeneous();
+    return 0.5 * ((p.template head<2>() / p.z() - x.second).squaredNorm() +
+                  (q.template head<2>() / q.z() - x.first).squaredNorm());
+  }
+
+  void squared_errors(const model& m, std::size_t first, std::span<float, consensus_block> out) const {
+    std::array<float, 9> f, b;
+    for (int k = 0; k != 9; ++k) {
+      f[static_cast<std::size_t>(k)] = static_cast<float>(m.forward(k / 3, k % 3));
+      b[static_cast<std::size_t>(k)] = static_cast<float>(m.backward(k / 3, k % 3));
+    }
+    std::array<float, consensus_block> errors;
+    const float* const x = columns_[0].data() + first;
+    const float* const y = columns_[1].data() + first;
+    const float* const u = columns_[2].data() + first;
+    const float* const v = columns_[3].data() + first;
+    for (std::size_t i = 0; i != consensus_block; ++i) {
+      const float pz = 1.0F / (f[6] * x[i] + f[7] * y[i] + f[8]), qz = 1.0F / (b[6] * u[i] + b[7] * v[i] + b[8]);
+      const float px = (f[0] * x[i] + f[1] * y[i] + f[2]) * pz - u[i];
+      const float py = (f[3] * x[i] + f[4] * y[i] + f[5]) * pz - v[i];
+      const float qx = (b[0] * u[i] + b[1] * v[i] + b[2]) * qz - x[i];
+      const float qy = (b[3] * u[i] + b[4] * v[i] + b[5]) * qz - y[i];
+      errors[i] = 0.5F * ((px * px + py * py) + (qx * qx + qy * qy));
+    }
+    std::copy(errors.begin(), errors.end(), out.begin());
+  }
+
+  /// Gauss-Newton on the transfers both ways.
+  [[nodiscard]] std::optional<model> refine(const model& start, std::span<const std::uint32_t> inliers) const {
+    return refine(start, inliers, 4);
+  }
+  [[nodiscard]] std::optional<model> refine(const model& start, std::span<const std::uint32_t> inliers,
+                                            int steps) const {
+    const auto step = [](const model& m, const equations& e) -> std::optional<model> {
+      small_cholesky<8> factors;
+      if (!factors.set(e.h) || !(factors.factor(1e-9) > 0.0)) return std::nullopt;
+      const matrix<8> entries = -factors.solve(e.g);
+      if (!entries.allFinite()) return std::nullopt;
+      mat3 d = mat3::Identity();
+      for (int j = 0; j != 8; ++j) d(j / 3, j % 3) += entries[j];
+      return made_of(d * m.forward);
+    };
+    return descend(
+        start, steps, [&](const model& m) { return sum_up(m, inliers); }, step);
+  }
+
+ private:
+  [[nodiscard]] static model made_of(const mat3& h) {
+    model m{h / h.norm(), h.inverse()};
+    m.backward /= m.backward.norm();
+    return m;
+  }
+
+  /// For D in (I + D) H, its last entry held; of `h` the lower triangle. `cost`: the sum of squares of all transfers.
+  struct equations {
+    matrix<8, 8> h = matrix<8, 8>::Zero();
+    matrix<8> g = matrix<8>::Zero();
+    double cost = 0.0;
+  };
+  [[nodiscard]] equations sum_up(const model& m, std::span<const std::uint32_t> inliers) const {
+    equations e;
+    for (const std::uint32_t i : inliers) {
+      const match& x = matches_[i];
+      const auto add = [&](const vec3& p, const vec2& seen, const mat3& by_d, const vec3& moved) {
+        // p moves by by_d * D * moved.
+        const double inverse = 1.0 / p.z();
+        const vec2 xy = p.template head<2>() * inverse;
+        matrix<2, 3> projection;
+        projection << inverse, 0.0, -xy.x() * inverse, 0.0, inverse, -xy.y() * inverse;
+        const matrix<2, 3> a = projection * by_d;
+        matrix<2, 8> j;
+        for (int k = 0; k != 8; ++k) j.col(k) = a.col(k / 3) * moved[k % 3];
+        const vec2 r = xy - seen;
+        for (int k = 0; k != 8; ++k) {
+          for (int l = k; l != 8; ++l) e.h(l, k) += j(0, l) * j(0, k) + j(1, l) * j(1, k);
+          e.g[k] += j(0, k) * r[0] + j(1, k) * r[1];
+        }
+        e.cost += r.squaredNorm();
+      };
+      const vec3 p = m.forward * x.first.homogeneous();
+      add(p, x.second, mat3::Identity(), p);
+      add(m.backward * x.second.homogeneous(), x.first, -m.backward, x.second.homogeneous());
+    }
+    return e;
+  }
+
+  const std::vector<match>& matches_;
+  std::array<std::vector<float>, 4> columns_;
+};
+
+}  // namespace orbis::optimize::detail

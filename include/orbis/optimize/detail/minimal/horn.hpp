@@ -1,0 +1,188 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Absolute orientation in closed form.
+///
+/// Sources: B. K. P. Horn, "Closed-form solution of absolute orientation using unit quaternions", JOSA A 4 (1987); the
+/// scale is the least-squares one of S. Umeyama, PAMI 13 (1991); the largest eigenvalue is found on the characteristic
+/// polynomial as by D. Theobald, "Rapid calculation of RMSDs using a quaternion-based characteristic polynomial", Acta
+/// Crystallographica A 61 (2005).
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <iterator>
+#include <optional>
+#include <ranges>
+#include <string>
+#include <type_traits>
+
+#include <orbis/core/jacobi.hpp>
+#include <orbis/core/point.hpp>
+#include <orbis/core/result.hpp>
+#include <orbis/core/sim3.hpp>
+#include <orbis/core/so3.hpp>
+#include <orbis/core/types.hpp>
+
+namespace orbis::optimize::detail {
+
+/// The eigenvector of the largest eigenvalue of the symmetric 4x4 matrix that Horn makes of `m`, the sum of `a b^T`
+/// over pairs of centred points: the rotation that takes a to b, as w x y z. With that eigenvalue, which is the trace
+/// of the rotated `m`. Empty where two rotations are equally good: the points lie on a line or in one place.
+struct best_turn {
+  so3::quaternion quaternion;
+  double trace = 0.0;
+};
+
+[[nodiscard]] inline std::optional<best_turn> find_best_turn(const mat3& m, double relative_gap) {
+  const double size = m.norm();
+  if (!(size > 0.0) || !std::isfinite(size)) return std::nullopt;
+  const mat3 s = m / size;
+  // The lower triangle.
+  const double a00 = s(0, 0) + s(1, 1) + s(2, 2), a11 = s(0, 0) - s(1, 1) - s(2, 2);
+  const double a22 = -s(0, 0) + s(1, 1) - s(2, 2), a33 = -s(0, 0) - s(1, 1) + s(2, 2);
+  const double a10 = s(1, 2) - s(2, 1), a20 = s(2, 0) - s(0, 2), a30 = s(0, 1) - s(1, 0);
+  const double a21 = s(0, 1) + s(1, 0), a31 = s(2, 0) + s(0, 2), a32 = s(1, 2) + s(2, 1);
+
+  // The characteristic polynomial is x^4 - 2 |s|^2 x^2 - 8 det(s) x + det(a); by minors of pairs of rows.
+  const auto minors = [](double p0, double p1, double p2, double p3, double q0, double q1, double q2, double q3) {
+    return std::array{p0 * q1 - p1 * q0, p0 * q2 - p2 * q0, p0 * q3 - p3 * q0,
+                      p1 * q2 - p2 * q1, p1 * q3 - p3 * q1, p2 * q3 - p3 * q2};
+  };
+  const auto laplace = [](const std::array<double, 6>& u, const std::array<double, 6>& v) {
+    return u[0] * v[5] - u[1] * v[4] + u[2] * v[3] + u[3] * v[2] - u[4] * v[1] + u[5] * v[0];
+  };
+  const double c0 =
+      laplace(minors(a00, a10, a20, a30, a10, a11, a21, a31), minors(a20, a21, a22, a32, a30, a31, a32, a33));
+  const double c1 = -8.0 * s.determinant();
+  // |s| = 1: the largest root lies between 1 and the square root of 3, and from above Newton's steps only go down.
+  double x = 1.7320508075688774, slope = 0.0;
+  for (int i = 0; i != 50; ++i) {
+    const double xx = x * x;
+    slope = 4.0 * x * (xx - 1.0) + c1;
+    if (!(slope > 0.0)) break;
+    const double step = ((xx - 2.0) * xx + c1 * x + c0) / slope;
+    x -= step;
+    if (std::fabs(step) < 1e-15) break;
+  }
+  // The slope there is the product of the distances to the other three roots, two of which are large.
+  if (slope > 1e-3) {
+    // A column of the adjugate of a - x: three of its minors stand for all where they are not small.
+    const double b00 = a00 - x, b11 = a11 - x, b22 = a22 - x, b33 = a33 - x;
+    const auto low = minors(a20, a21, b22, a32, a30, a31, a32, b33);
+    const auto high = minors(b00, a10, a20, a30, a10, b11, a21, a31);
+    const std::array<vec4, 4> columns{
+        vec4(b11 * low[5] - a21 * low[4] + a31 * low[3], -(a10 * low[5] - a21 * low[2] + a31 * low[1]),
+             a10 * low[4] - b11 * low[2] + a31 * low[0], -(a10 * low[3] - b11 * low[1] + a21 * low[0])),
+        vec4(-(a10 * low[5] - a20 * low[4] + a30 * low[3]), b00 * low[5] - a20 * low[2] + a30 * low[1],
+             -(b00 * low[4] - a10 * low[2] + a30 * low[0]), b00 * low[3] - a10 * low[1] + a20 * low[0]),
+        vec4(a31 * high[5] - a32 * high[4] + b33 * high[3], -(a30 * high[5] - a32 * high[2] + b33 * high[1]),
+             a30 * high[4] - a31 * high[2] + b33 * high[0], -(a30 * high[3] - a31 * high[1] + a32 * high[0])),
+        vec4(-(a21 * high[5] - b22 * high[4] + a32 * high[3]), a20 * high[5] - b22 * high[2] + a32 * high[1],
+             -(a20 * high[4] - a21 * high[2] + a32 * high[0]), a20 * high[3] - a21 * high[1] + b22 * high[0])};
+    std::size_t best = 0;
+    for (std::size_t k = 1; k != 4; ++k)
+      if (columns[k].squaredNorm() > columns[best].squaredNorm()) best = k;
+    const vec4& q = columns[best];
+    return best_turn{so3::quaternion(q[0], q[1], q[2], q[3]).normalized(), x * size};
+  }
+  mat4 a;
+  a << a00, a10, a20, a30, a10, a11, a21, a31, a20, a21, a22, a32, a30, a31, a32, a33;
+  const auto eigen = eigen_of_symmetric<4>(a);
+  if (!(eigen.values[3] - eigen.values[2] > relative_gap)) return std::nullopt;
+  const mat4& q = eigen.vectors;
+  return best_turn{so3::quaternion(q(0, 3), q(1, 3), q(2, 3), q(3, 3)).normalized(), eigen.values[3] * size};
+}
+
+/// What absolute orientation takes from pairs of points: numbers, means, products about the means.
+struct pair_moments {
+  vec3 from_mean, to_mean;
+  mat3 products;  ///< sum of (from - mean) (to - mean)^T
+  double from_spread = 0.0, to_spread = 0.0;
+};
+
+/// `pair(i, a, b)` writes the i-th pair as two arrays of three doubles and returns its weight. O(n), two passes.
+template <class Pair>
+[[nodiscard]] pair_moments moments_of(std::size_t n, const Pair& pair) {
+  // Two sums of everything, for even and odd pairs: additions that need not wait for each other.
+  double sums[2][7] = {};
+  for (std::size_t i = 0; i != n; ++i) {
+    double a[3], b[3];
+    const double w = pair(i, a, b);
+    double* const sum = sums[i % 2];
+    for (std::size_t k = 0; k != 3; ++k) {
+      sum[k] += w * a[k];
+      sum[3 + k] += w * b[k];
+    }
+    sum[6] += w;
+  }
+  double mean[6];
+  for (std::size_t k = 0; k != 6; ++k) mean[k] = (sums[0][k] + sums[1][k]) / (sums[0][6] + sums[1][6]);
+  double m[11] = {};
+  for (std::size_t i = 0; i != n; ++i) {
+    double a[3], b[3];
+    const double w = pair(i, a, b);
+    const double px = a[0] - mean[0], py = a[1] - mean[1], pz = a[2] - mean[2];
+    const double ax = w * px, ay = w * py, az = w * pz;
+    const double bx = b[0] - mean[3], by = b[1] - mean[4], bz = b[2] - mean[5];
+    m[0] += ax * bx, m[1] += ax * by, m[2] += ax * bz;
+    m[3] += ay * bx, m[4] += ay * by, m[5] += ay * bz;
+    m[6] += az * bx, m[7] += az * by, m[8] += az * bz;
+    m[9] += ax * px + ay * py + az * pz;
+    m[10] += w * (bx * bx + by * by + bz * bz);
+  }
+  pair_moments out;
+  out.from_mean = vec3(mean[0], mean[1], mean[2]);
+  out.to_mean = vec3(mean[3], mean[4], mean[5]);
+  out.products << m[0], m[1], m[2], m[3], m[4], m[5], m[6], m[7], m[8];
+  out.from_spread = m[9];
+  out.to_spread = m[10];
+  return out;
+}
+
+/// Empty where the points do not determine a rotation.
+template <class Pair>
+[[nodiscard]] std::optional<sim3> align_pairs(std::size_t n, const Pair& pair, bool with_scale) {
+  const pair_moments moments = moments_of(n, pair);
+  const double spread = std::sqrt(moments.from_spread) * std::sqrt(moments.to_spread);
+  // Points in one place, up to the rounding of their coordinates.
+  const double rounding = 1e-30 * static_cast<double>(n);
+  if (!(moments.from_spread > rounding * moments.from_mean.squaredNorm()) ||
+      !(moments.to_spread > rounding * moments.to_mean.squaredNorm()) || !(moments.products.norm() > 1e-10 * spread))
+    return std::nullopt;
+  const auto turn = find_best_turn(moments.products, 1e-10);
+  if (!turn) return std::nullopt;
+  const so3 rotation(turn->quaternion);
+  const double scale = with_scale ? turn->trace / moments.from_spread : 1.0;
+  return sim3(rotation, moments.to_mean - scale * (rotation * moments.from_mean), scale);
+}
+
+template <point_range From, point_range To>
+[[nodiscard]] result<sim3> align(const From& from, const To& to, bool with_scale) {
+  constexpr const char* where = "absolute orientation";
+  const auto n = static_cast<std::size_t>(std::ranges::size(from));
+  if (n != static_cast<std::size_t>(std::ranges::size(to)))
+    return fail(errc::invalid_argument, where, "the two lists of points differ in length");
+  if (n < 3) return fail(errc::no_data, where, "fewer than three pairs of points");
+  const auto read = [](const auto& points, std::size_t i, double* out) {
+    using range = std::remove_cvref_t<decltype(points)>;
+    const auto c =
+        coordinates<double>(std::ranges::begin(points)[static_cast<std::ranges::range_difference_t<range>>(i)]);
+    out[0] = c[0], out[1] = c[1], out[2] = c[2];
+  };
+  const auto pair = [&](std::size_t i, double* a, double* b) {
+    read(from, i, a);
+    read(to, i, b);
+    return 1.0;
+  };
+  if (const auto found = align_pairs(n, pair, with_scale)) return *found;
+  for (std::size_t i = 0; i != n; ++i) {
+    double a[3], b[3];
+    pair(i, a, b);
+    if (!std::isfinite(a[0] + a[1] + a[2] + b[0] + b[1] + b[2]))
+      return fail(errc::degenerate, where, "a coordinate of pair " + std::to_string(i) + " is not finite");
+  }
+  return fail(errc::degenerate, where, "the points do not determine a rotation: they lie on a line or in one place");
+}
+
+}  // namespace orbis::optimize::detail

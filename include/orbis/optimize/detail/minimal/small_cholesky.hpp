@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Normal equations of a few unknowns, on the stack.
+#pragma once
+
+#include <cmath>
+
+#include <orbis/core/types.hpp>
+
+namespace orbis::optimize::detail {
+
+/// `H = L D L^T` of a symmetric N x N matrix scaled to a unit diagonal, so that neither the units of the
+/// unknowns nor how many residuals there were says anything. O(N^3), for N up to about ten.
+template <int N>
+class small_cholesky {
+ public:
+  using vector = matrix<N>;
+  using square = matrix<N, N>;
+
+  /// Reads the lower triangle. False where H has an entry on its diagonal that is not positive and
+  /// finite.
+  [[nodiscard]] bool set(const square& h) {
+    for (int i = 0; i != N; ++i) {
+      if (!(h(i, i) > 0.0) || !std::isfinite(h(i, i))) return false;
+      scale_[i] = 1.0 / std::sqrt(h(i, i));
+    }
+    for (int j = 0; j != N; ++j)
+      for (int i = j + 1; i != N; ++i) scaled_[i][j] = h(i, j) * scale_[i] * scale_[j];
+    return true;
+  }
+
+  /// Factors H with its diagonal multiplied by `1 + damping`. Returns the smallest pivot of the scaled
+  /// matrix: 1 for unknowns that have nothing to do with each other, about the rounding of double or below
+  /// for some that are not determined (or NaN).
+  [[nodiscard]] double factor(double damping) {
+    double least = 1.0 + damping;
+    for (int j = 0; j != N; ++j) {
+      double pivot = 1.0 + damping;
+      for (int k = 0; k != j; ++k) pivot -= l_[j][k] * l_[j][k] * pivots_[k];
+      pivots_[j] = pivot;
+      inverse_[j] = 1.0 / pivot;
+      if (!(pivot > least)) least = pivot;
+      for (int i = j + 1; i != N; ++i) {
+        double sum = scaled_[i][j];
+        for (int k = 0; k != j; ++k) sum -= l_[i][k] * l_[j][k] * pivots_[k];
+        l_[i][j] = sum * inverse_[j];
+      }
+    }
+    return least;
+  }
+
+  /// The solution of `H x = b` for the matrix last factored. @pre its smallest pivot was positive
+  [[nodiscard]] vector solve(const vector& b) const {
+    vector x;
+    for (int i = 0; i != N; ++i) {
+      double sum = b[i] * scale_[i];
+      for (int k = 0; k != i; ++k) sum -= l_[i][k] * x[k];
+      x[i] = sum;
+    }
+    for (int i = 0; i != N; ++i) x[i] *= inverse_[i];
+    for (int i = N - 1; i >= 0; --i) {
+      double sum = x[i];
+      for (int k = i + 1; k != N; ++k) sum -= l_[k][i] * x[k];
+      x[i] = sum;
+    }
+    for (int i = 0; i != N; ++i) x[i] *= scale_[i];
+    return x;
+  }
+
+  /// Below this smallest pivot of the undamped matrix, some direction is called undetermined.
+  static constexpr double determined = 1e-11;
+
+ private:
+  double scale_[N] = {}, pivots_[N] = {}, inverse_[N] = {};
+  double scaled_[N][N] = {}, l_[N][N] = {};  // the lower triangles
+};
+
+}  // namespace orbis::optimize::detail

@@ -1,0 +1,306 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// What the solvers of bundle adjustment and pose graphs are made of: how they step (Gauss-Newton, Levenberg-Marquardt,
+/// dogleg), and how bundle adjustment solves its reduced system (dense, sparse, iterative).
+///
+/// Sources: K. Madsen, H. B. Nielsen, O. Tingleff, "Methods for non-linear least squares problems",
+/// 2nd edition, DTU 2004; M. J. D. Powell, "A hybrid method for nonlinear equations", 1970.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <concepts>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <span>
+
+#include <Eigen/Core>
+
+#include <orbis/core/types.hpp>
+#include <orbis/optimize/detail/sparse/block_ordering.hpp>
+#include <orbis/optimize/detail/sparse/reduced_solvers.hpp>
+
+namespace orbis::optimize {
+
+namespace detail {
+template <class P>
+concept solves_newton = requires(P& problem, Eigen::VectorXd& out) {
+  {problem.newton_step(out)};
+};
+template <class P>
+concept solves = solves_newton<P> || requires(P& problem, Eigen::VectorXd& out) {
+  {problem.solve(out)};
+};
+}  // namespace detail
+
+/// A problem that is linearised at its current estimate: it has the cost there, its gradient `g`, and the positive
+/// semidefinite `H` of the model `cost + g^T s + s^T H s / 2`. `factor(d)` factors `H + diag(d)` (an empty `d` is 0)
+/// and returns whether it is positive definite; `solve(x)` then replaces `x` by the solution. Instead of `solve` a
+/// problem may have `newton_step(x)`, which sets `x` to the solution for the right-hand side `-g`. `try_step(s)` is the
+/// true cost one step away, and not finite where there is none.
+template <class P>
+concept stepped_problem = requires(P& problem, const Eigen::VectorXd& in, Eigen::VectorXd& out) {
+  { problem.cost() } -> std::same_as<double>;
+  { problem.gradient() } -> std::same_as<const Eigen::VectorXd&>;
+  { problem.diagonal() } -> std::same_as<const Eigen::VectorXd&>;
+  { problem.curvature(in) } -> std::same_as<double>;
+  { problem.factor(in) } -> std::same_as<bool>;
+  requires detail::solves<P>;
+  { problem.try_step(in) } -> std::same_as<double>;
+};
+
+enum class step_outcome {
+  taken,       ///< keep the step tried last
+  stationary,  ///< the model predicts a decrease that rounding cannot tell from 0
+  exhausted,   ///< no step lowers the cost
+  singular     ///< H is not positive definite
+};
+
+/// Memory of the policies, kept between steps.
+struct step_workspace {
+  Eigen::VectorXd step, damping, metric, newton, cauchy, scratch;
+};
+
+/// A way to choose steps. `state` is what it keeps between the steps of one solution.
+template <class D, class P>
+concept damping_policy = std::copyable<D> && std::default_initializable<typename D::state> &&
+    requires(const D& d, typename D::state& s, P& problem, step_workspace& w) {
+  { d.advance(s, problem, w) } -> std::same_as<step_outcome>;
+};
+
+namespace detail {
+/// The members that a policy may use, for the concept below; never constructed.
+struct any_stepped_problem {
+  double cost() const;
+  const Eigen::VectorXd& gradient() const;
+  const Eigen::VectorXd& diagonal() const;
+  double curvature(const Eigen::VectorXd&) const;
+  bool factor(const Eigen::VectorXd&);
+  void newton_step(Eigen::VectorXd&);
+  double try_step(const Eigen::VectorXd&);
+};
+}  // namespace detail
+
+/// A damping policy that works for every problem: what the solvers take.
+template <class D>
+concept general_damping_policy = damping_policy<D, detail::any_stepped_problem>;
+
+namespace detail {
+
+/// Whether a decrease is below the rounding of a sum of squares.
+[[nodiscard]] inline bool is_rounding(double decrease, double cost) { return decrease <= 1e-14 * cost; }
+
+/// The outcome when the predicted decrease is below rounding: `stationary`, unless only the damping keeps the step
+/// short. Judged by the diagonal of H, which bounds the decrease.
+template <class P>
+[[nodiscard]] step_outcome bottom_or_stuck(P& problem) {
+  double promise = 0.0;
+  for (Eigen::Index i = 0; i != problem.gradient().size(); ++i)
+    if (const double g = problem.gradient()[i]; g != 0.0) promise += 0.5 * g * g / problem.diagonal()[i];
+  return promise <= 1e-12 * problem.cost() ? step_outcome::stationary : step_outcome::exhausted;
+}
+
+/// `out = -(H + D)^-1 g` for the D last factored.
+template <class P>
+void newton_step(P& problem, Eigen::VectorXd& out) {
+  if constexpr (solves_newton<P>) {
+    problem.newton_step(out);
+  } else {
+    out = -problem.gradient();
+    problem.solve(out);
+  }
+}
+
+/// The diagonal of H as a metric of steps, which makes them invariant to the units of the unknowns.
+template <class P>
+void set_metric(P& problem, Eigen::VectorXd& out) {
+  const Eigen::VectorXd& diagonal = problem.diagonal();
+  const double least = std::max(1e-12 * diagonal.maxCoeff(), std::numeric_limits<double>::min());
+  out = diagonal.cwiseMax(least);
+}
+
+}  // namespace detail
+
+/// Steps to the minimum of the model, even where the true cost rises.
+struct gauss_newton {
+  struct state {};
+
+  template <stepped_problem P>
+  [[nodiscard]] step_outcome advance(state&, P& problem, step_workspace& w) const {
+    const Eigen::VectorXd none;
+    if (!problem.factor(none)) return step_outcome::singular;
+    detail::newton_step(problem, w.step);
+    if (detail::is_rounding(-0.5 * problem.gradient().dot(w.step), problem.cost())) return step_outcome::stationary;
+    return std::isfinite(problem.try_step(w.step)) ? step_outcome::taken : step_outcome::exhausted;
+  }
+};
+
+/// Steps to the minimum of the model with `lambda * diag(H)` added to H; `lambda` falls where the model was good, and
+/// rises where it was not.
+struct levenberg_marquardt {
+  double initial = 1e-5;  ///< first lambda
+  int max_attempts = 16;  ///< rejected steps before giving up
+
+  struct state {
+    double lambda = -1.0;
+    double growth = 2.0;
+  };
+
+  template <stepped_problem P>
+  [[nodiscard]] step_outcome advance(state& s, P& problem, step_workspace& w) const {
+    detail::set_metric(problem, w.metric);
+    if (s.lambda < 0.0) s.lambda = initial;
+    for (int attempt = 0; attempt != max_attempts; ++attempt) {
+      w.damping = s.lambda * w.metric;
+      if (problem.factor(w.damping)) {
+        detail::newton_step(problem, w.step);
+        w.scratch = w.step.cwiseProduct(w.damping);
+        const double predicted = 0.5 * (w.scratch.dot(w.step) - problem.gradient().dot(w.step));
+        if (detail::is_rounding(predicted, problem.cost())) return detail::bottom_or_stuck(problem);
+        const double gain = (problem.cost() - problem.try_step(w.step)) / predicted;
+        if (gain > 0.0) {
+          const double better = 2.0 * gain - 1.0;
+          s.lambda *= std::max(1.0 / 3.0, 1.0 - better * better * better);
+          s.lambda = std::max(s.lambda, 1e-20);
+          s.growth = 2.0;
+          return step_outcome::taken;
+        }
+      }
+      s.lambda = std::max(s.lambda, 1e-15) * s.growth;
+      s.growth *= 2.0;
+    }
+    return step_outcome::exhausted;
+  }
+};
+
+/// Steps between steepest descent and the minimum of the model, within a radius in which the model holds. A rejected
+/// step costs no factorisation.
+struct dogleg {
+  double initial_radius = 0.0;  ///< 0: the length of the first Gauss-Newton step
+  int max_attempts = 30;        ///< rejected steps before giving up
+
+  struct state {
+    double radius = -1.0;
+  };
+
+  template <stepped_problem P>
+  [[nodiscard]] step_outcome advance(state& s, P& problem, step_workspace& w) const {
+    detail::set_metric(problem, w.metric);
+    if (!find_newton(problem, w)) return step_outcome::singular;
+    const Eigen::VectorXd& g = problem.gradient();
+    w.cauchy = -g.cwiseQuotient(w.metric);
+    const double along = problem.curvature(w.cauchy);
+    w.cauchy *= along > 0.0 ? -g.dot(w.cauchy) / along : 0.0;
+    const double newton = length(w.newton, w), cauchy = length(w.cauchy, w);
+    if (s.radius < 0.0) s.radius = initial_radius > 0.0 ? initial_radius : newton;
+
+    for (int attempt = 0; attempt != max_attempts; ++attempt) {
+      if (newton <= s.radius) {
+        w.step = w.newton;
+      } else if (cauchy >= s.radius) {
+        w.step = (s.radius / cauchy) * w.cauchy;
+      } else {
+        w.scratch = w.newton - w.cauchy;  // where does the leg leave the region?
+        const double a = square(w.scratch, w);
+        const double b = weighted_dot(w.scratch, w.metric, w.cauchy);
+        const double c = cauchy * cauchy - s.radius * s.radius;
+        w.step = w.cauchy + (-c / (b + std::sqrt(b * b - a * c))) * w.scratch;
+      }
+      const double predicted = -g.dot(w.step) - 0.5 * problem.curvature(w.step);
+      if (detail::is_rounding(predicted, problem.cost())) return detail::bottom_or_stuck(problem);
+      const double gain = (problem.cost() - problem.try_step(w.step)) / predicted;
+      const double far = length(w.step, w);
+      if (gain > 0.75) s.radius = std::max(s.radius, 3.0 * far);
+      if (!(gain > 0.25)) s.radius = std::min(s.radius, far) * (gain > 0.0 ? 0.5 : 0.25);
+      if (gain > 0.0) return step_outcome::taken;
+    }
+    return step_outcome::exhausted;
+  }
+
+ private:
+  [[nodiscard]] static double weighted_dot(const Eigen::VectorXd& a, const Eigen::VectorXd& weights,
+                                           const Eigen::VectorXd& b) {
+    return a.cwiseProduct(weights).dot(b);
+  }
+  [[nodiscard]] static double square(const Eigen::VectorXd& x, const step_workspace& w) {
+    return weighted_dot(x, w.metric, x);
+  }
+  [[nodiscard]] static double length(const Eigen::VectorXd& x, const step_workspace& w) {
+    return std::sqrt(square(x, w));
+  }
+  /// The Gauss-Newton step, with the least damping that makes H positive definite.
+  template <stepped_problem P>
+  [[nodiscard]] static bool find_newton(P& problem, step_workspace& w) {
+    const Eigen::VectorXd none;
+    bool definite = problem.factor(none);
+    for (double lambda = 1e-10; !definite && lambda <= 1.0; lambda *= 100.0) {
+      w.damping = lambda * w.metric;
+      definite = problem.factor(w.damping);
+    }
+    if (!definite) return false;
+    detail::newton_step(problem, w.newton);
+    return true;
+  }
+};
+
+static_assert(general_damping_policy<gauss_newton> && general_damping_policy<levenberg_marquardt> &&
+              general_damping_policy<dogleg>);
+
+using block_place = detail::block_place;
+
+/// A solver of symmetric systems of C x C blocks. `s.analyze(size, places)` says where the blocks below the diagonal
+/// are; `s.factor(diagonal, off_diagonal)` takes their values and returns whether the matrix is positive definite (if
+/// not, `s.failed_block()` is a block row where it fails); `s.solve(x)` replaces the right-hand side by the solution.
+/// `s.iterations()` counts the iterations of an iterative solver.
+template <class S, int C>
+concept block_solver = requires(S& s, std::size_t size, std::span<const block_place> places,
+                                std::span<const matrix<C, C>> blocks, std::span<double> x) {
+  {s.analyze(size, places)};
+  { s.factor(blocks, blocks) } -> std::same_as<bool>;
+  { s.failed_block() } -> std::convertible_to<std::uint32_t>;
+  {s.solve(x)};
+  { s.iterations() } -> std::convertible_to<int>;
+};
+
+/// A family of solvers of the reduced system of bundle adjustment: `typename R::template solver<C>`, constructed from
+/// an `R`, for every block size C.
+template <class R>
+concept reduced_solver = std::copyable<R> && block_solver < typename R::template solver<6>,
+6 > &&std::constructible_from<typename R::template solver<6>, const R&>;
+
+/// Dense Cholesky factorisation: best up to about a hundred cameras with many points in common. (C cameras)^3 / 3
+/// multiplications.
+struct dense_reduced_solver {
+  template <int C>
+  using solver = detail::dense_block_solver<C>;
+};
+
+/// Block-sparse Cholesky factorisation in a fill-reducing order: hundreds to thousands of cameras along a path.
+struct sparse_reduced_solver {
+  template <int C>
+  using solver = detail::sparse_block_solver<C>;
+};
+
+/// Conjugate gradients, preconditioned with the diagonal blocks: thousands of cameras, where inexact steps will do.
+struct iterative_reduced_solver {
+  double relative_tolerance = 1e-6;  ///< norm of the residual where the iteration stops, relative to the right side
+  int max_iterations = 500;
+  template <int C>
+  using solver = detail::iterative_block_solver<C>;
+};
+
+/// Dense up to `dense_limit` cameras, block-sparse while the factor has at most `fill_limit` blocks, iterative beyond.
+struct automatic_reduced_solver {
+  using kind = detail::block_solver_kind;
+  std::size_t dense_limit = 100;
+  std::size_t fill_limit = 2'000'000;
+  iterative_reduced_solver iterative{};
+  template <int C>
+  using solver = detail::automatic_block_solver<C>;
+};
+
+static_assert(reduced_solver<dense_reduced_solver> && reduced_solver<sparse_reduced_solver>);
+static_assert(reduced_solver<iterative_reduced_solver> && reduced_solver<automatic_reduced_solver>);
+
+}  // namespace orbis::optimize

@@ -1,0 +1,315 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Two-view geometry: essential matrix and homography of two images from matched pixels, many of which may be wrong,
+/// and the relative poses that they stand for.
+///
+/// Sources: D. Nister, PAMI 26(6), 2004, for five points and the choice among four decompositions; P. Sampson, "Fitting
+/// conic sections to very scattered data", CGIP 18 (1982), for the error; R. Hartley, A. Zisserman, "Multiple View
+/// Geometry in Computer Vision", 2003, chapter 4; Y. Ma, S. Soatto, J. Kosecka, S. Sastry, "An Invitation to 3-D
+/// Vision", 2003, section 5.3, for the decomposition of homographies.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <Eigen/LU>
+
+#include <orbis/camera/model.hpp>
+#include <orbis/core/jacobi.hpp>
+#include <orbis/core/random.hpp>
+#include <orbis/core/result.hpp>
+#include <orbis/core/se3.hpp>
+#include <orbis/core/types.hpp>
+#include <orbis/optimize/detail/minimal/essential_estimator.hpp>
+#include <orbis/optimize/detail/minimal/homography_estimator.hpp>
+#include <orbis/optimize/detail/minimal/image_matches.hpp>
+#include <orbis/optimize/ransac.hpp>
+#include <orbis/optimize/triangulation.hpp>
+
+namespace orbis::optimize {
+
+struct essential_options {
+  double threshold = 1.5;  ///< largest Sampson distance of an inlier, pixels
+  double confidence = 0.9999;
+  std::size_t min_iterations = 10;
+  std::size_t max_iterations = 10000;
+  std::size_t min_inliers = 15;  ///< fewer than this is a failure
+  std::uint64_t seed = 1;
+};
+
+struct relative_pose_estimate {
+  se3 T_first_second;                  ///< the second camera in the first; the translation has length 1
+  mat3 essential;                      ///< `second^T E first = 0` for rays, of norm sqrt(2)
+  std::vector<std::uint32_t> inliers;  ///< exactly the matches within the threshold, ascending
+  std::size_t in_front = 0;            ///< inliers whose rays meet in front of both cameras
+  double parallax = 0.0;               ///< median angle between the rays of an inlier, radians
+  double rmse = 0.0;                   ///< of the inliers' Sampson distances, pixels
+  std::size_t iterations = 0;
+};
+
+/// The four poses `T_second_first`, with translations of length 1, that an essential matrix may stand for.
+[[nodiscard]] inline std::array<se3, 4> decompose_essential(const mat3& essential) {
+  return detail::decompose_essential(essential);
+}
+
+/// The relative pose that the most matches agree with: five points in RANSAC, each new best matrix refined on its
+/// inliers. Matches that are not finite or cannot be un-projected are outliers. Deterministic by `options.seed`.
+/// Errors: `invalid_argument` for spans of different length or options out of range, `no_data` below five matches,
+/// `degenerate` where fewer than five can be used, no matrix has `min_inliers` inliers, or a rotation alone explains
+/// (nearly) all inliers, so that there is no parallax to tell a translation by; the message says which.
+template <camera::camera_model First, camera::camera_model Second>
+[[nodiscard]] result<relative_pose_estimate> estimate_essential(std::span<const vec2> first_pixels,
+                                                                std::span<const vec2> second_pixels,
+                                                                const First& first_camera, const Second& second_camera,
+                                                                const essential_options& options = {}) {
+  constexpr const char* where = "essential matrix";
+  const std::size_t n = first_pixels.size();
+  if (n != second_pixels.size()) return fail(errc::invalid_argument, where, "the lists of pixels differ in length");
+  const ransac_options asked = detail::ransac_part(options);
+  if (const char* const fault = detail::fault_of(asked)) return fail(errc::invalid_argument, where, fault);
+  if (n < 5) return fail(errc::no_data, where, "fewer than five matches");
+  const std::vector<detail::image_match> matches =
+      detail::read_matches(first_pixels, second_pixels, first_camera, second_camera, options.seed);
+  if (matches.size() < 5)
+    return fail(errc::degenerate, where,
+                "of " + std::to_string(n) + " matches " + std::to_string(matches.size()) +
+                    " are finite and in the cameras' views, five are needed");
+  const detail::essential_estimator estimator(matches);
+  auto found =
+      ransac(estimator, asked, ransac_policies{msac{}, uniform_sampling{}, sprt(2000.0), iterated_refinement{}});
+  if (!found) return fail(found.error().code, where, found.error().message);
+  const double squared_threshold = options.threshold * options.threshold;
+  const std::size_t by_rotation = detail::explained_by_rotation(matches, found->inliers, squared_threshold);
+  if (10 * by_rotation >= 9 * found->inliers.size())
+    return fail(errc::degenerate, where,
+                "no parallax: a rotation alone explains " + std::to_string(by_rotation) + " of " +
+                    std::to_string(found->inliers.size()) + " inliers");
+
+  mat3 essential = detail::polished(estimator, *found, squared_threshold, options.min_inliers);
+  essential *= std::sqrt(2.0) / essential.norm();
+  relative_pose_estimate out;
+  out.essential = essential;
+  out.iterations = found->iterations;
+  std::vector<std::uint32_t> inside;
+  double sum = 0.0;
+  for (std::size_t i = 0; i != matches.size(); ++i) {
+    const double e = estimator.squared_error(essential, i);
+    if (!(e < squared_threshold)) continue;
+    sum += e;
+    inside.push_back(static_cast<std::uint32_t>(i));
+    out.inliers.push_back(matches[i].original);
+  }
+  std::sort(out.inliers.begin(), out.inliers.end());
+  if (auto enough = detail::enough_inliers(where, inside.size(), n, options.min_inliers, 5); !enough)
+    return fail(std::move(enough.error()));
+  out.rmse = std::sqrt(sum / static_cast<double>(inside.size()));
+  // Of the four poses, the one from which the most points are in front of both cameras.
+  std::vector<double> angles;
+  for (const se3& T_second_first : decompose_essential(essential)) {
+    std::size_t in_front = 0;
+    angles.clear();
+    const se3 T_first_second = T_second_first.inverse();
+    for (const std::uint32_t i : inside) {
+      const triangulation t = triangulate(se3(), matches[i].first.direction(), T_first_second,
+                                          matches[i].second.direction(), {.min_parallax = 0.0});
+      in_front += t.ok() ? 1U : 0U;
+      angles.push_back(t.parallax);
+    }
+    if (in_front <= out.in_front && out.in_front != 0) continue;
+    out.in_front = in_front;
+    out.T_first_second = T_first_second;
+    if (angles.empty()) continue;
+    const auto middle = angles.begin() + static_cast<std::ptrdiff_t>(angles.size() / 2);
+    std::nth_element(angles.begin(), middle, angles.end());
+    out.parallax = *middle;
+  }
+  return out;
+}
+
+/// The same for two images of one camera.
+template <camera::camera_model Camera>
+[[nodiscard]] result<relative_pose_estimate> estimate_essential(std::span<const vec2> first_pixels,
+                                                                std::span<const vec2> second_pixels,
+                                                                const Camera& camera,
+                                                                const essential_options& options = {}) {
+  return estimate_essential(first_pixels, second_pixels, camera, camera, options);
+}
+
+struct homography_options {
+  double threshold = 3.0;  ///< largest error of an inlier, pixels: root mean square of the transfers both ways
+  double confidence = 0.9999;
+  std::size_t min_iterations = 10;
+  std::size_t max_iterations = 10000;
+  std::size_t min_inliers = 8;  ///< fewer than this is a failure
+  std::uint64_t seed = 1;
+};
+
+struct homography_estimate {
+  mat3 H_second_first;                 ///< `second ~ H * (first, 1)`, with H(2, 2) = 1 unless that is 0
+  std::vector<std::uint32_t> inliers;  ///< exactly the matches within the threshold, ascending
+  double rmse = 0.0;                   ///< of the inliers, pixels
+  std::size_t iterations = 0;
+};
+
+/// A way to read the homography of a plane: `H ~ rotation + translation * normal^T`, with `normal` the plane's unit
+/// normal in the first camera (towards the plane: points on it have normal . p > 0), `translation` that of
+/// `T_second_first` in units of the plane's distance from the first camera.
+struct plane_motion {
+  so3 R_second_first;
+  vec3 translation = vec3::Zero();
+  vec3 normal = vec3::UnitZ();
+};
+
+/// The homography that takes `first[i]` to `second[i]`; empty where three of either four are on one line, or where no
+/// plane in front of a camera could do it.
+[[nodiscard]] inline std::optional<mat3> homography_of_four(const std::array<vec2, 4>& first,
+                                                            const std::array<vec2, 4>& second) {
+  mat3 h;
+  if (!detail::homography_of_four(first, second, h)) return std::nullopt;
+  if (h(2, 2) != 0.0) h /= double{h(2, 2)};
+  return h;
+}
+
+/// The homography that the most matches agree with: four points in RANSAC, each new best one refined on its inliers
+/// (least squares of the transfers both ways). Matches that are not finite are outliers. Deterministic by
+/// `options.seed`. For images with distortion give undistorted pixels.
+/// Errors: `invalid_argument` for spans of different length or options out of range, `no_data` below four matches,
+/// `degenerate` where fewer than four are finite, all points of an image lie on one line, or no homography has
+/// `min_inliers` inliers; the message says which.
+[[nodiscard]] inline result<homography_estimate> estimate_homography(std::span<const vec2> first,
+                                                                     std::span<const vec2> second,
+                                                                     const homography_options& options = {}) {
+  constexpr const char* where = "homography";
+  using estimator_type = detail::homography_estimator;
+  const std::size_t n = first.size();
+  if (n != second.size()) return fail(errc::invalid_argument, where, "the lists of pixels differ in length");
+  ransac_options asked = detail::ransac_part(options);
+  if (const char* const fault = detail::fault_of(asked)) return fail(errc::invalid_argument, where, fault);
+  if (n < 4) return fail(errc::no_data, where, "fewer than four matches");
+  std::vector<typename estimator_type::match> matches;
+  matches.reserve(n);
+  vec2 first_centre = vec2::Zero(), second_centre = vec2::Zero();
+  for (std::size_t i = 0; i != n; ++i) {
+    if (!first[i].allFinite() || !second[i].allFinite()) continue;
+    matches.push_back({first[i], second[i], static_cast<std::uint32_t>(i)});
+    first_centre += first[i];
+    second_centre += second[i];
+  }
+  if (matches.size() < 4)
+    return fail(
+        errc::degenerate, where,
+        "of " + std::to_string(n) + " matches " + std::to_string(matches.size()) + " are finite, four are needed");
+  first_centre /= static_cast<double>(matches.size());
+  second_centre /= static_cast<double>(matches.size());
+  // In pixels about the centres and in units of about the size of the images, so that all entries of H are of one
+  // order.
+  double size = 0.0;
+  mat2 first_spread = mat2::Zero(), second_spread = mat2::Zero();
+  for (auto& m : matches) {
+    m.first -= first_centre;
+    m.second -= second_centre;
+    first_spread += m.first * m.first.transpose();
+    second_spread += m.second * m.second.transpose();
+  }
+  size = std::sqrt((first_spread.trace() + second_spread.trace()) / static_cast<double>(2 * matches.size()));
+  const double threshold = options.threshold / size;
+  if (!(size > 0.0) || !std::isfinite(threshold))
+    return fail(errc::degenerate, where, "the points all lie on one line or in one place");
+  for (auto& m : matches) {
+    m.first /= size;
+    m.second /= size;
+  }
+  random_bits random(mix64(options.seed));
+  shuffle(matches, random);
+
+  const estimator_type estimator(matches);
+  asked.threshold = threshold;
+  auto found = ransac(estimator, asked, ransac_policies{msac{}, uniform_sampling{}, sprt{}, iterated_refinement{}});
+  if (!found) {
+    const auto is_line = [](const mat2& spread) {
+      return !(spread.determinant() > 1e-12 * spread.trace() * spread.trace());
+    };
+    if (found.error().code == errc::degenerate && (is_line(first_spread) || is_line(second_spread)))
+      return fail(errc::degenerate, where, "the points all lie on one line or in one place");
+    return fail(found.error().code, where, found.error().message);
+  }
+  const typename estimator_type::model model =
+      detail::polished(estimator, *found, threshold * threshold, options.min_inliers);
+  homography_estimate out;
+  out.iterations = found->iterations;
+  double sum = 0.0;
+  for (std::size_t i = 0; i != matches.size(); ++i) {
+    const double e = estimator.squared_error(model, i);
+    if (!(e < threshold * threshold)) continue;
+    sum += e;
+    out.inliers.push_back(matches[i].original);
+  }
+  std::sort(out.inliers.begin(), out.inliers.end());
+  if (auto enough = detail::enough_inliers(where, out.inliers.size(), n, options.min_inliers, 4); !enough)
+    return fail(std::move(enough.error()));
+  out.rmse = size * std::sqrt(sum / static_cast<double>(out.inliers.size()));
+  // Back from the centres.
+  mat3 to_centre = mat3::Identity(), from_centre = mat3::Identity();
+  for (int i = 0; i != 2; ++i) {
+    to_centre(i, i) = 1.0 / size;
+    to_centre(i, 2) = -first_centre[i] / size;
+    from_centre(i, i) = size;
+    from_centre(i, 2) = second_centre[i];
+  }
+  const mat3 whole = from_centre * model.forward * to_centre;
+  out.H_second_first = whole / (whole(2, 2) != 0.0 ? whole(2, 2) : whole.norm());
+  return out;
+}
+
+/// The motions that a homography between rays at z = 1 may stand for, of any scale and sign: two, or one without
+/// translation. (Two more would have the plane behind the first camera.) `ray`, one of the first camera that was
+/// matched, tells front from behind.
+/// Errors: degenerate where H is singular or not finite.
+[[nodiscard]] inline result<std::vector<plane_motion>> decompose_homography(const mat3& homography,
+                                                                            const vec3& ray = vec3::UnitZ()) {
+  constexpr const char* where = "homography";
+  mat3 h = homography;
+  if (!h.allFinite()) return fail(errc::degenerate, where, "is not finite");
+  const auto [squares, vectors] = eigen_of_symmetric<3>(mat3(h.transpose() * h));
+  const double middle = std::sqrt(std::fmax(0.0, squares[1]));
+  if (!(squares[0] > 1e-20 * squares[2])) return fail(errc::degenerate, where, "is singular");
+  // R + t n^T has the middle singular value 1, and a positive determinant where camera and plane are on proper sides.
+  h /= middle;
+  if (h.determinant() < 0.0) h = -h;
+  const double s1 = squares[2] / (middle * middle), s3 = squares[0] / (middle * middle);
+  std::vector<plane_motion> motions;
+  if (!(s1 - s3 > 1e-12)) {
+    motions.push_back({so3(h), vec3::Zero(), vec3(ray).normalized()});
+    return motions;
+  }
+  mat3 v;
+  for (int k = 0; k != 3; ++k) v.col(k) = vectors.col(2 - k);
+  if (v.determinant() < 0.0) v = -v;
+  const double a = std::sqrt(std::fmax(0.0, 1.0 - s3) / (s1 - s3)), b = std::sqrt(std::fmax(0.0, s1 - 1.0) / (s1 - s3));
+  for (const double sign : {1.0, -1.0}) {
+    const vec3 u = a * v.col(0) + sign * b * v.col(2);
+    mat3 before, after;
+    before << v.col(1), u, v.col(1).cross(u);
+    const vec3 hv = h * v.col(1), hu = h * u;
+    after << hv, hu, hv.cross(hu);
+    const so3 rotation(mat3(after * before.transpose()));
+    vec3 normal = before.col(2);
+    vec3 translation = (h - rotation.rotation_matrix()) * normal;
+    if (normal.dot(ray) < 0.0) {
+      normal = -normal;
+      translation = -translation;
+    }
+    motions.push_back({rotation, translation, normal});
+  }
+  return motions;
+}
+
+}  // namespace orbis::optimize
