@@ -22,8 +22,8 @@
 #include <orbis/core/random.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/optimize/alignment.hpp>
-#include <orbis/optimize/two_view.hpp>
 #include <orbis/optimize/pnp.hpp>
+#include <orbis/optimize/two_view.hpp>
 
 namespace orbis::bench {
 namespace {

@@ -37,7 +37,7 @@ done <<<"$(grep -rnE '^ *# *include *<orbis/' --include='*.hpp' . | sed 's|^\./|
 # The detail/ of a component is its own: no umbrella, no sibling, no document and no example includes it, and no document
 # names it.
 declare -A known=(  # exceptions, to become none
-  ["include/orbis/optimize/bal_reprojection.hpp camera"]=1
+  ["include/orbis/optimize/reprojection_with_intrinsics.hpp camera"]=1
   ["include/orbis/interop/octomap.hpp octree"]=1
   ["include/orbis/optimize/detail/pose/pose_kernels.hpp camera"]=1
   ["include/orbis/optimize/reprojection.hpp camera"]=1

@@ -12,8 +12,8 @@
 #include <CLI/CLI.hpp>
 
 #include <orbis/io/bal.hpp>
-#include <orbis/optimize/reprojection_with_intrinsics.hpp>
 #include <orbis/optimize/bundle_adjustment.hpp>
+#include <orbis/optimize/reprojection_with_intrinsics.hpp>
 
 namespace optimize = orbis::optimize;
 

@@ -210,6 +210,12 @@ inline constexpr int residual_size = R::RowsAtCompileTime;
 template <class R>
 inline constexpr int residual_size<std::optional<R>> = R::RowsAtCompileTime;
 
+/// `lift` with the manifold by value: g++ 12 takes a reference to an empty member for one to something uninitialised.
+template <class S, class M>
+[[nodiscard]] auto lifted(M m, const typename M::point& p, const matrix<M::dimension, 1, S>& d) {
+  return lift<M>::template at<S>(m, p, d);
+}
+
 }  // namespace detail
 
 /// A residual for `bundle_adjuster` made of `f(camera, point, observation)`; satisfies `bundle_residual`. `camera` is
@@ -239,7 +245,7 @@ struct automatic_bundle_residual {
   }
   /// Empty where `f` says so, and where a value is not finite.
   [[nodiscard]] value_type residual(const view& v, const vec3& point, const observation& o) const {
-    const value_type r = f(lift<M>::template at<double>(manifold, v, matrix<M::dimension>::Zero()), point, o);
+    const value_type r = f(detail::lifted<double>(manifold, v, matrix<M::dimension>::Zero()), point, o);
     return r && r->allFinite() ? r : std::nullopt;
   }
   /// The residual and its derivatives, which are unchanged where it is empty.
@@ -251,7 +257,7 @@ struct automatic_bundle_residual {
     for (int i = 0; i != M::dimension; ++i) step[i] = number::variable(0.0, i);
     matrix<3, 1, number> p;
     for (int i = 0; i != 3; ++i) p[i] = number::variable(point[i], M::dimension + i);
-    const std::optional<matrix<dimension, 1, number>> r = f(lift<M>::template at<number>(manifold, v, step), p, o);
+    const std::optional<matrix<dimension, 1, number>> r = f(detail::lifted<number>(manifold, v, step), p, o);
     if (!r) return std::nullopt;
     matrix<dimension> values;
     matrix<dimension, n> all;

@@ -104,7 +104,7 @@ template <camera::camera_model Camera>
     return fail(errc::invalid_argument, where, "the order of the matches names not each of them once");
   ransac_options asked = detail::ransac_part(options);
   if (const char* const fault = detail::fault_of(asked)) return fail(errc::invalid_argument, where, fault);
-  asked.min_inliers = 0;  // they are counted at the end, with the camera as it is
+  asked.min_inliers = 0;  // inliers are counted at the end, with the camera itself
   if (n < 3) return fail(errc::no_data, where, "fewer than three matches");
 
   detail::pnp_matches& matches = workspace.matches;
@@ -139,7 +139,7 @@ template <camera::camera_model Camera>
     return fail(errc::degenerate, where, why.empty() ? found.error().message : why);
   }
 
-  // From here on with the camera as it is: the pose of the least truncated squared error, and its inliers.
+  // From here on with the camera itself: the pose with the least truncated squared error, and its inliers.
   const double squared_threshold = options.threshold * options.threshold;
   const auto error_at = [&](const se3& T_camera_world, std::size_t i) {
     const auto pixel = camera.project(T_camera_world * points_world[i]);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The distance of a measured point from a plane: what a depth image says about a pose.
+/// The distance of a measured point from a plane: the residual of a depth measurement.
 ///
 /// Source: Y. Chen, G. Medioni, "Object modelling by registration of multiple range images", Image and
 /// Vision Computing 10(3), 1992.
@@ -16,30 +16,30 @@
 
 namespace orbis::optimize {
 
-/// A point in the camera frame that lies on a plane of the world, metres: the residual of the pose
-/// `T_world_camera` is `sqrt(information) * n . (T_world_camera * q - p)`. Whether it says anything is
-/// `is_usable()`.
+/// A point, measured in the camera frame, that lies on a plane of the world. The whitened residual of the pose
+/// `T_world_camera` is `sqrt(information) * n . (T_world_camera * q - p)`. Use it only if `is_usable()`.
 struct point_to_plane {
   using point = se3;
   static constexpr int dimension = 1;
 
-  vec3 measured = vec3::Zero();  ///< q, in the camera frame
-  vec3 on_plane = vec3::Zero();  ///< p, in the world
-  vec3 normal = vec3::UnitZ();   ///< n, in the world, of unit length
+  vec3 measured = vec3::Zero();  ///< q, in the camera frame, metres
+  vec3 on_plane = vec3::Zero();  ///< p, in the world frame, metres
+  vec3 normal = vec3::UnitZ();   ///< n, in the world frame, of unit length
   double information = 1.0;      ///< 1 / sigma^2 along the normal, 1 / m^2
 
   [[nodiscard]] bool is_usable() const {
     return measured.allFinite() && on_plane.allFinite() && std::abs(normal.squaredNorm() - 1.0) < 1e-6 &&
            information > 0.0 && std::isfinite(information);
   }
-  /// Empty where it is not finite.
+  /// The residual; empty if it is not finite.
   [[nodiscard]] std::optional<matrix<1>> residual(const se3& T_world_camera) const {
     const vec3 off = T_world_camera * measured - on_plane;
     const matrix<1> r(std::sqrt(information) * normal.dot(off));
     if (!std::isfinite(r[0])) return std::nullopt;
     return r;
   }
-  /// The same with its derivative by a step on the right of the pose; untouched where empty.
+  /// The residual and its derivative by a step `T_world_camera * exp(d)`, which is unchanged where the residual is
+  /// empty.
   [[nodiscard]] std::optional<matrix<1>> linearize(const se3& T_world_camera, matrix<1, 6>& jacobian) const {
     const auto r = residual(T_world_camera);
     if (!r) return r;
@@ -54,17 +54,18 @@ struct point_to_plane {
   }
 };
 
-/// Plane `point` (an index, as bundle adjustment has them) touched by a depth measurement of camera `pose`.
+/// A depth measurement by the camera `pose` of the plane through the point `point`; both are indices into the caller's
+/// arrays.
 struct plane_observation {
   std::uint32_t pose = 0;
   std::uint32_t point = 0;
   vec3 measured = vec3::Zero();  ///< in the camera frame, metres
-  vec3 normal = vec3::UnitZ();   ///< of the plane, in the world, of unit length
+  vec3 normal = vec3::UnitZ();   ///< of the plane, in the world frame, of unit length
   double information = 1.0;      ///< 1 / sigma^2 along the normal, 1 / m^2
 };
 
-/// `point_to_plane` for bundle adjustment: the point through which the plane goes is estimated, its normal
-/// is given. Only what moves that point along its normal is determined. Satisfies `bundle_residual`.
+/// The point-to-plane residual for bundle adjustment: estimates a point of the plane; the normal is given. Only the
+/// position of that point along the normal is determined. Satisfies `bundle_residual`.
 struct point_to_plane_adjustment {
   using camera_state = se3;
   using camera_manifold = lie_group<se3>;

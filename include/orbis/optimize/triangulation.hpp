@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Points from the rays of two or more cameras whose poses are known.
+/// Triangulation: a point from the rays of two or more cameras with known poses.
 ///
-/// Rays are in the camera frame, scaled to z = 1, as cameras un-project pixels; errors are distances at z = 1.
+/// Rays are in the camera frame, as cameras unproject pixels; errors are distances in the plane z = 1.
 ///
 /// Sources: P. Lindstrom, "Triangulation made easy", CVPR 2010, for two views; R. Hartley, P. Sturm, "Triangulation",
-/// CVIU 68 (1997), for what is best.
+/// CVIU 68 (1997), for the optimality criterion.
 #pragma once
 
 #include <algorithm>
@@ -26,11 +26,12 @@ namespace orbis::optimize {
 enum class triangulation_status {
   ok,
   too_few_views,  ///< fewer than two
-  not_finite,     ///< a pose or a ray
-  no_parallax,    ///< the rays are parallel, or nearly, or start in one place: the depth is not determined
+  not_finite,     ///< a pose or a ray is not finite
+  no_parallax,    ///< the rays are nearly parallel or start in one place: the depth is not determined
   behind_camera   ///< the rays meet behind a camera
 };
 
+/// The status in words.
 [[nodiscard]] constexpr std::string_view to_string(triangulation_status status) noexcept {
   switch (status) {
     case triangulation_status::ok: return "ok";
@@ -48,9 +49,9 @@ struct triangulation_options {
 
 struct triangulation {
   triangulation_status status = triangulation_status::too_few_views;
-  vec3 point = vec3::Zero();  ///< in the world, metres; of use only if `ok()`
-  double parallax = 0.0;      ///< the angle between the rays, for many views that of two that are far apart, radians
-  double error = 0.0;         ///< root mean square distance from the rays at z = 1
+  vec3 point = vec3::Zero();  ///< in the world frame, metres; valid only if `ok()`
+  double parallax = 0.0;  ///< the angle between the rays (for more than two views between two distant ones), radians
+  double error = 0.0;     ///< root mean square distance from the rays at z = 1
   [[nodiscard]] bool ok() const noexcept { return status == triangulation_status::ok; }
 };
 
@@ -66,7 +67,7 @@ namespace detail {
   return hat<double>(T_second_first.translation()) * T_second_first.rotation_matrix();
 }
 
-/// Moves two rays at z = 1 by the least sum of squares so that they meet. (Two steps, which is as good as many.)
+/// Moves two rays at z = 1 by the least sum of squares so that they meet. Two steps, after which nothing changes.
 inline void make_rays_meet(const mat3& essential, vec3& first, vec3& second) {
   // `second` is x and `first` is x' in the paper.
   const mat2 e = essential.template topLeftCorner<2, 2>();
@@ -88,7 +89,7 @@ inline void make_rays_meet(const mat3& essential, vec3& first, vec3& second) {
 
 }  // namespace detail
 
-/// The point whose projections at z = 1 are nearest to the two rays (least sum of squares). Constant time.
+/// The point whose projections to z = 1 have the least sum of squared distances from the two rays. Constant time.
 [[nodiscard]] inline triangulation triangulate(const se3& T_world_first, const vec3& first_ray,
                                                const se3& T_world_second, const vec3& second_ray,
                                                const triangulation_options& options = {}) {
@@ -120,8 +121,9 @@ inline void make_rays_meet(const mat3& essential, vec3& first, vec3& second) {
   return out;
 }
 
-/// The same for any number of views: from the point nearest to all rays, Levenberg's and Marquardt's way down.
-/// O(views) for each of a few steps. @pre T_world_camera.size() == rays.size()
+/// The point whose projections to z = 1 have the least sum of squared distances from all rays: starts at the point
+/// nearest to the rays and refines it by Levenberg-Marquardt. O(views) for each of a few steps.
+/// @pre T_world_camera.size() == rays.size()
 [[nodiscard]] inline triangulation triangulate(std::span<const se3> T_world_camera, std::span<const vec3> rays,
                                                const triangulation_options& options = {}) {
   assert(T_world_camera.size() == rays.size());

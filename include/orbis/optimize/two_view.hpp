@@ -60,11 +60,12 @@ struct relative_pose_estimate {
   return detail::decompose_essential(essential);
 }
 
-/// The relative pose that the most matches agree with: five points in RANSAC, each new best matrix refined on its
-/// inliers. Matches that are not finite or cannot be un-projected are outliers. Deterministic by `options.seed`.
-/// Errors: `invalid_argument` for spans of different length or options out of range, `no_data` below five matches,
-/// `degenerate` where fewer than five can be used, no matrix has `min_inliers` inliers, or a rotation alone explains
-/// (nearly) all inliers, so that there is no parallax to tell a translation by; the message says which.
+/// The essential matrix, and the relative pose, that most matches agree with: five points in RANSAC, each new best
+/// matrix refined on its inliers. `first_pixels[i]` matches `second_pixels[i]`. Matches that are not finite or cannot
+/// be unprojected are outliers. Deterministic by `options.seed`. Errors: `invalid_argument` for spans of different
+/// length or options out of range; `no_data` below five matches; `degenerate` if fewer than five can be used, no matrix
+/// has `min_inliers` inliers, or a rotation alone explains nearly all inliers, so that the translation is not
+/// determined. The message says which.
 template <camera::camera_model First, camera::camera_model Second>
 [[nodiscard]] result<relative_pose_estimate> estimate_essential(std::span<const vec2> first_pixels,
                                                                 std::span<const vec2> second_pixels,
@@ -134,7 +135,7 @@ template <camera::camera_model First, camera::camera_model Second>
   return out;
 }
 
-/// The same for two images of one camera.
+/// As above, for two images of one camera.
 template <camera::camera_model Camera>
 [[nodiscard]] result<relative_pose_estimate> estimate_essential(std::span<const vec2> first_pixels,
                                                                 std::span<const vec2> second_pixels,
@@ -159,17 +160,17 @@ struct homography_estimate {
   std::size_t iterations = 0;
 };
 
-/// A way to read the homography of a plane: `H ~ rotation + translation * normal^T`, with `normal` the plane's unit
-/// normal in the first camera (towards the plane: points on it have normal . p > 0), `translation` that of
-/// `T_second_first` in units of the plane's distance from the first camera.
+/// A decomposition of the homography of a plane: `H ~ rotation + translation * normal^T`. `normal` is the unit normal
+/// of the plane in the first camera, towards the plane (its points have normal . p > 0). `translation` is that of
+/// `T_second_first`, in units of the distance of the plane from the first camera.
 struct plane_motion {
   so3 R_second_first;
   vec3 translation = vec3::Zero();
   vec3 normal = vec3::UnitZ();
 };
 
-/// The homography that takes `first[i]` to `second[i]`; empty where three of either four are on one line, or where no
-/// plane in front of a camera could do it.
+/// The homography that takes `first[i]` to `second[i]` (pixels). Empty if three points of an image lie on one line, or
+/// if no plane in front of both cameras gives these points.
 [[nodiscard]] inline std::optional<mat3> homography_of_four(const std::array<vec2, 4>& first,
                                                             const std::array<vec2, 4>& second) {
   mat3 h;
@@ -178,12 +179,12 @@ struct plane_motion {
   return h;
 }
 
-/// The homography that the most matches agree with: four points in RANSAC, each new best one refined on its inliers
-/// (least squares of the transfers both ways). Matches that are not finite are outliers. Deterministic by
-/// `options.seed`. For images with distortion give undistorted pixels.
-/// Errors: `invalid_argument` for spans of different length or options out of range, `no_data` below four matches,
-/// `degenerate` where fewer than four are finite, all points of an image lie on one line, or no homography has
-/// `min_inliers` inliers; the message says which.
+/// The homography that most matches agree with: four points in RANSAC, each new best one refined on its inliers (least
+/// squares of the transfer errors in both images). `first[i]` matches `second[i]`, in undistorted pixels. Matches that
+/// are not finite are outliers. Deterministic by `options.seed`.
+/// Errors: `invalid_argument` for spans of different length or options out of range; `no_data` below four matches;
+/// `degenerate` if fewer than four are finite, all points of an image lie on one line, or no homography has
+/// `min_inliers` inliers. The message says which.
 [[nodiscard]] inline result<homography_estimate> estimate_homography(std::span<const vec2> first,
                                                                      std::span<const vec2> second,
                                                                      const homography_options& options = {}) {
@@ -209,8 +210,7 @@ struct plane_motion {
         "of " + std::to_string(n) + " matches " + std::to_string(matches.size()) + " are finite, four are needed");
   first_centre /= static_cast<double>(matches.size());
   second_centre /= static_cast<double>(matches.size());
-  // In pixels about the centres and in units of about the size of the images, so that all entries of H are of one
-  // order.
+  // About the centres and in units of the size of the images, so that the entries of H have one magnitude.
   double size = 0.0;
   mat2 first_spread = mat2::Zero(), second_spread = mat2::Zero();
   for (auto& m : matches) {
@@ -269,10 +269,9 @@ struct plane_motion {
   return out;
 }
 
-/// The motions that a homography between rays at z = 1 may stand for, of any scale and sign: two, or one without
-/// translation. (Two more would have the plane behind the first camera.) `ray`, one of the first camera that was
-/// matched, tells front from behind.
-/// Errors: degenerate where H is singular or not finite.
+/// The motions that a homography between rays at z = 1 may stand for, whatever its scale and sign: two, or one if there
+/// is no translation. (Two more would have the plane behind the first camera.) `ray` is any matched ray of the first
+/// camera, which lies in front of it. Errors: `degenerate` if the homography is singular or not finite.
 [[nodiscard]] inline result<std::vector<plane_motion>> decompose_homography(const mat3& homography,
                                                                             const vec3& ray = vec3::UnitZ()) {
   constexpr const char* where = "homography";

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Robust losses on eight residuals at a time.
+/// Robust losses for eight residuals at a time.
 #pragma once
 
 #include <array>
@@ -11,8 +11,8 @@
 
 namespace orbis::optimize::detail {
 
-/// `lanes_of_loss<Loss>::weigh(loss, s, cost, weight)`: rho(s) and its derivative, up to rounding, for
-/// finite s >= 0. It exists for every loss; for those without a specialisation it asks them eight times.
+/// `lanes_of_loss<Loss>::weigh(loss, s, cost, weight)` computes rho(s) and its derivative, up to rounding, for finite
+/// s >= 0. Losses without a specialisation are called eight times.
 template <robust_loss Loss>
 struct lanes_of_loss {
   template <simd::lane_vector L>
@@ -26,7 +26,7 @@ struct lanes_of_loss {
 
  private:
   using values = std::array<double, simd::lane_count>;
-  /// Kept out of the kernels, which are compiled for instruction sets that might round it otherwise.
+  /// Not inlined: the kernels are compiled for instruction sets that might round differently.
   [[gnu::noinline]] static void weigh_each(const Loss& loss, const values& squared, values& cost, values& weight) {
     for (std::size_t i = 0; i != squared.size(); ++i) {
       cost[i] = loss.cost(squared[i]);

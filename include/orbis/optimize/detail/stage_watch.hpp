@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// What solvers that report on their iterations share.
+/// How solvers measure their stages and report their iterations.
 #pragma once
 
 #include <chrono>
 
 namespace orbis::optimize::detail {
 
-/// Adds the time from its making to its end, in seconds.
+/// Adds the seconds between its construction and its destruction to `total`.
 class stage_watch {
  public:
   explicit stage_watch(double& total) : total_{total}, start_{clock::now()} {}
@@ -21,7 +21,7 @@ class stage_watch {
   clock::time_point start_;
 };
 
-/// Nobody listens.
+/// Ignores all reports.
 struct no_report {
   template <class Summary>
   void operator()(const Summary&) const noexcept {}

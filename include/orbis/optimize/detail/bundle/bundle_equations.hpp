@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The normal equations of bundle adjustment: made, reduced to the cameras, solved.
+/// The normal equations of bundle adjustment: computed, reduced to the cameras, solved.
 ///
 /// Source: B. Triggs, P. McLauchlan, R. Hartley, A. Fitzgibbon, "Bundle adjustment - a modern
 /// synthesis", Vision Algorithms 2000.
@@ -28,8 +28,8 @@
 
 namespace orbis::optimize::detail {
 
-/// Unknowns are the steps of the cameras that may move, C numbers each, then of the points in the order
-/// of `structure()`, three each. Keeps its memory.
+/// The unknowns are the steps of the cameras that may move, C numbers each, then those of the points in the order of
+/// `structure()`, three each. Keeps its memory.
 template <bundle_residual R, robust_loss Loss, reduced_solver Reduced>
 class bundle_equations {
  public:
@@ -76,8 +76,8 @@ class bundle_equations {
     analyze_reduced();
   }
 
-  /// Begins at these estimates, with the observations that are not ignored and have a projection there;
-  /// counts them in `summary`.
+  /// Begins at these estimates, with the observations that are not ignored and have a projection there; counts them in
+  /// `summary`.
   template <class Policy>
   void begin(const Policy& policy, std::span<const camera_state> cameras, std::span<const vec3> points,
              const bundle_options& options, bundle_summary& summary) {
@@ -146,8 +146,8 @@ class bundle_equations {
     return sum;
   }
 
-  /// Eliminates the points from H + diag(damping); an empty `damping` is 0. False where a point's block
-  /// is not positive definite: `failed_camera()` is one that sees it.
+  /// Eliminates the points from H + diag(damping); an empty `damping` is 0. False if the block of a point is not
+  /// positive definite; `failed_camera()` then sees that point.
   template <class Policy>
   [[nodiscard]] bool eliminate(const Policy& policy, const Eigen::VectorXd& damping) {
     const std::size_t n = structure_.unknowns();
@@ -194,7 +194,7 @@ class bundle_equations {
       }
     return true;
   }
-  /// Factors the reduced system; false where it is not positive definite.
+  /// Factors the reduced system; false if it is not positive definite.
   [[nodiscard]] bool factor() {
     if (structure_.unknowns() == 0) return true;
     if (reduced_.factor(reduced_diagonal_, reduced_off_diagonal_)) return true;
@@ -203,15 +203,15 @@ class bundle_equations {
   }
   [[nodiscard]] std::size_t failed_camera() const { return failed_camera_; }
 
-  /// The cameras' part of `-(H + D)^-1 g`.
+  /// The step of the cameras, their part of `-(H + D)^-1 g`.
   void solve_cameras(Eigen::VectorXd& step) {
     step.resize(gradient_.size());
     std::copy(reduced_right_.begin(), reduced_right_.end(), step.data());
     if (structure_.unknowns() != 0) reduced_.solve({step.data(), reduced_right_.size()});
   }
-  /// Replaces a right-hand side of the reduced system, as it was last factored, by the solution.
+  /// Replaces a right-hand side of the reduced system that was factored last by the solution.
   void solve_reduced(std::span<double> x) { reduced_.solve(x); }
-  /// The points' part of it.
+  /// The step of the points, for that of the cameras in `step`.
   template <class Policy>
   void solve_points(const Policy& policy, Eigen::VectorXd& step) {
     const std::size_t n = structure_.unknowns();
@@ -229,7 +229,7 @@ class bundle_equations {
     });
   }
 
-  /// The cost one step away, which is what `accept` then makes the estimate.
+  /// The cost one step away; `accept` then makes that the estimate.
   template <class Policy>
   [[nodiscard]] double try_step(const Policy& policy, const Eigen::VectorXd& step) {
     for (std::size_t u = 0; u != structure_.unknowns(); ++u) {
@@ -252,7 +252,7 @@ class bundle_equations {
     cost_ = tried_cost_;
   }
 
-  /// The estimates, into the caller's arrays.
+  /// Writes the estimates to the caller's arrays.
   void write(std::span<camera_state> cameras, std::span<vec3> points) const {
     for (const std::uint32_t c : structure_.camera) cameras[c] = states_[c];
     for (std::size_t p = 0; p != structure_.points(); ++p)
@@ -271,7 +271,7 @@ class bundle_equations {
     h << v[0], v[8], v[16], v[8], v[24], v[32], v[16], v[32], v[40];
     return h;
   }
-  /// Of camera and point of an observation by a camera that may move, in the order of
+  /// The block of camera and point of an observation by a camera that may move, in the order of
   /// `structure().mixed_unknown`.
   [[nodiscard]] auto mixed_block(std::size_t observation_by_point) const {
     return Eigen::Map<const matrix<camera_size, 3>, Eigen::Unaligned, Eigen::OuterStride<>>(
@@ -283,10 +283,10 @@ class bundle_equations {
   static constexpr std::size_t block_size = pad * camera_size;
   static constexpr std::size_t point_grain = 256, slot_grain = 256;
 
-  /// What a run of points takes from the reduced system.
+  /// What a chunk of points subtracts from the reduced system.
   struct partial {
     std::vector<double> blocks, right, scratch;
-    std::size_t first_slot = 0, end_slot = 0;  ///< those it touches
+    std::size_t first_slot = 0, end_slot = 0;  ///< the slots that the chunk touches
     std::size_t failed = 0;
   };
 
@@ -311,8 +311,8 @@ class bundle_equations {
     padded_step_.assign(pad * n, 0.0);
     reduced_right_.resize(camera_size * n);
 
-    // Runs of points whose bounds depend on the problem alone, fewer where a reduced system is large
-    // compared to the work that goes into it.
+    // Chunks of points whose bounds depend only on the problem; fewer where the reduced system is large compared to the
+    // work that goes into it.
     const std::size_t runs = std::clamp<std::size_t>(
         structure_.pair_slot.size() / (8 * std::max<std::size_t>(1, structure_.slots.size())), 1, 8);
     chunk_ = std::max<std::size_t>(8, (points + 8 * runs - 1) / (8 * runs) * 8);
@@ -368,7 +368,7 @@ class bundle_equations {
     if (!on_diagonal) return;
     for (int i = 0; i != camera_size; ++i) {
       if (damping.size() != 0) to(i, i) += damping[static_cast<Eigen::Index>(camera_size * slot.row) + i];
-      if (camera_hessian_[slot.row](i, i) == 0.0) to(i, i) = 1.0;  // nothing is known of it: it stays
+      if (camera_hessian_[slot.row](i, i) == 0.0) to(i, i) = 1.0;  // not determined at all: it stays
     }
   }
 
@@ -423,7 +423,7 @@ class bundle_equations {
     return sum;
   }
 
-  /// Adds up what the observations of a point say of it.
+  /// Adds up the contributions of the observations of a point.
   void gather(std::size_t p) {
     double sum[point_size] = {};
     if (holds_point_[p] == 0)

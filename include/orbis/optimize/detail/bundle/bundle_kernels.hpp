@@ -2,8 +2,8 @@
 /// @file
 /// Linearisation and cost of all observations by one camera, eight at a time.
 ///
-/// Source of the saving: with q = R X + t and M = J_q^T W J_q all blocks of the normal equations of an
-/// observation are products of M with R and hat(q); see `camera_frame_residual`.
+/// With q = R X + t and M = J_q^T W J_q all blocks of the normal equations of an observation are products of M with R
+/// and hat(q), which saves half of the arithmetic; see `camera_frame_residual`.
 #pragma once
 
 #include <array>
@@ -21,14 +21,15 @@
 
 namespace orbis::optimize::detail {
 
-/// Cost of an observation that a step throws out of the sight of its camera, as if it were a thousand sigmas off:
-/// more than losing it could gain.
+/// The cost of an observation that loses its projection by a step: that of an error of a thousand sigmas, so that no
+/// step gains by losing observations.
 inline constexpr double out_of_sight = 0.5e6;
 
-/// Rows of the mixed block of an observation, filled up to whole registers.
+/// Rows of the camera-point block of an observation, rounded up to whole registers.
 template <int C>
 inline constexpr int padded = (C + 3) / 4 * 4;
-/// What the point of an observation gets of it: the upper triangle of its block, row by row, then its gradient.
+/// Size of the contribution of an observation to its point: the upper triangle of the block, row by row, then the
+/// gradient.
 inline constexpr int share_size = 12;
 
 /// All observations by one camera.
@@ -37,9 +38,9 @@ struct camera_work {
   const R& residual;
   const typename R::view& view;
   std::size_t count = 0;
-  const double* measurements = nullptr;                   ///< for residuals in lanes
-  const typename R::observation* observations = nullptr;  ///< for others
-  const double* information = nullptr;                    ///< 0: takes no part
+  const double* measurements = nullptr;                   ///< for residuals that are evaluated in lanes
+  const typename R::observation* observations = nullptr;  ///< for other residuals
+  const double* information = nullptr;                    ///< 0 for those that take no part
   const std::uint32_t* point = nullptr;
   const double* positions = nullptr;  ///< of the points, four numbers each
   // Where results go.
@@ -51,8 +52,8 @@ struct camera_work {
   double* gradient = nullptr;
 };
 
-/// Residuals of eight observations by a residual that knows one at a time, kept out of the kernels:
-/// they are compiled for instruction sets that might round it otherwise.
+/// Residuals of eight observations, for residuals that are evaluated one at a time. Not inlined into the kernels, which
+/// are compiled for instruction sets that might round differently.
 template <class R, int Columns>
 struct tile_of_residuals {
   static constexpr std::size_t rows = R::dimension;
@@ -96,8 +97,8 @@ template <bool Derive, class R, int Columns>
   }
 }
 
-/// Residuals of eight observations: `r`, and with `Derive` their derivatives by `q` (the point in the
-/// camera frame, or for general residuals in the world) and by the rest.
+/// The residuals `r` of eight observations, and with `Derive` their derivatives by `q` (the point in the camera frame,
+/// or for general residuals in the world) and by the other parameters. Returns which have a projection.
 template <bool Derive, class R, int Columns, class L>
 ORBIS_ALWAYS_INLINE typename L::mask residuals_of_tile(const camera_work<R>& work, std::size_t first, const L* q, L* r,
                                                        L (*by_q)[3], L (*by_rest)[Columns == 0 ? 1 : Columns]) {
@@ -122,7 +123,7 @@ ORBIS_ALWAYS_INLINE typename L::mask residuals_of_tile(const camera_work<R>& wor
   }
 }
 
-/// Eight points, in the camera frame; for general residuals in the world.
+/// Loads eight points in the camera frame; for general residuals in the world.
 template <class R, class L>
 ORBIS_ALWAYS_INLINE void points_of_tile(const camera_work<R>& work, std::size_t first, L* q) {
   const double* from[8];
@@ -176,12 +177,12 @@ ORBIS_ALWAYS_INLINE void camera_visibility(const camera_work<R>& work, double* f
   }
 }
 
-/// Writes what eight observations say of their points and of camera and point together.
+/// Writes the contributions of eight observations to their points, and their camera-point blocks.
 template <int Native, int C, class R, class L>
 ORBIS_ALWAYS_INLINE void scatter(const camera_work<R>& work, std::size_t first, const L* share, const L (*mixed)[3]) {
   constexpr int pad = padded<C>;
   const std::size_t count = work.count - first;
-  double nowhere[3 * pad > share_size ? 3 * pad : share_size];  // of the room left in the last tile
+  double nowhere[3 * pad > share_size ? 3 * pad : share_size];  // for the empty places of the last tile
   double* to[8];
   for (std::size_t i = 0; i != 8; ++i)
     to[i] = i < count ? work.shares + share_size * std::size_t{work.by_point[first + i]} : nowhere;
@@ -271,7 +272,7 @@ ORBIS_ALWAYS_INLINE double linearize_camera(const camera_work<R>& work, const Lo
 
     L share[9], mixed[C][3];
     if constexpr (through_camera) {
-      unroll<C - 6>([&](auto i) ORBIS_INLINE_LAMBDA {  // where nothing is written to them the compiler wants to see it
+      unroll<C - 6>([&](auto i) ORBIS_INLINE_LAMBDA {  // fixed cameras write nothing there, and the compiler warns
         unroll<3>([&](auto k) ORBIS_INLINE_LAMBDA { mixed[6 + i][k] = L(0.0); });
       });
       unroll<3>([&](auto i) ORBIS_INLINE_LAMBDA { b[i] = L(0.0) - b[i]; });

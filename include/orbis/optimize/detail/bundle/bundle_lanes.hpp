@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// What the kernels of bundle adjustment need of `core/lanes.hpp` beyond arithmetic: loops without a
-/// loop, and rows that become columns.
+/// Unrolled loops and transpositions for the kernels of bundle adjustment.
 #pragma once
 
 #include <cstring>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// In which order bundle adjustment looks at observations, and which blocks its reduced system has.
+/// The order of the observations in bundle adjustment, and the blocks of its reduced system.
 #pragma once
 
 #include <algorithm>
@@ -15,12 +15,11 @@
 
 namespace orbis::optimize::detail {
 
-/// Observations in two orders. By camera, in tiles of eight whose last may have room left, for
-/// everything that is the same arithmetic on each observation; by point, cameras ascending, for the
-/// elimination of the points. Points with a first camera in common stand together, so that their
-/// elimination stays in one part of the reduced system. Keeps its memory.
+/// Observations in two orders. By camera, in tiles of eight (the last may have empty places), for arithmetic that is
+/// the same for each observation. By point, cameras ascending, for the elimination of the points. Points with the same
+/// first camera are neighbours, so that their elimination touches one part of the reduced system. Keeps its memory.
 ///
-/// O(observations + pairs of observations of one point + pairs of cameras that may move), the last with a bit for each.
+/// O(observations + pairs of observations of one point + pairs of cameras that may move); one bit for each of the last.
 class bundle_structure {
  public:
   static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
@@ -30,7 +29,7 @@ class bundle_structure {
   std::vector<std::size_t> first_tile;
   std::vector<std::uint32_t> count;
   std::vector<std::uint32_t> source;                    ///< index of the caller's observation at a place
-  std::vector<std::uint32_t> point;                     ///< of each place; that of the first where there is room left
+  std::vector<std::uint32_t> point;                     ///< of each place; that of the first place where it is empty
   std::vector<std::uint32_t> by_point, mixed_by_point;  ///< of each place, its number in the orders by point
 
   // By point. Number p is the caller's `point_source[p]`.
@@ -49,8 +48,8 @@ class bundle_structure {
   [[nodiscard]] std::size_t tiles() const { return first_tile.empty() ? 0 : first_tile.back(); }
   [[nodiscard]] std::size_t longest() const { return longest_; }  ///< most observations of a point
 
-  /// Orders the observations for which `is_usable(index)`; cameras that have none of them do not move.
-  /// With `hold_first` neither does the first that has some, where no other is fixed.
+  /// Orders the observations for which `is_usable(index)`. Cameras without any do not move. With `hold_first` the first
+  /// camera with observations does not move either, unless another is fixed.
   /// @pre their indices are in range, `fixed` is empty or has one entry for each camera
   template <class Observation, class Usable>
   void build(std::size_t cameras, std::size_t points, std::span<const Observation> observations,

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Elimination of points from the normal equations, and the points' steps afterwards.
+/// The Schur complement: elimination of the points from the normal equations, and their steps by back-substitution.
 ///
-/// With V = L L^T of a point and Y = W L^-T of each camera that sees it the reduced system loses
-/// Y_a Y_b^T for every pair of them: the Schur complement, symmetric whatever the rounding. Source: D. C.
-/// Brown, "The bundle adjustment - progress and prospects", 1976.
+/// With V = L L^T of a point and Y = W L^-T of each camera that sees it, Y_a Y_b^T is subtracted from the reduced
+/// system for every pair of cameras; this is symmetric in spite of rounding. Source: D. C. Brown, "The bundle
+/// adjustment - progress and prospects", 1976.
 #pragma once
 
 #include <algorithm>
@@ -18,15 +18,15 @@
 
 namespace orbis::optimize::detail {
 
-/// Points stand together in eights: number k of the point p is `tile[8 * k + p % 8]`. Of a point's block of
-/// the normal equations the upper triangle row by row, then its gradient.
+/// Numbers of a point: the upper triangle of its block of the normal equations, row by row, then its gradient. Points
+/// are stored in tiles of eight: number k of point p is `tile[8 * k + p % 8]`.
 inline constexpr std::size_t point_size = 9;
 [[nodiscard]] ORBIS_ALWAYS_INLINE std::size_t point_at(std::size_t p) { return point_size * (p / 8 * 8) + p % 8; }
 
-/// A run of points, whose cameras' unknowns have C numbers.
+/// The elimination of a chunk of points, for cameras with C unknowns.
 struct elimination {
   std::size_t begin = 0, end = 0;   ///< `begin` is a multiple of eight
-  const double* normal = nullptr;   ///< `point_size` of each point; all zero: it stays where it is
+  const double* normal = nullptr;   ///< `point_size` of each point; all zero: the point stays
   const double* damping = nullptr;  ///< three of each point, or null
   const double* mixed = nullptr;    ///< 3 * padded<C> of each observation
   const std::uint32_t* first_mixed = nullptr;
@@ -34,14 +34,14 @@ struct elimination {
   const std::size_t* first_pair = nullptr;
   const std::uint32_t* pair_slot = nullptr;
   double* inverse = nullptr;  ///< `point_size` of each point: L^-1, row by row, and L^-1 g
-  // What the reduced system loses.
+  // What is subtracted from the reduced system.
   double* blocks = nullptr;   ///< C columns of padded<C> rows for each slot
   double* right = nullptr;    ///< padded<C> of each unknown
   double* scratch = nullptr;  ///< 3 * padded<C> * most observations of a point
 };
 
-/// L^-1 and L^-1 g of eight points from `p` on; returns the first of them before `work.end` whose block is
-/// not positive definite, or `work.end`.
+/// Computes L^-1 and L^-1 g of eight points from `p` on. Returns the first of them before `work.end` whose block is not
+/// positive definite, or `work.end`.
 template <int Native>
 ORBIS_ALWAYS_INLINE std::size_t invert_factors(const elimination& work, std::size_t p) {
   using L = simd::lanes<Native>;
@@ -100,7 +100,7 @@ ORBIS_ALWAYS_INLINE std::size_t eliminate(const elimination& work) {
     const std::uint32_t first = work.first_mixed[p], count = work.first_mixed[p + 1] - first;
     if (inverse[0] == 0.0) continue;
     const std::uint32_t* slot = work.pair_slot + work.first_pair[p];
-    // Y of an observation, also for those to come; and what its camera loses on the right.
+    // Y of an observation, which later ones need as well, and what is subtracted from the right-hand side.
     const auto make = [&](std::uint32_t a, row(*y)[parts]) ORBIS_INLINE_LAMBDA {
       const double* const w = work.mixed + 3 * pad * std::size_t{first + a};
       double* const kept = work.scratch + 3 * pad * std::size_t{a};
@@ -129,7 +129,7 @@ ORBIS_ALWAYS_INLINE std::size_t eliminate(const elimination& work) {
     };
     const auto block_at = [&](const std::uint32_t* at)
                               ORBIS_INLINE_LAMBDA { return work.blocks + C * pad * std::size_t{*at}; };
-    // A camera that sees the point twice: the pair stands for both orders of it.
+    // A camera that sees the point twice: the pair counts in both orders.
     const auto mirror = [&](std::uint32_t a, std::uint32_t b, double* block) ORBIS_INLINE_LAMBDA {
       if (a == b || work.mixed_unknown[first + a] != work.mixed_unknown[first + b]) return;
       const double *const one = work.scratch + 3 * pad * std::size_t{a}, *const other =
@@ -139,7 +139,7 @@ ORBIS_ALWAYS_INLINE std::size_t eliminate(const elimination& work) {
           for (int k = 0; k != 3; ++k) block[pad * c + r] += rounded_product(other[pad * k + r], one[pad * k + c]);
     };
     std::uint32_t a = 0;
-    for (; a + 1 < count; a += 2) {  // two rows of blocks share what they are multiplied with
+    for (; a + 1 < count; a += 2) {  // two rows of blocks share the loads of their factors
       row upper[3][parts], lower[3][parts];
       make(a, upper);
       make(a + 1, lower);
@@ -174,7 +174,7 @@ ORBIS_ALWAYS_INLINE std::size_t eliminate(const elimination& work) {
   return work.end;
 }
 
-/// The points' steps `-V^-1 (g + W^T x)` for the cameras' steps x, padded as the blocks are.
+/// The steps of the points, `-V^-1 (g + W^T x)`, for the steps x of the cameras, padded like the blocks.
 struct substitution {
   std::size_t begin = 0, end = 0;
   const double* mixed = nullptr;

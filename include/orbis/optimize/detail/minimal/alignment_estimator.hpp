@@ -22,13 +22,13 @@
 
 namespace orbis::optimize::detail {
 
-/// Pairs of points as `ransac` wants them, about their centres and in random order.
+/// Pairs of points about their centres, in random order.
 template <class Transform>
 class alignment_estimator {
  public:
   struct model {
     Transform transform;           ///< between the centred points
-    std::array<float, 12> rows{};  ///< the same
+    std::array<float, 12> rows{};  ///< the same, by rows
   };
   static constexpr std::size_t sample_size = 3;
   static constexpr bool with_scale = std::same_as<Transform, sim3>;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Gauss and Newton's steps for the few unknowns of a minimal model, as long as each is an improvement.
+/// Gauss-Newton for models with few unknowns.
 #pragma once
 
 #include <cmath>
@@ -9,9 +9,9 @@
 
 namespace orbis::optimize::detail {
 
-/// From `state`, at most `steps` of them: `sum_up(state)` gives equations with a `cost`, the sum of squares there;
-/// `step(state, equations)` an `optional` state one step on, empty where there is none. Ends where the cost does not
-/// fall, or by no more than rounding. Empty where it is not finite at the start.
+/// Takes at most `steps` steps, beginning at `state`. `sum_up(state)` returns the equations there, with the sum of
+/// squares as their `cost`; `step(state, equations)` returns the next state, or empty if there is none. Stops when a
+/// step does not lower the cost by more than rounding. Empty if the cost is not finite at the start.
 template <class State, class SumUp, class Step>
 [[nodiscard]] std::optional<State> descend(State state, int steps, const SumUp& sum_up, const Step& step) {
   auto here = sum_up(state);

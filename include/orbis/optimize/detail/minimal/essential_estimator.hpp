@@ -41,7 +41,7 @@ namespace orbis::optimize::detail {
   return {se3(one, t), se3(one, -t), se3(other, t), se3(other, -t)};
 }
 
-/// A ray's part in Sampson distances: gradients at z = 1 become gradients by pixel.
+/// Turns gradients by the point at z = 1 into gradients by the pixel.
 struct pixel_gradient {
   double xx, yx, yy;
   explicit pixel_gradient(const metric_ray& r) : xx{1.0 / r.xx}, yx{-r.xy / (r.xx * r.yy)}, yy{1.0 / r.yy} {}
@@ -123,7 +123,7 @@ class essential_estimator {
     }
   }
 
-  /// Gauss-Newton on rotation and direction.
+  /// Gauss-Newton on the rotation and the direction of the translation.
   [[nodiscard]] std::optional<mat3> refine(const mat3& start, std::span<const std::uint32_t> inliers) const {
     return refine(start, inliers, 4);
   }
@@ -159,7 +159,7 @@ class essential_estimator {
   }
 
  private:
-  /// An essential matrix by what it is made of.
+  /// An essential matrix and the motion that it stands for.
   struct motion {
     so3 rotation;
     vec3 direction;
@@ -167,7 +167,7 @@ class essential_estimator {
     motion(const so3& r, const vec3& t) : rotation{r}, direction{t}, e{hat<double>(t) * r.rotation_matrix()} {}
   };
 
-  /// For the nine entries of E, row by row; `cost` is the sum of squares.
+  /// Normal equations for the nine entries of E, row by row; `cost` is the sum of squares.
   struct equations {
     matrix<9, 9> h = matrix<9, 9>::Zero();
     matrix<9> g = matrix<9>::Zero();
@@ -209,8 +209,8 @@ class essential_estimator {
   std::size_t stride_ = 0;
 };
 
-/// How many of the matches a turn of the camera alone explains. The turn is found with weights that fall with the
-/// error, since wrong matches that happen to lie near their epipolar lines are among the inliers.
+/// The number of inliers that a rotation of the camera alone explains. The rotation is found with weights that fall
+/// with the error, because wrong matches that lie near their epipolar lines by chance are among the inliers.
 [[nodiscard]] inline std::size_t explained_by_rotation(const std::vector<image_match>& matches,
                                                        std::span<const std::uint32_t> inliers,
                                                        double squared_threshold) {
@@ -229,7 +229,7 @@ class essential_estimator {
       const double weight = round == 0 ? 1.0 : 1.0 / (1.0 + squared / squared_threshold);
       products += weight * from.normalized() * to.direction().normalized().transpose();
     }
-    const auto turn = find_best_turn(products, 1e-10);
+    const auto turn = find_best_rotation(products, 1e-10);
     if (!turn) break;
     rotation = so3(turn->quaternion).rotation_matrix();
   }

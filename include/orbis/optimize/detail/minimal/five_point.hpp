@@ -2,9 +2,9 @@
 /// @file
 /// The essential matrices of five pairs of rays.
 ///
-/// The five epipolar constraints leave a four-dimensional space of matrices `x X + y Y + z Z + W`; that an essential
-/// matrix is singular and has two equal singular values gives ten cubics in x, y and z. Elimination leaves a
-/// polynomial of degree ten in z; Newton's method on the cubics gives back the digits that this costs.
+/// The five epipolar constraints leave the matrices `x X + y Y + z Z + W`. An essential matrix is singular and has two
+/// equal singular values, which gives ten cubic equations in x, y and z. Elimination leaves a polynomial of degree ten
+/// in z. Newton's method on the cubics restores the digits that were lost on the way.
 ///
 /// Source: D. Nister, "An efficient solution to the five-point relative pose problem", PAMI 26(6), 2004.
 #pragma once
@@ -50,12 +50,12 @@ using exponents = std::array<std::uint8_t, 3>;
 inline constexpr std::array<exponents, 4> linear_terms{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {0, 0, 0}}};
 inline constexpr std::array<exponents, 10> quadric_terms{
     {{2, 0, 0}, {1, 1, 0}, {1, 0, 1}, {1, 0, 0}, {0, 2, 0}, {0, 1, 1}, {0, 1, 0}, {0, 0, 2}, {0, 0, 1}, {0, 0, 0}}};
-/// Those to be eliminated first, then what is left: x, y and 1 times powers of z.
+/// First the terms to be eliminated, then the rest: x, y and 1 times powers of z.
 inline constexpr std::array<exponents, 20> cubic_terms{
     {{3, 0, 0}, {0, 3, 0}, {2, 1, 0}, {1, 2, 0}, {2, 0, 1}, {2, 0, 0}, {0, 2, 1}, {0, 2, 0}, {1, 1, 1}, {1, 1, 0},
      {1, 0, 2}, {1, 0, 1}, {1, 0, 0}, {0, 1, 2}, {0, 1, 1}, {0, 1, 0}, {0, 0, 3}, {0, 0, 2}, {0, 0, 1}, {0, 0, 0}}};
 
-/// Which term of `terms` is the product of the i-th and the j-th of two others.
+/// The index in `terms` of the product of the i-th term of `a` and the j-th of `b`.
 template <std::size_t A, std::size_t B, std::size_t N>
 [[nodiscard]] consteval std::array<std::array<std::uint8_t, B>, A> product_table(
     const std::array<exponents, A>& a, const std::array<exponents, B>& b, const std::array<exponents, N>& terms) {
@@ -108,7 +108,7 @@ inline void add_product(cubic& sum, const quadric& a, const linear& b) noexcept 
   return all;
 }
 
-/// Gauss-Newton on the cubics; false where that does not lead to a common root.
+/// Gauss-Newton on the cubics; false if it does not lead to a common root.
 [[nodiscard]] inline bool polish(const std::array<cubic, 10>& cubics, vec3& p) {
   double last = 0.0;
   vec3 previous = p;
@@ -148,7 +148,7 @@ inline void add_product(cubic& sum, const quadric& a, const linear& b) noexcept 
   return last <= 1e-16 * size * size * size;
 }
 
-/// Four orthonormal vectors that are orthogonal to the five rows; false where the rows are dependent.
+/// Four orthonormal vectors that are orthogonal to the five rows; false if the rows are linearly dependent.
 [[nodiscard]] inline bool null_space(std::array<std::array<double, 9>, 5>& rows,
                                      std::array<std::array<double, 9>, 4>& basis) {
   std::array<std::size_t, 9> column{0, 1, 2, 3, 4, 5, 6, 7, 8};
@@ -189,7 +189,7 @@ inline void add_product(cubic& sum, const quadric& a, const linear& b) noexcept 
   return true;
 }
 
-/// Solves for the first ten terms: afterwards row i reads `term i + rest = 0`. False where that cannot be done.
+/// Solves for the first ten terms: afterwards row i is `term i + rest = 0`. False if the system is singular.
 [[nodiscard]] inline bool eliminate(std::array<cubic, 10>& rows) {
   for (std::size_t k = 0; k != 10; ++k) {
     std::size_t best = k;
@@ -210,10 +210,10 @@ inline void add_product(cubic& sum, const quadric& a, const linear& b) noexcept 
 
 }  // namespace epipolar_cubics
 
-/// All essential matrices with `second[i]^T E first[i] = 0`; rays at z = 1 or of any length. Empty where the rays do
-/// not determine them up to ten (all in one plane through the centre, the same ray twice, say) or are not finite. Rays
-/// that differ by a rotation alone, or by nothing, are no failure here: there is a matrix for every translation.
-/// Constant time, no allocation.
+/// All essential matrices with `second[i]^T E first[i] = 0`, for rays of any length. Empty if the rays do not determine
+/// at most ten of them (all rays in one plane through the centre, or the same ray twice, for example), or are not
+/// finite. Rays that differ only by a rotation are no failure: there is a matrix for every translation. Constant time,
+/// no allocation.
 [[nodiscard]] inline five_point_solutions five_point(const std::array<vec3, 5>& first,
                                                      const std::array<vec3, 5>& second) {
   namespace poly = epipolar_cubics;

@@ -21,8 +21,8 @@
 
 namespace orbis::optimize::detail {
 
-/// The homography of four points each, by projective bases; false where three of them are on a line, or where points
-/// would have to change sides.
+/// The homography of four pairs of points, by projective bases. False if three points are on a line, or if some points
+/// would lie behind a camera.
 [[nodiscard]] inline bool homography_of_four(const std::array<vec2, 4>& first, const std::array<vec2, 4>& second,
                                              mat3& out) {
   mat3 bases[2];
@@ -41,7 +41,7 @@ namespace orbis::optimize::detail {
     for (int i = 0; i != 3; ++i) bases[k].col(i) = weights[k][i] * p[static_cast<std::size_t>(i)].homogeneous();
   }
   const vec3 ratio = weights[1].cwiseQuotient(weights[0]);
-  if (!(ratio.minCoeff() > 0.0)) return false;  // the plane would be seen from behind by some of the points
+  if (!(ratio.minCoeff() > 0.0)) return false;  // some points would see the plane from behind
   out = bases[1] * bases[0].inverse();
   out /= out.norm();
   return out.allFinite();
@@ -113,7 +113,7 @@ class homography_estimator {
     std::copy(errors.begin(), errors.end(), out.begin());
   }
 
-  /// Gauss-Newton on the transfers both ways.
+  /// Gauss-Newton on the transfer errors in both images.
   [[nodiscard]] std::optional<model> refine(const model& start, std::span<const std::uint32_t> inliers) const {
     return refine(start, inliers, 4);
   }
@@ -139,7 +139,8 @@ class homography_estimator {
     return m;
   }
 
-  /// For D in (I + D) H, its last entry held; of `h` the lower triangle. `cost`: the sum of squares of all transfers.
+  /// Normal equations for D in (I + D) H, whose last entry is 0; the lower triangle of `h`. `cost` is the sum of
+  /// squares.
   struct equations {
     matrix<8, 8> h = matrix<8, 8>::Zero();
     matrix<8> g = matrix<8>::Zero();

@@ -26,15 +26,16 @@
 
 namespace orbis::optimize::detail {
 
-/// The eigenvector of the largest eigenvalue of the symmetric 4x4 matrix that Horn makes of `m`, the sum of `a b^T`
-/// over pairs of centred points: the rotation that takes a to b, as w x y z. With that eigenvalue, which is the trace
-/// of the rotated `m`. Empty where two rotations are equally good: the points lie on a line or in one place.
-struct best_turn {
+/// A rotation and the trace of the matrix that it rotates.
+struct best_rotation {
   so3::quaternion quaternion;
   double trace = 0.0;
 };
 
-[[nodiscard]] inline std::optional<best_turn> find_best_turn(const mat3& m, double relative_gap) {
+/// The rotation that best takes the points a to the points b, where `m` is the sum of `a b^T` over pairs of centred
+/// points: the eigenvector of the largest eigenvalue of Horn's symmetric 4x4 matrix. That eigenvalue is the trace.
+/// Empty if two rotations are equally good: the points lie on a line or in one place.
+[[nodiscard]] inline std::optional<best_rotation> find_best_rotation(const mat3& m, double relative_gap) {
   const double size = m.norm();
   if (!(size > 0.0) || !std::isfinite(size)) return std::nullopt;
   const mat3 s = m / size;
@@ -55,7 +56,7 @@ struct best_turn {
   const double c0 =
       laplace(minors(a00, a10, a20, a30, a10, a11, a21, a31), minors(a20, a21, a22, a32, a30, a31, a32, a33));
   const double c1 = -8.0 * s.determinant();
-  // |s| = 1: the largest root lies between 1 and the square root of 3, and from above Newton's steps only go down.
+  // |s| = 1: the largest root lies between 1 and sqrt(3), and Newton's method from above decreases monotonically.
   double x = 1.7320508075688774, slope = 0.0;
   for (int i = 0; i != 50; ++i) {
     const double xx = x * x;
@@ -67,7 +68,7 @@ struct best_turn {
   }
   // The slope there is the product of the distances to the other three roots, two of which are large.
   if (slope > 1e-3) {
-    // A column of the adjugate of a - x: three of its minors stand for all where they are not small.
+    // The largest column of the adjugate of a - x.
     const double b00 = a00 - x, b11 = a11 - x, b22 = a22 - x, b33 = a33 - x;
     const auto low = minors(a20, a21, b22, a32, a30, a31, a32, b33);
     const auto high = minors(b00, a10, a20, a30, a10, b11, a21, a31);
@@ -84,27 +85,28 @@ struct best_turn {
     for (std::size_t k = 1; k != 4; ++k)
       if (columns[k].squaredNorm() > columns[best].squaredNorm()) best = k;
     const vec4& q = columns[best];
-    return best_turn{so3::quaternion(q[0], q[1], q[2], q[3]).normalized(), x * size};
+    return best_rotation{so3::quaternion(q[0], q[1], q[2], q[3]).normalized(), x * size};
   }
   mat4 a;
   a << a00, a10, a20, a30, a10, a11, a21, a31, a20, a21, a22, a32, a30, a31, a32, a33;
   const auto eigen = eigen_of_symmetric<4>(a);
   if (!(eigen.values[3] - eigen.values[2] > relative_gap)) return std::nullopt;
   const mat4& q = eigen.vectors;
-  return best_turn{so3::quaternion(q(0, 3), q(1, 3), q(2, 3), q(3, 3)).normalized(), eigen.values[3] * size};
+  return best_rotation{so3::quaternion(q(0, 3), q(1, 3), q(2, 3), q(3, 3)).normalized(), eigen.values[3] * size};
 }
 
-/// What absolute orientation takes from pairs of points: numbers, means, products about the means.
+/// The moments of pairs of points that absolute orientation needs.
 struct pair_moments {
   vec3 from_mean, to_mean;
   mat3 products;  ///< sum of (from - mean) (to - mean)^T
   double from_spread = 0.0, to_spread = 0.0;
 };
 
-/// `pair(i, a, b)` writes the i-th pair as two arrays of three doubles and returns its weight. O(n), two passes.
+/// The moments of n pairs: `pair(i, a, b)` writes the i-th pair as two arrays of three doubles and returns its weight.
+/// O(n), two passes.
 template <class Pair>
 [[nodiscard]] pair_moments moments_of(std::size_t n, const Pair& pair) {
-  // Two sums of everything, for even and odd pairs: additions that need not wait for each other.
+  // Separate sums for even and odd pairs, so that one addition need not wait for the other.
   double sums[2][7] = {};
   for (std::size_t i = 0; i != n; ++i) {
     double a[3], b[3];
@@ -140,7 +142,7 @@ template <class Pair>
   return out;
 }
 
-/// Empty where the points do not determine a rotation.
+/// The transform between weighted pairs; empty if the points do not determine a rotation.
 template <class Pair>
 [[nodiscard]] std::optional<sim3> align_pairs(std::size_t n, const Pair& pair, bool with_scale) {
   const pair_moments moments = moments_of(n, pair);
@@ -150,13 +152,14 @@ template <class Pair>
   if (!(moments.from_spread > rounding * moments.from_mean.squaredNorm()) ||
       !(moments.to_spread > rounding * moments.to_mean.squaredNorm()) || !(moments.products.norm() > 1e-10 * spread))
     return std::nullopt;
-  const auto turn = find_best_turn(moments.products, 1e-10);
+  const auto turn = find_best_rotation(moments.products, 1e-10);
   if (!turn) return std::nullopt;
   const so3 rotation(turn->quaternion);
   const double scale = with_scale ? turn->trace / moments.from_spread : 1.0;
   return sim3(rotation, moments.to_mean - scale * (rotation * moments.from_mean), scale);
 }
 
+/// The transform between two lists of points.
 template <point_range From, point_range To>
 [[nodiscard]] result<sim3> align(const From& from, const To& to, bool with_scale) {
   constexpr const char* where = "absolute orientation";

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Matches between the pixels of two images as two-view geometry wants them: by coordinate, at z = 1, in random order.
+/// Matches between the pixels of two images, prepared for two-view geometry: at z = 1 and in random order.
 #pragma once
 
 #include <array>
@@ -17,15 +17,15 @@
 
 namespace orbis::optimize::detail {
 
-/// Where a pixel lies at z = 1, and by how many pixels it moves with it: the derivative of the pixel, made upper
-/// triangular by a rotation.
+/// The point (x, y) of a pixel at z = 1, and the derivative of the pixel by that point, made upper triangular by a
+/// rotation: it turns distances at z = 1 into pixels.
 struct metric_ray {
   double x = 0.0, y = 0.0;
   double xx = 1.0, xy = 0.0, yy = 1.0;
   [[nodiscard]] vec3 direction() const { return {x, y, 1.0}; }
 };
 
-/// False where the camera cannot un-project the pixel.
+/// False if the camera cannot unproject the pixel.
 template <camera::camera_model Camera>
 [[nodiscard]] bool read_ray(const Camera& camera, const vec2& pixel, metric_ray& out) {
   if (!pixel.allFinite()) return false;
@@ -45,7 +45,7 @@ struct image_match {
   std::uint32_t original = 0;
 };
 
-/// The usable matches, in an order that depends on the seed alone.
+/// The usable matches, in an order that depends only on the seed.
 template <camera::camera_model First, camera::camera_model Second>
 [[nodiscard]] std::vector<image_match> read_matches(std::span<const vec2> first, std::span<const vec2> second,
                                                     const First& first_camera, const Second& second_camera,

@@ -21,7 +21,7 @@
 
 namespace orbis::optimize::detail {
 
-/// A real root of `c3 x^3 + c2 x^2 + c1 x + c0`, the best separated one where there are three.
+/// A real root of `c3 x^3 + c2 x^2 + c1 x + c0`; of three real roots the best separated one.
 /// @pre |c3| >= |c0|
 [[nodiscard]] inline double real_root_of_cubic(double c3, double c2, double c1, double c0) {
   if (c3 == 0.0) return 0.0;  // then c0 is 0 as well
@@ -65,7 +65,7 @@ struct conic {
   return a.xx * b.xx + a.yy * b.yy + a.zz * b.zz + 2.0 * (a.xy * b.xy + a.xz * b.xz + a.yz * b.yz);
 }
 
-/// The two lines that a degenerate conic consists of; false where they are complex.
+/// The two lines of a degenerate conic; false if they are complex.
 [[nodiscard]] inline bool split_conic(const conic& c, vec3& line, vec3& other) {
   const conic adjugate = c.adjugate();  // -v v^T, v half the cross product of the lines
   vec3 v;
@@ -103,7 +103,7 @@ struct conic {
   return largest > 0.0;
 }
 
-/// Newton's method on the three distances; the root it starts from is already good.
+/// Newton's method on the three distances, from a start that is already good.
 inline void polish_depths(vec3& l, const std::array<double, 3>& cosines, const std::array<double, 3>& squared) {
   const auto [b12, b13, b23] = cosines;
   const auto [a12, a13, a23] = squared;
@@ -118,7 +118,8 @@ inline void polish_depths(vec3& l, const std::array<double, 3>& cosines, const s
     const double d = l(2) - b13 * l(0), e = l(1) - b23 * l(2), f = l(2) - b23 * l(1);
     const double determinant = -a * d * e - b * c * f;
     const double length = l.squaredNorm();
-    if (determinant * determinant < 1e-28 * length * length * length) return;  // a double root: as good as it gets
+    if (determinant * determinant < 1e-28 * length * length * length)
+      return;  // a double root: no more digits to be had
     const double scale = 0.5 / determinant;
     l(0) -= scale * (b * d * r23 - d * e * r12 - b * f * r13);
     l(1) -= scale * (a * f * r13 - c * f * r12 - a * d * r23);
@@ -126,8 +127,8 @@ inline void polish_depths(vec3& l, const std::array<double, 3>& cosines, const s
   }
 }
 
-/// `solution(R, t)` for each pose with `R * points_world[i] + t` on the ray `rays[i]` (unit vectors): a
-/// rotation up to rounding, as a matrix, from the world to the camera.
+/// Calls `solution(R, t)` for each pose from the world to the camera with `R * points_world[i] + t` on the ray
+/// `rays[i]` (unit vectors). R is a rotation matrix up to rounding.
 template <class Solution>
 void for_each_p3p(const std::array<vec3, 3>& points_world, const std::array<vec3, 3>& rays, Solution&& solution) {
   const vec3 &y1 = rays[0], &y2 = rays[1], &y3 = rays[2];

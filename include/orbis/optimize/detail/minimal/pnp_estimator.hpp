@@ -24,28 +24,28 @@
 
 namespace orbis::optimize::detail {
 
-/// Of half the sum of squares, for a motion on the left of the pose; `cost` is the sum itself.
+/// The normal equations of half the sum of squares for a motion on the left of the pose; `cost` is the sum of squares.
 struct pose_equations {
   mat6 h;
   vec6 g;
   double cost;
 };
 
-/// As `descend` in general, by motions of the camera; `sum_up(pose, equations)`.
+/// Gauss-Newton on a pose; `sum_up(pose, equations)` fills in the equations.
 template <class SumUp>
 [[nodiscard]] std::optional<centred_pose> descend_pose(const centred_pose& start, int steps, const SumUp& sum_up) {
   struct state {
     so3 rotation;
     centred_pose pose;
   };
-  const so3 rotation(start.rotation);  // samples give rotations up to rounding and a little more
+  const so3 rotation(start.rotation);  // those of samples are orthonormal only up to rounding and a little more
   const auto equations = [&](const state& s) {
     pose_equations e;
     sum_up(s.pose, e);
     return e;
   };
   const auto step = [](const state& s, const pose_equations& e) -> std::optional<state> {
-    // The slightest damping: enough to leave alone what the matches do not determine.
+    // A very small damping, so that directions stay that the matches do not determine.
     mat6 damped = e.h;
     damped.diagonal() *= 1.0 + 1e-9;
     damped.diagonal().array() += 1e-12 * e.h.diagonal().maxCoeff();
@@ -62,12 +62,12 @@ template <class SumUp>
   return found->pose;
 }
 
-/// P3P with reprojection errors in pixels, as `ransac` wants it.
+/// P3P with reprojection errors in pixels.
 class pnp_estimator {
  public:
   struct model {
     centred_pose pose;
-    std::array<float, 12> rows{};  ///< the same, as the errors want it
+    std::array<float, 12> rows{};  ///< the pose for the loops over the matches
   };
   static constexpr std::size_t sample_size = 3;
 
@@ -107,7 +107,7 @@ class pnp_estimator {
     return u * u + v * v;
   }
 
-  /// A few steps of Gauss and Newton.
+  /// A few steps of Gauss-Newton.
   [[nodiscard]] std::optional<model> refine(const model& start, std::span<const std::uint32_t> inliers) const {
     return refine(start, inliers, 3);
   }
@@ -131,7 +131,8 @@ class pnp_estimator {
   }
 
  private:
-  /// The named matches side by side, filled up with ones of no weight; returns the number of groups of four.
+  /// Copies the named matches side by side and fills up with matches of no weight; returns the number of groups of
+  /// four.
   [[nodiscard]] std::size_t gather(std::span<const std::uint32_t> inliers) const {
     const std::size_t groups = (inliers.size() + 3) / 4;
     auto& g = matches_.gathered;
@@ -168,12 +169,12 @@ class pnp_estimator {
   match_kernels kernels_;
 };
 
-/// Why there is no pose, by the points alone; empty if they are not to blame.
+/// Why the points themselves determine no pose; empty if they do.
 [[nodiscard]] inline std::string pnp_degeneracy(const pnp_matches& matches) {
   mat3 covariance = mat3::Zero();
   for (const vec3& p : matches.points) covariance += p * p.transpose();
   const vec3 spread = eigen_of_symmetric<3>(covariance).values;
-  // Up to the rounding of the points as they were, about the world's origin.
+  // Up to the rounding of the points about the origin of the world.
   const double rounding = 1e-30 * matches.centre.squaredNorm() * static_cast<double>(matches.size());
   if (!(spread[2] > rounding)) return "the points all lie in one place";
   if (!(spread[1] > 1e-12 * spread[2])) return "the points all lie on one line";

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Matches between known points and pixels as PnP wants them: by coordinate, for any camera, with the two loops over
-/// them, reprojection errors and normal equations, for every instruction set with the same bits.
+/// Matches between known points and pixels, prepared for PnP, and the two loops over them: reprojection errors and
+/// normal equations. Every instruction set gives the same bits.
 ///
-/// A pixel is kept as the point (x, y) of its ray at z = 1, and as the derivative of the pixel by that point, made
-/// upper triangular by a rotation: errors in pixels are that matrix times the difference at z = 1. Without distortion
-/// this is exact, with it exact to first order, which is what ranking poses takes; nothing in the loops depends on
-/// the camera's type.
+/// A pixel is stored as the point (x, y) of its ray at z = 1, and as the derivative of the pixel by that point, made
+/// upper triangular by a rotation. The error in pixels is this matrix times the difference at z = 1: exact without
+/// distortion, and correct to first order with it, which is enough to rank poses. So the loops do not depend on the
+/// camera's type.
 #pragma once
 
 #include <array>
@@ -26,21 +26,21 @@
 
 namespace orbis::optimize::detail {
 
-/// The world in the camera, about the points' centre.
+/// From the world, with the centre of the points as origin, to the camera.
 struct centred_pose {
   mat3 rotation = mat3::Identity();
   vec3 translation = vec3::Zero();
 };
 
-/// One list for each coordinate of a match: X Y Z, x y, and the derivative's three entries.
+/// The coordinates of a match, each in a list of its own: X Y Z, x y, and the three entries of the derivative.
 inline constexpr std::size_t match_coordinates = 8;
 
-/// Errors of 32 matches: `columns` are eight lists `stride` apart, `pose` the rotation by rows with the translation as
-/// a fourth column.
+/// Squared errors of 32 matches. `columns` are the lists of coordinates, `stride` apart; `pose` is the rotation by
+/// rows, with the translation as a fourth column.
 using match_errors = void(const float* columns, std::size_t stride, const float* pose, float* out);
 
-/// The normal equations of `groups` times four matches: 21 numbers of the lower triangle of H by rows, 6 of g, the
-/// sum of squared errors; four partial sums of each.
+/// The normal equations of four times `groups` matches: the lower triangle of H by rows (21 numbers), g (6) and the sum
+/// of squared errors, as four partial sums each.
 using match_equations = void(const double* columns, std::size_t stride, std::size_t groups, const double* pose,
                              double* out);
 inline constexpr std::size_t equation_sums = 28;
@@ -213,7 +213,7 @@ struct match_kernels {
   }
 };
 
-/// The usable matches of two lists, in random order.
+/// The usable matches of two lists, in an order that depends only on the seed.
 struct pnp_matches {
   std::vector<std::uint32_t> original;  ///< which match of the caller's lists this is
   std::vector<vec3> points;             ///< about the centre
@@ -226,7 +226,7 @@ struct pnp_matches {
 
   [[nodiscard]] std::size_t size() const noexcept { return original.size(); }
 
-  /// Leaves out what is not finite and pixels that the camera cannot un-project. @pre the spans have one length
+  /// Reads the matches, without those that are not finite or cannot be unprojected. @pre the spans have one length
   template <camera::camera_model Camera>
   void assign(std::span<const vec3> points_world, std::span<const vec2> pixels, const Camera& camera,
               std::uint64_t seed) {

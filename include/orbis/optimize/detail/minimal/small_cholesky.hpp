@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Normal equations of a few unknowns, on the stack.
+/// Cholesky factorisation of the normal equations of a few unknowns, on the stack.
 #pragma once
 
 #include <cmath>
@@ -9,16 +9,15 @@
 
 namespace orbis::optimize::detail {
 
-/// `H = L D L^T` of a symmetric N x N matrix scaled to a unit diagonal, so that neither the units of the
-/// unknowns nor how many residuals there were says anything. O(N^3), for N up to about ten.
+/// `H = L D L^T` of a symmetric N x N matrix that is first scaled to a unit diagonal, so that its pivots do not depend
+/// on the units of the unknowns or on the number of residuals. O(N^3), for N up to about ten.
 template <int N>
 class small_cholesky {
  public:
   using vector = matrix<N>;
   using square = matrix<N, N>;
 
-  /// Reads the lower triangle. False where H has an entry on its diagonal that is not positive and
-  /// finite.
+  /// Reads the lower triangle. False if an entry on the diagonal is not positive and finite.
   [[nodiscard]] bool set(const square& h) {
     for (int i = 0; i != N; ++i) {
       if (!(h(i, i) > 0.0) || !std::isfinite(h(i, i))) return false;
@@ -29,9 +28,8 @@ class small_cholesky {
     return true;
   }
 
-  /// Factors H with its diagonal multiplied by `1 + damping`. Returns the smallest pivot of the scaled
-  /// matrix: 1 for unknowns that have nothing to do with each other, about the rounding of double or below
-  /// for some that are not determined (or NaN).
+  /// Factors H with its diagonal multiplied by `1 + damping`. Returns the smallest pivot of the scaled matrix: 1 for
+  /// independent unknowns; about the rounding of double, below it or NaN if some are not determined.
   [[nodiscard]] double factor(double damping) {
     double least = 1.0 + damping;
     for (int j = 0; j != N; ++j) {
@@ -67,7 +65,7 @@ class small_cholesky {
     return x;
   }
 
-  /// Below this smallest pivot of the undamped matrix, some direction is called undetermined.
+  /// If the smallest pivot of the undamped matrix is below this, some direction is not determined.
   static constexpr double determined = 1e-11;
 
  private:

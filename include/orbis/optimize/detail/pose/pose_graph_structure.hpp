@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// What a pose graph is, whether one can be solved, and which of its vertices and edges share blocks
-/// of the normal equations.
+/// Checks of pose graphs, and the structure of their normal equations: which vertices and edges share blocks.
 #pragma once
 
 #include <algorithm>
@@ -20,13 +19,14 @@
 
 namespace orbis::optimize::detail {
 
-/// Where a check ended.
+/// The result of a check.
 struct pose_graph_finding {
-  pose_graph_status status = pose_graph_status::converged;  ///< that is, no failure
+  pose_graph_status status = pose_graph_status::converged;  ///< no failure
   std::size_t where = 0;
 };
 
-/// Symmetric, and positive definite whatever the units of its rows. A semidefinite one may be accepted.
+/// Whether a matrix is symmetric and positive definite, whatever the units of its rows; semidefinite ones can be
+/// accepted.
 template <int N>
 [[nodiscard]] bool is_information(const matrix<N, N>& given, bool semidefinite) {
   if (!given.allFinite()) return false;
@@ -50,7 +50,7 @@ template <int N>
   return true;
 }
 
-/// The first vertex or edge that cannot be worked with.
+/// The first vertex or edge that is not valid.
 template <int Dimension, class T, class Edges>
 [[nodiscard]] pose_graph_finding check_pose_graph(std::span<const T> vertices, const Edges& edges,
                                                   bool semidefinite_information) {
@@ -79,7 +79,7 @@ struct edge_bundle {
   std::uint32_t begin = 0, count = 0;  ///< into `pose_graph_structure::bundled`
 };
 
-/// Which blocks there are. Kept while the graph's edges join the same vertices.
+/// The unknowns and blocks of a graph. Kept while the edges join the same vertices.
 class pose_graph_structure {
  public:
   static constexpr std::uint32_t held = std::numeric_limits<std::uint32_t>::max();
@@ -91,7 +91,8 @@ class pose_graph_structure {
   std::vector<block_place> places;                  ///< of the bundles between two unknowns, in their order
   std::vector<std::uint32_t> first_touch, touches;  ///< by unknown: 2 * bundle + (1 at the bundle's `to`)
 
-  /// Finds out what moves. True in `changed` if anything is not as it was. @pre edges name vertices
+  /// Finds the unknowns, and the blocks if the graph is not that of the last call (then `changed` is true).
+  /// @pre the edges name vertices that exist
   template <class Edges>
   [[nodiscard]] pose_graph_finding update(std::size_t vertex_count, const Edges& edges,
                                           std::span<const std::uint8_t> fixed, pose_graph_gauge policy, bool& changed) {
@@ -120,9 +121,9 @@ class pose_graph_structure {
     for (const auto& e : edges) {
       touched_[e.from] = touched_[e.to] = 1;
       const std::uint32_t a = root_of(e.from), b = root_of(e.to);
-      root_[std::max(a, b)] = std::min(a, b);  // so that the root is the first of its piece
+      root_[std::max(a, b)] = std::min(a, b);  // so that the root is the first vertex of its component
     }
-    // What holds each piece: 0 nothing, 1 a fixed vertex.
+    // Whether each component has a fixed vertex.
     anchored_.assign(vertex_count, 0);
     for (std::uint32_t v = 0; v != vertex_count; ++v)
       if (is_fixed(v)) anchored_[root_of(v)] = 1;

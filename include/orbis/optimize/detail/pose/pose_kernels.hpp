@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The inner loops of pose refinement: eight observations at a time, for any camera model and loss. Every
-/// instruction set gives the same bits.
+/// The inner loops of pose refinement: eight observations at a time, for any camera model and loss. Every instruction
+/// set gives the same bits.
 #pragma once
 
 #include <array>
@@ -22,16 +22,15 @@ struct alignas(64) pose_lanes {
   static constexpr std::size_t capacity = 1024;
   using row = std::array<double, capacity>;
   row x, y, z;      ///< the point
-  row u, v, right;  ///< where it was seen; `right` is NaN where the depth is not known
-  row information;  ///< 0 for what is not to be used at all
-  row active;       ///< the information of what takes part, 0 for what does not
+  row u, v, right;  ///< its pixel; `right` is NaN where the depth is unknown
+  row information;  ///< 0 for observations that cannot be used
+  row active;       ///< the information of the inliers, 0 for outliers
 };
 
-/// The normal equations of a pose `T_camera_world` with steps on the left, `exp(xi) * T`: what is summed
-/// over the observations.
+/// The normal equations of a pose `T_camera_world` with steps on the left, `exp(xi) * T`.
 struct pose_sums {
-  /// H's lower triangle for the translation, by rows; its corner, rows for the translation; the lower
-  /// triangle for the rotation.
+  /// Of H the lower triangle for the translation, by rows; the block of translation and rotation; the lower triangle
+  /// for the rotation.
   std::array<double, 6> translation{};
   std::array<double, 9> corner{};
   std::array<double, 6> rotation{};
@@ -39,15 +38,15 @@ struct pose_sums {
   double cost = 0.0;  ///< half the robust sum
 };
 
-/// What is the same for all observations of one pass.
+/// The constants of one pass over the observations.
 struct pose_at {
   mat3 rotation;  ///< from the world to the camera
   vec3 translation;
   double bf;
-  double without_projection;  ///< chi-squared of an observation whose point has none
+  double without_projection;  ///< chi-squared error of a point without a projection
 };
 
-/// A pose beside a block: points in the camera frame, their residuals and chi-squared.
+/// Eight observations at a pose: points in the camera frame, their residuals and chi-squared errors.
 template <simd::lane_vector L>
 struct pose_block {
   L x, y, z;
@@ -77,8 +76,8 @@ ORBIS_ALWAYS_INLINE void see(const pose_lanes& in, std::size_t i, const L& infor
   b.projection.valid = b.projection.valid & (b.chi2 <= L(std::numeric_limits<double>::max()));
 }
 
-/// The equations of the first `count` observations, a multiple of eight. A point without a projection
-/// costs as much as one at the edge of the gate, so that a step cannot gain by losing points.
+/// The equations of the first `count` observations, a multiple of eight. A point without a projection costs as much as
+/// one at the gate, so that a step cannot gain by losing points.
 template <int Native, class Camera, class Loss>
 ORBIS_ALWAYS_INLINE void sum_pose(const pose_lanes& in, std::size_t count, const Camera& camera, const pose_at& at,
                                   const Loss& loss, pose_sums& out) {
@@ -190,8 +189,8 @@ ORBIS_ALWAYS_INLINE void sum_pose(const pose_lanes& in, std::size_t count, const
   out.cost = 0.5 * sum(total);
 }
 
-/// Chi-squared of the first `count` observations, whether they take part or not; infinite for points
-/// without a projection and observations of no information.
+/// The chi-squared errors of the first `count` observations, outliers included; infinite without a projection or
+/// without information.
 template <int Native, class Camera>
 ORBIS_ALWAYS_INLINE void judge_pose(const pose_lanes& in, std::size_t count, const Camera& camera, const pose_at& at,
                                     double* chi2) {

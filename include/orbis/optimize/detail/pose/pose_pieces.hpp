@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Observations laid out for the kernels of pose refinement, on the stack however many there are.
+/// Observations in the layout of the kernels of pose refinement, on the stack for any number of them.
 #pragma once
 
 #include <algorithm>
@@ -15,8 +15,8 @@
 
 namespace orbis::optimize::detail {
 
-/// The observations of a refinement in lanes: packed once where they fit, else piece by piece whenever
-/// they are looked at. What is active is what is not an outlier.
+/// The observations of a refinement as a structure of arrays: packed once if they fit, else piece by piece in every
+/// pass. Active are those that are not outliers.
 class pose_pieces {
  public:
   pose_pieces(std::span<const pose_observation> observations, std::span<const std::uint8_t> outliers)
@@ -24,7 +24,7 @@ class pose_pieces {
     if (fits()) pack(0);
   }
 
-  /// Those with finite numbers that can be squared, and information.
+  /// Whether an observation has information and numbers that are finite when squared.
   [[nodiscard]] static bool usable(const pose_observation& o) {
     constexpr double most = 1e100;
     const double size = std::abs(o.point.x()) + std::abs(o.point.y()) + std::abs(o.point.z()) + std::abs(o.pixel.x()) +
@@ -32,7 +32,7 @@ class pose_pieces {
     return size < most && o.information > 0.0 && !(std::abs(o.right) >= most);
   }
 
-  /// `f(lanes, first, count, padded)` for every piece; `padded` is `count` rounded up to whole lanes.
+  /// Calls `f(lanes, first, count, padded)` for every piece; `padded` is `count` rounded up to a multiple of eight.
   template <class F>
   void for_each(F&& f) {
     for (std::size_t first = 0; first < observations_.size(); first += pose_lanes::capacity) {
@@ -42,7 +42,7 @@ class pose_pieces {
     }
   }
 
-  /// To be called when the outliers have changed.
+  /// Call this when the outliers have changed.
   void update() {
     if (!fits()) return;
     for (std::size_t i = 0; i != observations_.size(); ++i)

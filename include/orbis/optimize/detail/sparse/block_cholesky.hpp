@@ -2,9 +2,9 @@
 /// @file
 /// Cholesky factorisation of a sparse symmetric positive definite matrix of `B x B` blocks.
 ///
-/// Left-looking and supernodal: columns of the factor with the same structure are one dense panel, and
-/// all the work is products of panels. E. Ng, B. W. Peyton, "Block sparse Cholesky algorithms on
-/// advanced uniprocessor computers", SIAM J. Sci. Comput. 14(5), 1993.
+/// Left-looking and supernodal: columns of the factor with the same structure form one dense panel, and all the work is
+/// products of panels. Source: E. Ng, B. W. Peyton, "Block sparse Cholesky algorithms on advanced uniprocessor
+/// computers", SIAM J. Sci. Comput. 14(5), 1993.
 #pragma once
 
 #include <algorithm>
@@ -23,8 +23,8 @@
 
 namespace orbis::optimize::detail {
 
-/// Analyse once, factor and solve as often as the numbers change: nothing is allocated then. The
-/// results have the same bits on every processor. Not for several threads at once.
+/// Analyse the structure once, then factor and solve for any values; that allocates nothing. Every processor gives the
+/// same bits. Not thread-safe.
 template <int B>
 requires(B >= 1) class block_cholesky {
  public:
@@ -63,9 +63,9 @@ requires(B >= 1) class block_cholesky {
 
   [[nodiscard]] const block_symbolic& symbolic() const { return symbolic_; }
 
-  /// Factors the matrix with `diagonal[i]` at (i, i), `damping` added to its diagonal, and
-  /// `off_diagonal[k]` at `places[k]`. False where the matrix is not positive definite: a pivot is not
-  /// above `tolerance` times what stands there in the matrix, or not finite; see `failed_block`.
+  /// Factors the matrix with `diagonal[i]` at (i, i), `damping` added to its diagonal, and `off_diagonal[k]` at
+  /// `places[k]`. False if the matrix is not positive definite: a pivot is not above `tolerance` times the entry of the
+  /// matrix, or not finite; see `failed_block`.
   /// @pre sizes as analysed; `damping` empty or one for each row
   [[nodiscard]] bool factor(std::span<const block> diagonal, std::span<const block> off_diagonal,
                             std::span<const double> damping = {}, double tolerance = 1e-14) {
@@ -101,7 +101,7 @@ requires(B >= 1) class block_cholesky {
     std::size_t begin = 0;
     std::size_t stride = 0;  ///< between columns
   };
-  /// Where a block off the diagonal belongs.
+  /// Where a block off the diagonal is stored.
   struct target {
     std::size_t begin = 0, stride = 0;
     bool transposed = false;
@@ -110,7 +110,7 @@ requires(B >= 1) class block_cholesky {
   [[nodiscard]] static std::ptrdiff_t offset(std::size_t k) { return static_cast<std::ptrdiff_t>(width * k); }
   [[nodiscard]] double* panel_of(std::size_t s) { return values_.data() + panels_[s].begin; }
 
-  /// Where block (row, column) of the factor begins in `values_`, in the order of elimination.
+  /// The index in `values_` of block (row, column) of the factor, in the order of elimination.
   [[nodiscard]] std::size_t at(std::uint32_t row, std::uint32_t column) const {
     const std::uint32_t s = symbolic_.supernode_of[column];
     const supernode& node = symbolic_.supernodes[s];
@@ -143,7 +143,7 @@ requires(B >= 1) class block_cholesky {
     }
   }
 
-  /// Which block row of the panel of `s` each row of the factor is.
+  /// Finds for each row of the factor its block row in the panel of `s`.
   void find_places(std::size_t s) {
     const supernode& node = symbolic_.supernodes[s];
     for (std::uint32_t c = 0; c != node.columns; ++c) place_of_row_[node.first + c] = c;
@@ -151,7 +151,7 @@ requires(B >= 1) class block_cholesky {
     for (const std::uint32_t row : symbolic_.rows_of(node)) place_of_row_[row] = place++;
   }
 
-  /// Subtracts from the panel of `s` what its columns share with those of an earlier supernode.
+  /// Subtracts from the panel of `s` the products with the columns of an earlier supernode.
   void apply(const supernode_update& u, std::size_t s) {
     const supernode& source = symbolic_.supernodes[u.source];
     const supernode& node = symbolic_.supernodes[s];

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// In which order to eliminate the blocks of a sparse symmetric matrix, so that few new ones appear.
+/// A fill-reducing order for the elimination of the blocks of a sparse symmetric matrix.
 ///
 /// Source: P. R. Amestoy, T. A. Davis, I. S. Duff, "An approximate minimum degree ordering algorithm",
 /// SIAM J. Matrix Anal. Appl. 17(4), 1996.
@@ -16,15 +16,14 @@
 
 namespace orbis::optimize::detail {
 
-/// The place of one block off the diagonal. Of a symmetric matrix only one of (row, column) and
-/// (column, row) is given.
+/// The place of one block off the diagonal of a symmetric matrix; (column, row) is implied.
 struct block_place {
   std::uint32_t row = 0;
   std::uint32_t column = 0;
   friend bool operator==(const block_place&, const block_place&) = default;
 };
 
-/// For every block, those it shares a place with, both ways round: `neighbors(i)`.
+/// The neighbours of every block: `neighbors(i)` are those that share a place with i.
 class block_adjacency {
  public:
   block_adjacency() = default;
@@ -53,9 +52,9 @@ class block_adjacency {
   std::vector<std::uint32_t> neighbors_;
 };
 
-/// The quotient graph of an elimination under way. A node is a variable (not yet eliminated; it may
-/// stand for several that have the same neighbours), an element (eliminated; its list is the clique it
-/// left behind), or gone: absorbed by another.
+/// The quotient graph during an elimination. A node is a variable (not yet eliminated; it may stand for several with
+/// the same neighbours), an element (eliminated; its list is the clique that it leaves behind), or gone: absorbed by
+/// another.
 class quotient_graph {
  public:
   explicit quotient_graph(const block_adjacency& graph)
@@ -78,7 +77,7 @@ class quotient_graph {
         seen[j] = i;
         pool_.push_back(j);
       }
-      // Every list has room for the one element that can come before anything leaves it.
+      // Every list has room for one element, the only one that can be added before another entry is removed.
       list_[i].end = pool_.size();
       degree_[i] = static_cast<std::uint32_t>(list_[i].end - list_[i].begin);
       last_merged_[i] = i;
@@ -205,7 +204,7 @@ class quotient_graph {
       for (std::size_t at = own.begin; at != own.variables; ++at) {
         const std::uint32_t e = pool_[at];
         if (state_[e] != element) continue;
-        if (remains_[e] == 1) continue;  // wholly inside the clique: the new element says all it says
+        if (remains_[e] == 1) continue;  // wholly inside the clique: contained in the new element
         outside += remains_[e] - 1;
         hash += e;
         pool_[to++] = e;
@@ -226,7 +225,7 @@ class quotient_graph {
       own.variables = elements_end + 1;
       own.end = own.variables + kept;
       if (outside == 0) {
-        merge(i, pivot);  // nothing but the clique around it: it goes with the pivot
+        merge(i, pivot);  // has no neighbours outside the clique: eliminated with the pivot
         continue;
       }
       const std::uint64_t bound = std::min<std::uint64_t>(std::uint64_t{degree_[i]} + others, others + outside);
@@ -239,7 +238,7 @@ class quotient_graph {
     }
   }
 
-  /// Variables with the same elements and neighbours stay so to the end: one stands for all.
+  /// Merges variables with the same elements and neighbours: these stay the same to the end.
   void merge_indistinguishable() {
     std::sort(hashes_.begin(), hashes_.end(),
               [](const hashed& a, const hashed& b) { return a.hash != b.hash ? a.hash < b.hash : a.node < b.node; });

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Where the Cholesky factor of a block-sparse matrix has its blocks: everything about a
-/// factorisation that does not depend on the numbers.
+/// Symbolic Cholesky factorisation of a block-sparse matrix: the structure of the factor, which does not depend on the
+/// values.
 ///
 /// Sources: J. W. H. Liu, "The role of elimination trees in sparse factorization", SIAM J. Matrix
 /// Anal. Appl. 11(1), 1990; C. Ashcraft, R. Grimes, "The influence of relaxed supernode partitions on
@@ -28,7 +28,7 @@ struct supernode {
   std::uint32_t rows = 0;      ///< how many
 };
 
-/// The rows `[begin, end)` of a supernode's panel lie in the columns of another, which it changes.
+/// The rows `[begin, end)` of the panel of supernode `source` lie in the columns of another supernode and update it.
 struct supernode_update {
   std::uint32_t source = 0;
   std::uint32_t begin = 0, end = 0;  ///< positions in the source's rows
@@ -118,7 +118,7 @@ inline constexpr std::uint32_t no_block = std::numeric_limits<std::uint32_t>::ma
   return count;
 }
 
-/// Whether a panel that `zeros` of `blocks` blocks are wasted in is still faster than two.
+/// Whether one panel, in which `zeros` of `blocks` blocks are zero, is faster than two.
 [[nodiscard]] inline bool worth_merging(std::size_t columns, std::size_t zeros, std::size_t blocks) {
   const double share = static_cast<double>(zeros) / static_cast<double>(blocks);
   return zeros == 0 || (columns <= 4 && share < 0.4) || (columns <= 12 && share < 0.15) || share < 0.05;
@@ -191,7 +191,7 @@ inline void find_rows(block_symbolic& symbolic, const block_adjacency& graph) {
   }
 }
 
-/// Which supernode changes which.
+/// The updates between supernodes.
 inline void find_updates(block_symbolic& symbolic) {
   const auto for_each = [&](auto&& visit) {
     for (std::uint32_t s = 0; s != symbolic.supernodes.size(); ++s) {

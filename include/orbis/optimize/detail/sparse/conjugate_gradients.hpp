@@ -20,15 +20,15 @@
 
 namespace orbis::optimize::detail {
 
-/// Preconditioned with the inverses of the diagonal blocks. One iteration is O(blocks). Keeps its
-/// memory, and the blocks it was given until they are solved for. Not for several threads at once.
+/// Conjugate gradients, preconditioned with the inverses of the diagonal blocks. One iteration costs O(blocks). Keeps
+/// its memory, and refers to the blocks it was given until the last `solve`. Not thread-safe.
 template <int B>
 class block_conjugate_gradients {
  public:
   using block = matrix<B, B>;
   using vector = matrix<B>;
 
-  /// Ends where the residual's norm is `relative_tolerance` times that of the right-hand side.
+  /// Stops when the norm of the residual is below `relative_tolerance` times that of the right-hand side.
   block_conjugate_gradients(double relative_tolerance, int max_iterations)
       : tolerance_{relative_tolerance}, max_iterations_{max_iterations} {}
 
@@ -57,8 +57,8 @@ class block_conjugate_gradients {
   }
   [[nodiscard]] std::uint32_t failed_block() const { return failed_block_; }
 
-  /// Replaces the right-hand side by an approximate solution: the last one at which the matrix had shown
-  /// itself positive definite.
+  /// Replaces the right-hand side by an approximate solution: the last iterate before the matrix proved not to be
+  /// positive definite, if it does.
   void solve(std::span<double> x) {
     assert(x.size() == B * size_);
     residual_.assign(x.begin(), x.end());

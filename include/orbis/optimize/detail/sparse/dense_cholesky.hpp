@@ -17,9 +17,8 @@
 
 namespace orbis::optimize::detail {
 
-/// Left-looking in panels of eight columns, in the instruction set that the processor has. A third of
-/// n^3 multiplications; a matrix of a size seen before allocates nothing. The factor has the same bits
-/// on every processor. Not for several threads at once.
+/// Left-looking, in panels of eight columns. n^3 / 3 multiplications; a matrix of the same size as before allocates
+/// nothing. Every processor gives the same bits. Not thread-safe.
 class dense_cholesky {
  public:
   dense_cholesky() : dense_cholesky(simd::detected()) {}
@@ -38,13 +37,12 @@ class dense_cholesky {
   }
   [[nodiscard]] std::size_t size() const { return size_; }
 
-  /// Entry (row, column) of the matrix, of which only the lower triangle is looked at; after `factor`
-  /// that of the factor.
+  /// Entry (row, column) of the matrix, of which only the lower triangle is read; after `factor` that of the factor.
   [[nodiscard]] double& operator()(std::size_t row, std::size_t column) { return values_[column * stride_ + row]; }
   [[nodiscard]] double* column(std::size_t c) { return values_.data() + c * stride_; }
 
-  /// Replaces the matrix by its factor. False where it is not positive definite: a pivot is not above
-  /// `tolerance` times what stood there, or not finite; see `failed_row`.
+  /// Replaces the matrix by its factor. False if it is not positive definite: a pivot is not above `tolerance` times
+  /// the entry of the matrix, or not finite; see `failed_row`.
   [[nodiscard]] bool factor(double tolerance = 1e-14) {
     for (std::size_t i = size_; i != stride_; ++i) (*this)(i, i) = 1.0;
     for (std::size_t i = 0; i != stride_; ++i) given_[i] = (*this)(i, i);

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The two inner loops of a blocked Cholesky factorisation, on column-major panels whose block
-/// columns are `N` wide. Every instruction set gives the same bits: each element is a sum in the
-/// same order, without fused multiply-adds.
+/// The two inner loops of a blocked Cholesky factorisation, on column-major panels whose block columns are `N` wide.
+/// Every instruction set gives the same bits: each element is a sum in the same order, without fused multiply-adds.
 #pragma once
 
 #include <algorithm>
@@ -18,7 +17,7 @@
 
 namespace orbis::optimize::detail {
 
-/// Rows that a kernel may read and write beyond the last: a panel has this much room after its end.
+/// The number of rows that a kernel may read and write beyond the last: panels have this much room after their end.
 inline constexpr std::size_t panel_slack = 16;
 
 /// `out = A B^T`: A has `rows` rows, B has N; both have `depth` columns `stride` apart. `out` has N
@@ -26,7 +25,7 @@ inline constexpr std::size_t panel_slack = 16;
 using panel_product = void(const double* a, const double* b, std::size_t stride, std::size_t rows, std::size_t depth,
                            double* out, std::size_t out_stride);
 
-/// So many columns of a product are made at once, as sums in registers; what is left of the N comes after them.
+/// The number of columns of a product that are computed at once, as sums in registers; the rest of the N follows.
 template <std::size_t N>
 inline constexpr std::size_t product_columns = N <= 9 ? N : 8;
 

@@ -11,6 +11,7 @@
 
 #include <orbis/camera/model.hpp>
 #include <orbis/optimize/reprojection.hpp>
+#include <orbis/optimize/robust_loss.hpp>
 #include <orbis/slam/detail/map/landmark_search.hpp>
 
 namespace orbis::slam::detail {
@@ -29,7 +30,9 @@ template <camera::camera_model Camera>
 }
 
 /// What 95 % of the true squared errors stay below, in deviations: those of two coordinates, or of three with depth.
-[[nodiscard]] constexpr double error_limit(bool has_depth) noexcept { return has_depth ? 7.815 : 5.991; }
+[[nodiscard]] constexpr double error_limit(bool has_depth) noexcept {
+  return optimize::chi_squared_gate(has_depth ? 3 : 2);
+}
 
 /// Notes which observations of an adjustment disagree with what it has come to. `squared` is memory for it.
 template <class Adjuster>
