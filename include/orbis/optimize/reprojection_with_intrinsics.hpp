@@ -11,7 +11,7 @@
 #include <span>
 #include <utility>
 
-#include <orbis/camera/detail/lanes.hpp>
+#include <orbis/camera/project_lanes.hpp>
 #include <orbis/camera/parameters.hpp>
 #include <orbis/core/lanes.hpp>
 #include <orbis/core/se3.hpp>
@@ -286,7 +286,7 @@ struct bal_reprojection {
       by_intrinsics[1][2] = fs * s * y;
     }
     const auto off_plane = !(q[2] == L(0.0));
-    return off_plane & camera::detail::is_finite(r[0], r[1]);
+    return off_plane & camera::is_finite(r[0], r[1]);
   }
 };
 
