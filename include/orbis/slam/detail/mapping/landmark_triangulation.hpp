@@ -93,8 +93,8 @@ struct view_pair {
   /// Where parallax says, or depth, whichever knows better: depth is worth the parallax of the virtual stereo camera.
   [[nodiscard]] std::optional<vec3> place(std::uint32_t i, std::uint32_t j) const {
     const double of_a = stereo_parallax(a, i), of_b = stereo_parallax(b, j);
-    const auto met = optimize::triangulate<double>(a.T_world_camera, a.rays[i], b.T_world_camera, b.rays[j],
-                                                   {.min_parallax = options.min_parallax});
+    const auto met = optimize::triangulate(a.T_world_camera, a.rays[i], b.T_world_camera, b.rays[j],
+                                           {.min_parallax = options.min_parallax});
     if (std::max(of_a, of_b) > met.parallax) return of_a >= of_b ? a.point_world(i) : b.point_world(j);
     return met.ok() ? std::optional{met.point} : std::nullopt;
   }
