@@ -13,7 +13,7 @@
 #include <orbis/core/se3.hpp>
 #include <orbis/core/types.hpp>
 #include <orbis/optimize/bundle_adjustment.hpp>
-#include <orbis/optimize/bundle_summary.hpp>
+#include <orbis/optimize/bundle_problem.hpp>
 #include <orbis/optimize/reprojection.hpp>
 #include <orbis/optimize/robust_loss.hpp>
 
