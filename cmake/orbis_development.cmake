@@ -6,3 +6,10 @@ target_compile_options(orbis_development INTERFACE
   -Wall -Wextra -Wpedantic -Wconversion
   -ffp-contract=off  # bit-for-bit comparisons with other libraries
   $<$<BOOL:${ORBIS_WERROR}>:-Werror>)
+
+# The flavour of the library that our programs use: the compiled one where it is built.
+add_library(orbis_flavour INTERFACE)
+if(TARGET orbis_compiled)
+  target_compile_options(orbis_compiled PRIVATE $<TARGET_PROPERTY:orbis_development,INTERFACE_COMPILE_OPTIONS>)
+  target_link_libraries(orbis_flavour INTERFACE orbis_compiled)
+endif()

@@ -8,7 +8,7 @@ function(run)
 endfunction()
 
 file(REMOVE_RECURSE ${SCRATCH})
-set(options -G ${GENERATOR} -DCMAKE_CXX_COMPILER=${COMPILER} -DCMAKE_BUILD_TYPE=Release)
+set(options -G ${GENERATOR} -DCMAKE_CXX_COMPILER=${COMPILER} -DCMAKE_BUILD_TYPE=Debug)
 
 if(WAY STREQUAL "find_package")
   run(${CMAKE_COMMAND} -S ${ORBIS_SOURCE} -B ${SCRATCH}/orbis ${options} -DORBIS_BUILD_TESTS=OFF
@@ -33,6 +33,13 @@ if(WAY STREQUAL "find_package")
     file(WRITE ${SCRATCH}/core.cpp "#include <orbis/core.hpp>\nint main() { return orbis::seq.threads() == 1 ? 0 : 1; }\n")
     run(${COMPILER} -std=c++20 ${SCRATCH}/core.cpp -o ${SCRATCH}/core ${flags})
     run(${SCRATCH}/core)
+  endif()
+  if(BUILD)  # the compiled flavour, as this build has it
+    run(${CMAKE_COMMAND} --install ${BUILD} --prefix ${SCRATCH}/with_library)
+    run(${CMAKE_COMMAND} -S ${PROJECT} -B ${SCRATCH}/mixed ${options} -DWAY=find_package -DMIXED=ON
+        -DCMAKE_PREFIX_PATH=${SCRATCH}/with_library)
+    run(${CMAKE_COMMAND} --build ${SCRATCH}/mixed)
+    run(${SCRATCH}/mixed/consumer)
   endif()
 endif()
 

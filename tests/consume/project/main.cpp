@@ -1,9 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <array>
+#include <cstddef>
 #include <vector>
 
 #include <orbis/cloud.hpp>
 #include <orbis/octree.hpp>
+
+#ifdef MIXED
+std::size_t occupied_leaves_of_other_unit();  // other_unit.cpp
+#endif
 
 int main() {
   std::vector<std::array<float, 3>> points;
@@ -14,5 +19,8 @@ int main() {
   map.integrate(points, std::array<float, 3>{0.0F, 0.0F, 0.0F}, {.max_range = 5.0});
   const bool right = !keep.empty() && keep.back() != 100 &&
                      map.state(std::array<float, 3>{1.001F, 0.001F, 0.0F}) == orbis::octree::occupancy::occupied;
+#ifdef MIXED
+  if (map.num_occupied_leaves() != occupied_leaves_of_other_unit()) return 2;
+#endif
   return right ? 0 : 1;
 }
