@@ -55,8 +55,8 @@ using indices = std::vector<std::uint32_t>;
 
 /// The filter with the inner loops for one instruction set.
 [[nodiscard]] indices at_level(simd::level level, const points& cloud, std::size_t k) {
-  const auto decided =
-      cloud::statistical_decision(cloud::detail::all_mean_knn_distance_at(level, seq, cloud, k), {.neighbors = k});
+  const simd::level_limit limit{level};
+  const auto decided = cloud::statistical_decision(cloud::all_mean_knn_distance(seq, cloud, k), {.neighbors = k});
   indices inliers;
   for (std::size_t i = 0; i != cloud.size(); ++i) {
     if (!(decided.mean_distance[i] > decided.threshold)) inliers.push_back(static_cast<std::uint32_t>(i));

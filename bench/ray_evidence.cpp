@@ -119,7 +119,8 @@ void add(std::size_t n, std::size_t count, bool shuffled) {
   for (const auto& [name, level] :
        {std::pair{"orbis_avx2", orbis::simd::level::avx2}, std::pair{"orbis_portable", orbis::simd::level::portable}}) {
     row(name, [=, level = level](const std::vector<orbis::vec3f>& points, const views& all) {
-      orbis::cloud::ray_evidence_counter counter{orbis::seq, points, depth_keyframes::room().camera, once, level};
+      const orbis::simd::level_limit limit{level};
+      orbis::cloud::ray_evidence_counter counter{orbis::seq, points, depth_keyframes::room().camera, once};
       for (const auto& view : all) counter.add(orbis::seq, view);
       return counter.scores();
     });

@@ -53,7 +53,8 @@ TEST_CASE("the neighbours of all points are those that brute force finds, ties b
       using orbis::simd::level;
       for (const level l : {level::portable, level::avx2, level::avx512}) {
         INFO(name << " k " << k << " level " << static_cast<int>(l));
-        const neighbor_table found = orbis::cloud::detail::all_knn_at(l, orbis::par.with(2), cloud, k);
+        const orbis::simd::level_limit limit{l};
+        const neighbor_table found = orbis::cloud::all_knn(orbis::par.with(2), cloud, k);
         std::size_t different = 0;
         for (std::size_t i = 0; i < cloud.size(); i += 1 + cloud.size() / 150) {
           const auto row = found[i];
@@ -114,7 +115,7 @@ TEST_CASE("one table of neighbours gives the mean distances of every smaller k")
     for (const std::size_t k : {1U, 8U, 20U, 90U}) {
       INFO(name << " k " << k);
       const auto expected = orbis::cloud::all_mean_knn_distance(orbis::seq, cloud, std::min<std::size_t>(k, 20));
-      const auto found = orbis::cloud::mean_knn_distance(table, k);
+      const auto found = orbis::cloud::mean_knn_distance(orbis::seq, table, k);
       REQUIRE(found.size() == expected.size());
       std::size_t different = 0;
       for (std::size_t i = 0; i != found.size(); ++i) {

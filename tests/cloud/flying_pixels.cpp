@@ -215,10 +215,10 @@ TEST_CASE("the same for every policy, instruction set, kind of depth and in plac
     if (w == width) CHECK(count.removed > 50);
     orbis::cloud::flying_pixel_workspace workspace;
     for (const level l : {level::portable, level::avx2, level::avx512}) {
+      const orbis::simd::level_limit limit{l};
       for (const unsigned threads : {1U, 2U, 5U}) {
         image<float> out(w, h, -1.0F);
-        CHECK(orbis::cloud::detail::remove_flying_pixels_at(l, orbis::par.with(threads), depth, out, {}, workspace) ==
-              count);
+        CHECK(remove_flying_pixels(orbis::par.with(threads), depth, out, {}, workspace) == count);
         CHECK(out == expected);
       }
     }

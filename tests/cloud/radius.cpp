@@ -26,8 +26,8 @@ TEST_CASE("the radius filter keeps the points with enough others around them") {
           if (others >= least) expected.push_back(i);
         }
         for (const auto level : {orbis::simd::level::portable, orbis::simd::level::avx2, orbis::simd::level::avx512}) {
-          CHECK(orbis::cloud::detail::radius_inliers_at(level, orbis::seq, cloud,
-                                                        {.radius = radius, .min_neighbors = least}) == expected);
+          const orbis::simd::level_limit limit{level};
+          CHECK(radius_inliers(orbis::seq, cloud, {.radius = radius, .min_neighbors = least}) == expected);
         }
         CHECK(radius_inliers(orbis::par.with(3), cloud, {.radius = radius, .min_neighbors = least}) == expected);
       }

@@ -187,7 +187,8 @@ TEST_CASE("ray evidence is what every ray says of every point") {
       for (const unsigned threads : {2U, 7U})
         CHECK(ray_evidence_scores(orbis::par.with(threads), points, views, camera, options) == wanted);
       for (const auto level : {orbis::simd::level::portable, orbis::simd::level::avx2, orbis::simd::level::avx512}) {
-        orbis::cloud::ray_evidence_counter counter{orbis::seq, points, camera, options, level};
+        const orbis::simd::level_limit limit{level};
+        orbis::cloud::ray_evidence_counter counter{orbis::seq, points, camera, options};
         for (const auto& view : views) counter.add(orbis::seq, view);
         for (const auto& view : views) {
           if (ghosts) counter.review(orbis::seq, view);
@@ -278,7 +279,8 @@ TEST_CASE("counts end at their largest number") {
     std::vector<std::uint16_t> counters(orbis::cloud::detail::point_blocks::block_size, 65534);
     std::array<std::uint16_t, orbis::cloud::detail::block_verdict::words> words{};
     words.fill(0xa5c3);
-    const auto kernels = orbis::cloud::detail::ray_kernels_at(level);
+    const orbis::simd::level_limit limit{level};
+    const orbis::cloud::detail::ray_kernels kernels;
     for (int again = 0; again != 3; ++again) kernels.count(words, counters.data());
     for (std::size_t i = 0; i != counters.size(); ++i)
       CHECK(counters[i] == ((0xa5c3U >> (i % 16) & 1U) != 0 ? 65535 : 65534));

@@ -22,7 +22,6 @@
 #include <orbis/core/point.hpp>
 #include <orbis/core/progress.hpp>
 #include <orbis/core/result.hpp>
-#include <orbis/core/simd.hpp>
 
 namespace orbis::cloud {
 
@@ -55,72 +54,61 @@ inline void write_row(rank_sorter& gathered, std::span<neighbor<float>> row) {
   }
 }
 
-/// `all_knn` with the inner loops for `level`.
+}  // namespace detail
+
+/// The `min(k, finite points - 1)` nearest other points of every finite point, nearest first; points
+/// at equal squared distances by index, so that the result is one and the same for every policy and
+/// processor. Identical points are neighbours of each other. `on_progress` counts leaves of sixteen points.
+///
+/// Coordinates are taken as float, distances are computed in float. O(n (log n + k log k)), also where
+/// many points are identical. Memory: 8 k bytes per point for the result, 40 per point meanwhile.
+/// Errors: `cancelled`, if the callback asks to stop.
+/// @pre k > 0, fewer than 2^32 - 1 points
 template <execution_policy Policy, point_range Points>
-[[nodiscard]] neighbor_table all_knn_at(simd::level level, const Policy& policy, const Points& points, std::size_t k,
-                                        const progress& report = {}, bool* finished = nullptr) {
+[[nodiscard]] result<neighbor_table> all_knn(const Policy& policy, const Points& points, std::size_t k,
+                                             progress on_progress) {
+  assert(k > 0);
   const std::size_t count = std::ranges::size(points);
-  const leaf_hierarchy tree = make_leaves(policy, points, std::min(k, count) + 1);
+  const detail::leaf_hierarchy tree = detail::make_leaves(policy, points, std::min(k, count) + 1);
   neighbor_table out;
   out.points = count;
   out.width = std::min(k, std::max<std::size_t>(tree.finite, 1) - 1);
   out.rows.assign(count * out.width, {neighbor_table::none, std::numeric_limits<float>::quiet_NaN()});
   if (out.width == 0) return out;
-  const knn_kernels kernels = select_knn_kernels(level);
+  const detail::knn_kernels kernels;
   const std::size_t wanted = out.width + 1;  // with the point itself
   const auto row_of = [&](std::uint32_t i) { return std::span{out.rows}.subspan(i * out.width, out.width); };
-  const bool whole = for_each_reported_chunk(policy, tree.leaves.size(), 128, report, [&](auto begin, auto end) {
-    nearest_search search{tree, kernels, wanted};
-    rank_sorter gathered{level};
-    for (std::size_t l = begin; l != end; ++l) {
-      search.visit_leaf(l, [&](std::size_t i, std::span<float> found, float bound) {
-        const float largest = found.size() < wanted
-                                  ? std::numeric_limits<float>::infinity()
-                                  : kernels.sum_nearest(found.data(), found.size(), wanted, bound).largest_squared;
-        const std::uint32_t self = tree.members[l * leaf_width + i];
-        gathered.clear();
-        search.visit_within(l, i, largest, [&](std::uint32_t member, float d) {
-          if (member != self) gathered.add(member, d);
-        });
-        write_row(gathered, row_of(self));
-        return largest;
+  const bool whole =
+      detail::for_each_reported_chunk(policy, tree.leaves.size(), 128, on_progress, [&](auto begin, auto end) {
+        detail::nearest_search search{tree, kernels, wanted};
+        detail::rank_sorter gathered;
+        for (std::size_t l = begin; l != end; ++l) {
+          search.visit_leaf(l, [&](std::size_t i, std::span<float> found, float bound) {
+            const float largest = found.size() < wanted
+                                      ? std::numeric_limits<float>::infinity()
+                                      : kernels.sum_nearest(found.data(), found.size(), wanted, bound).largest_squared;
+            const std::uint32_t self = tree.members[l * detail::leaf_width + i];
+            gathered.clear();
+            search.visit_within(l, i, largest, [&](std::uint32_t member, float d) {
+              if (member != self) gathered.add(member, d);
+            });
+            detail::write_row(gathered, row_of(self));
+            return largest;
+          });
+        }
       });
-    }
-  });
-  if (finished != nullptr) *finished = whole;
+  if (!whole) return detail::fail_cancelled();
   // Those left out have the first of their copies for neighbours.
-  for (const surplus_copy& copy : tree.left_out) {
+  for (const detail::surplus_copy& copy : tree.left_out) {
     const auto row = row_of(copy.index);
     for (std::size_t n = 0; n != row.size(); ++n) row[n] = {tree.members[copy.kept + n], 0.0F};
   }
   return out;
 }
-
-}  // namespace detail
-
-/// The `min(k, finite points - 1)` nearest other points of every finite point, nearest first; points
-/// at equal squared distances by index, so that the result is one and the same for every policy and
-/// processor. Identical points are neighbours of each other.
-///
-/// Coordinates are taken as float, distances are computed in float. O(n (log n + k log k)), also where
-/// many points are identical. Memory: 8 k bytes per point for the result, 40 per point meanwhile.
-/// @pre k > 0, fewer than 2^32 - 1 points
+/// The same without a callback, which cannot fail.
 template <execution_policy Policy, point_range Points>
 [[nodiscard]] neighbor_table all_knn(const Policy& policy, const Points& points, std::size_t k) {
-  assert(k > 0);
-  return detail::all_knn_at(simd::detected(), policy, points, k);
-}
-
-/// The same with reports of progress, in leaves of sixteen points; an error (`cancelled`) if the callback asks
-/// to stop.
-template <execution_policy Policy, point_range Points>
-[[nodiscard]] result<neighbor_table> all_knn(const Policy& policy, const Points& points, std::size_t k,
-                                             progress on_progress) {
-  assert(k > 0);
-  bool finished = true;
-  neighbor_table table = detail::all_knn_at(simd::detected(), policy, points, k, on_progress, &finished);
-  if (!finished) return detail::fail_cancelled();
-  return table;
+  return *all_knn(policy, points, k, progress{});
 }
 
 namespace detail {
@@ -160,57 +148,46 @@ struct mean_and_largest {
   return {mean_root(found.first(wanted), divisor), sum.largest_squared};
 }
 
-/// `all_mean_knn_distance` with the inner loops for `level`.
-template <execution_policy Policy, point_range Points>
-[[nodiscard]] std::vector<float> all_mean_knn_distance_at(simd::level level, const Policy& policy, const Points& points,
-                                                          std::size_t k, const progress& report = {},
-                                                          bool* finished = nullptr) {
-  assert(k > 0);
-  std::vector<float> means(std::ranges::size(points), std::numeric_limits<float>::quiet_NaN());
-  const leaf_hierarchy tree = make_leaves(policy, points, std::min(k, means.size()) + 1);
-  const std::size_t wanted = std::min(k, std::max<std::size_t>(tree.finite, 1) - 1) + 1;  // with the point itself
-  if (wanted < 2) return means;
-  for (const surplus_copy& copy : tree.left_out) means[copy.index] = 0;
-  const knn_kernels kernels = select_knn_kernels(level);
-  const bool whole = for_each_reported_chunk(policy, tree.leaves.size(), 128, report, [&](auto begin, auto end) {
-    nearest_search search{tree, kernels, wanted};
-    for (std::size_t l = begin; l != end; ++l) {
-      search.visit_leaf(l, [&](std::size_t i, std::span<float> found, float bound) {
-        const mean_and_largest result = mean_of_nearest(kernels, found, bound, wanted);
-        means[tree.members[l * leaf_width + i]] = result.mean;
-        return result.largest_squared;
-      });
-    }
-  });
-  if (finished != nullptr) *finished = whole;
-  return means;
-}
-
 }  // namespace detail
 
 /// For each point the mean distance in metres to its `k` nearest other points; to all others where
 /// there are fewer than `k`. NaN for points that are not finite, and for a point that is alone.
+/// `on_progress` counts leaves of sixteen points.
 ///
 /// Coordinates are taken as float. Squared distances are float, roots and sums double in ascending
 /// order, the mean float: bit for bit the mean distances of the usual statistical outlier filter.
 /// O(n log n) for fixed k, also where many points are identical; the same result for every policy and
 /// processor. Memory: about 40 bytes per point, and 0.3 k + 20 kilobytes per thread.
+/// Errors: `cancelled`, if the callback asks to stop.
 /// @pre k > 0, fewer than 2^32 points
-template <execution_policy Policy, point_range Points>
-[[nodiscard]] std::vector<float> all_mean_knn_distance(const Policy& policy, const Points& points, std::size_t k) {
-  return detail::all_mean_knn_distance_at(simd::detected(), policy, points, k);
-}
-
-/// The same with reports of progress, in leaves of sixteen points; an error (`cancelled`) if the callback asks
-/// to stop.
 template <execution_policy Policy, point_range Points>
 [[nodiscard]] result<std::vector<float>> all_mean_knn_distance(const Policy& policy, const Points& points,
                                                                std::size_t k, progress on_progress) {
-  bool finished = true;
-  std::vector<float> means =
-      detail::all_mean_knn_distance_at(simd::detected(), policy, points, k, on_progress, &finished);
-  if (!finished) return detail::fail_cancelled();
+  assert(k > 0);
+  std::vector<float> means(std::ranges::size(points), std::numeric_limits<float>::quiet_NaN());
+  const detail::leaf_hierarchy tree = detail::make_leaves(policy, points, std::min(k, means.size()) + 1);
+  const std::size_t wanted = std::min(k, std::max<std::size_t>(tree.finite, 1) - 1) + 1;  // with the point itself
+  if (wanted < 2) return means;
+  for (const detail::surplus_copy& copy : tree.left_out) means[copy.index] = 0;
+  const detail::knn_kernels kernels;
+  const bool whole =
+      detail::for_each_reported_chunk(policy, tree.leaves.size(), 128, on_progress, [&](auto begin, auto end) {
+        detail::nearest_search search{tree, kernels, wanted};
+        for (std::size_t l = begin; l != end; ++l) {
+          search.visit_leaf(l, [&](std::size_t i, std::span<float> found, float bound) {
+            const detail::mean_and_largest result = detail::mean_of_nearest(kernels, found, bound, wanted);
+            means[tree.members[l * detail::leaf_width + i]] = result.mean;
+            return result.largest_squared;
+          });
+        }
+      });
+  if (!whole) return detail::fail_cancelled();
   return means;
+}
+/// The same without a callback, which cannot fail.
+template <execution_policy Policy, point_range Points>
+[[nodiscard]] std::vector<float> all_mean_knn_distance(const Policy& policy, const Points& points, std::size_t k) {
+  return *all_mean_knn_distance(policy, points, k, progress{});
 }
 
 /// For each point the mean distance in metres to the first `k` neighbours of its row, or to all of a
@@ -231,11 +208,6 @@ template <execution_policy Policy>
     means[i] = static_cast<float>(sum / static_cast<double>(width));
   });
   return means;
-}
-
-/// The same on the calling thread.
-[[nodiscard]] inline std::vector<float> mean_knn_distance(const neighbor_table& table, std::size_t k) {
-  return mean_knn_distance(seq, table, k);
 }
 
 }  // namespace orbis::cloud

@@ -102,74 +102,62 @@ struct flying_limits {
 };
 
 /// By how much inverse depths may differ by accident.
-[[gnu::always_inline]] inline float flying_tolerance(float w, const flying_limits& limits) noexcept {
+ORBIS_ALWAYS_INLINE float flying_tolerance(float w, const flying_limits& limits) noexcept {
   const float quantised = limits.resolution * (w * w);
   return quantised < limits.noise ? limits.noise : quantised;
 }
 
 /// All ones where `x > y`.
-[[gnu::always_inline]] inline std::uint32_t exceeds(float x, float y) noexcept { return x > y ? ~0U : 0U; }
+ORBIS_ALWAYS_INLINE std::uint32_t exceeds(float x, float y) noexcept { return x > y ? ~0U : 0U; }
 
 /// All ones unless `x == y`.
-[[gnu::always_inline]] inline std::uint32_t differ(float x, float y) noexcept { return x == y ? 0U : ~0U; }
+ORBIS_ALWAYS_INLINE std::uint32_t differ(float x, float y) noexcept { return x == y ? 0U : ~0U; }
 
 /// `x` where `mask` is all ones, 0 where it is 0.
-[[gnu::always_inline]] inline float masked(float x, std::uint32_t mask) noexcept {
+ORBIS_ALWAYS_INLINE float masked(float x, std::uint32_t mask) noexcept {
   return std::bit_cast<float>(std::bit_cast<std::uint32_t>(x) & mask);
 }
 
 /// Sets `flags[i]` where pixel i lies between the two surfaces beside it. In loops that compilers turn into
 /// vector instructions; no product is added to anything, so that there is nothing to fuse, and the result is
 /// the same on every processor.
-[[gnu::always_inline]] inline void flag_between(const flying_lines& l, const flying_limits& limits,
-                                                std::uint32_t* flags) noexcept {
-  for (std::size_t i = 0; i != flying_pixel_workspace::lanes; ++i) {
-    const float w = l.center[i];
-    const float a = l.before[i];
-    const float b = l.after[i];
-    // Over `reach` pixels; where one is not measured, as the surface on the other side goes on. Outside the
-    // image it is no number, and so are the differences: nothing exceeds anything.
-    const std::uint32_t a_known = exceeds(a, 0.0F) & differ(l.before_that[i], 0.0F);
-    const std::uint32_t b_known = exceeds(b, 0.0F) & differ(l.after_that[i], 0.0F);
-    const float a_own = masked(a - l.before_that[i], a_known);
-    const float b_own = masked(b - l.after_that[i], b_known);
-    const float a_slope = a_own - masked(b_own, ~a_known);
-    const float b_slope = b_own - masked(a_own, ~b_known);
-    const float a_here = a + a_slope;
-    const float b_here = b + b_slope;
-    // Each surface is somewhere between flat and extended.
-    const float a_low = a < a_here ? a : a_here;
-    const float a_high = a_here < a ? a : a_here;
-    const float b_low = b < b_here ? b : b_here;
-    const float b_high = b_here < b ? b : b_here;
-    const float tolerance = flying_tolerance(w, limits);
-    const float share = limits.margin * std::abs(a - b);
-    const float clear = tolerance < share ? share : tolerance;
-    // What steep surfaces do by themselves over that distance is no edge.
-    const float steep = std::abs(a_slope) + std::abs(b_slope);
-    const float far_apart = limits.jump * tolerance;
-    const float jump = far_apart < steep ? steep : far_apart;
-    const std::uint32_t falls = exceeds(a_low - b_high, jump) & exceeds(a_low - w, clear) & exceeds(w - b_high, clear);
-    const std::uint32_t rises = exceeds(b_low - a_high, jump) & exceeds(b_low - w, clear) & exceeds(w - a_high, clear);
-    flags[i] |= exceeds(w, 0.0F) & (falls | rises);
+struct flag_between {
+  template <simd::target>
+  static ORBIS_ALWAYS_INLINE void run(const flying_lines& l, const flying_limits& limits, std::uint32_t* flags) {
+    for (std::size_t i = 0; i != flying_pixel_workspace::lanes; ++i) {
+      const float w = l.center[i];
+      const float a = l.before[i];
+      const float b = l.after[i];
+      // Over `reach` pixels; where one is not measured, as the surface on the other side goes on. Outside the
+      // image it is no number, and so are the differences: nothing exceeds anything.
+      const std::uint32_t a_known = exceeds(a, 0.0F) & differ(l.before_that[i], 0.0F);
+      const std::uint32_t b_known = exceeds(b, 0.0F) & differ(l.after_that[i], 0.0F);
+      const float a_own = masked(a - l.before_that[i], a_known);
+      const float b_own = masked(b - l.after_that[i], b_known);
+      const float a_slope = a_own - masked(b_own, ~a_known);
+      const float b_slope = b_own - masked(a_own, ~b_known);
+      const float a_here = a + a_slope;
+      const float b_here = b + b_slope;
+      // Each surface is somewhere between flat and extended.
+      const float a_low = a < a_here ? a : a_here;
+      const float a_high = a_here < a ? a : a_here;
+      const float b_low = b < b_here ? b : b_here;
+      const float b_high = b_here < b ? b : b_here;
+      const float tolerance = flying_tolerance(w, limits);
+      const float share = limits.margin * std::abs(a - b);
+      const float clear = tolerance < share ? share : tolerance;
+      // What steep surfaces do by themselves over that distance is no edge.
+      const float steep = std::abs(a_slope) + std::abs(b_slope);
+      const float far_apart = limits.jump * tolerance;
+      const float jump = far_apart < steep ? steep : far_apart;
+      const std::uint32_t falls =
+          exceeds(a_low - b_high, jump) & exceeds(a_low - w, clear) & exceeds(w - b_high, clear);
+      const std::uint32_t rises =
+          exceeds(b_low - a_high, jump) & exceeds(b_low - w, clear) & exceeds(w - a_high, clear);
+      flags[i] |= exceeds(w, 0.0F) & (falls | rises);
+    }
   }
-}
-
-inline void flag_between_portable(const flying_lines& l, const flying_limits& limits, std::uint32_t* flags) {
-  flag_between(l, limits, flags);
-}
-ORBIS_TARGET("avx2")
-inline void flag_between_avx2(const flying_lines& l, const flying_limits& limits, std::uint32_t* flags) {
-  flag_between(l, limits, flags);
-}
-ORBIS_TARGET("avx512f")
-inline void flag_between_avx512(const flying_lines& l, const flying_limits& limits, std::uint32_t* flags) {
-  flag_between(l, limits, flags);
-}
-[[nodiscard]] inline auto* select_flag_between(simd::level level) noexcept {
-  return simd::select<void(const flying_lines&, const flying_limits&, std::uint32_t*)>(
-      level, {.portable = flag_between_portable, .avx2 = flag_between_avx2, .avx512 = flag_between_avx512});
-}
+};
 
 /// How many of the eight pixels around lie at the depth of the one at `center`.
 [[nodiscard]] inline int flying_support(const float* center, std::ptrdiff_t stride, float tolerance) noexcept {
@@ -182,11 +170,15 @@ inline void flag_between_avx512(const flying_lines& l, const flying_limits& limi
   return count;
 }
 
-/// `remove_flying_pixels` with the inner loop for `level`.
+}  // namespace detail
+
+/// Writes the depth in metres to `out`, 0 where there is none or the pixel flies. `out` may be the memory
+/// that `depth` reads, if that holds metres. O(width * height); the same result for every policy and
+/// processor.
+/// @pre out is as large as depth; reach is 1 ... 8
 template <execution_policy Policy, camera::depth_source Depth>
-flying_pixel_count remove_flying_pixels_at(simd::level level, const Policy& policy, const Depth& depth,
-                                           image_view<float> out, const flying_pixel_options& options,
-                                           flying_pixel_workspace& workspace) {
+flying_pixel_count remove_flying_pixels(const Policy& policy, const Depth& depth, image_view<float> out,
+                                        const flying_pixel_options& options, flying_pixel_workspace& workspace) {
   const int width = depth.width();
   const int height = depth.height();
   assert(out.width() == width && out.height() == height);
@@ -203,18 +195,20 @@ flying_pixel_count remove_flying_pixels_at(simd::level level, const Policy& poli
     float* const w = &inverse(border, y + border);
     std::uint32_t valid = 0;
     for (int x = 0; x != width; ++x) {
-      const std::uint32_t known = exceeds(z[x], 0.0F) & exceeds(std::numeric_limits<float>::infinity(), z[x]);
-      z[x] = masked(z[x], known);
-      w[x] = masked(1.0F / z[x], known);
+      const std::uint32_t known =
+          detail::exceeds(z[x], 0.0F) & detail::exceeds(std::numeric_limits<float>::infinity(), z[x]);
+      z[x] = detail::masked(z[x], known);
+      w[x] = detail::masked(1.0F / z[x], known);
       valid += known & 1U;
     }
     counts[row].valid = valid;
   });
 
-  const flying_limits limits{static_cast<float>(options.sigmas * options.noise),
-                             static_cast<float>(options.sigmas * options.resolution), static_cast<float>(options.jump),
-                             static_cast<float>(options.margin)};
-  auto* const flag = select_flag_between(level);
+  const detail::flying_limits limits{static_cast<float>(options.sigmas * options.noise),
+                                     static_cast<float>(options.sigmas * options.resolution),
+                                     static_cast<float>(options.jump), static_cast<float>(options.margin)};
+  auto* const flag = simd::kernel<detail::flag_between,
+                                  void(const detail::flying_lines&, const detail::flying_limits&, std::uint32_t*)>();
   const std::ptrdiff_t stride = inverse.stride();
   const std::ptrdiff_t reach = options.reach;
   for_each_index(policy, counts.size(), grain, [&](std::size_t row) {
@@ -234,7 +228,7 @@ flying_pixel_count remove_flying_pixels_at(simd::level level, const Policy& poli
       if (any == 0) continue;
       for (int i = 0; i != std::min(lanes, width - x); ++i) {
         if (flags[static_cast<std::size_t>(i)] == 0) continue;
-        if (flying_support(p + i, stride, flying_tolerance(p[i], limits)) >= options.support) continue;
+        if (detail::flying_support(p + i, stride, detail::flying_tolerance(p[i], limits)) >= options.support) continue;
         z[x + i] = 0.0F;
         ++counts[row].removed;
       }
@@ -246,18 +240,6 @@ flying_pixel_count remove_flying_pixels_at(simd::level level, const Policy& poli
     total.removed += c.removed;
   }
   return total;
-}
-
-}  // namespace detail
-
-/// Writes the depth in metres to `out`, 0 where there is none or the pixel flies. `out` may be the memory
-/// that `depth` reads, if that holds metres. O(width * height); the same result for every policy and
-/// processor.
-/// @pre out is as large as depth; reach is 1 ... 8
-template <execution_policy Policy, camera::depth_source Depth>
-flying_pixel_count remove_flying_pixels(const Policy& policy, const Depth& depth, image_view<float> out,
-                                        const flying_pixel_options& options, flying_pixel_workspace& workspace) {
-  return detail::remove_flying_pixels_at(simd::detected(), policy, depth, out, options, workspace);
 }
 
 /// The same with memory of its own.

@@ -20,7 +20,6 @@
 #include <orbis/cloud/neighbors.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/point.hpp>
-#include <orbis/core/simd.hpp>
 
 namespace orbis::cloud {
 
@@ -40,9 +39,8 @@ class leaf_search {
 
   /// @pre fewer than 2^32 points
   template <execution_policy Policy, point_range Points>
-  leaf_search(const Policy& policy, const Points& points, simd::level level = simd::detected())
-      : tree_{detail::make_leaves(policy, points, std::numeric_limits<std::size_t>::max())},
-        kernels_{detail::select_knn_kernels(level)} {
+  leaf_search(const Policy& policy, const Points& points)
+      : tree_{detail::make_leaves(policy, points, std::numeric_limits<std::size_t>::max())} {
     assert(tree_.levels.size() <= most_levels);
   }
   template <point_range Points>

@@ -24,7 +24,6 @@
 #include <orbis/core/point.hpp>
 #include <orbis/core/progress.hpp>
 #include <orbis/core/result.hpp>
-#include <orbis/core/simd.hpp>
 
 namespace orbis::cloud {
 
@@ -107,52 +106,41 @@ class crowd_search {
   std::vector<float> found_;
 };
 
-/// `radius_inliers` with the inner loops for `level`.
-template <execution_policy Policy, point_range Points>
-[[nodiscard]] std::vector<std::uint32_t> radius_inliers_at(simd::level level, const Policy& policy,
-                                                           const Points& points, const radius_options& options,
-                                                           const progress& report = {}, bool* finished = nullptr) {
-  assert(options.radius >= 0);
-  const std::size_t count = std::ranges::size(points);
-  const std::size_t enough = std::min(options.min_neighbors, count) + 1;  // with the point itself
-  const leaf_hierarchy tree = make_leaves(policy, points, enough);
-  std::vector<char> kept(count, options.non_finite == cloud::non_finite::keep ? 1 : 0);
-  const knn_kernels kernels = select_knn_kernels(level);
-  const bool whole = for_each_reported_chunk(policy, tree.leaves.size(), 128, report, [&](auto begin, auto end) {
-    crowd_search search{tree, kernels, static_cast<float>(options.radius), enough};
-    for (std::size_t l = begin; l != end; ++l) {
-      search.visit_leaf(
-          l, [&](std::size_t i, bool has_enough) { kept[tree.members[l * leaf_width + i]] = has_enough ? 1 : 0; });
-    }
-  });
-  if (finished != nullptr) *finished = whole;
-  // Enough copies of those left out are in the leaves.
-  for (const surplus_copy& copy : tree.left_out) kept[copy.index] = 1;
-  return indices_where(count, [&](std::size_t i) { return kept[i] != 0; });
-}
-
 }  // namespace detail
 
 /// The indices, ascending, of the points with at least `min_neighbors` other points within `radius`.
 /// O(n (log n + min_neighbors)), also where many points are identical; the same result for every policy and
-/// processor. Coordinates are taken as float, squared distances computed in float.
+/// processor. Coordinates are taken as float, squared distances computed in float. `on_progress` counts leaves of
+/// sixteen points. Errors: `cancelled`, if the callback asks to stop.
 /// @pre radius >= 0, fewer than 2^32 points
-template <execution_policy Policy, point_range Points>
-[[nodiscard]] std::vector<std::uint32_t> radius_inliers(const Policy& policy, const Points& points,
-                                                        const radius_options& options = {}) {
-  return detail::radius_inliers_at(simd::detected(), policy, points, options);
-}
-
-/// The same with reports of progress, in leaves of sixteen points; an error (`cancelled`) if the callback asks
-/// to stop.
 template <execution_policy Policy, point_range Points>
 [[nodiscard]] result<std::vector<std::uint32_t>> radius_inliers(const Policy& policy, const Points& points,
                                                                 const radius_options& options, progress on_progress) {
-  bool finished = true;
-  std::vector<std::uint32_t> inliers =
-      detail::radius_inliers_at(simd::detected(), policy, points, options, on_progress, &finished);
-  if (!finished) return detail::fail_cancelled();
-  return inliers;
+  assert(options.radius >= 0);
+  const std::size_t count = std::ranges::size(points);
+  const std::size_t enough = std::min(options.min_neighbors, count) + 1;  // with the point itself
+  const detail::leaf_hierarchy tree = detail::make_leaves(policy, points, enough);
+  std::vector<char> kept(count, options.non_finite == cloud::non_finite::keep ? 1 : 0);
+  const detail::knn_kernels kernels;
+  const bool whole =
+      detail::for_each_reported_chunk(policy, tree.leaves.size(), 128, on_progress, [&](auto begin, auto end) {
+        detail::crowd_search search{tree, kernels, static_cast<float>(options.radius), enough};
+        for (std::size_t l = begin; l != end; ++l) {
+          search.visit_leaf(l, [&](std::size_t i, bool has_enough) {
+            kept[tree.members[l * detail::leaf_width + i]] = has_enough ? 1 : 0;
+          });
+        }
+      });
+  if (!whole) return detail::fail_cancelled();
+  // Enough copies of those left out are in the leaves.
+  for (const detail::surplus_copy& copy : tree.left_out) kept[copy.index] = 1;
+  return detail::indices_where(count, [&](std::size_t i) { return kept[i] != 0; });
+}
+/// The same without a callback, which cannot fail.
+template <execution_policy Policy, point_range Points>
+[[nodiscard]] std::vector<std::uint32_t> radius_inliers(const Policy& policy, const Points& points,
+                                                        const radius_options& options = {}) {
+  return *radius_inliers(policy, points, options, progress{});
 }
 
 }  // namespace orbis::cloud

@@ -22,12 +22,10 @@
 #include <orbis/cloud/detail/rays/depth_windows.hpp>
 #include <orbis/cloud/detail/rays/point_blocks.hpp>
 #include <orbis/cloud/detail/rays/ray_kernels.hpp>
-#include <orbis/cloud/detail/rays/ray_kernels_simd.hpp>
 #include <orbis/cloud/detail/rays/ray_view.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/point.hpp>
 #include <orbis/core/se3.hpp>
-#include <orbis/core/simd.hpp>
 
 namespace orbis::cloud {
 
@@ -71,16 +69,14 @@ struct ray_evidence {
 template <camera::camera_model Camera>
 class ray_evidence_counter {
  public:
-  /// O(n). `camera` is copied. `level`: the best instructions that may be used.
+  /// O(n). `camera` is copied.
   template <execution_policy Policy, point_range Points>
   ray_evidence_counter(const Policy& policy, const Points& points, const Camera& camera,
-                       const ray_evidence_options& options = {}, simd::level level = simd::detected())
+                       const ray_evidence_options& options = {})
       : camera_{camera},
         options_{options},
         size_{std::ranges::size(points)},
         blocks_{detail::make_point_blocks(policy, points)},
-        level_{level},
-        kernels_{detail::ray_kernels_at(level)},
         through_(blocks_.axis[0].size(), 0),
         supported_(blocks_.axis[0].size(), 0),
         test_{camera_} {
@@ -96,7 +92,7 @@ class ray_evidence_counter {
     assert(view.depth.width() == camera_.width() && view.depth.height() == camera_.height());
     const se3 pose = view.T_world_camera;
     if (!pose.to_matrix().allFinite() || blocks_.index.empty()) return;
-    windows_.take(policy, view.depth, options_.window, level_);
+    windows_.take(policy, view.depth, options_.window);
     const detail::ray_view placed = view_at(pose);
     test_.place(pose, placed, windows_);
     for_each_seen_block(policy, placed, [&](std::size_t first, const auto&, const detail::block_verdict& verdict) {
@@ -116,7 +112,7 @@ class ray_evidence_counter {
     const se3 pose = view.T_world_camera;
     if (!pose.to_matrix().allFinite() || blocks_.index.empty()) return;
     for (auto* counters : {&through_dropped_, &refuted_}) counters->resize(through_.size(), 0);
-    windows_.take(policy, view.depth, options_.window, level_);
+    windows_.take(policy, view.depth, options_.window);
     const detail::ray_view placed = view_at(pose);
     test_.place(pose, placed, windows_);
 
@@ -219,7 +215,6 @@ class ray_evidence_counter {
   ray_evidence_options options_;
   std::size_t size_;
   detail::point_blocks blocks_;
-  simd::level level_;
   detail::ray_kernels kernels_;
   std::vector<std::uint16_t> through_;  ///< in the order of the blocks
   std::vector<std::uint16_t> supported_;

@@ -90,7 +90,8 @@ TEST_CASE("mean distances equal brute force with every instruction set and numbe
       const auto expected = orbis::test::reference_mean_distances(cloud, k);
       for (const level l : levels) {
         INFO(name << " k " << k << " level " << static_cast<int>(l));
-        CHECK(differences(orbis::cloud::detail::all_mean_knn_distance_at(l, orbis::seq, cloud, k), expected) == 0);
+        const orbis::simd::level_limit limit{l};
+        CHECK(differences(orbis::cloud::all_mean_knn_distance(orbis::seq, cloud, k), expected) == 0);
       }
       CHECK(differences(orbis::cloud::all_mean_knn_distance(orbis::par.with(3), cloud, k), expected) == 0);
     }
@@ -117,9 +118,9 @@ TEST_CASE("mean distances of larger clouds equal those of a k-d tree") {
         expected.push_back(static_cast<float>(sum / static_cast<double>(k)));
       }
       for (const level l : levels) {
-        CHECK(differences(orbis::cloud::detail::all_mean_knn_distance_at(l, orbis::seq, cloud, k), expected) == 0);
-        CHECK(differences(orbis::cloud::detail::all_mean_knn_distance_at(l, orbis::par.with(2), cloud, k), expected) ==
-              0);
+        const orbis::simd::level_limit limit{l};
+        CHECK(differences(orbis::cloud::all_mean_knn_distance(orbis::seq, cloud, k), expected) == 0);
+        CHECK(differences(orbis::cloud::all_mean_knn_distance(orbis::par.with(2), cloud, k), expected) == 0);
       }
     }
   }
@@ -148,8 +149,9 @@ TEST_CASE("the nearest of some distances are selected and summed alike by all in
       INFO("round " << round << " level " << static_cast<int>(l));
       std::vector<float> found = values;
       found.resize(count + orbis::cloud::detail::leaf_width, std::numeric_limits<float>::infinity());
-      const auto sum =
-          orbis::cloud::detail::select_knn_kernels(l).sum_nearest(found.data(), count, wanted, sorted.back());
+      const orbis::simd::level_limit limit{l};
+      const orbis::cloud::detail::knn_kernels kernels;
+      const auto sum = kernels.sum_nearest(found.data(), count, wanted, sorted.back());
       CHECK(sum.largest_squared == sorted[wanted - 1]);
       if (sum.roots >= 0) {
         CHECK(std::abs(sum.roots - roots) <= roots * orbis::cloud::detail::roots_slack(wanted));
@@ -163,38 +165,101 @@ TEST_CASE("the nearest of some distances are selected and summed alike by all in
   }
 }
 
+// The kernels by their definition, one number after the other.
+namespace {
+
+using namespace orbis::cloud::detail;
+
+/// The distance from a value to an interval.
+[[nodiscard]] float gap(float low, float high, float from_low, float from_high) noexcept {
+  return std::max(std::max(low - from_high, from_low - high), 0.0F);
+}
+
+std::uint32_t near_boxes_reference(const box_axes& boxes, const box3& query, float bound, float* distance) {
+  std::uint32_t mask = 0;
+  for (std::size_t i = 0; i != leaf_width; ++i) {
+    std::array<float, 3> d;
+    for (std::size_t a = 0; a != 3; ++a)
+      d[a] =
+          gap(boxes.first[a * boxes.stride + i], boxes.first[(a + 3) * boxes.stride + i], query.low[a], query.high[a]);
+    distance[i] = squared_distance<float>(d, {0.0F, 0.0F, 0.0F});
+    mask |= (distance[i] <= bound ? 1U : 0U) << i;
+  }
+  return mask;
+}
+
+std::uint32_t distances_reference(const point_row& leaf, const std::array<float, 3>& query, float bound,
+                                  float* distance) {
+  std::uint32_t mask = 0;
+  for (std::size_t i = 0; i != leaf_width; ++i) {
+    distance[i] = squared_distance<float>(query, {leaf.axis[0][i], leaf.axis[1][i], leaf.axis[2][i]});
+    mask |= (distance[i] <= bound ? 1U : 0U) << i;
+  }
+  return mask;
+}
+
+std::size_t in_leaf_reference(const point_row& leaf, const std::array<float, 3>& query, float bound, float* found) {
+  std::size_t count = 0;
+  for (std::size_t i = 0; i != leaf_width; ++i) {
+    const float d = squared_distance<float>(query, {leaf.axis[0][i], leaf.axis[1][i], leaf.axis[2][i]});
+    found[count] = d;
+    count += d <= bound ? 1 : 0;
+  }
+  return count;
+}
+
+std::size_t near_points_reference(const point_row* leaves, const nearby_leaves& near, const std::array<float, 3>& query,
+                                  float bound, float* found, std::size_t capacity) {
+  const box3 box{query, query};
+  std::array<float, leaf_width> distance;
+  std::size_t count = 0;
+  for (std::size_t first = 0; first < near.count; first += leaf_width) {
+    std::uint32_t mask = near_boxes_reference(near.row(first), box, bound, distance.data());
+    for (; mask != 0; mask &= mask - 1) {
+      const std::uint32_t leaf = near.leaves[first + static_cast<std::size_t>(std::countr_zero(mask))];
+      count += in_leaf_reference(leaves[leaf], query, bound, found + count);
+      if (count > capacity) break;
+    }
+    if (count > capacity) break;
+  }
+  std::fill_n(found + count, leaf_width, std::numeric_limits<float>::infinity());
+  return count;
+}
+
+}  // namespace
+
 TEST_CASE("boxes and leaves are measured alike by all instruction sets") {
   using orbis::cloud::detail::box3;
   const auto cloud = orbis::test::uniform_cloud(2000, 7, 3.0);
   const auto tree = orbis::cloud::detail::make_leaves(orbis::seq, cloud, 51);
   using namespace orbis::cloud::detail;
-  const knn_kernels reference{near_boxes_portable, gather_portable,    near_points_portable,
-                              in_leaf_portable,    distances_portable, sum_nearest_portable};
   for (const level l : levels) {
-    const auto kernels = orbis::cloud::detail::select_knn_kernels(l);
-    orbis::cloud::detail::nearby_leaves near{400};
-    orbis::cloud::detail::nearby_leaves near_reference{400};
+    const orbis::simd::level_limit limit{l};
+    const knn_kernels kernels;
+    nearby_leaves near{400};
+    std::vector<std::uint32_t> leaves;
     const box3 box{{1.0F, 1.0F, 1.0F}, {1.5F, 1.25F, 1.0F}};
     for (std::uint32_t row = 0; row != tree.levels[0].size(); ++row) {
       std::array<float, 16> distance{};
       std::array<float, 16> expected{};
       const auto mask = kernels.near_boxes(tree.levels[0][row], box, 0.3F, distance.data());
-      CHECK(mask == reference.near_boxes(tree.levels[0][row], box, 0.3F, expected.data()));
+      CHECK(mask == near_boxes_reference(tree.levels[0][row], box, 0.3F, expected.data()));
       CHECK(distance == expected);
       kernels.gather(tree.levels[0][row], mask, row * 16, near);
-      reference.gather(tree.levels[0][row], mask, row * 16, near_reference);
+      for (std::uint32_t i = 0; i != 16; ++i) {
+        if ((mask >> i & 1U) != 0) leaves.push_back(row * 16 + i);
+      }
     }
     near.finish();
-    near_reference.finish();
     for (const auto& leaf : tree.leaves) {
       const std::array<float, 3> q{leaf.axis[0][3], leaf.axis[1][0], leaf.axis[2][0]};
       if (!std::isfinite(q[0])) continue;
       std::array<float, 64> found{};
       std::array<float, 64> expected{};
-      CHECK(kernels.distances(leaf, q, 0.05F, found.data()) == reference.distances(leaf, q, 0.05F, expected.data()));
+      CHECK(kernels.distances(leaf, q, 0.05F, found.data()) == distances_reference(leaf, q, 0.05F, expected.data()));
       CHECK(found == expected);
       const std::size_t n = kernels.in_leaf(leaf, q, 0.05F, found.data());
-      CHECK(n == reference.in_leaf(leaf, q, 0.05F, expected.data()));
+      CHECK(n == in_leaf_reference(leaf, q, 0.05F, expected.data()));
       CHECK(std::equal(found.begin(), found.begin() + static_cast<std::ptrdiff_t>(n), expected.begin()));
     }
     const std::array<float, 3> middle{1.2F, 1.1F, 1.0F};
@@ -204,19 +269,20 @@ TEST_CASE("boxes and leaves are measured alike by all instruction sets") {
     const std::size_t n =
         kernels.near_points(tree.leaves.data(), near, middle, 0.2F, scratch.data(), found.data(), 3000);
     CHECK(n > 16);
-    CHECK(n == reference.near_points(tree.leaves.data(), near_reference, middle, 0.2F, scratch.data(),
-                                     found_reference.data(), 3000));
+    CHECK(n == near_points_reference(tree.leaves.data(), near, middle, 0.2F, found_reference.data(), 3000));
     found.resize(n + 16);
     found_reference.resize(n + 16);
     CHECK(found == found_reference);
-    REQUIRE(near.count == near_reference.count);
     CHECK(near.count > 16);
     near.leaves.resize(near.count);
-    near_reference.leaves.resize(near.count);
-    CHECK(near.leaves == near_reference.leaves);
-    for (std::size_t i = 0; i != (near.count + 15) / 16; ++i) {
-      CHECK(near.boxes[i].low == near_reference.boxes[i].low);
-      CHECK(near.boxes[i].high == near_reference.boxes[i].high);
+    CHECK(near.leaves == leaves);
+    for (std::size_t i = 0; i != near.count; ++i) {
+      const auto& from = tree.levels[0][leaves[i] / 16];
+      for (std::size_t a = 0; a != 3; ++a) {
+        CHECK(near.boxes[a * near.stride + i] == from.low[a][leaves[i] % 16]);
+        CHECK(near.boxes[(a + 3) * near.stride + i] == from.high[a][leaves[i] % 16]);
+      }
     }
+    for (std::size_t i = near.count; i % 16 != 0; ++i) CHECK(near.boxes[i] == std::numeric_limits<float>::infinity());
   }
 }

@@ -15,7 +15,8 @@ TEST_CASE("ranks sort by distance, then by index, with every instruction set") {
   using orbis::simd::level;
   orbis::random_bits random{1};
   for (const level l : {level::portable, level::avx2, level::avx512}) {
-    orbis::cloud::detail::rank_sorter sorter{l};
+    const orbis::simd::level_limit limit{l};
+    orbis::cloud::detail::rank_sorter sorter;
     for (int round = 0; round != 600; ++round) {
       const std::size_t count = random.below(round % 50 == 0 ? 1000 : 70);
       const int kind = round % 5;
@@ -52,7 +53,7 @@ TEST_CASE("ranks sort by distance, then by index, with every instruction set") {
 }
 
 TEST_CASE("nothing is sorted as well") {
-  orbis::cloud::detail::rank_sorter sorter{orbis::simd::detected()};
+  orbis::cloud::detail::rank_sorter sorter;
   bool called = false;
   sorter.for_each([&](std::size_t, std::uint32_t, float) { return called = true; });
   CHECK_FALSE(called);

@@ -73,10 +73,11 @@ TEST_CASE("windows of depth images of every size and kind") {
     }
     for (const int radius : {0, 1, 2, 7, 45}) {
       for (const auto level : {orbis::simd::level::portable, orbis::simd::level::avx2}) {
+        const orbis::simd::level_limit limit{level};
         const orbis::camera::depth_view<std::uint16_t> view(stored.view(), 1234.5, 0.3F, 6.0F);
-        windows.take(orbis::seq, view, radius, level);
+        windows.take(orbis::seq, view, radius);
         check_windows(windows, view, radius);
-        windows.take(orbis::par.with(3), orbis::camera::depth_view<float>(metres.view()), radius, level);
+        windows.take(orbis::par.with(3), orbis::camera::depth_view<float>(metres.view()), radius);
         check_windows(windows, orbis::camera::depth_view<float>(metres.view()), radius);
       }
     }

@@ -1,43 +1,58 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The inner loops of the search for the neighbours of all points: what they do, and how without any
-/// particular instructions.
+/// The inner loops of the search for the neighbours of all points.
 ///
 /// Distances to boxes are computed by the same operations in the same order as those to points.
 /// Rounding is monotonic, so the distance to a box is never more than that to a point within it, and
 /// no neighbour is lost to rounding.
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <bit>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <type_traits>
 #include <vector>
 
 #include <orbis/cloud/detail/knn/leaf_hierarchy.hpp>
-#include <orbis/cloud/detail/knn/squared_distance.hpp>
+#include <orbis/cloud/detail/knn/rank_bracket.hpp>
+#include <orbis/core/simd.hpp>
 
 namespace orbis::cloud::detail {
+
+/// Boxes axis by axis: the first corners' coordinates along axis a begin at `first + a * stride`, the opposite
+/// corners' three strides later.
+struct box_axes {
+  const float* first;
+  std::size_t stride;
+  box_axes(const float* from, std::size_t distance) noexcept : first{from}, stride{distance} {}
+  box_axes(const box_row& row) noexcept  // NOLINT(google-explicit-constructor)
+      : first{row.low[0].data()}, stride{leaf_width} {
+    static_assert(sizeof(box_row) == 6 * leaf_width * sizeof(float));
+  }
+};
 
 /// The leaves near a group of queries, and their boxes.
 struct nearby_leaves {
   explicit nearby_leaves(std::size_t most)
-      : boxes(most / leaf_width + 2), leaves((most / leaf_width + 2) * leaf_width) {}
-  std::vector<box_row> boxes;
+      : stride{(most / leaf_width + 2) * leaf_width}, boxes(6 * stride), leaves(stride) {}
+  std::size_t stride;
+  std::vector<float> boxes;  ///< as `box_axes` says
   std::vector<std::uint32_t> leaves;
   std::size_t count = 0;
   /// Whether a further row of children may be added.
-  [[nodiscard]] bool has_room() const noexcept { return count + 2 * leaf_width <= leaves.size(); }
+  [[nodiscard]] bool has_room() const noexcept { return count + 2 * leaf_width <= stride; }
+  /// Sixteen boxes. @pre first is a multiple of sixteen
+  [[nodiscard]] box_axes row(std::size_t first) const noexcept { return {boxes.data() + first, stride}; }
   /// Fills up the last row with boxes at infinity.
   void finish() noexcept {
-    const box_row none = empty_boxes();
+    constexpr float inf = std::numeric_limits<float>::infinity();
     for (std::size_t i = count; i % leaf_width != 0; ++i) {
       for (std::size_t a = 0; a != 3; ++a) {
-        boxes[i / leaf_width].low[a][i % leaf_width] = none.low[a][0];
-        boxes[i / leaf_width].high[a][i % leaf_width] = none.high[a][0];
+        boxes[a * stride + i] = inf;
+        boxes[(a + 3) * stride + i] = -inf;
       }
     }
   }
@@ -49,106 +64,303 @@ struct nearest_sum {
   float largest_squared = 0;  ///< the largest of them
 };
 
-/// The relative error that `nearest_sum::roots` may have: that of the vector kernels' roots, and of
+/// The relative error that `nearest_sum::roots` may have: that of roots from Newton's method, and of
 /// corrections added up in float.
 [[nodiscard]] inline double roots_slack(std::size_t wanted) noexcept {
   return 0x1p-40 + 0x1p-46 * static_cast<double>(wanted);
 }
 
-/// One set of inner loops.
-struct knn_kernels {
-  /// The squared distances from `query` to sixteen boxes; returns those within `bound` as bits.
-  std::uint32_t (*near_boxes)(const box_row& boxes, const box3& query, float bound, float* distance);
-  /// Adds to `near` the boxes with bits in `mask`; the first one is that of leaf `first`.
-  void (*gather)(const box_row& boxes, std::uint32_t mask, std::uint32_t first, nearby_leaves& near);
-  /// Writes the squared distances within `bound` from `query` to the points of `near`, then sixteen
-  /// times infinity, and returns the number of the former. Ends early with more than `capacity` of
-  /// them; touches no more than `capacity + 3 * leaf_width`. `scratch`: longer by sixteen than
-  /// `near.leaves`.
-  std::size_t (*near_points)(const point_row* leaves, const nearby_leaves& near, const std::array<float, 3>& query,
-                             float bound, std::uint32_t* scratch, float* found, std::size_t capacity);
-  /// The same for one leaf, whatever its box, and without infinity at the end.
-  std::size_t (*in_leaf)(const point_row& leaf, const std::array<float, 3>& query, float bound, float* found);
-  /// The squared distances from `query` to the points of a leaf; returns those within `bound` as bits.
-  std::uint32_t (*distances)(const point_row& leaf, const std::array<float, 3>& query, float bound, float* distance);
-  /// @pre 0 < wanted <= count, no distance above `bound`, and sixteen times infinity after them
-  nearest_sum (*sum_nearest)(float* found, std::size_t count, std::size_t wanted, float bound);
+/// `(x^2 + y^2) + z^2`, each operation rounded: `squared_distance` in lanes.
+template <simd::vector V>
+[[nodiscard]] ORBIS_ALWAYS_INLINE V sum_of_squares(const V& x, const V& y, const V& z) noexcept {
+  return (x * x + y * y) + z * z;
+}
+
+/// A point or the corner of a box, each coordinate in all lanes.
+template <simd::vector V>
+struct spread_point {
+  V x, y, z;
+  explicit ORBIS_ALWAYS_INLINE spread_point(const std::array<float, 3>& p) noexcept : x(p[0]), y(p[1]), z(p[2]) {}
 };
 
-/// The distance from a value to an interval.
-[[nodiscard]] inline float gap(float low, float high, float from_low, float from_high) noexcept {
-  return std::max(std::max(low - from_high, from_low - high), 0.0F);
+/// Squared distances between boxes `at`, `at + 1` ... of some and the one between `low` and `high`.
+template <simd::vector V>
+[[nodiscard]] ORBIS_ALWAYS_INLINE V box_distances(const box_axes& boxes, std::size_t at, const spread_point<V>& low,
+                                                  const spread_point<V>& high) noexcept {
+  const auto gap = [&](std::size_t a, const V& from, const V& to) ORBIS_INLINE_LAMBDA {
+    return max(V(0.0F), max(V::load(boxes.first + a * boxes.stride + at) - to,
+                            from - V::load(boxes.first + (a + 3) * boxes.stride + at)));
+  };
+  return sum_of_squares(gap(0, low.x, high.x), gap(1, low.y, high.y), gap(2, low.z, high.z));
+}
+/// Squared distances between points `at`, `at + 1` ... of a leaf and `q`.
+template <simd::vector V>
+[[nodiscard]] ORBIS_ALWAYS_INLINE V point_distances(const point_row& leaf, std::size_t at,
+                                                    const spread_point<V>& q) noexcept {
+  return sum_of_squares(q.x - V::load(leaf.axis[0].data() + at), q.y - V::load(leaf.axis[1].data() + at),
+                        q.z - V::load(leaf.axis[2].data() + at));
 }
 
-inline std::uint32_t near_boxes_portable(const box_row& boxes, const box3& query, float bound, float* distance) {
-  std::uint32_t mask = 0;
-  for (std::size_t i = 0; i != leaf_width; ++i) {
-    std::array<float, 3> d;
-    for (std::size_t a = 0; a != 3; ++a) d[a] = gap(boxes.low[a][i], boxes.high[a][i], query.low[a], query.high[a]);
-    distance[i] = squared_distance<float>(d, {0.0F, 0.0F, 0.0F});
-    mask |= (distance[i] <= bound ? 1U : 0U) << i;
-  }
-  return mask;
-}
-
-inline void gather_portable(const box_row& boxes, std::uint32_t mask, std::uint32_t first, nearby_leaves& near) {
-  for (; mask != 0; mask &= mask - 1) {
-    const auto i = static_cast<std::size_t>(std::countr_zero(mask));
-    box_row& row = near.boxes[near.count / leaf_width];
-    for (std::size_t a = 0; a != 3; ++a) {
-      row.low[a][near.count % leaf_width] = boxes.low[a][i];
-      row.high[a][near.count % leaf_width] = boxes.high[a][i];
+/// The squared distances from a box to sixteen others; returns those within `bound` as bits.
+struct near_boxes {
+  template <simd::target Target>
+  static ORBIS_ALWAYS_INLINE std::uint32_t run(const box_axes& boxes, const box3& query, float bound, float* distance) {
+    using lanes = simd::native_vec<float, Target>;
+    const spread_point<lanes> low{query.low}, high{query.high};
+    std::uint32_t within = 0;
+    for (std::size_t at = 0; at != leaf_width; at += lanes::count) {
+      const lanes d = box_distances(boxes, at, low, high);
+      d.store(distance + at);
+      within |= simd::bits(d <= lanes(bound)) << at;
     }
-    near.leaves[near.count++] = first + static_cast<std::uint32_t>(i);
+    return within;
   }
-}
+};
 
-inline std::uint32_t distances_portable(const point_row& leaf, const std::array<float, 3>& query, float bound,
-                                        float* distance) {
-  std::uint32_t mask = 0;
-  for (std::size_t i = 0; i != leaf_width; ++i) {
-    distance[i] = squared_distance<float>(query, {leaf.axis[0][i], leaf.axis[1][i], leaf.axis[2][i]});
-    mask |= (distance[i] <= bound ? 1U : 0U) << i;
+/// The squared distances from a point to those of a leaf; returns those within `bound` as bits.
+struct leaf_distances {
+  template <simd::target Target>
+  static ORBIS_ALWAYS_INLINE std::uint32_t run(const point_row& leaf, const std::array<float, 3>& query, float bound,
+                                               float* distance) {
+    using lanes = simd::native_vec<float, Target>;
+    const spread_point<lanes> q{query};
+    std::uint32_t within = 0;
+    for (std::size_t at = 0; at != leaf_width; at += lanes::count) {
+      const lanes d = point_distances(leaf, at, q);
+      d.store(distance + at);
+      within |= simd::bits(d <= lanes(bound)) << at;
+    }
+    return within;
   }
-  return mask;
-}
+};
 
-inline std::size_t in_leaf_portable(const point_row& leaf, const std::array<float, 3>& query, float bound,
-                                    float* found) {
-  std::size_t count = 0;
-  for (std::size_t i = 0; i != leaf_width; ++i) {
-    const float d = squared_distance<float>(query, {leaf.axis[0][i], leaf.axis[1][i], leaf.axis[2][i]});
-    found[count] = d;
-    count += d <= bound ? 1 : 0;
+/// Writes the squared distances within `bound` from a point to those of a leaf one after the other, and returns how
+/// many they are. May write sixteen.
+struct near_in_leaf {
+  template <simd::vector V>
+  static ORBIS_ALWAYS_INLINE std::size_t keep(const point_row& leaf, const spread_point<V>& q, const V& bound,
+                                              float* found) noexcept {
+    std::size_t count = 0;
+    for (std::size_t at = 0; at != leaf_width; at += V::count) {
+      const V d = point_distances(leaf, at, q);
+      const auto within = d <= bound;
+      if constexpr (V::count == 4)
+        if (simd::none(within)) continue;  // where moving lanes together takes long
+      count += simd::compress_store(found + count, d, within);
+    }
+    return count;
   }
-  return count;
-}
+  template <simd::target Target>
+  static ORBIS_ALWAYS_INLINE std::size_t run(const point_row& leaf, const std::array<float, 3>& query, float bound,
+                                             float* found) {
+    using lanes = simd::native_vec<float, Target>;
+    return keep(leaf, spread_point<lanes>{query}, lanes(bound), found);
+  }
+};
 
-inline std::size_t near_points_portable(const point_row* leaves, const nearby_leaves& near,
-                                        const std::array<float, 3>& query, float bound, std::uint32_t* /*scratch*/,
-                                        float* found, std::size_t capacity) {
-  const box3 box{query, query};
-  std::array<float, leaf_width> distance;
-  std::size_t count = 0;
-  for (std::size_t first = 0; first < near.count; first += leaf_width) {
-    std::uint32_t mask = near_boxes_portable(near.boxes[first / leaf_width], box, bound, distance.data());
-    for (; mask != 0; mask &= mask - 1) {
-      const std::uint32_t leaf = near.leaves[first + static_cast<std::size_t>(std::countr_zero(mask))];
-      count += in_leaf_portable(leaves[leaf], query, bound, found + count);
+/// The same for the points of the leaves of `near` whose boxes are within `bound`, then sixteen times infinity. Ends
+/// early with more than `capacity` of them; touches no more than `capacity + 3 * leaf_width`. `scratch`: longer by
+/// sixteen than `near.leaves`.
+struct near_in_leaves {
+  template <simd::target Target>
+  static ORBIS_ALWAYS_INLINE std::size_t run(const point_row* leaves, const nearby_leaves& near,
+                                             const std::array<float, 3>& query, float bound, std::uint32_t* scratch,
+                                             float* found, std::size_t capacity) {
+    using lanes = simd::native_vec<float, Target>;
+    using numbers = simd::native_vec<std::uint32_t, Target>;
+    const spread_point<lanes> q{query};
+    const lanes border = bound;
+    std::size_t chosen = 0;
+    for (std::size_t first = 0; first < near.count; first += lanes::count) {
+      const auto within = box_distances(near.row(0), first, q, q) <= border;
+      if constexpr (lanes::count == 4)
+        if (simd::none(within)) continue;
+      chosen += simd::compress_store(scratch + chosen, numbers::load(near.leaves.data() + first), within);
+    }
+    std::size_t count = 0;
+    for (std::size_t i = 0; i != chosen; ++i) {
+      count += near_in_leaf::keep(leaves[scratch[i]], q, border, found + count);
       if (count > capacity) break;
     }
-    if (count > capacity) break;
+    simd::vec<float, leaf_width, Target>(std::numeric_limits<float>::infinity()).store(found + count);
+    return count;
   }
-  std::fill_n(found + count, leaf_width, std::numeric_limits<float>::infinity());
-  return count;
-}
+};
 
-inline nearest_sum sum_nearest_portable(float* found, std::size_t count, std::size_t wanted, float /*bound*/) {
-  float* const last = found + (wanted - 1);
-  std::nth_element(found, last, found + count);
-  nearest_sum out{0, *last};
-  for (std::size_t i = 0; i != wanted; ++i) out.roots += std::sqrt(double{found[i]});
-  return out;
-}
+/// Counts lanes that are set.
+template <simd::target Target>
+class lane_counter {
+ public:
+  using lanes = simd::native_vec<float, Target>;
+  ORBIS_ALWAYS_INLINE void add(const typename lanes::mask_type& m) noexcept {
+    if constexpr (Target::needs == simd::level::portable)
+      count_ -= select(m, numbers(-1), numbers(0));  // without an instruction that counts bits
+    else
+      count_ += simd::number_of(m);
+  }
+  [[nodiscard]] ORBIS_ALWAYS_INLINE std::size_t total() const noexcept {
+    if constexpr (Target::needs == simd::level::portable)
+      return static_cast<std::size_t>(simd::sum(count_));
+    else
+      return count_;
+  }
+
+ private:
+  using numbers = simd::native_vec<std::int32_t, Target>;
+  std::conditional_t<Target::needs == simd::level::portable, numbers, std::size_t> count_ = 0;
+};
+
+/// The sum of the roots of the `wanted` smallest distances, and the largest of them.
+/// @pre 0 < wanted <= count, no distance above `bound`, and sixteen times infinity after them
+struct sum_nearest {
+  /// The `rank`-th smallest (from 1) of sixteen values.
+  template <simd::target Target>
+  static ORBIS_ALWAYS_INLINE float ranked(const float* values, std::size_t rank) noexcept {
+    using lanes = simd::vec<float, leaf_width, Target>;
+    using numbers = simd::vec<std::int32_t, leaf_width, Target>;
+    const lanes v = lanes::load(values);
+    numbers smaller = 0;  // for each value, minus how many are
+    for (std::size_t i = 0; i != leaf_width; ++i) smaller += select(lanes(values[i]) < v, numbers(-1), numbers(0));
+    return simd::greatest(select(smaller > numbers(-static_cast<std::int32_t>(rank)), v, lanes(0.0F)));
+  }
+
+  /// Adds the roots of the lanes of `v` that are set in `in`, in double. Where multiplications are fused with sums,
+  /// they are roots to twice the precision of float: s = v / sqrt(v) by Newton's method, and the remainder v - s^2 as
+  /// a correction; `tiny`: remainders that would underflow.
+  template <simd::target Target>
+  struct root_sum {
+    using lanes = simd::native_vec<float, Target>;
+    using mask = typename lanes::mask_type;
+    simd::vec<double, lanes::count, Target> sum = 0.0;
+    lanes corrections = 0.0F;
+    mask tiny = mask::first(0);
+
+    ORBIS_ALWAYS_INLINE void add(const lanes& all, const mask& in) noexcept {
+      if constexpr (Target::needs < simd::level::avx2) {
+        sum += simd::sqrt(simd::convert<double>(select(in, all, lanes(0.0F))));
+      } else {
+        const lanes zero = 0.0F, half = 0.5F, three_halves = 1.5F;
+        const mask usual = in & (all >= lanes(0x1p-70F));
+        tiny = tiny | (simd::and_not(in, usual) & (all > zero));
+        const lanes v = select(usual, all, zero);
+        // A guess from halving and negating the exponent; each step squares its error.
+        using bits = simd::native_vec<std::int32_t, Target>;
+        const lanes half_v = half * v;
+        lanes y = simd::bits_as<float>(bits(0x5f375a86) - (simd::bits_as<std::int32_t>(v) >> 1));
+        y = y * (three_halves - (half_v * y) * y);
+        y = y * (three_halves - (half_v * y) * y);
+        y = simd::approximate_multiply_add(y, simd::approximate_multiply_add(-(half_v * y), y, half), y);
+        const lanes s = v * y;
+        corrections = simd::approximate_multiply_add(simd::approximate_multiply_add(-s, s, v), half * y, corrections);
+        sum += simd::convert<double>(s);
+      }
+    }
+    /// Negative where it is not known.
+    [[nodiscard]] ORBIS_ALWAYS_INLINE double total() const noexcept {
+      return simd::any(tiny) ? -1.0 : simd::sum(sum + simd::convert<double>(corrections));
+    }
+  };
+
+  template <simd::target Target>
+  static ORBIS_ALWAYS_INLINE nearest_sum run(const float* found, std::size_t count, std::size_t wanted, float bound) {
+    using lanes = simd::native_vec<float, Target>;
+    const auto count_within = [&](float at) ORBIS_INLINE_LAMBDA {
+      lane_counter<Target> n;
+      for (std::size_t i = 0; i < count; i += lanes::count) n.add(lanes::load(found + i) <= lanes(at));
+      return n.total();
+    };
+    const auto count_three = [&](const std::array<float, 3>& at) ORBIS_INLINE_LAMBDA {
+      lane_counter<Target> n0, n1, n2;
+      const lanes at0 = at[0], at1 = at[1], at2 = at[2];
+      for (std::size_t i = 0; i < count; i += lanes::count) {
+        const lanes v = lanes::load(found + i);
+        n0.add(v <= at0);
+        n1.add(v <= at1);
+        n2.add(v <= at2);
+      }
+      return std::array<std::size_t, 3>{n0.total(), n1.total(), n2.total()};
+    };
+    const rank_bracket bracket = bracket_rank(bound, count, wanted, count_within, count_three);
+    nearest_sum out;
+    out.largest_squared = bracket.high;
+    if (bracket.at_high - bracket.at_low <= leaf_width) {
+      std::array<float, 2 * leaf_width> between;
+      std::size_t n = 0;
+      for (std::size_t i = 0; i < count; i += lanes::count) {
+        const lanes v = lanes::load(found + i);
+        const auto in = (v <= lanes(bracket.high)) & (v > lanes(bracket.low));
+        if constexpr (lanes::count == 4)
+          if (simd::none(in)) continue;
+        n += simd::compress_store(between.data() + n, v, in);
+      }
+      simd::vec<float, leaf_width, Target>(std::numeric_limits<float>::infinity()).store(between.data() + n);
+      out.largest_squared = ranked<Target>(between.data(), wanted - bracket.at_low);
+    }
+    // Those below the largest, and the largest as often as it takes.
+    root_sum<Target> roots;
+    lane_counter<Target> smaller;
+    for (std::size_t i = 0; i < count; i += lanes::count) {
+      const lanes v = lanes::load(found + i);
+      const auto in = v < lanes(out.largest_squared);
+      smaller.add(in);
+      roots.add(v, in);
+    }
+    const double total = roots.total();
+    out.roots = total < 0 ? -1.0
+                          : total + static_cast<double>(wanted - smaller.total()) *
+                                        std::sqrt(static_cast<double>(out.largest_squared));
+    return out;
+  }
+};
+
+/// Adds to `near` the boxes with bits in `wanted`; the first box of the row is that of leaf `first`.
+struct gather_leaves {
+  template <simd::target Target>
+  static ORBIS_ALWAYS_INLINE void run(const box_row& boxes, std::uint32_t wanted, std::uint32_t first,
+                                      nearby_leaves& near) {
+    using lanes = simd::native_vec<float, Target>;
+    using numbers = simd::native_vec<std::uint32_t, Target>;
+    float* const to = near.boxes.data();
+    if constexpr (Target::needs == simd::level::portable) {  // which moves lanes together one by one
+      for (; wanted != 0; wanted &= wanted - 1) {
+        const auto i = static_cast<std::size_t>(std::countr_zero(wanted));
+        for (std::size_t a = 0; a != 3; ++a) {
+          to[a * near.stride + near.count] = boxes.low[a][i];
+          to[(a + 3) * near.stride + near.count] = boxes.high[a][i];
+        }
+        near.leaves[near.count++] = first + static_cast<std::uint32_t>(i);
+      }
+    } else {
+      for (std::size_t at = 0; at != leaf_width; at += lanes::count) {
+        const auto in = lanes::mask_type::from_bits(wanted >> at);
+        for (std::size_t a = 0; a != 3; ++a) {
+          simd::compress_store(to + a * near.stride + near.count, lanes::load(boxes.low[a].data() + at), in);
+          simd::compress_store(to + (a + 3) * near.stride + near.count, lanes::load(boxes.high[a].data() + at), in);
+        }
+        const numbers leaf = numbers::iota() + numbers(first + static_cast<std::uint32_t>(at));
+        near.count += simd::compress_store(near.leaves.data() + near.count, leaf, in);
+      }
+    }
+  }
+};
+
+/// The loops for the best instruction set.
+struct knn_kernels {
+  using point = std::array<float, 3>;
+  using boxes_code = std::uint32_t(const box_axes&, const box3&, float, float*);
+  using gather_code = void(const box_row&, std::uint32_t, std::uint32_t, nearby_leaves&);
+  using leaves_code = std::size_t(const point_row*, const nearby_leaves&, const point&, float, std::uint32_t*, float*,
+                                  std::size_t);
+  using leaf_code = std::size_t(const point_row&, const point&, float, float*);
+  using distances_code = std::uint32_t(const point_row&, const point&, float, float*);
+  using sum_code = nearest_sum(const float*, std::size_t, std::size_t, float);
+
+  boxes_code* near_boxes = simd::kernel<detail::near_boxes, boxes_code>();
+  gather_code* gather = simd::kernel<gather_leaves, gather_code>();
+  leaves_code* near_points = simd::kernel<near_in_leaves, leaves_code>();
+  leaf_code* in_leaf = simd::kernel<near_in_leaf, leaf_code>();
+  distances_code* distances = simd::kernel<leaf_distances, distances_code>();
+  sum_code* sum_nearest = simd::kernel<detail::sum_nearest, sum_code>();
+};
 
 }  // namespace orbis::cloud::detail

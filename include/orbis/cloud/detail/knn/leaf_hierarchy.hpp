@@ -57,41 +57,37 @@ struct curve_block {
 
 /// Source: J. Skilling, "Programming the Hilbert curve", AIP Conference Proceedings 707, 2004; here
 /// for many cells at once, without branches, in loops that compilers turn into vector instructions.
-[[gnu::always_inline]] inline void fill_curve_keys(curve_block& cells) noexcept {
-  auto& [x, y, z] = cells.axis;
-  for (std::uint32_t level = curve_block::bits - 1; level > 0; --level) {
-    const std::uint32_t below = (1U << level) - 1;
+struct fill_curve_keys {
+  template <simd::target>
+  static ORBIS_ALWAYS_INLINE void run(curve_block& cells) {
+    auto& [x, y, z] = cells.axis;
+    for (std::uint32_t level = curve_block::bits - 1; level > 0; --level) {
+      const std::uint32_t below = (1U << level) - 1;
+      for (std::size_t i = 0; i != curve_block::size; ++i) {
+        std::uint32_t first = x[i] ^ (below & (0U - ((x[i] >> level) & 1U)));
+        const std::uint32_t y_set = 0U - ((y[i] >> level) & 1U);
+        const std::uint32_t xy = (first ^ y[i]) & below & ~y_set;
+        first ^= (below & y_set) | xy;
+        y[i] ^= xy;
+        const std::uint32_t z_set = 0U - ((z[i] >> level) & 1U);
+        const std::uint32_t xz = (first ^ z[i]) & below & ~z_set;
+        x[i] = first ^ ((below & z_set) | xz);
+        z[i] ^= xz;
+      }
+    }
     for (std::size_t i = 0; i != curve_block::size; ++i) {
-      std::uint32_t first = x[i] ^ (below & (0U - ((x[i] >> level) & 1U)));
-      const std::uint32_t y_set = 0U - ((y[i] >> level) & 1U);
-      const std::uint32_t xy = (first ^ y[i]) & below & ~y_set;
-      first ^= (below & y_set) | xy;
-      y[i] ^= xy;
-      const std::uint32_t z_set = 0U - ((z[i] >> level) & 1U);
-      const std::uint32_t xz = (first ^ z[i]) & below & ~z_set;
-      x[i] = first ^ ((below & z_set) | xz);
-      z[i] ^= xz;
+      y[i] ^= x[i];
+      z[i] ^= y[i];
+      std::uint32_t flip = z[i] >> 1U;
+      flip ^= flip >> 1U;
+      flip ^= flip >> 2U;
+      flip ^= flip >> 4U;
+      flip ^= flip >> 8U;
+      cells.key[i] =
+          spread_ten_bits(x[i] ^ flip) << 2U | spread_ten_bits(y[i] ^ flip) << 1U | spread_ten_bits(z[i] ^ flip);
     }
   }
-  for (std::size_t i = 0; i != curve_block::size; ++i) {
-    y[i] ^= x[i];
-    z[i] ^= y[i];
-    std::uint32_t flip = z[i] >> 1U;
-    flip ^= flip >> 1U;
-    flip ^= flip >> 2U;
-    flip ^= flip >> 4U;
-    flip ^= flip >> 8U;
-    cells.key[i] =
-        spread_ten_bits(x[i] ^ flip) << 2U | spread_ten_bits(y[i] ^ flip) << 1U | spread_ten_bits(z[i] ^ flip);
-  }
-}
-inline void curve_keys_portable(curve_block& cells) { fill_curve_keys(cells); }
-ORBIS_TARGET("avx2") inline void curve_keys_avx2(curve_block& cells) { fill_curve_keys(cells); }
-ORBIS_TARGET("avx512f") inline void curve_keys_avx512(curve_block& cells) { fill_curve_keys(cells); }
-[[nodiscard]] inline auto* select_curve_keys() noexcept {
-  return simd::select<void(curve_block&)>(
-      simd::detected(), {.portable = curve_keys_portable, .avx2 = curve_keys_avx2, .avx512 = curve_keys_avx512});
-}
+};
 
 /// The order in which points go into leaves: along a Hilbert curve, cell by cell of a grid of 2^10
 /// cells a side; where many points share a cell, along a curve of its own within it, and so on. So
@@ -154,7 +150,7 @@ class leaf_order {
     }
     // Two points differ in their cell at least, so that each level makes progress.
     const double scale = ((1U << bits) - 1) / extent;
-    auto* const keys_of = select_curve_keys();
+    auto* const keys_of = simd::kernel<fill_curve_keys, void(curve_block&)>();
     for_each_chunk(policy, end - begin, 16 * block, [&](std::size_t from, std::size_t to) {
       curve_block cells{};
       for (std::size_t first = begin + from; first < begin + to; first += block) {

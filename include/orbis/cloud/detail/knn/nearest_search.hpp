@@ -13,36 +13,11 @@
 #include <span>
 #include <vector>
 
-#include <orbis/cloud/detail/knn/knn_avx2.hpp>
-#include <orbis/cloud/detail/knn/knn_avx512.hpp>
 #include <orbis/cloud/detail/knn/knn_kernels.hpp>
-#include <orbis/cloud/detail/knn/knn_lanes.hpp>
 #include <orbis/cloud/detail/knn/leaf_hierarchy.hpp>
 #include <orbis/cloud/detail/knn/squared_distance.hpp>
-#include <orbis/core/simd.hpp>
 
 namespace orbis::cloud::detail {
-
-/// The best set of inner loops that neither `wanted` nor the processor excludes.
-[[nodiscard]] inline knn_kernels select_knn_kernels(simd::level wanted) noexcept {
-#if ORBIS_X86
-  const simd::level best = std::min(wanted, simd::detected());
-  if (best >= simd::level::avx512) {
-    return {near_boxes_avx512, gather_avx512, near_points_avx512, in_leaf_avx512, distances_avx512, sum_nearest_avx512};
-  }
-  if (best >= simd::level::avx2) {
-    return {near_boxes_avx2, gather_portable, near_points_avx2, in_leaf_avx2, distances_avx2, sum_nearest_avx2};
-  }
-#else
-  static_cast<void>(wanted);
-#endif
-#if ORBIS_HAS_LANES
-  return {near_boxes_lanes, gather_portable, near_points_lanes, in_leaf_lanes, distances_lanes, sum_nearest_lanes};
-#else
-  return {near_boxes_portable, gather_portable,    near_points_portable,
-          in_leaf_portable,    distances_portable, sum_nearest_portable};
-#endif
-}
 
 /// A row of boxes that is still to be looked at.
 struct open_row {
@@ -174,7 +149,7 @@ class nearest_search {
     const box3 box{q, q};
     std::array<float, leaf_width> distance;
     for (std::size_t first = 0; first < shared_.count; first += leaf_width) {
-      std::uint32_t mask = kernels_.near_boxes(shared_.boxes[first / leaf_width], box, bound, distance.data());
+      std::uint32_t mask = kernels_.near_boxes(shared_.row(first), box, bound, distance.data());
       for (; mask != 0; mask &= mask - 1) {
         const std::size_t leaf = shared_.leaves[first + static_cast<std::size_t>(std::countr_zero(mask))];
         std::uint32_t within = kernels_.distances(tree_->leaves[leaf], q, bound, distance.data());

@@ -16,66 +16,35 @@
 
 namespace orbis::cloud::detail {
 
-#if defined(__GNUC__)
-using int_lanes4 [[gnu::vector_size(16)]] = std::int32_t;
-using int_lanes8 [[gnu::vector_size(32)]] = std::int32_t;
-
 /// For each of `count` values, the number of smaller ones. @pre 32 more values can be read and written
-template <class Lanes>
-[[gnu::always_inline]] inline void count_smaller(const std::int32_t* values, std::size_t count,
-                                                 std::int32_t* smaller) noexcept {
-  constexpr std::size_t lanes = sizeof(Lanes) / sizeof(std::int32_t);
-  // In variables of their own, not in arrays: those would be kept in memory.
-  for (std::size_t i = 0; i < count; i += 4 * lanes) {
-    Lanes v0;
-    Lanes v1;
-    Lanes v2;
-    Lanes v3;
-    std::memcpy(&v0, values + i, sizeof v0);
-    std::memcpy(&v1, values + i + lanes, sizeof v1);
-    std::memcpy(&v2, values + i + 2 * lanes, sizeof v2);
-    std::memcpy(&v3, values + i + 3 * lanes, sizeof v3);
-    Lanes n0{};
-    Lanes n1{};
-    Lanes n2{};
-    Lanes n3{};
-    for (std::size_t j = 0; j != count; ++j) {
-      const Lanes other = Lanes{} + values[j];
-      n0 -= other < v0;
-      n1 -= other < v1;
-      n2 -= other < v2;
-      n3 -= other < v3;
+struct count_smaller {
+  template <simd::target Target>
+  static ORBIS_ALWAYS_INLINE void run(const std::int32_t* values, std::size_t count, std::int32_t* smaller) {
+    using lanes = simd::native_vec<std::int32_t, Target>;
+    constexpr std::size_t n = lanes::count;
+    // In variables of their own, not in arrays: those would be kept in memory.
+    for (std::size_t i = 0; i < count; i += 4 * n) {
+      const lanes v0 = lanes::load(values + i), v1 = lanes::load(values + i + n);
+      const lanes v2 = lanes::load(values + i + 2 * n), v3 = lanes::load(values + i + 3 * n);
+      lanes n0 = 0, n1 = 0, n2 = 0, n3 = 0;
+      for (std::size_t j = 0; j != count; ++j) {
+        const lanes other = values[j], one = -1, none = 0;
+        n0 -= select(other < v0, one, none);
+        n1 -= select(other < v1, one, none);
+        n2 -= select(other < v2, one, none);
+        n3 -= select(other < v3, one, none);
+      }
+      n0.store(smaller + i);
+      n1.store(smaller + i + n);
+      n2.store(smaller + i + 2 * n);
+      n3.store(smaller + i + 3 * n);
     }
-    std::memcpy(smaller + i, &n0, sizeof n0);
-    std::memcpy(smaller + i + lanes, &n1, sizeof n1);
-    std::memcpy(smaller + i + 2 * lanes, &n2, sizeof n2);
-    std::memcpy(smaller + i + 3 * lanes, &n3, sizeof n3);
   }
-}
-inline void count_smaller_portable(const std::int32_t* values, std::size_t count, std::int32_t* smaller) {
-  count_smaller<int_lanes4>(values, count, smaller);
-}
-ORBIS_TARGET("avx2")
-inline void count_smaller_avx2(const std::int32_t* values, std::size_t count, std::int32_t* smaller) {
-  count_smaller<int_lanes8>(values, count, smaller);
-}
-#else
-inline void count_smaller_portable(const std::int32_t* values, std::size_t count, std::int32_t* smaller) {
-  for (std::size_t i = 0; i != count; ++i) {
-    smaller[i] = 0;
-    for (std::size_t j = 0; j != count; ++j) smaller[i] += values[j] < values[i] ? 1 : 0;
-  }
-}
-constexpr decltype(count_smaller_portable)* count_smaller_avx2 = nullptr;
-#endif
+};
 
 /// Points by their squared distance, those at the same one by index. Keeps its memory.
 class rank_sorter {
  public:
-  explicit rank_sorter(simd::level level)
-      : count_smaller_{simd::select<void(const std::int32_t*, std::size_t, std::int32_t*)>(
-            level, {.portable = count_smaller_portable, .avx2 = count_smaller_avx2})} {}
-
   void clear() noexcept { count_ = 0; }
   [[nodiscard]] std::size_t size() const noexcept { return count_; }
   /// @pre distance_squared >= 0: the order of bits is that of values
@@ -127,7 +96,8 @@ class rank_sorter {
     sorted_.resize(size);
   }
 
-  void (*count_smaller_)(const std::int32_t*, std::size_t, std::int32_t*);
+  void (*count_smaller_)(const std::int32_t*, std::size_t, std::int32_t*) =
+      simd::kernel<count_smaller, void(const std::int32_t*, std::size_t, std::int32_t*), simd::avx2>();
   std::size_t count_ = 0;
   std::vector<std::int32_t> keys_;
   std::vector<std::uint32_t> indices_;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Loops over rows of depths for `depth_windows.hpp`, written for the vectoriser and compiled for several
-/// instruction sets. Nothing in them is rounded but a division, so that all give the same bits.
+/// Loops over rows of depths for `depth_windows.hpp`, written for the compiler's vectoriser and compiled for several
+/// targets. Nothing in them is rounded but a division, so that all give the same bits.
 #pragma once
 
 #include <concepts>
@@ -26,58 +26,46 @@ template <class F>
 }
 
 /// `low[i] = min(low[i], other_low[i])`, `high[i] = max(high[i], other_high[i])`
-[[gnu::always_inline]] inline void widen_range(float* __restrict low, float* __restrict high, const float* other_low,
-                                               const float* other_high, std::size_t n) {
-  in_sixteens(
-      n, [&](std::size_t i) __attribute__((always_inline)) {
-        low[i] = other_low[i] < low[i] ? other_low[i] : low[i];
-        high[i] = other_high[i] > high[i] ? other_high[i] : high[i];
-      });
-}
+struct widen_range {
+  template <simd::target>
+  static ORBIS_ALWAYS_INLINE void run(float* __restrict low, float* __restrict high, const float* other_low,
+                                      const float* other_high, std::size_t n) {
+    in_sixteens(n, [&](std::size_t i) ORBIS_INLINE_LAMBDA {
+      low[i] = other_low[i] < low[i] ? other_low[i] : low[i];
+      high[i] = other_high[i] > high[i] ? other_high[i] : high[i];
+    });
+  }
+};
 /// `x[i] = value` where it is not positive.
-[[gnu::always_inline]] inline void replace_zeros(float* __restrict x, float value, std::size_t n) {
-  in_sixteens(
-      n, [&](std::size_t i) __attribute__((always_inline)) { x[i] = x[i] > 0.0F ? x[i] : value; });
-}
+struct replace_zeros {
+  template <simd::target>
+  static ORBIS_ALWAYS_INLINE void run(float* __restrict x, float value, std::size_t n) {
+    in_sixteens(n, [&](std::size_t i) ORBIS_INLINE_LAMBDA { x[i] = x[i] > 0.0F ? x[i] : value; });
+  }
+};
 /// A row of stored depths in metres, 0 where there is none: what `camera::depth_view` says of each.
-[[gnu::always_inline]] inline void to_metres(const std::uint16_t* stored, double scale, float least, float most,
-                                             float* __restrict out, std::size_t n) {
-  in_sixteens(
-      n, [&](std::size_t i) __attribute__((always_inline)) {
-        const auto metres = static_cast<float>(static_cast<double>(stored[i]) / scale);
-        const bool valid = (stored[i] != 0) & (stored[i] != std::numeric_limits<std::uint16_t>::max()) &
-                           (metres > 0.0F) & (metres >= least) & (metres <= most);
-        out[i] = valid ? metres : 0.0F;
-      });
-}
-
-/// The loops for one instruction set.
-struct depth_row_kernels {
-  void (*widen_range)(float* low, float* high, const float* other_low, const float* other_high, std::size_t n);
-  void (*replace_zeros)(float* x, float value, std::size_t n);
-  void (*to_metres)(const std::uint16_t* stored, double scale, float least, float most, float* out, std::size_t n);
+struct stored_to_metres {
+  template <simd::target>
+  static ORBIS_ALWAYS_INLINE void run(const std::uint16_t* stored, double scale, float least, float most,
+                                      float* __restrict out, std::size_t n) {
+    in_sixteens(n, [&](std::size_t i) ORBIS_INLINE_LAMBDA {
+      const auto metres = static_cast<float>(static_cast<double>(stored[i]) / scale);
+      const bool valid = (stored[i] != 0) & (stored[i] != std::numeric_limits<std::uint16_t>::max()) & (metres > 0.0F) &
+                         (metres >= least) & (metres <= most);
+      out[i] = valid ? metres : 0.0F;
+    });
+  }
 };
 
-#define ORBIS_DEPTH_ROWS(name, target)                                                                                \
-  target inline void widen_range_##name(float* low, float* high, const float* other_low, const float* other_high,     \
-                                        std::size_t n) {                                                              \
-    widen_range(low, high, other_low, other_high, n);                                                                 \
-  }                                                                                                                   \
-  target inline void replace_zeros_##name(float* x, float value, std::size_t n) { replace_zeros(x, value, n); }       \
-  target inline void to_metres_##name(const std::uint16_t* stored, double scale, float least, float most, float* out, \
-                                      std::size_t n) {                                                                \
-    to_metres(stored, scale, least, most, out, n);                                                                    \
-  }
-ORBIS_DEPTH_ROWS(portable, )
-ORBIS_DEPTH_ROWS(avx2, ORBIS_TARGET("avx2"))
-#undef ORBIS_DEPTH_ROWS
-
-/// The fastest that neither `wanted` nor the processor excludes.
-[[nodiscard]] inline depth_row_kernels depth_row_kernels_at(simd::level wanted) noexcept {
-  if (wanted >= simd::level::avx2 && simd::detected() >= simd::level::avx2)
-    return {widen_range_avx2, replace_zeros_avx2, to_metres_avx2};
-  return {widen_range_portable, replace_zeros_portable, to_metres_portable};
-}
+/// The loops for the best instruction set. AVX-512 brings them nothing: they wait for memory.
+struct depth_row_kernels {
+  void (*widen_range)(float*, float*, const float*, const float*, std::size_t) =
+      simd::kernel<detail::widen_range, void(float*, float*, const float*, const float*, std::size_t), simd::avx2>();
+  void (*replace_zeros)(float*, float, std::size_t) =
+      simd::kernel<detail::replace_zeros, void(float*, float, std::size_t), simd::avx2>();
+  void (*to_metres)(const std::uint16_t*, double, float, float, float*, std::size_t) = simd::kernel<
+      stored_to_metres, void(const std::uint16_t*, double, float, float, float*, std::size_t), simd::avx2>();
+};
 
 /// A row of any depth image in metres, 0 where there is none.
 template <camera::depth_source Depth>

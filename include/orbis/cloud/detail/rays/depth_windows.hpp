@@ -12,7 +12,6 @@
 #include <orbis/camera/depth.hpp>
 #include <orbis/cloud/detail/rays/depth_rows.hpp>
 #include <orbis/core/execution.hpp>
-#include <orbis/core/simd.hpp>
 
 namespace orbis::cloud::detail {
 
@@ -29,7 +28,7 @@ class depth_windows {
   /// where any pixel of the window lies outside the image or has no depth: what hides there may be
   /// nearer than all. O(width * height * radius). @pre radius >= 0
   template <execution_policy Policy, camera::depth_source Depth>
-  void take(const Policy& policy, const Depth& depth, int radius, simd::level level = simd::detected()) {
+  void take(const Policy& policy, const Depth& depth, int radius) {
     assert(radius >= 0);
     width_ = depth.width();
     height_ = depth.height();
@@ -37,7 +36,7 @@ class depth_windows {
     const auto height = static_cast<std::size_t>(height_);
     const auto r = static_cast<std::size_t>(radius);
     for (auto* plane : {&nearest_, &farthest_, &middle_, &row_nearest_, &row_farthest_}) plane->resize(width * height);
-    const depth_row_kernels kernels = depth_row_kernels_at(level);
+    const depth_row_kernels kernels;
     for_each_chunk(policy, height, 32, [&](std::size_t begin, std::size_t end) {
       std::vector<float> padded(width + 2 * r, 0.0F);  // beyond the borders there is no depth
       for (std::size_t y = begin; y != end; ++y) {

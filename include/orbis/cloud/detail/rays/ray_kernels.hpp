@@ -1,20 +1,20 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The inner loops of `ray_evidence.hpp`: what they do, and how without any particular instructions.
-/// Every kernel rounds every operation, so that all of them give the same bits.
+/// The inner loops of `ray_evidence.hpp`. Every operation is rounded, so that all targets give the same bits.
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <bit>
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 
+#include <orbis/camera/model.hpp>
+#include <orbis/cloud/detail/rays/depth_windows.hpp>
 #include <orbis/cloud/detail/rays/point_blocks.hpp>
 #include <orbis/cloud/detail/rays/ray_view.hpp>
 #include <orbis/core/rounded.hpp>
+#include <orbis/core/simd.hpp>
+#include <orbis/core/types.hpp>
 
 namespace orbis::cloud::detail {
 
@@ -45,47 +45,16 @@ struct block_verdict {
 /// A block's points, axis by axis.
 using block_axes = std::array<const float*, 3>;
 
-/// One set of inner loops.
-struct ray_kernels {
-  /// Where the points lie in a pinhole's image.
-  void (*locate)(const ray_view& view, const block_axes& points, seen_block& seen);
-  /// What the windows around their pixels say of them.
-  void (*judge)(const ray_view& view, const seen_block& seen, block_verdict& verdict);
-  /// Adds one to the counters of the points with a bit in `words`, up to their largest number.
-  void (*count)(const std::array<std::uint16_t, block_verdict::words>& words, std::uint16_t* counters);
-};
-
-/// A point in the camera frame.
-[[nodiscard]] inline std::array<float, 3> in_camera(const ray_view& view, float x, float y, float z) noexcept {
-  const std::array<float, 3> d{(x - view.origin[0]) - view.origin_rest[0], (y - view.origin[1]) - view.origin_rest[1],
-                               (z - view.origin[2]) - view.origin_rest[2]};
-  std::array<float, 3> out;
-  for (std::size_t a = 0; a != 3; ++a) {
-    const auto& row = view.rotation[a];
-    out[a] = (rounded_product(row[0], d[0]) + rounded_product(row[1], d[1])) + rounded_product(row[2], d[2]);
-  }
-  return out;
-}
-
-inline void locate_portable(const ray_view& view, const block_axes& points, seen_block& seen) {
-  const auto width = static_cast<float>(view.width);
-  const auto height = static_cast<float>(view.height);
-  for (std::size_t i = 0; i != seen_block::size; ++i) {
-    const auto q = in_camera(view, points[0][i], points[1][i], points[2][i]);
-    const float u = rounded_product(view.fx, q[0] / q[2]) + view.cx;
-    const float v = rounded_product(view.fy, q[1] / q[2]) + view.cy;
-    const bool inside =
-        q[2] > view.min_depth && q[2] <= view.max_depth && u >= 0.0F && u < width && v >= 0.0F && v < height;
-    seen.depth[i] = q[2];
-    seen.pixel[i] = inside ? static_cast<std::int32_t>(v) * view.width + static_cast<std::int32_t>(u) : -1;
-  }
-}
-
-/// The same for any camera.
+/// Where the points lie in any camera's image.
 template <camera::camera_model Camera>
 void locate_by(const Camera& camera, const ray_view& view, const block_axes& points, seen_block& seen) {
   for (std::size_t i = 0; i != seen_block::size; ++i) {
-    const auto q = in_camera(view, points[0][i], points[1][i], points[2][i]);
+    std::array<float, 3> d, q;
+    for (std::size_t a = 0; a != 3; ++a) d[a] = (points[a][i] - view.origin[a]) - view.origin_rest[a];
+    for (std::size_t a = 0; a != 3; ++a) {
+      const auto& row = view.rotation[a];
+      q[a] = (rounded_product(row[0], d[0]) + rounded_product(row[1], d[1])) + rounded_product(row[2], d[2]);
+    }
     seen.depth[i] = q[2];
     seen.pixel[i] = -1;
     if (!(q[2] > view.min_depth && q[2] <= view.max_depth)) continue;
@@ -98,32 +67,90 @@ void locate_by(const Camera& camera, const ray_view& view, const block_axes& poi
   }
 }
 
-inline void judge_portable(const ray_view& view, const seen_block& seen, block_verdict& verdict) {
-  for (std::size_t w = 0; w != block_verdict::words; ++w) {
-    std::uint32_t through = 0;
-    std::uint32_t supported = 0;
-    for (std::uint32_t lane = 0; lane != 16; ++lane) {
-      const std::size_t i = 16 * w + lane;
-      if (seen.pixel[i] < 0) continue;
-      const float z = seen.depth[i];
-      const float nearest = view.nearest[seen.pixel[i]];
-      const float farthest = view.farthest[seen.pixel[i]];
-      const float margin = view.margin + rounded_product(view.margin_growth, rounded_product(z, z));
-      const auto near = [&](float depth) { return std::abs(depth - z) <= margin; };
-      if (nearest - z > margin + rounded_product(view.slant, farthest - nearest)) through |= 1U << lane;
-      if (near(nearest) || near(farthest) || near(view.middle[seen.pixel[i]])) supported |= 1U << lane;
+/// Where the points lie in a pinhole's image.
+struct locate_in_pinhole {
+  template <simd::target Target>
+  static ORBIS_ALWAYS_INLINE void run(const ray_view& view, const block_axes& points, seen_block& seen) {
+    using lanes = simd::native_vec<float, Target>;
+    using integers = simd::native_vec<std::int32_t, Target>;
+    for (std::size_t i = 0; i != seen_block::size; i += lanes::count) {
+      lanes d[3], q[3];
+      for (std::size_t a = 0; a != 3; ++a)
+        d[a] = (lanes::load(points[a] + i) - lanes(view.origin[a])) - lanes(view.origin_rest[a]);
+      for (std::size_t a = 0; a != 3; ++a) {
+        const auto& row = view.rotation[a];
+        q[a] = (lanes(row[0]) * d[0] + lanes(row[1]) * d[1]) + lanes(row[2]) * d[2];
+      }
+      const lanes u = lanes(view.fx) * (q[0] / q[2]) + lanes(view.cx);
+      const lanes v = lanes(view.fy) * (q[1] / q[2]) + lanes(view.cy);
+      const auto inside = (q[2] > lanes(view.min_depth)) & (q[2] <= lanes(view.max_depth)) & (u >= lanes(0.0F)) &
+                          (u < lanes(static_cast<float>(view.width))) & (v >= lanes(0.0F)) &
+                          (v < lanes(static_cast<float>(view.height)));
+      const integers pixel = simd::convert<std::int32_t>(v) * integers(view.width) + simd::convert<std::int32_t>(u);
+      q[2].store(seen.depth.data() + i);
+      select(inside, pixel, integers(-1)).store(seen.pixel.data() + i);
     }
-    verdict.through[w] = static_cast<std::uint16_t>(through);
-    verdict.supported[w] = static_cast<std::uint16_t>(supported);
   }
-}
+};
 
-inline void count_portable(const std::array<std::uint16_t, block_verdict::words>& words, std::uint16_t* counters) {
-  for (std::size_t i = 0; i != point_blocks::block_size; ++i) {
-    const std::uint32_t more = words[i / 16] >> (i % 16) & 1U;
-    counters[i] = static_cast<std::uint16_t>(
-        std::min<std::uint32_t>(counters[i] + more, std::numeric_limits<std::uint16_t>::max()));
+/// What the windows around their pixels say of the points.
+struct judge_by_windows {
+  template <simd::target Target>
+  static ORBIS_ALWAYS_INLINE void run(const ray_view& view, const seen_block& seen, block_verdict& verdict) {
+    using lanes = simd::native_vec<float, Target>;
+    using integers = simd::native_vec<std::int32_t, Target>;
+    const lanes nothing = depth_windows::none;
+    for (std::size_t w = 0; w != block_verdict::words; ++w) {
+      std::uint32_t through = 0;
+      std::uint32_t supported = 0;
+      for (std::size_t at = 0; at != 16; at += lanes::count) {
+        const integers pixel = integers::load(seen.pixel.data() + 16 * w + at);
+        const auto inside = pixel >= integers(0);
+        if (simd::none(inside)) continue;
+        const lanes z = lanes::load(seen.depth.data() + 16 * w + at);
+        const lanes nearest = simd::gather(view.nearest, pixel, inside, nothing);
+        const lanes margin = lanes(view.margin) + lanes(view.margin_growth) * (z * z);
+        const auto near = [&](const lanes& depth) ORBIS_INLINE_LAMBDA { return simd::abs(depth - z) <= margin; };
+        // Mostly the nearest says it all, since rays do not pass through what it is near to.
+        auto measured = inside & near(nearest);
+        auto open = simd::and_not(inside, measured);
+        if (simd::any(open)) {
+          const lanes farthest = simd::gather(view.farthest, pixel, open, nothing);
+          const auto beyond = open & (nearest - z > margin + lanes(view.slant) * (farthest - nearest));
+          through |= simd::bits(beyond) << at;
+          measured = measured | (open & near(farthest));
+          open = simd::and_not(open, measured | beyond);
+          if (simd::any(open)) measured = measured | (open & near(simd::gather(view.middle, pixel, open, nothing)));
+        }
+        supported |= simd::bits(measured) << at;
+      }
+      verdict.through[w] = static_cast<std::uint16_t>(through);
+      verdict.supported[w] = static_cast<std::uint16_t>(supported);
+    }
   }
-}
+};
+
+/// Adds one to the counters of the points with a bit in `words`, up to their largest number.
+struct count_points {
+  template <simd::target Target>
+  static ORBIS_ALWAYS_INLINE void run(const std::array<std::uint16_t, block_verdict::words>& words,
+                                      std::uint16_t* counters) {
+    using lanes = simd::vec<std::uint16_t, 16, Target>;
+    for (std::size_t w = 0; w != block_verdict::words; ++w) {
+      const lanes one = select(lanes::mask_type::from_bits(words[w]), lanes(1), lanes(0));
+      simd::add_saturated(lanes::load(counters + 16 * w), one).store(counters + 16 * w);
+    }
+  }
+};
+
+/// The loops for the best instruction set.
+struct ray_kernels {
+  void (*locate)(const ray_view&, const block_axes&, seen_block&) =
+      simd::kernel<locate_in_pinhole, void(const ray_view&, const block_axes&, seen_block&)>();
+  void (*judge)(const ray_view&, const seen_block&, block_verdict&) =
+      simd::kernel<judge_by_windows, void(const ray_view&, const seen_block&, block_verdict&)>();
+  void (*count)(const std::array<std::uint16_t, block_verdict::words>&, std::uint16_t*) =
+      simd::kernel<count_points, void(const std::array<std::uint16_t, block_verdict::words>&, std::uint16_t*)>();
+};
 
 }  // namespace orbis::cloud::detail
