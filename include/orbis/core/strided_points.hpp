@@ -114,7 +114,9 @@ class strided_points {
 
 }  // namespace orbis
 
+/// @cond
 template <class S>
 inline constexpr bool std::ranges::enable_borrowed_range<orbis::strided_points<S>> = true;
 template <class S>
 inline constexpr bool std::ranges::enable_view<orbis::strided_points<S>> = true;
+/// @endcond

@@ -123,6 +123,7 @@ template <int N>
 
 }  // namespace orbis::optimize
 
+/// @cond
 template <int N>
 struct Eigen::NumTraits<orbis::optimize::dual<N>> : Eigen::NumTraits<double> {
   using Real = orbis::optimize::dual<N>;
@@ -147,6 +148,7 @@ template <int N, class Operation>
 struct Eigen::ScalarBinaryOpTraits<double, orbis::optimize::dual<N>, Operation> {
   using ReturnType = orbis::optimize::dual<N>;
 };
+/// @endcond
 
 namespace orbis::optimize {
 
