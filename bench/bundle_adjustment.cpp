@@ -28,9 +28,10 @@
 #include <orbis/camera/pinhole.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/io/bal.hpp>
-#include <orbis/io/synthetic/bundle.hpp>
-#include <orbis/optimize/reprojection_with_intrinsics.hpp>
 #include <orbis/optimize/bundle_adjustment.hpp>
+#include <orbis/optimize/reprojection_with_intrinsics.hpp>
+
+#include "support/synthetic/bundle.hpp"
 
 namespace orbis::bench {
 namespace {
@@ -48,12 +49,12 @@ constexpr double gate = 7.815;  ///< chi-squared of three degrees of freedom at 
 constexpr int first_phase = 5, second_phase = 10;
 
 struct local_map {
-  io::synthetic_local_map given;
+  test::synthetic_local_map given;
   reached expected;
 };
 
 template <class Policy>
-reached adjust_locally(const Policy& policy, const io::synthetic_local_map& map) {
+reached adjust_locally(const Policy& policy, const test::synthetic_local_map& map) {
   // Kept from call to call, as a SLAM keeps it.
   static bundle_adjuster ba{reprojection{map.camera, map.bf}, huber{std::sqrt(gate)}};
   static std::vector<bundle_observation> observations;
@@ -78,10 +79,10 @@ local_map& map_named(const std::string& name) {
   static std::map<std::string, local_map> made;
   if (const auto found = made.find(name); found != made.end()) return found->second;
   local_map& m = made[name];
-  m.given = io::make_local_map(
+  m.given = test::make_local_map(
       name == "20_free_10_fixed"
-          ? io::synthetic_local_map_options{}
-          : io::synthetic_local_map_options{
+          ? test::synthetic_local_map_options{}
+          : test::synthetic_local_map_options{
                 .free_keyframes = 60, .fixed_keyframes = 30, .points = 10000, .views_per_point = 5.85});
   m.expected = adjust_locally(seq, m.given);
   return m;
@@ -123,8 +124,8 @@ large_problem& problem_named(const std::string& name, const std::string& path) {
     p.given = *read;
   } else {
     const int cameras = std::atoi(name.substr(name.rfind('_') + 1).c_str());
-    p.given = io::make_bal_problem(
-                  {.scene = name.starts_with("street") ? io::bundle_scene::street : io::bundle_scene::monument,
+    p.given = test::make_bal_problem(
+                  {.scene = name.starts_with("street") ? test::bundle_scene::street : test::bundle_scene::monument,
                    .cameras = cameras,
                    .points = 200 * cameras})
                   .measured;
@@ -152,7 +153,7 @@ void measure(benchmark::State& state, const Solve& solve, double best, double sh
 }
 
 void add_local(const std::string& map, const std::string& who,
-               std::function<reached(const io::synthetic_local_map&)> solve) {
+               std::function<reached(const test::synthetic_local_map&)> solve) {
   add_row("local_bundle/" + map + "/" + who, [=](benchmark::State& state) {
     const local_map& m = map_named(map);
     measure(
@@ -171,8 +172,8 @@ void add_large(const std::string& name, const std::string& path, const std::stri
 }
 
 #ifdef ORBIS_BENCH_WITH_CERES
-reached ceres_locally(const io::synthetic_local_map& given, ceres::LinearSolverType solver) {
-  io::synthetic_local_map map = given;
+reached ceres_locally(const test::synthetic_local_map& given, ceres::LinearSolverType solver) {
+  test::synthetic_local_map map = given;
   const auto done = with_ceres::adjust_locally(map,
                                                {.solver = solver,
                                                 .dense = ceres::LAPACK,
@@ -207,13 +208,13 @@ void register_large(const std::string& name, const std::string& path) {
 
 [[maybe_unused]] const bool registered = [] {
   for (const std::string map : {"20_free_10_fixed", "60_free_30_fixed"}) {
-    add_local(map, "orbis", [](const io::synthetic_local_map& m) { return adjust_locally(seq, m); });
-    add_local(map, "orbis_par2", [](const io::synthetic_local_map& m) { return adjust_locally(par.with(2), m); });
+    add_local(map, "orbis", [](const test::synthetic_local_map& m) { return adjust_locally(seq, m); });
+    add_local(map, "orbis_par2", [](const test::synthetic_local_map& m) { return adjust_locally(par.with(2), m); });
 #ifdef ORBIS_BENCH_WITH_CERES
     add_local(map, "ceres_dense_schur",
-              [](const io::synthetic_local_map& m) { return ceres_locally(m, ceres::DENSE_SCHUR); });
+              [](const test::synthetic_local_map& m) { return ceres_locally(m, ceres::DENSE_SCHUR); });
     add_local(map, "ceres_sparse_schur",
-              [](const io::synthetic_local_map& m) { return ceres_locally(m, ceres::SPARSE_SCHUR); });
+              [](const test::synthetic_local_map& m) { return ceres_locally(m, ceres::SPARSE_SCHUR); });
 #endif
   }
   for (const char* name : {"monument_21", "monument_60", "street_60", "street_200"}) register_large(name, "");

@@ -20,7 +20,8 @@
 #include <orbis/core/se3.hpp>
 #include <orbis/core/types.hpp>
 #include <orbis/io/bal.hpp>
-#include <orbis/io/synthetic/bundle.hpp>
+
+#include "support/synthetic/bundle.hpp"
 
 namespace orbis::bench::with_ceres {
 
@@ -198,7 +199,7 @@ inline constexpr double stereo_gate = 7.815;
 
 /// Local bundle adjustment in two phases: all observations, then those that passed the gate. Every
 /// observation has depth.
-inline outcome adjust_locally(io::synthetic_local_map& map, const settings& s, int first_phase, int second_phase) {
+inline outcome adjust_locally(test::synthetic_local_map& map, const settings& s, int first_phase, int second_phase) {
   std::vector<keyframe_block> keyframes;
   for (const se3& pose : map.poses) {
     const se3 inverse = pose.inverse();

@@ -31,8 +31,9 @@
 #include <orbis/core/execution.hpp>
 #include <orbis/core/simd.hpp>
 #include <orbis/io/g2o.hpp>
-#include <orbis/io/synthetic/pose_graph.hpp>
 #include <orbis/optimize/pose_graph.hpp>
+
+#include "support/synthetic/pose_graph.hpp"
 
 namespace orbis::bench {
 namespace {
@@ -212,11 +213,11 @@ problem& named(const std::string& name) {
   if (name == "sphere.g2o") {
     p.graph = io::read_g2o(std::string{ORBIS_DATA_DIR} + "/pose_graph/sphere.g2o").value();
   } else {
-    io::synthetic_graph_options options{.translation_sigma = 0.1, .rotation_sigma = 0.05};
-    if (name == "torus_5000") options.shape = io::graph_shape::torus, options.turns = 100;
+    test::synthetic_graph_options options{.translation_sigma = 0.1, .rotation_sigma = 0.05};
+    if (name == "torus_5000") options.shape = test::graph_shape::torus, options.turns = 100;
     if (name == "grid_2744")
-      options.shape = io::graph_shape::grid, options.poses_per_turn = 14, options.closure_probability = 0.3;
-    p.graph = io::make_pose_graph(options).measured;
+      options.shape = test::graph_shape::grid, options.poses_per_turn = 14, options.closure_probability = 0.3;
+    p.graph = test::make_pose_graph(options).measured;
     if (is_failure(initialize_chordally(std::span{p.graph.vertices}, p.graph.edges).status)) std::abort();
   }
   poses vertices;

@@ -27,15 +27,16 @@
 #include <orbis/camera/settings.hpp>
 #include <orbis/features/orb.hpp>
 #include <orbis/io/recording.hpp>
-#include <orbis/io/synthetic/read_ahead.hpp>
-#include <orbis/io/synthetic/sequence.hpp>
 #include <orbis/slam/place_recognition.hpp>
 #include <orbis/slam/rgbd_system.hpp>
+
+#include "support/synthetic/read_ahead.hpp"
+#include "support/synthetic/sequence.hpp"
 
 namespace {
 
 using namespace orbis;
-namespace syn = io::synthetic;
+namespace syn = test;
 using bench_clock = std::chrono::steady_clock;
 
 /// Notes when a signature was asked for last: looking for loops begins with one.

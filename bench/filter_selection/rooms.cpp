@@ -6,13 +6,13 @@
 #include <cmath>
 #include <limits>
 
-#include <orbis/io/synthetic/scene.hpp>
+#include <orbis/io/detail/synthetic/scene.hpp>
 
 namespace orbis::bench {
 
-using io::synthetic::shape;
-using io::synthetic::solid;
-using io::synthetic::to_triple;
+using io::detail::synthetic::shape;
+using io::detail::synthetic::solid;
+using io::detail::synthetic::to_triple;
 
 namespace {
 
@@ -121,7 +121,7 @@ double room::cast(const vec3& origin, const vec3& direction) const {
 room make_room(room_kind kind, std::uint64_t seed) {
   random_bits random{mix64(seed ^ 0x726f6f6d73ULL)};
   switch (kind) {
-    case room_kind::furnished: return {kind, io::synthetic::scene{{}, seed}.solids()};
+    case room_kind::furnished: return {kind, io::detail::synthetic::scene{{}, seed}.solids()};
     case room_kind::clutter: return clutter(random);
     case room_kind::corridor: return corridor(random);
     case room_kind::table_top: return table_top(random);

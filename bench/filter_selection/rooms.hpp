@@ -11,7 +11,7 @@
 #include <orbis/core/image.hpp>
 #include <orbis/core/random.hpp>
 #include <orbis/core/se3.hpp>
-#include <orbis/io/synthetic/solid.hpp>
+#include <orbis/io/detail/synthetic/solid.hpp>
 
 namespace orbis::bench {
 
@@ -26,7 +26,7 @@ enum class room_kind {
 /// A room is a list of solids; the first is its hull, seen from inside.
 struct room {
   room_kind kind;
-  std::vector<io::synthetic::solid> solids;
+  std::vector<io::detail::synthetic::solid> solids;
 
   /// Metres from a point to the nearest surface.
   [[nodiscard]] double distance(const vec3& p) const;
@@ -57,7 +57,7 @@ struct depth_sensor {
 };
 
 /// A solid somewhere in the path of the camera, as somebody walking by.
-[[nodiscard]] io::synthetic::solid walker(const room& r, const std::vector<se3>& path, double progress,
+[[nodiscard]] io::detail::synthetic::solid walker(const room& r, const std::vector<se3>& path, double progress,
                                           std::uint64_t seed);
 
 }  // namespace orbis::bench

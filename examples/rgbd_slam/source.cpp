@@ -73,7 +73,7 @@ frame_source make_synthetic(const settings& s) {
   source.frames = limited(recording->size(), s);
   source.frame = [recording, stride = s.stride](std::size_t i) { return recording->frame(i * stride); };
   source.ground_truth = recording->ground_truth();
-  source.surface_distance = [recording](const orbis::vec3& p) { return recording->scene().distance(p); };
+  source.surface_distance = [recording](const orbis::vec3& p) { return recording->surface_distance(p); };
   return source;
 }
 

@@ -15,15 +15,17 @@
 #include <vector>
 
 #include <orbis/core/image.hpp>
+#include <orbis/core/portable_sine.hpp>
 #include <orbis/core/random.hpp>
-#include <orbis/io/synthetic/arithmetic.hpp>
 
 namespace textures {
 
+using orbis::cos_turns;
 using orbis::random_bits;
-using orbis::io::synthetic::between;
-using orbis::io::synthetic::cos_turns;
-using orbis::io::synthetic::sin_turns;
+using orbis::sin_turns;
+
+/// Uniform in [lo, hi).
+[[nodiscard]] inline double between(random_bits& bits, double lo, double hi) noexcept { return bits.uniform(lo, hi); }
 
 /// One picture while it is painted; brightness from 0 to 1 or so.
 class picture {

@@ -14,6 +14,7 @@
 #include <orbis/core/lanes.hpp>
 #include <orbis/core/point.hpp>
 #include <orbis/core/point_cloud.hpp>
+#include <orbis/core/portable_sine.hpp>
 #include <orbis/core/progress.hpp>
 #include <orbis/core/random.hpp>
 #include <orbis/core/result.hpp>

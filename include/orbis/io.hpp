@@ -1,20 +1,32 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Reading and writing: images, cameras, recordings, trajectories, clouds.
+/// Reading and writing: images, cameras, recordings, trajectories, clouds, optimisation problems.
+///
+/// | header                | what it is for                                                                   |
+/// | --------------------- | -------------------------------------------------------------------------------- |
+/// | `recording.hpp`       | RGB-D recordings in the layouts of TUM RGB-D, 7-Scenes and ICL-NUIM              |
+/// | `synthetic.hpp`       | a recording rendered on the fly, whose poses and surfaces are known exactly      |
+/// | `synthetic_options.hpp` | its room, its camera's path and its sensor's errors                            |
+/// | `camera_file.hpp`     | `camera.toml`: model, size, intrinsics, distortion, depth scale                  |
+/// | `trajectory_file.hpp` | trajectories in TUM format                                                       |
+/// | `image.hpp`           | colour and depth images, whatever their format                                   |
+/// | `png.hpp`, `jpeg.hpp` | images of one format, read and (PNG) written                                     |
+/// | `cloud_file.hpp`      | point clouds, whatever their format                                              |
+/// | `ply.hpp`, `pcd.hpp`  | point clouds of one format, read and written                                     |
+/// | `bal.hpp`             | bundle adjustment problems ("bundle adjustment in the large")                    |
+/// | `g2o.hpp`             | pose graphs                                                                      |
 #pragma once
 
 #include <orbis/io/bal.hpp>
 #include <orbis/io/camera_file.hpp>
 #include <orbis/io/cloud_file.hpp>
 #include <orbis/io/g2o.hpp>
-#include <orbis/io/icl_nuim.hpp>
 #include <orbis/io/image.hpp>
 #include <orbis/io/jpeg.hpp>
 #include <orbis/io/pcd.hpp>
 #include <orbis/io/ply.hpp>
 #include <orbis/io/png.hpp>
 #include <orbis/io/recording.hpp>
-#include <orbis/io/seven_scenes.hpp>
 #include <orbis/io/synthetic.hpp>
+#include <orbis/io/synthetic_options.hpp>
 #include <orbis/io/trajectory_file.hpp>
-#include <orbis/io/tum.hpp>

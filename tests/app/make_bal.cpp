@@ -5,11 +5,12 @@
 #include <cstdlib>
 
 #include <orbis/io/bal.hpp>
-#include <orbis/io/synthetic/bundle.hpp>
+
+#include "support/synthetic/bundle.hpp"
 
 int main(int argc, char** argv) {
   if (argc != 6) return 1;
-  const auto made = orbis::io::make_bal_problem({.cameras = std::atoi(argv[2]),
+  const auto made = orbis::test::make_bal_problem({.cameras = std::atoi(argv[2]),
                                                  .points = std::atoi(argv[3]),
                                                  .pixel_sigma = std::atof(argv[4]),
                                                  .outlier_share = std::atof(argv[5])});

@@ -26,10 +26,10 @@ TEST_CASE("numbers are read in both byte orders") {
   CHECK(orbis::load_number<std::uint16_t>(bytes, std::endian::little) == 0x0201);
   CHECK(orbis::load_number<std::uint16_t>(bytes, std::endian::big) == 0x0102);
   CHECK(orbis::load_number<std::uint32_t>(bytes, std::endian::big) == 0x010203FC);
-  CHECK(io::load_as_double(bytes + 3, io::scalar_type::int8, std::endian::little) == -4.0);
-  CHECK(io::load_as_double(bytes + 3, io::scalar_type::uint8, std::endian::little) == 252.0);
+  CHECK(io::detail::load_as_double(bytes + 3, io::detail::scalar_type::int8, std::endian::little) == -4.0);
+  CHECK(io::detail::load_as_double(bytes + 3, io::detail::scalar_type::uint8, std::endian::little) == 252.0);
   const char one[] = {0x3F, '\x80', 0, 0};
-  CHECK(io::load_as_double(one, io::scalar_type::float32, std::endian::big) == 1.0);
+  CHECK(io::detail::load_as_double(one, io::detail::scalar_type::float32, std::endian::big) == 1.0);
 }
 
 TEST_CASE("what is appended is read back") {

@@ -4,9 +4,9 @@
 #include <string>
 
 #include <orbis/io/g2o.hpp>
-#include <orbis/io/synthetic/pose_graph.hpp>
 
 #include "support/catch.hpp"
+#include "support/synthetic/pose_graph.hpp"
 #include "support/data.hpp"
 #include "temporary_folder.hpp"
 
@@ -69,7 +69,7 @@ TEST_CASE("A g2o graph is read, in any order of its lines") {
 }
 
 TEST_CASE("What is written is read back to the bit") {
-  auto made = io::make_pose_graph({.poses_per_turn = 9, .turns = 7}).measured;
+  auto made = test::make_pose_graph({.poses_per_turn = 9, .turns = 7}).measured;
   made.ids[3] = std::numeric_limits<std::int64_t>::max();
   made.ids[4] = std::numeric_limits<std::int64_t>::min();
   made.fixed[5] = 1;

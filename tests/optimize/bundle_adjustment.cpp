@@ -4,7 +4,6 @@
 #include <utility>
 
 #include <orbis/io/bal.hpp>
-#include <orbis/io/synthetic/bundle.hpp>
 #include <orbis/optimize/bundle_adjustment.hpp>
 #include <orbis/optimize/reprojection_with_intrinsics.hpp>
 
@@ -13,6 +12,7 @@
 #include "support/allocations.hpp"
 #include "support/catch.hpp"
 #include "support/data.hpp"
+#include "support/synthetic/bundle.hpp"
 
 using namespace orbis;
 using optimize::bundle_observation;
@@ -183,7 +183,7 @@ TEST_CASE("A second phase without a rebuild is what a fresh start with the same 
 }
 
 TEST_CASE("A local map is adjusted to a millimetre and a fortieth of a degree") {
-  const auto m = io::make_local_map({});
+  const auto m = test::make_local_map({});
   problem p{m.poses, m.true_poses, m.points, m.true_points, {}, m.fixed};
   for (const auto& o : m.observations) p.observations.push_back({o.keyframe, o.point, o.pixel, o.right, o.information});
   optimize::bundle_adjuster ba{optimize::reprojection{m.camera, m.bf}, optimize::huber{2.8}};

@@ -10,7 +10,6 @@
 #include <Eigen/LU>
 
 #include <orbis/camera/pinhole.hpp>
-#include <orbis/io/synthetic/bundle.hpp>
 #include <orbis/optimize/bundle_adjustment.hpp>
 #include <orbis/optimize/bundle_covariance.hpp>
 #include <orbis/optimize/reprojection_with_intrinsics.hpp>
@@ -18,6 +17,7 @@
 #include "bundle_instances.hpp"
 #include "support.hpp"
 #include "support/catch.hpp"
+#include "support/synthetic/bundle.hpp"
 
 using namespace orbis;
 using optimize::bundle_gauge;
@@ -39,7 +39,7 @@ using pinhole_residual = optimize::reprojection<camera::pinhole>;
 
 /// Keyframes and points where they truly are; observations, with noise, of which so many have depth.
 problem<pinhole_residual> local_map(double depth_share, int fixed, double outliers = 0.0) {
-  const auto made = io::make_local_map({.free_keyframes = 7 - fixed,
+  const auto made = test::make_local_map({.free_keyframes = 7 - fixed,
                                         .fixed_keyframes = fixed,
                                         .points = 60,
                                         .views_per_point = 4.0,
@@ -53,7 +53,7 @@ problem<pinhole_residual> local_map(double depth_share, int fixed, double outlie
   return p;
 }
 problem<optimize::bal_reprojection> photographs() {
-  const auto made = io::make_bal_problem({.cameras = 9, .points = 150, .views_per_point = 4.0, .seed = 2});
+  const auto made = test::make_bal_problem({.cameras = 9, .points = 150, .views_per_point = 4.0, .seed = 2});
   problem<optimize::bal_reprojection> p;
   for (const auto& c : made.truth.cameras) p.cameras.push_back(optimize::bal_camera::from_parameters(c));
   p.points = made.truth.points;

@@ -16,7 +16,6 @@
 
 #include <orbis/camera/pinhole.hpp>
 #include <orbis/io/bal.hpp>
-#include <orbis/io/synthetic/bundle.hpp>
 #include <orbis/optimize/bundle_adjustment.hpp>
 #include <orbis/optimize/reprojection_with_intrinsics.hpp>
 
@@ -24,6 +23,7 @@
 #include "support.hpp"
 #include "support/catch.hpp"
 #include "support/data.hpp"
+#include "support/synthetic/bundle.hpp"
 
 using namespace orbis;
 using optimize::bundle_observation;
@@ -58,12 +58,12 @@ double cost_of(const io::bal_problem& p) {
   return sum;
 }
 
-io::bal_problem generated(io::bundle_scene scene, std::uint64_t seed = 1) {
-  return io::make_bal_problem({.scene = scene, .cameras = 24, .points = 1500, .seed = seed}).measured;
+io::bal_problem generated(test::bundle_scene scene, std::uint64_t seed = 1) {
+  return test::make_bal_problem({.scene = scene, .cameras = 24, .points = 1500, .seed = seed}).measured;
 }
 
 /// Two phases, as a SLAM adjusts its local map. Returns the last cost.
-double adjust_locally(io::synthetic_local_map& map) {
+double adjust_locally(test::synthetic_local_map& map) {
   optimize::bundle_adjuster ba{optimize::reprojection{map.camera, map.bf}, optimize::huber{std::sqrt(gate)}};
   std::vector<bundle_observation> observations;
   for (const auto& o : map.observations) observations.push_back({o.keyframe, o.point, o.pixel, o.right, o.information});
@@ -81,7 +81,7 @@ double adjust_locally(io::synthetic_local_map& map) {
 struct pose_error {
   double metres = 0.0, radians = 0.0;  ///< root mean squares over the keyframes that moved
 };
-pose_error error_of(const io::synthetic_local_map& map) {
+pose_error error_of(const test::synthetic_local_map& map) {
   pose_error e;
   int free = 0;
   for (std::size_t k = 0; k != map.poses.size(); ++k) {
@@ -108,7 +108,7 @@ TEST_CASE("A problem of the BAL collection ends at the cost that is known of it"
 }
 
 TEST_CASE("Every way of stepping and solving ends at the same cost") {
-  for (const auto scene : {io::bundle_scene::monument, io::bundle_scene::street}) {
+  for (const auto scene : {test::bundle_scene::monument, test::bundle_scene::street}) {
     const io::bal_problem start = generated(scene);
     io::bal_problem p = start;
     const double best = adjust(p, {}, {}, {}, 1e-12).final_cost;
@@ -134,7 +134,7 @@ TEST_CASE("Every way of stepping and solving ends at the same cost") {
 TEST_CASE("Adjusting a local map in two phases brings its keyframes to where they are") {
   pose_error mean;
   for (const std::uint64_t seed : {1U, 2U, 3U, 4U}) {
-    auto map = io::make_local_map({.seed = seed});
+    auto map = test::make_local_map({.seed = seed});
     CHECK(error_of(map).metres > 0.01);
     (void)adjust_locally(map);
     const pose_error e = error_of(map);
@@ -163,10 +163,10 @@ void compare_with_ceres(const io::bal_problem& start, double huber = 0.0) {
 
 TEST_CASE("Costs are no higher than those of Ceres") {
   for (const std::uint64_t seed : {1U, 2U, 3U}) {
-    compare_with_ceres(generated(io::bundle_scene::monument, seed));
-    compare_with_ceres(generated(io::bundle_scene::street, seed));
+    compare_with_ceres(generated(test::bundle_scene::monument, seed));
+    compare_with_ceres(generated(test::bundle_scene::street, seed));
   }
-  compare_with_ceres(io::make_bal_problem({.cameras = 20, .points = 800, .outlier_share = 0.05}).measured, 2.0);
+  compare_with_ceres(test::make_bal_problem({.cameras = 20, .points = 800, .outlier_share = 0.05}).measured, 2.0);
 }
 
 TEST_CASE("The cost of a problem of the BAL collection is no higher than that of Ceres") {
@@ -176,7 +176,7 @@ TEST_CASE("The cost of a problem of the BAL collection is no higher than that of
 
 TEST_CASE("The cost of an adjusted local map is that of Ceres") {
   for (const std::uint64_t seed : {1U, 2U}) {
-    const auto start = io::make_local_map({.seed = seed});
+    const auto start = test::make_local_map({.seed = seed});
     auto theirs = start, ours = start;
     // One phase: both minimise the same thing.
     const auto reference = with_ceres::adjust_locally(theirs, {.huber = std::sqrt(gate)}, 50, 0);

@@ -38,7 +38,7 @@ std::vector<edge> chain(std::size_t count) {
 }  // namespace
 
 TEST_CASE("Every policy of damping and execution finds the same minimum, near the truth") {
-  for (const io::synthetic_graph& made : test::small_graphs()) {
+  for (const test::synthetic_graph& made : test::small_graphs()) {
     const auto& edges = made.measured.edges;
     const auto run = [&](auto damping, std::vector<se3>& vertices, const auto& policy) {
       vertices = made.measured.vertices;
@@ -93,7 +93,7 @@ TEST_CASE("sphere.g2o: the chi2 of g2o") {
 
 TEST_CASE("The answer moves with the world and does not depend on the order of the edges") {
   random_bits random{361};
-  for (const io::synthetic_graph& made : test::small_graphs()) {
+  for (const test::synthetic_graph& made : test::small_graphs()) {
     const pose_graph_options options{.relative_tolerance = 1e-12, .fixed = made.measured.fixed};
     std::vector<se3> plain = made.measured.vertices;
     const auto s = test::solve<dogleg>(seq, plain, made.measured.edges, options);
@@ -132,7 +132,7 @@ TEST_CASE("Edges between the same vertices add up, either way round") {
 }
 
 TEST_CASE("A robust loss keeps wrong closures from pulling") {
-  auto made = io::make_pose_graph({.shape = io::graph_shape::torus,
+  auto made = test::make_pose_graph({.shape = test::graph_shape::torus,
                                    .poses_per_turn = 16,
                                    .turns = 20,
                                    .radius = 10.0,

@@ -14,7 +14,7 @@ using namespace orbis::optimize;
 
 TEST_CASE("Without noise the truth comes out, wherever the vertices were") {
   random_bits random{371};
-  for (const io::synthetic_graph& made : test::small_graphs(1e-9)) {
+  for (const test::synthetic_graph& made : test::small_graphs(1e-9)) {
     std::vector<se3> vertices;
     for (std::size_t i = 0; i != made.truth.size(); ++i) vertices.push_back(test::random_pose(random, 50.0));
     vertices[0] = made.truth[0];
@@ -29,7 +29,7 @@ TEST_CASE("Without noise the truth comes out, wherever the vertices were") {
 
 TEST_CASE("Noisy graphs converge from it to the best minimum, and from odometry do not") {
   // Odometry that is lost after a few turns.
-  const auto run = [](const io::synthetic_graph& made, bool chordal) {
+  const auto run = [](const test::synthetic_graph& made, bool chordal) {
     std::vector<se3> vertices = made.measured.vertices;
     if (chordal)
       REQUIRE(
@@ -38,14 +38,14 @@ TEST_CASE("Noisy graphs converge from it to the best minimum, and from odometry 
     return test::solve<gauss_newton>(seq, vertices, made.measured.edges,
                                      {.max_iterations = 25, .fixed = made.measured.fixed});
   };
-  const auto from_truth = [](const io::synthetic_graph& made) {
+  const auto from_truth = [](const test::synthetic_graph& made) {
     std::vector<se3> vertices = made.truth;
     return test::solve<gauss_newton>(seq, vertices, made.measured.edges, {.fixed = made.measured.fixed});
   };
   int lost = 0;
-  for (const io::graph_shape shape : {io::graph_shape::torus, io::graph_shape::sphere})
+  for (const test::graph_shape shape : {test::graph_shape::torus, test::graph_shape::sphere})
     for (const std::uint64_t seed : {1U, 2U}) {
-      const auto made = io::make_pose_graph({.shape = shape,
+      const auto made = test::make_pose_graph({.shape = shape,
                                              .poses_per_turn = 20,
                                              .turns = 25,
                                              .radius = 10.0,

@@ -10,16 +10,17 @@
 
 #include <orbis/core/execution.hpp>
 #include <orbis/core/se3.hpp>
-#include <orbis/io/synthetic/pose_graph.hpp>
 #include <orbis/optimize/pose_graph.hpp>
+
+#include "support/synthetic/pose_graph.hpp"
 
 namespace orbis::test {
 
 /// A few hundred poses of each shape; odometry goes astray, but not beyond recovery.
-inline std::vector<io::synthetic_graph> small_graphs(double noise = 1.0) {
-  std::vector<io::synthetic_graph> graphs;
-  const auto add = [&](io::graph_shape shape, int poses, int turns) {
-    graphs.push_back(io::make_pose_graph({.shape = shape,
+inline std::vector<test::synthetic_graph> small_graphs(double noise = 1.0) {
+  std::vector<test::synthetic_graph> graphs;
+  const auto add = [&](test::graph_shape shape, int poses, int turns) {
+    graphs.push_back(test::make_pose_graph({.shape = shape,
                                           .poses_per_turn = poses,
                                           .turns = turns,
                                           .radius = 10.0,
@@ -28,9 +29,9 @@ inline std::vector<io::synthetic_graph> small_graphs(double noise = 1.0) {
                                           .closure_probability = 0.8,
                                           .seed = 17}));
   };
-  add(io::graph_shape::sphere, 20, 15);
-  add(io::graph_shape::torus, 16, 20);
-  add(io::graph_shape::grid, 7, 0);
+  add(test::graph_shape::sphere, 20, 15);
+  add(test::graph_shape::torus, 16, 20);
+  add(test::graph_shape::grid, 7, 0);
   return graphs;
 }
 

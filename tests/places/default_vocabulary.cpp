@@ -4,7 +4,7 @@
 
 #include <orbis/core/execution.hpp>
 #include <orbis/features/orb.hpp>
-#include <orbis/io/synthetic/recording.hpp>
+#include <orbis/io/synthetic.hpp>
 #include <orbis/places/default_vocabulary.hpp>
 #include <orbis/places/keyframe_database.hpp>
 #include <orbis/places/vocabulary_file.hpp>

@@ -11,15 +11,15 @@
 #include <vector>
 
 #include <orbis/eval/ate.hpp>
-#include <orbis/io/synthetic/sequence.hpp>
 #include <orbis/slam/detail/system/worker.hpp>
 #include <orbis/slam/validate.hpp>
 
 #include "slam/tested_system.hpp"
 #include "support/catch.hpp"
+#include "support/synthetic/sequence.hpp"
 
 using namespace orbis;
-namespace syn = io::synthetic;
+namespace syn = test;
 using std::chrono::milliseconds;
 
 namespace {

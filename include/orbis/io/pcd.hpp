@@ -262,7 +262,7 @@ point_cloud read_pcd_binary(const pcd_header& header, const pcd_columns& columns
   bytes.remove_prefix(8);
   if (compressed_size > bytes.size() || size % header->point_size != 0 || size / header->point_size != header->points)
     return ends_early();
-  const auto data = lzf_decompress(bytes.substr(0, compressed_size), size);
+  const auto data = detail::lzf_decompress(bytes.substr(0, compressed_size), size);
   if (!data) return ends_early();
   out.cloud = read_pcd_binary(*header, columns, [&](const pcd_field& f, std::size_t i) {
     return data->data() + f.offset * header->points + i * f.size * f.count;
@@ -329,7 +329,7 @@ inline result<void> write_pcd(const std::filesystem::path& path, const organized
       for (const int axis : {0, 1, 2})
         for (const vec3f& p : cloud.points) append_little_endian(columns, p[axis]);
       for (const rgb8& c : cloud.colors) append_little_endian(columns, detail::packed_rgb(c));
-      const std::string compressed = lzf_compress(columns);
+      const std::string compressed = detail::lzf_compress(columns);
       if (std::max(columns.size(), compressed.size()) > UINT32_MAX)
         return fail(errc::invalid_argument, path.string(), "too large for binary_compressed, use binary");
       append_little_endian(bytes, static_cast<std::uint32_t>(compressed.size()));

@@ -179,7 +179,7 @@ class ply_body {
 
     constexpr std::string_view names[6] = {"x", "y", "z", "red", "green", "blue"};
     std::vector<int> role(element.properties.size(), -1);
-    std::array<scalar_type, 6> type{};
+    std::array<detail::scalar_type, 6> type{};
     unsigned found = 0;
     for (std::size_t k = 0; k != role.size(); ++k)
       for (std::size_t r = 0; r != 6; ++r)
@@ -190,9 +190,9 @@ class ply_body {
         }
     if ((found & 7U) != 7U) return fail(errc::unsupported, where, "the vertices have no x, y and z");
     const bool colored = found == 63U;
-    const auto channel = [](double v, scalar_type t) {
-      if (t == scalar_type::float32 || t == scalar_type::float64) v *= 255.0;
-      if (t == scalar_type::uint16) v /= 257.0;
+    const auto channel = [](double v, detail::scalar_type t) {
+      if (t == detail::scalar_type::float32 || t == detail::scalar_type::float64) v *= 255.0;
+      if (t == detail::scalar_type::uint16) v /= 257.0;
       return static_cast<std::uint8_t>(v >= 0.0 ? std::min(255.0, std::round(v)) : 0.0);
     };
 

@@ -24,11 +24,11 @@
 #include <orbis/core/result.hpp>
 #include <orbis/core/trajectory.hpp>
 #include <orbis/io/camera_file.hpp>
-#include <orbis/io/detail/recording_index.hpp>
-#include <orbis/io/icl_nuim.hpp>
+#include <orbis/io/detail/recordings/icl_nuim.hpp>
+#include <orbis/io/detail/recordings/recording_index.hpp>
+#include <orbis/io/detail/recordings/seven_scenes.hpp>
+#include <orbis/io/detail/recordings/tum.hpp>
 #include <orbis/io/image.hpp>
-#include <orbis/io/seven_scenes.hpp>
-#include <orbis/io/tum.hpp>
 
 namespace orbis::io {
 
@@ -57,7 +57,7 @@ struct recording_options {
 class recording {
  public:
   /// @pre !index.frames.empty()
-  recording(recording_index index, camera::camera_settings camera, recording_format format)
+  recording(detail::recording_index index, camera::camera_settings camera, recording_format format)
       : index_{std::move(index)}, camera_{std::move(camera)}, format_{format} {
     assert(!index_.frames.empty());
   }
@@ -75,7 +75,7 @@ class recording {
   /// Every file that the recording is read from: lists, poses, camera, and all images.
   [[nodiscard]] std::vector<std::filesystem::path> files() const {
     std::vector<std::filesystem::path> all = index_.files;
-    for (const recording_entry& entry : index_.frames) all.insert(all.end(), {entry.color, entry.depth});
+    for (const detail::recording_entry& entry : index_.frames) all.insert(all.end(), {entry.color, entry.depth});
     return all;
   }
 
@@ -83,7 +83,7 @@ class recording {
   /// malformed (damaged, or of another size than the camera's), unsupported. @pre i < size()
   [[nodiscard]] result<camera::rgbd_frame> frame(std::size_t i) const {
     assert(i < size());
-    const recording_entry& entry = index_.frames[i];
+    const detail::recording_entry& entry = index_.frames[i];
     auto color = read_color(entry.color);
     if (!color) return fail(color.error());
     auto depth = read_depth(entry.depth);
@@ -156,7 +156,7 @@ class recording {
                     std::to_string(camera_.model.width()) + "x" + std::to_string(camera_.model.height()));
   }
 
-  recording_index index_;
+  detail::recording_index index_;
   camera::camera_settings camera_;
   recording_format format_;
   result<void> status_;
@@ -164,9 +164,9 @@ class recording {
 
 /// Which format the recording in `folder` has; `automatic` if none is recognised.
 [[nodiscard]] inline recording_format detect_format(const std::filesystem::path& folder) {
-  if (is_icl_nuim(folder)) return recording_format::icl_nuim;
-  if (is_tum(folder)) return recording_format::tum;
-  if (is_seven_scenes(folder)) return recording_format::seven_scenes;
+  if (detail::is_icl_nuim(folder)) return recording_format::icl_nuim;
+  if (detail::is_tum(folder)) return recording_format::tum;
+  if (detail::is_seven_scenes(folder)) return recording_format::seven_scenes;
   return recording_format::automatic;
 }
 
@@ -179,7 +179,7 @@ class recording {
 [[nodiscard]] inline result<recording> open_recording(const std::filesystem::path& folder,
                                                       const recording_options& options = {}) {
   std::error_code ignored;
-  if (!present(folder)) return fail(errc::not_found, folder.string(), "no such folder");
+  if (!detail::present(folder)) return fail(errc::not_found, folder.string(), "no such folder");
   if (!std::filesystem::is_directory(folder, ignored))
     return fail(errc::unsupported, folder.string(), "a recording is a folder, this is a file");
 
@@ -190,13 +190,13 @@ class recording {
                 "no known recording: neither rgb.txt and depth.txt (TUM), nor frame-*.color.png (7-Scenes), nor "
                 "numbered images in rgb and depth (ICL-NUIM)");
 
-  auto index = format == recording_format::tum            ? index_tum(folder, options.max_time_difference)
-               : format == recording_format::seven_scenes ? index_seven_scenes(folder)
-                                                          : index_icl_nuim(folder);
+  auto index = format == recording_format::tum            ? detail::index_tum(folder, options.max_time_difference)
+               : format == recording_format::seven_scenes ? detail::index_seven_scenes(folder)
+                                                          : detail::index_icl_nuim(folder);
   if (!index) return fail(index.error());
 
   std::optional<camera::camera_settings> camera = options.camera;
-  if (const auto file = folder / "camera.toml"; !camera && present(file)) {
+  if (const auto file = folder / "camera.toml"; !camera && detail::present(file)) {
     auto read = read_camera(file);
     if (!read) return fail(read.error());
     camera = *std::move(read);

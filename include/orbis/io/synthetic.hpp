@@ -5,25 +5,164 @@
 /// @code
 ///   orbis::io::synthetic_recording room{{.frames = 300, .seed = 7}};
 ///   for (const orbis::camera::rgbd_frame& frame : room) slam.track(frame);
-///   double error = room.scene().distance(point_of_the_map);
+///   double error = room.surface_distance(point_of_the_map);
 /// @endcode
 #pragma once
 
-#include <orbis/io/synthetic/arithmetic.hpp>
-#include <orbis/io/synthetic/building.hpp>
-#include <orbis/io/synthetic/bundle.hpp>
-#include <orbis/io/synthetic/canvas.hpp>
-#include <orbis/io/synthetic/effects.hpp>
-#include <orbis/io/synthetic/path.hpp>
-#include <orbis/io/synthetic/pose_graph.hpp>
-#include <orbis/io/synthetic/read_ahead.hpp>
-#include <orbis/io/synthetic/recording.hpp>
-#include <orbis/io/synthetic/renderer.hpp>
-#include <orbis/io/synthetic/scene.hpp>
-#include <orbis/io/synthetic/sensor.hpp>
-#include <orbis/io/synthetic/sequence.hpp>
-#include <orbis/io/synthetic/solid.hpp>
-#include <orbis/io/synthetic/studio.hpp>
-#include <orbis/io/synthetic/texture.hpp>
-#include <orbis/io/synthetic/walk.hpp>
-#include <orbis/io/synthetic/world.hpp>
+#include <algorithm>
+#include <cassert>
+#include <cstddef>
+#include <cstdint>
+#include <iterator>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <orbis/camera/pinhole.hpp>
+#include <orbis/camera/rgbd_frame.hpp>
+#include <orbis/camera/settings.hpp>
+#include <orbis/core/execution.hpp>
+#include <orbis/core/result.hpp>
+#include <orbis/core/trajectory.hpp>
+#include <orbis/core/types.hpp>
+#include <orbis/io/detail/synthetic/camera_path.hpp>
+#include <orbis/io/detail/synthetic/looks.hpp>
+#include <orbis/io/detail/synthetic/scene.hpp>
+#include <orbis/io/detail/synthetic/sensor.hpp>
+#include <orbis/io/detail/synthetic/simulator.hpp>
+#include <orbis/io/detail/synthetic/texture.hpp>
+#include <orbis/io/synthetic_options.hpp>
+
+namespace orbis::io {
+
+/// A recording of a hand-held camera going once round a furnished room, with everything known
+/// exactly. Frames are independent: each can be asked for in any order, from several threads, and is
+/// the same bytes on every machine (the pose apart, whose last bit may differ).
+///
+/// The room stands on z = 0 with the origin in the middle of its floor. Construction paints the
+/// textures (a few tenths of a second at 640x480, on all threads); copies share them.
+class synthetic_recording {
+ public:
+  class iterator;
+
+  /// @pre frames >= 0, fps > 0, width and height > 0, depth_scale > 0, and those of scene and path
+  explicit synthetic_recording(const synthetic_options& options = {})
+      : options_{options},
+        path_{options.path, options.seed,
+              (options.frames_around > 0 ? options.frames_around : options.frames) / options.fps},
+        k_{detail::synthetic::usual_intrinsics(options.width, options.height)},
+        scene_{std::make_shared<detail::synthetic::scene>(options.scene, options.seed)},
+        simulator_{
+            std::make_shared<detail::synthetic::texture_set>(par, detail::synthetic::painted(*scene_), texel(k_)), k_,
+            options.depth_scale, options.sensor, options.seed} {
+    assert(options.frames >= 0 && options.fps > 0.0);
+  }
+
+  [[nodiscard]] std::size_t size() const noexcept { return static_cast<std::size_t>(options_.frames); }
+  [[nodiscard]] bool empty() const noexcept { return size() == 0; }
+  /// Seconds.
+  [[nodiscard]] double timestamp(std::size_t i) const noexcept { return static_cast<double>(i) / options_.fps; }
+  [[nodiscard]] const synthetic_options& options() const noexcept { return options_; }
+  /// The distance (metres, unsigned) of a point of the world to the nearest surface that a camera could see: the error
+  /// of a map point. Exact in front of the surfaces; behind them, where solids overlap, the distance to the hull of the
+  /// one that the point is deepest in. The moving object does not count. O(solids of the room)
+  [[nodiscard]] double surface_distance(const vec3& p_world) const noexcept { return scene_->distance(p_world); }
+  /// The room's solids, for tests of this component.
+  [[nodiscard]] const detail::synthetic::scene& scene() const noexcept { return *scene_; }
+  /// A pinhole camera of 525 pixels focal length at 640 pixels width.
+  [[nodiscard]] camera::camera_settings camera() const {
+    return {.model = camera::pinhole{k_},
+            .depth_scale = options_.depth_scale,
+            .fps = options_.fps,
+            .baseline = options_.sensor.baseline};
+  }
+  /// The exact pose of frame `i`.
+  [[nodiscard]] se3 T_world_camera(std::size_t i) const { return path_.at(timestamp(i)).T_world_camera(); }
+  /// The exact poses of all frames.
+  [[nodiscard]] trajectory ground_truth() const {
+    trajectory all;
+    all.reserve(size());
+    for (std::size_t i = 0; i != size(); ++i) all.push_back({timestamp(i), T_world_camera(i)});
+    return all;
+  }
+
+  /// Frame `i` as the sensor sees it. Errors: invalid_argument if there is no frame `i`.
+  [[nodiscard]] result<camera::rgbd_frame> frame(std::size_t i) const { return render(par, i); }
+
+  /// Frame `i` as the sensor sees it, made on the policy's threads. Errors: as `frame`.
+  template <execution_policy Policy>
+  [[nodiscard]] result<camera::rgbd_frame> render(const Policy& policy, std::size_t i) const {
+    if (i >= size()) return no_such_frame(i);
+    return simulator_.frame(
+        policy, [this](double time) { return moment_at(time); }, timestamp(i), i);
+  }
+
+  /// Colour, depth (metres) and angles of frame `i` without any error of the sensor.
+  /// Errors: invalid_argument if there is no frame `i`.
+  template <execution_policy Policy>
+  [[nodiscard]] result<detail::synthetic::exact_view> exact(const Policy& policy, std::size_t i) const {
+    if (i >= size()) return no_such_frame(i);
+    return simulator_.exact(policy, moment_at(timestamp(i)));
+  }
+
+  /// Iteration renders one frame after the other.
+  [[nodiscard]] iterator begin() const;
+  [[nodiscard]] iterator end() const;
+
+ private:
+  /// Texels are about the size of a pixel at 2 m.
+  [[nodiscard]] static double texel(const camera::intrinsics& k) noexcept { return std::max(0.003, 2.0 / k.fx); }
+  [[nodiscard]] detail::synthetic::moment moment_at(double time) const {
+    return {scene_->solids_at(time), path_.at(time)};
+  }
+  [[nodiscard]] tl::unexpected<error> no_such_frame(std::size_t i) const {
+    return fail(errc::invalid_argument, "frame",
+                "there is no frame " + std::to_string(i) + " among " + std::to_string(size()));
+  }
+
+  synthetic_options options_;
+  detail::synthetic::camera_path path_;
+  camera::intrinsics k_;
+  std::shared_ptr<const detail::synthetic::scene> scene_;
+  detail::synthetic::simulator simulator_;
+};
+
+/// A single pass over the frames; a frame lives until the iterator moves on.
+class synthetic_recording::iterator {
+ public:
+  using iterator_concept = std::input_iterator_tag;
+  using iterator_category = std::input_iterator_tag;
+  using value_type = camera::rgbd_frame;
+  using difference_type = std::ptrdiff_t;
+  using reference = const camera::rgbd_frame&;
+  using pointer = const camera::rgbd_frame*;
+
+  iterator() = default;
+  iterator(const synthetic_recording& recording, std::size_t index) : recording_{&recording}, index_{index} { load(); }
+
+  [[nodiscard]] reference operator*() const noexcept { return *frame_; }
+  [[nodiscard]] pointer operator->() const noexcept { return frame_.get(); }
+  iterator& operator++() {
+    ++index_;
+    load();
+    return *this;
+  }
+  void operator++(int) { ++*this; }
+  [[nodiscard]] friend bool operator==(const iterator& a, const iterator& b) noexcept { return a.index_ == b.index_; }
+
+ private:
+  void load() {
+    frame_ = index_ < recording_->size() ? std::make_shared<const camera::rgbd_frame>(recording_->frame(index_).value())
+                                         : nullptr;
+  }
+
+  const synthetic_recording* recording_ = nullptr;
+  std::size_t index_ = 0;
+  std::shared_ptr<const camera::rgbd_frame> frame_;
+};
+
+inline synthetic_recording::iterator synthetic_recording::begin() const { return {*this, 0}; }
+inline synthetic_recording::iterator synthetic_recording::end() const { return {*this, size()}; }
+
+}  // namespace orbis::io

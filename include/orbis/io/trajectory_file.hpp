@@ -28,7 +28,7 @@ namespace orbis::io {
   trajectory poses;
   std::string problem;
   std::size_t problem_line = 0;
-  for_each_line(text, [&](std::string_view line, std::size_t number) {
+  detail::for_each_line(text, [&](std::string_view line, std::size_t number) {
     const auto reject = [&](std::string why) {
       problem = std::move(why);
       problem_line = number;
@@ -36,18 +36,19 @@ namespace orbis::io {
     };
     double v[8];
     for (double& value : v) {
-      const std::string_view field = next_field(line);
+      const std::string_view field = detail::next_field(line);
       if (field.empty()) return reject("a pose has 8 numbers: timestamp tx ty tz qx qy qz qw");
-      if (!parse_number(field, value)) return reject("\"" + std::string{field.substr(0, 40)} + "\" is not a number");
+      if (!detail::parse_number(field, value))
+        return reject("\"" + std::string{field.substr(0, 40)} + "\" is not a number");
       if (!std::isfinite(value)) return reject("a pose with NaN or infinity");
     }
-    if (!trimmed(line).empty()) return reject("a pose has 8 numbers: timestamp tx ty tz qx qy qz qw");
+    if (!detail::trimmed(line).empty()) return reject("a pose has 8 numbers: timestamp tx ty tz qx qy qz qw");
     const so3::quaternion q(v[7], v[4], v[5], v[6]);
     if (!(q.norm() > 1e-6) || !std::isfinite(q.norm())) return reject("a quaternion that is no rotation");
     poses.push_back({v[0], se3(so3(q), vec3(v[1], v[2], v[3]))});
     return true;
   });
-  if (problem_line != 0) return fail(errc::malformed, at_line(where, problem_line), std::move(problem));
+  if (problem_line != 0) return fail(errc::malformed, detail::at_line(where, problem_line), std::move(problem));
   std::stable_sort(poses.begin(), poses.end(),
                    [](const stamped_pose& a, const stamped_pose& b) { return a.timestamp < b.timestamp; });
   return poses;

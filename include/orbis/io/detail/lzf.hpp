@@ -15,7 +15,7 @@
 #include <string>
 #include <string_view>
 
-namespace orbis::io {
+namespace orbis::io::detail {
 
 /// The most bytes `size` compressed ones can stand for: a copy of 264 bytes takes 3.
 [[nodiscard]] constexpr std::uint64_t lzf_max_output(std::uint64_t size) noexcept { return size * 88 + 32; }
@@ -97,4 +97,4 @@ namespace orbis::io {
   return out;
 }
 
-}  // namespace orbis::io
+}  // namespace orbis::io::detail

@@ -9,7 +9,7 @@
 
 #include <orbis/core/bits.hpp>
 
-namespace orbis::io {
+namespace orbis::io::detail {
 
 /// The number types a cloud file may store.
 enum class scalar_type { int8, uint8, int16, uint16, int32, uint32, int64, uint64, float32, float64 };
@@ -48,4 +48,4 @@ enum class scalar_type { int8, uint8, int16, uint16, int32, uint32, int64, uint6
   return 0.0;
 }
 
-}  // namespace orbis::io
+}  // namespace orbis::io::detail

@@ -14,7 +14,7 @@
 #include <utility>
 #include <vector>
 
-namespace orbis::io {
+namespace orbis::io::detail {
 
 /// "path:line", for the `where` of an error.
 [[nodiscard]] inline std::string at_line(const std::filesystem::path& path, std::size_t line) {
@@ -71,4 +71,4 @@ void for_each_line(std::string_view text, Visit&& visit) {
   }
 }
 
-}  // namespace orbis::io
+}  // namespace orbis::io::detail

@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// What the readers of recording formats hand to `recording`: a list of frames, not yet read.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <system_error>
+#include <vector>
+
+#include <orbis/camera/settings.hpp>
+#include <orbis/core/result.hpp>
+#include <orbis/core/trajectory.hpp>
+
+namespace orbis::io::detail {
+
+/// One frame: two files and what is known about their moment.
+struct recording_entry {
+  double timestamp = 0.0;  ///< of the colour image, seconds
+  std::filesystem::path color;
+  std::filesystem::path depth;
+  std::optional<se3> T_world_camera;  ///< ground truth, where there is one
+};
+
+/// A recording without its pixels.
+struct recording_index {
+  std::vector<recording_entry> frames;  ///< in the order of time, never empty when handed out
+  trajectory ground_truth;
+  std::optional<camera::camera_settings> camera;  ///< where the format's own files tell
+  std::vector<std::string> notes;                 ///< what a user should be warned about
+  std::vector<std::filesystem::path> files;       ///< that were read for this; images are not among them
+};
+
+/// Gives every frame the ground truth's pose at its time: interpolated where poses are at most 0.2 s
+/// apart, else the nearest within `max_distance` seconds.
+inline void attach_ground_truth(recording_index& index, double max_distance) {
+  std::size_t without = 0;
+  for (recording_entry& frame : index.frames) {
+    frame.T_world_camera = interpolate(index.ground_truth, frame.timestamp, 0.2, max_distance);
+    without += frame.T_world_camera ? 0U : 1U;
+  }
+  if (!index.ground_truth.empty() && without != 0)
+    index.notes.push_back(std::to_string(without) + " of " + std::to_string(index.frames.size()) +
+                          " frames lie outside the ground truth");
+}
+
+/// Fails if a frame list is empty or its first images do not exist: the list is wrong as a whole.
+/// Later images are looked for when they are read. Errors: no_data, not_found.
+inline result<void> check_first_frame(const recording_index& index, const std::filesystem::path& where) {
+  if (index.frames.empty()) return fail(errc::no_data, where.string(), "there is not one frame in this recording");
+  for (const std::filesystem::path& path : {index.frames.front().color, index.frames.front().depth}) {
+    std::error_code ignored;
+    if (!std::filesystem::exists(path, ignored))
+      return fail(errc::not_found, path.string(), "the first image of the recording does not exist");
+  }
+  return {};
+}
+
+/// The regular files and folders directly in `folder`, sorted by name; empty if it cannot be read.
+[[nodiscard]] inline std::vector<std::filesystem::path> list_folder(const std::filesystem::path& folder) {
+  std::vector<std::filesystem::path> paths;
+  std::error_code failure;
+  for (std::filesystem::directory_iterator it{folder, failure}, end; !failure && it != end; it.increment(failure))
+    paths.push_back(it->path());
+  std::sort(paths.begin(), paths.end());
+  return paths;
+}
+
+/// Whether there is something called `path`.
+[[nodiscard]] inline bool present(const std::filesystem::path& path) {
+  std::error_code ignored;
+  return std::filesystem::exists(path, ignored);
+}
+
+}  // namespace orbis::io::detail

@@ -1,0 +1,185 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Recordings as the 7-Scenes data set has them: `frame-XXXXXX.color.png` (or `.jpg`),
+/// `frame-XXXXXX.depth.png`, `frame-XXXXXX.pose.txt`, possibly `camera-intrinsics.txt`.
+///
+/// Source: J. Shotton et al., "Scene coordinate regression forests for camera relocalization in RGB-D
+/// images", CVPR 2013. Depth is in millimetres, 0 and 65535 are invalid; colour and depth come from
+/// two cameras and are not registered to each other.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include <orbis/camera/settings.hpp>
+#include <orbis/core/file.hpp>
+#include <orbis/core/result.hpp>
+#include <orbis/core/rotation.hpp>
+#include <orbis/core/se3.hpp>
+#include <orbis/io/detail/recordings/recording_index.hpp>
+#include <orbis/io/detail/text.hpp>
+#include <orbis/io/image.hpp>
+
+namespace orbis::io::detail {
+
+/// Reads the pose `T_world_camera` from a file with a 4x4 matrix. Its rotation may be off by a few
+/// parts in a thousand, as those of 7-Scenes are: the nearest rotation is taken.
+/// Errors: not_found, unreadable; malformed, with the line (not 16 numbers, NaN or infinity, a
+/// matrix that is no rigid transform by more than 5 %).
+[[nodiscard]] inline result<se3> read_pose_matrix(const std::filesystem::path& path) {
+  const auto text = read_file(path);
+  if (!text) return fail(text.error());
+  double m[16];
+  std::size_t count = 0, last_line = 0;
+  std::string problem;
+  for_each_line(*text, [&](std::string_view line, std::size_t number) {
+    last_line = number;
+    for (std::string_view field = next_field(line); !field.empty(); field = next_field(line)) {
+      if (count == 16)
+        problem = "more than 16 numbers in a pose";
+      else if (!parse_number(field, m[count]))
+        problem = "\"" + std::string{field.substr(0, 40)} + "\" is not a number";
+      else if (!std::isfinite(m[count++]))
+        problem = "a pose with NaN or infinity";
+      if (!problem.empty()) return false;
+    }
+    return true;
+  });
+  if (!problem.empty()) return fail(errc::malformed, at_line(path, last_line), problem);
+  if (count != 16) return fail(errc::malformed, path.string(), "a pose is a 4x4 matrix, 16 numbers");
+
+  mat3 r;
+  r << m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10];
+  const bool last_row =
+      std::abs(m[12]) < 1e-3 && std::abs(m[13]) < 1e-3 && std::abs(m[14]) < 1e-3 && std::abs(m[15] - 1.0) < 1e-3;
+  if (!last_row || r.determinant() < 0.0 || (r.transpose() * r - mat3::Identity()).cwiseAbs().maxCoeff() > 0.05)
+    return fail(errc::malformed, path.string(), "the matrix is no rigid transform");
+  const auto rotation = nearest_rotation(r);
+  if (!rotation) return fail(errc::malformed, path.string(), rotation.error().message);
+  return se3(*rotation, vec3(m[3], m[7], m[11]));
+}
+
+/// Reads a 3x3 camera matrix as text. Errors: not_found, unreadable, malformed.
+[[nodiscard]] inline result<mat3> read_camera_matrix(const std::filesystem::path& path) {
+  const auto text = read_file(path);
+  if (!text) return fail(text.error());
+  mat3 k;
+  int count = 0;
+  bool ok = true;
+  for_each_line(*text, [&](std::string_view line, std::size_t) {
+    for (std::string_view field = next_field(line); ok && !field.empty(); field = next_field(line)) {
+      double value = 0.0;
+      ok = count < 9 && parse_number(field, value) && std::isfinite(value);
+      if (ok) k(count / 3, count % 3) = value;
+      ++count;
+    }
+    return ok;
+  });
+  if (!ok || count != 9) return fail(errc::malformed, path.string(), "a camera matrix has 9 finite numbers");
+  if (!(k(0, 0) > 0.0) || !(k(1, 1) > 0.0) || k(0, 1) != 0.0)
+    return fail(errc::malformed, path.string(), "focal lengths must be above zero, and skew zero");
+  return k;
+}
+
+inline constexpr std::string_view seven_scenes_color[] = {".color.png", ".color.jpg"};
+
+/// Whether `name` is a colour image's; if so, its stem and number.
+inline bool seven_scenes_frame(const std::string& name, std::string& stem, unsigned& number) {
+  if (!name.starts_with("frame-")) return false;
+  for (const std::string_view ending : seven_scenes_color) {
+    if (!name.ends_with(ending)) continue;
+    stem = name.substr(0, name.size() - ending.size());
+    return parse_number(std::string_view{stem}.substr(6), number);
+  }
+  return false;
+}
+
+inline bool has_seven_scenes_frames(const std::filesystem::path& folder) {
+  for (const auto& path : list_folder(folder)) {
+    std::string stem;
+    unsigned number = 0;
+    if (seven_scenes_frame(path.filename().string(), stem, number)) return true;
+  }
+  return false;
+}
+
+/// The sub-folders seq-XX with frames in them.
+inline std::vector<std::filesystem::path> seven_scenes_sequences(const std::filesystem::path& folder) {
+  std::vector<std::filesystem::path> found;
+  for (const auto& path : list_folder(folder))
+    if (path.filename().string().starts_with("seq-") && has_seven_scenes_frames(path)) found.push_back(path);
+  return found;
+}
+
+/// Whether `folder` looks like a 7-Scenes recording (or a scene with such recordings in seq-XX).
+[[nodiscard]] inline bool is_seven_scenes(const std::filesystem::path& folder) {
+  return has_seven_scenes_frames(folder) || !seven_scenes_sequences(folder).empty();
+}
+
+/// The index of a 7-Scenes recording, at 30 frames per second by the frames' numbers. A scene folder
+/// with a single seq-XX stands for that. `camera-intrinsics.txt` is taken to be the depth camera's;
+/// its image size is read from the first depth image.
+/// Errors: no_data, not_found, unreadable, malformed (a pose, with its file), invalid_argument (a
+/// scene with several sequences).
+[[nodiscard]] inline result<recording_index> index_seven_scenes(std::filesystem::path folder) {
+  if (!has_seven_scenes_frames(folder)) {
+    const auto sequences = seven_scenes_sequences(folder);
+    if (sequences.size() > 1)
+      return fail(errc::invalid_argument, folder.string(),
+                  "holds " + std::to_string(sequences.size()) + " sequences, name one of them, for example " +
+                      sequences.front().filename().string());
+    if (!sequences.empty()) folder = sequences.front();
+  }
+
+  recording_index index;
+  std::size_t without_depth = 0;
+  for (const auto& color : list_folder(folder)) {
+    std::string stem;
+    unsigned number = 0;
+    if (!seven_scenes_frame(color.filename().string(), stem, number)) continue;
+    recording_entry frame{number / 30.0, color, folder / (stem + ".depth.png"), {}};
+    if (!present(frame.depth)) {
+      ++without_depth;
+      continue;
+    }
+    if (const auto file = folder / (stem + ".pose.txt"); present(file)) {
+      const auto pose = read_pose_matrix(file);
+      if (!pose) return fail(pose.error());
+      frame.T_world_camera = *pose;
+      index.files.push_back(file);
+      index.ground_truth.push_back({frame.timestamp, *pose});
+    }
+    index.frames.push_back(std::move(frame));
+  }
+  std::stable_sort(index.frames.begin(), index.frames.end(),
+                   [](const recording_entry& a, const recording_entry& b) { return a.timestamp < b.timestamp; });
+  std::stable_sort(index.ground_truth.begin(), index.ground_truth.end(),
+                   [](const stamped_pose& a, const stamped_pose& b) { return a.timestamp < b.timestamp; });
+  if (const auto ok = check_first_frame(index, folder); !ok) return fail(ok.error());
+  if (without_depth != 0)
+    index.notes.push_back(std::to_string(without_depth) + " colour images have no depth image and are left out");
+  index.notes.push_back("colour and depth are not registered in this format: colours are a little off");
+
+  std::filesystem::path intrinsics = folder / "camera-intrinsics.txt";
+  if (!present(intrinsics)) intrinsics = folder.parent_path() / "camera-intrinsics.txt";
+  if (present(intrinsics)) {
+    const auto k = read_camera_matrix(intrinsics);
+    if (!k) return fail(k.error());
+    index.files.push_back(intrinsics);
+    const auto first = read_depth(index.frames.front().depth);
+    if (!first) return fail(first.error());
+    index.camera = camera::camera_settings{
+        .model = camera::pinhole{first->width(), first->height(), (*k)(0, 0), (*k)(1, 1), (*k)(0, 2), (*k)(1, 2)},
+        .depth_scale = 1000.0,
+        .fps = 30.0};
+  }
+  return index;
+}
+
+}  // namespace orbis::io::detail

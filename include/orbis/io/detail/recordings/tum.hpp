@@ -1,0 +1,180 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// The layout of the TUM RGB-D benchmark: `rgb.txt`, `depth.txt` (or `associations.txt`),
+/// `groundtruth.txt`.
+///
+/// Source: J. Sturm et al., "A benchmark for the evaluation of RGB-D SLAM systems", IROS 2012, and the
+/// benchmark's page on file formats.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include <orbis/camera/presets.hpp>
+#include <orbis/core/file.hpp>
+#include <orbis/core/result.hpp>
+#include <orbis/core/trajectory.hpp>
+#include <orbis/io/detail/recordings/recording_index.hpp>
+#include <orbis/io/detail/text.hpp>
+#include <orbis/io/trajectory_file.hpp>
+
+namespace orbis::io::detail {
+
+/// A line of `rgb.txt` or `depth.txt`.
+struct stamped_file {
+  double timestamp = 0.0;
+  std::filesystem::path path;
+};
+
+/// Reads a list of `timestamp filename` lines: comments, blank lines and CRLF are fine, the order is
+/// made right, unreadable lines and repeated time stamps are left out and noted. File names are
+/// relative to the list's folder. Errors: not_found, unreadable, no_data (no line is left).
+[[nodiscard]] inline result<std::vector<stamped_file>> read_image_list(const std::filesystem::path& list,
+                                                                       std::vector<std::string>& notes) {
+  const auto text = read_file(list);
+  if (!text) return fail(text.error());
+  std::vector<stamped_file> files;
+  for_each_line(*text, [&](std::string_view line, std::size_t number) {
+    double t = 0.0;
+    const std::string_view stamp = next_field(line);
+    const std::string_view name = trimmed(line);
+    if (!parse_number(stamp, t) || !std::isfinite(t) || name.empty())
+      notes.push_back(at_line(list, number) + ": left out, not a time stamp and a file name");
+    else
+      files.push_back({t, list.parent_path() / std::filesystem::path{name}});
+    return true;
+  });
+  const auto earlier = [](const stamped_file& a, const stamped_file& b) { return a.timestamp < b.timestamp; };
+  if (!std::is_sorted(files.begin(), files.end(), earlier)) {
+    std::stable_sort(files.begin(), files.end(), earlier);
+    notes.push_back(list.string() + ": not in the order of time, sorted");
+  }
+  const auto repeated = std::unique(files.begin(), files.end(), [](const stamped_file& a, const stamped_file& b) {
+    return a.timestamp == b.timestamp;
+  });
+  if (repeated != files.end()) {
+    notes.push_back(list.string() + ": " + std::to_string(files.end() - repeated) +
+                    " lines with a repeated time stamp left out");
+    files.erase(repeated, files.end());
+  }
+  if (files.empty()) return fail(errc::no_data, list.string(), "the list names no image");
+  return files;
+}
+
+/// Reads `associations.txt`: four fields a line, a time stamp and a file for colour and for depth, in
+/// either order (the file whose path says "depth" is the depth image; colour first if neither or
+/// both do). Unreadable lines and repeated time stamps are left out and noted. Errors: as `read_image_list`.
+[[nodiscard]] inline result<std::vector<recording_entry>> read_associations(const std::filesystem::path& list,
+                                                                            std::vector<std::string>& notes) {
+  const auto text = read_file(list);
+  if (!text) return fail(text.error());
+  std::vector<recording_entry> frames;
+  for_each_line(*text, [&](std::string_view line, std::size_t number) {
+    double t1 = 0.0, t2 = 0.0;
+    const bool first_ok = parse_number(next_field(line), t1) && std::isfinite(t1);
+    std::string_view file1 = next_field(line);
+    const bool second_ok = parse_number(next_field(line), t2) && std::isfinite(t2);
+    std::string_view file2 = next_field(line);
+    if (!first_ok || !second_ok || file2.empty() || !trimmed(line).empty()) {
+      notes.push_back(at_line(list, number) + ": left out, not two pairs of time stamp and file name");
+      return true;
+    }
+    const auto says_depth = [](std::string_view name) { return name.find("depth") != std::string_view::npos; };
+    if (says_depth(file1) && !says_depth(file2)) {
+      std::swap(file1, file2);
+      std::swap(t1, t2);
+    }
+    const std::filesystem::path folder = list.parent_path();
+    frames.push_back({t1, folder / std::filesystem::path{file1}, folder / std::filesystem::path{file2}, {}});
+    return true;
+  });
+  const auto earlier = [](const recording_entry& a, const recording_entry& b) { return a.timestamp < b.timestamp; };
+  if (!std::is_sorted(frames.begin(), frames.end(), earlier)) {
+    std::stable_sort(frames.begin(), frames.end(), earlier);
+    notes.push_back(list.string() + ": not in the order of time, sorted");
+  }
+  const auto repeated =
+      std::unique(frames.begin(), frames.end(),
+                  [](const recording_entry& a, const recording_entry& b) { return a.timestamp == b.timestamp; });
+  if (repeated != frames.end()) {
+    notes.push_back(list.string() + ": " + std::to_string(frames.end() - repeated) +
+                    " lines with a repeated time stamp left out");
+    frames.erase(repeated, frames.end());
+  }
+  if (frames.empty()) return fail(errc::no_data, list.string(), "the list names no image");
+  return frames;
+}
+
+/// Whether `folder` looks like a TUM recording.
+[[nodiscard]] inline bool is_tum(const std::filesystem::path& folder) {
+  return present(folder / "rgb.txt") || present(folder / "depth.txt") || present(folder / "associations.txt");
+}
+
+/// The index of a TUM recording. `associations.txt` decides where it is present; otherwise colour and
+/// depth images are paired by `associate` within `max_time_difference` seconds, and what finds no
+/// partner is noted. The ground truth is interpolated at the colour images' time stamps. The camera
+/// is known for folders with freiburg1, 2 or 3 in their name.
+/// Errors: not_found (a list, the first image), unreadable, no_data (empty lists, no pair),
+/// malformed (ground truth, with its line).
+[[nodiscard]] inline result<recording_index> index_tum(const std::filesystem::path& folder,
+                                                       double max_time_difference = 0.020) {
+  recording_index index;
+  if (const auto list = folder / "associations.txt"; present(list)) {
+    auto frames = read_associations(list, index.notes);
+    if (!frames) return fail(frames.error());
+    index.frames = *std::move(frames);
+    index.files = {list};
+  } else {
+    index.files = {folder / "rgb.txt", folder / "depth.txt"};
+    const auto color = read_image_list(folder / "rgb.txt", index.notes);
+    if (!color) return fail(color.error());
+    const auto depth = read_image_list(folder / "depth.txt", index.notes);
+    if (!depth) return fail(depth.error());
+    const auto stamps = [](const std::vector<stamped_file>& files) {
+      std::vector<double> t;
+      for (const stamped_file& f : files) t.push_back(f.timestamp);
+      return t;
+    };
+    for (const auto& [c, d] : associate(stamps(*color), stamps(*depth), max_time_difference))
+      index.frames.push_back({(*color)[c].timestamp, (*color)[c].path, (*depth)[d].path, {}});
+    if (index.frames.empty())
+      return fail(errc::no_data, folder.string(),
+                  "no colour image has a depth image within " + std::to_string(max_time_difference) + " s");
+    if (const std::size_t lonely = color->size() - index.frames.size(); lonely != 0)
+      index.notes.push_back(std::to_string(lonely) + " of " + std::to_string(color->size()) +
+                            " colour images have no depth image within " + std::to_string(max_time_difference) +
+                            " s and are left out");
+    if (const std::size_t lonely = depth->size() - index.frames.size(); lonely != 0)
+      index.notes.push_back(std::to_string(lonely) + " of " + std::to_string(depth->size()) +
+                            " depth images are left out");
+  }
+  if (const auto ok = check_first_frame(index, folder); !ok) return fail(ok.error());
+
+  if (const auto file = folder / "groundtruth.txt"; present(file)) {
+    auto truth = read_trajectory(file);
+    if (!truth) return fail(truth.error());
+    index.ground_truth = *std::move(truth);
+    index.files.push_back(file);
+    attach_ground_truth(index, max_time_difference);
+  }
+
+  // Of several words in the path the last one tells: the sequence may lie in another one's folder.
+  const std::string name = std::filesystem::absolute(folder).lexically_normal().string();
+  std::size_t last = 0;
+  for (const auto& [word, preset] :
+       {std::pair{"freiburg1", "tum_fr1"}, std::pair{"freiburg2", "tum_fr2"}, std::pair{"freiburg3", "tum_fr3"}}) {
+    const std::size_t at = name.rfind(word);
+    if (at == std::string::npos || at < last) continue;
+    last = at;
+    if (auto camera = camera::preset(preset)) index.camera = *std::move(camera);
+  }
+  return index;
+}
+
+}  // namespace orbis::io::detail

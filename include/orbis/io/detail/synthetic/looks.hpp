@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// What the faces of solids look like, and which lamps light them.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include <orbis/io/detail/synthetic/arithmetic.hpp>
+#include <orbis/io/detail/synthetic/scene.hpp>
+#include <orbis/io/detail/synthetic/solid.hpp>
+#include <orbis/io/synthetic_options.hpp>
+
+ORBIS_BEGIN_UNFUSED
+
+namespace orbis::io::detail::synthetic {
+
+/// What one face of a solid is painted with.
+struct face_look {
+  material surface = material::plain;  ///< the base
+  double patches = 0.0;                ///< painted on it, for each square metre
+  double contrast = 0.8;               ///< of the patches
+  std::uint64_t seed = 0;              ///< the same seed and size: the same picture
+  double period = 0.0;                 ///< metres; above 0 the picture repeats itself along both axes
+  double coarseness = 1.0;             ///< size of its texels, in those of the other faces
+};
+/// Of the six faces of a solid: 2 * axis, plus one for the positive side.
+using face_looks = std::array<face_look, 6>;
+
+/// How many patches a square metre of a material has: books and clutter are full of corners, a plain surface is not.
+[[nodiscard]] inline double usual_patches(material m) noexcept {
+  switch (m) {
+    case material::plain: return 6.0;
+    case material::wallpaper: return 160.0;
+    case material::brick: return 120.0;
+    case material::tile: return 120.0;
+    case material::wood: return 160.0;
+    case material::fabric: return 300.0;
+    case material::books: return 250.0;
+    case material::clutter: return 700.0;
+  }
+  return 0.0;
+}
+
+/// The look of face `face` of a solid made of `m`; no two faces and no two seeds look alike.
+[[nodiscard]] inline face_look usual_look(material m, std::uint64_t seed, int face, double density = 1.0) noexcept {
+  return {.surface = m,
+          .patches = density * usual_patches(m),
+          .contrast = m == material::clutter ? 1.0 : 0.8,
+          .seed = noise_word(seed, 7, static_cast<std::uint64_t>(face))};
+}
+/// All six of them for a solid with its own material and seed.
+[[nodiscard]] inline face_looks usual_looks(const solid& s, double density = 1.0) noexcept {
+  face_looks looks;
+  for (int face = 0; face != 6; ++face)
+    looks[static_cast<std::size_t>(face)] = usual_look(s.surface, s.seed, face, density);
+  return looks;
+}
+
+/// Solids with their looks, and the lamps among them: what textures are painted from.
+struct painted_solids {
+  std::vector<solid> solids;
+  std::vector<face_looks> looks;  ///< one for each solid
+  std::vector<triple> lamps;      ///< metres, world; the brightest of them lights a place
+};
+
+/// Walls, floor and ceiling of a furnished room.
+[[nodiscard]] inline face_looks looks_of_walls(const scene& room) noexcept {
+  const solid& walls = room.solids().front();
+  const synthetic_scene_options& o = room.options();
+  face_looks looks;
+  for (int face = 0; face != 6; ++face) {
+    material m = walls.surface;
+    if (face == 4) m = material::tile;   // floor
+    if (face == 5) m = material::plain;  // ceiling
+    if (face == 1) m = material::brick;
+    if (face < 4 && o.wall_period > 0.0) m = walls.surface;
+    if (room.is_poor_wall(face)) m = material::plain;
+    face_look& look = looks[static_cast<std::size_t>(face)];
+    look = usual_look(m, walls.seed, face, o.texture_density);
+    if (m == material::plain) look.patches = (face == 5 ? 60.0 : 10.0) * o.texture_density;
+    if (face < 4 && o.wall_period > 0.0) {
+      look.period = o.wall_period;
+      look.seed = noise_word(walls.seed, 7, 0);
+    }
+  }
+  return looks;
+}
+
+/// A furnished room as it looks. Its moving object is lit as in the middle of its way.
+[[nodiscard]] inline painted_solids painted(const scene& room) {
+  painted_solids all{room.solids(), {}, {{0.0, 0.0, room.options().height - 0.5}}};
+  for (const solid& s : all.solids)
+    all.looks.push_back(all.looks.empty() ? looks_of_walls(room) : usual_looks(s, room.options().texture_density));
+  return all;
+}
+
+}  // namespace orbis::io::detail::synthetic
+
+ORBIS_END_UNFUSED

@@ -1,0 +1,283 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// A furnished room of known geometry.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <vector>
+
+#include <orbis/core/types.hpp>
+#include <orbis/io/detail/synthetic/arithmetic.hpp>
+#include <orbis/io/detail/synthetic/solid.hpp>
+#include <orbis/io/synthetic_options.hpp>
+
+ORBIS_BEGIN_UNFUSED
+
+namespace orbis::io::detail::synthetic {
+
+/// A room with its floor at z = 0 and its middle at the origin, furnished along its walls. The seed
+/// decides sizes, order and places of the furniture, and all textures.
+class scene {
+ public:
+  /// @pre sizes of 3 m x 3 m x 2 m at least, size_jitter in [0, 0.2]
+  scene(const synthetic_scene_options& options, std::uint64_t seed)
+      : options_{options}, bits_{mix64(seed ^ 0x726f6f6dULL)} {
+    length_ = options.length * (1.0 + options.size_jitter * between(bits_, -1.0, 1.0));
+    width_ = options.width * (1.0 + options.size_jitter * between(bits_, -1.0, 1.0));
+    add(shape::room, {0.0, 0.0, 0.5 * options.height}, {0.5 * length_, 0.5 * width_, 0.5 * options.height},
+        material::wallpaper);
+    first_poor_wall_ = static_cast<int>(bits_.below(4));
+    if (options.furniture) furnish();
+    if (options.moving_object) {
+      moving_ = solids_.size();
+      add(shape::box, {0.0, 0.0, 0.8}, {0.2, 0.15, 0.8}, material::clutter);
+    }
+  }
+
+  /// The surfaces: first the room itself, then all that stands in it.
+  [[nodiscard]] const std::vector<solid>& solids() const noexcept { return solids_; }
+  /// The same `time` seconds after the beginning: only the moving object is elsewhere.
+  [[nodiscard]] std::vector<solid> solids_at(double time) const {
+    std::vector<solid> now = solids_;
+    if (moving_ != 0) {
+      const double across = sin_turns(time / 24.0), along = cos_turns(time / 24.0);
+      now[moving_].centre.x = 1.6 * across;
+      now[moving_].centre.y = 1.3 * along;
+    }
+    return now;
+  }
+
+  /// Metres along x, y and z.
+  [[nodiscard]] vec3 size() const { return {length_, width_, options_.height}; }
+  [[nodiscard]] const synthetic_scene_options& options() const noexcept { return options_; }
+  /// Whether wall `face` (0: -x, 1: +x, 2: -y, 3: +y) is one of the poor ones.
+  [[nodiscard]] bool is_poor_wall(int face) const noexcept {
+    return face < 4 && (face - first_poor_wall_ + 4) % 4 < options_.poor_walls;
+  }
+
+  /// The distance (metres, unsigned) of a point to the nearest surface a camera could see: the error
+  /// of a map point. Exact in front of the surfaces; behind them, where several solids overlap, the
+  /// distance to the hull of the one the point is deepest in. The moving object does not count.
+  [[nodiscard]] double distance(const vec3& p_world) const noexcept {
+    const triple p = to_triple(p_world);
+    double nearest = solids_.front().signed_distance(p);
+    for (std::size_t i = 1; i != solids_.size(); ++i)
+      if (i != moving_) nearest = std::min(nearest, solids_[i].signed_distance(p));
+    return std::abs(nearest);
+  }
+
+  /// Where the ray `origin + t direction` first meets a surface: `t`, empty if the ray starts outside
+  /// of the room, or the direction is zero or not finite. The moving object does not count.
+  [[nodiscard]] std::optional<double> cast(const vec3& origin, const vec3& direction) const noexcept {
+    if (!origin.allFinite() || !direction.allFinite() || direction.isZero(0.0)) return std::nullopt;
+    double t = std::numeric_limits<double>::infinity();
+    for (std::size_t i = 0; i != solids_.size(); ++i)
+      if (i != moving_ || i == 0)
+        t = std::min(t, intersect(solids_[i], solids_[i].to_local(to_triple(origin)),
+                                  solids_[i].to_local_direction(to_triple(direction)))
+                            .t);
+    if (!(t > 0.0) || !std::isfinite(t)) return std::nullopt;
+    return t;
+  }
+
+ private:
+  /// A place at a wall: `along` it from its middle, `out` of it into the room.
+  struct wall {
+    int face;       // as in is_poor_wall
+    double length;  // metres
+  };
+
+  solid& add(shape kind, triple centre, triple half, material surface) {
+    solid s;
+    s.kind = kind;
+    s.centre = centre;
+    s.half = half;
+    s.surface = surface;
+    s.seed = bits_();
+    solids_.push_back(s);
+    return solids_.back();
+  }
+
+  [[nodiscard]] triple place(const wall& w, double along, double out, double up) const noexcept {
+    switch (w.face) {
+      case 0: return {out - 0.5 * length_, along, up};
+      case 1: return {0.5 * length_ - out, -along, up};
+      case 2: return {-along, out - 0.5 * width_, up};
+      default: return {along, 0.5 * width_ - out, up};
+    }
+  }
+
+  /// A box by its extent along the wall, out of it and up.
+  solid& block(const wall& w, std::array<double, 2> along, std::array<double, 2> out, std::array<double, 2> up,
+               material surface) {
+    const triple centre = place(w, 0.5 * (along[0] + along[1]), 0.5 * (out[0] + out[1]), 0.5 * (up[0] + up[1]));
+    const double a = 0.5 * (along[1] - along[0]), o = 0.5 * (out[1] - out[0]), u = 0.5 * (up[1] - up[0]);
+    return add(shape::box, centre, w.face < 2 ? triple{o, a, u} : triple{a, o, u}, surface);
+  }
+  solid& pillar(const wall& w, double along, double out, std::array<double, 2> up, double radius, material surface) {
+    return add(shape::cylinder, place(w, along, out, 0.5 * (up[0] + up[1])), {radius, radius, 0.5 * (up[1] - up[0])},
+               surface);
+  }
+  solid& ball(const wall& w, double along, double out, double up, double radius, material surface) {
+    return add(shape::sphere, place(w, along, out, up), {radius, radius, radius}, surface);
+  }
+  /// Turns a box about the vertical by up to `turns`.
+  void turn(solid& s, double turns) {
+    const double by = between(bits_, -turns, turns);
+    s.cos_yaw = cos_turns(by);
+    s.sin_yaw = sin_turns(by);
+  }
+
+  // The furniture; `a` is the middle of each piece along the wall.
+
+  void cupboard(const wall& w, double a) {
+    block(w, {a - 0.5, a + 0.5}, {0.0, 0.5}, {0.0, 1.9}, material::wood);
+    block(w, {a - 0.47, a - 0.02}, {0.5, 0.52}, {0.1, 1.85}, material::wallpaper);
+    block(w, {a + 0.02, a + 0.47}, {0.5, 0.52}, {0.1, 1.85}, material::plain);
+    turn(block(w, {a - 0.3, a + 0.2}, {0.1, 0.4}, {1.9, 2.15}, material::clutter), 0.03);
+  }
+  void shelves(const wall& w, double a) {
+    block(w, {a - 0.6, a - 0.57}, {0.0, 0.32}, {0.0, 1.9}, material::wood);
+    block(w, {a + 0.57, a + 0.6}, {0.0, 0.32}, {0.0, 1.9}, material::wood);
+    for (int board = 0; board != 5; ++board) {
+      const double up = 0.05 + 0.45 * board;
+      block(w, {a - 0.57, a + 0.57}, {0.0, 0.32}, {up, up + 0.03}, material::wood);
+      if (board == 4) break;
+      const double from = a - 0.55 + between(bits_, 0.0, 0.3), to = from + between(bits_, 0.4, 0.75);
+      block(w, {from, to}, {0.02, 0.24}, {up + 0.03, up + 0.03 + between(bits_, 0.22, 0.33)}, material::books);
+    }
+    ball(w, a + 0.42, 0.16, 0.05 + 0.45 * 4 + 0.03 + 0.12, 0.12, material::fabric);
+  }
+  void table(const wall& w, double a) {
+    block(w, {a - 0.65, a + 0.65}, {0.1, 0.85}, {0.70, 0.74}, material::wood);
+    for (const double x : {a - 0.6, a + 0.6})
+      for (const double y : {0.15, 0.8})
+        block(w, {x - 0.03, x + 0.03}, {y - 0.03, y + 0.03}, {0.0, 0.70}, material::wood);
+    turn(block(w, {a - 0.5, a - 0.2}, {0.25, 0.45}, {0.74, 0.92}, material::clutter), 0.08);
+    turn(block(w, {a + 0.2, a + 0.45}, {0.3, 0.65}, {0.74, 0.80}, material::books), 0.1);
+    ball(w, a + 0.05, 0.5, 0.74 + 0.1, 0.1, material::tile);
+    pillar(w, a - 0.1, 0.25, {0.74, 0.98}, 0.05, material::fabric);
+    pillar(w, a + 0.52, 0.25, {0.74, 0.86}, 0.045, material::brick);
+  }
+  void bed(const wall& w, double a) {
+    block(w, {a - 1.0, a + 1.0}, {0.02, 0.92}, {0.0, 0.30}, material::wood);
+    block(w, {a - 0.98, a + 0.98}, {0.04, 0.90}, {0.30, 0.48}, material::fabric);
+    block(w, {a - 1.05, a - 1.0}, {0.0, 0.95}, {0.0, 0.95}, material::wood);
+    turn(block(w, {a - 0.92, a - 0.52}, {0.17, 0.77}, {0.48, 0.60}, material::clutter), 0.02);
+    turn(block(w, {a + 0.1, a + 0.6}, {0.2, 0.7}, {0.48, 0.53}, material::wallpaper), 0.06);
+  }
+  void sofa(const wall& w, double a) {
+    block(w, {a - 0.9, a + 0.9}, {0.05, 0.80}, {0.05, 0.42}, material::fabric);
+    block(w, {a - 0.9, a + 0.9}, {0.05, 0.25}, {0.42, 0.85}, material::fabric);
+    block(w, {a - 1.05, a - 0.9}, {0.05, 0.80}, {0.05, 0.62}, material::clutter);
+    block(w, {a + 0.9, a + 1.05}, {0.05, 0.80}, {0.05, 0.62}, material::clutter);
+    turn(block(w, {a - 0.7, a - 0.3}, {0.27, 0.42}, {0.42, 0.78}, material::tile), 0.02);
+    turn(block(w, {a + 0.25, a + 0.6}, {0.27, 0.40}, {0.42, 0.74}, material::brick), 0.03);
+  }
+  void basin(const wall& w, double a) {
+    block(w, {a - 0.40, a + 0.40}, {0.0, 0.55}, {0.0, 0.62}, material::tile);
+    block(w, {a - 0.40, a + 0.40}, {0.0, 0.05}, {0.62, 0.85}, material::clutter);
+    block(w, {a - 0.40, a + 0.40}, {0.50, 0.55}, {0.62, 0.85}, material::clutter);
+    block(w, {a - 0.40, a - 0.35}, {0.05, 0.50}, {0.62, 0.85}, material::clutter);
+    block(w, {a + 0.35, a + 0.40}, {0.05, 0.50}, {0.62, 0.85}, material::clutter);
+    pillar(w, a, 0.09, {0.85, 1.1}, 0.02, material::plain);
+    block(w, {a - 0.02, a + 0.02}, {0.07, 0.25}, {1.06, 1.1}, material::plain);
+    block(w, {a - 0.3, a + 0.3}, {0.0, 0.02}, {1.25, 1.85}, material::clutter);
+  }
+  void lamp(const wall& w, double a) {
+    pillar(w, a, 0.3, {0.0, 0.04}, 0.15, material::tile);
+    pillar(w, a, 0.3, {0.04, 1.45}, 0.02, material::plain);
+    ball(w, a, 0.3, 1.6, 0.17, material::brick);
+  }
+  void column(const wall& w, double a) { pillar(w, a, 0.25, {0.0, options_.height}, 0.15, material::brick); }
+  void drawers(const wall& w, double a) {
+    block(w, {a - 0.3, a + 0.3}, {0.0, 0.42}, {0.0, 0.75}, material::wood);
+    for (int i = 0; i != 3; ++i)
+      block(w, {a - 0.27, a + 0.27}, {0.42, 0.435}, {0.06 + 0.23 * i, 0.26 + 0.23 * i}, material::clutter);
+    pillar(w, a + 0.1, 0.2, {0.75, 1.05}, 0.07, material::clutter);
+  }
+  void bin(const wall& w, double a) {
+    pillar(w, a, 0.3, {0.0, 0.45}, 0.16, material::fabric);
+    ball(w, a - 0.02, 0.75, 0.13, 0.13, material::tile);
+  }
+  void stool(const wall& w, double a) {
+    pillar(w, a, 0.45, {0.0, 0.42}, 0.2, material::clutter);
+    turn(block(w, {a - 0.12, a + 0.12}, {0.33, 0.57}, {0.42, 0.50}, material::books), 0.1);
+  }
+
+  using piece = void (scene::*)(const wall&, double);
+  struct furniture {
+    piece build;
+    double width;
+  };
+
+  /// Four groups of furniture, one for each wall, in an order and with gaps that the seed decides.
+  void furnish() {
+    std::array<std::vector<furniture>, 4> groups{{
+        {{&scene::bed, 2.1}, {&scene::lamp, 0.4}, {&scene::drawers, 0.6}},
+        {{&scene::shelves, 1.2}, {&scene::table, 1.3}, {&scene::stool, 0.5}},
+        {{&scene::sofa, 2.1}, {&scene::column, 0.4}, {&scene::lamp, 0.4}},
+        {{&scene::cupboard, 1.0}, {&scene::basin, 0.8}, {&scene::bin, 0.5}, {&scene::drawers, 0.6}},
+    }};
+    shuffle(groups);
+    for (int face = 0; face != 4; ++face) {
+      const wall w{face, face < 2 ? width_ : length_};
+      auto& group = groups[static_cast<std::size_t>(face)];
+      shuffle(group);
+      arrange(w, group);
+      decorate(w);
+    }
+    // A beam under the ceiling and a lamp beside it.
+    add(shape::box, {0.22 * length_, 0.0, options_.height - 0.1}, {0.1, 0.5 * width_, 0.1}, material::wood);
+    add(shape::sphere, {-0.1 * length_, 0.1, options_.height - 0.35}, {0.2, 0.2, 0.2}, material::fabric);
+  }
+
+  void arrange(const wall& w, const std::vector<furniture>& group) {
+    constexpr double corner = 0.7;  // leaves room for what stands at the neighbouring wall
+    double taken = 0.0;
+    for (const furniture& f : group) taken += f.width;
+    double spare = std::max(0.0, w.length - 2.0 * corner - taken);
+    double at = -0.5 * (taken + spare);
+    for (const furniture& f : group) {
+      const double gap = spare * between(bits_, 0.1, 0.6);
+      spare -= gap;
+      at += gap;
+      if (at + f.width > 0.5 * w.length) break;  // a small room
+      (this->*f.build)(w, at + 0.5 * f.width);
+      at += f.width;
+    }
+  }
+
+  /// Picture frames, slightly raised.
+  void decorate(const wall& w) {
+    const int count = 2 + static_cast<int>(bits_.below(2));
+    for (int i = 0; i != count; ++i) {
+      const double a = w.length * ((i + between(bits_, 0.25, 0.75)) / count - 0.5);
+      const double half_width = between(bits_, 0.15, 0.35), half_height = between(bits_, 0.15, 0.25);
+      const double up = between(bits_, 1.6, 2.1);
+      block(w, {a - half_width, a + half_width}, {0.0, 0.025}, {up - half_height, up + half_height}, material::clutter);
+    }
+  }
+
+  template <class Sequence>
+  void shuffle(Sequence& s) {
+    for (std::size_t i = s.size(); i > 1; --i) std::swap(s[i - 1], s[bits_.below(static_cast<std::uint32_t>(i))]);
+  }
+
+  synthetic_scene_options options_;
+  random_bits bits_;
+  double length_ = 0.0, width_ = 0.0;
+  int first_poor_wall_ = 0;
+  std::vector<solid> solids_;
+  std::size_t moving_ = 0;  // its index, or 0: there is none
+};
+
+}  // namespace orbis::io::detail::synthetic
+
+ORBIS_END_UNFUSED

@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// A camera with its sensor, in front of painted solids: takes frames.
+#pragma once
+
+#include <cassert>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include <orbis/camera/intrinsics.hpp>
+#include <orbis/camera/rgbd_frame.hpp>
+#include <orbis/core/execution.hpp>
+#include <orbis/core/image.hpp>
+#include <orbis/io/detail/synthetic/camera_path.hpp>
+#include <orbis/io/detail/synthetic/renderer.hpp>
+#include <orbis/io/detail/synthetic/sensor.hpp>
+#include <orbis/io/detail/synthetic/solid.hpp>
+#include <orbis/io/detail/synthetic/texture.hpp>
+#include <orbis/io/synthetic_options.hpp>
+
+namespace orbis::io::detail::synthetic {
+
+/// What there is to see at a moment, and from where.
+struct moment {
+  std::vector<solid> solids;
+  camera_pose pose;
+};
+
+/// Intrinsics of a pinhole camera of 525 pixels focal length at 640 pixels width.
+[[nodiscard]] inline camera::intrinsics usual_intrinsics(int width, int height) noexcept {
+  const double focal = 525.0 * width / 640.0;
+  return {width, height, focal, focal, 0.5 * (width - 1), 0.5 * (height - 1)};
+}
+
+/// Takes frames of what a function of time says is there to see. Thread-safe; copies share the textures.
+class simulator {
+ public:
+  /// `textures` are those of the solids to come. @pre depth_scale > 0
+  simulator(std::shared_ptr<const texture_set> textures, const camera::intrinsics& k, double depth_scale,
+            const synthetic_sensor_options& sensor, std::uint64_t seed)
+      : textures_{std::move(textures)}, k_{k}, depth_scale_{depth_scale}, sensor_{sensor}, seed_{seed} {
+    assert(depth_scale > 0.0);
+  }
+
+  /// Colour, depth (metres) and angles of a moment without any error of the sensor.
+  template <execution_policy Policy>
+  [[nodiscard]] exact_view exact(const Policy& policy, const moment& m) const {
+    const renderer picture{m.solids, *textures_, m.pose, k_};
+    exact_view out{image<rgb8>(k_.width, k_.height), image<float>(k_.width, k_.height),
+                   image<float>(k_.width, k_.height)};
+    for_each_index(policy, static_cast<std::size_t>(picture.tile_rows()), 1,
+                   [&](std::size_t row) { picture.render_tile_row(static_cast<int>(row), out); });
+    return out;
+  }
+
+  /// What the sensor sees at `time`, where `at(time)` is the `moment` of any time. `key`: another one for each frame.
+  template <execution_policy Policy, class At>
+  [[nodiscard]] camera::rgbd_frame frame(const Policy& policy, const At& at, double time, std::uint64_t key) const {
+    const moment now = at(time);
+    exact_view seen = exact(policy, now);
+    if (sensor_.motion_blur > 1) blur(policy, at, time, seen.color);
+
+    camera::rgbd_frame f;
+    f.timestamp = time;
+    f.depth_scale = depth_scale_;
+    f.T_world_camera = now.pose.T_world_camera();
+    f.depth = image<std::uint16_t>(k_.width, k_.height);
+    const sensor errors{sensor_, k_.fx, depth_scale_, seed_, key};
+    const double gain = exposure_gain(sensor_, seed_, time);
+    for_each_index(policy, static_cast<std::size_t>(k_.height), renderer::tile, [&](std::size_t row) {
+      const int y = static_cast<int>(row);
+      errors.measure_depth(seen, y, f.depth.row(y));
+      errors.measure_colour(seen.color.row(y), y, k_.width, k_.height, gain);
+    });
+    f.color = std::move(seen.color);
+    return f;
+  }
+
+ private:
+  /// Averages pictures spread evenly over the exposure time, which is centred on `time`.
+  template <execution_policy Policy, class At>
+  void blur(const Policy& policy, const At& at, double time, image<rgb8>& color) const {
+    const int count = sensor_.motion_blur;
+    std::vector<std::uint32_t> sums(3 * color.pixels().size());
+    for (int k = 0; k != count; ++k) {
+      const exact_view part = exact(policy, at(time + sensor_.exposure * ((k + 0.5) / count - 0.5)));
+      for (std::size_t i = 0; i != color.pixels().size(); ++i) {
+        const rgb8 c = part.color.pixels()[i];
+        sums[3 * i] += c.r;
+        sums[3 * i + 1] += c.g;
+        sums[3 * i + 2] += c.b;
+      }
+    }
+    const auto n = static_cast<std::uint32_t>(count);
+    const auto mean = [&](std::size_t i) { return static_cast<std::uint8_t>((sums[i] + n / 2) / n); };
+    for (std::size_t i = 0; i != color.pixels().size(); ++i)
+      color.pixels()[i] = {mean(3 * i), mean(3 * i + 1), mean(3 * i + 2)};
+  }
+
+  std::shared_ptr<const texture_set> textures_;
+  camera::intrinsics k_;
+  double depth_scale_;
+  synthetic_sensor_options sensor_;
+  std::uint64_t seed_;
+};
+
+}  // namespace orbis::io::detail::synthetic

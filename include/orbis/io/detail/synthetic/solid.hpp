@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// The solids a synthetic room is made of, and where a ray meets them.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+
+#include <orbis/io/detail/synthetic/arithmetic.hpp>
+
+ORBIS_BEGIN_UNFUSED
+
+namespace orbis::io::detail::synthetic {
+
+/// What a surface looks like.
+enum class material : std::uint8_t { plain, wallpaper, brick, tile, wood, fabric, books, clutter };
+
+enum class shape : std::uint8_t {
+  box,       ///< half sizes along its own axes
+  sphere,    ///< half.x is the radius
+  cylinder,  ///< upright; half.x is the radius, half.z half the height
+  room       ///< a box seen from inside: everything outside of it is solid
+};
+
+/// A solid, possibly turned about the vertical. Each has six faces, two for each of its own axes
+/// (2 * axis, plus one for the positive side); round ones take the face of their largest coordinate.
+struct solid {
+  shape kind = shape::box;
+  triple centre;  ///< metres, world
+  triple half;    ///< half sizes, metres
+  double cos_yaw = 1.0, sin_yaw = 0.0;
+  material surface = material::plain;
+  std::uint64_t seed = 0;  ///< of its texture
+
+  [[nodiscard]] triple to_local_direction(triple d) const noexcept {
+    return {cos_yaw * d.x + sin_yaw * d.y, cos_yaw * d.y - sin_yaw * d.x, d.z};
+  }
+  [[nodiscard]] triple to_local(triple p) const noexcept { return to_local_direction(p - centre); }
+  [[nodiscard]] triple to_world_direction(triple d) const noexcept {
+    return {cos_yaw * d.x - sin_yaw * d.y, sin_yaw * d.x + cos_yaw * d.y, d.z};
+  }
+  /// Half sizes of the upright box of the world's axes around it.
+  [[nodiscard]] triple bounds() const noexcept {
+    if (kind == shape::sphere || kind == shape::cylinder)
+      return {half.x, half.x, kind == shape::sphere ? half.x : half.z};
+    const double c = std::abs(cos_yaw), s = std::abs(sin_yaw);
+    return {c * half.x + s * half.y, s * half.x + c * half.y, half.z};
+  }
+
+  /// The distance (metres) of a point to the surface, negative inside of the solid.
+  [[nodiscard]] double signed_distance(triple p_world) const noexcept {
+    const triple p = to_local(p_world);
+    switch (kind) {
+      case shape::sphere: return length(p) - half.x;
+      case shape::cylinder:
+        return rounded_off({std::sqrt(p.x * p.x + p.y * p.y) - half.x, std::abs(p.z) - half.z, -1e30});
+      case shape::box: break;
+      case shape::room: break;
+    }
+    const double d = rounded_off({std::abs(p.x) - half.x, std::abs(p.y) - half.y, std::abs(p.z) - half.z});
+    return kind == shape::room ? -d : d;
+  }
+
+ private:
+  /// The distance to a box whose faces are `q` away.
+  [[nodiscard]] static double rounded_off(triple q) noexcept {
+    const triple outside{std::max(q.x, 0.0), std::max(q.y, 0.0), std::max(q.z, 0.0)};
+    return length(outside) + std::min(std::max({q.x, q.y, q.z}), 0.0);
+  }
+};
+
+/// Where a ray first meets a solid.
+struct hit {
+  double t = std::numeric_limits<double>::infinity();  ///< in units of the ray's direction
+  int axis = 0;                                        ///< boxes, rooms: of the face; cylinders: 2 a cap, 0 the side
+};
+
+/// The ray `origin + t direction` in the solid's own frame; hits beyond `t > 0` only. Seen from the
+/// inside only a room is met.
+[[nodiscard]] inline hit intersect(const solid& s, triple origin, triple direction) noexcept {
+  const auto inverse = [](double d) { return 1.0 / (d == 0.0 ? 1e-30 : d); };
+  hit h;
+  if (s.kind == shape::room) {
+    const double tx = (std::copysign(s.half.x, direction.x) - origin.x) * inverse(direction.x);
+    const double ty = (std::copysign(s.half.y, direction.y) - origin.y) * inverse(direction.y);
+    const double tz = (std::copysign(s.half.z, direction.z) - origin.z) * inverse(direction.z);
+    h.t = tx;
+    if (ty < h.t) h.t = ty, h.axis = 1;
+    if (tz < h.t) h.t = tz, h.axis = 2;
+    return h;
+  }
+  if (s.kind == shape::box) {
+    const double ix = inverse(direction.x), iy = inverse(direction.y), iz = inverse(direction.z);
+    const double mx = -origin.x * ix, my = -origin.y * iy, mz = -origin.z * iz;
+    const double rx = s.half.x * std::abs(ix), ry = s.half.y * std::abs(iy), rz = s.half.z * std::abs(iz);
+    const double nx = mx - rx, ny = my - ry, nz = mz - rz;
+    const double enter = std::max(nx, std::max(ny, nz));
+    const double leave = std::min(mx + rx, std::min(my + ry, mz + rz));
+    if (enter <= 0.0 || enter > leave) return h;
+    h.t = enter;
+    h.axis = enter == nx ? 0 : (enter == ny ? 1 : 2);
+    return h;
+  }
+  if (s.kind == shape::sphere) {
+    const double a = dot(direction, direction), b = dot(origin, direction);
+    const double c = dot(origin, origin) - s.half.x * s.half.x;
+    const double discriminant = b * b - a * c;
+    if (discriminant < 0.0 || b >= 0.0) return h;
+    const double t = c / (std::sqrt(discriminant) - b);  // the nearer root, without cancellation
+    if (t > 0.0) h.t = t;
+    return h;
+  }
+  const double a = direction.x * direction.x + direction.y * direction.y;
+  const double b = origin.x * direction.x + origin.y * direction.y;
+  const double c = origin.x * origin.x + origin.y * origin.y - s.half.x * s.half.x;
+  const double discriminant = b * b - a * c;
+  if (discriminant < 0.0) return h;
+  if (c > 0.0 && b < 0.0) {
+    const double t = c / (std::sqrt(discriminant) - b);
+    if (std::abs(origin.z + t * direction.z) <= s.half.z) {
+      h.t = t;
+      return h;
+    }
+  }
+  const double t = (-std::copysign(s.half.z, direction.z) - origin.z) * inverse(direction.z);
+  if (t > 0.0 && square(origin.x + t * direction.x) + square(origin.y + t * direction.y) <= s.half.x * s.half.x) {
+    h.t = t;
+    h.axis = 2;
+  }
+  return h;
+}
+
+}  // namespace orbis::io::detail::synthetic
+
+ORBIS_END_UNFUSED

@@ -1,0 +1,179 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include <orbis/io/detail/recordings/tum.hpp>
+
+#include "io/recordings.hpp"
+#include "support/catch.hpp"
+#include "support/data.hpp"
+
+namespace io = orbis::io;
+using orbis::test::message_of;
+using orbis::test::temporary_folder;
+
+namespace {
+
+/// Colour at 1.00, 1.03, 1.06, 1.09 and depth at 1.01, 1.04, 1.07, 1.30 seconds.
+void write_images(const temporary_folder& folder) {
+  for (const char* stamp : {"1.00", "1.03", "1.06", "1.09"})
+    folder.write(std::string{"rgb/"} + stamp + ".png", orbis::test::tiny_color(1));
+  for (const char* stamp : {"1.01", "1.04", "1.07", "1.30"})
+    folder.write(std::string{"depth/"} + stamp + ".png", orbis::test::tiny_depth(1));
+}
+
+bool mentions(const io::detail::recording_index& index, const std::string& words) {
+  for (const std::string& note : index.notes)
+    if (note.find(words) != std::string::npos) return true;
+  return false;
+}
+
+}  // namespace
+
+TEST_CASE("images are paired by time whatever the lists look like") {
+  const temporary_folder folder;
+  write_images(folder);
+  folder.write("rgb.txt",
+               "# color images\r\n# timestamp filename\r\n1.06 rgb/1.06.png\r\n\r\n1.00 "
+               "rgb/1.00.png\r\n1.03\trgb/1.03.png \r\n1.09 rgb/1.09.png");
+  folder.write("depth.txt",
+               "1.30 depth/1.30.png\nrubbish\n1.01 depth/1.01.png\n  1.04   depth/1.04.png\n1.07 depth/1.07.png\n");
+  const auto index = io::detail::index_tum(folder.path()).value();
+  REQUIRE(index.frames.size() == 3);
+  for (const std::size_t i : {0U, 1U, 2U}) {
+    CHECK(index.frames[i].timestamp == Approx(1.0 + 0.03 * static_cast<double>(i)));
+    const auto expected = std::vector<const char*>{"1.01.png", "1.04.png", "1.07.png"}[i];
+    CHECK(index.frames[i].depth.filename() == expected);
+    CHECK_FALSE(index.frames[i].T_world_camera.has_value());
+  }
+  CHECK(mentions(index, "rgb.txt: not in the order of time"));
+  CHECK(mentions(index, "depth.txt:2: left out"));
+  CHECK(mentions(index, "1 of 4 colour images have no depth image"));
+  CHECK(mentions(index, "1 of 4 depth images are left out"));
+}
+
+TEST_CASE("the time allowed between colour and depth can be chosen") {
+  const temporary_folder folder;
+  write_images(folder);
+  folder.write("rgb.txt", "1.00 rgb/1.00.png\n1.09 rgb/1.09.png\n");
+  folder.write("depth.txt", "1.01 depth/1.01.png\n1.30 depth/1.30.png\n");
+  CHECK(io::detail::index_tum(folder.path()).value().frames.size() == 1);
+  CHECK(io::detail::index_tum(folder.path(), 0.5).value().frames.size() == 2);
+  CHECK(io::detail::index_tum(folder.path(), 0.005).error().code == orbis::errc::no_data);
+}
+
+TEST_CASE("repeated time stamps are used once") {
+  const temporary_folder folder;
+  write_images(folder);
+  folder.write("rgb.txt", "1.00 rgb/1.00.png\n1.00 rgb/1.03.png\n");
+  folder.write("depth.txt", "1.01 depth/1.01.png\n1.01 depth/1.04.png\n");
+  const auto index = io::detail::index_tum(folder.path()).value();
+  REQUIRE(index.frames.size() == 1);
+  CHECK(index.frames[0].color.filename() == "1.00.png");
+  CHECK(mentions(index, "repeated time stamp"));
+}
+
+TEST_CASE("an association list decides and may name depth first") {
+  const temporary_folder folder;
+  write_images(folder);
+  folder.write("rgb.txt", "1.00 rgb/1.00.png\n");
+  folder.write("depth.txt", "1.01 depth/1.01.png\n");
+  folder.write("associations.txt",
+               "# all\n1.03 rgb/1.03.png 1.30 depth/1.30.png\nbad line\n1.00 rgb/1.00.png 1.04 depth/1.04.png\n");
+  for (int pass = 0; pass != 2; ++pass) {
+    const auto index = io::detail::index_tum(folder.path()).value();
+    REQUIRE(index.frames.size() == 2);
+    CHECK(index.frames[0].timestamp == 1.00);
+    CHECK(index.frames[0].color.filename() == "1.00.png");
+    CHECK(index.frames[0].depth.filename() == "1.04.png");
+    CHECK(index.frames[1].depth.filename() == "1.30.png");
+    CHECK(mentions(index, pass == 0 ? "associations.txt:3: left out" : "not in the order"));
+    folder.write("associations.txt", "1.30 depth/1.30.png 1.03 rgb/1.03.png\n1.04 depth/1.04.png 1.00 rgb/1.00.png\n");
+  }
+}
+
+TEST_CASE("what is missing in a TUM recording is named") {
+  const temporary_folder folder;
+  folder.write("rgb.txt", "1.00 rgb/1.00.png\n");
+  CHECK(message_of(io::detail::index_tum(folder.path())) == (folder / "depth.txt").string() + ": no such file");
+  folder.write("depth.txt", "# nothing\n\n");
+  CHECK(message_of(io::detail::index_tum(folder.path())) == (folder / "depth.txt").string() + ": the list names no image");
+  folder.write("depth.txt", "1.00 depth/1.00.png\n");
+  CHECK(message_of(io::detail::index_tum(folder.path())).find("1.00.png: the first image of the recording does not exist") !=
+        std::string::npos);
+  folder.write("rgb/1.00.png", "x");
+  CHECK(io::detail::index_tum(folder.path()).error().code == orbis::errc::not_found);
+  folder.write("depth/1.00.png", "x");
+  CHECK(io::detail::index_tum(folder.path()).has_value());
+}
+
+TEST_CASE("the ground truth is interpolated at the colour images") {
+  const temporary_folder folder;
+  write_images(folder);
+  folder.write("rgb.txt", "1.00 rgb/1.00.png\n1.03 rgb/1.03.png\n1.09 rgb/1.09.png\n");
+  folder.write("depth.txt", "1.01 depth/1.01.png\n1.04 depth/1.04.png\n1.09 depth/1.30.png\n");
+  folder.write("groundtruth.txt", "0.98 0 0 0 0 0 0 1\n1.04 6 0 0 0 0 1 0\n");
+  const auto index = io::detail::index_tum(folder.path()).value();
+  REQUIRE(index.frames.size() == 3);
+  CHECK(index.frames[0].T_world_camera.value().translation().x() == Approx(2.0));
+  CHECK(index.frames[0].T_world_camera.value().rotation().angle() == Approx(3.14159265358979 / 3.0));
+  CHECK(index.frames[1].T_world_camera.value().translation().x() == Approx(5.0));
+  CHECK_FALSE(index.frames[2].T_world_camera.has_value());
+  CHECK(mentions(index, "1 of 3 frames lie outside the ground truth"));
+  CHECK(index.ground_truth.size() == 2);
+
+  folder.write("groundtruth.txt", "0.98 0 0 0 0 0 0 1\n1.04 nan 0 0 0 0 1 0\n");
+  CHECK(message_of(io::detail::index_tum(folder.path())) ==
+        (folder / "groundtruth.txt").string() + ":2: a pose with NaN or infinity");
+}
+
+TEST_CASE("a time stamp that an association list repeats gives one frame") {
+  const temporary_folder folder;
+  folder.write("associations.txt", "2 rgb/b.png 2 depth/b.png\n1 rgb/a.png 1 depth/a.png\n1 rgb/x.png 1 depth/x.png\n");
+  std::vector<std::string> notes;
+  const auto frames = io::detail::read_associations(folder / "associations.txt", notes).value();
+  REQUIRE(frames.size() == 2);
+  CHECK(frames[0].color.filename() == "a.png");
+  CHECK(notes.back().find("1 lines with a repeated time stamp left out") != std::string::npos);
+}
+
+TEST_CASE("the folder's name tells the camera of the benchmark's sequences") {
+  const temporary_folder folder;
+  for (const auto& [name, fx] :
+       {std::pair{"rgbd_dataset_freiburg1_desk", 517.3}, std::pair{"rgbd_dataset_freiburg2_xyz", 520.9},
+        std::pair{"rgbd_dataset_freiburg3_office", 535.4},
+        std::pair{"freiburg2 and freiburg3/rgbd_dataset_freiburg1_xyz", 517.3}}) {
+    const std::filesystem::path sub = name;
+    folder.write(sub / "rgb.txt", "1 a.png\n");
+    folder.write(sub / "depth.txt", "1 b.png\n");
+    folder.write(sub / "a.png", "x");
+    folder.write(sub / "b.png", "x");
+    CHECK(io::detail::index_tum(folder / sub).value().camera.value().model.k().fx == fx);
+  }
+}
+
+TEST_CASE("every truncation of a list is an index or an error in words") {
+  const temporary_folder folder;
+  write_images(folder);
+  folder.write("depth.txt", "1.01 depth/1.01.png\n1.04 depth/1.04.png\n");
+  const std::string good = "# color\n1.00 rgb/1.00.png\n1.03 rgb/1.03.png\n";
+  for (std::size_t n = 0; n <= good.size(); ++n) {
+    folder.write("rgb.txt", good.substr(0, n));
+    const auto index = io::detail::index_tum(folder.path());
+    if (index)
+      CHECK_FALSE(index->frames.empty());
+    else
+      CHECK_FALSE(index.error().message.empty());
+  }
+}
+
+TEST_CASE("a piece of the TUM benchmark is indexed as it was shipped") {
+  ORBIS_NEEDS_DATA("fr1_desk_9");
+  const auto index = io::detail::index_tum(orbis::test::data_dir() / "fr1_desk_9").value();
+  REQUIRE(index.frames.size() == 9);
+  CHECK(index.ground_truth.size() == 2335);
+  for (const auto& frame : index.frames) CHECK(frame.T_world_camera.has_value());
+  CHECK(index.frames[0].color.filename() == "1305031453.359684.png");
+  CHECK(index.frames[0].depth.filename() == "1305031453.374112.png");
+}
