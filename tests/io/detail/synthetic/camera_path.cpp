@@ -2,7 +2,6 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <numbers>
 
 #include <orbis/io/detail/synthetic/arithmetic.hpp>
 #include <orbis/io/detail/synthetic/camera_path.hpp>
