@@ -2,6 +2,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <numbers>
 
 #include <orbis/io/detail/synthetic/arithmetic.hpp>
 #include <orbis/io/detail/synthetic/camera_path.hpp>
