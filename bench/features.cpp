@@ -54,7 +54,7 @@ image<std::uint8_t> kitchen() {
   const auto color = io::read_color(files[199]);
   if (!color) return {};
   image<std::uint8_t> grey(color->width(), color->height());
-  features::luma(simd::level::avx512, *color, grey);
+  features::luma(*color, grey);
   return grey;
 }
 
@@ -83,7 +83,8 @@ void count_quality(benchmark::State& state, const image<std::uint8_t>& im, const
 }
 
 void orb_orbis(benchmark::State& state, const image<std::uint8_t>& im, simd::level level) {
-  const features::orb_extractor extract{{.max_features = 1000, .levels = 8, .scale_factor = 1.2f, .simd = level}};
+  const simd::level_limit limit{level};
+  const features::orb_extractor extract{{.max_features = 1000, .levels = 8, .scale_factor = 1.2f}};
   for (auto _ : state) benchmark::DoNotOptimize(extract(im));
   if (level == simd::level::avx512) count_quality(state, im, found_by_orbis);  // the same at every level
 }
@@ -101,8 +102,8 @@ void orb_opencv(benchmark::State& state, const image<std::uint8_t>& im) {
 
 /// The stages of extraction, each with what the ones before it left.
 struct stages {
-  explicit stages(const image<std::uint8_t>& im, simd::level simd) : level{simd} {
-    pyramid.build(level, im, 8, 1.2, 39);
+  explicit stages(const image<std::uint8_t>& im) {
+    pyramid.build(im, 8, 1.2, 39);
     levels.resize(pyramid.size());
     for (std::size_t i = 0; i != pyramid.size(); ++i) {
       levels[i].area = {19, 19, pyramid[i].width() - 38, pyramid[i].height() - 38};
@@ -112,9 +113,8 @@ struct stages {
     chosen = levels;
     choose(chosen, 1000, distribution);
   }
-  void detect(std::size_t i) { fast(level, pyramid[i], levels[i].area, {14, 3}, corners, levels[i].corners); }
+  void detect(std::size_t i) { fast(pyramid[i], levels[i].area, {14, 3}, corners, levels[i].corners); }
 
-  simd::level level;
   features::detail::image_pyramid pyramid;
   features::fast9 fast;
   features::fast9::workspace corners;
@@ -124,9 +124,10 @@ struct stages {
 };
 
 void pyramid_orbis(benchmark::State& state, const image<std::uint8_t>& im, simd::level level) {
-  stages s{im, level};
+  const simd::level_limit limit{level};
+  stages s{im};
   for (auto _ : state) {
-    s.pyramid.build(level, im, 8, 1.2, 39);
+    s.pyramid.build(im, 8, 1.2, 39);
     benchmark::ClobberMemory();
   }
 }
@@ -146,20 +147,22 @@ void pyramid_opencv(benchmark::State& state, const image<std::uint8_t>& im) {
 }
 
 void fast_orbis(benchmark::State& state, const image<std::uint8_t>& im, simd::level level) {
-  stages s{im, level};
+  const simd::level_limit limit{level};
+  stages s{im};
   for (auto _ : state)
     for (std::size_t i = 0; i != s.pyramid.size(); ++i) s.detect(i);
 }
 
 void fast_opencv(benchmark::State& state, const image<std::uint8_t>& im) {
-  stages s{im, simd::level::avx512};
+  stages s{im};
   std::vector<cv::KeyPoint> keypoints;
   for (auto _ : state)
     for (std::size_t i = 0; i != s.pyramid.size(); ++i) cv::FAST(interop::mat_over(s.pyramid[i]), keypoints, 7, true);
 }
 
 void distribution_orbis(benchmark::State& state, const image<std::uint8_t>& im, simd::level level) {
-  stages s{im, level};
+  const simd::level_limit limit{level};
+  stages s{im};
   for (auto _ : state) {
     s.chosen = s.levels;
     s.choose(s.chosen, 1000, s.distribution);
@@ -167,23 +170,25 @@ void distribution_orbis(benchmark::State& state, const image<std::uint8_t>& im, 
 }
 
 void orientation_orbis(benchmark::State& state, const image<std::uint8_t>& im, simd::level level) {
-  stages s{im, level};
+  const simd::level_limit limit{level};
+  stages s{im};
   for (auto _ : state)
     for (std::size_t i = 0; i != s.pyramid.size(); ++i)
       for (const features::corner& c : s.chosen[i].corners)
-        benchmark::DoNotOptimize(features::intensity_centroid{}(level, s.pyramid[i], c.x, c.y));
+        benchmark::DoNotOptimize(features::intensity_centroid{}(s.pyramid[i], c.x, c.y));
 }
 
 void smooth_orbis(benchmark::State& state, const image<std::uint8_t>& im, simd::level level) {
-  stages s{im, level};
+  const simd::level_limit limit{level};
+  stages s{im};
   features::steered_brief::workspace memory;
   for (auto _ : state)
     for (std::size_t i = 0; i != s.pyramid.size(); ++i)
-      features::steered_brief{}.prepare(level, s.pyramid[i], 0, s.pyramid[i].height(), memory);
+      features::steered_brief{}.prepare(s.pyramid[i], 0, s.pyramid[i].height(), memory);
 }
 
 void smooth_opencv(benchmark::State& state, const image<std::uint8_t>& im) {
-  stages s{im, simd::level::avx512};
+  stages s{im};
   cv::Mat smoothed;
   for (auto _ : state)
     for (std::size_t i = 0; i != s.pyramid.size(); ++i)
@@ -191,15 +196,16 @@ void smooth_opencv(benchmark::State& state, const image<std::uint8_t>& im) {
 }
 
 void brief_orbis(benchmark::State& state, const image<std::uint8_t>& im, simd::level level) {
-  stages s{im, level};
+  const simd::level_limit limit{level};
+  stages s{im};
   std::vector<features::steered_brief::workspace> memory(s.pyramid.size());
   for (std::size_t i = 0; i != s.pyramid.size(); ++i)
-    features::steered_brief{}.prepare(level, s.pyramid[i], 0, s.pyramid[i].height(), memory[i]);
+    features::steered_brief{}.prepare(s.pyramid[i], 0, s.pyramid[i].height(), memory[i]);
   const features::orientation direction{0.5F, 0.87758F, 0.47943F};
   for (auto _ : state)
     for (std::size_t i = 0; i != s.pyramid.size(); ++i)
       for (const features::corner& c : s.chosen[i].corners)
-        benchmark::DoNotOptimize(features::steered_brief{}(level, memory[i], c.x, c.y, direction));
+        benchmark::DoNotOptimize(features::steered_brief{}(memory[i], c.x, c.y, direction));
 }
 
 void register_extraction(const std::string& scene, const image<std::uint8_t>& im) {

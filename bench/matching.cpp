@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -55,10 +56,10 @@ cv::Mat rows_of(const orbis::features::features& f) {
 /// What anyone would write first.
 ORBIS_TARGET("popcnt")
 void popcnt_loop(const std::vector<descriptor>& queries, const std::vector<descriptor>& trains,
-                 std::vector<orbis::features::detail::nearest_two>& nearest) {
+                 std::vector<features::detail::nearest_two>& nearest) {
   for (std::size_t i = 0; i != queries.size(); ++i) {
     const auto q = queries[i].words;
-    orbis::features::detail::nearest_two best;
+    features::detail::nearest_two best;
     for (std::size_t j = 0; j != trains.size(); ++j) {
       const auto& t = trains[j].words;
       const auto d = static_cast<std::uint32_t>(__builtin_popcountll(q[0] ^ t[0]) + __builtin_popcountll(q[1] ^ t[1]) +
@@ -80,8 +81,10 @@ void add_row(const std::string& name, Function function) {
 
 /// A row for a matcher, with its memory kept, as a caller does it for every frame.
 template <class Matcher, class... Where>
-void add_matcher(const std::string& name, const Matcher& matcher, std::size_t count, Where... where) {
+void add_matcher(const std::string& name, simd::level level, const Matcher& matcher, std::size_t count,
+                 Where... where) {
   add_row(name, [=](benchmark::State& state) {
+    const simd::level_limit limit{level};
     const auto a = random_features(count, 1), b = random_features(count, 2);
     std::vector<match> matches;
     typename Matcher::workspace memory;
@@ -96,21 +99,23 @@ void add_matcher(const std::string& name, const Matcher& matcher, std::size_t co
 void add_brute_force(std::size_t count) {
   const std::string group = "matching/" + std::to_string(count) + "x" + std::to_string(count);
   for (const auto& [name, level] : levels) {
-    add_matcher(group + "/knn2/" + name, brute_force(hamming{}, level) | ratio_test{1.0F}, count);
-    add_matcher(group + "/cross_check/" + name, brute_force(hamming{}, level) | cross_check{}, count);
+    add_matcher(group + "/knn2/" + name, level, brute_force(hamming{}) | ratio_test{1.0F}, count);
+    add_matcher(group + "/cross_check/" + name, level, brute_force(hamming{}) | cross_check{}, count);
     add_row(group + "/knn10/" + name, [count, level = level](benchmark::State& state) {
+      const simd::level_limit limit{level};
       const auto a = random_features(count, 1), b = random_features(count, 2);
-      std::vector<orbis::features::detail::neighbor> nearest(10 * count);
-      orbis::features::detail::hamming_workspace memory;
+      std::vector<features::detail::neighbor> nearest(10 * count);
+      features::detail::hamming_workspace memory;
       for (auto _ : state) {
-        orbis::features::detail::hamming_k_nearest(level, a.descriptors, b.descriptors, 10, nearest, memory);
+        features::detail::hamming_k_nearest(std::span<const descriptor>{a.descriptors},
+                                            std::span<const descriptor>{b.descriptors}, 10, std::span{nearest}, memory);
         benchmark::DoNotOptimize(nearest.data());
       }
     });
   }
   add_row(group + "/knn2/popcnt64_loop", [count](benchmark::State& state) {
     const auto a = random_features(count, 1), b = random_features(count, 2);
-    std::vector<orbis::features::detail::nearest_two> nearest(count);
+    std::vector<features::detail::nearest_two> nearest(count);
     for (auto _ : state) {
       popcnt_loop(a.descriptors, b.descriptors, nearest);
       benchmark::DoNotOptimize(nearest.data());
@@ -157,13 +162,14 @@ void add_guided(std::size_t count) {
 
   for (const auto& [name, level] : {levels[0], levels[3]}) {  // there are two kernels
     const std::string who = std::string("/") + name;
-    add_matcher(group + "/windowed_20px" + who, windowed(hamming{}, level) | unique{}, count, windows);
-    add_matcher(group + "/projected_20px" + who, projected(hamming{}, {.radius = 20.0F}, level) | unique{}, count,
+    add_matcher(group + "/windowed_20px" + who, level, windowed(hamming{}) | unique{}, count, windows);
+    add_matcher(group + "/projected_20px" + who, level, projected(hamming{}, {.radius = 20.0F}) | unique{}, count,
                 points, project);
-    add_matcher(group + "/epipolar" + who, epipolar(hamming{}, {}, level) | unique{}, count, geometry);
+    add_matcher(group + "/epipolar" + who, level, epipolar(hamming{}) | unique{}, count, geometry);
     add_row(group + "/node_guided_100" + who, [=, level = level](benchmark::State& state) {
       const auto a = random_features(count, 1), b = random_features(count, 2);
-      const auto matcher = node_guided(hamming{}, level) | unique{};
+      const simd::level_limit limit{level};
+      const auto matcher = node_guided(hamming{}) | unique{};
       std::vector<match> matches;
       decltype(matcher)::workspace memory;
       const node_index query_nodes{nodes}, train_nodes{nodes};
@@ -202,7 +208,7 @@ void add_two_frames(std::size_t gap) {
       const orb_extractor extract{{.max_features = 1000}};
       const auto found = [&](image_view<const rgb8> color) {
         image<std::uint8_t> grey(color.width(), color.height());
-        luma(simd::level::avx512, color, grey);
+        luma(color, grey);
         return opencv ? test::found_by_opencv(grey) : extract(grey);
       };
       std::vector<std::pair<test::seen_frame, test::seen_frame>> pairs;

@@ -148,6 +148,7 @@ void add_transforms(std::uint32_t depth, const std::string& words_name) {
   const std::string group = "places/transform/1000_in_" + words_name + "_words/";
   for (const auto& [name, level] : levels)
     add_row(group + "orbis_" + name, [depth, level = level](benchmark::State& state) {
+      const simd::level_limit limit{level};
       const vocabulary& words = tree_of(depth);
       const auto images = images_of(words, 40);
       bag_of_words bag;
@@ -155,7 +156,7 @@ void add_transforms(std::uint32_t depth, const std::string& words_name) {
       transform_workspace memory;
       std::size_t next = 0;
       for (auto _ : state) {
-        words.transform(images[next++ % images.size()], bag, nodes, memory, {.simd = level});
+        words.transform(images[next++ % images.size()], bag, nodes, memory);
         benchmark::DoNotOptimize(bag.words.data());
       }
     });

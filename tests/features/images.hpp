@@ -14,9 +14,6 @@
 
 namespace orbis::test {
 
-inline constexpr simd::level simd_levels[] = {simd::level::portable, simd::level::popcnt, simd::level::avx2,
-                                              simd::level::avx512};
-
 /// Blocks of random brightness at two scales: corners everywhere.
 inline image<std::uint8_t> blocks(int width, int height, std::uint64_t seed) {
   image<std::uint8_t> im(width, height);

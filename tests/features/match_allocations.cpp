@@ -44,7 +44,7 @@ void check_second_call(const Matcher& matcher, const Where&... where) {
 
 TEST_CASE("a matcher whose memory has served before allocates nothing") {
   check_second_call(brute_force(hamming{}) | ratio_test{0.9F} | cross_check{} | max_distance{60});
-  check_second_call(brute_force(hamming{}, simd::level::portable) | cross_check{} | unique{} | rotation_consistency{} |
+  check_second_call(brute_force(hamming{}) | cross_check{} | unique{} | rotation_consistency{} |
                     motion_statistics{.strictness = 0.5F, .cells = 8, .rotations = true, .scales = true});
 
   const auto queries = test::random_features(300, 1);

@@ -14,7 +14,7 @@ using namespace orbis;
 using namespace orbis::features;
 
 TEST_CASE("guided by nodes, exactly the pairs with a common node are compared, at every level") {
-  const auto level = GENERATE(simd::level::portable, simd::level::popcnt, simd::level::avx512);
+  const simd::level_limit limit{GENERATE(from_range(simd::available_levels()))};
   const int nodes = GENERATE(1, 7, 60, 100000);
   const auto q = test::random_features(200, 1);
   const auto t = test::random_features(301, 2);
@@ -27,7 +27,7 @@ TEST_CASE("guided by nodes, exactly the pairs with a common node are compared, a
   for (auto& n : b) n = node_of();
   const auto expected =
       test::naive_candidates(q, t, [&](std::uint32_t i, std::uint32_t j) { return a[i] != none && a[i] == b[j]; });
-  const auto source = node_guided(hamming{}, level);
+  const auto source = node_guided(hamming{});
   const node_index query_nodes{a}, train_nodes{b};
   const search_needs reverse{.reverse = true};
   CHECK(candidates_of(source, view_of(q), view_of(t), reverse, query_nodes, train_nodes) == expected);

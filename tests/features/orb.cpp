@@ -71,16 +71,16 @@ TEST_CASE("any number of levels and any factor between them give features inside
     for (const float factor : {1.0001F, 1.01F, 1.2F, 2.0F, 3.0F})
       for (const int levels : {1, 2, 16})
         for (const int most : {1, 60}) {
-          const auto found = [&](simd::level level) {
-            return orb_extractor{{.max_features = most, .levels = levels, .scale_factor = factor, .simd = level}}(
-                embedded.view());
-          };
-          const auto f = found(simd::level::portable);
+          const orb_extractor extract{{.max_features = most, .levels = levels, .scale_factor = factor}};
+          const auto f = extract(embedded.view());
           CHECK(f.size() <= static_cast<std::size_t>(most));
           for (const keypoint& k : f.keypoints)
             CHECK((k.x > 15.0F && k.y > 15.0F && k.x < static_cast<float>(width) - 16.0F &&
                    k.y < static_cast<float>(height) - 16.0F && k.octave < levels));
-          for (const auto level : test::simd_levels) CHECK(found(level) == f);
+          for (const auto level : simd::available_levels()) {
+            const simd::level_limit limit{level};
+            CHECK(extract(embedded.view()) == f);
+          }
         }
   }
 }
@@ -162,10 +162,11 @@ TEST_CASE("coarse keypoints are not shifted against the image") {
 TEST_CASE("every level of instructions finds the same ORB features") {
   const auto im = moved(blocks(333, 251, 7), 0.2, 0, 0);
   const test::embedded_image embedded{im};
-  const auto expected = orb_extractor{{.max_features = 400, .simd = simd::level::portable}}(im);
+  const orb_extractor extract{{.max_features = 400}};
+  const auto expected = extract(im);
   REQUIRE(expected.size() == 400);
-  for (const auto level : test::simd_levels) {
-    const orb_extractor extract{{.max_features = 400, .simd = level}};
+  for (const auto level : simd::available_levels()) {
+    const simd::level_limit limit{level};
     CHECK(extract(im) == expected);
     CHECK(extract(embedded.view()) == expected);
   }

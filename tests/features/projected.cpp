@@ -80,7 +80,7 @@ TEST_CASE("a window grows with the level and the angle, and there is none out of
 }
 
 TEST_CASE("projected matching equals a search through all trains with every rule tested") {
-  const auto level = GENERATE(simd::level::portable, simd::level::avx512);
+  const simd::level_limit limit{GENERATE(from_range(simd::available_levels()))};
   const auto q = test::random_features(300, 1);
   const auto t = test::random_features(500, 2);
   random_bits random{5};
@@ -103,7 +103,7 @@ TEST_CASE("projected matching equals a search through all trains with every rule
     return std::hypot(double{k.x} - double{p.x}, double{k.y} - double{p.y}) <= radius && k.octave >= octave - 2 &&
            k.octave <= octave + 1;
   });
-  const auto source = projected(hamming{}, rule, level);
+  const auto source = projected(hamming{}, rule);
   const search_needs reverse{.reverse = true};
   CHECK(expected.size() > 50);
   CHECK(candidates_of(source, view_of(q), view_of(t), reverse, points, project) == expected);

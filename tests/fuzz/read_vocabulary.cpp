@@ -38,7 +38,8 @@ void use(const words& read) {
   for (const word_value& w : bag.words) fuzz::require(w.word < read.size(), "words are words");
   for (const std::uint32_t n : nodes) fuzz::require(n < read.nodes(), "nodes are nodes");
   const bag_of_words with = bag;
-  read.transform(image, bag, plain_nodes, memory, {.simd = simd::level::portable});
+  const simd::level_limit limit{simd::level::portable};
+  read.transform(image, bag, plain_nodes, memory);
   fuzz::require(bag == with && nodes == plain_nodes, "levels make no difference");
 }
 

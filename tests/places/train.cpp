@@ -21,9 +21,10 @@ TEST_CASE("training is the same for every policy and level, and another one for 
   CHECK(words.depth() == 4);
   CHECK(words.branching() == 7);
   CHECK(vocabulary_bytes(train(par.with(3), images, options).value()) == vocabulary_bytes(words));
-  auto portable = options;
-  portable.simd = simd::level::portable;
-  CHECK(train(par.with(2), images, portable).value() == words);
+  {
+    const simd::level_limit limit{simd::level::portable};
+    CHECK(train(par.with(2), images, options).value() == words);
+  }
   auto other = options;
   other.seed = 2;
   CHECK(train(seq, images, other).value() != words);

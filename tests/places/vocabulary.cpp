@@ -24,8 +24,6 @@ static_assert(!bit_string<std::vector<std::uint64_t>>);
 
 namespace {
 
-constexpr std::array levels{simd::level::portable, simd::level::popcnt, simd::level::avx2, simd::level::avx512};
-
 /// Words and nodes as the plainest descent finds them, counted in a map.
 template <std::size_t Bits>
 void check_transform(const basic_vocabulary<Bits>& words, const test::descriptors<Bits>& image) {
@@ -37,11 +35,12 @@ void check_transform(const basic_vocabulary<Bits>& words, const test::descriptor
       ++counts[words.tree().word_of_leaf(way.back())];
       expected_nodes.push_back(way[std::min<std::size_t>(node_depth, way.size() - 1)]);
     }
-    for (const simd::level level : levels) {
+    for (const simd::level level : simd::available_levels()) {
+      const simd::level_limit limit{level};
       transform_workspace memory;
       bag_of_words bag;
       std::vector<std::uint32_t> nodes;
-      words.transform(image, bag, nodes, memory, {.norm = bag_norm::none, .node_depth = node_depth, .simd = level});
+      words.transform(image, bag, nodes, memory, {.norm = bag_norm::none, .node_depth = node_depth});
       CHECK(nodes == expected_nodes);
       std::map<std::uint32_t, int> found;
       for (const auto& [word, value] : bag.words)
@@ -51,7 +50,7 @@ void check_transform(const basic_vocabulary<Bits>& words, const test::descriptor
       CHECK(std::is_sorted(bag.words.begin(), bag.words.end(),
                            [](const word_value& a, const word_value& b) { return a.word < b.word; }));
       bag_of_words alone;
-      words.transform(image, alone, memory, {.norm = bag_norm::none, .simd = level});
+      words.transform(image, alone, memory, {.norm = bag_norm::none});
       CHECK(alone == bag);
     }
   }
@@ -85,12 +84,13 @@ TEST_CASE("leaves above the deepest level are words") {
   CHECK(words.size() == 4);
   CHECK(words.depth() == 2);
   CHECK(words.branching() == 3);
-  for (const simd::level level : levels) {
-    CHECK(words.word_of(std::uint64_t{0x1}, level) == 0);
-    CHECK(words.word_of(~std::uint64_t{0x1}, level) == 1);
-    CHECK(words.word_of(std::uint64_t{0x1f}, level) == 2);
-    CHECK(words.word_of(std::uint64_t{0xf1}, level) == 3);
-    CHECK(words.word_of(std::uint64_t{0x77}, level) == 2);  // as near to one as to the other: the first
+  for (const simd::level level : simd::available_levels()) {
+    const simd::level_limit limit{level};
+    CHECK(words.word_of(std::uint64_t{0x1}) == 0);
+    CHECK(words.word_of(~std::uint64_t{0x1}) == 1);
+    CHECK(words.word_of(std::uint64_t{0x1f}) == 2);
+    CHECK(words.word_of(std::uint64_t{0xf1}) == 3);
+    CHECK(words.word_of(std::uint64_t{0x77}) == 2);  // as near to one as to the other: the first
   }
   check_transform(words, test::make_images<64>(1, 200, 3)[0]);
 }

@@ -9,7 +9,6 @@
 #include <span>
 #include <vector>
 
-#include <orbis/core/simd.hpp>
 #include <orbis/features/detail/match/hamming_nearest.hpp>
 #include <orbis/features/detail/match/nearest.hpp>
 #include <orbis/features/hamming.hpp>
@@ -23,7 +22,6 @@ template <class Distance>
 struct brute_force_source {
   using match_source_tag = void;
   Distance distance{};
-  simd::level level = simd::level::avx512;  ///< the best instruction set to use, if the processor has it
 
   struct workspace {
     std::vector<detail::nearest_two> nearest;
@@ -43,9 +41,9 @@ struct brute_force_source {
 
     memory.nearest.resize(query_count);
     memory.reverse.resize(needs.reverse ? train_count : 0);
-    if constexpr (std::same_as<Distance, hamming> && detail::has_hamming_kernel<Descriptor>) {
-      detail::hamming_nearest<Descriptor::bits>(level, queries.descriptors, trains.descriptors, memory.nearest,
-                                                memory.reverse, memory.search);
+    if constexpr (std::same_as<Distance, hamming>) {
+      detail::hamming_nearest(queries.descriptors, trains.descriptors, std::span{memory.nearest},
+                              std::span{memory.reverse}, memory.search);
     } else {
       detail::nearest_by(distance, queries.descriptors, trains.descriptors, std::span{memory.nearest},
                          std::span{memory.reverse}, memory.search.reverse_distance);
@@ -62,9 +60,8 @@ struct brute_force_source {
 
 /// A source that compares every query with every train: `brute_force(hamming{})`.
 template <class Distance>
-[[nodiscard]] constexpr brute_force_source<Distance> brute_force(Distance distance,
-                                                                 simd::level level = simd::level::avx512) {
-  return {distance, level};
+[[nodiscard]] constexpr brute_force_source<Distance> brute_force(Distance distance) {
+  return {distance};
 }
 
 }  // namespace orbis::features

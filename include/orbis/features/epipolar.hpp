@@ -15,7 +15,6 @@
 #include <span>
 #include <vector>
 
-#include <orbis/core/simd.hpp>
 #include <orbis/core/types.hpp>
 #include <orbis/features/detail/match/search_among.hpp>
 #include <orbis/features/epipolar_geometry.hpp>
@@ -48,7 +47,6 @@ struct epipolar_source {
   using match_source_tag = void;
   Distance distance{};
   epipolar_rule rule{};
-  simd::level level = simd::level::avx512;  ///< the best instruction set to use, if the processor has it
 
   struct workspace {
     detail::search_among_workspace search;
@@ -75,23 +73,22 @@ struct epipolar_source {
     assert(queries.keypoints.size() == queries.descriptors.size());
     assert(trains.keypoints.size() == trains.descriptors.size());
     place_trains(memory, trains.keypoints, geometry);
-    detail::search_among(
-        distance, level, candidates, memory.search, queries, trains, needs, [&](std::size_t q, auto&& add) {
-          const keypoint& query = queries.keypoints[q];
-          const std::optional<epipolar_line> line = geometry.line(q, query);
-          if (!line) return;
-          for (std::size_t begin = 0; begin < memory.x.size(); begin += block) {
-            std::array<std::uint32_t, block> close;
-            if (!any_close(*line, memory.x.data() + begin, memory.y.data() + begin, memory.limit.data() + begin, close))
-              continue;
-            for (std::size_t i = 0; i != block; ++i) {
-              if (close[i] == 0) continue;
-              const auto t = static_cast<std::uint32_t>(begin + i);
-              const std::int64_t step = std::int64_t{trains.keypoints[t].octave} - query.octave;
-              if (std::abs(step) <= rule.max_octave_difference) add(t);
-            }
-          }
-        });
+    detail::search_among(distance, candidates, memory.search, queries, trains, needs, [&](std::size_t q, auto&& add) {
+      const keypoint& query = queries.keypoints[q];
+      const std::optional<epipolar_line> line = geometry.line(q, query);
+      if (!line) return;
+      for (std::size_t begin = 0; begin < memory.x.size(); begin += block) {
+        std::array<std::uint32_t, block> close;
+        if (!any_close(*line, memory.x.data() + begin, memory.y.data() + begin, memory.limit.data() + begin, close))
+          continue;
+        for (std::size_t i = 0; i != block; ++i) {
+          if (close[i] == 0) continue;
+          const auto t = static_cast<std::uint32_t>(begin + i);
+          const std::int64_t step = std::int64_t{trains.keypoints[t].octave} - query.octave;
+          if (std::abs(step) <= rule.max_octave_difference) add(t);
+        }
+      }
+    });
   }
 
  private:
@@ -130,9 +127,8 @@ struct epipolar_source {
 
 /// A source that looks along epipolar lines: `epipolar(hamming{})`.
 template <class Distance>
-[[nodiscard]] constexpr epipolar_source<Distance> epipolar(Distance distance, epipolar_rule rule = {},
-                                                           simd::level level = simd::level::avx512) {
-  return {distance, rule, level};
+[[nodiscard]] constexpr epipolar_source<Distance> epipolar(Distance distance, epipolar_rule rule = {}) {
+  return {distance, rule};
 }
 
 }  // namespace orbis::features

@@ -18,7 +18,6 @@
 #include <vector>
 
 #include <orbis/core/image.hpp>
-#include <orbis/core/simd.hpp>
 #include <orbis/features/descriptor.hpp>
 
 namespace orbis::features {
@@ -78,13 +77,13 @@ struct corner_thresholds {
   int weak = 7;
 };
 
-/// `detect(level, image, area, thresholds, memory, corners)` replaces `corners` by those of `image` that lie in `area`,
+/// `detect(image, area, thresholds, memory, corners)` replaces `corners` by those of `image` that lie in `area`,
 /// ordered by `before_in_image`. `memory` is a `D::workspace` that later calls use again.
 template <class D>
 concept corner_detector = std::default_initializable<typename D::workspace> &&
-    requires(const D& detect, simd::level level, image_view<const std::uint8_t> image, const region& area,
+    requires(const D& detect, image_view<const std::uint8_t> image, const region& area,
              const corner_thresholds& thresholds, typename D::workspace& memory, std::vector<corner>& corners) {
-  detect(level, image, area, thresholds, memory, corners);
+  detect(image, area, thresholds, memory, corners);
 };
 
 /// The corners of one pyramid level.
@@ -109,28 +108,27 @@ struct orientation {
   float sine = 0.0F;
 };
 
-/// `orient(level, image, x, y)` gives the direction at a pixel of a pyramid level that lies at least `O::radius` pixels
+/// `orient(image, x, y)` gives the direction at a pixel of a pyramid level that lies at least `O::radius` pixels
 /// from the left, upper and lower edges and `O::radius` + 1 pixels from the right one.
 template <class O>
-concept orientation_estimator = requires(const O& orient, simd::level level, image_view<const std::uint8_t> image,
-                                         int at) {
+concept orientation_estimator = requires(const O& orient, image_view<const std::uint8_t> image, int at) {
   { O::radius } -> std::convertible_to<int>;
-  { orient(level, image, at, at) } -> std::same_as<orientation>;
+  { orient(image, at, at) } -> std::same_as<orientation>;
 };
 
-/// Describes the pixels around a keypoint. `describe.prepare(level, image, first, last, memory)` sees a pyramid level
-/// and the rows [first, last) of its keypoints once; then `describe(level, memory, x, y, orientation)` returns a
+/// Describes the pixels around a keypoint. `describe.prepare(image, first, last, memory)` sees a pyramid level
+/// and the rows [first, last) of its keypoints once; then `describe(memory, x, y, orientation)` returns a
 /// `D::descriptor` of a pixel that lies at least `D::reach` pixels from the edge. `D::diameter` (pixels) becomes
 /// `keypoint::size`.
 template <class D>
 concept patch_descriptor = std::default_initializable<typename D::workspace> &&
-    requires(const D& describe, simd::level level, image_view<const std::uint8_t> image, typename D::workspace& memory,
+    requires(const D& describe, image_view<const std::uint8_t> image, typename D::workspace& memory,
              const typename D::workspace& prepared, int at, const orientation& o) {
   requires feature_descriptor<typename D::descriptor>;
   { D::reach } -> std::convertible_to<int>;
   { D::diameter } -> std::convertible_to<int>;
-  describe.prepare(level, image, at, at, memory);
-  { describe(level, prepared, at, at, o) } -> std::same_as<typename D::descriptor>;
+  describe.prepare(image, at, at, memory);
+  { describe(prepared, at, at, o) } -> std::same_as<typename D::descriptor>;
 };
 
 }  // namespace orbis::features

@@ -8,7 +8,7 @@
 #include <cstdint>
 
 #include <orbis/core/image.hpp>
-#include <orbis/core/simd.hpp>
+#include <orbis/core/simd/dispatch.hpp>
 #include <orbis/features/detail/extract/luma_row.hpp>
 
 namespace orbis::features {
@@ -16,15 +16,9 @@ namespace orbis::features {
 /// Writes the luma of a colour image (Rec. 601, rounded to the nearest): the same bits as OpenCV's COLOR_RGB2GRAY.
 /// O(pixels).
 /// @pre both images have the same size
-inline void luma(simd::level level, image_view<const rgb8> from, image_view<std::uint8_t> to) {
+inline void luma(image_view<const rgb8> from, image_view<std::uint8_t> to) {
   assert(from.width() == to.width() && from.height() == to.height());
-#if ORBIS_X86
-  const auto row =
-      simd::select<detail::luma_row>(level, {.portable = detail::luma_row_portable, .avx2 = detail::luma_row_avx2});
-#else
-  (void)level;
-  const auto row = detail::luma_row_portable;
-#endif
+  const auto row = simd::kernel<detail::luma_kernel, detail::luma_kernel::signature, simd::avx2>();
   for (int y = 0; y < from.height(); ++y) row(from.row(y).data(), from.width(), to.row(y).data());
 }
 

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The Hamming distance of binary descriptors, one pair at a time.
+/// Distances of descriptors, and the Hamming distance of binary ones.
 #pragma once
 
 #include <concepts>
-#include <cstddef>
 #include <cstdint>
+#include <type_traits>
 
-#include <orbis/core/bits.hpp>
+#include <orbis/core/bit_string.hpp>
 #include <orbis/features/descriptor.hpp>
 
 namespace orbis::features {
@@ -17,16 +17,12 @@ template <class F, class Descriptor>
 concept descriptor_distance = std::regular_invocable<const F&, const Descriptor&, const Descriptor&> &&
     std::convertible_to<std::invoke_result_t<const F&, const Descriptor&, const Descriptor&>, std::uint32_t>;
 
-/// The number of bits in which two descriptors differ.
-///
-/// For many pairs the matchers recognise this type and use the kernels of `hamming_nearest.hpp`.
+/// The number of bits in which two descriptors differ, for any `bit_string`. Matchers compare many pairs at once with
+/// vector instructions where their distance is of this type.
 struct hamming {
-  template <std::size_t Bits>
-  [[nodiscard]] constexpr std::uint32_t operator()(const binary_descriptor<Bits>& a,
-                                                   const binary_descriptor<Bits>& b) const noexcept {
-    std::uint32_t sum = 0;
-    for (std::size_t i = 0; i != a.words.size(); ++i) sum += count_ones(a.words[i] ^ b.words[i]);
-    return sum;
+  template <bit_string Descriptor>
+  [[nodiscard]] constexpr std::uint32_t operator()(const Descriptor& a, const Descriptor& b) const noexcept {
+    return hamming_distance(words_of(a), words_of(b));
   }
 };
 static_assert(descriptor_distance<hamming, binary_descriptor<256>>);

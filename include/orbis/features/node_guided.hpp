@@ -10,7 +10,6 @@
 #include <span>
 #include <vector>
 
-#include <orbis/core/simd.hpp>
 #include <orbis/features/detail/match/search_among.hpp>
 #include <orbis/features/hamming.hpp>
 #include <orbis/features/match.hpp>
@@ -75,7 +74,6 @@ template <class Distance>
 struct node_guided_source {
   using match_source_tag = void;
   Distance distance{};
-  simd::level level = simd::level::avx512;  ///< the best instruction set to use, if the processor has it
 
   struct workspace {
     detail::search_among_workspace search;
@@ -107,10 +105,9 @@ struct node_guided_source {
         memory.trains_of[q] = t->features;
       }
     }
-    detail::search_among(distance, level, candidates, memory.search, queries, trains, needs,
-                         [&](std::size_t q, auto&& add) {
-                           for (const std::uint32_t train : memory.trains_of[q]) add(train);
-                         });
+    detail::search_among(distance, candidates, memory.search, queries, trains, needs, [&](std::size_t q, auto&& add) {
+      for (const std::uint32_t train : memory.trains_of[q]) add(train);
+    });
   }
   template <class Descriptor>
   requires descriptor_distance<Distance, Descriptor>
@@ -123,9 +120,8 @@ struct node_guided_source {
 
 /// A source that compares under common nodes: `node_guided(hamming{})`.
 template <class Distance>
-[[nodiscard]] constexpr node_guided_source<Distance> node_guided(Distance distance,
-                                                                 simd::level level = simd::level::avx512) {
-  return {distance, level};
+[[nodiscard]] constexpr node_guided_source<Distance> node_guided(Distance distance) {
+  return {distance};
 }
 
 }  // namespace orbis::features

@@ -16,7 +16,6 @@
 #include <vector>
 
 #include <orbis/core/image.hpp>
-#include <orbis/core/simd.hpp>
 #include <orbis/features/descriptor.hpp>
 #include <orbis/features/detail/extract/cover_first.hpp>
 #include <orbis/features/detail/extract/fast.hpp>
@@ -44,7 +43,6 @@ struct orb_options {
   float scale_factor = 1.2F;  ///< between two levels, > 1
   int threshold = 14;         ///< brightness step of a corner (of the slightly smoothed image)
   int min_threshold = 3;      ///< where nothing reaches `threshold`; the same as it to have only strong ones
-  simd::level simd = simd::level::avx512;  ///< the best instructions to use if there are such; no result depends on it
 };
 
 /// Finds keypoints on the levels of an image pyramid and describes them. What finds corners, chooses among
@@ -112,7 +110,7 @@ class basic_orb_extractor {
     const auto pixels = static_cast<std::size_t>(image.width()) * static_cast<std::size_t>(image.height());
     if (memory->grey.size() < pixels) memory->grey.resize(pixels);
     const image_view<std::uint8_t> grey{memory->grey.data(), image.width(), image.height()};
-    luma(options_.simd, image, grey);
+    luma(image, grey);
     extract(found, *memory, grey, mask, regions);
     kept_.give(std::move(memory));
   }
@@ -133,8 +131,7 @@ class basic_orb_extractor {
     found.keypoints.clear();
     found.descriptors.clear();
     if (image.empty() || options_.max_features == 0) return;
-    memory.pyramid.build(options_.simd, image, options_.levels, static_cast<double>(options_.scale_factor),
-                         2 * border + 1);
+    memory.pyramid.build(image, options_.levels, static_cast<double>(options_.scale_factor), 2 * border + 1);
     const std::size_t levels = memory.pyramid.size();
     if (memory.levels.size() < levels) memory.levels.resize(levels);
     for (std::size_t level = 0; level != levels; ++level) {
@@ -142,8 +139,7 @@ class basic_orb_extractor {
       level_corners& on = memory.levels[level];
       on.area = area_of(pixels, image, regions);
       on.scale = static_cast<double>(image.width()) / pixels.width();
-      detect_(options_.simd, pixels, on.area, {options_.threshold, options_.min_threshold}, memory.detector,
-              on.corners);
+      detect_(pixels, on.area, {options_.threshold, options_.min_threshold}, memory.detector, on.corners);
       drop_unwanted(on.corners, pixels, image, mask, regions);
     }
     choose_(std::span{memory.levels}.first(levels), options_.max_features, memory.distribution);
@@ -201,12 +197,12 @@ class basic_orb_extractor {
     const std::vector<corner>& corners = memory.levels[static_cast<std::size_t>(octave)].corners;
     if (corners.empty()) return;
     const image_view<const std::uint8_t> level = memory.pyramid[static_cast<std::size_t>(octave)];
-    describe_.prepare(options_.simd, level, corners.front().y, corners.back().y + 1, memory.descriptor);
+    describe_.prepare(level, corners.front().y, corners.back().y + 1, memory.descriptor);
     const float size = static_cast<float>(Descriptor::diameter) * static_cast<float>(image.width()) /
                        static_cast<float>(level.width());
     for (const corner& c : corners) {
-      const orientation o = orient_(options_.simd, level, c.x, c.y);
-      found.descriptors.push_back(describe_(options_.simd, memory.descriptor, c.x, c.y, o));
+      const orientation o = orient_(level, c.x, c.y);
+      found.descriptors.push_back(describe_(memory.descriptor, c.x, c.y, o));
       found.keypoints.push_back({.x = static_cast<float>(detail::image_pyramid::full_coordinate(
                                      c.x + static_cast<double>(c.dx), level.width(), image.width())),
                                  .y = static_cast<float>(detail::image_pyramid::full_coordinate(

@@ -14,7 +14,6 @@
 #include <span>
 #include <vector>
 
-#include <orbis/core/simd.hpp>
 #include <orbis/features/grid.hpp>
 #include <orbis/features/match.hpp>
 #include <orbis/features/windowed.hpp>
@@ -106,7 +105,6 @@ struct projected_source {
   using match_source_tag = void;
   Distance distance{};
   projection_rule rule{};
-  simd::level level = simd::level::avx512;  ///< the best instruction set to use, if the processor has it
 
   struct workspace {
     std::vector<window> windows;
@@ -121,7 +119,7 @@ struct projected_source {
               const feature_view<Descriptor>& trains, search_needs needs, const Points& points, const Project& project,
               const keypoint_grid& grid) const {
     detail::predict_windows(memory.windows, points, project, rule);
-    windowed(distance, level).search(candidates, memory.search, queries, trains, needs, memory.windows, grid);
+    windowed(distance).search(candidates, memory.search, queries, trains, needs, memory.windows, grid);
   }
 
   /// The same, with a grid made for this one search.
@@ -131,15 +129,14 @@ struct projected_source {
               const feature_view<Descriptor>& trains, search_needs needs, const Points& points,
               const Project& project) const {
     detail::predict_windows(memory.windows, points, project, rule);
-    windowed(distance, level).search(candidates, memory.search, queries, trains, needs, memory.windows);
+    windowed(distance).search(candidates, memory.search, queries, trains, needs, memory.windows);
   }
 };
 
 /// A source that looks where points project to: `projected(hamming{})`.
 template <class Distance>
-[[nodiscard]] constexpr projected_source<Distance> projected(Distance distance, projection_rule rule = {},
-                                                             simd::level level = simd::level::avx512) {
-  return {distance, rule, level};
+[[nodiscard]] constexpr projected_source<Distance> projected(Distance distance, projection_rule rule = {}) {
+  return {distance, rule};
 }
 
 }  // namespace orbis::features

@@ -10,7 +10,6 @@
 #include <span>
 #include <vector>
 
-#include <orbis/core/simd.hpp>
 #include <orbis/features/detail/match/search_among.hpp>
 #include <orbis/features/grid.hpp>
 #include <orbis/features/hamming.hpp>
@@ -41,7 +40,6 @@ template <class Distance>
 struct windowed_source {
   using match_source_tag = void;
   Distance distance{};
-  simd::level level = simd::level::avx512;  ///< the best instruction set to use, if the processor has it
 
   struct workspace {
     detail::search_among_workspace search;
@@ -57,11 +55,10 @@ struct windowed_source {
               const keypoint_grid& grid) const {
     assert(windows.size() == queries.descriptors.size());
     assert(trains.keypoints.size() == trains.descriptors.size());
-    detail::search_among(distance, level, candidates, memory.search, queries, trains, needs,
-                         [&](std::size_t q, auto&& add) {
-                           const window& w = windows[q];
-                           grid.for_each_near(w.x, w.y, w.radius, w.min_octave, w.max_octave, add);
-                         });
+    detail::search_among(distance, candidates, memory.search, queries, trains, needs, [&](std::size_t q, auto&& add) {
+      const window& w = windows[q];
+      grid.for_each_near(w.x, w.y, w.radius, w.min_octave, w.max_octave, add);
+    });
   }
 
   /// The same, with a grid made for this one search.
@@ -76,8 +73,8 @@ struct windowed_source {
 
 /// A source that compares within windows: `windowed(hamming{})`.
 template <class Distance>
-[[nodiscard]] constexpr windowed_source<Distance> windowed(Distance distance, simd::level level = simd::level::avx512) {
-  return {distance, level};
+[[nodiscard]] constexpr windowed_source<Distance> windowed(Distance distance) {
+  return {distance};
 }
 
 }  // namespace orbis::features

@@ -20,7 +20,6 @@
 #include <orbis/core/progress.hpp>
 #include <orbis/core/random.hpp>
 #include <orbis/core/result.hpp>
-#include <orbis/core/simd.hpp>
 #include <orbis/places/bag_of_words.hpp>
 #include <orbis/places/detail/k_majority.hpp>
 #include <orbis/places/vocabulary.hpp>
@@ -33,8 +32,7 @@ struct training_options {
   std::uint32_t depth = 4;       ///< levels below the root, at least 1; branching^depth is the most words there can be
   places::weighting weighting = places::weighting::tf_idf;
   std::uint64_t seed = 1;
-  int max_iterations = 10;                 ///< of each clustering
-  simd::level simd = simd::level::avx512;  ///< the best instructions to use if there are such; no result depends on it
+  int max_iterations = 10;  ///< of each clustering
 };
 
 /// Images, as the ranges of their descriptors.
@@ -124,7 +122,7 @@ class vocabulary_trainer {
   [[nodiscard]] clustering<Bits> split(const Policy& policy, const segment& node) const {
     const auto part = std::span{descriptors_}.subspan(node.begin, node.size());
     if (std::ranges::adjacent_find(part, std::ranges::not_equal_to{}) == part.end()) return {};
-    return k_majority<Bits>(policy, part, {options_.branching, options_.max_iterations, node.seed, options_.simd});
+    return k_majority<Bits>(policy, part, {options_.branching, options_.max_iterations, node.seed});
   }
 
   void order_by_cluster(const segment& node, const clustering<Bits>& part, std::vector<segment>& next) {

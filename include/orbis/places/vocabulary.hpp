@@ -16,7 +16,6 @@
 #include <vector>
 
 #include <orbis/core/bit_string.hpp>
-#include <orbis/core/simd.hpp>
 #include <orbis/places/bag_of_words.hpp>
 #include <orbis/places/detail/descent.hpp>
 #include <orbis/places/vocabulary_tree.hpp>
@@ -24,9 +23,8 @@
 namespace orbis::places {
 
 struct transform_options {
-  bag_norm norm = bag_norm::l1;            ///< as the score wants it
-  std::uint32_t node_depth = 2;            ///< of the direct index's nodes, levels below the root
-  simd::level simd = simd::level::avx512;  ///< the best instructions to use if there are such; no result depends on it
+  bag_norm norm = bag_norm::l1;  ///< as the score wants it
+  std::uint32_t node_depth = 2;  ///< of the direct index's nodes, levels below the root
 };
 
 /// Memory of a transform, which the next one uses again.
@@ -72,11 +70,10 @@ class basic_vocabulary {
 
   /// The word of a descriptor. @pre !empty()
   template <bit_string D>
-  requires(8 * sizeof(D) == Bits) [[nodiscard]] std::uint32_t
-      word_of(const D& descriptor, simd::level level = simd::level::avx512) const noexcept {
+  requires(8 * sizeof(D) == Bits) [[nodiscard]] std::uint32_t word_of(const D& descriptor) const noexcept {
     assert(!empty());
     std::uint32_t leaf = 0;
-    detail::find_leaves(level, *tree_, {reinterpret_cast<const std::byte*>(&descriptor), 1, 0, &leaf, nullptr});
+    detail::find_leaves(*tree_, {reinterpret_cast<const std::byte*>(&descriptor), 1, 0, &leaf, nullptr});
     return tree_->word_of_leaf(leaf);
   }
 
@@ -131,9 +128,8 @@ class basic_vocabulary {
       if (nodes != nullptr) std::fill_n(nodes, descriptors.size(), 0U);
       return;
     }
-    detail::find_leaves(
-        options.simd, *tree_,
-        {std::as_bytes(descriptors).data(), descriptors.size(), options.node_depth, memory.words.data(), nodes});
+    detail::find_leaves(*tree_, {std::as_bytes(descriptors).data(), descriptors.size(), options.node_depth,
+                                 memory.words.data(), nodes});
     for (std::uint32_t& leaf : memory.words) leaf = tree_->word_of_leaf(leaf);
     sort(memory);
     count(memory.words, bag);

@@ -13,7 +13,6 @@
 #include <orbis/core/bit_string.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/random.hpp>
-#include <orbis/core/simd.hpp>
 #include <orbis/places/detail/bit_votes.hpp>
 #include <orbis/places/detail/nearest_child.hpp>
 
@@ -23,7 +22,6 @@ struct k_majority_options {
   std::uint32_t clusters = 10;  ///< at most; fewer where there are fewer different descriptors
   int max_iterations = 10;
   std::uint64_t seed = 1;
-  simd::level simd = simd::level::avx512;  ///< the best instructions to use if there are such; no result depends on it
 };
 
 /// Centres, each with at least one member, and the nearest centre of each descriptor (the first of equals).
@@ -98,8 +96,7 @@ class k_majority_solver {
   template <execution_policy Policy>
   void assign(const Policy& policy) {
     for_each_chunk(policy, descriptors_.size(), grain, [&](std::size_t begin, std::size_t end) {
-      assign_nearest<Bits>(options_.simd,
-                           {result_.centres.data(), static_cast<std::uint32_t>(result_.centres.size()),
+      assign_nearest<Bits>({result_.centres.data(), static_cast<std::uint32_t>(result_.centres.size()),
                             descriptors_.data() + begin, end - begin, result_.cluster_of.data() + begin});
     });
   }

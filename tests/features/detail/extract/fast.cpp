@@ -20,11 +20,11 @@ using namespace orbis::features::detail;
 
 namespace {
 
-std::vector<corner> found(const fast9& detect, simd::level level, image_view<const std::uint8_t> im, const region& area,
+std::vector<corner> found(const fast9& detect, image_view<const std::uint8_t> im, const region& area,
                           const corner_thresholds& thresholds) {
   fast9::workspace memory;
   std::vector<corner> corners;
-  detect(level, im, area, thresholds, memory, corners);
+  detect(im, area, thresholds, memory, corners);
   return corners;
 }
 
@@ -56,15 +56,16 @@ image<std::uint8_t> smoothed(const image<std::uint8_t>& im) {
 
 TEST_CASE("FAST corners without smoothing and ties are OpenCV's, at every level") {
   const fast9 plain{.smooth = false, .ties = false, .subpixel = false};
-  const auto level = GENERATE(simd::level::portable, simd::level::popcnt, simd::level::avx2, simd::level::avx512);
+  const auto level = GENERATE(from_range(simd::available_levels()));
+  const simd::level_limit limit{level};
   for (const auto& [width, height] : {std::pair{320, 240}, {7, 7}, {8, 30}, {21, 22}, {38, 39}, {70, 50}, {133, 61}})
     for (const int threshold : {1, 2, 7, 20, 100}) {
       for (const auto& im : {test::blocks(width, height, 1), test::noise(width, height, 2)}) {
         INFO(width << "x" << height << ", threshold " << threshold);
         const test::embedded_image embedded{im};
         const auto expected = opencv(im, threshold);
-        CHECK(found(plain, level, im, whole(im), {threshold, threshold}) == expected);
-        CHECK(found(plain, level, embedded.view(), whole(im), {threshold, threshold}) == expected);
+        CHECK(found(plain, im, whole(im), {threshold, threshold}) == expected);
+        CHECK(found(plain, embedded.view(), whole(im), {threshold, threshold}) == expected);
       }
     }
   CHECK(opencv(test::blocks(320, 240, 1), 7).size() > 80);
@@ -72,9 +73,10 @@ TEST_CASE("FAST corners without smoothing and ties are OpenCV's, at every level"
 
 TEST_CASE("FAST corners of an area are those of the image that lie in it") {
   const auto im = test::moved(test::blocks(200, 150, 3), 0.3, 0, 0);
-  const auto level = GENERATE(simd::level::portable, simd::level::popcnt, simd::level::avx2, simd::level::avx512);
+  const auto level = GENERATE(from_range(simd::available_levels()));
+  const simd::level_limit limit{level};
   const fast9 detect{.smooth = GENERATE(false, true), .ties = GENERATE(false, true)};
-  const auto all = found(detect, level, im, whole(im), {9, 9});
+  const auto all = found(detect, im, whole(im), {9, 9});
   REQUIRE(all.size() > 100);
   for (const region area : {region{0, 0, 200, 1},
                             {0, 0, 200, 5},
@@ -88,18 +90,19 @@ TEST_CASE("FAST corners of an area are those of the image that lie in it") {
     std::vector<corner> expected;
     std::copy_if(all.begin(), all.end(), std::back_inserter(expected),
                  [&](const corner& c) { return area.contains(c.x, c.y); });
-    CHECK(found(detect, level, im, area, {9, 9}) == expected);
+    CHECK(found(detect, im, area, {9, 9}) == expected);
   }
 }
 
 TEST_CASE("smoothing before the segment test is a binomial, at every level") {
-  const auto level = GENERATE(simd::level::portable, simd::level::popcnt, simd::level::avx2, simd::level::avx512);
+  const auto level = GENERATE(from_range(simd::available_levels()));
+  const simd::level_limit limit{level};
   for (const auto& [width, height] : {std::pair{320, 240}, {7, 7}, {9, 140}, {40, 67}, {71, 50}}) {
     const auto im = test::noise(width, height, 4);
     const test::embedded_image embedded{im};
     const auto expected = opencv(smoothed(im), 5);
-    CHECK(found({.ties = false, .subpixel = false}, level, im, whole(im), {5, 5}) == expected);
-    CHECK(found({.ties = false, .subpixel = false}, level, embedded.view(), whole(im), {5, 5}) == expected);
+    CHECK(found({.ties = false, .subpixel = false}, im, whole(im), {5, 5}) == expected);
+    CHECK(found({.ties = false, .subpixel = false}, embedded.view(), whole(im), {5, 5}) == expected);
   }
 }
 
@@ -108,19 +111,22 @@ TEST_CASE("of equal neighbours the last is a corner") {
   image<std::uint8_t> im(40, 40, 50);
   im(20, 20) = im(21, 20) = 200;
   im(10, 30) = im(10, 31) = 200;
-  for (const auto level : test::simd_levels) {
-    CHECK(found({.smooth = false, .ties = false, .subpixel = false}, level, im, whole(im), {20, 20}).empty());
+  for (const auto level : simd::available_levels()) {
+    const simd::level_limit limit{level};
+    CHECK(found({.smooth = false, .ties = false, .subpixel = false}, im, whole(im), {20, 20}).empty());
     const std::vector<corner> last{{21, 20, 149.0F, -0.5F, 0.0F}, {10, 31, 149.0F, 0.0F, -0.5F}};
-    CHECK(found({.smooth = false}, level, im, whole(im), {20, 20}) == last);
+    CHECK(found({.smooth = false}, im, whole(im), {20, 20}) == last);
   }
 }
 
 TEST_CASE("ties kept are peaks that no neighbour exceeds, one of each run of equals") {
   const auto im = test::blocks(200, 150, 5);  // steps of few sizes: many ties
-  const auto strict =
-      found({.smooth = false, .ties = false, .subpixel = false}, simd::level::portable, im, whole(im), {7, 7});
-  const auto kept = found({.smooth = false}, simd::level::portable, im, whole(im), {7, 7});
-  for (const auto level : test::simd_levels) CHECK(found({.smooth = false}, level, im, whole(im), {7, 7}) == kept);
+  const auto strict = found({.smooth = false, .ties = false, .subpixel = false}, im, whole(im), {7, 7});
+  const auto kept = found({.smooth = false}, im, whole(im), {7, 7});
+  for (const auto level : simd::available_levels()) {
+    const simd::level_limit limit{level};
+    CHECK(found({.smooth = false}, im, whole(im), {7, 7}) == kept);
+  }
   CHECK(kept.size() > strict.size());
   CHECK(std::includes(kept.begin(), kept.end(), strict.begin(), strict.end(), before_in_image));
   for (std::size_t i = 1; i < kept.size(); ++i)
@@ -129,8 +135,8 @@ TEST_CASE("ties kept are peaks that no neighbour exceeds, one of each run of equ
 
 TEST_CASE("corners are located within the pixel, at every level alike") {
   const auto im = test::moved(test::blocks(200, 150, 8), 0.3, 0, 0);
-  const auto corners = found({}, simd::level::portable, im, whole(im), {9, 9});
-  const auto whole_pixels = found({.subpixel = false}, simd::level::portable, im, whole(im), {9, 9});
+  const auto corners = found({}, im, whole(im), {9, 9});
+  const auto whole_pixels = found({.subpixel = false}, im, whole(im), {9, 9});
   REQUIRE(corners.size() == whole_pixels.size());
   std::size_t moved = 0;
   for (std::size_t i = 0; i != corners.size(); ++i) {
@@ -140,14 +146,17 @@ TEST_CASE("corners are located within the pixel, at every level alike") {
     moved += corners[i].dx != 0.0F || corners[i].dy != 0.0F ? 1 : 0;
   }
   CHECK(moved > corners.size() / 2);
-  for (const auto level : test::simd_levels) CHECK(found({}, level, im, whole(im), {9, 9}) == corners);
+  for (const auto level : simd::available_levels()) {
+    const simd::level_limit limit{level};
+    CHECK(found({}, im, whole(im), {9, 9}) == corners);
+  }
 }
 
 TEST_CASE("a cell with a strong corner has no weak ones, the others keep theirs") {
   const auto im = test::blocks(210, 140, 6);
   const fast9 detect{.cell = 35};
-  const auto all = found(detect, simd::level::avx512, im, whole(im), {5, 5});
-  const auto adapted = found(detect, simd::level::avx512, im, whole(im), {40, 5});
+  const auto all = found(detect, im, whole(im), {5, 5});
+  const auto adapted = found(detect, im, whole(im), {40, 5});
   std::vector<corner> expected;
   for (const corner& c : all) {
     const bool strong_near = std::any_of(all.begin(), all.end(), [&](const corner& other) {
@@ -161,9 +170,10 @@ TEST_CASE("a cell with a strong corner has no weak ones, the others keep theirs"
 }
 
 TEST_CASE("constant images and tiny ones have no corners") {
-  for (const auto level : test::simd_levels)
+  for (const auto level : simd::available_levels())
     for (const auto& [width, height] : {std::pair{1, 1}, {6, 100}, {100, 6}, {100, 100}}) {
+      const simd::level_limit limit{level};
       const image<std::uint8_t> im(width, height, 255);
-      CHECK(found({}, level, im, whole(im), {1, 0}).empty());
+      CHECK(found({}, im, whole(im), {1, 0}).empty());
     }
 }

@@ -17,17 +17,17 @@ TEST_CASE("moments are the sums of the definition, at every level") {
   // The disc's rows as the ORB paper's authors published them.
   constexpr int half_widths[16] = {15, 15, 15, 15, 14, 14, 14, 13, 13, 12, 11, 10, 9, 8, 6, 3};
   for (const auto& im : {test::noise(33, 32, 1), test::blocks(33, 32, 2), image<std::uint8_t>(33, 32, 255)}) {
-    detail::image_moments expected;
+    image_moments expected;
     for (int dy = -15; dy <= 15; ++dy)
       for (int dx = -half_widths[std::abs(dy)]; dx <= half_widths[std::abs(dy)]; ++dx) {
         expected.x += dx * im(16 + dx, 15 + dy);
         expected.y += dy * im(16 + dx, 15 + dy);
       }
     const std::uint8_t* centre = &im(16, 15);
-    CHECK(detail::disc_moments_portable(centre, 33) == expected);
-#if ORBIS_X86
-    if (simd::detected() >= simd::level::avx2) CHECK(detail::disc_moments_avx2(centre, 33) == expected);
-#endif
+    for (const auto level : simd::available_levels()) {
+      const simd::level_limit limit{level};
+      CHECK(simd::kernel<disc_moments_kernel, disc_moments_kernel::signature>()(centre, 33) == expected);
+    }
   }
 }
 
@@ -39,8 +39,10 @@ TEST_CASE("the extremes of moments do not overflow") {
         const bool bright = side == 0 ? x > 20 : side == 1 ? y > 20 : side == 2 ? x < 20 : y < 20;
         if (bright) im(x, y) = 255;
       }
-    for (const auto level : test::simd_levels)
-      CHECK(intensity_centroid{}(level, im, 20, 20).angle == Approx(side * std::numbers::pi / 2).margin(1e-6));
+    for (const auto level : simd::available_levels()) {
+      const simd::level_limit limit{level};
+      CHECK(intensity_centroid{}(im, 20, 20).angle == Approx(side * std::numbers::pi / 2).margin(1e-6));
+    }
   }
 }
 
@@ -49,14 +51,14 @@ TEST_CASE("an angle is that of the standard library, in [0, 2 pi)") {
   for (int i = 0; i != 10000; ++i) {
     const double wanted = 2.0 * pi * i / 10000.0;
     for (const double radius : {1e-3, 1.0, 1e6}) {
-      const float angle = detail::angle_of(radius * std::cos(wanted), radius * std::sin(wanted));
+      const float angle = angle_of(radius * std::cos(wanted), radius * std::sin(wanted));
       CHECK((angle >= 0.0F && angle < 2.0F * std::numbers::pi_v<float>));
       CHECK(std::abs(std::remainder(static_cast<double>(angle) - wanted, 2.0 * pi)) < 5e-7);
     }
   }
-  CHECK(detail::angle_of(0.0, 0.0) == 0.0F);
-  CHECK(detail::angle_of(5.0, 0.0) == 0.0F);
-  CHECK(detail::angle_of(5.0, -1e-12) < 6.3F);
+  CHECK(angle_of(0.0, 0.0) == 0.0F);
+  CHECK(angle_of(5.0, 0.0) == 0.0F);
+  CHECK(angle_of(5.0, -1e-12) < 6.3F);
 }
 
 TEST_CASE("a turned picture is turned, and a plain one points to the right") {
@@ -64,12 +66,12 @@ TEST_CASE("a turned picture is turned, and a plain one points to the right") {
   image<std::uint8_t> quarter(81, 81);  // by 90 degrees, clockwise as one looks at it
   for (int y = 0; y != 81; ++y)
     for (int x = 0; x != 81; ++x) quarter(80 - y, x) = im(x, y);
-  const orientation a = intensity_centroid{}(simd::level::avx2, im, 40, 40);
-  const orientation b = intensity_centroid{}(simd::level::avx2, quarter, 40, 40);
+  const orientation a = intensity_centroid{}(im, 40, 40);
+  const orientation b = intensity_centroid{}(quarter, 40, 40);
   CHECK(std::remainder(b.angle - a.angle - std::numbers::pi_v<float> / 2, 2.0F * std::numbers::pi_v<float>) ==
         Approx(0.0).margin(1e-5));
   CHECK(a.cosine == Approx(std::cos(a.angle)).margin(1e-6));
   CHECK(a.sine == Approx(std::sin(a.angle)).margin(1e-6));
-  const orientation none = intensity_centroid{}(simd::level::avx2, image<std::uint8_t>(40, 40, 9), 20, 20);
+  const orientation none = intensity_centroid{}(image<std::uint8_t>(40, 40, 9), 20, 20);
   CHECK((none.angle == 0.0F && none.cosine == 1.0F && none.sine == 0.0F));
 }

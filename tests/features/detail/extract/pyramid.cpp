@@ -17,10 +17,11 @@ using namespace orbis::features::detail;
 
 TEST_CASE("each level of a pyramid is made of the one before it") {
   image_pyramid pyramid;
-  for (const auto level : test::simd_levels)
+  for (const auto level : simd::available_levels())
     for (const auto& [width, height] : {std::pair{320, 240}, {61, 200}, {320, 240}}) {
+      const simd::level_limit limit{level};
       const auto im = test::noise(width, height, 1);
-      pyramid.build(level, im, 8, 1.2, 39);
+      pyramid.build(im, 8, 1.2, 39);
       cv::Mat expected = interop::mat_over(im.view()).clone();
       double scale = 1.0;
       for (std::size_t i = 0; i != pyramid.size(); ++i, scale *= 1.2) {
@@ -37,12 +38,12 @@ TEST_CASE("each level of a pyramid is made of the one before it") {
 
 TEST_CASE("a pyramid leaves out what is too small") {
   image_pyramid pyramid;
-  pyramid.build(simd::level::avx2, image<std::uint8_t>(30, 500, 1), 8, 1.2, 39);
+  pyramid.build(image<std::uint8_t>(30, 500, 1), 8, 1.2, 39);
   CHECK(pyramid.size() == 0);
-  pyramid.build(simd::level::avx2, image<std::uint8_t>(100, 100, 1), 0, 1.2, 1);
+  pyramid.build(image<std::uint8_t>(100, 100, 1), 0, 1.2, 1);
   CHECK(pyramid.size() == 0);
   const image<std::uint8_t> im(100, 100, 1);
-  pyramid.build(simd::level::avx2, im, 100, 2.0, 1);
+  pyramid.build(im, 100, 2.0, 1);
   CHECK(pyramid.size() == 8);  // 100, 50, 25, 13, 6, 3, 2, 1: the next would be 0
 }
 

@@ -8,7 +8,9 @@
 
 #include <orbis/core/random.hpp>
 #include <orbis/features/detail/match/hamming_nearest.hpp>
+#include <orbis/features/hamming.hpp>
 
+#include "features/k_nearest_by.hpp"
 #include "support/catch.hpp"
 
 using namespace orbis;
@@ -93,8 +95,8 @@ TEST_CASE("the Hamming distance counts differing bits") {
 }
 
 TEST_CASE("every SIMD level finds the two nearest and the reverse nearest of the definition") {
-  const simd::level level =
-      GENERATE(simd::level::portable, simd::level::popcnt, simd::level::avx2, simd::level::avx512);
+  const auto level = GENERATE(from_range(simd::available_levels()));
+  const simd::level_limit limit{level};
   const int variety = GENERATE(256, 12, 2);  // 2: nearly everything is a tie
   // Few are compared pair by pair, more in blocks of 256 or 512 trains.
   for (const std::size_t queries : {0U, 1U, 3U, 15U, 16U, 40U})
@@ -103,7 +105,8 @@ TEST_CASE("every SIMD level finds the two nearest and the reverse nearest of the
       const auto q = random_descriptors(queries, 10 + queries, variety);
       const auto t = random_descriptors(trains, 1000 + trains, variety);
       answer expected = naive(q, t);
-      const auto kernel = [&](auto... spans) { hamming_nearest(level, spans...); };
+      hamming_workspace memory;
+      const auto kernel = [&](auto... spans) { hamming_nearest(spans..., memory); };
       REQUIRE(run(kernel, q, t, true) == expected);
       expected.reverse.clear();
       REQUIRE(run(kernel, q, t, false) == expected);
@@ -111,8 +114,8 @@ TEST_CASE("every SIMD level finds the two nearest and the reverse nearest of the
 }
 
 TEST_CASE("every SIMD level finds any number of nearest neighbours, lower indices first") {
-  const simd::level level =
-      GENERATE(simd::level::portable, simd::level::popcnt, simd::level::avx2, simd::level::avx512);
+  const auto level = GENERATE(from_range(simd::available_levels()));
+  const simd::level_limit limit{level};
   const int variety = GENERATE(256, 12, 2);
   hamming_workspace workspace;
   for (const std::size_t queries : {1U, 30U})
@@ -134,7 +137,7 @@ TEST_CASE("every SIMD level finds any number of nearest neighbours, lower indice
           expected.insert(expected.end(), row.begin(), row.end());
         }
         std::vector<neighbor> found(queries * k, {7, 7});
-        hamming_k_nearest(level, q, t, k, found, workspace);
+        hamming_k_nearest(std::span<const descriptor>{q}, std::span<const descriptor>{t}, k, found, workspace);
         REQUIRE(found == expected);
       }
     }
@@ -142,25 +145,27 @@ TEST_CASE("every SIMD level finds any number of nearest neighbours, lower indice
 
 TEST_CASE("queries whose nearest lie at very different distances do not mislead each other") {
   // Groups of queries with near and with far trains in turn: the first block's limit is guessed from the last query.
-  const simd::level level =
-      GENERATE(simd::level::portable, simd::level::popcnt, simd::level::avx2, simd::level::avx512);
+  const auto level = GENERATE(from_range(simd::available_levels()));
+  const simd::level_limit limit{level};
   const auto t = random_descriptors(400, 77, 256);
   auto q = random_descriptors(90, 78, 256);
   for (std::size_t i = 0; i < q.size(); i += 3) q[i] = t[(i * 37) % t.size()];
   for (std::size_t i = 1; i < q.size(); i += 3)
     for (std::size_t w = 0; w != 4; ++w) q[i].words[w] = ~t[i].words[w];
-  CHECK(run([&](auto... spans) { hamming_nearest(level, spans...); }, q, t, true) == naive(q, t));
+  hamming_workspace memory;
+  CHECK(run([&](auto... spans) { hamming_nearest(spans..., memory); }, q, t, true) == naive(q, t));
 }
 
 TEST_CASE("distances of 0 and 256 come out of every SIMD level") {
-  const simd::level level =
-      GENERATE(simd::level::portable, simd::level::popcnt, simd::level::avx2, simd::level::avx512);
+  const auto level = GENERATE(from_range(simd::available_levels()));
+  const simd::level_limit limit{level};
   descriptor zeros;
   descriptor ones;
   ones.words.fill(~std::uint64_t{0});
   const std::vector<descriptor> q{zeros, ones};
   const std::vector<descriptor> t{ones, ones};
-  const answer a = run([&](auto... spans) { hamming_nearest(level, spans...); }, q, t, true);
+  hamming_workspace memory;
+  const answer a = run([&](auto... spans) { hamming_nearest(spans..., memory); }, q, t, true);
   CHECK(a.nearest[0] == nearest_two{0, 256, 256});
   CHECK(a.nearest[1] == nearest_two{0, 0, 0});
   CHECK(a.reverse == std::vector<std::uint32_t>{1, 1});
@@ -168,12 +173,12 @@ TEST_CASE("distances of 0 and 256 come out of every SIMD level") {
   std::vector<descriptor> many_q(20, zeros), many_t(300, ones);
   many_q[7] = ones;
   many_t[299] = zeros;
-  CHECK(run([&](auto... spans) { hamming_nearest(level, spans...); }, many_q, many_t, true) == naive(many_q, many_t));
+  CHECK(run([&](auto... spans) { hamming_nearest(spans..., memory); }, many_q, many_t, true) == naive(many_q, many_t));
 }
 
 TEST_CASE("descriptors of other lengths have the neighbours of the definition, at every level") {
-  const simd::level level =
-      GENERATE(simd::level::portable, simd::level::popcnt, simd::level::avx2, simd::level::avx512);
+  const auto level = GENERATE(from_range(simd::available_levels()));
+  const simd::level_limit limit{level};
   const auto check = [&]<std::size_t Bits>(std::integral_constant<std::size_t, Bits>) {
     using other = binary_descriptor<Bits>;
     random_bits random{Bits};
@@ -183,15 +188,15 @@ TEST_CASE("descriptors of other lengths have the neighbours of the definition, a
         for (std::uint64_t& word : d.words) word = random() & random() & random();
     std::vector<nearest_two> nearest(q.size()), expected(q.size());
     std::vector<std::uint32_t> reverse(t.size()), expected_reverse(t.size()), distances;
-    hamming_nearest<Bits>(level, q, t, nearest, reverse);
+    hamming_workspace memory;
+    hamming_nearest(std::span<const other>{q}, std::span<const other>{t}, nearest, reverse, memory);
     nearest_by(hamming{}, std::span<const other>{q}, std::span<const other>{t}, std::span{expected},
                std::span{expected_reverse}, distances);
     CHECK(nearest == expected);
     CHECK(reverse == expected_reverse);
     std::vector<neighbor> found(5 * q.size()), wanted(5 * q.size());
-    hamming_workspace memory;
-    hamming_k_nearest<Bits>(level, q, t, 5, found, memory);
-    k_nearest_by(hamming{}, std::span<const other>{q}, std::span<const other>{t}, 5, std::span{wanted});
+    hamming_k_nearest(std::span<const other>{q}, std::span<const other>{t}, 5, found, memory);
+    test::k_nearest_by(hamming{}, std::span<const other>{q}, std::span<const other>{t}, 5, std::span{wanted});
     CHECK(found == wanted);
   };
   check(std::integral_constant<std::size_t, 64>{});

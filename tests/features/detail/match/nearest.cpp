@@ -7,6 +7,7 @@
 #include <orbis/core/random.hpp>
 #include <orbis/features/detail/match/nearest.hpp>
 
+#include "features/k_nearest_by.hpp"
 #include "support/catch.hpp"
 
 using namespace orbis;
@@ -30,7 +31,7 @@ TEST_CASE("the nearest by any distance are those of sorting, lower indices first
       expected.insert(expected.end(), row.begin(), row.end());
     }
     std::vector<neighbor> found(queries.size() * k, {9, 9});
-    k_nearest_by(distance, std::span<const int>{queries}, std::span<const int>{trains}, k, std::span{found});
+    test::k_nearest_by(distance, std::span<const int>{queries}, std::span<const int>{trains}, k, std::span{found});
     CHECK(found == expected);
     if (k != 2) continue;
     std::vector<nearest_two> two(queries.size());

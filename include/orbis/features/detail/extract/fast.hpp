@@ -15,9 +15,9 @@
 #include <vector>
 
 #include <orbis/core/image.hpp>
-#include <orbis/core/simd.hpp>
+#include <orbis/core/simd/dispatch.hpp>
 #include <orbis/features/detail/extract/binomial.hpp>
-#include <orbis/features/detail/extract/fast_lanes.hpp>
+#include <orbis/features/detail/extract/fast_scores.hpp>
 #include <orbis/features/extractor.hpp>
 
 namespace orbis::features::detail {
@@ -51,13 +51,13 @@ struct fast9 {
 
   /// The same corners at every level. Circles that leave the image are no corners'. O(pixels of the area).
   /// @pre the area lies in the image; 0 <= weak <= strong <= 254; cell >= 1
-  void operator()(simd::level level, image_view<const std::uint8_t> image, const region& area,
-                  const corner_thresholds& thresholds, workspace& memory, std::vector<corner>& corners) const {
+  void operator()(image_view<const std::uint8_t> image, const region& area, const corner_thresholds& thresholds,
+                  workspace& memory, std::vector<corner>& corners) const {
     corners.clear();
     assert(cell >= 1 && 0 <= thresholds.weak && thresholds.weak <= thresholds.strong && thresholds.strong <= 254);
     assert(area.empty() || (area.x >= 0 && area.y >= 0 && area.x + area.width <= image.width() &&
                             area.y + area.height <= image.height()));
-    find_peaks(level, image, area, thresholds.weak, memory, corners);
+    find_peaks(image, area, thresholds.weak, memory, corners);
     if (thresholds.weak != thresholds.strong) drop_weak(area, thresholds.strong, memory, corners);
   }
 
@@ -65,22 +65,16 @@ struct fast9 {
   static constexpr std::size_t margin = 64;  // what kernels may touch beside a row
   static constexpr int band_rows = 64;
 
-  void find_peaks(simd::level level, image_view<const std::uint8_t> image, const region& area, int threshold,
-                  workspace& memory, std::vector<corner>& corners) const {
+  void find_peaks(image_view<const std::uint8_t> image, const region& area, int threshold, workspace& memory,
+                  std::vector<corner>& corners) const {
     // Scores are needed one pixel around the area, to see whether its outermost pixels are peaks.
     const int left = std::max(circle_radius, area.x - 1);
     const int right = std::min(image.width() - circle_radius, area.x + area.width + 1);
     const int top = std::max(circle_radius, area.y - 1);
     const int bottom = std::min(image.height() - circle_radius, area.y + area.height + 1);
     if (area.empty() || left >= right || top >= bottom) return;
-#if ORBIS_X86
-    const auto score_row = simd::select<fast_scores>(
-        level, {.portable = fast_scores_portable, .avx2 = fast_scores_avx2, .avx512 = fast_scores_avx512});
-    const auto peaks_of = simd::select<fast_peaks>(level, {.portable = fast_peaks_portable, .avx2 = fast_peaks_avx2});
-#else
-    const auto score_row = fast_scores_portable;
-    const auto peaks_of = fast_peaks_portable;
-#endif
+    const auto score_row = simd::kernel<fast_scores_kernel, fast_scores_kernel::signature>();
+    const auto peaks_of = simd::kernel<fast_peaks_kernel, fast_peaks_kernel::signature>();
     const int count = right - left;
     const auto width = static_cast<std::size_t>(count);
     const std::size_t pitch = width + 2 * margin;
@@ -93,7 +87,7 @@ struct fast9 {
         std::memset(row_of(y), 0, width);
       } else if (smooth) {
         const int in_band = (y - top) % band_rows;
-        if (in_band == 0) smooth_band(level, image, left, count, y, std::min(bottom, y + band_rows), memory);
+        if (in_band == 0) smooth_band(image, left, count, y, std::min(bottom, y + band_rows), memory);
         score_row(memory.band.data() + static_cast<std::size_t>(in_band + circle_radius) * pitch + margin,
                   static_cast<std::ptrdiff_t>(pitch), count, static_cast<std::uint8_t>(threshold), row_of(y));
       } else {
@@ -120,20 +114,15 @@ struct fast9 {
 
   /// Smooths what the circles of rows [first, last) see. Bands, so that they are still in the cache when
   /// the circles look.
-  static void smooth_band(simd::level level, image_view<const std::uint8_t> image, int left, int count, int first,
-                          int last, workspace& memory) {
+  static void smooth_band(image_view<const std::uint8_t> image, int left, int count, int first, int last,
+                          workspace& memory) {
     const std::size_t pitch = static_cast<std::size_t>(count) + 2 * margin;
     const int from = left - circle_radius, columns = count + 2 * circle_radius;  // all of them in the image
     const int from_more = std::max(0, from - 1), to_more = std::min(image.width(), from + columns + 1);
     if (memory.band.size() < pitch * (band_rows + 2 * circle_radius))
       memory.band.resize(pitch * (band_rows + 2 * circle_radius));
     if (memory.line.size() < pitch) memory.line.resize(pitch);
-#if ORBIS_X86
-    const auto mix = simd::select<binomial_row>(level, {.portable = binomial_row_portable, .avx2 = binomial_row_avx2});
-#else
-    (void)level;
-    const auto mix = binomial_row_portable;
-#endif
+    const auto mix = simd::kernel<binomial_kernel, binomial_kernel::signature>();
     std::uint8_t* line = memory.line.data() + margin;  // begins with column `from`
     for (int y = first - circle_radius; y != last + circle_radius; ++y) {
       const std::uint8_t* row = image.row(y).data();

@@ -7,7 +7,7 @@
 #include <cstdint>
 
 #include <orbis/core/image.hpp>
-#include <orbis/core/simd.hpp>
+#include <orbis/core/simd/dispatch.hpp>
 
 #if ORBIS_X86
 #include <immintrin.h>
@@ -18,17 +18,9 @@ namespace orbis::features::detail {
 /// Rec. 601 luma, in 1/32768.
 inline constexpr int luma_red = 9798, luma_green = 19235, luma_blue = 3735;
 
-using luma_row = void(const rgb8* from, int count, std::uint8_t* to);
-
-inline void luma_row_portable(const rgb8* from, int count, std::uint8_t* to) {
-  for (int x = 0; x < count; ++x)
-    to[x] = static_cast<std::uint8_t>(
-        (from[x].r * luma_red + from[x].g * luma_green + from[x].b * luma_blue + (1 << 14)) >> 15);
-}
-
 #if ORBIS_X86
-ORBIS_TARGET("avx2")
-inline void luma_row_avx2(const rgb8* from, int count, std::uint8_t* to) {
+/// Thirty-two pixels at a time; returns how many are done, all but the last few.
+ORBIS_TARGET_AVX2 inline int luma_blocks(const rgb8* from, int count, std::uint8_t* to) {
   const auto* bytes = reinterpret_cast<const std::uint8_t*>(from);
   constexpr char o = -128;  // zero
   const __m256i red_green = _mm256_broadcastsi128_si256(_mm_setr_epi8(0, o, 1, o, 3, o, 4, o, 6, o, 7, o, 9, o, 10, o));
@@ -36,7 +28,7 @@ inline void luma_row_avx2(const rgb8* from, int count, std::uint8_t* to) {
   const __m256i red_green_weights = _mm256_set1_epi32(luma_red | luma_green << 16);
   const __m256i blue_weight = _mm256_set1_epi32(luma_blue), half = _mm256_set1_epi32(1 << 14);
   // Eight pixels; reads four bytes beyond them.
-  const auto eight = [&](const std::uint8_t* p) ORBIS_TARGET("avx2") {
+  const auto eight = [&](const std::uint8_t* p) ORBIS_TARGET_AVX2 {
     const __m256i v =
         _mm256_inserti128_si256(_mm256_castsi128_si256(_mm_loadu_si128(reinterpret_cast<const __m128i*>(p))),
                                 _mm_loadu_si128(reinterpret_cast<const __m128i*>(p + 12)), 1);
@@ -52,8 +44,22 @@ inline void luma_row_avx2(const rgb8* from, int count, std::uint8_t* to) {
                                               _mm256_packus_epi32(eight(p + 48), eight(p + 72)));
     _mm256_storeu_si256(reinterpret_cast<__m256i*>(to + x), _mm256_permutevar8x32_epi32(words, in_order));
   }
-  luma_row_portable(from + x, count - x, to + x);
+  return x;
 }
 #endif
+
+struct luma_kernel {
+  using signature = void(const rgb8* from, int count, std::uint8_t* to);
+  template <class Target>
+  static ORBIS_ALWAYS_INLINE void run(const rgb8* from, int count, std::uint8_t* to) {
+    int x = 0;
+#if ORBIS_X86
+    if constexpr (Target::needs >= simd::level::avx2) x = luma_blocks(from, count, to);
+#endif
+    for (; x < count; ++x)
+      to[x] = static_cast<std::uint8_t>(
+          (from[x].r * luma_red + from[x].g * luma_green + from[x].b * luma_blue + (1 << 14)) >> 15);
+  }
+};
 
 }  // namespace orbis::features::detail

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Which way a keypoint points.
+/// The direction of a keypoint.
 #pragma once
 
 #include <array>
@@ -11,13 +11,12 @@
 #include <numbers>
 
 #include <orbis/core/image.hpp>
-#include <orbis/core/simd.hpp>
-#include <orbis/features/detail/extract/lanes16.hpp>
+#include <orbis/core/simd/dispatch.hpp>
+#include <orbis/core/simd/integer.hpp>
+#include <orbis/core/simd/math.hpp>
+#include <orbis/core/simd/vec.hpp>
+#include <orbis/features/detail/extract/byte_pairs.hpp>
 #include <orbis/features/extractor.hpp>
-
-#if ORBIS_X86
-#include <immintrin.h>
-#endif
 
 namespace orbis::features::detail {
 
@@ -39,7 +38,6 @@ struct image_moments {
   std::int32_t y = 0;
   friend bool operator==(const image_moments&, const image_moments&) = default;
 };
-using disc_moments = image_moments(const std::uint8_t* centre, std::ptrdiff_t stride);
 
 /// Which of the 32 pixels of a row from -15 to 16 lie in the disc, by distance of the row from its centre.
 inline constexpr auto disc_masks = [] {
@@ -50,76 +48,46 @@ inline constexpr auto disc_masks = [] {
   return masks;
 }();
 
-inline image_moments disc_moments_portable(const std::uint8_t* centre, std::ptrdiff_t stride) {
-  image_moments m;
-  for (int left = -disc_radius; left <= 1; left += 16) {
-    const auto pixels = [&](int dy) {
-      const auto& mask = disc_masks[static_cast<std::size_t>(dy < 0 ? -dy : dy)];
-      return load16(centre + dy * stride + left) & load16(mask.data() + left + disc_radius);
+struct disc_moments_kernel {
+  using signature = image_moments(const std::uint8_t* centre, std::ptrdiff_t stride);
+  template <class Target>
+  static ORBIS_ALWAYS_INLINE image_moments run(const std::uint8_t* centre, std::ptrdiff_t stride) {
+    using bytes = simd::vec<std::uint8_t, 32, Target>;
+    using words = simd::vec<std::uint16_t, 16, Target>;  // of every other column
+    const std::uint8_t* const left = centre - disc_radius;
+    const auto pixels = [&](int dy) ORBIS_INLINE_LAMBDA {
+      return bytes::load(left + dy * stride) &
+             bytes::load(disc_masks[static_cast<std::size_t>(dy < 0 ? -dy : dy)].data());
     };
-    // Of each column the sum, and the sum of dy times brightness: at most 31 * 255 and 120 * 255, so that words do.
-    words8 sum_low = low_bytes(pixels(0)), sum_high = high_bytes(pixels(0)), y_low{}, y_high{};
-    for (int dy = 1; dy <= disc_radius; ++dy) {
-      const bytes16 above = pixels(-dy), below = pixels(dy);
-      const auto times = static_cast<std::uint16_t>(dy);
-      sum_low += low_bytes(below) + low_bytes(above);
-      sum_high += high_bytes(below) + high_bytes(above);
-      y_low += (low_bytes(below) - low_bytes(above)) * times;
-      y_high += (high_bytes(below) - high_bytes(above)) * times;
+    // The sum of each column, and the sum of dy times brightness: at most 31 * 255 and 120 * 255, so that 16 bits do.
+    // The latter adds up the differences of all rows at least k from the centre, for k from 15 to 1.
+    const bytes middle = pixels(0);
+    words sum_even = even_bytes(middle), sum_odd = odd_bytes(middle);
+    words step_even(0), step_odd(0), y_even(0), y_odd(0);
+    for (int dy = disc_radius; dy != 0; --dy) {
+      const bytes above = pixels(-dy), below = pixels(dy);
+      const words above_even = even_bytes(above), below_even = even_bytes(below);
+      const words above_odd = odd_bytes(above), below_odd = odd_bytes(below);
+      sum_even += above_even + below_even;
+      sum_odd += above_odd + below_odd;
+      step_even += below_even - above_even;
+      step_odd += below_odd - above_odd;
+      y_even += step_even;
+      y_odd += step_odd;
     }
-    constexpr bytes16 order{0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
-    const words8 at_low = low_bytes(order), at_high = high_bytes(order);
-    for (std::size_t i = 0; i != 8; ++i) {
-      m.x += (left + at_low[i]) * sum_low[i] + (left + at_high[i]) * sum_high[i];
-      m.y += static_cast<std::int16_t>(y_low[i]) + static_cast<std::int16_t>(y_high[i]);
-    }
+    const auto weighted = [](const words& even, const words& odd, auto weight) ORBIS_INLINE_LAMBDA {
+      using signed_words = simd::vec<std::int16_t, 16, Target>;
+      const auto weights = [&](int offset) ORBIS_INLINE_LAMBDA {
+        return signed_words::generate(
+            [&](std::size_t i) ORBIS_INLINE_LAMBDA { return weight(2 * static_cast<int>(i) + offset - disc_radius); });
+      };
+      return simd::sum(multiply_add_pairs(simd::bits_as<std::int16_t>(even), weights(0)) +
+                       multiply_add_pairs(simd::bits_as<std::int16_t>(odd), weights(1)));
+    };
+    return {weighted(sum_even, sum_odd, [](int x) ORBIS_INLINE_LAMBDA { return x; }),
+            weighted(y_even, y_odd, [](int) ORBIS_INLINE_LAMBDA { return 1; })};
   }
-  return m;
-}
-
-#if ORBIS_X86
-/// Weights of the 32 pixels of a row from -15 to 16, row by row.
-struct disc_row {
-  std::array<std::int8_t, 32> x{};
-  std::array<std::int8_t, 32> y{};
 };
-inline constexpr auto disc_rows = [] {
-  std::array<disc_row, 2 * disc_radius + 1> rows{};
-  for (int dy = -disc_radius; dy <= disc_radius; ++dy) {
-    const int reach = disc_half_width[static_cast<std::size_t>(dy < 0 ? -dy : dy)];
-    disc_row& row = rows[static_cast<std::size_t>(dy + disc_radius)];
-    for (int dx = -reach; dx <= reach; ++dx) {
-      row.x[static_cast<std::size_t>(dx + disc_radius)] = static_cast<std::int8_t>(dx);
-      row.y[static_cast<std::size_t>(dx + disc_radius)] = static_cast<std::int8_t>(dy);
-    }
-  }
-  return rows;
-}();
-
-ORBIS_TARGET("avx2")
-inline image_moments disc_moments_avx2(const std::uint8_t* centre, std::ptrdiff_t stride) {
-  const auto load = [&](const void* p)
-                        ORBIS_TARGET("avx2") { return _mm256_loadu_si256(static_cast<const __m256i*>(p)); };
-  const __m256i ones = _mm256_set1_epi16(1);
-  __m256i sum_x = _mm256_setzero_si256(), sum_y = sum_x;
-  const std::uint8_t* row = centre - disc_radius * stride - disc_radius;
-  for (std::size_t first = 0; first < disc_rows.size(); first += 4) {
-    // A word grows by at most 255 (15 + 15) a row: four rows fit.
-    __m256i x = _mm256_setzero_si256(), y = x;
-    for (std::size_t i = first; i < first + 4 && i < disc_rows.size(); ++i, row += stride) {
-      const __m256i pixels = load(row);
-      x = _mm256_add_epi16(x, _mm256_maddubs_epi16(pixels, load(disc_rows[i].x.data())));
-      y = _mm256_add_epi16(y, _mm256_maddubs_epi16(pixels, load(disc_rows[i].y.data())));
-    }
-    sum_x = _mm256_add_epi32(sum_x, _mm256_madd_epi16(x, ones));
-    sum_y = _mm256_add_epi32(sum_y, _mm256_madd_epi16(y, ones));
-  }
-  __m256i both = _mm256_hadd_epi32(sum_x, sum_y);  // x x y y | x x y y
-  both = _mm256_hadd_epi32(both, both);            // x y x y | x y x y
-  const __m128i sum = _mm_add_epi32(_mm256_castsi256_si128(both), _mm256_extracti128_si256(both, 1));
-  return {_mm_extract_epi32(sum, 0), _mm_extract_epi32(sum, 1)};
-}
-#endif
 
 /// The angle of (x, y) in [0, 2 pi), to 1e-7; the same bits wherever doubles are IEEE's.
 [[nodiscard]] inline float angle_of(double x, double y) noexcept {
@@ -149,15 +117,9 @@ struct intensity_centroid {
   static constexpr int radius = disc_radius;
 
   /// @pre at least `radius` pixels from the image's edge, on the right one more
-  [[nodiscard]] orientation operator()(simd::level level, image_view<const std::uint8_t> image, int x, int y) const {
+  [[nodiscard]] orientation operator()(image_view<const std::uint8_t> image, int x, int y) const {
     assert(x >= radius && y >= radius && x + radius + 1 < image.width() && y + radius < image.height());
-#if ORBIS_X86
-    const auto moments =
-        simd::select<disc_moments>(level, {.portable = disc_moments_portable, .avx2 = disc_moments_avx2});
-#else
-    (void)level;
-    const auto moments = disc_moments_portable;
-#endif
+    const auto moments = simd::kernel<disc_moments_kernel, disc_moments_kernel::signature>();
     const image_moments m = moments(image.data() + y * image.stride() + x, image.stride());
     if (m.x == 0 && m.y == 0) return {};
     const double mx = m.x, my = m.y;
@@ -165,13 +127,12 @@ struct intensity_centroid {
     return {angle_of(mx, my), static_cast<float>(mx * inverse), static_cast<float>(my * inverse)};
   }
 };
+static_assert(orientation_estimator<intensity_centroid>);
 
-/// No rotation, for cameras that do not roll: descriptors tell more apart if they need not turn.
+/// No direction, for cameras that do not roll: descriptors that are not turned tell more patches apart.
 struct upright {
   static constexpr int radius = 0;
-  [[nodiscard]] orientation operator()(simd::level, image_view<const std::uint8_t>, int, int) const noexcept {
-    return {};
-  }
+  [[nodiscard]] orientation operator()(image_view<const std::uint8_t>, int, int) const noexcept { return {}; }
 };
 
 }  // namespace orbis::features::detail

@@ -11,7 +11,6 @@
 #include <vector>
 
 #include <orbis/core/image.hpp>
-#include <orbis/core/simd.hpp>
 #include <orbis/features/detail/extract/resize.hpp>
 
 namespace orbis::features::detail {
@@ -23,7 +22,7 @@ class image_pyramid {
   /// Level 0 is `image` itself, not a copy: it must live as long as the levels are used. Levels with a side
   /// of less than `min_side` pixels, and what follows them, are left out. O(pixels).
   /// @pre levels >= 0, scale_factor > 1, min_side >= 1
-  void build(simd::level simd, image_view<const std::uint8_t> image, int levels, double scale_factor, int min_side) {
+  void build(image_view<const std::uint8_t> image, int levels, double scale_factor, int min_side) {
     assert(levels >= 0 && scale_factor > 1.0 && min_side >= 1);
     views_.clear();
     double scale = 1.0;
@@ -41,7 +40,7 @@ class image_pyramid {
       const std::size_t needed = static_cast<std::size_t>(stride) * static_cast<std::size_t>(height);
       if (to.pixels.size() < needed) to.pixels.resize(needed);
       const image_view<std::uint8_t> view{to.pixels.data(), width, height, stride};
-      resize(simd, views_.back(), view, to.memory);
+      resize(views_.back(), view, to.memory);
       views_.push_back(view);
     }
   }

@@ -5,143 +5,128 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cassert>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <utility>
 #include <vector>
 
 #include <orbis/core/image.hpp>
-#include <orbis/core/simd.hpp>
-#include <orbis/features/detail/extract/lanes16.hpp>
-
-#if ORBIS_X86
-#include <immintrin.h>
-#endif
+#include <orbis/core/simd/dispatch.hpp>
+#include <orbis/core/simd/integer.hpp>
+#include <orbis/core/simd/shuffle.hpp>
+#include <orbis/core/simd/vec.hpp>
+#include <orbis/features/detail/extract/byte_pairs.hpp>
 
 namespace orbis::features::detail {
 
-/// Memory that `smooth` uses again and again.
+/// Memory of `smooth`, which the next call uses again.
 struct smooth_workspace {
-  std::vector<std::uint8_t> line;   ///< a row with its reflections
-  std::vector<std::uint16_t> sums;  ///< the last eight rows, smoothed horizontally
+  std::vector<std::uint8_t> line;  ///< a row with its reflections
+  std::vector<std::int16_t> sums;  ///< the last eight rows, smoothed horizontally
 };
 
 /// A Gaussian of sigma 2 at -3 ... 3, in 1/256; their sum is exactly one.
-inline constexpr std::array<int, 7> gaussian_weights{18, 34, 48, 56, 48, 34, 18};
-inline constexpr int smooth_lanes = 32;
+inline constexpr std::array<std::uint16_t, 7> gaussian_weights{18, 34, 48, 56, 48, 34, 18};
+inline constexpr int smooth_block = 64;  ///< pixels that are written at a time
 
-/// Weighted sums along a row. The order of the 16-bit words within a block of 32 is the kernel's own.
-/// @pre `line` is readable from -3 to 3 + `count` rounded up to 32
-using smooth_along = void(const std::uint8_t* line, int count, std::uint16_t* sums);
-/// Weighted sum of seven such rows, rounded, in the pixels' order.
-using smooth_across = void(const std::array<const std::uint16_t*, 7>& rows, int count, std::uint8_t* to);
-
-[[nodiscard]] inline words8 gaussian_sum(const std::array<words8, 7>& v) noexcept {
-  const auto weight = [](std::size_t i) { return static_cast<std::uint16_t>(gaussian_weights[i]); };
-  return (v[0] + v[6]) * weight(0) + (v[1] + v[5]) * weight(1) + (v[2] + v[4]) * weight(2) + v[3] * weight(3);
-}
-
-inline void smooth_along_portable(const std::uint8_t* line, int count, std::uint16_t* sums) {
-  for (int x = 0; x < count; x += 16) {
-    std::array<words8, 7> low, high;
-    for (int i = 0; i != 7; ++i) {
-      const bytes16 v = load16(line + x + i - 3);
-      low[static_cast<std::size_t>(i)] = low_bytes(v);
-      high[static_cast<std::size_t>(i)] = high_bytes(v);
+/// Weighted sums along a row, less 2^15 so that they are signed words. Of every block of as many pixels as a register
+/// has bytes, the sums of the even pixels come first, then those of the odd ones.
+/// @pre `line` is readable from -3 to 4 + `count` rounded up to whole blocks
+struct smooth_along_kernel {
+  // The weights are a parameter, because the compiler makes slow shifts and sums of products with constants.
+  using signature = void(const std::uint8_t* line, int count, const std::array<std::uint16_t, 7>& weights,
+                         std::int16_t* sums);
+  template <class Target>
+  static ORBIS_ALWAYS_INLINE void run(const std::uint8_t* line, int count, const std::array<std::uint16_t, 7>& weights,
+                                      std::int16_t* sums) {
+    using bytes = simd::native_vec<std::uint8_t, Target>;
+    using words = simd::native_vec<std::uint16_t, Target>;
+    const words w0(weights[0]), w1(weights[1]), w2(weights[2]), w3(weights[3]), to_signed(0x8000);
+    for (int x = 0; x < count; x += static_cast<int>(bytes::count)) {
+      std::array<words, 8> at;  // the bytes at -3, -2 ... 4 from each even pixel
+      for (std::size_t i = 0; i != 8; i += 2) {
+        const bytes v = bytes::load(line + x + static_cast<int>(i) - 3);
+        at[i] = even_bytes(v);
+        at[i + 1] = odd_bytes(v);
+      }
+      const auto put = [&](std::size_t i, std::int16_t* to) ORBIS_INLINE_LAMBDA {
+        const words sum =
+            (at[i] + at[i + 6]) * w0 + (at[i + 1] + at[i + 5]) * w1 + (at[i + 2] + at[i + 4]) * w2 + at[i + 3] * w3;
+        simd::bits_as<std::int16_t>(sum ^ to_signed).store(to);
+      };
+      put(0, sums + x);
+      put(1, sums + x + words::count);
     }
-    store(sums + x, gaussian_sum(low));
-    store(sums + x + 8, gaussian_sum(high));
   }
-}
+};
 
-inline void smooth_across_portable(const std::array<const std::uint16_t*, 7>& rows, int count, std::uint8_t* to) {
-  const auto eight = [&](int x) {
-    // The bytes of the words apart, so that their sums fit into words.
-    std::array<words8, 7> low, high;
-    for (std::size_t i = 0; i != 7; ++i) {
-      const auto v = loaded<words8>(rows[i] + x);
-      low[i] = v & 255;
-      high[i] = v >> 8;
-    }
-    return rounded_high(gaussian_sum(high), gaussian_sum(low));
-  };
-  for (int x = 0; x < count; x += 16) store16(to + x, joined(eight(x), eight(x + 8)));
-}
-
-#if ORBIS_X86
-ORBIS_TARGET("avx2")
-inline void smooth_along_avx2(const std::uint8_t* line, int count, std::uint16_t* sums) {
-  const auto load = [&](const std::uint8_t* p)
-                        ORBIS_TARGET("avx2") { return _mm256_loadu_si256(reinterpret_cast<const __m256i*>(p)); };
-  const __m256i w01 = _mm256_set1_epi16(18 | 34 << 8), w23 = _mm256_set1_epi16(48 | 56 << 8);
-  const __m256i w45 = _mm256_set1_epi16(48 | 34 << 8), w6 = _mm256_set1_epi16(18);
-  // The next stage multiplies signed words.
-  const __m256i to_signed = _mm256_set1_epi16(static_cast<short>(-0x8000));
-  for (int x = 0; x < count; x += smooth_lanes) {
-    const std::uint8_t* at = line + x;
-    const __m256i a = load(at - 3), b = load(at - 2), c = load(at - 1), d = load(at);
-    const __m256i e = load(at + 1), f = load(at + 2), g = load(at + 3), zero = _mm256_setzero_si256();
-    const __m256i low = _mm256_add_epi16(_mm256_add_epi16(_mm256_maddubs_epi16(_mm256_unpacklo_epi8(a, b), w01),
-                                                          _mm256_maddubs_epi16(_mm256_unpacklo_epi8(c, d), w23)),
-                                         _mm256_add_epi16(_mm256_maddubs_epi16(_mm256_unpacklo_epi8(e, f), w45),
-                                                          _mm256_maddubs_epi16(_mm256_unpacklo_epi8(g, zero), w6)));
-    const __m256i high = _mm256_add_epi16(_mm256_add_epi16(_mm256_maddubs_epi16(_mm256_unpackhi_epi8(a, b), w01),
-                                                           _mm256_maddubs_epi16(_mm256_unpackhi_epi8(c, d), w23)),
-                                          _mm256_add_epi16(_mm256_maddubs_epi16(_mm256_unpackhi_epi8(e, f), w45),
-                                                           _mm256_maddubs_epi16(_mm256_unpackhi_epi8(g, zero), w6)));
-    _mm256_storeu_si256(reinterpret_cast<__m256i*>(sums + x), _mm256_xor_si256(low, to_signed));
-    _mm256_storeu_si256(reinterpret_cast<__m256i*>(sums + x + 16), _mm256_xor_si256(high, to_signed));
-  }
-}
-
-ORBIS_TARGET("avx2")
-inline void smooth_across_avx2(const std::array<const std::uint16_t*, 7>& rows, int count, std::uint8_t* to) {
-  const __m256i w01 = _mm256_set1_epi32(18 | 34 << 16), w23 = _mm256_set1_epi32(48 | 56 << 16);
-  const __m256i w45 = _mm256_set1_epi32(48 | 34 << 16), w6 = _mm256_set1_epi32(18);
-  const __m256i bias = _mm256_set1_epi32(0x8000 * 256 + 0x8000);  // back to unsigned, and half for rounding
-  const auto half = [&](int x) ORBIS_TARGET("avx2") {
-    const auto load = [&](std::size_t i) ORBIS_TARGET("avx2") {
-      return _mm256_loadu_si256(reinterpret_cast<const __m256i*>(rows[i] + x));
+/// Weighted sums of seven such rows, rounded, in the order of the pixels.
+struct smooth_across_kernel {
+  using signature = void(const std::array<const std::int16_t*, 7>& rows, int count, std::uint8_t* to);
+  template <class Target>
+  static ORBIS_ALWAYS_INLINE void run(const std::array<const std::int16_t*, 7>& rows, int count, std::uint8_t* to) {
+    using words = simd::native_vec<std::int16_t, Target>;
+    using sums = simd::native_vec<std::uint32_t, Target>;
+    const auto weights_of = [](std::size_t row) ORBIS_INLINE_LAMBDA {
+      return words::generate([row](std::size_t i)
+                                 ORBIS_INLINE_LAMBDA { return row + i % 2 < 7 ? gaussian_weights[row + i % 2] : 0; });
     };
-    const __m256i a = load(0), b = load(1), c = load(2), d = load(3), e = load(4), f = load(5), g = load(6);
-    const __m256i zero = _mm256_setzero_si256();
-    const __m256i low = _mm256_add_epi32(_mm256_add_epi32(_mm256_madd_epi16(_mm256_unpacklo_epi16(a, b), w01),
-                                                          _mm256_madd_epi16(_mm256_unpacklo_epi16(c, d), w23)),
-                                         _mm256_add_epi32(_mm256_madd_epi16(_mm256_unpacklo_epi16(e, f), w45),
-                                                          _mm256_madd_epi16(_mm256_unpacklo_epi16(g, zero), w6)));
-    const __m256i high = _mm256_add_epi32(_mm256_add_epi32(_mm256_madd_epi16(_mm256_unpackhi_epi16(a, b), w01),
-                                                           _mm256_madd_epi16(_mm256_unpackhi_epi16(c, d), w23)),
-                                          _mm256_add_epi32(_mm256_madd_epi16(_mm256_unpackhi_epi16(e, f), w45),
-                                                           _mm256_madd_epi16(_mm256_unpackhi_epi16(g, zero), w6)));
-    return _mm256_packus_epi32(_mm256_srli_epi32(_mm256_add_epi32(low, bias), 16),
-                               _mm256_srli_epi32(_mm256_add_epi32(high, bias), 16));
-  };
-  for (int x = 0; x < count; x += smooth_lanes)
-    _mm256_storeu_si256(reinterpret_cast<__m256i*>(to + x), _mm256_packus_epi16(half(x), half(x + 16)));
-}
-#endif
+    const words w01 = weights_of(0), w23 = weights_of(2), w45 = weights_of(4), w6 = weights_of(6);
+    const sums bias(0x8000U * 256 + 0x8000U);  // back to unsigned, and half for rounding
+    const auto half_block = [&](int x) ORBIS_INLINE_LAMBDA {
+      const auto row = [&](std::size_t i) ORBIS_INLINE_LAMBDA { return words::load(rows[i] + x); };
+      const words a = row(0), b = row(1), c = row(2), d = row(3), e = row(4), f = row(5), g = row(6);
+      const auto low =
+          multiply_add_pairs(zip_low_in_blocks(a, b), w01) + multiply_add_pairs(zip_low_in_blocks(c, d), w23) +
+          multiply_add_pairs(zip_low_in_blocks(e, f), w45) + multiply_add_pairs(zip_low_in_blocks(g, g), w6);
+      const auto high =
+          multiply_add_pairs(zip_high_in_blocks(a, b), w01) + multiply_add_pairs(zip_high_in_blocks(c, d), w23) +
+          multiply_add_pairs(zip_high_in_blocks(e, f), w45) + multiply_add_pairs(zip_high_in_blocks(g, g), w6);
+      // Words 0 4 1 5 2 6 3 7 of each block of eight.
+      const sums even = (simd::bits_as<std::uint32_t>(low) + bias) >> 16;
+      const sums odd = (simd::bits_as<std::uint32_t>(high) + bias) & sums(0xffff0000U);
+      return words_of_pairs(even, odd);
+    };
+    constexpr int half = static_cast<int>(words::count);
+    for (int x = 0; x < count; x += 2 * half) {
+      const auto pairs = simd::bits_as<std::uint16_t>(interleaved(half_block(x), half_block(x + half)));
+      simd::bits_as<std::uint8_t>(in_order(pairs, std::make_index_sequence<words::count>{})).store(to + x);
+    }
+  }
+
+ private:
+  /// Word 2 i is even[i], word 2 i + 1 is the upper half of odd[i].
+  template <class V>
+  [[nodiscard]] static ORBIS_ALWAYS_INLINE auto words_of_pairs(const V& even, const V& odd) noexcept {
+    if constexpr (std::endian::native == std::endian::little)
+      return simd::bits_as<std::uint16_t>(even | odd);
+    else
+      return simd::bits_as<std::uint16_t>((even << 16) | (odd >> 16));
+  }
+  /// Words that stand as 0 4 1 5 2 6 3 7 in each block of eight.
+  template <class V, std::size_t... I>
+  [[nodiscard]] static ORBIS_ALWAYS_INLINE V in_order(const V& v, std::index_sequence<I...>) noexcept {
+    return simd::shuffle<(I / 8 * 8 + 2 * (I % 4) + I % 8 / 4)...>(v);
+  }
+};
 
 /// Convolves rows `[first, last)` of an image with the 7x7 Gaussian of sigma 2, weights in 1/256, with one
-/// rounding at the end; beyond the edge the image is its reflection (without the edge itself). The same bits
-/// as OpenCV's GaussianBlur with these parameters, at every level. O(pixels).
+/// rounding at the end. Beyond the edge the image continues as its reflection, without the edge itself. The same bits
+/// as OpenCV's GaussianBlur with these parameters. O(pixels).
 /// @pre width >= 4, height >= 4; `to` has the size of `from`, and its rows may be written up to a
-///      multiple of 32 pixels (at the end of the last one, too)
-inline void smooth(simd::level level, image_view<const std::uint8_t> from, image_view<std::uint8_t> to, int first,
-                   int last, smooth_workspace& memory) {
+///      multiple of 64 pixels (at the end of the last one, too)
+inline void smooth(image_view<const std::uint8_t> from, image_view<std::uint8_t> to, int first, int last,
+                   smooth_workspace& memory) {
   const int width = from.width(), height = from.height();
   assert(width >= 4 && height >= 4 && to.width() == width && to.height() == height);
   assert(first >= 0 && last <= height);
-#if ORBIS_X86
-  const auto along = simd::select<smooth_along>(level, {.portable = smooth_along_portable, .avx2 = smooth_along_avx2});
-  const auto across =
-      simd::select<smooth_across>(level, {.portable = smooth_across_portable, .avx2 = smooth_across_avx2});
-#else
-  const auto along = smooth_along_portable;
-  const auto across = smooth_across_portable;
-#endif
-  const auto padded = (static_cast<std::size_t>(width) + smooth_lanes - 1) / smooth_lanes * smooth_lanes;
-  memory.line.resize(std::max(memory.line.size(), padded + 16 + smooth_lanes));
+  const auto along = simd::kernel<smooth_along_kernel, smooth_along_kernel::signature>();
+  const auto across = simd::kernel<smooth_across_kernel, smooth_across_kernel::signature>();
+  const auto padded = (static_cast<std::size_t>(width) + smooth_block - 1) / smooth_block * smooth_block;
+  memory.line.resize(std::max(memory.line.size(), padded + 16 + smooth_block));
   memory.sums.resize(std::max(memory.sums.size(), padded * 8));
   const auto sums_of = [&](int y) { return memory.sums.data() + static_cast<std::size_t>(y & 7) * padded; };
   const auto reflected = [](int at, int size) { return at < 0 ? -at : at >= size ? 2 * size - 2 - at : at; };
@@ -155,9 +140,9 @@ inline void smooth(simd::level level, image_view<const std::uint8_t> from, image
         line[-i] = line[i];
         line[width - 1 + i] = line[width - 1 - i];
       }
-      along(line, width, sums_of(ready));
+      along(line, width, gaussian_weights, sums_of(ready));
     }
-    std::array<const std::uint16_t*, 7> rows;
+    std::array<const std::int16_t*, 7> rows;
     for (int i = 0; i != 7; ++i) rows[static_cast<std::size_t>(i)] = sums_of(reflected(y + i - 3, height));
     across(rows, width, to.data() + y * to.stride());
   }

@@ -3,31 +3,28 @@
 /// The nearest neighbours by any distance: the plain definition.
 #pragma once
 
-#include <algorithm>
 #include <cassert>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <span>
 #include <vector>
 
-namespace orbis::features::detail {
+#include <orbis/features/match.hpp>
 
-/// In place of an index or a distance that does not exist.
-inline constexpr std::uint32_t no_neighbor = std::numeric_limits<std::uint32_t>::max();
+namespace orbis::features::detail {
 
 /// One of the nearest.
 struct neighbor {
-  std::uint32_t index = no_neighbor;
-  std::uint32_t distance = no_neighbor;
+  std::uint32_t index = none;
+  std::uint32_t distance = none;
   friend constexpr bool operator==(const neighbor&, const neighbor&) = default;
 };
 
 /// The nearest of a set, the lowest index on ties, and the distance of the second nearest.
 struct nearest_two {
-  std::uint32_t index = no_neighbor;
-  std::uint32_t distance = no_neighbor;
-  std::uint32_t second_distance = no_neighbor;
+  std::uint32_t index = none;
+  std::uint32_t distance = none;
+  std::uint32_t second_distance = none;
   friend constexpr bool operator==(const nearest_two&, const nearest_two&) = default;
 };
 
@@ -39,7 +36,7 @@ void nearest_by(const Distance& distance, std::span<const Descriptor> queries, s
                 std::span<nearest_two> nearest, std::span<std::uint32_t> reverse,
                 std::vector<std::uint32_t>& reverse_distance) {
   assert(nearest.size() == queries.size() && (reverse.empty() || reverse.size() == trains.size()));
-  reverse_distance.assign(reverse.size(), no_neighbor);
+  reverse_distance.assign(reverse.size(), none);
   const Descriptor* const train = trains.data();
   const std::size_t train_count = trains.size();
   for (std::size_t q = 0; q != queries.size(); ++q) {
@@ -58,27 +55,6 @@ void nearest_by(const Distance& distance, std::span<const Descriptor> queries, s
       }
     }
     nearest[q] = best;
-  }
-}
-
-/// For each query its `k` nearest trains by ascending distance, then index: row `q` begins at
-/// `nearest[q * k]`, and what there are too few trains for is left at the default.
-/// O(queries x trains) distances.
-/// @pre k > 0; nearest.size() == queries.size() * k
-template <class Distance, class Descriptor>
-void k_nearest_by(const Distance& distance, std::span<const Descriptor> queries, std::span<const Descriptor> trains,
-                  std::size_t k, std::span<neighbor> nearest) {
-  assert(k > 0 && nearest.size() == queries.size() * k);
-  std::fill(nearest.begin(), nearest.end(), neighbor{});
-  for (std::size_t q = 0; q != queries.size(); ++q) {
-    const auto row = nearest.subspan(q * k, k);
-    for (std::size_t t = 0; t != trains.size(); ++t) {
-      const auto d = static_cast<std::uint32_t>(distance(queries[q], trains[t]));
-      if (d >= row.back().distance) continue;
-      std::size_t at = k - 1;
-      for (; at != 0 && row[at - 1].distance > d; --at) row[at] = row[at - 1];
-      row[at] = {static_cast<std::uint32_t>(t), d};
-    }
   }
 }
 

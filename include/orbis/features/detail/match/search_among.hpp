@@ -10,7 +10,6 @@
 #include <tuple>
 #include <vector>
 
-#include <orbis/core/simd.hpp>
 #include <orbis/features/detail/match/hamming_listed.hpp>
 #include <orbis/features/hamming.hpp>
 #include <orbis/features/match.hpp>
@@ -33,9 +32,9 @@ struct search_among_workspace {
 /// distance may be used, the Hamming distance of many pairs is fast.
 template <class Distance, class Descriptor, class List>
 requires descriptor_distance<Distance, Descriptor>
-void search_among(const Distance& distance, simd::level level, std::vector<candidate>& candidates,
-                  search_among_workspace& memory, const feature_view<Descriptor>& queries,
-                  const feature_view<Descriptor>& trains, search_needs needs, List&& list) {
+void search_among(const Distance& distance, std::vector<candidate>& candidates, search_among_workspace& memory,
+                  const feature_view<Descriptor>& queries, const feature_view<Descriptor>& trains, search_needs needs,
+                  List&& list) {
   auto& [indices, distances, reverse] = memory;
   reverse.assign(needs.reverse ? trains.descriptors.size() : 0, {});
   candidates.clear();
@@ -48,7 +47,7 @@ void search_among(const Distance& distance, simd::level level, std::vector<candi
     list(q, [&indices = indices](std::uint32_t t) { indices.push_back(t); });
     const auto found = std::span{distances}.first(indices.size());
     if constexpr (std::same_as<Distance, hamming>) {
-      hamming_listed(level, queries.descriptors[q], trains.descriptors, indices, found);
+      hamming_listed(queries.descriptors[q], trains.descriptors, indices, found);
     } else {
       for (std::size_t i = 0; i != indices.size(); ++i)
         found[i] = static_cast<std::uint32_t>(distance(queries.descriptors[q], trains.descriptors[indices[i]]));
