@@ -23,7 +23,7 @@ struct depth_noise {
   [[nodiscard]] constexpr double operator()(double z) const noexcept { return constant + quadratic * z * z; }
 };
 
-/// How a depth is taken from the neighbourhood of a keypoint.
+/// How the depth of a keypoint is found in its neighbourhood.
 struct keypoint_depth_options {
   int radius = 1;               ///< of the window: 1 is 3x3, 2 is 5x5; at most 3
   int min_valid = 3;            ///< pixels with a depth in the window
@@ -34,13 +34,13 @@ struct keypoint_depth_options {
   depth_noise noise{};
 };
 
-/// A depth and how far to trust it, metres.
+/// A depth and its standard deviation, metres.
 struct keypoint_depth {
   double z = 0.0;
   double sigma = 0.0;
 };
 
-/// The depth of a plane through the pixels of a window, by least squares; the insides of `depth_at`.
+/// A plane through the depths of a window, by least squares. `depth_at` uses it.
 class depth_plane {
  public:
   /// A pixel, relative to where the depth is wanted.
@@ -50,7 +50,7 @@ class depth_plane {
     uu_ += u * u, uv_ += u * v, vv_ += v * v;
     uz_ += u * z, vz_ += v * z, zz_ += z * z;
   }
-  /// Whether the pixels say how the plane lies: at least six that are not all in a row.
+  /// Whether the pixels determine a plane: at least six that do not lie on a line.
   [[nodiscard]] bool determined() const noexcept {
     return n_ >= 6 && spread_uu() * spread_vv() - sq(spread_uv()) > 1.0;
   }
@@ -81,8 +81,8 @@ class depth_plane {
 /// the sensor's noise, what the surface departs from the plane, and on a slope the keypoint's own position.
 ///
 /// Empty where too little is valid, where `(x, y)` lies outside the image or is not finite, and where the
-/// window straddles a depth edge: there the pixel belongs to either side, and to which one would be
-/// a guess of decimetres. A few strays (flying pixels) beyond an edge are ignored.
+/// window straddles a depth edge: there the pixel may belong to either side, and a wrong
+/// choice would be wrong by decimetres. A few flying pixels beyond an edge are ignored.
 /// @pre 0 <= radius <= 3
 template <camera::depth_source Depth>
 [[nodiscard]] std::optional<keypoint_depth> depth_at(const Depth& depth, float x, float y,

@@ -26,7 +26,7 @@ class keypoint_grid {
   /// @pre cell_size > 0 (pixels)
   explicit keypoint_grid(std::span<const keypoint> keypoints, float cell_size = 20.0F) { assign(keypoints, cell_size); }
 
-  /// The same in the memory of the grid before. O(n).
+  /// Replaces the contents of the grid, whose memory is used again. O(n).
   /// @pre cell_size > 0 (pixels)
   void assign(std::span<const keypoint> keypoints, float cell_size = 20.0F) {
     assert(cell_size > 0.0F);

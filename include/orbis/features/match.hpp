@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The vocabulary of matching: matches, candidates, what is searched, and what the parts of a
-/// matcher are.
+/// Matches, candidates, and the concepts of the parts of a matcher: sources and stages.
 #pragma once
 
 #include <concepts>
@@ -28,7 +27,7 @@ struct match {
 /// In place of an index or a distance that does not exist.
 inline constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
 
-/// What a search finds for one query, and what the stages of a matcher judge.
+/// What a source finds for one query; stages accept or reject it.
 struct candidate {
   std::uint32_t query = 0;
   std::uint32_t train = 0;               ///< the nearest; the lowest index where several are equally near
@@ -68,7 +67,7 @@ template <describable T>
 using descriptor_of =
     std::remove_const_t<typename decltype(decltype(view_of(std::declval<const T&>()))::descriptors)::element_type>;
 
-/// What the stages behind a source want to know beyond the nearest neighbour.
+/// What the stages behind a source need beyond the nearest neighbour.
 struct search_needs {
   bool reverse = false;    ///< `candidate::reverse_query`
   bool keypoints = false;  ///< the keypoints of both sides, of the caller
@@ -77,7 +76,7 @@ struct search_needs {
   }
 };
 
-/// The memory of a part that needs none.
+/// The workspace of a part that has none.
 struct no_workspace {};
 
 namespace detail {
@@ -92,11 +91,11 @@ struct workspace_of_part<Part> {
 };
 }  // namespace detail
 
-/// What a part of a matcher keeps to use again in the next call: its member type `workspace`, if it has one.
+/// The memory that a part of a matcher uses again in the next call: its member type `workspace`, if it has one.
 template <class Part>
 using workspace_of = typename detail::workspace_of_part<Part>::type;
 
-/// Where a chain begins. It gives the candidates in ascending order of their query, at most one for
+/// The first part of a matcher. It gives the candidates in ascending order of their query, at most one for
 /// each, by `search(candidates, workspace, queries, trains, needs, where...)`, or where memory does not matter by
 /// `search(queries, trains, needs, where...)`, which returns them.
 template <class S>
@@ -104,7 +103,7 @@ concept match_source = requires {
   typename S::match_source_tag;
 };
 
-/// A source that searches such descriptors in memory that it uses again.
+/// A source that searches among descriptors of this type, in a workspace.
 template <class S, class Descriptor, class... Where>
 concept searches_in_place = match_source<S> &&
     requires(const S& source, std::vector<candidate>& candidates, workspace_of<S>& memory,
@@ -112,7 +111,8 @@ concept searches_in_place = match_source<S> &&
   source.search(candidates, memory, view, view, needs, where...);
 };
 
-/// A source that can search such descriptors when it is told `where`: see the source for what it wants to know.
+/// A source that searches among descriptors of this type. `Where` are its further arguments, e.g. the windows of
+/// `windowed`.
 template <class S, class Descriptor, class... Where>
 concept searches = searches_in_place<S, Descriptor, Where...> ||
     (match_source<S>&& requires(const S& source, const feature_view<Descriptor>& view, search_needs needs,
@@ -154,7 +154,7 @@ concept match_filter = std::invocable < const S&,
 template <class S>
 concept match_stage = (match_predicate<S> || match_filter<S>)&&!match_source<S>;
 
-/// What a stage asks for.
+/// What a stage needs.
 template <match_stage S>
 [[nodiscard]] constexpr search_needs needs_of() noexcept {
   if constexpr (requires {

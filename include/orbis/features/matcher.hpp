@@ -61,7 +61,7 @@ class match_chain {
     return matches;
   }
 
-  /// The same into `matches`, which it replaces: with memory that has served for a call of this size
+  /// Replaces the contents of `matches` by the matches. With memory that has served for a call of this size
   /// before, nothing is allocated (by our own parts).
   template <describable Queries, describable Trains, class... Where>
   requires std::same_as<descriptor_of<Queries>, descriptor_of<Trains>> &&
@@ -85,7 +85,7 @@ class match_chain {
     for (const candidate& c : memory.candidates) matches.push_back({c.query, c.train, c.distance});
   }
 
-  /// The same chain with one more stage.
+  /// A copy of this chain with one more stage at its end.
   template <match_stage Stage>
   [[nodiscard]] constexpr auto then(Stage stage) const {
     return match_chain<Source, Stages..., Stage>{source_, std::tuple_cat(stages_, std::tuple<Stage>{std::move(stage)})};

@@ -34,7 +34,7 @@ class node_index {
   node_index& operator=(node_index&&) = default;
   ~node_index() = default;
 
-  /// The same in the memory of the index before.
+  /// Replaces the contents of the index, whose memory is used again. O(n log n).
   void assign(std::span<const std::uint32_t> nodes) {
     order_.clear();
     groups_.clear();

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// ORB features, spread evenly over the image.
+/// ORB features that are spread evenly over the image.
 ///
 /// Source: Rublee, Rabaud, Konolige, Bradski, "ORB: an efficient alternative to SIFT or SURF", ICCV
-/// 2011. Which corners are taken is our own choice: theirs are the strongest, which cluster.
+/// 2011. They take the strongest corners, which cluster; this one covers the image first.
 #pragma once
 
 #include <algorithm>
@@ -37,17 +37,18 @@ namespace orbis::features {
 using detail::fast9, detail::cover_first, detail::strongest, detail::intensity_centroid, detail::upright,
     detail::steered_brief;
 
+/// Options of an ORB extractor.
 struct orb_options {
-  int max_features = 1000;
-  int levels = 8;             ///< of the image pyramid; levels too small for a patch are left out
+  int max_features = 1000;    ///< at most so many
+  int levels = 8;             ///< of the image pyramid; levels that are too small for a patch are left out
   float scale_factor = 1.2F;  ///< between two levels, > 1
   int threshold = 14;         ///< brightness step of a corner (of the slightly smoothed image)
-  int min_threshold = 3;      ///< where nothing reaches `threshold`; the same as it to have only strong ones
+  int min_threshold = 3;      ///< where no corner reaches `threshold`; equal to it: no weaker corners at all
 };
 
-/// Finds keypoints on the levels of an image pyramid and describes them. What finds corners, chooses among
-/// them, turns and describes them are types. Calls on a const object may run at the same time. Between
-/// calls it keeps the memory it works in, one portion for each of the calls that ever ran at once.
+/// Finds keypoints on the levels of an image pyramid and describes them. The parts that find corners, choose among
+/// them, give them a direction and describe them are types. Calls on a const object may run at the same time. The
+/// extractor keeps its working memory for the next call, one piece for each call that ran at the same time.
 template <corner_detector Detector = fast9, corner_selection Distribution = cover_first,
           orientation_estimator Orientation = intensity_centroid, patch_descriptor Descriptor = steered_brief>
 class basic_orb_extractor {
@@ -55,7 +56,7 @@ class basic_orb_extractor {
   using descriptor = typename Descriptor::descriptor;
   using features_type = basic_features<descriptor>;
 
-  /// Keypoints lie at least so many pixels (of their level) from the edge.
+  /// The least distance of a keypoint from the edge, pixels of its level.
   static constexpr int border = std::max<int>(Orientation::radius, Descriptor::reach) + 1;
 
   basic_orb_extractor() = default;
@@ -84,7 +85,7 @@ class basic_orb_extractor {
     return found;
   }
 
-  /// The same for a colour image, by its luma.
+  /// The features of the luma of a colour image (`luma`); the rest as for a grey image.
   [[nodiscard]] features_type operator()(image_view<const rgb8> image, image_view<const std::uint8_t> mask = {},
                                          std::span<const region> regions = {}) const {
     features_type found;
@@ -92,12 +93,12 @@ class basic_orb_extractor {
     return found;
   }
 
-  /// What 16 bits mean only the caller knows: `narrow` them first.
+  /// Deleted: make 8 bits of a 16-bit image by `narrow` first, which needs its range of values.
   features_type operator()(image_view<const std::uint16_t> image, image_view<const std::uint8_t> mask = {},
                            std::span<const region> regions = {}) const = delete;
 
-  /// The same, replacing the contents of `found`: once there was an image of this size with as many corners,
-  /// nothing is allocated.
+  /// Replaces the contents of `found` by the features of an image. Allocates nothing once an image of this size with as
+  /// many corners has been seen.
   void into(features_type& found, image_view<const std::uint8_t> image, image_view<const std::uint8_t> mask = {},
             std::span<const region> regions = {}) const {
     auto memory = kept_.take();
@@ -146,7 +147,7 @@ class basic_orb_extractor {
     for (std::size_t level = 0; level != levels; ++level) describe(found, memory, static_cast<int>(level), image);
   }
 
-  /// Where on a level keypoints can lie: around all regions, without the border.
+  /// The part of a level in which keypoints can lie: what surrounds all regions, without the border.
   [[nodiscard]] static region area_of(image_view<const std::uint8_t> level, image_view<const std::uint8_t> image,
                                       std::span<const region> regions) {
     const auto extent = [](int level_size, int full_size, std::span<const region> all, int region::*from,
@@ -163,7 +164,7 @@ class basic_orb_extractor {
       const auto to_level = [&](double at) {
         return detail::image_pyramid::full_coordinate(at, full_size, level_size);
       };
-      // Half a pixel further on both sides: a keypoint is asked where it lies, rounded to a pixel.
+      // Half a pixel more on both sides, because the position of a keypoint is rounded to a pixel.
       const double begin = std::clamp(std::floor(to_level(first - 0.5)), static_cast<double>(border), 1e9);
       const double end =
           std::clamp(std::ceil(to_level(last + 0.5)) + 1.0, 0.0, static_cast<double>(level_size - border));
@@ -222,7 +223,7 @@ class basic_orb_extractor {
   mutable detail::kept_memory<workspace> kept_;
 };
 
-/// ORB as the field knows it, but evenly spread.
+/// ORB features with the default parts.
 using orb_extractor = basic_orb_extractor<>;
 
 }  // namespace orbis::features

@@ -20,7 +20,7 @@
 
 namespace orbis::features {
 
-/// Where and how a point should appear in an image.
+/// Where a known point should appear in an image, and how it is seen.
 struct projection {
   float x = 0.0F, y = 0.0F;   ///< pixels
   float distance = 1.0F;      ///< from the camera, metres
@@ -29,12 +29,12 @@ struct projection {
   float max_distance = std::numeric_limits<float>::infinity();  ///< from which it appears at the finest level
 };
 
-/// How wide to look around a projection, and at which levels.
+/// How far to search around a projection, and at which pyramid levels.
 struct projection_rule {
   float radius = 4.0F;            ///< of the window around what should appear at the finest level, pixels
-  float slanted = 1.6F;           ///< times as wide where the view differs from the earlier one:
-  float frontal_cosine = 0.998F;  ///< cosine of the angle from which on it does
-  float min_cosine = 0.5F;        ///< below it, the point is not looked for; -1: always
+  float slanted = 1.6F;           ///< factor of the radius where the direction of view differs from the earlier one
+  float frontal_cosine = 0.998F;  ///< cosine of the angle from which on it differs
+  float min_cosine = 0.5F;        ///< below it, the point is not searched; -1: always searched
   float range_tolerance = 0.2F;   ///< share by which the distance may leave the point's range
   int levels = 8;                 ///< of the extractor's pyramid
   float scale_factor = 1.2F;      ///< between them
@@ -90,7 +90,7 @@ void predict_windows(std::vector<window>& windows, const Points& points, const P
 
 /// Finds for each query, the descriptor of a known point, the nearest and the second nearest train
 /// where the point should appear. Made by `projected(distance, rule)`; a chain that begins with it is
-/// called with the points, one for each query, with what projects them, and if one is at hand with the
+/// called with the points, one for each query, with what projects them, and optionally with the
 /// grid over the trains' keypoints:
 ///
 /// @code
@@ -122,7 +122,7 @@ struct projected_source {
     windowed(distance).search(candidates, memory.search, queries, trains, needs, memory.windows, grid);
   }
 
-  /// The same, with a grid made for this one search.
+  /// One candidate for each query that has a train in its window; makes the grid itself, in its workspace.
   template <class Descriptor, class Points, class Project>
   requires descriptor_distance<Distance, Descriptor> && projects<Project, Points>
   void search(std::vector<candidate>& candidates, workspace& memory, const feature_view<Descriptor>& queries,

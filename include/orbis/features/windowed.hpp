@@ -17,17 +17,17 @@
 
 namespace orbis::features {
 
-/// Where to look for one query.
+/// The part of the image in which the match of one query is searched.
 struct window {
   float x = 0.0F, y = 0.0F;  ///< predicted position, pixels; NaN: there is none
-  float radius = -1.0F;      ///< pixels, inclusive; negative: do not look at all
-  int min_octave = 0;        ///< pyramid levels to look at, both inclusive
+  float radius = -1.0F;      ///< pixels, inclusive; negative: no search
+  int min_octave = 0;        ///< pyramid levels to search, both inclusive
   int max_octave = std::numeric_limits<int>::max();
 };
 
 /// Finds for each query the nearest and the second nearest train inside its window. Made by
 /// `windowed(distance)`; a chain that begins with it is called with the windows, one for each query,
-/// and if one is at hand with the grid over the trains' keypoints:
+/// and optionally with a grid over the trains' keypoints:
 ///
 /// @code
 ///   constexpr auto matcher = windowed(hamming{}) | ratio_test{0.8f} | max_distance{100} | unique{};
@@ -61,7 +61,7 @@ struct windowed_source {
     });
   }
 
-  /// The same, with a grid made for this one search.
+  /// One candidate for each query that has a train in its window; makes the grid itself, in its workspace.
   template <class Descriptor>
   requires descriptor_distance<Distance, Descriptor>
   void search(std::vector<candidate>& candidates, workspace& memory, const feature_view<Descriptor>& queries,

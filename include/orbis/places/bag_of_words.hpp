@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// An image as the words of a vocabulary that occur in it, and how much each counts.
+/// An image as a bag of visual words: the words that occur in it, with their values.
 #pragma once
 
 #include <cmath>
@@ -11,7 +11,7 @@
 
 namespace orbis::places {
 
-/// What a word counts for in an image.
+/// How the value of a word in an image is computed.
 enum class weighting : std::uint8_t {
   tf_idf,  ///< how often it occurs, times how rare it is among images
   tf,      ///< how often it occurs
@@ -19,7 +19,7 @@ enum class weighting : std::uint8_t {
   binary   ///< one
 };
 
-/// How the values of a bag are scaled.
+/// How the values of a bag are normalised.
 enum class bag_norm : std::uint8_t {
   none,
   l1,  ///< their sum is 1
@@ -42,11 +42,11 @@ struct bag_of_words {
   friend bool operator==(const bag_of_words&, const bag_of_words&) = default;
 };
 
-/// The most that a word may weigh: values and their sums stay numbers.
+/// The largest weight of a word, so that values and their sums stay finite.
 inline constexpr float largest_weight = 1e20F;
 
-/// Scales the values; words whose value becomes nothing beside the others are left out. Without words, or with `none`,
-/// nothing happens.
+/// Normalises the values; words whose value underflows to zero are erased. Does nothing for an empty bag or for `none`.
+/// O(words).
 inline void normalize(bag_of_words& bag, bag_norm norm) noexcept {
   if (norm == bag_norm::none) return;
   double sum = 0.0;

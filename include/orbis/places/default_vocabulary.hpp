@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A vocabulary to begin with, which needs no file.
+/// A vocabulary for ORB descriptors that needs no file.
 #pragma once
 
 #include <cstddef>
@@ -15,12 +15,11 @@
 
 namespace orbis::places {
 
-/// Words of the descriptors of `features::orb_extractor`, learnt on pictures and rooms that were made up: nobody's
-/// recordings are in it. Takes a few milliseconds: keep what it returns, whose copies cost nothing. One that is trained
-/// on recordings of the places in question, or a larger one, recognises more.
+/// A vocabulary of 10,000 words for the descriptors of `features::orb_extractor`, trained on synthetic pictures and
+/// rooms. Takes a few milliseconds: keep the result, whose copies share the tree. A vocabulary that is trained on
+/// recordings of your own places, or a larger one, recognises more.
 ///
-/// `train_vocabulary` among the examples makes the data again, byte by byte: see the head of
-/// default_vocabulary_data.hpp.
+/// The example `train_vocabulary` makes the same bytes again: see the head of default_vocabulary_data.hpp.
 [[nodiscard]] inline vocabulary default_vocabulary() {
   std::string bytes;
   bytes.reserve(detail::default_vocabulary_size + 4);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Which images have a word.
+/// An inverted index: the images that have a word.
 #pragma once
 
 #include <algorithm>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Keyframes by the words they show, and which of them a new image may show again.
+/// Finds the keyframes that may show the same place as an image, by their visual words.
 #pragma once
 
 #include <algorithm>
@@ -22,13 +22,14 @@
 
 namespace orbis::places {
 
-/// What names a keyframe.
+/// The name of a keyframe: any ordered value that can be hashed.
 template <class Id>
 concept keyframe_id = std::totally_ordered<Id> && std::copyable<Id> && std::default_initializable<Id> &&
     requires(const Id& id) {
   { std::hash<Id>{}(id) } -> std::convertible_to<std::size_t>;
 };
 
+/// Which keyframes a query accepts.
 struct query_options {
   double shared_words =
       0.8;                 ///< a candidate shares more words with the image than this part of the most that one shares
@@ -52,12 +53,12 @@ template <class Id>
 struct query_workspace {
   std::vector<std::uint32_t> shared;   ///< words, by slot
   std::vector<std::uint32_t> touched;  ///< slots that share a word
-  std::vector<double> scores;          ///< by slot, of those scored in the query at hand
+  std::vector<double> scores;          ///< by slot, of those scored in the current query
   std::vector<std::uint32_t> scored;
   std::vector<place_candidate<Id>> groups;
 };
 
-/// Callables for queries that leave nothing out and know no groups.
+/// The default callables of queries: no keyframe is excluded, and none has neighbours.
 struct none_excluded {
   template <class Id>
   [[nodiscard]] constexpr bool operator()(const Id&) const noexcept {
@@ -69,9 +70,9 @@ struct no_neighbors {
   [[nodiscard]] std::span<const Id> operator()(const Id&) const noexcept { return {}; }
 };
 
-/// Keyframes with their bags, in an inverted index. Ids are the caller's; results depend on what is in the database
-/// alone, not on the order or history of additions and erasures. Queries on a const object may run at the same
-/// time, each with memory of its own; adding and erasing needs the object alone.
+/// Keyframes and their bags of words, with an inverted index. The caller chooses the ids. Results depend on the
+/// contents only, not on the order in which keyframes were added and erased. Queries on a const object may run at the
+/// same time, each with memory of its own; adding and erasing needs the object alone.
 ///
 /// Source of the criteria: R. Mur-Artal, J. D. Tardos, "ORB-SLAM: a versatile and accurate monocular SLAM system",
 /// IEEE T-RO 2015, sections III.E and VII.A.
@@ -92,7 +93,7 @@ class basic_keyframe_database {
     return keyframes_[at->second].bag;
   }
 
-  /// Takes a keyframe in; false, and nothing changes, if it is there already. O(words).
+  /// Adds a keyframe; false, and nothing changes, if the id is in use. O(words).
   /// @pre the bag is scaled as the score wants it, by the same vocabulary as all others
   bool add(const Id& id, const bag_of_words& bag) {
     const bool reuse = !free_.empty();
@@ -109,7 +110,7 @@ class basic_keyframe_database {
     return true;
   }
 
-  /// Takes a keyframe out; false if it is not there. O(keyframes that share its words).
+  /// Erases a keyframe; false if there is none of this id. O(keyframes that share its words).
   bool erase(const Id& id) {
     const auto at = slots_.find(id);
     if (at == slots_.end()) return false;
@@ -153,7 +154,7 @@ class basic_keyframe_database {
     gather_groups(memory, options, neighbors);
     keep_best(memory, options, found);
   }
-  /// The same, with memory of its own.
+  /// Returns the candidates; allocates its memory.
   template <std::predicate<const Id&> Exclude = none_excluded, class Neighbors = no_neighbors<Id>>
   [[nodiscard]] std::vector<candidate> query(const bag_of_words& image, const query_options& options = {},
                                              Exclude&& exclude = {}, Neighbors&& neighbors = {}) const {
@@ -278,7 +279,7 @@ class basic_keyframe_database {
   inverted_index index_;
 };
 
-/// Of keyframes that are numbered.
+/// Keyframes with numbers as ids, compared by the L1 score.
 using keyframe_database = basic_keyframe_database<>;
 
 }  // namespace orbis::places

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// How alike two bags of words are: from 0, nothing in common, to 1, the same.
+/// How alike two bags of words are: from 0 (nothing in common) to 1 (equal).
 ///
 /// Each score is a type that says how its bags have to be scaled. They are symmetric to the last bit, and cost one
 /// pass over both bags. Source: D. Nister, H. Stewenius, "Scalable recognition with a vocabulary tree", CVPR 2006
@@ -18,7 +18,7 @@
 
 namespace orbis::places {
 
-/// A measure of likeness of bags that are scaled by its `norm`.
+/// A similarity of two bags that are normalised by its `norm`: from 0 to 1.
 template <class S>
 concept bag_score = std::default_initializable<S> && requires(const S& score, const bag_of_words& bag) {
   { S::norm } -> std::convertible_to<bag_norm>;
@@ -36,7 +36,7 @@ template <class Term>
   while (i != end_i && j != end_j) {
     const std::uint32_t x = i->word, y = j->word;
     if (x == y) sum += term(static_cast<double>(i->value), static_cast<double>(j->value));
-    // Which is less cannot be foreseen: no branches.
+    // Which one is less cannot be predicted: no branches.
     i += x <= y ? 1 : 0;
     j += y <= x ? 1 : 0;
   }

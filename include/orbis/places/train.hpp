@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A vocabulary of what images show.
+/// Trains a vocabulary from the descriptors of images.
 #pragma once
 
 #include <algorithm>
@@ -27,6 +27,7 @@
 
 namespace orbis::places {
 
+/// The shape of the vocabulary, its weights and the effort of training.
 struct training_options {
   std::uint32_t branching = 10;  ///< children of a node, at most; from 2 to 65535
   std::uint32_t depth = 4;       ///< levels below the root, at least 1; branching^depth is the most words there can be

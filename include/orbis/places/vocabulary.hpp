@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A vocabulary: descriptors that look alike are one word.
+/// A vocabulary tree: turns descriptors into visual words and images into bags of words.
 #pragma once
 
 #include <algorithm>
@@ -22,21 +22,22 @@
 
 namespace orbis::places {
 
+/// How descriptors become a bag.
 struct transform_options {
   bag_norm norm = bag_norm::l1;  ///< as the score wants it
   std::uint32_t node_depth = 2;  ///< of the direct index's nodes, levels below the root
 };
 
-/// Memory of a transform, which the next one uses again.
+/// Memory of `transform`, which the next call uses again.
 struct transform_workspace {
   std::vector<std::uint32_t> words, sorted;
 };
 
-/// A tree of descriptors of `Bits` bits: each node's children stand for parts of what it stands for, and a
-/// descriptor goes down from the root to the nearest child each time. The leaves are the words.
+/// A tree of descriptors of `Bits` bits. A descriptor descends from the root to the nearest child at each node; the
+/// leaf that it reaches is its word.
 ///
 /// Immutable, and cheap to copy: copies share the tree. Made by `train`, `read_vocabulary`, `default_vocabulary`
-/// and the readers of other formats. One that is made of nothing has no words.
+/// and the readers of other formats. A default-constructed vocabulary has no words.
 ///
 /// Source: D. Nister, H. Stewenius, "Scalable recognition with a vocabulary tree", CVPR 2006; D. Galvez-Lopez,
 /// J. D. Tardos, "Bags of binary words for fast place recognition in image sequences", IEEE T-RO 2012.
@@ -49,7 +50,7 @@ class basic_vocabulary {
   basic_vocabulary() : tree_{std::make_shared<tree_type>(empty_tree())} {}
   /// @pre a connected tree, see `connect_tree`
   explicit basic_vocabulary(tree_type&& tree) : tree_{std::make_shared<tree_type>(std::move(tree))} {}
-  // Moving is copying: what was moved from still has its words.
+  // A move copies the pointer, so that a vocabulary that was moved from keeps its words.
   basic_vocabulary(const basic_vocabulary&) noexcept = default;
   basic_vocabulary& operator=(const basic_vocabulary&) noexcept = default;
   ~basic_vocabulary() = default;
@@ -86,7 +87,7 @@ class basic_vocabulary {
                    options);
   }
 
-  /// The same, and the direct index: `nodes[i]` becomes descriptor `i`'s node at `options.node_depth` (or its
+  /// As above, and makes the direct index: `nodes[i]` becomes descriptor `i`'s node at `options.node_depth` (or its
   /// leaf, where that is higher), as `features::node_index` takes it.
   template <bit_string_range_of<Bits> Descriptors>
   void transform(const Descriptors& descriptors, bag_of_words& bag, std::vector<std::uint32_t>& nodes,
@@ -96,7 +97,7 @@ class basic_vocabulary {
                    options);
   }
 
-  /// The same, with memory of its own.
+  /// Returns the bag; allocates its memory.
   template <bit_string_range_of<Bits> Descriptors>
   [[nodiscard]] bag_of_words transform(const Descriptors& descriptors, const transform_options& options = {}) const {
     bag_of_words bag;
@@ -136,7 +137,7 @@ class basic_vocabulary {
     normalize(bag, options.norm);
   }
 
-  /// By digits: a comparison sort would take a quarter of a transform's time.
+  /// Radix sort: a comparison sort would take a quarter of the time of a transform.
   void sort(transform_workspace& memory) const {
     if (memory.words.size() < 64) return std::sort(memory.words.begin(), memory.words.end());
     constexpr unsigned digit = 8;
@@ -166,7 +167,7 @@ class basic_vocabulary {
   std::shared_ptr<const tree_type> tree_;
 };
 
-/// For the descriptors of ORB.
+/// A vocabulary for descriptors of 256 bits, such as those of ORB.
 using vocabulary = basic_vocabulary<256>;
 
 }  // namespace orbis::places

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Vocabularies in files of our own: as they lie in memory, so that a million words are there in milliseconds.
+/// Vocabularies in files, in the layout that they have in memory: a million words are read in milliseconds.
 ///
 /// A file is little-endian and the same bytes for the same vocabulary on every machine:
 ///

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Choosing corners: some that cover the image, for the rest the best.
+/// Chooses corners: some that cover the image, then the strongest.
 #pragma once
 
 #include <algorithm>
@@ -15,10 +15,10 @@
 
 namespace orbis::features::detail {
 
-/// First the image is covered: it is cut into square cells, as many as a share of the wanted corners, and
-/// every cell gives the strongest corner that it has on any level. The rest are the strongest of
-/// their levels, wherever they are, because strong corners are found again. That a cell needs one corner and
-/// not one on each level is what leaves room for them. O(n) but for sorting what is chosen.
+/// Covers the image first: it is cut into square cells, as many as a share of the wanted corners, and every cell gives
+/// its strongest corner of all levels. The rest are the strongest corners of their levels, wherever they are, because
+/// strong corners are found again in other images. A cell gives one corner, not one on each level, so that there is
+/// room for these. O(n), and sorting of the chosen corners.
 struct cover_first {
   double share = 0.25;  ///< of the wanted corners, for covering; 0 ... 1: from best found again to best spread
 

@@ -49,7 +49,8 @@ struct fast9 {
     std::vector<float> strongest;        ///< of each cell
   };
 
-  /// The same corners at every level. Circles that leave the image are no corners'. O(pixels of the area).
+  /// Replaces `corners` by those of the area. Pixels whose circle leaves the image are no corners. O(pixels of the
+  /// area).
   /// @pre the area lies in the image; 0 <= weak <= strong <= 254; cell >= 1
   void operator()(image_view<const std::uint8_t> image, const region& area, const corner_thresholds& thresholds,
                   workspace& memory, std::vector<corner>& corners) const {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Memory that is used again by the next call.
+/// Workspaces that later calls use again.
 #pragma once
 
 #include <memory>
@@ -10,9 +10,8 @@
 
 namespace orbis::features::detail {
 
-/// A stock of workspaces: a call takes one and gives it back, so that calls that run at the same time have one
-/// each and calls that follow each other share one. What is not given back (after an exception) is
-/// freed. Copies begin empty.
+/// A pool of workspaces: a call takes one and gives it back. Calls that run at the same time have one each; calls that
+/// follow each other share one. A workspace that is not given back (after an exception) is freed. Copies start empty.
 template <class Workspace>
 class kept_memory {
  public:

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The same image at several scales.
+/// An image pyramid: copies of an image at several scales.
 #pragma once
 
 #include <cassert>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Choosing corners that cover the image evenly.
+/// Numbers of corners for each pyramid level, and the strongest corners.
 #pragma once
 
 #include <algorithm>
@@ -44,7 +44,7 @@ inline void keep_strongest(std::vector<corner>& corners, int wanted) {
   std::sort(corners.begin(), corners.end(), before_in_image);
 }
 
-/// The strongest ones of each level, wherever they are: no spread at all. O(n).
+/// Chooses the strongest corners of each level, wherever they are. O(n).
 struct strongest {
   struct workspace {
     std::vector<int> quotas;

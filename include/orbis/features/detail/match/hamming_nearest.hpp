@@ -22,7 +22,7 @@ namespace orbis::features::detail {
 /// Memory of `hamming_nearest`, which the next call uses again.
 struct hamming_workspace {
   std::vector<slice_query> queries;
-  std::vector<slice_table<4>> table4;  ///< of the block of trains at hand, for registers of up to 256 bits
+  std::vector<slice_table<4>> table4;  ///< of the current block of trains, for registers of up to 256 bits
   std::vector<slice_table<8>> table8;  ///< the same for registers of 512 bits
   std::vector<std::uint32_t> reverse_distance;
 };
@@ -114,7 +114,8 @@ ORBIS_ALWAYS_INLINE void search_slices(std::span<const D> queries, std::span<con
     for (slice<Words>& plane : least) plane.words.fill(~std::uint64_t{0});
     const std::size_t rank = std::min(keep.rank(), block.size());
     std::uint32_t guess = 0;
-    slice_distances<Words> distances;  // of the query at hand; here, as clearing them for each would cost a twelfth
+    slice_distances<Words>
+        distances;  // of the current query; declared here, because clearing them for each costs a twelfth
     slice<Words> below;
 
     for (std::size_t q = 0; q != queries.size(); ++q) {
@@ -122,7 +123,7 @@ ORBIS_ALWAYS_INLINE void search_slices(std::span<const D> queries, std::span<con
       const bool first = limit == none;
       slice_count<Target>(table, workspace.queries[q], first ? guess : limit, distances, below);
       if (first) {
-        // The last queries tell about where the nearest lie; the exact limit costs more.
+        // The limit of the last query is a good guess; the exact one costs more.
         std::size_t found = 0;
         for (std::size_t w = 0; w != Words; ++w) found += simd::ones<Target>(below.words[w] & valid.words[w]);
         if (found < rank || found > 4 * rank + 8) {

@@ -22,7 +22,7 @@ struct search_among_workspace {
     std::uint32_t distance = none;
     std::uint32_t query = none;
   };
-  std::vector<std::uint32_t> indices, distances;  ///< of the trains that the query at hand is compared with
+  std::vector<std::uint32_t> indices, distances;  ///< of the trains that the current query is compared with
   std::vector<nearest_query> reverse;             ///< by train
 };
 
