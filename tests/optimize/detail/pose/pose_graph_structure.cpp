@@ -11,7 +11,7 @@
 
 using namespace orbis;
 using namespace orbis::optimize;
-using detail::pose_graph_structure;
+using optimize::detail::pose_graph_structure;
 
 namespace {
 
@@ -82,7 +82,7 @@ TEST_CASE("A pose graph is checked before it is solved") {
   std::vector<se3> vertices(3);
   auto edges = edges_between({{0, 1}, {1, 2}});
   const auto check = [&](bool semidefinite = false) {
-    const auto found = detail::check_pose_graph<6>(std::span<const se3>(vertices), edges, semidefinite);
+    const auto found = optimize::detail::check_pose_graph<6>(std::span<const se3>(vertices), edges, semidefinite);
     CHECK(found.where == (is_failure(found.status) ? 1U : 0U));
     return found.status;
   };
