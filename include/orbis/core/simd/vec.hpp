@@ -87,7 +87,8 @@ struct vec {
   static_assert(std::is_arithmetic_v<T> && N >= 2 && (N & (N - 1)) == 0, "a power of two of numbers");
   using value_type = T;
   using target_type = Target;
-  using mask_type = mask<sizeof(T), N, Target>;
+  using mask_type = simd::mask<sizeof(T), N, Target>;
+  using mask = mask_type;
   using half = vec<T, N / 2, Target>;
   static constexpr std::size_t count = N;
   static constexpr bool is_native = N * sizeof(T) <= Target::bytes;  ///< it fits into one register

@@ -3,14 +3,12 @@
 /// Unrolled loops and transpositions for the kernels of bundle adjustment.
 #pragma once
 
+#include <cstddef>
 #include <cstring>
 #include <type_traits>
 #include <utility>
 
 #include <orbis/core/lanes.hpp>
-
-/// Behind the parameters of a lambda that kernels call.
-#define ORBIS_INLINE_LAMBDA __attribute__((always_inline))
 
 namespace orbis::optimize::detail {
 
@@ -24,8 +22,9 @@ ORBIS_ALWAYS_INLINE void unroll(const F& f) {
 using quarter = typename simd::lanes<4, 4>::native;
 
 /// Three numbers of eight rows of four: number k of all rows goes to `out[k]`.
-template <int W>
-ORBIS_ALWAYS_INLINE void load_transposed(const double* const* from, simd::lanes<W>* out) {
+template <simd::vector L>
+ORBIS_ALWAYS_INLINE void load_transposed(const double* const* from, L* out) {
+  constexpr std::size_t W = L::target_type::bytes / sizeof(double);
   if constexpr (W == 8) {
     quarter row[8];
     unroll<8>([&](auto i) ORBIS_INLINE_LAMBDA { std::memcpy(&row[i], from[i], sizeof(quarter)); });
@@ -52,20 +51,21 @@ ORBIS_ALWAYS_INLINE void load_transposed(const double* const* from, simd::lanes<
       y = __builtin_shufflevector(yw01, yw23, 0, 1, 4, 5);
       z = __builtin_shufflevector(xz01, xz23, 2, 3, 6, 7);
     };
-    part(0, out[0].low.v, out[1].low.v, out[2].low.v);
-    part(4, out[0].high.v, out[1].high.v, out[2].high.v);
+    part(0, out[0].v.low.v, out[1].v.low.v, out[2].v.low.v);
+    part(4, out[0].v.high.v, out[1].v.high.v, out[2].v.high.v);
   } else {
     double columns[3][8];
     for (int i = 0; i != 8; ++i)
       for (int k = 0; k != 3; ++k) columns[k][i] = from[i][k];
-    for (int k = 0; k != 3; ++k) out[k] = simd::lanes<W>::load(columns[k]);
+    for (int k = 0; k != 3; ++k) out[k] = L::load(columns[k]);
   }
 }
 
 /// Four rows of eight numbers, as eight rows of four: row i of them goes to `to[i] + offset`.
-template <int W>
-ORBIS_ALWAYS_INLINE void store_transposed(const simd::lanes<W>& a, const simd::lanes<W>& b, const simd::lanes<W>& c,
-                                          const simd::lanes<W>& d, double* const* to, int offset) {
+template <simd::vector L>
+ORBIS_ALWAYS_INLINE void store_transposed(const L& a, const L& b, const L& c, const L& d, double* const* to,
+                                          int offset) {
+  constexpr std::size_t W = L::target_type::bytes / sizeof(double);
   if constexpr (W == 8) {
     const auto ab0 = __builtin_shufflevector(a.v, b.v, 0, 8, 2, 10, 4, 12, 6, 14);
     const auto ab1 = __builtin_shufflevector(a.v, b.v, 1, 9, 3, 11, 5, 13, 7, 15);
@@ -92,8 +92,8 @@ ORBIS_ALWAYS_INLINE void store_transposed(const simd::lanes<W>& a, const simd::l
           __builtin_shufflevector(xy0, zw0, 2, 3, 6, 7), __builtin_shufflevector(xy1, zw1, 2, 3, 6, 7)};
       unroll<4>([&](auto i) ORBIS_INLINE_LAMBDA { std::memcpy(to[from + i] + offset, &rows[i], sizeof(quarter)); });
     };
-    part(a.low.v, b.low.v, c.low.v, d.low.v, 0);
-    part(a.high.v, b.high.v, c.high.v, d.high.v, 4);
+    part(a.v.low.v, b.v.low.v, c.v.low.v, d.v.low.v, 0);
+    part(a.v.high.v, b.v.high.v, c.v.high.v, d.v.high.v, 4);
     return;
   }
   if constexpr (W <= 2) {
