@@ -44,17 +44,17 @@ orbis::result<double> map_error(const orbis::point_cloud& cloud, const std::vect
   return error->distance.rmse;
 }
 
-void compare_with_truth(results& r, const frame_source& source, console& say) {
+void compare_with_truth(results& r, const frame_source& source, console& console) {
   if (source.ground_truth.empty()) {
     r.truth_note = "Without ground truth.";
     return;
   }
-  say.stage("comparing");
+  console.stage("comparing");
   auto compared = compare(r.slam->trajectory, source.ground_truth);
   if (!compared) {
     r.truth_note = "Not compared with ground truth.";
     r.warnings.push_back(compared.error().to_string());
-    say.warn(compared.error().to_string());
+    console.warn(compared.error().to_string());
     return;
   }
   r.truth_note = "Compared with ground truth after aligning the trajectories by a rigid motion.";
@@ -64,7 +64,7 @@ void compare_with_truth(results& r, const frame_source& source, console& say) {
     r.truth_note += " The map's error is that of its filtered cloud, brought to the true room by aligning the poses.";
   }
   r.against_truth = *std::move(compared);
-  say.finish("ATE and RPE" + std::string{r.map && r.map->error_m ? ", map error" : ""});
+  console.finish("ATE and RPE" + std::string{r.map && r.map->error_m ? ", map error" : ""});
 }
 
 }  // namespace app

@@ -23,6 +23,6 @@ namespace app {
                                               const std::function<double(const orbis::vec3&)>& surface_distance);
 
 /// Fills in what the source's ground truth tells about `r`; says so where it tells nothing.
-void compare_with_truth(results& r, const frame_source& source, console& say);
+void compare_with_truth(results& r, const frame_source& source, console& console);
 
 }  // namespace app

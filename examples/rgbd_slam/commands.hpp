@@ -8,8 +8,8 @@
 
 namespace app {
 
-[[nodiscard]] exit_code run_slam(const settings& s, console& say);          ///< run, demo
-[[nodiscard]] exit_code evaluate(const settings& s, console& say);          ///< eval
-[[nodiscard]] exit_code map_without_slam(const settings& s, console& say);  ///< map
+[[nodiscard]] exit_code run_slam(const settings& s, console& console);          ///< run, demo
+[[nodiscard]] exit_code evaluate(const settings& s, console& console);          ///< eval
+[[nodiscard]] exit_code map_without_slam(const settings& s, console& console);  ///< map
 
 }  // namespace app

@@ -16,7 +16,7 @@ namespace app {
 [[nodiscard]] std::vector<std::string> filter_names();
 /// The filter that was asked for. @pre s.filter is one of the names
 [[nodiscard]] orbis::mapping::filter_options filter_options(const settings& s);
-/// The same in words.
+/// The filter that was asked for, in words.
 [[nodiscard]] std::string filter_in_words(const settings& s);
 
 }  // namespace app

@@ -11,16 +11,16 @@ int main(int argc, char** argv) {
   if (const auto* code = std::get_if<app::exit_code>(&asked)) return *code;
   app::interrupts::listen();
   const auto& settings = std::get<app::settings>(asked);
-  app::console say{settings.quiet};
+  app::console console{settings.quiet};
   try {
     switch (settings.what) {
       case app::command::run:
-      case app::command::demo: return app::run_slam(settings, say);
-      case app::command::eval: return app::evaluate(settings, say);
-      case app::command::map: return app::map_without_slam(settings, say);
+      case app::command::demo: return app::run_slam(settings, console);
+      case app::command::eval: return app::evaluate(settings, console);
+      case app::command::map: return app::map_without_slam(settings, console);
     }
   } catch (const std::exception& e) {  // no memory, no threads
-    say.error({orbis::errc::unreadable, {}, std::string{"gave up: "} + e.what()});
+    console.error({orbis::errc::unreadable, {}, std::string{"gave up: "} + e.what()});
   }
   return app::bad_input;
 }

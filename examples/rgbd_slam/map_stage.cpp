@@ -86,8 +86,9 @@ std::vector<voxel> occupied_voxels(const tree& map, const orbis::point_cloud& cl
 
 }  // namespace
 
-result<built_map> map_frames(const posed_frames& frames, const frame_source& source, const settings& s, console& say) {
-  say.stage("mapping");
+result<built_map> map_frames(const posed_frames& frames, const frame_source& source, const settings& s,
+                             console& console) {
+  console.stage("mapping");
   orbis::mapping::map_options options;
   options.dense.max_depth = static_cast<float>(s.max_depth);
   options.filter = filter_options(s);
@@ -98,14 +99,14 @@ result<built_map> map_frames(const posed_frames& frames, const frame_source& sou
   options.dense.flying_pixels.emplace();
 
   auto map =
-      orbis::mapping::build_map(orbis::par.with(s.threads), frames, source.camera.model, options, say.progress());
+      orbis::mapping::build_map(orbis::par.with(s.threads), frames, source.camera.model, options, console.progress());
   if (!map && frames.trouble()) return orbis::fail(*frames.trouble());
-  if (map) say.finish(in_words(*map));
+  if (map) console.finish(in_words(*map));
   return map;
 }
 
-built_map map_cloud(orbis::point_cloud cloud, const settings& s, console& say) {
-  say.stage("mapping");
+built_map map_cloud(orbis::point_cloud cloud, const settings& s, console& console) {
+  console.stage("mapping");
   built_map map{.octree = tree{s.resolution}};
   map.cloud = std::move(cloud);
   orbis::mapping::filter_options options = filter_options(s);
@@ -126,12 +127,12 @@ built_map map_cloud(orbis::point_cloud cloud, const settings& s, console& say) {
   };
   map.unfiltered_octree = build(map.cloud.points, map.insert_ms_unfiltered);
   map.octree = build(map.filtered_cloud.points, map.insert_ms);
-  say.finish(in_words(map));
+  console.finish(in_words(map));
   return map;
 }
 
-result<map_results> write_map(built_map map, const settings& s, const std::filesystem::path& folder, console& say) {
-  say.stage("writing");
+result<map_results> write_map(built_map map, const settings& s, const std::filesystem::path& folder, console& console) {
+  console.stage("writing");
   map_results m;
   const auto write = [&](const char* name, const auto& how, std::uintmax_t& bytes) -> result<void> {
     const std::filesystem::path path = folder / name;
@@ -164,7 +165,7 @@ result<map_results> write_map(built_map map, const settings& s, const std::files
   m.voxels = occupied_voxels(map.octree, map.filtered_cloud);
   m.kept = std::move(map.inliers);
   m.cloud = std::move(map.cloud);
-  say.finish("cloud.ply, cloud_filtered.ply, map_unfiltered.bt, map.bt, map.ot");
+  console.finish("cloud.ply, cloud_filtered.ply, map_unfiltered.bt, map.bt, map.ot");
   return m;
 }
 

@@ -18,13 +18,13 @@ using built_map = orbis::mapping::built_map<orbis::octree::occupancy_octree<>>;
 
 /// Keyframes -> dense cloud -> filter -> octree.
 [[nodiscard]] orbis::result<built_map> map_frames(const posed_frames& frames, const frame_source& source,
-                                                  const settings& s, console& say);
+                                                  const settings& s, console& console);
 /// Cloud -> filter -> octree. With an origin all points are scanned from there; without one their
 /// voxels are occupied and nothing is known of the rest.
-[[nodiscard]] built_map map_cloud(orbis::point_cloud cloud, const settings& s, console& say);
+[[nodiscard]] built_map map_cloud(orbis::point_cloud cloud, const settings& s, console& console);
 
 /// Writes the clouds and octrees into `folder`, and counts what is in them.
 [[nodiscard]] orbis::result<map_results> write_map(built_map map, const settings& s,
-                                                   const std::filesystem::path& folder, console& say);
+                                                   const std::filesystem::path& folder, console& console);
 
 }  // namespace app

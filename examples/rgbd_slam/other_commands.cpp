@@ -19,19 +19,19 @@ namespace app {
 namespace {
 
 /// All frames whose pose the ground truth knows.
-orbis::result<posed_frames> frames_with_poses(const frame_source& source, const settings& s, console& say) {
-  say.stage("reading");
+orbis::result<posed_frames> frames_with_poses(const frame_source& source, const settings& s, console& console) {
+  console.stage("reading");
   posed_frames posed{source};
   read_ahead frames{source, s.threads != 1};
   for (std::size_t i = 0; frames.has_next(); ++i) {
     const auto frame = frames.next();
     if (!frame) return orbis::fail(frame.error());
     if (frame->T_world_camera) posed.add(i, *frame->T_world_camera, *frame);
-    say.advance(i + 1, source.frames);
+    console.advance(i + 1, source.frames);
   }
   if (posed.size() == 0)
     return orbis::fail(orbis::errc::no_data, s.input.string(), "no frame has a pose in the ground truth");
-  say.finish(std::to_string(posed.size()) + " of " + std::to_string(source.frames) + " frames have a pose");
+  console.finish(std::to_string(posed.size()) + " of " + std::to_string(source.frames) + " frames have a pose");
   return posed;
 }
 
@@ -42,10 +42,10 @@ struct mapped {
 };
 
 orbis::result<mapped> map_recording(const frame_source& source, const settings& s, const std::filesystem::path& folder,
-                                    console& say) {
-  const auto posed = frames_with_poses(source, s, say);
+                                    console& console) {
+  const auto posed = frames_with_poses(source, s, console);
   if (!posed) return orbis::fail(posed.error());
-  auto map = map_frames(*posed, source, s, say);
+  auto map = map_frames(*posed, source, s, console);
   if (!map) return orbis::fail(map.error());
   results r = begin_results(s, source.title, &source, folder);
   r.truth_note = "Mapped with the poses of the ground truth.";
@@ -60,11 +60,11 @@ void keep_finite(orbis::point_cloud& cloud) {
   if (finite.size() != cloud.size()) cloud = orbis::cloud::extract(cloud, finite);
 }
 
-orbis::result<mapped> map_cloud_file(const settings& s, const std::filesystem::path& folder, console& say) {
+orbis::result<mapped> map_cloud_file(const settings& s, const std::filesystem::path& folder, console& console) {
   if (filter_options(s).kind == orbis::mapping::filter_kind::ray_evidence)
     return orbis::fail(orbis::errc::invalid_argument, s.input.string(),
                        "the filter ray-evidence wants a recording: a cloud has no depth images");
-  say.stage("reading");
+  console.stage("reading");
   auto cloud = orbis::io::read_cloud(s.input);
   if (!cloud) return orbis::fail(cloud.error());
   const std::size_t in_file = cloud->size();
@@ -73,17 +73,17 @@ orbis::result<mapped> map_cloud_file(const settings& s, const std::filesystem::p
   const std::string name = s.input.filename().string();
   const std::string left_out =
       in_file == cloud->size() ? "" : ", " + count_text(in_file - cloud->size()) + " without coordinates left out";
-  say.finish(name + ": " + count_text(cloud->size()) + " points" + left_out);
+  console.finish(name + ": " + count_text(cloud->size()) + " points" + left_out);
   results r = begin_results(s, name, nullptr, folder);
   r.setup.emplace_back("points", count_text(cloud->size()) + left_out);
   r.truth_note = "A cloud, without SLAM.";
-  return mapped{std::move(r), map_cloud(*std::move(cloud), s, say), {}};
+  return mapped{std::move(r), map_cloud(*std::move(cloud), s, console), {}};
 }
 
 }  // namespace
 
-exit_code evaluate(const settings& s, console& say) {
-  const auto give_up = [&](const orbis::error& e) { return say.error(e), bad_input; };
+exit_code evaluate(const settings& s, console& console) {
+  const auto give_up = [&](const orbis::error& e) { return console.error(e), bad_input; };
   const auto estimate = orbis::io::read_trajectory(s.input);
   if (!estimate) return give_up(estimate.error());
   const auto truth = orbis::io::read_trajectory(s.reference);
@@ -92,31 +92,32 @@ exit_code evaluate(const settings& s, console& say) {
   if (!compared) return give_up({compared.error().code, s.input.string(), compared.error().message});
   std::string text = s.json ? accuracy_json(*compared) : accuracy_lines(*compared) + "\n";
   text.pop_back();
-  if (!say.print(text)) return give_up({orbis::errc::write_failed, "standard output", "cannot be written"});
+  if (!console.print(text)) return give_up({orbis::errc::write_failed, "standard output", "cannot be written"});
   return done;
 }
 
-exit_code map_without_slam(const settings& s, console& say) {
-  const auto give_up = [&](const orbis::error& e) { return say.error(e), bad_input; };
+exit_code map_without_slam(const settings& s, console& console) {
+  const auto give_up = [&](const orbis::error& e) { return console.error(e), bad_input; };
   std::error_code ignored;
   std::optional<frame_source> recording;
   if (std::filesystem::is_directory(s.input, ignored)) {
-    auto source = open_source(s, say);
+    auto source = open_source(s, console);
     if (!source) return give_up(source.error());
     recording = *std::move(source);
   }
   const auto inputs = inputs_of(s, recording ? recording->files : std::vector<std::filesystem::path>{});
-  if (const auto lost = find_overwritten(s, inputs)) return say.error(*lost), bad_usage;
+  if (const auto lost = find_overwritten(s, inputs)) return console.error(*lost), bad_usage;
   auto files = result_files::begin(s);
   if (!files) return give_up(files.error());
 
-  auto found = recording ? map_recording(*recording, s, files->folder(), say) : map_cloud_file(s, files->folder(), say);
+  auto found =
+      recording ? map_recording(*recording, s, files->folder(), console) : map_cloud_file(s, files->folder(), console);
   if (!found) return give_up(found.error());
-  auto written = write_map(std::move(found->map), s, files->folder(), say);
+  auto written = write_map(std::move(found->map), s, files->folder(), console);
   if (!written) return give_up(written.error());
   found->r.map = *std::move(written);
-  if (auto done = write_report_files(found->r, found->cameras, *files, say); !done) return give_up(done.error());
-  print_results(found->r, say);
+  if (auto done = write_report_files(found->r, found->cameras, *files, console); !done) return give_up(done.error());
+  print_results(found->r, console);
   return done;
 }
 

@@ -18,13 +18,13 @@ using orbis::result;
 namespace {
 
 /// Notes which files this run makes and which ones of earlier runs stay beside them. `coming`: still to be written.
-void list_files(results& r, const result_files& files, const file_names& coming, console& say) {
+void list_files(results& r, const result_files& files, const file_names& coming, console& console) {
   r.files = files.made(coming);
   r.files_of_earlier_runs = files.of_earlier_runs(r.files);
   if (r.files_of_earlier_runs.empty()) return;
   std::string names;
   for (const std::string& name : r.files_of_earlier_runs) names += (names.empty() ? "" : ", ") + name;
-  say.warn(r.warnings.emplace_back("of an earlier run, and left as they are: " + names));
+  console.warn(r.warnings.emplace_back("of an earlier run, and left as they are: " + names));
 }
 
 }  // namespace
@@ -83,8 +83,8 @@ result<void> write_trajectories(const slam_results& slam, const std::filesystem:
   return orbis::io::write_trajectory(folder / "keyframes.txt", slam.keyframes);
 }
 
-result<void> write_report_files(results& r, const orbis::trajectory& cameras, result_files& files, console& say) {
-  say.stage("report");
+result<void> write_report_files(results& r, const orbis::trajectory& cameras, result_files& files, console& console) {
+  console.stage("report");
   std::vector<orbis::vec3f> points;
   if (r.map) {
     for (const voxel& v : r.map->voxels) points.push_back(v.center);
@@ -93,13 +93,13 @@ result<void> write_report_files(results& r, const orbis::trajectory& cameras, re
   }
   const view_frame frame = find_view_frame(points, cameras);
   if (auto done = write_pictures(r, frame); !done) return done;
-  list_files(r, files, {"summary.json", "report.html"}, say);
-  r.wall_s = say.total();
+  list_files(r, files, {"summary.json", "report.html"}, console);
+  r.wall_s = console.total();
   if (auto done = write_report(r, frame); !done) return done;
-  r.wall_s = say.total();
+  r.wall_s = console.total();
   if (auto done = write_summary(r); !done) return done;
   if (auto done = files.put_in_place(); !done) return done;
-  say.finish("pictures, report.html, summary.json");
+  console.finish("pictures, report.html, summary.json");
   return {};
 }
 
@@ -109,17 +109,17 @@ orbis::error explain_no_start(const results& r, const settings& s) {
       "tracking never started: none of " + std::to_string(r.slam->frames) + " frames shows enough texture with depth"};
 }
 
-exit_code report_no_start(results& r, const orbis::error& why, result_files& files, console& say) {
-  list_files(r, files, {"summary.json"}, say);
-  r.wall_s = say.total();
+exit_code report_no_start(results& r, const orbis::error& why, result_files& files, console& console) {
+  list_files(r, files, {"summary.json"}, console);
+  r.wall_s = console.total();
   auto done = write_summary(r);
   if (done) done = files.put_in_place();
-  if (!done) return say.error(done.error()), bad_input;
-  say.error(why);
+  if (!done) return console.error(done.error()), bad_input;
+  console.error(why);
   return never_tracked;
 }
 
-void print_results(const results& r, console& say) {
+void print_results(const results& r, console& console) {
   std::string text;
   if (r.map) text.append("\n").append(size_table(*r.map)).append("\n\n").append(filter_lines(*r.map)).append("\n");
   if (r.against_truth) text.append("\n").append(accuracy_lines(*r.against_truth)).append("\n");
@@ -129,7 +129,7 @@ void print_results(const results& r, console& say) {
     text.append(buffer);
   }
   text.append("\n  ").append((r.out / "report.html").string()).append(" shows it all; the files are beside it");
-  say.print(text);
+  console.print(text);
 }
 
 }  // namespace app

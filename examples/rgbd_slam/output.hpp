@@ -21,12 +21,12 @@ namespace app {
 [[nodiscard]] orbis::result<void> write_trajectories(const slam_results& slam, const std::filesystem::path& folder);
 /// Writes pictures, report.html and summary.json, and puts all files in place.
 [[nodiscard]] orbis::result<void> write_report_files(results& r, const orbis::trajectory& cameras, result_files& files,
-                                                     console& say);
+                                                     console& console);
 /// That no frame had what it takes.
 [[nodiscard]] orbis::error explain_no_start(const results& r, const settings& s);
 /// Where not a single frame was tracked: summary.json, `why` as a line on stderr, and the code for it.
-[[nodiscard]] exit_code report_no_start(results& r, const orbis::error& why, result_files& files, console& say);
+[[nodiscard]] exit_code report_no_start(results& r, const orbis::error& why, result_files& files, console& console);
 /// The tables, and where the files are, on the terminal.
-void print_results(const results& r, console& say);
+void print_results(const results& r, console& console);
 
 }  // namespace app

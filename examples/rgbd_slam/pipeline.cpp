@@ -11,52 +11,53 @@
 
 namespace app {
 
-exit_code run_slam(const settings& s, console& say) {
-  const auto give_up = [&](const orbis::error& e) { return say.error(e), bad_input; };
+exit_code run_slam(const settings& s, console& console) {
+  const auto give_up = [&](const orbis::error& e) { return console.error(e), bad_input; };
 
   // Read.
-  const auto source = open_source(s, say);
+  const auto source = open_source(s, console);
   if (!source) return give_up(source.error());
-  if (const auto lost = find_overwritten(s, inputs_of(s, source->files))) return say.error(*lost), bad_usage;
+  if (const auto lost = find_overwritten(s, inputs_of(s, source->files))) return console.error(*lost), bad_usage;
   auto files = result_files::begin(s);
   if (!files) return give_up(files.error());
   results r = begin_results(s, source->title, &*source, files->folder());
 
   // Track; some frames become keyframes.
-  const auto attempt = track(*source, s, files->landmark_map(), say);
+  const auto attempt = track(*source, s, files->landmark_map(), console);
   if (!attempt) return give_up(attempt.error());
   const tracked_frames& tracked = *attempt;
   if (tracked.stopped && tracked.slam.frames == 0) return give_up(*tracked.stopped);
   if (tracked.stopped) r.warnings.push_back(explain_stop(tracked, *source).to_string());
-  if (interrupts::requested()) say.warn(r.warnings.emplace_back("interrupted by the user; what was reached is kept"));
-  for (const std::string& note : tracking_notes(tracked, s)) say.warn(r.warnings.emplace_back(note));
+  if (interrupts::requested())
+    console.warn(r.warnings.emplace_back("interrupted by the user; what was reached is kept"));
+  for (const std::string& note : tracking_notes(tracked, s)) console.warn(r.warnings.emplace_back(note));
   if (tracked.missed_map) r.warnings.push_back(explain_miss(tracked, s).to_string());
   r.slam = tracked.slam;
   if (r.slam->tracked == 0 && interrupts::requested())
     return give_up({orbis::errc::cancelled, s.out.string(), "interrupted before a frame was tracked: left as it was"}),
            interrupted;
   if (r.slam->tracked == 0)
-    return report_no_start(r, tracked.missed_map ? explain_miss(tracked, s) : explain_no_start(r, s), *files, say);
+    return report_no_start(r, tracked.missed_map ? explain_miss(tracked, s) : explain_no_start(r, s), *files, console);
   if (auto done = write_trajectories(*r.slam, files->folder()); !done) return give_up(done.error());
 
   // Keyframes -> dense cloud -> filter -> octree -> files.
   if (tracked.keyframes.size() != 0) {
-    auto map = map_frames(tracked.keyframes, *source, s, say);
+    auto map = map_frames(tracked.keyframes, *source, s, console);
     if (!map) return give_up(map.error());
-    auto written = write_map(*std::move(map), s, files->folder(), say);
+    auto written = write_map(*std::move(map), s, files->folder(), console);
     if (!written) return give_up(written.error());
     r.map = *std::move(written);
   }
 
   // Evaluation and report; then all files are put in place.
-  compare_with_truth(r, *source, say);
-  if (auto done = write_report_files(r, r.slam->keyframes, *files, say); !done) return give_up(done.error());
-  print_results(r, say);
+  compare_with_truth(r, *source, console);
+  if (auto done = write_report_files(r, r.slam->keyframes, *files, console); !done) return give_up(done.error());
+  print_results(r, console);
 
   if (tracked.stopped) return give_up(explain_stop(tracked, *source));
   if (tracked.unsaved) return give_up(*tracked.unsaved);
   if (interrupts::requested()) return interrupted;
-  return tracked.missed_map ? (say.error(explain_miss(tracked, s)), never_tracked) : done;
+  return tracked.missed_map ? (console.error(explain_miss(tracked, s)), never_tracked) : done;
 }
 
 }  // namespace app

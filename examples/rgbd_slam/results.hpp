@@ -59,7 +59,7 @@ struct accuracy {
   std::optional<double> rpe_trans_rmse_m, rpe_rot_rmse_deg;
   std::vector<compared_pose> poses;
   orbis::se3 T_truth_estimate;  ///< aligns the estimate's world with the truth's, by the positions (ATE)
-  orbis::se3 T_truth_map;       ///< the same by the poses: well determined on the shortest path
+  orbis::se3 T_truth_map;       ///< aligns them by positions and orientations: well determined on a short path too
 };
 
 /// Frames one after the other.

@@ -85,12 +85,12 @@ std::string describe(const frame_source& source) {
 
 }  // namespace
 
-result<frame_source> open_source(const settings& s, console& say) {
-  say.stage("opening");
+result<frame_source> open_source(const settings& s, console& console) {
+  console.stage("opening");
   auto source = s.what == command::demo ? result<frame_source>{make_synthetic(s)} : open_recording(s);
   if (!source) return source;
-  say.finish(describe(*source));
-  for (const std::string& note : source->notes) say.warn(note);
+  console.finish(describe(*source));
+  for (const std::string& note : source->notes) console.warn(note);
   return source;
 }
 

@@ -34,7 +34,7 @@ struct frame_source {
 };
 
 /// The recording that the settings name; says what it is.
-[[nodiscard]] orbis::result<frame_source> open_source(const settings& s, console& say);
+[[nodiscard]] orbis::result<frame_source> open_source(const settings& s, console& console);
 
 /// Reads the frames of a source in order, one ahead of who asks.
 class read_ahead {

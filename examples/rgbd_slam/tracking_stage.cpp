@@ -29,7 +29,7 @@ using known_poses = std::map<double, se3>;
 
 /// Feeds the frames to SLAM, up to the first that cannot be read, or to Ctrl-C.
 known_poses track_frames(slam_system& slam, const frame_source& source, const settings& s, tracked_frames& out,
-                         console& say) {
+                         console& console) {
   known_poses truth;
   read_ahead frames{source, s.threads != 1};
   for (std::size_t i = 0; frames.has_next() && !interrupts::requested(); ++i) {
@@ -49,8 +49,8 @@ known_poses track_frames(slam_system& slam, const frame_source& source, const se
     }
     if (frame->T_world_camera) truth.emplace(frame->timestamp, *frame->T_world_camera);
     if (found.keyframe) out.keyframes.add(i, {found.map, *found.keyframe}, *frame);
-    say.advance(i + 1, source.frames,
-                std::string{to_string(found.state)} + ", " + std::to_string(out.keyframes.size()) + " keyframes");
+    console.advance(i + 1, source.frames,
+                    std::string{to_string(found.state)} + ", " + std::to_string(out.keyframes.size()) + " keyframes");
   }
   return truth;
 }
@@ -105,8 +105,8 @@ std::string in_words(const slam_results& slam) {
 }  // namespace
 
 orbis::result<tracked_frames> track(const frame_source& source, const settings& s,
-                                    const std::filesystem::path& landmark_map, console& say) {
-  say.stage("tracking");
+                                    const std::filesystem::path& landmark_map, console& console) {
+  console.stage("tracking");
   slam_system slam{source.camera.model, options_for(source, s)};
   if (!s.load_map.empty())
     if (auto loaded = slam.load_map(s.load_map); !loaded) return orbis::fail(loaded.error());
@@ -117,7 +117,7 @@ orbis::result<tracked_frames> track(const frame_source& source, const settings& 
                                ? ""
                                : "\nrgbd_slam: stopping; what was reached is mapped and written. Once more: stop at "
                                  "once, and leave the folder as it was\n");
-  const known_poses truth = track_frames(slam, source, s, out, say);
+  const known_poses truth = track_frames(slam, source, s, out, console);
   slam.wait();
 
   // The results are about the loaded map where the camera was found in it, else about the one with the most frames.
@@ -133,15 +133,15 @@ orbis::result<tracked_frames> track(const frame_source& source, const settings& 
     if (const auto at = truth.find(poses.front().timestamp); at != truth.end())
       T_world_slam = at->second * poses.front().T_world_camera.inverse();
   collect(slam, T_world_slam, out);
-  out.slam.seconds = say.elapsed();
-  say.finish(in_words(out.slam));
+  out.slam.seconds = console.elapsed();
+  console.finish(in_words(out.slam));
 
   // A map that was missed is not replaced by one without it.
   const bool spares_loaded = out.missed_map && is_same_file(s.load_map, s.save_map);
   if (!s.save_map.empty() && !out.slam.trajectory.empty() && !spares_loaded) {
-    say.stage("saving");
+    console.stage("saving");
     if (auto saved = save_map(slam, T_world_slam, landmark_map))
-      say.finish(s.save_map.string());
+      console.finish(s.save_map.string());
     else
       out.unsaved = saved.error();
   }

@@ -29,7 +29,7 @@ struct tracked_frames {
 /// Tracks the source's frames, up to the first that cannot be read, or to Ctrl-C. Errors: a map that cannot be loaded.
 /// `landmark_map`: where the map of landmarks is written, if it is to be saved.
 [[nodiscard]] orbis::result<tracked_frames> track(const frame_source& source, const settings& s,
-                                                  const std::filesystem::path& landmark_map, console& say);
+                                                  const std::filesystem::path& landmark_map, console& console);
 
 /// The error that stopped the tracking, with what was reached. @pre tracked.stopped
 [[nodiscard]] orbis::error explain_stop(const tracked_frames& tracked, const frame_source& source);
