@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// Keyframes spliced into a dense cloud, moved, and read back; the peer is what one would write at first:
+// Keyframes added to a dense cloud, moved, and read back; the peer is what one would write at first:
 // every point un-projected and its sums, in doubles, put into a std::unordered_map.
 #include <array>
 #include <cmath>
@@ -27,7 +27,7 @@ using orbis::bench::depth_keyframes;
 class plain_cloud {
  public:
   explicit plain_cloud(double size) : size_{size} {}
-  void splice(const orbis::mapping::keyframe<>& k, const orbis::camera::pinhole& camera, int stride) {
+  void add_keyframe(const orbis::mapping::keyframe<>& k, const orbis::camera::pinhole& camera, int stride) {
     const orbis::mat4 T = k.T_world_camera.to_matrix();
     for (int y = 0; y < camera.height(); y += stride) {
       for (int x = 0; x < camera.width(); x += stride) {
@@ -63,11 +63,11 @@ class plain_cloud {
 };
 
 /// All keyframes once; the time is that of one of them.
-template <class Splice>
-void each_keyframe(benchmark::State& state, std::size_t count, Splice&& splice) {
+template <class Add>
+void each_keyframe(benchmark::State& state, std::size_t count, Add&& add_keyframe) {
   std::size_t i = 0;
   for (auto _ : state) {
-    splice(i % count);
+    add_keyframe(i % count);
     ++i;
   }
 }
@@ -83,8 +83,8 @@ void add(int stride, double voxel) {
     return [=](benchmark::State& state) {
       const depth_keyframes& scene = depth_keyframes::room();
       orbis::mapping::dense_cloud dense{orbis::camera::ray_table{scene.camera}, options};
-      for (std::size_t i = 0; i != scene.size(); ++i) dense.splice(policy, scene.keyframe(i));
-      each_keyframe(state, scene.size(), [&](std::size_t i) { dense.splice(policy, scene.keyframe(i)); });
+      for (std::size_t i = 0; i != scene.size(); ++i) dense.add_keyframe(policy, scene.keyframe(i));
+      each_keyframe(state, scene.size(), [&](std::size_t i) { dense.add_keyframe(policy, scene.keyframe(i)); });
       state.counters["voxels"] = static_cast<double>(dense.size());
       state.counters["bytes_per_voxel"] = static_cast<double>(dense.memory_bytes()) / static_cast<double>(dense.size());
     };
@@ -95,8 +95,9 @@ void add(int stride, double voxel) {
     row(group + "unordered_map", [=](benchmark::State& state) {
       const depth_keyframes& scene = depth_keyframes::room();
       plain_cloud plain{voxel};
-      for (std::size_t i = 0; i != scene.size(); ++i) plain.splice(scene.keyframe(i), scene.camera, stride);
-      each_keyframe(state, scene.size(), [&](std::size_t i) { plain.splice(scene.keyframe(i), scene.camera, stride); });
+      for (std::size_t i = 0; i != scene.size(); ++i) plain.add_keyframe(scene.keyframe(i), scene.camera, stride);
+      each_keyframe(state, scene.size(),
+                    [&](std::size_t i) { plain.add_keyframe(scene.keyframe(i), scene.camera, stride); });
       state.counters["voxels"] = static_cast<double>(plain.size());
     });
     // What a correction costs: as much as splicing twice.
@@ -104,7 +105,7 @@ void add(int stride, double voxel) {
         [=](benchmark::State& state) {
           const depth_keyframes& scene = depth_keyframes::room();
           orbis::mapping::dense_cloud dense{orbis::camera::ray_table{scene.camera}, options};
-          for (std::size_t i = 0; i != scene.size(); ++i) dense.splice(orbis::seq, scene.keyframe(i));
+          for (std::size_t i = 0; i != scene.size(); ++i) dense.add_keyframe(orbis::seq, scene.keyframe(i));
           bool there = false;
           each_keyframe(state, scene.size(), [&](std::size_t i) {
             auto k = scene.keyframe(i);
@@ -117,7 +118,7 @@ void add(int stride, double voxel) {
         [=](benchmark::State& state) {
           const depth_keyframes& scene = depth_keyframes::room();
           orbis::mapping::dense_cloud dense{orbis::camera::ray_table{scene.camera}, options};
-          for (std::size_t i = 0; i != scene.size(); ++i) dense.splice(orbis::seq, scene.keyframe(i));
+          for (std::size_t i = 0; i != scene.size(); ++i) dense.add_keyframe(orbis::seq, scene.keyframe(i));
           for (auto _ : state) benchmark::DoNotOptimize(dense.cloud());
           state.counters["voxels"] = static_cast<double>(dense.size());
         });

@@ -51,7 +51,7 @@ TEST_CASE("a map is the keyframes' surviving points each seen from its own place
       CHECK_FALSE(map->filter.reason.empty());
 
       orbis::mapping::dense_cloud dense{orbis::camera::ray_table{scene.camera}, options.dense};
-      for (const auto& k : keyframes) dense.splice(orbis::seq, k);
+      for (const auto& k : keyframes) dense.add_keyframe(orbis::seq, k);
       orbis::octree::occupancy_octree<> unfiltered{options.resolution};
       for (std::size_t i = 0; i != keyframes.size(); ++i) {
         unfiltered.integrate(dense.measurements(orbis::seq, keyframes[i], i),
@@ -180,7 +180,7 @@ TEST_CASE("building a map can be watched and stopped") {
     return done <= total;
   };
   REQUIRE(build_map(orbis::seq, scene.keyframes(), scene.camera, {}, watch).has_value());
-  // Spliced, filtered by what they see (which takes two rounds at most), integrated into two octrees.
+  // Added to the cloud, filtered by what they see (which takes two rounds at most), integrated into two octrees.
   CHECK(last == 15);
   CHECK(calls >= 9);
   CHECK(calls <= 15);

@@ -39,7 +39,7 @@ TEST_CASE("every valid depth becomes a coloured point in the world") {
   const orbis::camera::ray_table rays{scene.camera};
   dense_cloud dense{rays, {.stride = 1}};
   const auto k = scene.keyframe(0);
-  const std::size_t measured = dense.splice(orbis::seq, k);
+  const std::size_t measured = dense.add_keyframe(orbis::seq, k);
   CHECK(measured == dense.size());
   const orbis::point_cloud cloud = dense.cloud();
   std::size_t i = 0;
@@ -62,9 +62,9 @@ TEST_CASE("with a voxel size the cloud follows the surface and not the frames") 
   const auto scene = orbis::test::wall_scene(1);
   const orbis::camera::ray_table rays{scene.camera};
   dense_cloud dense{rays, {.stride = 1, .voxel_size = 0.05}};
-  for (int again = 0; again != 5; ++again) dense.splice(orbis::par, scene.keyframe(0));
+  for (int again = 0; again != 5; ++again) dense.add_keyframe(orbis::par, scene.keyframe(0));
   dense_cloud once{rays, {.stride = 1, .voxel_size = 0.05}};
-  once.splice(orbis::seq, scene.keyframe(0));
+  once.add_keyframe(orbis::seq, scene.keyframe(0));
   CHECK(dense.size() == once.size());
   const auto all_points = dense.cloud().points;
   const auto once_points = once.cloud().points;
@@ -79,7 +79,7 @@ TEST_CASE("a keyframe's measurements are those whose point of the cloud is kept"
   for (const double voxel : {0.0, 0.04}) {
     dense_cloud dense{rays, {.stride = 2, .voxel_size = voxel}};
     std::size_t measured = 0;
-    for (std::size_t i = 0; i != 3; ++i) measured += dense.splice(orbis::par.with(2), scene.keyframe(i));
+    for (std::size_t i = 0; i != 3; ++i) measured += dense.add_keyframe(orbis::par.with(2), scene.keyframe(i));
     const std::vector<char> all(dense.size(), 1);
     const std::vector<char> none(dense.size(), 0);
     std::vector<char> half(dense.size(), 0);
@@ -105,10 +105,10 @@ TEST_CASE("without colour images the cloud has no colours") {
   const auto scene = orbis::test::wall_scene(2);
   dense_cloud dense{orbis::camera::ray_table{scene.camera}};
   auto k = scene.keyframe(0);
-  dense.splice(orbis::seq, k);
+  dense.add_keyframe(orbis::seq, k);
   CHECK(dense.cloud().has_colors());
   k.color = {};
-  dense.splice(orbis::seq, k);
+  dense.add_keyframe(orbis::seq, k);
   CHECK_FALSE(dense.cloud().has_colors());
   dense.remove(orbis::seq, k, 1);
   CHECK(dense.cloud().has_colors());
@@ -124,13 +124,13 @@ TEST_CASE("keyframes that are moved leave no trace where they were") {
         dense_options{.stride = 1, .voxel_size = 0.01, .flying_pixels = orbis::cloud::flying_pixel_options{}}}) {
     INFO("voxel size " << options.voxel_size);
     dense_cloud wanted{rays, options};
-    for (std::size_t i = 0; i != 6; ++i) wanted.splice(orbis::seq, right.keyframe(i));
+    for (std::size_t i = 0; i != 6; ++i) wanted.add_keyframe(orbis::seq, right.keyframe(i));
     REQUIRE(wanted.size() > 0);
 
     for (const unsigned threads : {1U, 2U, 5U}) {
       const auto policy = orbis::par.with(threads);
       dense_cloud dense{rays, options};
-      for (std::size_t i = 0; i != 6; ++i) dense.splice(policy, wrong.keyframe(i));
+      for (std::size_t i = 0; i != 6; ++i) dense.add_keyframe(policy, wrong.keyframe(i));
       CHECK_FALSE(same(dense, wanted));
       CHECK(dense.reassemble(policy, right.keyframes()) == 5);  // the first had not drifted
       CHECK(same(dense, wanted));
@@ -155,7 +155,7 @@ TEST_CASE("keyframes that are moved leave no trace where they were") {
       CHECK(dense.cloud().empty());
       CHECK(same(dense, dense_cloud{rays, options}));
       CHECK(dense.reassemble(policy, right.keyframes()) == 0);
-      for (std::size_t i = 0; i != 6; ++i) dense.splice(policy, right.keyframe(i));
+      for (std::size_t i = 0; i != 6; ++i) dense.add_keyframe(policy, right.keyframe(i));
       CHECK(same(dense, wanted));
     }
   }
@@ -167,8 +167,8 @@ TEST_CASE("with a voxel size the order of the keyframes does not matter") {
   const dense_options options{.stride = 1, .voxel_size = 0.03};
   dense_cloud forth{rays, options};
   dense_cloud back{rays, options};
-  for (std::size_t i = 0; i != 4; ++i) forth.splice(orbis::par, scene.keyframe(i));
-  for (std::size_t i = 4; i-- > 0;) back.splice(orbis::seq, scene.keyframe(i));
+  for (std::size_t i = 0; i != 4; ++i) forth.add_keyframe(orbis::par, scene.keyframe(i));
+  for (std::size_t i = 4; i-- > 0;) back.add_keyframe(orbis::seq, scene.keyframe(i));
   CHECK(same(forth, back));
 }
 
@@ -179,16 +179,16 @@ TEST_CASE("a removed keyframe is as if it had never been there") {
     const dense_options options{.stride = 1, .voxel_size = voxel};
     dense_cloud without{rays, options};
     dense_cloud dense{rays, options};
-    for (std::size_t i = 0; i != 4; ++i) dense.splice(orbis::seq, scene.keyframe(i));
+    for (std::size_t i = 0; i != 4; ++i) dense.add_keyframe(orbis::seq, scene.keyframe(i));
     for (std::size_t i = 0; i != 4; ++i) {
-      if (i != 1) without.splice(orbis::seq, scene.keyframe(i));
+      if (i != 1) without.add_keyframe(orbis::seq, scene.keyframe(i));
     }
     dense.remove(orbis::seq, scene.keyframe(1), 1);
     CHECK(same(dense, without));
     // Numbers stay what they were.
     CHECK(dense.measurements(orbis::seq, scene.keyframe(2), 2) ==
           without.measurements(orbis::seq, scene.keyframe(2), 1));
-    dense.splice(orbis::seq, scene.keyframe(1));
+    dense.add_keyframe(orbis::seq, scene.keyframe(1));
     CHECK(dense.contains(4));
   }
 }
@@ -198,7 +198,7 @@ TEST_CASE("memory follows the surface, whatever moves over it") {
   const auto elsewhere = drifted(drifted(drifted(scene)));
   const orbis::camera::ray_table rays{scene.camera};
   dense_cloud dense{rays, {.stride = 1, .voxel_size = 0.01}};
-  for (std::size_t i = 0; i != 8; ++i) dense.splice(orbis::seq, scene.keyframe(i));
+  for (std::size_t i = 0; i != 8; ++i) dense.add_keyframe(orbis::seq, scene.keyframe(i));
   dense.reassemble(orbis::seq, elsewhere.keyframes());
   dense.reassemble(orbis::seq, scene.keyframes());
   const std::size_t voxels = dense.size();
@@ -210,7 +210,7 @@ TEST_CASE("memory follows the surface, whatever moves over it") {
   CHECK(dense.size() == voxels);
   CHECK(dense.memory_bytes() <= before + before / 20);
   // And whatever is added on top.
-  for (int pass = 0; pass != 50; ++pass) dense.splice(orbis::seq, scene.keyframe(0));
+  for (int pass = 0; pass != 50; ++pass) dense.add_keyframe(orbis::seq, scene.keyframe(0));
   CHECK(dense.size() == voxels);
   CHECK(dense.memory_bytes() <= before + before / 10);
 }
@@ -227,7 +227,7 @@ TEST_CASE("a voxel holds the mean of what was measured in it") {
   };
   std::map<std::array<int, 3>, sum> voxels;
   for (std::size_t i = 0; i != 3; ++i) {
-    CHECK(every.splice(orbis::seq, scene.keyframe(i)) == merged.splice(orbis::seq, scene.keyframe(i)));
+    CHECK(every.add_keyframe(orbis::seq, scene.keyframe(i)) == merged.add_keyframe(orbis::seq, scene.keyframe(i)));
   }
   const auto cell = [&](const orbis::vec3f& p) {
     std::array<int, 3> out{};
@@ -269,9 +269,9 @@ TEST_CASE("flying pixels never become points") {
     const auto k = scene.keyframe(0);
     orbis::image<float> filtered{64, 48};
     const auto count = orbis::cloud::remove_flying_pixels(orbis::seq, k.depth, filtered.view());
-    const std::size_t measured = all.splice(orbis::seq, k);
+    const std::size_t measured = all.add_keyframe(orbis::seq, k);
     CHECK(measured == count.valid);
-    CHECK(fewer.splice(orbis::par, k) == count.valid - count.removed);
+    CHECK(fewer.add_keyframe(orbis::par, k) == count.valid - count.removed);
     CHECK(fewer.measurements(orbis::seq, k, 0).size() == count.valid - count.removed);
     CHECK(count.removed > 50);
     CHECK(fewer.flying_pixels() == count);
@@ -286,7 +286,7 @@ TEST_CASE("an image without depth adds nothing") {
   scene.depth[0] = orbis::image<std::uint16_t>(64, 48, 0);
   for (const double voxel : {0.0, 0.02}) {
     dense_cloud dense{orbis::camera::ray_table{scene.camera}, {.voxel_size = voxel}};
-    CHECK(dense.splice(orbis::par, scene.keyframe(0)) == 0);
+    CHECK(dense.add_keyframe(orbis::par, scene.keyframe(0)) == 0);
     CHECK(dense.size() == 0);
     CHECK(dense.measurements(orbis::par, scene.keyframe(0), 0).empty());
     dense.remove(orbis::par, scene.keyframe(0), 0);

@@ -54,11 +54,11 @@ TEST_CASE("a map whose drift is corrected is the map without drift") {
        {dense_options{.stride = 2}, dense_options{.stride = 1, .voxel_size = 0.02},
         dense_options{.stride = 1, .voxel_size = 0.05, .flying_pixels = orbis::cloud::flying_pixel_options{}}}) {
     dense_cloud wanted{rays, options};
-    for (const auto& k : right.keyframes()) wanted.splice(orbis::seq, k);
+    for (const auto& k : right.keyframes()) wanted.add_keyframe(orbis::seq, k);
     dense_cloud live{rays, options};
     std::size_t number = 0;
     for (const auto& k : wrong.keyframes()) {
-      live.splice(orbis::par.with(2), k);
+      live.add_keyframe(orbis::par.with(2), k);
       // Half-way the first half is corrected for the first time, a little.
       if (++number == 6) {
         auto half = wrong.keyframes();
@@ -87,7 +87,7 @@ TEST_CASE("rays leave a real kitchen its surfaces") {
   const auto camera = recording.camera().model;
   const orbis::camera::ray_table rays{camera};
   dense_cloud dense{rays, {.voxel_size = 0.01}};
-  for (const auto& k : keyframes) dense.splice(orbis::par, k);
+  for (const auto& k : keyframes) dense.add_keyframe(orbis::par, k);
   const auto cloud = dense.cloud();
   const auto inliers = orbis::cloud::ray_evidence_inliers(orbis::par, cloud.points, keyframes, camera);
   // What goes lies along the edges of things, where the sensor makes them wider than they are.

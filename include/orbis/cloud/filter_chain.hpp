@@ -63,7 +63,7 @@ struct log_line {
 };
 
 /// Removes what the views exclude: points that rays pass through, and with `need_support` points that
-/// no view measured, stray pixels (`settled_depth`) not counted. Needs the views.
+/// no view measured, stray pixels (`remove_stray_pixels`) not counted. Needs the views.
 struct ray_step {
   ray_evidence_options evidence{.resolve_ghosts = false, .ratio = 0.5};
   std::vector<std::uint32_t> distrusted{};  ///< views, by number, that count as no evidence

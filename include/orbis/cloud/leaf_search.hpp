@@ -32,11 +32,8 @@ namespace orbis::cloud {
 /// those with the lowest indices, except where k points and more lie at the query itself. The same results
 /// for every policy and processor. Memory: about 20 bytes per point. `const` use is thread-safe and
 /// allocates nothing but what the results need.
-class leaf_search {
+class leaf_search : public neighbor_queries<leaf_search, float> {
  public:
-  using scalar = float;
-  using query = std::array<float, 3>;
-
   /// @pre fewer than 2^32 points
   template <execution_policy Policy, point_range Points>
   leaf_search(const Policy& policy, const Points& points)
@@ -47,26 +44,6 @@ class leaf_search {
   explicit leaf_search(const Points& points) : leaf_search(seq, points) {}
 
   [[nodiscard]] std::size_t size() const noexcept { return tree_.finite; }
-
-  /// The `min(k, size())` points nearest to `q`, nearest first. @pre q is finite
-  void knn(const query& q, std::size_t k, std::vector<neighbor<float>>& out) const { nearest(q, k, out); }
-  /// The same with squared distances.
-  void knn_squared(const query& q, std::size_t k, std::vector<squared_neighbor<float>>& out) const {
-    nearest(q, k, out);
-  }
-  /// All points within `r` metres of `q`, nearest first. @pre q is finite, r >= 0
-  void radius(const query& q, float r, std::vector<neighbor<float>>& out) const {
-    radius_sink<float> sink{r, out};
-    visit(q, sink);
-    sink.finish();
-  }
-  /// All points at a squared distance of at most `r_squared`, with squared distances, nearest first.
-  /// @pre q is finite, r_squared >= 0
-  void radius_squared(const query& q, float r_squared, std::vector<squared_neighbor<float>>& out) const {
-    auto sink = radius_sink<float, squared_neighbor<float>>::within_squared(r_squared, out);
-    visit(q, sink);
-    sink.finish();
-  }
 
   /// Reports to `sink` every point within its bound, near leaves first.
   template <neighbor_sink<float> Sink>
@@ -102,6 +79,7 @@ class leaf_search {
   }
 
  private:
+  friend neighbor_queries<leaf_search, float>;
   static constexpr std::size_t most_levels = 8;  // 2^32 points make seven
   struct box_to_visit {
     float distance;       ///< squared
@@ -162,13 +140,9 @@ class leaf_search {
     if (k == 0) return;
     const float bound = sufficient_bound(q, k);
     if (k <= few) {
-      bounded_sink<Neighbor> sink{k, bound, out};
-      visit(q, sink);
-      sink.finish();
+      collect(q, bounded_sink<Neighbor>{k, bound, out});
     } else {
-      selecting_sink<Neighbor> sink{k, bound, out};
-      visit(q, sink);
-      sink.finish();
+      collect(q, selecting_sink<Neighbor>{k, bound, out});
     }
   }
   /// A squared distance within which there are k points: of those about the leaf nearest to `q`.

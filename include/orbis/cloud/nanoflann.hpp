@@ -17,64 +17,37 @@
 
 #include <nanoflann.hpp>
 
-#include <orbis/cloud/detail/knn/leaf_hierarchy.hpp>
 #include <orbis/cloud/detail/knn/squared_distance.hpp>
 #include <orbis/cloud/detail/select/decision.hpp>
 #include <orbis/cloud/neighbors.hpp>
-#include <orbis/core/execution.hpp>
 #include <orbis/core/point.hpp>
 
 namespace orbis::cloud {
-
-/// Asks `nanoflann_search` for a copy of the points along a space-filling curve.
-struct reordered_t {};
-inline constexpr reordered_t reordered{};
 
 /// A k-d tree over `points`, which must outlive it and stay as they are. Points that are not finite
 /// are left out. Building takes O(n log n), a query O(log n + k) on usual clouds; identical points do
 /// no harm. Memory: about 20 bytes per point, and the indices of the finite ones where not all are.
 ///
-/// The tree reads the points where they are, at random: where a cloud has no order in memory (shuffled, out of
-/// a hash), queries of a large one wait for memory most of the time. `nanoflann_search{points, reordered}`
-/// copies the points along a Hilbert curve first; the cloud need not outlive it then.
+/// The tree reads the points where they are, at random: where a large cloud has no order in memory (shuffled, out of
+/// a hash), queries wait for memory most of the time, and `leaf_search`, which orders a copy, is faster.
 /// @pre fewer than 2^32 points
 template <point_range Points>
-class nanoflann_search {
+class nanoflann_search
+    : public neighbor_queries<nanoflann_search<Points>, point_scalar_t<std::ranges::range_value_t<Points>>> {
+  using queries = neighbor_queries<nanoflann_search<Points>, point_scalar_t<std::ranges::range_value_t<Points>>>;
+
  public:
-  using scalar = point_scalar_t<std::ranges::range_value_t<Points>>;
-  using query = std::array<scalar, 3>;
+  using scalar = typename queries::scalar;
+  using query = typename queries::query;
 
   explicit nanoflann_search(const Points& points, std::size_t leaf_size = 12)
       : data_{points}, tree_{3, data_, nanoflann::KDTreeSingleIndexAdaptorParams(leaf_size)} {}
   nanoflann_search(Points&&, std::size_t = 0) = delete;  // would not outlive the constructor
-  /// Over a copy of the points in an order that suits memory: 16 bytes per point more (28 for double), and
-  /// the same results, except perhaps for which of several points at exactly the k-th distance is reported.
-  nanoflann_search(const Points& points, reordered_t /*tag*/, std::size_t leaf_size = 12)
-      : data_{points, reordered}, tree_{3, data_, nanoflann::KDTreeSingleIndexAdaptorParams(leaf_size)} {}
   nanoflann_search(const nanoflann_search&) = delete;
   nanoflann_search& operator=(const nanoflann_search&) = delete;
 
   [[nodiscard]] std::size_t size() const noexcept { return data_.kdtree_get_point_count(); }
 
-  /// The `min(k, size())` points nearest to `q`, nearest first. @pre q is finite
-  void knn(const query& q, std::size_t k, std::vector<neighbor<scalar>>& out) const { nearest(q, k, out); }
-  /// The same with squared distances.
-  void knn_squared(const query& q, std::size_t k, std::vector<squared_neighbor<scalar>>& out) const {
-    nearest(q, k, out);
-  }
-  /// All points within `r` metres of `q`, nearest first. @pre q is finite, r >= 0
-  void radius(const query& q, scalar r, std::vector<neighbor<scalar>>& out) const {
-    radius_sink<scalar> sink{r, out};
-    visit(q, sink);
-    sink.finish();
-  }
-  /// All points at a squared distance of at most `r_squared`, with squared distances, nearest first.
-  /// @pre q is finite, r_squared >= 0
-  void radius_squared(const query& q, scalar r_squared, std::vector<squared_neighbor<scalar>>& out) const {
-    auto sink = radius_sink<scalar, squared_neighbor<scalar>>::within_squared(r_squared, out);
-    visit(q, sink);
-    sink.finish();
-  }
   /// Reports to `sink` every point within its bound, in no particular order (and, harmlessly, some
   /// that are further).
   template <neighbor_sink<scalar> Sink>
@@ -85,15 +58,6 @@ class nanoflann_search {
   }
 
  private:
-  template <class Neighbor>
-  void nearest(const query& q, std::size_t k, std::vector<Neighbor>& out) const {
-    out.clear();
-    if (k == 0) return;
-    nearest_sink<scalar, Neighbor> sink{k, out};
-    visit(q, sink);
-    sink.finish();
-  }
-
   /// nanoflann's view of the points.
   struct dataset {
     explicit dataset(const Points& p) : points{&p} {
@@ -108,21 +72,9 @@ class nanoflann_search {
         if (i < first_bad || is_finite(at(i))) finite.push_back(i);
       }
     }
-    dataset(const Points& p, reordered_t /*tag*/) : points{&p}, some_left_out{true} {
-      const detail::leaf_order<Points> order{seq, p, std::numeric_limits<std::size_t>::max()};
-      finite.reserve(order.entries().size());
-      copies.reserve(order.entries().size());
-      for (const auto& entry : order.entries()) {
-        finite.push_back(entry.index);
-        copies.push_back(coordinates<scalar>(at(entry.index)));
-      }
-      points = nullptr;
-    }
     [[nodiscard]] decltype(auto) at(std::uint32_t i) const { return detail::point_at(*points, i); }
     [[nodiscard]] std::uint32_t original(std::uint32_t i) const noexcept { return some_left_out ? finite[i] : i; }
-    [[nodiscard]] query position(std::uint32_t i) const {
-      return points == nullptr ? copies[i] : coordinates<scalar>(at(original(i)));
-    }
+    [[nodiscard]] query position(std::uint32_t i) const { return coordinates<scalar>(at(original(i))); }
 
     [[nodiscard]] std::size_t kdtree_get_point_count() const noexcept {
       return some_left_out ? finite.size() : std::ranges::size(*points);
@@ -135,9 +87,8 @@ class nanoflann_search {
       return false;
     }
 
-    const Points* points;               ///< null where they are copied
+    const Points* points;
     std::vector<std::uint32_t> finite;  ///< original indices of the points that are searched
-    std::vector<query> copies;          ///< their positions
     bool some_left_out = false;
   };
 

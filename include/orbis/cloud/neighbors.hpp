@@ -155,4 +155,43 @@ class radius_sink {
   std::vector<Neighbor>* out_;
 };
 
+/// The four queries of `neighbor_search`, for a search that derives from this and has `size()` and
+/// `visit(query, sink)`, which reports to the sink every point within its bound. All are `const` and thread-safe.
+template <class Search, std::floating_point S>
+class neighbor_queries {
+ public:
+  using scalar = S;
+  using query = std::array<S, 3>;
+
+  /// The `min(k, size())` points nearest to `q`, nearest first. @pre q is finite
+  void knn(const query& q, std::size_t k, std::vector<neighbor<S>>& out) const { self().nearest(q, k, out); }
+  /// The same points with squared distances.
+  void knn_squared(const query& q, std::size_t k, std::vector<squared_neighbor<S>>& out) const {
+    self().nearest(q, k, out);
+  }
+  /// All points within `r` metres of `q`, nearest first. @pre q is finite, r >= 0
+  void radius(const query& q, S r, std::vector<neighbor<S>>& out) const { collect(q, radius_sink<S>{r, out}); }
+  /// All points at a squared distance of at most `r_squared`, with squared distances, nearest first.
+  /// @pre q is finite, r_squared >= 0
+  void radius_squared(const query& q, S r_squared, std::vector<squared_neighbor<S>>& out) const {
+    collect(q, radius_sink<S, squared_neighbor<S>>::within_squared(r_squared, out));
+  }
+
+ protected:
+  template <class Sink>
+  void collect(const query& q, Sink sink) const {
+    self().visit(q, sink);
+    sink.finish();
+  }
+  /// By a heap; a search may have a faster one of its own.
+  template <class Neighbor>
+  void nearest(const query& q, std::size_t k, std::vector<Neighbor>& out) const {
+    out.clear();
+    if (k != 0) collect(q, nearest_sink<S, Neighbor>{k, out});
+  }
+
+ private:
+  [[nodiscard]] const Search& self() const noexcept { return static_cast<const Search&>(*this); }
+};
+
 }  // namespace orbis::cloud

@@ -61,7 +61,7 @@ struct built_map {
   std::size_t skipped = 0;                     ///< keyframes without a finite pose
 };
 
-/// Splices the keyframes into a cloud, filters it, and integrates each keyframe's own measurements,
+/// Adds the keyframes to a cloud, filters it, and integrates each keyframe's own measurements,
 /// those whose point of the cloud survived, with rays from where that keyframe was. Filtering the
 /// whole cloud lets one keyframe's points judge another's; the automatic filter asks the keyframes'
 /// depth images as well which points their rays pass through.
@@ -97,7 +97,7 @@ template <scan_map Octree = octree::occupancy_octree<>, execution_policy Policy,
     return image.width() == camera.width() && image.height() == camera.height();
   };
   const auto finite_pose = [](const auto& k) { return se3(k.T_world_camera).to_matrix().allFinite(); };
-  const std::size_t looks = looks_at_views(options.filter);
+  const std::size_t looks = view_passes(options.filter);
   const std::size_t passes = (options.unfiltered_octree ? 3U : 2U) + looks;
   const std::size_t total = passes * std::ranges::size(keyframes);
   std::size_t done = 0;
@@ -110,7 +110,7 @@ template <scan_map Octree = octree::occupancy_octree<>, execution_policy Policy,
       return fail(errc::invalid_argument, "keyframes", "an image is not of the camera's size");
     }
     if (finite_pose(k)) {
-      dense.splice(policy, k);
+      dense.add_keyframe(policy, k);
     } else {
       ++map.skipped;
     }

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Keyframes' depth images spliced into one cloud in the world, and moved in it when their poses are
-/// corrected.
+/// The points of all keyframes' depth images as one cloud in the world, which follows corrections of their poses.
 #pragma once
 
 #include <algorithm>
@@ -50,17 +49,17 @@ class dense_cloud {
     assert(options.stride > 0 && options.voxel_size >= 0);
   }
 
-  /// Adds a keyframe's points; returns how many measurements there were. The keyframe's number is that of
-  /// those spliced before it. Colours are kept if every keyframe has them.
+  /// Adds a keyframe's points; returns how many measurements there were. The keyframe's number is the count
+  /// of those added before it. Colours are kept if every keyframe has them.
   /// O(pixels). @pre the images have the size of the ray table; the pose is finite; with a voxel size, fewer than
   /// 2^22 measurements in a voxel
   template <execution_policy Policy, keyframe_like Keyframe>
-  std::size_t splice(const Policy& policy, const Keyframe& k) {
+  std::size_t add_keyframe(const Policy& policy, const Keyframe& k) {
     frames_.push_back({});
     return put(policy, k, frames_.size() - 1);
   }
   /// Takes back keyframe `number`. Only the images of `k` are looked at.
-  /// O(pixels). @pre it was spliced with the same images and has not been removed
+  /// O(pixels). @pre it was added with the same images and has not been removed
   template <execution_policy Policy, keyframe_like Keyframe>
   void remove(const Policy& policy, const Keyframe& k, std::size_t number) {
     assert(contains(number));
@@ -76,14 +75,14 @@ class dense_cloud {
     f = {};
   }
   /// Moves keyframe `number` to the pose that `k` has now. O(pixels).
-  /// @pre it was spliced with the same images and has not been removed; the pose is finite
+  /// @pre it was added with the same images and has not been removed; the pose is finite
   template <execution_policy Policy, keyframe_like Keyframe>
   void move(const Policy& policy, const Keyframe& k, std::size_t number) {
     remove(policy, k, number);
     put(policy, k, number);
   }
   /// Moves all keyframes whose pose has changed in any bit; returns how many. `keyframes`: all that were
-  /// spliced, in that order; those that were removed are passed over. O(pixels of those that moved).
+  /// added, in that order; those that were removed are passed over. O(pixels of those that moved).
   template <execution_policy Policy, keyframe_range Keyframes>
   std::size_t reassemble(const Policy& policy, const Keyframes& keyframes) {
     assert(std::ranges::size(keyframes) == frames_.size());
@@ -99,7 +98,7 @@ class dense_cloud {
     return moved;
   }
 
-  /// Whether keyframe `number` was spliced and not removed.
+  /// Whether keyframe `number` was added and not removed.
   [[nodiscard]] bool contains(std::size_t number) const noexcept {
     return number < frames_.size() && frames_[number].present;
   }
@@ -176,7 +175,7 @@ class dense_cloud {
     }
     return out;
   }
-  /// The measurements of keyframe `number` in the world, where it was spliced or moved to last, of those
+  /// The measurements of keyframe `number` in the world, where it was added or moved to last, of those
   /// alone whose point of the cloud is in `kept`. Only the images of `k` are looked at. O(pixels).
   /// @pre contains(number), and its images are those of `k`
   template <execution_policy Policy, keyframe_like Keyframe>

@@ -169,13 +169,13 @@ template <execution_policy Policy, point_range Points>
 }
 
 /// How often `filter_points` looks at each view.
-[[nodiscard]] constexpr std::size_t looks_at_views(const filter_options& options) noexcept {
+[[nodiscard]] constexpr std::size_t view_passes(const filter_options& options) noexcept {
   if (options.kind == filter_kind::ray_evidence) return options.ray_evidence.resolve_ghosts ? 2 : 1;
   return options.kind == filter_kind::automatic ? 2 : 0;
 }
 
 /// The same, and the automatic filter listens to the views that the points come from, too.
-/// `on_progress` counts the views, as often as they are looked at (`looks_at_views`); if it cancels, all points
+/// `on_progress` counts the views, as often as they are looked at (`view_passes`); if it cancels, all points
 /// stay. @pre the images have the camera's size
 template <execution_policy Policy, point_range Points, cloud::posed_depth_range Views, camera::camera_model Camera>
 [[nodiscard]] filtered_indices filter_points(const Policy& policy, const Points& points, std::span<const float> ranges,

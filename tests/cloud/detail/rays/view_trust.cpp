@@ -44,7 +44,7 @@ TEST_CASE("stray pixels are replaced and surfaces are not") {
   depth(12, 20) = 0.0F;
   orbis::image<float> out;
   const orbis::camera::depth_view<float> view{depth};
-  orbis::cloud::detail::settled_depth(orbis::seq, view, 0.02F, 0.005F, out);
+  orbis::cloud::detail::remove_stray_pixels(orbis::seq, view, 0.02F, 0.005F, out);
   CHECK(out(10, 10) == 2.0F);
   CHECK(out(30, 15) == Approx(2.2).margin(0.05));
   CHECK(out(12, 20) == 0.0F);
@@ -54,6 +54,6 @@ TEST_CASE("stray pixels are replaced and surfaces are not") {
     for (int x = 1; x != 39; ++x) changed += out(x, y) != depth(x, y) ? 1 : 0;
   CHECK(changed <= 4);  // the two, and the ends of the pole
   orbis::image<float> together;
-  orbis::cloud::detail::settled_depth(orbis::par.with(3), view, 0.02F, 0.005F, together);
+  orbis::cloud::detail::remove_stray_pixels(orbis::par.with(3), view, 0.02F, 0.005F, together);
   CHECK(together == out);
 }

@@ -43,7 +43,7 @@ template <camera::depth_source Depth>
 
 /// Whether two of the pixels around agree with depth `z`, or two opposite ones with their mean: a
 /// surface seen flat has no two pixels of one depth.
-[[nodiscard]] inline bool is_settled(float z, const std::array<float, 8>& around, float margin) noexcept {
+[[nodiscard]] inline bool agrees_with_neighbors(float z, const std::array<float, 8>& around, float margin) noexcept {
   int agree = 0;
   for (const float other : around) agree += other > 0 && std::abs(other - z) <= margin ? 1 : 0;
   if (agree >= 2) return true;
@@ -61,7 +61,8 @@ template <camera::depth_source Depth>
 /// depth. A stray pixel would testify for itself, and silence the rays of all pixels around it. O(pixels).
 /// `out` is resized if it has another size.
 template <execution_policy Policy, camera::depth_source Depth>
-void settled_depth(const Policy& policy, const Depth& depth, float margin, float margin_growth, image<float>& out) {
+void remove_stray_pixels(const Policy& policy, const Depth& depth, float margin, float margin_growth,
+                         image<float>& out) {
   if (out.width() != depth.width() || out.height() != depth.height()) out = image<float>(depth.width(), depth.height());
   for_each_index(policy, static_cast<std::size_t>(depth.height()), 16, [&](std::size_t row) {
     const int y = static_cast<int>(row);
@@ -70,7 +71,7 @@ void settled_depth(const Policy& policy, const Depth& depth, float margin, float
       out(x, y) = z;
       if (!(z > 0)) continue;
       std::array<float, 8> around = depths_around(depth, x, y);
-      if (is_settled(z, around, margin + margin_growth * z * z)) continue;
+      if (agrees_with_neighbors(z, around, margin + margin_growth * z * z)) continue;
       const auto end = std::remove_if(around.begin(), around.end(), [](float d) { return !(d > 0); });
       const auto count = end - around.begin();
       out(x, y) = 0;
@@ -84,16 +85,16 @@ void settled_depth(const Policy& policy, const Depth& depth, float margin, float
 /// Views with the stray pixels of their depth replaced, one at a time.
 /// Calls `f(number, view)` for each; false from `f` ends it, and is returned.
 template <execution_policy Policy, posed_depth_range Views, class F>
-bool for_each_settled_view(const Policy& policy, const Views& views, const ray_evidence_options& options, F&& f) {
-  struct settled_view {
+bool for_each_cleaned_view(const Policy& policy, const Views& views, const ray_evidence_options& options, F&& f) {
+  struct cleaned_view {
     camera::depth_view<float> depth;
     se3 T_world_camera;
   };
   image<float> depth;
   std::uint32_t number = 0;
   for (const auto& view : views) {
-    settled_depth(policy, view.depth, options.margin, options.margin_growth, depth);
-    if (!f(number++, settled_view{camera::depth_view<float>(depth), view.T_world_camera})) return false;
+    remove_stray_pixels(policy, view.depth, options.margin, options.margin_growth, depth);
+    if (!f(number++, cleaned_view{camera::depth_view<float>(depth), view.T_world_camera})) return false;
   }
   return true;
 }
@@ -157,8 +158,8 @@ template <execution_policy Policy, posed_depth_range Views, camera::camera_model
         const int x = (2 * i + 1) * camera.width() / (2 * options.samples);
         const int y = (2 * j + 1) * camera.height() / (2 * options.samples);
         const float z = view.depth(x, y);
-        if (!(z > 0) ||
-            !is_settled(z, depths_around(view.depth, x, y), evidence.margin + evidence.margin_growth * z * z))
+        if (!(z > 0) || !agrees_with_neighbors(z, depths_around(view.depth, x, y),
+                                               evidence.margin + evidence.margin_growth * z * z))
           continue;
         const auto ray = camera.unproject({x, y});
         if (!ray) continue;
@@ -172,7 +173,7 @@ template <execution_policy Policy, posed_depth_range Views, camera::camera_model
   std::vector<std::vector<view_verdict>> verdicts(count);  // for each view that has a part in them
   ray_evidence_counter<Camera> counter{policy, samples, camera, evidence};
   std::vector<ray_evidence> before = counter.scores();
-  const bool finished = for_each_settled_view(policy, views, evidence, [&](std::uint32_t by, const auto& view) {
+  const bool finished = for_each_cleaned_view(policy, views, evidence, [&](std::uint32_t by, const auto& view) {
     counter.add(policy, view);
     std::vector<ray_evidence> scores = counter.scores();  // of all views so far
     for (std::size_t begin = 0; begin != place.size();) {

@@ -36,7 +36,7 @@ ray_removals apply_rays(const Policy& policy, const Points& points, const ray_st
                         const Camera& camera, std::span<char> left, bool& cancelled, progress on_progress) {
   ray_evidence_counter<Camera> counter{policy, points, camera, step.evidence};
   const std::size_t count = std::ranges::size(views);
-  cancelled = !for_each_settled_view(policy, views, step.evidence, [&](std::uint32_t number, const auto& view) {
+  cancelled = !for_each_cleaned_view(policy, views, step.evidence, [&](std::uint32_t number, const auto& view) {
     if (!std::ranges::binary_search(step.distrusted, number)) counter.add(policy, view);
     return on_progress(number + 1, count);
   });
