@@ -1,6 +1,19 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
 /// Camera models, depth images and rays.
+///
+/// | header | what it is for |
+/// | --- | --- |
+/// | `model.hpp` | the concept `camera_model` |
+/// | `intrinsics.hpp` | image size and camera matrix |
+/// | `pinhole.hpp, radial_tangential.hpp, kannala_brandt.hpp` | the camera models |
+/// | `any.hpp` | a camera whose model is known at run time only |
+/// | `parameters.hpp` | parameters of a camera and derivatives by them, for calibration |
+/// | `presets.hpp, settings.hpp` | the cameras of the usual recordings; what `camera.toml` says |
+/// | `depth.hpp, rgbd_frame.hpp` | depth images; a colour image with its depth image |
+/// | `rays.hpp, world_point.hpp, cloud.hpp` | rays of pixels; points of pixels in the world; points of a depth image |
+/// | `undistort.hpp` | images without distortion |
+/// | `project_lanes.hpp` | eight points at a time, for adjustments; to be included by itself |
 #pragma once
 
 #include <orbis/camera/any.hpp>
