@@ -134,10 +134,17 @@ inline constexpr std::size_t slice_words = Target::bytes == 64 ? 8 : 4;
 template <class Target>
 using slice_plane = simd::vec<std::uint64_t, Target::bytes / 8, Target>;
 
-/// Bit `i` of `limit` for all trains.
+template <std::size_t Words>
+inline constexpr std::array<slice<Words>, 2> constant_slices = [] {
+  std::array<slice<Words>, 2> zeros_and_ones{};
+  zeros_and_ones[1].words.fill(~std::uint64_t{0});
+  return zeros_and_ones;
+}();
+
+/// Bit `i` of `limit` for all trains: a load, because a broadcast from a scalar costs several instructions.
 template <class Target>
 [[nodiscard]] ORBIS_ALWAYS_INLINE slice_plane<Target> limit_plane(std::uint32_t limit, std::size_t i) noexcept {
-  return slice_plane<Target>(std::uint64_t{0} - ((limit >> i) & 1U));
+  return slice_plane<Target>::load(constant_slices<slice_words<Target>>[(limit >> i) & 1U].words.data());
 }
 
 #if ORBIS_X86
