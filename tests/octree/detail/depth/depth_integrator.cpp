@@ -82,10 +82,10 @@ void require_walked(double resolution, const Depth& depth, const Camera& camera,
                     const integration_options& options = {}) {
   const voxel_grid grid{resolution};
   const walked expected{grid, depth, camera, pose, options};
-  for (const simd::level level : {simd::level::portable, simd::level::avx2, simd::level::avx512}) {
-    if (level > simd::detected()) continue;
+  for (const simd::level level : simd::available_levels()) {
+    const simd::level_limit limit{level};
     INFO("resolution " << resolution << ", level " << static_cast<int>(level));
-    depth_integrator marker{level};
+    depth_integrator marker;
     scan_masks found;
     const auto summary = marker.mark(seq, grid, depth, camera, pose, options, found);
     REQUIRE(differences(expected.marker.masks(), found, nothing_saturated{}) == 0);

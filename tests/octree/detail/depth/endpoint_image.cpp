@@ -20,8 +20,6 @@ using namespace orbis::octree::detail;
 
 namespace {
 
-constexpr std::array<simd::level, 3> all_levels{simd::level::portable, simd::level::avx2, simd::level::avx512};
-
 template <class T>
 [[nodiscard]] image<T> random_image(random_bits& random, int width, int height) {
   image<T> pixels{width, height};
@@ -35,9 +33,9 @@ void require_ends(const Depth& depth, const camera::pinhole& camera, const se3& 
                   double max_range) {
   const depth_sensor sensor{grid, pose, max_range};
   const camera::ray_table table{camera};
-  for (const simd::level level : all_levels) {
-    if (level > simd::detected()) continue;
-    endpoint_image rays{level};
+  for (const simd::level level : simd::available_levels()) {
+    const simd::level_limit limit{level};
+    endpoint_image rays;
     scan_masks found, expected;
     const auto counts = rays.find_ends(seq, sensor, depth, camera, found);
     octree::detail::end_counts one_by_one;

@@ -50,12 +50,14 @@ TEST_CASE("A ray that surely crosses a voxel is walked through it, and one that 
       traverse_ray(grid, sensor.pose.centre, *sensor.key, end.point, end.key,
                    [&](const voxel_key& k) { walked = walked || k == voxel; });
       REQUIRE(crossed == walked);
-      const auto answer = test.test(x, y, end.z);
-      yes += answer == voxel_test::answer::yes ? 1 : 0;
-      no += answer == voxel_test::answer::no ? 1 : 0;
-      unsure += answer == voxel_test::answer::unsure ? 1 : 0;
-      if (answer == voxel_test::answer::yes) REQUIRE(crossed);
-      if (answer == voxel_test::answer::no) REQUIRE_FALSE(crossed);
+      using floats = simd::vec<float, 4, simd::portable>;
+      const auto answer = test_rays(test, floats(x), floats(y), floats(end.z), floats::mask_type::first(4));
+      const bool is_sure = any(answer.sure), is_unsure = any(answer.may) && !is_sure;
+      yes += is_sure ? 1 : 0;
+      no += none(answer.may) ? 1 : 0;
+      unsure += is_unsure ? 1 : 0;
+      if (is_sure) REQUIRE(crossed);
+      if (none(answer.may)) REQUIRE_FALSE(crossed);
       // What a tile of one direction cannot cross, the ray does not cross.
       if (!test.may_cross(x, x, y, y)) REQUIRE_FALSE(crossed);
     }

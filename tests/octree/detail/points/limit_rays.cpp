@@ -22,6 +22,27 @@ constexpr float infinite = std::numeric_limits<float>::infinity();
 
 [[nodiscard]] bool has(const ray_batch::bits& bits, std::size_t i) { return (bits[i >> 6U] >> (i & 63U) & 1U) != 0; }
 
+/// The rays to some points, one after the other.
+void one_by_one(const ray_frame& f, const point_batch& points, const double* limits, std::size_t count,
+                ray_batch& rays) {
+  rays.clear();
+  for (std::size_t i = 0; i != count; ++i) {
+    float3 end{points.x[i], points.y[i], points.z[i]};
+    const float3 ray = difference(end, f.origin);
+    const double distance = length(ray);
+    const bool hit = distance <= limits[i];
+    if (!hit) {
+      if (!(limits[i] >= 0.0) || !std::isfinite(static_cast<float>(distance))) continue;
+      end = cut_off(f.origin, ray, distance, limits[i]);
+    }
+    if (const auto k = f.grid.key(end))
+      rays.set(i, end,
+               {static_cast<std::int32_t>(k->x - f.from.x), static_cast<std::int32_t>(k->y - f.from.y),
+                static_cast<std::int32_t>(k->z - f.from.z)},
+               hit);
+  }
+}
+
 }  // namespace
 
 TEST_CASE("Every instruction set finds the same ends of rays, bit for bit") {
@@ -47,9 +68,10 @@ TEST_CASE("Every instruction set finds the same ends of rays, bit for bit") {
     }
     const float3 origin{static_cast<float>(random.uniform(-2.0, 2.0)), 0.05F, run % 3 == 0 ? 0.0F : 0.3F};
     const octree::detail::ray_frame frame{grid, origin, *grid.key(origin)};
-    octree::detail::limit_rays(simd::level::portable)(frame, *points, limits.data(), count, *want);
-    for (const auto level : {simd::level::avx2, simd::level::avx512}) {
-      octree::detail::limit_rays(level)(frame, *points, limits.data(), count, *got);
+    one_by_one(frame, *points, limits.data(), count, *want);
+    for (const simd::level level : simd::available_levels()) {
+      const simd::level_limit limit{level};
+      limit_rays()(frame, *points, limits.data(), count, *got);
       REQUIRE(got->hit == want->hit);
       REQUIRE(got->cut == want->cut);
       for (std::size_t i = 0; i != count; ++i) {
@@ -77,9 +99,10 @@ TEST_CASE("A ray ends at its point or at its limit") {
   std::array<double, point_batch::capacity> limits{2.0, 2.0, -1.0, 2.0};
   const octree::detail::ray_frame frame{grid, {0.05F, 0.0F, 0.0F}, *grid.key(float3{0.05F, 0.0F, 0.0F})};
   auto rays = std::make_unique<ray_batch>();
-  for (const auto level : {simd::level::portable, simd::level::avx2, simd::level::avx512}) {
+  for (const simd::level level : simd::available_levels()) {
+    const simd::level_limit limit{level};
     limits[1] = 1.51;
-    octree::detail::limit_rays(level)(frame, *points, limits.data(), 4, *rays);
+    limit_rays()(frame, *points, limits.data(), 4, *rays);
     CHECK(rays->hit == ray_batch::bits{1});
     CHECK(rays->cut == ray_batch::bits{2});
     CHECK(rays->way[0][0] == 10);

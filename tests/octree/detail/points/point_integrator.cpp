@@ -279,62 +279,6 @@ TEST_CASE("Points of any type and layout mark the same voxels") {
   }
 }
 
-TEST_CASE("Every instruction set loads the same points") {
-  random_bits random{200};
-  for (std::size_t count = 0; count <= octree::detail::point_batch::capacity; ++count) {
-    const auto points = random_scan(random, count + 1, 1.0);
-    auto want = std::make_unique<octree::detail::point_batch>(), got = std::make_unique<octree::detail::point_batch>();
-    octree::detail::load_triples_portable(points[0].data(), count, *want);
-#if ORBIS_X86
-    const auto check_level = [&](simd::level level, auto* load) {
-      if (simd::detected() < level) return;
-      *got = {};
-      load(points[0].data(), count, *got);
-      const auto same = [&](const auto& a, const auto& b) {
-        return std::equal(a.begin(), a.begin() + static_cast<std::ptrdiff_t>(count), b.begin());
-      };
-      REQUIRE(same(want->x, got->x));
-      REQUIRE(same(want->y, got->y));
-      REQUIRE(same(want->z, got->z));
-    };
-    check_level(simd::level::avx2, octree::detail::load_triples_avx2);
-    check_level(simd::level::avx512, octree::detail::load_triples_avx512);
-#endif
-  }
-}
-
-TEST_CASE("Every instruction set finds the same voxels of points") {
-  random_bits random{197};
-  auto batch = std::make_unique<octree::detail::point_batch>();
-  auto want = std::make_unique<octree::detail::batch_keys>();
-  auto got = std::make_unique<octree::detail::batch_keys>();
-  for (int run = 0; run != 300; ++run) {
-    const voxel_grid grid{0.1, 8};  // 25.6 m wide
-    const std::size_t count = random.below(octree::detail::point_batch::capacity + 1);
-    for (std::size_t i = 0; i != count; ++i)
-      for (auto* axis : {&batch->x, &batch->y, &batch->z}) {
-        float& c = (*axis)[i];
-        c = i != 0 && random.below(3) != 0 ? (*axis)[i - 1] : static_cast<float>(random.uniform(-13.5, 13.5));
-        if (random.below(4) == 0) c = std::round(c * 10.0F) * 0.1F;
-        if (random.below(40) == 0) c = not_a_number;
-        if (random.below(40) == 0) c = 1e30F;
-      }
-    octree::detail::find_keys_portable(grid, *batch, count, *want);
-    for (const auto level : {simd::level::avx2, simd::level::avx512}) {
-      octree::detail::find_keys(level)(grid, *batch, count, *got);
-      REQUIRE(got->outside == want->outside);
-      // Which repetitions are left out may differ behind a point outside.
-      const auto listed = [](const octree::detail::batch_keys& keys) {
-        std::vector<voxel> all;
-        for (std::size_t i = 0; i != keys.count; ++i)
-          if (const voxel v{keys.x[i], keys.y[i], keys.z[i]}; all.empty() || all.back() != v) all.push_back(v);
-        return all;
-      };
-      REQUIRE(listed(*got) == listed(*want));
-    }
-  }
-}
-
 TEST_CASE("The second of two equal scans allocates nothing") {
   random_bits random{198};
   const auto points = random_scan(random, 20000, 2.0);

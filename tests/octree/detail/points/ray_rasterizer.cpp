@@ -45,9 +45,10 @@ void check(const voxel_grid& grid, const float3& origin, const std::vector<ray>&
     walked.mark_ray(grid, origin, *from, r.end, *to);
     if (r.hit) walked.mark_occupied(*to);
   }
-  for (const auto level : {simd::level::portable, simd::level::avx2, simd::level::avx512}) {
+  for (const simd::level level : simd::available_levels()) {
+    const simd::level_limit limit{level};
     scan_masks swept;
-    sweep.start(grid, origin, *from, level);
+    sweep.start(grid, origin, *from);
     for (const ray& r : rays) {
       sweep.add(r.end, *grid.key(r.end), r.hit, swept);
       if (r.hit) swept.mark_occupied(*grid.key(r.end));

@@ -11,7 +11,7 @@ using namespace orbis::octree::detail;
 namespace {
 
 template <sensor_model M>
-void check_update(simd::level level) {
+void check_update() {
   using value_type = typename M::value_type;
   random_bits random{3};
   block<value_type> b;
@@ -26,7 +26,7 @@ void check_update(simd::level level) {
     const std::uint64_t occupied = random() & random();
     const std::uint64_t free = random() & ~occupied;
     const block<value_type> before = b;
-    const std::uint64_t changed = update_block<M>(b, free, occupied, level);
+    const std::uint64_t changed = update_block<M>(b, free, occupied);
     REQUIRE(b.known == (before.known | free | occupied));
     for (unsigned k = 0; k != 64; ++k) {
       const value_type v = before.value[k];
@@ -42,8 +42,11 @@ void check_update(simd::level level) {
 }  // namespace
 
 TEST_CASE("Sixty-four voxels at once get what one voxel would get at every instruction set") {
-  for (const simd::level level : {simd::level::portable, simd::level::avx2, simd::level::avx512}) {
-    check_update<log_odds<float>>(level);
-    check_update<log_odds<double>>(level);
+  for (const simd::level level : simd::available_levels()) {
+    const simd::level_limit limit{level};
+    check_update<log_odds<float>>();
+    check_update<log_odds<double>>();
+    check_update<log_odds<std::int16_t>>();
+    check_update<log_odds<std::int8_t>>();
   }
 }

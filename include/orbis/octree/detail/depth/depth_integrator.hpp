@@ -47,32 +47,10 @@ struct nothing_saturated {
 /// free if one of its pixels' rays crosses it. Where rounding could decide, the ray is walked.
 class depth_integrator {
  public:
-  explicit depth_integrator(simd::level level = simd::detected()) noexcept
-      : classify_{simd::select<classify_kernel>(level,
-                                                {
-                                                  .portable = classify_children_portable,
-#if ORBIS_X86
-                                                  .popcnt = nullptr, .avx2 = classify_children_avx2
-#endif
-                                                })},
-        sample_{simd::select<sample_kernel>(level,
-                                            {
-                                              .portable = sample_children_portable,
-#if ORBIS_X86
-                                              .popcnt = nullptr, .avx2 = sample_children_avx2
-#endif
-                                            })},
-        test_pixels_{simd::select<test_kernel>(level,
-                                               {
-                                                 .portable = test_pixels_portable,
-#if ORBIS_X86
-                                                 .popcnt = nullptr, .avx2 = test_pixels_avx2,
-                                                 .avx512 = test_pixels_avx512
-#endif
-                                               })},
-        rays_{level},
-        pyramid_{level} {
-  }
+  depth_integrator() noexcept
+      : classify_{simd::kernel<classify_children_kernel, classify_kernel, simd::avx2>()},
+        sample_{simd::kernel<sample_children_kernel, sample_kernel, simd::avx2>()},
+        test_pixels_{simd::kernel<test_pixels_kernel, test_kernel>()} {}
 
   /// Marks, in `masks`, what every_ray integration of the image's world points marks (see
   /// append_world_points), except that voxels for which `saturated` says that a miss would not change

@@ -16,10 +16,6 @@
 
 #include <orbis/core/simd.hpp>
 
-#if ORBIS_X86
-#include <immintrin.h>
-#endif
-
 namespace orbis::octree::detail {
 
 /// What a cell of the pyramid holds: in the upper half the farthest depth in it, rounded up, and in
@@ -28,72 +24,56 @@ namespace orbis::octree::detail {
   return std::max(a & 0xffff0000U, b & 0xffff0000U) | std::max(a & 0xffffU, b & 0xffffU);
 }
 
-/// Two rows of depths to one row of cells of 2x2: `strict` counts a missing depth as 0, `some` leaves
-/// it out (0 if all are missing). Reads up to 16 values past the last cell's.
-inline void first_cells_portable(const float* upper, const float* lower, float scale, int cells, std::uint32_t* strict,
-                                 std::uint32_t* some) noexcept {
-  const auto word = [&](float z) {
-    const auto q = static_cast<std::uint32_t>(static_cast<std::int32_t>(z * scale));
-    return z > 0.0F ? (q + 1U) << 16U | (65535U - q) : 0U;
-  };
-  for (int i = 0; i != cells; ++i) {
-    const std::uint32_t a = word(upper[2 * i]), b = word(upper[2 * i + 1]);
-    const std::uint32_t c = word(lower[2 * i]), d = word(lower[2 * i + 1]);
-    some[i] = larger_halves(larger_halves(a, b), larger_halves(c, d));
-    strict[i] = a == 0 || b == 0 || c == 0 || d == 0 ? some[i] | 0xffffU : some[i];
-  }
+/// The larger halves of two vectors of cells.
+template <class Cells>
+[[nodiscard]] ORBIS_ALWAYS_INLINE Cells larger_halves_of(const Cells& a, const Cells& b) noexcept {
+  return simd::bits_as<std::uint32_t>(max(simd::bits_as<std::uint16_t>(a), simd::bits_as<std::uint16_t>(b)));
 }
+
+/// Two rows of depths to one row of cells of 2x2: `strict` counts a missing depth as 0, `some` leaves it out (0 if all
+/// are missing). Reads up to 16 values past the last cell's.
+struct first_cells_kernel {
+  template <simd::target Target>
+  static ORBIS_ALWAYS_INLINE void run(const float* upper, const float* lower, float scale, int cells,
+                                      std::uint32_t* strict, std::uint32_t* some) noexcept {
+    using floats = simd::native_vec<float, Target>;
+    using words = simd::native_vec<std::uint32_t, Target>;
+    constexpr int n = static_cast<int>(words::count);
+    const auto word = [&](const float* p) ORBIS_INLINE_LAMBDA {
+      const floats z = floats::load(p);
+      const words q = simd::bits_as<std::uint32_t>(simd::convert<std::int32_t>(z * scale));
+      // (q + 1) << 16 | (65535 - q), as one sum
+      return select(z > 0.0F, (q << 16) - q + words(65536U + 65535U), words(0U));
+    };
+    for (int i = 0; i < cells; i += n) {
+      const words a = word(upper + 2 * i), b = word(upper + 2 * i + n);
+      const words c = word(lower + 2 * i), d = word(lower + 2 * i + n);
+      const words left = larger_halves_of(a, c), right = larger_halves_of(b, d);
+      const words any = larger_halves_of(unzip_even(left, right), unzip_odd(left, right));
+      const auto gap_of = [](const words& x, const words& y)
+                              ORBIS_INLINE_LAMBDA { return select((x == 0U) | (y == 0U), words(0xffffU), words(0U)); };
+      const words gap_left = gap_of(a, c), gap_right = gap_of(b, d);
+      any.store(some + i);
+      (any | unzip_even(gap_left, gap_right) | unzip_odd(gap_left, gap_right)).store(strict + i);
+    }
+  }
+};
 
 /// `out[i]`: the larger halves of `a[i]`, `a[i + 1]`, `b[i]` and `b[i + 1]`. @pre a[count], b[count] readable
-inline void overlap_portable(const std::uint32_t* a, const std::uint32_t* b, int count, std::uint32_t* out) noexcept {
-  for (int i = 0; i != count; ++i) out[i] = larger_halves(larger_halves(a[i], a[i + 1]), larger_halves(b[i], b[i + 1]));
-}
-
-#if ORBIS_X86
-ORBIS_TARGET("avx2")
-inline void first_cells_avx2(const float* upper, const float* lower, float scale, int cells, std::uint32_t* strict,
-                             std::uint32_t* some) noexcept {
-  const __m256 scales = _mm256_set1_ps(scale);
-  const __m256i ones = _mm256_set1_epi32(65535 + 65536);
-  const auto word = [&](const float* p) ORBIS_TARGET("avx2") {
-    const __m256 z = _mm256_loadu_ps(p);
-    const __m256i q = _mm256_cvttps_epi32(_mm256_mul_ps(z, scales));
-    // (q + 1) << 16 | (65535 - q), as one sum
-    const __m256i w = _mm256_add_epi32(_mm256_sub_epi32(_mm256_slli_epi32(q, 16), q), ones);
-    return _mm256_and_si256(w, _mm256_castps_si256(_mm256_cmp_ps(z, _mm256_setzero_ps(), _CMP_GT_OQ)));
-  };
-  for (int i = 0; i < cells; i += 8) {
-    const __m256i a = word(upper + 2 * i), b = word(upper + 2 * i + 8);
-    const __m256i c = word(lower + 2 * i), d = word(lower + 2 * i + 8);
-    const __m256i left = _mm256_max_epu16(a, c), right = _mm256_max_epu16(b, d);
-    const auto pairs = [&](const __m256i x, const __m256i y, const int order) ORBIS_TARGET("avx2") {
-      const __m256 f = _mm256_castsi256_ps(x), g = _mm256_castsi256_ps(y);
-      const __m256 h = order == 0 ? _mm256_shuffle_ps(f, g, 0x88) : _mm256_shuffle_ps(f, g, 0xdd);
-      return _mm256_permute4x64_epi64(_mm256_castps_si256(h), 0xd8);
-    };
-    const __m256i any = _mm256_max_epu16(pairs(left, right, 0), pairs(left, right, 1));
-    const __m256i none = _mm256_setzero_si256();
-    const __m256i gap_l = _mm256_or_si256(_mm256_cmpeq_epi32(a, none), _mm256_cmpeq_epi32(c, none));
-    const __m256i gap_r = _mm256_or_si256(_mm256_cmpeq_epi32(b, none), _mm256_cmpeq_epi32(d, none));
-    const __m256i gap = _mm256_or_si256(pairs(gap_l, gap_r, 0), pairs(gap_l, gap_r, 1));
-    _mm256_storeu_si256(reinterpret_cast<__m256i*>(some + i), any);
-    _mm256_storeu_si256(reinterpret_cast<__m256i*>(strict + i),
-                        _mm256_or_si256(any, _mm256_and_si256(gap, _mm256_set1_epi32(0xffff))));
+struct overlap_kernel {
+  template <simd::target Target>
+  static ORBIS_ALWAYS_INLINE void run(const std::uint32_t* a, const std::uint32_t* b, int count,
+                                      std::uint32_t* out) noexcept {
+    using words = simd::native_vec<std::uint32_t, Target>;
+    constexpr int n = static_cast<int>(words::count);
+    int i = 0;
+    for (; i + n <= count; i += n)
+      larger_halves_of(larger_halves_of(words::load(a + i), words::load(a + i + 1)),
+                       larger_halves_of(words::load(b + i), words::load(b + i + 1)))
+          .store(out + i);
+    for (; i != count; ++i) out[i] = larger_halves(larger_halves(a[i], a[i + 1]), larger_halves(b[i], b[i + 1]));
   }
-}
-
-ORBIS_TARGET("avx2")
-inline void overlap_avx2(const std::uint32_t* a, const std::uint32_t* b, int count, std::uint32_t* out) noexcept {
-  const auto load = [&](const std::uint32_t* p)
-                        ORBIS_TARGET("avx2") { return _mm256_loadu_si256(reinterpret_cast<const __m256i*>(p)); };
-  int i = 0;
-  for (; i + 8 <= count; i += 8)
-    _mm256_storeu_si256(reinterpret_cast<__m256i*>(out + i),
-                        _mm256_max_epu16(_mm256_max_epu16(load(a + i), load(a + i + 1)),
-                                         _mm256_max_epu16(load(b + i), load(b + i + 1))));
-  overlap_portable(a + i, b + i, count - i, out + i);
-}
-#endif
+};
 
 /// Level k, from 1 on, has cells of 2^k x 2^k pixels; its entry (i, j) covers the cells i, i + 1 of
 /// the rows j, j + 1. A box that touches at most four cells in a row is covered by the entries of its
@@ -106,21 +86,9 @@ class depth_pyramid {
  public:
   static constexpr int max_levels = 16;
 
-  explicit depth_pyramid(simd::level level = simd::detected()) noexcept
-      : first_{simd::select<first_kernel>(level,
-                                          {
-                                            .portable = first_cells_portable,
-#if ORBIS_X86
-                                            .popcnt = nullptr, .avx2 = first_cells_avx2
-#endif
-                                          })},
-        overlap_{simd::select<overlap_kernel>(level, {
-          .portable = overlap_portable,
-#if ORBIS_X86
-          .popcnt = nullptr, .avx2 = overlap_avx2
-#endif
-        })} {
-  }
+  depth_pyramid() noexcept
+      : first_{simd::kernel<first_cells_kernel, first_signature, simd::avx2>()},
+        overlap_{simd::kernel<overlap_kernel, overlap_signature, simd::avx2>()} {}
 
   /// `row(v)`: the depths at which the rays of image row v end, 0 where there is none, followed by 16
   /// zeros. `max_z`: the largest of them. O(pixels).
@@ -173,8 +141,8 @@ class depth_pyramid {
   }
 
  private:
-  using first_kernel = void(const float*, const float*, float, int, std::uint32_t*, std::uint32_t*);
-  using overlap_kernel = void(const std::uint32_t*, const std::uint32_t*, int, std::uint32_t*);
+  using first_signature = void(const float*, const float*, float, int, std::uint32_t*, std::uint32_t*);
+  using overlap_signature = void(const std::uint32_t*, const std::uint32_t*, int, std::uint32_t*);
   static constexpr std::size_t padding = 16;
 
   void lay_out(int width, int height) {
@@ -224,8 +192,8 @@ class depth_pyramid {
     }
   }
 
-  first_kernel* first_;
-  overlap_kernel* overlap_;
+  first_signature* first_;
+  overlap_signature* overlap_;
   std::vector<std::uint32_t> cells_, strict_, some_, scratch_;
   std::array<std::int32_t, max_levels> begin_{}, width_{}, height_{};
   std::size_t family_ = 0;

@@ -27,22 +27,8 @@ namespace orbis::octree::detail {
 /// memory from image to image.
 class endpoint_image {
  public:
-  explicit endpoint_image(simd::level level = simd::detected()) noexcept
-      : level_{level},
-        find_{simd::select<find_kernel>(level,
-                                        {
-                                          .portable = find_ends_portable,
-#if ORBIS_X86
-                                          .popcnt = nullptr, .avx2 = find_ends_avx2, .avx512 = find_ends_avx512
-#endif
-                                        })},
-        fresh_{simd::select<fresh_kernel>(level, {
-          .portable = fresh_portable,
-#if ORBIS_X86
-          .popcnt = nullptr, .avx2 = fresh_avx2, .avx512 = fresh_avx512
-#endif
-        })} {
-  }
+  endpoint_image() noexcept
+      : find_{simd::kernel<find_ends_kernel, find_kernel>()}, fresh_{simd::kernel<fresh_keys_kernel, fresh_kernel>()} {}
 
   /// Takes in an image: the depths at which rays end, and in `masks` the voxels of the ends that are
   /// used, as occupied. O(pixels). @pre depth and camera have the same size
@@ -153,13 +139,8 @@ class endpoint_image {
       const auto scale = static_cast<float>(depth.scale());
       // Rounding a quotient of floats to double first does not change it.
       if (static_cast<double>(scale) == depth.scale()) {
-        const auto convert = simd::select<void(const metres_row<stored>&)>(level_, {
-          .portable = to_metres_portable<stored>,
-#if ORBIS_X86
-          .popcnt = nullptr, .avx2 = to_metres_avx2<stored>
-#endif
-        });
-        convert({depth.pixels().row(v).data(), z, rays_.width(), scale, depth.min_depth(), depth.max_depth()});
+        simd::kernel<to_metres_kernel<stored>, void(const metres_row<stored>&), simd::avx2>()(
+            {depth.pixels().row(v).data(), z, rays_.width(), scale, depth.min_depth(), depth.max_depth()});
         return;
       }
     }
@@ -169,7 +150,6 @@ class endpoint_image {
     }
   }
 
-  simd::level level_;
   find_kernel* find_;
   fresh_kernel* fresh_;
   pixel_rays rays_;

@@ -10,15 +10,12 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <type_traits>
 
 #include <orbis/core/simd.hpp>
 #include <orbis/octree/detail/depth/depth_pyramid.hpp>
 #include <orbis/octree/detail/depth/direction_index.hpp>
 #include <orbis/octree/detail/depth/endpoint_image.hpp>
-
-#if ORBIS_X86
-#include <immintrin.h>
-#endif
 
 namespace orbis::octree::detail {
 
@@ -103,249 +100,151 @@ struct children {
   unsigned inside = 0;                                     ///< child i projects into the image
 };
 
-/// Judges the children of the node whose centre is (x, y, z) in the camera frame. `inside`: the node
-/// projects into the image. All variants are right, but may differ in what they leave undecided.
-inline void classify_children_portable(const depth_scene& s, const child_offsets& o, const float3& c, bool inside,
-                                       children& out) noexcept {
-  out.live = out.full = out.inside = 0;
-  const depth_pyramid& pyramid = *s.pyramid;
-  for (unsigned i = 0; i != 8; ++i) {
-    const float x = c[0] + o.x[i], y = c[1] + o.y[i], z = c[2] + o.z[i];
-    const float margin = s.margin(std::fabs(x) + std::fabs(y) + std::fabs(z));
-    const float reach = o.half_z + margin, near = z - reach, far = z + reach;
-    out.x[i] = x;
-    out.y[i] = y;
-    out.z[i] = z;
-    out.near_z[i] = near;
-    if (!(far > 0.0F)) continue;
-    if (!inside && (x - s.min_x * z + o.half_side[0] + margin * (1.0F + std::fabs(s.min_x)) < 0.0F ||
-                    s.max_x * z - x + o.half_side[1] + margin * (1.0F + std::fabs(s.max_x)) < 0.0F ||
-                    y - s.min_y * z + o.half_side[2] + margin * (1.0F + std::fabs(s.min_y)) < 0.0F ||
-                    s.max_y * z - y + o.half_side[3] + margin * (1.0F + std::fabs(s.max_y)) < 0.0F))
-      continue;
-    const bool projects = near > s.near_z;
-    float u0 = 0.0F, u1 = s.last_u, v0 = 0.0F, v1 = s.last_v;
-    bool inner = false, covered = false;
-    std::array<float, 3> dense_z = s.dense_z;
-    if (projects) {
-      const float u = x / z, v = y / z;
-      float wide = 0, high = 0;
-      for (std::size_t j = 0; j != 3; ++j) {
-        wide += std::fabs(s.x_axis[j] - u * s.z_axis[j]);
-        high += std::fabs(s.y_axis[j] - v * s.z_axis[j]);
-      }
-      const float du = (wide * o.half + margin * (1.0F + std::fabs(u))) / near;
-      const float dv = (high * o.half + margin * (1.0F + std::fabs(v))) / near;
-      u0 = s.fx * (u - du) + s.cx - s.pixel_margin;
-      u1 = s.fx * (u + du) + s.cx + s.pixel_margin;
-      v0 = s.fy * (v - dv) + s.cy - s.pixel_margin;
-      v1 = s.fy * (v + dv) + s.cy + s.pixel_margin;
-      if (s.map != nullptr) {
-        const auto& off = s.map->at(u - du, u + du, v - dv, v + dv);
-        u0 += off.least_u;
-        u1 += off.most_u;
-        v0 += off.least_v;
-        v1 += off.most_v;
-        for (std::size_t kind = 0; kind != 3; ++kind) dense_z[kind] = s.dense(kind, off.spacing);
-        covered = true;
-      } else {
-        covered = inner = u0 >= 0.0F && v0 >= 0.0F && u1 <= s.last_u && v1 <= s.last_v;
-      }
-      u0 = std::clamp(u0, 0.0F, s.last_u + 1.0F);
-      v0 = std::clamp(v0, 0.0F, s.last_v + 1.0F);
-      u1 = std::clamp(u1, -1.0F, s.last_u);
-      v1 = std::clamp(v1, -1.0F, s.last_v);
+/// a * b + c for bounds, see simd::approximate_multiply_add.
+template <class V>
+[[nodiscard]] ORBIS_ALWAYS_INLINE V multiply_add(const std::type_identity_t<V>& a, const V& b,
+                                                 const std::type_identity_t<V>& c) noexcept {
+  return simd::approximate_multiply_add(a, b, c);
+}
+
+/// Classifies the children of the node whose centre is `c` in the camera frame. `inside`: the node projects into the
+/// image. What it says is right on every target; targets may differ in what they leave undecided.
+struct classify_children_kernel {
+  template <simd::target Target>
+  static ORBIS_ALWAYS_INLINE void run(const depth_scene& s, const child_offsets& o, const float3& c, bool inside,
+                                      children& out) noexcept {
+    using floats = simd::vec<float, 8, Target>;
+    using integers = simd::vec<std::int32_t, 8, Target>;
+    using mask = typename floats::mask_type;
+    const floats x = c[0] + floats::load(o.x.data()), y = c[1] + floats::load(o.y.data());
+    const floats z = c[2] + floats::load(o.z.data());
+    x.store(out.x.data());
+    y.store(out.y.data());
+    z.store(out.z.data());
+    const floats margin = multiply_add(s.margin_1, abs(x) + abs(y) + abs(z), s.margin_0);
+    const floats reach = o.half_z + margin, near = z - reach, far = z + reach;
+    near.store(out.near_z.data());
+    mask live = far > 0.0F;
+    if (!inside) {
+      // On the inner side of the view's four sides; `off` is positive towards larger slopes.
+      const auto side = [&](const floats& at, float sign, float slope, float half) ORBIS_INLINE_LAMBDA {
+        const floats room = multiply_add(1.0F + std::fabs(slope), margin, half);
+        const floats off = multiply_add(-slope, z, at);
+        return multiply_add(sign, off, room) >= 0.0F;
+      };
+      live = live & side(x, 1.0F, s.min_x, o.half_side[0]) & side(x, -1.0F, s.max_x, o.half_side[1]) &
+             side(y, 1.0F, s.min_y, o.half_side[2]) & side(y, -1.0F, s.max_y, o.half_side[3]);
     }
-    const auto iu0 = static_cast<std::int32_t>(std::ceil(u0)), iu1 = static_cast<std::int32_t>(std::floor(u1));
-    const auto iv0 = static_cast<std::int32_t>(std::ceil(v0)), iv1 = static_cast<std::int32_t>(std::floor(v1));
-    if (iu0 > iu1 || iv0 > iv1) continue;
-    out.u0[i] = iu0;
-    out.u1[i] = iu1;
-    out.v0[i] = iv0;
-    out.v1[i] = iv1;
-    int level = 1;
-    while (3 << level < std::max(iu1 - iu0, iv1 - iv0) && level < pyramid.levels()) ++level;
-    const auto k = static_cast<std::size_t>(level);
-    std::size_t kind = 0;
-    while (kind != 2 && far < dense_z[kind + 1]) ++kind;
-    const std::uint32_t* const cells = pyramid.data() + kind * pyramid.family() + pyramid.begin()[k];
-    const std::int32_t a = iu0 >> level, b = std::max(a, (iu1 >> level) - 1);
-    const std::int32_t d = iv0 >> level, e = std::max(d, (iv1 >> level) - 1), w = pyramid.width()[k];
-    const std::uint32_t ends = larger_halves(larger_halves(cells[d * w + a], cells[d * w + b]),
-                                             larger_halves(cells[e * w + a], cells[e * w + b]));
-    if (ends >> 16U == 0 || static_cast<float>(ends >> 16U) < near * pyramid.scale()) continue;
-    out.live |= 1U << i;
-    if (inner) out.inside |= 1U << i;
-    if (covered && far < dense_z[0] && static_cast<float>(65535U - (ends & 0xffffU)) > far * pyramid.scale())
-      out.full |= 1U << i;
-  }
-}
+    out.live = out.full = out.inside = 0;
+    if (none(live)) return;
 
-#if ORBIS_X86
-ORBIS_TARGET("avx2,fma")
-inline void classify_children_avx2(const depth_scene& s, const child_offsets& o, const float3& c, bool inside,
-                                   children& out) noexcept {
-  const auto set = [&](float v) ORBIS_TARGET("avx2") { return _mm256_set1_ps(v); };
-  const auto abs = [&](const __m256 v) ORBIS_TARGET("avx2") { return _mm256_andnot_ps(_mm256_set1_ps(-0.0F), v); };
-  const __m256 zero = _mm256_setzero_ps(), one = set(1.0F);
-  const __m256 x = _mm256_add_ps(set(c[0]), _mm256_load_ps(o.x.data()));
-  const __m256 y = _mm256_add_ps(set(c[1]), _mm256_load_ps(o.y.data()));
-  const __m256 z = _mm256_add_ps(set(c[2]), _mm256_load_ps(o.z.data()));
-  _mm256_store_ps(out.x.data(), x);
-  _mm256_store_ps(out.y.data(), y);
-  _mm256_store_ps(out.z.data(), z);
-  const __m256 l1 = _mm256_add_ps(_mm256_add_ps(abs(x), abs(y)), abs(z));
-  const __m256 margin = _mm256_fmadd_ps(set(s.margin_1), l1, set(s.margin_0));
-  const __m256 reach = _mm256_add_ps(set(o.half_z), margin);
-  const __m256 near = _mm256_sub_ps(z, reach), far = _mm256_add_ps(z, reach);
-  _mm256_store_ps(out.near_z.data(), near);
-  __m256 live = _mm256_cmp_ps(far, zero, _CMP_GT_OQ);
-  if (!inside) {
-    const auto side = [&](const __m256 at, float sign, float slope, float half) ORBIS_TARGET("avx2,fma") {
-      const __m256 room = _mm256_fmadd_ps(margin, _mm256_set1_ps(1.0F + std::fabs(slope)), _mm256_set1_ps(half));
-      const __m256 off = _mm256_fnmadd_ps(_mm256_set1_ps(slope), z, at);  // positive towards larger slopes
-      return _mm256_cmp_ps(_mm256_fmadd_ps(_mm256_set1_ps(sign), off, room), _mm256_setzero_ps(), _CMP_GE_OQ);
+    // The pixels that a child may project to: its centre's, plus or minus its extent across that ray.
+    const mask projects = near > s.near_z;
+    const floats near_1 = select(projects, near, floats(1.0F)), z_1 = select(projects, z, floats(1.0F));
+    const floats inverse = 1.0F / (near_1 * z_1), per_z = inverse * near_1, per_near = inverse * z_1;
+    const floats u = x * per_z, v = y * per_z;
+    const auto across = [&](const float3& axis, const floats& slope) ORBIS_INLINE_LAMBDA {
+      const auto part = [&](std::size_t i)
+                            ORBIS_INLINE_LAMBDA { return abs(multiply_add(-s.z_axis[i], slope, floats(axis[i]))); };
+      const floats slack = multiply_add(margin, abs(slope), margin);
+      return multiply_add(o.half, part(0) + part(1) + part(2), slack) * per_near;
     };
-    live = _mm256_and_ps(
-        live,
-        _mm256_and_ps(_mm256_and_ps(side(x, 1.0F, s.min_x, o.half_side[0]), side(x, -1.0F, s.max_x, o.half_side[1])),
-                      _mm256_and_ps(side(y, 1.0F, s.min_y, o.half_side[2]), side(y, -1.0F, s.max_y, o.half_side[3]))));
-  }
-  out.live = out.full = out.inside = 0;
-  if (_mm256_movemask_ps(live) == 0) return;
+    const floats wide = across(s.x_axis, u), high = across(s.y_axis, v);
+    const floats du = multiply_add(s.fx, wide, s.pixel_margin), dv = multiply_add(s.fy, high, s.pixel_margin);
+    const floats cu = multiply_add(s.fx, u, s.cx), cv = multiply_add(s.fy, v, s.cy);
+    floats u0 = cu - du, u1 = cu + du, v0 = cv - dv, v1 = cv + dv;
+    std::array<floats, 3> dense_z{floats(s.dense_z[0]), floats(s.dense_z[1]), floats(s.dense_z[2])};
+    if (s.map != nullptr) {
+      const integers at = entry_of(*s.map, u - wide, u + wide, v - high, v + high);
+      const float* const entries = &s.map->entries()->least_u;
+      u0 += simd::gather(entries, at);
+      u1 += simd::gather(entries + 1, at);
+      v0 += simd::gather(entries + 2, at);
+      v1 += simd::gather(entries + 3, at);
+      const floats spacing = simd::gather(entries + 4, at);
+      for (std::size_t kind = 0; kind != 3; ++kind)
+        dense_z[kind] = s.ball / multiply_add(depth_scene::tiles[kind], spacing, s.ball_slope);
+    }
+    u0 = select(projects, u0, floats(0.0F));
+    v0 = select(projects, v0, floats(0.0F));
+    u1 = select(projects, u1, floats(s.last_u));
+    v1 = select(projects, v1, floats(s.last_v));
+    const mask inner = projects & (u0 >= 0.0F) & (v0 >= 0.0F) & (u1 <= s.last_u) & (v1 <= s.last_v);
+    // Rounded up and down; the numbers are not negative but for -1.
+    const auto first = [](const floats& p, float last) ORBIS_INLINE_LAMBDA {
+      return -simd::convert<std::int32_t>(floor(-min(max(p, floats(0.0F)), floats(last + 1.0F))));
+    };
+    const auto last = [](const floats& p, float end) ORBIS_INLINE_LAMBDA {
+      return simd::convert<std::int32_t>(floor(max(min(p, floats(end)), floats(-1.0F))));
+    };
+    integers a = first(u0, s.last_u), b = last(u1, s.last_u), d = first(v0, s.last_v), e = last(v1, s.last_v);
+    live = and_not(live, (a > b) | (d > e));
+    if (none(live)) return;
+    const integers zero(0);
+    a = select(live, a, zero);
+    b = select(live, b, zero);
+    d = select(live, d, zero);
+    e = select(live, e, zero);
+    a.store(out.u0.data());
+    b.store(out.u1.data());
+    d.store(out.v0.data());
+    e.store(out.v1.data());
 
-  // The pixels that a child may project to: its centre's, plus or minus its extent across that ray.
-  const __m256 projects = _mm256_cmp_ps(near, set(s.near_z), _CMP_GT_OQ);
-  const __m256 near_1 = _mm256_blendv_ps(one, near, projects), z_1 = _mm256_blendv_ps(one, z, projects);
-  const __m256 inverse = _mm256_div_ps(one, _mm256_mul_ps(near_1, z_1));
-  const __m256 per_z = _mm256_mul_ps(inverse, near_1), per_near = _mm256_mul_ps(inverse, z_1);
-  const __m256 u = _mm256_mul_ps(x, per_z), v = _mm256_mul_ps(y, per_z);
-  const auto across = [&](const float3& axis, const __m256 slope) ORBIS_TARGET("avx2,fma") {
-    const __m256 sign = _mm256_set1_ps(-0.0F);
-    const __m256 a = _mm256_fnmadd_ps(slope, _mm256_set1_ps(s.z_axis[0]), _mm256_set1_ps(axis[0]));
-    const __m256 b = _mm256_fnmadd_ps(slope, _mm256_set1_ps(s.z_axis[1]), _mm256_set1_ps(axis[1]));
-    const __m256 d = _mm256_fnmadd_ps(slope, _mm256_set1_ps(s.z_axis[2]), _mm256_set1_ps(axis[2]));
-    const __m256 sum =
-        _mm256_add_ps(_mm256_add_ps(_mm256_andnot_ps(sign, a), _mm256_andnot_ps(sign, b)), _mm256_andnot_ps(sign, d));
-    const __m256 slack = _mm256_fmadd_ps(margin, _mm256_andnot_ps(sign, slope), margin);
-    return _mm256_mul_ps(_mm256_fmadd_ps(sum, _mm256_set1_ps(o.half), slack), per_near);
-  };
-  const __m256 wide = across(s.x_axis, u), high = across(s.y_axis, v);
-  const __m256 du = _mm256_fmadd_ps(wide, set(s.fx), set(s.pixel_margin));
-  const __m256 dv = _mm256_fmadd_ps(high, set(s.fy), set(s.pixel_margin));
-  const __m256 cu = _mm256_fmadd_ps(u, set(s.fx), set(s.cx)), cv = _mm256_fmadd_ps(v, set(s.fy), set(s.cy));
-  const __m256 last_u = set(s.last_u), last_v = set(s.last_v);
-  __m256 u0 = _mm256_sub_ps(cu, du), u1 = _mm256_add_ps(cu, du), v0 = _mm256_sub_ps(cv, dv), v1 = _mm256_add_ps(cv, dv);
-  __m256 dense_0 = set(s.dense_z[0]), dense_1 = set(s.dense_z[1]), dense_2 = set(s.dense_z[2]);
-  if (s.map != nullptr) {
-    const direction_index& map = *s.map;
-    const auto cell = [&](const __m256 at, float least, float per, std::int32_t count) ORBIS_TARGET("avx2") {
-      const __m256 c = _mm256_mul_ps(_mm256_sub_ps(at, _mm256_set1_ps(least)), _mm256_set1_ps(per));
-      return _mm256_cvttps_epi32(
-          _mm256_min_ps(_mm256_max_ps(c, _mm256_setzero_ps()), _mm256_set1_ps(static_cast<float>(count - 1))));
+    // The level on which that many pixels are at most four cells: the logarithm of a third, rounded up.
+    const depth_pyramid& pyramid = *s.pyramid;
+    const floats third = simd::convert<float>(max(b - a, e - d)) * (1.0F / 3.0F);
+    const integers level = min(max(log2_rounded_up(third), integers(1)), integers(pyramid.levels()));
+    const auto of_level = [&](const std::int32_t* table) ORBIS_INLINE_LAMBDA {
+      if (pyramid.levels() > 8) return simd::gather(table, level);
+      return simd::look_up(integers::load(table + 1), level - integers(1));
     };
-    const __m256i i0 = cell(_mm256_sub_ps(u, wide), map.min_x(), map.per_x(), map.width()[0]);
-    const __m256i i1 = cell(_mm256_add_ps(u, wide), map.min_x(), map.per_x(), map.width()[0]);
-    const __m256i j0 = cell(_mm256_sub_ps(v, high), map.min_y(), map.per_y(), map.height()[0]);
-    const __m256i j1 = cell(_mm256_add_ps(v, high), map.min_y(), map.per_y(), map.height()[0]);
-    const __m256 extent = _mm256_cvtepi32_ps(_mm256_max_epi32(_mm256_sub_epi32(i1, i0), _mm256_sub_epi32(j1, j0)));
-    __m256i k = _mm256_sub_epi32(
-        _mm256_srli_epi32(_mm256_add_epi32(_mm256_castps_si256(extent), _mm256_set1_epi32(0x7fffff)), 23),
-        _mm256_set1_epi32(127));
-    k = _mm256_min_epi32(_mm256_max_epi32(k, _mm256_setzero_si256()), _mm256_set1_epi32(map.levels()));
-    __m256i at = _mm256_mullo_epi32(_mm256_srlv_epi32(j0, k), _mm256_i32gather_epi32(map.width().data(), k, 4));
-    at = _mm256_add_epi32(_mm256_add_epi32(at, _mm256_srlv_epi32(i0, k)),
-                          _mm256_i32gather_epi32(map.begin().data(), k, 4));
-    at = _mm256_slli_epi32(at, 3);
-    const float* const entries = &map.entries()->least_u;
-    u0 = _mm256_add_ps(u0, _mm256_i32gather_ps(entries, at, 4));
-    u1 = _mm256_add_ps(u1, _mm256_i32gather_ps(entries + 1, at, 4));
-    v0 = _mm256_add_ps(v0, _mm256_i32gather_ps(entries + 2, at, 4));
-    v1 = _mm256_add_ps(v1, _mm256_i32gather_ps(entries + 3, at, 4));
-    const __m256 spacing = _mm256_i32gather_ps(entries + 4, at, 4);
-    const auto dense = [&](std::size_t kind) ORBIS_TARGET("avx2,fma") {
-      return _mm256_div_ps(_mm256_set1_ps(s.ball), _mm256_fmadd_ps(_mm256_set1_ps(depth_scene::tiles[kind]), spacing,
-                                                                   _mm256_set1_ps(s.ball_slope)));
+    const integers width = of_level(pyramid.width().data()), family(static_cast<std::int32_t>(pyramid.family()));
+    integers begin = of_level(pyramid.begin().data());
+    begin += select(far < dense_z[1], family, zero);
+    begin += select(far < dense_z[2], family, zero);  // implies the one before
+    const integers i0 = a >> level, i1 = max(i0, (b >> level) - integers(1));
+    const integers j0 = d >> level, j1 = max(j0, (e >> level) - integers(1));
+    const integers row0 = begin + j0 * width, row1 = begin + j1 * width;
+    const auto ends_at = [&](const integers& at) ORBIS_INLINE_LAMBDA {
+      return simd::bits_as<std::uint32_t>(simd::gather(reinterpret_cast<const std::int32_t*>(pyramid.data()), at));
     };
-    dense_0 = dense(0);
-    dense_1 = dense(1);
-    dense_2 = dense(2);
+    const auto ends = larger_halves_of(larger_halves_of(ends_at(row0 + i0), ends_at(row0 + i1)),
+                                       larger_halves_of(ends_at(row1 + i0), ends_at(row1 + i1)));
+    const auto depth_of = [](const auto& half)
+                              ORBIS_INLINE_LAMBDA { return simd::convert<float>(simd::bits_as<std::int32_t>(half)); };
+    const floats farthest = depth_of(ends >> 16), nearest = depth_of((ends & 0xffffU) ^ 0xffffU);
+    live = live & (farthest >= near * pyramid.scale()) & (farthest > 0.0F);
+    const mask filled = (nearest > far * pyramid.scale()) & (far < dense_z[0]);
+    out.live = simd::bits(live);
+    // Where there is a map, it is the spacing that says whether there are rays all over a child.
+    const bool mapped = s.map != nullptr;
+    out.inside = mapped ? 0 : out.live & simd::bits(inner);
+    out.full = (mapped ? out.live & simd::bits(projects) : out.inside) & simd::bits(filled);
   }
-  u0 = _mm256_and_ps(u0, projects);
-  v0 = _mm256_and_ps(v0, projects);
-  u1 = _mm256_blendv_ps(last_u, u1, projects);
-  v1 = _mm256_blendv_ps(last_v, v1, projects);
-  const __m256 inner = _mm256_and_ps(
-      projects,
-      _mm256_and_ps(_mm256_and_ps(_mm256_cmp_ps(u0, zero, _CMP_GE_OQ), _mm256_cmp_ps(v0, zero, _CMP_GE_OQ)),
-                    _mm256_and_ps(_mm256_cmp_ps(u1, last_u, _CMP_LE_OQ), _mm256_cmp_ps(v1, last_v, _CMP_LE_OQ))));
-  const auto first = [&](const __m256 p, const __m256 last) ORBIS_TARGET("avx2") {
-    return _mm256_cvttps_epi32(_mm256_ceil_ps(
-        _mm256_min_ps(_mm256_max_ps(p, _mm256_setzero_ps()), _mm256_add_ps(last, _mm256_set1_ps(1.0F)))));
-  };
-  const auto last = [&](const __m256 p, const __m256 end) ORBIS_TARGET("avx2") {
-    return _mm256_cvttps_epi32(_mm256_floor_ps(_mm256_max_ps(_mm256_min_ps(p, end), _mm256_set1_ps(-1.0F))));
-  };
-  __m256i a = first(u0, last_u), b = last(u1, last_u), d = first(v0, last_v), e = last(v1, last_v);
-  live =
-      _mm256_andnot_ps(_mm256_castsi256_ps(_mm256_or_si256(_mm256_cmpgt_epi32(a, b), _mm256_cmpgt_epi32(d, e))), live);
-  if (_mm256_movemask_ps(live) == 0) return;
-  const __m256i alive = _mm256_castps_si256(live);
-  a = _mm256_and_si256(a, alive);
-  b = _mm256_and_si256(b, alive);
-  d = _mm256_and_si256(d, alive);
-  e = _mm256_and_si256(e, alive);
-  _mm256_store_si256(reinterpret_cast<__m256i*>(out.u0.data()), a);
-  _mm256_store_si256(reinterpret_cast<__m256i*>(out.u1.data()), b);
-  _mm256_store_si256(reinterpret_cast<__m256i*>(out.v0.data()), d);
-  _mm256_store_si256(reinterpret_cast<__m256i*>(out.v1.data()), e);
 
-  // The level on which that many pixels are at most four cells: the logarithm of a third, rounded up.
-  const __m256i extent = _mm256_max_epi32(_mm256_sub_epi32(b, a), _mm256_sub_epi32(e, d));
-  const __m256 third = _mm256_mul_ps(_mm256_cvtepi32_ps(extent), set(1.0F / 3.0F));
-  __m256i level =
-      _mm256_sub_epi32(_mm256_srli_epi32(_mm256_add_epi32(_mm256_castps_si256(third), _mm256_set1_epi32(0x7fffff)), 23),
-                       _mm256_set1_epi32(127));
-  const depth_pyramid& pyramid = *s.pyramid;
-  level = _mm256_min_epi32(_mm256_max_epi32(level, _mm256_set1_epi32(1)), _mm256_set1_epi32(pyramid.levels()));
-  const auto of_level = [&](const std::int32_t* table) ORBIS_TARGET("avx2") {
-    if (pyramid.levels() > 8) return _mm256_i32gather_epi32(table, level, 4);
-    const __m256i from_1 = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(table + 1));
-    return _mm256_permutevar8x32_epi32(from_1, _mm256_sub_epi32(level, _mm256_set1_epi32(1)));
-  };
-  const __m256i width = of_level(pyramid.width().data());
-  __m256i begin = of_level(pyramid.begin().data());
-  const __m256i family = _mm256_set1_epi32(static_cast<int>(pyramid.family()));
-  const __m256 pairs = _mm256_cmp_ps(far, dense_1, _CMP_LT_OQ);
-  const __m256 fours = _mm256_cmp_ps(far, dense_2, _CMP_LT_OQ);  // implies the one before
-  begin = _mm256_add_epi32(begin, _mm256_and_si256(family, _mm256_castps_si256(pairs)));
-  begin = _mm256_add_epi32(begin, _mm256_and_si256(family, _mm256_castps_si256(fours)));
-  const auto before_last = [&](const __m256i from, const __m256i to) ORBIS_TARGET("avx2") {
-    return _mm256_max_epi32(from, _mm256_sub_epi32(to, _mm256_set1_epi32(1)));
-  };
-  const __m256i i0 = _mm256_srlv_epi32(a, level), i1 = before_last(i0, _mm256_srlv_epi32(b, level));
-  const __m256i j0 = _mm256_srlv_epi32(d, level), j1 = before_last(j0, _mm256_srlv_epi32(e, level));
-  const __m256i row0 = _mm256_add_epi32(begin, _mm256_mullo_epi32(j0, width));
-  const __m256i row1 = _mm256_add_epi32(begin, _mm256_mullo_epi32(j1, width));
-  const int* const cells = reinterpret_cast<const int*>(pyramid.data());
-  const __m256i ends = _mm256_max_epu16(_mm256_max_epu16(_mm256_i32gather_epi32(cells, _mm256_add_epi32(row0, i0), 4),
-                                                         _mm256_i32gather_epi32(cells, _mm256_add_epi32(row0, i1), 4)),
-                                        _mm256_max_epu16(_mm256_i32gather_epi32(cells, _mm256_add_epi32(row1, i0), 4),
-                                                         _mm256_i32gather_epi32(cells, _mm256_add_epi32(row1, i1), 4)));
-  const __m256 farthest = _mm256_cvtepi32_ps(_mm256_srli_epi32(ends, 16)), scale = set(pyramid.scale());
-  live = _mm256_and_ps(live, _mm256_and_ps(_mm256_cmp_ps(farthest, _mm256_mul_ps(near, scale), _CMP_GE_OQ),
-                                           _mm256_cmp_ps(farthest, zero, _CMP_GT_OQ)));
-  const __m256 nearest =
-      _mm256_cvtepi32_ps(_mm256_sub_epi32(_mm256_set1_epi32(65535), _mm256_and_si256(ends, _mm256_set1_epi32(65535))));
-  const __m256 filled = _mm256_and_ps(_mm256_cmp_ps(nearest, _mm256_mul_ps(far, scale), _CMP_GT_OQ),
-                                      _mm256_cmp_ps(far, dense_0, _CMP_LT_OQ));
-  out.live = static_cast<unsigned>(_mm256_movemask_ps(live));
-  // Where there is a map, it is the spacing that says whether there are rays all over a child.
-  const bool mapped = s.map != nullptr;
-  out.inside = mapped ? 0 : out.live & static_cast<unsigned>(_mm256_movemask_ps(inner));
-  out.full = (mapped ? out.live & static_cast<unsigned>(_mm256_movemask_ps(projects)) : out.inside) &
-             static_cast<unsigned>(_mm256_movemask_ps(filled));
-}
-#endif
+ private:
+  /// The logarithm to base 2 of numbers >= 0, rounded up; 0 gives a large negative number.
+  template <class Floats>
+  static ORBIS_ALWAYS_INLINE auto log2_rounded_up(const Floats& x) noexcept {
+    return ((simd::bits_as<std::int32_t>(x) + 0x7fffff) >> 23) - 127;
+  }
+  /// Where the entries of a map for the rays of a rectangle begin, counted in floats.
+  template <class Floats>
+  static ORBIS_ALWAYS_INLINE auto entry_of(const direction_index& map, const Floats& x0, const Floats& x1,
+                                           const Floats& y0, const Floats& y1) noexcept {
+    const auto cell = [](const Floats& at, float least, float per, std::int32_t count) ORBIS_INLINE_LAMBDA {
+      return simd::convert<std::int32_t>(
+          min(max((at - least) * per, Floats(0.0F)), Floats(static_cast<float>(count - 1))));
+    };
+    const auto i0 = cell(x0, map.min_x(), map.per_x(), map.width()[0]);
+    const auto i1 = cell(x1, map.min_x(), map.per_x(), map.width()[0]);
+    const auto j0 = cell(y0, map.min_y(), map.per_y(), map.height()[0]);
+    const auto j1 = cell(y1, map.min_y(), map.per_y(), map.height()[0]);
+    using integers = std::remove_const_t<decltype(i0)>;
+    const integers k =
+        min(max(log2_rounded_up(simd::convert<float>(max(i1 - i0, j1 - j0))), integers(0)), integers(map.levels()));
+    return ((j0 >> k) * simd::gather(map.width().data(), k) + (i0 >> k) + simd::gather(map.begin().data(), k)) << 3;
+  }
+};
 
 }  // namespace orbis::octree::detail

@@ -9,15 +9,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <utility>
 #include <vector>
 
 #include <orbis/core/simd.hpp>
 #include <orbis/octree/detail/points/ray_traversal.hpp>
 #include <orbis/octree/detail/storage/scan_masks.hpp>
-
-#if ORBIS_X86
-#include <immintrin.h>
-#endif
 
 namespace orbis::octree::detail {
 
@@ -31,99 +28,46 @@ struct traversal_lanes {
   alignas(64) std::array<std::int64_t, width> end;                    ///< the cell not to be marked
 };
 
-/// Marks the cells that the rays of `r` cross after the first one. The same comparisons and additions
-/// as in traverse_ray; all variants mark the same cells.
-inline void traverse_lanes_portable(std::uint8_t* cells, std::int64_t start, const traversal_lanes& r) noexcept {
-  for (std::size_t i = 0; i != traversal_lanes::width; ++i) {
-    double x = r.next[0][i], y = r.next[1][i], z = r.next[2][i];
-    for (std::int64_t at = start;;) {
-      const bool along_x = x < y && x < z, along_y = !(x < y) && y < z;
-      if (along_x) {
-        at += r.stride[0][i];
-        x += r.delta[0][i];
-      } else if (along_y) {
-        at += r.stride[1][i];
-        y += r.delta[1][i];
-      } else {
-        at += r.stride[2][i];
-        z += r.delta[2][i];
-      }
-      if (at == r.end[i] || std::min(std::min(x, y), z) > r.reach[i]) break;
-      cells[at] = 1;
-    }
+/// Marks the cells that the rays of `r` cross after the first one, by the comparisons and additions of traverse_ray.
+struct traverse_lanes_kernel {
+  template <simd::target Target>
+  static ORBIS_ALWAYS_INLINE void run(std::uint8_t* cells, std::int64_t start, const traversal_lanes& r) noexcept {
+    constexpr std::size_t n = Target::bytes == 64 ? 8 : 4;
+    for (std::size_t i = 0; i != traversal_lanes::width; i += n) traverse<n, Target>(cells, start, r, i);
   }
-}
 
-#if ORBIS_X86
-ORBIS_TARGET("avx2,bmi2")
-inline void traverse_lanes_avx2(std::uint8_t* cells, std::int64_t start, const traversal_lanes& r) noexcept {
-  for (std::size_t i = 0; i != traversal_lanes::width; i += 4) {
-    const auto load = [&](const std::array<double, 8>& a) ORBIS_TARGET("avx2") { return _mm256_load_pd(a.data() + i); };
-    const auto load_i = [&](const std::array<std::int64_t, 8>& a) ORBIS_TARGET("avx2") {
-      return _mm256_load_si256(reinterpret_cast<const __m256i*>(a.data() + i));
-    };
-    __m256d x = load(r.next[0]), y = load(r.next[1]), z = load(r.next[2]);
-    const __m256d dx = load(r.delta[0]), dy = load(r.delta[1]), dz = load(r.delta[2]), reach = load(r.reach);
-    const __m256i sx = load_i(r.stride[0]), sy = load_i(r.stride[1]), sz = load_i(r.stride[2]), end = load_i(r.end);
-    const __m256i first = _mm256_set1_epi64x(start);
-    __m256i at = first, active = _mm256_set1_epi64x(-1);
+ private:
+  template <std::size_t N, simd::target Target>
+  static ORBIS_ALWAYS_INLINE void traverse(std::uint8_t* cells, std::int64_t start, const traversal_lanes& r,
+                                           std::size_t i) noexcept {
+    using doubles = simd::vec<double, N, Target>;
+    using integers = simd::vec<std::int64_t, N, Target>;
+    using mask = typename doubles::mask_type;
+    doubles x = doubles::load(r.next[0].data() + i), y = doubles::load(r.next[1].data() + i);
+    doubles z = doubles::load(r.next[2].data() + i);
+    const doubles dx = doubles::load(r.delta[0].data() + i), dy = doubles::load(r.delta[1].data() + i);
+    const doubles dz = doubles::load(r.delta[2].data() + i), reach = doubles::load(r.reach.data() + i);
+    const integers sx = integers::load(r.stride[0].data() + i), sy = integers::load(r.stride[1].data() + i);
+    const integers sz = integers::load(r.stride[2].data() + i), end = integers::load(r.end.data() + i);
+    const integers first(start);
+    integers at = first;
+    mask active = mask::first(N);
     for (;;) {
-      const __m256d xy = _mm256_cmp_pd(x, y, _CMP_LT_OQ);
-      const __m256d along_x = _mm256_and_pd(xy, _mm256_cmp_pd(x, z, _CMP_LT_OQ));
-      const __m256d along_y = _mm256_andnot_pd(xy, _mm256_cmp_pd(y, z, _CMP_LT_OQ));
-      const __m256d not_z = _mm256_or_pd(along_x, along_y);
-      x = _mm256_add_pd(x, _mm256_and_pd(along_x, dx));
-      y = _mm256_add_pd(y, _mm256_and_pd(along_y, dy));
-      z = _mm256_add_pd(z, _mm256_andnot_pd(not_z, dz));
-      const __m256i step = _mm256_or_si256(_mm256_or_si256(_mm256_and_si256(_mm256_castpd_si256(along_x), sx),
-                                                           _mm256_and_si256(_mm256_castpd_si256(along_y), sy)),
-                                           _mm256_andnot_si256(_mm256_castpd_si256(not_z), sz));
-      at = _mm256_add_epi64(at, step);
-      const __m256d beyond = _mm256_cmp_pd(_mm256_min_pd(_mm256_min_pd(x, y), z), reach, _CMP_GT_OQ);
-      active = _mm256_andnot_si256(_mm256_or_si256(_mm256_cmpeq_epi64(at, end), _mm256_castpd_si256(beyond)), active);
-      if (_mm256_testz_si256(active, active) != 0) break;
+      const mask before_y = x < y, along_x = before_y & (x < z), along_y = and_not(y < z, before_y);
+      const mask along_z = !(along_x | along_y);
+      x = select(along_x, x + dx, x);
+      y = select(along_y, y + dy, y);
+      z = select(along_z, z + dz, z);
+      at += select(along_x, sx, select(along_y, sy, sz));
+      active = and_not(active, ((x > reach) & (y > reach) & (z > reach)) | (at == end));
+      if (none(active)) return;
       // Rays that have ended mark the first cell again: cheaper than asking.
-      const __m256i mark = _mm256_blendv_epi8(first, at, active);
-      cells[_mm256_extract_epi64(mark, 0)] = 1;
-      cells[_mm256_extract_epi64(mark, 1)] = 1;
-      cells[_mm256_extract_epi64(mark, 2)] = 1;
-      cells[_mm256_extract_epi64(mark, 3)] = 1;
+      const integers marks = select(active, at, first);
+      [&]<std::size_t... I>(std::index_sequence<I...>) ORBIS_INLINE_LAMBDA { ((cells[marks[I]] = 1), ...); }
+      (std::make_index_sequence<N>{});
     }
   }
-}
-
-ORBIS_TARGET("avx512f,avx512dq,avx512vl")
-inline void traverse_lanes_avx512(std::uint8_t* cells, std::int64_t start, const traversal_lanes& r) noexcept {
-  __m512d x = _mm512_load_pd(r.next[0].data()), y = _mm512_load_pd(r.next[1].data());
-  __m512d z = _mm512_load_pd(r.next[2].data());
-  const __m512d dx = _mm512_load_pd(r.delta[0].data()), dy = _mm512_load_pd(r.delta[1].data());
-  const __m512d dz = _mm512_load_pd(r.delta[2].data()), reach = _mm512_load_pd(r.reach.data());
-  const __m512i sx = _mm512_load_si512(r.stride[0].data()), sy = _mm512_load_si512(r.stride[1].data());
-  const __m512i sz = _mm512_load_si512(r.stride[2].data()), end = _mm512_load_si512(r.end.data());
-  const __m512i first = _mm512_set1_epi64(start);
-  __m512i at = first;
-  __mmask8 active = 0xff;
-  alignas(64) std::array<std::int64_t, 8> mark;
-  for (;;) {
-    const __mmask8 xy = _mm512_cmp_pd_mask(x, y, _CMP_LT_OQ);
-    const __mmask8 along_x = xy & _mm512_cmp_pd_mask(x, z, _CMP_LT_OQ);
-    const __mmask8 along_y = static_cast<__mmask8>(~xy) & _mm512_cmp_pd_mask(y, z, _CMP_LT_OQ);
-    const __mmask8 along_z = static_cast<__mmask8>(~(along_x | along_y));
-    x = _mm512_mask_add_pd(x, along_x, x, dx);
-    y = _mm512_mask_add_pd(y, along_y, y, dy);
-    z = _mm512_mask_add_pd(z, along_z, z, dz);
-    at = _mm512_mask_add_epi64(at, along_x, at, sx);
-    at = _mm512_mask_add_epi64(at, along_y, at, sy);
-    at = _mm512_mask_add_epi64(at, along_z, at, sz);
-    const __mmask8 beyond = _mm512_cmp_pd_mask(x, reach, _CMP_GT_OQ) & _mm512_cmp_pd_mask(y, reach, _CMP_GT_OQ) &
-                            _mm512_cmp_pd_mask(z, reach, _CMP_GT_OQ);
-    active &= static_cast<__mmask8>(~(beyond | _mm512_cmpeq_epi64_mask(at, end)));
-    if (active == 0) break;
-    _mm512_store_si512(mark.data(), _mm512_mask_blend_epi64(active, first, at));
-    for (const std::int64_t i : mark) cells[i] = 1;
-  }
-}
-#endif
+};
 
 /// A dense window of voxels around a sensor in which the rays of a scan are marked. All zero between
 /// scans; its memory is kept.
@@ -149,12 +93,7 @@ class dense_window {
     if (cells_.size() < cells) cells_.resize(cells);
     start_ = cell(from);
     from_ = from;
-    mark_ = simd::select<void(std::uint8_t*, std::int64_t, const traversal_lanes&)>(simd::detected(), {
-      .portable = traverse_lanes_portable,
-#if ORBIS_X86
-      .popcnt = nullptr, .avx2 = traverse_lanes_avx2, .avx512 = traverse_lanes_avx512
-#endif
-    });
+    mark_ = simd::kernel<traverse_lanes_kernel, void(std::uint8_t*, std::int64_t, const traversal_lanes&)>();
     return true;
   }
 

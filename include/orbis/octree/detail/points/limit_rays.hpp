@@ -14,10 +14,6 @@
 #include <orbis/octree/detail/points/point_keys.hpp>
 #include <orbis/octree/detail/points/ray_traversal.hpp>
 
-#if ORBIS_X86
-#include <immintrin.h>
-#endif
-
 namespace orbis::octree::detail {
 
 /// The ray from `origin` to a point, cut off at `limit` metres. @pre the point lies further away, at
@@ -66,140 +62,45 @@ struct ray_frame {
   voxel_key from;  ///< where the way begins
 };
 
-/// The rays to `count` points, each cut off at its limit in metres; a limit that is negative or NaN, an
-/// end that lies outside the grid: no ray.
-inline void limit_rays_portable(const ray_frame& f, const point_batch& points, const double* limits, std::size_t count,
-                                ray_batch& rays) noexcept {
-  rays.clear();
-  for (std::size_t i = 0; i != count; ++i) {
-    float3 end{points.x[i], points.y[i], points.z[i]};
-    const float3 ray = difference(end, f.origin);
-    const double distance = length(ray);
-    const bool hit = distance <= limits[i];
-    if (!hit) {
-      if (!(limits[i] >= 0.0) || !std::isfinite(static_cast<float>(distance))) continue;
-      end = cut_off(f.origin, ray, distance, limits[i]);
-    }
-    if (const auto k = f.grid.key(end))
-      rays.set(i, end,
-               {static_cast<std::int32_t>(k->x - f.from.x), static_cast<std::int32_t>(k->y - f.from.y),
-                static_cast<std::int32_t>(k->z - f.from.z)},
-               hit);
-  }
-}
-
-#if ORBIS_X86
-ORBIS_TARGET("avx2")
-inline void limit_rays_avx2(const ray_frame& f, const point_batch& points, const double* limits, std::size_t count,
-                            ray_batch& rays) noexcept {
-  rays.clear();
-  const std::array<const float*, 3> at{points.x.data(), points.y.data(), points.z.data()};
-  const std::array<std::uint32_t, 3> from{f.from.x, f.from.y, f.from.z};
-  const __m256d per_metre = _mm256_set1_pd(1.0 / f.grid.resolution());
-  const __m256d high = _mm256_set1_pd(0.5 * f.grid.cells()), low = _mm256_set1_pd(-0.5 * f.grid.cells());
-  const __m128 most = _mm_set1_ps(std::numeric_limits<float>::max());
-  for (std::size_t i = 0; i < count; i += 4) {
-    __m128 ray[3], square[3];
-    for (std::size_t axis = 0; axis != 3; ++axis) {
-      ray[axis] = _mm_sub_ps(_mm_load_ps(at[axis] + i), _mm_set1_ps(f.origin[axis]));
-      square[axis] = _mm_mul_ps(ray[axis], ray[axis]);
-#if !defined(__clang__)
-      asm("" : "+x"(square[axis]));  // rounded: see rounded_product
-#endif
-    }
-    const __m128 squares = _mm_add_ps(_mm_add_ps(square[0], square[1]), square[2]);
-    const __m256d distance = _mm256_sqrt_pd(_mm256_cvtps_pd(squares)), limit = _mm256_loadu_pd(limits + i);
-    const __m256d within = _mm256_cmp_pd(distance, limit, _CMP_LE_OQ);
-    const __m128 scale = _mm256_cvtpd_ps(distance), range = _mm256_cvtpd_ps(limit);
-    const __m256d may_be_cut = _mm256_cmp_pd(limit, _mm256_setzero_pd(), _CMP_GE_OQ);
-    const int hit = _mm256_movemask_pd(within);
-    const int finite = _mm_movemask_ps(_mm_cmp_ps(scale, most, _CMP_LE_OQ));
-    __m256d inside = _mm256_cmp_pd(low, low, _CMP_EQ_OQ);
-    for (std::size_t axis = 0; axis != 3; ++axis) {
-      __m128 end = _mm_load_ps(at[axis] + i);
-      if (hit != 15) {
-        __m128 step = _mm_mul_ps(_mm_div_ps(ray[axis], scale), range);
-#if !defined(__clang__)
-        asm("" : "+x"(step));
-#endif
-        const __m128i hits = _mm256_castsi256_si128(
-            _mm256_permutevar8x32_epi32(_mm256_castpd_si256(within), _mm256_setr_epi32(0, 2, 4, 6, 0, 2, 4, 6)));
-        end = _mm_blendv_ps(_mm_add_ps(_mm_set1_ps(f.origin[axis]), step), end, _mm_castsi128_ps(hits));
+struct limit_rays_kernel {
+  template <simd::target Target>
+  static ORBIS_ALWAYS_INLINE void run(const ray_frame& f, const point_batch& points, const double* limits,
+                                      std::size_t count, ray_batch& rays) noexcept {
+    constexpr std::size_t n = Target::bytes == 64 ? 8 : 4;
+    using floats = simd::vec<float, n, Target>;
+    using doubles = simd::vec<double, n, Target>;
+    using integers = simd::vec<std::int32_t, n, Target>;
+    rays.clear();
+    const std::array<const float*, 3> at{points.x.data(), points.y.data(), points.z.data()};
+    const std::array<std::uint32_t, 3> from{f.from.x, f.from.y, f.from.z};
+    const double per_metre = 1.0 / f.grid.resolution(), half = 0.5 * f.grid.cells();
+    for (std::size_t i = 0; i < count; i += n) {
+      const auto along = [&](std::size_t axis)
+                             ORBIS_INLINE_LAMBDA { return floats::load(at[axis] + i) - floats(f.origin[axis]); };
+      const std::array<floats, 3> ray{along(0), along(1), along(2)};
+      const doubles distance = sqrt(simd::convert<double>(ray[0] * ray[0] + ray[1] * ray[1] + ray[2] * ray[2]));
+      const doubles limit = doubles::load(limits + i);
+      const auto is_hit = simd::mask_as<4>(distance <= limit);
+      const floats scale = simd::convert<float>(distance), range = simd::convert<float>(limit);
+      auto inside = floats::mask_type::first(count - i);
+      for (std::size_t axis = 0; axis != 3; ++axis) {
+        floats end = floats::load(at[axis] + i);
+        if (!all(is_hit)) end = select(is_hit, end, f.origin[axis] + ray[axis] / scale * range);
+        end.store(rays.end[axis].data() + i);
+        const auto to_way = static_cast<std::int32_t>((f.grid.cells() >> 1U) - from[axis]);
+        (cells_along(end, per_metre, half, inside) + integers(to_way)).store(rays.way[axis].data() + i);
       }
-      _mm_store_ps(rays.end[axis].data() + i, end);
-      const __m256d cells = _mm256_mul_pd(_mm256_cvtps_pd(end), per_metre);
-      inside = _mm256_and_pd(
-          inside, _mm256_and_pd(_mm256_cmp_pd(cells, low, _CMP_GE_OQ), _mm256_cmp_pd(cells, high, _CMP_LT_OQ)));
-      const __m128i cell = _mm256_cvtpd_epi32(_mm256_floor_pd(cells));
-      const __m128i to_way = _mm_set1_epi32(static_cast<int>((f.grid.cells() >> 1U) - from[axis]));
-      _mm_store_si128(reinterpret_cast<__m128i*>(rays.way[axis].data() + i), _mm_add_epi32(cell, to_way));
+      const auto may_be_cut = simd::mask_as<4>(limit >= 0.0) & (scale <= floats(std::numeric_limits<float>::max()));
+      rays.hit[i >> 6U] |= std::uint64_t{simd::bits(inside & is_hit)} << (i & 63U);
+      rays.cut[i >> 6U] |= std::uint64_t{simd::bits(and_not(inside & may_be_cut, is_hit))} << (i & 63U);
     }
-    int live = _mm256_movemask_pd(inside);
-    if (count - i < 4) live &= (1 << (count - i)) - 1;
-    const int cut = live & ~hit & finite & _mm256_movemask_pd(may_be_cut);
-    rays.hit[i >> 6U] |= std::uint64_t{static_cast<unsigned>(live & hit)} << (i & 63U);
-    rays.cut[i >> 6U] |= std::uint64_t{static_cast<unsigned>(cut)} << (i & 63U);
   }
-}
-
-ORBIS_TARGET("avx512f,avx512dq,avx512vl")
-inline void limit_rays_avx512(const ray_frame& f, const point_batch& points, const double* limits, std::size_t count,
-                              ray_batch& rays) noexcept {
-  rays.clear();
-  constexpr __mmask8 all = 0xff;
-  const std::array<const float*, 3> at{points.x.data(), points.y.data(), points.z.data()};
-  const std::array<std::uint32_t, 3> from{f.from.x, f.from.y, f.from.z};
-  const __m512d per_metre = _mm512_set1_pd(1.0 / f.grid.resolution());
-  const __m512d high = _mm512_set1_pd(0.5 * f.grid.cells()), low = _mm512_set1_pd(-0.5 * f.grid.cells());
-  const __m256 most = _mm256_set1_ps(std::numeric_limits<float>::max());
-  for (std::size_t i = 0; i < count; i += 8) {
-    __m256 ray[3], square[3];
-    for (std::size_t axis = 0; axis != 3; ++axis) {
-      ray[axis] = _mm256_sub_ps(_mm256_load_ps(at[axis] + i), _mm256_set1_ps(f.origin[axis]));
-      square[axis] = _mm256_mul_ps(ray[axis], ray[axis]);
-#if !defined(__clang__)
-      asm("" : "+v"(square[axis]));  // rounded: see rounded_product
-#endif
-    }
-    const __m256 squares = _mm256_add_ps(_mm256_add_ps(square[0], square[1]), square[2]);
-    const __m512d distance = _mm512_maskz_sqrt_pd(all, _mm512_maskz_cvtps_pd(all, squares));
-    const __m512d limit = _mm512_loadu_pd(limits + i);
-    const __mmask8 hit = _mm512_cmp_pd_mask(distance, limit, _CMP_LE_OQ);
-    const __m256 scale = _mm512_maskz_cvtpd_ps(all, distance), range = _mm512_maskz_cvtpd_ps(all, limit);
-    __mmask8 live = count - i >= 8 ? all : static_cast<__mmask8>((1U << (count - i)) - 1U);
-    for (std::size_t axis = 0; axis != 3; ++axis) {
-      __m256 end = _mm256_load_ps(at[axis] + i);
-      if (hit != all) {
-        __m256 step = _mm256_mul_ps(_mm256_div_ps(ray[axis], scale), range);
-#if !defined(__clang__)
-        asm("" : "+v"(step));
-#endif
-        end = _mm256_mask_mov_ps(_mm256_add_ps(_mm256_set1_ps(f.origin[axis]), step), hit, end);
-      }
-      _mm256_store_ps(rays.end[axis].data() + i, end);
-      const __m512d cells = _mm512_mul_pd(_mm512_maskz_cvtps_pd(all, end), per_metre);
-      live &= _mm512_cmp_pd_mask(cells, low, _CMP_GE_OQ);
-      live &= _mm512_cmp_pd_mask(cells, high, _CMP_LT_OQ);
-      const __m256i cell = _mm512_maskz_cvt_roundpd_epi32(all, cells, _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC);
-      const __m256i to_way = _mm256_set1_epi32(static_cast<int>((f.grid.cells() >> 1U) - from[axis]));
-      _mm256_store_si256(reinterpret_cast<__m256i*>(rays.way[axis].data() + i), _mm256_add_epi32(cell, to_way));
-    }
-    const unsigned may_be_cut = static_cast<unsigned>(_mm512_cmp_pd_mask(limit, _mm512_setzero_pd(), _CMP_GE_OQ)) &
-                                _mm256_cmp_ps_mask(scale, most, _CMP_LE_OQ);
-    rays.hit[i >> 6U] |= std::uint64_t{static_cast<unsigned>(live & hit)} << (i & 63U);
-    rays.cut[i >> 6U] |= std::uint64_t{live & ~static_cast<unsigned>(hit) & may_be_cut} << (i & 63U);
-  }
-}
-#endif
+};
 
 using limit_kernel = void(const ray_frame&, const point_batch&, const double*, std::size_t, ray_batch&);
 
-[[nodiscard]] inline limit_kernel* limit_rays(simd::level level) noexcept {
-  return simd::select<limit_kernel>(level, {
-    .portable = limit_rays_portable,
-#if ORBIS_X86
-    .popcnt = nullptr, .avx2 = limit_rays_avx2, .avx512 = limit_rays_avx512
-#endif
-  });
-}
+/// Finds the rays to `count` points, each cut off at its limit in metres. A limit that is negative or NaN, or an end
+/// that lies outside the grid: no ray. @pre points and limits can be read up to a multiple of 8
+[[nodiscard]] inline limit_kernel* limit_rays() noexcept { return simd::kernel<limit_rays_kernel, limit_kernel>(); }
+
 }  // namespace orbis::octree::detail

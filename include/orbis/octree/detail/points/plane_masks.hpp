@@ -12,10 +12,6 @@
 #include <orbis/octree/detail/points/plane_stack.hpp>
 #include <orbis/octree/detail/storage/scan_masks.hpp>
 
-#if ORBIS_X86
-#include <immintrin.h>
-#endif
-
 namespace orbis::octree::detail {
 
 /// Where a window of planes lies in the grid.
@@ -32,17 +28,8 @@ struct stack_placement {
 
 /// Bit i: whether any of the i-th bytes is set.
 [[nodiscard]] inline std::uint64_t marks(const std::uint8_t* a, const std::uint8_t* b, const std::uint8_t* c) noexcept {
-  std::uint64_t bits = 0;
-  for (unsigned i = 0; i != 64; i += ORBIS_X86 ? 16 : 8) {
-#if ORBIS_X86
-    const auto load = [&](const std::uint8_t* p) { return _mm_loadu_si128(reinterpret_cast<const __m128i*>(p + i)); };
-    const __m128i any = _mm_or_si128(_mm_or_si128(load(a), load(b)), load(c));
-    bits |= std::uint64_t{static_cast<std::uint32_t>(_mm_movemask_epi8(any))} << i;
-#else
-    for (unsigned k = 0; k != 8; ++k) bits |= std::uint64_t{(a[i + k] | b[i + k] | c[i + k]) & 1U} << (i + k);
-#endif
-  }
-  return bits;
+  using bytes = simd::vec<std::uint8_t, 64, simd::portable>;
+  return simd::bits((bytes::load(a) | bytes::load(b) | bytes::load(c)) != bytes(0));
 }
 /// Eight layers of eight rows of eight voxels.
 inline void add_brick(const std::array<std::uint64_t, 8>& layers, std::size_t axis, std::size_t iu, std::size_t iv,

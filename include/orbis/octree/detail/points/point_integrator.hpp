@@ -103,7 +103,7 @@ class point_integrator {
     std::optional<voxel_key> key;  ///< empty: no ray is walked
     double max_range;
     std::span<const float> beam_ranges;
-    limit_kernel* limit_batch = limit_rays(simd::detected());
+    limit_kernel* limit_batch = limit_rays();
 
     /// Of the i-th point; negative or NaN if it is to be rejected.
     [[nodiscard]] double limit(std::size_t i) const noexcept {
@@ -168,13 +168,12 @@ class point_integrator {
     /// The points [begin, end) in mode discretized.
     template <class Point>
     void add_ends(const voxel_grid& grid, std::size_t begin, std::size_t end, Point&& point) {
-      auto* const keys_of = find_keys(simd::detected());
       scan_brick* brick = nullptr;  // of the last point; neighbours mostly lie in the same one
       while (begin != end) {
         const std::size_t n = std::min(end - begin, point_batch::capacity);
         load_points(point, begin, n, batch);
         begin += n;
-        keys_of(grid, batch, n, keys);
+        find_keys(grid, batch, n, keys);
         for (std::size_t i = 0; i != keys.count; ++i) {
           const voxel_key k{keys.x[i], keys.y[i], keys.z[i]};
           if (const std::uint64_t name = node_name(k, brick_level); brick == nullptr || name != brick->name)

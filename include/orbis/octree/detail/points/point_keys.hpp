@@ -4,21 +4,15 @@
 #pragma once
 
 #include <array>
-#include <bit>
 #include <concepts>
 #include <cstddef>
 #include <cstdint>
 #include <ranges>
-#include <type_traits>
+#include <utility>
 
 #include <orbis/core/point.hpp>
 #include <orbis/core/simd.hpp>
-#include <orbis/octree/detail/storage/packed_lanes.hpp>
 #include <orbis/octree/key.hpp>
-
-#if ORBIS_X86
-#include <immintrin.h>
-#endif
 
 namespace orbis::octree::detail {
 
@@ -28,56 +22,36 @@ struct point_batch {
   alignas(64) std::array<float, capacity> x, y, z;
 };
 
-inline void load_triples_portable(const float* points, std::size_t count, point_batch& batch) noexcept {
-  for (std::size_t i = 0; i != count; ++i) {
-    batch.x[i] = points[3 * i];
-    batch.y[i] = points[3 * i + 1];
-    batch.z[i] = points[3 * i + 2];
+/// x, y, z, x, y, z ... to one array for each coordinate.
+struct load_triples_kernel {
+  template <simd::target Target>
+  static ORBIS_ALWAYS_INLINE void run(const float* points, std::size_t count, point_batch& batch) noexcept {
+    using floats = simd::native_vec<float, Target>;
+    constexpr std::size_t n = floats::count;
+    std::size_t i = 0;
+    for (; i + n <= count; i += n) {
+      const float* const p = points + 3 * i;
+      const floats a = floats::load(p), b = floats::load(p + n), c = floats::load(p + 2 * n);
+      coordinate<0>(a, b, c, std::make_index_sequence<n>{}).store(batch.x.data() + i);
+      coordinate<1>(a, b, c, std::make_index_sequence<n>{}).store(batch.y.data() + i);
+      coordinate<2>(a, b, c, std::make_index_sequence<n>{}).store(batch.z.data() + i);
+    }
+    for (; i != count; ++i) {
+      batch.x[i] = points[3 * i];
+      batch.y[i] = points[3 * i + 1];
+      batch.z[i] = points[3 * i + 2];
+    }
   }
-}
-#if ORBIS_X86
-ORBIS_TARGET("avx2")
-inline void load_triples_avx2(const float* points, std::size_t count, point_batch& batch) noexcept {
-  std::size_t i = 0;
-  for (; i + 8 <= count; i += 8) {
-    const float* const p = points + 3 * i;
-    const __m256 a = _mm256_loadu_ps(p), b = _mm256_loadu_ps(p + 8), c = _mm256_loadu_ps(p + 16);
-    const __m256 x = _mm256_blend_ps(_mm256_blend_ps(a, b, 0x92), c, 0x24);
-    const __m256 y = _mm256_blend_ps(_mm256_blend_ps(a, b, 0x24), c, 0x49);
-    const __m256 z = _mm256_blend_ps(_mm256_blend_ps(a, b, 0x49), c, 0x92);
-    _mm256_store_ps(batch.x.data() + i, _mm256_permutevar8x32_ps(x, _mm256_setr_epi32(0, 3, 6, 1, 4, 7, 2, 5)));
-    _mm256_store_ps(batch.y.data() + i, _mm256_permutevar8x32_ps(y, _mm256_setr_epi32(1, 4, 7, 2, 5, 0, 3, 6)));
-    _mm256_store_ps(batch.z.data() + i, _mm256_permutevar8x32_ps(z, _mm256_setr_epi32(2, 5, 0, 3, 6, 1, 4, 7)));
+
+ private:
+  /// Every third of 3 N numbers, from number K on.
+  template <std::size_t K, class V, std::size_t... I>
+  static ORBIS_ALWAYS_INLINE V coordinate(const V& a, const V& b, const V& c, std::index_sequence<I...>) noexcept {
+    constexpr std::size_t n = sizeof...(I);
+    const V from_two = simd::shuffle<(3 * I + K < 2 * n ? 3 * I + K : 0)...>(a, b);
+    return simd::shuffle<(3 * I + K < 2 * n ? I : 3 * I + K - n)...>(from_two, c);
   }
-  for (; i != count; ++i) {
-    batch.x[i] = points[3 * i];
-    batch.y[i] = points[3 * i + 1];
-    batch.z[i] = points[3 * i + 2];
-  }
-}
-ORBIS_TARGET("avx512f")
-inline void load_triples_avx512(const float* points, std::size_t count, point_batch& batch) noexcept {
-  // Of each coordinate the first two registers hold eleven, the third the rest.
-  const __m512i every_third = _mm512_setr_epi32(0, 3, 6, 9, 12, 15, 18, 21, 24, 27, 30, 33, 36, 39, 42, 45);
-  std::size_t i = 0;
-  for (; i + 16 <= count; i += 16) {
-    const float* const p = points + 3 * i;
-    const __m512 a = _mm512_loadu_ps(p), b = _mm512_loadu_ps(p + 16), c = _mm512_loadu_ps(p + 32);
-    const auto coordinate = [&](int first, __mmask16 in_c) ORBIS_TARGET("avx512f") {
-      const __m512i at = _mm512_add_epi32(_mm512_set1_epi32(first), every_third);
-      return _mm512_mask_permutexvar_ps(_mm512_permutex2var_ps(a, at, b), in_c, at, c);
-    };
-    _mm512_store_ps(batch.x.data() + i, coordinate(0, 0xf800));  // 33, 36 ... lie in c
-    _mm512_store_ps(batch.y.data() + i, coordinate(1, 0xf800));
-    _mm512_store_ps(batch.z.data() + i, coordinate(2, 0xfc00));
-  }
-  for (; i != count; ++i) {
-    batch.x[i] = points[3 * i];
-    batch.y[i] = points[3 * i + 1];
-    batch.z[i] = points[3 * i + 2];
-  }
-}
-#endif
+};
 
 /// Whether the points of a range are floats x, y, z, x, y, z ... in memory.
 template <class Points>
@@ -97,13 +71,8 @@ struct point_source {
         std::ranges::begin(points)[static_cast<std::ranges::range_difference_t<const Points>>(i)]);
   }
   void load(std::size_t begin, std::size_t count, point_batch& batch) const requires float_triples<const Points> {
-    auto* const load = simd::select<void(const float*, std::size_t, point_batch&)>(simd::detected(), {
-      .portable = load_triples_portable,
-#if ORBIS_X86
-      .popcnt = nullptr, .avx2 = load_triples_avx2, .avx512 = load_triples_avx512
-#endif
-    });
-    load(std::ranges::data(points)[begin].data(), count, batch);
+    auto* const load_triples = simd::kernel<load_triples_kernel, void(const float*, std::size_t, point_batch&)>();
+    load_triples(std::ranges::data(points)[begin].data(), count, batch);
   }
 };
 
@@ -122,151 +91,71 @@ void load_points(Source&& source, std::size_t begin, std::size_t count, point_ba
   }
 }
 
-/// The voxels of some points, in their order, without those that equal the one before; and the number
-/// of points that lie in none.
+/// The voxels of some points, in their order; a voxel that equals the one before may be left out. And the number of
+/// points that lie in none.
 struct batch_keys {
   alignas(64) std::array<std::uint32_t, point_batch::capacity + 16> x, y, z;
   std::size_t count = 0;
   std::size_t outside = 0;
 };
 
-inline void find_keys_portable(const voxel_grid& grid, const point_batch& points, std::size_t begin, std::size_t count,
-                               batch_keys& keys) noexcept {
-  for (std::size_t i = begin; i != count; ++i) {
-    const auto key = grid.key(std::array{points.x[i], points.y[i], points.z[i]});
-    if (!key) {
-      ++keys.outside;
-      continue;
+/// Along one axis the cells of some coordinates, counted from the middle of the grid; what voxel_grid::key does.
+/// `inside` loses the lanes that lie outside the grid or are not numbers: of these the cell means nothing.
+/// `half`: half the width of the grid, in cells.
+template <class Floats, class Mask>
+[[nodiscard]] ORBIS_ALWAYS_INLINE auto cells_along(const Floats& at, double per_metre, double half,
+                                                   Mask& inside) noexcept {
+  const auto cells = simd::convert<double>(at) * per_metre;
+  inside = inside & simd::mask_as<4>((cells >= -half) & (cells < half));
+  return simd::convert<std::int32_t>(floor(cells));
+}
+
+struct find_keys_kernel {
+  template <simd::target Target>
+  static ORBIS_ALWAYS_INLINE void run(const voxel_grid& grid, const point_batch& points, std::size_t count,
+                                      batch_keys& keys) noexcept {
+    using floats = simd::native_vec<float, Target>;
+    using integers = simd::native_vec<std::int32_t, Target>;
+    constexpr std::size_t n = floats::count;
+    const double per_metre = 1.0 / grid.resolution(), half = 0.5 * grid.cells();
+    const integers middle(static_cast<std::int32_t>(half)), none(-1);
+    // All keys, one place further back, so that the key before each can be read; the first has none before it.
+    alignas(64) std::array<std::array<std::int32_t, point_batch::capacity + 32>, 3> all;
+    for (auto& axis : all) axis[15] = -1;
+    std::size_t used = 0, inside_count = 0;
+    for (std::size_t i = 0; i < count; i += n) {
+      auto inside = floats::mask_type::first(count - i);
+      const integers x = cells_along(floats::load(points.x.data() + i), per_metre, half, inside) + middle;
+      const integers y = cells_along(floats::load(points.y.data() + i), per_metre, half, inside) + middle;
+      const integers z = cells_along(floats::load(points.z.data() + i), per_metre, half, inside) + middle;
+      inside_count += simd::number_of(inside);
+      select(inside, x, none).store(all[0].data() + 16 + i);  // no voxel equals what lies outside
+      y.store(all[1].data() + 16 + i);
+      z.store(all[2].data() + 16 + i);
     }
-    keys.x[keys.count] = key->x;
-    keys.y[keys.count] = key->y;
-    keys.z[keys.count] = key->z;
-    const std::size_t n = keys.count;
-    keys.count += n == 0 || key->x != keys.x[n - 1] || key->y != keys.y[n - 1] || key->z != keys.z[n - 1] ? 1 : 0;
+    for (std::size_t i = 0; i < count; i += n) {
+      const auto here = [&](std::size_t axis) ORBIS_INLINE_LAMBDA { return integers::load(all[axis].data() + 16 + i); };
+      const auto before = [&](std::size_t axis)
+                              ORBIS_INLINE_LAMBDA { return integers::load(all[axis].data() + 15 + i); };
+      const integers x = here(0), y = here(1), z = here(2);
+      const auto fresh = (x >= integers(0)) & ((x != before(0)) | (y != before(1)) | (z != before(2)));
+      const auto put = [&](std::array<std::uint32_t, point_batch::capacity + 16>& to, const integers& k)
+                           ORBIS_INLINE_LAMBDA {
+                             return simd::compress_store(to.data() + used, simd::bits_as<std::uint32_t>(k), fresh);
+                           };
+      put(keys.x, x);
+      put(keys.y, y);
+      used += put(keys.z, z);
+    }
+    keys.count = used;
+    keys.outside = count - inside_count;
   }
-}
-inline void find_keys_portable(const voxel_grid& grid, const point_batch& points, std::size_t count,
-                               batch_keys& keys) noexcept {
-  keys.count = keys.outside = 0;
-  find_keys_portable(grid, points, 0, count, keys);
-}
+};
 
-#if ORBIS_X86
-/// What voxel_grid::key does, of eight coordinates; clears the lanes of those outside in `inside`.
-ORBIS_TARGET("avx2")
-inline __m256i cells_avx2(const float* at, double per_metre, double half, __m256i& inside) noexcept {
-  const __m256d scale = _mm256_set1_pd(per_metre), high = _mm256_set1_pd(half), low = _mm256_set1_pd(-half);
-  const __m256d a = _mm256_mul_pd(_mm256_cvtps_pd(_mm_load_ps(at)), scale);
-  const __m256d b = _mm256_mul_pd(_mm256_cvtps_pd(_mm_load_ps(at + 4)), scale);
-  const auto in = [&](__m256d x) ORBIS_TARGET("avx2") {
-    return _mm256_and_pd(_mm256_cmp_pd(x, low, _CMP_GE_OQ), _mm256_cmp_pd(x, high, _CMP_LT_OQ));
-  };
-  const __m256 halves = _mm256_shuffle_ps(_mm256_castpd_ps(in(a)), _mm256_castpd_ps(in(b)), 0x88);
-  inside = _mm256_and_si256(inside, _mm256_permute4x64_epi64(_mm256_castps_si256(halves), 0xd8));
-  const __m256i cells = _mm256_inserti128_si256(_mm256_castsi128_si256(_mm256_cvtpd_epi32(_mm256_floor_pd(a))),
-                                                _mm256_cvtpd_epi32(_mm256_floor_pd(b)), 1);
-  return _mm256_add_epi32(cells, _mm256_set1_epi32(static_cast<int>(half)));
-}
-ORBIS_TARGET("avx2,popcnt")
-inline void find_keys_avx2(const voxel_grid& grid, const point_batch& points, std::size_t count,
-                           batch_keys& keys) noexcept {
-  const double per_metre = 1.0 / grid.resolution(), half = 0.5 * grid.cells();
-  const __m256i none = _mm256_set1_epi32(-1), rotation = _mm256_setr_epi32(7, 0, 1, 2, 3, 4, 5, 6);
-  __m256i x0 = none, y0 = none, z0 = none;  // of the voxel before, rotated; no voxel at first
-  std::size_t i = 0, n = 0, outside = 0;
-  for (; i + 8 <= count; i += 8) {
-    __m256i inside = none;
-    __m256i x = cells_avx2(points.x.data() + i, per_metre, half, inside);
-    const __m256i y = cells_avx2(points.y.data() + i, per_metre, half, inside);
-    const __m256i z = cells_avx2(points.z.data() + i, per_metre, half, inside);
-    x = _mm256_blendv_epi8(none, x, inside);  // what lies outside equals no voxel
-    const auto same = [&](__m256i k, __m256i& before) ORBIS_TARGET("avx2") {
-      const __m256i turned = _mm256_permutevar8x32_epi32(k, rotation);
-      const __m256i equal = _mm256_cmpeq_epi32(k, _mm256_blend_epi32(turned, before, 1));
-      before = turned;
-      return equal;
-    };
-    const __m256i same_x = same(x, x0), same_y = same(y, y0), same_z = same(z, z0);
-    const __m256i repeated = _mm256_and_si256(same_x, _mm256_and_si256(same_y, same_z));
-    const auto bits = [](__m256i mask) ORBIS_TARGET("avx2") {
-      return static_cast<std::uint32_t>(_mm256_movemask_ps(_mm256_castsi256_ps(mask)));
-    };
-    const std::uint32_t fresh = bits(_mm256_andnot_si256(repeated, inside));
-    const __m256i packed = packed_lanes(fresh);
-    const auto store = [&](std::uint32_t* to, __m256i k) ORBIS_TARGET("avx2") {
-      _mm256_storeu_si256(reinterpret_cast<__m256i*>(to + n), _mm256_permutevar8x32_epi32(k, packed));
-    };
-    store(keys.x.data(), x);
-    store(keys.y.data(), y);
-    store(keys.z.data(), z);
-    n += static_cast<std::size_t>(__builtin_popcount(fresh));
-    outside += static_cast<std::size_t>(8 - __builtin_popcount(bits(inside)));
-  }
-  keys.count = n;
-  keys.outside = outside;
-  find_keys_portable(grid, points, i, count, keys);
-}
-
-/// What voxel_grid::key does, of sixteen coordinates; clears the bits of those outside in `inside`.
-ORBIS_TARGET("avx512f,avx512dq,avx512vl")
-inline __m512i cells_avx512(const float* at, double per_metre, double half, __mmask16& inside) noexcept {
-  const __m512d scale = _mm512_set1_pd(per_metre), high = _mm512_set1_pd(half), low = _mm512_set1_pd(-half);
-  const __m512d a = _mm512_mul_pd(_mm512_maskz_cvtps_pd(0xff, _mm256_loadu_ps(at)), scale);
-  const __m512d b = _mm512_mul_pd(_mm512_maskz_cvtps_pd(0xff, _mm256_loadu_ps(at + 8)), scale);
-  const auto in_a =
-      static_cast<__mmask8>(_mm512_cmp_pd_mask(a, low, _CMP_GE_OQ) & _mm512_cmp_pd_mask(a, high, _CMP_LT_OQ));
-  const auto in_b =
-      static_cast<__mmask8>(_mm512_cmp_pd_mask(b, low, _CMP_GE_OQ) & _mm512_cmp_pd_mask(b, high, _CMP_LT_OQ));
-  inside &= static_cast<__mmask16>(in_a | in_b << 8U);
-  constexpr int down = _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC;
-  const __m512i cells =
-      _mm512_maskz_inserti64x4(0xff, _mm512_castsi256_si512(_mm512_maskz_cvt_roundpd_epi32(in_a, a, down)),
-                               _mm512_maskz_cvt_roundpd_epi32(in_b, b, down), 1);
-  return _mm512_add_epi32(cells, _mm512_set1_epi32(static_cast<int>(half)));
-}
-ORBIS_TARGET("avx512f,avx512dq,avx512vl,popcnt")
-inline void find_keys_avx512(const voxel_grid& grid, const point_batch& points, std::size_t count,
-                             batch_keys& keys) noexcept {
-  const double per_metre = 1.0 / grid.resolution(), half = 0.5 * grid.cells();
-  __m512i x0 = _mm512_set1_epi32(-1), y0 = x0, z0 = x0;  // of the voxel before; no voxel at first
-  const __m512i before = _mm512_setr_epi32(15, 16, 17, 18, 19, 20, 21, 22, 23, 24, 25, 26, 27, 28, 29, 30);
-  std::size_t i = 0, n = 0, outside = 0;
-  for (; i + 16 <= count; i += 16) {
-    __mmask16 inside = 0xffff;
-    const __m512i x = cells_avx512(points.x.data() + i, per_metre, half, inside);
-    const __m512i y = cells_avx512(points.y.data() + i, per_metre, half, inside);
-    const __m512i z = cells_avx512(points.z.data() + i, per_metre, half, inside);
-    const auto fresh =
-        static_cast<__mmask16>(inside & (_mm512_cmpneq_epi32_mask(x, _mm512_permutex2var_epi32(x0, before, x)) |
-                                         _mm512_cmpneq_epi32_mask(y, _mm512_permutex2var_epi32(y0, before, y)) |
-                                         _mm512_cmpneq_epi32_mask(z, _mm512_permutex2var_epi32(z0, before, z)) |
-                                         // The one before lies outside: its cell means nothing.
-                                         static_cast<unsigned>(static_cast<__mmask16>(~inside)) << 1U));
-    _mm512_storeu_si512(keys.x.data() + n, _mm512_maskz_compress_epi32(fresh, x));
-    _mm512_storeu_si512(keys.y.data() + n, _mm512_maskz_compress_epi32(fresh, y));
-    _mm512_storeu_si512(keys.z.data() + n, _mm512_maskz_compress_epi32(fresh, z));
-    n += static_cast<std::size_t>(__builtin_popcount(fresh));
-    outside += static_cast<std::size_t>(16 - __builtin_popcount(inside));
-    const __m512i last = _mm512_set1_epi32(-1);
-    x0 = (inside & 0x8000U) != 0 ? x : last;
-    y0 = y;
-    z0 = z;
-  }
-  keys.count = n;
-  keys.outside = outside;
-  find_keys_portable(grid, points, i, count, keys);
-}
-#endif
-
-using keys_kernel = void(const voxel_grid&, const point_batch&, std::size_t, batch_keys&);
-
-[[nodiscard]] inline keys_kernel* find_keys(simd::level level) noexcept {
-  return simd::select<keys_kernel>(level, {
-    .portable = find_keys_portable,
-#if ORBIS_X86
-    .popcnt = nullptr, .avx2 = find_keys_avx2, .avx512 = find_keys_avx512
-#endif
-  });
+/// The voxels of the first `count` points. @pre the arrays of `points` can be read up to a multiple of 16
+inline void find_keys(const voxel_grid& grid, const point_batch& points, std::size_t count, batch_keys& keys) noexcept {
+  using signature = void(const voxel_grid&, const point_batch&, std::size_t, batch_keys&);
+  simd::kernel<find_keys_kernel, signature>()(grid, points, count, keys);
 }
 
 }  // namespace orbis::octree::detail

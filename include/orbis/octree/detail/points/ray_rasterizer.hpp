@@ -32,9 +32,8 @@ namespace orbis::octree::detail {
 /// The rays of one scan. Keeps its memory from scan to scan, some megabytes however far the rays go.
 class ray_rasterizer {
  public:
-  /// Begins a scan from `origin` in voxel `from`. `level`: of the instructions used, for tests.
-  void start(const voxel_grid& grid, const float3& origin, const voxel_key& from,
-             simd::level level = simd::detected()) {
+  /// Begins a scan from `origin` in voxel `from`.
+  void start(const voxel_grid& grid, const float3& origin, const voxel_key& from) {
     grid_ = &grid;
     source_ = {grid, origin, from};
     for (auto& q : queues_) q.clear();
@@ -42,8 +41,8 @@ class ray_rasterizer {
     batch_.clear();
     batched_ = 0;
     passed_ = 0;
-    prepare_ = set_up_rays(level);
-    sweep_ = mark_crossings(level);
+    prepare_ = set_up_rays();
+    sweep_ = mark_crossings();
   }
 
   /// Marks in `masks` what traverse_ray visits, now or when `flush` is called, and perhaps `to` if it is a
