@@ -64,6 +64,14 @@ struct depth_sensor {
       e.what = ray_endpoint::fate::rejected;
     return e;
   }
+  /// The lower corner of a voxel, relative to the camera's centre, metres in the world frame.
+  [[nodiscard]] float3 corner(const voxel_key& k) const {
+    const double half = 0.5 * grid.resolution();
+    const auto along = [&](std::uint32_t c, float centre) {
+      return static_cast<float>((grid.center(c) - half) - static_cast<double>(centre));
+    };
+    return {along(k.x, pose.centre[0]), along(k.y, pose.centre[1]), along(k.z, pose.centre[2])};
+  }
 
  private:
   /// The largest float whose root (in double) is at most `range`.

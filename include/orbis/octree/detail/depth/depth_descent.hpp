@@ -1,0 +1,197 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// The descent through the octree that finds the voxels which a depth image observes free.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include <orbis/octree/detail/depth/depth_frame.hpp>
+#include <orbis/octree/detail/storage/node_name.hpp>
+#include <orbis/octree/detail/storage/scan_masks.hpp>
+
+namespace orbis::octree::detail {
+
+/// What one thread finds.
+struct descent_worker {
+  struct free_brick {
+    std::uint64_t name;
+    std::array<std::uint64_t, 8> free;
+  };
+  std::vector<free_brick> bricks;
+  std::vector<std::array<std::int32_t, 2>> unsure;  ///< pixels of the voxel at hand
+};
+
+/// What one thread does with the nodes it is given. `EndOf`: the ray_endpoint of pixel (u, v). `Saturated`: see
+/// depth_integrator::mark.
+template <class EndOf, class Saturated>
+struct depth_descent {
+  using words = std::array<std::uint64_t, 8>;
+
+  const depth_frame& frame;
+  descent_worker& own;
+  const depth_sensor& sensor;
+  const EndOf& end_of;
+  const scan_masks& hits;  ///< the voxels that rays end in
+  Saturated& saturated;
+  bool on_face;  ///< the camera's centre lies close to a face of its voxel
+
+  /// Finds the free voxels of the node at `level` > brick_level whose lowest voxel is `k`.
+  void descend(const voxel_key& k, const float3& center, int level, bool inside) const {
+    children c;
+    frame.classify(frame.scene, offsets(level - 1), center, inside, c);
+    for (unsigned bits = c.live; bits != 0; bits &= bits - 1) {
+      const auto i = static_cast<unsigned>(std::countr_zero(bits));
+      const bool full = (c.full >> i & 1U) != 0, inner = (c.inside >> i & 1U) != 0;
+      const voxel_key child = child_key(k, i, node_cells(level - 1));
+      const float3 at{c.x[i], c.y[i], c.z[i]};
+      if (level - 1 == brick_level)
+        add_brick(child, at, full, inner);
+      else if (full)
+        fill(child, level - 1);
+      else
+        descend(child, at, level - 1, inner);
+    }
+  }
+
+ private:
+  [[nodiscard]] const child_offsets& offsets(int level) const { return frame.offsets[static_cast<std::size_t>(level)]; }
+  void fill(const voxel_key& k, int level) const {
+    for (unsigned i = 0; i != 8; ++i) {
+      const voxel_key child = child_key(k, i, node_cells(level - 1));
+      if (level - 1 == brick_level)
+        add_brick(child, {}, true, true);
+      else
+        fill(child, level - 1);
+    }
+  }
+  void add_brick(const voxel_key& k, const float3& center, bool full, bool inside) const {
+    const std::uint64_t name = node_name(k, brick_level);
+    words skip{};  // voxels of which nothing needs to be known
+    saturated(name, skip);
+    if (const scan_brick* hit = hits.find(name))
+      for (std::size_t i = 0; i != 8; ++i) skip[i] |= hit->occupied[i];
+    skip_camera(k, skip);
+    bool done = true;
+    for (const std::uint64_t w : skip) done = done && w == ~std::uint64_t{0};
+    if (done) return;
+    words free{};
+    if (full) {
+      free.fill(~std::uint64_t{0});
+    } else {
+      refine(k, center, inside, skip, free);
+    }
+    std::uint64_t any = 0;
+    for (std::size_t i = 0; i != 8; ++i) any |= free[i] &= ~skip[i];
+    if (any != 0) own.bricks.push_back({name, free});
+  }
+  /// The camera's own voxel, and its neighbours if it is on a face, are seen to apart.
+  void skip_camera(const voxel_key& k, words& skip) const {
+    const voxel_key& from = *sensor.key;
+    const std::uint32_t around = on_face ? 1 : 0;
+    const auto touches = [&](std::uint32_t low, std::uint32_t at) {
+      return at + around >= low && at <= low + 7 + around;
+    };
+    if (!touches(k.x, from.x) || !touches(k.y, from.y) || !touches(k.z, from.z)) return;
+    for (std::uint32_t i = 0; i != 512; ++i) {
+      const voxel_key p = voxel_in_brick(i);
+      const auto close = [&](std::uint32_t c, std::uint32_t at) { return c + around - at <= 2 * around; };
+      if (close(k.x + p.x, from.x) && close(k.y + p.y, from.y) && close(k.z + p.z, from.z))
+        skip[i >> 6U] |= std::uint64_t{1} << (i & 63U);
+    }
+  }
+
+  /// The free voxels of a brick, as far as they are not to be skipped.
+  void refine(const voxel_key& k, const float3& center, bool inside, const words& skip, words& free) const {
+    const float3 low = sensor.corner(k);
+    children octants;
+    frame.classify(frame.scene, offsets(octant_level), center, inside, octants);
+    for (unsigned bits = octants.live; bits != 0; bits &= bits - 1) {
+      const auto i = static_cast<unsigned>(std::countr_zero(bits));
+      if (skip[i] == ~std::uint64_t{0}) continue;
+      if ((octants.full >> i & 1U) != 0)
+        free[i] = ~std::uint64_t{0};
+      else
+        free[i] = refine_octant(k, low, i, octants, skip[i]);
+    }
+  }
+  [[nodiscard]] std::uint64_t refine_octant(const voxel_key& k, const float3& low, unsigned octant,
+                                            const children& octants, std::uint64_t skip) const {
+    children groups;
+    frame.classify(frame.scene, offsets(1), {octants.x[octant], octants.y[octant], octants.z[octant]},
+                   (octants.inside >> octant & 1U) != 0, groups);
+    std::uint64_t free = 0;
+    for (unsigned bits = groups.live; bits != 0; bits &= bits - 1) {
+      const auto i = static_cast<unsigned>(std::countr_zero(bits));
+      const auto known = static_cast<unsigned>(skip >> (8 * i) & 0xffU);
+      if (known == 0xff) continue;
+      const std::uint64_t found =
+          (groups.full >> i & 1U) != 0 ? 0xff : refine_group(k, low, octant << 6U | i << 3U, groups, i, known);
+      free |= found << (8 * i);
+    }
+    return free;
+  }
+  [[nodiscard]] unsigned refine_group(const voxel_key& k, const float3& low, std::uint32_t place,
+                                      const children& groups, unsigned group, unsigned known) const {
+    children voxels;
+    frame.classify(frame.scene, offsets(0), {groups.x[group], groups.y[group], groups.z[group]},
+                   (groups.inside >> group & 1U) != 0, voxels);
+    unsigned left = voxels.live & ~voxels.full & ~known;
+    if (left == 0) return voxels.full;
+    const voxel_key p = voxel_in_brick(place);
+    const float edge = frame.scene.voxel;
+    const auto middle = [&](std::size_t i, std::uint32_t at) { return low[i] + edge * static_cast<float>(at + 1); };
+    const float3 center{middle(0, p.x), middle(1, p.y), middle(2, p.z)};
+    unsigned free = voxels.full | frame.sample(frame.scene, offsets(0), center, voxels, left);
+    for (left &= ~free; left != 0; left &= left - 1) {
+      const auto i = static_cast<unsigned>(std::countr_zero(left));
+      const auto& o = offsets(0);
+      const float3 at{center[0] + o.world_x[i], center[1] + o.world_y[i], center[2] + o.world_z[i]};
+      const voxel_key voxel = child_key({k.x + p.x, k.y + p.y, k.z + p.z}, i, 1);
+      if (is_crossed(voxel, at, {voxels.u0[i], voxels.u1[i], voxels.v0[i], voxels.v1[i]}, voxels.near_z[i]))
+        free |= 1U << i;
+    }
+    return free;
+  }
+  [[nodiscard]] bool is_crossed(const voxel_key& voxel, const float3& at, const pixel_box& box, float near_z) const {
+    own.unsure.clear();
+    const voxel_test test{frame.scene, at, 0.5F * frame.scene.voxel};
+    if (test_box(test, box, near_z)) return true;
+    for (const auto& [u, v] : own.unsure)
+      if (crosses(sensor, end_of(u, v), voxel)) return true;
+    return false;
+  }
+  [[nodiscard]] bool test_box(const voxel_test& test, const pixel_box& box, float near_z) const {
+    if ((box.u1 - box.u0) * (box.v1 - box.v0) < 1024)
+      return frame.test_pixels(frame.scene, test, box, near_z, own.unsure);
+    // A voxel at the camera: most of its box are rays that pass it by, tile by tile.
+    constexpr std::int32_t size = 128;
+    for (std::int32_t v = box.v0 & -size; v <= box.v1; v += size)
+      for (std::int32_t u = box.u0 & -size; u <= box.u1; u += size)
+        if (test_tile(test, box, near_z, u, v, size)) return true;
+    return false;
+  }
+  [[nodiscard]] bool test_tile(const voxel_test& test, const pixel_box& box, float near_z, std::int32_t u,
+                               std::int32_t v, std::int32_t size) const {
+    const pixel_box part{std::max(box.u0, u), std::min(box.u1, u + size - 1), std::max(box.v0, v),
+                         std::min(box.v1, v + size - 1)};
+    if (part.u0 > part.u1 || part.v0 > part.v1 || !frame.pyramid.reaches(u, v, size, near_z)) return false;
+    const pixel_rays& rays = frame.ends.rays();
+    if (rays.separable()) {
+      if (!test.may_cross(rays.x(0)[part.u0], rays.x(0)[part.u1], *rays.y(part.v0), *rays.y(part.v1))) return false;
+    } else {
+      const auto& t = frame.map.tile_at(u, v, size);
+      if (!(t.x0 <= t.x1) || !test.may_cross(t.x0, t.x1, t.y0, t.y1)) return false;
+    }
+    if (size == 16) return frame.test_pixels(frame.scene, test, part, near_z, own.unsure);
+    const std::int32_t half = size / 2;
+    return test_tile(test, box, near_z, u, v, half) || test_tile(test, box, near_z, u + half, v, half) ||
+           test_tile(test, box, near_z, u, v + half, half) || test_tile(test, box, near_z, u + half, v + half, half);
+  }
+};
+
+}  // namespace orbis::octree::detail
