@@ -234,7 +234,7 @@ template <octree_map Map, node_policy<typename Map::model> Policy = max_of_child
   const auto made = detail::make_node<typename Map::model, Policy>(map.store(), k, map.grid().depth() - depth);
   return {made.kind, made.kind == node_kind::none ? typename Map::model::value_type{} : made.value()};
 }
-/// The same for the point `p`, metres; nothing is known outside the grid.
+/// The node at `depth` that contains the point `p` (metres); none outside the grid. See above.
 template <octree_map Map, point_like P, node_policy<typename Map::model> Policy = max_of_children>
 [[nodiscard]] octree_node<typename Map::model::value_type> find_node(const Map& map, const P& p, int depth,
                                                                      Policy policy = {}) {

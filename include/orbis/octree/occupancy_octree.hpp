@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The occupancy map: a log-odds octree, bit for bit the one OctoMap would make of the same scans.
+/// The occupancy map: a log-odds octree. From the same scans it gets the same values as OctoMap, bit for bit.
 ///
 /// A. Hornung, K. M. Wurm, M. Bennewitz, C. Stachniss, W. Burgard, "OctoMap: An efficient
 /// probabilistic 3D mapping framework based on octrees", Autonomous Robots 34, 2013.
@@ -57,8 +57,8 @@ struct octree_leaf {
   bool occupied = false;
 };
 
-/// A map of free, occupied and unknown space in voxels of a fixed size, 65536 along each axis unless
-/// told otherwise, and centred at the world's origin. Coordinates are metres in the world frame.
+/// A map of free, occupied and unknown space in cubic voxels of one size. The grid has 2^tree_depth voxels along
+/// each axis (65536 by default) and is centred at the world's origin. Coordinates are metres in the world frame.
 ///
 /// @code
 ///   orbis::octree::occupancy_octree<> map{0.05};
@@ -66,9 +66,9 @@ struct octree_leaf {
 ///   if (map.state(p) == orbis::octree::occupancy::occupied) ...
 /// @endcode
 ///
-/// Const members may be called from several threads at once. A copy costs next to nothing, as it
-/// shares everything until one of the two maps changes: readers on other threads take copies between
-/// two insertions and keep them as long as they like, while the writer goes on.
+/// Const members may be called from several threads at once. A copy shares all memory with the original until one of
+/// the two changes, and costs O(pages of 4 KB): readers on other threads take a copy between two insertions and use it
+/// while the writer goes on.
 template <sensor_model Model = log_odds<>>
 class occupancy_octree {
  public:
@@ -80,22 +80,23 @@ class occupancy_octree {
   /// `resolution`: the edge of a voxel, metres. `tree_depth`: the map is 2^tree_depth voxels wide.
   /// @pre resolution finite and > 0; 5 <= tree_depth <= max_tree_depth
   explicit occupancy_octree(double resolution, int tree_depth = default_tree_depth) : grid_{resolution, tree_depth} {}
-  /// A map of bricks that were made elsewhere, by a reader for example. @pre none lies outside the grid
+  /// A map of bricks that the library's own readers have made. @pre no brick lies outside the grid
   occupancy_octree(double resolution, int tree_depth, detail::brick_store<value_type> store)
       : grid_{resolution, tree_depth}, store_{std::move(store)} {}
 
   [[nodiscard]] double resolution() const noexcept { return grid_.resolution(); }
   [[nodiscard]] int tree_depth() const noexcept { return grid_.depth(); }
   [[nodiscard]] const voxel_grid& grid() const noexcept { return grid_; }
-  /// The bricks, for algorithms that know them.
+  /// What is stored, for the library's own algorithms. The type is internal and may change.
   [[nodiscard]] const detail::brick_store<value_type>& store() const noexcept { return store_; }
 
   // -- insertion
 
-  /// Takes in a scan: points in the world frame, seen from `origin`. Every voxel that a ray crosses
-  /// is observed free once, every voxel that holds a point is observed occupied once, however many
-  /// rays and points there are; where both is the case, occupied wins. Coordinates are rounded to
-  /// float first. The map comes out the same under every policy.
+  /// Integrates a scan: `points` in the world frame (metres), seen from `origin`. Every voxel that a ray crosses
+  /// is observed free once and every voxel that holds a point is observed occupied once, however many rays and
+  /// points there are; where both is the case, it is observed occupied. Coordinates are rounded to float first.
+  /// The result does not depend on the policy or on the order of the points. Points that are not finite or lie
+  /// outside the grid are counted as rejected; if the origin is not finite, all are. O(points x voxels per ray).
   template <execution_policy Policy, point_range Points, point_like Origin>
   integration_summary integrate(const Policy& policy, const Points& points, const Origin& origin,
                                 const integration_options& options = {}) {
@@ -105,9 +106,10 @@ class occupancy_octree {
   integration_summary integrate(const Points& points, const Origin& origin, const integration_options& options = {}) {
     return integrate(seq, points, origin, options);
   }
-  /// Takes in a depth image: the same map as from its points in the world (see append_world_points),
-  /// seen from the camera's centre, many times as fast. Voxels that no miss can change any more are not
-  /// looked at, and are not among the summary's `free`. O(pixels + voxels near surfaces).
+  /// Integrates a depth image (depths in metres along the optical axis). The map is the one that the image's world
+  /// points (see append_world_points) make when seen from the camera's centre, but this is many times as fast.
+  /// Voxels that are free already and saturated are skipped and not counted in the summary's `free`.
+  /// O(pixels + voxels near surfaces).
   /// @pre depth and camera have the same size; options.beam_ranges is empty
   template <execution_policy Policy, camera::depth_source Depth, camera::camera_model Camera>
   integration_summary integrate(const Policy& policy, const Depth& depth, const Camera& camera,
@@ -118,15 +120,16 @@ class occupancy_octree {
     return integrate(seq, depth, camera, T_world_camera, options);
   }
 
-  /// Gives the node at `depth` (tree_depth(): one voxel) whose lowest voxel is `key` one value.
-  /// @pre nothing is known inside it yet; key is a multiple of the node's size
+  /// Gives all voxels of a node one value, in the model's units. `key`: the node's lowest voxel; `depth`: of the node
+  /// in the tree (0: the root, tree_depth(): one voxel). O(1).
+  /// @pre the node is unknown as a whole; key is a multiple of the node's size
   void set_unknown_node(const voxel_key& key, int depth, value_type value) {
     begin_change();
     store_.set_node(key, tree_depth() - depth, without_sign_of_zero(value));
     note_node(key, tree_depth() - depth);
   }
 
-  /// Forgets everything but the resolution.
+  /// Makes everything unknown and gives the memory back. The grid stays.
   void clear() {
     store_.clear();
     scratch_ = {};
@@ -135,13 +138,14 @@ class occupancy_octree {
 
   // -- changing what is known
 
-  /// Lets `edit(block&)` change the octant of 4x4x4 voxels that contains `k`. What the block says of
-  /// voxels that it does not know is ignored. @pre k lies in the grid
+  /// Calls `edit(block&)` with the 64 voxels of the octant that contains `k`, and stores what it leaves there. Values
+  /// of voxels that are unknown afterwards are ignored. O(1). @pre k lies in the grid
   template <std::invocable<block<value_type>&> Edit>
   void edit_octant(const voxel_key& k, Edit&& edit) {
     edit_octants(std::array{k}, [&](const voxel_key&, block<value_type>& voxels) { edit(voxels); });
   }
-  /// The same for the octants that contain `keys`, one after the other: `edit(key, block&)`.
+  /// Calls `edit(key, block&)` for each of `keys` in turn, as edit_octant does; all changes belong to one revision of
+  /// the change log. O(keys).
   template <std::ranges::input_range Keys, std::invocable<const voxel_key&, block<value_type>&> Edit>
   void edit_octants(const Keys& keys, Edit&& edit) {
     begin_change();
@@ -159,9 +163,9 @@ class occupancy_octree {
       replace_octant(k, before, after);
     }
   }
-  /// Replaces every voxel's value by `change(value)`, a std::optional: empty makes the voxel unknown.
-  /// `change` must depend on its argument alone; a decay policy does, see decay.hpp. O(octants), not
-  /// voxels.
+  /// Replaces every voxel's value by `change(value)`, a std::optional: empty makes the voxel unknown. `change` must
+  /// depend on its argument alone, as decay policies do (decay.hpp): it is called once for each distinct value of an
+  /// octant. O(octants).
   template <class Change>
   requires std::is_invocable_r_v<std::optional<value_type>, Change&, value_type> void transform(Change&& change) {
     begin_change();
@@ -176,16 +180,15 @@ class occupancy_octree {
     });
     if (has_large) lose_track();
   }
-  /// Makes every voxel as certain as the model allows: what is more likely occupied than free gets the
-  /// upper bound, everything else the lower one. This is what `.bt` files hold.
+  /// Gives every occupied voxel the model's upper bound and every free one its lower bound, as `.bt` files do.
+  /// O(octants).
   void to_maximum_likelihood() {
     transform([](value_type v) { return std::optional{is_occupied<Model>(v) ? Model::clamp_max : Model::clamp_min}; });
   }
-  /// A rolling window: forgets every brick (8x8x8 voxels) and larger leaf that lies outside `box`
-  /// altogether, after `evict(const leaf&)` has seen its leaves. What was evicted comes back by
-  /// `set_unknown_node(leaf.key, leaf.depth, leaf.log_odds)`. Returns the number of bricks and larger
-  /// leaves that went. The log of changes does not mention it, and payload layers do not know of it:
-  /// erase there what was evicted. O(bricks + voxels evicted).
+  /// A rolling window: removes every brick (8x8x8 voxels) and larger leaf that lies completely outside `box` (metres),
+  /// after calling `evict(const leaf&)` for its leaves. `set_unknown_node(leaf.key, leaf.depth, leaf.log_odds)` brings
+  /// a leaf back. Returns the number of bricks and larger leaves removed. The change log does not record this, and
+  /// payload layers keep their values: erase there what was evicted. O(bricks + voxels evicted).
   template <std::invocable<const leaf&> Evict>
   std::size_t evict_outside(const bounding_box& box, Evict&& evict) {
     const auto is_outside = [&](std::uint64_t name) {
@@ -205,9 +208,8 @@ class occupancy_octree {
     store_.erase_large(large);
     return bricks.size() + large.size();
   }
-  /// Merges equal bricks to larger leaves as far as they go, which saves memory and changes nothing
-  /// else: what lies within bricks is always stored pruned. Leaves are split again where something
-  /// changes. O(bricks).
+  /// Merges equal uniform bricks to larger leaves. This saves memory and changes no value; inside bricks, pruning is
+  /// done at once and always. A later change splits a leaf again. O(bricks).
   void prune() {
     const std::vector<detail::tree_part<value_type>> parts = detail::tree_parts(store_, tree_depth());
     detail::large_leaves<value_type> merged;
@@ -233,10 +235,9 @@ class occupancy_octree {
     }
   }
 
-  /// From now on keeps a log of the voxels whose value changes, or stops doing so and forgets it.
-  /// Whoever mirrors the map elsewhere asks the log what to send, see change_log; where it cannot tell
-  /// (after `clear`, an assignment, a change to a leaf bigger than a brick, or a time without tracking)
-  /// its `complete_since` moves on, and the whole map has to be sent again. Copies are not tracked.
+  /// Starts recording which voxels change (see change_log), or stops and clears the record. After `clear`, an
+  /// assignment, a change to a leaf bigger than a brick, or a time without tracking, the log cannot tell what changed:
+  /// its `complete_since` moves on, and whoever mirrors the map has to take all of it again. Copies are not tracked.
   void track_changes(bool wanted = true) {
     if (track_.on == wanted) return;
     track_.on = wanted;
@@ -244,12 +245,13 @@ class occupancy_octree {
     if (!store_.empty() || track_.log.revision() != 0) lose_track();
   }
   [[nodiscard]] const change_log& changes() const noexcept { return track_.log; }
-  /// The same, to forget what all have seen or to limit its length.
+  /// The log for writing: to forget revisions that all readers have seen, or to limit its length.
   [[nodiscard]] change_log& changes() noexcept { return track_.log; }
 
   // -- queries
 
-  /// What is stored at `p`, in the model's units: empty where unknown or outside the grid.
+  /// What is stored at `p` (metres), in the model's units: empty where unknown or outside the grid. O(1), as are the
+  /// queries for one place below.
   template <point_like P>
   [[nodiscard]] std::optional<value_type> value(const P& p) const {
     const auto key = grid_.key(p);
@@ -264,8 +266,8 @@ class occupancy_octree {
   template <class P>
   requires point_like<P> || std::same_as<P, voxel_key>
   [[nodiscard]] std::optional<double> probability(const P& p) const { return probability_at<Model>(value(p)); }
-  /// The same queries for places near each other, several times as fast: one accessor for each
-  /// thread, good until the map changes.
+  /// An object with these queries that is several times as fast for places near each other. One for each thread; valid
+  /// until the map changes.
   [[nodiscard]] octree_accessor<Model> accessor() const noexcept { return {store_, grid_}; }
   /// What is known about `p`.
   template <class P>
@@ -276,8 +278,9 @@ class occupancy_octree {
     return is_occupied<Model>(*v) ? occupancy::occupied : occupancy::free;
   }
 
-  /// The first voxel along a ray that is occupied, or unknown unless `ignore_unknown`; a range that
-  /// is infinite or <= 0 is no limit. See ray_hit, and cast_rays for many. O(voxels along the ray).
+  /// The first voxel along a ray that is occupied, or unknown unless `ignore_unknown`. `origin` in metres, `direction`
+  /// of any length, `max_range` in metres (infinite or <= 0: no limit). The voxel is the one that OctoMap's `castRay`
+  /// finds. See ray_hit, and cast_rays for many rays. O(voxels along the ray).
   template <point_like Origin, point_like Direction>
   [[nodiscard]] ray_hit cast_ray(const Origin& origin, const Direction& direction,
                                  double max_range = std::numeric_limits<double>::infinity(),
@@ -286,35 +289,35 @@ class occupancy_octree {
     return cast(coordinates<float>(origin), coordinates<float>(direction));
   }
 
-  /// Calls `visit(const leaf&)` for every leaf of the pruned octree, depth first.
-  /// O(known voxels).
+  /// Calls `visit(const leaf&)` for every leaf of the pruned octree, in Morton order. O(known voxels).
   template <std::invocable<const leaf&> Visit>
   void for_each_leaf(Visit&& visit) const {
     detail::visit_leaves(store_, tree_depth(),
                          [&](const voxel_key& key, int level, value_type v) { visit(leaf_of(key, level, v)); });
   }
-  /// The same for those leaves that have a voxel in `box`, both corners' voxels included. Touches only
-  /// the chunks in the box.
+  /// Calls `visit(const leaf&)` for every leaf that has a voxel in `box` (metres; the voxels of both corners belong to
+  /// it), in Morton order. Looks at the part of the map in the box only.
   template <std::invocable<const leaf&> Visit>
   void for_each_leaf_in(const bounding_box& box, Visit&& visit) const {
     if (const auto keys = keys_between(grid_, box.min, box.max))
       detail::visit_leaves_in(store_, tree_depth(), *keys,
                               [&](const voxel_key& key, int level, value_type v) { visit(leaf_of(key, level, v)); });
   }
-  /// The same for the tree cut off at `depth` (tree_depth(): all of it): what lies deeper is reported
-  /// as the inner node at `depth`, whose value `Policy` makes of its children.
+  /// Calls `visit(const leaf&)` for every leaf of the tree cut off at `depth` (tree_depth(): all of it): an inner node
+  /// at `depth` counts as a leaf whose value `Policy` makes of its children. O(known voxels).
   template <node_policy<Model> Policy = max_of_children, std::invocable<const leaf&> Visit>
   void for_each_leaf_down_to(int depth, Visit&& visit, Policy = {}) const {
     detail::visit_nodes_down_to<Model, Policy>(
         store_, tree_depth(), tree_depth() - depth,
         [&](const voxel_key& key, int level, value_type v, node_kind) { visit(leaf_of(key, level, v)); });
   }
-  /// Calls `visit(const vec3& center)` for every occupied voxel, whatever the size of its leaf.
+  /// Calls `visit(const vec3& center)` (metres) for every occupied voxel, also for each voxel of a larger leaf.
+  /// O(bricks + voxels visited).
   template <std::invocable<const vec3&> Visit>
   void for_each_occupied_voxel(Visit&& visit) const {
     detail::visit_occupied_voxels<Model>(store_, [&](const voxel_key& key, value_type) { visit(grid_.center(key)); });
   }
-  /// Counts nodes. O(bricks + octants that are not uniform), as are the four after it.
+  /// Numbers of nodes of the pruned octree. O(bricks + octants that are not uniform), as are the four functions below.
   [[nodiscard]] octree_counts counts() const { return detail::count_leaves<Model>(store_, tree_depth()); }
   /// Leaves of the pruned octree, of any size.
   [[nodiscard]] std::size_t num_leaves() const { return counts().leaves; }
@@ -337,7 +340,7 @@ class occupancy_octree {
     return box;
   }
 
-  /// Bytes on the heap: the map's own, and the buffers kept for the next scan.
+  /// Bytes on the heap: of the map (with what copies share), and of the buffers that are kept for the next scan.
   [[nodiscard]] std::size_t memory_bytes() const noexcept { return store_.memory_bytes() + track_.log.memory_bytes(); }
   [[nodiscard]] std::size_t buffer_bytes() const noexcept { return scratch_.memory_bytes(); }
 
@@ -351,7 +354,7 @@ class occupancy_octree {
     detail::depth_integrator depth;
     detail::scan_masks masks;
   };
-  /// Made with the first scan and kept for the next ones, but nothing a copy needs.
+  /// The buffers of a scan, made with the first one. A copy of the map makes its own.
   class scratch {
    public:
     scratch() = default;
@@ -374,7 +377,7 @@ class occupancy_octree {
     std::unique_ptr<scan_buffers> buffers_;
   };
 
-  /// Belongs to one map and not to its copies; a map that is assigned to has changed as a whole.
+  /// The change log. Copies of the map begin without one; a map that is assigned to has changed as a whole.
   struct tracking {
     change_log log;
     bool on = false;
@@ -417,7 +420,7 @@ class occupancy_octree {
   void begin_change() {
     if (track_.on) track_.log.begin_revision();
   }
-  /// Nobody can follow what has just happened.
+  /// Marks the log as incomplete: what has just changed is not recorded.
   void lose_track() {
     begin_change();
     track_.log.clear();

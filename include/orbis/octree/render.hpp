@@ -41,7 +41,7 @@ void render(const Policy& policy, const Map& map, const Camera& camera, const se
 }
 
 /// The depth image of the occupied voxels: metres along the optical axis to where the pixel's ray
-/// enters the voxel it hits, 0 where it hits none. The same under every policy.
+/// enters the voxel it hits, 0 where it hits none. All policies give the same image.
 template <execution_policy Policy, octree_map Map, camera::camera_model Camera>
 [[nodiscard]] image<float> render_depth(const Policy& policy, const Map& map, const Camera& camera,
                                         const se3& T_world_camera, const ray_options& options = {}) {

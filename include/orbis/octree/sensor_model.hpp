@@ -94,7 +94,7 @@ struct log_odds<T> {
   static constexpr T occupancy_threshold{0};
 };
 
-/// The same in thousandths: hit and miss are right to 0.12 %, the bounds to 0.001 %.
+/// The model above with values in thousandths of log-odds: hit and miss are right to 0.12 %, the bounds to 0.001 %.
 template <>
 struct log_odds<std::int16_t> {
   using value_type = std::int16_t;
@@ -106,8 +106,8 @@ struct log_odds<std::int16_t> {
   static constexpr value_type occupancy_threshold = 0;
 };
 
-/// The same in steps of 0.037, of which a miss is almost exactly eleven and a hit twenty-three: both
-/// are right to 0.06 %, the bounds to 0.5 % (probabilities 0.1202 and 0.9707).
+/// The model above with values in steps of 0.037 of log-odds. A miss is almost exactly eleven steps and a hit
+/// twenty-three: both are right to 0.06 %, the bounds to 0.5 % (probabilities 0.1202 and 0.9707).
 template <>
 struct log_odds<std::int8_t> {
   using value_type = std::int8_t;

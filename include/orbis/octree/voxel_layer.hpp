@@ -128,7 +128,7 @@ class voxel_layer {
     const octant& o = octants_[i];
     return (o.known >> (code & 63U) & 1U) != 0 ? &o.value[code & 63U] : nullptr;
   }
-  /// The same, for writing.
+  /// The value of voxel `k` for writing, or null if it has none.
   [[nodiscard]] T* find_writable(const voxel_key& k) {
     const std::uint64_t code = morton_code(k);
     const std::uint32_t i = index_.find(code >> 6U);

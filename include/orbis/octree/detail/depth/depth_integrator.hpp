@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The voxels that one depth image observes free and occupied, found voxel by voxel instead of ray by
-/// ray: at the frame rate of a depth camera the same voxels, to the last, as walking every ray.
+/// The voxels that a depth image observes free and occupied. They are found voxel by voxel, by projection, instead of
+/// ray by ray, and are exactly those that the traversal of every ray finds.
 #pragma once
 
 #include <algorithm>
@@ -31,17 +31,17 @@
 
 namespace orbis::octree::detail {
 
-/// Says that a miss may change every voxel.
+/// No voxel is saturated: a miss may change each of them.
 struct nothing_saturated {
   void operator()(std::uint64_t, std::array<std::uint64_t, 8>&) const noexcept {}
 };
 
 /// Marks the voxels of depth images. Keeps its memory from image to image.
 ///
-/// The octree is descended from a node around all rays. A node that no ray reaches is dropped, a node
-/// all of whose voxels are surely crossed is filled; both are read off a pyramid of the nearest and
-/// farthest ray ends. What is left are voxels at surfaces and at the border of the view: a voxel is
-/// free if one of its pixels' rays crosses it. Where rounding could decide, the ray is walked.
+/// The octree is descended from a node around all rays. A node that no ray reaches is dropped, and a node whose voxels
+/// are all surely crossed is filled; a min/max pyramid of the ray ends tells both. What remains are voxels at surfaces
+/// and at the border of the view: such a voxel is free if the ray of one of its pixels crosses it. Where rounding
+/// could decide, the exact traversal of that ray does.
 class depth_integrator {
  public:
   /// Marks, in `masks`, what every_ray integration of the image's world points marks (see

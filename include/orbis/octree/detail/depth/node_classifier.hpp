@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// What a depth image says about whole nodes of the octree: no ray can touch them, or surely every
-/// voxel in them is crossed.
+/// Certified classification of octree nodes against a depth image: no ray can touch the node, or rays surely cross
+/// every voxel in it, or undecided.
 #pragma once
 
 #include <algorithm>
@@ -49,8 +49,8 @@ struct depth_scene {
   const depth_pyramid* pyramid = nullptr;
   const endpoint_image* rays = nullptr;
 
-  /// The same where every direction has a ray within `spacing` at z = 1: that many times as far off
-  /// are all rays of a tile that contains the nearest one.
+  /// dense_z where every direction has a ray within `spacing` (at z = 1). All rays of a tile of 1, 2x2 or 4x4 pixels
+  /// that contains the nearest ray lie within `tiles[kind]` times the spacing.
   static constexpr std::array<float, 3> tiles{1.02F, 3.06F, 7.14F};
   [[nodiscard]] float dense(std::size_t kind, float spacing) const noexcept {
     return ball / (tiles[kind] * spacing + ball_slope);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Many rays from one point, several at a time: the voxels of traverse_ray, marked in a dense window.
+/// The exact traversal of several rays at a time, marked in a dense window of voxels.
 #pragma once
 
 #include <algorithm>

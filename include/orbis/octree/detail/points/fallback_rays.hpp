@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Rays for which there is no other way than to be walked.
+/// Rays that only the exact traversal can decide.
 #pragma once
 
 #include <algorithm>

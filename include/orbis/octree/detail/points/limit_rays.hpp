@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Where the rays of points end, many points at a time.
+/// Rays to points, cut off at a maximum range, many at a time.
 #pragma once
 
 #include <array>
@@ -25,7 +25,7 @@ namespace orbis::octree::detail {
   return end;
 }
 
-/// Some rays: their ends, and the way there in voxels from the origin's.
+/// Some rays: their ends, and how many voxels away along each axis these are from the origin's voxel.
 struct ray_batch {
   static constexpr std::size_t capacity = point_batch::capacity;
   static constexpr std::size_t lanes = 8;
@@ -55,11 +55,11 @@ struct ray_batch {
   }
 };
 
-/// From where and in what rays go.
+/// The grid, and where the rays start.
 struct ray_frame {
   const voxel_grid& grid;
   float3 origin;
-  voxel_key from;  ///< where the way begins
+  voxel_key from;  ///< voxels are counted from here
 };
 
 struct limit_rays_kernel {

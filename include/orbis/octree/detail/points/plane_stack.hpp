@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Rays through a stack of planes of voxel faces, and the maps they are marked in.
+/// Rays through a stack of parallel planes of voxel faces, and the byte maps in which their crossings are marked.
 #pragma once
 
 #include <cstddef>
@@ -56,7 +56,7 @@ struct plane_stack {
   [[nodiscard]] std::uint32_t cell(std::int32_t u, std::int32_t v) const noexcept {
     return at(static_cast<std::uint32_t>(u - low_u), static_cast<std::uint32_t>(v - low_v));
   }
-  /// The same, u and v being counted from the map's first cell.
+  /// The number of a cell whose u and v are counted from the map's first cell.
   [[nodiscard]] std::uint32_t at(std::uint32_t u, std::uint32_t v) const noexcept {
     return ((v >> 3U << log2_width | u >> 3U) << 6U) | (v & 7U) << 3U | (u & 7U);
   }

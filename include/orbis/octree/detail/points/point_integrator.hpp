@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// From a point cloud to the voxels that it observes free and occupied.
+/// The voxels that a point cloud observes free and occupied.
 #pragma once
 
 #include <algorithm>
@@ -28,7 +28,7 @@
 
 namespace orbis::octree::detail {
 
-/// Takes from a scan the voxels that lie outside the bounds, if there are any.
+/// Removes the voxels outside `bounds` from a scan; does nothing without bounds.
 inline void clip(scan_masks& masks, const voxel_grid& grid, const std::optional<bounding_box>& bounds) {
   if (!bounds) return;
   if (const auto box = keys_between(grid, bounds->min, bounds->max))
@@ -71,7 +71,7 @@ class point_integrator {
     return finish(policy, grid, options);
   }
 
-  /// The same of a range of points.
+  /// Marks the scan of a range of points.
   template <execution_policy Policy, point_range Points>
   integration_summary mark(const Policy& policy, const voxel_grid& grid, const Points& points, const float3& origin,
                            const integration_options& options) {
@@ -184,7 +184,7 @@ class point_integrator {
         summary.rejected += keys.outside;
       }
     }
-    /// The same of one point that has a range of its own.
+    /// Adds one point that has a range of its own, in mode discretized.
     void add_end(const sensor& from, const float3& end, float own_range) {
       const auto limit = static_cast<double>(own_range);
       const float3 ray = difference(end, from.origin);

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Many rays from one point as sets of voxels: exactly those of traverse_ray, many times as fast.
+/// Rasterises many rays from one point: finds exactly the voxels of traverse_ray, many times as fast.
 ///
-/// A walk compares the distances at which a ray leaves its voxel along x, y and z. All that matters is
-/// the outcome of the comparisons, so a ray is not walked: its crossings with the planes of voxel
-/// faces across its main axis are computed with known error, slab by slab for all rays, in maps small
-/// enough for the cache. Where the error could change an outcome, the ray is walked.
+/// A traversal compares the distances at which a ray leaves its voxel along x, y and z. Only the outcomes of these
+/// comparisons matter. So instead of stepping along each ray, its crossings with the planes of voxel faces across its
+/// main axis are computed with known error, slab by slab for all rays, in maps that fit into the cache. Where the
+/// error could change an outcome, the ray is traversed step by step.
 #pragma once
 
 #include <algorithm>
@@ -29,7 +29,8 @@
 
 namespace orbis::octree::detail {
 
-/// The rays of one scan. Keeps its memory from scan to scan, some megabytes however far the rays go.
+/// Collects the rays of one scan and marks their voxels. Keeps its memory from scan to scan: some megabytes, however
+/// long the rays are.
 class ray_rasterizer {
  public:
   /// Begins a scan from `origin` in voxel `from`.
@@ -53,7 +54,7 @@ class ray_rasterizer {
                hit);
     if (++batched_ == ray_batch::capacity) add_waiting(masks);
   }
-  /// The same of the first `count` rays of a batch.
+  /// Adds the first `count` rays of a batch, as above.
   void add(const ray_batch& rays, std::size_t count, scan_masks& masks) {
     for (std::size_t i = 0; i < count; i += ray_batch::lanes) {
       const std::uint32_t cut = ray_batch::eight(rays.cut, i);

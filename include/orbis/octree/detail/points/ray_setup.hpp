@@ -16,8 +16,9 @@
 
 namespace orbis::octree::detail {
 
-/// Rays prepared, see queued_rays. A ray's kind: eight times the main axis, plus four if it goes down
-/// it, one if it goes down the axis u, two if it goes down v. What follows is counted in steps.
+/// Eight rays as lines over their main axis, see queued_rays. The kind of a ray: eight times its main axis, plus four
+/// if it goes down along it, one if it goes down along axis u, two if it goes down along v. Cells and planes are
+/// counted in steps from where the ray starts.
 struct ray_setup {
   static constexpr std::size_t lanes = ray_batch::lanes;
   static constexpr std::int32_t kinds = 24;
@@ -27,7 +28,7 @@ struct ray_setup {
   alignas(64) std::array<std::int32_t, lanes> planes;          ///< that the ray crosses
   alignas(64) std::array<std::int32_t, lanes> cell_u, cell_v;  ///< behind the last of them
   // Bit i is of ray i.
-  std::uint32_t done = 0;    ///< of the others nothing is known: they must be walked
+  std::uint32_t done = 0;    ///< the others are undecided and must be traversed step by step
   std::uint32_t step_u = 0;  ///< crosses a face between the last two planes
   std::uint32_t step_v = 0;
   std::uint32_t step_u_first = 0;  ///< the one across u comes first
@@ -51,9 +52,9 @@ struct ray_setup {
   }
 };
 
-/// In voxels: more than what a walk's arithmetic and this one's can differ.
+/// Voxels: the arithmetic of a traversal and the one here differ by less.
 inline constexpr double ray_doubt = 1e-8;
-/// Rays that cross more planes are walked.
+/// Rays that cross more planes are traversed step by step.
 inline constexpr std::int32_t max_ray_planes = 4096;
 
 struct set_up_rays_kernel {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Where the rays of a scan start, and the first steps of those that start on an edge.
+/// The origin of a scan's rays, and the first steps of rays whose origin lies on an edge of its voxel.
 #pragma once
 
 #include <array>

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Where the voxels lie: a hash of chunks of 4x4x4 bricks, each of eight octants of 4x4x4 voxels,
-/// each of which is unknown, uniform (one value: this is pruning) or stored as indices into the
-/// values it has. Leaves bigger than a brick are kept by their own name and split when something
-/// inside changes.
+/// How a map is stored. A hash finds chunks of 4x4x4 bricks. A brick has eight octants of 4x4x4 voxels. An octant is
+/// unknown, uniform (one value: this is pruning), or stored as indices into the values it has. Leaves bigger than a
+/// brick are kept apart, and are split when something inside changes.
 #pragma once
 
 #include <algorithm>
@@ -15,7 +14,6 @@
 #include <cstdint>
 #include <optional>
 #include <span>
-#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -23,6 +21,7 @@
 #include <orbis/octree/detail/storage/cow_pages.hpp>
 #include <orbis/octree/detail/storage/large_leaves.hpp>
 #include <orbis/octree/detail/storage/node_name.hpp>
+#include <orbis/octree/detail/storage/octant_pools.hpp>
 #include <orbis/octree/detail/storage/octant_record.hpp>
 #include <orbis/octree/detail/storage/packed_block.hpp>
 
@@ -95,7 +94,7 @@ class brick_store {
     const std::uint32_t octant = place >> 6U;
     if ((b.uniform >> octant & 1U) != 0) return b.value[octant];
     if ((b.dense >> octant & 1U) == 0) return std::nullopt;
-    return with_record(b.at[octant], [&](const auto& r) -> std::optional<T> {
+    return pools_.read(b.at[octant], [&](const auto& r) -> std::optional<T> {
       const std::uint32_t p = place & 63U;
       return (r.known >> p & 1U) != 0 ? std::optional{r.at(p)} : std::nullopt;
     });
@@ -111,20 +110,20 @@ class brick_store {
   [[nodiscard]] octant_view<T> view(const brick<T>& b, std::uint32_t i) const noexcept {
     if ((b.uniform >> i & 1U) != 0) return {~std::uint64_t{0}, nullptr, 0, &b.value[i]};
     if ((b.dense >> i & 1U) == 0) return {};
-    return with_record(b.at[i], [](const auto& r) { return r.view(); });
+    return pools_.read(b.at[i], [](const auto& r) { return r.view(); });
   }
   /// The known voxels of octant `i` of `b`.
   [[nodiscard]] std::uint64_t known(const brick<T>& b, std::uint32_t i) const noexcept {
     if ((b.uniform >> i & 1U) != 0) return ~std::uint64_t{0};
     if ((b.dense >> i & 1U) == 0) return 0;
-    return with_record(b.at[i], [](const auto& r) { return r.known; });
+    return pools_.read(b.at[i], [](const auto& r) { return r.known; });
   }
   /// The known voxels of octant `i` of `b` for whose value `wanted` is true.
   template <std::predicate<T> Wanted>
   [[nodiscard]] std::uint64_t voxels_where(const brick<T>& b, std::uint32_t i, Wanted&& wanted) const noexcept {
     if ((b.uniform >> i & 1U) != 0) return wanted(b.value[i]) ? ~std::uint64_t{0} : 0;
     if ((b.dense >> i & 1U) == 0) return 0;
-    return with_record(b.at[i], [&](const auto& r) { return r.known & r.where(wanted); });
+    return pools_.read(b.at[i], [&](const auto& r) { return r.known & r.where(wanted); });
   }
   /// Unpacks octant `i` of `b`.
   void read_octant(const brick<T>& b, std::uint32_t i, block<T>& out) const noexcept {
@@ -132,7 +131,7 @@ class brick_store {
       out.value.fill(b.value[i]);
       out.known = ~std::uint64_t{0};
     } else if ((b.dense >> i & 1U) != 0) {
-      with_record(b.at[i], [&](const auto& r) { r.unpack(out); });
+      pools_.read(b.at[i], [&](const auto& r) { r.unpack(out); });
     } else {
       out.value.fill(T{});
       out.known = 0;
@@ -158,12 +157,8 @@ class brick_store {
   }
   /// Bytes on the heap, those shared with copies included.
   [[nodiscard]] std::size_t memory_bytes() const noexcept {
-    std::size_t bytes = index_.memory_bytes() + chunks_.memory_bytes() + bricks_.memory_bytes() +
-                        large_.memory_bytes() + free_bricks_.capacity() * sizeof(std::uint32_t);
-    std::apply(
-        [&](const auto&... p) { ((bytes += p.items.memory_bytes() + p.free.capacity() * sizeof(std::uint32_t)), ...); },
-        pools_);
-    return bytes;
+    return index_.memory_bytes() + chunks_.memory_bytes() + bricks_.memory_bytes() + large_.memory_bytes() +
+           free_bricks_.capacity() * sizeof(std::uint32_t) + pools_.memory_bytes();
   }
 
   // -- changing
@@ -192,8 +187,10 @@ class brick_store {
       write_octant(b, i, voxels.known, p);
       return;
     }
-    make_record(b, i, raw);
-    std::get<raw>(pools_).items.writable(place_of(b.at[i])).pack(voxels);
+    make_record(b, i, octant_pools<T>::plain);
+    pools_.write(b.at[i], [&](auto& r) {
+      if constexpr (requires { r.pack(voxels); }) r.pack(voxels);
+    });
     b.value[i] = voxels.value[static_cast<std::size_t>(std::countr_zero(voxels.known))];
     for (std::uint64_t rest = voxels.known; rest != 0; rest &= rest - 1)
       b.value[i] = std::max(b.value[i], voxels.value[static_cast<std::size_t>(std::countr_zero(rest))]);
@@ -207,7 +204,7 @@ class brick_store {
       make_uniform(b, i, p.value[0]);
     } else {
       make_record(b, i, static_cast<unsigned>(std::bit_width(p.count - 1)));
-      with_writable_record(b.at[i], [&](auto& r) {
+      pools_.write(b.at[i], [&](auto& r) {
         if constexpr (requires { r.pack(known, p); }) r.pack(known, p);
       });
       b.value[i] = *std::max_element(p.value.begin(), p.value.begin() + p.count);
@@ -257,7 +254,7 @@ class brick_store {
           if (v) b.value[octant] = *v;
           if (!v) drop_record(b, octant);
         } else if ((before.dense >> octant & 1U) != 0) {
-          with_record(before.at[octant], [&](const auto& r) { r.transformed(change, different).unpack(voxels); });
+          pools_.read(before.at[octant], [&](const auto& r) { r.transformed(change, different).unpack(voxels); });
           if (different != 0) write_octant(bricks_.writable(i), octant, voxels);
         }
         if (different != 0) changed(bricks_[i].name, octant, different);
@@ -298,61 +295,18 @@ class brick_store {
   void clear() { *this = {}; }
 
  private:
-  static constexpr unsigned raw = max_palette_bits + 1;
-
-  template <class Record>
-  struct pool {
-    cow_pages<Record> items;
-    std::vector<std::uint32_t> free;
-  };
-
-  // A record's number: 3 bits for the pool, 29 for the place in it.
-  [[nodiscard]] static constexpr unsigned pool_of(std::uint32_t record) noexcept { return record >> 29U; }
-  [[nodiscard]] static constexpr std::uint32_t place_of(std::uint32_t record) noexcept { return record & 0x1fffffffU; }
-
-  template <class Self, class Use>
-  static decltype(auto) with_pool(Self& self, unsigned number, Use&& use) {
-    switch (number) {
-      case 0: return use(std::get<0>(self.pools_));
-      case 1: return use(std::get<1>(self.pools_));
-      case 2: return use(std::get<2>(self.pools_));
-      case 3: return use(std::get<3>(self.pools_));
-      case 4: return use(std::get<4>(self.pools_));
-      case 5: return use(std::get<5>(self.pools_));
-      default: return use(std::get<6>(self.pools_));
-    }
-  }
-  template <class Use>
-  decltype(auto) with_record(std::uint32_t record, Use&& use) const {
-    return with_pool(*this, pool_of(record), [&](const auto& p) { return use(p.items[place_of(record)]); });
-  }
-  template <class Use>
-  void with_writable_record(std::uint32_t record, Use&& use) {
-    with_pool(*this, pool_of(record), [&](auto& p) { use(p.items.writable(place_of(record))); });
-  }
-  [[nodiscard]] std::uint32_t new_record(unsigned number) {
-    return number << 29U | with_pool(*this, number, [](auto& p) {
-             if (p.free.empty()) {
-               p.items.push_back({});
-               return static_cast<std::uint32_t>(p.items.size() - 1);
-             }
-             const std::uint32_t place = p.free.back();
-             p.free.pop_back();
-             return place;
-           });
-  }
   /// Gives octant `i` of `b` a record of its own in a pool, in use already or not.
   void make_record(brick<T>& b, std::uint32_t i, unsigned number) {
     const auto bit = static_cast<std::uint8_t>(1U << i);
-    if ((b.dense & bit) != 0 && pool_of(b.at[i]) == number) return;
+    if ((b.dense & bit) != 0 && octant_pools<T>::pool_of(b.at[i]) == number) return;
     drop_record(b, i);
-    b.at[i] = new_record(number);
+    b.at[i] = pools_.add(number);
     b.dense |= bit;
   }
   /// Makes octant `i` of `b` unknown.
   void drop_record(brick<T>& b, std::uint32_t i) {
     const auto bit = static_cast<std::uint8_t>(1U << i);
-    if ((b.dense & bit) != 0) with_pool(*this, pool_of(b.at[i]), [&](auto& p) { p.free.push_back(place_of(b.at[i])); });
+    if ((b.dense & bit) != 0) pools_.erase(b.at[i]);
     b.dense &= static_cast<std::uint8_t>(~bit);
     b.uniform &= static_cast<std::uint8_t>(~bit);
   }
@@ -432,9 +386,7 @@ class brick_store {
   cow_pages<chunk> chunks_;
   cow_pages<brick<T>> bricks_;
   std::vector<std::uint32_t> free_bricks_;
-  std::tuple<pool<packed_octant<T, 0>>, pool<packed_octant<T, 1>>, pool<packed_octant<T, 2>>, pool<packed_octant<T, 3>>,
-             pool<packed_octant<T, 4>>, pool<packed_octant<T, 5>>, pool<plain_octant<T>>>
-      pools_;
+  octant_pools<T> pools_;
   large_leaves<T> large_;
 };
 
