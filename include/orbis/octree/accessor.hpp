@@ -15,14 +15,14 @@
 
 namespace orbis::octree {
 
-/// A map as queries see it: a sensor model, a store and the grid it lies in. See occupancy_octree.
+/// What queries need of a map: its sensor model, its store and its grid. See occupancy_octree.
 template <class M>
 concept octree_map = sensor_model<typename M::model> && requires(const M& map) {
   { map.store() } -> std::same_as<const detail::brick_store<typename M::model::value_type>&>;
   { map.grid() } -> std::same_as<const voxel_grid&>;
 };
 
-/// How log-odds are answered: as they are stored, or in float for models of integers.
+/// The type of log-odds in results: as they are stored, or float for models of integers.
 template <sensor_model Model>
 using log_odds_type =
     std::conditional_t<std::floating_point<typename Model::value_type>, typename Model::value_type, float>;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// What a ray through the map meets first, as OctoMap's `castRay` answers it.
+/// The first occupied or unknown voxel along a ray, as OctoMap's `castRay` finds it.
 #pragma once
 
 #include <array>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// What has changed since when: for sending a map's changes to other processes, or bringing up to date
-/// what was derived from it.
+/// Which voxels changed since a revision: for sending changes of a map to other processes, or for updating what was
+/// derived from it.
 #pragma once
 
 #include <algorithm>
@@ -18,8 +18,8 @@
 
 namespace orbis::octree {
 
-/// A log of changed voxels, as masks of octants of 4x4x4 voxels, by revision. Whoever has seen revision
-/// r asks for what changed after it:
+/// A log of changed voxels by revision, as masks of octants of 4x4x4 voxels. A reader that has seen revision r asks for
+/// what changed after it:
 ///
 /// @code
 ///   const std::uint64_t seen = log.revision();
@@ -76,7 +76,7 @@ class change_log {
     for (const entry& e : changed) visit(morton_key(e.octant << 6U), e.mask);
   }
 
-  /// Nobody will ask for what changed after a revision older than this one any more.
+  /// Forgets changes up to `revision`. Afterwards, only revisions from this one on may be asked about. O(entries).
   void forget_before(std::uint64_t revision) {
     if (revision <= complete_since_) return;
     complete_since_ = std::min(revision, revision_);
@@ -104,7 +104,7 @@ class change_log {
   }
   [[nodiscard]] std::size_t capacity() const noexcept { return capacity_; }
 
-  /// Forgets all changes, keeps counting revisions.
+  /// Forgets all changes and keeps the revision number. O(1).
   void clear() {
     const std::size_t capacity = capacity_;
     const std::uint64_t revision = revision_;

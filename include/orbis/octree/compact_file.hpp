@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Our own files, `.orbis`: any sensor model's values bit for bit, or only what is free and what is
-/// occupied, in a third of the room that `.bt` takes. Checksummed, little-endian, the same bytes for
-/// the same map on every machine.
+/// The library's own file format, `.orbis`: the values of any sensor model bit for bit, or only which voxels are free
+/// and which occupied, in a third of the bytes of `.bt`. Files are little-endian and checksummed; the same map gives
+/// the same bytes on every machine.
 ///
 /// A file is 8 bytes of magic, a version (u32), and sections: a tag of four letters, a length (u64),
 /// that many bytes, and the CRC-32C of all that (u32). Sections whose tag is not known are passed over.
@@ -59,7 +59,7 @@ struct compact_options {
   bool occupancy_only = false;
 };
 
-/// What a file says of itself.
+/// The header of a file.
 struct compact_info {
   double resolution = 0;  ///< metres
   int tree_depth = 0;
@@ -261,7 +261,7 @@ template <compact_model Model>
   return {};
 }
 
-/// What a file says of itself; its checksums are verified, its nodes are not read. Errors: malformed,
+/// Reads the header of a file. Verifies the checksums and does not read the nodes. O(bytes). Errors: malformed,
 /// unsupported (another version, depth or type).
 [[nodiscard]] inline result<compact_info> read_compact_info(std::span<const std::byte> bytes,
                                                             const std::string& where = "bytes") {

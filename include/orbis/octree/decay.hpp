@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Decay: what time does to the belief about a voxel that is not observed. What was seen long ago may
-/// have moved away; its voxels fade towards unknown and are forgotten in the end.
+/// Decay: how the value of a voxel changes with the time since it was observed. What was seen long ago may have moved
+/// away; its voxels fade towards unknown and become unknown in the end.
 ///
 /// A policy is a pure function of a voxel's value, so that a map may apply it once for each distinct
 /// value. None of those here ever turns free into occupied or back.

@@ -2,8 +2,8 @@
 /// @file
 /// OctoMap's files: `.bt` (free or occupied, 2 bits per child) and `.ot` (log-odds as float32).
 ///
-/// What is written is byte for byte what OctoMap writes for the same map, pruned as it prunes. Reading
-/// takes at most 400 bytes for each byte given and 8 KB, whatever they claim.
+/// The files are byte for byte those that OctoMap writes for the same map, pruned in the same way. Reading takes at
+/// most 8 KB and 400 bytes for each byte of the file, also of damaged files.
 #pragma once
 
 #include <algorithm>
@@ -52,7 +52,7 @@ struct octomap_file {
   std::string_view data;
 };
 
-/// Takes the header apart. Comments, CRLF and keywords in any order are accepted.
+/// Parses the header. Comments, CRLF and keywords in any order are accepted.
 [[nodiscard]] inline result<octomap_file> parse_header(std::string_view bytes, std::string_view magic,
                                                        const std::string& where) {
   const auto next_line = [&]() -> std::optional<std::string_view> {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// How a scan is integrated: the options, and what became of its points.
+/// Options of the integration of a scan, and a summary of what became of its points.
 #pragma once
 
 #include <cstddef>
@@ -12,7 +12,7 @@
 
 namespace orbis::octree {
 
-/// Which rays of a scan are walked.
+/// Which rays of a scan are traversed.
 enum class ray_mode {
   every_ray,   ///< from the sensor to every point (OctoMap's `discretize = false`)
   discretized  ///< from the sensor to the centre of every voxel that holds points (`discretize = true`)
@@ -24,7 +24,7 @@ struct integration_options {
   /// @pre >= 0
   double max_range = std::numeric_limits<double>::infinity();
   ray_mode mode = ray_mode::every_ray;
-  /// False: points mark their voxels as occupied, no ray is walked and nothing is observed free.
+  /// False: points mark their voxels as occupied, no ray is traversed and nothing is observed free.
   bool rays = true;
   /// Voxels outside, from the one that contains `min` to the one that contains `max`, are left as they
   /// are; inside, the result is the same as without bounds; infinity is none. (OctoMap's

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// One map made of two.
+/// Merges two maps into one.
 #pragma once
 
 #include <algorithm>
@@ -110,16 +110,14 @@ template <sensor_model Model>
 
 }  // namespace detail
 
-/// Adds the evidence of `from` to `into`: the log-odds of every voxel of `into` whose centre lies in a
-/// known voxel of `from` grow by that voxel's log-odds, within the model's bounds (the two maps come
-/// from independent observations). `T_into_from` moves points of `from` to the frame of `into`.
-/// Resolutions may differ. With the same grid and the identity, or a shift by whole voxels, it is the
-/// sum of the two maps voxel by voxel; else every voxel takes the value of the nearest, so that
-/// surfaces move by up to half a voxel's diagonal.
+/// Adds the evidence of `from` to `into`. For every voxel of `into` whose centre lies in a known voxel of `from`, the
+/// log-odds of that voxel are added, within the model's bounds; this takes the two maps to be made of independent
+/// observations. `T_into_from` moves points of `from` to the frame of `into`. Resolutions may differ. With the same
+/// grid and the identity, or a shift by whole voxels, the result is the sum of the two maps voxel by voxel. Otherwise
+/// every voxel takes the value of the nearest one, and surfaces move by up to half a voxel's diagonal.
 ///
-/// The result is the same under every policy. O(volume known to `from`), time and memory, in octants
-/// of `into`, but for leaves bigger than a brick of which `into`, on the same grid, knows nothing: with
-/// the identity they are taken over whole.
+/// All policies give the same map. Time and memory O(octants of `into` in the volume known to `from`). With the same
+/// grid and the identity, leaves bigger than a brick whose place is unknown in `into` cost O(1) each.
 template <execution_policy Policy, sensor_model Model>
 merge_summary merge(const Policy& policy, occupancy_octree<Model>& into, const occupancy_octree<Model>& from,
                     const se3& T_into_from = {}, progress report = {}) {

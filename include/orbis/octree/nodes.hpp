@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The octree at every resolution: the node of any size that contains a voxel, inner nodes made of
-/// their children by a policy. What is stored of the tree are bricks and the largest value of each
-/// octant; everything above and between is worked out when it is asked for.
+/// The octree at every resolution: the node of any size that contains a voxel. Inner nodes are not stored, except the
+/// largest value of each octant; a policy makes their values of their children when they are asked for.
 #pragma once
 
 #include <algorithm>

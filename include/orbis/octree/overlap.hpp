@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Whether boxes, spheres and capsules are free of what the map holds: the question of every planner.
+/// Collision tests for planners: whether a box, a sphere or a capsule overlaps what the map holds.
 #pragma once
 
 #include <array>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// What a camera would see of a map: depth images, and voxels pixel by pixel.
+/// Renders what a camera would see of a map: depth images, labels, and voxels pixel by pixel.
 #pragma once
 
 #include <algorithm>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Taking an earlier scan out of a map again.
+/// Removes an earlier scan from a map.
 #pragma once
 
 #include <algorithm>
@@ -23,16 +23,16 @@ namespace orbis::octree {
 struct subtraction_summary {
   std::size_t restored = 0;   ///< voxels from which the scan's part was taken
   std::size_t forgotten = 0;  ///< of these, voxels of which nothing remained: unknown again
-  std::size_t lost = 0;       ///< voxels at a bound, left as they are: nobody knows where they would be
+  std::size_t lost = 0;       ///< voxels at a bound, left as they are: their value without the scan cannot be known
 };
 
-/// Takes back what `map.integrate(points, origin, options)` added: give it the same arguments.
+/// Removes what `map.integrate(points, origin, options)` added; call it with the same arguments.
 ///
-/// Clamping forgets: of a voxel at a bound it cannot be told whether the scan made a difference, so
-/// that it stays as it is and counts as lost. Nor can a bound that was touched and left in between be
-/// undone; such voxels come out too certain by at most what was clamped away. In floating point
-/// values come back to within a few rounding errors (1e-5); a value that near to 0 is taken for
-/// nothing at all, and the voxel becomes unknown, even if other scans' hits and misses cancelled out.
+/// The result is an approximation, because clamping loses information. A voxel at a bound stays as it is and counts as
+/// lost. A voxel that reached a bound and left it in between comes out too certain by at most what was clamped away.
+/// Floating-point values come back to within a few rounding errors (1e-5). A value within 1e-5 of 0 is taken as no
+/// observation: the voxel becomes unknown, even if hits and misses of other scans have cancelled out.
+/// O(points x voxels per ray).
 template <execution_policy Policy, sensor_model Model, point_range Points, point_like Origin>
 subtraction_summary subtract(const Policy& policy, occupancy_octree<Model>& map, const Points& points,
                              const Origin& origin, const integration_options& options = {}) {
@@ -84,7 +84,7 @@ subtraction_summary subtract(occupancy_octree<Model>& map, const Points& points,
                              const integration_options& options = {}) {
   return subtract(seq, map, points, origin, options);
 }
-/// Takes back a depth image.
+/// Removes a depth image that `map.integrate(depth, camera, T_world_camera, options)` added. See above.
 template <execution_policy Policy, sensor_model Model, camera::depth_source Depth, camera::camera_model Camera>
 subtraction_summary subtract(const Policy& policy, occupancy_octree<Model>& map, const Depth& depth,
                              const Camera& camera, const se3& T_world_camera, const integration_options& options = {}) {

@@ -91,7 +91,7 @@ struct end_row {
   const float* x = nullptr;
   const float* y = nullptr;
   bool one_y = false;  ///< y is a single value
-  float* z = nullptr;  ///< in: metres, 0 where there is nothing; out: where the ray ends, 0 if it is not walked
+  float* z = nullptr;  ///< in: metres, 0 where there is nothing; out: where the ray ends, 0 if it does not count
   std::array<std::int32_t*, 3> key{};  ///< out: the voxels of the ends that are used, -1 for the others
 };
 
@@ -100,7 +100,7 @@ struct end_counts {
   std::size_t used = 0, truncated = 0, rejected = 0;
   bool leaves = false;  ///< a ray ends outside the voxel of the camera's centre
   float max_z = 0.0F;
-  double sum_z = 0.0;  ///< of the rays that are walked; up to rounding
+  double sum_z = 0.0;  ///< of the rays that count; up to rounding
 
   void add(const end_counts& o) noexcept {
     used += o.used;

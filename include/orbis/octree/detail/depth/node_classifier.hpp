@@ -21,7 +21,7 @@ namespace orbis::octree::detail {
 
 /// What the tests of nodes need to know about a frame. Positions are relative to the camera's centre.
 ///
-/// The rays that are walked are those from the centre to the world points, rounded to float; the tests
+/// The rays that count are those from the centre to the world points, rounded to float; the tests
 /// know the rays of the pixels, and nodes whose centres are rounded as well. With u = 2^-24 and c a
 /// node's centre:
 /// - the sum that makes a world point p errs by at most 10 u |p - t|_1 + u |t|_1, and seen from the node

@@ -46,7 +46,7 @@ class point_integrator {
 
   /// Marks the scan of `count` points, `point(i)` being the i-th as float3, seen from `origin`. The
   /// summary's voxel counts stay zero. Nothing is marked if the origin is not finite; rays are not
-  /// walked if it lies outside the grid. O(points x voxels along a ray).
+  /// traversed if it lies outside the grid. O(points x voxels along a ray).
   template <execution_policy Policy, class Point>
   integration_summary mark(const Policy& policy, const voxel_grid& grid, std::size_t count, Point&& point,
                            const float3& origin, const integration_options& options) {
@@ -100,7 +100,7 @@ class point_integrator {
   struct sensor {
     const voxel_grid& grid;
     float3 origin;
-    std::optional<voxel_key> key;  ///< empty: no ray is walked
+    std::optional<voxel_key> key;  ///< empty: no ray is traversed
     double max_range;
     std::span<const float> beam_ranges;
     limit_kernel* limit_batch = limit_rays();

@@ -38,12 +38,12 @@ class ray_rasterizer {
     grid_ = &grid;
     source_ = {grid, origin, from};
     for (auto& q : queues_) q.clear();
-    walked_.clear();
+    fallback_.clear();
     batch_.clear();
     batched_ = 0;
     passed_ = 0;
-    prepare_ = set_up_rays();
-    sweep_ = mark_crossings();
+    set_up_ = set_up_rays();
+    mark_crossings_ = mark_crossings();
   }
 
   /// Marks in `masks` what traverse_ray visits, now or when `flush` is called, and perhaps `to` if it is a
@@ -60,25 +60,25 @@ class ray_rasterizer {
       const std::uint32_t cut = ray_batch::eight(rays.cut, i);
       const std::uint32_t wanted = ray_batch::eight(rays.hit, i) | cut;
       if (wanted == 0) continue;
-      prepare_(source_, rays, i, prepared_);
+      set_up_(source_, rays, i, setup_);
       for (std::uint32_t left = wanted; left != 0; left &= left - 1) {
         const auto lane = static_cast<std::size_t>(std::countr_zero(left));
         const float3 end{rays.end[0][i + lane], rays.end[1][i + lane], rays.end[2][i + lane]};
-        if ((prepared_.done >> lane & 1U) == 0)
-          walked_.add(end);
+        if ((setup_.done >> lane & 1U) == 0)
+          fallback_.add(end);
         else
           take(lane, end, (cut >> lane & 1U) != 0, masks);
       }
-      if (walked_.size() >= max_waiting) walk(masks);
+      if (fallback_.size() >= max_waiting) flush_fallback(masks);
     }
   }
 
-  /// Sweeps and walks the rays that are waiting.
+  /// Marks the rays that are waiting.
   void flush(scan_masks& masks) {
     if (grid_ == nullptr) return;
     add_waiting(masks);
-    for (std::size_t kind = 0; kind != queues_.size(); ++kind) sweep(kind, masks);
-    walk(masks);
+    for (std::size_t kind = 0; kind != queues_.size(); ++kind) rasterize(kind, masks);
+    flush_fallback(masks);
     for (; passed_ != 0; passed_ &= passed_ - 1) {
       const int voxel = std::countr_zero(passed_);
       masks.mark_free(key({voxel % 3 - 1, voxel / 3 % 3 - 1, voxel / 9 - 1}));
@@ -87,15 +87,15 @@ class ray_rasterizer {
   [[nodiscard]] std::size_t memory_bytes() const noexcept {
     std::size_t bytes =
         rays_.memory_bytes() + bytes_.capacity() + (counts_.capacity() + buckets_.capacity()) * sizeof(std::uint32_t) +
-        bounds_.capacity() * sizeof(bounds) + doubtful_.capacity() * sizeof(std::uint32_t) + walked_.memory_bytes();
+        bounds_.capacity() * sizeof(bounds) + doubtful_.capacity() * sizeof(std::uint32_t) + fallback_.memory_bytes();
     for (const auto& q : queues_) bytes += q.capacity() * sizeof(waiting_ray);
     return bytes;
   }
 
  private:
-  static constexpr std::size_t max_waiting = 1U << 14U;  ///< rays that are swept at once
+  static constexpr std::size_t max_waiting = 1U << 14U;  ///< rays that are rasterised at once
   static constexpr double max_width = 448.0;             ///< of a map, in cells, when it is planned
-  static constexpr std::int32_t slab = 16;               ///< layers that are swept at once: two bricks
+  static constexpr std::int32_t slab = 16;               ///< layers that are rasterised at once: two bricks
 
   struct waiting_ray {
     double u, du, v, dv;
@@ -120,26 +120,26 @@ class ray_rasterizer {
             static_cast<std::uint32_t>(source_.from[1] + away[1]),
             static_cast<std::uint32_t>(source_.from[2] + away[2])};
   }
-  void walk(scan_masks& masks) { walked_.flush(*grid_, source_.origin, key({}), masks); }
+  void flush_fallback(scan_masks& masks) { fallback_.flush(*grid_, source_.origin, key({}), masks); }
   void add_waiting(scan_masks& masks) {
     add(batch_, batched_, masks);
     batch_.clear();
     batched_ = 0;
   }
 
-  /// A ray that has been prepared: to its queue; what is not swept of it is marked at once.
+  /// A ray that has been prepared: to its queue; voxels that no plane marks are marked at once.
   void take(std::size_t lane, const float3& end, bool cut, scan_masks& masks) {
-    const ray_setup& r = prepared_;
+    const ray_setup& r = setup_;
     const std::int32_t kind = r.kind[lane], planes = r.planes[lane];
     if (source_.on_edge) {
       const std::uint32_t passed = first_steps(source_, end, ray_setup::down(kind));
-      if (passed == 0) return walked_.add(end);
+      if (passed == 0) return fallback_.add(end);
       passed_ |= passed & ~(1U << 31U);
     }
     const auto is = [lane](std::uint32_t bits) { return (bits >> lane & 1U) != 0; };
     const bool end_u = is(r.end_u), end_v = is(r.end_v);
     // Of a ray that is cut off the end must stay unmarked; a plane marks the voxels on both sides.
-    const std::int32_t swept = cut ? planes - 1 : planes;
+    const std::int32_t marked_planes = cut ? planes - 1 : planes;
     if (cut || planes == 0 || (end_u && end_v)) {
       const std::int32_t u = r.cell_u[lane], v = r.cell_v[lane];
       const auto mark = [&](std::int32_t n, std::int32_t cell_u, std::int32_t cell_v) {
@@ -154,11 +154,11 @@ class ray_rasterizer {
       if ((end_u || end_v) && (cut || planes == 0)) mark(planes, u, v);
       if (end_u && end_v) is(r.end_u_first) ? mark(planes, u + 1, v) : mark(planes, u, v + 1);
     }
-    if (swept <= 0) return;
+    if (marked_planes <= 0) return;
     const auto number = static_cast<std::size_t>(source_.on_edge ? kind : kind & ~3);
     auto& queue = queues_[number];
-    queue.push_back({r.u[lane], r.du[lane], r.v[lane], r.dv[lane], swept, end});
-    if (queue.size() == max_waiting) sweep(number, masks);
+    queue.push_back({r.u[lane], r.du[lane], r.v[lane], r.dv[lane], marked_planes, end});
+    if (queue.size() == max_waiting) rasterize(number, masks);
   }
   /// Where rays of a kind start, from the origin's voxel.
   [[nodiscard]] std::array<std::int32_t, 3> start_of(std::int32_t kind) const noexcept {
@@ -182,7 +182,7 @@ class ray_rasterizer {
     return std::abs((origin + step * planes) / slab - origin / slab);
   }
 
-  void sweep(std::size_t kind, scan_masks& masks) {
+  void rasterize(std::size_t kind, scan_masks& masks) {
     auto& queue = queues_[kind];
     if (queue.empty()) return;
     stack_placement place;
@@ -248,9 +248,9 @@ class ray_rasterizer {
         mark_slab(place, static_cast<std::int32_t>(s), planes, bounds_[b], begin, counts_[b], masks);
       }
     }
-    for (const std::uint32_t i : doubtful_) walked_.add(queue[i].end);
+    for (const std::uint32_t i : doubtful_) fallback_.add(queue[i].end);
     queue.clear();
-    if (walked_.size() >= max_waiting) walk(masks);
+    if (fallback_.size() >= max_waiting) flush_fallback(masks);
   }
   [[nodiscard]] static bounds slopes(const waiting_ray& r) noexcept {
     const auto u = static_cast<float>(r.du), v = static_cast<float>(r.dv);
@@ -286,7 +286,7 @@ class ray_rasterizer {
     w.planes = bytes_.data();
     w.layers = w.planes + maps * w.stride;
     if (first == 0) w.planes[w.cell(0, 0)] = plane_stack::marked;
-    sweep_(w, rays_, begin, end, doubtful_);
+    mark_crossings_(w, rays_, begin, end, doubtful_);
     move_to_masks(w, place, masks);
     std::memset(w.planes, 0, 2 * maps * w.stride);
   }
@@ -295,7 +295,7 @@ class ray_rasterizer {
   scan_origin source_;
   ray_batch batch_;
   std::size_t batched_ = 0;
-  ray_setup prepared_;
+  ray_setup setup_;
   std::uint32_t passed_ = 0;  ///< see first_steps
   std::array<std::vector<waiting_ray>, ray_setup::kinds> queues_;
   queued_rays rays_;
@@ -303,9 +303,9 @@ class ray_rasterizer {
   std::vector<std::uint32_t> counts_, buckets_;
   std::vector<bounds> bounds_;
   std::vector<std::uint32_t> doubtful_;
-  fallback_rays walked_;
-  setup_kernel* prepare_ = nullptr;
-  crossings_kernel* sweep_ = nullptr;
+  fallback_rays fallback_;
+  setup_kernel* set_up_ = nullptr;
+  crossings_kernel* mark_crossings_ = nullptr;
 };
 
 }  // namespace orbis::octree::detail

@@ -35,7 +35,7 @@ struct scan_origin {
         from{static_cast<std::int32_t>(key.x), static_cast<std::int32_t>(key.y), static_cast<std::int32_t>(key.z)},
         edge{grid.resolution()},
         per_metre{1.0 / grid.resolution()} {
-    constexpr double near = 1e-4;  // voxels; rays that cross another face first are walked
+    constexpr double near = 1e-4;  // voxels; rays that cross another face first are traversed step by step
     const std::array<std::uint32_t, 3> k{key.x, key.y, key.z};
     const double half = 0.5 * grid.resolution();
     int on_faces = 0;

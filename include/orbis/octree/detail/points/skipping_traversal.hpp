@@ -13,7 +13,7 @@ namespace orbis::octree::detail {
 
 /// The walk of `ray_traversal`, able to leave a whole node at once: the parameters of the next steps along
 /// each axis are summed up in advance, in the same order, so that how many of them come before the
-/// node's face can be looked up instead of walked.
+/// node's face can be looked up instead of traversed.
 class skipping_traversal {
  public:
   explicit skipping_traversal(const ray_traversal& c) noexcept

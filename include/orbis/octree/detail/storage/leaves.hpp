@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The leaves of the pruned octree, straight from the bricks: all of them, those in a box, those of
+/// Visits the leaves of the pruned octree, which are found from the bricks alone: all leaves, those in a box, those of
 /// the tree cut off at a depth, and single voxels.
 #pragma once
 
@@ -14,6 +14,7 @@
 #include <span>
 #include <vector>
 
+#include <orbis/core/bits.hpp>
 #include <orbis/octree/detail/storage/brick.hpp>
 #include <orbis/octree/detail/storage/tree_parts.hpp>
 #include <orbis/octree/key.hpp>
@@ -28,13 +29,6 @@ inline constexpr std::uint64_t low_bits = 0x0101010101010101;  ///< the first vo
   constexpr std::uint64_t rest = 0x7f * low_bits;
   return (((mask & rest) + rest) | mask) >> 7U & low_bits;
 }
-/// The number of set bits; std::popcount is a call where the processor is not known to have it.
-[[nodiscard]] constexpr std::size_t count_bits(std::uint64_t mask) noexcept {
-  mask -= mask >> 1U & 0x5555555555555555;
-  mask = (mask & 0x3333333333333333) + (mask >> 2U & 0x3333333333333333);
-  return static_cast<std::size_t>(((mask + (mask >> 4U)) & 0x0f0f0f0f0f0f0f0f) * low_bits >> 56U);
-}
-
 /// The leaves of an octant that is not one itself.
 struct octant_leaves {
   std::uint64_t first;      ///< the lowest voxel of each leaf
@@ -56,7 +50,7 @@ template <class T>
     }
   }
   const std::uint64_t inner = bytes_with_any(o.known) & ~large;
-  return {(o.known & inner * 0xff) | large, large, 1 + count_bits(inner)};
+  return {(o.known & inner * 0xff) | large, large, 1 + count_ones(inner)};
 }
 /// The lowest voxel of each place of an octant.
 inline constexpr auto octant_offsets = [] {
@@ -143,9 +137,9 @@ template <sensor_model Model>
   };
   const auto on_octant = [&](const voxel_key&, const brick<T>& b, std::uint32_t i) {
     const octant_leaves leaves = leaves_of(store.view(b, i));
-    n.leaves += count_bits(leaves.first);
+    n.leaves += count_ones(leaves.first);
     if (is_occupied<Model>(b.value[i]))
-      n.occupied_leaves += count_bits(leaves.first & store.voxels_where(b, i, is_occupied<Model>));
+      n.occupied_leaves += count_ones(leaves.first & store.voxels_where(b, i, is_occupied<Model>));
     return leaves.inner_nodes;
   };
   n.nodes = walk_octants(tree_parts(store, root_level), root_level, on_leaf, on_octant);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A pruned octree down to its bricks, as a sorted list; for whoever visits all of it.
+/// A pruned octree down to its bricks, as a sorted list, for algorithms that visit all of it.
 #pragma once
 
 #include <algorithm>
@@ -42,7 +42,8 @@ template <class T>
   return parts;
 }
 
-/// Merges equal ones of parts in Morton order as far as they go, except into a root of eight parts.
+/// Merges every eight equal leaves that fill their parent, again and again. The root is not merged. `parts` are in
+/// Morton order.
 template <class T>
 void merge_parts(std::vector<tree_part<T>>& parts, int root_level) {
   // The merged ones take the place of those read already. Eight leaves of one size that end with a
