@@ -74,6 +74,10 @@ struct limit_rays_kernel {
     const std::array<const float*, 3> at{points.x.data(), points.y.data(), points.z.data()};
     const std::array<std::uint32_t, 3> from{f.from.x, f.from.y, f.from.z};
     const double per_metre = 1.0 / f.grid.resolution(), half = 0.5 * f.grid.cells();
+    const auto to_way = [&](std::size_t axis) ORBIS_INLINE_LAMBDA {
+      return integers(static_cast<int>((f.grid.cells() >> 1U) - from[axis]));
+    };
+    const std::array<integers, 3> ways{to_way(0), to_way(1), to_way(2)};
     for (std::size_t i = 0; i < count; i += n) {
       const auto along = [&](std::size_t axis)
                              ORBIS_INLINE_LAMBDA { return floats::load(at[axis] + i) - floats(f.origin[axis]); };
@@ -87,8 +91,7 @@ struct limit_rays_kernel {
         floats end = floats::load(at[axis] + i);
         if (!all(is_hit)) end = select(is_hit, end, f.origin[axis] + ray[axis] / scale * range);
         end.store(rays.end[axis].data() + i);
-        const auto to_way = static_cast<std::int32_t>((f.grid.cells() >> 1U) - from[axis]);
-        (cells_along(end, per_metre, half, inside) + integers(to_way)).store(rays.way[axis].data() + i);
+        (cells_along(end, per_metre, half, inside) + ways[axis]).store(rays.way[axis].data() + i);
       }
       const auto may_be_cut = simd::mask_as<4>(limit >= 0.0) & (scale <= floats(std::numeric_limits<float>::max()));
       rays.hit[i >> 6U] |= std::uint64_t{simd::bits(inside & is_hit)} << (i & 63U);

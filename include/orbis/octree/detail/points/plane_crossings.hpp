@@ -8,9 +8,11 @@
 #include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include <orbis/core/simd.hpp>
+#include <orbis/octree/detail/points/plane_crossings_avx512.hpp>
 #include <orbis/octree/detail/points/plane_stack.hpp>
 
 namespace orbis::octree::detail {
@@ -45,10 +47,11 @@ struct mark_crossings_kernel {
     };
     const integers nowhere(static_cast<std::int32_t>(w.size)), one_map(static_cast<std::int32_t>(w.stride));
     const std::int32_t stop = w.first + w.count - 1;
+    const integers first_plane(w.first), origin_cell(static_cast<std::int32_t>(w.cell(0, 0)));
 
     for (std::size_t r = begin; r < end; r += n) {
-      const integers planes = integers::load(rays.planes.data() + r);
-      mask alive = mask::first(end - r) & (planes >= integers(w.first));
+      integers left = integers::load(rays.planes.data() + r) - first_plane;  // planes; negative: the ray has ended
+      mask alive = mask::first(end - r) & (left >= integers(0));
       if (none(alive)) continue;
 
       const doubles du_cells = doubles::load(rays.du.data() + r), dv_cells = doubles::load(rays.dv.data() + r);
@@ -72,7 +75,7 @@ struct mark_crossings_kernel {
       };
 
       mask doubtful_lanes = alive ^ alive;
-      integers layer(0), last(static_cast<std::int32_t>(w.cell(0, 0)));
+      integers layer(0), last = origin_cell;
       std::size_t waiting = 0;
       std::int32_t j = w.first;
       std::uint8_t* map = w.planes;
@@ -87,7 +90,8 @@ struct mark_crossings_kernel {
         u += simd::bits_as<std::uint32_t>(du);
         v += simd::bits_as<std::uint32_t>(dv);
         map += w.stride;
-        alive = alive & (planes >= integers(j));
+        left -= integers(1);
+        alive = alive & (left >= integers(0));
         if (j > stop || none(alive)) break;
         const integers part_u = part_of(u), part_v = part_of(v);
         const integers cell = cell_at(u, v), changed = cell ^ last;
@@ -108,8 +112,8 @@ struct mark_crossings_kernel {
         last = cell;
       }
       for (std::size_t i = 0; i != waiting; ++i) w.layers[between[i]] = plane_stack::marked;
-      for (std::uint64_t left = simd::bits(doubtful_lanes); left != 0; left &= left - 1) {
-        const std::size_t i = r + static_cast<std::size_t>(std::countr_zero(left));
+      for (std::uint64_t lanes = simd::bits(doubtful_lanes); lanes != 0; lanes &= lanes - 1) {
+        const std::size_t i = r + static_cast<std::size_t>(std::countr_zero(lanes));
         doubtful.push_back(rays.id[i]);
         rays.planes[i] = -1;
       }
@@ -139,7 +143,10 @@ using crossings_kernel = void(const plane_stack&, queued_rays&, std::size_t, std
 /// order is right, the ray is appended to `doubtful` and taken out (planes = -1); what has been marked of it is right.
 /// @pre the cells of the rays lie in the stack
 [[nodiscard]] inline crossings_kernel* mark_crossings() noexcept {
-  return simd::kernel<mark_crossings_kernel, crossings_kernel>();
+#if ORBIS_X86
+  if (simd::best_level() >= simd::level::avx512) return mark_crossings_avx512;
+#endif
+  return simd::kernel<mark_crossings_kernel, crossings_kernel, simd::avx2>();
 }
 
 }  // namespace orbis::octree::detail

@@ -73,7 +73,7 @@ struct find_palette_kernel {
     p.plane.fill(0);
     for (std::uint64_t rest = b.known; rest != 0;) {
       const T v = b.value[static_cast<std::size_t>(std::countr_zero(rest))];
-      const words wanted(std::bit_cast<bits_of<T>>(v));
+      const words wanted = simd::bits_as<bits_of<T>>(simd::native_vec<T, Target>(v));
       std::uint64_t same = 0;
       for (unsigned i = 0; i != 64; i += words::count) {
         const auto values = simd::native_vec<T, Target>::load(b.value.data() + i);
@@ -98,8 +98,8 @@ struct expand_palette_kernel {
     using lanes = simd::vec<T, index::count, Target>;
     for (unsigned i = 0; i != 64; i += index::count) {
       index at(0);
-      for (unsigned j = 0; j != bits; ++j)
-        at += select(index::mask_type::from_bits(plane[j] >> i), index(1 << j), index(0));
+      for (unsigned j = bits; j-- != 0;)
+        at = at + at + select(index::mask_type::from_bits(plane[j] >> i), index(1), index(0));
       const auto known = lanes::mask_type::from_bits(out.known >> i);
       select(known, simd::gather(values, at), lanes(T{})).store(out.value.data() + i);
     }
