@@ -18,7 +18,7 @@ mkdir -p "$out/include"
 for library in eigen3/Eigen eigen3/unsupported tl catch2; do
   [[ -e /usr/include/$library ]] && ln -sfn "/usr/include/$library" "$out/include/${library##*/}"
 done
-flags=(-std=c++20 -O1 -w -Iinclude -Itests -isystem "$out/include" '-DORBIS_DATA_DIR="none"')
+flags=(-std=c++20 -O1 -w -Wno-psabi -Iinclude -Itests -isystem "$out/include" '-DORBIS_DATA_DIR="none"')
 
 # Where the kernels' tests stand; those that compare with a library that is not here are left out.
 places=(tests/core/simd.cpp tests/core/simd tests/core/rounded.cpp tests/core/crc32c.cpp tests/camera/project_lanes.cpp
@@ -44,7 +44,7 @@ fi
   for source in "${sources[@]}" "$out/main.cpp"; do
     object=$out/${source//\//_}.o
     objects+=("$object")
-    printf '%s: %s\n\t@echo "  %s"\n\t@%s %s -MMD -c -o $@ $<\n' "$object" "$source" "$source" "$compiler" \
+    printf '%s: %s\n\t@echo "  %s"\n\t@%s %s -MMD -MP -c -o $@ $<\n' "$object" "$source" "$source" "$compiler" \
       "$(printf '%q ' "${flags[@]}")"
   done
   printf '%s/tests: %s\n\t@%s -static -o $@ $^\n' "$out" "${objects[*]}" "$compiler"
