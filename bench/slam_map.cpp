@@ -30,7 +30,7 @@ constexpr std::uint32_t keypoints = 300, fresh = 30;
 
 slam::frame next_frame(const slam::map& m, random_bits& random) {
   slam::frame f;
-  f.index = m.keyframe_end();
+  f.index = m.keyframe_end().value();
   f.T_world_camera = se3(so3{}, vec3(0.05 * static_cast<double>(f.index), 0.0, 0.0));
   f.features.keypoints.resize(keypoints);
   f.features.descriptors.resize(keypoints);
@@ -55,7 +55,7 @@ void add_keyframe(slam::map& m, random_bits& random) {
     if (m.at(id).landmarks[i] == slam::no_id) {
       m.add_landmark(id, i);
     } else {
-      m.update(m.at(id).landmarks[i]);
+      m.update_landmark(m.at(id).landmarks[i]);
     }
   }
 }
@@ -91,12 +91,12 @@ void add_row(const std::string& what, std::size_t length, Work&& work) {
     add_row("neighbors_recount", length, [](benchmark::State& state, const slam::map& m) {
       const auto& seen = m.keyframes().back().landmarks;
       for (auto _ : state) {
-        std::vector<std::uint32_t> shared(m.keyframe_end(), 0);
+        std::vector<std::uint32_t> shared(m.keyframe_end().value(), 0);
         for (const slam::landmark_id l : seen)
-          for (const slam::observation& o : m.landmark_at(l).observations) ++shared[o.keyframe];
+          for (const slam::observation& o : m.landmark_at(l).observations) ++shared[o.keyframe.value()];
         std::vector<slam::covisible> found;
         for (slam::keyframe_id k = 0; k != m.keyframe_end(); ++k)
-          if (shared[k] >= 15) found.push_back({k, shared[k]});
+          if (shared[k.value()] >= 15) found.push_back({k, shared[k.value()]});
         std::sort(found.begin(), found.end(), slam::stronger);
         benchmark::DoNotOptimize(found);
       }

@@ -9,6 +9,7 @@
 /// | `track_result.hpp` | what tracking a frame returns: state, pose, timings, counters |
 /// | `events.hpp` | callbacks for new keyframes, corrections of the map and changes of state |
 /// | `ids.hpp` | the ids of landmarks, keyframes and maps |
+/// | `extractor.hpp` | requirements on extractors and descriptors, replaceable |
 /// | `frame.hpp` | a frame and a keyframe: features, depth and the landmarks they show |
 /// | `landmark.hpp` | a point of the map and its observations |
 /// | `map.hpp` | keyframes, landmarks, who observes what, and the graphs that follow |
@@ -17,13 +18,18 @@
 /// | `atlas.hpp` | several maps, one of them active |
 /// | `map_file.hpp` | saving and loading a map |
 /// | `validate.hpp` | whether a map is consistent |
+/// | `sensor.hpp` | what a frame measures for each feature: RGB-D |
+/// | `camera_rig.hpp` | the camera with its image pyramid and the weight of depth |
+/// | `pyramid_scales.hpp` | the scales of an image pyramid |
 /// | `matchers.hpp` | how tracking matches features, replaceable |
 /// | `place_recognition.hpp` | how similar keyframes are found, replaceable |
 #pragma once
 
 #include <orbis/slam/atlas.hpp>
+#include <orbis/slam/camera_rig.hpp>
 #include <orbis/slam/covisibility_graph.hpp>
 #include <orbis/slam/events.hpp>
+#include <orbis/slam/extractor.hpp>
 #include <orbis/slam/frame.hpp>
 #include <orbis/slam/ids.hpp>
 #include <orbis/slam/landmark.hpp>
@@ -32,7 +38,9 @@
 #include <orbis/slam/matchers.hpp>
 #include <orbis/slam/options.hpp>
 #include <orbis/slam/place_recognition.hpp>
+#include <orbis/slam/pyramid_scales.hpp>
 #include <orbis/slam/rgbd_system.hpp>
+#include <orbis/slam/sensor.hpp>
 #include <orbis/slam/spanning_tree.hpp>
 #include <orbis/slam/track_result.hpp>
 #include <orbis/slam/validate.hpp>

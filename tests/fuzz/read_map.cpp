@@ -49,7 +49,7 @@ void check(const std::string& file) {
   const auto again = slam::parse_map(std::as_bytes(std::span{written}));
   fuzz::require(again && slam::map_bytes(*again) == written, "what was read is written and read to the same bytes");
   for (slam::landmark_id l = 0; l < m.landmark_end(); l += 2)
-    if (m.has_landmark(l)) m.update(l);
+    if (m.has_landmark(l)) m.update_landmark(l);
   for (slam::keyframe_id k = 0; k < m.keyframe_end(); k += 2)
     if (m.has_keyframe(k)) m.erase_keyframe(k);
   fuzz::require(slam::validate(m).has_value(), "a map that was read stays whole");

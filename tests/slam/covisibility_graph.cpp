@@ -115,7 +115,7 @@ TEST_CASE("After any sequence of changes the graph is what counting afresh gives
   for (const std::uint32_t min_shared : {1U, 6U, 100U}) {
     covisibility_graph graph(min_shared);
     counted_pairs plain{{}, min_shared};
-    constexpr keyframe_id end = 18;
+    constexpr std::uint32_t end = 18;
     for (int step = 0; step != 6000; ++step) {
       const keyframe_id a = random.below(end), b = random.below(end);
       if (a == b) continue;

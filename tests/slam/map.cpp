@@ -45,10 +45,10 @@ TEST_CASE("Keyframes that share landmarks come most shared first") {
   auto query = random_frame(random, 40, 2);
   for (std::uint32_t i = 0; i < 25; ++i) query.landmarks[i] = m.at(1).landmarks[i];
 
-  const auto order = m.sharing(query.landmarks);
+  const auto order = m.observers_of(query.landmarks);
   REQUIRE(order.size() == 2);
-  CHECK(order[0] == std::pair<slam::keyframe_id, std::size_t>(1, 25));
-  CHECK(order[1] == std::pair<slam::keyframe_id, std::size_t>(0, 10));
+  CHECK(order[0] == slam::covisible{1, 25});
+  CHECK(order[1] == slam::covisible{0, 10});
 }
 
 TEST_CASE("A landmark's descriptor is the most typical of those observed") {
@@ -72,10 +72,10 @@ TEST_CASE("A landmark's descriptor is the most typical of those observed") {
   CHECK(m.landmark_at(0).observations.size() == 5);
   CHECK(features::hamming{}(chosen, typical) <= 1);
   // Without these two the others have nothing in common with it.
-  m.forget(0, 0);
-  m.forget(0, near);
+  m.erase_observation(0, 0);
+  m.erase_observation(0, near);
   CHECK_FALSE(m.landmark_at(0).has_current_descriptor);
-  m.update(0);
+  m.update_landmark(0);
   CHECK(m.landmark_at(0).has_current_descriptor);
   CHECK(features::hamming{}(m.landmark_at(0).descriptor, typical) >= 8);
 }
@@ -104,12 +104,12 @@ TEST_CASE("A fused landmark leads to what it became, and frames that show it joi
   CHECK(m.covisibility().shared(first, second) == 0);
   m.fuse(a, b);
   CHECK(m.covisibility().shared(first, second) == 1);
-  CHECK(m.became(a) == b);
+  CHECK(m.replacement_of(a) == b);
   CHECK(m.at(first).landmarks[0] == b);
   CHECK(m.landmark_at(b).visible == 3);
   CHECK(m.landmark_at(b).found == 2);
   m.fuse(b, c);  // the second keyframe sees both: its keypoint 0 shows nothing now
-  CHECK(m.became(a) == c);
+  CHECK(m.replacement_of(a) == c);
   CHECK(m.at(second).landmarks[0] == slam::no_id);
   CHECK(m.landmark_at(c).observations == std::vector<slam::observation>{{first, 0}, {second, 1}});
 
@@ -119,7 +119,7 @@ TEST_CASE("A fused landmark leads to what it became, and frames that show it joi
   CHECK(m.at(third).landmarks[3] == c);
   CHECK(m.covisibility().shared(first, third) == 1);
   m.remove_landmark(c);
-  CHECK(m.became(a) == slam::no_id);
+  CHECK(m.replacement_of(a) == slam::no_id);
   CHECK(fault_of(m) == "");
 }
 
@@ -159,18 +159,18 @@ TEST_CASE("An erased keyframe leaves its landmarks to others, its children to it
   CHECK(m.has_landmark(shared));
   CHECK_FALSE(m.has_landmark(own));
   CHECK(m.tree().parent(2) == 0);
-  CHECK(m.heir(1) == 0);
+  CHECK(m.replacement_of(slam::keyframe_id{1}) == 0);
   CHECK((m.pose_of(1).inverse() * before).log().norm() < 1e-12);
 
   const se3 moved = test::random_motion(random);
   m.set_pose(0, moved * m.at(0).T_world_camera);
   CHECK((m.pose_of(1).inverse() * (moved * before)).log().norm() < 1e-12);
-  m.erase_keyframe(0);  // the root; the heir of the heir
-  CHECK(m.heir(1) == 2);
+  m.erase_keyframe(0);  // the root; the replacement of the replacement
+  CHECK(m.replacement_of(slam::keyframe_id{1}) == 2);
   CHECK(m.tree().root() == 2);
   CHECK((m.pose_of(1).inverse() * (moved * before)).log().norm() < 1e-12);
   m.erase_keyframe(2);
-  CHECK(m.heir(1) == slam::no_id);
+  CHECK(m.replacement_of(slam::keyframe_id{1}) == slam::no_id);
   CHECK(m.landmark_count() == 0);
   CHECK((m.pose_of(1).inverse() * (moved * before)).log().norm() < 1e-12);
   m.transform(moved);
@@ -203,12 +203,12 @@ TEST_CASE("A map absorbs another, which hangs on it where the caller says") {
     while (!b.has_keyframe(from)) from = test::any_keyframe(random, b);
     const se3 T = test::random_motion(random);
 
-    const auto offsets = a.absorb(std::move(b), T, {into, from});
+    const auto offsets = a.append(std::move(b), T, {into, from});
     REQUIRE(fault_of(a) == "");
     CHECK(fault_of(b) == "");  // NOLINT(bugprone-use-after-move): an empty map
     CHECK(b.keyframes().empty());
     CHECK(offsets.keyframes == a_before.keyframe_end());
-    CHECK(a.keyframe_end() == a_before.keyframe_end() + b_before.keyframe_end());
+    CHECK(a.keyframe_end() == a_before.keyframe_end() + b_before.keyframe_end().value());
     CHECK(a.landmark_count() == a_before.landmark_count() + b_before.landmark_count());
     CHECK(a.tree().parent(from + offsets.keyframes) == into);
     for (slam::keyframe_id k = 0; k != b_before.keyframe_end(); ++k)
@@ -216,8 +216,8 @@ TEST_CASE("A map absorbs another, which hangs on it where the caller says") {
     for (slam::keyframe_id k = 0; k != a_before.keyframe_end(); ++k)
       REQUIRE((a.pose_of(k).inverse() * a_before.pose_of(k)).log().norm() == 0.0);
     for (slam::landmark_id l = 0; l != b_before.landmark_end(); ++l) {
-      const auto now = b_before.became(l);
-      REQUIRE(a.became(l + offsets.landmarks) == (now == slam::no_id ? now : now + offsets.landmarks));
+      const auto now = b_before.replacement_of(l);
+      REQUIRE(a.replacement_of(l + offsets.landmarks) == (now == slam::no_id ? now : now + offsets.landmarks));
       if (!b_before.has_landmark(l)) continue;
       const auto& moved = a.landmark_at(l + offsets.landmarks);
       REQUIRE((moved.position - T * b_before.landmark_at(l).position).norm() < 1e-9);
@@ -230,10 +230,10 @@ TEST_CASE("A map absorbs another, which hangs on it where the caller says") {
 TEST_CASE("Nothing absorbed changes nothing, and what nothing absorbs is what it was") {
   slam::map m = test::random_map(50, 500);
   const auto count = m.landmark_count();
-  CHECK(m.absorb(slam::map(8, 1.2), se3{}, {}).keyframes == m.keyframe_end());
+  CHECK(m.append(slam::map(8, 1.2), se3{}, {}).keyframes == m.keyframe_end());
   CHECK(m.landmark_count() == count);
   slam::map empty(8, 1.2, 3);
-  CHECK(empty.absorb(std::move(m), se3{}, {}).landmarks == 0);
+  CHECK(empty.append(std::move(m), se3{}, {}).landmarks == 0);
   CHECK(empty.landmark_count() == count);
   CHECK(fault_of(empty) == "");
 }

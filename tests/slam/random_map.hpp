@@ -56,16 +56,16 @@ namespace orbis::test {
 
 /// Any of the keyframes or landmarks that there ever were.
 [[nodiscard]] inline slam::keyframe_id any_keyframe(random_bits& random, const slam::map& m) {
-  return m.keyframe_end() == 0 ? 0 : random.below(m.keyframe_end());
+  return m.keyframe_end() == 0 ? 0 : random.below(m.keyframe_end().value());
 }
 [[nodiscard]] inline slam::landmark_id any_landmark(random_bits& random, const slam::map& m) {
-  return m.landmark_end() == 0 ? 0 : random.below(m.landmark_end());
+  return m.landmark_end() == 0 ? 0 : random.below(m.landmark_end().value());
 }
 
 /// A keyframe that shows some of what the map has.
 inline slam::keyframe_id add_random_keyframe(random_bits& random, slam::map& m, std::size_t keypoints,
                                              std::size_t known) {
-  auto f = random_frame(random, keypoints, m.keyframe_end());
+  auto f = random_frame(random, keypoints, m.keyframe_end().value());
   const auto n = static_cast<std::uint32_t>(keypoints);
   for (std::size_t i = 0; i < known; ++i) f.landmarks[random.below(n)] = any_landmark(random, m);
   return slam::detail::insert_keyframe(m, std::move(f), {});
@@ -83,9 +83,9 @@ inline void change_somehow(random_bits& random, slam::map& m, std::size_t keyfra
     case 1:
     case 2:
     case 3:
-      if (m.has_landmark(l) && m.has_keyframe(k)) m.observe(l, k, feature);
+      if (m.has_landmark(l) && m.has_keyframe(k)) m.add_observation(l, k, feature);
       break;
-    case 4: m.forget(l, k); break;
+    case 4: m.erase_observation(l, k); break;
     case 5:
       if (m.has_landmark(l) && random.below(10) == 0) m.remove_landmark(l);
       break;
@@ -103,7 +103,7 @@ inline void change_somehow(random_bits& random, slam::map& m, std::size_t keyfra
       if (k != other && m.has_keyframe(k) && m.has_keyframe(other) && random.below(10) == 0) m.add_loop_edge(k, other);
       break;
     default:
-      if (m.has_landmark(l)) m.update(l);
+      if (m.has_landmark(l)) m.update_landmark(l);
   }
 }
 

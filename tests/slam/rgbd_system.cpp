@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <cmath>
+#include <cstdint>
 #include <cstring>
 #include <limits>
 #include <string>
@@ -60,7 +61,7 @@ TEST_CASE("A walk through a synthetic room is tracked without a lost frame and w
   const auto& [camera, recorded] = small_room();
   test::slam_system slam{camera, slam::options{}};
   CHECK(slam.state() == slam::track_state::not_started);
-  std::size_t keyframes = 0;
+  std::uint32_t keyframes = 0;
   for (const auto& f : recorded) {
     const auto r = slam.track(f);
     CHECK(r.tracked());

@@ -15,8 +15,7 @@
 #include <orbis/camera/pinhole.hpp>
 #include <orbis/core/random.hpp>
 #include <orbis/core/se3.hpp>
-#include <orbis/optimize/reprojection.hpp>
-#include <orbis/slam/detail/map/landmark_search.hpp>
+#include <orbis/slam/camera_rig.hpp>
 #include <orbis/slam/detail/mapping/keyframe_insertion.hpp>
 #include <orbis/slam/map.hpp>
 
@@ -35,8 +34,7 @@ struct ring_options {
 class ring_world {
  public:
   camera::pinhole camera{640, 480, 525.0, 525.0, 320.0, 240.0};
-  optimize::reprojection<camera::pinhole> model{camera, 400.0};
-  slam::detail::pyramid_scales scales{};
+  slam::camera_rig<camera::pinhole> rig{{camera, 400.0}};
 
   explicit ring_world(const ring_options& o = {}) : o_{o}, radius_{0.15 * o.steps / (2 * std::numbers::pi)} {
     random_bits random(o.seed);
@@ -63,6 +61,10 @@ class ring_world {
   }
   /// Where a point is that keypoint `feature` of the frame of step `i` shows.
   [[nodiscard]] std::size_t point_of(std::uint32_t i, std::uint32_t feature) const { return shown_[i][feature]; }
+  /// As above, of a keyframe whose id is its step.
+  [[nodiscard]] std::size_t point_of(slam::keyframe_id k, std::uint32_t feature) const {
+    return point_of(k.value(), feature);
+  }
   [[nodiscard]] const vec3& point(std::size_t p) const { return points_[p].position; }
 
   /// What the camera sees at step `i`, at the pose given, with noise; no landmarks.
@@ -83,8 +85,8 @@ class ring_world {
       if (!(at.z() > 0.5)) continue;
       features::keypoint k;
       k.octave =
-          std::clamp(static_cast<int>(std::ceil(std::log(w.size / at.norm()) / std::log(scales.factor()))), 0, 7);
-      const double sigma = 0.5 * scales.scale(k.octave);
+          std::clamp(static_cast<int>(std::ceil(std::log(w.size / at.norm()) / std::log(rig.scales.factor()))), 0, 7);
+      const double sigma = 0.5 * rig.scales.scale(k.octave);
       const auto exact = camera.project(at);
       if (!exact) continue;
       const double dx = sigma * random.normal(), dy = sigma * random.normal(), dz = sigma * random.normal();
@@ -96,7 +98,7 @@ class ring_world {
       f.features.descriptors.push_back(w.descriptor);
       for (int flips = 0; flips < 8; ++flips)
         f.features.descriptors.back().words[random.below(4)] ^= std::uint64_t{1} << random.below(64);
-      f.depth.push_back(static_cast<float>(model.bf / (model.bf / at.z() + dz)));
+      f.depth.push_back(static_cast<float>(rig.model.bf / (rig.model.bf / at.z() + dz)));
       f.rays.push_back(*camera.unproject(pixel));
       f.landmarks.push_back(slam::no_id);
       shown_[i].push_back(p);

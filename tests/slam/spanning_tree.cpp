@@ -52,11 +52,11 @@ TEST_CASE("Children of an erased keyframe go where they share most") {
   for (const keyframe_id k : {3U, 4U, 5U, 6U}) tree.add(k, 2);
   const std::map<std::pair<keyframe_id, keyframe_id>, std::uint32_t> shared{
       {{1, 4}, 30}, {{3, 4}, 50}, {{1, 3}, 10}, {{3, 5}, 5}, {{4, 5}, 4}};
-  const auto heir = tree.erase(2, [&](keyframe_id a, keyframe_id b) {
+  const auto replacement = tree.erase(2, [&](keyframe_id a, keyframe_id b) {
     const auto at = shared.find(std::minmax(a, b));
     return at == shared.end() ? 0U : at->second;
   });
-  CHECK(heir == 1);
+  CHECK(replacement == 1);
   CHECK(tree.parent(4) == 1);  // the strongest tie to the parent
   CHECK(tree.parent(3) == 4);  // then a stronger one to that
   CHECK(tree.parent(5) == 3);
@@ -109,7 +109,9 @@ TEST_CASE("A tree stays one tree after any sequence of operations") {
   std::set<keyframe_id> present;
   std::set<std::pair<keyframe_id, keyframe_id>> loops;
   keyframe_id end = 0;
-  const auto shared = [](keyframe_id a, keyframe_id b) { return (a * 7 + b * 7 + a * b) % 23; };
+  const auto shared = [](keyframe_id a, keyframe_id b) {
+    return (a.value() * 7 + b.value() * 7 + a.value() * b.value()) % 23;
+  };
   const auto any = [&] {
     auto at = present.begin();
     std::advance(at, random.below(static_cast<std::uint32_t>(present.size())));
@@ -133,14 +135,14 @@ TEST_CASE("A tree stays one tree after any sequence of operations") {
       }
     } else {
       const keyframe_id k = any();
-      const keyframe_id heir = tree.erase(k, shared);
+      const keyframe_id replacement = tree.erase(k, shared);
       present.erase(k);
-      REQUIRE((heir == no_id ? present.empty() : present.contains(heir)));
+      REQUIRE((replacement == no_id ? present.empty() : present.contains(replacement)));
       for (const auto& [a, b] : std::set(loops)) {
         if (a != k && b != k) continue;
         loops.erase({a, b});
         const keyframe_id other = a == k ? b : a;
-        if (heir != no_id && other != heir) loops.insert(std::minmax(heir, other));
+        if (replacement != no_id && other != replacement) loops.insert(std::minmax(replacement, other));
       }
     }
     if (step % 10 == 0) check_tree(tree, present, loops, end);
@@ -149,18 +151,18 @@ TEST_CASE("A tree stays one tree after any sequence of operations") {
 
   const keyframe_id at = any(), by = any();
   spanning_tree twice = tree;
-  twice.append(spanning_tree(tree), end, at, by);
+  twice.append(spanning_tree(tree), end.value(), at, by);
   auto all = present;
   auto all_loops = loops;
-  for (const keyframe_id k : present) all.insert(k + end);
-  for (const auto& [a, b] : loops) all_loops.insert({a + end, b + end});
-  check_tree(twice, all, all_loops, 2 * end);
-  CHECK(twice.parent(by + end) == at);
+  for (const keyframe_id k : present) all.insert(k + end.value());
+  for (const auto& [a, b] : loops) all_loops.insert({a + end.value(), b + end.value()});
+  check_tree(twice, all, all_loops, end + end.value());
+  CHECK(twice.parent(by + end.value()) == at);
   CHECK(twice.root() == tree.root());
 
   spanning_tree from_nothing;
   from_nothing.append(spanning_tree(tree), 3, no_id, no_id);
   CHECK(from_nothing.root() == tree.root() + 3);
-  from_nothing.append(spanning_tree{}, end + 3, no_id, no_id);
+  from_nothing.append(spanning_tree{}, end.value() + 3, no_id, no_id);
   CHECK(from_nothing.size() == present.size());
 }

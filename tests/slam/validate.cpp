@@ -13,6 +13,8 @@ using namespace orbis;
 
 namespace {
 
+using content = slam::detail::map_content<features::binary_descriptor<256>>;
+
 /// What is found wrong with a map of four keyframes after `damage(parts)`.
 template <class Damage>
 [[nodiscard]] std::string fault_after(Damage&& damage) {
@@ -21,7 +23,7 @@ template <class Damage>
   for (int i = 0; i < 5; ++i) test::add_random_keyframe(random, m, 20, 8);
   m.fuse(m.at(4).landmarks[0], m.at(0).landmarks[0]);
   m.erase_keyframe(2);
-  slam::detail::map_content parts = m.content();
+  content parts = m.content();
   damage(parts);
   return test::fault_of(slam::map{std::move(parts)});
 }
@@ -36,7 +38,7 @@ TEST_CASE("A whole map has no fault") {
 }
 
 TEST_CASE("What is wrong is said in words") {
-  using parts = slam::detail::map_content;
+  using parts = content;
   CHECK(fault_after([](parts& p) { p.keyframes[1].id = 3; }) == "keyframe 1: calls itself 3");
   CHECK(fault_after([](parts& p) { p.keyframes[1].depth.pop_back(); }) ==
         "keyframe 1: does not have one descriptor, depth, ray and landmark for each keypoint");
@@ -48,7 +50,7 @@ TEST_CASE("What is wrong is said in words") {
   CHECK(fault_after([](parts& p) { p.landmarks[1].created = 99; }) ==
         "landmark 1: comes from a keyframe that never was");
   CHECK(fault_after([](parts& p) {
-          for (auto& [id, e] : p.erased) e.T_heir_camera = se3(so3{}, vec3(not_a_number, 0, 0));
+          for (auto& [id, e] : p.erased) e.T_replacement_camera = se3(so3{}, vec3(not_a_number, 0, 0));
         }) == "keyframe 2: was at no finite place");
   CHECK(fault_after([](parts& p) { p.erased.clear(); }) == "keyframe 2: is gone, and where it was is not known");
   CHECK(fault_after([](parts& p) { p.erased[9] = {}; }) == "keyframes: are remembered as erased that never were");
@@ -62,9 +64,8 @@ TEST_CASE("What is wrong is said in words") {
 
 TEST_CASE("Observations that disagree are found") {
   // Of a keypoint that shows another landmark, of a keyframe twice.
-  CHECK_FALSE(fault_after([](slam::detail::map_content& p) { p.landmarks[1].observations.front().feature ^= 1U; }) ==
-              "");
-  CHECK_FALSE(fault_after([](slam::detail::map_content& p) {
+  CHECK_FALSE(fault_after([](content& p) { p.landmarks[1].observations.front().feature ^= 1U; }) == "");
+  CHECK_FALSE(fault_after([](content& p) {
                 auto& all = p.landmarks[1].observations;
                 all.insert(all.begin(), all.front());
               }) == "");

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Which keyframes see the same landmarks, and how many.
+/// The covisibility graph: which keyframes observe the same landmarks, and how many.
 ///
 /// Source: R. Mur-Artal, J. M. M. Montiel, J. D. Tardos, "ORB-SLAM: a versatile and accurate monocular SLAM system",
 /// T-RO 31 (2015), section III.D; the idea is H. Strasdat's, "Double window optimisation for constant time visual
@@ -20,20 +20,20 @@
 
 namespace orbis::slam {
 
-/// Another keyframe, and how many landmarks both see.
+/// A keyframe, and how many landmarks it shares with the one asked about.
 struct covisible {
-  keyframe_id keyframe = no_id;
+  keyframe_id keyframe;
   std::uint32_t shared = 0;
   friend bool operator==(const covisible&, const covisible&) = default;
 };
 
-/// The order in which keyframes are named everywhere: more shared landmarks first, the older one where equal.
+/// The order of covisible keyframes: more shared landmarks first, the older keyframe where equal.
 [[nodiscard]] constexpr bool stronger(const covisible& a, const covisible& b) noexcept {
   return a.shared != b.shared ? a.shared > b.shared : a.keyframe < b.keyframe;
 }
 
 namespace detail {
-/// Where the pair with `k` is, or should be, in pairs by ascending keyframe.
+/// The position of the pair with `k`, or where it would be inserted, in pairs sorted by keyframe.
 template <class Pairs>
 [[nodiscard]] auto find_pair(Pairs&& pairs, keyframe_id k) {
   return std::lower_bound(pairs.begin(), pairs.end(), k,
@@ -41,72 +41,74 @@ template <class Pairs>
 }
 }  // namespace detail
 
-/// A symmetric graph with weights. Counts every pair of keyframes that shares a landmark; an edge is a pair that
-/// shares at least `min_shared`, and for a keyframe that has no such edge the one pair in which it shares most. What
-/// it says depends on the landmarks alone, not on the order in which they came to be shared.
+/// A symmetric graph. It counts every pair of keyframes that shares a landmark. A pair has an edge if it shares at
+/// least `min_shared` landmarks; a keyframe without such a pair has one edge, to the keyframe that it shares most with.
+/// The graph depends on the counts alone, not on the order of the changes.
 ///
-/// Let d be the number of keyframes that one shares landmarks with: lookups and changes take O(log d), but for a new
-/// pair, the end of one, and a loss in the strongest, which take O(d). Memory is O(1) for a keyframe, erased or not,
-/// and O(1) for a pair.
+/// Let d be the number of keyframes that one shares landmarks with. Lookups and changes cost O(log d); adding a pair,
+/// removing a pair and lowering the strongest one cost O(d). Memory: O(1) for each id and for each pair.
 class covisibility_graph {
  public:
   explicit covisibility_graph(std::uint32_t min_shared = 15) : min_shared_{min_shared} {}
 
   [[nodiscard]] std::uint32_t min_shared() const noexcept { return min_shared_; }
 
-  /// Two keyframes see `count` more of the same landmarks. @pre a != b
+  /// Two keyframes share `count` more landmarks. @pre a != b
   void share(keyframe_id a, keyframe_id b, std::uint32_t count = 1) {
     assert(a != b);
     if (count == 0) return;
-    if (const std::size_t needed = std::size_t{std::max(a, b)} + 1; needed > nodes_.size()) nodes_.resize(needed);
-    increase(nodes_[a], b, count);
-    increase(nodes_[b], a, count);
+    if (const std::size_t needed = std::size_t{std::max(a, b).value()} + 1; needed > nodes_.size())
+      nodes_.resize(needed);
+    increase(nodes_[a.value()], b, count);
+    increase(nodes_[b.value()], a, count);
   }
-  /// ... and so many fewer. @pre they share as many
+  /// Two keyframes share `count` fewer landmarks. @pre they share as many
   void unshare(keyframe_id a, keyframe_id b, std::uint32_t count = 1) {
     assert(shared(a, b) >= count);
     if (count == 0) return;
-    decrease(nodes_[a], b, count);
-    decrease(nodes_[b], a, count);
+    decrease(nodes_[a.value()], b, count);
+    decrease(nodes_[b.value()], a, count);
   }
-  /// A keyframe shares nothing any more. O(d^2) at most.
+  /// Removes a keyframe from all pairs. O(d^2) at most.
   void erase(keyframe_id k) {
-    if (k >= nodes_.size()) return;
-    for (const covisible& other : std::exchange(nodes_[k], {}).pairs) decrease(nodes_[other.keyframe], k, other.shared);
+    if (k.value() >= nodes_.size()) return;
+    for (const covisible& other : std::exchange(nodes_[k.value()], {}).pairs)
+      decrease(nodes_[other.keyframe.value()], k, other.shared);
   }
-  /// Takes over another graph, whose keyframes' numbers grow by `shift`. @pre there are none from `shift` on
-  void append(covisibility_graph&& other, keyframe_id shift) {
-    assert(nodes_.size() <= shift);
-    nodes_.resize(shift);
+  /// Adds another graph, whose ids grow by `offset`. @pre this graph has no ids from `offset` on
+  void append(covisibility_graph&& other, std::uint32_t offset) {
+    assert(nodes_.size() <= offset);
+    nodes_.resize(offset);
     for (node& n : other.nodes_) {
-      for (covisible& pair : n.pairs) pair.keyframe += shift;
-      if (n.strongest.keyframe != no_id) n.strongest.keyframe += shift;
+      for (covisible& pair : n.pairs) pair.keyframe += offset;
+      if (n.strongest.keyframe != no_id) n.strongest.keyframe += offset;
       nodes_.push_back(std::move(n));
     }
     other.nodes_.clear();
   }
 
-  /// How many landmarks both see.
+  /// The number of landmarks that both observe.
   [[nodiscard]] std::uint32_t shared(keyframe_id a, keyframe_id b) const {
     const std::span<const covisible> pairs = sharing(a);
     const auto at = detail::find_pair(pairs, b);
     return at != pairs.end() && at->keyframe == b ? at->shared : 0;
   }
-  /// Whether there is an edge.
+  /// Whether two keyframes have an edge.
   [[nodiscard]] bool connected(keyframe_id a, keyframe_id b) const {
     const std::uint32_t both = shared(a, b);
     return both != 0 && (both >= min_shared_ || is_only_edge(a, b) || is_only_edge(b, a));
   }
-  /// All that a keyframe shares a landmark with, edges or not, by ascending number.
+  /// All keyframes that share a landmark with `k`, with or without an edge, by ascending id.
   [[nodiscard]] std::span<const covisible> sharing(keyframe_id k) const {
-    return k < nodes_.size() ? std::span<const covisible>{nodes_[k].pairs} : std::span<const covisible>{};
+    return k.value() < nodes_.size() ? std::span<const covisible>{nodes_[k.value()].pairs}
+                                     : std::span<const covisible>{};
   }
-  /// The one that it shares most with; `no_id` if it shares nothing.
+  /// The keyframe that `k` shares most with; `no_id` if it shares nothing.
   [[nodiscard]] covisible strongest(keyframe_id k) const {
-    return k < nodes_.size() ? nodes_[k].strongest : covisible{};
+    return k.value() < nodes_.size() ? nodes_[k.value()].strongest : covisible{};
   }
 
-  /// The keyframes at the other ends of its edges, the strongest first; at most `limit`. O(d log d).
+  /// The neighbours of `k` in the graph, the strongest first; at most `limit`. O(d log d).
   [[nodiscard]] std::vector<covisible> neighbors(keyframe_id k,
                                                  std::size_t limit = std::numeric_limits<std::size_t>::max()) const {
     std::vector<covisible> found;
@@ -118,7 +120,7 @@ class covisibility_graph {
     found.erase(end, found.end());
     return found;
   }
-  /// Those that it shares at least so many with, the strongest first. O(d log d).
+  /// The keyframes that share at least `shared` landmarks with `k`, the strongest first. O(d log d).
   [[nodiscard]] std::vector<covisible> at_least(keyframe_id k, std::uint32_t shared) const {
     std::vector<covisible> found;
     for (const covisible& pair : sharing(k))
@@ -133,9 +135,9 @@ class covisibility_graph {
     covisible strongest;
   };
 
-  /// Whether `a` has no other edge than that with `b`, for want of a strong one.
+  /// Whether the edge to `b` is the only one of `a`, because no pair reaches `min_shared`.
   [[nodiscard]] bool is_only_edge(keyframe_id a, keyframe_id b) const {
-    return nodes_[a].strongest.keyframe == b && nodes_[a].strongest.shared < min_shared_;
+    return nodes_[a.value()].strongest.keyframe == b && nodes_[a.value()].strongest.shared < min_shared_;
   }
   static void increase(node& n, keyframe_id k, std::uint32_t count) {
     auto at = detail::find_pair(n.pairs, k);

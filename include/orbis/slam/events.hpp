@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// What the SLAM system tells those who listen.
+/// The events of the SLAM system, and the callbacks for them.
 #pragma once
 
 #include <cstddef>
@@ -14,18 +14,18 @@
 
 namespace orbis::slam {
 
-/// A keyframe that was made or culled.
+/// A keyframe was made, or culled.
 struct keyframe_event {
   map_keyframe id;
-  double timestamp = 0.0;
-  std::size_t frame = 0;  ///< index of the frame it was, from 0
-  se3 T_world_camera;     ///< in the world of its map
+  double timestamp = 0.0;  ///< seconds
+  std::size_t frame = 0;   ///< index of the frame, from 0
+  se3 T_world_camera;      ///< in the world of its map
 };
 
 enum class correction_kind : std::uint8_t {
-  loop,               ///< the keyframes were brought in line with a loop that was closed
-  global_adjustment,  ///< keyframes and landmarks were adjusted all at once
-  merge               ///< a map has become a part of another
+  loop,               ///< a loop was closed
+  global_adjustment,  ///< all keyframes and landmarks of a map were adjusted
+  merge               ///< a map became a part of another one
 };
 
 [[nodiscard]] constexpr std::string_view to_string(correction_kind kind) noexcept {
@@ -37,25 +37,27 @@ enum class correction_kind : std::uint8_t {
   return "unknown";
 }
 
-/// Poses of a map have changed by more than local adjustment does: what was built on them is to be moved.
+/// The poses of a map changed by more than local adjustment changes them. What was built on them has to be moved.
 struct correction_event {
   correction_kind kind{};
-  map_id map = 0;             ///< that was corrected
-  map_keyframe from{}, to{};  ///< the keyframes that show the same place, of a loop or merge (`from` by its new name)
-  map_id merged = 0;          ///< the map that is no more, of a merge
-  id_offsets offsets{};       ///< what its numbers have grown by
-  se3 T_corrected_before{};   ///< what the correction was at keyframe `from`
-  double milliseconds = 0.0;  ///< it took
+  map_id map = 0;             ///< the corrected map
+  map_keyframe from{}, to{};  ///< of a loop or merger: the keyframes of the same place (`from` by its new id)
+  map_id merged = 0;          ///< of a merger: the map that became a part of `map`
+  id_offsets offsets{};       ///< of a merger: by how much the ids of `merged` grew
+  se3 T_corrected_before{};   ///< the correction at keyframe `from`, in the world of the map
+  double milliseconds = 0.0;  ///< wall time
 };
 
+/// Tracking changed its state.
 struct state_event {
-  track_state from{};  ///< what was told last
+  track_state from{};  ///< the state of the last event
   track_state to{};
-  std::size_t frame = 0;
+  std::size_t frame = 0;  ///< index of the frame, from 0
 };
 
-/// Called without any lock held, so that they may ask the system for what they want; those of mapping and corrections
-/// from the system's own threads, if it has any: they must not wait for the system, nor throw. May be left empty.
+/// Callbacks; any of them may be empty. They are called without a lock held, so they may query the system. With
+/// threads, those for culled keyframes and corrections are called from the system's own threads. They must not throw,
+/// nor wait for the system.
 struct listeners {
   std::function<void(const keyframe_event&)> keyframe_made{};
   std::function<void(const keyframe_event&)> keyframe_culled{};

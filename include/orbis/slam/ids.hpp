@@ -1,38 +1,77 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// What names the keyframes and landmarks of a map.
+/// The ids of landmarks, keyframes and maps.
 #pragma once
 
+#include <compare>
+#include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <ostream>
+#include <string>
 
 namespace orbis::slam {
 
-/// Landmarks and keyframes are numbered in the order of their creation; numbers are never used again.
-using landmark_id = std::uint32_t;
-using keyframe_id = std::uint32_t;
+/// The value of an id that refers to nothing.
 inline constexpr std::uint32_t no_id = std::numeric_limits<std::uint32_t>::max();
 
-/// Maps are numbered in the order of their creation; numbers are never used again.
-using map_id = std::uint32_t;
+/// An id: a 32-bit number with a type of its own. A number converts to an id; an id converts neither to a number nor to
+/// an id of another kind (`value()` gives the number). Ids are given in ascending order, and never twice.
+template <class Kind>
+class basic_id {
+ public:
+  /// `no_id`.
+  constexpr basic_id() noexcept = default;
+  constexpr basic_id(std::uint32_t value) noexcept : value_{value} {}
 
-/// A keyframe of an atlas.
+  [[nodiscard]] constexpr std::uint32_t value() const noexcept { return value_; }
+
+  constexpr basic_id& operator++() noexcept {
+    ++value_;
+    return *this;
+  }
+  constexpr basic_id operator++(int) noexcept { return value_++; }
+  constexpr basic_id& operator+=(std::uint32_t n) noexcept {
+    value_ += n;
+    return *this;
+  }
+  friend constexpr basic_id operator+(basic_id id, std::uint32_t n) noexcept { return id.value_ + n; }
+  /// The distance of two ids.
+  friend constexpr std::uint32_t operator-(basic_id a, basic_id b) noexcept { return a.value_ - b.value_; }
+  friend constexpr bool operator==(basic_id, basic_id) noexcept = default;
+  friend constexpr auto operator<=>(basic_id, basic_id) noexcept = default;
+
+  friend std::string to_string(basic_id id) { return std::to_string(id.value_); }
+  friend std::ostream& operator<<(std::ostream& out, basic_id id) { return out << id.value_; }
+
+ private:
+  std::uint32_t value_ = no_id;
+};
+
+/// Identifies a landmark within its map.
+using landmark_id = basic_id<struct landmark_kind>;
+/// Identifies a keyframe within its map.
+using keyframe_id = basic_id<struct keyframe_kind>;
+/// Identifies a map within its atlas.
+using map_id = basic_id<struct map_kind>;
+
+/// Identifies a keyframe within an atlas.
 struct map_keyframe {
   map_id map = 0;
-  keyframe_id keyframe = no_id;
-  friend bool operator==(const map_keyframe&, const map_keyframe&) = default;
+  keyframe_id keyframe;
+  friend constexpr bool operator==(const map_keyframe&, const map_keyframe&) = default;
 };
 
-/// By how much the ids of a map have grown when it became a part of another one.
+/// By how much the ids of a map grew when it became a part of another one.
 struct id_offsets {
-  keyframe_id keyframes = 0;
-  landmark_id landmarks = 0;
+  std::uint32_t keyframes = 0;
+  std::uint32_t landmarks = 0;
 };
 
-/// Where one map is attached to another: a keyframe of each that show the same place.
+/// Where a map is attached to another one: a keyframe of each; both observe the same place.
 struct map_link {
-  keyframe_id into = no_id;  ///< of the map that stays
-  keyframe_id from = no_id;  ///< of the one that becomes a part of it, in its own ids
+  keyframe_id into;  ///< of the map that stays
+  keyframe_id from;  ///< of the map that becomes a part of it, by its id there
 };
 
 }  // namespace orbis::slam

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A point of the world, and what tells it from others.
+/// A point of the world in a map, with its observations.
 #pragma once
 
 #include <algorithm>
@@ -9,29 +9,32 @@
 
 #include <orbis/core/types.hpp>
 #include <orbis/features/descriptor.hpp>
+#include <orbis/slam/extractor.hpp>
 #include <orbis/slam/ids.hpp>
 
 namespace orbis::slam {
 
-/// A keypoint that shows a landmark.
+/// A keypoint of a keyframe that observes a landmark.
 struct observation {
-  keyframe_id keyframe = no_id;
-  std::uint32_t feature = 0;
-  friend bool operator==(const observation&, const observation&) = default;
+  keyframe_id keyframe;
+  std::uint32_t feature = 0;  ///< index of the keypoint
+  friend constexpr bool operator==(const observation&, const observation&) = default;
 };
 
-struct landmark {
-  landmark_id id = no_id;
-  vec3 position = vec3::Zero();                 ///< in the world, metres
-  vec3 normal = vec3::Zero();                   ///< mean direction towards the keyframes that see it, unit length
-  features::binary_descriptor<256> descriptor;  ///< the most typical of those observed
-  double min_distance = 0.0;                    ///< from which a keypoint at the coarsest level shows it, metres
-  double max_distance = 0.0;                    ///< the same at the finest level
-  std::vector<observation> observations;        ///< in ascending order of keyframe
-  keyframe_id created = no_id;
-  std::uint32_t visible = 0;            ///< frames that should have shown it
-  std::uint32_t found = 0;              ///< frames that did
-  bool has_current_descriptor = false;  ///< whether it is that of the observations as they are now
+/// A point of the world with a descriptor of type `D`.
+template <feature_descriptor D>
+struct basic_landmark {
+  landmark_id id;
+  vec3 position = vec3::Zero();           ///< in the world, metres
+  vec3 normal = vec3::Zero();             ///< mean direction towards the keyframes that observe it, unit length
+  D descriptor{};                         ///< the most typical one of its observations
+  double min_distance = 0.0;              ///< from which it appears at the coarsest pyramid level, metres
+  double max_distance = 0.0;              ///< from which it appears at the finest pyramid level, metres
+  std::vector<observation> observations;  ///< by ascending keyframe, one for each keyframe at most
+  keyframe_id created;                    ///< the keyframe that created it
+  std::uint32_t visible = 0;              ///< number of frames in which it was expected
+  std::uint32_t found = 0;                ///< number of frames in which it was found
+  bool has_current_descriptor = false;    ///< whether `descriptor` was chosen from the present observations
 
   /// The observation by a keyframe, or null. O(log observations).
   [[nodiscard]] const observation* seen_by(keyframe_id k) const noexcept {
@@ -40,5 +43,8 @@ struct landmark {
     return at != observations.end() && at->keyframe == k ? &*at : nullptr;
   }
 };
+
+/// A landmark with a descriptor of ORB.
+using landmark = basic_landmark<features::binary_descriptor<256>>;
 
 }  // namespace orbis::slam

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <concepts>
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -15,29 +16,37 @@
 #include <orbis/features/matcher.hpp>
 #include <orbis/features/stages.hpp>
 #include <orbis/features/windowed.hpp>
+#include <orbis/slam/extractor.hpp>
 
 namespace orbis::slam {
 
-/// How features are matched: near where the last frame's should be by now, near where landmarks should be, and
-/// anywhere. Any of them can be replaced by another chain of the same kind (see features/matcher.hpp).
-struct orb_matchers {
-  static constexpr auto motion = features::windowed(features::hamming{}) | features::max_distance{100} |
-                                 features::unique{} | features::rotation_consistency{};
-  static constexpr auto landmarks =
-      features::windowed(features::hamming{}) | features::max_distance{80} | features::unique{};
-  static constexpr auto appearance = features::brute_force(features::hamming{}) | features::ratio_test{0.8F} |
-                                     features::cross_check{} | features::max_distance{80};
+/// The matchers of tracking for descriptors of type `D`: `motion` matches what the last frame observed, near where it
+/// is expected by now; `landmarks` matches landmarks near their projections; `appearance` matches two images without
+/// any expectation. Each is a chain as in `features/matcher.hpp`.
+template <class M, class D>
+concept tracking_matchers = feature_descriptor<D> &&
+    requires(const features::basic_features<D>& image, const features::feature_view<D>& seen,
+             const std::vector<D>& descriptors, const std::vector<features::window>& windows,
+             const features::keypoint_grid& grid) {
+  { M::motion(seen, image, windows, grid) } -> std::convertible_to<std::span<const features::match>>;
+  { M::landmarks(descriptors, image, windows, grid) } -> std::convertible_to<std::span<const features::match>>;
+  { M::appearance(image, image) } -> std::convertible_to<std::span<const features::match>>;
 };
 
-template <class M>
-concept tracking_matchers = requires(const features::features& a,
-                                     const features::feature_view<features::binary_descriptor<256>>& seen,
-                                     const std::vector<features::binary_descriptor<256>>& descriptors,
-                                     const std::vector<features::window>& windows,
-                                     const features::keypoint_grid& grid) {
-  { M::motion(seen, a, windows, grid) } -> std::convertible_to<std::span<const features::match>>;
-  { M::landmarks(descriptors, a, windows, grid) } -> std::convertible_to<std::span<const features::match>>;
-  { M::appearance(a, a) } -> std::convertible_to<std::span<const features::match>>;
+/// Matchers whose greatest distances of descriptors are `Motion`, `Landmarks` and `Appearance`.
+/// Source of the default figures: R. Mur-Artal, J. D. Tardos, "ORB-SLAM2", T-RO 33 (2017), and its descriptors of 256
+/// bits.
+template <class Distance, std::uint32_t Motion = 100, std::uint32_t Landmarks = 80, std::uint32_t Appearance = 80>
+struct distance_matchers {
+  static constexpr auto motion = features::windowed(Distance{}) | features::max_distance{Motion} | features::unique{} |
+                                 features::rotation_consistency{};
+  static constexpr auto landmarks =
+      features::windowed(Distance{}) | features::max_distance{Landmarks} | features::unique{};
+  static constexpr auto appearance = features::brute_force(Distance{}) | features::ratio_test{0.8F} |
+                                     features::cross_check{} | features::max_distance{Appearance};
 };
+
+/// The default, for the descriptors of ORB.
+using orb_matchers = distance_matchers<features::hamming>;
 
 }  // namespace orbis::slam

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Which keyframes look like an image: what finds them, and how it is done by default.
+/// Place recognition: which keyframes have an appearance similar to an image's.
 #pragma once
 
 #include <algorithm>
@@ -19,14 +19,18 @@
 
 namespace orbis::slam {
 
-/// Remembers keyframes by their looks. `describe` makes of an image's features what is remembered and asked for: it
-/// may be called at any time, from any thread. `similar` names at most so many keyframes, the likeliest first: not
-/// those for which `exclude` is true, and not several of one place, where `neighbors` tells which keyframes show the
-/// same. The same additions and removals give the same answers.
-template <class P>
+/// A database of the appearance of keyframes, for descriptors of type `D`.
+///  - `describe(features)`: the signature of an image. It may be called at any time, from any thread.
+///  - `add`, `erase`, `rename`: change the keyframes in the database; false if that is not possible.
+///  - `similar(signature, count, exclude, neighbors)`: at most `count` keyframes, the most similar first. Those for
+///  which
+///    `exclude(id)` is true are left out. `neighbors(id)` gives keyframes that observe the same place, of which one is
+///    enough.
+/// The same changes give the same answers.
+template <class P, class D>
 concept place_recognizer = std::movable<P> &&
-    requires(P& places, const P& known, const features::features& seen, const typename P::signature& bow_vector,
-             map_keyframe k, std::size_t count, bool (*exclude)(map_keyframe),
+    requires(P& places, const P& known, const features::basic_features<D>& seen,
+             const typename P::signature& bow_vector, map_keyframe k, std::size_t count, bool (*exclude)(map_keyframe),
              std::vector<map_keyframe> (*neighbors)(map_keyframe)) {
   { known.describe(seen) } -> std::convertible_to<typename P::signature>;
   { places.add(k, bow_vector) } -> std::same_as<bool>;
@@ -35,38 +39,42 @@ concept place_recognizer = std::movable<P> &&
   { places.similar(bow_vector, count, exclude, neighbors) } -> std::convertible_to<std::vector<map_keyframe>>;
 };
 
-/// By the words of a vocabulary tree; see orbis/places.hpp. Without a vocabulary of the caller's, the built-in one.
+/// Place recognition by bags of the words of a vocabulary tree (see `orbis/places.hpp`), for the descriptors of ORB.
 class bag_of_words_places {
  public:
   using signature = places::bag_of_words;
 
+  /// With the built-in vocabulary.
   bag_of_words_places() : bag_of_words_places(places::default_vocabulary()) {}
   explicit bag_of_words_places(places::vocabulary words) : words_{std::move(words)} {}
   bag_of_words_places(places::vocabulary words, const places::query_options& options)
       : words_{std::move(words)}, options_{options} {}
 
   [[nodiscard]] const places::vocabulary& vocabulary() const noexcept { return words_; }
-  [[nodiscard]] std::size_t size() const noexcept { return seen_.size(); }
+  /// The number of keyframes.
+  [[nodiscard]] std::size_t size() const noexcept { return database_.size(); }
 
+  /// The words of an image.
   [[nodiscard]] signature describe(const features::features& f) const { return words_.transform(f.descriptors); }
 
-  /// False if it is known already.
-  bool add(map_keyframe k, const signature& bow_vector) { return seen_.add(packed(k), bow_vector); }
-  /// False if it is not known.
-  bool erase(map_keyframe k) { return seen_.erase(packed(k)); }
-  /// A keyframe has another name now. False if it is not known by the old one, or another is by the new one.
+  /// False if the keyframe is in the database already.
+  bool add(map_keyframe k, const signature& bow_vector) { return database_.add(packed(k), bow_vector); }
+  /// False if the keyframe is not in the database.
+  bool erase(map_keyframe k) { return database_.erase(packed(k)); }
+  /// Gives a keyframe another id. False if `from` is not in the database, or `to` is.
   bool rename(map_keyframe from, map_keyframe to) {
-    if (!seen_.contains(packed(from)) || seen_.contains(packed(to))) return false;
-    const signature bow_vector = seen_.bag(packed(from));
-    seen_.erase(packed(from));
-    return seen_.add(packed(to), bow_vector);
+    if (!database_.contains(packed(from)) || database_.contains(packed(to))) return false;
+    const signature bow_vector = database_.bag(packed(from));
+    database_.erase(packed(from));
+    return database_.add(packed(to), bow_vector);
   }
 
+  /// At most `count` keyframes with similar words, the most similar first (see `place_recognizer`).
   template <std::predicate<map_keyframe> Exclude, std::invocable<map_keyframe> Neighbors>
   [[nodiscard]] std::vector<map_keyframe> similar(const signature& bow_vector, std::size_t count, Exclude&& exclude,
                                                   Neighbors&& neighbors) {
     std::vector<std::uint64_t> around;
-    seen_.query(
+    database_.query(
         bow_vector, found_, memory_, options_, [&](std::uint64_t k) { return exclude(unpacked(k)); },
         [&](std::uint64_t k) -> const std::vector<std::uint64_t>& {
           around.clear();
@@ -80,14 +88,16 @@ class bag_of_words_places {
 
  private:
   using database = places::basic_keyframe_database<std::uint64_t>;
-  [[nodiscard]] static std::uint64_t packed(map_keyframe k) { return std::uint64_t{k.map} << 32 | k.keyframe; }
+  [[nodiscard]] static std::uint64_t packed(map_keyframe k) {
+    return std::uint64_t{k.map.value()} << 32 | k.keyframe.value();
+  }
   [[nodiscard]] static map_keyframe unpacked(std::uint64_t k) {
-    return {static_cast<map_id>(k >> 32), static_cast<keyframe_id>(k & no_id)};
+    return {static_cast<std::uint32_t>(k >> 32), static_cast<std::uint32_t>(k & no_id)};
   }
 
   places::vocabulary words_;
   places::query_options options_;
-  database seen_;
+  database database_;
   database::workspace memory_;
   std::vector<database::candidate> found_;
 };

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The tree that holds the keyframes of a map together, and the loops closed between them.
+/// The spanning tree of the keyframes of a map, and the loops closed between them.
 ///
 /// Source: R. Mur-Artal, J. M. M. Montiel, J. D. Tardos, "ORB-SLAM: a versatile and accurate monocular SLAM system",
 /// T-RO 31 (2015), section III.D.
@@ -18,17 +18,21 @@
 
 namespace orbis::slam {
 
-/// Keyframes, each but the root with a parent, and undirected loop edges between any two of them. Children and loop
-/// edges are listed by ascending number. Nothing here knows why a keyframe has the parent it has.
+/// A tree: each keyframe except the root has a parent. In addition, undirected loop edges between any two keyframes.
+/// Children and loop edges are sorted by id. Who chooses the parents is not decided here.
 class spanning_tree {
  public:
   [[nodiscard]] std::size_t size() const noexcept { return size_; }
-  [[nodiscard]] bool contains(keyframe_id k) const noexcept { return k < nodes_.size() && nodes_[k].present; }
-  /// `no_id` while there is no keyframe.
+  [[nodiscard]] bool contains(keyframe_id k) const noexcept {
+    return k.value() < nodes_.size() && nodes_[k.value()].present;
+  }
+  /// The root; `no_id` while there is no keyframe.
   [[nodiscard]] keyframe_id root() const noexcept { return root_; }
-  /// `no_id` for the root. @pre contains(k)
+  /// The parent of a keyframe; `no_id` for the root. @pre contains(k)
   [[nodiscard]] keyframe_id parent(keyframe_id k) const { return at(k).parent; }
+  /// By ascending id. @pre contains(k)
   [[nodiscard]] const std::vector<keyframe_id>& children(keyframe_id k) const { return at(k).children; }
+  /// The other ends of the loop edges of a keyframe, by ascending id. @pre contains(k)
   [[nodiscard]] const std::vector<keyframe_id>& loop_edges(keyframe_id k) const { return at(k).loops; }
   /// Whether `k` is `ancestor` or below it. O(depth).
   [[nodiscard]] bool descends_from(keyframe_id k, keyframe_id ancestor) const {
@@ -36,90 +40,90 @@ class spanning_tree {
     return k == ancestor;
   }
 
-  /// @pre !contains(k); `parent` is there, or is `no_id` and nothing is
+  /// Adds a keyframe. @pre !contains(k); contains(parent), or `parent` is `no_id` and the tree is empty
   void add(keyframe_id k, keyframe_id parent) {
     assert(!contains(k) && (parent == no_id ? size_ == 0 : contains(parent)));
-    if (k >= nodes_.size()) nodes_.resize(std::size_t{k} + 1);
-    nodes_[k].present = true;
+    if (k.value() >= nodes_.size()) nodes_.resize(std::size_t{k.value()} + 1);
+    nodes_[k.value()].present = true;
     ++size_;
     if (parent == no_id) {
       root_ = k;
     } else {
-      hang(k, parent);
+      attach(k, parent);
     }
   }
 
-  /// @pre both are there, and `parent` does not descend from `k`
+  /// Gives a keyframe another parent. @pre both are there, and `parent` does not descend from `k`
   void set_parent(keyframe_id k, keyframe_id parent) {
     assert(contains(parent) && !descends_from(parent, k));
-    if (nodes_[k].parent == parent) return;
-    remove(nodes_[nodes_[k].parent].children, k);
-    hang(k, parent);
+    if (nodes_[k.value()].parent == parent) return;
+    remove(nodes_[nodes_[k.value()].parent.value()].children, k);
+    attach(k, parent);
   }
 
-  /// Turns the edges around that lie between the root and `k`. O(depth).
+  /// Makes `k` the root: the edges between it and the old root change direction. O(depth). @pre contains(k)
   void set_root(keyframe_id k) {
     keyframe_id above = no_id;
     for (root_ = k; k != no_id;) {
       const keyframe_id next = at(k).parent;
-      if (next != no_id) remove(nodes_[next].children, k);
-      nodes_[k].parent = no_id;
-      if (above != no_id) hang(k, above);
+      if (next != no_id) remove(nodes_[next.value()].children, k);
+      nodes_[k.value()].parent = no_id;
+      if (above != no_id) attach(k, above);
       above = std::exchange(k, next);
     }
   }
 
-  /// Notes that a loop was closed between two keyframes. @pre a != b, and both are there
+  /// Records that a loop was closed between two keyframes. @pre a != b, and both are there
   void add_loop_edge(keyframe_id a, keyframe_id b) {
     assert(a != b && contains(a) && contains(b));
-    insert(nodes_[a].loops, b);
-    insert(nodes_[b].loops, a);
+    insert(nodes_[a.value()].loops, b);
+    insert(nodes_[b.value()].loops, a);
   }
 
-  /// Takes a keyframe out. Its children go where they share most landmarks (`shared(a, b)`): to its parent, or to one
-  /// another; those that share nothing go to the parent. The root's place is taken by its oldest child. Loop edges
-  /// pass to the keyframe that is returned: the parent, or the new root, or `no_id` if none is left. O(children^2).
+  /// Erases a keyframe. Each of its children gets a new parent: the old parent or another child, whichever it shares
+  /// most landmarks with (`shared(a, b)`); the old parent where it shares none. If the root is erased, its oldest child
+  /// becomes the root. Loop edges pass to the keyframe that is returned: the parent, or the new root, or `no_id` if
+  /// none is left. O(children^2). @pre contains(k)
   template <std::invocable<keyframe_id, keyframe_id> Shared>
   keyframe_id erase(keyframe_id k, Shared&& shared) {
-    const node gone = std::exchange(nodes_[k], {});
+    const node gone = std::exchange(nodes_[k.value()], {});
     --size_;
     std::vector<keyframe_id> orphans = gone.children;
-    keyframe_id heir = gone.parent;
-    if (heir != no_id) {
-      remove(nodes_[heir].children, k);
+    keyframe_id replacement = gone.parent;
+    if (replacement != no_id) {
+      remove(nodes_[replacement.value()].children, k);
     } else {
-      root_ = heir = orphans.empty() ? no_id : orphans.front();
-      if (heir != no_id) {
-        nodes_[heir].parent = no_id;
+      root_ = replacement = orphans.empty() ? no_id : orphans.front();
+      if (replacement != no_id) {
+        nodes_[replacement.value()].parent = no_id;
         orphans.erase(orphans.begin());
       }
     }
-    adopt(std::move(orphans), heir, shared);
+    adopt(std::move(orphans), replacement, shared);
     for (const keyframe_id other : gone.loops) {
-      remove(nodes_[other].loops, k);
-      if (heir != no_id && other != heir) add_loop_edge(heir, other);
+      remove(nodes_[other.value()].loops, k);
+      if (replacement != no_id && other != replacement) add_loop_edge(replacement, other);
     }
-    return heir;
+    return replacement;
   }
 
-  /// Takes over another tree, whose numbers grow by `shift`, and hangs it under `at` by its keyframe `by`, which
-  /// becomes its root before. @pre there are no numbers from `shift` on; `at` and `by` are there, unless either tree is
-  /// empty
-  void append(spanning_tree&& other, keyframe_id shift, keyframe_id at, keyframe_id by) {
-    assert(nodes_.size() <= shift);
+  /// Adds another tree, whose ids grow by `offset`. Its keyframe `by` becomes its root and a child of `at`.
+  /// @pre this tree has no ids from `offset` on; `at` and `by` are there, unless either tree is empty
+  void append(spanning_tree&& other, std::uint32_t offset, keyframe_id at, keyframe_id by) {
+    assert(nodes_.size() <= offset);
     if (other.size_ != 0 && size_ != 0) other.set_root(by);
-    nodes_.resize(shift);
+    nodes_.resize(offset);
     for (node& n : other.nodes_) {
-      if (n.parent != no_id) n.parent += shift;
-      for (keyframe_id& c : n.children) c += shift;
-      for (keyframe_id& l : n.loops) l += shift;
+      if (n.parent != no_id) n.parent += offset;
+      for (keyframe_id& c : n.children) c += offset;
+      for (keyframe_id& l : n.loops) l += offset;
       nodes_.push_back(std::move(n));
     }
     if (other.size_ != 0) {
       if (size_ == 0) {
-        root_ = other.root_ + shift;
+        root_ = other.root_ + offset;
       } else {
-        hang(by + shift, at);
+        attach(by + offset, at);
       }
     }
     size_ += other.size_;
@@ -128,14 +132,14 @@ class spanning_tree {
 
  private:
   struct node {
-    keyframe_id parent = no_id;
+    keyframe_id parent;
     bool present = false;
     std::vector<keyframe_id> children, loops;
   };
 
   [[nodiscard]] const node& at(keyframe_id k) const {
     assert(contains(k));
-    return nodes_[k];
+    return nodes_[k.value()];
   }
   static void insert(std::vector<keyframe_id>& sorted, keyframe_id k) {
     const auto place = std::lower_bound(sorted.begin(), sorted.end(), k);
@@ -144,26 +148,27 @@ class spanning_tree {
   static void remove(std::vector<keyframe_id>& sorted, keyframe_id k) {
     sorted.erase(std::lower_bound(sorted.begin(), sorted.end(), k));
   }
-  void hang(keyframe_id k, keyframe_id parent) {
-    nodes_[k].parent = parent;
-    insert(nodes_[parent].children, k);
+  void attach(keyframe_id k, keyframe_id parent) {
+    nodes_[k.value()].parent = parent;
+    insert(nodes_[parent.value()].children, k);
   }
 
-  /// Prim's algorithm: the orphan with the strongest tie to what has a place already comes next.
+  /// Prim's algorithm: the next one is the orphan that shares most with a keyframe that is in the tree.
   template <class Shared>
-  void adopt(std::vector<keyframe_id> orphans, keyframe_id heir, Shared&& shared) {
-    struct tie {
+  void adopt(std::vector<keyframe_id> orphans, keyframe_id replacement, Shared&& shared) {
+    struct edge {
       std::uint32_t shared;
       keyframe_id to;
     };
-    std::vector<tie> best;
-    for (const keyframe_id k : orphans) best.push_back({static_cast<std::uint32_t>(shared(k, heir)), heir});
+    std::vector<edge> best;
+    for (const keyframe_id k : orphans)
+      best.push_back({static_cast<std::uint32_t>(shared(k, replacement)), replacement});
     while (!orphans.empty()) {
       std::size_t next = 0;
       for (std::size_t i = 1; i != orphans.size(); ++i)
         if (best[i].shared > best[next].shared) next = i;
       const keyframe_id placed = orphans[next];
-      hang(placed, best[next].to);
+      attach(placed, best[next].to);
       orphans.erase(orphans.begin() + static_cast<std::ptrdiff_t>(next));
       best.erase(best.begin() + static_cast<std::ptrdiff_t>(next));
       for (std::size_t i = 0; i != orphans.size(); ++i)
@@ -174,7 +179,7 @@ class spanning_tree {
 
   std::vector<node> nodes_;  ///< by keyframe
   std::size_t size_ = 0;
-  keyframe_id root_ = no_id;
+  keyframe_id root_;
 };
 
 }  // namespace orbis::slam

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// What tracking a frame tells.
+/// What tracking a frame returns.
 #pragma once
 
 #include <cstddef>
@@ -13,10 +13,10 @@
 namespace orbis::slam {
 
 enum class track_state {
-  not_started,  ///< no frame yet had enough keypoints with depth
-  tracking,
-  lost,        ///< the pose of the last frame is not known
-  relocalized  ///< the last frame was found again in the map by its appearance
+  not_started,  ///< no frame so far had enough keypoints with depth
+  tracking,     ///< the pose of the last frame is known
+  lost,         ///< the pose of the last frame is not known
+  relocalized   ///< the last frame was found again in a map by its appearance
 };
 
 [[nodiscard]] constexpr std::string_view to_string(track_state state) noexcept {
@@ -31,26 +31,27 @@ enum class track_state {
 
 /// Wall time of the stages, milliseconds.
 struct track_timings {
-  double features_ms = 0.0;  ///< extraction and depth
-  double tracking_ms = 0.0;  ///< pose
-  double mapping_ms = 0.0;   ///< keyframe and map
+  double features_ms = 0.0;  ///< feature extraction and depth
+  double tracking_ms = 0.0;  ///< estimation of the pose
+  double mapping_ms = 0.0;   ///< keyframe and, without threads, all of mapping
   [[nodiscard]] double total_ms() const noexcept { return features_ms + tracking_ms + mapping_ms; }
 };
 
+/// The result of tracking one frame.
 struct track_result {
   track_state state = track_state::not_started;
-  std::optional<se3> T_world_camera;    ///< where tracked
-  map_id map = 0;                       ///< that this pose is in
+  std::optional<se3> T_world_camera;    ///< the pose, in the world of `map`; empty where not tracked
+  map_id map = 0;                       ///< the active map
   std::size_t inliers = 0;              ///< landmarks that agree with the pose
-  std::optional<keyframe_id> keyframe;  ///< the number of the keyframe that the frame became, if it did
+  std::optional<keyframe_id> keyframe;  ///< the keyframe that the frame became, if it did
   track_timings timings;
   [[nodiscard]] bool tracked() const noexcept { return T_world_camera.has_value(); }
 };
 
-/// Over all frames so far. Frames before the start are neither tracked nor lost.
+/// Counts over all frames so far. Frames before the first map begins are neither tracked nor lost.
 struct track_counters {
   std::size_t frames = 0;
-  std::size_t tracked = 0;  ///< relocalised ones included
+  std::size_t tracked = 0;  ///< relocalised frames included
   std::size_t lost = 0;
   std::size_t relocalized = 0;
   std::size_t loops_closed = 0;
@@ -58,10 +59,11 @@ struct track_counters {
   std::size_t keyframes_culled = 0;
 };
 
+/// The pose of a keyframe.
 struct keyframe_pose {
-  double timestamp = 0.0;
+  double timestamp = 0.0;  ///< seconds
   se3 T_world_camera;
-  std::size_t frame = 0;  ///< index of the frame it was, from 0
+  std::size_t frame = 0;  ///< index of the frame, from 0
 };
 
 }  // namespace orbis::slam

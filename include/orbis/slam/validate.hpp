@@ -19,9 +19,10 @@ namespace orbis::slam {
 namespace detail {
 
 /// One check after the other; each gives the first thing that is wrong, in words, or done.
+template <feature_descriptor D>
 class map_check {
  public:
-  explicit map_check(const map& m) : m_{m} {}
+  explicit map_check(const basic_map<D>& m) : m_{m} {}
 
   [[nodiscard]] result<void> run() const {
     for (const auto check : {&map_check::keyframes, &map_check::landmarks, &map_check::covisibility, &map_check::tree,
@@ -32,10 +33,10 @@ class map_check {
 
  private:
   [[nodiscard]] static auto wrong_keyframe(keyframe_id k, std::string what) {
-    return fail(errc::malformed, "keyframe " + std::to_string(k), std::move(what));
+    return fail(errc::malformed, "keyframe " + to_string(k), std::move(what));
   }
   [[nodiscard]] static auto wrong_landmark(landmark_id l, std::string what) {
-    return fail(errc::malformed, "landmark " + std::to_string(l), std::move(what));
+    return fail(errc::malformed, "landmark " + to_string(l), std::move(what));
   }
   [[nodiscard]] static bool is_finite(const se3& pose) {
     return pose.translation().allFinite() && pose.rotation().unit_quaternion().coeffs().allFinite();
@@ -46,15 +47,15 @@ class map_check {
     for (keyframe_id id = 0; id != m_.keyframe_end(); ++id) {
       if (!m_.has_keyframe(id)) continue;
       ++count;
-      const keyframe& k = m_.at(id);
-      if (k.id != id) return wrong_keyframe(id, "calls itself " + std::to_string(k.id));
+      const auto& k = m_.at(id);
+      if (k.id != id) return wrong_keyframe(id, "calls itself " + to_string(k.id));
       const std::size_t n = k.features.keypoints.size();
       if (k.features.descriptors.size() != n || k.depth.size() != n || k.rays.size() != n || k.landmarks.size() != n)
         return wrong_keyframe(id, "does not have one descriptor, depth, ray and landmark for each keypoint");
       if (!is_finite(k.T_world_camera)) return wrong_keyframe(id, "has a pose that is not finite");
       for (std::size_t i = 0; i != n; ++i) {
         const landmark_id l = k.landmarks[i];
-        const auto at = "keypoint " + std::to_string(i) + " shows landmark " + std::to_string(l);
+        const auto at = "keypoint " + std::to_string(i) + " shows landmark " + to_string(l);
         if (l == no_id) continue;
         if (!m_.has_landmark(l)) return wrong_keyframe(id, at + ", which is dead");
         const observation* o = m_.landmark_at(l).seen_by(id);
@@ -70,18 +71,18 @@ class map_check {
     for (landmark_id id = 0; id != m_.landmark_end(); ++id) {
       if (!m_.has_landmark(id)) continue;
       ++count;
-      const landmark& l = m_.landmark_at(id);
-      if (l.id != id) return wrong_landmark(id, "calls itself " + std::to_string(l.id));
+      const auto& l = m_.landmark_at(id);
+      if (l.id != id) return wrong_landmark(id, "calls itself " + to_string(l.id));
       if (l.observations.empty()) return wrong_landmark(id, "is seen by no keyframe");
       if (l.created >= m_.keyframe_end()) return wrong_landmark(id, "comes from a keyframe that never was");
       if (!l.position.allFinite() || !l.normal.allFinite()) return wrong_landmark(id, "is at no finite place");
       for (std::size_t i = 0; i != l.observations.size(); ++i) {
         const observation& o = l.observations[i];
-        const std::string by = "keyframe " + std::to_string(o.keyframe);
+        const std::string by = "keyframe " + to_string(o.keyframe);
         if (i != 0 && l.observations[i - 1].keyframe >= o.keyframe)
           return wrong_landmark(id, "lists its observations in no order at " + by);
         if (!m_.has_keyframe(o.keyframe)) return wrong_landmark(id, "is seen by " + by + ", which is not there");
-        const keyframe& k = m_.at(o.keyframe);
+        const auto& k = m_.at(o.keyframe);
         if (o.feature >= k.size() || k.landmarks[o.feature] != id)
           return wrong_landmark(id, "is seen by " + by + ", which does not know of it");
       }
@@ -94,7 +95,7 @@ class map_check {
   [[nodiscard]] result<void> covisibility() const {
     const covisibility_graph& graph = m_.covisibility();
     for (keyframe_id id = 0; id != m_.keyframe_end(); ++id) {
-      counter counted;
+      counter<keyframe_id> counted;
       if (m_.has_keyframe(id))
         for (const landmark_id l : m_.at(id).landmarks)
           if (l != no_id)
@@ -102,8 +103,8 @@ class map_check {
               if (o.keyframe != id) counted.add(o.keyframe);
       std::vector<covisible> shared;
       covisible most;
-      for (const counter::entry& e : counted.entries()) {
-        shared.push_back({e.number, e.count});
+      for (const auto& e : counted.entries()) {
+        shared.push_back({e.id, e.count});
         if (stronger(shared.back(), most)) most = shared.back();
       }
       std::sort(shared.begin(), shared.end(),
@@ -113,7 +114,7 @@ class map_check {
       if (most != graph.strongest(id)) return wrong_keyframe(id, "does not share most with whom the graph says");
       for (const covisible& n : graph.neighbors(id))
         if (!graph.connected(n.keyframe, id))
-          return wrong_keyframe(id, "has an edge to keyframe " + std::to_string(n.keyframe) + ", but not back");
+          return wrong_keyframe(id, "has an edge to keyframe " + to_string(n.keyframe) + ", but not back");
       if (!shared.empty() && graph.neighbors(id).empty()) return wrong_keyframe(id, "shares landmarks but has no edge");
     }
     return {};
@@ -135,12 +136,11 @@ class map_check {
       const keyframe_id id = open.back();
       open.pop_back();
       if (++reached > tree.size()) return wrong_keyframe(id, "is met twice in the tree");
-      keyframe_id last = no_id;
+      keyframe_id last;
       for (const keyframe_id child : tree.children(id)) {
         if (!m_.has_keyframe(child) || !tree.contains(child))
-          return wrong_keyframe(id, "has the child " + std::to_string(child) + ", which is not there");
-        if (tree.parent(child) != id)
-          return wrong_keyframe(child, "is a child of " + std::to_string(id) + " only there");
+          return wrong_keyframe(id, "has the child " + to_string(child) + ", which is not there");
+        if (tree.parent(child) != id) return wrong_keyframe(child, "is a child of " + to_string(id) + " only there");
         if (last != no_id && last >= child) return wrong_keyframe(id, "lists its children in no order");
         open.push_back(last = child);
       }
@@ -148,7 +148,7 @@ class map_check {
         if (other == id || !tree.contains(other)) return wrong_keyframe(id, "closes a loop with no keyframe");
         const auto& back = tree.loop_edges(other);
         if (!std::binary_search(back.begin(), back.end(), id))
-          return wrong_keyframe(id, "closes a loop with " + std::to_string(other) + ", but not back");
+          return wrong_keyframe(id, "closes a loop with " + to_string(other) + ", but not back");
       }
     }
     if (reached != tree.size()) return fail(errc::malformed, "tree", "does not hold all keyframes together");
@@ -158,21 +158,22 @@ class map_check {
   /// What was erased leads to what is there.
   [[nodiscard]] result<void> lineage() const {
     for (keyframe_id id = 0; id != m_.keyframe_end(); ++id) {
-      const keyframe_id heir = m_.heir(id);
-      if (heir != no_id && !m_.has_keyframe(heir)) return wrong_keyframe(id, "became one that is not there");
+      const keyframe_id replacement = m_.replacement_of(id);
+      if (replacement != no_id && !m_.has_keyframe(replacement))
+        return wrong_keyframe(id, "became one that is not there");
       if (m_.has_keyframe(id)) continue;
       if (!m_.content().erased.contains(id)) return wrong_keyframe(id, "is gone, and where it was is not known");
       if (!is_finite(m_.pose_of(id))) return wrong_keyframe(id, "was at no finite place");
     }
-    if (m_.content().erased.size() + m_.keyframes().size() != m_.keyframe_end())
+    if (m_.content().erased.size() + m_.keyframes().size() != m_.keyframe_end().value())
       return fail(errc::malformed, "keyframes", "are remembered as erased that never were");
     for (landmark_id id = 0; id != m_.landmark_end(); ++id)
-      if (const landmark_id now = m_.became(id); now != no_id && !m_.has_landmark(now))
+      if (const landmark_id now = m_.replacement_of(id); now != no_id && !m_.has_landmark(now))
         return wrong_landmark(id, "became one that is not there");
     return {};
   }
 
-  const map& m_;
+  const basic_map<D>& m_;
 };
 
 }  // namespace detail
@@ -180,6 +181,9 @@ class map_check {
 /// Done if both sides of every observation agree, the covisibility graph is what a recount gives, the tree holds all
 /// keyframes together, and what was erased leads to what is there; else the first thing that is wrong, and where. For
 /// tests and debugging: O(map).
-[[nodiscard]] inline result<void> validate(const map& m) { return detail::map_check{m}.run(); }
+template <feature_descriptor D>
+[[nodiscard]] result<void> validate(const basic_map<D>& m) {
+  return detail::map_check<D>{m}.run();
+}
 
 }  // namespace orbis::slam

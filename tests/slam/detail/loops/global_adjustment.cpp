@@ -15,12 +15,20 @@ using namespace orbis;
 
 namespace {
 
+namespace global = slam::detail::global_adjustment;
+
+slam::detail::bundle_solution solve(const global::snapshot& taken, const slam::camera_rig<camera::pinhole>& rig,
+                                    const progress& callback = {}) {
+  return slam::detail::bundle_solver<camera::pinhole>{rig.model, global::loss}.solve(taken, global::schedule_of({}),
+                                                                                     callback);
+}
+
 /// A map whose loop was closed, and is still bent.
 [[nodiscard]] slam::map closed_ring(test::ring_world& world) {
   slam::map m = world.round(4);
   const auto last = m.keyframes().back().id;
-  const auto check = slam::detail::verify_loop(m, last, m, 3, world.model, world.scales);
-  slam::detail::close_loop(m, check.match, world.model, world.scales);
+  const auto check = slam::detail::verify_loop(m, last, m, 3, world.rig);
+  slam::detail::loop_correction::close(m, check.match, world.rig);
   return m;
 }
 
@@ -39,13 +47,13 @@ TEST_CASE("Adjusting a whole map takes out what closing its loop has left, and f
       keypoints.push_back(i);
     }
   REQUIRE(swapped.size() == 2);
-  for (const auto l : swapped) m.forget(l, 20);
-  REQUIRE(m.observe(swapped[0], 20, keypoints[1]));
-  REQUIRE(m.observe(swapped[1], 20, keypoints[0]));
+  for (const auto l : swapped) m.erase_observation(l, 20);
+  REQUIRE(m.add_observation(swapped[0], 20, keypoints[1]));
+  REQUIRE(m.add_observation(swapped[1], 20, keypoints[0]));
   m.erase_keyframe(30);
   const slam::map before = m;
 
-  const auto report = slam::detail::adjust_globally(m, world.model, world.scales);
+  const auto report = slam::detail::global_adjustment::adjust(m, world.rig);
   CHECK(test::fault_of(m) == "");
   CHECK(report.keyframes == 63);
   CHECK(report.landmarks > 1000);
@@ -66,18 +74,18 @@ TEST_CASE("Adjusting a whole map takes out what closing its loop has left, and f
   }
   CHECK(now < 0.5 * then);
   for (const auto l : swapped) CHECK((!m.has_landmark(l) || m.landmark_at(l).seen_by(20) == nullptr));
-  CHECK(report.forgotten >= 2);
-  CHECK(report.forgotten < report.observations / 10);
+  CHECK(report.outliers >= 2);
+  CHECK(report.outliers < report.observations / 10);
 }
 
 TEST_CASE("What is added while a map is adjusted goes along, and what is gone is left alone") {
   test::ring_world world({.steps = 60});
   slam::map m = closed_ring(world);
   slam::map alone = m;
-  slam::detail::adjust_globally(alone, world.model, world.scales);
+  slam::detail::global_adjustment::adjust(alone, world.rig);
 
-  slam::detail::global_adjustment<camera::pinhole> adjustment;
-  REQUIRE(adjustment.gather(m, world.model, world.scales));
+  const auto taken = global::take(m, world.rig);
+  REQUIRE_FALSE(taken.empty());
   slam::frame next = m.at(63);
   for (std::size_t i = 0; i < next.size(); i += 2) next.landmarks[i] = slam::no_id;
   const auto first_new = m.landmark_end();
@@ -89,8 +97,9 @@ TEST_CASE("What is added while a map is adjusted goes along, and what is gone is
   m.fuse(fused, into);
   m.erase_keyframe(50);
   const slam::map before = m;
-  REQUIRE(adjustment.solve());
-  adjustment.apply(m);
+  const auto solved = solve(taken, world.rig);
+  REQUIRE(solved.complete);
+  global::apply(m, taken, solved);
   CHECK(test::fault_of(m) == "");
   for (slam::keyframe_id k = 0; k < 64; ++k)
     if (k != 50) CHECK(m.at(k).T_world_camera.to_matrix() == alone.at(k).T_world_camera.to_matrix());
@@ -113,53 +122,60 @@ TEST_CASE("What is added while a map is adjusted goes along, and what is gone is
 TEST_CASE("Adjustment is the same every time, and may be stopped") {
   test::ring_world world({.steps = 60, .density = 12.0});
   slam::map m(8, 1.2);
-  slam::detail::global_adjustment<camera::pinhole> adjustment;
-  CHECK_FALSE(adjustment.gather(m, world.model, world.scales));
+  CHECK(global::take(m, world.rig).empty());
   world.walk(m, 0, 12, world.truth(0));
   const slam::map before = m;
   slam::map again = m;
 
-  REQUIRE(adjustment.gather(m, world.model, world.scales));
+  const auto taken = global::take(m, world.rig);
+  REQUIRE_FALSE(taken.empty());
   std::size_t calls = 0;
   const auto third = [&](std::size_t done, std::size_t total) {
     CHECK(done < total);
     return ++calls < 3;
   };
-  CHECK_FALSE(adjustment.solve(third));
+  const auto stopped = solve(taken, world.rig, third);
+  CHECK_FALSE(stopped.complete);
+  CHECK_FALSE(stopped.usable);
   CHECK(calls == 3);
   CHECK(test::same(before, m));
 
-  REQUIRE(adjustment.gather(m, world.model, world.scales));
-  REQUIRE(adjustment.solve());
-  adjustment.apply(m);
-  slam::detail::adjust_globally(again, world.model, world.scales);
+  const auto solved = solve(taken, world.rig);
+  REQUIRE(solved.complete);
+  global::apply(m, taken, solved);
+  slam::detail::global_adjustment::adjust(again, world.rig);
   CHECK(test::same(m, again));
   CHECK_FALSE(test::same(m, before));
   slam::map single(8, 1.2);
   world.walk(single, 0, 1, world.truth(0));
-  CHECK(slam::detail::adjust_globally(single, world.model, world.scales).keyframes == 0);
+  CHECK(slam::detail::global_adjustment::adjust(single, world.rig).keyframes == 0);
 }
 
 TEST_CASE("A map may be gathered part by part; what is added in between takes no part") {
   test::ring_world world({.steps = 60});
   const slam::map before = closed_ring(world);
   slam::map whole = before, parts = before;
-  slam::detail::global_adjustment<camera::pinhole> at_once, adjustment;
-  REQUIRE(at_once.gather(whole, world.model, world.scales));
+  const auto at_once = global::take(whole, world.rig);
+  REQUIRE_FALSE(at_once.empty());
   slam::frame next = before.at(63);
   for (std::size_t i = 0; i < next.size(); i += 2) next.landmarks[i] = slam::no_id;
   slam::detail::insert_keyframe(whole, next, {});
 
   std::size_t steps = 1;
-  REQUIRE(adjustment.gather_keyframes(parts, world.model, world.scales));
-  for (; adjustment.gather_landmarks(parts, 500); ++steps)
+  auto taken = global::take_keyframes(parts);
+  REQUIRE(taken.has_more());
+  for (;; ++steps) {
+    global::take_landmarks(taken, parts, world.rig, 500);
+    if (!taken.has_more()) break;
     if (steps == 1) slam::detail::insert_keyframe(parts, next, {});
-  CHECK(steps == (before.landmark_end() + 499) / 500);
+  }
+  CHECK(steps == (before.landmark_end().value() + 499) / 500);
   REQUIRE(steps > 2);
-  REQUIRE(adjustment.has_gathered());
-  REQUIRE((at_once.solve() && adjustment.solve()));
-  at_once.apply(whole);
-  adjustment.apply(parts);
+  REQUIRE_FALSE(taken.empty());
+  const auto solved_at_once = solve(at_once, world.rig), solved = solve(taken, world.rig);
+  REQUIRE((solved_at_once.complete && solved.complete));
+  global::apply(whole, at_once, solved_at_once);
+  global::apply(parts, taken, solved);
   CHECK(test::fault_of(parts) == "");
   REQUIRE(parts.keyframes().size() == whole.keyframes().size());
   for (const auto& k : whole.keyframes())

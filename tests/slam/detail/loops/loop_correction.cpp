@@ -20,12 +20,12 @@ struct open_ring {
   test::ring_world world;
   slam::map m = world.round(4);
   slam::keyframe_id last = m.keyframes().back().id;
-  slam::detail::loop_match match = slam::detail::verify_loop(m, last, m, 3, world.model, world.scales).match;
+  slam::detail::loop_match match = slam::detail::verify_loop(m, last, m, 3, world.rig).match;
 };
 
 /// How far a keyframe is from where the truth puts it, as seen from keyframe 0.
 [[nodiscard]] double error_of(const open_ring& r, const slam::map& m, slam::keyframe_id k) {
-  return (m.pose_of(k).translation() - r.world.truth(k).translation()).norm();
+  return (m.pose_of(k).translation() - r.world.truth(k.value()).translation()).norm();
 }
 
 }  // namespace
@@ -35,7 +35,7 @@ TEST_CASE("Closing a loop takes the drift out of keyframes and landmarks, erased
   r.m.erase_keyframe(40);
   const slam::map before = r.m;
   REQUIRE(r.match.inliers >= 40);
-  const auto report = slam::detail::close_loop(r.m, r.match, r.world.model, r.world.scales);
+  const auto report = slam::detail::loop_correction::close(r.m, r.match, r.world.rig);
   CHECK(report.corrected);
   CHECK(report.keyframes == 103);
   CHECK(report.moved > 0.2);
@@ -79,7 +79,7 @@ TEST_CASE("Closing a loop takes the drift out of keyframes and landmarks, erased
   CHECK(worst_landmark < worst + 0.2);
 
   // A second time there is nothing left to gain.
-  const auto again = slam::detail::close_loop(r.m, r.match, r.world.model, r.world.scales);
+  const auto again = slam::detail::loop_correction::close(r.m, r.match, r.world.rig);
   CHECK(again.corrected);
   CHECK(again.moved < 0.01);
   CHECK(again.fusion.fused < report.fusion.fused / 20);
@@ -89,13 +89,13 @@ TEST_CASE("Closing a loop takes the drift out of keyframes and landmarks, erased
 TEST_CASE("What is added while a loop is solved goes along") {
   open_ring r;
   slam::map alone = r.m;
-  slam::detail::close_loop(alone, r.match, r.world.model, r.world.scales);
+  slam::detail::loop_correction::close(alone, r.match, r.world.rig);
 
-  slam::detail::loop_correction<camera::pinhole> correction;
-  REQUIRE(correction.gather(r.m, r.match, r.world.model, r.world.scales));
+  const auto taken = slam::detail::loop_correction::take(r.m, r.match);
+  REQUIRE(taken);
   // Two keyframes follow, one of which is gone again, and new landmarks.
-  const se3 step = r.world.truth(r.last).inverse() * r.world.truth(r.last + 1);
-  slam::frame next = r.world.look(r.last + 1, r.m.at(r.last).T_world_camera * step);
+  const se3 step = r.world.truth(r.last.value()).inverse() * r.world.truth(r.last.value() + 1);
+  slam::frame next = r.world.look(r.last.value() + 1, r.m.at(r.last).T_world_camera * step);
   for (std::uint32_t i = 0; i < next.size(); ++i)
     for (std::uint32_t j = 0; j < r.m.at(r.last).size(); ++j)
       if (r.world.point_of(r.last, j) == r.world.point_of(r.last + 1, i))
@@ -108,8 +108,9 @@ TEST_CASE("What is added while a loop is solved goes along") {
   r.m.remove_landmark(r.m.at(20).landmarks[0]);
   REQUIRE(r.m.landmark_end() > first_new);
   const slam::map before = r.m;
-  REQUIRE(correction.solve());
-  const auto report = correction.apply(r.m);
+  const auto solved = slam::detail::loop_correction::solve(*taken, r.world.rig);
+  REQUIRE(solved);
+  const auto report = slam::detail::loop_correction::apply(r.m, *taken, *solved);
   CHECK(report.corrected);
   CHECK(test::fault_of(r.m) == "");
   const auto parent = before.tree().parent(added);
@@ -133,21 +134,21 @@ TEST_CASE("A loop is closed alike every time; one that is stopped, or has lost a
   slam::map again = r.m;
   const slam::map before = r.m;
 
-  slam::detail::loop_correction<camera::pinhole> correction;
-  REQUIRE(correction.gather(r.m, r.match, r.world.model, r.world.scales));
+  const auto taken = slam::detail::loop_correction::take(r.m, r.match);
+  REQUIRE(taken);
   const auto never = [](std::size_t, std::size_t) { return false; };
-  CHECK_FALSE(correction.solve(never));
+  CHECK_FALSE(slam::detail::loop_correction::solve(*taken, r.world.rig, {}, never));
   CHECK(test::same(before, r.m));
-  REQUIRE(correction.gather(r.m, r.match, r.world.model, r.world.scales));
-  REQUIRE(correction.solve());
-  correction.apply(r.m);
+  const auto solved = slam::detail::loop_correction::solve(*taken, r.world.rig);
+  REQUIRE(solved);
+  slam::detail::loop_correction::apply(r.m, *taken, *solved);
   CHECK_FALSE(test::same(before, r.m));
-  slam::detail::close_loop(again, r.match, r.world.model, r.world.scales);
+  slam::detail::loop_correction::close(again, r.match, r.world.rig);
   CHECK(test::same(again, r.m));
 
   slam::map without = before;
   without.erase_keyframe(3);
   const slam::map kept = without;
-  CHECK_FALSE(slam::detail::close_loop(without, r.match, r.world.model, r.world.scales).corrected);
+  CHECK_FALSE(slam::detail::loop_correction::close(without, r.match, r.world.rig).corrected);
   CHECK(test::same(kept, without));
 }

@@ -11,6 +11,7 @@
 #include "support/catch.hpp"
 
 using namespace orbis;
+namespace merging = slam::detail::map_merging;
 
 TEST_CASE("Two maps that show the same place become one") {
   test::ring_world world;
@@ -21,11 +22,11 @@ TEST_CASE("Two maps that show the same place become one") {
   const auto from = maps.create();
   world.walk(maps.active(), 15, 35, elsewhere * world.truth(15));
   maps.at(from).erase_keyframe(10);
-  const auto check = slam::detail::verify_loop(maps.at(from), 2, maps.at(into), 16, world.model, world.scales);
+  const auto check = slam::detail::verify_loop(maps.at(from), 2, maps.at(into), 16, world.rig);
   REQUIRE(check);
   const slam::map first = maps.at(into), second = maps.at(from);
 
-  const auto report = slam::detail::merge_maps(maps, from, into, check.match, world.model, world.scales);
+  const auto report = slam::detail::map_merging::merge(maps, from, into, check.match, world.rig);
   REQUIRE(report.merged);
   CHECK(maps.size() == 1);
   CHECK(maps.active_id() == into);
@@ -45,7 +46,7 @@ TEST_CASE("Two maps that show the same place become one") {
   for (slam::keyframe_id k = 0; k < 20; ++k)
     if (k != 10) {
       const se3 T = report.T_into_from * second.at(k).T_world_camera;
-      CHECK((T.inverse() * m.at(20 + k).T_world_camera).log().norm() < 1e-9);
+      CHECK((T.inverse() * m.at(k + 20).T_world_camera).log().norm() < 1e-9);
     }
   slam::map in_one(8, 1.2);  // as if tracking had never been lost
   world.walk(in_one, 0, 35, world.truth(0));
@@ -55,7 +56,7 @@ TEST_CASE("Two maps that show the same place become one") {
   CHECK(m.landmark_count() == first.landmark_count() + second.landmark_count() - report.fusion.fused);
   CHECK(m.covisibility().shared(22, 17) > 60);
   std::size_t wrong = 0;
-  const auto step = [](slam::keyframe_id k) { return k < 20 ? k : k - 5; };
+  const auto step = [](slam::keyframe_id k) { return k < 20 ? k.value() : k.value() - 5; };
   for (const auto& l : m.landmarks()) {
     const auto point = world.point_of(step(l.observations.front().keyframe), l.observations.front().feature);
     for (const auto& o : l.observations) wrong += world.point_of(step(o.keyframe), o.feature) != point;
@@ -70,16 +71,16 @@ TEST_CASE("Maps that grow while they are compared are merged whole; without thei
   world.walk(maps.active(), 0, 12, world.truth(0));
   const auto from = maps.create();
   world.walk(maps.active(), 6, 18, world.truth(6));
-  const auto match = slam::detail::verify_loop(maps.at(from), 2, maps.at(into), 7, world.model, world.scales).match;
+  const auto match = slam::detail::verify_loop(maps.at(from), 2, maps.at(into), 7, world.rig).match;
   REQUIRE(match.inliers >= 40);
 
-  slam::detail::map_merging<camera::pinhole> merging;
-  REQUIRE(merging.gather(maps, from, into, match, world.model, world.scales));
-  merging.solve();
+  const auto taken = merging::take(maps, from, into, match);
+  REQUIRE(taken);
+  const auto solved = merging::solve(*taken, world.rig);
   slam::atlas without = maps;
   slam::detail::insert_keyframe(maps.at(from), world.look(18, maps.at(from).at(11).T_world_camera), {});
   slam::detail::insert_keyframe(maps.at(into), world.look(12, maps.at(into).at(11).T_world_camera), {});
-  const auto report = merging.apply(maps);
+  const auto report = merging::apply(maps, *taken, solved);
   REQUIRE(report.merged);
   CHECK(report.offsets.keyframes == 13);
   CHECK(report.fusion.fused > 100);
@@ -87,8 +88,8 @@ TEST_CASE("Maps that grow while they are compared are merged whole; without thei
   CHECK(test::fault_of(maps.active()) == "");
 
   without.at(into).erase_keyframe(7);
-  CHECK_FALSE(merging.apply(without).merged);
+  CHECK_FALSE(merging::apply(without, *taken, solved).merged);
   CHECK(without.size() == 2);
-  CHECK_FALSE(merging.gather(without, from, into, match, world.model, world.scales));
-  CHECK_FALSE(slam::detail::merge_maps(without, into, into, match, world.model, world.scales).merged);
+  CHECK_FALSE(merging::take(without, from, into, match));
+  CHECK_FALSE(slam::detail::map_merging::merge(without, into, into, match, world.rig).merged);
 }

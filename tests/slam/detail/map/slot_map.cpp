@@ -10,7 +10,8 @@
 
 using namespace orbis;
 using slam::no_id;
-using slam::detail::slot_map;
+template <class T>
+using slot_map = slam::detail::slot_map<T, slam::keyframe_id>;
 
 TEST_CASE("Numbers ascend, stay, and are never used again") {
   slot_map<std::vector<int>> all;
@@ -50,14 +51,14 @@ TEST_CASE("A number leads to what took its place in the end") {
   all.erase(0, 1);
   all.erase(1, 5);
   all.erase(2);
-  CHECK(all.became(0) == 5);
-  CHECK(all.became(1) == 5);
-  CHECK(all.became(2) == no_id);
-  CHECK(all.became(3) == 3);
-  CHECK(all.became(6) == no_id);
-  CHECK(all.became(no_id) == no_id);
+  CHECK(all.replacement_of(0) == 5);
+  CHECK(all.replacement_of(1) == 5);
+  CHECK(all.replacement_of(2) == no_id);
+  CHECK(all.replacement_of(3) == 3);
+  CHECK(all.replacement_of(6) == no_id);
+  CHECK(all.replacement_of(no_id) == no_id);
   all.erase(5);
-  CHECK(all.became(0) == no_id);
+  CHECK(all.replacement_of(0) == no_id);
 }
 
 TEST_CASE("A store behaves as a map from numbers after any sequence of operations, appended ones included") {
@@ -81,7 +82,7 @@ TEST_CASE("A store behaves as a map from numbers after any sequence of operation
       REQUIRE(p.tested.contains(id) == p.plain.contains(id));
       std::uint32_t now = id;
       while (now != no_id && !p.plain.contains(now)) now = p.successor.at(now);
-      REQUIRE(p.tested.became(id) == now);
+      REQUIRE(p.tested.replacement_of(id) == now);
     }
   };
   for (int step = 0; step != 4000; ++step) {

@@ -19,7 +19,7 @@ constexpr double close_depth = 3.2;
 
 /// Shows the first `known` landmarks of keyframe 1 again, at levels `coarser` than it does.
 slam::keyframe_id add(random_bits& random, slam::map& m, std::uint32_t known, int coarser = 0) {
-  auto f = random_frame(random, 40, m.keyframe_end());
+  auto f = random_frame(random, 40, m.keyframe_end().value());
   for (std::uint32_t i = 0; i < known; ++i) {
     f.landmarks[i] = m.at(1).landmarks[i];
     f.features.keypoints[i].octave = m.at(1).features.keypoints[i].octave + coarser;
@@ -66,7 +66,7 @@ TEST_CASE("Redundant neighbours go as long as they are redundant, but those that
   slam::map m = start(random);
   // Keyframes 2 to 7 see the same as 1 and nothing else: of these seven three stay.
   for (int i = 0; i < 6; ++i) {
-    auto f = random_frame(random, 40, m.keyframe_end());
+    auto f = random_frame(random, 40, m.keyframe_end().value());
     f.features.keypoints = m.at(1).features.keypoints;
     f.landmarks = m.at(1).landmarks;
     m.add_keyframe(std::move(f));
@@ -76,7 +76,7 @@ TEST_CASE("Redundant neighbours go as long as they are redundant, but those that
   CHECK(erased == std::vector<slam::keyframe_id>{1, 2, 3, 4});
   CHECK(m.keyframes().size() == 4);
   CHECK(test::fault_of(m) == "");
-  CHECK(m.heir(3) == 0);
+  CHECK(m.replacement_of(slam::keyframe_id{3}) == 0);
 
   CHECK(slam::detail::cull_keyframes(kept, 7, close_depth, {}, [](slam::keyframe_id k) { return k != 6; }) ==
         std::vector<slam::keyframe_id>{6});
@@ -90,7 +90,7 @@ TEST_CASE("The root stays") {
   slam::map m(8, 1.2);
   slam::detail::insert_keyframe(m, random_frame(random, 40, 0), {});
   for (int i = 0; i < 5; ++i) {
-    auto f = random_frame(random, 40, m.keyframe_end());
+    auto f = random_frame(random, 40, m.keyframe_end().value());
     f.features.keypoints = m.at(0).features.keypoints;
     f.landmarks = m.at(0).landmarks;
     m.add_keyframe(std::move(f));

@@ -17,7 +17,7 @@ namespace {
 
 /// A keyframe that shows the first `known` landmarks of keyframe 0 again.
 slam::keyframe_id add(random_bits& random, slam::map& m, std::uint32_t known) {
-  auto f = random_frame(random, 40, m.keyframe_end());
+  auto f = random_frame(random, 40, m.keyframe_end().value());
   for (std::uint32_t i = 0; i < known; ++i) f.landmarks[i] = m.at(0).landmarks[i];
   return slam::detail::insert_keyframe(m, std::move(f), {});
 }
@@ -47,7 +47,7 @@ TEST_CASE("An observation without depth counts half") {
   const auto full = m.add_landmark(0, 0), half = m.add_landmark(0, 1, vec3(0, 0, 2)),
              twice = m.add_landmark(0, 2, vec3(0, 0, 2));
   const auto without_depth = [&](std::vector<slam::landmark_id> seen) {
-    auto g = random_frame(random, seen.size(), m.keyframe_end());
+    auto g = random_frame(random, seen.size(), m.keyframe_end().value());
     g.landmarks = std::move(seen);
     for (float& z : g.depth) z = 0.0F;
     return m.add_keyframe(std::move(g));

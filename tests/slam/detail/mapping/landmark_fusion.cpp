@@ -21,8 +21,7 @@ namespace {
 struct scene {
   random_bits random{1};
   camera::pinhole camera{640, 480, 525.0, 525.0, 320.0, 240.0};
-  optimize::reprojection<camera::pinhole> model{camera, 400.0};
-  slam::detail::pyramid_scales scales{};
+  slam::camera_rig<camera::pinhole> rig{{camera, 400.0}};
   std::vector<vec3> points;
   std::vector<features::binary_descriptor<256>> descriptors;
 
@@ -68,7 +67,7 @@ TEST_CASE("Landmarks that two keyframes made of the same points become one") {
   REQUIRE(m.landmark_count() == 160);
   REQUIRE(m.covisibility().shared(0, 1) == 0);
   const auto own = slam::detail::landmarks_of(m, {1});
-  const auto counts = slam::detail::fuse_into(m, 0, own, s.model, s.scales);
+  const auto counts = slam::detail::fuse_into(m, 0, own, s.rig);
   CHECK(counts.fused > 70);
   CHECK(counts.observed == 0);
   CHECK(m.landmark_count() == 160 - counts.fused);
@@ -79,7 +78,7 @@ TEST_CASE("Landmarks that two keyframes made of the same points become one") {
     CHECK(m.landmark_at(l).has_current_descriptor);
   }
   CHECK(test::fault_of(m) == "");
-  CHECK(slam::detail::fuse_into(m, 0, own, s.model, s.scales).fused == 0);  // nothing is left to do
+  CHECK(slam::detail::fuse_into(m, 0, own, s.rig).fused == 0);  // nothing is left to do
 }
 
 TEST_CASE("A keypoint that shows nothing yet becomes an observation") {
@@ -87,7 +86,7 @@ TEST_CASE("A keypoint that shows nothing yet becomes an observation") {
   slam::map m(8, 1.2);
   slam::detail::insert_keyframe(m, s.look(0.0, 0), {});
   m.add_keyframe(s.look(0.1, 1));
-  const auto counts = slam::detail::fuse_into(m, 1, slam::detail::landmarks_of(m, {0}), s.model, s.scales);
+  const auto counts = slam::detail::fuse_into(m, 1, slam::detail::landmarks_of(m, {0}), s.rig);
   CHECK(counts.fused == 0);
   CHECK(counts.observed == 80);
   CHECK(m.covisibility().shared(0, 1) == 80);
@@ -105,7 +104,7 @@ TEST_CASE("What looks different, or is elsewhere, is not fused") {
     other.depth[i] += 0.5F;
   }
   slam::detail::insert_keyframe(m, other, {});
-  slam::detail::fuse_into(m, 0, slam::detail::landmarks_of(m, {1}), s.model, s.scales);
+  slam::detail::fuse_into(m, 0, slam::detail::landmarks_of(m, {1}), s.rig);
   for (std::uint32_t i = 0; i < 80; ++i) CHECK((m.at(0).landmarks[i] == m.at(1).landmarks[i]) == (i >= 40));
 }
 
@@ -118,8 +117,8 @@ TEST_CASE("The landmark that more keyframes see stays") {
   third.landmarks = m.at(1).landmarks;
   slam::detail::insert_keyframe(m, third, {});
   const auto many = m.at(1).landmarks[5], few = m.at(0).landmarks[5];
-  slam::detail::fuse_into(m, 0, slam::detail::landmarks_of(m, {1}), s.model, s.scales);
-  CHECK(m.became(few) == many);
+  slam::detail::fuse_into(m, 0, slam::detail::landmarks_of(m, {1}), s.rig);
+  CHECK(m.replacement_of(few) == many);
   CHECK(m.landmark_at(many).observations.size() == 3);
 }
 
@@ -134,7 +133,7 @@ TEST_CASE("Duplicates among neighbours and their neighbours are found, in both d
     slam::detail::insert_keyframe(m, std::move(f), {});
   }
   REQUIRE(m.landmark_count() == 80 + 4 * 60);
-  for (slam::keyframe_id k = 0; k < 5; ++k) slam::detail::fuse_with_neighbors(m, k, s.model, s.scales);
+  for (slam::keyframe_id k = 0; k < 5; ++k) slam::detail::fuse_with_neighbors(m, k, s.rig);
   CHECK(m.landmark_count() == 80);
   for (const auto& l : m.landmarks()) CHECK(l.observations.size() == 5);
   CHECK(m.covisibility().shared(0, 4) == 80);

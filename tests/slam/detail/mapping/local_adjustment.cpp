@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -19,17 +20,40 @@ using namespace orbis;
 
 namespace {
 
+namespace local = slam::detail::local_adjustment;
+
+/// The steps of an adjustment, with the values between them.
+struct adjustment_steps {
+  slam::adjustment_options options;
+  std::optional<slam::detail::bundle_solver<camera::pinhole>> solver;
+  local::snapshot taken;
+  slam::detail::bundle_solution solved;
+
+  bool gather(const slam::map& m, slam::keyframe_id newest, const slam::camera_rig<camera::pinhole>& rig,
+              const slam::adjustment_options& o) {
+    options = o;
+    if (!solver) solver.emplace(rig.model);
+    solved.usable = false;
+    taken = local::take(m, newest, rig, o, std::move(taken));
+    return !taken.empty();
+  }
+  bool solve(const progress& go_on = {}) {
+    solved = solver->solve(taken, local::schedule_of(options), go_on, std::move(solved));
+    return solved.complete;
+  }
+  void apply(slam::map& m) const { local::apply(m, taken, solved); }
+};
+
 /// A camera that passes a crowd of points, with its true path. Keypoint i of each keyframe shows point i.
 struct scene {
   random_bits random{11};
   camera::pinhole camera{640, 480, 525.0, 525.0, 320.0, 240.0};
-  optimize::reprojection<camera::pinhole> model{camera, 400.0};
-  slam::detail::pyramid_scales scales{};
+  slam::camera_rig<camera::pinhole> rig{{camera, 400.0}};
   slam::adjustment_options options{};
   std::vector<vec3> points;
   std::vector<se3> path;
   slam::map m{8, 1.2};
-  slam::detail::local_adjustment<camera::pinhole> adjustment;
+  adjustment_steps adjustment;
 
   explicit scene(std::size_t keyframes = 6, std::size_t count = 120) {
     for (std::size_t i = 0; i < count; ++i) {
@@ -53,7 +77,7 @@ struct scene {
   /// Another keyframe that sees everything from `T_true` and believes to be elsewhere.
   slam::keyframe_id add(const se3& T_believed, const se3& T_true) {
     slam::frame f;
-    f.index = m.keyframe_end();
+    f.index = m.keyframe_end().value();
     f.T_world_camera = T_believed;
     f.features.keypoints.resize(points.size());
     f.features.descriptors.resize(points.size());
@@ -67,7 +91,7 @@ struct scene {
       f.depth.push_back(i % 3 == 2 ? 0.0F
                                    : static_cast<float>(p.z() + 0.5 * p.z() * p.z() / 400.0 * random.uniform(-1, 1)));
       f.rays.push_back(*camera.unproject(pixel));
-      f.landmarks.push_back(m.keyframe_end() == 0 ? slam::no_id : m.at(m.keyframe_end() - 1).landmarks[i]);
+      f.landmarks.push_back(m.keyframe_end() == 0 ? slam::no_id : m.at(m.keyframe_end() - 1U).landmarks[i]);
     }
     f.grid = features::keypoint_grid(f.features.keypoints);
     const auto id = m.add_keyframe(std::move(f));
@@ -80,7 +104,7 @@ struct scene {
   [[nodiscard]] double pose_error() const {
     double sum = 0.0;
     for (const slam::keyframe& k : m.keyframes())
-      sum += (k.T_world_camera.translation() - path[k.id].translation()).squaredNorm();
+      sum += (k.T_world_camera.translation() - path[k.id.value()].translation()).squaredNorm();
     return std::sqrt(sum / static_cast<double>(m.keyframes().size()));
   }
   [[nodiscard]] double point_error() const {
@@ -91,8 +115,13 @@ struct scene {
         sum += (m.landmark_at(l).position - points[i]).squaredNorm();
     return std::sqrt(sum / static_cast<double>(n));
   }
-  [[nodiscard]] bool gather(slam::keyframe_id newest) { return adjustment.gather(m, newest, model, scales, options); }
-  bool adjust() { return slam::detail::adjust_locally(m, m.keyframes().back().id, adjustment, model, scales, options); }
+  [[nodiscard]] bool gather(slam::keyframe_id newest) { return adjustment.gather(m, newest, rig, options); }
+  bool adjust() {
+    if (!gather(m.keyframes().back().id)) return false;
+    adjustment.solve();
+    adjustment.apply(m);
+    return true;
+  }
 };
 
 /// All poses and positions.
@@ -118,9 +147,9 @@ TEST_CASE("Local adjustment brings keyframes and landmarks to where they are") {
   CHECK(s.pose_error() < 0.002);
   CHECK(s.point_error() < 0.015);  // without depth: 2 cm at 3 m, from six views within 30 cm
   CHECK(s.m.at(0).T_world_camera.to_matrix() == root.to_matrix());
-  CHECK(s.adjustment.keyframes().size() == 6);
-  CHECK(std::count(s.adjustment.is_fixed().begin(), s.adjustment.is_fixed().end(), 1) == 1);
-  CHECK(s.adjustment.landmarks().size() == s.points.size());
+  CHECK(s.adjustment.taken.keyframes.size() == 6);
+  CHECK(std::count(s.adjustment.taken.is_fixed.begin(), s.adjustment.taken.is_fixed.end(), 1) == 1);
+  CHECK(s.adjustment.taken.landmarks.size() == s.points.size());
   CHECK(test::fault_of(s.m) == "");
   for (const auto& l : s.m.landmarks()) CHECK(std::abs(l.normal.norm() - 1.0) < 1e-12);
 }
@@ -130,8 +159,9 @@ TEST_CASE("Only the nearest keyframes move, and the others hold them") {
   s.options.keyframes = 2;
   const auto before = poses_of(s.m);
   REQUIRE(s.gather(5));
-  CHECK(s.adjustment.keyframes().size() == 6);
-  CHECK(std::count(s.adjustment.is_fixed().begin(), s.adjustment.is_fixed().end(), 0) == 1);  // one of both is the root
+  CHECK(s.adjustment.taken.keyframes.size() == 6);
+  CHECK(std::count(s.adjustment.taken.is_fixed.begin(), s.adjustment.taken.is_fixed.end(), 0) ==
+        1);  // one of both is the root
   CHECK(s.adjustment.solve());
   s.adjustment.apply(s.m);
   const auto after = poses_of(s.m);
@@ -152,8 +182,8 @@ TEST_CASE("Observations that disagree are forgotten, the others stay") {
   f.T_world_camera = s.wrong_pose(3);
   const auto id = s.m.add_keyframe(f);
   REQUIRE(s.adjust());
-  CHECK(s.adjustment.outliers() >= wrong.size());
-  CHECK(s.adjustment.outliers() < wrong.size() + 20);
+  CHECK(s.adjustment.solved.outlier_count() >= wrong.size());
+  CHECK(s.adjustment.solved.outlier_count() < wrong.size() + 20);
   for (const auto i : wrong) CHECK(s.m.at(id).landmarks[i] == slam::no_id);
   CHECK(std::count(s.m.at(id).landmarks.begin(), s.m.at(id).landmarks.end(), slam::no_id) < 30);
   CHECK(s.pose_error() < 0.003);
@@ -182,7 +212,7 @@ TEST_CASE("A landmark that one keyframe is left to see, without depth, goes") {
 TEST_CASE("What is added while the adjustment is solved moves along") {
   scene s;
   for (std::uint32_t i = 0; i < 5; ++i)  // so that others share more with what comes than the root, which holds still
-    for (const slam::keyframe_id k : {0U, 1U, 2U, 3U}) s.m.forget(s.m.at(5).landmarks[100 + i], k);
+    for (const std::uint32_t k : {0U, 1U, 2U, 3U}) s.m.erase_observation(s.m.at(5).landmarks[100 + i], k);
   REQUIRE(s.gather(5));
   CHECK(s.adjustment.solve());
   const se3 T_5_camera(so3::exp(vec3(0.01, 0.02, 0.03)), vec3(0.05, 0.02, 0.01));
@@ -193,7 +223,7 @@ TEST_CASE("What is added while the adjustment is solved moves along") {
   const se3 T_parent_added = s.m.at(parent).T_world_camera.inverse() * believed;
   const auto second = s.add(believed * T_5_camera, s.path[5] * T_5_camera * T_5_camera);
   const se3 T_parent_second = s.m.at(s.m.tree().parent(second)).T_world_camera.inverse() * (believed * T_5_camera);
-  s.m.forget(s.m.at(added).landmarks[0], added);
+  s.m.erase_observation(s.m.at(added).landmarks[0], added);
   const auto l = s.m.add_landmark(added, 0);
   const vec3 in_camera = s.m.at(added).T_world_camera.inverse() * s.m.landmark_at(l).position;
   const auto seen = s.m.at(added).landmarks;
@@ -216,7 +246,7 @@ TEST_CASE("What is gone when the adjustment is applied does no harm") {
   s.m.erase_keyframe(3);
   s.m.remove_landmark(s.m.at(0).landmarks[1]);
   s.m.fuse(s.m.at(0).landmarks[2], s.m.at(0).landmarks[3]);
-  for (const slam::keyframe_id k : {1U, 2U, 4U}) s.m.forget(s.m.at(0).landmarks[4], k);
+  for (const std::uint32_t k : {1U, 2U, 4U}) s.m.erase_observation(s.m.at(0).landmarks[4], k);
   s.adjustment.apply(s.m);
   CHECK(test::fault_of(s.m) == "");
   CHECK(s.pose_error() < 0.002);
@@ -243,7 +273,7 @@ TEST_CASE("An adjustment that is stopped changes nothing, or leaves something be
   const auto twice = [&](std::size_t, std::size_t) { return ++asked < 5; };
   CHECK_FALSE(s.adjustment.solve(twice));
   CHECK(asked == 5);
-  CHECK(s.adjustment.outliers() == 0);
+  CHECK(s.adjustment.solved.outlier_count() == 0);
   s.adjustment.apply(s.m);
   CHECK(s.pose_error() < error);
   CHECK(poses_of(s.m) != poses);
@@ -281,11 +311,21 @@ TEST_CASE("Poses that are not finite leave the map as it is") {
 TEST_CASE("Another camera model is taken up") {
   scene s;
   CHECK(s.adjust());
-  s.model = {camera::pinhole{640, 480, 500.0, 500.0, 320.0, 240.0}, 400.0};
+  s.rig.model = {camera::pinhole{640, 480, 500.0, 500.0, 320.0, 240.0}, 400.0};
+  s.adjustment.solver.emplace(s.rig.model);
   s.options.robust_iterations = s.options.iterations = 0;
   REQUIRE(s.gather(5));
   CHECK(s.adjustment.solve());
-  CHECK(s.adjustment.outliers() > 6 * s.points.size() / 2);  // which fits nothing here
+  CHECK(s.adjustment.solved.outlier_count() > 6 * s.points.size() / 2);  // which fits nothing here
+}
+
+TEST_CASE("The steps in a row do what they do one by one") {
+  scene one, row;
+  REQUIRE(one.adjust());
+  slam::detail::bundle_solver<camera::pinhole> solver{row.rig.model};
+  REQUIRE(local::adjust(row.m, 5, solver, row.rig, row.options));
+  CHECK(poses_of(one.m) == poses_of(row.m));
+  CHECK(positions_of(one.m) == positions_of(row.m));
 }
 
 TEST_CASE("Solving again what is no larger allocates nothing") {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The few edges that are enough to spread the correction of a loop over the keyframes.
+/// The essential graph: the few edges between keyframes over which the correction of a loop is distributed.
 ///
 /// Source: R. Mur-Artal, J. M. M. Montiel, J. D. Tardos, "ORB-SLAM: a versatile and accurate monocular SLAM system",
 /// T-RO 31 (2015), section III.D.
@@ -28,25 +28,26 @@ enum class edge_kind { tree, loop, covisibility };
   return "unknown";
 }
 
-/// An edge between two keyframes, as pose graphs want it (`optimize::relative_measurement`): its ends index
-/// `poses_of(map)`.
+/// An edge of a pose graph (`optimize::relative_measurement`): its ends index `poses_of(map)`.
 struct essential_edge {
-  keyframe_id from = no_id;
-  keyframe_id to = no_id;
+  std::uint32_t from = no_id;  ///< a keyframe's id
+  std::uint32_t to = no_id;    ///< a keyframe's id
   edge_kind kind = edge_kind::tree;
-  std::uint32_t shared = 0;  ///< landmarks that both see
-  se3 measurement;           ///< `T_from_to`, by the poses as they are
+  std::uint32_t shared = 0;  ///< landmarks that both observe
+  se3 measurement;           ///< `T_from_to`
   matrix<6, 6> information = matrix<6, 6>::Identity();
 };
 
-/// The spanning tree, the loop edges, and the pairs that share at least `threshold` landmarks; each pair of keyframes
-/// once, by ascending `from`: the tree's edges from child to parent, the others from the newer keyframe to the older
-/// one. O(keyframes and pairs that share).
-[[nodiscard]] inline std::vector<essential_edge> essential_graph(const map& m, std::uint32_t threshold = 100) {
+/// The edges of the spanning tree, the loop edges, and the pairs that share at least `threshold` landmarks; each pair
+/// of keyframes once, by ascending `from`. Edges of the tree lead from child to parent, the others from the newer
+/// keyframe to the older one. The measurements are the present relative poses. O(keyframes and pairs that share
+/// landmarks).
+template <feature_descriptor D>
+[[nodiscard]] std::vector<essential_edge> essential_graph(const basic_map<D>& m, std::uint32_t threshold = 100) {
   std::vector<essential_edge> edges;
-  for (const keyframe& k : m.keyframes()) {
+  for (const auto& k : m.keyframes()) {
     const auto add = [&](keyframe_id to, edge_kind kind) {
-      edges.push_back({k.id, to, kind, m.covisibility().shared(k.id, to),
+      edges.push_back({k.id.value(), to.value(), kind, m.covisibility().shared(k.id, to),
                        k.T_world_camera.inverse() * m.at(to).T_world_camera, matrix<6, 6>::Identity()});
     };
     const spanning_tree& tree = m.tree();
@@ -65,10 +66,11 @@ struct essential_edge {
   return edges;
 }
 
-/// `T_world_camera` of every keyframe, by number; the identity where one was erased, which no edge touches.
-[[nodiscard]] inline std::vector<se3> poses_of(const map& m) {
-  std::vector<se3> poses(m.keyframe_end());
-  for (const keyframe& k : m.keyframes()) poses[k.id] = k.T_world_camera;
+/// `T_world_camera` of every keyframe, by id; the identity for erased ones, which no edge touches.
+template <feature_descriptor D>
+[[nodiscard]] std::vector<se3> poses_of(const basic_map<D>& m) {
+  std::vector<se3> poses(m.keyframe_end().value());
+  for (const auto& k : m.keyframes()) poses[k.id.value()] = k.T_world_camera;
   return poses;
 }
 

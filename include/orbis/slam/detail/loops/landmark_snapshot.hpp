@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The landmarks around a keyframe, copied out of the map, and looking for them in other keyframes.
+/// A copy of the landmarks around a keyframe, and the search for them in frames.
 #pragma once
 
 #include <cstddef>
@@ -10,68 +10,69 @@
 
 #include <orbis/camera/model.hpp>
 #include <orbis/core/se3.hpp>
-#include <orbis/features/descriptor.hpp>
-#include <orbis/features/hamming.hpp>
 #include <orbis/features/match.hpp>
 #include <orbis/features/matcher.hpp>
 #include <orbis/features/project_points.hpp>
 #include <orbis/features/projected.hpp>
 #include <orbis/features/stages.hpp>
 #include <orbis/features/windowed.hpp>
+#include <orbis/slam/camera_rig.hpp>
 #include <orbis/slam/detail/map/landmark_search.hpp>
 #include <orbis/slam/detail/map/local_map.hpp>
 #include <orbis/slam/map.hpp>
 
 namespace orbis::slam::detail {
 
-/// What it takes to find a landmark in an image.
+/// What the search for a landmark needs, but for the descriptor.
 struct snapshot_landmark {
-  landmark_id id = no_id;
+  landmark_id id;
   vec3 position = vec3::Zero();  ///< in the world of its map, metres
   vec3 normal = vec3::Zero();
   double min_distance = 0.0;
   double max_distance = 0.0;
 };
 
-/// A keyframe with the landmarks that it and its neighbours see. Nothing of it refers to the map any more.
+/// A keyframe with the landmarks that it and its neighbours observe. It does not refer to the map.
+template <feature_descriptor D>
 struct landmark_snapshot {
-  keyframe_id keyframe = no_id;
+  keyframe_id keyframe;
   se3 T_world_camera;
-  std::vector<snapshot_landmark> landmarks;                   ///< by ascending number
-  std::vector<features::binary_descriptor<256>> descriptors;  ///< one for each
+  std::vector<snapshot_landmark> landmarks;  ///< by ascending id
+  std::vector<D> descriptors;                ///< by landmark
 };
 
-/// The place around a keyframe and its `neighbors` strongest neighbours. O(landmarks seen). @pre m.has_keyframe(k)
-[[nodiscard]] inline landmark_snapshot snapshot_around(const map& m, keyframe_id k, std::size_t neighbors) {
+/// Copies the landmarks of a keyframe and its `neighbors` strongest neighbours. O(their observations).
+/// @pre m.has_keyframe(k)
+template <feature_descriptor D>
+[[nodiscard]] landmark_snapshot<D> snapshot_around(const basic_map<D>& m, keyframe_id k, std::size_t neighbors) {
   std::vector<keyframe_id> around{k};
   for (const covisible& n : m.covisibility().neighbors(k, neighbors)) around.push_back(n.keyframe);
-  landmark_snapshot place{k, m.at(k).T_world_camera, {}, {}};
+  landmark_snapshot<D> taken{k, m.at(k).T_world_camera, {}, {}};
   for (const landmark_id id : landmarks_of(m, around)) {
-    const landmark& l = m.landmark_at(id);
-    place.landmarks.push_back({id, l.position, l.normal, l.min_distance, l.max_distance});
-    place.descriptors.push_back(l.descriptor);
+    const auto& l = m.landmark_at(id);
+    taken.landmarks.push_back({id, l.position, l.normal, l.min_distance, l.max_distance});
+    taken.descriptors.push_back(l.descriptor);
   }
-  return place;
+  return taken;
 }
 
-/// Looks for the landmarks of a place in a frame whose pose in the world of these is `T_world_camera`: within `radius`
-/// pixels (of the predicted level) of where they project, unlike by at most `distance` bits. The matches' queries index
-/// the landmarks, their trains the keypoints; no keypoint is matched twice. O(landmarks).
-template <camera::camera_model Camera>
-[[nodiscard]] std::vector<features::match> find_landmarks(const landmark_snapshot& place, const frame& f,
-                                                          const se3& T_world_camera, const Camera& camera,
-                                                          const pyramid_scales& scales, double radius,
-                                                          std::uint32_t distance) {
-  const features::camera_projection project{camera, T_world_camera};
-  const features::projection_rule rule = rule_of(scales, radius);
+/// Searches for landmarks in a frame at `T_world_camera`: within `radius` pixels (of the predicted level) of their
+/// projections, with descriptors that differ by `distance` at most. Queries of the matches index the landmarks, trains
+/// the keypoints; no keypoint is matched twice. O(landmarks).
+template <camera::camera_model Camera, feature_descriptor D>
+[[nodiscard]] std::vector<features::match> find_landmarks(const landmark_snapshot<D>& known, const basic_frame<D>& f,
+                                                          const se3& T_world_camera, const camera_rig<Camera>& rig,
+                                                          double radius, std::uint32_t distance) {
+  const features::camera_projection project{rig.camera(), T_world_camera};
+  const features::projection_rule rule = rule_of(rig.scales, radius);
   std::vector<features::window> windows;
-  windows.reserve(place.landmarks.size());
-  for (const snapshot_landmark& l : place.landmarks) {
+  windows.reserve(known.landmarks.size());
+  for (const snapshot_landmark& l : known.landmarks) {
     const auto appears = project(l);
     windows.push_back(appears ? features::window_of(*appears, rule) : features::window{});
   }
-  const auto matcher = features::windowed(features::hamming{}) | features::max_distance{distance} | features::unique{};
-  return matcher(place.descriptors, f.features, std::span<const features::window>(windows), f.grid);
+  const auto matcher = features::windowed(distance_of_t<D>{}) | features::max_distance{distance} | features::unique{};
+  return matcher(known.descriptors, f.features, std::span<const features::window>(windows), f.grid);
 }
 
 }  // namespace orbis::slam::detail

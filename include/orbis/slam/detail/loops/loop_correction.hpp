@@ -1,9 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Closing a loop: what drifted apart is brought together, and the way between bends to it.
+/// Closes a loop: distributes the drift over the keyframes between its ends, and fuses the landmarks of both ends.
+///
+/// `take` and `apply` touch the map, `solve` works on the snapshot. The essential graph with the new edge is optimised
+/// as a pose graph; the root of the map is held, and the other edges keep their measurement. Landmarks follow the
+/// keyframes. Between `take` and `apply` keyframes, landmarks and observations may be added: keyframes follow their
+/// parent.
 ///
 /// Source: R. Mur-Artal, J. M. M. Montiel, J. D. Tardos, "ORB-SLAM: a versatile and accurate monocular SLAM system",
-/// T-RO 31 (2015), sections VII.C and VII.D, for cameras with depth: poses have no scale.
+/// T-RO 31 (2015), sections VII.C and VII.D, for cameras with depth: poses without scale.
 #pragma once
 
 #include <algorithm>
@@ -18,123 +23,117 @@
 #include <orbis/core/progress.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/optimize/pose_graph.hpp>
-#include <orbis/optimize/reprojection.hpp>
+#include <orbis/slam/camera_rig.hpp>
 #include <orbis/slam/detail/loops/essential_graph.hpp>
 #include <orbis/slam/detail/loops/loop_fusion.hpp>
 #include <orbis/slam/detail/loops/loop_verification.hpp>
 #include <orbis/slam/detail/map/keyframe_motion.hpp>
-#include <orbis/slam/detail/map/landmark_search.hpp>
-#include <orbis/slam/detail/map/motion_propagation.hpp>
 #include <orbis/slam/detail/mapping/landmark_fusion.hpp>
 #include <orbis/slam/map.hpp>
 #include <orbis/slam/options.hpp>
 
-namespace orbis::slam::detail {
+namespace orbis::slam::detail::loop_correction {
 
-/// What closing a loop came to.
-struct loop_report {
+/// The result of closing a loop.
+struct report {
   bool corrected = false;
   fusion_counts fusion;       ///< of landmarks
-  double moved = 0.0;         ///< how far the keyframe went, metres, ...
-  double turned = 0.0;        ///< ... and how it turned, radians
+  double moved = 0.0;         ///< of the keyframe, metres
+  double turned = 0.0;        ///< of the keyframe, radians
   std::size_t keyframes = 0;  ///< that were corrected
   int iterations = 0;         ///< of the pose graph
 };
 
-/// Closes a loop in three parts: `gather` and `apply` touch the map, `solve` works on what was copied out of it.
-///
-/// The essential graph with the new edge is optimised as a pose graph, the root of the map fixed; the other edges keep
-/// what they measure before. Landmarks follow the keyframes; those of the two sides that are the same are made one.
-/// Between `gather` and `apply` keyframes, landmarks and observations may have been added: keyframes follow their
-/// parent.
-template <camera::camera_model Camera>
-class loop_correction {
- public:
-  /// False if a keyframe of the match is gone by now. O(keyframes, pairs that share, features of the neighbourhood).
-  /// @pre the match is one within the map
-  bool gather(const map& m, const loop_match& match, const optimize::reprojection<Camera>& model,
-              const pyramid_scales& scales, const loop_correction_options& o = {}) {
-    if (!m.has_keyframe(match.keyframe) || !m.has_keyframe(match.candidate) || match.keyframe == match.candidate)
-      return false;
-    match_ = match;
-    options_ = o;
-    model_.emplace(model);
-    scales_ = scales;
-    fusion_.gather(m, m, match, o.fusion);
-    poses_ = poses_of(m);
-    edges_ = essential_graph(m, o.strong);
-    fixed_.assign(poses_.size(), 0);
-    fixed_[m.tree().root()] = 1;
-    keyframes_.clear();
-    for (const keyframe& k : m.keyframes()) keyframes_.push_back(k.id);
-    std::erase_if(edges_, [&](const essential_edge& e) {
-      return e.kind == edge_kind::loop && std::min(e.from, e.to) == std::min(match.keyframe, match.candidate) &&
-             std::max(e.from, e.to) == std::max(match.keyframe, match.candidate);
-    });
-    for (essential_edge& e : edges_)  // the more they share, the better it is known how they lie
-      e.information *= static_cast<double>(std::clamp(e.shared, 1U, o.strong)) / o.strong;
-    edges_.push_back({match.candidate, match.keyframe, edge_kind::loop, static_cast<std::uint32_t>(match.inliers),
-                      match.T_candidate_keyframe, o.loop_weight * matrix<6, 6>::Identity()});
-    return true;
-  }
-
-  /// False if it was stopped (`callback(iteration, iterations)` returned false), or the graph cannot be solved: there
-  /// is nothing to apply then. @pre `gather` was true
-  [[nodiscard]] bool solve(progress callback = {}) {
-    fusion_.solve(*model_, scales_);
-    const auto summary = solver_.solve(seq, std::span<se3>(poses_), edges_,
-                                       {.max_iterations = options_.iterations, .fixed = fixed_}, callback);
-    iterations_ = summary.iterations;
-    return !optimize::is_failure(summary.status) && summary.status != optimize::pose_graph_status::cancelled;
-  }
-
-  /// @pre `solve` was true, and the map is that of `gather`, with what was added since
-  loop_report apply(map& m) {
-    const loop_report report = move(m);
-    if (report.corrected) update_landmarks(m, 0, m.landmark_end());
-    return report;
-  }
-  /// The same, but for `update_landmarks`, which is left to the caller where the report says that it was corrected.
-  loop_report move(map& m) {
-    loop_report report;
-    report.iterations = iterations_;
-    std::vector<se3> solved;
-    for (const keyframe_id k : keyframes_) solved.push_back(poses_[k]);
-    const std::vector<se3> motion = carried_motion(m, keyframes_, solved);
-    const keyframe_id a = m.heir(match_.keyframe), b = m.heir(match_.candidate);
-    if (a == no_id || b == no_id) return report;
-    const se3 before = m.at(a).T_world_camera;
-    move_all(m, motion);
-    if (a != b) m.add_loop_edge(a, b);
-    report.fusion = fusion_.fuse(m);
-    report.corrected = true;
-    report.keyframes = m.keyframes().size();
-    report.moved = (m.at(a).T_world_camera.translation() - before.translation()).norm();
-    report.turned = (before.rotation().inverse() * m.at(a).T_world_camera.rotation()).log().norm();
-    return report;
-  }
-
- private:
-  loop_match match_;
-  loop_correction_options options_;
-  std::optional<optimize::reprojection<Camera>> model_;
-  pyramid_scales scales_;
-  loop_fusion fusion_;
-  std::vector<keyframe_id> keyframes_;
-  std::vector<se3> poses_;  // by keyframe
-  std::vector<essential_edge> edges_;
-  std::vector<std::uint8_t> fixed_;
-  optimize::pose_graph_solver<se3> solver_;
-  int iterations_ = 0;
+template <feature_descriptor D>
+struct snapshot {
+  loop_match match;
+  loop_fusion::snapshot<D> fusion;
+  std::vector<keyframe_id> keyframes;
+  std::vector<se3> poses;  ///< by keyframe id
+  std::vector<essential_edge> edges;
+  std::vector<std::uint8_t> is_fixed;  ///< by keyframe id
 };
 
-/// Closes a loop at once; see `loop_correction`. Nothing is changed where the report says that nothing was corrected.
-template <camera::camera_model Camera>
-loop_report close_loop(map& m, const loop_match& match, const optimize::reprojection<Camera>& model,
-                       const pyramid_scales& scales, const loop_correction_options& o = {}) {
-  loop_correction<Camera> correction;
-  if (!correction.gather(m, match, model, scales, o) || !correction.solve()) return {};
-  return correction.apply(m);
+struct solution {
+  std::vector<se3> poses;  ///< by keyframe id
+  std::vector<loop_fusion::pair> pairs;
+  int iterations = 0;
+};
+
+/// Empty if a keyframe of the match is gone. O(keyframes, pairs that share landmarks, features of the neighbourhood).
+/// @pre the match is one within the map
+template <feature_descriptor D>
+[[nodiscard]] std::optional<snapshot<D>> take(const basic_map<D>& m, const loop_match& match,
+                                              const loop_correction_options& o = {}) {
+  if (!m.has_keyframe(match.keyframe) || !m.has_keyframe(match.candidate) || match.keyframe == match.candidate)
+    return std::nullopt;
+  snapshot<D> s{match, loop_fusion::take(m, m, match, o.fusion), {}, poses_of(m), essential_graph(m, o.strong), {}};
+  s.is_fixed.assign(s.poses.size(), 0);
+  s.is_fixed[m.tree().root().value()] = 1;
+  for (const auto& k : m.keyframes()) s.keyframes.push_back(k.id);
+  const std::uint32_t a = match.keyframe.value(), b = match.candidate.value();
+  std::erase_if(s.edges, [&](const essential_edge& e) {
+    return e.kind == edge_kind::loop && std::min(e.from, e.to) == std::min(a, b) &&
+           std::max(e.from, e.to) == std::max(a, b);
+  });
+  for (essential_edge& e : s.edges)  // the more landmarks they share, the better their relative pose is known
+    e.information *= static_cast<double>(std::clamp(e.shared, 1U, o.strong)) / o.strong;
+  s.edges.push_back({b, a, edge_kind::loop, static_cast<std::uint32_t>(match.inliers), match.T_candidate_keyframe,
+                     o.loop_weight * matrix<6, 6>::Identity()});
+  return s;
 }
 
-}  // namespace orbis::slam::detail
+/// Empty if it was stopped (`callback(iteration, iterations)` returned false), or the graph cannot be solved.
+template <feature_descriptor D, camera::camera_model Camera>
+[[nodiscard]] std::optional<solution> solve(const snapshot<D>& s, const camera_rig<Camera>& rig,
+                                            const loop_correction_options& o = {}, const progress& callback = {}) {
+  solution found{s.poses, loop_fusion::find_pairs(s.fusion, rig, o.fusion), 0};
+  optimize::pose_graph_solver<se3> solver;
+  const auto summary = solver.solve(seq, std::span<se3>(found.poses), s.edges,
+                                    {.max_iterations = o.iterations, .fixed = s.is_fixed}, callback);
+  if (optimize::is_failure(summary.status) || summary.status == optimize::pose_graph_status::cancelled)
+    return std::nullopt;
+  found.iterations = summary.iterations;
+  return found;
+}
+
+/// Writes a solution into the map that the snapshot was taken of. `update_landmarks` is left to the caller, if the
+/// report says that the map was corrected: it is not if no keyframe stands for an end of the loop any more.
+template <feature_descriptor D>
+report apply_poses(basic_map<D>& m, const snapshot<D>& s, const solution& solved) {
+  report done;
+  done.iterations = solved.iterations;
+  std::vector<se3> poses;
+  for (const keyframe_id k : s.keyframes) poses.push_back(solved.poses[k.value()]);
+  const std::vector<se3> motion = propagate_motion<D>(m, s.keyframes, poses);
+  const keyframe_id a = m.replacement_of(s.match.keyframe), b = m.replacement_of(s.match.candidate);
+  if (a == no_id || b == no_id) return done;
+  const se3 before = m.at(a).T_world_camera;
+  move_all<D>(m, motion);
+  if (a != b) m.add_loop_edge(a, b);
+  done.fusion = loop_fusion::fuse<D>(m, solved.pairs);
+  done.corrected = true;
+  done.keyframes = m.keyframes().size();
+  done.moved = (m.at(a).T_world_camera.translation() - before.translation()).norm();
+  done.turned = (before.rotation().inverse() * m.at(a).T_world_camera.rotation()).log().norm();
+  return done;
+}
+
+/// As `apply_poses`, and updates all landmarks.
+template <feature_descriptor D>
+report apply(basic_map<D>& m, const snapshot<D>& s, const solution& solved) {
+  const report done = apply_poses(m, s, solved);
+  if (done.corrected) update_landmarks(m);
+  return done;
+}
+
+/// Closes a loop at once. Nothing is changed unless the report says so.
+template <feature_descriptor D, camera::camera_model Camera>
+report close(basic_map<D>& m, const loop_match& match, const camera_rig<Camera>& rig,
+             const loop_correction_options& o = {}) {
+  const auto s = take(m, match, o);
+  const auto solved = s ? solve(*s, rig, o) : std::nullopt;
+  return solved ? apply(m, *s, *solved) : report{};
+}
+
+}  // namespace orbis::slam::detail::loop_correction

@@ -1,109 +1,109 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Where two parts of a map, or two maps, that show the same place are sewn together: which keypoints of one show which
-/// landmarks of the other.
+/// Fuses the landmarks of two parts of a map, or of two maps, that observe the same place.
+///
+/// `take` copies what is needed, `find_pairs` finds which keypoints of the one side observe which landmarks of the
+/// other one, `fuse` enters these into the map.
 ///
 /// Source: R. Mur-Artal, J. M. M. Montiel, J. D. Tardos, "ORB-SLAM: a versatile and accurate monocular SLAM system",
 /// T-RO 31 (2015), section VII.C.
 #pragma once
 
-#include <algorithm>
 #include <cstddef>
-#include <cstdint>
-#include <utility>
+#include <span>
 #include <vector>
 
 #include <orbis/camera/model.hpp>
 #include <orbis/core/se3.hpp>
-#include <orbis/optimize/reprojection.hpp>
+#include <orbis/features/match.hpp>
+#include <orbis/slam/camera_rig.hpp>
 #include <orbis/slam/detail/loops/landmark_snapshot.hpp>
 #include <orbis/slam/detail/loops/loop_verification.hpp>
 #include <orbis/slam/detail/map/counter.hpp>
 #include <orbis/slam/detail/map/keyframe_motion.hpp>
-#include <orbis/slam/detail/map/landmark_search.hpp>
 #include <orbis/slam/detail/map/point_observation.hpp>
 #include <orbis/slam/detail/mapping/landmark_fusion.hpp>
 #include <orbis/slam/map.hpp>
 #include <orbis/slam/options.hpp>
 
-namespace orbis::slam::detail {
+namespace orbis::slam::detail::loop_fusion {
 
-/// In three parts: `gather` copies what it takes, `solve` finds the pairs on the copies, `sew` enters them into the
-/// map.
-class loop_fusion {
- public:
-  /// The neighbourhood of the keyframe and the place around the candidate. O(features of the neighbourhood).
-  /// @pre the keyframes of the match are there
-  void gather(const map& current, const map& candidate_map, const loop_match& match, const loop_fusion_options& o) {
-    match_ = match;
-    options_ = o;
-    place_ = snapshot_around(candidate_map, match.candidate, o.neighbors);
-    images_.clear();
-    const se3 T_camera_world = current.at(match.keyframe).T_world_camera.inverse();
-    for (const keyframe_id k : neighborhood(current, match.keyframe)) {
-      if (images_.size() > o.keyframes) break;
-      images_.push_back({k, current.at(k), T_camera_world * current.at(k).T_world_camera});
-    }
-  }
-
-  /// Each keyframe of the neighbourhood is looked at from where the match puts it.
-  template <camera::camera_model Camera>
-  void solve(const optimize::reprojection<Camera>& model, const pyramid_scales& scales) {
-    pairs_.clear();
-    for (const loop_pair& p : match_.matches) pairs_.push_back({match_.keyframe, p});
-    for (const image& i : images_) {
-      const se3 T_world_camera = place_.T_world_camera * match_.T_candidate_keyframe * i.T_keyframe_camera;
-      const se3 T_camera_world = T_world_camera.inverse();
-      for (const features::match& m :
-           find_landmarks(place_, i.seen, T_world_camera, model.camera, scales, options_.radius, options_.distance)) {
-        const snapshot_landmark& l = place_.landmarks[m.query];
-        if (agrees(model, scales, i.seen, T_camera_world, m.train, l.position))
-          pairs_.push_back({i.keyframe, {m.train, l.id}});
-      }
-    }
-  }
-
-  /// Makes one of the landmarks that are the same: those of the candidate's side stay. `shift` is what the numbers of
-  /// the keyframe's side have grown by, if that was a map of its own. What is gone by now is left out. Returns what
-  /// came of it; landmarks that have changed are updated.
-  fusion_counts fuse(map& m, const id_offsets& shift = {}) const {
-    fusion_counts counts;
-    counter changed;
-    for (const found& f : pairs_) {
-      const keyframe_id k = f.keyframe + shift.keyframes;
-      const landmark_id l = m.became(f.pair.landmark);
-      if (!m.has_keyframe(k) || l == no_id || m.landmark_at(l).seen_by(k) != nullptr) continue;
-      const landmark_id shown = m.at(k).landmarks[f.pair.feature];
-      if (shown == no_id) {
-        m.observe(l, k, f.pair.feature);
-        ++counts.observed;
-      } else {
-        m.fuse(shown, l);
-        ++counts.fused;
-      }
-      changed.add(l);
-    }
-    for (const counter::entry& e : changed.entries())
-      if (m.has_landmark(e.number)) m.update(e.number);
-    return counts;
-  }
-
- private:
-  struct image {
-    keyframe_id keyframe;
-    frame seen;
-    se3 T_keyframe_camera;  ///< to the keyframe of the match
-  };
-  struct found {
-    keyframe_id keyframe;
-    loop_pair pair;
-  };
-
-  loop_match match_;
-  loop_fusion_options options_;
-  landmark_snapshot place_;
-  std::vector<image> images_;
-  std::vector<found> pairs_;
+/// A keyframe around the one of the match.
+template <feature_descriptor D>
+struct image {
+  keyframe_id keyframe;
+  basic_frame<D> seen;
+  se3 T_keyframe_camera;  ///< relative to the keyframe of the match
 };
 
-}  // namespace orbis::slam::detail
+template <feature_descriptor D>
+struct snapshot {
+  loop_match match;
+  landmark_snapshot<D> landmarks;  ///< around the candidate
+  std::vector<image<D>> images;    ///< around the keyframe
+};
+
+/// A keyframe that observes a landmark of the candidate's side.
+struct pair {
+  keyframe_id keyframe;
+  loop_pair observed;
+};
+
+/// Copies the neighbourhood of the keyframe and the landmarks around the candidate. O(features of the neighbourhood).
+/// @pre the keyframes of the match are there
+template <feature_descriptor D>
+[[nodiscard]] snapshot<D> take(const basic_map<D>& current, const basic_map<D>& candidate_map, const loop_match& match,
+                               const loop_fusion_options& o) {
+  snapshot<D> s{match, snapshot_around(candidate_map, match.candidate, o.neighbors), {}};
+  const se3 T_camera_world = current.at(match.keyframe).T_world_camera.inverse();
+  for (const keyframe_id k : neighborhood(current, match.keyframe)) {
+    if (s.images.size() > o.keyframes) break;
+    s.images.push_back({k, current.at(k), T_camera_world * current.at(k).T_world_camera});
+  }
+  return s;
+}
+
+/// The matches, and what a search for the landmarks finds in each image at the pose that follows from the match.
+template <camera::camera_model Camera, feature_descriptor D>
+[[nodiscard]] std::vector<pair> find_pairs(const snapshot<D>& s, const camera_rig<Camera>& rig,
+                                           const loop_fusion_options& o) {
+  std::vector<pair> pairs;
+  for (const loop_pair& p : s.match.matches) pairs.push_back({s.match.keyframe, p});
+  for (const image<D>& i : s.images) {
+    const se3 T_world_camera = s.landmarks.T_world_camera * s.match.T_candidate_keyframe * i.T_keyframe_camera;
+    const se3 T_camera_world = T_world_camera.inverse();
+    for (const features::match& m : find_landmarks(s.landmarks, i.seen, T_world_camera, rig, o.radius, o.distance)) {
+      const snapshot_landmark& l = s.landmarks.landmarks[m.query];
+      if (agrees(rig, i.seen, T_camera_world, m.train, l.position)) pairs.push_back({i.keyframe, {m.train, l.id}});
+    }
+  }
+  return pairs;
+}
+
+/// Fuses landmarks that the pairs say are the same; those of the candidate's side stay. `offsets`: by how much the ids
+/// of the keyframe's side have grown, if it was a map of its own. Pairs whose keyframe or landmark is gone are left
+/// out. Changed landmarks are updated.
+template <feature_descriptor D>
+fusion_counts fuse(basic_map<D>& m, std::span<const pair> pairs, const id_offsets& offsets = {}) {
+  fusion_counts counts;
+  counter<landmark_id> changed;
+  for (const pair& p : pairs) {
+    const keyframe_id k = p.keyframe + offsets.keyframes;
+    const landmark_id l = m.replacement_of(p.observed.landmark);
+    if (!m.has_keyframe(k) || l == no_id || m.landmark_at(l).seen_by(k) != nullptr) continue;
+    const landmark_id shown = m.at(k).landmarks[p.observed.feature];
+    if (shown == no_id) {
+      m.add_observation(l, k, p.observed.feature);
+      ++counts.observed;
+    } else {
+      m.fuse(shown, l);
+      ++counts.fused;
+    }
+    changed.add(l);
+  }
+  for (const auto& e : changed.entries())
+    if (m.has_landmark(e.id)) m.update_landmark(e.id);
+  return counts;
+}
+
+}  // namespace orbis::slam::detail::loop_fusion

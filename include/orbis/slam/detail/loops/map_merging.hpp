@@ -1,97 +1,94 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Making one map of two that show the same place.
+/// Merges two maps that observe the same place.
+///
+/// `take` and `apply` touch the maps, `solve` works on the snapshot. Between them both maps may grow.
 ///
 /// Source: C. Campos, R. Elvira, J. J. Gomez Rodriguez, J. M. M. Montiel, J. D. Tardos, "ORB-SLAM3", T-RO 37 (2021),
 /// section VI.
 #pragma once
 
 #include <optional>
+#include <vector>
 
 #include <orbis/camera/model.hpp>
 #include <orbis/core/se3.hpp>
-#include <orbis/optimize/reprojection.hpp>
 #include <orbis/slam/atlas.hpp>
+#include <orbis/slam/camera_rig.hpp>
 #include <orbis/slam/detail/loops/loop_fusion.hpp>
 #include <orbis/slam/detail/loops/loop_verification.hpp>
-#include <orbis/slam/detail/map/landmark_search.hpp>
 #include <orbis/slam/detail/mapping/landmark_fusion.hpp>
-#include <orbis/slam/map.hpp>
+#include <orbis/slam/ids.hpp>
+#include <orbis/slam/options.hpp>
 
-namespace orbis::slam::detail {
+namespace orbis::slam::detail::map_merging {
 
-/// What merging two maps came to.
-struct merge_report {
+/// The result of merging two maps.
+struct report {
   bool merged = false;
-  id_offsets offsets;            ///< what the numbers of the one map have grown by
-  keyframe_id keyframe = no_id;  ///< that of the match, by its new number
-  keyframe_id candidate = no_id;
-  fusion_counts fusion;  ///< of landmarks
-  se3 T_into_from;       ///< how the one map was moved
+  id_offsets offsets;     ///< by how much the ids of the one map have grown
+  keyframe_id keyframe;   ///< that of the match, by its new id
+  keyframe_id candidate;  ///< that of the match
+  fusion_counts fusion;   ///< of landmarks
+  se3 T_into_from;        ///< how the one map was moved
 };
 
-/// Merges map `from`, which has the keyframe of a match, into map `into`, which has the candidate, in three parts:
-/// `gather` and `apply` touch the maps, `solve` works on what was copied out of them. In between both may grow.
-template <camera::camera_model Camera>
-class map_merging {
- public:
-  /// False if a map or a keyframe is gone by now. O(features of the neighbourhood).
-  bool gather(const atlas& maps, map_id from, map_id into, const loop_match& match,
-              const optimize::reprojection<Camera>& model, const pyramid_scales& scales,
-              const loop_fusion_options& o = {}) {
-    from_ = from;
-    into_ = into;
-    match_ = match;
-    model_.emplace(model);
-    scales_ = scales;
-    if (!is_there(maps)) return false;
-    fusion_.gather(maps.at(from), maps.at(into), match, o);
-    return true;
-  }
-
-  /// @pre `gather` was true
-  void solve() { fusion_.solve(*model_, scales_); }
-
-  /// Moves `from` to where the match says, hangs it on `into` at the match, notes a loop edge there, and makes one of
-  /// the landmarks that are the same. If `from` was the active map, `into` is now. Nothing happens if a map or keyframe
-  /// is gone by now. O(both maps).
-  merge_report apply(atlas& maps) const {
-    merge_report report;
-    if (!is_there(maps)) return report;
-    map& m = maps.at(into_);
-    report.T_into_from = m.at(match_.candidate).T_world_camera * match_.T_candidate_keyframe *
-                         maps.at(from_).at(match_.keyframe).T_world_camera.inverse();
-    report.offsets = maps.merge(from_, into_, report.T_into_from, {match_.candidate, match_.keyframe});
-    report.keyframe = match_.keyframe + report.offsets.keyframes;
-    report.candidate = match_.candidate;
-    m.add_loop_edge(report.keyframe, report.candidate);
-    report.fusion = fusion_.fuse(m, report.offsets);
-    report.merged = true;
-    return report;
-  }
-
- private:
-  [[nodiscard]] bool is_there(const atlas& maps) const {
-    return from_ != into_ && maps.contains(from_) && maps.contains(into_) &&
-           maps.at(from_).has_keyframe(match_.keyframe) && maps.at(into_).has_keyframe(match_.candidate);
-  }
-
-  map_id from_ = 0, into_ = 0;
-  loop_match match_;
-  std::optional<optimize::reprojection<Camera>> model_;
-  pyramid_scales scales_;
-  loop_fusion fusion_;
+template <feature_descriptor D>
+struct snapshot {
+  map_id from, into;
+  loop_match match;
+  loop_fusion::snapshot<D> fusion;
 };
 
-/// Merges two maps at once; see `map_merging`. Nothing is changed where the report says that nothing was merged.
-template <camera::camera_model Camera>
-merge_report merge_maps(atlas& maps, map_id from, map_id into, const loop_match& match,
-                        const optimize::reprojection<Camera>& model, const pyramid_scales& scales,
-                        const loop_fusion_options& o = {}) {
-  map_merging<Camera> merging;
-  if (!merging.gather(maps, from, into, match, model, scales, o)) return {};
-  merging.solve();
-  return merging.apply(maps);
+/// What landmarks of the maps are the same.
+struct solution {
+  std::vector<loop_fusion::pair> pairs;
+};
+
+/// Whether the maps and keyframes of a match are there.
+template <feature_descriptor D>
+[[nodiscard]] bool is_possible(const basic_atlas<D>& maps, map_id from, map_id into, const loop_match& match) {
+  return from != into && maps.has({from, match.keyframe}) && maps.has({into, match.candidate});
 }
 
-}  // namespace orbis::slam::detail
+/// Copies what merging map `from`, which contains the keyframe of the match, into map `into`, which contains the
+/// candidate, needs. Empty if a map or keyframe is gone. O(features of the neighbourhood).
+template <feature_descriptor D>
+[[nodiscard]] std::optional<snapshot<D>> take(const basic_atlas<D>& maps, map_id from, map_id into,
+                                              const loop_match& match, const loop_fusion_options& o = {}) {
+  if (!is_possible(maps, from, into, match)) return std::nullopt;
+  return snapshot<D>{from, into, match, loop_fusion::take(maps.at(from), maps.at(into), match, o)};
+}
+
+template <feature_descriptor D, camera::camera_model Camera>
+[[nodiscard]] solution solve(const snapshot<D>& s, const camera_rig<Camera>& rig, const loop_fusion_options& o = {}) {
+  return {loop_fusion::find_pairs(s.fusion, rig, o)};
+}
+
+/// Moves `from` as the match says, makes it a part of `into`, adds a loop edge at the match, and fuses landmarks. If
+/// `from` was the active map, `into` becomes it. Nothing is changed if a map or keyframe is gone. O(both maps).
+template <feature_descriptor D>
+report apply(basic_atlas<D>& maps, const snapshot<D>& s, const solution& solved) {
+  report done;
+  if (!is_possible(maps, s.from, s.into, s.match)) return done;
+  basic_map<D>& m = maps.at(s.into);
+  done.T_into_from = m.at(s.match.candidate).T_world_camera * s.match.T_candidate_keyframe *
+                     maps.at(s.from).at(s.match.keyframe).T_world_camera.inverse();
+  done.offsets = maps.merge(s.from, s.into, done.T_into_from, {s.match.candidate, s.match.keyframe});
+  done.keyframe = s.match.keyframe + done.offsets.keyframes;
+  done.candidate = s.match.candidate;
+  m.add_loop_edge(done.keyframe, done.candidate);
+  done.fusion = loop_fusion::fuse<D>(m, solved.pairs, done.offsets);
+  done.merged = true;
+  return done;
+}
+
+/// Merges two maps at once. Nothing is changed unless the report says so.
+template <feature_descriptor D, camera::camera_model Camera>
+report merge(basic_atlas<D>& maps, map_id from, map_id into, const loop_match& match, const camera_rig<Camera>& rig,
+             const loop_fusion_options& o = {}) {
+  const auto s = take(maps, from, into, match, o);
+  return s ? apply(maps, *s, solve(*s, rig, o)) : report{};
+}
+
+}  // namespace orbis::slam::detail::map_merging

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The part of the map that a frame may show.
+/// The local map of a frame: the keyframes around it and their landmarks.
 #pragma once
 
 #include <algorithm>
 #include <cstddef>
-#include <cstdint>
 #include <vector>
 
 #include <orbis/slam/detail/map/counter.hpp>
@@ -14,23 +13,25 @@
 namespace orbis::slam::detail {
 
 /// The keyframe that shares the most landmarks with a frame; `otherwise` if none shares any.
-[[nodiscard]] inline keyframe_id most_shared(const map& m, const frame& f, keyframe_id otherwise) {
-  const auto order = m.sharing(f.landmarks);
-  return order.empty() ? otherwise : order.front().first;
+template <feature_descriptor D>
+[[nodiscard]] keyframe_id most_shared(const basic_map<D>& m, const basic_frame<D>& f, keyframe_id otherwise) {
+  const auto order = m.observers_of(f.landmarks);
+  return order.empty() ? otherwise : order.front().keyframe;
 }
 
-/// The keyframes around a frame: the reference, those that share landmarks with the frame, most first, then the
-/// neighbours in both graphs of the nearest of these; at most `limit`. Costs what the frame's landmarks are seen and
-/// what neighbours there are, whatever the size of the map.
-[[nodiscard]] inline std::vector<keyframe_id> local_keyframes(const map& m, const frame& f, keyframe_id reference,
-                                                              std::size_t limit) {
-  counter taken;
+/// The keyframes around a frame, at most `limit`: the reference, those that share landmarks with the frame (most
+/// first), then the neighbours of the nearest of these in the covisibility graph and in the spanning tree. The cost
+/// depends on the observations of the frame's landmarks and on these neighbours, not on the size of the map.
+template <feature_descriptor D>
+[[nodiscard]] std::vector<keyframe_id> local_keyframes(const basic_map<D>& m, const basic_frame<D>& f,
+                                                       keyframe_id reference, std::size_t limit) {
+  counter<keyframe_id> taken;
   std::vector<keyframe_id> around;
   const auto take = [&](keyframe_id k) {
     if (k != no_id && around.size() < limit && taken.add(k)) around.push_back(k);
   };
-  take(m.heir(reference));
-  for (const auto& [k, shared] : m.sharing(f.landmarks)) take(k);
+  take(m.replacement_of(reference));
+  for (const covisible& c : m.observers_of(f.landmarks)) take(c.keyframe);
   constexpr std::size_t nearest = 5, neighbors = 10;
   const std::size_t first = std::min(nearest, around.size());
   for (std::size_t i = 0; i < first && around.size() < limit; ++i) {
@@ -42,9 +43,10 @@ namespace orbis::slam::detail {
   return around;
 }
 
-/// The landmarks of these keyframes, each once, in ascending order.
-[[nodiscard]] inline std::vector<landmark_id> landmarks_of(const map& m, const std::vector<keyframe_id>& keyframes) {
-  counter seen;
+/// The landmarks that these keyframes observe, each once, in ascending order.
+template <feature_descriptor D>
+[[nodiscard]] std::vector<landmark_id> landmarks_of(const basic_map<D>& m, const std::vector<keyframe_id>& keyframes) {
+  counter<landmark_id> seen;
   std::vector<landmark_id> all;
   for (const keyframe_id k : keyframes)
     for (const landmark_id l : m.at(k).landmarks)
@@ -53,8 +55,10 @@ namespace orbis::slam::detail {
   return all;
 }
 
-[[nodiscard]] inline std::vector<landmark_id> local_landmarks(const map& m, const frame& f, keyframe_id reference,
-                                                              std::size_t limit) {
+/// The landmarks of `local_keyframes`.
+template <feature_descriptor D>
+[[nodiscard]] std::vector<landmark_id> local_landmarks(const basic_map<D>& m, const basic_frame<D>& f,
+                                                       keyframe_id reference, std::size_t limit) {
   return landmarks_of(m, local_keyframes(m, f, reference, limit));
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// What a map consists of.
+/// The data of a map, from which everything else in it follows.
 #pragma once
 
 #include <cstdint>
@@ -15,19 +15,19 @@
 
 namespace orbis::slam::detail {
 
-/// What is left of a keyframe that was erased: where it was, seen from the keyframe that took its place.
+/// Where an erased keyframe was, relative to the keyframe that replaced it.
 struct erased_keyframe {
-  keyframe_id heir = no_id;  ///< erased itself, maybe; `no_id` if it was the last one
-  se3 T_heir_camera;         ///< or `T_world_camera` without an heir
+  keyframe_id replacement;   ///< may be erased itself; `no_id` if no keyframe was left
+  se3 T_replacement_camera;  ///< without a replacement: `T_world_camera`
 };
 
-/// What a map consists of; all the rest of it follows.
+template <feature_descriptor D>
 struct map_content {
   int levels = 8;                 ///< of the image pyramid
   double scale_factor = 1.2;      ///< between two levels
-  std::uint32_t min_shared = 15;  ///< landmarks that make an edge of the covisibility graph
-  slot_map<keyframe> keyframes;
-  slot_map<landmark> landmarks;
+  std::uint32_t min_shared = 15;  ///< shared landmarks that make an edge of the covisibility graph
+  slot_map<basic_keyframe<D>, keyframe_id> keyframes;
+  slot_map<basic_landmark<D>, landmark_id> landmarks;
   spanning_tree tree;
   std::map<keyframe_id, erased_keyframe> erased;
 };

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The sections of a map's file, read and found to fit together. See `map_file.hpp` for what they hold.
+/// Reads the sections of a map's file and checks that they are consistent. `map_file.hpp` describes the format.
 #pragma once
 
 #include <algorithm>
@@ -21,11 +21,11 @@
 
 namespace orbis::slam::detail {
 
-/// No coordinate is as large, metres: sums and products stay finite.
+/// The bound of all coordinates, metres: sums and products stay finite.
 inline constexpr double farthest = 1e12;
 inline constexpr std::size_t bytes_of_keypoint = 76, bytes_of_observation = 8;
 
-/// The pose as it was written, bit for bit; none if it is not one.
+/// A pose with the bits that were written; empty if the numbers are no pose.
 [[nodiscard]] inline std::optional<se3> take_pose(section_reader& from) {
   std::array<double, 7> v{};
   for (double& x : v) x = from.take<double>();
@@ -44,10 +44,12 @@ inline constexpr std::size_t bytes_of_keypoint = 76, bytes_of_observation = 8;
   return {x, y, from.take<double>()};
 }
 
-/// Reads section by section; `problem` has what is wrong, in words, and everything fits together where nothing is.
+/// Reads section by section. Each function returns whether the section is valid and consistent with those before it; if
+/// not, `problem` says what is wrong.
 class map_reader {
  public:
-  explicit map_reader(map_content& to) : to_{to} {}
+  using content = map_content<features::binary_descriptor<256>>;
+  explicit map_reader(content& to) : to_{to} {}
 
   std::string problem;
 
@@ -55,8 +57,8 @@ class map_reader {
     const auto levels = in.take<std::uint32_t>();
     to_.min_shared = in.take<std::uint32_t>();
     to_.scale_factor = in.take<double>();
-    keyframe_numbers_ = in.take<std::uint32_t>();
-    landmark_numbers_ = in.take<std::uint32_t>();
+    keyframe_ids_ = in.take<std::uint32_t>();
+    landmark_ids_ = in.take<std::uint32_t>();
     to_.levels = static_cast<int>(levels);
     if (levels == 0 || levels > 64) return wrong("a pyramid of " + std::to_string(levels) + " levels");
     if (!(to_.scale_factor > 1.0 && to_.scale_factor < 100.0)) return wrong("a scale factor that is none");
@@ -64,32 +66,33 @@ class map_reader {
   }
 
   bool keyframes(section_reader in) {
-    for (keyframe_id id = 0; id != keyframe_numbers_; ++id) {
-      const std::string name = "keyframe " + std::to_string(id);
+    for (keyframe_id id = 0; id != keyframe_ids_; ++id) {
+      const std::string name = "keyframe " + to_string(id);
       const auto state = in.take<std::uint8_t>();
       if (in.ended()) return wrong(name + ": the section ends before it");
       if (state > 1) return wrong(name + ": neither there nor erased");
       if (!(state == 0 ? erased(in, id) : keyframe_at(in, id))) return wrong(name + ": " + problem);
     }
-    return lead_somewhere() && ends(in, "kfrm");
+    return replacements_end() && ends(in, "kfrm");
   }
 
   bool tree(section_reader in) {
-    std::vector<std::vector<keyframe_id>> children(keyframe_numbers_);
+    std::vector<std::vector<keyframe_id>> children(keyframe_ids_);
     std::vector<std::pair<keyframe_id, keyframe_id>> loops;
-    keyframe_id root = no_id;
+    keyframe_id root;
     for (const keyframe& k : to_.keyframes) {
-      const std::string name = "keyframe " + std::to_string(k.id);
-      const auto parent = in.take<std::uint32_t>();
+      const std::string name = "keyframe " + to_string(k.id);
+      const keyframe_id parent = in.take<std::uint32_t>();
       const auto count = in.take<std::uint32_t>();
       if (in.ended() || in.left() / sizeof(keyframe_id) < count) return wrong(name + ": the section ends within it");
       if (parent != no_id && !to_.keyframes.contains(parent)) return wrong(name + ": its parent is not there");
       if (parent == no_id && std::exchange(root, k.id) != no_id) return wrong(name + ": a second root");
-      if (parent != no_id) children[parent].push_back(k.id);
-      for (std::uint32_t i = 0, last = no_id; i != count; ++i) {
-        const auto other = in.take<std::uint32_t>();
+      if (parent != no_id) children[parent.value()].push_back(k.id);
+      keyframe_id last;
+      for (std::uint32_t i = 0; i != count; ++i) {
+        const keyframe_id other = in.take<std::uint32_t>();
         if (other == k.id || !to_.keyframes.contains(other) || (last != no_id && other <= last))
-          return wrong(name + ": a loop edge to keyframe " + std::to_string(other));
+          return wrong(name + ": a loop edge to keyframe " + to_string(other));
         loops.emplace_back(k.id, last = other);
       }
     }
@@ -98,7 +101,7 @@ class map_reader {
     while (!open.empty()) {
       const keyframe_id parent = open.back();
       open.pop_back();
-      for (const keyframe_id child : children[parent]) {
+      for (const keyframe_id child : children[parent.value()]) {
         to_.tree.add(child, parent);
         open.push_back(child);
       }
@@ -108,7 +111,7 @@ class map_reader {
       if (a < b) to_.tree.add_loop_edge(a, b);
     for (const auto& [a, b] : loops)
       if (const auto& ends = to_.tree.loop_edges(a); !std::binary_search(ends.begin(), ends.end(), b))
-        return wrong("keyframe " + std::to_string(a) + ": a loop edge that does not lead back");
+        return wrong("keyframe " + to_string(a) + ": a loop edge that does not lead back");
     std::size_t both_ways = 0;
     for (const keyframe& k : to_.keyframes) both_ways += to_.tree.loop_edges(k.id).size();
     if (both_ways != loops.size()) return wrong("a loop edge that does not lead back");
@@ -116,15 +119,16 @@ class map_reader {
   }
 
   bool landmarks(section_reader in) {
-    for (landmark_id id = 0; id != landmark_numbers_; ++id) {
+    for (landmark_id id = 0; id != landmark_ids_; ++id) {
       const auto count = in.take<std::uint32_t>();
-      const bool whole = count == 0 ? dead(in) : landmark_at(in, id, count);
+      const bool whole = count == 0 ? removed(in) : landmark_at(in, id, count);
       if (in.ended()) problem = "the section ends within it";
-      if (!whole || in.ended()) return wrong("landmark " + std::to_string(id) + ": " + problem);
+      if (!whole || in.ended()) return wrong("landmark " + to_string(id) + ": " + problem);
     }
-    for (landmark_id id = 0; id != landmark_numbers_; ++id)
-      if (!to_.landmarks.contains(id) && successors_[id] != no_id && !to_.landmarks.contains(successors_[id]))
-        return wrong("landmark " + std::to_string(id) + ": became one that is not there");
+    for (landmark_id id = 0; id != landmark_ids_; ++id)
+      if (!to_.landmarks.contains(id) && replacements_[id.value()] != no_id &&
+          !to_.landmarks.contains(replacements_[id.value()]))
+        return wrong("landmark " + to_string(id) + ": became one that is not there");
     return ends(in, "land");
   }
 
@@ -141,13 +145,13 @@ class map_reader {
   }
 
   bool erased(section_reader& in, keyframe_id id) {
-    const auto heir = in.take<std::uint32_t>();
+    const keyframe_id replacement = in.take<std::uint32_t>();
     const auto pose = take_pose(in);
     if (in.ended()) return wrong("the section ends within it");
     if (!pose) return wrong("its pose is none");
-    if (heir != no_id && heir >= keyframe_numbers_) return wrong("its heir never was");
-    to_.erased[id] = {heir, *pose};
-    to_.keyframes.add_erased(heir);
+    if (replacement != no_id && replacement >= keyframe_ids_) return wrong("its replacement never was");
+    to_.erased[id] = {replacement, *pose};
+    to_.keyframes.add_erased(replacement);
     return true;
   }
 
@@ -184,22 +188,22 @@ class map_reader {
     return true;
   }
 
-  /// Heirs of heirs come to an end.
-  bool lead_somewhere() {
-    std::vector<std::uint32_t> met(keyframe_numbers_, no_id);
-    for (keyframe_id id = 0; id != keyframe_numbers_; ++id)
-      for (keyframe_id k = id; k != no_id && !to_.keyframes.contains(k); k = to_.erased.at(k).heir) {
-        if (met[k] == id) return wrong("keyframe " + std::to_string(id) + ": is its own heir");
-        if (std::exchange(met[k], id) != no_id) break;  // from here on it has been followed before
+  /// The chains of replacements have no cycle.
+  bool replacements_end() {
+    std::vector<keyframe_id> met(keyframe_ids_);
+    for (keyframe_id id = 0; id != keyframe_ids_; ++id)
+      for (keyframe_id k = id; k != no_id && !to_.keyframes.contains(k); k = to_.erased.at(k).replacement) {
+        if (met[k.value()] == id) return wrong("keyframe " + to_string(id) + ": is its own replacement");
+        if (std::exchange(met[k.value()], id) != no_id) break;  // from here on it has been followed before
       }
     return true;
   }
 
-  bool dead(section_reader& in) {
-    successors_.push_back(in.take<std::uint32_t>());
-    if (successors_.back() != no_id && successors_.back() >= landmark_numbers_)
+  bool removed(section_reader& in) {
+    replacements_.push_back(in.take<std::uint32_t>());
+    if (replacements_.back() != no_id && replacements_.back() >= landmark_ids_)
       return wrong("became one that never was");
-    to_.landmarks.add_erased(successors_.back());
+    to_.landmarks.add_erased(replacements_.back());
     return true;
   }
 
@@ -219,13 +223,13 @@ class map_reader {
     if (!(l.position.array().abs() < farthest).all() || !l.normal.allFinite() || !(l.min_distance >= 0.0) ||
         !(l.max_distance >= 0.0) || !std::isfinite(l.max_distance))
       return wrong("is at no finite place");
-    if (l.created >= keyframe_numbers_) return wrong("comes from a keyframe that never was");
+    if (l.created >= keyframe_ids_) return wrong("comes from a keyframe that never was");
     l.observations.reserve(count);
     for (std::uint32_t i = 0; i != count; ++i) {
       observation o;
       o.keyframe = in.take<std::uint32_t>();
       o.feature = in.take<std::uint32_t>();
-      const std::string by = "keypoint " + std::to_string(o.feature) + " of keyframe " + std::to_string(o.keyframe);
+      const std::string by = "keypoint " + std::to_string(o.feature) + " of keyframe " + to_string(o.keyframe);
       if (!to_.keyframes.contains(o.keyframe) || o.feature >= to_.keyframes[o.keyframe].size())
         return wrong("is seen by " + by + ", which is not there");
       if (i != 0 && o.keyframe <= l.observations.back().keyframe) return wrong("lists its observations in no order");
@@ -233,14 +237,14 @@ class map_reader {
         return wrong("is seen by " + by + ", which shows another");
       l.observations.push_back(o);
     }
-    successors_.push_back(no_id);
+    replacements_.push_back(no_id);
     to_.landmarks.add(std::move(l));
     return true;
   }
 
-  map_content& to_;
-  std::uint32_t keyframe_numbers_ = 0, landmark_numbers_ = 0;
-  std::vector<landmark_id> successors_;
+  content& to_;
+  std::uint32_t keyframe_ids_ = 0, landmark_ids_ = 0;
+  std::vector<landmark_id> replacements_;
 };
 
 }  // namespace orbis::slam::detail

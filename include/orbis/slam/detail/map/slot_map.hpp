@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Objects by number: a number stays what it is, whatever comes and goes.
+/// Objects by id. Ids stay valid while objects come and go.
 #pragma once
 
 #include <cassert>
@@ -16,84 +16,89 @@
 
 namespace orbis::slam::detail {
 
-/// Objects with the numbers 0, 1, 2 ... in the order in which they came. A number is never used again; the memory of
-/// what was erased is. An erased number remembers which other one took its place, if any did, and takes four bytes.
-/// References stay valid while their object is there.
-template <std::default_initializable T>
+/// Objects with the ids 0, 1, 2 ... in the order in which they were added. No id is used twice, but the memory of
+/// erased objects is. An erased id remembers which object replaced it, if one did, and takes four bytes. References
+/// stay valid until their object is erased. All operations take O(1) where nothing else is said.
+template <std::default_initializable T, class Id>
 class slot_map {
  public:
-  using id = std::uint32_t;
-  static constexpr id most_ids = 0x7fffffffU;
+  static constexpr std::uint32_t most_ids = 0x7fffffffU;
 
-  /// The number of the new object. @pre fewer than `most_ids` so far
-  id add(T value) {
-    assert(fate_.size() < most_ids);
-    std::uint32_t place = static_cast<std::uint32_t>(items_.size());
+  /// Adds an object and returns its id. @pre fewer than `most_ids` ids were given so far
+  Id add(T value) {
+    assert(slot_of_.size() < most_ids);
+    std::uint32_t slot = static_cast<std::uint32_t>(items_.size());
     if (free_.empty()) {
       items_.push_back(std::move(value));
     } else {
-      place = free_.back();
+      slot = free_.back();
       free_.pop_back();
-      items_[place] = std::move(value);
+      items_[slot] = std::move(value);
     }
-    fate_.push_back(place);
-    return end_id() - 1;
+    slot_of_.push_back(slot);
+    return last_id();
   }
 
-  /// A number whose object is gone from the start, as when a store is read from a file.
-  /// @pre `successor` is `no_id`, or will be the number of an object
-  id add_erased(id successor) {
-    assert(fate_.size() < most_ids);
-    fate_.push_back(gone | successor);
-    return end_id() - 1;
+  /// Adds an id whose object was erased before: for maps that are read from a file.
+  /// @pre `replacement` is `no_id`, or the id of an object that will be added
+  Id add_erased(Id replacement) {
+    assert(slot_of_.size() < most_ids);
+    slot_of_.push_back(erased | replacement.value());
+    return last_id();
   }
 
-  /// Frees the object; `successor` takes its place. @pre contains(i); successor is no_id or another that is there
-  void erase(id i, id successor = no_id) {
-    assert(contains(i) && (successor == no_id || (successor != i && contains(successor))));
-    const std::uint32_t place = std::exchange(fate_[i], gone | successor);
-    items_[place] = T{};
-    free_.push_back(place);
+  /// Erases an object; `replacement` takes its place. @pre contains(i); replacement is no_id or another contained id
+  void erase(Id i, Id replacement = no_id) {
+    assert(contains(i) && (replacement == no_id || (replacement != i && contains(replacement))));
+    const std::uint32_t slot = std::exchange(slot_of_[i.value()], erased | replacement.value());
+    items_[slot] = T{};
+    free_.push_back(slot);
   }
 
-  [[nodiscard]] bool contains(id i) const noexcept { return i < fate_.size() && (fate_[i] & gone) == 0; }
+  [[nodiscard]] bool contains(Id i) const noexcept {
+    return i.value() < slot_of_.size() && (slot_of_[i.value()] & erased) == 0;
+  }
   /// @pre contains(i)
-  [[nodiscard]] const T& operator[](id i) const {
+  [[nodiscard]] const T& operator[](Id i) const {
     assert(contains(i));
-    return items_[fate_[i]];
+    return items_[slot_of_[i.value()]];
   }
-  [[nodiscard]] T& operator[](id i) {
+  [[nodiscard]] T& operator[](Id i) {
     assert(contains(i));
-    return items_[fate_[i]];
+    return items_[slot_of_[i.value()]];
   }
-  /// How many objects there are.
+  /// The number of objects.
   [[nodiscard]] std::size_t size() const noexcept { return items_.size() - free_.size(); }
-  /// The number that the next object will have.
-  [[nodiscard]] id end_id() const noexcept { return static_cast<id>(fate_.size()); }
+  [[nodiscard]] bool empty() const noexcept { return size() == 0; }
+  /// The id that the next object will get.
+  [[nodiscard]] Id end_id() const noexcept { return static_cast<std::uint32_t>(slot_of_.size()); }
 
-  /// `i` itself while it is there, else what took its place in the end; `no_id` if nothing did.
-  [[nodiscard]] id became(id i) const noexcept {
-    while (i < fate_.size() && (fate_[i] & gone) != 0) i = fate_[i] == no_id ? no_id : fate_[i] & ~gone;
-    return i < fate_.size() ? i : no_id;
+  /// `i` itself while its object is there; otherwise the object that replaced it, over all replacements since; `no_id`
+  /// if there is none. O(replacements).
+  [[nodiscard]] Id replacement_of(Id i) const noexcept {
+    std::uint32_t at = i.value();
+    while (at < slot_of_.size() && (slot_of_[at] & erased) != 0)
+      at = slot_of_[at] == no_id ? no_id : slot_of_[at] & ~erased;
+    return at < slot_of_.size() ? at : no_id;
   }
 
-  /// Takes over the objects and the past of `other`. Returns what its numbers have grown by; numbers that the
-  /// objects hold are the caller's to change.
-  id append(slot_map&& other) {
-    assert(fate_.size() + other.fate_.size() <= most_ids);
-    const id shift = end_id();
-    for (const std::uint32_t fate : other.fate_) {
-      if ((fate & gone) == 0) {
-        add(std::move(other.items_[fate]));
+  /// Moves all objects and erased ids of `other` behind those of this one. Returns by how much its ids have grown. Ids
+  /// inside the objects are not changed. O(ids of `other`).
+  std::uint32_t append(slot_map&& other) {
+    assert(slot_of_.size() + other.slot_of_.size() <= most_ids);
+    const auto offset = static_cast<std::uint32_t>(slot_of_.size());
+    for (const std::uint32_t slot : other.slot_of_) {
+      if ((slot & erased) == 0) {
+        add(std::move(other.items_[slot]));
       } else {
-        fate_.push_back(fate == no_id ? no_id : fate + shift);
+        slot_of_.push_back(slot == no_id ? no_id : slot + offset);
       }
     }
     other = slot_map{};
-    return shift;
+    return offset;
   }
 
-  /// Goes through the objects by ascending number.
+  /// Iterates over the objects by ascending id.
   class const_iterator {
    public:
     using value_type = T;
@@ -103,7 +108,7 @@ class slot_map {
     using iterator_category = std::forward_iterator_tag;
 
     const_iterator() = default;
-    const_iterator(const slot_map& all, id at) : all_{&all}, at_{at} { skip(); }
+    const_iterator(const slot_map& all, Id at) : all_{&all}, at_{at} { skip(); }
     [[nodiscard]] reference operator*() const { return (*all_)[at_]; }
     [[nodiscard]] pointer operator->() const { return &(*all_)[at_]; }
     const_iterator& operator++() {
@@ -123,25 +128,28 @@ class slot_map {
       while (at_ < all_->end_id() && !all_->contains(at_)) ++at_;
     }
     const slot_map* all_ = nullptr;
-    id at_ = 0;
+    Id at_ = 0;
   };
 
   [[nodiscard]] const_iterator begin() const { return {*this, 0}; }
   [[nodiscard]] const_iterator end() const { return {*this, end_id()}; }
-  [[nodiscard]] bool empty() const noexcept { return size() == 0; }
-  /// The object of the lowest number, and of the highest. @pre !empty()
+  /// The object with the least id. O(erased ids before it). @pre !empty()
   [[nodiscard]] const T& front() const { return *begin(); }
+  /// The object with the greatest id. O(erased ids behind it). @pre !empty()
   [[nodiscard]] const T& back() const {
-    id last = end_id() - 1;
-    while (!contains(last)) --last;
+    Id last = last_id();
+    while (!contains(last)) last = last - 1U;
     return (*this)[last];
   }
 
  private:
-  static constexpr std::uint32_t gone = 0x80000000U;
-  std::vector<std::uint32_t> fate_;  ///< by number: its place in `items_`; or `gone` with the number that follows
+  static constexpr std::uint32_t erased = 0x80000000U;
+
+  [[nodiscard]] Id last_id() const noexcept { return static_cast<std::uint32_t>(slot_of_.size()) - 1; }
+
+  std::vector<std::uint32_t> slot_of_;  ///< by id: index in `items_`; or `erased` with the id of the replacement
   std::deque<T> items_;
-  std::vector<std::uint32_t> free_;  ///< places
+  std::vector<std::uint32_t> free_;  ///< slots without an object
 };
 
 }  // namespace orbis::slam::detail

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Which of several descriptors of a landmark describes it best.
+/// Which of several descriptors of a landmark is the most typical.
 #pragma once
 
 #include <algorithm>
@@ -8,17 +8,20 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <type_traits>
 
-#include <orbis/features/hamming.hpp>
+#include <orbis/slam/extractor.hpp>
 
 namespace orbis::slam::detail {
 
-/// Which of `count` descriptors (`of(i)`) is the most typical: the one whose median distance to the others is least,
-/// the first of those where equal. With more than 16 of them, of 16 spread evenly, so that the cost is bounded.
+/// The index of the most typical of `count` descriptors (`of(i)`): the one whose median distance to the others is
+/// least, the first of those where equal. With more than 16 descriptors, 16 evenly spread ones take part, so that the
+/// cost is bounded. With one or two, the last one.
 /// @pre count > 0
 /// Source: R. Mur-Artal, J. M. M. Montiel, J. D. Tardos, "ORB-SLAM", T-RO 31 (2015), section III.C.
 template <class Of>
 [[nodiscard]] std::size_t most_typical(std::size_t count, Of&& of) {
+  using distance = distance_of_t<std::remove_cvref_t<decltype(of(std::size_t{}))>>;
   constexpr std::size_t most = 16;
   const std::size_t n = std::min(count, most);
   if (n < 3) return count - 1;
@@ -26,7 +29,7 @@ template <class Of>
   std::array<std::array<std::uint32_t, most>, most> distances{};
   for (std::size_t i = 0; i != n; ++i)
     for (std::size_t j = 0; j != i; ++j)
-      distances[i][j] = distances[j][i] = features::hamming{}(of(original(i)), of(original(j)));
+      distances[i][j] = distances[j][i] = distance{}(of(original(i)), of(original(j)));
   std::size_t best = 0;
   std::uint32_t best_median = std::numeric_limits<std::uint32_t>::max();
   for (std::size_t i = 0; i != n; ++i) {

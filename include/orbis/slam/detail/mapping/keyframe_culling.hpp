@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Which keyframes the map can do without.
+/// Erases redundant keyframes.
 #pragma once
 
 #include <concepts>
@@ -13,11 +13,13 @@
 
 namespace orbis::slam::detail {
 
-/// Whether enough of the close landmarks of a keyframe are seen as well or better by enough others. One that sees no
-/// close landmark is not redundant. O(observations of its landmarks).
+/// Whether enough of a keyframe's landmarks that are closer than `close_depth` (metres) are observed by enough other
+/// keyframes at the same or a finer pyramid level. False for a keyframe without close landmarks. O(observations of its
+/// landmarks).
 /// Source: R. Mur-Artal, J. D. Tardos, "ORB-SLAM2", T-RO 33 (2017), section III.C, after ORB-SLAM (2015), VI.E.
-[[nodiscard]] inline bool is_redundant(const map& m, keyframe_id id, double close_depth, const culling_options& o) {
-  const keyframe& k = m.at(id);
+template <feature_descriptor D>
+[[nodiscard]] bool is_redundant(const basic_map<D>& m, keyframe_id id, double close_depth, const culling_options& o) {
+  const auto& k = m.at(id);
   std::size_t close = 0, seen_by_others = 0;
   for (std::uint32_t i = 0; i < k.size(); ++i) {
     if (k.landmarks[i] == no_id || !k.has_depth(i) || static_cast<double>(k.depth[i]) > close_depth) continue;
@@ -31,15 +33,17 @@ namespace orbis::slam::detail {
   return close != 0 && static_cast<double>(seen_by_others) >= o.redundant * static_cast<double>(close);
 }
 
+/// Keeps no keyframe.
 struct keep_none {
   [[nodiscard]] constexpr bool operator()(keyframe_id) const noexcept { return false; }
 };
 
-/// Erases the redundant neighbours of keyframe `newest`, the strongest first, each judged by what is left: not those
-/// that `keep(id)` asks to keep, nor the root, nor those at which a loop was closed. Returns the erased ones.
-template <std::predicate<keyframe_id> Keep = keep_none>
-std::vector<keyframe_id> cull_keyframes(map& m, keyframe_id newest, double close_depth, const culling_options& o,
-                                        Keep&& keep = {}) {
+/// Erases the redundant neighbours of keyframe `newest`, the strongest first; each is judged after the ones before it
+/// were erased. Kept are the root, keyframes with loop edges, and those for which `keep(id)` is true. Returns the
+/// erased ones.
+template <feature_descriptor D, std::predicate<keyframe_id> Keep = keep_none>
+std::vector<keyframe_id> cull_keyframes(basic_map<D>& m, keyframe_id newest, double close_depth,
+                                        const culling_options& o, Keep&& keep = {}) {
   std::vector<keyframe_id> erased;
   for (const covisible& n : m.covisibility().neighbors(newest, o.neighborhood)) {
     const keyframe_id k = n.keyframe;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// How the map grows: keyframes, and the landmarks their depth gives.
+/// Turns a frame into a keyframe, and its depth into landmarks.
 #pragma once
 
 #include <algorithm>
@@ -14,9 +14,10 @@
 
 namespace orbis::slam::detail {
 
-/// Keypoints with depth that show no landmark, the nearest first: all close ones, and at least
-/// `min_new_landmarks` if there are as many.
-[[nodiscard]] inline std::vector<std::uint32_t> new_landmark_keypoints(const frame& f, const options& o) {
+/// The keypoints that become landmarks: those with depth that observe none yet, the nearest first; all that are closer
+/// than `o.close_depth`, and at least `o.min_new_landmarks` if there are as many.
+template <feature_descriptor D>
+[[nodiscard]] std::vector<std::uint32_t> new_landmark_keypoints(const basic_frame<D>& f, const options& o) {
   std::vector<std::uint32_t> with_depth;
   for (std::uint32_t i = 0; i < f.size(); ++i)
     if (f.has_depth(i) && f.landmarks[i] == no_id) with_depth.push_back(i);
@@ -29,13 +30,14 @@ namespace orbis::slam::detail {
   return with_depth;
 }
 
-/// Makes a keyframe of a frame: it observes the landmarks that the frame shows, and its remaining
-/// depth becomes new ones.
-inline keyframe_id insert_keyframe(map& m, frame f, const options& o) {
+/// Adds a frame as a keyframe that observes `f.landmarks`, and adds landmarks at `new_landmark_keypoints`. Returns its
+/// id.
+template <feature_descriptor D>
+keyframe_id insert_keyframe(basic_map<D>& m, basic_frame<D> f, const options& o) {
   const keyframe_id id = m.add_keyframe(std::move(f));
   for (const landmark_id l : m.at(id).landmarks)
-    if (l != no_id) m.update(l);
-  for (const std::uint32_t i : new_landmark_keypoints(m.at(id), o)) m.add_landmark(id, i);
+    if (l != no_id) m.update_landmark(l);
+  for (const std::uint32_t i : new_landmark_keypoints<D>(m.at(id), o)) m.add_landmark(id, i);
   return id;
 }
 

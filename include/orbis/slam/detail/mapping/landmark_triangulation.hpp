@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// New landmarks from keypoints of two keyframes that show the same point: the only way where there is no depth.
+/// New landmarks from matching keypoints of two keyframes, by triangulation: for points without depth.
 ///
 /// Sources: R. Mur-Artal, J. M. M. Montiel, J. D. Tardos, "ORB-SLAM: a versatile and accurate monocular SLAM system",
-/// T-RO 31 (2015), section VI.C; R. Mur-Artal, J. D. Tardos, "ORB-SLAM2", T-RO 33 (2017), section III.A, for what depth
-/// is worth against parallax.
+/// T-RO 31 (2015), section VI.C; R. Mur-Artal, J. D. Tardos, "ORB-SLAM2", T-RO 33 (2017), section III.A, for the
+/// weight of depth against parallax.
 #pragma once
 
 #include <algorithm>
@@ -22,27 +22,26 @@
 #include <orbis/features/descriptor.hpp>
 #include <orbis/features/epipolar.hpp>
 #include <orbis/features/epipolar_geometry.hpp>
-#include <orbis/features/hamming.hpp>
 #include <orbis/features/match.hpp>
 #include <orbis/features/matcher.hpp>
 #include <orbis/features/stages.hpp>
-#include <orbis/optimize/reprojection.hpp>
 #include <orbis/optimize/triangulation.hpp>
+#include <orbis/slam/camera_rig.hpp>
 #include <orbis/slam/covisibility_graph.hpp>
-#include <orbis/slam/detail/map/landmark_search.hpp>
 #include <orbis/slam/detail/map/point_observation.hpp>
 #include <orbis/slam/map.hpp>
 #include <orbis/slam/options.hpp>
 
 namespace orbis::slam::detail {
 
-/// The keypoints of a keyframe that show no landmark.
+/// The keypoints of a keyframe that observe no landmark.
+template <feature_descriptor D>
 struct free_keypoints {
-  features::features features;
+  orbis::features::basic_features<D> features;
   std::vector<vec3> rays;
   std::vector<std::uint32_t> index;  ///< in the keyframe
 
-  void assign(const keyframe& k) {
+  void assign(const basic_keyframe<D>& k) {
     features.keypoints.clear();
     features.descriptors.clear();
     rays.clear();
@@ -57,40 +56,41 @@ struct free_keypoints {
   }
 };
 
-/// Pixels per radian about the middle of the image.
+/// The focal length in the middle of the image, pixels per radian; 0 if the camera cannot project there.
 template <camera::camera_model Camera>
 [[nodiscard]] double focal_length(const Camera& camera) {
   matrix<2, 3> j = matrix<2, 3>::Zero();
   return camera.project(vec3(0.0, 0.0, 1.0), j) ? std::sqrt(std::abs(j(0, 0) * j(1, 1))) : 0.0;
 }
 
-/// Two keyframes, and whether a keypoint of each can be one point.
-template <camera::camera_model Camera>
+/// Two keyframes whose keypoints are triangulated.
+template <camera::camera_model Camera, feature_descriptor D>
 struct view_pair {
-  const optimize::reprojection<Camera>& model;
-  const pyramid_scales& scales;
+  const camera_rig<Camera>& rig;
   const triangulation_options& options;
-  const keyframe& a;
-  const keyframe& b;
+  const basic_keyframe<D>& a;
+  const basic_keyframe<D>& b;
   double focal;
   se3 T_a_world = a.T_world_camera.inverse(), T_b_world = b.T_world_camera.inverse();
 
-  /// The point that keypoint `i` of `a` and `j` of `b` show, if it passes all checks.
+  /// The point (world, metres) that keypoint `i` of `a` and keypoint `j` of `b` observe; empty unless it passes all
+  /// checks.
   [[nodiscard]] std::optional<vec3> point(std::uint32_t i, std::uint32_t j) const {
     const auto p = place(i, j);
     if (!p) return std::nullopt;
     const vec3 in_a = T_a_world * *p, in_b = T_b_world * *p;
     if (!(in_a.z() > 0.0 && in_b.z() > 0.0)) return std::nullopt;
-    if (!agrees(model, scales, a, T_a_world, i, *p) || !agrees(model, scales, b, T_b_world, j, *p)) return std::nullopt;
+    if (!agrees<Camera, D>(rig, a, T_a_world, i, *p) || !agrees<Camera, D>(rig, b, T_b_world, j, *p))
+      return std::nullopt;
     // A point that is twice as far appears half as large.
-    const double factor = in_b.norm() * scales.scale(b.features.keypoints[j].octave) /
-                          (in_a.norm() * scales.scale(a.features.keypoints[i].octave));
-    const double limit = options.scale_tolerance * scales.factor();
+    const double factor = in_b.norm() * rig.scales.scale(b.features.keypoints[j].octave) /
+                          (in_a.norm() * rig.scales.scale(a.features.keypoints[i].octave));
+    const double limit = options.scale_tolerance * rig.scales.factor();
     return factor <= limit && factor * limit >= 1.0 ? p : std::nullopt;
   }
 
  private:
-  /// Where parallax says, or depth, whichever knows better: depth is worth the parallax of the virtual stereo camera.
+  /// By triangulation or by depth, whichever has the larger parallax: that of depth is the virtual stereo camera's.
   [[nodiscard]] std::optional<vec3> place(std::uint32_t i, std::uint32_t j) const {
     const double of_a = stereo_parallax(a, i), of_b = stereo_parallax(b, j);
     const auto met = optimize::triangulate(a.T_world_camera, a.rays[i], b.T_world_camera, b.rays[j],
@@ -98,42 +98,42 @@ struct view_pair {
     if (std::max(of_a, of_b) > met.parallax) return of_a >= of_b ? a.point_world(i) : b.point_world(j);
     return met.ok() ? std::optional{met.point} : std::nullopt;
   }
-  [[nodiscard]] double stereo_parallax(const keyframe& k, std::uint32_t i) const {
-    return k.has_depth(i) ? model.bf / (focal * static_cast<double>(k.depth[i])) : 0.0;
+  [[nodiscard]] double stereo_parallax(const basic_keyframe<D>& k, std::uint32_t i) const {
+    return k.has_depth(i) ? rig.model.bf / (focal * static_cast<double>(k.depth[i])) : 0.0;
   }
 };
 
-/// Makes landmarks of keypoints of a keyframe that show none, and look like keypoints of its best neighbours that show
-/// none: both lie on each other's epipolar line. Such a point is where the rays meet, or, where either keypoint has
-/// depth that is worth more than the parallax, where that says. It becomes a landmark with both observations if
+/// Matches keypoints without a landmark of a keyframe with those of its best neighbours, along epipolar lines, and
+/// makes landmarks of the matches. The position is triangulated, or taken from the depth of either keypoint where that
+/// is more precise. A match becomes a landmark with both observations if
 ///  - it lies in front of both cameras;
-///  - the rays enclose enough of an angle (but where depth is used);
-///  - it projects to where both keypoints are (chi-square, 95 %), at their depth where they have it;
-///  - the keypoints' pyramid levels differ as its distances do.
-/// Returns how many it made. O(neighbours x keypoints^2) distances to lines. @pre m.has_keyframe(newest)
-template <camera::camera_model Camera>
-std::size_t triangulate_landmarks(map& m, keyframe_id newest, const optimize::reprojection<Camera>& model,
-                                  const pyramid_scales& scales, const triangulation_options& o = {}) {
+///  - the angle between the rays is large enough (not required where depth is used);
+///  - it agrees with both keypoints (chi-square, 95 %), and with their depth where they have it;
+///  - the ratio of its distances agrees with the keypoints' pyramid levels.
+/// Returns the number of new landmarks. O(neighbours x keypoints^2) distances to lines. @pre m.has_keyframe(newest)
+template <feature_descriptor D, camera::camera_model Camera>
+std::size_t triangulate_landmarks(basic_map<D>& m, keyframe_id newest, const camera_rig<Camera>& rig,
+                                  const triangulation_options& o = {}) {
   assert(m.has_keyframe(newest));
-  const double focal = detail::focal_length(model.camera);
+  const double focal = focal_length(rig.camera());
   if (!(focal > 0.0)) return 0;
-  const auto matcher = features::epipolar(features::hamming{}, {.distance = o.line_distance,
-                                                                .scale_factor = static_cast<float>(scales.factor()),
-                                                                .epipole_radius = o.epipole_radius}) |
+  const auto matcher = features::epipolar(distance_of_t<D>{}, {.distance = o.line_distance,
+                                                               .scale_factor = static_cast<float>(rig.scales.factor()),
+                                                               .epipole_radius = o.epipole_radius}) |
                        features::max_distance{o.distance} | features::ratio_test{o.ratio} | features::unique{} |
                        features::rotation_consistency{};
   typename decltype(matcher)::workspace memory;
   std::vector<features::match> matches;
-  detail::free_keypoints own, others;
+  free_keypoints<D> own, others;
   std::size_t made = 0;
-  const keyframe& k = m.at(newest);
+  const auto& k = m.at(newest);
   for (const covisible& n : m.covisibility().neighbors(newest, o.neighbors)) {
-    const keyframe& other = m.at(n.keyframe);
+    const auto& other = m.at(n.keyframe);
     const se3 T_other_k = other.T_world_camera.inverse() * k.T_world_camera;
     if (!(T_other_k.translation().norm() >= o.min_baseline)) continue;
     own.assign(k);
     others.assign(other);
-    const detail::view_pair<Camera> pair{model, scales, o, k, other, focal};
+    const view_pair<Camera, D> pair{rig, o, k, other, focal};
     matcher.match_into(matches, memory, own.features, others.features,
                        features::ray_geometry{own.rays, others.rays, T_other_k, focal});
     for (const features::match& found : matches) {
@@ -141,8 +141,8 @@ std::size_t triangulate_landmarks(map& m, keyframe_id newest, const optimize::re
       const auto point = pair.point(i, j);
       if (!point) continue;
       const landmark_id l = m.add_landmark(newest, i, *point);
-      m.observe(l, n.keyframe, j);
-      m.update(l);
+      m.add_observation(l, n.keyframe, j);
+      m.update_landmark(l);
       ++made;
     }
   }

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// What tracking, mapping and loop closing have in common, and the locks that keep them apart.
+/// What tracking, mapping and loop closing share, and the locks for it.
 #pragma once
 
-#include <atomic>
 #include <concepts>
 #include <cstddef>
 #include <mutex>
@@ -11,9 +10,8 @@
 #include <vector>
 
 #include <orbis/camera/model.hpp>
-#include <orbis/optimize/reprojection.hpp>
 #include <orbis/slam/atlas.hpp>
-#include <orbis/slam/detail/map/landmark_search.hpp>
+#include <orbis/slam/camera_rig.hpp>
 #include <orbis/slam/events.hpp>
 #include <orbis/slam/options.hpp>
 #include <orbis/slam/place_recognition.hpp>
@@ -21,27 +19,25 @@
 namespace orbis::slam::detail {
 
 /// Two locks, always taken in this order:
-///  - `edit()`: held by whoever changes maps in several steps (mapping of a keyframe, correction of a loop, global
-///    adjustment), so that only tracking adds to a map in between;
-///  - `lock()`: held by whoever reads or changes anything here, for a short time; never while solving, nor while
-///    listeners are called.
+///  - `edit()`: held while maps are changed in several steps (mapping of a keyframe, correction of a loop, global
+///    adjustment), so that between the steps only tracking adds to a map;
+///  - `lock()`: held while anything here is read or changed, for a short time; never while solving, nor while callbacks
+///    are called.
 ///
-/// Both are given in turn: who gives a lock back and wants it again at once, part by part, comes after who waits.
-template <camera::camera_model Camera, place_recognizer Places>
+/// Both are fair: a thread that releases a lock and takes it again, step by step, lets those that wait go first.
+template <camera::camera_model Camera, feature_descriptor D, place_recognizer<D> Places>
 struct shared_state {
-  shared_state(optimize::reprojection<Camera> model_, pyramid_scales scales_, const options& settings_, Places places_)
-      : model{std::move(model_)},
-        scales{scales_},
+  shared_state(camera_rig<Camera> rig_, const options& settings_, Places places_)
+      : rig{std::move(rig_)},
         settings{settings_},
-        atlas{scales.levels(), scales.factor()},
+        atlas{rig.scales.levels(), rig.scales.factor()},
         places{std::move(places_)} {}
 
-  const optimize::reprojection<Camera> model;
-  const pyramid_scales scales;
+  const camera_rig<Camera> rig;
   const options& settings;
-  listeners listening;
+  listeners callbacks;
 
-  slam::atlas atlas;
+  basic_atlas<D> atlas;
   Places places;
   std::size_t loops_closed = 0;
   std::size_t maps_merged = 0;
@@ -49,26 +45,24 @@ struct shared_state {
 
   [[nodiscard]] std::unique_lock<std::mutex> lock() const { return lock_fairly(next_map_mutex_, map_mutex_); }
   [[nodiscard]] std::unique_lock<std::mutex> edit() const { return lock_fairly(next_edit_mutex_, edit_mutex_); }
-  /// As `edit`, unless somebody has it.
+  /// As `edit`, without waiting: check whether the lock is owned.
   [[nodiscard]] std::unique_lock<std::mutex> try_edit() const {
     return std::unique_lock{edit_mutex_, std::try_to_lock};
   }
+  /// Calls `f` with `lock()` held.
   template <std::invocable F>
   decltype(auto) locked(F&& f) const {
     const auto held = lock();
     return std::forward<F>(f)();
   }
 
-  [[nodiscard]] bool has(map_keyframe k) const {
-    return atlas.contains(k.map) && atlas.at(k.map).has_keyframe(k.keyframe);
-  }
-  /// @pre has(k)
+  /// @pre atlas.has(k)
   [[nodiscard]] keyframe_event event_of(map_keyframe k) const {
-    const keyframe& frame = atlas.at(k.map).at(k.keyframe);
+    const auto& frame = atlas.at(k);
     return {k, frame.timestamp, frame.index, frame.T_world_camera};
   }
 
-  /// The keyframes that look most like an image, one of each place.
+  /// The keyframes with the most similar appearance, one of each place.
   template <std::predicate<map_keyframe> Exclude>
   [[nodiscard]] std::vector<map_keyframe> similar(const typename Places::signature& bow_vector, std::size_t count,
                                                   Exclude&& exclude) {
@@ -80,14 +74,15 @@ struct shared_state {
     });
   }
 
-  /// Drops a map with all that is known of it. @pre it is there, and not the active one
+  /// Removes a map and its keyframes. @pre it is there, and not the active one
   void remove_map(map_id id) {
-    for (const keyframe& k : atlas.at(id).keyframes()) places.erase({id, k.id});
+    for (const auto& k : atlas.at(id).keyframes()) places.erase({id, k.id});
     atlas.remove(id);
   }
 
  private:
-  /// Whoever is next holds `next` while it waits: a plain mutex may be taken again before those that wait wake up.
+  /// The thread that is next holds `next` while it waits: a plain mutex may be taken again before waiting threads wake
+  /// up.
   [[nodiscard]] static std::unique_lock<std::mutex> lock_fairly(std::mutex& next, std::mutex& mutex) {
     const std::lock_guard first{next};
     return std::unique_lock{mutex};

@@ -7,9 +7,10 @@
 
 namespace orbis::slam::detail {
 
-/// Time between laps.
+/// Measures the time between calls of `lap`.
 class stopwatch {
  public:
+  /// Sets `milliseconds` to the time since the last call, or since the construction.
   void lap(double& milliseconds) {
     const auto now = std::chrono::steady_clock::now();
     milliseconds = std::chrono::duration<double, std::milli>(now - last_).count();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A thread that works on what it is given, one after the other.
+/// A thread with a queue of jobs.
 #pragma once
 
 #include <concepts>
@@ -14,8 +14,8 @@
 
 namespace orbis::slam::detail {
 
-/// Jobs are done in the order in which they come. `stop` and the destructor let the job at hand end, and drop those
-/// that wait. A job that asks its own worker by a pointer finds none while that is reset: stop the worker before.
+/// Calls `work` for each job, in the order in which they are pushed. `stop` and the destructor wait for the running job
+/// and drop the others. While jobs use a pointer to their worker, call `stop` before the pointer is reset.
 /// @pre `work` does not throw
 template <std::movable Job>
 class worker {
@@ -25,7 +25,7 @@ class worker {
   worker& operator=(const worker&) = delete;
   ~worker() { stop(); }
 
-  /// Returns when the job at hand is done; no other one is begun any more. Not to be called by a job.
+  /// Waits for the running job; no other one is begun any more. Not to be called by a job.
   void stop() {
     {
       const std::lock_guard lock(mutex_);
@@ -35,7 +35,7 @@ class worker {
     if (thread_.joinable()) thread_.join();
   }
 
-  /// Once it is stopped, jobs are dropped.
+  /// Appends a job; drops it after `stop`.
   void push(Job job) {
     {
       const std::lock_guard lock(mutex_);
@@ -45,22 +45,22 @@ class worker {
     changed_.notify_all();
   }
 
-  /// How many jobs wait, without the one at hand.
+  /// The number of jobs in the queue, without the running one.
   [[nodiscard]] std::size_t waiting() const {
     const std::lock_guard lock(mutex_);
     return jobs_.size();
   }
-  /// Whether there is nothing to do.
+  /// Whether no job runs or waits.
   [[nodiscard]] bool idle() const {
     const std::lock_guard lock(mutex_);
     return jobs_.empty() && !busy_;
   }
-  /// Returns when fewer than `count` jobs wait.
+  /// Waits until fewer than `count` jobs are in the queue.
   void wait_for_room(std::size_t count) const {
     std::unique_lock lock(mutex_);
     changed_.wait(lock, [&] { return jobs_.size() < count; });
   }
-  /// Returns when there is nothing to do.
+  /// Waits until no job runs or waits.
   void wait() const {
     std::unique_lock lock(mutex_);
     changed_.wait(lock, [&] { return jobs_.empty() && !busy_; });
@@ -72,7 +72,7 @@ class worker {
     for (;;) {
       changed_.wait(lock, [&] { return ends_ || !jobs_.empty(); });
       if (ends_) {
-        jobs_.clear();  // so that nobody waits for them
+        jobs_.clear();  // nobody shall wait for them
         changed_.notify_all();
         return;
       }

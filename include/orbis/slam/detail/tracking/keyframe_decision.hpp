@@ -11,22 +11,24 @@
 
 namespace orbis::slam::detail {
 
-/// What the decision rests on.
+/// What the decision depends on.
 struct keyframe_evidence {
   double since = 0.0;               ///< the last keyframe, seconds
-  double moved = 0.0;               ///< metres since then
-  double turned = 0.0;              ///< radians since then
+  double moved = 0.0;               ///< since then, metres
+  double turned = 0.0;              ///< since then, radians
   std::size_t inliers = 0;          ///< landmarks tracked in the frame
-  std::size_t reference = 0;        ///< landmarks of the reference keyframe that others see as well
-  std::size_t close_tracked = 0;    ///< close keypoints that show a landmark
-  std::size_t close_untracked = 0;  ///< close keypoints that could become one
-  std::size_t keyframes = 0;        ///< in the map
+  std::size_t reference = 0;        ///< landmarks of the reference keyframe that other keyframes observe as well
+  std::size_t close_tracked = 0;    ///< close keypoints that observe a landmark
+  std::size_t close_untracked = 0;  ///< close keypoints that could become landmarks
+  std::size_t keyframes = 0;        ///< of the map
 };
 
-[[nodiscard]] inline keyframe_evidence gather_evidence(const map& m, const frame& f, keyframe_id reference,
-                                                       std::size_t inliers, const options& o) {
+/// @pre the map has keyframes, and `reference` is one
+template <feature_descriptor D>
+[[nodiscard]] keyframe_evidence gather_evidence(const basic_map<D>& m, const basic_frame<D>& f, keyframe_id reference,
+                                                std::size_t inliers, const options& o) {
   keyframe_evidence e;
-  const keyframe& last = m.keyframes().back();
+  const auto& last = m.keyframes().back();
   e.since = f.timestamp - last.timestamp;
   const se3 motion = last.T_world_camera.inverse() * f.T_world_camera;
   e.moved = motion.translation().norm();
@@ -43,9 +45,8 @@ struct keyframe_evidence {
   return e;
 }
 
-/// A keyframe is due when the view has changed much, when too little of what is close is in the map,
-/// or when the last one is a while ago and the camera has moved; never where the pose itself is in
-/// doubt. A camera at rest makes no keyframes.
+/// A keyframe is due when the view has changed much, when too few of the close keypoints observe landmarks, or when the
+/// last keyframe is some time ago and the camera has moved. Never with too few inliers, and never for a camera at rest.
 [[nodiscard]] inline bool is_keyframe_due(const keyframe_evidence& e, const keyframe_options& o) {
   if (e.inliers <= o.min_inliers) return false;
   const double ratio = e.keyframes < 2 ? o.inlier_ratio_start : o.inlier_ratio;

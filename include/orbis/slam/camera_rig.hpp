@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// The camera as the SLAM system uses it: its model, its image pyramid, and how much its depth is worth.
+#pragma once
+
+#include <utility>
+
+#include <orbis/camera/model.hpp>
+#include <orbis/core/se3.hpp>
+#include <orbis/optimize/reprojection.hpp>
+#include <orbis/slam/options.hpp>
+#include <orbis/slam/pyramid_scales.hpp>
+
+namespace orbis::slam {
+
+/// A camera with the settings that observations depend on.
+template <camera::camera_model Camera>
+struct camera_rig {
+  optimize::reprojection<Camera> model;  ///< the camera, and `bf`, which weights depth (see `options::bf`)
+  pyramid_scales scales{};               ///< of the extractor's image pyramid
+  double min_depth = 0.1;                ///< metres; depth outside of min_depth ... max_depth is not used
+  double max_depth = 10.0;               ///< metres
+
+  [[nodiscard]] const Camera& camera() const noexcept { return model.camera; }
+  /// The standard deviation of a depth (metres) that was measured at a keypoint of a pyramid level, metres.
+  [[nodiscard]] double depth_deviation(double depth, int octave) const {
+    return depth * depth / model.bf * scales.scale(octave);
+  }
+};
+
+template <class Camera>
+camera_rig(optimize::reprojection<Camera>, pyramid_scales) -> camera_rig<Camera>;
+
+/// The rig of a camera with the settings of a system.
+template <camera::camera_model Camera>
+[[nodiscard]] camera_rig<Camera> make_rig(Camera camera, const options& settings) {
+  return {{std::move(camera), settings.bf},
+          {settings.features.levels, static_cast<double>(settings.features.scale_factor)},
+          settings.min_depth,
+          settings.max_depth};
+}
+
+}  // namespace orbis::slam

@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Writes the sections of a map's file. `map_file.hpp` describes the format.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+#include <orbis/slam/detail/map/file_sections.hpp>
+#include <orbis/slam/detail/map/map_content.hpp>
+#include <orbis/slam/map.hpp>
+
+namespace orbis::slam::detail {
+
+inline constexpr std::string_view map_magic = "orbismap";
+inline constexpr std::uint32_t map_version = 1;
+inline void put_pose(std::string& to, const se3& pose) {
+  const auto& q = pose.rotation().unit_quaternion();
+  put(to, pose.translation().x(), pose.translation().y(), pose.translation().z(), q.x(), q.y(), q.z(), q.w());
+}
+inline void put_descriptor(std::string& to, const features::binary_descriptor<256>& d) {
+  for (const std::uint64_t w : d.words) put(to, w);
+}
+inline void put_keyframe(std::string& to, const keyframe& k) {
+  put(to, k.timestamp, std::uint64_t{k.index});
+  put_pose(to, k.T_world_camera);
+  put(to, static_cast<std::uint32_t>(k.size()));
+  for (std::size_t i = 0; i != k.size(); ++i) {
+    const features::keypoint& p = k.features.keypoints[i];
+    put(to, p.x, p.y, p.size, p.angle, p.response, std::int32_t{p.octave}, k.depth[i], k.rays[i].x(), k.rays[i].y());
+    put_descriptor(to, k.features.descriptors[i]);
+  }
+}
+
+inline void put_landmark(std::string& to, const landmark& l) {
+  for (const vec3& v : {l.position, l.normal}) put(to, v.x(), v.y(), v.z());
+  put(to, l.min_distance, l.max_distance);
+  put_descriptor(to, l.descriptor);
+  put(to, l.created.value(), l.visible, l.found, static_cast<std::uint8_t>(l.has_current_descriptor));
+  for (const observation& o : l.observations) put(to, o.keyframe.value(), o.feature);
+}
+
+/// The whole file.
+[[nodiscard]] inline std::string write_sections(const map& m) {
+  std::string bytes(map_magic);
+  put(bytes, map_version);
+  put_section(bytes, "size", [&](std::string& to) {
+    const auto& all = m.content();
+    put(to, static_cast<std::uint32_t>(all.levels), all.min_shared, all.scale_factor, m.keyframe_end().value(),
+        m.landmark_end().value());
+  });
+  put_section(bytes, "kfrm", [&](std::string& to) {
+    for (keyframe_id id = 0; id != m.keyframe_end(); ++id) {
+      put(to, static_cast<std::uint8_t>(m.has_keyframe(id)));
+      if (m.has_keyframe(id)) {
+        put_keyframe(to, m.at(id));
+      } else {
+        const erased_keyframe& e = m.content().erased.at(id);
+        put(to, e.replacement.value());
+        put_pose(to, e.T_replacement_camera);
+      }
+    }
+  });
+  put_section(bytes, "tree", [&](std::string& to) {
+    for (const keyframe& k : m.keyframes()) {
+      const auto& loops = m.tree().loop_edges(k.id);
+      put(to, m.tree().parent(k.id).value(), static_cast<std::uint32_t>(loops.size()));
+      for (const keyframe_id other : loops) put(to, other.value());
+    }
+  });
+  put_section(bytes, "land", [&](std::string& to) {
+    for (landmark_id id = 0; id != m.landmark_end(); ++id) {
+      if (m.has_landmark(id)) {
+        put(to, static_cast<std::uint32_t>(m.landmark_at(id).observations.size()));
+        put_landmark(to, m.landmark_at(id));
+      } else {
+        put(to, std::uint32_t{0}, m.replacement_of(id).value());
+      }
+    }
+  });
+  return bytes;
+}
+
+}  // namespace orbis::slam::detail

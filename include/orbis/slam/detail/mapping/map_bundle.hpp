@@ -1,0 +1,171 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// A part of a map as a bundle adjustment problem: copied out of the map, solved, and without outliers solved again.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include <orbis/camera/model.hpp>
+#include <orbis/core/execution.hpp>
+#include <orbis/core/progress.hpp>
+#include <orbis/core/se3.hpp>
+#include <orbis/core/types.hpp>
+#include <orbis/optimize/bundle_adjustment.hpp>
+#include <orbis/optimize/bundle_problem.hpp>
+#include <orbis/optimize/reprojection.hpp>
+#include <orbis/optimize/robust_loss.hpp>
+#include <orbis/slam/camera_rig.hpp>
+#include <orbis/slam/detail/map/point_observation.hpp>
+#include <orbis/slam/map.hpp>
+
+namespace orbis::slam::detail {
+
+/// Keyframes, landmarks and observations of a map, as arrays.
+struct bundle_snapshot {
+  std::vector<keyframe_id> keyframes;                      ///< ascending
+  std::vector<std::uint8_t> is_fixed;                      ///< by keyframe: 1 if its pose is held
+  std::vector<se3> poses;                                  ///< by keyframe: `T_world_camera`
+  std::vector<landmark_id> landmarks;                      ///< ascending
+  std::vector<vec3> points;                                ///< by landmark: in the world, metres
+  std::vector<optimize::bundle_observation> observations;  ///< `pose` and `point` index the arrays above
+  std::vector<observation> sources;                        ///< of each of these, the keyframe and keypoint
+  keyframe_id end_keyframe = 0;                            ///< ids from here on were added to the map later
+  landmark_id end_landmark = 0;
+
+  /// Whether there is nothing to adjust.
+  [[nodiscard]] bool empty() const noexcept { return observations.empty(); }
+
+  /// Empties the arrays and keeps their memory.
+  void clear() {
+    keyframes.clear();
+    is_fixed.clear();
+    poses.clear();
+    landmarks.clear();
+    points.clear();
+    observations.clear();
+    sources.clear();
+  }
+  void add_keyframe(keyframe_id k, const se3& T_world_camera, bool fixed) {
+    keyframes.push_back(k);
+    poses.push_back(T_world_camera);
+    is_fixed.push_back(fixed ? 1 : 0);
+  }
+  /// Adds a landmark with the observations by keyframes for which `index_of(id)` gives an index, not `no_id`.
+  template <feature_descriptor D, camera::camera_model Camera, class IndexOf>
+  void add_landmark(const basic_map<D>& m, const basic_landmark<D>& l, const camera_rig<Camera>& rig,
+                    IndexOf&& index_of) {
+    const auto point = static_cast<std::uint32_t>(points.size());
+    landmarks.push_back(l.id);
+    points.push_back(l.position);
+    for (const observation& seen : l.observations) {
+      const std::uint32_t pose = index_of(seen.keyframe);
+      if (pose == no_id) continue;
+      const auto at = observation_of<Camera, D>(rig, m.at(seen.keyframe), seen.feature, l.position);
+      observations.push_back({pose, point, at.pixel, at.right, at.information});
+      sources.push_back(seen);
+    }
+  }
+};
+
+/// The result of an adjustment, index by index as the snapshot.
+struct bundle_solution {
+  std::vector<se3> poses;
+  std::vector<vec3> points;
+  std::vector<std::uint8_t> outliers;  ///< by observation: 1 if it disagrees with the result
+  bool usable = false;                 ///< whether poses and points are valid, and better than before
+  bool complete = false;               ///< false if it was stopped, or failed
+  int iterations = 0;
+  double initial_cost = 0.0;  ///< half the robust sum of squared errors
+  double final_cost = 0.0;    ///< the same at the end, without outliers
+
+  [[nodiscard]] std::size_t outlier_count() const noexcept {
+    return static_cast<std::size_t>(std::count(outliers.begin(), outliers.end(), 1));
+  }
+};
+
+struct bundle_schedule {
+  int robust_iterations = 5;  ///< with all observations, at most
+  int iterations = 5;         ///< without the outliers, at most
+  double relative_tolerance = 1e-6;
+  bool keep_partial = false;  ///< whether the result so far is used if the adjustment is stopped
+};
+
+/// Solves snapshots. It keeps its memory: the next problem allocates next to nothing if it is not larger.
+template <camera::camera_model Camera>
+class bundle_solver {
+ public:
+  explicit bundle_solver(const optimize::reprojection<Camera>& model, optimize::huber loss = {})
+      : adjuster_{model, loss} {}
+
+  /// `go_on(iteration, iterations)` is asked before each step; if it returns false, the adjustment stops. Nothing is
+  /// called an outlier before the first half is complete. `memory`: a former solution, whose memory is used again. The
+  /// result is the same for every policy.
+  template <execution_policy Policy = sequential_policy>
+  [[nodiscard]] bundle_solution solve(const bundle_snapshot& s, const bundle_schedule& schedule,
+                                      const progress& go_on = {}, bundle_solution memory = {},
+                                      const Policy& policy = seq);
+
+ private:
+  /// Marks the observations that disagree with the present poses and points.
+  void find_outliers(const bundle_snapshot& s, bundle_solution& to) {
+    squared_.resize(s.observations.size());
+    adjuster_.chi2(to.poses, to.points, s.observations, squared_);
+    for (std::size_t i = 0; i != s.observations.size(); ++i)
+      to.outliers[i] = squared_[i] > error_limit(!std::isnan(s.observations[i].right)) ? 1 : 0;
+  }
+
+  optimize::bundle_adjuster<optimize::reprojection<Camera>> adjuster_;
+  std::vector<double> squared_;
+};
+
+template <camera::camera_model Camera>
+template <execution_policy Policy>
+bundle_solution bundle_solver<Camera>::solve(const bundle_snapshot& s, const bundle_schedule& schedule,
+                                             const progress& go_on, bundle_solution memory, const Policy& policy) {
+  bundle_solution result = std::move(memory);
+  result.poses.assign(s.poses.begin(), s.poses.end());
+  result.points.assign(s.points.begin(), s.points.end());
+  result.outliers.assign(s.observations.size(), 0);
+  result.usable = schedule.keep_partial;
+  result.complete = false;
+  const auto first_total = static_cast<std::size_t>(std::max(0, schedule.robust_iterations));
+  const std::size_t total = first_total + static_cast<std::size_t>(std::max(0, schedule.iterations));
+  if (schedule.keep_partial && !go_on(0, total)) return result;
+  std::size_t before = 0;
+  const auto step = [&](std::size_t done, std::size_t) { return go_on(before + done, total); };
+  const auto accept = [&](const optimize::bundle_summary& summary) {
+    const bool cancelled = summary.status == optimize::bundle_status::cancelled;
+    result.usable = !optimize::is_failure(summary.status) && (!cancelled || schedule.keep_partial);
+    return result.usable && !cancelled;
+  };
+  const auto robust = adjuster_.solve(policy, std::span<se3>(result.poses), std::span<vec3>(result.points),
+                                      std::span<const optimize::bundle_observation>(s.observations),
+                                      {.max_iterations = schedule.robust_iterations,
+                                       .relative_tolerance = schedule.relative_tolerance,
+                                       .fixed_poses = s.is_fixed},
+                                      step);
+  if (!accept(robust)) return result;
+  find_outliers(s, result);
+  before = first_total;
+  const auto last = adjuster_.solve_again(policy, std::span<se3>(result.poses), std::span<vec3>(result.points),
+                                          {.max_iterations = schedule.iterations,
+                                           .relative_tolerance = schedule.relative_tolerance,
+                                           .fixed_poses = s.is_fixed,
+                                           .ignored = result.outliers},
+                                          step);
+  result.complete = accept(last);
+  if (!result.usable) return result;
+  find_outliers(s, result);
+  result.iterations = robust.iterations + last.iterations;
+  result.initial_cost = robust.initial_cost;
+  result.final_cost = last.final_cost;
+  return result;
+}
+
+}  // namespace orbis::slam::detail

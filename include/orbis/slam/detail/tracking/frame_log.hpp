@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// The tracked frames, each relative to a keyframe, so that they follow later corrections.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <map>
+#include <vector>
+
+#include <orbis/core/se3.hpp>
+#include <orbis/core/trajectory.hpp>
+#include <orbis/slam/atlas.hpp>
+#include <orbis/slam/ids.hpp>
+
+namespace orbis::slam::detail {
+
+struct logged_frame {
+  double timestamp = 0.0;  ///< seconds
+  map_keyframe reference;
+  se3 T_reference_camera;
+};
+
+class frame_log {
+ public:
+  void add(const logged_frame& f) { frames_.push_back(f); }
+
+  /// The present poses of the frames that were tracked in a map, or in one that was merged into it. Empty if there is
+  /// no such map. O(frames).
+  template <feature_descriptor D>
+  [[nodiscard]] orbis::trajectory trajectory(const basic_atlas<D>& maps, map_id map) const {
+    orbis::trajectory all;
+    for (const logged_frame& f : frames_) {
+      const map_keyframe k = maps.current(f.reference);
+      if (k.map == map && maps.contains(map))
+        all.push_back({f.timestamp, maps.at(map).pose_of(k.keyframe) * f.T_reference_camera});
+    }
+    return all;
+  }
+
+  /// The map with most frames, the oldest where equal; the active map if there are no frames. O(frames).
+  template <feature_descriptor D>
+  [[nodiscard]] map_id largest_map(const basic_atlas<D>& maps) const {
+    std::map<map_id, std::size_t> frames;
+    for (const logged_frame& f : frames_)
+      if (const map_id m = maps.current(f.reference).map; maps.contains(m)) ++frames[m];
+    const auto most = std::max_element(frames.begin(), frames.end(),
+                                       [](const auto& a, const auto& b) { return a.second < b.second; });
+    return most == frames.end() ? maps.active_id() : most->first;
+  }
+
+ private:
+  std::vector<logged_frame> frames_;
+};
+
+}  // namespace orbis::slam::detail

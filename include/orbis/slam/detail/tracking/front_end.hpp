@@ -1,0 +1,234 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// The front end: localises frames in the active map and decides on keyframes.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include <orbis/camera/model.hpp>
+#include <orbis/core/se3.hpp>
+#include <orbis/slam/atlas.hpp>
+#include <orbis/slam/camera_rig.hpp>
+#include <orbis/slam/detail/map/local_map.hpp>
+#include <orbis/slam/detail/mapping/keyframe_insertion.hpp>
+#include <orbis/slam/detail/tracking/frame_log.hpp>
+#include <orbis/slam/detail/tracking/keyframe_decision.hpp>
+#include <orbis/slam/detail/tracking/motion_model.hpp>
+#include <orbis/slam/detail/tracking/tracker.hpp>
+#include <orbis/slam/ids.hpp>
+#include <orbis/slam/matchers.hpp>
+#include <orbis/slam/options.hpp>
+#include <orbis/slam/sensor.hpp>
+#include <orbis/slam/track_result.hpp>
+
+namespace orbis::slam::detail {
+
+/// Tracks the frames of one camera. It takes no lock: the caller makes sure that the maps are not changed during a
+/// call. For each frame, in this order: `sync_with_map`, `localize`, `update_reference` and, if `needs_keyframe`,
+/// `make_keyframe`, then `finish`.
+///
+/// The scheme is that of R. Mur-Artal, J. D. Tardos, "ORB-SLAM2", T-RO 33 (2017), section III.
+template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
+class front_end {
+ public:
+  using frame_type = basic_frame<D>;
+  using atlas_type = basic_atlas<D>;
+
+  front_end(const camera_rig<Camera>& rig, const options& settings) : tracker_{rig, settings}, options_{settings} {}
+
+  [[nodiscard]] track_state state() const noexcept { return state_; }
+  [[nodiscard]] bool is_tracking() const noexcept {
+    return state_ == track_state::tracking || state_ == track_state::relocalized;
+  }
+  /// Counts over all frames; those of mapping are not filled in.
+  [[nodiscard]] const track_counters& counters() const noexcept { return counters_; }
+  /// All tracked frames.
+  [[nodiscard]] const frame_log& log() const noexcept { return log_; }
+  [[nodiscard]] double last_timestamp() const noexcept { return last_.timestamp; }
+  /// The present pose of the last tracked frame: later corrections of its keyframe move it.
+  [[nodiscard]] se3 last_pose(const atlas_type& maps) const;
+
+  /// The active map was changed from outside: the camera is searched for in it.
+  void set_lost() {
+    state_ = track_state::lost;
+    lost_since_.reset();
+  }
+
+  /// Brings ids and poses that are kept from the last frame to the state of the maps, which may have been merged,
+  /// corrected and culled since.
+  void sync_with_map(const atlas_type& maps);
+
+  /// Estimates the pose of a frame and sets `state()`. Returns the number of landmarks that agree with the pose (of
+  /// points with depth, if the frame begins a map), 0 if it has none. `is_frozen`: nothing is changed in the maps, and
+  /// no map is begun. `similar(features, count)`: the keyframes with the most similar appearance, as ids; `drop(map)`:
+  /// called for a map that is left behind with few keyframes.
+  template <class Similar, class Drop>
+  std::size_t localize(frame_type& f, atlas_type& maps, bool is_frozen, Similar&& similar, Drop&& drop);
+
+  /// Makes the keyframe that shares most landmarks with the frame the reference.
+  void update_reference(const frame_type& f, const atlas_type& maps) {
+    if (!maps.active().keyframes().empty())
+      reference_ = {maps.active_id(), most_shared(maps.active(), f, reference_.keyframe)};
+  }
+  /// Whether a localised frame should become a keyframe.
+  [[nodiscard]] bool needs_keyframe(const frame_type& f, std::size_t inliers, const atlas_type& maps) const {
+    return maps.active().keyframes().empty() ||
+           is_keyframe_due(gather_evidence(maps.active(), f, reference_.keyframe, inliers, options_),
+                           options_.keyframes);
+  }
+  /// Adds a frame to the active map as a keyframe, which becomes the reference.
+  map_keyframe make_keyframe(frame_type& f, atlas_type& maps) {
+    const keyframe_id id = insert_keyframe(maps.active(), f, options_);
+    f.landmarks = maps.active().at(id).landmarks;
+    return reference_ = {maps.active_id(), id};
+  }
+
+  /// Counts a frame and, if it was localised, keeps it for the next prediction and in the log.
+  void finish(frame_type f, const atlas_type& maps);
+
+ private:
+  /// Begins the active map with a frame, if the sensor says that it can. Returns the number of its points.
+  std::size_t begin_map(frame_type& f);
+  /// Begins a new map, which becomes the active one.
+  template <class Drop>
+  std::size_t begin_new_map(frame_type& f, atlas_type& maps, Drop&& drop);
+  /// From the last frame, otherwise from the reference keyframe; refined on the local map.
+  std::size_t track_from_last(frame_type& f, atlas_type& maps, bool is_frozen);
+  /// From the reference and the keyframes with similar appearance, in any map.
+  template <class Similar>
+  std::size_t relocalize(frame_type& f, atlas_type& maps, bool is_frozen, Similar&& similar);
+  std::size_t track_local_map(frame_type& f, basic_map<D>& m, double radius, bool is_frozen) {
+    return tracker_.on_local_map(
+        f, m, reference_.keyframe, radius, [&](landmark_id l) { is_frozen ? void() : m.count_visible(l); },
+        [&](landmark_id l) { is_frozen ? void() : m.count_found(l); });
+  }
+
+  tracker<Camera, D, Matchers> tracker_;
+  const options& options_;
+
+  track_state state_ = track_state::not_started;
+  std::optional<double> lost_since_;  ///< time stamp; empty: since the next frame
+  map_keyframe reference_;            ///< the keyframe that the current frame shares most with
+  frame_type last_;                   ///< the last frame that was tracked
+  map_keyframe last_reference_;       ///< its reference ...
+  se3 T_reference_last_;              ///< ... and its pose relative to that
+  motion_model motion_;
+  track_counters counters_;
+  frame_log log_;
+};
+
+template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
+se3 front_end<Camera, D, Matchers, Sensor>::last_pose(const atlas_type& maps) const {
+  const map_keyframe k = maps.current(last_reference_);
+  return maps.contains(k.map) && k.keyframe < maps.at(k.map).keyframe_end()
+             ? maps.at(k.map).pose_of(k.keyframe) * T_reference_last_
+             : last_.T_world_camera;
+}
+
+template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
+void front_end<Camera, D, Matchers, Sensor>::sync_with_map(const atlas_type& maps) {
+  const map_keyframe now = maps.current(reference_);
+  if (now.map != reference_.map)
+    for (landmark_id& l : last_.landmarks)
+      if (l != no_id) l = maps.current(reference_.map, l);
+  reference_ = now;
+  if (!maps.contains(now.map)) return;
+  last_.T_world_camera = last_pose(maps);
+  reference_.keyframe = maps.at(now.map).replacement_of(now.keyframe);
+}
+
+template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
+template <class Similar, class Drop>
+std::size_t front_end<Camera, D, Matchers, Sensor>::localize(frame_type& f, atlas_type& maps, bool is_frozen,
+                                                             Similar&& similar, Drop&& drop) {
+  if (state_ == track_state::not_started) return is_frozen ? 0 : begin_map(f);
+  if (is_tracking())
+    if (const std::size_t inliers = track_from_last(f, maps, is_frozen); inliers > 0) return inliers;
+  if (const std::size_t inliers = relocalize(f, maps, is_frozen, similar); inliers > 0) return inliers;
+  if (is_tracking()) lost_since_ = last_.timestamp;
+  if (!lost_since_) lost_since_ = f.timestamp;
+  state_ = track_state::lost;
+  if (is_frozen || f.timestamp - *lost_since_ < options_.recovery.new_map_after) return 0;
+  return begin_new_map(f, maps, drop);
+}
+
+template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
+std::size_t front_end<Camera, D, Matchers, Sensor>::begin_map(frame_type& f) {
+  const std::size_t points = Sensor::begins_map(f, options_);
+  if (points == 0) return 0;
+  f.T_world_camera = options_.initial_pose.value_or(se3{});
+  state_ = track_state::tracking;
+  return points;
+}
+
+template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
+template <class Drop>
+std::size_t front_end<Camera, D, Matchers, Sensor>::begin_new_map(frame_type& f, atlas_type& maps, Drop&& drop) {
+  const std::size_t points = begin_map(f);
+  if (points == 0) return 0;
+  const map_id before = maps.active_id();
+  maps.create();
+  if (maps.at(before).keyframes().size() < options_.recovery.min_map_keyframes) drop(before);
+  last_ = {};
+  motion_.reset();
+  return points;
+}
+
+template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
+std::size_t front_end<Camera, D, Matchers, Sensor>::track_from_last(frame_type& f, atlas_type& maps, bool is_frozen) {
+  const se3 predicted = motion_.predict({last_.timestamp, last_.T_world_camera}, f.timestamp);
+  if (tracker_.by_motion(f, maps.active(), last_, predicted) == 0 &&
+      tracker_.by_appearance(f, maps.active(), reference_.keyframe) == 0)
+    return 0;
+  const std::size_t inliers = track_local_map(f, maps.active(), options_.search_radius, is_frozen);
+  if (inliers < options_.min_inliers) return 0;
+  state_ = track_state::tracking;
+  return inliers;
+}
+
+template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
+template <class Similar>
+std::size_t front_end<Camera, D, Matchers, Sensor>::relocalize(frame_type& f, atlas_type& maps, bool is_frozen,
+                                                               Similar&& similar) {
+  std::vector<map_keyframe> candidates = similar(f.features, options_.recovery.candidates);
+  if (reference_.map == maps.active_id() && maps.active().has_keyframe(reference_.keyframe) &&
+      std::find(candidates.begin(), candidates.end(), reference_) == candidates.end())
+    candidates.insert(candidates.begin(), reference_);
+  const map_id active_before = maps.active_id();
+  const map_keyframe reference_before = reference_;
+  for (const map_keyframe& k : candidates) {
+    if (tracker_.by_appearance(f, maps.at(k.map), k.keyframe) == 0) continue;
+    maps.activate(k.map);
+    reference_ = k;
+    const std::size_t inliers = track_local_map(f, maps.active(), 3.0 * options_.search_radius, is_frozen);
+    if (inliers >= options_.recovery.min_inliers) {
+      state_ = track_state::relocalized;
+      return inliers;
+    }
+  }
+  maps.activate(active_before);
+  reference_ = reference_before;
+  return 0;
+}
+
+template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
+void front_end<Camera, D, Matchers, Sensor>::finish(frame_type f, const atlas_type& maps) {
+  ++counters_.frames;
+  counters_.tracked += is_tracking();
+  counters_.relocalized += state_ == track_state::relocalized;
+  counters_.lost += state_ == track_state::lost;
+  motion_.reset();
+  if (!is_tracking()) return;
+  if (last_.index + 1 == f.index && state_ == track_state::tracking && last_.size() != 0)
+    motion_.set({last_.timestamp, last_.T_world_camera}, {f.timestamp, f.T_world_camera});
+  last_reference_ = reference_;
+  T_reference_last_ = maps.active().at(reference_.keyframe).T_world_camera.inverse() * f.T_world_camera;
+  log_.add({f.timestamp, last_reference_, T_reference_last_});
+  last_ = std::move(f);
+}
+
+}  // namespace orbis::slam::detail

@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Sensors: what a frame measures for each feature, and when a map can begin.
+#pragma once
+
+#include <concepts>
+#include <cstddef>
+#include <limits>
+#include <optional>
+
+#include <orbis/camera/depth.hpp>
+#include <orbis/camera/model.hpp>
+#include <orbis/core/image.hpp>
+#include <orbis/features/depth.hpp>
+#include <orbis/slam/camera_rig.hpp>
+#include <orbis/slam/extractor.hpp>
+#include <orbis/slam/frame.hpp>
+#include <orbis/slam/options.hpp>
+
+namespace orbis::slam {
+
+/// A kind of sensor, as a compile-time policy of the SLAM system: a type without state, with
+///  - `S::measure(rig, extract, images...)`: a frame with its features, their rays, and what the sensor measures for
+///  each
+///    (its depth, 0 where there is none); `images...` are those that the sensor takes at one moment;
+///  - `S::begins_map(frame, options)`: the number of points with which this frame can begin a map; 0 if it cannot.
+template <class S, class D>
+concept sensor = feature_descriptor<D> && requires(const basic_frame<D>& f, const options& settings) {
+  { S::begins_map(f, settings) } -> std::convertible_to<std::size_t>;
+};
+
+/// Whether a sensor makes frames of these images.
+template <class S, class Camera, class Extractor, class... Images>
+concept measures = requires(const camera_rig<Camera>& rig, const Extractor& extract, const Images&... images) {
+  { S::measure(rig, extract, images...) } -> std::same_as<basic_frame<descriptor_of_t<Extractor>>>;
+};
+
+/// A colour image with a registered depth image. The first frame with enough depth begins a map.
+struct rgbd {
+  /// Extracts features and reads their depth. Depth outside of the rig's range is not used. @pre all images have the
+  /// size of the camera
+  template <camera::camera_model Camera, feature_extractor Extractor, camera::depth_source Depth>
+  [[nodiscard]] static basic_frame<descriptor_of_t<Extractor>> measure(const camera_rig<Camera>& rig,
+                                                                       const Extractor& extract,
+                                                                       image_view<const rgb8> color,
+                                                                       const Depth& depth);
+
+  /// The number of features with depth, if there are `settings.min_start_points` or more, otherwise 0.
+  template <feature_descriptor D>
+  [[nodiscard]] static std::size_t begins_map(const basic_frame<D>& f, const options& settings) {
+    std::size_t with_depth = 0;
+    for (std::size_t i = 0; i < f.size(); ++i) with_depth += f.has_depth(i);
+    return with_depth < settings.min_start_points ? 0 : with_depth;
+  }
+};
+
+template <camera::camera_model Camera, feature_extractor Extractor, camera::depth_source Depth>
+basic_frame<descriptor_of_t<Extractor>> rgbd::measure(const camera_rig<Camera>& rig, const Extractor& extract,
+                                                      image_view<const rgb8> color, const Depth& depth) {
+  const auto usable = [&](double z) { return z >= rig.min_depth && z <= rig.max_depth; };
+  basic_frame<descriptor_of_t<Extractor>> f;
+  f.features = extract(color);
+  const std::size_t n = f.features.size();
+  f.depth.resize(n);
+  f.rays.resize(n);
+  f.landmarks.assign(n, no_id);
+  for (std::size_t i = 0; i < n; ++i) {
+    const auto& k = f.features.keypoints[i];
+    const auto ray = rig.camera().unproject(vec2(k.x, k.y));
+    f.rays[i] = ray.value_or(vec3::Constant(std::numeric_limits<double>::quiet_NaN()));
+    const auto z = ray ? features::depth_at(depth, k.x, k.y) : std::nullopt;
+    f.depth[i] = z && usable(z->z) ? static_cast<float>(z->z) : 0.0F;
+  }
+  f.grid = features::keypoint_grid(f.features.keypoints);
+  return f;
+}
+
+}  // namespace orbis::slam

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <orbis/core/random.hpp>
+#include <orbis/slam/detail/tracking/frame_log.hpp>
+
+#include "slam/random_map.hpp"
+#include "support/catch.hpp"
+
+using namespace orbis;
+
+TEST_CASE("Frames follow their keyframe, through erasing and merging, and are listed by map") {
+  random_bits random(3);
+  slam::atlas maps(8, 1.2);
+  const slam::map_id first = maps.active_id();
+  for (int i = 0; i < 3; ++i) test::add_random_keyframe(random, maps.active(), 30, 20);
+  const slam::map_id second = maps.create();
+  for (int i = 0; i < 3; ++i) test::add_random_keyframe(random, maps.active(), 30, 20);
+
+  const se3 T(so3{}, vec3(0.5, 0, 0));
+  slam::detail::frame_log log;
+  CHECK(log.largest_map(maps) == second);  // the active one, for want of frames
+  log.add({1.0, {first, 1}, T});
+  log.add({2.0, {second, 1}, T});
+  log.add({3.0, {first, 2}, T});
+  CHECK(log.largest_map(maps) == first);
+  CHECK(log.trajectory(maps, first).size() == 2);
+  CHECK(log.trajectory(maps, second).size() == 1);
+  CHECK(log.trajectory(maps, 9).empty());
+
+  const se3 moved = test::random_motion(random);
+  maps.at(first).set_pose(1, moved);
+  CHECK((log.trajectory(maps, first)[0].T_world_camera.inverse() * moved * T).log().norm() < 1e-12);
+  const se3 before = log.trajectory(maps, second)[0].T_world_camera;
+  maps.at(second).erase_keyframe(1);
+  CHECK((log.trajectory(maps, second)[0].T_world_camera.inverse() * before).log().norm() < 1e-9);
+  maps.merge(second, first, moved);
+  REQUIRE(log.trajectory(maps, first).size() == 3);
+  CHECK((log.trajectory(maps, first)[1].T_world_camera.inverse() * moved * before).log().norm() < 1e-9);
+  CHECK(log.trajectory(maps, second).empty());
+}

@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <cstddef>
+#include <vector>
+
+#include <orbis/slam/detail/tracking/front_end.hpp>
+#include <orbis/slam/validate.hpp>
+
+#include "slam/ring_world.hpp"
+#include "support/catch.hpp"
+
+using namespace orbis;
+using slam::track_state;
+
+namespace {
+
+using descriptor = features::binary_descriptor<256>;
+
+/// The front end on its own: keyframes are made, and nothing else is done with them.
+struct scene {
+  test::ring_world world{{.steps = 60, .drift = 0.0}};
+  slam::options options;
+  slam::atlas maps{8, 1.2};
+  slam::detail::front_end<camera::pinhole, descriptor, slam::orb_matchers, slam::rgbd> front_end{world.rig, options};
+  std::vector<slam::map_keyframe> similar;  ///< what place recognition says
+  std::vector<slam::map_id> dropped;
+  bool is_frozen = false;
+  std::size_t frames = 0;
+
+  scene() {
+    options.initial_pose = world.truth(0);
+    options.min_start_points = 50;
+  }
+
+  std::size_t feed(slam::frame f) {
+    f.index = frames++;
+    front_end.sync_with_map(maps);
+    const std::size_t inliers = front_end.localize(
+        f, maps, is_frozen, [&](const auto&, std::size_t) { return similar; },
+        [&](slam::map_id m) {
+          maps.remove(m);
+          dropped.push_back(m);
+        });
+    if (inliers > 0) {
+      front_end.update_reference(f, maps);
+      if (!is_frozen && front_end.needs_keyframe(f, inliers, maps)) front_end.make_keyframe(f, maps);
+    }
+    front_end.finish(std::move(f), maps);
+    return inliers;
+  }
+  std::size_t see(std::uint32_t step) { return feed(world.look(step, se3{})); }
+  std::size_t see_nothing(double timestamp) {
+    slam::frame f;
+    f.timestamp = timestamp;
+    return feed(f);
+  }
+  [[nodiscard]] double error(std::uint32_t step) const {
+    return (world.truth(step).inverse() * front_end.last_pose(maps)).log().norm();
+  }
+};
+
+}  // namespace
+
+TEST_CASE("The first frame begins the map, and the ones that follow are tracked in it") {
+  scene s;
+  CHECK(s.front_end.state() == track_state::not_started);
+  CHECK(s.see_nothing(-1.0) == 0);
+  CHECK(s.front_end.state() == track_state::not_started);
+  for (std::uint32_t i = 0; i < 8; ++i) {
+    CHECK(s.see(i) > 30);
+    CHECK(s.front_end.state() == track_state::tracking);
+    CHECK(s.error(i) < 0.02);
+  }
+  CHECK(s.maps.active().keyframes().size() >= 4);
+  CHECK(s.front_end.counters().frames == 9);
+  CHECK(s.front_end.counters().tracked == 8);
+  CHECK(s.front_end.counters().lost == 0);
+  CHECK(s.front_end.log().trajectory(s.maps, 0).size() == 8);
+  CHECK(slam::validate(s.maps.active()));
+}
+
+TEST_CASE("A camera that was lost is found by appearance, and not before") {
+  scene s;
+  s.options.recovery.new_map_after = 100.0;
+  for (std::uint32_t i = 0; i < 6; ++i) s.see(i);
+  CHECK(s.see_nothing(2.6) == 0);
+  CHECK(s.front_end.state() == track_state::lost);
+  CHECK(s.see(25) == 0);
+  CHECK(s.front_end.counters().lost == 2);
+  s.similar = {{0, 0}, {0, 2}};
+  CHECK(s.see(2) > 40);
+  CHECK(s.front_end.state() == track_state::relocalized);
+  CHECK(s.error(2) < 0.02);
+  CHECK(s.see(3) > 40);
+  CHECK(s.front_end.state() == track_state::tracking);
+  CHECK(s.front_end.counters().relocalized == 1);
+}
+
+TEST_CASE(
+    "A camera that is lost for long begins a map; one with few keyframes is dropped, and the old one found again") {
+  scene s;
+  s.options.recovery.min_map_keyframes = 2;
+  for (std::uint32_t i = 0; i < 6; ++i) s.see(i);  // time stamps are half a second apart
+  REQUIRE(s.maps.active().keyframes().size() >= 2);
+  CHECK(s.see(30) > 0);  // 15 seconds later, in a place that is not known
+  CHECK(s.front_end.state() == track_state::tracking);
+  CHECK(s.maps.active_id() == 1);
+  CHECK(s.maps.contains(0));
+  CHECK(s.dropped.empty());
+  CHECK(s.see(45) > 0);
+  CHECK(s.maps.active_id() == 2);
+  CHECK(s.dropped == std::vector<slam::map_id>{1});
+  CHECK(s.see_nothing(23.0) == 0);
+  s.similar = {{0, 4}};
+  CHECK(s.see(4) > 40);
+  CHECK(s.maps.active_id() == 0);
+  CHECK(s.front_end.log().trajectory(s.maps, 0).size() == 7);
+}
+
+TEST_CASE("A frozen map does not change, and none is begun") {
+  scene s;
+  s.is_frozen = true;
+  CHECK(s.see(0) == 0);
+  CHECK(s.front_end.state() == track_state::not_started);
+  s.is_frozen = false;
+  for (std::uint32_t i = 0; i < 6; ++i) s.see(i);
+  s.is_frozen = true;
+  const slam::map before = s.maps.active();
+  for (std::uint32_t i = 6; i < 9; ++i) CHECK(s.see(i) > 20);
+  CHECK(s.see(40) == 0);
+  CHECK(s.maps.size() == 1);
+  CHECK(test::same(before, s.maps.active()));
+  for (const auto& l : before.landmarks()) {
+    CHECK(s.maps.active().landmark_at(l.id).visible == l.visible);
+    CHECK(s.maps.active().landmark_at(l.id).found == l.found);
+  }
+}
+
+TEST_CASE("Whether a keyframe is needed may be asked any number of times") {
+  scene s;
+  for (std::uint32_t i = 0; i < 4; ++i) s.see(i);
+  slam::frame f = s.world.look(4, s.world.truth(4));
+  const auto& asked = std::as_const(s.front_end);
+  const bool first = asked.needs_keyframe(f, 100, s.maps);
+  for (int i = 0; i < 3; ++i) CHECK(asked.needs_keyframe(f, 100, s.maps) == first);
+  CHECK(s.see(4) > 30);
+}
+
+TEST_CASE("Tracking goes on when the map was merged, moved and culled between two frames") {
+  scene s;
+  const se3 T(so3::exp(vec3(0, 0, 0.7)), vec3(3, -2, 1));
+  slam::map& first = s.maps.active();
+  s.world.walk(first, 20, 24, T * s.world.truth(20));  // a map made before, in another world
+  s.maps.create();
+  for (std::uint32_t i = 20; i < 26; ++i) s.see(i);
+  REQUIRE(s.maps.active_id() == 1);
+  s.options.initial_pose.reset();
+  const se3 T_into_from = T * s.world.truth(20) * s.world.truth(0).inverse();
+  const auto offsets = s.maps.merge(1, 0, T_into_from, {3, 0});
+  CHECK(offsets.keyframes == 4);
+  CHECK(s.see(26) > 30);
+  CHECK(s.front_end.state() == track_state::tracking);
+  CHECK(s.maps.active_id() == 0);
+  CHECK((s.front_end.last_pose(s.maps).inverse() * T * s.world.truth(26)).log().norm() < 0.03);
+  CHECK(s.front_end.log().trajectory(s.maps, 0).size() == 7);
+}
