@@ -36,18 +36,12 @@ done <<<"$(grep -rnE '^ *# *include *<orbis/' --include='*.hpp' . | sed 's|^\./|
 
 # The detail/ of a component is its own: no umbrella, no sibling, no document and no example includes it, and no document
 # names it.
-declare -A known=(  # exceptions, to become none
-  ["include/orbis/optimize/reprojection_with_intrinsics.hpp camera"]=1
-  ["include/orbis/interop/octomap.hpp octree"]=1
-  ["include/orbis/optimize/detail/pose/pose_kernels.hpp camera"]=1
-  ["include/orbis/optimize/reprojection.hpp camera"]=1
-)
 private() {  # <pattern, whose first group is the component> <where>...
   local pattern=$1 hit file component
   while IFS= read -r hit; do
     [[ $hit =~ $pattern ]] || continue
     component=${BASH_REMATCH[1]} file=${hit%%:*}
-    [[ $file == include/orbis/$component/* || -n ${known["$file $component"]-} ]] && continue
+    [[ $file == include/orbis/$component/* ]] && continue
     complain "$hit: the detail/ of $component is used outside of it"
   done <<<"$(cd ../.. && grep -rnE "$pattern" "${@:2}" 2>/dev/null)"
 }

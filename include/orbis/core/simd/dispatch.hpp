@@ -3,6 +3,7 @@
 /// Compiles a kernel once for every instruction set and chooses one of them at run time.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <type_traits>
 #include <utility>
