@@ -45,16 +45,23 @@ struct block_verdict {
 /// A block's points, axis by axis.
 using block_axes = std::array<const float*, 3>;
 
+/// A point in the camera frame.
+[[nodiscard]] inline std::array<float, 3> in_camera(const ray_view& view, float x, float y, float z) noexcept {
+  const std::array<float, 3> d{(x - view.origin[0]) - view.origin_rest[0], (y - view.origin[1]) - view.origin_rest[1],
+                               (z - view.origin[2]) - view.origin_rest[2]};
+  std::array<float, 3> out;
+  for (std::size_t a = 0; a != 3; ++a) {
+    const auto& row = view.rotation[a];
+    out[a] = (rounded_product(row[0], d[0]) + rounded_product(row[1], d[1])) + rounded_product(row[2], d[2]);
+  }
+  return out;
+}
+
 /// Where the points lie in any camera's image.
 template <camera::camera_model Camera>
 void locate_by(const Camera& camera, const ray_view& view, const block_axes& points, seen_block& seen) {
   for (std::size_t i = 0; i != seen_block::size; ++i) {
-    std::array<float, 3> d, q;
-    for (std::size_t a = 0; a != 3; ++a) d[a] = (points[a][i] - view.origin[a]) - view.origin_rest[a];
-    for (std::size_t a = 0; a != 3; ++a) {
-      const auto& row = view.rotation[a];
-      q[a] = (rounded_product(row[0], d[0]) + rounded_product(row[1], d[1])) + rounded_product(row[2], d[2]);
-    }
+    const auto q = in_camera(view, points[0][i], points[1][i], points[2][i]);
     seen.depth[i] = q[2];
     seen.pixel[i] = -1;
     if (!(q[2] > view.min_depth && q[2] <= view.max_depth)) continue;
