@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <cmath>
+#include <cstddef>
+#include <string>
 
 #include <orbis/core/se3.hpp>
 #include <orbis/core/sim3.hpp>
@@ -43,10 +45,15 @@ TEST_CASE("A step on a camera manifold is found again between its ends") {
 }
 
 TEST_CASE("A summary of bundle adjustment says what was wrong and where") {
-  CHECK(to_string(bundle_summary{.status = bundle_status::converged}) == "converged");
-  CHECK(to_string(bundle_summary{.status = bundle_status::missing_point, .where = 7}).find("observation 7") !=
-        std::string::npos);
-  CHECK(to_string(bundle_summary{.status = bundle_status::bad_pose, .where = 3}).find("pose 3") != std::string::npos);
+  const auto text = [](bundle_status status, std::size_t where) {
+    bundle_summary s;
+    s.status = status;
+    s.where = where;
+    return to_string(s);
+  };
+  CHECK(text(bundle_status::converged, 0) == "converged");
+  CHECK(text(bundle_status::missing_point, 7).find("observation 7") != std::string::npos);
+  CHECK(text(bundle_status::bad_pose, 3).find("pose 3") != std::string::npos);
   CHECK(is_failure(bundle_status::undetermined_pose));
   CHECK_FALSE(is_failure(bundle_status::nothing_to_do));
 }
