@@ -47,8 +47,8 @@ fi
     printf '%s: %s\n\t@echo "  %s"\n\t@%s %s -MMD -MP -c -o $@ $<\n' "$object" "$source" "$source" "$compiler" \
       "$(printf '%q ' "${flags[@]}")"
   done
-  printf '%s/tests: %s\n\t@%s -static -o $@ $^\n' "$out" "${objects[*]}" "$compiler"
+  printf '%s/tests: %s\n\t@%s -o $@ $^\n' "$out" "${objects[*]}" "$compiler"
   printf -- '-include %s\n' "${objects[*]/%.o/.d}"
 } >"$out/Makefile"
 make -f "$out/Makefile" -j "${JOBS:-$(nproc)}" --no-print-directory
-exec qemu-aarch64 "$out/tests" "$@"
+exec qemu-aarch64 -L "${AARCH64_ROOT:-/usr/aarch64-linux-gnu}" "$out/tests" "$@"
