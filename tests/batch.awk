@@ -8,6 +8,15 @@ FNR == 1 {
   inside = 1
   line_known = 0
 }
+/^#include "/ {  # what stands beside the file is no longer beside the batch
+  split($0, quoted, "\"")
+  folder = FILENAME
+  sub(/[^\/]*$/, "", folder)
+  if ((getline line < (folder quoted[2])) >= 0) {
+    close(folder quoted[2])
+    $0 = "#include \"" folder quoted[2] "\""
+  }
+}
 /^#include / {
   if (!($0 in seen)) includes = includes $0 "\n"
   seen[$0] = 1
