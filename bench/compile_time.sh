@@ -1,10 +1,11 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
 #
-# What each umbrella header costs whoever includes it: processor time to compile a file of that one line, and the
-# lines that the compiler sees. Beside them what they are made of. Sources may be named as well: what a program costs.
+# What it costs to compile against the library: each umbrella header alone, and typical programs header-only and with
+# orbis::compiled. Processor seconds (the least of the runs: what disturbs only adds), peak memory of the compiler, and the
+# lines that it sees. Then the heaviest translation units of the builds that there are, from their .ninja_log.
 # usage: [CXX=g++] [CXXFLAGS=-O2] [RUNS=3] compile_time.sh [HEADER | FILE.cpp]...
-#        HEADER as after #include, e.g. orbis/features.hpp
+#        HEADER as after #include, e.g. orbis/features.hpp; without arguments: all of the above
 set -euo pipefail
 root=$(cd "$(dirname "$0")/.." && pwd)
 read -ra command <<< "${CXX:-g++} -std=c++20 ${CXXFLAGS:--O2} -I$root/include"
@@ -15,38 +16,95 @@ runs=${RUNS:-3}
 scratch=$(mktemp -d)
 trap 'rm -rf "$scratch"' EXIT
 
+everything=0
 if (($# == 0)); then
+  everything=1
   set -- vector Eigen/Core
   while read -r header; do set -- "$@" "orbis/${header##*/}"; done < <(printf '%s\n' "$root"/include/orbis/*.hpp | sort)
 fi
 
-# Seconds of processor time, the least of the runs: what disturbs only adds.
-seconds_of() {
-  local TIMEFORMAT='%U %S' best='' user system
-  for ((i = 0; i < runs; ++i)); do
-    read -r user system < <({ time "${command[@]}" -c "$1" -o "$scratch/out.o" 2> "$scratch/errors"; } 2>&1) || return 1
-    [[ -f $scratch/out.o ]] || return 1
-    rm "$scratch/out.o"
-    best=$(awk -v a="$user" -v b="$system" -v best="$best" 'BEGIN { s = a + b; print best == "" || s < best ? s : best }')
+# Seconds of processor time, the least of the runs, and megabytes: measure SOURCE [OPTION]...
+measure() {
+  local run seconds megabytes best=''
+  for ((run = 0; run < runs; ++run)); do
+    read -r seconds megabytes < <(python3 "$scratch/cost.py" "${command[@]}" "${@:2}" -c "$1" -o "$scratch/out.o") || return 1
+    best=$(awk -v s="$seconds" -v b="$best" 'BEGIN { print b == "" || s < b ? s : b }')
   done
-  echo "$best"
+  echo "$best $megabytes"
 }
+cat > "$scratch/cost.py" <<'EOF_COST'
+import resource, subprocess, sys
+status = subprocess.run(sys.argv[1:], stderr=subprocess.DEVNULL).returncode
+used = resource.getrusage(resource.RUSAGE_CHILDREN)
+print(f"{used.ru_utime + used.ru_stime:.2f} {used.ru_maxrss // 1024}" if status == 0 else "")
+sys.exit(status)
+EOF_COST
 
 failed=0
-printf '%-34s %9s %12s\n' "$("${command[0]}" -dumpversion | sed "s/^/${command[0]} /"), ${CXXFLAGS:--O2}" 'seconds' 'lines'
-for what in "$@"; do
-  if [[ $what == *.cpp ]]; then
-    source=$what
+printf '%-42s %9s %7s %10s\n' "$("${command[0]}" -dumpversion | sed "s/^/${command[0]} /"), ${CXXFLAGS:--O2}" seconds MB lines
+row() {  # <name> <source> [option]...
+  local cost
+  if cost=$(measure "${@:2}"); then
+    printf '%-42s %9.2f %7d %10d\n' "$1" $cost "$("${command[@]}" "${@:3}" -E -P "$2" 2> /dev/null | wc -l)"
   else
-    source=$scratch/one.cpp
-    echo "#include <$what>" > "$source"
-  fi
-  if seconds=$(seconds_of "$source"); then
-    lines=$("${command[@]}" -E -P "$source" 2> /dev/null | wc -l)
-    printf '%-34s %9.2f %12d\n' "$what" "$seconds" "$lines"
-  else
-    printf '%-34s %9s   %s\n' "$what" '-' "$(grep -m1 -E 'error' "$scratch/errors" || echo failed)"
+    printf '%-42s %9s   %s\n' "$1" - "does not compile"
     failed=1
   fi
+}
+for what in "$@"; do
+  source=$scratch/one.cpp
+  if [[ $what == *.cpp ]]; then source=$what; else echo "#include <$what>" > "$source"; fi
+  row "$what" "$source"
+done
+((everything)) || exit $failed
+
+cat > "$scratch/octree_from_points.cpp" <<'EOF_PROGRAM'
+#include <array>
+#include <vector>
+#include <orbis/octree.hpp>
+int main() {
+  std::vector<std::array<float, 3>> points{{1, 2, 3}};
+  orbis::octree::occupancy_octree<> map{0.05};
+  map.integrate(points, std::array{0.0F, 0.0F, 0.0F}, {.max_range = 5.0});
+}
+EOF_PROGRAM
+cat > "$scratch/octree_from_depth.cpp" <<'EOF_PROGRAM'
+#include <orbis/camera.hpp>
+#include <orbis/octree.hpp>
+int main() {
+  const orbis::camera::pinhole camera{320, 240, 260.0, 260.0, 159.5, 119.5};
+  const orbis::image<float> depth(320, 240, 2.0F);
+  orbis::octree::occupancy_octree<> map{0.05};
+  map.integrate(orbis::par, orbis::camera::depth_view{depth}, camera, orbis::se3{}, {.max_range = 5.0});
+}
+EOF_PROGRAM
+cat > "$scratch/automatic_filter.cpp" <<'EOF_PROGRAM'
+#include <array>
+#include <vector>
+#include <orbis/cloud.hpp>
+int main() {
+  std::vector<std::array<float, 3>> points(100);
+  return static_cast<int>(orbis::cloud::filter_automatically(orbis::par, points).inliers.size());
+}
+EOF_PROGRAM
+cat > "$scratch/slam_in_three_lines.cpp" <<'EOF_PROGRAM'
+#include <orbis/camera/any.hpp>
+#include <orbis/slam.hpp>
+int main() {
+  orbis::slam::rgbd_system slam{orbis::camera::any_camera{orbis::camera::pinhole{320, 240, 260, 260, 159.5, 119.5}}};
+  slam.track(orbis::camera::rgbd_frame{});
+  return static_cast<int>(slam.trajectory().size());
+}
+EOF_PROGRAM
+echo
+for program in octree_from_points octree_from_depth automatic_filter slam_in_three_lines; do
+  row "$program" "$scratch/$program.cpp"
+  row "$program, compiled flavour" "$scratch/$program.cpp" -DORBIS_COMPILED
+done
+
+for log in "$root"/build/*/.ninja_log; do
+  [[ -f $log ]] || continue
+  printf '\nheaviest of %s (seconds of wall time)\n' "${log#"$root"/}"
+  awk '!/^#/ && $4 ~ /\.o$/ { t[$4] = ($2 - $1) / 1000 } END { for (o in t) printf "%9.1f  %s\n", t[o], o }' "$log" | sort -rn | head -10
 done
 exit $failed
