@@ -131,13 +131,14 @@ class rgbd_system {
   [[nodiscard]] const Camera& camera() const noexcept { return shared_.rig.camera(); }
 
   /// Writes the active map to a file. For the descriptors of ORB. Errors: `write_failed`.
-  [[nodiscard]] result<void> save_map(
-      const std::filesystem::path& path) const requires std::same_as<map_type, slam::map>;
+  [[nodiscard]] result<void> save_map(const std::filesystem::path& path)
+      const requires std::same_as<descriptor_of_t<Extractor>, features::binary_descriptor<256>>;
   /// Reads a map from a file and makes it the active one; the camera is searched for in it. The map so far is kept, and
   /// merged into the loaded one where that is recognised; without keyframes it is removed. For the descriptors of ORB.
   /// Errors: those of `read_map`, `unsupported` for a map of another image pyramid, `no_data` for one without
   /// keyframes.
-  [[nodiscard]] result<void> load_map(const std::filesystem::path& path) requires std::same_as<map_type, slam::map>;
+  [[nodiscard]] result<void> load_map(const std::filesystem::path& path) requires
+      std::same_as<descriptor_of_t<Extractor>, features::binary_descriptor<256>>;
 
  private:
   using frame_type = basic_frame<descriptor_type>;
@@ -350,14 +351,15 @@ bool ORBIS_SLAM_SYSTEM::activate(map_id map) {
 }
 
 ORBIS_SLAM_SYSTEM_TEMPLATE
-result<void> ORBIS_SLAM_SYSTEM::save_map(
-    const std::filesystem::path& path) const requires std::same_as<map_type, slam::map> {
+result<void> ORBIS_SLAM_SYSTEM::save_map(const std::filesystem::path& path)
+    const requires std::same_as<descriptor_of_t<Extractor>, features::binary_descriptor<256>> {
   const std::string bytes = inspect([](const atlas_type& all) { return map_bytes(all.active()); });
   return write_map_bytes(path, bytes);
 }
 
 ORBIS_SLAM_SYSTEM_TEMPLATE
-result<void> ORBIS_SLAM_SYSTEM::load_map(const std::filesystem::path& path) requires std::same_as<map_type, slam::map> {
+result<void> ORBIS_SLAM_SYSTEM::load_map(const std::filesystem::path& path) requires
+    std::same_as<descriptor_of_t<Extractor>, features::binary_descriptor<256>> {
   auto loaded = read_map(path);
   if (!loaded) return fail(loaded.error());
   const auto& content = loaded->content();
