@@ -7,6 +7,7 @@
 #include <vector>
 
 #include <orbis/cloud/detail/knn/leaf_hierarchy.hpp>
+#include <orbis/core/simd.hpp>
 
 #include "cloud/clouds.hpp"
 #include "cloud/reference.hpp"
@@ -100,10 +101,16 @@ TEST_CASE("keys of many cells are those of a curve that goes from each cell to a
       block->axis[2][i] = n >> 8U;
     }
     const auto cube = *block;
-    orbis::cloud::detail::select_curve_keys()(*block);
-    auto again = cube;
-    orbis::cloud::detail::curve_keys_portable(again);
-    CHECK(again.key == block->key);
+    const auto fill_keys = [](curve_block& b) {
+      orbis::simd::kernel<orbis::cloud::detail::fill_curve_keys, void(curve_block&)>()(b);
+    };
+    fill_keys(*block);
+    for (const orbis::simd::level level : orbis::simd::available_levels()) {
+      const orbis::simd::level_limit limit{level};
+      auto again = cube;
+      fill_keys(again);
+      CHECK(again.key == block->key);
+    }
     for (std::size_t i = 0; i != curve_block::size; ++i) {
       cells.push_back({block->key[i], cube.axis[0][i], cube.axis[1][i], cube.axis[2][i]});
     }
