@@ -167,7 +167,7 @@ struct stereo_cost final : ceres::SizedCostFunction<3, 3, 3, 3> {
   const camera::intrinsics* k;
   double bf;
   const rotation_view* rotation;
-  stereo_cost(const io::keyframe_observation& o, const camera::intrinsics* intrinsics, double baseline_focal,
+  stereo_cost(const test::keyframe_observation& o, const camera::intrinsics* intrinsics, double baseline_focal,
               const rotation_view* r)
       : seen{o.pixel.x(), o.pixel.y(), o.right},
         root{std::sqrt(o.information)},
