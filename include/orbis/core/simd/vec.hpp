@@ -41,22 +41,21 @@ ORBIS_ALWAYS_INLINE void round_product([[maybe_unused]] V& product) noexcept {
 /// `x` in all lanes.
 template <class V, class T>
 ORBIS_ALWAYS_INLINE void broadcast(V& out, T x) noexcept {
-  if constexpr (std::is_floating_point_v<T>) {
 #if ORBIS_X86 && !defined(__clang__)
-    // g++ 12 forgets that all lanes are the same, and fills them one after the other.
-    if constexpr (sizeof(V) >= 32)
-      if (!__builtin_constant_p(x)) {
-        if constexpr (sizeof(V) == 64)
-          broadcast_64(out, x);
-        else
-          broadcast_32(out, x);
-        return;
-      }
+  // g++ 12 forgets that all lanes of a wide register are the same, and fills them one after the other.
+  if constexpr (sizeof(V) >= 32)
+    if (!__builtin_constant_p(x)) {
+      if constexpr (sizeof(V) == 64)
+        broadcast_64(out, x);
+      else
+        broadcast_32(out, x);
+      return;
+    }
 #endif
+  if constexpr (std::is_floating_point_v<T>)
     out = x - V{};  // not +: that has a sign of zero to think of
-  } else {
+  else
     out = V{} + x;
-  }
 }
 
 template <class T, bool = std::is_integral_v<T>>
@@ -309,14 +308,16 @@ struct vec {
     else
       return {a.v.low >> n, a.v.high >> n};
   }
-  /// Lane by lane.
+  /// Lane by lane, of numbers of four or eight bytes: for smaller ones there are no such instructions.
   friend ORBIS_ALWAYS_INLINE vec operator<<(const vec& a, const vec& n) noexcept {
+    static_assert(sizeof(T) >= 4);
     if constexpr (is_native)
       return from_register(reinterpret_cast<native>(reinterpret_cast<modular>(a.v) << reinterpret_cast<modular>(n.v)));
     else
       return {a.v.low << n.v.low, a.v.high << n.v.high};
   }
   friend ORBIS_ALWAYS_INLINE vec operator>>(const vec& a, const vec& n) noexcept {
+    static_assert(sizeof(T) >= 4);
     if constexpr (is_native)
       return from_register(a.v >> n.v);
     else

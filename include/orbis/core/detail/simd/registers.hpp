@@ -72,10 +72,19 @@ ORBIS_TARGET_AVX2 inline void any_bit_32(bool& out, const V& v) noexcept {
 }
 template <class V>
 ORBIS_TARGET_AVX2 inline void broadcast_32(V& out, const element_of<V>& x) noexcept {
-  if constexpr (sizeof x == 8)
+  using T = element_of<V>;
+  if constexpr (std::is_same_v<T, double>)
     out = reinterpret_cast<V>(_mm256_set1_pd(x));
-  else
+  else if constexpr (std::is_same_v<T, float>)
     out = reinterpret_cast<V>(_mm256_set1_ps(x));
+  else if constexpr (sizeof(T) == 8)
+    out = reinterpret_cast<V>(_mm256_set1_epi64x(static_cast<std::int64_t>(x)));
+  else if constexpr (sizeof(T) == 4)
+    out = reinterpret_cast<V>(_mm256_set1_epi32(static_cast<std::int32_t>(x)));
+  else if constexpr (sizeof(T) == 2)
+    out = reinterpret_cast<V>(_mm256_set1_epi16(static_cast<std::int16_t>(x)));
+  else
+    out = reinterpret_cast<V>(_mm256_set1_epi8(static_cast<char>(x)));
 }
 template <class V>
 ORBIS_TARGET_AVX2 inline void square_root_32(V& out, const V& v) noexcept {
@@ -148,10 +157,19 @@ ORBIS_TARGET_AVX512 inline void blend_64(V& out, const Word& m, const V& a, cons
 }
 template <class V>
 ORBIS_TARGET_AVX512 inline void broadcast_64(V& out, const element_of<V>& x) noexcept {
-  if constexpr (sizeof x == 8)
+  using T = element_of<V>;
+  if constexpr (std::is_same_v<T, double>)
     out = reinterpret_cast<V>(_mm512_set1_pd(x));
-  else
+  else if constexpr (std::is_same_v<T, float>)
     out = reinterpret_cast<V>(_mm512_set1_ps(x));
+  else if constexpr (sizeof(T) == 8)
+    out = reinterpret_cast<V>(_mm512_set1_epi64(static_cast<std::int64_t>(x)));
+  else if constexpr (sizeof(T) == 4)
+    out = reinterpret_cast<V>(_mm512_set1_epi32(static_cast<std::int32_t>(x)));
+  else if constexpr (sizeof(T) == 2)
+    out = reinterpret_cast<V>(_mm512_set1_epi16(static_cast<std::int16_t>(x)));
+  else
+    out = reinterpret_cast<V>(_mm512_set1_epi8(static_cast<char>(x)));
 }
 template <class V>
 ORBIS_TARGET_AVX512 inline void square_root_64(V& out, const V& v) noexcept {
