@@ -42,24 +42,44 @@ std::vector<T> numbers(std::size_t n, std::uint64_t seed) {
   return out;
 }
 
-/// Whether two numbers are the same bits.
+/// CHECKs that two vectors hold the same bits.
 template <class T>
-bool same_bits(const T& a, const T& b) {
-  return std::memcmp(&a, &b, sizeof a) == 0;
+[[gnu::noinline]] void check_same_bits(const std::vector<T>& found, const std::vector<T>& expected) {
+  REQUIRE(found.size() == expected.size());
+  for (std::size_t i = 0; i != found.size(); ++i)
+    if (std::memcmp(&found[i], &expected[i], sizeof(T)) != 0) {
+      INFO("number " << i << " of " << sizeof(T) << " bytes");
+      CHECK(+found[i] == +expected[i]);
+      if (found[i] == expected[i]) FAIL_CHECK("zeros of different signs");
+    }
 }
 
-/// CHECKs that `f(a[i], b[i])` is what the vector holds in lane i, bit by bit.
-template <class V, class T, class F>
-void check_lanes(const V& v, const T* a, const T* b, const F& f) {
-  using U = typename V::value_type;
-  U lanes[V::count];
-  v.store(lanes);
-  for (std::size_t i = 0; i != V::count; ++i) {
-    const U expected = static_cast<U>(f(a[i], b[i]));
-    if (!same_bits(lanes[i], expected)) {
-      INFO("lane " << i << " of " << V::count << " numbers of " << sizeof(T) << " bytes");
-      CHECK(+lanes[i] == +expected);
-    }
+/// Where results go: those of each operation into a row of its own, one row behind the other. A kernel puts vectors
+/// and its plain reference numbers, in the same order.
+template <class T>
+struct rows {
+  T* to;  ///< the place in the next row
+  std::size_t length;
+
+  template <class V>
+  ORBIS_ALWAYS_INLINE void put(const V& v) {
+    if constexpr (simd::vector<V>)
+      v.store(to);
+    else
+      *to = static_cast<T>(v);
+    to += length;
+  }
+};
+
+/// Runs a kernel at every level with room for the results, and CHECKs that these are as expected, bit by bit. Comparing
+/// is no part of the kernel, which is compiled for many targets, types and sizes.
+template <class Kernel, class T, class... Args>
+void check_on_every_level(const std::vector<T>& expected, const Args&... args) {
+  for (const simd::level l : simd::available_levels()) {
+    INFO("level " << static_cast<int>(l));
+    std::vector<T> found(expected.size());
+    simd::kernel<Kernel, void(T*, const Args&...), simd::popcnt, simd::avx2, simd::avx512>(l)(found.data(), args...);
+    check_same_bits(found, expected);
   }
 }
 
