@@ -41,18 +41,15 @@ ORBIS_ALWAYS_INLINE void round_product([[maybe_unused]] V& product) noexcept {
 /// `x` in all lanes.
 template <class V, class T>
 ORBIS_ALWAYS_INLINE void broadcast(V& out, T x) noexcept {
-#if ORBIS_X86 && !defined(__clang__)
-  // g++ 12 forgets that all lanes of a wide register are the same, and fills them one after the other.
-  if constexpr (sizeof(V) >= 32)
-    if (!__builtin_constant_p(x)) {
-      if constexpr (sizeof(V) == 64)
-        broadcast_64(out, x);
-      else
-        broadcast_32(out, x);
-      return;
-    }
+#if ORBIS_X86
+  // g++ 12 fills a wide register lane by lane in a template that has no target, also with a constant.
+  if constexpr (sizeof(V) == 64)
+    broadcast_64(out, x);
+  else if constexpr (sizeof(V) == 32)
+    broadcast_32(out, x);
+  else
 #endif
-  if constexpr (std::is_floating_point_v<T>)
+      if constexpr (std::is_floating_point_v<T>)
     out = x - V{};  // not +: that has a sign of zero to think of
   else
     out = V{} + x;
