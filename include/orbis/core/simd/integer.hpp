@@ -17,38 +17,46 @@ namespace orbis::simd {
 namespace detail {
 
 #if ORBIS_X86
-// One intrinsic for registers of 16, 32 and 64 bytes. SSE2 is the baseline, so that 16 bytes need no attribute.
-#define ORBIS_SIMD_BINARY(name, intrinsic)                                                                       \
-  template <class Out, class A, class B>                                                                         \
-  ORBIS_ALWAYS_INLINE void name##_16(Out& out, const A& a, const B& b) noexcept {                                \
-    out = reinterpret_cast<Out>(_mm_##intrinsic(reinterpret_cast<__m128i>(a), reinterpret_cast<__m128i>(b)));    \
-  }                                                                                                              \
-  template <class Out, class A, class B>                                                                         \
-  ORBIS_TARGET_AVX2 inline void name##_32(Out& out, const A& a, const B& b) noexcept {                           \
-    out = reinterpret_cast<Out>(_mm256_##intrinsic(reinterpret_cast<__m256i>(a), reinterpret_cast<__m256i>(b))); \
-  }                                                                                                              \
-  template <class Out, class A, class B>                                                                         \
-  ORBIS_TARGET_AVX512 inline void name##_64(Out& out, const A& a, const B& b) noexcept {                         \
-    out = reinterpret_cast<Out>(_mm512_##intrinsic(reinterpret_cast<__m512i>(a), reinterpret_cast<__m512i>(b))); \
-  }                                                                                                              \
-  template <class Out, class A, class B>                                                                         \
-  ORBIS_ALWAYS_INLINE void name(Out& out, const A& a, const B& b) noexcept {                                     \
-    if constexpr (sizeof(a) == 64)                                                                               \
-      name##_64(out, a, b);                                                                                      \
-    else if constexpr (sizeof(a) == 32)                                                                          \
-      name##_32(out, a, b);                                                                                      \
-    else                                                                                                         \
-      name##_16(out, a, b);                                                                                      \
+// Intrinsics of registers of 16, 32 and 64 bytes, one for bytes and one for wider numbers. SSE2 is the baseline, so
+// that 16 bytes need no attribute.
+#define ORBIS_SIMD_BINARY(name, of_bytes, of_words)                                                     \
+  template <class Out, class A, class B>                                                                \
+  ORBIS_ALWAYS_INLINE void name##_16(Out& out, const A& a, const B& b) noexcept {                       \
+    const auto x = reinterpret_cast<__m128i>(a), y = reinterpret_cast<__m128i>(b);                      \
+    out = reinterpret_cast<Out>(sizeof(a[0]) == 1 ? _mm_##of_bytes(x, y) : _mm_##of_words(x, y));       \
+  }                                                                                                     \
+  template <class Out, class A, class B>                                                                \
+  ORBIS_TARGET_AVX2 inline void name##_32(Out& out, const A& a, const B& b) noexcept {                  \
+    const auto x = reinterpret_cast<__m256i>(a), y = reinterpret_cast<__m256i>(b);                      \
+    out = reinterpret_cast<Out>(sizeof(a[0]) == 1 ? _mm256_##of_bytes(x, y) : _mm256_##of_words(x, y)); \
+  }                                                                                                     \
+  template <class Out, class A, class B>                                                                \
+  ORBIS_TARGET_AVX512 inline void name##_64(Out& out, const A& a, const B& b) noexcept {                \
+    const auto x = reinterpret_cast<__m512i>(a), y = reinterpret_cast<__m512i>(b);                      \
+    out = reinterpret_cast<Out>(sizeof(a[0]) == 1 ? _mm512_##of_bytes(x, y) : _mm512_##of_words(x, y)); \
+  }                                                                                                     \
+  template <class Out, class A, class B>                                                                \
+  ORBIS_ALWAYS_INLINE void name(Out& out, const A& a, const B& b) noexcept {                            \
+    if constexpr (sizeof(a) == 64)                                                                      \
+      name##_64(out, a, b);                                                                             \
+    else if constexpr (sizeof(a) == 32)                                                                 \
+      name##_32(out, a, b);                                                                             \
+    else                                                                                                \
+      name##_16(out, a, b);                                                                             \
   }
-ORBIS_SIMD_BINARY(add_bytes, adds_epu8)
-ORBIS_SIMD_BINARY(add_words, adds_epu16)
-ORBIS_SIMD_BINARY(subtract_bytes, subs_epu8)
-ORBIS_SIMD_BINARY(subtract_words, subs_epu16)
-ORBIS_SIMD_BINARY(average_bytes, avg_epu8)
-ORBIS_SIMD_BINARY(average_words, avg_epu16)
-ORBIS_SIMD_BINARY(add_products, madd_epi16)
-ORBIS_SIMD_BINARY(pack_words, packus_epi16)
+#else
+#define ORBIS_SIMD_BINARY(name, of_bytes, of_words) \
+  template <class Out, class A, class B>            \
+  void name(Out& out, const A& a, const B& b) noexcept;
+#endif
+ORBIS_SIMD_BINARY(add_small, adds_epu8, adds_epu16)
+ORBIS_SIMD_BINARY(subtract_small, subs_epu8, subs_epu16)
+ORBIS_SIMD_BINARY(average_small, avg_epu8, avg_epu16)
+ORBIS_SIMD_BINARY(add_products, madd_epi16, madd_epi16)
+ORBIS_SIMD_BINARY(pack_words, packus_epi16, packus_epi16)
 #undef ORBIS_SIMD_BINARY
+
+#if ORBIS_X86
 template <class Out, class A, class B>
 ORBIS_TARGET_POPCNT inline void byte_products_16(Out& out, const A& a, const B& b) noexcept {
   out = reinterpret_cast<Out>(_mm_maddubs_epi16(reinterpret_cast<__m128i>(a), reinterpret_cast<__m128i>(b)));
@@ -83,6 +91,20 @@ ORBIS_TARGET_AVX512 inline void count_bits_64(V& out, const V& v) noexcept {
 }
 #endif
 
+/// `instruction` for registers of at least 16 bytes on x86, elsewhere `plain`.
+template <class V, class I, class F>
+[[nodiscard]] ORBIS_ALWAYS_INLINE V binary(const V& a, const V& b, const I& instruction, const F& plain) noexcept {
+  if constexpr (!V::is_native) {
+    return {binary(a.v.low, b.v.low, instruction, plain), binary(a.v.high, b.v.high, instruction, plain)};
+  } else if constexpr (ORBIS_X86 && sizeof(a.v) >= 16) {
+    V out;
+    instruction(out.v, a.v, b.v);
+    return out;
+  } else {
+    return plain(a, b);
+  }
+}
+
 template <class T>
 concept small_unsigned = std::same_as<T, std::uint8_t> || std::same_as<T, std::uint16_t>;
 
@@ -92,61 +114,25 @@ concept small_unsigned = std::same_as<T, std::uint8_t> || std::same_as<T, std::u
 template <detail::small_unsigned T, std::size_t N, target Target>
 [[nodiscard]] ORBIS_ALWAYS_INLINE vec<T, N, Target> add_saturated(const vec<T, N, Target>& a,
                                                                   const vec<T, N, Target>& b) noexcept {
-  using V = vec<T, N, Target>;
-  if constexpr (!V::is_native) {
-    return {add_saturated(a.v.low, b.v.low), add_saturated(a.v.high, b.v.high)};
-  } else if constexpr (ORBIS_X86 && sizeof(a.v) >= 16) {
-    V out;
-#if ORBIS_X86
-    if constexpr (sizeof(T) == 1)
-      detail::add_bytes(out.v, a.v, b.v);
-    else
-      detail::add_words(out.v, a.v, b.v);
-#endif
-    return out;
-  } else {
-    return a + min(b, ~a);
-  }
+  return detail::binary(
+      a, b, [](auto& out, const auto& x, const auto& y) ORBIS_INLINE_LAMBDA { detail::add_small(out, x, y); },
+      [](const auto& x, const auto& y) ORBIS_INLINE_LAMBDA { return x + min(y, ~x); });
 }
 /// a - b, at least zero.
 template <detail::small_unsigned T, std::size_t N, target Target>
 [[nodiscard]] ORBIS_ALWAYS_INLINE vec<T, N, Target> subtract_saturated(const vec<T, N, Target>& a,
                                                                        const vec<T, N, Target>& b) noexcept {
-  using V = vec<T, N, Target>;
-  if constexpr (!V::is_native) {
-    return {subtract_saturated(a.v.low, b.v.low), subtract_saturated(a.v.high, b.v.high)};
-  } else if constexpr (ORBIS_X86 && sizeof(a.v) >= 16) {
-    V out;
-#if ORBIS_X86
-    if constexpr (sizeof(T) == 1)
-      detail::subtract_bytes(out.v, a.v, b.v);
-    else
-      detail::subtract_words(out.v, a.v, b.v);
-#endif
-    return out;
-  } else {
-    return max(a, b) - b;
-  }
+  return detail::binary(
+      a, b, [](auto& out, const auto& x, const auto& y) ORBIS_INLINE_LAMBDA { detail::subtract_small(out, x, y); },
+      [](const auto& x, const auto& y) ORBIS_INLINE_LAMBDA { return max(x, y) - y; });
 }
 /// (a + b + 1) / 2, rounded down, without overflow.
 template <detail::small_unsigned T, std::size_t N, target Target>
 [[nodiscard]] ORBIS_ALWAYS_INLINE vec<T, N, Target> average(const vec<T, N, Target>& a,
                                                             const vec<T, N, Target>& b) noexcept {
-  using V = vec<T, N, Target>;
-  if constexpr (!V::is_native) {
-    return {average(a.v.low, b.v.low), average(a.v.high, b.v.high)};
-  } else if constexpr (ORBIS_X86 && sizeof(a.v) >= 16) {
-    V out;
-#if ORBIS_X86
-    if constexpr (sizeof(T) == 1)
-      detail::average_bytes(out.v, a.v, b.v);
-    else
-      detail::average_words(out.v, a.v, b.v);
-#endif
-    return out;
-  } else {
-    return (a | b) - ((a ^ b) >> 1);
-  }
+  return detail::binary(
+      a, b, [](auto& out, const auto& x, const auto& y) ORBIS_INLINE_LAMBDA { detail::average_small(out, x, y); },
+      [](const auto& x, const auto& y) ORBIS_INLINE_LAMBDA { return (x | y) - ((x ^ y) >> 1); });
 }
 
 /// Lane i is a[2 i] * b[2 i] + a[2 i + 1] * b[2 i + 1]. Vectors of at least 16 bytes.

@@ -16,10 +16,50 @@ namespace orbis::simd {
 
 namespace detail {
 
-/// f(0), f(1) ... f(N - 1).
-template <auto F, std::size_t... I>
-[[nodiscard]] constexpr auto places(std::index_sequence<I...>) noexcept {
-  return std::index_sequence<F(I)...>{};
+/// Lane i is lane Place(i) of a followed by b. Vectors of one register.
+template <auto Place, class V>
+[[nodiscard]] ORBIS_ALWAYS_INLINE V shuffle_by(const V& a, const V& b) noexcept {
+  V out;
+  [&]<std::size_t... I>(std::index_sequence<I...>) ORBIS_INLINE_LAMBDA {
+    choose(out.v, a.v, b.v, std::index_sequence<Place(I)...>{});
+  }
+  (std::make_index_sequence<V::count>{});
+  return out;
+}
+/// The first halves of a and b (Half = 0) or the second ones (1), interleaved.
+template <std::size_t Half, class V>
+[[nodiscard]] ORBIS_ALWAYS_INLINE V zip(const V& a, const V& b) noexcept {
+  if constexpr (V::is_native) {
+    constexpr auto place = [](std::size_t i) { return (Half * V::count + i) / 2 + (i % 2) * V::count; };
+    return shuffle_by<place>(a, b);
+  } else if constexpr (Half == 0) {
+    return {zip<0>(a.v.low, b.v.low), zip<1>(a.v.low, b.v.low)};
+  } else {
+    return {zip<0>(a.v.high, b.v.high), zip<1>(a.v.high, b.v.high)};
+  }
+}
+/// The lanes of even number (Odd = 0) or odd number (1) of a, then those of b.
+template <std::size_t Odd, class V>
+[[nodiscard]] ORBIS_ALWAYS_INLINE V unzip(const V& a, const V& b) noexcept {
+  if constexpr (V::is_native) {
+    constexpr auto place = [](std::size_t i) { return 2 * i + Odd; };
+    return shuffle_by<place>(a, b);
+  } else {
+    return {unzip<Odd>(a.v.low, a.v.high), unzip<Odd>(b.v.low, b.v.high)};
+  }
+}
+/// As zip, within each 16 bytes.
+template <std::size_t Half, class V>
+[[nodiscard]] ORBIS_ALWAYS_INLINE V zip_in_blocks(const V& a, const V& b) noexcept {
+  if constexpr (V::is_native) {
+    constexpr auto place = [](std::size_t i) {
+      constexpr std::size_t block = 16 / sizeof(typename V::value_type);
+      return i / block * block + (Half * block + i % block) / 2 + (i % 2) * V::count;
+    };
+    return shuffle_by<place>(a, b);
+  } else {
+    return {zip_in_blocks<Half>(a.v.low, b.v.low), zip_in_blocks<Half>(a.v.high, b.v.high)};
+  }
 }
 
 #if ORBIS_X86
@@ -71,99 +111,42 @@ template <std::size_t... I, class T, std::size_t N, target Target>
 /// The first halves of a and b, interleaved: a0 b0 a1 b1 ... Two to three instructions on AVX2.
 template <class T, std::size_t N, target Target>
 [[nodiscard]] ORBIS_ALWAYS_INLINE vec<T, N, Target> zip_low(const vec<T, N, Target>& a,
-                                                            const vec<T, N, Target>& b) noexcept;
+                                                            const vec<T, N, Target>& b) noexcept {
+  return detail::zip<0>(a, b);
+}
 /// The second halves of a and b, interleaved.
 template <class T, std::size_t N, target Target>
 [[nodiscard]] ORBIS_ALWAYS_INLINE vec<T, N, Target> zip_high(const vec<T, N, Target>& a,
                                                              const vec<T, N, Target>& b) noexcept {
-  using V = vec<T, N, Target>;
-  if constexpr (V::is_native) {
-    constexpr auto place = [](std::size_t i) { return N / 2 + i / 2 + (i % 2) * N; };
-    V out;
-    detail::choose(out.v, a.v, b.v, detail::places<place>(std::make_index_sequence<N>{}));
-    return out;
-  } else {
-    return {zip_low(a.v.high, b.v.high), zip_high(a.v.high, b.v.high)};
-  }
-}
-template <class T, std::size_t N, target Target>
-[[nodiscard]] ORBIS_ALWAYS_INLINE vec<T, N, Target> zip_low(const vec<T, N, Target>& a,
-                                                            const vec<T, N, Target>& b) noexcept {
-  using V = vec<T, N, Target>;
-  if constexpr (V::is_native) {
-    constexpr auto place = [](std::size_t i) { return i / 2 + (i % 2) * N; };
-    V out;
-    detail::choose(out.v, a.v, b.v, detail::places<place>(std::make_index_sequence<N>{}));
-    return out;
-  } else {
-    return {zip_low(a.v.low, b.v.low), zip_high(a.v.low, b.v.low)};
-  }
+  return detail::zip<1>(a, b);
 }
 /// The lanes of even number of a, then those of b. Undoes zip.
 template <class T, std::size_t N, target Target>
 [[nodiscard]] ORBIS_ALWAYS_INLINE vec<T, N, Target> unzip_even(const vec<T, N, Target>& a,
                                                                const vec<T, N, Target>& b) noexcept {
-  using V = vec<T, N, Target>;
-  if constexpr (V::is_native) {
-    constexpr auto place = [](std::size_t i) { return 2 * i; };
-    V out;
-    detail::choose(out.v, a.v, b.v, detail::places<place>(std::make_index_sequence<N>{}));
-    return out;
-  } else {
-    return {unzip_even(a.v.low, a.v.high), unzip_even(b.v.low, b.v.high)};
-  }
+  return detail::unzip<0>(a, b);
 }
 /// The lanes of odd number of a, then those of b.
 template <class T, std::size_t N, target Target>
 [[nodiscard]] ORBIS_ALWAYS_INLINE vec<T, N, Target> unzip_odd(const vec<T, N, Target>& a,
                                                               const vec<T, N, Target>& b) noexcept {
-  using V = vec<T, N, Target>;
-  if constexpr (V::is_native) {
-    constexpr auto place = [](std::size_t i) { return 2 * i + 1; };
-    V out;
-    detail::choose(out.v, a.v, b.v, detail::places<place>(std::make_index_sequence<N>{}));
-    return out;
-  } else {
-    return {unzip_odd(a.v.low, a.v.high), unzip_odd(b.v.low, b.v.high)};
-  }
+  return detail::unzip<1>(a, b);
 }
 
 // Within each 16 bytes: one instruction on every target. Where the order of blocks of 16 bytes does not matter, or
-// pack_blocks restores it. a and b have at least 16 bytes.
+// narrow_in_blocks restores it. a and b have at least 16 bytes.
 
 /// The first eight bytes of each 16 of a and b, interleaved.
 template <class T, std::size_t N, target Target>
 [[nodiscard]] ORBIS_ALWAYS_INLINE vec<T, N, Target> zip_low_in_blocks(const vec<T, N, Target>& a,
                                                                       const vec<T, N, Target>& b) noexcept {
-  using V = vec<T, N, Target>;
-  if constexpr (V::is_native) {
-    constexpr auto place = [](std::size_t i) {
-      constexpr std::size_t block = 16 / sizeof(T);
-      return i / block * block + i % block / 2 + (i % 2) * N;
-    };
-    V out;
-    detail::choose(out.v, a.v, b.v, detail::places<place>(std::make_index_sequence<N>{}));
-    return out;
-  } else {
-    return {zip_low_in_blocks(a.v.low, b.v.low), zip_low_in_blocks(a.v.high, b.v.high)};
-  }
+  return detail::zip_in_blocks<0>(a, b);
 }
 /// The last eight bytes of each 16 of a and b, interleaved.
 template <class T, std::size_t N, target Target>
 [[nodiscard]] ORBIS_ALWAYS_INLINE vec<T, N, Target> zip_high_in_blocks(const vec<T, N, Target>& a,
                                                                        const vec<T, N, Target>& b) noexcept {
-  using V = vec<T, N, Target>;
-  if constexpr (V::is_native) {
-    constexpr auto place = [](std::size_t i) {
-      constexpr std::size_t block = 16 / sizeof(T);
-      return i / block * block + block / 2 + i % block / 2 + (i % 2) * N;
-    };
-    V out;
-    detail::choose(out.v, a.v, b.v, detail::places<place>(std::make_index_sequence<N>{}));
-    return out;
-  } else {
-    return {zip_high_in_blocks(a.v.low, b.v.low), zip_high_in_blocks(a.v.high, b.v.high)};
-  }
+  return detail::zip_in_blocks<1>(a, b);
 }
 
 /// Lane i is table[at[i]], for numbers of four bytes. One instruction on AVX2 and AVX-512 for a table of one register;
