@@ -21,7 +21,7 @@ done
 flags=(-std=c++20 -O1 -w -Wno-psabi -Iinclude -Itests -isystem "$out/include" '-DORBIS_DATA_DIR="none"')
 
 # Where the kernels' tests stand; those that compare with a library that is not here are left out.
-places=(tests/core/simd.cpp tests/core/simd tests/core/rounded.cpp tests/core/crc32c.cpp tests/camera/project_lanes.cpp
+places=(tests/core/simd.cpp tests/core/simd tests/core/rounded.cpp tests/core/bytes.cpp tests/camera/project_lanes.cpp
   tests/features/detail tests/places/detail tests/cloud/detail/knn tests/cloud/detail/rays
   tests/optimize/detail/bundle tests/optimize/detail/sparse tests/optimize/detail/pose
   tests/optimize/bundle_instances.cpp  # what those of bundle adjustment share

@@ -10,7 +10,7 @@
 #include <string>
 #include <string_view>
 
-#include <orbis/core/progress.hpp>
+#include <orbis/core/execution.hpp>
 #include <orbis/core/result.hpp>
 
 namespace spdlog {

@@ -18,7 +18,7 @@
 #include <utility>
 #include <vector>
 
-#include <orbis/core/bit_string.hpp>
+#include <orbis/core/bits.hpp>
 #include <orbis/core/file.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/places/bag_of_words.hpp>

@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include <orbis/core/bit_string.hpp>
+#include <orbis/core/bits.hpp>
 #include <orbis/places/bag_of_words.hpp>
 #include <orbis/places/vocabulary_tree.hpp>
 

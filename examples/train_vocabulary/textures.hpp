@@ -15,8 +15,8 @@
 #include <vector>
 
 #include <orbis/core/image.hpp>
-#include <orbis/core/portable_sine.hpp>
 #include <orbis/core/random.hpp>
+#include <orbis/core/rounded.hpp>
 
 namespace textures {
 

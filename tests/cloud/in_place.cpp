@@ -13,7 +13,7 @@
 #include <orbis/cloud/radius.hpp>
 #include <orbis/cloud/select.hpp>
 #include <orbis/cloud/statistical.hpp>
-#include <orbis/core/strided_points.hpp>
+#include <orbis/interop/strided_points.hpp>
 
 #include "cloud/clouds.hpp"
 #include "support/catch.hpp"
@@ -60,8 +60,9 @@ TEST_CASE("points in records, planes and other containers are filtered in place"
   for (std::size_t i = 0; i != 2000; ++i)
     for (std::size_t a = 0; a != 3; ++a)
       message[8 * i + a] = planes[2000 * a + i] = ours[i][static_cast<Eigen::Index>(a)];
-  CHECK(kept_of(strided_points{message.data(), 2000, {.point_stride = 8}}) == expected);
-  CHECK(kept_of(strided_points{planes.data(), 2000, {.point_stride = 1, .coordinate_stride = 2000}}) == expected);
+  CHECK(kept_of(interop::strided_points{message.data(), 2000, {.point_stride = 8}}) == expected);
+  CHECK(kept_of(interop::strided_points{planes.data(), 2000, {.point_stride = 1, .coordinate_stride = 2000}}) ==
+        expected);
   CHECK(kept_of(std::span{ours}) == expected);
   CHECK(kept_of(std::deque<vec3f>{ours.begin(), ours.end()}) == expected);
   const auto packed = reinterpret_cast<const std::array<float, 3>*>(ours.data());

@@ -1,13 +1,17 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <array>
 #include <bit>
 #include <cstdint>
+#include <span>
 #include <string>
+#include <vector>
 
 #include <orbis/core/bits.hpp>
 #include <orbis/core/random.hpp>
-#include <orbis/io/detail/scalar_type.hpp>
 
 #include "support/catch.hpp"
+
+using namespace orbis;
 
 static_assert(orbis::count_ones(0) == 0 && orbis::count_ones(~std::uint64_t{0}) == 64);
 
@@ -19,24 +23,28 @@ TEST_CASE("Ones are counted as the standard library counts them") {
   }
 }
 
-namespace io = orbis::io;
+namespace {
 
-TEST_CASE("numbers are read in both byte orders") {
-  const char bytes[] = {0x01, 0x02, 0x03, '\xFC', 0, 0, 0, 0};
-  CHECK(orbis::load_number<std::uint16_t>(bytes, std::endian::little) == 0x0201);
-  CHECK(orbis::load_number<std::uint16_t>(bytes, std::endian::big) == 0x0102);
-  CHECK(orbis::load_number<std::uint32_t>(bytes, std::endian::big) == 0x010203FC);
-  CHECK(io::detail::load_as_double(bytes + 3, io::detail::scalar_type::int8, std::endian::little) == -4.0);
-  CHECK(io::detail::load_as_double(bytes + 3, io::detail::scalar_type::uint8, std::endian::little) == 252.0);
-  const char one[] = {0x3F, '\x80', 0, 0};
-  CHECK(io::detail::load_as_double(one, io::detail::scalar_type::float32, std::endian::big) == 1.0);
-}
+struct four_words {
+  std::uint64_t a, b, c, d;
+};
+struct padded {
+  std::uint64_t a;
+  std::uint8_t b;
+};
 
-TEST_CASE("what is appended is read back") {
-  std::string to;
-  orbis::append_little_endian(to, std::uint32_t{0x01020304});
-  orbis::append_little_endian(to, 2.5);
-  CHECK(to.size() == 12);
-  CHECK(to.substr(0, 4) == std::string("\4\3\2\1"));
-  CHECK(orbis::load_number<double>(to.data() + 4) == 2.5);
+}  // namespace
+
+static_assert(bit_string<four_words> && bits_of<four_words> == 256);
+static_assert(bit_string<std::array<unsigned char, 32>> && bit_string<std::array<std::uint64_t, 8>>);
+static_assert(!bit_string<padded> && !bit_string<std::array<float, 8>> && !bit_string<std::array<char, 12>> &&
+              !bit_string<std::string>);
+static_assert(bit_string_range<std::vector<four_words>> && bit_string_range_of<std::span<const four_words>, 256>);
+static_assert(!bit_string_range_of<std::vector<four_words>, 512> && !bit_string_range<std::vector<float>>);
+
+TEST_CASE("the words of a bit string are its bytes, and its distance is the number of different bits") {
+  const four_words x{1, 2, 3, ~std::uint64_t{0}}, y{1, 0, 0, 0};
+  CHECK(words_of(x) == bit_words<256>{1, 2, 3, ~std::uint64_t{0}});
+  CHECK(hamming_distance(words_of(x), words_of(x)) == 0);
+  CHECK(hamming_distance(words_of(x), words_of(y)) == 1 + 2 + 64);
 }

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <limits>
+#include <numbers>
 
 #include <orbis/core/rounded.hpp>
 
@@ -25,4 +27,15 @@ TEST_CASE("Rounded products in a loop that vectorises are rounded first") {
   }
   for (std::size_t i = 0; i != 4; ++i) sum[i] = -1.0F + orbis::rounded_product(a[i], b[i]);
   CHECK(sum == std::array<float, 4>{});
+}
+
+using namespace orbis;
+
+TEST_CASE("the sine of turns agrees with the library's") {
+  for (int i = -4000; i <= 4000; ++i) {
+    const double turns = i * 0.00137;
+    CHECK(std::abs(sin_turns(turns) - std::sin(2.0 * std::numbers::pi * turns)) < 1e-13);
+    CHECK(std::abs(cos_turns(turns) - std::cos(2.0 * std::numbers::pi * turns)) < 1e-13);
+  }
+  CHECK(sin_turns(0.0) == 0.0);
 }

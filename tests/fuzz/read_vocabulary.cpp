@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-#include <orbis/core/crc32c.hpp>
+#include <orbis/core/bytes.hpp>
 #include <orbis/places/vocabulary_file.hpp>
 
 #include "fuzz/target.hpp"

@@ -7,7 +7,7 @@
 #include <span>
 #include <string>
 
-#include <orbis/core/crc32c.hpp>
+#include <orbis/core/bytes.hpp>
 #include <orbis/core/file.hpp>
 #include <orbis/core/random.hpp>
 #include <orbis/places/vocabulary_file.hpp>

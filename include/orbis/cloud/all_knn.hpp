@@ -20,7 +20,6 @@
 #include <orbis/cloud/neighbors.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/point.hpp>
-#include <orbis/core/progress.hpp>
 #include <orbis/core/result.hpp>
 
 namespace orbis::cloud {

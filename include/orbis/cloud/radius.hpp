@@ -22,7 +22,6 @@
 #include <orbis/cloud/detail/select/decision.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/point.hpp>
-#include <orbis/core/progress.hpp>
 #include <orbis/core/result.hpp>
 
 namespace orbis::cloud {

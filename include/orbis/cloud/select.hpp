@@ -45,7 +45,6 @@
 #include <orbis/cloud/statistical.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/point.hpp>
-#include <orbis/core/progress.hpp>
 #include <orbis/core/se3.hpp>
 
 namespace orbis::cloud {

@@ -31,7 +31,6 @@
 #include <orbis/cloud/sensor_origins.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/point.hpp>
-#include <orbis/core/progress.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/core/rounded.hpp>
 

@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Counts of bits, and numbers in binary files of either byte order.
+/// Counts of bits, and strings of bits such as binary descriptors: what they are, their words, their Hamming distance.
 #pragma once
 
-#include <algorithm>
+#include <array>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
-#include <cstring>
-#include <string>
+#include <ranges>
 #include <type_traits>
 
 namespace orbis {
@@ -22,26 +21,44 @@ namespace orbis {
   return static_cast<std::uint32_t>((x * 0x0101010101010101ULL) >> 56U);
 }
 
-/// The `T` stored at `from` in the byte order `order`.
-template <class T>
-requires std::is_arithmetic_v<T>
-[[nodiscard]] T load_number(const char* from, std::endian order = std::endian::little) noexcept {
-  char bytes[sizeof(T)];
-  std::memcpy(bytes, from, sizeof(T));
-  if (order != std::endian::native) std::reverse(bytes, bytes + sizeof(T));
-  T value;
-  std::memcpy(&value, bytes, sizeof(T));
-  return value;
+/// A string of bits of any type: trivially copyable, without padding, a whole number of 64-bit words long. Its bits are
+/// those of its bytes in memory. `features::binary_descriptor<256>`, `std::array<std::uint64_t, 4>` and, on a
+/// little-endian machine, a row of 32 bytes of OpenCV's are the same string.
+template <class D>
+concept bit_string = std::is_trivially_copyable_v<D> && std::has_unique_object_representations_v<D> && sizeof(D) % 8 ==
+                     0;
+
+/// The number of bits of such a type.
+template <bit_string D>
+inline constexpr std::size_t bits_of = 8 * sizeof(D);
+
+/// Bit strings side by side in memory.
+template <class R>
+concept bit_string_range =
+    std::ranges::contiguous_range<R> && std::ranges::sized_range<R> && bit_string<std::ranges::range_value_t<R>>;
+
+/// A range of strings of `Bits` bits.
+template <class R, std::size_t Bits>
+concept bit_string_range_of = bit_string_range<R> && bits_of<std::ranges::range_value_t<R>>
+== Bits;
+
+/// `Bits` bits: bit `i` is bit `i % 64` of word `i / 64`.
+template <std::size_t Bits>
+requires(Bits > 0 && Bits % 64 == 0 && Bits < 65536) using bit_words = std::array<std::uint64_t, Bits / 64>;
+
+/// The bits of a string as words.
+template <bit_string D>
+[[nodiscard]] constexpr bit_words<bits_of<D>> words_of(const D& string) noexcept {
+  return std::bit_cast<bit_words<bits_of<D>>>(string);
 }
 
-/// Appends `value` in little-endian order.
-template <class T>
-requires std::is_arithmetic_v<T>
-void append_little_endian(std::string& to, T value) {
-  char bytes[sizeof(T)];
-  std::memcpy(bytes, &value, sizeof(T));
-  if constexpr (std::endian::native != std::endian::little) std::reverse(bytes, bytes + sizeof(T));
-  to.append(bytes, sizeof(T));
+/// The number of bits in which two strings differ.
+template <std::size_t Words>
+[[nodiscard]] constexpr std::uint32_t hamming_distance(const std::array<std::uint64_t, Words>& a,
+                                                       const std::array<std::uint64_t, Words>& b) noexcept {
+  std::uint32_t sum = 0;
+  for (std::size_t i = 0; i != Words; ++i) sum += count_ones(a[i] ^ b[i]);
+  return sum;
 }
 
 }  // namespace orbis

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Eigenvalues and singular values of small matrices by Jacobi's rotations: accurate to rounding, and
-/// far cheaper to compile than a general decomposition, which every includer of a header would pay for.
+/// Eigenvalues and singular values of small matrices by Jacobi's rotations, and the rotation nearest to a matrix:
+/// accurate to rounding, and far cheaper to compile than a general decomposition.
 ///
 /// Sources: G. Golub, C. Van Loan, "Matrix computations", 4th edition, 2013, sections 8.5 and 8.6.3;
 /// M. Hestenes, "Inversion of matrices by biorthogonalization and related results", 1958.
@@ -12,6 +12,10 @@
 #include <limits>
 #include <utility>
 
+#include <Eigen/LU>
+
+#include <orbis/core/result.hpp>
+#include <orbis/core/so3.hpp>
 #include <orbis/core/types.hpp>
 
 namespace orbis {
@@ -172,6 +176,22 @@ template <int N>
   }
   for (int i = 0; i != N; ++i) out.values[i] *= scale;
   return out;
+}
+
+/// The rotation whose matrix is closest to `m` (least sum of squared differences). Errors:
+/// degenerate, where `m` mirrors (determinant below 0), is singular to rounding, or is not finite.
+///
+/// Source: S. Umeyama, "Least-squares estimation of transformation parameters between two point
+/// patterns", PAMI 13(4), 1991.
+[[nodiscard]] inline result<so3> nearest_rotation(const mat3& m) {
+  const double size = m.cwiseAbs().maxCoeff();
+  if (!m.allFinite()) return fail(errc::degenerate, "rotation matrix", "is not finite");
+  const double determinant = size > 0.0 ? mat3(m / size).determinant() : 0.0;
+  if (determinant < 0.0) return fail(errc::degenerate, "rotation matrix", "mirrors: its determinant is negative");
+  if (!(determinant > 16.0 * std::numeric_limits<double>::epsilon()))
+    return fail(errc::degenerate, "rotation matrix", "is singular");
+  const auto [u, values, v] = singular_values_of<3>(m);
+  return so3{mat3(u * v.transpose())};
 }
 
 }  // namespace orbis

@@ -16,8 +16,8 @@
 #include <Eigen/LU>
 #include <Eigen/SVD>
 
+#include <orbis/core/jacobi.hpp>
 #include <orbis/core/result.hpp>
-#include <orbis/core/rotation.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/core/trajectory.hpp>
 

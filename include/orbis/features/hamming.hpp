@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <type_traits>
 
-#include <orbis/core/bit_string.hpp>
+#include <orbis/core/bits.hpp>
 #include <orbis/features/descriptor.hpp>
 
 namespace orbis::features {

@@ -17,9 +17,9 @@
 
 #include <orbis/core/image.hpp>
 #include <orbis/core/result.hpp>
-#include <orbis/core/strided_points.hpp>
 #include <orbis/core/types.hpp>
 #include <orbis/features/descriptor.hpp>
+#include <orbis/interop/strided_points.hpp>
 
 namespace orbis::interop {
 

@@ -22,7 +22,7 @@
 #include <utility>
 #include <vector>
 
-#include <orbis/core/bits.hpp>
+#include <orbis/core/bytes.hpp>
 #include <orbis/core/file.hpp>
 #include <orbis/core/point_cloud.hpp>
 #include <orbis/core/result.hpp>

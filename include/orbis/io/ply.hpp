@@ -23,7 +23,7 @@
 #include <utility>
 #include <vector>
 
-#include <orbis/core/bits.hpp>
+#include <orbis/core/bytes.hpp>
 #include <orbis/core/file.hpp>
 #include <orbis/core/point.hpp>
 #include <orbis/core/point_cloud.hpp>

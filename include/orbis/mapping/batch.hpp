@@ -20,7 +20,6 @@
 #include <orbis/cloud/extract.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/point_cloud.hpp>
-#include <orbis/core/progress.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/mapping/dense_cloud.hpp>
 #include <orbis/mapping/filter.hpp>

@@ -26,7 +26,6 @@
 #include <orbis/cloud/statistical.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/point.hpp>
-#include <orbis/core/progress.hpp>
 
 namespace orbis::mapping {
 

@@ -36,7 +36,7 @@
 #include <utility>
 #include <vector>
 
-#include <orbis/core/crc32c.hpp>
+#include <orbis/core/bytes.hpp>
 #include <orbis/core/file.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/octree/detail/files/compact_tree.hpp>

@@ -14,7 +14,6 @@
 
 #include <orbis/core/execution.hpp>
 #include <orbis/core/hash_index.hpp>
-#include <orbis/core/progress.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/octree/detail/storage/large_leaves.hpp>
 #include <orbis/octree/key.hpp>

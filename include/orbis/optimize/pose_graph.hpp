@@ -20,7 +20,6 @@
 #include <vector>
 
 #include <orbis/core/execution.hpp>
-#include <orbis/core/progress.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/core/types.hpp>
 #include <orbis/optimize/detail/pose/chordal_system.hpp>

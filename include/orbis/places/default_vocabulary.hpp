@@ -8,7 +8,7 @@
 #include <string>
 #include <string_view>
 
-#include <orbis/core/base85.hpp>
+#include <orbis/core/bytes.hpp>
 #include <orbis/places/detail/default_vocabulary_data.hpp>
 #include <orbis/places/vocabulary.hpp>
 #include <orbis/places/vocabulary_file.hpp>

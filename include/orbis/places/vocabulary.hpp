@@ -15,7 +15,7 @@
 #include <utility>
 #include <vector>
 
-#include <orbis/core/bit_string.hpp>
+#include <orbis/core/bits.hpp>
 #include <orbis/places/bag_of_words.hpp>
 #include <orbis/places/detail/descent.hpp>
 #include <orbis/places/vocabulary_tree.hpp>

@@ -32,7 +32,7 @@
 #include <utility>
 #include <vector>
 
-#include <orbis/core/crc32c.hpp>
+#include <orbis/core/bytes.hpp>
 #include <orbis/core/file.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/places/bag_of_words.hpp>

@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include <orbis/core/bit_string.hpp>
+#include <orbis/core/bits.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/places/bag_of_words.hpp>
 #include <orbis/places/detail/table_memory.hpp>

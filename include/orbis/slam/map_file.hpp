@@ -35,7 +35,7 @@
 #include <string_view>
 #include <utility>
 
-#include <orbis/core/bits.hpp>
+#include <orbis/core/bytes.hpp>
 #include <orbis/core/file.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/slam/detail/map/file_sections.hpp>

@@ -7,7 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include <orbis/core/bits.hpp>
+#include <orbis/core/bytes.hpp>
 
 namespace orbis::io::detail {
 

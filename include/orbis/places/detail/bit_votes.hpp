@@ -8,7 +8,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include <orbis/core/bit_string.hpp>
+#include <orbis/core/bits.hpp>
 
 namespace orbis::places::detail {
 

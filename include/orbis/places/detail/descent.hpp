@@ -12,7 +12,7 @@
 #include <cstdint>
 #include <cstring>
 
-#include <orbis/core/bit_string.hpp>
+#include <orbis/core/bits.hpp>
 #include <orbis/core/simd/dispatch.hpp>
 #include <orbis/places/detail/nearest_child.hpp>
 #include <orbis/places/vocabulary_tree.hpp>

@@ -10,7 +10,7 @@
 #include <span>
 #include <vector>
 
-#include <orbis/core/bit_string.hpp>
+#include <orbis/core/bits.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/random.hpp>
 #include <orbis/places/detail/bit_votes.hpp>

@@ -7,7 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include <orbis/core/bit_string.hpp>
+#include <orbis/core/bits.hpp>
 #include <orbis/core/simd/dispatch.hpp>
 #include <orbis/core/simd/integer.hpp>
 #include <orbis/core/simd/mask.hpp>

@@ -8,7 +8,6 @@
 #include <mutex>
 
 #include <orbis/core/execution.hpp>
-#include <orbis/core/progress.hpp>
 #include <orbis/core/result.hpp>
 
 namespace orbis::cloud::detail {

@@ -19,7 +19,6 @@
 #include <orbis/cloud/ray_evidence.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/image.hpp>
-#include <orbis/core/progress.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/core/types.hpp>
 

@@ -20,7 +20,6 @@
 #include <orbis/cloud/ray_evidence.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/point.hpp>
-#include <orbis/core/progress.hpp>
 
 namespace orbis::cloud::detail {
 

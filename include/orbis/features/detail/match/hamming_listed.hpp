@@ -9,7 +9,7 @@
 #include <cstring>
 #include <span>
 
-#include <orbis/core/bit_string.hpp>
+#include <orbis/core/bits.hpp>
 #include <orbis/core/simd/dispatch.hpp>
 #include <orbis/core/simd/mask.hpp>
 

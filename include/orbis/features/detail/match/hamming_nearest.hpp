@@ -11,7 +11,7 @@
 #include <span>
 #include <vector>
 
-#include <orbis/core/bit_string.hpp>
+#include <orbis/core/bits.hpp>
 #include <orbis/core/simd/dispatch.hpp>
 #include <orbis/features/detail/match/hamming_listed.hpp>
 #include <orbis/features/detail/match/hamming_slices.hpp>

@@ -18,7 +18,7 @@
 #include <span>
 #include <type_traits>
 
-#include <orbis/core/bit_string.hpp>
+#include <orbis/core/bits.hpp>
 #include <orbis/core/simd/dispatch.hpp>
 #include <orbis/core/simd/vec.hpp>
 

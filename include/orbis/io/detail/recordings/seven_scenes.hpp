@@ -19,8 +19,8 @@
 
 #include <orbis/camera/settings.hpp>
 #include <orbis/core/file.hpp>
+#include <orbis/core/jacobi.hpp>
 #include <orbis/core/result.hpp>
-#include <orbis/core/rotation.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/io/detail/recordings/recording_index.hpp>
 #include <orbis/io/detail/text.hpp>

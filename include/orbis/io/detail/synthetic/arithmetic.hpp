@@ -3,7 +3,7 @@
 /// The arithmetic that synthetic pixels are made of: the same bits on every machine.
 ///
 /// Only operations that IEEE 754 defines to the last bit (+ - * / sqrt, conversions) and integers
-/// are used; sine and cosine are those of core/portable_sine.hpp. A compiler may still fuse a product and a
+/// are used; sine and cosine are those of core/rounded.hpp. A compiler may still fuse a product and a
 /// sum into one rounding where the target can (`-march=native`), so every header whose arithmetic
 /// reaches a pixel switches this off for its own functions, between ORBIS_BEGIN_UNFUSED and
 /// ORBIS_END_UNFUSED. Functions in such a region are no templates: those would be compiled elsewhere,
@@ -13,8 +13,8 @@
 #include <cmath>
 #include <cstdint>
 
-#include <orbis/core/portable_sine.hpp>
 #include <orbis/core/random.hpp>
+#include <orbis/core/rounded.hpp>
 #include <orbis/core/types.hpp>
 
 ORBIS_BEGIN_UNFUSED

@@ -9,7 +9,6 @@
 #include <orbis/camera/any.hpp>
 #include <orbis/camera/pinhole.hpp>
 #include <orbis/core/execution.hpp>
-#include <orbis/core/progress.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/core/types.hpp>
 #include <orbis/optimize/bundle_adjustment.hpp>

@@ -20,7 +20,6 @@
 
 #include <orbis/camera/model.hpp>
 #include <orbis/core/execution.hpp>
-#include <orbis/core/progress.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/optimize/pose_graph.hpp>
 #include <orbis/slam/camera_rig.hpp>

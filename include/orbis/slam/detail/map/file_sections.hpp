@@ -10,8 +10,7 @@
 #include <string>
 #include <string_view>
 
-#include <orbis/core/bits.hpp>
-#include <orbis/core/crc32c.hpp>
+#include <orbis/core/bytes.hpp>
 
 namespace orbis::slam::detail {
 

@@ -26,7 +26,7 @@
 #include <vector>
 
 #include <orbis/camera/model.hpp>
-#include <orbis/core/progress.hpp>
+#include <orbis/core/execution.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/slam/camera_rig.hpp>
 #include <orbis/slam/covisibility_graph.hpp>

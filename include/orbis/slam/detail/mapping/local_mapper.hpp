@@ -10,7 +10,7 @@
 #include <vector>
 
 #include <orbis/camera/model.hpp>
-#include <orbis/core/progress.hpp>
+#include <orbis/core/execution.hpp>
 #include <orbis/slam/detail/mapping/keyframe_culling.hpp>
 #include <orbis/slam/detail/mapping/landmark_culling.hpp>
 #include <orbis/slam/detail/mapping/landmark_fusion.hpp>

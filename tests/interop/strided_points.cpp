@@ -6,11 +6,12 @@
 #include <vector>
 
 #include <orbis/core/point.hpp>
-#include <orbis/core/strided_points.hpp>
+#include <orbis/interop/strided_points.hpp>
 
 #include "support/catch.hpp"
 
 using namespace orbis;
+using namespace orbis::interop;
 
 static_assert(point_range<strided_points<float>> && point_range<const strided_points<double>&>);
 static_assert(std::ranges::view<strided_points<float>> && std::ranges::borrowed_range<strided_points<float>>);

@@ -14,7 +14,7 @@
 #include <iterator>
 #include <ranges>
 
-namespace orbis {
+namespace orbis::interop {
 
 /// Where the points are, in numbers of the type `S`.
 struct point_layout {
@@ -112,11 +112,11 @@ class strided_points {
   point_layout layout_{};
 };
 
-}  // namespace orbis
+}  // namespace orbis::interop
 
 /// @cond
 template <class S>
-inline constexpr bool std::ranges::enable_borrowed_range<orbis::strided_points<S>> = true;
+inline constexpr bool std::ranges::enable_borrowed_range<orbis::interop::strided_points<S>> = true;
 template <class S>
-inline constexpr bool std::ranges::enable_view<orbis::strided_points<S>> = true;
+inline constexpr bool std::ranges::enable_view<orbis::interop::strided_points<S>> = true;
 /// @endcond
