@@ -1,6 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
 /// Judging trajectories and maps.
+///
+/// | header | what it is for |
+/// | --- | --- |
+/// | `alignment.hpp` | poses of two trajectories that belong together, and the transform between them |
+/// | `ate.hpp` | absolute trajectory error |
+/// | `rpe.hpp` | relative pose error |
+/// | `cloud_error.hpp` | distances of points to the true surface |
+/// | `statistics.hpp` | mean, median, RMSE and more of a list of errors |
 #pragma once
 
 #include <orbis/eval/alignment.hpp>

@@ -1,6 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
 /// Mapping: keyframes to dense clouds, filtered clouds and octrees.
+///
+/// | header | what it is for |
+/// | --- | --- |
+/// | `batch.hpp` | `build_map`: from posed keyframes to a map, all at once |
+/// | `dense_cloud.hpp` | the points of all keyframes as one cloud, which follows corrections of their poses |
+/// | `filter.hpp` | `filter_points`: the outlier filter, as a choice at run time |
+/// | `keyframe.hpp` | what mapping needs of a keyframe |
+/// | `keyframe_points.hpp` | the points of one keyframe |
 #pragma once
 
 #include <orbis/mapping/batch.hpp>

@@ -17,10 +17,11 @@
 /// | ransac.hpp | RANSAC for any model |
 /// | ransac_policies.hpp | scoring, sampling, preemption and local optimisation for RANSAC |
 /// | reprojection.hpp | reprojection error for any camera model |
-/// | reprojection_with_intrinsics.hpp | reprojection error with intrinsics among the unknowns; the camera of BAL files
-/// | | robust_loss.hpp | robust losses (Huber, Cauchy, Tukey, Geman-McClure), chi-squared gates | | solver_policies.hpp
-/// | damping (Gauss-Newton, Levenberg-Marquardt, dogleg), solvers of the reduced system | | triangulation.hpp | points
-/// from two or more rays | | two_view.hpp | essential matrix, homography and relative pose of two images |
+/// | reprojection_with_intrinsics.hpp | the same with intrinsics among the unknowns; the camera of BAL files |
+/// | robust_loss.hpp | robust losses (Huber, Cauchy, Tukey, Geman-McClure), chi-squared gates |
+/// | solver_policies.hpp | damping (Gauss-Newton, Levenberg-Marquardt, dogleg), solvers of the reduced system |
+/// | triangulation.hpp | points from two or more rays |
+/// | two_view.hpp | essential matrix, homography and relative pose of two images |
 #pragma once
 
 #include <orbis/optimize/alignment.hpp>

@@ -22,9 +22,8 @@ namespace orbis::slam {
 /// A database of the appearance of keyframes, for descriptors of type `D`.
 ///  - `describe(features)`: the signature of an image. It may be called at any time, from any thread.
 ///  - `add`, `erase`, `rename`: change the keyframes in the database; false if that is not possible.
-///  - `similar(signature, count, exclude, neighbors)`: at most `count` keyframes, the most similar first. Those for
-///  which
-///    `exclude(id)` is true are left out. `neighbors(id)` gives keyframes that observe the same place, of which one is
+///  - `similar(signature, count, exclude, neighbors)`: at most `count` keyframes, the most similar first, without those
+///    for which `exclude(id)` is true. `neighbors(id)` gives keyframes that observe the same place, of which one is
 ///    enough.
 /// The same changes give the same answers.
 template <class P, class D>

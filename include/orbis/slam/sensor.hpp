@@ -21,8 +21,7 @@ namespace orbis::slam {
 
 /// A kind of sensor, as a compile-time policy of the SLAM system: a type without state, with
 ///  - `S::measure(rig, extract, images...)`: a frame with its features, their rays, and what the sensor measures for
-///  each
-///    (its depth, 0 where there is none); `images...` are those that the sensor takes at one moment;
+///    each (its depth, 0 where there is none); `images...` are those that the sensor takes at one moment;
 ///  - `S::begins_map(frame, options)`: the number of points with which this frame can begin a map; 0 if it cannot.
 template <class S, class D>
 concept sensor = feature_descriptor<D> && requires(const basic_frame<D>& f, const options& settings) {
