@@ -20,7 +20,8 @@ declare -A allowed=(
 
 while IFS=: read -r file line text; do
   component=${file%%/*}
-  included=$(sed -E 's/.*<orbis\/([^>]+)>.*/\1/' <<<"$text")
+  [[ $text =~ \<orbis/([^\>]+)\> ]] || continue
+  included=${BASH_REMATCH[1]}
   target=${included%%/*}
   target=${target%.hpp}
   [[ $target == "$component" ]] && continue
