@@ -253,14 +253,14 @@ struct vec {
   /// As std::min: b where b < a, else a (also where one of them is not a number).
   friend ORBIS_ALWAYS_INLINE vec min(const vec& a, const vec& b) noexcept {
     if constexpr (is_native)
-      return from_register(b.v < a.v ? b.v : a.v);
+      return extremum<false>(a, b);
     else
       return {min(a.v.low, b.v.low), min(a.v.high, b.v.high)};
   }
   /// As std::max: b where a < b, else a (also where one of them is not a number).
   friend ORBIS_ALWAYS_INLINE vec max(const vec& a, const vec& b) noexcept {
     if constexpr (is_native)
-      return from_register(a.v < b.v ? b.v : a.v);
+      return extremum<true>(a, b);
     else
       return {max(a.v.low, b.v.low), max(a.v.high, b.v.high)};
   }
@@ -322,6 +322,21 @@ struct vec {
   }
 
  private:
+  template <bool Max>
+  [[nodiscard]] static ORBIS_ALWAYS_INLINE vec extremum(const vec& a, const vec& b) noexcept {
+    vec out;
+#if ORBIS_X86
+    if constexpr (std::is_floating_point_v<T> && sizeof(native) == 64)
+      detail::extremum_64<Max>(out.v, a.v, b.v);
+    else if constexpr (std::is_floating_point_v<T> && sizeof(native) == 32)
+      detail::extremum_32<Max>(out.v, a.v, b.v);
+    else if constexpr (std::is_floating_point_v<T> && sizeof(native) == 16)
+      detail::extremum_16<Max>(out.v, a.v, b.v);
+    else
+#endif
+      out.v = (Max ? a.v < b.v : b.v < a.v) ? b.v : a.v;
+    return out;
+  }
   template <detail::order O>
   [[nodiscard]] static ORBIS_ALWAYS_INLINE mask_type compare(const vec& a, const vec& b) noexcept {
     using detail::order;

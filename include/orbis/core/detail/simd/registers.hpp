@@ -47,6 +47,20 @@ enum class order { equal = 0, less = 1, less_equal = 2, unequal = 4 };
 
 #if ORBIS_X86
 
+// -- SSE2: 16 bytes ---------------------------------------------------------------------------------------------------
+
+/// `b` where it is larger (smaller) than `a`, else `a`. g++ 12 makes a comparison and a blend of these where one of
+/// them is a constant.
+template <bool Max, class V>
+ORBIS_ALWAYS_INLINE void extremum_16(V& out, const V& a, const V& b) noexcept {
+  if constexpr (sizeof(a[0]) == 8)
+    out = reinterpret_cast<V>(Max ? _mm_max_pd(reinterpret_cast<__m128d>(b), reinterpret_cast<__m128d>(a))
+                                  : _mm_min_pd(reinterpret_cast<__m128d>(b), reinterpret_cast<__m128d>(a)));
+  else
+    out = reinterpret_cast<V>(Max ? _mm_max_ps(reinterpret_cast<__m128>(b), reinterpret_cast<__m128>(a))
+                                  : _mm_min_ps(reinterpret_cast<__m128>(b), reinterpret_cast<__m128>(a)));
+}
+
 // -- AVX2: 32 bytes ---------------------------------------------------------------------------------------------------
 
 /// The sign bits of the lanes.
@@ -85,6 +99,15 @@ ORBIS_TARGET_AVX2 inline void broadcast_32(V& out, const element_of<V>& x) noexc
     out = reinterpret_cast<V>(_mm256_set1_epi16(static_cast<std::int16_t>(x)));
   else
     out = reinterpret_cast<V>(_mm256_set1_epi8(static_cast<char>(x)));
+}
+template <bool Max, class V>
+ORBIS_TARGET_AVX2 inline void extremum_32(V& out, const V& a, const V& b) noexcept {
+  if constexpr (sizeof(a[0]) == 8)
+    out = reinterpret_cast<V>(Max ? _mm256_max_pd(reinterpret_cast<__m256d>(b), reinterpret_cast<__m256d>(a))
+                                  : _mm256_min_pd(reinterpret_cast<__m256d>(b), reinterpret_cast<__m256d>(a)));
+  else
+    out = reinterpret_cast<V>(Max ? _mm256_max_ps(reinterpret_cast<__m256>(b), reinterpret_cast<__m256>(a))
+                                  : _mm256_min_ps(reinterpret_cast<__m256>(b), reinterpret_cast<__m256>(a)));
 }
 template <class V>
 ORBIS_TARGET_AVX2 inline void square_root_32(V& out, const V& v) noexcept {
@@ -170,6 +193,17 @@ ORBIS_TARGET_AVX512 inline void broadcast_64(V& out, const element_of<V>& x) noe
     out = reinterpret_cast<V>(_mm512_set1_epi16(static_cast<std::int16_t>(x)));
   else
     out = reinterpret_cast<V>(_mm512_set1_epi8(static_cast<char>(x)));
+}
+template <bool Max, class V>
+ORBIS_TARGET_AVX512 inline void extremum_64(V& out, const V& a, const V& b) noexcept {
+  if constexpr (sizeof(a[0]) == 8)
+    out = reinterpret_cast<V>(
+        Max ? _mm512_maskz_max_pd(0xff, reinterpret_cast<__m512d>(b), reinterpret_cast<__m512d>(a))
+            : _mm512_maskz_min_pd(0xff, reinterpret_cast<__m512d>(b), reinterpret_cast<__m512d>(a)));
+  else
+    out = reinterpret_cast<V>(
+        Max ? _mm512_maskz_max_ps(0xffff, reinterpret_cast<__m512>(b), reinterpret_cast<__m512>(a))
+            : _mm512_maskz_min_ps(0xffff, reinterpret_cast<__m512>(b), reinterpret_cast<__m512>(a)));
 }
 template <class V>
 ORBIS_TARGET_AVX512 inline void square_root_64(V& out, const V& v) noexcept {
