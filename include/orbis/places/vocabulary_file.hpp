@@ -15,7 +15,6 @@
 ///         the number of children (u16) of each node up to the last that has any
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <bit>
 #include <cerrno>
@@ -49,23 +48,6 @@ namespace detail {
 inline constexpr std::uint32_t vocabulary_version = 1;
 inline constexpr std::size_t vocabulary_header = 64, vocabulary_checked_from = 16;
 
-/// From the order of bytes of this machine to little-endian, or back.
-template <class T>
-void swap_if_big_endian(std::span<T> values) noexcept {
-  if constexpr (std::endian::native != std::endian::little)
-    for (T& value : values) {
-      auto bytes = std::bit_cast<std::array<std::byte, sizeof(T)>>(value);
-      std::ranges::reverse(bytes);
-      value = std::bit_cast<T>(bytes);
-    }
-}
-
-[[nodiscard]] inline std::uint32_t little_u32(const std::byte* from) noexcept {
-  std::uint32_t value = 0;
-  for (unsigned i = 0; i != 4; ++i) value |= static_cast<std::uint32_t>(from[i]) << (8 * i);
-  return value;
-}
-
 /// The words of all descriptors, one after the other.
 template <std::size_t Bits>
 [[nodiscard]] std::span<std::uint64_t> all_words(std::span<bit_words<Bits>> descriptors) noexcept {
@@ -78,12 +60,12 @@ template <std::size_t Bits, class Read>
 [[nodiscard]] result<basic_vocabulary<Bits>> read_vocabulary_by(Read&& read, std::uint64_t size,
                                                                 const std::string& where) {
   const auto bad = [&](std::string why) { return fail(errc::malformed, where, std::move(why)); };
-  std::array<std::byte, vocabulary_header> header{};
+  std::array<char, vocabulary_header> header{};
   if (size < header.size()) return bad("too short for a vocabulary");
-  if (auto done = read(std::span<std::byte>{header}); !done) return fail(done.error());
+  if (auto done = read(std::as_writable_bytes(std::span{header})); !done) return fail(done.error());
   if (std::memcmp(header.data(), vocabulary_magic.data(), vocabulary_magic.size()) != 0)
     return bad("not a vocabulary of orbis: it does not begin with \"orbisvoc\"");
-  const auto field = [&](std::size_t at) { return little_u32(header.data() + at); };
+  const auto field = [&](std::size_t at) { return load_number<std::uint32_t>(header.data() + at); };
   if (field(8) != vocabulary_version)
     return fail(errc::unsupported, where, "version " + std::to_string(field(8)) + ", this reads version 1");
   if (field(16) != Bits)
@@ -100,12 +82,13 @@ template <std::size_t Bits, class Read>
   vocabulary_tree<Bits> tree;
   tree.resize(nodes);
   tree.weights_are = static_cast<weighting>(field(20));
-  std::uint32_t sum = crc32c(std::span{header}.subspan(vocabulary_checked_from));
-  const auto read_all = [&](auto values) -> result<void> {
+  std::uint32_t sum = crc32c(std::as_bytes(std::span{header}).subspan(vocabulary_checked_from));
+  const auto read_all = [&]<class T>(std::span<T> values) -> result<void> {
     const auto bytes = std::as_writable_bytes(values);
     if (auto done = read(bytes); !done) return done;
     sum = crc32c(bytes, sum);
-    swap_if_big_endian(values);
+    if constexpr (std::endian::native != std::endian::little)
+      for (T& value : values) value = load_number<T>(reinterpret_cast<const char*>(&value));
     return {};
   };
   if (auto done = read_all(all_words<Bits>(tree.descriptors.values())); !done) return fail(done.error());
@@ -125,30 +108,19 @@ template <std::size_t Bits>
 [[nodiscard]] std::string vocabulary_bytes(const basic_vocabulary<Bits>& vocabulary) {
   const auto& tree = vocabulary.tree();
   std::string bytes(vocabulary_magic);
-  const auto put = [&]<class T>(std::span<const T> values) {
-    std::vector<T> swapped(values.begin(), values.end());
-    detail::swap_if_big_endian(std::span{swapped});
-    bytes.append(reinterpret_cast<const char*>(swapped.data()), swapped.size() * sizeof(T));
-  };
-  const std::array<std::uint32_t, 14> header{detail::vocabulary_version,
-                                             0,
-                                             static_cast<std::uint32_t>(Bits),
-                                             static_cast<std::uint32_t>(tree.weights_are),
-                                             tree.node_count,
-                                             tree.inner_end(),
-                                             tree.word_count()};
-  put(std::span<const std::uint32_t>{header});
-  std::vector<std::uint64_t> words;
+  for (const std::uint32_t field :
+       {detail::vocabulary_version, 0U, static_cast<std::uint32_t>(Bits), static_cast<std::uint32_t>(tree.weights_are),
+        tree.node_count, tree.inner_end(), tree.word_count()})
+    append_little_endian(bytes, field);
+  bytes.resize(detail::vocabulary_header);
   for (const auto& descriptor : tree.descriptors.values())
-    words.insert(words.end(), descriptor.begin(), descriptor.end());
-  put(std::span<const std::uint64_t>{words});
-  put(std::span<const float>{tree.weights});
-  std::vector<std::uint16_t> child_counts;
+    for (const std::uint64_t word : descriptor) append_little_endian(bytes, word);
+  for (const float weight : tree.weights) append_little_endian(bytes, weight);
   for (std::size_t i = 0; i + 1 < tree.nodes.size(); ++i)
-    child_counts.push_back(static_cast<std::uint16_t>(tree.nodes[i + 1].first_child - tree.nodes[i].first_child));
-  put(std::span<const std::uint16_t>{child_counts});
-  const std::uint32_t sum = crc32c(std::as_bytes(std::span{bytes}).subspan(detail::vocabulary_checked_from));
-  for (unsigned i = 0; i != 4; ++i) bytes[12 + i] = static_cast<char>((sum >> (8 * i)) & 0xffU);
+    append_little_endian(bytes, static_cast<std::uint16_t>(tree.nodes[i + 1].first_child - tree.nodes[i].first_child));
+  std::string sum;
+  append_little_endian(sum, crc32c(std::as_bytes(std::span{bytes}).subspan(detail::vocabulary_checked_from)));
+  bytes.replace(12, sum.size(), sum);
   return bytes;
 }
 

@@ -74,32 +74,6 @@ TEST_CASE("the strongest are the strongest") {
   CHECK(some == corners);
 }
 
-TEST_CASE("covering takes the strongest of each cell on any level, then the strongest of the levels") {
-  std::vector<level_corners> levels(2);
-  levels[0].area = {10, 10, 200, 200};
-  levels[1].area = {5, 5, 100, 100};
-  levels[1].scale = 2.0;
-  for (int i = 0; i != 60; ++i) levels[0].corners.push_back({20 + i % 8, 20 + i / 8, 100.0F + static_cast<float>(i)});
-  for (int i = 0; i != 30; ++i) levels[1].corners.push_back({12 + i % 8, 12 + i / 8, 200.0F + static_cast<float>(i)});
-  levels[0].corners.push_back({180, 180, 5.0F});
-  levels[1].corners.push_back({91, 91, 6.0F});  // in the same cell as the one before, but stronger
-  levels[0].corners.push_back({180, 30, 4.0F});
-  cover_first::workspace memory;
-  cover_first{.share = 0.4}(levels, 40, memory);  // 16 cells of 50 pixels
-  CHECK(levels[0].corners.size() + levels[1].corners.size() == 40);
-  const auto has = [&](std::size_t level, const corner& c) {
-    return std::count(levels[level].corners.begin(), levels[level].corners.end(), c) == 1;
-  };
-  CHECK(has(1, {91, 91, 6.0F}));
-  CHECK_FALSE(has(0, {180, 180, 5.0F}));
-  CHECK(has(0, {180, 30, 4.0F}));
-  CHECK(has(0, {20 + 59 % 8, 20 + 59 / 8, 159.0F}));
-  CHECK(has(1, {12 + 29 % 8, 12 + 29 / 8, 229.0F}));
-  CHECK((in_image_order(levels[0].corners) && in_image_order(levels[1].corners)));
-  for (const level_corners& level : levels)
-    for (const corner& c : level.corners) CHECK(c.response > 0.0F);
-}
-
 TEST_CASE("levels share by the sides of their images, and what one cannot give the others do") {
   std::vector<level_corners> levels(3);
   const auto fill = [&](std::size_t a, std::size_t b, std::size_t c) {
