@@ -13,14 +13,16 @@
 /// | `png.hpp`, `jpeg.hpp` | images of one format, read and (PNG) written                                     |
 /// | `cloud_file.hpp`      | point clouds, whatever their format                                              |
 /// | `ply.hpp`, `pcd.hpp`  | point clouds of one format, read and written                                     |
-/// | `bal.hpp`             | bundle adjustment problems ("bundle adjustment in the large")                    |
-/// | `g2o.hpp`             | pose graphs                                                                      |
+/// | `bal_problem.hpp`, `bal.hpp` | bundle adjustment problems ("bundle adjustment in the large"); their files |
+/// | `g2o_graph.hpp`, `g2o.hpp` | pose graphs; their files                                                    |
 #pragma once
 
 #include <orbis/io/bal.hpp>
+#include <orbis/io/bal_problem.hpp>
 #include <orbis/io/camera_file.hpp>
 #include <orbis/io/cloud_file.hpp>
 #include <orbis/io/g2o.hpp>
+#include <orbis/io/g2o_graph.hpp>
 #include <orbis/io/image.hpp>
 #include <orbis/io/jpeg.hpp>
 #include <orbis/io/pcd.hpp>

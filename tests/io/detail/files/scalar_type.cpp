@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <bit>
 
-#include <orbis/io/detail/scalar_type.hpp>
+#include <orbis/io/detail/files/scalar_type.hpp>
 
 #include "support/catch.hpp"
 

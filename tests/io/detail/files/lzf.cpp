@@ -2,7 +2,7 @@
 #include <string>
 
 #include <orbis/core/random.hpp>
-#include <orbis/io/detail/lzf.hpp>
+#include <orbis/io/detail/files/lzf.hpp>
 
 #include "support/catch.hpp"
 

@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// A JPEG decoder over bytes in memory.
+///
+/// libjpeg reports errors by `longjmp` here. Every function that calls `setjmp` keeps nothing but
+/// trivial locals, so that no destructor is jumped over.
+#pragma once
+
+#include <csetjmp>
+#include <cstddef>
+#include <cstdint>
+#include <cstdio>  // jpeglib.h needs it
+#include <cstring>
+#include <string>
+#include <string_view>
+
+#include <jpeglib.h>
+
+#include <orbis/core/image.hpp>
+
+namespace orbis::io::detail {
+
+/// A decoder over bytes in memory.
+class jpeg_decoder {
+ public:
+  explicit jpeg_decoder(std::string_view bytes) : size_{bytes.size()} {
+    info_.err = jpeg_std_error(&trouble_.base);
+    trouble_.base.error_exit = [](j_common_ptr info) {
+      auto* own = reinterpret_cast<struct trouble*>(info->err);
+      info->err->format_message(info, own->message);
+      std::longjmp(own->jump, 1);
+    };
+    // Warnings are counted by hand: a decoder that goes on after a bad code makes up pixels.
+    trouble_.base.emit_message = [](j_common_ptr info, int level) {
+      if (level < 0 && info->err->num_warnings++ == 0)
+        info->err->format_message(info, reinterpret_cast<struct trouble*>(info->err)->message);
+    };
+    trouble_.base.output_message = [](j_common_ptr) {};
+
+    source_.next_input_byte = reinterpret_cast<const JOCTET*>(bytes.data());
+    source_.bytes_in_buffer = bytes.size();
+    source_.init_source = [](j_decompress_ptr) {};
+    source_.term_source = [](j_decompress_ptr) {};
+    source_.resync_to_restart = jpeg_resync_to_restart;
+    source_.fill_input_buffer = [](j_decompress_ptr info) -> boolean { out_of_data(info); };
+    source_.skip_input_data = [](j_decompress_ptr info, long count) {
+      if (count <= 0) return;
+      if (static_cast<std::size_t>(count) > info->src->bytes_in_buffer) out_of_data(info);
+      info->src->next_input_byte += count;
+      info->src->bytes_in_buffer -= static_cast<std::size_t>(count);
+    };
+  }
+  jpeg_decoder(const jpeg_decoder&) = delete;
+  jpeg_decoder& operator=(const jpeg_decoder&) = delete;
+  ~jpeg_decoder() { jpeg_destroy_decompress(&info_); }
+
+  /// Reads up to the pixels. False: see `message`.
+  bool read_header() {
+    if (setjmp(trouble_.jump) != 0) return false;
+    jpeg_create_decompress(&info_);
+    info_.src = &source_;
+    jpeg_read_header(&info_, TRUE);
+    // A Huffman-coded block of 64 pixels takes a bit at least; arithmetic coding a little less.
+    const std::uint64_t pixels = std::uint64_t{info_.image_width} * info_.image_height;
+    if (pixels > (std::uint64_t{1} << 28) || (pixels > (1U << 20) && pixels > 2048 * std::uint64_t{size_}))
+      return give_up("claims more pixels than the file can hold");
+    return true;
+  }
+
+  /// Decodes to 8-bit colour. False: see `message`. @pre read_header() was true
+  bool read_pixels(rgb8* to) {
+    if (setjmp(trouble_.jump) != 0) return false;
+    info_.out_color_space = JCS_RGB;
+    info_.err->num_warnings = 0;  // what a header is warned about does not change pixels
+    jpeg_start_decompress(&info_);
+    while (info_.output_scanline < info_.output_height) {
+      auto* row = reinterpret_cast<JSAMPROW>(to + std::size_t{info_.output_scanline} * info_.output_width);
+      jpeg_read_scanlines(&info_, &row, 1);
+      if (info_.err->num_warnings != 0) return false;
+    }
+    if (info_.err->num_warnings != 0) return false;
+    jpeg_finish_decompress(&info_);
+    return true;
+  }
+
+  [[nodiscard]] int width() const { return static_cast<int>(info_.image_width); }
+  [[nodiscard]] int height() const { return static_cast<int>(info_.image_height); }
+  [[nodiscard]] std::string message() const { return trouble_.message; }
+
+ private:
+  struct trouble {
+    jpeg_error_mgr base;  // first: libjpeg hands a pointer to it back to us
+    std::jmp_buf jump;
+    char message[JMSG_LENGTH_MAX] = "";
+  };
+
+  [[noreturn]] static void out_of_data(j_decompress_ptr info) {
+    auto* trouble = reinterpret_cast<struct trouble*>(info->err);
+    std::strncpy(trouble->message, "the file ends early", sizeof trouble->message - 1);
+    std::longjmp(trouble->jump, 1);
+  }
+  bool give_up(const char* why) {
+    std::strncpy(trouble_.message, why, sizeof trouble_.message - 1);
+    return false;
+  }
+
+  jpeg_decompress_struct info_{};
+  trouble trouble_{};
+  jpeg_source_mgr source_{};
+  std::size_t size_;
+};
+
+}  // namespace orbis::io::detail

@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// The header of a PLY file, and its body number by number.
+#pragma once
+
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include <orbis/core/result.hpp>
+#include <orbis/io/detail/files/scalar_type.hpp>
+#include <orbis/io/detail/text.hpp>
+
+namespace orbis::io::detail {
+
+struct ply_property {
+  std::string name;
+  scalar_type type = scalar_type::float32;
+  std::optional<scalar_type> count;  ///< of a list: the type of its length
+};
+struct ply_element {
+  std::string name;
+  std::uint64_t count = 0;
+  std::vector<ply_property> properties;
+};
+enum class ply_format { ascii, little, big };
+struct ply_header {
+  ply_format format = ply_format::ascii;
+  std::vector<ply_element> elements;
+};
+
+inline std::optional<scalar_type> ply_type(std::string_view name) {
+  using enum scalar_type;
+  constexpr std::pair<std::string_view, scalar_type> names[] = {
+      {"char", int8},     {"int8", int8},       {"uchar", uint8},    {"uint8", uint8},
+      {"short", int16},   {"int16", int16},     {"ushort", uint16},  {"uint16", uint16},
+      {"int", int32},     {"int32", int32},     {"uint", uint32},    {"uint32", uint32},
+      {"float", float32}, {"float32", float32}, {"double", float64}, {"float64", float64}};
+  for (const auto& [known, type] : names)
+    if (known == name) return type;
+  return std::nullopt;
+}
+
+/// Takes the header off the front of `bytes`.
+inline result<ply_header> take_ply_header(std::string_view& bytes, const std::string& where) {
+  ply_header header;
+  const auto bad = [&](std::string why) { return fail(errc::malformed, where, "PLY header: " + std::move(why)); };
+  if (bytes.empty() || trimmed(next_line(bytes)) != "ply") return fail(errc::malformed, where, "is not a PLY file");
+  bool has_format = false;
+  while (!bytes.empty()) {
+    std::string_view line = next_line(bytes);
+    const std::string_view word = next_field(line);
+    if (word == "end_header") {
+      if (!has_format) return bad("no format line");
+      return header;
+    }
+    if (word.empty() || word == "comment" || word == "obj_info") continue;
+    if (word == "format") {
+      const std::string_view name = next_field(line);
+      if (name == "ascii")
+        header.format = ply_format::ascii;
+      else if (name == "binary_little_endian")
+        header.format = ply_format::little;
+      else if (name == "binary_big_endian")
+        header.format = ply_format::big;
+      else
+        return bad("unknown format");
+      has_format = true;
+    } else if (word == "element") {
+      ply_element element{std::string{next_field(line)}, 0, {}};
+      if (element.name.empty() || !parse_number(next_field(line), element.count)) return bad("a bad element line");
+      header.elements.push_back(std::move(element));
+    } else if (word == "property") {
+      if (header.elements.empty()) return bad("a property before any element");
+      std::string_view type = next_field(line);
+      ply_property property;
+      if (type == "list") {
+        property.count = ply_type(next_field(line));
+        if (!property.count || size_of(*property.count) == 8 || *property.count == scalar_type::float32)
+          return bad("a list with a bad type of length");
+        type = next_field(line);
+      }
+      const auto known = ply_type(type);
+      if (!known) return bad("a property of an unknown type");
+      property.type = *known;
+      property.name = next_field(line);
+      header.elements.back().properties.push_back(std::move(property));
+    } else {
+      return bad("an unknown line");
+    }
+  }
+  return bad("ends early");
+}
+
+/// Reads numbers one after the other from the body, in whichever encoding.
+class ply_body {
+ public:
+  ply_body(std::string_view bytes, ply_format format) : left_{bytes}, format_{format} {}
+
+  /// False at the end of the data, or if there is no number of that type.
+  bool next(scalar_type type, double& value) {
+    if (format_ == ply_format::ascii) return parse_number(next_field(left_), value);
+    const std::size_t size = size_of(type);
+    if (left_.size() < size) return false;
+    value = load_as_double(left_.data(), type, format_ == ply_format::big ? std::endian::big : std::endian::little);
+    left_.remove_prefix(size);
+    return true;
+  }
+  bool skip(const ply_property& property) {
+    double value = 0.0, count = 1.0;
+    if (property.count && (!next(*property.count, count) || !(count >= 0.0))) return false;
+    for (; count >= 1.0; count -= 1.0)
+      if (!next(property.type, value)) return false;
+    return true;
+  }
+  [[nodiscard]] std::size_t bytes_left() const { return left_.size(); }
+  /// The least bytes that a property takes.
+  [[nodiscard]] std::size_t least_size(const ply_property& property) const {
+    if (format_ == ply_format::ascii) return 1;
+    return size_of(property.count.value_or(property.type));
+  }
+
+ private:
+  std::string_view left_;
+  ply_format format_;
+};
+
+}  // namespace orbis::io::detail
