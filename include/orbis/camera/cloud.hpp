@@ -96,7 +96,8 @@ template <execution_policy Policy, depth_source Depth>
   return out;
 }
 
-/// The same for a single image, without a table of one's own.
+/// The points of a single depth image: makes the camera's table of rays first. For several images of one camera, make
+/// the table once and call the function above. O(pixels).
 template <execution_policy Policy, depth_source Depth, camera_model Camera>
 [[nodiscard]] unprojected_points unproject_depth(const Policy& policy, const Depth& depth, const Camera& camera,
                                                  const unproject_options& options = {},

@@ -42,7 +42,7 @@ class depth_view {
   /// The range of valid depths, metres.
   [[nodiscard]] float min_depth() const noexcept { return min_; }
   [[nodiscard]] float max_depth() const noexcept { return max_; }
-  /// The same image with a narrower range of valid depths, in metres.
+  /// A view of these pixels with a narrower range of valid depths, in metres.
   [[nodiscard]] depth_view within(float min_depth, float max_depth) const noexcept {
     return depth_view(pixels_, scale_, std::max(min_, min_depth), std::min(max_, max_depth));
   }

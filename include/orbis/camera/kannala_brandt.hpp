@@ -59,7 +59,7 @@ class kannala_brandt {
     if (!std::isfinite(pixel.x()) || !std::isfinite(pixel.y())) return std::nullopt;
     return pixel;
   }
-  /// The same, with the derivative of the pixel by the point; `jacobian` is untouched if empty.
+  /// The pixel of the point, and the derivative of the pixel by the point. Without a pixel `jacobian` is not changed.
   [[nodiscard]] std::optional<vec2> project(const vec3& p, matrix<2, 3>& jacobian) const {
     const auto pixel = project(p);
     if (!pixel) return pixel;

@@ -15,7 +15,7 @@ namespace orbis::camera {
 ///
 /// - `project(p)`: the pixel of a point in the camera frame, empty where there is none (behind the
 ///   camera, outside the model's domain). Does not test against the image bounds.
-/// - `project(p, J)`: the same, with the derivative of the pixel by the point (2x3).
+/// - `project(p, J)`: the pixel, and the derivative of the pixel by the point (2x3).
 /// - `unproject(pixel)`: the ray through a pixel, scaled to z = 1, empty where the inversion fails.
 template <class C>
 concept camera_model = requires(const C& camera, const vec3& point, const vec2& pixel, matrix<2, 3>& jacobian) {

@@ -57,7 +57,7 @@ class radial_tangential {
     if (!(p.z() > 0.0)) return std::nullopt;
     return pixel_of({p.x() / p.z(), p.y() / p.z()});
   }
-  /// The same, with the derivative of the pixel by the point; `jacobian` is untouched if empty.
+  /// The pixel of the point, and the derivative of the pixel by the point. Without a pixel `jacobian` is not changed.
   [[nodiscard]] std::optional<vec2> project(const vec3& p, matrix<2, 3>& jacobian) const {
     const auto pixel = project(p);
     if (pixel) {

@@ -32,7 +32,8 @@ template <camera_model Camera>
   return ray ? ideal.project(*ray) : std::nullopt;
 }
 
-/// The same for the pinhole with the camera's own size and matrix.
+/// Where the ideal pinhole with the camera's own size and matrix sees what the camera sees at `pixel`. None where there
+/// is no such pixel.
 template <has_intrinsics Camera>
 [[nodiscard]] std::optional<vec2> undistort(const Camera& camera, const vec2& pixel) {
   return undistort(camera, pixel, pinhole{camera.k()});

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Whole files in, whole files out: a reader of what we write never sees half a file.
+/// Reads and writes whole files. Who reads a file while it is written never sees a part of it.
 #pragma once
 
 #include <cerrno>

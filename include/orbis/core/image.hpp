@@ -20,7 +20,7 @@ struct rgb8 {
 };
 static_assert(sizeof(rgb8) == 3);
 
-/// A rectangle of pixels that somebody else owns.
+/// A view of a rectangle of pixels; it does not own them.
 template <class T>
 class image_view {
  public:

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The cloud our own readers and mappers hand out. Algorithms take any `point_range`; nothing needs
-/// this type.
+/// The cloud that readers and mappers return. Algorithms take any `point_range`.
 #pragma once
 
 #include <vector>

@@ -229,15 +229,15 @@ class leaf_painter {
 
 }  // namespace detail
 
-/// The same map as an `octomap::OcTree`: the same nodes with the same log-odds, pruned, and the
-/// sensor model's constants as its parameters. @pre map.tree_depth() == octree::default_tree_depth
+/// Converts a map to an `octomap::OcTree` with the same nodes and log-odds, pruned; its parameters are the sensor
+/// model's constants. O(nodes). @pre map.tree_depth() == octree::default_tree_depth
 template <octree::octomap_model Model>
 [[nodiscard]] std::unique_ptr<octomap::OcTree> to_octomap(const octree::occupancy_octree<Model>& map) {
   return detail::make_tree<octomap::OcTree>(map, [](auto&&...) {});
 }
-/// The same as an `octomap::ColorOcTree`: a leaf is split where its voxels' colours differ, so that
-/// none is lost; OctoMap's own `prune()` would merge them and average. Inner nodes have the average
-/// of their children. White is no colour to OctoMap, and colours of unknown voxels are left out.
+/// Converts a map and its colours to an `octomap::ColorOcTree`. A leaf is split where the colours of its voxels
+/// differ, so that none is lost; OctoMap's own `prune()` would merge and average them. Inner nodes have the average of
+/// their children. For OctoMap white means no colour; colours of unknown voxels are left out. O(nodes).
 /// @pre map.tree_depth() == octree::default_tree_depth
 template <octree::octomap_model Model, color_payload Color>
 [[nodiscard]] std::unique_ptr<octomap::ColorOcTree> to_octomap(const octree::occupancy_octree<Model>& map,
@@ -247,15 +247,14 @@ template <octree::octomap_model Model, color_payload Color>
   return tree;
 }
 
-/// The same map as an `octomap::OcTree`. The tree's own sensor parameters are not carried over: they
-/// are the Model's. Errors: malformed for a log-odds that is not finite, unsupported for a tree of
-/// another depth than 16.
+/// Converts an `octomap::OcTree` to a map. The tree's sensor parameters are not used; the map has those of the Model.
+/// Errors: malformed for a log-odds that is not finite, unsupported for a tree of another depth than 16.
 template <octree::octomap_model Model = octree::log_odds<>>
 [[nodiscard]] result<octree::occupancy_octree<Model>> from_octomap(const octomap::OcTree& tree) {
   return detail::read_tree<Model>(tree, [](auto&&...) { return true; });
 }
-/// The same map as an `octomap::ColorOcTree`, and its leaves' colours, one observation each; those of
-/// inner nodes follow from them. Errors: those above, and unsupported for a leaf of more than 32x32x32
+/// Converts an `octomap::ColorOcTree` to a map and the colours of its leaves, one observation each; colours of inner
+/// nodes are not read. Errors: those above, and unsupported for a leaf of more than 32x32x32
 /// voxels that has a colour, since each voxel takes its own.
 template <octree::octomap_model Model = octree::log_odds<>, color_payload Color = octree::rgb_mean>
 [[nodiscard]] result<colored_map<Model, Color>> from_octomap(const octomap::ColorOcTree& tree) {

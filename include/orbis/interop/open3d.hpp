@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Open3D's clouds (`open3d::geometry::PointCloud`). Their `points_` are a range of points as they are,
-/// for every algorithm here, and no point is copied; indices go into the cloud, so that colours,
-/// normals and covariances ride along:
+/// Open3D's clouds (`open3d::geometry::PointCloud`). Every algorithm takes their `points_` in place, as a range of
+/// points. Filters return indices; `extract` copies the chosen points with their colours, normals and covariances:
 ///
 /// @code
 ///   const auto keep = orbis::cloud::statistical_inliers(orbis::par, cloud.points_);

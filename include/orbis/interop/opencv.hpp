@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// OpenCV's images, points and keypoints as ours, and ours as OpenCV's; pixels and points stay where they
-/// are.
+/// Views of OpenCV's images and points as types of orbis, and the other way round, without copies; conversions of
+/// keypoints and of the order of colours.
 #pragma once
 
 #include <concepts>
@@ -97,7 +97,8 @@ template <shared_pixel T>
   return {view.height(), view.width(), cv_type<T>, view.data(), static_cast<std::size_t>(view.stride()) * sizeof(T)};
 }
 
-/// The same for pixels that must not change. `cv::Mat` has no const: only read from it.
+/// A `cv::Mat` header over pixels that must not change; they must outlive it. `cv::Mat` has no const: only read from
+/// it.
 template <shared_pixel T>
 [[nodiscard]] const cv::Mat mat_over(image_view<const T> view) {  // NOLINT(readability-const-return-type)
   if (view.empty()) return {};

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// PCL's clouds. A `pcl::PointCloud` is a range of points as it is, for every algorithm here, and no
-/// point is copied; indices go into the cloud, so that colours and all other fields ride along:
+/// PCL's clouds. Every algorithm takes a `pcl::PointCloud` in place, as a range of points. Filters return indices into
+/// the cloud; `extract` copies the chosen points with all their fields:
 ///
 /// @code
 ///   const auto keep = orbis::cloud::statistical_inliers(orbis::par, cloud);   // cloud: pcl::PointCloud<P>
@@ -45,8 +45,8 @@ template <colored_pcl_point P>
 }
 
 /// Where the cloud's points were seen from, metres in its frame: `sensor_origin_`. PCL leaves zeros
-/// where nobody said; they count for an organised cloud, which one sensor took, and mean nothing for
-/// another.
+/// where it is not known: zeros are taken as the origin of an organised cloud, which one sensor took, and as unknown
+/// for any other.
 template <point_like P>
 [[nodiscard]] std::optional<vec3> sensor_origin(const pcl::PointCloud<P>& cloud) {
   const vec3 origin = cloud.sensor_origin_.template head<3>().template cast<double>();

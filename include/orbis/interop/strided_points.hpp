@@ -24,7 +24,7 @@ struct point_layout {
   std::ptrdiff_t row_stride = 0;         ///< from the first point of a row to that of the next
 };
 
-/// A view of `size` points of coordinates `S`, each handed out as `std::array<S, 3>`. A `point_range`
+/// A view of `size` points of coordinates `S`; each is read as a `std::array<S, 3>`. A `point_range`
 /// that owns nothing: the buffer must outlive it. Iterators outlive the view.
 template <std::floating_point S>
 class strided_points {

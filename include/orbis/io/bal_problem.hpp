@@ -36,7 +36,7 @@ struct bal_problem {
 };
 
 /// Where a camera of the format sees a point; empty in the plane of its centre, and for what is not
-/// finite. Points behind the camera have a pixel too, as everybody's residuals have it.
+/// finite. Points behind the camera have a pixel too, as the residuals of the paper have it.
 [[nodiscard]] inline std::optional<vec2> project_bal(std::span<const double, 9> camera, const vec3& point) {
   const vec3 p = so3::exp(vec3(camera[0], camera[1], camera[2])) * point + vec3(camera[3], camera[4], camera[5]);
   const vec2 d = p.head<2>() / p.z();

@@ -63,7 +63,7 @@ struct png_options {
 }
 
 /// The bytes of a PNG file: 8-bit colour, 8-bit grey or 16-bit grey, as the pixel type says.
-/// The same pixels give the same bytes (for one version of zlib). @pre !view.empty()
+/// For one version of zlib, equal pixels give equal bytes. @pre !view.empty()
 [[nodiscard]] inline std::string encode_png(image_view<const rgb8> view, const png_options& options = {}) {
   return detail::encode_png(view, options.compression);
 }

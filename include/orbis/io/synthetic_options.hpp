@@ -33,7 +33,7 @@ struct synthetic_path_options {
   double jitter = 1.0;        ///< scales the trembling of the hand (millimetres, tenths of degrees)
 };
 
-/// Errors of a Kinect- or Astra-like camera; each goes away with the value 0 (or false).
+/// Errors of a Kinect- or Astra-like camera; the value 0 (or false) switches one off.
 ///
 /// Depth: axial noise of deviation 0.0012 + 0.0019 (z - 0.4)^2 metres and lateral noise, both from
 /// C. V. Nguyen, S. Izadi, D. Lovell, "Modeling Kinect sensor noise for improved 3D reconstruction and

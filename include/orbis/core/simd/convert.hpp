@@ -130,7 +130,7 @@ template <class U, class T, std::size_t N, target Target>
   }
 }
 
-/// The same lanes for vectors whose numbers have `Size` bytes.
+/// A mask of these lanes for vectors whose numbers have `Size` bytes.
 template <std::size_t Size, std::size_t From, std::size_t N, class Target>
 [[nodiscard]] ORBIS_ALWAYS_INLINE mask<Size, N, Target> mask_as(const mask<From, N, Target>& m) noexcept {
   using out = mask<Size, N, Target>;

@@ -32,6 +32,27 @@ struct stamped_file {
   std::filesystem::path path;
 };
 
+/// What a list names, in the order of time and each time stamp once; notes say what was changed. Errors: no_data (it is
+/// empty).
+template <class Entry>
+[[nodiscard]] result<std::vector<Entry>> in_order_of_time(const std::filesystem::path& list, std::vector<Entry> entries,
+                                                          std::vector<std::string>& notes) {
+  const auto earlier = [](const Entry& a, const Entry& b) { return a.timestamp < b.timestamp; };
+  if (!std::is_sorted(entries.begin(), entries.end(), earlier)) {
+    std::stable_sort(entries.begin(), entries.end(), earlier);
+    notes.push_back(list.string() + ": not in the order of time, sorted");
+  }
+  const auto repeated = std::unique(entries.begin(), entries.end(),
+                                    [](const Entry& a, const Entry& b) { return a.timestamp == b.timestamp; });
+  if (repeated != entries.end()) {
+    notes.push_back(list.string() + ": " + std::to_string(entries.end() - repeated) +
+                    " lines with a repeated time stamp left out");
+    entries.erase(repeated, entries.end());
+  }
+  if (entries.empty()) return fail(errc::no_data, list.string(), "the list names no image");
+  return entries;
+}
+
 /// Reads a list of `timestamp filename` lines: comments, blank lines and CRLF are fine, the order is
 /// made right, unreadable lines and repeated time stamps are left out and noted. File names are
 /// relative to the list's folder. Errors: not_found, unreadable, no_data (no line is left).
@@ -50,21 +71,7 @@ struct stamped_file {
       files.push_back({t, list.parent_path() / std::filesystem::path{name}});
     return true;
   });
-  const auto earlier = [](const stamped_file& a, const stamped_file& b) { return a.timestamp < b.timestamp; };
-  if (!std::is_sorted(files.begin(), files.end(), earlier)) {
-    std::stable_sort(files.begin(), files.end(), earlier);
-    notes.push_back(list.string() + ": not in the order of time, sorted");
-  }
-  const auto repeated = std::unique(files.begin(), files.end(), [](const stamped_file& a, const stamped_file& b) {
-    return a.timestamp == b.timestamp;
-  });
-  if (repeated != files.end()) {
-    notes.push_back(list.string() + ": " + std::to_string(files.end() - repeated) +
-                    " lines with a repeated time stamp left out");
-    files.erase(repeated, files.end());
-  }
-  if (files.empty()) return fail(errc::no_data, list.string(), "the list names no image");
-  return files;
+  return in_order_of_time(list, std::move(files), notes);
 }
 
 /// Reads `associations.txt`: four fields a line, a time stamp and a file for colour and for depth, in
@@ -94,21 +101,7 @@ struct stamped_file {
     frames.push_back({t1, folder / std::filesystem::path{file1}, folder / std::filesystem::path{file2}, {}});
     return true;
   });
-  const auto earlier = [](const recording_entry& a, const recording_entry& b) { return a.timestamp < b.timestamp; };
-  if (!std::is_sorted(frames.begin(), frames.end(), earlier)) {
-    std::stable_sort(frames.begin(), frames.end(), earlier);
-    notes.push_back(list.string() + ": not in the order of time, sorted");
-  }
-  const auto repeated =
-      std::unique(frames.begin(), frames.end(),
-                  [](const recording_entry& a, const recording_entry& b) { return a.timestamp == b.timestamp; });
-  if (repeated != frames.end()) {
-    notes.push_back(list.string() + ": " + std::to_string(frames.end() - repeated) +
-                    " lines with a repeated time stamp left out");
-    frames.erase(repeated, frames.end());
-  }
-  if (frames.empty()) return fail(errc::no_data, list.string(), "the list names no image");
-  return frames;
+  return in_order_of_time(list, std::move(frames), notes);
 }
 
 /// Whether `folder` looks like a TUM recording.

@@ -42,7 +42,7 @@ class scene {
 
   /// The surfaces: first the room itself, then all that stands in it.
   [[nodiscard]] const std::vector<solid>& solids() const noexcept { return solids_; }
-  /// The same `time` seconds after the beginning: only the moving object is elsewhere.
+  /// The surfaces `time` seconds after the beginning: only the moving object is at another place.
   [[nodiscard]] std::vector<solid> solids_at(double time) const {
     std::vector<solid> now = solids_;
     if (moving_ != 0) {
