@@ -58,7 +58,7 @@ only() {
   done <<<"$(grep -rnE "^ *# *include *[<\"]($pattern)" --include='*.hpp' . || true)"
 }
 only 'nanoflann' '^cloud/nanoflann\.hpp$'
-only 'octomap/' '^interop/octomap\.hpp$'
+only 'octomap/' '^interop/(octomap|detail/octomap_nodes)\.hpp$'
 only 'opencv2/' '^interop/opencv\.hpp$'
 only 'pcl/' '^interop/pcl\.hpp$'
 only 'open3d/' '^interop/open3d\.hpp$'
