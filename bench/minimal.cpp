@@ -318,9 +318,9 @@ void add_essential_and_homography() {
     for (const auto& [who, level] :
          {std::pair{"orbis", simd::level::avx512}, std::pair{"orbis_portable", simd::level::portable}})
       add_pnp(percent, who, [level = level](const pnp_scene& s, se3& pose) {
+        const simd::level_limit limit{level};
         static optimize::pnp_workspace workspace;
-        const auto found = optimize::estimate_pose(s.points, s.pixels, the_camera,
-                                                   {.threshold = threshold, .level = level}, workspace);
+        const auto found = optimize::estimate_pose(s.points, s.pixels, the_camera, {.threshold = threshold}, workspace);
         if (found) pose = found->T_world_camera;
         return found.has_value();
       });

@@ -79,9 +79,9 @@ struct answer {
 
 template <class Camera>
 answer solve(const problem<Camera>& p, std::vector<std::uint8_t>& outliers, simd::level level) {
+  const simd::level_limit limit{level};
   outliers.resize(p.seen.size());
-  const auto refined =
-      refine_pose(std::span{p.seen}, p.model, p.start, std::span{outliers}, {.simd = level}, huber{width});
+  const auto refined = refine_pose(std::span{p.seen}, p.model, p.start, std::span{outliers}, {}, huber{width});
   return {refined.T_world_camera, refined.inliers};
 }
 

@@ -3,6 +3,7 @@
 #include <cstring>
 #include <utility>
 
+#include <orbis/core/simd/level.hpp>
 #include <orbis/io/bal.hpp>
 #include <orbis/optimize/bundle_adjustment.hpp>
 #include <orbis/optimize/reprojection_with_intrinsics.hpp>
@@ -100,10 +101,11 @@ TEST_CASE("Bundle adjustment gives the same bytes with any number of threads and
     (void)solve(b, optimize::cauchy{2.0}, par.with(threads));
     check_same_bytes(a, b);
   }
-  for (const auto level : {simd::level::portable, simd::level::avx2}) {
+  for (const simd::level level : simd::available_levels()) {
+    const simd::level_limit limit{level};
     problem b = start;
     optimize::bundle_adjuster ba{model, optimize::cauchy{2.0}, optimize::levenberg_marquardt{.initial = 1e-4},
-                                 optimize::automatic_reduced_solver{}, level};
+                                 optimize::automatic_reduced_solver{}};
     (void)run(ba, b, seq, {.max_iterations = 30, .relative_tolerance = 0.0});
     check_same_bytes(a, b);
   }

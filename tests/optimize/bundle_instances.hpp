@@ -3,10 +3,8 @@
 // bundle_instances.cpp, for all of them.
 #pragma once
 
-#include <cstddef>
-
 #include <orbis/camera/pinhole.hpp>
-#include <orbis/core/simd.hpp>
+#include <orbis/core/simd/dispatch.hpp>
 #include <orbis/optimize/detail/bundle/bundle_kernels.hpp>
 #include <orbis/optimize/detail/bundle/schur_kernels.hpp>
 #include <orbis/optimize/reprojection.hpp>
@@ -17,31 +15,31 @@
 #define ORBIS_TEST_INSTANCES extern template
 #endif
 
-#define ORBIS_TEST_REDUCED(RESIDUAL, LOSS, LEVEL)                                                           \
-  ORBIS_TEST_INSTANCES double linearize_##LEVEL<RESIDUAL, LOSS>(const camera_work<RESIDUAL>&, const LOSS&); \
-  ORBIS_TEST_INSTANCES double cost_##LEVEL<RESIDUAL, LOSS>(const camera_work<RESIDUAL>&, const LOSS&);
-#define ORBIS_TEST_ELIMINATED(SIZE, LEVEL)                                      \
-  ORBIS_TEST_INSTANCES std::size_t eliminate_##LEVEL<SIZE>(const elimination&); \
-  ORBIS_TEST_INSTANCES void substitute_##LEVEL<SIZE>(const substitution&);
-#define ORBIS_TEST_KERNELS(LEVEL)                      \
-  ORBIS_TEST_REDUCED(pinhole_residual, huber, LEVEL)   \
-  ORBIS_TEST_REDUCED(pinhole_residual, trivial, LEVEL) \
-  ORBIS_TEST_REDUCED(bal_reprojection, huber, LEVEL)   \
-  ORBIS_TEST_REDUCED(bal_reprojection, trivial, LEVEL) \
-  ORBIS_TEST_ELIMINATED(6, LEVEL)                      \
-  ORBIS_TEST_ELIMINATED(9, LEVEL)
-
 namespace orbis::optimize::detail {
-
 using pinhole_residual = reprojection<camera::pinhole>;
-ORBIS_TEST_KERNELS(portable)
-#if ORBIS_X86
-ORBIS_TEST_KERNELS(avx2)
-ORBIS_TEST_KERNELS(avx512)
-#endif
+}
 
-}  // namespace orbis::optimize::detail
+#define ORBIS_TEST_REDUCED(RESIDUAL, LOSS)                                                                            \
+  ORBIS_TEST_INSTANCES struct compiled<optimize::detail::linearize_kernel<optimize::RESIDUAL, optimize::LOSS>,        \
+                                       optimize::detail::bundle_kernels<optimize::RESIDUAL, optimize::LOSS>::reduce>; \
+  ORBIS_TEST_INSTANCES struct compiled<optimize::detail::cost_kernel<optimize::RESIDUAL, optimize::LOSS>,             \
+                                       optimize::detail::bundle_kernels<optimize::RESIDUAL, optimize::LOSS>::reduce>;
+#define ORBIS_TEST_ELIMINATED(SIZE)                                                        \
+  ORBIS_TEST_INSTANCES struct compiled<optimize::detail::eliminate_kernel<SIZE>,           \
+                                       optimize::detail::schur_kernels<SIZE>::eliminator>; \
+  ORBIS_TEST_INSTANCES struct compiled<optimize::detail::substitute_kernel<SIZE>,          \
+                                       optimize::detail::schur_kernels<SIZE>::substituter>;
 
-#undef ORBIS_TEST_KERNELS
+namespace orbis::simd::detail {
+
+ORBIS_TEST_REDUCED(detail::pinhole_residual, huber)
+ORBIS_TEST_REDUCED(detail::pinhole_residual, trivial)
+ORBIS_TEST_REDUCED(bal_reprojection, huber)
+ORBIS_TEST_REDUCED(bal_reprojection, trivial)
+ORBIS_TEST_ELIMINATED(6)
+ORBIS_TEST_ELIMINATED(9)
+
+}  // namespace orbis::simd::detail
+
 #undef ORBIS_TEST_ELIMINATED
 #undef ORBIS_TEST_REDUCED

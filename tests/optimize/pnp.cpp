@@ -110,10 +110,14 @@ TEST_CASE("PnP recovers the pose to rounding from exact matches in hundreds of s
 TEST_CASE("PnP gives the same bits under every instruction set") {
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
     const scene s = random_scene(pinhole_camera, seed, 333, 0.6, 1.0);
-    const auto portable = optimize::estimate_pose(s.points, s.pixels, pinhole_camera, {.level = simd::level::portable});
+    const auto at = [&](simd::level level) {
+      const simd::level_limit limit{level};
+      return optimize::estimate_pose(s.points, s.pixels, pinhole_camera);
+    };
+    const auto portable = at(simd::level::portable);
     REQUIRE(portable.has_value());
-    for (const simd::level level : {simd::level::avx2, simd::level::avx512}) {
-      const auto wide = optimize::estimate_pose(s.points, s.pixels, pinhole_camera, {.level = level});
+    for (const simd::level level : simd::available_levels()) {
+      const auto wide = at(level);
       REQUIRE(wide.has_value());
       CHECK(wide->T_world_camera.to_matrix() == portable->T_world_camera.to_matrix());
       CHECK(wide->inliers == portable->inliers);

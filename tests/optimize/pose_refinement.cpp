@@ -225,8 +225,9 @@ void check_levels(const Camera& camera, const Loss& loss, int n) {
   seen[6].point.setConstant(1e200);
   std::vector<std::uint8_t> expected(seen.size()), outliers(seen.size());
   const auto run = [&](simd::level level, std::vector<std::uint8_t>& out) {
+    const simd::level_limit limit{level};
     return optimize::refine_pose(std::span<const pose_observation>(seen), model, truth * se3::exp(off),
-                                 std::span<std::uint8_t>(out), {.simd = level}, loss);
+                                 std::span<std::uint8_t>(out), {}, loss);
   };
   const auto reference = run(simd::level::portable, expected);
   REQUIRE(reference.ok());
@@ -234,7 +235,7 @@ void check_levels(const Camera& camera, const Loss& loss, int n) {
   CHECK(expected[1] == 1);
   CHECK(expected[3] == 1);
   CHECK(expected[6] == 1);
-  for (const auto level : {simd::level::avx2, simd::level::avx512}) {
+  for (const simd::level level : simd::available_levels()) {
     const auto r = run(level, outliers);
     CHECK(r.T_world_camera.to_matrix() == reference.T_world_camera.to_matrix());
     CHECK(r.cost == reference.cost);

@@ -18,7 +18,6 @@
 #include <vector>
 
 #include <orbis/core/execution.hpp>
-#include <orbis/core/simd.hpp>
 #include <orbis/optimize/bundle_problem.hpp>
 #include <orbis/optimize/detail/bundle/bundle_equations.hpp>
 #include <orbis/optimize/detail/stage_watch.hpp>
@@ -59,11 +58,7 @@ class bundle_adjuster {
   explicit bundle_adjuster(Residual residual, Loss loss = Loss{},
                            Damping damping = detail::default_bundle_damping<Damping>(),
                            ReducedSolver reduced = ReducedSolver{})
-      : bundle_adjuster(std::move(residual), std::move(loss), std::move(damping), std::move(reduced),
-                        simd::detected()) {}
-  /// With kernels for `level`, as far as the processor has it.
-  bundle_adjuster(Residual residual, Loss loss, Damping damping, ReducedSolver reduced, simd::level level)
-      : equations_{std::move(residual), std::move(loss), reduced, level}, damping_{std::move(damping)} {}
+      : equations_{std::move(residual), std::move(loss), reduced}, damping_{std::move(damping)} {}
 
   /// The chi-squared error of an observation: `information` times the squared norm of its residual; infinite without a
   /// projection.

@@ -20,7 +20,6 @@
 #include <orbis/camera/pinhole.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/core/se3.hpp>
-#include <orbis/core/simd.hpp>
 #include <orbis/core/types.hpp>
 #include <orbis/optimize/detail/minimal/p3p_equations.hpp>
 #include <orbis/optimize/detail/minimal/pnp_estimator.hpp>
@@ -70,7 +69,6 @@ struct pnp_options {
   /// The matches from the most to the least reliable, every index once: samples are drawn in PROSAC's order. Empty: in
   /// no order.
   std::span<const std::uint32_t> best_first = {};
-  simd::level level = simd::level::avx512;  ///< at most; the outcome does not depend on it
 };
 
 struct pose_estimate {
@@ -114,7 +112,7 @@ template <camera::camera_model Camera>
                 "of " + std::to_string(n) + " matches " + std::to_string(matches.size()) +
                     " are finite and in the camera's view, three are needed");
   using estimator_type = detail::pnp_estimator;
-  const estimator_type estimator(matches, options.level);
+  const estimator_type estimator(matches);
   const auto search = [&](const auto& sampling) {
     return ransac(estimator, asked, ransac_policies{msac{}, sampling, sprt{}, iterated_refinement{}}, workspace.ransac);
   };

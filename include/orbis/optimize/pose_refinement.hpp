@@ -19,7 +19,6 @@
 #include <span>
 #include <string_view>
 
-#include <orbis/core/simd.hpp>
 #include <orbis/optimize/detail/minimal/small_cholesky.hpp>
 #include <orbis/optimize/detail/pose/pose_kernels.hpp>
 #include <orbis/optimize/detail/pose/pose_pieces.hpp>
@@ -52,7 +51,6 @@ struct pose_refinement_options {
   int iterations = 10;  ///< per round
   /// Largest chi-squared error of an inlier without depth, and with depth.
   double gate_mono = chi_squared_gate(2), gate_depth = chi_squared_gate(3);
-  simd::level simd = simd::level::avx512;  ///< the best instructions to use if there are such; no result depends on it
 };
 
 struct pose_refinement {
@@ -128,7 +126,7 @@ class pose_refiner {
     cost_ = 0.0;
     std::array<double, pose_lanes::capacity> chi2;
     const pose_at at = at_pose(T_camera_world_);
-    auto* judge = pose_kernels<Camera, trivial>::judge(options_.simd);
+    auto* const judge = judge_pose_function<Camera>();
     pieces_.for_each([&](const pose_lanes& lanes, std::size_t first, std::size_t count, std::size_t padded) {
       judge(lanes, padded, camera_, at, chi2.data());
       for (std::size_t i = 0; i != count; ++i) {
@@ -161,7 +159,7 @@ class pose_refiner {
   [[nodiscard]] pose_normal_equations linearize(const se3& pose, const Loss& loss) {
     pose_normal_equations e{mat6::Zero(), vec6::Zero(), 0.0};
     const pose_at at = at_pose(pose);
-    auto* sum = pose_kernels<Camera, Loss>::sum(options_.simd);
+    auto* const sum = sum_pose_function<Camera, Loss>();
     pieces_.for_each([&](const pose_lanes& lanes, std::size_t, std::size_t, std::size_t padded) {
       pose_sums s;
       sum(lanes, padded, camera_, at, loss, s);

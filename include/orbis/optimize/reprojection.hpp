@@ -8,9 +8,8 @@
 #include <limits>
 #include <optional>
 
-#include <orbis/camera/project_lanes.hpp>
 #include <orbis/camera/model.hpp>
-#include <orbis/core/lanes.hpp>
+#include <orbis/camera/project_lanes.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/core/types.hpp>
 #include <orbis/optimize/bundle_problem.hpp>
@@ -107,9 +106,9 @@ struct reprojection {
     to[16] = std::isnan(o.right) ? 0.0 : o.right;
     to[24] = std::isnan(o.right) ? 0.0 : 1.0;
   }
-  template <bool Derive, simd::lane_vector L>
-  ORBIS_ALWAYS_INLINE typename L::mask lanes_in_camera(const view&, const double* measurements, const L* q, L* r,
-                                                       L (*by_q)[3], L (*)[1]) const {
+  template <bool Derive, camera::double_lanes L>
+  ORBIS_ALWAYS_INLINE camera::mask_of<L> lanes_in_camera(const view&, const double* measurements, const L* q, L* r,
+                                                         L (*by_q)[3], L (*)[1]) const {
     camera::lane_projection<L> p;
     camera::lanes_of<Camera>::template project<Derive>(camera, q[0], q[1], q[2], p);
     const L has_depth = L::load(measurements + 24), inverse_z = 1.0 / q[2];

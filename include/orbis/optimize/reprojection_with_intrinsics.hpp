@@ -11,9 +11,8 @@
 #include <span>
 #include <utility>
 
-#include <orbis/camera/project_lanes.hpp>
 #include <orbis/camera/parameters.hpp>
-#include <orbis/core/lanes.hpp>
+#include <orbis/camera/project_lanes.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/core/types.hpp>
 #include <orbis/optimize/bundle_problem.hpp>
@@ -258,9 +257,9 @@ struct bal_reprojection {
     to[0] = o.pixel.x();
     to[8] = o.pixel.y();
   }
-  template <bool Derive, simd::lane_vector L>
-  ORBIS_ALWAYS_INLINE typename L::mask lanes_in_camera(const view& c, const double* measurements, const L* q, L* r,
-                                                       L (*by_q)[3], L (*by_intrinsics)[3]) const {
+  template <bool Derive, camera::double_lanes L>
+  ORBIS_ALWAYS_INLINE camera::mask_of<L> lanes_in_camera(const view& c, const double* measurements, const L* q, L* r,
+                                                         L (*by_q)[3], L (*by_intrinsics)[3]) const {
     const L f = c.focal, k1 = c.k1, k2 = c.k2;
     const L inverse = -1.0 / q[2];
     const L x = q[0] * inverse, y = q[1] * inverse;

@@ -14,7 +14,7 @@ struct own {
 
 template <class Loss>
 void check(const Loss& loss) {
-  using lanes = simd::lanes<2>;
+  using lanes = simd::vec<double, 8, simd::portable>;
   double s[8], cost[8], weight[8];
   for (double base = 0.0; base < 1e12; base = 1.7 * base + 0.01) {
     for (int i = 0; i != 8; ++i) s[i] = base * (1.0 + 0.07 * i);

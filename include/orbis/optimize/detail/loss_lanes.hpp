@@ -6,7 +6,8 @@
 #include <array>
 #include <cstddef>
 
-#include <orbis/core/lanes.hpp>
+#include <orbis/camera/project_lanes.hpp>
+#include <orbis/core/simd/math.hpp>
 #include <orbis/optimize/robust_loss.hpp>
 
 namespace orbis::optimize::detail {
@@ -15,7 +16,7 @@ namespace orbis::optimize::detail {
 /// s >= 0. Losses without a specialisation are called eight times.
 template <robust_loss Loss>
 struct lanes_of_loss {
-  template <simd::lane_vector L>
+  template <camera::double_lanes L>
   static ORBIS_ALWAYS_INLINE void weigh(const Loss& loss, const L& squared, L& cost, L& weight) {
     values s, c, w;
     squared.store(s.data());
@@ -25,7 +26,7 @@ struct lanes_of_loss {
   }
 
  private:
-  using values = std::array<double, simd::lane_count>;
+  using values = std::array<double, 8>;
   /// Not inlined: the kernels are compiled for instruction sets that might round differently.
   [[gnu::noinline]] static void weigh_each(const Loss& loss, const values& squared, values& cost, values& weight) {
     for (std::size_t i = 0; i != squared.size(); ++i) {
@@ -37,7 +38,7 @@ struct lanes_of_loss {
 
 template <>
 struct lanes_of_loss<trivial> {
-  template <simd::lane_vector L>
+  template <camera::double_lanes L>
   static ORBIS_ALWAYS_INLINE void weigh(const trivial&, const L& squared, L& cost, L& weight) {
     cost = squared;
     weight = 1.0;
@@ -46,7 +47,7 @@ struct lanes_of_loss<trivial> {
 
 template <>
 struct lanes_of_loss<huber> {
-  template <simd::lane_vector L>
+  template <camera::double_lanes L>
   static ORBIS_ALWAYS_INLINE void weigh(const huber& loss, const L& squared, L& cost, L& weight) {
     const double bound = loss.width * loss.width;
     const auto inside = squared <= L(bound);
@@ -58,7 +59,7 @@ struct lanes_of_loss<huber> {
 
 template <>
 struct lanes_of_loss<tukey> {
-  template <simd::lane_vector L>
+  template <camera::double_lanes L>
   static ORBIS_ALWAYS_INLINE void weigh(const tukey& loss, const L& squared, L& cost, L& weight) {
     const double bound = loss.width * loss.width;
     const L rest = select(squared < L(bound), 1.0 - squared * (1.0 / bound), L(0.0));
@@ -69,7 +70,7 @@ struct lanes_of_loss<tukey> {
 
 template <>
 struct lanes_of_loss<geman_mcclure> {
-  template <simd::lane_vector L>
+  template <camera::double_lanes L>
   static ORBIS_ALWAYS_INLINE void weigh(const geman_mcclure& loss, const L& squared, L& cost, L& weight) {
     const double bound = loss.width * loss.width;
     const L share = bound / (bound + squared);

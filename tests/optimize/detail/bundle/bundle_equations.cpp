@@ -69,15 +69,16 @@ Eigen::VectorXd step_of(equations_of<R>& equations, const std::vector<Camera>& c
 
 template <class R>
 void check_step(const R& residual, const test::bundle& p) {
-  equations_of<R> equations{residual, optimize::huber{2.45}, {}, simd::detected()};
+  equations_of<R> equations{residual, optimize::huber{2.45}, {}};
   Eigen::VectorXd damping;
   const Eigen::VectorXd step = step_of(equations, p.poses, p.points, p.observations, p.fixed, damping);
   const Eigen::VectorXd expected = test::dense_step(equations, p.poses, p.points, p.observations, damping);
   CHECK((step - expected).norm() <= 1e-9 * expected.norm());
   CHECK(equations.curvature(step) + step.dot(damping.cwiseProduct(step)) ==
         Approx(-equations.gradient().dot(step)).epsilon(1e-9));
-  for (const auto level : {simd::level::portable, simd::level::avx2}) {
-    equations_of<R> other{residual, optimize::huber{2.45}, {}, level};
+  for (const simd::level level : simd::available_levels()) {
+    const simd::level_limit limit{level};
+    equations_of<R> other{residual, optimize::huber{2.45}, {}};
     const Eigen::VectorXd same = step_of(other, p.poses, p.points, p.observations, p.fixed, damping);
     CHECK(same == step);
     CHECK(other.cost() == equations.cost());
@@ -124,13 +125,14 @@ TEST_CASE("The Schur step for cameras with nine unknowns is that of the dense no
       observations.push_back(o);
     }
   }
-  equations_of<optimize::bal_reprojection> equations{{}, optimize::huber{2.45}, {}, simd::detected()};
+  equations_of<optimize::bal_reprojection> equations{{}, optimize::huber{2.45}, {}};
   Eigen::VectorXd damping;
   const Eigen::VectorXd step = step_of(equations, cameras, points, observations, {}, damping);
   const Eigen::VectorXd expected = test::dense_step(equations, cameras, points, observations, damping);
   CHECK((step - expected).norm() <= 1e-9 * expected.norm());
-  for (const auto level : {simd::level::portable, simd::level::avx2}) {
-    equations_of<optimize::bal_reprojection> other{{}, optimize::huber{2.45}, {}, level};
+  for (const simd::level level : simd::available_levels()) {
+    const simd::level_limit limit{level};
+    equations_of<optimize::bal_reprojection> other{{}, optimize::huber{2.45}, {}};
     CHECK(step_of(other, cameras, points, observations, {}, damping) == step);
     CHECK(other.cost() == equations.cost());
   }

@@ -18,12 +18,17 @@ std::vector<double> random_numbers(random_bits& random, std::size_t count) {
   return numbers;
 }
 
-template <std::size_t N>
+template <int Size>
 void check_kernels() {
   random_bits random{341};
-  const auto portable = panel_kernels<N>::at(simd::level::portable);
-  for (const simd::level level : {simd::level::portable, simd::level::avx2, simd::level::avx512}) {
-    const auto kernels = panel_kernels<N>::at(level);
+  constexpr std::size_t N = Size;
+  const auto portable = [] {
+    const simd::level_limit limit{simd::level::portable};
+    return panel_kernels<Size>{};
+  }();
+  for (const simd::level level : simd::available_levels()) {
+    const simd::level_limit limit{level};
+    const panel_kernels<Size> kernels;
     for (const std::size_t rows : {std::size_t{1}, N, 2 * N, std::size_t{16}, std::size_t{17}, 7 * N})
       for (const std::size_t depth : {std::size_t{1}, N, 5 * N}) {
         const std::size_t stride = rows + 3;

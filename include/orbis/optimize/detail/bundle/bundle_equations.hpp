@@ -18,7 +18,6 @@
 #include <Eigen/Core>
 
 #include <orbis/core/execution.hpp>
-#include <orbis/core/simd.hpp>
 #include <orbis/optimize/bundle_problem.hpp>
 #include <orbis/optimize/detail/bundle/bundle_kernels.hpp>
 #include <orbis/optimize/detail/bundle/bundle_structure.hpp>
@@ -39,12 +38,8 @@ class bundle_equations {
   using camera_block = matrix<camera_size, camera_size>;
   using reduced_type = typename Reduced::template solver<camera_size>;
 
-  bundle_equations(R residual, Loss loss, const Reduced& reduced, simd::level level)
-      : residual_{std::move(residual)},
-        loss_{std::move(loss)},
-        reduced_{reduced},
-        kernels_{bundle_kernels<R, Loss>::at(level)},
-        schur_{schur_kernels<camera_size>::at(level)} {}
+  bundle_equations(R residual, Loss loss, const Reduced& reduced)
+      : residual_{std::move(residual)}, loss_{std::move(loss)}, reduced_{reduced} {}
 
   [[nodiscard]] const R& residual() const { return residual_; }
   [[nodiscard]] const Loss& loss() const { return loss_; }
@@ -377,7 +372,7 @@ class bundle_equations {
     information_ = base_information_;
     flags_.resize(information_.size());
     for_each_camera(policy, [&](std::size_t c) {
-      visibility_portable(work_of(c, views_, positions_), flags_.data() + 8 * structure_.first_tile[c]);
+      find_visible(work_of(c, views_, positions_), flags_.data() + 8 * structure_.first_tile[c]);
     });
     for (std::size_t at = 0; at != information_.size(); ++at) {
       const std::uint32_t source = structure_.source[at];

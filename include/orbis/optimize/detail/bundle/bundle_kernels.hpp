@@ -12,12 +12,15 @@
 #include <limits>
 #include <optional>
 
-#include <orbis/core/lanes.hpp>
+#include <orbis/core/simd/dispatch.hpp>
+#include <orbis/core/simd/math.hpp>
+#include <orbis/core/simd/vec.hpp>
 #include <orbis/core/types.hpp>
 #include <orbis/optimize/bundle_problem.hpp>
-#include <orbis/optimize/detail/bundle/bundle_lanes.hpp>
 #include <orbis/optimize/detail/bundle/lane_residual.hpp>
+#include <orbis/optimize/detail/bundle/transposed.hpp>
 #include <orbis/optimize/detail/loss_lanes.hpp>
+#include <orbis/optimize/detail/unroll.hpp>
 
 namespace orbis::optimize::detail {
 
@@ -100,8 +103,9 @@ template <bool Derive, class R, int Columns>
 /// The residuals `r` of eight observations, and with `Derive` their derivatives by `q` (the point in the camera frame,
 /// or for general residuals in the world) and by the other parameters. Returns which have a projection.
 template <bool Derive, class R, int Columns, class L>
-ORBIS_ALWAYS_INLINE typename L::mask residuals_of_tile(const camera_work<R>& work, std::size_t first, const L* q, L* r,
-                                                       L (*by_q)[3], L (*by_rest)[Columns == 0 ? 1 : Columns]) {
+ORBIS_ALWAYS_INLINE typename L::mask_type residuals_of_tile(const camera_work<R>& work, std::size_t first, const L* q,
+                                                            L* r, L (*by_q)[3],
+                                                            L (*by_rest)[Columns == 0 ? 1 : Columns]) {
   if constexpr (lane_residual<R>) {
     return work.residual.template lanes_in_camera<Derive>(work.view, work.measurements + R::measured * first, q, r,
                                                           by_q, by_rest);
@@ -140,9 +144,9 @@ ORBIS_ALWAYS_INLINE void points_of_tile(const camera_work<R>& work, std::size_t 
 }
 
 /// The cost of a camera's observations at `work.view` and `work.positions`.
-template <int Native, class R, class Loss>
+template <simd::target Target, class R, class Loss>
 ORBIS_ALWAYS_INLINE double camera_cost(const camera_work<R>& work, const Loss& loss) {
-  using L = simd::lanes<Native>;
+  using L = simd::vec<double, 8, Target>;
   constexpr int columns = camera_frame_residual<R> ? R::camera_manifold::dimension - 6 : R::camera_manifold::dimension;
   L cost = 0.0;
   for (std::size_t first = 0; first < work.count; first += 8) {
@@ -162,9 +166,9 @@ ORBIS_ALWAYS_INLINE double camera_cost(const camera_work<R>& work, const Loss& l
 }
 
 /// Sets `flags[i]` where observation i has a finite residual.
-template <int Native, class R>
+template <simd::target Target, class R>
 ORBIS_ALWAYS_INLINE void camera_visibility(const camera_work<R>& work, double* flags) {
-  using L = simd::lanes<Native>;
+  using L = simd::vec<double, 8, Target>;
   constexpr int columns = camera_frame_residual<R> ? R::camera_manifold::dimension - 6 : R::camera_manifold::dimension;
   for (std::size_t first = 0; first < work.count; first += 8) {
     L q[3], r[R::dimension], by_q[R::dimension][3], by_rest[R::dimension][columns == 0 ? 1 : columns];
@@ -178,7 +182,7 @@ ORBIS_ALWAYS_INLINE void camera_visibility(const camera_work<R>& work, double* f
 }
 
 /// Writes the contributions of eight observations to their points, and their camera-point blocks.
-template <int Native, int C, class R, class L>
+template <int C, class R, class L>
 ORBIS_ALWAYS_INLINE void scatter(const camera_work<R>& work, std::size_t first, const L* share, const L (*mixed)[3]) {
   constexpr int pad = padded<C>;
   const std::size_t count = work.count - first;
@@ -203,9 +207,9 @@ ORBIS_ALWAYS_INLINE void scatter(const camera_work<R>& work, std::size_t first, 
 }
 
 /// Normal equations of a camera's observations; returns their cost.
-template <int Native, class R, class Loss>
+template <simd::target Target, class R, class Loss>
 ORBIS_ALWAYS_INLINE double linearize_camera(const camera_work<R>& work, const Loss& loss) {
-  using L = simd::lanes<Native>;
+  using L = simd::vec<double, 8, Target>;
   constexpr int rows = R::dimension;
   constexpr int C = R::camera_manifold::dimension;
   constexpr bool through_camera = camera_frame_residual<R>;
@@ -367,7 +371,7 @@ ORBIS_ALWAYS_INLINE double linearize_camera(const camera_work<R>& work, const Lo
         }
       }
     }
-    scatter<Native, C>(work, first, share, mixed);
+    scatter<C>(work, first, share, mixed);
   }
   if (work.mixed != nullptr)
     for (int i = 0; i != C; ++i) {
@@ -377,56 +381,32 @@ ORBIS_ALWAYS_INLINE double linearize_camera(const camera_work<R>& work, const Lo
   return simd::sum(cost);
 }
 
+/// The loops over the observations of a camera, compiled for every instruction set.
 template <class R, class Loss>
-ORBIS_UNFUSED double linearize_portable(const camera_work<R>& work, const Loss& loss) {
-  return linearize_camera<2>(work, loss);
-}
+struct linearize_kernel {
+  template <simd::target Target>
+  static ORBIS_ALWAYS_INLINE double run(const camera_work<R>& work, const Loss& loss) {
+    return linearize_camera<Target>(work, loss);
+  }
+};
 template <class R, class Loss>
-ORBIS_UNFUSED double cost_portable(const camera_work<R>& work, const Loss& loss) {
-  return camera_cost<2>(work, loss);
-}
+struct cost_kernel {
+  template <simd::target Target>
+  static ORBIS_ALWAYS_INLINE double run(const camera_work<R>& work, const Loss& loss) {
+    return camera_cost<Target>(work, loss);
+  }
+};
 template <class R>
-ORBIS_UNFUSED void visibility_portable(const camera_work<R>& work, double* flags) {
-  camera_visibility<2>(work, flags);
+ORBIS_UNFUSED void find_visible(const camera_work<R>& work, double* flags) {
+  camera_visibility<simd::portable>(work, flags);
 }
-#if ORBIS_X86
-template <class R, class Loss>
-ORBIS_UNFUSED ORBIS_TARGET_AVX2 double linearize_avx2(const camera_work<R>& work, const Loss& loss) {
-  return linearize_camera<4>(work, loss);
-}
-template <class R, class Loss>
-ORBIS_UNFUSED ORBIS_TARGET_AVX512 double linearize_avx512(const camera_work<R>& work, const Loss& loss) {
-  return linearize_camera<8>(work, loss);
-}
-template <class R, class Loss>
-ORBIS_UNFUSED ORBIS_TARGET_AVX2 double cost_avx2(const camera_work<R>& work, const Loss& loss) {
-  return camera_cost<4>(work, loss);
-}
-template <class R, class Loss>
-ORBIS_UNFUSED ORBIS_TARGET_AVX512 double cost_avx512(const camera_work<R>& work, const Loss& loss) {
-  return camera_cost<8>(work, loss);
-}
-#endif
 
-/// The kernels for one instruction set, or the best below it that the processor has.
+/// The kernels for this processor.
 template <class R, class Loss>
 struct bundle_kernels {
   using reduce = double(const camera_work<R>&, const Loss&);
-  reduce* linearize;
-  reduce* cost;
-
-  [[nodiscard]] static bundle_kernels at([[maybe_unused]] simd::level level) {
-#if ORBIS_X86
-    return {
-        simd::select<reduce>(level, {.portable = linearize_portable<R, Loss>,
-                                     .avx2 = linearize_avx2<R, Loss>,
-                                     .avx512 = linearize_avx512<R, Loss>}),
-        simd::select<reduce>(
-            level, {.portable = cost_portable<R, Loss>, .avx2 = cost_avx2<R, Loss>, .avx512 = cost_avx512<R, Loss>})};
-#else
-    return {linearize_portable<R, Loss>, cost_portable<R, Loss>};
-#endif
-  }
+  reduce* linearize = simd::kernel<linearize_kernel<R, Loss>, reduce>();
+  reduce* cost = simd::kernel<cost_kernel<R, Loss>, reduce>();
 };
 
 }  // namespace orbis::optimize::detail

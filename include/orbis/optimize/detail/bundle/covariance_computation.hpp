@@ -16,7 +16,6 @@
 #include <Eigen/Core>
 
 #include <orbis/core/execution.hpp>
-#include <orbis/core/simd.hpp>
 #include <orbis/core/types.hpp>
 #include <orbis/optimize/bundle_problem.hpp>
 #include <orbis/optimize/detail/bundle/bundle_equations.hpp>
@@ -42,7 +41,7 @@ class covariance_computation {
   using status_type = decltype(Output::status);
 
   covariance_computation(const R& residual, const Loss& loss, const Reduced& reduced)
-      : equations_{residual, loss, reduced, simd::detected()} {}
+      : equations_{residual, loss, reduced} {}
 
   template <class Policy>
   Output run(const Policy& policy, std::span<const camera_state> cameras, std::span<const vec3> points,

@@ -5,10 +5,12 @@
 
 #include <concepts>
 
-#include <orbis/core/lanes.hpp>
+#include <orbis/core/simd/vec.hpp>
 #include <orbis/optimize/bundle_problem.hpp>
 
 namespace orbis::optimize::detail {
+
+using portable_lanes = simd::vec<double, 8, simd::portable>;
 
 /// A `camera_frame_residual` that evaluates eight observations by one camera at once. `measure(o, to)` writes what it
 /// needs of an observation to `to[8 * i]`, i < `R::measured`. `lanes_in_camera<Derive>(view, measurements, q, r, by_q,
@@ -17,12 +19,12 @@ namespace orbis::optimize::detail {
 template <class R>
 concept lane_residual = camera_frame_residual<R> &&
     requires(const R& r, const typename R::observation& o, const typename R::view& view, double* to,
-             simd::lanes<2>* lanes, simd::lanes<2> (*by_q)[3],
-             simd::lanes<2> (*by_intrinsics)[R::intrinsic_dimension == 0 ? 1 : R::intrinsic_dimension]) {
+             portable_lanes* lanes, portable_lanes (*by_q)[3],
+             portable_lanes (*by_intrinsics)[R::intrinsic_dimension == 0 ? 1 : R::intrinsic_dimension]) {
   {r.measure(o, to)};
   {
     r.template lanes_in_camera<true>(view, to, lanes, lanes, by_q, by_intrinsics)
-    } -> std::same_as<simd::lanes<2>::mask>;
+    } -> std::same_as<portable_lanes::mask_type>;
 };
 
 }  // namespace orbis::optimize::detail

@@ -11,10 +11,12 @@
 #include <cstddef>
 #include <cstdint>
 
-#include <orbis/core/lanes.hpp>
 #include <orbis/core/rounded.hpp>
+#include <orbis/core/simd/dispatch.hpp>
+#include <orbis/core/simd/math.hpp>
+#include <orbis/core/simd/vec.hpp>
 #include <orbis/optimize/detail/bundle/bundle_kernels.hpp>
-#include <orbis/optimize/detail/bundle/bundle_lanes.hpp>
+#include <orbis/optimize/detail/unroll.hpp>
 
 namespace orbis::optimize::detail {
 
@@ -42,9 +44,9 @@ struct elimination {
 
 /// Computes L^-1 and L^-1 g of eight points from `p` on. Returns the first of them before `work.end` whose block is not
 /// positive definite, or `work.end`.
-template <int Native>
+template <simd::target Target>
 ORBIS_ALWAYS_INLINE std::size_t invert_factors(const elimination& work, std::size_t p) {
-  using L = simd::lanes<Native>;
+  using L = simd::vec<double, 8, Target>;
   constexpr double least = 1e-14;
   const double* const v = work.normal + point_at(p);
   double* const out = work.inverse + point_at(p);
@@ -84,16 +86,16 @@ ORBIS_ALWAYS_INLINE std::size_t invert_factors(const elimination& work, std::siz
 }
 
 /// Rows of a block in registers.
-template <int C, int Native>
-inline constexpr int row_width = padded<C> % Native == 0 ? Native : 4;
+template <int C, simd::target Target>
+inline constexpr int row_width = padded<C> % static_cast<int>(Target::bytes / 8) == 0 ? Target::bytes / 8 : 4;
 
 /// Returns the first point whose block is not positive definite, or `work.end`.
-template <int C, int Native>
+template <int C, simd::target Target>
 ORBIS_ALWAYS_INLINE std::size_t eliminate(const elimination& work) {
-  constexpr int pad = padded<C>, width = row_width<C, Native>, parts = pad / width;
-  using row = simd::lanes<width, width>;
+  constexpr int pad = padded<C>, width = row_width<C, Target>, parts = pad / width;
+  using row = simd::vec<double, width, Target>;
   for (std::size_t p = work.begin; p < work.end; p += 8)
-    if (const std::size_t failed = invert_factors<Native>(work, p); failed != work.end) return failed;
+    if (const std::size_t failed = invert_factors<Target>(work, p); failed != work.end) return failed;
 
   for (std::size_t p = work.begin; p != work.end; ++p) {
     const double* const inverse = work.inverse + point_at(p);
@@ -185,10 +187,10 @@ struct substitution {
   double* steps = nullptr;  ///< three of each point
 };
 
-template <int C, int Native>
+template <int C, simd::target Target>
 ORBIS_ALWAYS_INLINE void substitute(const substitution& work) {
-  constexpr int pad = padded<C>, width = row_width<C, Native>, parts = pad / width;
-  using row = simd::lanes<width, width>;
+  constexpr int pad = padded<C>, width = row_width<C, Target>, parts = pad / width;
+  using row = simd::vec<double, width, Target>;
   for (std::size_t p = work.begin; p != work.end; ++p) {
     row sum[3][parts];
     unroll<parts>([&](auto i) ORBIS_INLINE_LAMBDA { sum[0][i] = sum[1][i] = sum[2][i] = row(0.0); });
@@ -220,51 +222,29 @@ ORBIS_ALWAYS_INLINE void substitute(const substitution& work) {
   }
 }
 
+/// The two loops over points, compiled for every instruction set.
 template <int C>
-ORBIS_UNFUSED std::size_t eliminate_portable(const elimination& work) {
-  return eliminate<C, 2>(work);
-}
+struct eliminate_kernel {
+  template <simd::target Target>
+  static ORBIS_ALWAYS_INLINE std::size_t run(const elimination& work) {
+    return eliminate<C, Target>(work);
+  }
+};
 template <int C>
-ORBIS_UNFUSED void substitute_portable(const substitution& work) {
-  substitute<C, 2>(work);
-}
-#if ORBIS_X86
-template <int C>
-ORBIS_UNFUSED ORBIS_TARGET_AVX2 std::size_t eliminate_avx2(const elimination& work) {
-  return eliminate<C, 4>(work);
-}
-template <int C>
-ORBIS_UNFUSED ORBIS_TARGET_AVX512 std::size_t eliminate_avx512(const elimination& work) {
-  return eliminate<C, 8>(work);
-}
-template <int C>
-ORBIS_UNFUSED ORBIS_TARGET_AVX2 void substitute_avx2(const substitution& work) {
-  substitute<C, 4>(work);
-}
-template <int C>
-ORBIS_UNFUSED ORBIS_TARGET_AVX512 void substitute_avx512(const substitution& work) {
-  substitute<C, 8>(work);
-}
-#endif
+struct substitute_kernel {
+  template <simd::target Target>
+  static ORBIS_ALWAYS_INLINE void run(const substitution& work) {
+    substitute<C, Target>(work);
+  }
+};
 
+/// The kernels for this processor.
 template <int C>
 struct schur_kernels {
   using eliminator = std::size_t(const elimination&);
   using substituter = void(const substitution&);
-  eliminator* eliminate_points;
-  substituter* substitute_points;
-
-  [[nodiscard]] static schur_kernels at([[maybe_unused]] simd::level level) {
-#if ORBIS_X86
-    return {
-        simd::select<eliminator>(
-            level, {.portable = eliminate_portable<C>, .avx2 = eliminate_avx2<C>, .avx512 = eliminate_avx512<C>}),
-        simd::select<substituter>(
-            level, {.portable = substitute_portable<C>, .avx2 = substitute_avx2<C>, .avx512 = substitute_avx512<C>})};
-#else
-    return {eliminate_portable<C>, substitute_portable<C>};
-#endif
-  }
+  eliminator* eliminate_points = simd::kernel<eliminate_kernel<C>, eliminator>();
+  substituter* substitute_points = simd::kernel<substitute_kernel<C>, substituter>();
 };
 
 }  // namespace orbis::optimize::detail

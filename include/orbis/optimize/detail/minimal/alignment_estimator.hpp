@@ -15,9 +15,11 @@
 
 #include <orbis/core/se3.hpp>
 #include <orbis/core/sim3.hpp>
+#include <orbis/core/simd/dispatch.hpp>
+#include <orbis/core/simd/vec.hpp>
 #include <orbis/core/types.hpp>
 #include <orbis/optimize/detail/minimal/horn.hpp>
-#include <orbis/optimize/detail/minimal/wide.hpp>
+#include <orbis/optimize/detail/unroll.hpp>
 #include <orbis/optimize/ransac.hpp>
 
 namespace orbis::optimize::detail {
@@ -84,26 +86,17 @@ class alignment_estimator {
     return pairs_[i].weight * (m.transform * pairs_[i].from - pairs_[i].to).squaredNorm();
   }
   void squared_errors(const model& m, std::size_t first, std::span<float, consensus_block> out) const {
-    using namespace wide;
-    using V = numbers<float, 4>;
-    for (std::size_t i = 0; i != consensus_block; i += 4) {
-      const float* const at = columns_.data() + first + i;
-      V from[3], sum{}, weight;
-      unrolled<3>([&](auto k) { load(from[k], at + k * stride_); });
-      unrolled<3>([&](auto k) {
-        V d, r;
-        fill(d, m.rows[4 * k + 3]);
-        unrolled<3>([&](auto j) {
-          fill(r, m.rows[4 * k + j]);
-          add_product(d, r, from[j]);
-        });
-        load(r, at + (3 + k) * stride_);
-        d -= r;
-        add_product(sum, d, d);
+    using V = simd::vec<float, 4, simd::portable>;
+    for (std::size_t i = 0; i != consensus_block; i += V::count) {
+      const auto at = [&](std::size_t k) { return V::load(columns_.data() + first + i + k * stride_); };
+      const V x = at(0), y = at(1), z = at(2);
+      V sum = 0.0F;
+      unroll<3>([&](auto k) ORBIS_INLINE_LAMBDA {
+        const float* const row = m.rows.data() + 4 * k;
+        const V d = (((row[3] + row[0] * x) + row[1] * y) + row[2] * z) - at(3 + k);
+        sum += d * d;
       });
-      load(weight, at + 6 * stride_);
-      multiply(sum, sum, weight);
-      store(out.data() + i, sum);
+      (sum * at(6)).store(out.data() + i);
     }
   }
 

@@ -17,6 +17,8 @@
 
 #include <orbis/core/jacobi.hpp>
 #include <orbis/core/se3.hpp>
+#include <orbis/core/simd/dispatch.hpp>
+#include <orbis/core/simd/vec.hpp>
 #include <orbis/core/types.hpp>
 #include <orbis/optimize/detail/minimal/descent.hpp>
 #include <orbis/optimize/detail/minimal/five_point.hpp>
@@ -24,7 +26,7 @@
 #include <orbis/optimize/detail/minimal/image_matches.hpp>
 #include <orbis/optimize/detail/minimal/small_cholesky.hpp>
 #include <orbis/optimize/detail/minimal/unit_sphere.hpp>
-#include <orbis/optimize/detail/minimal/wide.hpp>
+#include <orbis/optimize/detail/unroll.hpp>
 #include <orbis/optimize/ransac.hpp>
 
 namespace orbis::optimize::detail {
@@ -87,39 +89,26 @@ class essential_estimator {
   }
 
   void squared_errors(const mat3& e, std::size_t first, std::span<float, consensus_block> out) const {
-    using namespace wide;
-    using V = numbers<float, 4>;
+    using V = simd::vec<float, 4, simd::portable>;
     V m[9];
-    unrolled<9>([&](auto k) { fill(m[k], static_cast<float>(e(static_cast<int>(k / 3), static_cast<int>(k % 3)))); });
-    for (std::size_t i = 0; i != consensus_block; i += 4) {
-      const float* const at = columns_.data() + first + i;
+    unroll<9>([&](auto k) ORBIS_INLINE_LAMBDA { m[k] = static_cast<float>(e(k / 3, k % 3)); });
+    for (std::size_t i = 0; i != consensus_block; i += V::count) {
       V v[10];
-      unrolled<10>([&](auto k) { load(v[k], at + k * stride_); });
-      V line[3] = {m[2], m[5], m[8]}, other[2] = {m[6], m[7]}, c;
-      unrolled<3>([&](auto k) {
-        add_product(line[k], m[3 * k], v[0]);
-        add_product(line[k], m[3 * k + 1], v[1]);
-      });
-      unrolled<2>([&](auto k) {
-        add_product(other[k], m[k], v[2]);
-        add_product(other[k], m[3 + k], v[3]);
-      });
-      c = line[2];
-      add_product(c, line[0], v[2]);
-      add_product(c, line[1], v[3]);
-      V g, sum{}, cc;
-      const auto add_gradient = [&](const V& gx, const V& gy, const V& xx, const V& yx, const V& yy) {
-        multiply(g, xx, gx);
-        add_product(sum, g, g);
-        multiply(g, yx, gx);
-        add_product(g, yy, gy);
-        add_product(sum, g, g);
-      };
+      unroll<10>([&](auto k) ORBIS_INLINE_LAMBDA { v[k] = V::load(columns_.data() + first + i + k * stride_); });
+      V line[3], other[2];
+      unroll<3>([&](auto k) ORBIS_INLINE_LAMBDA { line[k] = (m[3 * k + 2] + m[3 * k] * v[0]) + m[3 * k + 1] * v[1]; });
+      unroll<2>([&](auto k) ORBIS_INLINE_LAMBDA { other[k] = (m[6 + k] + m[k] * v[2]) + m[3 + k] * v[3]; });
+      const V c = (line[2] + line[0] * v[2]) + line[1] * v[3];
+      V sum = 0.0F;
+      const auto add_gradient = [&](const V& gx, const V& gy, const V& xx, const V& yx, const V& yy)
+                                    ORBIS_INLINE_LAMBDA {
+                                      const V by_x = xx * gx, by_y = yx * gx + yy * gy;
+                                      sum += by_x * by_x;
+                                      sum += by_y * by_y;
+                                    };
       add_gradient(other[0], other[1], v[4], v[5], v[6]);
       add_gradient(line[0], line[1], v[7], v[8], v[9]);
-      multiply(cc, c, c);
-      const V squared = cc / sum;
-      store(out.data() + i, squared);
+      (c * c / sum).store(out.data() + i);
     }
   }
 

@@ -14,7 +14,6 @@
 
 #include <orbis/core/jacobi.hpp>
 #include <orbis/core/se3.hpp>
-#include <orbis/core/simd.hpp>
 #include <orbis/core/types.hpp>
 #include <orbis/optimize/detail/minimal/descent.hpp>
 #include <orbis/optimize/detail/minimal/p3p_equations.hpp>
@@ -79,7 +78,7 @@ class pnp_estimator {
     [[nodiscard]] const model* end() const noexcept { return models.data() + size; }
   };
 
-  pnp_estimator(pnp_matches& matches, simd::level level) : matches_{matches}, kernels_{match_kernels::at(level)} {}
+  explicit pnp_estimator(pnp_matches& matches) : matches_{matches} {}
 
   [[nodiscard]] std::size_t size() const noexcept { return matches_.size(); }
 
@@ -153,7 +152,7 @@ class pnp_estimator {
         rows[static_cast<std::size_t>(4 * row + column)] = pose.rotation(row, column);
       rows[static_cast<std::size_t>(4 * row + 3)] = pose.translation[row];
     }
-    std::array<double, 4 * equation_sums> sums;
+    std::array<double, std::size_t{4} * equation_sums> sums;
     kernels_.equations(matches_.gathered.data(), matches_.stride, groups, rows.data(), sums.data());
     const auto total = [&](std::size_t k) {
       return (sums[4 * k] + sums[4 * k + 2]) + (sums[4 * k + 1] + sums[4 * k + 3]);
@@ -166,7 +165,7 @@ class pnp_estimator {
   }
 
   pnp_matches& matches_;
-  match_kernels kernels_;
+  match_kernels kernels_{};
 };
 
 /// Why the points themselves determine no pose; empty if they do.

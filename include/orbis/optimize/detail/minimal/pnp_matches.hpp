@@ -21,8 +21,11 @@
 #include <orbis/camera/model.hpp>
 #include <orbis/core/random.hpp>
 #include <orbis/core/se3.hpp>
-#include <orbis/core/simd.hpp>
-#include <orbis/optimize/detail/minimal/wide.hpp>
+#include <orbis/core/simd/dispatch.hpp>
+#include <orbis/core/simd/math.hpp>
+#include <orbis/core/simd/vec.hpp>
+#include <orbis/core/types.hpp>
+#include <orbis/optimize/detail/unroll.hpp>
 
 namespace orbis::optimize::detail {
 
@@ -43,174 +46,78 @@ using match_errors = void(const float* columns, std::size_t stride, const float*
 /// of squared errors, as four partial sums each.
 using match_equations = void(const double* columns, std::size_t stride, std::size_t groups, const double* pose,
                              double* out);
-inline constexpr std::size_t equation_sums = 28;
+inline constexpr int equation_sums = 28;
 
-/// Row `k` of the pose times the point.
+/// Row `row` of the pose times the point.
 template <class V, class S>
-[[gnu::always_inline]] inline void moved(V& out, const S* row, const V& x, const V& y, const V& z) noexcept {
-  using namespace wide;
-  V a, b, c;
-  fill(out, row[3]);
-  fill(a, row[0]);
-  fill(b, row[1]);
-  fill(c, row[2]);
-  add_product(out, a, x);
-  add_product(out, b, y);
-  add_product(out, c, z);
+[[nodiscard]] ORBIS_ALWAYS_INLINE V moved(const S* row, const V& x, const V& y, const V& z) noexcept {
+  return ((row[3] + row[0] * x) + row[1] * y) + row[2] * z;
 }
 
-template <class V>
-[[gnu::always_inline]] inline void match_errors_in_lanes(const float* columns, std::size_t stride, const float* pose,
-                                                         float* out) noexcept {
-  using namespace wide;
-  constexpr std::size_t width = sizeof(V) / sizeof(float);
-  V one;
-  fill(one, 1.0F);
-  for (std::size_t i = 0; i != 32; i += width) {
-    const float* const at = columns + i;
-    V px, py, pz, x, y, z;
-    load(px, at);
-    load(py, at + stride);
-    load(pz, at + 2 * stride);
-    moved(z, pose + 8, px, py, pz);
-    moved(x, pose, px, py, pz);
-    moved(y, pose + 4, px, py, pz);
-    const V inverse = one / z;
-    V seen_x, seen_y, xx, xy, yy;
-    load(seen_x, at + 3 * stride);
-    load(seen_y, at + 4 * stride);
-    load(xx, at + 5 * stride);
-    load(xy, at + 6 * stride);
-    load(yy, at + 7 * stride);
-    V dx, dy, u, v, squared;
-    multiply(dx, x, inverse);
-    multiply(dy, y, inverse);
-    dx -= seen_x;
-    dy -= seen_y;
-    multiply(u, xx, dx);
-    add_product(u, xy, dy);
-    multiply(v, yy, dy);
-    multiply(squared, u, u);
-    add_product(squared, v, v);
-    spoil_where_negative(squared, z);
-    store(out + i, squared);
+struct match_errors_kernel {
+  template <simd::target Target>
+  static ORBIS_ALWAYS_INLINE void run(const float* columns, std::size_t stride, const float* pose, float* out) {
+    using V = simd::vec<float, Target::bytes / sizeof(float), Target>;
+    for (std::size_t i = 0; i != 32; i += V::count) {
+      const auto at = [&](std::size_t k) ORBIS_INLINE_LAMBDA { return V::load(columns + k * stride + i); };
+      const V px = at(0), py = at(1), pz = at(2);
+      const V z = moved(pose + 8, px, py, pz), x = moved(pose, px, py, pz), y = moved(pose + 4, px, py, pz);
+      const V inverse = 1.0F / z;
+      const V dx = x * inverse - at(3), dy = y * inverse - at(4);
+      const V u = at(5) * dx + at(6) * dy, v = at(7) * dy;
+      select(V(0.0F) < z, u * u + v * v, V(std::numeric_limits<float>::infinity())).store(out + i);
+    }
   }
-}
+};
 
-/// The lanes from `offset` on of every group of four.
-template <class V>
-[[gnu::always_inline]] inline void match_equations_in_lanes(const double* columns, std::size_t stride,
-                                                            std::size_t groups, const double* pose, double* out,
-                                                            std::size_t offset) noexcept {
-  using namespace wide;
-  V sums[equation_sums];
-  unrolled<equation_sums>([&](auto k) __attribute__((always_inline)) { sums[k] = V{}; });
-  V one;
-  fill(one, 1.0);
-  for (std::size_t group = 0; group != groups; ++group) {
-    const double* const at = columns + 4 * group + offset;
-    V px, py, pz, p0, p1, p2;
-    load(px, at);
-    load(py, at + stride);
-    load(pz, at + 2 * stride);
-    moved(p0, pose, px, py, pz);
-    moved(p1, pose + 4, px, py, pz);
-    moved(p2, pose + 8, px, py, pz);
-    const V inverse = one / p2;
-    V seen_x, seen_y, xx, xy, yy, x, y, u, v;
-    load(seen_x, at + 3 * stride);
-    load(seen_y, at + 4 * stride);
-    load(xx, at + 5 * stride);
-    load(xy, at + 6 * stride);
-    load(yy, at + 7 * stride);
-    multiply(x, p0, inverse);
-    multiply(y, p1, inverse);
-    const V dx = x - seen_x, dy = y - seen_y;
-    multiply(u, xx, dx);
-    add_product(u, xy, dy);
-    multiply(v, yy, dy);
-    // The derivatives of u and v by the point, then by a motion of it: rho + phi x p.
-    V a[6], b[6];
-    multiply(a[0], xx, inverse);
-    multiply(a[1], xy, inverse);
-    multiply(a[2], a[0], x);
-    add_product(a[2], a[1], y);
-    a[2] = -a[2];
-    multiply(a[3], p1, a[2]);
-    subtract_product(a[3], p2, a[1]);
-    multiply(a[4], p2, a[0]);
-    subtract_product(a[4], p0, a[2]);
-    multiply(a[5], p0, a[1]);
-    subtract_product(a[5], p1, a[0]);
-    multiply(b[1], yy, inverse);
-    multiply(b[2], b[1], y);
-    b[2] = -b[2];
-    multiply(b[3], p1, b[2]);
-    subtract_product(b[3], p2, b[1]);
-    multiply(b[4], p0, b[2]);
-    b[4] = -b[4];
-    multiply(b[5], p0, b[1]);
-    unrolled<6>([&](auto r) __attribute__((always_inline)) {
-      unrolled<r + 1>([&](auto c) __attribute__((always_inline)) {
-        constexpr std::size_t k = r * (r + 1) / 2 + c;
-        add_product(sums[k], a[r], a[c]);
-        if constexpr (c != 0) add_product(sums[k], b[r], b[c]);
+struct match_equations_kernel {
+  template <simd::target Target>
+  static ORBIS_ALWAYS_INLINE void run(const double* columns, std::size_t stride, std::size_t groups, const double* pose,
+                                      double* out) {
+    using V = simd::vec<double, 4, Target>;
+    V sums[equation_sums];
+    unroll<equation_sums>([&](auto k) ORBIS_INLINE_LAMBDA { sums[k] = 0.0; });
+    for (std::size_t group = 0; group != groups; ++group) {
+      const auto at = [&](std::size_t k) ORBIS_INLINE_LAMBDA { return V::load(columns + k * stride + 4 * group); };
+      const V px = at(0), py = at(1), pz = at(2);
+      const V p0 = moved(pose, px, py, pz), p1 = moved(pose + 4, px, py, pz), p2 = moved(pose + 8, px, py, pz);
+      const V inverse = 1.0 / p2, xx = at(5), xy = at(6), yy = at(7);
+      const V x = p0 * inverse, y = p1 * inverse;
+      const V dx = x - at(3), dy = y - at(4);
+      const V u = xx * dx + xy * dy, v = yy * dy;
+      // The derivatives of u and v by the point, then by a motion of it: rho + phi x p.
+      V a[6], b[6];
+      a[0] = xx * inverse;
+      a[1] = xy * inverse;
+      a[2] = -(a[0] * x + a[1] * y);
+      a[3] = p1 * a[2] - p2 * a[1];
+      a[4] = p2 * a[0] - p0 * a[2];
+      a[5] = p0 * a[1] - p1 * a[0];
+      b[1] = yy * inverse;
+      b[2] = -(b[1] * y);
+      b[3] = p1 * b[2] - p2 * b[1];
+      b[4] = -(p0 * b[2]);
+      b[5] = p0 * b[1];
+      unroll<6>([&](auto r) ORBIS_INLINE_LAMBDA {
+        unroll<r + 1>([&](auto c) ORBIS_INLINE_LAMBDA {
+          constexpr int k = r * (r + 1) / 2 + c;
+          sums[k] += a[r] * a[c];
+          if constexpr (c != 0) sums[k] += b[r] * b[c];
+        });
+        sums[21 + r] += a[r] * u;
+        if constexpr (r != 0) sums[21 + r] += b[r] * v;
       });
-      add_product(sums[21 + r], a[r], u);
-      if constexpr (r != 0) add_product(sums[21 + r], b[r], v);
-    });
-    add_product(sums[27], u, u);
-    add_product(sums[27], v, v);
+      sums[27] += u * u;
+      sums[27] += v * v;
+    }
+    unroll<equation_sums>([&](auto k) ORBIS_INLINE_LAMBDA { sums[k].store(out + 4 * k); });
   }
-  unrolled<equation_sums>([&](auto k) __attribute__((always_inline)) { store(out + 4 * k + offset, sums[k]); });
-}
+};
 
-inline void match_errors_portable(const float* columns, std::size_t stride, const float* pose, float* out) {
-  match_errors_in_lanes<wide::numbers<float, 4>>(columns, stride, pose, out);
-}
-inline void match_equations_portable(const double* columns, std::size_t stride, std::size_t groups, const double* pose,
-                                     double* out) {
-  for (const std::size_t offset : {std::size_t{0}, std::size_t{2}})
-    match_equations_in_lanes<wide::numbers<double, 2>>(columns, stride, groups, pose, out, offset);
-}
-#if ORBIS_X86
-ORBIS_TARGET("avx2")
-inline void match_errors_avx2(const float* columns, std::size_t stride, const float* pose, float* out) {
-  match_errors_in_lanes<wide::numbers<float, 8>>(columns, stride, pose, out);
-}
-ORBIS_TARGET("avx512f,avx512dq,avx512vl,avx512bw")
-inline void match_errors_avx512(const float* columns, std::size_t stride, const float* pose, float* out) {
-  match_errors_in_lanes<wide::numbers<float, 16>>(columns, stride, pose, out);
-}
-ORBIS_TARGET("avx2")
-inline void match_equations_avx2(const double* columns, std::size_t stride, std::size_t groups, const double* pose,
-                                 double* out) {
-  match_equations_in_lanes<wide::numbers<double, 4>>(columns, stride, groups, pose, out, 0);
-}
-/// Twice as many registers keep all sums out of memory.
-ORBIS_TARGET("avx512f,avx512dq,avx512vl,avx512bw")
-inline void match_equations_avx512(const double* columns, std::size_t stride, std::size_t groups, const double* pose,
-                                   double* out) {
-  match_equations_in_lanes<wide::numbers<double, 4>>(columns, stride, groups, pose, out, 0);
-}
-#endif
-
+/// The loops for this processor.
 struct match_kernels {
-  match_errors* errors;
-  match_equations* equations;
-
-  [[nodiscard]] static match_kernels at(simd::level level) {
-#if ORBIS_X86
-    return {simd::select<match_errors>(
-                level, {.portable = match_errors_portable, .avx2 = match_errors_avx2, .avx512 = match_errors_avx512}),
-            simd::select<match_equations>(level, {.portable = match_equations_portable,
-                                                  .avx2 = match_equations_avx2,
-                                                  .avx512 = match_equations_avx512})};
-#else
-    static_cast<void>(level);
-    return {match_errors_portable, match_equations_portable};
-#endif
-  }
+  match_errors* errors = simd::kernel<match_errors_kernel, match_errors>();
+  match_equations* equations = simd::kernel<match_equations_kernel, match_equations>();
 };
 
 /// The usable matches of two lists, in an order that depends only on the seed.

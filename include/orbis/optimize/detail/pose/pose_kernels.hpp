@@ -10,8 +10,10 @@
 #include <limits>
 
 #include <orbis/camera/project_lanes.hpp>
-#include <orbis/core/lanes.hpp>
 #include <orbis/core/se3.hpp>
+#include <orbis/core/simd/dispatch.hpp>
+#include <orbis/core/simd/math.hpp>
+#include <orbis/core/simd/vec.hpp>
 #include <orbis/optimize/detail/loss_lanes.hpp>
 #include <orbis/optimize/reprojection.hpp>
 
@@ -47,17 +49,17 @@ struct pose_at {
 };
 
 /// Eight observations at a pose: points in the camera frame, their residuals and chi-squared errors.
-template <simd::lane_vector L>
+template <camera::double_lanes L>
 struct pose_block {
   L x, y, z;
   L r0, r1, r2;
   L chi2;
   camera::lane_projection<L> projection;
-  typename L::mask has_depth;
+  camera::mask_of<L> has_depth;
   L inverse_z;
 };
 
-template <bool Jacobian, class Camera, simd::lane_vector L>
+template <bool Jacobian, class Camera, camera::double_lanes L>
 ORBIS_ALWAYS_INLINE void see(const pose_lanes& in, std::size_t i, const L& information, const Camera& camera,
                              const pose_at& at, pose_block<L>& b) {
   const L wx = L::load(&in.x[i]), wy = L::load(&in.y[i]), wz = L::load(&in.z[i]);
@@ -78,10 +80,10 @@ ORBIS_ALWAYS_INLINE void see(const pose_lanes& in, std::size_t i, const L& infor
 
 /// The equations of the first `count` observations, a multiple of eight. A point without a projection costs as much as
 /// one at the gate, so that a step cannot gain by losing points.
-template <int Native, class Camera, class Loss>
+template <simd::target Target, class Camera, class Loss>
 ORBIS_ALWAYS_INLINE void sum_pose(const pose_lanes& in, std::size_t count, const Camera& camera, const pose_at& at,
                                   const Loss& loss, pose_sums& out) {
-  using L = simd::lanes<Native>;
+  using L = simd::vec<double, 8, Target>;
   constexpr bool aligned = camera::lanes_of<Camera>::axis_aligned;
   L t0(0.0), t1(0.0), t2(0.0), t3(0.0), t4(0.0), t5(0.0);
   L c0(0.0), c1(0.0), c2(0.0), c3(0.0), c4(0.0), c5(0.0), c6(0.0), c7(0.0), c8(0.0);
@@ -89,7 +91,7 @@ ORBIS_ALWAYS_INLINE void sum_pose(const pose_lanes& in, std::size_t count, const
   L g0(0.0), g1(0.0), g2(0.0), g3(0.0), g4(0.0), g5(0.0);
   L total(0.0);
   const L lost = loss.cost(at.without_projection);
-  for (std::size_t i = 0; i != count; i += simd::lane_count) {
+  for (std::size_t i = 0; i != count; i += L::count) {
     const L information = L::load(&in.active[i]);
     pose_block<L> b;
     see<true>(in, i, information, camera, at, b);
@@ -191,11 +193,11 @@ ORBIS_ALWAYS_INLINE void sum_pose(const pose_lanes& in, std::size_t count, const
 
 /// The chi-squared errors of the first `count` observations, outliers included; infinite without a projection or
 /// without information.
-template <int Native, class Camera>
+template <simd::target Target, class Camera>
 ORBIS_ALWAYS_INLINE void judge_pose(const pose_lanes& in, std::size_t count, const Camera& camera, const pose_at& at,
                                     double* chi2) {
-  using L = simd::lanes<Native>;
-  for (std::size_t i = 0; i != count; i += simd::lane_count) {
+  using L = simd::vec<double, 8, Target>;
+  for (std::size_t i = 0; i != count; i += L::count) {
     const L information = L::load(&in.information[i]);
     pose_block<L> b;
     see<false>(in, i, information, camera, at, b);
@@ -204,53 +206,34 @@ ORBIS_ALWAYS_INLINE void judge_pose(const pose_lanes& in, std::size_t count, con
   }
 }
 
-/// The two loops for one camera model and loss.
+/// The two loops, compiled for every instruction set.
 template <class Camera, class Loss>
-struct pose_kernels {
-  using sum_signature = void(const pose_lanes&, std::size_t, const Camera&, const pose_at&, const Loss&, pose_sums&);
-  using judge_signature = void(const pose_lanes&, std::size_t, const Camera&, const pose_at&, double*);
-
-  ORBIS_UNFUSED static void sum_portable(const pose_lanes& in, std::size_t n, const Camera& camera, const pose_at& at,
-                                         const Loss& loss, pose_sums& out) {
-    sum_pose<2>(in, n, camera, at, loss, out);
-  }
-  ORBIS_UNFUSED static void judge_portable(const pose_lanes& in, std::size_t n, const Camera& camera, const pose_at& at,
-                                           double* chi2) {
-    judge_pose<2>(in, n, camera, at, chi2);
-  }
-#if ORBIS_X86
-  ORBIS_UNFUSED ORBIS_TARGET_AVX2 static void sum_avx2(const pose_lanes& in, std::size_t n, const Camera& camera,
-                                                       const pose_at& at, const Loss& loss, pose_sums& out) {
-    sum_pose<4>(in, n, camera, at, loss, out);
-  }
-  ORBIS_UNFUSED ORBIS_TARGET_AVX2 static void judge_avx2(const pose_lanes& in, std::size_t n, const Camera& camera,
-                                                         const pose_at& at, double* chi2) {
-    judge_pose<4>(in, n, camera, at, chi2);
-  }
-  ORBIS_UNFUSED ORBIS_TARGET_AVX512 static void sum_avx512(const pose_lanes& in, std::size_t n, const Camera& camera,
-                                                           const pose_at& at, const Loss& loss, pose_sums& out) {
-    sum_pose<8>(in, n, camera, at, loss, out);
-  }
-  ORBIS_UNFUSED ORBIS_TARGET_AVX512 static void judge_avx512(const pose_lanes& in, std::size_t n, const Camera& camera,
-                                                             const pose_at& at, double* chi2) {
-    judge_pose<8>(in, n, camera, at, chi2);
-  }
-#endif
-
-  [[nodiscard]] static sum_signature* sum(simd::level level) noexcept {
-#if ORBIS_X86
-    return simd::select<sum_signature>(level, {sum_portable, nullptr, sum_avx2, sum_avx512});
-#else
-    return simd::select<sum_signature>(level, {sum_portable});
-#endif
-  }
-  [[nodiscard]] static judge_signature* judge(simd::level level) noexcept {
-#if ORBIS_X86
-    return simd::select<judge_signature>(level, {judge_portable, nullptr, judge_avx2, judge_avx512});
-#else
-    return simd::select<judge_signature>(level, {judge_portable});
-#endif
+struct sum_pose_kernel {
+  template <simd::target Target>
+  static ORBIS_ALWAYS_INLINE void run(const pose_lanes& in, std::size_t count, const Camera& camera, const pose_at& at,
+                                      const Loss& loss, pose_sums& out) {
+    sum_pose<Target>(in, count, camera, at, loss, out);
   }
 };
+template <class Camera>
+struct judge_pose_kernel {
+  template <simd::target Target>
+  static ORBIS_ALWAYS_INLINE void run(const pose_lanes& in, std::size_t count, const Camera& camera, const pose_at& at,
+                                      double* chi2) {
+    judge_pose<Target>(in, count, camera, at, chi2);
+  }
+};
+
+/// The loops for this processor.
+template <class Camera, class Loss>
+[[nodiscard]] auto* sum_pose_function() noexcept {
+  return simd::kernel<sum_pose_kernel<Camera, Loss>,
+                      void(const pose_lanes&, std::size_t, const Camera&, const pose_at&, const Loss&, pose_sums&)>();
+}
+template <class Camera>
+[[nodiscard]] auto* judge_pose_function() noexcept {
+  return simd::kernel<judge_pose_kernel<Camera>,
+                      void(const pose_lanes&, std::size_t, const Camera&, const pose_at&, double*)>();
+}
 
 }  // namespace orbis::optimize::detail

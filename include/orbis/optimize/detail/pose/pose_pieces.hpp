@@ -52,7 +52,7 @@ class pose_pieces {
  private:
   [[nodiscard]] bool fits() const noexcept { return observations_.size() <= pose_lanes::capacity; }
   [[nodiscard]] static std::size_t padded(std::size_t count) noexcept {
-    constexpr std::size_t width = simd::lane_count;
+    constexpr std::size_t width = 8;
     return (count + width - 1) / width * width;
   }
 

@@ -15,7 +15,7 @@
 #include <span>
 #include <vector>
 
-#include <orbis/core/simd.hpp>
+#include <orbis/core/rounded.hpp>
 #include <orbis/core/types.hpp>
 #include <orbis/optimize/detail/sparse/block_ordering.hpp>
 #include <orbis/optimize/detail/sparse/block_symbolic.hpp>
@@ -29,10 +29,6 @@ template <int B>
 requires(B >= 1) class block_cholesky {
  public:
   using block = matrix<B, B>;
-
-  block_cholesky() : block_cholesky(simd::detected()) {}
-  /// With the inner loops for `level`, as far as the processor has it.
-  explicit block_cholesky(simd::level level) : kernels_{panel_kernels<width>::at(level)} {}
 
   /// Prepares for matrices of `size` blocks a side with blocks on the diagonal and at `places`.
   /// @pre every place is below `size` and off the diagonal, and none is given twice
@@ -263,7 +259,7 @@ requires(B >= 1) class block_cholesky {
     std::copy_n(x, width * node.columns, ordered_.begin() + offset(node.first));
   }
 
-  panel_kernels<width> kernels_;
+  panel_kernels<B> kernels_;
   block_symbolic symbolic_;
   std::vector<panel> panels_;
   std::vector<target> targets_;

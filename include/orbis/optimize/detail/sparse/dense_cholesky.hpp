@@ -12,7 +12,6 @@
 #include <Eigen/Core>
 
 #include <orbis/core/rounded.hpp>
-#include <orbis/core/simd.hpp>
 #include <orbis/optimize/detail/sparse/panel_kernels.hpp>
 
 namespace orbis::optimize::detail {
@@ -21,10 +20,6 @@ namespace orbis::optimize::detail {
 /// nothing. Every processor gives the same bits. Not thread-safe.
 class dense_cholesky {
  public:
-  dense_cholesky() : dense_cholesky(simd::detected()) {}
-  /// With the inner loops for `level`, as far as the processor has it.
-  explicit dense_cholesky(simd::level level) : kernels_{panel_kernels<width>::at(level)} {}
-
   /// Room for an n x n matrix, all of it 0.
   void resize(std::size_t n) {
     size_ = n;
@@ -97,7 +92,7 @@ class dense_cholesky {
     return true;
   }
 
-  panel_kernels<width> kernels_;
+  panel_kernels<8> kernels_;
   std::size_t size_ = 0, stride_ = 0, product_stride_ = 0, failed_row_ = 0;
   std::vector<double> values_, product_, inverse_diagonal_, given_;
 };

@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Loads and stores of eight rows of four numbers as columns of eight.
+#pragma once
+
+#include <orbis/core/simd/shuffle.hpp>
+#include <orbis/core/simd/vec.hpp>
+#include <orbis/optimize/detail/unroll.hpp>
+
+namespace orbis::optimize::detail {
+
+/// Reads three numbers of eight rows of four: number k of all rows goes to `out[k]`.
+template <simd::target Target>
+ORBIS_ALWAYS_INLINE void load_transposed(const double* const* from, simd::vec<double, 8, Target>* out) {
+  using quarter = simd::vec<double, 4, Target>;
+  using simd::shuffle;
+  if constexpr (Target::bytes == 64) {
+    quarter row[8];
+    unroll<8>([&](auto i) ORBIS_INLINE_LAMBDA { row[i] = quarter::load(from[i]); });
+    const auto r04 = shuffle<0, 1, 2, 3, 4, 5, 6, 7>(row[0], row[4]);
+    const auto r15 = shuffle<0, 1, 2, 3, 4, 5, 6, 7>(row[1], row[5]);
+    const auto r26 = shuffle<0, 1, 2, 3, 4, 5, 6, 7>(row[2], row[6]);
+    const auto r37 = shuffle<0, 1, 2, 3, 4, 5, 6, 7>(row[3], row[7]);
+    const auto xz01 = shuffle<0, 8, 2, 10, 4, 12, 6, 14>(r04, r15), yw01 = shuffle<1, 9, 3, 11, 5, 13, 7, 15>(r04, r15);
+    const auto xz23 = shuffle<0, 8, 2, 10, 4, 12, 6, 14>(r26, r37), yw23 = shuffle<1, 9, 3, 11, 5, 13, 7, 15>(r26, r37);
+    out[0] = shuffle<0, 1, 8, 9, 4, 5, 12, 13>(xz01, xz23);
+    out[1] = shuffle<0, 1, 8, 9, 4, 5, 12, 13>(yw01, yw23);
+    out[2] = shuffle<2, 3, 10, 11, 6, 7, 14, 15>(xz01, xz23);
+  } else if constexpr (Target::bytes == 32) {
+    const auto part = [&](int at, quarter& x, quarter& y, quarter& z) ORBIS_INLINE_LAMBDA {
+      quarter row[4];
+      unroll<4>([&](auto i) ORBIS_INLINE_LAMBDA { row[i] = quarter::load(from[at + i]); });
+      const auto xz01 = shuffle<0, 4, 2, 6>(row[0], row[1]), yw01 = shuffle<1, 5, 3, 7>(row[0], row[1]);
+      const auto xz23 = shuffle<0, 4, 2, 6>(row[2], row[3]), yw23 = shuffle<1, 5, 3, 7>(row[2], row[3]);
+      x = shuffle<0, 1, 4, 5>(xz01, xz23);
+      y = shuffle<0, 1, 4, 5>(yw01, yw23);
+      z = shuffle<2, 3, 6, 7>(xz01, xz23);
+    };
+    part(0, out[0].v.low, out[1].v.low, out[2].v.low);
+    part(4, out[0].v.high, out[1].v.high, out[2].v.high);
+  } else {
+    double columns[3][8];
+    for (int i = 0; i != 8; ++i)
+      for (int k = 0; k != 3; ++k) columns[k][i] = from[i][k];
+    for (int k = 0; k != 3; ++k) out[k] = simd::vec<double, 8, Target>::load(columns[k]);
+  }
+}
+
+/// Writes four columns of eight numbers as eight rows of four: row i goes to `to[i] + offset`.
+template <simd::target Target>
+ORBIS_ALWAYS_INLINE void store_transposed(const simd::vec<double, 8, Target>& a, const simd::vec<double, 8, Target>& b,
+                                          const simd::vec<double, 8, Target>& c, const simd::vec<double, 8, Target>& d,
+                                          double* const* to, int offset) {
+  using quarter = simd::vec<double, 4, Target>;
+  using simd::shuffle;
+  if constexpr (Target::bytes == 64) {
+    const auto ab0 = shuffle<0, 8, 2, 10, 4, 12, 6, 14>(a, b), ab1 = shuffle<1, 9, 3, 11, 5, 13, 7, 15>(a, b);
+    const auto cd0 = shuffle<0, 8, 2, 10, 4, 12, 6, 14>(c, d), cd1 = shuffle<1, 9, 3, 11, 5, 13, 7, 15>(c, d);
+    const auto r04 = shuffle<0, 1, 8, 9, 4, 5, 12, 13>(ab0, cd0), r15 = shuffle<0, 1, 8, 9, 4, 5, 12, 13>(ab1, cd1);
+    const auto r26 = shuffle<2, 3, 10, 11, 6, 7, 14, 15>(ab0, cd0), r37 = shuffle<2, 3, 10, 11, 6, 7, 14, 15>(ab1, cd1);
+    const quarter rows[8] = {r04.low(),  r15.low(),  r26.low(),  r37.low(),
+                             r04.high(), r15.high(), r26.high(), r37.high()};
+    unroll<8>([&](auto i) ORBIS_INLINE_LAMBDA { rows[i].store(to[i] + offset); });
+  } else if constexpr (Target::bytes == 32) {
+    const auto part = [&](const quarter& x, const quarter& y, const quarter& z, const quarter& w, int first)
+                          ORBIS_INLINE_LAMBDA {
+                            const auto xy0 = shuffle<0, 4, 2, 6>(x, y), xy1 = shuffle<1, 5, 3, 7>(x, y);
+                            const auto zw0 = shuffle<0, 4, 2, 6>(z, w), zw1 = shuffle<1, 5, 3, 7>(z, w);
+                            shuffle<0, 1, 4, 5>(xy0, zw0).store(to[first] + offset);
+                            shuffle<0, 1, 4, 5>(xy1, zw1).store(to[first + 1] + offset);
+                            shuffle<2, 3, 6, 7>(xy0, zw0).store(to[first + 2] + offset);
+                            shuffle<2, 3, 6, 7>(xy1, zw1).store(to[first + 3] + offset);
+                          };
+    part(a.v.low, b.v.low, c.v.low, d.v.low, 0);
+    part(a.v.high, b.v.high, c.v.high, d.v.high, 4);
+  } else {
+    double columns[4][8];
+    a.store(columns[0]), b.store(columns[1]), c.store(columns[2]), d.store(columns[3]);
+    for (int i = 0; i != 8; ++i)
+      for (int k = 0; k != 4; ++k) to[i][offset + k] = columns[k][i];
+  }
+}
+
+}  // namespace orbis::optimize::detail

@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Loops of a constant number of turns that are written out, for kernels whose numbers have to stay in registers.
+#pragma once
+
+#include <type_traits>
+#include <utility>
+
+#include <orbis/core/simd/dispatch.hpp>
+
+namespace orbis::optimize::detail {
+
+/// Calls `f` with the constants 0 ... N - 1.
+template <int N, class F>
+ORBIS_ALWAYS_INLINE void unroll(const F& f) {
+  [&]<int... I>(std::integer_sequence<int, I...>) ORBIS_INLINE_LAMBDA { (f(std::integral_constant<int, I>{}), ...); }
+  (std::make_integer_sequence<int, N>{});
+}
+
+}  // namespace orbis::optimize::detail
