@@ -26,7 +26,6 @@
 #include <orbis/core/hash_index.hpp>
 #include <orbis/core/image.hpp>
 #include <orbis/core/jacobi.hpp>
-#include <orbis/core/lanes.hpp>
 #include <orbis/core/point.hpp>
 #include <orbis/core/point_cloud.hpp>
 #include <orbis/core/random.hpp>

@@ -212,3 +212,7 @@ template <camera::camera_model Camera>
 }
 
 }  // namespace orbis::optimize
+
+#ifdef ORBIS_COMPILED
+#include <orbis/optimize/detail/compiled/pnp.hpp>
+#endif

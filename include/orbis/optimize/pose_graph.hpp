@@ -65,17 +65,8 @@ class pose_graph_solver {
   requires relative_measurement<std::ranges::range_value_t<Edges>, T> pose_graph_summary
   solve(const Policy& policy, std::span<T> vertices, const Edges& edges, const pose_graph_options& options = {},
         progress callback = {}, Report&& report = {}) {
-    pose_graph_summary summary;
-    const std::span all{std::ranges::data(edges), std::ranges::size(edges)};
-    if (!set_up(std::span<const T>{vertices}, all, options, summary)) return summary;
-    problem<Policy, std::remove_cvref_t<decltype(all)>> graph{equations_, policy, all, summary};
-    graph.linearize();
-    summary.initial_cost = summary.final_cost = graph.cost();
-    best_ = equations_.estimate();
-    report(std::as_const(summary));
-    summary.status = run(graph, options, callback, summary, report);
-    for (const std::uint32_t v : equations_.structure().vertices) vertices[v] = best_[v];
-    return summary;
+    const std::span<const std::ranges::range_value_t<Edges>> all{std::ranges::data(edges), std::ranges::size(edges)};
+    return solve_edges(policy, vertices, all, options, callback, report);
   }
 
  private:
@@ -111,6 +102,10 @@ class pose_graph_solver {
       return equations.try_step(policy, edges, step);
     }
   };
+
+  template <class Policy, class Edge, class Report>
+  pose_graph_summary solve_edges(const Policy& policy, std::span<T> vertices, std::span<const Edge> edges,
+                                 const pose_graph_options& options, const progress& callback, Report& report);
 
   template <class Edges>
   [[nodiscard]] bool set_up(std::span<const T> vertices, const Edges& edges, const pose_graph_options& options,
@@ -160,6 +155,25 @@ class pose_graph_solver {
   std::vector<T> best_;
   step_workspace workspace_;
 };
+
+template <class T, robust_loss Loss, general_damping_policy Damping, between_factor<T> Between>
+template <class Policy, class Edge, class Report>
+pose_graph_summary pose_graph_solver<T, Loss, Damping, Between>::solve_edges(const Policy& policy,
+                                                                             std::span<T> vertices,
+                                                                             std::span<const Edge> edges,
+                                                                             const pose_graph_options& options,
+                                                                             const progress& callback, Report& report) {
+  pose_graph_summary summary;
+  if (!set_up(std::span<const T>{vertices}, edges, options, summary)) return summary;
+  problem<Policy, std::span<const Edge>> graph{equations_, policy, edges, summary};
+  graph.linearize();
+  summary.initial_cost = summary.final_cost = graph.cost();
+  best_ = equations_.estimate();
+  report(std::as_const(summary));
+  summary.status = run(graph, options, callback, summary, report);
+  for (const std::uint32_t v : equations_.structure().vertices) vertices[v] = best_[v];
+  return summary;
+}
 
 /// Solves a pose graph once, with a solver that is made for it; see `pose_graph_solver::solve`.
 template <execution_policy Policy, std::ranges::contiguous_range Vertices, std::ranges::contiguous_range Edges,
@@ -258,3 +272,7 @@ initialize_chordally(std::span<se3> vertices, const Edges& edges, const pose_gra
 }
 
 }  // namespace orbis::optimize
+
+#ifdef ORBIS_COMPILED
+#include <orbis/optimize/detail/compiled/pose_graph.hpp>
+#endif

@@ -262,3 +262,7 @@ template <camera::camera_model Camera, robust_loss Loss = huber>
 }
 
 }  // namespace orbis::optimize
+
+#ifdef ORBIS_COMPILED
+#include <orbis/optimize/detail/compiled/pose_refinement.hpp>
+#endif

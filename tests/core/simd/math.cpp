@@ -86,6 +86,44 @@ struct sums_and_roots {
   }
 };
 
+/// What kernels make of arithmetic, comparisons and roots, to be compared between the levels.
+struct mixed_arithmetic {
+  static constexpr std::size_t results = 10 * 8 + 10;
+  template <simd::target Target>
+  static ORBIS_ALWAYS_INLINE void run(const double* a, const double* b, double* out) {
+    using V = simd::vec<double, 8, Target>;
+    const V x = V::load(a), y = V::load(b);
+    const auto less = x < y, equal = x == y;
+    const V r[] = {x + y,
+                   x - y,
+                   x * y,
+                   x / y,
+                   x * y + x * x - 3.0 * y,
+                   select(less, x, y),
+                   select((x <= y) & !equal, V(1.0), V(0.0)),
+                   select(less | equal, V(1.0), V(0.0)),
+                   reciprocal_root(x * x + 1e-9),
+                   square_root(x * x)};
+    for (const V& v : r) {
+      v.store(out);
+      out += V::count;
+    }
+    for (const V& v : r) *out++ = sum(v);
+  }
+};
+
+/// Root and inverse root of one number.
+struct roots {
+  template <simd::target Target>
+  static ORBIS_ALWAYS_INLINE void run(double x, double* out) {
+    const simd::vec<double, 8, Target> v(x);
+    out[0] = square_root(v)[3];
+    out[1] = reciprocal_root(v)[6];
+  }
+};
+
+bool same_number(double a, double b) { return std::memcmp(&a, &b, sizeof a) == 0 || (std::isnan(a) && std::isnan(b)); }
+
 }  // namespace
 
 TEST_CASE("functions of vectors are those of their lanes") {
@@ -127,4 +165,46 @@ TEST_CASE("sums over lanes have one order and roots one series on every target")
       CHECK(inverse == y);
     }
   }
+}
+
+TEST_CASE("arithmetic and roots have the same bits on every level, also of what is not finite") {
+  random_bits random(11);
+  for (int trial = 0; trial != 200; ++trial) {
+    double a[8], b[8];
+    for (int i = 0; i != 8; ++i) a[i] = random.uniform(-3, 3), b[i] = random.uniform() < 0.2 ? a[i] : random.normal();
+    if (trial == 0) b[3] = std::numeric_limits<double>::quiet_NaN(), a[5] = std::numeric_limits<double>::infinity();
+    const auto at = [&](simd::level l, double* out) {
+      simd::kernel<mixed_arithmetic, void(const double*, const double*, double*)>(l)(a, b, out);
+    };
+    double expected[mixed_arithmetic::results];
+    at(simd::level::portable, expected);
+    for (const simd::level l : simd::available_levels()) {
+      double out[mixed_arithmetic::results];
+      at(l, out);
+      for (std::size_t i = 0; i != mixed_arithmetic::results; ++i) REQUIRE(same_number(out[i], expected[i]));
+    }
+    for (int i = 0; i != 8; ++i) {
+      const double x = a[i], y = b[i];
+      CHECK(same_number(expected[i], x + y));
+      CHECK(same_number(expected[8 + i], x - y));
+      CHECK(same_number(expected[16 + i], x * y));
+      CHECK(same_number(expected[24 + i], x / y));
+      CHECK(same_number(expected[40 + i], x < y ? x : y));
+      CHECK(expected[48 + i] == (x < y ? 1.0 : 0.0));
+      CHECK(expected[56 + i] == (x <= y ? 1.0 : 0.0));
+      if (!std::isfinite(x)) continue;
+      CHECK(expected[64 + i] == Approx(1.0 / std::sqrt(x * x + 1e-9)).epsilon(1e-15));
+      CHECK(expected[72 + i] == Approx(std::abs(x)).epsilon(1e-15));
+    }
+  }
+}
+
+TEST_CASE("roots hold over the range of double on every level") {
+  for (const simd::level l : simd::available_levels())
+    for (double x = 1e-300; x < 1e300; x *= 7.3) {
+      double out[2];
+      simd::kernel<roots, void(double, double*)>(l)(x, out);
+      CHECK(std::abs(out[0] - std::sqrt(x)) <= 4e-16 * std::sqrt(x));
+      CHECK(std::abs(out[1] * std::sqrt(x) - 1.0) <= 6e-16);
+    }
 }

@@ -56,26 +56,44 @@ concept target = requires {
 
 namespace detail {
 
-/// The functions that hold the code of `Kernel` for each target.
-template <class Kernel, class Signature>
-struct compiled;
+/// The function that holds the code of `Kernel` for a target. It is not defined in the class, where it would be inline:
+/// compilers instantiate inline functions even if `extern template` says that they are elsewhere.
+template <class Kernel, class Signature, class Target>
+struct code;
 template <class Kernel, class R, class... Args>
-struct compiled<Kernel, R(Args...)> {
-  static ORBIS_UNFUSED R on_portable(Args... args) {
-    return Kernel::template run<portable>(static_cast<Args&&>(args)...);
-  }
-#if ORBIS_X86
-  static ORBIS_UNFUSED ORBIS_TARGET_POPCNT R on_popcnt(Args... args) {
-    return Kernel::template run<popcnt>(static_cast<Args&&>(args)...);
-  }
-  static ORBIS_UNFUSED ORBIS_TARGET_AVX2 R on_avx2(Args... args) {
-    return Kernel::template run<avx2>(static_cast<Args&&>(args)...);
-  }
-  static ORBIS_UNFUSED ORBIS_TARGET_AVX512 R on_avx512(Args... args) {
-    return Kernel::template run<avx512>(static_cast<Args&&>(args)...);
-  }
-#endif
+struct code<Kernel, R(Args...), portable> {
+  static R run(Args... args);
 };
+template <class Kernel, class R, class... Args>
+ORBIS_UNFUSED R code<Kernel, R(Args...), portable>::run(Args... args) {
+  return Kernel::template run<portable>(static_cast<Args&&>(args)...);
+}
+#if ORBIS_X86
+template <class Kernel, class R, class... Args>
+struct code<Kernel, R(Args...), popcnt> {
+  static ORBIS_TARGET_POPCNT R run(Args... args);
+};
+template <class Kernel, class R, class... Args>
+ORBIS_UNFUSED ORBIS_TARGET_POPCNT R code<Kernel, R(Args...), popcnt>::run(Args... args) {
+  return Kernel::template run<popcnt>(static_cast<Args&&>(args)...);
+}
+template <class Kernel, class R, class... Args>
+struct code<Kernel, R(Args...), avx2> {
+  static ORBIS_TARGET_AVX2 R run(Args... args);
+};
+template <class Kernel, class R, class... Args>
+ORBIS_UNFUSED ORBIS_TARGET_AVX2 R code<Kernel, R(Args...), avx2>::run(Args... args) {
+  return Kernel::template run<avx2>(static_cast<Args&&>(args)...);
+}
+template <class Kernel, class R, class... Args>
+struct code<Kernel, R(Args...), avx512> {
+  static ORBIS_TARGET_AVX512 R run(Args... args);
+};
+template <class Kernel, class R, class... Args>
+ORBIS_UNFUSED ORBIS_TARGET_AVX512 R code<Kernel, R(Args...), avx512>::run(Args... args) {
+  return Kernel::template run<avx512>(static_cast<Args&&>(args)...);
+}
+#endif
 
 template <class T, class... List>
 inline constexpr bool is_one_of = (std::is_same_v<T, List> || ...);
@@ -92,20 +110,31 @@ template <class Kernel, class Signature, target... Targets>
   if constexpr (sizeof...(Targets) == 0) {
     return kernel<Kernel, Signature, avx2, avx512>(highest);
   } else {
-    using code = detail::compiled<Kernel, Signature>;
 #if ORBIS_X86
     const level best = std::min(highest, best_level());
     if constexpr (detail::is_one_of<avx512, Targets...>)
-      if (best >= level::avx512) return code::on_avx512;
+      if (best >= level::avx512) return detail::code<Kernel, Signature, avx512>::run;
     if constexpr (detail::is_one_of<avx2, Targets...>)
-      if (best >= level::avx2) return code::on_avx2;
+      if (best >= level::avx2) return detail::code<Kernel, Signature, avx2>::run;
     if constexpr (detail::is_one_of<popcnt, Targets...>)
-      if (best >= level::popcnt) return code::on_popcnt;
+      if (best >= level::popcnt) return detail::code<Kernel, Signature, popcnt>::run;
 #else
     static_cast<void>(highest);
 #endif
-    return code::on_portable;
+    return detail::code<Kernel, Signature, portable>::run;
   }
 }
 
 }  // namespace orbis::simd
+
+/// Explicit instantiation of a kernel for the targets that `kernel` has by default: `ORBIS_KERNEL_INSTANCE(extern
+/// template, signature, kernel)`, in namespace orbis.
+#if ORBIS_X86
+#define ORBIS_KERNEL_INSTANCE(what, signature, ...)                       \
+  what struct simd::detail::code<__VA_ARGS__, signature, simd::portable>; \
+  what struct simd::detail::code<__VA_ARGS__, signature, simd::avx2>;     \
+  what struct simd::detail::code<__VA_ARGS__, signature, simd::avx512>;
+#else
+#define ORBIS_KERNEL_INSTANCE(what, signature, ...) \
+  what struct simd::detail::code<__VA_ARGS__, signature, simd::portable>;
+#endif

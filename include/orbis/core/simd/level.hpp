@@ -88,23 +88,4 @@ class level_limit {
   return levels;
 }
 
-/// The variants of one kernel; those that do not exist are null.
-template <class Signature>
-struct variants {
-  Signature* portable;
-  Signature* popcnt = nullptr;
-  Signature* avx2 = nullptr;
-  Signature* avx512 = nullptr;
-};
-
-/// The best existing variant that neither `wanted` nor the processor nor a test's limit excludes.
-template <class Signature>
-[[nodiscard]] Signature* select(level wanted, const variants<Signature>& v) noexcept {
-  const level best = std::min(wanted, best_level());
-  if (best >= level::avx512 && v.avx512 != nullptr) return v.avx512;
-  if (best >= level::avx2 && v.avx2 != nullptr) return v.avx2;
-  if (best >= level::popcnt && v.popcnt != nullptr) return v.popcnt;
-  return v.portable;
-}
-
 }  // namespace orbis::simd

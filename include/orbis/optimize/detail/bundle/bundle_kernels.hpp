@@ -396,9 +396,17 @@ struct cost_kernel {
     return camera_cost<Target>(work, loss);
   }
 };
+/// Runs once for a problem, so that one instruction set is enough.
 template <class R>
-ORBIS_UNFUSED void find_visible(const camera_work<R>& work, double* flags) {
-  camera_visibility<simd::portable>(work, flags);
+struct visibility_kernel {
+  template <simd::target Target>
+  static ORBIS_ALWAYS_INLINE void run(const camera_work<R>& work, double* flags) {
+    camera_visibility<Target>(work, flags);
+  }
+};
+template <class R>
+void find_visible(const camera_work<R>& work, double* flags) {
+  simd::kernel<visibility_kernel<R>, void(const camera_work<R>&, double*), simd::portable>()(work, flags);
 }
 
 /// The kernels for this processor.

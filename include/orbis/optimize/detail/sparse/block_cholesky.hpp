@@ -32,30 +32,7 @@ requires(B >= 1) class block_cholesky {
 
   /// Prepares for matrices of `size` blocks a side with blocks on the diagonal and at `places`.
   /// @pre every place is below `size` and off the diagonal, and none is given twice
-  void analyze(std::size_t size, std::span<const block_place> places) {
-    symbolic_ = analyze_blocks(size, places);
-    panels_.clear();
-    std::size_t total = 0, tallest = 0;
-    for (const supernode& s : symbolic_.supernodes) {
-      const std::size_t height = width * (std::size_t{s.columns} + s.rows);
-      panels_.push_back({total, (height + 7) / 8 * 8});
-      total += panels_.back().stride * width * s.columns;
-      tallest = std::max(tallest, height);
-    }
-    values_.assign(total + 2 * panel_slack, 0.0);
-    product_.assign((tallest + 2 * panel_slack) * width, 0.0);
-    product_stride_ = (tallest + panel_slack) / panel_slack * panel_slack;
-    inverse_diagonal_.assign(width * size, 0.0);
-    ordered_.assign(width * size, 0.0);
-    place_of_row_.assign(size, 0);
-
-    targets_.clear();
-    for (const block_place& p : places) {
-      const std::uint32_t row = symbolic_.position[p.row], column = symbolic_.position[p.column];
-      const std::uint32_t lower = std::max(row, column), upper = std::min(row, column);
-      targets_.push_back({at(lower, upper), panels_[symbolic_.supernode_of[upper]].stride, row < column});
-    }
-  }
+  void analyze(std::size_t size, std::span<const block_place> places);
 
   [[nodiscard]] const block_symbolic& symbolic() const { return symbolic_; }
 
@@ -64,31 +41,13 @@ requires(B >= 1) class block_cholesky {
   /// matrix, or not finite; see `failed_block`.
   /// @pre sizes as analysed; `damping` empty or one for each row
   [[nodiscard]] bool factor(std::span<const block> diagonal, std::span<const block> off_diagonal,
-                            std::span<const double> damping = {}, double tolerance = 1e-14) {
-    assert(diagonal.size() == symbolic_.size() && off_diagonal.size() == targets_.size());
-    assert(damping.empty() || damping.size() == width * symbolic_.size());
-    fill(diagonal, off_diagonal, damping);
-    for (std::size_t s = 0; s != symbolic_.supernodes.size(); ++s) {
-      find_places(s);
-      for (const supernode_update& u : symbolic_.updates_of(s)) apply(u, s);
-      if (!factor_panel(s, diagonal, damping, tolerance)) return false;
-    }
-    return true;
-  }
+                            std::span<const double> damping = {}, double tolerance = 1e-14);
 
   /// The block whose pivot was not positive, after `factor` has returned false.
   [[nodiscard]] std::uint32_t failed_block() const { return failed_block_; }
 
   /// Replaces the right-hand side in `x` by the solution. @pre the last `factor` returned true
-  void solve(std::span<double> x) {
-    assert(x.size() == ordered_.size());
-    for (std::size_t k = 0; k != symbolic_.size(); ++k)
-      std::copy_n(x.begin() + offset(symbolic_.order[k]), B, ordered_.begin() + offset(k));
-    for (std::size_t s = 0; s != symbolic_.supernodes.size(); ++s) forward(s);
-    for (std::size_t s = symbolic_.supernodes.size(); s != 0; --s) backward(s - 1);
-    for (std::size_t k = 0; k != symbolic_.size(); ++k)
-      std::copy_n(ordered_.begin() + offset(k), B, x.begin() + offset(symbolic_.order[k]));
-  }
+  void solve(std::span<double> x);
 
  private:
   static constexpr std::size_t width = static_cast<std::size_t>(B);
@@ -271,5 +230,56 @@ requires(B >= 1) class block_cholesky {
   std::vector<std::uint32_t> place_of_row_;
   std::uint32_t failed_block_ = 0;
 };
+
+template <int B>
+requires(B >= 1) void block_cholesky<B>::analyze(std::size_t size, std::span<const block_place> places) {
+  symbolic_ = analyze_blocks(size, places);
+  panels_.clear();
+  std::size_t total = 0, tallest = 0;
+  for (const supernode& s : symbolic_.supernodes) {
+    const std::size_t height = width * (std::size_t{s.columns} + s.rows);
+    panels_.push_back({total, (height + 7) / 8 * 8});
+    total += panels_.back().stride * width * s.columns;
+    tallest = std::max(tallest, height);
+  }
+  values_.assign(total + 2 * panel_slack, 0.0);
+  product_.assign((tallest + 2 * panel_slack) * width, 0.0);
+  product_stride_ = (tallest + panel_slack) / panel_slack * panel_slack;
+  inverse_diagonal_.assign(width * size, 0.0);
+  ordered_.assign(width * size, 0.0);
+  place_of_row_.assign(size, 0);
+
+  targets_.clear();
+  for (const block_place& p : places) {
+    const std::uint32_t row = symbolic_.position[p.row], column = symbolic_.position[p.column];
+    const std::uint32_t lower = std::max(row, column), upper = std::min(row, column);
+    targets_.push_back({at(lower, upper), panels_[symbolic_.supernode_of[upper]].stride, row < column});
+  }
+}
+
+template <int B>
+requires(B >= 1) bool block_cholesky<B>::factor(std::span<const block> diagonal, std::span<const block> off_diagonal,
+                                                std::span<const double> damping, double tolerance) {
+  assert(diagonal.size() == symbolic_.size() && off_diagonal.size() == targets_.size());
+  assert(damping.empty() || damping.size() == width * symbolic_.size());
+  fill(diagonal, off_diagonal, damping);
+  for (std::size_t s = 0; s != symbolic_.supernodes.size(); ++s) {
+    find_places(s);
+    for (const supernode_update& u : symbolic_.updates_of(s)) apply(u, s);
+    if (!factor_panel(s, diagonal, damping, tolerance)) return false;
+  }
+  return true;
+}
+
+template <int B>
+requires(B >= 1) void block_cholesky<B>::solve(std::span<double> x) {
+  assert(x.size() == ordered_.size());
+  for (std::size_t k = 0; k != symbolic_.size(); ++k)
+    std::copy_n(x.begin() + offset(symbolic_.order[k]), B, ordered_.begin() + offset(k));
+  for (std::size_t s = 0; s != symbolic_.supernodes.size(); ++s) forward(s);
+  for (std::size_t s = symbolic_.supernodes.size(); s != 0; --s) backward(s - 1);
+  for (std::size_t k = 0; k != symbolic_.size(); ++k)
+    std::copy_n(ordered_.begin() + offset(k), B, x.begin() + offset(symbolic_.order[k]));
+}
 
 }  // namespace orbis::optimize::detail

@@ -95,32 +95,10 @@ class automatic_block_solver {
 
   [[nodiscard]] kind chosen() const { return kind_; }
 
-  void analyze(std::size_t size, std::span<const block_place> places) {
-    kind_ = kind::dense;
-    if (size > dense_limit_) {
-      kind_ = kind::sparse;
-      sparse_.analyze(size, places);
-      std::size_t blocks = 0;
-      for (const supernode& s : sparse_.symbolic().supernodes)
-        blocks += std::size_t{s.columns} * (std::size_t{s.columns} + s.rows);
-      if (blocks > fill_limit_) kind_ = kind::iterative;
-    }
-    if (kind_ == kind::dense) dense_.analyze(size, places);
-    if (kind_ == kind::iterative) iterative_.analyze(size, places);
-  }
-  [[nodiscard]] bool factor(std::span<const matrix<C, C>> diagonal, std::span<const matrix<C, C>> off_diagonal) {
-    bool definite = false;
-    with([&](auto& s) { definite = s.factor(diagonal, off_diagonal); });
-    return definite;
-  }
-  void solve(std::span<double> x) {
-    with([&](auto& s) { s.solve(x); });
-  }
-  [[nodiscard]] std::uint32_t failed_block() {
-    std::uint32_t block = 0;
-    with([&](auto& s) { block = s.failed_block(); });
-    return block;
-  }
+  void analyze(std::size_t size, std::span<const block_place> places);
+  [[nodiscard]] bool factor(std::span<const matrix<C, C>> diagonal, std::span<const matrix<C, C>> off_diagonal);
+  void solve(std::span<double> x);
+  [[nodiscard]] std::uint32_t failed_block();
   [[nodiscard]] int iterations() const { return iterative_.iterations(); }
 
  private:
@@ -137,5 +115,40 @@ class automatic_block_solver {
   sparse_block_solver<C> sparse_;
   iterative_block_solver<C> iterative_;
 };
+
+template <int C>
+void automatic_block_solver<C>::analyze(std::size_t size, std::span<const block_place> places) {
+  kind_ = kind::dense;
+  if (size > dense_limit_) {
+    kind_ = kind::sparse;
+    sparse_.analyze(size, places);
+    std::size_t blocks = 0;
+    for (const supernode& s : sparse_.symbolic().supernodes)
+      blocks += std::size_t{s.columns} * (std::size_t{s.columns} + s.rows);
+    if (blocks > fill_limit_) kind_ = kind::iterative;
+  }
+  if (kind_ == kind::dense) dense_.analyze(size, places);
+  if (kind_ == kind::iterative) iterative_.analyze(size, places);
+}
+
+template <int C>
+bool automatic_block_solver<C>::factor(std::span<const matrix<C, C>> diagonal,
+                                       std::span<const matrix<C, C>> off_diagonal) {
+  bool definite = false;
+  with([&](auto& s) { definite = s.factor(diagonal, off_diagonal); });
+  return definite;
+}
+
+template <int C>
+void automatic_block_solver<C>::solve(std::span<double> x) {
+  with([&](auto& s) { s.solve(x); });
+}
+
+template <int C>
+std::uint32_t automatic_block_solver<C>::failed_block() {
+  std::uint32_t block = 0;
+  with([&](auto& s) { block = s.failed_block(); });
+  return block;
+}
 
 }  // namespace orbis::optimize::detail
