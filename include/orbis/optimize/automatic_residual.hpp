@@ -51,15 +51,19 @@ struct dual {
   dual& operator/=(const dual& b) { return *this = *this / b; }
 
   friend dual operator+(const dual& a) { return a; }
-  friend dual operator-(const dual& a) { return {-a.value, -a.slope}; }
-  friend dual operator+(const dual& a, const dual& b) { return {a.value + b.value, a.slope + b.slope}; }
-  friend dual operator-(const dual& a, const dual& b) { return {a.value - b.value, a.slope - b.slope}; }
-  friend dual operator*(const dual& a, const dual& b) {
-    return {a.value * b.value, a.value * b.slope + b.value * a.slope};
+  friend dual operator-(const dual& a) {
+    return {-a.value, map(a, [](double s) { return -s; })};
   }
+  friend dual operator+(const dual& a, const dual& b) {
+    return {a.value + b.value, map(a, b, [](double s, double t) { return s + t; })};
+  }
+  friend dual operator-(const dual& a, const dual& b) {
+    return {a.value - b.value, map(a, b, [](double s, double t) { return s - t; })};
+  }
+  friend dual operator*(const dual& a, const dual& b) { return {a.value * b.value, sum(a.value, b, b.value, a)}; }
   friend dual operator/(const dual& a, const dual& b) {
     const double quotient = a.value / b.value;
-    return {quotient, (a.slope - quotient * b.slope) / b.value};
+    return {quotient, map(a, b, [&](double s, double t) { return (s - quotient * t) / b.value; })};
   }
 
   friend bool operator==(const dual& a, const dual& b) { return a.value == b.value; }
@@ -72,46 +76,72 @@ struct dual {
   friend dual abs(const dual& a) { return a.value < 0.0 ? -a : a; }
   friend dual sqrt(const dual& a) {
     const double root = std::sqrt(a.value);
-    return {root, a.slope * (0.5 / root)};
+    return {root, times(0.5 / root, a)};
   }
   friend dual exp(const dual& a) {
     const double e = std::exp(a.value);
-    return {e, e * a.slope};
+    return {e, times(e, a)};
   }
-  friend dual log(const dual& a) { return {std::log(a.value), a.slope / a.value}; }
-  friend dual log1p(const dual& a) { return {std::log1p(a.value), a.slope / (1.0 + a.value)}; }
-  friend dual sin(const dual& a) { return {std::sin(a.value), std::cos(a.value) * a.slope}; }
-  friend dual cos(const dual& a) { return {std::cos(a.value), -std::sin(a.value) * a.slope}; }
+  friend dual log(const dual& a) { return {std::log(a.value), over(a, a.value)}; }
+  friend dual log1p(const dual& a) { return {std::log1p(a.value), over(a, 1.0 + a.value)}; }
+  friend dual sin(const dual& a) { return {std::sin(a.value), times(std::cos(a.value), a)}; }
+  friend dual cos(const dual& a) { return {std::cos(a.value), times(-std::sin(a.value), a)}; }
   friend dual tan(const dual& a) {
     const double t = std::tan(a.value);
-    return {t, (1.0 + t * t) * a.slope};
+    return {t, times(1.0 + t * t, a)};
   }
-  friend dual asin(const dual& a) { return {std::asin(a.value), a.slope / std::sqrt(1.0 - a.value * a.value)}; }
-  friend dual acos(const dual& a) { return {std::acos(a.value), -a.slope / std::sqrt(1.0 - a.value * a.value)}; }
-  friend dual atan(const dual& a) { return {std::atan(a.value), a.slope / (1.0 + a.value * a.value)}; }
-  friend dual sinh(const dual& a) { return {std::sinh(a.value), std::cosh(a.value) * a.slope}; }
-  friend dual cosh(const dual& a) { return {std::cosh(a.value), std::sinh(a.value) * a.slope}; }
+  friend dual asin(const dual& a) { return {std::asin(a.value), over(a, std::sqrt(1.0 - a.value * a.value))}; }
+  friend dual acos(const dual& a) { return {std::acos(a.value), over(a, -std::sqrt(1.0 - a.value * a.value))}; }
+  friend dual atan(const dual& a) { return {std::atan(a.value), over(a, 1.0 + a.value * a.value)}; }
+  friend dual sinh(const dual& a) { return {std::sinh(a.value), times(std::cosh(a.value), a)}; }
+  friend dual cosh(const dual& a) { return {std::cosh(a.value), times(std::sinh(a.value), a)}; }
   friend dual tanh(const dual& a) {
     const double t = std::tanh(a.value);
-    return {t, (1.0 - t * t) * a.slope};
+    return {t, times(1.0 - t * t, a)};
   }
   friend dual atan2(const dual& y, const dual& x) {
     const double square = x.value * x.value + y.value * y.value;
-    return {std::atan2(y.value, x.value), (x.value * y.slope - y.value * x.slope) / square};
+    return {std::atan2(y.value, x.value),
+            map(x, y, [&](double by_x, double by_y) { return (x.value * by_y - y.value * by_x) / square; })};
   }
   friend dual hypot(const dual& a, const dual& b) {
     const double h = std::hypot(a.value, b.value);
-    return {h, (a.value / h) * a.slope + (b.value / h) * b.slope};
+    return {h, sum(a.value / h, a, b.value / h, b)};
   }
   friend dual pow(const dual& a, double b) {
-    return {std::pow(a.value, b), (b == 0.0 ? 0.0 : b * std::pow(a.value, b - 1.0)) * a.slope};
+    return {std::pow(a.value, b), times(b == 0.0 ? 0.0 : b * std::pow(a.value, b - 1.0), a)};
   }
   friend dual pow(const dual& a, const dual& b) {
     const double p = std::pow(a.value, b.value);
-    return {p, b.value * std::pow(a.value, b.value - 1.0) * a.slope + p * std::log(a.value) * b.slope};
+    return {p, sum(b.value * std::pow(a.value, b.value - 1.0), a, p * std::log(a.value), b)};
   }
   friend dual min(const dual& a, const dual& b) { return b.value < a.value ? b : a; }
   friend dual max(const dual& a, const dual& b) { return a.value < b.value ? b : a; }
+
+ private:
+  // Loops instead of Eigen's expressions, which compilers take a hundred times as long for.
+  template <class F>
+  [[nodiscard]] static matrix<N> map(const dual& a, const F& f) {
+    matrix<N> out;
+    for (int i = 0; i != N; ++i) out.data()[i] = f(a.slope.data()[i]);
+    return out;
+  }
+  template <class F>
+  [[nodiscard]] static matrix<N> map(const dual& a, const dual& b, const F& f) {
+    matrix<N> out;
+    for (int i = 0; i != N; ++i) out.data()[i] = f(a.slope.data()[i], b.slope.data()[i]);
+    return out;
+  }
+  [[nodiscard]] static matrix<N> times(double factor, const dual& a) {
+    return map(a, [&](double s) { return factor * s; });
+  }
+  [[nodiscard]] static matrix<N> over(const dual& a, double divisor) {
+    return map(a, [&](double s) { return s / divisor; });
+  }
+  /// `p a' + q b'`.
+  [[nodiscard]] static matrix<N> sum(double p, const dual& a, double q, const dual& b) {
+    return map(a, b, [&](double s, double t) { return p * s + q * t; });
+  }
 };
 
 /// The value without its derivatives, for comparisons in code that is written for any number type.
