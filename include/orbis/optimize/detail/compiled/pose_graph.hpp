@@ -6,7 +6,6 @@
 #include <span>
 
 #include <orbis/core/execution.hpp>
-#include <orbis/core/progress.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/optimize/detail/compiled/block_solvers.hpp>
 #include <orbis/optimize/pose_graph.hpp>
