@@ -99,13 +99,10 @@ inline std::uint32_t crc32c_sse42(const std::byte* at, std::size_t size, std::ui
 /// Source: G. Castagnoli, S. Bräuer, M. Herrmann, "Optimization of cyclic redundancy-check codes with 24 and 32 parity
 /// bits", IEEE Transactions on Communications 41, 1993.
 [[nodiscard]] inline std::uint32_t crc32c(std::span<const std::byte> bytes, std::uint32_t before = 0) noexcept {
-  using kernel = std::uint32_t(const std::byte*, std::size_t, std::uint32_t) noexcept;
 #if ORBIS_X86
-  constexpr simd::variants<kernel> best{.portable = detail::crc32c_portable, .popcnt = detail::crc32c_sse42};
-#else
-  constexpr simd::variants<kernel> best{.portable = detail::crc32c_portable};
+  if (simd::best_level() >= simd::level::popcnt) return ~detail::crc32c_sse42(bytes.data(), bytes.size(), ~before);
 #endif
-  return ~simd::select<kernel>(simd::level::avx512, best)(bytes.data(), bytes.size(), ~before);
+  return ~detail::crc32c_portable(bytes.data(), bytes.size(), ~before);
 }
 
 namespace detail {
