@@ -68,7 +68,7 @@ static_assert(slam::feature_extractor<histogram_extractor> && !slam::feature_ext
 static_assert(std::is_same_v<slam::descriptor_of_t<histogram_extractor>, histogram>);
 static_assert(std::is_same_v<slam::descriptor_of_t<features::orb_extractor>, features::binary_descriptor<256>>);
 static_assert(std::is_same_v<decltype(slam::basic_landmark<histogram>{}.descriptor), histogram>);
-static_assert(slam::tracking_matchers<matchers, histogram>);
+static_assert(slam::tracking_matchers<matchers, histogram> && !slam::tracking_matchers<slam::orb_matchers, histogram>);
 
 // Files hold the descriptors of ORB alone.
 template <class S>

@@ -20,11 +20,24 @@
 
 namespace orbis::slam {
 
+namespace detail {
+
+/// Whether matchers that name their distance, `M::distance`, compare descriptors as a map does.
+template <class M, class D>
+concept compares_as_map = !requires {
+  typename M::distance;
+}
+|| requires { requires std::same_as<typename M::distance, distance_of_t<D>>; };
+
+}  // namespace detail
+
 /// The matchers of tracking for descriptors of type `D`: `motion` matches what the last frame observed, near where it
 /// is expected by now; `landmarks` matches landmarks near their projections; `appearance` matches two images without
-/// any expectation. Each is a chain as in `features/matcher.hpp`.
+/// any expectation. Each is a chain as in `features/matcher.hpp`. A type `distance`, if there is one, must be the
+/// distance by which a map compares these descriptors: many types of descriptors can be compared bit by bit, which
+/// means nothing for most of them.
 template <class M, class D>
-concept tracking_matchers = feature_descriptor<D> &&
+concept tracking_matchers = feature_descriptor<D> && detail::compares_as_map<M, D> &&
     requires(const features::basic_features<D>& image, const features::feature_view<D>& seen,
              const std::vector<D>& descriptors, const std::vector<features::window>& windows,
              const features::keypoint_grid& grid) {
@@ -38,6 +51,7 @@ concept tracking_matchers = feature_descriptor<D> &&
 /// bits.
 template <class Distance, std::uint32_t Motion = 100, std::uint32_t Landmarks = 80, std::uint32_t Appearance = 80>
 struct distance_matchers {
+  using distance = Distance;
   static constexpr auto motion = features::windowed(Distance{}) | features::max_distance{Motion} | features::unique{} |
                                  features::rotation_consistency{};
   static constexpr auto landmarks =

@@ -382,3 +382,7 @@ result<void> ORBIS_SLAM_SYSTEM::load_map(const std::filesystem::path& path) requ
 #undef ORBIS_SLAM_SYSTEM_TEMPLATE
 
 }  // namespace orbis::slam
+
+#ifdef ORBIS_COMPILED
+#include <orbis/slam/detail/compiled/rgbd_system.hpp>
+#endif
