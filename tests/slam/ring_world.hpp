@@ -12,12 +12,14 @@
 #include <utility>
 #include <vector>
 
+#include <orbis/camera/any.hpp>
 #include <orbis/camera/pinhole.hpp>
 #include <orbis/core/random.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/slam/camera_rig.hpp>
 #include <orbis/slam/detail/mapping/keyframe_insertion.hpp>
 #include <orbis/slam/map.hpp>
+#include <orbis/slam/rgbd_system.hpp>  // declares what orbis::compiled holds
 
 namespace orbis::test {
 
@@ -34,7 +36,7 @@ struct ring_options {
 class ring_world {
  public:
   camera::pinhole camera{640, 480, 525.0, 525.0, 320.0, 240.0};
-  slam::camera_rig<camera::pinhole> rig{{camera, 400.0}};
+  slam::camera_rig<camera::any_camera> rig{{camera, 400.0}};
 
   explicit ring_world(const ring_options& o = {}) : o_{o}, radius_{0.15 * o.steps / (2 * std::numbers::pi)} {
     random_bits random(o.seed);

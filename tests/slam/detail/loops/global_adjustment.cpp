@@ -4,6 +4,7 @@
 #include <utility>
 #include <vector>
 
+#include <orbis/camera/any.hpp>
 #include <orbis/slam/detail/loops/global_adjustment.hpp>
 #include <orbis/slam/detail/loops/loop_correction.hpp>
 
@@ -17,10 +18,10 @@ namespace {
 
 namespace global = slam::detail::global_adjustment;
 
-slam::detail::bundle_solution solve(const global::snapshot& taken, const slam::camera_rig<camera::pinhole>& rig,
+slam::detail::bundle_solution solve(const global::snapshot& taken, const slam::camera_rig<camera::any_camera>& rig,
                                     const progress& callback = {}) {
-  return slam::detail::bundle_solver<camera::pinhole>{rig.model, global::loss}.solve(taken, global::schedule_of({}),
-                                                                                     callback);
+  return slam::detail::bundle_solver<camera::any_camera>{rig.model, global::loss}.solve(taken, global::schedule_of({}),
+                                                                                        callback);
 }
 
 /// A map whose loop was closed, and is still bent.

@@ -2,6 +2,7 @@
 #include <cstddef>
 #include <vector>
 
+#include <orbis/camera/any.hpp>
 #include <orbis/slam/detail/loops/loop_closer.hpp>
 #include <orbis/slam/validate.hpp>
 
@@ -18,8 +19,8 @@ using descriptor = features::binary_descriptor<256>;
 struct scene {
   test::ring_world world{{.steps = 60}};
   slam::options options;
-  slam::detail::shared_state<camera::pinhole, descriptor, test::known_places> shared{world.rig, options, {}};
-  slam::detail::loop_closer<camera::pinhole, descriptor, test::known_places> closer{shared};
+  slam::detail::shared_state<camera::any_camera, descriptor, test::known_places> shared{world.rig, options, {}};
+  slam::detail::loop_closer<camera::any_camera, descriptor, test::known_places> closer{shared};
   std::vector<slam::correction_event> told;
 
   scene() {

@@ -2,6 +2,7 @@
 #include <cstddef>
 #include <vector>
 
+#include <orbis/camera/any.hpp>
 #include <orbis/slam/detail/mapping/local_mapper.hpp>
 #include <orbis/slam/validate.hpp>
 
@@ -18,8 +19,8 @@ using descriptor = features::binary_descriptor<256>;
 struct scene {
   test::ring_world world{{.steps = 60}};
   slam::options options;
-  slam::detail::shared_state<camera::pinhole, descriptor, test::known_places> shared{world.rig, options, {}};
-  slam::detail::local_mapper<camera::pinhole, descriptor, test::known_places> mapper{shared};
+  slam::detail::shared_state<camera::any_camera, descriptor, test::known_places> shared{world.rig, options, {}};
+  slam::detail::local_mapper<camera::any_camera, descriptor, test::known_places> mapper{shared};
 
   [[nodiscard]] slam::map& m() { return shared.atlas.active(); }
 };

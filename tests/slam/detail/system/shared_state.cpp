@@ -3,6 +3,7 @@
 #include <thread>
 #include <vector>
 
+#include <orbis/camera/any.hpp>
 #include <orbis/slam/detail/system/shared_state.hpp>
 
 #include "slam/known_places.hpp"
@@ -16,7 +17,7 @@ namespace {
 struct scene {
   test::ring_world world{{.steps = 60, .density = 12.0}};
   slam::options options;
-  slam::detail::shared_state<camera::pinhole, features::binary_descriptor<256>, test::known_places> shared{
+  slam::detail::shared_state<camera::any_camera, features::binary_descriptor<256>, test::known_places> shared{
       world.rig, options, {}};
 };
 

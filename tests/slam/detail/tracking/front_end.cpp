@@ -2,6 +2,7 @@
 #include <cstddef>
 #include <vector>
 
+#include <orbis/camera/any.hpp>
 #include <orbis/slam/detail/tracking/front_end.hpp>
 #include <orbis/slam/validate.hpp>
 
@@ -20,7 +21,7 @@ struct scene {
   test::ring_world world{{.steps = 60, .drift = 0.0}};
   slam::options options;
   slam::atlas maps{8, 1.2};
-  slam::detail::front_end<camera::pinhole, descriptor, slam::orb_matchers, slam::rgbd> front_end{world.rig, options};
+  slam::detail::front_end<camera::any_camera, descriptor, slam::orb_matchers, slam::rgbd> front_end{world.rig, options};
   std::vector<slam::map_keyframe> similar;  ///< what place recognition says
   std::vector<slam::map_id> dropped;
   bool is_frozen = false;

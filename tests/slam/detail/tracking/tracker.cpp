@@ -2,6 +2,7 @@
 #include <cstddef>
 #include <set>
 
+#include <orbis/camera/any.hpp>
 #include <orbis/slam/detail/tracking/tracker.hpp>
 
 #include "slam/ring_world.hpp"
@@ -18,7 +19,7 @@ struct scene {
   test::ring_world world{{.steps = 60, .drift = 0.0}};
   slam::options options;
   slam::map m{8, 1.2};
-  slam::detail::tracker<camera::pinhole, descriptor, slam::orb_matchers> tracker{world.rig, options};
+  slam::detail::tracker<camera::any_camera, descriptor, slam::orb_matchers> tracker{world.rig, options};
   slam::frame next;
 
   scene() {

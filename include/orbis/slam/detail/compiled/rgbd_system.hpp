@@ -6,16 +6,13 @@
 #pragma once
 
 #include <cstddef>
-#include <optional>
 #include <span>
 #include <vector>
 
 #include <orbis/camera/any.hpp>
 #include <orbis/core/execution.hpp>
-#include <orbis/core/progress.hpp>
 #include <orbis/features/descriptor.hpp>
 #include <orbis/slam/camera_rig.hpp>
-#include <orbis/slam/detail/loops/loop_correction.hpp>
 #include <orbis/slam/detail/loops/loop_fusion.hpp>
 #include <orbis/slam/detail/loops/loop_verification.hpp>
 #include <orbis/slam/detail/mapping/landmark_fusion.hpp>
@@ -60,9 +57,6 @@ extern template bundle_solution bundle_solver<camera::any_camera>::solve(const b
                                                                          const sequential_policy&);
 extern template loop_check loop_verification::verify(const loop_verification::snapshot<compiled_descriptor>&,
                                                      const compiled_rig&, const loop_options&);
-extern template std::optional<loop_correction::solution> loop_correction::solve(
-    const loop_correction::snapshot<compiled_descriptor>&, const compiled_rig&, const loop_correction_options&,
-    const progress&);
 extern template std::vector<loop_fusion::pair> loop_fusion::find_pairs(
     const loop_fusion::snapshot<compiled_descriptor>&, const compiled_rig&, const loop_fusion_options&);
 

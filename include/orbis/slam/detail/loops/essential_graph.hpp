@@ -8,9 +8,12 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <optional>
+#include <span>
 #include <string_view>
 #include <vector>
 
+#include <orbis/core/execution.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/core/types.hpp>
 #include <orbis/slam/map.hpp>
@@ -74,4 +77,14 @@ template <feature_descriptor D>
   return poses;
 }
 
+/// Moves poses, as `poses_of`, such that they agree with the edges; those with a nonzero entry in `is_fixed` stay.
+/// Returns the number of iterations; empty, and the poses are of no use, if it fails or `callback` cancels it.
+[[nodiscard]] std::optional<int> optimize_poses(std::span<se3> poses, const std::vector<essential_edge>& edges,
+                                                std::span<const std::uint8_t> is_fixed, int max_iterations,
+                                                const progress& callback = {});
+
 }  // namespace orbis::slam::detail
+
+#ifndef ORBIS_COMPILED
+#include <orbis/slam/detail/compiled/essential_graph_functions.hpp>
+#endif

@@ -21,7 +21,6 @@
 #include <orbis/camera/model.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/se3.hpp>
-#include <orbis/optimize/pose_graph.hpp>
 #include <orbis/slam/camera_rig.hpp>
 #include <orbis/slam/detail/loops/essential_graph.hpp>
 #include <orbis/slam/detail/loops/loop_fusion.hpp>
@@ -87,12 +86,9 @@ template <feature_descriptor D, camera::camera_model Camera>
 [[nodiscard]] std::optional<solution> solve(const snapshot<D>& s, const camera_rig<Camera>& rig,
                                             const loop_correction_options& o = {}, const progress& callback = {}) {
   solution found{s.poses, loop_fusion::find_pairs(s.fusion, rig, o.fusion), 0};
-  optimize::pose_graph_solver<se3> solver;
-  const auto summary = solver.solve(seq, std::span<se3>(found.poses), s.edges,
-                                    {.max_iterations = o.iterations, .fixed = s.is_fixed}, callback);
-  if (optimize::is_failure(summary.status) || summary.status == optimize::pose_graph_status::cancelled)
-    return std::nullopt;
-  found.iterations = summary.iterations;
+  const auto iterations = optimize_poses(found.poses, s.edges, s.is_fixed, o.iterations, callback);
+  if (!iterations) return std::nullopt;
+  found.iterations = *iterations;
   return found;
 }
 
