@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include <orbis/slam/rgbd_system.hpp>
+#include <orbis/slam/detail/compiled/loops.hpp>
 
 namespace orbis::slam::detail {
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include <orbis/slam/rgbd_system.hpp>
+#include <orbis/slam/detail/compiled/loops.hpp>
+#include <orbis/slam/detail/loops/loop_closer.hpp>
 
 namespace orbis::slam::detail {
 

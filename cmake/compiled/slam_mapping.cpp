@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include <orbis/slam/rgbd_system.hpp>
+#include <orbis/slam/detail/compiled/mapping.hpp>
+#include <orbis/slam/detail/mapping/local_mapper.hpp>
 
 namespace orbis::slam::detail {
 

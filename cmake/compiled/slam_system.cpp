@@ -3,7 +3,6 @@
 
 namespace orbis::slam {
 
-template class detail::front_end<camera::any_camera, detail::compiled_descriptor, orb_matchers, rgbd>;
 template class detail::back_end<camera::any_camera, detail::compiled_descriptor, bag_of_words_places>;
 template class rgbd_system<camera::any_camera>;
 

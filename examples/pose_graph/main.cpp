@@ -40,9 +40,25 @@ void print_json(const settings& s, const orbis::io::g2o_graph& graph, const opti
       r.iterations, r.factorizations, t.set_up, t.linearize, t.factor, t.solve, t.evaluate);
 }
 
-template <class Loss, class Damping>
-int run(const settings& s, orbis::io::g2o_graph& graph, Loss loss, Damping damping) {
-  optimize::pose_graph_solver<orbis::se3, Loss, Damping> solver{loss, damping};
+/// How to step is chosen at run time: one type does for all, and the solver is compiled once for each loss.
+struct chosen_damping {
+  std::string name;
+  struct state {
+    optimize::gauss_newton::state gauss_newton;
+    optimize::dogleg::state dogleg;
+    optimize::levenberg_marquardt::state levenberg_marquardt;
+  };
+  template <class Problem>
+  optimize::step_outcome advance(state& s, Problem& problem, optimize::step_workspace& w) const {
+    if (name == "gauss-newton") return optimize::gauss_newton{}.advance(s.gauss_newton, problem, w);
+    if (name == "dogleg") return optimize::dogleg{}.advance(s.dogleg, problem, w);
+    return optimize::levenberg_marquardt{}.advance(s.levenberg_marquardt, problem, w);
+  }
+};
+
+template <class Loss>
+int run(const settings& s, orbis::io::g2o_graph& graph, Loss loss) {
+  optimize::pose_graph_solver<orbis::se3, Loss, chosen_damping> solver{loss, chosen_damping{s.damping}};
   if (!s.json) std::printf("%9s %20s %15s\n", "iteration", "cost", "factorizations");
   const auto summary =
       solver.solve(orbis::par.with(s.threads), std::span{graph.vertices}, graph.edges,
@@ -61,13 +77,6 @@ int run(const settings& s, orbis::io::g2o_graph& graph, Loss loss, Damping dampi
     std::printf("%s; half the sum of squares over %zu vertices and %zu edges\n", to_string(summary).c_str(),
                 graph.vertices.size(), graph.edges.size());
   return 0;
-}
-
-template <class Loss>
-int run(const settings& s, orbis::io::g2o_graph& graph, Loss loss) {
-  if (s.damping == "gauss-newton") return run(s, graph, loss, optimize::gauss_newton{});
-  if (s.damping == "dogleg") return run(s, graph, loss, optimize::dogleg{});
-  return run(s, graph, loss, optimize::levenberg_marquardt{});
 }
 
 int main(int argc, char** argv) {

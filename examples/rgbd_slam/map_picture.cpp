@@ -81,6 +81,10 @@ class picture {
     constexpr int n = oversampling;
     for (int y = 0; y != out.height(); ++y)
       for (int x = 0; x != out.width(); ++x) {
+        if (is_empty(n * x, n * y)) {
+          out(x, y) = paper;
+          continue;
+        }
         std::array<double, 3> sum{};
         for (int j = 0; j != n; ++j)
           for (int i = 0; i != n; ++i) {
@@ -90,7 +94,11 @@ class picture {
             sum[1] += s * c.g;
             sum[2] += s * c.b;
           }
-        const auto byte = [](double v) { return static_cast<std::uint8_t>(std::lround(v / (n * n))); };
+        const auto byte = [](double v) {  // rounded; std::lround is a call
+          const double mean = v / (n * n);
+          const auto whole = static_cast<std::uint8_t>(mean);
+          return static_cast<std::uint8_t>(whole + (mean - whole >= 0.5 ? 1 : 0));
+        };
         out(x, y) = {byte(sum[0]), byte(sum[1]), byte(sum[2])};
       }
     return out;
@@ -109,15 +117,25 @@ class picture {
     const int y1 = std::min(color_.height() - 1, pixel(std::ceil(std::max({a.y(), b.y(), c.y()})), color_.height()));
     for (int y = y0; y <= y1; ++y)
       for (int x = x0; x <= x1; ++x) {
-        const double u = ((b.x() - x) * (c.y() - y) - (b.y() - y) * (c.x() - x)) / area;
-        const double v = ((c.x() - x) * (a.y() - y) - (c.y() - y) * (a.x() - x)) / area;
+        const double of_a = (b.x() - x) * (c.y() - y) - (b.y() - y) * (c.x() - x);
+        const double of_b = (c.x() - x) * (a.y() - y) - (c.y() - y) * (a.x() - x);
+        if (of_a * area < 0 || of_b * area < 0) continue;  // most pixels: without a division
+        const double u = of_a / area, v = of_b / area;
         const double w = 1.0 - u - v;
-        if (u < 0 || v < 0 || w < 0) continue;
+        if (w < 0) continue;
         const auto nearness = static_cast<float>(u / a.z() + v / b.z() + w / c.z());
         if (nearness <= inverse_depth_(x, y)) continue;
         inverse_depth_(x, y) = nearness;
         color_(x, y) = color;
       }
+  }
+
+  /// Whether nothing was drawn on the pixels that are averaged from (x, y) on.
+  [[nodiscard]] bool is_empty(int x, int y) const {
+    for (int j = 0; j != oversampling; ++j)
+      for (int i = 0; i != oversampling; ++i)
+        if (inverse_depth_(x + i, y + j) > 0.0F) return false;
+    return true;
   }
 
   [[nodiscard]] double shade(int x, int y) const {
@@ -128,7 +146,10 @@ class picture {
     for (const auto& [dx, dy] : {std::pair{reach, 0}, {-reach, 0}, {0, reach}, {0, -reach}}) {
       if (!inverse_depth_.view().contains(x + dx, y + dy)) continue;
       const float there = inverse_depth_(x + dx, y + dy);
-      if (there > here) behind += std::min(0.25, std::log2(static_cast<double>(there / here)));
+      if (!(there > here)) continue;
+      const float ratio = there / here;
+      constexpr float far = 1.19F;  // above 2^0.25
+      behind += ratio >= far ? 0.25 : std::min(0.25, std::log2(static_cast<double>(ratio)));
     }
     return behind == 0.0 ? 1.0 : std::exp(-6.0 * behind / 4.0);
   }

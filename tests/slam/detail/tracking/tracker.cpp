@@ -84,13 +84,3 @@ TEST_CASE("The local map adds landmarks that the last frame did not show") {
   CHECK(s.error() < 0.005);
   CHECK(s.wrong_landmarks() == 0);
 }
-
-TEST_CASE("Too few matches leave a frame without a pose and landmarks") {
-  scene s;
-  s.next.T_world_camera = s.world.truth(10);
-  const slam::detail::search_list<descriptor> empty;
-  s.next.landmarks[0] = 3;
-  CHECK(slam::detail::refine_on_matches<descriptor>(s.next, empty, {}, s.world.rig) == 0);
-  CHECK(s.error() == 0.0);
-  CHECK(s.next.landmarks[0] == slam::no_id);
-}

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <cstddef>
+#include <cstdint>
+
+#include <orbis/camera/any.hpp>
+#include <orbis/slam/detail/system/back_end.hpp>
+#include <orbis/slam/validate.hpp>
+
+#include "slam/ring_world.hpp"
+#include "support/catch.hpp"
+
+using namespace orbis;
+
+namespace {
+
+using places = slam::bag_of_words_places;
+
+/// A round with the drift of its keyframes, whose last ones show what the first ones do.
+struct scene {
+  test::ring_world world{{.steps = 60}};
+  slam::options options;
+  slam::detail::shared_state<camera::any_camera, features::binary_descriptor<256>, places> shared{
+      world.rig, options, {}};
+
+  explicit scene(bool threads) {
+    options.threads.enabled = threads;
+    shared.atlas.active() = world.round(4);
+    for (const auto& k : shared.atlas.active().keyframes())
+      if (k.id < 63) shared.places.add({0, k.id}, shared.places.describe(k.features));
+  }
+};
+
+}  // namespace
+
+TEST_CASE("A keyframe is mapped, closes a loop, and the map is adjusted; in threads as well") {
+  for (const bool threads : {false, true}) {
+    scene s{threads};
+    const double before = s.world.errors(s.shared.atlas.active())[0];
+    slam::detail::back_end<camera::any_camera, features::binary_descriptor<256>, places> back_end{s.shared};
+    back_end.process({0, 63});
+    back_end.wait();
+    CHECK(s.shared.loops_closed == 1);
+    CHECK(s.world.errors(s.shared.atlas.active())[0] < 0.6 * before);
+    CHECK(slam::validate(s.shared.atlas.active()));
+    CHECK_FALSE(back_end.is_full());
+  }
+}
+
+TEST_CASE("A back end that ends does not wait for what is in its queue") {
+  scene s{true};
+  {
+    slam::detail::back_end<camera::any_camera, features::binary_descriptor<256>, places> back_end{s.shared};
+    for (std::uint32_t k = 0; k != 64; ++k) back_end.process({0, k});
+  }
+  CHECK(slam::validate(s.shared.atlas.active()));
+}
