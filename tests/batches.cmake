@@ -12,7 +12,7 @@ function(orbis_batch out name)
     return()
   endif()
   set(most ${ORBIS_BATCH_BYTES})
-  if(name MATCHES "^(core|optimize)$")  # kernels for each target, solvers for each test: these files take memory
+  if(name MATCHES "^(core|features|optimize)$")  # kernels for each target, solvers for each test: these files take memory
     math(EXPR most "${most} / 2")
   endif()
   set(sources)

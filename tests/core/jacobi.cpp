@@ -4,7 +4,6 @@
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/SVD>
-#include <support/catch.hpp>
 
 #include <orbis/core/jacobi.hpp>
 #include <orbis/core/random.hpp>
@@ -15,83 +14,101 @@ using namespace orbis;
 
 namespace {
 
-template <int N>
-matrix<N, N> random_matrix(random_bits& random) {
-  matrix<N, N> m;
-  for (int i = 0; i != N; ++i)
-    for (int k = 0; k != N; ++k) m(i, k) = random.normal();
+// Sizes are compile-time constants only where the library is called: the rest is compiled once for all of them.
+using Eigen::MatrixXd, Eigen::VectorXd;
+
+MatrixXd random_matrix(int n, random_bits& random) {
+  MatrixXd m(n, n);
+  for (int i = 0; i != n; ++i)
+    for (int k = 0; k != n; ++k) m(i, k) = random.normal();
   return m;
 }
 
-template <int N>
-void check_eigen(const matrix<N, N>& a) {
-  const auto e = eigen_of_symmetric<N>(a);
-  const double size = std::max(a.cwiseAbs().maxCoeff(), 1e-290);
-  CHECK((a * e.vectors - e.vectors * e.values.asDiagonal()).cwiseAbs().maxCoeff() <= 1e-14 * N * size);
-  CHECK((e.vectors.transpose() * e.vectors - matrix<N, N>::Identity()).norm() < 1e-13);
-  for (int i = 1; i < N; ++i) CHECK(e.values[i - 1] <= e.values[i]);
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, N, N>> reference(a);
-  CHECK((e.values - reference.eigenvalues()).cwiseAbs().maxCoeff() <= 1e-13 * size);
+void check_orthonormal(const MatrixXd& m, double tolerance) {
+  CHECK((m.transpose() * m - MatrixXd::Identity(m.rows(), m.cols())).norm() < tolerance);
 }
 
+void check_eigen(const MatrixXd& a, const VectorXd& values, const MatrixXd& vectors) {
+  const double n = static_cast<double>(a.rows()), size = std::max(a.cwiseAbs().maxCoeff(), 1e-290);
+  CHECK((a * vectors - vectors * values.asDiagonal()).cwiseAbs().maxCoeff() <= 1e-14 * n * size);
+  check_orthonormal(vectors, 1e-13);
+  for (int i = 1; i < a.rows(); ++i) CHECK(values[i - 1] <= values[i]);
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> reference(a);
+  CHECK((values - reference.eigenvalues()).cwiseAbs().maxCoeff() <= 1e-13 * size);
+}
 template <int N>
-void check_singular(const matrix<N, N>& m) {
-  const auto s = singular_values_of<N>(m);
-  const double size = std::max(m.cwiseAbs().maxCoeff(), 1e-290);
-  CHECK((s.u * s.values.asDiagonal() * s.v.transpose() - m).cwiseAbs().maxCoeff() <= 1e-14 * N * size);
-  CHECK((s.u.transpose() * s.u - matrix<N, N>::Identity()).norm() < 1e-12);
-  CHECK((s.v.transpose() * s.v - matrix<N, N>::Identity()).norm() < 1e-12);
-  for (int i = 1; i < N; ++i) CHECK(s.values[i - 1] >= s.values[i]);
-  CHECK(s.values[N - 1] >= 0.0);
-  const Eigen::JacobiSVD<Eigen::Matrix<double, N, N>> reference(m);
-  CHECK((s.values - reference.singularValues()).cwiseAbs().maxCoeff() <= 1e-13 * size);
+void check_eigen(const MatrixXd& a) {
+  const auto e = eigen_of_symmetric<N>(matrix<N, N>(a));
+  check_eigen(a, e.values, e.vectors);
 }
 
-}  // namespace
+void check_singular(const MatrixXd& m, const MatrixXd& u, const VectorXd& values, const MatrixXd& v) {
+  const double n = static_cast<double>(m.rows()), size = std::max(m.cwiseAbs().maxCoeff(), 1e-290);
+  CHECK((u * values.asDiagonal() * v.transpose() - m).cwiseAbs().maxCoeff() <= 1e-14 * n * size);
+  check_orthonormal(u, 1e-12);
+  check_orthonormal(v, 1e-12);
+  for (int i = 1; i < m.rows(); ++i) CHECK(values[i - 1] >= values[i]);
+  CHECK(values[m.rows() - 1] >= 0.0);
+  const Eigen::JacobiSVD<MatrixXd, Eigen::NoQRPreconditioner> reference(m);
+  CHECK((values - reference.singularValues()).cwiseAbs().maxCoeff() <= 1e-13 * size);
+}
+template <int N>
+void check_singular(const MatrixXd& m) {
+  const auto s = singular_values_of<N>(matrix<N, N>(m));
+  check_singular(m, s.u, s.values, s.v);
+}
 
-TEMPLATE_TEST_CASE_SIG("eigenvalues of symmetric matrices are Eigen's", "[jacobi]", ((int N), N), 2, 3, 4, 9) {
-  random_bits random{N};
-  for (int n = 0; n != 50; ++n) {
-    const matrix<N, N> m = random_matrix<N>(random);
-    check_eigen<N>(m + m.transpose());
-    check_eigen<N>(m * m.transpose());
+/// What is checked with one matrix.
+using check_of_size = void (*)(const MatrixXd&);
+
+void check_symmetric_matrices(int n, check_of_size check) {
+  random_bits random{static_cast<std::uint64_t>(n)};
+  for (int round = 0; round != 50; ++round) {
+    const MatrixXd m = random_matrix(n, random);
+    check(m + m.transpose());
+    check(m * m.transpose());
     // Directions that hardly count beside others, and equal eigenvalues.
-    matrix<N> scale;
-    for (int i = 0; i != N; ++i) scale[i] = std::pow(10.0, -4.0 * i);
-    check_eigen<N>(scale.asDiagonal() * (m * m.transpose()) * scale.asDiagonal());
-    check_eigen<N>(m.col(0) * m.col(0).transpose());
+    VectorXd scale(n);
+    for (int i = 0; i != n; ++i) scale[i] = std::pow(10.0, -4.0 * i);
+    check(scale.asDiagonal() * (m * m.transpose()) * scale.asDiagonal());
+    check(m.col(0) * m.col(0).transpose());
   }
-  check_eigen<N>(matrix<N, N>::Zero());
-  check_eigen<N>(matrix<N, N>::Identity());
-  check_eigen<N>(1e-200 * matrix<N, N>::Ones());
+  check(MatrixXd::Zero(n, n));
+  check(MatrixXd::Identity(n, n));
+  check(1e-200 * MatrixXd::Ones(n, n));
 }
 
-TEMPLATE_TEST_CASE_SIG("singular values are Eigen's, of singular matrices as well", "[jacobi]", ((int N), N), 2, 3, 4) {
-  random_bits random{10 + N};
-  for (int n = 0; n != 50; ++n) {
-    const matrix<N, N> m = random_matrix<N>(random);
-    check_singular<N>(m);
-    check_singular<N>(1e200 * m);
-    check_singular<N>(1e-200 * m);
-    check_singular<N>(m.col(0) * m.row(1));
-    matrix<N, N> empty_column = m;
-    empty_column.col(n % N).setZero();
-    check_singular<N>(empty_column);
+void check_square_matrices(int n, check_of_size check) {
+  random_bits random{10 + static_cast<std::uint64_t>(n)};
+  for (int round = 0; round != 50; ++round) {
+    const MatrixXd m = random_matrix(n, random);
+    check(m);
+    check(1e200 * m);
+    check(1e-200 * m);
+    check(m.col(0) * m.row(1));
+    MatrixXd empty_column = m;
+    empty_column.col(round % n).setZero();
+    check(empty_column);
   }
-  check_singular<N>(matrix<N, N>::Zero());
-  check_singular<N>(matrix<N, N>::Identity());
-  check_singular<N>(matrix<N, N>::Ones());
-}
-
-namespace {
-
-mat3 random_matrix(random_bits& random) {
-  mat3 m;
-  for (int i = 0; i != 9; ++i) m(i / 3, i % 3) = random.normal();
-  return m;
+  check(MatrixXd::Zero(n, n));
+  check(MatrixXd::Identity(n, n));
+  check(MatrixXd::Ones(n, n));
 }
 
 }  // namespace
+
+TEST_CASE("eigenvalues of symmetric matrices are Eigen's", "[jacobi]") {
+  check_symmetric_matrices(2, check_eigen<2>);
+  check_symmetric_matrices(3, check_eigen<3>);
+  check_symmetric_matrices(4, check_eigen<4>);
+  check_symmetric_matrices(9, check_eigen<9>);
+}
+
+TEST_CASE("singular values are Eigen's, of singular matrices as well", "[jacobi]") {
+  check_square_matrices(2, check_singular<2>);
+  check_square_matrices(3, check_singular<3>);
+  check_square_matrices(4, check_singular<4>);
+}
 
 TEST_CASE("a rotation is its own nearest rotation") {
   random_bits random{1};
@@ -103,7 +120,7 @@ TEST_CASE("a rotation is its own nearest rotation") {
     // Neither a scale nor a symmetric positive stretch turns anything.
     CHECK((nearest_rotation(1e-200 * r.rotation_matrix())->inverse() * r).angle() < 1e-14);
     CHECK((nearest_rotation(1e200 * r.rotation_matrix())->inverse() * r).angle() < 1e-14);
-    const mat3 a = random_matrix(random);
+    const mat3 a = random_matrix(3, random);
     const mat3 stretch = a * a.transpose() + mat3::Identity();
     CHECK((nearest_rotation(r.rotation_matrix() * stretch)->inverse() * r).angle() < 1e-12);
   }
@@ -112,7 +129,7 @@ TEST_CASE("a rotation is its own nearest rotation") {
 TEST_CASE("no rotation close by is nearer than the nearest") {
   random_bits random{2};
   for (int i = 0; i != 50; ++i) {
-    mat3 m = random_matrix(random);
+    mat3 m = random_matrix(3, random);
     if (m.determinant() < 0.0) m = -m;
     const auto nearest = nearest_rotation(m);
     REQUIRE(nearest);

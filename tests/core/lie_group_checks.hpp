@@ -18,25 +18,26 @@
 namespace orbis::test {
 
 /// exp(m) by its power series, in long double.
-template <int N>
-matrix<N, N> exponential_series(const matrix<N, N>& m) {
-  using big = Eigen::Matrix<long double, N, N>;
-  const big x = m.template cast<long double>();
-  big sum = big::Identity();
-  big term = big::Identity();
+[[gnu::noinline]] inline Eigen::MatrixXd exponential_series(const Eigen::MatrixXd& m) {
+  using big = Eigen::Matrix<long double, Eigen::Dynamic, Eigen::Dynamic>;
+  const big x = m.cast<long double>();
+  big sum = big::Identity(m.rows(), m.cols());
+  big term = sum;
   for (int n = 1; n != 120; ++n) {
-    term = (term * x / static_cast<long double>(n)).eval();
+    term = (term.lazyProduct(x) / static_cast<long double>(n)).eval();
     sum += term;
   }
-  return sum.template cast<double>();
+  return sum.cast<double>();
 }
 
 /// How far apart the parameters of two matrices are, relative to their size.
+[[gnu::noinline]] inline double difference_of(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
+  const double size = std::max({1.0, a.cwiseAbs().maxCoeff(), b.cwiseAbs().maxCoeff()});
+  return (a - b).cwiseAbs().maxCoeff() / size;
+}
 template <class A, class B>
 double difference(const A& a, const B& b) {
-  const double size =
-      std::max({1.0, static_cast<double>(a.cwiseAbs().maxCoeff()), static_cast<double>(b.cwiseAbs().maxCoeff())});
-  return (a.template cast<double>() - b.template cast<double>()).cwiseAbs().maxCoeff() / size;
+  return difference_of(a.template cast<double>(), b.template cast<double>());
 }
 
 /// A rotation vector of the given angle and random direction.
