@@ -5,4 +5,3 @@
 #define ORBIS_INSTANTIATE_OPTIMIZE template
 #include <orbis/optimize/detail/compiled/pnp.hpp>
 #include <orbis/optimize/detail/compiled/pose_graph.hpp>
-#include <orbis/optimize/detail/compiled/pose_refinement.hpp>
