@@ -12,7 +12,10 @@ function(orbis_batch out name)
     return()
   endif()
   set(most ${ORBIS_BATCH_BYTES})
-  if(name MATCHES "^(core|features|optimize)$")  # kernels for each target, solvers for each test: these files take memory
+  # Kernels for each target, solvers for each test: these files take memory.
+  if(name STREQUAL "optimize")
+    math(EXPR most "${most} / 3")
+  elseif(name MATCHES "^(core|features)$")
     math(EXPR most "${most} / 2")
   endif()
   set(sources)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What the tests of bundle adjustment instantiate again and again: compiled once, by bundle_instances.cpp, unless
-// orbis::compiled has it.
+// What the tests of bundle adjustment instantiate again and again: compiled once, by bundle_instances.cpp and its
+// neighbours, unless orbis::compiled has it.
 #pragma once
 
 #include <orbis/core/simd/dispatch.hpp>
@@ -9,6 +9,9 @@
 
 #ifndef ORBIS_TEST_INSTANCES
 #define ORBIS_TEST_INSTANCES extern template
+#endif
+#ifndef ORBIS_TEST_BAL_INSTANCES
+#define ORBIS_TEST_BAL_INSTANCES extern template
 #endif
 
 namespace orbis {
@@ -26,7 +29,7 @@ namespace optimize::detail {
 ORBIS_TEST_INSTANCES class block_cholesky<9>;
 ORBIS_TEST_INSTANCES class automatic_block_solver<9>;
 }  // namespace optimize::detail
-ORBIS_INSTANTIATE_BUNDLE(ORBIS_TEST_INSTANCES, bal_reprojection, huber)
-ORBIS_INSTANTIATE_BUNDLE(ORBIS_TEST_INSTANCES, bal_reprojection, trivial)
+ORBIS_INSTANTIATE_BUNDLE(ORBIS_TEST_BAL_INSTANCES, bal_reprojection, huber)
+ORBIS_INSTANTIATE_BUNDLE(ORBIS_TEST_BAL_INSTANCES, bal_reprojection, trivial)
 
 }  // namespace orbis

@@ -46,12 +46,12 @@ TEST_CASE("Noisy graphs converge from it to the best minimum, and from odometry 
   for (const test::graph_shape shape : {test::graph_shape::torus, test::graph_shape::sphere})
     for (const std::uint64_t seed : {1U, 2U}) {
       const auto made = test::make_pose_graph({.shape = shape,
-                                             .poses_per_turn = 20,
-                                             .turns = 25,
-                                             .radius = 10.0,
-                                             .translation_sigma = 0.1,
-                                             .rotation_sigma = 0.3,
-                                             .seed = seed});
+                                               .poses_per_turn = 20,
+                                               .turns = 25,
+                                               .radius = 10.0,
+                                               .translation_sigma = 0.1,
+                                               .rotation_sigma = 0.3,
+                                               .seed = seed});
       const double best = from_truth(made).final_cost;
       const auto started = run(made, true);
       CHECK(started.status == pose_graph_status::converged);
