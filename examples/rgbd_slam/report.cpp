@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <map>
 #include <string_view>
@@ -14,6 +13,7 @@
 
 #include <orbis/core/file.hpp>
 
+#include "formatted_text.hpp"
 #include "summary.hpp"
 
 namespace app {
@@ -35,13 +35,6 @@ std::string escaped(std::string_view text) {
       default: out += c;
     }
   return out;
-}
-
-template <class... Args>
-std::string text(const char* format, Args... args) {
-  char buffer[512];
-  std::snprintf(buffer, sizeof buffer, format, args...);
-  return buffer;
 }
 
 /// JSON for a script element: no "</script>" can occur in it.

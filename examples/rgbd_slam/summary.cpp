@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <numeric>
 
@@ -11,6 +10,8 @@
 #include <sys/resource.h>
 
 #include <orbis/core/file.hpp>
+
+#include "formatted_text.hpp"
 
 namespace app {
 namespace {
@@ -26,13 +27,6 @@ double peak_rss_mb() {
 template <class T>
 json or_null(const std::optional<T>& value) {
   return value ? json(*value) : json(nullptr);
-}
-
-template <class... Args>
-std::string text(const char* format, Args... args) {
-  char buffer[256];
-  std::snprintf(buffer, sizeof buffer, format, args...);
-  return buffer;
 }
 
 }  // namespace
