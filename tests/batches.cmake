@@ -12,10 +12,10 @@ function(orbis_batch out name)
     return()
   endif()
   set(most ${ORBIS_BATCH_BYTES})
-  # Kernels for each target, solvers for each test: these files take memory.
-  if(name STREQUAL "optimize")
+  # Kernels for each target, expressions of small matrices and solvers take memory to compile.
+  if(name MATCHES "^(core|optimize)$")
     math(EXPR most "${most} / 3")
-  elseif(name MATCHES "^(core|features)$")
+  elseif(name STREQUAL "features")
     math(EXPR most "${most} / 2")
   endif()
   set(sources)
