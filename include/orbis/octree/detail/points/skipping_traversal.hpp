@@ -49,7 +49,7 @@ class skipping_traversal {
     const auto steps_along = [&](std::size_t i) {
       const std::uint32_t inside = at_[i] & (cells - 1);
       way.steps[i] = step_[i] > 0 ? cells - inside : inside + 1;
-      return used_[i] + way.steps[i] >= count;
+      return used_[i] + way.steps[i] >= count - 1;  // step() wants one more
     };
     const bool short_x = steps_along(0), short_y = steps_along(1), short_z = steps_along(2);
     if (short_x || short_y || short_z) renew();
