@@ -17,7 +17,6 @@
 /// | change_log.hpp | which voxels changed since a revision |
 /// | decay.hpp | what time does to voxels that are not observed |
 /// | merge.hpp | adds one map to another |
-/// | subtract.hpp | takes a scan out again |
 /// | voxel_layer.hpp | colours, labels or counts beside the map |
 /// | files.hpp | OctoMap's `.bt` and `.ot` |
 /// | compact_file.hpp | small files with every value and checksums |
@@ -39,6 +38,5 @@
 #include <orbis/octree/overlap.hpp>
 #include <orbis/octree/render.hpp>
 #include <orbis/octree/sensor_model.hpp>
-#include <orbis/octree/subtract.hpp>
 #include <orbis/octree/surface.hpp>
 #include <orbis/octree/voxel_layer.hpp>

@@ -21,7 +21,6 @@
 #include <orbis/octree/merge.hpp>
 #include <orbis/octree/nodes.hpp>
 #include <orbis/octree/overlap.hpp>
-#include <orbis/octree/subtract.hpp>
 
 #include "fuzz/octree.hpp"
 #include "fuzz/source.hpp"
@@ -301,8 +300,8 @@ class session {
       case 4: edit_octant(); break;
       case 5: transform(); break;
       case 6: evict(); break;
-      case 7: integrate(); break;
-      case 8: subtract(); break;
+      case 7:
+      case 8: integrate(); break;
       case 9: merge(); break;
       case 10: merge_with_itself(); break;
       case 11: through_file(); break;
@@ -486,25 +485,6 @@ class session {
       const float before = v.value_or(0.0F);
       v = once > 0.0F ? octree::after_hit<model>(before) : octree::after_miss<model>(before);
     });
-  }
-  void subtract() {
-    const scan s = next_scan();
-    const octree::subtraction_summary done = octree::subtract(map_, s.points, s.origin, s.options);
-    octree::subtraction_summary expected;
-    for_each_known_in(s.alone, [&](voxel& v, float once) {
-      if (!v) return;
-      if (*v <= model::clamp_min || *v >= model::clamp_max) {
-        ++expected.lost;
-        return;
-      }
-      add_evidence(v, -once);
-      ++expected.restored;
-      if (std::fabs(*v) >= 1e-5F) return;
-      v.reset();
-      ++expected.forgotten;
-    });
-    require(done.restored == expected.restored && done.forgotten == expected.forgotten && done.lost == expected.lost,
-            "what is taken out is counted");
   }
   void merge() {
     map other{resolution, where().tree_depth};
