@@ -59,20 +59,27 @@ enum class level {
 }
 
 namespace detail {
-inline std::atomic<level> highest_level{level::avx512};
+/// What best_level() returns, as a number; negative until it is first asked.
+inline std::atomic<int> chosen_level{-1};
 }  // namespace detail
 
-/// The level that kernels run at: the processor's best one, unless a test limits it.
+/// The level that kernels run at: the processor's best one, unless a test limits it. Costs one load.
 [[nodiscard]] inline level best_level() noexcept {
-  return std::min(detected(), detail::highest_level.load(std::memory_order_relaxed));
+  const int chosen = detail::chosen_level.load(std::memory_order_relaxed);
+  if (chosen >= 0) return static_cast<level>(chosen);
+  int unknown = -1;  // a limit may have been set meanwhile
+  detail::chosen_level.compare_exchange_strong(unknown, static_cast<int>(detected()));
+  return static_cast<level>(detail::chosen_level.load(std::memory_order_relaxed));
 }
 
 /// For tests: while it lives, `best_level()` is at most `highest`, in all threads. Limits nest; they must end in the
 /// reverse order.
 class level_limit {
  public:
-  explicit level_limit(level highest) noexcept : before_{detail::highest_level.exchange(highest)} {}
-  ~level_limit() { detail::highest_level.store(before_); }
+  explicit level_limit(level highest) noexcept : before_{best_level()} {
+    detail::chosen_level.store(static_cast<int>(std::min(highest, detected())));
+  }
+  ~level_limit() { detail::chosen_level.store(static_cast<int>(before_)); }
   level_limit(const level_limit&) = delete;
   level_limit& operator=(const level_limit&) = delete;
 

@@ -123,8 +123,19 @@ struct vec {
       out.v.low = half::load(p), out.v.high = half::load(p + N / 2);
     return out;
   }
-  /// The first n <= N numbers at p, then zeros. Reads no more than these; through memory.
+  /// The first n <= N numbers at p, then zeros. Reads no more than these; through memory unless they are of four or
+  /// eight bytes in one register of AVX2 or AVX-512.
   [[nodiscard]] static ORBIS_ALWAYS_INLINE vec load(const T* p, std::size_t n) noexcept {
+#if ORBIS_X86
+    if constexpr (is_native && sizeof(T) >= 4 && sizeof(native) >= 32) {
+      vec out;
+      if constexpr (sizeof(native) == 64)
+        detail::load_first_64(out.v, p, n);
+      else
+        detail::load_first_32(out.v, p, n);
+      return out;
+    }
+#endif
     alignas(N * sizeof(T)) T buffer[N] = {};
     std::memcpy(buffer, p, n * sizeof(T));
     return load(buffer);

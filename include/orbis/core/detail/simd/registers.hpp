@@ -109,6 +109,19 @@ ORBIS_TARGET_AVX2 inline void extremum_32(V& out, const V& a, const V& b) noexce
     out = reinterpret_cast<V>(Max ? _mm256_max_ps(reinterpret_cast<__m256>(b), reinterpret_cast<__m256>(a))
                                   : _mm256_min_ps(reinterpret_cast<__m256>(b), reinterpret_cast<__m256>(a)));
 }
+/// The first n numbers of four or eight bytes at p, then zeros. @pre n <= lanes
+template <class V>
+ORBIS_TARGET_AVX2 inline void load_first_32(V& out, const element_of<V>* p, std::size_t n) noexcept {
+  if constexpr (sizeof(out[0]) == 8) {
+    const __m256i wanted =
+        _mm256_cmpgt_epi64(_mm256_set1_epi64x(static_cast<long long>(n)), _mm256_setr_epi64x(0, 1, 2, 3));
+    out = reinterpret_cast<V>(_mm256_maskload_epi64(reinterpret_cast<const long long*>(p), wanted));
+  } else {
+    const __m256i wanted =
+        _mm256_cmpgt_epi32(_mm256_set1_epi32(static_cast<int>(n)), _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7));
+    out = reinterpret_cast<V>(_mm256_maskload_epi32(reinterpret_cast<const int*>(p), wanted));
+  }
+}
 template <class V>
 ORBIS_TARGET_AVX2 inline void square_root_32(V& out, const V& v) noexcept {
   if constexpr (sizeof(v[0]) == 8)
@@ -204,6 +217,14 @@ ORBIS_TARGET_AVX512 inline void extremum_64(V& out, const V& a, const V& b) noex
     out = reinterpret_cast<V>(
         Max ? _mm512_maskz_max_ps(0xffff, reinterpret_cast<__m512>(b), reinterpret_cast<__m512>(a))
             : _mm512_maskz_min_ps(0xffff, reinterpret_cast<__m512>(b), reinterpret_cast<__m512>(a)));
+}
+template <class V>
+ORBIS_TARGET_AVX512 inline void load_first_64(V& out, const element_of<V>* p, std::size_t n) noexcept {
+  const std::uint32_t wanted = (1U << n) - 1;
+  if constexpr (sizeof(out[0]) == 8)
+    out = reinterpret_cast<V>(_mm512_maskz_loadu_epi64(static_cast<__mmask8>(wanted), p));
+  else
+    out = reinterpret_cast<V>(_mm512_maskz_loadu_epi32(static_cast<__mmask16>(wanted), p));
 }
 template <class V>
 ORBIS_TARGET_AVX512 inline void square_root_64(V& out, const V& v) noexcept {
