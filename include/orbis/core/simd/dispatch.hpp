@@ -138,3 +138,28 @@ template <class Kernel, class Signature, target... Targets>
 #define ORBIS_KERNEL_INSTANCE(what, signature, ...) \
   what struct simd::detail::code<__VA_ARGS__, signature, simd::portable>;
 #endif
+
+/// At the end of a kernel's header, outside namespaces: the library orbis::compiled holds the kernel for `portable`,
+/// `avx2` and `avx512`, or without the last, and who links it does not compile the kernel. The arguments are those of
+/// `kernel`. The sources in cmake/compiled define ORBIS_INSTANTIATE_KERNELS.
+#if !defined(ORBIS_COMPILED)
+#define ORBIS_COMPILED_KERNEL(...) static_assert(true)
+#define ORBIS_COMPILED_KERNEL_AVX2(...) static_assert(true)
+#else
+#if defined(ORBIS_INSTANTIATE_KERNELS)
+#define ORBIS_COMPILED_CODE(...) template struct orbis::simd::detail::code<__VA_ARGS__>
+#else
+#define ORBIS_COMPILED_CODE(...) extern template struct orbis::simd::detail::code<__VA_ARGS__>
+#endif
+#if ORBIS_X86
+#define ORBIS_COMPILED_KERNEL_AVX2(...)                    \
+  ORBIS_COMPILED_CODE(__VA_ARGS__, orbis::simd::portable); \
+  ORBIS_COMPILED_CODE(__VA_ARGS__, orbis::simd::avx2)
+#define ORBIS_COMPILED_KERNEL(...)         \
+  ORBIS_COMPILED_KERNEL_AVX2(__VA_ARGS__); \
+  ORBIS_COMPILED_CODE(__VA_ARGS__, orbis::simd::avx512)
+#else
+#define ORBIS_COMPILED_KERNEL_AVX2(...) ORBIS_COMPILED_CODE(__VA_ARGS__, orbis::simd::portable)
+#define ORBIS_COMPILED_KERNEL(...) ORBIS_COMPILED_CODE(__VA_ARGS__, orbis::simd::portable)
+#endif
+#endif
