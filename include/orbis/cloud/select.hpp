@@ -31,7 +31,6 @@
 #include <vector>
 
 #include <orbis/camera/model.hpp>
-#include <orbis/camera/pinhole.hpp>
 #include <orbis/cloud/detail/select/decision.hpp>
 #include <orbis/cloud/detail/select/density_judge.hpp>
 #include <orbis/cloud/detail/select/in_words.hpp>
@@ -45,7 +44,6 @@
 #include <orbis/cloud/statistical.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/point.hpp>
-#include <orbis/core/se3.hpp>
 
 namespace orbis::cloud {
 
@@ -57,10 +55,12 @@ struct automatic_result {
 
 namespace detail {
 
-/// A view for clouds that have none.
-struct absent_view {
-  camera::depth_view<float> depth;
-  se3 T_world_camera;
+/// What `judge` and `apply_chain` ask about views where there are none.
+struct without_views {
+  [[nodiscard]] bool operator()(std::span<char>, filter_choice&, std::vector<std::string>&) const noexcept {
+    return true;
+  }
+  void operator()(const ray_step&, std::span<char>) const noexcept { assert(!"a ray_step needs views"); }
 };
 
 template <point_range Points>
@@ -105,12 +105,11 @@ void apply_alone(const Points& points, std::span<char> left, Filter&& inliers_of
   for (const std::uint32_t i : inliers_of(rest)) left[index[i]] = 1;
 }
 
-/// @pre every ray_step finds views
-template <execution_policy Policy, point_range Points, posed_depth_range Views, camera::camera_model Camera>
+/// `apply_views(ray_step, left)` clears `left` where the views exclude a point.
+template <execution_policy Policy, point_range Points, class Views>
 [[nodiscard]] std::vector<std::uint32_t> apply_chain(const Policy& policy, const Points& points,
-                                                     const filter_chain& chain, const Views& views,
-                                                     const Camera& camera, const select_options& options,
-                                                     progress on_progress) {
+                                                     const filter_chain& chain, const select_options& options,
+                                                     const Views& apply_views) {
   std::vector<char> left = finite_points(points);
   const std::vector<float> ranges = ranges_of(policy, points, options);
   std::optional<surroundings> around;
@@ -130,9 +129,7 @@ template <execution_policy Policy, point_range Points, posed_depth_range Views, 
           using Step = std::remove_cvref_t<decltype(step)>;
           if constexpr (std::is_same_v<Step, ray_step>) {
             settle();
-            assert(std::ranges::size(views) != 0);
-            bool cancelled = false;
-            apply_rays(policy, points, step, views, camera, left, cancelled, on_progress);
+            apply_views(step, left);
           } else if constexpr (std::is_same_v<Step, density_step> || std::is_same_v<Step, isolation_step>) {
             look_around(step.neighbors).apply(policy, step);
           } else if constexpr (std::is_same_v<Step, cluster_options>) {
@@ -160,9 +157,10 @@ template <execution_policy Policy, point_range Points, posed_depth_range Views, 
   return out + (by_range ? ", which grows with range)" : ")");
 }
 
-template <execution_policy Policy, point_range Points, posed_depth_range Views, camera::camera_model Camera>
-[[nodiscard]] automatic_result judge(const Policy& policy, const Points& points, const Views& views,
-                                     const Camera& camera, const select_options& options, progress on_progress) {
+/// `judge_by_views(left, choice, reasons)` does what judge_views does. False: cancelled.
+template <execution_policy Policy, point_range Points, class Views>
+[[nodiscard]] automatic_result judge(const Policy& policy, const Points& points, const select_options& options,
+                                     const Views& judge_by_views) {
   assert(options.neighbors > 0);
   assert(options.ranges.empty() || options.ranges.size() == std::ranges::size(points));
   constexpr std::size_t enough = 50;
@@ -173,7 +171,7 @@ template <execution_policy Policy, point_range Points, posed_depth_range Views, 
   choice.evidence.finite = static_cast<std::size_t>(std::ranges::count(left, char{1}));
   const std::vector<float> ranges = ranges_of(policy, points, options);
   std::vector<std::string> reasons;
-  if (!judge_views(policy, points, views, camera, options, left, choice, reasons, on_progress)) {
+  if (!judge_by_views(left, choice, reasons)) {
     choice.chain.clear();
     choice.reason = "cancelled";
     out.inliers = kept_points(points, left, options);
@@ -212,16 +210,20 @@ template <execution_policy Policy, point_range Points, posed_depth_range Views, 
 [[nodiscard]] automatic_result filter_automatically(const Policy& policy, const Points& points, const Views& views,
                                                     const Camera& camera, const select_options& options = {},
                                                     progress on_progress = {}) {
-  return detail::with_model(
-      camera, [&](const auto& model) { return detail::judge(policy, points, views, model, options, on_progress); });
+  return detail::with_model(camera, [&](const auto& model) {
+    return detail::judge(
+        policy, points, options, [&](std::span<char> left, filter_choice& choice, std::vector<std::string>& reasons) {
+          return detail::judge_views(policy, points, views, model, options, left, choice, reasons, on_progress);
+        });
+  });
 }
 
-/// The same by the points alone. An empty cloud, or one too small to judge, gets an empty chain. O(n log n).
+/// Judges the cloud by its points alone. An empty cloud, or one too small to judge, gets an empty chain. O(n log n).
 /// @pre neighbors > 0; ranges is empty or as long as points
 template <execution_policy Policy, point_range Points>
 [[nodiscard]] automatic_result filter_automatically(const Policy& policy, const Points& points,
                                                     const select_options& options = {}) {
-  return detail::judge(policy, points, std::span<const detail::absent_view>{}, camera::pinhole{}, options, {});
+  return detail::judge(policy, points, options, detail::without_views{});
 }
 
 /// Judges the cloud and says which filters suit it: `filter_automatically` without its inliers.
@@ -230,7 +232,7 @@ template <execution_policy Policy, point_range Points>
                                           const select_options& options = {}) {
   return filter_automatically(policy, points, options).choice;
 }
-/// The same with views.
+/// Judges the cloud by its points and depth images, see `filter_automatically`.
 template <execution_policy Policy, point_range Points, posed_depth_range Views, camera::camera_model Camera>
 [[nodiscard]] filter_choice select_filter(const Policy& policy, const Points& points, const Views& views,
                                           const Camera& camera, const select_options& options = {},
@@ -245,17 +247,21 @@ template <execution_policy Policy, point_range Points, posed_depth_range Views, 
 template <execution_policy Policy, point_range Points>
 [[nodiscard]] std::vector<std::uint32_t> apply_filter(const Policy& policy, const Points& points,
                                                       const filter_chain& chain, const select_options& options = {}) {
-  return detail::apply_chain(policy, points, chain, std::span<const detail::absent_view>{}, camera::pinhole{}, options,
-                             {});
+  return detail::apply_chain(policy, points, chain, options, detail::without_views{});
 }
-/// The same with views. If `on_progress`, which counts the views, cancels, what they say is left out.
+/// Applies a chain that may ask depth images. If `on_progress`, which counts the views, cancels, what they say is left
+/// out. @pre there are views if the chain has a `ray_step`
 template <execution_policy Policy, point_range Points, posed_depth_range Views, camera::camera_model Camera>
 [[nodiscard]] std::vector<std::uint32_t> apply_filter(const Policy& policy, const Points& points,
                                                       const filter_chain& chain, const Views& views,
                                                       const Camera& camera, const select_options& options = {},
                                                       progress on_progress = {}) {
   return detail::with_model(camera, [&](const auto& model) {
-    return detail::apply_chain(policy, points, chain, views, model, options, on_progress);
+    return detail::apply_chain(policy, points, chain, options, [&](const ray_step& step, std::span<char> left) {
+      assert(std::ranges::size(views) != 0);
+      bool cancelled = false;
+      detail::apply_rays(policy, points, step, views, model, left, cancelled, on_progress);
+    });
   });
 }
 

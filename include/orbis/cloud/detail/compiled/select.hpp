@@ -5,10 +5,16 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
+#include <string>
 #include <vector>
 
+#include <orbis/cloud/cluster.hpp>
+#include <orbis/cloud/detail/select/density_judge.hpp>
+#include <orbis/cloud/detail/select/surroundings.hpp>
 #include <orbis/cloud/filter_chain.hpp>
+#include <orbis/cloud/filter_choice.hpp>
 #include <orbis/cloud/select.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/types.hpp>
@@ -18,6 +24,17 @@
 #endif
 
 namespace orbis::cloud {
+
+#define ORBIS_INSTANTIATE_JUDGE(policy)                                                                          \
+  ORBIS_INSTANTIATE_CLOUD void detail::surroundings::measure(const policy&, std::size_t);                        \
+  ORBIS_INSTANTIATE_CLOUD void detail::surroundings::apply(const policy&, const density_step&);                  \
+  ORBIS_INSTANTIATE_CLOUD void detail::surroundings::apply(const policy&, const isolation_step&);                \
+  ORBIS_INSTANTIATE_CLOUD void detail::surroundings::apply(const policy&, const cluster_options&);               \
+  ORBIS_INSTANTIATE_CLOUD void detail::judge_points(const policy&, detail::surroundings&, const select_options&, \
+                                                    filter_choice&, std::vector<std::string>&);
+ORBIS_INSTANTIATE_JUDGE(sequential_policy)
+ORBIS_INSTANTIATE_JUDGE(parallel_policy)
+#undef ORBIS_INSTANTIATE_JUDGE
 
 #define ORBIS_INSTANTIATE_SELECT(policy, ...)                                                                     \
   ORBIS_INSTANTIATE_CLOUD automatic_result filter_automatically(const policy&, const std::vector<__VA_ARGS__>&,   \

@@ -44,10 +44,7 @@ class surroundings {
       const float range = ranges[i];
       log_range_.push_back(range >= 0 ? std::log(std::max(range, 1e-3F)) : nan);
     }
-    table_ = all_knn(policy, points_, std::max(width, neighbors));
-    gone_.assign(size(), 0);
-    flat_.assign(size(), unknown);
-    measure_spacing(policy, neighbors);
+    measure(policy, neighbors);
   }
 
   [[nodiscard]] std::size_t size() const noexcept { return points_.size(); }
@@ -145,8 +142,12 @@ class surroundings {
   [[nodiscard]] bool is_bulk(const log_line& line, std::size_t i) const noexcept {
     return log_spacing_[i] - usual(line, i) < bulk_end;
   }
+  /// All that follows from the points.
   template <execution_policy Policy>
-  void measure_spacing(const Policy& policy, std::size_t neighbors) {
+  void measure(const Policy& policy, std::size_t neighbors) {
+    table_ = all_knn(policy, points_, std::max(width, neighbors));
+    gone_.assign(size(), 0);
+    flat_.assign(size(), unknown);
     log_spacing_ = mean_knn_distance(policy, table_, neighbors);
     for (float& s : log_spacing_) s = s > 0 && std::isfinite(s) ? std::log(s) : nan;
   }
