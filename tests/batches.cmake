@@ -17,6 +17,8 @@ function(orbis_batch out name)
     math(EXPR most "${most} / 3")
   elseif(name STREQUAL "features")
     math(EXPR most "${most} / 2")
+  elseif(name MATCHES "^(cloud|octree)$")  # tests of many kinds of points, of many sensor models
+    math(EXPR most "${most} * 2 / 3")
   endif()
   set(sources)
   set(batch)
