@@ -251,3 +251,7 @@ flying_pixel_count remove_flying_pixels(const Policy& policy, const Depth& depth
 }
 
 }  // namespace orbis::cloud
+
+ORBIS_COMPILED_KERNEL(orbis::cloud::detail::flag_between,
+                      void(const orbis::cloud::detail::flying_lines&, const orbis::cloud::detail::flying_limits&,
+                           std::uint32_t*));

@@ -364,3 +364,10 @@ struct knn_kernels {
 };
 
 }  // namespace orbis::cloud::detail
+
+ORBIS_COMPILED_KERNEL(orbis::cloud::detail::near_boxes, orbis::cloud::detail::knn_kernels::boxes_code);
+ORBIS_COMPILED_KERNEL(orbis::cloud::detail::gather_leaves, orbis::cloud::detail::knn_kernels::gather_code);
+ORBIS_COMPILED_KERNEL(orbis::cloud::detail::near_in_leaves, orbis::cloud::detail::knn_kernels::leaves_code);
+ORBIS_COMPILED_KERNEL(orbis::cloud::detail::near_in_leaf, orbis::cloud::detail::knn_kernels::leaf_code);
+ORBIS_COMPILED_KERNEL(orbis::cloud::detail::leaf_distances, orbis::cloud::detail::knn_kernels::distances_code);
+ORBIS_COMPILED_KERNEL(orbis::cloud::detail::sum_nearest, orbis::cloud::detail::knn_kernels::sum_code);

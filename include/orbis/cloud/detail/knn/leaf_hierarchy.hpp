@@ -294,3 +294,5 @@ template <execution_policy Policy, point_range Points>
 }
 
 }  // namespace orbis::cloud::detail
+
+ORBIS_COMPILED_KERNEL(orbis::cloud::detail::fill_curve_keys, void(orbis::cloud::detail::curve_block&));

@@ -107,3 +107,5 @@ class rank_sorter {
 };
 
 }  // namespace orbis::cloud::detail
+
+ORBIS_COMPILED_KERNEL_AVX2(orbis::cloud::detail::count_smaller, void(const std::int32_t*, std::size_t, std::int32_t*));

@@ -182,3 +182,9 @@ struct depth_frame {
 };
 
 }  // namespace orbis::octree::detail
+
+ORBIS_COMPILED_KERNEL_AVX2(orbis::octree::detail::classify_children_kernel,
+                           orbis::octree::detail::depth_frame::classify_kernel);
+ORBIS_COMPILED_KERNEL_AVX2(orbis::octree::detail::sample_children_kernel,
+                           orbis::octree::detail::depth_frame::sample_kernel);
+ORBIS_COMPILED_KERNEL(orbis::octree::detail::test_pixels_kernel, orbis::octree::detail::depth_frame::test_kernel);

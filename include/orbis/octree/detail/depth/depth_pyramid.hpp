@@ -203,3 +203,8 @@ class depth_pyramid {
 };
 
 }  // namespace orbis::octree::detail
+
+ORBIS_COMPILED_KERNEL_AVX2(orbis::octree::detail::first_cells_kernel,
+                           void(const float*, const float*, float, int, std::uint32_t*, std::uint32_t*));
+ORBIS_COMPILED_KERNEL_AVX2(orbis::octree::detail::overlap_kernel,
+                           void(const std::uint32_t*, const std::uint32_t*, int, std::uint32_t*));

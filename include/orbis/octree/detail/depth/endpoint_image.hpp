@@ -159,3 +159,14 @@ class endpoint_image {
 };
 
 }  // namespace orbis::octree::detail
+
+ORBIS_COMPILED_KERNEL(orbis::octree::detail::find_ends_kernel,
+                      void(const orbis::octree::detail::depth_sensor&, const orbis::octree::detail::end_row&,
+                           orbis::octree::detail::end_counts&));
+ORBIS_COMPILED_KERNEL(orbis::octree::detail::fresh_keys_kernel,
+                      unsigned(const std::array<const std::int32_t*, 3>&, const std::array<const std::int32_t*, 3>&,
+                               int));
+ORBIS_COMPILED_KERNEL_AVX2(orbis::octree::detail::to_metres_kernel<std::uint16_t>,
+                           void(const orbis::octree::detail::metres_row<std::uint16_t>&));
+ORBIS_COMPILED_KERNEL_AVX2(orbis::octree::detail::to_metres_kernel<float>,
+                           void(const orbis::octree::detail::metres_row<float>&));

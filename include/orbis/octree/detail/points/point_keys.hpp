@@ -159,3 +159,9 @@ inline void find_keys(const voxel_grid& grid, const point_batch& points, std::si
 }
 
 }  // namespace orbis::octree::detail
+
+ORBIS_COMPILED_KERNEL(orbis::octree::detail::load_triples_kernel,
+                      void(const float*, std::size_t, orbis::octree::detail::point_batch&));
+ORBIS_COMPILED_KERNEL(orbis::octree::detail::find_keys_kernel,
+                      void(const orbis::octree::voxel_grid&, const orbis::octree::detail::point_batch&, std::size_t,
+                           orbis::octree::detail::batch_keys&));

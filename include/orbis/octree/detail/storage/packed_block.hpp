@@ -96,12 +96,25 @@ struct expand_palette_kernel {
                                       block<T>& out) noexcept {
     using index = simd::native_vec<std::int32_t, Target>;
     using lanes = simd::vec<T, index::count, Target>;
+    constexpr bool in_registers = sizeof(T) == 4 && index::count == 16;  // all values in two of them
+    lanes low, high;
+    if constexpr (in_registers) {
+      const std::size_t count = std::size_t{1} << bits;
+      low = lanes::load(values, std::min<std::size_t>(count, 16));
+      high = count > 16 ? lanes::load(values + 16) : low;
+    }
     for (unsigned i = 0; i != 64; i += index::count) {
       index at(0);
-      for (unsigned j = bits; j-- != 0;)
-        at = at + at + select(index::mask_type::from_bits(plane[j] >> i), index(1), index(0));
+      for (unsigned j = 0; j != bits; ++j)
+        at = at |
+             select(index::mask_type::from_bits(plane[j] >> i), index(static_cast<std::int32_t>(1U << j)), index(0));
+      lanes chosen;
+      if constexpr (in_registers)
+        chosen = simd::look_up(low, high, at);
+      else
+        chosen = simd::gather(values, at);
       const auto known = lanes::mask_type::from_bits(out.known >> i);
-      select(known, simd::gather(values, at), lanes(T{})).store(out.value.data() + i);
+      select(known, chosen, lanes(T{})).store(out.value.data() + i);
     }
   }
 };
@@ -121,3 +134,8 @@ void expand_palette(const T* values, const std::uint64_t* plane, unsigned bits, 
 }
 
 }  // namespace orbis::octree::detail
+
+ORBIS_COMPILED_KERNEL(orbis::octree::detail::find_palette_kernel<float>,
+                      void(const orbis::octree::detail::block<float>&, orbis::octree::detail::palette<float>&));
+ORBIS_COMPILED_KERNEL(orbis::octree::detail::expand_palette_kernel<float>,
+                      void(const float*, const std::uint64_t*, unsigned, orbis::octree::detail::block<float>&));
