@@ -104,7 +104,7 @@ template <execution_policy Policy, point_range Points>
   }
   return out;
 }
-/// The same without a callback, which cannot fail.
+/// The nearest neighbours of every point as above, without a callback: cannot fail.
 template <execution_policy Policy, point_range Points>
 [[nodiscard]] neighbor_table all_knn(const Policy& policy, const Points& points, std::size_t k) {
   return *all_knn(policy, points, k, progress{});
@@ -183,7 +183,7 @@ template <execution_policy Policy, point_range Points>
   if (!whole) return detail::fail_cancelled();
   return means;
 }
-/// The same without a callback, which cannot fail.
+/// The mean distances as above, without a callback: cannot fail.
 template <execution_policy Policy, point_range Points>
 [[nodiscard]] std::vector<float> all_mean_knn_distance(const Policy& policy, const Points& points, std::size_t k) {
   return *all_mean_knn_distance(policy, points, k, progress{});

@@ -202,7 +202,7 @@ template <execution_policy Policy, point_range Points>
   return out;
 }
 
-/// The same as `cluster_inliers`, with the components.
+/// Finds the points that `cluster_inliers` returns, and the components they are in.
 template <execution_policy Policy, point_range Points>
 [[nodiscard]] cluster_result cluster_filter(const Policy& policy, const Points& points,
                                             const cluster_options& options = {}) {

@@ -242,7 +242,7 @@ flying_pixel_count remove_flying_pixels(const Policy& policy, const Depth& depth
   return total;
 }
 
-/// The same with memory of its own.
+/// Removes flying pixels as above, with memory that is freed at the end.
 template <execution_policy Policy, camera::depth_source Depth>
 flying_pixel_count remove_flying_pixels(const Policy& policy, const Depth& depth, image_view<float> out,
                                         const flying_pixel_options& options = {}) {

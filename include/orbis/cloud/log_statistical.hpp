@@ -77,7 +77,7 @@ struct log_statistical_result {
   return out;
 }
 
-/// The same as `log_statistical_inliers`, with the scores and the threshold.
+/// Finds the points that `log_statistical_inliers` returns, their scores and the threshold.
 template <execution_policy Policy, point_range Points>
 [[nodiscard]] log_statistical_result log_statistical_filter(const Policy& policy, const Points& points,
                                                             const log_statistical_options& options = {}) {

@@ -25,7 +25,7 @@ struct neighbor {
   friend bool operator==(const neighbor&, const neighbor&) = default;
 };
 
-/// The same with the square of the distance, which is what searches compute.
+/// A point that was found, with the square of its distance, which is what searches compute.
 template <std::floating_point S>
 struct squared_neighbor {
   std::uint32_t index = 0;
@@ -137,7 +137,7 @@ template <std::floating_point S, class Neighbor = neighbor<S>>
 class radius_sink {
  public:
   radius_sink(S radius, std::vector<Neighbor>& out) : bound_{radius * radius}, out_{&out} { out.clear(); }
-  /// The same of a squared radius.
+  /// Keeps everything within a radius that is given by its square, in square metres.
   [[nodiscard]] static radius_sink within_squared(S radius_squared, std::vector<Neighbor>& out) {
     radius_sink sink{0, out};
     sink.bound_ = radius_squared;
@@ -165,7 +165,7 @@ class neighbor_queries {
 
   /// The `min(k, size())` points nearest to `q`, nearest first. @pre q is finite
   void knn(const query& q, std::size_t k, std::vector<neighbor<S>>& out) const { self().nearest(q, k, out); }
-  /// The same points with squared distances.
+  /// The points that `knn` finds, with squared distances.
   void knn_squared(const query& q, std::size_t k, std::vector<squared_neighbor<S>>& out) const {
     self().nearest(q, k, out);
   }

@@ -135,7 +135,7 @@ template <execution_policy Policy, point_range Points>
   for (const detail::surplus_copy& copy : tree.left_out) kept[copy.index] = 1;
   return detail::indices_where(count, [&](std::size_t i) { return kept[i] != 0; });
 }
-/// The same without a callback, which cannot fail.
+/// The inliers as above, without a callback: cannot fail.
 template <execution_policy Policy, point_range Points>
 [[nodiscard]] std::vector<std::uint32_t> radius_inliers(const Policy& policy, const Points& points,
                                                         const radius_options& options = {}) {

@@ -99,7 +99,7 @@ template <point_range Points>
 
 }  // namespace detail
 
-/// The same as `statistical_inliers`, with the scores and the threshold.
+/// Finds the points that `statistical_inliers` returns, their scores and the threshold.
 template <execution_policy Policy, point_range Points>
 [[nodiscard]] statistical_result statistical_filter(const Policy& policy, const Points& points,
                                                     const statistical_options& options = {}) {
@@ -107,8 +107,8 @@ template <execution_policy Policy, point_range Points>
   return detail::decide_statistically(points, all_mean_knn_distance(policy, points, options.neighbors), options);
 }
 
-/// The same with reports of progress, in leaves of sixteen points; an error (`cancelled`) if the callback asks
-/// to stop. For other filters give the callback to `all_mean_knn_distance` or `all_knn`, which take all the
+/// Filters as above and reports progress, in leaves of sixteen points. Errors: `cancelled`, if the callback asks to
+/// stop. For other filters give the callback to `all_mean_knn_distance` or `all_knn`, which take all the
 /// time, and decide on their results.
 template <execution_policy Policy, point_range Points>
 [[nodiscard]] result<statistical_result> statistical_filter(const Policy& policy, const Points& points,
@@ -201,7 +201,7 @@ struct range_statistical_result {
   return out;
 }
 
-/// The same as `range_statistical_inliers`, with the scores and the threshold.
+/// Finds the points that `range_statistical_inliers` returns, their scores and the threshold.
 template <execution_policy Policy, point_range Points>
 [[nodiscard]] range_statistical_result range_statistical_filter(const Policy& policy, const Points& points,
                                                                 const sensor_origins& origins,

@@ -168,14 +168,14 @@ template <point_range Points, voxel_choice Choice>
   return out;
 }
 
-/// The same for a cloud without colours.
+/// One point for each occupied voxel of a cloud without colours.
 template <point_range Points, class Choice = voxel_centroid>
 requires(voxel_choice<Choice> || std::same_as<Choice, voxel_centroid>) [[nodiscard]] point_cloud
     voxel_grid(const Points& points, const voxel_grid_options& options = {}, const Choice& choice = {}) {
   return voxel_grid(points, std::span<const rgb8>{}, options, choice);
 }
 
-/// The same for a cloud of our own, colours included.
+/// One point, with its colour, for each occupied voxel of a `point_cloud`.
 template <class Choice = voxel_centroid>
 requires(voxel_choice<Choice> || std::same_as<Choice, voxel_centroid>) [[nodiscard]] point_cloud
     voxel_grid(const point_cloud& cloud, const voxel_grid_options& options = {}, const Choice& choice = {}) {

@@ -158,7 +158,8 @@ struct near_in_leaf {
   }
 };
 
-/// The same for the points of the leaves of `near` whose boxes are within `bound`, then sixteen times infinity. Ends
+/// Writes the squared distances within `bound` from a point to those of the leaves of `near` whose boxes are within
+/// `bound`, then sixteen times infinity. Returns how many they are. Ends
 /// early with more than `capacity` of them; touches no more than `capacity + 3 * leaf_width`. `scratch`: longer by
 /// sixteen than `near.leaves`.
 struct near_in_leaves {

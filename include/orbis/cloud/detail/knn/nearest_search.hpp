@@ -240,7 +240,7 @@ class nearest_search {
     }
   }
 
-  /// The same, nearest leaf first.
+  /// The `wanted` nearest, found leaf by leaf from the nearest leaf on.
   [[nodiscard]] found_within search_outwards(const std::array<float, 3>& q, float* found) {
     float bound = most;
     std::size_t count = 0;
