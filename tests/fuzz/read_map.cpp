@@ -8,6 +8,8 @@
 #include <string>
 #include <string_view>
 
+#include <orbis/core/bytes.hpp>
+#include <orbis/slam/detail/map/file_sections.hpp>
 #include <orbis/slam/map_file.hpp>
 #include <orbis/slam/validate.hpp>
 
