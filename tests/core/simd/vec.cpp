@@ -176,6 +176,24 @@ struct partial_memory {
   }
 };
 
+/// The first n of N numbers, for every n.
+template <class T, std::size_t N>
+struct first_lanes {
+  template <simd::target Target>
+  static ORBIS_ALWAYS_INLINE void run(T* out, const std::vector<T>& in) {
+    test::rows<T> to{out, N};
+    for (std::size_t n = 0; n <= N; ++n) to.put(simd::vec<T, N, Target>::load(in.data(), n));
+  }
+};
+template <class T, std::size_t N>
+void check_first_lanes() {
+  std::vector<T> in, expected;
+  for (std::size_t i = 0; i != N; ++i) in.push_back(static_cast<T>(i + 3));
+  for (std::size_t n = 0; n <= N; ++n)
+    for (std::size_t i = 0; i != N; ++i) expected.push_back(i < n ? in[i] : T{});
+  test::check_on_every_level<first_lanes<T, N>>(expected, in);
+}
+
 struct parts {
   template <simd::target Target>
   static ORBIS_ALWAYS_INLINE void run(float* out, const std::vector<float>& in) {
@@ -230,6 +248,16 @@ TEST_CASE("vectors give their lanes and halves") {
     to.put(in[i]);
   }
   test::check_on_every_level<parts>(expected, in);
+}
+
+TEST_CASE("the first lanes are loaded and the others are zero") {
+  check_first_lanes<float, 8>();
+  check_first_lanes<float, 16>();
+  check_first_lanes<double, 4>();
+  check_first_lanes<double, 8>();
+  check_first_lanes<std::int32_t, 8>();
+  check_first_lanes<std::uint64_t, 4>();
+  check_first_lanes<std::int16_t, 16>();
 }
 
 TEST_CASE("a product is rounded before it is added to") {
