@@ -298,7 +298,8 @@ std::function<bool()> eigen_factor(problem& p) {
          {std::pair{"orbis", simd::level::avx512}, std::pair{"orbis_avx2", simd::level::avx2},
           std::pair{"orbis_portable", simd::level::portable}})
       add_factor(g, who, [level = level](problem& p) -> std::function<bool()> {
-        auto cholesky = std::make_shared<optimize::detail::block_cholesky<6>>(level);
+        const simd::level_limit limit{level};  // it chooses its kernels when it is made
+        auto cholesky = std::make_shared<optimize::detail::block_cholesky<6>>();
         cholesky->analyze(p.diagonal.size(), p.places);
         return [&p, cholesky] { return cholesky->factor(p.diagonal, p.off_diagonal); };
       });
