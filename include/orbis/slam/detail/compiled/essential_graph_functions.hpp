@@ -12,19 +12,14 @@
 #include <orbis/core/execution.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/optimize/pose_graph.hpp>
+#include <orbis/slam/detail/compiled/compiled_once.hpp>
 #include <orbis/slam/detail/loops/essential_graph.hpp>
-
-#ifdef ORBIS_COMPILED
-#define ORBIS_INLINE
-#else
-#define ORBIS_INLINE inline
-#endif
 
 namespace orbis::slam::detail {
 
-ORBIS_INLINE std::optional<int> optimize_poses(std::span<se3> poses, const std::vector<essential_edge>& edges,
-                                               std::span<const std::uint8_t> is_fixed, int max_iterations,
-                                               const progress& callback) {
+ORBIS_COMPILED_ONCE std::optional<int> optimize_poses(std::span<se3> poses, const std::vector<essential_edge>& edges,
+                                                      std::span<const std::uint8_t> is_fixed, int max_iterations,
+                                                      const progress& callback) {
   optimize::pose_graph_solver<se3> solver;
   const auto summary = solver.solve(seq, poses, edges, {.max_iterations = max_iterations, .fixed = is_fixed}, callback);
   if (optimize::is_failure(summary.status) || summary.status == optimize::pose_graph_status::cancelled)
@@ -33,5 +28,3 @@ ORBIS_INLINE std::optional<int> optimize_poses(std::span<se3> poses, const std::
 }
 
 }  // namespace orbis::slam::detail
-
-#undef ORBIS_INLINE
