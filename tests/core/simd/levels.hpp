@@ -15,15 +15,6 @@
 
 namespace orbis::test {
 
-/// Runs a kernel at every level that the processor has.
-template <class Kernel, class... Args>
-void on_every_level(const Args&... args) {
-  for (const simd::level l : simd::available_levels()) {
-    INFO("level " << static_cast<int>(l));
-    simd::kernel<Kernel, void(const Args&...), simd::popcnt, simd::avx2, simd::avx512>(l)(args...);
-  }
-}
-
 /// Numbers of all sizes, with the ends of the type's range among them.
 template <class T>
 std::vector<T> numbers(std::size_t n, std::uint64_t seed) {
