@@ -15,6 +15,8 @@
 /// | render.hpp | depth images and labels that a camera would see |
 /// | surface.hpp | centres and normals of occupied voxels |
 /// | change_log.hpp | which voxels changed since a revision |
+/// | scan_history.hpp | a map that follows its scans when they change, are removed or come late |
+/// | scan_voxels.hpp | the voxels that one scan observes, packed; the marker that finds them |
 /// | decay.hpp | what time does to voxels that are not observed |
 /// | merge.hpp | adds one map to another |
 /// | voxel_layer.hpp | colours, labels or counts beside the map |
@@ -37,6 +39,8 @@
 #include <orbis/octree/occupancy_octree.hpp>
 #include <orbis/octree/overlap.hpp>
 #include <orbis/octree/render.hpp>
+#include <orbis/octree/scan_history.hpp>
+#include <orbis/octree/scan_voxels.hpp>
 #include <orbis/octree/sensor_model.hpp>
 #include <orbis/octree/surface.hpp>
 #include <orbis/octree/voxel_layer.hpp>

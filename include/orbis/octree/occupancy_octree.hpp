@@ -120,6 +120,15 @@ class occupancy_octree {
     return integrate(seq, depth, camera, T_world_camera, options);
   }
 
+  /// Calls `change(store, log)` with what is stored, as one revision of the change log, for the library's own
+  /// algorithms: the type of the store is internal and may change. `change` must record in `log` every voxel that it
+  /// changes, unless `log` is null because changes are not tracked.
+  template <std::invocable<detail::brick_store<value_type>&, change_log*> Change>
+  void change_store(Change&& change) {
+    begin_change();
+    change(store_, track_.on ? &track_.log : nullptr);
+  }
+
   /// Gives all voxels of a node one value, in the model's units. `key`: the node's lowest voxel; `depth`: of the node
   /// in the tree (0: the root, tree_depth(): one voxel). O(1).
   /// @pre the node is unknown as a whole; key is a multiple of the node's size

@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Which scans observe something in which brick, and which octants have to be replayed.
+#pragma once
+
+#include <bit>
+#include <cassert>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include <orbis/core/hash_index.hpp>
+
+namespace orbis::octree::detail {
+
+/// One scan's part of a brick: the scan's number and the part's place among scan_voxels::parts().
+struct brick_use {
+  std::uint32_t scan, part;
+};
+
+/// A brick, the scans that observe something in it in order, and its octants that are stale (bit i: octant i): they do
+/// not hold what these scans say.
+struct used_brick {
+  std::uint64_t name = 0;
+  std::uint8_t stale = 0;
+  std::vector<brick_use> uses;
+};
+
+/// All bricks that scans observe, and a queue of those that have stale octants. A brick that no scan uses is forgotten
+/// once it is not stale any more; its memory serves the next one.
+class brick_uses {
+ public:
+  /// The number of a brick, new or not; valid until it is forgotten. O(1).
+  [[nodiscard]] std::uint32_t number_of(std::uint64_t name) {
+    const std::uint32_t found = index_.find(name);
+    if (found != hash_index::none) return found;
+    std::uint32_t number = 0;
+    if (free_.empty()) {
+      number = static_cast<std::uint32_t>(bricks_.size());
+      bricks_.emplace_back();
+    } else {
+      number = free_.back();
+      free_.pop_back();
+    }
+    bricks_[number].name = name;
+    index_.set(name, number);
+    return number;
+  }
+  [[nodiscard]] used_brick& operator[](std::uint32_t number) noexcept { return bricks_[number]; }
+  [[nodiscard]] const used_brick& operator[](std::uint32_t number) const noexcept { return bricks_[number]; }
+
+  /// Marks octants of a brick as stale.
+  void make_stale(std::uint32_t number, unsigned octants) {
+    if (octants == 0) return;
+    used_brick& b = bricks_[number];
+    if (b.stale == 0) queue_.push_back(number);
+    b.stale = static_cast<std::uint8_t>(b.stale | octants);
+  }
+  /// The bricks that have stale octants, those first that have been so for longest.
+  [[nodiscard]] std::span<const std::uint32_t> stale() const noexcept { return std::span{queue_}.subspan(done_); }
+  /// The first `count` stale bricks are up to date.
+  void finish(std::size_t count) {
+    assert(count <= stale().size());
+    for (const std::uint32_t number : stale().first(count)) {
+      used_brick& b = bricks_[number];
+      b.stale = 0;
+      if (!b.uses.empty()) continue;
+      index_.erase(b.name);
+      free_.push_back(number);
+    }
+    done_ += count;
+    if (done_ < queue_.size() / 2) return;
+    queue_.erase(queue_.begin(), queue_.begin() + static_cast<std::ptrdiff_t>(done_));
+    done_ = 0;
+  }
+  /// How many bricks there are.
+  [[nodiscard]] std::size_t size() const noexcept { return index_.size(); }
+  /// Bytes on the heap. O(bricks).
+  [[nodiscard]] std::size_t bytes() const noexcept {
+    std::size_t n = index_.memory_bytes() + bricks_.capacity() * sizeof(used_brick) +
+                    (free_.capacity() + queue_.capacity()) * sizeof(std::uint32_t);
+    for (const used_brick& b : bricks_) n += b.uses.capacity() * sizeof(brick_use);
+    return n;
+  }
+
+ private:
+  hash_index index_;
+  std::vector<used_brick> bricks_;
+  std::vector<std::uint32_t> free_;   ///< numbers that are not in use
+  std::vector<std::uint32_t> queue_;  ///< numbers of stale bricks, from done_ on
+  std::size_t done_ = 0;
+};
+
+}  // namespace orbis::octree::detail
