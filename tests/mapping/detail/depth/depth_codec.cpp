@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <cmath>
+#include <functional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <orbis/core/random.hpp>
+#include <orbis/io/recording.hpp>
+#include <orbis/io/synthetic.hpp>
+#include <orbis/mapping/detail/depth/depth_codec.hpp>
+
+#include "support/catch.hpp"
+#include "support/data.hpp"
+
+namespace {
+
+using orbis::image;
+using orbis::mapping::detail::depth_decoder;
+using orbis::mapping::detail::depth_encoder;
+using orbis::mapping::detail::depth_symbol;
+using depth_image = image<std::uint16_t>;
+
+std::vector<std::byte> packed(const depth_image& depth) {
+  depth_encoder encoder;
+  const auto bytes = encoder.encode(depth);
+  return {bytes.begin(), bytes.end()};
+}
+
+/// Bytes per byte of the image, which has to come back as it was.
+double ratio(const depth_image& depth) {
+  const auto bytes = packed(depth);
+  depth_image back(depth.width(), depth.height(), 12345);
+  depth_decoder decoder;
+  REQUIRE(decoder.decode(bytes, back.view()));
+  REQUIRE(back == depth);
+  CHECK(bytes.size() <= depth.pixels().size_bytes() + 1);
+  return static_cast<double>(bytes.size()) / static_cast<double>(depth.pixels().size_bytes());
+}
+
+depth_image made(int width, int height, const std::function<std::uint32_t(int, int)>& pixel) {
+  depth_image out(width, height);
+  for (int y = 0; y != height; ++y)
+    for (int x = 0; x != width; ++x) out(x, y) = static_cast<std::uint16_t>(pixel(x, y));
+  return out;
+}
+
+TEST_CASE("every residual of 17 bits has a symbol, and comes back from it") {
+  for (int residual = -65535; residual <= 65535; ++residual) {
+    const depth_symbol s = depth_symbol::of(residual);
+    const unsigned bits = depth_symbol::rest_bits(s.symbol);
+    if (s.symbol == depth_symbol::no_depth || s.symbol >= depth_symbol::count || bits > 15 || s.rest >> bits != 0 ||
+        static_cast<std::int32_t>(depth_symbol::residual(s.symbol, s.rest)) != residual)
+      FAIL("residual " << residual);
+  }
+}
+
+TEST_CASE("images of every size come back from compression") {
+  orbis::random_bits random{1};
+  for (int height = 0; height != 11; ++height)
+    for (int width = 0; width != 11; ++width)
+      for (const std::uint32_t range : {1U, 2U, 700U, 65536U})
+        ratio(made(width, height, [&](int, int) { return random.below(range); }));
+}
+
+TEST_CASE("pure noise stays as large as it is") {
+  orbis::random_bits random{2};
+  CHECK(ratio(made(320, 240, [&](int, int) { return random.below(65536); })) <= 1.0001);
+}
+
+TEST_CASE("an image without anything to say is next to nothing") {
+  CHECK(ratio(depth_image(640, 480)) < 0.0005);
+  CHECK(ratio(depth_image(640, 480, 65535)) < 0.0005);
+  CHECK(ratio(depth_image(640, 480, 1234)) < 0.0005);
+  CHECK(ratio(made(640, 480, [](int x, int) { return static_cast<std::uint32_t>(1000 + x); })) < 0.002);
+}
+
+TEST_CASE("values, ranks and holes come back from compression") {
+  orbis::random_bits random{3};
+  const auto with_holes = [&](std::uint32_t step, std::uint32_t noise, std::uint32_t holes) {
+    return made(97, 53, [&](int x, int y) {
+      if (random.below(100) < holes) return 0U;
+      return 65535U - step * (static_cast<std::uint32_t>(x / 3 + y / 2) + random.below(noise));
+    });
+  };
+  for (const std::uint32_t step : {1U, 50U})
+    for (const std::uint32_t noise : {1U, 5U, 300U})
+      for (const std::uint32_t holes : {0U, 10U, 90U}) ratio(with_holes(step, noise, holes));
+}
+
+TEST_CASE("a part of a larger image is compressed alone") {
+  orbis::random_bits random{4};
+  const depth_image all =
+      made(40, 30, [&](int x, int) { return 900 + static_cast<std::uint32_t>(x) + random.below(3); });
+  const orbis::image_view<const std::uint16_t> part{all.data() + 5 * 40 + 7, 20, 15, 40};
+  depth_encoder encoder;
+  const auto bytes = encoder.encode(part);
+  depth_image back(40, 30, 7);
+  depth_decoder decoder;
+  REQUIRE(decoder.decode(bytes, {back.data() + 40 + 3, 20, 15, 40}));
+  for (int y = 0; y != 15; ++y)
+    for (int x = 0; x != 20; ++x) REQUIRE(back(x + 3, y + 1) == part(x, y));
+  CHECK(back(2, 1) == 7);
+  CHECK(back(23, 1) == 7);
+}
+
+TEST_CASE("the encoder and the decoder can be used again") {
+  depth_encoder encoder;
+  depth_decoder decoder;
+  orbis::random_bits random{5};
+  for (int trial = 0; trial != 40; ++trial) {
+    const auto size = [&] { return static_cast<int>(1 + random.below(40)); };
+    const std::uint32_t range = 1 + random.below(400), step = 1 + random.below(20);
+    const depth_image depth = made(size(), size(), [&](int, int) { return random.below(range) * step; });
+    const auto bytes = encoder.encode(depth);
+    const auto fresh = packed(depth);
+    REQUIRE(std::vector(bytes.begin(), bytes.end()) == fresh);
+    depth_image back(depth.width(), depth.height());
+    REQUIRE(decoder.decode(bytes, back.view()));
+    REQUIRE(back == depth);
+  }
+}
+
+TEST_CASE("a compressed image that was cut short or changed is told from a whole one, or gives some image",
+          "[mapping]") {
+  orbis::random_bits random{6};
+  const depth_image depth = made(31, 23, [&](int x, int) {
+    return random.below(9) == 0 ? 0U : 700 + 13 * (static_cast<std::uint32_t>(x) / 4 + random.below(3));
+  });
+  const auto bytes = packed(depth);
+  depth_decoder decoder;
+  depth_image back(31, 23);
+  for (std::size_t size = 0; size != bytes.size(); ++size) {
+    const auto cut = decoder.decode(std::span{bytes}.first(size), back.view());
+    REQUIRE_FALSE(cut);
+    REQUIRE(cut.error().code == orbis::errc::malformed);
+  }
+  auto longer = bytes;
+  longer.push_back(std::byte{0});
+  CHECK_FALSE(decoder.decode(longer, back.view()));
+  depth_image other(30, 23);
+  CHECK_FALSE(decoder.decode(bytes, other.view()));
+  for (std::size_t i = 0; i != bytes.size(); ++i)
+    for (int bit = 0; bit != 8; ++bit) {
+      auto changed = bytes;
+      changed[i] ^= static_cast<std::byte>(1U << static_cast<unsigned>(bit));
+      static_cast<void>(decoder.decode(changed, back.view()));  // any answer, but no harm
+    }
+}
+
+TEST_CASE("depth of a simulated sensor takes less than a fifth") {
+  const orbis::io::synthetic_recording room{orbis::io::synthetic_options{.frames = 4, .width = 320, .height = 240}};
+  for (const std::size_t i : {0U, 2U}) CHECK(ratio(room.frame(i).value().depth) < 0.16);
+}
+
+TEST_CASE("depth of real sensors takes less than a tenth") {
+  for (const std::string name : {"kitchen", "livingroom", "fr1_desk_9"}) {
+    ORBIS_NEEDS_DATA(name);
+    const auto recording = orbis::io::open_recording(orbis::test::data_dir() / name).value();
+    const std::size_t step = recording.size() / 3;
+    for (std::size_t i = 0; i < recording.size(); i += step) {
+      INFO(name << " " << i);
+      CHECK(ratio(recording.frame(i).value().depth) < 0.10);
+    }
+  }
+}
+
+}  // namespace
