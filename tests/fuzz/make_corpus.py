@@ -213,6 +213,28 @@ def depth_images():
     write("integrate_depth", "one_pixel", start(0, 0, 4, base=3) + shot(0) + shot(3))
 
 
+def compressed_depths():
+    """Size, then bytes that are a compressed image, or pixels, or both."""
+    size = lambda width, height: bytes([width, height])
+    rng = random.Random(11)
+    write("read_depth", "empty", b"")
+    write("read_depth", "no_pixels", size(0, 9) + b"\0")
+    write("read_depth", "plain", size(3, 2) + b"\0" + struct.pack("<6H", 0, 1, 2, 1000, 65534, 65535))
+    write("read_depth", "plain_short", size(3, 2) + b"\0" + struct.pack("<5H", 0, 1, 2, 1000, 65534))
+    no_tables, no_words, states = bytes(27), bytes(4), b"\x80\x80\x04" * 4
+    write("read_depth", "no_depth_anywhere", size(40, 30) + b"\1" + no_tables + no_words + states)
+    write("read_depth", "list_too_long", size(4, 4) + b"\2\xff\xff\xff\xff\x0f" + b"\1" * 40)
+    write("read_depth", "depth_beyond_16_bits", size(4, 4) + b"\2\2\xff\xff\3\1" + no_tables + no_words + states)
+    write("read_depth", "rank_beyond_list", size(4, 4) + b"\2\1\5" + (b"\2\0\x80\x20" * 27) + no_words + states)
+    write("read_depth", "frequencies_too_large", size(4, 4) + b"\1" + b"\2\x80\x20\1" * 27 + no_words + states)
+    write("read_depth", "words_missing", size(4, 4) + b"\1" + no_tables + b"\0\0\0\x7f" + states)
+    write("read_depth", "steps", size(37, 29) + bytes(64 + (x // 5 + y // 3) % 128 for y in range(29) for x in range(37)))
+    write("read_depth", "noise", size(20, 20) + bytes(rng.randrange(256) for _ in range(700)))
+    write("read_depth", "holes", size(33, 21) + bytes(rng.choice((0, 0, 100, 101)) for _ in range(33 * 21)))
+    write("read_depth", "one_row", size(63, 1) + bytes(range(64, 127)))
+    write("read_depth", "one_column", size(1, 63) + bytes(range(64, 127)))
+
+
 def pose_graphs():
     def vertex(i, pose="0 0 0 0 0 0 1"):
         return f"VERTEX_SE3:QUAT {i} {pose}\n"
@@ -445,3 +467,4 @@ if __name__ == "__main__":
     scans()
     edits()
     depth_images()
+    compressed_depths()
