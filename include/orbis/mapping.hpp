@@ -5,6 +5,8 @@
 /// | header | what it is for |
 /// | --- | --- |
 /// | `batch.hpp` | `build_map`: from posed keyframes to a map, all at once |
+/// | `live_map.hpp` | `live_map`: an octree that grows with each keyframe and follows corrections of their poses |
+/// | `depth_history.hpp` | the concept of what keeps the keyframes' depth images for it |
 /// | `dense_cloud.hpp` | the points of all keyframes as one cloud, which follows corrections of their poses |
 /// | `depth_store.hpp` | depth images of many keyframes, compressed without loss, within a budget |
 /// | `filter.hpp` | `filter_points`: the outlier filter, as a choice at run time |
@@ -14,7 +16,9 @@
 
 #include <orbis/mapping/batch.hpp>
 #include <orbis/mapping/dense_cloud.hpp>
+#include <orbis/mapping/depth_history.hpp>
 #include <orbis/mapping/depth_store.hpp>
 #include <orbis/mapping/filter.hpp>
 #include <orbis/mapping/keyframe.hpp>
 #include <orbis/mapping/keyframe_points.hpp>
+#include <orbis/mapping/live_map.hpp>

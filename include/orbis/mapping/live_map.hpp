@@ -1,0 +1,418 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// An occupancy map that grows with each keyframe, and follows every correction of the keyframes' poses.
+///
+/// @code
+///   orbis::mapping::live_map<orbis::octree::occupancy_octree<>, orbis::camera::pinhole> map{camera, {.resolution =
+///   0.05}}; map.add_keyframe(seq, frame, depth, T_world_camera);        // in the map at once
+///   ...
+///   map.set_poses(keyframes);                                   // after each step of the SLAM system
+///   map.correct(seq, {.time = 5ms, .robot = T_world_camera.translation()});
+///   const auto snapshot = map.snapshot();                       // for readers on other threads
+/// @endcode
+#pragma once
+
+#include <algorithm>
+#include <cassert>
+#include <chrono>
+#include <cmath>
+#include <concepts>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <ranges>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <orbis/camera/depth.hpp>
+#include <orbis/camera/model.hpp>
+#include <orbis/core/execution.hpp>
+#include <orbis/core/image.hpp>
+#include <orbis/core/result.hpp>
+#include <orbis/core/se3.hpp>
+#include <orbis/core/types.hpp>
+#include <orbis/mapping/depth_history.hpp>
+#include <orbis/mapping/depth_store.hpp>
+#include <orbis/mapping/detail/live/view_frustum.hpp>
+#include <orbis/octree/integration.hpp>
+#include <orbis/octree/scan_history.hpp>
+
+namespace orbis::mapping {
+
+struct live_map_options {
+  double resolution = 0.05;                   ///< the edge of a voxel, metres; > 0
+  octree::integration_options integration{};  ///< of every depth image
+  /// A keyframe stays where it is in the map until its pose has moved a point of its view by more than this, in voxels.
+  /// 0: until any bit of the pose has changed, so that the map is always the one of the present poses. >= 0
+  double tolerance = 0.25;
+  /// So many keyframes are moved before the map follows: more is less work, less is sooner. > 0
+  std::size_t keyframes_per_replay = 16;
+  /// The most frames between keyframes that are in the map at a time; what is older is dropped. 0: keyframes only.
+  std::size_t max_frames = 0;
+};
+
+/// The pose of a keyframe; anything with these members will do.
+struct keyframe_position {
+  std::uint64_t frame = 0;  ///< index of its frame
+  se3 T_world_camera;
+};
+template <class P>
+concept keyframe_position_like = requires(const P& p) {
+  { p.frame } -> std::convertible_to<std::uint64_t>;
+  { p.T_world_camera } -> std::convertible_to<se3>;
+};
+
+/// What becomes of keyframes that are not among the given poses: they keep their poses, or are taken out of the map
+/// until they are given a pose again, as those of another map of the atlas are.
+enum class unlisted { keep, hide };
+
+/// How far to go in one call of live_map::correct.
+struct correction_limits {
+  /// A keyframe or a few dozen bricks that were begun are finished.
+  std::chrono::nanoseconds time = std::chrono::nanoseconds::max();
+  std::optional<vec3> robot{};  ///< in the world; keyframes near it are moved first
+};
+
+/// What a call of live_map::correct has done.
+struct correction_progress {
+  std::size_t keyframes = 0;  ///< moved
+  std::size_t bricks = 0;     ///< brought up to date
+  bool done = false;          ///< nothing is left to do
+};
+
+/// An occupancy octree of the depth images of keyframes. It keeps what each keyframe observed (see
+/// octree::scan_history) and its depth image (in `Depths`), so that a keyframe can be moved, changed and removed.
+///
+/// When nothing is pending, the map is the one that `integrate` makes of the depth images in the order of their frames,
+/// each from the pose that it was marked with (`used_pose`), bit for bit: with tolerance 0 and after `finish` from the
+/// present poses, otherwise from poses within the tolerance. It depends neither on policies nor on limits of time.
+///
+/// One thread at a time; see live_map_thread.hpp for a map with a thread of its own.
+template <octree::replayable_octree Octree, camera::camera_model Camera, depth_history Depths = depth_store>
+class live_map {
+ public:
+  using octree_type = Octree;
+  using depth_view = camera::depth_view<std::uint16_t>;
+
+  /// @pre options.resolution > 0 and finite; tolerance >= 0; keyframes_per_replay > 0
+  explicit live_map(Camera camera, const live_map_options& options = {}, Depths depths = Depths{})
+      : camera_{std::move(camera)},
+        options_{options},
+        frustum_{camera_},
+        depths_{std::move(depths)},
+        history_{options.resolution} {
+    assert(options.tolerance >= 0 && options.keyframes_per_replay > 0);
+  }
+
+  // -- scans
+
+  /// Adds a keyframe, or gives one that is there another depth image and pose. `frame`: the index of its frame, which
+  /// orders keyframes; `depth`: as it goes into the map, without the pixels that a filter removed; `T_world_camera`: if
+  /// it is not finite, the keyframe waits for a pose outside of the map. The newest keyframe is in the map at once.
+  /// Error: that of `Depths::put`; the keyframe is in the map even so.
+  /// O(marking, see octree::scan_marker) and Depths::put. @pre depth has the camera's size
+  template <execution_policy Policy>
+  result<octree::integration_summary> add_keyframe(const Policy& policy, std::uint64_t frame, const depth_view& depth,
+                                                   const se3& T_world_camera) {
+    assert(depth.width() == camera_.width() && depth.height() == camera_.height());
+    std::erase_if(frames_, [&](const transient& t) { return t.frame == frame; });  // it becomes a keyframe
+    entry& k = make(frame);
+    if (k.used) drop_frames_of(frame);
+    k.scale = depth.scale();
+    k.min_depth = depth.min_depth();
+    k.max_depth = depth.max_depth();
+    k.reach = std::min(detail::largest_depth(depth), options_.integration.max_range);
+    set_waiting(k, false);
+    k.wanted = if_finite(T_world_camera);
+    k.used = k.wanted;
+    octree::integration_summary summary;
+    if (k.used)
+      summary = history_.set(policy, frame, depth, camera_, *k.used, options_.integration);
+    else
+      history_.remove(frame);
+    if (auto kept = depths_.put(frame, depth.pixels()); !kept) return fail(std::move(kept.error()));
+    return summary;
+  }
+  /// Gives a keyframe another depth image: the later verdict of a filter, with the pixels set to 0 that it removes.
+  /// The map follows with `correct`. Errors: not_found; that of `Depths::put`.
+  /// @pre depth has the camera's size
+  template <execution_policy Policy>
+  result<void> set_depth(const Policy& policy, std::uint64_t frame, const depth_view& depth) {
+    const entry* const k = find(frame);
+    if (k == nullptr) return fail(errc::not_found, "keyframe " + std::to_string(frame), "there is no such keyframe");
+    const se3 pose = k->wanted ? *k->wanted : se3{so3{}, vec3::Constant(std::numeric_limits<double>::quiet_NaN())};
+    if (auto added = add_keyframe(policy, frame, depth, pose); !added) return fail(std::move(added.error()));
+    return {};
+  }
+  /// Adds a frame between keyframes, whose pose was measured relative to `keyframe`. It makes the map denser in time,
+  /// and is not kept for corrections: it leaves the map when there are more than `max_frames`, when its keyframe moves,
+  /// is hidden or removed, and with `finish`. Any depth source. False if frames are not wanted, the keyframe is not in
+  /// the map, the pose is not finite, or the frame is a keyframe. O(marking). @pre depth has the camera's size
+  template <execution_policy Policy, camera::depth_source Depth>
+  bool add_frame(const Policy& policy, std::uint64_t frame, const Depth& depth, const se3& T_world_camera,
+                 std::uint64_t keyframe) {
+    assert(depth.width() == camera_.width() && depth.height() == camera_.height());
+    const entry* const k = find(keyframe);
+    if (options_.max_frames == 0 || k == nullptr || !k->used || find(frame) != nullptr || !if_finite(T_world_camera))
+      return false;
+    std::erase_if(frames_, [&](const transient& t) { return t.frame == frame; });
+    // Several are dropped at a time: the bricks that they share are replayed once.
+    if (frames_.size() >= options_.max_frames) drop_oldest_frames(1 + options_.max_frames / 4);
+    history_.set(policy, frame, depth, camera_, T_world_camera, options_.integration);
+    frames_.push_back({frame, keyframe});
+    return true;
+  }
+  /// Forgets a keyframe, which was culled; the map follows with `correct`. False if there is none. O(its bricks).
+  bool remove(std::uint64_t frame) {
+    entry* const k = find(frame);
+    if (k == nullptr) return false;
+    hide(*k);
+    depths_.erase(frame);
+    keyframes_.erase(keyframes_.begin() + (k - keyframes_.data()));
+    return true;
+  }
+
+  // -- corrections
+
+  /// Tells the present poses of keyframes, in any order; the map follows with `correct`. Frames that are no keyframes
+  /// of the map are passed over; a pose that is not finite hides its keyframe. Returns how many keyframes wait for
+  /// being moved. O(poses x log keyframes), about 0.1 us each.
+  template <std::ranges::input_range Poses>
+  requires keyframe_position_like<std::ranges::range_value_t<Poses>> std::size_t set_poses(
+      const Poses& poses, unlisted others = unlisted::keep) {
+    ++round_;
+    for (const auto& p : poses) {
+      entry* const k = find(p.frame);
+      if (k == nullptr) continue;
+      k->listed = round_;
+      want(*k, if_finite(se3(p.T_world_camera)));
+    }
+    if (others == unlisted::hide)
+      for (entry& k : keyframes_)
+        if (k.listed != round_) want(k, std::nullopt);
+    return waiting_;
+  }
+  /// Moves keyframes whose poses are out of tolerance to where they are now, those first whose view moved most and that
+  /// are close to the robot, and brings the map up to date, until the time is over. Every call does something, if there
+  /// is something to do.
+  /// Error: that of `Depths::get`. The keyframe whose image is lost is removed, the others go on with the next call.
+  /// O(keyframes) and, for each keyframe that is moved, marking and replaying; nothing if nothing is pending.
+  template <execution_policy Policy>
+  result<correction_progress> correct(const Policy& policy, const correction_limits& limits = {}) {
+    correction_progress progress;
+    if (pending() == 0) {
+      progress.done = true;
+      return progress;
+    }
+    const auto start = std::chrono::steady_clock::now();
+    const auto left = [&] {
+      const auto used = std::chrono::steady_clock::now() - start;
+      return used < limits.time ? limits.time - used : std::chrono::nanoseconds{0};
+    };
+    const auto has_time = [&] { return left() > std::chrono::nanoseconds{0}; };
+    const auto replay = [&] {
+      progress.bricks += history_.replay(policy, {.time = left()});
+      if (history_.stale_bricks() == 0) moved_since_replay_ = 0;
+    };
+    list_by_priority(limits.robot);
+    std::size_t next = 0;
+    while (next != queue_.size() && (next == 0 || has_time())) {
+      if (moved_since_replay_ >= options_.keyframes_per_replay && history_.stale_bricks() != 0) {
+        replay();
+        if (!has_time()) break;
+      }
+      const std::size_t count = std::min<std::size_t>(std::max(1U, policy.threads()), queue_.size() - next);
+      if (auto moved = move_next(policy, next, count); !moved) return fail(std::move(moved.error()));
+      progress.keyframes += count;
+      moved_since_replay_ += count;
+      next += count;
+    }
+    if (next == queue_.size() && (next == 0 || has_time())) replay();
+    progress.done = pending() == 0;
+    return progress;
+  }
+  /// Moves every keyframe whose pose differs in any bit, drops the frames between keyframes, and brings the map up to
+  /// date: it is the map made afresh of the present keyframes and poses. Errors: those of `correct`.
+  template <execution_policy Policy>
+  result<void> finish(const Policy& policy) {
+    drop_oldest_frames(frames_.size());
+    for (entry& k : keyframes_)
+      if (k.used && k.wanted && differ(*k.used, *k.wanted)) set_waiting(k, true);
+    while (pending() != 0)
+      if (auto corrected = correct(policy); !corrected) return fail(std::move(corrected.error()));
+    return {};
+  }
+  /// How much is left to do: keyframes that wait for being moved, and bricks that are not up to date. O(1).
+  [[nodiscard]] std::size_t pending() const noexcept { return waiting_ + history_.stale_bricks(); }
+
+  // -- looking
+
+  /// The map as it is; readable at any time.
+  [[nodiscard]] const Octree& map() const noexcept { return history_.map(); }
+  /// A copy, which shares its memory with the map until that changes: for readers on other threads. O(pages of 4 KB).
+  [[nodiscard]] Octree snapshot() const { return history_.map(); }
+  /// Which voxels changed, see octree::scan_history::changes.
+  [[nodiscard]] const octree::change_log& changes() const noexcept { return history_.changes(); }
+  [[nodiscard]] octree::change_log& changes() noexcept { return history_.changes(); }
+  [[nodiscard]] const Camera& camera() const noexcept { return camera_; }
+  [[nodiscard]] const live_map_options& options() const noexcept { return options_; }
+  [[nodiscard]] const Depths& depths() const noexcept { return depths_; }
+  /// How many keyframes there are, in the map or hidden; how many frames between them are in the map.
+  [[nodiscard]] std::size_t size() const noexcept { return keyframes_.size(); }
+  [[nodiscard]] std::size_t frames() const noexcept { return frames_.size(); }
+  [[nodiscard]] bool contains(std::uint64_t frame) const noexcept { return find(frame) != nullptr; }
+  /// The pose that a keyframe was marked with; empty if it is not in the map. O(log keyframes).
+  [[nodiscard]] std::optional<se3> used_pose(std::uint64_t frame) const {
+    const entry* const k = find(frame);
+    return k == nullptr ? std::nullopt : k->used;
+  }
+  /// Bytes on the heap, without those of `Depths`. O(bricks + keyframes).
+  [[nodiscard]] std::size_t bytes() const noexcept {
+    std::size_t n = history_.bytes() + history_.buffer_bytes() + map().memory_bytes() + map().buffer_bytes() +
+                    keyframes_.capacity() * sizeof(entry) + frames_.capacity() * sizeof(transient) +
+                    queue_.capacity() * sizeof(ranked);
+    for (const worker& w : workers_)
+      n += w.marker.bytes() + w.voxels.bytes() + w.depth.pixels().size() * sizeof(std::uint16_t);
+    return n;
+  }
+
+ private:
+  struct entry {
+    std::uint64_t frame = 0;
+    std::optional<se3> used;    ///< as it is in the map
+    std::optional<se3> wanted;  ///< as it is to be; empty: not in the map
+    double scale = 1.0;         ///< of its depth image, see camera::depth_view
+    float min_depth = 0.0F, max_depth = 0.0F;
+    double reach = 0.0;  ///< the largest depth that counts, metres
+    bool waiting = false;
+    std::uint64_t listed = 0;  ///< the last call of set_poses that named it
+  };
+  struct transient {
+    std::uint64_t frame, keyframe;
+  };
+  struct ranked {
+    double urgency;
+    std::uint64_t frame;
+  };
+  /// What one thread needs to mark a keyframe.
+  struct worker {
+    image<std::uint16_t> depth;
+    octree::scan_marker marker;
+    octree::scan_voxels voxels;
+  };
+
+  [[nodiscard]] static std::optional<se3> if_finite(const se3& T) {
+    return T.to_matrix().allFinite() ? std::optional{T} : std::nullopt;
+  }
+  [[nodiscard]] static bool differ(const se3& a, const se3& b) { return a.to_matrix() != b.to_matrix(); }
+  [[nodiscard]] static bool is_before(const entry& k, std::uint64_t frame) noexcept { return k.frame < frame; }
+  [[nodiscard]] const entry* find(std::uint64_t frame) const noexcept {
+    const auto at = std::lower_bound(keyframes_.begin(), keyframes_.end(), frame, is_before);
+    return at == keyframes_.end() || at->frame != frame ? nullptr : &*at;
+  }
+  [[nodiscard]] entry* find(std::uint64_t frame) noexcept {
+    return const_cast<entry*>(std::as_const(*this).find(frame));
+  }
+  [[nodiscard]] entry& make(std::uint64_t frame) {
+    const auto at = std::lower_bound(keyframes_.begin(), keyframes_.end(), frame, is_before);
+    if (at != keyframes_.end() && at->frame == frame) return *at;
+    return *keyframes_.insert(at, entry{.frame = frame, .used = {}, .wanted = {}});
+  }
+  void set_waiting(entry& k, bool waiting) noexcept {
+    waiting_ += static_cast<std::size_t>(waiting) - static_cast<std::size_t>(k.waiting);
+    k.waiting = waiting;
+  }
+  /// Takes a keyframe out of the map.
+  void hide(entry& k) {
+    k.wanted.reset();
+    set_waiting(k, false);
+    if (!k.used) return;
+    k.used.reset();
+    drop_frames_of(k.frame);
+    history_.remove(k.frame);
+  }
+  void want(entry& k, const std::optional<se3>& pose) {
+    if (!pose) {
+      hide(k);
+      return;
+    }
+    if (k.wanted && !differ(*k.wanted, *pose)) return;
+    k.wanted = pose;
+    const double tolerance = options_.tolerance * options_.resolution;
+    set_waiting(k, !k.used || (tolerance > 0 ? frustum_.displacement(*k.used, *pose, k.reach) > tolerance
+                                             : differ(*k.used, *pose)));
+  }
+  /// The keyframes that wait, the most urgent first; equal ones in the order of their frames.
+  void list_by_priority(const std::optional<vec3>& robot) {
+    queue_.clear();
+    if (waiting_ == 0) return;
+    for (const entry& k : keyframes_) {
+      if (!k.waiting) continue;
+      const double moved = k.used ? frustum_.displacement(*k.used, *k.wanted, k.reach) : k.reach;
+      const double distance = robot ? (k.wanted->translation() - *robot).norm() : 0.0;
+      queue_.push_back({moved / (1.0 + distance), k.frame});
+    }
+    std::sort(queue_.begin(), queue_.end(), [](const ranked& a, const ranked& b) {
+      return a.urgency != b.urgency ? a.urgency > b.urgency : a.frame < b.frame;
+    });
+  }
+  /// Moves `count` keyframes of the queue, each on a thread of its own.
+  template <class Policy>
+  result<void> move_next(const Policy& policy, std::size_t next, std::size_t count) {
+    if (workers_.size() < count) workers_.resize(count);
+    for (std::size_t i = 0; i != count; ++i) {
+      const std::uint64_t frame = queue_[next + i].frame;
+      if (auto got = depths_.get(frame, workers_[i].depth); !got) {
+        remove(frame);
+        return fail(std::move(got.error()));
+      }
+    }
+    const auto mark = [&](const auto& how, std::size_t i) {
+      worker& w = workers_[i];
+      const entry& k = *find(queue_[next + i].frame);
+      const depth_view depth{w.depth.view(), k.scale, k.min_depth, k.max_depth};
+      w.marker.mark(how, history_.grid(), depth, camera_, *k.wanted, options_.integration, w.voxels);
+    };
+    if (count == 1)
+      mark(policy, 0);
+    else
+      for_each_index(policy, count, 1, [&](std::size_t i) { mark(seq, i); });
+    for (std::size_t i = 0; i != count; ++i) {
+      entry& k = *find(queue_[next + i].frame);
+      drop_frames_of(k.frame);
+      history_.set(k.frame, workers_[i].voxels);
+      k.used = k.wanted;
+      set_waiting(k, false);
+    }
+    return {};
+  }
+  /// Drops frames between keyframes.
+  void drop_oldest_frames(std::size_t count) {
+    count = std::min(count, frames_.size());
+    for (std::size_t i = 0; i != count; ++i) history_.remove(frames_[i].frame);
+    frames_.erase(frames_.begin(), frames_.begin() + static_cast<std::ptrdiff_t>(count));
+  }
+  void drop_frames_of(std::uint64_t keyframe) {
+    std::erase_if(frames_, [&](const transient& t) {
+      if (t.keyframe == keyframe) history_.remove(t.frame);
+      return t.keyframe == keyframe;
+    });
+  }
+
+  Camera camera_;
+  live_map_options options_;
+  detail::view_frustum frustum_;
+  Depths depths_;
+  octree::scan_history<Octree> history_;
+  std::vector<entry> keyframes_;   ///< by frame
+  std::vector<transient> frames_;  ///< in the order they came
+  std::size_t waiting_ = 0;        ///< keyframes
+  std::size_t moved_since_replay_ = 0;
+  std::uint64_t round_ = 0;  ///< of set_poses
+  std::vector<ranked> queue_;
+  std::vector<worker> workers_;
+};
+
+}  // namespace orbis::mapping
