@@ -6,6 +6,7 @@
 /// | --- | --- |
 /// | `batch.hpp` | `build_map`: from posed keyframes to a map, all at once |
 /// | `live_map.hpp` | `live_map`: an octree that grows with each keyframe and follows corrections of their poses |
+/// | `live_map_thread.hpp` | the same with a thread and a queue, and snapshots for readers |
 /// | `depth_history.hpp` | the concept of what keeps the keyframes' depth images for it |
 /// | `dense_cloud.hpp` | the points of all keyframes as one cloud, which follows corrections of their poses |
 /// | `depth_store.hpp` | depth images of many keyframes, compressed without loss, within a budget |
@@ -22,3 +23,4 @@
 #include <orbis/mapping/keyframe.hpp>
 #include <orbis/mapping/keyframe_points.hpp>
 #include <orbis/mapping/live_map.hpp>
+#include <orbis/mapping/live_map_thread.hpp>

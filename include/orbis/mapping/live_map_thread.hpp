@@ -1,0 +1,444 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// A live map with a thread of its own: keyframes and poses go in without waiting, snapshots come out.
+///
+/// @code
+///   using live = orbis::mapping::live_map_thread<orbis::octree::occupancy_octree<>, orbis::camera::pinhole>;
+///   live map{camera, {.map = {.resolution = 0.05}}};
+///   map.add_keyframe(frame, depth, T_world_camera);                      // the tracking thread
+///   map.set_poses(poses, orbis::mapping::unlisted::hide);                // after local adjustment, loops, mergers
+///   ...
+///   const auto seen = map.latest();                                      // any thread
+///   if (seen->map.state(p) == orbis::octree::occupancy::occupied) ...
+/// @endcode
+#pragma once
+
+#include <algorithm>
+#include <chrono>
+#include <condition_variable>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <limits>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include <orbis/camera/depth.hpp>
+#include <orbis/camera/model.hpp>
+#include <orbis/core/execution.hpp>
+#include <orbis/core/image.hpp>
+#include <orbis/core/result.hpp>
+#include <orbis/core/se3.hpp>
+#include <orbis/core/types.hpp>
+#include <orbis/mapping/depth_store.hpp>
+#include <orbis/mapping/live_map.hpp>
+#include <orbis/octree/change_log.hpp>
+
+namespace orbis::mapping {
+
+struct live_map_thread_options {
+  live_map_options map{};
+  unsigned threads = 1;          ///< that work on the map, its own included; > 0
+  std::size_t max_waiting = 16;  ///< keyframes and frames that wait for being inserted; > 0
+  /// How long `add_keyframe` waits for room where only keyframes wait; then the keyframe is left out.
+  std::chrono::milliseconds patience{100};
+  /// A correction goes on for this long before keyframes that came meanwhile are inserted.
+  std::chrono::microseconds correction_slice{5000};
+  std::chrono::milliseconds poll_interval{30};  ///< between two calls of live_map_listeners::poll_poses
+};
+
+/// The map at one moment. It does not change any more.
+template <class Octree>
+struct live_map_snapshot {
+  Octree map;
+  std::uint64_t revision = 0;  ///< of the change log
+  std::size_t keyframes = 0;   ///< that were added and not removed
+  std::size_t frames = 0;      ///< between keyframes, in the map
+  std::size_t pending = 0;     ///< keyframes and bricks that wait for a correction; 0: the map is right
+};
+
+/// A keyframe or frame went into the map.
+struct insertion_event {
+  std::uint64_t frame = 0;
+  bool is_keyframe = false;
+  double milliseconds = 0.0;  ///< wall time
+  std::size_t waiting = 0;    ///< keyframes and frames that still wait
+};
+/// A keyframe or frame was left out, because too many were waiting.
+struct overflow_event {
+  std::uint64_t frame = 0;
+  bool is_keyframe = false;
+};
+/// Nothing waits for a correction any more.
+struct live_correction_event {
+  std::size_t keyframes = 0;  ///< moved
+  std::size_t bricks = 0;     ///< brought up to date
+  double milliseconds = 0.0;  ///< wall time that it took, without insertions between its parts
+};
+
+/// Callbacks; any of them may be empty. All but `overflowed` are called on the map's thread. They must not throw, wait
+/// for the map, or destroy it.
+template <class Octree>
+struct live_map_listeners {
+  /// Fills in the present poses of all keyframes (the others are hidden) and returns true, or returns false if they are
+  /// what they were at the last call; with `always`, fills them in whatever they are.
+  std::function<bool(std::vector<keyframe_position>& poses, bool always)> poll_poses{};
+  std::function<void(const insertion_event&)> inserted{};
+  std::function<void(const overflow_event&)> overflowed{};  ///< on the thread that adds
+  std::function<void(const live_correction_event&)> corrected{};
+  /// A new snapshot, and the log of what changed up to it; the log may be read during the call.
+  std::function<void(const live_map_snapshot<Octree>&, const octree::change_log&)> published{};
+  std::function<void(const error&)> failed{};  ///< a depth image could not be kept or read, see live_map
+};
+
+struct live_map_counters {
+  std::size_t keyframes = 0;          ///< inserted
+  std::size_t frames = 0;             ///< inserted, between keyframes
+  std::size_t dropped_keyframes = 0;  ///< left out because too many were waiting
+  std::size_t dropped_frames = 0;     ///< the same, between keyframes
+  std::size_t corrections = 0;        ///< finished
+  std::size_t most_waiting = 0;       ///< keyframes and frames, at any time
+};
+
+/// A live_map with a thread and a bounded queue. What is asked for is done in order; corrections go on, in slices,
+/// while nothing else waits, and one slice after each insertion. Where the queue is full, frames between keyframes give
+/// way first, the oldest of them; then `add_keyframe` waits for a while; then the keyframe is left out. Both are
+/// counted and told.
+///
+/// All member functions may be called from any thread.
+template <octree::replayable_octree Octree, camera::camera_model Camera, depth_history Depths = depth_store>
+class live_map_thread {
+ public:
+  using map_type = live_map<Octree, Camera, Depths>;
+  using snapshot_type = live_map_snapshot<Octree>;
+  using depth_view = typename map_type::depth_view;
+
+  /// @pre as for live_map; options.threads > 0, options.max_waiting > 0
+  explicit live_map_thread(Camera camera, const live_map_thread_options& options = {},
+                           live_map_listeners<Octree> listeners = {}, Depths depths = Depths{})
+      : options_{options},
+        policy_{par.with(options.threads)},
+        listeners_{std::move(listeners)},
+        map_{std::move(camera), options.map, std::move(depths)} {
+    publish();
+    thread_ = std::thread{[this] { run(); }};
+  }
+  live_map_thread(const live_map_thread&) = delete;
+  live_map_thread& operator=(const live_map_thread&) = delete;
+  /// Waits for the running step; what waits is dropped.
+  ~live_map_thread() { stop(); }
+
+  // -- what goes in
+
+  /// Adds a keyframe, see live_map::add_keyframe; the images are copied. False if it was left out: too many keyframes
+  /// wait, or the thread was stopped. O(pixels), and at most `patience` of waiting. @pre depth has the camera's size
+  bool add_keyframe(std::uint64_t frame, const depth_view& depth, const se3& T_world_camera) {
+    job j{.kind = job::keyframe, .frame = frame, .T_world_camera = T_world_camera};
+    return add_scan(std::move(j), depth);
+  }
+  /// Adds a frame between keyframes, see live_map::add_frame; the image is copied. Never waits. False if it was left
+  /// out. O(pixels). @pre depth has the camera's size
+  bool add_frame(std::uint64_t frame, const depth_view& depth, const se3& T_world_camera, std::uint64_t keyframe) {
+    job j{.kind = job::between, .frame = frame, .keyframe_of = keyframe, .T_world_camera = T_world_camera};
+    return add_scan(std::move(j), depth);
+  }
+  /// Gives a keyframe another depth image, see live_map::set_depth. False if it was left out, as add_keyframe does.
+  bool set_depth(std::uint64_t frame, const depth_view& depth) {
+    job j{.kind = job::verdict, .frame = frame};
+    return add_scan(std::move(j), depth);
+  }
+  /// Forgets a keyframe, see live_map::remove.
+  void remove(std::uint64_t frame) { push({.kind = job::removal, .frame = frame}); }
+  /// Tells the present poses, see live_map::set_poses.
+  void set_poses(std::vector<keyframe_position> poses, unlisted others = unlisted::keep) {
+    job j{.kind = job::positions, .others = others};
+    j.poses = std::move(poses);
+    push(std::move(j));
+  }
+  /// Where the robot is (metres, world): corrections begin near it.
+  void set_robot(const vec3& position) {
+    const std::lock_guard lock{mutex_};
+    robot_ = position;
+  }
+
+  // -- what comes out
+
+  /// The last snapshot. Never waits for the map: the lock is held for the copy of a pointer. O(1).
+  [[nodiscard]] std::shared_ptr<const snapshot_type> latest() const {
+    const std::lock_guard lock{published_mutex_};
+    return latest_;
+  }
+  /// The last snapshot in which nothing waited for a correction: the map of before as long as a correction goes on.
+  /// O(1).
+  [[nodiscard]] std::shared_ptr<const snapshot_type> settled() const {
+    const std::lock_guard lock{published_mutex_};
+    return settled_;
+  }
+  [[nodiscard]] live_map_counters counters() const {
+    const std::lock_guard lock{mutex_};
+    return counters_;
+  }
+
+  // -- waiting
+
+  /// Waits until everything that was asked for is done and nothing waits for a correction. Not to be called by
+  /// callbacks.
+  void wait() const {
+    std::unique_lock lock{mutex_};
+    changed_.wait(lock, [&] { return ends_ || is_idle(); });
+  }
+  /// Makes the map the one of all present keyframes and poses, see live_map::finish, and waits for it.
+  void finish() {
+    push({.kind = job::completion});
+    wait();
+  }
+  /// Ends the thread, and gives the map to the caller; what waits is dropped. Not to be called by callbacks.
+  map_type& stop() {
+    {
+      const std::lock_guard lock{mutex_};
+      ends_ = true;
+    }
+    changed_.notify_all();
+    if (thread_.joinable()) thread_.join();
+    return map_;
+  }
+
+ private:
+  using clock = std::chrono::steady_clock;
+
+  struct job {
+    enum kind_type : std::uint8_t { keyframe, between, verdict, removal, positions, completion };
+    kind_type kind = keyframe;
+    std::uint64_t frame = 0;
+    std::uint64_t keyframe_of = 0;
+    se3 T_world_camera{};
+    image<std::uint16_t> pixels{};
+    double scale = 1.0;
+    float min_depth = 0.0F, max_depth = 0.0F;
+    std::vector<keyframe_position> poses{};
+    unlisted others = unlisted::keep;
+
+    [[nodiscard]] bool has_image() const noexcept { return kind <= verdict; }
+  };
+
+  // -- the queue; `mutex_` guards it
+
+  [[nodiscard]] bool is_idle() const noexcept { return jobs_.empty() && !busy_ && pending_ == 0; }
+  [[nodiscard]] bool is_full() const noexcept { return images_waiting_ >= options_.max_waiting; }
+  void push(job j) {
+    {
+      const std::lock_guard lock{mutex_};
+      if (ends_) return;
+      // Complete poses make older ones that still wait superfluous, unless a job between them depends on their order.
+      if (j.kind == job::positions && j.others == unlisted::hide && !jobs_.empty() &&
+          jobs_.back().kind == job::positions)
+        jobs_.pop_back();
+      jobs_.push_back(std::move(j));
+    }
+    changed_.notify_all();
+  }
+  bool add_scan(job j, const depth_view& depth) {
+    j.scale = depth.scale();
+    j.min_depth = depth.min_depth();
+    j.max_depth = depth.max_depth();
+    j.pixels = copy_of(depth.pixels());
+    std::optional<overflow_event> dropped;
+    bool added = false;
+    {
+      std::unique_lock lock{mutex_};
+      if (is_full()) {
+        dropped = drop_frame();
+        if (!dropped && j.kind != job::between)
+          changed_.wait_for(lock, options_.patience, [&] { return ends_ || !is_full(); });
+      }
+      if (ends_) return false;
+      added = !is_full();
+      if (added) {
+        ++images_waiting_;
+        counters_.most_waiting = std::max(counters_.most_waiting, images_waiting_);
+        jobs_.push_back(std::move(j));
+      } else {
+        dropped = overflow_event{j.frame, j.kind != job::between};
+        spare_.push_back(std::move(j.pixels));
+      }
+      if (dropped) ++(dropped->is_keyframe ? counters_.dropped_keyframes : counters_.dropped_frames);
+    }
+    changed_.notify_all();
+    if (dropped && listeners_.overflowed) listeners_.overflowed(*dropped);
+    return added;
+  }
+  /// Drops the oldest frame between keyframes that waits, if there is one.
+  [[nodiscard]] std::optional<overflow_event> drop_frame() {
+    const auto at = std::find_if(jobs_.begin(), jobs_.end(), [](const job& j) { return j.kind == job::between; });
+    if (at == jobs_.end()) return std::nullopt;
+    const overflow_event event{at->frame, false};
+    spare_.push_back(std::move(at->pixels));
+    jobs_.erase(at);
+    --images_waiting_;
+    return event;
+  }
+  /// A copy in memory that was used before, if there is any.
+  [[nodiscard]] image<std::uint16_t> copy_of(image_view<const std::uint16_t> pixels) {
+    image<std::uint16_t> copy;
+    {
+      const std::lock_guard lock{mutex_};
+      if (!spare_.empty()) {
+        copy = std::move(spare_.back());
+        spare_.pop_back();
+      }
+    }
+    if (copy.width() != pixels.width() || copy.height() != pixels.height())
+      copy = image<std::uint16_t>(pixels.width(), pixels.height());
+    for (int y = 0; y != pixels.height(); ++y) {
+      const auto row = pixels.row(y);
+      std::copy(row.begin(), row.end(), copy.row(y).begin());
+    }
+    return copy;
+  }
+
+  // -- the thread
+
+  void run() {
+    std::unique_lock lock{mutex_};
+    auto next_poll = clock::now();
+    for (;;) {
+      const auto wakes = [&] { return ends_ || !jobs_.empty() || pending_ != 0; };
+      if (!listeners_.poll_poses)
+        changed_.wait(lock, wakes);
+      else
+        changed_.wait_until(lock, next_poll, wakes);
+      if (ends_) return;
+      busy_ = true;
+      std::optional<job> next;
+      if (!jobs_.empty()) {
+        next = std::move(jobs_.front());
+        jobs_.pop_front();
+        if (next->has_image()) --images_waiting_;
+      }
+      const std::size_t waiting = images_waiting_;
+      const std::optional<vec3> robot = robot_;
+      lock.unlock();
+      changed_.notify_all();
+      if (next) work_on(*next, waiting);
+      if (listeners_.poll_poses && clock::now() >= next_poll) {
+        poll();
+        next_poll = clock::now() + options_.poll_interval;
+      }
+      if (map_.pending() != 0) correct(robot);
+      publish();
+      lock.lock();
+      if (next && next->has_image() && spare_.size() < options_.max_waiting) spare_.push_back(std::move(next->pixels));
+      pending_ = map_.pending();
+      busy_ = false;
+      if (is_idle()) changed_.notify_all();
+    }
+  }
+  void work_on(const job& j, std::size_t waiting) {
+    const depth_view depth{j.pixels.view(), j.scale, j.min_depth, j.max_depth};
+    const auto start = clock::now();
+    bool inserted = false;
+    switch (j.kind) {
+      case job::keyframe: {
+        const auto added = map_.add_keyframe(policy_, j.frame, depth, j.T_world_camera);
+        if (!added) report(added.error());
+        inserted = poll_always_ = true;
+        break;
+      }
+      case job::between: inserted = map_.add_frame(policy_, j.frame, depth, j.T_world_camera, j.keyframe_of); break;
+      case job::verdict:
+        if (const auto set = map_.set_depth(policy_, j.frame, depth); !set) report(set.error());
+        break;
+      case job::removal: map_.remove(j.frame); break;
+      case job::positions: map_.set_poses(j.poses, j.others); break;
+      case job::completion:
+        if (listeners_.poll_poses) poll();
+        for (;;) {  // an error removes a keyframe
+          const auto finished = map_.finish(policy_);
+          if (finished) break;
+          report(finished.error());
+        }
+        break;
+    }
+    if (!inserted) return;
+    {
+      const std::lock_guard lock{mutex_};
+      ++(j.kind == job::keyframe ? counters_.keyframes : counters_.frames);
+    }
+    if (listeners_.inserted)
+      listeners_.inserted({j.frame, j.kind == job::keyframe, milliseconds_since(start), waiting});
+  }
+  void poll() {
+    polled_.clear();
+    if (listeners_.poll_poses(polled_, std::exchange(poll_always_, false))) map_.set_poses(polled_, unlisted::hide);
+  }
+  void correct(const std::optional<vec3>& robot) {
+    const auto start = clock::now();
+    const auto progress = map_.correct(policy_, {.time = options_.correction_slice, .robot = robot});
+    correction_.milliseconds += milliseconds_since(start);
+    if (!progress) {
+      report(progress.error());
+      return;
+    }
+    correction_.keyframes += progress->keyframes;
+    correction_.bricks += progress->bricks;
+    if (!progress->done) return;
+    const live_correction_event event = std::exchange(correction_, {});
+    {
+      const std::lock_guard lock{mutex_};
+      ++counters_.corrections;
+    }
+    if (listeners_.corrected) listeners_.corrected(event);
+  }
+  void publish() {
+    const std::uint64_t revision = map_.changes().revision();
+    const std::size_t pending = map_.pending();
+    if (latest_ && latest_->revision == revision && latest_->pending == pending && latest_->keyframes == map_.size())
+      return;
+    auto next = std::make_shared<const snapshot_type>(
+        snapshot_type{map_.snapshot(), revision, map_.size(), map_.frames(), pending});
+    std::shared_ptr<const snapshot_type> before_latest, before_settled;  // let go of without the lock
+    {
+      const std::lock_guard lock{published_mutex_};
+      before_latest = std::exchange(latest_, next);
+      if (pending == 0) before_settled = std::exchange(settled_, next);
+    }
+    if (listeners_.published) listeners_.published(*next, map_.changes());
+  }
+  void report(const error& e) const {
+    if (listeners_.failed) listeners_.failed(e);
+  }
+  [[nodiscard]] static double milliseconds_since(clock::time_point start) {
+    return std::chrono::duration<double, std::milli>(clock::now() - start).count();
+  }
+
+  const live_map_thread_options options_;
+  const parallel_policy policy_;
+  const live_map_listeners<Octree> listeners_;
+
+  mutable std::mutex mutex_;
+  mutable std::condition_variable changed_;
+  std::deque<job> jobs_;
+  std::vector<image<std::uint16_t>> spare_;  ///< images whose memory can be used again
+  std::size_t images_waiting_ = 0;           ///< jobs with an image
+  std::size_t pending_ = 0;                  ///< of the map
+  bool busy_ = false;
+  bool ends_ = false;
+  std::optional<vec3> robot_;
+  live_map_counters counters_;
+
+  mutable std::mutex published_mutex_;
+  std::shared_ptr<const snapshot_type> latest_, settled_;
+
+  map_type map_;  ///< belongs to the thread, as do those below
+  std::vector<keyframe_position> polled_;
+  bool poll_always_ = true;
+  live_correction_event correction_;
+  std::thread thread_;
+};
+
+}  // namespace orbis::mapping

@@ -1,0 +1,227 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// A live map with a thread of its own: the same map, readers beside it, and a queue that tells what it leaves out.
+#include <algorithm>
+#include <atomic>
+#include <bit>
+#include <chrono>
+#include <cstdint>
+#include <future>
+#include <limits>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include <orbis/core/execution.hpp>
+#include <orbis/core/random.hpp>
+#include <orbis/mapping/live_map_thread.hpp>
+#include <orbis/octree/files.hpp>
+
+#include "mapping/keyframes.hpp"
+#include "mapping/memory_depths.hpp"
+#include "support/catch.hpp"
+
+using namespace orbis;
+using namespace std::chrono_literals;
+using mapping::unlisted;
+using octree::ot_bytes;
+
+namespace {
+
+using octree_type = octree::occupancy_octree<>;
+using live = mapping::live_map_thread<octree_type, camera::pinhole, test::memory_depths>;
+using listeners = mapping::live_map_listeners<octree_type>;
+using snapshot = mapping::live_map_snapshot<octree_type>;
+using poses = std::vector<mapping::keyframe_position>;
+
+poses shifted(const test::scene& scene, std::size_t count, double x, double turn) {
+  poses all;
+  for (std::size_t i = 0; i != count; ++i)
+    all.push_back({i, se3{so3::exp(vec3{0, turn, 0}), vec3{x, 0, 0}} * scene.poses[i]});
+  return all;
+}
+octree_type fresh(const test::scene& scene, const poses& at) {
+  octree_type map{0.05};
+  for (const auto& [frame, T] : at) map.integrate(scene.keyframe(frame).depth, scene.camera, T);
+  return map;
+}
+bool add(live& map, const test::scene& scene, std::size_t i) {
+  return map.add_keyframe(i, scene.keyframe(i).depth, scene.poses[i]);
+}
+
+}  // namespace
+
+TEST_CASE("Four readers see snapshots that stay as they are while the live map is corrected") {
+  const auto scene = test::edge_scene(12);
+  live map{scene.camera,
+           {.map = {.resolution = 0.05, .tolerance = 0.0, .keyframes_per_replay = 2},
+            .threads = 2,
+            .correction_slice = 200us}};
+  std::atomic<bool> done{false};
+  std::atomic<std::size_t> looks{0}, changed{0}, unsettled{0}, backwards{0};
+  std::vector<std::thread> readers;
+  for (int r = 0; r != 4; ++r)
+    readers.emplace_back([&, r] {
+      std::uint64_t last = 0;
+      while (!done) {
+        const auto seen = r % 2 == 0 ? map.latest() : map.settled();
+        if (seen->revision < last) ++backwards;
+        last = seen->revision;
+        const std::size_t leaves = seen->map.num_leaves();
+        const std::string bytes = ot_bytes(seen->map);
+        if (r % 2 == 1 && seen->pending != 0) ++unsettled;
+        if (ot_bytes(octree_type{seen->map}) != bytes || seen->map.num_leaves() != leaves) ++changed;
+        ++looks;
+      }
+    });
+  for (std::size_t i = 0; i != 12; ++i) {
+    CHECK(add(map, scene, i));
+    map.set_poses(shifted(scene, i + 1, 0.01 * static_cast<double>(i), 0.01), unlisted::hide);
+    map.set_robot(scene.poses[i].translation());
+  }
+  map.remove(4);
+  for (int turn = 0; turn != 6; ++turn) {
+    map.set_poses(shifted(scene, 12, 0.0, 0.01 * turn), unlisted::hide);
+    std::this_thread::sleep_for(2ms);
+  }
+  map.wait();
+  while (looks < 50) std::this_thread::yield();
+  done = true;
+  for (auto& r : readers) r.join();
+  CHECK(changed == 0);
+  CHECK(unsettled == 0);
+  CHECK(backwards == 0);
+
+  poses left = shifted(scene, 12, 0.0, 0.05);
+  left.erase(left.begin() + 4);
+  CHECK(ot_bytes(map.latest()->map) == ot_bytes(fresh(scene, left)));
+  CHECK(map.latest()->keyframes == 11);
+  CHECK(map.latest() == map.settled());
+  CHECK(map.counters().keyframes == 12);
+  CHECK(map.counters().corrections >= 1);
+  CHECK(map.counters().most_waiting <= 16);
+}
+
+TEST_CASE("A live map in a thread asks for the poses itself, tells what it does, and its log makes the map") {
+  const auto scene = test::edge_scene(6);
+  std::mutex mutex;
+  poses believed;
+  bool news = false;
+  std::vector<mapping::insertion_event> insertions;
+  std::vector<mapping::live_correction_event> corrections;
+  octree_type mirror{0.05};
+  std::uint64_t seen = 0;
+  std::atomic<std::size_t> voxels{0};
+  listeners hear{
+      .poll_poses =
+          [&](poses& out, bool always) {
+            const std::lock_guard lock{mutex};
+            if (news || always) out = believed;
+            return std::exchange(news, false) || always;
+          },
+      .inserted = [&](const auto& e) { insertions.push_back(e); },
+      .corrected = [&](const auto& e) { corrections.push_back(e); },
+      .published =
+          [&](const snapshot& s, const octree::change_log& log) {
+            log.for_each_since(seen, [&](const octree::voxel_key& octant, std::uint64_t mask) {
+              voxels += static_cast<std::size_t>(std::popcount(mask));
+              mirror.edit_octant(octant, [&](auto& b) {
+                for (unsigned i = 0; i != 64; ++i) {
+                  const auto in = octree::morton_key(i);
+                  const auto v = s.map.value(octree::voxel_key{octant.x + in.x, octant.y + in.y, octant.z + in.z});
+                  b.value[i] = v.value_or(0.0F);
+                  b.known = (b.known & ~(std::uint64_t{1} << i)) | std::uint64_t{v.has_value()} << i;
+                }
+              });
+            });
+            seen = s.revision;
+          }};
+  live map{scene.camera, {.map = {.resolution = 0.05, .max_frames = 3}, .poll_interval = 1ms}, hear};
+  for (std::size_t i = 0; i != 4; ++i) {
+    const std::lock_guard lock{mutex};
+    believed.push_back({i, scene.poses[i]});
+    CHECK(add(map, scene, i));
+  }
+  CHECK(map.add_frame(4, scene.keyframe(4).depth, scene.poses[4], 3));
+  map.wait();
+  CHECK(map.latest()->frames == 1);
+  {
+    const std::lock_guard lock{mutex};
+    believed = shifted(scene, 4, 0.1, 0.0);
+    believed.erase(believed.begin() + 1);  // as if it belonged to another map
+    news = true;
+  }
+  map.finish();
+  CHECK(map.latest()->keyframes == 4);
+  CHECK(map.latest()->frames == 0);
+  const std::string now = ot_bytes(map.latest()->map);
+  CHECK(now == ot_bytes(fresh(scene, believed)));
+  auto& inner = map.stop();
+  CHECK(ot_bytes(inner.map()) == now);
+  CHECK(ot_bytes(mirror) == now);
+  CHECK(voxels > 1000);
+  REQUIRE(insertions.size() == 5);
+  CHECK((insertions[2].frame == 2 && insertions[2].is_keyframe && insertions[2].milliseconds > 0));
+  CHECK((insertions[4].frame == 4 && !insertions[4].is_keyframe));
+  CHECK_FALSE(add(map, scene, 5));  // stopped
+}
+
+TEST_CASE("Frames give way before keyframes where a live map falls behind, and each is told") {
+  const auto scene = test::wall_scene(12);
+  std::promise<void> begun, go;
+  std::shared_future<void> wait_for_go = go.get_future().share();
+  std::vector<mapping::overflow_event> left_out;
+  listeners hear{.inserted =
+                     [&](const mapping::insertion_event& e) {
+                       if (e.frame != 0) return;
+                       begun.set_value();
+                       wait_for_go.wait();
+                     },
+                 .overflowed = [&](const auto& e) { left_out.push_back(e); }};
+  live map{scene.camera, {.map = {.resolution = 0.05, .max_frames = 10}, .max_waiting = 3, .patience = 1ms}, hear};
+  const auto add_frame = [&](std::size_t i) { return map.add_frame(i, scene.keyframe(i).depth, scene.poses[i], 0); };
+  REQUIRE(add(map, scene, 0));
+  begun.get_future().wait();  // from now on the map's thread is busy
+  for (const std::size_t i : {1U, 2U, 3U}) CHECK(add_frame(i));
+  CHECK(left_out.empty());
+  CHECK(add_frame(4));  // instead of 1
+  CHECK(add(map, scene, 5));
+  CHECK(add(map, scene, 6));
+  CHECK(add(map, scene, 7));  // instead of 2, 3 and 4
+  CHECK_FALSE(add_frame(8));
+  CHECK_FALSE(add(map, scene, 9));
+  std::vector<std::pair<std::uint64_t, bool>> told;
+  for (const auto& e : left_out) told.emplace_back(e.frame, e.is_keyframe);
+  CHECK(told == std::vector<std::pair<std::uint64_t, bool>>{
+                    {1, false}, {2, false}, {3, false}, {4, false}, {8, false}, {9, true}});
+  go.set_value();
+  map.wait();
+  const auto counters = map.counters();
+  CHECK(counters.keyframes == 4);
+  CHECK(counters.frames == 0);
+  CHECK(counters.dropped_frames == 5);
+  CHECK(counters.dropped_keyframes == 1);
+  CHECK(counters.most_waiting == 3);
+  poses there;
+  for (const std::uint64_t i : {0U, 5U, 6U, 7U}) there.push_back({i, scene.poses[i]});
+  CHECK(ot_bytes(map.latest()->map) == ot_bytes(fresh(scene, there)));
+}
+
+TEST_CASE("A live map in a thread tells of lost depth images and goes on") {
+  const auto scene = test::wall_scene(4);
+  std::vector<std::string> where;
+  listeners hear{.failed = [&](const error& e) { where.push_back(e.where); }};
+  live map{scene.camera, {.map = {.resolution = 0.05}}, hear, test::memory_depths{.images = {}, .lost = {1, 2}}};
+  for (std::size_t i = 0; i != 4; ++i) CHECK(add(map, scene, i));
+  map.set_poses(shifted(scene, 4, 0.2, 0.0));
+  map.wait();
+  CHECK(map.set_depth(2, scene.keyframe(2).depth));  // it is gone
+  map.finish();
+  poses there = shifted(scene, 4, 0.2, 0.0);
+  there.erase(there.begin() + 1, there.begin() + 3);
+  CHECK(ot_bytes(map.latest()->map) == ot_bytes(fresh(scene, there)));
+  std::sort(where.begin(), where.begin() + 2);
+  CHECK(where == std::vector<std::string>{"frame 1", "frame 2", "keyframe 2"});
+}
