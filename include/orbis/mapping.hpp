@@ -13,6 +13,7 @@
 /// | `filter.hpp` | `filter_points`: the outlier filter, as a choice at run time |
 /// | `keyframe.hpp` | what mapping needs of a keyframe |
 /// | `keyframe_points.hpp` | the points of one keyframe |
+/// | `upright.hpp` | which way is up in a depth image, so that a map can begin upright |
 #pragma once
 
 #include <orbis/mapping/batch.hpp>
@@ -24,3 +25,4 @@
 #include <orbis/mapping/keyframe_points.hpp>
 #include <orbis/mapping/live_map.hpp>
 #include <orbis/mapping/live_map_thread.hpp>
+#include <orbis/mapping/upright.hpp>
