@@ -139,6 +139,9 @@ TEST_CASE("formats are told apart") {
   CHECK(io::open_recording(folder / "other").error().code == orbis::errc::unsupported);
   CHECK(io::open_recording(folder / "none").error().code == orbis::errc::not_found);
   CHECK(io::open_recording(folder / "tum" / "rgb.txt").error().code == orbis::errc::unsupported);
+  // A value that is no format at all is no silent choice of one of them.
+  CHECK(io::open_recording(folder / "icl", {.format = static_cast<io::recording_format>(17)}).error().code ==
+        orbis::errc::unsupported);
   CHECK(io::open_recording(folder / "other", {.format = io::recording_format::tum}).error().code ==
         orbis::errc::not_found);
 }

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <concepts>
+#include <iterator>
 #include <optional>
 #include <string_view>
 #include <type_traits>
@@ -41,6 +42,7 @@ class any_camera {
   /// "pinhole", "radtan" or "kannala_brandt", as camera files say it.
   [[nodiscard]] std::string_view model_name() const noexcept {
     constexpr std::string_view names[] = {"pinhole", "radtan", "kannala_brandt"};
+    static_assert(std::size(names) == std::variant_size_v<decltype(model_)>, "a name for each model");
     return names[model_.index()];
   }
 

@@ -111,12 +111,20 @@ using filter_chain = std::vector<filter_step>;
   return std::visit(
       [](const auto& s) {
         using S = std::remove_cvref_t<decltype(s)>;
-        if constexpr (std::is_same_v<S, ray_step>) return filter_mode::ray_evidence;
-        if constexpr (std::is_same_v<S, density_step>) return s.mode;
-        if constexpr (std::is_same_v<S, isolation_step>) return filter_mode::isolation;
-        if constexpr (std::is_same_v<S, cluster_options>) return filter_mode::cluster;
-        if constexpr (std::is_same_v<S, statistical_options>) return filter_mode::statistical;
-        return filter_mode::radius;
+        if constexpr (std::is_same_v<S, ray_step>) {
+          return filter_mode::ray_evidence;
+        } else if constexpr (std::is_same_v<S, density_step>) {
+          return s.mode;
+        } else if constexpr (std::is_same_v<S, isolation_step>) {
+          return filter_mode::isolation;
+        } else if constexpr (std::is_same_v<S, cluster_options>) {
+          return filter_mode::cluster;
+        } else if constexpr (std::is_same_v<S, statistical_options>) {
+          return filter_mode::statistical;
+        } else {
+          static_assert(std::is_same_v<S, radius_options>, "a kind of step that has no mode");
+          return filter_mode::radius;
+        }
       },
       step);
 }

@@ -138,6 +138,7 @@ template <execution_policy Policy, point_range Points, class Views>
             settle();
             apply_alone(points, left, [&](const auto& rest) { return statistical_inliers(policy, rest, step); });
           } else {
+            static_assert(std::is_same_v<Step, radius_options>, "a kind of step that is not applied");
             settle();
             apply_alone(points, left, [&](const auto& rest) { return radius_inliers(policy, rest, step); });
           }

@@ -26,10 +26,14 @@
 #include <ostream>
 #include <string>
 #include <string_view>
+#include <type_traits>
 #include <vector>
 
 #include <toml++/toml.h>
 
+#include <orbis/camera/kannala_brandt.hpp>
+#include <orbis/camera/pinhole.hpp>
+#include <orbis/camera/radial_tangential.hpp>
 #include <orbis/camera/settings.hpp>
 #include <orbis/core/file.hpp>
 #include <orbis/core/result.hpp>
@@ -108,15 +112,20 @@ inline result<void> write_camera(const std::filesystem::path& path, const camera
   const camera::intrinsics& k = settings.model.k();
   std::string distortion;
   const auto add = [&](double value) { distortion += (distortion.empty() ? "" : ", ") + number(value); };
-  if (const auto* m = settings.model.get_if<camera::radial_tangential>()) {
-    const auto& d = m->distortion();
-    for (const double value : {d.k1, d.k2, d.p1, d.p2, d.k3}) add(value);
-    if (d.k4 != 0.0 || d.k5 != 0.0 || d.k6 != 0.0)
-      for (const double value : {d.k4, d.k5, d.k6}) add(value);
-  } else if (const auto* fisheye = settings.model.get_if<camera::kannala_brandt>()) {
-    const auto& d = fisheye->distortion();
-    for (const double value : {d.k1, d.k2, d.k3, d.k4}) add(value);
-  }
+  settings.model.visit([&](const auto& model) {
+    using Model = std::remove_cvref_t<decltype(model)>;
+    if constexpr (std::is_same_v<Model, camera::radial_tangential>) {
+      const auto& d = model.distortion();
+      for (const double value : {d.k1, d.k2, d.p1, d.p2, d.k3}) add(value);
+      if (d.k4 != 0.0 || d.k5 != 0.0 || d.k6 != 0.0)
+        for (const double value : {d.k4, d.k5, d.k6}) add(value);
+    } else if constexpr (std::is_same_v<Model, camera::kannala_brandt>) {
+      const auto& d = model.distortion();
+      for (const double value : {d.k1, d.k2, d.k3, d.k4}) add(value);
+    } else {
+      static_assert(std::is_same_v<Model, camera::pinhole>, "a camera model whose distortion is not written");
+    }
+  });
   return write_file_atomically(path, [&](std::ostream& out) {
     out << "model = \"" << settings.model.model_name() << "\"\n"
         << "width = " << std::to_string(k.width) << "\nheight = " << std::to_string(k.height)

@@ -183,16 +183,20 @@ class recording {
   if (!std::filesystem::is_directory(folder, ignored))
     return fail(errc::unsupported, folder.string(), "a recording is a folder, this is a file");
 
-  recording_format format = options.format;
-  if (format == recording_format::automatic) format = detect_format(folder);
-  if (format == recording_format::automatic)
+  const recording_format format =
+      options.format == recording_format::automatic ? detect_format(folder) : options.format;
+  const auto read_index = [&]() -> result<detail::recording_index> {
+    switch (format) {
+      case recording_format::tum: return detail::index_tum(folder, options.max_time_difference);
+      case recording_format::seven_scenes: return detail::index_seven_scenes(folder);
+      case recording_format::icl_nuim: return detail::index_icl_nuim(folder);
+      case recording_format::automatic: break;
+    }
     return fail(errc::unsupported, folder.string(),
                 "no known recording: neither rgb.txt and depth.txt (TUM), nor frame-*.color.png (7-Scenes), nor "
                 "numbered images in rgb and depth (ICL-NUIM)");
-
-  auto index = format == recording_format::tum            ? detail::index_tum(folder, options.max_time_difference)
-               : format == recording_format::seven_scenes ? detail::index_seven_scenes(folder)
-                                                          : detail::index_icl_nuim(folder);
+  };
+  auto index = read_index();
   if (!index) return fail(index.error());
 
   std::optional<camera::camera_settings> camera = options.camera;

@@ -60,40 +60,22 @@ namespace detail {
 /// compilers instantiate inline functions even if `extern template` says that they are elsewhere.
 template <class Kernel, class Signature, class Target>
 struct code;
-template <class Kernel, class R, class... Args>
-struct code<Kernel, R(Args...), portable> {
-  static R run(Args... args);
-};
-template <class Kernel, class R, class... Args>
-ORBIS_UNFUSED R code<Kernel, R(Args...), portable>::run(Args... args) {
-  return Kernel::template run<portable>(static_cast<Args&&>(args)...);
-}
+#define ORBIS_KERNEL_CODE(Target, attribute)                                      \
+  template <class Kernel, class R, class... Args>                                 \
+  struct code<Kernel, R(Args...), Target> {                                       \
+    static attribute R run(Args... args);                                         \
+  };                                                                              \
+  template <class Kernel, class R, class... Args>                                 \
+  ORBIS_UNFUSED attribute R code<Kernel, R(Args...), Target>::run(Args... args) { \
+    return Kernel::template run<Target>(static_cast<Args&&>(args)...);            \
+  }
+ORBIS_KERNEL_CODE(portable, )
 #if ORBIS_X86
-template <class Kernel, class R, class... Args>
-struct code<Kernel, R(Args...), popcnt> {
-  static ORBIS_TARGET_POPCNT R run(Args... args);
-};
-template <class Kernel, class R, class... Args>
-ORBIS_UNFUSED ORBIS_TARGET_POPCNT R code<Kernel, R(Args...), popcnt>::run(Args... args) {
-  return Kernel::template run<popcnt>(static_cast<Args&&>(args)...);
-}
-template <class Kernel, class R, class... Args>
-struct code<Kernel, R(Args...), avx2> {
-  static ORBIS_TARGET_AVX2 R run(Args... args);
-};
-template <class Kernel, class R, class... Args>
-ORBIS_UNFUSED ORBIS_TARGET_AVX2 R code<Kernel, R(Args...), avx2>::run(Args... args) {
-  return Kernel::template run<avx2>(static_cast<Args&&>(args)...);
-}
-template <class Kernel, class R, class... Args>
-struct code<Kernel, R(Args...), avx512> {
-  static ORBIS_TARGET_AVX512 R run(Args... args);
-};
-template <class Kernel, class R, class... Args>
-ORBIS_UNFUSED ORBIS_TARGET_AVX512 R code<Kernel, R(Args...), avx512>::run(Args... args) {
-  return Kernel::template run<avx512>(static_cast<Args&&>(args)...);
-}
+ORBIS_KERNEL_CODE(popcnt, ORBIS_TARGET_POPCNT)
+ORBIS_KERNEL_CODE(avx2, ORBIS_TARGET_AVX2)
+ORBIS_KERNEL_CODE(avx512, ORBIS_TARGET_AVX512)
 #endif
+#undef ORBIS_KERNEL_CODE
 
 template <class T, class... List>
 inline constexpr bool is_one_of = (std::is_same_v<T, List> || ...);
@@ -127,16 +109,18 @@ template <class Kernel, class Signature, target... Targets>
 
 }  // namespace orbis::simd
 
-/// Explicit instantiation of a kernel for the targets that `kernel` has by default: `ORBIS_KERNEL_INSTANCE(extern
-/// template, signature, kernel)`, in namespace orbis.
+/// Explicit instantiation of a kernel for the targets that `kernel` has by default, or without the last:
+/// `ORBIS_KERNEL_INSTANCE(extern template, kernel, signature);` outside of namespaces or in namespace orbis.
 #if ORBIS_X86
-#define ORBIS_KERNEL_INSTANCE(what, signature, ...)                       \
-  what struct simd::detail::code<__VA_ARGS__, signature, simd::portable>; \
-  what struct simd::detail::code<__VA_ARGS__, signature, simd::avx2>;     \
-  what struct simd::detail::code<__VA_ARGS__, signature, simd::avx512>;
+#define ORBIS_KERNEL_INSTANCE_AVX2(what, ...)                                \
+  what struct orbis::simd::detail::code<__VA_ARGS__, orbis::simd::portable>; \
+  what struct orbis::simd::detail::code<__VA_ARGS__, orbis::simd::avx2>
+#define ORBIS_KERNEL_INSTANCE(what, ...)         \
+  ORBIS_KERNEL_INSTANCE_AVX2(what, __VA_ARGS__); \
+  what struct orbis::simd::detail::code<__VA_ARGS__, orbis::simd::avx512>
 #else
-#define ORBIS_KERNEL_INSTANCE(what, signature, ...) \
-  what struct simd::detail::code<__VA_ARGS__, signature, simd::portable>;
+#define ORBIS_KERNEL_INSTANCE_AVX2(what, ...) what struct orbis::simd::detail::code<__VA_ARGS__, orbis::simd::portable>
+#define ORBIS_KERNEL_INSTANCE(what, ...) ORBIS_KERNEL_INSTANCE_AVX2(what, __VA_ARGS__)
 #endif
 
 /// At the end of a kernel's header, outside namespaces: the library orbis::compiled holds the kernel for `portable`,
@@ -145,21 +129,10 @@ template <class Kernel, class Signature, target... Targets>
 #if !defined(ORBIS_COMPILED)
 #define ORBIS_COMPILED_KERNEL(...) static_assert(true)
 #define ORBIS_COMPILED_KERNEL_AVX2(...) static_assert(true)
+#elif defined(ORBIS_INSTANTIATE_KERNELS)
+#define ORBIS_COMPILED_KERNEL(...) ORBIS_KERNEL_INSTANCE(template, __VA_ARGS__)
+#define ORBIS_COMPILED_KERNEL_AVX2(...) ORBIS_KERNEL_INSTANCE_AVX2(template, __VA_ARGS__)
 #else
-#if defined(ORBIS_INSTANTIATE_KERNELS)
-#define ORBIS_COMPILED_CODE(...) template struct orbis::simd::detail::code<__VA_ARGS__>
-#else
-#define ORBIS_COMPILED_CODE(...) extern template struct orbis::simd::detail::code<__VA_ARGS__>
-#endif
-#if ORBIS_X86
-#define ORBIS_COMPILED_KERNEL_AVX2(...)                    \
-  ORBIS_COMPILED_CODE(__VA_ARGS__, orbis::simd::portable); \
-  ORBIS_COMPILED_CODE(__VA_ARGS__, orbis::simd::avx2)
-#define ORBIS_COMPILED_KERNEL(...)         \
-  ORBIS_COMPILED_KERNEL_AVX2(__VA_ARGS__); \
-  ORBIS_COMPILED_CODE(__VA_ARGS__, orbis::simd::avx512)
-#else
-#define ORBIS_COMPILED_KERNEL_AVX2(...) ORBIS_COMPILED_CODE(__VA_ARGS__, orbis::simd::portable)
-#define ORBIS_COMPILED_KERNEL(...) ORBIS_COMPILED_CODE(__VA_ARGS__, orbis::simd::portable)
-#endif
+#define ORBIS_COMPILED_KERNEL(...) ORBIS_KERNEL_INSTANCE(extern template, __VA_ARGS__)
+#define ORBIS_COMPILED_KERNEL_AVX2(...) ORBIS_KERNEL_INSTANCE_AVX2(extern template, __VA_ARGS__)
 #endif

@@ -14,14 +14,14 @@
 
 namespace orbis {
 
-ORBIS_KERNEL_INSTANCE(ORBIS_INSTANTIATE_OPTIMIZE, optimize::detail::panel_product,
-                      optimize::detail::panel_product_kernel<6>)
-ORBIS_KERNEL_INSTANCE(ORBIS_INSTANTIATE_OPTIMIZE, optimize::detail::panel_product,
-                      optimize::detail::panel_product_kernel<8>)
-ORBIS_KERNEL_INSTANCE(ORBIS_INSTANTIATE_OPTIMIZE, optimize::detail::panel_solve,
-                      optimize::detail::panel_solve_kernel<6>)
-ORBIS_KERNEL_INSTANCE(ORBIS_INSTANTIATE_OPTIMIZE, optimize::detail::panel_solve,
-                      optimize::detail::panel_solve_kernel<8>)
+ORBIS_KERNEL_INSTANCE(ORBIS_INSTANTIATE_OPTIMIZE, optimize::detail::panel_product_kernel<6>,
+                      optimize::detail::panel_product);
+ORBIS_KERNEL_INSTANCE(ORBIS_INSTANTIATE_OPTIMIZE, optimize::detail::panel_product_kernel<8>,
+                      optimize::detail::panel_product);
+ORBIS_KERNEL_INSTANCE(ORBIS_INSTANTIATE_OPTIMIZE, optimize::detail::panel_solve_kernel<6>,
+                      optimize::detail::panel_solve);
+ORBIS_KERNEL_INSTANCE(ORBIS_INSTANTIATE_OPTIMIZE, optimize::detail::panel_solve_kernel<8>,
+                      optimize::detail::panel_solve);
 
 namespace optimize::detail {
 ORBIS_INSTANTIATE_OPTIMIZE class block_cholesky<6>;

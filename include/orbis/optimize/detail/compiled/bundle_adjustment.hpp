@@ -22,17 +22,17 @@
 
 namespace orbis {
 
-ORBIS_KERNEL_INSTANCE(ORBIS_INSTANTIATE_OPTIMIZE, optimize::detail::schur_kernels<6>::eliminator,
-                      optimize::detail::eliminate_kernel<6>)
-ORBIS_KERNEL_INSTANCE(ORBIS_INSTANTIATE_OPTIMIZE, optimize::detail::schur_kernels<6>::substituter,
-                      optimize::detail::substitute_kernel<6>)
+ORBIS_KERNEL_INSTANCE(ORBIS_INSTANTIATE_OPTIMIZE, optimize::detail::eliminate_kernel<6>,
+                      optimize::detail::schur_kernels<6>::eliminator);
+ORBIS_KERNEL_INSTANCE(ORBIS_INSTANTIATE_OPTIMIZE, optimize::detail::substitute_kernel<6>,
+                      optimize::detail::schur_kernels<6>::substituter);
 
 /// The kernels, the constructor and the loops for a residual, a loss and the default policies.
-#define ORBIS_INSTANTIATE_BUNDLE_KERNELS(what, residual, loss)                                                         \
-  ORBIS_KERNEL_INSTANCE(what, double(const optimize::detail::camera_work<optimize::residual>&, const optimize::loss&), \
-                        optimize::detail::linearize_kernel<optimize::residual, optimize::loss>)                        \
-  ORBIS_KERNEL_INSTANCE(what, double(const optimize::detail::camera_work<optimize::residual>&, const optimize::loss&), \
-                        optimize::detail::cost_kernel<optimize::residual, optimize::loss>)
+#define ORBIS_INSTANTIATE_BUNDLE_KERNELS(what, residual, loss)                                                    \
+  ORBIS_KERNEL_INSTANCE(what, optimize::detail::linearize_kernel<optimize::residual, optimize::loss>,             \
+                        double(const optimize::detail::camera_work<optimize::residual>&, const optimize::loss&)); \
+  ORBIS_KERNEL_INSTANCE(what, optimize::detail::cost_kernel<optimize::residual, optimize::loss>,                  \
+                        double(const optimize::detail::camera_work<optimize::residual>&, const optimize::loss&));
 #define ORBIS_INSTANTIATE_BUNDLE(what, residual, loss)                                                               \
   ORBIS_INSTANTIATE_BUNDLE_KERNELS(what, residual, loss)                                                             \
   what optimize::detail::bundle_equations<optimize::residual, optimize::loss, optimize::automatic_reduced_solver>::  \
