@@ -8,6 +8,7 @@
 #include <CLI/CLI.hpp>
 
 #include <orbis/io/g2o.hpp>
+#include <orbis/optimize/chordal_initialization.hpp>
 #include <orbis/optimize/pose_graph.hpp>
 
 namespace optimize = orbis::optimize;

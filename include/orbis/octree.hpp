@@ -18,7 +18,6 @@
 /// | scan_history.hpp | a map that follows its scans when they change, are removed or come late |
 /// | scan_voxels.hpp | the voxels that one scan observes, packed; the marker that finds them |
 /// | decay.hpp | what time does to voxels that are not observed |
-/// | merge.hpp | adds one map to another |
 /// | voxel_layer.hpp | colours, labels or counts beside the map |
 /// | files.hpp | OctoMap's `.bt` and `.ot` |
 /// | compact_file.hpp | small files with every value and checksums |
@@ -34,7 +33,6 @@
 #include <orbis/octree/files.hpp>
 #include <orbis/octree/integration.hpp>
 #include <orbis/octree/key.hpp>
-#include <orbis/octree/merge.hpp>
 #include <orbis/octree/nodes.hpp>
 #include <orbis/octree/occupancy_octree.hpp>
 #include <orbis/octree/overlap.hpp>

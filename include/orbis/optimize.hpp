@@ -9,9 +9,10 @@
 /// | bundle_adjustment.hpp | bundle adjustment: cameras and points from observations |
 /// | bundle_covariance.hpp | covariances of the cameras and points of a bundle adjustment |
 /// | bundle_problem.hpp | observations, residual concepts, options and summary of bundle adjustment |
+/// | chordal_initialization.hpp | a start for pose graphs whose odometry is too far off |
 /// | pnp.hpp | camera pose from known points and pixels with outliers (P3P in RANSAC); P3P |
 /// | point_to_plane.hpp | distance of a measured point from a plane, as a residual |
-/// | pose_graph.hpp | pose graph optimisation and chordal initialisation |
+/// | pose_graph.hpp | pose graph optimisation |
 /// | pose_graph_problem.hpp | edges, residuals, options and summary of pose graphs |
 /// | pose_refinement.hpp | camera pose from known points, refined from a start, with outlier rejection |
 /// | ransac.hpp | RANSAC for any model |
@@ -29,6 +30,7 @@
 #include <orbis/optimize/bundle_adjustment.hpp>
 #include <orbis/optimize/bundle_covariance.hpp>
 #include <orbis/optimize/bundle_problem.hpp>
+#include <orbis/optimize/chordal_initialization.hpp>
 #include <orbis/optimize/pnp.hpp>
 #include <orbis/optimize/point_to_plane.hpp>
 #include <orbis/optimize/pose_graph.hpp>

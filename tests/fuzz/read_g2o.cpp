@@ -9,6 +9,7 @@
 
 #include <orbis/core/execution.hpp>
 #include <orbis/io/g2o.hpp>
+#include <orbis/optimize/chordal_initialization.hpp>
 #include <orbis/optimize/pose_graph.hpp>
 
 #include "fuzz/target.hpp"

@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <array>
 #include <limits>
-#include <numeric>
 
 #include <orbis/camera/kannala_brandt.hpp>
 #include <orbis/camera/pinhole.hpp>
@@ -141,22 +140,6 @@ TEST_CASE("PnP moves with the world, far away as well") {
           1e-7 * std::max(1.0, 1e-2 * distance));
     CHECK(again->inliers == pose->inliers);
   }
-}
-
-TEST_CASE("PnP takes the matches in the order of their promise") {
-  const scene s = random_scene(pinhole_camera, 14, 500, 0.9, 0.5);  // the first 50 are right
-  std::vector<std::uint32_t> order(500);
-  std::iota(order.begin(), order.end(), 0U);
-  const auto found =
-      optimize::estimate_pose(s.points, s.pixels, pinhole_camera, {.max_iterations = 10, .best_first = order});
-  REQUIRE(found.has_value());
-  CHECK(test::distance_between(found->T_world_camera, s.T_world_camera) < 0.05);
-  order[3] = 4;  // 3 is not named
-  CHECK(optimize::estimate_pose(s.points, s.pixels, pinhole_camera, {.best_first = order}).error().code ==
-        errc::invalid_argument);
-  order.resize(7);
-  CHECK(optimize::estimate_pose(s.points, s.pixels, pinhole_camera, {.best_first = order}).error().code ==
-        errc::invalid_argument);
 }
 
 TEST_CASE("PnP leaves out what is not finite and works through a fisheye") {

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
-#include <numeric>
 #include <utility>
 #include <vector>
 
@@ -106,7 +105,6 @@ TEST_CASE("Every way to score is between zero and the threshold, and there for o
     }
   };
   check(msac{});
-  check(inlier_count{});
 }
 
 TEMPLATE_TEST_CASE("RANSAC finds the line by whatever it is made of", "", line_estimator, line_by_blocks) {
@@ -115,7 +113,6 @@ TEMPLATE_TEST_CASE("RANSAC finds the line by whatever it is made of", "", line_e
     const auto data = noisy_line<TestType>(seed, 61, 142);
     const auto exact = ransac(data, options);
     CHECK(is_the_line(exact));
-    CHECK(is_the_line(ransac(data, options, ransac_policies<inlier_count>{})));
     CHECK(is_the_line(
         ransac(data, options, ransac_policies{msac{}, uniform_sampling{}, bail_out{}, no_local_optimization{}})));
     const auto tested =
@@ -138,44 +135,6 @@ TEST_CASE("Errors by blocks rank models as errors one by one do") {
     REQUIRE(by_blocks.has_value());
     CHECK(one_by_one->inliers == by_blocks->inliers);
     CHECK(one_by_one->score == Approx(by_blocks->score));
-  }
-}
-
-TEST_CASE("PROSAC draws the best data first and each of its samples once from all it has") {
-  std::vector<std::uint32_t> order(100);
-  std::iota(order.begin(), order.end(), 0U);
-  std::reverse(order.begin(), order.end());
-  auto sampler = prosac{order}.over<4>(100);
-  random_bits random(1);
-  std::uint32_t lowest = 100;
-  for (int draw = 0; draw != 400; ++draw) {
-    auto sample = sampler.draw(random);
-    std::sort(sample.begin(), sample.end());
-    CHECK(std::adjacent_find(sample.begin(), sample.end()) == sample.end());
-    CHECK(sample.back() < 100);
-    if (draw == 0) CHECK(sample == std::array<std::uint32_t, 4>{96, 97, 98, 99});
-    if (draw < 10) CHECK(sample.front() >= 80);
-    lowest = std::min(lowest, sample.front());
-  }
-  CHECK(lowest < 80);  // the pool has grown
-  // In the end it is as with all data.
-  auto impatient = prosac{order, 10.0}.over<4>(100);
-  std::vector<int> seen(100);
-  for (int draw = 0; draw != 4000; ++draw)
-    for (const std::uint32_t i : impatient.draw(random)) ++seen[i];
-  CHECK(*std::min_element(seen.begin(), seen.end()) > 80);
-}
-
-TEST_CASE("PROSAC needs fewer samples where the order is good, and survives one that is bad") {
-  std::vector<std::uint32_t> good_first(400), bad_first(400);
-  std::iota(good_first.begin(), good_first.end(), 0U);
-  std::copy(good_first.rbegin(), good_first.rend(), bad_first.begin());
-  const auto data = noisy_line<line_estimator>(3, 40, 360, false);
-  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
-    const ransac_options few{.threshold = 0.03, .max_iterations = 20, .min_inliers = 35, .seed = seed};
-    const ransac_options many{.threshold = 0.03, .max_iterations = 5000, .min_inliers = 35, .seed = seed};
-    CHECK(is_the_line(ransac(data, few, ransac_policies<msac, prosac>{.sampling = {good_first}})));
-    CHECK(is_the_line(ransac(data, many, ransac_policies<msac, prosac>{.sampling = {bad_first, 1000.0}})));
   }
 }
 

@@ -130,6 +130,5 @@ class basic_se3 {
 };
 
 using se3 = basic_se3<double>;
-using se3f = basic_se3<float>;
 
 }  // namespace orbis

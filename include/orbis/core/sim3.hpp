@@ -10,6 +10,7 @@
 
 #include <cassert>
 #include <cmath>
+#include <concepts>
 #include <limits>
 
 #include <Eigen/LU>
@@ -23,24 +24,24 @@ namespace orbis {
 namespace detail {
 
 /// The sum of `a^n / (n + 1)!`, that is the integral of `exp(t a)` for `t` from 0 to 1.
-template <int N>
-[[nodiscard]] matrix<N, N> exponential_integral(const matrix<N, N>& a) {
-  using square = matrix<N, N>;
-  const double norm = a.cwiseAbs().colwise().sum().maxCoeff();
-  if (!std::isfinite(norm)) return square::Constant(std::numeric_limits<double>::quiet_NaN());
+template <int N, class S>
+[[nodiscard]] matrix<N, N, S> exponential_integral(const matrix<N, N, S>& a) {
+  using square = matrix<N, N, S>;
+  const S norm = a.cwiseAbs().colwise().sum().maxCoeff();
+  if (!std::isfinite(norm)) return square::Constant(std::numeric_limits<S>::quiet_NaN());
   int doublings = 0;
-  for (double n = norm; n > 0.5; n /= 2.0) ++doublings;
+  for (S n = norm; n > S(0.5); n /= S(2)) ++doublings;
 
-  square x = a * std::ldexp(1.0, -doublings);
+  square x = a * std::ldexp(S(1), -doublings);
   square sum = square::Identity();
   square term = square::Identity();
   for (int n = 2; n != 16; ++n) {  // 0.5^15 / 16! is below the rounding of double
-    term = (term * x / static_cast<double>(n)).eval();
+    term = (term * x / static_cast<S>(n)).eval();
     sum += term;
   }
   for (; doublings != 0; --doublings) {  // F(2x) = F(x) (exp(x) + 1) / 2, exp(x) = 1 + x F(x)
-    sum = (sum + 0.5 * (sum * x * sum)).eval();
-    x *= 2.0;
+    sum = (sum + S(0.5) * (sum * x * sum)).eval();
+    x *= S(2);
   }
   return sum;
 }
@@ -49,90 +50,94 @@ template <int N>
 
 /// Scaling, rotation, translation: `S_a_b * p_b == scale * (R * p_b) + t == p_a`. Tangent vectors
 /// are `(rho, phi, sigma)`: translation, rotation (radians), logarithm of the scale.
-class sim3 {
+template <std::floating_point S = double>
+class basic_sim3 {
  public:
-  using scalar = double;
+  using scalar = S;
   static constexpr int dof = 7;
-  using tangent = vec7;
-  using point = vec3;
+  using tangent = matrix<7, 1, S>;
+  using point = matrix<3, 1, S>;
 
   /// The identity.
-  sim3() : t_{point::Zero()} {}
+  basic_sim3() : t_{point::Zero()} {}
   /// @pre scale > 0
-  sim3(const so3& rotation, const point& translation, double scale) : r_{rotation}, t_{translation}, scale_{scale} {
-    assert(!(scale < 0.0));
+  basic_sim3(const basic_so3<S>& rotation, const point& translation, S scale)
+      : r_{rotation}, t_{translation}, scale_{scale} {
+    assert(!(scale < S(0)));
   }
   /// The rigid transform, of scale 1.
-  explicit sim3(const se3& rigid) : sim3(rigid.rotation(), rigid.translation(), 1.0) {}
+  explicit basic_sim3(const basic_se3<S>& rigid) : basic_sim3(rigid.rotation(), rigid.translation(), S(1)) {}
 
-  [[nodiscard]] static sim3 exp(const tangent& xi) {
-    const point phi = xi.segment<3>(3);
-    return {so3::exp(phi), translation_integral(phi, xi[6]) * xi.head<3>(), std::exp(xi[6])};
+  [[nodiscard]] static basic_sim3 exp(const tangent& xi) {
+    const point phi = xi.template segment<3>(3);
+    return {basic_so3<S>::exp(phi), translation_integral(phi, xi[6]) * xi.template head<3>(), std::exp(xi[6])};
   }
   [[nodiscard]] tangent log() const {
     const point phi = r_.log();
-    const double sigma = std::log(scale_);
+    const S sigma = std::log(scale_);
     tangent xi;
     xi << translation_integral(phi, sigma).inverse() * t_, phi, sigma;
     return xi;
   }
-  [[nodiscard]] sim3 inverse() const {
-    const so3 r = r_.inverse();
-    return {r, -(r * t_) / scale_, 1.0 / scale_};
+  [[nodiscard]] basic_sim3 inverse() const {
+    const basic_so3<S> r = r_.inverse();
+    return {r, -(r * t_) / scale_, S(1) / scale_};
   }
-  [[nodiscard]] friend sim3 operator*(const sim3& a, const sim3& b) {
+  [[nodiscard]] friend basic_sim3 operator*(const basic_sim3& a, const basic_sim3& b) {
     return {a.r_ * b.r_, a * b.t_, a.scale_ * b.scale_};
   }
-  [[nodiscard]] friend point operator*(const sim3& s, const point& p) { return s.scale_ * (s.r_ * p) + s.t_; }
+  [[nodiscard]] friend point operator*(const basic_sim3& s, const point& p) { return s.scale_ * (s.r_ * p) + s.t_; }
 
-  [[nodiscard]] const so3& rotation() const { return r_; }
+  [[nodiscard]] const basic_so3<S>& rotation() const { return r_; }
   [[nodiscard]] const point& translation() const { return t_; }
-  [[nodiscard]] double scale() const { return scale_; }
-  [[nodiscard]] mat3 rotation_matrix() const { return r_.rotation_matrix(); }
+  [[nodiscard]] S scale() const { return scale_; }
+  [[nodiscard]] matrix<3, 3, S> rotation_matrix() const { return r_.rotation_matrix(); }
   /// The homogeneous 4x4 matrix.
-  [[nodiscard]] mat4 to_matrix() const {
-    mat4 m = mat4::Identity();
-    m.topLeftCorner<3, 3>() = scale_ * rotation_matrix();
-    m.topRightCorner<3, 1>() = t_;
+  [[nodiscard]] matrix<4, 4, S> to_matrix() const {
+    matrix<4, 4, S> m = matrix<4, 4, S>::Identity();
+    m.template topLeftCorner<3, 3>() = scale_ * rotation_matrix();
+    m.template topRightCorner<3, 1>() = t_;
     return m;
   }
   /// `exp(adjoint() * xi) == T exp(xi) T^-1`.
-  [[nodiscard]] mat7 adjoint() const {
-    const mat3 r = rotation_matrix();
-    mat7 ad = mat7::Zero();
-    ad.block<3, 3>(0, 0) = scale_ * r;
-    ad.block<3, 3>(0, 3) = hat<double>(t_) * r;
-    ad.block<3, 1>(0, 6) = -t_;
-    ad.block<3, 3>(3, 3) = r;
-    ad(6, 6) = 1.0;
+  [[nodiscard]] matrix<7, 7, S> adjoint() const {
+    const matrix<3, 3, S> r = rotation_matrix();
+    matrix<7, 7, S> ad = matrix<7, 7, S>::Zero();
+    ad.template block<3, 3>(0, 0) = scale_ * r;
+    ad.template block<3, 3>(0, 3) = hat<S>(t_) * r;
+    ad.template block<3, 1>(0, 6) = -t_;
+    ad.template block<3, 3>(3, 3) = r;
+    ad(6, 6) = S(1);
     return ad;
   }
   /// `exp(xi + delta) ~ exp(left_jacobian(xi) * delta) * exp(xi)`.
-  [[nodiscard]] static mat7 left_jacobian(const tangent& xi) {
-    const mat3 k = hat<double>(xi.segment<3>(3));
-    mat7 ad = mat7::Zero();  // ad * eta is the Lie bracket of xi and eta
-    ad.block<3, 3>(0, 0) = k + xi[6] * mat3::Identity();
-    ad.block<3, 3>(0, 3) = hat<double>(xi.head<3>());
-    ad.block<3, 1>(0, 6) = -xi.head<3>();
-    ad.block<3, 3>(3, 3) = k;
-    return detail::exponential_integral<7>(ad);
+  [[nodiscard]] static matrix<7, 7, S> left_jacobian(const tangent& xi) {
+    const matrix<3, 3, S> k = hat<S>(xi.template segment<3>(3));
+    matrix<7, 7, S> ad = matrix<7, 7, S>::Zero();  // ad * eta is the Lie bracket of xi and eta
+    ad.template block<3, 3>(0, 0) = k + xi[6] * matrix<3, 3, S>::Identity();
+    ad.template block<3, 3>(0, 3) = hat<S>(xi.template head<3>());
+    ad.template block<3, 1>(0, 6) = -xi.template head<3>();
+    ad.template block<3, 3>(3, 3) = k;
+    return detail::exponential_integral<7, S>(ad);
   }
-  [[nodiscard]] static mat7 left_jacobian_inverse(const tangent& xi) {
+  [[nodiscard]] static matrix<7, 7, S> left_jacobian_inverse(const tangent& xi) {
     return left_jacobian(xi).partialPivLu().inverse();
   }
   /// `exp(xi + delta) ~ exp(xi) * exp(right_jacobian(xi) * delta)`.
-  [[nodiscard]] static mat7 right_jacobian(const tangent& xi) { return left_jacobian(-xi); }
-  [[nodiscard]] static mat7 right_jacobian_inverse(const tangent& xi) { return left_jacobian_inverse(-xi); }
+  [[nodiscard]] static matrix<7, 7, S> right_jacobian(const tangent& xi) { return left_jacobian(-xi); }
+  [[nodiscard]] static matrix<7, 7, S> right_jacobian_inverse(const tangent& xi) { return left_jacobian_inverse(-xi); }
 
  private:
   /// What takes `rho` to the translation of `exp`.
-  [[nodiscard]] static mat3 translation_integral(const point& phi, double sigma) {
-    return detail::exponential_integral<3>(hat<double>(phi) + sigma * mat3::Identity());
+  [[nodiscard]] static matrix<3, 3, S> translation_integral(const point& phi, S sigma) {
+    return detail::exponential_integral<3, S>(hat<S>(phi) + sigma * matrix<3, 3, S>::Identity());
   }
 
-  so3 r_;
+  basic_so3<S> r_;
   point t_;
-  double scale_ = 1.0;
+  S scale_ = S(1);
 };
+
+using sim3 = basic_sim3<double>;
 
 }  // namespace orbis

@@ -170,6 +170,5 @@ class basic_so3 {
 };
 
 using so3 = basic_so3<double>;
-using so3f = basic_so3<float>;
 
 }  // namespace orbis

@@ -86,7 +86,7 @@ inline constexpr compact_value compact_value_of = std::floating_point<T> ? (size
 /// Appends a number's bytes, the lowest first.
 template <class T>
 void put(std::string& out, T number) {
-  const auto bits = std::bit_cast<bits_of<T>>(number);
+  const auto bits = std::bit_cast<value_bits<T>>(number);
   for (std::size_t i = 0; i != sizeof(T); ++i)
     out += static_cast<char>(static_cast<std::uint64_t>(bits) >> (8 * i) & 0xffU);
 }
@@ -96,7 +96,7 @@ template <class T>
   std::uint64_t bits = 0;
   for (std::size_t i = 0; i != sizeof(T); ++i) bits |= std::uint64_t{static_cast<unsigned char>(in[i])} << (8 * i);
   in.remove_prefix(sizeof(T));
-  return std::bit_cast<T>(static_cast<bits_of<T>>(bits));
+  return std::bit_cast<T>(static_cast<value_bits<T>>(bits));
 }
 
 inline void put_section(std::string& out, std::string_view tag, std::string_view content) {

@@ -66,9 +66,6 @@ struct pnp_options {
   std::size_t max_iterations = 10000;
   std::size_t min_inliers = 6;  ///< fewer than this is a failure
   std::uint64_t seed = 1;
-  /// The matches from the most to the least reliable, every index once: samples are drawn in PROSAC's order. Empty: in
-  /// no order.
-  std::span<const std::uint32_t> best_first = {};
 };
 
 struct pose_estimate {
@@ -82,7 +79,7 @@ struct pose_estimate {
 struct pnp_workspace {
   detail::pnp_matches matches;
   ransac_workspace ransac;
-  std::vector<std::uint32_t> order, place, part;
+  std::vector<std::uint32_t> part;
 };
 
 /// The pose from which most of `points_world[i]` (metres) project to `pixels[i]`: P3P in RANSAC with a sequential test
@@ -98,8 +95,6 @@ template <camera::camera_model Camera>
   constexpr const char* where = "pnp";
   const std::size_t n = points_world.size();
   if (n != pixels.size()) return fail(errc::invalid_argument, where, "the lists of points and pixels differ in length");
-  if (!options.best_first.empty() && options.best_first.size() != n)
-    return fail(errc::invalid_argument, where, "the order of the matches names not each of them once");
   ransac_options asked = detail::ransac_part(options);
   if (const char* const fault = detail::fault_of(asked)) return fail(errc::invalid_argument, where, fault);
   asked.min_inliers = 0;  // inliers are counted at the end, with the camera itself
@@ -113,24 +108,8 @@ template <camera::camera_model Camera>
                     " are finite and in the camera's view, three are needed");
   using estimator_type = detail::pnp_estimator;
   const estimator_type estimator(matches);
-  const auto search = [&](const auto& sampling) {
-    return ransac(estimator, asked, ransac_policies{msac{}, sampling, sprt{}, iterated_refinement{}}, workspace.ransac);
-  };
-  result<ransac_estimate<estimator_type::model>> found = [&] {
-    if (options.best_first.empty()) return search(uniform_sampling{});
-    auto& place = workspace.place;
-    auto& order = workspace.order;
-    place.assign(n, std::numeric_limits<std::uint32_t>::max());
-    for (std::size_t i = 0; i != matches.size(); ++i) place[matches.original[i]] = static_cast<std::uint32_t>(i);
-    order.clear();
-    order.reserve(n);
-    for (const std::uint32_t i : options.best_first)
-      if (i < n && place[i] < n) order.push_back(std::exchange(place[i], std::numeric_limits<std::uint32_t>::max()));
-    if (order.size() != matches.size())
-      return result<ransac_estimate<estimator_type::model>>(
-          fail(errc::invalid_argument, where, "the order of the matches names not each of them once"));
-    return search(prosac{order});
-  }();
+  const result<ransac_estimate<estimator_type::model>> found = ransac(
+      estimator, asked, ransac_policies{msac{}, uniform_sampling{}, sprt{}, iterated_refinement{}}, workspace.ransac);
   if (!found) {
     if (found.error().code != errc::degenerate) return fail(found.error());
     const std::string why = detail::pnp_degeneracy(matches);

@@ -18,6 +18,7 @@
 #include <limits>
 #include <span>
 #include <string_view>
+#include <type_traits>
 
 #include <orbis/optimize/detail/minimal/small_cholesky.hpp>
 #include <orbis/optimize/detail/pose/pose_kernels.hpp>
@@ -193,6 +194,16 @@ concept holds_a_model = requires(const Camera& camera) {
   {camera.visit([](const auto&) {})};
 };
 
+/// Least squares; for Huber's loss by one whose width has no bound, which gives the same bits and needs no kernel of
+/// its own.
+template <class Loss>
+[[nodiscard]] auto without_robustness(const Loss&) {
+  if constexpr (std::is_same_v<Loss, huber>)
+    return huber{std::numeric_limits<double>::infinity()};
+  else
+    return trivial{};
+}
+
 template <class Camera, class Loss>
 [[nodiscard]] pose_refinement refine_pose(std::span<const pose_observation> observations, const Camera& camera,
                                           double bf, const se3& T_world_camera, std::span<std::uint8_t> outliers,
@@ -219,7 +230,7 @@ template <class Camera, class Loss>
   for (int round = 0; round < options.rounds; ++round) {
     const bool last = round + 1 == options.rounds;
     if (last)
-      out.status = refiner.run_round(trivial{}, 1e-9);
+      out.status = refiner.run_round(without_robustness(loss), 1e-9);
     else if (changed || out.status != refinement_status::converged)
       out.status = refiner.run_round(loss, 1e-6);  // it only has to tell the outliers
     else

@@ -37,15 +37,7 @@ struct msac {
   }
 };
 
-/// Counts the outliers. M. Fischler, R. Bolles, CACM 24 (1981).
-struct inlier_count {
-  template <std::floating_point S>
-  [[nodiscard]] static constexpr S cost(S squared, S limit) noexcept {
-    return squared < limit ? S(0) : limit;
-  }
-};
-
-static_assert(consensus_score<msac> && consensus_score<inlier_count>);
+static_assert(consensus_score<msac>);
 
 // -- order of samples -------------------------------------------------------------------------------------------------
 
@@ -103,66 +95,7 @@ struct uniform_sampling {
   }
 };
 
-/// Reliable data first: draws from a set of the best data, which grows until it contains all.
-/// O. Chum, J. Matas, "Matching with PROSAC: progressive sample consensus", CVPR 2005.
-struct prosac {
-  /// All data, from the most to the least reliable (for example by descriptor distance).
-  /// @pre a permutation of 0 ... n - 1 that outlives the call of RANSAC
-  std::span<const std::uint32_t> best_first;
-  /// After this many samples all data are drawn from, as with `uniform_sampling`.
-  double samples_until_uniform = 200000.0;
-
-  template <std::size_t N>
-  class sampler {
-   public:
-    sampler(const prosac& p, std::size_t n) : order_{p.best_first}, pool_{std::min(N, n)} {
-      assert(p.best_first.size() == n);
-      // T_n for n = N: the number of samples of `samples_until_uniform` that lie in the first N data.
-      in_pool_ = p.samples_until_uniform;
-      for (std::size_t i = 0; i != N; ++i) in_pool_ *= static_cast<double>(N - i) / static_cast<double>(n - i);
-    }
-    [[nodiscard]] std::array<std::uint32_t, N> draw(random_bits& random) {
-      ++drawn_;
-      while (drawn_ > until_growth_ && pool_ < order_.size()) {
-        const double next = in_pool_ * static_cast<double>(pool_ + 1) / static_cast<double>(pool_ + 1 - N);
-        until_growth_ += static_cast<std::size_t>(std::ceil(next - in_pool_));
-        in_pool_ = next;
-        ++pool_;
-      }
-      std::array<std::uint32_t, N> sample{};
-      if (drawn_ > until_growth_ || pool_ == N) {  // the pool is everything, or just one sample
-        sample = detail::draw_sample<N>(random, pool_);
-      } else {  // the newest, and others before it
-        if constexpr (N > 1) {
-          const auto others = detail::draw_sample<N - 1>(random, pool_ - 1);
-          std::copy(others.begin(), others.end(), sample.begin());
-        }
-        sample[N - 1] = static_cast<std::uint32_t>(pool_ - 1);
-      }
-      for (std::uint32_t& i : sample) i = order_[i];
-      return sample;
-    }
-    /// By the inliers among all data. (To stop by a prefix of the data, as the paper does, takes ranks that are
-    /// reliable.)
-    [[nodiscard]] double wanted(double confidence, std::span<const std::uint32_t> inliers, double recognised) const {
-      return detail::wanted_iterations(
-          confidence, static_cast<double>(inliers.size()) / static_cast<double>(order_.size()), N, recognised);
-    }
-
-   private:
-    std::span<const std::uint32_t> order_;
-    std::size_t pool_;
-    std::size_t drawn_ = 0;
-    std::size_t until_growth_ = 1;
-    double in_pool_;
-  };
-  template <std::size_t N>
-  [[nodiscard]] sampler<N> over(std::size_t n) const {
-    return {*this, n};
-  }
-};
-
-static_assert(sampling_order<uniform_sampling> && sampling_order<prosac>);
+static_assert(sampling_order<uniform_sampling>);
 
 // -- preemption -------------------------------------------------------------------------------------------------------
 

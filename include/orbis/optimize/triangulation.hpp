@@ -13,6 +13,7 @@
 #include <cmath>
 #include <concepts>
 #include <cstddef>
+#include <ranges>
 #include <span>
 #include <string_view>
 
@@ -123,9 +124,13 @@ inline void make_rays_meet(const mat3& essential, vec3& first, vec3& second) {
 
 /// The point whose projections to z = 1 have the least sum of squared distances from all rays: starts at the point
 /// nearest to the rays and refines it by Levenberg-Marquardt. O(views) for each of a few steps.
-/// @pre T_world_camera.size() == rays.size()
-[[nodiscard]] inline triangulation triangulate(std::span<const se3> T_world_camera, std::span<const vec3> rays,
-                                               const triangulation_options& options = {}) {
+/// `poses` are the cameras' `T_world_camera`. @pre poses and rays are as many
+template <std::ranges::contiguous_range Poses, std::ranges::contiguous_range Rays>
+requires std::same_as<std::ranges::range_value_t<Poses>, se3> && std::same_as<std::ranges::range_value_t<Rays>, vec3>
+[[nodiscard]] triangulation triangulate(const Poses& poses, const Rays& directions,
+                                        const triangulation_options& options = {}) {
+  const std::span<const se3> T_world_camera{poses};
+  const std::span<const vec3> rays{directions};
   assert(T_world_camera.size() == rays.size());
   triangulation out;
   const std::size_t n = rays.size();

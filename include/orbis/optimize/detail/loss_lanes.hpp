@@ -51,6 +51,11 @@ struct lanes_of_loss<huber> {
   static ORBIS_ALWAYS_INLINE void weigh(const huber& loss, const L& squared, L& cost, L& weight) {
     const double bound = loss.width * loss.width;
     const auto inside = squared <= L(bound);
+    if (all(inside)) {  // as most are; no root, no quotient
+      cost = squared;
+      weight = 1.0;
+      return;
+    }
     const L pull = loss.width * simd::reciprocal_root(select(inside, L(1.0), squared));
     cost = select(inside, squared, 2.0 * (squared * pull) - bound);
     weight = select(inside, L(1.0), pull);

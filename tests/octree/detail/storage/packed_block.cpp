@@ -30,8 +30,8 @@ void palette_one_by_one(const block<T>& b, palette<T>& p) {
     const T v = b.value[static_cast<std::size_t>(std::countr_zero(rest))];
     std::uint64_t same = 0;
     for (std::size_t i = 0; i != 64; ++i)
-      same |= std::uint64_t{std::bit_cast<octree::detail::bits_of<T>>(b.value[i]) ==
-                            std::bit_cast<octree::detail::bits_of<T>>(v)}
+      same |= std::uint64_t{std::bit_cast<octree::detail::value_bits<T>>(b.value[i]) ==
+                            std::bit_cast<octree::detail::value_bits<T>>(v)}
               << i;
     if (p.count == max_palette) {
       ++p.count;

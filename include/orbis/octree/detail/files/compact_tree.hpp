@@ -35,7 +35,7 @@ template <class T>
 class value_counter {
  public:
   [[nodiscard]] std::uint32_t number_of(T value) {
-    const auto bits = static_cast<std::uint64_t>(std::bit_cast<bits_of<T>>(value));
+    const auto bits = static_cast<std::uint64_t>(std::bit_cast<value_bits<T>>(value));
     if (bits != last_bits_ || values_.empty()) {
       last_bits_ = bits;
       last_ = index_.find(bits);

@@ -59,7 +59,7 @@ template <unsigned Bits>
 }
 
 template <class T>
-using bits_of =
+using value_bits =
     std::conditional_t<sizeof(T) == 1, std::uint8_t,
                        std::conditional_t<sizeof(T) == 2, std::uint16_t,
                                           std::conditional_t<sizeof(T) == 4, std::uint32_t, std::uint64_t>>>;
@@ -68,16 +68,16 @@ template <class T>
 struct find_palette_kernel {
   template <simd::target Target>
   static ORBIS_ALWAYS_INLINE void run(const block<T>& b, palette<T>& p) noexcept {
-    using words = simd::native_vec<bits_of<T>, Target>;
+    using words = simd::native_vec<value_bits<T>, Target>;
     p.count = 0;
     p.plane.fill(0);
     for (std::uint64_t rest = b.known; rest != 0;) {
       const T v = b.value[static_cast<std::size_t>(std::countr_zero(rest))];
-      const words wanted = simd::bits_as<bits_of<T>>(simd::native_vec<T, Target>(v));
+      const words wanted = simd::bits_as<value_bits<T>>(simd::native_vec<T, Target>(v));
       std::uint64_t same = 0;
       for (unsigned i = 0; i != 64; i += words::count) {
         const auto values = simd::native_vec<T, Target>::load(b.value.data() + i);
-        same |= std::uint64_t{simd::bits(simd::bits_as<bits_of<T>>(values) == wanted)} << i;
+        same |= std::uint64_t{simd::bits(simd::bits_as<value_bits<T>>(values) == wanted)} << i;
       }
       if (p.count == max_palette) {
         ++p.count;

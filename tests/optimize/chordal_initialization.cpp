@@ -3,6 +3,7 @@
 #include <cstring>
 #include <limits>
 
+#include <orbis/optimize/chordal_initialization.hpp>
 #include <orbis/optimize/pose_graph.hpp>
 
 #include "pose_graphs.hpp"
