@@ -14,7 +14,7 @@ TEST_CASE("vectors and matrices are laid out as arrays of numbers under every in
   static_assert(alignof(matrix<4, 1, float>) == 4 && alignof(matrix<2, 1, float>) == 4);
   static_assert(alignof(matrix<8, 1, float>) == 4 && alignof(matrix<1, 4>) == 8 && alignof(matrix<2, 3>) == 8);
   static_assert(alignof(se3) == 8 && sizeof(se3) == 7 * 8 && alignof(sim3) == 8 && sizeof(sim3) == 8 * 8);
-  static_assert(alignof(basic_se3<float>) == 4 && sizeof(se3f) == 7 * 4);
+  static_assert(alignof(basic_se3<float>) == 4 && sizeof(basic_se3<float>) == 7 * 4);
   CHECK((vec2{1, 2} + vec2{3, 4}) == vec2{4, 6});
 }
 
