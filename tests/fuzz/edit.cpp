@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// Any bytes as a few changes to a map: nodes, edits, transformations, evictions, scans, merges, files. After
+// Any bytes as a few changes to a map: nodes, edits, transformations, evictions, scans, files. After
 // each the map must be what the same changes make of a plain array of voxels, in all that can be asked of it,
 // and a mirror that follows its log of changes must be able to keep up.
 #include <algorithm>
@@ -18,7 +18,6 @@
 #include <orbis/core/random.hpp>
 #include <orbis/octree/compact_file.hpp>
 #include <orbis/octree/decay.hpp>
-#include <orbis/octree/merge.hpp>
 #include <orbis/octree/nodes.hpp>
 #include <orbis/octree/overlap.hpp>
 
@@ -301,9 +300,9 @@ class session {
       case 5: transform(); break;
       case 6: evict(); break;
       case 7:
-      case 8: integrate(); break;
-      case 9: merge(); break;
-      case 10: merge_with_itself(); break;
+      case 8:
+      case 9:
+      case 10: integrate(); break;
       case 11: through_file(); break;
       case 12: copy(); break;
       case 13: clear(); break;
@@ -367,9 +366,6 @@ class session {
     m.for_each_leaf([&](const map::leaf& l) {
       for (voxel& v : expected_.node(l.key, m.tree_depth() - l.depth)) use(v, l.log_odds);
     });
-  }
-  static void add_evidence(voxel& v, float evidence) {
-    v = std::clamp(v.value_or(0.0F) + evidence, model::clamp_min, model::clamp_max);
   }
 
   // -- changes
@@ -485,34 +481,6 @@ class session {
       const float before = v.value_or(0.0F);
       v = once > 0.0F ? octree::after_hit<model>(before) : octree::after_miss<model>(before);
     });
-  }
-  void merge() {
-    map other{resolution, where().tree_depth};
-    const int at = level();
-    const voxel_key node = octree::node_key(key(), at);
-    other.set_unknown_node(node, where().tree_depth - at, value());
-    const scan s = next_scan();
-    other.integrate(s.points, s.origin, s.options);
-    std::array<int, 3> shift{};  // voxels; a window must not be left
-    if (where().level == where().tree_depth)
-      for (int& d : shift) d = from_.signed_byte() / 16;
-    vec3 metres;
-    for (int i = 0; i != 3; ++i) metres[i] = shift[static_cast<std::size_t>(i)] * resolution;
-    octree::merge(map_, other, se3{so3{}, metres});
-    auto near = other.accessor();
-    const auto cells = expected_.all();
-    for (std::size_t i = 0; i != cells.size(); ++i) {
-      const voxel_key k = expected_.key(i);
-      const auto from = [&](std::uint32_t c, int d) { return c - static_cast<std::uint32_t>(d); };
-      const voxel_key before{from(k.x, shift[0]), from(k.y, shift[1]), from(k.z, shift[2])};
-      if (!expected_.is_inside(before)) continue;
-      if (const voxel v = near.value(before)) add_evidence(cells[i], *v);
-    }
-  }
-  void merge_with_itself() {
-    octree::merge(map_, map_);
-    for (voxel& v : expected_.all())
-      if (v) add_evidence(v, *v);
   }
   void through_file() {
     const std::string bytes = octree::compact_bytes(map_);
