@@ -36,3 +36,5 @@ struct binomial_kernel {
 };
 
 }  // namespace orbis::features::detail
+
+ORBIS_COMPILED_KERNEL(orbis::features::detail::binomial_kernel, orbis::features::detail::binomial_kernel::signature);

@@ -136,3 +136,6 @@ struct upright {
 };
 
 }  // namespace orbis::features::detail
+
+ORBIS_COMPILED_KERNEL(orbis::features::detail::disc_moments_kernel,
+                      orbis::features::detail::disc_moments_kernel::signature);

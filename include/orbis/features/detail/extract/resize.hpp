@@ -179,3 +179,8 @@ inline void resize(image_view<const std::uint8_t> from, image_view<std::uint8_t>
 }
 
 }  // namespace orbis::features::detail
+
+ORBIS_COMPILED_KERNEL(orbis::features::detail::resize_along_kernel,
+                      orbis::features::detail::resize_along_kernel::signature);
+ORBIS_COMPILED_KERNEL(orbis::features::detail::resize_across_kernel,
+                      orbis::features::detail::resize_across_kernel::signature);

@@ -149,3 +149,8 @@ inline void smooth(image_view<const std::uint8_t> from, image_view<std::uint8_t>
 }
 
 }  // namespace orbis::features::detail
+
+ORBIS_COMPILED_KERNEL(orbis::features::detail::smooth_along_kernel,
+                      orbis::features::detail::smooth_along_kernel::signature);
+ORBIS_COMPILED_KERNEL(orbis::features::detail::smooth_across_kernel,
+                      orbis::features::detail::smooth_across_kernel::signature);

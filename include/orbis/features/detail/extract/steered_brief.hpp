@@ -111,3 +111,6 @@ struct steered_brief {
 static_assert(patch_descriptor<steered_brief>);
 
 }  // namespace orbis::features::detail
+
+ORBIS_COMPILED_KERNEL(orbis::features::detail::steered_brief_kernel,
+                      orbis::features::detail::steered_brief_kernel::signature);

@@ -180,3 +180,6 @@ struct pnp_matches {
 };
 
 }  // namespace orbis::optimize::detail
+
+ORBIS_COMPILED_KERNEL(orbis::optimize::detail::match_errors_kernel, orbis::optimize::detail::match_errors);
+ORBIS_COMPILED_KERNEL(orbis::optimize::detail::match_equations_kernel, orbis::optimize::detail::match_equations);
