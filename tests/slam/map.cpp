@@ -150,8 +150,10 @@ TEST_CASE("An erased keyframe leaves its landmarks to others, its children to it
   slam::detail::insert_keyframe(m, f, {});
   const auto shared = m.at(0).landmarks[3], own = m.at(1).landmarks[29];
   const se3 before = m.at(1).T_world_camera;
+  const std::uint64_t changes = m.pose_changes();
 
   m.erase_keyframe(1);
+  CHECK(m.pose_changes() > changes);
   REQUIRE(fault_of(m) == "");
   CHECK_FALSE(m.has_keyframe(1));
   CHECK(m.keyframes().size() == 2);
@@ -205,6 +207,7 @@ TEST_CASE("A map absorbs another, which hangs on it where the caller says") {
 
     const auto offsets = a.append(std::move(b), T, {into, from});
     REQUIRE(fault_of(a) == "");
+    CHECK(a.pose_changes() > a_before.pose_changes());
     CHECK(fault_of(b) == "");  // NOLINT(bugprone-use-after-move): an empty map
     CHECK(b.keyframes().empty());
     CHECK(offsets.keyframes == a_before.keyframe_end());

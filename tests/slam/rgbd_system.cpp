@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
@@ -80,6 +81,35 @@ TEST_CASE("A walk through a synthetic room is tracked without a lost frame and w
   CHECK(slam.landmark_count() > 300);
   const auto valid = slam::validate(slam.map());
   CHECK((valid ? "" : valid.error().to_string()) == "");
+}
+
+TEST_CASE("Whoever follows the keyframes' poses is told of each change, and of nothing else") {
+  const auto& [camera, recorded] = small_room();
+  test::slam_system slam{camera};
+  slam::pose_revision seen;
+  std::vector<slam::keyframe_pose> followed;
+  std::size_t changes = 0, moved = 0;
+  for (std::size_t i = 0; i < 60; ++i) {
+    slam.track(recorded[i]);
+    if (auto now = slam.keyframes_since(seen)) {
+      ++changes;
+      const std::size_t common = std::min(followed.size(), now->size());
+      bool same = true;
+      for (std::size_t k = 0; k != common; ++k)
+        same = same && followed[k].T_world_camera.to_matrix() == (*now)[k].T_world_camera.to_matrix();
+      moved += same ? 0 : 1;
+      followed = *std::move(now);
+    }
+    CHECK_FALSE(slam.keyframes_since(seen));
+    const auto all = slam.keyframes();
+    REQUIRE(all.size() == followed.size());
+    for (std::size_t k = 0; k != all.size(); ++k) {
+      CHECK(all[k].frame == followed[k].frame);
+      CHECK(all[k].T_world_camera.to_matrix() == followed[k].T_world_camera.to_matrix());
+    }
+  }
+  CHECK(moved > 0);     // by local adjustment
+  CHECK(changes < 30);  // most frames make no keyframe
 }
 
 TEST_CASE("The first pose is the identity unless the caller knows better") {

@@ -29,6 +29,9 @@ void slam_system::set_localization_only(bool on) { held_->system.set_localizatio
 orbis::trajectory slam_system::trajectory() const { return held_->system.trajectory(); }
 orbis::trajectory slam_system::trajectory(slam::map_id map) const { return held_->system.trajectory(map); }
 std::vector<slam::keyframe_pose> slam_system::keyframes() const { return held_->system.keyframes(); }
+std::optional<std::vector<slam::keyframe_pose>> slam_system::keyframes_since(slam::pose_revision& seen) const {
+  return held_->system.keyframes_since(seen);
+}
 orbis::trajectory slam_system::keyframe_trajectory() const { return held_->system.keyframe_trajectory(); }
 std::size_t slam_system::landmark_count() const { return held_->system.landmark_count(); }
 slam::track_counters slam_system::counters() const { return held_->system.counters(); }

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -35,6 +36,7 @@ class slam_system {
   [[nodiscard]] orbis::trajectory trajectory() const;
   [[nodiscard]] orbis::trajectory trajectory(slam::map_id map) const;
   [[nodiscard]] std::vector<slam::keyframe_pose> keyframes() const;
+  [[nodiscard]] std::optional<std::vector<slam::keyframe_pose>> keyframes_since(slam::pose_revision& seen) const;
   [[nodiscard]] orbis::trajectory keyframe_trajectory() const;
   [[nodiscard]] std::size_t landmark_count() const;
   [[nodiscard]] slam::track_counters counters() const;

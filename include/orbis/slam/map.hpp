@@ -80,6 +80,8 @@ class basic_map {
   [[nodiscard]] keyframe_id replacement_of(keyframe_id id) const noexcept {
     return content_.keyframes.replacement_of(id);
   }
+  /// How often a pose was set or a keyframe added or erased: while it stays, the keyframes and their poses do.
+  [[nodiscard]] std::uint64_t pose_changes() const noexcept { return pose_changes_; }
   /// `T_world_camera` of a keyframe. An erased keyframe moves with the one that replaced it. @pre id < keyframe_end()
   [[nodiscard]] se3 pose_of(keyframe_id id) const;
 
@@ -92,7 +94,10 @@ class basic_map {
   /// Counts a frame in which the landmark was found. @pre has_landmark(id)
   void count_found(landmark_id id) { ++content_.landmarks[id].found; }
   /// @pre has_keyframe(id)
-  void set_pose(keyframe_id id, const se3& T_world_camera) { content_.keyframes[id].T_world_camera = T_world_camera; }
+  void set_pose(keyframe_id id, const se3& T_world_camera) {
+    content_.keyframes[id].T_world_camera = T_world_camera;
+    ++pose_changes_;
+  }
   /// @pre has_landmark(id)
   void set_position(landmark_id id, const vec3& position) { content_.landmarks[id].position = position; }
   /// Moves a landmark and its normal by `T_new_old`, a motion in the world. @pre has_landmark(id)
@@ -160,6 +165,7 @@ class basic_map {
 
   detail::map_content<D> content_;
   covisibility_graph covisibility_;
+  std::uint64_t pose_changes_ = 0;
 };
 
 /// A map with the descriptors of ORB.
@@ -199,6 +205,7 @@ void basic_map<D>::transform(const se3& T_new_old) {
 
 template <feature_descriptor D>
 keyframe_id basic_map<D>::add_keyframe(frame_type f) {
+  ++pose_changes_;
   const keyframe_id before = content_.keyframes.empty() ? no_id : content_.keyframes.back().id;
   const std::vector<landmark_id> seen = std::exchange(f.landmarks, std::vector<landmark_id>(f.features.size(), no_id));
   const keyframe_id id = content_.keyframes.add({std::move(f), keyframe_end()});
@@ -213,6 +220,7 @@ keyframe_id basic_map<D>::add_keyframe(frame_type f) {
 template <feature_descriptor D>
 void basic_map<D>::erase_keyframe(keyframe_id id) {
   assert(has_keyframe(id));
+  ++pose_changes_;
   for (const landmark_id l : at(id).landmarks)
     if (l != no_id) detach(l, id);
   const keyframe_id replacement =
@@ -292,6 +300,7 @@ void basic_map<D>::update_landmark(landmark_id id) {
 
 template <feature_descriptor D>
 id_offsets basic_map<D>::append(basic_map&& other, const se3& T_this_other, const map_link& link) {
+  ++pose_changes_;
   assert(content_.levels == other.content_.levels && content_.scale_factor == other.content_.scale_factor);
   other.transform(T_this_other);
   const id_offsets offsets{keyframe_end().value(), landmark_end().value()};

@@ -108,6 +108,10 @@ class rgbd_system {
   [[nodiscard]] orbis::trajectory trajectory(map_id map) const;
   /// Time stamp, pose and frame index of each keyframe of the active map.
   [[nodiscard]] std::vector<keyframe_pose> keyframes() const;
+  /// As above, unless the poses are those of revision `seen`: then empty. Sets `seen` to the present revision. Cheap
+  /// enough to be asked again and again by whoever builds on the keyframes' poses: local adjustment moves keyframes
+  /// without an event. O(1) if nothing has changed.
+  [[nodiscard]] std::optional<std::vector<keyframe_pose>> keyframes_since(pose_revision& seen) const;
   /// Time stamp and pose of each keyframe of the active map.
   [[nodiscard]] orbis::trajectory keyframe_trajectory() const;
   /// The number of landmarks of the active map.
@@ -298,9 +302,18 @@ orbis::trajectory ORBIS_SLAM_SYSTEM::trajectory(map_id map) const {
 
 ORBIS_SLAM_SYSTEM_TEMPLATE
 std::vector<keyframe_pose> ORBIS_SLAM_SYSTEM::keyframes() const {
-  return shared_.locked([&] {
+  pose_revision never{.map = no_id};
+  return *keyframes_since(never);
+}
+
+ORBIS_SLAM_SYSTEM_TEMPLATE
+std::optional<std::vector<keyframe_pose>> ORBIS_SLAM_SYSTEM::keyframes_since(pose_revision& seen) const {
+  return shared_.locked([&]() -> std::optional<std::vector<keyframe_pose>> {
+    const map_type& active = shared_.atlas.active();
+    const pose_revision now{shared_.atlas.active_id(), active.pose_changes()};
+    if (std::exchange(seen, now) == now) return std::nullopt;
     std::vector<keyframe_pose> all;
-    for (const auto& k : shared_.atlas.active().keyframes()) all.push_back({k.timestamp, k.T_world_camera, k.index});
+    for (const auto& k : active.keyframes()) all.push_back({k.timestamp, k.T_world_camera, k.index});
     return all;
   });
 }

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <string_view>
 
@@ -64,6 +65,14 @@ struct keyframe_pose {
   double timestamp = 0.0;  ///< seconds
   se3 T_world_camera;
   std::size_t frame = 0;  ///< index of the frame, from 0
+};
+
+/// Identifies the keyframes of the active map with their poses: it differs after any of them moved, was made or was
+/// culled, and after another map became the active one.
+struct pose_revision {
+  map_id map{};
+  std::uint64_t changes = 0;
+  friend bool operator==(const pose_revision&, const pose_revision&) = default;
 };
 
 }  // namespace orbis::slam
