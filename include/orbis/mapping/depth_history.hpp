@@ -15,7 +15,9 @@ namespace orbis::mapping {
 /// - `put(frame, pixels)` keeps a copy, in place of the image that was there. On an error the image is kept all the
 /// same,
 ///   or `get` fails for it from then on;
-/// - `get(frame, out)` copies it to `out`, whose size changes to the image's;
+/// - `get(frame, out)` copies it to `out`, whose size changes to the image's; if it is const, it may be called from
+/// several
+///   threads at once;
 /// - `erase(frame)` forgets it, if it is there.
 template <class S>
 concept depth_history = std::movable<S> &&

@@ -299,6 +299,7 @@ class live_map {
   /// What one thread needs to mark a keyframe.
   struct worker {
     image<std::uint16_t> depth;
+    result<void> read;
     octree::scan_marker marker;
     octree::scan_voxels voxels;
   };
@@ -362,23 +363,32 @@ class live_map {
   template <class Policy>
   result<void> move_next(const Policy& policy, std::size_t next, std::size_t count) {
     if (workers_.size() < count) workers_.resize(count);
-    for (std::size_t i = 0; i != count; ++i) {
-      const std::uint64_t frame = queue_[next + i].frame;
-      if (auto got = depths_.get(frame, workers_[i].depth); !got) {
-        remove(frame);
-        return fail(std::move(got.error()));
-      }
-    }
+    const auto read = [&](std::size_t i) { workers_[i].read = depths_.get(queue_[next + i].frame, workers_[i].depth); };
     const auto mark = [&](const auto& how, std::size_t i) {
       worker& w = workers_[i];
+      if (!w.read) return;
       const entry& k = *find(queue_[next + i].frame);
       const depth_view depth{w.depth.view(), k.scale, k.min_depth, k.max_depth};
       w.marker.mark(how, history_.grid(), depth, camera_, *k.wanted, options_.integration, w.voxels);
     };
-    if (count == 1)
+    constexpr bool reads_in_parallel = requires(const Depths& depths, image<std::uint16_t>& out) {
+      depths.get(0, out);
+    };
+    if (!reads_in_parallel || count == 1)
+      for (std::size_t i = 0; i != count; ++i) read(i);
+    if (count == 1) {
       mark(policy, 0);
-    else
-      for_each_index(policy, count, 1, [&](std::size_t i) { mark(seq, i); });
+    } else {
+      for_each_index(policy, count, 1, [&](std::size_t i) {
+        if (reads_in_parallel) read(i);
+        mark(seq, i);
+      });
+    }
+    for (std::size_t i = 0; i != count; ++i) {
+      if (workers_[i].read) continue;
+      remove(queue_[next + i].frame);
+      return fail(std::move(workers_[i].read.error()));
+    }
     for (std::size_t i = 0; i != count; ++i) {
       entry& k = *find(queue_[next + i].frame);
       drop_frames_of(k.frame);
