@@ -11,6 +11,17 @@
 ///   const auto seen = map.latest();                                      // any thread
 ///   if (seen->map.state(p) == orbis::octree::occupancy::occupied) ...
 /// @endcode
+///
+/// Instead of being told poses, the thread can ask a SLAM system for them:
+///
+/// @code
+///   listeners.poll_poses = [&slam, seen = orbis::slam::pose_revision{}](auto& poses, bool always) mutable {
+///     if (always) seen.map = orbis::slam::no_id;
+///     const auto now = slam.keyframes_since(seen);
+///     if (now) for (const auto& k : *now) poses.push_back({k.frame, k.T_world_camera});
+///     return now.has_value();
+///   };
+/// @endcode
 #pragma once
 
 #include <algorithm>
