@@ -9,30 +9,20 @@
 /// Vision", 2003, section 5.3, for the decomposition of homographies.
 #pragma once
 
-#include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <span>
 #include <string>
-#include <utility>
 #include <vector>
 
-#include <Eigen/LU>
-
 #include <orbis/camera/model.hpp>
-#include <orbis/core/jacobi.hpp>
-#include <orbis/core/random.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/core/types.hpp>
-#include <orbis/optimize/detail/minimal/essential_estimator.hpp>
-#include <orbis/optimize/detail/minimal/homography_estimator.hpp>
 #include <orbis/optimize/detail/minimal/image_matches.hpp>
 #include <orbis/optimize/ransac.hpp>
-#include <orbis/optimize/triangulation.hpp>
 
 namespace orbis::optimize {
 
@@ -56,9 +46,15 @@ struct relative_pose_estimate {
 };
 
 /// The four poses `T_second_first`, with translations of length 1, that an essential matrix may stand for.
-[[nodiscard]] inline std::array<se3, 4> decompose_essential(const mat3& essential) {
-  return detail::decompose_essential(essential);
-}
+[[nodiscard]] std::array<se3, 4> decompose_essential(const mat3& essential);
+
+namespace detail {
+
+/// What `estimate_essential` does with the usable matches of `n`.
+[[nodiscard]] result<relative_pose_estimate> essential_of_matches(const std::vector<image_match>& matches,
+                                                                  std::size_t n, const essential_options& options);
+
+}  // namespace detail
 
 /// The essential matrix, and the relative pose, that most matches agree with: five points in RANSAC, each new best
 /// matrix refined on its inliers. `first_pixels[i]` matches `second_pixels[i]`. Matches that are not finite or cannot
@@ -83,56 +79,7 @@ template <camera::camera_model First, camera::camera_model Second>
     return fail(errc::degenerate, where,
                 "of " + std::to_string(n) + " matches " + std::to_string(matches.size()) +
                     " are finite and in the cameras' views, five are needed");
-  const detail::essential_estimator estimator(matches);
-  auto found =
-      ransac(estimator, asked, ransac_policies{msac{}, uniform_sampling{}, sprt(2000.0), iterated_refinement{}});
-  if (!found) return fail(found.error().code, where, found.error().message);
-  const double squared_threshold = options.threshold * options.threshold;
-  const std::size_t by_rotation = detail::explained_by_rotation(matches, found->inliers, squared_threshold);
-  if (10 * by_rotation >= 9 * found->inliers.size())
-    return fail(errc::degenerate, where,
-                "no parallax: a rotation alone explains " + std::to_string(by_rotation) + " of " +
-                    std::to_string(found->inliers.size()) + " inliers");
-
-  mat3 essential = detail::polished(estimator, *found, squared_threshold, options.min_inliers);
-  essential *= std::sqrt(2.0) / essential.norm();
-  relative_pose_estimate out;
-  out.essential = essential;
-  out.iterations = found->iterations;
-  std::vector<std::uint32_t> inside;
-  double sum = 0.0;
-  for (std::size_t i = 0; i != matches.size(); ++i) {
-    const double e = estimator.squared_error(essential, i);
-    if (!(e < squared_threshold)) continue;
-    sum += e;
-    inside.push_back(static_cast<std::uint32_t>(i));
-    out.inliers.push_back(matches[i].original);
-  }
-  std::sort(out.inliers.begin(), out.inliers.end());
-  if (auto enough = detail::enough_inliers(where, inside.size(), n, options.min_inliers, 5); !enough)
-    return fail(std::move(enough.error()));
-  out.rmse = std::sqrt(sum / static_cast<double>(inside.size()));
-  // Of the four poses, the one from which the most points are in front of both cameras.
-  std::vector<double> angles;
-  for (const se3& T_second_first : decompose_essential(essential)) {
-    std::size_t in_front = 0;
-    angles.clear();
-    const se3 T_first_second = T_second_first.inverse();
-    for (const std::uint32_t i : inside) {
-      const triangulation t = triangulate(se3(), matches[i].first.direction(), T_first_second,
-                                          matches[i].second.direction(), {.min_parallax = 0.0});
-      in_front += t.ok() ? 1U : 0U;
-      angles.push_back(t.parallax);
-    }
-    if (in_front <= out.in_front && out.in_front != 0) continue;
-    out.in_front = in_front;
-    out.T_first_second = T_first_second;
-    if (angles.empty()) continue;
-    const auto middle = angles.begin() + static_cast<std::ptrdiff_t>(angles.size() / 2);
-    std::nth_element(angles.begin(), middle, angles.end());
-    out.parallax = *middle;
-  }
-  return out;
+  return detail::essential_of_matches(matches, n, options);
 }
 
 /// As above, for two images of one camera.
@@ -171,13 +118,8 @@ struct plane_motion {
 
 /// The homography that takes `first[i]` to `second[i]` (pixels). Empty if three points of an image lie on one line, or
 /// if no plane in front of both cameras gives these points.
-[[nodiscard]] inline std::optional<mat3> homography_of_four(const std::array<vec2, 4>& first,
-                                                            const std::array<vec2, 4>& second) {
-  mat3 h;
-  if (!detail::homography_of_four(first, second, h)) return std::nullopt;
-  if (h(2, 2) != 0.0) h /= double{h(2, 2)};
-  return h;
-}
+[[nodiscard]] std::optional<mat3> homography_of_four(const std::array<vec2, 4>& first,
+                                                     const std::array<vec2, 4>& second);
 
 /// The homography that most matches agree with: four points in RANSAC, each new best one refined on its inliers (least
 /// squares of the transfer errors in both images). `first[i]` matches `second[i]`, in undistorted pixels. Matches that
@@ -185,130 +127,17 @@ struct plane_motion {
 /// Errors: `invalid_argument` for spans of different length or options out of range; `no_data` below four matches;
 /// `degenerate` if fewer than four are finite, all points of an image lie on one line, or no homography has
 /// `min_inliers` inliers. The message says which.
-[[nodiscard]] inline result<homography_estimate> estimate_homography(std::span<const vec2> first,
-                                                                     std::span<const vec2> second,
-                                                                     const homography_options& options = {}) {
-  constexpr const char* where = "homography";
-  using estimator_type = detail::homography_estimator;
-  const std::size_t n = first.size();
-  if (n != second.size()) return fail(errc::invalid_argument, where, "the lists of pixels differ in length");
-  ransac_options asked = detail::ransac_part(options);
-  if (const char* const fault = detail::fault_of(asked)) return fail(errc::invalid_argument, where, fault);
-  if (n < 4) return fail(errc::no_data, where, "fewer than four matches");
-  std::vector<typename estimator_type::match> matches;
-  matches.reserve(n);
-  vec2 first_centre = vec2::Zero(), second_centre = vec2::Zero();
-  for (std::size_t i = 0; i != n; ++i) {
-    if (!first[i].allFinite() || !second[i].allFinite()) continue;
-    matches.push_back({first[i], second[i], static_cast<std::uint32_t>(i)});
-    first_centre += first[i];
-    second_centre += second[i];
-  }
-  if (matches.size() < 4)
-    return fail(
-        errc::degenerate, where,
-        "of " + std::to_string(n) + " matches " + std::to_string(matches.size()) + " are finite, four are needed");
-  first_centre /= static_cast<double>(matches.size());
-  second_centre /= static_cast<double>(matches.size());
-  // About the centres and in units of the size of the images, so that the entries of H have one magnitude.
-  double size = 0.0;
-  mat2 first_spread = mat2::Zero(), second_spread = mat2::Zero();
-  for (auto& m : matches) {
-    m.first -= first_centre;
-    m.second -= second_centre;
-    first_spread += m.first * m.first.transpose();
-    second_spread += m.second * m.second.transpose();
-  }
-  size = std::sqrt((first_spread.trace() + second_spread.trace()) / static_cast<double>(2 * matches.size()));
-  const double threshold = options.threshold / size;
-  if (!(size > 0.0) || !std::isfinite(threshold))
-    return fail(errc::degenerate, where, "the points all lie on one line or in one place");
-  for (auto& m : matches) {
-    m.first /= size;
-    m.second /= size;
-  }
-  random_bits random(mix64(options.seed));
-  shuffle(matches, random);
-
-  const estimator_type estimator(matches);
-  asked.threshold = threshold;
-  auto found = ransac(estimator, asked, ransac_policies{msac{}, uniform_sampling{}, sprt{}, iterated_refinement{}});
-  if (!found) {
-    const auto is_line = [](const mat2& spread) {
-      return !(spread.determinant() > 1e-12 * spread.trace() * spread.trace());
-    };
-    if (found.error().code == errc::degenerate && (is_line(first_spread) || is_line(second_spread)))
-      return fail(errc::degenerate, where, "the points all lie on one line or in one place");
-    return fail(found.error().code, where, found.error().message);
-  }
-  const typename estimator_type::model model =
-      detail::polished(estimator, *found, threshold * threshold, options.min_inliers);
-  homography_estimate out;
-  out.iterations = found->iterations;
-  double sum = 0.0;
-  for (std::size_t i = 0; i != matches.size(); ++i) {
-    const double e = estimator.squared_error(model, i);
-    if (!(e < threshold * threshold)) continue;
-    sum += e;
-    out.inliers.push_back(matches[i].original);
-  }
-  std::sort(out.inliers.begin(), out.inliers.end());
-  if (auto enough = detail::enough_inliers(where, out.inliers.size(), n, options.min_inliers, 4); !enough)
-    return fail(std::move(enough.error()));
-  out.rmse = size * std::sqrt(sum / static_cast<double>(out.inliers.size()));
-  // Back from the centres.
-  mat3 to_centre = mat3::Identity(), from_centre = mat3::Identity();
-  for (int i = 0; i != 2; ++i) {
-    to_centre(i, i) = 1.0 / size;
-    to_centre(i, 2) = -first_centre[i] / size;
-    from_centre(i, i) = size;
-    from_centre(i, 2) = second_centre[i];
-  }
-  const mat3 whole = from_centre * model.forward * to_centre;
-  out.H_second_first = whole / (whole(2, 2) != 0.0 ? whole(2, 2) : whole.norm());
-  return out;
-}
+[[nodiscard]] result<homography_estimate> estimate_homography(std::span<const vec2> first, std::span<const vec2> second,
+                                                              const homography_options& options = {});
 
 /// The motions that a homography between rays at z = 1 may stand for, whatever its scale and sign: two, or one if there
 /// is no translation. (Two more would have the plane behind the first camera.) `ray` is any matched ray of the first
 /// camera, which lies in front of it. Errors: `degenerate` if the homography is singular or not finite.
-[[nodiscard]] inline result<std::vector<plane_motion>> decompose_homography(const mat3& homography,
-                                                                            const vec3& ray = vec3::UnitZ()) {
-  constexpr const char* where = "homography";
-  mat3 h = homography;
-  if (!h.allFinite()) return fail(errc::degenerate, where, "is not finite");
-  const auto [squares, vectors] = eigen_of_symmetric<3>(mat3(h.transpose() * h));
-  const double middle = std::sqrt(std::fmax(0.0, squares[1]));
-  if (!(squares[0] > 1e-20 * squares[2])) return fail(errc::degenerate, where, "is singular");
-  // R + t n^T has the middle singular value 1, and a positive determinant where camera and plane are on proper sides.
-  h /= middle;
-  if (h.determinant() < 0.0) h = -h;
-  const double s1 = squares[2] / (middle * middle), s3 = squares[0] / (middle * middle);
-  std::vector<plane_motion> motions;
-  if (!(s1 - s3 > 1e-12)) {
-    motions.push_back({so3(h), vec3::Zero(), vec3(ray).normalized()});
-    return motions;
-  }
-  mat3 v;
-  for (int k = 0; k != 3; ++k) v.col(k) = vectors.col(2 - k);
-  if (v.determinant() < 0.0) v = -v;
-  const double a = std::sqrt(std::fmax(0.0, 1.0 - s3) / (s1 - s3)), b = std::sqrt(std::fmax(0.0, s1 - 1.0) / (s1 - s3));
-  for (const double sign : {1.0, -1.0}) {
-    const vec3 u = a * v.col(0) + sign * b * v.col(2);
-    mat3 before, after;
-    before << v.col(1), u, v.col(1).cross(u);
-    const vec3 hv = h * v.col(1), hu = h * u;
-    after << hv, hu, hv.cross(hu);
-    const so3 rotation(mat3(after * before.transpose()));
-    vec3 normal = before.col(2);
-    vec3 translation = (h - rotation.rotation_matrix()) * normal;
-    if (normal.dot(ray) < 0.0) {
-      normal = -normal;
-      translation = -translation;
-    }
-    motions.push_back({rotation, translation, normal});
-  }
-  return motions;
-}
+[[nodiscard]] result<std::vector<plane_motion>> decompose_homography(const mat3& homography,
+                                                                     const vec3& ray = vec3::UnitZ());
 
 }  // namespace orbis::optimize
+
+#ifndef ORBIS_COMPILED
+#include <orbis/optimize/detail/compiled/two_view_functions.hpp>
+#endif

@@ -12,7 +12,7 @@
 #include <orbis/core/execution.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/optimize/pose_graph.hpp>
-#include <orbis/slam/detail/compiled/compiled_once.hpp>
+#include <orbis/core/compiled_once.hpp>
 #include <orbis/slam/detail/loops/essential_graph.hpp>
 
 namespace orbis::slam::detail {

@@ -15,7 +15,7 @@
 #include <orbis/core/bytes.hpp>
 #include <orbis/core/file.hpp>
 #include <orbis/core/result.hpp>
-#include <orbis/slam/detail/compiled/compiled_once.hpp>
+#include <orbis/core/compiled_once.hpp>
 #include <orbis/slam/detail/map/file_sections.hpp>
 #include <orbis/slam/detail/map/map_reader.hpp>
 #include <orbis/slam/detail/map/map_writer.hpp>
