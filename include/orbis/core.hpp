@@ -16,11 +16,13 @@
 /// | `rounded.hpp` | products that no sum is fused with; sines that are the same bits everywhere |
 /// | `simd.hpp` | vector kernels, written once for every instruction set |
 /// | `hash_index.hpp` | hash tables from keys to positions |
+/// | `compiled_once.hpp` | for authors of components: what is inline, or compiled once in `orbis::compiled` |
 /// | `bits.hpp, bytes.hpp` | counts and strings of bits; byte orders, checksums, bytes as text |
 #pragma once
 
 #include <orbis/core/bits.hpp>
 #include <orbis/core/bytes.hpp>
+#include <orbis/core/compiled_once.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/file.hpp>
 #include <orbis/core/hash_index.hpp>
