@@ -4,6 +4,7 @@
 
 #include <orbis/camera/pinhole.hpp>
 #include <orbis/camera/radial_tangential.hpp>
+#include <orbis/optimize/triangulation.hpp>
 #include <orbis/optimize/two_view.hpp>
 
 #include "support.hpp"
