@@ -159,11 +159,20 @@ std::optional<exit_code> read_config(CLI::App& cmd, const std::string& path) {
   return std::nullopt;
 }
 
+/// "x,y,z"; nothing if it is not.
+std::optional<orbis::vec3> vector_of(const std::string& text) {
+  orbis::vec3 p;
+  char rest = 0;
+  if (std::sscanf(text.c_str(), "%lf,%lf,%lf%c", &p.x(), &p.y(), &p.z(), &rest) != 3 || !p.allFinite())
+    return std::nullopt;
+  return p;
+}
+
 }  // namespace
 
 std::variant<settings, exit_code> read_command_line(int argc, char** argv) {
   settings s;
-  std::string origin;
+  std::string origin, gravity;
 
   CLI::App cli{"RGB-D SLAM and mapping: from a recording to a trajectory, a cloud and an octree map", "rgbd_slam"};
   cli.require_subcommand(1);
@@ -208,6 +217,11 @@ std::variant<settings, exit_code> read_command_line(int argc, char** argv) {
   add_map_options(*map, s);
 
   for (CLI::App* cmd : {run, demo, map})
+    cmd->add_option("--gravity", gravity,
+                    "where it pulls at the first frame, in the camera's frame: x right, y down, z forward. Without it "
+                    "the depth image has to tell")
+        ->type_name("X,Y,Z");
+  for (CLI::App* cmd : {run, demo, map})
     cmd->add_option("--config", s.config, "options from a TOML file: resolution = 0.02")->type_name("FILE");
   for (CLI::App* cmd : {run, demo, eval, map}) cmd->get_formatter()->column_width(28);
 
@@ -231,11 +245,13 @@ std::variant<settings, exit_code> read_command_line(int argc, char** argv) {
   if (!s.config.empty())
     if (const auto failed = read_config(*chosen, s.config.string())) return *failed;
   if (!origin.empty()) {
-    orbis::vec3 p;
-    char rest = 0;
-    if (std::sscanf(origin.c_str(), "%lf,%lf,%lf%c", &p.x(), &p.y(), &p.z(), &rest) != 3 || !p.allFinite())
-      return complain("--origin: \"" + origin + "\" is not x,y,z in metres", bad_usage);
-    s.origin = p;
+    s.origin = vector_of(origin);
+    if (!s.origin) return complain("--origin: \"" + origin + "\" is not x,y,z in metres", bad_usage);
+  }
+  if (!gravity.empty()) {
+    s.gravity = vector_of(gravity);
+    if (!s.gravity || s.gravity->isZero())
+      return complain("--gravity: \"" + gravity + "\" is not a direction x,y,z", bad_usage);
   }
   if (const std::string what = contradiction(s); !what.empty()) return complain(what, bad_usage);
   return s;

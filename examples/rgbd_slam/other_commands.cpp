@@ -14,19 +14,32 @@
 #include "output.hpp"
 #include "result_files.hpp"
 #include "summary.hpp"
+#include "tracking_stage.hpp"
+#include "upright_world.hpp"
 
 namespace app {
 namespace {
 
 /// All frames whose pose the ground truth knows.
-orbis::result<posed_frames> frames_with_poses(const frame_source& source, const settings& s, console& console) {
+orbis::result<posed_frames> frames_with_poses(const frame_source& source, const settings& s,
+                                              const std::filesystem::path& spill_file,
+                                              std::optional<world_results>& world, console& console) {
   console.stage("reading");
-  posed_frames posed{source};
+  posed_frames posed{source, spill_file};
+  orbis::se3 T_world_truth;
   read_ahead frames{source, s.threads != 1};
   for (std::size_t i = 0; frames.has_next(); ++i) {
     const auto frame = frames.next();
     if (!frame) return orbis::fail(frame.error());
-    if (frame->T_world_camera) posed.add(i, *frame->T_world_camera, *frame);
+    if (frame->T_world_camera) {
+      if (posed.size() == 0) {
+        upright_worlds worlds{source, s};
+        T_world_truth = worlds.begin_with(*frame, true) * frame->T_world_camera->inverse();
+        world = worlds.begun_at(frame->timestamp);
+        if (world->up_from == "ground truth") T_world_truth = {};
+      }
+      posed.add(i, T_world_truth * *frame->T_world_camera, *frame);
+    }
     console.advance(i + 1, source.frames);
   }
   if (posed.size() == 0)
@@ -43,11 +56,14 @@ struct mapped {
 
 orbis::result<mapped> map_recording(const frame_source& source, const settings& s, const std::filesystem::path& folder,
                                     console& console) {
-  const auto posed = frames_with_poses(source, s, console);
+  std::optional<world_results> world;
+  const auto posed = frames_with_poses(source, s, folder / spill_name, world, console);
   if (!posed) return orbis::fail(posed.error());
   auto map = map_frames(*posed, source, s, console);
   if (!map) return orbis::fail(map.error());
   results r = begin_results(s, source.title, &source, folder);
+  r.world = world;
+  for (const std::string& note : mapping_notes(*posed, world)) console.warn(r.warnings.emplace_back(note));
   r.truth_note = "Mapped with the poses of the ground truth.";
   return mapped{std::move(r), *std::move(map), posed->trajectory()};
 }

@@ -53,10 +53,6 @@ results begin_results(const settings& s, const std::string& title, const frame_s
     r.setup.emplace_back(
         "frames", std::to_string(source->frames) + (s.stride > 1 ? ", every " + std::to_string(s.stride) + "th" : ""));
     if (s.what == command::run || s.what == command::demo) {
-      r.setup.emplace_back("world", !s.load_map.empty()            ? "the loaded map's, where the camera is found in it"
-                                    : source->ground_truth.empty() ? "the first tracked camera"
-                                                                   : "the ground truth's, by its pose of the first "
-                                                                     "tracked frame");
       if (!s.load_map.empty())
         r.setup.emplace_back("map of landmarks", "begun with " + s.load_map.filename().string() +
                                                      (s.localize_only ? ", which stays as it is" : ""));
@@ -122,6 +118,7 @@ exit_code report_no_start(results& r, const orbis::error& why, result_files& fil
 void print_results(const results& r, console& console) {
   std::string text;
   if (r.map) text.append("\n").append(size_table(*r.map)).append("\n\n").append(filter_lines(*r.map)).append("\n");
+  if (r.world) text.append("\n  World  ").append(world_text(*r.world)).append("\n");
   if (r.against_truth) text.append("\n").append(accuracy_lines(*r.against_truth)).append("\n");
   if (r.map && r.map->error_m) {
     char buffer[96];

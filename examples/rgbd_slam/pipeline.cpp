@@ -23,7 +23,7 @@ exit_code run_slam(const settings& s, console& console) {
   results r = begin_results(s, source->title, &*source, files->folder());
 
   // Track; some frames become keyframes.
-  const auto attempt = track(*source, s, files->landmark_map(), console);
+  const auto attempt = track(*source, s, files->landmark_map(), files->folder() / spill_name, console);
   if (!attempt) return give_up(attempt.error());
   const tracked_frames& tracked = *attempt;
   if (tracked.stopped && tracked.slam.frames == 0) return give_up(*tracked.stopped);
@@ -33,6 +33,7 @@ exit_code run_slam(const settings& s, console& console) {
   for (const std::string& note : tracking_notes(tracked, s)) console.warn(r.warnings.emplace_back(note));
   if (tracked.missed_map) r.warnings.push_back(explain_miss(tracked, s).to_string());
   r.slam = tracked.slam;
+  r.world = tracked.world;
   if (r.slam->tracked == 0 && interrupts::requested())
     return give_up({orbis::errc::cancelled, s.out.string(), "interrupted before a frame was tracked: left as it was"}),
            interrupted;

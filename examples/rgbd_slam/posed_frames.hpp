@@ -1,17 +1,18 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The frames that go into the map, as a range of keyframes that can be gone through again and
-/// again: the first ones are kept in memory, the rest is read again when its turn comes.
+/// The frames that go into the map, as a range of keyframes that can be gone through again and again. Depth is kept
+/// compressed; colour, which is needed once, is read again. One frame at a time is unpacked.
 #pragma once
 
-#include <algorithm>
 #include <cstddef>
+#include <filesystem>
 #include <iterator>
 #include <memory>
 #include <optional>
 #include <utility>
 #include <vector>
 
+#include <orbis/mapping/depth_store.hpp>
 #include <orbis/mapping/keyframe.hpp>
 #include <orbis/slam/atlas.hpp>
 
@@ -19,17 +20,27 @@
 
 namespace app {
 
+/// The name of the spill file, in the folder where the files are made; it loses it as soon as it is there.
+inline constexpr const char* spill_name = "depth.spill";
+
 class posed_frames {
+  struct unpacked {
+    orbis::image<std::uint16_t> depth;
+    std::optional<orbis::image<orbis::rgb8>> color;  // once it was asked for
+  };
+
  public:
-  explicit posed_frames(const frame_source& source) : source_{&source} {}
+  /// `spill_file`: for depth beyond what there is room for in memory; see `depth_store_options`.
+  posed_frames(const frame_source& source, std::filesystem::path spill_file)
+      : source_{&source}, depths_{{.memory_budget = std::size_t{32} << 20U, .spill_file = std::move(spill_file)}} {}
 
   /// Frame number `i` of the source, where the camera was at `T_world_camera`.
   void add(std::size_t i, const orbis::se3& T_world_camera, const orbis::camera::rgbd_frame& frame) {
-    entries_.push_back({i, {}, T_world_camera, kept_of(frame)});
+    add({i, {}, T_world_camera}, frame);
   }
   /// Frame number `i` of the source, which has become a keyframe; where it was is said in the end (`place`).
   void add(std::size_t i, orbis::slam::map_keyframe keyframe, const orbis::camera::rgbd_frame& frame) {
-    entries_.push_back({i, keyframe, {}, kept_of(frame)});
+    add({i, keyframe, {}}, frame);
   }
   /// Puts each frame where `where(keyframe)` says; those of which it says nothing are dropped.
   template <class Where>
@@ -37,6 +48,7 @@ class posed_frames {
     std::erase_if(entries_, [&](entry& e) {
       const std::optional<orbis::se3> T_world_camera = where(e.keyframe);
       if (T_world_camera) e.T_world_camera = *T_world_camera;
+      if (!T_world_camera) depths_.erase(e.index);
       return !T_world_camera;
     });
   }
@@ -48,10 +60,32 @@ class posed_frames {
     return poses;
   }
 
+  /// A frame's colours, which are read when they are asked for.
+  class colors {
+   public:
+    colors(const posed_frames& of, std::size_t index, std::shared_ptr<unpacked> images)
+        : of_{&of}, index_{index}, images_{std::move(images)} {}
+    operator orbis::image_view<const orbis::rgb8>() const {  // NOLINT(google-explicit-constructor)
+      if (!images_->color) images_->color = of_->read_color(index_);
+      return images_->color->view();
+    }
+
+   private:
+    const posed_frames* of_;
+    std::size_t index_;
+    std::shared_ptr<unpacked> images_;
+  };
+  /// What `mapping::keyframe` is. Its images last as long as it does, or a copy of it.
+  struct value {
+    orbis::camera::depth_view<std::uint16_t> depth;
+    colors color;
+    orbis::se3 T_world_camera;
+  };
+
   class iterator {
    public:
     using iterator_category = std::forward_iterator_tag;
-    using value_type = orbis::mapping::keyframe<>;
+    using value_type = value;
     using difference_type = std::ptrdiff_t;
     using reference = value_type;
     using pointer = void;
@@ -59,12 +93,14 @@ class posed_frames {
     iterator() = default;
     iterator(const posed_frames& of, std::size_t at) : of_{&of}, at_{at} {}
     [[nodiscard]] reference operator*() const {
-      if (!frame_) frame_ = of_->load(at_);
-      return {frame_->depth_metres(), frame_->color.view(), of_->entries_[at_].T_world_camera};
+      if (!images_) images_ = of_->unpack(at_);
+      const entry& e = of_->entries_[at_];
+      return {orbis::camera::depth_view<std::uint16_t>(images_->depth.view(), of_->source_->camera.depth_scale),
+              colors{*of_, e.index, images_}, e.T_world_camera};
     }
     iterator& operator++() {
       ++at_;
-      frame_.reset();
+      images_.reset();
       return *this;
     }
     iterator operator++(int) {
@@ -77,12 +113,14 @@ class posed_frames {
    private:
     const posed_frames* of_ = nullptr;
     std::size_t at_ = 0;
-    mutable std::shared_ptr<const orbis::camera::rgbd_frame> frame_;  // what the value points to
+    mutable std::shared_ptr<unpacked> images_;  // what the value points to
   };
   [[nodiscard]] iterator begin() const { return {*this, 0}; }
   [[nodiscard]] iterator end() const { return {*this, size()}; }
 
-  /// Why a frame could not be read again, if so; it then had no pixels.
+  /// Why depth images that should be in the spill file are in memory instead, if so.
+  [[nodiscard]] const std::optional<orbis::error>& unspilled() const { return unspilled_; }
+  /// Why an image could not be had again, if so; it then had no pixels.
   [[nodiscard]] const std::optional<orbis::error>& trouble() const { return trouble_; }
 
  private:
@@ -90,29 +128,28 @@ class posed_frames {
     std::size_t index;
     orbis::slam::map_keyframe keyframe;
     orbis::se3 T_world_camera;
-    std::shared_ptr<const orbis::camera::rgbd_frame> frame;
   };
 
-  /// A copy, while there is room for it.
-  [[nodiscard]] std::shared_ptr<const orbis::camera::rgbd_frame> kept_of(const orbis::camera::rgbd_frame& frame) {
-    constexpr std::size_t budget = std::size_t{512} << 20U;
-    const std::size_t bytes = frame.color.pixels().size_bytes() + frame.depth.pixels().size_bytes();
-    if (in_memory_ + bytes > budget) return nullptr;
-    in_memory_ += bytes;
-    return std::make_shared<const orbis::camera::rgbd_frame>(frame);
+  void add(const entry& e, const orbis::camera::rgbd_frame& frame) {
+    entries_.push_back(e);
+    if (auto kept = depths_.put(e.index, frame.depth); !kept) unspilled_ = kept.error();
   }
-
-  [[nodiscard]] std::shared_ptr<const orbis::camera::rgbd_frame> load(std::size_t number) const {
-    if (entries_[number].frame) return entries_[number].frame;
-    auto frame = source_->frame(entries_[number].index);
-    if (frame) return std::make_shared<const orbis::camera::rgbd_frame>(*std::move(frame));
-    trouble_ = frame.error();
-    return std::make_shared<const orbis::camera::rgbd_frame>();
+  [[nodiscard]] std::shared_ptr<unpacked> unpack(std::size_t number) const {
+    auto images = std::make_shared<unpacked>();
+    if (auto done = depths_.get(entries_[number].index, images->depth); !done) trouble_ = done.error();
+    return images;
+  }
+  [[nodiscard]] orbis::image<orbis::rgb8> read_color(std::size_t index) const {
+    auto read = source_->color(index);
+    if (read) return *std::move(read);
+    trouble_ = read.error();
+    return {};
   }
 
   const frame_source* source_;
   std::vector<entry> entries_;
-  std::size_t in_memory_ = 0;
+  orbis::mapping::depth_store depths_;
+  std::optional<orbis::error> unspilled_;
   mutable std::optional<orbis::error> trouble_;
 };
 

@@ -332,6 +332,7 @@ std::string tables(const results& r, const view_frame& frame) {
     t += "</table></div>\n";
   }
   auto setup = r.setup;
+  if (r.world) setup.emplace_back("world", world_text(*r.world));
   setup.emplace_back("pictures", std::string{view_frame_note} + "; T_view_world " + view_frame_text(frame));
   return t + "<h2>What was used</h2>\n" + words(setup);
 }

@@ -62,6 +62,12 @@ struct accuracy {
   orbis::se3 T_truth_map;       ///< aligns them by positions and orientations: well determined on a short path too
 };
 
+/// The world that trajectory, clouds and maps are in. Its z is up.
+struct world_results {
+  std::string up_from;               ///< "gravity", "floor", "walls", "assumed", "ground truth" or "loaded map"
+  std::optional<double> confidence;  ///< 0 ... 1, of what the depth image of the first frame says
+};
+
 /// Frames one after the other.
 struct frame_range {
   std::size_t first = 0, count = 0;
@@ -82,6 +88,7 @@ struct results {
   std::filesystem::path out;                               ///< where they are in the end
   std::vector<std::string> files, files_of_earlier_runs;   ///< names of what is in `out` in the end
   std::vector<std::pair<std::string, std::string>> setup;  ///< what was used, in words
+  std::optional<world_results> world;                      ///< empty: that of a cloud, which nobody turned
   std::optional<slam_results> slam;
   std::optional<map_results> map;
   std::optional<accuracy> against_truth;

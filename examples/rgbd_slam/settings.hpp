@@ -27,12 +27,13 @@ struct settings {
   std::filesystem::path config;     ///< file with options; empty: none
 
   std::string format = "auto";
-  std::string camera;                 ///< file or preset; empty: as the recording says
-  std::size_t frames = 0;             ///< at most so many; 0: all
-  std::size_t stride = 1;             ///< every so many frames
-  std::size_t width = 640;            ///< of the synthetic camera, pixels
-  std::uint64_t seed = 1;             ///< of the synthetic recording
-  std::optional<orbis::vec3> origin;  ///< of the rays to a cloud's points (map)
+  std::string camera;                  ///< file or preset; empty: as the recording says
+  std::size_t frames = 0;              ///< at most so many; 0: all
+  std::size_t stride = 1;              ///< every so many frames
+  std::size_t width = 640;             ///< of the synthetic camera, pixels
+  std::uint64_t seed = 1;              ///< of the synthetic recording
+  std::optional<orbis::vec3> origin;   ///< of the rays to a cloud's points (map)
+  std::optional<orbis::vec3> gravity;  ///< where it pulls, in the frame of the first camera
 
   double resolution = 0.05;              ///< octree, metres
   double max_depth = 4.0;                ///< depth beyond this is left out of the map, metres

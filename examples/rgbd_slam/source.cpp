@@ -50,6 +50,7 @@ result<frame_source> open_recording(const settings& s) {
   source.camera = recording->camera();
   source.frames = limited(recording->size(), s);
   source.frame = [recording, stride = s.stride](std::size_t i) { return recording->frame(i * stride); };
+  source.color = [recording, stride = s.stride](std::size_t i) { return recording->color(i * stride); };
   source.ground_truth = recording->ground_truth();
   source.files = recording->files();
   source.notes.assign(recording->notes().begin(), recording->notes().end());
@@ -72,6 +73,11 @@ frame_source make_synthetic(const settings& s) {
   source.camera = recording->camera();
   source.frames = limited(recording->size(), s);
   source.frame = [recording, stride = s.stride](std::size_t i) { return recording->frame(i * stride); };
+  source.color = [frame = source.frame](std::size_t i) -> result<orbis::image<orbis::rgb8>> {
+    auto rendered = frame(i);
+    if (!rendered) return fail(rendered.error());
+    return std::move(rendered->color);
+  };
   source.ground_truth = recording->ground_truth();
   source.surface_distance = [recording](const orbis::vec3& p) { return recording->surface_distance(p); };
   return source;

@@ -26,6 +26,8 @@ struct frame_source {
   std::size_t frames = 0;
   /// Reads or renders a frame; `--stride` is applied already. May be called from another thread.
   std::function<orbis::result<orbis::camera::rgbd_frame>(std::size_t)> frame;
+  /// Reads or renders the colour image of a frame alone. As above.
+  std::function<orbis::result<orbis::image<orbis::rgb8>>(std::size_t)> color;
   orbis::trajectory ground_truth;            ///< empty if not known
   std::vector<std::filesystem::path> files;  ///< that it is read from
   std::vector<std::string> notes;            ///< worth a warning

@@ -65,6 +65,8 @@ std::string summary_json(const results& r) {
   j["wall_s"] = r.wall_s;
   j["fps"] = s && s->seconds > 0 ? json(static_cast<double>(s->frames) / s->seconds) : null;
   j["peak_rss_mb"] = peak_rss_mb();
+  const auto& w = r.world;
+  j["world"] = {{"up_from", w ? json(w->up_from) : null}, {"confidence", w ? or_null(w->confidence) : null}};
   j["ate_rmse_m"] = a ? json(a->ate_rmse_m) : null;
   j["rpe_trans_rmse_m"] = a ? or_null(a->rpe_trans_rmse_m) : null;
   j["rpe_rot_rmse_deg"] = a ? or_null(a->rpe_rot_rmse_deg) : null;
@@ -133,6 +135,15 @@ std::string size_table(const map_results& m) {
   table += row(octree + ", after the filter", count_text(m.filtered.leaves), "leaves", bytes_text(m.filtered.bt_bytes));
   table.pop_back();
   return table;
+}
+
+std::string world_text(const world_results& w) {
+  const std::string sure = w.confidence ? text(" (confidence %.2f)", *w.confidence) : "";
+  if (w.up_from == "loaded map") return "the loaded map's";
+  if (w.up_from == "ground truth") return "the ground truth's, whose z is up" + sure;
+  if (w.up_from == "gravity") return "z up, by gravity";
+  if (w.up_from == "assumed") return "z up, if the camera was level at the first frame";
+  return "z up, by the " + w.up_from + " of the first depth image" + sure;
 }
 
 std::string removed_text(const map_results& m) {

@@ -20,6 +20,7 @@ namespace app {
 /// The table of sizes: point cloud, octree before the filter, octree after it.
 [[nodiscard]] std::string size_table(const map_results& m);
 /// "123 of 4,567 points (2.69 %)": what the filter took away.
+[[nodiscard]] std::string world_text(const world_results& w);
 [[nodiscard]] std::string removed_text(const map_results& m);
 /// Which filter it was, what it removed, and why it was chosen.
 [[nodiscard]] std::string filter_lines(const map_results& m);

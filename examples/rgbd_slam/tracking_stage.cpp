@@ -2,12 +2,12 @@
 #include "tracking_stage.hpp"
 
 #include <chrono>
-#include <map>
 #include <string>
 
 #include <orbis/slam/rgbd_system.hpp>
 
 #include "interrupts.hpp"
+#include "upright_world.hpp"
 
 namespace app {
 namespace {
@@ -24,13 +24,11 @@ orbis::slam::options options_for(const frame_source& source, const settings& s) 
   return options;
 }
 
-/// The ground truth's poses of the frames, by time stamp, where they are known.
-using known_poses = std::map<double, se3>;
-
-/// Feeds the frames to SLAM, up to the first that cannot be read, or to Ctrl-C.
-known_poses track_frames(slam_system& slam, const frame_source& source, const settings& s, tracked_frames& out,
-                         console& console) {
-  known_poses truth;
+/// Feeds the frames to SLAM, up to the first that cannot be read, or to Ctrl-C. Every map begins in a world of its own.
+upright_worlds track_frames(slam_system& slam, const frame_source& source, const settings& s, tracked_frames& out,
+                            console& console) {
+  using orbis::slam::track_state;
+  upright_worlds worlds{source, s};
   read_ahead frames{source, s.threads != 1};
   for (std::size_t i = 0; frames.has_next() && !interrupts::requested(); ++i) {
     const auto frame = frames.next();
@@ -38,36 +36,35 @@ known_poses track_frames(slam_system& slam, const frame_source& source, const se
       out.stopped = frame.error();
       break;
     }
+    if (const track_state state = slam.state(); state == track_state::not_started || state == track_state::lost)
+      slam.set_initial_pose(worlds.begin_with(*frame, state == track_state::not_started));
     const auto start = console::clock::now();
     const orbis::slam::track_result found = slam.track(*frame);
     const std::chrono::duration<double, std::milli> took = console::clock::now() - start;
     out.slam.tracking_ms.push_back(took.count());
-    if (found.state == orbis::slam::track_state::lost) {
+    if (found.state == track_state::lost) {
       auto& lost = out.slam.lost_stretches;
       if (lost.empty() || lost.back().first + lost.back().count != i) lost.push_back({i, 0});
       ++lost.back().count;
     }
-    if (frame->T_world_camera) truth.emplace(frame->timestamp, *frame->T_world_camera);
     if (found.keyframe) out.keyframes.add(i, {found.map, *found.keyframe}, *frame);
     console.advance(i + 1, source.frames,
                     std::string{to_string(found.state)} + ", " + std::to_string(out.keyframes.size()) + " keyframes");
   }
-  return truth;
+  return worlds;
 }
 
-/// Takes over the active map and what was found out, in the world that `T_world_slam` makes of the map's.
-void collect(const slam_system& slam, const se3& T_world_slam, tracked_frames& out) {
+/// Takes over the active map and what was found out.
+void collect(const slam_system& slam, tracked_frames& out) {
   out.slam.trajectory = slam.trajectory();
   out.slam.keyframes = slam.keyframe_trajectory();
-  for (orbis::trajectory* poses : {&out.slam.trajectory, &out.slam.keyframes})
-    for (orbis::stamped_pose& p : *poses) p.T_world_camera = T_world_slam * p.T_world_camera;
   // Keyframes have moved since they were made, and some are in maps that were never joined with this one. Those that
   // were culled were redundant to the landmarks, not to the dense cloud.
   slam.inspect([&](const orbis::slam::atlas& maps) {
     out.keyframes.place([&](const orbis::slam::map_keyframe& made) -> std::optional<se3> {
       const orbis::slam::map_keyframe now = maps.current(made);
       if (now.map != maps.active_id()) return std::nullopt;
-      return T_world_slam * maps.active().pose_of(now.keyframe);
+      return maps.active().pose_of(now.keyframe);
     });
   });
   const orbis::slam::track_counters counters = slam.counters();
@@ -79,13 +76,6 @@ void collect(const slam_system& slam, const se3& T_world_slam, tracked_frames& o
   out.slam.maps_merged = counters.maps_merged;
   out.slam.keyframes_culled = counters.keyframes_culled;
   out.slam.landmarks = slam.landmark_count();
-}
-
-/// Saves the active map in the world of the trajectory that is written beside it.
-orbis::result<void> save_map(const slam_system& slam, const se3& T_world_slam, const std::filesystem::path& path) {
-  orbis::slam::map map = slam.inspect([](const orbis::slam::atlas& maps) { return maps.active(); });
-  map.transform(T_world_slam);
-  return orbis::slam::write_map(path, map);
 }
 
 bool is_same_file(const std::filesystem::path& a, const std::filesystem::path& b) {
@@ -105,19 +95,21 @@ std::string in_words(const slam_results& slam) {
 }  // namespace
 
 orbis::result<tracked_frames> track(const frame_source& source, const settings& s,
-                                    const std::filesystem::path& landmark_map, console& console) {
+                                    const std::filesystem::path& landmark_map, const std::filesystem::path& spill_file,
+                                    console& console) {
   console.stage("tracking");
   slam_system slam{source.camera.model, options_for(source, s)};
   if (!s.load_map.empty())
     if (auto loaded = slam.load_map(s.load_map); !loaded) return orbis::fail(loaded.error());
   const map_id first_map = slam.active_map();
 
-  tracked_frames out{.slam = {}, .keyframes = posed_frames{source}, .stopped = {}, .unsaved = {}};
+  tracked_frames out{
+      .slam = {}, .world = {}, .keyframes = posed_frames{source, spill_file}, .stopped = {}, .unsaved = {}};
   interrupts::keep_results(s.quiet
                                ? ""
                                : "\nrgbd_slam: stopping; what was reached is mapped and written. Once more: stop at "
                                  "once, and leave the folder as it was\n");
-  const known_poses truth = track_frames(slam, source, s, out, console);
+  const upright_worlds worlds = track_frames(slam, source, s, out, console);
   slam.wait();
 
   // The results are about the loaded map where the camera was found in it, else about the one with the most frames.
@@ -126,13 +118,11 @@ orbis::result<tracked_frames> track(const frame_source& source, const settings& 
   slam.activate(goes_on ? begun : slam.largest_map());
   out.missed_map = !s.load_map.empty() && !goes_on;
 
-  // SLAM's world is that of its first camera, or of the map that was loaded; ours is the ground truth's where that is
-  // known, and no map says otherwise. This is a choice of the world frame alone.
-  se3 T_world_slam;
-  if (const orbis::trajectory poses = slam.trajectory(); !poses.empty() && !goes_on)
-    if (const auto at = truth.find(poses.front().timestamp); at != truth.end())
-      T_world_slam = at->second * poses.front().T_world_camera.inverse();
-  collect(slam, T_world_slam, out);
+  collect(slam, out);
+  if (goes_on)
+    out.world = {"loaded map", {}};
+  else if (!out.slam.trajectory.empty())
+    out.world = worlds.begun_at(out.slam.trajectory.front().timestamp);
   out.slam.seconds = console.elapsed();
   console.finish(in_words(out.slam));
 
@@ -140,7 +130,7 @@ orbis::result<tracked_frames> track(const frame_source& source, const settings& 
   const bool spares_loaded = out.missed_map && is_same_file(s.load_map, s.save_map);
   if (!s.save_map.empty() && !out.slam.trajectory.empty() && !spares_loaded) {
     console.stage("saving");
-    if (auto saved = save_map(slam, T_world_slam, landmark_map))
+    if (auto saved = slam.save_map(landmark_map))
       console.finish(s.save_map.string());
     else
       out.unsaved = saved.error();
@@ -163,6 +153,16 @@ orbis::error explain_miss(const tracked_frames& tracked, const settings& s) {
   return {orbis::errc::no_data, s.load_map.string(), std::move(message)};
 }
 
+std::vector<std::string> mapping_notes(const posed_frames& frames, const std::optional<world_results>& world) {
+  std::vector<std::string> notes;
+  if (world && world->up_from == "assumed")
+    notes.emplace_back(
+        "which way is up is not known: the first frame shows no floor and no two walls, so the camera is "
+        "taken to be level there (--gravity tells)");
+  if (const auto& e = frames.unspilled()) notes.push_back(e->to_string() + "; depth images are kept in memory instead");
+  return notes;
+}
+
 std::vector<std::string> tracking_notes(const tracked_frames& tracked, const settings& s) {
   std::vector<std::string> notes;
   if (const std::size_t here = tracked.slam.trajectory.size(); here < tracked.slam.tracked)
@@ -171,6 +171,7 @@ std::vector<std::string> tracking_notes(const tracked_frames& tracked, const set
                     "the rest");
   if (!s.localize_only && tracked.slam.tracked != 0 && tracked.keyframes.size() == 0)
     notes.emplace_back("no cloud and no octree: the loaded map shows all that was seen, so no frame became a keyframe");
+  for (std::string& note : mapping_notes(tracked.keyframes, tracked.world)) notes.push_back(std::move(note));
   return notes;
 }
 

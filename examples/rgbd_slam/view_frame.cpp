@@ -26,28 +26,6 @@ double planarity(const std::vector<vec3>& points, const vec3& axis) {
   return sum;
 }
 
-/// The direction within `reach` radians of `axis` that the points are most planar across; directions
-/// far from `axis` are trusted less.
-vec3 refine(const std::vector<vec3>& points, const vec3& axis, double reach, double step) {
-  const vec3 u = axis.unitOrthogonal();
-  const vec3 v = axis.cross(u);
-  vec3 best = axis;
-  double best_score = -1.0;
-  const int n = static_cast<int>(std::ceil(reach / step));
-  for (int i = -n; i <= n; ++i)
-    for (int j = -n; j <= n; ++j) {
-      const double a = i * step, b = j * step;
-      if (a * a + b * b > reach * reach) continue;
-      const vec3 direction = (axis + std::tan(a) * u + std::tan(b) * v).normalized();
-      const double score = planarity(points, direction) * std::pow(axis.dot(direction), 2.0);
-      if (score > best_score) {
-        best_score = score;
-        best = direction;
-      }
-    }
-  return best;
-}
-
 double quantile(std::vector<double> values, double q) {
   const auto at = values.begin() + static_cast<std::ptrdiff_t>(q * static_cast<double>(values.size() - 1));
   std::nth_element(values.begin(), at, values.end());
@@ -62,21 +40,14 @@ view_frame find_view_frame(const std::vector<orbis::vec3f>& points, const orbis:
   for (std::size_t i = 0; i < points.size(); i += stride)
     if (points[i].allFinite()) sample.push_back(points[i].cast<double>());
 
-  vec3 up = vec3::Zero();
-  for (const orbis::stamped_pose& c : cameras) up -= c.T_world_camera.rotation() * vec3::UnitY();
-  up = up.norm() > 1e-3 ? up.normalized() : vec3::UnitZ();
   view_frame frame;
   if (sample.empty()) return frame;
   constexpr double degree = std::numbers::pi / 180.0;
-  up = refine(sample, up, 35 * degree, 3 * degree);
-  up = refine(sample, up, 3 * degree, 0.5 * degree);
-
-  const vec3 u = up.unitOrthogonal();
-  const vec3 v = up.cross(u);
-  vec3 x = u;
+  const vec3 up = vec3::UnitZ();
+  vec3 x = vec3::UnitX();
   double best = -1.0;
   for (double yaw = 0.0; yaw < std::numbers::pi / 2; yaw += degree) {
-    const vec3 along = std::cos(yaw) * u + std::sin(yaw) * v;
+    const vec3 along(std::cos(yaw), std::sin(yaw), 0.0);
     const double score = planarity(sample, along) + planarity(sample, up.cross(along));
     if (score > best) {
       best = score;

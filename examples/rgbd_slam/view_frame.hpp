@@ -18,13 +18,13 @@ struct view_frame {
   double cut = 1.0;  ///< what lies higher hides the rest from above: a ceiling
 };
 
-/// Guesses which way is up from how the cameras were held, then turns the frame so that floors and
-/// walls fall into few, full bins. For pictures only; nothing is measured in this frame.
+/// Turns the world about its z axis so that walls fall into few, full bins, and puts the lowest points at 0. For
+/// pictures only; nothing is measured in this frame.
 [[nodiscard]] view_frame find_view_frame(const std::vector<orbis::vec3f>& points, const orbis::trajectory& cameras);
 
 /// What pictures say about it, since it is not the world's frame, in which the files are.
 inline constexpr const char* view_frame_note =
-    "drawn upright, z up, walls along x and y, floor at 0: turned against the world frame of the files";
+    "drawn with walls along x and y and the floor at 0: turned about z against the world frame of the files";
 /// The transform from the world, `tx ty tz qx qy qz qw`.
 [[nodiscard]] std::string view_frame_text(const view_frame& frame);
 

@@ -99,3 +99,9 @@ foreach(field frames tracked keyframes landmarks loops_closed maps_merged keyfra
   summary(other ${WORK}/again ${field})
   check(one STREQUAL other)
 endforeach()
+
+# The world is upright: the true room's, whose z is up; or by gravity, which here pulls along the camera's -x.
+summary(up ${WORK}/demo world up_from)
+check(up STREQUAL "ground truth")
+check(page MATCHES "whose z is up")
+app_fails(1 "is not a direction" demo --frames 5 --width 160 --gravity 0,0,0 --out never)

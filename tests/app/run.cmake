@@ -30,3 +30,17 @@ app(0 run "<script>alert(1)<" --out out --frames 5 --resolution 0.2)
 file(READ ${WORK}/out/report.html page)
 string(FIND "${page}" "<script>alert" at)
 check(at EQUAL -1)
+file(RENAME "${WORK}/<script>alert(1)<" ${WORK}/room)
+
+# The world is upright, and the summary says how that was found.
+summary(up ${WORK}/out world up_from)
+check(up STREQUAL "floor" OR up STREQUAL "walls")
+summary(confidence ${WORK}/out world confidence)
+check(confidence GREATER 0.06)
+check(out MATCHES "World  z up, by the ${up}")
+app(0 run room --out level --frames 5 --resolution 0.2 --gravity 0,2,0)
+summary(up ${WORK}/level world up_from)
+check(up STREQUAL "gravity")
+file(STRINGS ${WORK}/level/trajectory.txt poses REGEX "^[^#]")
+list(GET poses 0 first)  # at the origin; a level camera looks along x: half turns about the room's diagonals
+check(first MATCHES " 0(\\.0+)? 0(\\.0+)? 0(\\.0+)? -?0\\.50* -?0\\.50* -?0\\.50* -?0\\.50*$")

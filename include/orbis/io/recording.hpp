@@ -82,22 +82,25 @@ class recording {
   /// Reads frame `i`. Colour and depth have the camera's size. Errors: not_found, unreadable,
   /// malformed (damaged, or of another size than the camera's), unsupported. @pre i < size()
   [[nodiscard]] result<camera::rgbd_frame> frame(std::size_t i) const {
-    assert(i < size());
+    auto image = color(i);
+    if (!image) return fail(image.error());
     const detail::recording_entry& entry = index_.frames[i];
-    auto color = read_color(entry.color);
-    if (!color) return fail(color.error());
     auto depth = read_depth(entry.depth);
     if (!depth) return fail(depth.error());
-    const auto wrong_size = [&](int width, int height) {
-      return width != camera_.model.width() || height != camera_.model.height();
-    };
-    if (wrong_size(color->width(), color->height())) return size_error(entry.color, color->width(), color->height());
-    if (wrong_size(depth->width(), depth->height())) return size_error(entry.depth, depth->width(), depth->height());
+    if (!has_size(*depth)) return size_error(entry.depth, depth->width(), depth->height());
     return camera::rgbd_frame{.timestamp = entry.timestamp,
-                              .color = *std::move(color),
+                              .color = *std::move(image),
                               .depth = *std::move(depth),
                               .depth_scale = camera_.depth_scale,
                               .T_world_camera = entry.T_world_camera};
+  }
+  /// Reads the colour image of frame `i` alone. Errors as above. @pre i < size()
+  [[nodiscard]] result<image<rgb8>> color(std::size_t i) const {
+    assert(i < size());
+    const std::filesystem::path& path = index_.frames[i].color;
+    auto image = read_color(path);
+    if (image && !has_size(*image)) return size_error(path, image->width(), image->height());
+    return image;
   }
 
   /// Goes over the frames once, reading each when it is reached. Ends at the first frame that cannot
@@ -150,6 +153,10 @@ class recording {
   [[nodiscard]] const result<void>& status() const noexcept { return status_; }
 
  private:
+  template <class T>
+  [[nodiscard]] bool has_size(const image<T>& read) const {
+    return read.width() == camera_.model.width() && read.height() == camera_.model.height();
+  }
   tl::unexpected<error> size_error(const std::filesystem::path& path, int width, int height) const {
     return fail(errc::malformed, path.string(),
                 "the image has " + std::to_string(width) + "x" + std::to_string(height) + " pixels, the camera " +

@@ -165,7 +165,7 @@ struct options {
   fusion_options fusion{};
   thread_options threads{};
   bool localization_only = false;     ///< no keyframes are made, and the map is kept unchanged: for a loaded map
-  std::optional<se3> initial_pose{};  ///< `T_world_camera` of the first frame; default: the identity
+  std::optional<se3> initial_pose{};  ///< `T_world_camera` of the first frame of a map; default: the identity
   std::uint64_t seed = 1;             ///< of RANSAC
 };
 

@@ -98,6 +98,10 @@ class rgbd_system {
   /// Sets whether the map is kept unchanged, from the next frame on.
   void set_localization_only(bool on) noexcept { localization_only_ = on; }
 
+  /// Sets `T_world_camera` of the first frame of every map that begins from the next frame on
+  /// (`options::initial_pose`). For the thread that tracks: where frames say which way is up, a new map begins upright.
+  void set_initial_pose(const se3& T_world_camera) { options_.initial_pose = T_world_camera; }
+
   /// Waits until the threads have nothing to do.
   void wait() const;
 

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "upright_world.hpp"
+
+#include <cmath>
+#include <numbers>
+#include <string>
+
+#include <Eigen/Geometry>
+
+#include <orbis/mapping/upright.hpp>
+
+namespace app {
+
+using orbis::se3;
+using orbis::so3;
+using orbis::vec3;
+using orbis::mapping::upright_source;
+
+upright_worlds::upright_worlds(const frame_source& source, const settings& s)
+    : rays_{source.camera.model}, gravity_{s.gravity} {}
+
+se3 upright_worlds::begin_with(const orbis::camera::rgbd_frame& frame, bool is_first) {
+  orbis::mapping::upright_options options;
+  if (is_first) options.gravity_camera = gravity_;
+  const auto view = orbis::mapping::find_upright(frame.depth_metres(), rays_, options);
+  world_results& how = begun_[frame.timestamp];
+  how = {std::string{to_string(view.source)}, view.confidence};
+  if (!frame.T_world_camera) return {view.R_world_camera, vec3::Zero()};
+
+  // A ground truth whose z is up, as far as the frame can tell, is believed to the last degree.
+  const double reach = (view.source == upright_source::assumed ? 45.0 : 10.0) * std::numbers::pi / 180.0;
+  const vec3 up = frame.T_world_camera->rotation() * view.up_camera();
+  if (std::atan2(up.cross(vec3::UnitZ()).norm(), up.z()) <= reach) {
+    how.up_from = "ground truth";
+    return *frame.T_world_camera;
+  }
+  const so3 upright{Eigen::Quaterniond::FromTwoVectors(up, vec3::UnitZ())};
+  return se3{upright, vec3::Zero()} * *frame.T_world_camera;
+}
+
+std::optional<world_results> upright_worlds::begun_at(double timestamp) const {
+  const auto at = begun_.find(timestamp);
+  if (at == begun_.end()) return std::nullopt;
+  return at->second;
+}
+
+}  // namespace app
