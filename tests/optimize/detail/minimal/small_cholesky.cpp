@@ -31,6 +31,10 @@ void check_size() {
     damped.diagonal() *= 1.0 + damping;
     const matrix<N> residual = damped * x - b;
     for (int i = 0; i != N; ++i) CHECK(std::abs(residual[i]) <= 1e-9 * a.col(i).norm());
+    const matrix<N, N> one = damped * cholesky.inverse();
+    for (int i = 0; i != N; ++i)
+      for (int k = 0; k != N; ++k)
+        CHECK(std::abs(one(i, k) - (i == k ? 1.0 : 0.0)) <= 1e-9 * a.col(i).norm() / a.col(k).norm());
   }
 }
 

@@ -12,13 +12,13 @@
 #include <span>
 #include <vector>
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
 
 #include <orbis/core/execution.hpp>
 #include <orbis/core/types.hpp>
 #include <orbis/optimize/bundle_problem.hpp>
 #include <orbis/optimize/detail/bundle/bundle_equations.hpp>
+#include <orbis/optimize/detail/minimal/small_cholesky.hpp>
 
 namespace orbis::optimize::detail {
 
@@ -197,7 +197,9 @@ class covariance_computation {
   }
 
   [[nodiscard]] mat3 point_inverse(std::size_t p) const {
-    return equations_.point_hessian(p).llt().solve(mat3::Identity());
+    small_cholesky<3> factors;
+    const bool is_definite = factors.set(equations_.point_hessian(p)) && factors.factor(0.0) > 0.0;
+    return is_definite ? factors.inverse() : mat3(mat3::Constant(std::numeric_limits<double>::quiet_NaN()));
   }
 
   bundle_equations<R, Loss, Reduced> equations_;

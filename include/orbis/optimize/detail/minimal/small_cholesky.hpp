@@ -65,6 +65,17 @@ class small_cholesky {
     return x;
   }
 
+  /// The inverse of the matrix last factored. @pre its smallest pivot was positive
+  [[nodiscard]] square inverse() const {
+    square out;
+    for (int j = 0; j != N; ++j) {
+      vector unit = vector::Zero();
+      unit[j] = 1.0;
+      out.col(j) = solve(unit);
+    }
+    return out;
+  }
+
   /// If the smallest pivot of the undamped matrix is below this, some direction is not determined.
   static constexpr double determined = 1e-11;
 

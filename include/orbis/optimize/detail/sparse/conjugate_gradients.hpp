@@ -13,9 +13,10 @@
 #include <span>
 #include <vector>
 
-#include <Eigen/Cholesky>
+#include <Eigen/Core>
 
 #include <orbis/core/types.hpp>
+#include <orbis/optimize/detail/minimal/small_cholesky.hpp>
 #include <orbis/optimize/detail/sparse/block_ordering.hpp>
 
 namespace orbis::optimize::detail {
@@ -46,9 +47,10 @@ class block_conjugate_gradients {
     diagonal_ = diagonal;
     off_diagonal_ = off_diagonal;
     for (std::size_t i = 0; i != size_; ++i) {
-      const Eigen::LLT<block> llt(diagonal[i]);
-      inverse_[i] = llt.solve(block::Identity());
-      if (llt.info() != Eigen::Success || !inverse_[i].allFinite()) {
+      small_cholesky<B> factors;
+      const bool is_definite = factors.set(diagonal[i]) && factors.factor(0.0) > 0.0;
+      if (is_definite) inverse_[i] = factors.inverse();
+      if (!is_definite || !inverse_[i].allFinite()) {
         failed_block_ = static_cast<std::uint32_t>(i);
         return false;
       }
