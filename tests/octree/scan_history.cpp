@@ -127,8 +127,8 @@ class mirror {
 };
 
 /// Any scans, changes, removals and replays.
-template <class Model, class Policy>
-std::string check_random_calls(const Policy& policy, std::uint64_t seed, std::size_t bricks,
+template <class Model>
+std::string check_random_calls(const parallel_policy& policy, std::uint64_t seed, std::size_t bricks,
                                const integration_options& options) {
   using octree_type = occupancy_octree<Model>;
   random_bits random{seed};
@@ -190,9 +190,9 @@ TEMPLATE_TEST_CASE("A history's map is that of its scans in order, whatever happ
                    unsure) {
   for (const std::uint64_t seed : {1U, 2U}) {
     const integration_options options{.max_range = seed == 1 ? 5.0 : 1.9};
-    const std::string once = check_random_calls<TestType>(seq, seed, all, options);
+    const std::string once = check_random_calls<TestType>(par.with(1), seed, all, options);
     for (const std::size_t bricks : {std::size_t{1}, std::size_t{17}})
-      CHECK(check_random_calls<TestType>(seq, seed, bricks, options) == once);
+      CHECK(check_random_calls<TestType>(par.with(1), seed, bricks, options) == once);
     CHECK(check_random_calls<TestType>(par.with(3), seed, 100, options) == once);
   }
 }
@@ -201,7 +201,8 @@ TEST_CASE("A history's map is that of its scans with every option of integration
   const bounding_box box{{-1.0, -0.4, 0.3}, {1.5, 1.0, 1.9}};
   for (const ray_mode mode : {ray_mode::every_ray, ray_mode::discretized})
     for (const bool rays : {true, false})
-      check_random_calls<log_odds<>>(seq, 3, all, {.max_range = 1.9, .mode = mode, .rays = rays, .bounds = box});
+      check_random_calls<log_odds<>>(par.with(2), 3, all,
+                                     {.max_range = 1.9, .mode = mode, .rays = rays, .bounds = box});
 }
 
 TEST_CASE("The newest scan is in a history's map at once, an older one after a replay") {

@@ -129,35 +129,11 @@ class scan_marker {
   /// @pre depth and camera have the same size; options.beam_ranges is empty
   template <execution_policy Policy, camera::depth_source Depth, camera::camera_model Camera>
   integration_summary mark(const Policy& policy, const voxel_grid& grid, const Depth& depth, const Camera& camera,
-                           const se3& T_world_camera, const integration_options& options, scan_voxels& voxels) {
-    assert(options.beam_ranges.empty());
-    integration_summary summary;
-    if (options.mode == ray_mode::every_ray) {
-      summary = options.rays ? depth_.mark(policy, grid, depth, camera, T_world_camera, options, masks_)
-                             : depth_.mark_ends(policy, grid, depth, camera, T_world_camera, options, masks_);
-      detail::clip(masks_, grid, options.bounds);
-      pack(masks_, voxels, summary);
-    } else {
-      // Whether a voxel is within range is decided at its centre, not at its points.
-      integration_options unlimited = options;
-      unlimited.max_range = std::numeric_limits<double>::infinity();
-      const std::size_t rejected =
-          depth_.mark_ends(policy, grid, depth, camera, T_world_camera, unlimited, masks_).rejected;
-      const detail::float3 origin = coordinates<float>(T_world_camera.translation());
-      summary = points_.mark_centers(policy, grid, masks_, origin, options);
-      summary.rejected += rejected;
-      pack(points_.masks(), voxels, summary);
-    }
-    return summary;
-  }
+                           const se3& T_world_camera, const integration_options& options, scan_voxels& voxels);
   /// Marks points in the world frame (metres), seen from `origin`. O(points x voxels per ray).
   template <execution_policy Policy, point_range Points, point_like Origin>
   integration_summary mark(const Policy& policy, const voxel_grid& grid, const Points& points, const Origin& origin,
-                           const integration_options& options, scan_voxels& voxels) {
-    integration_summary summary = points_.mark(policy, grid, points, coordinates<float>(origin), options);
-    pack(points_.masks(), voxels, summary);
-    return summary;
-  }
+                           const integration_options& options, scan_voxels& voxels);
   /// Bytes on the heap.
   [[nodiscard]] std::size_t bytes() const noexcept {
     return depth_.memory_bytes() + points_.memory_bytes() + masks_.memory_bytes() +
@@ -165,21 +141,8 @@ class scan_marker {
   }
 
  private:
-  void pack(const detail::scan_masks& masks, scan_voxels& voxels, integration_summary& summary) {
-    const std::vector<detail::scan_brick>& bricks = masks.bricks();
-    order_.resize(bricks.size());
-    for (std::uint32_t i = 0; i != bricks.size(); ++i) order_[i] = {bricks[i].name, i};
-    std::sort(order_.begin(), order_.end());
-    voxels.clear();
-    for (const auto& [name, i] : order_) {
-      for (std::size_t octant = 0; octant != 8; ++octant) {
-        const std::uint64_t occupied = bricks[i].occupied[octant];
-        summary.occupied += static_cast<std::size_t>(std::popcount(occupied));
-        summary.free += static_cast<std::size_t>(std::popcount(bricks[i].free[octant] & ~occupied));
-      }
-      voxels.add(bricks[i]);
-    }
-  }
+  /// Packs the masks of a scan, and counts its voxels.
+  void pack(const detail::scan_masks& masks, scan_voxels& voxels, integration_summary& summary);
 
   detail::depth_integrator depth_;
   detail::point_integrator points_;
@@ -187,4 +150,57 @@ class scan_marker {
   std::vector<std::pair<std::uint64_t, std::uint32_t>> order_;
 };
 
+inline void scan_marker::pack(const detail::scan_masks& masks, scan_voxels& voxels, integration_summary& summary) {
+  const std::vector<detail::scan_brick>& bricks = masks.bricks();
+  order_.resize(bricks.size());
+  for (std::uint32_t i = 0; i != bricks.size(); ++i) order_[i] = {bricks[i].name, i};
+  std::sort(order_.begin(), order_.end());
+  voxels.clear();
+  for (const auto& [name, i] : order_) {
+    for (std::size_t octant = 0; octant != 8; ++octant) {
+      const std::uint64_t occupied = bricks[i].occupied[octant];
+      summary.occupied += static_cast<std::size_t>(std::popcount(occupied));
+      summary.free += static_cast<std::size_t>(std::popcount(bricks[i].free[octant] & ~occupied));
+    }
+    voxels.add(bricks[i]);
+  }
+}
+
+template <execution_policy Policy, camera::depth_source Depth, camera::camera_model Camera>
+integration_summary scan_marker::mark(const Policy& policy, const voxel_grid& grid, const Depth& depth,
+                                      const Camera& camera, const se3& T_world_camera,
+                                      const integration_options& options, scan_voxels& voxels) {
+  assert(options.beam_ranges.empty());
+  integration_summary summary;
+  if (options.mode == ray_mode::every_ray) {
+    summary = options.rays ? depth_.mark(policy, grid, depth, camera, T_world_camera, options, masks_)
+                           : depth_.mark_ends(policy, grid, depth, camera, T_world_camera, options, masks_);
+    detail::clip(masks_, grid, options.bounds);
+    pack(masks_, voxels, summary);
+  } else {
+    // Whether a voxel is within range is decided at its centre, not at its points.
+    integration_options unlimited = options;
+    unlimited.max_range = std::numeric_limits<double>::infinity();
+    const std::size_t rejected =
+        depth_.mark_ends(policy, grid, depth, camera, T_world_camera, unlimited, masks_).rejected;
+    const detail::float3 origin = coordinates<float>(T_world_camera.translation());
+    summary = points_.mark_centers(policy, grid, masks_, origin, options);
+    summary.rejected += rejected;
+    pack(points_.masks(), voxels, summary);
+  }
+  return summary;
+}
+
+template <execution_policy Policy, point_range Points, point_like Origin>
+integration_summary scan_marker::mark(const Policy& policy, const voxel_grid& grid, const Points& points,
+                                      const Origin& origin, const integration_options& options, scan_voxels& voxels) {
+  integration_summary summary = points_.mark(policy, grid, points, coordinates<float>(origin), options);
+  pack(points_.masks(), voxels, summary);
+  return summary;
+}
+
 }  // namespace orbis::octree
+
+#ifdef ORBIS_COMPILED
+#include <orbis/octree/detail/compiled/scan_voxels.hpp>
+#endif

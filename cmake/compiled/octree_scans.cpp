@@ -1,0 +1,3 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#define ORBIS_INSTANTIATE_OCTREE template
+#include <orbis/octree/scan_voxels.hpp>
