@@ -4,4 +4,5 @@
 #undef ORBIS_INSTANTIATE_OPTIMIZE
 #define ORBIS_INSTANTIATE_OPTIMIZE template
 #include <orbis/optimize/detail/compiled/pnp.hpp>
+#include <orbis/optimize/detail/compiled/pnp_functions.hpp>
 #include <orbis/optimize/detail/compiled/pose_graph.hpp>

@@ -63,8 +63,7 @@ class fundamental_geometry {
     }
   }
   /// From the intrinsic matrices (pixels) and the pose of the query's camera in the train's.
-  fundamental_geometry(const mat3& K_query, const mat3& K_train, const se3& T_train_query)
-      : fundamental_geometry{mat3{K_train.inverse().transpose() * essential(T_train_query) * K_query.inverse()}} {}
+  fundamental_geometry(const mat3& K_query, const mat3& K_train, const se3& T_train_query);
 
   [[nodiscard]] std::optional<epipolar_line> line(std::size_t, const keypoint& k) const noexcept {
     return line_of(F_ * vec3{k.x, k.y, 1.0});
@@ -132,3 +131,7 @@ template <camera::camera_model Camera>
 static_assert(epipolar_geometry<fundamental_geometry> && epipolar_geometry<ray_geometry>);
 
 }  // namespace orbis::features
+
+#ifndef ORBIS_COMPILED
+#include <orbis/features/detail/compiled/epipolar_functions.hpp>
+#endif

@@ -82,15 +82,7 @@ class pnp_estimator {
 
   [[nodiscard]] std::size_t size() const noexcept { return matches_.size(); }
 
-  [[nodiscard]] candidates fit(const std::array<std::uint32_t, 3>& s) const {
-    candidates all;
-    for_each_p3p({matches_.points[s[0]], matches_.points[s[1]], matches_.points[s[2]]},
-                 {matches_.rays[s[0]], matches_.rays[s[1]], matches_.rays[s[2]]},
-                 [&](const mat3& rotation, const vec3& translation) {
-                   if (all.size != 4) all.models[all.size++] = made_of({rotation, translation});
-                 });
-    return all;
-  }
+  [[nodiscard]] candidates fit(const std::array<std::uint32_t, 3>& s) const;
 
   void squared_errors(const model& m, std::size_t first, std::span<float, consensus_block> out) const {
     kernels_.errors(matches_.float_columns.data() + first, matches_.stride, m.rows.data(), out.data());
@@ -111,13 +103,7 @@ class pnp_estimator {
     return refine(start, inliers, 3);
   }
   [[nodiscard]] std::optional<model> refine(const model& start, std::span<const std::uint32_t> inliers,
-                                            int steps) const {
-    const std::size_t groups = gather(inliers);
-    const auto pose =
-        descend_pose(start.pose, steps, [&](const centred_pose& at, pose_equations& e) { sum_up(groups, at, e); });
-    if (!pose) return std::nullopt;
-    return made_of(*pose);
-  }
+                                            int steps) const;
 
   [[nodiscard]] static model made_of(const centred_pose& pose) {
     model m{pose, {}};
@@ -181,3 +167,7 @@ class pnp_estimator {
 }
 
 }  // namespace orbis::optimize::detail
+
+#ifndef ORBIS_COMPILED
+#include <orbis/optimize/detail/compiled/pnp_functions.hpp>
+#endif

@@ -3,13 +3,10 @@
 /// Cholesky factorisation of a dense symmetric positive definite matrix.
 #pragma once
 
-#include <cassert>
 #include <cmath>
 #include <cstddef>
 #include <span>
 #include <vector>
-
-#include <Eigen/Core>
 
 #include <orbis/core/rounded.hpp>
 #include <orbis/optimize/detail/sparse/panel_kernels.hpp>
@@ -67,15 +64,7 @@ class dense_cholesky {
   [[nodiscard]] std::size_t failed_row() const { return failed_row_; }
 
   /// Replaces the right-hand side in `x` by the solution. @pre the last `factor` returned true
-  void solve(std::span<double> x) const {
-    assert(x.size() == size_);
-    const auto n = static_cast<Eigen::Index>(size_);
-    const Eigen::Map<const Eigen::MatrixXd, Eigen::Unaligned, Eigen::OuterStride<>> l(
-        values_.data(), n, n, Eigen::OuterStride<>(static_cast<Eigen::Index>(stride_)));
-    Eigen::Map<Eigen::VectorXd> y(x.data(), n);
-    l.triangularView<Eigen::Lower>().solveInPlace(y);
-    l.triangularView<Eigen::Lower>().transpose().solveInPlace(y);
-  }
+  void solve(std::span<double> x) const;
 
  private:
   static constexpr std::size_t width = 8;
@@ -98,3 +87,7 @@ class dense_cholesky {
 };
 
 }  // namespace orbis::optimize::detail
+
+#ifndef ORBIS_COMPILED
+#include <orbis/optimize/detail/compiled/dense_cholesky_functions.hpp>
+#endif
