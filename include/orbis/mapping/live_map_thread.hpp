@@ -121,7 +121,7 @@ struct live_map_counters {
 /// way first, the oldest of them; then `add_keyframe` waits for a while; then the keyframe is left out. Both are
 /// counted and told.
 ///
-/// All member functions may be called from any thread.
+/// All member functions may be called from any thread, but `stop` and the destructor from one only.
 template <octree::replayable_octree Octree, camera::camera_model Camera, depth_history Depths = depth_store>
 class live_map_thread {
  public:
