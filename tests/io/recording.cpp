@@ -75,6 +75,23 @@ TEST_CASE("frames are read in any order and a recording can be gone over again")
   }
 }
 
+TEST_CASE("a colour image is read alone") {
+  const temporary_folder folder;
+  write_recording(folder);
+  const auto recording = io::open_recording(folder.path()).value();
+  std::filesystem::remove(folder.path() / "depth" / "2.png");
+  for (std::size_t i = 0; i != 4; ++i) {
+    const auto color = recording.color(i).value();
+    CHECK(color.width() == recording.camera().model.width());
+    CHECK(color(7, 5).g == i + 1);
+  }
+  CHECK_FALSE(recording.frame(2));
+  std::filesystem::remove(folder.path() / "rgb" / "1.png");
+  const auto gone = recording.color(1);
+  REQUIRE_FALSE(gone);
+  CHECK(gone.error().code == orbis::errc::not_found);
+}
+
 TEST_CASE("iteration ends at a damaged frame and says why") {
   const temporary_folder folder;
   write_recording(folder);

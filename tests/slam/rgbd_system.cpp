@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <cstring>
 #include <limits>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -124,6 +125,32 @@ TEST_CASE("The first pose is the identity unless the caller knows better") {
   const vec3 error =
       placed.trajectory().back().T_world_camera.translation() - recorded[9].T_world_camera->translation();
   CHECK(error.norm() < 0.02);
+}
+
+TEST_CASE("A map begins where the caller says by then") {
+  const auto& [camera, recorded] = small_room();
+  test::slam_system slam{camera};
+  const se3 here{so3::exp(vec3(0.3, -1.0, 0.2)), vec3(1, 2, 3)}, there{so3::exp(vec3(-0.5, 0.1, 2.0)), vec3(-4, 0, 1)};
+  slam.set_initial_pose(here);
+  for (std::size_t i = 0; i < 20; ++i) {
+    const slam::track_result r = slam.track(recorded[i]);
+    REQUIRE(r.tracked());
+    if (i == 0) CHECK((r.T_world_camera->inverse() * here).log().norm() < 1e-12);
+    if (i == 5) slam.set_initial_pose(there);  // of the next map, not of this one
+  }
+  CHECK((slam.trajectory().front().T_world_camera.inverse() * here).log().norm() < 1e-12);
+
+  // Another room, which looks like nothing before: after a while it is a map of its own.
+  const io::synthetic_recording elsewhere{
+      {.frames = 60, .seed = 77, .width = camera.width(), .height = camera.height(), .frames_around = 360}};
+  std::optional<se3> first;
+  for (std::size_t i = 0; i < elsewhere.size() && !first; ++i) {
+    camera::rgbd_frame frame = elsewhere.frame(i).value();
+    frame.timestamp += recorded[20].timestamp;
+    if (const slam::track_result r = slam.track(frame); r.tracked()) first = r.T_world_camera;
+  }
+  REQUIRE(first);
+  CHECK((first->inverse() * there).log().norm() < 1e-12);
 }
 
 TEST_CASE("Two runs over the same frames give the same bytes") {

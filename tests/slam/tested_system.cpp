@@ -26,6 +26,7 @@ void slam_system::wait() const { held_->system.wait(); }
 slam::track_state slam_system::state() const { return held_->system.state(); }
 bool slam_system::localizes_only() const { return held_->system.localizes_only(); }
 void slam_system::set_localization_only(bool on) { held_->system.set_localization_only(on); }
+void slam_system::set_initial_pose(const se3& T_world_camera) { held_->system.set_initial_pose(T_world_camera); }
 orbis::trajectory slam_system::trajectory() const { return held_->system.trajectory(); }
 orbis::trajectory slam_system::trajectory(slam::map_id map) const { return held_->system.trajectory(map); }
 std::vector<slam::keyframe_pose> slam_system::keyframes() const { return held_->system.keyframes(); }

@@ -33,6 +33,7 @@ class slam_system {
   [[nodiscard]] slam::track_state state() const;
   [[nodiscard]] bool localizes_only() const;
   void set_localization_only(bool on);
+  void set_initial_pose(const se3& T_world_camera);
   [[nodiscard]] orbis::trajectory trajectory() const;
   [[nodiscard]] orbis::trajectory trajectory(slam::map_id map) const;
   [[nodiscard]] std::vector<slam::keyframe_pose> keyframes() const;
