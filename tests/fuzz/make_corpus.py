@@ -140,7 +140,7 @@ def scans():
         write("integrate", f"far_origin_{mode}", bytes([0]) + scan(mode | 24, calm, swap(wild(5e3, 0, 0))))
 
 
-SET, EDIT, TRANSFORM, EVICT, SCAN, SUBTRACT, MERGE, DOUBLE, FILE, COPY, CLEAR, TRACK = 0, 3, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14
+SET, EDIT, TRANSFORM, EVICT, SCAN, SUBTRACT, FILE, COPY, CLEAR, TRACK = 0, 3, 5, 6, 7, 8, 11, 12, 13, 14
 FORGET_BEFORE, CAPACITY, FOLLOW, TRACK_OFF, TRACK_AGAIN, TRACK_ON = 3, 4, 5, 0, 1, 6
 MIN, MISS, HIT, MAX, ZERO, MINUS_ZERO = range(6)
 
@@ -166,10 +166,6 @@ def edits():
     write("edit", "log_off_and_on", bytes([1]) + track(TRACK_ON) + track(CAPACITY | 3 << 3)
           + scan(SCAN, 0, key(), some) + track(FOLLOW) + track(TRACK_AGAIN) + edit(2, HIT, 4, some[0]) + track(FOLLOW)
           + track(FORGET_BEFORE) + scan(SCAN, 1, key(), some) + track(FOLLOW) + transform(1, MISS))
-    write("edit", "with_itself", bytes([1]) + track(TRACK_ON) + scan(SCAN, 0, some[0], some) + bytes([DOUBLE])
-          + track(FOLLOW) + bytes([DOUBLE, FILE, DOUBLE]))
-    write("edit", "merges", bytes([2]) + node(4, MISS, key()) + b"".join(
-        bytes([MERGE, level]) + key() + scan(HIT, 0, key(), some[:level]) + bytes([16, 240, 32]) for level in (0, 3, 5)))
     write("edit", "scan_taken_out", bytes([3]) + node(4, MISS, some[0]) + scan(SCAN, 0, some[1], some)
           + scan(SUBTRACT, 0, some[1], some) + scan(SCAN, 1, some[2], some) + scan(SUBTRACT, 1, some[2], some))
     write("edit", "window_rolls", bytes([0]) + b"".join(
