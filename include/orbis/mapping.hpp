@@ -12,6 +12,7 @@
 /// | `depth_store.hpp` | depth images of many keyframes, compressed without loss, within a budget |
 /// | `filter.hpp` | `filter_points`: the outlier filter, as a choice at run time |
 /// | `keyframe.hpp` | what mapping needs of a keyframe |
+/// | `masked_depth.hpp` | depth images from which pixels were removed |
 /// | `keyframe_points.hpp` | the points of one keyframe |
 /// | `upright.hpp` | which way is up in a depth image, so that a map can begin upright |
 #pragma once
@@ -25,4 +26,5 @@
 #include <orbis/mapping/keyframe_points.hpp>
 #include <orbis/mapping/live_map.hpp>
 #include <orbis/mapping/live_map_thread.hpp>
+#include <orbis/mapping/masked_depth.hpp>
 #include <orbis/mapping/upright.hpp>

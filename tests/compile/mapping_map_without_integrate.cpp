@@ -1,5 +1,5 @@
-// error: scan_map
-// A map that takes in no scans cannot be built of keyframes.
+// error: depth_map
+// A map that takes in no depth images cannot be built of keyframes.
 #include <vector>
 
 #include <orbis/camera/pinhole.hpp>

@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <cstddef>
+#include <cstdint>
 #include <limits>
 #include <tuple>
 #include <vector>
 
 #include <orbis/mapping/batch.hpp>
+#include <orbis/mapping/live_map.hpp>
+#include <orbis/octree/files.hpp>
 
 #include "mapping/keyframes.hpp"
 #include "support/catch.hpp"
@@ -213,5 +217,45 @@ TEST_CASE("a filter by rays is watched and stopped like the rest") {
       CHECK(map.error().code == orbis::errc::cancelled);
       CHECK(calls == stop);
     }
+  }
+}
+
+TEST_CASE("a live map of the same depth images and poses is the same map") {
+  const auto scene = orbis::test::wall_scene(5, 20);
+  const auto keyframes = scene.keyframes();
+  for (const int stride : {1, 2}) {
+    const orbis::mapping::map_options options{
+        .dense = {.stride = stride, .voxel_size = 0.02, .flying_pixels = orbis::cloud::flying_pixel_options{}},
+        .filter = {.kind = filter_kind::statistical, .statistical = {.neighbors = 20}}};
+    const auto map = build_map(orbis::par, keyframes, scene.camera, options);
+    REQUIRE(map.has_value());
+    CHECK(map->filter.removed > 0);
+    orbis::mapping::dense_cloud dense{orbis::camera::ray_table{scene.camera}, options.dense};
+    for (const auto& k : keyframes) dense.add_keyframe(orbis::seq, k);
+    std::vector<char> kept(map->cloud.size(), 0);
+    for (const std::uint32_t i : map->inliers) kept[i] = 1;
+    const auto selection = dense.select(kept);
+
+    // Keyframes come in another order and elsewhere; later they are corrected, and after that the filter decides.
+    using octree = orbis::octree::occupancy_octree<>;
+    orbis::mapping::live_map<octree, orbis::camera::pinhole> live{scene.camera, {.resolution = options.resolution}};
+    std::vector<orbis::mapping::keyframe_position> poses;
+    for (const std::size_t i : {std::size_t{3}, std::size_t{0}, std::size_t{4}, std::size_t{1}, std::size_t{2}}) {
+      const auto& k = keyframes[i];
+      const auto depth = dense.masked_depth(orbis::seq, k, i);
+      const orbis::se3 drifted{k.T_world_camera.rotation(), k.T_world_camera.translation() + orbis::vec3{0.1, 0, 0.2}};
+      REQUIRE(live.add_keyframe(orbis::seq, i, orbis::mapping::view_like(k.depth, depth.view()), drifted).has_value());
+      poses.push_back({i, k.T_world_camera});
+    }
+    live.set_poses(poses);
+    REQUIRE(live.finish(orbis::par).has_value());
+    CHECK(orbis::octree::ot_bytes(live.map()) == orbis::octree::ot_bytes(*map->unfiltered_octree));
+    for (std::size_t i = 0; i != keyframes.size(); ++i) {
+      const auto depth = dense.masked_depth(orbis::seq, keyframes[i], i, selection);
+      REQUIRE(live.set_depth(orbis::seq, i, orbis::mapping::view_like(keyframes[i].depth, depth.view())).has_value());
+    }
+    REQUIRE(live.finish(orbis::par).has_value());
+    CHECK(orbis::octree::ot_bytes(live.map()) == orbis::octree::ot_bytes(map->octree));
+    CHECK(orbis::octree::ot_bytes(map->octree) != orbis::octree::ot_bytes(*map->unfiltered_octree));
   }
 }

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -291,5 +292,55 @@ TEST_CASE("an image without depth adds nothing") {
     CHECK(dense.measurements(orbis::par, scene.keyframe(0), 0).empty());
     dense.remove(orbis::par, scene.keyframe(0), 0);
     CHECK(dense.cloud().empty());
+  }
+}
+
+TEST_CASE("a masked depth image holds the pixels whose point of the cloud is kept") {
+  const auto scene = orbis::test::wall_scene(3, 20);
+  for (const double voxel : {0.0, 0.03}) {
+    for (const int stride : {1, 3}) {
+      INFO("voxel " << voxel << ", stride " << stride);
+      orbis::mapping::dense_cloud dense{orbis::camera::ray_table{scene.camera},
+                                        {.stride = stride, .voxel_size = voxel}};
+      for (std::size_t i = 0; i != 3; ++i) dense.add_keyframe(orbis::seq, scene.keyframe(i));
+      // Kept: what lies left of the middle.
+      const auto points = dense.cloud().points;
+      std::vector<char> left;
+      for (const auto& p : points) left.push_back(p.x() < 0.0F ? 1 : 0);
+      const auto selection = dense.select(left);
+      std::size_t kept = 0;
+      for (std::size_t i = 0; i != 3; ++i) {
+        const auto k = scene.keyframe(i);
+        const auto all = dense.masked_depth(orbis::seq, k, i);
+        const auto some = dense.masked_depth(orbis::par.with(3), k, i, selection);
+        const auto none = dense.masked_depth(orbis::seq, k, i, dense.select(std::vector<char>(points.size(), 0)));
+        std::size_t measured = 0, wrong = 0, left_over = 0;
+        const orbis::camera::ray_table rays{scene.camera};
+        const orbis::camera::float_pose pose{k.T_world_camera};
+        for (int y = 0; y != all.height(); ++y)
+          for (int x = 0; x != all.width(); ++x) {
+            const float z = k.depth(x, y);
+            const bool valid = z > 0.0F && z <= 4.0F;
+            wrong += all(x, y) != (valid ? scene.depth[i](x, y) : 0);
+            measured += valid ? 1U : 0U;
+            wrong += some(x, y) != 0 && some(x, y) != scene.depth[i](x, y);
+            kept += some(x, y) != 0 ? 1U : 0U;
+            left_over += none(x, y) != 0 ? 1U : 0U;
+            const auto p = orbis::camera::world_point(pose, rays(x, y).x(), rays(x, y).y(), z);
+            // Well away from the middle a pixel's point, or that of its voxel or block, is on its own side.
+            if (valid && stride == 1) wrong += p[0] < -0.1F && some(x, y) == 0;
+            if (valid) wrong += p[0] > 0.2F && some(x, y) != 0;
+          }
+        CHECK(wrong == 0);
+        CHECK(measured > 1000);
+        CHECK(left_over == 0);
+        if (stride == 1 && voxel == 0.0) {
+          const auto wanted = dense.measurements(orbis::seq, k, i, selection).size();
+          CHECK(static_cast<std::size_t>(std::ranges::count_if(some.pixels(), [](auto z) { return z != 0; })) ==
+                wanted);
+        }
+      }
+      CHECK(kept > 1000);
+    }
   }
 }

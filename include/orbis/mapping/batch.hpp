@@ -15,15 +15,19 @@
 #include <utility>
 #include <vector>
 
+#include <orbis/camera/depth.hpp>
 #include <orbis/camera/model.hpp>
 #include <orbis/camera/rays.hpp>
 #include <orbis/cloud/extract.hpp>
 #include <orbis/core/execution.hpp>
+#include <orbis/core/image.hpp>
 #include <orbis/core/point_cloud.hpp>
 #include <orbis/core/result.hpp>
+#include <orbis/core/se3.hpp>
 #include <orbis/mapping/dense_cloud.hpp>
 #include <orbis/mapping/filter.hpp>
 #include <orbis/mapping/keyframe.hpp>
+#include <orbis/mapping/masked_depth.hpp>
 #include <orbis/octree/occupancy_octree.hpp>
 
 namespace orbis::mapping {
@@ -32,17 +36,17 @@ struct map_options {
   dense_options dense{};
   filter_options filter{};
   double resolution = 0.05;                   ///< of the octrees, metres; > 0
-  octree::integration_options integration{};  ///< of every keyframe's points into the octrees
-  bool unfiltered_octree = true;              ///< build the octree of the unfiltered points as well
+  octree::integration_options integration{};  ///< of every keyframe's depth image into the octrees
+  bool unfiltered_octree = true;              ///< build the octree of the unfiltered depth images as well
 };
 
-/// A map that scans can be integrated into, made of its resolution in metres; what
+/// A map that depth images of this camera can be integrated into, made of its resolution in metres; what
 /// `octree::occupancy_octree` is.
-template <class M>
-concept scan_map = std::constructible_from<M, double> && std::movable<M> &&
-    requires(M& map, const std::vector<vec3f>& points_world, const vec3& origin,
+template <class M, class Camera>
+concept depth_map = std::constructible_from<M, double> && std::movable<M> &&
+    requires(M& map, const camera::depth_view<float>& depth, const Camera& camera, const se3& T_world_camera,
              const octree::integration_options& options) {
-  map.integrate(seq, points_world, origin, options);
+  map.integrate(seq, depth, camera, T_world_camera, options);
 };
 
 /// The map, and how it came to be.
@@ -60,16 +64,18 @@ struct built_map {
   std::size_t skipped = 0;                     ///< keyframes without a finite pose
 };
 
-/// Adds the keyframes to a cloud, filters it, and integrates each keyframe's own measurements,
-/// those whose point of the cloud survived, with rays from where that keyframe was. Filtering the
+/// Adds the keyframes to a cloud, filters it, and integrates each keyframe's depth image without the pixels whose point
+/// of the cloud the filter removed (`dense_cloud::masked_depth`), with rays from where that keyframe was. Filtering the
 /// whole cloud lets one keyframe's points judge another's; the automatic filter asks the keyframes'
-/// depth images as well which points their rays pass through.
+/// depth images as well which points their rays pass through. The octrees are those that a `live_map` makes of the same
+/// depth images and poses, bit for bit.
 ///
 /// Keyframes whose pose is not finite are skipped and counted. Errors: `no_data` if there is no
 /// keyframe; `invalid_argument` if an image's size is not the camera's, or an option is out of range;
 /// `cancelled`. The same result for every policy. `on_progress` counts the keyframes of all passes.
-template <scan_map Octree = octree::occupancy_octree<>, execution_policy Policy, keyframe_range Keyframes,
+template <class Octree = octree::occupancy_octree<>, execution_policy Policy, keyframe_range Keyframes,
           camera::camera_model Camera>
+requires depth_map<Octree, Camera>
 [[nodiscard]] result<built_map<Octree>> build_map(const Policy& policy, const Keyframes& keyframes,
                                                   const Camera& camera, const map_options& options = {},
                                                   progress on_progress = {}) {
@@ -138,10 +144,9 @@ template <scan_map Octree = octree::occupancy_octree<>, execution_policy Policy,
     std::size_t number = 0;
     for (const auto& k : keyframes) {
       if (finite_pose(k)) {
-        const std::vector<vec3f> points = dense.measurements(policy, k, number++, mask);
-        const vec3 origin = se3(k.T_world_camera).translation();
+        const auto depth = dense.masked_depth(policy, k, number++, mask);
         const auto start = std::chrono::steady_clock::now();
-        octree.integrate(policy, points, origin, options.integration);
+        octree.integrate(policy, view_like(k.depth, depth.view()), camera, se3(k.T_world_camera), options.integration);
         const auto time = std::chrono::steady_clock::now() - start;
         milliseconds.push_back(std::chrono::duration<double, std::milli>(time).count());
       }

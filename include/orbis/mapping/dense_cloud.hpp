@@ -11,6 +11,7 @@
 #include <optional>
 #include <ranges>
 #include <span>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -18,10 +19,12 @@
 #include <orbis/cloud/flying_pixels.hpp>
 #include <orbis/cloud/voxel_sums.hpp>
 #include <orbis/core/execution.hpp>
+#include <orbis/core/image.hpp>
 #include <orbis/core/point_cloud.hpp>
 #include <orbis/core/types.hpp>
 #include <orbis/mapping/keyframe.hpp>
 #include <orbis/mapping/keyframe_points.hpp>
+#include <orbis/mapping/masked_depth.hpp>
 
 namespace orbis::mapping {
 
@@ -173,6 +176,45 @@ class dense_cloud {
         first += f.cloud.size();
       }
     }
+    return out;
+  }
+  /// The whole depth image of keyframe `number` (every pixel, whatever the stride; the stored values, see `view_like`)
+  /// without what the cloud leaves out: 0 where the depth is out of range, where flying pixels were looked for and
+  /// found, and where the point of the cloud that the pixel belongs to is not in `kept`. A pixel between the strides
+  /// belongs to the point in its voxel, or else to the point of its block of stride x stride pixels; where there is
+  /// neither, nothing speaks for it and it is left out. O(pixels). @pre as for `measurements`
+  template <execution_policy Policy, keyframe_like Keyframe>
+  [[nodiscard]] auto masked_depth(const Policy& policy, const Keyframe& k, std::size_t number,
+                                  const selection& kept = {}) const {
+    assert(contains(number));
+    const frame& f = frames_[number];
+    image<depth_pixel<std::remove_cvref_t<decltype(k.depth)>>> out(rays_.width(), rays_.height());
+    keyframe_points reader;  // const functions share no memory
+    const bool all = !kept.places_ && kept.first_of_frame_.empty();
+    const auto is_kept = [&](const vec3f& point) -> std::optional<bool> {  // by its voxel
+      if (!kept.places_) return std::nullopt;
+      const auto place = kept.places_->find(point.cast<double>());
+      return place ? std::optional{kept.kept_[*place] != 0} : std::nullopt;
+    };
+    image<std::uint8_t> block_kept;
+    if (!all) {
+      block_kept = image<std::uint8_t>((rays_.width() + options_.stride - 1) / options_.stride,
+                                       (rays_.height() + options_.stride - 1) / options_.stride);
+      std::size_t point = kept.places_ ? 0 : kept.first_of_frame_[number];
+      reader.read(seq, k.depth, rays_, point_options(), f.T_world_camera,
+                  [&](std::size_t, int x, int y, const vec3f& p, float) {
+                    const bool keep = kept.places_ ? is_kept(p).value_or(false) : kept.kept_[point++] != 0;
+                    block_kept(x / options_.stride, y / options_.stride) = keep ? 1 : 0;
+                  });
+    }
+    keyframe_point_options every_pixel = point_options();
+    every_pixel.stride = 1;
+    reader.read(policy, k.depth, rays_, every_pixel, f.T_world_camera,
+                [&](std::size_t, int x, int y, const vec3f& point, float) {
+                  if (!all && !is_kept(point).value_or(block_kept(x / options_.stride, y / options_.stride) != 0))
+                    return;
+                  out(x, y) = stored_depth(k.depth, x, y);
+                });
     return out;
   }
   /// The measurements of keyframe `number` in the world, where it was added or moved to last, of those
