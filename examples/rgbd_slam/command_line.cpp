@@ -107,6 +107,9 @@ void add_frame_options(CLI::App& cmd, settings& s) {
 void add_slam_options(CLI::App& cmd, settings& s) {
   cmd.add_flag("--deterministic", s.deterministic,
                "the same bytes on every run: mapping and loop closing take place between the frames, not beside them");
+  cmd.add_flag(
+      "--live-map,!--batch-map", s.live_map,
+      "the octree grows while frames are tracked (default), or is made of all keyframes in the end: the same map");
   cmd.add_option("--save-map", s.save_map, "write the map of landmarks when all is tracked")
       ->check(not_empty)
       ->type_name("FILE");

@@ -86,20 +86,25 @@ std::vector<voxel> occupied_voxels(const tree& map, const orbis::point_cloud& cl
 
 }  // namespace
 
-result<built_map> map_frames(const posed_frames& frames, const frame_source& source, const settings& s,
-                             console& console) {
-  console.stage("mapping");
-  orbis::mapping::map_options options;
-  options.dense.max_depth = static_cast<float>(s.max_depth);
-  options.filter = filter_options(s);
-  options.resolution = s.resolution;
+orbis::mapping::dense_options dense_options(const settings& s) {
+  orbis::mapping::dense_options options;
+  options.max_depth = static_cast<float>(s.max_depth);
   // Finer than the octree's voxels, so that these see every surface; memory follows what there is to
   // see, not how long it was looked at.
-  options.dense.voxel_size = s.resolution / 5;
-  options.dense.flying_pixels.emplace();
+  options.voxel_size = s.resolution / 5;
+  options.flying_pixels.emplace();
+  return options;
+}
 
-  auto map =
-      orbis::mapping::build_map(orbis::par.with(s.threads), frames, source.camera.model, options, console.progress());
+result<built_map> map_frames(const posed_frames& frames, const frame_source& source, live_octree* live,
+                             const settings& s, console& console) {
+  console.stage("mapping");
+  const orbis::mapping::map_options options{
+      .dense = dense_options(s), .filter = filter_options(s), .resolution = s.resolution};
+  const auto policy = orbis::par.with(s.threads);
+  auto map = live != nullptr
+                 ? orbis::mapping::build_map(policy, frames, *live, options, console.progress())
+                 : orbis::mapping::build_map(policy, frames, source.camera.model, options, console.progress());
   if (!map && frames.trouble()) return orbis::fail(*frames.trouble());
   if (map) console.finish(in_words(*map));
   return map;

@@ -5,7 +5,9 @@
 
 #include <optional>
 
+#include <orbis/camera/any.hpp>
 #include <orbis/mapping/batch.hpp>
+#include <orbis/mapping/live_map.hpp>
 
 #include "console.hpp"
 #include "posed_frames.hpp"
@@ -15,10 +17,13 @@
 namespace app {
 
 using built_map = orbis::mapping::built_map<orbis::octree::occupancy_octree<>>;
+using live_octree = orbis::mapping::live_map<orbis::octree::occupancy_octree<>, orbis::camera::any_camera>;
 
-/// Keyframes -> dense cloud -> filter -> octree.
+/// Which pixels of a keyframe become points, and how dense these are.
+[[nodiscard]] orbis::mapping::dense_options dense_options(const settings& s);
+/// Keyframes -> dense cloud -> filter -> octree; by the map that grew while they were made, if there is one.
 [[nodiscard]] orbis::result<built_map> map_frames(const posed_frames& frames, const frame_source& source,
-                                                  const settings& s, console& console);
+                                                  live_octree* live, const settings& s, console& console);
 /// Cloud -> filter -> octree. With an origin all points are scanned from there; without one their
 /// voxels are occupied and nothing is known of the rest.
 [[nodiscard]] built_map map_cloud(orbis::point_cloud cloud, const settings& s, console& console);

@@ -59,7 +59,7 @@ orbis::result<mapped> map_recording(const frame_source& source, const settings& 
   std::optional<world_results> world;
   const auto posed = frames_with_poses(source, s, folder / spill_name, world, console);
   if (!posed) return orbis::fail(posed.error());
-  auto map = map_frames(*posed, source, s, console);
+  auto map = map_frames(*posed, source, nullptr, s, console);
   if (!map) return orbis::fail(map.error());
   results r = begin_results(s, source.title, &source, folder);
   r.world = world;

@@ -26,6 +26,8 @@ exit_code run_slam(const settings& s, console& console) {
   const auto attempt = track(*source, s, files->landmark_map(), files->folder() / spill_name, console);
   if (!attempt) return give_up(attempt.error());
   const tracked_frames& tracked = *attempt;
+  live_octree* const live = tracked.live ? &tracked.live->map() : nullptr;
+  if (live != nullptr) r.live = tracked.live->measured();
   if (tracked.stopped && tracked.slam.frames == 0) return give_up(*tracked.stopped);
   if (tracked.stopped) r.warnings.push_back(explain_stop(tracked, *source).to_string());
   if (interrupts::requested())
@@ -43,7 +45,7 @@ exit_code run_slam(const settings& s, console& console) {
 
   // Keyframes -> dense cloud -> filter -> octree -> files.
   if (tracked.keyframes.size() != 0) {
-    auto map = map_frames(tracked.keyframes, *source, s, console);
+    auto map = map_frames(tracked.keyframes, *source, live, s, console);
     if (!map) return give_up(map.error());
     auto written = write_map(*std::move(map), s, files->folder(), console);
     if (!written) return give_up(written.error());

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <iterator>
 #include <memory>
@@ -80,6 +81,7 @@ class posed_frames {
     orbis::camera::depth_view<std::uint16_t> depth;
     colors color;
     orbis::se3 T_world_camera;
+    std::uint64_t frame;  // its number in the source
   };
 
   class iterator {
@@ -96,7 +98,7 @@ class posed_frames {
       if (!images_) images_ = of_->unpack(at_);
       const entry& e = of_->entries_[at_];
       return {orbis::camera::depth_view<std::uint16_t>(images_->depth.view(), of_->source_->camera.depth_scale),
-              colors{*of_, e.index, images_}, e.T_world_camera};
+              colors{*of_, e.index, images_}, e.T_world_camera, e.index};
     }
     iterator& operator++() {
       ++at_;

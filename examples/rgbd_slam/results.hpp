@@ -12,6 +12,7 @@
 #include <vector>
 
 #include <orbis/core/point_cloud.hpp>
+#include <orbis/core/result.hpp>
 #include <orbis/core/trajectory.hpp>
 
 namespace app {
@@ -82,6 +83,15 @@ struct slam_results {
   orbis::trajectory trajectory, keyframes;
 };
 
+/// Of the map that grew while the camera moved.
+struct live_results {
+  std::vector<double> insert_ms;        ///< of each keyframe
+  std::size_t behind_frames_max = 0;    ///< by how many frames tracking was ahead of a keyframe's insertion
+  std::vector<double> correction_ms;    ///< of each correction: what moved keyframes took
+  std::size_t dropped = 0;              ///< keyframes that came in too fast; they enter the map in the end
+  std::optional<orbis::error> trouble;  ///< a depth image that could not be kept or read
+};
+
 struct results {
   std::string command, title;
   std::filesystem::path folder;                            ///< where the files are made
@@ -90,6 +100,7 @@ struct results {
   std::vector<std::pair<std::string, std::string>> setup;  ///< what was used, in words
   std::optional<world_results> world;                      ///< empty: that of a cloud, which nobody turned
   std::optional<slam_results> slam;
+  std::optional<live_results> live;
   std::optional<map_results> map;
   std::optional<accuracy> against_truth;
   std::string truth_note;  ///< why there is no comparison, or what it compares

@@ -44,6 +44,7 @@ struct settings {
 
   std::filesystem::path load_map;  ///< of landmarks, to begin with; empty: none
   std::filesystem::path save_map;  ///< of landmarks, in the end; empty: nowhere
+  bool live_map = true;            ///< the octree grows while frames are tracked; otherwise it is made in the end
   bool localize_only = false;      ///< the loaded map stays as it is
 
   unsigned threads = 0;  ///< 0: all

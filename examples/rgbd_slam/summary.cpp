@@ -88,6 +88,20 @@ std::string summary_json(const results& r) {
                  {"bt_bytes", m ? json(m->filtered.bt_bytes) : null},
                  {"ot_bytes", m ? json(m->ot_bytes) : null},
                  {"insert_ms_per_frame", {{"median", insertion.median}, {"p95", insertion.p95}}}};
+  const auto& l = r.live;
+  const spread live_insertion = spread_of(l ? l->insert_ms : std::vector<double>{});
+  const spread correction = spread_of(l ? l->correction_ms : std::vector<double>{});
+  const auto largest = [&](const std::vector<double>& ms) {
+    return ms.empty() ? null : json(*std::max_element(ms.begin(), ms.end()));
+  };
+  j["live_map"] = null;
+  if (l)
+    j["live_map"] = {
+        {"insert_ms", {{"median", live_insertion.median}, {"p95", live_insertion.p95}, {"max", largest(l->insert_ms)}}},
+        {"behind_frames_max", l->behind_frames_max},
+        {"dropped_keyframes", l->dropped},
+        {"corrections", l->correction_ms.size()},
+        {"correction_ms", {{"median", correction.median}, {"max", largest(l->correction_ms)}}}};
   j["map_error_m"] = m ? or_null(m->error_m) : null;
   j["files"] = r.files;
   j["files_of_earlier_runs"] = r.files_of_earlier_runs;

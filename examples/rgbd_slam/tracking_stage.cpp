@@ -48,24 +48,43 @@ upright_worlds track_frames(slam_system& slam, const frame_source& source, const
       ++lost.back().count;
     }
     if (found.keyframe) out.keyframes.add(i, {found.map, *found.keyframe}, *frame);
+    if (out.live) out.live->tracked(i);
+    if (out.live && found.keyframe && found.T_world_camera)
+      out.live->add(i, {found.map, *found.keyframe}, *found.T_world_camera, *frame);
     console.advance(i + 1, source.frames,
                     std::string{to_string(found.state)} + ", " + std::to_string(out.keyframes.size()) + " keyframes");
   }
   return worlds;
 }
 
+/// The pose of a keyframe that was made in the active map or in one that was merged with it. Keyframes have moved since
+/// they were made; those that were culled were redundant to the landmarks, not to the dense cloud and the octree.
+std::optional<se3> present_pose(const orbis::slam::atlas& maps, const orbis::slam::map_keyframe& made) {
+  const orbis::slam::map_keyframe now = maps.current(made);
+  if (now.map != maps.active_id()) return std::nullopt;
+  return maps.active().pose_of(now.keyframe);
+}
+
+/// How the live map asks for the poses of its keyframes.
+live_mapping::find_poses poses_of(const slam_system& slam) {
+  return [&slam, seen = orbis::slam::pose_revision{.map = orbis::slam::no_id}](
+             const std::vector<live_mapping::made>& keyframes, std::vector<live_mapping::pose>& poses,
+             bool always) mutable {
+    if (!slam.keyframes_since(seen) && !always) return false;
+    slam.inspect([&](const orbis::slam::atlas& maps) {
+      for (const auto& k : keyframes)
+        if (const auto pose = present_pose(maps, k.keyframe)) poses.push_back({k.frame, *pose});
+    });
+    return true;
+  };
+}
+
 /// Takes over the active map and what was found out.
 void collect(const slam_system& slam, tracked_frames& out) {
   out.slam.trajectory = slam.trajectory();
   out.slam.keyframes = slam.keyframe_trajectory();
-  // Keyframes have moved since they were made, and some are in maps that were never joined with this one. Those that
-  // were culled were redundant to the landmarks, not to the dense cloud.
   slam.inspect([&](const orbis::slam::atlas& maps) {
-    out.keyframes.place([&](const orbis::slam::map_keyframe& made) -> std::optional<se3> {
-      const orbis::slam::map_keyframe now = maps.current(made);
-      if (now.map != maps.active_id()) return std::nullopt;
-      return maps.active().pose_of(now.keyframe);
-    });
+    out.keyframes.place([&](const orbis::slam::map_keyframe& made) { return present_pose(maps, made); });
   });
   const orbis::slam::track_counters counters = slam.counters();
   out.slam.frames = counters.frames;
@@ -104,13 +123,15 @@ orbis::result<tracked_frames> track(const frame_source& source, const settings& 
   const map_id first_map = slam.active_map();
 
   tracked_frames out{
-      .slam = {}, .world = {}, .keyframes = posed_frames{source, spill_file}, .stopped = {}, .unsaved = {}};
+      .slam = {}, .world = {}, .keyframes = posed_frames{source, spill_file}, .live = {}, .stopped = {}, .unsaved = {}};
+  if (s.live_map && !s.localize_only) out.live = std::make_unique<live_mapping>(source, s, poses_of(slam));
   interrupts::keep_results(s.quiet
                                ? ""
                                : "\nrgbd_slam: stopping; what was reached is mapped and written. Once more: stop at "
                                  "once, and leave the folder as it was\n");
   const upright_worlds worlds = track_frames(slam, source, s, out, console);
   slam.wait();
+  if (out.live) out.live->stop();
 
   // The results are about the loaded map where the camera was found in it, else about the one with the most frames.
   const map_id begun = slam.inspect([&](const orbis::slam::atlas& maps) { return maps.current({first_map, 0}).map; });

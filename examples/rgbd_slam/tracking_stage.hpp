@@ -4,6 +4,7 @@
 #pragma once
 
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -11,6 +12,7 @@
 #include <orbis/core/result.hpp>
 
 #include "console.hpp"
+#include "live_stage.hpp"
 #include "posed_frames.hpp"
 #include "results.hpp"
 #include "settings.hpp"
@@ -22,6 +24,7 @@ struct tracked_frames {
   slam_results slam;
   std::optional<world_results> world;   ///< of the poses
   posed_frames keyframes;               ///< with their images, for the map
+  std::unique_ptr<live_mapping> live;   ///< the octree that grew meanwhile, if that was asked for; stopped
   std::optional<orbis::error> stopped;  ///< why not all frames were read
   std::optional<orbis::error> unsaved;  ///< why the map of landmarks could not be saved
   bool missed_map = false;              ///< a map was loaded, and the camera never found in it

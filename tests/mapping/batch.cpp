@@ -257,5 +257,31 @@ TEST_CASE("a live map of the same depth images and poses is the same map") {
     REQUIRE(live.finish(orbis::par).has_value());
     CHECK(orbis::octree::ot_bytes(live.map()) == orbis::octree::ot_bytes(map->octree));
     CHECK(orbis::octree::ot_bytes(map->octree) != orbis::octree::ot_bytes(*map->unfiltered_octree));
+
+    // The same in one call, by a live map that lacks a keyframe and has one too many.
+    struct numbered : orbis::mapping::keyframe<> {
+      std::uint64_t frame = 0;
+    };
+    std::vector<numbered> named;
+    for (std::size_t i = 0; i != keyframes.size(); ++i) named.push_back({keyframes[i], 10 * i});
+    orbis::mapping::live_map<octree, orbis::camera::pinhole> grown{scene.camera, {.resolution = options.resolution}};
+    orbis::mapping::keyframe_points reader;
+    const orbis::camera::ray_table rays{scene.camera};
+    for (const std::size_t i : {std::size_t{0}, std::size_t{1}, std::size_t{2}, std::size_t{4}}) {
+      const auto& k = keyframes[i];
+      const auto depth =
+          reader.masked(orbis::seq, k.depth, rays,
+                        {.max_depth = options.dense.max_depth, .flying_pixels = options.dense.flying_pixels});
+      REQUIRE(grown
+                  .add_keyframe(orbis::seq, i == 0 ? 7 : 10 * i, orbis::mapping::view_like(k.depth, depth.view()),
+                                orbis::se3{})
+                  .has_value());
+    }
+    const auto built = build_map(orbis::par, named, grown, options);
+    REQUIRE(built.has_value());
+    CHECK(built->cloud.points == map->cloud.points);
+    CHECK(built->inliers == map->inliers);
+    CHECK(orbis::octree::ot_bytes(*built->unfiltered_octree) == orbis::octree::ot_bytes(*map->unfiltered_octree));
+    CHECK(orbis::octree::ot_bytes(built->octree) == orbis::octree::ot_bytes(map->octree));
   }
 }

@@ -27,6 +27,7 @@
 #include <orbis/mapping/dense_cloud.hpp>
 #include <orbis/mapping/filter.hpp>
 #include <orbis/mapping/keyframe.hpp>
+#include <orbis/mapping/live_map.hpp>
 #include <orbis/mapping/masked_depth.hpp>
 #include <orbis/octree/occupancy_octree.hpp>
 
@@ -64,21 +65,14 @@ struct built_map {
   std::size_t skipped = 0;                     ///< keyframes without a finite pose
 };
 
-/// Adds the keyframes to a cloud, filters it, and integrates each keyframe's depth image without the pixels whose point
-/// of the cloud the filter removed (`dense_cloud::masked_depth`), with rays from where that keyframe was. Filtering the
-/// whole cloud lets one keyframe's points judge another's; the automatic filter asks the keyframes'
-/// depth images as well which points their rays pass through. The octrees are those that a `live_map` makes of the same
-/// depth images and poses, bit for bit.
-///
-/// Keyframes whose pose is not finite are skipped and counted. Errors: `no_data` if there is no
-/// keyframe; `invalid_argument` if an image's size is not the camera's, or an option is out of range;
-/// `cancelled`. The same result for every policy. `on_progress` counts the keyframes of all passes.
-template <class Octree = octree::occupancy_octree<>, execution_policy Policy, keyframe_range Keyframes,
-          camera::camera_model Camera>
-requires depth_map<Octree, Camera>
-[[nodiscard]] result<built_map<Octree>> build_map(const Policy& policy, const Keyframes& keyframes,
-                                                  const Camera& camera, const map_options& options = {},
-                                                  progress on_progress = {}) {
+namespace detail {
+
+/// The steps of `build_map`. `into.scan(filtered, keyframe, depth)` takes one depth image, before and after the filter;
+/// `into.complete(filtered)` gives the map of all of them.
+template <class Octree, execution_policy Policy, keyframe_range Keyframes, camera::camera_model Camera, class Into>
+[[nodiscard]] result<built_map<Octree>> build_map_into(const Policy& policy, const Keyframes& keyframes,
+                                                       const Camera& camera, const map_options& options,
+                                                       const progress& on_progress, Into& into) {
   if (std::ranges::size(keyframes) == 0) return fail(errc::no_data, "keyframes", "there are none");
   if (!(options.resolution > 0) || !std::isfinite(options.resolution))
     return fail(errc::invalid_argument, "resolution", "must be positive");
@@ -139,29 +133,115 @@ requires depth_map<Octree, Camera>
   std::vector<char> kept(map.cloud.size(), 0);
   for (const std::uint32_t i : map.inliers) kept[i] = 1;
 
-  const auto integrate_all = [&](Octree& octree, const dense_cloud::selection& mask,
-                                 std::vector<double>& milliseconds) {
+  const auto scan_all = [&](bool filtered, const dense_cloud::selection& kept_points,
+                            std::vector<double>& milliseconds) -> result<void> {
     std::size_t number = 0;
     for (const auto& k : keyframes) {
       if (finite_pose(k)) {
-        const auto depth = dense.masked_depth(policy, k, number++, mask);
+        const auto depth = dense.masked_depth(policy, k, number++, kept_points);
         const auto start = std::chrono::steady_clock::now();
-        octree.integrate(policy, view_like(k.depth, depth.view()), camera, se3(k.T_world_camera), options.integration);
+        if (auto done_scan = into.scan(filtered, k, view_like(k.depth, depth.view())); !done_scan) return done_scan;
         const auto time = std::chrono::steady_clock::now() - start;
         milliseconds.push_back(std::chrono::duration<double, std::milli>(time).count());
       }
-      if (!on_progress(++done, total)) return false;
+      if (!on_progress(++done, total)) return fail(errc::cancelled, {}, "cancelled");
     }
-    return true;
+    return {};
   };
   if (options.unfiltered_octree) {
-    map.unfiltered_octree.emplace(options.resolution);
-    if (!integrate_all(*map.unfiltered_octree, {}, map.insert_ms_unfiltered)) {
-      return fail(errc::cancelled, {}, "cancelled");
-    }
+    if (auto scanned = scan_all(false, {}, map.insert_ms_unfiltered); !scanned) return fail(std::move(scanned.error()));
+    auto octree = into.complete(false);
+    if (!octree) return fail(std::move(octree.error()));
+    map.unfiltered_octree.emplace(*std::move(octree));
   }
-  if (!integrate_all(map.octree, dense.select(kept), map.insert_ms)) return fail(errc::cancelled, {}, "cancelled");
+  if (auto scanned = scan_all(true, dense.select(kept), map.insert_ms); !scanned)
+    return fail(std::move(scanned.error()));
+  auto octree = into.complete(true);
+  if (!octree) return fail(std::move(octree.error()));
+  map.octree = *std::move(octree);
   return map;
+}
+
+/// Into octrees of their own.
+template <class Octree, class Policy, class Camera>
+struct fresh_octrees {
+  const Policy& policy;
+  const Camera& camera;
+  const map_options& options;
+  Octree octree{options.resolution};
+
+  template <class Keyframe, class Depth>
+  result<void> scan(bool, const Keyframe& k, const Depth& depth) {
+    octree.integrate(policy, depth, camera, se3(k.T_world_camera), options.integration);
+    return {};
+  }
+  result<Octree> complete(bool) { return std::exchange(octree, Octree{options.resolution}); }
+};
+
+/// Into a live map, which has most of the keyframes already.
+template <class Live, class Policy>
+struct live_octree {
+  const Policy& policy;
+  Live& live;
+  std::vector<keyframe_position> poses{};
+
+  template <class Keyframe, class Depth>
+  result<void> scan(bool filtered, const Keyframe& k, const Depth& depth) {
+    if (filtered) return live.set_depth(policy, k.frame, depth);
+    poses.push_back({k.frame, se3(k.T_world_camera)});
+    if (live.contains(k.frame)) return {};
+    if (auto added = live.add_keyframe(policy, k.frame, depth, poses.back().T_world_camera); !added)
+      return fail(std::move(added.error()));
+    return {};
+  }
+  result<typename Live::octree_type> complete(bool filtered) {
+    if (!filtered) live.set_poses(poses, unlisted::hide);
+    if (auto finished = live.finish(policy); !finished) return fail(std::move(finished.error()));
+    return live.snapshot();
+  }
+};
+
+}  // namespace detail
+
+/// Adds the keyframes to a cloud, filters it, and integrates each keyframe's depth image without the pixels whose point
+/// of the cloud the filter removed (`dense_cloud::masked_depth`), with rays from where that keyframe was. Filtering the
+/// whole cloud lets one keyframe's points judge another's; the automatic filter asks the keyframes'
+/// depth images as well which points their rays pass through. The octrees are those that a `live_map` makes of the same
+/// depth images and poses, bit for bit.
+///
+/// Keyframes whose pose is not finite are skipped and counted. Errors: `no_data` if there is no
+/// keyframe; `invalid_argument` if an image's size is not the camera's, or an option is out of range;
+/// `cancelled`. The same result for every policy. `on_progress` counts the keyframes of all passes.
+template <class Octree = octree::occupancy_octree<>, execution_policy Policy, keyframe_range Keyframes,
+          camera::camera_model Camera>
+requires depth_map<Octree, Camera>
+[[nodiscard]] result<built_map<Octree>> build_map(const Policy& policy, const Keyframes& keyframes,
+                                                  const Camera& camera, const map_options& options = {},
+                                                  progress on_progress = {}) {
+  detail::fresh_octrees<Octree, Policy, Camera> into{policy, camera, options};
+  return detail::build_map_into<Octree>(policy, keyframes, camera, options, on_progress, into);
+}
+
+/// As above, by a live map that grew while these keyframes were made: they are moved to the poses that they have now,
+/// those that it does not have are added, others are hidden, and then the filter's verdict is taken over. The octrees
+/// are bit for bit those of the function above. Keyframes have a member `frame`, the index by which the live map knows
+/// them. `options.resolution` and `options.integration` are those of the live map, and the unfiltered octree is always
+/// made. Errors, in addition: those of the live map. @pre what the live map has was added with the depth that
+/// `masked_depth(keyframe)` leaves under `options.dense`
+template <execution_policy Policy, keyframe_range Keyframes, octree::replayable_octree Octree,
+          camera::camera_model Camera, depth_history Depths>
+requires requires(const std::ranges::range_value_t<Keyframes>& k) {
+  { k.frame } -> std::convertible_to<std::uint64_t>;
+  { k.depth } -> std::convertible_to<camera::depth_view<std::uint16_t>>;
+}
+[[nodiscard]] result<built_map<Octree>> build_map(const Policy& policy, const Keyframes& keyframes,
+                                                  live_map<Octree, Camera, Depths>& live, map_options options = {},
+                                                  progress on_progress = {}) {
+  options.resolution = live.options().resolution;
+  options.integration = live.options().integration;
+  options.unfiltered_octree = true;
+  detail::live_octree<live_map<Octree, Camera, Depths>, Policy> into{policy, live};
+  return detail::build_map_into<Octree>(policy, keyframes, live.camera(), options, on_progress, into);
 }
 
 }  // namespace orbis::mapping

@@ -18,6 +18,7 @@
 #include <orbis/core/rounded.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/core/types.hpp>
+#include <orbis/mapping/masked_depth.hpp>
 
 namespace orbis::mapping {
 
@@ -57,6 +58,17 @@ class keyframe_points {
     }
     read_all(policy, depth, rays, options, T_world_camera, f);
     return {};
+  }
+  /// A copy of the depth image (see `view_like`) in which every pixel is 0 that would not become a point, whatever the
+  /// stride: what `dense_cloud::masked_depth` gives before a filter of the cloud. O(pixels). @pre as for `read`
+  template <execution_policy Policy, camera::depth_source Depth>
+  [[nodiscard]] image<depth_pixel<Depth>> masked(const Policy& policy, const Depth& depth,
+                                                 const camera::ray_table& rays, keyframe_point_options options) {
+    options.stride = 1;
+    image<depth_pixel<Depth>> out(rays.width(), rays.height());
+    read(policy, depth, rays, options, se3{},
+         [&](std::size_t, int x, int y, const vec3f&, float) { out(x, y) = stored_depth(depth, x, y); });
+    return out;
   }
 
  private:
