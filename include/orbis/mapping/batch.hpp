@@ -168,14 +168,18 @@ struct fresh_octrees {
   const Policy& policy;
   const Camera& camera;
   const map_options& options;
-  Octree octree{options.resolution};
+  std::optional<Octree> octree{};  // options are checked before the first scan
 
   template <class Keyframe, class Depth>
   result<void> scan(bool, const Keyframe& k, const Depth& depth) {
-    octree.integrate(policy, depth, camera, se3(k.T_world_camera), options.integration);
+    if (!octree) octree.emplace(options.resolution);
+    octree->integrate(policy, depth, camera, se3(k.T_world_camera), options.integration);
     return {};
   }
-  result<Octree> complete(bool) { return std::exchange(octree, Octree{options.resolution}); }
+  result<Octree> complete(bool) {
+    std::optional<Octree> whole = std::exchange(octree, std::nullopt);
+    return whole ? *std::move(whole) : Octree{options.resolution};
+  }
 };
 
 /// Into a live map, which has most of the keyframes already.
