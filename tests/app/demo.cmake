@@ -37,7 +37,8 @@ set(fields frames tracked lost relocalized keyframes landmarks loops_closed maps
            filter:reason filter:removed cloud:points cloud:points_filtered cloud:bytes cloud:bytes_filtered
            octree:resolution_m octree:leaves_unfiltered octree:leaves octree:occupied octree:free
            octree:bt_bytes_unfiltered octree:bt_bytes octree:ot_bytes octree:insert_ms_per_frame:median
-           octree:insert_ms_per_frame:p95 map_error_m)
+           octree:insert_ms_per_frame:p95 live_map:insert_ms:median live_map:insert_ms:p95 live_map:insert_ms:max
+           live_map:behind_frames_max live_map:dropped_keyframes live_map:corrections map_error_m)
 foreach(field IN LISTS fields)
   string(REPLACE ":" ";" path ${field})
   summary(value ${WORK}/demo ${path})
@@ -80,6 +81,17 @@ if(CONVERT_OCTREE)
   file(SHA256 ${WORK}/demo/map.bt ours)
   check(theirs STREQUAL ours)
 endif()
+
+# The octree that grew while frames were tracked is the one that is made of all keyframes in the end.
+app(0 demo --frames 40 --width 320 --resolution 0.1 --batch-map --out batch --quiet --threads 1)
+foreach(name trajectory.txt cloud_filtered.ply map_unfiltered.bt map.bt map.ot)
+  file(SHA256 ${WORK}/demo/${name} first)
+  file(SHA256 ${WORK}/batch/${name} second)
+  check(first STREQUAL second)
+endforeach()
+file(READ ${WORK}/batch/summary.json json)
+string(JSON type TYPE "${json}" live_map)
+check(type STREQUAL "NULL")
 
 # --quiet says nothing; one thread means the same bytes as --deterministic.
 app(0 demo --frames 40 --width 320 --resolution 0.1 --out again --save-map again.map --quiet --threads 1)
