@@ -62,20 +62,25 @@ std::vector<voxel> occupied_voxels(const tree& map, const orbis::point_cloud& cl
   map.for_each_leaf([&](const tree::leaf& leaf) {
     if (!leaf.occupied) return;
     voxel v{leaf.center.cast<float>(), static_cast<float>(leaf.size), {176, 178, 182}};
-    sum all;  // a large leaf takes its colour from its lowest voxel's neighbours along the diagonal
-    const auto cells = static_cast<std::uint32_t>(std::lround(leaf.size / map.resolution()));
-    for (std::uint32_t i = 0; i != cells; ++i) {
+    sum all;
+    const auto add = [&](int x, int y, int z) {  // the colour of a voxel beside the leaf's first
       auto key = leaf.key;
-      key.x = static_cast<decltype(key.x)>(key.x + i);
-      key.y = static_cast<decltype(key.y)>(key.y + i);
-      key.z = static_cast<decltype(key.z)>(key.z + i);
-      if (const auto found = colors.find(name(key)); found != colors.end()) {
-        all.r += found->second.r;
-        all.g += found->second.g;
-        all.b += found->second.b;
-        all.n += found->second.n;
-      }
-    }
+      key.x = static_cast<decltype(key.x)>(key.x + x);
+      key.y = static_cast<decltype(key.y)>(key.y + y);
+      key.z = static_cast<decltype(key.z)>(key.z + z);
+      const auto found = colors.find(name(key));
+      if (found == colors.end()) return;
+      all.r += found->second.r;
+      all.g += found->second.g;
+      all.b += found->second.b;
+      all.n += found->second.n;
+    };
+    // A large leaf takes the colours along its diagonal.
+    const auto cells = static_cast<int>(std::lround(leaf.size / map.resolution()));
+    for (int i = 0; i != cells; ++i) add(i, i, i);
+    // A voxel may be occupied by pixels whose points in the cloud, means of several pixels, lie in the next voxel.
+    if (all.n == 0)
+      for (int i = 0; i != 27; ++i) add(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1);
     if (all.n != 0)
       v.color = {static_cast<std::uint8_t>(all.r / all.n), static_cast<std::uint8_t>(all.g / all.n),
                  static_cast<std::uint8_t>(all.b / all.n)};
