@@ -15,27 +15,30 @@ orbis::mapping::live_map_thread_options thread_options(const settings& s) {
 
 }  // namespace
 
-live_mapping::live_mapping(const frame_source& source, const settings& s, find_poses where)
+live_mapping::live_mapping(const frame_source& source, const settings& s, std::filesystem::path spill_file,
+                           find_poses where)
     : where_{std::move(where)},
       depth_scale_{source.camera.depth_scale},
       rays_{source.camera.model},
-      live_{source.camera.model,
-            thread_options(s),
-            {.poll_poses = [this](std::vector<pose>& poses, bool always) { return poll(poses, always); },
-             .inserted =
-                 [this](const orbis::mapping::insertion_event& e) {
-                   results_.insert_ms.push_back(e.milliseconds);
-                   const std::size_t newest = newest_;
-                   if (newest > e.frame)
-                     results_.behind_frames_max = std::max(results_.behind_frames_max, newest - e.frame);
-                 },
-             .overflowed = {},
-             .corrected =
-                 [this](const orbis::mapping::live_correction_event& e) {
-                   results_.correction_ms.push_back(e.milliseconds);
-                 },
-             .published = {},
-             .failed = [this](const orbis::error& e) { results_.trouble = e; }}} {
+      live_{
+          source.camera.model,
+          thread_options(s),
+          {.poll_poses = [this](std::vector<pose>& poses, bool always) { return poll(poses, always); },
+           .inserted =
+               [this](const orbis::mapping::insertion_event& e) {
+                 results_.insert_ms.push_back(e.milliseconds);
+                 const std::size_t newest = newest_;
+                 if (newest > e.frame)
+                   results_.behind_frames_max = std::max(results_.behind_frames_max, newest - e.frame);
+               },
+           .overflowed = {},
+           .corrected =
+               [this](const orbis::mapping::live_correction_event& e) {
+                 results_.correction_ms.push_back(e.milliseconds);
+               },
+           .published = {},
+           .failed = [this](const orbis::error& e) { results_.trouble = e; }},
+          orbis::mapping::depth_store{{.memory_budget = std::size_t{32} << 20U, .spill_file = std::move(spill_file)}}} {
   const auto dense = dense_options(s);
   points_ = {
       .stride = 1, .min_depth = dense.min_depth, .max_depth = dense.max_depth, .flying_pixels = dense.flying_pixels};

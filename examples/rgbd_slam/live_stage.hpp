@@ -7,6 +7,7 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <functional>
 #include <mutex>
 #include <optional>
@@ -38,8 +39,9 @@ class live_mapping {
   /// those of the last call and `always` is false.
   using find_poses = std::function<bool(const std::vector<made>&, std::vector<pose>&, bool always)>;
 
-  /// `where` is called on the map's thread until `stop`.
-  live_mapping(const frame_source& source, const settings& s, find_poses where);
+  /// `where` is called on the map's thread until `stop`. `spill_file`: for depth images beyond what there is room for
+  /// in memory, see `depth_store_options`.
+  live_mapping(const frame_source& source, const settings& s, std::filesystem::path spill_file, find_poses where);
 
   /// Says how far tracking is.
   void tracked(std::size_t frame) { newest_ = frame; }

@@ -110,7 +110,7 @@ result<built_map> map_frames(const posed_frames& frames, const frame_source& sou
   auto map = live != nullptr
                  ? orbis::mapping::build_map(policy, frames, *live, options, console.progress())
                  : orbis::mapping::build_map(policy, frames, source.camera.model, options, console.progress());
-  if (!map && frames.trouble()) return orbis::fail(*frames.trouble());
+  if (frames.trouble()) return orbis::fail(*frames.trouble());  // a map without an image is not the map
   if (map) console.finish(in_words(*map));
   return map;
 }

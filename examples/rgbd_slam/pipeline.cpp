@@ -28,6 +28,7 @@ exit_code run_slam(const settings& s, console& console) {
   const tracked_frames& tracked = *attempt;
   live_octree* const live = tracked.live ? &tracked.live->map() : nullptr;
   if (live != nullptr) r.live = tracked.live->measured();
+  if (r.live && r.live->trouble) console.warn(r.warnings.emplace_back(r.live->trouble->to_string()));
   if (tracked.stopped && tracked.slam.frames == 0) return give_up(*tracked.stopped);
   if (tracked.stopped) r.warnings.push_back(explain_stop(tracked, *source).to_string());
   if (interrupts::requested())
@@ -50,6 +51,7 @@ exit_code run_slam(const settings& s, console& console) {
     auto written = write_map(*std::move(map), s, files->folder(), console);
     if (!written) return give_up(written.error());
     r.map = *std::move(written);
+    if (r.live) r.map->insert_ms = r.live->insert_ms;  // when they were made, not when the filter's verdict came
   }
 
   // Evaluation and report; then all files are put in place.

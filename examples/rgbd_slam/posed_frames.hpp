@@ -21,7 +21,7 @@
 
 namespace app {
 
-/// The name of the spill file, in the folder where the files are made; it loses it as soon as it is there.
+/// The name of the spill file, in the folder where the files are made. The file has no name once it is open.
 inline constexpr const char* spill_name = "depth.spill";
 
 class posed_frames {
@@ -39,11 +39,11 @@ class posed_frames {
   void add(std::size_t i, const orbis::se3& T_world_camera, const orbis::camera::rgbd_frame& frame) {
     add({i, {}, T_world_camera}, frame);
   }
-  /// Frame number `i` of the source, which has become a keyframe; where it was is said in the end (`place`).
+  /// Frame number `i` of the source, which has become a keyframe; `place` sets its pose later.
   void add(std::size_t i, orbis::slam::map_keyframe keyframe, const orbis::camera::rgbd_frame& frame) {
     add({i, keyframe, {}}, frame);
   }
-  /// Puts each frame where `where(keyframe)` says; those of which it says nothing are dropped.
+  /// Gives each frame the pose `where(keyframe)`; frames without a pose are dropped.
   template <class Where>
   void place(const Where& where) {
     std::erase_if(entries_, [&](entry& e) {
@@ -138,7 +138,10 @@ class posed_frames {
   }
   [[nodiscard]] std::shared_ptr<unpacked> unpack(std::size_t number) const {
     auto images = std::make_shared<unpacked>();
-    if (auto done = depths_.get(entries_[number].index, images->depth); !done) trouble_ = done.error();
+    if (auto done = depths_.get(entries_[number].index, images->depth); !done) {
+      trouble_ = done.error();
+      images->depth = orbis::image<std::uint16_t>(source_->camera.model.width(), source_->camera.model.height());
+    }
     return images;
   }
   [[nodiscard]] orbis::image<orbis::rgb8> read_color(std::size_t index) const {

@@ -124,7 +124,8 @@ orbis::result<tracked_frames> track(const frame_source& source, const settings& 
 
   tracked_frames out{
       .slam = {}, .world = {}, .keyframes = posed_frames{source, spill_file}, .live = {}, .stopped = {}, .unsaved = {}};
-  if (s.live_map && !s.localize_only) out.live = std::make_unique<live_mapping>(source, s, poses_of(slam));
+  if (s.live_map && !s.localize_only)
+    out.live = std::make_unique<live_mapping>(source, s, spill_file.string() + ".live", poses_of(slam));
   interrupts::keep_results(s.quiet
                                ? ""
                                : "\nrgbd_slam: stopping; what was reached is mapped and written. Once more: stop at "

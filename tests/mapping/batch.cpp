@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <limits>
 #include <tuple>
+#include <utility>
 #include <vector>
 
 #include <orbis/mapping/batch.hpp>
@@ -277,6 +278,9 @@ TEST_CASE("a live map of the same depth images and poses is the same map") {
                                 orbis::se3{})
                   .has_value());
     }
+    auto unordered = named;
+    std::swap(unordered[1], unordered[2]);
+    CHECK(build_map(orbis::par, unordered, grown, options).error().code == orbis::errc::invalid_argument);
     const auto built = build_map(orbis::par, named, grown, options);
     REQUIRE(built.has_value());
     CHECK(built->cloud.points == map->cloud.points);

@@ -191,12 +191,21 @@ struct live_octree {
 
   template <class Keyframe, class Depth>
   result<void> scan(bool filtered, const Keyframe& k, const Depth& depth) {
-    if (filtered) return live.set_depth(policy, k.frame, depth);
+    // Where the images' file cannot be written to, they stay in memory: nothing is lost.
+    const auto unless_kept = [](error e) -> result<void> {
+      if (e.code == errc::write_failed) return {};
+      return fail(std::move(e));
+    };
+    if (filtered) {
+      auto set = live.set_depth(policy, k.frame, depth);
+      return set ? result<void>{} : unless_kept(std::move(set.error()));
+    }
+    if (!poses.empty() && !(poses.back().frame < k.frame))
+      return fail(errc::invalid_argument, "keyframes", "their frame numbers do not ascend");
     poses.push_back({k.frame, se3(k.T_world_camera)});
     if (live.contains(k.frame)) return {};
-    if (auto added = live.add_keyframe(policy, k.frame, depth, poses.back().T_world_camera); !added)
-      return fail(std::move(added.error()));
-    return {};
+    auto added = live.add_keyframe(policy, k.frame, depth, poses.back().T_world_camera);
+    return added ? result<void>{} : unless_kept(std::move(added.error()));
   }
   result<typename Live::octree_type> complete(bool filtered) {
     if (!filtered) live.set_poses(poses, unlisted::hide);
@@ -229,9 +238,11 @@ requires depth_map<Octree, Camera>
 /// As above, by a live map that grew while these keyframes were made: they are moved to the poses that they have now,
 /// those that it does not have are added, others are hidden, and then the filter's verdict is taken over. The octrees
 /// are bit for bit those of the function above. Keyframes have a member `frame`, the index by which the live map knows
-/// them. `options.resolution` and `options.integration` are those of the live map, and the unfiltered octree is always
-/// made. Errors, in addition: those of the live map. @pre what the live map has was added with the depth that
-/// `masked_depth(keyframe)` leaves under `options.dense`
+/// them, and come in the order of these. The times in the result are those of handing over images, without replaying.
+/// `options.resolution` and `options.integration` are those of the live map, and the unfiltered octree is always made.
+/// Errors, in addition: `invalid_argument` if the frame numbers do not ascend; those of the live map, but for images
+/// that stay in memory because they cannot be written to their file. @pre what the live map has was added with the
+/// depth that `keyframe_points::masked` leaves under `options.dense`, and no filter's verdict was taken over yet
 template <execution_policy Policy, keyframe_range Keyframes, octree::replayable_octree Octree,
           camera::camera_model Camera, depth_history Depths>
 requires requires(const std::ranges::range_value_t<Keyframes>& k) {

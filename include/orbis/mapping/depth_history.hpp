@@ -11,14 +11,15 @@
 
 namespace orbis::mapping {
 
-/// Keeps depth images by the index of their frame, and gives them back pixel by pixel:
-/// - `put(frame, pixels)` keeps a copy, in place of the image that was there. On an error the image is kept all the
-/// same,
-///   or `get` fails for it from then on;
-/// - `get(frame, out)` copies it to `out`, whose size changes to the image's; if it is const, it may be called from
-/// several
-///   threads at once;
-/// - `erase(frame)` forgets it, if it is there.
+/// Keeps depth images by the index of their frame, and gives them back pixel by pixel.
+///
+/// `put(frame, pixels)` keeps a copy, in place of the image that was there. On an error the image is kept even so, or
+/// `get` fails for it from then on.
+///
+/// `get(frame, out)` copies it to `out`, whose size changes to the image's. If it is const, several threads may call it
+/// at once.
+///
+/// `erase(frame)` forgets it, if it is there.
 template <class S>
 concept depth_history = std::movable<S> &&
     requires(S& store, std::uint64_t frame, image_view<const std::uint16_t> pixels, image<std::uint16_t>& out) {

@@ -3,8 +3,9 @@
 /// An occupancy map that grows with each keyframe, and follows every correction of the keyframes' poses.
 ///
 /// @code
-///   orbis::mapping::live_map<orbis::octree::occupancy_octree<>, orbis::camera::pinhole> map{camera, {.resolution =
-///   0.05}}; map.add_keyframe(seq, frame, depth, T_world_camera);        // in the map at once
+///   using live = orbis::mapping::live_map<orbis::octree::occupancy_octree<>, orbis::camera::pinhole>;
+///   live map{camera, {.resolution = 0.05}};
+///   map.add_keyframe(seq, frame, depth, T_world_camera);        // in the map at once
 ///   ...
 ///   map.set_poses(keyframes);                                   // after each step of the SLAM system
 ///   map.correct(seq, {.time = 5ms, .robot = T_world_camera.translation()});
@@ -45,7 +46,8 @@ struct live_map_options {
   double resolution = 0.05;                   ///< the edge of a voxel, metres; > 0
   octree::integration_options integration{};  ///< of every depth image
   /// A keyframe stays where it is in the map until its pose has moved a point of its view by more than this, in voxels.
-  /// 0: until any bit of the pose has changed, so that the map is always the one of the present poses. >= 0
+  /// 0: until any bit of the pose has changed, so that the map is the one of the present poses whenever nothing is
+  /// pending. >= 0
   double tolerance = 0.25;
   /// So many keyframes are moved before the map follows: more is less work, less is sooner. > 0
   std::size_t keyframes_per_replay = 16;
@@ -234,15 +236,21 @@ class live_map {
     return progress;
   }
   /// Moves every keyframe whose pose differs in any bit, drops the frames between keyframes, and brings the map up to
-  /// date: it is the map made afresh of the present keyframes and poses. Errors: those of `correct`.
+  /// date: it is the map made afresh of the present keyframes and poses. Returns what was done. Errors: those of
+  /// `correct`.
   template <execution_policy Policy>
-  result<void> finish(const Policy& policy) {
+  result<correction_progress> finish(const Policy& policy) {
+    correction_progress all{.keyframes = 0, .bricks = 0, .done = true};
     drop_oldest_frames(frames_.size());
     for (entry& k : keyframes_)
       if (k.used && k.wanted && differ(*k.used, *k.wanted)) set_waiting(k, true);
-    while (pending() != 0)
-      if (auto corrected = correct(policy); !corrected) return fail(std::move(corrected.error()));
-    return {};
+    while (pending() != 0) {
+      const auto corrected = correct(policy);
+      if (!corrected) return fail(corrected.error());
+      all.keyframes += corrected->keyframes;
+      all.bricks += corrected->bricks;
+    }
+    return all;
   }
   /// How much is left to do: keyframes that wait for being moved, and bricks that are not up to date. O(1).
   [[nodiscard]] std::size_t pending() const noexcept { return waiting_ + history_.stale_bricks(); }

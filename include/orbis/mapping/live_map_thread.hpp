@@ -92,8 +92,8 @@ struct live_correction_event {
   double milliseconds = 0.0;  ///< wall time that it took, without insertions between its parts
 };
 
-/// Callbacks; any of them may be empty. All but `overflowed` are called on the map's thread. They must not throw, wait
-/// for the map, or destroy it.
+/// Callbacks; any of them may be empty. All but `overflowed` are called on the map's thread, and `published` for the
+/// first, empty map by the constructor. They must not throw, wait for the map, or destroy it.
 template <class Octree>
 struct live_map_listeners {
   /// Fills in the present poses of all keyframes (the others are hidden) and returns true, or returns false if they are
@@ -199,14 +199,14 @@ class live_map_thread {
 
   /// Waits until everything that was asked for is done and nothing waits for a correction. Not to be called by
   /// callbacks.
-  void wait() const {
-    std::unique_lock lock{mutex_};
-    changed_.wait(lock, [&] { return ends_ || is_idle(); });
+  void wait() {
+    if (listeners_.poll_poses) push({.kind = job::question});  // poses may have moved since the last poll
+    wait_until_idle();
   }
   /// Makes the map the one of all present keyframes and poses, see live_map::finish, and waits for it.
   void finish() {
     push({.kind = job::completion});
-    wait();
+    wait_until_idle();
   }
   /// Ends the thread, and gives the map to the caller; what waits is dropped. Not to be called by callbacks.
   map_type& stop() {
@@ -223,7 +223,7 @@ class live_map_thread {
   using clock = std::chrono::steady_clock;
 
   struct job {
-    enum kind_type : std::uint8_t { keyframe, between, verdict, removal, positions, completion };
+    enum kind_type : std::uint8_t { keyframe, between, verdict, removal, positions, completion, question };
     kind_type kind = keyframe;
     std::uint64_t frame = 0;
     std::uint64_t keyframe_of = 0;
@@ -240,6 +240,10 @@ class live_map_thread {
   // -- the queue; `mutex_` guards it
 
   [[nodiscard]] bool is_idle() const noexcept { return jobs_.empty() && !busy_ && pending_ == 0; }
+  void wait_until_idle() const {
+    std::unique_lock lock{mutex_};
+    changed_.wait(lock, [&] { return ends_ || is_idle(); });
+  }
   [[nodiscard]] bool is_full() const noexcept { return images_waiting_ >= options_.max_waiting; }
   void push(job j) {
     {
@@ -366,13 +370,21 @@ class live_map_thread {
         break;
       case job::removal: map_.remove(j.frame); break;
       case job::positions: map_.set_poses(j.poses, j.others); break;
+      case job::question: poll(); break;
       case job::completion:
         if (listeners_.poll_poses) poll();
         for (;;) {  // an error removes a keyframe
           const auto finished = map_.finish(policy_);
-          if (finished) break;
+          correction_.milliseconds += milliseconds_since(start);
+          if (finished) {
+            correction_.keyframes += finished->keyframes;
+            correction_.bricks += finished->bricks;
+            break;
+          }
           report(finished.error());
         }
+        if (correction_.keyframes + correction_.bricks != 0) tell_correction();
+        correction_ = {};
         break;
     }
     if (!inserted) return;
@@ -397,7 +409,9 @@ class live_map_thread {
     }
     correction_.keyframes += progress->keyframes;
     correction_.bricks += progress->bricks;
-    if (!progress->done) return;
+    if (progress->done) tell_correction();
+  }
+  void tell_correction() {
     const live_correction_event event = std::exchange(correction_, {});
     {
       const std::lock_guard lock{mutex_};

@@ -81,8 +81,8 @@ class scan_history {
   /// The map as it is, readable at any time. A copy shares its memory until the map changes.
   [[nodiscard]] const Octree& map() const noexcept { return map_; }
   [[nodiscard]] const voxel_grid& grid() const noexcept { return map_.grid(); }
-  /// Which voxels changed: every `set` and every `replay` is one revision, and records exactly the voxels whose value
-  /// it changed or made known or unknown.
+  /// Which voxels changed: a `set` or `replay` that changes the map is one revision, and records exactly the voxels
+  /// whose value it changed or made known or unknown.
   [[nodiscard]] const change_log& changes() const noexcept { return map_.changes(); }
   /// The log for writing: to forget revisions that all readers have seen, or to limit its length.
   [[nodiscard]] change_log& changes() noexcept { return map_.changes(); }

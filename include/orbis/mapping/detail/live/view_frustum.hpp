@@ -18,7 +18,7 @@ namespace orbis::mapping::detail {
 /// The corners of a pyramid around all rays of a camera, in the camera frame at z = 1.
 class view_frustum {
  public:
-  /// O(pixels at the image's border).
+  /// O(pixels).
   template <camera::camera_model Camera>
   explicit view_frustum(const Camera& camera) {
     vec2 low = vec2::Constant(std::numeric_limits<double>::infinity()), high = -low;
@@ -28,12 +28,15 @@ class view_frustum {
       low = low.cwiseMin(ray->template head<2>());
       high = high.cwiseMax(ray->template head<2>());
     };
-    const int right = camera.width() - 1, bottom = camera.height() - 1;
-    for (int u = 0; u <= right; ++u)
-      for (const int v : {0, bottom}) add(u, v);
-    for (int v = 0; v <= bottom; ++v)
-      for (const int u : {0, right}) add(u, v);
+    // Every pixel: at the border of a fisheye image there may be no ray.
+    for (int v = 0; v != camera.height(); ++v)
+      for (int u = 0; u != camera.width(); ++u) add(u, v);
     if (!(low.array() <= high.array()).all()) low = high = vec2::Zero();
+    // Depth along the axis says little of rays that are almost at right angles to it: what is farther off than 80
+    // degrees counts as if it were there.
+    constexpr double widest = 5.67;
+    low = low.cwiseMax(-widest);
+    high = high.cwiseMin(widest);
     for (unsigned i = 0; i != 4; ++i)
       corners_[i] = {(i & 1U) != 0 ? high.x() : low.x(), (i & 2U) != 0 ? high.y() : low.y(), 1.0};
   }
