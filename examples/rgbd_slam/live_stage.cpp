@@ -39,9 +39,7 @@ live_mapping::live_mapping(const frame_source& source, const settings& s, std::f
            .published = {},
            .failed = [this](const orbis::error& e) { results_.trouble = e; }},
           orbis::mapping::depth_store{{.memory_budget = std::size_t{32} << 20U, .spill_file = std::move(spill_file)}}} {
-  const auto dense = dense_options(s);
-  points_ = {
-      .stride = 1, .min_depth = dense.min_depth, .max_depth = dense.max_depth, .flying_pixels = dense.flying_pixels};
+  points_ = point_options(dense_options(s));
 }
 
 bool live_mapping::poll(std::vector<pose>& poses, bool always) {

@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <string>
+#include <utility>
 
 #include <orbis/slam/rgbd_system.hpp>
 
@@ -70,12 +71,13 @@ live_mapping::find_poses poses_of(const slam_system& slam) {
   return [&slam, seen = orbis::slam::pose_revision{.map = orbis::slam::no_id}](
              const std::vector<live_mapping::made>& keyframes, std::vector<live_mapping::pose>& poses,
              bool always) mutable {
-    if (!slam.keyframes_since(seen) && !always) return false;
-    slam.inspect([&](const orbis::slam::atlas& maps) {
+    return slam.inspect([&](const orbis::slam::atlas& maps) {
+      const orbis::slam::pose_revision now{maps.active_id(), maps.active().pose_changes()};
+      if (std::exchange(seen, now) == now && !always) return false;
       for (const auto& k : keyframes)
         if (const auto pose = present_pose(maps, k.keyframe)) poses.push_back({k.frame, *pose});
+      return true;
     });
-    return true;
   };
 }
 

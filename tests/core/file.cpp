@@ -16,21 +16,16 @@
 #include <orbis/core/file.hpp>
 
 #include "support/catch.hpp"
+#include "support/temporary_folder.hpp"
 
 namespace fs = std::filesystem;
 using namespace orbis;
 
 namespace {
 
-/// A folder of one's own that goes away again.
-struct scratch_folder {
-  fs::path path = fs::temp_directory_path() / ("orbis_core_file_" + std::to_string(::getpid()));
-  scratch_folder() { fs::create_directories(path); }
-  ~scratch_folder() { fs::remove_all(path); }
-  scratch_folder(const scratch_folder&) = delete;
-  scratch_folder& operator=(const scratch_folder&) = delete;
+struct scratch_folder : test::temporary_folder {
   [[nodiscard]] std::ptrdiff_t files() const {
-    return std::distance(fs::directory_iterator{path}, fs::directory_iterator{});
+    return std::distance(fs::directory_iterator{path()}, fs::directory_iterator{});
   }
 };
 
@@ -45,8 +40,8 @@ TEST_CASE("what was written is read again whatever the bytes") {
   std::string bytes;
   for (int i = 0; i != 200000; ++i) bytes += static_cast<char>(i * 7);
   for (const std::string& text : {std::string{}, std::string{"a\r\n\0b", 5}, bytes}) {
-    REQUIRE(write_text(folder.path / "file", text));
-    const auto again = read_file(folder.path / "file");
+    REQUIRE(write_text(folder / "file", text));
+    const auto again = read_file(folder / "file");
     REQUIRE(again);
     CHECK(*again == text);
     CHECK(folder.files() == 1);
@@ -55,11 +50,11 @@ TEST_CASE("what was written is read again whatever the bytes") {
 
 TEST_CASE("files that are not there or not readable are told apart") {
   const scratch_folder folder;
-  const auto absent = read_file(folder.path / "absent");
+  const auto absent = read_file(folder / "absent");
   REQUIRE(!absent);
   CHECK(absent.error().code == errc::not_found);
-  CHECK(absent.error().where == (folder.path / "absent").string());
-  const auto directory = read_file(folder.path);
+  CHECK(absent.error().where == (folder / "absent").string());
+  const auto directory = read_file(folder.path());
   REQUIRE(!directory);
   CHECK(directory.error().code == errc::unreadable);
   CHECK(read_file(std::string(5000, 'n')).error().code == errc::unreadable);  // longer than any name
@@ -73,7 +68,7 @@ TEST_CASE("files that are not there or not readable are told apart") {
 
 TEST_CASE("a writer that gives up or throws leaves the old file and nothing else") {
   const scratch_folder folder;
-  const fs::path path = folder.path / "kept.txt";
+  const fs::path path = folder / "kept.txt";
   REQUIRE(write_text(path, "old"));
 
   const auto given_up = write_file_atomically(path, [](std::ostream& out) -> result<void> {
@@ -110,7 +105,7 @@ TEST_CASE("a writer that gives up or throws leaves the old file and nothing else
 
 TEST_CASE("a file that finds no room is an error whether it shows in writing or in closing") {
   const scratch_folder folder;
-  const fs::path path = folder.path / "map.bt";
+  const fs::path path = folder / "map.bt";
   REQUIRE(write_text(path, "old"));
   rlimit before{};
   REQUIRE(::getrlimit(RLIMIT_FSIZE, &before) == 0);
@@ -132,7 +127,7 @@ TEST_CASE("a file that finds no room is an error whether it shows in writing or 
 
 TEST_CASE("threads that write the same file leave one of their files and nothing else") {
   const scratch_folder folder;
-  const fs::path path = folder.path / "shared";
+  const fs::path path = folder / "shared";
   std::atomic<int> failures{0};
   std::vector<std::thread> writers;
   for (char name = 'a'; name != 'e'; ++name)
@@ -149,21 +144,21 @@ TEST_CASE("threads that write the same file leave one of their files and nothing
 TEST_CASE("a temporary file that an ended process left does not stop the next one") {
   const scratch_folder folder;
   for (int i = 0; i != 4; ++i) {  // the names that this process would use next
-    orbis::detail::temporary_file probe{folder.path / "x"};
+    orbis::detail::temporary_file probe{folder / "x"};
     REQUIRE(probe.exists());
     const std::string name = probe.path().filename().string();
     const auto number = std::stoul(name.substr(name.rfind('-') + 1));
-    std::ofstream{folder.path / (name.substr(0, name.rfind('-') + 1) + std::to_string(number + 1) + ".part")} << "left";
+    std::ofstream{folder / (name.substr(0, name.rfind('-') + 1) + std::to_string(number + 1) + ".part")} << "left";
   }
   const std::ptrdiff_t left = folder.files();
-  CHECK(write_text(folder.path / "file", "text"));
-  CHECK(read_file(folder.path / "file").value() == "text");
+  CHECK(write_text(folder / "file", "text"));
+  CHECK(read_file(folder / "file").value() == "text");
   CHECK(folder.files() == left + 1);
 }
 
 TEST_CASE("a device or a pipe is not replaced by a file") {
   const scratch_folder folder;
-  const fs::path pipe = folder.path / "pipe";
+  const fs::path pipe = folder / "pipe";
   REQUIRE(::mkfifo(pipe.c_str(), 0600) == 0);
   const auto r = write_text(pipe, "text");
   REQUIRE(!r);
@@ -174,15 +169,15 @@ TEST_CASE("a device or a pipe is not replaced by a file") {
 
 TEST_CASE("a file that cannot be created says so and names the file") {
   const scratch_folder folder;
-  REQUIRE(write_text(folder.path / "plain", "x"));
-  for (const fs::path& path : {folder.path / "absent" / "file", folder.path / "plain" / "file"}) {
+  REQUIRE(write_text(folder / "plain", "x"));
+  for (const fs::path& path : {folder / "absent" / "file", folder / "plain" / "file"}) {
     const auto r = write_text(path, "text");
     REQUIRE(!r);
     CHECK(r.error().code == errc::write_failed);
     CHECK(r.error().to_string().find(path.string()) == 0);
   }
-  fs::create_directories(folder.path / "occupied" / "by");
-  const auto r = write_text(folder.path / "occupied", "text");
+  fs::create_directories(folder / "occupied" / "by");
+  const auto r = write_text(folder / "occupied", "text");
   REQUIRE(!r);
   CHECK(r.error().code == errc::write_failed);
   CHECK(folder.files() == 2);

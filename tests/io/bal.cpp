@@ -9,7 +9,7 @@
 
 #include "support/catch.hpp"
 #include "support/data.hpp"
-#include "temporary_folder.hpp"
+#include "support/temporary_folder.hpp"
 
 using namespace orbis;
 using io::parse_bal;

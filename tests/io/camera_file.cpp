@@ -7,7 +7,7 @@
 #include <orbis/camera/presets.hpp>
 #include <orbis/io/camera_file.hpp>
 
-#include "io/temporary_folder.hpp"
+#include "support/temporary_folder.hpp"
 #include "support/catch.hpp"
 #include "support/data.hpp"
 

@@ -8,7 +8,7 @@
 #include "support/catch.hpp"
 #include "support/synthetic/pose_graph.hpp"
 #include "support/data.hpp"
-#include "temporary_folder.hpp"
+#include "support/temporary_folder.hpp"
 
 using namespace orbis;
 using io::parse_g2o;

@@ -9,7 +9,7 @@
 #include <orbis/io/jpeg.hpp>
 
 #include "io/quiet.hpp"
-#include "io/temporary_folder.hpp"
+#include "support/temporary_folder.hpp"
 #include "support/catch.hpp"
 
 namespace io = orbis::io;

@@ -9,7 +9,7 @@
 
 #include <orbis/io/pcd.hpp>
 
-#include "io/temporary_folder.hpp"
+#include "support/temporary_folder.hpp"
 #include "support/catch.hpp"
 #include "support/data.hpp"
 

@@ -10,7 +10,7 @@
 
 #include <orbis/io/ply.hpp>
 
-#include "io/temporary_folder.hpp"
+#include "support/temporary_folder.hpp"
 #include "support/catch.hpp"
 
 namespace io = orbis::io;

@@ -11,7 +11,7 @@
 #include <orbis/io/png.hpp>
 
 #include "io/quiet.hpp"
-#include "io/temporary_folder.hpp"
+#include "support/temporary_folder.hpp"
 #include "support/catch.hpp"
 
 namespace io = orbis::io;

@@ -9,7 +9,7 @@
 
 #include <orbis/io/png.hpp>
 
-#include "io/temporary_folder.hpp"
+#include "support/temporary_folder.hpp"
 
 namespace orbis::test {
 

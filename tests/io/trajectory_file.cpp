@@ -4,7 +4,7 @@
 
 #include <orbis/io/trajectory_file.hpp>
 
-#include "io/temporary_folder.hpp"
+#include "support/temporary_folder.hpp"
 #include "support/catch.hpp"
 #include "support/data.hpp"
 

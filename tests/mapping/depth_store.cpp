@@ -15,6 +15,7 @@
 #include <orbis/mapping/depth_store.hpp>
 
 #include "support/catch.hpp"
+#include "support/temporary_folder.hpp"
 
 namespace {
 
@@ -23,15 +24,9 @@ using orbis::errc;
 using orbis::mapping::depth_store;
 using depth_image = orbis::image<std::uint16_t>;
 
-/// A folder that is gone when the test ends.
-struct scratch {
-  fs::path path = fs::temp_directory_path() / ("orbis_depth_store_" + std::to_string(::getpid()));
-  scratch() { fs::create_directories(path); }
-  ~scratch() { fs::remove_all(path); }
-  scratch(const scratch&) = delete;
-  scratch& operator=(const scratch&) = delete;
-  [[nodiscard]] fs::path spill() const { return path / "depths.tmp"; }
-  [[nodiscard]] bool empty() const { return fs::is_empty(path); }
+struct scratch : orbis::test::temporary_folder {
+  [[nodiscard]] fs::path spill() const { return path() / "depths.tmp"; }
+  [[nodiscard]] bool empty() const { return fs::is_empty(path()); }
 };
 
 /// Noise that takes 2 kB and more when it is compressed; different for each seed.
@@ -191,8 +186,8 @@ TEST_CASE("a store leaves no file, moved or not") {
 
 TEST_CASE("a spill file that cannot be made is told, and nothing is lost") {
   const scratch folder;
-  std::ofstream{folder.path / "taken"} << "somebody's";
-  for (const fs::path& path : {folder.path / "none" / "depths.tmp", folder.path / "taken", fs::path{"/dev/full"}}) {
+  std::ofstream{folder / "taken"} << "somebody's";
+  for (const fs::path& path : {folder / "none" / "depths.tmp", folder / "taken", fs::path{"/dev/full"}}) {
     depth_store store{{.memory_budget = 0, .spill_file = path}};
     for (std::uint32_t i = 0; i != 3; ++i) {
       const auto kept = store.put(i, noise(i));
@@ -205,7 +200,7 @@ TEST_CASE("a spill file that cannot be made is told, and nothing is lost") {
     for (std::uint32_t i = 0; i != 3; ++i) CHECK(get(store, i) == noise(i));
   }
   std::string content;
-  std::ifstream{folder.path / "taken"} >> content;
+  std::ifstream{folder / "taken"} >> content;
   CHECK(content == "somebody's");
 }
 

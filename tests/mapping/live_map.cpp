@@ -20,6 +20,7 @@
 #include "mapping/keyframes.hpp"
 #include "mapping/memory_depths.hpp"
 #include "support/catch.hpp"
+#include "support/random_motion.hpp"
 
 using namespace orbis;
 using namespace std::chrono_literals;
@@ -30,15 +31,6 @@ namespace {
 using octree_type = octree::occupancy_octree<>;
 using live = mapping::live_map<octree_type, camera::pinhole, test::memory_depths>;
 using depth_view = camera::depth_view<std::uint16_t>;
-
-se3 random_motion(random_bits& random, double metres, double radians) {
-  se3::tangent xi;
-  for (int i = 0; i != 3; ++i) {
-    xi[i] = random.uniform(-metres, metres);
-    xi[i + 3] = random.uniform(-radians, radians);
-  }
-  return se3::exp(xi);
-}
 
 /// What the SLAM system believes: the keyframes of all maps, in the world of each.
 struct belief {
@@ -95,7 +87,7 @@ std::vector<std::string> run(const Policy& policy, std::uint64_t seed, double to
   for (int step = 0; step != 40; ++step) {
     switch (random.below(8)) {
       case 0: {  // a loop closes: drift that grows towards the newest keyframe is taken out
-        const se3 drift = random_motion(random, 0.1, 0.03);
+        const se3 drift = test::random_motion(random, 0.1, 0.03);
         double part = 0;
         for (auto& [frame, k] : b.keyframes) {
           if (k.map == b.active) k.T_world_camera = se3::exp(part * drift.log()) * k.T_world_camera;
@@ -105,7 +97,7 @@ std::vector<std::string> run(const Policy& policy, std::uint64_t seed, double to
       }
       case 1:  // local adjustment: a little, most of it within the tolerance
         for (auto& [frame, k] : b.keyframes)
-          if (random.below(2) == 0) k.T_world_camera = random_motion(random, 0.004, 0.002) * k.T_world_camera;
+          if (random.below(2) == 0) k.T_world_camera = test::random_motion(random, 0.004, 0.002) * k.T_world_camera;
         break;
       case 2:  // a keyframe is redundant
         if (!b.keyframes.empty()) {
@@ -119,7 +111,7 @@ std::vector<std::string> run(const Policy& policy, std::uint64_t seed, double to
         if (b.active == 0) {
           b.active = 1;
         } else {
-          const se3 T = random_motion(random, 0.3, 0.2);
+          const se3 T = test::random_motion(random, 0.3, 0.2);
           for (auto& [frame, k] : b.keyframes) {
             if (k.map == 1) k.T_world_camera = T * k.T_world_camera;
             k.map = 0;
@@ -137,7 +129,7 @@ std::vector<std::string> run(const Policy& policy, std::uint64_t seed, double to
       default:
         if (added != b.scene.depth.size()) {
           const std::uint64_t frame = 30 * (added ^ 1U);  // pairs come in the wrong order
-          const se3 drifted = random_motion(random, 0.02, 0.01) * b.scene.poses[added];
+          const se3 drifted = test::random_motion(random, 0.02, 0.01) * b.scene.poses[added];
           auto& k = b.keyframes[frame] = {b.scene.depth[added++], drifted, b.active};
           CHECK(map.add_keyframe(policy, frame, b.depth_of(k), k.T_world_camera));
         }
@@ -188,7 +180,7 @@ TEST_CASE("A finished live map is the map of all keyframes built at once") {
   random_bits random{4};
   for (std::size_t i = 0; i != 8; ++i) {
     const auto k = scene.keyframe(i);
-    REQUIRE(map.add_keyframe(seq, i, k.depth, random_motion(random, 0.05, 0.05) * k.T_world_camera));
+    REQUIRE(map.add_keyframe(seq, i, k.depth, test::random_motion(random, 0.05, 0.05) * k.T_world_camera));
   }
   scene.poses[5] = se3{so3{}, vec3::Constant(std::numeric_limits<double>::quiet_NaN())};
   std::vector<mapping::keyframe_position> poses;

@@ -21,6 +21,7 @@
 #include "octree/support.hpp"
 #include "support/allocations.hpp"
 #include "support/catch.hpp"
+#include "support/random_motion.hpp"
 
 using namespace orbis;
 using namespace orbis::octree;
@@ -41,14 +42,6 @@ image<float> wavy_depth(random_bits& random) {
     }
   return depth;
 }
-se3 random_pose(random_bits& random, double metres, double radians) {
-  se3::tangent xi;
-  for (int i = 0; i != 3; ++i) {
-    xi[i] = random.uniform(-metres, metres);
-    xi[i + 3] = random.uniform(-radians, radians);
-  }
-  return se3::exp(xi);
-}
 
 struct scan {
   image<float> depth;  ///< empty: points
@@ -56,7 +49,7 @@ struct scan {
   se3 T_world_camera;
 };
 scan random_scan(random_bits& random) {
-  const se3 pose = random_pose(random, 0.4, 0.5);
+  const se3 pose = test::random_motion(random, 0.4, 0.5);
   if (random.below(4) != 0) return {wavy_depth(random), {}, pose};
   const vec3f origin = pose.translation().cast<float>();
   return {{}, test::shell_scan(random, 300, origin), pose};
@@ -147,7 +140,7 @@ std::string check_random_calls(const parallel_policy& policy, std::uint64_t seed
           if (!at->second.depth.empty() && random.below(2) == 0)
             for (int y = 10; y != 40; ++y) at->second.depth(30, y) = 0.0F;
           else
-            at->second.T_world_camera = random_pose(random, 0.02, 0.01) * at->second.T_world_camera;
+            at->second.T_world_camera = test::random_motion(random, 0.02, 0.01) * at->second.T_world_camera;
           put(policy, history, at->second, options, frame);
           break;
         }
@@ -210,7 +203,7 @@ TEST_CASE("The newest scan is in a history's map at once, an older one after a r
   scan_history<> history{0.05};
   occupancy_octree<> map{0.05};
   for (std::uint64_t frame = 10; frame != 16; ++frame) {
-    const scan s{wavy_depth(random), {}, random_pose(random, 0.2, 0.2)};
+    const scan s{wavy_depth(random), {}, test::random_motion(random, 0.2, 0.2)};
     const auto got = history.set(seq, frame, camera::depth_view(s.depth), small_camera, s.T_world_camera);
     map.integrate(camera::depth_view(s.depth), small_camera, s.T_world_camera);
     const auto [free, occupied] = history.find_scan(frame)->counts();
@@ -221,7 +214,7 @@ TEST_CASE("The newest scan is in a history's map at once, an older one after a r
   }
   const std::string before = ot_bytes(history.map());
   const occupancy_octree<> snapshot = history.map();
-  const scan late{wavy_depth(random), {}, random_pose(random, 0.2, 0.2)};
+  const scan late{wavy_depth(random), {}, test::random_motion(random, 0.2, 0.2)};
   history.set(seq, 3, camera::depth_view(late.depth), small_camera, late.T_world_camera);
   CHECK(history.stale_bricks() > 10);
   history.replay(seq, {.time = std::chrono::nanoseconds{0}});  // does something even so
@@ -268,7 +261,7 @@ TEST_CASE("Marked voxels are packed without loss, and replaying allocates nothin
   scan_voxels voxels;
   std::vector<scan> scans;
   for (std::uint64_t frame = 0; frame != 8; ++frame) {
-    scans.push_back({wavy_depth(random), {}, random_pose(random, 0.2, 0.2)});
+    scans.push_back({wavy_depth(random), {}, test::random_motion(random, 0.2, 0.2)});
     const auto& s = scans.back();
     const auto got =
         marker.mark(seq, history.grid(), camera::depth_view(s.depth), small_camera, s.T_world_camera, {}, voxels);

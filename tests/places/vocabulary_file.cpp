@@ -12,7 +12,7 @@
 #include <orbis/core/random.hpp>
 #include <orbis/places/vocabulary_file.hpp>
 
-#include "io/temporary_folder.hpp"
+#include "support/temporary_folder.hpp"
 #include "places/images.hpp"
 #include "support/catch.hpp"
 

@@ -67,7 +67,8 @@ struct built_map {
 
 namespace detail {
 
-/// The steps of `build_map`. `into.scan(filtered, keyframe, depth)` takes one depth image, before and after the filter;
+/// The steps of `build_map`. `into.wants(filtered, keyframe)` says whether it lacks this keyframe's depth image;
+/// `into.scan(filtered, keyframe, depth)` takes one depth image, before and after the filter;
 /// `into.complete(filtered)` gives the map of all of them.
 template <class Octree, execution_policy Policy, keyframe_range Keyframes, camera::camera_model Camera, class Into>
 [[nodiscard]] result<built_map<Octree>> build_map_into(const Policy& policy, const Keyframes& keyframes,
@@ -138,10 +139,16 @@ template <class Octree, execution_policy Policy, keyframe_range Keyframes, camer
     std::size_t number = 0;
     for (const auto& k : keyframes) {
       if (finite_pose(k)) {
-        const auto depth = dense.masked_depth(policy, k, number++, kept_points);
-        const auto start = std::chrono::steady_clock::now();
-        if (auto done_scan = into.scan(filtered, k, view_like(k.depth, depth.view())); !done_scan) return done_scan;
-        const auto time = std::chrono::steady_clock::now() - start;
+        const result<bool> wanted = into.wants(filtered, k);
+        if (!wanted) return fail(wanted.error());
+        std::chrono::steady_clock::duration time{};
+        if (*wanted) {
+          const auto depth = dense.masked_depth(policy, k, number, kept_points);
+          const auto start = std::chrono::steady_clock::now();
+          if (auto scanned = into.scan(filtered, k, view_like(k.depth, depth.view())); !scanned) return scanned;
+          time = std::chrono::steady_clock::now() - start;
+        }
+        ++number;
         milliseconds.push_back(std::chrono::duration<double, std::milli>(time).count());
       }
       if (!on_progress(++done, total)) return fail(errc::cancelled, {}, "cancelled");
@@ -170,6 +177,10 @@ struct fresh_octrees {
   const map_options& options;
   std::optional<Octree> octree{};  // options are checked before the first scan
 
+  template <class Keyframe>
+  result<bool> wants(bool, const Keyframe&) const {
+    return true;
+  }
   template <class Keyframe, class Depth>
   result<void> scan(bool, const Keyframe& k, const Depth& depth) {
     if (!octree) octree.emplace(options.resolution);
@@ -189,6 +200,14 @@ struct live_octree {
   Live& live;
   std::vector<keyframe_position> poses{};
 
+  template <class Keyframe>
+  result<bool> wants(bool filtered, const Keyframe& k) {
+    if (filtered) return true;
+    if (!poses.empty() && !(poses.back().frame < k.frame))
+      return fail(errc::invalid_argument, "keyframes", "their frame numbers do not ascend");
+    poses.push_back({k.frame, se3(k.T_world_camera)});
+    return !live.contains(k.frame);
+  }
   template <class Keyframe, class Depth>
   result<void> scan(bool filtered, const Keyframe& k, const Depth& depth) {
     // Where the images' file cannot be written to, they stay in memory: nothing is lost.
@@ -200,10 +219,6 @@ struct live_octree {
       auto set = live.set_depth(policy, k.frame, depth);
       return set ? result<void>{} : unless_kept(std::move(set.error()));
     }
-    if (!poses.empty() && !(poses.back().frame < k.frame))
-      return fail(errc::invalid_argument, "keyframes", "their frame numbers do not ascend");
-    poses.push_back({k.frame, se3(k.T_world_camera)});
-    if (live.contains(k.frame)) return {};
     auto added = live.add_keyframe(policy, k.frame, depth, poses.back().T_world_camera);
     return added ? result<void>{} : unless_kept(std::move(added.error()));
   }
@@ -242,7 +257,8 @@ requires depth_map<Octree, Camera>
 /// `options.resolution` and `options.integration` are those of the live map, and the unfiltered octree is always made.
 /// Errors, in addition: `invalid_argument` if the frame numbers do not ascend; those of the live map, but for images
 /// that stay in memory because they cannot be written to their file. @pre what the live map has was added with the
-/// depth that `keyframe_points::masked` leaves under `options.dense`, and no filter's verdict was taken over yet
+/// depth that `keyframe_points::masked` leaves under `point_options(options.dense)`, and no filter's verdict was taken
+/// over yet
 template <execution_policy Policy, keyframe_range Keyframes, octree::replayable_octree Octree,
           camera::camera_model Camera, depth_history Depths>
 requires requires(const std::ranges::range_value_t<Keyframes>& k) {

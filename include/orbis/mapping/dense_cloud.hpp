@@ -37,6 +37,11 @@ struct dense_options {
   std::optional<cloud::flying_pixel_options> flying_pixels{};
 };
 
+/// Which pixels of a keyframe become points of the cloud.
+[[nodiscard]] inline keyframe_point_options point_options(const dense_options& options) {
+  return {options.stride, options.min_depth, options.max_depth, options.flying_pixels};
+}
+
 /// A cloud that grows by keyframes, and follows them when their poses change.
 ///
 /// With a voxel size, memory follows the surface that is seen (about 50 bytes for each voxel, and 20 for
@@ -187,33 +192,30 @@ class dense_cloud {
   [[nodiscard]] auto masked_depth(const Policy& policy, const Keyframe& k, std::size_t number,
                                   const selection& kept = {}) const {
     assert(contains(number));
-    const frame& f = frames_[number];
-    image<depth_pixel<std::remove_cvref_t<decltype(k.depth)>>> out(rays_.width(), rays_.height());
     keyframe_points reader;  // const functions share no memory
-    const bool all = !kept.places_ && kept.first_of_frame_.empty();
+    auto out = reader.masked(policy, k.depth, rays_, point_options(options_));
+    if (!kept.places_ && kept.first_of_frame_.empty()) return out;
+    const auto depth = view_like(k.depth, image_view<const depth_pixel<std::remove_cvref_t<decltype(k.depth)>>>(out));
+    keyframe_point_options points = point_options(options_);
+    points.flying_pixels.reset();  // they are gone
+    const se3& T_world_camera = frames_[number].T_world_camera;
     const auto is_kept = [&](const vec3f& point) -> std::optional<bool> {  // by its voxel
       if (!kept.places_) return std::nullopt;
       const auto place = kept.places_->find(point.cast<double>());
       return place ? std::optional{kept.kept_[*place] != 0} : std::nullopt;
     };
-    image<std::uint8_t> block_kept;
-    if (!all) {
-      block_kept = image<std::uint8_t>((rays_.width() + options_.stride - 1) / options_.stride,
-                                       (rays_.height() + options_.stride - 1) / options_.stride);
-      std::size_t point = kept.places_ ? 0 : kept.first_of_frame_[number];
-      reader.read(seq, k.depth, rays_, point_options(), f.T_world_camera,
-                  [&](std::size_t, int x, int y, const vec3f& p, float) {
-                    const bool keep = kept.places_ ? is_kept(p).value_or(false) : kept.kept_[point++] != 0;
-                    block_kept(x / options_.stride, y / options_.stride) = keep ? 1 : 0;
-                  });
-    }
-    keyframe_point_options every_pixel = point_options();
-    every_pixel.stride = 1;
-    reader.read(policy, k.depth, rays_, every_pixel, f.T_world_camera,
+    image<std::uint8_t> block_kept((rays_.width() + options_.stride - 1) / options_.stride,
+                                   (rays_.height() + options_.stride - 1) / options_.stride);
+    std::size_t next = kept.places_ ? 0 : kept.first_of_frame_[number];
+    reader.read(seq, depth, rays_, points, T_world_camera, [&](std::size_t, int x, int y, const vec3f& point, float) {
+      const bool keep = kept.places_ ? is_kept(point).value_or(false) : kept.kept_[next++] != 0;
+      block_kept(x / options_.stride, y / options_.stride) = keep ? 1 : 0;
+    });
+    points.stride = 1;
+    reader.read(policy, depth, rays_, points, T_world_camera,
                 [&](std::size_t, int x, int y, const vec3f& point, float) {
-                  if (!all && !is_kept(point).value_or(block_kept(x / options_.stride, y / options_.stride) != 0))
-                    return;
-                  out(x, y) = stored_depth(k.depth, x, y);
+                  if (!is_kept(point).value_or(block_kept(x / options_.stride, y / options_.stride) != 0))
+                    out(x, y) = 0;
                 });
     return out;
   }
@@ -237,7 +239,7 @@ class dense_cloud {
     }
     keyframe_points reader;  // const functions share no memory
     std::vector<std::vector<vec3f>> parts(reader.parts(rays_, options_.stride));
-    reader.read(policy, k.depth, rays_, point_options(), frames_[number].T_world_camera,
+    reader.read(policy, k.depth, rays_, point_options(options_), frames_[number].T_world_camera,
                 [&](std::size_t part, int, int, const vec3f& point, float) {
                   if (!all) {
                     const auto place = kept.places_->find(point.cast<double>());
@@ -260,10 +262,6 @@ class dense_cloud {
   };
 
   [[nodiscard]] bool merging() const noexcept { return options_.voxel_size > 0; }
-  [[nodiscard]] keyframe_point_options point_options() const {
-    return {options_.stride, options_.min_depth, options_.max_depth, options_.flying_pixels};
-  }
-
   template <execution_policy Policy, keyframe_like Keyframe>
   std::size_t put(const Policy& policy, const Keyframe& k, std::size_t number) {
     frame& f = frames_[number];
@@ -298,14 +296,14 @@ class dense_cloud {
     if (merging()) {
       parts_.resize(parts, cloud::voxel_measurements{options_.voxel_size});
       for (auto& part : parts_) part.clear();
-      return reader_.read(policy, k.depth, rays_, point_options(), T_world_camera,
+      return reader_.read(policy, k.depth, rays_, point_options(options_), T_world_camera,
                           [&](std::size_t part, int x, int y, const vec3f& point, float range) {
                             parts_[part].push(point.cast<double>(), color_at(x, y), range);
                           });
     }
     plain_.resize(parts);
     for (auto& part : plain_) part.clear();
-    return reader_.read(policy, k.depth, rays_, point_options(), T_world_camera,
+    return reader_.read(policy, k.depth, rays_, point_options(options_), T_world_camera,
                         [&](std::size_t part, int x, int y, const vec3f& point, float range) {
                           plain_[part].cloud.points.push_back(point);
                           plain_[part].cloud.colors.push_back(color_at(x, y));

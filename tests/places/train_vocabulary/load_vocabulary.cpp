@@ -3,7 +3,7 @@
 
 #include <orbis/places/vocabulary_file.hpp>
 
-#include "io/temporary_folder.hpp"
+#include "support/temporary_folder.hpp"
 #include "places/images.hpp"
 #include "places/train_vocabulary/foreign_files.hpp"
 #include "support/catch.hpp"

@@ -4,7 +4,7 @@
 
 #include <orbis/io/detail/recordings/recording_index.hpp>
 
-#include "io/temporary_folder.hpp"
+#include "support/temporary_folder.hpp"
 #include "support/catch.hpp"
 
 namespace io = orbis::io;

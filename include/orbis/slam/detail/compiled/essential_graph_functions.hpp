@@ -9,10 +9,10 @@
 #include <span>
 #include <vector>
 
+#include <orbis/core/compiled_once.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/optimize/pose_graph.hpp>
-#include <orbis/core/compiled_once.hpp>
 #include <orbis/slam/detail/loops/essential_graph.hpp>
 
 namespace orbis::slam::detail {

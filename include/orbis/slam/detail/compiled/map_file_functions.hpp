@@ -13,9 +13,9 @@
 #include <utility>
 
 #include <orbis/core/bytes.hpp>
+#include <orbis/core/compiled_once.hpp>
 #include <orbis/core/file.hpp>
 #include <orbis/core/result.hpp>
-#include <orbis/core/compiled_once.hpp>
 #include <orbis/slam/detail/map/file_sections.hpp>
 #include <orbis/slam/detail/map/map_reader.hpp>
 #include <orbis/slam/detail/map/map_writer.hpp>
