@@ -4,7 +4,7 @@
 # `find_package(orbis COMPONENTS octree)` looks for exactly what `octree` needs.
 
 # In an order in which everything a component needs stands before it.
-set(ORBIS_ALL_COMPONENTS core camera features places optimize cloud octree io eval slam mapping
+set(ORBIS_ALL_COMPONENTS core camera features places optimize cloud octree io eval slam mapping nav
                          cloud_nanoflann interop_opencv interop_octomap interop_pcl interop_open3d)
 # One header each, for another library: provided where that library is, and asked for by name.
 set(ORBIS_OPTIONAL_COMPONENTS "^(cloud_nanoflann|interop_.*|compiled)$")
@@ -36,6 +36,7 @@ set(ORBIS_eval_NEEDS core)
 
 set(ORBIS_slam_NEEDS features optimize places)
 set(ORBIS_mapping_NEEDS cloud octree)
+set(ORBIS_nav_NEEDS octree)
 
 set(ORBIS_interop_opencv_NEEDS features)
 set(ORBIS_interop_opencv_PACKAGES OpenCV)

@@ -15,7 +15,7 @@
 /// | `random.hpp` | random numbers, the same on every machine |
 /// | `rounded.hpp` | products that no sum is fused with; sines that are the same bits everywhere |
 /// | `simd.hpp` | vector kernels, written once for every instruction set |
-/// | `hash_index.hpp` | hash tables from keys to positions |
+/// | `hash_index.hpp, cow_pages.hpp` | hash tables from keys to positions; arrays whose copies share pages |
 /// | `compiled_once.hpp` | for authors of components: what is inline, or compiled once in `orbis::compiled` |
 /// | `bits.hpp, bytes.hpp` | counts and strings of bits; byte orders, checksums, bytes as text |
 #pragma once
@@ -23,6 +23,7 @@
 #include <orbis/core/bits.hpp>
 #include <orbis/core/bytes.hpp>
 #include <orbis/core/compiled_once.hpp>
+#include <orbis/core/cow_pages.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/file.hpp>
 #include <orbis/core/hash_index.hpp>

@@ -9,6 +9,7 @@
 /// | sensor_model.hpp | what a hit and a miss do to a voxel; models in float, int16 and int8, or your own |
 /// | key.hpp | voxel keys, the grid, boxes, Morton order |
 /// | accessor.hpp | many look-ups near each other; the concept of a map |
+/// | octants.hpp | what is known, as bit masks of 4x4x4 voxels |
 /// | nodes.hpp | nodes of any size, inner nodes made of their children by a policy |
 /// | cast_ray.hpp | what a ray meets first, one ray or many |
 /// | overlap.hpp | whether boxes, spheres and capsules are free |
@@ -35,6 +36,7 @@
 #include <orbis/octree/key.hpp>
 #include <orbis/octree/nodes.hpp>
 #include <orbis/octree/occupancy_octree.hpp>
+#include <orbis/octree/octants.hpp>
 #include <orbis/octree/overlap.hpp>
 #include <orbis/octree/render.hpp>
 #include <orbis/octree/scan_history.hpp>

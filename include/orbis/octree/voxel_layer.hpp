@@ -19,11 +19,11 @@
 #include <utility>
 #include <vector>
 
+#include <orbis/core/cow_pages.hpp>
 #include <orbis/core/hash_index.hpp>
 #include <orbis/core/image.hpp>
 #include <orbis/core/point.hpp>
 #include <orbis/octree/detail/points/ray_traversal.hpp>
-#include <orbis/octree/detail/storage/cow_pages.hpp>
 #include <orbis/octree/integration.hpp>
 #include <orbis/octree/key.hpp>
 
@@ -232,7 +232,7 @@ class voxel_layer {
   }
 
   hash_index index_;
-  detail::cow_pages<octant> octants_;
+  cow_pages<octant> octants_;
   std::vector<std::uint32_t> free_;  ///< octants not in use
 };
 

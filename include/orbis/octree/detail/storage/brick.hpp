@@ -17,8 +17,8 @@
 #include <utility>
 #include <vector>
 
+#include <orbis/core/cow_pages.hpp>
 #include <orbis/core/hash_index.hpp>
-#include <orbis/octree/detail/storage/cow_pages.hpp>
 #include <orbis/octree/detail/storage/large_leaves.hpp>
 #include <orbis/octree/detail/storage/node_name.hpp>
 #include <orbis/octree/detail/storage/octant_pools.hpp>

@@ -9,8 +9,8 @@
 #include <cstdint>
 #include <utility>
 
+#include <orbis/core/cow_pages.hpp>
 #include <orbis/core/hash_index.hpp>
-#include <orbis/octree/detail/storage/cow_pages.hpp>
 #include <orbis/octree/detail/storage/node_name.hpp>
 
 namespace orbis::octree::detail {

@@ -8,7 +8,7 @@
 #include <tuple>
 #include <vector>
 
-#include <orbis/octree/detail/storage/cow_pages.hpp>
+#include <orbis/core/cow_pages.hpp>
 #include <orbis/octree/detail/storage/octant_record.hpp>
 
 namespace orbis::octree::detail {

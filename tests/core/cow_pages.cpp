@@ -4,13 +4,12 @@
 #include <utility>
 #include <vector>
 
+#include <orbis/core/cow_pages.hpp>
 #include <orbis/core/random.hpp>
-#include <orbis/octree/detail/storage/cow_pages.hpp>
 
 #include "support/catch.hpp"
 
 using namespace orbis;
-using octree::detail::cow_pages;
 
 TEST_CASE("A paged array and its copies hold what vectors would hold") {
   random_bits random{9};

@@ -14,7 +14,7 @@
 #include <utility>
 #include <vector>
 
-namespace orbis::octree::detail {
+namespace orbis {
 
 /// Values in pages of about 4 KB. A page that several arrays share is cloned by the one that writes
 /// to it. Each array belongs to one thread at a time; arrays that share pages need no lock between
@@ -89,4 +89,4 @@ class cow_pages {
   std::size_t size_ = 0;
 };
 
-}  // namespace orbis::octree::detail
+}  // namespace orbis

@@ -1,0 +1,3 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#define ORBIS_INSTANTIATE_KERNELS
+#include <orbis/nav/detail/compiled/squared_distances_functions.hpp>

@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Everything in orbis::nav: what a robot needs to plan on a map.
+///
+/// | header | what it is for |
+/// | --- | --- |
+/// | distance_field.hpp | how far it is to the nearest obstacle of a map, and in which direction; follows the map |
+/// | squared_distances.hpp | the same without a map: exact squared distances in voxels |
+/// | map_access.hpp | how planning reads a map, also one of another library |
+#pragma once
+
+#include <orbis/nav/distance_field.hpp>
+#include <orbis/nav/map_access.hpp>
+#include <orbis/nav/squared_distances.hpp>

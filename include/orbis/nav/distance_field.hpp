@@ -1,0 +1,224 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// How far it is to the nearest obstacle of an occupancy map: a truncated Euclidean distance field that follows the
+/// map.
+///
+/// @code
+///   map.track_changes();
+///   orbis::nav::distance_field field{map, {.reach = 1.0}};
+///   ...
+///   map.integrate(depth, camera, T_world_camera);
+///   field.update(map);                                   // what changed since the last update
+///   if (field.distance(p) < 0.3) slow_down();
+///   const auto [metres, gradient] = field.distance_and_gradient(p);
+///   const orbis::nav::distance_view now = field.view();   // for readers on other threads
+/// @endcode
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cassert>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include <orbis/core/point.hpp>
+#include <orbis/core/types.hpp>
+#include <orbis/nav/map_access.hpp>
+#include <orbis/nav/squared_distances.hpp>
+#include <orbis/octree/change_log.hpp>
+#include <orbis/octree/key.hpp>
+
+namespace orbis::nav {
+
+struct distance_field_options {
+  double reach = 1.0;  ///< distances beyond are not told apart, metres; 1 to 181 voxels
+  /// What a voxel of which nothing is known counts as: an obstacle, or free.
+  octree::occupancy unknown = octree::occupancy::occupied;
+};
+
+/// A distance and its gradient: dimensionless, of length about 1 where one obstacle is nearest.
+struct distance_with_gradient {
+  double distance = 0.0;  ///< metres
+  vec3 gradient = vec3::Zero();
+};
+
+/// Distances in metres. A voxel's distance is the one between its centre and the centre of the nearest voxel that is an
+/// obstacle: 0 in obstacles, and nowhere more than `reach()`. The grid's outside counts as unknown.
+template <class Voxels>
+class metric_distances {
+ public:
+  /// The distance of the voxel that `p` (metres) lies in. O(1), about 20 ns.
+  template <point_like P>
+  [[nodiscard]] double distance(const P& p) const noexcept {
+    const auto k = grid_.key(p);
+    return k ? distance(*k) : metres(voxels_.elsewhere());
+  }
+  [[nodiscard]] double distance(const octree::voxel_key& k) const noexcept { return metres(voxels_.squared(k)); }
+  /// Interpolated linearly along each axis between the centres of the eight voxels around `p` (metres): continuous, and
+  /// the gradient is its derivative. O(1), about 50 ns.
+  template <point_like P>
+  [[nodiscard]] distance_with_gradient distance_and_gradient(const P& p) const noexcept {
+    const auto c = coordinates<double>(p);
+    const double cell = grid_.resolution();
+    std::array<double, 3> part{};
+    std::array<std::optional<std::uint32_t>, 3> low, high;
+    for (std::size_t i = 0; i != 3; ++i) {
+      const double shifted = c[i] - cell / 2;
+      low[i] = grid_.key(shifted);
+      high[i] = low[i] ? std::optional{*low[i] + 1} : grid_.key(shifted + cell);
+      part[i] = low[i] ? std::clamp((c[i] - grid_.center(*low[i])) / cell, 0.0, 1.0) : 0.5;
+    }
+    squared_distance_view::reader reader{voxels_};
+    std::array<double, 8> d{};
+    for (std::size_t i = 0; i != 8; ++i) {
+      const auto& x = (i & 1U) != 0 ? high[0] : low[0];
+      const auto& y = (i & 2U) != 0 ? high[1] : low[1];
+      const auto& z = (i & 4U) != 0 ? high[2] : low[2];
+      d[i] = metres(x && y && z ? reader.squared({*x, *y, *z}) : voxels_.elsewhere());  // also beyond the last voxel
+    }
+    const auto mix = [](double a, double b, double t) { return a + t * (b - a); };
+    const auto [u, v, w] = part;
+    const double x00 = mix(d[0], d[1], u), x10 = mix(d[2], d[3], u), x01 = mix(d[4], d[5], u), x11 = mix(d[6], d[7], u);
+    const double y0 = mix(x00, x10, v), y1 = mix(x01, x11, v);
+    const double along_x = mix(mix(d[1] - d[0], d[3] - d[2], v), mix(d[5] - d[4], d[7] - d[6], v), w);
+    const double along_y = mix(x10 - x00, x11 - x01, w);
+    return {mix(y0, y1, w), vec3{along_x, along_y, y1 - y0} / cell};
+  }
+  /// How far from `p` (metres) there is certainly no point of an obstacle's cube, at least; 0 in obstacles. O(1).
+  template <point_like P>
+  [[nodiscard]] double clearance(const P& p) const noexcept {
+    const auto k = grid_.key(p);
+    if (!k) return 0.0;
+    const auto c = coordinates<double>(p);
+    const double off = (vec3{c[0], c[1], c[2]} - grid_.center(*k)).norm();
+    return std::max(0.0, distance(*k) - off - half_diagonal());
+  }
+  /// Squared distances in voxels.
+  [[nodiscard]] const Voxels& voxels() const noexcept { return voxels_; }
+  [[nodiscard]] const octree::voxel_grid& grid() const noexcept { return grid_; }
+  /// The largest distance, metres.
+  [[nodiscard]] double reach() const noexcept { return reach_; }
+  /// Of a squared distance in voxels, metres.
+  [[nodiscard]] double metres(std::uint16_t squared) const noexcept {
+    return squared == squared_distance_view::far
+               ? reach_
+               : std::min(reach_, std::sqrt(static_cast<double>(squared)) * grid_.resolution());
+  }
+
+ protected:
+  friend class distance_field;
+  metric_distances(octree::voxel_grid grid, Voxels voxels, double reach)
+      : grid_{grid}, voxels_{std::move(voxels)}, reach_{reach} {}
+
+  [[nodiscard]] double half_diagonal() const noexcept { return 0.86602540378443865 * grid_.resolution(); }
+
+  octree::voxel_grid grid_;
+  Voxels voxels_;
+  double reach_;
+};
+
+/// The distances at one moment, for readers. It shares memory with the field it was taken of, and does not change.
+using distance_view = metric_distances<squared_distance_view>;
+
+/// The distance field of a map. It is, bit for bit, the one made afresh of the map as it is, whatever the order of
+/// changes, with obstacles that come and go; no box has to be named. See squared_distances.hpp for how.
+///
+/// One thread at a time; `view()` is for readers on other threads.
+class distance_field : public metric_distances<squared_distances> {
+ public:
+  /// Of an empty map. @pre options.reach is 1 to 181 times the resolution
+  explicit distance_field(const octree::voxel_grid& grid, const distance_field_options& options = {})
+      : metric_distances{grid,
+                         {static_cast<int>(std::ceil(options.reach / grid.resolution() - 1e-9)), grid.cells(),
+                          options.unknown == octree::occupancy::occupied},
+                         options.reach},
+        options_{options} {}
+  /// Of `map` as it is.
+  template <planning_map Map>
+  explicit distance_field(const Map& map, const distance_field_options& options = {})
+      : distance_field{map_access<Map>::grid(map), options} {
+    update(map);
+  }
+
+  /// Follows the map: by its change log, where it has one that knows all since the last update, else by comparing
+  /// everything. @pre the same map every time, or one that has grown out of it; of the same grid
+  template <planning_map Map>
+  void update(const Map& map) {
+    if constexpr (requires {
+                    { map.changes() } -> std::convertible_to<const octree::change_log&>;
+                  })
+      update(map, map.changes());
+    else
+      update_all(map);
+  }
+  /// As above, with the log of another map of which `map` is a copy: a snapshot.
+  template <planning_map Map>
+  void update(const Map& map, const octree::change_log& log) {
+    if (!seen_ || *seen_ < log.complete_since() || log.revision() == 0) {
+      update_all(map);
+    } else if (*seen_ != log.revision()) {
+      octants_.clear();
+      auto octants = map_access<Map>::octants(map);
+      log.for_each_since(*seen_, [&](const octree::voxel_key& k, std::uint64_t) {
+        octants_.push_back({k, obstacles(octants(k))});
+      });
+      voxels_.update(octants_);
+    }
+    seen_ = log.revision();
+  }
+  /// Follows the map by comparing everything: for maps whose log does not tell all, as after `evict_outside`.
+  template <planning_map Map>
+  void update_all(const Map& map) {
+    assert(map_access<Map>::grid(map) == grid_);
+    octants_.clear();
+    auto octants = map_access<Map>::octants(map);
+    voxels_.for_each_brick([&](const octree::voxel_key& low, auto&&) {
+      for (unsigned i = 0; i != 8; ++i) {
+        const octree::voxel_key k = octree::child_key(low, i, 4);
+        octants_.push_back({k, obstacles(octants(k))});
+      }
+    });
+    map_access<Map>::for_each_octant(map, [&](const octree::voxel_key& low, int level, const octree::octant_states& s) {
+      const std::uint64_t mask = obstacles(s);
+      if (mask == obstacles({})) return;  // as where nothing is stored
+      const std::uint32_t cells = octree::node_cells(level);
+      for (std::uint32_t z = 0; z != cells; z += 4)
+        for (std::uint32_t y = 0; y != cells; y += 4)
+          for (std::uint32_t x = 0; x != cells; x += 4) {
+            const octree::voxel_key k{low.x + x, low.y + y, low.z + z};
+            if (!voxels_.is_stored(k)) octants_.push_back({k, mask});
+          }
+    });
+    voxels_.update(octants_);
+  }
+
+  /// The centre of the obstacle nearest to the voxel that `p` lies in, metres; empty if there is none within reach.
+  template <point_like P>
+  [[nodiscard]] std::optional<vec3> nearest_obstacle(const P& p) const {
+    const auto k = grid_.key(p);
+    const auto found = k ? voxels_.nearest(*k) : std::nullopt;
+    return found ? std::optional{grid_.center(*found)} : std::nullopt;
+  }
+  /// What readers need. Copying it costs a pointer for each 4 kB; the copy does not change.
+  [[nodiscard]] distance_view view() const { return {grid_, voxels_.view(), reach_}; }
+  [[nodiscard]] const distance_field_options& options() const noexcept { return options_; }
+  /// Bytes on the heap.
+  [[nodiscard]] std::size_t memory_bytes() const noexcept {
+    return voxels_.memory_bytes() + octants_.capacity() * sizeof(octant_obstacles);
+  }
+
+ private:
+  [[nodiscard]] std::uint64_t obstacles(const octree::octant_states& s) const noexcept {
+    return options_.unknown == octree::occupancy::occupied ? ~s.free() : s.occupied;
+  }
+
+  distance_field_options options_;
+  std::optional<std::uint64_t> seen_;
+  std::vector<octant_obstacles> octants_;
+};
+
+}  // namespace orbis::nav

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// How planning reads an occupancy map: ours, a snapshot of it, or a type of yours by a trait.
+#pragma once
+
+#include <concepts>
+#include <cstdint>
+
+#include <orbis/octree/accessor.hpp>
+#include <orbis/octree/key.hpp>
+#include <orbis/octree/octants.hpp>
+
+namespace orbis::nav {
+
+/// What planning needs of a map. Specialise it for a type of yours with these three functions; copies are not made.
+template <class Map>
+struct map_access;
+
+/// Our octrees.
+template <octree::octree_map Map>
+struct map_access<Map> {
+  /// The grid of voxels.
+  [[nodiscard]] static const octree::voxel_grid& grid(const Map& map) noexcept { return map.grid(); }
+  /// A function that says what is known of the octant of 4x4x4 voxels that contains a voxel, as long as the map stays
+  /// as it is.
+  [[nodiscard]] static octree::octant_reader<Map> octants(const Map& map) { return octree::octant_reader<Map>{map}; }
+  /// Calls `visit(lowest voxel, level, states)` for every octant (level 2) of which something is known; larger cubes
+  /// whose octants have all the same states may be visited as one. Each voxel once, in any order.
+  template <class Visit>
+  static void for_each_octant(const Map& map, Visit&& visit) {
+    octree::for_each_octant(map, visit);
+  }
+};
+
+/// A map for planning: one with a `map_access`.
+template <class Map>
+concept planning_map = requires(const Map& map, const octree::voxel_key& k,
+                                void (*visit)(const octree::voxel_key&, int, const octree::octant_states&)) {
+  { map_access<Map>::grid(map) } -> std::convertible_to<const octree::voxel_grid&>;
+  { map_access<Map>::octants(map)(k) } -> std::same_as<octree::octant_states>;
+  map_access<Map>::for_each_octant(map, visit);
+};
+
+}  // namespace orbis::nav

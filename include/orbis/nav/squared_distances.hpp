@@ -1,0 +1,219 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Exact squared Euclidean distances of voxels to the nearest obstacle, in integers, kept up to date.
+///
+/// The transform is separable (T. Saito, J. Toriwaki, "New algorithms for Euclidean distance transformation of an
+/// n-dimensional digitized picture with applications", Pattern Recognition 27(11), 1994; P. Felzenszwalb,
+/// D. Huttenlocher, "Distance transforms of sampled functions", Theory of Computing 8, 2012), and all three stages are
+/// kept:
+///
+///     along(x, y, z) = distance along x to the nearest obstacle of that row
+///     plane(x, y, z) = min over j of along(x, j, z)^2 + (y - j)^2
+///     space(x, y, z) = min over k of plane(x, y, k) + (z - k)^2
+///
+/// A change goes through the stages and ends where a value stays as it was. In each stage, sources that rose make
+/// those slices of 8x8 voxels stale in which a value equals what the source offered before: it may have been the least,
+/// and the slice is worked out again, once. Sources that fell lower their targets. So the values do not depend on the
+/// order of changes.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cassert>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <deque>
+#include <limits>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include <orbis/core/cow_pages.hpp>
+#include <orbis/nav/detail/field/brick_directory.hpp>
+#include <orbis/nav/detail/field/slice_kernels.hpp>
+#include <orbis/octree/key.hpp>
+
+namespace orbis::nav {
+
+/// The obstacles in an octant of 4x4x4 voxels: bit i is the voxel at place i of the Morton curve.
+struct octant_obstacles {
+  octree::voxel_key octant;  ///< any voxel of it
+  std::uint64_t mask = 0;
+};
+
+/// The distances at one moment, for readers. A copy shares its memory with the field it was taken of, and is not
+/// changed by it.
+class squared_distance_view {
+ public:
+  /// The value beyond the reach.
+  static constexpr std::uint16_t far = detail::far_away;
+
+  /// The squared distance between the centre of voxel `k` and that of the nearest obstacle, in voxels; 0 in obstacles;
+  /// `far` if that is more than the reach. O(1), about 10 ns.
+  [[nodiscard]] std::uint16_t squared(const octree::voxel_key& k) const noexcept {
+    const std::uint32_t n = directory_.find(place_of(k));
+    return n == detail::brick_directory::none ? elsewhere_ : values_[n][index_of(k)];
+  }
+  /// Whether the brick of 8x8x8 voxels that contains `k` is stored. O(1).
+  [[nodiscard]] bool is_stored(const octree::voxel_key& k) const noexcept {
+    return directory_.find(place_of(k)) != detail::brick_directory::none;
+  }
+  /// How far it looks, in voxels.
+  [[nodiscard]] int reach() const noexcept { return reach_; }
+  /// The value outside of all bricks, and of the grid.
+  [[nodiscard]] std::uint16_t elsewhere() const noexcept { return elsewhere_; }
+  /// Calls `visit(lowest voxel, values)` for every brick that is stored: 8x8x8 squared distances, x fastest. What is
+  /// not stored has the value `elsewhere()`. In no particular order.
+  template <class Visit>
+  void for_each_brick(Visit&& visit) const {
+    for (std::size_t i = 0; i != values_.size(); ++i) {
+      const detail::brick_place& p = places_[i];
+      visit(octree::voxel_key{static_cast<std::uint32_t>(p.x) * 8, static_cast<std::uint32_t>(p.y) * 8,
+                              static_cast<std::uint32_t>(p.z) * 8},
+            std::span<const std::uint16_t, 512>{values_[i]});
+    }
+  }
+  [[nodiscard]] std::size_t brick_count() const noexcept { return values_.size(); }
+
+  /// Squared distances of voxels of which each lies near the one before. The view must outlive it and stay as it is.
+  class reader {
+   public:
+    explicit reader(const squared_distance_view& view) noexcept : view_{&view}, cursor_{view.directory_} {}
+    [[nodiscard]] std::uint16_t squared(const octree::voxel_key& k) noexcept {
+      const detail::brick_place p = place_of(k);
+      if (p != place_) {
+        place_ = p;
+        const std::uint32_t n = cursor_.find(p);
+        values_ = n == detail::brick_directory::none ? nullptr : view_->values_[n].data();
+      }
+      return values_ == nullptr ? view_->elsewhere_ : values_[index_of(k)];
+    }
+
+   private:
+    const squared_distance_view* view_;
+    detail::brick_directory::cursor cursor_;
+    detail::brick_place place_{-1, -1, -1};
+    const std::uint16_t* values_ = nullptr;
+  };
+
+ protected:
+  using brick_values = std::array<std::uint16_t, 512>;
+
+  squared_distance_view(int reach, std::uint32_t cells, bool elsewhere_is_obstacle)
+      : directory_{cells / 8}, reach_{reach}, elsewhere_{elsewhere_is_obstacle ? std::uint16_t{0} : far} {}
+
+  [[nodiscard]] static detail::brick_place place_of(const octree::voxel_key& k) noexcept {
+    return {static_cast<std::int32_t>(k.x >> 3U), static_cast<std::int32_t>(k.y >> 3U),
+            static_cast<std::int32_t>(k.z >> 3U)};
+  }
+  [[nodiscard]] static std::size_t index_of(const octree::voxel_key& k) noexcept {
+    return (k.z & 7U) << 6U | (k.y & 7U) << 3U | (k.x & 7U);
+  }
+
+  detail::brick_directory directory_;
+  cow_pages<brick_values> values_;
+  cow_pages<detail::brick_place> places_;
+  int reach_;
+  std::uint16_t elsewhere_;
+};
+
+/// Distances that follow their obstacles: after any sequence of updates the values are, bit for bit, those of a field
+/// made afresh of the same obstacles. No box has to be named: memory grows with what is near obstacles or, where all is
+/// an obstacle that is not named (`elsewhere_is_obstacle`), with what is free; about 2.8 kB for 8x8x8 voxels.
+///
+/// One thread at a time; `view()` can be copied for readers on other threads.
+class squared_distances : public squared_distance_view {
+ public:
+  /// `reach`: how far distances are known, in voxels. `cells`: of the grid, along an axis.
+  /// `elsewhere_is_obstacle`: what voxels are of which nothing was said, and all that lies outside of the grid.
+  /// @pre 1 <= reach <= 181; cells is a multiple of 8
+  squared_distances(int reach, std::uint32_t cells, bool elsewhere_is_obstacle);
+
+  /// Says which voxels of these octants are obstacles now; all others stay what they are. Each octant is named once.
+  /// O(changes x reach^2) at worst; typically each changed voxel costs a few microseconds divided by how many of its
+  /// neighbours change with it.
+  /// @pre keys lie in the grid
+  void update(std::span<const octant_obstacles> octants);
+
+  /// Whether voxel `k` is an obstacle. O(1).
+  [[nodiscard]] bool is_obstacle(const octree::voxel_key& k) const noexcept { return squared(k) == 0; }
+  /// The obstacle nearest to voxel `k`, or one of them if several are; empty if there is none within reach. The nearest
+  /// may be one that was never named (see `elsewhere_is_obstacle`). O(reach).
+  [[nodiscard]] std::optional<octree::voxel_key> nearest(const octree::voxel_key& k) const;
+
+  /// What readers need; a copy of it stays as it is.
+  [[nodiscard]] const squared_distance_view& view() const noexcept { return *this; }
+  /// Bytes on the heap, those shared with copies of the view included.
+  [[nodiscard]] std::size_t memory_bytes() const noexcept;
+
+ private:
+  static constexpr std::uint32_t none = detail::brick_directory::none;
+  static constexpr std::uint8_t far_along = 0xff;
+
+  /// What is kept of a brick beside its distances. Arrays are in rows along x: z * 64 + y * 8 + x.
+  struct stages {
+    alignas(64) std::array<std::uint16_t, 512> plane;
+    std::array<std::uint8_t, 512> along;
+    std::array<std::uint8_t, 64> obstacles;  ///< row z * 8 + y, bit x
+    std::array<std::uint64_t, 8> octants;    ///< the same as it was given
+    std::array<std::uint16_t, 8> plane_top;  ///< the largest value of each slice
+    std::array<std::uint16_t, 8> space_top;
+    std::uint32_t kept = none;     ///< number of the copy of `plane` from before the update
+    std::uint8_t stale_plane = 0;  ///< slices to work out again
+    std::uint8_t stale_space = 0;
+  };
+  /// `plane` as it was before an update.
+  struct kept_plane {
+    alignas(64) std::array<std::uint16_t, 512> plane;
+    std::uint32_t brick;
+    std::uint8_t changed;  ///< slices that may be different now
+  };
+  struct along_change {
+    std::uint32_t brick;
+    std::uint32_t row;
+    std::uint64_t before, after;  ///< eight distances
+  };
+
+  [[nodiscard]] std::uint32_t make(const detail::brick_place& p);
+  [[nodiscard]] std::uint8_t far_obstacles() const noexcept { return elsewhere_ == 0 ? 0xff : 0; }
+  [[nodiscard]] std::uint16_t bound() const noexcept { return static_cast<std::uint16_t>(reach_ * reach_); }
+  /// The squares of the distances of eight rows, the first `distance` rows away, eight times each.
+  [[nodiscard]] const std::uint16_t* squares(int distance) const noexcept {
+    return squares_.data() + 8 * (distance + squares_pad_);
+  }
+  /// How far an offer of `least` reaches, in voxels; < 0 if nowhere.
+  [[nodiscard]] int range_of(std::uint16_t least) const noexcept;
+
+  void set_obstacles(std::span<const octant_obstacles> octants);
+  void update_rows();
+  void update_line(std::span<const std::uint64_t> rows);
+  void spread_along_y();
+  void spread_along_z();
+  void keep_plane(std::uint32_t brick, unsigned changed);
+  void make_plane(std::uint32_t brick, int z);
+  void make_space(std::uint32_t brick, unsigned slices);
+
+  detail::slice_kernels kernels_;
+  std::deque<stages> stages_;  ///< by brick
+  int bricks_in_reach_;
+  int squares_pad_;
+  std::vector<std::uint16_t> squares_;
+  std::array<std::array<std::uint8_t, 8>, 256> nearest_bit_;  ///< distances of 8 voxels to the nearest set bit
+
+  // Buffers of an update.
+  std::vector<std::uint64_t> rows_;
+  std::vector<std::uint32_t> line_;
+  std::vector<std::uint8_t> line_bits_, left_, right_;
+  std::vector<along_change> along_;
+  std::deque<kept_plane> kept_;
+  std::size_t used_kept_ = 0;
+  std::vector<std::uint32_t> stale_plane_, stale_space_;
+};
+
+}  // namespace orbis::nav
+
+#ifndef ORBIS_COMPILED
+#include <orbis/nav/detail/compiled/squared_distances_functions.hpp>
+#endif

@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// What a map knows, by octants of 4x4x4 voxels as bit masks: for what is derived from a map as a whole, or from what
+/// its change log names.
+#pragma once
+
+#include <concepts>
+#include <cstdint>
+
+#include <orbis/octree/accessor.hpp>
+#include <orbis/octree/detail/storage/brick.hpp>
+#include <orbis/octree/key.hpp>
+
+namespace orbis::octree {
+
+/// The 64 voxels of an octant; bit i is the voxel at place i of the Morton curve, as in change_log.
+struct octant_states {
+  std::uint64_t known = 0;
+  std::uint64_t occupied = 0;  ///< of the known ones
+
+  [[nodiscard]] constexpr std::uint64_t free() const noexcept { return known & ~occupied; }
+  friend constexpr bool operator==(const octant_states&, const octant_states&) = default;
+};
+
+namespace detail {
+
+template <sensor_model Model>
+[[nodiscard]] octant_states states_of(const brick_store<typename Model::value_type>& store,
+                                      const brick<typename Model::value_type>& b, std::uint32_t octant) {
+  return {store.known(b, octant), store.voxels_where(b, octant, is_occupied<Model>)};
+}
+template <sensor_model Model>
+[[nodiscard]] octant_states states_of(typename Model::value_type v) {
+  const std::uint64_t all = ~std::uint64_t{0};
+  return {all, is_occupied<Model>(v) ? all : 0};
+}
+
+}  // namespace detail
+
+/// Octants of a map of which each lies near the one before: those of a change log, for example. The map must outlive it
+/// and stay as it is; one for each thread.
+template <octree_map Map>
+class octant_reader {
+ public:
+  explicit octant_reader(const Map& map) noexcept : store_{&map.store()} {}
+
+  /// The octant that contains `k`. O(1).
+  [[nodiscard]] octant_states operator()(const voxel_key& k) {
+    if (const voxel_key chunk = node_key(k, detail::chunk_level); !started_ || !(chunk == at_)) {
+      started_ = true;
+      at_ = chunk;
+      chunk_ = store_->find_chunk(k);
+    }
+    const auto* const b = chunk_ == nullptr ? nullptr : store_->find(*chunk_, detail::place_in_chunk(k));
+    if (b != nullptr) return detail::states_of<model>(*store_, *b, detail::place_in_brick(k) >> 6U);
+    const auto* const v = store_->find_large_value(k);
+    return v != nullptr ? detail::states_of<model>(*v) : octant_states{};
+  }
+
+ private:
+  using model = typename Map::model;
+  using store = detail::brick_store<typename model::value_type>;
+
+  const store* store_;
+  const typename store::chunk* chunk_ = nullptr;
+  voxel_key at_{};
+  bool started_ = false;
+};
+
+/// Calls `visit(lowest voxel, level, states)` for every octant (level 2) of which something is known, and for every
+/// leaf bigger than 8x8x8 voxels (level > 3), all of whose octants have these states, in no particular order.
+/// O(bricks + octants that are not uniform).
+template <octree_map Map, std::invocable<const voxel_key&, int, const octant_states&> Visit>
+void for_each_octant(const Map& map, Visit&& visit) {
+  using model = typename Map::model;
+  const auto& store = map.store();
+  store.for_each_brick([&](const auto& b) {
+    const voxel_key low = detail::named_key(b.name);
+    for (std::uint32_t i = 0; i != 8; ++i)
+      if (((b.uniform | b.dense) >> i & 1U) != 0)
+        visit(child_key(low, i, node_cells(detail::octant_level)), detail::octant_level,
+              detail::states_of<model>(store, b, i));
+  });
+  store.for_each_large([&](std::uint64_t name, typename model::value_type v) {
+    visit(detail::named_key(name), detail::named_level(name), detail::states_of<model>(v));
+  });
+}
+
+}  // namespace orbis::octree

@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include <orbis/core/random.hpp>
+#include <orbis/nav/distance_field.hpp>
+#include <orbis/octree/occupancy_octree.hpp>
+#include <orbis/octree/overlap.hpp>
+
+#include "support/catch.hpp"
+
+using namespace orbis;
+using nav::distance_field;
+using octree::occupancy;
+using octree::voxel_key;
+
+namespace {
+
+using map_type = octree::occupancy_octree<>;
+
+/// Points on the walls of a room of 2 m, some of them missing, seen from inside.
+std::vector<vec3f> scan_from(random_bits& random, const vec3& origin) {
+  std::vector<vec3f> points;
+  for (int i = 0; i != 300; ++i) {
+    const vec3 direction{random.normal(), random.normal(), random.normal()};
+    double t = 1e9;
+    for (int axis = 0; axis != 3; ++axis)
+      t = std::min(t, (std::copysign(1.0, direction[axis]) - origin[axis]) / direction[axis]);
+    points.push_back((origin + t * direction).cast<float>());
+  }
+  return points;
+}
+void add_scan(map_type& map, random_bits& random) {
+  const auto along = [&] { return random.uniform() * 1.2 - 0.6; };
+  const vec3 origin{along(), along(), along()};
+  map.integrate(seq, scan_from(random, origin), origin);
+}
+
+std::size_t differences(const distance_field& a, const distance_field& b) {
+  std::size_t count = 0;
+  const auto compare = [&](const distance_field& from, const distance_field& to) {
+    from.voxels().for_each_brick([&](const voxel_key& low, auto values) {
+      for (std::uint32_t i = 0; i != 512; ++i)
+        count += to.voxels().squared({low.x + (i & 7U), low.y + (i >> 3U & 7U), low.z + (i >> 6U)}) != values[i];
+    });
+  };
+  compare(a, b);
+  compare(b, a);
+  return count;
+}
+
+}  // namespace
+
+TEST_CASE("A distance field follows its map, and is the one made afresh") {
+  const occupancy unknown = GENERATE(occupancy::occupied, occupancy::free);
+  random_bits random{unknown == occupancy::free ? 1U : 2U};
+  map_type map{0.1};
+  map.track_changes();
+  const nav::distance_field_options options{.reach = 0.75, .unknown = unknown};
+  distance_field field{map, options};
+  const auto check = [&] {
+    field.update(map);
+    CHECK(differences(field, distance_field{map, options}) == 0);
+  };
+  check();
+  for (int i = 0; i != 6; ++i) {
+    add_scan(map, random);
+    check();
+  }
+  // Some is forgotten, by voxels and by leaves.
+  map.transform([](float v) { return v < -1.0F ? std::nullopt : std::optional{v}; });
+  check();
+  map.prune();
+  add_scan(map, random);
+  check();
+  map.transform([](float v) { return std::optional{-v}; });
+  check();
+  map.clear();
+  check();
+  add_scan(map, random);
+  map.changes().set_capacity(1);
+  add_scan(map, random);
+  check();
+}
+
+TEST_CASE("A field that is told follows what the change log does not know") {
+  random_bits random{3};
+  map_type map{0.1};
+  map.track_changes();
+  for (int i = 0; i != 4; ++i) add_scan(map, random);
+  distance_field field{map, {.reach = 0.5}};
+  map.evict_outside({vec3{-0.4, -0.4, -0.4}, vec3{0.4, 0.4, 0.4}}, [](const auto&) {});
+  field.update_all(map);
+  CHECK(differences(field, distance_field{map, {.reach = 0.5}}) == 0);
+  // A map whose changes are not tracked.
+  map_type untracked = map;
+  distance_field another{untracked, {.reach = 0.5}};
+  add_scan(untracked, random);
+  another.update(untracked);
+  CHECK(differences(another, distance_field{untracked, {.reach = 0.5}}) == 0);
+}
+
+TEST_CASE("Distances in metres, their gradient, and what they promise") {
+  const occupancy unknown = GENERATE(occupancy::occupied, occupancy::free);
+  random_bits random{4};
+  map_type map{0.1};
+  for (int i = 0; i != 6; ++i) add_scan(map, random);
+  const distance_field field{map, {.reach = 0.6, .unknown = unknown}};
+  const nav::distance_view view = field.view();
+  for (int i = 0; i != 2000; ++i) {
+    const auto along = [&] { return random.uniform() * 3.0 - 1.5; };
+    const vec3 p{along(), along(), along()};
+    const double d = field.distance(p);
+    CHECK(view.distance(p) == d);
+    CHECK((d >= 0.0 && d <= 0.6));
+    // Nothing is nearer than the clearance says.
+    const double clear = field.clearance(p);
+    if (clear > 0.0) CHECK_FALSE(overlaps(map, octree::sphere{p, clear - 1e-9}, {.unknown = unknown}));
+    if (const auto nearest = field.nearest_obstacle(p)) {
+      const vec3 center = map.grid().center(*map.grid().key(p));
+      CHECK(std::min(0.6, (*nearest - center).norm()) == Approx(d).margin(1e-12));
+    } else {
+      CHECK(d == 0.6);
+    }
+    // The value at a centre is the voxel's; the gradient is the derivative, where no cell's border is near.
+    const vec3 center = map.grid().center(*map.grid().key(p));
+    CHECK(field.distance_and_gradient(center).distance == Approx(field.distance(center)).margin(1e-9));
+    const auto [value, gradient] = field.distance_and_gradient(p);
+    for (int axis = 0; axis != 3; ++axis) {
+      const double h = 1e-5, place = (p[axis] - 0.05) / 0.1;
+      if (std::abs(place - std::round(place)) < 1e-3) continue;
+      vec3 step = vec3::Zero();
+      step[axis] = h;
+      const double slope = (field.distance_and_gradient(vec3{p + step}).distance -
+                            field.distance_and_gradient(vec3{p - step}).distance) /
+                           (2 * h);
+      CHECK(gradient[axis] == Approx(slope).margin(1e-6));
+    }
+    CHECK(view.distance_and_gradient(p).distance == value);
+  }
+  const double outside = unknown == occupancy::occupied ? 0.0 : 0.6;
+  CHECK(field.distance(vec3{1e9, 0.0, 0.0}) == outside);
+  CHECK(field.distance(vec3{std::nan(""), 0.0, 0.0}) == outside);
+  CHECK(field.distance_and_gradient(vec3{1e9, 0.0, 0.0}).distance == outside);
+  CHECK(field.clearance(vec3{1e9, 0.0, 0.0}) == 0.0);
+}
