@@ -121,6 +121,30 @@ TEST_CASE("a component is as far away as its closest point") {
   CHECK(cluster_inliers(orbis::seq, cloud).size() == 3600);
 }
 
+TEST_CASE("the components of a cloud are those of its table of neighbours") {
+  auto clouds = orbis::test::all_clouds();
+  clouds.emplace_back("wall and ball", wall_and_ball(25, 0.3));
+  points bits = orbis::test::room_cloud(60, 45, 0.004, 5);  // many small components, among them copies
+  for (std::size_t i = 0; i != 60; ++i) bits.push_back(bits[40 * i]);
+  clouds.emplace_back("bits", bits);
+  for (const auto& [name, cloud] : clouds) {
+    for (const cluster_link link : {cluster_link::mutual, cluster_link::either}) {
+      for (const double reach : {1.2, 3.0}) {
+        INFO(name << " reach " << reach);
+        const cluster_options options{.reach = reach, .link = link, .min_size = 40};
+        const auto table = orbis::cloud::all_knn(orbis::seq, cloud, options.neighbors);
+        const cluster_result expected = cluster_decision(orbis::seq, cloud, table, {}, {}, options);
+        const cluster_result found = cluster_filter(orbis::par.with(3), cloud, options);
+        CHECK(found.inliers == expected.inliers);
+        CHECK(found.component == expected.component);
+        CHECK(found.sizes == expected.sizes);
+        CHECK(found.removed == expected.removed);
+        CHECK(found.min_size == expected.min_size);
+      }
+    }
+  }
+}
+
 TEST_CASE("where nothing is large everything stays") {
   CHECK(cluster_inliers(orbis::seq, orbis::test::uniform_cloud(20, 1)).size() == 20);
   CHECK(cluster_inliers(orbis::seq, points{}).empty());

@@ -3,6 +3,7 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <cstdint>
 #include <cstring>
 #include <limits>
 #include <string>
@@ -10,8 +11,8 @@
 
 #include <orbis/io/ply.hpp>
 
-#include "support/temporary_folder.hpp"
 #include "support/catch.hpp"
+#include "support/temporary_folder.hpp"
 
 namespace io = orbis::io;
 using orbis::rgb8;
@@ -50,6 +51,28 @@ TEST_CASE("clouds survive writing and reading a PLY exactly") {
       const auto read = io::read_ply(folder / "c.ply").value();
       CHECK(read.points == cloud.points);
       CHECK(read.colors == cloud.colors);
+    }
+}
+
+TEST_CASE("chosen points of a cloud are written as a cloud of them would be") {
+  const orbis::test::temporary_folder folder;
+  for (const auto encoding : {io::ply_encoding::ascii, io::ply_encoding::binary})
+    for (const bool colored : {false, true}) {
+      orbis::point_cloud cloud, chosen;
+      while (cloud.size() < 20'000) {  // more than a block
+        const auto more = some_cloud(colored);
+        cloud.points.insert(cloud.points.end(), more.points.begin(), more.points.end());
+        cloud.colors.insert(cloud.colors.end(), more.colors.begin(), more.colors.end());
+      }
+      std::vector<std::uint32_t> indices;
+      for (std::uint32_t i = 1; i < cloud.size(); i += 1 + i % 3) {
+        indices.push_back(i);
+        chosen.points.push_back(cloud.points[i]);
+        if (colored) chosen.colors.push_back(cloud.colors[i]);
+      }
+      REQUIRE(io::write_ply(folder / "some.ply", cloud, indices, {.encoding = encoding}));
+      REQUIRE(io::write_ply(folder / "all.ply", chosen, {.encoding = encoding}));
+      CHECK(orbis::read_file(folder / "some.ply").value() == orbis::read_file(folder / "all.ply").value());
     }
 }
 

@@ -15,7 +15,7 @@
 
 #include <orbis/cloud/detail/knn/leaf_hierarchy.hpp>
 #include <orbis/cloud/detail/knn/nearest_search.hpp>
-#include <orbis/cloud/detail/knn/rank_sort.hpp>
+#include <orbis/cloud/detail/knn/neighbor_rows.hpp>
 #include <orbis/cloud/detail/knn/reported_chunks.hpp>
 #include <orbis/cloud/neighbors.hpp>
 #include <orbis/core/execution.hpp>
@@ -39,22 +39,6 @@ struct neighbor_table {
   }
 };
 
-namespace detail {
-
-/// Writes the nearest of what was gathered as a row, the point itself left out already.
-inline void write_row(rank_sorter& gathered, std::span<neighbor<float>> row) {
-  gathered.for_each([&](std::size_t rank, std::uint32_t index, float distance_squared) {
-    row[rank] = {index, std::sqrt(distance_squared)};
-    return rank + 1 != row.size();
-  });
-  // Different squares can have the same root.
-  if (!std::is_sorted(row.begin(), row.end(), nearest_sink<float>::less)) {
-    std::sort(row.begin(), row.end(), nearest_sink<float>::less);
-  }
-}
-
-}  // namespace detail
-
 /// The `min(k, finite points - 1)` nearest other points of every finite point, nearest first; points
 /// at equal squared distances by index, so that the result is one and the same for every policy and
 /// processor. Identical points are neighbours of each other. `on_progress` counts leaves of sixteen points.
@@ -75,26 +59,13 @@ template <execution_policy Policy, point_range Points>
   out.rows.assign(count * out.width, {neighbor_table::none, std::numeric_limits<float>::quiet_NaN()});
   if (out.width == 0) return out;
   const detail::knn_kernels kernels;
-  const std::size_t wanted = out.width + 1;  // with the point itself
   const auto row_of = [&](std::uint32_t i) { return std::span{out.rows}.subspan(i * out.width, out.width); };
   const bool whole =
       detail::for_each_reported_chunk(policy, tree.leaves.size(), 128, on_progress, [&](auto begin, auto end) {
-        detail::nearest_search search{tree, kernels, wanted};
-        detail::rank_sorter gathered;
-        for (std::size_t l = begin; l != end; ++l) {
-          search.visit_leaf(l, [&](std::size_t i, std::span<float> found, float bound) {
-            const float largest = found.size() < wanted
-                                      ? std::numeric_limits<float>::infinity()
-                                      : kernels.sum_nearest(found.data(), found.size(), wanted, bound).largest_squared;
-            const std::uint32_t self = tree.members[l * detail::leaf_width + i];
-            gathered.clear();
-            search.visit_within(l, i, largest, [&](std::uint32_t member, float d) {
-              if (member != self) gathered.add(member, d);
-            });
-            detail::write_row(gathered, row_of(self));
-            return largest;
-          });
-        }
+        detail::find_neighbor_rows(
+            tree, kernels, out.width, begin, end,
+            [&](std::size_t l, std::size_t i) { return row_of(tree.members[l * detail::leaf_width + i]); },
+            [](std::size_t) {});
       });
   if (!whole) return detail::fail_cancelled();
   // Those left out have the first of their copies for neighbours.

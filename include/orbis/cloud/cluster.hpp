@@ -22,8 +22,12 @@
 #include <vector>
 
 #include <orbis/cloud/all_knn.hpp>
+#include <orbis/cloud/detail/knn/knn_kernels.hpp>
+#include <orbis/cloud/detail/knn/leaf_hierarchy.hpp>
+#include <orbis/cloud/detail/knn/neighbor_graph.hpp>
+#include <orbis/cloud/detail/knn/squared_distance.hpp>
+#include <orbis/cloud/detail/knn/visit_near.hpp>
 #include <orbis/cloud/detail/select/decision.hpp>
-#include <orbis/cloud/leaf_search.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/point.hpp>
 
@@ -100,6 +104,136 @@ class disjoint_sets {
 
 }  // namespace detail
 
+namespace detail {
+
+/// Components of linked points, by the least vertex in them, their root.
+struct linked_components {
+  disjoint_sets sets;
+  std::vector<std::uint32_t> sizes;  ///< by root
+  std::vector<char> goes;            ///< by root
+  std::size_t min_size = 0;          ///< as it was applied
+
+  [[nodiscard]] bool is_small(std::uint32_t i) noexcept { return sizes[sets.root(i)] < min_size; }
+};
+
+/// Finds the components of `count` vertices, and which of them go. `takes_part(i)`: whether a vertex is there at all.
+/// `for_each_neighbor(i, f)` calls `f(j, distance)` for those that can be linked with it. `make_nearest()` makes a
+/// function of a vertex and of `counts(j)`: the vertex nearest to it of those that count, and the distance.
+/// O(links), 9 bytes for each vertex.
+template <execution_policy Policy, class TakesPart, class ForEachNeighbor, class MakeNearest>
+[[nodiscard]] linked_components find_components(const Policy& policy, std::size_t count, const TakesPart& takes_part,
+                                                const ForEachNeighbor& for_each_neighbor,
+                                                std::span<const float> spacing, const MakeNearest& make_nearest,
+                                                const cluster_options& options) {
+  const auto reach = static_cast<float>(options.reach);
+  const auto for_each_link = [&](std::uint32_t i, auto&& f) {
+    for_each_neighbor(i, [&](std::uint32_t j, float distance) {
+      if (!takes_part(j)) return;
+      const float limit =
+          options.link == cluster_link::mutual ? std::min(spacing[i], spacing[j]) : std::max(spacing[i], spacing[j]);
+      if (distance <= reach * limit) f(j, distance);
+    });
+  };
+  linked_components out{disjoint_sets{count}, std::vector<std::uint32_t>(count, 0), std::vector<char>(count, 0)};
+  for_each_index(policy, count, 2048, [&](std::size_t vertex) {
+    const auto i = static_cast<std::uint32_t>(vertex);
+    if (takes_part(i)) for_each_link(i, [&](std::uint32_t j, float) { out.sets.join(i, j); });
+  });
+  std::size_t present = 0;
+  for (std::uint32_t i = 0; i != count; ++i) {
+    if (!takes_part(i)) continue;
+    ++present;
+    ++out.sizes[out.sets.root(i)];
+  }
+  out.min_size = smallest_large(options, present);
+  std::vector<std::uint32_t> small_ones;
+  for (std::uint32_t i = 0; i != count; ++i) {
+    if (takes_part(i) && out.is_small(i)) small_ones.push_back(i);
+  }
+  if (small_ones.empty() || small_ones.size() == present) return out;
+  const auto is_main = [&](std::uint32_t j) { return takes_part(j) && !out.is_small(j); };
+  const auto nearest = make_nearest();
+  std::vector<char> apart(small_ones.size(), 0);
+  for_each_index(policy, small_ones.size(), 64, [&](std::size_t s) {
+    const std::uint32_t i = small_ones[s];
+    const auto [main, distance] = nearest(i, is_main);
+    double within = 0;  // mean length of its links
+    double links = 0;
+    for_each_link(i, [&](std::uint32_t, float length) {
+      within += length;
+      links += 1;
+    });
+    if (links > 0) within /= links;
+    const double local = std::max(within, double{spacing[main]});
+    const double gap = options.min_gap > 0 ? options.min_gap * local : 0;  // spacings may be infinite
+    apart[s] = distance > gap ? 1 : 0;
+  });
+  for (const std::uint32_t i : small_ones) out.goes[out.sets.root(i)] = 1;
+  for (std::size_t s = 0; s != small_ones.size(); ++s) {
+    if (apart[s] == 0) out.goes[out.sets.root(small_ones[s])] = 0;  // one point close to the surface is enough
+  }
+  return out;
+}
+
+/// The vertex nearest to `p`, and its distance, for `find_components`.
+template <class Counts>
+[[nodiscard]] std::pair<std::uint32_t, float> nearest_place_of(const leaf_hierarchy& tree, const knn_kernels& kernels,
+                                                               const std::array<float, 3>& p, const Counts& counts) {
+  const nearest_place found = find_nearest(tree, kernels, p, counts);
+  assert(found.found());
+  return {found.place, std::sqrt(found.distance_squared)};
+}
+
+/// The components of a graph. `gone`: by place, whether a point takes no part, or empty. `spacing`: by place, metres.
+template <execution_policy Policy>
+[[nodiscard]] linked_components separate(const Policy& policy, const neighbor_graph& graph, std::span<const char> gone,
+                                         std::span<const float> spacing, const cluster_options& options) {
+  const std::size_t width = std::min(options.neighbors, graph.width());
+  const knn_kernels kernels;
+  return find_components(
+      policy, graph.size(), [&](std::uint32_t i) { return gone.empty() || gone[i] == 0; },
+      [&](std::uint32_t i, auto&& f) {
+        const std::array<float, 3> at = graph.position(i);
+        graph.for_each_neighbor(i, width,
+                                [&](std::uint32_t j) { f(j, std::sqrt(squared_distance(at, graph.position(j)))); });
+      },
+      spacing,
+      [&] {
+        return [&](std::uint32_t i, const auto& counts) {
+          return nearest_place_of(graph.tree(), kernels, graph.position(i), counts);
+        };
+      },
+      options);
+}
+
+/// Numbers components by their first points. `vertex(i)`: of point `i` of the cloud; negative where it takes no part.
+/// `stays(i)`: whether such a point is an inlier even so.
+template <class Vertex, class Stays>
+[[nodiscard]] cluster_result numbered(linked_components found, std::size_t count, const Vertex& vertex,
+                                      const Stays& stays) {
+  cluster_result out;
+  out.min_size = found.min_size;
+  out.component.assign(count, cluster_result::none);
+  std::vector<std::uint32_t> number(found.sizes.size(), cluster_result::none);  // by root
+  for (std::size_t i = 0; i != count; ++i) {
+    const std::int64_t v = vertex(i);
+    if (v < 0) continue;
+    const std::uint32_t root = found.sets.root(static_cast<std::uint32_t>(v));
+    if (number[root] == cluster_result::none) {
+      number[root] = static_cast<std::uint32_t>(out.sizes.size());
+      out.sizes.push_back(found.sizes[root]);
+      out.removed.push_back(found.goes[root]);
+    }
+    out.component[i] = number[root];
+  }
+  out.inliers = indices_where(count, [&](std::size_t i) {
+    return out.component[i] != cluster_result::none ? out.removed[out.component[i]] == 0 : stays(i);
+  });
+  return out;
+}
+
+}  // namespace detail
+
 /// The components of a neighbour graph that is known already, and which of them go: see `cluster_inliers`.
 /// `gone`: for each point whether it is an outlier already, or empty; those take no part, and are not among
 /// the inliers. `spacing`: for each point the spacing that counts, metres, or empty for the mean over the
@@ -119,87 +253,26 @@ template <execution_policy Policy, point_range Points>
     own = mean_knn_distance(policy, table, options.neighbors);
     spacing = own;
   }
+  const auto is_left = [&](std::size_t i) { return gone.empty() || gone[i] == 0; };
   const auto takes_part = [&](std::size_t i) {
-    return (gone.empty() || gone[i] == 0) && is_finite(coordinates<float>(detail::point_at(points, i)));
+    return is_left(i) && is_finite(coordinates<float>(detail::point_at(points, i)));
   };
-  const auto reach = static_cast<float>(options.reach);
-  // Calls `f(neighbour)` for those of a point's neighbours that are linked with it by its row.
-  const auto for_each_link = [&](std::size_t i, auto&& f) {
-    const neighbor<float>* const row = table.rows.data() + i * table.width;
-    for (std::size_t n = 0; n != width; ++n) {
-      const auto [j, distance] = row[n];
-      if (!gone.empty() && gone[j] != 0) continue;
-      const float limit =
-          options.link == cluster_link::mutual ? std::min(spacing[i], spacing[j]) : std::max(spacing[i], spacing[j]);
-      if (distance <= reach * limit) f(row[n]);
-    }
+  const auto for_each_neighbor = [&](std::size_t i, auto&& f) {
+    for (const neighbor<float>& n : table[i].first(std::min(width, table[i].size()))) f(n.index, n.distance);
   };
-
-  detail::disjoint_sets sets{count};
-  std::vector<char> part(count, 0);
-  for_each_index(policy, count, 2048, [&](std::size_t i) {
-    if (!takes_part(i)) return;
-    part[i] = 1;
-    if (width == 0) return;
-    for_each_link(i, [&](const neighbor<float>& n) { sets.join(static_cast<std::uint32_t>(i), n.index); });
-  });
-
-  cluster_result out;
-  out.component.assign(count, cluster_result::none);
-  std::size_t present = 0;
-  for (std::size_t i = 0; i != count; ++i) {
-    if (part[i] == 0) continue;
-    ++present;
-    const std::uint32_t root = sets.root(static_cast<std::uint32_t>(i));  // the first of its set: numbered by now
-    if (root == i) {
-      out.component[i] = static_cast<std::uint32_t>(out.sizes.size());
-      out.sizes.push_back(0);
-    }
-    out.component[i] = out.component[root];
-    ++out.sizes[out.component[i]];
-  }
-  out.min_size = detail::smallest_large(options, present);
-  out.removed.assign(out.sizes.size(), 0);
-
-  const auto small = [&](std::size_t i) { return out.sizes[out.component[i]] < out.min_size; };
-  std::vector<std::uint32_t> main_points;
-  std::vector<std::uint32_t> small_points;
-  for (std::size_t i = 0; i != count; ++i) {
-    if (part[i] != 0) (small(i) ? small_points : main_points).push_back(static_cast<std::uint32_t>(i));
-  }
-  if (!small_points.empty() && !main_points.empty()) {
-    std::vector<std::array<float, 3>> surface;
-    surface.reserve(main_points.size());
-    for (const std::uint32_t i : main_points) surface.push_back(coordinates<float>(detail::point_at(points, i)));
-    const leaf_search search{policy, surface};
-    std::vector<char> apart(small_points.size(), 0);
-    for_each_chunk(policy, small_points.size(), 64, [&](std::size_t begin, std::size_t end) {
-      std::vector<neighbor<float>> nearest;
-      for (std::size_t s = begin; s != end; ++s) {
-        const std::uint32_t i = small_points[s];
-        search.knn(coordinates<float>(detail::point_at(points, i)), 1, nearest);
-        double within = 0;  // mean length of its links
-        double links = 0;
-        for_each_link(i, [&](const neighbor<float>& n) {
-          within += n.distance;
-          links += 1;
-        });
-        if (links > 0) within /= links;
-        const double local = std::max(within, double{spacing[main_points[nearest.front().index]]});
-        const double gap = options.min_gap > 0 ? options.min_gap * local : 0;  // spacings may be infinite
-        apart[s] = nearest.front().distance > gap ? 1 : 0;
-      }
-    });
-    for (const std::uint32_t i : small_points) out.removed[out.component[i]] = 1;
-    for (std::size_t s = 0; s != small_points.size(); ++s) {
-      if (apart[s] == 0) out.removed[out.component[small_points[s]]] = 0;  // one point close to the surface is enough
-    }
-  }
-  out.inliers = detail::indices_where(count, [&](std::size_t i) {
-    if (part[i] != 0) return out.removed[out.component[i]] == 0;
-    return (gone.empty() || gone[i] == 0) && options.non_finite == non_finite::keep;
-  });
-  return out;
+  const auto make_nearest = [&] {
+    constexpr std::size_t all = std::numeric_limits<std::size_t>::max();
+    return [&points, tree = detail::make_leaves(policy, points, all), kernels = detail::knn_kernels{}](
+               std::uint32_t i, const auto& counts) {
+      const auto found = detail::nearest_place_of(tree, kernels, coordinates<float>(detail::point_at(points, i)),
+                                                  [&](std::uint32_t place) { return counts(tree.members[place]); });
+      return std::pair{tree.members[found.first], found.second};
+    };
+  };
+  return detail::numbered(
+      detail::find_components(policy, count, takes_part, for_each_neighbor, spacing, make_nearest, options), count,
+      [&](std::size_t i) { return takes_part(i) ? static_cast<std::int64_t>(i) : -1; },
+      [&](std::size_t i) { return is_left(i) && options.non_finite == non_finite::keep; });
 }
 
 /// Finds the points that `cluster_inliers` returns, and the components they are in.
@@ -207,7 +280,16 @@ template <execution_policy Policy, point_range Points>
 [[nodiscard]] cluster_result cluster_filter(const Policy& policy, const Points& points,
                                             const cluster_options& options = {}) {
   assert(options.neighbors > 0);
-  return cluster_decision(policy, points, all_knn(policy, points, options.neighbors), {}, {}, options);
+  const std::size_t count = std::ranges::size(points);
+  const detail::neighbor_graph graph{
+      policy, detail::make_leaves(policy, points, std::min(options.neighbors, count) + 1), count, options.neighbors};
+  const std::vector<std::uint32_t> place_of = graph.places(count);
+  return detail::numbered(
+      detail::separate(policy, graph, {}, graph.mean_distance(policy, options.neighbors), options), count,
+      [&](std::size_t i) {
+        return place_of[i] == detail::neighbor_graph::no_place ? -1 : static_cast<std::int64_t>(place_of[i]);
+      },
+      [&](std::size_t) { return options.non_finite == non_finite::keep; });
 }
 
 /// The indices, ascending, of the points that are not in a small component of the neighbour graph far from

@@ -17,6 +17,7 @@
 #include <orbis/cloud/detail/knn/knn_kernels.hpp>
 #include <orbis/cloud/detail/knn/leaf_hierarchy.hpp>
 #include <orbis/cloud/detail/knn/nearest_search.hpp>
+#include <orbis/cloud/detail/knn/visit_near.hpp>
 #include <orbis/cloud/neighbors.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/point.hpp>
@@ -38,7 +39,7 @@ class leaf_search : public neighbor_queries<leaf_search, float> {
   template <execution_policy Policy, point_range Points>
   leaf_search(const Policy& policy, const Points& points)
       : tree_{detail::make_leaves(policy, points, std::numeric_limits<std::size_t>::max())} {
-    assert(tree_.levels.size() <= most_levels);
+    assert(tree_.levels.size() <= detail::most_box_levels);
   }
   template <point_range Points>
   explicit leaf_search(const Points& points) : leaf_search(seq, points) {}
@@ -48,45 +49,19 @@ class leaf_search : public neighbor_queries<leaf_search, float> {
   /// Reports to `sink` every point within its bound, near leaves first.
   template <neighbor_sink<float> Sink>
   void visit(const query& q, Sink& sink) const {
-    if (tree_.leaves.empty()) return;
-    const detail::box3 box{q, q};
-    std::array<box_to_visit, most_levels * detail::leaf_width> open;
-    std::size_t count = 0;
-    open[count++] = {0, static_cast<std::uint32_t>(tree_.levels.size()), 0};
-    while (count != 0) {
-      const box_to_visit next = open[--count];
-      const auto bound = static_cast<float>(sink.bound_squared());
-      if (next.distance > bound) continue;
-      if (next.level == 0) {
-        if (!visit_leaf(q, next.index, bound, sink)) return;
-        continue;
+    struct {
+      const leaf_search& search;
+      Sink& sink;
+      [[nodiscard]] auto bound_squared() const noexcept { return sink.bound_squared(); }
+      bool add(std::uint32_t place, float distance_squared) {
+        return sink.add(search.tree_.members[place], distance_squared);
       }
-      const std::uint32_t level = next.level - 1;
-      std::array<float, detail::leaf_width> distance;
-      std::uint32_t mask = kernels_.near_boxes(tree_.levels[level][next.index], box, bound, distance.data());
-      const std::size_t children = level == 0 ? tree_.leaves.size() : tree_.levels[level - 1].size();
-      const std::size_t first = count;
-      for (; mask != 0; mask &= mask - 1) {
-        const auto n = static_cast<std::size_t>(std::countr_zero(mask));
-        const std::size_t child = next.index * detail::leaf_width + n;
-        if (child >= children) break;  // where the bound is infinite
-        open[count++] = {distance[n], level, static_cast<std::uint32_t>(child)};
-        if (open[count - 1].distance > open[first].distance) continue;
-        std::swap(open[count - 1], open[first]);  // the nearest at the bottom, for now
-      }
-      if (count > first) std::swap(open[count - 1], open[first]);  // and on top
-    }
+    } by_index{*this, sink};
+    detail::visit_near(tree_, kernels_, q, by_index);
   }
 
  private:
   friend neighbor_queries<leaf_search, float>;
-  static constexpr std::size_t most_levels = 8;  // 2^32 points make seven
-  struct box_to_visit {
-    float distance;       ///< squared
-    std::uint32_t level;  ///< 0: a leaf
-    std::uint32_t index;
-  };
-
   static constexpr std::size_t few = 12;  ///< neighbours for which a heap is fastest
 
   /// Keeps the k nearest of those within a bound.
@@ -185,18 +160,6 @@ class leaf_search : public neighbor_queries<leaf_search, float> {
                      found.begin() + static_cast<std::ptrdiff_t>(count));
     return found[k - 1];
   }
-  template <class Sink>
-  [[nodiscard]] bool visit_leaf(const query& q, std::size_t leaf, float bound, Sink& sink) const {
-    std::array<float, detail::leaf_width> distance;
-    std::uint32_t within = kernels_.distances(tree_.leaves[leaf], q, bound, distance.data());
-    within &= (1U << tree_.size_of(leaf)) - 1;
-    for (; within != 0; within &= within - 1) {
-      const auto n = static_cast<std::size_t>(std::countr_zero(within));
-      if (!sink.add(tree_.members[leaf * detail::leaf_width + n], distance[n])) return false;
-    }
-    return true;
-  }
-
   detail::leaf_hierarchy tree_;
   detail::knn_kernels kernels_;
 };

@@ -60,7 +60,7 @@ struct without_views {
   [[nodiscard]] bool operator()(std::span<char>, filter_choice&, std::vector<std::string>&) const noexcept {
     return true;
   }
-  void operator()(const ray_step&, std::span<char>) const noexcept { assert(!"a ray_step needs views"); }
+  void operator()(const ray_step&, std::span<char>) const noexcept { assert(false && "a ray_step needs views"); }
 };
 
 template <point_range Points>
@@ -70,10 +70,20 @@ template <point_range Points>
   return out;
 }
 
-template <execution_policy Policy, point_range Points>
-[[nodiscard]] std::vector<float> ranges_of(const Policy& policy, const Points& points, const select_options& options) {
-  return sensor_ranges(policy, points, {.common = options.sensor_origin, .ranges = options.ranges});
-}
+/// The ranges that are given, or those from the sensor's origin; empty where neither is known.
+struct known_ranges {
+  std::vector<float> own{};
+  std::span<const float> all{};
+
+  template <execution_policy Policy, point_range Points>
+  known_ranges(const Policy& policy, const Points& points, const select_options& options) : all{options.ranges} {
+    if (!all.empty() || (!options.sensor_origin && !stated_sensor_origin(points))) return;
+    own = sensor_ranges(policy, points, {.common = options.sensor_origin});
+    all = own;
+  }
+  known_ranges(const known_ranges&) = delete;
+  known_ranges& operator=(const known_ranges&) = delete;
+};
 
 /// Points left, and with `non_finite::keep` those that are not finite.
 template <point_range Points>
@@ -111,7 +121,7 @@ template <execution_policy Policy, point_range Points, class Views>
                                                      const filter_chain& chain, const select_options& options,
                                                      const Views& apply_views) {
   std::vector<char> left = finite_points(points);
-  const std::vector<float> ranges = ranges_of(policy, points, options);
+  const known_ranges ranges{policy, points, options};
   std::optional<surroundings> around;
   std::size_t averaged = 0;  // neighbours, in `around`
   const auto settle = [&] {
@@ -120,7 +130,7 @@ template <execution_policy Policy, point_range Points, class Views>
   };
   const auto look_around = [&](std::size_t neighbors) -> surroundings& {
     if (around && averaged != neighbors) settle();
-    if (!around) around.emplace(policy, points, left, ranges, averaged = neighbors);
+    if (!around) around.emplace(policy, points, left, ranges.all, averaged = neighbors);
     return *around;
   };
   for (const filter_step& any : chain) {
@@ -170,7 +180,6 @@ template <execution_policy Policy, point_range Points, class Views>
   choice.evidence.points = std::ranges::size(points);
   std::vector<char> left = finite_points(points);
   choice.evidence.finite = static_cast<std::size_t>(std::ranges::count(left, char{1}));
-  const std::vector<float> ranges = ranges_of(policy, points, options);
   std::vector<std::string> reasons;
   if (!judge_by_views(left, choice, reasons)) {
     choice.chain.clear();
@@ -178,10 +187,12 @@ template <execution_policy Policy, point_range Points, class Views>
     out.inliers = kept_points(points, left, options);
     return out;
   }
-  surroundings around{policy, points, left, ranges, options.neighbors};
-  const bool ranged = std::ranges::any_of(around.log_range(), [](float r) { return std::isfinite(r); });
+  const known_ranges ranges{policy, points, options};
+  surroundings around{policy, points, left, ranges.all, options.neighbors};
+  bool ranged = false;
+  for (std::size_t i = 0; i != around.size() && !ranged; ++i) ranged = around.has_range(i);
   for (std::size_t i = 0; i != around.size(); ++i) {
-    const bool judged = std::isfinite(around.log_spacing()[i]) && (!ranged || std::isfinite(around.log_range()[i]));
+    const bool judged = std::isfinite(around.log_spacing()[i]) && (!ranged || around.has_range(i));
     choice.evidence.judged += judged ? 1 : 0;
   }
   if (choice.evidence.judged < enough) {

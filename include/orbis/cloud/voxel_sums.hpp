@@ -140,6 +140,14 @@ class voxel_sums {
     apply<false>(policy, parts);
   }
 
+  /// Frees the sums; which voxels are occupied stays. Afterwards measurements are neither added nor removed, and `cloud`
+  /// and `ranges` are not called. O(bricks).
+  void finish() {
+    for (brick& b : bricks_) b.voxels.drop_sums();
+    std::vector<std::uint32_t>{}.swap(touched_);
+    std::vector<chained_run>{}.swap(chained_);
+  }
+
   /// The number of occupied voxels.
   [[nodiscard]] std::size_t size() const noexcept { return occupied_; }
   /// All memory that is held, bytes.
@@ -215,7 +223,7 @@ class voxel_sums {
   [[nodiscard]] std::vector<float> ranges(const Policy& policy, const order& places) const {
     std::vector<float> out(occupied_);
     for_each_voxel(policy, places, [&](std::size_t place, const detail::voxel_key&, const detail::voxel_sum& sum) {
-      out[place] = static_cast<float>(static_cast<double>(sum.range) / (1000.0 * sum.count));
+      out[place] = static_cast<float>(static_cast<double>(sum.range()) / (1000.0 * sum.count));
     });
     return out;
   }

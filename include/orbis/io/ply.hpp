@@ -103,6 +103,49 @@ struct ply_options {
   return parse_ply(*bytes, path.string());
 }
 
+namespace detail {
+
+/// Writes `count` vertices, of which `point(i)` and `color(i)` are the parts, block by block.
+template <class Point, class Color>
+result<void> write_ply_vertices(const std::filesystem::path& path, std::size_t count, bool colored, const Point& point,
+                                const Color& color, const ply_options& options) {
+  const bool binary = options.encoding == ply_encoding::binary;
+  return write_file_atomically(path, [&](std::ostream& out) {
+    std::string bytes =
+        std::string{"ply\nformat "} + (binary ? "binary_little_endian" : "ascii") + " 1.0\nelement vertex " +
+        std::to_string(count) + "\nproperty float x\nproperty float y\nproperty float z\n" +
+        (colored ? "property uchar red\nproperty uchar green\nproperty uchar blue\n" : "") + "end_header\n";
+    const auto flush = [&] {
+      out.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+      bytes.clear();
+    };
+    constexpr std::size_t block = 65536;
+    bytes.reserve(block + 256);
+    for (std::size_t i = 0; i != count; ++i) {
+      const std::array<float, 3> xyz = point(i);
+      const rgb8 c = colored ? color(i) : rgb8{};
+      if (binary) {
+        for (const float v : xyz) append_little_endian(bytes, v);
+        if (colored)
+          for (const std::uint8_t v : {c.r, c.g, c.b}) append_little_endian(bytes, v);
+      } else {
+        char buffer[64];
+        for (const float v : xyz) {
+          bytes.append(buffer, std::to_chars(buffer, buffer + sizeof buffer, v).ptr);
+          bytes += ' ';
+        }
+        if (colored)
+          for (const unsigned v : {c.r, c.g, c.b}) bytes += std::to_string(v) + ' ';
+        bytes.back() = '\n';
+      }
+      if (bytes.size() >= block) flush();
+    }
+    flush();
+  });
+}
+
+}  // namespace detail
+
 /// Writes points (as float), and their colours if there are any, as a PLY file, whole or not at all.
 /// @pre colors.empty() || colors.size() == size of points. Errors: write_failed.
 template <point_range Points>
@@ -110,39 +153,28 @@ result<void> write_ply(const std::filesystem::path& path, const Points& points, 
                        const ply_options& options = {}) {
   const auto count = static_cast<std::size_t>(std::ranges::size(points));
   assert(colors.empty() || colors.size() == count);
-  const bool binary = options.encoding == ply_encoding::binary;
-  std::string bytes =
-      std::string{"ply\nformat "} + (binary ? "binary_little_endian" : "ascii") + " 1.0\nelement vertex " +
-      std::to_string(count) + "\nproperty float x\nproperty float y\nproperty float z\n" +
-      (colors.empty() ? "" : "property uchar red\nproperty uchar green\nproperty uchar blue\n") + "end_header\n";
-  bytes.reserve(bytes.size() + count * (binary ? 15 : 40));
-  std::size_t i = 0;
-  for (const auto& point : points) {
-    const auto xyz = coordinates<float>(point);
-    if (binary) {
-      for (const float v : xyz) append_little_endian(bytes, v);
-      if (!colors.empty())
-        for (const std::uint8_t v : {colors[i].r, colors[i].g, colors[i].b}) append_little_endian(bytes, v);
-    } else {
-      char buffer[64];
-      for (const float v : xyz) {
-        bytes.append(buffer, std::to_chars(buffer, buffer + sizeof buffer, v).ptr);
-        bytes += ' ';
-      }
-      if (!colors.empty())
-        for (const unsigned v : {colors[i].r, colors[i].g, colors[i].b}) bytes += std::to_string(v) + ' ';
-      bytes.back() = '\n';
-    }
-    ++i;
-  }
-  return write_file_atomically(
-      path, [&](std::ostream& out) { out.write(bytes.data(), static_cast<std::streamsize>(bytes.size())); });
+  const auto first = std::ranges::begin(points);
+  return detail::write_ply_vertices(
+      path, count, !colors.empty(),
+      [&](std::size_t i) {
+        return coordinates<float>(first[static_cast<std::ranges::range_difference_t<const Points>>(i)]);
+      },
+      [&](std::size_t i) { return colors[i]; }, options);
 }
 
 /// Writes a cloud as a PLY file: `x y z`, with `red green blue` if it has colours.
 inline result<void> write_ply(const std::filesystem::path& path, const point_cloud& cloud,
                               const ply_options& options = {}) {
   return write_ply(path, cloud.points, std::span<const rgb8>{cloud.colors}, options);
+}
+
+/// Writes the points of a cloud that a filter kept, without making a cloud of them. @pre indices are of the cloud
+inline result<void> write_ply(const std::filesystem::path& path, const point_cloud& cloud,
+                              std::span<const std::uint32_t> indices, const ply_options& options = {}) {
+  return detail::write_ply_vertices(
+      path, indices.size(), cloud.has_colors(),
+      [&](std::size_t i) { return coordinates<float>(cloud.points[indices[i]]); },
+      [&](std::size_t i) { return cloud.colors[indices[i]]; }, options);
 }
 
 }  // namespace orbis::io

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include <orbis/cloud/detail/rays/view_trust.hpp>
+#include <orbis/core/random.hpp>
 
 #include "cloud/views.hpp"
 #include "support/catch.hpp"
@@ -56,4 +58,55 @@ TEST_CASE("stray pixels are replaced and surfaces are not") {
   orbis::image<float> together;
   orbis::cloud::detail::remove_stray_pixels(orbis::par.with(3), view, 0.02F, 0.005F, together);
   CHECK(together == out);
+}
+
+TEST_CASE("stray pixels are those that pixel by pixel do not agree with their neighbours") {
+  using namespace orbis::cloud::detail;
+  orbis::random_bits random{7};
+  for (const int width : {1, 5, 15, 16, 17, 70}) {
+    for (const int height : {1, 2, 15, 16, 17, 40}) {
+      orbis::image<std::uint16_t> stored(width, height);
+      for (auto& v : stored.pixels())
+        v = static_cast<std::uint16_t>(random.below(5) == 0 ? 0 : 900 + 30 * random.below(4) + random.below(12));
+      const orbis::camera::depth_view<std::uint16_t> depth{stored, 1000.0};
+      for (const auto l : orbis::simd::available_levels()) {
+        const orbis::simd::level_limit limit{l};
+        orbis::image<float> out;
+        remove_stray_pixels(orbis::par.with(2), depth, 0.006F, 0.003F, out);
+        int wrong = 0, replaced = 0;
+        for (int y = 0; y != height; ++y)
+          for (int x = 0; x != width; ++x) {
+            const float z = depth(x, y);
+            auto around = depths_around(depth, x, y);
+            float expected = z;
+            if (z > 0 && !agrees_with_neighbors(z, around, 0.006F + 0.003F * z * z)) {
+              std::sort(around.begin(), around.end(), std::greater<>{});
+              const auto count = std::count_if(around.begin(), around.end(), [](float d) { return d > 0; });
+              std::reverse(around.begin(), around.begin() + count);
+              expected = count < 5 ? 0.0F : around[static_cast<std::size_t>(count / 2)];
+              ++replaced;
+            }
+            wrong += out(x, y) == expected ? 0 : 1;
+          }
+        CHECK(wrong == 0);
+        if (width == 70 && height == 40) CHECK(replaced > 50);
+      }
+    }
+  }
+}
+
+TEST_CASE("few views keep all verdicts on each other, and of many each keeps as many as before") {
+  using orbis::cloud::detail::is_kept;
+  for (const std::uint32_t views : {2U, 128U, 1000U, 5000U}) {
+    const std::uint32_t of = views / 2;
+    std::size_t kept = 0;
+    for (std::uint32_t by = 0; by != views; ++by)
+      for (std::size_t tile = 0; tile != 16; ++tile) kept += is_kept(of, by, tile, views) ? 1 : 0;
+    if (views <= 128) {
+      CHECK(kept == 16 * views);
+    } else {
+      CHECK(kept > 1800);
+      CHECK(kept < 2300);
+    }
+  }
 }

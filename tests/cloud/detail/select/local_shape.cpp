@@ -5,6 +5,7 @@
 #include <limits>
 #include <vector>
 
+#include <orbis/cloud/all_knn.hpp>
 #include <orbis/cloud/detail/select/local_shape.hpp>
 
 #include "cloud/clouds.hpp"
@@ -39,22 +40,23 @@ TEST_CASE("a point in a plane, at an edge, in a volume and beside a surface") {
 
 TEST_CASE("what is usual around is a quantile over neighbours, and of any policy") {
   const auto cloud = orbis::test::uniform_cloud(3000, 3);
-  const auto table = all_knn(orbis::seq, cloud, 12);
+  const orbis::cloud::detail::neighbor_graph graph{orbis::seq, orbis::cloud::detail::make_leaves(orbis::seq, cloud, 13),
+                                                   cloud.size(), 12};
   orbis::random_bits random{4};
   std::vector<float> values(cloud.size());
   for (float& v : values) v = static_cast<float>(random.uniform());
   values[7] = std::numeric_limits<float>::quiet_NaN();
   const orbis::cloud::detail::smoothing_options once{.neighbors = 12, .rounds = 1, .quantile = 0.35};
-  const auto smooth = orbis::cloud::detail::smoothed_over_neighbors(orbis::seq, table, values, once);
+  const auto smooth = orbis::cloud::detail::smoothed_over_neighbors(orbis::seq, graph, values, once);
   for (std::size_t i = 0; i != cloud.size(); ++i) {
     if (i == 7) {
       CHECK(std::isnan(smooth[i]));
       continue;
     }
     std::vector<float> around;
-    for (const auto& n : table[i]) {
-      if (n.index != 7) around.push_back(values[n.index]);
-    }
+    graph.for_each_neighbor(i, 12, [&](std::uint32_t n) {
+      if (n != 7) around.push_back(values[n]);
+    });
     std::sort(around.begin(), around.end());
     const auto rank = static_cast<std::size_t>(0.35 * static_cast<double>(around.size() - 1) + 0.5);
     REQUIRE(smooth[i] == around[rank]);
@@ -65,9 +67,9 @@ TEST_CASE("what is usual around is a quantile over neighbours, and of any policy
     const auto n = static_cast<double>(v.size() - 10);
     return squares / n - sum / n * (sum / n);
   };
-  const auto smoother = orbis::cloud::detail::smoothed_over_neighbors(orbis::par.with(3), table, values);
+  const auto smoother = orbis::cloud::detail::smoothed_over_neighbors(orbis::par.with(3), graph, values);
   CHECK(spread(smoother) < 0.5 * spread(smooth));
-  auto again = orbis::cloud::detail::smoothed_over_neighbors(orbis::seq, table, values);
+  auto again = orbis::cloud::detail::smoothed_over_neighbors(orbis::seq, graph, values);
   again[7] = smoother[7];
   for (std::size_t i = 0; i != again.size(); ++i) {
     if (i != 7) REQUIRE(again[i] == smoother[i]);

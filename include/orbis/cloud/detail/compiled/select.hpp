@@ -11,6 +11,7 @@
 #include <vector>
 
 #include <orbis/cloud/cluster.hpp>
+#include <orbis/cloud/detail/knn/leaf_hierarchy.hpp>
 #include <orbis/cloud/detail/select/density_judge.hpp>
 #include <orbis/cloud/detail/select/surroundings.hpp>
 #include <orbis/cloud/filter_chain.hpp>
@@ -26,7 +27,8 @@
 namespace orbis::cloud {
 
 #define ORBIS_INSTANTIATE_JUDGE(policy)                                                                          \
-  ORBIS_INSTANTIATE_CLOUD void detail::surroundings::measure(const policy&, std::size_t);                        \
+  ORBIS_INSTANTIATE_CLOUD void detail::surroundings::measure(const policy&, detail::leaf_hierarchy, std::size_t, \
+                                                             std::size_t);                                       \
   ORBIS_INSTANTIATE_CLOUD void detail::surroundings::apply(const policy&, const density_step&);                  \
   ORBIS_INSTANTIATE_CLOUD void detail::surroundings::apply(const policy&, const isolation_step&);                \
   ORBIS_INSTANTIATE_CLOUD void detail::surroundings::apply(const policy&, const cluster_options&);               \

@@ -107,18 +107,25 @@ class leaf_order {
 
   /// Orders the finite points. Of identical points that share a cell with many, those beyond
   /// `most_copies` are left out, so that a search never meets more of them than it has use for.
+  /// `there`: for each point whether it is looked at; empty for all.
   template <execution_policy Policy>
-  leaf_order(const Policy& policy, const Points& points, std::size_t most_copies)
+  leaf_order(const Policy& policy, const Points& points, std::size_t most_copies, std::span<const char> there = {})
       : points_{&points}, most_copies_{most_copies} {
     const auto count = static_cast<std::uint32_t>(std::ranges::size(points));
-    entries_.reserve(count);
+    const auto counts = [&](std::uint32_t i) { return (there.empty() || there[i] != 0) && is_finite(position(i)); };
+    std::size_t present = 0;
+    for (std::uint32_t i = 0; i != count; ++i) present += counts(i) ? 1 : 0;
+    entries_.reserve(present);
     for (std::uint32_t i = 0; i != count; ++i) {
-      if (is_finite(position(i))) entries_.push_back({0, i});
+      if (counts(i)) entries_.push_back({0, i});
     }
     spare_.resize(entries_.size());
     order(policy, 0, entries_.size());
+    std::vector<entry>{}.swap(spare_);
   }
   [[nodiscard]] std::span<const entry> entries() const noexcept { return entries_; }
+  /// Frees the memory of the entries, where they are not needed any more.
+  void drop_entries() noexcept { std::vector<entry>{}.swap(entries_); }
   /// The entries left out, in ascending order. Each has at least `most_copies` copies elsewhere.
   [[nodiscard]] std::span<const range> left_out() const noexcept { return left_out_; }
   [[nodiscard]] std::array<float, 3> position(std::uint32_t i) const {
@@ -217,7 +224,7 @@ struct surplus_copy {
   std::uint32_t kept;  ///< position in `members` of the first of those that are
 };
 
-/// The leaves of a cloud and the boxes around them. About 18 bytes per point; 16 more while it is made.
+/// The leaves of a cloud and the boxes around them. About 18 bytes per point, and no more while it is made.
 struct leaf_hierarchy {
   std::vector<point_row> leaves;
   std::vector<std::vector<box_row>> levels;  ///< [0]: boxes of the leaves; the last one is a single row
@@ -241,14 +248,19 @@ struct leaf_hierarchy {
   return row;
 }
 
-/// @pre most_copies > 0, fewer than 2^32 points
+/// `there`: for each point whether it is looked at; empty for all.
+/// @pre most_copies > 0, fewer than 2^32 points; there is empty or as long as points
 template <execution_policy Policy, point_range Points>
-[[nodiscard]] leaf_hierarchy make_leaves(const Policy& policy, const Points& points, std::size_t most_copies) {
+[[nodiscard]] leaf_hierarchy make_leaves(const Policy& policy, const Points& points, std::size_t most_copies,
+                                         std::span<const char> there = {}) {
   leaf_hierarchy out;
-  const leaf_order<Points> order{policy, points, most_copies};
+  leaf_order<Points> order{policy, points, most_copies, there};
   const auto entries = order.entries();
   out.finite = entries.size();
-  out.members.reserve(entries.size());
+  std::size_t copies = 0;
+  for (const auto& range : order.left_out()) copies += range.end - range.begin;
+  out.members.reserve(entries.size() - copies);
+  out.left_out.reserve(copies);
   std::size_t next = 0;
   const auto take = [&](std::size_t end) {
     for (; next != end; ++next) out.members.push_back(entries[next].index);
@@ -259,6 +271,7 @@ template <execution_policy Policy, point_range Points>
     for (; next != range.end; ++next) out.left_out.push_back({entries[next].index, kept});
   }
   take(entries.size());
+  order.drop_entries();
   if (out.members.empty()) return out;
 
   constexpr float inf = std::numeric_limits<float>::infinity();

@@ -15,11 +15,14 @@
 
 #include <orbis/camera/depth.hpp>
 #include <orbis/camera/model.hpp>
+#include <orbis/cloud/detail/rays/depth_rows.hpp>
 #include <orbis/cloud/detail/select/log_density.hpp>
 #include <orbis/cloud/ray_evidence.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/image.hpp>
+#include <orbis/core/random.hpp>
 #include <orbis/core/se3.hpp>
+#include <orbis/core/simd.hpp>
 #include <orbis/core/types.hpp>
 
 namespace orbis::cloud::detail {
@@ -55,6 +58,36 @@ template <camera::depth_source Depth>
   return false;
 }
 
+/// For each depth of a row how many of the eight around it agree with it. Most depths agree with two at least, which is
+/// found out many at a time. Reads sixteen depths beyond the rows.
+struct count_agreeing_depths {
+  using signature = void(const float*, const float*, const float*, float, float, float*, std::size_t);
+  template <simd::target Target>
+  static ORBIS_ALWAYS_INLINE void run(const float* above, const float* middle, const float* below, float margin,
+                                      float margin_growth, float* out, std::size_t width) {
+    using lanes = simd::native_vec<float, Target>;
+    const lanes zero = 0.0F, one = 1.0F;
+    for (std::size_t x = 0; x < width; x += lanes::count) {
+      const lanes z = lanes::load(middle + x);
+      const lanes widest = lanes(margin) + lanes(margin_growth) * z * z;
+      lanes count = 0.0F;
+      const auto look_at = [&](const float* other) ORBIS_INLINE_LAMBDA {
+        const lanes d = lanes::load(other);
+        count = count + select((d > zero) & (max(d - z, z - d) <= widest), one, zero);
+      };
+      look_at(above + x - 1);
+      look_at(above + x);
+      look_at(above + x + 1);
+      look_at(middle + x - 1);
+      look_at(middle + x + 1);
+      look_at(below + x - 1);
+      look_at(below + x);
+      look_at(below + x + 1);
+      count.store(out + x);
+    }
+  }
+};
+
 /// The depth image in metres with stray pixels replaced: one with which fewer than two of those around it
 /// agree, within `margin + margin_growth z^2`, gets their median, or none where fewer than five have a
 /// depth. A stray pixel would testify for itself, and silence the rays of all pixels around it. O(pixels).
@@ -63,26 +96,47 @@ template <execution_policy Policy, camera::depth_source Depth>
 void remove_stray_pixels(const Policy& policy, const Depth& depth, float margin, float margin_growth,
                          image<float>& out) {
   if (out.width() != depth.width() || out.height() != depth.height()) out = image<float>(depth.width(), depth.height());
-  for_each_index(policy, static_cast<std::size_t>(depth.height()), 16, [&](std::size_t row) {
-    const int y = static_cast<int>(row);
-    for (int x = 0; x != depth.width(); ++x) {
-      const float z = depth(x, y);
-      out(x, y) = z;
-      if (!(z > 0)) continue;
-      std::array<float, 8> around = depths_around(depth, x, y);
-      if (agrees_with_neighbors(z, around, margin + margin_growth * z * z)) continue;
-      const auto end = std::remove_if(around.begin(), around.end(), [](float d) { return !(d > 0); });
-      const auto count = end - around.begin();
-      out(x, y) = 0;
-      if (count < 5) continue;
-      std::nth_element(around.begin(), around.begin() + count / 2, end);
-      out(x, y) = around[static_cast<std::size_t>(count / 2)];
+  const depth_row_kernels kernels;
+  const auto count_agreeing = simd::kernel<count_agreeing_depths, count_agreeing_depths::signature, simd::avx2>();
+  const auto width = static_cast<std::size_t>(depth.width());
+  constexpr std::size_t beside = 16;                           // the kernel reads as many beyond a row
+  const std::size_t stride = beside + (width + 31) / 16 * 16;  // of padded rows
+  for_each_chunk(policy, static_cast<std::size_t>(depth.height()), 16, [&](std::size_t begin, std::size_t end) {
+    std::vector<float> rows(4 * stride, 0.0F);  // three rows of depths, and the counts; there is no depth beside them
+    const auto row = [&](std::size_t y) { return rows.data() + y % 3 * stride + beside; };
+    const auto read = [&](std::size_t y) {  // y + 1, so that it is never negative
+      if (y == 0 || y > static_cast<std::size_t>(depth.height()))
+        std::fill_n(row(y), width, 0.0F);
+      else
+        read_depth_row(kernels, depth, static_cast<int>(y) - 1, row(y));
+    };
+    float* const agreeing = rows.data() + 3 * stride;
+    read(begin);
+    read(begin + 1);
+    for (std::size_t y = begin; y != end; ++y) {
+      read(y + 2);
+      const float* const middle = row(y + 1);
+      count_agreeing(row(y), middle, row(y + 2), margin, margin_growth, agreeing, width);
+      std::copy_n(middle, width, out.row(static_cast<int>(y)).begin());
+      for (std::size_t x = 0; x != width; ++x) {
+        const float z = middle[x];
+        if (agreeing[x] >= 2.0F || !(z > 0)) continue;
+        std::array<float, 8> around = depths_around(depth, static_cast<int>(x), static_cast<int>(y));
+        if (agrees_with_neighbors(z, around, margin + margin_growth * z * z)) continue;
+        const auto last = std::remove_if(around.begin(), around.end(), [](float d) { return !(d > 0); });
+        const auto count = last - around.begin();
+        float& replaced = out(static_cast<int>(x), static_cast<int>(y));
+        replaced = 0;
+        if (count < 5) continue;
+        std::nth_element(around.begin(), around.begin() + count / 2, last);
+        replaced = around[static_cast<std::size_t>(count / 2)];
+      }
     }
   });
 }
 
 /// Views with the stray pixels of their depth replaced, one at a time.
-/// Calls `f(number, view)` for each; false from `f` ends it, and is returned.
+/// Calls `f(number, cleaned view, view)` for each; false from `f` ends it, and is returned.
 template <execution_policy Policy, posed_depth_range Views, class F>
 bool for_each_cleaned_view(const Policy& policy, const Views& views, const ray_evidence_options& options, F&& f) {
   struct cleaned_view {
@@ -93,10 +147,16 @@ bool for_each_cleaned_view(const Policy& policy, const Views& views, const ray_e
   std::uint32_t number = 0;
   for (const auto& view : views) {
     remove_stray_pixels(policy, view.depth, options.margin, options.margin_growth, depth);
-    if (!f(number++, cleaned_view{camera::depth_view<float>(depth), view.T_world_camera})) return false;
+    if (!f(number++, cleaned_view{camera::depth_view<float>(depth), view.T_world_camera}, view)) return false;
   }
   return true;
 }
+
+/// What is asked of views beside their trust: nothing.
+struct ask_nothing {
+  template <class View>
+  void operator()(const View&) const noexcept {}
+};
 
 struct view_trust_options {
   double conflict = 0.1;  ///< a view is distrusted beyond this,
@@ -116,15 +176,24 @@ struct view_trust {
 struct view_verdict {
   std::uint32_t of;
   std::uint32_t by;
-  double conflict;  ///< passed through / (passed through + supported)
+  std::uint16_t through;
+  std::uint16_t all;  ///< passed through or supported
+  [[nodiscard]] double conflict() const noexcept { return static_cast<double>(through) / all; }
 };
+
+/// Whether a verdict on a tile is kept: all of them up to 128 views, beyond that as many of each view, chosen by
+/// chance, so that memory grows with the views and not with their square.
+[[nodiscard]] inline bool is_kept(std::uint32_t of, std::uint32_t by, std::size_t tile, std::uint32_t views) noexcept {
+  constexpr std::uint32_t enough = 128;
+  return views <= enough || mix64((std::uint64_t{of} << 32U | by) ^ mix64(tile)) % views < enough;
+}
 
 /// The median of the conflicts that a view has with those not left out; 0 where there are too few.
 /// `verdicts`: those that it has a part in; `of` is itself or the other.
 [[nodiscard]] inline double conflict_of(std::span<const view_verdict> verdicts, std::span<const char> left_out) {
   std::vector<double> values;
   for (const view_verdict& c : verdicts) {
-    if (left_out[c.of] == 0 && left_out[c.by] == 0) values.push_back(c.conflict);
+    if (left_out[c.of] == 0 && left_out[c.by] == 0) values.push_back(c.conflict());
   }
   if (values.size() < 10) return 0;
   return quantile(values, 0.5);
@@ -133,17 +202,22 @@ struct view_verdict {
 /// Finds views whose pose is wrong by what they say of each other. A sample of the pixels of each is
 /// tested by all others (`ray_evidence`), tile by tile: a wrong pose is contradicted all over the
 /// image, a moving object in a part of it alone, so the median over the tiles counts. The worst view is left
-/// out until none stands out; if that would be half of them, all are trusted. Deterministic.
+/// out until none stands out; if that would be half of them, all are trusted. Deterministic. `also(view)` is called for
+/// each view as well, so that who has other questions needs no pass of its own: views may be costly to look at.
 /// O(views (pixels + samples of all views)). @pre views' images have the camera's size
-template <execution_policy Policy, posed_depth_range Views, camera::camera_model Camera>
+template <execution_policy Policy, posed_depth_range Views, camera::camera_model Camera, class Also = ask_nothing>
 [[nodiscard]] view_trust find_distrusted_views(const Policy& policy, const Views& views, const Camera& camera,
                                                const ray_evidence_options& evidence = {},
-                                               const view_trust_options& options = {}, progress on_progress = {}) {
+                                               const view_trust_options& options = {}, progress on_progress = {},
+                                               const Also& also = {}) {
   constexpr int tiles = 4;   // across and down
   constexpr int enough = 6;  // verdicts on a tile
   const auto count = static_cast<std::uint32_t>(std::ranges::size(views));
   view_trust out;
-  if (count < options.least) return out;
+  if (count < options.least) {
+    for (const auto& view : views) also(view);
+    return out;
+  }
 
   std::vector<vec3f> samples;
   std::vector<std::uint32_t> place;  // view and tile
@@ -172,31 +246,34 @@ template <execution_policy Policy, posed_depth_range Views, camera::camera_model
   std::vector<std::vector<view_verdict>> verdicts(count);  // for each view that has a part in them
   ray_evidence_counter<Camera> counter{policy, samples, camera, evidence};
   std::vector<ray_evidence> before = counter.scores();
-  const bool finished = for_each_cleaned_view(policy, views, evidence, [&](std::uint32_t by, const auto& view) {
-    counter.add(policy, view);
-    std::vector<ray_evidence> scores = counter.scores();  // of all views so far
-    for (std::size_t begin = 0; begin != place.size();) {
-      std::size_t end = begin;
-      const std::uint32_t of = place[begin] / (tiles * tiles);
-      std::array<int, tiles * tiles> through{};
-      std::array<int, tiles * tiles> supported{};
-      for (; end != place.size() && place[end] / (tiles * tiles) == of; ++end) {
-        through[place[end] % (tiles * tiles)] += scores[end].through - before[end].through;
-        supported[place[end] % (tiles * tiles)] += scores[end].supported - before[end].supported;
-      }
-      begin = end;
-      if (of == by) continue;
-      for (std::size_t t = 0; t != tiles * tiles; ++t) {
-        const int all = through[t] + supported[t];
-        if (all < enough) continue;
-        const view_verdict verdict{of, by, static_cast<double>(through[t]) / all};
-        verdicts[of].push_back(verdict);
-        verdicts[by].push_back(verdict);
-      }
-    }
-    before.swap(scores);
-    return on_progress(by + 1, count);
-  });
+  const bool finished =
+      for_each_cleaned_view(policy, views, evidence, [&](std::uint32_t by, const auto& view, const auto& as_seen) {
+        also(as_seen);
+        counter.add(policy, view);
+        std::vector<ray_evidence> scores = counter.scores();  // of all views so far
+        for (std::size_t begin = 0; begin != place.size();) {
+          std::size_t end = begin;
+          const std::uint32_t of = place[begin] / (tiles * tiles);
+          std::array<int, tiles * tiles> through{};
+          std::array<int, tiles * tiles> supported{};
+          for (; end != place.size() && place[end] / (tiles * tiles) == of; ++end) {
+            through[place[end] % (tiles * tiles)] += scores[end].through - before[end].through;
+            supported[place[end] % (tiles * tiles)] += scores[end].supported - before[end].supported;
+          }
+          begin = end;
+          if (of == by) continue;
+          for (std::size_t t = 0; t != tiles * tiles; ++t) {
+            const int all = through[t] + supported[t];
+            if (all < enough) continue;
+            if (!is_kept(of, by, t, count)) continue;
+            const view_verdict verdict{of, by, static_cast<std::uint16_t>(through[t]), static_cast<std::uint16_t>(all)};
+            verdicts[of].push_back(verdict);
+            verdicts[by].push_back(verdict);
+          }
+        }
+        before.swap(scores);
+        return on_progress(by + 1, count);
+      });
   if (!finished) return out;
 
   std::vector<char> left_out(count, 0);

@@ -34,13 +34,9 @@ struct reference {
 /// Width of the bulk as it counts in the comparison of references.
 [[nodiscard]] inline double width_of(const bulk& b) noexcept { return std::max(b.left_scale, 0.5 * b.right_scale); }
 
-[[nodiscard]] inline std::vector<double> finite_of(std::span<const float> values) {
-  std::vector<double> out;
-  out.reserve(values.size());
-  for (const float v : values) {
-    if (std::isfinite(v)) out.push_back(v);
-  }
-  return out;
+[[nodiscard]] inline std::vector<float> finite_of(std::vector<float> values) {
+  std::erase_if(values, [](float v) { return !std::isfinite(v); });
+  return values;
 }
 
 /// Moves the reference to the bulk's median, and measures the bulk.
@@ -73,17 +69,14 @@ template <execution_policy Policy>
   constexpr double chance = 10;  // points: fewer say nothing
   const std::vector<float> residual = around.residuals(policy, r.step);
   around.look_at_shapes(policy, residual, r.step.surface_line());
-  std::vector<double> loose;  // residuals of points that are not on surfaces
-  loose.reserve(residual.size());
+  std::vector<float> loose;  // residuals of sparse points that are not on surfaces
   std::array<double, bins> all{};
   std::array<double, bins> surface{};
   for (std::size_t i = 0; i != residual.size(); ++i) {
     const double x = residual[i];
-    if (std::isnan(x)) continue;
-    const bool sparse = x >= first;
-    const bool on_surface = sparse && around.on_surface(i, r.step.surface, r.step.surface_line());
-    if (!on_surface) loose.push_back(x);
-    if (!sparse) continue;
+    if (!(x >= first)) continue;
+    const bool on_surface = around.on_surface(i, r.step.surface, r.step.surface_line());
+    if (!on_surface) loose.push_back(residual[i]);
     const auto bin = static_cast<std::size_t>(std::min((x - first) / bin_width, bins - 1.0));
     all[bin] += 1;
     surface[bin] += on_surface ? 1 : 0;
@@ -149,14 +142,10 @@ void judge_points(const Policy& policy, surroundings& around, const select_optio
   evidence.global_scale = width_of(global.width);
   std::optional<reference> ranged;
   {
-    std::vector<double> spacing;
-    std::vector<double> range;
-    for (std::size_t i = 0; i != around.size(); ++i) {
-      if (!std::isfinite(around.log_spacing()[i]) || !std::isfinite(around.log_range()[i])) continue;
-      spacing.push_back(around.log_spacing()[i]);
-      range.push_back(around.log_range()[i]);
-    }
-    const auto line = fit_log_line(spacing, range);
+    std::vector<float> log_range(around.size());
+    for_each_index(policy, log_range.size(), 4096, [&](std::size_t i) { log_range[i] = around.log_range(i); });
+    const auto line = fit_log_line(around.log_spacing(), log_range);
+    std::vector<float>{}.swap(log_range);
     if (line) {
       ranged = global;
       ranged->step.mode = filter_mode::range_log_statistical;

@@ -8,6 +8,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <limits>
 #include <span>
 #include <utility>
@@ -15,8 +16,9 @@
 
 #include <Eigen/Eigenvalues>
 
-#include <orbis/cloud/all_knn.hpp>
+#include <orbis/cloud/detail/knn/neighbor_graph.hpp>
 #include <orbis/cloud/detail/select/decision.hpp>
+#include <orbis/cloud/neighbors.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/point.hpp>
 #include <orbis/core/types.hpp>
@@ -29,19 +31,19 @@ struct smoothing_options {
   double quantile = 0.35;  ///< of the neighbours' values, 0 to 1
 };
 
-/// For each point the value that is usual in its surroundings: the quantile over its neighbours, round
+/// For each place the value that is usual in its surroundings: the quantile over its neighbours, round
 /// after round, so that they reach further than the neighbours. Values that are not finite (NaN) stay and
 /// do not count; so do those of points without neighbours. O(n rounds neighbors), the same for every policy.
-/// @pre values has an entry for each point of the table
+/// @pre values has an entry for each place
 template <execution_policy Policy>
-[[nodiscard]] std::vector<float> smoothed_over_neighbors(const Policy& policy, const neighbor_table& table,
+[[nodiscard]] std::vector<float> smoothed_over_neighbors(const Policy& policy, const neighbor_graph& graph,
                                                          std::vector<float> values,
                                                          const smoothing_options& options = {}) {
   constexpr float inf = std::numeric_limits<float>::infinity();
   const auto rank_of = [&](std::size_t count) {
     return static_cast<std::size_t>(options.quantile * static_cast<double>(count - 1) + 0.5);
   };
-  const std::size_t width = std::min(options.neighbors, table.width);
+  const std::size_t width = std::min(options.neighbors, graph.width());
   if (width == 0) return values;
   const std::size_t most = rank_of(width) + 1;
   std::vector<float> next(values.size());
@@ -50,12 +52,11 @@ template <execution_policy Policy>
       std::vector<float> smallest(most);  // ascending
       for (std::size_t i = begin; i != end; ++i) {
         next[i] = values[i];
-        const auto row = table[i];
-        if (row.empty() || !std::isfinite(values[i])) continue;
+        if (!std::isfinite(values[i])) continue;
         std::fill(smallest.begin(), smallest.end(), inf);
         std::size_t count = 0;
-        for (const auto& n : row.first(width)) {
-          float v = values[n.index];
+        graph.for_each_neighbor(i, width, [&](std::uint32_t n) {
+          float v = values[n];
           const bool counts = std::isfinite(v);
           count += counts ? 1 : 0;
           v = counts ? v : inf;
@@ -64,7 +65,7 @@ template <execution_policy Policy>
             v = v < s ? s : v;
             s = low;
           }
-        }
+        });
         if (count > 0) next[i] = smallest[rank_of(count)];
       }
     });

@@ -10,6 +10,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <ranges>
 #include <span>
 #include <vector>
 
@@ -17,12 +18,17 @@
 
 namespace orbis::cloud::detail {
 
+/// Which of `count` values in ascending order the fraction `q` of them does not exceed. @pre count > 0
+[[nodiscard]] inline std::ptrdiff_t quantile_rank(std::ptrdiff_t count, double q) noexcept {
+  return static_cast<std::ptrdiff_t>(q * static_cast<double>(count - 1) + 0.5);
+}
 /// A value that the fraction `q` of `values` does not exceed; 0 for none. Reorders them. O(n).
-[[nodiscard]] inline double quantile(std::span<double> values, double q) {
-  if (values.empty()) return 0;
-  const auto rank = static_cast<std::ptrdiff_t>(q * static_cast<double>(values.size() - 1) + 0.5);
-  std::nth_element(values.begin(), values.begin() + rank, values.end());
-  return values[static_cast<std::size_t>(rank)];
+template <std::ranges::contiguous_range Values>
+[[nodiscard]] double quantile(Values&& values, double q) {
+  if (std::ranges::empty(values)) return 0;
+  const auto at = std::ranges::begin(values) + quantile_rank(std::ranges::ssize(values), q);
+  std::nth_element(std::ranges::begin(values), at, std::ranges::end(values));
+  return static_cast<double>(*at);
 }
 
 /// A value that half of the weight does not exceed; 0 for none. Entries are value and weight.
@@ -41,30 +47,45 @@ namespace orbis::cloud::detail {
 /// The Theil-Sen line through the 40 % quantiles of log spacing in 24 bins of log range, weighted by the
 /// numbers of their points, so that ranges at which there are few points but outliers do not bend it; empty
 /// where fewer than four bins are populated. Range can only thin a cloud out, and no faster than its noise
-/// grows: the slope is clipped to 0 ... 2.5. O(n).
+/// grows: the slope is clipped to 0 ... 2.5. Points of which one of the two is not finite do not count.
+/// O(n), 4 bytes for each point. @pre one range for each spacing
 /// Source: P. K. Sen, "Estimates of the regression coefficient based on Kendall's tau", JASA 63, 1968.
-[[nodiscard]] inline std::optional<log_line> fit_log_line(std::span<const double> log_spacing,
-                                                          std::span<const double> log_range) {
+[[nodiscard]] inline std::optional<log_line> fit_log_line(std::span<const float> log_spacing,
+                                                          std::span<const float> log_range) {
   constexpr std::size_t bins = 24;
   constexpr std::size_t enough = 20;  // points for a usable quantile
-  if (log_spacing.empty()) return std::nullopt;
-  std::vector<double> sorted(log_range.begin(), log_range.end());
-  const double low = quantile(sorted, 0.01);
-  const double width = (quantile(sorted, 0.99) - low) / bins;
+  const auto for_each_point = [&](auto&& f) {
+    for (std::size_t i = 0; i != log_range.size(); ++i)
+      if (std::isfinite(log_spacing[i]) && std::isfinite(log_range[i])) f(log_spacing[i], log_range[i]);
+  };
+  std::size_t count = 0;
+  for_each_point([&](float, float) { ++count; });
+  if (count == 0) return std::nullopt;
+  std::vector<float> values;  // ranges at first
+  values.reserve(count);
+  for_each_point([&](float, float range) { values.push_back(range); });
+  const double low = quantile(values, 0.01);
+  const double width = (quantile(values, 0.99) - low) / bins;
   if (!(width > 1e-6)) return std::nullopt;
-  std::array<std::vector<double>, bins> members;
-  for (std::size_t i = 0; i != log_range.size(); ++i) {
-    const double bin = (log_range[i] - low) / width;
-    if (bin >= 0 && bin < bins) members[static_cast<std::size_t>(bin)].push_back(log_spacing[i]);
-  }
+  const auto bin_of = [&](double range) {
+    const double bin = (range - low) / width;
+    return bin >= 0 && bin < bins ? static_cast<std::size_t>(bin) : bins;  // the last one holds what is left over
+  };
+  std::array<std::size_t, bins + 2> begin{};
+  for_each_point([&](float, float range) { ++begin[bin_of(range) + 1]; });
+  for (std::size_t b = 0; b != bins + 1; ++b) begin[b + 1] += begin[b];
+  std::array<std::size_t, bins + 1> next;
+  std::copy_n(begin.begin(), next.size(), next.begin());
+  for_each_point([&](float spacing, float range) { values[next[bin_of(range)]++] = spacing; });
   struct knot {
     double x, y, weight;
   };
   std::vector<knot> knots;
   for (std::size_t b = 0; b != bins; ++b) {
-    if (members[b].size() < enough) continue;
-    knots.push_back({low + (static_cast<double>(b) + 0.5) * width, quantile(members[b], 0.4),
-                     static_cast<double>(members[b].size())});
+    const auto members = std::span{values}.subspan(begin[b], begin[b + 1] - begin[b]);
+    if (members.size() < enough) continue;
+    knots.push_back(
+        {low + (static_cast<double>(b) + 0.5) * width, quantile(members, 0.4), static_cast<double>(members.size())});
   }
   if (knots.size() < 4) return std::nullopt;
   std::vector<std::array<double, 2>> slopes;
@@ -89,18 +110,25 @@ struct bulk {
   double left_scale = 0;
   double right_scale = 0;
 };
-[[nodiscard]] inline bulk bulk_of(std::span<const double> values) {
-  std::vector<double> v(values.begin(), values.end());
+[[nodiscard]] inline bulk bulk_of(std::vector<float> values) {
   bulk out;
-  out.median = quantile(v, 0.5);
-  std::vector<double> below;
-  std::vector<double> above;
-  for (const double x : v) {
-    if (x <= out.median) below.push_back(out.median - x);
-    if (x >= out.median) above.push_back(x - out.median);
-  }
-  out.left_scale = 1.4826 * quantile(below, 0.5);
-  out.right_scale = 1.4826 * quantile(above, 0.5);
+  out.median = quantile(values, 0.5);
+  if (values.empty()) return out;
+  // Ranks of distances are those of values, from the other end on the left: no distances are stored.
+  const auto median = static_cast<float>(out.median);
+  const auto end_below = std::partition(values.begin(), values.end(), [&](float x) { return x <= median; });
+  const auto below = std::span{values.begin(), end_below};
+  const auto count_below = std::ranges::ssize(below);
+  const auto left = below.begin() + (count_below - 1 - quantile_rank(count_below, 0.5));
+  std::nth_element(below.begin(), left, below.end());
+  out.left_scale = 1.4826 * (out.median - double{*left});
+  const auto above = std::span{end_below, values.end()};
+  const auto equal = std::count(below.begin(), below.end(), median);
+  const std::ptrdiff_t rank = quantile_rank(equal + std::ranges::ssize(above), 0.5);
+  if (rank < equal) return out;
+  const auto right = above.begin() + (rank - equal);
+  std::nth_element(above.begin(), right, above.end());
+  out.right_scale = 1.4826 * (double{*right} - out.median);
   return out;
 }
 
@@ -111,13 +139,13 @@ struct valley {
 };
 /// Searches the smoothed histogram of `values - median` for the place in [lowest, 3.2] where the
 /// ratio of the highest later peak to the height is largest. O(n).
-[[nodiscard]] inline valley deepest_valley(std::span<const double> values, double median, double lowest) {
+[[nodiscard]] inline valley deepest_valley(std::span<const float> values, double median, double lowest) {
   constexpr double first = 0.3;
   constexpr double width = 0.08;
   constexpr std::size_t bins = 58;
   constexpr std::array<double, 5> kernel{1 / 9.0, 2 / 9.0, 3 / 9.0, 2 / 9.0, 1 / 9.0};
   std::array<double, bins + 4> counts{};  // two empty bins at either end, for the kernel
-  for (const double v : values) {
+  for (const float v : values) {
     const double bin = (v - median - first) / width;
     if (bin >= 0 && bin < static_cast<double>(bins)) counts[static_cast<std::size_t>(bin) + 2] += 1;
   }

@@ -35,10 +35,11 @@ ray_removals apply_rays(const Policy& policy, const Points& points, const ray_st
                         const Camera& camera, std::span<char> left, bool& cancelled, progress on_progress) {
   ray_evidence_counter<Camera> counter{policy, points, camera, step.evidence};
   const std::size_t count = std::ranges::size(views);
-  cancelled = !for_each_cleaned_view(policy, views, step.evidence, [&](std::uint32_t number, const auto& view) {
-    if (!std::ranges::binary_search(step.distrusted, number)) counter.add(policy, view);
-    return on_progress(number + 1, count);
-  });
+  cancelled =
+      !for_each_cleaned_view(policy, views, step.evidence, [&](std::uint32_t number, const auto& view, const auto&) {
+        if (!std::ranges::binary_search(step.distrusted, number)) counter.add(policy, view);
+        return on_progress(number + 1, count);
+      });
   ray_removals out;
   if (cancelled) return out;
   const std::vector<ray_evidence> scores = counter.scores();
@@ -53,23 +54,39 @@ ray_removals apply_rays(const Policy& policy, const Points& points, const ray_st
   return out;
 }
 
-/// Whether the cloud was made of these views: nearly every point of a sample is in one of them.
-template <execution_policy Policy, point_range Points, posed_depth_range Views, camera::camera_model Camera>
-[[nodiscard]] bool is_made_of(const Policy& policy, const Points& points, const Views& views, const Camera& camera,
-                              const ray_evidence_options& options) {
-  constexpr std::size_t most = 4096;
-  std::vector<std::array<float, 3>> sample;
-  const std::size_t size = std::ranges::size(points);
-  for (std::size_t i = 0; i < size; i += size / most + 1) {
-    const auto p = coordinates<float>(point_at(points, i));
-    if (is_finite(p)) sample.push_back(p);
+/// Whether a cloud was made of some views: nearly every point of a sample is in one of them.
+template <camera::camera_model Camera>
+class made_of_views {
+ public:
+  template <execution_policy Policy, point_range Points>
+  made_of_views(const Policy& policy, const Points& points, const Camera& camera, const ray_evidence_options& options)
+      : counter_{policy, sample_of(points), camera, options} {}
+
+  template <execution_policy Policy, posed_depth View>
+  void add(const Policy& policy, const View& view) {
+    counter_.add(policy, view);
   }
-  ray_evidence_counter<Camera> counter{policy, sample, camera, options};
-  for (const auto& view : views) counter.add(policy, view);
-  const std::vector<ray_evidence> scores = counter.scores();
-  const auto supported = std::ranges::count_if(scores, [](const ray_evidence& e) { return e.supported > 0; });
-  return static_cast<double>(supported) >= 0.98 * static_cast<double>(sample.size());
-}
+  /// @pre all views were added
+  [[nodiscard]] bool verdict() const {
+    const std::vector<ray_evidence> scores = counter_.scores();
+    const auto supported = std::ranges::count_if(scores, [](const ray_evidence& e) { return e.supported > 0; });
+    return static_cast<double>(supported) >= 0.98 * static_cast<double>(scores.size());
+  }
+
+ private:
+  template <point_range Points>
+  [[nodiscard]] static std::vector<std::array<float, 3>> sample_of(const Points& points) {
+    constexpr std::size_t most = 4096;
+    std::vector<std::array<float, 3>> sample;
+    const std::size_t size = std::ranges::size(points);
+    for (std::size_t i = 0; i < size; i += size / most + 1) {
+      const auto p = coordinates<float>(point_at(points, i));
+      if (is_finite(p)) sample.push_back(p);
+    }
+    return sample;
+  }
+  ray_evidence_counter<Camera> counter_;
+};
 
 /// Judges a cloud by its views, clears `left` where they exclude a point, and adds the step and its
 /// reason. False if cancelled.
@@ -87,12 +104,14 @@ template <execution_policy Policy, point_range Points, posed_depth_range Views, 
     cancelled = cancelled || !on_progress(done, 2 * count);
     return !cancelled;
   };
-  view_trust trust = find_distrusted_views(policy, views, camera, step.evidence, {}, first_half);
+  made_of_views<Camera> sources{policy, points, camera, step.evidence};
+  view_trust trust = find_distrusted_views(policy, views, camera, step.evidence, {}, first_half,
+                                           [&](const auto& view) { sources.add(policy, view); });
   if (cancelled) return false;
   evidence.worst_conflict = trust.worst_conflict;
   evidence.usual_conflict = trust.usual_conflict;
   step.distrusted = std::move(trust.distrusted);
-  step.need_support = is_made_of(policy, points, views, camera, step.evidence);
+  step.need_support = sources.verdict();
   const auto second_half = [&](std::size_t done, std::size_t) { return on_progress(count + done, 2 * count); };
   const ray_removals removed = apply_rays(policy, points, step, views, camera, left, cancelled, second_half);
   if (cancelled) return false;

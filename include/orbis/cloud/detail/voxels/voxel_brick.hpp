@@ -27,15 +27,16 @@ struct voxel_item {
   std::uint32_t range;  ///< millimetres
 };
 
-/// The measurements of a voxel.
+/// The measurements of a voxel. In words of 32 bits: with one of 64 it would be a tenth larger.
 struct voxel_sum {
-  std::uint64_t range = 0;
+  std::array<std::uint32_t, 2> range_words{};  ///< low, high
   std::array<std::uint32_t, 3> offset{};
   std::array<std::uint32_t, 3> color{};
   std::uint32_t count = 0;
 
+  [[nodiscard]] std::uint64_t range() const noexcept { return range_words[0] | std::uint64_t{range_words[1]} << 32U; }
   void add(const voxel_item& item) noexcept {
-    range += item.range;
+    set_range(range() + item.range);
     for (std::size_t a = 0; a != 3; ++a) offset[a] += item.offset[a];
     color[0] += item.color.r;
     color[1] += item.color.g;
@@ -43,19 +44,27 @@ struct voxel_sum {
     ++count;
   }
   void remove(const voxel_item& item) noexcept {
-    range -= item.range;
+    set_range(range() - item.range);
     for (std::size_t a = 0; a != 3; ++a) offset[a] -= item.offset[a];
     color[0] -= item.color.r;
     color[1] -= item.color.g;
     color[2] -= item.color.b;
     --count;
   }
+
+ private:
+  void set_range(std::uint64_t range) noexcept {
+    range_words = {static_cast<std::uint32_t>(range), static_cast<std::uint32_t>(range >> 32U)};
+  }
 };
 
 /// The occupied voxels of a brick, in the order of their cells.
 class voxel_brick {
  public:
-  [[nodiscard]] std::size_t size() const noexcept { return sums_.size(); }
+  /// How many voxels are occupied.
+  [[nodiscard]] std::size_t size() const noexcept {
+    return before_[7] + static_cast<std::size_t>(std::popcount(mask_[7]));
+  }
   [[nodiscard]] std::size_t memory_bytes() const noexcept { return sums_.capacity() * sizeof(voxel_sum); }
   [[nodiscard]] bool contains(std::uint32_t cell) const noexcept { return (mask_[cell / 64] >> (cell % 64) & 1U) != 0; }
   /// How many occupied cells come before this one.
@@ -63,9 +72,12 @@ class voxel_brick {
     const std::uint64_t below = mask_[cell / 64] & ((std::uint64_t{1} << (cell % 64)) - 1);
     return before_[cell / 64] + static_cast<std::size_t>(std::popcount(below));
   }
-  /// `f(cell, sum)`
+  /// Forgets the sums, and keeps which cells are occupied.
+  void drop_sums() noexcept { std::vector<voxel_sum>{}.swap(sums_); }
+  /// `f(cell, sum)`. @pre the sums were not dropped
   template <class F>
   void for_each(F&& f) const {
+    assert(sums_.size() == size());
     for_each_cell(mask_, [&, i = std::size_t{0}](std::uint32_t cell) mutable { f(cell, sums_[i++]); });
   }
 

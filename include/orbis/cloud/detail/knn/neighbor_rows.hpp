@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// The neighbours of the points of some leaves, one point after the other.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <vector>
+
+#include <orbis/cloud/detail/knn/knn_kernels.hpp>
+#include <orbis/cloud/detail/knn/leaf_hierarchy.hpp>
+#include <orbis/cloud/detail/knn/nearest_search.hpp>
+#include <orbis/cloud/detail/knn/rank_sort.hpp>
+#include <orbis/cloud/neighbors.hpp>
+
+namespace orbis::cloud::detail {
+
+/// Writes the nearest of what was gathered as a row, the point itself left out already.
+inline void write_row(rank_sorter& gathered, std::span<neighbor<float>> row) {
+  gathered.for_each([&](std::size_t rank, std::uint32_t index, float distance_squared) {
+    row[rank] = {index, std::sqrt(distance_squared)};
+    return rank + 1 != row.size();
+  });
+  // Different squares can have the same root.
+  if (!std::is_sorted(row.begin(), row.end(), nearest_sink<float>::less)) {
+    std::sort(row.begin(), row.end(), nearest_sink<float>::less);
+  }
+}
+
+/// For the points of the leaves [begin, end), calls `row_of(l, i)` for the i-th point of leaf `l`, writes its `width`
+/// nearest other points, nearest first, into the span that this returns, and calls `done(l)` after each leaf.
+/// @pre 0 < width < points in the leaves
+template <class RowOf, class Done>
+void find_neighbor_rows(const leaf_hierarchy& tree, const knn_kernels& kernels, std::size_t width, std::size_t begin,
+                        std::size_t end, RowOf&& row_of, Done&& done) {
+  const std::size_t wanted = width + 1;  // with the point itself
+  nearest_search search{tree, kernels, wanted};
+  rank_sorter gathered;
+  for (std::size_t l = begin; l != end; ++l) {
+    search.visit_leaf(l, [&](std::size_t i, std::span<float> found, float bound) {
+      const float largest = found.size() < wanted
+                                ? std::numeric_limits<float>::infinity()
+                                : kernels.sum_nearest(found.data(), found.size(), wanted, bound).largest_squared;
+      const std::uint32_t self = tree.members[l * leaf_width + i];
+      gathered.clear();
+      search.visit_within(l, i, largest, [&](std::uint32_t member, float d) {
+        if (member != self) gathered.add(member, d);
+      });
+      write_row(gathered, row_of(l, i));
+      return largest;
+    });
+    done(l);
+  }
+}
+
+}  // namespace orbis::cloud::detail
