@@ -50,7 +50,7 @@ TEST_CASE("a map is the keyframes' surviving points each seen from its own place
       REQUIRE(map.has_value());
       INFO("voxel " << voxel << ": " << to_string(map->filter.mode) << ", " << map->filter.reason);
       CHECK(map->filter.points == map->cloud.size());
-      CHECK(map->filter.removed == map->cloud.size() - map->filtered_cloud.size());
+      CHECK(map->filter.removed == map->cloud.size() - map->filtered_cloud().size());
       CHECK(map->insert_ms.size() == keyframes.size());
       CHECK(map->insert_ms_unfiltered.size() == keyframes.size());
       CHECK_FALSE(map->filter.reason.empty());
@@ -83,8 +83,8 @@ TEST_CASE("a map is the same under every policy") {
     const auto together = build_map(orbis::par.with(threads), scene.keyframes(), scene.camera);
     REQUIRE(together.has_value());
     CHECK(together->cloud.points == alone->cloud.points);
-    CHECK(together->filtered_cloud.points == alone->filtered_cloud.points);
-    CHECK(together->filtered_cloud.colors == alone->filtered_cloud.colors);
+    CHECK(together->filtered_cloud().points == alone->filtered_cloud().points);
+    CHECK(together->filtered_cloud().colors == alone->filtered_cloud().colors);
     CHECK(leaves_of(together->octree) == leaves_of(alone->octree));
   }
 }
@@ -171,7 +171,7 @@ TEST_CASE("keyframes without any depth make an empty map") {
   const auto map = build_map(orbis::seq, scene.keyframes(), scene.camera);
   REQUIRE(map.has_value());
   CHECK(map->cloud.empty());
-  CHECK(map->filtered_cloud.empty());
+  CHECK(map->filtered_cloud().empty());
   CHECK(map->octree.empty());
 }
 

@@ -74,6 +74,31 @@ TEST_CASE("with a voxel size the cloud follows the surface and not the frames") 
   }
 }
 
+TEST_CASE("keyframes that moved by less than a tolerance stay where they are") {
+  auto scene = orbis::test::wall_scene(4);
+  const orbis::camera::ray_table rays{scene.camera};
+  dense_cloud dense{rays, {.stride = 2, .max_depth = 2.5F, .voxel_size = 0.02}};
+  for (std::size_t i = 0; i != 4; ++i) dense.add_keyframe(orbis::seq, scene.keyframe(i));
+  const auto put = scene.poses;
+  const auto turn = [](double angle) {
+    return orbis::se3{orbis::so3::exp(orbis::vec3{0, angle, 0}), orbis::vec3::Zero()};
+  };
+  scene.poses[1] = orbis::se3{orbis::so3{}, orbis::vec3{0.009, 0, 0}} * scene.poses[1];
+  scene.poses[2] = scene.poses[2] * turn(0.002);  // 5 mm at the far end
+  scene.poses[3] = scene.poses[3] * turn(0.006);  // 15 mm: a turn alone counts
+  CHECK(dense.reassemble(orbis::seq, scene.keyframes(), 0.012) == 1);
+  dense_cloud expected{rays, {.stride = 2, .max_depth = 2.5F, .voxel_size = 0.02}};
+  auto there = scene;
+  there.poses = {put[0], put[1], put[2], scene.poses[3]};
+  for (std::size_t i = 0; i != 4; ++i) expected.add_keyframe(orbis::seq, there.keyframe(i));
+  CHECK(dense.cloud().points == expected.cloud().points);
+  // Small steps add up, because the pose that a keyframe was put to is what counts.
+  scene.poses[1] = orbis::se3{orbis::so3{}, orbis::vec3{0.009, 0, 0}} * scene.poses[1];
+  CHECK(dense.reassemble(orbis::seq, scene.keyframes(), 0.012) == 1);
+  CHECK(dense.reassemble(orbis::seq, scene.keyframes()) == 1);
+  CHECK(dense.reassemble(orbis::seq, scene.keyframes()) == 0);
+}
+
 TEST_CASE("a keyframe's measurements are those whose point of the cloud is kept") {
   const auto scene = orbis::test::wall_scene(3);
   const orbis::camera::ray_table rays{scene.camera};
@@ -342,5 +367,25 @@ TEST_CASE("a masked depth image holds the pixels whose point of the cloud is kep
       }
       CHECK(kept > 1000);
     }
+  }
+}
+
+TEST_CASE("a cloud that is read for the last time frees its sums, and masks images as before") {
+  const auto scene = orbis::test::wall_scene(3, 20);
+  orbis::mapping::dense_cloud dense{orbis::camera::ray_table{scene.camera}, {.stride = 1, .voxel_size = 0.03}};
+  for (std::size_t i = 0; i != 3; ++i) dense.add_keyframe(orbis::seq, scene.keyframe(i));
+  const std::size_t size = dense.size();
+  std::vector<char> kept(size, 1);
+  for (std::size_t i = 0; i < size; i += 3) kept[i] = 0;
+  std::vector<decltype(dense.masked_depth(orbis::seq, scene.keyframe(0), 0))> before;
+  for (std::size_t i = 0; i != 3; ++i)
+    before.push_back(dense.masked_depth(orbis::seq, scene.keyframe(i), i, dense.select(kept)));
+  const std::size_t bytes = dense.memory_bytes();
+  dense.finish();
+  CHECK(dense.memory_bytes() + 36 * size <= bytes);
+  CHECK(dense.size() == size);
+  for (std::size_t i = 0; i != 3; ++i) {
+    const auto after = dense.masked_depth(orbis::seq, scene.keyframe(i), i, dense.select(kept));
+    CHECK(std::ranges::equal(after.pixels(), before[i].pixels()));
   }
 }

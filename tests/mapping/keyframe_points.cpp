@@ -95,3 +95,31 @@ TEST_CASE("pixels without a ray, or a depth that is none, give no points") {
   CHECK(seen.size() == wanted - 3);
   for (const auto& s : seen) CHECK(std::isfinite(std::get<2>(s) + std::get<3>(s) + std::get<4>(s)));
 }
+
+TEST_CASE("a depth image is masked in place as into another one") {
+  const auto scene = orbis::test::edge_scene(2);
+  const auto k = scene.keyframe(1);
+  const orbis::camera::ray_table rays{scene.camera};
+  for (const bool flying : {false, true}) {
+    keyframe_point_options options{.stride = 3, .min_depth = 1.0F, .max_depth = 2.1F};
+    if (flying) options.flying_pixels.emplace();
+    keyframe_points reader;
+    const auto masked = reader.masked(orbis::seq, k.depth, rays, options);
+    // What is left are the pixels that are read.
+    options.stride = 1;
+    orbis::image<std::uint16_t> expected(64, 48);
+    reader.read(orbis::seq, k.depth, rays, options, k.T_world_camera,
+                [&](std::size_t, int x, int y, const auto&, float) { expected(x, y) = scene.depth[1](x, y); });
+    auto in_place = scene.depth[1];
+    reader.mask(orbis::par.with(3), orbis::camera::depth_view<std::uint16_t>(in_place.view(), 1000.0), rays, options,
+                in_place.view());
+    int removed = 0;
+    for (int y = 0; y != 48; ++y)
+      for (int x = 0; x != 64; ++x) {
+        REQUIRE(masked(x, y) == expected(x, y));
+        REQUIRE(in_place(x, y) == expected(x, y));
+        removed += scene.depth[1](x, y) != 0 && expected(x, y) == 0 ? 1 : 0;
+      }
+    CHECK(removed > 0);
+  }
+}

@@ -9,6 +9,8 @@
 #include <future>
 #include <limits>
 #include <mutex>
+#include <new>
+#include <stdexcept>
 #include <string>
 #include <thread>
 #include <utility>
@@ -116,9 +118,9 @@ TEST_CASE("A live map in a thread asks for the poses itself, tells what it does,
   std::atomic<std::size_t> voxels{0};
   listeners hear{
       .poll_poses =
-          [&](poses& out, bool always) {
+          [&](mapping::keyframe_beliefs& now, bool always) {
             const std::lock_guard lock{mutex};
-            if (news || always) out = believed;
+            if (news || always) now.poses = believed;
             return std::exchange(news, false) || always;
           },
       .inserted = [&](const auto& e) { insertions.push_back(e); },
@@ -164,6 +166,7 @@ TEST_CASE("A live map in a thread asks for the poses itself, tells what it does,
   CHECK(voxels > 1000);
   REQUIRE(insertions.size() == 5);
   CHECK((insertions[2].frame == 2 && insertions[2].is_keyframe && insertions[2].milliseconds > 0));
+  for (const auto& e : insertions) CHECK(e.delay_milliseconds >= e.milliseconds);
   CHECK((insertions[4].frame == 4 && !insertions[4].is_keyframe));
   CHECK_FALSE(add(map, scene, 5));  // stopped
 }
@@ -192,10 +195,17 @@ TEST_CASE("Frames give way before keyframes where a live map falls behind, and e
   CHECK(add(map, scene, 7));  // instead of 2, 3 and 4
   CHECK_FALSE(add_frame(8));
   CHECK_FALSE(add(map, scene, 9));
-  std::vector<std::pair<std::uint64_t, bool>> told;
-  for (const auto& e : left_out) told.emplace_back(e.frame, e.is_keyframe);
-  CHECK(told == std::vector<std::pair<std::uint64_t, bool>>{
-                    {1, false}, {2, false}, {3, false}, {4, false}, {8, false}, {9, true}});
+  CHECK_FALSE(map.set_depth(0, scene.keyframe(0).depth));
+  using mapping::depth_use;
+  std::vector<std::pair<std::uint64_t, depth_use>> told;
+  for (const auto& e : left_out) told.emplace_back(e.frame, e.use);
+  CHECK(told == std::vector<std::pair<std::uint64_t, depth_use>>{{1, depth_use::frame},
+                                                                 {2, depth_use::frame},
+                                                                 {3, depth_use::frame},
+                                                                 {4, depth_use::frame},
+                                                                 {8, depth_use::frame},
+                                                                 {9, depth_use::keyframe},
+                                                                 {0, depth_use::verdict}});
   go.set_value();
   map.wait();
   const auto counters = map.counters();
@@ -203,6 +213,7 @@ TEST_CASE("Frames give way before keyframes where a live map falls behind, and e
   CHECK(counters.frames == 0);
   CHECK(counters.dropped_frames == 5);
   CHECK(counters.dropped_keyframes == 1);
+  CHECK(counters.dropped_verdicts == 1);
   CHECK(counters.most_waiting == 3);
   poses there;
   for (const std::uint64_t i : {0U, 5U, 6U, 7U}) there.push_back({i, scene.poses[i]});
@@ -224,4 +235,145 @@ TEST_CASE("A live map in a thread tells of lost depth images and goes on") {
   CHECK(ot_bytes(map.latest()->map) == ot_bytes(fresh(scene, there)));
   std::sort(where.begin(), where.begin() + 2);
   CHECK(where == std::vector<std::string>{"frame 1", "frame 2", "keyframe 2"});
+}
+
+TEST_CASE("A live map tells which frames between keyframes it does not take") {
+  const auto scene = test::wall_scene(4);
+  std::vector<mapping::refusal_event> refused;
+  listeners hear{.refused = [&](const auto& e) { refused.push_back(e); }};
+  live map{scene.camera, {.map = {.resolution = 0.05, .max_frames = 3}}, hear};
+  CHECK(add(map, scene, 0));
+  for (const std::size_t i : {1U, 2U}) CHECK(map.add_frame(i, scene.keyframe(i).depth, scene.poses[i], i - 1));
+  map.wait();
+  REQUIRE(refused.size() == 1);
+  CHECK((refused[0].frame == 2 && refused[0].keyframe == 1));
+  CHECK(map.counters().refused_frames == 1);
+  CHECK(map.counters().frames == 1);
+}
+
+TEST_CASE("A live map's thread prepares depth images before they go in") {
+  const auto scene = test::wall_scene(3);
+  const auto caller = std::this_thread::get_id();
+  bool elsewhere = true;
+  std::vector<mapping::depth_use> uses;
+  listeners hear{.prepare = [&](std::uint64_t, mapping::depth_use use, image_view<std::uint16_t> pixels) {
+    elsewhere = elsewhere && std::this_thread::get_id() != caller;
+    uses.push_back(use);
+    for (int y = 0; y != pixels.height(); ++y)
+      for (int x = 0; x != 20; ++x) pixels(x, y) = 0;
+  }};
+  live map{scene.camera, {.map = {.resolution = 0.05, .max_frames = 3}}, hear};
+  CHECK(add(map, scene, 0));
+  CHECK(map.add_frame(1, scene.keyframe(1).depth, scene.poses[1], 0));
+  CHECK(map.set_depth(0, scene.keyframe(2).depth));
+  map.wait();
+  using mapping::depth_use;
+  CHECK(elsewhere);
+  CHECK(uses == std::vector{depth_use::keyframe, depth_use::frame, depth_use::verdict});
+  octree_type expected{0.05};
+  image<std::uint16_t> pixels = scene.depth[2];
+  for (int y = 0; y != pixels.height(); ++y)
+    for (int x = 0; x != 20; ++x) pixels(x, y) = 0;
+  expected.integrate(camera::depth_view<std::uint16_t>(pixels.view(), 1000.0), scene.camera, scene.poses[0]);
+  map.finish();
+  CHECK(ot_bytes(map.latest()->map) == ot_bytes(expected));
+}
+
+TEST_CASE("Keyframes that will never come back lose their depth images, hidden ones keep them") {
+  const auto scene = test::wall_scene(5);
+  std::promise<void> begun, go;
+  std::shared_future<void> wait_for_go = go.get_future().share();
+  std::mutex mutex;
+  mapping::keyframe_beliefs believed;
+  listeners hear{.poll_poses =
+                     [&](mapping::keyframe_beliefs& now, bool) {
+                       const std::lock_guard lock{mutex};
+                       now = believed;
+                       return true;
+                     },
+                 .inserted =
+                     [&](const mapping::insertion_event& e) {
+                       if (e.frame != 2) return;
+                       begun.set_value();
+                       wait_for_go.wait();
+                     }};
+  live map{scene.camera, {.map = {.resolution = 0.05}}, hear};
+  for (const std::size_t i : {0U, 1U, 2U}) CHECK(add(map, scene, i));
+  begun.get_future().wait();
+  CHECK(add(map, scene, 3));  // gone before the map has seen it
+  CHECK(add(map, scene, 4));
+  {
+    const std::lock_guard lock{mutex};
+    believed = {.poses = {{0, scene.poses[0]}, {4, scene.poses[4]}}, .removed = {1, 3}};
+  }
+  go.set_value();
+  map.wait();
+  map.finish();
+  CHECK(ot_bytes(map.latest()->map) == ot_bytes(fresh(scene, {{0, scene.poses[0]}, {4, scene.poses[4]}})));
+  const auto& images = map.stop().depths().images;
+  CHECK(images.size() == 3);
+  CHECK((images.contains(0) && images.contains(2) && images.contains(4)));
+}
+
+TEST_CASE("An exception on a live map's thread ends it in order") {
+  const auto scene = test::wall_scene(6);
+  const auto throws_at = [&](auto what, bool tells) {
+    std::vector<std::string> told;
+    listeners hear{.prepare =
+                       [&](std::uint64_t frame, mapping::depth_use, image_view<std::uint16_t>) {
+                         if (frame == 2) what();
+                       },
+                   .failed =
+                       [&](const error& e) {
+                         told.push_back(e.to_string());
+                         if (!tells) throw 3;
+                       }};
+    live map{scene.camera, {.map = {.resolution = 0.05}, .max_waiting = 2, .patience = 60s}, hear};
+    bool all = true;
+    for (std::size_t i = 0; i != 6; ++i) all = add(map, scene, i) && all;  // nobody waits for a thread that ended
+    map.wait();
+    map.finish();
+    CHECK_FALSE(add(map, scene, 5));
+    CHECK_FALSE(all);
+    const auto why = map.failure();
+    REQUIRE(why);
+    CHECK(why->code == errc::exception);
+    map.stop();
+    CHECK(told == std::vector{why->to_string()});
+    // What readers see is what was there before.
+    CHECK(ot_bytes(map.latest()->map) == ot_bytes(fresh(scene, {{0, scene.poses[0]}, {1, scene.poses[1]}})));
+    return why->message;
+  };
+  CHECK(throws_at([] { throw std::bad_alloc{}; }, true) == std::bad_alloc{}.what());
+  CHECK(throws_at([] { throw std::runtime_error{"a longer text than fits into a string itself"}; }, true) ==
+        "a longer text than fits into a string itself");
+  CHECK(throws_at([] { throw 3; }, false) == "unknown");
+
+  live fine{scene.camera, {.map = {.resolution = 0.05}}};
+  CHECK(add(fine, scene, 0));
+  fine.finish();
+  CHECK_FALSE(fine.failure());
+}
+
+TEST_CASE("Poses told while a live map is busy are those of the last call") {
+  const auto scene = test::wall_scene(3);
+  std::promise<void> begun, go;
+  std::shared_future<void> wait_for_go = go.get_future().share();
+  listeners hear{.inserted = [&](const mapping::insertion_event& e) {
+    if (e.frame != 0) return;
+    begun.set_value();
+    wait_for_go.wait();
+  }};
+  live map{scene.camera, {.map = {.resolution = 0.05}}, hear};
+  for (const std::size_t i : {0U, 1U, 2U}) CHECK(add(map, scene, i));
+  begun.get_future().wait();
+  for (int turn = 0; turn != 2000; ++turn)
+    map.set_poses(
+        {{static_cast<std::uint64_t>(turn % 3), shifted(scene, 3, 0.001 * turn, 0.0)[turn % 3].T_world_camera}});
+  map.remove(1);
+  go.set_value();
+  map.finish();
+  const poses last{{0, shifted(scene, 3, 0.001 * 1998, 0.0)[0].T_world_camera},
+                   {2, shifted(scene, 3, 0.001 * 1997, 0.0)[2].T_world_camera}};
+  CHECK(ot_bytes(map.latest()->map) == ot_bytes(fresh(scene, last)));
 }

@@ -113,6 +113,40 @@ TEST_CASE("Whoever follows the keyframes' poses is told of each change, and of n
   CHECK(changes < 30);  // most frames make no keyframe
 }
 
+TEST_CASE("Whoever shows the last frame gets its features, which of them are tracked, and what its pose follows") {
+  const auto& [camera, recorded] = small_room();
+  test::slam_system slam{camera};
+  CHECK_FALSE(slam.last_frame());
+  for (std::size_t i = 0; i < 30; ++i) {
+    const auto r = slam.track(recorded[i]);
+    const auto shown = slam.last_frame();
+    REQUIRE(shown);
+    std::size_t tracked = 0;
+    bool inside = true;
+    for (const auto& f : shown->features) {
+      tracked += f.tracked ? 1 : 0;
+      inside = inside && f.x >= 0.0F && f.y >= 0.0F && f.x < 320.0F && f.y < 240.0F;
+    }
+    CHECK(inside);
+    CHECK(shown->features.size() > 300);
+    // A keyframe's new landmarks are none that were tracked: the first frame has tracked none.
+    if (i == 0)
+      CHECK(tracked == 0);
+    else
+      CHECK(tracked >= r.inliers);
+    CHECK(tracked < shown->features.size());
+    const se3 pose = slam.inspect([&](const slam::atlas& maps) {
+      const auto now = maps.current(shown->reference);
+      return maps.at(now.map).pose_of(now.keyframe) * shown->T_reference_camera;
+    });
+    CHECK((pose.inverse() * *r.T_world_camera).log().norm() < 1e-12);
+  }
+  camera::rgbd_frame dark = recorded[30];
+  dark.color = image<rgb8>(320, 240);
+  CHECK_FALSE(slam.track(dark).tracked());
+  CHECK_FALSE(slam.last_frame());
+}
+
 TEST_CASE("The first pose is the identity unless the caller knows better") {
   const auto& [camera, recorded] = small_room();
   test::slam_system at_origin{camera};
@@ -140,7 +174,13 @@ TEST_CASE("A map begins where the caller says by then") {
   }
   CHECK((slam.trajectory().front().T_world_camera.inverse() * here).log().norm() < 1e-12);
 
-  // Another room, which looks like nothing before: after a while it is a map of its own.
+  // Another room, which looks like nothing before: after a while it is a map of its own. Whoever has to find out where
+  // it begins is asked then, and not for frames that begin none.
+  int asked = 0;
+  slam.set_initial_pose([&] {
+    ++asked;
+    return there;
+  });
   const io::synthetic_recording elsewhere{
       {.frames = 60, .seed = 77, .width = camera.width(), .height = camera.height(), .frames_around = 360}};
   std::optional<se3> first;
@@ -150,7 +190,29 @@ TEST_CASE("A map begins where the caller says by then") {
     if (const slam::track_result r = slam.track(frame); r.tracked()) first = r.T_world_camera;
   }
   REQUIRE(first);
+  CHECK(asked == 1);
   CHECK((first->inverse() * there).log().norm() < 1e-12);
+}
+
+TEST_CASE("A tracked frame names the keyframe that its pose follows") {
+  const auto& [camera, recorded] = small_room();
+  test::slam_system slam{camera};
+  std::size_t others = 0;
+  for (std::size_t i = 0; i < 30; ++i) {
+    const slam::track_result r = slam.track(recorded[i]);
+    REQUIRE(r.reference);
+    if (r.keyframe) CHECK(*r.reference == *r.keyframe);
+    const double distance = slam.inspect([&](const slam::atlas& maps) {
+      const se3 reference = maps.at(r.map).pose_of(*r.reference);
+      return (reference.inverse() * *r.T_world_camera).translation().norm();
+    });
+    CHECK(distance < 0.5);
+    others += r.keyframe ? 0U : 1U;
+  }
+  CHECK(others > 10);
+  camera::rgbd_frame dark = recorded[30];
+  dark.color = image<rgb8>(dark.color.width(), dark.color.height());
+  CHECK_FALSE(slam.track(dark).reference);
 }
 
 TEST_CASE("Two runs over the same frames give the same bytes") {

@@ -24,6 +24,7 @@ void slam_system::listen(slam::listeners all) { held_->system.listen(std::move(a
 slam::track_result slam_system::track(const camera::rgbd_frame& f) { return held_->system.track(f); }
 void slam_system::wait() const { held_->system.wait(); }
 slam::track_state slam_system::state() const { return held_->system.state(); }
+void slam_system::set_initial_pose(std::function<se3()> find) { held_->system.set_initial_pose(std::move(find)); }
 bool slam_system::localizes_only() const { return held_->system.localizes_only(); }
 void slam_system::set_localization_only(bool on) { held_->system.set_localization_only(on); }
 void slam_system::set_initial_pose(const se3& T_world_camera) { held_->system.set_initial_pose(T_world_camera); }
@@ -33,6 +34,7 @@ std::vector<slam::keyframe_pose> slam_system::keyframes() const { return held_->
 std::optional<std::vector<slam::keyframe_pose>> slam_system::keyframes_since(slam::pose_revision& seen) const {
   return held_->system.keyframes_since(seen);
 }
+std::optional<slam::tracked_frame> slam_system::last_frame() const { return held_->system.last_frame(); }
 orbis::trajectory slam_system::keyframe_trajectory() const { return held_->system.keyframe_trajectory(); }
 std::size_t slam_system::landmark_count() const { return held_->system.landmark_count(); }
 slam::track_counters slam_system::counters() const { return held_->system.counters(); }

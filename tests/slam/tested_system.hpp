@@ -34,10 +34,12 @@ class slam_system {
   [[nodiscard]] bool localizes_only() const;
   void set_localization_only(bool on);
   void set_initial_pose(const se3& T_world_camera);
+  void set_initial_pose(std::function<se3()> find);
   [[nodiscard]] orbis::trajectory trajectory() const;
   [[nodiscard]] orbis::trajectory trajectory(slam::map_id map) const;
   [[nodiscard]] std::vector<slam::keyframe_pose> keyframes() const;
   [[nodiscard]] std::optional<std::vector<slam::keyframe_pose>> keyframes_since(slam::pose_revision& seen) const;
+  [[nodiscard]] std::optional<slam::tracked_frame> last_frame() const;
   [[nodiscard]] orbis::trajectory keyframe_trajectory() const;
   [[nodiscard]] std::size_t landmark_count() const;
   [[nodiscard]] slam::track_counters counters() const;

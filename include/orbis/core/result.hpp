@@ -24,7 +24,8 @@ enum class errc {
   invalid_argument,  ///< a value outside what the function accepts
   no_data,           ///< nothing to work on: an empty cloud, list or trajectory
   degenerate,        ///< geometry that does not determine the answer
-  cancelled          ///< the progress callback asked to stop
+  cancelled,         ///< the progress callback asked to stop
+  exception          ///< an exception ended the work of a thread: want of memory, or one that a callback threw
 };
 
 /// The name of a kind of failure, e.g. "malformed".
@@ -39,6 +40,7 @@ enum class errc {
     case errc::no_data: return "no data";
     case errc::degenerate: return "degenerate";
     case errc::cancelled: return "cancelled";
+    case errc::exception: return "exception";
   }
   return "unknown";
 }

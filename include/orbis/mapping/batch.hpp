@@ -56,13 +56,15 @@ struct built_map {
   point_cloud cloud{};                        ///< all keyframes' points, in the world
   cloud::flying_pixel_count flying_pixels{};  ///< left out before they became points, if that was asked for
   std::vector<std::uint32_t> inliers{};       ///< indices into `cloud` of the points that the filter kept, ascending
-  point_cloud filtered_cloud{};               ///< those points
   filter_report filter{};
   std::optional<Octree> unfiltered_octree{};
   Octree octree;                               ///< of the points that the filter kept, each seen from its own keyframe
   std::vector<double> insert_ms{};             ///< into `octree`, for each keyframe
   std::vector<double> insert_ms_unfiltered{};  ///< into `unfiltered_octree`, for each keyframe, if it is built
   std::size_t skipped = 0;                     ///< keyframes without a finite pose
+
+  /// The points that the filter kept, copied.
+  [[nodiscard]] point_cloud filtered_cloud() const { return cloud::extract(cloud, inliers); }
 };
 
 namespace detail {
@@ -118,6 +120,8 @@ template <class Octree, execution_policy Policy, keyframe_range Keyframes, camer
   }
 
   map.cloud = dense.cloud(policy);
+  std::vector<float> ranges = dense.ranges(policy);
+  dense.finish();
   map.flying_pixels = dense.flying_pixels();
   bool cancelled = false;
   const auto while_filtering = [&](std::size_t views_done, std::size_t) {
@@ -125,12 +129,12 @@ template <class Octree, execution_policy Policy, keyframe_range Keyframes, camer
     return !cancelled;
   };
   filtered_indices filtered =
-      filter_points(policy, map.cloud.points, dense.ranges(policy), keyframes, camera, options.filter, while_filtering);
+      filter_points(policy, map.cloud.points, ranges, keyframes, camera, options.filter, while_filtering);
   if (cancelled) return fail(errc::cancelled, {}, "cancelled");
+  std::vector<float>{}.swap(ranges);
   done += looks * std::ranges::size(keyframes);
   map.filter = std::move(filtered.report);
   map.inliers = std::move(filtered.inliers);
-  map.filtered_cloud = cloud::extract(map.cloud, map.inliers);
   std::vector<char> kept(map.cloud.size(), 0);
   for (const std::uint32_t i : map.inliers) kept[i] = 1;
 
@@ -161,7 +165,7 @@ template <class Octree, execution_policy Policy, keyframe_range Keyframes, camer
     if (!octree) return fail(std::move(octree.error()));
     map.unfiltered_octree.emplace(*std::move(octree));
   }
-  if (auto scanned = scan_all(true, dense.select(kept), map.insert_ms); !scanned)
+  if (auto scanned = scan_all(true, dense.select(std::move(kept)), map.insert_ms); !scanned)
     return fail(std::move(scanned.error()));
   auto octree = into.complete(true);
   if (!octree) return fail(std::move(octree.error()));
@@ -206,7 +210,7 @@ struct live_octree {
     if (!poses.empty() && !(poses.back().frame < k.frame))
       return fail(errc::invalid_argument, "keyframes", "their frame numbers do not ascend");
     poses.push_back({k.frame, se3(k.T_world_camera)});
-    return !live.contains(k.frame);
+    return !live.contains(k.frame) || live.is_filtered(k.frame);
   }
   template <class Keyframe, class Depth>
   result<void> scan(bool filtered, const Keyframe& k, const Depth& depth) {
@@ -257,8 +261,8 @@ requires depth_map<Octree, Camera>
 /// `options.resolution` and `options.integration` are those of the live map, and the unfiltered octree is always made.
 /// Errors, in addition: `invalid_argument` if the frame numbers do not ascend; those of the live map, but for images
 /// that stay in memory because they cannot be written to their file. @pre what the live map has was added with the
-/// depth that `keyframe_points::masked` leaves under `point_options(options.dense)`, and no filter's verdict was taken
-/// over yet
+/// depth that `keyframe_points::masked` leaves under `point_options(options.dense)`, but for keyframes that are
+/// `live_map::is_filtered`, which get it again
 template <execution_policy Policy, keyframe_range Keyframes, octree::replayable_octree Octree,
           camera::camera_model Camera, depth_history Depths>
 requires requires(const std::ranges::range_value_t<Keyframes>& k) {

@@ -22,6 +22,7 @@
 #include <orbis/core/image.hpp>
 #include <orbis/core/point_cloud.hpp>
 #include <orbis/core/types.hpp>
+#include <orbis/mapping/detail/live/view_frustum.hpp>
 #include <orbis/mapping/keyframe.hpp>
 #include <orbis/mapping/keyframe_points.hpp>
 #include <orbis/mapping/masked_depth.hpp>
@@ -46,9 +47,9 @@ struct dense_options {
 ///
 /// With a voxel size, memory follows the surface that is seen (about 50 bytes for each voxel, and 20 for
 /// each measurement of the largest keyframe), without one the number of measurements. Either way the cloud is a
-/// function of the keyframes and the poses they have now: after corrections it is, byte for byte, the one that would
-/// have been built with the corrected poses from the start. With a voxel size not even the order of the keyframes
-/// matters.
+/// function of the keyframes and the poses they were put to last: after corrections without a tolerance it is, byte for
+/// byte, the one that would have been built with the corrected poses from the start. With a voxel size not even the
+/// order of the keyframes matters.
 class dense_cloud {
  public:
   /// @pre options.stride > 0, options.voxel_size >= 0
@@ -89,15 +90,22 @@ class dense_cloud {
     remove(policy, k, number);
     put(policy, k, number);
   }
-  /// Moves all keyframes whose pose has changed in any bit; returns how many. `keyframes`: all that were
-  /// added, in that order; those that were removed are passed over. O(pixels of those that moved).
+  /// Moves all keyframes whose pose has changed since they were put where they are: in any bit, or, with a `tolerance`
+  /// (metres, >= 0), so far that a point of their view moves by more than that. Returns how many. `keyframes`: all that
+  /// were added, in that order; those that were removed are passed over. O(pixels of those that moved).
   template <execution_policy Policy, keyframe_range Keyframes>
-  std::size_t reassemble(const Policy& policy, const Keyframes& keyframes) {
-    assert(std::ranges::size(keyframes) == frames_.size());
+  std::size_t reassemble(const Policy& policy, const Keyframes& keyframes, double tolerance = 0.0) {
+    assert(std::ranges::size(keyframes) == frames_.size() && tolerance >= 0);
+    std::optional<detail::view_frustum> view;
+    if (tolerance > 0) view.emplace(rays_);
+    const auto has_moved = [&](const se3& before, const se3& now) {
+      if (before.to_matrix() == now.to_matrix()) return false;
+      return !view || !(view->displacement(before, now, static_cast<double>(options_.max_depth)) <= tolerance);
+    };
     std::size_t moved = 0;
     std::size_t number = 0;
     for (const auto& k : keyframes) {
-      if (contains(number) && se3(k.T_world_camera).to_matrix() != frames_[number].T_world_camera.to_matrix()) {
+      if (contains(number) && has_moved(frames_[number].T_world_camera, se3(k.T_world_camera))) {
         move(policy, k, number);
         ++moved;
       }
@@ -135,6 +143,13 @@ class dense_cloud {
     for (const frame& f : frames_) out.insert(out.end(), f.ranges.begin(), f.ranges.end());
     return out;
   }
+  /// Says that the cloud and the ranges were read for the last time, and no keyframe will come, go or move: what these
+  /// need is freed. With a voxel size a few bytes for each voxel are left, for `select`, `masked_depth` and
+  /// `measurements`; without one nothing is freed.
+  void finish() {
+    voxels_.finish();
+    std::vector<cloud::voxel_measurements>{}.swap(parts_);
+  }
   /// How many pixels of the keyframes' whole images were looked at, and how many of them were left out.
   [[nodiscard]] cloud::flying_pixel_count flying_pixels() const noexcept {
     cloud::flying_pixel_count sum;
@@ -168,10 +183,10 @@ class dense_cloud {
     std::vector<std::size_t> first_of_frame_;
   };
   /// `kept`: one entry for each point of the cloud, not 0 where it is kept.
-  [[nodiscard]] selection select(std::span<const char> kept) const {
+  [[nodiscard]] selection select(std::vector<char> kept) const {
     assert(kept.size() == size());
     selection out;
-    out.kept_.assign(kept.begin(), kept.end());
+    out.kept_ = std::move(kept);
     if (merging()) {
       out.places_ = voxels_.in_order();
     } else {

@@ -105,6 +105,8 @@ class depth_store {
   }
 
   [[nodiscard]] bool contains(std::uint64_t frame) const { return entries_.contains(frame); }
+  /// Frees the memory that `put` works in; the next call of it gets it again.
+  void free_buffers() { encoder_ = {}; }
   /// How many images there are.
   [[nodiscard]] std::size_t size() const noexcept { return entries_.size(); }
   /// Of the compressed images that are in memory.

@@ -49,10 +49,7 @@ class keyframe_points {
                                  const keyframe_point_options& options, const se3& T_world_camera, F&& f) {
     assert(depth.width() == rays.width() && depth.height() == rays.height() && options.stride > 0);
     if (options.flying_pixels) {
-      if (filtered_.width() != rays.width() || filtered_.height() != rays.height())
-        filtered_ = image<float>(rays.width(), rays.height());
-      const auto count =
-          cloud::remove_flying_pixels(policy, depth, filtered_.view(), *options.flying_pixels, workspace_);
+      const auto count = remove_flying(policy, depth, rays, options);
       read_all(policy, camera::depth_view<float>(filtered_.view()), rays, options, T_world_camera, f);
       return count;
     }
@@ -63,17 +60,51 @@ class keyframe_points {
   /// stride: what `dense_cloud::masked_depth` gives before a filter of the cloud. O(pixels). @pre as for `read`
   template <execution_policy Policy, camera::depth_source Depth>
   [[nodiscard]] image<depth_pixel<Depth>> masked(const Policy& policy, const Depth& depth,
-                                                 const camera::ray_table& rays, keyframe_point_options options) {
-    options.stride = 1;
+                                                 const camera::ray_table& rays, const keyframe_point_options& options) {
     image<depth_pixel<Depth>> out(rays.width(), rays.height());
-    read(policy, depth, rays, options, se3{},
-         [&](std::size_t, int x, int y, const vec3f&, float) { out(x, y) = stored_depth(depth, x, y); });
+    mask(policy, depth, rays, options, out.view());
     return out;
+  }
+  /// The same into `out`, which may be the pixels of `depth` itself. @pre `out` has the size of `depth`
+  template <execution_policy Policy, camera::depth_source Depth>
+  void mask(const Policy& policy, const Depth& depth, const camera::ray_table& rays,
+            const keyframe_point_options& options, image_view<depth_pixel<Depth>> out) {
+    const auto keep = [&](const auto& valid) {
+      for_each_index(policy, static_cast<std::size_t>(rays.height()), rows_of_part, [&](std::size_t row) {
+        const int y = static_cast<int>(row);
+        for (int x = 0; x != rays.width(); ++x) {
+          const float z = valid(x, y);
+          const bool is_point = is_in_range(z, options) && std::isfinite(squared_norm(rays.at(x, y, z)));
+          out(x, y) = is_point ? stored_depth(depth, x, y) : depth_pixel<Depth>{};
+        }
+      });
+    };
+    if (options.flying_pixels) {
+      static_cast<void>(remove_flying(policy, depth, rays, options));
+      keep(camera::depth_view<float>(filtered_.view()));
+    } else {
+      keep(depth);
+    }
   }
 
  private:
   static constexpr int rows_of_part = 8;
 
+  [[nodiscard]] static bool is_in_range(float z, const keyframe_point_options& options) noexcept {
+    return z > 0.0F && z >= options.min_depth && z <= options.max_depth;
+  }
+  /// Not finite for a pixel without a ray.
+  [[nodiscard]] static float squared_norm(const vec3f& p) noexcept {
+    return (rounded_product(p[0], p[0]) + rounded_product(p[1], p[1])) + rounded_product(p[2], p[2]);
+  }
+  /// Fills `filtered_`.
+  template <execution_policy Policy, camera::depth_source Depth>
+  cloud::flying_pixel_count remove_flying(const Policy& policy, const Depth& depth, const camera::ray_table& rays,
+                                          const keyframe_point_options& options) {
+    if (filtered_.width() != rays.width() || filtered_.height() != rays.height())
+      filtered_ = image<float>(rays.width(), rays.height());
+    return cloud::remove_flying_pixels(policy, depth, filtered_.view(), *options.flying_pixels, workspace_);
+  }
   template <execution_policy Policy, camera::depth_source Depth, class F>
   static void read_all(const Policy& policy, const Depth& depth, const camera::ray_table& rays,
                        const keyframe_point_options& options, const se3& T_world_camera, F&& f) {
@@ -83,12 +114,9 @@ class keyframe_points {
       for (int y = first; y < std::min(rays.height(), first + rows_of_part * options.stride); y += options.stride) {
         for (int x = 0; x < rays.width(); x += options.stride) {
           const float z = depth(x, y);
-          if (!(z > 0.0F && z >= options.min_depth && z <= options.max_depth)) continue;
-          const vec3f in_camera = rays.at(x, y, z);
-          const float squared = (rounded_product(in_camera[0], in_camera[0]) +  //
-                                 rounded_product(in_camera[1], in_camera[1])) +
-                                rounded_product(in_camera[2], in_camera[2]);
-          if (!std::isfinite(squared)) continue;  // a pixel without a ray
+          if (!is_in_range(z, options)) continue;
+          const float squared = squared_norm(rays.at(x, y, z));
+          if (!std::isfinite(squared)) continue;
           const vec2f& ray = rays(x, y);
           const auto p = camera::world_point(pose, ray.x(), ray.y(), z);
           f(part, x, y, vec3f{p[0], p[1], p[2]}, std::sqrt(squared));

@@ -70,6 +70,9 @@ concept keyframe_position_like = requires(const P& p) {
 /// until they are given a pose again, as those of another map of the atlas are.
 enum class unlisted { keep, hide };
 
+/// Whether the depth image of a keyframe is what the camera measured, or without pixels that a filter has judged.
+enum class completeness { complete, filtered };
+
 /// How far to go in one call of live_map::correct.
 struct correction_limits {
   /// A keyframe or a few dozen bricks that were begun are finished.
@@ -113,15 +116,17 @@ class live_map {
   /// Adds a keyframe, or gives one that is there another depth image and pose. `frame`: the index of its frame, which
   /// orders keyframes; `depth`: as it goes into the map, without the pixels that a filter removed; `T_world_camera`: if
   /// it is not finite, the keyframe waits for a pose outside of the map. The newest keyframe is in the map at once.
-  /// Error: that of `Depths::put`; the keyframe is in the map even so.
+  /// `what` is only noted, see is_filtered. Error: that of `Depths::put`; the keyframe is in the map even so.
   /// O(marking, see octree::scan_marker) and Depths::put. @pre depth has the camera's size
   template <execution_policy Policy>
   result<octree::integration_summary> add_keyframe(const Policy& policy, std::uint64_t frame, const depth_view& depth,
-                                                   const se3& T_world_camera) {
+                                                   const se3& T_world_camera,
+                                                   completeness what = completeness::complete) {
     assert(depth.width() == camera_.width() && depth.height() == camera_.height());
     std::erase_if(frames_, [&](const transient& t) { return t.frame == frame; });  // it becomes a keyframe
     entry& k = make(frame);
     if (k.used) drop_frames_of(frame);
+    k.filtered = what == completeness::filtered;
     k.scale = depth.scale();
     k.min_depth = depth.min_depth();
     k.max_depth = depth.max_depth();
@@ -145,7 +150,8 @@ class live_map {
     const entry* const k = find(frame);
     if (k == nullptr) return fail(errc::not_found, "keyframe " + std::to_string(frame), "there is no such keyframe");
     const se3 pose = k->wanted ? *k->wanted : se3{so3{}, vec3::Constant(std::numeric_limits<double>::quiet_NaN())};
-    if (auto added = add_keyframe(policy, frame, depth, pose); !added) return fail(std::move(added.error()));
+    if (auto added = add_keyframe(policy, frame, depth, pose, completeness::filtered); !added)
+      return fail(std::move(added.error()));
     return {};
   }
   /// Adds a frame between keyframes, whose pose was measured relative to `keyframe`. It makes the map denser in time,
@@ -276,6 +282,12 @@ class live_map {
     const entry* const k = find(frame);
     return k == nullptr ? std::nullopt : k->used;
   }
+  /// Whether a keyframe's depth image is without pixels that a filter has judged: it was given by `set_depth`, or said
+  /// to be so by `add_keyframe`. O(log keyframes).
+  [[nodiscard]] bool is_filtered(std::uint64_t frame) const noexcept {
+    const entry* const k = find(frame);
+    return k != nullptr && k->filtered;
+  }
   /// Bytes on the heap, without those of `Depths`. O(bricks + keyframes).
   [[nodiscard]] std::size_t bytes() const noexcept {
     std::size_t n = history_.bytes() + history_.buffer_bytes() + map().memory_bytes() + map().buffer_bytes() +
@@ -295,6 +307,7 @@ class live_map {
     float min_depth = 0.0F, max_depth = 0.0F;
     double reach = 0.0;  ///< the largest depth that counts, metres
     bool waiting = false;
+    bool filtered = false;
     std::uint64_t listed = 0;  ///< the last call of set_poses that named it
   };
   struct transient {

@@ -15,13 +15,17 @@
 /// Instead of being told poses, the thread can ask a SLAM system for them:
 ///
 /// @code
-///   listeners.poll_poses = [&slam, seen = orbis::slam::pose_revision{}](auto& poses, bool always) mutable {
+///   listeners.poll_poses = [&slam, seen = orbis::slam::pose_revision{}](auto& now, bool always) mutable {
 ///     if (always) seen.map = orbis::slam::no_id;
-///     const auto now = slam.keyframes_since(seen);
-///     if (now) for (const auto& k : *now) poses.push_back({k.frame, k.T_world_camera});
-///     return now.has_value();
+///     const auto present = slam.keyframes_since(seen);
+///     if (present) for (const auto& k : *present) now.poses.push_back({k.frame, k.T_world_camera});
+///     return present.has_value();
 ///   };
+///   ...
+///   slam.listen({.keyframe_culled = [&map](const auto& e) { map.remove(e.frame); }});
 /// @endcode
+///
+/// Without the last line, a culled keyframe would be hidden, and its depth image kept in case that it comes back.
 #pragma once
 
 #include <algorithm>
@@ -29,9 +33,7 @@
 #include <condition_variable>
 #include <cstddef>
 #include <cstdint>
-#include <deque>
-#include <functional>
-#include <limits>
+#include <exception>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -46,9 +48,12 @@
 #include <orbis/core/result.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/core/types.hpp>
+#include <orbis/mapping/depth_history.hpp>
 #include <orbis/mapping/depth_store.hpp>
+#include <orbis/mapping/detail/live/map_jobs.hpp>
 #include <orbis/mapping/live_map.hpp>
-#include <orbis/octree/change_log.hpp>
+#include <orbis/mapping/live_map_events.hpp>
+#include <orbis/mapping/moving_filter.hpp>
 
 namespace orbis::mapping {
 
@@ -61,65 +66,14 @@ struct live_map_thread_options {
   /// A correction goes on for this long before keyframes that came meanwhile are inserted.
   std::chrono::microseconds correction_slice{5000};
   std::chrono::milliseconds poll_interval{30};  ///< between two calls of live_map_listeners::poll_poses
-};
-
-/// The map at one moment. It does not change any more.
-template <class Octree>
-struct live_map_snapshot {
-  Octree map;
-  std::uint64_t revision = 0;  ///< of the change log
-  std::size_t keyframes = 0;   ///< that were added and not removed
-  std::size_t frames = 0;      ///< between keyframes, in the map
-  std::size_t pending = 0;     ///< keyframes and bricks that wait for a correction; 0: the map is right
-};
-
-/// A keyframe or frame went into the map.
-struct insertion_event {
-  std::uint64_t frame = 0;
-  bool is_keyframe = false;
-  double milliseconds = 0.0;  ///< wall time
-  std::size_t waiting = 0;    ///< keyframes and frames that still wait
-};
-/// A keyframe or frame was left out, because too many were waiting.
-struct overflow_event {
-  std::uint64_t frame = 0;
-  bool is_keyframe = false;
-};
-/// Nothing waits for a correction any more.
-struct live_correction_event {
-  std::size_t keyframes = 0;  ///< moved
-  std::size_t bricks = 0;     ///< brought up to date
-  double milliseconds = 0.0;  ///< wall time that it took, without insertions between its parts
-};
-
-/// Callbacks; any of them may be empty. All but `overflowed` are called on the map's thread, and `published` for the
-/// first, empty map by the constructor. They must not throw, wait for the map, or destroy it.
-template <class Octree>
-struct live_map_listeners {
-  /// Fills in the present poses of all keyframes (the others are hidden) and returns true, or returns false if they are
-  /// what they were at the last call; with `always`, fills them in whatever they are.
-  std::function<bool(std::vector<keyframe_position>& poses, bool always)> poll_poses{};
-  std::function<void(const insertion_event&)> inserted{};
-  std::function<void(const overflow_event&)> overflowed{};  ///< on the thread that adds
-  std::function<void(const live_correction_event&)> corrected{};
-  /// A new snapshot, and the log of what changed up to it; the log may be read during the call.
-  std::function<void(const live_map_snapshot<Octree>&, const octree::change_log&)> published{};
-  std::function<void(const error&)> failed{};  ///< a depth image could not be kept or read, see live_map
-};
-
-struct live_map_counters {
-  std::size_t keyframes = 0;          ///< inserted
-  std::size_t frames = 0;             ///< inserted, between keyframes
-  std::size_t dropped_keyframes = 0;  ///< left out because too many were waiting
-  std::size_t dropped_frames = 0;     ///< the same, between keyframes
-  std::size_t corrections = 0;        ///< finished
-  std::size_t most_waiting = 0;       ///< keyframes and frames, at any time
+  /// Takes out what has moved away, see moving_filter; empty: everything stays.
+  std::optional<moving_filter_options> moving{};
 };
 
 /// A live_map with a thread and a bounded queue. What is asked for is done in order; corrections go on, in slices,
 /// while nothing else waits, and one slice after each insertion. Where the queue is full, frames between keyframes give
-/// way first, the oldest of them; then `add_keyframe` waits for a while; then the keyframe is left out. Both are
-/// counted and told.
+/// way first, the oldest of them; then `add_keyframe` waits for a while; then the keyframe is left out. All of it is
+/// counted and told. Poses that come faster than they are taken are merged.
 ///
 /// All member functions may be called from any thread, but `stop` and the destructor from one only.
 template <octree::replayable_octree Octree, camera::camera_model Camera, depth_history Depths = depth_store>
@@ -136,6 +90,7 @@ class live_map_thread {
         policy_{par.with(options.threads)},
         listeners_{std::move(listeners)},
         map_{std::move(camera), options.map, std::move(depths)} {
+    if (options_.moving) moving_.emplace(map_.camera(), *options_.moving);
     publish();
     thread_ = std::thread{[this] { run(); }};
   }
@@ -146,30 +101,28 @@ class live_map_thread {
 
   // -- what goes in
 
-  /// Adds a keyframe, see live_map::add_keyframe; the images are copied. False if it was left out: too many keyframes
-  /// wait, or the thread was stopped. O(pixels), and at most `patience` of waiting. @pre depth has the camera's size
+  /// Adds a keyframe, see live_map::add_keyframe; the image is copied, and goes through `prepare` on the map's thread.
+  /// False if it was left out: too many keyframes wait, or the thread ended. O(pixels), and at most `patience` of
+  /// waiting. @pre depth has the camera's size
   bool add_keyframe(std::uint64_t frame, const depth_view& depth, const se3& T_world_camera) {
-    job j{.kind = job::keyframe, .frame = frame, .T_world_camera = T_world_camera};
-    return add_scan(std::move(j), depth);
+    return add_scan({.kind = job::keyframe, .frame = frame, .T_world_camera = T_world_camera}, depth);
   }
-  /// Adds a frame between keyframes, see live_map::add_frame; the image is copied. Never waits. False if it was left
-  /// out. O(pixels). @pre depth has the camera's size
+  /// Adds a frame between keyframes, see live_map::add_frame, as above. Never waits. False if it was left out; whether
+  /// the map takes it is told by `refused`. O(pixels). @pre depth has the camera's size
   bool add_frame(std::uint64_t frame, const depth_view& depth, const se3& T_world_camera, std::uint64_t keyframe) {
-    job j{.kind = job::between, .frame = frame, .keyframe_of = keyframe, .T_world_camera = T_world_camera};
-    return add_scan(std::move(j), depth);
+    return add_scan({.kind = job::between, .frame = frame, .keyframe_of = keyframe, .T_world_camera = T_world_camera},
+                    depth);
   }
-  /// Gives a keyframe another depth image, see live_map::set_depth. False if it was left out, as add_keyframe does.
+  /// Gives a keyframe another depth image, see live_map::set_depth, as above. False if it was left out, as add_keyframe
+  /// does.
   bool set_depth(std::uint64_t frame, const depth_view& depth) {
-    job j{.kind = job::verdict, .frame = frame};
-    return add_scan(std::move(j), depth);
+    return add_scan({.kind = job::verdict, .frame = frame}, depth);
   }
   /// Forgets a keyframe, see live_map::remove.
   void remove(std::uint64_t frame) { push({.kind = job::removal, .frame = frame}); }
   /// Tells the present poses, see live_map::set_poses.
   void set_poses(std::vector<keyframe_position> poses, unlisted others = unlisted::keep) {
-    job j{.kind = job::positions, .others = others};
-    j.poses = std::move(poses);
-    push(std::move(j));
+    push({.kind = job::positions, .poses = std::move(poses), .others = others});
   }
   /// Where the robot is (metres, world): corrections begin near it.
   void set_robot(const vec3& position) {
@@ -194,21 +147,29 @@ class live_map_thread {
     const std::lock_guard lock{mutex_};
     return counters_;
   }
+  /// Why the thread ended by itself, if it did: an exception of a listener or of `Depths`, or want of memory. It was
+  /// told by `failed` as well. What waits is dropped then, calls that wait return, nothing goes in any more, and the
+  /// snapshots stay as they are. Code: errc::exception.
+  [[nodiscard]] std::optional<error> failure() const {
+    const std::lock_guard lock{mutex_};
+    return failure_;
+  }
 
   // -- waiting
 
-  /// Waits until everything that was asked for is done and nothing waits for a correction. Not to be called by
-  /// callbacks.
+  /// Waits until everything that was asked for is done and nothing waits for a correction, or the thread ended. Not to
+  /// be called by callbacks.
   void wait() {
     if (listeners_.poll_poses) push({.kind = job::question});  // poses may have moved since the last poll
     wait_until_idle();
   }
-  /// Makes the map the one of all present keyframes and poses, see live_map::finish, and waits for it.
+  /// Makes the map the one of all present keyframes and poses, see live_map::finish, and waits for it, as above.
   void finish() {
     push({.kind = job::completion});
     wait_until_idle();
   }
-  /// Ends the thread, and gives the map to the caller; what waits is dropped. Not to be called by callbacks.
+  /// Ends the thread, and gives the map to the caller; what waits is dropped. After a failure the map may be destroyed,
+  /// and nothing else: a step was broken off. Not to be called by callbacks.
   map_type& stop() {
     {
       const std::lock_guard lock{mutex_};
@@ -221,21 +182,7 @@ class live_map_thread {
 
  private:
   using clock = std::chrono::steady_clock;
-
-  struct job {
-    enum kind_type : std::uint8_t { keyframe, between, verdict, removal, positions, completion, question };
-    kind_type kind = keyframe;
-    std::uint64_t frame = 0;
-    std::uint64_t keyframe_of = 0;
-    se3 T_world_camera{};
-    image<std::uint16_t> pixels{};
-    double scale = 1.0;
-    float min_depth = 0.0F, max_depth = 0.0F;
-    std::vector<keyframe_position> poses{};
-    unlisted others = unlisted::keep;
-
-    [[nodiscard]] bool has_image() const noexcept { return kind <= verdict; }
-  };
+  using job = detail::map_job;
 
   // -- the queue; `mutex_` guards it
 
@@ -244,58 +191,53 @@ class live_map_thread {
     std::unique_lock lock{mutex_};
     changed_.wait(lock, [&] { return ends_ || is_idle(); });
   }
-  [[nodiscard]] bool is_full() const noexcept { return images_waiting_ >= options_.max_waiting; }
+  [[nodiscard]] bool is_full() const noexcept { return jobs_.images() >= options_.max_waiting; }
   void push(job j) {
     {
       const std::lock_guard lock{mutex_};
       if (ends_) return;
-      // Complete poses make older ones that still wait superfluous, unless a job between them depends on their order.
-      if (j.kind == job::positions && j.others == unlisted::hide && !jobs_.empty() &&
-          jobs_.back().kind == job::positions)
-        jobs_.pop_back();
-      jobs_.push_back(std::move(j));
+      jobs_.push(std::move(j));
     }
     changed_.notify_all();
   }
+  [[nodiscard]] static depth_use use_of(const job& j) noexcept {
+    return j.kind == job::keyframe  ? depth_use::keyframe
+           : j.kind == job::between ? depth_use::frame
+                                    : depth_use::verdict;
+  }
   bool add_scan(job j, const depth_view& depth) {
+    j.since = clock::now();
     j.scale = depth.scale();
     j.min_depth = depth.min_depth();
     j.max_depth = depth.max_depth();
     j.pixels = copy_of(depth.pixels());
-    std::optional<overflow_event> dropped;
+    std::optional<job> dropped;
     bool added = false;
     {
       std::unique_lock lock{mutex_};
       if (is_full()) {
-        dropped = drop_frame();
+        dropped = jobs_.pop_frame();
         if (!dropped && j.kind != job::between)
           changed_.wait_for(lock, options_.patience, [&] { return ends_ || !is_full(); });
       }
       if (ends_) return false;
       added = !is_full();
       if (added) {
-        ++images_waiting_;
-        counters_.most_waiting = std::max(counters_.most_waiting, images_waiting_);
-        jobs_.push_back(std::move(j));
+        jobs_.push(std::move(j));
+        counters_.most_waiting = std::max(counters_.most_waiting, jobs_.images());
       } else {
-        dropped = overflow_event{j.frame, j.kind != job::between};
-        spare_.push_back(std::move(j.pixels));
+        dropped = std::move(j);
       }
-      if (dropped) ++(dropped->is_keyframe ? counters_.dropped_keyframes : counters_.dropped_frames);
+      if (dropped) {
+        spare_.push_back(std::move(dropped->pixels));
+        ++(dropped->kind == job::keyframe  ? counters_.dropped_keyframes
+           : dropped->kind == job::between ? counters_.dropped_frames
+                                           : counters_.dropped_verdicts);
+      }
     }
     changed_.notify_all();
-    if (dropped && listeners_.overflowed) listeners_.overflowed(*dropped);
+    if (dropped && listeners_.overflowed) listeners_.overflowed({dropped->frame, use_of(*dropped)});
     return added;
-  }
-  /// Drops the oldest frame between keyframes that waits, if there is one.
-  [[nodiscard]] std::optional<overflow_event> drop_frame() {
-    const auto at = std::find_if(jobs_.begin(), jobs_.end(), [](const job& j) { return j.kind == job::between; });
-    if (at == jobs_.end()) return std::nullopt;
-    const overflow_event event{at->frame, false};
-    spare_.push_back(std::move(at->pixels));
-    jobs_.erase(at);
-    --images_waiting_;
-    return event;
   }
   /// A copy in memory that was used before, if there is any.
   [[nodiscard]] image<std::uint16_t> copy_of(image_view<const std::uint16_t> pixels) {
@@ -318,7 +260,41 @@ class live_map_thread {
 
   // -- the thread
 
-  void run() {
+  void run() noexcept {
+    try {
+      work();
+    } catch (const std::exception& e) {
+      give_up(e.what());
+    } catch (...) {
+      give_up("unknown");
+    }
+  }
+  void give_up(const char* what) noexcept {
+    error why{errc::exception, "live map", {}};
+    try {
+      why.message = what;
+    } catch (...) {
+      why.message = "no memory";  // short: it needs none
+    }
+    {
+      const std::lock_guard lock{mutex_};
+      ends_ = true;
+      jobs_.clear();
+      spare_.clear();
+      try {
+        failure_ = why;
+      } catch (...) {
+        failure_ = error{errc::exception, "live map", "no memory"};
+      }
+    }
+    changed_.notify_all();
+    try {
+      report(why);
+    } catch (...) {  // there is nobody left to tell
+    }
+  }
+  void work() {
+    if (listeners_.started) listeners_.started();
     std::unique_lock lock{mutex_};
     auto next_poll = clock::now();
     for (;;) {
@@ -330,12 +306,8 @@ class live_map_thread {
       if (ends_) return;
       busy_ = true;
       std::optional<job> next;
-      if (!jobs_.empty()) {
-        next = std::move(jobs_.front());
-        jobs_.pop_front();
-        if (next->has_image()) --images_waiting_;
-      }
-      const std::size_t waiting = images_waiting_;
+      if (!jobs_.empty()) next = jobs_.pop();
+      const std::size_t waiting = jobs_.images();
       const std::optional<vec3> robot = robot_;
       lock.unlock();
       changed_.notify_all();
@@ -353,22 +325,31 @@ class live_map_thread {
       if (is_idle()) changed_.notify_all();
     }
   }
-  void work_on(const job& j, std::size_t waiting) {
-    const depth_view depth{j.pixels.view(), j.scale, j.min_depth, j.max_depth};
+  void work_on(job& j, std::size_t waiting) {
     const auto start = clock::now();
+    if (j.has_image() && listeners_.prepare) listeners_.prepare(j.frame, use_of(j), j.pixels.view());
+    const depth_view depth{j.pixels.view(), j.scale, j.min_depth, j.max_depth};
     bool inserted = false;
     switch (j.kind) {
       case job::keyframe: {
-        const auto added = map_.add_keyframe(policy_, j.frame, depth, j.T_world_camera);
+        const auto added = moving_ ? moving_->add_keyframe(policy_, map_, j.frame, depth, j.T_world_camera)
+                                   : map_.add_keyframe(policy_, j.frame, depth, j.T_world_camera);
         if (!added) report(added.error());
         inserted = poll_always_ = true;
         break;
       }
-      case job::between: inserted = map_.add_frame(policy_, j.frame, depth, j.T_world_camera, j.keyframe_of); break;
+      case job::between:
+        inserted = map_.add_frame(policy_, j.frame, depth, j.T_world_camera, j.keyframe_of);
+        if (!inserted) tell_refusal(j);
+        break;
       case job::verdict:
+        if (moving_) moving_->forget(j.frame);
         if (const auto set = map_.set_depth(policy_, j.frame, depth); !set) report(set.error());
         break;
-      case job::removal: map_.remove(j.frame); break;
+      case job::removal:
+        if (moving_) moving_->forget(j.frame);
+        map_.remove(j.frame);
+        break;
       case job::positions: map_.set_poses(j.poses, j.others); break;
       case job::question: poll(); break;
       case job::completion:
@@ -387,17 +368,21 @@ class live_map_thread {
         correction_ = {};
         break;
     }
-    if (!inserted) return;
-    {
-      const std::lock_guard lock{mutex_};
-      ++(j.kind == job::keyframe ? counters_.keyframes : counters_.frames);
-    }
-    if (listeners_.inserted)
-      listeners_.inserted({j.frame, j.kind == job::keyframe, milliseconds_since(start), waiting});
+    if (inserted) tell_insertion(j, waiting, milliseconds_since(start));
   }
   void poll() {
-    polled_.clear();
-    if (listeners_.poll_poses(polled_, std::exchange(poll_always_, false))) map_.set_poses(polled_, unlisted::hide);
+    polled_.poses.clear();
+    polled_.removed.clear();
+    if (!listeners_.poll_poses(polled_, std::exchange(poll_always_, false))) return;
+    for (const std::uint64_t frame : polled_.removed) {
+      if (moving_) moving_->forget(frame);
+      map_.remove(frame);
+    }
+    if (!polled_.removed.empty()) {
+      const std::lock_guard lock{mutex_};
+      jobs_.forget(polled_.removed);
+    }
+    map_.set_poses(polled_.poses, unlisted::hide);
   }
   void correct(const std::optional<vec3>& robot) {
     const auto start = clock::now();
@@ -418,6 +403,22 @@ class live_map_thread {
       ++counters_.corrections;
     }
     if (listeners_.corrected) listeners_.corrected(event);
+  }
+  void tell_insertion(const job& j, std::size_t waiting, double milliseconds) {
+    {
+      const std::lock_guard lock{mutex_};
+      ++(j.kind == job::keyframe ? counters_.keyframes : counters_.frames);
+    }
+    publish();
+    if (listeners_.inserted)
+      listeners_.inserted({j.frame, j.kind == job::keyframe, milliseconds, milliseconds_since(j.since), waiting});
+  }
+  void tell_refusal(const job& j) {
+    {
+      const std::lock_guard lock{mutex_};
+      ++counters_.refused_frames;
+    }
+    if (listeners_.refused) listeners_.refused({j.frame, j.keyframe_of});
   }
   void publish() {
     const std::uint64_t revision = map_.changes().revision();
@@ -447,12 +448,12 @@ class live_map_thread {
 
   mutable std::mutex mutex_;
   mutable std::condition_variable changed_;
-  std::deque<job> jobs_;
+  detail::map_jobs jobs_;
   std::vector<image<std::uint16_t>> spare_;  ///< images whose memory can be used again
-  std::size_t images_waiting_ = 0;           ///< jobs with an image
   std::size_t pending_ = 0;                  ///< of the map
   bool busy_ = false;
   bool ends_ = false;
+  std::optional<error> failure_;
   std::optional<vec3> robot_;
   live_map_counters counters_;
 
@@ -460,7 +461,8 @@ class live_map_thread {
   std::shared_ptr<const snapshot_type> latest_, settled_;
 
   map_type map_;  ///< belongs to the thread, as do those below
-  std::vector<keyframe_position> polled_;
+  std::optional<moving_filter<Camera>> moving_;
+  keyframe_beliefs polled_;
   bool poll_always_ = true;
   live_correction_event correction_;
   std::thread thread_;

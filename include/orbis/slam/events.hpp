@@ -56,8 +56,8 @@ struct state_event {
 };
 
 /// Callbacks; any of them may be empty. They are called without a lock held, so they may query the system. With
-/// threads, those for culled keyframes and corrections are called from the system's own threads. They must not throw,
-/// nor wait for the system.
+/// threads, those for culled keyframes and corrections are called from the system's own threads. They must not wait
+/// for the system; what they throw on a thread of the system ends that, see rgbd_system.
 struct listeners {
   std::function<void(const keyframe_event&)> keyframe_made{};
   std::function<void(const keyframe_event&)> keyframe_culled{};

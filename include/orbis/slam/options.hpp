@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <numbers>
 #include <optional>
 
@@ -166,7 +167,10 @@ struct options {
   thread_options threads{};
   bool localization_only = false;     ///< no keyframes are made, and the map is kept unchanged: for a loaded map
   std::optional<se3> initial_pose{};  ///< `T_world_camera` of the first frame of a map; default: the identity
-  std::uint64_t seed = 1;             ///< of RANSAC
+  /// The same, asked for by tracking's thread when a map begins with a frame; `initial_pose` does not count then. It
+  /// must not call the system.
+  std::function<se3()> find_initial_pose{};
+  std::uint64_t seed = 1;  ///< of RANSAC
 };
 
 }  // namespace orbis::slam

@@ -20,6 +20,7 @@
 #include <concepts>
 #include <cstddef>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 #include <utility>
@@ -54,7 +55,9 @@ namespace orbis::slam {
 ///
 /// Without threads (the default) `track` does everything, and the same frames and options give the same bytes. With
 /// threads (`options::threads`) mapping, loop closing and global adjustment go on while frames are tracked. `track` is
-/// for one thread; everything else may be called from any thread.
+/// for one thread; everything else may be called from any thread. An exception on a thread of the system (want of
+/// memory, or one of a callback) ends that thread; `track` of a keyframe and `wait` throw it then, and a map may be
+/// left half changed: the system is to be destroyed.
 ///
 /// Template parameters: the camera model; the extractor, which determines the type of descriptors; the matchers of
 /// tracking; place recognition; the sensor, which determines what a frame measures.
@@ -98,9 +101,19 @@ class rgbd_system {
   /// Sets whether the map is kept unchanged, from the next frame on.
   void set_localization_only(bool on) noexcept { localization_only_ = on; }
 
+  /// The features of the last frame and where it hangs in the map; empty if it was not tracked. For the thread that
+  /// tracks, and without a lock: asking for it does not wait for the back end. O(features).
+  [[nodiscard]] std::optional<tracked_frame> last_frame() const;
+
   /// Sets `T_world_camera` of the first frame of every map that begins from the next frame on
   /// (`options::initial_pose`). For the thread that tracks: where frames say which way is up, a new map begins upright.
-  void set_initial_pose(const se3& T_world_camera) { options_.initial_pose = T_world_camera; }
+  void set_initial_pose(const se3& T_world_camera) {
+    options_.initial_pose = T_world_camera;
+    options_.find_initial_pose = nullptr;
+  }
+  /// As above, asked for only when a map does begin with the frame that is tracked: what it costs is paid once a map
+  /// (`options::find_initial_pose`). `find` must not call the system.
+  void set_initial_pose(std::function<se3()> find) { options_.find_initial_pose = std::move(find); }
 
   /// Waits until the threads have nothing to do.
   void wait() const;
@@ -279,7 +292,10 @@ void ORBIS_SLAM_SYSTEM::report(track_result& result, const std::optional<map_key
   result.state = front_end_.state();
   result.map = shared_.atlas.active_id();
   if (made) result.keyframe = shared_.atlas.current(*made).keyframe;
-  if (front_end_.is_tracking()) result.T_world_camera = front_end_.last_pose(shared_.atlas);
+  if (front_end_.is_tracking()) {
+    result.T_world_camera = front_end_.last_pose(shared_.atlas);
+    result.reference = shared_.atlas.current(front_end_.last_reference()).keyframe;
+  }
   const state_event changed{std::exchange(reported_state_, result.state), result.state,
                             front_end_.counters().frames - 1};
   lock.unlock();
@@ -289,6 +305,12 @@ void ORBIS_SLAM_SYSTEM::report(track_result& result, const std::optional<map_key
 ORBIS_SLAM_SYSTEM_TEMPLATE
 track_state ORBIS_SLAM_SYSTEM::state() const {
   return shared_.locked([&] { return front_end_.state(); });
+}
+
+ORBIS_SLAM_SYSTEM_TEMPLATE
+std::optional<tracked_frame> ORBIS_SLAM_SYSTEM::last_frame() const {
+  if (reported_state_ != track_state::tracking && reported_state_ != track_state::relocalized) return std::nullopt;
+  return front_end_.last_frame();
 }
 
 ORBIS_SLAM_SYSTEM_TEMPLATE

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <optional>
 #include <string_view>
+#include <vector>
 
 #include <orbis/core/se3.hpp>
 #include <orbis/slam/ids.hpp>
@@ -45,8 +46,23 @@ struct track_result {
   map_id map = 0;                       ///< the active map
   std::size_t inliers = 0;              ///< landmarks that agree with the pose
   std::optional<keyframe_id> keyframe;  ///< the keyframe that the frame became, if it did
+  /// The keyframe of `map` whose corrections move the pose; it may have been culled since. Empty where not tracked.
+  std::optional<keyframe_id> reference;
   track_timings timings;
   [[nodiscard]] bool tracked() const noexcept { return T_world_camera.has_value(); }
+};
+
+/// A feature of a tracked frame.
+struct tracked_feature {
+  float x = 0.0F, y = 0.0F;  ///< pixels
+  bool tracked = false;      ///< observes a landmark that was known before, in agreement with the pose
+};
+
+/// What tracking knows of a frame, to be shown or logged.
+struct tracked_frame {
+  map_keyframe reference;  ///< the keyframe that the frame's pose follows; `atlas::current` gives its present id
+  se3 T_reference_camera;
+  std::vector<tracked_feature> features;
 };
 
 /// Counts over all frames so far. Frames before the first map begins are neither tracked nor lost.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <cstddef>
 #include <cstdint>
+#include <stdexcept>
 
 #include <orbis/camera/any.hpp>
 #include <orbis/slam/detail/system/back_end.hpp>
@@ -13,13 +14,13 @@ using namespace orbis;
 
 namespace {
 
-using places = slam::bag_of_words_places;
+using bow_places = slam::bag_of_words_places;
 
 /// A round with the drift of its keyframes, whose last ones show what the first ones do.
 struct scene {
   test::ring_world world{{.steps = 60}};
   slam::options options;
-  slam::detail::shared_state<camera::any_camera, features::binary_descriptor<256>, places> shared{
+  slam::detail::shared_state<camera::any_camera, features::binary_descriptor<256>, bow_places> shared{
       world.rig, options, {}};
 
   explicit scene(bool threads) {
@@ -36,7 +37,7 @@ TEST_CASE("A keyframe is mapped, closes a loop, and the map is adjusted; in thre
   for (const bool threads : {false, true}) {
     scene s{threads};
     const double before = s.world.errors(s.shared.atlas.active())[0];
-    slam::detail::back_end<camera::any_camera, features::binary_descriptor<256>, places> back_end{s.shared};
+    slam::detail::back_end<camera::any_camera, features::binary_descriptor<256>, bow_places> back_end{s.shared};
     back_end.process({0, 63});
     back_end.wait();
     CHECK(s.shared.loops_closed == 1);
@@ -49,8 +50,16 @@ TEST_CASE("A keyframe is mapped, closes a loop, and the map is adjusted; in thre
 TEST_CASE("A back end that ends does not wait for what is in its queue") {
   scene s{true};
   {
-    slam::detail::back_end<camera::any_camera, features::binary_descriptor<256>, places> back_end{s.shared};
+    slam::detail::back_end<camera::any_camera, features::binary_descriptor<256>, bow_places> back_end{s.shared};
     for (std::uint32_t k = 0; k != 64; ++k) back_end.process({0, k});
   }
   CHECK(slam::validate(s.shared.atlas.active()));
+}
+
+TEST_CASE("What a callback throws on a thread of the back end comes to its user") {
+  scene s{true};
+  s.shared.callbacks.map_corrected = [](const slam::correction_event&) { throw std::runtime_error{"of a callback"}; };
+  slam::detail::back_end<camera::any_camera, features::binary_descriptor<256>, bow_places> back_end{s.shared};
+  back_end.process({0, 63});
+  CHECK_THROWS_AS(back_end.wait(), std::runtime_error);
 }

@@ -5,45 +5,39 @@
 
 #include <algorithm>
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <limits>
 
 #include <orbis/camera/depth.hpp>
 #include <orbis/camera/model.hpp>
+#include <orbis/camera/rays.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/core/types.hpp>
 
 namespace orbis::mapping::detail {
 
-/// The corners of a pyramid around all rays of a camera, in the camera frame at z = 1.
+/// A pyramid with eight sides around all rays of a camera, in the camera frame: its corners at z = 1.
 class view_frustum {
  public:
   /// O(pixels).
   template <camera::camera_model Camera>
   explicit view_frustum(const Camera& camera) {
-    vec2 low = vec2::Constant(std::numeric_limits<double>::infinity()), high = -low;
-    const auto add = [&](int u, int v) {
-      const auto ray = camera.unproject(vec2{u, v});
-      if (!ray || !ray->allFinite()) return;
-      low = low.cwiseMin(ray->template head<2>());
-      high = high.cwiseMax(ray->template head<2>());
-    };
     // Every pixel: at the border of a fisheye image there may be no ray.
     for (int v = 0; v != camera.height(); ++v)
-      for (int u = 0; u != camera.width(); ++u) add(u, v);
-    if (!(low.array() <= high.array()).all()) low = high = vec2::Zero();
-    // Depth along the axis says little of rays that are almost at right angles to it: what is farther off than 80
-    // degrees counts as if it were there.
-    constexpr double widest = 5.67;
-    low = low.cwiseMax(-widest);
-    high = high.cwiseMin(widest);
-    for (unsigned i = 0; i != 4; ++i)
-      corners_[i] = {(i & 1U) != 0 ? high.x() : low.x(), (i & 2U) != 0 ? high.y() : low.y(), 1.0};
+      for (int u = 0; u != camera.width(); ++u)
+        if (const auto ray = camera.unproject(vec2{u, v})) include(ray->template head<2>());
+    close();
+  }
+  explicit view_frustum(const camera::ray_table& rays) {
+    for (int v = 0; v != rays.height(); ++v)
+      for (int u = 0; u != rays.width(); ++u) include(rays(u, v).cast<double>());
+    close();
   }
 
   /// The largest distance by which a change of the pose moves a point of the frustum from the camera to the depth
   /// `reach` (metres along the optical axis). A change moves points by an affine function, whose norm is largest at a
-  /// corner: of the five corners, one is the camera's centre. O(1).
+  /// corner: of the nine corners, one is the camera's centre. O(1).
   [[nodiscard]] double displacement(const se3& T_world_before, const se3& T_world_after, double reach) const {
     double largest = (T_world_after.translation() - T_world_before.translation()).norm();
     for (const vec3& c : corners_) {
@@ -54,7 +48,40 @@ class view_frustum {
   }
 
  private:
-  std::array<vec3, 4> corners_;
+  static constexpr std::size_t sides = 8;
+  [[nodiscard]] static vec2 direction(std::size_t side) noexcept {
+    constexpr double half = 0.70710678118654752440;
+    constexpr std::array<std::array<double, 2>, sides> all{
+        {{1, 0}, {half, half}, {0, 1}, {-half, half}, {-1, 0}, {-half, -half}, {0, -1}, {half, -half}}};
+    return {all[side % sides][0], all[side % sides][1]};
+  }
+  /// `ray`: x and y at z = 1.
+  void include(vec2 ray) {
+    if (!ray.allFinite()) return;
+    // Depth along the axis says little of rays that are almost at right angles to it: what is farther off than 80
+    // degrees counts as if it were there.
+    constexpr double widest = 5.67;
+    const double off_axis = ray.norm();
+    if (off_axis > widest) ray *= widest / off_axis;
+    for (std::size_t i = 0; i != sides; ++i) reach_[i] = std::max(reach_[i], direction(i).dot(ray));
+  }
+  /// A corner is where two neighbouring sides meet.
+  void close() {
+    for (std::size_t i = 0; i != sides; ++i) {
+      const vec2 a = direction(i), b = direction(i + 1);
+      const double of_a = reach_[i], of_b = reach_[(i + 1) % sides];
+      const double sine = a.x() * b.y() - a.y() * b.x();
+      corners_[i] = {(of_a * b.y() - of_b * a.y()) / sine, (a.x() * of_b - b.x() * of_a) / sine, 1.0};
+      if (!corners_[i].allFinite()) corners_[i] = vec3::UnitZ();  // there is no ray
+    }
+  }
+
+  std::array<double, sides> reach_ = [] {
+    std::array<double, sides> none{};
+    none.fill(-std::numeric_limits<double>::infinity());
+    return none;
+  }();
+  std::array<vec3, sides> corners_;
 };
 
 /// The largest depth of an image, metres; 0 if no pixel is valid. O(pixels).

@@ -7,6 +7,7 @@
 #include <condition_variable>
 #include <cstddef>
 #include <deque>
+#include <exception>
 #include <functional>
 #include <mutex>
 #include <thread>
@@ -15,8 +16,9 @@
 namespace orbis::slam::detail {
 
 /// Calls `work` for each job, in the order in which they are pushed. `stop` and the destructor wait for the running job
-/// and drop the others. While jobs use a pointer to their worker, call `stop` before the pointer is reset.
-/// @pre `work` does not throw
+/// and drop the others. While jobs use a pointer to their worker, call `stop` before the pointer is reset. If `work`
+/// throws, that is the end: the other jobs are dropped, and `push`, `wait` and `wait_for_room` throw the same from then
+/// on.
 template <std::movable Job>
 class worker {
  public:
@@ -39,6 +41,7 @@ class worker {
   void push(Job job) {
     {
       const std::lock_guard lock(mutex_);
+      rethrow_failure();
       if (ends_) return;
       jobs_.push_back(std::move(job));
     }
@@ -59,14 +62,19 @@ class worker {
   void wait_for_room(std::size_t count) const {
     std::unique_lock lock(mutex_);
     changed_.wait(lock, [&] { return jobs_.size() < count; });
+    rethrow_failure();
   }
   /// Waits until no job runs or waits.
   void wait() const {
     std::unique_lock lock(mutex_);
     changed_.wait(lock, [&] { return jobs_.empty() && !busy_; });
+    rethrow_failure();
   }
 
  private:
+  void rethrow_failure() const {
+    if (failure_) std::rethrow_exception(failure_);
+  }
   void run() {
     std::unique_lock lock(mutex_);
     for (;;) {
@@ -81,8 +89,17 @@ class worker {
       busy_ = true;
       lock.unlock();
       changed_.notify_all();
-      work_(std::move(job));
+      std::exception_ptr thrown;
+      try {
+        work_(std::move(job));
+      } catch (...) {
+        thrown = std::current_exception();
+      }
       lock.lock();
+      if (thrown) {
+        failure_ = std::move(thrown);
+        ends_ = true;
+      }
       busy_ = false;
       changed_.notify_all();
     }
@@ -94,6 +111,7 @@ class worker {
   std::deque<Job> jobs_;
   bool busy_ = false;
   bool ends_ = false;
+  std::exception_ptr failure_;
   std::thread thread_;
 };
 

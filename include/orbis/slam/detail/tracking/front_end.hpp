@@ -51,6 +51,11 @@ class front_end {
   [[nodiscard]] double last_timestamp() const noexcept { return last_.timestamp; }
   /// The present pose of the last tracked frame: later corrections of its keyframe move it.
   [[nodiscard]] se3 last_pose(const atlas_type& maps) const;
+  /// That keyframe, by the id that it had then.
+  [[nodiscard]] map_keyframe last_reference() const noexcept { return last_reference_; }
+
+  /// The last tracked frame with its features. For the thread that tracks; takes no look at the maps. O(features).
+  [[nodiscard]] tracked_frame last_frame() const;
 
   /// The active map was changed from outside: the camera is searched for in it.
   void set_lost() {
@@ -82,6 +87,7 @@ class front_end {
   }
   /// Adds a frame to the active map as a keyframe, which becomes the reference.
   map_keyframe make_keyframe(frame_type& f, atlas_type& maps) {
+    first_new_ = maps.active().landmark_end();
     const keyframe_id id = insert_keyframe(maps.active(), f, options_);
     f.landmarks = maps.active().at(id).landmarks;
     return reference_ = {maps.active_id(), id};
@@ -116,6 +122,7 @@ class front_end {
   frame_type last_;                   ///< the last frame that was tracked
   map_keyframe last_reference_;       ///< its reference ...
   se3 T_reference_last_;              ///< ... and its pose relative to that
+  landmark_id first_new_;             ///< landmarks from this on were made of the last frame; `no_id`: none were
   motion_model motion_;
   track_counters counters_;
   frame_log log_;
@@ -127,6 +134,18 @@ se3 front_end<Camera, D, Matchers, Sensor>::last_pose(const atlas_type& maps) co
   return maps.contains(k.map) && k.keyframe < maps.at(k.map).keyframe_end()
              ? maps.at(k.map).pose_of(k.keyframe) * T_reference_last_
              : last_.T_world_camera;
+}
+
+template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
+tracked_frame front_end<Camera, D, Matchers, Sensor>::last_frame() const {
+  tracked_frame shown{last_reference_, T_reference_last_, {}};
+  shown.features.reserve(last_.size());
+  for (std::size_t i = 0; i != last_.size(); ++i) {
+    const landmark_id l = last_.landmarks[i];
+    const auto& at = last_.features.keypoints[i];
+    shown.features.push_back({at.x, at.y, l != no_id && l < first_new_});
+  }
+  return shown;
 }
 
 template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
@@ -145,6 +164,7 @@ template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D
 template <class Similar, class Drop>
 std::size_t front_end<Camera, D, Matchers, Sensor>::localize(frame_type& f, atlas_type& maps, bool is_frozen,
                                                              Similar&& similar, Drop&& drop) {
+  first_new_ = no_id;
   if (state_ == track_state::not_started) return is_frozen ? 0 : begin_map(f);
   if (is_tracking())
     if (const std::size_t inliers = track_from_last(f, maps, is_frozen); inliers > 0) return inliers;
@@ -160,7 +180,7 @@ template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D
 std::size_t front_end<Camera, D, Matchers, Sensor>::begin_map(frame_type& f) {
   const std::size_t points = Sensor::begins_map(f, options_);
   if (points == 0) return 0;
-  f.T_world_camera = options_.initial_pose.value_or(se3{});
+  f.T_world_camera = options_.find_initial_pose ? options_.find_initial_pose() : options_.initial_pose.value_or(se3{});
   state_ = track_state::tracking;
   return points;
 }

@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// What waits for a live map's thread, in order.
+#pragma once
+
+#include <algorithm>
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <iterator>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include <orbis/core/image.hpp>
+#include <orbis/core/se3.hpp>
+#include <orbis/mapping/live_map.hpp>
+
+namespace orbis::mapping::detail {
+
+struct map_job {
+  enum kind_type : std::uint8_t { keyframe, between, verdict, removal, positions, completion, question };
+  kind_type kind = keyframe;
+  std::uint64_t frame = 0;
+  std::uint64_t keyframe_of = 0;
+  se3 T_world_camera{};
+  image<std::uint16_t> pixels{};
+  double scale = 1.0;
+  float min_depth = 0.0F, max_depth = 0.0F;
+  std::vector<keyframe_position> poses{};
+  unlisted others = unlisted::keep;
+  std::chrono::steady_clock::time_point since{};
+
+  [[nodiscard]] bool has_image() const noexcept { return kind <= verdict; }
+};
+
+/// A queue. Whoever bounds the images in it bounds the queue: between two of them, poses are kept once a keyframe, and
+/// so are removals.
+class map_jobs {
+ public:
+  [[nodiscard]] bool empty() const noexcept { return jobs_.empty(); }
+  [[nodiscard]] std::size_t size() const noexcept { return jobs_.size(); }
+  /// How many jobs have an image.
+  [[nodiscard]] std::size_t images() const noexcept { return images_; }
+
+  /// Appends a job. The poses that wait as the last job, or as the last but removals, take in poses that come later,
+  /// and a removal that waits is not asked for again: in the end the map is the same. O(poses log poses).
+  void push(map_job j) {
+    if (j.kind == map_job::positions || j.kind == map_job::removal)
+      for (auto at = jobs_.rbegin(); at != jobs_.rend(); ++at) {
+        if (at->kind == map_job::removal) {
+          if (j.kind == map_job::removal && j.frame == at->frame) return;
+        } else if (at->kind == map_job::positions && j.kind == map_job::positions) {
+          merge(*at, std::move(j));
+          return;
+        } else if (at->kind != map_job::positions) {
+          break;
+        }
+      }
+    images_ += j.has_image() ? 1U : 0U;
+    jobs_.push_back(std::move(j));
+  }
+  /// @pre !empty()
+  [[nodiscard]] map_job pop() {
+    map_job first = std::move(jobs_.front());
+    jobs_.pop_front();
+    images_ -= first.has_image() ? 1U : 0U;
+    return first;
+  }
+  /// Takes out the oldest frame between keyframes, if there is one.
+  [[nodiscard]] std::optional<map_job> pop_frame() {
+    const auto at =
+        std::find_if(jobs_.begin(), jobs_.end(), [](const map_job& j) { return j.kind == map_job::between; });
+    if (at == jobs_.end()) return std::nullopt;
+    std::optional<map_job> frame{std::move(*at)};
+    jobs_.erase(at);
+    --images_;
+    return frame;
+  }
+  /// Drops the depth images of these frames.
+  void forget(const std::vector<std::uint64_t>& frames) {
+    images_ -= std::erase_if(jobs_, [&](const map_job& j) {
+      return j.has_image() && std::find(frames.begin(), frames.end(), j.frame) != frames.end();
+    });
+  }
+  void clear() noexcept {
+    jobs_.clear();
+    images_ = 0;
+  }
+
+ private:
+  /// `earlier` becomes what is the same as itself and then `later`.
+  static void merge(map_job& earlier, map_job later) {
+    if (later.others == unlisted::hide) {  // of all keyframes: nothing is left of what was said before
+      earlier.poses = std::move(later.poses);
+      earlier.others = unlisted::hide;
+      return;
+    }
+    auto& all = earlier.poses;
+    all.insert(all.end(), std::make_move_iterator(later.poses.begin()), std::make_move_iterator(later.poses.end()));
+    std::stable_sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.frame < b.frame; });
+    // The last of those of one frame is the latest.
+    auto end = all.begin();
+    for (auto p = all.begin(); p != all.end(); ++p)
+      if (std::next(p) == all.end() || std::next(p)->frame != p->frame) *end++ = *p;
+    all.erase(end, all.end());
+  }
+
+  std::deque<map_job> jobs_;
+  std::size_t images_ = 0;
+};
+
+}  // namespace orbis::mapping::detail

@@ -1,0 +1,220 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// Somebody who walks through a room leaves little of a trail in its live map, and nothing else is lost.
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <orbis/core/execution.hpp>
+#include <orbis/io/synthetic.hpp>
+#include <orbis/mapping/live_map.hpp>
+#include <orbis/mapping/moving_filter.hpp>
+#include <orbis/octree/files.hpp>
+
+#include "mapping/keyframes.hpp"
+#include "mapping/memory_depths.hpp"
+#include "support/catch.hpp"
+
+using namespace orbis;
+
+namespace {
+
+using octree_type = octree::occupancy_octree<>;
+using live = mapping::live_map<octree_type, camera::pinhole, test::memory_depths>;
+using filter = mapping::moving_filter<camera::pinhole>;
+using depth_view = camera::depth_view<std::uint16_t>;
+
+struct shot {
+  std::uint64_t frame;
+  image<std::uint16_t> depth;
+  se3 T_world_camera;
+};
+
+constexpr double scale = 5000.0;
+
+/// Keyframes of the room with or without a person, and the truth about it.
+struct round_trip {
+  io::synthetic_recording recording;
+  std::vector<shot> shots;
+
+  explicit round_trip(bool person)
+      : recording{{.frames = 360, .width = 320, .height = 240, .scene = {.person = person}}} {
+    for (std::size_t i = 0; i < recording.size(); i += 9)
+      shots.push_back({i, recording.frame(i).value().depth, recording.T_world_camera(i)});
+  }
+  [[nodiscard]] camera::pinhole camera() const {
+    return camera::pinhole{*recording.camera().model.get_if<camera::pinhole>()};
+  }
+};
+
+struct quality {
+  std::size_t ghosts = 0;    ///< occupied voxels that are more than two voxels from every surface
+  std::size_t occupied = 0;  ///< the others
+  double error = 0.0;        ///< of these: root mean square of the distance to the surface, metres
+};
+
+quality judge(const octree_type& map, const io::synthetic_recording& truth) {
+  quality q;
+  const double edge = map.resolution();
+  map.for_each_leaf([&](const octree_type::leaf& leaf) {
+    if (!leaf.occupied) return;
+    const int cells = static_cast<int>(std::lround(leaf.size / edge));
+    for (int i = 0; i != cells * cells * cells; ++i) {
+      const vec3 cell = Eigen::Vector3i{i % cells, i / cells % cells, i / cells / cells}.cast<double>();
+      const double d = truth.surface_distance(leaf.center + edge * (cell - vec3::Constant(0.5 * (cells - 1))));
+      if (d > 2.0 * edge) {
+        ++q.ghosts;
+      } else {
+        ++q.occupied;
+        q.error += d * d;
+      }
+    }
+  });
+  q.error = std::sqrt(q.error / static_cast<double>(q.occupied));
+  return q;
+}
+
+/// The live map of all keyframes; `moving`: with the filter.
+template <class Policy>
+live live_map_of(const Policy& policy, const round_trip& trip,
+                 const std::optional<mapping::moving_filter_options>& moving) {
+  live map{trip.camera(), {.resolution = 0.05, .integration = {.max_range = 4.0}}};
+  std::optional<filter> judge;
+  if (moving) judge.emplace(trip.camera(), *moving);
+  for (const shot& s : trip.shots) {
+    const depth_view depth{s.depth.view(), scale};
+    if (judge)
+      REQUIRE(judge->add_keyframe(policy, map, s.frame, depth, s.T_world_camera));
+    else
+      REQUIRE(map.add_keyframe(policy, s.frame, depth, s.T_world_camera));
+    REQUIRE(map.correct(policy));
+  }
+  return map;
+}
+
+}  // namespace
+
+TEST_CASE("of the trail of somebody who walks through the room nine voxels of ten are gone") {
+  const round_trip quiet{false}, walked{true};
+  const quality before = judge(live_map_of(seq, quiet, std::nullopt).map(), quiet.recording);
+  const quality trail = judge(live_map_of(seq, walked, std::nullopt).map(), quiet.recording);
+  const live quiet_map = live_map_of(seq, quiet, mapping::moving_filter_options{});
+  const live map = live_map_of(seq, walked, mapping::moving_filter_options{});
+  const quality without = judge(quiet_map.map(), quiet.recording), with = judge(map.map(), quiet.recording);
+  CAPTURE(before.ghosts, trail.ghosts, without.ghosts, with.ghosts, before.occupied, without.occupied, with.occupied,
+          before.error, without.error, with.error);
+  CHECK(trail.ghosts > before.ghosts + 400);                                  // there is something to be done
+  CHECK(with.ghosts <= before.ghosts + (trail.ghosts - before.ghosts) / 10);  // nine of ten voxels of it are gone
+  CHECK(without.ghosts <= before.ghosts);
+  CHECK(std::abs(with.error - before.error) < 0.001);
+  CHECK(std::abs(without.error - before.error) < 0.001);
+  // The room itself is not carved away.
+  CHECK(static_cast<double>(without.occupied) > 0.995 * static_cast<double>(before.occupied));
+  CHECK(static_cast<double>(with.occupied) > 0.97 * static_cast<double>(before.occupied));
+
+  // And the map is that of the depth images that it has, bit for bit.
+  octree_type fresh{map.options().resolution};
+  std::size_t filtered = 0;
+  for (const shot& s : walked.shots) {
+    image<std::uint16_t> depth;
+    REQUIRE(map.depths().get(s.frame, depth));
+    filtered += map.is_filtered(s.frame) ? 1 : 0;
+    fresh.integrate(seq, depth_view{depth.view(), scale}, walked.camera(), s.T_world_camera, map.options().integration);
+  }
+  CHECK(filtered > 5);
+  CHECK(octree::ot_bytes(map.map()) == octree::ot_bytes(fresh));
+  CHECK(octree::ot_bytes(live_map_of(par.with(3), walked, mapping::moving_filter_options{}).map()) ==
+        octree::ot_bytes(fresh));
+}
+
+namespace {
+
+/// A wall 2 m before a camera that stands, and a board 1 m before it in some of the images.
+struct still_camera {
+  camera::pinhole camera{{.width = 64, .height = 48, .fx = 55, .fy = 55, .cx = 31.5, .cy = 23.5}};
+  live map{camera, {.resolution = 0.05}};
+  filter moving{camera, {.keyframes = 6}};
+  std::uint64_t next = 0;
+
+  void see(bool board) {
+    image<std::uint16_t> depth(64, 48, static_cast<std::uint16_t>(2.0 * scale));
+    for (int y = 12; board && y != 36; ++y)
+      for (int x = 20; x != 44; ++x) depth(x, y) = static_cast<std::uint16_t>(scale);
+    REQUIRE(moving.add_keyframe(seq, map, next++, depth_view{depth.view(), scale}, se3{}));
+    REQUIRE(map.correct(seq));
+  }
+  /// How many pixels of the board's place a keyframe's image in the map has.
+  [[nodiscard]] int pixels(std::uint64_t frame) const {
+    image<std::uint16_t> depth;
+    REQUIRE(map.depths().get(frame, depth));
+    int n = 0;
+    for (int y = 12; y != 36; ++y)
+      for (int x = 20; x != 44; ++x) n += depth(x, y) != 0 ? 1 : 0;
+    return n;
+  }
+};
+
+constexpr int board_pixels = 24 * 24;
+
+}  // namespace
+
+TEST_CASE("what was seen once and is looked through is taken out as soon as there is evidence") {
+  still_camera c;
+  c.see(true);
+  CHECK(c.pixels(0) == board_pixels);
+  CHECK_FALSE(c.map.is_filtered(0));
+  c.see(false);
+  CHECK(c.pixels(0) < board_pixels / 4);  // all but cells that have the wall around them
+  CHECK(c.map.is_filtered(0));
+  CHECK(*c.moving.removed_share(0) > 0.1);
+  CHECK_FALSE(c.map.is_filtered(1));
+  CHECK(*c.moving.removed_share(1) == 0.0);
+  CHECK(c.map.map().state(vec3{0.01, 0.01, 1.01}) != octree::occupancy::occupied);
+  CHECK(c.map.map().state(vec3{0.01, 0.01, 2.01}) == octree::occupancy::occupied);
+}
+
+TEST_CASE("what comes and stays is shown once it has been seen more often than its place was empty") {
+  still_camera c;
+  c.see(false);
+  c.see(false);
+  c.see(true);
+  CHECK(c.pixels(2) < board_pixels / 4);  // it may be somebody who walks by
+  c.see(true);
+  for (const std::uint64_t frame : {2U, 3U}) {
+    CAPTURE(frame);
+    CHECK(c.pixels(frame) < board_pixels / 4);
+  }
+  c.see(true);
+  for (const std::uint64_t frame : {2U, 3U, 4U}) {
+    CAPTURE(frame);
+    CHECK(c.pixels(frame) == board_pixels);  // two others show it, two do not
+  }
+  c.see(true);
+  CHECK(c.map.map().state(vec3{0.01, 0.01, 1.01}) == octree::occupancy::occupied);
+}
+
+TEST_CASE("a keyframe that is forgotten is judged no more") {
+  still_camera c;
+  c.see(true);
+  c.moving.forget(0);
+  CHECK_FALSE(c.moving.removed_share(0));
+  for (int i = 0; i != 4; ++i) c.see(false);
+  CHECK(c.pixels(0) == board_pixels);
+  c.moving.forget(17);  // never known
+}
+
+TEST_CASE("a keyframe without a place is neither judged nor asked") {
+  still_camera c;
+  const image<std::uint16_t> depth(64, 48, static_cast<std::uint16_t>(scale));
+  const se3 nowhere{so3{}, vec3::Constant(std::numeric_limits<double>::quiet_NaN())};
+  for (int i = 0; i != 3; ++i)
+    REQUIRE(c.moving.add_keyframe(seq, c.map, c.next++, depth_view{depth.view(), scale}, nowhere));
+  CHECK_FALSE(c.moving.removed_share(0));
+  c.see(true);
+  CHECK(c.pixels(3) == board_pixels);
+  CHECK_FALSE(c.map.is_filtered(3));
+}
