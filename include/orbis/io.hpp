@@ -10,7 +10,7 @@
 /// | `camera_file.hpp`     | `camera.toml`: model, size, intrinsics, distortion, depth scale                  |
 /// | `trajectory_file.hpp` | trajectories in TUM format                                                       |
 /// | `image.hpp`           | colour and depth images, whatever their format                                   |
-/// | `png.hpp`, `jpeg.hpp` | images of one format, read and (PNG) written                                     |
+/// | `png.hpp`, `jpeg.hpp` | images of one format, read and written                                           |
 /// | `cloud_file.hpp`      | point clouds, whatever their format                                              |
 /// | `ply.hpp`, `pcd.hpp`  | point clouds of one format, read and written                                     |
 /// | `bal_problem.hpp`, `bal.hpp` | bundle adjustment problems ("bundle adjustment in the large"); their files |

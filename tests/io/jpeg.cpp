@@ -9,8 +9,8 @@
 #include <orbis/io/jpeg.hpp>
 
 #include "io/quiet.hpp"
-#include "support/temporary_folder.hpp"
 #include "support/catch.hpp"
+#include "support/temporary_folder.hpp"
 
 namespace io = orbis::io;
 
@@ -115,4 +115,26 @@ TEST_CASE("a JPEG header that claims too many pixels allocates nothing") {
   const auto read = io::decode_jpeg(bytes);
   REQUIRE_FALSE(read);
   CHECK(read.error().message == "damaged JPEG: claims more pixels than the file can hold");
+}
+
+TEST_CASE("what is written as JPEG is read back") {
+  orbis::image<orbis::rgb8> picture(70, 40);
+  for (int y = 0; y != picture.height(); ++y)
+    for (int x = 0; x != picture.width(); ++x)
+      picture(x, y) = {static_cast<std::uint8_t>(3 * x), static_cast<std::uint8_t>(5 * y), 90};
+  const auto read = io::decode_jpeg(io::encode_jpeg(picture, 95).value()).value();
+  REQUIRE(read.width() == 70);
+  REQUIRE(read.height() == 40);
+  for (const auto& [x, y] : {std::pair{5, 5}, std::pair{30, 8}, std::pair{66, 37}}) {
+    CHECK(read(x, y).r == Approx(picture(x, y).r).margin(8));
+    CHECK(read(x, y).g == Approx(picture(x, y).g).margin(8));
+    CHECK(read(x, y).b == Approx(90).margin(8));
+  }
+  // A part of an image: rows with pixels between them.
+  const orbis::image_view<const orbis::rgb8> corner{picture.data() + 30, 16, 8, 70};
+  CHECK(io::decode_jpeg(io::encode_jpeg(corner, 95).value()).value()(0, 0).r == Approx(90).margin(8));
+  CHECK(io::encode_jpeg(picture, 30).value().size() < io::encode_jpeg(picture, 95).value().size());
+
+  CHECK(io::encode_jpeg({}).error().code == orbis::errc::invalid_argument);
+  CHECK(io::encode_jpeg(orbis::image<orbis::rgb8>(70000, 1)).error().code == orbis::errc::invalid_argument);
 }

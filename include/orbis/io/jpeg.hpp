@@ -1,15 +1,17 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// JPEG images, decoded with libjpeg(-turbo). A damaged or truncated file is an error, never a half
+/// JPEG images, decoded and encoded with libjpeg(-turbo). A damaged or truncated file is an error, never a half
 /// grey image.
 #pragma once
 
+#include <cassert>
 #include <string>
 #include <string_view>
 
 #include <orbis/core/image.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/io/detail/files/jpeg_decoder.hpp>
+#include <orbis/io/detail/files/jpeg_encoder.hpp>
 
 namespace orbis::io {
 
@@ -24,6 +26,16 @@ namespace orbis::io {
   image<rgb8> pixels(decoder.width(), decoder.height());
   if (!decoder.read_pixels(pixels.data())) return fail(errc::malformed, where, "damaged JPEG: " + decoder.message());
   return pixels;
+}
+
+/// A baseline JPEG of an image, with half the resolution for colour. `quality`: 1 (small) ... 100 (like the image).
+/// Errors: invalid_argument (no pixels, or more than 65500 in a row or column). @pre 1 <= quality <= 100
+[[nodiscard]] inline result<std::string> encode_jpeg(image_view<const rgb8> pixels, int quality = 85) {
+  assert(1 <= quality && quality <= 100);
+  if (pixels.empty()) return fail(errc::invalid_argument, {}, "a JPEG without pixels");
+  detail::jpeg_encoder encoder;
+  if (!encoder.write(pixels, quality)) return fail(errc::invalid_argument, {}, "no JPEG: " + encoder.message());
+  return std::string{encoder.bytes()};
 }
 
 }  // namespace orbis::io

@@ -40,8 +40,9 @@ namespace orbis::io {
 /// exactly. Frames are independent: each can be asked for in any order, from several threads, and is
 /// the same bytes on every machine (the pose apart, whose last bit may differ).
 ///
-/// The room stands on z = 0 with the origin in the middle of its floor. Construction paints the
-/// textures (a few tenths of a second at 640x480, on all threads); copies share them.
+/// The room stands on z = 0 with the origin in the middle of its floor. The surfaces' textures are painted when they
+/// are seen first, which takes a few tenths of a second for the first frames at 640x480, and some 50 MB in the end;
+/// copies share them.
 class synthetic_recording {
  public:
   class iterator;
@@ -53,9 +54,8 @@ class synthetic_recording {
               (options.frames_around > 0 ? options.frames_around : options.frames) / options.fps},
         k_{detail::synthetic::usual_intrinsics(options.width, options.height)},
         scene_{std::make_shared<detail::synthetic::scene>(options.scene, options.seed)},
-        simulator_{
-            std::make_shared<detail::synthetic::texture_set>(par, detail::synthetic::painted(*scene_), texel(k_)), k_,
-            options.depth_scale, options.sensor, options.seed} {
+        simulator_{std::make_shared<detail::synthetic::texture_set>(detail::synthetic::painted(*scene_), texel(k_)), k_,
+                   options.depth_scale, options.sensor, options.seed} {
     assert(options.frames >= 0 && options.fps > 0.0);
   }
 
@@ -66,7 +66,7 @@ class synthetic_recording {
   [[nodiscard]] const synthetic_options& options() const noexcept { return options_; }
   /// The distance (metres, unsigned) of a point of the world to the nearest surface that a camera could see: the error
   /// of a map point. Exact in front of the surfaces; behind them, where solids overlap, the distance to the hull of the
-  /// one that the point is deepest in. The moving object does not count. O(solids of the room)
+  /// one that the point is deepest in. What moves does not count. O(solids of the room)
   [[nodiscard]] double surface_distance(const vec3& p_world) const noexcept { return scene_->distance(p_world); }
   /// The room's solids, for tests of this component.
   [[nodiscard]] const detail::synthetic::scene& scene() const noexcept { return *scene_; }

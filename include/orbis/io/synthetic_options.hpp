@@ -17,6 +17,7 @@ struct synthetic_scene_options {
   int poor_walls = 1;            ///< how many of the four walls are nearly without texture, 0..4
   double texture_density = 1.0;  ///< scales the number of patches painted on every surface; 0: none
   bool moving_object = false;    ///< a box that walks through the room
+  bool person = false;           ///< somebody who walks round the room, against the camera's way, at 1 m/s
   double wall_period = 0.0;      ///< metres; above 0 all walls bear one picture that repeats itself at this distance
 };
 

@@ -91,8 +91,8 @@ class sequence {
         path_{std::move(path)},
         k_{usual_intrinsics(options.width, options.height)},
         place_{std::make_shared<const world>(std::move(place))},
-        simulator_{std::make_shared<const texture_set>(par, place_->painted(), texel(options, k_)), k_, options.depth_scale,
-                options.sensor, options.seed} {
+        simulator_{std::make_shared<const texture_set>(place_->painted(), texel(options, k_)), k_, options.depth_scale,
+                   options.sensor, options.seed} {
     assert(options.fps > 0.0 && options.frames >= 0);
     if (options.frames == 0) options_.frames = static_cast<int>(path_.duration() * options.fps + 1e-6) + 1;
   }

@@ -106,7 +106,7 @@ TEST_CASE("as many walls of a building are poor as were asked for") {
 TEST_CASE("walls with a period bear one picture over and over, the others never do") {
   const auto likeness = [](double period) {
     const world place{scene{{.furniture = false, .poor_walls = 0, .wall_period = period}, 1}};
-    const texture_set textures{seq, place.painted(), 0.02};
+    const texture_set textures{place.painted(), 0.02};
     double sum = 0.0;
     constexpr int n = 500;
     random_bits bits{2};

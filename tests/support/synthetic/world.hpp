@@ -70,11 +70,10 @@ class world {
     add(room, looks);
   }
 
-  /// The room of `scene` with what stands in it, as it looks there; without the moving object.
+  /// The room of `scene` with what stands in it, as it looks there; without what moves there.
   explicit world(const scene& room) : lamps_{{0.0, 0.0, room.options().height - 0.5}} {
     const synthetic_scene_options& o = room.options();
-    const std::size_t last = room.solids().size() - (o.moving_object ? 1 : 0);
-    for (std::size_t i = 0; i != last; ++i)
+    for (std::size_t i = 0; i != room.still(); ++i)
       add(room.solids()[i], i == 0 ? looks_of_walls(room) : usual_looks(room.solids()[i], o.texture_density));
   }
 

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <limits>
@@ -25,7 +26,7 @@ triple random_direction(random_bits& bits) {
 
 TEST_CASE("a ray meets each kind of solid where walking along the distance field does") {
   random_bits bits{11};
-  for (const shape kind : {shape::box, shape::sphere, shape::cylinder, shape::room}) {
+  for (const shape kind : {shape::box, shape::sphere, shape::cylinder, shape::capsule, shape::room}) {
     int hits = 0;
     for (int i = 0; i != 2000; ++i) {
       solid s;
@@ -35,6 +36,12 @@ TEST_CASE("a ray meets each kind of solid where walking along the distance field
       const double yaw = bits.uniform();
       s.cos_yaw = cos_turns(yaw);
       s.sin_yaw = sin_turns(yaw);
+      if (kind == shape::capsule) {
+        const double tilt = bits.uniform();
+        s.cos_tilt = cos_turns(tilt);
+        s.sin_tilt = sin_turns(tilt);
+        s.half.z += s.half.x;
+      }
       const triple origin = kind == shape::room
                                 ? s.centre
                                 : s.centre + 2.0 * (1.0 / length(random_direction(bits))) * random_direction(bits);
@@ -158,4 +165,59 @@ TEST_CASE("only the moving object moves and only if there is one") {
   CHECK(count_moved(still) == 0);
   CHECK(count_moved(moving) == 1);
   CHECK(moving.solids().size() == still.solids().size() + 1);
+}
+
+TEST_CASE("a solid is inside of its bounds") {
+  random_bits bits{12};
+  for (const shape kind : {shape::box, shape::cylinder, shape::capsule}) {
+    for (int i = 0; i != 300; ++i) {
+      solid s;
+      s.kind = kind;
+      s.half = {bits.uniform(0.1, 0.4), bits.uniform(0.1, 0.4), bits.uniform(0.4, 0.8)};
+      const double yaw = bits.uniform(), tilt = bits.uniform();
+      s.cos_yaw = cos_turns(yaw);
+      s.sin_yaw = sin_turns(yaw);
+      s.cos_tilt = cos_turns(tilt);
+      s.sin_tilt = sin_turns(tilt);
+      const triple b = s.bounds();
+      for (int j = 0; j != 50; ++j) {
+        const triple p{bits.uniform(-1, 1), bits.uniform(-1, 1), bits.uniform(-1, 1)};
+        if (s.signed_distance(p) > 0.0) continue;
+        const bool inside = std::abs(p.x) <= b.x && std::abs(p.y) <= b.y && std::abs(p.z) <= b.z;
+        REQUIRE(inside);
+      }
+    }
+  }
+}
+
+TEST_CASE("a person walks round the room, on the floor and between camera and furniture") {
+  const scene empty{{}, 4}, with{{.person = true}, 4};
+  REQUIRE(with.still() == empty.solids().size());
+  REQUIRE(with.solids().size() > with.still());
+  const auto middle = [&](double time) {
+    triple sum;
+    const auto now = with.solids_at(time);
+    for (std::size_t i = with.still(); i != now.size(); ++i) sum = sum + now[i].centre;
+    return (1.0 / static_cast<double>(now.size() - with.still())) * sum;
+  };
+  double way = 0.0;
+  for (double time = 0.0; time < 10.0; time += 0.1) {
+    way += length(middle(time + 0.1) - middle(time));
+    const auto now = with.solids_at(time);
+    double lowest = 9.0, highest = 0.0;
+    for (std::size_t i = with.still(); i != now.size(); ++i) {
+      lowest = std::min(lowest, now[i].centre.z - now[i].bounds().z);
+      highest = std::max(highest, now[i].centre.z + now[i].bounds().z);
+      CHECK(empty.solids().front().signed_distance(now[i].centre) > 0.4);  // away from the walls
+      CHECK(std::abs(now[i].centre.x) + std::abs(now[i].centre.y) > 0.9);  // the camera is not run over
+      for (std::size_t other = 1; other != with.still(); ++other)
+        CHECK(with.solids()[other].signed_distance(now[i].centre) > 0.0);
+    }
+    CHECK(std::abs(lowest) < 0.1);
+    CHECK(highest == Approx(1.75).margin(0.1));
+    for (std::size_t i = 0; i != with.still(); ++i) REQUIRE(length(now[i].centre - empty.solids()[i].centre) == 0.0);
+  }
+  CHECK(way == Approx(10.0).epsilon(0.1));
+  // The truth is that of the room.
+  CHECK(with.distance(to_vec3(middle(3.0))) == empty.distance(to_vec3(middle(3.0))));
 }

@@ -88,7 +88,7 @@ class renderer {
     return dot(inward, c.offset) + reach >= 0.0;
   }
 
-  void render_pixel(int x, int y, const std::vector<const candidate*>& near, exact_view& out) const noexcept {
+  void render_pixel(int x, int y, const std::vector<const candidate*>& near, exact_view& out) const {
     const double a = (x - k_.cx) * inverse_fx_, b = (y - k_.cy) * inverse_fy_;
     const candidate* best = &seen_.front();
     triple direction = a * best->right + (b * best->down + best->forward);
@@ -102,22 +102,23 @@ class renderer {
     shade(x, y, *best, h, direction, length({a, b, 1.0}), out);
   }
 
-  void shade(int x, int y, const candidate& c, hit h, triple direction, double range_per_depth,
-             exact_view& out) const noexcept {
+  void shade(int x, int y, const candidate& c, hit h, triple direction, double range_per_depth, exact_view& out) const {
     const triple p = c.origin + h.t * direction;
     const triple half = c.body.half;
     double u = 0.0, v = 0.0, cosine = 0.0;
     int face = 0;
-    if (c.body.kind == shape::sphere || (c.body.kind == shape::cylinder && h.axis != 2)) {
+    if (c.body.kind == shape::sphere || c.body.kind == shape::capsule ||
+        (c.body.kind == shape::cylinder && h.axis != 2)) {
       // Projected from the middle onto the cube around it.
       const double ax = std::abs(p.x), ay = std::abs(p.y);
       const double az = c.body.kind == shape::sphere ? std::abs(p.z) : 0.0;
       const int axis = az > ax && az > ay ? 2 : (ay > ax ? 1 : 0);
-      const double scale = half.x / (axis == 0 ? ax : (axis == 1 ? ay : az));
+      const double scale = half.x / std::max(axis == 0 ? ax : (axis == 1 ? ay : az), 1e-12);
       u = (axis == 0 ? p.y : p.x) * scale + half.x;
-      v = c.body.kind == shape::cylinder ? p.z + half.z : (axis == 2 ? p.y : p.z) * scale + half.x;
+      v = c.body.kind != shape::sphere ? p.z + half.z : (axis == 2 ? p.y : p.z) * scale + half.x;
       face = 2 * axis + ((axis == 0 ? p.x : (axis == 1 ? p.y : p.z)) > 0.0 ? 1 : 0);
-      const triple normal{p.x, p.y, c.body.kind == shape::sphere ? p.z : 0.0};
+      const triple normal = c.body.kind == shape::capsule ? c.body.from_axis(p)
+                                                          : triple{p.x, p.y, c.body.kind == shape::sphere ? p.z : 0.0};
       cosine = std::abs(dot(normal, direction)) / (half.x * range_per_depth);
     } else {
       const double along = h.axis == 0 ? direction.x : (h.axis == 1 ? direction.y : direction.z);

@@ -14,6 +14,7 @@
 
 #include <orbis/core/types.hpp>
 #include <orbis/io/detail/synthetic/arithmetic.hpp>
+#include <orbis/io/detail/synthetic/person.hpp>
 #include <orbis/io/detail/synthetic/solid.hpp>
 #include <orbis/io/synthetic_options.hpp>
 
@@ -34,24 +35,32 @@ class scene {
         material::wallpaper);
     first_poor_wall_ = static_cast<int>(bits_.below(4));
     if (options.furniture) furnish();
-    if (options.moving_object) {
-      moving_ = solids_.size();
-      add(shape::box, {0.0, 0.0, 0.8}, {0.2, 0.15, 0.8}, material::clutter);
+    still_ = solids_.size();
+    if (options.moving_object) add(shape::box, {0.0, 0.0, 0.8}, {0.2, 0.15, 0.8}, material::clutter);
+    if (options.person) {
+      person_seed_ = bits_();
+      for (const solid& s : person_at(0.0)) solids_.push_back(s);
     }
   }
 
   /// The surfaces: first the room itself, then all that stands in it.
   [[nodiscard]] const std::vector<solid>& solids() const noexcept { return solids_; }
-  /// The surfaces `time` seconds after the beginning: only the moving object is at another place.
+  /// The surfaces `time` seconds after the beginning: only those of the moving object and of the person are elsewhere.
   [[nodiscard]] std::vector<solid> solids_at(double time) const {
     std::vector<solid> now = solids_;
-    if (moving_ != 0) {
+    if (options_.moving_object) {
       const double across = sin_turns(time / 24.0), along = cos_turns(time / 24.0);
-      now[moving_].centre.x = 1.6 * across;
-      now[moving_].centre.y = 1.3 * along;
+      now[still_].centre.x = 1.6 * across;
+      now[still_].centre.y = 1.3 * along;
+    }
+    if (options_.person) {
+      const body_parts parts = person_at(time);
+      std::copy(parts.begin(), parts.end(), now.end() - static_cast<std::ptrdiff_t>(parts.size()));
     }
     return now;
   }
+  /// How many of the solids never move: the first ones.
+  [[nodiscard]] std::size_t still() const noexcept { return still_; }
 
   /// Metres along x, y and z.
   [[nodiscard]] vec3 size() const { return {length_, width_, options_.height}; }
@@ -63,30 +72,39 @@ class scene {
 
   /// The distance (metres, unsigned) of a point to the nearest surface a camera could see: the error
   /// of a map point. Exact in front of the surfaces; behind them, where several solids overlap, the
-  /// distance to the hull of the one the point is deepest in. The moving object does not count.
+  /// distance to the hull of the one the point is deepest in. What moves does not count.
   [[nodiscard]] double distance(const vec3& p_world) const noexcept {
     const triple p = to_triple(p_world);
     double nearest = solids_.front().signed_distance(p);
-    for (std::size_t i = 1; i != solids_.size(); ++i)
-      if (i != moving_) nearest = std::min(nearest, solids_[i].signed_distance(p));
+    for (std::size_t i = 1; i != still_; ++i) nearest = std::min(nearest, solids_[i].signed_distance(p));
     return std::abs(nearest);
   }
 
   /// Where the ray `origin + t direction` first meets a surface: `t`, empty if the ray starts outside
-  /// of the room, or the direction is zero or not finite. The moving object does not count.
+  /// of the room, or the direction is zero or not finite. What moves does not count.
   [[nodiscard]] std::optional<double> cast(const vec3& origin, const vec3& direction) const noexcept {
     if (!origin.allFinite() || !direction.allFinite() || direction.isZero(0.0)) return std::nullopt;
     double t = std::numeric_limits<double>::infinity();
-    for (std::size_t i = 0; i != solids_.size(); ++i)
-      if (i != moving_ || i == 0)
-        t = std::min(t, intersect(solids_[i], solids_[i].to_local(to_triple(origin)),
-                                  solids_[i].to_local_direction(to_triple(direction)))
-                            .t);
+    for (std::size_t i = 0; i != still_; ++i)
+      t = std::min(t, intersect(solids_[i], solids_[i].to_local(to_triple(origin)),
+                                solids_[i].to_local_direction(to_triple(direction)))
+                          .t);
     if (!(t > 0.0) || !std::isfinite(t)) return std::nullopt;
     return t;
   }
 
  private:
+  /// The person, on an ellipse between the camera's way and the furniture.
+  [[nodiscard]] body_parts person_at(double time) const noexcept {
+    const double a = 0.5 * length_ - 1.25, b = 0.5 * width_ - 1.15;
+    constexpr double radians_per_turn = 6.283185307179586;
+    // Mean speed 1 m/s, and a double step of 1.3 m.
+    const double turn = -time / (radians_per_turn * std::sqrt(0.5 * (a * a + b * b)));
+    const double x = cos_turns(turn), y = sin_turns(turn);
+    const double speed = std::sqrt(square(a * y) + square(b * x));
+    return walking_person({a * x, b * y, 0.0}, a * y / speed, -b * x / speed, time / 1.3, person_seed_);
+  }
+
   /// A place at a wall: `along` it from its middle, `out` of it into the room.
   struct wall {
     int face;       // as in is_poor_wall
@@ -275,7 +293,8 @@ class scene {
   double length_ = 0.0, width_ = 0.0;
   int first_poor_wall_ = 0;
   std::vector<solid> solids_;
-  std::size_t moving_ = 0;  // its index, or 0: there is none
+  std::size_t still_ = 0;  // how many never move
+  std::uint64_t person_seed_ = 0;
 };
 
 }  // namespace orbis::io::detail::synthetic

@@ -21,30 +21,41 @@ enum class shape : std::uint8_t {
   box,       ///< half sizes along its own axes
   sphere,    ///< half.x is the radius
   cylinder,  ///< upright; half.x is the radius, half.z half the height
+  capsule,   ///< a cylinder with half spheres for ends, which count in its half height half.z; may be tilted
   room       ///< a box seen from inside: everything outside of it is solid
 };
 
-/// A solid, possibly turned about the vertical. Each has six faces, two for each of its own axes
-/// (2 * axis, plus one for the positive side); round ones take the face of their largest coordinate.
+/// A solid, possibly turned about the vertical, and before that about its own y axis, if it is a capsule. Each has six
+/// faces, two for each of its own axes (2 * axis, plus one for the positive side); round ones take the face of their
+/// largest coordinate.
 struct solid {
   shape kind = shape::box;
   triple centre;  ///< metres, world
   triple half;    ///< half sizes, metres
   double cos_yaw = 1.0, sin_yaw = 0.0;
+  double cos_tilt = 1.0, sin_tilt = 0.0;  ///< of a capsule: its upper end is turned towards its own x axis
   material surface = material::plain;
   std::uint64_t seed = 0;  ///< of its texture
 
   [[nodiscard]] triple to_local_direction(triple d) const noexcept {
-    return {cos_yaw * d.x + sin_yaw * d.y, cos_yaw * d.y - sin_yaw * d.x, d.z};
+    const triple turned{cos_yaw * d.x + sin_yaw * d.y, cos_yaw * d.y - sin_yaw * d.x, d.z};
+    if (kind != shape::capsule) return turned;
+    return {cos_tilt * turned.x - sin_tilt * turned.z, turned.y, sin_tilt * turned.x + cos_tilt * turned.z};
   }
   [[nodiscard]] triple to_local(triple p) const noexcept { return to_local_direction(p - centre); }
   [[nodiscard]] triple to_world_direction(triple d) const noexcept {
+    if (kind == shape::capsule) d = {cos_tilt * d.x + sin_tilt * d.z, d.y, cos_tilt * d.z - sin_tilt * d.x};
     return {cos_yaw * d.x - sin_yaw * d.y, sin_yaw * d.x + cos_yaw * d.y, d.z};
   }
   /// Half sizes of the upright box of the world's axes around it.
   [[nodiscard]] triple bounds() const noexcept {
     if (kind == shape::sphere || kind == shape::cylinder)
       return {half.x, half.x, kind == shape::sphere ? half.x : half.z};
+    if (kind == shape::capsule) {
+      const double core = half.z - half.x;  // of its axis
+      return {half.x + core * std::abs(sin_tilt * cos_yaw), half.x + core * std::abs(sin_tilt * sin_yaw),
+              half.x + core * std::abs(cos_tilt)};
+    }
     const double c = std::abs(cos_yaw), s = std::abs(sin_yaw);
     return {c * half.x + s * half.y, s * half.x + c * half.y, half.z};
   }
@@ -56,11 +67,18 @@ struct solid {
       case shape::sphere: return length(p) - half.x;
       case shape::cylinder:
         return rounded_off({std::sqrt(p.x * p.x + p.y * p.y) - half.x, std::abs(p.z) - half.z, -1e30});
+      case shape::capsule: return length(from_axis(p)) - half.x;
       case shape::box: break;
       case shape::room: break;
     }
     const double d = rounded_off({std::abs(p.x) - half.x, std::abs(p.y) - half.y, std::abs(p.z) - half.z});
     return kind == shape::room ? -d : d;
+  }
+
+  /// From the nearest point of a capsule's axis to `p`, in its own frame.
+  [[nodiscard]] triple from_axis(triple p) const noexcept {
+    const double core = half.z - half.x;
+    return {p.x, p.y, p.z - std::clamp(p.z, -core, core)};
   }
 
  private:
@@ -110,6 +128,29 @@ struct hit {
     if (discriminant < 0.0 || b >= 0.0) return h;
     const double t = c / (std::sqrt(discriminant) - b);  // the nearer root, without cancellation
     if (t > 0.0) h.t = t;
+    return h;
+  }
+  if (s.kind == shape::capsule) {
+    // Of all points of the surface that the ray may enter by, the side's is valid between the half spheres.
+    const double core = s.half.z - s.half.x;
+    const auto enters = [&](double a, double b, double c) {
+      const double discriminant = b * b - a * c;
+      return discriminant < 0.0 || b >= 0.0 || c <= 0.0 ? -1.0 : c / (std::sqrt(discriminant) - b);
+    };
+    const double radius2 = s.half.x * s.half.x;
+    const double t =
+        enters(direction.x * direction.x + direction.y * direction.y, origin.x * direction.x + origin.y * direction.y,
+               origin.x * origin.x + origin.y * origin.y - radius2);
+    if (t > 0.0 && std::abs(origin.z + t * direction.z) <= core) {
+      h.t = t;
+      return h;
+    }
+    for (const double end : {-core, core}) {
+      const triple from{origin.x, origin.y, origin.z - end};
+      const double to_end = enters(dot(direction, direction), dot(from, direction), dot(from, from) - radius2);
+      // A half sphere: its other half is inside of the capsule.
+      if (to_end > 0.0 && to_end < h.t && (from.z + to_end * direction.z) * end >= 0.0) h.t = to_end;
+    }
     return h;
   }
   const double a = direction.x * direction.x + direction.y * direction.y;

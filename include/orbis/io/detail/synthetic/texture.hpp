@@ -11,13 +11,15 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <bit>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <mutex>
+#include <utility>
 #include <vector>
 
-#include <orbis/core/execution.hpp>
 #include <orbis/io/detail/synthetic/arithmetic.hpp>
 #include <orbis/io/detail/synthetic/canvas.hpp>
 #include <orbis/io/detail/synthetic/looks.hpp>
@@ -27,19 +29,19 @@ ORBIS_BEGIN_UNFUSED
 
 namespace orbis::io::detail::synthetic {
 
-/// All faces of some solids, painted and lit, in pyramids.
+/// All faces of some solids, painted and lit, in pyramids. A face is painted when it is seen first: no camera sees all
+/// of them. Thread-safe. Four bytes for each texel of the faces that were seen, and twelve more of the one that is
+/// painted.
 class texture_set {
  public:
-  /// Paints every face with `texel` metres for each texel. O(surface / texel^2).
-  template <execution_policy Policy>
-  texture_set(const Policy& policy, const painted_solids& place, double texel) : faces_(6 * place.solids.size()) {
-    for_each_index(policy, faces_.size(), 1, [&](std::size_t i) { paint(place, i, texel); });
-  }
+  /// `texel`: metres for each texel of the faces.
+  texture_set(painted_solids place, double texel)
+      : place_{std::move(place)}, texel_{texel}, faces_(6 * place_.solids.size()) {}
 
   /// The colour (red in the lowest byte) at (u, v) metres from the corner of face `face` of solid
   /// `of`, where a pixel covers `footprint` metres.
-  [[nodiscard]] std::uint32_t sample(std::size_t of, int face, double u, double v, double footprint) const noexcept {
-    const pyramid& p = faces_[6 * of + static_cast<std::size_t>(face)];
+  [[nodiscard]] std::uint32_t sample(std::size_t of, int face, double u, double v, double footprint) const {
+    const pyramid& p = painted(6 * of + static_cast<std::size_t>(face));
     // The logarithm to base 2, linear between powers of two, in 1/256.
     const auto relative = static_cast<float>(footprint * p.inverse_texel);
     const int detail = (std::bit_cast<std::int32_t>(relative) - 0x3f800000) >> 15;
@@ -56,17 +58,36 @@ class texture_set {
 
  private:
   static constexpr int most_levels = 12;
+  static constexpr std::size_t channels = 3;
   struct pyramid {
-    std::vector<std::uint32_t> texels;
+    std::vector<unsigned char> texels;  // red, green, blue
     std::array<std::uint32_t, most_levels> begin{};
     std::array<std::int32_t, most_levels> width{}, height{};
     int levels = 0;
     double inverse_texel = 1.0;  // of the finest level
   };
 
+  struct lazy_face {
+    pyramid picture;
+    std::atomic<bool> is_painted{false};
+    std::mutex painting;
+  };
+
+  [[nodiscard]] const pyramid& painted(std::size_t index) const {
+    lazy_face& f = faces_[index];
+    if (!f.is_painted.load(std::memory_order_acquire)) {
+      const std::lock_guard lock{f.painting};
+      if (!f.is_painted.load(std::memory_order_relaxed)) {
+        paint(index, f.picture);
+        f.is_painted.store(true, std::memory_order_release);
+      }
+    }
+    return f.picture;
+  }
+
   // Three channels side by side in one word, 16 bits apart.
-  [[nodiscard]] static std::uint64_t spread(std::uint32_t c) noexcept {
-    return (c & 0xffU) | (std::uint64_t{c & 0xff00U} << 8U) | (std::uint64_t{c & 0xff0000U} << 16U);
+  [[nodiscard]] static std::uint64_t spread(const unsigned char* texel) noexcept {
+    return texel[0] | std::uint64_t{texel[1]} << 16U | std::uint64_t{texel[2]} << 32U;
   }
   [[nodiscard]] static std::uint32_t pack(std::uint64_t s) noexcept {
     return static_cast<std::uint32_t>((s & 0xffU) | ((s >> 8U) & 0xff00U) | ((s >> 16U) & 0xff0000U));
@@ -83,11 +104,11 @@ class texture_set {
     const int x = std::clamp((u >> level) - 128, 0, (w - 1) * 256);
     const int y = std::clamp((v >> level) - 128, 0, (h - 1) * 256);
     const int i = x >> 8, j = y >> 8;
-    const std::uint32_t* row = p.texels.data() + p.begin[l] + j * w + i;
-    const int right = i + 1 < w ? 1 : 0, below = j + 1 < h ? w : 0;
+    const unsigned char* const at = p.texels.data() + channels * (p.begin[l] + static_cast<std::size_t>(j * w + i));
+    const std::size_t right = i + 1 < w ? channels : 0, below = j + 1 < h ? channels * static_cast<std::size_t>(w) : 0;
     const auto f = static_cast<std::uint64_t>(x & 255), g = static_cast<std::uint64_t>(y & 255);
-    const std::uint64_t top = blend(spread(row[0]), spread(row[right]), f);
-    const std::uint64_t bottom = blend(spread(row[below]), spread(row[below + right]), f);
+    const std::uint64_t top = blend(spread(at), spread(at + right), f);
+    const std::uint64_t bottom = blend(spread(at + below), spread(at + below + right), f);
     return blend(top, bottom, g);
   }
 
@@ -104,27 +125,27 @@ class texture_set {
     return static_cast<float>(0.46 + lamp + 0.16 * window);
   }
 
-  void paint(const painted_solids& place, std::size_t index, double finest) {
+  void paint(std::size_t index, pyramid& p) const {
     const std::size_t of = index / 6;
     const int face = static_cast<int>(index % 6);
-    const solid& s = place.solids[of];
+    const solid& s = place_.solids[of];
     const std::array<double, 3> half{s.half.x, s.half.y, s.half.z};
     const int axis = face / 2;
     const auto ua = static_cast<std::size_t>(axis == 0 ? 1 : 0), va = static_cast<std::size_t>(axis == 2 ? 1 : 2);
-    const face_look& look = place.looks[of][static_cast<std::size_t>(face)];
-    const double texel = finest * look.coarseness;
+    const face_look& look = place_.looks[of][static_cast<std::size_t>(face)];
+    const double texel = texel_ * look.coarseness;
     const double across = 2.0 * half[ua], up = 2.0 * half[va];
     const bool repeats = look.period > 0.0;
     canvas c{repeats ? std::min(look.period, across) : across, repeats ? std::min(look.period, up) : up, texel};
     c.prime(look.surface, look.seed);
     c.scatter(look.patches, look.contrast, mix64(look.seed));
 
-    pyramid& p = faces_[index];
     p.inverse_texel = 1.0 / texel;
     p.width[0] = repeats ? canvas::texels(across, texel) : c.width();
     p.height[0] = repeats ? canvas::texels(up, texel) : c.height();
-    p.texels.reserve(static_cast<std::size_t>(p.width[0]) * static_cast<std::size_t>(p.height[0]) * 4 / 3 + 32);
-    const bool round = s.kind == shape::sphere || s.kind == shape::cylinder;
+    p.texels.clear();  // where painting failed before
+    p.texels.reserve(channels * texels_of(p.width[0], p.height[0]));
+    const bool round = s.kind == shape::sphere || s.kind == shape::cylinder || s.kind == shape::capsule;
     for (int y = 0; y != p.height[0]; ++y)
       for (int x = 0; x != p.width[0]; ++x) {
         std::array<double, 3> at{}, normal{};
@@ -141,12 +162,12 @@ class texture_set {
           n = {normal[0], normal[1], normal[2]};
         }
         const float brightness =
-            light(place, s.centre + s.to_world_direction({at[0], at[1], at[2]}), s.to_world_direction(n));
+            light(place_, s.centre + s.to_world_direction({at[0], at[1], at[2]}), s.to_world_direction(n));
         const tint t = c(x % c.width(), y % c.height());
         const auto byte = [&](float v) {
-          return static_cast<std::uint32_t>(std::clamp(v * brightness, 0.0F, 1.0F) * 255.0F + 0.5F);
+          return static_cast<unsigned char>(std::clamp(v * brightness, 0.0F, 1.0F) * 255.0F + 0.5F);
         };
-        p.texels.push_back(byte(t.r) | byte(t.g) << 8U | byte(t.b) << 16U);
+        for (const float v : {t.r, t.g, t.b}) p.texels.push_back(byte(v));
       }
     p.levels = 1;
     while (p.levels < most_levels && (p.width[static_cast<std::size_t>(p.levels - 1)] > 1 ||
@@ -154,27 +175,42 @@ class texture_set {
       halve(p);
   }
 
+  /// How many texels a pyramid has.
+  [[nodiscard]] static std::size_t texels_of(int width, int height) noexcept {
+    std::size_t all = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
+    for (int level = 1; level != most_levels && (width > 1 || height > 1); ++level) {
+      width = (width + 1) / 2;
+      height = (height + 1) / 2;
+      all += static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
+    }
+    return all;
+  }
+
   /// Appends the next level: means of two by two.
   static void halve(pyramid& p) {
     const auto l = static_cast<std::size_t>(p.levels);
     const int w = p.width[l - 1], h = p.height[l - 1];
     const std::size_t from = p.begin[l - 1];
-    p.begin[l] = static_cast<std::uint32_t>(p.texels.size());
+    p.begin[l] = static_cast<std::uint32_t>(p.texels.size() / channels);
     p.width[l] = (w + 1) / 2;
     p.height[l] = (h + 1) / 2;
     const auto texel = [&](int x, int y) {
-      return spread(p.texels[from + static_cast<std::size_t>(std::min(y, h - 1) * w + std::min(x, w - 1))]);
+      return spread(p.texels.data() +
+                    channels * (from + static_cast<std::size_t>(std::min(y, h - 1) * w + std::min(x, w - 1))));
     };
     for (int y = 0; y != p.height[l]; ++y)
       for (int x = 0; x != p.width[l]; ++x) {
         const std::uint64_t sum =
             texel(2 * x, 2 * y) + texel(2 * x + 1, 2 * y) + texel(2 * x, 2 * y + 1) + texel(2 * x + 1, 2 * y + 1);
-        p.texels.push_back(pack(((sum + 0x0000000200020002ULL) >> 2U) & 0x000000ff00ff00ffULL));
+        const std::uint32_t mean = pack(((sum + 0x0000000200020002ULL) >> 2U) & 0x000000ff00ff00ffULL);
+        for (std::size_t c = 0; c != channels; ++c) p.texels.push_back(static_cast<unsigned char>(mean >> (8 * c)));
       }
     ++p.levels;
   }
 
-  std::vector<pyramid> faces_;
+  painted_solids place_;
+  double texel_;
+  mutable std::vector<lazy_face> faces_;
 };
 
 }  // namespace orbis::io::detail::synthetic
