@@ -16,6 +16,7 @@
 #include <orbis/core/file.hpp>
 
 #include "filters.hpp"
+#include "viewer/backend.hpp"
 
 namespace app {
 namespace {
@@ -77,7 +78,14 @@ void add_map_options(CLI::App& cmd, settings& s) {
       ->check(within(0.0, 1000.0))
       ->capture_default_str()
       ->type_name("A");
-  cmd.add_option("--threads", s.threads, "threads for filter and octree; 1: for all, as --deterministic")
+  count(cmd, "--depth-memory", s.depth_memory,
+        "memory for the depth images of keyframes, MB; what is beyond goes to a nameless file in the output folder", 0,
+        1'000'000)
+      ->capture_default_str();
+  cmd.add_option(
+         "--threads", s.threads,
+         "threads for filter and octree; 1: for all, as --deterministic, and one thing after the other: tracking "
+         "waits for the live map")
       ->check(within(1U, 1024U))
       ->type_name("N");
   cmd.add_flag("--quiet", s.quiet, "say nothing but errors");
@@ -110,6 +118,10 @@ void add_slam_options(CLI::App& cmd, settings& s) {
   cmd.add_flag(
       "--live-map,!--batch-map", s.live_map,
       "the octree grows while frames are tracked (default), or is made of all keyframes in the end: the same map");
+  cmd.add_flag(
+      "--map-every-frame", s.map_every_frame,
+      "the live map takes every tracked frame, not keyframes alone; the files are made of keyframes all the same");
+  cmd.add_flag("--realtime", s.realtime, "frames come at the pace of their time stamps, as from a camera");
   cmd.add_option("--save-map", s.save_map, "write the map of landmarks when all is tracked")
       ->check(not_empty)
       ->type_name("FILE");
@@ -120,12 +132,35 @@ void add_slam_options(CLI::App& cmd, settings& s) {
                "only find the camera in the loaded map, which stays as it is: no keyframes, no cloud, no octree");
 }
 
+void add_viewer_options(CLI::App& cmd, settings& s) {
+  cmd.add_option_function<std::string>(
+         "--viewer", [&s](const std::string& name) { s.viewer = name.empty() ? "window" : name; },
+         "shows the run while it goes on: in a window, or (--viewer web) as a page for browsers of this machine")
+      ->check(CLI::Validator(
+          [](const std::string& name) {
+            const bool is_known = name.empty() || name == "window" || name == "web";
+            return is_known ? std::string{} : "\"" + name + "\" is neither window nor web";
+          },
+          ""))
+      ->expected(0, 1)
+      ->type_name("[window|web]");
+  cmd.add_option("--viewer-port", s.viewer_port, "where --viewer web serves its page on 127.0.0.1; 0: any free port")
+      ->check(within(0U, 65535U))
+      ->capture_default_str()
+      ->type_name("N");
+  cmd.add_flag("--viewer-hold", s.viewer_hold, "the viewer stays after the run, until it is closed or Ctrl-C");
+}
+
 /// What of the options does not go together; empty if all does.
 std::string contradiction(const settings& s) {
   if (s.localize_only && s.load_map.empty())
     return "--localize-only wants a map to find the camera in: --load-map FILE";
+  if (s.map_every_frame && (!s.live_map || s.localize_only))
+    return "--map-every-frame wants a live map: not with --batch-map or --localize-only";
   if (s.localize_only && !s.save_map.empty())
     return "--localize-only leaves the map as it is: there is nothing to save with --save-map";
+  if (s.viewer.empty() && s.viewer_hold) return "--viewer-hold wants a viewer: --viewer";
+  if (!has_viewer(s.viewer)) return how_to_get_viewer(s.viewer);
   return {};
 }
 
@@ -190,6 +225,7 @@ std::variant<settings, exit_code> read_command_line(int argc, char** argv) {
   add_frame_options(*run, s);
   add_map_options(*run, s);
   add_slam_options(*run, s);
+  add_viewer_options(*run, s);
 
   CLI::App* demo = cli.add_subcommand("demo", "SLAM on a synthetic room made on the fly, with ground truth");
   add_frame_options(*demo, s);
@@ -198,8 +234,10 @@ std::variant<settings, exit_code> read_command_line(int argc, char** argv) {
   demo->add_option("--seed", s.seed, "of the room, the camera's path and the sensor's noise")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
+  demo->add_flag("--person", s.person, "somebody walks round the room");
   add_map_options(*demo, s);
   add_slam_options(*demo, s);
+  add_viewer_options(*demo, s);
 
   CLI::App* eval = cli.add_subcommand("eval", "compare a trajectory with ground truth (TUM format): ATE and RPE");
   eval->add_option("TRAJECTORY", s.input, "the estimate")->required()->type_name("");

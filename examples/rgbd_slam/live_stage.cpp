@@ -2,14 +2,24 @@
 #include "live_stage.hpp"
 
 #include <algorithm>
+#include <chrono>
 #include <utility>
+
+#include "priority.hpp"
 
 namespace app {
 namespace {
 
+using orbis::mapping::depth_use;
+using pixels_view = orbis::camera::depth_view<std::uint16_t>;
+
 orbis::mapping::live_map_thread_options thread_options(const settings& s) {
   orbis::mapping::live_map_thread_options options;
   options.map.resolution = s.resolution;
+  options.correction_slice = std::chrono::milliseconds{2};  // a keyframe waits for no more than that
+  if (s.map_every_frame) options.map.max_frames = 90;
+  if (s.threads == 1) options.poll_interval = std::chrono::hours{24};  // whoever waits for the map has it ask
+  options.moving.emplace();
   return options;
 }
 
@@ -19,36 +29,59 @@ live_mapping::live_mapping(const frame_source& source, const settings& s, std::f
                            find_poses where)
     : where_{std::move(where)},
       depth_scale_{source.camera.depth_scale},
+      waits_{s.threads == 1},
       rays_{source.camera.model},
-      live_{
-          source.camera.model,
-          thread_options(s),
-          {.poll_poses = [this](std::vector<pose>& poses, bool always) { return poll(poses, always); },
-           .inserted =
-               [this](const orbis::mapping::insertion_event& e) {
-                 results_.insert_ms.push_back(e.milliseconds);
-                 const std::size_t newest = newest_;
-                 if (newest > e.frame)
-                   results_.behind_frames_max = std::max(results_.behind_frames_max, newest - e.frame);
-               },
-           .overflowed = {},
-           .corrected =
-               [this](const orbis::mapping::live_correction_event& e) {
-                 results_.correction_ms.push_back(e.milliseconds);
-               },
-           .published = {},
-           .failed = [this](const orbis::error& e) { results_.trouble = e; }},
-          orbis::mapping::depth_store{{.memory_budget = std::size_t{32} << 20U, .spill_file = std::move(spill_file)}}} {
-  points_ = point_options(dense_options(s));
+      points_{point_options(dense_options(s))},
+      live_{source.camera.model,
+            thread_options(s),
+            {.started = [] { lower_priority(live_map_niceness); },
+             .poll_poses = [this](beliefs& now, bool always) { return poll(now, always); },
+             .prepare =
+                 [this](std::uint64_t, depth_use, orbis::image_view<std::uint16_t> pixels) {
+                   reader_.mask(orbis::seq, pixels_view{pixels, depth_scale_}, rays_, points_, pixels);
+                 },
+             .inserted = [this](const orbis::mapping::insertion_event& e) { note(e); },
+             .overflowed = {},
+             .refused = {},
+             .corrected =
+                 [this](const orbis::mapping::live_correction_event& e) {
+                   const std::lock_guard lock{results_mutex_};
+                   results_.correction_ms.push_back(e.milliseconds);
+                 },
+             .published = {},
+             .failed =
+                 [this](const orbis::error& e) {
+                   const std::lock_guard lock{results_mutex_};
+                   results_.trouble = e;
+                 }},
+            orbis::mapping::depth_store{depth_options(s, std::move(spill_file))}} {}
+
+std::vector<live_mapping::made> live_mapping::made_so_far() const {
+  const std::lock_guard lock{mutex_};
+  return made_;
 }
 
-bool live_mapping::poll(std::vector<pose>& poses, bool always) {
-  std::vector<made> known;
-  {
+bool live_mapping::poll(beliefs& now, bool always) {
+  if (!where_(made_so_far(), now, always)) return false;
+  if (!now.removed.empty()) {
     const std::lock_guard lock{mutex_};
-    known = made_;
+    std::erase_if(made_, [&](const made& k) {
+      return std::find(now.removed.begin(), now.removed.end(), k.frame) != now.removed.end();
+    });
   }
-  return where_(known, poses, always);
+  return true;
+}
+
+void live_mapping::note(const orbis::mapping::insertion_event& e) {
+  const std::lock_guard lock{results_mutex_};
+  if (!e.is_keyframe) {
+    results_.frame_delay_ms.push_back(e.delay_milliseconds);
+    return;
+  }
+  results_.insert_ms.push_back(e.milliseconds);
+  results_.delay_ms.push_back(e.delay_milliseconds);
+  const std::size_t newest = newest_;
+  if (newest > e.frame) results_.behind_frames_max = std::max(results_.behind_frames_max, newest - e.frame);
 }
 
 void live_mapping::add(std::size_t frame, orbis::slam::map_keyframe keyframe, const orbis::se3& T_world_camera,
@@ -57,15 +90,60 @@ void live_mapping::add(std::size_t frame, orbis::slam::map_keyframe keyframe, co
     const std::lock_guard lock{mutex_};
     made_.push_back({frame, keyframe});
   }
-  const orbis::camera::depth_view<std::uint16_t> depth{image.depth, depth_scale_};
-  const auto masked = reader_.masked(orbis::seq, depth, rays_, points_);
-  live_.add_keyframe(frame, orbis::mapping::view_like(depth, masked.view()), T_world_camera);
+  live_.add_keyframe(frame, pixels_view{image.depth, depth_scale_}, T_world_camera);
+  if (waits_) live_.wait();
+}
+
+void live_mapping::add_frame(std::size_t frame, std::uint64_t reference, const orbis::se3& T_world_camera,
+                             const orbis::camera::rgbd_frame& image) {
+  live_.add_frame(frame, pixels_view{image.depth, depth_scale_}, T_world_camera, reference);
+  if (waits_) live_.wait();
+}
+
+live_results live_mapping::so_far() const {
+  const std::lock_guard lock{results_mutex_};
+  return results_;
+}
+
+bool live_mapping::occupied_since(std::optional<std::uint64_t>& seen, std::vector<voxel>& cubes) const {
+  const auto newest = live_.latest();
+  if (seen == newest->revision) return false;
+  seen = newest->revision;
+  cubes.clear();
+  newest->map.for_each_leaf([&](const live_octree::octree_type::leaf& leaf) {
+    if (leaf.occupied) cubes.push_back({leaf.center.cast<float>(), static_cast<float>(leaf.size)});
+  });
+  return true;
 }
 
 void live_mapping::stop() {
   live_.wait();
   live_.stop();
-  results_.dropped = live_.counters().dropped_keyframes;
+  const orbis::mapping::live_map_counters counters = live_.counters();
+  results_.dropped = counters.dropped_keyframes;
+  results_.frames = counters.frames;
+  results_.dropped_frames = counters.dropped_frames;
+  results_.refused_frames = counters.refused_frames;
+  results_.stopped = live_.failure();
+}
+
+std::vector<std::string> live_notes(const live_results& live) {
+  std::vector<std::string> notes;
+  const auto count = [](std::size_t n, const char* what) {
+    return std::to_string(n) + " " + what + (n == 1 ? "" : "s");
+  };
+  if (live.dropped != 0)
+    notes.push_back(count(live.dropped, "keyframe") +
+                    " came in faster than the live map took them: they are in the map of the end, but were not in it "
+                    "before");
+  if (live.dropped_frames != 0)
+    notes.push_back(count(live.dropped_frames, "frame") +
+                    " between keyframes came in faster than the live map took them, and were left out");
+  if (live.stopped)
+    notes.push_back("the live map stopped growing: " + live.stopped->message + "; it is made in the end instead");
+  else if (live.trouble)
+    notes.push_back(live.trouble->to_string());
+  return notes;
 }
 
 }  // namespace app

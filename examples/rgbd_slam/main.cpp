@@ -2,11 +2,29 @@
 #include <exception>
 #include <new>
 
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
+
 #include "command_line.hpp"
 #include "commands.hpp"
 #include "interrupts.hpp"
 
+namespace {
+
+/// Large blocks go back to the system as soon as they are freed, and threads share their heaps: otherwise half of the
+/// memory that the mapping needs would be what the tracking has left, in pieces.
+void set_up_memory() {
+#ifdef __GLIBC__
+  mallopt(M_MMAP_THRESHOLD, 1 << 20);
+  mallopt(M_ARENA_MAX, 2);
+#endif
+}
+
+}  // namespace
+
 int main(int argc, char** argv) {
+  set_up_memory();
   const auto asked = app::read_command_line(argc, argv);
   if (const auto* code = std::get_if<app::exit_code>(&asked)) return *code;
   app::interrupts::listen();

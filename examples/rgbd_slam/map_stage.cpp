@@ -6,7 +6,10 @@
 #include <cmath>
 #include <unordered_map>
 
-#include <orbis/cloud/extract.hpp>
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
+
 #include <orbis/io/ply.hpp>
 #include <orbis/octree/files.hpp>
 
@@ -20,6 +23,13 @@ namespace {
 using orbis::result;
 using orbis::vec3f;
 using tree = orbis::octree::occupancy_octree<>;
+
+/// Gives memory back to the system that was freed in small pieces.
+void give_back_memory() {
+#ifdef __GLIBC__
+  malloc_trim(0);
+#endif
+}
 
 std::string in_words(const built_map& map) {
   return count_text(map.cloud.size()) + " points, " + count_text(map.filter.removed) + " removed by filter " +
@@ -40,8 +50,9 @@ tree_numbers numbers_of(const tree& map, std::uintmax_t bytes) {
   return {n.leaves, n.occupied_leaves, n.free_leaves, bytes};
 }
 
-/// The occupied leaves, in the mean colour of the points in them.
-std::vector<voxel> occupied_voxels(const tree& map, const orbis::point_cloud& cloud) {
+/// The occupied leaves, in the mean colour of the points in them; of those of `only`, if it is given.
+std::vector<voxel> occupied_voxels(const tree& map, const orbis::point_cloud& cloud,
+                                   const std::vector<std::uint32_t>* only = nullptr) {
   struct sum {
     std::uint64_t r = 0, g = 0, b = 0, n = 0;
   };
@@ -49,7 +60,9 @@ std::vector<voxel> occupied_voxels(const tree& map, const orbis::point_cloud& cl
     return std::uint64_t{k.x} << 32U | std::uint64_t{k.y} << 16U | k.z;
   };
   std::unordered_map<std::uint64_t, sum> colors;
-  for (std::size_t i = 0; i != cloud.colors.size(); ++i) {
+  const std::size_t count = !cloud.has_colors() ? 0 : only != nullptr ? only->size() : cloud.size();
+  for (std::size_t k = 0; k != count; ++k) {
+    const std::size_t i = only != nullptr ? (*only)[k] : k;
     const auto key = map.grid().key(cloud.points[i]);
     if (!key) continue;
     sum& s = colors[name(*key)];
@@ -107,9 +120,14 @@ result<built_map> map_frames(const posed_frames& frames, const frame_source& sou
   const orbis::mapping::map_options options{
       .dense = dense_options(s), .filter = filter_options(s), .resolution = s.resolution};
   const auto policy = orbis::par.with(s.threads);
-  auto map = live != nullptr
-                 ? orbis::mapping::build_map(policy, frames, *live, options, console.progress())
-                 : orbis::mapping::build_map(policy, frames, source.camera.model, options, console.progress());
+  const auto shown = console.progress();
+  const auto progress = [&](std::size_t done, std::size_t total) {
+    if (done % frames.size() == 1) give_back_memory();  // of the last pass over the frames
+    return shown(done, total);
+  };
+  give_back_memory();  // of the tracking
+  auto map = live != nullptr ? orbis::mapping::build_map(policy, frames, *live, options, progress)
+                             : orbis::mapping::build_map(policy, frames, source.camera.model, options, progress);
   if (frames.trouble()) return orbis::fail(*frames.trouble());  // a map without an image is not the map
   if (map) console.finish(in_words(*map));
   return map;
@@ -125,7 +143,6 @@ built_map map_cloud(orbis::point_cloud cloud, const settings& s, console& consol
       orbis::mapping::filter_points(orbis::par.with(s.threads), map.cloud.points, {}, options);
   map.filter = std::move(filtered.report);
   map.inliers = std::move(filtered.inliers);
-  map.filtered_cloud = orbis::cloud::extract(map.cloud, map.inliers);
 
   const auto build = [&](const std::vector<vec3f>& points, std::vector<double>& milliseconds) {
     if (!s.origin) return occupied_only(points, s.resolution);
@@ -136,7 +153,7 @@ built_map map_cloud(orbis::point_cloud cloud, const settings& s, console& consol
     return scanned;
   };
   map.unfiltered_octree = build(map.cloud.points, map.insert_ms_unfiltered);
-  map.octree = build(map.filtered_cloud.points, map.insert_ms);
+  map.octree = build(map.filtered_cloud().points, map.insert_ms);
   console.finish(in_words(map));
   return map;
 }
@@ -151,13 +168,14 @@ result<map_results> write_map(built_map map, const settings& s, const std::files
     bytes = std::filesystem::file_size(path, ignored);
     return {};
   };
-  const auto cloud_of = [](const orbis::point_cloud& c) {
-    return [&c](const auto& path) -> result<void> { return orbis::io::write_ply(path, c); };
-  };
   const auto bt_of = [](const tree& t) { return [&t](const auto& path) { return orbis::octree::write_bt(t, path); }; };
   std::uintmax_t bt_bytes = 0, bt_bytes_unfiltered = 0;
-  result<void> done = write("cloud.ply", cloud_of(map.cloud), m.cloud_bytes);
-  if (done) done = write("cloud_filtered.ply", cloud_of(map.filtered_cloud), m.filtered_bytes);
+  result<void> done = write(
+      "cloud.ply", [&](const auto& path) { return orbis::io::write_ply(path, map.cloud); }, m.cloud_bytes);
+  if (done)
+    done = write(
+        "cloud_filtered.ply", [&](const auto& path) { return orbis::io::write_ply(path, map.cloud, map.inliers); },
+        m.filtered_bytes);
   if (done) done = write("map_unfiltered.bt", bt_of(*map.unfiltered_octree), bt_bytes_unfiltered);
   if (done) done = write("map.bt", bt_of(map.octree), bt_bytes);
   if (done)
@@ -172,7 +190,7 @@ result<map_results> write_map(built_map map, const settings& s, const std::files
   m.filtered = numbers_of(map.octree, bt_bytes);
   m.insert_ms = std::move(map.insert_ms);
   m.voxels_unfiltered = occupied_voxels(*map.unfiltered_octree, map.cloud);
-  m.voxels = occupied_voxels(map.octree, map.filtered_cloud);
+  m.voxels = occupied_voxels(map.octree, map.cloud, &map.inliers);
   m.kept = std::move(map.inliers);
   m.cloud = std::move(map.cloud);
   console.finish("cloud.ply, cloud_filtered.ply, map_unfiltered.bt, map.bt, map.ot");

@@ -25,7 +25,7 @@ orbis::result<posed_frames> frames_with_poses(const frame_source& source, const 
                                               const std::filesystem::path& spill_file,
                                               std::optional<world_results>& world, console& console) {
   console.stage("reading");
-  posed_frames posed{source, spill_file};
+  posed_frames posed{source, s, spill_file};
   orbis::se3 T_world_truth;
   read_ahead frames{source, s.threads != 1};
   for (std::size_t i = 0; frames.has_next(); ++i) {

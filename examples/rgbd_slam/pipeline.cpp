@@ -8,6 +8,7 @@
 #include "output.hpp"
 #include "result_files.hpp"
 #include "tracking_stage.hpp"
+#include "viewer/viewer.hpp"
 
 namespace app {
 
@@ -18,17 +19,21 @@ exit_code run_slam(const settings& s, console& console) {
   const auto source = open_source(s, console);
   if (!source) return give_up(source.error());
   if (const auto lost = find_overwritten(s, inputs_of(s, source->files))) return console.error(*lost), bad_usage;
+  auto shown = viewer::open(s, *source, console);
+  if (!shown) return console.error(shown.error()), bad_usage;
   auto files = result_files::begin(s);
   if (!files) return give_up(files.error());
   results r = begin_results(s, source->title, &*source, files->folder());
 
   // Track; some frames become keyframes.
-  const auto attempt = track(*source, s, files->landmark_map(), files->folder() / spill_name, console);
+  const auto attempt = track(*source, s, files->landmark_map(), files->folder() / spill_name, *shown, console);
   if (!attempt) return give_up(attempt.error());
   const tracked_frames& tracked = *attempt;
-  live_octree* const live = tracked.live ? &tracked.live->map() : nullptr;
-  if (live != nullptr) r.live = tracked.live->measured();
-  if (r.live && r.live->trouble) console.warn(r.warnings.emplace_back(r.live->trouble->to_string()));
+  if (source->rest) source->rest();
+  live_octree* const live = tracked.live ? tracked.live->map() : nullptr;
+  if (tracked.live) r.live = tracked.live->measured();
+  if (r.live)
+    for (const std::string& note : live_notes(*r.live)) console.warn(r.warnings.emplace_back(note));
   if (tracked.stopped && tracked.slam.frames == 0) return give_up(*tracked.stopped);
   if (tracked.stopped) r.warnings.push_back(explain_stop(tracked, *source).to_string());
   if (interrupts::requested())
@@ -51,17 +56,21 @@ exit_code run_slam(const settings& s, console& console) {
     auto written = write_map(*std::move(map), s, files->folder(), console);
     if (!written) return give_up(written.error());
     r.map = *std::move(written);
-    if (r.live) r.map->insert_ms = r.live->insert_ms;  // when they were made, not when the filter's verdict came
+    shown->show_map(r.map->voxels);
+    if (live != nullptr)
+      r.map->insert_ms = r.live->insert_ms;  // when they were made, not when the filter's verdict came
   }
 
   // Evaluation and report; then all files are put in place.
   compare_with_truth(r, *source, console);
   if (auto done = write_report_files(r, r.slam->keyframes, *files, console); !done) return give_up(done.error());
   print_results(r, console);
+  const bool was_interrupted = interrupts::requested();
+  shown->finish(s, console);
 
   if (tracked.stopped) return give_up(explain_stop(tracked, *source));
   if (tracked.unsaved) return give_up(*tracked.unsaved);
-  if (interrupts::requested()) return interrupted;
+  if (was_interrupted) return interrupted;
   return tracked.missed_map ? (console.error(explain_miss(tracked, s)), never_tracked) : done;
 }
 

@@ -1,22 +1,26 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
 /// The frames that go into the map, as a range of keyframes that can be gone through again and again. Depth is kept
-/// compressed; colour, which is needed once, is read again. One frame at a time is unpacked.
+/// compressed; colour, which is needed once, is read again, or from a file where frames are made and not read. One
+/// frame at a time is unpacked, and the next one on another thread.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <future>
 #include <iterator>
 #include <memory>
 #include <optional>
 #include <utility>
 #include <vector>
 
-#include <orbis/mapping/depth_store.hpp>
 #include <orbis/mapping/keyframe.hpp>
 #include <orbis/slam/atlas.hpp>
 
+#include "color_file.hpp"
+#include "kept_depths.hpp"
+#include "settings.hpp"
 #include "source.hpp"
 
 namespace app {
@@ -24,16 +28,27 @@ namespace app {
 /// The name of the spill file, in the folder where the files are made. The file has no name once it is open.
 inline constexpr const char* spill_name = "depth.spill";
 
+/// How a store of keyframes' depth images divides what there is between memory and file. There are two: of the images
+/// as they came, and of those in the live map.
+[[nodiscard]] inline orbis::mapping::depth_store_options depth_options(const settings& s,
+                                                                       std::filesystem::path spill_file) {
+  return {.memory_budget = (s.depth_memory << 20U) / 2, .spill_file = std::move(spill_file)};
+}
+
 class posed_frames {
   struct unpacked {
     orbis::image<std::uint16_t> depth;
     std::optional<orbis::image<orbis::rgb8>> color;  // once it was asked for
+    std::optional<orbis::error> trouble;
   };
 
  public:
   /// `spill_file`: for depth beyond what there is room for in memory; see `depth_store_options`.
-  posed_frames(const frame_source& source, std::filesystem::path spill_file)
-      : source_{&source}, depths_{{.memory_budget = std::size_t{32} << 20U, .spill_file = std::move(spill_file)}} {}
+  posed_frames(const frame_source& source, const settings& s, const std::filesystem::path& spill_file)
+      : source_{&source},
+        background_{s.threads != 1},
+        depths_{std::make_unique<kept_depths>(depth_options(s, spill_file), background_)},
+        colors_{spill_file.string() + ".colors"} {}
 
   /// Frame number `i` of the source, where the camera was at `T_world_camera`.
   void add(std::size_t i, const orbis::se3& T_world_camera, const orbis::camera::rgbd_frame& frame) {
@@ -46,12 +61,14 @@ class posed_frames {
   /// Gives each frame the pose `where(keyframe)`; frames without a pose are dropped.
   template <class Where>
   void place(const Where& where) {
+    depths_->finish();
     std::erase_if(entries_, [&](entry& e) {
       const std::optional<orbis::se3> T_world_camera = where(e.keyframe);
       if (T_world_camera) e.T_world_camera = *T_world_camera;
-      if (!T_world_camera) depths_.erase(e.index);
+      if (!T_world_camera) depths_->erase(e.index);
       return !T_world_camera;
     });
+    depths_->free_buffers();  // no frame will come
   }
 
   [[nodiscard]] std::size_t size() const { return entries_.size(); }
@@ -67,7 +84,9 @@ class posed_frames {
     colors(const posed_frames& of, std::size_t index, std::shared_ptr<unpacked> images)
         : of_{&of}, index_{index}, images_{std::move(images)} {}
     operator orbis::image_view<const orbis::rgb8>() const {  // NOLINT(google-explicit-constructor)
-      if (!images_->color) images_->color = of_->read_color(index_);
+      if (!images_->color) of_->read_color(index_, *images_);
+      of_->tell(*images_);
+      of_->wants_color_ = index_ != of_->entries_.back().index;
       return images_->color->view();
     }
 
@@ -117,11 +136,17 @@ class posed_frames {
     std::size_t at_ = 0;
     mutable std::shared_ptr<unpacked> images_;  // what the value points to
   };
-  [[nodiscard]] iterator begin() const { return {*this, 0}; }
+  [[nodiscard]] iterator begin() const {
+    depths_->finish();
+    return {*this, 0};
+  }
   [[nodiscard]] iterator end() const { return {*this, size()}; }
 
   /// Why depth images that should be in the spill file are in memory instead, if so.
-  [[nodiscard]] const std::optional<orbis::error>& unspilled() const { return unspilled_; }
+  [[nodiscard]] const std::optional<orbis::error>& unspilled() const {
+    depths_->finish();
+    return depths_->unspilled();
+  }
   /// Why an image could not be had again, if so; it then had no pixels.
   [[nodiscard]] const std::optional<orbis::error>& trouble() const { return trouble_; }
 
@@ -134,28 +159,55 @@ class posed_frames {
 
   void add(const entry& e, const orbis::camera::rgbd_frame& frame) {
     entries_.push_back(e);
-    if (auto kept = depths_.put(e.index, frame.depth); !kept) unspilled_ = kept.error();
+    depths_->put(e.index, frame.depth);
+    if (source_->made) colors_.put(e.index, frame.color);
   }
+  /// The images of entry `number`, from the other thread if that was at them.
   [[nodiscard]] std::shared_ptr<unpacked> unpack(std::size_t number) const {
-    auto images = std::make_shared<unpacked>();
-    if (auto done = depths_.get(entries_[number].index, images->depth); !done) {
-      trouble_ = done.error();
-      images->depth = orbis::image<std::uint16_t>(source_->camera.model.width(), source_->camera.model.height());
+    std::shared_ptr<unpacked> images;
+    if (ahead_.valid()) {
+      images = ahead_.get();
+      if (ahead_number_ != number) images.reset();
+    }
+    if (!images) images = read(number, false);
+    tell(*images);
+    if (background_ && number + 1 != entries_.size()) {
+      ahead_number_ = number + 1;
+      ahead_ = std::async(std::launch::async,
+                          [this, next = number + 1, with_color = wants_color_] { return read(next, with_color); });
     }
     return images;
   }
-  [[nodiscard]] orbis::image<orbis::rgb8> read_color(std::size_t index) const {
+  [[nodiscard]] std::shared_ptr<unpacked> read(std::size_t number, bool with_color) const {
+    auto images = std::make_shared<unpacked>();
+    const std::size_t index = entries_[number].index;
+    if (auto done = depths_->get(index, images->depth); !done) {
+      images->trouble = done.error();
+      images->depth = orbis::image<std::uint16_t>(source_->camera.model.width(), source_->camera.model.height());
+    }
+    if (with_color) read_color(index, *images);
+    return images;
+  }
+  void read_color(std::size_t index, unpacked& images) const {
+    images.color.emplace(source_->camera.model.width(), source_->camera.model.height());
+    if (colors_.get(index, *images.color)) return;
     auto read = source_->color(index);
-    if (read) return *std::move(read);
-    trouble_ = read.error();
-    return {};
+    if (!read) images.trouble = read.error();
+    images.color = read ? *std::move(read) : orbis::image<orbis::rgb8>{};
+  }
+  void tell(const unpacked& images) const {
+    if (images.trouble) trouble_ = images.trouble;
   }
 
   const frame_source* source_;
+  bool background_;
   std::vector<entry> entries_;
-  orbis::mapping::depth_store depths_;
-  std::optional<orbis::error> unspilled_;
+  std::unique_ptr<kept_depths> depths_;
+  color_file colors_;  // where frames are made
   mutable std::optional<orbis::error> trouble_;
+  mutable bool wants_color_ = false;  // the next frame's colours will be asked for, too
+  mutable std::size_t ahead_number_ = 0;
+  mutable std::future<std::shared_ptr<unpacked>> ahead_;  // the last member: it ends before the others go
 };
 
 }  // namespace app

@@ -78,18 +78,25 @@ struct slam_results {
   std::size_t frames = 0, tracked = 0, lost = 0, relocalized = 0, landmarks = 0;
   std::size_t loops_closed = 0, maps_merged = 0, keyframes_culled = 0;
   std::vector<frame_range> lost_stretches;
-  std::vector<double> tracking_ms;
-  double seconds = 0.0;  ///< reading and tracking
+  std::vector<double> tracking_ms;  ///< of each frame: until tracking is ready for the next one
+  std::vector<double> slam_ms;      ///< of it, in SLAM
+  double seconds = 0.0;             ///< reading and tracking
   orbis::trajectory trajectory, keyframes;
 };
 
 /// Of the map that grew while the camera moved.
 struct live_results {
-  std::vector<double> insert_ms;        ///< of each keyframe
+  std::vector<double> insert_ms;        ///< of each keyframe: the work
+  std::vector<double> delay_ms;         ///< of each keyframe: from when it was made until it was in the map
   std::size_t behind_frames_max = 0;    ///< by how many frames tracking was ahead of a keyframe's insertion
+  std::size_t frames = 0;               ///< between keyframes, that were in the map for a while
+  std::vector<double> frame_delay_ms;   ///< of each of them, as delay_ms
+  std::size_t dropped_frames = 0;       ///< between keyframes, that came in too fast
+  std::size_t refused_frames = 0;       ///< between keyframes, whose keyframe was not in the map
   std::vector<double> correction_ms;    ///< of each correction: what moved keyframes took
   std::size_t dropped = 0;              ///< keyframes that came in too fast; they enter the map in the end
   std::optional<orbis::error> trouble;  ///< a depth image that could not be kept or read
+  std::optional<orbis::error> stopped;  ///< why the map stopped growing; it is made in the end instead
 };
 
 struct results {

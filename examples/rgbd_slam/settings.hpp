@@ -32,6 +32,7 @@ struct settings {
   std::size_t stride = 1;              ///< every so many frames
   std::size_t width = 640;             ///< of the synthetic camera, pixels
   std::uint64_t seed = 1;              ///< of the synthetic recording
+  bool person = false;                 ///< somebody walks through the synthetic room
   std::optional<orbis::vec3> origin;   ///< of the rays to a cloud's points (map)
   std::optional<orbis::vec3> gravity;  ///< where it pulls, in the frame of the first camera
 
@@ -45,7 +46,14 @@ struct settings {
   std::filesystem::path load_map;  ///< of landmarks, to begin with; empty: none
   std::filesystem::path save_map;  ///< of landmarks, in the end; empty: nowhere
   bool live_map = true;            ///< the octree grows while frames are tracked; otherwise it is made in the end
+  std::size_t depth_memory = 16;   ///< for keyframes' depth images, MB; what is beyond goes to a file
+  bool map_every_frame = false;    ///< into the live map, until it takes over the filter's verdict
+  bool realtime = false;           ///< frames come at the pace of their time stamps
   bool localize_only = false;      ///< the loaded map stays as it is
+
+  std::string viewer;           ///< "window", "web"; empty: none
+  unsigned viewer_port = 8090;  ///< of the page; 0: any that is free
+  bool viewer_hold = false;     ///< stays open when all is written
 
   unsigned threads = 0;  ///< 0: all
   bool deterministic = false;

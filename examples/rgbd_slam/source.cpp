@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <memory>
+#include <mutex>
 #include <utility>
 
 #include <orbis/camera/presets.hpp>
@@ -57,22 +58,46 @@ result<frame_source> open_recording(const settings& s) {
   return source;
 }
 
+/// A synthetic recording whose textures, most of its memory, can be dropped.
+class renderer {
+ public:
+  explicit renderer(const orbis::io::synthetic_options& options) : options_{options} {}
+  [[nodiscard]] std::shared_ptr<const orbis::io::synthetic_recording> get() {
+    const std::lock_guard lock{mutex_};
+    if (!recording_) recording_ = std::make_shared<const orbis::io::synthetic_recording>(options_);
+    return recording_;
+  }
+  void drop() {
+    const std::lock_guard lock{mutex_};
+    recording_.reset();
+  }
+
+ private:
+  orbis::io::synthetic_options options_;
+  std::mutex mutex_;
+  std::shared_ptr<const orbis::io::synthetic_recording> recording_;
+};
+
 frame_source make_synthetic(const settings& s) {
   constexpr std::size_t once_round = 360;  // at an unhurried pace: a degree a frame
   const std::size_t frames = s.frames == 0 ? once_round : std::min<std::size_t>(s.frames * s.stride, 1'000'000);
   const auto width = static_cast<int>(s.width / 4 * 4);
-  const auto recording = std::make_shared<const orbis::io::synthetic_recording>(
-      orbis::io::synthetic_options{.frames = static_cast<int>(frames),
-                                   .seed = s.seed,
-                                   .width = width,
-                                   .height = width / 4 * 3,
-                                   .frames_around = static_cast<int>(std::max(frames, once_round))});
+  const orbis::io::synthetic_options options{.frames = static_cast<int>(frames),
+                                             .seed = s.seed,
+                                             .width = width,
+                                             .height = width / 4 * 3,
+                                             .frames_around = static_cast<int>(std::max(frames, once_round)),
+                                             .scene = {.person = s.person}};
+  const auto recording = std::make_shared<const orbis::io::synthetic_recording>(options);  // of no frame: small
+  const auto frames_of = std::make_shared<renderer>(options);
   frame_source source;
   source.title = "synthetic room";
-  source.kind = "rendered on the fly, seed " + std::to_string(s.seed);
+  source.kind = "rendered on the fly, seed " + std::to_string(s.seed) + (s.person ? ", with a person" : "");
   source.camera = recording->camera();
   source.frames = limited(recording->size(), s);
-  source.frame = [recording, stride = s.stride](std::size_t i) { return recording->frame(i * stride); };
+  source.frame = [frames_of, stride = s.stride](std::size_t i) { return frames_of->get()->frame(i * stride); };
+  source.made = true;
+  source.rest = [frames_of] { frames_of->drop(); };
   source.color = [frame = source.frame](std::size_t i) -> result<orbis::image<orbis::rgb8>> {
     auto rendered = frame(i);
     if (!rendered) return fail(rendered.error());

@@ -28,6 +28,9 @@ struct frame_source {
   std::function<orbis::result<orbis::camera::rgbd_frame>(std::size_t)> frame;
   /// Reads or renders the colour image of a frame alone. As above.
   std::function<orbis::result<orbis::image<orbis::rgb8>>(std::size_t)> color;
+  bool made = false;  ///< frames are rendered, which takes longer than to read them
+  /// Frees what the making of frames needs; it is there again when a frame is asked for. Empty: nothing is.
+  std::function<void()> rest;
   orbis::trajectory ground_truth;            ///< empty if not known
   std::vector<std::filesystem::path> files;  ///< that it is read from
   std::vector<std::string> notes;            ///< worth a warning

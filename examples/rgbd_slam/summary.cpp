@@ -61,7 +61,9 @@ std::string summary_json(const results& r) {
   j["maps_merged"] = s ? json(s->maps_merged) : null;
   j["keyframes_culled"] = s ? json(s->keyframes_culled) : null;
   const spread tracking = spread_of(s ? s->tracking_ms : std::vector<double>{});
-  j["tracking_ms"] = {{"median", tracking.median}, {"p95", tracking.p95}, {"mean", tracking.mean}};
+  const spread in_slam = spread_of(s ? s->slam_ms : std::vector<double>{});
+  j["tracking_ms"] = {
+      {"median", tracking.median}, {"p95", tracking.p95}, {"mean", tracking.mean}, {"p95_in_slam", in_slam.p95}};
   j["wall_s"] = r.wall_s;
   j["fps"] = s && s->seconds > 0 ? json(static_cast<double>(s->frames) / s->seconds) : null;
   j["peak_rss_mb"] = peak_rss_mb();
@@ -90,6 +92,8 @@ std::string summary_json(const results& r) {
                  {"insert_ms_per_frame", {{"median", insertion.median}, {"p95", insertion.p95}}}};
   const auto& l = r.live;
   const spread live_insertion = spread_of(l ? l->insert_ms : std::vector<double>{});
+  const spread delay = spread_of(l ? l->delay_ms : std::vector<double>{});
+  const spread frame_delay = spread_of(l ? l->frame_delay_ms : std::vector<double>{});
   const spread correction = spread_of(l ? l->correction_ms : std::vector<double>{});
   const auto largest = [&](const std::vector<double>& ms) {
     return ms.empty() ? null : json(*std::max_element(ms.begin(), ms.end()));
@@ -98,8 +102,15 @@ std::string summary_json(const results& r) {
   if (l)
     j["live_map"] = {
         {"insert_ms", {{"median", live_insertion.median}, {"p95", live_insertion.p95}, {"max", largest(l->insert_ms)}}},
+        {"delay_ms", {{"median", delay.median}, {"p95", delay.p95}, {"max", largest(l->delay_ms)}}},
         {"behind_frames_max", l->behind_frames_max},
         {"dropped_keyframes", l->dropped},
+        {"frames",
+         {{"inserted", l->frames},
+          {"dropped", l->dropped_frames},
+          {"refused", l->refused_frames},
+          {"delay_ms",
+           {{"median", frame_delay.median}, {"p95", frame_delay.p95}, {"max", largest(l->frame_delay_ms)}}}}},
         {"corrections", l->correction_ms.size()},
         {"correction_ms", {{"median", correction.median}, {"max", largest(l->correction_ms)}}}};
   j["map_error_m"] = m ? or_null(m->error_m) : null;

@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <string>
+#include <thread>
 #include <utility>
 
 #include <orbis/slam/rgbd_system.hpp>
@@ -25,37 +26,81 @@ orbis::slam::options options_for(const frame_source& source, const settings& s) 
   return options;
 }
 
+/// A frame for the viewer, which gets its images for good.
+handed_frame handed_over(const slam_system& slam, std::size_t i, const orbis::slam::track_result& found, double took_ms,
+                         orbis::camera::rgbd_frame frame) {
+  handed_frame handed{.number = i, .state = std::string{to_string(found.state)}, .tracking_ms = took_ms};
+  handed.T_world_camera = found.T_world_camera;
+  handed.tracked = slam.last_frame();
+  if (found.keyframe) handed.keyframe = {found.map, *found.keyframe};
+  handed.color = std::move(frame.color);
+  handed.depth = std::move(frame.depth);
+  handed.depth_scale = frame.depth_scale;
+  return handed;
+}
+
+/// Lets time go by until a frame with this time stamp comes from the camera.
+class camera_pace {
+ public:
+  void wait_for(double timestamp) {
+    if (!std::exchange(has_begun_, true)) first_ = timestamp;
+    const std::chrono::duration<double> since_first{timestamp - first_};
+    std::this_thread::sleep_until(begin_ + std::chrono::duration_cast<console::clock::duration>(since_first));
+  }
+
+ private:
+  console::clock::time_point begin_ = console::clock::now();
+  bool has_begun_ = false;
+  double first_ = 0.0;  // time stamp
+};
+
+/// Hands a tracked frame on to the live map.
+void hand_on(const slam_system& slam, const orbis::slam::track_result& found, std::size_t i,
+             const orbis::camera::rgbd_frame& frame, const settings& s, live_mapping& live) {
+  live.tracked(i);
+  if (!found.T_world_camera) return;
+  if (found.keyframe) return live.add(i, {found.map, *found.keyframe}, *found.T_world_camera, frame);
+  if (!s.map_every_frame) return;
+  const auto reference = slam.inspect([&](const orbis::slam::atlas& maps) {
+    return live.find([&](const live_mapping::made& k) {
+      return maps.current(k.keyframe) == orbis::slam::map_keyframe{found.map, *found.reference};
+    });
+  });
+  if (reference) live.add_frame(i, *reference, *found.T_world_camera, frame);
+}
+
 /// Feeds the frames to SLAM, up to the first that cannot be read, or to Ctrl-C. Every map begins in a world of its own.
-upright_worlds track_frames(slam_system& slam, const frame_source& source, const settings& s, tracked_frames& out,
-                            console& console) {
+void track_frames(slam_system& slam, const frame_source& source, const settings& s, upright_worlds& worlds,
+                  tracked_frames& out, viewer& viewer, console& console) {
   using orbis::slam::track_state;
-  upright_worlds worlds{source, s};
   read_ahead frames{source, s.threads != 1};
+  camera_pace pace;
   for (std::size_t i = 0; frames.has_next() && !interrupts::requested(); ++i) {
-    const auto frame = frames.next();
+    auto frame = frames.next();
     if (!frame) {
       out.stopped = frame.error();
       break;
     }
-    if (const track_state state = slam.state(); state == track_state::not_started || state == track_state::lost)
-      slam.set_initial_pose(worlds.begin_with(*frame, state == track_state::not_started));
+    if (s.realtime) pace.wait_for(frame->timestamp);
     const auto start = console::clock::now();
+    const auto took = [&] { return std::chrono::duration<double, std::milli>(console::clock::now() - start).count(); };
+    slam.set_initial_pose(
+        [&, is_first = slam.state() == track_state::not_started] { return worlds.begin_with(*frame, is_first); });
     const orbis::slam::track_result found = slam.track(*frame);
-    const std::chrono::duration<double, std::milli> took = console::clock::now() - start;
-    out.slam.tracking_ms.push_back(took.count());
+    out.slam.slam_ms.push_back(took());
+    if (found.keyframe) out.keyframes.add(i, {found.map, *found.keyframe}, *frame);
+    if (out.live) hand_on(slam, found, i, *frame, s, *out.live);
+    out.slam.tracking_ms.push_back(took());
     if (found.state == track_state::lost) {
       auto& lost = out.slam.lost_stretches;
       if (lost.empty() || lost.back().first + lost.back().count != i) lost.push_back({i, 0});
       ++lost.back().count;
     }
-    if (found.keyframe) out.keyframes.add(i, {found.map, *found.keyframe}, *frame);
-    if (out.live) out.live->tracked(i);
-    if (out.live && found.keyframe && found.T_world_camera)
-      out.live->add(i, {found.map, *found.keyframe}, *found.T_world_camera, *frame);
+    if (viewer.is_open()) viewer.show(handed_over(slam, i, found, out.slam.tracking_ms.back(), *std::move(frame)));
     console.advance(i + 1, source.frames,
                     std::string{to_string(found.state)} + ", " + std::to_string(out.keyframes.size()) + " keyframes");
   }
-  return worlds;
+  slam.set_initial_pose(se3{});
 }
 
 /// The pose of a keyframe that was made in the active map or in one that was merged with it. Keyframes have moved since
@@ -69,16 +114,63 @@ std::optional<se3> present_pose(const orbis::slam::atlas& maps, const orbis::sla
 /// How the live map asks for the poses of its keyframes.
 live_mapping::find_poses poses_of(const slam_system& slam) {
   return [&slam, seen = orbis::slam::pose_revision{.map = orbis::slam::no_id}](
-             const std::vector<live_mapping::made>& keyframes, std::vector<live_mapping::pose>& poses,
-             bool always) mutable {
+             const std::vector<live_mapping::made>& keyframes, live_mapping::beliefs& beliefs, bool always) mutable {
     return slam.inspect([&](const orbis::slam::atlas& maps) {
       const orbis::slam::pose_revision now{maps.active_id(), maps.active().pose_changes()};
       if (std::exchange(seen, now) == now && !always) return false;
-      for (const auto& k : keyframes)
-        if (const auto pose = present_pose(maps, k.keyframe)) poses.push_back({k.frame, *pose});
+      for (const auto& k : keyframes) {
+        if (const auto pose = present_pose(maps, k.keyframe))
+          beliefs.poses.push_back({k.frame, *pose});
+        else if (!maps.contains(maps.current(k.keyframe).map))
+          beliefs.removed.push_back(k.frame);
+      }
       return true;
     });
   };
+}
+
+/// How the viewer asks for the keyframes and their graph. Edges: of the spanning tree, of loops, and between keyframes
+/// that share many landmarks; all that are covisible would hide each other.
+auto graph_of(const slam_system& slam) {
+  return [&slam, seen = orbis::slam::pose_revision{.map = orbis::slam::no_id}](slam_graph& graph, bool always) mutable {
+    constexpr std::uint32_t many_shared = 100;
+    return slam.inspect([&](const orbis::slam::atlas& maps) {
+      const auto& map = maps.active();
+      const orbis::slam::pose_revision now{maps.active_id(), map.pose_changes()};
+      if (std::exchange(seen, now) == now && !always) return false;
+      graph.poses.clear();
+      for (const auto& asked : graph.asked) graph.poses.push_back(present_pose(maps, asked));
+      graph.keyframes.clear();
+      graph.edges.clear();
+      std::vector<std::uint32_t> place(map.keyframe_end().value());  // of each keyframe in the list
+      for (const auto& k : map.keyframes()) {
+        place[k.id.value()] = static_cast<std::uint32_t>(graph.keyframes.size());
+        graph.keyframes.push_back(k.T_world_camera);
+      }
+      for (const auto& k : map.keyframes()) {
+        const auto add = [&](orbis::slam::keyframe_id other, edge_kind kind) {
+          if (map.has_keyframe(other)) graph.edges.push_back({place[k.id.value()], place[other.value()], kind});
+        };
+        for (const auto& both : map.covisibility().sharing(k.id))
+          if (both.keyframe < k.id && both.shared >= many_shared) add(both.keyframe, edge_kind::covisible);
+        if (const auto parent = map.tree().parent(k.id); parent != orbis::slam::no_id) add(parent, edge_kind::tree);
+        for (const auto other : map.tree().loop_edges(k.id))
+          if (other < k.id) add(other, edge_kind::loop);
+      }
+      return true;
+    });
+  };
+}
+
+/// What the viewer asks while frames are tracked. `live` may be null.
+scene_sources sources_of(const slam_system& slam, const live_mapping* live) {
+  scene_sources sources{.graph = graph_of(slam)};
+  if (live == nullptr) return sources;
+  sources.voxels = [live, seen = std::optional<std::uint64_t>{}](std::vector<voxel>& cubes) mutable {
+    return live->occupied_since(seen, cubes);
+  };
+  sources.numbers = [live] { return live->so_far(); };
+  return sources;
 }
 
 /// Takes over the active map and what was found out.
@@ -117,22 +209,28 @@ std::string in_words(const slam_results& slam) {
 
 orbis::result<tracked_frames> track(const frame_source& source, const settings& s,
                                     const std::filesystem::path& landmark_map, const std::filesystem::path& spill_file,
-                                    console& console) {
+                                    viewer& viewer, console& console) {
   console.stage("tracking");
   slam_system slam{source.camera.model, options_for(source, s)};
   if (!s.load_map.empty())
     if (auto loaded = slam.load_map(s.load_map); !loaded) return orbis::fail(loaded.error());
   const map_id first_map = slam.active_map();
 
-  tracked_frames out{
-      .slam = {}, .world = {}, .keyframes = posed_frames{source, spill_file}, .live = {}, .stopped = {}, .unsaved = {}};
+  tracked_frames out{.slam = {},
+                     .world = {},
+                     .keyframes = posed_frames{source, s, spill_file},
+                     .live = {},
+                     .stopped = {},
+                     .unsaved = {}};
   if (s.live_map && !s.localize_only)
     out.live = std::make_unique<live_mapping>(source, s, spill_file.string() + ".live", poses_of(slam));
+  const viewer::connection connection{viewer, sources_of(slam, out.live.get())};  // goes before what it asks
   interrupts::keep_results(s.quiet
                                ? ""
                                : "\nrgbd_slam: stopping; what was reached is mapped and written. Once more: stop at "
                                  "once, and leave the folder as it was\n");
-  const upright_worlds worlds = track_frames(slam, source, s, out, console);
+  upright_worlds worlds{source, s};
+  track_frames(slam, source, s, worlds, out, viewer, console);
   slam.wait();
   if (out.live) out.live->stop();
 

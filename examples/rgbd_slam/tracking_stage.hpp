@@ -17,6 +17,7 @@
 #include "results.hpp"
 #include "settings.hpp"
 #include "source.hpp"
+#include "viewer/viewer.hpp"
 
 namespace app {
 
@@ -31,10 +32,12 @@ struct tracked_frames {
 };
 
 /// Tracks the source's frames, up to the first that cannot be read, or to Ctrl-C. Errors: a map that cannot be loaded.
-/// `landmark_map`: where the map of landmarks is written, if it is to be saved. `spill_file`: see posed_frames.
+/// `viewer` is shown what goes on. `landmark_map`: where the map of landmarks is written, if it is to be saved.
+/// `spill_file`: see posed_frames.
 [[nodiscard]] orbis::result<tracked_frames> track(const frame_source& source, const settings& s,
                                                   const std::filesystem::path& landmark_map,
-                                                  const std::filesystem::path& spill_file, console& console);
+                                                  const std::filesystem::path& spill_file, viewer& viewer,
+                                                  console& console);
 
 /// The error that stopped the tracking, with what was reached. @pre tracked.stopped
 [[nodiscard]] orbis::error explain_stop(const tracked_frames& tracked, const frame_source& source);

@@ -68,6 +68,16 @@ class run {
   run& operator=(const run&) = delete;
 
   void send(int signal) const { ::kill(process_, signal); }
+  /// How many files without a name it has open, whose name was `name`.
+  [[nodiscard]] std::size_t nameless(const std::string& name) const {
+    std::size_t count = 0;
+    std::error_code ignored;
+    for (const auto& entry : fs::directory_iterator{"/proc/" + std::to_string(process_) + "/fd", ignored}) {
+      const std::string target = fs::read_symlink(entry.path(), ignored).string();
+      count += target.ends_with("/" + name + " (deleted)") ? 1U : 0U;
+    }
+    return count;
+  }
   [[nodiscard]] bool is_over() { return over_ = over_ || ::waitpid(process_, &status_, WNOHANG) == process_; }
   /// Waits for the end; the exit code, or minus the signal.
   int wait() {
@@ -288,6 +298,29 @@ int main(int argc, char** argv) {
       check(!kept || end == 130, "a run that has kept something does not say that it was interrupted");
     }
   }
+  // Killed while the live map grows and its depth images are in files: those are gone with it.
+  if (fs::exists("/proc/self/fd"))
+    for (int i = 0; i != 3; ++i) {
+      put_back(work / "demo", room);
+      std::vector<std::string> spilling = demo("2", "100000");
+      spilling.insert(spilling.end(), {"--depth-memory", "0", "--map-every-frame"});
+      run endless{spilling};
+      const auto has_spilled = [&] {
+        return endless.nameless("depth.spill") == 1 && endless.nameless("depth.spill.live") == 1;
+      };
+      for (int wait = 0; !has_spilled(); ++wait) {
+        check(wait < 6000 && !endless.is_over(), "no depth image was spilled");
+        std::this_thread::sleep_for(std::chrono::milliseconds{10});
+      }
+      std::this_thread::sleep_for(std::chrono::milliseconds{70 * i});
+      endless.send(SIGKILL);
+      check(endless.wait() == -SIGKILL, "a killed run goes on");
+      check(!is_new(content_of(work / "demo"), room, nullptr, "killed beside the live map"), "killed, and written");
+      check(hidden_in(work / "demo") == 1, "a killed run leaves more than its hidden folder");
+      for (const auto& entry : fs::recursive_directory_iterator{work / "demo"})
+        check(entry.path().filename().string().find("spill") == std::string::npos, "a spill file is left");
+    }
+
   put_back(work / "demo", room);
   for (int i = 0; i != 6; ++i) {
     run endless{demo("2", "100000")};

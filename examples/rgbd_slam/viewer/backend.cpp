@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "viewer/backend.hpp"
+
+namespace app {
+
+bool has_viewer(const std::string& name) {
+#ifdef RGBD_SLAM_WINDOW
+  if (name == "window") return true;
+#endif
+#ifdef RGBD_SLAM_WEB
+  if (name == "web") return true;
+#endif
+  return name.empty();
+}
+
+std::string how_to_get_viewer(const std::string& name) {
+  const bool is_window = name == "window";
+  return "--viewer " + name + ": this program was built without it; install " +
+         (is_window ? "libglfw3-dev, libimgui-dev and libgl-dev" : "libcpp-httplib-dev and pkg-config") +
+         ", configure and build again";
+}
+
+#ifndef RGBD_SLAM_WINDOW
+orbis::result<std::unique_ptr<viewer_backend>> open_window() {
+  return orbis::fail(orbis::errc::unsupported, {}, how_to_get_viewer("window"));
+}
+#endif
+#ifndef RGBD_SLAM_WEB
+orbis::result<std::unique_ptr<viewer_backend>> open_web(unsigned) {
+  return orbis::fail(orbis::errc::unsupported, {}, how_to_get_viewer("web"));
+}
+#endif
+
+}  // namespace app

@@ -1,0 +1,292 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "viewer/scene_builder.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace app {
+namespace {
+
+using orbis::se3;
+using orbis::vec3f;
+
+constexpr float trail_step = 0.02F;              // metres between points of the path
+constexpr std::size_t recent_frames = 300;       // that the percentile of tracking is about
+constexpr std::size_t keyframes_at_a_time = 64;  // whose colours follow a correction before voxels are shown
+constexpr int color_tolerance = 12;              // a voxel that changed its colour by less is not shown anew
+
+std::uint64_t name_of(orbis::slam::map_keyframe k) { return std::uint64_t{k.map.value()} << 32U | k.keyframe.value(); }
+
+/// How far points two metres in front of the camera moved, metres.
+double motion(const se3& from, const se3& to) {
+  const auto difference = (from.inverse() * to).log();
+  return difference.head<3>().norm() + 2.0 * difference.tail<3>().norm();
+}
+
+/// The value below which `share` of the values lie. @pre there is one
+template <class T>
+T percentile(std::vector<T> values, double share) {
+  const auto nth = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), nth, values.end());
+  return *nth;
+}
+
+/// Whether two lists of cubes look the same.
+bool look_alike(const std::vector<shown_voxel>& a, const std::vector<shown_voxel>& b) {
+  const auto close = [](std::uint8_t p, std::uint8_t q) { return std::abs(p - q) <= color_tolerance; };
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [&](const shown_voxel& p, const shown_voxel& q) {
+    return p.x == q.x && p.y == q.y && p.z == q.z && p.level == q.level && close(p.color.r, q.color.r) &&
+           close(p.color.g, q.color.g) && close(p.color.b, q.color.b);
+  });
+}
+
+}  // namespace
+
+frustum_rays corner_rays(const orbis::camera::ray_table& rays) {
+  frustum_rays corners;
+  const int right = rays.width() - 1, bottom = rays.height() - 1;
+  const std::array<std::array<int, 2>, 4> at{{{0, 0}, {right, 0}, {right, bottom}, {0, bottom}}};
+  for (std::size_t i = 0; i != 4; ++i) {
+    corners[i] = rays.at(at[i][0], at[i][1], 1.0F);
+    // A wide lens may see nothing there: a pyramid of 90 degrees stands for it.
+    if (!corners[i].allFinite()) corners[i] = {at[i][0] == 0 ? -1.0F : 1.0F, at[i][1] == 0 ? -1.0F : 1.0F, 1.0F};
+  }
+  return corners;
+}
+
+scene_builder::scene_builder(std::string title, std::size_t frames, orbis::camera::ray_table rays, double resolution)
+    : rays_{std::move(rays)},
+      resolution_{resolution},
+      // A sample for each voxel at three metres; each keyframe sees most of the voxels that the others see.
+      step_{std::clamp(static_cast<int>(resolution / 3.0 * 0.8 * rays_.width()), 3, 8)},
+      colors_{resolution} {
+  scene_.title = std::move(title);
+  scene_.camera = corner_rays(rays_);
+  scene_.voxels.resolution = resolution;
+  scene_.numbers.frames = frames;
+}
+
+// -- the thread that tracks
+
+std::vector<scene_builder::sample> scene_builder::samples_of(const handed_frame& frame) const {
+  std::vector<sample> samples;
+  const int width = std::min({frame.color.width(), frame.depth.width(), rays_.width()});
+  const int height = std::min({frame.color.height(), frame.depth.height(), rays_.height()});
+  samples.reserve(static_cast<std::size_t>((width / step_ + 1) * (height / step_ + 1)));
+  for (int y = step_ / 2; y < height; y += step_)
+    for (int x = step_ / 2; x < width; x += step_) {
+      const std::uint16_t d = frame.depth(x, y);
+      if (d == 0 || d == 65535) continue;
+      samples.push_back({static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y),
+                         static_cast<float>(d / frame.depth_scale), frame.color(x, y)});
+    }
+  return samples;
+}
+
+void scene_builder::hand_over(handed_frame frame) {
+  std::vector<sample> samples;
+  if (frame.keyframe) samples = samples_of(frame);
+  std::optional<passed_point> passed;
+  if (frame.tracked) {
+    const vec3f at = frame.tracked->T_reference_camera.translation().cast<float>();
+    if (was_lost_ || last_reference_ != frame.tracked->reference || (at - last_at_).norm() >= trail_step) {
+      passed = passed_point{frame.tracked->reference, at, was_lost_};
+      last_reference_ = frame.tracked->reference;
+      last_at_ = at;
+    }
+  }
+  was_lost_ = !frame.tracked;
+  std::optional<handed_frame> before;  // let go of without the lock
+  {
+    const std::lock_guard lock{mutex_};
+    if (passed) mail_.passed.push_back(*passed);
+    if (frame.keyframe) mail_.keyframes.emplace_back(*frame.keyframe, std::move(samples));
+    mail_.tracking_ms.push_back(frame.tracking_ms);
+    before = std::exchange(mail_.newest, std::move(frame));
+  }
+}
+
+// -- the viewer's thread
+
+std::size_t scene_builder::index_of(orbis::slam::map_keyframe k) {
+  const auto [at, is_new] = asked_.try_emplace(name_of(k), graph_.asked.size());
+  if (is_new) {
+    graph_.asked.push_back(k);
+    graph_asked_more_ = true;
+  }
+  return at->second;
+}
+
+void scene_builder::take_mail() {
+  mailbox mail;
+  {
+    const std::lock_guard lock{mutex_};
+    std::swap(mail, mail_);
+  }
+  for (const double ms : mail.tracking_ms) {
+    if (tracking_ms_.size() < recent_frames) tracking_ms_.emplace_back();
+    tracking_ms_[frames_seen_++ % recent_frames] = ms;
+    scene_.numbers.tracking_ms = ms;
+  }
+  for (const passed_point& p : mail.passed) {
+    trail_.push_back({index_of(p.reference), p.at, p.begins});
+    graph_asked_more_ = true;
+  }
+  for (auto& [keyframe, samples] : mail.keyframes) colored_.push_back({index_of(keyframe), std::move(samples), {}});
+  if (!mail.newest) return;
+  handed_frame& f = *mail.newest;
+  shown_frame shown{f.number, std::move(f.state), f.T_world_camera, {}, {}};
+  shown.image = std::make_shared<const orbis::image<orbis::rgb8>>(std::move(f.color));
+  if (f.tracked)
+    for (const auto& feature : f.tracked->features) shown.features.push_back({feature.x, feature.y, feature.tracked});
+  scene_.frame = std::move(shown);
+}
+
+const viewer_scene& scene_builder::update(const scene_sources& sources) { return update(sources, false); }
+const viewer_scene& scene_builder::update_at_once(const scene_sources& sources) { return update(sources, true); }
+
+const viewer_scene& scene_builder::update(const scene_sources& sources, bool at_once) {
+  take_mail();
+  auto start = clock::now();
+  if (sources.graph && (at_once || graph_pace_.is_due(start))) {
+    update_graph(sources, at_once);
+    graph_pace_.ran(start, clock::now());
+  }
+  start = clock::now();
+  if (at_once || voxel_pace_.is_due(start)) {
+    update_voxels(sources, at_once);
+    voxel_pace_.ran(start, clock::now());
+  }
+  start = clock::now();
+  if (at_once || number_pace_.is_due(start)) {
+    update_numbers(sources);
+    number_pace_.ran(start, clock::now());
+  }
+  return scene_;
+}
+
+void scene_builder::update_graph(const scene_sources& sources, bool at_once) {
+  if (!sources.graph(graph_, at_once || std::exchange(graph_asked_more_, false))) return;
+  graph_asked_more_ = false;
+  ++scene_.graph.revision;
+  scene_.graph.keyframes = graph_.keyframes;
+  scene_.graph.edges = graph_.edges;
+  draw_trail();
+  colors_wait_ = true;
+}
+
+void scene_builder::draw_trail() {
+  scene_.graph.trail.clear();
+  bool begins = true;
+  for (const trail_item& item : trail_) {
+    const auto& pose = item.asked < graph_.poses.size() ? graph_.poses[item.asked] : std::nullopt;
+    begins = begins || item.begins;
+    if (!pose) {  // of another map
+      begins = true;
+      continue;
+    }
+    scene_.graph.trail.push_back({(*pose * item.at.cast<double>()).cast<float>(), begins});
+    begins = false;
+  }
+}
+
+bool scene_builder::move_colors(std::size_t limit) {
+  for (colored_keyframe& k : colored_) {
+    const auto& pose = k.asked < graph_.poses.size() ? graph_.poses[k.asked] : std::nullopt;
+    if (pose.has_value() == k.placed.has_value() && (!pose || motion(*k.placed, *pose) < 0.5 * resolution_)) continue;
+    if (limit-- == 0) return false;
+    const auto each = [&](const se3& T_world_camera, auto&& use) {
+      const auto T = T_world_camera.cast<float>();
+      for (const sample& s : k.samples)
+        if (const vec3f p = rays_.at(s.x, s.y, s.depth); p.allFinite()) use(vec3f(T * p), s.color);
+    };
+    if (k.placed) each(*k.placed, [&](const vec3f& p, orbis::rgb8 c) { colors_.remove(p, c); });
+    if (pose) each(*pose, [&](const vec3f& p, orbis::rgb8 c) { colors_.add(p, c); });
+    k.placed = pose;
+    colors_changed_ = true;
+  }
+  return true;
+}
+
+void scene_builder::update_voxels(const scene_sources& sources, bool at_once) {
+  if (has_final_voxels_) return;
+  const bool has_new = sources.voxels && sources.voxels(cubes_);
+  if (cubes_.empty() && !has_new) return;
+  if (colors_wait_) colors_wait_ = !move_colors(at_once ? colored_.size() : keyframes_at_a_time);
+  if (!has_new && !std::exchange(colors_changed_, false)) return;
+  colors_changed_ = false;
+  for (voxel& v : cubes_) v.color = colors_.color_of(v).value_or(no_color);
+  show_cubes();
+}
+
+void scene_builder::set_voxels(std::vector<voxel> colored) {
+  has_final_voxels_ = true;
+  cubes_ = std::move(colored);
+  scene_.voxels.absent.clear();
+  show_cubes();
+  cubes_ = {};
+}
+
+void scene_builder::show_cubes() {
+  std::map<block_index, std::vector<shown_voxel>> blocks;
+  block_index last{};
+  std::vector<shown_voxel>* into = nullptr;
+  std::vector<float> heights;
+  heights.reserve(cubes_.size());
+  for (const voxel& v : cubes_) {
+    const auto level = static_cast<int>(std::lround(std::log2(static_cast<double>(v.size) / resolution_)));
+    const double to_lowest = 0.5 * (static_cast<double>(v.size) - resolution_);
+    block_index block{};
+    std::array<std::uint8_t, 3> inside{};
+    for (int i = 0; i != 3; ++i) {
+      const auto cell =
+          static_cast<std::int32_t>(std::floor((static_cast<double>(v.center[i]) - to_lowest) / resolution_));
+      const std::int32_t b = cell >> 5;  // towards minus infinity
+      block[static_cast<std::size_t>(i)] = b;
+      inside[static_cast<std::size_t>(i)] = static_cast<std::uint8_t>(cell - b * block_voxels);
+    }
+    if (into == nullptr || block != last) into = &blocks[last = block];
+    into->push_back({inside[0], inside[1], inside[2], static_cast<std::uint8_t>(level), v.color});
+    heights.push_back(v.center.z());
+  }
+
+  shown_voxels& shown = scene_.voxels;
+  const std::uint64_t revision = shown.revision + 1;
+  bool changed = false;
+  for (auto& [index, block] : shown.blocks)
+    if (!block.voxels.empty() && !blocks.contains(index)) {
+      block = {revision, {}};
+      changed = true;
+    }
+  for (auto& [index, voxels] : blocks) {
+    voxel_block& block = shown.blocks[index];
+    if (look_alike(block.voxels, voxels)) continue;
+    block = {revision, std::move(voxels)};
+    changed = true;
+  }
+  if (!changed) return;
+  shown.revision = revision;
+  shown.count = cubes_.size();
+  if (heights.empty()) return;
+  shown.floor =
+      std::floor(10.0F * percentile(heights, 0.01)) / 10.0F;  // in steps, so that colours stay as the map grows
+  shown.ceiling = std::max(std::ceil(10.0F * percentile(heights, 0.99)) / 10.0F, shown.floor + 0.5F);
+}
+
+void scene_builder::update_numbers(const scene_sources& sources) {
+  shown_numbers& n = scene_.numbers;
+  if (!tracking_ms_.empty()) n.tracking_p95_ms = percentile(tracking_ms_, 0.95);
+  if (!sources.numbers) return;
+  const live_results live = sources.numbers();
+  n.insertions = live.insert_ms.size();
+  n.corrections = live.correction_ms.size();
+  n.behind_frames = live.behind_frames_max;
+  if (!live.insert_ms.empty()) {
+    n.insert_ms = live.insert_ms.back();
+    n.insert_p95_ms = percentile(live.insert_ms, 0.95);
+  }
+  if (!live.correction_ms.empty()) n.correction_ms = live.correction_ms.back();
+}
+
+}  // namespace app

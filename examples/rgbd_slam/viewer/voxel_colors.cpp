@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "viewer/voxel_colors.hpp"
+
+#include <cmath>
+
+namespace app {
+namespace {
+
+std::uint64_t name_of(const orbis::octree::voxel_key& k) {
+  return std::uint64_t{k.x} << 42U | std::uint64_t{k.y} << 21U | k.z;
+}
+
+}  // namespace
+
+voxel_colors::sum* voxel_colors::sum_at(const orbis::vec3f& point, bool make) {
+  const auto key = grid_.key(point);
+  if (!key) return nullptr;
+  const std::uint32_t at = index_.find(name_of(*key));
+  if (at != orbis::hash_index::none) return &sums_[at];
+  if (!make) return nullptr;
+  index_.set(name_of(*key), static_cast<std::uint32_t>(sums_.size()));
+  return &sums_.emplace_back();
+}
+
+void voxel_colors::add(const orbis::vec3f& point, orbis::rgb8 color) {
+  if (sum* const s = sum_at(point, true)) *s = {s->r + color.r, s->g + color.g, s->b + color.b, s->n + 1};
+}
+
+void voxel_colors::remove(const orbis::vec3f& point, orbis::rgb8 color) {
+  if (sum* const s = sum_at(point, false)) *s = {s->r - color.r, s->g - color.g, s->b - color.b, s->n - 1};
+}
+
+std::optional<orbis::rgb8> voxel_colors::color_of(const voxel& cube) const {
+  const auto cells = static_cast<int>(std::lround(static_cast<double>(cube.size) / grid_.resolution()));
+  const double to_lowest = 0.5 * (cells - 1) * grid_.resolution();
+  const auto lowest = grid_.key(orbis::vec3(cube.center.cast<double>().array() - to_lowest));
+  if (!lowest) return std::nullopt;
+  std::uint64_t r = 0, g = 0, b = 0, n = 0;
+  const auto take = [&](int x, int y, int z) {
+    const auto beside = [](std::uint32_t k, int by) { return k + static_cast<std::uint32_t>(by); };
+    const std::uint32_t at = index_.find(name_of({beside(lowest->x, x), beside(lowest->y, y), beside(lowest->z, z)}));
+    if (at == orbis::hash_index::none) return;
+    const sum& s = sums_[at];
+    r += s.r, g += s.g, b += s.b, n += s.n;
+  };
+  // A large cube takes the colours along its diagonal.
+  for (int i = 0; i != cells; ++i) take(i, i, i);
+  // A voxel may be occupied by pixels whose points, means of several pixels or some of them, lie in the next voxel.
+  if (n == 0)
+    for (int i = 0; i != 27; ++i) take(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1);
+  if (n == 0) return std::nullopt;
+  return orbis::rgb8{static_cast<std::uint8_t>(r / n), static_cast<std::uint8_t>(g / n),
+                     static_cast<std::uint8_t>(b / n)};
+}
+
+}  // namespace app

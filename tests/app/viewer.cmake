@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: BSD-3-Clause
+#
+# The viewer beside a run: it changes no result, and what cannot be shown is said before any work.
+include(${CMAKE_CURRENT_LIST_DIR}/support.cmake)
+
+app_fails(1 "--viewer.*television" demo --out out --viewer television)
+app_fails(1 "--viewer-port" demo --out out --viewer web --viewer-port 65536)
+app_fails(1 "--viewer-port" demo --out out --viewer web --viewer-port many)
+app_fails(1 "--viewer-hold wants a viewer" demo --out out --viewer-hold)
+app_fails(1 "--viewer" map cloud.ply --out out --viewer)
+app(0 demo --help)
+check(out MATCHES "--viewer-port")
+
+# A window: without the library for it, or without a display.
+set(ENV{DISPLAY})
+set(ENV{WAYLAND_DISPLAY})
+if(HAS_WINDOW)
+  app_fails(1 "--viewer window: no window can be opened" demo --out out --frames 2 --width 160 --quiet --viewer)
+else()
+  app_fails(1 "--viewer window: this program was built without it" demo --out out --viewer)
+  app_fails(1 "--viewer window: .*libglfw3-dev" demo --out out --viewer window)
+endif()
+check(NOT EXISTS ${WORK}/out)
+if(NOT HAS_WEB)
+  app_fails(1 "--viewer web: this program was built without it.*libcpp-httplib-dev" demo --out out --viewer web)
+  return()
+endif()
+
+# The same bytes with it.
+set(common demo --width 320 --resolution 0.1 --deterministic)
+app(0 ${common} --frames 20 --out plain --quiet)
+app(0 ${common} --frames 20 --out shown --viewer web --viewer-port 0)
+check(err MATCHES "http://127.0.0.1:[0-9]+/")
+file(GLOB names RELATIVE ${WORK}/plain ${WORK}/plain/*)
+list(REMOVE_ITEM names summary.json report.html)  # which say how long things took
+list(LENGTH names count)
+check(count GREATER 6)
+foreach(name IN LISTS names)
+  file(SHA256 ${WORK}/plain/${name} plain)
+  file(SHA256 ${WORK}/shown/${name} shown)
+  if(NOT plain STREQUAL shown)
+    message(FATAL_ERROR "${name} is not the same with --viewer")
+  endif()
+endforeach()
+app(0 ${common} --frames 4 --out batch --batch-map --viewer web --viewer-port 0 --quiet)
+
+# A port that is taken.
+file(WRITE ${WORK}/viewer.toml "viewer = \"web\"\nviewer-port = 0\nviewer-hold = true\n")
+execute_process(COMMAND bash -c "
+  set -e
+  '${APP}' demo --frames 3 --width 160 --out held --config viewer.toml 2>held.log &
+  run=$!
+  trap 'kill -9 $run 2>/dev/null || true' EXIT
+  for i in $(seq 600); do
+    port=$(sed -n 's,.*http://127.0.0.1:\\([0-9]*\\)/.*,\\1,p' held.log)
+    [ -n \"$port\" ] && [ -e held/report.html ] && break
+    sleep 0.1
+  done
+  '${APP}' demo --frames 3 --width 160 --out other --viewer web --viewer-port $port 2>taken.log && exit 3 || [ $? = 1 ]
+  kill -0 $run      # it is held open ...
+  kill -INT $run    # ... until Ctrl-C, which ends it well
+  wait $run"
+  WORKING_DIRECTORY ${WORK} RESULT_VARIABLE result ERROR_VARIABLE err)
+if(NOT result EQUAL 0)
+  message(FATAL_ERROR "a held viewer: ${result} ${err}")
+endif()
+file(READ ${WORK}/taken.log err)
+check(err MATCHES "127.0.0.1:[0-9]+: .*--viewer-port")
+check(NOT EXISTS ${WORK}/other)
+must_exist(${WORK}/held summary.json report.html map.bt)
