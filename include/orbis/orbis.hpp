@@ -10,6 +10,7 @@
 #include <orbis/features.hpp>
 #include <orbis/io.hpp>
 #include <orbis/mapping.hpp>
+#include <orbis/nav.hpp>
 #include <orbis/octree.hpp>
 #include <orbis/optimize.hpp>
 #include <orbis/places.hpp>
