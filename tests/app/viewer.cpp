@@ -8,8 +8,13 @@
 #include <cmath>
 #include <cstdint>
 #include <cstring>
+#include <exception>
+#include <functional>
+#include <future>
 #include <memory>
+#include <mutex>
 #include <set>
+#include <stdexcept>
 #include <string>
 #include <thread>
 #include <utility>
@@ -20,6 +25,7 @@
 
 #include "support/catch.hpp"
 #include "viewer/backend.hpp"
+#include "viewer/bounded_threads.hpp"
 #include "viewer/scene_builder.hpp"
 #include "viewer/voxel_colors.hpp"
 #include "viewer/web_messages.hpp"
@@ -288,6 +294,56 @@ TEST_CASE("Tracking never waits for who looks at the scene") {
   CHECK(builder.update_at_once(told.sources()).frame->number == 199);
 }
 
+namespace {
+
+// What cpp-httplib has had so far.
+struct old_queue {
+  virtual ~old_queue() = default;
+  virtual void enqueue(std::function<void()> job) = 0;
+  virtual void shutdown() = 0;
+};
+struct new_queue {
+  virtual ~new_queue() = default;
+  virtual bool enqueue(std::function<void()> job) = 0;
+  virtual void shutdown() = 0;
+};
+
+/// Gives a job to the queue; whether it was taken.
+bool give(old_queue& queue, std::function<void()> job) { return queue.enqueue(std::move(job)), true; }
+bool give(new_queue& queue, std::function<void()> job) { return queue.enqueue(std::move(job)); }
+
+}  // namespace
+
+TEMPLATE_TEST_CASE("The server's threads do every job, and an exception in one ends none of them", "", old_queue,
+                   new_queue) {
+  std::mutex mutex;
+  std::vector<std::string> failures;
+  std::atomic<int> jobs_done{0};
+  {
+    bounded_threads<TestType> queue{3, 2, [&](std::exception_ptr e) {
+                                      const std::lock_guard lock{mutex};
+                                      try {
+                                        std::rethrow_exception(std::move(e));
+                                      } catch (const std::exception& what) {
+                                        failures.emplace_back(what.what());
+                                      }
+                                    }};
+    for (int i = 0; i != 50; ++i)
+      CHECK(give(queue, [&, i] {
+        if (i % 10 == 3) throw std::runtime_error{"job " + std::to_string(i)};
+        ++jobs_done;
+      }));
+    queue.shutdown();
+    CHECK(jobs_done == 45);
+  }
+  std::sort(failures.begin(), failures.end());
+  CHECK(failures == std::vector<std::string>{"job 13", "job 23", "job 3", "job 33", "job 43"});
+  // A server that ends by an exception does not call shutdown.
+  {
+    const bounded_threads<TestType> queue{2, 2, [](const std::exception_ptr&) {}};
+  }
+}
+
 #ifdef RGBD_SLAM_WEB
 
 namespace {
@@ -440,6 +496,26 @@ TEST_CASE("The server answers this machine only, reads only, and knows no files"
   for (const char* path :
        {"/frame?since=x", "/voxels?since=-1", "/graph?since=1e3", "/graph?since=99999999999999999999"})
     CHECK(s.client.Get(path)->status == 400);
+}
+
+TEST_CASE("The server gives no parts of anything, so that nobody can ask for one part many times") {
+  served s;
+  REQUIRE(s.backend->draw(small_scene()));
+  std::string many = "bytes=0-";
+  for (int i = 0; i != 2000; ++i) many += ",0-";
+  for (const std::string& range :
+       {std::string{"bytes=0-9"}, std::string{"bytes=5-"}, std::string{"bytes=-5"}, std::string{"bytes=99999999-"},
+        std::string{"bytes=5-2"}, std::string{"bytes=-"}, std::string{"bytes=0-1,3-4"}, std::string{"lines=1-2"},
+        std::string{"bytes=99999999999999999999999-1"}, "bytes=" + std::string(8000, '1') + "-", many})
+    for (const char* path : {"/", "/frame", "/voxels", "/nothing"}) {
+      INFO(path << " " << range.substr(0, 40));
+      const auto answer = s.client.Get(path, {{"Range", range}});
+      REQUIRE(answer);
+      CHECK(answer->status == 416);
+      CHECK(answer->body.size() < 1000);
+    }
+  CHECK(body(s.client.Get("/")).size() > 1000);
+  CHECK(s.backend->draw(small_scene()));
 }
 
 TEST_CASE("A port that is taken is an error, and is free again afterwards") {

@@ -17,7 +17,8 @@ namespace app {
 class viewer_backend {
  public:
   virtual ~viewer_backend() = default;
-  /// Draws, and takes what the user does. False: the user has closed it.
+  /// Draws, and takes what the user does. False: the user has closed it. Throws what a thread of the back end has
+  /// thrown.
   [[nodiscard]] virtual bool draw(const viewer_scene& scene) = 0;
   /// Where it is to be seen, for the user; empty: nothing needs to be said.
   [[nodiscard]] virtual std::string where() const = 0;

@@ -3,22 +3,22 @@
 // The scene in a browser: a server on 127.0.0.1 that gives one page and what the page asks for, and takes nothing.
 #include <atomic>
 #include <charconv>
-#include <condition_variable>
+#include <chrono>
 #include <cstdint>
-#include <deque>
-#include <functional>
+#include <exception>
 #include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
 #include <random>
+#include <stdexcept>
 #include <string>
-#include <string_view>
 #include <thread>
 #include <utility>
 #include <vector>
 
 #include "viewer/backend.hpp"
+#include "viewer/bounded_threads.hpp"
 #include "viewer/viewer_page.hpp"
 #include "viewer/web_messages.hpp"
 
@@ -31,50 +31,6 @@ namespace {
 constexpr std::size_t server_threads = 8;
 constexpr std::size_t waiting_connections = 8;
 constexpr std::size_t requests_per_connection = 20;  // then others have a turn
-
-/// Threads for connections. Who comes while too many wait is left to wait in the system's own, bounded queue.
-class bounded_threads final : public httplib::TaskQueue {
- public:
-  bounded_threads() {
-    for (std::size_t i = 0; i != server_threads; ++i) threads_.emplace_back([this] { work(); });
-  }
-  void enqueue(std::function<void()> job) override {
-    std::unique_lock lock{mutex_};
-    changed_.wait(lock, [&] { return jobs_.size() < waiting_connections; });
-    jobs_.push_back(std::move(job));
-    changed_.notify_all();
-  }
-  void shutdown() override {
-    {
-      const std::lock_guard lock{mutex_};
-      ends_ = true;
-    }
-    changed_.notify_all();
-    for (std::thread& t : threads_) t.join();
-  }
-
- private:
-  void work() {
-    for (;;) {
-      std::function<void()> job;
-      {
-        std::unique_lock lock{mutex_};
-        changed_.wait(lock, [&] { return ends_ || !jobs_.empty(); });
-        if (jobs_.empty()) return;
-        job = std::move(jobs_.front());
-        jobs_.pop_front();
-      }
-      changed_.notify_all();
-      job();
-    }
-  }
-
-  std::mutex mutex_;
-  std::condition_variable changed_;
-  std::deque<std::function<void()>> jobs_;
-  bool ends_ = false;
-  std::vector<std::thread> threads_;
-};
 
 /// Whether a request is meant for this machine. A page from elsewhere whose name was made to resolve to 127.0.0.1 sends
 /// that name. The port may be another one: that of a tunnel.
@@ -117,8 +73,8 @@ class web_backend final : public viewer_backend {
       if (!server_.bind_to_port(address, static_cast<int>(port))) return false;
       port_ = port;
     }
-    thread_ = std::thread{[this] { server_.listen_after_bind(); }};
-    for (int i = 0; i != 1000 && !server_.is_running(); ++i)  // `stop` would be overlooked before that
+    thread_ = std::thread{[this] { serve(); }};
+    while (!server_.is_running() && !has_ended_)  // `stop` would be overlooked before that
       std::this_thread::sleep_for(std::chrono::milliseconds{1});
     return true;
   }
@@ -144,6 +100,19 @@ class web_backend final : public viewer_backend {
   static constexpr const char* address = "127.0.0.1";
 
   void set_up();
+  void serve() {
+    try {
+      if (!server_.listen_after_bind()) throw std::runtime_error{"the page's server takes no more connections"};
+    } catch (...) {
+      note(std::current_exception());
+    }
+    has_ended_ = true;
+  }
+  /// Keeps the first exception of a thread of the server, for `draw`.
+  void note(std::exception_ptr failure) {
+    const std::lock_guard lock{mutex_};
+    if (!failure_) failure_ = std::move(failure);
+  }
   void give_frame(std::uint64_t since, httplib::Response& response);
   void give_graph(std::uint64_t since, httplib::Response& response);
   void give_voxels(std::uint64_t since, httplib::Response& response);
@@ -152,8 +121,10 @@ class web_backend final : public viewer_backend {
   unsigned port_ = 0;
   httplib::Server server_;
   std::thread thread_;
+  std::atomic<bool> has_ended_{false};
 
   std::mutex mutex_;  // of what follows
+  std::exception_ptr failure_;
   std::string state_ = "{}";
   std::shared_ptr<published_frame> frame_;
   bytes graph_ = std::make_shared<const std::string>();
@@ -163,7 +134,10 @@ class web_backend final : public viewer_backend {
 };
 
 void web_backend::set_up() {
-  server_.new_task_queue = [] { return new bounded_threads; };
+  server_.new_task_queue = [this] {
+    return new bounded_threads<httplib::TaskQueue>{server_threads, waiting_connections,
+                                                   [this](std::exception_ptr e) { note(std::move(e)); }};
+  };
   // Not the library's default, by which two servers may have one port.
   server_.set_socket_options([](socket_t socket) {
     const int yes = 1;
@@ -184,6 +158,13 @@ void web_backend::set_up() {
                                 "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
                                 "connect-src 'self'; img-src blob:; base-uri 'none'; form-action 'none'"}});
   server_.set_pre_routing_handler([](const httplib::Request& request, httplib::Response& response) {
+    // The library would make an answer of all ranges together: thousands of times the whole, if so many are asked for.
+    // No body, as it would cut that up as well.
+    if (request.has_header("Range")) {
+      response.status = 416;
+      response.set_header("Connection", "close");
+      return httplib::Server::HandlerResponse::Handled;
+    }
     if (!is_local(request)) {
       response.status = 403;
       response.set_header("Connection", "close");
@@ -231,6 +212,7 @@ bool web_backend::draw(const viewer_scene& scene) {
         blocks.emplace_back(
             index, published_block{block.revision, std::make_shared<const std::string>(block_message(index, block))});
   const std::lock_guard lock{mutex_};
+  if (failure_) std::rethrow_exception(failure_);
   state_ = std::move(state);
   if (frame) frame_.swap(frame);
   if (graph) {
