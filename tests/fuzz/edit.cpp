@@ -273,8 +273,6 @@ class mirror {
     seen_ = log.revision();
     is_new_ = false;
   }
-  /// Eviction is no change of what is known, and the log is silent about it.
-  void forget(const voxel_key& k, int level) { std::ranges::fill(voxels_.node(k, level), voxel{}); }
   void start_anew() { is_new_ = true; }
   [[nodiscard]] std::uint64_t seen() const { return seen_; }
   [[nodiscard]] const voxels& content() const { return voxels_; }
@@ -459,7 +457,6 @@ class session {
               "what is evicted was in the map");
       require(is_outside(l, l.size, 1e-6), "what is evicted lies outside the box");
       std::ranges::fill(inside, voxel{});
-      mirror_.forget(l.key, at);
     }
     const double brick = map_.grid().node_size(octree::detail::brick_level);
     map_.for_each_leaf([&](const map::leaf& l) {

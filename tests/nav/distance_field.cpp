@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstdint>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include <orbis/core/random.hpp>
@@ -86,21 +87,100 @@ TEST_CASE("A distance field follows its map, and is the one made afresh") {
   check();
 }
 
-TEST_CASE("A field that is told follows what the change log does not know") {
+TEST_CASE("A field follows a map whose changes are not recorded all the time") {
+  const occupancy unknown = GENERATE(occupancy::occupied, occupancy::free);
+  const nav::distance_field_options options{.reach = 0.5, .unknown = unknown};
   random_bits random{3};
   map_type map{0.1};
+  const bool from_the_start = GENERATE(true, false);
+  if (from_the_start) map.track_changes();
+  distance_field field{map, options};
+  const auto check = [&] {
+    field.update(map);
+    CHECK(differences(field, distance_field{map, options}) == 0);
+  };
+  for (int i = 0; i != 3; ++i) {
+    add_scan(map, random);
+    check();
+  }
   map.track_changes();
-  for (int i = 0; i != 4; ++i) add_scan(map, random);
-  distance_field field{map, {.reach = 0.5}};
-  map.evict_outside({vec3{-0.4, -0.4, -0.4}, vec3{0.4, 0.4, 0.4}}, [](const auto&) {});
-  field.update_all(map);
-  CHECK(differences(field, distance_field{map, {.reach = 0.5}}) == 0);
-  // A map whose changes are not tracked.
-  map_type untracked = map;
-  distance_field another{untracked, {.reach = 0.5}};
-  add_scan(untracked, random);
-  another.update(untracked);
-  CHECK(differences(another, distance_field{untracked, {.reach = 0.5}}) == 0);
+  check();
+  for (int round = 0; round != 2; ++round) {
+    map.track_changes(false);
+    for (int i = 0; i != 2; ++i) {
+      add_scan(map, random);
+      check();
+    }
+    const map_type before = map;
+    map.clear();
+    check();
+    map = before;
+    check();
+    add_scan(map, random);
+    map.track_changes();
+    add_scan(map, random);
+    check();
+    add_scan(map, random);
+    check();
+  }
+  map_type another{0.1};  // moved in, with a log of its own that is behind
+  another.track_changes();
+  add_scan(another, random);
+  map = std::move(another);
+  check();
+}
+
+TEST_CASE("A field follows a rolling window") {
+  const occupancy unknown = GENERATE(occupancy::occupied, occupancy::free);
+  const nav::distance_field_options options{.reach = 0.5, .unknown = unknown};
+  random_bits random{5};
+  map_type map{0.1};
+  map.track_changes();
+  distance_field field{map, options};
+  for (int i = 0; i != 6; ++i) {
+    add_scan(map, random);
+    if (i == 3) map.set_unknown_node({0, 0, 0}, 8, 0.5F);  // a large leaf
+    field.update(map);
+    const vec3 half = vec3::Constant(i % 2 == 0 ? 0.4 : 0.3);
+    REQUIRE(map.evict_outside({-half, half}, [](const auto&) {}) > 0);
+    field.update(map);
+    CHECK(differences(field, distance_field{map, options}) == 0);
+  }
+}
+
+TEST_CASE("A field follows copies of a map, whatever their revisions are") {
+  const occupancy unknown = GENERATE(occupancy::occupied, occupancy::free);
+  const nav::distance_field_options options{.reach = 0.5, .unknown = unknown};
+  random_bits random{6};
+  map_type map{0.1};
+  map.track_changes();
+  struct snapshot {
+    map_type map;
+    std::uint64_t revision;
+  };
+  std::vector<snapshot> snapshots{{map, map.changes().revision()}};
+  distance_field field{map.grid(), options};
+  for (int i = 0; i != 12; ++i) {
+    if (i % 3 == 2)
+      map.transform([](float v) { return v < -1.0F ? std::nullopt : std::optional{v}; });
+    else
+      add_scan(map, random);
+    snapshots.push_back({map, map.changes().revision()});
+    if (i == 7) map.changes().set_capacity(20);
+    if (i == 10) map.changes().forget_before(map.changes().revision() - 1);
+    // The newest, or one before it, while the log knows more: also back in time.
+    for (const std::size_t back : {2U, 1U, 3U}) {
+      const snapshot& s = snapshots[snapshots.size() - std::min<std::size_t>(back, snapshots.size())];
+      field.update(s.map, map.changes(), s.revision);
+      CHECK(differences(field, distance_field{s.map, options}) == 0);
+    }
+    if (i % 4 != 3) continue;
+    field.update(map);
+    CHECK(differences(field, distance_field{map, options}) == 0);
+  }
+  distance_field all{snapshots.front().map, options};
+  all.update_all(map);
+  CHECK(differences(all, field) == 0);
 }
 
 TEST_CASE("Distances in metres, their gradient, and what they promise") {

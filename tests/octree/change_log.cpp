@@ -191,3 +191,23 @@ TEST_CASE("A cleared change log goes on counting and has nothing to tell") {
   CHECK(log.revision() == 0);
   CHECK(since(moved, 50) == masks{{morton_code({8, 4, 0}) / 64, 6}});
 }
+
+TEST_CASE("A stopped change log answers nobody until it is cleared") {
+  change_log log;
+  log.stop();
+  CHECK(log.complete_since() == 0);  // it never had a revision
+  log.begin_revision();
+  log.record({4, 0, 0}, 1);
+  for (int again = 0; again != 2; ++again) {
+    log.stop();
+    CHECK(log.revision() == 1);
+    CHECK(log.complete_since() > log.revision());
+    CHECK(log.memory_bytes() == 0);
+  }
+  log.forget_before(7);
+  CHECK(log.complete_since() > log.revision());
+  log.begin_revision();
+  log.clear();
+  CHECK(log.complete_since() == 2);
+  CHECK(since(log, 2).empty());
+}

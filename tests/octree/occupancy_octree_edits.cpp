@@ -261,6 +261,12 @@ TEST_CASE("A mirror that applies the logged changes stays the same map") {
       case 1:
         map.set_unknown_node({32768 + 400, 32768 + 8 * static_cast<std::uint32_t>(round), 32768}, 13, 0.5F);
         break;
+      case 2: {
+        const vec3 half = vec3::Constant(round == 2 ? 1.0 : 0.8);
+        CHECK(map.evict_outside({-half, half}, [](const auto&) {}) > 0);
+        scan(map, random, 2);
+        break;
+      }
       default: scan(map, random, 2); break;
     }
     update();
@@ -288,6 +294,11 @@ TEST_CASE("A mirror that applies the logged changes stays the same map") {
   map.transform([](float v) { return v == 0.5F ? std::nullopt : std::optional{v}; });  // the last large leaf goes
   CHECK(is_lost());
   CHECK_FALSE(is_lost());
+  map.set_unknown_node({0, 0, 0}, 8, 0.5F);
+  CHECK(is_lost());
+  map.evict_outside({{-1.0, -1.0, -1.0}, {1.0, 1.0, 1.0}}, [](const auto&) {});  // a large leaf with it
+  CHECK(is_lost());
+  CHECK(map.tracks_changes());
   map.clear();
   CHECK(is_lost());
   map.integrate(points, vec3f::Zero());
@@ -301,8 +312,15 @@ TEST_CASE("A mirror that applies the logged changes stays the same map") {
   map = mirror;
   CHECK(is_lost());
   map.track_changes(false);
+  CHECK_FALSE(map.tracks_changes());
+  CHECK(is_lost());
   map.integrate(points, vec3f::Ones());
   CHECK(map.changes().memory_bytes() == 0);
+  CHECK(is_lost());  // each time, as long as nothing is recorded
+  map.clear();
+  CHECK(is_lost());
+  map = mirror;
+  CHECK(is_lost());
   map.track_changes();
   CHECK(is_lost());
   const occupancy_octree<> copy = map;

@@ -19,6 +19,7 @@
 #include <array>
 #include <cassert>
 #include <cmath>
+#include <concepts>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -144,35 +145,79 @@ class distance_field : public metric_distances<squared_distances> {
     update(map);
   }
 
-  /// Follows the map: by its change log, where it has one that knows all since the last update, else by comparing
-  /// everything. @pre the same map every time, or one that has grown out of it; of the same grid
+  /// Follows the map: by its change log (`map.changes()`), where it has one that knows all since the last update, else
+  /// by comparing everything: after what the log does not record (see occupancy_octree::track_changes), and each time
+  /// while changes are not tracked. Costs what squared_distances::update costs, and comparing everything O(bricks of the
+  /// field + octants of the map) more. @pre the same map every time, of the same grid
   template <planning_map Map>
   void update(const Map& map) {
-    if constexpr (requires {
-                    { map.changes() } -> std::convertible_to<const octree::change_log&>;
-                  })
-      update(map, map.changes());
-    else
+    if constexpr (has_change_log<Map>) {
+      const octree::change_log& log = map.changes();
+      if (seen_ && *seen_ > log.revision()) seen_.reset();  // a map that was moved in
+      update(map, log, log.revision());
+    } else {
       update_all(map);
+    }
   }
-  /// As above, with the log of another map of which `map` is a copy: a snapshot.
+  /// Follows a copy of the map (a snapshot), with the log of the map that it is a copy of. `revision`: of the log when
+  /// the copy was made. The log may have gone on since then, and the copy may be
+  /// older than the one before: the field becomes that of the copy.
+  ///
+  /// @code
+  ///   listeners.published = [&](const auto& snapshot, const octree::change_log& log) {  // of a live_map_thread
+  ///     field.update(snapshot.map, log, snapshot.revision);
+  ///   };
+  /// @endcode
+  /// @pre revision <= log.revision(); copies of the same map every time, of the same grid
   template <planning_map Map>
-  void update(const Map& map, const octree::change_log& log) {
-    if (!seen_ || *seen_ < log.complete_since() || log.revision() == 0) {
-      update_all(map);
-    } else if (*seen_ != log.revision()) {
+  void update(const Map& copy, const octree::change_log& log, std::uint64_t revision) {
+    assert(map_access<Map>::grid(copy) == grid_);
+    assert(revision <= log.revision());
+    // Where both are older than the log, it names more octants than have changed between them, never fewer.
+    const std::uint64_t since = seen_ ? std::min(*seen_, revision) : 0;
+    if (!seen_ || since < log.complete_since() || log.revision() == 0) {
+      compare_all(copy);
+    } else if (*seen_ != revision) {
       octants_.clear();
-      auto octants = map_access<Map>::octants(map);
-      log.for_each_since(*seen_, [&](const octree::voxel_key& k, std::uint64_t) {
+      auto octants = map_access<Map>::octants(copy);
+      log.for_each_since(since, [&](const octree::voxel_key& k, std::uint64_t) {
         octants_.push_back({k, obstacles(octants(k))});
       });
       voxels_.update(octants_);
     }
-    seen_ = log.revision();
+    seen_ = revision;
   }
-  /// Follows the map by comparing everything: for maps whose log does not tell all, as after `evict_outside`.
+  /// Follows the map by comparing everything, whatever its log says.
   template <planning_map Map>
   void update_all(const Map& map) {
+    compare_all(map);
+    seen_.reset();
+    if constexpr (has_change_log<Map>) seen_ = map.changes().revision();
+  }
+
+  /// The centre of the obstacle nearest to the voxel that `p` lies in, metres; empty if there is none within reach.
+  template <point_like P>
+  [[nodiscard]] std::optional<vec3> nearest_obstacle(const P& p) const {
+    const auto k = grid_.key(p);
+    const auto found = k ? voxels_.nearest(*k) : std::nullopt;
+    return found ? std::optional{grid_.center(*found)} : std::nullopt;
+  }
+  /// What readers need. Copying it costs a pointer for each 4 kB; the copy does not change.
+  [[nodiscard]] distance_view view() const { return {grid_, voxels_.view(), reach_}; }
+  [[nodiscard]] const distance_field_options& options() const noexcept { return options_; }
+  /// Bytes on the heap.
+  [[nodiscard]] std::size_t memory_bytes() const noexcept {
+    return voxels_.memory_bytes() + octants_.capacity() * sizeof(octant_obstacles);
+  }
+
+ private:
+  template <class Map>
+  static constexpr bool has_change_log = requires(const Map& map) {
+    { map.changes() } -> std::convertible_to<const octree::change_log&>;
+  };
+
+  template <planning_map Map>
+  void compare_all(const Map& map) {
     assert(map_access<Map>::grid(map) == grid_);
     octants_.clear();
     auto octants = map_access<Map>::octants(map);
@@ -195,29 +240,12 @@ class distance_field : public metric_distances<squared_distances> {
     });
     voxels_.update(octants_);
   }
-
-  /// The centre of the obstacle nearest to the voxel that `p` lies in, metres; empty if there is none within reach.
-  template <point_like P>
-  [[nodiscard]] std::optional<vec3> nearest_obstacle(const P& p) const {
-    const auto k = grid_.key(p);
-    const auto found = k ? voxels_.nearest(*k) : std::nullopt;
-    return found ? std::optional{grid_.center(*found)} : std::nullopt;
-  }
-  /// What readers need. Copying it costs a pointer for each 4 kB; the copy does not change.
-  [[nodiscard]] distance_view view() const { return {grid_, voxels_.view(), reach_}; }
-  [[nodiscard]] const distance_field_options& options() const noexcept { return options_; }
-  /// Bytes on the heap.
-  [[nodiscard]] std::size_t memory_bytes() const noexcept {
-    return voxels_.memory_bytes() + octants_.capacity() * sizeof(octant_obstacles);
-  }
-
- private:
   [[nodiscard]] std::uint64_t obstacles(const octree::octant_states& s) const noexcept {
     return options_.unknown == octree::occupancy::occupied ? ~s.free() : s.occupied;
   }
 
   distance_field_options options_;
-  std::optional<std::uint64_t> seen_;
+  std::optional<std::uint64_t> seen_;  ///< the revision of the map whose field this is
   std::vector<octant_obstacles> octants_;
 };
 

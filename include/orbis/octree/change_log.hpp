@@ -79,7 +79,7 @@ class change_log {
   /// Forgets changes up to `revision`. Afterwards, only revisions from this one on may be asked about. O(entries).
   void forget_before(std::uint64_t revision) {
     if (revision <= complete_since_) return;
-    complete_since_ = std::min(revision, revision_);
+    complete_since_ = std::max(complete_since_, std::min(revision, revision_));
     exact_since_ = std::max(exact_since_, complete_since_);
     while (!entries_.empty() && entries_[0].revision <= complete_since_) entries_.pop_front();
     std::erase_if(merged_, [&](const entry& e) { return e.revision <= complete_since_; });
@@ -87,7 +87,7 @@ class change_log {
     for (std::size_t i = 0; i != merged_.size(); ++i)
       merged_index_.set(merged_[i].octant, static_cast<std::uint32_t>(i));
   }
-  /// The oldest revision that may be asked about, see forget_before() and clear(): who has seen only an
+  /// The oldest revision that may be asked about, see forget_before(), clear() and stop(): who has seen only an
   /// older one needs the whole map.
   [[nodiscard]] std::uint64_t complete_since() const noexcept { return complete_since_; }
   /// The oldest revision about which answers are exact; for older ones they may have too many voxels,
@@ -111,6 +111,12 @@ class change_log {
     *this = {};
     set_capacity(capacity);
     revision_ = complete_since_ = exact_since_ = revision;
+  }
+  /// Changes are not recorded from now on: forgets all, and until the next clear() no revision may be asked about, not
+  /// the current one either. A log that never had a revision says so by revision() == 0. O(1).
+  void stop() {
+    clear();
+    if (revision_ != 0) exact_since_ = ++complete_since_;
   }
   /// Bytes on the heap.
   [[nodiscard]] std::size_t memory_bytes() const noexcept {

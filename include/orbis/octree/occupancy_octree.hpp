@@ -196,8 +196,8 @@ class occupancy_octree {
   }
   /// A rolling window: removes every brick (8x8x8 voxels) and larger leaf that lies completely outside `box` (metres),
   /// after calling `evict(const leaf&)` for its leaves. `set_unknown_node(leaf.key, leaf.depth, leaf.log_odds)` brings
-  /// a leaf back. Returns the number of bricks and larger leaves removed. The change log does not record this, and
-  /// payload layers keep their values: erase there what was evicted. O(bricks + voxels evicted).
+  /// a leaf back. Returns the number of bricks and larger leaves removed. The change log records what was evicted: it is
+  /// unknown now. Payload layers keep their values: erase there what was evicted. O(bricks + voxels evicted).
   template <std::invocable<const leaf&> Evict>
   std::size_t evict_outside(const bounding_box& box, Evict&& evict) {
     const auto is_outside = [&](std::uint64_t name) {
@@ -210,6 +210,8 @@ class occupancy_octree {
     for (const auto& part : parts)
       (part.level == detail::brick_level ? bricks : large).push_back(detail::node_name(part.key, part.level));
     if (parts.empty()) return 0;
+    begin_change();
+    for (const auto& part : parts) note_brick(part.key, part.level);
     detail::merge_parts(parts, tree_depth());
     detail::visit_parts(store_, parts, tree_depth(),
                         [&](const voxel_key& key, int level, value_type v) { evict(leaf_of(key, level, v)); });
@@ -246,13 +248,15 @@ class occupancy_octree {
 
   /// Starts recording which voxels change (see change_log), or stops and clears the record. After `clear`, an
   /// assignment, a change to a leaf bigger than a brick, or a time without tracking, the log cannot tell what changed:
-  /// its `complete_since` moves on, and whoever mirrors the map has to take all of it again. Copies are not tracked.
+  /// its `complete_since` moves on, and whoever mirrors the map has to take all of it again; while tracking is stopped,
+  /// each time (`complete_since` is beyond `revision` then). Copies are not tracked.
   void track_changes(bool wanted = true) {
     if (track_.on == wanted) return;
     track_.on = wanted;
-    if (!wanted) track_.log.clear();
     if (!store_.empty() || track_.log.revision() != 0) lose_track();
   }
+  /// Whether changes are recorded. A map of which they never were has a log whose `revision` is 0.
+  [[nodiscard]] bool tracks_changes() const noexcept { return track_.on; }
   [[nodiscard]] const change_log& changes() const noexcept { return track_.log; }
   /// The log for writing: to forget revisions that all readers have seen, or to limit its length.
   [[nodiscard]] change_log& changes() noexcept { return track_.log; }
@@ -395,12 +399,18 @@ class occupancy_octree {
     tracking(const tracking&) noexcept {}
     tracking(tracking&&) noexcept = default;
     tracking& operator=(const tracking&) {
-      if (on) log.begin_revision();
-      log.clear();
+      lose();
       return *this;
     }
     tracking& operator=(tracking&&) noexcept = default;
     ~tracking() = default;
+
+    /// Marks the log as incomplete: what has just changed is not recorded.
+    void lose() {
+      if (!on) return log.stop();
+      log.begin_revision();
+      log.clear();
+    }
   };
 
   [[nodiscard]] leaf leaf_of(const voxel_key& key, int level, value_type v) const {
@@ -429,10 +439,14 @@ class occupancy_octree {
   void begin_change() {
     if (track_.on) track_.log.begin_revision();
   }
-  /// Marks the log as incomplete: what has just changed is not recorded.
-  void lose_track() {
-    begin_change();
-    track_.log.clear();
+  void lose_track() { track_.lose(); }
+  /// Everything known in a brick, or a larger leaf, is about to change.
+  void note_brick(const voxel_key& k, int level) {
+    if (!track_.on) return;
+    const detail::brick<value_type>* const b = level == detail::brick_level ? store_.find(k) : nullptr;
+    if (b == nullptr) return note_node(k, level);
+    for (unsigned i = 0; i != 8; ++i)
+      track_.log.record(child_key(k, i, node_cells(detail::octant_level)), store_.known(*b, i));
   }
   void note_node(const voxel_key& k, int level) {
     if (!track_.on) return;
