@@ -148,7 +148,7 @@ void add_viewer_options(CLI::App& cmd, settings& s) {
       ->check(within(0U, 65535U))
       ->capture_default_str()
       ->type_name("N");
-  cmd.add_flag("--viewer-hold", s.viewer_hold, "the viewer stays after the run, until it is closed or Ctrl-C");
+  cmd.add_flag("--viewer-hold", s.viewer_hold, "the viewer stays after the run, until the window is closed or Ctrl-C");
 }
 
 /// What of the options does not go together; empty if all does.

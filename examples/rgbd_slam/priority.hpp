@@ -13,6 +13,7 @@ namespace app {
 
 inline constexpr int live_map_niceness = 3;      ///< keyframes are to be in the map soon
 inline constexpr int compression_niceness = 10;  ///< nobody waits for it
+inline constexpr int viewer_niceness = 10;       ///< it may skip frames; it takes no lock that tracking waits for
 
 /// Makes this thread's share of a busy processor smaller: by a fifth for each step.
 inline void lower_priority([[maybe_unused]] int niceness) {

@@ -26,7 +26,7 @@ orbis::slam::options options_for(const frame_source& source, const settings& s) 
   return options;
 }
 
-/// A frame for the viewer, which gets its images for good.
+/// A frame for the viewer, which gets its images for good. `took_ms`: tracking up to here.
 handed_frame handed_over(const slam_system& slam, std::size_t i, const orbis::slam::track_result& found, double took_ms,
                          orbis::camera::rgbd_frame frame) {
   handed_frame handed{.number = i, .state = std::string{to_string(found.state)}, .tracking_ms = took_ms};
@@ -90,13 +90,14 @@ void track_frames(slam_system& slam, const frame_source& source, const settings&
     out.slam.slam_ms.push_back(took());
     if (found.keyframe) out.keyframes.add(i, {found.map, *found.keyframe}, *frame);
     if (out.live) hand_on(slam, found, i, *frame, s, *out.live);
+    viewer.show([&] { return handed_over(slam, i, found, took(), *std::move(frame)); });
     out.slam.tracking_ms.push_back(took());
+    viewer.tell_trouble(console);
     if (found.state == track_state::lost) {
       auto& lost = out.slam.lost_stretches;
       if (lost.empty() || lost.back().first + lost.back().count != i) lost.push_back({i, 0});
       ++lost.back().count;
     }
-    if (viewer.is_open()) viewer.show(handed_over(slam, i, found, out.slam.tracking_ms.back(), *std::move(frame)));
     console.advance(i + 1, source.frames,
                     std::string{to_string(found.state)} + ", " + std::to_string(out.keyframes.size()) + " keyframes");
   }

@@ -26,12 +26,22 @@
 #include "support/catch.hpp"
 #include "viewer/backend.hpp"
 #include "viewer/bounded_threads.hpp"
+#include "viewer/calls_aside.hpp"
 #include "viewer/scene_builder.hpp"
+#include "viewer/viewer_thread.hpp"
 #include "viewer/voxel_colors.hpp"
 #include "viewer/web_messages.hpp"
 
 #ifdef RGBD_SLAM_WEB
 #include <httplib.h>  // after Eigen: it brings a macro, _res
+#endif
+#ifdef __linux__
+#include <sys/resource.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+#endif
+#ifdef __GLIBC__
+#include <pthread.h>
 #endif
 
 using namespace app;
@@ -276,6 +286,113 @@ TEST_CASE("The colour of a voxel is the mean of its points; what is taken out le
   colors.add({std::nanf(""), 0.0F, 0.0F}, {1, 1, 1});
 }
 
+TEST_CASE("What voxels without points took is used again") {
+  voxel_colors colors{0.1};
+  const auto at_step = [](int i) { return vec3f{0.1F * static_cast<float>(i) + 0.05F, 0.05F, 0.05F}; };
+  for (int i = 0; i != 100; ++i) colors.add(at_step(i), {1, 2, 3});
+  CHECK(colors.size() == 100);
+  for (int i = 0; i != 100; ++i) colors.remove(at_step(i), {1, 2, 3});
+  CHECK(colors.size() == 0);
+  const std::size_t memory = colors.memory_bytes();
+  for (int i = 100; i != 10000; ++i) {
+    colors.add(at_step(i), {1, 2, 3});
+    if (i >= 200) colors.remove(at_step(i - 100), {1, 2, 3});
+  }
+  CHECK(colors.size() == 100);
+  CHECK(colors.memory_bytes() <= 2 * memory);
+  CHECK(colors.color_of({at_step(9999), 0.1F}) == rgb8{1, 2, 3});
+}
+
+namespace {
+
+/// Keyframes in a row, five metres from each other, that look at a wall each; the wall of the last one is green.
+struct row_of_walls {
+  static constexpr std::size_t count = 20, most = 2000;
+  told_graph told;
+  scene_builder builder{"", 0, rays(), 0.05, most};
+  std::vector<voxel> cubes;
+  scene_sources sources = told.sources();
+  explicit row_of_walls(double y) {
+    sources.voxels = [this, is_new = true](std::vector<voxel>& out) mutable {
+      out = cubes;
+      return std::exchange(is_new, false);
+    };
+    for (std::size_t i = 0; i != count; ++i) {
+      const double x = 5.0 * static_cast<double>(i);
+      for (int a = -10; a != 10; ++a)
+        for (int b = -8; b != 8; ++b)
+          cubes.push_back({vec3f(vec3(x + 0.05 * a + 0.025, y + 0.05 * b + 0.025, 2.025).cast<float>()), 0.05F});
+    }
+  }
+  void hand_over(std::size_t i) {
+    handed_frame keyframe =
+        frame_at(i, {0, static_cast<std::uint32_t>(i)}, at(0), i + 1 == count ? rgb8{10, 200, 30} : rgb8{200, 10, 30});
+    keyframe.keyframe = map_keyframe{0, static_cast<std::uint32_t>(i)};
+    builder.hand_over(std::move(keyframe));
+  }
+  /// The share of the cubes that have a colour.
+  [[nodiscard]] static double colored(const shown_voxels& voxels) {
+    std::size_t all = 0, with_color = 0;
+    for (const auto& [index, block] : voxels.blocks)
+      for (const shown_voxel& v : block.voxels) {
+        ++all;
+        if (v.color != no_color) ++with_color;
+      }
+    return static_cast<double>(with_color) / static_cast<double>(all);
+  }
+};
+
+}  // namespace
+
+TEST_CASE("The pixels that are kept for colours have a limit, and what is given up leaves no trace") {
+  row_of_walls row{3.0};
+  for (std::size_t i = 0; i != row_of_walls::count; ++i) {
+    row.told.poses.push_back(at(5.0 * static_cast<double>(i)));
+    row.told.changed = true;
+    row.hand_over(i);
+    static_cast<void>(row.builder.update_at_once(row.sources));
+    CHECK(row.builder.color_samples() <= row_of_walls::most);
+  }
+  CHECK(row.builder.color_samples() > row_of_walls::most / 2);
+  // Where the keyframes were is nothing of them any more; where they are now, all have something left.
+  for (se3& pose : row.told.poses) pose = at(pose.translation().x(), 3.0);
+  row.told.changed = true;
+  const viewer_scene& scene = row.builder.update_at_once(row.sources);
+  CHECK(row_of_walls::colored(scene.voxels) > 0.3);  // a third of the pixels is left
+  bool has_green = false;
+  for (const auto& [index, block] : scene.voxels.blocks)
+    for (const shown_voxel& v : block.voxels) has_green = has_green || v.color == rgb8{10, 200, 30};
+  CHECK(has_green);
+  for (se3& pose : row.told.poses) pose = at(pose.translation().x(), 300.0);
+  row.told.changed = true;
+  static_cast<void>(row.builder.update_at_once(row.sources));
+  CHECK(row_of_walls::colored(scene.voxels) == 0.0);
+
+  row.builder.finish(row.sources);
+  CHECK(scene.is_over);
+  CHECK(row.builder.color_samples() == 0);
+}
+
+TEST_CASE("Keyframes that nobody takes do not pile up, and without a live map none of their pixels are kept") {
+  row_of_walls row{0.0};
+  for (std::size_t i = 0; i != row_of_walls::count; ++i) {
+    row.told.poses.push_back(at(5.0 * static_cast<double>(i)));
+    row.hand_over(i);
+  }
+  static_cast<void>(row.builder.update_at_once(row.sources));
+  CHECK(row.builder.color_samples() > 0);
+  CHECK(row.builder.color_samples() <= row_of_walls::most / 2);
+
+  row_of_walls other{0.0};
+  other.builder.set_no_voxels("no live map");
+  for (std::size_t i = 0; i != row_of_walls::count; ++i) {
+    other.told.poses.push_back(at(0));
+    other.hand_over(i);
+    static_cast<void>(other.builder.update_at_once(other.sources));
+    CHECK(other.builder.color_samples() == 0);
+  }
+}
+
 TEST_CASE("Tracking never waits for who looks at the scene") {
   told_graph told{{at(0)}};
   scene_builder builder{"", 0, rays(), 0.05};
@@ -342,6 +459,198 @@ TEMPLATE_TEST_CASE("The server's threads do every job, and an exception in one e
   {
     const bounded_threads<TestType> queue{2, 2, [](const std::exception_ptr&) {}};
   }
+}
+
+namespace {
+
+/// Does what it is told to when it draws.
+class told_backend final : public viewer_backend {
+ public:
+  explicit told_backend(std::function<bool(const viewer_scene&)> draw) : draw_{std::move(draw)} {}
+  [[nodiscard]] bool draw(const viewer_scene& scene) override { return draw_(scene); }
+  [[nodiscard]] std::string where() const override { return "here"; }
+  [[nodiscard]] std::chrono::milliseconds interval() const override { return std::chrono::milliseconds{1}; }
+
+ private:
+  std::function<bool(const viewer_scene&)> draw_;
+};
+
+viewer_thread::open_backend opens(std::function<bool(const viewer_scene&)> draw) {
+  return [draw = std::move(draw)]() -> orbis::result<std::unique_ptr<viewer_backend>> {
+    return std::make_unique<told_backend>(draw);
+  };
+}
+
+/// False if it does not come true within ten seconds.
+template <class Condition>
+bool comes_true(const Condition& condition) {
+  for (int i = 0; i != 10000 && !condition(); ++i) std::this_thread::sleep_for(std::chrono::milliseconds{1});
+  return condition();
+}
+
+#ifdef __linux__
+int niceness() { return ::getpriority(PRIO_PROCESS, static_cast<id_t>(::syscall(SYS_gettid))); }
+#endif
+
+}  // namespace
+
+TEST_CASE("A call aside runs on another thread, and brings back what it throws") {
+  calls_aside aside;
+  std::thread::id where;
+  aside.call([&] { where = std::this_thread::get_id(); });
+  CHECK(where != std::this_thread::get_id());
+  CHECK_THROWS_WITH(aside.call([] { throw std::runtime_error{"no"}; }), "no");
+  int calls = 0;
+  for (int i = 0; i != 100; ++i) aside.call([&] { ++calls; });
+  CHECK(calls == 100);
+}
+
+TEST_CASE("The viewer draws what it is shown and what its sources say, until it is closed") {
+  viewer_thread viewer{"a run", 3, rays(), 0.05};
+  CHECK_FALSE(viewer.is_open());
+  std::atomic<bool> sees_all{false}, closes{false};
+  REQUIRE(viewer.start(opens([&](const viewer_scene& scene) {
+    sees_all =
+        scene.frame && scene.frame->number == 2 && scene.graph.keyframes.size() == 1 && scene.numbers.insertions == 2;
+    return !closes;
+  })) == "here");
+  CHECK(viewer.is_open());
+  told_graph told{{at(0)}};
+  scene_sources sources = told.sources();
+  sources.numbers = [] {
+    live_results live;
+    live.insert_ms = {1.0, 2.0};
+    return live;
+  };
+  viewer.connect(sources);
+  for (std::uint64_t i = 0; i != 3; ++i) viewer.show([&] { return frame_at(i, {0, 0}, at(0)); });
+  CHECK(comes_true([&] { return sees_all.load(); }));
+  viewer.disconnect();
+  closes = true;
+  CHECK(comes_true([&] { return !viewer.is_open(); }));
+  bool was_asked = false;
+  viewer.show([&] { return was_asked = true, frame_at(4, {0, 0}, at(0)); });
+  CHECK_FALSE(was_asked);
+  CHECK(viewer.take_trouble().empty());
+}
+
+TEST_CASE("A viewer that cannot be opened says why") {
+  viewer_thread viewer{"", 0, rays(), 0.05};
+  const auto where = viewer.start([]() -> orbis::result<std::unique_ptr<viewer_backend>> {
+    return orbis::fail(orbis::errc::unsupported, "a screen", "there is none");
+  });
+  REQUIRE_FALSE(where);
+  CHECK(where.error().message == "there is none");
+  CHECK_FALSE(viewer.is_open());
+  CHECK(viewer.take_trouble().empty());
+}
+
+TEST_CASE("An exception closes the viewer, which says so once, and reaches nobody else") {
+  const std::string where_it_happens =
+      GENERATE(as<std::string>{}, "open", "draw", "draw, unknown", "graph", "numbers", "voxels", "show", "disconnect");
+  INFO(where_it_happens);
+  const auto happens = [&](const char* here) {
+    if (where_it_happens == here) throw std::runtime_error{"no more memory"};
+  };
+  viewer_thread viewer{"", 0, rays(), 0.05};
+  const auto where = viewer.start([&]() -> orbis::result<std::unique_ptr<viewer_backend>> {
+    happens("open");
+    return std::make_unique<told_backend>([&](const viewer_scene&) {
+      happens("draw");
+      if (where_it_happens == "draw, unknown") throw 1;
+      return true;
+    });
+  });
+  REQUIRE(where);
+  CHECK(*where == (where_it_happens == "open" ? "" : "here"));
+  scene_sources sources;
+  sources.graph = [&](slam_graph&, bool) { return happens("graph"), false; };
+  sources.numbers = [&] { return happens("numbers"), live_results{}; };
+  std::atomic<bool> is_over{false};
+  sources.voxels = [&](std::vector<voxel>&) {
+    happens("voxels");
+    if (is_over) happens("disconnect");
+    return false;
+  };
+  viewer.connect(sources);
+  viewer.show([&] {
+    happens("show");
+    return frame_at(0, {0, 0}, at(0));
+  });
+  if (where_it_happens == "disconnect") {
+    CHECK(viewer.is_open());
+    is_over = true;
+    viewer.disconnect();
+  }
+  CHECK(comes_true([&] { return !viewer.is_open(); }));
+  viewer.show([&] { return frame_at(1, {0, 0}, at(0)); });
+  viewer.disconnect();
+  viewer.show_map({});
+  CHECK(viewer.take_trouble() ==
+        (where_it_happens == "draw, unknown" ? "an exception of an unknown kind" : "no more memory"));
+  CHECK(viewer.take_trouble().empty());
+}
+
+#ifdef __GLIBC__
+TEST_CASE("Where the system gives no thread, the viewer is closed and says so") {
+  pthread_attr_t before, huge;
+  REQUIRE(::pthread_getattr_default_np(&before) == 0);
+  REQUIRE(::pthread_attr_init(&huge) == 0);
+  REQUIRE(::pthread_attr_setstacksize(&huge, std::size_t{1} << 47U) == 0);  // more than there are addresses
+  viewer_thread viewer{"", 0, rays(), 0.05};
+  REQUIRE(::pthread_setattr_default_np(&huge) == 0);
+  const auto where = viewer.start(opens([](const viewer_scene&) { return true; }));
+  REQUIRE(::pthread_setattr_default_np(&before) == 0);
+  REQUIRE(where);
+  CHECK(where->empty());
+  CHECK_FALSE(viewer.is_open());
+  viewer.connect({});
+  viewer.show([&] { return frame_at(0, {0, 0}, at(0)); });
+  viewer.disconnect();
+  CHECK_FALSE(viewer.take_trouble().empty());
+}
+#endif
+
+#ifdef __linux__
+TEST_CASE("The viewer gives way to tracking, but does not take its locks at low priority") {
+  const int here = niceness();
+  if (here > 9) return;  // it cannot be lowered by ten
+  std::atomic<int> of_open{100}, of_draw{100}, of_graph{100}, of_numbers{100};
+  viewer_thread viewer{"", 0, rays(), 0.05};
+  REQUIRE(viewer.start([&]() -> orbis::result<std::unique_ptr<viewer_backend>> {
+    of_open = niceness();
+    return std::make_unique<told_backend>([&](const viewer_scene&) {
+      of_draw = niceness();
+      return true;
+    });
+  }));
+  scene_sources sources;
+  sources.graph = [&](slam_graph&, bool) { return of_graph = niceness(), false; };
+  sources.numbers = [&] { return of_numbers = niceness(), live_results{}; };
+  viewer.connect(sources);
+  CHECK(comes_true([&] { return of_draw != 100 && of_graph != 100 && of_numbers != 100; }));
+  CHECK(of_open == here + 10);
+  CHECK(of_draw == here + 10);
+  CHECK(of_graph == here);
+  CHECK(of_numbers == here);
+  CHECK(niceness() == here);
+}
+#endif
+
+TEST_CASE("Frames can be shown while the viewer hangs in a drawing") {
+  std::atomic<bool> draws{false}, ends{false};
+  std::atomic<std::uint64_t> last{0};
+  viewer_thread viewer{"", 0, rays(), 0.05};
+  REQUIRE(viewer.start(opens([&](const viewer_scene& scene) {
+    draws = true;
+    while (!ends) std::this_thread::sleep_for(std::chrono::milliseconds{1});
+    if (scene.frame) last = scene.frame->number;
+    return true;
+  })));
+  while (!draws) std::this_thread::yield();
+  for (std::uint64_t i = 0; i != 200; ++i) viewer.show([&] { return frame_at(i, {0, 0}, at(static_cast<double>(i))); });
+  ends = true;  // nothing above could have come this far if it waited
+  CHECK(comes_true([&] { return last == 199; }));
 }
 
 #ifdef RGBD_SLAM_WEB

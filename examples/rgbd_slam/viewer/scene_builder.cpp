@@ -55,17 +55,21 @@ frustum_rays corner_rays(const orbis::camera::ray_table& rays) {
   return corners;
 }
 
-scene_builder::scene_builder(std::string title, std::size_t frames, orbis::camera::ray_table rays, double resolution)
+scene_builder::scene_builder(std::string title, std::size_t frames, orbis::camera::ray_table rays, double resolution,
+                             std::size_t max_samples)
     : rays_{std::move(rays)},
       resolution_{resolution},
       // A sample for each voxel at three metres; each keyframe sees most of the voxels that the others see.
       step_{std::clamp(static_cast<int>(resolution / 3.0 * 0.8 * rays_.width()), 3, 8)},
+      max_samples_{max_samples},
       colors_{resolution} {
   scene_.title = std::move(title);
   scene_.camera = corner_rays(rays_);
   scene_.voxels.resolution = resolution;
   scene_.numbers.frames = frames;
 }
+
+scene_builder::~scene_builder() { std::unique_ptr<mailbox>{box_.load()}.reset(); }
 
 // -- the thread that tracks
 
@@ -85,26 +89,27 @@ std::vector<scene_builder::sample> scene_builder::samples_of(const handed_frame&
 }
 
 void scene_builder::hand_over(handed_frame frame) {
-  std::vector<sample> samples;
-  if (frame.keyframe) samples = samples_of(frame);
-  std::optional<passed_point> passed;
+  // What the viewer has not taken is taken back, added to and put in again: neither thread can hold the other up.
+  std::unique_ptr<mailbox> mail{box_.exchange(nullptr)};
+  if (!mail) mail = std::make_unique<mailbox>();
+  if (frame.keyframe && takes_colors_ && mail->samples <= max_samples_ / 8) {
+    auto& [keyframe, samples] = mail->keyframes.emplace_back(*frame.keyframe, samples_of(frame));
+    mail->samples += samples.size();
+  }
   if (frame.tracked) {
     const vec3f at = frame.tracked->T_reference_camera.translation().cast<float>();
     if (was_lost_ || last_reference_ != frame.tracked->reference || (at - last_at_).norm() >= trail_step) {
-      passed = passed_point{frame.tracked->reference, at, was_lost_};
+      mail->passed.push_back({frame.tracked->reference, at, was_lost_});
       last_reference_ = frame.tracked->reference;
       last_at_ = at;
     }
   }
   was_lost_ = !frame.tracked;
-  std::optional<handed_frame> before;  // let go of without the lock
-  {
-    const std::lock_guard lock{mutex_};
-    if (passed) mail_.passed.push_back(*passed);
-    if (frame.keyframe) mail_.keyframes.emplace_back(*frame.keyframe, std::move(samples));
-    mail_.tracking_ms.push_back(frame.tracking_ms);
-    before = std::exchange(mail_.newest, std::move(frame));
-  }
+  if (mail->tracking_ms.size() == 2 * recent_frames)
+    mail->tracking_ms.erase(mail->tracking_ms.begin(), mail->tracking_ms.begin() + recent_frames);
+  mail->tracking_ms.push_back(frame.tracking_ms);
+  mail->newest = std::move(frame);
+  box_.store(mail.release());
 }
 
 // -- the viewer's thread
@@ -119,11 +124,9 @@ std::size_t scene_builder::index_of(orbis::slam::map_keyframe k) {
 }
 
 void scene_builder::take_mail() {
-  mailbox mail;
-  {
-    const std::lock_guard lock{mutex_};
-    std::swap(mail, mail_);
-  }
+  const std::unique_ptr<mailbox> taken{box_.exchange(nullptr)};
+  if (!taken) return;
+  mailbox& mail = *taken;
   for (const double ms : mail.tracking_ms) {
     if (tracking_ms_.size() < recent_frames) tracking_ms_.emplace_back();
     tracking_ms_[frames_seen_++ % recent_frames] = ms;
@@ -133,7 +136,14 @@ void scene_builder::take_mail() {
     trail_.push_back({index_of(p.reference), p.at, p.begins});
     graph_asked_more_ = true;
   }
-  for (auto& [keyframe, samples] : mail.keyframes) colored_.push_back({index_of(keyframe), std::move(samples), {}});
+  if (takes_colors_)
+    for (auto& [keyframe, samples] : mail.keyframes) {
+      samples.shrink_to_fit();
+      sample_count_ += samples.size();
+      colored_.push_back({index_of(keyframe), std::move(samples), {}});
+      colors_wait_ = true;
+    }
+  make_room();
   if (!mail.newest) return;
   handed_frame& f = *mail.newest;
   shown_frame shown{f.number, std::move(f.state), f.T_world_camera, {}, {}};
@@ -191,18 +201,37 @@ void scene_builder::draw_trail() {
   }
 }
 
+template <class Use>
+void scene_builder::for_each_point(const std::vector<sample>& samples, const se3& T_world_camera,
+                                   const Use& use) const {
+  const auto T = T_world_camera.cast<float>();
+  for (const sample& s : samples)
+    if (const vec3f p = rays_.at(s.x, s.y, s.depth); p.allFinite()) use(vec3f(T * p), s.color);
+}
+
+void scene_builder::make_room() {
+  while (sample_count_ > max_samples_) {
+    const auto has_less = [](const auto& a, const auto& b) { return a.samples.size() < b.samples.size(); };
+    colored_keyframe& most = *std::max_element(colored_.begin(), colored_.end(), has_less);
+    std::vector<sample> kept, gone;
+    kept.reserve(most.samples.size() / 2);
+    for (std::size_t i = 0; i != most.samples.size(); ++i) (i % 2 == 0 ? gone : kept).push_back(most.samples[i]);
+    if (most.placed) {
+      for_each_point(gone, *most.placed, [&](const vec3f& p, orbis::rgb8 c) { colors_.remove(p, c); });
+      colors_changed_ = true;
+    }
+    sample_count_ -= gone.size();
+    most.samples = std::move(kept);
+  }
+}
+
 bool scene_builder::move_colors(std::size_t limit) {
   for (colored_keyframe& k : colored_) {
     const auto& pose = k.asked < graph_.poses.size() ? graph_.poses[k.asked] : std::nullopt;
     if (pose.has_value() == k.placed.has_value() && (!pose || motion(*k.placed, *pose) < 0.5 * resolution_)) continue;
     if (limit-- == 0) return false;
-    const auto each = [&](const se3& T_world_camera, auto&& use) {
-      const auto T = T_world_camera.cast<float>();
-      for (const sample& s : k.samples)
-        if (const vec3f p = rays_.at(s.x, s.y, s.depth); p.allFinite()) use(vec3f(T * p), s.color);
-    };
-    if (k.placed) each(*k.placed, [&](const vec3f& p, orbis::rgb8 c) { colors_.remove(p, c); });
-    if (pose) each(*pose, [&](const vec3f& p, orbis::rgb8 c) { colors_.add(p, c); });
+    if (k.placed) for_each_point(k.samples, *k.placed, [&](const vec3f& p, orbis::rgb8 c) { colors_.remove(p, c); });
+    if (pose) for_each_point(k.samples, *pose, [&](const vec3f& p, orbis::rgb8 c) { colors_.add(p, c); });
     k.placed = pose;
     colors_changed_ = true;
   }
@@ -225,6 +254,27 @@ void scene_builder::set_voxels(std::vector<voxel> colored) {
   cubes_ = std::move(colored);
   scene_.voxels.absent.clear();
   show_cubes();
+  forget_colors();
+}
+
+void scene_builder::finish(const scene_sources& sources) {
+  scene_.is_over = true;
+  static_cast<void>(update_at_once(sources));
+  forget();
+}
+
+void scene_builder::forget() {
+  forget_colors();
+  graph_ = {};
+  asked_ = {};
+  trail_ = {};
+}
+
+void scene_builder::forget_colors() {
+  takes_colors_ = false;
+  colored_ = {};
+  sample_count_ = 0;
+  colors_ = voxel_colors{resolution_};
   cubes_ = {};
 }
 

@@ -4,11 +4,12 @@
 #pragma once
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
-#include <mutex>
+#include <memory>
 #include <optional>
 #include <string>
 #include <unordered_map>
@@ -47,7 +48,7 @@ struct slam_graph {
   std::vector<shown_edge> edges;                 ///< between them
 };
 
-/// Where the scene comes from besides frames. All are called on the viewer's thread; any may be empty.
+/// Where the scene comes from besides frames. All are called by `update`; any may be empty.
 struct scene_sources {
   /// Fills in a graph but for `asked` and returns true; or false if the poses are those of the last call and `always`
   /// is false.
@@ -60,23 +61,40 @@ struct scene_sources {
 
 class scene_builder {
  public:
-  /// `frames`: of the recording. `resolution`: of the map, metres.
-  scene_builder(std::string title, std::size_t frames, orbis::camera::ray_table rays, double resolution);
+  /// Pixels of keyframes that are kept for the colours of voxels, by default: 48 MB of them.
+  static constexpr std::size_t default_max_samples = 4'000'000;
 
-  /// Takes a frame over. Never waits for the other functions: what was not yet taken into the scene is replaced by it,
-  /// but for the path of the camera and the colours of keyframes. From any thread.
+  /// `frames`: of the recording. `resolution`: of the map, metres. `max_samples`: where more pixels would be kept,
+  /// every other one of the keyframe that has most is given up.
+  scene_builder(std::string title, std::size_t frames, orbis::camera::ray_table rays, double resolution,
+                std::size_t max_samples = default_max_samples);
+  scene_builder(const scene_builder&) = delete;
+  scene_builder& operator=(const scene_builder&) = delete;
+  ~scene_builder();
+
+  /// Takes a frame over. Has no lock, and never waits for the other functions: what was not yet taken into the scene is
+  /// replaced by it, but for the path of the camera and the colours of keyframes; of these, those that would be too
+  /// much until they are taken are left out. Of a keyframe it reads the pixels that are kept. For one thread.
   void hand_over(handed_frame frame);
 
   /// Brings the scene up to date, and returns it. SLAM is asked at most every few hundred milliseconds, and at most a
   /// tenth of the time; the map as well.
   const viewer_scene& update(const scene_sources& sources);
-  /// As above, but asks at once. For the end, when nothing changes any more.
+  /// As above, but asks at once.
   const viewer_scene& update_at_once(const scene_sources& sources);
+  /// As above, for the last time: no frame comes any more. Frees what was kept to follow corrections.
+  void finish(const scene_sources& sources);
+  /// Frees what was kept to follow corrections. The scene stays as it is.
+  void forget();
   /// Shows these voxels from now on, instead of the live map's.
   void set_voxels(std::vector<voxel> colored);
-  /// Says why no voxels are to be expected.
-  void set_no_voxels(std::string why) { scene_.voxels.absent = std::move(why); }
-  void set_over() { scene_.is_over = true; }
+  /// Says why there is no live map whose voxels could be shown. Then no pixels of keyframes are kept.
+  void set_no_voxels(std::string why) {
+    scene_.voxels.absent = std::move(why);
+    forget_colors();
+  }
+  /// The pixels of keyframes that are kept in the scene for the colours of voxels.
+  [[nodiscard]] std::size_t color_samples() const { return sample_count_; }
 
  private:
   using clock = std::chrono::steady_clock;
@@ -107,6 +125,7 @@ class scene_builder {
     std::optional<handed_frame> newest;
     std::vector<passed_point> passed;
     std::vector<std::pair<orbis::slam::map_keyframe, std::vector<sample>>> keyframes;
+    std::size_t samples = 0;  // of the keyframes
     std::vector<double> tracking_ms;
   };
   /// When something is asked next: it may take a tenth of the time.
@@ -123,6 +142,11 @@ class scene_builder {
   [[nodiscard]] std::size_t index_of(orbis::slam::map_keyframe k);
   const viewer_scene& update(const scene_sources& sources, bool at_once);
   void take_mail();
+  template <class Use>
+  void for_each_point(const std::vector<sample>& samples, const orbis::se3& T_world_camera, const Use& use) const;
+  /// Gives up pixels of keyframes until there are no more than are allowed.
+  void make_room();
+  void forget_colors();
   void update_graph(const scene_sources& sources, bool at_once);
   void draw_trail();
   /// Moves the colours of keyframes that have moved; of so many, before it returns. False: some are left.
@@ -134,9 +158,10 @@ class scene_builder {
   const orbis::camera::ray_table rays_;
   const double resolution_;
   const int step_;  // pixels from one sample to the next
+  const std::size_t max_samples_;
 
-  std::mutex mutex_;
-  mailbox mail_;                                             // guarded by mutex_
+  std::atomic<mailbox*> box_{nullptr};  // owned
+  std::atomic<bool> takes_colors_{true};
   std::optional<orbis::slam::map_keyframe> last_reference_;  // of the thread that hands over, as the next two
   orbis::vec3f last_at_ = orbis::vec3f::Zero();
   bool was_lost_ = true;
@@ -146,6 +171,7 @@ class scene_builder {
   std::unordered_map<std::uint64_t, std::size_t> asked_;  // index in graph_.asked, by keyframe
   std::vector<trail_item> trail_;
   std::vector<colored_keyframe> colored_;
+  std::size_t sample_count_ = 0;  // of all in colored_
   voxel_colors colors_;
   std::vector<voxel> cubes_;
   std::vector<double> tracking_ms_;  // of the last frames, in a ring

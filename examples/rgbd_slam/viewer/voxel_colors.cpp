@@ -12,22 +12,33 @@ std::uint64_t name_of(const orbis::octree::voxel_key& k) {
 
 }  // namespace
 
-voxel_colors::sum* voxel_colors::sum_at(const orbis::vec3f& point, bool make) {
-  const auto key = grid_.key(point);
-  if (!key) return nullptr;
-  const std::uint32_t at = index_.find(name_of(*key));
-  if (at != orbis::hash_index::none) return &sums_[at];
-  if (!make) return nullptr;
-  index_.set(name_of(*key), static_cast<std::uint32_t>(sums_.size()));
-  return &sums_.emplace_back();
-}
-
 void voxel_colors::add(const orbis::vec3f& point, orbis::rgb8 color) {
-  if (sum* const s = sum_at(point, true)) *s = {s->r + color.r, s->g + color.g, s->b + color.b, s->n + 1};
+  const auto key = grid_.key(point);
+  if (!key) return;
+  std::uint32_t at = index_.find(name_of(*key));
+  if (at == orbis::hash_index::none) {
+    if (unused_.empty()) {
+      unused_.push_back(static_cast<std::uint32_t>(sums_.size()));
+      sums_.emplace_back();
+    }
+    at = unused_.back();
+    index_.set(name_of(*key), at);
+    unused_.pop_back();
+  }
+  sum& s = sums_[at];
+  s = {s.r + color.r, s.g + color.g, s.b + color.b, s.n + 1};
 }
 
 void voxel_colors::remove(const orbis::vec3f& point, orbis::rgb8 color) {
-  if (sum* const s = sum_at(point, false)) *s = {s->r - color.r, s->g - color.g, s->b - color.b, s->n - 1};
+  const auto key = grid_.key(point);
+  if (!key) return;
+  const std::uint32_t at = index_.find(name_of(*key));
+  if (at == orbis::hash_index::none) return;
+  sum& s = sums_[at];
+  s = {s.r - color.r, s.g - color.g, s.b - color.b, s.n - 1};
+  if (s.n != 0) return;
+  index_.erase(name_of(*key));
+  unused_.push_back(at);
 }
 
 std::optional<orbis::rgb8> voxel_colors::color_of(const voxel& cube) const {

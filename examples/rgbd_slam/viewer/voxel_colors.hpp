@@ -3,6 +3,7 @@
 /// The colours of voxels: means of the coloured points in them.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <vector>
@@ -23,21 +24,26 @@ class voxel_colors {
 
   /// Adds a point (metres, world).
   void add(const orbis::vec3f& point, orbis::rgb8 color);
-  /// Takes out a point that was added.
+  /// Takes out a point that was added. The memory of a voxel that has none left is used again.
   void remove(const orbis::vec3f& point, orbis::rgb8 color);
   /// The mean colour of the points in a cube that consists of whole voxels; where it has none, of those in the voxels
   /// around it; where these have none either, nothing.
   [[nodiscard]] std::optional<orbis::rgb8> color_of(const voxel& cube) const;
+  /// The voxels that have a point.
+  [[nodiscard]] std::size_t size() const { return index_.size(); }
+  /// Bytes on the heap.
+  [[nodiscard]] std::size_t memory_bytes() const {
+    return index_.memory_bytes() + sums_.capacity() * sizeof(sum) + unused_.capacity() * sizeof(std::uint32_t);
+  }
 
  private:
   struct sum {
     std::uint32_t r = 0, g = 0, b = 0, n = 0;
   };
-  [[nodiscard]] sum* sum_at(const orbis::vec3f& point, bool make);
-
   orbis::octree::voxel_grid grid_;
-  orbis::hash_index index_;  // of voxels in sums_
+  orbis::hash_index index_;  // of voxels in sums_; of those that have a point
   std::vector<sum> sums_;
+  std::vector<std::uint32_t> unused_;  // places in sums_
 };
 
 /// The colour of what no image shows.

@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "viewer/viewer_thread.hpp"
+
+#include <algorithm>
+#include <chrono>
+
+#include "priority.hpp"
+
+namespace app {
+
+viewer_thread::viewer_thread(std::string title, std::size_t frames, orbis::camera::ray_table rays, double resolution,
+                             std::string no_voxels)
+    : builder_{std::move(title), frames, std::move(rays), resolution} {
+  if (!no_voxels.empty()) builder_.set_no_voxels(std::move(no_voxels));
+}
+
+viewer_thread::~viewer_thread() {
+  {
+    const std::lock_guard lock{mutex_};
+    ends_ = true;
+  }
+  changed_.notify_all();
+  if (thread_.joinable()) thread_.join();
+}
+
+orbis::result<std::string> viewer_thread::start(open_backend open) {
+  try {
+    aside_ = std::make_unique<calls_aside>();
+    std::promise<orbis::result<std::string>> opened;
+    auto outcome = opened.get_future();
+    thread_ = std::thread{[this, open = std::move(open), opened = std::move(opened)]() mutable { run(open, opened); }};
+    return outcome.get();
+  } catch (...) {
+    close(std::current_exception());
+    return std::string{};
+  }
+}
+
+void viewer_thread::run(const open_backend& open, std::promise<orbis::result<std::string>>& opened) {
+  lower_priority(viewer_niceness);  // and that of the threads which the back end starts
+  bool has_opened = false;
+  try {
+    auto backend = open();
+    if (!backend) return opened.set_value(orbis::fail(backend.error()));
+    std::string where = (*backend)->where();
+    is_open_ = has_opened = true;
+    opened.set_value(std::move(where));
+    draw_until_the_end(**backend);
+  } catch (...) {
+    close(std::current_exception());
+    if (!has_opened) opened.set_exception(std::current_exception());
+  }
+  is_open_ = false;
+  const std::lock_guard lock{mutex_};
+  builder_.forget();
+}
+
+void viewer_thread::draw_until_the_end(viewer_backend& backend) {
+  using clock = std::chrono::steady_clock;
+  std::unique_lock lock{mutex_};
+  while (!ends_) {
+    const auto start = clock::now();
+    if (!backend.draw(builder_.update(sources_))) return;
+    // At most a third of the time: a graphics card may be the processor in disguise.
+    const auto took = clock::now() - start;
+    const auto wait = std::max<clock::duration>(backend.interval() - took, 2 * took);
+    changed_.wait_for(lock, wait, [&] { return ends_.load(); });
+  }
+}
+
+void viewer_thread::close(std::exception_ptr why) noexcept {
+  {
+    const std::lock_guard lock{trouble_mutex_};
+    if (!trouble_) trouble_ = std::move(why);
+  }
+  is_open_ = false;
+  ends_ = true;
+}
+
+std::string viewer_thread::take_trouble() {
+  const std::lock_guard lock{trouble_mutex_};
+  if (!trouble_ || std::exchange(is_told_, true)) return {};
+  try {
+    std::rethrow_exception(trouble_);
+  } catch (const std::exception& e) {
+    return e.what();
+  } catch (...) {
+    return "an exception of an unknown kind";
+  }
+}
+
+void viewer_thread::connect(scene_sources sources) {
+  if (!is_open()) return;
+  if (sources.graph)
+    sources.graph = [this, ask = std::move(sources.graph)](slam_graph& graph, bool always) {
+      bool is_new = false;
+      aside_->call([&] { is_new = ask(graph, always); });
+      return is_new;
+    };
+  if (sources.numbers)
+    sources.numbers = [this, ask = std::move(sources.numbers)] {
+      live_results results;
+      aside_->call([&] { results = ask(); });
+      return results;
+    };
+  const std::lock_guard lock{mutex_};
+  sources_ = std::move(sources);
+}
+
+void viewer_thread::disconnect() {
+  const std::lock_guard lock{mutex_};
+  try {
+    if (is_open()) builder_.finish(sources_);
+  } catch (...) {
+    close(std::current_exception());
+  }
+  sources_ = {};
+}
+
+void viewer_thread::show_map(const std::vector<voxel>& voxels) {
+  if (!is_open()) return;
+  const std::lock_guard lock{mutex_};
+  try {
+    builder_.set_voxels(voxels);
+  } catch (...) {
+    close(std::current_exception());
+  }
+}
+
+}  // namespace app
