@@ -70,7 +70,7 @@ void bench_afresh(benchmark::State& state, const std::vector<scan>& scans, doubl
   const map m = whole_map(scans, resolution);
   for (auto _ : state) {
     const nav::distance_field field{m, {.reach = reach, .unknown = unknown}};
-    benchmark::DoNotOptimize(field.voxels().brick_count());
+    state.counters["MB"] = 1e-6 * static_cast<double>(field.memory_bytes());
   }
 }
 
@@ -84,6 +84,13 @@ octree::key_box box_of(const std::vector<scan>& scans, double resolution) {
 std::array<int, 3> place_in(const octree::key_box& box, const octree::voxel_key& k) {
   return {static_cast<int>(k.x - box.low.x), static_cast<int>(k.y - box.low.y), static_cast<int>(k.z - box.low.z)};
 }
+/// For the size of what it keeps of a voxel; the heap's own overhead is not counted.
+struct their_sizes : DynamicEDT3D {
+  [[nodiscard]] static double megabytes(const std::array<int, 3>& size) {
+    const double rows = static_cast<double>(size[0]) * size[1];
+    return 1e-6 * (rows * size[2] * (sizeof(dataCell) + sizeof(bool)) + 2 * rows * sizeof(void*));
+  }
+};
 int reach_in_voxels(double resolution) { return static_cast<int>(std::ceil(reach / resolution - 1e-9)); }
 
 void bench_update_dynamic_edt(benchmark::State& state, const std::vector<scan>& scans, double resolution) {
@@ -131,6 +138,7 @@ void bench_update_dynamic_edt(benchmark::State& state, const std::vector<scan>& 
           wrong += truth == nav::squared_distances::far || truth == r * r ? !is_far : found != truth;
         }
     state.counters["wrong"] = static_cast<double>(wrong);
+    state.counters["MB"] = their_sizes::megabytes(size);
     report_frames(state, std::move(seconds));
   }
 }
@@ -151,6 +159,7 @@ void bench_afresh_dynamic_edt(benchmark::State& state, const std::vector<scan>& 
       }
     });
     theirs.update(true);
+    state.counters["MB"] = their_sizes::megabytes(size);
   }
 }
 #endif

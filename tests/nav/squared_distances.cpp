@@ -8,6 +8,7 @@
 #include <vector>
 
 #include <orbis/core/random.hpp>
+#include <orbis/core/simd/level.hpp>
 #include <orbis/nav/squared_distances.hpp>
 #include <orbis/octree/key.hpp>
 
@@ -247,4 +248,217 @@ TEST_CASE("Long reach and long thin worlds") {
     }
     CHECK(wrong == "");
   }
+}
+
+TEST_CASE("All instruction sets give the same distances") {
+  const bool outside = GENERATE(false, true);
+  const int reach = GENERATE(3, 17, 181);
+  const auto values_at = [&](simd::level l) {
+    const simd::level_limit limit{l};
+    random_bits random{21};
+    world w{somewhere, {20, 12, 16}, outside};
+    squared_distances field{reach, cells, outside};
+    field.update(w.octants());
+    std::map<std::array<std::uint32_t, 3>, std::vector<std::uint16_t>> bricks;
+    for (int i = 0; i != 12; ++i) field.update(change(w, random));
+    field.for_each_brick([&](const voxel_key& low, auto values) {
+      bricks[{low.x, low.y, low.z}].assign(values.begin(), values.end());
+    });
+    return bricks;
+  };
+  const auto expected = values_at(simd::level::portable);
+  CHECK(expected.size() > 8);
+  for (const simd::level l : simd::available_levels()) CHECK(values_at(l) == expected);
+}
+
+TEST_CASE("Long reach along x and along y") {
+  const bool outside = GENERATE(false, true);
+  const int reach = GENERATE(60, 181);
+  const std::size_t axis = GENERATE(0U, 1U);
+  CAPTURE(outside, reach, axis);
+  // A free box that is long along the axis, and a few obstacles that come and go near its ends and in between.
+  std::array<int, 3> size{8, 8, 8};
+  size[axis] = 440;
+  world w{somewhere, size, outside};
+  for (int z = 0; z != size[2]; ++z)
+    for (int y = 0; y != size[1]; ++y)
+      for (int x = 0; x != size[0]; ++x) w.at(x, y, z) = 0;
+  squared_distances field{reach, cells, outside};
+  field.update(w.octants());
+  random_bits random{12};
+  std::vector<std::array<int, 3>> obstacles;
+  for (const int place : {3, 190, 439, 436, 0, 220, 190, 3}) {
+    std::array<int, 3> p{};
+    for (std::size_t i = 0; i != 3; ++i) p[i] = static_cast<int>(random.below(8));
+    p[axis] = place;
+    const auto known =
+        std::find_if(obstacles.begin(), obstacles.end(), [&](const auto& o) { return o[axis] == place; });
+    if (known != obstacles.end()) {
+      p = *known;
+      obstacles.erase(known);
+    } else {
+      obstacles.push_back(p);
+    }
+    w.at(p[0], p[1], p[2]) = static_cast<char>(known == obstacles.end() || w.at(p[0], p[1], p[2]) == 0);
+    field.update(std::vector{w.octant(p[0], p[1], p[2])});
+    std::string wrong;
+    const int margin = outside ? 4 : reach + 3;
+    for (int at = -margin; at < 440 + margin; at += outside ? 1 : 3)
+      for (const int side : {0, 5}) {
+        std::array<int, 3> q{side, side, 3};
+        q[axis] = at;
+        int best = squared_distances::far;
+        for (const auto& o : obstacles) {
+          int d = 0;
+          for (std::size_t i = 0; i != 3; ++i) d += (q[i] - o[i]) * (q[i] - o[i]);
+          best = std::min(best, d);
+        }
+        if (outside)
+          for (std::size_t i = 0; i != 3; ++i) {
+            const int edge = std::max(0, std::min(q[i] + 1, size[i] - q[i]));
+            best = std::min(best, edge * edge);
+          }
+        if (best > reach * reach) best = squared_distances::far;
+        const int found = field.squared(w.key(q[0], q[1], q[2]));
+        if (found != best)
+          wrong += std::to_string(at) + ": " + std::to_string(found) + ", not " + std::to_string(best) + "\n";
+      }
+    CHECK(wrong == "");
+  }
+}
+
+TEST_CASE("A large free box with a long reach") {
+  // Distances to the walls of a box of 64 x 72 x 48 voxels, and to one obstacle in it that comes and goes.
+  world w{somewhere, {64, 72, 48}, true};
+  const auto fill = [&](char c) {
+    for (int z = 0; z != 48; ++z)
+      for (int y = 0; y != 72; ++y)
+        for (int x = 0; x != 64; ++x) w.at(x, y, z) = c;
+  };
+  fill(0);
+  squared_distances field{90, cells, true};
+  field.update(w.octants());
+  const auto check = [&] {
+    const bool is_there = w.at(30, 41, 20) != 0;
+    std::size_t wrong = 0;
+    for (int z = -1; z != 49; ++z)
+      for (int y = -1; y != 73; ++y)
+        for (int x = -1; x != 65; ++x) {
+          const int wall = std::max(0, std::min({x + 1, 64 - x, y + 1, 72 - y, z + 1, 48 - z}));
+          const int d = (x - 30) * (x - 30) + (y - 41) * (y - 41) + (z - 20) * (z - 20);
+          wrong += field.squared(w.key(x, y, z)) != (is_there ? std::min(wall * wall, d) : wall * wall) ? 1U : 0U;
+        }
+    CHECK(wrong == 0);
+  };
+  check();
+  const std::size_t bricks = field.brick_count();
+  for (const char c : {char{1}, char{0}}) {
+    w.at(30, 41, 20) = c;
+    field.update(std::vector{w.octant(30, 41, 20)});
+    check();
+  }
+  CHECK(field.brick_count() == bricks);
+  fill(1);
+  field.update(w.octants());
+  CHECK(field.brick_count() == 0);
+}
+
+TEST_CASE("Obstacles at the borders of the grid") {
+  const bool outside = GENERATE(false, true);
+  const int reach = GENERATE(5, 20);
+  CAPTURE(outside, reach);
+  constexpr std::uint32_t small = 32;
+  // All of a small grid: beyond it is `outside`, and there is nothing to store.
+  world w{{0, 0, 0}, {32, 32, 32}, outside};
+  squared_distances field{reach, small, outside};
+  field.update(w.octants());
+  random_bits random{17};
+  const auto check = [&] {
+    std::string wrong;
+    for (int i = 0; i != 400; ++i) {
+      std::array<int, 3> q{};
+      for (int& c : q) c = static_cast<int>(random.below(32));
+      int best = squared_distances::far;
+      for (int z = 0; z != 32; ++z)
+        for (int y = 0; y != 32; ++y)
+          for (int x = 0; x != 32; ++x)
+            if (w.at(x, y, z) != 0)
+              best = std::min(best, (x - q[0]) * (x - q[0]) + (y - q[1]) * (y - q[1]) + (z - q[2]) * (z - q[2]));
+      if (outside)
+        for (const int c : q) best = std::min({best, (c + 1) * (c + 1), (32 - c) * (32 - c)});
+      if (best > reach * reach) best = squared_distances::far;
+      const voxel_key k = w.key(q[0], q[1], q[2]);
+      if (field.squared(k) != best) wrong += "wrong at " + std::to_string(q[0]) + " " + std::to_string(q[1]) + "\n";
+      if (const auto nearest = field.nearest(k); nearest.has_value() != (best != squared_distances::far))
+        wrong += "no nearest obstacle\n";
+    }
+    CHECK(wrong == "");
+  };
+  for (int z = 0; z != 32; ++z)
+    for (int y = 0; y != 32; ++y)
+      for (int x = 0; x != 32; ++x) w.at(x, y, z) = 0;
+  field.update(w.octants());
+  check();
+  for (const std::array<int, 3> corner : {std::array{0, 0, 0}, {31, 0, 31}, {31, 31, 31}, {0, 16, 31}, {31, 15, 0}})
+    for (const char c : {char{1}, char{0}, char{1}}) {
+      w.at(corner[0], corner[1], corner[2]) = c;
+      field.update(std::vector{w.octant(corner[0], corner[1], corner[2])});
+      check();
+    }
+  field.for_each_brick([&](const voxel_key& low, auto&&) { CHECK(std::max({low.x, low.y, low.z}) < small); });
+  // Beyond the grid is what lies elsewhere.
+  CHECK(field.squared({small, 0, 0}) == field.elsewhere());
+}
+
+TEST_CASE("Memory is given back") {
+  const bool outside = GENERATE(false, true);
+  CAPTURE(outside);
+  random_bits random{31};
+  world w{somewhere, {120, 120, 120}, outside};
+  squared_distances field{10, cells, outside};
+  const std::size_t at_first = field.memory_bytes();
+  const auto turn_some = [&] {  // something is free, something is an obstacle, everywhere
+    for (int z = 0; z != 120; ++z)
+      for (int y = 0; y != 120; ++y)
+        for (int x = 0; x != 120; ++x)
+          w.at(x, y, z) = static_cast<char>(outside ? random.below(60) == 0 : random.below(800) == 0);
+    field.update(w.octants());
+  };
+  turn_some();
+  turn_some();
+  // What bricks take, with little beside them; buffers of the size of the field are gone.
+  const double each = static_cast<double>(field.memory_bytes()) / static_cast<double>(field.brick_count());
+  CHECK(field.brick_count() > 3000);
+  CHECK(each > 2750.0);
+  CHECK(each < 2950.0 + 300.0);  // buffers are an eighth at most
+  const nav::squared_distance_view before = field.view();
+  const std::uint16_t value = before.squared(w.key(60, 60, 60));
+  for (int z = 0; z != 120; ++z)
+    for (int y = 0; y != 120; ++y)
+      for (int x = 0; x != 120; ++x) w.at(x, y, z) = char{outside};
+  field.update(w.octants());
+  CHECK(field.brick_count() == 0);
+  CHECK(before.brick_count() > 3000);
+  CHECK(before.squared(w.key(60, 60, 60)) == value);
+  CHECK(field.squared(w.key(60, 60, 60)) == field.elsewhere());
+  CHECK(field.memory_bytes() < at_first + (std::size_t{1} << 21U));
+  // One obstacle, or one free voxel, that wanders: bricks follow it, across their blocks.
+  std::size_t most = 0;
+  for (int x = 0; x != 120; ++x) {
+    std::vector<octant_obstacles> changed;
+    if (x != 0) {
+      w.at(x - 1, 60, 60) = char{outside};
+      changed.push_back(w.octant(x - 1, 60, 60));
+    }
+    w.at(x, 60, 60) = char{!outside};
+    if (x % 4 == 0 || changed.empty())
+      changed.push_back(w.octant(x, 60, 60));
+    else
+      changed.back() = w.octant(x, 60, 60);
+    field.update(changed);
+    most = std::max(most, field.brick_count());
+    CHECK(field.squared(w.key(x, 60, 60)) == (outside ? 1 : 0));
+  }
+  CHECK(most <= (outside ? 1U : 64U));
+  CHECK(w.difference(field) == "");
 }

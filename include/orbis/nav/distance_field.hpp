@@ -128,7 +128,7 @@ using distance_view = metric_distances<squared_distance_view>;
 /// The distance field of a map. It is, bit for bit, the one made afresh of the map as it is, whatever the order of
 /// changes, with obstacles that come and go; no box has to be named. See squared_distances.hpp for how.
 ///
-/// One thread at a time; `view()` is for readers on other threads.
+/// One thread at a time. Readers on other threads use a `view()`, which is taken on the field's own thread.
 class distance_field : public metric_distances<squared_distances> {
  public:
   /// Of an empty map. @pre options.reach is 1 to 181 times the resolution
@@ -147,8 +147,8 @@ class distance_field : public metric_distances<squared_distances> {
 
   /// Follows the map: by its change log (`map.changes()`), where it has one that knows all since the last update, else
   /// by comparing everything: after what the log does not record (see occupancy_octree::track_changes), and each time
-  /// while changes are not tracked. Costs what squared_distances::update costs, and comparing everything O(bricks of the
-  /// field + octants of the map) more. @pre the same map every time, of the same grid
+  /// while changes are not tracked. Costs what squared_distances::update costs, and comparing everything O(bricks of
+  /// the field + octants of the map) more. @pre the same map every time, of the same grid
   template <planning_map Map>
   void update(const Map& map) {
     if constexpr (has_change_log<Map>) {
@@ -183,7 +183,7 @@ class distance_field : public metric_distances<squared_distances> {
       log.for_each_since(since, [&](const octree::voxel_key& k, std::uint64_t) {
         octants_.push_back({k, obstacles(octants(k))});
       });
-      voxels_.update(octants_);
+      apply();
     }
     seen_ = revision;
   }
@@ -202,7 +202,11 @@ class distance_field : public metric_distances<squared_distances> {
     const auto found = k ? voxels_.nearest(*k) : std::nullopt;
     return found ? std::optional{grid_.center(*found)} : std::nullopt;
   }
-  /// What readers need. Copying it costs a pointer for each 4 kB; the copy does not change.
+  /// What readers on other threads need. To be called on the field's own thread (the one that updates it), between two
+  /// updates: after each, for example, and handed over under a lock or by an atomic shared pointer. It shares its
+  /// memory with the field and does not change; it may be read by several threads at once, copied, and destroyed on
+  /// any. O(bricks): a pointer and an atomic increment for each 4 of them; the field then clones what it writes to, 4
+  /// kB at a time. On the field's own thread ask the field itself.
   [[nodiscard]] distance_view view() const { return {grid_, voxels_.view(), reach_}; }
   [[nodiscard]] const distance_field_options& options() const noexcept { return options_; }
   /// Bytes on the heap.
@@ -238,7 +242,13 @@ class distance_field : public metric_distances<squared_distances> {
             if (!voxels_.is_stored(k)) octants_.push_back({k, mask});
           }
     });
+    apply();
+  }
+  void apply() {
     voxels_.update(octants_);
+    // What usual updates need is kept, so that these allocate nothing.
+    constexpr std::size_t few = (std::size_t{1} << 20U) / sizeof(octant_obstacles);
+    if (octants_.capacity() > std::max(few, 8 * voxels_.brick_count())) octants_ = std::vector<octant_obstacles>();
   }
   [[nodiscard]] std::uint64_t obstacles(const octree::octant_states& s) const noexcept {
     return options_.unknown == octree::occupancy::occupied ? ~s.free() : s.occupied;

@@ -12,7 +12,8 @@
 
 namespace orbis::nav {
 
-/// What planning needs of a map. Specialise it for a type of yours with these three functions; copies are not made.
+/// What planning needs of a map. Specialise it for a type of yours with the three functions of the one for octrees
+/// below; the map is read in place and not copied.
 template <class Map>
 struct map_access;
 

@@ -120,10 +120,11 @@ class squared_distance_view {
 };
 
 /// Distances that follow their obstacles: after any sequence of updates the values are, bit for bit, those of a field
-/// made afresh of the same obstacles. No box has to be named: memory grows with what is near obstacles or, where all is
-/// an obstacle that is not named (`elsewhere_is_obstacle`), with what is free; about 2.8 kB for 8x8x8 voxels.
+/// made afresh of the same obstacles. No box has to be named: memory follows what is near obstacles or, where all is an
+/// obstacle that is not named (`elsewhere_is_obstacle`), what is free: about 2.9 kB for each 8x8x8 voxels of which one
+/// is within reach, given back when none is any more.
 ///
-/// One thread at a time; `view()` can be copied for readers on other threads.
+/// One thread at a time. Readers on other threads use copies of `view()`, see there.
 class squared_distances : public squared_distance_view {
  public:
   /// `reach`: how far distances are known, in voxels. `cells`: of the grid, along an axis.
@@ -132,8 +133,13 @@ class squared_distances : public squared_distance_view {
   squared_distances(int reach, std::uint32_t cells, bool elsewhere_is_obstacle);
 
   /// Says which voxels of these octants are obstacles now; all others stay what they are. Each octant is named once.
-  /// O(changes x reach^2) at worst; typically each changed voxel costs a few microseconds divided by how many of its
-  /// neighbours change with it.
+  ///
+  /// O(changes x reach^3) at worst: an obstacle alone in free space is the nearest one of all voxels within reach, and
+  /// all these are written, 64 at a time; when it goes, their slices of 64 are worked out again in O(reach) each.
+  /// Typically obstacles are surfaces, and most changes end after a few voxels, where another obstacle is nearer; and
+  /// what several neighbours change is worked out once.
+  /// Memory that a large update needs beside the field (up to its size) is given back at its end; small ones allocate
+  /// nothing but new bricks.
   /// @pre keys lie in the grid
   void update(std::span<const octant_obstacles> octants);
 
@@ -143,7 +149,11 @@ class squared_distances : public squared_distance_view {
   /// may be one that was never named (see `elsewhere_is_obstacle`). O(reach).
   [[nodiscard]] std::optional<octree::voxel_key> nearest(const octree::voxel_key& k) const;
 
-  /// What readers need; a copy of it stays as it is.
+  /// What readers need. It is part of the field: to be read or copied on the field's own thread (the one that updates
+  /// it), between two updates. A copy stays as it is, and may be handed to other threads, read by several of them at
+  /// once, and destroyed on any. A copy costs a pointer and an atomic increment for each 4 bricks, and 40 to 80 bytes
+  /// for each block of 8x8x8 bricks (the directory); afterwards the field clones what it writes to, 4 kB at a time. On
+  /// the field's own thread no copy is needed.
   [[nodiscard]] const squared_distance_view& view() const noexcept { return *this; }
   /// Bytes on the heap, those shared with copies of the view included.
   [[nodiscard]] std::size_t memory_bytes() const noexcept;
@@ -152,7 +162,7 @@ class squared_distances : public squared_distance_view {
   static constexpr std::uint32_t none = detail::brick_directory::none;
   static constexpr std::uint8_t far_along = 0xff;
 
-  /// What is kept of a brick beside its distances. Arrays are in rows along x: z * 64 + y * 8 + x.
+  /// What is kept of a brick beside its distances (1728 bytes). Arrays are in rows along x: z * 64 + y * 8 + x.
   struct stages {
     alignas(64) std::array<std::uint16_t, 512> plane;
     std::array<std::uint8_t, 512> along;
@@ -177,6 +187,11 @@ class squared_distances : public squared_distance_view {
   };
 
   [[nodiscard]] std::uint32_t make(const detail::brick_place& p);
+  [[nodiscard]] bool is_as_elsewhere(std::uint32_t brick) const;
+  void remove_needless();
+  void remove(std::uint32_t brick);
+  [[nodiscard]] std::size_t buffer_bytes() const noexcept;
+  void release_buffers();
   [[nodiscard]] std::uint8_t far_obstacles() const noexcept { return elsewhere_ == 0 ? 0xff : 0; }
   [[nodiscard]] std::uint16_t bound() const noexcept { return static_cast<std::uint16_t>(reach_ * reach_); }
   /// The squares of the distances of eight rows, the first `distance` rows away, eight times each.
@@ -210,6 +225,7 @@ class squared_distances : public squared_distance_view {
   std::deque<kept_plane> kept_;
   std::size_t used_kept_ = 0;
   std::vector<std::uint32_t> stale_plane_, stale_space_;
+  std::vector<std::uint32_t> needless_;  ///< bricks that may be as elsewhere
 };
 
 }  // namespace orbis::nav

@@ -196,8 +196,8 @@ class occupancy_octree {
   }
   /// A rolling window: removes every brick (8x8x8 voxels) and larger leaf that lies completely outside `box` (metres),
   /// after calling `evict(const leaf&)` for its leaves. `set_unknown_node(leaf.key, leaf.depth, leaf.log_odds)` brings
-  /// a leaf back. Returns the number of bricks and larger leaves removed. The change log records what was evicted: it is
-  /// unknown now. Payload layers keep their values: erase there what was evicted. O(bricks + voxels evicted).
+  /// a leaf back. Returns the number of bricks and larger leaves removed. The change log records what was evicted: it
+  /// is unknown now. Payload layers keep their values: erase there what was evicted. O(bricks + voxels evicted).
   template <std::invocable<const leaf&> Evict>
   std::size_t evict_outside(const bounding_box& box, Evict&& evict) {
     const auto is_outside = [&](std::uint64_t name) {

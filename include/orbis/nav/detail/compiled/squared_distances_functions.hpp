@@ -12,8 +12,10 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <functional>
 #include <optional>
 #include <span>
+#include <type_traits>
 
 #include <orbis/core/compiled_once.hpp>
 #include <orbis/nav/squared_distances.hpp>
@@ -44,12 +46,18 @@ ORBIS_COMPILED_ONCE void squared_distances::update(std::span<const octant_obstac
   along_.clear();
   stale_plane_.clear();
   stale_space_.clear();
+  needless_.clear();
   used_kept_ = 0;
   set_obstacles(octants);
   update_rows();
   spread_along_y();
   spread_along_z();
   for (std::size_t i = 0; i != used_kept_; ++i) stages_[kept_[i].brick].kept = none;
+  remove_needless();
+  // Buffers of the size of usual updates are kept, so that these allocate nothing.
+  constexpr std::size_t few = std::size_t{1} << 20U;
+  const std::size_t field = stages_.size() * (sizeof(stages) + sizeof(brick_values));
+  if (buffer_bytes() > std::max(few, field / 8)) release_buffers();
 }
 
 ORBIS_COMPILED_ONCE std::uint32_t squared_distances::make(const detail::brick_place& p) {
@@ -68,6 +76,53 @@ ORBIS_COMPILED_ONCE std::uint32_t squared_distances::make(const detail::brick_pl
   values_.push_back(values);
   places_.push_back(p);
   return number;
+}
+
+/// Whether a brick says what is said of places without one. Distances do only if all stages do: no value is less than
+/// the distance.
+ORBIS_COMPILED_ONCE bool squared_distances::is_as_elsewhere(std::uint32_t brick) const {
+  const stages& s = stages_[brick];
+  for (const std::uint16_t top : s.space_top)
+    if (top != elsewhere_) return false;
+  const brick_values& values = values_[brick];
+  return std::all_of(values.begin(), values.end(), [&](std::uint16_t v) { return v == elsewhere_; });
+}
+
+ORBIS_COMPILED_ONCE void squared_distances::remove_needless() {
+  needless_.insert(needless_.end(), stale_space_.begin(), stale_space_.end());
+  std::erase_if(needless_, [&](std::uint32_t i) { return !is_as_elsewhere(i); });
+  // From the last: the brick that takes the place of a removed one stays.
+  std::sort(needless_.begin(), needless_.end(), std::greater{});
+  needless_.erase(std::unique(needless_.begin(), needless_.end()), needless_.end());
+  for (const std::uint32_t i : needless_) remove(i);
+}
+
+/// The last brick takes its number.
+ORBIS_COMPILED_ONCE void squared_distances::remove(std::uint32_t brick) {
+  const auto last = static_cast<std::uint32_t>(stages_.size() - 1);
+  directory_.erase(places_[brick]);
+  if (brick != last) {
+    directory_.set(places_[last], brick);
+    stages_[brick] = stages_[last];
+    values_.writable(brick) = values_[last];
+    places_.writable(brick) = places_[last];
+  }
+  stages_.pop_back();
+  values_.resize(last);
+  places_.resize(last);
+}
+
+ORBIS_COMPILED_ONCE std::size_t squared_distances::buffer_bytes() const noexcept {
+  return kept_.size() * sizeof(kept_plane) + rows_.capacity() * sizeof(std::uint64_t) +
+         along_.capacity() * sizeof(along_change) +
+         (stale_plane_.capacity() + stale_space_.capacity() + needless_.capacity() + line_.capacity()) *
+             sizeof(std::uint32_t) +
+         line_bits_.capacity() + left_.capacity() + right_.capacity();
+}
+
+ORBIS_COMPILED_ONCE void squared_distances::release_buffers() {
+  const auto release = [](auto&... buffers) { ((buffers = std::remove_cvref_t<decltype(buffers)>()), ...); };
+  release(rows_, along_, kept_, stale_plane_, stale_space_, needless_, line_, line_bits_, left_, right_);
 }
 
 ORBIS_COMPILED_ONCE int squared_distances::range_of(std::uint16_t least) const noexcept {
@@ -354,6 +409,8 @@ ORBIS_COMPILED_ONCE void squared_distances::spread_along_z() {
       if (offer.least + nearest * nearest >= highest) return;
       kernels_.lower_slices(values_.writable(i).data(), s.space_top.data(), &offer, from, first, last, s.stale_space,
                             bound());
+      if (elsewhere_ == 0 && std::all_of(s.space_top.begin(), s.space_top.end(), [](auto t) { return t == 0; }))
+        needless_.push_back(i);
     });
   });
   for (const std::uint32_t i : stale_space_) stages_[i].stale_space = 0;
@@ -425,10 +482,7 @@ ORBIS_COMPILED_ONCE std::optional<octree::voxel_key> squared_distances::nearest(
 
 ORBIS_COMPILED_ONCE std::size_t squared_distances::memory_bytes() const noexcept {
   return directory_.memory_bytes() + values_.memory_bytes() + places_.memory_bytes() + stages_.size() * sizeof(stages) +
-         kept_.size() * sizeof(kept_plane) + squares_.capacity() * sizeof(std::uint16_t) +
-         rows_.capacity() * sizeof(std::uint64_t) + along_.capacity() * sizeof(along_change) +
-         (stale_plane_.capacity() + stale_space_.capacity() + line_.capacity()) * sizeof(std::uint32_t) +
-         line_bits_.capacity() + left_.capacity() + right_.capacity();
+         squares_.capacity() * sizeof(std::uint16_t) + buffer_bytes();
 }
 
 }  // namespace orbis::nav

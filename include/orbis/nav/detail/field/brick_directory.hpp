@@ -3,9 +3,11 @@
 /// Which brick of 8x8x8 voxels has which number.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <vector>
 
 #include <orbis/core/cow_pages.hpp>
 #include <orbis/core/hash_index.hpp>
@@ -45,10 +47,29 @@ class brick_directory {
       block empty;
       empty.fill(none);
       numbers_.push_back(empty);
+      names_.push_back(name(p));
     }
     numbers_.writable(b)[place(p)] = number;
   }
-  [[nodiscard]] std::size_t memory_bytes() const noexcept { return blocks_.memory_bytes() + numbers_.memory_bytes(); }
+  /// Forgets the brick at `p`, and its block with the last one. @pre it has a number
+  void erase(const brick_place& p) {
+    const std::uint32_t b = blocks_.find(name(p));
+    block& numbers = numbers_.writable(b);
+    numbers[place(p)] = none;
+    if (std::any_of(numbers.begin(), numbers.end(), [](std::uint32_t n) { return n != none; })) return;
+    blocks_.erase(name(p));
+    const auto last = static_cast<std::uint32_t>(numbers_.size() - 1);
+    if (b != last) {
+      blocks_.set(names_[last], b);
+      numbers = numbers_[last];
+      names_[b] = names_[last];
+    }
+    numbers_.resize(last);
+    names_.pop_back();
+  }
+  [[nodiscard]] std::size_t memory_bytes() const noexcept {
+    return blocks_.memory_bytes() + numbers_.memory_bytes() + names_.capacity() * sizeof(std::uint64_t);
+  }
 
   /// Looks bricks up of which each lies near the one before. Valid until the directory changes.
   class cursor {
@@ -84,6 +105,7 @@ class brick_directory {
   std::uint32_t bricks_;
   hash_index blocks_;
   cow_pages<block> numbers_;
+  std::vector<std::uint64_t> names_;  ///< of blocks
 };
 
 }  // namespace orbis::nav::detail
