@@ -55,8 +55,8 @@ void viewer::finish(const settings& s, console& console) {
   if (s.viewer_hold && thread_->is_open() && !interrupts::requested()) {
     interrupts::keep_results({});  // all is written: Ctrl-C only closes the viewer
     console.stage("viewer");
+    console.finish(s.viewer == "web" ? "stays until Ctrl-C" : "stays until it is closed, or Ctrl-C");
     while (thread_->is_open() && !interrupts::requested()) std::this_thread::sleep_for(std::chrono::milliseconds{50});
-    console.finish("closed");
   }
   tell_trouble(console);
 }
