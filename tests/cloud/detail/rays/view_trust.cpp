@@ -95,18 +95,39 @@ TEST_CASE("stray pixels are those that pixel by pixel do not agree with their ne
   }
 }
 
-TEST_CASE("few views keep all verdicts on each other, and of many each keeps as many as before") {
-  using orbis::cloud::detail::is_kept;
-  for (const std::uint32_t views : {2U, 128U, 1000U, 5000U}) {
-    const std::uint32_t of = views / 2;
-    std::size_t kept = 0;
-    for (std::uint32_t by = 0; by != views; ++by)
-      for (std::size_t tile = 0; tile != 16; ++tile) kept += is_kept(of, by, tile, views) ? 1 : 0;
-    if (views <= 128) {
-      CHECK(kept == 16 * views);
-    } else {
-      CHECK(kept > 1800);
-      CHECK(kept < 2300);
+TEST_CASE("up to 128 views keep all verdicts on each other, and of more each keeps the lowest ranks") {
+  using namespace orbis::cloud::detail;
+  for (const std::uint32_t views : {2U, 128U, 1000U}) {
+    view_verdicts verdicts;
+    std::vector<std::uint32_t> ranks;
+    for (std::uint32_t other = 1; other != views; ++other) {
+      for (std::size_t tile = 0; tile != 16; ++tile) {
+        for (const std::uint32_t rank : {verdict_rank(0, other, tile), verdict_rank(other, 0, tile)}) {
+          verdicts.add({other, rank, 1, 2});
+          ranks.push_back(rank);
+        }
+      }
     }
+    std::sort(ranks.begin(), ranks.end());
+    if (views > 128) ranks.resize(128 * 2 * 16);
+    std::vector<std::uint32_t> kept;
+    for (const view_verdict& v : verdicts.kept()) kept.push_back(v.rank);
+    std::sort(kept.begin(), kept.end());
+    CHECK(kept == ranks);
   }
+}
+
+TEST_CASE("a wrong pose is found among a thousand views each of which overlaps with few") {
+  // Along a wall, a third of the image further each time.
+  const orbis::camera::pinhole camera{24, 24, 20, 20, 11.5, 11.5};
+  constexpr std::uint32_t count = 1100, wrong = 700;
+  const orbis::image<float> wall(24, 24, 2.0F);
+  std::vector<orbis::test::view> views(count);
+  for (std::uint32_t v = 0; v != count; ++v) {
+    views[v].depth = orbis::camera::depth_view<float>{wall};
+    views[v].T_world_camera = orbis::se3{orbis::so3{}, orbis::vec3{0.8 * v, 0, v == wrong ? -0.3 : 0.0}};
+  }
+  const auto trust = find_distrusted_views(orbis::par, views, camera, {}, {.samples = 12});
+  CHECK(trust.distrusted == std::vector<std::uint32_t>{wrong});
+  CHECK(trust.usual_conflict == 0.0);
 }

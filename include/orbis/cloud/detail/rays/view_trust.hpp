@@ -172,28 +172,53 @@ struct view_trust {
   double usual_conflict = 0;  ///< the median over the trusted views
 };
 
-/// What one view says of a tile of another: how many of its samples it passes through and how many it supports.
+/// What a view and another one say of each other: how many of the samples in a tile of one the other one passes
+/// through and how many it supports.
 struct view_verdict {
-  std::uint32_t of;
-  std::uint32_t by;
+  std::uint32_t other;
+  std::uint32_t rank;  ///< by chance: which verdicts stay where there are too many
   std::uint16_t through;
   std::uint16_t all;  ///< passed through or supported
   [[nodiscard]] double conflict() const noexcept { return static_cast<double>(through) / all; }
 };
 
-/// Whether a verdict on a tile is kept: all of them up to 128 views, beyond that as many of each view, chosen by
-/// chance, so that memory grows with the views and not with their square.
-[[nodiscard]] inline bool is_kept(std::uint32_t of, std::uint32_t by, std::size_t tile, std::uint32_t views) noexcept {
-  constexpr std::uint32_t enough = 128;
-  return views <= enough || mix64((std::uint64_t{of} << 32U | by) ^ mix64(tile)) % views < enough;
+/// The same for both views, whatever came before.
+[[nodiscard]] inline std::uint32_t verdict_rank(std::uint32_t of, std::uint32_t by, std::size_t tile) noexcept {
+  return static_cast<std::uint32_t>(mix64((std::uint64_t{of} << 32U | by) ^ mix64(tile)) >> 32U);
 }
 
+/// The verdicts that one view has a part in. Of up to 128 views all are kept; beyond that as many, those of lowest
+/// rank, which is a fair sample. So memory grows with the views and not with their square, and a view that shares its
+/// part of the scene with few others loses nothing.
+class view_verdicts {
+ public:
+  static constexpr std::size_t most = std::size_t{128} * 2 * 16;  ///< 16 tiles of each view and of the other
+
+  /// O(log most).
+  void add(const view_verdict& verdict) {
+    if (kept_.size() < most) {
+      kept_.push_back(verdict);
+      if (kept_.size() == most) std::make_heap(kept_.begin(), kept_.end(), lower);
+      return;
+    }
+    if (!lower(verdict, kept_.front())) return;
+    std::pop_heap(kept_.begin(), kept_.end(), lower);
+    kept_.back() = verdict;
+    std::push_heap(kept_.begin(), kept_.end(), lower);
+  }
+  [[nodiscard]] std::span<const view_verdict> kept() const noexcept { return kept_; }
+
+ private:
+  [[nodiscard]] static bool lower(const view_verdict& a, const view_verdict& b) noexcept { return a.rank < b.rank; }
+  std::vector<view_verdict> kept_;  // the highest rank in front, once there are as many as may stay
+};
+
 /// The median of the conflicts that a view has with those not left out; 0 where there are too few.
-/// `verdicts`: those that it has a part in; `of` is itself or the other.
+/// `verdicts`: those that it has a part in.
 [[nodiscard]] inline double conflict_of(std::span<const view_verdict> verdicts, std::span<const char> left_out) {
   std::vector<double> values;
   for (const view_verdict& c : verdicts) {
-    if (left_out[c.of] == 0 && left_out[c.by] == 0) values.push_back(c.conflict());
+    if (left_out[c.other] == 0) values.push_back(c.conflict());
   }
   if (values.size() < 10) return 0;
   return quantile(values, 0.5);
@@ -204,14 +229,14 @@ struct view_verdict {
 /// image, a moving object in a part of it alone, so the median over the tiles counts. The worst view is left
 /// out until none stands out; if that would be half of them, all are trusted. Deterministic. `also(view)` is called for
 /// each view as well, so that who has other questions needs no pass of its own: views may be costly to look at.
-/// O(views (pixels + samples of all views)). @pre views' images have the camera's size
+/// O(views (pixels + samples of all views)), and O(views) memory. @pre views' images have the camera's size
 template <execution_policy Policy, posed_depth_range Views, camera::camera_model Camera, class Also = ask_nothing>
 [[nodiscard]] view_trust find_distrusted_views(const Policy& policy, const Views& views, const Camera& camera,
                                                const ray_evidence_options& evidence = {},
                                                const view_trust_options& options = {}, progress on_progress = {},
                                                const Also& also = {}) {
   constexpr int tiles = 4;   // across and down
-  constexpr int enough = 6;  // verdicts on a tile
+  constexpr int enough = 6;  // samples of a tile that another view says something of
   const auto count = static_cast<std::uint32_t>(std::ranges::size(views));
   view_trust out;
   if (count < options.least) {
@@ -243,7 +268,7 @@ template <execution_policy Policy, posed_depth_range Views, camera::camera_model
     }
   }
 
-  std::vector<std::vector<view_verdict>> verdicts(count);  // for each view that has a part in them
+  std::vector<view_verdicts> verdicts(count);
   ray_evidence_counter<Camera> counter{policy, samples, camera, evidence};
   std::vector<ray_evidence> before = counter.scores();
   const bool finished =
@@ -265,10 +290,11 @@ template <execution_policy Policy, posed_depth_range Views, camera::camera_model
           for (std::size_t t = 0; t != tiles * tiles; ++t) {
             const int all = through[t] + supported[t];
             if (all < enough) continue;
-            if (!is_kept(of, by, t, count)) continue;
-            const view_verdict verdict{of, by, static_cast<std::uint16_t>(through[t]), static_cast<std::uint16_t>(all)};
-            verdicts[of].push_back(verdict);
-            verdicts[by].push_back(verdict);
+            view_verdict verdict{by, verdict_rank(of, by, t), static_cast<std::uint16_t>(through[t]),
+                                 static_cast<std::uint16_t>(all)};
+            verdicts[of].add(verdict);
+            verdict.other = of;
+            verdicts[by].add(verdict);
           }
         }
         before.swap(scores);
@@ -282,7 +308,7 @@ template <execution_policy Policy, posed_depth_range Views, camera::camera_model
     std::vector<double> trusted;
     std::uint32_t worst = 0;
     for (std::uint32_t v = 0; v != count; ++v) {
-      conflicts[v] = left_out[v] != 0 ? 0 : conflict_of(verdicts[v], left_out);
+      conflicts[v] = left_out[v] != 0 ? 0 : conflict_of(verdicts[v].kept(), left_out);
       if (left_out[v] == 0) trusted.push_back(conflicts[v]);
       if (conflicts[v] > conflicts[worst]) worst = v;
     }
