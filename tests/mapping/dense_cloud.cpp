@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <map>
 #include <vector>
 
@@ -97,6 +98,19 @@ TEST_CASE("keyframes that moved by less than a tolerance stay where they are") {
   CHECK(dense.reassemble(orbis::seq, scene.keyframes(), 0.012) == 1);
   CHECK(dense.reassemble(orbis::seq, scene.keyframes()) == 1);
   CHECK(dense.reassemble(orbis::seq, scene.keyframes()) == 0);
+}
+
+TEST_CASE("without a largest depth any change of a pose counts, whatever the tolerance") {
+  auto scene = orbis::test::wall_scene(2);
+  const orbis::camera::ray_table rays{scene.camera};
+  for (const float limit : {2.5F, std::numeric_limits<float>::infinity()}) {
+    dense_cloud dense{rays, {.stride = 2, .max_depth = limit, .voxel_size = 0.02}};
+    for (std::size_t i = 0; i != 2; ++i) dense.add_keyframe(orbis::seq, scene.keyframe(i));
+    CHECK(dense.reassemble(orbis::seq, scene.keyframes(), 0.05) == 0);
+    auto turned = scene;
+    turned.poses[1] = scene.poses[1] * orbis::se3{orbis::so3::exp(orbis::vec3{0, 1e-4, 0}), orbis::vec3::Zero()};
+    CHECK(dense.reassemble(orbis::seq, turned.keyframes(), 0.05) == (std::isinf(limit) ? 1 : 0));
+  }
 }
 
 TEST_CASE("a keyframe's measurements are those whose point of the cloud is kept") {

@@ -91,8 +91,10 @@ class dense_cloud {
     put(policy, k, number);
   }
   /// Moves all keyframes whose pose has changed since they were put where they are: in any bit, or, with a `tolerance`
-  /// (metres, >= 0), so far that a point of their view moves by more than that. Returns how many. `keyframes`: all that
-  /// were added, in that order; those that were removed are passed over. O(pixels of those that moved).
+  /// (metres, >= 0), so far that a point of their view, which ends at `max_depth`, moves by more than that; where
+  /// `max_depth` is not finite, in any bit. Returns how many. `keyframes`: all that were added, in that order; those
+  /// that were removed are passed over. O(keyframes + pixels of those that moved), with a tolerance O(pixels of one
+  /// image) more. @pre the number of keyframes is the number of those added; the poses are finite
   template <execution_policy Policy, keyframe_range Keyframes>
   std::size_t reassemble(const Policy& policy, const Keyframes& keyframes, double tolerance = 0.0) {
     assert(std::ranges::size(keyframes) == frames_.size() && tolerance >= 0);

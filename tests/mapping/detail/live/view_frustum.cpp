@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include <orbis/camera/kannala_brandt.hpp>
 #include <orbis/camera/pinhole.hpp>
@@ -57,4 +58,17 @@ TEST_CASE("A frustum's displacement is not less than that of any point in view")
   const se3 roll{so3::exp(vec3{0.0, 0.0, 0.035}), vec3::Zero()};
   CHECK(displacement(circle, se3{}, roll) > 0.3);
   CHECK(displacement(narrow, roll, roll) == 0.0);
+}
+
+TEST_CASE("What is without a limit moves without a limit") {
+  const mapping::detail::view_frustum view{
+      camera::pinhole{{.width = 64, .height = 48, .fx = 55, .fy = 55, .cx = 31.5, .cy = 23.5}}};
+  constexpr double infinity = std::numeric_limits<double>::infinity();
+  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+  const se3 before, after{so3{}, vec3{0.001, 0.0, 0.0}}, nowhere{so3{}, vec3{0.0, nan, 0.0}};
+  CHECK(view.displacement(before, after, 4.0) == Approx(0.001));
+  CHECK(view.displacement(before, after, infinity) == infinity);
+  CHECK(view.displacement(before, after, nan) == infinity);
+  CHECK(view.displacement(before, nowhere, 4.0) == infinity);
+  CHECK(view.displacement(nowhere, before, 4.0) == infinity);
 }

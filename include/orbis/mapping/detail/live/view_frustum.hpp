@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -37,12 +38,14 @@ class view_frustum {
 
   /// The largest distance by which a change of the pose moves a point of the frustum from the camera to the depth
   /// `reach` (metres along the optical axis). A change moves points by an affine function, whose norm is largest at a
-  /// corner: of the nine corners, one is the camera's centre. O(1).
+  /// corner: of the nine corners, one is the camera's centre. Infinite if the reach or a pose is not finite. O(1).
   [[nodiscard]] double displacement(const se3& T_world_before, const se3& T_world_after, double reach) const {
     double largest = (T_world_after.translation() - T_world_before.translation()).norm();
     for (const vec3& c : corners_) {
       const vec3 far = reach * c;
-      largest = std::max(largest, (T_world_after * far - T_world_before * far).norm());
+      const double moved = (T_world_after * far - T_world_before * far).norm();
+      if (!std::isfinite(moved)) return std::numeric_limits<double>::infinity();  // NaN would get lost in a maximum
+      largest = std::max(largest, moved);
     }
     return largest;
   }
