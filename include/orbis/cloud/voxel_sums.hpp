@@ -128,21 +128,21 @@ class voxel_sums {
   /// @pre size > 0, metres
   explicit voxel_sums(double size) : size_{size} { assert(size > 0); }
 
-  /// Adds measurements. O(n). @pre fewer than 2^22 measurements in a voxel
+  /// Adds measurements. O(n). @pre fewer than 2^22 measurements in a voxel; not after `finish`
   template <execution_policy Policy>
   void add(const Policy& policy, std::span<voxel_measurements> parts) {
     apply<true>(policy, parts);
   }
   /// Takes back measurements that were added; voxels without any, and bricks without voxels, are freed.
-  /// O(n). @pre they were added, and not removed since
+  /// O(n). @pre they were added, and not removed since; not after `finish`
   template <execution_policy Policy>
   void remove(const Policy& policy, std::span<voxel_measurements> parts) {
     apply<false>(policy, parts);
   }
 
-  /// Frees the sums; which voxels are occupied stays. Afterwards measurements are neither added nor removed, and `cloud`
-  /// and `ranges` are not called. O(bricks).
+  /// Frees the sums; which voxels are occupied stays. O(bricks).
   void finish() {
+    finished_ = true;
     for (brick& b : bricks_) b.voxels.drop_sums();
     std::vector<std::uint32_t>{}.swap(touched_);
     std::vector<chained_run>{}.swap(chained_);
@@ -198,7 +198,7 @@ class voxel_sums {
     return out;
   }
 
-  /// The mean of each voxel's measurements, with their mean colours. O(voxels)
+  /// The mean of each voxel's measurements, with their mean colours. O(voxels). @pre not after `finish`
   template <execution_policy Policy>
   [[nodiscard]] point_cloud cloud(const Policy& policy, const order& places, bool with_colors = true) const {
     point_cloud out;
@@ -218,7 +218,7 @@ class voxel_sums {
         });
     return out;
   }
-  /// The mean of the distances that each voxel was measured from, metres. O(voxels)
+  /// The mean of the distances that each voxel was measured from, metres. O(voxels). @pre not after `finish`
   template <execution_policy Policy>
   [[nodiscard]] std::vector<float> ranges(const Policy& policy, const order& places) const {
     std::vector<float> out(occupied_);
@@ -238,6 +238,7 @@ class voxel_sums {
 
   template <execution_policy Policy, class F>
   void for_each_voxel(const Policy& policy, const order& places, F&& f) const {
+    assert(!finished_);
     for_each_index(policy, places.bricks_.size(), 64, [&](std::size_t i) {
       const brick& b = bricks_[places.bricks_[i]];
       std::size_t place = places.first_[places.bricks_[i]];
@@ -265,6 +266,7 @@ class voxel_sums {
 
   template <bool Add, execution_policy Policy>
   void apply(const Policy& policy, std::span<voxel_measurements> parts) {
+    assert(!finished_);
     // Runs are chained brick by brick, then every brick is one thread's.
     std::size_t total = 0;
     for (const auto& part : parts) total += part.runs_.size();
@@ -320,6 +322,7 @@ class voxel_sums {
     std::uint32_t next;  ///< of the same brick
   };
   double size_;
+  bool finished_ = false;  ///< the sums are gone
   std::size_t occupied_ = 0;
   std::vector<brick> bricks_;
   std::vector<std::uint32_t> free_;                                ///< numbers of bricks that are not in use

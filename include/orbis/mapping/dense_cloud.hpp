@@ -61,17 +61,18 @@ class dense_cloud {
   /// Adds a keyframe's points; returns how many measurements there were. The keyframe's number is the count
   /// of those added before it. Colours are kept if every keyframe has them.
   /// O(pixels). @pre the images have the size of the ray table; the pose is finite; with a voxel size, fewer than
-  /// 2^22 measurements in a voxel
+  /// 2^22 measurements in a voxel; not after `finish`
   template <execution_policy Policy, keyframe_like Keyframe>
   std::size_t add_keyframe(const Policy& policy, const Keyframe& k) {
+    assert(!finished_);
     frames_.push_back({});
     return put(policy, k, frames_.size() - 1);
   }
   /// Takes back keyframe `number`. Only the images of `k` are looked at.
-  /// O(pixels). @pre it was added with the same images and has not been removed
+  /// O(pixels). @pre it was added with the same images and has not been removed; not after `finish`
   template <execution_policy Policy, keyframe_like Keyframe>
   void remove(const Policy& policy, const Keyframe& k, std::size_t number) {
-    assert(contains(number));
+    assert(contains(number) && !finished_);
     frame& f = frames_[number];
     if (merging()) {
       static_cast<void>(measure(policy, k, f.T_world_camera));
@@ -84,7 +85,7 @@ class dense_cloud {
     f = {};
   }
   /// Moves keyframe `number` to the pose that `k` has now. O(pixels).
-  /// @pre it was added with the same images and has not been removed; the pose is finite
+  /// @pre it was added with the same images and has not been removed; the pose is finite; not after `finish`
   template <execution_policy Policy, keyframe_like Keyframe>
   void move(const Policy& policy, const Keyframe& k, std::size_t number) {
     remove(policy, k, number);
@@ -94,10 +95,10 @@ class dense_cloud {
   /// (metres, >= 0), so far that a point of their view, which ends at `max_depth`, moves by more than that; where
   /// `max_depth` is not finite, in any bit. Returns how many. `keyframes`: all that were added, in that order; those
   /// that were removed are passed over. O(keyframes + pixels of those that moved), with a tolerance O(pixels of one
-  /// image) more. @pre the number of keyframes is the number of those added; the poses are finite
+  /// image) more. @pre the number of keyframes is the number of those added; the poses are finite; not after `finish`
   template <execution_policy Policy, keyframe_range Keyframes>
   std::size_t reassemble(const Policy& policy, const Keyframes& keyframes, double tolerance = 0.0) {
-    assert(std::ranges::size(keyframes) == frames_.size() && tolerance >= 0);
+    assert(std::ranges::size(keyframes) == frames_.size() && tolerance >= 0 && !finished_);
     std::optional<detail::view_frustum> view;
     if (tolerance > 0) view.emplace(rays_);
     const auto has_moved = [&](const se3& before, const se3& now) {
@@ -123,9 +124,10 @@ class dense_cloud {
   /// The number of points.
   [[nodiscard]] std::size_t size() const noexcept { return merging() ? voxels_.size() : size_; }
   /// The cloud so far, in the world: voxel by voxel in the order of `cloud::voxel_sums`, or keyframe by
-  /// keyframe. O(size()), and O(bricks log bricks) with a voxel size.
+  /// keyframe. O(size()), and O(bricks log bricks) with a voxel size. @pre not after `finish`
   template <execution_policy Policy = sequential_policy>
   [[nodiscard]] point_cloud cloud(const Policy& policy = {}) const {
+    assert(!finished_);
     const bool with_colors = colored_ == present_;
     if (merging()) return voxels_.cloud(policy, voxels_.in_order(), with_colors);
     point_cloud out;
@@ -137,9 +139,10 @@ class dense_cloud {
   }
   /// For each point of the cloud the distance in metres that it was seen from; with a voxel size, the mean
   /// of the measurements in the voxel, to the millimetre. (A mean can be taken back; a shortest one, whose
-  /// keyframe is removed, could not.) O(size())
+  /// keyframe is removed, could not.) O(size()). @pre not after `finish`
   template <execution_policy Policy = sequential_policy>
   [[nodiscard]] std::vector<float> ranges(const Policy& policy = {}) const {
+    assert(!finished_);
     if (merging()) return voxels_.ranges(policy, voxels_.in_order());
     std::vector<float> out;
     for (const frame& f : frames_) out.insert(out.end(), f.ranges.begin(), f.ranges.end());
@@ -147,8 +150,9 @@ class dense_cloud {
   }
   /// Says that the cloud and the ranges were read for the last time, and no keyframe will come, go or move: what these
   /// need is freed. With a voxel size a few bytes for each voxel are left, for `select`, `masked_depth` and
-  /// `measurements`; without one nothing is freed.
+  /// `measurements`; without one nothing is freed. O(bricks).
   void finish() {
+    finished_ = true;
     voxels_.finish();
     std::vector<cloud::voxel_measurements>{}.swap(parts_);
   }
@@ -342,6 +346,7 @@ class dense_cloud {
   dense_options options_;
   cloud::voxel_sums voxels_;
   std::vector<frame> frames_;
+  bool finished_ = false;
   std::size_t size_ = 0;     ///< points, where they are not merged
   std::size_t present_ = 0;  ///< keyframes,
   std::size_t colored_ = 0;  ///< and how many of them have colours
