@@ -25,7 +25,7 @@ enum class errc {
   no_data,           ///< nothing to work on: an empty cloud, list or trajectory
   degenerate,        ///< geometry that does not determine the answer
   cancelled,         ///< the progress callback asked to stop
-  exception          ///< an exception ended the work of a thread: want of memory, or one that a callback threw
+  exception          ///< an exception ended the work: want of memory, or one that a callback threw
 };
 
 /// The name of a kind of failure, e.g. "malformed".

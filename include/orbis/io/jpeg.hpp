@@ -29,13 +29,15 @@ namespace orbis::io {
 }
 
 /// A baseline JPEG of an image, with half the resolution for colour. `quality`: 1 (small) ... 100 (like the image).
-/// Errors: invalid_argument (no pixels, or more than 65500 in a row or column). @pre 1 <= quality <= 100
+/// Errors: invalid_argument (no pixels, or more than 65500 in a row or column), exception (no memory). O(pixels).
+/// @pre 1 <= quality <= 100
 [[nodiscard]] inline result<std::string> encode_jpeg(image_view<const rgb8> pixels, int quality = 85) {
   assert(1 <= quality && quality <= 100);
   if (pixels.empty()) return fail(errc::invalid_argument, {}, "a JPEG without pixels");
   detail::jpeg_encoder encoder;
-  if (!encoder.write(pixels, quality)) return fail(errc::invalid_argument, {}, "no JPEG: " + encoder.message());
-  return std::string{encoder.bytes()};
+  if (encoder.write(pixels, quality)) return encoder.take();
+  if (encoder.out_of_memory()) return fail(errc::exception, {}, "no memory");
+  return fail(errc::invalid_argument, {}, "no JPEG: " + encoder.message());
 }
 
 }  // namespace orbis::io
