@@ -5,10 +5,16 @@
 /// | header | what it is for |
 /// | --- | --- |
 /// | distance_field.hpp | how far it is to the nearest obstacle of a map, and in which direction; follows the map |
+/// | floor_map.hpp | where a robot that drives can go: free, occupied and unknown cells of the floor |
+/// | floor_cost.hpp | costs near obstacles, as Nav2's costmaps have them |
+/// | floor_file.hpp | floor maps as files for the map servers of ROS and Nav2 |
 /// | squared_distances.hpp | the same without a map: exact squared distances in voxels |
 /// | map_access.hpp | how planning reads a map, also one of another library |
 #pragma once
 
 #include <orbis/nav/distance_field.hpp>
+#include <orbis/nav/floor_cost.hpp>
+#include <orbis/nav/floor_file.hpp>
+#include <orbis/nav/floor_map.hpp>
 #include <orbis/nav/map_access.hpp>
 #include <orbis/nav/squared_distances.hpp>

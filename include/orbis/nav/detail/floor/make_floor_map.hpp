@@ -1,0 +1,312 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// The functions of floor_map.hpp.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cassert>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <numbers>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include <orbis/nav/detail/floor/columns.hpp>
+#include <orbis/nav/floor_map.hpp>
+
+namespace orbis::nav {
+
+template <planning_map Map>
+std::optional<double> find_floor(const Map& map) {
+  const octree::voxel_grid& grid = map_access<Map>::grid(map);
+  std::vector<std::size_t> surface(grid.cells());  // by layer
+  auto read = map_access<Map>::octants(map);
+  map_access<Map>::for_each_octant(map, [&](const octree::voxel_key& k, int level, const octree::octant_states& s) {
+    if (s.occupied == 0) return;
+    // Of a large cube, only the highest layer may have free space above.
+    const std::uint32_t size = octree::node_cells(level);
+    const auto& layers = detail::octant_layers;
+    for (std::uint32_t y = 0; y != size; y += 4)
+      for (std::uint32_t x = 0; x != size; x += 4) {
+        const octree::voxel_key top{k.x + x, k.y + y, k.z + size - 4};
+        const std::uint64_t above = top.z + 4 < grid.cells() ? read({top.x, top.y, top.z + 4}).free() : 0;
+        const std::uint64_t free = s.free();
+        const std::uint64_t free_above =
+            (free & (layers[1] | layers[3])) >> 4U | (free & layers[2]) >> 28U | (above & layers[0]) << 36U;
+        for (std::size_t z = 0; z != 4; ++z)
+          surface[top.z + z] += static_cast<std::size_t>(std::popcount(s.occupied & free_above & layers[z]));
+      }
+  });
+  const auto two = [&](std::size_t z) { return surface[z] + surface[z + 1]; };
+  std::size_t most = 0;
+  for (std::size_t z = 0; z + 1 != surface.size(); ++z) most = std::max(most, two(z));
+  if (most == 0) return std::nullopt;
+  std::size_t at = 0;
+  while (2 * two(at) < most) ++at;
+  while (at + 1 != surface.size() && surface[at + 1] > surface[at]) ++at;
+  return grid.center(static_cast<std::uint32_t>(at)) + grid.resolution() / 2;
+}
+
+namespace detail {
+
+/// Surfaces of columns, and which of them a robot gets to.
+class floor_search {
+ public:
+  static constexpr int none = std::numeric_limits<int>::min();
+
+  /// Levels are those of `columns`; `lowest` and `highest`: between which surfaces are looked for; `clear` and `step`
+  /// in voxels.
+  floor_search(const voxel_columns& columns, int lowest, int highest, int clear, int step, octree::occupancy unknown)
+      : columns_{columns},
+        lowest_{lowest},
+        highest_{highest},
+        clear_{clear},
+        step_{step},
+        unknown_{unknown},
+        levels_(columns.width(), columns.height(), none) {
+    find_surfaces();
+  }
+
+  /// Drives from all surfaces within a step of level `floor`, and keeps the lowest of each column.
+  void drive(int floor) {
+    std::vector<std::uint32_t> waiting;
+    const auto get_to = [&](std::size_t surface) {
+      if (reached_[surface]) return;
+      reached_[surface] = true;
+      waiting.push_back(static_cast<std::uint32_t>(surface));
+    };
+    for (std::size_t i = 0; i != surfaces_.size(); ++i)
+      if (std::abs(surfaces_[i].level - floor) <= step_) get_to(i);
+    while (!waiting.empty()) {
+      const surface from = surfaces_[waiting.back()];
+      waiting.pop_back();
+      int& level = levels_.data()[from.column];
+      if (level == none || from.level < level) level = from.level;
+      const auto x = static_cast<int>(from.column % static_cast<std::uint32_t>(columns_.width()));
+      const auto y = static_cast<int>(from.column / static_cast<std::uint32_t>(columns_.width()));
+      for_each_neighbor(x, y, [&](int u, int v) {
+        const std::size_t column = place(u, v);
+        for (std::size_t i = first_[column]; i != first_[column + 1]; ++i)
+          if (std::abs(surfaces_[i].level - from.level) <= step_) get_to(i);
+      });
+    }
+  }
+  /// The lowest surface of each column that the robot gets to, or `none`.
+  [[nodiscard]] const image<int>& levels() const noexcept { return levels_; }
+
+  [[nodiscard]] floor_state judge_surface(int x, int y, double steepest) const {
+    const int level = levels_(x, y);
+    bool is_edge = false;
+    for_each_neighbor(x, y, [&](int u, int v) {
+      const int other = levels_(u, v);
+      is_edge = is_edge || (other != none && other < level - step_);
+    });
+    if (is_edge || (is_uneven_(x, y) != 0 && is_steep(x, y, steepest))) return floor_state::occupied;
+    return columns_.next_unknown(x, y, level) > level + clear_ ? floor_state::free : in_doubt();
+  }
+  /// A column without a surface that the robot gets to, beside a floor at `level`.
+  [[nodiscard]] floor_state judge_other(int x, int y, int level) const {
+    const int from = std::max(level + step_ + 1, 0);
+    if (columns_.next_occupied(x, y, from) <= level + step_ + clear_) return floor_state::occupied;
+    const int deepest = std::max(level - step_, 0);
+    if (columns_.next_occupied(x, y, deepest) > level && columns_.next_unknown(x, y, deepest) > level)
+      return floor_state::occupied;
+    return in_doubt();
+  }
+  /// How far is_steep looks, in cells. Before judging, and after driving.
+  void set_radius(int radius) {
+    radius_ = radius;
+    // Where no level around differs by more than a step, no plane is needed: the extremes of rows, and then of columns.
+    is_uneven_ = image<std::uint8_t>(levels_.width(), levels_.height());
+    struct range {
+      int low = std::numeric_limits<int>::max(), high = none;
+      void add(const range& other) noexcept {
+        low = std::min(low, other.low);
+        high = std::max(high, other.high);
+      }
+    };
+    image<range> rows(levels_.width(), levels_.height());
+    for (int y = 0; y != levels_.height(); ++y)
+      for (int x = 0; x != levels_.width(); ++x)
+        for (int u = std::max(x - radius, 0); u <= std::min(x + radius, levels_.width() - 1); ++u)
+          if (const int level = levels_(u, y); level != none) rows(x, y).add({level, level});
+    for (int y = 0; y != levels_.height(); ++y)
+      for (int x = 0; x != levels_.width(); ++x) {
+        range around;
+        for (int v = std::max(y - radius, 0); v <= std::min(y + radius, levels_.height() - 1); ++v)
+          around.add(rows(x, v));
+        is_uneven_(x, y) = around.high != none && around.high - around.low > step_ ? 1 : 0;
+      }
+  }
+
+  /// For each column the level of the nearest one that has any, by steps to the four neighbours; of several the lowest.
+  /// `otherwise` if there is none.
+  [[nodiscard]] image<int> spread_levels(int otherwise) const {
+    image<int> spread = levels_;
+    std::vector<std::uint32_t> border, next;
+    for (std::size_t i = 0; i != spread.pixels().size(); ++i)
+      if (spread.data()[i] != none) border.push_back(static_cast<std::uint32_t>(i));
+    image<std::uint32_t> round(spread.width(), spread.height(), 0);
+    for (std::uint32_t n = 1; !border.empty(); ++n, border.swap(next)) {
+      next.clear();
+      for (const std::uint32_t i : border) {
+        const int level = spread.data()[i];
+        for_each_neighbor(static_cast<int>(i % static_cast<std::uint32_t>(spread.width())),
+                          static_cast<int>(i / static_cast<std::uint32_t>(spread.width())), [&](int u, int v) {
+                            int& other = spread(u, v);
+                            if (other == none) {
+                              round(u, v) = n;
+                              next.push_back(static_cast<std::uint32_t>(place(u, v)));
+                              other = level;
+                            } else if (round(u, v) == n) {
+                              other = std::min(other, level);
+                            }
+                          });
+      }
+    }
+    for (int& level : spread.pixels())
+      if (level == none) level = otherwise;
+    return spread;
+  }
+
+ private:
+  struct surface {
+    int level;
+    std::uint32_t column;
+  };
+
+  [[nodiscard]] std::size_t place(int x, int y) const noexcept {
+    return static_cast<std::size_t>(y) * static_cast<std::size_t>(columns_.width()) + static_cast<std::size_t>(x);
+  }
+  template <class Visit>
+  void for_each_neighbor(int x, int y, Visit&& visit) const {
+    if (x != 0) visit(x - 1, y);
+    if (x + 1 != columns_.width()) visit(x + 1, y);
+    if (y != 0) visit(x, y - 1);
+    if (y + 1 != columns_.height()) visit(x, y + 1);
+  }
+  [[nodiscard]] floor_state in_doubt() const noexcept {
+    return unknown_ == octree::occupancy::free       ? floor_state::free
+           : unknown_ == octree::occupancy::occupied ? floor_state::occupied
+                                                     : floor_state::unknown;
+  }
+  void find_surfaces() {
+    first_.reserve(levels_.pixels().size() + 1);
+    for (int y = 0; y != columns_.height(); ++y)
+      for (int x = 0; x != columns_.width(); ++x) {
+        first_.push_back(static_cast<std::uint32_t>(surfaces_.size()));
+        for (int z = columns_.next_occupied(x, y, lowest_); z <= highest_;) {
+          const int next = columns_.next_occupied(x, y, z + 1);
+          if (next > z + clear_ &&
+              (unknown_ != octree::occupancy::occupied || columns_.next_unknown(x, y, z) > z + clear_))
+            surfaces_.push_back({z, static_cast<std::uint32_t>(place(x, y))});
+          z = next;
+        }
+      }
+    first_.push_back(static_cast<std::uint32_t>(surfaces_.size()));
+    reached_.resize(surfaces_.size());
+  }
+  /// Whether the floor around rises by more than a step, and its plane by least squares is steeper than `steepest`
+  /// (tangent). Columns count that differ by at most a step for each cell that they are away: no ledges.
+  [[nodiscard]] bool is_steep(int x, int y, double steepest) const {
+    const int level = levels_(x, y);
+    int lowest = level, highest = level;
+    double n = 0, sx = 0, sy = 0, sz = 0, sxx = 0, sxy = 0, syy = 0, sxz = 0, syz = 0;
+    for (int v = std::max(y - radius_, 0); v <= std::min(y + radius_, columns_.height() - 1); ++v)
+      for (int u = std::max(x - radius_, 0); u <= std::min(x + radius_, columns_.width() - 1); ++u) {
+        const int other = levels_(u, v), dx = u - x, dy = v - y;
+        if (other == none || std::abs(other - level) > step_ * std::max(std::abs(dx), std::abs(dy))) continue;
+        const int dz = other - level;
+        lowest = std::min(lowest, other);
+        highest = std::max(highest, other);
+        n += 1;
+        sx += dx, sy += dy, sz += dz, sxx += dx * dx, sxy += dx * dy, syy += dy * dy, sxz += dx * dz, syz += dy * dz;
+      }
+    if (highest - lowest <= step_) return false;
+    const double xx = sxx - sx * sx / n, xy = sxy - sx * sy / n, yy = syy - sy * sy / n, xz = sxz - sx * sz / n,
+                 yz = syz - sy * sz / n;
+    const double determinant = xx * yy - xy * xy;
+    if (determinant < 1e-9 * xx * yy || determinant <= 0.0) {  // all in one row: the slope along it
+      const double along = xx + yy, rise = std::hypot(xz, yz);
+      return along > 0.0 && rise > steepest * along;
+    }
+    const double a = (xz * yy - yz * xy) / determinant, b = (yz * xx - xz * xy) / determinant;
+    return a * a + b * b > steepest * steepest;
+  }
+
+  const voxel_columns& columns_;
+  int lowest_, highest_, clear_, step_;
+  octree::occupancy unknown_;
+  int radius_ = 1;
+  std::vector<surface> surfaces_;     ///< by column, from the lowest
+  std::vector<std::uint32_t> first_;  ///< of each column
+  std::vector<bool> reached_;
+  image<int> levels_;
+  image<std::uint8_t> is_uneven_{};
+};
+
+}  // namespace detail
+
+template <planning_map Map>
+result<floor_map> make_floor_map(const Map& map, const ground_robot& robot, const floor_map_options& options) {
+  assert(robot.radius > 0.0 && robot.height > 0.0 && robot.step >= 0.0 && options.below >= 0.0 && options.above >= 0.0);
+  assert(robot.max_slope >= 0.0 && robot.max_slope < std::numbers::pi / 2);
+  constexpr std::uint64_t most_cells = std::uint64_t{1} << 26U;
+  const octree::voxel_grid& grid = map_access<Map>::grid(map);
+  const double cell = grid.resolution();
+  const auto voxels = [&](double metres) { return static_cast<int>(std::ceil(metres / cell - 1e-6)); };
+  const int clear = voxels(robot.height), step = static_cast<int>(std::floor(robot.step / cell + 1e-6));
+
+  const std::optional<double> floor = options.floor ? options.floor : find_floor(map);
+  if (!floor) return fail(errc::no_data, "", "the map has no floor");
+  const std::optional<std::uint32_t> floor_key = grid.key(*floor - cell / 2);
+  if (!floor_key) return fail(errc::no_data, "", "the floor lies outside of the map's grid");
+  const auto key_at = [&](int voxels_up) {
+    return static_cast<std::uint32_t>(
+        std::clamp<std::int64_t>(std::int64_t{*floor_key} + voxels_up, 0, std::int64_t{grid.cells()} - 1));
+  };
+  octree::key_box box{{0, 0, 0}, {grid.cells() - 1, grid.cells() - 1, grid.cells() - 1}};
+  if (options.region) {
+    const auto named = octree::keys_between(grid, options.region->min, options.region->max);
+    if (!named) return fail(errc::no_data, "", "the region lies outside of the map's grid");
+    box = *named;
+  }
+  const std::uint32_t lowest = key_at(-voxels(options.below)), highest = key_at(voxels(options.above));
+  box.low.z = key_at(-voxels(options.below) - step);
+  box.high.z = key_at(voxels(options.above) + step + clear);
+  const result<detail::voxel_columns> columns = detail::read_columns(map, box, most_cells);
+  if (!columns) return fail(columns.error());
+  const auto level_of = [&](std::uint32_t key) { return static_cast<int>(key - columns->low().z); };
+
+  detail::floor_search search{*columns, level_of(lowest), level_of(highest), clear, step, options.unknown};
+  search.drive(level_of(*floor_key));
+  search.set_radius(std::max(1, static_cast<int>(std::lround(robot.radius / cell))));
+  const image<int> beside = search.spread_levels(level_of(*floor_key));
+
+  floor_map out;
+  out.resolution = cell;
+  out.origin = vec2{grid.center(columns->low().x) - cell / 2, grid.center(columns->low().y) - cell / 2};
+  out.floor = *floor;
+  out.states = image<floor_state>(columns->width(), columns->height());
+  out.heights = image<float>(columns->width(), columns->height(), std::numeric_limits<float>::quiet_NaN());
+  const double steepest = std::tan(robot.max_slope);
+  for (int y = 0; y != columns->height(); ++y)
+    for (int x = 0; x != columns->width(); ++x) {
+      const int level = search.levels()(x, y);
+      if (level == detail::floor_search::none) {
+        out.states(x, y) = search.judge_other(x, y, beside(x, y));
+        continue;
+      }
+      out.states(x, y) = search.judge_surface(x, y, steepest);
+      out.heights(x, y) =
+          static_cast<float>(grid.center(columns->low().z + static_cast<std::uint32_t>(level)) + cell / 2);
+    }
+  return out;
+}
+
+}  // namespace orbis::nav
