@@ -64,6 +64,8 @@ execute_process(COMMAND bash -c "
 if(NOT result EQUAL 0)
   message(FATAL_ERROR "a held viewer: ${result} ${err}")
 endif()
+file(READ ${WORK}/held.log err)
+check(err MATCHES "viewer +stays until Ctrl-C")
 file(READ ${WORK}/taken.log err)
 check(err MATCHES "127.0.0.1:[0-9]+: .*--viewer-port")
 check(NOT EXISTS ${WORK}/other)
