@@ -7,11 +7,11 @@
 #include <cstdint>
 #include <future>
 #include <optional>
-#include <system_error>
 #include <utility>
 
 #include <orbis/mapping/depth_store.hpp>
 
+#include "background.hpp"
 #include "priority.hpp"
 
 namespace app {
@@ -31,16 +31,12 @@ class kept_depths {
   void put(std::uint64_t frame, const orbis::image<std::uint16_t>& depth) {
     finish();
     if (background_) {
-      try {
-        ahead_ = std::async(std::launch::async, [this, frame, copy = depth] {
-          lower_priority(compression_niceness);
-          keep(frame, copy);
-        });
-        return;
-      } catch (const std::system_error&) {  // the system gives no more threads
-      }
+      ahead_ = start_in_background([this, frame, copy = depth] {
+        lower_priority(compression_niceness);
+        keep(frame, copy);
+      });
     }
-    keep(frame, depth);
+    if (!ahead_.valid()) keep(frame, depth);
   }
   /// Waits for the last image, so that the others below may be called. Throws what compressing it has thrown.
   void finish() {

@@ -256,6 +256,7 @@ orbis::result<void> write_filter_picture(const results& r, const view_frame& fra
 }  // namespace
 
 orbis::result<void> write_pictures(const results& r, const view_frame& frame) {
+  cv::setNumThreads(0);  // little work, for which a run must not end where there are no threads to be had
   if (auto done = write_trajectory_picture(r, frame); !done) return done;
   if (!r.map) return {};
   const map_results& m = *r.map;

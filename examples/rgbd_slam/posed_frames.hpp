@@ -18,6 +18,7 @@
 #include <orbis/mapping/keyframe.hpp>
 #include <orbis/slam/atlas.hpp>
 
+#include "background.hpp"
 #include "color_file.hpp"
 #include "kept_depths.hpp"
 #include "settings.hpp"
@@ -173,8 +174,8 @@ class posed_frames {
     tell(*images);
     if (background_ && number + 1 != entries_.size()) {
       ahead_number_ = number + 1;
-      ahead_ = std::async(std::launch::async,
-                          [this, next = number + 1, with_color = wants_color_] { return read(next, with_color); });
+      ahead_ =
+          start_in_background([this, next = number + 1, with_color = wants_color_] { return read(next, with_color); });
     }
     return images;
   }

@@ -11,6 +11,8 @@
 #include <orbis/io/recording.hpp>
 #include <orbis/io/synthetic.hpp>
 
+#include "background.hpp"
+
 namespace app {
 namespace {
 
@@ -126,13 +128,9 @@ result<frame_source> open_source(const settings& s, console& console) {
 }
 
 result<orbis::camera::rgbd_frame> read_ahead::next() {
-  if (!background_) return source_.frame(at_++);
-  const auto start = [this](std::size_t i) {
-    return std::async(std::launch::async, [this, i] { return source_.frame(i); });
-  };
-  if (!ahead_.valid()) ahead_ = start(at_);
-  auto frame = ahead_.get();
-  if (++at_ < source_.frames) ahead_ = start(at_);
+  auto frame = ahead_.valid() ? ahead_.get() : source_.frame(at_);
+  ++at_;
+  if (background_ && has_next()) ahead_ = start_in_background([this, i = at_] { return source_.frame(i); });
   return frame;
 }
 

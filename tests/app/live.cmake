@@ -67,3 +67,8 @@ check(err MATCHES "depth images are kept in memory instead")
 check(err MATCHES "depth.spill.live: cannot be written: No space left on device")
 must_be_the_same(batch full)
 must_not_be_half_written(${WORK}/full)
+
+# No threads to be had: what would be done beside is done in turn.
+set(APP ${CMAKE_COMMAND} -E env LD_PRELOAD=${NO_THREADS} ASAN_OPTIONS=verify_asan_link_order=0 ${program})
+app(0 ${room} --batch-map --out alone)
+must_be_the_same(batch alone)
