@@ -20,7 +20,7 @@
 #include <orbis/cloud/detail/knn/squared_distance.hpp>
 #include <orbis/cloud/detail/select/decision.hpp>
 #include <orbis/cloud/detail/select/local_shape.hpp>
-#include <orbis/cloud/detail/select/values_of_few.hpp>
+#include <orbis/cloud/detail/select/sparse_values.hpp>
 #include <orbis/cloud/filter_chain.hpp>
 #include <orbis/cloud/neighbors.hpp>
 #include <orbis/core/execution.hpp>
@@ -186,7 +186,7 @@ class surroundings {
   neighbor_graph graph_;
   std::vector<float> log_spacing_;
   std::vector<float> local_;  ///< empty until asked for
-  values_of_few flat_;        ///< `off_plane` of those that were looked at
+  sparse_values flat_;        ///< `off_plane` of those that were looked at
   std::vector<char> gone_;
 };
 

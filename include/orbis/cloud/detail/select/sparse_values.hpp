@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A number for a few of many points.
+/// Values of a few of many points.
 #pragma once
 
 #include <bit>
@@ -13,14 +13,15 @@
 
 namespace orbis::cloud::detail {
 
-/// Values of some of the points 0 ... n - 1. A fifth of a byte for each point, and four for each value.
-class values_of_few {
+/// Values of some of the points 0 ... n - 1. A quarter of a byte for each point and four bytes for each value, and
+/// twice that while values are added.
+class sparse_values {
  public:
   /// Adds `value(i)` for each i < count that has none and for which `wanted(i)` is true. Both are called from several
   /// threads. O(count), the same for every policy. @pre count is the same in all calls
   template <execution_policy Policy, class Wanted, class Value>
   void add(const Policy& policy, std::size_t count, const Wanted& wanted, const Value& value) {
-    const values_of_few before = *this;
+    const sparse_values before = *this;
     words_.resize((count + 63) / 64);
     for_each_index(policy, words_.size(), 64, [&](std::size_t w) {
       for (std::size_t i = 64 * w; i != count && i != 64 * (w + 1); ++i) {

@@ -3,18 +3,18 @@
 #include <cstddef>
 #include <vector>
 
-#include <orbis/cloud/detail/select/values_of_few.hpp>
+#include <orbis/cloud/detail/select/sparse_values.hpp>
 #include <orbis/core/random.hpp>
 
 #include "support/catch.hpp"
 
-using orbis::cloud::detail::values_of_few;
+using orbis::cloud::detail::sparse_values;
 
-TEST_CASE("values of few points are those that were added first, under any policy") {
+TEST_CASE("sparse values are those that were added first, under any policy") {
   for (const std::size_t n : {0U, 1U, 63U, 64U, 65U, 5000U}) {
     orbis::random_bits random{n};
     std::vector<float> expected(n, NAN);
-    values_of_few alone, together;
+    sparse_values alone, together;
     for (int round = 0; round != 4; ++round) {
       std::vector<char> wanted(n);
       for (char& w : wanted) w = random.below(round == 3 ? 1 : 9) == 0 ? 1 : 0;  // all of them in the end
