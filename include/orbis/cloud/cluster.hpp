@@ -102,10 +102,6 @@ class disjoint_sets {
   return std::min<std::size_t>(200, std::max<std::size_t>(30, points / 250));
 }
 
-}  // namespace detail
-
-namespace detail {
-
 /// Components of linked points, by the least vertex in them, their root.
 struct linked_components {
   disjoint_sets sets;
