@@ -168,8 +168,8 @@ class moving_filter {
     const auto with_model = [&](const auto& model) {
       about.cells.ask(
           policy, by.cells, grid_, model, T_by_about, options_.slant, [&](float z) { return margin(z); },
-          [&](std::size_t cell, detail::sight seen) {
-            count(seen == detail::sight::through ? about.through[cell] : about.shown[cell]);
+          [&](std::size_t cell, detail::visibility seen) {
+            count(seen == detail::visibility::through ? about.through[cell] : about.shown[cell]);
           });
     };
     if constexpr (requires { camera_.visit(with_model); })

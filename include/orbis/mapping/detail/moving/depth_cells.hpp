@@ -44,7 +44,7 @@ struct cell_grid {
 };
 
 /// What a view says of a place: its rays pass through it, it shows it, or neither.
-enum class sight : std::uint8_t { nothing, through, shown };
+enum class visibility : std::uint8_t { nothing, through, shown };
 
 /// Each cell's nearest depth, which stands for it; and around each corner of cells, the range of the depths in the four
 /// cells there: a window of 8x8 pixels, so that a point that is a pixel or two beside its true place finds the same.
@@ -111,8 +111,9 @@ class depth_cells {
     });
   }
 
-  /// `visit(cell, sight)` for the cells of which `view` says something. `margin(z)`: what noise is good for at that
-  /// depth, metres; `slant`: so many times a window's range of depths is added for rays that pass through. O(cells).
+  /// `visit(cell, visibility)` for the cells of which `view` says something. `margin(z)`: what noise is good for at
+  /// that depth, metres; `slant`: so many times a window's range of depths is added for rays that pass through.
+  /// O(cells).
   template <execution_policy Policy, camera::camera_model Camera, class Margin, class Visit>
   void ask(const Policy& policy, const depth_cells& view, const cell_grid& grid, const Camera& camera,
            const se3& T_view_this, float slant, const Margin& margin, const Visit& visit) const {
@@ -126,10 +127,10 @@ class depth_cells {
         if (w == nullptr) continue;
         const float z = p[2], m = margin(z), before = w->nearest - m - z;
         if (before > 0.0F) {
-          if (w->covered && before > rounded_product(slant, w->farthest - w->nearest)) visit(i, sight::through);
+          if (w->covered && before > rounded_product(slant, w->farthest - w->nearest)) visit(i, visibility::through);
         } else if (z <= w->nearest + m || std::abs(z - w->farthest) <= m ||
                    (z < w->farthest && w->farthest - w->nearest <= 4.0F * m)) {
-          visit(i, sight::shown);
+          visit(i, visibility::shown);
         }
       }
     });
