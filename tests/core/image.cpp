@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <type_traits>
 
@@ -66,4 +68,27 @@ TEST_CASE("an image owns its pixels row by row") {
   CHECK(c.view()(1, 2).b == 7);
   CHECK(image<int>{}.empty());
   CHECK(!(image<int>{2, 3} == image<int>{3, 2}));
+}
+
+TEST_CASE("a copy of a view has its pixels and size, in memory that is used again where it fits") {
+  std::array<int, 20> pixels{};
+  for (int i = 0; i != 20; ++i) pixels[static_cast<std::size_t>(i)] = i;
+  const image_view<int> inside{pixels.data() + 6, 3, 2, 5};
+  image<int> copy;
+  copy_pixels(inside, copy);
+  REQUIRE(copy.width() == 3);
+  REQUIRE(copy.height() == 2);
+  CHECK(std::ranges::equal(copy.pixels(), std::array{6, 7, 8, 11, 12, 13}));
+  const int* const memory = copy.data();
+  pixels[7] = -1;
+  CHECK(copy(1, 0) == 7);
+  copy_pixels(inside, copy);
+  CHECK(copy(1, 0) == -1);
+  CHECK(copy.data() == memory);
+  const image<int> wide{6, 1, 9};  // as many pixels, but another size
+  copy_pixels(wide, copy);
+  CHECK(copy == wide);
+  copy_pixels({}, copy);
+  CHECK(copy.width() == 0);
+  CHECK(copy.empty());
 }

@@ -20,10 +20,7 @@ struct memory_depths {
   bool full = false;             ///< `put` keeps the image and fails
 
   result<void> put(std::uint64_t frame, image_view<const std::uint16_t> pixels) {
-    image<std::uint16_t> copy(pixels.width(), pixels.height());
-    for (int y = 0; y != copy.height(); ++y)
-      for (int x = 0; x != copy.width(); ++x) copy(x, y) = pixels(x, y);
-    images[frame] = copy;
+    copy_pixels(pixels, images[frame]);
     if (full) return fail(errc::write_failed, "frame " + std::to_string(frame), "the disk is full");
     return {};
   }

@@ -3,6 +3,7 @@
 /// Images as pointer, size and stride; pixel centres at integers, (0, 0) is the top left one.
 #pragma once
 
+#include <algorithm>
 #include <cassert>
 #include <concepts>
 #include <cstddef>
@@ -100,5 +101,13 @@ class image {
   int height_ = 0;
   std::vector<T> pixels_;
 };
+
+/// Makes `to` a copy of what a view shows, in the memory that it has if it is of that size. O(pixels).
+/// @pre `from` does not show pixels of `to`
+template <class T>
+void copy_pixels(std::type_identity_t<image_view<const T>> from, image<T>& to) {
+  if (to.width() != from.width() || to.height() != from.height()) to = image<T>(from.width(), from.height());
+  for (int y = 0; y != from.height(); ++y) std::ranges::copy(from.row(y), to.row(y).begin());
+}
 
 }  // namespace orbis
