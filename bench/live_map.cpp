@@ -157,7 +157,7 @@ void bench_insertion_live(benchmark::State& state, double resolution, bool as_ke
         if (as_keyframes)
           static_cast<void>(m.add_keyframe(seq, i, s.depth_metres(), s.T_world_camera));
         else
-          m.add_frame(seq, i, s.depth_metres(), s.T_world_camera, 0);
+          m.add_frame(seq, i, s.depth_metres(), 0, k.scans[0].T_world_camera.inverse() * s.T_world_camera);
         static_cast<void>(m.correct(seq));
       }));
     }

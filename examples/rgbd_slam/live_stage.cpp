@@ -35,7 +35,7 @@ live_mapping::live_mapping(const frame_source& source, const settings& s, std::f
       live_{source.camera.model,
             thread_options(s),
             {.started = [] { lower_priority(live_map_niceness); },
-             .poll_poses = [this](beliefs& now, bool always) { return poll(now, always); },
+             .poll_poses = [this](poses& now, bool always) { return poll(now, always); },
              .prepare =
                  [this](std::uint64_t, depth_use, orbis::image_view<std::uint16_t> pixels) {
                    reader_.mask(orbis::seq, pixels_view{pixels, depth_scale_}, rays_, points_, pixels);
@@ -61,7 +61,7 @@ std::vector<live_mapping::made> live_mapping::made_so_far() const {
   return made_;
 }
 
-bool live_mapping::poll(beliefs& now, bool always) {
+bool live_mapping::poll(poses& now, bool always) {
   if (!where_(made_so_far(), now, always)) return false;
   if (!now.removed.empty()) {
     const std::lock_guard lock{mutex_};
@@ -91,12 +91,14 @@ void live_mapping::add(std::size_t frame, orbis::slam::map_keyframe keyframe, co
     made_.push_back({frame, keyframe});
   }
   live_.add_keyframe(frame, pixels_view{image.depth, depth_scale_}, T_world_camera);
+  // The map's thread may have found it gone before it was there to be removed.
+  if (!find([&](const made& k) { return k.frame == frame; })) live_.remove(frame);
   if (waits_) live_.wait();
 }
 
-void live_mapping::add_frame(std::size_t frame, std::uint64_t reference, const orbis::se3& T_world_camera,
+void live_mapping::add_frame(std::size_t frame, std::uint64_t reference, const orbis::se3& T_reference_camera,
                              const orbis::camera::rgbd_frame& image) {
-  live_.add_frame(frame, pixels_view{image.depth, depth_scale_}, T_world_camera, reference);
+  live_.add_frame(frame, pixels_view{image.depth, depth_scale_}, reference, T_reference_camera);
   if (waits_) live_.wait();
 }
 
@@ -120,6 +122,7 @@ void live_mapping::stop() {
   live_.wait();
   live_.stop();
   const orbis::mapping::live_map_counters counters = live_.counters();
+  const std::lock_guard lock{results_mutex_};  // of the viewer
   results_.dropped = counters.dropped_keyframes;
   results_.frames = counters.frames;
   results_.dropped_frames = counters.dropped_frames;

@@ -31,7 +31,7 @@ namespace app {
 
 class live_mapping {
  public:
-  using beliefs = orbis::mapping::keyframe_beliefs;
+  using poses = orbis::mapping::keyframe_poses;
   /// A keyframe as SLAM knows it, by the index of its frame.
   struct made {
     std::uint64_t frame;
@@ -39,7 +39,7 @@ class live_mapping {
   };
   /// Fills in the present poses of the keyframes that are in the active map, and those that are in no map any more, and
   /// returns true; or false if they are those of the last call and `always` is false.
-  using find_poses = std::function<bool(const std::vector<made>&, beliefs&, bool always)>;
+  using find_poses = std::function<bool(const std::vector<made>&, poses&, bool always)>;
 
   /// `where` is called on the map's thread until `stop`. `spill_file`: for depth images beyond what there is room for
   /// in memory, see `depth_store_options`.
@@ -51,7 +51,7 @@ class live_mapping {
   void add(std::size_t frame, orbis::slam::map_keyframe keyframe, const orbis::se3& T_world_camera,
            const orbis::camera::rgbd_frame& image);
   /// Frame number `frame` was tracked, and has become no keyframe; its pose follows the keyframe of frame `reference`.
-  void add_frame(std::size_t frame, std::uint64_t reference, const orbis::se3& T_world_camera,
+  void add_frame(std::size_t frame, std::uint64_t reference, const orbis::se3& T_reference_camera,
                  const orbis::camera::rgbd_frame& image);
   /// The frame of the newest keyframe for which `is_wanted(made)` holds.
   template <class IsWanted>
@@ -76,7 +76,7 @@ class live_mapping {
 
  private:
   [[nodiscard]] std::vector<made> made_so_far() const;
-  [[nodiscard]] bool poll(beliefs& now, bool always);
+  [[nodiscard]] bool poll(poses& now, bool always);
   void note(const orbis::mapping::insertion_event& e);
 
   find_poses where_;

@@ -61,12 +61,12 @@ void hand_on(const slam_system& slam, const orbis::slam::track_result& found, st
   if (!found.T_world_camera) return;
   if (found.keyframe) return live.add(i, {found.map, *found.keyframe}, *found.T_world_camera, frame);
   if (!s.map_every_frame) return;
+  const auto tracked = slam.last_frame();
   const auto reference = slam.inspect([&](const orbis::slam::atlas& maps) {
-    return live.find([&](const live_mapping::made& k) {
-      return maps.current(k.keyframe) == orbis::slam::map_keyframe{found.map, *found.reference};
-    });
+    const auto now = maps.current(tracked->reference);
+    return live.find([&](const live_mapping::made& k) { return maps.current(k.keyframe) == now; });
   });
-  if (reference) live.add_frame(i, *reference, *found.T_world_camera, frame);
+  if (reference) live.add_frame(i, *reference, tracked->T_reference_camera, frame);
 }
 
 /// Feeds the frames to SLAM, up to the first that cannot be read, or to Ctrl-C. Every map begins in a world of its own.
@@ -115,15 +115,15 @@ std::optional<se3> present_pose(const orbis::slam::atlas& maps, const orbis::sla
 /// How the live map asks for the poses of its keyframes.
 live_mapping::find_poses poses_of(const slam_system& slam) {
   return [&slam, seen = orbis::slam::pose_revision{.map = orbis::slam::no_id}](
-             const std::vector<live_mapping::made>& keyframes, live_mapping::beliefs& beliefs, bool always) mutable {
+             const std::vector<live_mapping::made>& keyframes, live_mapping::poses& poses, bool always) mutable {
     return slam.inspect([&](const orbis::slam::atlas& maps) {
       const orbis::slam::pose_revision now{maps.active_id(), maps.active().pose_changes()};
       if (std::exchange(seen, now) == now && !always) return false;
       for (const auto& k : keyframes) {
         if (const auto pose = present_pose(maps, k.keyframe))
-          beliefs.poses.push_back({k.frame, *pose});
+          poses.poses.push_back({k.frame, *pose});
         else if (!maps.contains(maps.current(k.keyframe).map))
-          beliefs.removed.push_back(k.frame);
+          poses.removed.push_back(k.frame);
       }
       return true;
     });

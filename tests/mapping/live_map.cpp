@@ -199,13 +199,21 @@ TEST_CASE("A finished live map is the map of all keyframes built at once") {
 TEST_CASE("Frames between keyframes are in a live map until they are too old or their keyframe moves") {
   const auto scene = test::edge_scene(12);
   live map{scene.camera, {.resolution = 0.05, .max_frames = 4}};
-  const auto add_frame = [&](std::size_t i, std::uint64_t keyframe) {
-    const auto k = scene.keyframe(i);
-    return map.add_frame(seq, i, k.depth, k.T_world_camera, keyframe);
+  std::size_t key = 0;  // the second keyframe
+  const auto relative = [&](std::size_t i, std::size_t keyframe) {
+    return scene.poses[keyframe].inverse() * scene.poses[i];
   };
+  const auto add_frame = [&](std::size_t i, std::uint64_t keyframe) {
+    return map.add_frame(seq, i, scene.keyframe(i).depth, keyframe, relative(i, keyframe));
+  };
+  // Keyframe 0 and those frames; what is no keyframe is placed from its keyframe, which is 3 from 4 on, and else 0.
   const auto with = [&](const std::vector<std::size_t>& frames) {
     octree_type expected{0.05};
-    for (const std::size_t i : frames) expected.integrate(scene.keyframe(i).depth, scene.camera, scene.poses[i]);
+    for (const std::size_t i : frames) {
+      const std::size_t from = i == 0 || i == key ? i : i >= 4 && i != 7 ? key : 0;
+      expected.integrate(scene.keyframe(i).depth, scene.camera,
+                         from == i ? scene.poses[i] : scene.poses[from] * relative(i, from));
+    }
     return ot_bytes(expected);
   };
   const auto now = [&] {
@@ -219,6 +227,7 @@ TEST_CASE("Frames between keyframes are in a live map until they are too old or 
   CHECK(map.pending() == 0);  // the newest are in the map at once
   CHECK(now() == with({0, 1, 2, 3}));
   REQUIRE(map.add_keyframe(seq, 3, scene.keyframe(3).depth, scene.poses[3]));  // a frame becomes a keyframe
+  key = 3;
   CHECK(map.frames() == 2);
   CHECK(now() == with({0, 1, 2, 3}));
   for (const std::size_t i : {4U, 5U}) CHECK(add_frame(i, 3));
@@ -240,6 +249,19 @@ TEST_CASE("Frames between keyframes are in a live map until they are too old or 
   REQUIRE(map.finish(seq));
   CHECK(map.frames() == 0);
   CHECK(now() == with({0}));
+}
+
+TEST_CASE("A frame is placed from where its keyframe is in the map, not from where that is to be") {
+  const auto scene = test::edge_scene(2);
+  live map{scene.camera, {.resolution = 0.05, .tolerance = 1.0, .max_frames = 4}};
+  REQUIRE(map.add_keyframe(seq, 0, scene.keyframe(0).depth, scene.poses[0]));
+  const se3 moved = se3{so3{}, vec3{0.03, 0, 0}} * scene.poses[0], T_0_1 = scene.poses[0].inverse() * scene.poses[1];
+  CHECK(map.set_poses(std::vector<mapping::keyframe_position>{{0, moved}}) == 0);  // within the tolerance
+  CHECK(map.add_frame(seq, 1, scene.keyframe(1).depth, 0, T_0_1));
+  octree_type expected{0.05};
+  expected.integrate(scene.keyframe(0).depth, scene.camera, scene.poses[0]);
+  expected.integrate(scene.keyframe(1).depth, scene.camera, scene.poses[0] * T_0_1);
+  CHECK(ot_bytes(map.map()) == ot_bytes(expected));
 }
 
 TEST_CASE("What moved most and is close to the robot comes first") {

@@ -118,7 +118,7 @@ TEST_CASE("A live map in a thread asks for the poses itself, tells what it does,
   std::atomic<std::size_t> voxels{0};
   listeners hear{
       .poll_poses =
-          [&](mapping::keyframe_beliefs& now, bool always) {
+          [&](mapping::keyframe_poses& now, bool always) {
             const std::lock_guard lock{mutex};
             if (news || always) now.poses = believed;
             return std::exchange(news, false) || always;
@@ -146,7 +146,7 @@ TEST_CASE("A live map in a thread asks for the poses itself, tells what it does,
     believed.push_back({i, scene.poses[i]});
     CHECK(add(map, scene, i));
   }
-  CHECK(map.add_frame(4, scene.keyframe(4).depth, scene.poses[4], 3));
+  CHECK(map.add_frame(4, scene.keyframe(4).depth, 3, scene.poses[3].inverse() * scene.poses[4]));
   map.wait();
   CHECK(map.latest()->frames == 1);
   {
@@ -184,7 +184,7 @@ TEST_CASE("Frames give way before keyframes where a live map falls behind, and e
                      },
                  .overflowed = [&](const auto& e) { left_out.push_back(e); }};
   live map{scene.camera, {.map = {.resolution = 0.05, .max_frames = 10}, .max_waiting = 3, .patience = 1ms}, hear};
-  const auto add_frame = [&](std::size_t i) { return map.add_frame(i, scene.keyframe(i).depth, scene.poses[i], 0); };
+  const auto add_frame = [&](std::size_t i) { return map.add_frame(i, scene.keyframe(i).depth, 0, se3{}); };
   REQUIRE(add(map, scene, 0));
   begun.get_future().wait();  // from now on the map's thread is busy
   for (const std::size_t i : {1U, 2U, 3U}) CHECK(add_frame(i));
@@ -243,7 +243,7 @@ TEST_CASE("A live map tells which frames between keyframes it does not take") {
   listeners hear{.refused = [&](const auto& e) { refused.push_back(e); }};
   live map{scene.camera, {.map = {.resolution = 0.05, .max_frames = 3}}, hear};
   CHECK(add(map, scene, 0));
-  for (const std::size_t i : {1U, 2U}) CHECK(map.add_frame(i, scene.keyframe(i).depth, scene.poses[i], i - 1));
+  for (const std::size_t i : {1U, 2U}) CHECK(map.add_frame(i, scene.keyframe(i).depth, i - 1, se3{}));
   map.wait();
   REQUIRE(refused.size() == 1);
   CHECK((refused[0].frame == 2 && refused[0].keyframe == 1));
@@ -264,7 +264,7 @@ TEST_CASE("A live map's thread prepares depth images before they go in") {
   }};
   live map{scene.camera, {.map = {.resolution = 0.05, .max_frames = 3}}, hear};
   CHECK(add(map, scene, 0));
-  CHECK(map.add_frame(1, scene.keyframe(1).depth, scene.poses[1], 0));
+  CHECK(map.add_frame(1, scene.keyframe(1).depth, 0, se3{}));
   CHECK(map.set_depth(0, scene.keyframe(2).depth));
   map.wait();
   using mapping::depth_use;
@@ -279,14 +279,50 @@ TEST_CASE("A live map's thread prepares depth images before they go in") {
   CHECK(ot_bytes(map.latest()->map) == ot_bytes(expected));
 }
 
+TEST_CASE("A keyframe that comes with the pose of before a correction is judged at its pose of now") {
+  const auto scene = test::wall_scene(3);
+  std::mutex mutex;
+  mapping::keyframe_poses now;
+  listeners hear{.poll_poses = [&](mapping::keyframe_poses& told, bool) {
+    const std::lock_guard lock{mutex};
+    told = now;
+    return true;
+  }};
+  // Nothing is asked for but what keyframes need.
+  live map{scene.camera,
+           {.map = {.resolution = 0.05, .tolerance = 0.0}, .poll_interval = 1h, .moving = mapping::moving_filter_options{}},
+           hear};
+  const auto tell = [&](std::uint64_t frame, const se3& T_world_camera) {
+    const std::lock_guard lock{mutex};
+    now.poses.push_back({frame, T_world_camera});
+  };
+  for (const std::size_t i : {0U, 1U}) {
+    tell(i, scene.poses[i]);
+    CHECK(add(map, scene, i));
+  }
+  map.wait();
+  const se3 correction{so3{}, vec3{0, 0, -0.6}};
+  {
+    const std::lock_guard lock{mutex};
+    for (auto& p : now.poses) p.T_world_camera = correction * p.T_world_camera;
+  }
+  map.wait();  // the map has followed
+  tell(2, correction * scene.poses[2]);
+  CHECK(add(map, scene, 2));  // tracked before the correction
+  map.finish();
+  const auto& inner = map.stop();
+  for (const std::uint64_t frame : {0U, 1U, 2U}) CHECK_FALSE(inner.is_filtered(frame));
+  CHECK(ot_bytes(inner.map()) == ot_bytes(fresh(scene, now.poses)));
+}
+
 TEST_CASE("Keyframes that will never come back lose their depth images, hidden ones keep them") {
   const auto scene = test::wall_scene(5);
   std::promise<void> begun, go;
   std::shared_future<void> wait_for_go = go.get_future().share();
   std::mutex mutex;
-  mapping::keyframe_beliefs believed;
+  mapping::keyframe_poses believed;
   listeners hear{.poll_poses =
-                     [&](mapping::keyframe_beliefs& now, bool) {
+                     [&](mapping::keyframe_poses& now, bool) {
                        const std::lock_guard lock{mutex};
                        now = believed;
                        return true;

@@ -145,13 +145,14 @@ struct still_camera {
   live map{camera, {.resolution = 0.05}};
   filter moving{camera, {.keyframes = 6}};
   std::uint64_t next = 0;
+  bool corrects = true;  // after each keyframe
 
-  void see(bool board) {
+  void see(bool board, const se3& T_world_camera = {}) {
     image<std::uint16_t> depth(64, 48, static_cast<std::uint16_t>(2.0 * scale));
     for (int y = 12; board && y != 36; ++y)
       for (int x = 20; x != 44; ++x) depth(x, y) = static_cast<std::uint16_t>(scale);
-    REQUIRE(moving.add_keyframe(seq, map, next++, depth_view{depth.view(), scale}, se3{}));
-    REQUIRE(map.correct(seq));
+    REQUIRE(moving.add_keyframe(seq, map, next++, depth_view{depth.view(), scale}, T_world_camera));
+    if (corrects) REQUIRE(map.correct(seq));
   }
   /// How many pixels of the board's place a keyframe's image in the map has.
   [[nodiscard]] int pixels(std::uint64_t frame) const {
@@ -201,6 +202,25 @@ TEST_CASE("what comes and stays is shown once it has been seen more often than i
   }
   c.see(true);
   CHECK(c.map.map().state(vec3{0.01, 0.01, 1.01}) == octree::occupancy::occupied);
+}
+
+TEST_CASE("keyframes are compared at corrected poses, though the map has not followed yet") {
+  still_camera c;
+  c.see(true);
+  c.see(true);
+  // All of it was half a metre behind where it was thought to be.
+  const se3 corrected{so3{}, vec3{0, 0, -0.5}};
+  c.corrects = false;
+  CHECK(c.map.set_poses(std::vector<mapping::keyframe_position>{{0, corrected}, {1, corrected}}) == 2);
+  CHECK(c.map.used_pose(0)->translation().z() == 0.0);
+  CHECK(c.map.wanted_pose(0)->translation().z() == -0.5);
+  CHECK_FALSE(c.map.wanted_pose(7));
+  c.see(true, corrected);
+  for (const std::uint64_t frame : {0U, 1U, 2U}) {
+    CAPTURE(frame);
+    CHECK(*c.moving.removed_share(frame) == 0.0);
+    CHECK(c.pixels(frame) == board_pixels);
+  }
 }
 
 TEST_CASE("a keyframe that is forgotten is judged no more") {

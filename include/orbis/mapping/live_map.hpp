@@ -154,21 +154,22 @@ class live_map {
       return fail(std::move(added.error()));
     return {};
   }
-  /// Adds a frame between keyframes, whose pose was measured relative to `keyframe`. It makes the map denser in time,
-  /// and is not kept for corrections: it leaves the map when there are more than `max_frames`, when its keyframe moves,
-  /// is hidden or removed, and with `finish`. Any depth source. False if frames are not wanted, the keyframe is not in
-  /// the map, the pose is not finite, or the frame is a keyframe. O(marking). @pre depth has the camera's size
+  /// Adds a frame between keyframes, whose pose was measured relative to `keyframe`: it is marked from there, wherever
+  /// the keyframe is in the map. It makes the map denser in time, and is not kept for corrections: it leaves the map
+  /// when there are more than `max_frames`, when its keyframe moves, is hidden or removed, and with `finish`. Any depth
+  /// source. False if frames are not wanted, the keyframe is not in the map, the pose is not finite, or the frame is a
+  /// keyframe. O(marking). @pre depth has the camera's size
   template <execution_policy Policy, camera::depth_source Depth>
-  bool add_frame(const Policy& policy, std::uint64_t frame, const Depth& depth, const se3& T_world_camera,
-                 std::uint64_t keyframe) {
+  bool add_frame(const Policy& policy, std::uint64_t frame, const Depth& depth, std::uint64_t keyframe,
+                 const se3& T_keyframe_camera) {
     assert(depth.width() == camera_.width() && depth.height() == camera_.height());
     const entry* const k = find(keyframe);
-    if (options_.max_frames == 0 || k == nullptr || !k->used || find(frame) != nullptr || !if_finite(T_world_camera))
+    if (options_.max_frames == 0 || k == nullptr || !k->used || find(frame) != nullptr || !if_finite(T_keyframe_camera))
       return false;
     std::erase_if(frames_, [&](const transient& t) { return t.frame == frame; });
     // Several are dropped at a time: the bricks that they share are replayed once.
     if (frames_.size() >= options_.max_frames) drop_oldest_frames(1 + options_.max_frames / 4);
-    history_.set(policy, frame, depth, camera_, T_world_camera, options_.integration);
+    history_.set(policy, frame, depth, camera_, *k->used * T_keyframe_camera, options_.integration);
     frames_.push_back({frame, keyframe});
     return true;
   }
@@ -281,6 +282,12 @@ class live_map {
   [[nodiscard]] std::optional<se3> used_pose(std::uint64_t frame) const {
     const entry* const k = find(frame);
     return k == nullptr ? std::nullopt : k->used;
+  }
+  /// The pose that a keyframe was given last, at which `correct` will have put it; empty if it is hidden, or is none.
+  /// O(log keyframes).
+  [[nodiscard]] std::optional<se3> wanted_pose(std::uint64_t frame) const {
+    const entry* const k = find(frame);
+    return k == nullptr ? std::nullopt : k->wanted;
   }
   /// Whether a keyframe's depth image is without pixels that a filter has judged: it was given by `set_depth`, or said
   /// to be so by `add_keyframe`. O(log keyframes).

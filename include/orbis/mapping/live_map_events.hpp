@@ -57,8 +57,8 @@ struct live_correction_event {
   double milliseconds = 0.0;  ///< wall time that it took, without insertions between its parts
 };
 
-/// What the SLAM system believes of the keyframes.
-struct keyframe_beliefs {
+/// Where the SLAM system says that the keyframes are.
+struct keyframe_poses {
   std::vector<keyframe_position> poses{};  ///< the present ones; other keyframes are hidden
   std::vector<std::uint64_t> removed{};    ///< frames of keyframes that will never have a pose again
 };
@@ -69,10 +69,10 @@ struct keyframe_beliefs {
 template <class Octree>
 struct live_map_listeners {
   std::function<void()> started{};  ///< first of all, on the map's thread: to name it, or to lower its priority
-  /// Fills in the present beliefs and returns true, or returns false if the poses are what they were at the last call;
+  /// Fills in the present poses and returns true, or returns false if the poses are what they were at the last call;
   /// with `always`, fills them in whatever they are. What is hidden keeps its depth image, which costs memory, for it
   /// may come back with its map of the atlas; what was culled and shall not stay in the map is to be told as removed.
-  std::function<bool(keyframe_beliefs& now, bool always)> poll_poses{};
+  std::function<bool(keyframe_poses& now, bool always)> poll_poses{};
   /// May change a depth image before it goes in: a filter sets the pixels to 0 that it removes. On the map's thread,
   /// so that nobody else waits for it.
   std::function<void(std::uint64_t frame, depth_use use, image_view<std::uint16_t> pixels)> prepare{};

@@ -105,13 +105,12 @@ class live_map_thread {
   /// False if it was left out: too many keyframes wait, or the thread ended. O(pixels), and at most `patience` of
   /// waiting. @pre depth has the camera's size
   bool add_keyframe(std::uint64_t frame, const depth_view& depth, const se3& T_world_camera) {
-    return add_scan({.kind = job::keyframe, .frame = frame, .T_world_camera = T_world_camera}, depth);
+    return add_scan({.kind = job::keyframe, .frame = frame, .T = T_world_camera}, depth);
   }
   /// Adds a frame between keyframes, see live_map::add_frame, as above. Never waits. False if it was left out; whether
   /// the map takes it is told by `refused`. O(pixels). @pre depth has the camera's size
-  bool add_frame(std::uint64_t frame, const depth_view& depth, const se3& T_world_camera, std::uint64_t keyframe) {
-    return add_scan({.kind = job::between, .frame = frame, .keyframe_of = keyframe, .T_world_camera = T_world_camera},
-                    depth);
+  bool add_frame(std::uint64_t frame, const depth_view& depth, std::uint64_t keyframe, const se3& T_keyframe_camera) {
+    return add_scan({.kind = job::between, .frame = frame, .keyframe_of = keyframe, .T = T_keyframe_camera}, depth);
   }
   /// Gives a keyframe another depth image, see live_map::set_depth, as above. False if it was left out, as add_keyframe
   /// does.
@@ -160,12 +159,12 @@ class live_map_thread {
   /// Waits until everything that was asked for is done and nothing waits for a correction, or the thread ended. Not to
   /// be called by callbacks.
   void wait() {
-    if (listeners_.poll_poses) push({.kind = job::question});  // poses may have moved since the last poll
+    if (listeners_.poll_poses) push({.kind = job::poll});  // poses may have moved since the last poll
     wait_until_idle();
   }
   /// Makes the map the one of all present keyframes and poses, see live_map::finish, and waits for it, as above.
   void finish() {
-    push({.kind = job::completion});
+    push({.kind = job::finish});
     wait_until_idle();
   }
   /// Ends the thread, and gives the map to the caller; what waits is dropped. After a failure the map may be destroyed,
@@ -219,6 +218,7 @@ class live_map_thread {
         dropped = jobs_.pop_frame();
         if (!dropped && j.kind != job::between)
           changed_.wait_for(lock, options_.patience, [&] { return ends_ || !is_full(); });
+        if (!dropped && is_full()) dropped = jobs_.pop_frame();  // one that came while this one waited
       }
       if (ends_) return false;
       added = !is_full();
@@ -332,14 +332,15 @@ class live_map_thread {
     bool inserted = false;
     switch (j.kind) {
       case job::keyframe: {
-        const auto added = moving_ ? moving_->add_keyframe(policy_, map_, j.frame, depth, j.T_world_camera)
-                                   : map_.add_keyframe(policy_, j.frame, depth, j.T_world_camera);
+        const bool judged = moving_ && has_pose_of_now(j);
+        const auto added = judged ? moving_->add_keyframe(policy_, map_, j.frame, depth, j.T)
+                                  : map_.add_keyframe(policy_, j.frame, depth, j.T);
         if (!added) report(added.error());
         inserted = poll_always_ = true;
         break;
       }
       case job::between:
-        inserted = map_.add_frame(policy_, j.frame, depth, j.T_world_camera, j.keyframe_of);
+        inserted = map_.add_frame(policy_, j.frame, depth, j.keyframe_of, j.T);
         if (!inserted) tell_refusal(j);
         break;
       case job::verdict:
@@ -351,8 +352,8 @@ class live_map_thread {
         map_.remove(j.frame);
         break;
       case job::positions: map_.set_poses(j.poses, j.others); break;
-      case job::question: poll(); break;
-      case job::completion:
+      case job::poll: poll(); break;
+      case job::finish:
         if (listeners_.poll_poses) poll();
         for (;;) {  // an error removes a keyframe
           const auto finished = map_.finish(policy_);
@@ -369,6 +370,18 @@ class live_map_thread {
         break;
     }
     if (inserted) tell_insertion(j, waiting, milliseconds_since(start));
+  }
+  /// Keyframes judge each other by their poses, which have to be of one moment: asks for those of now, and gives a new
+  /// keyframe its own. False if it has none.
+  [[nodiscard]] bool has_pose_of_now(job& j) {
+    if (!listeners_.poll_poses) return true;
+    poll_always_ = true;
+    poll();
+    const auto at = std::find_if(polled_.poses.begin(), polled_.poses.end(),
+                                 [&](const keyframe_position& p) { return p.frame == j.frame; });
+    if (at == polled_.poses.end()) return false;
+    j.T = at->T_world_camera;
+    return true;
   }
   void poll() {
     polled_.poses.clear();
@@ -388,8 +401,9 @@ class live_map_thread {
     const auto start = clock::now();
     const auto progress = map_.correct(policy_, {.time = options_.correction_slice, .robot = robot});
     correction_.milliseconds += milliseconds_since(start);
-    if (!progress) {
+    if (!progress) {  // the keyframe whose image is lost is gone
       report(progress.error());
+      if (map_.pending() == 0) tell_correction();
       return;
     }
     correction_.keyframes += progress->keyframes;
@@ -462,7 +476,7 @@ class live_map_thread {
 
   map_type map_;  ///< belongs to the thread, as do those below
   std::optional<moving_filter<Camera>> moving_;
-  keyframe_beliefs polled_;
+  keyframe_poses polled_;
   bool poll_always_ = true;
   live_correction_event correction_;
   std::thread thread_;

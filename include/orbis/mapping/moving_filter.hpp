@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// What has moved away leaves no trail in a live map: pixels of the last keyframes that other keyframes' rays pass
-/// through are taken out of them while the camera moves.
+/// Removes moving objects from a live map: the pixels of the last keyframes that the rays of other keyframes pass
+/// through are taken out of their depth images while the camera moves.
 ///
-/// A log-odds map forgets by itself only what is looked through more often than it was hit: somebody who walks through
-/// a room leaves voxels that were hit once or twice, and of which little is seen afterwards. The depth images of a few
-/// keyframes tell more: a measurement says that nothing is before its end. See `cloud/ray_evidence.hpp` for the same
-/// evidence about a whole cloud, and its sources; and G. Kim, A. Kim, "Remove, then Revert: Static Point Cloud Map
-/// Construction Using Multiresolution Range Images", IROS 2020, for coarse depth images that decide and take back.
+/// The log-odds of a voxel become those of free space only if more rays pass through it than end in it. Somebody who
+/// walks through a room leaves voxels in which one or two scans end and which few later scans see. The depth images of
+/// a few keyframes tell more, because each measurement says that the space before its end is empty.
+/// `cloud/ray_evidence.hpp` does the same for a whole cloud, and names its sources. Coarse depth images that decide and
+/// can be overruled later are described by G. Kim, A. Kim, "Remove, then Revert: Static Point Cloud Map Construction
+/// Using Multiresolution Range Images", IROS 2020.
 #pragma once
 
 #include <algorithm>
@@ -37,20 +38,26 @@ namespace orbis::mapping {
 
 struct moving_filter_options {
   std::size_t keyframes = 8;      ///< so many of the last ones judge each other; the older ones stay as they are
-  float margin = 0.03F;           ///< what noise and small errors of poses are good for, metres:
-  float margin_growth = 0.0075F;  ///< margin + margin_growth z^2 at depth z; 1 / metres
-  float slant = 1.0F;             ///< so many times a window's range of depths is added for rays that pass through
-  int min_through = 1;            ///< so many keyframes' rays pass through what is taken out,
-  double ratio = 1.0;             ///< and more than so many times those that show it
-  int grow = 4;                   ///< so many cells around it go with it, of the same surface, if no more show them
+  /// Two depths z are the same if they differ by less than margin + margin_growth z^2, which covers noise and small
+  /// errors of poses. Metres; 1 / metres.
+  float margin = 0.03F;
+  float margin_growth = 0.0075F;
+  /// A ray passes through a point only if what it ends at is farther away by the margin and by this many times the
+  /// range of depths around that end: rays that graze a surface prove nothing.
+  float slant = 1.0F;
+  int min_through = 1;  ///< a cell is taken out if the rays of at least so many keyframes pass through it, > 0,
+  double ratio = 1.0;   ///< and of more than this many times as many as show it
+  int grow = 4;  ///< cells up to this far from one that is taken out go too, if of the same surface and shown by no more
   /// A keyframe that is in the map already is marked again only where so much of its image has got another verdict, or
   /// when it leaves the last keyframes.
   double least_change = 0.002;
 };
 
-/// Judges the last keyframes of a live map by each other, and lets the map know: a later keyframe that looks through
-/// what an earlier one shows takes it out, and one that shows it again brings it back. A verdict is a depth image with
-/// fewer pixels (`live_map::set_depth`), so that the map stays the one of these images and the keyframes' poses.
+/// Judges the last keyframes of a live map by each other, and gives the map the result: a later keyframe whose rays pass
+/// through what an earlier one shows takes it out, and one that shows it again brings it back. The result is a depth
+/// image with fewer pixels (`live_map::set_depth`), so that the map stays the one of these images and the keyframes'
+/// poses. Keyframes are compared at the poses that the map was told last (`live_map::wanted_pose`), for those are of
+/// one moment; in the map, a keyframe that waits for a correction is still at an earlier one.
 ///
 /// Keeps the last keyframes' depth images: 3.5 bytes a pixel for each. Memory is kept from keyframe to keyframe.
 template <camera::camera_model Camera>
@@ -89,7 +96,7 @@ class moving_filter {
     now.removed.assign(now.cells.size(), 0);
     for (view& v : views_) {
       if (&v == &now) continue;
-      const std::optional<se3> pose = map.used_pose(v.frame);
+      const std::optional<se3> pose = map.wanted_pose(v.frame);
       if (!pose) continue;
       ask(policy, v, now, T_world_camera.inverse() * *pose);
       ask(policy, now, v, pose->inverse() * T_world_camera);
@@ -239,7 +246,7 @@ class moving_filter {
       if (v.removed[i] == 0) continue;
       const float z = v.cells.depth(i), reach = 2.0F * margin(z);
       const double low = static_cast<double>(z - reach) * v.scale, high = static_cast<double>(z + reach) * v.scale;
-      const double own_high = high + 0.15 * v.scale;
+      const double own_high = high + rounded_product(0.15, v.scale);
       const int x0 = (static_cast<int>(i) % across - 1) * edge, y0 = (static_cast<int>(i) / across - 1) * edge;
       for (int y = std::max(0, y0); y < std::min(masked_.height(), y0 + 3 * edge); ++y)
         for (int x = std::max(0, x0); x < std::min(masked_.width(), x0 + 3 * edge); ++x) {

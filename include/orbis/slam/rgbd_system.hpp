@@ -292,10 +292,7 @@ void ORBIS_SLAM_SYSTEM::report(track_result& result, const std::optional<map_key
   result.state = front_end_.state();
   result.map = shared_.atlas.active_id();
   if (made) result.keyframe = shared_.atlas.current(*made).keyframe;
-  if (front_end_.is_tracking()) {
-    result.T_world_camera = front_end_.last_pose(shared_.atlas);
-    result.reference = shared_.atlas.current(front_end_.last_reference()).keyframe;
-  }
+  if (front_end_.is_tracking()) result.T_world_camera = front_end_.last_pose(shared_.atlas);
   const state_event changed{std::exchange(reported_state_, result.state), result.state,
                             front_end_.counters().frames - 1};
   lock.unlock();

@@ -46,8 +46,6 @@ struct track_result {
   map_id map = 0;                       ///< the active map
   std::size_t inliers = 0;              ///< landmarks that agree with the pose
   std::optional<keyframe_id> keyframe;  ///< the keyframe that the frame became, if it did
-  /// The keyframe of `map` whose corrections move the pose; it may have been culled since. Empty where not tracked.
-  std::optional<keyframe_id> reference;
   track_timings timings;
   [[nodiscard]] bool tracked() const noexcept { return T_world_camera.has_value(); }
 };

@@ -28,7 +28,7 @@ struct model {
 
   void apply(const map_job& j) {
     switch (j.kind) {
-      case map_job::keyframe: keyframes[j.frame] = j.T_world_camera.translation().x(); break;
+      case map_job::keyframe: keyframes[j.frame] = j.T.translation().x(); break;
       case map_job::removal: keyframes.erase(j.frame); break;
       case map_job::positions: {
         std::set<std::uint64_t> listed;
@@ -59,10 +59,10 @@ TEST_CASE("Merged jobs leave the keyframes where the jobs one by one leave them"
       map_job j{.frame = random.below(6)};
       const std::uint32_t kind = random.below(12);
       j.kind = kind == 0   ? map_job::keyframe
-               : kind == 1 ? map_job::question
+               : kind == 1 ? map_job::poll
                : kind < 5  ? map_job::removal
                            : map_job::positions;
-      j.T_world_camera = at(i);
+      j.T = at(i);
       if (j.kind == map_job::positions) {
         for (std::uint32_t n = random.below(5); n != 0; --n)
           j.poses.push_back({random.below(6), at(i + 0.01 * static_cast<double>(n))});

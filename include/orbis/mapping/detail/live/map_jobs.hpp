@@ -20,11 +20,11 @@
 namespace orbis::mapping::detail {
 
 struct map_job {
-  enum kind_type : std::uint8_t { keyframe, between, verdict, removal, positions, completion, question };
+  enum kind_type : std::uint8_t { keyframe, between, verdict, removal, positions, finish, poll };
   kind_type kind = keyframe;
   std::uint64_t frame = 0;
   std::uint64_t keyframe_of = 0;
-  se3 T_world_camera{};
+  se3 T{};  ///< T_world_camera of a keyframe, T_keyframe_camera of a frame between
   image<std::uint16_t> pixels{};
   double scale = 1.0;
   float min_depth = 0.0F, max_depth = 0.0F;
@@ -58,8 +58,9 @@ class map_jobs {
           break;
         }
       }
-    images_ += j.has_image() ? 1U : 0U;
+    const bool has_image = j.has_image();
     jobs_.push_back(std::move(j));
+    images_ += has_image ? 1U : 0U;  // after what may throw
   }
   /// @pre !empty()
   [[nodiscard]] map_job pop() {
