@@ -117,8 +117,9 @@ orbis::mapping::dense_options dense_options(const settings& s) {
 result<built_map> map_frames(const posed_frames& frames, const frame_source& source, live_octree* live,
                              const settings& s, console& console) {
   console.stage("mapping");
-  const orbis::mapping::map_options options{
+  orbis::mapping::map_options options{
       .dense = dense_options(s), .filter = filter_options(s), .resolution = s.resolution};
+  if (options.filter.kind == orbis::mapping::filter_kind::automatic) options.moving.emplace();
   const auto policy = orbis::par.with(s.threads);
   const auto shown = console.progress();
   const auto progress = [&](std::size_t done, std::size_t total) {

@@ -108,6 +108,8 @@ TEST_CASE("bad keyframes are skipped or refused") {
         orbis::mapping::map_options{.filter = {.cluster = {.neighbors = 0}}},
         orbis::mapping::map_options{.filter = {.cluster = {.min_gap = -1}}},
         orbis::mapping::map_options{.filter = {.ray_evidence = {.window = -1}}},
+        orbis::mapping::map_options{.moving = orbis::mapping::moving_filter_options{.keyframes = 0}},
+        orbis::mapping::map_options{.moving = orbis::mapping::moving_filter_options{.slant = -1}},
         orbis::mapping::map_options{.dense = {.voxel_size = inf}},
         orbis::mapping::map_options{.filter = {.radius = {.radius = -0.1}}}})
     CHECK(build_map(orbis::seq, scene.keyframes(), scene.camera, bad).error().code == errc::invalid_argument);

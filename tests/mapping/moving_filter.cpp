@@ -11,6 +11,7 @@
 
 #include <orbis/core/execution.hpp>
 #include <orbis/io/synthetic.hpp>
+#include <orbis/mapping/batch.hpp>
 #include <orbis/mapping/live_map.hpp>
 #include <orbis/mapping/moving_filter.hpp>
 #include <orbis/octree/files.hpp>
@@ -135,6 +136,34 @@ TEST_CASE("of the trail of somebody who walks through the room nine voxels of te
   CHECK(octree::ot_bytes(map.map()) == octree::ot_bytes(fresh));
   CHECK(octree::ot_bytes(live_map_of(par.with(3), walked, mapping::moving_filter_options{}).map()) ==
         octree::ot_bytes(fresh));
+}
+
+TEST_CASE("a map that is made of all keyframes keeps no more than one ghost voxel in fifty") {
+  const round_trip quiet{false}, walked{true};
+  const auto map_of = [&](const round_trip& trip, bool without_moving) {
+    std::vector<mapping::keyframe<>> keyframes;
+    for (const shot& s : trip.shots) keyframes.push_back({depth_view{s.depth.view(), scale}, {}, s.T_world_camera});
+    mapping::map_options options{.dense = {.max_depth = 4.0F, .voxel_size = 0.01},
+                                 .resolution = 0.05,
+                                 .integration = {.max_range = 4.0},
+                                 .unfiltered_octree = false};
+    options.dense.flying_pixels.emplace();
+    if (without_moving) options.moving.emplace();
+    return mapping::build_map(par.with(2), keyframes, trip.camera(), options).value();
+  };
+  const auto room = map_of(quiet, true), trail = map_of(walked, false), map = map_of(walked, true);
+  const quality before = judge(room.octree, quiet.recording), with_trail = judge(trail.octree, quiet.recording),
+                after = judge(map.octree, quiet.recording);
+  CAPTURE(before.ghosts, with_trail.ghosts, after.ghosts, before.occupied, after.occupied, before.error, after.error);
+  CHECK(with_trail.ghosts > before.ghosts + 200);
+  CHECK(after.ghosts <= before.ghosts + (with_trail.ghosts - before.ghosts) / 50);
+  CHECK(std::abs(after.error - before.error) < 0.001);
+  CHECK(static_cast<double>(after.occupied) > 0.99 * static_cast<double>(before.occupied));
+  CHECK(map.moving.keyframes >= 4);
+  CHECK(map.moving.pixels > 50000);
+  CHECK(room.moving.pixels < 2000);
+  CHECK(map.filter.reason.find("moved away") != std::string::npos);
+  CHECK(trail.moving.pixels == 0);
 }
 
 namespace {

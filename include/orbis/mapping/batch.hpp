@@ -25,16 +25,21 @@
 #include <orbis/core/result.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/mapping/dense_cloud.hpp>
+#include <orbis/mapping/detail/moving/find_moving.hpp>
 #include <orbis/mapping/filter.hpp>
 #include <orbis/mapping/keyframe.hpp>
 #include <orbis/mapping/live_map.hpp>
 #include <orbis/mapping/masked_depth.hpp>
+#include <orbis/mapping/moving_options.hpp>
 #include <orbis/octree/occupancy_octree.hpp>
 
 namespace orbis::mapping {
 
 struct map_options {
   dense_options dense{};
+  /// Takes what has moved away out of the depth images before they are used: cells that the rays of the keyframes just
+  /// before and after pass through, see moving_filter. Empty: the filter judges it as it judges anything else.
+  std::optional<moving_filter_options> moving{};
   filter_options filter{};
   double resolution = 0.05;                   ///< of the octrees, metres; > 0
   octree::integration_options integration{};  ///< of every keyframe's depth image into the octrees
@@ -50,11 +55,18 @@ concept depth_map = std::constructible_from<M, double> && std::movable<M> &&
   map.integrate(seq, depth, camera, T_world_camera, options);
 };
 
+/// What was taken out of the depth images, for it had moved away.
+struct moving_count {
+  std::size_t keyframes = 0;  ///< that have lost any pixel
+  std::size_t pixels = 0;
+};
+
 /// The map, and how it came to be.
 template <class Octree>
 struct built_map {
   point_cloud cloud{};                        ///< all keyframes' points, in the world
   cloud::flying_pixel_count flying_pixels{};  ///< left out before they became points, if that was asked for
+  moving_count moving{};                      ///< left out before that, if it was asked for
   std::vector<std::uint32_t> inliers{};       ///< indices into `cloud` of the points that the filter kept, ascending
   filter_report filter{};
   std::optional<Octree> unfiltered_octree{};
@@ -69,7 +81,39 @@ struct built_map {
 
 namespace detail {
 
-/// The steps of `build_map`. `into.wants(filtered, keyframe)` says whether it lacks this keyframe's depth image;
+[[nodiscard]] inline std::string reason_of(const moving_count& moving) {
+  return std::to_string(moving.pixels) + " pixels of " + std::to_string(moving.keyframes) +
+         (moving.keyframes == 1 ? " keyframe show" : " keyframes show") +
+         " what has moved away, and became no points: the rays of other keyframes pass through it";
+}
+
+/// A keyframe's depth image without what has moved away.
+template <camera::depth_source Depth>
+class standing_depth {
+ public:
+  /// Calls `use` with the image. Returns how many pixels were taken out.
+  template <class Use>
+  std::size_t with(const Depth& depth, const std::vector<removed_cell>* cells, const moving_filter_options& options,
+                   const Use& use) {
+    if (cells == nullptr || cells->empty()) {
+      use(depth);
+      return 0;
+    }
+    if (copy_.width() != depth.width() || copy_.height() != depth.height())
+      copy_ = image<mapping::depth_pixel<Depth>>(depth.width(), depth.height());
+    for (int y = 0; y != depth.height(); ++y)
+      for (int x = 0; x != depth.width(); ++x) copy_(x, y) = stored_depth(depth, x, y);
+    const std::size_t removed = remove_cells(depth, *cells, options, copy_.view());
+    use(view_like(depth, std::as_const(copy_).view()));
+    return removed;
+  }
+
+ private:
+  image<mapping::depth_pixel<Depth>> copy_;
+};
+
+/// The steps of `build_map`. `into.wants(filtered, keyframe, whole)` says whether it lacks this keyframe's depth image,
+/// of which, unless it is `whole`, something has moved away;
 /// `into.scan(filtered, keyframe, depth)` takes one depth image, before and after the filter;
 /// `into.complete(filtered)` gives the map of all of them.
 template <class Octree, execution_policy Policy, keyframe_range Keyframes, camera::camera_model Camera, class Into>
@@ -95,27 +139,53 @@ template <class Octree, execution_policy Policy, keyframe_range Keyframes, camer
   if (const auto& rays = filter.ray_evidence;
       !(rays.window >= 0 && rays.margin >= 0 && rays.margin_growth >= 0 && rays.slant >= 0))
     return fail(errc::invalid_argument, "ray_evidence", "window, margins and slant must not be negative");
+  const moving_filter_options moving = options.moving.value_or(moving_filter_options{});
+  if (moving.keyframes == 0 || moving.min_through <= 0)
+    return fail(errc::invalid_argument, "moving", "keyframes and min_through must be positive");
+  if (!(moving.margin >= 0 && moving.margin_growth >= 0 && moving.slant >= 0 && moving.ratio >= 0))
+    return fail(errc::invalid_argument, "moving", "margins, slant and ratio must not be negative");
   const auto fits = [&](const auto& image) {
     return image.width() == camera.width() && image.height() == camera.height();
   };
   const auto finite_pose = [](const auto& k) { return se3(k.T_world_camera).to_matrix().allFinite(); };
   const std::size_t looks = view_passes(options.filter);
-  const std::size_t passes = (options.unfiltered_octree ? 3U : 2U) + looks;
+  const std::size_t passes = (options.unfiltered_octree ? 3U : 2U) + (options.moving ? 1U : 0U) + looks;
   const std::size_t total = passes * std::ranges::size(keyframes);
   std::size_t done = 0;
 
   built_map<Octree> map{.octree = Octree{options.resolution}};
+  bool cancelled = false;
+  std::vector<std::vector<removed_cell>> moved;
+  if (options.moving) {
+    for (const auto& k : keyframes)
+      if (!fits(k.depth)) return fail(errc::invalid_argument, "keyframes", "an image is not of the camera's size");
+    moved = find_moving(policy, keyframes, camera, moving, [&] {
+      cancelled = !on_progress(++done, total);
+      return !cancelled;
+    });
+    if (cancelled) return fail(errc::cancelled, {}, "cancelled");
+  }
+  standing_depth<std::remove_cvref_t<decltype(std::ranges::begin(keyframes)->depth)>> standing;
+  const auto moved_of = [&](std::size_t index) { return moved.empty() ? nullptr : &moved[index]; };
+
   dense_cloud dense{camera::ray_table{camera}, options.dense};
+  std::size_t index = 0;
   for (const auto& k : keyframes) {
     const image_view<const rgb8> color = k.color;
     if (!fits(k.depth) || (!color.empty() && !fits(color))) {
       return fail(errc::invalid_argument, "keyframes", "an image is not of the camera's size");
     }
     if (finite_pose(k)) {
-      dense.add_keyframe(policy, k);
+      const se3 T_world_camera{k.T_world_camera};
+      const std::size_t removed = standing.with(k.depth, moved_of(index), moving, [&](const auto& depth) {
+        dense.add_keyframe(policy, keyframe<std::remove_cvref_t<decltype(depth)>>{depth, color, T_world_camera});
+      });
+      map.moving.keyframes += removed != 0 ? 1 : 0;
+      map.moving.pixels += removed;
     } else {
       ++map.skipped;
     }
+    ++index;
     if (!on_progress(++done, total)) return fail(errc::cancelled, {}, "cancelled");
   }
 
@@ -123,7 +193,6 @@ template <class Octree, execution_policy Policy, keyframe_range Keyframes, camer
   std::vector<float> ranges = dense.ranges(policy);
   dense.finish();
   map.flying_pixels = dense.flying_pixels();
-  bool cancelled = false;
   const auto while_filtering = [&](std::size_t views_done, std::size_t) {
     cancelled = cancelled || !on_progress(done + views_done, total);
     return !cancelled;
@@ -134,22 +203,29 @@ template <class Octree, execution_policy Policy, keyframe_range Keyframes, camer
   std::vector<float>{}.swap(ranges);
   done += looks * std::ranges::size(keyframes);
   map.filter = std::move(filtered.report);
+  if (map.moving.pixels != 0) map.filter.reason = reason_of(map.moving) + "; " + map.filter.reason;
   map.inliers = std::move(filtered.inliers);
   std::vector<char> kept(map.cloud.size(), 0);
   for (const std::uint32_t i : map.inliers) kept[i] = 1;
 
   const auto scan_all = [&](bool filtered, const dense_cloud::selection& kept_points,
                             std::vector<double>& milliseconds) -> result<void> {
-    std::size_t number = 0;
+    std::size_t number = 0, at = 0;
     for (const auto& k : keyframes) {
+      const std::vector<removed_cell>* const cells = moved_of(at++);
       if (finite_pose(k)) {
-        const result<bool> wanted = into.wants(filtered, k);
+        const result<bool> wanted = into.wants(filtered, k, cells == nullptr || cells->empty());
         if (!wanted) return fail(wanted.error());
         std::chrono::steady_clock::duration time{};
         if (*wanted) {
-          const auto depth = dense.masked_depth(policy, k, number, kept_points);
+          image<mapping::depth_pixel<std::remove_cvref_t<decltype(k.depth)>>> depth;
+          standing.with(k.depth, cells, moving, [&](const auto& whole) {
+            depth = dense.masked_depth(policy, keyframe<std::remove_cvref_t<decltype(whole)>>{whole, {}, {}}, number,
+                                       kept_points);
+          });
           const auto start = std::chrono::steady_clock::now();
-          if (auto scanned = into.scan(filtered, k, view_like(k.depth, depth.view())); !scanned) return scanned;
+          if (auto scanned = into.scan(filtered, k, view_like(k.depth, std::as_const(depth).view())); !scanned)
+            return scanned;
           time = std::chrono::steady_clock::now() - start;
         }
         ++number;
@@ -182,7 +258,7 @@ struct fresh_octrees {
   std::optional<Octree> octree{};  // options are checked before the first scan
 
   template <class Keyframe>
-  result<bool> wants(bool, const Keyframe&) const {
+  result<bool> wants(bool, const Keyframe&, bool) const {
     return true;
   }
   template <class Keyframe, class Depth>
@@ -205,12 +281,12 @@ struct live_octree {
   std::vector<keyframe_position> poses{};
 
   template <class Keyframe>
-  result<bool> wants(bool filtered, const Keyframe& k) {
+  result<bool> wants(bool filtered, const Keyframe& k, bool whole) {
     if (filtered) return true;
     if (!poses.empty() && !(poses.back().frame < k.frame))
       return fail(errc::invalid_argument, "keyframes", "their frame numbers do not ascend");
     poses.push_back({k.frame, se3(k.T_world_camera)});
-    return !live.contains(k.frame) || live.is_filtered(k.frame);
+    return !whole || !live.contains(k.frame) || live.is_filtered(k.frame);
   }
   template <class Keyframe, class Depth>
   result<void> scan(bool filtered, const Keyframe& k, const Depth& depth) {
@@ -235,7 +311,7 @@ struct live_octree {
 
 }  // namespace detail
 
-/// Adds the keyframes to a cloud, filters it, and integrates each keyframe's depth image without the pixels whose point
+/// Takes what has moved away out of the depth images, if that is asked for, adds the keyframes to a cloud, filters it, and integrates each keyframe's depth image without the pixels whose point
 /// of the cloud the filter removed (`dense_cloud::masked_depth`), with rays from where that keyframe was. Filtering the
 /// whole cloud lets one keyframe's points judge another's; the automatic filter asks the keyframes'
 /// depth images as well which points their rays pass through. The octrees are those that a `live_map` makes of the same

@@ -1,0 +1,223 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Which cells of the last keyframes' depth images show what has moved away, by the rays of the others.
+#pragma once
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include <orbis/camera/depth.hpp>
+#include <orbis/camera/model.hpp>
+#include <orbis/core/execution.hpp>
+#include <orbis/core/image.hpp>
+#include <orbis/core/rounded.hpp>
+#include <orbis/core/se3.hpp>
+#include <orbis/mapping/detail/moving/depth_cells.hpp>
+#include <orbis/mapping/masked_depth.hpp>
+#include <orbis/mapping/moving_options.hpp>
+
+namespace orbis::mapping::detail {
+
+/// A cell that is taken out of a depth image.
+struct removed_cell {
+  std::uint32_t cell = 0;
+  float depth = 0.0F;  ///< of its nearest pixel, metres
+};
+
+/// Sets the pixels of these cells to 0 in `pixels`, a copy of what `depth` stores, and those of the cells beside them
+/// that belong to the same surface. Returns how many. O(cells)
+template <camera::depth_source Depth>
+std::size_t remove_cells(const Depth& depth, const std::vector<removed_cell>& cells,
+                         const moving_filter_options& options, image_view<mapping::depth_pixel<Depth>> pixels) {
+  constexpr int edge = cell_grid::edge;
+  const int across = (depth.width() + edge - 1) / edge;
+  std::size_t removed = 0;
+  for (const removed_cell& c : cells) {
+    const float reach = 2.0F * depth_margin(options, c.depth), low = c.depth - reach, high = c.depth + reach;
+    const float own_high = high + 0.15F;
+    const int x0 = (static_cast<int>(c.cell) % across - 1) * edge, y0 = (static_cast<int>(c.cell) / across - 1) * edge;
+    for (int y = std::max(0, y0); y < std::min(depth.height(), y0 + 3 * edge); ++y)
+      for (int x = std::max(0, x0); x < std::min(depth.width(), x0 + 3 * edge); ++x) {
+        // Where a surface turns away, its cell's other pixels lie well behind the nearest one.
+        const bool own = x >= x0 + edge && x < x0 + 2 * edge && y >= y0 + edge && y < y0 + 2 * edge;
+        const float z = depth(x, y);
+        if (!(z >= low && z <= (own ? own_high : high)) || pixels(x, y) == 0) continue;
+        pixels(x, y) = 0;
+        ++removed;
+      }
+  }
+  return removed;
+}
+
+/// The last keyframes, and what their rays say about each other. See moving_filter.
+template <camera::camera_model Camera>
+class moving_judge {
+ public:
+  using depth_view = camera::depth_view<std::uint16_t>;
+
+  struct view {
+    std::uint64_t frame = 0;
+    image<std::uint16_t> pixels;
+    double scale = 1.0;
+    float min_depth = 0.0F, max_depth = 0.0F;
+    depth_cells cells;
+    std::vector<std::uint8_t> through;  ///< how many other views' rays pass through each cell
+    std::vector<std::uint8_t> shown;    ///< how many others show it as well
+    std::vector<std::uint8_t> removed;  ///< 1: taken out, as far as `accept` was called
+
+    [[nodiscard]] depth_view depth() const {
+      return depth_view{pixels.view(), scale, min_depth, max_depth};
+    }
+    [[nodiscard]] std::vector<removed_cell> removed_cells() const {
+      std::vector<removed_cell> out;
+      for (std::size_t i = 0; i != removed.size(); ++i)
+        if (removed[i] != 0) out.push_back({static_cast<std::uint32_t>(i), cells.depth(i)});
+      return out;
+    }
+  };
+
+  /// @pre options.keyframes > 0, min_through > 0; margins, slant and ratio >= 0
+  moving_judge(Camera camera, const moving_filter_options& options)
+      : camera_{std::move(camera)}, options_{options}, grid_{camera_} {
+    assert(options.keyframes > 0 && options.min_through > 0 && options.ratio >= 0 && options.slant >= 0);
+  }
+
+  /// Adds a keyframe in place of the oldest where there are enough, and compares it with the others:
+  /// `pose_of(view)` gives their poses, or none. The same for every policy. O(pixels + cells x keyframes).
+  /// @pre a finite pose; depth has the camera's size
+  template <execution_policy Policy, class PoseOf>
+  view& add(const Policy& policy, std::uint64_t frame, const depth_view& depth, const se3& T_world_camera,
+            const PoseOf& pose_of) {
+    view& now = make_view();
+    now.frame = frame;
+    now.scale = depth.scale();
+    now.min_depth = depth.min_depth();
+    now.max_depth = depth.max_depth();
+    copy_pixels<std::uint16_t>(depth.pixels(), now.pixels);
+    now.cells.take(policy, depth, grid_);
+    now.through.assign(now.cells.size(), 0);
+    now.shown.assign(now.cells.size(), 0);
+    now.removed.assign(now.cells.size(), 0);
+    for (view& v : views_) {
+      if (&v == &now) continue;
+      const std::optional<se3> pose = pose_of(std::as_const(v));
+      if (!pose) continue;
+      ask(policy, v, now, T_world_camera.inverse() * *pose);
+      ask(policy, now, v, pose->inverse() * T_world_camera);
+    }
+    return now;
+  }
+  /// Judges a view by what is known of it now; returns how many cells differ from what was accepted last. O(cells).
+  [[nodiscard]] std::size_t judge(const view& v) {
+    const int across = grid_.across, down = grid_.down;
+    const auto passed = [&](std::size_t i) {
+      return v.through[i] >= options_.min_through && v.through[i] > options_.ratio * v.shown[i];
+    };
+    verdict_.assign(v.cells.size(), 0);
+    bool any = false;
+    for (int y = 0; y != down; ++y)
+      for (int x = 0; x != across; ++x) {
+        const auto i = static_cast<std::size_t>(y * across + x);
+        if (passed(i)) {
+          // One cell alone is noise, or the edge of something.
+          int beside = 0;
+          for (int dy = -1; dy <= 1; ++dy)
+            for (int dx = -1; dx <= 1; ++dx)
+              if (y + dy >= 0 && y + dy < down && x + dx >= 0 && x + dx < across && (dx != 0 || dy != 0))
+                beside += passed(static_cast<std::size_t>((y + dy) * across + x + dx)) ? 1 : 0;
+          verdict_[i] = beside >= 2 ? 1 : 0;
+          any = any || beside >= 2;
+        }
+      }
+    for (int n = 0; any && n != options_.grow; ++n) grow(v);
+    std::size_t differ = 0;
+    for (std::size_t i = 0; i != verdict_.size(); ++i) differ += verdict_[i] != v.removed[i] ? 1 : 0;
+    return differ;
+  }
+  /// Takes over the last judgement, which was of this view.
+  void accept(view& v) const { v.removed = verdict_; }
+  /// The view's depth image without what is taken out. Valid until the next call.
+  [[nodiscard]] depth_view masked(const view& v) {
+    copy_pixels<std::uint16_t>(v.pixels, masked_);
+    remove_cells(v.depth(), v.removed_cells(), options_, masked_.view());
+    return depth_view{masked_.view(), v.scale, v.min_depth, v.max_depth};
+  }
+  void forget(std::uint64_t frame) {
+    const auto at = std::find_if(views_.begin(), views_.end(), [&](const view& v) { return v.frame == frame; });
+    if (at == views_.end()) return;
+    spare_.push_back(std::move(*at));
+    views_.erase(at);
+  }
+  /// The last keyframes, the oldest first. If there are enough, that one goes when the next one is added.
+  [[nodiscard]] std::deque<view>& views() noexcept { return views_; }
+  [[nodiscard]] const std::deque<view>& views() const noexcept { return views_; }
+  [[nodiscard]] bool is_full() const noexcept { return views_.size() == options_.keyframes; }
+  [[nodiscard]] const moving_filter_options& options() const noexcept { return options_; }
+
+ private:
+  /// A view for a new keyframe, in the memory of the oldest where there are enough.
+  [[nodiscard]] view& make_view() {
+    view next;
+    if (views_.size() == options_.keyframes) {
+      next = std::move(views_.front());
+      views_.pop_front();
+    } else if (!spare_.empty()) {
+      next = std::move(spare_.back());
+      spare_.pop_back();
+    }
+    views_.push_back(std::move(next));
+    return views_.back();
+  }
+  /// Counts what `by` says about the cells of `about`.
+  template <class Policy>
+  void ask(const Policy& policy, view& about, const view& by, const se3& T_by_about) const {
+    const auto count = [](std::uint8_t& n) { n = static_cast<std::uint8_t>(n + (n != 255 ? 1 : 0)); };
+    const auto with_model = [&](const auto& model) {
+      about.cells.ask(
+          policy, by.cells, grid_, model, T_by_about, options_.slant, [&](float z) { return depth_margin(options_, z); },
+          [&](std::size_t cell, visibility seen) {
+            count(seen == visibility::through ? about.through[cell] : about.shown[cell]);
+          });
+    };
+    if constexpr (requires { camera_.visit(with_model); })
+      camera_.visit(with_model);
+    else
+      with_model(camera_);
+  }
+  /// Takes out the cells beside those that are taken out, if they are of the same surface and nothing is known of them.
+  void grow(const view& v) {
+    const int across = grid_.across, down = grid_.down;
+    grown_.clear();
+    for (int y = 0; y != down; ++y)
+      for (int x = 0; x != across; ++x) {
+        const auto i = static_cast<std::size_t>(y * across + x);
+        const float z = v.cells.depth(i);
+        if (verdict_[i] != 0 || z == 0.0F || v.shown[i] > v.through[i]) continue;
+        const auto reaches = [&](int u, int w) {
+          if (u < 0 || u >= across || w < 0 || w >= down) return false;
+          const auto j = static_cast<std::size_t>(w * across + u);
+          return verdict_[j] != 0 && std::abs(v.cells.depth(j) - z) <= depth_margin(options_, z);
+        };
+        if (reaches(x - 1, y) || reaches(x + 1, y) || reaches(x, y - 1) || reaches(x, y + 1)) grown_.push_back(i);
+      }
+    for (const std::size_t i : grown_) verdict_[i] = 1;
+  }
+
+  Camera camera_;
+  moving_filter_options options_;
+  cell_grid grid_;
+  std::deque<view> views_;
+  std::vector<view> spare_;
+  std::vector<std::uint8_t> verdict_;  ///< of the last judgement
+  std::vector<std::size_t> grown_;
+  image<std::uint16_t> masked_;
+};
+
+}  // namespace orbis::mapping::detail
