@@ -183,8 +183,9 @@ void check_box(const map& m, const voxels& v, const std::vector<tree_node>& leav
 
   std::vector<tree_node> inside = leaves, found;
   std::erase_if(inside, [&](const tree_node& n) { return !box.overlaps(n.key, n.level); });
-  octree::detail::visit_leaves_in(m.store(), m.tree_depth(), box,
-                          [&](const voxel_key& k, int level, float value) { found.push_back({k, level, value}); });
+  octree::detail::visit_leaves_in(m.store(), m.tree_depth(), box, [&](const voxel_key& k, int level, float value) {
+    found.push_back({k, level, value});
+  });
   require(found == inside, "a box has those of the leaves that overlap it");
 
   bool occupied = false, unknown = false;

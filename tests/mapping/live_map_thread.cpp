@@ -289,9 +289,10 @@ TEST_CASE("A keyframe that comes with the pose of before a correction is judged 
     return true;
   }};
   // Nothing is asked for but what keyframes need.
-  live map{scene.camera,
-           {.map = {.resolution = 0.05, .tolerance = 0.0}, .poll_interval = 1h, .moving = mapping::moving_filter_options{}},
-           hear};
+  live map{
+      scene.camera,
+      {.map = {.resolution = 0.05, .tolerance = 0.0}, .poll_interval = 1h, .moving = mapping::moving_filter_options{}},
+      hear};
   const auto tell = [&](std::uint64_t frame, const se3& T_world_camera) {
     const std::lock_guard lock{mutex};
     now.poses.push_back({frame, T_world_camera});

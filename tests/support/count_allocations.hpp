@@ -62,7 +62,9 @@ void* realloc(void* block, std::size_t size) noexcept {
   return taken(moved);
 }
 void* memalign(std::size_t alignment, std::size_t size) noexcept { return taken(__libc_memalign(alignment, size)); }
-void* aligned_alloc(std::size_t alignment, std::size_t size) noexcept { return taken(__libc_memalign(alignment, size)); }
+void* aligned_alloc(std::size_t alignment, std::size_t size) noexcept {
+  return taken(__libc_memalign(alignment, size));
+}
 int posix_memalign(void** block, std::size_t alignment, std::size_t size) noexcept {
   *block = taken(__libc_memalign(alignment, size));
   return *block != nullptr ? 0 : ENOMEM;

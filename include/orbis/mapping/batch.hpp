@@ -311,11 +311,11 @@ struct live_octree {
 
 }  // namespace detail
 
-/// Takes what has moved away out of the depth images, if that is asked for, adds the keyframes to a cloud, filters it, and integrates each keyframe's depth image without the pixels whose point
-/// of the cloud the filter removed (`dense_cloud::masked_depth`), with rays from where that keyframe was. Filtering the
-/// whole cloud lets one keyframe's points judge another's; the automatic filter asks the keyframes'
-/// depth images as well which points their rays pass through. The octrees are those that a `live_map` makes of the same
-/// depth images and poses, bit for bit.
+/// Takes what has moved away out of the depth images, if that is asked for, adds the keyframes to a cloud, filters it,
+/// and integrates each keyframe's depth image without the pixels whose point of the cloud the filter removed
+/// (`dense_cloud::masked_depth`), with rays from where that keyframe was. Filtering the whole cloud lets one keyframe's
+/// points judge another's; the automatic filter asks the keyframes' depth images as well which points their rays pass
+/// through. The octrees are those that a `live_map` makes of the same depth images and poses, bit for bit.
 ///
 /// Keyframes whose pose is not finite are skipped and counted. Errors: `no_data` if there is no
 /// keyframe; `invalid_argument` if an image's size is not the camera's, or an option is out of range;

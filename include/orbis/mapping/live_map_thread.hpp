@@ -249,12 +249,7 @@ class live_map_thread {
         spare_.pop_back();
       }
     }
-    if (copy.width() != pixels.width() || copy.height() != pixels.height())
-      copy = image<std::uint16_t>(pixels.width(), pixels.height());
-    for (int y = 0; y != pixels.height(); ++y) {
-      const auto row = pixels.row(y);
-      std::copy(row.begin(), row.end(), copy.row(y).begin());
-    }
+    copy_pixels<std::uint16_t>(pixels, copy);
     return copy;
   }
 

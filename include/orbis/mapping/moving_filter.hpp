@@ -32,11 +32,11 @@
 
 namespace orbis::mapping {
 
-/// Judges the last keyframes of a live map by each other, and gives the map the result: a later keyframe whose rays pass
-/// through what an earlier one shows takes it out, and one that shows it again brings it back. The result is a depth
-/// image with fewer pixels (`live_map::set_depth`), so that the map stays the one of these images and the keyframes'
-/// poses. Keyframes are compared at the poses that the map was told last (`live_map::wanted_pose`), for those are of
-/// one moment; in the map, a keyframe that waits for a correction is still at an earlier one.
+/// Judges the last keyframes of a live map by each other, and gives the map the result: a later keyframe whose rays
+/// pass through what an earlier one shows takes it out, and one that shows it again brings it back. The result is a
+/// depth image with fewer pixels (`live_map::set_depth`), so that the map stays the one of these images and the
+/// keyframes' poses. Keyframes are compared at the poses that the map was told last (`live_map::wanted_pose`), for
+/// those are of one moment; in the map, a keyframe that waits for a correction is still at an earlier one.
 ///
 /// Keeps the last keyframes' depth images: 3.5 bytes a pixel for each. Memory is kept from keyframe to keyframe.
 template <camera::camera_model Camera>

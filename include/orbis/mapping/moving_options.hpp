@@ -10,7 +10,7 @@
 namespace orbis::mapping {
 
 struct moving_filter_options {
-  std::size_t keyframes = 8;      ///< so many of the last ones judge each other, > 0; older ones stay as they are
+  std::size_t keyframes = 8;  ///< so many of the last ones judge each other, > 0; older ones stay as they are
   /// Two depths z are the same if they differ by less than margin + margin_growth z^2, which covers noise and small
   /// errors of poses. Metres; 1 / metres.
   float margin = 0.03F;
@@ -20,7 +20,8 @@ struct moving_filter_options {
   float slant = 1.0F;
   int min_through = 1;  ///< a cell is taken out if the rays of at least so many keyframes pass through it, > 0,
   double ratio = 1.0;   ///< and of more than this many times as many as show it
-  int grow = 4;  ///< cells up to this far from one that is taken out go too, if of the same surface and shown by no more
+  int grow =
+      4;  ///< cells up to this far from one that is taken out go too, if of the same surface and shown by no more
   /// A keyframe that is in the map already is marked again only where so much of its image has got another verdict, or
   /// when it leaves the last keyframes.
   double least_change = 0.002;

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include "support/synthetic/world.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -9,7 +11,6 @@
 
 #include "support/catch.hpp"
 #include "support/synthetic/building.hpp"
-#include "support/synthetic/world.hpp"
 
 using namespace orbis;
 using namespace orbis;

@@ -72,9 +72,7 @@ class moving_judge {
     std::vector<std::uint8_t> shown;    ///< how many others show it as well
     std::vector<std::uint8_t> removed;  ///< 1: taken out, as far as `accept` was called
 
-    [[nodiscard]] depth_view depth() const {
-      return depth_view{pixels.view(), scale, min_depth, max_depth};
-    }
+    [[nodiscard]] depth_view depth() const { return depth_view{pixels.view(), scale, min_depth, max_depth}; }
     [[nodiscard]] std::vector<removed_cell> removed_cells() const {
       std::vector<removed_cell> out;
       for (std::size_t i = 0; i != removed.size(); ++i)
@@ -181,7 +179,8 @@ class moving_judge {
     const auto count = [](std::uint8_t& n) { n = static_cast<std::uint8_t>(n + (n != 255 ? 1 : 0)); };
     const auto with_model = [&](const auto& model) {
       about.cells.ask(
-          policy, by.cells, grid_, model, T_by_about, options_.slant, [&](float z) { return depth_margin(options_, z); },
+          policy, by.cells, grid_, model, T_by_about, options_.slant,
+          [&](float z) { return depth_margin(options_, z); },
           [&](std::size_t cell, visibility seen) {
             count(seen == visibility::through ? about.through[cell] : about.shown[cell]);
           });
