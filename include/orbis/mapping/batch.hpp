@@ -157,15 +157,14 @@ template <class Octree, execution_policy Policy, keyframe_range Keyframes, camer
   bool cancelled = false;
   std::vector<std::vector<removed_cell>> moved;
   if (options.moving) {
-    for (const auto& k : keyframes)
-      if (!fits(k.depth)) return fail(errc::invalid_argument, "keyframes", "an image is not of the camera's size");
     moved = find_moving(policy, keyframes, camera, moving, [&] {
       cancelled = !on_progress(++done, total);
       return !cancelled;
     });
     if (cancelled) return fail(errc::cancelled, {}, "cancelled");
   }
-  standing_depth<std::remove_cvref_t<decltype(std::ranges::begin(keyframes)->depth)>> standing;
+  standing_depth<std::remove_cvref_t<decltype(std::declval<const std::ranges::range_value_t<Keyframes>&>().depth)>>
+      standing;
   const auto moved_of = [&](std::size_t index) { return moved.empty() ? nullptr : &moved[index]; };
 
   dense_cloud dense{camera::ray_table{camera}, options.dense};

@@ -43,8 +43,8 @@ template <camera::depth_source Depth>
 }
 
 /// For each keyframe the cells that the rays of those before and after it pass through; empty for those without a
-/// finite pose. `go_on()` is called after each keyframe; if it returns false, so does this, as far as it got.
-/// O(keyframes x (pixels + cells x options.keyframes)). @pre each depth image has the camera's size
+/// finite pose, or whose depth image has not the camera's size. `go_on()` is called after each keyframe; if it returns
+/// false, so does this, as far as it got. O(keyframes x (pixels + cells x options.keyframes)).
 template <execution_policy Policy, keyframe_range Keyframes, camera::camera_model Camera, class GoOn>
 [[nodiscard]] std::vector<std::vector<removed_cell>> find_moving(const Policy& policy, const Keyframes& keyframes,
                                                                  const Camera& camera,
@@ -61,7 +61,8 @@ template <execution_policy Policy, keyframe_range Keyframes, camera::camera_mode
   image<std::uint16_t> copy;
   for (const auto& k : keyframes) {
     poses.push_back(k.T_world_camera);
-    if (poses.back().to_matrix().allFinite()) {
+    const bool fits = k.depth.width() == camera.width() && k.depth.height() == camera.height();
+    if (fits && poses.back().to_matrix().allFinite()) {
       if (judge.is_full()) settle(judge.views().front());
       judge.add(policy, poses.size() - 1, stored_depths(k.depth, copy), poses.back(),
                 [&](const auto& v) { return std::optional{poses[v.frame]}; });
