@@ -1,11 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "map_stage.hpp"
 
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <unordered_map>
-
 #ifdef __GLIBC__
 #include <malloc.h>
 #endif
@@ -16,6 +11,7 @@
 #include "filters.hpp"
 #include "summary.hpp"
 #include "view_frame.hpp"
+#include "voxel_colors.hpp"
 
 namespace app {
 namespace {
@@ -53,50 +49,17 @@ tree_numbers numbers_of(const tree& map, std::uintmax_t bytes) {
 /// The occupied leaves, in the mean colour of the points in them; of those of `only`, if it is given.
 std::vector<voxel> occupied_voxels(const tree& map, const orbis::point_cloud& cloud,
                                    const std::vector<std::uint32_t>* only = nullptr) {
-  struct sum {
-    std::uint64_t r = 0, g = 0, b = 0, n = 0;
-  };
-  const auto name = [](const orbis::octree::voxel_key& k) {
-    return std::uint64_t{k.x} << 32U | std::uint64_t{k.y} << 16U | k.z;
-  };
-  std::unordered_map<std::uint64_t, sum> colors;
+  voxel_colors colors{map.resolution()};
   const std::size_t count = !cloud.has_colors() ? 0 : only != nullptr ? only->size() : cloud.size();
   for (std::size_t k = 0; k != count; ++k) {
     const std::size_t i = only != nullptr ? (*only)[k] : k;
-    const auto key = map.grid().key(cloud.points[i]);
-    if (!key) continue;
-    sum& s = colors[name(*key)];
-    s.r += cloud.colors[i].r;
-    s.g += cloud.colors[i].g;
-    s.b += cloud.colors[i].b;
-    ++s.n;
+    colors.add(cloud.points[i], cloud.colors[i]);
   }
   std::vector<voxel> out;
   map.for_each_leaf([&](const tree::leaf& leaf) {
     if (!leaf.occupied) return;
-    voxel v{leaf.center.cast<float>(), static_cast<float>(leaf.size), {176, 178, 182}};
-    sum all;
-    const auto add = [&](int x, int y, int z) {  // the colour of a voxel beside the leaf's first
-      auto key = leaf.key;
-      key.x = static_cast<decltype(key.x)>(key.x + x);
-      key.y = static_cast<decltype(key.y)>(key.y + y);
-      key.z = static_cast<decltype(key.z)>(key.z + z);
-      const auto found = colors.find(name(key));
-      if (found == colors.end()) return;
-      all.r += found->second.r;
-      all.g += found->second.g;
-      all.b += found->second.b;
-      all.n += found->second.n;
-    };
-    // A large leaf takes the colours along its diagonal.
-    const auto cells = static_cast<int>(std::lround(leaf.size / map.resolution()));
-    for (int i = 0; i != cells; ++i) add(i, i, i);
-    // A voxel may be occupied by pixels whose points in the cloud, means of several pixels, lie in the next voxel.
-    if (all.n == 0)
-      for (int i = 0; i != 27; ++i) add(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1);
-    if (all.n != 0)
-      v.color = {static_cast<std::uint8_t>(all.r / all.n), static_cast<std::uint8_t>(all.g / all.n),
-                 static_cast<std::uint8_t>(all.b / all.n)};
+    voxel v{leaf.center.cast<float>(), static_cast<float>(leaf.size), no_color};
+    if (const auto color = colors.color_of(v)) v.color = *color;
     out.push_back(v);
   });
   return out;

@@ -29,8 +29,8 @@
 #include "viewer/calls_aside.hpp"
 #include "viewer/scene_builder.hpp"
 #include "viewer/viewer_thread.hpp"
-#include "viewer/voxel_colors.hpp"
 #include "viewer/web_messages.hpp"
+#include "voxel_colors.hpp"
 
 #ifdef RGBD_SLAM_WEB
 #include <httplib.h>  // after Eigen: it brings a macro, _res

@@ -23,7 +23,7 @@
 
 #include "results.hpp"
 #include "viewer/scene.hpp"
-#include "viewer/voxel_colors.hpp"
+#include "voxel_colors.hpp"
 
 namespace app {
 

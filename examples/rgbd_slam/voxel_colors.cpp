@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "viewer/voxel_colors.hpp"
+#include "voxel_colors.hpp"
 
 #include <cmath>
 
