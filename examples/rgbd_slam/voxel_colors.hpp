@@ -38,7 +38,7 @@ class voxel_colors {
 
  private:
   struct sum {
-    std::uint32_t r = 0, g = 0, b = 0, n = 0;
+    std::uint64_t r = 0, g = 0, b = 0, n = 0;
   };
   orbis::octree::voxel_grid grid_;
   orbis::hash_index index_;  // of voxels in sums_; of those that have a point

@@ -104,6 +104,8 @@ foreach(name cloud_filtered.ply map_unfiltered.bt map.bt map.ot)
 endforeach()
 summary(ate ${WORK}/person ate_rmse_m)
 check(ate LESS 0.02)
+summary(reason ${WORK}/person filter reason)
+check(reason MATCHES "has moved away")
 summary(map_error ${WORK}/person map_error_m)
 check(map_error LESS 0.1)
 

@@ -110,6 +110,7 @@ TEST_CASE("bad keyframes are skipped or refused") {
         orbis::mapping::map_options{.filter = {.ray_evidence = {.window = -1}}},
         orbis::mapping::map_options{.moving = orbis::mapping::moving_filter_options{.keyframes = 0}},
         orbis::mapping::map_options{.moving = orbis::mapping::moving_filter_options{.slant = -1}},
+        orbis::mapping::map_options{.moving = orbis::mapping::moving_filter_options{.grow = -1}},
         orbis::mapping::map_options{.dense = {.voxel_size = inf}},
         orbis::mapping::map_options{.filter = {.radius = {.radius = -0.1}}}})
     CHECK(build_map(orbis::seq, scene.keyframes(), scene.camera, bad).error().code == errc::invalid_argument);
@@ -290,4 +291,80 @@ TEST_CASE("a live map of the same depth images and poses is the same map") {
     CHECK(orbis::octree::ot_bytes(*built->unfiltered_octree) == orbis::octree::ot_bytes(*map->unfiltered_octree));
     CHECK(orbis::octree::ot_bytes(built->octree) == orbis::octree::ot_bytes(map->octree));
   }
+}
+
+TEST_CASE("a map without what moved is the same under every policy, by a live map, and from depth in metres") {
+  // A wall, and a board before it in one of five images.
+  auto scene = orbis::test::wall_scene(5);
+  for (int y = 12; y != 36; ++y)
+    for (int x = 20; x != 44; ++x) scene.depth[2](x, y) = 1000;
+  struct numbered : orbis::mapping::keyframe<> {
+    std::uint64_t frame = 0;
+  };
+  std::vector<numbered> keyframes;
+  for (std::size_t i = 0; i != 5; ++i) keyframes.push_back({scene.keyframe(i), i});
+  const orbis::mapping::map_options options{.moving = orbis::mapping::moving_filter_options{},
+                                            .filter = {.kind = filter_kind::none}};
+  std::size_t calls = 0;
+  const auto count = [&](std::size_t done, std::size_t total) {
+    CHECK(done == ++calls);
+    CHECK(total == 20);
+    return true;
+  };
+  const auto map = build_map(orbis::seq, keyframes, scene.camera, options, count);
+  REQUIRE(map.has_value());
+  CHECK(calls == 20);
+  CHECK(map->moving.keyframes == 1);
+  CHECK(map->moving.pixels > 300);
+  const auto board = [](const auto& m) { return m.octree.state(orbis::vec3{0.2, 0.15, 0.8}); };
+  CHECK(board(*map) != orbis::octree::occupancy::occupied);
+  auto without = options;
+  without.moving.reset();
+  const auto whole = build_map(orbis::seq, keyframes, scene.camera, without);
+  REQUIRE(whole.has_value());
+  CHECK(whole->cloud.size() > map->cloud.size() + 100);
+
+  for (const unsigned threads : {2U, 5U}) {
+    const auto again = build_map(orbis::par.with(threads), keyframes, scene.camera, options);
+    REQUIRE(again.has_value());
+    CHECK(again->cloud.points == map->cloud.points);
+    CHECK(again->moving.pixels == map->moving.pixels);
+    CHECK(orbis::octree::ot_bytes(again->octree) == orbis::octree::ot_bytes(map->octree));
+  }
+  for (const std::size_t stop : {1U, 5U, 6U})
+    CHECK(build_map(orbis::seq, keyframes, scene.camera, options,
+                    [&](std::size_t done, std::size_t) { return done < stop; })
+              .error()
+              .code == orbis::errc::cancelled);
+
+  // By a live map; and what an end in between leaves in it does not come into the next map.
+  using octree = orbis::octree::occupancy_octree<>;
+  orbis::mapping::live_map<octree, orbis::camera::pinhole> live{scene.camera, {.resolution = options.resolution}};
+  const auto built = build_map(orbis::par, keyframes, live, options);
+  REQUIRE(built.has_value());
+  CHECK(orbis::octree::ot_bytes(*built->unfiltered_octree) == orbis::octree::ot_bytes(*map->unfiltered_octree));
+  CHECK(orbis::octree::ot_bytes(built->octree) == orbis::octree::ot_bytes(map->octree));
+  orbis::mapping::live_map<octree, orbis::camera::pinhole> stopped{scene.camera, {.resolution = options.resolution}};
+  CHECK_FALSE(build_map(orbis::seq, keyframes, stopped, options, [](std::size_t done, std::size_t) {
+                return done < 14;
+              }).has_value());
+  CHECK(stopped.size() == 4);
+  const auto rebuilt = build_map(orbis::seq, keyframes, stopped, without);
+  REQUIRE(rebuilt.has_value());
+  CHECK(orbis::octree::ot_bytes(*rebuilt->unfiltered_octree) == orbis::octree::ot_bytes(*whole->unfiltered_octree));
+
+  // Metres instead of millimetres.
+  std::vector<orbis::image<float>> metres;
+  for (const auto& depth : scene.depth) {
+    metres.emplace_back(64, 48);
+    for (int y = 0; y != 48; ++y)
+      for (int x = 0; x != 64; ++x) metres.back()(x, y) = 0.001F * static_cast<float>(depth(x, y));
+  }
+  std::vector<orbis::mapping::keyframe<orbis::camera::depth_view<float>>> in_metres;
+  for (std::size_t i = 0; i != 5; ++i)
+    in_metres.push_back({orbis::camera::depth_view<float>(metres[i].view()), {}, scene.poses[i]});
+  const auto same = build_map(orbis::seq, in_metres, scene.camera, options);
+  REQUIRE(same.has_value());
+  CHECK(same->moving.keyframes == 1);
+  CHECK(same->moving.pixels == map->moving.pixels);
 }

@@ -316,6 +316,29 @@ TEST_CASE("A keyframe that comes with the pose of before a correction is judged 
   CHECK(ot_bytes(inner.map()) == ot_bytes(fresh(scene, now.poses)));
 }
 
+TEST_CASE("A keyframe that is gone when its pose is asked for does not go in") {
+  const auto scene = test::wall_scene(2);
+  std::mutex mutex;
+  int asked = 0;
+  listeners hear{.poll_poses = [&](mapping::keyframe_poses& told, bool) {
+    const std::lock_guard lock{mutex};
+    told.poses.push_back({0, scene.poses[0]});
+    if (++asked > 1) return true;
+    told.removed.push_back(1);  // said once
+    return true;
+  }};
+  live map{scene.camera,
+           {.map = {.resolution = 0.05}, .poll_interval = 1h, .moving = mapping::moving_filter_options{}},
+           hear};
+  CHECK(add(map, scene, 1));
+  map.wait();
+  CHECK(add(map, scene, 0));
+  map.finish();
+  CHECK(map.latest()->keyframes == 1);
+  CHECK(map.counters().keyframes == 1);
+  CHECK(ot_bytes(map.stop().map()) == ot_bytes(fresh(scene, {{0, scene.poses[0]}})));
+}
+
 TEST_CASE("Keyframes that will never come back lose their depth images, hidden ones keep them") {
   const auto scene = test::wall_scene(5);
   std::promise<void> begun, go;

@@ -37,13 +37,15 @@ namespace orbis::mapping {
 
 struct map_options {
   dense_options dense{};
-  /// Takes what has moved away out of the depth images before they are used: cells that the rays of the keyframes just
-  /// before and after pass through, see moving_filter. Empty: the filter judges it as it judges anything else.
+  /// Takes what has moved away out of the depth images before they become points: cells that the rays of the keyframes
+  /// just before and after pass through, see moving_filter. (Rays that a filter asks are those of the images as they
+  /// came.) Of depth images that are no depth_view<std::uint16_t>, what is farther away than 16 m says nothing. Empty:
+  /// the filter judges it as it judges anything else.
   std::optional<moving_filter_options> moving{};
   filter_options filter{};
   double resolution = 0.05;                   ///< of the octrees, metres; > 0
   octree::integration_options integration{};  ///< of every keyframe's depth image into the octrees
-  bool unfiltered_octree = true;              ///< build the octree of the unfiltered depth images as well
+  bool unfiltered_octree = true;              ///< build the octree of the cloud before the filter as well
 };
 
 /// A map that depth images of this camera can be integrated into, made of its resolution in metres; what
@@ -58,7 +60,7 @@ concept depth_map = std::constructible_from<M, double> && std::movable<M> &&
 /// What was taken out of the depth images, for it had moved away.
 struct moving_count {
   std::size_t keyframes = 0;  ///< that have lost any pixel
-  std::size_t pixels = 0;
+  std::size_t pixels = 0;     ///< of the whole images, whatever the stride
 };
 
 /// The map, and how it came to be.
@@ -84,7 +86,7 @@ namespace detail {
 [[nodiscard]] inline std::string reason_of(const moving_count& moving) {
   return std::to_string(moving.pixels) + " pixels of " + std::to_string(moving.keyframes) +
          (moving.keyframes == 1 ? " keyframe show" : " keyframes show") +
-         " what has moved away, and became no points: the rays of other keyframes pass through it";
+         " what has moved away, as the rays of other keyframes pass through it, and were left out";
 }
 
 /// A keyframe's depth image without what has moved away.
@@ -142,6 +144,7 @@ template <class Octree, execution_policy Policy, keyframe_range Keyframes, camer
   const moving_filter_options moving = options.moving.value_or(moving_filter_options{});
   if (moving.keyframes == 0 || moving.min_through <= 0)
     return fail(errc::invalid_argument, "moving", "keyframes and min_through must be positive");
+  if (moving.grow < 0) return fail(errc::invalid_argument, "moving", "grow must not be negative");
   if (!(moving.margin >= 0 && moving.margin_growth >= 0 && moving.slant >= 0 && moving.ratio >= 0))
     return fail(errc::invalid_argument, "moving", "margins, slant and ratio must not be negative");
   const auto fits = [&](const auto& image) {
@@ -298,7 +301,9 @@ struct live_octree {
       auto set = live.set_depth(policy, k.frame, depth);
       return set ? result<void>{} : unless_kept(std::move(set.error()));
     }
-    auto added = live.add_keyframe(policy, k.frame, depth, poses.back().T_world_camera);
+    // Not complete even before the filter: pixels of what moved away may be missing, and an end may come before the
+    // filter's verdict.
+    auto added = live.add_keyframe(policy, k.frame, depth, poses.back().T_world_camera, completeness::filtered);
     return added ? result<void>{} : unless_kept(std::move(added.error()));
   }
   result<typename Live::octree_type> complete(bool filtered) {

@@ -36,7 +36,7 @@ enum class depth_use : std::uint8_t {
 struct insertion_event {
   std::uint64_t frame = 0;
   bool is_keyframe = false;
-  double milliseconds = 0.0;        ///< wall time of the work: `prepare`, marking, keeping the depth image
+  double milliseconds = 0.0;        ///< wall time of the work: `prepare`, judging, marking, keeping the depth image
   double delay_milliseconds = 0.0;  ///< from the call that added it until readers see it
   std::size_t waiting = 0;          ///< keyframes and frames that still wait
 };

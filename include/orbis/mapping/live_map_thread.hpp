@@ -66,7 +66,8 @@ struct live_map_thread_options {
   /// A correction goes on for this long before keyframes that came meanwhile are inserted.
   std::chrono::microseconds correction_slice{5000};
   std::chrono::milliseconds poll_interval{30};  ///< between two calls of live_map_listeners::poll_poses
-  /// Takes out what has moved away, see moving_filter; empty: everything stays.
+  /// Takes out what has moved away, see moving_filter; empty: everything stays. Then poses are asked for before each
+  /// keyframe as well, and the keyframe goes in where it is by then.
   std::optional<moving_filter_options> moving{};
 };
 
@@ -328,10 +329,13 @@ class live_map_thread {
     switch (j.kind) {
       case job::keyframe: {
         const bool judged = moving_ && has_pose_of_now(j);
+        if (moving_ && !judged) moving_->forget(j.frame);  // what it has is of another image, if anything
+        if (moving_ && is_gone(j.frame)) break;
         const auto added = judged ? moving_->add_keyframe(policy_, map_, j.frame, depth, j.T)
                                   : map_.add_keyframe(policy_, j.frame, depth, j.T);
         if (!added) report(added.error());
-        inserted = poll_always_ = true;
+        inserted = true;
+        poll_always_ = poll_always_ || !judged;
         break;
       }
       case job::between:
@@ -369,6 +373,7 @@ class live_map_thread {
   /// Keyframes judge each other by their poses, which have to be of one moment: asks for those of now, and gives a new
   /// keyframe its own. False if it has none.
   [[nodiscard]] bool has_pose_of_now(job& j) {
+    polled_.removed.clear();
     if (!listeners_.poll_poses) return true;
     poll_always_ = true;
     poll();
@@ -377,6 +382,10 @@ class live_map_thread {
     if (at == polled_.poses.end()) return false;
     j.T = at->T_world_camera;
     return true;
+  }
+  /// Whether the last poll said that this keyframe was removed.
+  [[nodiscard]] bool is_gone(std::uint64_t frame) const {
+    return std::find(polled_.removed.begin(), polled_.removed.end(), frame) != polled_.removed.end();
   }
   void poll() {
     polled_.poses.clear();

@@ -44,7 +44,7 @@ class moving_filter {
  public:
   using depth_view = camera::depth_view<std::uint16_t>;
 
-  /// @pre options.keyframes > 0, min_through > 0; margins, slant and ratio >= 0
+  /// @pre options.keyframes > 0, min_through > 0; margins, slant, ratio and grow >= 0
   explicit moving_filter(Camera camera, const moving_filter_options& options = {})
       : judge_{std::move(camera), options} {}
 

@@ -20,8 +20,9 @@ struct moving_filter_options {
   float slant = 1.0F;
   int min_through = 1;  ///< a cell is taken out if the rays of at least so many keyframes pass through it, > 0,
   double ratio = 1.0;   ///< and of more than this many times as many as show it
-  int grow =
-      4;  ///< cells up to this far from one that is taken out go too, if of the same surface and shown by no more
+  /// Cells up to this far from one that is taken out go too, if they are of the same surface and no more keyframes show
+  /// them than look through them. >= 0
+  int grow = 4;
   /// A keyframe that is in the map already is marked again only where so much of its image has got another verdict, or
   /// when it leaves the last keyframes.
   double least_change = 0.002;

@@ -81,10 +81,11 @@ class moving_judge {
     }
   };
 
-  /// @pre options.keyframes > 0, min_through > 0; margins, slant and ratio >= 0
+  /// @pre options.keyframes > 0, min_through > 0; margins, slant, ratio and grow >= 0
   moving_judge(Camera camera, const moving_filter_options& options)
       : camera_{std::move(camera)}, options_{options}, grid_{camera_} {
-    assert(options.keyframes > 0 && options.min_through > 0 && options.ratio >= 0 && options.slant >= 0);
+    assert(options.keyframes > 0 && options.min_through > 0 && options.ratio >= 0 && options.slant >= 0 &&
+           options.grow >= 0);
   }
 
   /// Adds a keyframe in place of the oldest where there are enough, and compares it with the others:
@@ -134,7 +135,7 @@ class moving_judge {
           any = any || beside >= 2;
         }
       }
-    for (int n = 0; any && n != options_.grow; ++n) grow(v);
+    for (int n = 0; any && n < options_.grow; ++n) grow(v);
     std::size_t differ = 0;
     for (std::size_t i = 0; i != verdict_.size(); ++i) differ += verdict_[i] != v.removed[i] ? 1 : 0;
     return differ;
