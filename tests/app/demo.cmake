@@ -107,7 +107,7 @@ check(ate LESS 0.02)
 summary(reason ${WORK}/person filter reason)
 check(reason MATCHES "has moved away")
 summary(map_error ${WORK}/person map_error_m)
-check(map_error LESS 0.1)
+check(map_error LESS 0.02)
 
 # --quiet says nothing; one thread means the same bytes as --deterministic.
 app(0 demo --frames 40 --width 320 --resolution 0.1 --out again --save-map again.map --quiet --threads 1)

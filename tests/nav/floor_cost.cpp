@@ -55,15 +55,31 @@ TEST_CASE("Distances on the floor are those of all pairs, and costs follow from 
         }
         const double d = truth < 0.0 ? 1e9 : 0.05 * std::sqrt(truth);
         const bool is_unknown = floor.states(x, y) == floor_state::unknown;
-        const int expected = d == 0.0     ? 254
-                             : d <= 0.15  ? 253
-                             : is_unknown ? 255
-                             : d <= 0.4   ? static_cast<int>(252 * std::exp(-5.0 * (d - 0.15)))
-                                          : 0;
+        const int expected = truth == 0.0                   ? 254
+                             : truth > 0.0 && truth <= 9.0  ? 253  // three cells
+                             : is_unknown                   ? 255
+                             : truth > 0.0 && truth <= 64.0 ? static_cast<int>(252 * std::exp(-5.0 * (d - 0.15)))
+                                                            : 0;
         wrong += costs(x, y) == expected ? 0U : 1U;
       }
     CHECK(wrong == 0);
   }
+}
+
+TEST_CASE("A road of sixty thousand cells has the costs of its ends") {
+  nav::floor_map floor;
+  floor.resolution = 0.05;
+  floor.states = image<floor_state>(1, 60000, floor_state::free);
+  floor.states(0, 100) = floor.states(0, 59000) = floor_state::occupied;
+  const image<float> squared = nav::squared_floor_distances(floor.states);
+  const auto costs = nav::inflate(floor, {.radius = 0.05, .inflation_radius = 0.05});
+  for (const int y : {100, 59000})
+    for (const int beside : {-1, 1}) {
+      CHECK(squared(0, y + beside) == 1.0F);
+      CHECK(costs(0, y + beside) == nav::floor_cost::inscribed);
+    }
+  CHECK(squared(0, 29550) == 29450.0F * 29450.0F);
+  CHECK(costs(0, 29550) == nav::floor_cost::free_space);
 }
 
 TEST_CASE("A floor of one cell, and one of none") {

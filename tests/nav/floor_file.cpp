@@ -81,4 +81,15 @@ TEST_CASE("A floor map's files are read back by the map server's rule") {
   CHECK(nav::save_floor_map(dir / "floor.pgm", floor).error().code == errc::invalid_argument);
   CHECK(nav::save_floor_map(dir / "a \"floor\".yaml", floor).error().code == errc::invalid_argument);
   CHECK(nav::save_floor_map(dir / "none" / "floor.yaml", floor).error().code == errc::write_failed);
+  CHECK(nav::save_floor_map("", floor).error().code == errc::invalid_argument);
+  const auto refused = [&](const nav::floor_map& bad) {
+    return nav::save_floor_map(dir / "bad.yaml", bad).error().code == errc::invalid_argument &&
+           !std::filesystem::exists(dir / "bad.pgm");
+  };
+  CHECK(refused(nav::floor_map{}));
+  nav::floor_map nowhere = floor, without_size = floor;
+  nowhere.origin.x() = std::nan("");
+  without_size.resolution = 0.0;
+  CHECK(refused(nowhere));
+  CHECK(refused(without_size));
 }

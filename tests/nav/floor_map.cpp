@@ -312,4 +312,16 @@ TEST_CASE("A region of a floor map, and what cannot be had") {
   w.map().set_unknown_node({32768 + 16384, 32768, 32768}, 2, -0.5F);
   CHECK(nav::make_floor_map(w.map(), {}, {.floor = 0.3}).error().code == errc::invalid_argument);
   CHECK(nav::make_floor_map(w.map(), {}, {.floor = 0.3, .region = region}).has_value());
+  // Heights of a region mean nothing, and it has to be one.
+  const octree::bounding_box elsewhere{vec3{0.9, 1.7, 1e6}, vec3{2.0, 2.4, -1e6}};
+  const auto same = nav::make_floor_map(w.map(), {}, {.region = elsewhere});
+  REQUIRE(same.has_value());
+  CHECK(same->states == part->states);
+  const octree::bounding_box inverted{vec3{2.0, 1.7, 0.0}, vec3{0.9, 2.4, 0.0}};
+  CHECK(nav::make_floor_map(w.map(), {}, {.region = inverted}).error().code == errc::invalid_argument);
+  // No limits are limits, too.
+  constexpr double inf = std::numeric_limits<double>::infinity();
+  const auto open = nav::make_floor_map(w.map(), {}, {.above = inf, .region = region});
+  CHECK((open.has_value() || open.error().code == errc::invalid_argument));
+  CHECK(nav::make_floor_map(w.map(), {.radius = 0.2, .height = 1e9}, {.region = region}).has_value());
 }

@@ -208,6 +208,17 @@ TEST_CASE("A path over the voxels is as short as Dijkstra's, and shortening keep
   CHECK(unreachable > 5);
 }
 
+TEST_CASE("The way to an obstacle in the open does not look at the whole world") {
+  map_type map{cell};
+  set(map, 150, 0, 0, true);
+  const nav::distance_field field{map, {.reach = 0.8, .unknown = occupancy::free}};
+  const vec3 start{1, 1, 1}, goal{15.05, 0.05, 0.05};
+  const auto way = nav::find_path(nav::planning_view{map, field, 0.15}, start, goal, {.max_expanded = 20000});
+  CHECK(way.status == path_status::goal_blocked);
+  REQUIRE(way.points.size() >= 2);
+  CHECK((way.points.back() - goal).norm() < 0.5);
+}
+
 TEST_CASE("Why there is no path, and how near one comes") {
   // Two rooms of 2 m with a wall between them, and a hole in the wall that only a small robot passes.
   map_type map{cell};
@@ -248,6 +259,12 @@ TEST_CASE("Why there is no path, and how near one comes") {
   CHECK(plan(0.15, start, vec3{1e7, 0.0, 0.0}).status == path_status::goal_outside);
   CHECK(plan(0.15, start, vec3{0.0, std::nan(""), 0.0}).status == path_status::goal_outside);
   CHECK(plan(0.15, start, goal, {.max_expanded = 10}).status == path_status::gave_up);
+  const auto far = plan(0.15, start, vec3{1e200, 0.0, 0.0});
+  CHECK(far.status == path_status::goal_outside);
+  CHECK(far.points.back().x() > 3.5);  // as near as it gets
+  const nav::planning_view view{map, field, 0.15};
+  CHECK_FALSE(view.is_free(start, vec3{1e200, 0.4, 0.5}));
+  CHECK_FALSE(view.is_free(start, vec3{1e12, 0.4, 0.5}));
   CHECK(plan(0.15, start, start).status == path_status::found);
   CHECK(plan(0.15, start, start).length == 0.0);
 }

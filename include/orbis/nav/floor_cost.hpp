@@ -32,11 +32,11 @@ struct inflation_options {
 };
 
 /// The squared distance of each cell to the nearest occupied one, between the middles, in cells; a large number if
-/// nothing is occupied. Exact. O(cells).
+/// nothing is occupied. Exact up to 4096 cells, and rounded to a float beyond. O(cells).
 ///
 /// P. Felzenszwalb, D. Huttenlocher, "Distance transforms of sampled functions", Theory of Computing 8, 2012.
 [[nodiscard]] inline image<float> squared_floor_distances(const image<floor_state>& states) {
-  constexpr float far = 1e12F;
+  constexpr float far = 1e18F;
   image<float> squared(states.width(), states.height(), far);
   const int width = states.width(), height = states.height();
   for (int y = 0; y != height; ++y) {
@@ -66,7 +66,8 @@ struct inflation_options {
       double from = -std::numeric_limits<double>::infinity();
       for (; count != 0; --count) {
         const int other = lowest[count - 1];
-        from = (value + y * y - column[static_cast<std::size_t>(other)] - other * other) / (2.0 * (y - other));
+        const double here = y, there = other;  // squares of integers may overflow
+        from = (value + here * here - column[static_cast<std::size_t>(other)] - there * there) / (2.0 * (here - there));
         if (from > begin[count - 1]) break;
         from = -std::numeric_limits<double>::infinity();
       }
@@ -78,7 +79,8 @@ struct inflation_options {
     for (int y = 0; y != height; ++y) {
       while (at + 1 != count && begin[at + 1] < y) ++at;
       const int from = lowest[at];
-      squared(x, y) = static_cast<float>(column[static_cast<std::size_t>(from)] + (y - from) * (y - from));
+      const double along = y - from;
+      squared(x, y) = static_cast<float>(column[static_cast<std::size_t>(from)] + along * along);
     }
   }
   return squared;
@@ -91,19 +93,20 @@ struct inflation_options {
 [[nodiscard]] inline image<std::uint8_t> inflate(const floor_map& map, const inflation_options& options = {}) {
   assert(options.radius >= 0.0 && options.cost_scaling >= 0.0);
   const image<float> squared = squared_floor_distances(map.states);
+  const double rounding = 1e-9 * map.resolution;  // three cells of 0.05 m are at most 0.15 m apart
   image<std::uint8_t> costs(map.states.width(), map.states.height(), floor_cost::free_space);
   for (std::size_t i = 0; i != squared.pixels().size(); ++i) {
     const double d = std::sqrt(static_cast<double>(squared.pixels()[i])) * map.resolution;
     std::uint8_t& cost = costs.pixels()[i];
     if (map.states.pixels()[i] == floor_state::occupied) {
       cost = floor_cost::lethal;
-    } else if (d <= options.radius) {
+    } else if (d <= options.radius + rounding) {
       cost = floor_cost::inscribed;
     } else if (map.states.pixels()[i] == floor_state::unknown) {
       cost = floor_cost::no_information;
-    } else if (d <= options.inflation_radius) {
-      cost = static_cast<std::uint8_t>((floor_cost::inscribed - 1) *
-                                       std::exp(-options.cost_scaling * (d - options.radius)));
+    } else if (d <= options.inflation_radius + rounding) {
+      const double beyond = std::max(0.0, d - options.radius);
+      cost = static_cast<std::uint8_t>((floor_cost::inscribed - 1) * std::exp(-options.cost_scaling * beyond));
     }
   }
   return costs;

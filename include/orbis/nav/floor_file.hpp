@@ -5,6 +5,7 @@
 
 #include <array>
 #include <charconv>
+#include <cmath>
 #include <filesystem>
 #include <ostream>
 #include <string>
@@ -20,9 +21,15 @@ namespace orbis::nav {
 /// Writes `path` (a `.yaml` file) and beside it an image of the same name that ends in `.pgm`: 0 is occupied, 254 free,
 /// 205 unknown, the row of the largest y first. The thresholds are those with which both `map_server` and Nav2 read all
 /// three back ("trinary"): `free_thresh` is 0.196, for with 0.25, which Nav2 writes by default, unknown cells are read
-/// as free. Each file is replaced at once, the image first. Errors: write_failed, invalid_argument (a name that ends in
-/// .pgm, or has a quotation mark, a backslash or a control character in it).
+/// as free. Each file is replaced at once, the image first. Errors: write_failed, invalid_argument (no name, or one
+/// that ends in .pgm, or has a quotation mark, a backslash or a control character in it; an empty map, or one whose
+/// origin or resolution is not finite; nothing is written then).
 [[nodiscard]] inline result<void> save_floor_map(const std::filesystem::path& path, const floor_map& map) {
+  const auto fits = [&](double number) { return std::isfinite(number); };
+  if (!path.has_filename()) return fail(errc::invalid_argument, path.string(), "is not the name of a file");
+  if (map.states.empty() || !fits(map.origin.x()) || !fits(map.origin.y()) ||
+      !(fits(map.resolution) && map.resolution > 0))
+    return fail(errc::invalid_argument, path.string(), "the map is empty, or its place or resolution is not a number");
   const std::filesystem::path image_path = std::filesystem::path{path}.replace_extension(".pgm");
   const std::string name = image_path.filename().string();
   if (image_path == path) return fail(errc::invalid_argument, path.string(), "is the name of the image");

@@ -34,11 +34,13 @@ class planning_view {
   /// Whether the ball with its centre at `p` (metres) touches no obstacle. False if `p` is not finite. O(1) away from
   /// obstacles, and what `overlaps` costs near them.
   [[nodiscard]] bool is_free(const vec3& p) const { return is_free(p, p); }
-  /// Whether the ball touches no obstacle on its straight way from `a` to `b` (metres). O(length / distance to the
-  /// obstacles), and what `overlaps` costs for each 4 voxels near them.
+  /// Whether the ball touches no obstacle on its straight way from `a` to `b` (metres). False if the way is longer than
+  /// four edges of the map's grid. O(length / distance to the obstacles), and what `overlaps` costs for each 4 voxels
+  /// near them.
   [[nodiscard]] bool is_free(const vec3& a, const vec3& b) const {
     if (!a.allFinite() || !b.allFinite()) return false;
     const double length = (b - a).norm(), cell = field_->grid().resolution();
+    if (!(length <= 4.0 * cell * field_->grid().cells())) return false;
     const auto at = [&](double t) -> vec3 { return t >= length ? b : vec3{a + (b - a) * (t / length)}; };
     double t = 0.0;
     do {

@@ -259,8 +259,11 @@ result<floor_map> make_floor_map(const Map& map, const ground_robot& robot, cons
   constexpr std::uint64_t most_cells = std::uint64_t{1} << 26U;
   const octree::voxel_grid& grid = map_access<Map>::grid(map);
   const double cell = grid.resolution();
-  const auto voxels = [&](double metres) { return static_cast<int>(std::ceil(metres / cell - 1e-6)); };
-  const int clear = voxels(robot.height), step = static_cast<int>(std::floor(robot.step / cell + 1e-6));
+  const auto limited = [&](double voxels) {  // no more than the grid has: a limit may be infinite
+    return static_cast<int>(std::min(voxels, static_cast<double>(std::min(grid.cells(), 1U << 24U))));
+  };
+  const auto voxels = [&](double metres) { return limited(std::ceil(metres / cell - 1e-6)); };
+  const int clear = voxels(robot.height), step = limited(std::floor(robot.step / cell + 1e-6));
 
   const std::optional<double> floor = options.floor ? options.floor : find_floor(map);
   if (!floor) return fail(errc::no_data, "", "the map has no floor");
@@ -272,7 +275,10 @@ result<floor_map> make_floor_map(const Map& map, const ground_robot& robot, cons
   };
   octree::key_box box{{0, 0, 0}, {grid.cells() - 1, grid.cells() - 1, grid.cells() - 1}};
   if (options.region) {
-    const auto named = octree::keys_between(grid, options.region->min, options.region->max);
+    const auto flat = [&](const vec3& corner) { return vec3{corner.x(), corner.y(), *floor - cell / 2}; };
+    const vec3 min = flat(options.region->min), max = flat(options.region->max);
+    if (!(min.x() <= max.x() && min.y() <= max.y())) return fail(errc::invalid_argument, "region", "is not a box");
+    const auto named = octree::keys_between(grid, min, max);
     if (!named) return fail(errc::no_data, "", "the region lies outside of the map's grid");
     box = *named;
   }
@@ -285,7 +291,7 @@ result<floor_map> make_floor_map(const Map& map, const ground_robot& robot, cons
 
   detail::floor_search search{*columns, level_of(lowest), level_of(highest), clear, step, options.unknown};
   search.drive(level_of(*floor_key));
-  search.set_radius(std::max(1, static_cast<int>(std::lround(robot.radius / cell))));
+  search.set_radius(std::max(1, limited(std::round(robot.radius / cell))));
   const image<int> beside = search.spread_levels(level_of(*floor_key));
 
   floor_map out;

@@ -49,7 +49,10 @@ class voxel_search {
   /// Looks for the shortest way from `start` to `goal` through one of the voxels `exits` (see doors). Without any, it
   /// looks at all that can be reached.
   [[nodiscard]] search_end run(const vec3& start, const vec3& goal, const std::vector<key>& exits) {
-    goal_ = goal;
+    const double half = 0.5 * grid_.resolution();
+    const vec3 lowest = vec3::Constant(grid_.center(0U) - half);
+    const vec3 highest = vec3::Constant(grid_.center(grid_.cells() - 1) + half);
+    goal_ = goal.cwiseMax(lowest).cwiseMin(highest);  // outside, the nearest point of the grid stands for it
     exits_ = exits;
     for (const key& k : doors(start)) offer(k, (grid_.center(k) - start).norm(), from_start);
     double best = std::numeric_limits<double>::infinity();  // through the exits so far
@@ -60,7 +63,7 @@ class voxel_search {
       if (e.total >= best) break;
       const double cost = at(e.at).cost;
       if (at(e.at).closed) continue;
-      if (expanded_ == max_expanded_) return search_end::stopped;
+      if (expanded_ == max_expanded_) return last_ ? search_end::found : search_end::stopped;
       at(e.at).closed = true;
       ++expanded_;
       const double away = (grid_.center(e.at) - goal_).squaredNorm();
@@ -149,16 +152,22 @@ class voxel_search {
   [[nodiscard]] bool is_passable(const key& a, const key& b) {
     return is_free(b) && view_.is_free(grid_.center(a), grid_.center(b));
   }
-  /// No way on the grid is shorter: as many steps through corners and edges as there can be.
+  /// The length of the shortest way in steps to 26 neighbours where nothing is in between; `d`: along the axes, metres.
+  [[nodiscard]] static double length_in_steps(std::array<double, 3> d) {
+    std::sort(d.begin(), d.end());
+    return std::sqrt(3.0) * d[0] + std::sqrt(2.0) * (d[1] - d[0]) + (d[2] - d[1]);
+  }
+  /// No way on the grid is shorter, to an exit and from there to the goal; without exits, to where the goal is.
   [[nodiscard]] double ahead(const key& k) const noexcept {
-    if (exits_.empty()) return 0.0;
+    if (exits_.empty()) {
+      const vec3 d = (grid_.center(k) - goal_).cwiseAbs();
+      return length_in_steps({d.x(), d.y(), d.z()});
+    }
     double least = std::numeric_limits<double>::infinity();
     for (const key& exit : exits_) {
-      const auto along = [](std::uint32_t a, std::uint32_t b) { return static_cast<double>(a > b ? a - b : b - a); };
-      std::array<double, 3> d{along(k.x, exit.x), along(k.y, exit.y), along(k.z, exit.z)};
-      std::sort(d.begin(), d.end());
-      const double steps = std::sqrt(3.0) * d[0] + std::sqrt(2.0) * (d[1] - d[0]) + (d[2] - d[1]);
-      least = std::min(least, grid_.resolution() * steps + (grid_.center(exit) - goal_).norm());
+      const auto along = [&](std::uint32_t a, std::uint32_t b) { return grid_.resolution() * (a > b ? a - b : b - a); };
+      least = std::min(least, length_in_steps({along(k.x, exit.x), along(k.y, exit.y), along(k.z, exit.z)}) +
+                                  (grid_.center(exit) - goal_).norm());
     }
     return least;
   }
