@@ -2,6 +2,7 @@
 #include "interrupts.hpp"
 
 #include <atomic>
+#include <chrono>
 #include <csignal>
 #include <cstdio>
 #include <mutex>
@@ -47,12 +48,18 @@ sigset_t watched() {
 }
 
 [[noreturn]] void wait_for_signals(const sigset_t& set) {
+  // `timeout` signals its child, and then all of the group once more: nobody asks twice within a tenth of a second.
+  constexpr std::chrono::milliseconds same{100};
+  std::chrono::steady_clock::time_point first{};
   for (;;) {
     int signal = 0;
     if (sigwait(&set, &signal) != 0) continue;
     state& s = shared();
     const std::lock_guard lock{s.mutex};
+    const auto now = std::chrono::steady_clock::now();
+    if (s.requested && now - first < same) continue;
     if (s.keeps_results && !s.requested.exchange(true)) {
+      first = now;
       std::fputs(s.notice.c_str(), stderr);
       std::fflush(stderr);
       continue;
