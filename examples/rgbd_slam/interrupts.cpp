@@ -48,18 +48,21 @@ sigset_t watched() {
 }
 
 [[noreturn]] void wait_for_signals(const sigset_t& set) {
-  // `timeout` signals its child, and then all of the group once more: nobody asks twice within a tenth of a second.
-  constexpr std::chrono::milliseconds same{100};
-  std::chrono::steady_clock::time_point first{};
+  // `timeout` sends its signal to its child, and then to the whole group: the same one twice within a tenth of a second
+  // is one.
+  constexpr std::chrono::milliseconds together{100};
+  std::chrono::steady_clock::time_point first_at{};
+  int first = 0;
   for (;;) {
     int signal = 0;
     if (sigwait(&set, &signal) != 0) continue;
     state& s = shared();
     const std::lock_guard lock{s.mutex};
     const auto now = std::chrono::steady_clock::now();
-    if (s.requested && now - first < same) continue;
+    if (s.requested && signal == first && now - first_at < together) continue;
     if (s.keeps_results && !s.requested.exchange(true)) {
-      first = now;
+      first = signal;
+      first_at = now;
       std::fputs(s.notice.c_str(), stderr);
       std::fflush(stderr);
       continue;
