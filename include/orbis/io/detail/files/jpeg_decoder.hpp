@@ -17,6 +17,7 @@
 #include <jpeglib.h>
 
 #include <orbis/core/image.hpp>
+#include <orbis/io/detail/files/jpeg_errors.hpp>
 
 namespace orbis::io::detail {
 
@@ -24,18 +25,12 @@ namespace orbis::io::detail {
 class jpeg_decoder {
  public:
   explicit jpeg_decoder(std::string_view bytes) : size_{bytes.size()} {
-    info_.err = jpeg_std_error(&trouble_.base);
-    trouble_.base.error_exit = [](j_common_ptr info) {
-      auto* own = reinterpret_cast<struct trouble*>(info->err);
-      info->err->format_message(info, own->message);
-      std::longjmp(own->jump, 1);
-    };
+    info_.err = errors_.manager();
     // Warnings are counted by hand: a decoder that goes on after a bad code makes up pixels.
-    trouble_.base.emit_message = [](j_common_ptr info, int level) {
+    errors_.base.emit_message = [](j_common_ptr info, int level) {
       if (level < 0 && info->err->num_warnings++ == 0)
-        info->err->format_message(info, reinterpret_cast<struct trouble*>(info->err)->message);
+        info->err->format_message(info, jpeg_errors::of(info->err).message);
     };
-    trouble_.base.output_message = [](j_common_ptr) {};
 
     source_.next_input_byte = reinterpret_cast<const JOCTET*>(bytes.data());
     source_.bytes_in_buffer = bytes.size();
@@ -56,7 +51,7 @@ class jpeg_decoder {
 
   /// Reads up to the pixels. False: see `message`.
   bool read_header() {
-    if (setjmp(trouble_.jump) != 0) return false;
+    if (setjmp(errors_.jump) != 0) return false;
     jpeg_create_decompress(&info_);
     info_.src = &source_;
     jpeg_read_header(&info_, TRUE);
@@ -69,7 +64,7 @@ class jpeg_decoder {
 
   /// Decodes to 8-bit colour. False: see `message`. @pre read_header() was true
   bool read_pixels(rgb8* to) {
-    if (setjmp(trouble_.jump) != 0) return false;
+    if (setjmp(errors_.jump) != 0) return false;
     info_.out_color_space = JCS_RGB;
     info_.err->num_warnings = 0;  // what a header is warned about does not change pixels
     jpeg_start_decompress(&info_);
@@ -85,27 +80,21 @@ class jpeg_decoder {
 
   [[nodiscard]] int width() const { return static_cast<int>(info_.image_width); }
   [[nodiscard]] int height() const { return static_cast<int>(info_.image_height); }
-  [[nodiscard]] std::string message() const { return trouble_.message; }
+  [[nodiscard]] std::string message() const { return errors_.message; }
 
  private:
-  struct trouble {
-    jpeg_error_mgr base;  // first: libjpeg hands a pointer to it back to us
-    std::jmp_buf jump;
-    char message[JMSG_LENGTH_MAX] = "";
-  };
-
   [[noreturn]] static void out_of_data(j_decompress_ptr info) {
-    auto* trouble = reinterpret_cast<struct trouble*>(info->err);
-    std::strncpy(trouble->message, "the file ends early", sizeof trouble->message - 1);
-    std::longjmp(trouble->jump, 1);
+    jpeg_errors& own = jpeg_errors::of(info->err);
+    std::strncpy(own.message, "the file ends early", sizeof own.message - 1);
+    std::longjmp(own.jump, 1);
   }
   bool give_up(const char* why) {
-    std::strncpy(trouble_.message, why, sizeof trouble_.message - 1);
+    std::strncpy(errors_.message, why, sizeof errors_.message - 1);
     return false;
   }
 
   jpeg_decompress_struct info_{};
-  trouble trouble_{};
+  jpeg_errors errors_{};
   jpeg_source_mgr source_{};
   std::size_t size_;
 };

@@ -16,20 +16,14 @@
 #include <jpeglib.h>
 
 #include <orbis/core/image.hpp>
+#include <orbis/io/detail/files/jpeg_errors.hpp>
 
 namespace orbis::io::detail {
 
 class jpeg_encoder {
  public:
   jpeg_encoder() {
-    info_.err = jpeg_std_error(&trouble_.base);
-    trouble_.base.error_exit = [](j_common_ptr info) {
-      auto* own = reinterpret_cast<struct trouble*>(info->err);
-      info->err->format_message(info, own->message);
-      std::longjmp(own->jump, 1);
-    };
-    trouble_.base.output_message = [](j_common_ptr) {};
-
+    info_.err = errors_.manager();
     // Not `jpeg_mem_dest`: after an error nobody knows whether its buffer was freed.
     info_.client_data = this;
     destination_.init_destination = [](j_compress_ptr info) { make_room(info); };
@@ -48,7 +42,7 @@ class jpeg_encoder {
 
   /// Encodes an image. False: see `out_of_memory` and `message`. @pre it was not called before
   bool write(image_view<const rgb8> pixels, int quality) {
-    if (setjmp(trouble_.jump) != 0) return false;
+    if (setjmp(errors_.jump) != 0) return false;
     jpeg_create_compress(&info_);
     info_.dest = &destination_;
     info_.image_width = static_cast<JDIMENSION>(pixels.width());
@@ -70,16 +64,10 @@ class jpeg_encoder {
   /// The JPEG, which is given away. @pre write() was true
   [[nodiscard]] std::string take() { return std::move(bytes_); }
   /// Whether it was want of memory that ended `write`.
-  [[nodiscard]] bool out_of_memory() const { return trouble_.base.msg_code == JERR_OUT_OF_MEMORY; }
-  [[nodiscard]] std::string message() const { return trouble_.message; }
+  [[nodiscard]] bool out_of_memory() const { return errors_.base.msg_code == JERR_OUT_OF_MEMORY; }
+  [[nodiscard]] std::string message() const { return errors_.message; }
 
  private:
-  struct trouble {
-    jpeg_error_mgr base;  // first: libjpeg hands a pointer to it back to us
-    std::jmp_buf jump;
-    char message[JMSG_LENGTH_MAX] = "";
-  };
-
   [[nodiscard]] bool grow() noexcept {
     constexpr std::size_t least = std::size_t{1} << 14U;
     try {
@@ -99,7 +87,7 @@ class jpeg_encoder {
   }
 
   jpeg_compress_struct info_{};
-  trouble trouble_{};
+  jpeg_errors errors_{};
   jpeg_destination_mgr destination_{};
   std::string bytes_;
 };

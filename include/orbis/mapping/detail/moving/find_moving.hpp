@@ -3,14 +3,11 @@
 /// What has moved away in a whole range of keyframes.
 #pragma once
 
-#include <algorithm>
-#include <cmath>
 #include <concepts>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <ranges>
-#include <utility>
 #include <vector>
 
 #include <orbis/camera/depth.hpp>
