@@ -123,11 +123,20 @@ TEST_CASE("A field follows a map whose changes are not recorded all the time") {
     add_scan(map, random);
     check();
   }
-  map_type another{0.1};  // moved in, with a log of its own that is behind
-  another.track_changes();
-  add_scan(another, random);
-  map = std::move(another);
+  for (const int scans : {1, 5, 50}) {  // moved in, with a log of its own that is behind, ahead
+    map_type another{0.1};
+    another.track_changes();
+    for (int i = 0; i != scans; ++i) add_scan(another, random);
+    map = std::move(another);
+    check();
+  }
+  map_type level{0.1};  // or level
+  level.track_changes();
+  while (level.changes().revision() != map.changes().revision()) add_scan(level, random);
+  map = std::move(level);
   check();
+  const map_type away = std::move(map);
+  check();  // NOLINT(bugprone-use-after-move): it is empty, and says so
 }
 
 TEST_CASE("A field follows a rolling window") {

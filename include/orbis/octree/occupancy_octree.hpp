@@ -390,19 +390,25 @@ class occupancy_octree {
     std::unique_ptr<scan_buffers> buffers_;
   };
 
-  /// The change log. Copies of the map begin without one; a map that is assigned to has changed as a whole.
+  /// The change log. Copies of the map begin without one, and a map that is moved to a new place takes it along. A map
+  /// that is assigned to, or moved from, has changed as a whole, and its own log says so: readers know it by its
+  /// revisions, and those of another log say nothing to them.
   struct tracking {
     change_log log;
     bool on = false;
 
     tracking() = default;
     tracking(const tracking&) noexcept {}
-    tracking(tracking&&) noexcept = default;
+    tracking(tracking&& other) noexcept : log{std::move(other.log)}, on{other.on} { other.lose(); }
     tracking& operator=(const tracking&) {
       lose();
       return *this;
     }
-    tracking& operator=(tracking&&) noexcept = default;
+    tracking& operator=(tracking&& other) noexcept {
+      lose();
+      other.lose();
+      return *this;
+    }
     ~tracking() = default;
 
     /// Marks the log as incomplete: what has just changed is not recorded.
