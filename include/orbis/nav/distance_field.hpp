@@ -19,7 +19,6 @@
 #include <array>
 #include <cassert>
 #include <cmath>
-#include <concepts>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -28,6 +27,7 @@
 
 #include <orbis/core/point.hpp>
 #include <orbis/core/types.hpp>
+#include <orbis/nav/detail/map_follower.hpp>
 #include <orbis/nav/map_access.hpp>
 #include <orbis/nav/squared_distances.hpp>
 #include <orbis/octree/change_log.hpp>
@@ -151,13 +151,8 @@ class distance_field : public metric_distances<squared_distances> {
   /// the field + octants of the map) more. @pre the same map every time, of the same grid
   template <planning_map Map>
   void update(const Map& map) {
-    if constexpr (has_change_log<Map>) {
-      const octree::change_log& log = map.changes();
-      if (seen_ && *seen_ > log.revision()) seen_.reset();  // a map that was moved in
-      update(map, log, log.revision());
-    } else {
-      update_all(map);
-    }
+    assert(map_access<Map>::grid(map) == grid_);
+    follower_.follow(map, changed_in(map), [&] { compare_all(map); });
   }
   /// Follows a copy of the map (a snapshot), with the log of the map that it is a copy of. `revision`: of the log when
   /// the copy was made. The log may have gone on since then, and the copy may be
@@ -172,27 +167,14 @@ class distance_field : public metric_distances<squared_distances> {
   template <planning_map Map>
   void update(const Map& copy, const octree::change_log& log, std::uint64_t revision) {
     assert(map_access<Map>::grid(copy) == grid_);
-    assert(revision <= log.revision());
-    // Where both are older than the log, it names more octants than have changed between them, never fewer.
-    const std::uint64_t since = seen_ ? std::min(*seen_, revision) : 0;
-    if (!seen_ || since < log.complete_since() || log.revision() == 0) {
-      compare_all(copy);
-    } else if (*seen_ != revision) {
-      octants_.clear();
-      auto octants = map_access<Map>::octants(copy);
-      log.for_each_since(since, [&](const octree::voxel_key& k, std::uint64_t) {
-        octants_.push_back({k, obstacles(octants(k))});
-      });
-      apply();
-    }
-    seen_ = revision;
+    follower_.follow(log, revision, changed_in(copy), [&] { compare_all(copy); });
   }
   /// Follows the map by comparing everything, whatever its log says.
   template <planning_map Map>
   void update_all(const Map& map) {
+    assert(map_access<Map>::grid(map) == grid_);
     compare_all(map);
-    seen_.reset();
-    if constexpr (has_change_log<Map>) seen_ = map.changes().revision();
+    follower_.see(map);
   }
 
   /// The centre of the obstacle nearest to the voxel that `p` lies in, metres; empty if there is none within reach.
@@ -215,14 +197,19 @@ class distance_field : public metric_distances<squared_distances> {
   }
 
  private:
-  template <class Map>
-  static constexpr bool has_change_log = requires(const Map& map) {
-    { map.changes() } -> std::convertible_to<const octree::change_log&>;
-  };
-
+  template <planning_map Map>
+  [[nodiscard]] auto changed_in(const Map& map) {
+    return [this, &map](const octree::change_log& log, std::uint64_t since) {
+      octants_.clear();
+      auto octants = map_access<Map>::octants(map);
+      log.for_each_since(since, [&](const octree::voxel_key& k, std::uint64_t) {
+        octants_.push_back({k, obstacles(octants(k))});
+      });
+      apply();
+    };
+  }
   template <planning_map Map>
   void compare_all(const Map& map) {
-    assert(map_access<Map>::grid(map) == grid_);
     octants_.clear();
     auto octants = map_access<Map>::octants(map);
     voxels_.for_each_brick([&](const octree::voxel_key& low, auto&&) {
@@ -255,7 +242,7 @@ class distance_field : public metric_distances<squared_distances> {
   }
 
   distance_field_options options_;
-  std::optional<std::uint64_t> seen_;  ///< the revision of the map whose field this is
+  detail::map_follower follower_;
   std::vector<octant_obstacles> octants_;
 };
 

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// What has to be looked at again of something that was derived from a map, by the map's change log.
+#pragma once
+
+#include <algorithm>
+#include <cassert>
+#include <concepts>
+#include <cstdint>
+#include <optional>
+
+#include <orbis/octree/change_log.hpp>
+
+namespace orbis::nav::detail {
+
+/// A map that records its changes.
+template <class Map>
+concept has_change_log = requires(const Map& map) {
+  { map.changes() } -> std::convertible_to<const octree::change_log&>;
+};
+
+/// Remembers which revision of a map was seen last.
+class map_follower {
+ public:
+  /// Brings something up to date with `map` by `some(log, since)` or `all()`, as below; by `all()` if the map has no
+  /// log.
+  template <class Map, class Some, class All>
+  void follow(const Map& map, Some&& some, All&& all) {
+    if constexpr (has_change_log<Map>) {
+      const octree::change_log& log = map.changes();
+      if (seen_ && *seen_ > log.revision()) seen_.reset();  // a map that was moved in
+      follow(log, log.revision(), some, all);
+    } else {
+      all();
+    }
+  }
+  /// The same for a copy of the map of `log`, made at `revision`. Calls `some(log, since)` if all that may be different
+  /// from what was seen last has changed after revision `since`, `all()` if the log does not know, and nothing if this
+  /// revision was the last one.
+  template <class Some, class All>
+  void follow(const octree::change_log& log, std::uint64_t revision, Some&& some, All&& all) {
+    assert(revision <= log.revision());
+    // Where both are older than the log, it names more octants than have changed between them, never fewer.
+    const std::uint64_t since = seen_ ? std::min(*seen_, revision) : 0;
+    if (!seen_ || since < log.complete_since() || log.revision() == 0)
+      all();
+    else if (*seen_ != revision)
+      some(log, since);
+    seen_ = revision;
+  }
+  /// The present revision of `map` has been seen.
+  template <class Map>
+  void see(const Map& map) {
+    seen_.reset();
+    if constexpr (has_change_log<Map>) seen_ = map.changes().revision();
+  }
+
+ private:
+  std::optional<std::uint64_t> seen_;
+};
+
+}  // namespace orbis::nav::detail

@@ -1,0 +1,315 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Where the known space of a map ends and the unknown begins: what a robot that explores has to look at next.
+///
+/// B. Yamauchi, "A frontier-based approach for autonomous exploration", CIRA 1997.
+///
+/// @code
+///   map.track_changes();
+///   orbis::nav::frontiers frontiers{map};
+///   ...
+///   map.integrate(depth, camera, T_world_camera);
+///   frontiers.update(map);                                        // what changed since the last update
+///   for (const orbis::nav::frontier_cluster& c : frontiers.clusters({.min_size = 20})) consider(c.center);
+/// @endcode
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cassert>
+#include <concepts>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <numeric>
+#include <utility>
+#include <vector>
+
+#include <orbis/core/hash_index.hpp>
+#include <orbis/core/types.hpp>
+#include <orbis/nav/detail/frontier/octant_bits.hpp>
+#include <orbis/nav/detail/map_follower.hpp>
+#include <orbis/nav/map_access.hpp>
+#include <orbis/octree/change_log.hpp>
+#include <orbis/octree/key.hpp>
+#include <orbis/octree/octants.hpp>
+
+namespace orbis::nav {
+
+/// Frontier voxels in an octant of 4x4x4 voxels: bit i is the voxel at place i of the Morton curve.
+struct frontier_octant {
+  octree::voxel_key octant;  ///< its lowest voxel
+  std::uint64_t mask = 0;
+  friend bool operator==(const frontier_octant&, const frontier_octant&) = default;
+};
+
+/// Frontier voxels that hang together: each is one of the 26 neighbours of another one.
+struct frontier_cluster {
+  std::size_t size = 0;                    ///< voxels
+  vec3 center = vec3::Zero();              ///< mean of the voxels' centres, metres
+  octree::voxel_key voxel;                 ///< the frontier voxel whose centre is nearest to `center`
+  std::vector<frontier_octant> octants{};  ///< all of its voxels, in Morton order
+};
+
+struct cluster_options {
+  std::size_t min_size = 1;  ///< of a cluster, voxels
+};
+
+/// The frontier of a map: the free voxels of which one of the six neighbours across a face is unknown. What lies
+/// outside of the grid is not unknown: nobody can look there. The frontier is that of the map as it is, whatever the
+/// order of changes.
+///
+/// Octants are bit masks, so that a few shifts and ands give the frontier of 64 voxels. Only masks with a voxel in them
+/// are kept, 48 to 64 bytes for each. One thread at a time.
+class frontiers {
+ public:
+  /// Of an empty map.
+  explicit frontiers(const octree::voxel_grid& grid) : grid_{grid} {}
+  /// Of `map` as it is.
+  template <planning_map Map>
+  explicit frontiers(const Map& map) : frontiers{map_access<Map>::grid(map)} {
+    update(map);
+  }
+
+  /// Follows the map by its change log, as distance_field::update does. O(octants that changed) on average; if the log
+  /// does not know, O(octants of the map). @pre the same map every time, of the same grid
+  template <planning_map Map>
+  void update(const Map& map) {
+    assert(map_access<Map>::grid(map) == grid_);
+    follower_.follow(map, changed_in(map), [&] { make_afresh(map); });
+  }
+  /// Follows a copy of the map, as distance_field::update does.
+  /// @pre revision <= log.revision(); copies of the same map every time, of the same grid
+  template <planning_map Map>
+  void update(const Map& copy, const octree::change_log& log, std::uint64_t revision) {
+    assert(map_access<Map>::grid(copy) == grid_);
+    follower_.follow(log, revision, changed_in(copy), [&] { make_afresh(copy); });
+  }
+  /// Looks at the whole map, whatever its log says.
+  template <planning_map Map>
+  void update_all(const Map& map) {
+    assert(map_access<Map>::grid(map) == grid_);
+    make_afresh(map);
+    follower_.see(map);
+  }
+
+  /// How many voxels there are. O(1)
+  [[nodiscard]] std::size_t size() const noexcept { return size_; }
+  [[nodiscard]] bool empty() const noexcept { return size_ == 0; }
+  /// Whether the voxel belongs to the frontier. O(1)
+  [[nodiscard]] bool contains(const octree::voxel_key& k) const noexcept {
+    const std::uint64_t code = octree::morton_code(k);
+    const std::uint32_t i = index_.find(code >> 6U);
+    return i != hash_index::none && (found_[i].mask >> (code & 63U) & 1U) != 0;
+  }
+  /// All octants in which there is a voxel of the frontier, in Morton order. O(n log n)
+  [[nodiscard]] std::vector<frontier_octant> octants() const {
+    std::vector<std::uint32_t> order(found_.size());
+    std::iota(order.begin(), order.end(), 0U);
+    std::sort(order.begin(), order.end(), [&](auto a, auto b) { return found_[a].name < found_[b].name; });
+    std::vector<frontier_octant> out;
+    out.reserve(order.size());
+    for (const std::uint32_t i : order) out.push_back({octree::morton_key(found_[i].name << 6U), found_[i].mask});
+    return out;
+  }
+  /// The voxels by what hangs together: the largest cluster first, of equal ones that with the lowest voxel along the
+  /// Morton curve. O(n log n)
+  [[nodiscard]] std::vector<frontier_cluster> clusters(const cluster_options& options = {}) const;
+
+  [[nodiscard]] const octree::voxel_grid& grid() const noexcept { return grid_; }
+  /// Bytes on the heap.
+  [[nodiscard]] std::size_t memory_bytes() const noexcept {
+    return index_.memory_bytes() + found_.capacity() * sizeof(entry) + stale_.capacity() * sizeof(std::uint64_t);
+  }
+
+ private:
+  struct entry {
+    std::uint64_t name;  ///< of the octant: its Morton code
+    std::uint64_t mask;
+  };
+
+  /// The octant beside the one of `k`, across the lower or upper face.
+  [[nodiscard]] static octree::voxel_key beside(octree::voxel_key k, unsigned axis, bool up) noexcept {
+    std::uint32_t& c = axis == 0 ? k.x : axis == 1 ? k.y : k.z;
+    c = up ? c + 4U : c - 4U;
+    return k;
+  }
+  [[nodiscard]] bool is_inside(const octree::voxel_key& k) const noexcept {
+    return std::max({k.x, k.y, k.z}) < grid_.cells();  // below 0 wraps around
+  }
+  /// The frontier in the octant of `k`. `octants`: of the map.
+  template <class Octants>
+  [[nodiscard]] std::uint64_t frontier_in(Octants& octants, const octree::voxel_key& k) const {
+    const octree::octant_states here = octants(k);
+    const std::uint64_t free = here.free();
+    if (free == 0) return 0;
+    std::uint64_t beside_unknown = 0;
+    for (unsigned axis = 0; axis != 3; ++axis) {
+      beside_unknown |= detail::moved_up(~here.known, axis) | detail::moved_down(~here.known, axis);
+      for (const bool up : {false, true}) {
+        const std::uint64_t layer = free & (up ? detail::highest_layer(axis) : detail::lowest_layer(axis));
+        const octree::voxel_key n = beside(k, axis, up);
+        if ((layer & ~beside_unknown) == 0 || !is_inside(n)) continue;
+        const std::uint64_t unknown = ~octants(n).known;
+        beside_unknown |= up ? detail::spilled_down(unknown, axis) : detail::spilled_up(unknown, axis);
+      }
+    }
+    return free & beside_unknown;
+  }
+
+  template <class Map>
+  [[nodiscard]] auto changed_in(const Map& map) {
+    return [this, &map](const octree::change_log& log, std::uint64_t since) {
+      stale_.clear();
+      log.for_each_since(since, [&](const octree::voxel_key& k, std::uint64_t mask) {
+        stale_.push_back(octree::morton_code(k) >> 6U);
+        for (unsigned axis = 0; axis != 3; ++axis)
+          for (const bool up : {false, true}) {
+            if ((mask & (up ? detail::highest_layer(axis) : detail::lowest_layer(axis))) == 0) continue;
+            if (const octree::voxel_key n = beside(k, axis, up); is_inside(n))
+              stale_.push_back(octree::morton_code(n) >> 6U);
+          }
+      });
+      std::sort(stale_.begin(), stale_.end());
+      stale_.erase(std::unique(stale_.begin(), stale_.end()), stale_.end());
+      auto octants = map_access<Map>::octants(map);
+      for (const std::uint64_t name : stale_) set(name, frontier_in(octants, octree::morton_key(name << 6U)));
+      // What usual updates need is kept, so that these allocate nothing.
+      constexpr std::size_t few = (std::size_t{1} << 20U) / sizeof(std::uint64_t);
+      if (stale_.capacity() > std::max(few, 8 * found_.size())) stale_ = {};
+    };
+  }
+  template <class Map>
+  void make_afresh(const Map& map) {
+    index_.clear();
+    found_.clear();
+    size_ = 0;
+    auto octants = map_access<Map>::octants(map);
+    map_access<Map>::for_each_octant(map, [&](const octree::voxel_key& low, int level, const octree::octant_states& s) {
+      if (s.free() == 0) return;
+      const std::uint32_t cells = octree::node_cells(level);
+      const auto find_in = [&](std::uint32_t x, std::uint32_t y, std::uint32_t z) {
+        const octree::voxel_key k{low.x + x, low.y + y, low.z + z};
+        set(octree::morton_code(k) >> 6U, frontier_in(octants, k));
+      };
+      // Of larger cubes, all of whose octants are the same: if everything is known, the outermost octants.
+      const bool is_hollow = ~s.known == 0;
+      for (std::uint32_t z = 0; z != cells; z += 4)
+        for (std::uint32_t y = 0; y != cells; y += 4) {
+          const bool is_outermost = z == 0 || y == 0 || z + 4 == cells || y + 4 == cells;
+          const std::uint32_t step = is_hollow && !is_outermost && cells > 4 ? cells - 4 : 4;
+          for (std::uint32_t x = 0; x < cells; x += step) find_in(x, y, z);
+        }
+    });
+  }
+  void set(std::uint64_t name, std::uint64_t mask) {
+    const std::uint32_t i = index_.find(name);
+    if (i == hash_index::none) {
+      if (mask == 0) return;
+      index_.set(name, static_cast<std::uint32_t>(found_.size()));
+      found_.push_back({name, mask});
+    } else {
+      size_ -= static_cast<std::size_t>(std::popcount(found_[i].mask));
+      found_[i].mask = mask;
+      if (mask == 0) {
+        index_.erase(name);
+        if (i + 1 != found_.size()) {
+          found_[i] = found_.back();
+          index_.set(found_[i].name, i);
+        }
+        found_.pop_back();
+      }
+    }
+    size_ += static_cast<std::size_t>(std::popcount(mask));
+  }
+
+  octree::voxel_grid grid_;
+  detail::map_follower follower_;
+  hash_index index_;  ///< places in found_
+  std::vector<entry> found_;
+  std::size_t size_ = 0;
+  std::vector<std::uint64_t> stale_;
+};
+
+inline std::vector<frontier_cluster> frontiers::clusters(const cluster_options& options) const {
+  // Pieces that hang together within an octant, and then the pieces that touch.
+  struct piece {
+    std::uint32_t octant;
+    std::uint64_t mask;
+    std::uint32_t parent;
+  };
+  const std::vector<frontier_octant> all = octants();
+  std::vector<piece> pieces;
+  std::vector<std::uint32_t> first(all.size() + 1);
+  hash_index places;
+  for (std::uint32_t i = 0; i != all.size(); ++i) {
+    places.set(octree::morton_code(all[i].octant) >> 6U, i);
+    for (std::uint64_t rest = all[i].mask; rest != 0;) {
+      std::uint64_t grown = rest & (~rest + 1), before = 0;
+      while (grown != before) before = std::exchange(grown, detail::dilated(grown, {0, 0, 0}) & rest);
+      rest &= ~grown;
+      const auto n = static_cast<std::uint32_t>(pieces.size());
+      pieces.push_back({i, grown, n});
+    }
+    first[i + 1] = static_cast<std::uint32_t>(pieces.size());
+  }
+  const auto root = [&](std::uint32_t p) {
+    while (pieces[p].parent != p) p = pieces[p].parent = pieces[pieces[p].parent].parent;
+    return p;
+  };
+  for (std::uint32_t i = 0; i != all.size(); ++i)
+    for (int direction = 14; direction != 27; ++direction) {  // half of the 26: the others look back
+      const std::array<int, 3> offset{direction % 3 - 1, direction / 3 % 3 - 1, direction / 9 - 1};
+      if (detail::dilated(all[i].mask, offset) == 0) continue;
+      const auto along = [](std::uint32_t c, int by) { return c + static_cast<std::uint32_t>(4 * by); };
+      const octree::voxel_key k{along(all[i].octant.x, offset[0]), along(all[i].octant.y, offset[1]),
+                                along(all[i].octant.z, offset[2])};
+      const std::uint32_t other = is_inside(k) ? places.find(octree::morton_code(k) >> 6U) : hash_index::none;
+      if (other == hash_index::none) continue;
+      for (std::uint32_t a = first[i]; a != first[i + 1]; ++a)
+        for (std::uint32_t b = first[other]; b != first[other + 1]; ++b)
+          if ((detail::dilated(pieces[a].mask, offset) & pieces[b].mask) != 0) {
+            const std::uint32_t ra = root(a), rb = root(b);
+            pieces[std::max(ra, rb)].parent = std::min(ra, rb);  // the root is the first piece
+          }
+    }
+
+  std::vector<frontier_cluster> out;
+  std::vector<std::uint32_t> number(pieces.size());
+  for (std::uint32_t p = 0; p != pieces.size(); ++p) {
+    const std::uint32_t r = root(p);
+    if (r == p) {
+      number[p] = static_cast<std::uint32_t>(out.size());
+      out.emplace_back();
+    }
+    frontier_cluster& c = out[number[r]];
+    c.size += static_cast<std::size_t>(std::popcount(pieces[p].mask));
+    if (const octree::voxel_key& k = all[pieces[p].octant].octant; !c.octants.empty() && c.octants.back().octant == k)
+      c.octants.back().mask |= pieces[p].mask;
+    else
+      c.octants.push_back({k, pieces[p].mask});
+  }
+  std::erase_if(out, [&](const frontier_cluster& c) { return c.size < options.min_size; });
+  for (frontier_cluster& c : out) {
+    const auto for_each_voxel = [&](auto&& visit) {
+      for (const frontier_octant& o : c.octants)
+        for (std::uint64_t rest = o.mask; rest != 0; rest &= rest - 1) {
+          const octree::voxel_key in = octree::morton_key(static_cast<std::uint64_t>(std::countr_zero(rest)));
+          visit(octree::voxel_key{o.octant.x + in.x, o.octant.y + in.y, o.octant.z + in.z});
+        }
+    };
+    for_each_voxel([&](const octree::voxel_key& k) { c.center += grid_.center(k); });
+    c.center /= static_cast<double>(c.size);
+    double nearest = std::numeric_limits<double>::infinity();
+    for_each_voxel([&](const octree::voxel_key& k) {
+      const double away = (grid_.center(k) - c.center).squaredNorm();
+      if (away < nearest) nearest = away, c.voxel = k;
+    });
+  }
+  std::stable_sort(out.begin(), out.end(),
+                   [](const frontier_cluster& a, const frontier_cluster& b) { return a.size > b.size; });
+  return out;
+}
+
+}  // namespace orbis::nav
