@@ -8,6 +8,7 @@
 /// | floor_map.hpp | where a robot that drives can go: free, occupied and unknown cells of the floor |
 /// | floor_cost.hpp | costs near obstacles, as Nav2's costmaps have them |
 /// | floor_file.hpp | floor maps as files for the map servers of ROS and Nav2 |
+/// | frontiers.hpp | where known space ends and unknown space begins; follows the map |
 /// | planning_view.hpp | whether a round robot fits, at rest or along a segment; exact |
 /// | path_search.hpp | shortest ways of a round robot through a map |
 /// | squared_distances.hpp | the same without a map: exact squared distances in voxels |
@@ -18,6 +19,7 @@
 #include <orbis/nav/floor_cost.hpp>
 #include <orbis/nav/floor_file.hpp>
 #include <orbis/nav/floor_map.hpp>
+#include <orbis/nav/frontiers.hpp>
 #include <orbis/nav/map_access.hpp>
 #include <orbis/nav/path_search.hpp>
 #include <orbis/nav/planning_view.hpp>

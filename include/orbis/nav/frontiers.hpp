@@ -18,11 +18,11 @@
 #include <array>
 #include <bit>
 #include <cassert>
-#include <concepts>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <numeric>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -65,7 +65,8 @@ struct cluster_options {
 class frontiers {
  public:
   /// Of an empty map.
-  explicit frontiers(const octree::voxel_grid& grid) : grid_{grid} {}
+  explicit frontiers(const octree::voxel_grid& grid)
+      : grid_{grid}, last_{octree::morton_code({grid.cells() - 1, grid.cells() - 1, grid.cells() - 1}) >> 6U} {}
   /// Of `map` as it is.
   template <planning_map Map>
   explicit frontiers(const Map& map) : frontiers{map_access<Map>::grid(map)} {
@@ -129,33 +130,54 @@ class frontiers {
     std::uint64_t mask;
   };
 
-  /// The octant beside the one of `k`, across the lower or upper face.
-  [[nodiscard]] static octree::voxel_key beside(octree::voxel_key k, unsigned axis, bool up) noexcept {
-    std::uint32_t& c = axis == 0 ? k.x : axis == 1 ? k.y : k.z;
-    c = up ? c + 4U : c - 4U;
-    return k;
-  }
-  [[nodiscard]] bool is_inside(const octree::voxel_key& k) const noexcept {
-    return std::max({k.x, k.y, k.z}) < grid_.cells();  // below 0 wraps around
-  }
-  /// The frontier in the octant of `k`. `octants`: of the map.
+  /// Octants of a map by their Morton codes. Some are remembered by the low bits of these: one of each place in a cube.
   template <class Octants>
-  [[nodiscard]] std::uint64_t frontier_in(Octants& octants, const octree::voxel_key& k) const {
-    const octree::octant_states here = octants(k);
+  class octant_cache {
+   public:
+    explicit octant_cache(Octants octants) : octants_{std::move(octants)} { names_.fill(~std::uint64_t{0}); }
+    [[nodiscard]] const octree::octant_states& operator()(std::uint64_t name) {
+      const auto i = static_cast<std::size_t>(name & (names_.size() - 1));
+      if (names_[i] != name) {
+        names_[i] = name;
+        states_[i] = octants_(octree::morton_key(name << 6U));
+      }
+      return states_[i];
+    }
+
+   private:
+    Octants octants_;
+    std::array<std::uint64_t, 1024> names_;
+    std::array<octree::octant_states, 1024> states_;
+  };
+
+  /// Calls `visit(name, is above)` for the octants beside that of Morton code `name`, as far as they lie in the grid.
+  template <unsigned Axis, class Visit>
+  void for_each_beside(std::uint64_t name, Visit&& visit) const {
+    constexpr std::uint64_t one = std::uint64_t{1} << Axis, along = 0x1249249249249249U << Axis;
+    const std::uint64_t here = name & along, others = name & ~along;
+    if (here != 0) visit(others | ((here - one) & along), std::false_type{});
+    if (here != (last_ & along)) visit(others | (((here | ~along) + one) & along), std::true_type{});
+  }
+  /// The frontier in an octant. `octants`: of the map.
+  template <class Octants>
+  [[nodiscard]] std::uint64_t frontier_in(Octants& octants, std::uint64_t name) const {
+    const octree::octant_states here = octants(name);
     const std::uint64_t free = here.free();
     if (free == 0) return 0;
-    std::uint64_t beside_unknown = 0;
-    for (unsigned axis = 0; axis != 3; ++axis) {
-      beside_unknown |= detail::moved_up(~here.known, axis) | detail::moved_down(~here.known, axis);
-      for (const bool up : {false, true}) {
-        const std::uint64_t layer = free & (up ? detail::highest_layer(axis) : detail::lowest_layer(axis));
-        const octree::voxel_key n = beside(k, axis, up);
-        if ((layer & ~beside_unknown) == 0 || !is_inside(n)) continue;
-        const std::uint64_t unknown = ~octants(n).known;
-        beside_unknown |= up ? detail::spilled_down(unknown, axis) : detail::spilled_up(unknown, axis);
-      }
-    }
-    return free & beside_unknown;
+    std::uint64_t found = 0;  // that a neighbour is unknown, of any voxel
+    const auto look = [&]<unsigned Axis>(std::integral_constant<unsigned, Axis>) {
+      found |= detail::moved_up(~here.known, Axis) | detail::moved_down(~here.known, Axis);
+      for_each_beside<Axis>(name, [&](std::uint64_t beside, auto is_above) {
+        const std::uint64_t layer = free & (is_above ? detail::highest_layer(Axis) : detail::lowest_layer(Axis));
+        if ((layer & ~found) == 0) return;
+        const std::uint64_t unknown = ~octants(beside).known;
+        found |= is_above ? detail::spilled_down(unknown, Axis) : detail::spilled_up(unknown, Axis);
+      });
+    };
+    look(std::integral_constant<unsigned, 0>{});
+    look(std::integral_constant<unsigned, 1>{});
+    look(std::integral_constant<unsigned, 2>{});
+    return free & found;
   }
 
   template <class Map>
@@ -163,18 +185,22 @@ class frontiers {
     return [this, &map](const octree::change_log& log, std::uint64_t since) {
       stale_.clear();
       log.for_each_since(since, [&](const octree::voxel_key& k, std::uint64_t mask) {
-        stale_.push_back(octree::morton_code(k) >> 6U);
-        for (unsigned axis = 0; axis != 3; ++axis)
-          for (const bool up : {false, true}) {
-            if ((mask & (up ? detail::highest_layer(axis) : detail::lowest_layer(axis))) == 0) continue;
-            if (const octree::voxel_key n = beside(k, axis, up); is_inside(n))
-              stale_.push_back(octree::morton_code(n) >> 6U);
-          }
+        const std::uint64_t name = octree::morton_code(k) >> 6U;
+        stale_.push_back(name);
+        const auto add = [&]<unsigned Axis>(std::integral_constant<unsigned, Axis>) {
+          for_each_beside<Axis>(name, [&](std::uint64_t beside, auto is_above) {
+            if ((mask & (is_above ? detail::highest_layer(Axis) : detail::lowest_layer(Axis))) != 0)
+              stale_.push_back(beside);
+          });
+        };
+        add(std::integral_constant<unsigned, 0>{});
+        add(std::integral_constant<unsigned, 1>{});
+        add(std::integral_constant<unsigned, 2>{});
       });
       std::sort(stale_.begin(), stale_.end());
       stale_.erase(std::unique(stale_.begin(), stale_.end()), stale_.end());
-      auto octants = map_access<Map>::octants(map);
-      for (const std::uint64_t name : stale_) set(name, frontier_in(octants, octree::morton_key(name << 6U)));
+      octant_cache octants{map_access<Map>::octants(map)};
+      for (const std::uint64_t name : stale_) set(name, frontier_in(octants, name));
       // What usual updates need is kept, so that these allocate nothing.
       constexpr std::size_t few = (std::size_t{1} << 20U) / sizeof(std::uint64_t);
       if (stale_.capacity() > std::max(few, 8 * found_.size())) stale_ = {};
@@ -185,13 +211,13 @@ class frontiers {
     index_.clear();
     found_.clear();
     size_ = 0;
-    auto octants = map_access<Map>::octants(map);
+    octant_cache octants{map_access<Map>::octants(map)};
     map_access<Map>::for_each_octant(map, [&](const octree::voxel_key& low, int level, const octree::octant_states& s) {
       if (s.free() == 0) return;
       const std::uint32_t cells = octree::node_cells(level);
       const auto find_in = [&](std::uint32_t x, std::uint32_t y, std::uint32_t z) {
-        const octree::voxel_key k{low.x + x, low.y + y, low.z + z};
-        set(octree::morton_code(k) >> 6U, frontier_in(octants, k));
+        const std::uint64_t name = octree::morton_code({low.x + x, low.y + y, low.z + z}) >> 6U;
+        set(name, frontier_in(octants, name));
       };
       // Of larger cubes, all of whose octants are the same: if everything is known, the outermost octants.
       const bool is_hollow = ~s.known == 0;
@@ -225,6 +251,7 @@ class frontiers {
   }
 
   octree::voxel_grid grid_;
+  std::uint64_t last_;  ///< the Morton code of the grid's last octant
   detail::map_follower follower_;
   hash_index index_;  ///< places in found_
   std::vector<entry> found_;
@@ -265,7 +292,8 @@ inline std::vector<frontier_cluster> frontiers::clusters(const cluster_options& 
       const auto along = [](std::uint32_t c, int by) { return c + static_cast<std::uint32_t>(4 * by); };
       const octree::voxel_key k{along(all[i].octant.x, offset[0]), along(all[i].octant.y, offset[1]),
                                 along(all[i].octant.z, offset[2])};
-      const std::uint32_t other = is_inside(k) ? places.find(octree::morton_code(k) >> 6U) : hash_index::none;
+      const bool is_inside = std::max({k.x, k.y, k.z}) < grid_.cells();  // below 0 it wraps around
+      const std::uint32_t other = is_inside ? places.find(octree::morton_code(k) >> 6U) : hash_index::none;
       if (other == hash_index::none) continue;
       for (std::uint32_t a = first[i]; a != first[i + 1]; ++a)
         for (std::uint32_t b = first[other]; b != first[other + 1]; ++b)
