@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -235,4 +237,125 @@ TEST_CASE("Distances in metres, their gradient, and what they promise") {
   CHECK(field.distance(vec3{std::nan(""), 0.0, 0.0}) == outside);
   CHECK(field.distance_and_gradient(vec3{1e9, 0.0, 0.0}).distance == outside);
   CHECK(field.clearance(vec3{1e9, 0.0, 0.0}) == 0.0);
+}
+
+namespace {
+
+/// A scan inside of the leaf, or across its face: it splits it.
+void scan_near(map_type& map, random_bits& random, const vec3& place) {
+  std::vector<vec3f> points = scan_from(random, vec3::Zero());
+  for (vec3f& p : points) p = 0.3F * p + place.cast<float>();
+  map.integrate(seq, points, place);
+}
+
+/// The distance of a place to a cube's inside or outside by the definition, squared, in voxels.
+std::uint16_t cube_distance(const voxel_key& k, const voxel_key& low, std::uint32_t cells, bool inside_is_obstacle,
+                            int reach) {
+  std::int64_t outside = 0, inside = std::numeric_limits<std::int64_t>::max();
+  for (const auto& [at, first] : {std::pair{k.x, low.x}, {k.y, low.y}, {k.z, low.z}}) {
+    const std::int64_t below = std::int64_t{first} - at, above = std::int64_t{at} - (std::int64_t{first} + cells - 1);
+    const std::int64_t away = std::max<std::int64_t>({below, above, 0});
+    outside += away * away;
+    inside = std::min({inside, 1 - below, 1 - above});
+  }
+  const std::int64_t d = inside_is_obstacle ? outside : inside > 0 ? inside * inside : 0;
+  return d > reach * reach ? nav::squared_distances::far : static_cast<std::uint16_t>(d);
+}
+
+}  // namespace
+
+TEST_CASE("Of a large leaf the field stores what is near its faces") {
+  const bool is_obstacle = GENERATE(false, true);
+  const nav::distance_field_options options{.reach = 0.5,
+                                            .unknown = is_obstacle ? occupancy::free : occupancy::occupied};
+  const voxel_key low{32768, 32768 - 256, 32768};
+  map_type map{0.1};
+  map.track_changes();
+  map.set_unknown_node(low, 8, is_obstacle ? 0.5F : -0.5F);  // 256 voxels' edge
+  distance_field field{map, options};
+  CHECK(field.is_complete());
+  CHECK(field.voxels().brick_count() > 5000);
+  CHECK(field.voxels().brick_count() < 6600);  // of 32'768
+  random_bits random{8};
+  std::size_t wrong = 0;
+  for (int i = 0; i != 100'000; ++i) {
+    const auto along = [&](std::uint32_t first) {  // most of them near a face
+      const std::uint32_t off = random.below(2) == 0 ? 20 : 276;
+      return first - 10 + random.below(off) + (random.below(2) == 0 ? 0 : 276 - off);
+    };
+    const voxel_key k{along(low.x), along(low.y), along(low.z)};
+    const std::uint16_t expected = cube_distance(k, low, 256, is_obstacle, 5);
+    wrong += field.voxels().squared(k) != expected ? 1U : 0U;
+    const auto nearest = field.voxels().nearest(k);
+    if (nearest.has_value() != (expected != nav::squared_distances::far)) ++wrong;
+    if (nearest && !field.voxels().is_obstacle(*nearest)) ++wrong;
+  }
+  CHECK(wrong == 0);
+  CHECK(differences(field, distance_field{map, options}) == 0);
+  // What splits the leaf: in its middle, and across an edge. Then everything is compared with what is left of it.
+  const vec3 middle{12.8, -12.8, 12.8};
+  for (const vec3& place : {middle, vec3{25.6, -25.6, 10.0}}) {
+    scan_near(map, random, place);
+    field.update(map);
+    CHECK(field.distance(place) < 0.5);
+  }
+  CHECK(differences(field, distance_field{map, options}) == 0);
+  const distance_field followed = field;
+  field.update_all(map);
+  CHECK(differences(field, followed) == 0);
+  const nav::distance_view before = field.view();
+  // What makes it another one, or forgets it.
+  map.transform([](float v) { return std::optional{-v}; });
+  field.update(map);
+  CHECK(differences(field, distance_field{map, options}) == 0);
+  map.transform([](float v) { return std::optional{-v}; });
+  field.update(map);
+  CHECK(map.evict_outside({middle - vec3::Constant(3.0), middle + vec3::Constant(20.0)}, [](const auto&) {}) > 0);
+  field.update(map);
+  CHECK(differences(field, distance_field{map, options}) == 0);
+  map.clear();
+  field.update(map);
+  CHECK(field.voxels().brick_count() == 0);
+  CHECK(field.voxels().squared({low.x + 70, low.y + 64, low.z + 64}) == field.voxels().elsewhere());
+  CHECK(before.voxels().squared({low.x + 70, low.y + 64, low.z + 64}) != before.voxels().elsewhere());
+}
+
+TEST_CASE("Large leaves beside each other, and ones that are too large") {
+  const bool is_obstacle = GENERATE(false, true);
+  nav::distance_field_options options{.reach = 0.3, .unknown = is_obstacle ? occupancy::free : occupancy::occupied};
+  const float value = is_obstacle ? 0.5F : -0.5F;
+  map_type map{0.1};
+  map.set_unknown_node({32768, 32768, 32768}, 8, value);         // 256 voxels
+  map.set_unknown_node({32768, 32768, 32768 - 256}, 8, value);   // below
+  map.set_unknown_node({32768 + 256, 32768, 32768}, 11, value);  // 32 voxels
+  const distance_field field{map, options};
+  CHECK(field.is_complete());
+  // Nothing is said on the side that the two have in common, but at its edge.
+  const auto inner = is_obstacle ? std::uint16_t{0} : nav::squared_distances::far;
+  CHECK_FALSE(field.voxels().is_stored({32768 + 100, 32768 + 100, 32768}));
+  CHECK(field.voxels().squared({32768 + 100, 32768 + 100, 32768}) == inner);
+  CHECK(field.voxels().squared({32768 + 100, 32768 + 100, 32767}) == inner);
+  CHECK(field.voxels().squared({32768 + 255, 32768 + 16, 32768 + 16}) == inner);
+  CHECK(field.voxels().squared({32768 + 255, 32768 + 100, 32768}) == (is_obstacle ? 0 : 1));
+  CHECK(field.voxels().squared({32768 + 257, 32768 + 100, 32768}) == (is_obstacle ? 4 : 0));
+  // All of the grid, or too much for the limit.
+  map_type whole{0.1};
+  whole.set_unknown_node({0, 0, 0}, 1, value);
+  const distance_field none{whole, options};
+  CHECK_FALSE(none.is_complete());
+  CHECK(none.voxels().brick_count() == 0);
+  for (const std::size_t most : {7000U, 11'000U}) {  // one of the two
+    options.max_bricks = most;
+    distance_field some{map, options};
+    for (int i = 0; i != 2; ++i, some.update(map)) {
+      CHECK_FALSE(some.is_complete());
+      CHECK(some.voxels().brick_count() > 5000);
+      CHECK(some.voxels().brick_count() < 9000);
+      for (std::uint32_t z = 32768 - 256; !is_obstacle && z != 32768 + 256; ++z)
+        CHECK(some.voxels().squared({32768 + 80, 32768 + 2, z}) <= field.voxels().squared({32768 + 80, 32768 + 2, z}));
+    }
+  }
+  map.clear();
+  distance_field empty{map, options};
+  CHECK(empty.is_complete());
 }

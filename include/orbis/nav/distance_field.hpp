@@ -39,6 +39,9 @@ struct distance_field_options {
   double reach = 1.0;  ///< distances beyond are not told apart, metres; 1 to 181 voxels
   /// What a voxel of which nothing is known counts as: an obstacle, or free.
   octree::occupancy unknown = octree::occupancy::occupied;
+  /// For how many bricks of 8x8x8 voxels (2.9 kB each) leaves of the map that are larger than a brick may make room:
+  /// a file of a few bytes can be a leaf as large as the grid. What goes beyond is left out, see `is_complete`.
+  std::size_t max_bricks = std::size_t{1} << 19U;
 };
 
 /// A distance and its gradient: dimensionless, of length about 1 where one obstacle is nearest.
@@ -148,7 +151,9 @@ class distance_field : public metric_distances<squared_distances> {
   /// Follows the map: by its change log (`map.changes()`), where it has one that knows all since the last update, else
   /// by comparing everything: after what the log does not record (see occupancy_octree::track_changes), and each time
   /// while changes are not tracked. Costs what squared_distances::update costs, and comparing everything O(bricks of
-  /// the field + octants of the map) more. @pre the same map every time, of the same grid
+  /// the field + octants of the map) more. Of a leaf of 256 voxels' edge or more, only what is within reach of its
+  /// faces costs time and memory; where such a leaf is new or gone since everything was compared last, the field is
+  /// made afresh. @pre the same map every time, of the same grid
   template <planning_map Map>
   void update(const Map& map) {
     assert(map_access<Map>::grid(map) == grid_);
@@ -190,6 +195,10 @@ class distance_field : public metric_distances<squared_distances> {
   /// any. O(bricks): a pointer and an atomic increment for each 4 of them; the field then clones what it writes to, 4
   /// kB at a time. On the field's own thread ask the field itself.
   [[nodiscard]] distance_view view() const { return {grid_, voxels_.view(), reach_}; }
+  /// False if leaves of the map were left out because of `max_bricks`: they count as unknown, at least in places where
+  /// the field stores nothing. With unknown space as obstacle distances are then at most too short; with unknown space
+  /// as free, obstacles are missing.
+  [[nodiscard]] bool is_complete() const noexcept { return is_complete_; }
   [[nodiscard]] const distance_field_options& options() const noexcept { return options_; }
   /// Bytes on the heap.
   [[nodiscard]] std::size_t memory_bytes() const noexcept {
@@ -208,8 +217,21 @@ class distance_field : public metric_distances<squared_distances> {
       apply();
     };
   }
+  /// From which level on leaves are told to the field as cubes.
+  static constexpr int cube_level = 8;
+
   template <planning_map Map>
   void compare_all(const Map& map) {
+    if (!find_differences(map)) {
+      voxels_ = {voxels_.reach(), grid_.cells(), voxels_.elsewhere() == 0};
+      find_differences(map);
+    }
+    apply();
+  }
+  /// Lists the octants that may be different in the map, and begins a field that has nothing yet with the cubes. False
+  /// if the cubes that it began with are no longer those of the map.
+  template <planning_map Map>
+  bool find_differences(const Map& map) {
     octants_.clear();
     auto octants = map_access<Map>::octants(map);
     voxels_.for_each_brick([&](const octree::voxel_key& low, auto&&) {
@@ -218,9 +240,36 @@ class distance_field : public metric_distances<squared_distances> {
         octants_.push_back({k, obstacles(octants(k))});
       }
     });
+    const bool is_first = voxels_.brick_count() == 0 && !voxels_.has_cubes();
+    if (is_first) cubes_ = {};
+    const std::uint64_t elsewhere = obstacles({});
+    std::vector<voxel_cube> cubes;
+    std::uint64_t in_cubes = 0, bricks = 0;
+    bool is_same = true;
+    is_complete_ = true;
     map_access<Map>::for_each_octant(map, [&](const octree::voxel_key& low, int level, const octree::octant_states& s) {
       const std::uint64_t mask = obstacles(s);
-      if (mask == obstacles({})) return;  // as where nothing is stored
+      const voxel_cube node{low, level};
+      const bool is_in_cube = voxels_.is_in_cube(node);
+      if (is_in_cube) in_cubes += volume(level);
+      if (mask == (is_in_cube ? ~elsewhere : elsewhere)) return;  // as where nothing is stored
+      if (level >= cube_level && mask == (is_in_cube ? elsewhere : ~elsewhere)) {
+        const std::uint64_t more = voxels_.bricks_of(node);
+        if (!is_in_cube && cubes_.bricks + more > options_.max_bricks) {
+          is_complete_ = false;
+        } else if (is_first) {
+          cubes.push_back(node);
+          cubes_.bricks += more;
+          cubes_.volume += volume(level);
+        } else {
+          is_same = false;
+        }
+        return;
+      }
+      if (level > 3 && (bricks += volume(level - 3)) > options_.max_bricks) {
+        is_complete_ = false;
+        return;
+      }
       const std::uint32_t cells = octree::node_cells(level);
       for (std::uint32_t z = 0; z != cells; z += 4)
         for (std::uint32_t y = 0; y != cells; y += 4)
@@ -229,8 +278,12 @@ class distance_field : public metric_distances<squared_distances> {
             if (!voxels_.is_stored(k)) octants_.push_back({k, mask});
           }
     });
-    apply();
+    if (!cubes.empty()) voxels_.begin(cubes);
+    // Parts of a cube that the map no longer knows are not visited.
+    return is_same && (is_first || in_cubes == cubes_.volume);
   }
+  /// Of a node, in voxels.
+  [[nodiscard]] static std::uint64_t volume(int level) noexcept { return std::uint64_t{1} << (3 * level); }
   void apply() {
     voxels_.update(octants_);
     // What usual updates need is kept, so that these allocate nothing.
@@ -244,6 +297,10 @@ class distance_field : public metric_distances<squared_distances> {
   distance_field_options options_;
   detail::map_follower follower_;
   std::vector<octant_obstacles> octants_;
+  struct {
+    std::uint64_t bricks = 0, volume = 0;
+  } cubes_;  ///< those that the field began with, together
+  bool is_complete_ = true;
 };
 
 }  // namespace orbis::nav

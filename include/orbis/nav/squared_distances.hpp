@@ -43,6 +43,12 @@ struct octant_obstacles {
   std::uint64_t mask = 0;
 };
 
+/// A node of an octree: a cube of 2^level voxels along each edge, at multiples of that.
+struct voxel_cube {
+  octree::voxel_key low;  ///< any voxel of it
+  int level = 0;
+};
+
 /// The distances at one moment, for readers. A copy shares its memory with the field it was taken of, and is not
 /// changed by it.
 class squared_distance_view {
@@ -54,18 +60,19 @@ class squared_distance_view {
   /// `far` if that is more than the reach. O(1), about 10 ns.
   [[nodiscard]] std::uint16_t squared(const octree::voxel_key& k) const noexcept {
     const std::uint32_t n = directory_.find(place_of(k));
-    return n == detail::brick_directory::none ? elsewhere_ : values_[n][index_of(k)];
+    return is_brick(n) ? values_[n][index_of(k)] : value_without_brick(n);
   }
   /// Whether the brick of 8x8x8 voxels that contains `k` is stored. O(1).
   [[nodiscard]] bool is_stored(const octree::voxel_key& k) const noexcept {
-    return directory_.find(place_of(k)) != detail::brick_directory::none;
+    return is_brick(directory_.find(place_of(k)));
   }
   /// How far it looks, in voxels.
   [[nodiscard]] int reach() const noexcept { return reach_; }
-  /// The value outside of all bricks, and of the grid.
+  /// The value outside of the grid, and of all bricks but those that lie in a cube (see squared_distances::begin).
   [[nodiscard]] std::uint16_t elsewhere() const noexcept { return elsewhere_; }
   /// Calls `visit(lowest voxel, values)` for every brick that is stored: 8x8x8 squared distances, x fastest. What is
-  /// not stored has the value `elsewhere()`. In no particular order.
+  /// not stored has the value `elsewhere()`, or in cubes that the field began with the opposite: 0 or `far`. In no
+  /// particular order.
   template <class Visit>
   void for_each_brick(Visit&& visit) const {
     for (std::size_t i = 0; i != values_.size(); ++i) {
@@ -86,9 +93,10 @@ class squared_distance_view {
       if (p != place_) {
         place_ = p;
         const std::uint32_t n = cursor_.find(p);
-        values_ = n == detail::brick_directory::none ? nullptr : view_->values_[n].data();
+        values_ = is_brick(n) ? view_->values_[n].data() : nullptr;
+        without_ = view_->value_without_brick(n);
       }
-      return values_ == nullptr ? view_->elsewhere_ : values_[index_of(k)];
+      return values_ == nullptr ? without_ : values_[index_of(k)];
     }
 
    private:
@@ -96,6 +104,7 @@ class squared_distance_view {
     detail::brick_directory::cursor cursor_;
     detail::brick_place place_{-1, -1, -1};
     const std::uint16_t* values_ = nullptr;
+    std::uint16_t without_ = far;
   };
 
  protected:
@@ -107,6 +116,12 @@ class squared_distance_view {
   [[nodiscard]] static detail::brick_place place_of(const octree::voxel_key& k) noexcept {
     return {static_cast<std::int32_t>(k.x >> 3U), static_cast<std::int32_t>(k.y >> 3U),
             static_cast<std::int32_t>(k.z >> 3U)};
+  }
+  /// Whether what the directory says is the number of a brick.
+  [[nodiscard]] static bool is_brick(std::uint32_t found) noexcept { return found < detail::brick_directory::inner; }
+  /// The value of all voxels of a brick that is not stored, of which the directory said `found`: 0 or `far`.
+  [[nodiscard]] std::uint16_t value_without_brick(std::uint32_t found) const noexcept {
+    return found == detail::brick_directory::inner ? static_cast<std::uint16_t>(far - elsewhere_) : elsewhere_;
   }
   [[nodiscard]] static std::size_t index_of(const octree::voxel_key& k) noexcept {
     return (k.z & 7U) << 6U | (k.y & 7U) << 3U | (k.x & 7U);
@@ -131,6 +146,18 @@ class squared_distances : public squared_distance_view {
   /// `elsewhere_is_obstacle`: what voxels are of which nothing was said, and all that lies outside of the grid.
   /// @pre 1 <= reach <= 181; cells is a multiple of 8
   squared_distances(int reach, std::uint32_t cells, bool elsewhere_is_obstacle);
+
+  /// Says that these cubes are the opposite of what lies elsewhere: full of obstacles, or free. Only bricks within
+  /// reach of their faces are stored: outside of what is full, inside of what is free (see bricks_of).
+  /// @pre before the first update; disjoint cubes of level 6 or more, in the grid
+  void begin(std::span<const voxel_cube> cubes);
+  /// How many bricks of the field one cube alone makes at most. O(1).
+  [[nodiscard]] std::uint64_t bricks_of(const voxel_cube& cube) const noexcept;
+  /// Whether a node (level 2 or more) lies in one of the cubes that the field began with. O(levels).
+  [[nodiscard]] bool is_in_cube(const voxel_cube& node) const noexcept {
+    return directory_.has_cubes() && directory_.is_in_cube(place_of(node.low), std::max(node.level - 3, 0));
+  }
+  [[nodiscard]] bool has_cubes() const noexcept { return directory_.has_cubes(); }
 
   /// Says which voxels of these octants are obstacles now; all others stay what they are. Each octant is named once.
   ///
@@ -187,12 +214,14 @@ class squared_distances : public squared_distance_view {
   };
 
   [[nodiscard]] std::uint32_t make(const detail::brick_place& p);
-  [[nodiscard]] bool is_as_elsewhere(std::uint32_t brick) const;
+  [[nodiscard]] bool is_needless(std::uint32_t brick) const;
   void remove_needless();
   void remove(std::uint32_t brick);
   [[nodiscard]] std::size_t buffer_bytes() const noexcept;
   void release_buffers();
-  [[nodiscard]] std::uint8_t far_obstacles() const noexcept { return elsewhere_ == 0 ? 0xff : 0; }
+  /// Of a brick that is not stored: whether it is full of obstacles, and a row of them as bits.
+  [[nodiscard]] bool is_full(std::uint32_t found) const noexcept { return value_without_brick(found) == 0; }
+  [[nodiscard]] std::uint8_t row_bits(std::uint32_t found) const noexcept { return is_full(found) ? 0xff : 0; }
   [[nodiscard]] std::uint16_t bound() const noexcept { return static_cast<std::uint16_t>(reach_ * reach_); }
   /// The squares of the distances of eight rows, the first `distance` rows away, eight times each.
   [[nodiscard]] const std::uint16_t* squares(int distance) const noexcept {
@@ -201,7 +230,11 @@ class squared_distances : public squared_distance_view {
   /// How far an offer of `least` reaches, in voxels; < 0 if nowhere.
   [[nodiscard]] int range_of(std::uint16_t least) const noexcept;
 
+  /// Forgets the lists of changes of the update before, and takes those of this one through all stages.
+  void begin_update();
+  void finish_update();
   void set_obstacles(std::span<const octant_obstacles> octants);
+  void list_row(const detail::brick_place& p, std::size_t row);
   void update_rows();
   void update_line(std::span<const std::uint64_t> rows);
   void spread_along_y();

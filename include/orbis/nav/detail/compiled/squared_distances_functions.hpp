@@ -41,14 +41,60 @@ ORBIS_COMPILED_ONCE squared_distances::squared_distances(int reach, std::uint32_
     }
 }
 
+ORBIS_COMPILED_ONCE std::uint64_t squared_distances::bricks_of(const voxel_cube& cube) const noexcept {
+  const auto volume = [](std::int64_t edge) { return edge <= 0 ? 0 : static_cast<std::uint64_t>(edge * edge * edge); };
+  const std::int64_t edge = std::int64_t{octree::node_cells(cube.level)} / 8, reach = bricks_in_reach_;
+  return elsewhere_ == 0 ? volume(edge) - volume(edge - 2 * reach) : volume(edge + 2 * reach) - volume(edge);
+}
+
+ORBIS_COMPILED_ONCE void squared_distances::begin(std::span<const voxel_cube> cubes) {
+  assert(stages_.empty() && !has_cubes());
+  begin_update();
+  for (const voxel_cube& c : cubes) directory_.add_cube(place_of(octree::node_key(c.low, c.level)), c.level - 3);
+  // What is near a face is worked out as a whole. An obstacle has the same value as all around it: nothing is stored.
+  const auto work_out = [&](const detail::brick_place& p) {
+    const std::uint32_t found = directory_.find(p);
+    if (!directory_.is_inside(p) || is_brick(found) || is_full(found)) return;
+    const std::uint32_t i = make(p);
+    stages_[i].stale_plane = stages_[i].stale_space = 0xff;
+    stale_plane_.push_back(i);
+    stale_space_.push_back(i);
+    for (std::size_t row = 0; row != 64; ++row) list_row(p, row);
+  };
+  for (const voxel_cube& c : cubes) {
+    const detail::brick_place low = place_of(octree::node_key(c.low, c.level));
+    const int edge = static_cast<int>(octree::node_cells(c.level) / 8), reach = bricks_in_reach_;
+    const int first = elsewhere_ == 0 ? 0 : -reach, last = elsewhere_ == 0 ? edge - 1 : edge + reach - 1;
+    const auto is_near = [&](int i) { return i < first + reach || i > last - reach; };
+    for (int z = first; z <= last; ++z)
+      for (int y = first; y <= last; ++y)
+        for (int x = first; x <= last; ++x) {
+          // Past what lies between the faces.
+          if (x == first + reach && !is_near(x) && !is_near(y) && !is_near(z)) x = last - reach + 1;
+          work_out({low.x + x, low.y + y, low.z + z});
+        }
+  }
+  finish_update();
+}
+
 ORBIS_COMPILED_ONCE void squared_distances::update(std::span<const octant_obstacles> octants) {
+  begin_update();
+  set_obstacles(octants);
+  finish_update();
+}
+
+ORBIS_COMPILED_ONCE void squared_distances::begin_update() {
   rows_.clear();
   along_.clear();
   stale_plane_.clear();
   stale_space_.clear();
   needless_.clear();
   used_kept_ = 0;
-  set_obstacles(octants);
+}
+
+ORBIS_COMPILED_ONCE void squared_distances::finish_update() {
+  std::sort(rows_.begin(), rows_.end());
+  rows_.erase(std::unique(rows_.begin(), rows_.end()), rows_.end());
   update_rows();
   spread_along_y();
   spread_along_z();
@@ -61,36 +107,39 @@ ORBIS_COMPILED_ONCE void squared_distances::update(std::span<const octant_obstac
 }
 
 ORBIS_COMPILED_ONCE std::uint32_t squared_distances::make(const detail::brick_place& p) {
-  if (const std::uint32_t found = directory_.find(p); found != none) return found;
+  const std::uint32_t found = directory_.find(p);
+  if (is_brick(found)) return found;
+  const std::uint16_t value = value_without_brick(found);
   const auto number = static_cast<std::uint32_t>(stages_.size());
   directory_.set(p, number);
   stages& s = stages_.emplace_back();
-  s.plane.fill(elsewhere_);
-  s.along.fill(elsewhere_ == 0 ? std::uint8_t{0} : far_along);
-  s.obstacles.fill(far_obstacles());
-  s.octants.fill(elsewhere_ == 0 ? ~std::uint64_t{0} : 0);
-  s.plane_top.fill(elsewhere_);
-  s.space_top.fill(elsewhere_);
+  s.plane.fill(value);
+  s.along.fill(value == 0 ? std::uint8_t{0} : far_along);
+  s.obstacles.fill(row_bits(found));
+  s.octants.fill(value == 0 ? ~std::uint64_t{0} : 0);
+  s.plane_top.fill(value);
+  s.space_top.fill(value);
   brick_values values;
-  values.fill(elsewhere_);
+  values.fill(value);
   values_.push_back(values);
   places_.push_back(p);
   return number;
 }
 
-/// Whether a brick says what is said of places without one. Distances do only if all stages do: no value is less than
-/// the distance.
-ORBIS_COMPILED_ONCE bool squared_distances::is_as_elsewhere(std::uint32_t brick) const {
+/// Whether a brick says what would be said of its place without it. Distances do only if all stages do: no value is
+/// less than the distance.
+ORBIS_COMPILED_ONCE bool squared_distances::is_needless(std::uint32_t brick) const {
+  const std::uint16_t without = value_without_brick(directory_.without_number(places_[brick]));
   const stages& s = stages_[brick];
   for (const std::uint16_t top : s.space_top)
-    if (top != elsewhere_) return false;
+    if (top != without) return false;
   const brick_values& values = values_[brick];
-  return std::all_of(values.begin(), values.end(), [&](std::uint16_t v) { return v == elsewhere_; });
+  return std::all_of(values.begin(), values.end(), [&](std::uint16_t v) { return v == without; });
 }
 
 ORBIS_COMPILED_ONCE void squared_distances::remove_needless() {
   needless_.insert(needless_.end(), stale_space_.begin(), stale_space_.end());
-  std::erase_if(needless_, [&](std::uint32_t i) { return !is_as_elsewhere(i); });
+  std::erase_if(needless_, [&](std::uint32_t i) { return !is_needless(i); });
   // From the last: the brick that takes the place of a removed one stays.
   std::sort(needless_.begin(), needless_.end(), std::greater{});
   needless_.erase(std::unique(needless_.begin(), needless_.end()), needless_.end());
@@ -144,8 +193,8 @@ ORBIS_COMPILED_ONCE void squared_distances::set_obstacles(std::span<const octant
     const detail::brick_place p = place_of(o.octant);
     assert(directory_.is_inside(p));
     if (p != last) number = directory_.find(last = p);
-    if (number == none) {
-      if (o.mask == (elsewhere_ == 0 ? ~std::uint64_t{0} : 0)) continue;
+    if (!is_brick(number)) {
+      if (o.mask == (is_full(number) ? ~std::uint64_t{0} : 0)) continue;
       number = make(p);
     }
     std::uint64_t& known =
@@ -163,14 +212,17 @@ ORBIS_COMPILED_ONCE void squared_distances::set_obstacles(std::span<const octant
       const auto now = static_cast<std::uint8_t>((rows[at] & ~(15U << x)) | static_cast<unsigned>(four << x));
       if (now == rows[at]) continue;
       rows[at] = now;
-      // Coordinates have at most 21 bits, those of bricks 18.
-      rows_.push_back(static_cast<std::uint64_t>(p.z * 8 + static_cast<int>(at >> 3U)) << 39U |
-                      static_cast<std::uint64_t>(p.y * 8 + static_cast<int>(at & 7U)) << 18U |
-                      static_cast<std::uint64_t>(p.x));
+      list_row(p, at);
     }
   }
-  std::sort(rows_.begin(), rows_.end());
-  rows_.erase(std::unique(rows_.begin(), rows_.end()), rows_.end());
+}
+
+/// `row`: z * 8 + y in the brick.
+ORBIS_COMPILED_ONCE void squared_distances::list_row(const detail::brick_place& p, std::size_t row) {
+  // Coordinates have at most 21 bits, those of bricks 18.
+  rows_.push_back(static_cast<std::uint64_t>(p.z * 8 + static_cast<int>(row >> 3U)) << 39U |
+                  static_cast<std::uint64_t>(p.y * 8 + static_cast<int>(row & 7U)) << 18U |
+                  static_cast<std::uint64_t>(p.x));
 }
 
 // -- along x
@@ -202,7 +254,7 @@ ORBIS_COMPILED_ONCE void squared_distances::update_line(std::span<const std::uin
   detail::brick_directory::cursor bricks{directory_};
   for (std::size_t i = 0; i != count; ++i) {
     line_[i] = bricks.find({from + static_cast<int>(i), y >> 3, z >> 3});
-    line_bits_[i] = line_[i] == none ? far_obstacles() : stages_[line_[i]].obstacles[row];
+    line_bits_[i] = is_brick(line_[i]) ? stages_[line_[i]].obstacles[row] : row_bits(line_[i]);
   }
   // From the voxel before, or behind, each eight to the nearest obstacle on that side.
   constexpr int beyond = far_along - 1;
@@ -226,9 +278,9 @@ ORBIS_COMPILED_ONCE void squared_distances::update_line(std::span<const std::uin
     }
     const auto after = std::bit_cast<std::uint64_t>(now);
     std::uint32_t number = line_[i];
-    if (number == none) {
+    if (!is_brick(number)) {
       const detail::brick_place p{at, y >> 3, z >> 3};
-      if (elsewhere_ == 0 || after == ~std::uint64_t{0} || !directory_.is_inside(p)) continue;
+      if (is_full(number) || after == ~std::uint64_t{0} || !directory_.is_inside(p)) continue;
       number = make(p);
     }
     std::uint8_t* const stored = stages_[number].along.data() + 8 * row;
@@ -293,7 +345,7 @@ ORBIS_COMPILED_ONCE void squared_distances::spread_along_y() {
     if (offer.least == detail::no_offer) continue;
     for_each_target(c, [&](const detail::brick_place& p, int z, const std::uint16_t* squares, int gap) {
       const std::uint32_t i = bricks->find(p);
-      if (i == none) return;
+      if (!is_brick(i)) return;
       stages& s = stages_[i];
       if ((s.stale_plane >> z & 1) != 0 || offer.least + gap > s.plane_top[static_cast<std::size_t>(z)] ||
           !kernels_.equal_rows(s.plane.data() + 64 * z, &offer, squares))
@@ -312,8 +364,8 @@ ORBIS_COMPILED_ONCE void squared_distances::spread_along_y() {
     if (offer.least == detail::no_offer) continue;
     for_each_target(c, [&](const detail::brick_place& p, int z, const std::uint16_t* squares, int gap) {
       std::uint32_t i = bricks->find(p);
-      if (i == none) {
-        if (elsewhere_ == 0 || !directory_.is_inside(p)) return;
+      if (!is_brick(i)) {
+        if (is_full(i) || !directory_.is_inside(p)) return;
         i = make(p);
         bricks.emplace(directory_);
       }
@@ -340,9 +392,9 @@ ORBIS_COMPILED_ONCE void squared_distances::make_plane(std::uint32_t brick, int 
       const int gap = 8 * step - 7;
       if (gap * gap >= top) break;
       const std::uint32_t other = directory_.find({p.x, p.y + side * step, p.z});
-      if (other != none) {
+      if (is_brick(other)) {
         top = kernels_.add_rows(best.data(), stages_[other].along.data() + 64 * z, squares(-8 * side * step));
-      } else if (elsewhere_ == 0) {  // obstacles from its nearest row on
+      } else if (is_full(other)) {  // obstacles from its nearest row on
         static constexpr std::array<std::uint8_t, 64> all{};
         top = kernels_.add_rows(best.data(), all.data(), squares(-8 * side * step));
         break;
@@ -383,7 +435,7 @@ ORBIS_COMPILED_ONCE void squared_distances::spread_along_z() {
     if (offer.least == detail::no_offer) return;
     for_each_target(p, z, [&](const detail::brick_place& target, int from, int first, int last) {
       const std::uint32_t i = bricks->find(target);
-      if (i == none) return;
+      if (!is_brick(i)) return;
       stages& s = stages_[i];
       const unsigned stale =
           kernels_.equal_slices(values_[i].data(), s.space_top.data(), &offer, from, first, last, s.stale_space);
@@ -398,8 +450,8 @@ ORBIS_COMPILED_ONCE void squared_distances::spread_along_z() {
     if (offer.least == detail::no_offer) return;
     for_each_target(p, z, [&](const detail::brick_place& target, int from, int first, int last) {
       std::uint32_t i = bricks->find(target);
-      if (i == none) {
-        if (elsewhere_ == 0 || !directory_.is_inside(target)) return;
+      if (!is_brick(i)) {
+        if (is_full(i) || !directory_.is_inside(target)) return;
         i = make(target);
         bricks.emplace(directory_);
       }
@@ -409,7 +461,8 @@ ORBIS_COMPILED_ONCE void squared_distances::spread_along_z() {
       if (offer.least + nearest * nearest >= highest) return;
       kernels_.lower_slices(values_.writable(i).data(), s.space_top.data(), &offer, from, first, last, s.stale_space,
                             bound());
-      if (elsewhere_ == 0 && std::all_of(s.space_top.begin(), s.space_top.end(), [](auto t) { return t == 0; }))
+      if ((elsewhere_ == 0 || has_cubes()) &&
+          std::all_of(s.space_top.begin(), s.space_top.end(), [](auto t) { return t == 0; }))
         needless_.push_back(i);
     });
   });
@@ -427,9 +480,9 @@ ORBIS_COMPILED_ONCE void squared_distances::make_space(std::uint32_t brick, unsi
     const std::uint32_t down = directory_.find({p.x, p.y, p.z - step});
     for (int i = 0; i != 8; ++i) {
       const auto at = static_cast<std::size_t>(8 * (step - 1) + i);
-      const std::uint16_t* const elsewhere = elsewhere_ == 0 ? obstacles.data() : nullptr;
-      above[at] = up == none ? elsewhere : stages_[up].plane.data() + 64 * i;
-      below[at] = down == none ? elsewhere : stages_[down].plane.data() + 64 * (7 - i);
+      const auto without = [&](std::uint32_t found) { return is_full(found) ? obstacles.data() : nullptr; };
+      above[at] = is_brick(up) ? stages_[up].plane.data() + 64 * i : without(up);
+      below[at] = is_brick(down) ? stages_[down].plane.data() + 64 * (7 - i) : without(down);
     }
   }
   std::array<const std::uint16_t*, detail::max_reach + 1> before, behind;
@@ -457,20 +510,20 @@ ORBIS_COMPILED_ONCE std::optional<octree::voxel_key> squared_distances::nearest(
   for (int dz = 0; dz * dz <= target; ++dz)
     for (const int l : {z - dz, z + dz}) {
       const std::uint32_t n = number_at(y, l);
-      const int plane = n == none
-                            ? int{elsewhere_}
-                            : int{stages_[n].plane[static_cast<std::size_t>((l & 7) * 64 + (y & 7) * 8 + (x & 7))]};
+      const int plane = is_brick(n)
+                            ? int{stages_[n].plane[static_cast<std::size_t>((l & 7) * 64 + (y & 7) * 8 + (x & 7))]}
+                            : int{value_without_brick(n)};
       if (plane + dz * dz != target) continue;
       for (int dy = 0; dy * dy <= plane; ++dy)
         for (const int j : {y - dy, y + dy}) {
           const std::uint32_t m = number_at(j, l);
           const auto at = static_cast<std::size_t>((l & 7) * 64 + (j & 7) * 8 + (x & 7));
-          const int along = m == none ? (elsewhere_ == 0 ? 0 : int{far_along}) : int{stages_[m].along[at]};
+          const int along = is_brick(m) ? int{stages_[m].along[at]} : is_full(m) ? 0 : int{far_along};
           if (along == far_along || along * along + dy * dy != plane) continue;
           for (const int i : {x - along, x + along}) {
             const std::uint32_t b = directory_.find({i >> 3, j >> 3, l >> 3});
             const std::uint8_t bits =
-                b == none ? far_obstacles() : stages_[b].obstacles[static_cast<std::size_t>((l & 7) * 8 + (j & 7))];
+                is_brick(b) ? stages_[b].obstacles[static_cast<std::size_t>((l & 7) * 8 + (j & 7))] : row_bits(b);
             if ((bits >> (i & 7) & 1) != 0)
               return octree::voxel_key{static_cast<std::uint32_t>(i), static_cast<std::uint32_t>(j),
                                        static_cast<std::uint32_t>(l)};

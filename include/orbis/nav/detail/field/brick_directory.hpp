@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -23,7 +24,8 @@ struct brick_place {
 /// Numbers of bricks by their places, in blocks of 8x8x8 bricks. Copies share the blocks until one of them changes.
 class brick_directory {
  public:
-  static constexpr std::uint32_t none = hash_index::none;
+  /// Instead of a number, where there is none: in one of the cubes (see add_cube), and outside of all.
+  static constexpr std::uint32_t none = hash_index::none, inner = none - 1;
 
   /// `bricks`: how many the grid is wide. What lies outside is never found.
   explicit brick_directory(std::uint32_t bricks) noexcept : bricks_{bricks} {}
@@ -32,11 +34,28 @@ class brick_directory {
     return static_cast<std::uint32_t>(p.x) < bricks_ && static_cast<std::uint32_t>(p.y) < bricks_ &&
            static_cast<std::uint32_t>(p.z) < bricks_;
   }
-  /// The number of the brick at `p`, or `none`. O(1).
+  /// The number of the brick at `p`, or `inner`, or `none`. O(1).
   [[nodiscard]] std::uint32_t find(const brick_place& p) const noexcept {
     if (!is_inside(p)) return none;
     const std::uint32_t b = blocks_.find(name(p));
-    return b == none ? none : numbers_[b][place(p)];
+    return b == none ? without_number(p) : numbers_[b][place(p)];
+  }
+  /// What `find` says of places without a number in a cube of 2^level bricks, of which `p` is any.
+  /// @pre nothing has a number; level >= 3; in the grid
+  void add_cube(const brick_place& p, int level) {
+    cubes_.set(cube_name(p, level), 0);
+    levels_ |= 1U << static_cast<unsigned>(level);
+  }
+  /// Whether a node of 2^level bricks lies in one of the cubes. O(levels).
+  [[nodiscard]] bool is_in_cube(const brick_place& p, int level) const noexcept {
+    for (unsigned levels = levels_ >> level << level; levels != 0; levels &= levels - 1)
+      if (cubes_.find(cube_name(p, std::countr_zero(levels))) != none) return true;
+    return false;
+  }
+  [[nodiscard]] bool has_cubes() const noexcept { return levels_ != 0; }
+  /// `inner` or `none`: of a place, if it had no number. O(levels of cubes).
+  [[nodiscard]] std::uint32_t without_number(const brick_place& p) const noexcept {
+    return has_cubes() && is_in_cube(p, 0) ? inner : none;
   }
   /// Sets it. @pre is_inside(p)
   void set(const brick_place& p, std::uint32_t number) {
@@ -45,7 +64,7 @@ class brick_directory {
       b = static_cast<std::uint32_t>(numbers_.size());
       blocks_.set(name(p), b);
       block empty;
-      empty.fill(none);
+      empty.fill(without_number(p));  // of all: no cube is smaller than a block
       numbers_.push_back(empty);
       names_.push_back(name(p));
     }
@@ -55,8 +74,8 @@ class brick_directory {
   void erase(const brick_place& p) {
     const std::uint32_t b = blocks_.find(name(p));
     block& numbers = numbers_.writable(b);
-    numbers[place(p)] = none;
-    if (std::any_of(numbers.begin(), numbers.end(), [](std::uint32_t n) { return n != none; })) return;
+    numbers[place(p)] = without_number(p);
+    if (std::any_of(numbers.begin(), numbers.end(), [](std::uint32_t n) { return n < inner; })) return;
     blocks_.erase(name(p));
     const auto last = static_cast<std::uint32_t>(numbers_.size() - 1);
     if (b != last) {
@@ -68,7 +87,8 @@ class brick_directory {
     names_.pop_back();
   }
   [[nodiscard]] std::size_t memory_bytes() const noexcept {
-    return blocks_.memory_bytes() + numbers_.memory_bytes() + names_.capacity() * sizeof(std::uint64_t);
+    return blocks_.memory_bytes() + cubes_.memory_bytes() + numbers_.memory_bytes() +
+           names_.capacity() * sizeof(std::uint64_t);
   }
 
   /// Looks bricks up of which each lies near the one before. Valid until the directory changes.
@@ -82,7 +102,7 @@ class brick_directory {
         const std::uint32_t b = directory_->blocks_.find(n);
         block_ = b == none ? nullptr : &directory_->numbers_[b];
       }
-      return block_ == nullptr ? none : (*block_)[place(p)];
+      return block_ == nullptr ? directory_->without_number(p) : (*block_)[place(p)];
     }
 
    private:
@@ -98,12 +118,18 @@ class brick_directory {
     return static_cast<std::uint64_t>(p.x >> 3) | static_cast<std::uint64_t>(p.y >> 3) << 20U |
            static_cast<std::uint64_t>(p.z >> 3) << 40U;
   }
+  [[nodiscard]] static std::uint64_t cube_name(const brick_place& p, int level) noexcept {
+    return static_cast<std::uint64_t>(p.x >> level) | static_cast<std::uint64_t>(p.y >> level) << 20U |
+           static_cast<std::uint64_t>(p.z >> level) << 40U | static_cast<std::uint64_t>(level) << 59U;
+  }
   [[nodiscard]] static std::size_t place(const brick_place& p) noexcept {
     return static_cast<std::size_t>((p.x & 7) | (p.y & 7) << 3 | (p.z & 7) << 6);
   }
 
   std::uint32_t bricks_;
   hash_index blocks_;
+  hash_index cubes_;     ///< by their names
+  unsigned levels_ = 0;  ///< bit l: there is a cube of 2^l bricks
   cow_pages<block> numbers_;
   std::vector<std::uint64_t> names_;  ///< of blocks
 };
