@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // Somebody who walks through a room leaves little of a trail in its live map, and nothing else is lost.
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -92,6 +93,7 @@ live live_map_of(const Policy& policy, const round_trip& trip,
       REQUIRE(judge->add_keyframe(policy, map, s.frame, depth, s.T_world_camera));
     else
       REQUIRE(map.add_keyframe(policy, s.frame, depth, s.T_world_camera));
+    while (judge && judge->due() != 0) REQUIRE(judge->revise(policy, map));
     REQUIRE(map.correct(policy));
   }
   return map;
@@ -174,13 +176,14 @@ struct still_camera {
   live map{camera, {.resolution = 0.05}};
   filter moving{camera, {.keyframes = 6}};
   std::uint64_t next = 0;
-  bool corrects = true;  // after each keyframe
+  bool revises = true, corrects = true;  // after each keyframe
 
   void see(bool board, const se3& T_world_camera = {}) {
     image<std::uint16_t> depth(64, 48, static_cast<std::uint16_t>(2.0 * scale));
     for (int y = 12; board && y != 36; ++y)
       for (int x = 20; x != 44; ++x) depth(x, y) = static_cast<std::uint16_t>(scale);
     REQUIRE(moving.add_keyframe(seq, map, next++, depth_view{depth.view(), scale}, T_world_camera));
+    while (revises && moving.due() != 0) REQUIRE(moving.revise(seq, map));
     if (corrects) REQUIRE(map.correct(seq));
   }
   /// How many pixels of the board's place a keyframe's image in the map has.
@@ -250,6 +253,43 @@ TEST_CASE("keyframes are compared at corrected poses, though the map has not fol
     CHECK(*c.moving.removed_share(frame) == 0.0);
     CHECK(c.pixels(frame) == board_pixels);
   }
+}
+
+TEST_CASE("judgements that no time was found for are made up for with the next keyframe") {
+  still_camera prompt, late;
+  late.revises = false;
+  for (int i = 0; i != 20; ++i) {
+    const bool board = i == 1 || i == 4 || i == 11 || i == 12 || i >= 15;
+    prompt.see(board);
+    late.see(board);
+    CHECK(prompt.moving.due() == 0);
+    CHECK(late.moving.due() == std::min<std::size_t>(static_cast<std::size_t>(i), 5));
+  }
+  while (late.moving.due() != 0) REQUIRE(late.moving.revise(seq, late.map));
+  for (std::uint64_t frame = 0; frame != 20; ++frame) {
+    CAPTURE(frame);
+    CHECK(late.pixels(frame) == prompt.pixels(frame));
+  }
+  REQUIRE(late.moving.revise(seq, late.map));  // nothing is due
+  late.moving.forget(19);
+  CHECK(late.moving.due() == 0);
+}
+
+TEST_CASE("what is due to be judged by a keyframe that is forgotten is due no more") {
+  still_camera c;
+  c.revises = false;
+  c.see(true);
+  c.see(true);
+  c.see(false);
+  CHECK(c.moving.due() == 2);
+  c.moving.forget(2);
+  CHECK(c.moving.due() == 0);
+  CHECK(c.pixels(0) == board_pixels);
+  c.see(false);
+  c.moving.forget(0);
+  CHECK(c.moving.due() == 1);
+  REQUIRE(c.moving.revise(seq, c.map));
+  CHECK(c.moving.due() == 0);
 }
 
 TEST_CASE("a keyframe that is forgotten is judged no more") {

@@ -312,11 +312,12 @@ class live_map_thread {
         poll();
         next_poll = clock::now() + options_.poll_interval;
       }
+      if (due() != 0) revise(options_.correction_slice);
       if (map_.pending() != 0) correct(robot);
       publish();
       lock.lock();
       if (next && next->has_image() && spare_.size() < options_.max_waiting) spare_.push_back(std::move(next->pixels));
-      pending_ = map_.pending();
+      pending_ = map_.pending() + due();
       busy_ = false;
       if (is_idle()) changed_.notify_all();
     }
@@ -328,9 +329,16 @@ class live_map_thread {
     bool inserted = false;
     switch (j.kind) {
       case job::keyframe: {
-        const bool judged = moving_ && has_pose_of_now(j);
-        if (moving_ && !judged) moving_->forget(j.frame);  // what it has is of another image, if anything
-        if (moving_ && is_gone(j.frame)) break;
+        bool judged = moving_.has_value();
+        if (moving_ && listeners_.poll_poses) {
+          // Keyframes judge each other by their poses, which have to be of one moment: those of now, this one's too.
+          const keyframe_poses& now = poll(true);
+          const auto at = std::ranges::find(now.poses, j.frame, &keyframe_position::frame);
+          judged = at != now.poses.end();
+          if (judged) j.T = at->T_world_camera;
+          if (!judged) moving_->forget(j.frame);  // what it has is of another image, if anything
+          if (std::ranges::find(now.removed, j.frame) != now.removed.end()) break;
+        }
         const auto added = judged ? moving_->add_keyframe(policy_, map_, j.frame, depth, j.T)
                                   : map_.add_keyframe(policy_, j.frame, depth, j.T);
         if (!added) report(added.error());
@@ -354,6 +362,7 @@ class live_map_thread {
       case job::poll: poll(); break;
       case job::finish:
         if (listeners_.poll_poses) poll();
+        revise(std::chrono::nanoseconds::max());
         for (;;) {  // an error removes a keyframe
           const auto finished = map_.finish(policy_);
           correction_.milliseconds += milliseconds_since(start);
@@ -370,27 +379,11 @@ class live_map_thread {
     }
     if (inserted) tell_insertion(j, waiting, milliseconds_since(start));
   }
-  /// Keyframes judge each other by their poses, which have to be of one moment: asks for those of now, and gives a new
-  /// keyframe its own. False if it has none.
-  [[nodiscard]] bool has_pose_of_now(job& j) {
-    polled_.removed.clear();
-    if (!listeners_.poll_poses) return true;
-    poll_always_ = true;
-    poll();
-    const auto at = std::find_if(polled_.poses.begin(), polled_.poses.end(),
-                                 [&](const keyframe_position& p) { return p.frame == j.frame; });
-    if (at == polled_.poses.end()) return false;
-    j.T = at->T_world_camera;
-    return true;
-  }
-  /// Whether the last poll said that this keyframe was removed.
-  [[nodiscard]] bool is_gone(std::uint64_t frame) const {
-    return std::find(polled_.removed.begin(), polled_.removed.end(), frame) != polled_.removed.end();
-  }
-  void poll() {
+  /// Asks for the present poses and tells the map; what was answered, nothing if poses are what they were.
+  const keyframe_poses& poll(bool always = false) {
     polled_.poses.clear();
     polled_.removed.clear();
-    if (!listeners_.poll_poses(polled_, std::exchange(poll_always_, false))) return;
+    if (!listeners_.poll_poses(polled_, std::exchange(poll_always_, false) || always)) return polled_;
     for (const std::uint64_t frame : polled_.removed) {
       if (moving_) moving_->forget(frame);
       map_.remove(frame);
@@ -400,6 +393,14 @@ class live_map_thread {
       jobs_.forget(polled_.removed);
     }
     map_.set_poses(polled_.poses, unlisted::hide);
+    return polled_;
+  }
+  /// How many of the last keyframes wait for a judgement by the newest.
+  [[nodiscard]] std::size_t due() const noexcept { return moving_ ? moving_->due() : 0; }
+  void revise(std::chrono::nanoseconds time) {
+    const auto start = clock::now();
+    while (due() != 0 && clock::now() - start < time)
+      if (const auto revised = moving_->revise(policy_, map_); !revised) report(revised.error());
   }
   void correct(const std::optional<vec3>& robot) {
     const auto start = clock::now();
@@ -480,7 +481,7 @@ class live_map_thread {
 
   map_type map_;  ///< belongs to the thread, as do those below
   std::optional<moving_filter<Camera>> moving_;
-  keyframe_poses polled_;
+  keyframe_poses polled_;  ///< of the last poll
   bool poll_always_ = true;
   live_correction_event correction_;
   std::thread thread_;

@@ -33,7 +33,8 @@
 namespace orbis::mapping {
 
 /// Judges the last keyframes of a live map by each other, and gives the map the result: a later keyframe whose rays
-/// pass through what an earlier one shows takes it out, and one that shows it again brings it back. The result is a
+/// pass through what an earlier one shows takes it out, and one that shows it again brings it back. A keyframe goes in
+/// first, and the others are judged by it afterwards, one at a time, so that nothing waits for that. The result is a
 /// depth image with fewer pixels (`live_map::set_depth`), so that the map stays the one of these images and the
 /// keyframes' poses. Keyframes are compared at the poses that the map was told last (`live_map::wanted_pose`), for
 /// those are of one moment; in the map, a keyframe that waits for a correction is still at an earlier one.
@@ -48,18 +49,23 @@ class moving_filter {
   explicit moving_filter(Camera camera, const moving_filter_options& options = {})
       : judge_{std::move(camera), options} {}
 
-  /// live_map::add_keyframe, without the pixels that the last keyframes look through; and then set_depth for those of
-  /// them that this one judges otherwise than before, whose change the map follows with `correct`. A keyframe with a
-  /// pose that is not finite goes to the map as it is. The same for every policy. Errors: those of both. O(pixels +
-  /// cells x keyframes), and marking. @pre as for add_keyframe; `map` is always the same
+  /// live_map::add_keyframe, without the pixels that the last keyframes look through. These are due for a judgement
+  /// then, see revise. A keyframe with a pose that is not finite goes to the map as it is. The same for every policy.
+  /// Errors: those of live_map::add_keyframe and set_depth. O(pixels + cells x keyframes), and marking.
+  /// @pre as for live_map::add_keyframe; `map` is always the same
   template <execution_policy Policy, octree::replayable_octree Octree, depth_history Depths>
   result<octree::integration_summary> add_keyframe(const Policy& policy, live_map<Octree, Camera, Depths>& map,
                                                    std::uint64_t frame, const depth_view& depth,
                                                    const se3& T_world_camera) {
+    result<void> settled{};
+    for (auto& v : judge_.views()) {
+      if (!v.due) continue;
+      judge_.ask_newest(policy, v, pose_in(map));
+      if (leaves_next(v)) settled = change(policy, map, v);
+    }
     forget(frame);
     if (!T_world_camera.to_matrix().allFinite()) return map.add_keyframe(policy, frame, depth, T_world_camera);
-    auto& now =
-        judge_.add(policy, frame, depth, T_world_camera, [&](const auto& v) { return map.wanted_pose(v.frame); });
+    auto& now = judge_.add(policy, frame, depth, T_world_camera, pose_in(map));
     result<octree::integration_summary> added{};
     if (judge_.judge(now) == 0) {
       added = map.add_keyframe(policy, frame, depth, T_world_camera);
@@ -67,20 +73,25 @@ class moving_filter {
       judge_.accept(now);
       added = map.add_keyframe(policy, frame, judge_.masked(now), T_world_camera, completeness::filtered);
     }
-    result<void> changed{};
-    for (auto& v : judge_.views()) {
-      if (&v == &now) continue;
-      const std::size_t differ = judge_.judge(v);
-      const bool leaves = judge_.is_full() && &v == &judge_.views().front();
-      if (differ == 0 ||
-          (!leaves && static_cast<double>(differ) < options().least_change * static_cast<double>(v.cells.size())))
-        continue;
-      judge_.accept(v);
-      if (!map.contains(v.frame)) continue;
-      if (auto set = map.set_depth(policy, v.frame, judge_.masked(v)); !set && changed) changed = std::move(set);
-    }
-    if (added && !changed) return fail(std::move(changed.error()));
+    if (added && !settled) return fail(std::move(settled.error()));
     return added;
+  }
+  /// How many of the last keyframes have not been judged by the newest. O(keyframes).
+  [[nodiscard]] std::size_t due() const noexcept {
+    return static_cast<std::size_t>(std::ranges::count_if(judge_.views(), [](const auto& v) { return v.due; }));
+  }
+  /// Judges one of the last keyframes by the newest, and gives the map its image (live_map::set_depth) if it is judged
+  /// otherwise than before; the map follows with `correct`. To be called until nothing is due, or the next keyframe is
+  /// more urgent: what is due then is judged with that one. Errors: those of live_map::set_depth; the keyframe is
+  /// judged even so. O(cells), and marking if the image changes.
+  template <execution_policy Policy, octree::replayable_octree Octree, depth_history Depths>
+  result<void> revise(const Policy& policy, live_map<Octree, Camera, Depths>& map) {
+    for (auto& v : judge_.views()) {
+      if (!v.due) continue;
+      judge_.ask_newest(policy, v, pose_in(map));
+      return change(policy, map, v);
+    }
+    return {};
   }
   /// Judges this keyframe no more, nor by it: it was removed, or has got another verdict from elsewhere.
   void forget(std::uint64_t frame) { judge_.forget(frame); }
@@ -95,6 +106,25 @@ class moving_filter {
   [[nodiscard]] const moving_filter_options& options() const noexcept { return judge_.options(); }
 
  private:
+  using view = typename detail::moving_judge<Camera>::view;
+
+  template <class Map>
+  [[nodiscard]] static auto pose_in(const Map& map) {
+    return [&map](const view& v) { return map.wanted_pose(v.frame); };
+  }
+  [[nodiscard]] bool leaves_next(const view& v) const { return judge_.is_full() && &v == &judge_.views().front(); }
+  /// Judges a keyframe that is in the map, and changes its image there if enough of it differs.
+  template <class Policy, class Map>
+  result<void> change(const Policy& policy, Map& map, view& v) {
+    const std::size_t differ = judge_.judge(v);
+    if (differ == 0) return {};
+    const double least = leaves_next(v) ? 0.0 : options().least_change;
+    if (static_cast<double>(differ) < least * static_cast<double>(v.cells.size())) return {};
+    judge_.accept(v);
+    if (!map.contains(v.frame)) return {};
+    return map.set_depth(policy, v.frame, judge_.masked(v));
+  }
+
   detail::moving_judge<Camera> judge_;
 };
 

@@ -61,8 +61,9 @@ template <execution_policy Policy, keyframe_range Keyframes, camera::camera_mode
     const bool fits = k.depth.width() == camera.width() && k.depth.height() == camera.height();
     if (fits && poses.back().to_matrix().allFinite()) {
       if (judge.is_full()) settle(judge.views().front());
-      judge.add(policy, poses.size() - 1, stored_depths(k.depth, copy), poses.back(),
-                [&](const auto& v) { return std::optional{poses[v.frame]}; });
+      const auto pose_of = [&](const auto& v) { return std::optional{poses[v.frame]}; };
+      judge.add(policy, poses.size() - 1, stored_depths(k.depth, copy), poses.back(), pose_of);
+      for (auto& v : judge.views()) judge.ask_newest(policy, v, pose_of);
     }
     if (!go_on()) return found;
   }

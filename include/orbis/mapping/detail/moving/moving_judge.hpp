@@ -71,6 +71,7 @@ class moving_judge {
     std::vector<std::uint8_t> through;  ///< how many other views' rays pass through each cell
     std::vector<std::uint8_t> shown;    ///< how many others show it as well
     std::vector<std::uint8_t> removed;  ///< 1: taken out, as far as `accept` was called
+    bool due = false;                   ///< the newest one has not been asked about it
 
     [[nodiscard]] depth_view depth() const { return depth_view{pixels.view(), scale, min_depth, max_depth}; }
     [[nodiscard]] std::vector<removed_cell> removed_cells() const {
@@ -88,9 +89,9 @@ class moving_judge {
            options.grow >= 0);
   }
 
-  /// Adds a keyframe in place of the oldest where there are enough, and compares it with the others:
-  /// `pose_of(view)` gives their poses, or none. The same for every policy. O(pixels + cells x keyframes).
-  /// @pre a finite pose; depth has the camera's size
+  /// Adds a keyframe in place of the oldest where there are enough, and asks the others about it: `pose_of(view)` gives
+  /// their poses, or none. The others are due then, see ask_newest. The same for every policy. O(pixels + cells x
+  /// keyframes). @pre a finite pose; depth has the camera's size; no other view is due
   template <execution_policy Policy, class PoseOf>
   view& add(const Policy& policy, std::uint64_t frame, const depth_view& depth, const se3& T_world_camera,
             const PoseOf& pose_of) {
@@ -104,14 +105,23 @@ class moving_judge {
     now.through.assign(now.cells.size(), 0);
     now.shown.assign(now.cells.size(), 0);
     now.removed.assign(now.cells.size(), 0);
+    now.due = false;
     for (view& v : views_) {
       if (&v == &now) continue;
-      const std::optional<se3> pose = pose_of(std::as_const(v));
-      if (!pose) continue;
-      ask(policy, v, now, T_world_camera.inverse() * *pose);
-      ask(policy, now, v, pose->inverse() * T_world_camera);
+      assert(!v.due);
+      v.due = true;
+      if (const std::optional<se3> pose = pose_of(std::as_const(v)))
+        ask(policy, now, v, pose->inverse() * T_world_camera);
     }
     return now;
+  }
+  /// Asks the newest keyframe about another one, if that is due. O(cells).
+  template <execution_policy Policy, class PoseOf>
+  void ask_newest(const Policy& policy, view& about, const PoseOf& pose_of) {
+    if (!std::exchange(about.due, false)) return;
+    const view& newest = views_.back();
+    const std::optional<se3> by = pose_of(newest), of = pose_of(std::as_const(about));
+    if (by && of) ask(policy, about, newest, by->inverse() * *of);
   }
   /// Judges a view by what is known of it now; returns how many cells differ from what was accepted last. O(cells).
   [[nodiscard]] std::size_t judge(const view& v) {
@@ -151,6 +161,8 @@ class moving_judge {
   void forget(std::uint64_t frame) {
     const auto at = std::find_if(views_.begin(), views_.end(), [&](const view& v) { return v.frame == frame; });
     if (at == views_.end()) return;
+    if (&*at == &views_.back())
+      for (view& v : views_) v.due = false;  // nobody is there to be asked
     spare_.push_back(std::move(*at));
     views_.erase(at);
   }
