@@ -9,8 +9,10 @@
 /// | floor_cost.hpp | costs near obstacles, as Nav2's costmaps have them |
 /// | floor_file.hpp | floor maps as files for the map servers of ROS and Nav2 |
 /// | frontiers.hpp | where known space ends and unknown space begins; follows the map |
-/// | planning_view.hpp | whether a round robot fits, at rest or along a segment; exact |
-/// | path_search.hpp | shortest ways of a round robot through a map |
+/// | robot_shape.hpp | a ball, a vertical capsule, a vertical cylinder |
+/// | planning_view.hpp | whether a robot fits, at rest or along a segment; exact |
+/// | planning_space.hpp | what a path can be searched in, and what going costs |
+/// | path_search.hpp | cheapest ways of a robot through a map or over a floor |
 /// | squared_distances.hpp | the same without a map: exact squared distances in voxels |
 /// | map_access.hpp | how planning reads a map, also one of another library |
 #pragma once
@@ -22,5 +24,7 @@
 #include <orbis/nav/frontiers.hpp>
 #include <orbis/nav/map_access.hpp>
 #include <orbis/nav/path_search.hpp>
+#include <orbis/nav/planning_space.hpp>
 #include <orbis/nav/planning_view.hpp>
+#include <orbis/nav/robot_shape.hpp>
 #include <orbis/nav/squared_distances.hpp>

@@ -15,6 +15,7 @@
 #include "support/catch.hpp"
 
 using namespace orbis;
+using nav::path_method;
 using nav::path_status;
 using octree::occupancy;
 using octree::voxel_key;
@@ -166,7 +167,8 @@ TEST_CASE("A path over the voxels is as short as Dijkstra's, and shortening keep
       CAPTURE(round, i);
       const bool start_free = is_free(map, start, start, radius, occupancy::occupied);
       const bool goal_free = is_free(map, goal, goal, radius, occupancy::occupied);
-      const auto grid = nav::find_path(view, start, goal, {.shorten = false});
+      const auto grid = nav::find_path(view, start, goal, {.method = path_method::grid, .shorten = false});
+      const auto shortened = nav::find_path(view, start, goal, {.method = path_method::grid});
       const auto path = nav::find_path(view, start, goal);
       CHECK(path.status == grid.status);
       if (!start_free) {
@@ -176,8 +178,9 @@ TEST_CASE("A path over the voxels is as short as Dijkstra's, and shortening keep
       }
       CHECK(grid.points.front() == start);
       CHECK(path.points.front() == start);
-      CHECK(path.length <= grid.length + 1e-12);
-      for (const auto* p : {&grid.points, &path.points})
+      CHECK(shortened.status == path.status);
+      CHECK(shortened.length <= grid.length + 1e-12);
+      for (const auto* p : {&grid.points, &shortened.points, &path.points})
         for (std::size_t j = 1; j < p->size(); ++j)
           CHECK(is_free(map, (*p)[j - 1], (*p)[j], radius, occupancy::occupied));
       if (!goal_free) {

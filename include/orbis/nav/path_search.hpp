@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Shortest ways of a round robot through a map.
+/// Cheapest ways of a robot through a map or over a floor.
 ///
 /// @code
 ///   const orbis::nav::planning_view view{map, field, 0.2};
@@ -10,13 +10,16 @@
 #pragma once
 
 #include <algorithm>
+#include <cassert>
 #include <cstddef>
 #include <cstdint>
 #include <string_view>
 #include <vector>
 
 #include <orbis/core/types.hpp>
+#include <orbis/nav/detail/path/segments.hpp>
 #include <orbis/nav/detail/path/voxel_search.hpp>
+#include <orbis/nav/planning_space.hpp>
 #include <orbis/nav/planning_view.hpp>
 #include <orbis/octree/key.hpp>
 
@@ -24,12 +27,12 @@ namespace orbis::nav {
 
 enum class path_status : std::uint8_t {
   found,
-  start_outside,  ///< of the grid, or not finite
+  start_outside,  ///< of the grid or the region, or not finite
   start_blocked,  ///< the robot touches an obstacle where it starts
   goal_outside,
   goal_blocked,
   unreachable,  ///< both are free, and no way leads from one to the other on the grid
-  gave_up       ///< after `max_expanded` voxels
+  gave_up       ///< after `max_expanded` cells
 };
 
 [[nodiscard]] constexpr std::string_view to_string(path_status s) noexcept {
@@ -45,19 +48,28 @@ enum class path_status : std::uint8_t {
   return "unknown";
 }
 
+/// How a path is searched.
+enum class path_method : std::uint8_t {
+  any_angle,  ///< lazy Theta*: straight over many cells where nothing is in between; shorter, but no optimum is proven
+  grid        ///< A*: no way in steps from cell to neighbouring cell is cheaper
+};
+
 struct path_options {
-  bool shorten = true;                   ///< pull the path straight; else it goes from voxel to voxel
-  std::size_t max_expanded = 2'000'000;  ///< voxels to look at before giving up
+  path_method method = path_method::any_angle;
+  bool shorten = true;                   ///< pull the path straight; else it goes from middle to middle of cells
+  std::size_t max_expanded = 2'000'000;  ///< cells to look at before giving up
+  std::size_t max_checks = 2'000;        ///< straight ways to check in shortening
 };
 
 /// A path, or why there is none.
 struct found_path {
   path_status status = path_status::unreachable;
   /// From the start to the goal, metres. If there is no way to the goal, but the start is free: to the middle of the
-  /// voxel nearest to the goal of all that were reached (nothing if the goal is not finite).
+  /// cell nearest to the goal of all that were reached (nothing if the goal is not finite).
   std::vector<vec3> points{};
-  double length = 0.0;       ///< metres
-  std::size_t expanded = 0;  ///< voxels that were looked at; 0 if the straight way is free
+  double length = 0.0;       ///< of the points, metres
+  double cost = 0.0;         ///< see planning_options: the length where nothing else counts; heights of floors do not
+  std::size_t expanded = 0;  ///< cells that were looked at; 0 if the straight way was taken
 };
 
 /// The length of a polyline, in the unit of its points.
@@ -67,82 +79,124 @@ struct found_path {
   return sum;
 }
 
-/// Makes a path shorter as long as the robot fits: leaves points out that are not needed, and cuts corners. Both ends
-/// stay. The result is never longer, and each of its segments is free (`view.is_free`).
+/// What a polyline costs, see planning_options. O(cells on the way), or O(points) if the space is uniform.
+/// @pre the points lie in the space
+template <planning_space Space>
+[[nodiscard]] double cost_of(const Space& space, const std::vector<vec3>& points) {
+  double sum = 0.0;
+  for (std::size_t i = 1; i < points.size(); ++i) sum += detail::cost_of(space, points[i - 1], points[i]);
+  return sum;
+}
+
+/// Makes a path cheaper as long as the robot fits: leaves points out that are not needed, and cuts corners. Both ends
+/// stay. The result never costs more (see cost_of) and, in a uniform space, is never longer; each of its segments is
+/// free (`space.is_free`). It ends after `max_checks` segments have been checked, or when little is gained.
+/// O(max_checks) checks of segments, and as many costs where the space is not uniform.
 /// @pre each segment of `points` is free
-template <octree::octree_map Map>
-void shorten_path(const planning_view<Map>& view, std::vector<vec3>& points) {
-  const double cell = view.field().grid().resolution();
-  for (int round = 0; round != 4; ++round) {
-    const double before = length_of(points);
+template <planning_space Space>
+void shorten_path(const Space& space, std::vector<vec3>& points, std::size_t max_checks = 2'000) {
+  const auto is_free = [&](const vec3& a, const vec3& b) {
+    if (max_checks == 0) return false;
+    --max_checks;
+    return space.is_free(a, b);
+  };
+  const auto cost = [&](const vec3& a, const vec3& b) { return detail::cost_of(space, a, b); };
+  // Whether one can go straight from a point to a later one, for no more than over those between them.
+  const auto is_shortcut = [&](std::size_t i, std::size_t j) {
+    if (!is_free(points[i], points[j])) return false;
+    if (space.is_uniform()) return true;
+    double along = 0.0;
+    for (std::size_t k = i; k != j; ++k) along += cost(points[k], points[k + 1]);
+    return cost(points[i], points[j]) <= along;
+  };
+  const auto erase_between = [&](std::size_t i, std::size_t j) {
+    points.erase(points.begin() + static_cast<std::ptrdiff_t>(i) + 1, points.begin() + static_cast<std::ptrdiff_t>(j));
+  };
+  // One check for each point first: a path over the middles of cells has many.
+  std::size_t last = 0;
+  for (std::size_t i = 2; i < points.size(); ++i) {
+    if (is_free(points[last], points[i]) &&
+        (space.is_uniform() ||
+         cost(points[last], points[i]) <= cost(points[last], points[last + 1]) + cost(points[last + 1], points[i])))
+      points[last + 1] = points[i];
+    else
+      points[++last + 1] = points[i];
+  }
+  if (points.size() > 2) points.resize(last + 2);
+  for (int round = 0; round != 4 && max_checks != 0; ++round) {
+    const double before = cost_of(space, points);
     for (std::size_t i = 0; i + 2 < points.size(); ++i) {
       std::size_t farthest = points.size() - 1;
-      while (farthest > i + 1 && !view.is_free(points[i], points[farthest])) --farthest;
-      points.erase(points.begin() + static_cast<std::ptrdiff_t>(i) + 1,
-                   points.begin() + static_cast<std::ptrdiff_t>(farthest));
+      while (farthest > i + 1 && !is_shortcut(i, farthest)) --farthest;
+      erase_between(i, farthest);
     }
     for (std::size_t i = 1; i + 1 < points.size(); ++i) {  // a corner, cut equally far on both sides
       const vec3 a = points[i - 1], b = points[i], c = points[i + 1];
-      const auto on = [](const vec3& from, const vec3& to, double share) -> vec3 { return from + share * (to - from); };
+      const auto on = [](const vec3& p, const vec3& q, double share) -> vec3 { return p + share * (q - p); };
+      const double around = space.is_uniform() ? 0.0 : cost(a, b) + cost(b, c);
       double low = 0.0, high = 1.0;
       for (int k = 0; k != 6; ++k) {
         const double share = (low + high) / 2;
-        (view.is_free(on(b, a, share), on(b, c, share)) ? low : high) = share;
+        const vec3 p = on(b, a, share), q = on(b, c, share);
+        const bool is_better = is_free(p, q) && (space.is_uniform() || cost(a, p) + cost(p, q) + cost(q, c) <= around);
+        (is_better ? low : high) = share;
       }
       if (low == 0.0) continue;
       points[i] = on(b, a, low);
       points.insert(points.begin() + static_cast<std::ptrdiff_t>(i) + 1, on(b, c, low));
       ++i;
     }
-    if (length_of(points) > before - 1e-3 * cell) return;
+    if (cost_of(space, points) > before - 1e-3 * space.resolution()) return;
   }
 }
 
-/// A way of the robot from `start` to `goal` (metres): the straight one if that is free; else the shortest one over the
-/// middles of voxels, with steps to the 26 neighbours, made shorter in continuous space afterwards. Every segment is
-/// free by `view.is_free`: the robot's ball touches no obstacle anywhere on it. Where it cannot go, `status` says why
-/// (also a passage between two middles of voxels is not seen that is wide enough for the robot only off the grid), and
+/// A way of the robot from `start` to `goal` (metres): the straight one if that is free and costs its length; else a
+/// cheap one over the middles of cells (see path_method), made shorter in continuous space afterwards. Every segment
+/// is free by `space.is_free`: the robot touches no obstacle anywhere on it. Where it cannot go, `status` says why
+/// (also a passage between two middles of cells is not seen that is wide enough for the robot only off the grid), and
 /// the path leads to the nearest point that is reached.
 ///
-/// O(n log n) for n voxels expanded, 8 kB for each 8x8x8 voxels looked at. Where unknown space is free, the search for
-/// a goal that cannot be reached ends at `max_expanded` only.
-template <octree::octree_map Map>
-[[nodiscard]] found_path find_path(const planning_view<Map>& view, const vec3& start, const vec3& goal,
+/// O(n log n) for n cells expanded, 16 kB for each 8x8x8 voxels (2 kB for each 8x8 cells of a floor) looked at, and
+/// `max_checks` ways to check in shortening. Where unknown space is free and no region is named, the search for a goal
+/// that cannot be reached ends at `max_expanded` only.
+template <planning_space Space>
+[[nodiscard]] found_path find_path(const Space& space, const vec3& start, const vec3& goal,
                                    const path_options& options = {}) {
-  const octree::voxel_grid& grid = view.field().grid();
   found_path out;
-  if (!start.allFinite() || !grid.key(start)) {
+  if (!space.key(start)) {
     out.status = path_status::start_outside;
     return out;
   }
-  if (!view.is_free(start)) {
+  if (!space.is_free(start)) {
     out.status = path_status::start_blocked;
     return out;
   }
-  const bool is_inside = goal.allFinite() && grid.key(goal);
-  const bool is_free = is_inside && view.is_free(goal);
-  if (is_free && options.shorten && view.is_free(start, goal)) {
-    out = {path_status::found, {start, goal}, (goal - start).norm(), 0};
-    return out;
-  }
+  const bool is_inside = space.key(goal).has_value();
+  const bool is_free = is_inside && space.is_free(goal);
   if (!goal.allFinite()) {
     out.status = path_status::goal_outside;
     return out;
   }
-  detail::voxel_search search{view, options.max_expanded};
-  const auto exits = is_free ? search.doors(goal) : std::vector<octree::voxel_key>{};
-  switch (search.run(start, goal, exits)) {
-    case detail::search_end::found: out.status = path_status::found; break;
-    case detail::search_end::exhausted: out.status = path_status::unreachable; break;
-    case detail::search_end::stopped: out.status = path_status::gave_up; break;
+  if (is_free && options.shorten && space.is_free(start, goal) &&
+      (space.is_uniform() || detail::cost_of(space, start, goal) <= (goal - start).norm() * (1.0 + 1e-9))) {
+    out.status = path_status::found;
+    out.points = {start, goal};
+  } else {
+    detail::voxel_search search{space, options.method == path_method::any_angle, options.max_expanded};
+    const auto exits = is_free ? search.doors(goal) : std::vector<octree::voxel_key>{};
+    switch (search.run(start, goal, exits)) {
+      case detail::search_end::found: out.status = path_status::found; break;
+      case detail::search_end::exhausted: out.status = path_status::unreachable; break;
+      case detail::search_end::stopped: out.status = path_status::gave_up; break;
+    }
+    out.expanded = search.expanded();
+    out.points = search.way();
+    if (!is_inside) out.status = path_status::goal_outside;
+    if (is_inside && !is_free) out.status = path_status::goal_blocked;
+    if (options.shorten) shorten_path(space, out.points, options.max_checks);
   }
-  out.expanded = search.expanded();
-  out.points = search.way();
-  out.points.insert(out.points.begin(), start);
-  if (out.status == path_status::found) out.points.push_back(goal);
-  if (!is_inside) out.status = path_status::goal_outside;
-  if (is_inside && !is_free) out.status = path_status::goal_blocked;
-  if (options.shorten) shorten_path(view, out.points);
+  out.cost = cost_of(space, out.points);
+  for (vec3& p : out.points) p = space.on_ground(p);
   out.length = length_of(out.points);
   return out;
 }

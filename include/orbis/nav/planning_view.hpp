@@ -1,86 +1,184 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Where a round robot fits: an occupancy map and its distance field as one, exact in continuous space.
+/// Where a robot fits: an occupancy map and its distance field as one, exact in continuous space.
 #pragma once
 
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <concepts>
 #include <cstdint>
+#include <limits>
+#include <optional>
 
 #include <orbis/core/types.hpp>
+#include <orbis/nav/detail/path/segments.hpp>
 #include <orbis/nav/distance_field.hpp>
+#include <orbis/nav/planning_space.hpp>
+#include <orbis/nav/robot_shape.hpp>
 #include <orbis/octree/accessor.hpp>
 #include <orbis/octree/key.hpp>
 #include <orbis/octree/overlap.hpp>
 
 namespace orbis::nav {
 
-/// Whether a ball is free, at rest or on its way along a segment. The answer is that of `octree::overlaps` for the ball
-/// or the capsule, with what unknown space counts as in the field: it is not sampled, and not taken from the middles of
-/// voxels. The field says it where obstacles are far away, and only in the narrow band near them the map is asked.
+/// Whether a robot is free, at rest or on its way along a segment. The answer is that of `octree::overlaps` for the
+/// robot's shape or what it sweeps (for a ball: a capsule), with what unknown space counts as in the field: it is not
+/// sampled, and not taken from the middles of voxels. The field says it where obstacles are far away, or so near that
+/// the robot touches one in any case, and only in the narrow band between them the map is asked.
 ///
-/// It refers to the map and the field; both must stay as they are while it is used. Any number of threads may ask.
-template <octree::octree_map Map>
+/// A `planning_space`. It refers to the map and the field; both must stay as they are while it is used. Any number of
+/// threads may ask.
+template <octree::octree_map Map, robot_shape Shape = ball>
 class planning_view {
  public:
-  /// `radius`: of the robot, metres. The field should reach at least two voxels farther; less costs time only.
-  /// @pre radius > 0; the field is that of the map, up to date
-  planning_view(const Map& map, const distance_field& field, double radius)
-      : map_{&map}, field_{&field}, radius_{radius} {
-    assert(radius > 0.0 && map.grid() == field.grid());
+  static constexpr int dimensions = 3;
+
+  /// The field should reach at least two voxels farther than the robot's radius; less costs time only.
+  /// @pre the shape's; the options'; the field is that of the map, up to date
+  planning_view(const Map& map, const distance_field& field, const Shape& shape, const planning_options& options = {})
+      : map_{&map}, field_{&field}, shape_{shape}, cover_{cover_of(shape)}, options_{options} {
+    assert(cover_.inner > 0.0 && map.grid() == field.grid());
+    assert(options.clearance_weight >= 0.0 && options.preferred_clearance > 0.0 && options.unknown_cost >= 1.0);
+  }
+  /// A ball. `radius`: metres. @pre radius > 0
+  planning_view(const Map& map, const distance_field& field, double radius,
+                const planning_options& options = {}) requires std::same_as<Shape, ball>
+      : planning_view{map, field, ball{radius}, options} {}
+
+  /// Whether the robot with its reference point at `p` (metres) touches no obstacle. False if `p` is not finite, or
+  /// outside of the region. O(1) away from obstacles, and what `overlaps` costs near them.
+  [[nodiscard]] bool is_free(const vec3& p) const { return is_free(p, p); }
+  /// Whether the robot touches no obstacle on its straight way from `a` to `b` (metres). False if an end is outside of
+  /// the region, or the way longer than four edges of the map's grid. O(length / distance to the obstacles), and what
+  /// `overlaps` costs for each 4 voxels near them.
+  [[nodiscard]] bool is_free(const vec3& a, const vec3& b) const {
+    const double cell = resolution();
+    if (!is_in_region(a) || !is_in_region(b) || !((b - a).norm() <= 4.0 * cell * grid().cells())) return false;
+    squared_distance_view::reader reader{field_->voxels()};
+    return detail::is_way_free(
+        a, b, cell, [&](const vec3& p) { return margin(reader, p); },
+        [&](const vec3& p, const vec3& q) { return overlaps(p, q); });
+  }
+  /// Whether that is free as far as the field alone can tell: true only if `is_free(a, b)` is, and false also where
+  /// that would have to ask the map. O(length / distance to the obstacles).
+  [[nodiscard]] bool is_surely_free(const vec3& a, const vec3& b) const {
+    if (!is_in_region(a) || !is_in_region(b)) return false;
+    squared_distance_view::reader reader{field_->voxels()};
+    return detail::is_way_surely_free(a, b, resolution(), [&](const vec3& p) { return margin(reader, p); });
+  }
+  /// Whether the robot with its reference point in the middle of voxel `k` is free. @pre contains(k)
+  [[nodiscard]] bool is_free(const octree::voxel_key& k) const {
+    squared_distance_view::reader reader{field_->voxels()};
+    const vec3 p = center(k);
+    const double m = margin(reader, p);
+    return m != detail::blocked && (m >= 0.0 || !overlaps(p, p));
   }
 
-  /// Whether the ball with its centre at `p` (metres) touches no obstacle. False if `p` is not finite. O(1) away from
-  /// obstacles, and what `overlaps` costs near them.
-  [[nodiscard]] bool is_free(const vec3& p) const { return is_free(p, p); }
-  /// Whether the ball touches no obstacle on its straight way from `a` to `b` (metres). False if the way is longer than
-  /// four edges of the map's grid. O(length / distance to the obstacles), and what `overlaps` costs for each 4 voxels
-  /// near them.
-  [[nodiscard]] bool is_free(const vec3& a, const vec3& b) const {
-    if (!a.allFinite() || !b.allFinite()) return false;
-    const double length = (b - a).norm(), cell = field_->grid().resolution();
-    if (!(length <= 4.0 * cell * field_->grid().cells())) return false;
-    const auto at = [&](double t) -> vec3 { return t >= length ? b : vec3{a + (b - a) * (t / length)}; };
-    double t = 0.0;
-    do {
-      // What lies within the clearance of a point on the way is free; so are balls whose centres are that much nearer.
-      const vec3 p = at(t);
-      double step = field_->clearance(p) - radius_ - 1e-9 * cell;
-      if (step < 0.5 * cell) {
-        step = 4.0 * cell;
-        if (overlaps(octree::capsule{p, at(t + step), radius_})) return false;
-      }
-      t += step;
-    } while (t < length);
-    return true;
+  /// See planning_options. @pre contains(k)
+  [[nodiscard]] double density(const octree::voxel_key& k) const {
+    double sum = 1.0;
+    if (options_.clearance_weight > 0.0) {
+      double least = field_->reach();
+      const vec3 p = center(k);
+      for (int i = 0; i != cover_.count; ++i) least = std::min(least, field_->distance(ball_at(p, i)));
+      const double share = std::max(0.0, least - cover_.outer) / options_.preferred_clearance;
+      if (share < 1.0) sum += options_.clearance_weight * (1.0 - share) * (1.0 - share);
+    }
+    if (options_.unknown_cost > 1.0 && map_->state(k) == octree::occupancy::unknown) sum *= options_.unknown_cost;
+    return sum;
   }
-  /// Whether the ball with its centre in the middle of voxel `k` is free. @pre k lies in the grid
-  [[nodiscard]] bool is_free(const octree::voxel_key& k) const {
-    const double cell = field_->grid().resolution();
-    const std::uint16_t squared = field_->voxels().squared(k);
-    const bool is_far = squared == squared_distance_view::far;
-    // The obstacle's cube is half a voxel to half a diagonal nearer than its middle.
-    const double d = is_far ? field_->reach() : std::sqrt(static_cast<double>(squared)) * cell;
-    if (d - 0.8661 * cell > radius_) return true;
-    if (!is_far && d - 0.4999 * cell < radius_) return false;
-    const vec3 p = field_->grid().center(k);
-    return !overlaps(octree::capsule{p, p, radius_});
+  /// Whether a way costs its length everywhere.
+  [[nodiscard]] bool is_uniform() const noexcept {
+    return options_.clearance_weight == 0.0 && options_.unknown_cost == 1.0;
   }
+
+  /// The voxel of `p` (metres); empty outside of the grid and of the region, and if not finite. O(1).
+  [[nodiscard]] std::optional<octree::voxel_key> key(const vec3& p) const {
+    return is_in_region(p) ? grid().key(p) : std::nullopt;
+  }
+  /// Whether the voxel is in the grid and its middle in the region.
+  [[nodiscard]] bool contains(const octree::voxel_key& k) const noexcept {
+    return std::max({k.x, k.y, k.z}) < grid().cells() && (!options_.region || is_in_region(center(k)));
+  }
+  /// The middle of a voxel, metres.
+  [[nodiscard]] vec3 center(const octree::voxel_key& k) const noexcept { return grid().center(k); }
+  /// The point of the grid that is nearest to `p`, metres.
+  [[nodiscard]] vec3 clamped(const vec3& p) const {
+    const double edge = 0.5 * resolution() * grid().cells();
+    return p.cwiseMax(vec3::Constant(-edge)).cwiseMin(vec3::Constant(edge));
+  }
+  /// `p` as it is: there is no floor.
+  [[nodiscard]] const vec3& on_ground(const vec3& p) const noexcept { return p; }
 
   [[nodiscard]] const Map& map() const noexcept { return *map_; }
   [[nodiscard]] const distance_field& field() const noexcept { return *field_; }
+  [[nodiscard]] const octree::voxel_grid& grid() const noexcept { return field_->grid(); }
+  /// The edge of a voxel, metres.
+  [[nodiscard]] double resolution() const noexcept { return grid().resolution(); }
+  [[nodiscard]] const Shape& shape() const noexcept { return shape_; }
+  [[nodiscard]] const planning_options& options() const noexcept { return options_; }
   /// Of the robot, metres.
-  [[nodiscard]] double radius() const noexcept { return radius_; }
+  [[nodiscard]] double radius() const noexcept { return shape_.radius; }
 
  private:
-  [[nodiscard]] bool overlaps(const octree::capsule& c) const {
-    return octree::overlaps(*map_, c, {.unknown = field_->options().unknown});
+  [[nodiscard]] bool is_in_region(const vec3& p) const noexcept {
+    if (!p.allFinite()) return false;
+    const auto& r = options_.region;
+    return !r || ((p.array() >= r->min.array()).all() && (p.array() <= r->max.array()).all());
+  }
+  [[nodiscard]] vec3 ball_at(const vec3& p, int i) const noexcept {
+    return {p.x(), p.y(), p.z() + cover_.low + i * cover_.spacing};
+  }
+  /// See detail::is_way_free.
+  [[nodiscard]] double margin(squared_distance_view::reader& reader, const vec3& p) const {
+    double least = field_->reach();
+    for (int i = 0; i != cover_.count; ++i) {
+      const double m = ball_margin(reader, ball_at(p, i));
+      if (m == detail::blocked) return m;
+      least = std::min(least, m);
+    }
+    return least;
+  }
+  /// The same for one of the balls that cover the robot. Its middle is about as far from obstacles as the middles of
+  /// voxels around it are, and an obstacle's cube is half a voxel to half a diagonal nearer than its own middle.
+  [[nodiscard]] double ball_margin(squared_distance_view::reader& reader, const vec3& q) const {
+    const double cell = resolution();
+    const auto k = grid().key(q);
+    if (!k) return -cover_.outer;
+    double least = 0.0, most = std::numeric_limits<double>::infinity();  // to the middle of the nearest obstacle
+    const auto look = [&](const octree::voxel_key& at, const vec3& away) {
+      const std::uint16_t squared = reader.squared(at);
+      const bool is_far = squared == squared_distance_view::far;
+      const double d = is_far ? field_->reach() : std::sqrt(static_cast<double>(squared)) * cell, off = away.norm();
+      least = std::max(least, d - off);
+      if (!is_far) most = std::min(most, d + off);
+    };
+    const vec3 away = q - center(*k);
+    look(*k, away);
+    const auto is_certain = [&] {
+      return most - 0.4999 * cell < cover_.inner || least - 0.8661 * cell - cover_.outer > 0.5 * cell;
+    };
+    // Beyond the grid's last voxel there is another value, which says the truth as well.
+    if (!is_certain() && !away.isZero())
+      for (unsigned i = 1; i != 8; ++i) {
+        const auto beside = [&](unsigned bit, int axis) { return (i & bit) == 0 ? 0 : away[axis] < 0.0 ? -1 : 1; };
+        const int x = beside(1U, 0), y = beside(2U, 1), z = beside(4U, 2);
+        look({k->x + static_cast<std::uint32_t>(x), k->y + static_cast<std::uint32_t>(y),
+              k->z + static_cast<std::uint32_t>(z)},
+             away - cell * vec3{static_cast<double>(x), static_cast<double>(y), static_cast<double>(z)});
+      }
+    return most - 0.4999 * cell < cover_.inner ? detail::blocked : least - 0.8661 * cell - cover_.outer;
+  }
+  [[nodiscard]] bool overlaps(const vec3& a, const vec3& b) const {
+    return octree::overlaps(*map_, swept(shape_, a, b), {.unknown = field_->options().unknown});
   }
 
   const Map* map_;
   const distance_field* field_;
-  double radius_;
+  Shape shape_;
+  ball_cover cover_;
+  planning_options options_;
 };
 
 }  // namespace orbis::nav

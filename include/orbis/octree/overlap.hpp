@@ -44,10 +44,12 @@ struct capsule {
   const vec3 nearest = s.center.cwiseMax(b.min).cwiseMin(b.max);
   return (s.center - nearest).squaredNorm() <= s.radius * s.radius;
 }
-[[nodiscard]] inline bool touches(const capsule& c, const bounding_box& b) noexcept {
+namespace detail {
+/// Exact, see below.
+[[nodiscard]] inline bool touches_exactly(const capsule& c, const bounding_box& b) noexcept {
+  const vec3 along = c.b - c.a;
   // The squared distance of a + t (b - a) from the box is convex in t, its slope is linear between the
   // parameters at which the segment crosses the planes of the faces: look for the piece where it is 0.
-  const vec3 along = c.b - c.a;
   const auto away = [&](double t) -> vec3 {
     const vec3 p = c.a + t * along;
     return p - p.cwiseMax(b.min).cwiseMin(b.max);
@@ -70,6 +72,20 @@ struct capsule {
     slope = next;
   }
   return away(best).squaredNorm() <= c.radius * c.radius;
+}
+}  // namespace detail
+
+[[nodiscard]] inline bool touches(const capsule& c, const bounding_box& b) noexcept {
+  // Most boxes are farther from the segment than the ball around them, or nearer than the ball in them.
+  const vec3 middle = 0.5 * (b.min + b.max), half = b.max - middle, along = c.b - c.a, from = middle - c.a;
+  const double squares = along.squaredNorm(), product = from.dot(along);
+  // Where the segment is nearest to the middle of the box: at its beginning, its end, or between.
+  const double share = product <= 0.0 ? 0.0 : product >= squares ? 1.0 : product / squares;
+  const double apart = (from - share * along).squaredNorm();
+  const double outside = (c.radius + 1.7320508075688773 * half.maxCoeff()) * (1.0 + 1e-9);
+  if (apart > outside * outside) return false;
+  const double inside = (c.radius + half.minCoeff()) * (1.0 - 1e-9);
+  return apart < inside * inside || detail::touches_exactly(c, b);
 }
 
 /// A shape that can be looked for: `bounds_of(shape)` is a box around it, `touches(shape, box)` says

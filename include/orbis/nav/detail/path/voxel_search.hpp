@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Shortest ways over the middles of voxels.
+/// Cheapest ways over the middles of cells.
 #pragma once
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -15,6 +16,7 @@
 
 #include <orbis/core/hash_index.hpp>
 #include <orbis/core/types.hpp>
+#include <orbis/nav/detail/path/segments.hpp>
 #include <orbis/octree/key.hpp>
 
 namespace orbis::nav::detail {
@@ -25,113 +27,126 @@ enum class search_end : std::uint8_t {
   stopped     ///< at the limit
 };
 
-/// A* over the middles of voxels, with steps to the 26 neighbours. P. Hart, N. Nilsson, B. Raphael, "A formal basis for
-/// the heuristic determination of minimum cost paths", IEEE Transactions on Systems Science and Cybernetics 4(2), 1968.
-template <class View>
+/// The cheapest way from a place to another over the middles of cells, with steps to all 26 (on a floor 8) neighbours.
+///
+/// - On the grid: A*, P. Hart, N. Nilsson, B. Raphael, "A formal basis for the heuristic determination of minimum cost
+///   paths", IEEE Transactions on Systems Science and Cybernetics 4(2), 1968. No way on the grid is cheaper.
+/// - At any angle: lazy Theta*, A. Nash, S. Koenig, C. Tovey, "Lazy Theta*: any-angle path planning and path length
+///   analysis in 3D", AAAI 2010. A cell is offered the parent of the cell that leads to it, as if it saw it.
+///
+/// In both, whether a step can be taken, and what a line costs, is asked when the cell is the next to be looked at and
+/// not for each of its neighbours: until then costs are bounds from below. A cell whose cost rises then waits again.
+/// (Lazy evaluation of edges, as in C. Dellin, S. Srinivasa, "A unifying formalism for shortest path problems with
+/// expensive edge evaluations via lazy best-first search over paths with edge selectors", ICAPS 2016.)
+///
+/// The heuristic is the length that is left where nothing is in between, in steps or straight: it is admissible, as no
+/// way costs less than its length, and consistent, as it is a metric.
+template <class Space>
 class voxel_search {
  public:
   using key = octree::voxel_key;
 
-  voxel_search(const View& view, std::size_t max_expanded)
-      : view_{view}, grid_{view.field().grid()}, max_expanded_{max_expanded} {}
+  voxel_search(const Space& space, bool any_angle, std::size_t max_expanded)
+      : space_{space}, any_angle_{any_angle}, is_uniform_{space.is_uniform()}, max_expanded_{max_expanded} {}
 
-  /// The middles of voxels to which there is a free straight way from `p`: that of its own, or else of its neighbours.
+  /// The cells to whose middles there is a free straight way from `p`: its own, or else its neighbours.
   [[nodiscard]] std::vector<key> doors(const vec3& p) const {
-    const key own = *grid_.key(p);
-    if (view_.is_free(p, grid_.center(own))) return {own};
+    const key own = *space_.key(p);
+    const auto is_door = [&](const key& k) { return space_.contains(k) && space_.is_free(p, space_.center(k)); };
+    if (is_door(own)) return {own};
     std::vector<key> found;
-    for_each_neighbor(own, [&](const key& k, int) {
-      if (view_.is_free(p, grid_.center(k))) found.push_back(k);
+    for_each_direction([&](unsigned direction) {
+      if (const key k = neighbor(own, direction); is_door(k)) found.push_back(k);
     });
     return found;
   }
 
-  /// Looks for the shortest way from `start` to `goal` through one of the voxels `exits` (see doors). Without any, it
+  /// Looks for the cheapest way from `start` to `goal` through one of the cells `exits` (see doors). Without any, it
   /// looks at all that can be reached.
   [[nodiscard]] search_end run(const vec3& start, const vec3& goal, const std::vector<key>& exits) {
-    const double half = 0.5 * grid_.resolution();
-    const vec3 lowest = vec3::Constant(grid_.center(0U) - half);
-    const vec3 highest = vec3::Constant(grid_.center(grid_.cells() - 1) + half);
-    goal_ = goal.cwiseMax(lowest).cwiseMin(highest);  // outside, the nearest point of the grid stands for it
+    places_ = {start, goal};
+    goal_ = space_.clamped(goal);  // outside, the nearest point of the grid stands for it
     exits_ = exits;
-    for (const key& k : doors(start)) offer(k, (grid_.center(k) - start).norm(), from_start);
-    double best = std::numeric_limits<double>::infinity();  // through the exits so far
+    for (const key& exit : exits_) exit_costs_.push_back(cost_of(space_, space_.center(exit), goal));
+    doors_ = doors(start);
+    ends_[0].cost = 0.0;
+    ends_[0].is_closed = true;
+    for (const key& k : doors_) {
+      const std::uint32_t n = number_of(k);
+      offer(n, from, cost_of(space_, start, space_.center(k)), trust::sure);
+    }
     while (!open_.empty()) {
       std::pop_heap(open_.begin(), open_.end());
       const entry e = open_.back();
       open_.pop_back();
-      if (e.total >= best) break;
-      const double cost = at(e.at).cost;
-      if (at(e.at).closed) continue;
-      if (expanded_ == max_expanded_) return last_ ? search_end::found : search_end::stopped;
-      at(e.at).closed = true;
+      if (at(e.number).is_closed || at(e.number).cost != e.cost) continue;  // it has been offered something else since
+      if (!is_settled(e.number)) continue;
+      if (e.number != to && expanded_ == max_expanded_) return search_end::stopped;
+      at(e.number).is_closed = true;
+      if (e.number == to) return search_end::found;
       ++expanded_;
-      const double away = (grid_.center(e.at) - goal_).squaredNorm();
-      if (away < nearest_away_) nearest_away_ = away, nearest_ = e.at;
-      for (const key& exit : exits_)
-        if (const double all = cost + (grid_.center(exit) - goal_).norm(); exit == e.at && all < best)
-          best = all, last_ = exit;
-      for_each_neighbor(e.at, [&](const key& k, int direction) {
-        const double step = step_length(direction);
-        if (const node& n = at(k); n.closed || cost + step >= n.cost) return;
-        if (is_passable(e.at, k)) offer(k, cost + step, direction);
-      });
+      expand(e.number);
     }
-    return last_ ? search_end::found : search_end::exhausted;
+    return search_end::exhausted;
   }
   [[nodiscard]] std::size_t expanded() const noexcept { return expanded_; }
-  /// Middles of voxels, from the start's to the last one before the goal or to the one nearest to it.
+  /// What the way that was found costs.
+  [[nodiscard]] double cost() const noexcept { return ends_[1].cost; }
+  /// From the start to the goal or, if it was not reached, to the middle of the cell nearest to it.
   [[nodiscard]] std::vector<vec3> way() {
     std::vector<vec3> points;
-    const std::optional<key> end = last_ ? last_ : nearest_;
-    if (!end) return points;
-    for (key k = *end;;) {
-      points.push_back(grid_.center(k));
-      const int direction = at(k).direction;
-      if (direction == from_start) break;
-      const auto [x, y, z] = offset(direction);
-      k = {k.x - static_cast<std::uint32_t>(x), k.y - static_cast<std::uint32_t>(y),
-           k.z - static_cast<std::uint32_t>(z)};
-    }
+    for (std::uint32_t n = ends_[1].is_closed ? to : nearest_; n != from; n = at(n).parent)
+      points.push_back(position(n));
+    points.push_back(places_[0]);
     std::reverse(points.begin(), points.end());
     return points;
   }
 
  private:
-  static constexpr int from_start = 13;  ///< the direction of no step
+  static constexpr double infinity = std::numeric_limits<double>::infinity();
+  static constexpr bool is_flat = Space::dimensions == 2;
+  static constexpr std::uint32_t brick_bits = is_flat ? 6 : 9;  ///< cells of a brick: 8x8x8, or 8x8 on a floor
+  static constexpr std::uint32_t from = ~std::uint32_t{1}, to = ~std::uint32_t{0};  ///< the numbers of both ends
 
+  /// What is known of a cell's cost.
+  enum class trust : std::uint8_t {
+    bound,  ///< it costs no less to come from the parent
+    exact,  ///< it costs that, if the way is free
+    sure    ///< the way is free
+  };
   struct node {
-    double cost = std::numeric_limits<double>::infinity();
-    std::int8_t direction = from_start;  ///< of the step that leads here
-    std::uint8_t free = 0;               ///< 0: not asked, 1: no, 2: yes
-    bool closed = false;
+    double cost = infinity;
+    double density = 0.0;  ///< 0: not asked
+    std::uint32_t parent = from;
+    std::uint32_t barred = 0;  ///< directions of neighbours from which no step leads here; of the goal: exits
+    std::uint8_t free = 0;     ///< 0: not asked, 1: no, 2: yes
+    trust known = trust::bound;
+    bool is_closed = false;
   };
   struct entry {
-    double total;
-    key at;
+    double total, cost;
+    std::uint32_t number;
     friend bool operator<(const entry& a, const entry& b) noexcept { return a.total > b.total; }
   };
-  using brick = std::array<node, 512>;
+  using brick = std::array<node, std::size_t{1} << brick_bits>;
 
-  [[nodiscard]] static std::array<int, 3> offset(int direction) noexcept {
-    return {direction % 3 - 1, direction / 3 % 3 - 1, direction / 9 - 1};
-  }
-  [[nodiscard]] double step_length(int direction) const noexcept {
-    static const std::array<double, 4> lengths{0.0, 1.0, std::sqrt(2.0), std::sqrt(3.0)};
-    const auto [x, y, z] = offset(direction);
-    return grid_.resolution() * lengths[static_cast<std::size_t>(x * x + y * y + z * z)];
-  }
+  // -- cells and their neighbours
+
   template <class Visit>
-  void for_each_neighbor(const key& k, Visit&& visit) const {
-    for (int direction = 0; direction != 27; ++direction) {
-      if (direction == from_start) continue;
-      const auto [x, y, z] = offset(direction);
-      const key n{k.x + static_cast<std::uint32_t>(x), k.y + static_cast<std::uint32_t>(y),
-                  k.z + static_cast<std::uint32_t>(z)};
-      if (std::max({n.x, n.y, n.z}) < grid_.cells()) visit(n, direction);
-    }
+  static void for_each_direction(Visit&& visit) {
+    for (unsigned d = is_flat ? 9 : 0; d != (is_flat ? 18U : 27U); ++d)
+      if (d != 13) visit(d);
   }
-  [[nodiscard]] node& at(const key& k) {
+  [[nodiscard]] static key neighbor(const key& k, unsigned direction) noexcept {
+    return {k.x + direction % 3 - 1, k.y + direction / 3 % 3 - 1, k.z + direction / 9 - 1};
+  }
+  [[nodiscard]] double step_length(unsigned direction) const noexcept {
+    static constexpr std::array<double, 4> lengths{0.0, 1.0, 1.41421356237309505, 1.73205080756887729};
+    const auto is_along = [](unsigned part) { return part != 1 ? 1U : 0U; };
+    const unsigned axes = is_along(direction % 3) + is_along(direction / 3 % 3) + is_along(direction / 9);
+    return space_.resolution() * lengths[axes];
+  }
+  [[nodiscard]] std::uint32_t number_of(const key& k) {
     const std::uint64_t name = octree::morton_code(k) >> 9U;
     if (name != last_name_) {
       last_name_ = name;
@@ -140,59 +155,173 @@ class voxel_search {
         last_brick_ = static_cast<std::uint32_t>(bricks_.size());
         index_.set(name, last_brick_);
         bricks_.emplace_back();
+        corners_.push_back(octree::node_key(k, 3));
       }
     }
-    return bricks_[last_brick_][(k.z & 7U) << 6U | (k.y & 7U) << 3U | (k.x & 7U)];
+    return last_brick_ << brick_bits | (is_flat ? 0U : (k.z & 7U) << 6U) | (k.y & 7U) << 3U | (k.x & 7U);
   }
-  [[nodiscard]] bool is_free(const key& k) {
-    node& n = at(k);
-    if (n.free == 0) n.free = view_.is_free(k) ? 2 : 1;
+  [[nodiscard]] key key_of(std::uint32_t number) const {
+    const key& low = corners_[number >> brick_bits];
+    return {low.x + (number & 7U), low.y + (number >> 3U & 7U), is_flat ? low.z : low.z + (number >> 6U & 7U)};
+  }
+  [[nodiscard]] node& at(std::uint32_t number) {
+    if (number >= from) return ends_[number - from];
+    return bricks_[number >> brick_bits][number & ((1U << brick_bits) - 1)];
+  }
+  [[nodiscard]] vec3 position(std::uint32_t number) const {
+    return number >= from ? places_[number - from] : space_.center(key_of(number));
+  }
+  [[nodiscard]] bool is_free(node& n, const key& k) const {
+    if (n.free == 0) n.free = space_.is_free(k) ? 2 : 1;
     return n.free == 2;
   }
-  [[nodiscard]] bool is_passable(const key& a, const key& b) {
-    return is_free(b) && view_.is_free(grid_.center(a), grid_.center(b));
+  [[nodiscard]] double density(node& n, const key& k) const {
+    if (n.density == 0.0) n.density = space_.density(k);
+    return n.density;
   }
-  /// The length of the shortest way in steps to 26 neighbours where nothing is in between; `d`: along the axes, metres.
-  [[nodiscard]] static double length_in_steps(std::array<double, 3> d) {
-    std::sort(d.begin(), d.end());
-    return std::sqrt(3.0) * d[0] + std::sqrt(2.0) * (d[1] - d[0]) + (d[2] - d[1]);
+  /// From the middle of a cell to its neighbour's, half of it in each.
+  [[nodiscard]] double step_cost(node& a, const key& from_key, node& b, const key& to_key, unsigned direction) const {
+    const double length = step_length(direction);
+    return is_uniform_ ? length : length * (0.5 * (density(a, from_key) + density(b, to_key)));
   }
-  /// No way on the grid is shorter, to an exit and from there to the goal; without exits, to where the goal is.
-  [[nodiscard]] double ahead(const key& k) const noexcept {
-    if (exits_.empty()) {
-      const vec3 d = (grid_.center(k) - goal_).cwiseAbs();
-      return length_in_steps({d.x(), d.y(), d.z()});
-    }
-    double least = std::numeric_limits<double>::infinity();
-    for (const key& exit : exits_) {
-      const auto along = [&](std::uint32_t a, std::uint32_t b) { return grid_.resolution() * (a > b ? a - b : b - a); };
-      least = std::min(least, length_in_steps({along(k.x, exit.x), along(k.y, exit.y), along(k.z, exit.z)}) +
-                                  (grid_.center(exit) - goal_).norm());
-    }
+
+  // -- costs
+
+  /// The length of the shortest way in steps where nothing is in between; `d`: along the axes, metres.
+  [[nodiscard]] static double length_in_steps(const vec3& d) {
+    std::array<double, 3> s{std::abs(d.x()), std::abs(d.y()), std::abs(d.z())};
+    std::sort(s.begin(), s.end());
+    return 1.73205080756887729 * s[0] + 1.41421356237309505 * (s[1] - s[0]) + (s[2] - s[1]);
+  }
+  /// No way is cheaper to the goal or, on the grid, to an exit and from there to the goal.
+  [[nodiscard]] double ahead(std::uint32_t number) const {
+    if (number == to) return 0.0;
+    const vec3 p = position(number);
+    if (any_angle_) return (p - goal_).norm();
+    if (exits_.empty()) return length_in_steps(p - goal_);
+    double least = infinity;
+    for (std::size_t i = 0; i != exits_.size(); ++i)
+      least = std::min(least, length_in_steps(p - space_.center(exits_[i])) + exit_costs_[i]);
     return least;
   }
-  void offer(const key& k, double cost, int direction) {
-    node& n = at(k);
+  void offer(std::uint32_t number, std::uint32_t parent, double cost, trust known) {
+    node& n = at(number);
     if (cost >= n.cost) return;
+    n.parent = parent;
     n.cost = cost;
-    n.direction = static_cast<std::int8_t>(direction);
-    open_.push_back({cost + ahead(k), k});
+    n.known = known;
+    open_.push_back({cost + ahead(number), cost, number});
     std::push_heap(open_.begin(), open_.end());
   }
 
-  const View& view_;
-  const octree::voxel_grid& grid_;
+  void expand(std::uint32_t number) {
+    const key k = key_of(number);
+    if (const double away = (space_.center(k) - goal_).squaredNorm(); away < nearest_away_)
+      nearest_away_ = away, nearest_ = number;
+    node& n = at(number);
+    // As if the parent saw them; it costs its length at least.
+    const std::uint32_t above = any_angle_ ? n.parent : number;
+    const double above_cost = at(above).cost;
+    const vec3 above_position = position(above);
+    const trust known = any_angle_ && !is_uniform_ ? trust::bound : trust::exact;
+    for (std::size_t i = 0; i != exits_.size(); ++i)
+      if (exits_[i] == k)
+        offer(to, above, any_angle_ ? above_cost + (places_[1] - above_position).norm() : n.cost + exit_costs_[i],
+              known);
+    for_each_direction([&](unsigned direction) {
+      const key beside = neighbor(k, direction);
+      if (!space_.contains(beside)) return;
+      const std::uint32_t other = number_of(beside);
+      node& m = at(other);
+      if (m.is_closed || m.free == 1) return;
+      const double cost = any_angle_ ? above_cost + (space_.center(beside) - above_position).norm()
+                                     : n.cost + step_cost(n, k, m, beside, direction);
+      if (cost < m.cost && is_free(m, beside)) offer(other, above, cost, known);
+    });
+  }
+
+  /// Whether the cell's cost is what it says. If not, it waits again, with what is its cheapest way then.
+  [[nodiscard]] bool is_settled(std::uint32_t number) {
+    node& n = at(number);
+    if (n.known == trust::sure) return true;
+    const std::uint32_t parent = n.parent;
+    // A line over several cells is worth little time; if it is free but barely so, steps lead there, and the shortening
+    // afterwards finds it.
+    const unsigned direction = direction_between(parent, number);
+    double cost = infinity;
+    if (direction == none ? space_.is_surely_free(position(parent), position(number))
+                          : space_.is_free(position(parent), position(number))) {
+      cost = n.known == trust::exact ? n.cost : at(parent).cost + cost_of(space_, position(parent), position(number));
+      if (cost <= n.cost) {
+        n.known = trust::sure;
+        return true;
+      }
+    } else if (direction != none) {
+      n.barred |= 1U << direction;
+    }
+    n.cost = infinity;
+    offer_steps(number);
+    offer(number, parent, cost, trust::sure);
+    return false;
+  }
+  /// Which of its neighbours (of the goal: which exit) `parent` is; `none`, if it is none of them.
+  [[nodiscard]] unsigned direction_between(std::uint32_t parent, std::uint32_t number) const {
+    if (parent == from) return none;
+    const key p = key_of(parent);
+    if (number == to) {
+      for (unsigned i = 0; i != exits_.size(); ++i)
+        if (exits_[i] == p) return i;
+      return none;
+    }
+    const key k = key_of(number);
+    const std::uint32_t x = p.x - k.x + 1, y = p.y - k.y + 1, z = p.z - k.z + 1;
+    return std::max({x, y, z}) <= 2 ? z * 9 + y * 3 + x : none;
+  }
+  /// Offers a cell the cheapest of the steps that lead to it from what is closed.
+  void offer_steps(std::uint32_t number) {
+    node& n = at(number);
+    std::uint32_t best = from;
+    double least = infinity;
+    const auto consider = [&](std::uint32_t other, double cost) {
+      if (cost < least) least = cost, best = other;
+    };
+    if (number == to) {
+      for (std::size_t i = 0; i != exits_.size(); ++i)
+        if (const std::uint32_t other = number_of(exits_[i]); at(other).is_closed && (n.barred >> i & 1U) == 0)
+          consider(other, at(other).cost + exit_costs_[i]);
+    } else {
+      const key k = key_of(number);
+      for_each_direction([&](unsigned direction) {
+        const key beside = neighbor(k, direction);
+        if ((n.barred >> direction & 1U) != 0 || !space_.contains(beside)) return;
+        const std::uint32_t other = number_of(beside);
+        if (node& m = at(other); m.is_closed) consider(other, m.cost + step_cost(m, beside, n, k, direction));
+      });
+      if (std::find(doors_.begin(), doors_.end(), k) != doors_.end())
+        consider(from, cost_of(space_, places_[0], space_.center(k)));
+    }
+    offer(number, best, least, trust::exact);
+  }
+
+  static constexpr unsigned none = 31;  ///< no direction
+
+  const Space& space_;
+  bool any_angle_, is_uniform_;
   std::size_t max_expanded_;
+  std::array<vec3, 2> places_{};  ///< start and goal
   vec3 goal_ = vec3::Zero();
-  std::vector<key> exits_;
+  std::vector<key> doors_, exits_;
+  std::vector<double> exit_costs_;
+  std::array<node, 2> ends_{};
   std::vector<entry> open_;
   std::deque<brick> bricks_;
+  std::vector<key> corners_;
   hash_index index_;
   std::uint64_t last_name_ = ~std::uint64_t{0};
   std::uint32_t last_brick_ = 0;
   std::size_t expanded_ = 0;
-  std::optional<key> last_, nearest_;
-  double nearest_away_ = std::numeric_limits<double>::infinity();
+  std::uint32_t nearest_ = from;
+  double nearest_away_ = infinity;
 };
 
 }  // namespace orbis::nav::detail

@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Shapes of robots: a ball, a vertical capsule, a vertical cylinder. z points up; robots do not tilt.
+#pragma once
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <concepts>
+
+#include <orbis/core/types.hpp>
+#include <orbis/octree/key.hpp>
+#include <orbis/octree/overlap.hpp>
+
+namespace orbis::nav {
+
+/// Everything within `radius` (metres) of the robot's reference point. @pre radius > 0
+struct ball {
+  double radius = 0.2;
+};
+/// Everything within `radius` of the vertical segment from `low` to `high` above the reference point, metres.
+/// @pre radius > 0; low <= high
+struct vertical_capsule {
+  double radius = 0.2;
+  double low = 0.2, high = 0.8;
+};
+/// Everything that is at most `radius` beside the vertical line through the reference point, and `low` to `high` above
+/// it, metres. @pre radius > 0; low < high
+struct vertical_cylinder {
+  double radius = 0.2;
+  double low = 0.0, high = 1.0;
+};
+
+/// What a shape touches while its reference point goes straight from `a` to `b`.
+template <class Shape>
+struct swept_shape {
+  vec3 a = vec3::Zero(), b = vec3::Zero();
+  Shape shape{};
+};
+
+[[nodiscard]] inline octree::bounding_box bounds_of(const swept_shape<vertical_capsule>& s) {
+  const octree::bounding_box b = bounds_of(octree::capsule{s.a, s.b, s.shape.radius});
+  return {b.min + s.shape.low * vec3::UnitZ(), b.max + s.shape.high * vec3::UnitZ()};
+}
+[[nodiscard]] inline octree::bounding_box bounds_of(const swept_shape<vertical_cylinder>& s) {
+  const octree::bounding_box b = bounds_of(octree::capsule{s.a, s.b, s.shape.radius});
+  return {vec3{b.min.x(), b.min.y(), std::min(s.a.z(), s.b.z()) + s.shape.low},
+          vec3{b.max.x(), b.max.y(), std::max(s.a.z(), s.b.z()) + s.shape.high}};
+}
+/// Exact: the segment may as well be stretched in the box as in the robot.
+[[nodiscard]] inline bool touches(const swept_shape<vertical_capsule>& s, const octree::bounding_box& box) noexcept {
+  const octree::bounding_box stretched{box.min - s.shape.high * vec3::UnitZ(), box.max - s.shape.low * vec3::UnitZ()};
+  return touches(octree::capsule{s.a, s.b, s.shape.radius}, stretched);
+}
+/// Exact: the robot meets the box where its heights do (a piece of the way) and, seen from above, its circle does.
+[[nodiscard]] inline bool touches(const swept_shape<vertical_cylinder>& s, const octree::bounding_box& box) noexcept {
+  const double rise = s.b.z() - s.a.z();
+  const double lowest = box.min.z() - s.shape.high, highest = box.max.z() - s.shape.low;  // of the reference point
+  if (std::max(s.a.z(), s.b.z()) < lowest || std::min(s.a.z(), s.b.z()) > highest) return false;
+  double from = 0.0, to = 1.0;
+  if (rise != 0.0) {
+    const double t = (lowest - s.a.z()) / rise, u = (highest - s.a.z()) / rise;
+    from = std::clamp(std::min(t, u), 0.0, 1.0);
+    to = std::clamp(std::max(t, u), 0.0, 1.0);
+  }
+  const auto above = [](const vec3& p) { return vec3{p.x(), p.y(), 0.0}; };
+  const vec3 a = above(s.a), along = above(s.b) - a;
+  return touches(octree::capsule{a + from * along, a + to * along, s.shape.radius},
+                 octree::bounding_box{above(box.min), above(box.max)});
+}
+
+/// What it touches on its way from `a` to `b`, metres.
+[[nodiscard]] inline octree::capsule swept(const ball& s, const vec3& a, const vec3& b) { return {a, b, s.radius}; }
+[[nodiscard]] inline swept_shape<vertical_capsule> swept(const vertical_capsule& s, const vec3& a, const vec3& b) {
+  return {a, b, s};
+}
+[[nodiscard]] inline swept_shape<vertical_cylinder> swept(const vertical_cylinder& s, const vec3& a, const vec3& b) {
+  return {a, b, s};
+}
+
+/// Balls on the vertical line through the reference point that say where a shape is, from outside and inside: `count`
+/// of them from `low` above it on, `spacing` apart (metres). Balls of radius `outer` cover the shape, and those of
+/// radius `inner` lie in it.
+struct ball_cover {
+  double low = 0.0, spacing = 0.0;
+  int count = 1;
+  double outer = 0.0, inner = 0.0;
+};
+
+[[nodiscard]] inline ball_cover cover_of(const ball& s) { return {0.0, 0.0, 1, s.radius, s.radius}; }
+[[nodiscard]] inline ball_cover cover_of(const vertical_capsule& s) {
+  const int pieces = static_cast<int>(std::ceil((s.high - s.low) / s.radius));
+  const double spacing = pieces == 0 ? 0.0 : (s.high - s.low) / pieces;
+  return {s.low, spacing, pieces + 1, std::hypot(s.radius, spacing / 2), s.radius};
+}
+[[nodiscard]] inline ball_cover cover_of(const vertical_cylinder& s) {
+  const int pieces = static_cast<int>(std::ceil((s.high - s.low) / s.radius));
+  const double spacing = (s.high - s.low) / pieces;
+  return {s.low + spacing / 2, spacing, pieces, std::hypot(s.radius, spacing / 2), std::min(s.radius, spacing / 2)};
+}
+
+/// A robot that keeps its attitude: `swept(shape, a, b)` is what it touches on a straight way, for `octree::overlaps`,
+/// and `cover_of(shape)` are balls that spare most of these tests.
+template <class S>
+concept robot_shape = std::copyable<S> && requires(const S& shape, const vec3& p) {
+  { swept(shape, p, p) } -> octree::overlap_shape;
+  { cover_of(shape) } -> std::same_as<ball_cover>;
+};
+
+}  // namespace orbis::nav
