@@ -8,6 +8,7 @@
 /// | floor_map.hpp | where a robot that drives can go: free, occupied and unknown cells of the floor |
 /// | floor_cost.hpp | costs near obstacles, as Nav2's costmaps have them |
 /// | floor_file.hpp | floor maps as files for the map servers of ROS and Nav2 |
+/// | floor_view.hpp | where a round robot fits on a floor, for paths in two dimensions |
 /// | frontiers.hpp | where known space ends and unknown space begins; follows the map |
 /// | robot_shape.hpp | a ball, a vertical capsule, a vertical cylinder |
 /// | planning_view.hpp | whether a robot fits, at rest or along a segment; exact |
@@ -21,6 +22,7 @@
 #include <orbis/nav/floor_cost.hpp>
 #include <orbis/nav/floor_file.hpp>
 #include <orbis/nav/floor_map.hpp>
+#include <orbis/nav/floor_view.hpp>
 #include <orbis/nav/frontiers.hpp>
 #include <orbis/nav/map_access.hpp>
 #include <orbis/nav/path_search.hpp>

@@ -3,15 +3,13 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <limits>
-#include <queue>
-#include <utility>
 #include <vector>
 
 #include <orbis/core/random.hpp>
 #include <orbis/nav/path_search.hpp>
 #include <orbis/octree/occupancy_octree.hpp>
 
+#include "nav/dijkstra.hpp"
 #include "support/catch.hpp"
 
 using namespace orbis;
@@ -37,12 +35,13 @@ void set(map_type& map, int x, int y, int z, bool occupied) {
     b.value[i] = occupied ? 1.0F : -1.0F;
   });
 }
-/// Free space of `size` voxels from the origin on, with boxes of obstacles in it.
-map_type maze(random_bits& random, std::array<int, 3> size, int boxes) {
+/// Free space of `size` voxels from the origin on, with boxes of obstacles in it; of a share of it nothing is known.
+map_type maze(random_bits& random, std::array<int, 3> size, int boxes, double unknown = 0.0) {
   map_type map{cell};
   for (int z = 0; z != size[2]; ++z)
     for (int y = 0; y != size[1]; ++y)
-      for (int x = 0; x != size[0]; ++x) set(map, x, y, z, false);
+      for (int x = 0; x != size[0]; ++x)
+        if (unknown == 0.0 || random.uniform() >= unknown) set(map, x, y, z, false);
   const auto below = [&](int n) { return static_cast<int>(random.below(static_cast<std::uint32_t>(n))); };
   for (int i = 0; i != boxes; ++i) {
     std::array<int, 3> low{}, high{};
@@ -63,55 +62,12 @@ bool is_free(const map_type& map, const vec3& a, const vec3& b, double radius, o
   return !overlaps(map, octree::capsule{a, b, radius}, {.unknown = unknown});
 }
 
-/// The shortest way over the middles of voxels, by Dijkstra's algorithm and the exact capsule test. Infinite: none.
+/// What a path has to be as cheap as: Dijkstra's algorithm, with the exact capsule test.
 double shortest(const map_type& map, std::array<int, 3> size, const vec3& start, const vec3& goal, double radius) {
-  const auto index = [&](const std::array<int, 3>& p) {
-    return static_cast<std::size_t>((p[2] * size[1] + p[1]) * size[0] + p[0]);
-  };
-  const auto middle = [&](const std::array<int, 3>& p) { return map.grid().center(key(p[0], p[1], p[2])); };
-  const auto is_inside = [&](const std::array<int, 3>& p) {
-    for (std::size_t i = 0; i != 3; ++i)
-      if (p[i] < 0 || p[i] >= size[i]) return false;
-    return true;
-  };
-  const auto free = [&](const vec3& a, const vec3& b) { return is_free(map, a, b, radius, occupancy::occupied); };
-  const auto for_each_near = [&](const std::array<int, 3>& p, auto&& visit) {
-    for (int z = -1; z <= 1; ++z)
-      for (int y = -1; y <= 1; ++y)
-        for (int x = -1; x <= 1; ++x)
-          if (const std::array<int, 3> q{p[0] + x, p[1] + y, p[2] + z}; is_inside(q)) visit(q);
-  };
-  const auto doors = [&](const vec3& p) {
-    const std::array<int, 3> own{static_cast<int>(std::floor(p.x() / cell)), static_cast<int>(std::floor(p.y() / cell)),
-                                 static_cast<int>(std::floor(p.z() / cell))};
-    std::vector<std::array<int, 3>> found;
-    if (free(p, middle(own))) return std::vector{own};
-    for_each_near(own, [&](const std::array<int, 3>& q) {
-      if (q != own && free(p, middle(q))) found.push_back(q);
-    });
-    return found;
-  };
-  std::vector<double> cost(static_cast<std::size_t>(size[0] * size[1] * size[2]),
-                           std::numeric_limits<double>::infinity());
-  using entry = std::pair<double, std::array<int, 3>>;
-  std::priority_queue<entry, std::vector<entry>, std::greater<>> open;
-  const auto offer = [&](const std::array<int, 3>& p, double c) {
-    if (c >= cost[index(p)]) return;
-    cost[index(p)] = c;
-    open.push({c, p});
-  };
-  for (const auto& p : doors(start)) offer(p, (middle(p) - start).norm());
-  while (!open.empty()) {
-    const auto [c, p] = open.top();
-    open.pop();
-    if (c > cost[index(p)]) continue;
-    for_each_near(p, [&](const std::array<int, 3>& q) {
-      if (q != p && free(middle(p), middle(q))) offer(q, c + (middle(q) - middle(p)).norm());
-    });
-  }
-  double best = std::numeric_limits<double>::infinity();
-  for (const auto& p : doors(goal)) best = std::min(best, cost[index(p)] + (middle(p) - goal).norm());
-  return best;
+  return test::cheapest_on_grid(
+      size, [&](const std::array<int, 3>& p) { return map.grid().center(key(p[0], p[1], p[2])); },
+      [&](const vec3& a, const vec3& b) { return is_free(map, a, b, radius, occupancy::occupied); },
+      [](const std::array<int, 3>&) { return 1.0; }, cell, start, goal);
 }
 
 }  // namespace
@@ -270,4 +226,226 @@ TEST_CASE("Why there is no path, and how near one comes") {
   CHECK_FALSE(view.is_free(start, vec3{1e12, 0.4, 0.5}));
   CHECK(plan(0.15, start, start).status == path_status::found);
   CHECK(plan(0.15, start, start).length == 0.0);
+}
+
+TEST_CASE("What is ahead on the grid is never overrated, and never falls by more than a step costs") {
+  random_bits random{3};
+  for (int i = 0; i != 2000; ++i) {
+    const vec3 a = random_point(random, {20, 20, 20}), b = random_point(random, {20, 20, 20});
+    const vec3 c = random_point(random, {20, 20, 20});
+    const double ab = nav::detail::length_in_steps(a - b);
+    CHECK(ab <= nav::detail::length_in_steps(a - c) + nav::detail::length_in_steps(c - b) + 1e-12);
+    CHECK(ab >= (a - b).norm() - 1e-12);
+    CHECK(ab == nav::detail::length_in_steps(b - a));
+  }
+  for (int x = -1; x <= 1; ++x)
+    for (int y = -1; y <= 1; ++y)
+      for (int z = -1; z <= 1; ++z) {
+        const vec3 step{cell * x, cell * y, cell * z};
+        CHECK(nav::detail::length_in_steps(step) == Approx(step.norm()));
+      }
+}
+
+TEST_CASE("A path that keeps its distance is as cheap as Dijkstra's, and shortening does not undo it") {
+  random_bits random{4};
+  const std::array<int, 3> size{15, 13, 9};
+  int found = 0, dearer = 0;
+  for (int round = 0; round != 8; ++round) {
+    const map_type map = maze(random, size, 14, round % 2 == 0 ? 0.0 : 0.1);
+    const occupancy unknown = round % 2 == 0 ? occupancy::occupied : occupancy::free;
+    const nav::distance_field field{map, {.reach = 0.7, .unknown = unknown}};
+    const double radius = 0.08, wanted = 0.3, weight = 4.0, unknown_cost = round % 2 == 0 ? 1.0 : 2.0;
+    const octree::bounding_box inside{{0.0, 0.0, 0.0}, {cell * size[0], cell * size[1], cell * size[2]}};
+    const nav::planning_view view{
+        map,
+        field,
+        radius,
+        {.region = inside, .clearance_weight = weight, .preferred_clearance = wanted, .unknown_cost = unknown_cost}};
+    CHECK_FALSE(view.is_uniform());
+    const auto middle = [&](const std::array<int, 3>& p) { return map.grid().center(key(p[0], p[1], p[2])); };
+    const auto density = [&](const std::array<int, 3>& p) {  // from all obstacles there are
+      double nearest = field.reach();
+      for (int z = p[2] - 7; z <= p[2] + 7; ++z)
+        for (int y = p[1] - 7; y <= p[1] + 7; ++y)
+          for (int x = p[0] - 7; x <= p[0] + 7; ++x) {
+            const occupancy s = map.state(key(x, y, z));
+            if (s == occupancy::occupied || (s == occupancy::unknown && unknown == occupancy::occupied))
+              nearest = std::min(nearest, (middle({x, y, z}) - middle(p)).norm());
+          }
+      const double lacking = std::max(0.0, 1.0 - std::max(0.0, nearest - radius) / wanted);
+      const bool is_known = map.state(key(p[0], p[1], p[2])) != occupancy::unknown;
+      return (1.0 + weight * lacking * lacking) * (is_known ? 1.0 : unknown_cost);
+    };
+    for (int i = 0; i != 6; ++i) {
+      const auto draw = [&] {
+        for (;;) {
+          const vec3 p = map.grid().center(*map.grid().key(random_point(random, size)));
+          if (view.is_free(p)) return p;
+        }
+      };
+      const vec3 start = draw(), goal = draw();
+      CAPTURE(round, i);
+      const auto grid = nav::find_path(view, start, goal, {.method = path_method::grid, .shorten = false});
+      const double expected = test::cheapest_on_grid(
+          size, middle, [&](const vec3& a, const vec3& b) { return is_free(map, a, b, radius, unknown); }, density,
+          cell, start, goal);
+      if (std::isinf(expected)) {
+        CHECK(grid.status == path_status::unreachable);
+        continue;
+      }
+      ++found;
+      REQUIRE(grid.status == path_status::found);
+      CHECK(grid.cost == Approx(expected).epsilon(1e-9));
+      const auto shortened = nav::find_path(view, start, goal, {.method = path_method::grid});
+      const auto path = nav::find_path(view, start, goal);
+      CHECK(shortened.cost <= grid.cost * (1.0 + 1e-9));
+      for (const auto* p : {&grid, &shortened, &path}) {
+        CHECK(p->status == path_status::found);
+        CHECK(p->points.front() == start);
+        CHECK(p->points.back() == goal);
+        CHECK(p->cost >= p->length * (1.0 - 1e-9));
+        CHECK(p->cost == Approx(nav::cost_of(view, p->points)));
+        for (std::size_t j = 1; j < p->points.size(); ++j)
+          CHECK(is_free(map, p->points[j - 1], p->points[j], radius, unknown));
+      }
+      dearer += path.cost > 1.2 * path.length ? 1 : 0;
+      // The integral along the path, sampled.
+      double sum = 0.0;
+      constexpr int samples = 4000;
+      for (std::size_t j = 1; j < path.points.size(); ++j)
+        for (int s = 0; s != samples; ++s) {
+          const vec3 way = path.points[j] - path.points[j - 1];
+          sum += view.density(*view.key(path.points[j - 1] + (s + 0.5) / samples * way)) * way.norm() / samples;
+        }
+      CHECK(path.cost == Approx(sum).epsilon(1e-3));
+    }
+  }
+  CHECK(found > 25);
+  CHECK(dearer > 10);
+}
+
+TEST_CASE("A path keeps away from a wall if that is worth the way") {
+  map_type map{cell};
+  for (int x = 0; x != 30; ++x)
+    for (int y = 0; y != 20; ++y)
+      for (int z = 0; z != 10; ++z) set(map, x, y, z, y >= 9 && y < 11 && x < 20);
+  const nav::distance_field field{map, {.reach = 1.0}};
+  const vec3 start{0.55, 0.45, 0.55}, goal{0.55, 1.55, 0.55};  // round the end of the wall
+  const auto nearest = [&](const nav::found_path& path) {
+    double least = 1.0;
+    for (std::size_t i = 1; i < path.points.size(); ++i)
+      for (int s = 0; s <= 100; ++s)
+        least = std::min(least,
+                         field.distance(vec3{path.points[i - 1] + 0.01 * s * (path.points[i] - path.points[i - 1])}));
+    return least;
+  };
+  const auto direct = nav::find_path(nav::planning_view{map, field, 0.12}, start, goal);
+  const nav::planning_view wary{map, field, 0.12, {.clearance_weight = 10.0, .preferred_clearance = 0.25}};
+  const auto wide = nav::find_path(wary, start, goal);
+  REQUIRE(direct.status == path_status::found);
+  REQUIRE(wide.status == path_status::found);
+  CHECK(wide.length > direct.length);
+  CHECK(wide.cost < nav::cost_of(wary, direct.points));
+  CHECK(nearest(direct) < 0.25);
+  CHECK(nearest(wide) > 0.25);
+}
+
+TEST_CASE("Through what is unknown, at a price, and within a region") {
+  // A room with a wall of unknown space, and a way round it.
+  map_type map{cell};
+  for (int x = 0; x != 40; ++x)
+    for (int y = 0; y != 20; ++y)
+      for (int z = 0; z != 8; ++z)
+        if (x < 18 || x >= 22 || y >= 16) set(map, x, y, z, x == 0 || y == 0 || z == 0 || x == 39 || y == 19 || z == 7);
+  const nav::distance_field field{map, {.reach = 0.6, .unknown = occupancy::free}};
+  const octree::bounding_box room{{0.0, 0.0, 0.0}, {4.0, 2.0, 0.8}};
+  const vec3 start{1.0, 0.4, 0.4}, goal{3.0, 0.4, 0.4};
+  const auto plan = [&](double price, const octree::bounding_box& region) {
+    return nav::find_path(nav::planning_view{map, field, 0.12, {.region = region, .unknown_cost = price}}, start, goal);
+  };
+  const auto cheap = plan(1.5, room);
+  REQUIRE(cheap.status == path_status::found);
+  CHECK(cheap.length < 2.0 + 1e-6);
+  CHECK(cheap.cost == Approx(1.6 + 0.4 * 1.5));
+  const auto dear = plan(20.0, room);
+  REQUIRE(dear.status == path_status::found);
+  CHECK(dear.cost == Approx(dear.length));  // all round it
+  CHECK(dear.length > 2.8);
+  const auto low = plan(20.0, {{0.0, 0.0, 0.0}, {4.0, 1.5, 0.8}});  // the way round lies outside
+  REQUIRE(low.status == path_status::found);
+  CHECK(low.cost > 20.0 * 0.4);
+  for (const vec3& p : low.points) CHECK(p.y() <= 1.5);
+  const octree::bounding_box left{{0.0, 0.0, 0.0}, {1.5, 2.0, 0.8}};
+  CHECK(plan(1.0, left).status == path_status::goal_outside);
+  const nav::planning_view view{map, field, 0.12, {.region = left}};
+  CHECK_FALSE(view.is_free(goal));
+  CHECK(nav::find_path(view, goal, start).status == path_status::start_outside);
+  CHECK(nav::find_path(view, goal, start).points.empty());
+}
+
+namespace {
+
+/// A space of one's own: it counts what it is asked.
+struct counting_view : nav::planning_view<map_type> {
+  using base = nav::planning_view<map_type>;
+  using base::base;
+  using base::is_free;
+  [[nodiscard]] bool is_free(const vec3& a, const vec3& b) const {
+    ++asked;
+    return base::is_free(a, b);
+  }
+  mutable std::size_t asked = 0;
+};
+static_assert(nav::planning_space<counting_view>);
+
+}  // namespace
+
+TEST_CASE("Shortening ends after as many checks as it may do") {
+  random_bits random{5};
+  const map_type map = maze(random, {40, 40, 16}, 120);
+  const nav::distance_field field{map, {.reach = 0.8}};
+  const counting_view view{map, field, 0.12};
+  int shorter = 0, bounded = 0;
+  for (int i = 0; i != 30; ++i) {
+    const auto draw = [&] {
+      for (;;)
+        if (const vec3 p = random_point(random, {40, 40, 16}); view.is_free(p)) return p;
+    };
+    const auto grid = nav::find_path(view, draw(), draw(), {.method = path_method::grid, .shorten = false});
+    if (grid.status != path_status::found) continue;
+    double before = grid.length;
+    for (const std::size_t checks : {0U, 3U, 30U, 2000U}) {
+      auto points = grid.points;
+      view.asked = 0;
+      nav::shorten_path(view, points, checks);
+      CHECK(view.asked <= checks);
+      bounded += checks == 30 && view.asked == checks ? 1 : 0;
+      CHECK(nav::length_of(points) <= grid.length + 1e-12);
+      CHECK(points.front() == grid.points.front());
+      CHECK(points.back() == grid.points.back());
+      for (std::size_t j = 1; j < points.size(); ++j)
+        CHECK(is_free(map, points[j - 1], points[j], 0.12, occupancy::occupied));
+      shorter += checks == 2000 && nav::length_of(points) < before - 1e-6 ? 1 : 0;
+      before = nav::length_of(points);
+    }
+  }
+  CHECK(bounded > 10);
+  CHECK(shorter > 10);
+}
+
+TEST_CASE("What the field alone calls free is free") {
+  random_bits random{6};
+  const map_type map = maze(random, {40, 40, 24}, 60);
+  const nav::distance_field field{map, {.reach = 1.0}};
+  const nav::planning_view view{map, field, 0.12};
+  int sure = 0, free = 0;
+  for (int i = 0; i != 2000; ++i) {
+    const vec3 a = random_point(random, {40, 40, 24}), b = a + 0.1 * random_point(random, {8, 8, 8});
+    const bool is_sure = view.is_surely_free(a, b);
+    if (is_sure) CHECK(is_free(map, a, b, 0.12, occupancy::occupied));
+    sure += is_sure ? 1 : 0;
+    free += view.is_free(a, b) ? 1 : 0;
+  }
+  CHECK(sure > 100);
+  CHECK(sure * 10 > free * 7);
 }

@@ -84,7 +84,8 @@ struct found_path {
 template <planning_space Space>
 [[nodiscard]] double cost_of(const Space& space, const std::vector<vec3>& points) {
   double sum = 0.0;
-  for (std::size_t i = 1; i < points.size(); ++i) sum += detail::cost_of(space, points[i - 1], points[i]);
+  for (std::size_t i = 1; i < points.size(); ++i)
+    sum += detail::cost_of(space, space.placed(points[i - 1]), space.placed(points[i]));
   return sum;
 }
 
@@ -100,7 +101,9 @@ void shorten_path(const Space& space, std::vector<vec3>& points, std::size_t max
     --max_checks;
     return space.is_free(a, b);
   };
-  const auto cost = [&](const vec3& a, const vec3& b) { return detail::cost_of(space, a, b); };
+  const auto cost = [&](const vec3& a, const vec3& b) {
+    return detail::cost_of(space, space.placed(a), space.placed(b));
+  };
   // Whether one can go straight from a point to a later one, for no more than over those between them.
   const auto is_shortcut = [&](std::size_t i, std::size_t j) {
     if (!is_free(points[i], points[j])) return false;
@@ -150,8 +153,8 @@ void shorten_path(const Space& space, std::vector<vec3>& points, std::size_t max
   }
 }
 
-/// A way of the robot from `start` to `goal` (metres): the straight one if that is free and costs its length; else a
-/// cheap one over the middles of cells (see path_method), made shorter in continuous space afterwards. Every segment
+/// A way of the robot `from` a start `to` a goal (metres): the straight one if that is free and costs its length; else
+/// a cheap one over the middles of cells (see path_method), made shorter in continuous space afterwards. Every segment
 /// is free by `space.is_free`: the robot touches no obstacle anywhere on it. Where it cannot go, `status` says why
 /// (also a passage between two middles of cells is not seen that is wide enough for the robot only off the grid), and
 /// the path leads to the nearest point that is reached.
@@ -160,9 +163,10 @@ void shorten_path(const Space& space, std::vector<vec3>& points, std::size_t max
 /// `max_checks` ways to check in shortening. Where unknown space is free and no region is named, the search for a goal
 /// that cannot be reached ends at `max_expanded` only.
 template <planning_space Space>
-[[nodiscard]] found_path find_path(const Space& space, const vec3& start, const vec3& goal,
+[[nodiscard]] found_path find_path(const Space& space, const vec3& from, const vec3& to,
                                    const path_options& options = {}) {
   found_path out;
+  const vec3 start = space.placed(from), goal = space.placed(to);
   if (!space.key(start)) {
     out.status = path_status::start_outside;
     return out;

@@ -41,6 +41,7 @@ struct planning_options {
 ///   everywhere on the straight way between two positions. The last one is the first where both ends are the same;
 /// - `is_surely_free(a, b)`: a test for the same that costs little, and may be false where the way is free;
 /// - `density(k)`: what a metre costs in a cell, at least 1; `is_uniform()`: whether it is 1 everywhere;
+/// - `placed(p)`: the position as it is searched for: on a floor with z = 0;
 /// - `on_ground(p)`: the position as it is reported: with the floor's height, where there is a floor.
 template <class S>
 concept planning_space = requires(const S& space, const vec3& p, const octree::voxel_key& k) {
@@ -56,6 +57,7 @@ concept planning_space = requires(const S& space, const vec3& p, const octree::v
   { space.is_surely_free(p, p) } -> std::same_as<bool>;
   { space.density(k) } -> std::convertible_to<double>;
   { space.is_uniform() } -> std::same_as<bool>;
+  { space.placed(p) } -> std::convertible_to<vec3>;
   { space.on_ground(p) } -> std::convertible_to<vec3>;
 };
 

@@ -82,8 +82,7 @@ class planning_view {
       double least = field_->reach();
       const vec3 p = center(k);
       for (int i = 0; i != cover_.count; ++i) least = std::min(least, field_->distance(ball_at(p, i)));
-      const double share = std::max(0.0, least - cover_.outer) / options_.preferred_clearance;
-      if (share < 1.0) sum += options_.clearance_weight * (1.0 - share) * (1.0 - share);
+      sum = detail::clearance_density(options_, least - cover_.outer);
     }
     if (options_.unknown_cost > 1.0 && map_->state(k) == octree::occupancy::unknown) sum *= options_.unknown_cost;
     return sum;
@@ -108,6 +107,8 @@ class planning_view {
     const double edge = 0.5 * resolution() * grid().cells();
     return p.cwiseMax(vec3::Constant(-edge)).cwiseMin(vec3::Constant(edge));
   }
+  /// `p` as it is.
+  [[nodiscard]] const vec3& placed(const vec3& p) const noexcept { return p; }
   /// `p` as it is: there is no floor.
   [[nodiscard]] const vec3& on_ground(const vec3& p) const noexcept { return p; }
 

@@ -5,14 +5,22 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
 
 #include <orbis/core/types.hpp>
+#include <orbis/nav/planning_space.hpp>
 #include <orbis/octree/key.hpp>
 
 namespace orbis::nav::detail {
+
+/// What a metre costs so far (metres) from obstacles, see planning_options.
+[[nodiscard]] inline double clearance_density(const planning_options& options, double clearance) noexcept {
+  const double lacking = 1.0 - std::max(0.0, clearance) / options.preferred_clearance;
+  return lacking > 0.0 ? 1.0 + options.clearance_weight * lacking * lacking : 1.0;
+}
 
 /// What `margin` says where a robot certainly does not fit.
 inline constexpr double blocked = -std::numeric_limits<double>::infinity();

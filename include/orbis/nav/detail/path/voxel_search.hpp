@@ -27,6 +27,14 @@ enum class search_end : std::uint8_t {
   stopped     ///< at the limit
 };
 
+/// The length of the shortest way in steps along axes and diagonals, where nothing is in between; `d`: from one end to
+/// the other, metres. A metric.
+[[nodiscard]] inline double length_in_steps(const vec3& d) noexcept {
+  std::array<double, 3> s{std::abs(d.x()), std::abs(d.y()), std::abs(d.z())};
+  std::sort(s.begin(), s.end());
+  return 1.73205080756887729 * s[0] + 1.41421356237309505 * (s[1] - s[0]) + (s[2] - s[1]);
+}
+
 /// The cheapest way from a place to another over the middles of cells, with steps to all 26 (on a floor 8) neighbours.
 ///
 /// - On the grid: A*, P. Hart, N. Nilsson, B. Raphael, "A formal basis for the heuristic determination of minimum cost
@@ -187,12 +195,6 @@ class voxel_search {
 
   // -- costs
 
-  /// The length of the shortest way in steps where nothing is in between; `d`: along the axes, metres.
-  [[nodiscard]] static double length_in_steps(const vec3& d) {
-    std::array<double, 3> s{std::abs(d.x()), std::abs(d.y()), std::abs(d.z())};
-    std::sort(s.begin(), s.end());
-    return 1.73205080756887729 * s[0] + 1.41421356237309505 * (s[1] - s[0]) + (s[2] - s[1]);
-  }
   /// No way is cheaper to the goal or, on the grid, to an exit and from there to the goal.
   [[nodiscard]] double ahead(std::uint32_t number) const {
     if (number == to) return 0.0;

@@ -1,0 +1,199 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Where a round robot fits on a floor, for paths in two dimensions.
+///
+/// @code
+///   const auto floor = orbis::nav::make_floor_map(map, robot);
+///   const orbis::nav::floor_view view{*floor, robot.radius};
+///   const auto path = orbis::nav::find_path(view, start, goal);  // points at the floor's height
+/// @endcode
+#pragma once
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <cstdint>
+#include <optional>
+
+#include <orbis/core/image.hpp>
+#include <orbis/core/types.hpp>
+#include <orbis/nav/detail/path/segments.hpp>
+#include <orbis/nav/floor_cost.hpp>
+#include <orbis/nav/floor_map.hpp>
+#include <orbis/nav/planning_space.hpp>
+#include <orbis/octree/key.hpp>
+#include <orbis/octree/overlap.hpp>
+
+namespace orbis::nav {
+
+/// Whether a disc is free on a floor, at rest or on its way along a segment: whether it has no point in common with the
+/// square of a cell that is occupied. The answers are exact. A disc that leaves the map meets unknown cells there.
+///
+/// A `planning_space`, of which the z coordinate does not count: two places have the distance that they have seen from
+/// above, and a path is reported at the height of the floor in the cells of its points. It refers to the floor map,
+/// which must stay as it is while it is used. Any number of threads may ask.
+class floor_view {
+ public:
+  static constexpr int dimensions = 2;
+
+  /// `radius`: of the robot, metres. `unknown`: what cells count as of which nothing is known. O(cells).
+  /// @pre radius > 0; less than 2^21 cells along x and y; the options'
+  floor_view(const floor_map& map, double radius, const planning_options& options = {},
+             octree::occupancy unknown = octree::occupancy::occupied)
+      : map_{&map}, radius_{radius}, options_{options} {
+    look_at_obstacles(unknown, [&](int x, int y) { return map.states(x, y); });
+  }
+  /// For the middle of a robot on a cost map (see inflate), which knows its radius: cells from `inscribed` on are
+  /// obstacles, and a metre costs 1 + clearance_weight cost / 252 in the others; preferred_clearance does not count.
+  /// @pre as above; costs are those of `map`, and outlive the view
+  floor_view(const floor_map& map, const image<std::uint8_t>& costs, const planning_options& options = {},
+             octree::occupancy unknown = octree::occupancy::occupied)
+      : map_{&map}, costs_{&costs}, options_{options} {
+    assert(costs.width() == map.states.width() && costs.height() == map.states.height());
+    look_at_obstacles(unknown, [&](int x, int y) {
+      const std::uint8_t cost = costs(x, y);
+      return cost == floor_cost::no_information ? floor_state::unknown
+             : cost >= floor_cost::inscribed    ? floor_state::occupied
+                                                : floor_state::free;
+    });
+  }
+
+  /// Whether the disc around `p` (metres) touches no obstacle. False outside of the map or the region. O(1) away from
+  /// obstacles, O((radius / resolution)^2) near them.
+  [[nodiscard]] bool is_free(const vec3& p) const { return is_free(p, p); }
+  /// Whether it touches none on its straight way from `a` to `b` (metres). O(length / distance to the obstacles), and
+  /// the cells of the box around each 4 cells of the way near them.
+  [[nodiscard]] bool is_free(const vec3& a, const vec3& b) const {
+    if (!key(a) || !key(b)) return false;
+    return detail::is_way_free(
+        placed(a), placed(b), resolution(), [&](const vec3& p) { return margin(p); },
+        [&](const vec3& p, const vec3& q) { return overlaps(p, q); });
+  }
+  /// The same.
+  [[nodiscard]] bool is_surely_free(const vec3& a, const vec3& b) const { return is_free(a, b); }
+  /// Whether the disc in the middle of a cell is free. @pre contains(k)
+  [[nodiscard]] bool is_free(const octree::voxel_key& k) const {
+    const double m = margin(center(k));
+    return m != detail::blocked && (m >= 0.0 || !overlaps(center(k), center(k)));
+  }
+
+  /// See planning_options. @pre contains(k)
+  [[nodiscard]] double density(const octree::voxel_key& k) const {
+    const int x = static_cast<int>(k.x), y = static_cast<int>(k.y);
+    const double near = costs_ == nullptr ? detail::clearance_density(options_, distance(x, y) - radius_)
+                                          : 1.0 + options_.clearance_weight *
+                                                      std::min<int>((*costs_)(x, y), floor_cost::inscribed - 1) /
+                                                      (floor_cost::inscribed - 1);
+    return is_unknown(x, y) ? near * options_.unknown_cost : near;
+  }
+  /// Whether a way costs its length everywhere.
+  [[nodiscard]] bool is_uniform() const noexcept {
+    return options_.clearance_weight == 0.0 && options_.unknown_cost == 1.0;
+  }
+
+  /// The cell of `p` (metres); empty outside of the map and of the region, and if not finite. O(1).
+  [[nodiscard]] std::optional<octree::voxel_key> key(const vec3& p) const {
+    const auto cell = is_in_region(p) ? map_->cell(p) : std::nullopt;
+    if (!cell) return std::nullopt;
+    return octree::voxel_key{static_cast<std::uint32_t>((*cell)[0]), static_cast<std::uint32_t>((*cell)[1]), 0};
+  }
+  /// Whether the cell is in the map, and its middle in the region.
+  [[nodiscard]] bool contains(const octree::voxel_key& k) const noexcept {
+    return k.x < static_cast<std::uint32_t>(map_->states.width()) &&
+           k.y < static_cast<std::uint32_t>(map_->states.height()) && k.z == 0 && is_in_region(center(k));
+  }
+  /// The middle of a cell, metres; z = 0.
+  [[nodiscard]] vec3 center(const octree::voxel_key& k) const noexcept {
+    const vec2 p = map_->center(static_cast<int>(k.x), static_cast<int>(k.y));
+    return {p.x(), p.y(), 0.0};
+  }
+  /// The point of the map that is nearest to `p`, metres; z = 0.
+  [[nodiscard]] vec3 clamped(const vec3& p) const {
+    const double width = map_->states.width(), height = map_->states.height();
+    return {std::clamp(p.x(), map_->origin.x(), map_->origin.x() + width * resolution()),
+            std::clamp(p.y(), map_->origin.y(), map_->origin.y() + height * resolution()), 0.0};
+  }
+  /// With z = 0.
+  [[nodiscard]] vec3 placed(const vec3& p) const noexcept { return {p.x(), p.y(), 0.0}; }
+  /// At the height of the floor in its cell or, where the robot does not get to, at that of the floor as a whole.
+  [[nodiscard]] vec3 on_ground(const vec3& p) const {
+    const auto cell = map_->cell(p);
+    const double height = cell && !map_->heights.empty() ? map_->heights((*cell)[0], (*cell)[1]) : map_->floor;
+    return {p.x(), p.y(), std::isfinite(height) ? height : map_->floor};
+  }
+
+  [[nodiscard]] const floor_map& map() const noexcept { return *map_; }
+  /// The edge of a cell, metres.
+  [[nodiscard]] double resolution() const noexcept { return map_->resolution; }
+  /// Of the robot, metres; 0 on a cost map.
+  [[nodiscard]] double radius() const noexcept { return radius_; }
+
+ private:
+  template <class StateOf>
+  void look_at_obstacles(octree::occupancy unknown, StateOf&& state_of) {
+    const int width = map_->states.width(), height = map_->states.height();
+    assert(radius_ >= 0.0 && std::max(width, height) < 1 << 21 && options_.unknown_cost >= 1.0);
+    assert(options_.clearance_weight >= 0.0 && options_.preferred_clearance > 0.0);
+    const bool unknown_blocks = unknown == octree::occupancy::occupied;
+    const auto blocks = [&](floor_state s) {
+      return s == floor_state::occupied || (s == floor_state::unknown && unknown_blocks);
+    };
+    // A seam of unknown cells stands for all outside.
+    image<floor_state> states(width + 2, height + 2, unknown_blocks ? floor_state::occupied : floor_state::free);
+    for (int y = 0; y != height; ++y)
+      for (int x = 0; x != width; ++x)
+        states(x + 1, y + 1) = blocks(state_of(x, y)) ? floor_state::occupied : floor_state::free;
+    squared_ = squared_floor_distances(states);
+  }
+  [[nodiscard]] bool is_unknown(int x, int y) const {
+    return costs_ == nullptr ? map_->states(x, y) == floor_state::unknown
+                             : (*costs_)(x, y) == floor_cost::no_information;
+  }
+  [[nodiscard]] bool is_in_region(const vec3& p) const noexcept {
+    if (!p.allFinite()) return false;
+    const auto& r = options_.region;
+    return !r || (p.x() >= r->min.x() && p.y() >= r->min.y() && p.x() <= r->max.x() && p.y() <= r->max.y());
+  }
+  /// Of the middles of the cell and the nearest obstacle, metres.
+  [[nodiscard]] double distance(int x, int y) const {
+    return std::sqrt(static_cast<double>(squared_(x + 1, y + 1))) * resolution();
+  }
+  /// See detail::is_way_free. An obstacle's square is half a cell to half a diagonal nearer than its middle.
+  [[nodiscard]] double margin(const vec3& p) const {
+    const auto cell = map_->cell(p);
+    if (!cell) return -radius_ - resolution();
+    const double d = distance((*cell)[0], (*cell)[1]);
+    const double off = (map_->center((*cell)[0], (*cell)[1]) - p.head<2>()).norm();
+    if (d + off - 0.4999 * resolution() < radius_) return detail::blocked;
+    return d - off - 0.7072 * resolution() - radius_;
+  }
+  /// Whether what the disc sweeps touches an obstacle. @pre z = 0
+  [[nodiscard]] bool overlaps(const vec3& a, const vec3& b) const {
+    const octree::capsule way{a, b, radius_};
+    const octree::bounding_box box = bounds_of(way);
+    const auto index = [&](double p, double origin, int cells) {  // in squared_, which has a seam
+      return std::clamp(static_cast<int>(std::floor((p - origin) / resolution())) + 1, 0, cells - 1);
+    };
+    const double edge = resolution();  // faces that only touch are found as well
+    const int left = index(box.min.x() - 0.5 * edge, map_->origin.x(), squared_.width());
+    const int right = index(box.max.x() + 0.5 * edge, map_->origin.x(), squared_.width());
+    const int low = index(box.min.y() - 0.5 * edge, map_->origin.y(), squared_.height());
+    const int high = index(box.max.y() + 0.5 * edge, map_->origin.y(), squared_.height());
+    for (int y = low; y <= high; ++y)
+      for (int x = left; x <= right; ++x) {
+        if (squared_(x, y) != 0.0F) continue;
+        const vec2 corner = map_->origin + edge * vec2{x - 1.0, y - 1.0};
+        const octree::bounding_box square{{corner.x(), corner.y(), 0.0}, {corner.x() + edge, corner.y() + edge, 0.0}};
+        if (touches(way, square)) return true;
+      }
+    return false;
+  }
+
+  const floor_map* map_;
+  const image<std::uint8_t>* costs_ = nullptr;
+  double radius_ = 0.0;
+  planning_options options_;
+  image<float> squared_{};  ///< see squared_floor_distances, with a seam of one cell
+};
+
+}  // namespace orbis::nav
