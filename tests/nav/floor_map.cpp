@@ -325,3 +325,38 @@ TEST_CASE("A region of a floor map, and what cannot be had") {
   CHECK((open.has_value() || open.error().code == errc::invalid_argument));
   CHECK(nav::make_floor_map(w.map(), {.radius = 0.2, .height = 1e9}, {.region = region}).has_value());
 }
+
+TEST_CASE("Very large leaves cost what is near the floor, or too much") {
+  // A floor of 64 x 64 voxels in and above leaves of 1024 and more.
+  world w{64, 64, 3};
+  w.fill({0, 0, 0}, {64, 64, 3}, occupancy::occupied);
+  map_type& map = w.map();
+  for (const std::uint32_t x : {0U, 1U})
+    for (const std::uint32_t y : {0U, 1U})
+      for (std::uint32_t z = 0; z != 2; ++z)
+        if (z == 1 || x == 0 || y == 0)
+          map.set_unknown_node(
+              {32768 - 1024 + 1024 * x - 1024, 32768 - 1024 + 1024 * y - 1024, 32768 + 1024 * z - 1024}, 6,
+              z == 0 ? 0.5F : -0.5F);
+  CHECK(*nav::find_floor(map) == Approx(0.0));
+  const auto floor = nav::make_floor_map(map, {}, {.floor = 0.0});
+  REQUIRE(floor.has_value());
+  CHECK(floor->states.width() == 2048 + 64);
+  CHECK(floor->state(vec2{-20.0, -150.0}) == floor_state::free);
+  CHECK(floor->heights((*floor->cell(vec2{-20.0, -150.0}))[0], (*floor->cell(vec2{-20.0, -150.0}))[1]) == 0.0F);
+  // As high as the leaves are, there are too many words; a region has few.
+  constexpr double inf = std::numeric_limits<double>::infinity();
+  const nav::floor_map_options high{.floor = 0.0, .below = inf, .above = inf};
+  CHECK(nav::make_floor_map(map, {}, high).error().code == errc::invalid_argument);
+  nav::floor_map_options part = high;
+  part.region = octree::bounding_box{vec3{-60.0, -160.0, 0.0}, vec3{-10.0, -110.0, 0.0}};
+  const auto some = nav::make_floor_map(map, {}, part);
+  REQUIRE(some.has_value());
+  CHECK(some->state(vec2{-20.0, -150.0}) == floor_state::free);
+  // All of the grid.
+  map_type whole{0.1};
+  whole.set_unknown_node({0, 0, 0}, 1, 0.5F);
+  whole.set_unknown_node({0, 0, 32768}, 1, -0.5F);
+  CHECK_FALSE(nav::find_floor(whole).has_value());
+  CHECK(nav::make_floor_map(whole, {}, {.floor = 0.0}).error().code == errc::invalid_argument);
+}

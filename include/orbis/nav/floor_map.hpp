@@ -78,7 +78,8 @@ struct floor_map {
 
 /// The height (metres) of the floor: the top of the lowest of the large horizontal layers, those that have at least
 /// half as much surface with free space right above it as the largest has. Two layers of voxels count as one, for a
-/// floor lies between them. Empty if there is no such surface. O(octants).
+/// floor lies between them. Empty if there is no such surface. O(octants + tops of larger leaves in octants; of these
+/// not more than 2^24 count).
 template <planning_map Map>
 [[nodiscard]] std::optional<double> find_floor(const Map& map);
 
@@ -99,8 +100,10 @@ template <planning_map Map>
 /// After: A. Hornung et al., "OctoMap", Autonomous Robots 34, 2013 (projection of a height band); P. Fankhauser et al.,
 /// "Probabilistic terrain mapping for mobile robots with uncertain localization", RA-L 3, 2018 (steps and slopes).
 ///
-/// Errors: no_data (no floor is found, or nothing is known at its height), invalid_argument (more than 2^26 cells: name
-/// a region). O(octants + cells x (height of the layer + (radius / resolution)^2 where it is not level)).
+/// Errors: no_data (no floor is found, or nothing is known at its height), invalid_argument (more than 2^26 cells, each
+/// taken once for each 64 voxels of known height in the layer: name a region, or look less far below and above). It
+/// takes 16 bytes for each of these, and about 40 for each cell. O(octants + cells x (height of the layer +
+/// (radius / resolution)^2 where it is not level)).
 /// @pre height, radius > 0; step, below, above >= 0; 0 <= max_slope < pi / 2
 template <planning_map Map>
 [[nodiscard]] result<floor_map> make_floor_map(const Map& map, const ground_robot& robot = {},

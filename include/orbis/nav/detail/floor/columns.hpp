@@ -53,21 +53,49 @@ class voxel_columns {
     return next(known_, ~std::uint64_t{0}, x, y, z);
   }
 
-  /// Sets an octant. @pre it lies in the box
-  void set(const octree::voxel_key& octant, const octree::octant_states& s) noexcept {
-    const auto x = static_cast<int>(octant.x - low_.x), y = static_cast<int>(octant.y - low_.y);
-    const std::uint32_t z = octant.z - low_.z;
+  /// Sets what was not set before: all octants of a box of them. @pre it lies in this one
+  void set(const octree::key_box& octants, const octree::octant_states& s) noexcept {
+    const std::uint64_t all = ~std::uint64_t{0};
+    const bool is_uniform = s.known == all && (s.occupied == 0 || s.occupied == all);
+    const int from = static_cast<int>(octants.low.z - low_.z), to = static_cast<int>(octants.high.z - low_.z) + 4;
+    for (std::uint32_t y = octants.low.y; y <= octants.high.y; y += 4)
+      for (std::uint32_t x = octants.low.x; x <= octants.high.x; x += 4) {
+        const auto u = static_cast<int>(x - low_.x), v = static_cast<int>(y - low_.y);
+        if (is_uniform && from / 64 == (to - 1) / 64) {
+          const std::uint64_t bits = (to - from == 64 ? all : (std::uint64_t{1} << (to - from)) - 1) << (from & 63);
+          for (int j = 0; j != 4; ++j)
+            for (std::size_t i = 0, word = place(u, v + j) + static_cast<std::size_t>(from / 64); i != 4; ++i) {
+              known_[word + i * words_] |= bits;
+              if (s.occupied != 0) occupied_[word + i * words_] |= bits;
+            }
+        } else if (is_uniform) {
+          for (int i = 0; i != 16; ++i) fill(place(u + (i & 3), v + (i >> 2)), from, to, s.occupied != 0);
+        } else {
+          for (int z = from; z != to; z += 4) set_octant(u, v, static_cast<unsigned>(z), s);
+        }
+      }
+  }
+
+ private:
+  void set_octant(int x, int y, unsigned z, const octree::octant_states& s) noexcept {
     for (int i = 0; i != 16; ++i) {
       // Of the bits of a Morton code, x has 0 and 3, y 1 and 4, z 2 and 5.
       const auto in = static_cast<unsigned>(i);
       const unsigned code = (in & 1U) | (in & 2U) << 2U | (in & 4U) >> 1U | (in & 8U) << 1U;
       const std::size_t word = place(x + (i & 3), y + (i >> 2)) + z / 64;
       known_[word] |= four(s.known >> code) << (z & 63U);
-      occupied_[word] |= four(s.occupied >> code) << (z & 63U);
+      if (s.occupied != 0) occupied_[word] |= four(s.occupied >> code) << (z & 63U);
     }
   }
-
- private:
+  /// The levels [from, to) of the column whose first word is `first`.
+  void fill(std::size_t first, int from, int to, bool occupied) noexcept {
+    for (int z = from; z < to; z = (z | 63) + 1) {
+      const std::uint64_t rest = to - (z & ~63) < 64 ? (std::uint64_t{1} << (to & 63)) - 1 : ~std::uint64_t{0};
+      const std::uint64_t bits = rest & ~std::uint64_t{0} << (z & 63);
+      known_[first + static_cast<std::size_t>(z / 64)] |= bits;
+      if (occupied) occupied_[first + static_cast<std::size_t>(z / 64)] |= bits;
+    }
+  }
   /// The four voxels of a column of an octant, of which the lowest is bit 0.
   [[nodiscard]] static std::uint64_t four(std::uint64_t m) noexcept {
     return (m & 1U) | (m >> 3U & 2U) | (m >> 30U & 4U) | (m >> 33U & 8U);
@@ -90,8 +118,9 @@ class voxel_columns {
   std::vector<std::uint64_t> known_, occupied_;  ///< words_ for each column, row by row
 };
 
-/// The columns of what is known in a box of voxels: as far along x and y as something in it is known, in octants.
-/// Errors: no_data, invalid_argument (more than `most` columns). O(octants in the box + columns).
+/// The columns of what is known in a box of voxels: as far as something in it is known, in octants, along all axes.
+/// Errors: no_data, invalid_argument (more than `most` words of 64 levels). O(octants and larger leaves in the box +
+/// words).
 template <planning_map Map>
 [[nodiscard]] result<voxel_columns> read_columns(const Map& map, const octree::key_box& wanted, std::uint64_t most) {
   const auto down = [](const octree::voxel_key& k) { return octree::node_key(k, 2); };
@@ -109,19 +138,18 @@ template <planning_map Map>
         {std::max(k.x, box.low.x), std::max(k.y, box.low.y), std::max(k.z, box.low.z)},
         {std::min(k.x + last, box.high.x), std::min(k.y + last, box.high.y), std::min(k.z + last, box.high.z)}};
     parts.push_back({inside, s});
-    around.low = {std::min(around.low.x, inside.low.x), std::min(around.low.y, inside.low.y), box.low.z};
-    around.high = {std::max(around.high.x, inside.high.x), std::max(around.high.y, inside.high.y), box.high.z};
+    around.low = {std::min(around.low.x, inside.low.x), std::min(around.low.y, inside.low.y),
+                  std::min(around.low.z, inside.low.z)};
+    around.high = {std::max(around.high.x, inside.high.x), std::max(around.high.y, inside.high.y),
+                   std::max(around.high.z, inside.high.z)};
   });
   if (parts.empty()) return fail(errc::no_data, "", "nothing is known at the floor's height");
   const std::array<std::uint32_t, 3> size{around.high.x + 4 - around.low.x, around.high.y + 4 - around.low.y,
                                           around.high.z + 4 - around.low.z};
-  if (std::uint64_t{size[0]} * size[1] > most)
-    return fail(errc::invalid_argument, "region", "the map is too wide for one floor map");
+  if (std::uint64_t{size[0]} * size[1] > most || std::uint64_t{size[0]} * size[1] * ((size[2] + 63) / 64) > most)
+    return fail(errc::invalid_argument, "region", "the map is too wide, or its layer too high, for one floor map");
   voxel_columns columns{around.low, size};
-  for (const part& p : parts)
-    for (std::uint32_t z = p.octants.low.z; z <= p.octants.high.z; z += 4)
-      for (std::uint32_t y = p.octants.low.y; y <= p.octants.high.y; y += 4)
-        for (std::uint32_t x = p.octants.low.x; x <= p.octants.high.x; x += 4) columns.set({x, y, z}, p.states);
+  for (const part& p : parts) columns.set(p.octants, p.states);
   return columns;
 }
 

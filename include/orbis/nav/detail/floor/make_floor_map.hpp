@@ -21,15 +21,24 @@
 
 namespace orbis::nav {
 
+namespace detail {
+
+/// On so many octants on top of large leaves find_floor looks: one second's work.
+inline constexpr std::uint64_t most_octants_on_leaves = std::uint64_t{1} << 24U;
+
+}  // namespace detail
+
 template <planning_map Map>
 std::optional<double> find_floor(const Map& map) {
   const octree::voxel_grid& grid = map_access<Map>::grid(map);
   std::vector<std::size_t> surface(grid.cells());  // by layer
   auto read = map_access<Map>::octants(map);
+  std::uint64_t of_leaves = 0;
   map_access<Map>::for_each_octant(map, [&](const octree::voxel_key& k, int level, const octree::octant_states& s) {
     if (s.occupied == 0) return;
     // Of a large cube, only the highest layer may have free space above.
     const std::uint32_t size = octree::node_cells(level);
+    if (level > 3 && (of_leaves += std::uint64_t{size / 4} * (size / 4)) > detail::most_octants_on_leaves) return;
     const auto& layers = detail::octant_layers;
     for (std::uint32_t y = 0; y != size; y += 4)
       for (std::uint32_t x = 0; x != size; x += 4) {
@@ -54,10 +63,34 @@ std::optional<double> find_floor(const Map& map) {
 
 namespace detail {
 
+/// Instead of the level of a column.
+inline constexpr int no_level = std::numeric_limits<int>::min();
+
+/// Each value becomes the extreme of those at most `radius` away along both axes: of ranges whose length doubles, and
+/// of two of these that overlap. `nothing` is as no value. O(values x log radius).
+template <class Extreme>
+void spread_extremes(image<int>& values, int radius, int nothing, const Extreme& extreme) {
+  std::vector<int> line;
+  const auto along = [&](int* first, std::ptrdiff_t stride, int count) {
+    const int reach = std::min(radius, count);
+    const auto n = static_cast<std::size_t>(count), wide = static_cast<std::size_t>(2 * reach + 1);
+    line.assign(n + wide - 1, nothing);
+    int* const from = line.data() + reach;
+    for (std::ptrdiff_t i = 0; i != count; ++i) from[i] = first[i * stride];
+    std::size_t length = 1;
+    for (; 2 * length <= wide; length *= 2)
+      for (std::size_t i = 0; i + length < line.size(); ++i) line[i] = extreme(line[i], line[i + length]);
+    for (std::size_t i = 0; i != n; ++i)
+      first[static_cast<std::ptrdiff_t>(i) * stride] = extreme(line[i], line[i + wide - length]);
+  };
+  for (int y = 0; y != values.height(); ++y) along(&values(0, y), 1, values.width());
+  for (int x = 0; x != values.width(); ++x) along(&values(x, 0), &values(0, 1) - &values(0, 0), values.height());
+}
+
 /// Surfaces of columns, and which of them a robot gets to.
 class floor_search {
  public:
-  static constexpr int none = std::numeric_limits<int>::min();
+  static constexpr int none = no_level;
 
   /// Levels are those of `columns`; `lowest` and `highest`: between which surfaces are looked for; `clear` and `step`
   /// in voxels.
@@ -106,42 +139,28 @@ class floor_search {
       const int other = levels_(u, v);
       is_edge = is_edge || (other != none && other < level - step_);
     });
-    if (is_edge || (is_uneven_(x, y) != 0 && is_steep(x, y, steepest))) return floor_state::occupied;
+    if (is_edge || is_steep(x, y, steepest)) return floor_state::occupied;
     return columns_.next_unknown(x, y, level) > level + clear_ ? floor_state::free : in_doubt();
   }
   /// A column without a surface that the robot gets to, beside a floor at `level`.
   [[nodiscard]] floor_state judge_other(int x, int y, int level) const {
     const int from = std::max(level + step_ + 1, 0);
     if (columns_.next_occupied(x, y, from) <= level + step_ + clear_) return floor_state::occupied;
-    const int deepest = std::max(level - step_, 0);
-    if (columns_.next_occupied(x, y, deepest) > level && columns_.next_unknown(x, y, deepest) > level)
+    // Beneath level 0 and beyond the last nothing is known, unless there the grid ends.
+    const int deepest = columns_.low().z == 0 ? std::max(level - step_, 0) : level - step_;
+    if (deepest >= 0 && columns_.next_occupied(x, y, deepest) > level && columns_.next_unknown(x, y, deepest) > level)
       return floor_state::occupied;
     return in_doubt();
   }
   /// How far is_steep looks, in cells. Before judging, and after driving.
   void set_radius(int radius) {
-    radius_ = radius;
-    // Where no level around differs by more than a step, no plane is needed: the extremes of rows, and then of columns.
-    is_uneven_ = image<std::uint8_t>(levels_.width(), levels_.height());
-    struct range {
-      int low = std::numeric_limits<int>::max(), high = none;
-      void add(const range& other) noexcept {
-        low = std::min(low, other.low);
-        high = std::max(high, other.high);
-      }
-    };
-    image<range> rows(levels_.width(), levels_.height());
-    for (int y = 0; y != levels_.height(); ++y)
-      for (int x = 0; x != levels_.width(); ++x)
-        for (int u = std::max(x - radius, 0); u <= std::min(x + radius, levels_.width() - 1); ++u)
-          if (const int level = levels_(u, y); level != none) rows(x, y).add({level, level});
-    for (int y = 0; y != levels_.height(); ++y)
-      for (int x = 0; x != levels_.width(); ++x) {
-        range around;
-        for (int v = std::max(y - radius, 0); v <= std::min(y + radius, levels_.height() - 1); ++v)
-          around.add(rows(x, v));
-        is_uneven_(x, y) = around.high != none && around.high - around.low > step_ ? 1 : 0;
-      }
+    radius_ = std::min(radius, std::max(levels_.width(), levels_.height()));
+    constexpr int most = std::numeric_limits<int>::max();
+    low_ = high_ = levels_;
+    for (int& level : low_.pixels())
+      if (level == none) level = most;
+    spread_extremes(low_, radius_, most, [](int a, int b) { return std::min(a, b); });
+    spread_extremes(high_, radius_, none, [](int a, int b) { return std::max(a, b); });
   }
 
   /// For each column the level of the nearest one that has any, by steps to the four neighbours; of several the lowest.
@@ -200,7 +219,7 @@ class floor_search {
     for (int y = 0; y != columns_.height(); ++y)
       for (int x = 0; x != columns_.width(); ++x) {
         first_.push_back(static_cast<std::uint32_t>(surfaces_.size()));
-        for (int z = columns_.next_occupied(x, y, lowest_); z <= highest_;) {
+        for (int z = columns_.next_occupied(x, y, std::max(lowest_, 0)); z <= highest_;) {
           const int next = columns_.next_occupied(x, y, z + 1);
           if (next > z + clear_ &&
               (unknown_ != octree::occupancy::occupied || columns_.next_unknown(x, y, z) > z + clear_))
@@ -215,6 +234,7 @@ class floor_search {
   /// (tangent). Columns count that differ by at most a step for each cell that they are away: no ledges.
   [[nodiscard]] bool is_steep(int x, int y, double steepest) const {
     const int level = levels_(x, y);
+    if (high_(x, y) - low_(x, y) <= step_ || step_ == 0) return false;
     int lowest = level, highest = level;
     double n = 0, sx = 0, sy = 0, sz = 0, sxx = 0, sxy = 0, syy = 0, sxz = 0, syz = 0;
     for (int v = std::max(y - radius_, 0); v <= std::min(y + radius_, columns_.height() - 1); ++v)
@@ -247,7 +267,7 @@ class floor_search {
   std::vector<std::uint32_t> first_;  ///< of each column
   std::vector<bool> reached_;
   image<int> levels_;
-  image<std::uint8_t> is_uneven_{};
+  image<int> low_{}, high_{};  ///< of the levels within the radius
 };
 
 }  // namespace detail
@@ -256,7 +276,7 @@ template <planning_map Map>
 result<floor_map> make_floor_map(const Map& map, const ground_robot& robot, const floor_map_options& options) {
   assert(robot.radius > 0.0 && robot.height > 0.0 && robot.step >= 0.0 && options.below >= 0.0 && options.above >= 0.0);
   assert(robot.max_slope >= 0.0 && robot.max_slope < std::numbers::pi / 2);
-  constexpr std::uint64_t most_cells = std::uint64_t{1} << 26U;
+  constexpr std::uint64_t most_words = std::uint64_t{1} << 26U;
   const octree::voxel_grid& grid = map_access<Map>::grid(map);
   const double cell = grid.resolution();
   const auto limited = [&](double voxels) {  // no more than the grid has: a limit may be infinite
@@ -285,9 +305,9 @@ result<floor_map> make_floor_map(const Map& map, const ground_robot& robot, cons
   const std::uint32_t lowest = key_at(-voxels(options.below)), highest = key_at(voxels(options.above));
   box.low.z = key_at(-voxels(options.below) - step);
   box.high.z = key_at(voxels(options.above) + step + clear);
-  const result<detail::voxel_columns> columns = detail::read_columns(map, box, most_cells);
+  const result<detail::voxel_columns> columns = detail::read_columns(map, box, most_words);
   if (!columns) return fail(columns.error());
-  const auto level_of = [&](std::uint32_t key) { return static_cast<int>(key - columns->low().z); };
+  const auto level_of = [&](std::uint32_t key) { return static_cast<int>(key) - static_cast<int>(columns->low().z); };
 
   detail::floor_search search{*columns, level_of(lowest), level_of(highest), clear, step, options.unknown};
   search.drive(level_of(*floor_key));
