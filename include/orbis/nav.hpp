@@ -10,6 +10,8 @@
 /// | floor_file.hpp | floor maps as files for the map servers of ROS and Nav2 |
 /// | floor_view.hpp | where a round robot fits on a floor, for paths in two dimensions |
 /// | frontiers.hpp | where known space ends and unknown space begins; follows the map |
+/// | view_gain.hpp | how much unknown space a camera would see |
+/// | next_view.hpp | where a robot that explores should look next |
 /// | robot_shape.hpp | a ball, a vertical capsule, a vertical cylinder |
 /// | planning_view.hpp | whether a robot fits, at rest or along a segment; exact |
 /// | planning_space.hpp | what a path can be searched in, and what going costs |
@@ -25,8 +27,10 @@
 #include <orbis/nav/floor_view.hpp>
 #include <orbis/nav/frontiers.hpp>
 #include <orbis/nav/map_access.hpp>
+#include <orbis/nav/next_view.hpp>
 #include <orbis/nav/path_search.hpp>
 #include <orbis/nav/planning_space.hpp>
 #include <orbis/nav/planning_view.hpp>
 #include <orbis/nav/robot_shape.hpp>
 #include <orbis/nav/squared_distances.hpp>
+#include <orbis/nav/view_gain.hpp>

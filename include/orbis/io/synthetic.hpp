@@ -19,11 +19,14 @@
 #include <utility>
 #include <vector>
 
+#include <orbis/camera/model.hpp>
 #include <orbis/camera/pinhole.hpp>
 #include <orbis/camera/rgbd_frame.hpp>
 #include <orbis/camera/settings.hpp>
 #include <orbis/core/execution.hpp>
+#include <orbis/core/image.hpp>
 #include <orbis/core/result.hpp>
+#include <orbis/core/se3.hpp>
 #include <orbis/core/trajectory.hpp>
 #include <orbis/core/types.hpp>
 #include <orbis/io/detail/synthetic/camera_path.hpp>
@@ -104,6 +107,21 @@ class synthetic_recording {
   [[nodiscard]] result<detail::synthetic::exact_view> exact(const Policy& policy, std::size_t i) const {
     if (i >= size()) return no_such_frame(i);
     return simulator_.exact(policy, moment_at(timestamp(i)));
+  }
+
+  /// What a camera of any model sees from any place in the room: depths in metres along its axis, without any error; 0
+  /// where a pixel has no ray, and everywhere from outside of the room. What moves is not there.
+  template <execution_policy Policy, camera::camera_model Camera>
+  [[nodiscard]] image<float> exact_depth(const Policy& policy, const Camera& camera, const se3& T_world_camera) const {
+    image<float> depth(camera.width(), camera.height());
+    for_each_index(policy, static_cast<std::size_t>(camera.height()), 1, [&](std::size_t row) {
+      const int y = static_cast<int>(row);
+      for (int x = 0; x != camera.width(); ++x)
+        if (const auto ray = camera.unproject(vec2{double(x), double(y)}))  // its z is 1: lengths along it are depths
+          depth(x, y) = static_cast<float>(
+              scene_->cast(T_world_camera.translation(), T_world_camera.rotation() * *ray).value_or(0.0));
+    });
+    return depth;
   }
 
   /// Iteration renders one frame after the other.

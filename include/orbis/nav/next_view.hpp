@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Where a robot that explores should look next.
+///
+/// @code
+///   const auto places = orbis::nav::places_of(frontiers.clusters({.min_size = 20}), map.grid());
+///   const auto next = orbis::nav::next_best_view(view, places, camera, position);
+///   if (next) go(next->path.points), look(next->T_world_camera); else done();
+/// @endcode
+#pragma once
+
+#include <algorithm>
+#include <bit>
+#include <cassert>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include <orbis/camera/model.hpp>
+#include <orbis/core/random.hpp>
+#include <orbis/core/se3.hpp>
+#include <orbis/core/types.hpp>
+#include <orbis/nav/frontiers.hpp>
+#include <orbis/nav/path_search.hpp>
+#include <orbis/nav/planning_view.hpp>
+#include <orbis/nav/robot_shape.hpp>
+#include <orbis/nav/view_gain.hpp>
+#include <orbis/octree/key.hpp>
+
+namespace orbis::nav {
+
+/// Places of a frontier to look at: a large cluster is cut into the cubes of a lattice, and the mean of each cube's
+/// voxels is a place (metres). Larger clusters first. `spacing`: edge of the cubes, metres, rounded to a power of two
+/// of voxels, at least 4.
+[[nodiscard]] inline std::vector<vec3> places_of(std::span<const frontier_cluster> clusters,
+                                                 const octree::voxel_grid& grid, double spacing = 0.8) {
+  const double levels = std::round(std::log2(std::max(4.0, spacing / grid.resolution())));
+  const int level = std::clamp(static_cast<int>(levels), 2, grid.depth());
+  std::vector<vec3> places;
+  for (const frontier_cluster& c : clusters) {
+    // Octants are in Morton order: those of a cube follow each other.
+    for (std::size_t i = 0; i != c.octants.size();) {
+      const octree::voxel_key cube = octree::node_key(c.octants[i].octant, level);
+      vec3 sum = vec3::Zero();
+      double count = 0.0;
+      for (; i != c.octants.size() && octree::node_key(c.octants[i].octant, level) == cube; ++i)
+        for (std::uint64_t rest = c.octants[i].mask; rest != 0; rest &= rest - 1) {
+          const octree::voxel_key low = c.octants[i].octant;
+          const octree::voxel_key in = octree::morton_key(static_cast<std::uint64_t>(std::countr_zero(rest)));
+          sum += grid.center(octree::voxel_key{low.x + in.x, low.y + in.y, low.z + in.z});
+          count += 1.0;
+        }
+      places.push_back(sum / count);
+    }
+  }
+  return places;
+}
+
+struct next_view_options {
+  view_gain_options gain{};
+  int candidates = 12;         ///< poses for each place
+  double min_distance = 0.5;   ///< of the camera from the place, metres
+  double max_distance = 2.0;   ///< metres
+  double max_elevation = 0.5;  ///< how far the camera looks up or down at most, radians
+  double min_gain = 0.0;       ///< unknown space that makes a view worth while, cubic metres
+  /// How much a way costs: a view is worth exp(-lambda * length) of what it shows, 1 / metres.
+  double lambda = 0.2;
+  path_options path{};
+  std::uint64_t seed = 1;  ///< of the candidates
+};
+
+/// A view, and the way there.
+struct next_view {
+  se3 T_world_camera;         ///< the camera's axes: x to the right, y down, z ahead; x is level
+  vec3 place = vec3::Zero();  ///< that it looks at, metres
+  double gain = 0.0;          ///< unknown space that it would see, cubic metres
+  double utility = 0.0;       ///< gain * exp(-lambda * length of the path)
+  found_path path{};
+};
+
+/// The pose of a level camera at `from` that looks at `to` (metres).
+/// @pre `to` is not `from`, and neither above nor below it
+[[nodiscard]] inline se3 looking_at(const vec3& from, const vec3& to) {
+  mat3 axes;
+  axes.col(2) = (to - from).normalized();
+  axes.col(0) = axes.col(2).cross(vec3::UnitZ()).normalized();
+  axes.col(1) = axes.col(2).cross(axes.col(0));
+  return {so3{axes}, from};
+}
+
+/// The best of random views of the places, from where the robot (whose camera is at its reference point) is free and
+/// to where a path leads; empty if there is none whose gain is more than 0 and at least `min_gain`. The best is the one
+/// of the greatest utility, gain * exp(-lambda * length of the path): H. H. Gonzalez-Banos, J.-C. Latombe, "Navigation
+/// strategies for exploring indoor environments", International Journal of Robotics Research 21, 2002. Paths are looked
+/// for only as long as a straight one could still be the best. The world has z up.
+///
+/// The same arguments give the same view. Usually a millisecond for each candidate, and what find_path costs.
+/// @pre 0 < min_distance <= max_distance; 0 <= max_elevation < pi / 2; lambda >= 0
+template <octree::octree_map Map, robot_shape Shape, camera::camera_model Camera>
+[[nodiscard]] std::optional<next_view> next_best_view(const planning_view<Map, Shape>& view,
+                                                      std::span<const vec3> places, const Camera& camera,
+                                                      const vec3& position, const next_view_options& options = {}) {
+  assert(options.min_distance > 0.0 && options.min_distance <= options.max_distance && options.lambda >= 0.0);
+  struct candidate {
+    next_view view;
+    double bound;  ///< of its utility, if the straight way is free
+  };
+  const octree::voxel_grid& grid = view.map().grid();
+  const double voxel = grid.resolution() * grid.resolution() * grid.resolution();
+  view_gain gain{view.map(), camera, options.gain};
+  random_bits random{options.seed};
+  std::vector<candidate> candidates;
+  for (const vec3& place : places)
+    for (int i = 0; i < options.candidates; ++i) {
+      const double azimuth = random.uniform(0.0, 6.283185307179586);
+      const double elevation = random.uniform(-options.max_elevation, options.max_elevation);
+      const double distance = random.uniform(options.min_distance, options.max_distance);
+      const vec3 ahead{std::cos(elevation) * std::cos(azimuth), std::cos(elevation) * std::sin(azimuth),
+                       std::sin(elevation)};
+      const vec3 from = place - distance * ahead;
+      if (!view.is_free(from)) continue;
+      const se3 pose = looking_at(from, place);
+      const double seen = voxel * static_cast<double>(gain(pose));
+      if (!(seen > 0.0 && seen >= options.min_gain)) continue;
+      candidates.push_back({{pose, place, seen, 0.0, {}}, seen * std::exp(-options.lambda * (from - position).norm())});
+    }
+  std::stable_sort(candidates.begin(), candidates.end(),
+                   [](const candidate& a, const candidate& b) { return a.bound > b.bound; });
+  std::optional<next_view> best;
+  for (candidate& c : candidates) {
+    if (best && best->utility >= c.bound) break;
+    c.view.path = find_path(view, position, c.view.T_world_camera.translation(), options.path);
+    if (c.view.path.status != path_status::found) continue;
+    c.view.utility = c.view.gain * std::exp(-options.lambda * c.view.path.length);
+    if (!best || c.view.utility > best->utility) best = std::move(c.view);
+  }
+  return best;
+}
+
+}  // namespace orbis::nav

@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include <orbis/camera/pinhole.hpp>
+#include <orbis/nav/distance_field.hpp>
+#include <orbis/nav/frontiers.hpp>
+#include <orbis/nav/next_view.hpp>
+#include <orbis/octree/occupancy_octree.hpp>
+
+#include "support/catch.hpp"
+
+using namespace orbis;
+
+namespace {
+
+using map_type = octree::occupancy_octree<>;
+
+void fill(map_type& map, const vec3& low, const vec3& high, float log_odds) {
+  const auto box = *octree::keys_between(map.grid(), low.array() + 0.01, high.array() - 0.01);
+  for (auto z = box.low.z; z <= box.high.z; ++z)
+    for (auto y = box.low.y; y <= box.high.y; ++y)
+      for (auto x = box.low.x; x <= box.high.x; ++x)
+        map.edit_octant({x, y, z}, [&](auto& voxels) {
+          const auto i = octree::morton_code({x, y, z}) & 63U;
+          voxels.known |= std::uint64_t{1} << i;
+          voxels.value[i] = log_odds;
+        });
+}
+
+/// A room of 4 m x 4 m x 2 m with walls; two doors lead into the unknown: at x = 0, and at x = 4.
+map_type room() {
+  map_type map{0.1};
+  fill(map, {-0.1, -0.1, -0.1}, {4.1, 4.1, 2.1}, 1.0F);
+  fill(map, {0.0, 0.0, 0.0}, {4.0, 4.0, 2.0}, -1.0F);
+  fill(map, {-0.1, 1.0, 0.0}, {0.0, 2.0, 2.0}, -1.0F);
+  fill(map, {4.0, 1.0, 0.0}, {4.1, 2.0, 2.0}, -1.0F);
+  return map;
+}
+
+}  // namespace
+
+TEST_CASE("Places of a frontier: means of its voxels in the cubes of a lattice") {
+  map_type map{0.1};
+  fill(map, {0.0, 0.0, 0.0}, {3.2, 0.8, 0.1}, -1.0F);  // all of it is frontier
+  const nav::frontiers f{map};
+  REQUIRE(f.size() == 32 * 8);
+  const auto places = nav::places_of(f.clusters(), map.grid(), 0.8);
+  REQUIRE(places.size() == 4);
+  for (std::size_t i = 0; i != 4; ++i)
+    CHECK((places[i] - vec3{0.4 + 0.8 * static_cast<double>(i), 0.4, 0.05}).norm() < 1e-9);
+  CHECK(nav::places_of(f.clusters(), map.grid(), 100.0).size() == 1);
+  CHECK(nav::places_of({}, map.grid()).empty());
+}
+
+TEST_CASE("A camera that looks at a place has it in its middle, and is level") {
+  const camera::pinhole camera{40, 30, 25.0, 25.0, 19.5, 14.5};
+  const vec3 from{1.0, 2.0, 3.0}, to{-1.0, 2.5, 2.0};
+  const se3 T = nav::looking_at(from, to);
+  const vec3 seen = T.inverse() * to;
+  CHECK(seen.head<2>().norm() < 1e-12);
+  CHECK(seen.z() == Approx((to - from).norm()));
+  CHECK(std::abs((T.rotation() * vec3::UnitX()).z()) < 1e-12);
+  CHECK((T.rotation() * vec3::UnitY()).z() < 0.0);
+}
+
+TEST_CASE("The next best view is the one of the greatest utility, and can be reached") {
+  const map_type map = room();
+  const nav::frontiers f{map};
+  const auto clusters = f.clusters();
+  REQUIRE(clusters.size() == 2);
+  const camera::pinhole camera{40, 30, 25.0, 25.0, 19.5, 14.5};
+  const nav::distance_field field{map, {.reach = 0.6}};
+  const nav::planning_view view{map, field, 0.25};
+  const auto places = nav::places_of(clusters, map.grid());
+  nav::next_view_options options{.gain = {.max_range = 3.0, .pixel_step = 4}, .lambda = 3.0};
+  for (const double x : {0.6, 3.4}) {  // ways are dear: the nearer door
+    const vec3 position{x, 2.5, 1.0};
+    const auto next = nav::next_best_view(view, places, camera, position, options);
+    REQUIRE(next);
+    CHECK(std::abs(next->place.x() - x) < 1.0);
+    CHECK(next->path.status == nav::path_status::found);
+    CHECK(next->path.points.front() == position);
+    CHECK(next->path.points.back() == next->T_world_camera.translation());
+    CHECK(view.is_free(next->T_world_camera.translation()));
+    CHECK(next->utility == Approx(next->gain * std::exp(-3.0 * next->path.length)));
+    nav::view_gain gain{map, camera, options.gain};
+    CHECK(next->gain == Approx(1e-3 * static_cast<double>(gain(next->T_world_camera))));
+    const vec3 seen = next->T_world_camera.inverse() * next->place;
+    CHECK(seen.head<2>().norm() < 1e-9);
+    CHECK((seen.z() >= options.min_distance && seen.z() <= options.max_distance));
+    const auto again = nav::next_best_view(view, places, camera, position, options);
+    CHECK(again->T_world_camera.translation() == next->T_world_camera.translation());
+    CHECK(again->utility == next->utility);
+    // Fewer candidates that begin with the same ones are no better.
+    auto one = options;
+    for (const vec3& place : places) {
+      const auto alone = nav::next_best_view(view, std::vector<vec3>{place}, camera, position, one);
+      if (alone && place == places.front()) CHECK(alone->utility <= next->utility);
+    }
+  }
+  options.min_gain = 1e6;
+  CHECK_FALSE(nav::next_best_view(view, places, camera, vec3{2.0, 2.0, 1.0}, options));
+  options.min_gain = 0.0;
+  CHECK_FALSE(nav::next_best_view(view, {}, camera, vec3{2.0, 2.0, 1.0}, options));
+  options.gain.bounds = octree::bounding_box{vec3::Zero(), vec3{4.0, 4.0, 2.0}};  // all of it is known
+  CHECK_FALSE(nav::next_best_view(view, places, camera, vec3{2.0, 2.0, 1.0}, options));
+}
