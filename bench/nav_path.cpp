@@ -1,13 +1,29 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // Paths of a ball with a radius of 0.2 m through the known free space of a recording's map, between 100 random pairs of
-// free places: median and 95th percentile, and how much longer a path is than the straight line on average.
+// free places: median and 95th percentile of the time, and the mean of the length over the shortest that is known. That
+// is the shortest of ours, and of what OMPL's BIT* finds within a second where OMPL is at hand. OMPL's planners ask the
+// same exact tests.
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <ctime>
+#include <limits>
+#include <map>
+#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
+
+#ifdef ORBIS_BENCH_WITH_OMPL
+#include <ompl/base/MotionValidator.h>
+#include <ompl/base/objectives/PathLengthOptimizationObjective.h>
+#include <ompl/base/spaces/RealVectorStateSpace.h>
+#include <ompl/geometric/PathGeometric.h>
+#include <ompl/geometric/planners/informedtrees/BITstar.h>
+#include <ompl/geometric/planners/rrt/RRTConnect.h>
+#include <ompl/util/Console.h>
+#endif
 
 #include <orbis/core/random.hpp>
 #include <orbis/nav/distance_field.hpp>
@@ -21,43 +37,155 @@ namespace {
 
 constexpr double radius = 0.2;
 
-void bench_paths(benchmark::State& state, const std::vector<scan>& scans, double resolution, bool shorten) {
-  map m{resolution};
-  for (const scan& s : scans) m.integrate(s.depth_metres(), s.camera, s.T_world_camera, {.max_range = 5.0});
-  const nav::distance_field field{m, {.reach = 1.0}};
-  const nav::planning_view view{m, field, radius};
-  const octree::bounding_box box = m.bounds().value();
-  random_bits random{1};
-  const auto place = [&] {
-    for (;;) {
-      vec3 p;
-      for (int i = 0; i != 3; ++i) p[i] = box.min[i] + random.uniform() * (box.max[i] - box.min[i]);
-      if (view.is_free(p)) return p;
-    }
-  };
-  std::vector<std::pair<vec3, vec3>> pairs;
-  while (pairs.size() != 100) {
-    const vec3 a = place(), b = place();
-    pairs.emplace_back(a, b);
+using view_type = nav::planning_view<map>;
+using pair_of_places = std::pair<vec3, vec3>;
+
+#ifdef ORBIS_BENCH_WITH_OMPL
+vec3 position_of(const ompl::base::State* s) {
+  const double* v = s->as<ompl::base::RealVectorStateSpace::StateType>()->values;
+  return {v[0], v[1], v[2]};
+}
+class exact_motions : public ompl::base::MotionValidator {
+ public:
+  exact_motions(const ompl::base::SpaceInformationPtr& information, const view_type& view)
+      : MotionValidator{information}, view_{view} {}
+  bool checkMotion(const ompl::base::State* a, const ompl::base::State* b) const override {
+    return view_.is_free(position_of(a), position_of(b));
   }
+  bool checkMotion(const ompl::base::State* a, const ompl::base::State* b,
+                   std::pair<ompl::base::State*, double>& last) const override {
+    last.second = 0.0;
+    return checkMotion(a, b);
+  }
+
+ private:
+  const view_type& view_;
+};
+
+/// The length of what a planner finds within so many seconds; infinite if that is nothing.
+template <class Planner>
+double plan_by_ompl(const view_type& view, const octree::bounding_box& box, const pair_of_places& ends,
+                    double seconds) {
+  namespace ob = ompl::base;
+  ompl::msg::noOutputHandler();
+  const auto space = std::make_shared<ob::RealVectorStateSpace>(3);
+  ob::RealVectorBounds bounds{3};
+  for (unsigned i = 0; i != 3; ++i) {
+    bounds.setLow(i, box.min[static_cast<int>(i)]);
+    bounds.setHigh(i, box.max[static_cast<int>(i)]);
+  }
+  space->setBounds(bounds);
+  const auto information = std::make_shared<ob::SpaceInformation>(space);
+  information->setStateValidityChecker([&](const ob::State* s) { return view.is_free(position_of(s)); });
+  information->setMotionValidator(std::make_shared<exact_motions>(information, view));
+  information->setup();
+  const auto problem = std::make_shared<ob::ProblemDefinition>(information);
+  ob::ScopedState<ob::RealVectorStateSpace> start{space}, goal{space};
+  for (unsigned i = 0; i != 3; ++i) {
+    start[i] = ends.first[static_cast<int>(i)];
+    goal[i] = ends.second[static_cast<int>(i)];
+  }
+  problem->setStartAndGoalStates(start, goal);
+  problem->setOptimizationObjective(std::make_shared<ob::PathLengthOptimizationObjective>(information));
+  Planner planner{information};
+  planner.setProblemDefinition(problem);
+  planner.setup();
+  static_cast<ob::Planner&>(planner).solve(seconds);
+  if (!problem->hasExactSolution()) return std::numeric_limits<double>::infinity();
+  return problem->getSolutionPath()->as<ompl::geometric::PathGeometric>()->length();
+}
+#endif
+
+/// A map with its field, pairs of places, and the length of the shortest path that is known for each.
+struct planning_problem {
+  map m;
+  nav::distance_field field;
+  view_type view;
+  octree::bounding_box box;
+  std::vector<pair_of_places> pairs;
+  std::vector<double> shortest;
+  double bit_star_over_shortest = 0.0;  ///< of those that it found, the sum
+  std::size_t found_by_bit_star = 0;
+
+  planning_problem(const std::vector<scan>& scans, double resolution)
+      : m{map_of(scans, resolution)}, field{m, {.reach = 1.0}}, view{m, field, radius}, box{m.bounds().value()} {
+    random_bits random{1};
+    const auto place = [&] {
+      for (;;) {
+        vec3 p;
+        for (int i = 0; i != 3; ++i) p[i] = box.min[i] + random.uniform() * (box.max[i] - box.min[i]);
+        if (view.is_free(p)) return p;
+      }
+    };
+    while (pairs.size() != 100) {
+      const vec3 a = place(), b = place();
+      pairs.emplace_back(a, b);
+    }
+    for (const pair_of_places& p : pairs) {
+      double least = std::numeric_limits<double>::infinity();
+      for (const nav::path_method method : {nav::path_method::any_angle, nav::path_method::grid}) {
+        const auto path = nav::find_path(view, p.first, p.second, {.method = method});
+        if (path.status == nav::path_status::found) least = std::min(least, path.length);
+      }
+#ifdef ORBIS_BENCH_WITH_OMPL
+      double peer = (p.second - p.first).norm();
+      if (!view.is_free(p.first, p.second)) peer = plan_by_ompl<ompl::geometric::BITstar>(view, box, p, 1.0);
+      least = std::min(least, peer);
+      if (std::isfinite(peer)) ++found_by_bit_star, bit_star_over_shortest += peer / least;
+#endif
+      shortest.push_back(least);
+    }
+  }
+  planning_problem(const planning_problem&) = delete;
+  planning_problem& operator=(const planning_problem&) = delete;
+
+ private:
+  static map map_of(const std::vector<scan>& scans, double resolution) {
+    map made{resolution};
+    for (const scan& s : scans) made.integrate(s.depth_metres(), s.camera, s.T_world_camera, {.max_range = 5.0});
+    return made;
+  }
+};
+
+const planning_problem& problem_of(const std::vector<scan>& (*scans)(), double resolution) {
+  static std::map<std::pair<const std::vector<scan>*, double>, std::unique_ptr<planning_problem>> made;
+  auto& p = made[{&scans(), resolution}];
+  if (p == nullptr) p = std::make_unique<planning_problem>(scans(), resolution);
+  return *p;
+}
+
+/// `length_of_path(pair)` plans; infinite: nothing is found.
+template <class Plan>
+void bench_plans(benchmark::State& state, const planning_problem& problem, Plan&& length_of_path) {
   for (auto _ : state) {
     std::vector<double> seconds;
-    double longer = 0.0;
-    std::size_t found = 0, expanded = 0;
-    for (const auto& [a, b] : pairs) {
+    double over_shortest = 0.0;
+    std::size_t found = 0;
+    for (std::size_t i = 0; i != problem.pairs.size(); ++i) {
       const std::clock_t start = std::clock();
-      const nav::found_path path = nav::find_path(view, a, b, {.shorten = shorten});
+      const double length = length_of_path(problem.pairs[i]);
       seconds.push_back(static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC);
-      expanded += path.expanded;
-      if (path.status != nav::path_status::found) continue;
+      if (!std::isfinite(length)) continue;
       ++found;
-      longer += path.length / (b - a).norm();
+      over_shortest += length / problem.shortest[i];
     }
     state.counters["found"] = static_cast<double>(found);
-    state.counters["expanded"] = static_cast<double>(expanded) / 100.0;
-    state.counters["length_over_straight"] = longer / static_cast<double>(std::max<std::size_t>(1, found));
+    state.counters["length_over_shortest"] = over_shortest / static_cast<double>(std::max<std::size_t>(1, found));
     report_frames(state, std::move(seconds));
   }
+}
+
+void bench_paths(benchmark::State& state, const planning_problem& problem, const nav::path_options& options) {
+  std::size_t expanded = 0;
+  bench_plans(state, problem, [&](const pair_of_places& p) {
+    const nav::found_path path = nav::find_path(problem.view, p.first, p.second, options);
+    expanded += path.expanded;
+    return path.status == nav::path_status::found ? path.length : std::numeric_limits<double>::infinity();
+  });
+  if (problem.found_by_bit_star != 0)
+    state.counters["bit_star_over_shortest"] =
+        problem.bit_star_over_shortest / static_cast<double>(problem.found_by_bit_star);
+  state.counters["expanded"] = static_cast<double>(expanded) / static_cast<double>(problem.pairs.size());
 }
 
 [[maybe_unused]] const bool registered = [] {
@@ -65,8 +193,20 @@ void bench_paths(benchmark::State& state, const std::vector<scan>& scans, double
     for (const double resolution : {0.05, 0.02}) {
       const std::string group = "nav_path/" + name + "/" + in_centimetres(resolution);
       const auto row = [](const std::string& row_name, auto body) { timed_by_itself(add_row(row_name, body), 3); };
-      row(group + "/orbis", [=](auto& s) { bench_paths(s, scans(), resolution, true); });
-      row(group + "/orbis_grid_only", [=](auto& s) { bench_paths(s, scans(), resolution, false); });
+      const auto ours = [&](const std::string& who, const nav::path_options& options) {
+        row(group + who, [=](auto& s) { bench_paths(s, problem_of(scans, resolution), options); });
+      };
+      ours("/orbis", {});
+      ours("/orbis_grid", {.method = nav::path_method::grid});
+      ours("/orbis_grid_only", {.method = nav::path_method::grid, .shorten = false});
+#ifdef ORBIS_BENCH_WITH_OMPL
+      row(group + "/ompl_rrt_connect", [=](auto& s) {
+        const planning_problem& problem = problem_of(scans, resolution);
+        bench_plans(s, problem, [&](const pair_of_places& p) {
+          return plan_by_ompl<ompl::geometric::RRTConnect>(problem.view, problem.box, p, 5.0);
+        });
+      });
+#endif
     }
   };
   add("room", room);

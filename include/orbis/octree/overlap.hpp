@@ -3,6 +3,7 @@
 /// Collision tests for planners: whether a box, a sphere or a capsule overlaps what the map holds.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cassert>
@@ -125,10 +126,10 @@ class overlap_search {
       found = found || (is_occupied<Model>(v) && meets(named_key(name), named_level(name)));
     });
     if (found || unknown_blocks_ || chunks_in(*keys) < static_cast<double>(store_.chunk_count()))
-      return found || upper(*keys, {}, grid_.depth());
+      return found || from_common_node(*keys);
     store_.for_each_chunk([&](const auto& c) {
       const voxel_key k = named_key(c.name);
-      found = found || (keys->overlaps(k, chunk_level) && meets(k, chunk_level) && chunk(k));
+      found = found || (keys->overlaps(k, chunk_level) && meets(k, chunk_level) && chunk(*keys, k));
     });
     return found;
   }
@@ -140,26 +141,33 @@ class overlap_search {
     const auto along = [](std::uint32_t a, std::uint32_t b) { return (b >> chunk_level) - (a >> chunk_level) + 1.0; };
     return along(keys.low.x, keys.high.x) * along(keys.low.y, keys.high.y) * along(keys.low.z, keys.high.z);
   }
+  /// Below the smallest node that contains all keys.
+  [[nodiscard]] bool from_common_node(const key_box& keys) const {
+    const std::uint32_t differ = (keys.low.x ^ keys.high.x) | (keys.low.y ^ keys.high.y) | (keys.low.z ^ keys.high.z);
+    const int level = std::max(chunk_level, static_cast<int>(std::bit_width(differ)));
+    return upper(keys, node_key(keys.low, level), level);
+  }
   [[nodiscard]] bool upper(const key_box& keys, const voxel_key& k, int level) const {
     if (!keys.overlaps(k, level) || !meets(k, level)) return false;
-    if (level == chunk_level) return chunk(k);
+    if (level == chunk_level) return chunk(keys, k);
     // Large leaves that are occupied have been looked at.
     if (const auto large = store_.find_large(k); large && large->second >= level) return false;
     for (unsigned i = 0; i != 8; ++i)
       if (upper(keys, child_key(k, i, node_cells(level - 1)), level - 1)) return true;
     return false;
   }
-  [[nodiscard]] bool chunk(const voxel_key& k) const {
+  [[nodiscard]] bool chunk(const key_box& keys, const voxel_key& k) const {
     const auto* const c = store_.find_chunk(k);
     if (c == nullptr && !store_.has_large()) return unknown_blocks_;
     if (c == nullptr && !unknown_blocks_) return false;
     for (std::uint32_t place = 0; place != 64; ++place) {
       const voxel_key offset = brick_in_chunk(place);
       const voxel_key key{k.x + offset.x, k.y + offset.y, k.z + offset.z};
+      if (!keys.overlaps(key, brick_level)) continue;
       const brick<T>* const b = c == nullptr ? nullptr : store_.find(*c, place);
       const bool blocks = b != nullptr ? may_block(*b) : unknown_blocks_ && store_.find_large_value(key) == nullptr;
       if (!blocks || !meets(key, brick_level)) continue;
-      if (b == nullptr || in_brick(*b, key)) return true;
+      if (b == nullptr || in_brick(*b, keys, key)) return true;
     }
     return false;
   }
@@ -169,17 +177,25 @@ class overlap_search {
       may = may || (((b.uniform | b.dense) >> i & 1U) != 0 && is_occupied<Model>(b.value[i]));
     return may;
   }
-  [[nodiscard]] bool in_brick(const brick<T>& b, const voxel_key& key) const {
+  [[nodiscard]] bool in_brick(const brick<T>& b, const key_box& keys, const voxel_key& key) const {
     for (std::uint32_t i = 0; i != 8; ++i) {
+      const voxel_key octant = child_key(key, i, node_cells(octant_level));
+      if (!keys.overlaps(octant, octant_level)) continue;
       const bool is_known = ((b.uniform | b.dense) >> i & 1U) != 0;
       std::uint64_t blocking = 0;
       if (is_known && is_occupied<Model>(b.value[i])) blocking = store_.voxels_where(b, i, is_occupied<Model>);
       if (unknown_blocks_) blocking |= ~store_.known(b, i);
-      const voxel_key octant = child_key(key, i, node_cells(octant_level));
       if (blocking == 0 || !meets(octant, octant_level)) continue;
       if (blocking == ~std::uint64_t{0}) return true;
-      for (; blocking != 0; blocking &= blocking - 1)
-        if (meets(voxel_in_octant(octant, static_cast<std::uint32_t>(std::countr_zero(blocking))), 0)) return true;
+      for (unsigned eighth = 0; eighth != 8; ++eighth) {  // 2x2x2 voxels follow each other along the Morton curve
+        std::uint64_t voxels = blocking & (std::uint64_t{0xff} << (8 * eighth));
+        if (voxels == 0) continue;
+        const bool are_few = std::popcount(voxels) <= 2;
+        if (!are_few && !meets(child_key(octant, eighth, 2), 1)) continue;
+        if (std::popcount(voxels) == 8) return true;
+        for (; voxels != 0; voxels &= voxels - 1)
+          if (meets(voxel_in_octant(octant, static_cast<std::uint32_t>(std::countr_zero(voxels))), 0)) return true;
+      }
     }
     return false;
   }
