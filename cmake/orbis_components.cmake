@@ -5,7 +5,7 @@
 
 # In an order in which everything a component needs stands before it.
 set(ORBIS_ALL_COMPONENTS core camera features places optimize cloud octree io eval slam mapping nav
-                         cloud_nanoflann interop_opencv interop_octomap interop_pcl interop_open3d)
+                         cloud_nanoflann interop_opencv interop_octomap interop_pcl interop_open3d interop_ompl interop_fcl)
 # One header each, for another library: provided where that library is, and asked for by name.
 set(ORBIS_OPTIONAL_COMPONENTS "^(cloud_nanoflann|interop_.*|compiled)$")
 
@@ -42,7 +42,7 @@ set(ORBIS_interop_opencv_NEEDS features)
 set(ORBIS_interop_opencv_PACKAGES OpenCV)
 set(ORBIS_interop_opencv_LIBRARIES opencv_core)
 
-set(ORBIS_interop_octomap_NEEDS octree)
+set(ORBIS_interop_octomap_NEEDS octree nav)
 set(ORBIS_interop_octomap_PACKAGES octomap)
 set(ORBIS_interop_octomap_LIBRARIES octomap octomath)
 
@@ -54,9 +54,28 @@ set(ORBIS_interop_open3d_NEEDS cloud)
 set(ORBIS_interop_open3d_PACKAGES Open3D)
 set(ORBIS_interop_open3d_LIBRARIES Open3D::Open3D)
 
+set(ORBIS_interop_ompl_NEEDS nav)
+set(ORBIS_interop_ompl_PACKAGES ompl)
+set(ORBIS_interop_ompl_LIBRARIES ompl::ompl)
+
+set(ORBIS_interop_fcl_NEEDS interop_octomap)
+set(ORBIS_interop_fcl_PACKAGES fcl octomap)
+set(ORBIS_interop_fcl_LIBRARIES fcl)
+
 # What to ask find_package for beside the package's name.
 set(ORBIS_OpenCV_FIND_ARGUMENTS COMPONENTS core)
 set(ORBIS_PCL_FIND_ARGUMENTS COMPONENTS common)
+
+# orbis_name_targets(): targets for packages that were found and name none. OMPL before 1.6 gives variables; what its
+# library needs itself, it is linked to.
+macro(orbis_name_targets)
+  if(ompl_FOUND AND NOT TARGET ompl::ompl)
+    list(GET OMPL_LIBRARIES 0 _orbis_library)
+    add_library(ompl::ompl INTERFACE IMPORTED)
+    target_include_directories(ompl::ompl SYSTEM INTERFACE ${OMPL_INCLUDE_DIRS})
+    target_link_libraries(ompl::ompl INTERFACE ${_orbis_library})
+  endif()
+endmacro()
 
 # orbis_close_components(<out> <component>...): the components and all they need, in order.
 function(orbis_close_components out)
@@ -107,6 +126,7 @@ macro(orbis_add_components)
     foreach(_orbis_package IN LISTS ORBIS_${_orbis_component}_PACKAGES)
       find_package(${_orbis_package} ${ORBIS_${_orbis_package}_FIND_ARGUMENTS} REQUIRED)
     endforeach()
+    orbis_name_targets()
     _orbis_add_component(${_orbis_component})
   endforeach()
   add_library(orbis_orbis INTERFACE)

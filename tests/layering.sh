@@ -13,7 +13,7 @@ complain() { echo "$1"; bad=1; }
 declare -A allowed=(
   [core]="" [camera]="" [features]="" [places]="" [optimize]="" [cloud]="" [octree]="" [io]=""
   [eval]="" [nav]="octree"
-  [interop]="features cloud octree"
+  [interop]="features cloud octree nav"
   [slam]="features places optimize cloud octree io interop"
   [mapping]="features places optimize cloud octree io interop"
 )
@@ -62,6 +62,8 @@ only 'octomap/' '^interop/(octomap|detail/octomap_nodes)\.hpp$'
 only 'opencv2/' '^interop/opencv\.hpp$'
 only 'pcl/' '^interop/pcl\.hpp$'
 only 'open3d/' '^interop/open3d\.hpp$'
+only 'ompl/' '^interop/ompl\.hpp$'
+only 'fcl/' '^interop/fcl\.hpp$'
 while IFS= read -r hit; do
   [[ -z $hit ]] || complain "${hit#./}: include the parts that are needed instead"
 done <<<"$(grep -rnE 'include *<opencv2/opencv\.hpp>' --include='*.hpp' . || true)"

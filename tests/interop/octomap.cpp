@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <cstddef>
+#include <cstdint>
 #include <iostream>
 #include <limits>
 #include <sstream>
@@ -7,7 +9,10 @@
 #include <orbis/core/random.hpp>
 #include <orbis/core/types.hpp>
 #include <orbis/interop/octomap.hpp>
+#include <orbis/nav/distance_field.hpp>
+#include <orbis/nav/floor_map.hpp>
 #include <orbis/octree/files.hpp>
+#include <orbis/octree/octants.hpp>
 
 #include "support/catch.hpp"
 
@@ -225,4 +230,53 @@ TEST_CASE("Colours without a map, maps without colours and coloured leaves of ha
   const auto refused = interop::from_octomap(*one);
   REQUIRE_FALSE(refused);
   CHECK(refused.error().code == errc::unsupported);
+}
+
+TEST_CASE("Planning reads an OctoMap tree in place, as the map that it is a copy of") {
+  static_assert(nav::planning_map<octomap::OcTree>);
+  octree::occupancy_octree<> map = some_map();
+  map.set_unknown_node({32768 + 512, 32768, 32768}, 7, -0.5F);  // and a leaf of 512 voxels
+  const auto tree = interop::to_octomap(map);
+  std::size_t octants = 0, large = 0, wrong = 0;
+  auto read = nav::map_access<octomap::OcTree>::octants(*tree);
+  octree::octant_reader expected{map};
+  nav::map_access<octomap::OcTree>::for_each_octant(
+      *tree, [&](const octree::voxel_key& k, int level, const octree::octant_states& s) {
+        ++octants;
+        large += level == 9 ? 1U : 0U;
+        wrong += s == expected(k) && s == read(k) && s.known != 0 ? 0U : 1U;
+      });
+  octree::for_each_octant(map, [&](const octree::voxel_key& k, int, const octree::octant_states& s) {
+    wrong += read({k.x + 3, k.y + 1, k.z + 2}) == s ? 0U : 1U;
+  });
+  CHECK(octants > 500);
+  CHECK(large == 1);
+  CHECK(wrong == 0);
+  CHECK(read({1, 2, 3}) == octree::octant_states{});
+  for (const octree::occupancy unknown : {octree::occupancy::free, octree::occupancy::occupied}) {
+    const nav::distance_field_options options{.reach = 0.4, .unknown = unknown};
+    nav::distance_field theirs{*tree, options};
+    const nav::distance_field ours{map, options};
+    CHECK(theirs.voxels().brick_count() == ours.voxels().brick_count());
+    const auto differences = [&] {
+      std::size_t count = 0;
+      ours.voxels().for_each_brick([&](const octree::voxel_key& low, auto values) {
+        for (std::uint32_t i = 0; i != 512; ++i)
+          count += theirs.voxels().squared({low.x + (i & 7U), low.y + (i >> 3U & 7U), low.z + (i >> 6U)}) != values[i];
+      });
+      return count;
+    };
+    CHECK(differences() == 0);
+    theirs.update(*tree);
+    CHECK(differences() == 0);
+  }
+  const auto theirs = nav::make_floor_map(*tree, {}, {.floor = -0.5});
+  const auto ours = nav::make_floor_map(map, {}, {.floor = -0.5});
+  REQUIRE((theirs.has_value() && ours.has_value()));
+  CHECK(theirs->states == ours->states);
+  CHECK(nav::find_floor(*tree) == nav::find_floor(map));
+  // A tree without anything.
+  const octomap::OcTree nothing{0.05};
+  CHECK(nav::map_access<octomap::OcTree>::octants(nothing)({5, 5, 5}) == octree::octant_states{});
+  CHECK(nav::distance_field{nothing}.voxels().brick_count() == 0);
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Converts maps to `octomap::OcTree` and `octomap::ColorOcTree`, and these to maps.
+/// Converts maps to `octomap::OcTree` and `octomap::ColorOcTree`, and these to maps; planning on an `octomap::OcTree` as it
+/// is.
 #pragma once
 
 #include <concepts>
@@ -14,8 +15,10 @@
 #include <orbis/core/image.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/interop/detail/octomap_nodes.hpp>
+#include <orbis/nav/map_access.hpp>
 #include <orbis/octree/key.hpp>
 #include <orbis/octree/occupancy_octree.hpp>
+#include <orbis/octree/octants.hpp>
 #include <orbis/octree/voxel_layer.hpp>
 
 namespace orbis::interop {
@@ -82,3 +85,61 @@ template <octree::octomap_model Model = octree::log_odds<>, color_payload Color 
 }
 
 }  // namespace orbis::interop
+
+/// An `octomap::OcTree` for the distance fields and floor maps of `nav`, in place. The tree has no log of changes: each
+/// `update` of a field compares everything.
+template <>
+struct orbis::nav::map_access<octomap::OcTree> {
+  [[nodiscard]] static octree::voxel_grid grid(const octomap::OcTree& tree) {
+    return octree::voxel_grid{tree.getResolution()};
+  }
+  [[nodiscard]] static auto octants(const octomap::OcTree& tree) {
+    return [&tree](const octree::voxel_key& k) {
+      const octomap::OcTreeNode* node = tree.getRoot();
+      for (unsigned level = tree.getTreeDepth();
+           node != nullptr && level-- > octant_level && tree.nodeHasChildren(node);)
+        node = child(tree, node, (k.x >> level & 1U) | (k.y >> level & 1U) << 1U | (k.z >> level & 1U) << 2U);
+      return node == nullptr ? octree::octant_states{} : states(tree, node);
+    };
+  }
+  template <class Visit>
+  static void for_each_octant(const octomap::OcTree& tree, Visit&& visit) {
+    if (tree.getRoot() != nullptr) descend(tree, tree.getRoot(), {0, 0, 0}, tree.getTreeDepth(), visit);
+  }
+
+ private:
+  static constexpr unsigned octant_level = 2;
+
+  [[nodiscard]] static const octomap::OcTreeNode* child(const octomap::OcTree& tree, const octomap::OcTreeNode* node,
+                                                        unsigned i) {
+    return tree.nodeChildExists(node, i) ? tree.getNodeChild(node, i) : nullptr;
+  }
+  template <class Visit>
+  static void descend(const octomap::OcTree& tree, const octomap::OcTreeNode* node, const octree::voxel_key& low,
+                      unsigned level, Visit& visit) {
+    if (level == octant_level || !tree.nodeHasChildren(node)) {
+      visit(low, static_cast<int>(level), states(tree, node));
+      return;
+    }
+    for (unsigned i = 0; i != 8; ++i)
+      if (const octomap::OcTreeNode* const c = child(tree, node, i))
+        descend(tree, c, octree::child_key(low, i, octree::node_cells(static_cast<int>(level) - 1)), level - 1, visit);
+  }
+  /// Of an octant, or of any in a leaf.
+  [[nodiscard]] static octree::octant_states states(const octomap::OcTree& tree, const octomap::OcTreeNode* node) {
+    octree::octant_states s;
+    const auto add = [&](const octomap::OcTreeNode* leaf, std::uint64_t voxels) {
+      s.known |= voxels;
+      if (tree.isNodeOccupied(leaf)) s.occupied |= voxels;
+    };
+    if (!tree.nodeHasChildren(node)) add(node, ~std::uint64_t{0});
+    for (unsigned i = 0; i != 8; ++i) {
+      const octomap::OcTreeNode* const group = child(tree, node, i);
+      if (group == nullptr) continue;
+      if (!tree.nodeHasChildren(group)) add(group, std::uint64_t{0xff} << (8 * i));
+      for (unsigned j = 0; j != 8; ++j)
+        if (const octomap::OcTreeNode* const leaf = child(tree, group, j)) add(leaf, std::uint64_t{1} << (8 * i + j));
+    }
+    return s;
+  }
+};
