@@ -1,0 +1,296 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// A path as a trajectory in time, within bounds on speed and acceleration.
+///
+/// @code
+///   const auto path = orbis::nav::find_path(view, start, goal);
+///   const auto motion = orbis::nav::make_trajectory(view, path.points, {.speed = 0.8, .acceleration = 1.5});
+///   for (double t = 0.0; t < motion.duration(); t += 0.01) steer(motion.at(t));
+/// @endcode
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cassert>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <utility>
+#include <vector>
+
+#include <orbis/core/types.hpp>
+#include <orbis/nav/planning_view.hpp>
+#include <orbis/nav/robot_shape.hpp>
+#include <orbis/octree/accessor.hpp>
+
+namespace orbis::nav {
+
+struct motion_limits {
+  double speed = 1.0;         ///< metres / second
+  double acceleration = 1.0;  ///< in any direction, metres / second^2
+};
+
+/// Where a robot is at a moment.
+struct motion_state {
+  vec3 position = vec3::Zero();      ///< metres
+  vec3 velocity = vec3::Zero();      ///< metres / second
+  vec3 acceleration = vec3::Zero();  ///< metres / second^2
+};
+
+/// A piece of a path over a parameter from 0 to `length`: a straight line along `direction`, or a corner that turns
+/// from `direction` to `turned`. There, with l = parameter / length, the derivative goes from one unit vector to the
+/// other,
+///
+///     q' = (1 - w) direction + w turned,    w = l^2 (3 - 2 l),
+///
+/// so that |q'| <= 1, and with q'' = 0 at both ends: lines and corners join with continuous velocity and curvature. It
+/// is the Bezier curve of degree 4 whose control points lie on both legs of the corner, half of the length long: its
+/// end, the middle of the leg, the corner (see corner_points).
+struct path_piece {
+  vec3 start = vec3::Zero();
+  vec3 direction = vec3::UnitX(), turned = vec3::UnitX();  ///< of length 1
+  double length = 0.0;
+
+  [[nodiscard]] vec3 position(double s) const {
+    const double l = s / length, w = l * l * l * (1.0 - 0.5 * l);  // the integral over l
+    return start + length * ((l - w) * direction + w * turned);
+  }
+  /// q'.
+  [[nodiscard]] vec3 first(double s) const {
+    const double l = s / length, w = l * l * (3.0 - 2.0 * l);
+    return (1.0 - w) * direction + w * turned;
+  }
+  /// q''.
+  [[nodiscard]] vec3 second(double s) const {
+    const double l = s / length;
+    return 6.0 * l * (1.0 - l) / length * (turned - direction);
+  }
+  /// The control points of a corner.
+  [[nodiscard]] std::array<vec3, 5> corner_points() const {
+    const vec3 corner = start + 0.5 * length * direction;
+    return {start, start + 0.25 * length * direction, corner, corner + 0.25 * length * turned,
+            corner + 0.5 * length * turned};
+  }
+};
+
+/// Positions, velocities and accelerations over time, from rest to rest. Velocity is continuous; acceleration is not
+/// where braking sets in. Made by make_trajectory.
+class robot_trajectory {
+ public:
+  /// Along pieces that follow each other, as fast as the limits allow. `stops[i]`: whether it stops where piece i
+  /// starts. `start`: where it is if there are no pieces. @pre as many stops as pieces; limits finite and > 0
+  robot_trajectory(const vec3& start, std::vector<path_piece> pieces, const std::vector<bool>& stops,
+                   const motion_limits& limits)
+      : start_{start}, end_{start}, pieces_{std::move(pieces)} {
+    assert(stops.size() == pieces_.size());
+    assert(limits.speed > 0.0 && std::isfinite(limits.speed));
+    assert(limits.acceleration > 0.0 && std::isfinite(limits.acceleration));
+    if (!pieces_.empty()) end_ = pieces_.back().position(pieces_.back().length);
+    set_times(limits, stops);
+  }
+
+  /// Seconds.
+  [[nodiscard]] double duration() const noexcept { return knots_.empty() ? 0.0 : knots_.back().time; }
+  /// The state at `time` seconds, at rest before 0 and after `duration()`. O(log n)
+  [[nodiscard]] motion_state at(double time) const {
+    if (!(time > 0.0) || knots_.empty()) return {start_};
+    if (time >= duration()) return {end_};
+    const auto after =
+        std::upper_bound(knots_.begin() + 1, knots_.end(), time, [](double t, const knot& k) { return t < k.time; });
+    const knot& k = after[-1];
+    const path_piece& piece = pieces_[k.piece];
+    const double t = time - k.time;
+    const double s = std::min(k.s + t * (k.speed + 0.5 * t * k.gain), piece.length);
+    const double ds = std::max(0.0, k.speed + t * k.gain);
+    const vec3 q1 = piece.first(s);
+    return {piece.position(s), ds * q1, k.gain * q1 + ds * ds * piece.second(s)};
+  }
+  /// The lines and corners that it follows.
+  [[nodiscard]] const std::vector<path_piece>& pieces() const noexcept { return pieces_; }
+  /// How many times it stops on the way.
+  [[nodiscard]] std::size_t stops() const noexcept { return stops_; }
+
+ private:
+  /// From here to the next one the parameter's second derivative in time is constant.
+  struct knot {
+    double time;
+    std::size_t piece;
+    double s;      ///< the piece's parameter
+    double speed;  ///< of the parameter
+    double gain;   ///< its derivative in time
+  };
+
+  /// Sets the knots: the fastest way within the limits. Over an interval of a piece, with the square u of the
+  /// parameter's speed linear in the parameter, |q'| <= a and |q''| <= b,
+  ///
+  ///     speed^2 <= a^2 u,    |acceleration| <= a |du| / (2 h) + b u,
+  ///
+  /// hence bounds on u at one end by u at the other: a pass forward and one backward, as in J. E. Bobrow, S. Dubowsky,
+  /// J. S. Gibson, "Time-optimal control of robotic manipulators along specified paths", International Journal of
+  /// Robotics Research 4(3), 1985. `stops`: the pieces at whose start it stops.
+  void set_times(const motion_limits& limits, const std::vector<bool>& stops) {
+    struct interval {
+      std::size_t piece;
+      double s, length, a, b;
+    };
+    constexpr int parts = 16;  // of a corner
+    std::vector<interval> all;
+    std::vector<double> u{0.0};
+    const double top = limits.speed * limits.speed;
+    const auto cap = [&](const interval& i) {
+      return std::min(top / (i.a * i.a),
+                      i.b > 0.0 ? limits.acceleration / i.b : std::numeric_limits<double>::infinity());
+    };
+    for (std::size_t p = 0; p != pieces_.size(); ++p) {
+      const path_piece& piece = pieces_[p];
+      const bool is_line = piece.direction == piece.turned;
+      const int n = is_line ? 1 : parts;
+      if (p != 0 && stops[p]) u.back() = 0.0, ++stops_;
+      for (int k = 0; k != n; ++k) {
+        const double h = piece.length / n, s = k * h;
+        // |q'| is least and |q''| greatest in the middle.
+        const auto far = std::max(piece.first(s).norm(), piece.first(s + h).norm());
+        const auto near = std::max(piece.second(s).norm(), piece.second(s + h).norm());
+        all.push_back({p, s, h, is_line ? 1.0 : far, is_line ? 0.0 : near});
+        u.back() = std::min(u.back(), cap(all.back()));
+        u.push_back(cap(all.back()));
+      }
+    }
+    u.back() = 0.0;
+    const auto reach = [&](const interval& i, double from) {
+      const double slope = i.a / (2.0 * i.length);
+      return (limits.acceleration + slope * from) / (slope + i.b);
+    };
+    for (std::size_t i = 0; i != all.size(); ++i) u[i + 1] = std::min(u[i + 1], reach(all[i], u[i]));
+    for (std::size_t i = all.size(); i-- != 0;) u[i] = std::min(u[i], reach(all[i], u[i + 1]));
+
+    knots_.clear();
+    double time = 0.0;
+    const auto add = [&](std::size_t piece, double s, double length, double from, double to) {
+      if (!(length > 0.0)) return;
+      knots_.push_back({time, piece, s, std::sqrt(from), (to - from) / (2.0 * length)});
+      time += 2.0 * length / (std::sqrt(from) + std::sqrt(to));
+    };
+    for (std::size_t i = 0; i != all.size(); ++i) {
+      const interval& here = all[i];
+      if (here.b > 0.0) {
+        add(here.piece, here.s, here.length, u[i], u[i + 1]);
+        continue;
+      }
+      // A line: faster, at full speed, slower.
+      const double twice = 2.0 * limits.acceleration;
+      const double peak = std::min(top, 0.5 * (u[i] + u[i + 1] + twice * here.length));
+      const double up = std::min((peak - u[i]) / twice, here.length);
+      const double down = std::min((peak - u[i + 1]) / twice, here.length - up);
+      add(here.piece, 0.0, up, u[i], peak);
+      add(here.piece, up, here.length - up - down, peak, peak);
+      add(here.piece, here.length - down, down, peak, u[i + 1]);
+    }
+    if (!pieces_.empty()) knots_.push_back({time, pieces_.size() - 1, pieces_.back().length, 0.0, 0.0});
+  }
+
+  vec3 start_ = vec3::Zero(), end_ = vec3::Zero();
+  std::vector<path_piece> pieces_;
+  std::vector<knot> knots_;
+  std::size_t stops_ = 0;
+};
+
+namespace detail {
+
+/// A shape that covers everything within `by` (metres) of another one.
+[[nodiscard]] inline ball grown(const ball& s, double by) { return {s.radius + by}; }
+[[nodiscard]] inline vertical_capsule grown(const vertical_capsule& s, double by) {
+  return {s.radius + by, s.low, s.high};
+}
+[[nodiscard]] inline vertical_cylinder grown(const vertical_cylinder& s, double by) {
+  return {s.radius + by, s.low - by, s.high + by};
+}
+
+/// Whether a robot stays free along a Bezier curve. The curve lies in the convex hull of its control points, and so
+/// nowhere farther from the segment between its ends than the farthest of them: a thicker robot along that segment is
+/// free, or else each half of the curve is looked at in turn. Nothing is sampled.
+template <octree::octree_map Map, robot_shape Shape>
+[[nodiscard]] bool is_free_curve(const planning_view<Map, Shape>& view, const std::array<vec3, 5>& points,
+                                 int halvings = 6) {
+  const vec3 along = points[4] - points[0];
+  const double squared = along.squaredNorm();
+  double away = 0.0;
+  for (const vec3& p : points) {
+    const double t = squared > 0.0 ? std::clamp((p - points[0]).dot(along) / squared, 0.0, 1.0) : 0.0;
+    away = std::max(away, (p - (points[0] + t * along)).norm());
+  }
+  const double rounding = 1e-9 * view.field().grid().resolution();
+  const planning_view<Map, Shape> thicker{view.map(), view.field(), detail::grown(view.shape(), away + rounding),
+                                          view.options()};
+  if (thicker.is_free(points[0], points[4])) return true;
+  if (halvings == 0 || !view.is_free(points[0], points[4])) return false;
+  // By de Casteljau's rule.
+  std::array<vec3, 5> left = points, right = points;
+  for (std::size_t n = 4; n != 0; --n) {
+    for (std::size_t i = 0; i != n; ++i) right[i] = 0.5 * (right[i] + right[i + 1]);
+    left[5 - n] = right[0];
+  }
+  // `right` holds the points of the second half, `left` those of the first.
+  return is_free_curve(view, left, halvings - 1) && is_free_curve(view, right, halvings - 1);
+}
+
+}  // namespace detail
+
+/// A trajectory along a polyline, from rest to rest, within the limits. Corners are rounded (see path_piece) as far as
+/// the robot fits: each rounded corner is certified as a whole by the exact test of what a thicker robot sweeps along
+/// pieces of the curve's convex hull. Where none of some sizes fits, the robot stops at the corner. So the robot is
+/// free all the time. Speed and acceleration stay within the limits everywhere, not at samples alone.
+///
+/// Points that follow each other at the same place count once. O(points), and what `is_free` costs.
+/// @pre points is not empty; each segment is free (view.is_free), as those of find_path are; limits finite and > 0
+template <octree::octree_map Map, robot_shape Shape>
+[[nodiscard]] robot_trajectory make_trajectory(const planning_view<Map, Shape>& view, const std::vector<vec3>& points,
+                                               const motion_limits& limits = {}) {
+  assert(!points.empty());
+  std::vector<vec3> corners;
+  for (const vec3& p : points)
+    if (corners.empty() || (p - corners.back()).norm() > 1e-9) corners.push_back(p);
+  std::vector<path_piece> pieces;
+  std::vector<bool> stops;
+  vec3 from = corners.front();
+  const std::size_t last = corners.size() - 1;
+  const auto line_to = [&](const vec3& to, const vec3& direction, bool stop) {
+    const double length = (to - from).norm();
+    if (length > 1e-9) {
+      pieces.push_back({from, direction, direction, length});
+      stops.push_back(stop);
+    }
+    from = to;
+  };
+  bool stop = false;  // at the start of the next piece
+  for (std::size_t i = 1; i <= last; ++i) {
+    const vec3 leg = corners[i] - corners[i - 1];
+    const vec3 direction = leg.normalized();
+    if (i == last) {
+      line_to(corners[i], direction, stop);
+      break;
+    }
+    const vec3 next = corners[i + 1] - corners[i];
+    const vec3 turned = next.normalized();
+    // What two corners share is halved.
+    const double room = std::min(leg.norm() * (i == 1 ? 1.0 : 0.5), next.norm() * (i + 1 == last ? 1.0 : 0.5));
+    bool rounded = false;
+    for (double share = 1.0; share > 0.01 && !rounded; share *= 0.5) {
+      const path_piece corner{corners[i] - share * room * direction, direction, turned, 2.0 * share * room};
+      if (!detail::is_free_curve(view, corner.corner_points())) continue;
+      line_to(corner.start, direction, stop);
+      stop = false;
+      pieces.push_back(corner);
+      stops.push_back(false);
+      from = corner.corner_points()[4];
+      rounded = true;
+    }
+    if (!rounded) {
+      line_to(corners[i], direction, stop);
+      stop = true;
+    }
+  }
+  return {points.front(), std::move(pieces), stops, limits};
+}
+
+}  // namespace orbis::nav

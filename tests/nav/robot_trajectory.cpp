@@ -1,0 +1,205 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include <orbis/core/random.hpp>
+#include <orbis/nav/distance_field.hpp>
+#include <orbis/nav/path_search.hpp>
+#include <orbis/nav/robot_trajectory.hpp>
+#include <orbis/octree/occupancy_octree.hpp>
+#include <orbis/octree/overlap.hpp>
+
+#include "support/catch.hpp"
+
+using namespace orbis;
+
+namespace {
+
+using map_type = octree::occupancy_octree<>;
+
+void set(map_type& map, const octree::voxel_key& k, float log_odds) {
+  map.edit_octant(k, [&](auto& voxels) {
+    const auto i = octree::morton_code(k) & 63U;
+    voxels.known |= std::uint64_t{1} << i;
+    voxels.value[i] = log_odds;
+  });
+}
+/// Boxes strewn in 3 m x 3 m x 1.5 m of free space.
+map_type boxes(random_bits& random, int count) {
+  map_type map{0.1};
+  const std::uint32_t o = map.grid().cells() / 2;
+  for (std::uint32_t z = 0; z != 15; ++z)
+    for (std::uint32_t y = 0; y != 30; ++y)
+      for (std::uint32_t x = 0; x != 30; ++x) set(map, {o + x, o + y, o + z}, -1.0F);
+  for (int i = 0; i != count; ++i) {
+    const std::uint32_t x = random.below(27), y = random.below(27), z = random.below(12);
+    for (std::uint32_t j = 0; j != 27; ++j) set(map, {o + x + j % 3, o + y + j / 3 % 3, o + z + j / 9}, 1.0F);
+  }
+  return map;
+}
+
+/// Bounds, continuity, rest at both ends, by dense samples; the robot is free at each of them by the exact test.
+template <class View>
+void check(const View& view, const std::vector<vec3>& points, const nav::motion_limits& limits) {
+  const nav::robot_trajectory motion = nav::make_trajectory(view, points, limits);
+  const double duration = motion.duration();
+  REQUIRE(std::isfinite(duration));
+  const auto first = motion.at(0.0), last = motion.at(duration);
+  CHECK(first.position == points.front());
+  CHECK((last.position - points.back()).norm() < 1e-9);
+  CHECK((motion.at(duration - 1e-9).position - points.back()).norm() < 1e-6);
+  CHECK(first.velocity.norm() == 0.0);
+  CHECK(last.velocity.norm() == 0.0);
+  CHECK(motion.at(-1.0).position == points.front());
+  CHECK(motion.at(duration + 1.0).velocity.norm() == 0.0);
+  CHECK(motion.at(1e-7).velocity.norm() < 1e-5);
+  CHECK(motion.at(duration - 1e-7).velocity.norm() < 1e-5);
+
+  const double dt = 1e-3 / limits.speed;  // at most 1 mm
+  double length = 0.0, top_speed = 0.0, top_acceleration = 0.0, jump = 0.0, slope = 0.0;
+  std::size_t blocked = 0;
+  nav::motion_state before = first;
+  const auto steps = static_cast<std::size_t>(duration / dt);
+  for (std::size_t i = 1; i <= steps; ++i) {
+    const nav::motion_state now = motion.at(static_cast<double>(i) * dt);
+    top_speed = std::max(top_speed, now.velocity.norm());
+    top_acceleration = std::max(top_acceleration, now.acceleration.norm());
+    const vec3 moved = now.position - before.position;
+    length += moved.norm();
+    jump = std::max(jump, (now.velocity - before.velocity).norm());
+    slope = std::max(slope, (moved - 0.5 * dt * (now.velocity + before.velocity)).norm());
+    blocked += octree::overlaps(view.map(), swept(view.shape(), now.position, now.position),
+                                {.unknown = view.field().options().unknown})
+                   ? 1
+                   : 0;
+    before = now;
+  }
+  CHECK(blocked == 0);
+  CHECK(top_speed <= limits.speed * (1.0 + 1e-9));
+  CHECK(top_acceleration <= limits.acceleration * (1.0 + 1e-9));
+  CHECK(jump <= limits.acceleration * dt * (1.0 + 1e-6) + 1e-12);        // velocity is the integral of what is bounded
+  CHECK(slope <= limits.acceleration * dt * dt * (1.0 + 1e-6) + 1e-12);  // and position the integral of velocity
+  CHECK(length <= nav::length_of(points) + 1e-9);
+}
+
+}  // namespace
+
+TEST_CASE("A straight way is a trapezoid, or a triangle where it is short") {
+  random_bits random{1};
+  const map_type map = boxes(random, 0);
+  const nav::distance_field field{map, {.reach = 0.6}};
+  const nav::planning_view view{map, field, 0.2};
+  const vec3 a{0.5, 0.5, 0.7};
+  const auto trapezoid = nav::make_trajectory(view, {a, a + 2.0 * vec3::UnitX()}, {.speed = 1.0, .acceleration = 2.0});
+  CHECK(trapezoid.duration() == Approx(2.5));  // 0.5 s faster, 1.5 s at full speed, 0.5 s slower
+  CHECK(trapezoid.at(0.25).velocity.x() == Approx(0.5));
+  CHECK(trapezoid.at(0.25).acceleration.x() == Approx(2.0));
+  CHECK(trapezoid.at(1.0).position.x() == Approx(1.25));
+  CHECK(trapezoid.at(1.0).velocity.x() == Approx(1.0));
+  CHECK(trapezoid.at(2.25).acceleration.x() == Approx(-2.0));
+  const auto triangle = nav::make_trajectory(view, {a, a + 0.5 * vec3::UnitY()}, {.speed = 5.0, .acceleration = 2.0});
+  CHECK(triangle.duration() == Approx(1.0));
+  CHECK(triangle.at(0.5).velocity.y() == Approx(1.0));
+  for (const auto& points : {std::vector<vec3>{a}, std::vector<vec3>{a, a, a}}) {
+    const auto nothing = nav::make_trajectory(view, points);
+    CHECK(nothing.duration() == 0.0);
+    CHECK(nothing.at(0.0).position == a);
+    CHECK(nothing.at(1.0).position == a);
+  }
+}
+
+TEST_CASE("Corners are rounded where the robot fits, and it stops where it does not") {
+  random_bits random{1};
+  map_type map = boxes(random, 0);
+  const std::vector<vec3> points{{0.5, 0.5, 0.7}, {2.5, 0.5, 0.7}, {2.5, 2.5, 0.7}};
+  {
+    const nav::distance_field field{map, {.reach = 0.6}};
+    const nav::planning_view view{map, field, 0.2};
+    const auto motion = nav::make_trajectory(view, points);
+    CHECK(motion.pieces().size() == 1);  // the curve takes both legs
+    CHECK(motion.stops() == 0);
+    check(view, points, {});
+    // It does not stop, and is faster than with a stop.
+    double slowest = 1.0;
+    for (double t = 0.5; t < motion.duration() - 0.5; t += 0.01)
+      slowest = std::min(slowest, motion.at(t).velocity.norm());
+    CHECK(slowest > 0.3);
+    CHECK(motion.duration() < 2 * nav::make_trajectory(view, {points[0], points[1]}).duration());
+    // There and back again: no curve turns on the spot.
+    const std::vector<vec3> back{points[0], points[1], points[0]};
+    const auto reverse = nav::make_trajectory(view, back);
+    CHECK(std::isfinite(reverse.duration()));
+    check(view, back, {});
+  }
+  // A pole on the inside of the corner: a smaller curve.
+  const std::uint32_t o = map.grid().cells() / 2;
+  for (std::uint32_t z = 0; z != 15; ++z) set(map, {o + 22, o + 7, o + z}, 1.0F);
+  {
+    const nav::distance_field field{map, {.reach = 0.6}};
+    const nav::planning_view view{map, field, 0.1999};
+    REQUIRE(view.is_free(points[0], points[1]));
+    REQUIRE(view.is_free(points[1], points[2]));
+    const auto motion = nav::make_trajectory(view, points);
+    CHECK(motion.pieces().size() == 3);
+    CHECK(motion.stops() == 0);
+    check(view, points, {});
+  }
+  // A way round a pole that it nearly touches before and after the corner: the corner itself is a hair's breadth
+  // farther away, and there is no room for a curve.
+  for (std::uint32_t z = 0; z != 15; ++z) set(map, {o + 14, o + 15, o + z}, 1.0F);
+  const nav::distance_field field{map, {.reach = 0.6}};
+  const nav::planning_view view{map, field, 0.2};
+  const double turn = 0.05, half = std::sqrt(0.5);
+  const vec3 along{half, half, 0.0}, out{half, -half, 0.0};
+  const vec3 corner = vec3{1.5, 1.5, 0.7} + (0.2 + 1e-6) / std::cos(turn) * out;
+  const std::vector<vec3> tight{corner - 1.2 * (std::cos(turn) * along + std::sin(turn) * out), corner,
+                                corner + 1.2 * (std::cos(turn) * along - std::sin(turn) * out)};
+  REQUIRE(view.is_free(tight[0], tight[1]));
+  REQUIRE(view.is_free(tight[1], tight[2]));
+  CHECK_FALSE(view.is_free(tight[0], tight[2]));
+  const auto motion = nav::make_trajectory(view, tight);
+  CHECK(motion.stops() == 1);
+  CHECK(motion.pieces().size() == 2);
+  const double at_corner = 2.2;  // 1 m/s and 1 m/s^2 over 1.2 m
+  CHECK(motion.at(at_corner).velocity.norm() < 1e-9);
+  CHECK((motion.at(at_corner).position - corner).norm() < 1e-9);
+  check(view, tight, {});
+}
+
+TEST_CASE("Trajectories of paths between boxes keep their bounds and touch nothing") {
+  std::size_t smooth = 0, stops = 0, found = 0;
+  for (std::uint64_t seed = 1; seed != 9; ++seed) {
+    random_bits random{seed};
+    const map_type map = boxes(random, 60);
+    const nav::distance_field field{map, {.reach = 0.6}};
+    const auto run = [&](const auto& view) {
+      for (int i = 0; i != 4; ++i) {
+        const auto place = [&] {
+          for (;;) {
+            const vec3 p{3.0 * random.uniform(), 3.0 * random.uniform(), 1.5 * random.uniform()};
+            if (view.is_free(p)) return p;
+          }
+        };
+        const vec3 a = place(), b = place();
+        const nav::path_options options{.shorten = i % 2 == 0};
+        const auto path = nav::find_path(view, a, b, options);
+        if (path.status != nav::path_status::found) continue;
+        ++found;
+        const nav::motion_limits limits{.speed = random.uniform(0.3, 2.0), .acceleration = random.uniform(0.5, 4.0)};
+        check(view, path.points, limits);
+        const auto motion = nav::make_trajectory(view, path.points, limits);
+        smooth += path.points.size() - 2 - motion.stops();
+        stops += motion.stops();
+      }
+    };
+    run(nav::planning_view{map, field, 0.12});
+    run(nav::planning_view{map, field, nav::vertical_cylinder{.radius = 0.1, .low = -0.1, .high = 0.15}});
+    run(nav::planning_view{map, field, nav::vertical_capsule{.radius = 0.1, .low = -0.1, .high = 0.1}});
+  }
+  CHECK(found > 40);
+  CHECK(smooth > 3 * stops);
+}
