@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <sstream>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include <CLI/App.hpp>
@@ -91,6 +92,59 @@ void add_map_options(CLI::App& cmd, settings& s) {
   cmd.add_flag("--quiet", s.quiet, "say nothing but errors");
 }
 
+void add_robot_options(CLI::App& cmd, settings& s) {
+  cmd.add_option("--robot-radius", s.robot_radius, "of the robot that the floor map and the path are for, metres")
+      ->check(within(0.001, 10.0, " m"))
+      ->capture_default_str()
+      ->type_name("M");
+  cmd.add_option("--robot-height", s.robot_height, "so much space it needs above the floor, metres")
+      ->check(within(0.001, 10.0, " m"))
+      ->capture_default_str()
+      ->type_name("M");
+  cmd.add_option("--floor-map", s.floor_map,
+                 "write the floor map for the map servers of ROS and Nav2: this file and a .pgm beside it")
+      ->check(CLI::Validator(
+          [](const std::string& name) -> std::string {
+            const std::string ending = std::filesystem::path{name}.extension().string();
+            return ending == ".yaml" || ending == ".yml" ? "" : "\"" + name + "\" does not end in .yaml";
+          },
+          ""))
+      ->type_name("FILE");
+}
+
+void add_plan_options(CLI::App& cmd, settings& s, std::string& from, std::string& to) {
+  cmd.add_option("MAP", s.input, "an octree map: .bt, .ot or .orbis")->required()->type_name("");
+  cmd.add_option("--from", from, "where the robot is, metres")->required()->type_name("X,Y,Z");
+  cmd.add_option("--to", to, "where it is to go")->required()->type_name("X,Y,Z");
+  cmd.add_option("--radius", s.robot_radius, "of the robot, metres")
+      ->check(within(0.001, 10.0, " m"))
+      ->capture_default_str()
+      ->type_name("M");
+  cmd.add_option_function<double>(
+         "--height",
+         [&s](double height) {
+           s.robot_height = height;
+           s.stands = true;
+         },
+         "the robot is an upright cylinder of this height on the point that is given; without it, a ball around it")
+      ->check(within(0.001, 10.0, " m"))
+      ->type_name("M");
+  cmd.add_flag("--ground", s.on_floor,
+               "the robot drives on the floor: heights of the points do not count, and --height is 0.5 if not given");
+  cmd.add_option("--step", s.robot_step, "--ground: the highest step that it drives up or down, metres")
+      ->check(within(0.0, 10.0, " m"))
+      ->capture_default_str()
+      ->type_name("M");
+  cmd.add_option_function<std::string>(
+         "--unknown", [&s](const std::string& what) { s.unknown_is_free = what == "free"; },
+         "what space counts as of which nothing is known: obstacle (default) or free")
+      ->check(CLI::IsMember({"obstacle", "free"}))
+      ->type_name("WHAT");
+  cmd.add_option("--out", s.out, "the path's points, a line each")->check(not_empty)->type_name("FILE");
+  cmd.add_option("--picture", s.picture, "the map from above with the path, PNG")->check(not_empty)->type_name("FILE");
+  cmd.add_flag("--quiet", s.quiet, "say nothing but errors");
+}
+
 void add_recording_options(CLI::App& cmd, settings& s) {
   cmd.add_option("--format", s.format, "layout of the recording")
       ->check(CLI::IsMember({"auto", "tum", "7scenes", "icl"}))
@@ -159,6 +213,7 @@ std::string contradiction(const settings& s) {
     return "--map-every-frame wants a live map: not with --batch-map or --localize-only";
   if (s.localize_only && !s.save_map.empty())
     return "--localize-only leaves the map as it is: there is nothing to save with --save-map";
+  if (s.localize_only && !s.floor_map.empty()) return "--localize-only makes no map of the floor: not with --floor-map";
   if (s.viewer.empty() && s.viewer_hold) return "--viewer-hold wants a viewer: --viewer";
   if (!has_viewer(s.viewer)) return how_to_get_viewer(s.viewer);
   return {};
@@ -210,13 +265,14 @@ std::optional<orbis::vec3> vector_of(const std::string& text) {
 
 std::variant<settings, exit_code> read_command_line(int argc, char** argv) {
   settings s;
-  std::string origin, gravity;
+  std::string origin, gravity, from, to;
 
   CLI::App cli{"RGB-D SLAM and mapping: from a recording to a trajectory, a cloud and an octree map", "rgbd_slam"};
   cli.require_subcommand(1);
   cli.footer(
       "Exit codes: 0 done, 1 bad usage, 2 unreadable or damaged input (or output that cannot be\n"
-      "written), 3 tracking never started, or the camera was never found in the loaded map.\n"
+      "written), 3 tracking never started, or the camera was never found in the loaded map,\n"
+      "4 there is no way (plan).\n"
       "Interrupting a run keeps what it has reached (130).");
 
   CLI::App* run = cli.add_subcommand("run", "SLAM on a recording (TUM, 7-Scenes, ICL-NUIM)");
@@ -257,6 +313,10 @@ std::variant<settings, exit_code> read_command_line(int argc, char** argv) {
   add_frame_options(*map, s);
   add_map_options(*map, s);
 
+  CLI::App* way = cli.add_subcommand("plan", "the shortest way of a robot through an octree map");
+  add_plan_options(*way, s, from, to);
+
+  for (CLI::App* cmd : {run, demo, map}) add_robot_options(*cmd, s);
   for (CLI::App* cmd : {run, demo, map})
     cmd->add_option("--gravity", gravity,
                     "where it pulls at the first frame, in the camera's frame: x right, y down, z forward. Without it "
@@ -264,11 +324,12 @@ std::variant<settings, exit_code> read_command_line(int argc, char** argv) {
         ->type_name("X,Y,Z");
   for (CLI::App* cmd : {run, demo, map})
     cmd->add_option("--config", s.config, "options from a TOML file: resolution = 0.02")->type_name("FILE");
-  for (CLI::App* cmd : {run, demo, eval, map}) cmd->get_formatter()->column_width(28);
+  for (CLI::App* cmd : {run, demo, eval, map, way}) cmd->get_formatter()->column_width(28);
 
   const auto is_asked_for = [&](const CLI::App* command) { return command->get_name() == argv[1]; };
   if (argc > 1 && argv[1][0] != '-' && cli.get_subcommands(is_asked_for).empty())
-    return complain("there is no command \"" + std::string{argv[1]} + "\", but run, demo, eval and map", bad_usage);
+    return complain("there is no command \"" + std::string{argv[1]} + "\", but run, demo, eval, map and plan",
+                    bad_usage);
   try {
     cli.parse(argc, argv);
   } catch (const CLI::CallForHelp&) {
@@ -282,12 +343,19 @@ std::variant<settings, exit_code> read_command_line(int argc, char** argv) {
   s.what = chosen == run    ? command::run
            : chosen == demo ? command::demo
            : chosen == eval ? command::eval
-                            : command::map;
+           : chosen == map  ? command::map
+                            : command::plan;
   if (!s.config.empty())
     if (const auto failed = read_config(*chosen, s.config.string())) return *failed;
   if (!origin.empty()) {
     s.origin = vector_of(origin);
     if (!s.origin) return complain("--origin: \"" + origin + "\" is not x,y,z in metres", bad_usage);
+  }
+  for (const auto& [text, name, p] : {std::tuple{&from, "--from", &s.from}, {&to, "--to", &s.to}}) {
+    if (chosen != way) break;
+    const auto point = vector_of(*text);
+    if (!point) return complain(std::string{name} + ": \"" + *text + "\" is not x,y,z in metres", bad_usage);
+    *p = *point;
   }
   if (!gravity.empty()) {
     s.gravity = vector_of(gravity);

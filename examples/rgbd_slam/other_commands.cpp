@@ -11,6 +11,7 @@
 #include "commands.hpp"
 #include "filters.hpp"
 #include "map_stage.hpp"
+#include "navigation.hpp"
 #include "output.hpp"
 #include "result_files.hpp"
 #include "summary.hpp"
@@ -129,6 +130,9 @@ exit_code map_without_slam(const settings& s, console& console) {
   auto found =
       recording ? map_recording(*recording, s, files->folder(), console) : map_cloud_file(s, files->folder(), console);
   if (!found) return give_up(found.error());
+  auto usable = navigate(found->map.octree, found->cameras, s, files->folder(), console);
+  if (!usable) return give_up(usable.error());
+  found->r.navigation = *std::move(usable);
   auto written = write_map(std::move(found->map), s, files->folder(), console);
   if (!written) return give_up(written.error());
   found->r.map = *std::move(written);

@@ -31,7 +31,7 @@ void list_files(results& r, const result_files& files, const file_names& coming,
 
 results begin_results(const settings& s, const std::string& title, const frame_source* source,
                       const std::filesystem::path& folder) {
-  constexpr const char* names[] = {"run", "demo", "eval", "map"};
+  constexpr const char* names[] = {"run", "demo", "eval", "map", "plan"};
   results r;
   r.command = names[static_cast<int>(s.what)];
   r.title = title;
@@ -120,6 +120,7 @@ void print_results(const results& r, console& console) {
   if (r.map) text.append("\n").append(size_table(*r.map)).append("\n\n").append(filter_lines(*r.map)).append("\n");
   if (r.world) text.append("\n  World  ").append(world_text(*r.world)).append("\n");
   if (r.against_truth) text.append("\n").append(accuracy_lines(*r.against_truth)).append("\n");
+  if (r.navigation) text.append("\n").append(navigation_lines(*r.navigation)).append("\n");
   if (r.map && r.map->error_m) {
     char buffer[96];
     std::snprintf(buffer, sizeof buffer, "  Map  RMS %.4f m to the true surface\n", *r.map->error_m);

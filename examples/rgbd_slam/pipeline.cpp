@@ -5,6 +5,7 @@
 #include "commands.hpp"
 #include "interrupts.hpp"
 #include "map_stage.hpp"
+#include "navigation.hpp"
 #include "output.hpp"
 #include "result_files.hpp"
 #include "tracking_stage.hpp"
@@ -49,10 +50,13 @@ exit_code run_slam(const settings& s, console& console) {
     return report_no_start(r, tracked.missed_map ? explain_miss(tracked, s) : explain_no_start(r, s), *files, console);
   if (auto done = write_trajectories(*r.slam, files->folder()); !done) return give_up(done.error());
 
-  // Keyframes -> dense cloud -> filter -> octree -> files.
+  // Keyframes -> dense cloud -> filter -> octree -> floor map, path -> files.
   if (tracked.keyframes.size() != 0) {
     auto map = map_frames(tracked.keyframes, *source, live, s, console);
     if (!map) return give_up(map.error());
+    auto usable = navigate(map->octree, r.slam->keyframes, s, files->folder(), console);
+    if (!usable) return give_up(usable.error());
+    r.navigation = *std::move(usable);
     auto written = write_map(*std::move(map), s, files->folder(), console);
     if (!written) return give_up(written.error());
     r.map = *std::move(written);

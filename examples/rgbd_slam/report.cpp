@@ -316,6 +316,13 @@ std::string tables(const results& r, const view_frame& frame) {
            "src=\"data:image/png;base64," +
            base64(*picture) + "\"></figure>\n";
   }
+  if (r.navigation) {
+    t += "<h2>For a robot</h2>\n" + words({{"floor", floor_text(*r.navigation)}, {"path", path_text(*r.navigation)}});
+    if (const auto picture = orbis::read_file(r.folder / "navigation.png"))
+      t += "<figure class=\"panel\"><img alt=\"The floor map with its costs and the distance to obstacles, from above, "
+           "with a path\" src=\"data:image/png;base64," +
+           base64(*picture) + "\"></figure>\n";
+  }
   if (r.against_truth) {
     const accuracy& a = *r.against_truth;
     t += "<h2>Against ground truth</h2>\n<div "

@@ -23,15 +23,15 @@ using orbis::result;
 namespace {
 
 constexpr std::array trajectory_names = {"trajectory.txt", "keyframes.txt", "trajectory.png"};
-constexpr std::array map_names = {"cloud.ply", "cloud_filtered.ply", "map_unfiltered.bt", "map.bt", "map.ot",
-                                  "map.png",   "map_unfiltered.png", "filter.png"};
+constexpr std::array map_names = {"cloud.ply", "cloud_filtered.ply", "map_unfiltered.bt", "map.bt",        "map.ot",
+                                  "map.png",   "map_unfiltered.png", "filter.png",        "navigation.png"};
 constexpr std::array report_names = {"summary.json", "report.html"};
 
 file_names all_names() {
   return {"trajectory.txt",    "keyframes.txt",  "cloud.ply", "cloud_filtered.ply",
           "map_unfiltered.bt", "map.bt",         "map.ot",    "summary.json",
           "report.html",       "trajectory.png", "map.png",   "map_unfiltered.png",
-          "filter.png"};
+          "filter.png",        "navigation.png"};
 }
 
 template <class Names>
@@ -107,6 +107,10 @@ std::optional<orbis::error> find_overwritten(const settings& s, const std::vecto
   for (const std::string& name : result_names(s)) add(s.out / name);
   const std::size_t results = targets.size();
   if (!s.save_map.empty()) add(s.save_map);
+  if (!s.floor_map.empty()) {
+    add(s.floor_map);
+    add(fs::path{s.floor_map}.replace_extension(".pgm"));
+  }
   if (targets.empty()) return std::nullopt;
 
   const auto complain = [](const fs::path& path, const std::string& what) {

@@ -99,6 +99,16 @@ struct live_results {
   std::optional<orbis::error> stopped;  ///< why the map stopped growing; it is made in the end instead
 };
 
+/// What a robot can do with the map.
+struct navigation_results {
+  double robot_radius = 0.0;        ///< metres
+  std::optional<double> floor_m;    ///< its height; empty: no floor was found
+  double free_m2 = 0.0;             ///< where the robot can drive
+  std::string path_status;          ///< "found", or why there is no path
+  std::vector<orbis::vec3> path{};  ///< of a ball through the air, metres
+  double path_m = 0.0, straight_m = 0.0, planning_ms = 0.0;
+};
+
 struct results {
   std::string command, title;
   std::filesystem::path folder;                            ///< where the files are made
@@ -109,6 +119,7 @@ struct results {
   std::optional<slam_results> slam;
   std::optional<live_results> live;
   std::optional<map_results> map;
+  std::optional<navigation_results> navigation;
   std::optional<accuracy> against_truth;
   std::string truth_note;  ///< why there is no comparison, or what it compares
   std::vector<std::string> warnings;

@@ -14,14 +14,14 @@
 namespace app {
 
 /// The documented exit codes, and the shell's own for a run that was interrupted.
-enum exit_code : int { done = 0, bad_usage = 1, bad_input = 2, never_tracked = 3, interrupted = 130 };
+enum exit_code : int { done = 0, bad_usage = 1, bad_input = 2, never_tracked = 3, no_path = 4, interrupted = 130 };
 
-enum class command { run, demo, eval, map };
+enum class command { run, demo, eval, map, plan };
 
 struct settings {
   command what = command::run;
 
-  std::filesystem::path input;      ///< recording, cloud or estimated trajectory
+  std::filesystem::path input;      ///< recording, cloud, octree map (plan) or estimated trajectory
   std::filesystem::path reference;  ///< ground truth (eval)
   std::filesystem::path out;        ///< where the files go
   std::filesystem::path config;     ///< file with options; empty: none
@@ -50,6 +50,16 @@ struct settings {
   bool map_every_frame = false;    ///< into the live map, until it takes over the filter's verdict
   bool realtime = false;           ///< frames come at the pace of their time stamps
   bool localize_only = false;      ///< the loaded map stays as it is
+
+  double robot_radius = 0.2;        ///< metres
+  double robot_height = 0.5;        ///< metres
+  double robot_step = 0.05;         ///< the highest that it drives up, metres (plan)
+  std::filesystem::path floor_map;  ///< .yaml for map servers; empty: nowhere
+  bool on_floor = false;            ///< the robot drives (plan)
+  bool stands = false;              ///< it is a cylinder of its height; otherwise a ball (plan)
+  bool unknown_is_free = false;     ///< (plan)
+  orbis::vec3 from = orbis::vec3::Zero(), to = orbis::vec3::Zero();  ///< metres (plan)
+  std::filesystem::path picture;                                     ///< of the way (plan); empty: none
 
   std::string viewer;           ///< "window", "web"; empty: none
   unsigned viewer_port = 8090;  ///< of the page; 0: any that is free

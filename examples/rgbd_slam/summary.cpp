@@ -113,6 +113,15 @@ std::string summary_json(const results& r) {
            {{"median", frame_delay.median}, {"p95", frame_delay.p95}, {"max", largest(l->frame_delay_ms)}}}}},
         {"corrections", l->correction_ms.size()},
         {"correction_ms", {{"median", correction.median}, {"max", largest(l->correction_ms)}}}};
+  const auto& n = r.navigation;
+  const bool has_path = n && !n->path.empty();
+  j["navigation"] = {{"floor_m", n ? or_null(n->floor_m) : null},
+                     {"free_m2", n && n->floor_m ? json(n->free_m2) : null},
+                     {"path",
+                      {{"status", n ? json(n->path_status) : null},
+                       {"length_m", has_path ? json(n->path_m) : null},
+                       {"straight_m", has_path ? json(n->straight_m) : null},
+                       {"planning_ms", has_path ? json(n->planning_ms) : null}}}};
   j["map_error_m"] = m ? or_null(m->error_m) : null;
   j["files"] = r.files;
   j["files_of_earlier_runs"] = r.files_of_earlier_runs;
@@ -185,6 +194,22 @@ std::string filter_lines(const map_results& m) {
     if (m.filter_reason.compare(i, 2, "; ") == 0) lines += "\n         ";
   }
   return lines;
+}
+
+std::string floor_text(const navigation_results& n) {
+  if (!n.floor_m) return "none was found";
+  return text("at a height of %.2f m, %.1f square metres for a robot of radius %g m", *n.floor_m, n.free_m2,
+              n.robot_radius);
+}
+
+std::string path_text(const navigation_results& n) {
+  if (n.path.empty()) return n.path_status;
+  return text("%.2f m for a ball of %g m, straight %.2f m (%.2f times), found in %.1f ms", n.path_m, n.robot_radius,
+              n.straight_m, n.path_m / n.straight_m, n.planning_ms);
+}
+
+std::string navigation_lines(const navigation_results& n) {
+  return "  Floor  " + floor_text(n) + "\n  Path   " + path_text(n);
 }
 
 std::string accuracy_lines(const accuracy& a) {

@@ -24,6 +24,10 @@ namespace app {
 [[nodiscard]] std::string removed_text(const map_results& m);
 /// Which filter it was, what it removed, and why it was chosen.
 [[nodiscard]] std::string filter_lines(const map_results& m);
+/// The floor, and the path that was planned.
+[[nodiscard]] std::string navigation_lines(const navigation_results& n);
+[[nodiscard]] std::string floor_text(const navigation_results& n);
+[[nodiscard]] std::string path_text(const navigation_results& n);
 [[nodiscard]] std::string accuracy_lines(const accuracy& a);
 
 /// "12.3 MB"

@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "navigation.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <functional>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include <orbis/nav/distance_field.hpp>
+#include <orbis/nav/floor_file.hpp>
+#include <orbis/nav/floor_map.hpp>
+#include <orbis/nav/path_search.hpp>
+#include <orbis/nav/planning_view.hpp>
+
+#include "navigation_picture.hpp"
+
+namespace app {
+namespace {
+
+namespace nav = orbis::nav;
+using orbis::vec3;
+using octree = orbis::octree::occupancy_octree<>;
+using view = nav::planning_view<octree>;
+
+struct way {
+  vec3 from = vec3::Zero(), to = vec3::Zero();
+  nav::found_path path;
+};
+
+/// Of the places where the camera was or looked along its axis, those where the robot fits.
+std::vector<vec3> free_places(const view& robot, const orbis::trajectory& cameras) {
+  std::vector<vec3> places;
+  for (const auto& pose : cameras)
+    for (const double ahead : {0.0, 0.5, 1.0, 1.5, 2.0, 2.5})
+      if (const vec3 p = pose.T_world_camera * vec3(0, 0, ahead); robot.is_free(p)) places.push_back(p);
+  return places;
+}
+
+/// A way from the first of these places to the one farthest from it, or to the farthest that can be reached of a few;
+/// if possible one to which the straight way is not free.
+std::optional<way> plan_through(const view& robot, const std::vector<vec3>& places) {
+  if (places.size() < 2) return std::nullopt;
+  const vec3 from = places.front();
+  std::vector<vec3> goals{places.begin() + 1, places.end()};
+  const auto distance = [&](const vec3& p) { return (p - from).norm(); };
+  std::ranges::sort(goals, std::greater{}, distance);
+  const auto straight = std::ranges::stable_partition(goals, [&](const vec3& p) { return !robot.is_free(from, p); });
+  const auto attempts = std::min<std::ptrdiff_t>(8, std::ranges::distance(goals.begin(), straight.begin()));
+  way found{.from = from, .path = {}};
+  for (std::ptrdiff_t i = 0; i != attempts; ++i) {
+    found.to = goals[static_cast<std::size_t>(i)];
+    found.path = nav::find_path(robot, from, found.to);
+    if (found.path.status == nav::path_status::found) return found;
+  }
+  if (!straight.empty()) {
+    found.to = straight.front();
+    found.path = nav::find_path(robot, from, found.to);
+  }
+  return found;
+}
+
+}  // namespace
+
+orbis::result<navigation_results> navigate(const octree& map, const orbis::trajectory& cameras, const settings& s,
+                                           const std::filesystem::path& folder, console& console) {
+  console.stage("planning");
+  navigation_results r;
+  r.robot_radius = s.robot_radius;
+
+  const nav::ground_robot robot{.radius = s.robot_radius, .height = s.robot_height, .step = s.resolution};
+  const auto floor = nav::make_floor_map(map, robot);
+  if (floor) {
+    r.floor_m = floor->floor;
+    r.free_m2 = static_cast<double>(std::ranges::count(floor->states.pixels(), nav::floor_state::free)) *
+                floor->resolution * floor->resolution;
+  }
+  if (!s.floor_map.empty()) {
+    if (!floor)
+      return orbis::fail(floor.error().code, s.floor_map.string(),
+                         "there is no floor map to write: " + floor.error().message);
+    if (auto saved = nav::save_floor_map(s.floor_map, *floor); !saved) return orbis::fail(saved.error());
+  }
+
+  const double reach = std::min(std::max(1.0, s.robot_radius + 2 * s.resolution), 181 * s.resolution);
+  const nav::distance_field field{map, {.reach = reach}};
+  const view ball{map, field, s.robot_radius};
+  const std::vector<vec3> places = free_places(ball, cameras);
+  const auto start = console::clock::now();
+  if (const auto found = plan_through(ball, places)) {
+    r.planning_ms = std::chrono::duration<double, std::milli>(console::clock::now() - start).count();
+    r.path_status = to_string(found->path.status);
+    if (found->path.status == nav::path_status::found) {
+      r.path = found->path.points;
+      r.path_m = found->path.length;
+      r.straight_m = (found->to - found->from).norm();
+    }
+  } else {
+    r.path_status = "no two places that the camera saw are known to be free";
+  }
+
+  char text[160];
+  if (r.path.empty())
+    std::snprintf(text, sizeof text, "no way: %s", r.path_status.c_str());
+  else
+    std::snprintf(text, sizeof text, "way of a ball of %g m: %.2f m, straight %.2f m, found in %.1f ms", s.robot_radius,
+                  r.path_m, r.straight_m, r.planning_ms);
+  if (floor || !cameras.empty()) {
+    const double height = !r.path.empty() ? r.path.front().z() : floor ? floor->floor + 0.5 * s.robot_height : 0.0;
+    const auto drawn = write_navigation_picture({.title = "Floor and distances",
+                                                 .subtitle = text,
+                                                 .map = map,
+                                                 .field = &field,
+                                                 .height = height,
+                                                 .floor = floor ? &*floor : nullptr,
+                                                 .radius = s.robot_radius,
+                                                 .path = r.path},
+                                                folder / "navigation.png");
+    if (!drawn) return orbis::fail(drawn.error());
+  }
+  console.finish(text);
+  return r;
+}
+
+}  // namespace app

@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// What a robot can do with the map of a run: where it can drive, and a way through the room.
+#pragma once
+
+#include <filesystem>
+
+#include <orbis/core/result.hpp>
+#include <orbis/core/trajectory.hpp>
+#include <orbis/octree/occupancy_octree.hpp>
+
+#include "console.hpp"
+#include "results.hpp"
+#include "settings.hpp"
+
+namespace app {
+
+/// Makes the floor map, writes it to `s.floor_map` if that is given, plans a way of a ball between two places that the
+/// camera saw, and draws navigation.png into `folder`. Nothing if the world is not upright or there is no floor and no
+/// camera. Errors: write_failed; no_data if a floor map was asked for and there is no floor.
+[[nodiscard]] orbis::result<navigation_results> navigate(const orbis::octree::occupancy_octree<>& map,
+                                                         const orbis::trajectory& cameras, const settings& s,
+                                                         const std::filesystem::path& folder, console& console);
+
+}  // namespace app

@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "navigation_picture.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+
+#include <orbis/nav/floor_cost.hpp>
+
+#include "sheet.hpp"
+
+namespace app {
+namespace {
+
+using orbis::rgb8;
+using orbis::vec2;
+using orbis::vec3;
+using orbis::octree::occupancy;
+
+constexpr rgb8 dark{28, 32, 40}, nothing{205, 206, 208};
+
+rgb8 mixed(rgb8 a, rgb8 b, double t) {
+  const auto byte = [&](std::uint8_t u, std::uint8_t v) {
+    return static_cast<std::uint8_t>(std::lround(u + std::clamp(t, 0.0, 1.0) * (v - u)));
+  };
+  return {byte(a.r, b.r), byte(a.g, b.g), byte(a.b, b.b)};
+}
+/// Free space: white far from obstacles, orange beside them.
+rgb8 cost_color(std::uint8_t cost) {
+  namespace cost_of = orbis::nav::floor_cost;
+  if (cost == cost_of::lethal) return dark;
+  if (cost == cost_of::no_information) return nothing;
+  if (cost == cost_of::inscribed) return {235, 150, 120};
+  return mixed({255, 255, 255}, {250, 190, 140}, cost / 252.0);
+}
+rgb8 distance_color(double share) { return mixed({120, 60, 140}, {235, 245, 250}, std::sqrt(std::max(0.0, share))); }
+
+/// What is seen from above, metres.
+struct window {
+  vec2 low, high;
+};
+
+/// Of the floor map, or of all that is known.
+window window_of(const navigation_picture& what) {
+  if (what.floor != nullptr) {
+    const auto& f = *what.floor;
+    return {f.origin, f.origin + f.resolution * vec2(f.states.width(), f.states.height())};
+  }
+  window w{vec2::Constant(1e9), vec2::Constant(-1e9)};
+  what.map.for_each_leaf([&](const auto& leaf) {
+    const vec2 c = leaf.center.template head<2>(), half = vec2::Constant(0.5 * leaf.size);
+    w = {w.low.cwiseMin(c - half), w.high.cwiseMax(c + half)};
+  });
+  if (!(w.low.array() <= w.high.array()).all()) w = {vec2::Zero(), vec2::Ones()};
+  return w;
+}
+
+/// A picture of the window, whose cells are colored by where their middles are.
+template <class ColorAt>
+orbis::image<rgb8> draw(const window& w, int width, int height, const ColorAt& color_at) {
+  orbis::image<rgb8> out(width, height);
+  for (int y = 0; y != height; ++y)
+    for (int x = 0; x != width; ++x)
+      out(x, y) = color_at(vec2(w.low.x() + (x + 0.5) / width * (w.high.x() - w.low.x()),
+                                w.high.y() - (y + 0.5) / height * (w.high.y() - w.low.y())));
+  return out;
+}
+
+orbis::image<rgb8> draw_floor(const navigation_picture& what, const window& w, int width, int height) {
+  const auto costs = orbis::nav::inflate(*what.floor, {.radius = what.radius});
+  return draw(w, width, height, [&](const vec2& p) {
+    const auto cell = what.floor->cell(p);
+    return cell ? cost_color(costs((*cell)[0], (*cell)[1])) : nothing;
+  });
+}
+orbis::image<rgb8> draw_slice(const navigation_picture& what, const window& w, int width, int height) {
+  return draw(w, width, height, [&](const vec2& xy) {
+    const vec3 p{xy.x(), xy.y(), what.height};
+    switch (what.map.state(p)) {
+      case occupancy::occupied: return dark;
+      case occupancy::unknown: return nothing;
+      case occupancy::free: break;
+    }
+    return distance_color(what.field->distance(p) / what.field->reach());
+  });
+}
+
+}  // namespace
+
+orbis::result<void> write_navigation_picture(const navigation_picture& what, const std::filesystem::path& path) {
+  cv::setNumThreads(0);
+  const window w = window_of(what);
+  const vec2 size = (w.high - w.low).cwiseMax(1e-3);
+  const int panels = (what.floor != nullptr ? 1 : 0) + (what.field != nullptr ? 1 : 0);
+  constexpr double left = 80, top = 130, most_across = 640, most_down = 620, gap = 100;
+  const double scale = std::min(most_across / size.x(), most_down / size.y());  // pixels per metre
+  const int width = std::max(1, static_cast<int>(scale * size.x())),
+            height = std::max(1, static_cast<int>(scale * size.y()));
+
+  sheet s{1500, 820};
+  s.text(what.title, {60, 44}, ink, 19, 0.0, true);
+  s.text(what.subtitle, {60, 70}, faint, 13);
+  const auto panel = [&](double x, const std::string& title, const orbis::image<rgb8>& picture, bool has_path) {
+    axes a{s,
+           x,
+           top,
+           static_cast<double>(width),
+           static_cast<double>(height),
+           {w.low.x(), w.high.x()},
+           {w.low.y(), w.high.y()},
+           false};
+    a.frame(title, "x, m", "y, m");
+    s.paste(picture, static_cast<int>(x), static_cast<int>(top));
+    if (!has_path || what.path.empty()) return;
+    std::vector<vec2> way;
+    for (const vec3& p : what.path) way.emplace_back(p.x(), p.y());
+    a.curve(way, estimate_color, 2.4);
+    s.dot(a.place(way.front().x(), way.front().y()), {22, 140, 80}, 5.0);
+    s.dot(a.place(way.back().x(), way.back().y()), error_color, 5.0);
+  };
+  char text[160];
+  double x = panels == 1 ? 0.5 * (1500 - width) : left;
+  if (what.floor != nullptr) {
+    std::snprintf(text, sizeof text, "floor at %.2f m: free, costs, occupied, unknown", what.floor->floor);
+    panel(x, text, draw_floor(what, w, width, height), what.field == nullptr);
+    x += most_across + gap;
+  }
+  if (what.field != nullptr) {
+    std::snprintf(text, sizeof text, "distance to obstacles at a height of %.2f m, 0 to %.1f m", what.height,
+                  what.field->reach());
+    panel(x, text, draw_slice(what, w, width, height), true);
+  }
+  return s.write(path);
+}
+
+}  // namespace app

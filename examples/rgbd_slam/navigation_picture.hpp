@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// The floor map with its costs, and the distance field at one height; from above, with a path.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include <orbis/core/result.hpp>
+#include <orbis/core/types.hpp>
+#include <orbis/nav/distance_field.hpp>
+#include <orbis/nav/floor_map.hpp>
+#include <orbis/octree/occupancy_octree.hpp>
+
+namespace app {
+
+struct navigation_picture {
+  std::string title, subtitle;
+  const orbis::octree::occupancy_octree<>& map;
+  const orbis::nav::distance_field* field = nullptr;  ///< null: no slice
+  double height = 0.0;                                ///< of the slice, metres
+  const orbis::nav::floor_map* floor = nullptr;       ///< null: no floor is drawn
+  double radius = 0.2;                                ///< of the robot, metres
+  std::vector<orbis::vec3> path{};  ///< world, metres; drawn over the slice, or over the floor if that is all
+};
+
+/// As PNG. Coordinates are those of the world. Errors: write_failed.
+[[nodiscard]] orbis::result<void> write_navigation_picture(const navigation_picture& what,
+                                                           const std::filesystem::path& path);
+
+}  // namespace app

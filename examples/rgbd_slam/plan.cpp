@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// A way through a map file: for a ball, for a cylinder that stands upright, or for a robot that drives on the floor.
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include <orbis/core/file.hpp>
+#include <orbis/nav/distance_field.hpp>
+#include <orbis/nav/floor_map.hpp>
+#include <orbis/nav/floor_view.hpp>
+#include <orbis/nav/path_search.hpp>
+#include <orbis/nav/planning_view.hpp>
+#include <orbis/nav/robot_shape.hpp>
+#include <orbis/octree/compact_file.hpp>
+#include <orbis/octree/files.hpp>
+
+#include "commands.hpp"
+#include "navigation_picture.hpp"
+
+namespace app {
+namespace {
+
+namespace nav = orbis::nav;
+using octree = orbis::octree::occupancy_octree<>;
+using orbis::octree::occupancy;
+
+/// A map of any of the three kinds, by what it begins with.
+orbis::result<octree> read_map(const std::filesystem::path& path) {
+  const auto bytes = orbis::read_file(path);
+  if (!bytes) return orbis::fail(bytes.error());
+  const auto view = std::as_bytes(std::span{*bytes});
+  const auto begins_with = [&](std::string_view magic) { return bytes->starts_with(magic); };
+  if (begins_with("# Octomap OcTree binary file")) return orbis::octree::read_bt<octree::model>(view, path.string());
+  if (begins_with("# Octomap OcTree file")) return orbis::octree::read_ot<octree::model>(view, path.string());
+  if (begins_with("\x89orbis")) return orbis::octree::read_compact<octree::model>(view, path.string());
+  return orbis::fail(orbis::errc::unsupported, path.string(), "is no octree map: neither .bt nor .ot nor .orbis");
+}
+
+orbis::result<void> write_path(const std::filesystem::path& path, const std::vector<orbis::vec3>& points) {
+  return orbis::write_file_atomically(path, [&](std::ostream& out) {
+    out << "# x y z, metres\n";
+    char line[128];
+    for (const orbis::vec3& p : points) {
+      std::snprintf(line, sizeof line, "%.6f %.6f %.6f\n", p.x(), p.y(), p.z());
+      out << line;
+    }
+  });
+}
+
+}  // namespace
+
+exit_code plan(const settings& s, console& console) {
+  const auto give_up = [&](const orbis::error& e) { return console.error(e), bad_input; };
+  console.stage("reading");
+  const auto map = read_map(s.input);
+  if (!map) return give_up(map.error());
+  if (map->empty()) return give_up({orbis::errc::no_data, s.input.string(), "the map is empty"});
+  const double cell = map->resolution();
+  char text[256];
+  std::snprintf(text, sizeof text, "%s: voxels of %g cm", s.input.filename().string().c_str(), 100 * cell);
+  console.finish(text);
+
+  console.stage("preparing");
+  const occupancy unknown = s.unknown_is_free ? occupancy::free : occupancy::occupied;
+  std::optional<nav::floor_map> floor;
+  if (s.on_floor) {
+    auto made = nav::make_floor_map(*map, {.radius = s.robot_radius, .height = s.robot_height, .step = s.robot_step});
+    if (!made) return give_up({made.error().code, s.input.string(), made.error().message});
+    floor = *std::move(made);
+  }
+  const double reach = std::min(181 * cell, std::max(1.0, s.robot_radius + 2 * cell));
+  const nav::distance_field field{*map, {.reach = reach, .unknown = unknown}};
+  console.finish(floor ? "floor map" : "distance field");
+
+  console.stage("planning");
+  const auto start = console::clock::now();
+  const auto planned_in = [&](const auto& space) { return nav::find_path(space, s.from, s.to); };
+  const nav::found_path path =
+      floor ? planned_in(nav::floor_view{*floor, s.robot_radius, {}, unknown})
+      : s.stands
+          ? planned_in(nav::planning_view{*map, field, nav::vertical_cylinder{s.robot_radius, 0.0, s.robot_height}})
+          : planned_in(nav::planning_view{*map, field, nav::ball{s.robot_radius}});
+  const double ms = std::chrono::duration<double, std::milli>(console::clock::now() - start).count();
+  const bool found = path.status == nav::path_status::found;
+  const double straight = (s.to - s.from).norm();
+  if (found)
+    std::snprintf(text, sizeof text, "way of %.3f m over %zu points, straight %.3f m, found in %.1f ms", path.length,
+                  path.points.size(), straight, ms);
+  else
+    std::snprintf(text, sizeof text, "no way: %s", std::string{to_string(path.status)}.c_str());
+  console.finish(text);
+
+  if (!s.picture.empty()) {
+    const auto drawn = write_navigation_picture({.title = s.input.filename().string(),
+                                                 .subtitle = text,
+                                                 .map = *map,
+                                                 .field = floor ? nullptr : &field,
+                                                 .height = s.from.z(),
+                                                 .floor = floor ? &*floor : nullptr,
+                                                 .radius = s.robot_radius,
+                                                 .path = path.points},
+                                                s.picture);
+    if (!drawn) return give_up(drawn.error());
+  }
+  if (!found) {
+    std::string why{to_string(path.status)};
+    if (path.points.size() > 1) {
+      const orbis::vec3& p = path.points.back();
+      std::snprintf(text, sizeof text, "; the nearest place that is reached is %.3f,%.3f,%.3f", p.x(), p.y(), p.z());
+      why += text;
+    }
+    console.error({orbis::errc::degenerate, s.input.string(), "no way: " + why});
+    return no_path;
+  }
+  if (!s.out.empty())
+    if (auto written = write_path(s.out, path.points); !written) return give_up(written.error());
+  console.print(text);
+  return done;
+}
+
+}  // namespace app

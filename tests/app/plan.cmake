@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: BSD-3-Clause
+#
+# Floor maps and paths.
+include(${CMAKE_CURRENT_LIST_DIR}/support.cmake)
+
+function(length_of variable file)  # of the path that was printed last, in millimetres
+  string(REGEX MATCH "of ([0-9]+)\\.([0-9][0-9][0-9]) m over" found "${out}")
+  set(${variable} "${CMAKE_MATCH_1}${CMAKE_MATCH_2}" PARENT_SCOPE)
+  file(STRINGS ${WORK}/${file} lines)
+  list(POP_FRONT lines head)
+  check(head STREQUAL "# x y z, metres")
+  list(LENGTH lines points)
+  check(points GREATER 1)
+  check(out MATCHES "over ${points} points")
+endfunction()
+
+# A square metre of points 10 cm apart, 1 m above the origin; the rest is unknown.
+set(points "")
+foreach(x RANGE 9)
+  foreach(y RANGE 9)
+    string(APPEND points "0.${x}5 0.${y}5 1.05\n")
+  endforeach()
+endforeach()
+file(WRITE ${WORK}/cloud.ply "ply\nformat ascii 1.0\nelement vertex 100\nproperty float x\nproperty float y\n"
+     "property float z\nend_header\n${points}")
+app(0 map cloud.ply --out plate --resolution 0.1 --filter none)
+check(NOT EXISTS ${WORK}/plate/navigation.png)  # no floor, no camera
+app(0 plan plate/map.bt --from 0.5,0.5,0.5 --to 0.5,0.5,1.6 --radius 0.1 --unknown free --out way.txt --picture way.png)
+must_exist(${WORK} way.txt way.png)
+length_of(length way.txt)
+check(length GREATER 1560)  # two sides of 0.74 m and 0.78 m, to where the ball passes the plate's edge
+check(length LESS 1760)
+check(out MATCHES "straight 1.100 m")
+app(0 plan plate/map.ot --from 0.5,0.5,0.5 --to 0.5,1.6,0.5 --radius 0.1 --unknown free --out way.txt)
+length_of(length way.txt)
+check(length EQUAL 1100)
+file(SHA256 ${WORK}/way.txt kept)
+# A cylinder under the plate is too high for a ball's way.
+app_fails(4 "start blocked" plan plate/map.ot --from 0.5,0.5,0.5 --to 0.5,1.6,0.5 --radius 0.1 --height 0.6
+          --unknown free --out way.txt)
+app_fails(4 "start blocked" plan plate/map.bt --from 0.5,0.5,0.5 --to 0.5,0.5,1.6 --out way.txt)
+app_fails(4 "goal blocked; the nearest" plan plate/map.bt --from 0.5,0.5,0.5 --to 0.5,0.5,1.0 --unknown free
+          --radius 0.1 --out way.txt)
+file(SHA256 ${WORK}/way.txt left)
+check(left STREQUAL kept)  # what is not found replaces nothing
+app_fails(2 "no floor" plan plate/map.bt --from 0.5,0.5,0.5 --to 0.5,1.5,0.5 --ground)
+app_fails(2 "no octree map" plan cloud.ply --from 0,0,0 --to 1,1,1)
+app_fails(2 "no.such" plan no.such --from 0,0,0 --to 1,1,1)
+file(READ ${WORK}/plate/map.ot bytes LIMIT 300)
+file(WRITE ${WORK}/half.ot "${bytes}")
+app_fails(2 "half.ot" plan half.ot --from 0,0,0 --to 1,1,1)
+app_fails(1 "is not x,y,z" plan plate/map.bt --from 0,0 --to 1,1,1)
+app_fails(1 "--to" plan plate/map.bt --from 0,0,0)
+app_fails(1 "does not end in .yaml" map cloud.ply --out plate --floor-map floor.pgm)
+app_fails(2 "no floor" map cloud.ply --out never --floor-map floor.yaml)
+check(NOT EXISTS ${WORK}/never/map.bt)
+
+# A room, all round.
+app(0 demo --frames 90 --stride 4 --width 320 --resolution 0.1 --threads 1 --out room --floor-map room/floor.yaml)
+check(out MATCHES "Floor  at a height of 0.10 m, [4-6].[0-9] square metres")
+check(out MATCHES "Path   [0-9.]+ m for a ball of 0.2 m, straight")
+must_exist(${WORK}/room floor.yaml floor.pgm navigation.png map.bt)
+summary(status ${WORK}/room navigation path status)
+check(status STREQUAL "found")
+summary(length ${WORK}/room navigation path length_m)
+summary(straight ${WORK}/room navigation path straight_m)
+check(NOT length LESS straight)
+file(READ ${WORK}/room/floor.yaml yaml)
+check(yaml MATCHES "image: \"floor.pgm\"\nmode: trinary\nresolution: 0.1\norigin: .-3.[0-9]+, -2.[0-9]+, 0.0.")
+file(READ ${WORK}/room/report.html page)
+check(page MATCHES "<h2>For a robot</h2>")
+# In a corner of it, on the floor.
+app(0 plan room/map.bt --from 2.6,-2.15,0 --to 1.9,-1.6,3 --ground --radius 0.12 --out way.txt --picture way.png)
+length_of(length way.txt)
+check(length GREATER 888)
+check(length LESS 1200)
+file(STRINGS ${WORK}/way.txt lines)
+list(GET lines -1 last)
+check(last MATCHES "^1.900000 -1.600000 0.[01]0")  # on the floor, whatever height was asked for
