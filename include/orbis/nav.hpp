@@ -16,6 +16,7 @@
 /// | planning_view.hpp | whether a robot fits, at rest or along a segment; exact |
 /// | planning_space.hpp | what a path can be searched in, and what going costs |
 /// | path_search.hpp | cheapest ways of a robot through a map or over a floor |
+/// | replanning.hpp | whether changes of the map touch a path; a new path only then |
 /// | robot_trajectory.hpp | paths over time, within bounds on speed and acceleration |
 /// | squared_distances.hpp | the same without a map: exact squared distances in voxels |
 /// | map_access.hpp | how planning reads a map, also one of another library |
@@ -32,6 +33,7 @@
 #include <orbis/nav/path_search.hpp>
 #include <orbis/nav/planning_space.hpp>
 #include <orbis/nav/planning_view.hpp>
+#include <orbis/nav/replanning.hpp>
 #include <orbis/nav/robot_shape.hpp>
 #include <orbis/nav/robot_trajectory.hpp>
 #include <orbis/nav/squared_distances.hpp>
