@@ -115,8 +115,8 @@ void check_view(const map_type& map, const Shape& shape, occupancy unknown) {
     const auto path = nav::find_path(view, a, b, {.max_expanded = 20'000});
     for (std::size_t j = 1; j < path.points.size(); ++j) {
       const vec3 p = path.points[j - 1], way = path.points[j] - p;
-      const int steps = static_cast<int>(std::ceil(way.norm() / 0.001));
-      for (int k = 0; k <= steps; k += 3)
+      const int steps = std::max(1, static_cast<int>(std::ceil(way.norm() / 0.001)));
+      for (int k = 0; k <= steps; ++k)
         REQUIRE_FALSE(overlaps(map, swept(shape, p + way * k / steps, p + way * k / steps), {.unknown = unknown}));
     }
     found += path.status == nav::path_status::found ? 1 : 0;
