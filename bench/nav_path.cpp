@@ -2,8 +2,8 @@
 //
 // Paths of a ball with a radius of 0.2 m through the known free space of a recording's map, between 100 random pairs of
 // free places: median and 95th percentile of the time, and the mean of the length over the shortest that is known. That
-// is the shortest of ours, and of what OMPL's BIT* finds within a second where OMPL is at hand. OMPL's planners ask the
-// same exact tests.
+// is the shortest of ours, and of what OMPL's BIT* finds within a second by the same exact tests, where OMPL is at
+// hand.
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -16,13 +16,13 @@
 #include <vector>
 
 #ifdef ORBIS_BENCH_WITH_OMPL
-#include <ompl/base/MotionValidator.h>
 #include <ompl/base/objectives/PathLengthOptimizationObjective.h>
 #include <ompl/base/spaces/RealVectorStateSpace.h>
 #include <ompl/geometric/PathGeometric.h>
 #include <ompl/geometric/planners/informedtrees/BITstar.h>
-#include <ompl/geometric/planners/rrt/RRTConnect.h>
 #include <ompl/util/Console.h>
+
+#include <orbis/interop/ompl.hpp>
 #endif
 
 #include <orbis/core/random.hpp>
@@ -41,31 +41,9 @@ using view_type = nav::planning_view<map>;
 using pair_of_places = std::pair<vec3, vec3>;
 
 #ifdef ORBIS_BENCH_WITH_OMPL
-vec3 position_of(const ompl::base::State* s) {
-  const double* v = s->as<ompl::base::RealVectorStateSpace::StateType>()->values;
-  return {v[0], v[1], v[2]};
-}
-class exact_motions : public ompl::base::MotionValidator {
- public:
-  exact_motions(const ompl::base::SpaceInformationPtr& information, const view_type& view)
-      : MotionValidator{information}, view_{view} {}
-  bool checkMotion(const ompl::base::State* a, const ompl::base::State* b) const override {
-    return view_.is_free(position_of(a), position_of(b));
-  }
-  bool checkMotion(const ompl::base::State* a, const ompl::base::State* b,
-                   std::pair<ompl::base::State*, double>& last) const override {
-    last.second = 0.0;
-    return checkMotion(a, b);
-  }
-
- private:
-  const view_type& view_;
-};
-
-/// The length of what a planner finds within so many seconds; infinite if that is nothing.
-template <class Planner>
-double plan_by_ompl(const view_type& view, const octree::bounding_box& box, const pair_of_places& ends,
-                    double seconds) {
+/// The length of what OMPL's BIT* finds within so many seconds; infinite if that is nothing.
+double length_by_bit_star(const view_type& view, const octree::bounding_box& box, const pair_of_places& ends,
+                          double seconds) {
   namespace ob = ompl::base;
   ompl::msg::noOutputHandler();
   const auto space = std::make_shared<ob::RealVectorStateSpace>(3);
@@ -76,8 +54,7 @@ double plan_by_ompl(const view_type& view, const octree::bounding_box& box, cons
   }
   space->setBounds(bounds);
   const auto information = std::make_shared<ob::SpaceInformation>(space);
-  information->setStateValidityChecker([&](const ob::State* s) { return view.is_free(position_of(s)); });
-  information->setMotionValidator(std::make_shared<exact_motions>(information, view));
+  interop::use_planning_space(information, view);
   information->setup();
   const auto problem = std::make_shared<ob::ProblemDefinition>(information);
   ob::ScopedState<ob::RealVectorStateSpace> start{space}, goal{space};
@@ -87,7 +64,7 @@ double plan_by_ompl(const view_type& view, const octree::bounding_box& box, cons
   }
   problem->setStartAndGoalStates(start, goal);
   problem->setOptimizationObjective(std::make_shared<ob::PathLengthOptimizationObjective>(information));
-  Planner planner{information};
+  ompl::geometric::BITstar planner{information};
   planner.setProblemDefinition(problem);
   planner.setup();
   static_cast<ob::Planner&>(planner).solve(seconds);
@@ -129,7 +106,7 @@ struct planning_problem {
       }
 #ifdef ORBIS_BENCH_WITH_OMPL
       double peer = (p.second - p.first).norm();
-      if (!view.is_free(p.first, p.second)) peer = plan_by_ompl<ompl::geometric::BITstar>(view, box, p, 1.0);
+      if (!view.is_free(p.first, p.second)) peer = length_by_bit_star(view, box, p, 1.0);
       least = std::min(least, peer);
       if (std::isfinite(peer)) ++found_by_bit_star, bit_star_over_shortest += peer / least;
 #endif
@@ -154,38 +131,29 @@ const planning_problem& problem_of(const std::vector<scan>& (*scans)(), double r
   return *p;
 }
 
-/// `length_of_path(pair)` plans; infinite: nothing is found.
-template <class Plan>
-void bench_plans(benchmark::State& state, const planning_problem& problem, Plan&& length_of_path) {
+void bench_paths(benchmark::State& state, const planning_problem& problem, const nav::path_options& options) {
   for (auto _ : state) {
     std::vector<double> seconds;
     double over_shortest = 0.0;
-    std::size_t found = 0;
+    std::size_t found = 0, expanded = 0;
     for (std::size_t i = 0; i != problem.pairs.size(); ++i) {
+      const auto& [from, to] = problem.pairs[i];
       const std::clock_t start = std::clock();
-      const double length = length_of_path(problem.pairs[i]);
+      const nav::found_path path = nav::find_path(problem.view, from, to, options);
       seconds.push_back(static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC);
-      if (!std::isfinite(length)) continue;
+      expanded += path.expanded;
+      if (path.status != nav::path_status::found) continue;
       ++found;
-      over_shortest += length / problem.shortest[i];
+      over_shortest += path.length / problem.shortest[i];
     }
     state.counters["found"] = static_cast<double>(found);
+    state.counters["expanded"] = static_cast<double>(expanded) / static_cast<double>(problem.pairs.size());
     state.counters["length_over_shortest"] = over_shortest / static_cast<double>(std::max<std::size_t>(1, found));
+    if (problem.found_by_bit_star != 0)
+      state.counters["bit_star_over_shortest"] =
+          problem.bit_star_over_shortest / static_cast<double>(problem.found_by_bit_star);
     report_frames(state, std::move(seconds));
   }
-}
-
-void bench_paths(benchmark::State& state, const planning_problem& problem, const nav::path_options& options) {
-  std::size_t expanded = 0;
-  bench_plans(state, problem, [&](const pair_of_places& p) {
-    const nav::found_path path = nav::find_path(problem.view, p.first, p.second, options);
-    expanded += path.expanded;
-    return path.status == nav::path_status::found ? path.length : std::numeric_limits<double>::infinity();
-  });
-  if (problem.found_by_bit_star != 0)
-    state.counters["bit_star_over_shortest"] =
-        problem.bit_star_over_shortest / static_cast<double>(problem.found_by_bit_star);
-  state.counters["expanded"] = static_cast<double>(expanded) / static_cast<double>(problem.pairs.size());
 }
 
 [[maybe_unused]] const bool registered = [] {
@@ -199,14 +167,6 @@ void bench_paths(benchmark::State& state, const planning_problem& problem, const
       ours("/orbis", {});
       ours("/orbis_grid", {.method = nav::path_method::grid});
       ours("/orbis_grid_only", {.method = nav::path_method::grid, .shorten = false});
-#ifdef ORBIS_BENCH_WITH_OMPL
-      row(group + "/ompl_rrt_connect", [=](auto& s) {
-        const planning_problem& problem = problem_of(scans, resolution);
-        bench_plans(s, problem, [&](const pair_of_places& p) {
-          return plan_by_ompl<ompl::geometric::RRTConnect>(problem.view, problem.box, p, 5.0);
-        });
-      });
-#endif
     }
   };
   add("room", room);

@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <map>
 #include <vector>
 
 #include <orbis/core/random.hpp>
@@ -263,7 +264,9 @@ TEST_CASE("A path that keeps its distance is as cheap as Dijkstra's, and shorten
         {.region = inside, .clearance_weight = weight, .preferred_clearance = wanted, .unknown_cost = unknown_cost}};
     CHECK_FALSE(view.is_uniform());
     const auto middle = [&](const std::array<int, 3>& p) { return map.grid().center(key(p[0], p[1], p[2])); };
+    std::map<std::array<int, 3>, double> known;
     const auto density = [&](const std::array<int, 3>& p) {  // from all obstacles there are
+      if (const auto at = known.find(p); at != known.end()) return at->second;
       double nearest = field.reach();
       for (int z = p[2] - 7; z <= p[2] + 7; ++z)
         for (int y = p[1] - 7; y <= p[1] + 7; ++y)
@@ -274,7 +277,7 @@ TEST_CASE("A path that keeps its distance is as cheap as Dijkstra's, and shorten
           }
       const double lacking = std::max(0.0, 1.0 - std::max(0.0, nearest - radius) / wanted);
       const bool is_known = map.state(key(p[0], p[1], p[2])) != occupancy::unknown;
-      return (1.0 + weight * lacking * lacking) * (is_known ? 1.0 : unknown_cost);
+      return known[p] = (1.0 + weight * lacking * lacking) * (is_known ? 1.0 : unknown_cost);
     };
     for (int i = 0; i != 6; ++i) {
       const auto draw = [&] {
