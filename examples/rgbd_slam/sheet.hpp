@@ -112,11 +112,11 @@ class axes {
   void frame(const std::string& title, const std::string& x_label, const std::string& y_label) {
     const double step_x = nice_step(x_.length(), static_cast<int>(width_ / 110));
     const double step_y = nice_step(y_.length(), std::max(3, static_cast<int>(height_ / 70)));
-    for (double v = std::ceil(x_.low / step_x) * step_x; v <= x_.high; v += step_x) {
+    for (const double v : ticks(x_, step_x)) {
       sheet_.line(place(v, y_.low), place(v, y_.high), grid);
       sheet_.text(tick_text(v, step_x), place(v, y_.low) + orbis::vec2(0, 18), faint, 11, 0.5);
     }
-    for (double v = std::ceil(y_.low / step_y) * step_y; v <= y_.high; v += step_y) {
+    for (const double v : ticks(y_, step_y)) {
       sheet_.line(place(x_.low, v), place(x_.high, v), grid);
       sheet_.text(tick_text(v, step_y), place(x_.low, v) + orbis::vec2(-8, 4), faint, 11, 1.0);
     }
@@ -133,6 +133,14 @@ class axes {
   }
 
  private:
+  /// The multiples of `step` in a range: few, also where the step is lost in the size of the numbers.
+  [[nodiscard]] static std::vector<double> ticks(const range& r, double step) {
+    std::vector<double> at;
+    const double first = std::ceil(r.low / step);
+    for (int i = 0; i != 50 && (first + i) * step <= r.high; ++i) at.push_back((first + i) * step);
+    return at;
+  }
+
   sheet& sheet_;
   double left_, top_, width_, height_;
   range x_, y_;

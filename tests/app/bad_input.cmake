@@ -53,6 +53,9 @@ check(out MATCHES "--resolution")
 
 # Input: 2.
 file(WRITE ${WORK}/broken.toml "frames = = 3\n")
+file(WRITE ${WORK}/latin.sh "printf 'frames = 5 # gr\\374n\\n' > latin.toml")
+execute_process(COMMAND sh latin.sh WORKING_DIRECTORY ${WORK})
+app_fails(2 "latin.toml: not TOML: no UTF-8" run good --out out --config latin.toml)
 app_fails(2 "broken.toml:1" run good --out out --config broken.toml)
 app_fails(2 "none.toml: no such file" run good --out out --config none.toml)
 app_fails(2 "nowhere: no such folder" run nowhere --out out)

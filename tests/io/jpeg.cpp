@@ -138,3 +138,17 @@ TEST_CASE("what is written as JPEG is read back") {
   CHECK(io::encode_jpeg({}).error().code == orbis::errc::invalid_argument);
   CHECK(io::encode_jpeg(orbis::image<orbis::rgb8>(70000, 1)).error().code == orbis::errc::invalid_argument);
 }
+
+TEST_CASE("a progressive JPEG of more scans than anybody needs is refused before they are decoded") {
+  const std::string good = encode(64, 48, 3, true);
+  REQUIRE(io::decode_jpeg(good));
+  const std::size_t last = good.rfind("\xff\xda");
+  REQUIRE(last != std::string::npos);
+  const std::string scan = good.substr(last, good.size() - 2 - last);
+  std::string many = good.substr(0, good.size() - 2);
+  for (int i = 0; i != 600; ++i) many += scan;
+  const auto read = io::decode_jpeg(many + "\xff\xd9", "many.jpg");
+  REQUIRE_FALSE(read);
+  CHECK(read.error().code == orbis::errc::malformed);
+  CHECK(read.error().to_string().find("too many scans") != std::string::npos);
+}

@@ -19,7 +19,8 @@ namespace orbis::io {
 [[nodiscard]] inline bool is_jpeg(std::string_view bytes) noexcept { return bytes.starts_with("\xFF\xD8\xFF"); }
 
 /// A JPEG as 8-bit colour; grey is spread over the channels. `where` names the source in errors.
-/// Errors: malformed (damaged or truncated; a colour space without a way to RGB).
+/// Errors: malformed (damaged or truncated; a colour space without a way to RGB; more scans than such an image needs, for
+/// each costs O(pixels)). O(pixels x scans).
 [[nodiscard]] inline result<image<rgb8>> decode_jpeg(std::string_view bytes, const std::string& where = {}) {
   detail::jpeg_decoder decoder{bytes};
   if (!decoder.read_header()) return fail(errc::malformed, where, "damaged JPEG: " + decoder.message());

@@ -6,6 +6,7 @@
 /// trivial locals, so that no destructor is jumped over.
 #pragma once
 
+#include <algorithm>
 #include <csetjmp>
 #include <cstddef>
 #include <cstdint>
@@ -59,6 +60,18 @@ class jpeg_decoder {
     const std::uint64_t pixels = std::uint64_t{info_.image_width} * info_.image_height;
     if (pixels > (std::uint64_t{1} << 28) || (pixels > (1U << 20) && pixels > 2048 * std::uint64_t{size_}))
       return give_up("claims more pixels than the file can hold");
+    if (jpeg_has_multiple_scans(&info_) != FALSE) {
+      // Each scan goes over all pixels again, and a scan of few bytes may say nothing; the coefficients are all kept.
+      if (pixels > (std::uint64_t{1} << 26)) return give_up("has several scans, and too many pixels for that");
+      progress_.most_scans =
+          static_cast<int>(std::clamp<std::uint64_t>((std::uint64_t{1} << 30) / (pixels + 1), 16, 500));
+      progress_.base.progress_monitor = [](j_common_ptr common) {
+        auto* const info = reinterpret_cast<j_decompress_ptr>(common);
+        if (info->input_scan_number > reinterpret_cast<const progress*>(info->progress)->most_scans)
+          end_with(info, "has too many scans");
+      };
+      info_.progress = &progress_.base;
+    }
     return true;
   }
 
@@ -83,11 +96,17 @@ class jpeg_decoder {
   [[nodiscard]] std::string message() const { return errors_.message; }
 
  private:
-  [[noreturn]] static void out_of_data(j_decompress_ptr info) {
+  struct progress {
+    jpeg_progress_mgr base{};  // first: libjpeg hands a pointer to it back to us
+    int most_scans = 0;
+  };
+
+  [[noreturn]] static void end_with(j_decompress_ptr info, const char* why) {
     jpeg_errors& own = jpeg_errors::of(info->err);
-    std::strncpy(own.message, "the file ends early", sizeof own.message - 1);
+    std::strncpy(own.message, why, sizeof own.message - 1);
     std::longjmp(own.jump, 1);
   }
+  [[noreturn]] static void out_of_data(j_decompress_ptr info) { end_with(info, "the file ends early"); }
   bool give_up(const char* why) {
     std::strncpy(errors_.message, why, sizeof errors_.message - 1);
     return false;
@@ -96,6 +115,7 @@ class jpeg_decoder {
   jpeg_decompress_struct info_{};
   jpeg_errors errors_{};
   jpeg_source_mgr source_{};
+  progress progress_{};
   std::size_t size_;
 };
 
