@@ -1,16 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 include(${CMAKE_CURRENT_LIST_DIR}/support.cmake)
 
-# A square metre of points 10 cm apart, 1 m above the origin.
-set(points "")
-foreach(x RANGE 9)
-  foreach(y RANGE 9)
-    string(APPEND points "0.${x}5 0.${y}5 1.05\n")
-  endforeach()
-endforeach()
-file(WRITE ${WORK}/cloud.ply "ply\nformat ascii 1.0\nelement vertex 100\nproperty float x\nproperty float y\n"
-     "property float z\nend_header\n${points}")
-
+make_plate(${WORK}/cloud.ply)
 app(0 map cloud.ply --out out --resolution 0.1 --filter none)
 must_exist(${WORK}/out cloud.ply cloud_filtered.ply map_unfiltered.bt map.bt map.ot summary.json report.html map.png)
 summary(occupied ${WORK}/out octree occupied)

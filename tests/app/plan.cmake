@@ -14,15 +14,8 @@ function(length_of variable file)  # of the path that was printed last, in milli
   check(out MATCHES "over ${points} points")
 endfunction()
 
-# A square metre of points 10 cm apart, 1 m above the origin; the rest is unknown.
-set(points "")
-foreach(x RANGE 9)
-  foreach(y RANGE 9)
-    string(APPEND points "0.${x}5 0.${y}5 1.05\n")
-  endforeach()
-endforeach()
-file(WRITE ${WORK}/cloud.ply "ply\nformat ascii 1.0\nelement vertex 100\nproperty float x\nproperty float y\n"
-     "property float z\nend_header\n${points}")
+# The rest is unknown.
+make_plate(${WORK}/cloud.ply)
 app(0 map cloud.ply --out plate --resolution 0.1 --filter none)
 check(NOT EXISTS ${WORK}/plate/navigation.png)  # no floor, no camera
 app(0 plan plate/map.bt --from 0.5,0.5,0.5 --to 0.5,0.5,1.6 --radius 0.1 --unknown free --out way.txt --picture way.png)

@@ -36,6 +36,18 @@ function(make_recording folder frames width)
   endif()
 endfunction()
 
+# A cloud: a square metre of points 10 cm apart, 1 m above the origin.
+function(make_plate file)
+  set(points "")
+  foreach(x RANGE 9)
+    foreach(y RANGE 9)
+      string(APPEND points "0.${x}5 0.${y}5 1.05\n")
+    endforeach()
+  endforeach()
+  file(WRITE ${file} "ply\nformat ascii 1.0\nelement vertex 100\nproperty float x\nproperty float y\n"
+       "property float z\nend_header\n${points}")
+endfunction()
+
 function(must_exist folder)  # names...
   foreach(name IN LISTS ARGN)
     if(NOT EXISTS ${folder}/${name})
