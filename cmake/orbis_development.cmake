@@ -5,6 +5,8 @@ add_library(orbis_development INTERFACE)
 target_compile_options(orbis_development INTERFACE
   -Wall -Wextra -Wpedantic -Wconversion
   -ffp-contract=off  # bit-for-bit comparisons with other libraries
+  # g++ looks for garbage less often: a tenth of its time for some MB more.
+  $<$<CXX_COMPILER_ID:GNU>:--param=ggc-min-heapsize=400000>
   $<$<BOOL:${ORBIS_WERROR}>:-Werror>)
 
 # The flavour of the library that our programs use: the compiled one where it is built.
