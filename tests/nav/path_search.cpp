@@ -327,6 +327,37 @@ TEST_CASE("A path that keeps its distance is as cheap as Dijkstra's, and shorten
   CHECK(dearer > 10);
 }
 
+TEST_CASE("A robot finds its way with costs from places where the middle of its own cell is blocked") {
+  random_bits random{7};
+  map_type map = maze(random, {20, 20, 12}, 0);
+  for (int i = 0; i != 60; ++i) {
+    const auto below = [&](std::uint32_t n) { return static_cast<int>(random.below(n)); };
+    set(map, below(20), below(20), below(12), true);
+  }
+  const nav::distance_field field{map, {.reach = 0.8}};
+  const nav::planning_view view{map, field, 0.12, {.clearance_weight = 4.0, .preferred_clearance = 0.4}};
+  const nav::planning_view plain{map, field, 0.12};
+  int found = 0;
+  for (int i = 0; i != 40; ++i) {
+    const auto draw = [&](bool off_middle) {
+      for (;;)
+        if (const vec3 p = random_point(random, {20, 20, 12});
+            view.is_free(p) && !(off_middle && view.is_free(p, view.center(*view.key(p)))))
+          return p;
+    };
+    const vec3 start = draw(true), goal = draw(i % 2 == 0);
+    for (const path_method method : {path_method::any_angle, path_method::grid}) {
+      const auto path = nav::find_path(view, start, goal, {.method = method});
+      CHECK(path.status == nav::find_path(plain, start, goal, {.method = method, .shorten = false}).status);
+      CHECK(path.points.front() == start);
+      for (std::size_t j = 1; j < path.points.size(); ++j)
+        CHECK(is_free(map, path.points[j - 1], path.points[j], 0.12, occupancy::occupied));
+      found += path.status == path_status::found && path.points.size() > 2 ? 1 : 0;
+    }
+  }
+  CHECK(found > 40);
+}
+
 TEST_CASE("A path keeps away from a wall if that is worth the way") {
   map_type map{cell};
   for (int x = 0; x != 30; ++x)

@@ -302,7 +302,7 @@ class voxel_search {
       if (std::find(doors_.begin(), doors_.end(), k) != doors_.end())
         consider(from, cost_of(space_, places_[0], space_.center(k)));
     }
-    offer(number, best, least, trust::exact);
+    offer(number, best, least, best == from ? trust::sure : trust::exact);  // doors are known to be free
   }
 
   static constexpr unsigned none = 31;  ///< no direction
