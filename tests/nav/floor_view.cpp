@@ -227,3 +227,36 @@ TEST_CASE("A path over a cost map") {
   CHECK(far.cost < nav::cost_of(wary, near.points));
   CHECK(near.cost == Approx(near.length));
 }
+
+namespace {
+
+/// Says how often it was asked what lies outside of it.
+struct watched_floor : nav::floor_view {
+  using nav::floor_view::floor_view;
+  [[nodiscard]] double density(const octree::voxel_key& k) const {
+    if (contains(k)) return 1.0;
+    ++outside;
+    return 1.0;
+  }
+  mutable int outside = 0;
+};
+
+}  // namespace
+
+TEST_CASE("What a long way to the corner of a floor costs is asked of its cells only") {
+  random_bits random{9};
+  for (int round = 0; round != 30; ++round) {
+    nav::floor_map map = empty_floor(20000, 3);
+    map.resolution = random.uniform(0.01, 0.1);
+    map.origin = {random.uniform(-300.0, 0.0), random.uniform(-300.0, 0.0)};
+    const watched_floor view{map, 0.01, {.clearance_weight = 1.0}, occupancy::free};
+    const vec3 corner{map.origin.x(), map.origin.y(), 0.0};
+    for (int i = 0; i != 5; ++i) {
+      const vec3 p = corner + map.resolution * vec3{random.uniform(0.0, 20000.0), random.uniform(0.0, 3.0), 0.0};
+      const double length = (p - corner).norm();
+      CHECK(nav::cost_of(view, {p, corner}) == Approx(length).epsilon(1e-12));
+      CHECK(nav::cost_of(view, {corner, p}) == Approx(length).epsilon(1e-12));
+    }
+    CHECK(view.outside == 0);
+  }
+}

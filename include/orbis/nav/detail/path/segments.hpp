@@ -76,17 +76,21 @@ template <class Margin>
 template <class Space>
 [[nodiscard]] double cost_of(const Space& space, const vec3& a, const vec3& b) {
   const double length = (b - a).norm();
-  const auto key = space.key(a);
-  if (space.is_uniform() || length == 0.0 || !key) return length;
+  const auto key = space.key(a), end = space.key(b);
+  if (space.is_uniform() || length == 0.0 || !key || !end) return length;
   const vec3 middle = space.center(*key);
   std::array<std::uint32_t, 3> at{key->x, key->y, key->z};
+  const std::array<std::uint32_t, 3> last{end->x, end->y, end->z};
   std::array<std::uint32_t, 3> step{};
-  std::array<double, 3> next{}, apart{};  // where faces are crossed, metres along the way
+  // Where faces are crossed, metres along the way. Rounding errors add up, so that it could leave the grid in the end:
+  // along an axis nothing is crossed any more when the last cell is reached.
+  std::array<double, 3> next{}, apart{};
+  constexpr double never = std::numeric_limits<double>::infinity();
   for (int i = 0; i != 3; ++i) {
     const auto j = static_cast<std::size_t>(i);
     const double along = (b[i] - a[i]) / length;
     const double face = middle[i] + (along > 0.0 ? 0.5 : -0.5) * space.resolution();
-    next[j] = along == 0.0 ? std::numeric_limits<double>::infinity() : std::max(0.0, (face - a[i]) / along);
+    next[j] = at[j] == last[j] ? never : std::max(0.0, (face - a[i]) / along);
     apart[j] = space.resolution() / std::abs(along);
     step[j] = along > 0.0 ? 1U : ~0U;
   }
@@ -99,7 +103,7 @@ template <class Space>
     sum += (to - t) * density;
     t = to;
     at[i] += step[i];
-    next[i] += apart[i];
+    next[i] = at[i] == last[i] ? never : next[i] + apart[i];
   }
   return sum;
 }
