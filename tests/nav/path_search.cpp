@@ -358,6 +358,23 @@ TEST_CASE("A robot finds its way with costs from places where the middle of its 
   CHECK(found > 40);
 }
 
+TEST_CASE("Leaves that are too large for the field are not gone through") {
+  map_type map{cell};
+  map.set_unknown_node({32768, 32768, 32768}, 1, 1.0F);  // an eighth of the grid, occupied
+  const nav::distance_field field{map, {.reach = 1.0, .unknown = occupancy::free}};
+  REQUIRE_FALSE(field.is_complete());
+  const nav::planning_view view{map, field, 0.3};
+  CHECK_FALSE(view.is_free(vec3{1, 1, 1}));
+  CHECK_FALSE(view.is_surely_free(vec3{1, 1, 1}, vec3{1, 1, 2}));
+  CHECK(view.is_free(vec3{-1, -1, -1}));
+  CHECK_FALSE(view.is_free(vec3{-1, 2, 2}, vec3{2, -1, 2}));
+  const auto path = nav::find_path(view, {-0.5, 1, 2}, {1, -0.5, 2});  // round its edge
+  REQUIRE(path.status == path_status::found);
+  CHECK(path.points.size() > 2);
+  for (std::size_t j = 1; j < path.points.size(); ++j)
+    CHECK(is_free(map, path.points[j - 1], path.points[j], 0.3, occupancy::free));
+}
+
 TEST_CASE("A path keeps away from a wall if that is worth the way") {
   map_type map{cell};
   for (int x = 0; x != 30; ++x)

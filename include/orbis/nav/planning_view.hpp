@@ -24,7 +24,8 @@ namespace orbis::nav {
 
 /// Whether a robot is free, at rest or on its way along a segment. The answer is that of `octree::overlaps` for the
 /// robot's shape or what it sweeps (for a ball: a capsule), with what unknown space counts as in the field: it is not
-/// sampled, and not taken from the middles of voxels. The field says it where obstacles are far away, or so near that
+/// sampled, and not taken from the middles of voxels; they differ at most where the robot just touches a voxel, by
+/// rounding. The field says it where obstacles are far away, or so near that
 /// the robot touches one in any case, and only in the narrow band between them the map is asked.
 ///
 /// A `planning_space`. It refers to the map and the field; both must stay as they are while it is used. Any number of
@@ -34,7 +35,8 @@ class planning_view {
  public:
   static constexpr int dimensions = 3;
 
-  /// The field should reach at least two voxels farther than the robot's radius; less costs time only.
+  /// The field should reach at least two voxels farther than the robot's radius, and be complete (`is_complete`); if
+  /// not, that costs time only: of a field that is not complete, just distances for costs are taken.
   /// @pre the shape's; the options'; the field is that of the map, up to date
   planning_view(const Map& map, const distance_field& field, const Shape& shape, const planning_options& options = {})
       : map_{&map}, field_{&field}, shape_{shape}, cover_{cover_of(shape)}, options_{options} {
@@ -133,6 +135,7 @@ class planning_view {
   }
   /// See detail::is_way_free.
   [[nodiscard]] double margin(squared_distance_view::reader& reader, const vec3& p) const {
+    if (!field_->is_complete()) return -cover_.outer;
     double least = field_->reach();
     for (int i = 0; i != cover_.count; ++i) {
       const double m = ball_margin(reader, ball_at(p, i));
