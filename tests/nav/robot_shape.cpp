@@ -140,6 +140,7 @@ TEST_CASE("Balls cover a shape, and smaller ones lie in it") {
   const auto check = [&](const auto& shape) {
     const nav::ball_cover cover = cover_of(shape);
     REQUIRE(cover.count >= 1);
+    CHECK(cover.count < 50);  // also of what is thin: each is looked at on each step
     CHECK(cover.inner > 0.0);
     const auto is_in = [&](const vec3& p) { return gap(shape, vec3{0, 0, 0}, {p, p}) <= 0.0; };
     for (int i = 0; i != 3000; ++i) {
@@ -156,6 +157,10 @@ TEST_CASE("Balls cover a shape, and smaller ones lie in it") {
   check(vertical_capsule{0.2, 0.3, 0.3});
   check(vertical_cylinder{0.2, -0.4, 0.7});
   check(vertical_cylinder{0.6, 0.0, 0.1});
+  check(vertical_cylinder{0.002, -0.5, 0.5});
+  check(vertical_cylinder{1e-12, 0.0, 1.0});
+  check(vertical_capsule{0.002, -0.5, 0.5});
+  check(vertical_capsule{1e-12, 0.0, 1.0});
 }
 
 TEST_CASE("Whether a shape is free is what the exact tests of the map say, and paths of it are free") {

@@ -87,14 +87,21 @@ struct ball_cover {
   double outer = 0.0, inner = 0.0;
 };
 
+namespace detail {
+/// How many balls a thing of this height (metres) is covered by: not more than a few dozen, however thin it is.
+[[nodiscard]] inline int pieces_of(double height, double radius) noexcept {
+  return static_cast<int>(std::ceil(std::min(height / radius, 40.0)));
+}
+}  // namespace detail
+
 [[nodiscard]] inline ball_cover cover_of(const ball& s) { return {0.0, 0.0, 1, s.radius, s.radius}; }
 [[nodiscard]] inline ball_cover cover_of(const vertical_capsule& s) {
-  const int pieces = static_cast<int>(std::ceil((s.high - s.low) / s.radius));
+  const int pieces = detail::pieces_of(s.high - s.low, s.radius);
   const double spacing = pieces == 0 ? 0.0 : (s.high - s.low) / pieces;
   return {s.low, spacing, pieces + 1, std::hypot(s.radius, spacing / 2), s.radius};
 }
 [[nodiscard]] inline ball_cover cover_of(const vertical_cylinder& s) {
-  const int pieces = static_cast<int>(std::ceil((s.high - s.low) / s.radius));
+  const int pieces = detail::pieces_of(s.high - s.low, s.radius);
   const double spacing = (s.high - s.low) / pieces;
   return {s.low + spacing / 2, spacing, pieces, std::hypot(s.radius, spacing / 2), std::min(s.radius, spacing / 2)};
 }
