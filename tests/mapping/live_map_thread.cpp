@@ -316,6 +316,22 @@ TEST_CASE("A keyframe that comes with the pose of before a correction is judged 
   CHECK(ot_bytes(inner.map()) == ot_bytes(fresh(scene, now.poses)));
 }
 
+TEST_CASE("However short a slice of time is, judgements and corrections come to their end") {
+  const auto scene = test::wall_scene(4);
+  live map{scene.camera,
+           {.map = {.resolution = 0.05, .tolerance = 0.0},
+            .correction_slice = 0us,
+            .moving = mapping::moving_filter_options{}}};
+  for (std::size_t i = 0; i != 4; ++i) CHECK(add(map, scene, i));
+  const se3 correction{so3{}, vec3{0, 0, -0.6}};
+  std::vector<mapping::keyframe_position> poses;
+  for (std::size_t i = 0; i != 4; ++i) poses.push_back({i, correction * scene.poses[i]});
+  map.set_poses(poses);
+  map.wait();
+  CHECK(map.latest()->pending == 0);
+  CHECK(ot_bytes(map.stop().map()) == ot_bytes(fresh(scene, poses)));
+}
+
 TEST_CASE("A keyframe that is gone when its pose is asked for does not go in") {
   const auto scene = test::wall_scene(2);
   std::mutex mutex;

@@ -277,9 +277,9 @@ TEST_CASE("judgements that no time was found for are made up for with the next k
 
 TEST_CASE("what is due to be judged by a keyframe that is forgotten is due no more") {
   still_camera c;
+  c.see(true);
+  c.see(true);
   c.revises = false;
-  c.see(true);
-  c.see(true);
   c.see(false);
   CHECK(c.moving.due() == 2);
   c.moving.forget(2);
@@ -290,6 +290,27 @@ TEST_CASE("what is due to be judged by a keyframe that is forgotten is due no mo
   CHECK(c.moving.due() == 1);
   REQUIRE(c.moving.revise(seq, c.map));
   CHECK(c.moving.due() == 0);
+}
+
+TEST_CASE("what earlier keyframes say counts even if the newest is forgotten or has no place before it is asked") {
+  for (const bool forgotten : {false, true}) {
+    CAPTURE(forgotten);
+    still_camera c;
+    c.revises = false;
+    c.see(true);
+    c.see(false);
+    if (forgotten) {
+      c.see(false);
+      c.moving.forget(2);
+    } else {
+      const se3 nowhere{so3{}, vec3::Constant(std::numeric_limits<double>::quiet_NaN())};
+      c.see(false, nowhere);
+    }
+    CHECK(c.pixels(0) == board_pixels);
+    CHECK(c.moving.due() == 1);
+    while (c.moving.due() != 0) REQUIRE(c.moving.revise(seq, c.map));
+    CHECK(c.pixels(0) < board_pixels / 4);
+  }
 }
 
 TEST_CASE("a keyframe that is forgotten is judged no more") {

@@ -399,8 +399,10 @@ class live_map_thread {
   [[nodiscard]] std::size_t due() const noexcept { return moving_ ? moving_->due() : 0; }
   void revise(std::chrono::nanoseconds time) {
     const auto start = clock::now();
-    while (due() != 0 && clock::now() - start < time)
+    while (due() != 0) {  // one at least, however short the time is
       if (const auto revised = moving_->revise(policy_, map_); !revised) report(revised.error());
+      if (clock::now() - start >= time) return;
+    }
   }
   void correct(const std::optional<vec3>& robot) {
     const auto start = clock::now();

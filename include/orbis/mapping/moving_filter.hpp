@@ -59,9 +59,8 @@ class moving_filter {
                                                    const se3& T_world_camera) {
     result<void> settled{};
     for (auto& v : judge_.views()) {
-      if (!v.due) continue;
       judge_.ask_newest(policy, v, pose_in(map));
-      if (leaves_next(v)) settled = change(policy, map, v);
+      if (v.unjudged && leaves_next(v)) settled = change(policy, map, v);
     }
     forget(frame);
     if (!T_world_camera.to_matrix().allFinite()) return map.add_keyframe(policy, frame, depth, T_world_camera);
@@ -76,18 +75,18 @@ class moving_filter {
     if (added && !settled) return fail(std::move(settled.error()));
     return added;
   }
-  /// How many of the last keyframes have not been judged by the newest. O(keyframes).
+  /// How many of the last keyframes have not been judged by all others that there are. O(keyframes).
   [[nodiscard]] std::size_t due() const noexcept {
-    return static_cast<std::size_t>(std::ranges::count_if(judge_.views(), [](const auto& v) { return v.due; }));
+    return static_cast<std::size_t>(std::ranges::count_if(judge_.views(), [](const auto& v) { return is_due(v); }));
   }
-  /// Judges one of the last keyframes by the newest, and gives the map its image (live_map::set_depth) if it is judged
+  /// Judges one of the last keyframes that are due, and gives the map its image (live_map::set_depth) if it is judged
   /// otherwise than before; the map follows with `correct`. To be called until nothing is due, or the next keyframe is
   /// more urgent: what is due then is judged with that one. Errors: those of live_map::set_depth; the keyframe is
   /// judged even so. O(cells), and marking if the image changes.
   template <execution_policy Policy, octree::replayable_octree Octree, depth_history Depths>
   result<void> revise(const Policy& policy, live_map<Octree, Camera, Depths>& map) {
     for (auto& v : judge_.views()) {
-      if (!v.due) continue;
+      if (!is_due(v)) continue;
       judge_.ask_newest(policy, v, pose_in(map));
       return change(policy, map, v);
     }
@@ -108,6 +107,7 @@ class moving_filter {
  private:
   using view = typename detail::moving_judge<Camera>::view;
 
+  [[nodiscard]] static bool is_due(const view& v) noexcept { return v.due || v.unjudged; }
   template <class Map>
   [[nodiscard]] static auto pose_in(const Map& map) {
     return [&map](const view& v) { return map.wanted_pose(v.frame); };

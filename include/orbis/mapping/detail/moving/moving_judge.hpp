@@ -72,6 +72,7 @@ class moving_judge {
     std::vector<std::uint8_t> shown;    ///< how many others show it as well
     std::vector<std::uint8_t> removed;  ///< 1: taken out, as far as `accept` was called
     bool due = false;                   ///< the newest one has not been asked about it
+    bool unjudged = false;              ///< others have been asked about it since it was judged
 
     [[nodiscard]] depth_view depth() const { return depth_view{pixels.view(), scale, min_depth, max_depth}; }
     [[nodiscard]] std::vector<removed_cell> removed_cells() const {
@@ -105,7 +106,7 @@ class moving_judge {
     now.through.assign(now.cells.size(), 0);
     now.shown.assign(now.cells.size(), 0);
     now.removed.assign(now.cells.size(), 0);
-    now.due = false;
+    now.due = now.unjudged = false;
     for (view& v : views_) {
       if (&v == &now) continue;
       assert(!v.due);
@@ -124,7 +125,8 @@ class moving_judge {
     if (by && of) ask(policy, about, newest, by->inverse() * *of);
   }
   /// Judges a view by what is known of it now; returns how many cells differ from what was accepted last. O(cells).
-  [[nodiscard]] std::size_t judge(const view& v) {
+  [[nodiscard]] std::size_t judge(view& v) {
+    v.unjudged = false;
     const int across = grid_.across, down = grid_.down;
     const auto passed = [&](std::size_t i) {
       return v.through[i] >= options_.min_through && v.through[i] > options_.ratio * v.shown[i];
@@ -189,6 +191,7 @@ class moving_judge {
   /// Counts what `by` says about the cells of `about`.
   template <class Policy>
   void ask(const Policy& policy, view& about, const view& by, const se3& T_by_about) const {
+    about.unjudged = true;
     const auto count = [](std::uint8_t& n) { n = static_cast<std::uint8_t>(n + (n != 255 ? 1 : 0)); };
     const auto with_model = [&](const auto& model) {
       about.cells.ask(
