@@ -141,6 +141,31 @@ TEST_CASE("The frontier of random maps, and of a leaf as wide as the grid") {
   CHECK_FALSE(f.contains({18, 20, 20}));
 }
 
+TEST_CASE("Leaves with too large faces are left out, and it is said") {
+  map_type map{0.1};
+  map.track_changes();
+  map.set_unknown_node({0, 0, 0}, 1, -1.0F);                  // an eighth of the grid
+  map.set_unknown_node({40'000, 40'000, 40'000}, 11, -1.0F);  // 32 voxels
+  frontiers f{map};
+  CHECK_FALSE(f.is_complete());
+  CHECK(f.size() == 32 * 32 * 32 - 30 * 30 * 30);
+  CHECK(f.memory_bytes() < 1'000'000);
+  const std::uint32_t last = 32767;
+  map.edit_octant({last, 100, 100}, [](auto& voxels) { voxels.known &= ~std::uint64_t{1}; });
+  f.update(map);
+  CHECK(f.contains({last, 100, 100}));
+  for (const std::size_t most : {295U, 296U}) {  // 8^3 - 6^3 octants
+    const frontiers g{map, {.max_octants = most}};
+    CHECK((g.size() > 1000) == (most == 296));
+    CHECK_FALSE(g.is_complete());
+  }
+  map.clear();
+  f.update(map);
+  CHECK(f.is_complete());
+  CHECK(f.empty());
+  CHECK_FALSE(f.contains({0U - 1, 0, 0}));
+}
+
 TEST_CASE("The frontier follows copies of a map, whatever their revisions are") {
   random_bits random{6};
   map_type map{0.1, 8};

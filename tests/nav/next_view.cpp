@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <vector>
 
@@ -54,7 +55,8 @@ TEST_CASE("Places of a frontier: means of its voxels in the cubes of a lattice")
   REQUIRE(places.size() == 4);
   for (std::size_t i = 0; i != 4; ++i)
     CHECK((places[i] - vec3{0.4 + 0.8 * static_cast<double>(i), 0.4, 0.05}).norm() < 1e-9);
-  CHECK(nav::places_of(f.clusters(), map.grid(), 100.0).size() == 1);
+  for (const double whole : {100.0, 1e300, std::numeric_limits<double>::infinity()})
+    CHECK(nav::places_of(f.clusters(), map.grid(), whole).size() == 1);
   CHECK(nav::places_of({}, map.grid()).empty());
 }
 

@@ -52,6 +52,13 @@ struct frontier_cluster {
   std::vector<frontier_octant> octants{};  ///< all of its voxels, in Morton order
 };
 
+struct frontier_options {
+  /// How many octants on the faces of leaves of the map that are larger than 8x8x8 voxels are looked at: a file of a
+  /// few bytes can be a leaf as large as the grid, whose faces have 1.6e9. What goes beyond is left out, see
+  /// `is_complete`.
+  std::size_t max_octants = std::size_t{1} << 24U;
+};
+
 struct cluster_options {
   std::size_t min_size = 1;  ///< of a cluster, voxels
 };
@@ -65,16 +72,20 @@ struct cluster_options {
 class frontiers {
  public:
   /// Of an empty map.
-  explicit frontiers(const octree::voxel_grid& grid)
-      : grid_{grid}, last_{octree::morton_code({grid.cells() - 1, grid.cells() - 1, grid.cells() - 1}) >> 6U} {}
+  explicit frontiers(const octree::voxel_grid& grid, const frontier_options& options = {})
+      : grid_{grid},
+        last_{octree::morton_code({grid.cells() - 1, grid.cells() - 1, grid.cells() - 1}) >> 6U},
+        options_{options} {}
   /// Of `map` as it is.
   template <planning_map Map>
-  explicit frontiers(const Map& map) : frontiers{map_access<Map>::grid(map)} {
+  explicit frontiers(const Map& map, const frontier_options& options = {})
+      : frontiers{map_access<Map>::grid(map), options} {
     update(map);
   }
 
   /// Follows the map by its change log, as distance_field::update does. O(octants that changed) on average; if the log
-  /// does not know, O(octants of the map). @pre the same map every time, of the same grid
+  /// does not know, O(octants of the map + octants on the faces of its larger leaves). @pre the same map every time, of
+  /// the same grid
   template <planning_map Map>
   void update(const Map& map) {
     assert(map_access<Map>::grid(map) == grid_);
@@ -98,8 +109,12 @@ class frontiers {
   /// How many voxels there are. O(1)
   [[nodiscard]] std::size_t size() const noexcept { return size_; }
   [[nodiscard]] bool empty() const noexcept { return size_ == 0; }
-  /// Whether the voxel belongs to the frontier. O(1)
+  /// False if leaves of the map were left out because of `max_octants`: voxels on their faces are missing, but for
+  /// those beside later changes.
+  [[nodiscard]] bool is_complete() const noexcept { return is_complete_; }
+  /// Whether the voxel belongs to the frontier; false outside of the grid. O(1)
   [[nodiscard]] bool contains(const octree::voxel_key& k) const noexcept {
+    if (std::max({k.x, k.y, k.z}) >= grid_.cells()) return false;
     const std::uint64_t code = octree::morton_code(k);
     const std::uint32_t i = index_.find(code >> 6U);
     return i != hash_index::none && (found_[i].mask >> (code & 63U) & 1U) != 0;
@@ -211,16 +226,27 @@ class frontiers {
     index_.clear();
     found_.clear();
     size_ = 0;
+    is_complete_ = true;
+    std::uint64_t on_faces = 0;
     octant_cache octants{map_access<Map>::octants(map)};
     map_access<Map>::for_each_octant(map, [&](const octree::voxel_key& low, int level, const octree::octant_states& s) {
       if (s.free() == 0) return;
       const std::uint32_t cells = octree::node_cells(level);
+      // Of larger cubes, all of whose octants are the same: if everything is known, the outermost octants.
+      const bool is_hollow = ~s.known == 0;
+      if (level > 3) {
+        const std::uint64_t n = cells / 4, inner = is_hollow ? n - 2 : 0;
+        const std::uint64_t more = n * n * n - inner * inner * inner;
+        if (on_faces + more > options_.max_octants) {
+          is_complete_ = false;
+          return;
+        }
+        on_faces += more;
+      }
       const auto find_in = [&](std::uint32_t x, std::uint32_t y, std::uint32_t z) {
         const std::uint64_t name = octree::morton_code({low.x + x, low.y + y, low.z + z}) >> 6U;
         set(name, frontier_in(octants, name));
       };
-      // Of larger cubes, all of whose octants are the same: if everything is known, the outermost octants.
-      const bool is_hollow = ~s.known == 0;
       for (std::uint32_t z = 0; z != cells; z += 4)
         for (std::uint32_t y = 0; y != cells; y += 4) {
           const bool is_outermost = z == 0 || y == 0 || z + 4 == cells || y + 4 == cells;
@@ -252,6 +278,8 @@ class frontiers {
 
   octree::voxel_grid grid_;
   std::uint64_t last_;  ///< the Morton code of the grid's last octant
+  frontier_options options_;
+  bool is_complete_ = true;
   detail::map_follower follower_;
   hash_index index_;  ///< places in found_
   std::vector<entry> found_;

@@ -39,7 +39,7 @@ namespace orbis::nav {
 [[nodiscard]] inline std::vector<vec3> places_of(std::span<const frontier_cluster> clusters,
                                                  const octree::voxel_grid& grid, double spacing = 0.8) {
   const double levels = std::round(std::log2(std::max(4.0, spacing / grid.resolution())));
-  const int level = std::clamp(static_cast<int>(levels), 2, grid.depth());
+  const int level = static_cast<int>(std::clamp(levels, 2.0, static_cast<double>(grid.depth())));
   std::vector<vec3> places;
   for (const frontier_cluster& c : clusters) {
     // Octants are in Morton order: those of a cube follow each other.
