@@ -17,6 +17,20 @@
 
 using namespace orbis;
 
+namespace elsewhere {
+
+/// A shape of somebody's own: a ball that hangs beneath its reference point.
+struct pendulum {
+  double radius = 0.1, length = 0.15;
+};
+[[nodiscard]] octree::capsule swept(const pendulum& s, const vec3& a, const vec3& b) {
+  return {a - s.length * vec3::UnitZ(), b - s.length * vec3::UnitZ(), s.radius};
+}
+[[nodiscard]] nav::ball_cover cover_of(const pendulum& s) { return {-s.length, 0.0, 1, s.radius, s.radius}; }
+static_assert(nav::robot_shape<pendulum>);
+
+}  // namespace elsewhere
+
 namespace {
 
 using map_type = octree::occupancy_octree<>;
@@ -199,6 +213,7 @@ TEST_CASE("Trajectories of paths between boxes keep their bounds and touch nothi
     run(nav::planning_view{map, field, 0.12});
     run(nav::planning_view{map, field, nav::vertical_cylinder{.radius = 0.1, .low = -0.1, .high = 0.15}});
     run(nav::planning_view{map, field, nav::vertical_capsule{.radius = 0.1, .low = -0.1, .high = 0.1}});
+    run(nav::planning_view{map, field, elsewhere::pendulum{}});
   }
   CHECK(found > 40);
   CHECK(smooth > 3 * stops);

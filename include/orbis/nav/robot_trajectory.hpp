@@ -73,8 +73,8 @@ struct path_piece {
   }
 };
 
-/// Positions, velocities and accelerations over time, from rest to rest. Velocity is continuous; acceleration is not
-/// where braking sets in. Made by make_trajectory.
+/// Positions, velocities and accelerations over time, from rest to rest. Velocity is continuous; acceleration jumps
+/// within its bound: at both ends, where braking sets in, in corners. Made by make_trajectory.
 class robot_trajectory {
  public:
   /// Along pieces that follow each other, as fast as the limits allow. `stops[i]`: whether it stops where piece i
@@ -205,6 +205,12 @@ namespace detail {
 [[nodiscard]] inline vertical_cylinder grown(const vertical_cylinder& s, double by) {
   return {s.radius + by, s.low - by, s.high + by};
 }
+/// Of any other shape: around the balls that cover it.
+template <robot_shape Shape>
+[[nodiscard]] vertical_capsule grown(const Shape& s, double by) {
+  const ball_cover c = cover_of(s);
+  return {c.outer + by, c.low, c.low + (c.count - 1) * c.spacing};
+}
 
 /// Whether a robot stays free along a Bezier curve. The curve lies in the convex hull of its control points, and so
 /// nowhere farther from the segment between its ends than the farthest of them: a thicker robot along that segment is
@@ -220,8 +226,7 @@ template <octree::octree_map Map, robot_shape Shape>
     away = std::max(away, (p - (points[0] + t * along)).norm());
   }
   const double rounding = 1e-9 * view.field().grid().resolution();
-  const planning_view<Map, Shape> thicker{view.map(), view.field(), detail::grown(view.shape(), away + rounding),
-                                          view.options()};
+  const planning_view thicker{view.map(), view.field(), detail::grown(view.shape(), away + rounding), view.options()};
   if (thicker.is_free(points[0], points[4])) return true;
   if (halvings == 0 || !view.is_free(points[0], points[4])) return false;
   // By de Casteljau's rule.
@@ -237,9 +242,10 @@ template <octree::octree_map Map, robot_shape Shape>
 }  // namespace detail
 
 /// A trajectory along a polyline, from rest to rest, within the limits. Corners are rounded (see path_piece) as far as
-/// the robot fits: each rounded corner is certified as a whole by the exact test of what a thicker robot sweeps along
-/// pieces of the curve's convex hull. Where none of some sizes fits, the robot stops at the corner. So the robot is
-/// free all the time. Speed and acceleration stay within the limits everywhere, not at samples alone.
+/// the robot fits: each rounded corner is certified as a whole by the exact test of what a thicker robot (of a shape of
+/// yours: the balls that cover it) sweeps along pieces of the curve's convex hull. Where none of some sizes fits, the
+/// robot stops at the corner. So the robot is free all the time. Speed and acceleration stay within the limits
+/// everywhere, not at samples alone.
 ///
 /// Points that follow each other at the same place count once. O(points), and what `is_free` costs.
 /// @pre points is not empty; each segment is free (view.is_free), as those of find_path are; limits finite and > 0
