@@ -4,8 +4,12 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
+#include <filesystem>
+#include <optional>
+#include <span>
 #include <string>
 #include <string_view>
+#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -52,10 +56,28 @@ orbis::result<void> write_path(const std::filesystem::path& path, const std::vec
   });
 }
 
+/// What would be written over, if anything: the map, or one result by the other.
+std::optional<orbis::error> find_overwritten(const settings& s) {
+  const auto are_one = [](const std::filesystem::path& a, const std::filesystem::path& b) {
+    std::error_code ignored;
+    return std::filesystem::equivalent(a, b, ignored) ||
+           std::filesystem::absolute(a).lexically_normal() == std::filesystem::absolute(b).lexically_normal();
+  };
+  const auto complain = [](const std::filesystem::path& path, const char* what) {
+    return orbis::error{orbis::errc::invalid_argument, path.string(), what};
+  };
+  for (const auto& path : {s.out, s.picture})
+    if (!path.empty() && are_one(path, s.input)) return complain(path, "is the map, and would be written over");
+  if (!s.out.empty() && !s.picture.empty() && are_one(s.out, s.picture))
+    return complain(s.out, "would be both the path and the picture");
+  return std::nullopt;
+}
+
 }  // namespace
 
 exit_code plan(const settings& s, console& console) {
   const auto give_up = [&](const orbis::error& e) { return console.error(e), bad_input; };
+  if (const auto lost = find_overwritten(s)) return console.error(*lost), bad_usage;
   console.stage("reading");
   const auto map = read_map(s.input);
   if (!map) return give_up(map.error());
@@ -119,7 +141,7 @@ exit_code plan(const settings& s, console& console) {
   }
   if (!s.out.empty())
     if (auto written = write_path(s.out, path.points); !written) return give_up(written.error());
-  console.print(text);
+  if (!console.print(text)) return give_up({orbis::errc::write_failed, "standard output", "cannot be written"});
   return done;
 }
 

@@ -10,6 +10,7 @@
 
 #include <nlohmann/json.hpp>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <orbis/core/file.hpp>
 
@@ -105,12 +106,12 @@ std::optional<orbis::error> find_overwritten(const settings& s, const std::vecto
     if (const auto id = identity_of(path)) targets.emplace_back(*id, path);
   };
   for (const std::string& name : result_names(s)) add(s.out / name);
-  const std::size_t results = targets.size();
-  if (!s.save_map.empty()) add(s.save_map);
   if (!s.floor_map.empty()) {
     add(s.floor_map);
     add(fs::path{s.floor_map}.replace_extension(".pgm"));
   }
+  const std::size_t results = targets.size();
+  if (!s.save_map.empty()) add(s.save_map);
   if (targets.empty()) return std::nullopt;
 
   const auto complain = [](const fs::path& path, const std::string& what) {
@@ -158,6 +159,16 @@ result<result_files> result_files::begin(const settings& s) {
     if (beside && is_among(files.map_name_, all_names())) return fail("another result has this name");
     if (const auto there = fs::status(s.save_map, ec); fs::exists(there) && !fs::is_regular_file(there))
       return fail("it is not a regular file, and is not replaced by one");
+  }
+  if (!s.floor_map.empty()) {  // said now, and not when all is done
+    const fs::path place = folder_of(s.floor_map);
+    std::error_code ec;
+    if (fs::create_directories(place, ec); ec)
+      return orbis::fail(orbis::errc::write_failed, place.string(), "cannot be made: " + ec.message());
+    if (::access(place.c_str(), W_OK) != 0)
+      return orbis::fail(orbis::errc::write_failed, s.floor_map.string(), "cannot be created: its folder is read-only");
+    if (fs::is_directory(s.floor_map, ec))
+      return orbis::fail(orbis::errc::write_failed, s.floor_map.string(), "is a folder");
   }
   if (beside) names.push_back(files.map_name_);
   auto folder = staged_folder::open(s.out, std::move(names));
