@@ -346,6 +346,11 @@ TEST_CASE("A keyframe that is gone when its pose is asked for does not go in") {
   live map{scene.camera,
            {.map = {.resolution = 0.05}, .poll_interval = 1h, .moving = mapping::moving_filter_options{}},
            hear};
+  map.wait();  // the thread asks when it starts
+  {
+    const std::lock_guard lock{mutex};
+    asked = 0;
+  }
   CHECK(add(map, scene, 1));
   map.wait();
   CHECK(add(map, scene, 0));
