@@ -18,6 +18,21 @@
 
 using namespace orbis;
 
+namespace elsewhere {
+
+/// A ball that counts how often the map is asked.
+struct counted {
+  double radius = 0.25;
+  std::size_t* asked = nullptr;
+};
+[[nodiscard]] octree::capsule swept(const counted& s, const vec3& a, const vec3& b) {
+  ++*s.asked;
+  return {a, b, s.radius};
+}
+[[nodiscard]] nav::ball_cover cover_of(const counted& s) { return {0.0, 0.0, 1, s.radius, s.radius}; }
+
+}  // namespace elsewhere
+
 namespace {
 
 using map_type = octree::occupancy_octree<>;
@@ -112,4 +127,38 @@ TEST_CASE("The next best view is the one of the greatest utility, and can be rea
   CHECK_FALSE(nav::next_best_view(view, {}, camera, vec3{2.0, 2.0, 1.0}, options));
   options.gain.bounds = octree::bounding_box{vec3::Zero(), vec3{4.0, 4.0, 2.0}};  // all of it is known
   CHECK_FALSE(nav::next_best_view(view, places, camera, vec3{2.0, 2.0, 1.0}, options));
+}
+
+TEST_CASE("What cannot be reached is found out once, and what can be is found all the same") {
+  map_type map = room();
+  fill(map, {0.0, 3.0, 0.0}, {4.0, 3.1, 2.0}, 1.0F);    // a wall across
+  fill(map, {3.0, 5.0, 0.0}, {12.0, 9.0, 2.0}, -1.0F);  // and another room, which cannot be reached
+  const nav::frontiers f{map};
+  const camera::pinhole camera{40, 30, 25.0, 25.0, 19.5, 14.5};
+  const nav::distance_field field{map, {.reach = 0.6}};
+  std::size_t asked = 0;
+  const nav::planning_view view{map, field, elsewhere::counted{.asked = &asked}};
+  const vec3 position{2.0, 1.5, 1.0};
+  REQUIRE(view.is_free(position));
+  nav::next_view_options options{.gain = {.max_range = 3.0, .pixel_step = 4}, .max_distance = 1.0, .lambda = 0.0};
+  std::vector<vec3> far;
+  for (const vec3& p : nav::places_of(f.clusters(), map.grid()))
+    if (p.y() > 5.0) far.push_back(p);
+  REQUIRE(far.size() > 20);
+  options.candidates = 1;
+  const auto asked_for = [&](const std::vector<vec3>& places) {
+    asked = 0;
+    CHECK_FALSE(nav::next_best_view(view, places, camera, position, options));
+    return asked;
+  };
+  std::size_t most = 0;  // for a place
+  for (const vec3& p : far) most = std::max(most, asked_for({p}));
+  REQUIRE(most > 1000);
+  CHECK(asked_for(far) < 2 * most);
+  // A door that can be looked through, after all those.
+  far.push_back({3.95, 1.5, 1.0});
+  options.candidates = 20;
+  const auto next = nav::next_best_view(view, far, camera, position, options);
+  REQUIRE(next);
+  CHECK(next->place == far.back());
 }

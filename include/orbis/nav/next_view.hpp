@@ -24,6 +24,7 @@
 #include <orbis/core/random.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/core/types.hpp>
+#include <orbis/nav/detail/path/voxel_search.hpp>
 #include <orbis/nav/frontiers.hpp>
 #include <orbis/nav/path_search.hpp>
 #include <orbis/nav/planning_view.hpp>
@@ -96,7 +97,8 @@ struct next_view {
 /// to where a path leads; empty if there is none whose gain is more than 0 and at least `min_gain`. The best is the one
 /// of the greatest utility, gain * exp(-lambda * length of the path): H. H. Gonzalez-Banos, J.-C. Latombe, "Navigation
 /// strategies for exploring indoor environments", International Journal of Robotics Research 21, 2002. Paths are looked
-/// for only as long as a straight one could still be the best. The world has z up.
+/// for only as long as a straight one could still be the best, and to what cannot be reached at most once. The world
+/// has z up.
 ///
 /// The same arguments give the same view. Usually a millisecond for each candidate, and what find_path costs.
 /// @pre 0 < min_distance <= max_distance; 0 <= max_elevation < pi / 2; lambda >= 0
@@ -131,9 +133,18 @@ template <octree::octree_map Map, robot_shape Shape, camera::camera_model Camera
   std::stable_sort(candidates.begin(), candidates.end(),
                    [](const candidate& a, const candidate& b) { return a.bound > b.bound; });
   std::optional<next_view> best;
+  // What cannot be reached is not looked for again and again: each time all that can be reached would be searched.
+  using search = detail::voxel_search<planning_view<Map, Shape>>;
+  std::optional<search> reached;
   for (candidate& c : candidates) {
     if (best && best->utility >= c.bound) break;
-    c.view.path = find_path(view, position, c.view.T_world_camera.translation(), options.path);
+    const vec3 goal = c.view.T_world_camera.translation();
+    if (reached && !(view.key(goal) && reached->has_reached(goal)) && !view.is_free(position, goal)) continue;
+    c.view.path = find_path(view, position, goal, options.path);
+    if (c.view.path.status == path_status::unreachable && !reached) {
+      reached.emplace(view, false, options.path.max_expanded);
+      if (reached->run(position, goal, {}) != detail::search_end::exhausted) reached.reset();
+    }
     if (c.view.path.status != path_status::found) continue;
     c.view.utility = c.view.gain * std::exp(-options.lambda * c.view.path.length);
     if (!best || c.view.utility > best->utility) best = std::move(c.view);
