@@ -92,7 +92,8 @@ template <planning_space Space>
 /// Makes a path cheaper as long as the robot fits: leaves points out that are not needed, and cuts corners. Both ends
 /// stay. The result never costs more (see cost_of) and, in a uniform space, is never longer; each of its segments is
 /// free (`space.is_free`). It ends after `max_checks` segments have been checked, or when little is gained.
-/// O(max_checks) checks of segments, and as many costs where the space is not uniform.
+/// O(max_checks) checks of segments and, where the space is not uniform, as many times the costs of the way between the
+/// ends of a segment.
 /// @pre each segment of `points` is free
 template <planning_space Space>
 void shorten_path(const Space& space, std::vector<vec3>& points, std::size_t max_checks = 2'000) {
