@@ -15,7 +15,7 @@
 
 #include <orbis/camera/presets.hpp>
 #include <orbis/core/file.hpp>
-#include <orbis/io/detail/files/utf8.hpp>
+#include <orbis/core/utf8.hpp>
 
 #include "filters.hpp"
 #include "viewer/backend.hpp"
@@ -224,7 +224,7 @@ std::string contradiction(const settings& s) {
 std::optional<exit_code> read_config(CLI::App& cmd, const std::string& path) {
   const orbis::result<std::string> text = orbis::read_file(path);
   if (!text) return complain(text.error().to_string(), bad_input);
-  if (!orbis::io::detail::is_utf8(*text)) return complain(path + ": not TOML: no UTF-8", bad_input);
+  if (!orbis::is_utf8(*text)) return complain(path + ": not TOML: no UTF-8", bad_input);
   toml::table table;
   try {
     table = toml::parse(*text);

@@ -79,9 +79,10 @@ orbis::result<navigation_results> navigate(const octree& map, const orbis::traje
   }
   if (!s.floor_map.empty()) {
     if (!floor)
-      return orbis::fail(floor.error().code, s.floor_map.string(),
-                         "there is no floor map to write: " + floor.error().message);
-    if (auto saved = nav::save_floor_map(s.floor_map, *floor); !saved) return orbis::fail(saved.error());
+      r.unsaved = {floor.error().code, s.floor_map.string(),
+                   "there is no floor map to write: " + floor.error().message};
+    else if (auto saved = nav::save_floor_map(s.floor_map, *floor); !saved)
+      r.unsaved = std::move(saved.error());
   }
 
   const double reach = std::min(std::max(1.0, s.robot_radius + 2 * s.resolution), 181 * s.resolution);

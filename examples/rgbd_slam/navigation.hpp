@@ -16,8 +16,8 @@
 namespace app {
 
 /// Makes the floor map, writes it to `s.floor_map` if that is given, plans a way of a ball between two places that the
-/// camera saw, and draws navigation.png into `folder`. Nothing if the world is not upright or there is no floor and no
-/// camera. Errors: write_failed; no_data if a floor map was asked for and there is no floor.
+/// camera saw, and draws navigation.png into `folder`. No picture where there is neither a
+/// floor nor a camera. Errors: write_failed, of the picture; for the floor map see `navigation_results::unsaved`.
 [[nodiscard]] orbis::result<navigation_results> navigate(const orbis::octree::occupancy_octree<>& map,
                                                          const orbis::trajectory& cameras, const settings& s,
                                                          const std::filesystem::path& folder, console& console);

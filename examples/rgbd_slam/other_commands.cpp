@@ -132,13 +132,14 @@ exit_code map_without_slam(const settings& s, console& console) {
   if (!found) return give_up(found.error());
   auto usable = navigate(found->map.octree, found->cameras, s, files->folder(), console);
   if (!usable) return give_up(usable.error());
-  found->r.navigation = *std::move(usable);
+  const auto& unsaved = found->r.navigation.emplace(*std::move(usable)).unsaved;
+  if (unsaved) found->r.warnings.push_back(unsaved->to_string());
   auto written = write_map(std::move(found->map), s, files->folder(), console);
   if (!written) return give_up(written.error());
   found->r.map = *std::move(written);
   if (auto done = write_report_files(found->r, found->cameras, *files, console); !done) return give_up(done.error());
   print_results(found->r, console);
-  return done;
+  return unsaved ? give_up(*unsaved) : done;
 }
 
 }  // namespace app

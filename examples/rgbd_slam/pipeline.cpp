@@ -57,6 +57,7 @@ exit_code run_slam(const settings& s, console& console) {
     auto usable = navigate(map->octree, r.slam->keyframes, s, files->folder(), console);
     if (!usable) return give_up(usable.error());
     r.navigation = *std::move(usable);
+    if (r.navigation->unsaved) r.warnings.push_back(r.navigation->unsaved->to_string());
     auto written = write_map(*std::move(map), s, files->folder(), console);
     if (!written) return give_up(written.error());
     r.map = *std::move(written);
@@ -74,6 +75,7 @@ exit_code run_slam(const settings& s, console& console) {
 
   if (tracked.stopped) return give_up(explain_stop(tracked, *source));
   if (tracked.unsaved) return give_up(*tracked.unsaved);
+  if (r.navigation && r.navigation->unsaved) return give_up(*r.navigation->unsaved);
   if (was_interrupted) return interrupted;
   return tracked.missed_map ? (console.error(explain_miss(tracked, s)), never_tracked) : done;
 }

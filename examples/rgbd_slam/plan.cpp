@@ -96,7 +96,8 @@ exit_code plan(const settings& s, console& console) {
     floor = *std::move(made);
   }
   const double reach = std::min(181 * cell, std::max(1.0, s.robot_radius + 2 * cell));
-  const nav::distance_field field{*map, {.reach = reach, .unknown = unknown}};
+  std::optional<nav::distance_field> field;
+  if (!floor) field.emplace(*map, nav::distance_field_options{.reach = reach, .unknown = unknown});
   console.finish(floor ? "floor map" : "distance field");
 
   console.stage("planning");
@@ -105,8 +106,8 @@ exit_code plan(const settings& s, console& console) {
   const nav::found_path path =
       floor ? planned_in(nav::floor_view{*floor, s.robot_radius, {}, unknown})
       : s.stands
-          ? planned_in(nav::planning_view{*map, field, nav::vertical_cylinder{s.robot_radius, 0.0, s.robot_height}})
-          : planned_in(nav::planning_view{*map, field, nav::ball{s.robot_radius}});
+          ? planned_in(nav::planning_view{*map, *field, nav::vertical_cylinder{s.robot_radius, 0.0, s.robot_height}})
+          : planned_in(nav::planning_view{*map, *field, nav::ball{s.robot_radius}});
   const double ms = std::chrono::duration<double, std::milli>(console::clock::now() - start).count();
   const bool found = path.status == nav::path_status::found;
   const double straight = (s.to - s.from).norm();
@@ -121,7 +122,7 @@ exit_code plan(const settings& s, console& console) {
     const auto drawn = write_navigation_picture({.title = s.input.filename().string(),
                                                  .subtitle = text,
                                                  .map = *map,
-                                                 .field = floor ? nullptr : &field,
+                                                 .field = field ? &*field : nullptr,
                                                  .height = s.from.z(),
                                                  .floor = floor ? &*floor : nullptr,
                                                  .radius = s.robot_radius,

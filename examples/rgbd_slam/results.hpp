@@ -107,6 +107,7 @@ struct navigation_results {
   std::string path_status;          ///< "found", or why there is no path
   std::vector<orbis::vec3> path{};  ///< of a ball through the air, metres
   double path_m = 0.0, straight_m = 0.0, planning_ms = 0.0;
+  std::optional<orbis::error> unsaved;  ///< why the floor map that was asked for could not be written
 };
 
 struct results {

@@ -18,6 +18,7 @@
 /// | `hash_index.hpp, cow_pages.hpp` | hash tables from keys to positions; arrays whose copies share pages |
 /// | `compiled_once.hpp` | for authors of components: what is inline, or compiled once in `orbis::compiled` |
 /// | `bits.hpp, bytes.hpp` | counts and strings of bits; byte orders, checksums, bytes as text |
+/// | `utf8.hpp` | whether bytes are text in UTF-8 |
 #pragma once
 
 #include <orbis/core/bits.hpp>
@@ -40,3 +41,4 @@
 #include <orbis/core/so3.hpp>
 #include <orbis/core/trajectory.hpp>
 #include <orbis/core/types.hpp>
+#include <orbis/core/utf8.hpp>

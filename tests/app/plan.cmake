@@ -55,8 +55,10 @@ check(err MATCHES "^rgbd_slam: ")
 app_fails(1 "is not x,y,z" plan plate/map.bt --from 0,0 --to 1,1,1)
 app_fails(1 "--to" plan plate/map.bt --from 0,0,0)
 app_fails(1 "does not end in .yaml" map cloud.ply --out plate --floor-map floor.pgm)
-app_fails(2 "no floor" map cloud.ply --out never --floor-map floor.yaml)
 check(NOT EXISTS ${WORK}/never/map.bt)
+app_fails(2 "no floor" map cloud.ply --out all_but_that --floor-map floor.yaml)
+check(NOT EXISTS ${WORK}/floor.yaml)
+must_exist(${WORK}/all_but_that map.bt summary.json report.html)
 
 # A room, all round.
 app(0 demo --frames 90 --stride 4 --width 320 --resolution 0.1 --threads 1 --out room --floor-map room/floor.yaml)

@@ -37,8 +37,8 @@
 #include <orbis/camera/settings.hpp>
 #include <orbis/core/file.hpp>
 #include <orbis/core/result.hpp>
+#include <orbis/core/utf8.hpp>
 #include <orbis/io/detail/files/camera_fields.hpp>
-#include <orbis/io/detail/files/utf8.hpp>
 
 namespace orbis::io {
 
@@ -48,7 +48,7 @@ namespace orbis::io {
 /// know).
 [[nodiscard]] inline result<camera::camera_settings> parse_camera(std::string_view text,
                                                                   const std::filesystem::path& where = {}) {
-  if (!detail::is_utf8(text)) return fail(errc::malformed, where.string(), "not TOML: no UTF-8");
+  if (!is_utf8(text)) return fail(errc::malformed, where.string(), "not TOML: no UTF-8");
   toml::table table;
   try {
     table = toml::parse(text, std::string_view{});

@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <string_view>
 
-namespace orbis::io::detail {
+namespace orbis {
 
 /// Whether `text` is well-formed UTF-8 (RFC 3629): no overlong forms, no surrogates, nothing cut off. O(bytes).
 [[nodiscard]] constexpr bool is_utf8(std::string_view text) noexcept {
@@ -33,4 +33,4 @@ namespace orbis::io::detail {
   return true;
 }
 
-}  // namespace orbis::io::detail
+}  // namespace orbis

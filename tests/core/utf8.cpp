@@ -2,12 +2,12 @@
 #include <string>
 #include <string_view>
 
-#include <orbis/io/detail/files/utf8.hpp>
+#include <orbis/core/utf8.hpp>
 
 #include "support/catch.hpp"
 
 using namespace std::string_view_literals;
-using orbis::io::detail::is_utf8;
+using orbis::is_utf8;
 
 TEST_CASE("text in UTF-8 is told from other bytes") {
   for (const auto text : {""sv, "plain"sv, "\0"sv, "\x7f"sv, "\xc2\x80"sv, "\xdf\xbf"sv, "\xe0\xa0\x80"sv,
