@@ -107,6 +107,7 @@ template <octree::octree_map Map, robot_shape Shape, camera::camera_model Camera
                                                       std::span<const vec3> places, const Camera& camera,
                                                       const vec3& position, const next_view_options& options = {}) {
   assert(options.min_distance > 0.0 && options.min_distance <= options.max_distance && options.lambda >= 0.0);
+  assert(options.max_elevation >= 0.0 && options.max_elevation < 1.5707963267948966);
   struct candidate {
     next_view view;
     double bound;  ///< of its utility, if the straight way is free

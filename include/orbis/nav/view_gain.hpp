@@ -47,8 +47,9 @@ class view_gain {
   view_gain(const Map& map, const Camera& camera, const view_gain_options& options = {})
       : grid_{map_access<Map>::grid(map)}, octants_{map_access<Map>::octants(map)}, max_range_{options.max_range} {
     assert(std::isfinite(max_range_) && max_range_ > 0.0 && options.pixel_step > 0);
-    for (int y = options.pixel_step / 2; y < camera.height(); y += options.pixel_step)
-      for (int x = options.pixel_step / 2; x < camera.width(); x += options.pixel_step)
+    const auto first = [&](int size) { return std::min(options.pixel_step / 2, (size - 1) / 2); };  // one at least
+    for (int y = first(camera.height()); y < camera.height(); y += options.pixel_step)
+      for (int x = first(camera.width()); x < camera.width(); x += options.pixel_step)
         if (const std::optional<vec3> ray = camera.unproject(vec2{double(x), double(y)}))
           rays_.push_back(ray->normalized());
     if (options.bounds) counted_ = octree::keys_between(grid_, options.bounds->min, options.bounds->max);

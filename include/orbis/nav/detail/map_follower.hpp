@@ -8,6 +8,7 @@
 #include <concepts>
 #include <cstdint>
 #include <optional>
+#include <utility>
 
 #include <orbis/octree/change_log.hpp>
 
@@ -42,9 +43,10 @@ class map_follower {
     assert(revision <= log.revision());
     // Where both are older than the log, it names more octants than have changed between them, never fewer.
     const std::uint64_t since = seen_ ? std::min(*seen_, revision) : 0;
-    if (!seen_ || since < log.complete_since() || log.revision() == 0)
+    const std::optional<std::uint64_t> seen = std::exchange(seen_, std::nullopt);  // should one of these throw
+    if (!seen || since < log.complete_since() || log.revision() == 0)
       all();
-    else if (*seen_ != revision)
+    else if (*seen != revision)
       some(log, since);
     seen_ = revision;
   }
