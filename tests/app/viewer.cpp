@@ -121,7 +121,7 @@ std::set<std::array<long, 4>> cubes_of(const shown_voxels& voxels) {
 
 }  // namespace
 
-TEST_CASE("The newest frame is shown; the path has those that nobody looked at as well") {
+TEST_CASE("The newest frame is shown, the path has those that nobody looked at as well") {
   told_graph told{{at(0)}};
   scene_builder builder{"a run", 10, rays(), 0.05};
   for (std::uint64_t i = 0; i != 5; ++i)
@@ -268,7 +268,7 @@ TEST_CASE("Voxels have the colours of keyframes, which follow their corrections"
   CHECK(color_in(in_later) == no_color);
 }
 
-TEST_CASE("The colour of a voxel is the mean of its points; what is taken out leaves no trace") {
+TEST_CASE("The colour of a voxel is the mean of its points, what is taken out leaves no trace") {
   voxel_colors colors{0.1};
   colors.add({0.05F, 0.05F, 0.05F}, {100, 0, 0});
   colors.add({0.06F, 0.05F, 0.05F}, {200, 50, 0});

@@ -24,7 +24,7 @@ static_assert(!mapping::keyframe_range<std::vector<posed_depth>>);
 
 }  // namespace
 
-TEST_CASE("A keyframe refers to images of its owner; colours may be absent") {
+TEST_CASE("A keyframe refers to images of its owner, colours may be absent") {
   const image<float> depth(4, 3, 2.0F);
   const mapping::keyframe<camera::depth_view<float>> k{camera::depth_view{depth}, {}, se3{}};
   CHECK(k.color.empty());

@@ -79,7 +79,7 @@ TEST_CASE("A monitor tests only what changes touch, and finds every path that is
   CHECK(spared > 50);
 }
 
-TEST_CASE("Changes away from the path never lead to a new one; a wall across it does, from where the robot is") {
+TEST_CASE("Changes away from the path never lead to a new one, a wall across it does, from where the robot is") {
   map_type map = two_doors();
   nav::distance_field field{map, {.reach = 0.5}};
   const nav::planning_view view{map, field, 0.2};

@@ -10,7 +10,7 @@ static_assert(slam::to_string(slam::correction_kind::global_adjustment) == "glob
 static_assert(slam::to_string(slam::correction_kind::merge) == "merge");
 static_assert(slam::to_string(static_cast<slam::correction_kind>(9)) == "unknown");
 
-TEST_CASE("Callbacks are empty until they are set; events refer to nothing until they are filled in") {
+TEST_CASE("Callbacks are empty until they are set, events refer to nothing until they are filled in") {
   const slam::listeners none;
   CHECK_FALSE((none.keyframe_made || none.keyframe_culled || none.map_corrected || none.state_changed));
   CHECK(slam::keyframe_event{}.id.keyframe == slam::no_id);

@@ -46,7 +46,7 @@ TEST_CASE("the extremes of moments do not overflow") {
   }
 }
 
-TEST_CASE("an angle is that of the standard library, in [0, 2 pi)") {
+TEST_CASE("an angle is that of the standard library, from 0 to below 2 pi") {
   const double pi = std::numbers::pi;
   for (int i = 0; i != 10000; ++i) {
     const double wanted = 2.0 * pi * i / 10000.0;

@@ -8,7 +8,7 @@
 
 using namespace orbis::octree::detail;
 
-TEST_CASE("Records of every pool keep what is written; places that are free are used again") {
+TEST_CASE("Records of every pool keep what is written, places that are free are used again") {
   octant_pools<float> pools;
   std::array<std::uint32_t, octant_pools<float>::plain + 1> record{};
   for (unsigned number = 0; number != record.size(); ++number) {

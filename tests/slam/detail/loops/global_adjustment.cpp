@@ -152,7 +152,7 @@ TEST_CASE("Adjustment is the same every time, and may be stopped") {
   CHECK(slam::detail::global_adjustment::adjust(single, world.rig).keyframes == 0);
 }
 
-TEST_CASE("A map may be gathered part by part; what is added in between takes no part") {
+TEST_CASE("A map may be gathered part by part, what is added in between takes no part") {
   test::ring_world world({.steps = 60});
   const slam::map before = closed_ring(world);
   slam::map whole = before, parts = before;

@@ -129,7 +129,7 @@ TEST_CASE("What is added while a loop is solved goes along") {
   CHECK(error_of(r, r.m, added) < 0.2 * error_of(r, before, added));
 }
 
-TEST_CASE("A loop is closed alike every time; one that is stopped, or has lost a keyframe, changes nothing") {
+TEST_CASE("A loop is closed alike every time, one that is stopped, or has lost a keyframe, changes nothing") {
   open_ring r;
   slam::map again = r.m;
   const slam::map before = r.m;

@@ -64,7 +64,7 @@ TEST_CASE("Two maps that show the same place become one") {
   CHECK(wrong == 0);
 }
 
-TEST_CASE("Maps that grow while they are compared are merged whole; without their keyframes they are not") {
+TEST_CASE("Maps that grow while they are compared are merged whole, without their keyframes they are not") {
   test::ring_world world;
   slam::atlas maps(8, 1.2);
   const auto into = maps.active_id();

@@ -46,7 +46,7 @@ TEST_CASE("A neighbourhood is a keyframe and its neighbours in the covisibility 
   for (std::size_t i = 1; i != around.size(); ++i) CHECK(m.covisibility().connected(last, around[i]));
 }
 
-TEST_CASE("All keyframes move, landmarks with the oldest one that observes them; these may be updated part by part") {
+TEST_CASE("All keyframes move, landmarks with the oldest one that observes them, these may be updated part by part") {
   random_bits random(7);
   const slam::map before = test::random_map(8, 1500, 25);
   slam::map all = before;

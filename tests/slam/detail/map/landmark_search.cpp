@@ -9,7 +9,7 @@
 using namespace orbis;
 using slam::detail::search_list;
 
-TEST_CASE("The window of a landmark contains its keypoint; landmarks out of sight have none") {
+TEST_CASE("The window of a landmark contains its keypoint, landmarks out of sight have none") {
   test::ring_world world({.steps = 60, .drift = 0.0});
   slam::map m(8, 1.2);
   world.walk(m, 0, 20, world.truth(0));

@@ -68,7 +68,7 @@ TEST_CASE("Redundant keyframes are erased, forgotten as places, and reported") {
   }
 }
 
-TEST_CASE("A keyframe that is gone is left alone; one whose map was merged is found under its new id") {
+TEST_CASE("A keyframe that is gone is left alone, one whose map was merged is found under its new id") {
   scene s;
   s.world.walk(s.m(), 0, 4, s.world.truth(0));
   s.m().erase_keyframe(2);

@@ -33,7 +33,7 @@ struct scene {
 
 }  // namespace
 
-TEST_CASE("A keyframe is mapped, closes a loop, and the map is adjusted; in threads as well") {
+TEST_CASE("A keyframe is mapped, closes a loop, and the map is adjusted, in threads as well") {
   for (const bool threads : {false, true}) {
     scene s{threads};
     const double before = s.world.errors(s.shared.atlas.active())[0];

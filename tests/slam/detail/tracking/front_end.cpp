@@ -97,7 +97,7 @@ TEST_CASE("A camera that was lost is found by appearance, and not before") {
 }
 
 TEST_CASE(
-    "A camera that is lost for long begins a map; one with few keyframes is dropped, and the old one found again") {
+    "A camera that is lost for long begins a map, one with few keyframes is dropped, and the old one found again") {
   scene s;
   s.options.recovery.min_map_keyframes = 2;
   for (std::uint32_t i = 0; i < 6; ++i) s.see(i);  // time stamps are half a second apart

@@ -21,7 +21,7 @@ constexpr slam::detail::keyframe_evidence quiet{.since = 0.05,
 
 }  // namespace
 
-TEST_CASE("Each reason for a keyframe is enough; none is, if few landmarks are tracked") {
+TEST_CASE("Each reason for a keyframe is enough, none is, if few landmarks are tracked") {
   const slam::keyframe_options o;
   CHECK_FALSE(is_keyframe_due(quiet, o));
 
