@@ -132,9 +132,9 @@ void add_plan_options(CLI::App& cmd, settings& s, std::string& from, std::string
       ->type_name("M");
   cmd.add_flag("--ground", s.on_floor,
                "the robot drives on the floor: heights of the points do not count, and --height is 0.5 if not given");
-  cmd.add_option("--step", s.robot_step, "--ground: the highest step that it drives up or down, metres")
+  cmd.add_option("--step", s.robot_step,
+                 "--ground: the highest step that it drives up or down, metres; without it, a voxel")
       ->check(within(0.0, 10.0, " m"))
-      ->capture_default_str()
       ->type_name("M");
   cmd.add_option_function<std::string>(
          "--unknown", [&s](const std::string& what) { s.unknown_is_free = what == "free"; },
@@ -214,6 +214,7 @@ std::string contradiction(const settings& s) {
     return "--map-every-frame wants a live map: not with --batch-map or --localize-only";
   if (s.localize_only && !s.save_map.empty())
     return "--localize-only leaves the map as it is: there is nothing to save with --save-map";
+  if (s.robot_step && !s.on_floor) return "--step is for robots that drive: with --ground";
   if (s.localize_only && !s.floor_map.empty()) return "--localize-only makes no map of the floor: not with --floor-map";
   if (s.viewer.empty() && s.viewer_hold) return "--viewer-hold wants a viewer: --viewer";
   if (!has_viewer(s.viewer)) return how_to_get_viewer(s.viewer);

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
+#include <limits>
 #include <optional>
 #include <span>
 #include <string>
@@ -73,6 +74,30 @@ std::optional<orbis::error> find_overwritten(const settings& s) {
   return std::nullopt;
 }
 
+/// Around all that is known and the ends of the way: a search for what cannot be reached ends there.
+orbis::octree::bounding_box box_to_search(const octree& map, const settings& s) {
+  constexpr double inf = std::numeric_limits<double>::infinity();
+  orbis::octree::bounding_box box{orbis::vec3::Constant(inf), orbis::vec3::Constant(-inf)};
+  const auto take = [&](const orbis::vec3& p, double half) {
+    box.min = box.min.cwiseMin((p.array() - half).matrix());
+    box.max = box.max.cwiseMax((p.array() + half).matrix());
+  };
+  map.for_each_leaf([&](const octree::leaf& leaf) { take(leaf.center, 0.5 * leaf.size); });
+  for (const orbis::vec3& p : {s.from, s.to})
+    if (map.grid().key(p)) take(p, 0.0);
+  const double margin = 1.0 + 2 * s.robot_radius;
+  return {(box.min.array() - margin).matrix(), (box.max.array() + margin).matrix()};
+}
+
+/// Whether it is only what nobody has seen that is in the robot's way there.
+bool is_only_unknown(const octree& map, const settings& s, const orbis::vec3& p) {
+  const orbis::octree::overlap_options known{.unknown = occupancy::free};
+  if (s.unknown_is_free || s.on_floor) return false;
+  using standing = nav::swept_shape<nav::vertical_cylinder>;
+  return s.stands ? !overlaps(map, standing{p, p, {s.robot_radius, 0.0, s.robot_height}}, known)
+                  : !overlaps(map, orbis::octree::capsule{p, p, s.robot_radius}, known);
+}
+
 }  // namespace
 
 exit_code plan(const settings& s, console& console) {
@@ -91,7 +116,8 @@ exit_code plan(const settings& s, console& console) {
   const occupancy unknown = s.unknown_is_free ? occupancy::free : occupancy::occupied;
   std::optional<nav::floor_map> floor;
   if (s.on_floor) {
-    auto made = nav::make_floor_map(*map, {.radius = s.robot_radius, .height = s.robot_height, .step = s.robot_step});
+    auto made = nav::make_floor_map(
+        *map, {.radius = s.robot_radius, .height = s.robot_height, .step = s.robot_step.value_or(cell)});
     if (!made) return give_up({made.error().code, s.input.string(), made.error().message});
     floor = *std::move(made);
   }
@@ -103,11 +129,12 @@ exit_code plan(const settings& s, console& console) {
   console.stage("planning");
   const auto start = console::clock::now();
   const auto planned_in = [&](const auto& space) { return nav::find_path(space, s.from, s.to); };
+  const nav::planning_options within{.region = box_to_search(*map, s)};
   const nav::found_path path =
-      floor ? planned_in(nav::floor_view{*floor, s.robot_radius, {}, unknown})
-      : s.stands
-          ? planned_in(nav::planning_view{*map, *field, nav::vertical_cylinder{s.robot_radius, 0.0, s.robot_height}})
-          : planned_in(nav::planning_view{*map, *field, nav::ball{s.robot_radius}});
+      floor      ? planned_in(nav::floor_view{*floor, s.robot_radius, {}, unknown})
+      : s.stands ? planned_in(nav::planning_view{*map, *field,
+                                                 nav::vertical_cylinder{s.robot_radius, 0.0, s.robot_height}, within})
+                 : planned_in(nav::planning_view{*map, *field, nav::ball{s.robot_radius}, within});
   const double ms = std::chrono::duration<double, std::milli>(console::clock::now() - start).count();
   const bool found = path.status == nav::path_status::found;
   const double straight = (s.to - s.from).norm();
@@ -132,6 +159,9 @@ exit_code plan(const settings& s, console& console) {
   }
   if (!found) {
     std::string why{to_string(path.status)};
+    if ((path.status == nav::path_status::start_blocked && is_only_unknown(*map, s, s.from)) ||
+        (path.status == nav::path_status::goal_blocked && is_only_unknown(*map, s, s.to)))
+      why += " by unknown space alone (--unknown free)";
     if (path.points.size() > 1) {
       const orbis::vec3& p = path.points.back();
       std::snprintf(text, sizeof text, "; the nearest place that is reached is %.3f,%.3f,%.3f", p.x(), p.y(), p.z());

@@ -51,13 +51,13 @@ struct settings {
   bool realtime = false;           ///< frames come at the pace of their time stamps
   bool localize_only = false;      ///< the loaded map stays as it is
 
-  double robot_radius = 0.2;        ///< metres
-  double robot_height = 0.5;        ///< metres
-  double robot_step = 0.05;         ///< the highest that it drives up, metres (plan)
-  std::filesystem::path floor_map;  ///< .yaml for map servers; empty: nowhere
-  bool on_floor = false;            ///< the robot drives (plan)
-  bool stands = false;              ///< it is a cylinder of its height; otherwise a ball (plan)
-  bool unknown_is_free = false;     ///< (plan)
+  double robot_radius = 0.2;         ///< metres
+  double robot_height = 0.5;         ///< metres
+  std::optional<double> robot_step;  ///< the highest that it drives up, metres (plan); empty: a voxel
+  std::filesystem::path floor_map;   ///< .yaml for map servers; empty: nowhere
+  bool on_floor = false;             ///< the robot drives (plan)
+  bool stands = false;               ///< it is a cylinder of its height; otherwise a ball (plan)
+  bool unknown_is_free = false;      ///< (plan)
   orbis::vec3 from = orbis::vec3::Zero(), to = orbis::vec3::Zero();  ///< metres (plan)
   std::filesystem::path picture;                                     ///< of the way (plan); empty: none
 

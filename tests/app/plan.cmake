@@ -31,7 +31,12 @@ file(SHA256 ${WORK}/way.txt kept)
 # A cylinder under the plate is too high for a ball's way.
 app_fails(4 "start blocked" plan plate/map.ot --from 0.5,0.5,0.5 --to 0.5,1.6,0.5 --radius 0.1 --height 0.6
           --unknown free --out way.txt)
-app_fails(4 "start blocked" plan plate/map.bt --from 0.5,0.5,0.5 --to 0.5,0.5,1.6 --out way.txt)
+app_fails(4 "start blocked by unknown space alone" plan plate/map.bt --from 0.5,0.5,0.5 --to 0.5,0.5,1.6 --out way.txt)
+app_fails(4 "start blocked" plan plate/map.bt --from 0.5,0.5,1.0 --to 0.5,0.5,1.6 --out way.txt)
+check(NOT err MATCHES "unknown")
+app_fails(4 "goal outside; the nearest" plan plate/map.bt --from 0.5,0.5,0.5 --to 1e6,0.5,1.0 --unknown free
+          --radius 0.1 --out way.txt)
+app_fails(1 "--step is for robots that drive" plan plate/map.bt --from 0.5,0.5,0.5 --to 1,1,1 --step 0.1)
 app_fails(4 "goal blocked; the nearest" plan plate/map.bt --from 0.5,0.5,0.5 --to 0.5,0.5,1.0 --unknown free
           --radius 0.1 --out way.txt)
 file(SHA256 ${WORK}/way.txt left)
