@@ -50,6 +50,12 @@ CLI::Option* count(CLI::App& cmd, const std::string& name, std::size_t& value, c
   return cmd.add_option(name, value, what)->check(within<std::size_t>(low, high))->type_name("N");
 }
 
+/// A length within [low, high], whose default `--help` tells.
+CLI::Option* metres(CLI::App& cmd, const std::string& name, double& value, const std::string& what, double low,
+                    double high) {
+  return cmd.add_option(name, value, what)->check(within(low, high, " m"))->capture_default_str()->type_name("M");
+}
+
 std::string not_empty(const std::string& path) { return path.empty() ? "must not be empty" : ""; }
 
 void add_map_options(CLI::App& cmd, settings& s) {
@@ -57,14 +63,8 @@ void add_map_options(CLI::App& cmd, settings& s) {
       ->required()
       ->check(not_empty)
       ->type_name("DIR");
-  cmd.add_option("--resolution", s.resolution, "edge of the octree's smallest voxels, metres")
-      ->check(within(0.001, 10.0, " m"))
-      ->capture_default_str()
-      ->type_name("M");
-  cmd.add_option("--max-depth", s.max_depth, "farther measurements do not enter the map, metres")
-      ->check(within(0.1, 1000.0, " m"))
-      ->capture_default_str()
-      ->type_name("M");
+  metres(cmd, "--resolution", s.resolution, "edge of the octree's smallest voxels, metres", 0.001, 10.0);
+  metres(cmd, "--max-depth", s.max_depth, "farther measurements do not enter the map, metres", 0.1, 1000.0);
   cmd.add_option("--filter", s.filter, "how outliers are removed; auto: as the cloud suggests")
       ->check(CLI::IsMember(filter_names()))
       ->capture_default_str()
@@ -72,10 +72,7 @@ void add_map_options(CLI::App& cmd, settings& s) {
   cmd.add_option("--neighbors", s.neighbors, "neighbours of a point, e.g. 50 of the statistical filter, 5 of radius")
       ->check(within<std::size_t>(1, 100'000))
       ->type_name("N");
-  cmd.add_option("--radius", s.radius, "radius filter: where so many neighbours must lie, metres")
-      ->check(within(1e-6, 1000.0, " m"))
-      ->capture_default_str()
-      ->type_name("M");
+  metres(cmd, "--radius", s.radius, "radius filter: where so many neighbours must lie, metres", 1e-6, 1000.0);
   cmd.add_option("--sigma", s.sigma, "statistical filter: how many deviations above the mean a point may lie")
       ->check(within(0.0, 1000.0))
       ->capture_default_str()
@@ -94,14 +91,9 @@ void add_map_options(CLI::App& cmd, settings& s) {
 }
 
 void add_robot_options(CLI::App& cmd, settings& s) {
-  cmd.add_option("--robot-radius", s.robot_radius, "of the robot that the floor map and the path are for, metres")
-      ->check(within(0.001, 10.0, " m"))
-      ->capture_default_str()
-      ->type_name("M");
-  cmd.add_option("--robot-height", s.robot_height, "so much space it needs above the floor, metres")
-      ->check(within(0.001, 10.0, " m"))
-      ->capture_default_str()
-      ->type_name("M");
+  metres(cmd, "--robot-radius", s.robot_radius, "of the robot that the floor map and the path are for, metres", 0.001,
+         10.0);
+  metres(cmd, "--robot-height", s.robot_height, "so much space it needs above the floor, metres", 0.001, 10.0);
   cmd.add_option("--floor-map", s.floor_map,
                  "write the floor map for the map servers of ROS and Nav2: this file and a .pgm beside it")
       ->check(CLI::Validator(
@@ -117,10 +109,7 @@ void add_plan_options(CLI::App& cmd, settings& s, std::string& from, std::string
   cmd.add_option("MAP", s.input, "an octree map: .bt, .ot or .orbis")->required()->type_name("");
   cmd.add_option("--from", from, "where the robot is, metres")->required()->type_name("X,Y,Z");
   cmd.add_option("--to", to, "where it is to go")->required()->type_name("X,Y,Z");
-  cmd.add_option("--radius", s.robot_radius, "of the robot, metres")
-      ->check(within(0.001, 10.0, " m"))
-      ->capture_default_str()
-      ->type_name("M");
+  metres(cmd, "--radius", s.robot_radius, "of the robot, metres", 0.001, 10.0);
   cmd.add_option_function<double>(
          "--height",
          [&s](double height) {
