@@ -85,8 +85,7 @@ orbis::result<navigation_results> navigate(const octree& map, const orbis::traje
       r.unsaved = std::move(saved.error());
   }
 
-  const double reach = std::min(std::max(1.0, s.robot_radius + 2 * s.resolution), 181 * s.resolution);
-  const nav::distance_field field{map, {.reach = reach}};
+  const nav::distance_field field{map, {.reach = field_reach(s.robot_radius, s.resolution)}};
   const view ball{map, field, s.robot_radius};
   const std::vector<vec3> places = free_places(ball, cameras);
   const auto start = console::clock::now();

@@ -3,6 +3,7 @@
 /// What a robot can do with the map of a run: where it can drive, and a way through the room.
 #pragma once
 
+#include <algorithm>
 #include <filesystem>
 
 #include <orbis/core/result.hpp>
@@ -14,6 +15,11 @@
 #include "settings.hpp"
 
 namespace app {
+
+/// How far a distance field is to reach for a robot and for a picture, as far as one can, metres.
+[[nodiscard]] inline double field_reach(double robot_radius, double resolution) {
+  return std::min(std::max(1.0, robot_radius + 2 * resolution), 181 * resolution);
+}
 
 /// Makes the floor map, writes it to `s.floor_map` if that is given, plans a way of a ball between two places that the
 /// camera saw, and draws navigation.png into `folder`. No picture where there is neither a

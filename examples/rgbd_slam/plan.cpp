@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // A way through a map file: for a ball, for a cylinder that stands upright, or for a robot that drives on the floor.
-#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
@@ -25,6 +24,7 @@
 #include <orbis/octree/files.hpp>
 
 #include "commands.hpp"
+#include "navigation.hpp"
 #include "navigation_picture.hpp"
 
 namespace app {
@@ -121,9 +121,9 @@ exit_code plan(const settings& s, console& console) {
     if (!made) return give_up({made.error().code, s.input.string(), made.error().message});
     floor = *std::move(made);
   }
-  const double reach = std::min(181 * cell, std::max(1.0, s.robot_radius + 2 * cell));
   std::optional<nav::distance_field> field;
-  if (!floor) field.emplace(*map, nav::distance_field_options{.reach = reach, .unknown = unknown});
+  if (!floor)
+    field.emplace(*map, nav::distance_field_options{.reach = field_reach(s.robot_radius, cell), .unknown = unknown});
   console.finish(floor ? "floor map" : "distance field");
 
   console.stage("planning");
