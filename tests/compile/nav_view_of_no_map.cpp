@@ -1,5 +1,5 @@
-// error: octree_map
-// The exact test needs an octree.
+// error: planning_map
+// Points are no map.
 #include <vector>
 
 #include <orbis/nav/planning_view.hpp>

@@ -6,13 +6,23 @@
 #include <sstream>
 #include <vector>
 
+#include <orbis/camera/pinhole.hpp>
 #include <orbis/core/random.hpp>
 #include <orbis/core/types.hpp>
 #include <orbis/interop/octomap.hpp>
+#include <orbis/nav/detail/map_queries.hpp>
 #include <orbis/nav/distance_field.hpp>
 #include <orbis/nav/floor_map.hpp>
+#include <orbis/nav/frontiers.hpp>
+#include <orbis/nav/next_view.hpp>
+#include <orbis/nav/path_search.hpp>
+#include <orbis/nav/planning_view.hpp>
+#include <orbis/nav/replanning.hpp>
+#include <orbis/nav/robot_shape.hpp>
+#include <orbis/nav/robot_trajectory.hpp>
 #include <orbis/octree/files.hpp>
 #include <orbis/octree/octants.hpp>
+#include <orbis/octree/overlap.hpp>
 
 #include "support/catch.hpp"
 
@@ -279,4 +289,175 @@ TEST_CASE("Planning reads an OctoMap tree in place, as the map that it is a copy
   const octomap::OcTree nothing{0.05};
   CHECK(nav::map_access<octomap::OcTree>::octants(nothing)({5, 5, 5}) == octree::octant_states{});
   CHECK(nav::distance_field{nothing}.voxels().brick_count() == 0);
+}
+
+namespace {
+
+/// Free space from the origin on with boxes in it, and some voxels of which nothing is known; a large leaf beside it.
+[[nodiscard]] octree::occupancy_octree<> boxes_in_space(std::uint64_t seed) {
+  octree::occupancy_octree<> map{0.1};
+  random_bits random{seed};
+  const std::uint32_t o = map.grid().cells() / 2;
+  const auto set = [&](std::uint32_t x, std::uint32_t y, std::uint32_t z, float log_odds) {
+    const octree::voxel_key k{o + x, o + y, o + z};
+    map.edit_octant(k, [&](auto& voxels) {
+      const auto i = octree::morton_code(k) & 63U;
+      voxels.known |= std::uint64_t{1} << i;
+      voxels.value[i] = log_odds;
+    });
+  };
+  for (std::uint32_t z = 0; z != 16; ++z)
+    for (std::uint32_t y = 0; y != 32; ++y)
+      for (std::uint32_t x = 0; x != 32; ++x)
+        if (random.below(500) != 0) set(x, y, z, -1.0F);
+  for (int i = 0; i != 40; ++i) {
+    const std::uint32_t x = random.below(29), y = random.below(29), z = random.below(13);
+    for (std::uint32_t j = 0; j != 27; ++j) set(x + j % 3, y + j / 3 % 3, z + j / 9, 1.0F);
+  }
+  map.set_unknown_node({o + 64, o, o}, 10, 1.0F);   // of 64 voxels' edge
+  map.set_unknown_node({o, o + 32, o}, 11, -1.0F);  // and a free one of 32
+  return map;
+}
+[[nodiscard]] vec3 random_place(random_bits& random) {
+  return {random.uniform(-0.5, 7.0), random.uniform(-0.5, 4.5), random.uniform(-0.3, 2.2)};
+}
+
+}  // namespace
+
+TEST_CASE("What a robot sweeps meets the same in an OctoMap tree as in our octree") {
+  using tree_access = nav::map_access<octomap::OcTree>;
+  std::size_t met = 0, missed = 0, different = 0;
+  for (std::uint64_t seed = 1; seed != 6; ++seed) {
+    const auto map = boxes_in_space(seed);
+    auto tree = interop::to_octomap(map);
+    // Inner nodes that have not been updated do not matter.
+    if (seed % 2 == 0) tree->getRoot()->setLogOdds(-2.0F);
+    random_bits random{seed};
+    const auto compare = [&](const auto& shape) {
+      for (const octree::occupancy unknown : {octree::occupancy::free, octree::occupancy::occupied}) {
+        const bool expected = octree::overlaps(map, shape, {.unknown = unknown});
+        different += nav::detail::map_overlaps(*tree, shape, {.unknown = unknown}) == expected ? 0U : 1U;
+        ++(expected ? met : missed);
+      }
+    };
+    for (int i = 0; i != 1000; ++i) {
+      const vec3 a = random_place(random);
+      const vec3 b = i % 4 == 0 ? a : i % 4 == 1 ? random_place(random) : vec3{a + 0.1 * random_place(random)};
+      const double radius = random.uniform(0.02, 0.3);
+      compare(octree::capsule{a, b, radius});
+      compare(octree::sphere{a, radius});
+      compare(octree::bounding_box{a.cwiseMin(b), a.cwiseMax(b)});
+      compare(nav::swept(nav::vertical_cylinder{radius, -0.1, 0.2}, a, b));
+      compare(nav::swept(nav::vertical_capsule{radius, 0.0, 0.3}, a, b));
+      const octree::voxel_key k = *map.grid().key(a);
+      different += tree_access::state(*tree, k) == map.state(k) ? 0U : 1U;
+    }
+    // Across the border of the grid, and beyond it.
+    const double edge = 0.1 * map.grid().cells() / 2;
+    compare(octree::capsule{{edge - 0.2, 0.0, 0.0}, {edge + 0.2, 0.0, 0.0}, 0.1});
+    compare(octree::sphere{{0.0, 0.0, -2.0 * edge}, 0.1});
+  }
+  CHECK(different == 0);
+  CHECK(met > 10000);
+  CHECK(missed > 10000);
+  const octomap::OcTree nothing{0.1};
+  const octree::sphere ball{vec3::Zero(), 0.2};
+  CHECK(nav::detail::map_overlaps(nothing, ball, {.unknown = octree::occupancy::occupied}));
+  CHECK_FALSE(nav::detail::map_overlaps(nothing, ball, {.unknown = octree::occupancy::free}));
+  CHECK(tree_access::state(nothing, {1, 2, 3}) == octree::occupancy::unknown);
+}
+
+TEST_CASE("Paths and trajectories through an OctoMap tree are those through our octree") {
+  const octree::occupancy unknown = GENERATE(octree::occupancy::occupied, octree::occupancy::free);
+  std::size_t found = 0, corners = 0, different = 0, free = 0;
+  for (std::uint64_t seed = 1; seed != 6; ++seed) {
+    const auto map = boxes_in_space(seed);
+    const auto tree = interop::to_octomap(map);
+    const nav::distance_field_options options{.reach = 0.6, .unknown = unknown};
+    const nav::distance_field our_field{map, options}, their_field{*tree, options};
+    random_bits random{seed};
+    const auto compare = [&](const auto& shape, const nav::planning_options& costs) {
+      const nav::planning_view ours{map, our_field, shape, costs};
+      const nav::planning_view theirs{*tree, their_field, shape, costs};
+      const auto place = [&] {
+        for (;;)
+          if (const vec3 p = random_place(random); ours.is_free(p)) return p;
+      };
+      for (int i = 0; i != 200; ++i) {
+        const vec3 a = random_place(random), b = random_place(random);
+        const octree::voxel_key k = *map.grid().key(a);
+        different += ours.is_free(a) == theirs.is_free(a) ? 0U : 1U;
+        different += ours.is_free(a, b) == theirs.is_free(a, b) ? 0U : 1U;
+        different += ours.is_free(k) == theirs.is_free(k) && ours.density(k) == theirs.density(k) ? 0U : 1U;
+        free += theirs.is_free(a) ? 1U : 0U;
+      }
+      for (int i = 0; i != 3; ++i) {
+        const vec3 a = place(), b = place();
+        const nav::path_options how{.method = i == 0 ? nav::path_method::grid : nav::path_method::any_angle,
+                                    .max_expanded = 20'000};
+        const auto our_path = nav::find_path(ours, a, b, how);
+        const auto their_path = nav::find_path(theirs, a, b, how);
+        CHECK(their_path.status == our_path.status);
+        CHECK(their_path.points == our_path.points);
+        CHECK(their_path.cost == our_path.cost);
+        if (their_path.status != nav::path_status::found) continue;
+        ++found;
+        corners += their_path.points.size() - 2;
+        const auto our_motion = nav::make_trajectory(ours, our_path.points);
+        const auto their_motion = nav::make_trajectory(theirs, their_path.points);
+        CHECK(their_motion.duration() == our_motion.duration());
+        CHECK(their_motion.pieces().size() == our_motion.pieces().size());
+        CHECK(their_motion.at(1.0).position == our_motion.at(1.0).position);
+      }
+    };
+    compare(nav::ball{0.12}, {});
+    compare(nav::vertical_cylinder{0.1, -0.1, 0.2}, {});
+    compare(nav::vertical_capsule{0.1, -0.05, 0.1}, {.clearance_weight = 2.0, .unknown_cost = 3.0});
+  }
+  CHECK(different == 0);
+  CHECK(free > 300);
+  CHECK(found > 20);
+  CHECK(corners > 20);
+}
+
+TEST_CASE("A robot explores and keeps its path on an OctoMap tree") {
+  auto map = boxes_in_space(1);
+  const auto tree = interop::to_octomap(map);
+  nav::distance_field our_field{map, {.reach = 0.6}}, their_field{*tree, {.reach = 0.6}};
+  const nav::planning_view ours{map, our_field, 0.12};
+  const nav::planning_view theirs{*tree, their_field, 0.12};
+  random_bits random{3};
+  vec3 from, to;
+  nav::found_path path;
+  vec3 between = vec3::Zero();  // on the path, away from its ends
+  do {
+    from = random_place(random), to = random_place(random);
+    path = nav::find_path(ours, from, to);
+    if (path.points.size() > 3) between = 0.5 * (path.points[1] + path.points[2]);
+  } while (path.status != nav::path_status::found || path.points.size() < 4 || (between - from).norm() < 0.5 ||
+           (between - to).norm() < 0.5);
+
+  nav::frontiers frontiers{*tree};
+  const auto places = nav::places_of(frontiers.clusters({.min_size = 1}), theirs.grid());
+  REQUIRE(!places.empty());
+  const camera::pinhole camera{64, 48, 40.0, 40.0, 31.5, 23.5};
+  const nav::next_view_options options{.gain = {.pixel_step = 4}, .min_distance = 0.2};
+  const auto our_view = nav::next_best_view(ours, places, camera, from, options);
+  const auto their_view = nav::next_best_view(theirs, places, camera, from, options);
+  REQUIRE((our_view && their_view));
+  CHECK(their_view->utility == our_view->utility);
+  CHECK(their_view->path.points == our_view->path.points);
+
+  // No log of changes: it is tested each time, and a new path is made when the tree blocks it.
+  nav::replanner planner{to};
+  const auto first = planner.update(theirs, from).points;
+  CHECK(planner.update(theirs, from).points == first);
+  CHECK(planner.planned() == 1);
+  tree->updateNode(between.x(), between.y(), between.z(), 5.0F);
+  their_field.update(*tree);
+  const auto& second = planner.update(theirs, from);
+  CHECK(planner.planned() == 2);
+  REQUIRE(second.status == nav::path_status::found);
+  CHECK(second.points != first);
+  for (std::size_t i = 1; i != second.points.size(); ++i) CHECK(theirs.is_free(second.points[i - 1], second.points[i]));
 }

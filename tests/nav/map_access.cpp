@@ -8,7 +8,11 @@
 #include <orbis/core/random.hpp>
 #include <orbis/nav/distance_field.hpp>
 #include <orbis/nav/map_access.hpp>
+#include <orbis/nav/path_search.hpp>
+#include <orbis/nav/planning_view.hpp>
+#include <orbis/nav/robot_shape.hpp>
 #include <orbis/octree/occupancy_octree.hpp>
+#include <orbis/octree/overlap.hpp>
 
 #include "support/catch.hpp"
 
@@ -140,4 +144,60 @@ TEST_CASE("A field of somebody's own map is that of an octree with the same cont
     CHECK(compared > 10000);
     CHECK(different == 0);
   }
+}
+
+TEST_CASE("Planning on somebody's own map is that on an octree with the same content") {
+  const occupancy unknown = GENERATE(occupancy::occupied, occupancy::free);
+  random_bits random{2};
+  dense_grid dense{0.1, {-13, -6, 2}, {30, 21, 17}};
+  const auto place = [&] {
+    std::array<int, 3> p{};
+    for (std::size_t j = 0; j != 3; ++j)
+      p[j] = dense.first()[j] + static_cast<int>(random.below(static_cast<std::uint32_t>(dense.size()[j])));
+    return p;
+  };
+  for (int i = 0; i != 200000; ++i) dense.set(place(), dense_grid::empty);
+  for (int i = 0; i != 100; ++i) dense.set(place(), i % 10 == 0 ? dense_grid::nothing_known : dense_grid::full);
+  const auto map = octree_of(dense);
+  const nav::distance_field field{dense, {.reach = 0.5, .unknown = unknown}};
+  const auto point = [&] {
+    return vec3{random.uniform(-1.6, 2.0), random.uniform(-0.9, 1.8), random.uniform(0.0, 2.1)};
+  };
+  std::array<int, 2> seen{};
+  std::size_t found = 0, bends = 0;
+  const auto compare = [&](const auto& shape, const nav::planning_options& options) {
+    const nav::planning_view theirs{dense, field, shape, options};
+    const nav::planning_view ours{map, field, shape, options};
+    static_assert(!std::same_as<decltype(theirs), decltype(ours)>);
+    for (int i = 0; i != 2000; ++i) {
+      const vec3 a = point(), b = i % 2 == 0 ? point() : a;
+      const bool expected = !overlaps(map, swept(shape, a, b), {.unknown = unknown});
+      ++seen[expected ? 1 : 0];
+      CHECK(theirs.is_free(a, b) == expected);
+      const voxel_key k = *map.grid().key(a);
+      CHECK(theirs.density(k) == ours.density(k));
+    }
+    for (int i = 0; i != 10; ++i) {
+      vec3 a = point(), b = point();
+      while (!ours.is_free(a) || !ours.is_free(b)) a = point(), b = point();
+      const auto expected = nav::find_path(ours, a, b, {.max_expanded = 5000});
+      const auto path = nav::find_path(theirs, a, b, {.max_expanded = 5000});
+      CHECK(path.status == expected.status);
+      CHECK(path.points == expected.points);
+      if (path.status == nav::path_status::found) ++found, bends += path.points.size() - 2;
+    }
+  };
+  compare(nav::ball{0.13}, {});
+  compare(nav::vertical_cylinder{0.12, -0.05, 0.2}, {.unknown_cost = 2.0});
+  CHECK(seen[0] > 400);
+  CHECK(seen[1] > 400);
+  CHECK(found > 5);
+  CHECK(bends > 5);
+  // Across the border of the grid, and beyond it.
+  const nav::distance_field empty{map.grid(), {.reach = 0.5, .unknown = unknown}};
+  const dense_grid nothing{0.1, {0, 0, 0}, {1, 1, 1}};
+  const nav::planning_view view{nothing, empty, 0.2};
+  const double edge = 0.1 * map.grid().cells() / 2;
+  CHECK(view.is_free(vec3{edge - 0.1, 0.0, 0.0}) == (unknown == occupancy::free));
+  CHECK(view.is_free(vec3{2 * edge, 0.0, 0.0}) == (unknown == occupancy::free));
 }

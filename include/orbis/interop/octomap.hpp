@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Converts maps to `octomap::OcTree` and `octomap::ColorOcTree`, and these to maps; planning on an `octomap::OcTree` as it
-/// is.
+/// Converts maps to `octomap::OcTree` and `octomap::ColorOcTree`, and these to maps; planning on an `octomap::OcTree`
+/// as it is.
 #pragma once
 
 #include <concepts>
@@ -19,6 +19,7 @@
 #include <orbis/octree/key.hpp>
 #include <orbis/octree/occupancy_octree.hpp>
 #include <orbis/octree/octants.hpp>
+#include <orbis/octree/sensor_model.hpp>
 #include <orbis/octree/voxel_layer.hpp>
 
 namespace orbis::interop {
@@ -86,8 +87,8 @@ template <octree::octomap_model Model = octree::log_odds<>, color_payload Color 
 
 }  // namespace orbis::interop
 
-/// An `octomap::OcTree` for the distance fields and floor maps of `nav`, in place. The tree has no log of changes: each
-/// `update` of a field compares everything.
+/// An `octomap::OcTree` for all of `nav`, in place. The tree has no log of changes: each `update` of a field compares
+/// everything. Only leaves are read, so that inner nodes need not be up to date.
 template <>
 struct orbis::nav::map_access<octomap::OcTree> {
   [[nodiscard]] static octree::voxel_grid grid(const octomap::OcTree& tree) {
@@ -105,6 +106,12 @@ struct orbis::nav::map_access<octomap::OcTree> {
   template <class Visit>
   static void for_each_octant(const octomap::OcTree& tree, Visit&& visit) {
     if (tree.getRoot() != nullptr) descend(tree, tree.getRoot(), {0, 0, 0}, tree.getTreeDepth(), visit);
+  }
+  [[nodiscard]] static octree::occupancy state(const octomap::OcTree& tree, const octree::voxel_key& k) {
+    const auto along = [](std::uint32_t c) { return static_cast<octomap::key_type>(c); };
+    const octomap::OcTreeNode* const node = tree.search(octomap::OcTreeKey{along(k.x), along(k.y), along(k.z)});
+    if (node == nullptr) return octree::occupancy::unknown;
+    return tree.isNodeOccupied(node) ? octree::occupancy::occupied : octree::occupancy::free;
   }
 
  private:

@@ -9,11 +9,14 @@
 #include <orbis/octree/accessor.hpp>
 #include <orbis/octree/key.hpp>
 #include <orbis/octree/octants.hpp>
+#include <orbis/octree/overlap.hpp>
+#include <orbis/octree/sensor_model.hpp>
 
 namespace orbis::nav {
 
-/// What planning needs of a map. Specialise it for a type of yours with the three functions of the one for octrees
-/// below; the map is read in place and not copied.
+/// What planning needs of a map. Specialise it for a type of yours with `grid`, `octants` and `for_each_octant` of the
+/// one for octrees below; the map is read in place and not copied. `state` and `overlaps` may be left out: they are
+/// then made of `octants`, which takes more time.
 template <class Map>
 struct map_access;
 
@@ -30,6 +33,17 @@ struct map_access<Map> {
   template <class Visit>
   static void for_each_octant(const Map& map, Visit&& visit) {
     octree::for_each_octant(map, visit);
+  }
+  /// What is known of a voxel.
+  [[nodiscard]] static octree::occupancy state(const Map& map, const octree::voxel_key& k) {
+    const auto v = map.store().value(k);
+    if (!v) return octree::occupancy::unknown;
+    return octree::is_occupied<typename Map::model>(*v) ? octree::occupancy::occupied : octree::occupancy::free;
+  }
+  /// See octree::overlaps. @pre finite coordinates
+  template <octree::overlap_shape Shape>
+  [[nodiscard]] static bool overlaps(const Map& map, const Shape& shape, const octree::overlap_options& options) {
+    return octree::overlaps(map, shape, options);
   }
 };
 

@@ -102,7 +102,7 @@ struct next_view {
 ///
 /// The same arguments give the same view. Usually a millisecond for each candidate, and what find_path costs.
 /// @pre 0 < min_distance <= max_distance; 0 <= max_elevation < pi / 2; lambda >= 0
-template <octree::octree_map Map, robot_shape Shape, camera::camera_model Camera>
+template <planning_map Map, robot_shape Shape, camera::camera_model Camera>
 [[nodiscard]] std::optional<next_view> next_best_view(const planning_view<Map, Shape>& view,
                                                       std::span<const vec3> places, const Camera& camera,
                                                       const vec3& position, const next_view_options& options = {}) {
@@ -112,7 +112,7 @@ template <octree::octree_map Map, robot_shape Shape, camera::camera_model Camera
     next_view view;
     double bound;  ///< of its utility, if the straight way is free
   };
-  const octree::voxel_grid& grid = view.map().grid();
+  const octree::voxel_grid& grid = view.grid();
   const double voxel = grid.resolution() * grid.resolution() * grid.resolution();
   view_gain gain{view.map(), camera, options.gain};
   random_bits random{options.seed};

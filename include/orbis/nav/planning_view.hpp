@@ -12,11 +12,12 @@
 #include <optional>
 
 #include <orbis/core/types.hpp>
+#include <orbis/nav/detail/map_queries.hpp>
 #include <orbis/nav/detail/path/segments.hpp>
 #include <orbis/nav/distance_field.hpp>
+#include <orbis/nav/map_access.hpp>
 #include <orbis/nav/planning_space.hpp>
 #include <orbis/nav/robot_shape.hpp>
-#include <orbis/octree/accessor.hpp>
 #include <orbis/octree/key.hpp>
 #include <orbis/octree/overlap.hpp>
 
@@ -30,7 +31,7 @@ namespace orbis::nav {
 ///
 /// A `planning_space`. It refers to the map and the field; both must stay as they are while it is used. Any number of
 /// threads may ask.
-template <octree::octree_map Map, robot_shape Shape = ball>
+template <planning_map Map, robot_shape Shape = ball>
 class planning_view {
  public:
   static constexpr int dimensions = 3;
@@ -40,7 +41,7 @@ class planning_view {
   /// @pre the shape's; the options'; the field is that of the map, up to date
   planning_view(const Map& map, const distance_field& field, const Shape& shape, const planning_options& options = {})
       : map_{&map}, field_{&field}, shape_{shape}, cover_{cover_of(shape)}, options_{options} {
-    assert(cover_.inner > 0.0 && map.grid() == field.grid());
+    assert(cover_.inner > 0.0 && map_access<Map>::grid(map) == field.grid());
     assert(options.clearance_weight >= 0.0 && options.preferred_clearance > 0.0 && options.unknown_cost >= 1.0);
   }
   /// A ball. `radius`: metres. @pre radius > 0
@@ -86,7 +87,8 @@ class planning_view {
       for (int i = 0; i != cover_.count; ++i) least = std::min(least, field_->distance(ball_at(p, i)));
       sum = detail::clearance_density(options_, least - cover_.outer);
     }
-    if (options_.unknown_cost > 1.0 && map_->state(k) == octree::occupancy::unknown) sum *= options_.unknown_cost;
+    if (options_.unknown_cost > 1.0 && detail::state_of(*map_, k) == octree::occupancy::unknown)
+      sum *= options_.unknown_cost;
     return sum;
   }
   /// Whether a way costs its length everywhere.
@@ -175,7 +177,7 @@ class planning_view {
     return most - 0.4999 * cell < cover_.inner ? detail::blocked : least - 0.8661 * cell - cover_.outer;
   }
   [[nodiscard]] bool overlaps(const vec3& a, const vec3& b) const {
-    return octree::overlaps(*map_, swept(shape_, a, b), {.unknown = field_->options().unknown});
+    return detail::map_overlaps(*map_, swept(shape_, a, b), {.unknown = field_->options().unknown});
   }
 
   const Map* map_;

@@ -26,7 +26,6 @@
 #include <orbis/nav/path_search.hpp>
 #include <orbis/nav/planning_view.hpp>
 #include <orbis/nav/robot_shape.hpp>
-#include <orbis/octree/accessor.hpp>
 #include <orbis/octree/change_log.hpp>
 #include <orbis/octree/key.hpp>
 #include <orbis/octree/overlap.hpp>
@@ -42,7 +41,7 @@ class path_monitor {
   /// Watches nothing.
   path_monitor() = default;
   /// @pre `points` is free in the map as `view` has it: each of its segments
-  template <octree::octree_map Map, robot_shape Shape>
+  template <planning_map Map, robot_shape Shape>
   path_monitor(const planning_view<Map, Shape>& view, std::vector<vec3> points) : points_{std::move(points)} {
     follower_.see(view.map());
   }
@@ -51,7 +50,7 @@ class path_monitor {
   /// or last checked. Once one is blocked, it is tested each time. O(changed octants x segments), few operations for
   /// each, and what `is_free` costs for the segments that are tested.
   /// @pre the same map every time, and a view of it as it is
-  template <octree::octree_map Map, robot_shape Shape>
+  template <planning_map Map, robot_shape Shape>
   [[nodiscard]] std::optional<std::size_t> first_blocked(const planning_view<Map, Shape>& view) {
     const std::size_t segments = points_.empty() ? 0 : points_.size() - 1;
     is_suspect_.resize(segments);
@@ -123,7 +122,7 @@ class replanner {
 
   /// The path from `position` (metres) to the goal, as find_path has it: the one there was, without what lies behind,
   /// or a new one. Valid until the next call. @pre those of path_monitor::first_blocked
-  template <octree::octree_map Map, robot_shape Shape>
+  template <planning_map Map, robot_shape Shape>
   const found_path& update(const planning_view<Map, Shape>& view, const vec3& position) {
     if (path_.status == path_status::found && planned_ != 0) {
       monitor_.advance(position);

@@ -21,7 +21,6 @@
 #include <orbis/core/types.hpp>
 #include <orbis/nav/planning_view.hpp>
 #include <orbis/nav/robot_shape.hpp>
-#include <orbis/octree/accessor.hpp>
 
 namespace orbis::nav {
 
@@ -215,7 +214,7 @@ template <robot_shape Shape>
 /// Whether a robot stays free along a Bezier curve. The curve lies in the convex hull of its control points, and so
 /// nowhere farther from the segment between its ends than the farthest of them: a thicker robot along that segment is
 /// free, or else each half of the curve is looked at in turn. Nothing is sampled.
-template <octree::octree_map Map, robot_shape Shape>
+template <planning_map Map, robot_shape Shape>
 [[nodiscard]] bool is_free_curve(const planning_view<Map, Shape>& view, const std::array<vec3, 5>& points,
                                  int halvings = 6) {
   const vec3 along = points[4] - points[0];
@@ -249,7 +248,7 @@ template <octree::octree_map Map, robot_shape Shape>
 ///
 /// Points that follow each other at the same place count once. O(points), and what `is_free` costs.
 /// @pre points is not empty; each segment is free (view.is_free), as those of find_path are; limits finite and > 0
-template <octree::octree_map Map, robot_shape Shape>
+template <planning_map Map, robot_shape Shape>
 [[nodiscard]] robot_trajectory make_trajectory(const planning_view<Map, Shape>& view, const std::vector<vec3>& points,
                                                const motion_limits& limits = {}) {
   assert(!points.empty());
