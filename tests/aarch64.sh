@@ -25,7 +25,7 @@ places=(tests/core/simd.cpp tests/core/simd tests/core/rounded.cpp tests/core/by
   tests/features/detail tests/places/detail tests/cloud/detail/knn tests/cloud/detail/rays
   tests/optimize/detail/bundle tests/optimize/detail/sparse tests/optimize/detail/pose
   tests/optimize/bundle_instances.cpp  # what those of bundle adjustment share
-  tests/octree/detail/storage tests/octree/detail/points tests/octree/detail/depth)
+  tests/octree/detail/storage tests/octree/detail/points tests/octree/detail/depth tests/nav/detail/floor)
 sources=()
 while read -r source; do
   grep -qE 'opencv|octomap|orbis/io|interop' "$source" || sources+=("$source")

@@ -88,3 +88,27 @@ TEST_CASE("All octants of a map are visited once") {
       }
   CHECK(known == seen.size());
 }
+
+TEST_CASE("Octants in a box are those of the map that have a voxel in it") {
+  random_bits random{8};
+  const map_type map = random_map(random);
+  using place = std::tuple<std::uint32_t, std::uint32_t, std::uint32_t, int>;
+  for (int round = 0; round != 50; ++round) {
+    octree::key_box box;
+    const auto along = [&](std::uint32_t& low, std::uint32_t& high) {
+      low = 32768 - 80 + random.below(150);
+      high = low + random.below(60);
+    };
+    along(box.low.x, box.high.x);
+    along(box.low.y, box.high.y);
+    along(box.low.z, box.high.z);
+    std::map<place, octant_states> expected, found;
+    octree::for_each_octant(map, [&](const voxel_key& k, int level, const octant_states& states) {
+      if (box.overlaps(k, level)) expected[{k.x, k.y, k.z, level}] = states;
+    });
+    octree::for_each_octant(map, box, [&](const voxel_key& k, int level, const octant_states& states) {
+      CHECK(found.try_emplace({k.x, k.y, k.z, level}, states).second);
+    });
+    CHECK(found == expected);
+  }
+}

@@ -15,8 +15,8 @@
 namespace orbis::nav {
 
 /// What planning needs of a map. Specialise it for a type of yours with `grid`, `octants` and `for_each_octant` of the
-/// one for octrees below; the map is read in place and not copied. `state` and `overlaps` may be left out: they are
-/// then made of `octants`, which takes more time.
+/// one for octrees below; the map is read in place and not copied. The others may be left out: `state` and
+/// `overlaps` are then made of `octants`, and octants in a box picked out of all, which takes more time.
 template <class Map>
 struct map_access;
 
@@ -33,6 +33,11 @@ struct map_access<Map> {
   template <class Visit>
   static void for_each_octant(const Map& map, Visit&& visit) {
     octree::for_each_octant(map, visit);
+  }
+  /// The same for those that have a voxel in a box.
+  template <class Visit>
+  static void for_each_octant(const Map& map, const octree::key_box& box, Visit&& visit) {
+    octree::for_each_octant(map, box, visit);
   }
   /// What is known of a voxel.
   [[nodiscard]] static octree::occupancy state(const Map& map, const octree::voxel_key& k) {

@@ -67,23 +67,40 @@ class octant_reader {
   bool started_ = false;
 };
 
-/// Calls `visit(lowest voxel, level, states)` for every octant (level 2) of which something is known, and for every
-/// leaf bigger than 8x8x8 voxels (level > 3), all of whose octants have these states, in no particular order.
-/// O(bricks + octants that are not uniform).
+/// Calls `visit(lowest voxel, level, states)` for every octant (level 2) that has a voxel in `box` and of which
+/// something is known, and for every such leaf bigger than 8x8x8 voxels (level > 3), all of whose octants have these
+/// states, in no particular order. O(blocks of 32x32x32 voxels with bricks + large leaves + octants in the box that are
+/// not uniform).
 template <octree_map Map, std::invocable<const voxel_key&, int, const octant_states&> Visit>
-void for_each_octant(const Map& map, Visit&& visit) {
+void for_each_octant(const Map& map, const key_box& box, Visit&& visit) {
   using model = typename Map::model;
   const auto& store = map.store();
-  store.for_each_brick([&](const auto& b) {
-    const voxel_key low = detail::named_key(b.name);
-    for (std::uint32_t i = 0; i != 8; ++i)
-      if (((b.uniform | b.dense) >> i & 1U) != 0)
-        visit(child_key(low, i, node_cells(detail::octant_level)), detail::octant_level,
-              detail::states_of<model>(store, b, i));
+  store.for_each_chunk([&](const auto& c) {
+    const voxel_key chunk = detail::named_key(c.name);
+    if (!box.overlaps(chunk, detail::chunk_level)) return;
+    for (std::uint32_t place = 0; place != 64; ++place) {
+      const auto* const b = store.find(c, place);
+      if (b == nullptr) continue;
+      const voxel_key low = detail::named_key(b->name);
+      if (!box.overlaps(low, detail::octant_level + 1)) continue;
+      for (std::uint32_t i = 0; i != 8; ++i)
+        if (const voxel_key k = child_key(low, i, node_cells(detail::octant_level));
+            ((b->uniform | b->dense) >> i & 1U) != 0 && box.overlaps(k, detail::octant_level))
+          visit(k, detail::octant_level, detail::states_of<model>(store, *b, i));
+    }
   });
   store.for_each_large([&](std::uint64_t name, typename model::value_type v) {
-    visit(detail::named_key(name), detail::named_level(name), detail::states_of<model>(v));
+    const voxel_key low = detail::named_key(name);
+    if (const int level = detail::named_level(name); box.overlaps(low, level))
+      visit(low, level, detail::states_of<model>(v));
   });
+}
+
+/// The same for the whole map. O(bricks + octants that are not uniform).
+template <octree_map Map, std::invocable<const voxel_key&, int, const octant_states&> Visit>
+void for_each_octant(const Map& map, Visit&& visit) {
+  constexpr std::uint32_t last = node_cells(max_tree_depth) - 1;
+  for_each_octant(map, {{0, 0, 0}, {last, last, last}}, visit);
 }
 
 }  // namespace orbis::octree

@@ -48,6 +48,10 @@ class voxel_columns {
     const int found = next(occupied_, 0, x, y, z);
     return found < levels() ? found : std::numeric_limits<int>::max();
   }
+  /// A voxel up to which, from level `z` on, all voxels are occupied. @pre that at `z` is; z >= 0
+  [[nodiscard]] int end_of_run(int x, int y, int z) const noexcept {
+    return z + std::countr_one(occupied_[place(x, y) + static_cast<std::size_t>(z >> 6)] >> (z & 63)) - 1;
+  }
   /// The lowest voxel of which nothing is known; levels() if that lies beyond the box. @pre z >= 0
   [[nodiscard]] int next_unknown(int x, int y, int z) const noexcept {
     return next(known_, ~std::uint64_t{0}, x, y, z);
@@ -78,13 +82,15 @@ class voxel_columns {
 
  private:
   void set_octant(int x, int y, unsigned z, const octree::octant_states& s) noexcept {
-    for (int i = 0; i != 16; ++i) {
-      // Of the bits of a Morton code, x has 0 and 3, y 1 and 4, z 2 and 5.
-      const auto in = static_cast<unsigned>(i);
-      const unsigned code = (in & 1U) | (in & 2U) << 2U | (in & 4U) >> 1U | (in & 8U) << 1U;
-      const std::size_t word = place(x + (i & 3), y + (i >> 2)) + z / 64;
-      known_[word] |= four(s.known >> code) << (z & 63U);
-      if (s.occupied != 0) occupied_[word] |= four(s.occupied >> code) << (z & 63U);
+    const std::uint64_t known = by_column(s.known), occupied = by_column(s.occupied);
+    const unsigned shift = z & 63U;
+    for (unsigned j = 0; j != 4; ++j) {
+      const unsigned row = 16 * (j >> 1U | (j & 1U) << 1U);
+      std::size_t word = place(x, y + static_cast<int>(j)) + z / 64;
+      for (unsigned i = 0; i != 4; ++i, word += words_) {
+        known_[word] |= (known >> (row + 4 * i) & 15U) << shift;
+        occupied_[word] |= (occupied >> (row + 4 * i) & 15U) << shift;
+      }
     }
   }
   /// The levels [from, to) of the column whose first word is `first`.
@@ -96,9 +102,16 @@ class voxel_columns {
       if (occupied) occupied_[first + static_cast<std::size_t>(z / 64)] |= bits;
     }
   }
-  /// The four voxels of a column of an octant, of which the lowest is bit 0.
-  [[nodiscard]] static std::uint64_t four(std::uint64_t m) noexcept {
-    return (m & 1U) | (m >> 3U & 2U) | (m >> 30U & 4U) | (m >> 33U & 8U);
+  /// An octant's voxels by columns of four, from the lowest; columns along x, then rows y = 0, 2, 1, 3. Of the bits of
+  /// a Morton code, x has 0 and 3, y 1 and 4, z 2 and 5: 0 is exchanged with 2, and 1 with 5.
+  [[nodiscard]] static std::uint64_t by_column(std::uint64_t m) noexcept {
+    const auto exchange = [&](std::uint64_t bits, int distance) {  // these with those so far above
+      const std::uint64_t differ = (m >> distance ^ m) & bits;
+      m ^= differ ^ differ << distance;
+    };
+    exchange(0x0a0a0a0a0a0a0a0a, 3);
+    exchange(0x00000000cccccccc, 30);
+    return m;
   }
   [[nodiscard]] std::size_t place(int x, int y) const noexcept {
     return (static_cast<std::size_t>(y) * size_[0] + static_cast<std::size_t>(x)) * words_;
@@ -131,7 +144,7 @@ template <planning_map Map>
   };
   std::vector<part> parts;
   octree::key_box around{box.high, box.low};
-  map_access<Map>::for_each_octant(map, [&](const octree::voxel_key& k, int level, const octree::octant_states& s) {
+  const auto take = [&](const octree::voxel_key& k, int level, const octree::octant_states& s) {
     if (!box.overlaps(k, level) || s.known == 0) return;
     const std::uint32_t last = octree::node_cells(level) - 4;
     const octree::key_box inside{
@@ -142,7 +155,11 @@ template <planning_map Map>
                   std::min(around.low.z, inside.low.z)};
     around.high = {std::max(around.high.x, inside.high.x), std::max(around.high.y, inside.high.y),
                    std::max(around.high.z, inside.high.z)};
-  });
+  };
+  if constexpr (requires { map_access<Map>::for_each_octant(map, box, take); })
+    map_access<Map>::for_each_octant(map, box, take);
+  else
+    map_access<Map>::for_each_octant(map, take);
   if (parts.empty()) return fail(errc::no_data, "", "nothing is known at the floor's height");
   const std::array<std::uint32_t, 3> size{around.high.x + 4 - around.low.x, around.high.y + 4 - around.low.y,
                                           around.high.z + 4 - around.low.z};

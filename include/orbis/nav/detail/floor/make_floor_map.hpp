@@ -16,7 +16,9 @@
 #include <utility>
 #include <vector>
 
+#include <orbis/core/simd/dispatch.hpp>
 #include <orbis/nav/detail/floor/columns.hpp>
+#include <orbis/nav/detail/floor/plane_sums.hpp>
 #include <orbis/nav/floor_map.hpp>
 
 namespace orbis::nav {
@@ -62,9 +64,6 @@ std::optional<double> find_floor(const Map& map) {
 }
 
 namespace detail {
-
-/// Instead of the level of a column.
-inline constexpr int no_level = std::numeric_limits<int>::min();
 
 /// Each value becomes the extreme of those at most `radius` away along both axes: of ranges whose length doubles, and
 /// of two of these that overlap. `nothing` is as no value. O(values x log radius).
@@ -155,6 +154,12 @@ class floor_search {
   /// How far is_steep looks, in cells. Before judging, and after driving.
   void set_radius(int radius) {
     radius_ = std::min(radius, std::max(levels_.width(), levels_.height()));
+    // Sums of integers are faster, if they fit.
+    const double r = radius_, rise = std::min(static_cast<double>(step_) * r, static_cast<double>(columns_.levels()));
+    if ((2.0 * r + 1.0) * (2.0 * r + 1.0) * r * std::max(r, rise) < std::numeric_limits<std::int32_t>::max())
+      sums_ = simd::kernel<plane_sums_kernel<std::int32_t>, plane_sums(const level_window&)>();
+    else
+      sums_ = simd::kernel<plane_sums_kernel<double>, plane_sums(const level_window&)>();
     constexpr int most = std::numeric_limits<int>::max();
     low_ = high_ = levels_;
     for (int& level : low_.pixels())
@@ -167,25 +172,29 @@ class floor_search {
   /// `otherwise` if there is none.
   [[nodiscard]] image<int> spread_levels(int otherwise) const {
     image<int> spread = levels_;
-    std::vector<std::uint32_t> border, next;
-    for (std::size_t i = 0; i != spread.pixels().size(); ++i)
-      if (spread.data()[i] != none) border.push_back(static_cast<std::uint32_t>(i));
+    std::vector<std::array<int, 2>> border, next;
+    for (int y = 0; y != spread.height(); ++y)
+      for (int x = 0; x != spread.width(); ++x) {
+        if (levels_(x, y) == none) continue;
+        bool is_border = false;
+        for_each_neighbor(x, y, [&](int u, int v) { is_border = is_border || levels_(u, v) == none; });
+        if (is_border) border.push_back({x, y});
+      }
     image<std::uint32_t> round(spread.width(), spread.height(), 0);
     for (std::uint32_t n = 1; !border.empty(); ++n, border.swap(next)) {
       next.clear();
-      for (const std::uint32_t i : border) {
-        const int level = spread.data()[i];
-        for_each_neighbor(static_cast<int>(i % static_cast<std::uint32_t>(spread.width())),
-                          static_cast<int>(i / static_cast<std::uint32_t>(spread.width())), [&](int u, int v) {
-                            int& other = spread(u, v);
-                            if (other == none) {
-                              round(u, v) = n;
-                              next.push_back(static_cast<std::uint32_t>(place(u, v)));
-                              other = level;
-                            } else if (round(u, v) == n) {
-                              other = std::min(other, level);
-                            }
-                          });
+      for (const auto& [x, y] : border) {
+        const int level = spread(x, y);
+        for_each_neighbor(x, y, [&](int u, int v) {
+          int& other = spread(u, v);
+          if (other == none) {
+            round(u, v) = n;
+            next.push_back({u, v});
+            other = level;
+          } else if (round(u, v) == n) {
+            other = std::min(other, level);
+          }
+        });
       }
     }
     for (int& level : spread.pixels())
@@ -220,6 +229,7 @@ class floor_search {
       for (int x = 0; x != columns_.width(); ++x) {
         first_.push_back(static_cast<std::uint32_t>(surfaces_.size()));
         for (int z = columns_.next_occupied(x, y, std::max(lowest_, 0)); z <= highest_;) {
+          if (clear_ != 0) z = std::min(columns_.end_of_run(x, y, z), highest_);
           const int next = columns_.next_occupied(x, y, z + 1);
           if (next > z + clear_ &&
               (unknown_ != octree::occupancy::occupied || columns_.next_unknown(x, y, z) > z + clear_))
@@ -235,21 +245,20 @@ class floor_search {
   [[nodiscard]] bool is_steep(int x, int y, double steepest) const {
     const int level = levels_(x, y);
     if (high_(x, y) - low_(x, y) <= step_ || step_ == 0) return false;
-    int lowest = level, highest = level;
-    double n = 0, sx = 0, sy = 0, sz = 0, sxx = 0, sxy = 0, syy = 0, sxz = 0, syz = 0;
-    for (int v = std::max(y - radius_, 0); v <= std::min(y + radius_, columns_.height() - 1); ++v)
-      for (int u = std::max(x - radius_, 0); u <= std::min(x + radius_, columns_.width() - 1); ++u) {
-        const int other = levels_(u, v), dx = u - x, dy = v - y;
-        if (other == none || std::abs(other - level) > step_ * std::max(std::abs(dx), std::abs(dy))) continue;
-        const int dz = other - level;
-        lowest = std::min(lowest, other);
-        highest = std::max(highest, other);
-        n += 1;
-        sx += dx, sy += dy, sz += dz, sxx += dx * dx, sxy += dx * dy, syy += dy * dy, sxz += dx * dz, syz += dy * dz;
-      }
-    if (highest - lowest <= step_) return false;
-    const double xx = sxx - sx * sx / n, xy = sxy - sx * sy / n, yy = syy - sy * sy / n, xz = sxz - sx * sz / n,
-                 yz = syz - sy * sz / n;
+    level_window w;
+    w.x = -std::min(radius_, x);
+    w.y = -std::min(radius_, y);
+    w.width = std::min(radius_, columns_.width() - 1 - x) - w.x + 1;
+    w.height = std::min(radius_, columns_.height() - 1 - y) - w.y + 1;
+    w.levels = levels_.data() + place(x + w.x, y + w.y);
+    w.stride = levels_.width();
+    w.level = level;
+    w.step = std::min(step_, columns_.levels());  // no levels differ by more
+    w.enough = columns_.levels() / w.step + 1;
+    const plane_sums s = sums_(w);
+    if (s.highest - s.lowest <= step_) return false;
+    const double xx = s.xx - s.x * s.x / s.n, xy = s.xy - s.x * s.y / s.n, yy = s.yy - s.y * s.y / s.n,
+                 xz = s.xz - s.x * s.z / s.n, yz = s.yz - s.y * s.z / s.n;
     const double determinant = xx * yy - xy * xy;
     if (determinant < 1e-9 * xx * yy || determinant <= 0.0) {  // all in one row: the slope along it
       const double along = xx + yy, rise = std::hypot(xz, yz);
@@ -263,6 +272,7 @@ class floor_search {
   int lowest_, highest_, clear_, step_;
   octree::occupancy unknown_;
   int radius_ = 1;
+  plane_sums (*sums_)(const level_window&) = nullptr;
   std::vector<surface> surfaces_;     ///< by column, from the lowest
   std::vector<std::uint32_t> first_;  ///< of each column
   std::vector<bool> reached_;
