@@ -6,9 +6,15 @@
 #include <cstdint>
 #include <vector>
 
+#include <orbis/core/image.hpp>
 #include <orbis/core/random.hpp>
 #include <orbis/nav/distance_field.hpp>
+#include <orbis/nav/floor_cost.hpp>
+#include <orbis/nav/floor_map.hpp>
+#include <orbis/nav/floor_view.hpp>
 #include <orbis/nav/path_search.hpp>
+#include <orbis/nav/planning_view.hpp>
+#include <orbis/nav/robot_shape.hpp>
 #include <orbis/nav/robot_trajectory.hpp>
 #include <orbis/octree/occupancy_octree.hpp>
 #include <orbis/octree/overlap.hpp>
@@ -28,6 +34,8 @@ struct pendulum {
 }
 [[nodiscard]] nav::ball_cover cover_of(const pendulum& s) { return {-s.length, 0.0, 1, s.radius, s.radius}; }
 static_assert(nav::robot_shape<pendulum>);
+static_assert(nav::inflatable_space<nav::planning_view<octree::occupancy_octree<>, pendulum>>);
+static_assert(nav::inflatable_space<nav::floor_view>);
 
 }  // namespace elsewhere
 
@@ -52,6 +60,38 @@ map_type boxes(random_bits& random, int count) {
   for (int i = 0; i != count; ++i) {
     const std::uint32_t x = random.below(27), y = random.below(27), z = random.below(12);
     for (std::uint32_t j = 0; j != 27; ++j) set(map, {o + x + j % 3, o + y + j / 3 % 3, o + z + j / 9}, 1.0F);
+  }
+  return map;
+}
+
+/// Whether a robot touches something there, by the exact test alone.
+template <class View>
+bool is_blocked(const View& view, const vec3& p) {
+  return octree::overlaps(view.map(), swept(view.shape(), p, p), {.unknown = view.field().options().unknown});
+}
+bool is_blocked(const nav::floor_view& view, const vec3& p) {
+  const nav::floor_map& map = view.map();
+  for (int y = -1; y <= map.states.height(); ++y)
+    for (int x = -1; x <= map.states.width(); ++x) {
+      const bool is_inside = x >= 0 && y >= 0 && x < map.states.width() && y < map.states.height();
+      if (is_inside && map.states(x, y) == nav::floor_state::free) continue;
+      const vec2 low = map.origin + map.resolution * vec2{x, y};
+      const vec2 nearest = p.head<2>().cwiseMax(low).cwiseMin(vec2{low.array() + map.resolution});
+      if ((nearest - p.head<2>()).norm() <= view.radius()) return true;
+    }
+  return false;
+}
+/// A floor of 4 m x 3 m with boxes on it, that rises by 5 cm from one half to the other.
+nav::floor_map boxes_on_floor(random_bits& random, int count) {
+  nav::floor_map map{.resolution = 0.1, .origin = {-1.0, 0.5}, .floor = 0.2};
+  map.states = image<nav::floor_state>(40, 30, nav::floor_state::free);
+  map.heights = image<float>(40, 30, 0.2F);
+  for (int y = 0; y != 30; ++y)
+    for (int x = 20; x != 40; ++x) map.heights(x, y) = 0.25F;
+  for (int i = 0; i != count; ++i) {
+    const int x = static_cast<int>(random.below(38)), y = static_cast<int>(random.below(28));
+    for (int j = 0; j != 4; ++j)
+      map.states(x + j % 2, y + j / 2) = i % 6 == 0 ? nav::floor_state::unknown : nav::floor_state::occupied;
   }
   return map;
 }
@@ -86,10 +126,7 @@ void check(const View& view, const std::vector<vec3>& points, const nav::motion_
     length += moved.norm();
     jump = std::max(jump, (now.velocity - before.velocity).norm());
     slope = std::max(slope, (moved - 0.5 * dt * (now.velocity + before.velocity)).norm());
-    blocked += octree::overlaps(view.map(), swept(view.shape(), now.position, now.position),
-                                {.unknown = view.field().options().unknown})
-                   ? 1
-                   : 0;
+    blocked += is_blocked(view, now.position) ? 1 : 0;
     before = now;
   }
   CHECK(blocked == 0);
@@ -217,4 +254,66 @@ TEST_CASE("Trajectories of paths between boxes keep their bounds and touch nothi
   }
   CHECK(found > 40);
   CHECK(smooth > 3 * stops);
+}
+
+TEST_CASE("Trajectories over a floor keep their bounds and touch no blocked cell") {
+  std::size_t smooth = 0, stops = 0, found = 0;
+  for (std::uint64_t seed = 1; seed != 9; ++seed) {
+    random_bits random{seed};
+    const nav::floor_map map = boxes_on_floor(random, 30);
+    const auto run = [&](const nav::floor_view& view, const nav::floor_view& disc) {
+      for (int i = 0; i != 4; ++i) {
+        const auto place = [&] {
+          for (;;) {
+            const vec3 p{random.uniform(-1.0, 3.0), random.uniform(0.5, 3.5), 0.0};
+            if (view.is_free(p) && disc.is_free(p)) return p;
+          }
+        };
+        const vec3 a = place(), b = place();
+        const auto path = nav::find_path(view, a, b, {.shorten = i % 2 == 0});
+        if (path.status != nav::path_status::found) continue;
+        ++found;
+        const nav::motion_limits limits{.speed = random.uniform(0.3, 2.0), .acceleration = random.uniform(0.5, 4.0)};
+        if (&view == &disc) check(view, path.points, limits);
+        const auto motion = nav::make_trajectory(view, path.points, limits);
+        for (double t = 0.0; t < motion.duration(); t += 0.01) CHECK(view.is_free(motion.at(t).position));
+        CHECK(motion.at(0.0).position == view.on_ground(a));
+        CHECK((motion.at(motion.duration()).position - view.on_ground(b)).norm() < 1e-9);
+        smooth += path.points.size() - 2 - motion.stops();
+        stops += motion.stops();
+      }
+    };
+    const nav::floor_view disc{map, 0.12};
+    run(disc, disc);
+    const auto costs = nav::inflate(map, {.radius = 0.12});
+    run(nav::floor_view{map, costs, {.clearance_weight = 2.0}}, disc);
+  }
+  CHECK(found > 40);
+  CHECK(smooth > 3 * stops);
+}
+
+TEST_CASE("What is free for a thicker robot is free for the robot with all that is near it") {
+  random_bits random{5};
+  const map_type map = boxes(random, 60);
+  const nav::distance_field field{map, {.reach = 0.6}};
+  const nav::floor_map floor = boxes_on_floor(random, 30);
+  std::array<int, 2> seen{};
+  const auto compare = [&](const auto& thin, const auto& thick, double by) {
+    for (int i = 0; i != 600; ++i) {
+      const vec3 a{random.uniform(-1.0, 3.0), random.uniform(0.0, 3.5), random.uniform(0.0, 1.5)};
+      const vec3 b = a + vec3{random.uniform(-0.5, 0.5), random.uniform(-0.5, 0.5), random.uniform(-0.2, 0.2)};
+      const bool expected = thick.is_free(a, b);
+      CHECK(thin.is_free(a, b, by) == expected);
+      CHECK(thin.is_free(a, b, 0.0) == thin.is_free(a, b));
+      ++seen[expected ? 1 : 0];
+    }
+  };
+  compare(nav::planning_view{map, field, 0.1}, nav::planning_view{map, field, 0.17}, 0.07);
+  compare(nav::planning_view{map, field, nav::vertical_capsule{0.1, 0.0, 0.2}},
+          nav::planning_view{map, field, nav::vertical_capsule{0.15, 0.0, 0.2}}, 0.05);
+  compare(nav::planning_view{map, field, nav::vertical_cylinder{0.1, 0.0, 0.2}},
+          nav::planning_view{map, field, nav::vertical_cylinder{0.15, -0.05, 0.25}}, 0.05);
+  compare(nav::floor_view{floor, 0.1}, nav::floor_view{floor, 0.17}, 0.07);
+  CHECK(seen[0] > 100);
+  CHECK(seen[1] > 100);
 }

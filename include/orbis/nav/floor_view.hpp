@@ -63,18 +63,21 @@ class floor_view {
   [[nodiscard]] bool is_free(const vec3& p) const { return is_free(p, p); }
   /// Whether it touches none on its straight way from `a` to `b` (metres). O(length / distance to the obstacles), and
   /// the cells of the box around each 4 cells of the way near them.
-  [[nodiscard]] bool is_free(const vec3& a, const vec3& b) const {
+  [[nodiscard]] bool is_free(const vec3& a, const vec3& b) const { return is_free(a, b, 0.0); }
+  /// The same for a disc whose radius is larger by `by` (metres). @pre by >= 0
+  [[nodiscard]] bool is_free(const vec3& a, const vec3& b, double by) const {
     if (!key(a) || !key(b)) return false;
+    const double radius = radius_ + by;
     return detail::is_way_free(
-        placed(a), placed(b), resolution(), [&](const vec3& p) { return margin(p); },
-        [&](const vec3& p, const vec3& q) { return overlaps(p, q); });
+        placed(a), placed(b), resolution(), [&](const vec3& p) { return margin(p, radius); },
+        [&](const vec3& p, const vec3& q) { return overlaps(p, q, radius); });
   }
   /// The same.
   [[nodiscard]] bool is_surely_free(const vec3& a, const vec3& b) const { return is_free(a, b); }
   /// Whether the disc in the middle of a cell is free. @pre contains(k)
   [[nodiscard]] bool is_free(const octree::voxel_key& k) const {
-    const double m = margin(center(k));
-    return m != detail::blocked && (m >= 0.0 || !overlaps(center(k), center(k)));
+    const double m = margin(center(k), radius_);
+    return m != detail::blocked && (m >= 0.0 || !overlaps(center(k), center(k), radius_));
   }
 
   /// See planning_options. @pre contains(k)
@@ -123,6 +126,9 @@ class floor_view {
   }
 
   [[nodiscard]] const floor_map& map() const noexcept { return *map_; }
+  /// Of each cell: how far the nearest obstacle is, squared, in cells; with a seam of one cell around the map. See
+  /// squared_floor_distances.
+  [[nodiscard]] const image<float>& squared_distances() const noexcept { return squared_; }
   /// The edge of a cell, metres.
   [[nodiscard]] double resolution() const noexcept { return map_->resolution; }
   /// Of the robot, metres; 0 on a cost map.
@@ -159,17 +165,17 @@ class floor_view {
     return std::sqrt(static_cast<double>(squared_(x + 1, y + 1))) * resolution();
   }
   /// See detail::is_way_free. An obstacle's square is half a cell to half a diagonal nearer than its middle.
-  [[nodiscard]] double margin(const vec3& p) const {
+  [[nodiscard]] double margin(const vec3& p, double radius) const {
     const auto cell = map_->cell(p);
-    if (!cell) return -radius_ - resolution();
+    if (!cell) return -radius - resolution();
     const double d = distance((*cell)[0], (*cell)[1]);
     const double off = (map_->center((*cell)[0], (*cell)[1]) - p.head<2>()).norm();
-    if (d + off - 0.4999 * resolution() < radius_) return detail::blocked;
-    return d - off - 0.7072 * resolution() - radius_;
+    if (d + off - 0.4999 * resolution() < radius) return detail::blocked;
+    return d - off - 0.7072 * resolution() - radius;
   }
   /// Whether what the disc sweeps touches an obstacle. @pre z = 0
-  [[nodiscard]] bool overlaps(const vec3& a, const vec3& b) const {
-    const octree::capsule way{a, b, radius_};
+  [[nodiscard]] bool overlaps(const vec3& a, const vec3& b, double radius) const {
+    const octree::capsule way{a, b, radius};
     const octree::bounding_box box = bounds_of(way);
     const auto index = [&](double p, double origin, int cells) {  // in squared_, which has a seam
       return std::clamp(static_cast<int>(std::floor((p - origin) / resolution())) + 1, 0, cells - 1);

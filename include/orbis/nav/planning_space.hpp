@@ -61,4 +61,14 @@ concept planning_space = requires(const S& space, const vec3& p, const octree::v
   { space.on_ground(p) } -> std::convertible_to<vec3>;
 };
 
+/// A planning space that says of thicker robots, too, whether they fit: what make_trajectory needs.
+///
+/// - `is_free(a, b, by)`: true only if nothing that is within `by` (metres, >= 0) of what the robot sweeps on its
+/// straight
+///   way from `a` to `b` is an obstacle, and both ends are in the space.
+template <class S>
+concept inflatable_space = planning_space<S> && requires(const S& space, const vec3& p, double by) {
+  { space.is_free(p, p, by) } -> std::same_as<bool>;
+};
+
 }  // namespace orbis::nav

@@ -63,7 +63,15 @@ class planning_view {
         a, b, cell, [&](const vec3& p) { return margin(reader, p); },
         [&](const vec3& p, const vec3& q) { return overlaps(p, q); });
   }
-  /// Whether that is free as far as the field alone can tell: true only if `is_free(a, b)` is, and false also where
+  /// Whether nothing within `by` (metres) of what the robot sweeps on that way is an obstacle: is_free for a thicker
+  /// robot, exact for a ball and a vertical capsule. For a vertical cylinder it is one that is thicker and higher by as
+  /// much, for a shape of yours a vertical capsule around the balls that cover it. @pre by >= 0
+  [[nodiscard]] bool is_free(const vec3& a, const vec3& b, double by) const {
+    const planning_view<Map, decltype(detail::grown(shape_, by))> thicker{*map_, *field_, detail::grown(shape_, by),
+                                                                          options_};
+    return thicker.is_free(a, b);
+  }
+  /// Whether a way is free as far as the field alone can tell: true only if `is_free(a, b)` is, and false also where
   /// that would have to ask the map. O(length / distance to the obstacles).
   [[nodiscard]] bool is_surely_free(const vec3& a, const vec3& b) const {
     if (!is_in_region(a) || !is_in_region(b)) return false;

@@ -114,4 +114,21 @@ concept robot_shape = std::copyable<S> && requires(const S& shape, const vec3& p
   { cover_of(shape) } -> std::same_as<ball_cover>;
 };
 
+namespace detail {
+/// A shape that covers everything within `by` (metres) of another one.
+[[nodiscard]] inline ball grown(const ball& s, double by) { return {s.radius + by}; }
+[[nodiscard]] inline vertical_capsule grown(const vertical_capsule& s, double by) {
+  return {s.radius + by, s.low, s.high};
+}
+[[nodiscard]] inline vertical_cylinder grown(const vertical_cylinder& s, double by) {
+  return {s.radius + by, s.low - by, s.high + by};
+}
+/// Of any other shape: around the balls that cover it.
+template <robot_shape Shape>
+[[nodiscard]] vertical_capsule grown(const Shape& s, double by) {
+  const ball_cover c = cover_of(s);
+  return {c.outer + by, c.low, c.low + (c.count - 1) * c.spacing};
+}
+}  // namespace detail
+
 }  // namespace orbis::nav

@@ -19,8 +19,7 @@
 #include <vector>
 
 #include <orbis/core/types.hpp>
-#include <orbis/nav/planning_view.hpp>
-#include <orbis/nav/robot_shape.hpp>
+#include <orbis/nav/planning_space.hpp>
 
 namespace orbis::nav {
 
@@ -196,27 +195,11 @@ class robot_trajectory {
 
 namespace detail {
 
-/// A shape that covers everything within `by` (metres) of another one.
-[[nodiscard]] inline ball grown(const ball& s, double by) { return {s.radius + by}; }
-[[nodiscard]] inline vertical_capsule grown(const vertical_capsule& s, double by) {
-  return {s.radius + by, s.low, s.high};
-}
-[[nodiscard]] inline vertical_cylinder grown(const vertical_cylinder& s, double by) {
-  return {s.radius + by, s.low - by, s.high + by};
-}
-/// Of any other shape: around the balls that cover it.
-template <robot_shape Shape>
-[[nodiscard]] vertical_capsule grown(const Shape& s, double by) {
-  const ball_cover c = cover_of(s);
-  return {c.outer + by, c.low, c.low + (c.count - 1) * c.spacing};
-}
-
 /// Whether a robot stays free along a Bezier curve. The curve lies in the convex hull of its control points, and so
 /// nowhere farther from the segment between its ends than the farthest of them: a thicker robot along that segment is
 /// free, or else each half of the curve is looked at in turn. Nothing is sampled.
-template <planning_map Map, robot_shape Shape>
-[[nodiscard]] bool is_free_curve(const planning_view<Map, Shape>& view, const std::array<vec3, 5>& points,
-                                 int halvings = 6) {
+template <inflatable_space Space>
+[[nodiscard]] bool is_free_curve(const Space& space, const std::array<vec3, 5>& points, int halvings = 6) {
   const vec3 along = points[4] - points[0];
   const double squared = along.squaredNorm();
   double away = 0.0;
@@ -224,10 +207,9 @@ template <planning_map Map, robot_shape Shape>
     const double t = squared > 0.0 ? std::clamp((p - points[0]).dot(along) / squared, 0.0, 1.0) : 0.0;
     away = std::max(away, (p - (points[0] + t * along)).norm());
   }
-  const double rounding = 1e-9 * view.field().grid().resolution();
-  const planning_view thicker{view.map(), view.field(), detail::grown(view.shape(), away + rounding), view.options()};
-  if (thicker.is_free(points[0], points[4])) return true;
-  if (halvings == 0 || !view.is_free(points[0], points[4])) return false;
+  const double rounding = 1e-9 * space.resolution();
+  if (space.is_free(points[0], points[4], away + rounding)) return true;
+  if (halvings == 0 || !space.is_free(points[0], points[4])) return false;
   // By de Casteljau's rule.
   std::array<vec3, 5> left = points, right = points;
   for (std::size_t n = 4; n != 0; --n) {
@@ -235,7 +217,7 @@ template <planning_map Map, robot_shape Shape>
     left[5 - n] = right[0];
   }
   // `right` holds the points of the second half, `left` those of the first.
-  return is_free_curve(view, left, halvings - 1) && is_free_curve(view, right, halvings - 1);
+  return is_free_curve(space, left, halvings - 1) && is_free_curve(space, right, halvings - 1);
 }
 
 }  // namespace detail
@@ -246,10 +228,13 @@ template <planning_map Map, robot_shape Shape>
 /// robot stops at the corner. So the robot is free all the time. Speed and acceleration stay within the limits
 /// everywhere, not at samples alone.
 ///
+/// On a floor (`floor_view`) the points keep the heights that they have. Between them height is linear, so that the
+/// robot may be at another one: `view.on_ground(position)` says which. The limits hold for the polyline's motion.
+///
 /// Points that follow each other at the same place count once. O(points), and what `is_free` costs.
-/// @pre points is not empty; each segment is free (view.is_free), as those of find_path are; limits finite and > 0
-template <planning_map Map, robot_shape Shape>
-[[nodiscard]] robot_trajectory make_trajectory(const planning_view<Map, Shape>& view, const std::vector<vec3>& points,
+/// @pre points is not empty; each segment is free (space.is_free), as those of find_path are; limits finite and > 0
+template <inflatable_space Space>
+[[nodiscard]] robot_trajectory make_trajectory(const Space& space, const std::vector<vec3>& points,
                                                const motion_limits& limits = {}) {
   assert(!points.empty());
   std::vector<vec3> corners;
@@ -282,7 +267,7 @@ template <planning_map Map, robot_shape Shape>
     bool rounded = false;
     for (double share = 1.0; share > 0.01 && !rounded; share *= 0.5) {
       const path_piece corner{corners[i] - share * room * direction, direction, turned, 2.0 * share * room};
-      if (!detail::is_free_curve(view, corner.corner_points())) continue;
+      if (!detail::is_free_curve(space, corner.corner_points())) continue;
       line_to(corner.start, direction, stop);
       stop = false;
       pieces.push_back(corner);
