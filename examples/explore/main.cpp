@@ -247,17 +247,18 @@ int main(int argc, char** argv) {
     });
     ++options.seed;
     const auto next = orbis::nav::next_best_view(robot.view(), places, robot.camera, robot.position, options);
-    if (!next) {
-      why = "nothing more is worth a view";
+    if (next.status != orbis::nav::next_view_status::found) {
+      why = next.status == orbis::nav::next_view_status::nothing_to_see ? "nothing more is worth a view"
+                                                                        : std::string{to_string(next.status)};
       break;
     }
     orbis::nav::view_gain gain{robot.map, robot.camera, options.gain};
-    const auto before = gain(next->T_world_camera);
-    if (!robot.follow(next->path.points, budget)) continue;
-    robot.look(next->T_world_camera);
+    const auto before = gain(next.T_world_camera);
+    if (!robot.follow(next.path.points, budget)) continue;
+    robot.look(next.T_world_camera);
     // Unknown space that stays unknown cannot be seen from here.
     orbis::nav::view_gain after{robot.map, robot.camera, options.gain};
-    if (2 * after(next->T_world_camera) > before) done.push_back(next->place);
+    if (2 * after(next.T_world_camera) > before) done.push_back(next.place);
   }
 
   std::size_t air = 0;

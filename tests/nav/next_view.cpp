@@ -5,7 +5,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
-#include <optional>
 #include <vector>
 
 #include <orbis/camera/pinhole.hpp>
@@ -17,6 +16,7 @@
 #include "support/catch.hpp"
 
 using namespace orbis;
+using nav::next_view_status;
 
 namespace elsewhere {
 
@@ -99,34 +99,42 @@ TEST_CASE("The next best view is the one of the greatest utility, and can be rea
   for (const double x : {0.6, 3.4}) {  // ways are dear: the nearer door
     const vec3 position{x, 2.5, 1.0};
     const auto next = nav::next_best_view(view, places, camera, position, options);
-    REQUIRE(next);
-    CHECK(std::abs(next->place.x() - x) < 1.0);
-    CHECK(next->path.status == nav::path_status::found);
-    CHECK(next->path.points.front() == position);
-    CHECK(next->path.points.back() == next->T_world_camera.translation());
-    CHECK(view.is_free(next->T_world_camera.translation()));
-    CHECK(next->utility == Approx(next->gain * std::exp(-3.0 * next->path.length)));
+    REQUIRE(next.status == next_view_status::found);
+    CHECK(std::abs(next.place.x() - x) < 1.0);
+    CHECK(next.path.status == nav::path_status::found);
+    CHECK(next.path.points.front() == position);
+    CHECK(next.path.points.back() == next.T_world_camera.translation());
+    CHECK(view.is_free(next.T_world_camera.translation()));
+    CHECK(next.utility == Approx(next.gain * std::exp(-3.0 * next.path.length)));
     nav::view_gain gain{map, camera, options.gain};
-    CHECK(next->gain == Approx(1e-3 * static_cast<double>(gain(next->T_world_camera))));
-    const vec3 seen = next->T_world_camera.inverse() * next->place;
+    CHECK(next.gain == Approx(1e-3 * static_cast<double>(gain(next.T_world_camera))));
+    const vec3 seen = next.T_world_camera.inverse() * next.place;
     CHECK(seen.head<2>().norm() < 1e-9);
     CHECK((seen.z() >= options.min_distance && seen.z() <= options.max_distance));
     const auto again = nav::next_best_view(view, places, camera, position, options);
-    CHECK(again->T_world_camera.translation() == next->T_world_camera.translation());
-    CHECK(again->utility == next->utility);
+    CHECK(again.T_world_camera.translation() == next.T_world_camera.translation());
+    CHECK(again.utility == next.utility);
     // Fewer candidates that begin with the same ones are no better.
     auto one = options;
     for (const vec3& place : places) {
       const auto alone = nav::next_best_view(view, std::vector<vec3>{place}, camera, position, one);
-      if (alone && place == places.front()) CHECK(alone->utility <= next->utility);
+      if (place == places.front()) CHECK(alone.utility <= next.utility);
     }
   }
+  const auto status_at = [&](const vec3& position, const std::vector<vec3>& at) {
+    return nav::next_best_view(view, at, camera, position, options).status;
+  };
+  const vec3 middle{2.0, 2.0, 1.0};
+  CHECK(status_at(vec3{2.0, 2.0, 0.1}, places) == next_view_status::start_blocked);
+  CHECK(status_at(vec3{2.0, 2.0, 1e9}, places) == next_view_status::start_outside);
+  CHECK(status_at(vec3{2.0, std::nan(""), 1.0}, places) == next_view_status::start_outside);
+  CHECK(status_at(middle, {}) == next_view_status::nothing_to_see);
   options.min_gain = 1e6;
-  CHECK_FALSE(nav::next_best_view(view, places, camera, vec3{2.0, 2.0, 1.0}, options));
+  CHECK(status_at(middle, places) == next_view_status::nothing_to_see);
   options.min_gain = 0.0;
-  CHECK_FALSE(nav::next_best_view(view, {}, camera, vec3{2.0, 2.0, 1.0}, options));
   options.gain.bounds = octree::bounding_box{vec3::Zero(), vec3{4.0, 4.0, 2.0}};  // all of it is known
-  CHECK_FALSE(nav::next_best_view(view, places, camera, vec3{2.0, 2.0, 1.0}, options));
+  CHECK(status_at(middle, places) == next_view_status::nothing_to_see);
+  CHECK(nav::to_string(next_view_status::nothing_to_see) == "nothing to see");
 }
 
 TEST_CASE("What cannot be reached is found out once, and what can be is found all the same") {
@@ -148,7 +156,9 @@ TEST_CASE("What cannot be reached is found out once, and what can be is found al
   options.candidates = 1;
   const auto asked_for = [&](const std::vector<vec3>& places) {
     asked = 0;
-    CHECK_FALSE(nav::next_best_view(view, places, camera, position, options));
+    const auto status = nav::next_best_view(view, places, camera, position, options).status;
+    CHECK((status == next_view_status::unreachable ||
+           (places.size() == 1 && status == next_view_status::nothing_to_see)));
     return asked;
   };
   std::size_t most = 0;  // for a place
@@ -159,6 +169,58 @@ TEST_CASE("What cannot be reached is found out once, and what can be is found al
   far.push_back({3.95, 1.5, 1.0});
   options.candidates = 20;
   const auto next = nav::next_best_view(view, far, camera, position, options);
-  REQUIRE(next);
-  CHECK(next->place == far.back());
+  REQUIRE(next.status == next_view_status::found);
+  CHECK(next.place == far.back());
+}
+
+TEST_CASE("Where more can be reached than is looked at it says so, and does not look for each view as long") {
+  map_type map = room();
+  fill(map, {0.0, 3.0, 0.0}, {4.0, 3.1, 2.0}, 1.0F);                                       // a wall across
+  for (const double x : {-0.1, 4.0}) fill(map, {x, 1.0, 0.0}, {x + 0.1, 3.0, 2.0}, 1.0F);  // and both doors are closed
+  fill(map, {1.0, 1.0, 2.0}, {2.0, 2.0, 2.1}, -1.0F);  // but a hole in the ceiling leads outside
+  const camera::pinhole camera{40, 30, 25.0, 25.0, 19.5, 14.5};
+  std::size_t asked = 0;
+  const vec3 position{3.0, 1.5, 1.0};
+  nav::next_view_options options{.gain = {.max_range = 3.0, .pixel_step = 4},
+                                 .candidates = 1,
+                                 .max_distance = 0.6,
+                                 .lambda = 0.0,
+                                 .path = {.shorten = false, .max_expanded = 20'000}};
+  // In a box that is closed, somewhere in unknown space, through which the robot could go on for ever.
+  fill(map, {19.0, 19.0, -1.0}, {23.0, 23.0, 3.0}, 1.0F);
+  fill(map, {19.1, 19.1, -0.9}, {22.9, 22.9, 2.9}, -1.0F);
+  std::vector<vec3> places;
+  for (int i = 0; i != 24; ++i) {
+    // A single unknown voxel in the box is to be seen from near it.
+    const vec3 p{20.5 + 0.5 * (i % 4), 20.5 + 0.5 * (i / 4 % 3), 0.55 + 0.8 * (i / 12)};
+    map.edit_octant(*map.grid().key(p), [&](auto& voxels) {
+      voxels.known &= ~(std::uint64_t{1} << (octree::morton_code(*map.grid().key(p)) & 63U));
+    });
+    places.push_back(p);
+  }
+  const nav::distance_field field{map, {.reach = 0.6, .unknown = octree::occupancy::free}};
+  const nav::planning_view view{map, field, elsewhere::counted{.asked = &asked}};
+  REQUIRE(view.is_free(position));
+  const auto look_at = [&](const std::vector<vec3>& at) {
+    asked = 0;
+    return nav::next_best_view(view, at, camera, position, options);
+  };
+  std::size_t alone = 0, gave_up = 0;
+  for (const vec3& p : places) {
+    const auto status = look_at({p}).status;
+    CHECK((status == next_view_status::gave_up || status == next_view_status::nothing_to_see));
+    gave_up += status == next_view_status::gave_up ? 1U : 0U;
+    alone += asked;
+  }
+  REQUIRE(gave_up > 15);
+  CHECK(look_at(places).status == next_view_status::gave_up);
+  CHECK(5 * asked < alone);
+  // What is near is found all the same.
+  places.push_back({1.5, 1.5, 2.05});
+  options.candidates = 20;
+  options.max_distance = 1.0;
+  options.max_elevation = 1.2;
+  const auto next = look_at(places);
+  REQUIRE(next.status == next_view_status::found);
+  CHECK(next.place == places.back());
 }

@@ -57,6 +57,13 @@ class floor_view {
                                                 : floor_state::free;
     });
   }
+  // Neither would outlive the view.
+  floor_view(const floor_map&&, double, const planning_options& = {},
+             octree::occupancy = octree::occupancy::occupied) = delete;
+  floor_view(const floor_map&&, const image<std::uint8_t>&, const planning_options& = {},
+             octree::occupancy = octree::occupancy::occupied) = delete;
+  floor_view(const floor_map&, const image<std::uint8_t>&&, const planning_options& = {},
+             octree::occupancy = octree::occupancy::occupied) = delete;
 
   /// Whether the disc around `p` (metres) touches no obstacle. False outside of the map or the region. O(1) away from
   /// obstacles, O((radius / resolution)^2) near them.

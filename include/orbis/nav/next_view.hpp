@@ -5,7 +5,7 @@
 /// @code
 ///   const auto places = orbis::nav::places_of(frontiers.clusters({.min_size = 20}), map.grid());
 ///   const auto next = orbis::nav::next_best_view(view, places, camera, position);
-///   if (next) go(next->path.points), look(next->T_world_camera); else done();
+///   if (next.status == orbis::nav::next_view_status::found) go(next.path.points), look(next.T_world_camera);
 /// @endcode
 #pragma once
 
@@ -17,6 +17,7 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -74,9 +75,31 @@ struct next_view_options {
   std::uint64_t seed = 1;  ///< of the candidates
 };
 
-/// A view, and the way there.
+enum class next_view_status : std::uint8_t {
+  found,
+  nothing_to_see,  ///< no view from where the robot is free shows enough: what can be explored is known
+  start_outside,   ///< the robot itself is outside of the grid or the region, or its position not finite
+  start_blocked,   ///< it touches an obstacle
+  unreachable,     ///< no way leads to any of the views
+  gave_up          ///< none was found after path.max_expanded cells, which does not say that there is none
+};
+
+[[nodiscard]] constexpr std::string_view to_string(next_view_status s) noexcept {
+  switch (s) {
+    case next_view_status::found: return "found";
+    case next_view_status::nothing_to_see: return "nothing to see";
+    case next_view_status::start_outside: return "start outside";
+    case next_view_status::start_blocked: return "start blocked";
+    case next_view_status::unreachable: return "unreachable";
+    case next_view_status::gave_up: return "gave up";
+  }
+  return "unknown";
+}
+
+/// A view, and the way there; or why there is none, and nothing else.
 struct next_view {
-  se3 T_world_camera;         ///< the camera's axes: x to the right, y down, z ahead; x is level
+  next_view_status status = next_view_status::nothing_to_see;
+  se3 T_world_camera{};       ///< the camera's axes: x to the right, y down, z ahead; x is level
   vec3 place = vec3::Zero();  ///< that it looks at, metres
   double gain = 0.0;          ///< unknown space that it would see, cubic metres
   double utility = 0.0;       ///< gain * exp(-lambda * length of the path)
@@ -94,24 +117,30 @@ struct next_view {
 }
 
 /// The best of random views of the places, from where the robot (whose camera is at its reference point) is free and
-/// to where a path leads; empty if there is none whose gain is more than 0 and at least `min_gain`. The best is the one
+/// to where a path leads, of those whose gain is more than 0 and at least `min_gain`. The best is the one
 /// of the greatest utility, gain * exp(-lambda * length of the path): H. H. Gonzalez-Banos, J.-C. Latombe, "Navigation
 /// strategies for exploring indoor environments", International Journal of Robotics Research 21, 2002. Paths are looked
 /// for only as long as a straight one could still be the best, and to what cannot be reached at most once. The world
 /// has z up.
 ///
+/// Where more can be reached than `path.max_expanded` cells, as where unknown space is free and no region is named, a
+/// search may give up. Each one after it may look at half as many cells as the one before, so that all of those that
+/// give up take no longer than two; then the best of the views to which a path was found is taken, if there is any.
+///
 /// The same arguments give the same view. Usually a millisecond for each candidate, and what find_path costs.
 /// @pre 0 < min_distance <= max_distance; 0 <= max_elevation < pi / 2; lambda >= 0
 template <planning_map Map, robot_shape Shape, camera::camera_model Camera>
-[[nodiscard]] std::optional<next_view> next_best_view(const planning_view<Map, Shape>& view,
-                                                      std::span<const vec3> places, const Camera& camera,
-                                                      const vec3& position, const next_view_options& options = {}) {
+[[nodiscard]] next_view next_best_view(const planning_view<Map, Shape>& view, std::span<const vec3> places,
+                                       const Camera& camera, const vec3& position,
+                                       const next_view_options& options = {}) {
   assert(options.min_distance > 0.0 && options.min_distance <= options.max_distance && options.lambda >= 0.0);
   assert(options.max_elevation >= 0.0 && options.max_elevation < 1.5707963267948966);
   struct candidate {
     next_view view;
     double bound;  ///< of its utility, if the straight way is free
   };
+  if (!view.key(position)) return {.status = next_view_status::start_outside};
+  if (!view.is_free(position)) return {.status = next_view_status::start_blocked};
   const octree::voxel_grid& grid = view.grid();
   const double voxel = grid.resolution() * grid.resolution() * grid.resolution();
   view_gain gain{view.map(), camera, options.gain};
@@ -129,26 +158,32 @@ template <planning_map Map, robot_shape Shape, camera::camera_model Camera>
       const se3 pose = looking_at(from, place);
       const double seen = voxel * static_cast<double>(gain(pose));
       if (!(seen > 0.0 && seen >= options.min_gain)) continue;
-      candidates.push_back({{pose, place, seen, 0.0, {}}, seen * std::exp(-options.lambda * (from - position).norm())});
+      candidates.push_back({{next_view_status::found, pose, place, seen, 0.0, {}},
+                            seen * std::exp(-options.lambda * (from - position).norm())});
     }
   std::stable_sort(candidates.begin(), candidates.end(),
                    [](const candidate& a, const candidate& b) { return a.bound > b.bound; });
-  std::optional<next_view> best;
+  next_view best{.status = candidates.empty() ? next_view_status::nothing_to_see : next_view_status::unreachable};
   // What cannot be reached is not looked for again and again: each time all that can be reached would be searched.
   using search = detail::voxel_search<planning_view<Map, Shape>>;
   std::optional<search> reached;
+  path_options how = options.path;
   for (candidate& c : candidates) {
-    if (best && best->utility >= c.bound) break;
+    if (best.utility >= c.bound) break;
     const vec3 goal = c.view.T_world_camera.translation();
     if (reached && !(view.key(goal) && reached->has_reached(goal)) && !view.is_free(position, goal)) continue;
-    c.view.path = find_path(view, position, goal, options.path);
+    c.view.path = find_path(view, position, goal, how);
     if (c.view.path.status == path_status::unreachable && !reached) {
-      reached.emplace(view, false, options.path.max_expanded);
+      reached.emplace(view, false, how.max_expanded);
       if (reached->run(position, goal, {}) != detail::search_end::exhausted) reached.reset();
+    }
+    if (c.view.path.status == path_status::gave_up) {
+      how.max_expanded /= 2;
+      if (best.status != next_view_status::found) best.status = next_view_status::gave_up;
     }
     if (c.view.path.status != path_status::found) continue;
     c.view.utility = c.view.gain * std::exp(-options.lambda * c.view.path.length);
-    if (!best || c.view.utility > best->utility) best = std::move(c.view);
+    if (c.view.utility > best.utility) best = std::move(c.view);
   }
   return best;
 }

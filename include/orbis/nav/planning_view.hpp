@@ -48,6 +48,15 @@ class planning_view {
   planning_view(const Map& map, const distance_field& field, double radius,
                 const planning_options& options = {}) requires std::same_as<Shape, ball>
       : planning_view{map, field, ball{radius}, options} {}
+  // Neither would outlive the view.
+  planning_view(const Map&&, const distance_field&, const Shape&, const planning_options& = {}) = delete;
+  planning_view(const Map&, const distance_field&&, const Shape&, const planning_options& = {}) = delete;
+  planning_view(const Map&&, const distance_field&, double,
+                const planning_options& = {}) requires std::same_as<Shape, ball>
+  = delete;
+  planning_view(const Map&, const distance_field&&, double,
+                const planning_options& = {}) requires std::same_as<Shape, ball>
+  = delete;
 
   /// Whether the robot with its reference point at `p` (metres) touches no obstacle. False if `p` is not finite, or
   /// outside of the region. O(1) away from obstacles, and what `overlaps` costs near them.

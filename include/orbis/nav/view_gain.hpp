@@ -55,6 +55,7 @@ class view_gain {
     if (options.bounds) counted_ = octree::keys_between(grid_, options.bounds->min, options.bounds->max);
     counts_any_ = !options.bounds || counted_;
   }
+  view_gain(const Map&&, const Camera&, const view_gain_options& = {}) = delete;  // it would not outlive the gain
 
   /// The number of unknown voxels seen from a pose; 0 from outside of the grid. O(voxels along the rays)
   [[nodiscard]] std::size_t operator()(const se3& T_world_camera) {
