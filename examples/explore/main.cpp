@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // explore MAP.bt: a robot that flies through a made-up building of three furnished rooms and maps it by itself, from
-// known poses: it looks where most unknown space is to be seen for a short way, goes there along a path through what
-// it knows to be free, and looks around while it goes; until nothing more is worth a view.
+// known poses: it looks where most unknown space is to be seen for a short way, flies there through what it knows to be
+// free, and looks ahead while it flies; until nothing more is worth a view.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -147,23 +147,28 @@ struct explorer {
     for (; !view().is_free(position) && !trail.empty(); trail.pop_back()) go(trail.back());
     return view().is_free(position);
   }
-  /// Goes along a path, and looks ahead after each half metre. Stops where what it sees then blocks the path.
-  bool follow(const std::vector<vec3>& path, int budget) {
-    for (std::size_t i = 1; i < path.size(); ++i) {
-      while (position != path[i]) {
-        if (views >= budget) return false;
-        if (!view().is_free(position, path[i])) return false;
-        const vec3 ahead = path[i] - position;
-        const double step = std::min(0.5, ahead.norm());
-        const vec3 next = step < 0.5 ? path[i] : vec3{position + ahead * (step / ahead.norm())};
+  /// Flies to a place: a second at a time, from rest to rest, and after each it looks ahead. What it sees may lead it
+  /// round another way. False if there is none, or no view is left.
+  bool fly_to(const vec3& goal, int budget) {
+    orbis::nav::replanner planner{goal};
+    while (views < budget) {
+      if (position == goal) return true;
+      const auto now = view();
+      const auto& path = planner.update(now, position);
+      if (path.status != orbis::nav::path_status::found) return false;
+      const auto motion = orbis::nav::make_trajectory(now, path.points, {.speed = 1.0, .acceleration = 1.0});
+      const double seconds = std::min(1.0, motion.duration());
+      for (const double share : {0.25, 0.5, 0.75, 1.0}) {
         trail.push_back(position);
-        go(next);
-        const orbis::vec2 level = ahead.head<2>();
-        if (level.norm() > 0.1 * ahead.norm())
-          look(orbis::nav::looking_at(position, position + vec3{level.x(), level.y(), 0.0}));
+        go(motion.at(share * seconds).position);
       }
+      if (seconds == motion.duration()) position = goal;
+      const vec3 ahead = position - trail.back();
+      const orbis::vec2 level = ahead.head<2>();
+      if (level.norm() > 0.1 * ahead.norm())
+        look(orbis::nav::looking_at(position, position + vec3{level.x(), level.y(), 0.0}));
     }
-    return true;
+    return false;
   }
 };
 
@@ -233,7 +238,7 @@ int main(int argc, char** argv) {
   const double spacing = 0.8;
   orbis::nav::next_view_options options;
   options.gain = {.max_range = range, .pixel_step = std::max(1, width / 40), .bounds = world.bounds()};
-  options.min_gain = 0.02;
+  options.min_gain = 0.01;
   std::vector<vec3> done;  // places that a view has shown nothing of
   std::string why = "out of views";
   while (robot.views < budget) {
@@ -254,7 +259,7 @@ int main(int argc, char** argv) {
     }
     orbis::nav::view_gain gain{robot.map, robot.camera, options.gain};
     const auto before = gain(next.T_world_camera);
-    if (!robot.follow(next.path.points, budget)) continue;
+    if (!robot.fly_to(next.T_world_camera.translation(), budget)) continue;
     robot.look(next.T_world_camera);
     // Unknown space that stays unknown cannot be seen from here.
     orbis::nav::view_gain after{robot.map, robot.camera, options.gain};
