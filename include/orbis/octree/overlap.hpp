@@ -86,7 +86,15 @@ namespace detail {
   const double outside = (c.radius + 1.7320508075688773 * half.maxCoeff()) * (1.0 + 1e-9);
   if (apart > outside * outside) return false;
   const double inside = (c.radius + half.minCoeff()) * (1.0 - 1e-9);
-  return apart < inside * inside || detail::touches_exactly(c, b);
+  if (apart < inside * inside) return true;
+  // That point of the segment may be near enough to the box; or else the plane through the nearest point of the box,
+  // across the way between the two, may keep both ends away. A ball is one or the other, but for rounding.
+  const vec3 point = c.a + share * along, nearest = point.cwiseMax(b.min).cwiseMin(b.max), way = point - nearest;
+  const double squared = way.squaredNorm(), reach = c.radius * c.radius;
+  if (squared < reach * (1.0 - 1e-9)) return true;
+  const double gap = std::min((c.a - nearest).dot(way), (c.b - nearest).dot(way));
+  if (gap > 0.0 && gap * gap > reach * squared * (1.0 + 1e-9)) return false;
+  return detail::touches_exactly(c, b);
 }
 
 /// A shape that can be looked for: `bounds_of(shape)` is a box around it, `touches(shape, box)` says
@@ -160,15 +168,19 @@ class overlap_search {
     const auto* const c = store_.find_chunk(k);
     if (c == nullptr && !store_.has_large()) return unknown_blocks_;
     if (c == nullptr && !unknown_blocks_) return false;
-    for (std::uint32_t place = 0; place != 64; ++place) {
-      const voxel_key offset = brick_in_chunk(place);
-      const voxel_key key{k.x + offset.x, k.y + offset.y, k.z + offset.z};
-      if (!keys.overlaps(key, brick_level)) continue;
-      const brick<T>* const b = c == nullptr ? nullptr : store_.find(*c, place);
-      const bool blocks = b != nullptr ? may_block(*b) : unknown_blocks_ && store_.find_large_value(key) == nullptr;
-      if (!blocks || !meets(key, brick_level)) continue;
-      if (b == nullptr || in_brick(*b, keys, key)) return true;
-    }
+    const auto from = [&](std::uint32_t low, std::uint32_t first) { return std::max(low & ~7U, first); };
+    const auto to = [&](std::uint32_t high, std::uint32_t first) {
+      return std::min(high, first + node_cells(chunk_level) - 1);
+    };
+    for (std::uint32_t z = from(keys.low.z, k.z); z <= to(keys.high.z, k.z); z += 8)
+      for (std::uint32_t y = from(keys.low.y, k.y); y <= to(keys.high.y, k.y); y += 8)
+        for (std::uint32_t x = from(keys.low.x, k.x); x <= to(keys.high.x, k.x); x += 8) {
+          const voxel_key key{x, y, z};
+          const brick<T>* const b = c == nullptr ? nullptr : store_.find(*c, place_in_chunk(key));
+          const bool blocks = b != nullptr ? may_block(*b) : unknown_blocks_ && store_.find_large_value(key) == nullptr;
+          if (!blocks || !meets(key, brick_level)) continue;
+          if (b == nullptr || in_brick(*b, keys, key)) return true;
+        }
     return false;
   }
   [[nodiscard]] bool may_block(const brick<T>& b) const noexcept {
