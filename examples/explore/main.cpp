@@ -217,7 +217,9 @@ int main(int argc, char** argv) {
   cli.add_option("--resolution", resolution, "edge of a voxel, metres")
       ->check(CLI::Range(0.02, 0.2))
       ->capture_default_str();
-  cli.add_option("--radius", radius, "of the robot, metres")->check(CLI::Range(0.05, 0.35))->capture_default_str();
+  cli.add_option("--robot-radius,--radius", radius, "of the robot, metres")
+      ->check(CLI::Range(0.05, 0.35))
+      ->capture_default_str();
   cli.add_option("--range", range, "how far the camera sees, metres")
       ->check(CLI::Range(1.0, 10.0))
       ->capture_default_str();

@@ -109,9 +109,9 @@ void add_plan_options(CLI::App& cmd, settings& s, std::string& from, std::string
   cmd.add_option("MAP", s.input, "an octree map: .bt, .ot or .orbis")->required()->type_name("");
   cmd.add_option("--from", from, "where the robot is, metres")->required()->type_name("X,Y,Z");
   cmd.add_option("--to", to, "where it is to go")->required()->type_name("X,Y,Z");
-  metres(cmd, "--radius", s.robot_radius, "of the robot, metres", 0.001, 10.0);
+  metres(cmd, "--robot-radius,--radius", s.robot_radius, "of the robot, metres", 0.001, 10.0);
   cmd.add_option_function<double>(
-         "--height",
+         "--robot-height,--height",
          [&s](double height) {
            s.robot_height = height;
            s.stands = true;
@@ -119,8 +119,9 @@ void add_plan_options(CLI::App& cmd, settings& s, std::string& from, std::string
          "the robot is an upright cylinder of this height on the point that is given; without it, a ball around it")
       ->check(within(0.001, 10.0, " m"))
       ->type_name("M");
-  cmd.add_flag("--ground", s.on_floor,
-               "the robot drives on the floor: heights of the points do not count, and --height is 0.5 if not given");
+  cmd.add_flag(
+      "--ground", s.on_floor,
+      "the robot drives on the floor: heights of the points do not count, and --robot-height is 0.5 if not given");
   cmd.add_option("--step", s.robot_step,
                  "--ground: the highest step that it drives up or down, metres; without it, a voxel")
       ->check(within(0.0, 10.0, " m"))

@@ -65,7 +65,8 @@ std::optional<way> plan_through(const view& robot, const std::vector<vec3>& plac
 }  // namespace
 
 orbis::result<navigation_results> navigate(const octree& map, const orbis::trajectory& cameras, const settings& s,
-                                           const std::filesystem::path& folder, console& console) {
+                                           const std::filesystem::path& folder, const std::filesystem::path& floor_file,
+                                           console& console) {
   console.stage("planning");
   navigation_results r;
   r.robot_radius = s.robot_radius;
@@ -78,11 +79,13 @@ orbis::result<navigation_results> navigate(const octree& map, const orbis::traje
                 floor->resolution * floor->resolution;
   }
   if (!s.floor_map.empty()) {
-    if (!floor)
-      r.unsaved = {floor.error().code, s.floor_map.string(),
-                   "there is no floor map to write: " + floor.error().message};
-    else if (auto saved = nav::save_floor_map(s.floor_map, *floor); !saved)
-      r.unsaved = std::move(saved.error());
+    const auto saved = floor ? nav::save_floor_map(floor_file, *floor) : orbis::fail(floor.error());
+    if (!saved) {
+      r.unsaved = {saved.error().code, s.floor_map.string(),
+                   (floor ? "" : "there is no floor map to write: ") + saved.error().message};
+      std::error_code ignored;  // the image without the file is of no use
+      std::filesystem::remove(std::filesystem::path{floor_file}.replace_extension(".pgm"), ignored);
+    }
   }
 
   const nav::distance_field field{map, {.reach = field_reach(s.robot_radius, s.resolution)}};

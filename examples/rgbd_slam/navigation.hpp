@@ -21,11 +21,13 @@ namespace app {
   return std::min(std::max(1.0, robot_radius + 2 * resolution), 181 * resolution);
 }
 
-/// Makes the floor map, writes it to `s.floor_map` if that is given, plans a way of a ball between two places that the
-/// camera saw, and draws navigation.png into `folder`. No picture where there is neither a
-/// floor nor a camera. Errors: write_failed, of the picture; for the floor map see `navigation_results::unsaved`.
+/// Makes the floor map, writes it to `floor_file` if `s.floor_map` is given (where it will be, which messages name),
+/// plans a way of a ball between two places that the camera saw, and draws navigation.png into `folder`. No picture
+/// where there is neither a floor nor a camera. Errors: write_failed, of the picture; for the floor map see
+/// `navigation_results::unsaved`.
 [[nodiscard]] orbis::result<navigation_results> navigate(const orbis::octree::occupancy_octree<>& map,
                                                          const orbis::trajectory& cameras, const settings& s,
-                                                         const std::filesystem::path& folder, console& console);
+                                                         const std::filesystem::path& folder,
+                                                         const std::filesystem::path& floor_file, console& console);
 
 }  // namespace app

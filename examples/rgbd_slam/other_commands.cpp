@@ -130,7 +130,7 @@ exit_code map_without_slam(const settings& s, console& console) {
   auto found =
       recording ? map_recording(*recording, s, files->folder(), console) : map_cloud_file(s, files->folder(), console);
   if (!found) return give_up(found.error());
-  auto usable = navigate(found->map.octree, found->cameras, s, files->folder(), console);
+  auto usable = navigate(found->map.octree, found->cameras, s, files->folder(), files->floor_map(), console);
   if (!usable) return give_up(usable.error());
   const auto& unsaved = found->r.navigation.emplace(*std::move(usable)).unsaved;
   if (unsaved) found->r.warnings.push_back(unsaved->to_string());

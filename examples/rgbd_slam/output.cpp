@@ -87,7 +87,7 @@ result<void> write_report_files(results& r, const orbis::trajectory& cameras, re
   } else if (r.slam) {
     for (const auto& p : r.slam->trajectory) points.push_back(p.T_world_camera.translation().cast<float>());
   }
-  const view_frame frame = find_view_frame(points, cameras);
+  const view_frame frame = find_view_frame(points, cameras, height_of_floor(r));
   if (auto done = write_pictures(r, frame); !done) return done;
   list_files(r, files, {"summary.json", "report.html"}, console);
   r.wall_s = console.total();

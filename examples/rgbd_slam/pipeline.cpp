@@ -54,7 +54,7 @@ exit_code run_slam(const settings& s, console& console) {
   if (tracked.keyframes.size() != 0) {
     auto map = map_frames(tracked.keyframes, *source, live, s, console);
     if (!map) return give_up(map.error());
-    auto usable = navigate(map->octree, r.slam->keyframes, s, files->folder(), console);
+    auto usable = navigate(map->octree, r.slam->keyframes, s, files->folder(), files->floor_map(), console);
     if (!usable) return give_up(usable.error());
     r.navigation = *std::move(usable);
     if (r.navigation->unsaved) r.warnings.push_back(r.navigation->unsaved->to_string());

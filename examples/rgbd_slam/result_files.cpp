@@ -142,42 +142,49 @@ std::optional<orbis::error> find_overwritten(const settings& s, const std::vecto
 result<result_files> result_files::begin(const settings& s) {
   result_files files;
   files.out_ = s.out;
-  file_names names = result_names(s);
-  const auto fail = [&](const std::string& why) {
-    return orbis::fail(orbis::errc::write_failed, s.save_map.string(), "the map cannot be saved: " + why);
+  struct place {
+    fs::path folder;
+    file_names names;
   };
-  bool beside = false;  // the map of landmarks lies in the output folder
+  std::vector<place> places{{s.out, result_names(s)}};
+  const auto fail = [](const fs::path& path, const std::string& why) {
+    return orbis::fail(orbis::errc::write_failed, path.string(), "the map cannot be saved: " + why);
+  };
+  std::error_code ec;
+  // A file that may be elsewhere goes to the folder that it lies in. `others`: what is made with it.
+  const auto add = [&](const fs::path& file, const file_names& others, std::size_t& index) -> result<void> {
+    const fs::path folder = folder_of(file);
+    for (const fs::path& f : {s.out, folder})
+      if (fs::create_directories(f, ec); ec)
+        return orbis::fail(orbis::errc::write_failed, f.string(), "cannot be made: " + ec.message());
+    for (index = 0; index != places.size() && !are_one_file(places[index].folder, folder);) ++index;
+    if (index == places.size()) places.push_back({folder, {}});
+    file_names& names = places[index].names;
+    for (const std::string& name : others) {
+      if (is_among(name, names) || (index == 0 && is_among(name, all_names())))
+        return fail(file, "another result has this name");
+      names.push_back(name);
+      if (const auto there = fs::status(folder / name, ec); fs::exists(there) && !fs::is_regular_file(there))
+        return fail(folder / name, "it is not a regular file, and is not replaced by one");
+    }
+    return {};
+  };
   if (!s.save_map.empty()) {
     files.map_name_ = s.save_map.filename().string();
     if (files.map_name_.empty() || files.map_name_ == "." || files.map_name_ == "..")
-      return fail("this is no name for a file");
-    std::error_code ec;
-    for (const fs::path& folder : {s.out, folder_of(s.save_map)})
-      if (fs::create_directories(folder, ec); ec)
-        return orbis::fail(orbis::errc::write_failed, folder.string(), "cannot be made: " + ec.message());
-    beside = are_one_file(s.out, folder_of(s.save_map));
-    if (beside && is_among(files.map_name_, all_names())) return fail("another result has this name");
-    if (const auto there = fs::status(s.save_map, ec); fs::exists(there) && !fs::is_regular_file(there))
-      return fail("it is not a regular file, and is not replaced by one");
+      return fail(s.save_map, "this is no name for a file");
+    if (auto added = add(s.save_map, {files.map_name_}, files.map_folder_); !added) return orbis::fail(added.error());
   }
-  if (!s.floor_map.empty()) {  // said now, and not when all is done
-    const fs::path place = folder_of(s.floor_map);
-    std::error_code ec;
-    if (fs::create_directories(place, ec); ec)
-      return orbis::fail(orbis::errc::write_failed, place.string(), "cannot be made: " + ec.message());
-    if (::access(place.c_str(), W_OK) != 0)
-      return orbis::fail(orbis::errc::write_failed, s.floor_map.string(), "cannot be created: its folder is read-only");
-    if (fs::is_directory(s.floor_map, ec))
-      return orbis::fail(orbis::errc::write_failed, s.floor_map.string(), "is a folder");
+  if (!s.floor_map.empty()) {
+    files.floor_name_ = s.floor_map.filename().string();
+    const std::string picture = fs::path{s.floor_map}.replace_extension(".pgm").filename().string();
+    if (auto added = add(s.floor_map, {files.floor_name_, picture}, files.floor_folder_); !added)
+      return orbis::fail(added.error());
   }
-  if (beside) names.push_back(files.map_name_);
-  auto folder = staged_folder::open(s.out, std::move(names));
-  if (!folder) return orbis::fail(folder.error());
-  files.folders_.push_back(*std::move(folder));
-  if (!s.save_map.empty() && !beside) {
-    auto other = staged_folder::open(folder_of(s.save_map), {files.map_name_});
-    if (!other) return orbis::fail(other.error());
-    files.folders_.push_back(*std::move(other));
+  for (place& p : places) {
+    auto folder = staged_folder::open(p.folder, std::move(p.names));
+    if (!folder) return orbis::fail(folder.error());
+    files.folders_.push_back(*std::move(folder));
   }
   std::vector<fs::path> temporary;
   for (const staged_folder& f : files.folders_) temporary.push_back(f.path());

@@ -7,6 +7,7 @@
 /// was not made by this program is not replaced, nor is any input of the run.
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -45,7 +46,11 @@ class result_files {
   /// Where the files of the output folder are made.
   [[nodiscard]] const std::filesystem::path& folder() const { return folders_.front().path(); }
   /// Where the map of landmarks is made. @pre settings name one
-  [[nodiscard]] std::filesystem::path landmark_map() const { return folders_.back().path() / map_name_; }
+  [[nodiscard]] std::filesystem::path landmark_map() const { return folders_[map_folder_].path() / map_name_; }
+  /// Where the floor map is made, the image beside it; empty if settings name none.
+  [[nodiscard]] std::filesystem::path floor_map() const {
+    return floor_name_.empty() ? std::filesystem::path{} : folders_[floor_folder_].path() / floor_name_;
+  }
 
   /// The files of the output folder: those made so far, with those of `coming` ...
   [[nodiscard]] file_names made(const file_names& coming) const;
@@ -59,8 +64,9 @@ class result_files {
   result_files() = default;
 
   std::filesystem::path out_;
-  std::string map_name_;
-  std::vector<staged_folder> folders_;  ///< the output folder; that of the map of landmarks if it is another one
+  std::string map_name_, floor_name_;
+  std::size_t map_folder_ = 0, floor_folder_ = 0;
+  std::vector<staged_folder> folders_;  ///< the output folder; those of the other files that are elsewhere
 };
 
 }  // namespace app

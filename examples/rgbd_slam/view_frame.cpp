@@ -4,8 +4,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
 #include <numbers>
+#include <optional>
+#include <utility>
 
 namespace app {
 namespace {
@@ -34,7 +37,18 @@ double quantile(std::vector<double> values, double q) {
 
 }  // namespace
 
-view_frame find_view_frame(const std::vector<orbis::vec3f>& points, const orbis::trajectory& cameras) {
+std::optional<double> height_of_floor(const results& r) {
+  if (!r.map || !r.navigation || !r.navigation->floor_m) return std::nullopt;
+  // The top of the voxels that the floor lies in: of one layer, or of two if it lies between them.
+  const double top = *r.navigation->floor_m, bottom = top - 2 * r.map->resolution;
+  std::vector<double> heights;
+  for (const std::uint32_t i : r.map->kept)
+    if (const double z = r.map->cloud.points[i].z(); z > bottom && z < top) heights.push_back(z);
+  return heights.empty() ? top : quantile(std::move(heights), 0.5);
+}
+
+view_frame find_view_frame(const std::vector<orbis::vec3f>& points, const orbis::trajectory& cameras,
+                           std::optional<double> floor) {
   std::vector<vec3> sample;
   const std::size_t stride = std::max<std::size_t>(1, points.size() / 6000);
   for (std::size_t i = 0; i < points.size(); i += stride)
@@ -60,17 +74,18 @@ view_frame find_view_frame(const std::vector<orbis::vec3f>& points, const orbis:
   rows.row(2) = up;
   const orbis::so3 R_view_world{rows};
 
+  constexpr double margin = 0.05;
   for (int axis = 0; axis != 3; ++axis) {
     std::vector<double> along;
     along.reserve(sample.size());
     for (const vec3& p : sample) along.push_back((R_view_world * p)[axis]);
-    frame.low[axis] = quantile(along, 0.005) - 0.05;
-    frame.high[axis] = quantile(std::move(along), 0.995) + 0.05;
+    frame.low[axis] = quantile(along, 0.005) - margin;
+    frame.high[axis] = quantile(std::move(along), 0.995) + margin;
   }
-  const double floor = frame.low.z();
-  frame.low.z() = 0.0;
-  frame.high.z() -= floor;
-  frame.T_view_world = {R_view_world, vec3(0, 0, -floor)};
+  const double zero = floor.value_or(frame.low.z() + margin);
+  frame.low.z() -= zero;
+  frame.high.z() -= zero;
+  frame.T_view_world = {R_view_world, vec3(0, 0, -zero)};
 
   frame.cut = frame.high.z();
   if (!cameras.empty()) {

@@ -3,6 +3,7 @@
 /// A frame to look at a map in: z up, walls along the axes, the floor at zero.
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include <orbis/core/se3.hpp>
@@ -18,9 +19,13 @@ struct view_frame {
   double cut = 1.0;  ///< what lies higher hides the rest from above: a ceiling
 };
 
-/// Turns the world about its z axis so that walls fall into few, full bins, and puts the lowest points at 0. For
-/// pictures only; nothing is measured in this frame.
-[[nodiscard]] view_frame find_view_frame(const std::vector<orbis::vec3f>& points, const orbis::trajectory& cameras);
+/// Turns the world about its z axis so that walls fall into few, full bins, and puts the floor (its height in the
+/// world, metres) at 0, or where none is known the lowest points. For pictures only; nothing is measured in this frame.
+[[nodiscard]] view_frame find_view_frame(const std::vector<orbis::vec3f>& points, const orbis::trajectory& cameras,
+                                         std::optional<double> floor);
+/// The height of the floor in the world, metres: the median of the points in the voxels of which it is made. Empty if
+/// no floor was found.
+[[nodiscard]] std::optional<double> height_of_floor(const results& r);
 
 /// What pictures say about it, since it is not the world's frame, in which the files are.
 inline constexpr const char* view_frame_note =

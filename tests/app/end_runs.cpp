@@ -156,12 +156,12 @@ bool has_ready_files(const fs::path& folder) {
   return false;
 }
 
-/// Points along a line: their pictures are quickly drawn.
+/// Points of a narrow floor, longer for the second: their pictures are quickly drawn.
 void write_cloud(const fs::path& path, std::uint64_t seed) {
   orbis::point_cloud cloud;
   orbis::random_bits random{seed};
   for (int i = 0; i != 1500; ++i) {
-    const double along = random.uniform(0.0, 6.0), aside = random.uniform(0.0, 0.02);
+    const double along = random.uniform(0.0, 4.0 + static_cast<double>(seed)), aside = random.uniform(0.0, 0.02);
     cloud.points.emplace_back(static_cast<float>(along), static_cast<float>(aside), 1.0F);
   }
   check(orbis::io::write_ply(path, cloud).has_value(), "no cloud");
@@ -178,12 +178,21 @@ int main(int argc, char** argv) {
   write_cloud(work / "first.ply", 1);
   write_cloud(work / "second.ply", 2);
   const auto map_of = [&](const char* cloud) -> std::vector<std::string> {
-    return {"map",     (work / cloud).string(),
-            "--out",   out.string(),
-            "--quiet", "--resolution",
-            "0.1",     "--threads",
-            "1",       "--filter",
-            "none"};
+    return {"map",
+            (work / cloud).string(),
+            "--out",
+            out.string(),
+            "--quiet",
+            "--resolution",
+            "0.1",
+            "--threads",
+            "1",
+            "--filter",
+            "none",
+            "--origin",
+            "3,0,2",
+            "--floor-map",
+            (out / "floor.yaml").string()};
   };
 
   // What the two runs write.
@@ -191,7 +200,8 @@ int main(int argc, char** argv) {
   const folder_content after = content_of(out);
   check(run{map_of("first.ply")}.wait() == 0, "the first cloud cannot be mapped");
   const folder_content before = content_of(out);
-  check(before.size() == 10, "there are " + std::to_string(before.size()) + " files");
+  check(before.at("floor.pgm") != after.at("floor.pgm"), "both clouds have the same floor");
+  check(before.size() == 13, "there are " + std::to_string(before.size()) + " files");
   auto start = clock_type::now();
   check(run{map_of("second.ply")}.wait() == 0, "the second cloud cannot be mapped again");
   const seconds whole = clock_type::now() - start;

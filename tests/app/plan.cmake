@@ -14,11 +14,12 @@ function(length_of variable file)  # of the path that was printed last, in milli
   check(out MATCHES "over ${points} points")
 endfunction()
 
+set(room_run demo --frames 90 --stride 4 --width 320 --resolution 0.1 --threads 1 --out room)
 # The rest is unknown.
 make_plate(${WORK}/cloud.ply)
 app(0 map cloud.ply --out plate --resolution 0.1 --filter none)
 check(NOT EXISTS ${WORK}/plate/navigation.png)  # no floor, no camera
-app(0 plan plate/map.bt --from 0.5,0.5,0.5 --to 0.5,0.5,1.6 --radius 0.1 --unknown free --out way.txt --picture way.png)
+app(0 plan plate/map.bt --from 0.5,0.5,0.5 --to 0.5,0.5,1.6 --robot-radius 0.1 --unknown free --out way.txt --picture way.png)
 must_exist(${WORK} way.txt way.png)
 length_of(length way.txt)
 check(length GREATER 1560)  # two sides of 0.74 m and 0.78 m, to where the ball passes the plate's edge
@@ -59,28 +60,41 @@ app_fails(2 "cloud.ply" map cloud.ply --out never --floor-map cloud.ply/floor.ya
 check(err MATCHES "^rgbd_slam: ")
 app_fails(1 "is not x,y,z" plan plate/map.bt --from 0,0 --to 1,1,1)
 app_fails(1 "--to" plan plate/map.bt --from 0,0,0)
+app_fails(1 "--robot-radius" plan plate/map.bt ${ends} --robot-radius 0.2)  # --radius is the same
+# The floor map under the name of another result, and where no file can be replaced.
+app_fails(2 "floor.yaml: .*another result" ${room_run} --save-map rooms/floor.yaml --floor-map rooms/floor.yaml)
+file(MAKE_DIRECTORY ${WORK}/folders/floor.pgm)
+app_fails(2 "floor.pgm: .*not a regular file" map cloud.ply --out never --floor-map folders/floor.yaml)
 app_fails(1 "does not end in .yaml" map cloud.ply --out plate --floor-map floor.pgm)
 check(NOT EXISTS ${WORK}/never/map.bt)
+file(WRITE ${WORK}/floor.yaml "of an earlier run")
 app_fails(2 "no floor" map cloud.ply --out all_but_that --floor-map floor.yaml)
-check(NOT EXISTS ${WORK}/floor.yaml)
+check(NOT EXISTS ${WORK}/floor.pgm)
+file(READ ${WORK}/floor.yaml left)
+check(left STREQUAL "of an earlier run")
 must_exist(${WORK}/all_but_that map.bt summary.json report.html)
 
 # A room, all round.
-app(0 demo --frames 90 --stride 4 --width 320 --resolution 0.1 --threads 1 --out room --floor-map room/floor.yaml)
+app(0 ${room_run} --floor-map floors/of/room.yaml)
 check(out MATCHES "Floor  at a height of 0.10 m, [4-6].[0-9] square metres")
 check(out MATCHES "Path   [0-9.]+ m for a ball of 0.2 m, straight")
-must_exist(${WORK}/room floor.yaml floor.pgm navigation.png map.bt)
+must_exist(${WORK}/room navigation.png map.bt)
+must_exist(${WORK}/floors/of room.yaml room.pgm)
+file(GLOB left ${WORK}/floors/of/.rgbd_slam*)
+list(LENGTH left hidden)
+check(hidden EQUAL 0)
 summary(status ${WORK}/room navigation path status)
 check(status STREQUAL "found")
 summary(length ${WORK}/room navigation path length_m)
 summary(straight ${WORK}/room navigation path straight_m)
 check(NOT length LESS straight)
-file(READ ${WORK}/room/floor.yaml yaml)
-check(yaml MATCHES "image: \"floor.pgm\"\nmode: trinary\nresolution: 0.1\norigin: .-3.[0-9]+, -2.[0-9]+, 0.0.")
+file(READ ${WORK}/floors/of/room.yaml yaml)
+check(yaml MATCHES "image: \"room.pgm\"\nmode: trinary\nresolution: 0.1\norigin: .-3.[0-9]+, -2.[0-9]+, 0.0.")
 file(READ ${WORK}/room/report.html page)
 check(page MATCHES "<h2>For a robot</h2>")
+check(page MATCHES "T_view_world 0.0000 0.0000 -?0.00[0-9]+ ")  # pictures have the floor at 0, where it is in this world
 # In a corner of it, on the floor.
-app(0 plan room/map.bt --from 2.6,-2.15,0 --to 1.9,-1.6,3 --ground --radius 0.12 --out way.txt --picture way.png)
+app(0 plan room/map.bt --from 2.6,-2.15,0 --to 1.9,-1.6,3 --ground --robot-radius 0.12 --out way.txt --picture way.png)
 length_of(length way.txt)
 check(length GREATER 888)
 check(length LESS 1200)
