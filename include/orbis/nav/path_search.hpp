@@ -51,9 +51,8 @@ enum class path_status : std::uint8_t {
 /// How a path is searched.
 enum class path_method : std::uint8_t {
   /// Lazy Theta*: straight over many cells where nothing is in between; shorter, but no optimum is proven. Where more
-  /// than the length counts (see planning_options), it adds up costs along each of these ways, and may take ten times
-  /// as
-  /// long as `grid` for a path that is hardly better.
+  /// than the length counts (see planning_options), it adds up costs along each of these ways, and takes several times
+  /// as long as `grid` for a path that is hardly better.
   any_angle,
   grid  ///< A*: no way in steps from cell to neighbouring cell is cheaper
 };

@@ -132,6 +132,7 @@ class voxel_search {
     double cost = infinity;
     double density = 0.0;  ///< 0: not asked
     std::uint32_t parent = from;
+    std::uint32_t tried = to;  ///< the last parent whose line was blocked or cost more than was hoped for
     std::uint32_t barred = 0;  ///< directions of neighbours from which no step leads here; of the goal: exits
     std::uint8_t free = 0;     ///< 0: not asked, 1: no, 2: yes
     trust known = trust::bound;
@@ -231,6 +232,11 @@ class voxel_search {
     const std::uint32_t above = any_angle_ ? n.parent : number;
     const double above_cost = at(above).cost;
     const vec3 above_position = position(above);
+    // A line costs its length at least and, in the half cells at its ends, what these cost.
+    const auto half_cell = [&](node& end, const key& end_key) {
+      return is_uniform_ ? 0.0 : 0.5 * space_.resolution() * (density(end, end_key) - 1.0);
+    };
+    const double line_begin = above_cost + (any_angle_ && above != from ? half_cell(at(above), key_of(above)) : 0.0);
     const trust known = any_angle_ && !is_uniform_ ? trust::bound : trust::exact;
     for (std::size_t i = 0; i != exits_.size(); ++i)
       if (exits_[i] == k)
@@ -242,8 +248,15 @@ class voxel_search {
       const std::uint32_t other = number_of(beside);
       node& m = at(other);
       if (m.is_closed || m.free == 1) return;
-      const double cost = any_angle_ ? above_cost + (space_.center(beside) - above_position).norm()
-                                     : n.cost + step_cost(n, k, m, beside, direction);
+      if (any_angle_ && !is_uniform_ && m.tried == above) {  // its cost is known: what may be new is the step
+        if ((m.barred >> (26 - direction) & 1U) != 0) return;
+        const double cost = n.cost + step_cost(n, k, m, beside, direction);
+        if (cost < m.cost && is_free(m, beside)) offer(other, number, cost, trust::exact);
+        return;
+      }
+      const double cost = any_angle_
+                              ? line_begin + (space_.center(beside) - above_position).norm() + half_cell(m, beside)
+                              : n.cost + step_cost(n, k, m, beside, direction);
       if (cost < m.cost && is_free(m, beside)) offer(other, above, cost, known);
     });
   }
@@ -257,8 +270,12 @@ class voxel_search {
     // afterwards finds it.
     const unsigned direction = direction_between(parent, number);
     double cost = infinity;
-    if (direction == none ? space_.is_surely_free(position(parent), position(number))
-                          : space_.is_free(position(parent), position(number))) {
+    const auto is_way_free = [&] {
+      const vec3 a = position(parent), b = position(number);
+      if (direction != none) return space_.is_free(a, b);
+      return !(is_uniform_ && n.tried == parent) && space_.is_surely_free(a, b);
+    };
+    if (is_way_free()) {
       cost = n.known == trust::exact ? n.cost : at(parent).cost + cost_of(space_, position(parent), position(number));
       if (cost <= n.cost) {
         n.known = trust::sure;
@@ -267,6 +284,7 @@ class voxel_search {
     } else if (direction != none) {
       n.barred |= 1U << direction;
     }
+    if (direction == none) n.tried = parent;
     n.cost = infinity;
     offer_steps(number);
     offer(number, parent, cost, trust::sure);
