@@ -137,7 +137,7 @@ template <planning_map Map, robot_shape Shape, camera::camera_model Camera>
   assert(options.max_elevation >= 0.0 && options.max_elevation < 1.5707963267948966);
   struct candidate {
     next_view view;
-    double bound;  ///< of its utility, if the straight way is free
+    double bound = 0.0;  ///< of its utility, if the straight way is free
   };
   if (!view.key(position)) return {.status = next_view_status::start_outside};
   if (!view.is_free(position)) return {.status = next_view_status::start_blocked};
@@ -158,8 +158,12 @@ template <planning_map Map, robot_shape Shape, camera::camera_model Camera>
       const se3 pose = looking_at(from, place);
       const double seen = voxel * static_cast<double>(gain(pose));
       if (!(seen > 0.0 && seen >= options.min_gain)) continue;
-      candidates.push_back({{next_view_status::found, pose, place, seen, 0.0, {}},
-                            seen * std::exp(-options.lambda * (from - position).norm())});
+      candidate& c = candidates.emplace_back();
+      c.view.status = next_view_status::found;
+      c.view.T_world_camera = pose;
+      c.view.place = place;
+      c.view.gain = seen;
+      c.bound = seen * std::exp(-options.lambda * (from - position).norm());
     }
   std::stable_sort(candidates.begin(), candidates.end(),
                    [](const candidate& a, const candidate& b) { return a.bound > b.bound; });
