@@ -60,11 +60,6 @@ void bench_update(benchmark::State& state, const std::vector<scan>& scans, doubl
     report_frames(state, std::move(seconds));
   }
 }
-map whole_map(const std::vector<scan>& scans, double resolution) {
-  map m{resolution};
-  for (const scan& s : scans) m.integrate(s.depth_metres(), s.camera, s.T_world_camera, {.max_range = 5.0});
-  return m;
-}
 void bench_afresh(benchmark::State& state, const std::vector<scan>& scans, double resolution,
                   octree::occupancy unknown) {
   const map m = whole_map(scans, resolution);
@@ -165,23 +160,19 @@ void bench_afresh_dynamic_edt(benchmark::State& state, const std::vector<scan>& 
 #endif
 
 [[maybe_unused]] const bool registered = [] {
-  const auto add = [](const std::string& name, const std::vector<scan>& (*scans)()) {
-    for (const double resolution : {0.05, 0.02}) {
-      const std::string group = "nav_distance_field/" + name + "/" + in_centimetres(resolution);
-      const auto row = [](const std::string& row_name, auto body) { timed_by_itself(add_row(row_name, body), 3); };
-      for (const octree::occupancy unknown : {octree::occupancy::free, octree::occupancy::occupied}) {
-        const std::string how = unknown == octree::occupancy::free ? "_unknown_free" : "_unknown_occupied";
-        row(group + "/update/orbis" + how, [=](auto& s) { bench_update(s, scans(), resolution, unknown); });
-        add_row(group + "/afresh/orbis" + how, [=](auto& s) { bench_afresh(s, scans(), resolution, unknown); });
-      }
+  for_each_world(
+      "nav_distance_field", [](const std::string& group, const std::vector<scan>& (*scans)(), double resolution) {
+        const auto row = [](const std::string& row_name, auto body) { timed_by_itself(add_row(row_name, body), 3); };
+        for (const octree::occupancy unknown : {octree::occupancy::free, octree::occupancy::occupied}) {
+          const std::string how = unknown == octree::occupancy::free ? "_unknown_free" : "_unknown_occupied";
+          row(group + "/update/orbis" + how, [=](auto& s) { bench_update(s, scans(), resolution, unknown); });
+          add_row(group + "/afresh/orbis" + how, [=](auto& s) { bench_afresh(s, scans(), resolution, unknown); });
+        }
 #ifdef ORBIS_BENCH_WITH_DYNAMIC_EDT
-      row(group + "/update/dynamic_edt_3d", [=](auto& s) { bench_update_dynamic_edt(s, scans(), resolution); });
-      add_row(group + "/afresh/dynamic_edt_3d", [=](auto& s) { bench_afresh_dynamic_edt(s, scans(), resolution); });
+        row(group + "/update/dynamic_edt_3d", [=](auto& s) { bench_update_dynamic_edt(s, scans(), resolution); });
+        add_row(group + "/afresh/dynamic_edt_3d", [=](auto& s) { bench_afresh_dynamic_edt(s, scans(), resolution); });
 #endif
-    }
-  };
-  add("room", room);
-  if (have_kitchen()) add("kitchen", kitchen);
+      });
   return true;
 }();
 

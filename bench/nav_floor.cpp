@@ -21,11 +21,6 @@ namespace {
 
 constexpr nav::ground_robot robot{.radius = 0.2, .height = 0.6, .step = 0.05};
 
-map whole_map(const std::vector<scan>& scans, double resolution) {
-  map m{resolution};
-  for (const scan& s : scans) m.integrate(s.depth_metres(), s.camera, s.T_world_camera, {.max_range = 5.0});
-  return m;
-}
 /// How high the floor is that rows look at: that of the map, or the most common height if none is found.
 double floor_of(const map& m) { return nav::find_floor(m).value_or(0.0); }
 
@@ -73,17 +68,12 @@ void bench_projection_octomap(benchmark::State& state, const std::vector<scan>& 
 }
 
 [[maybe_unused]] const bool registered = [] {
-  const auto add = [](const std::string& name, const std::vector<scan>& (*scans)()) {
-    for (const double resolution : {0.05, 0.02}) {
-      const std::string group = "nav_floor/" + name + "/" + in_centimetres(resolution);
-      add_row(group + "/map/orbis", [=](auto& s) { bench_floor_map(s, scans(), resolution); });
-      add_row(group + "/map/octomap_projection", [=](auto& s) { bench_projection_octomap(s, scans(), resolution); });
-      add_row(group + "/find_floor/orbis", [=](auto& s) { bench_find_floor(s, scans(), resolution); });
-      add_row(group + "/inflate/orbis", [=](auto& s) { bench_inflate(s, scans(), resolution); });
-    }
-  };
-  add("room", room);
-  if (have_kitchen()) add("kitchen", kitchen);
+  for_each_world("nav_floor", [](const std::string& group, const std::vector<scan>& (*scans)(), double resolution) {
+    add_row(group + "/map/orbis", [=](auto& s) { bench_floor_map(s, scans(), resolution); });
+    add_row(group + "/map/octomap_projection", [=](auto& s) { bench_projection_octomap(s, scans(), resolution); });
+    add_row(group + "/find_floor/orbis", [=](auto& s) { bench_find_floor(s, scans(), resolution); });
+    add_row(group + "/inflate/orbis", [=](auto& s) { bench_inflate(s, scans(), resolution); });
+  });
   return true;
 }();
 

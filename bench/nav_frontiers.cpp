@@ -17,12 +17,6 @@
 namespace orbis::bench {
 namespace {
 
-map whole_map(const std::vector<scan>& scans, double resolution) {
-  map m{resolution};
-  for (const scan& s : scans) m.integrate(s.depth_metres(), s.camera, s.T_world_camera, {.max_range = 5.0});
-  return m;
-}
-
 void bench_update(benchmark::State& state, const std::vector<scan>& scans, double resolution) {
   for (auto _ : state) {
     map m{resolution};
@@ -99,18 +93,13 @@ void bench_octomap(benchmark::State& state, const std::vector<scan>& scans, doub
 }
 
 [[maybe_unused]] const bool registered = [] {
-  const auto add = [](const std::string& name, const std::vector<scan>& (*scans)()) {
-    for (const double resolution : {0.05, 0.02}) {
-      const std::string group = "nav_frontiers/" + name + "/" + in_centimetres(resolution);
-      timed_by_itself(add_row(group + "/update/orbis", [=](auto& s) { bench_update(s, scans(), resolution); }), 3);
-      add_row(group + "/afresh/orbis", [=](auto& s) { bench_afresh(s, scans(), resolution); });
-      add_row(group + "/afresh/brute_force", [=](auto& s) { bench_brute_force(s, scans(), resolution); });
-      add_row(group + "/afresh/octomap", [=](auto& s) { bench_octomap(s, scans(), resolution); });
-      add_row(group + "/clusters/orbis", [=](auto& s) { bench_clusters(s, scans(), resolution); });
-    }
-  };
-  add("room", room);
-  if (have_kitchen()) add("kitchen", kitchen);
+  for_each_world("nav_frontiers", [](const std::string& group, const std::vector<scan>& (*scans)(), double resolution) {
+    timed_by_itself(add_row(group + "/update/orbis", [=](auto& s) { bench_update(s, scans(), resolution); }), 3);
+    add_row(group + "/afresh/orbis", [=](auto& s) { bench_afresh(s, scans(), resolution); });
+    add_row(group + "/afresh/brute_force", [=](auto& s) { bench_brute_force(s, scans(), resolution); });
+    add_row(group + "/afresh/octomap", [=](auto& s) { bench_octomap(s, scans(), resolution); });
+    add_row(group + "/clusters/orbis", [=](auto& s) { bench_clusters(s, scans(), resolution); });
+  });
   return true;
 }();
 

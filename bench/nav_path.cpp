@@ -85,7 +85,7 @@ struct planning_problem {
   std::size_t found_by_bit_star = 0;
 
   planning_problem(const std::vector<scan>& scans, double resolution)
-      : m{map_of(scans, resolution)}, field{m, {.reach = 1.0}}, view{m, field, radius}, box{m.bounds().value()} {
+      : m{whole_map(scans, resolution)}, field{m, {.reach = 1.0}}, view{m, field, radius}, box{m.bounds().value()} {
     random_bits random{1};
     const auto place = [&] {
       for (;;) {
@@ -115,13 +115,6 @@ struct planning_problem {
   }
   planning_problem(const planning_problem&) = delete;
   planning_problem& operator=(const planning_problem&) = delete;
-
- private:
-  static map map_of(const std::vector<scan>& scans, double resolution) {
-    map made{resolution};
-    for (const scan& s : scans) made.integrate(s.depth_metres(), s.camera, s.T_world_camera, {.max_range = 5.0});
-    return made;
-  }
 };
 
 const planning_problem& problem_of(const std::vector<scan>& (*scans)(), double resolution) {
@@ -157,20 +150,15 @@ void bench_paths(benchmark::State& state, const planning_problem& problem, const
 }
 
 [[maybe_unused]] const bool registered = [] {
-  const auto add = [](const std::string& name, const std::vector<scan>& (*scans)()) {
-    for (const double resolution : {0.05, 0.02}) {
-      const std::string group = "nav_path/" + name + "/" + in_centimetres(resolution);
-      const auto row = [](const std::string& row_name, auto body) { timed_by_itself(add_row(row_name, body), 3); };
-      const auto ours = [&](const std::string& who, const nav::path_options& options) {
-        row(group + who, [=](auto& s) { bench_paths(s, problem_of(scans, resolution), options); });
-      };
-      ours("/orbis", {});
-      ours("/orbis_grid", {.method = nav::path_method::grid});
-      ours("/orbis_grid_only", {.method = nav::path_method::grid, .shorten = false});
-    }
-  };
-  add("room", room);
-  if (have_kitchen()) add("kitchen", kitchen);
+  for_each_world("nav_path", [](const std::string& group, const std::vector<scan>& (*scans)(), double resolution) {
+    const auto row = [](const std::string& row_name, auto body) { timed_by_itself(add_row(row_name, body), 3); };
+    const auto ours = [&](const std::string& who, const nav::path_options& options) {
+      row(group + who, [=](auto& s) { bench_paths(s, problem_of(scans, resolution), options); });
+    };
+    ours("/orbis", {});
+    ours("/orbis_grid", {.method = nav::path_method::grid});
+    ours("/orbis_grid_only", {.method = nav::path_method::grid, .shorten = false});
+  });
   return true;
 }();
 

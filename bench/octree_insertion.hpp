@@ -73,6 +73,25 @@ void bench_insertion(benchmark::State& state, const Policy& policy, const insert
   if (ot_bytes(ours) != ot_bytes(reference)) state.SkipWithError("not the map of the points on one thread");
 }
 
+/// The map of all frames, from their depth images.
+[[nodiscard]] inline map whole_map(const std::vector<scan>& scans, double resolution) {
+  map m{resolution};
+  for (const scan& s : scans) m.integrate(s.depth_metres(), s.camera, s.T_world_camera, {.max_range = 5.0});
+  return m;
+}
+
+/// Calls `add(group, scans, resolution)` for the room and, where it is at hand, the kitchen, with voxels of 5 and 2 cm;
+/// `group`: for the names of the rows.
+template <class Add>
+void for_each_world(const std::string& bench, Add&& add) {
+  const auto with = [&](const std::string& name, const std::vector<scan>& (*scans)()) {
+    for (const double resolution : {0.05, 0.02})
+      add(bench + "/" + name + "/" + in_centimetres(resolution), scans, resolution);
+  };
+  with("room", room);
+  if (have_kitchen()) with("kitchen", kitchen);
+}
+
 /// OctoMap starts from our map of the first frames, and must end with ours.
 void bench_octomap_insertion(benchmark::State& state, const insertion& what);
 
