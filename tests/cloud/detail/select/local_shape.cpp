@@ -46,8 +46,7 @@ TEST_CASE("what is usual around is a quantile over neighbours, and of any policy
   std::vector<float> values(cloud.size());
   for (float& v : values) v = static_cast<float>(random.uniform());
   values[7] = std::numeric_limits<float>::quiet_NaN();
-  const orbis::cloud::detail::smoothing_options once{.neighbors = 12, .rounds = 1, .quantile = 0.35};
-  const auto smooth = orbis::cloud::detail::smoothed_over_neighbors(orbis::seq, graph, values, once);
+  const auto smooth = orbis::cloud::detail::smoothed_over_neighbors(orbis::seq, graph, values, 1);
   for (std::size_t i = 0; i != cloud.size(); ++i) {
     if (i == 7) {
       CHECK(std::isnan(smooth[i]));
@@ -75,4 +74,35 @@ TEST_CASE("what is usual around is a quantile over neighbours, and of any policy
     if (i != 7) REQUIRE(again[i] == smoother[i]);
   }
   CHECK(orbis::cloud::detail::smoothed_over_neighbors(orbis::seq, {}, {}).empty());
+}
+
+TEST_CASE("what is usual around is the same on every vector unit, however many values are missing") {
+  constexpr float nan = std::numeric_limits<float>::quiet_NaN();
+  for (const std::size_t size : {2U, 7U, 600U}) {
+    const auto cloud = orbis::test::uniform_cloud(size, 5);
+    const orbis::cloud::detail::neighbor_graph graph{
+        orbis::seq, orbis::cloud::detail::make_leaves(orbis::seq, cloud, 13), cloud.size(), 12};
+    const std::size_t width = std::min<std::size_t>(12, size - 1);
+    orbis::random_bits random{6};
+    for (const double missing : {0.0, 0.1, 0.9, 1.0}) {
+      std::vector<float> values(cloud.size());
+      for (float& v : values) v = random.uniform() < missing ? nan : static_cast<float>(random.uniform());
+      std::vector<float> expected = values;
+      for (std::size_t i = 0; i != cloud.size(); ++i) {
+        std::vector<float> around;
+        graph.for_each_neighbor(i, width, [&](std::uint32_t n) {
+          if (!std::isnan(values[n])) around.push_back(values[n]);
+        });
+        std::sort(around.begin(), around.end());
+        if (std::isnan(values[i]) || around.empty()) continue;
+        expected[i] = around[static_cast<std::size_t>(0.35 * static_cast<double>(around.size() - 1) + 0.5)];
+      }
+      for (const auto level : {orbis::simd::level::portable, orbis::simd::level::avx2, orbis::simd::level::avx512}) {
+        const orbis::simd::level_limit limit{level};
+        const auto smooth = orbis::cloud::detail::smoothed_over_neighbors(orbis::seq, graph, values, 1);
+        for (std::size_t i = 0; i != cloud.size(); ++i)
+          REQUIRE((std::isnan(expected[i]) ? std::isnan(smooth[i]) : smooth[i] == expected[i]));
+      }
+    }
+  }
 }

@@ -28,6 +28,7 @@
 #include <utility>
 #include <vector>
 
+#include <orbis/core/simd/dispatch.hpp>
 #include <orbis/core/image.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/mapping/detail/depth/rans.hpp>
@@ -398,7 +399,7 @@ class depth_decoder {
   }
 
   /// One pixel of one band.
-  [[nodiscard]] static std::uint32_t next_rank(rans_decoder& stream, const table* tables,
+  [[nodiscard]] static ORBIS_ALWAYS_INLINE std::uint32_t next_rank(rans_decoder& stream, const table* tables,
                                                const neighbors& near) noexcept {
     const neighbors::prediction expected = near.predict();
     const std::uint32_t symbol = stream.get(tables[expected.context]);
@@ -427,7 +428,7 @@ class depth_decoder {
         at[b].begin_row(above[b], width);
       }
       for (int x = 0; x != width; ++x) {
-        const auto step = [&](std::size_t b) {
+        const auto step = [&](std::size_t b) ORBIS_INLINE_LAMBDA {
           const std::uint32_t rank = next_rank(from[b], tables, at[b]);
           here[b][x] = static_cast<std::uint16_t>(rank);
           at[b].advance(rank, x + 2 < width ? above[b][x + 2] : 0U);
