@@ -20,6 +20,7 @@
 /// | `select.hpp`               | choose and apply filters automatically                                      |
 /// | `sensor_origins.hpp`       | where points were seen from                                                 |
 /// | `statistical.hpp`          | filter: mean neighbour distance above mu + alpha sigma; also relative to range |
+/// | `view_samples.hpp`         | a few measurements of each depth image, by which these judge each other      |
 /// | `voxel_grid.hpp`           | one point for each voxel                                                    |
 /// | `voxel_sums.hpp`           | centroids of voxels from which measurements can be removed again            |
 #pragma once
@@ -39,5 +40,6 @@
 #include <orbis/cloud/select.hpp>
 #include <orbis/cloud/sensor_origins.hpp>
 #include <orbis/cloud/statistical.hpp>
+#include <orbis/cloud/view_samples.hpp>
 #include <orbis/cloud/voxel_grid.hpp>
 #include <orbis/cloud/voxel_sums.hpp>

@@ -17,12 +17,17 @@
 
 namespace orbis::cloud {
 
+class view_samples;
+
 struct select_options {
   std::size_t neighbors = 8;            ///< over which a point's spacing is averaged; > 0
   std::optional<vec3> sensor_origin{};  ///< where all points were seen from, metres
   /// Per point, metres from the sensor that saw it; wins over sensor_origin. A point whose range is not
   /// finite is not judged by range.
   std::span<const float> ranges{};
+  /// Of the views, in their order, drawn with the default options while these were at hand: then each view is looked at
+  /// once less.
+  const view_samples* samples = nullptr;
   cloud::non_finite non_finite = cloud::non_finite::drop;
   std::vector<filter_mode> forbidden{};  ///< modes that are not to be chosen
 

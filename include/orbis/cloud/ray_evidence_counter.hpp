@@ -90,15 +90,23 @@ class ray_evidence_counter {
   template <execution_policy Policy, posed_depth View>
   void add(const Policy& policy, const View& view) {
     assert(view.depth.width() == camera_.width() && view.depth.height() == camera_.height());
-    const se3 pose = view.T_world_camera;
-    if (!pose.to_matrix().allFinite() || blocks_.index.empty()) return;
+    if (blocks_.index.empty()) return;
     windows_.take(policy, view.depth, options_.window);
-    const detail::ray_view placed = view_at(pose);
-    test_.place(pose, placed, windows_);
-    for_each_seen_block(policy, placed, [&](std::size_t first, const auto&, const detail::block_verdict& verdict) {
-      kernels_.count(verdict.through, through_.data() + first);
-      kernels_.count(verdict.supported, supported_.data() + first);
-    });
+    add(policy, windows_, view.T_world_camera);
+  }
+  /// The same with the windows of the view's depth image, of this counter's options, taken already.
+  template <execution_policy Policy>
+  void add(const Policy& policy, const detail::depth_windows& windows, const se3& T_world_camera) {
+    change(policy, windows, T_world_camera, kernels_.count);
+  }
+  /// Takes a view back. O(pixels + points before the camera).
+  /// @pre it was added, and not taken back since; fewer than 65536 views were added; there was no review
+  template <execution_policy Policy, posed_depth View>
+  void remove(const Policy& policy, const View& view) {
+    assert(view.depth.width() == camera_.width() && view.depth.height() == camera_.height());
+    if (blocks_.index.empty()) return;
+    windows_.take(policy, view.depth, options_.window);
+    change(policy, windows_, view.T_world_camera, kernels_.take_back);
   }
 
   /// To be called for the views once more when all were added: finds the parts of a view, tiles of
@@ -113,7 +121,7 @@ class ray_evidence_counter {
     if (!pose.to_matrix().allFinite() || blocks_.index.empty()) return;
     for (auto* counters : {&through_dropped_, &refuted_}) counters->resize(through_.size(), 0);
     windows_.take(policy, view.depth, options_.window);
-    const detail::ray_view placed = view_at(pose);
+    const detail::ray_view placed = view_at(pose, windows_);
     test_.place(pose, placed, windows_);
 
     const int tile = tile_size(placed.width);
@@ -160,17 +168,29 @@ class ray_evidence_counter {
   }
 
  private:
-  [[nodiscard]] detail::ray_view view_at(const se3& pose) const {
-    detail::ray_view view{.width = windows_.width(),
-                          .height = windows_.height(),
+  /// Lets a kernel change the counts of all points of which the view says something.
+  template <class Policy, class Kernel>
+  void change(const Policy& policy, const detail::depth_windows& windows, const se3& pose, const Kernel& kernel) {
+    assert(windows.width() == camera_.width() && windows.height() == camera_.height());
+    if (!pose.to_matrix().allFinite() || blocks_.index.empty()) return;
+    const detail::ray_view placed = view_at(pose, windows);
+    test_.place(pose, placed, windows);
+    for_each_seen_block(policy, placed, [&](std::size_t first, const auto&, const detail::block_verdict& verdict) {
+      kernel(verdict.through, through_.data() + first);
+      kernel(verdict.supported, supported_.data() + first);
+    });
+  }
+  [[nodiscard]] detail::ray_view view_at(const se3& pose, const detail::depth_windows& windows) const {
+    detail::ray_view view{.width = windows.width(),
+                          .height = windows.height(),
                           .min_depth = std::max(0.0F, options_.min_depth),
                           .max_depth = options_.max_depth,
                           .margin = options_.margin,
                           .margin_growth = options_.margin_growth,
                           .slant = options_.slant,
-                          .nearest = windows_.nearest(),
-                          .farthest = windows_.farthest(),
-                          .middle = windows_.middle()};
+                          .nearest = windows.nearest(),
+                          .farthest = windows.farthest(),
+                          .middle = windows.middle()};
     detail::place(view, pose);
     if constexpr (std::same_as<Camera, camera::pinhole>) {
       view.fx = static_cast<float>(camera_.k().fx);

@@ -215,7 +215,7 @@ template <execution_policy Policy, point_range Points, class Views>
 /// place, and returns the points that the chosen filters keep. The images testify against points in
 /// front of what they measured, which no density can show: moving objects, wrong poses.
 ///
-/// Deterministic, the same for every policy. `on_progress` counts the views, twice; if it cancels, the
+/// Deterministic, the same for every policy. `on_progress` counts the views; if it cancels, the
 /// chain is empty, the reason "cancelled", and all points stay. O(n log n + views (pixels + n)).
 /// @pre neighbors > 0; ranges is empty or as long as points; views' images have the camera's size
 template <execution_policy Policy, point_range Points, posed_depth_range Views, camera::camera_model Camera>

@@ -41,7 +41,7 @@ enum class filter_kind {
 
 struct filter_options {
   filter_kind kind = filter_kind::automatic;
-  cloud::select_options automatic{};  ///< its `ranges` are set from the map
+  cloud::select_options automatic{};  ///< its `ranges` and `samples` are set from the map
   cloud::statistical_options statistical{};
   cloud::radius_options radius{};
   cloud::log_statistical_options log_statistical{};
@@ -170,7 +170,7 @@ template <execution_policy Policy, point_range Points>
 /// How often `filter_points` looks at each view.
 [[nodiscard]] constexpr std::size_t view_passes(const filter_options& options) noexcept {
   if (options.kind == filter_kind::ray_evidence) return options.ray_evidence.resolve_ghosts ? 2 : 1;
-  return options.kind == filter_kind::automatic ? 2 : 0;
+  return options.kind == filter_kind::automatic ? 1 : 0;
 }
 
 /// The same, and the automatic filter listens to the views that the points come from, too.

@@ -150,6 +150,19 @@ struct count_points {
   }
 };
 
+/// Takes one from the counters of the points with a bit in `words`. @pre none of these is zero
+struct uncount_points {
+  template <simd::target Target>
+  static ORBIS_ALWAYS_INLINE void run(const std::array<std::uint16_t, block_verdict::words>& words,
+                                      std::uint16_t* counters) {
+    using lanes = simd::vec<std::uint16_t, 16, Target>;
+    for (std::size_t w = 0; w != block_verdict::words; ++w) {
+      const lanes one = select(lanes::mask_type::from_bits(words[w]), lanes(1), lanes(0));
+      (lanes::load(counters + 16 * w) - one).store(counters + 16 * w);
+    }
+  }
+};
+
 /// The loops for the best instruction set.
 struct ray_kernels {
   void (*locate)(const ray_view&, const block_axes&, seen_block&) =
@@ -158,6 +171,8 @@ struct ray_kernels {
       simd::kernel<judge_by_windows, void(const ray_view&, const seen_block&, block_verdict&)>();
   void (*count)(const std::array<std::uint16_t, block_verdict::words>&, std::uint16_t*) =
       simd::kernel<count_points, void(const std::array<std::uint16_t, block_verdict::words>&, std::uint16_t*)>();
+  void (*take_back)(const std::array<std::uint16_t, block_verdict::words>&, std::uint16_t*) =
+      simd::kernel<uncount_points, void(const std::array<std::uint16_t, block_verdict::words>&, std::uint16_t*)>();
 };
 
 }  // namespace orbis::cloud::detail
@@ -169,5 +184,8 @@ ORBIS_COMPILED_KERNEL(orbis::cloud::detail::judge_by_windows,
                       void(const orbis::cloud::detail::ray_view&, const orbis::cloud::detail::seen_block&,
                            orbis::cloud::detail::block_verdict&));
 ORBIS_COMPILED_KERNEL(orbis::cloud::detail::count_points,
+                      void(const std::array<std::uint16_t, orbis::cloud::detail::block_verdict::words>&,
+                           std::uint16_t*));
+ORBIS_COMPILED_KERNEL(orbis::cloud::detail::uncount_points,
                       void(const std::array<std::uint16_t, orbis::cloud::detail::block_verdict::words>&,
                            std::uint16_t*));

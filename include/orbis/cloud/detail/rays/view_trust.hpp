@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cassert>
 #include <cmath>
 #include <concepts>
 #include <cstddef>
@@ -16,8 +17,10 @@
 #include <orbis/camera/depth.hpp>
 #include <orbis/camera/model.hpp>
 #include <orbis/cloud/detail/rays/depth_rows.hpp>
+#include <orbis/cloud/detail/rays/depth_windows.hpp>
 #include <orbis/cloud/detail/select/log_density.hpp>
 #include <orbis/cloud/ray_evidence.hpp>
+#include <orbis/cloud/view_samples.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/image.hpp>
 #include <orbis/core/random.hpp>
@@ -26,37 +29,6 @@
 #include <orbis/core/types.hpp>
 
 namespace orbis::cloud::detail {
-
-/// The depths of the eight pixels around one, opposite ones at i and 7 - i; 0 outside of the image.
-template <camera::depth_source Depth>
-[[nodiscard]] std::array<float, 8> depths_around(const Depth& depth, int x, int y) {
-  std::array<float, 8> out{};
-  std::size_t n = 0;
-  for (int dy = -1; dy <= 1; ++dy) {
-    for (int dx = -1; dx <= 1; ++dx) {
-      if (dx == 0 && dy == 0) continue;
-      const int u = x + dx;
-      const int v = y + dy;
-      out[n++] = u >= 0 && v >= 0 && u < depth.width() && v < depth.height() ? depth(u, v) : 0.0F;
-    }
-  }
-  return out;
-}
-
-/// Whether two of the pixels around agree with depth `z`, or two opposite ones with their mean: a
-/// surface seen flat has no two pixels of one depth.
-[[nodiscard]] inline bool agrees_with_neighbors(float z, const std::array<float, 8>& around, float margin) noexcept {
-  int agree = 0;
-  for (const float other : around) agree += other > 0 && std::abs(other - z) <= margin ? 1 : 0;
-  if (agree >= 2) return true;
-  constexpr float widest = 0.15F;  // of z: opposite pixels further apart lie on two surfaces
-  for (std::size_t i = 0; i != 4; ++i) {
-    const float a = around[i];
-    const float b = around[7 - i];
-    if (a > 0 && b > 0 && std::abs(a - b) <= widest * z && std::abs(0.5F * (a + b) - z) <= margin) return true;
-  }
-  return false;
-}
 
 /// For each depth of a row how many of the eight around it agree with it. Most depths agree with two at least, which is
 /// found out many at a time. Reads sixteen depths beyond the rows.
@@ -135,27 +107,30 @@ void remove_stray_pixels(const Policy& policy, const Depth& depth, float margin,
   });
 }
 
-/// Views with the stray pixels of their depth replaced, one at a time.
-/// Calls `f(number, cleaned view, view)` for each; false from `f` ends it, and is returned.
-template <execution_policy Policy, posed_depth_range Views, class F>
-bool for_each_cleaned_view(const Policy& policy, const Views& views, const ray_evidence_options& options, F&& f) {
-  struct cleaned_view {
-    camera::depth_view<float> depth;
-    se3 T_world_camera;
-  };
-  image<float> depth;
-  std::uint32_t number = 0;
-  for (const auto& view : views) {
-    remove_stray_pixels(policy, view.depth, options.margin, options.margin_growth, depth);
-    if (!f(number++, cleaned_view{camera::depth_view<float>(depth), view.T_world_camera}, view)) return false;
+/// A view with the stray pixels of its depth replaced.
+struct cleaned_view {
+  camera::depth_view<float> depth;
+  se3 T_world_camera;
+};
+
+/// Cleans one view at a time. Keeps its memory.
+class view_cleaner {
+ public:
+  /// The cleaned view; valid until the next call.
+  template <execution_policy Policy, posed_depth View>
+  [[nodiscard]] cleaned_view clean(const Policy& policy, const View& view, const ray_evidence_options& options) {
+    remove_stray_pixels(policy, view.depth, options.margin, options.margin_growth, depth_);
+    return {camera::depth_view<float>(depth_), view.T_world_camera};
   }
-  return true;
-}
+
+ private:
+  image<float> depth_;
+};
 
 /// What is asked of views beside their trust: nothing.
 struct ask_nothing {
   template <class View>
-  void operator()(const View&) const noexcept {}
+  void operator()(const View&, const cleaned_view&, const depth_windows&) const noexcept {}
 };
 
 struct view_trust_options {
@@ -227,80 +202,75 @@ class view_verdicts {
 /// Finds views whose pose is wrong by what they say of each other. A sample of the pixels of each is
 /// tested by all others (`ray_evidence`), tile by tile: a wrong pose is contradicted all over the
 /// image, a moving object in a part of it alone, so the median over the tiles counts. The worst view is left
-/// out until none stands out; if that would be half of them, all are trusted. Deterministic. `also(view)` is called for
-/// each view as well, so that who has other questions needs no pass of its own: views may be costly to look at.
-/// O(views (pixels + samples of all views)), and O(views) memory. @pre views' images have the camera's size
+/// out until none stands out; if that would be half of them, all are trusted. Deterministic. `also(view, cleaned
+/// view, its windows)` is called for each view as well, so that who has other questions needs no pass of its own: views
+/// may be costly to look at.
+/// `samples`: of the
+/// views, if they were drawn before; otherwise each view is looked at once more. O(views (pixels + samples of all
+/// views)), and O(views) memory. @pre views' images have the camera's size
 template <execution_policy Policy, posed_depth_range Views, camera::camera_model Camera, class Also = ask_nothing>
 [[nodiscard]] view_trust find_distrusted_views(const Policy& policy, const Views& views, const Camera& camera,
                                                const ray_evidence_options& evidence = {},
                                                const view_trust_options& options = {}, progress on_progress = {},
-                                               const Also& also = {}) {
-  constexpr int tiles = 4;   // across and down
+                                               const Also& also = {}, const view_samples* samples = nullptr) {
+  constexpr std::uint32_t tiles = view_samples::tiles;
   constexpr int enough = 6;  // samples of a tile that another view says something of
   const auto count = static_cast<std::uint32_t>(std::ranges::size(views));
   view_trust out;
+  view_cleaner cleaner;
+  depth_windows windows;
   if (count < options.least) {
-    for (const auto& view : views) also(view);
+    std::size_t done = 0;
+    for (const auto& view : views) {
+      const cleaned_view cleaned = cleaner.clean(policy, view, evidence);
+      windows.take(policy, cleaned.depth, evidence.window);
+      also(view, cleaned, windows);
+      if (!on_progress(++done, count)) break;
+    }
     return out;
   }
 
-  std::vector<vec3f> samples;
-  std::vector<std::uint32_t> place;  // view and tile
-  std::uint32_t number = 0;
-  for (const auto& view : views) {
-    const se3 pose = view.T_world_camera;
-    const std::uint32_t v = number++;
-    if (!pose.to_matrix().allFinite()) continue;
-    for (int j = 0; j != options.samples; ++j) {
-      for (int i = 0; i != options.samples; ++i) {
-        const int x = (2 * i + 1) * camera.width() / (2 * options.samples);
-        const int y = (2 * j + 1) * camera.height() / (2 * options.samples);
-        const float z = view.depth(x, y);
-        if (!(z > 0) || !agrees_with_neighbors(z, depths_around(view.depth, x, y),
-                                               evidence.margin + evidence.margin_growth * z * z))
-          continue;
-        const auto ray = camera.unproject({x, y});
-        if (!ray) continue;
-        samples.push_back((pose * (double{z} * *ray)).template cast<float>());
-        place.push_back(v * tiles * tiles +
-                        static_cast<std::uint32_t>(j * tiles / options.samples * tiles + i * tiles / options.samples));
-      }
-    }
-  }
+  view_samples drawn{evidence, options.samples};
+  if (samples == nullptr)
+    for (const auto& view : views) drawn.add(camera, view);
+  const view_samples& asked = samples != nullptr ? *samples : drawn;
+  assert(asked.views() == count);
+  const std::span<const std::uint32_t> place = asked.tile_of();  // view and tile
 
   std::vector<view_verdicts> verdicts(count);
-  ray_evidence_counter<Camera> counter{policy, samples, camera, evidence};
+  ray_evidence_counter<Camera> counter{policy, asked.points(), camera, evidence};
   std::vector<ray_evidence> before = counter.scores();
-  const bool finished =
-      for_each_cleaned_view(policy, views, evidence, [&](std::uint32_t by, const auto& view, const auto& as_seen) {
-        also(as_seen);
-        counter.add(policy, view);
-        std::vector<ray_evidence> scores = counter.scores();  // of all views so far
-        for (std::size_t begin = 0; begin != place.size();) {
-          std::size_t end = begin;
-          const std::uint32_t of = place[begin] / (tiles * tiles);
-          std::array<int, tiles * tiles> through{};
-          std::array<int, tiles * tiles> supported{};
-          for (; end != place.size() && place[end] / (tiles * tiles) == of; ++end) {
-            through[place[end] % (tiles * tiles)] += scores[end].through - before[end].through;
-            supported[place[end] % (tiles * tiles)] += scores[end].supported - before[end].supported;
-          }
-          begin = end;
-          if (of == by) continue;
-          for (std::size_t t = 0; t != tiles * tiles; ++t) {
-            const int all = through[t] + supported[t];
-            if (all < enough) continue;
-            view_verdict verdict{by, verdict_rank(of, by, t), static_cast<std::uint16_t>(through[t]),
-                                 static_cast<std::uint16_t>(all)};
-            verdicts[of].add(verdict);
-            verdict.other = of;
-            verdicts[by].add(verdict);
-          }
-        }
-        before.swap(scores);
-        return on_progress(by + 1, count);
-      });
-  if (!finished) return out;
+  std::uint32_t by = 0;
+  for (const auto& view : views) {
+    const cleaned_view cleaned = cleaner.clean(policy, view, evidence);
+    windows.take(policy, cleaned.depth, evidence.window);
+    also(view, cleaned, windows);
+    counter.add(policy, windows, cleaned.T_world_camera);
+    std::vector<ray_evidence> scores = counter.scores();  // of all views so far
+    for (std::size_t begin = 0; begin != place.size();) {
+      std::size_t end = begin;
+      const std::uint32_t of = place[begin] / (tiles * tiles);
+      std::array<int, tiles * tiles> through{};
+      std::array<int, tiles * tiles> supported{};
+      for (; end != place.size() && place[end] / (tiles * tiles) == of; ++end) {
+        through[place[end] % (tiles * tiles)] += scores[end].through - before[end].through;
+        supported[place[end] % (tiles * tiles)] += scores[end].supported - before[end].supported;
+      }
+      begin = end;
+      if (of == by) continue;
+      for (std::size_t t = 0; t != tiles * tiles; ++t) {
+        const int all = through[t] + supported[t];
+        if (all < enough) continue;
+        view_verdict verdict{by, verdict_rank(of, by, t), static_cast<std::uint16_t>(through[t]),
+                             static_cast<std::uint16_t>(all)};
+        verdicts[of].add(verdict);
+        verdict.other = of;
+        verdicts[by].add(verdict);
+      }
+    }
+    before.swap(scores);
+    if (!on_progress(++by, count)) return out;
+  }
 
   std::vector<char> left_out(count, 0);
   std::vector<double> conflicts(count);

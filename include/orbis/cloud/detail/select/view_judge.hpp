@@ -7,12 +7,14 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <ranges>
 #include <span>
 #include <string>
 #include <vector>
 
 #include <orbis/camera/model.hpp>
+#include <orbis/cloud/detail/rays/depth_windows.hpp>
 #include <orbis/cloud/detail/rays/view_trust.hpp>
 #include <orbis/cloud/detail/select/in_words.hpp>
 #include <orbis/cloud/filter_chain.hpp>
@@ -29,20 +31,10 @@ struct ray_removals {
   std::size_t unsupported = 0;
 };
 
-/// Clears `left` where the views exclude a point. If cancelled, nothing is removed.
-template <execution_policy Policy, point_range Points, posed_depth_range Views, camera::camera_model Camera>
-ray_removals apply_rays(const Policy& policy, const Points& points, const ray_step& step, const Views& views,
-                        const Camera& camera, std::span<char> left, bool& cancelled, progress on_progress) {
-  ray_evidence_counter<Camera> counter{policy, points, camera, step.evidence};
-  const std::size_t count = std::ranges::size(views);
-  cancelled =
-      !for_each_cleaned_view(policy, views, step.evidence, [&](std::uint32_t number, const auto& view, const auto&) {
-        if (!std::ranges::binary_search(step.distrusted, number)) counter.add(policy, view);
-        return on_progress(number + 1, count);
-      });
+/// Clears `left` where the counts exclude a point.
+[[nodiscard]] inline ray_removals remove_by_rays(const std::vector<ray_evidence>& scores, const ray_step& step,
+                                                 std::span<char> left) {
   ray_removals out;
-  if (cancelled) return out;
-  const std::vector<ray_evidence> scores = counter.scores();
   for (std::size_t i = 0; i != left.size(); ++i) {
     if (left[i] == 0) continue;
     const bool passed = is_passed_through(scores[i], step.evidence);
@@ -52,6 +44,22 @@ ray_removals apply_rays(const Policy& policy, const Points& points, const ray_st
     if (passed || unsupported) left[i] = 0;
   }
   return out;
+}
+
+/// Clears `left` where the views exclude a point. If cancelled, nothing is removed.
+template <execution_policy Policy, point_range Points, posed_depth_range Views, camera::camera_model Camera>
+ray_removals apply_rays(const Policy& policy, const Points& points, const ray_step& step, const Views& views,
+                        const Camera& camera, std::span<char> left, bool& cancelled, progress on_progress) {
+  ray_evidence_counter<Camera> counter{policy, points, camera, step.evidence};
+  view_cleaner cleaner;
+  const std::size_t count = std::ranges::size(views);
+  std::uint32_t number = 0;
+  for (auto view = std::ranges::begin(views); view != std::ranges::end(views) && !cancelled; ++view, ++number) {
+    if (!std::ranges::binary_search(step.distrusted, number))
+      counter.add(policy, cleaner.clean(policy, *view, step.evidence));
+    cancelled = !on_progress(number + 1, count);
+  }
+  return cancelled ? ray_removals{} : remove_by_rays(counter.scores(), step, left);
 }
 
 /// Whether a cloud was made of some views: nearly every point of a sample is in one of them.
@@ -100,21 +108,39 @@ template <execution_policy Policy, point_range Points, posed_depth_range Views, 
   ray_step step;
   bool cancelled = false;
   const std::size_t count = evidence.views;
-  const auto first_half = [&](std::size_t done, std::size_t) {
-    cancelled = cancelled || !on_progress(done, 2 * count);
+  const auto watched = [&](std::size_t done, std::size_t) {
+    cancelled = cancelled || !on_progress(done, count);
     return !cancelled;
   };
+  // All views are counted at once, and those that turn out to be wrong are taken back: most views are looked at once.
   made_of_views<Camera> sources{policy, points, camera, step.evidence};
-  view_trust trust = find_distrusted_views(policy, views, camera, step.evidence, {}, first_half,
-                                           [&](const auto& view) { sources.add(policy, view); });
+  ray_evidence_counter<Camera> counter{policy, points, camera, step.evidence};
+  view_trust trust = find_distrusted_views(
+      policy, views, camera, step.evidence, {}, watched,
+      [&](const auto& view, const cleaned_view& cleaned, const depth_windows& windows) {
+        sources.add(policy, view);
+        counter.add(policy, windows, cleaned.T_world_camera);
+      },
+      options.samples);
   if (cancelled) return false;
   evidence.worst_conflict = trust.worst_conflict;
   evidence.usual_conflict = trust.usual_conflict;
   step.distrusted = std::move(trust.distrusted);
   step.need_support = sources.verdict();
-  const auto second_half = [&](std::size_t done, std::size_t) { return on_progress(count + done, 2 * count); };
-  const ray_removals removed = apply_rays(policy, points, step, views, camera, left, cancelled, second_half);
-  if (cancelled) return false;
+  ray_removals removed;
+  constexpr std::size_t most_counted = std::numeric_limits<std::uint16_t>::max();
+  if (count > most_counted && !step.distrusted.empty()) {  // counts may have come to their end
+    removed = apply_rays(policy, points, step, views, camera, left, cancelled, {});
+  } else {
+    view_cleaner cleaner;
+    auto view = std::ranges::begin(views);
+    std::uint32_t number = 0;
+    for (const std::uint32_t wrong : step.distrusted) {
+      for (; number != wrong; ++number) ++view;
+      counter.remove(policy, cleaner.clean(policy, *view, step.evidence));
+    }
+    removed = remove_by_rays(counter.scores(), step, left);
+  }
   const auto total = static_cast<double>(std::max<std::size_t>(evidence.finite, 1));
   evidence.passed_through = static_cast<double>(removed.passed_through) / total;
   evidence.unsupported = static_cast<double>(removed.unsupported) / total;
