@@ -162,25 +162,13 @@ class voxel_sums {
   /// Gives every voxel its place in the order of `cloud`: by brick, then by voxel, along z, y, x. Valid
   /// until the next change. O(bricks log bricks).
   class order {
-   public:
-    /// The place of the voxel a point (metres, in the world) lies in; empty where nothing is.
-    [[nodiscard]] std::optional<std::size_t> find(const vec3& point) const {
-      detail::brick_place at;
-      if (!detail::locate(point, 1024.0 / sums_->size_, at)) return std::nullopt;
-      const std::uint32_t number = sums_->index_.find(at.brick, sums_->key_of());
-      if (number == none || !sums_->bricks_[number].voxels.contains(at.cell)) return std::nullopt;
-      return first_[number] + sums_->bricks_[number].voxels.rank(at.cell);
-    }
-
    private:
     friend class voxel_sums;
-    const voxel_sums* sums_ = nullptr;
     std::vector<std::uint32_t> bricks_;  ///< numbers, in order
     std::vector<std::size_t> first_;     ///< for each brick's number the place of its first voxel
   };
   [[nodiscard]] order in_order() const {
     order out;
-    out.sums_ = this;
     for (std::uint32_t b = 0; b != bricks_.size(); ++b) {
       if (bricks_[b].voxels.size() != 0) out.bricks_.push_back(b);
     }
@@ -195,6 +183,54 @@ class voxel_sums {
       out.first_[b] = place;
       place += bricks_[b].voxels.size();
     }
+    return out;
+  }
+
+  /// Some of the voxels, in a form made for many questions. Valid until the next change.
+  class choice {
+   public:
+    choice() = default;
+    /// Asks about points one after the other, quickly where most lie in the same brick as the one before.
+    class reader {
+     public:
+      explicit reader(const choice& of) noexcept : of_{&of} {}
+      /// Whether the voxel that the point (metres, in the world) lies in was chosen; empty where nothing is.
+      [[nodiscard]] std::optional<bool> find(const vec3& point) {
+        detail::brick_place at;
+        if (!detail::locate(point, 1024.0 / of_->sums_->size_, at)) return std::nullopt;
+        if (at.brick != brick_ || !asked_) {
+          asked_ = true;
+          brick_ = at.brick;
+          number_ = of_->sums_->index_.find(brick_, of_->sums_->key_of());
+        }
+        if (number_ == none || !of_->sums_->bricks_[number_].voxels.contains(at.cell)) return std::nullopt;
+        return (of_->chosen_[number_][at.cell / 64U] >> (at.cell % 64U) & 1U) != 0;
+      }
+
+     private:
+      const choice* of_;
+      bool asked_ = false;
+      detail::voxel_key brick_{};  ///< of the last point,
+      std::uint32_t number_ = 0;   ///< and its number
+    };
+
+   private:
+    friend class voxel_sums;
+    const voxel_sums* sums_ = nullptr;
+    std::vector<std::array<std::uint64_t, 8>> chosen_;  ///< by the bricks' numbers, a bit for each cell
+  };
+  /// `chosen`: for each voxel, in the order of `cloud`, not 0 if it is chosen. O(voxels + bricks log bricks).
+  [[nodiscard]] choice choose(std::span<const char> chosen) const {
+    assert(chosen.size() == occupied_);
+    choice out;
+    out.sums_ = this;
+    out.chosen_.resize(bricks_.size());
+    const order places = in_order();
+    std::size_t place = 0;
+    for (const std::uint32_t b : places.bricks_)
+      bricks_[b].voxels.for_each_cell([&](std::uint32_t cell) {
+        if (chosen[place++] != 0) out.chosen_[b][cell / 64U] |= std::uint64_t{1} << (cell % 64U);
+      });
     return out;
   }
 

@@ -19,15 +19,17 @@
 #include <orbis/camera/model.hpp>
 #include <orbis/camera/rays.hpp>
 #include <orbis/cloud/extract.hpp>
+#include <orbis/cloud/view_samples.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/image.hpp>
 #include <orbis/core/point_cloud.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/mapping/dense_cloud.hpp>
-#include <orbis/mapping/detail/moving/find_moving.hpp>
+#include <orbis/mapping/detail/moving/moving_window.hpp>
 #include <orbis/mapping/filter.hpp>
 #include <orbis/mapping/keyframe.hpp>
+#include <orbis/mapping/keyframe_points.hpp>
 #include <orbis/mapping/live_map.hpp>
 #include <orbis/mapping/masked_depth.hpp>
 #include <orbis/mapping/moving_options.hpp>
@@ -114,10 +116,10 @@ class standing_depth {
   image<mapping::depth_pixel<Depth>> copy_;
 };
 
-/// The steps of `build_map`. `into.wants(filtered, keyframe, whole)` says whether it lacks this keyframe's depth image,
-/// of which, unless it is `whole`, something has moved away;
-/// `into.scan(filtered, keyframe, depth)` takes one depth image, before and after the filter;
-/// `into.complete(filtered)` gives the map of all of them.
+/// The steps of `build_map`. `into.wants(k, whole)` says whether it lacks this keyframe's depth image, of which, unless
+/// it is `whole`, something has moved away; `into.scan(k, depth)` takes one depth image before the filter of the cloud;
+/// `into.unfiltered()` gives the map of these. `into.scan_filtered(k, depth)` and `into.filtered()` do the same after
+/// that filter.
 template <class Octree, execution_policy Policy, keyframe_range Keyframes, camera::camera_model Camera, class Into>
 [[nodiscard]] result<built_map<Octree>> build_map_into(const Policy& policy, const Keyframes& keyframes,
                                                        const Camera& camera, const map_options& options,
@@ -152,55 +154,91 @@ template <class Octree, execution_policy Policy, keyframe_range Keyframes, camer
   };
   const auto finite_pose = [](const auto& k) { return se3(k.T_world_camera).to_matrix().allFinite(); };
   const std::size_t looks = view_passes(options.filter);
-  const std::size_t passes = (options.unfiltered_octree ? 3U : 2U) + (options.moving ? 1U : 0U) + looks;
-  const std::size_t total = passes * std::ranges::size(keyframes);
+  const std::size_t total = (2U + looks) * std::ranges::size(keyframes);
   std::size_t done = 0;
 
+  // One pass for all that can be made of a keyframe by itself: depth images are costly to have.
+  using keyframe_type = std::ranges::range_value_t<Keyframes>;
+  using depth_type = std::remove_cvref_t<decltype(std::declval<const keyframe_type&>().depth)>;
+  using pixel = mapping::depth_pixel<depth_type>;
   built_map<Octree> map{.octree = Octree{options.resolution}};
-  bool cancelled = false;
-  std::vector<std::vector<removed_cell>> moved;
-  if (options.moving) {
-    moved = find_moving(policy, keyframes, camera, moving, [&] {
-      cancelled = !on_progress(++done, total);
-      return !cancelled;
-    });
-    if (cancelled) return fail(errc::cancelled, {}, "cancelled");
-  }
-  standing_depth<std::remove_cvref_t<decltype(std::declval<const std::ranges::range_value_t<Keyframes>&>().depth)>>
-      standing;
-  const auto moved_of = [&](std::size_t index) { return moved.empty() ? nullptr : &moved[index]; };
-
-  dense_cloud dense{camera::ray_table{camera}, options.dense};
-  std::size_t index = 0;
-  for (const auto& k : keyframes) {
-    const image_view<const rgb8> color = k.color;
-    if (!fits(k.depth) || (!color.empty() && !fits(color))) {
-      return fail(errc::invalid_argument, "keyframes", "an image is not of the camera's size");
-    }
-    if (finite_pose(k)) {
-      const se3 T_world_camera{k.T_world_camera};
-      const std::size_t removed = standing.with(k.depth, moved_of(index), moving, [&](const auto& depth) {
-        dense.add_keyframe(policy, keyframe<std::remove_cvref_t<decltype(depth)>>{depth, color, T_world_camera});
-      });
-      map.moving.keyframes += removed != 0 ? 1 : 0;
-      map.moving.pixels += removed;
-    } else {
+  const camera::ray_table rays{camera};
+  dense_options of_masked = options.dense;
+  of_masked.flying_pixels.reset();  // they are gone then
+  dense_cloud dense{rays, of_masked};
+  keyframe_points points;
+  standing_depth<depth_type> standing;
+  cloud::view_samples samples;
+  std::vector<std::vector<removed_cell>> moved(std::ranges::size(keyframes));
+  image<pixel> masked(camera.width(), camera.height());
+  const auto mask = [&](const auto& depth) {
+    return points.mask(policy, depth, rays, point_options(options.dense), masked.view());
+  };
+  const auto add = [&](auto& judged) -> result<void> {
+    const keyframe_type& k = judged.keyframe;
+    if (options.filter.kind == filter_kind::automatic) samples.add(camera, k);
+    if (!finite_pose(k)) {
       ++map.skipped;
+      return {};
     }
-    ++index;
+    const image_view<const rgb8> color = k.color;
+    if (!color.empty() && !fits(color))
+      return fail(errc::invalid_argument, "keyframes", "an image is not of the camera's size");
+    const std::size_t removed = standing.with(k.depth, &judged.removed, moving, [&](const auto& depth) {
+      const cloud::flying_pixel_count flying = mask(depth);
+      map.flying_pixels.valid += flying.valid;
+      map.flying_pixels.removed += flying.removed;
+    });
+    map.moving.keyframes += removed != 0 ? 1 : 0;
+    map.moving.pixels += removed;
+    const auto depth = view_like(k.depth, std::as_const(masked).view());
+    dense.add_keyframe(policy, keyframe<std::remove_cv_t<decltype(depth)>>{depth, color, se3(k.T_world_camera)});
+    if (options.unfiltered_octree) {
+      const result<bool> wanted = into.wants(k, judged.removed.empty());
+      if (!wanted) return fail(wanted.error());
+      std::chrono::steady_clock::duration time{};
+      if (*wanted) {
+        const auto start = std::chrono::steady_clock::now();
+        if (auto scanned = into.scan(k, depth); !scanned) return scanned;
+        time = std::chrono::steady_clock::now() - start;
+      }
+      map.insert_ms_unfiltered.push_back(std::chrono::duration<double, std::milli>(time).count());
+    }
+    moved[judged.number] = std::move(judged.removed);
+    return {};
+  };
+  moving_window<Camera, keyframe_type> window{camera, options.moving};
+  const auto add_judged = [&]() -> result<void> {
+    while (auto judged = window.pop())
+      if (auto added = add(*judged); !added) return added;
+    return {};
+  };
+  for (const auto& k : keyframes) {
+    if (!fits(k.depth)) return fail(errc::invalid_argument, "keyframes", "an image is not of the camera's size");
+    window.push(policy, k);
+    if (auto added = add_judged(); !added) return fail(std::move(added.error()));
     if (!on_progress(++done, total)) return fail(errc::cancelled, {}, "cancelled");
+  }
+  window.finish();
+  if (auto added = add_judged(); !added) return fail(std::move(added.error()));
+  if (options.unfiltered_octree) {
+    auto octree = into.unfiltered();
+    if (!octree) return fail(std::move(octree.error()));
+    map.unfiltered_octree.emplace(*std::move(octree));
   }
 
   map.cloud = dense.cloud(policy);
   std::vector<float> ranges = dense.ranges(policy);
   dense.finish();
-  map.flying_pixels = dense.flying_pixels();
+  bool cancelled = false;
   const auto while_filtering = [&](std::size_t views_done, std::size_t) {
     cancelled = cancelled || !on_progress(done + views_done, total);
     return !cancelled;
   };
+  filter_options with_samples = options.filter;
+  with_samples.automatic.samples = &samples;
   filtered_indices filtered =
-      filter_points(policy, map.cloud.points, ranges, keyframes, camera, options.filter, while_filtering);
+      filter_points(policy, map.cloud.points, ranges, keyframes, camera, with_samples, while_filtering);
   if (cancelled) return fail(errc::cancelled, {}, "cancelled");
   std::vector<float>{}.swap(ranges);
   done += looks * std::ranges::size(keyframes);
@@ -209,43 +247,24 @@ template <class Octree, execution_policy Policy, keyframe_range Keyframes, camer
   map.inliers = std::move(filtered.inliers);
   std::vector<char> kept(map.cloud.size(), 0);
   for (const std::uint32_t i : map.inliers) kept[i] = 1;
+  const dense_cloud::selection kept_points = dense.select(std::move(kept));
 
-  const auto scan_all = [&](bool filtered, const dense_cloud::selection& kept_points,
-                            std::vector<double>& milliseconds) -> result<void> {
-    std::size_t number = 0, at = 0;
-    for (const auto& k : keyframes) {
-      const std::vector<removed_cell>* const cells = moved_of(at++);
-      if (finite_pose(k)) {
-        const result<bool> wanted = into.wants(filtered, k, cells == nullptr || cells->empty());
-        if (!wanted) return fail(wanted.error());
-        std::chrono::steady_clock::duration time{};
-        if (*wanted) {
-          image<mapping::depth_pixel<std::remove_cvref_t<decltype(k.depth)>>> depth;
-          standing.with(k.depth, cells, moving, [&](const auto& whole) {
-            depth = dense.masked_depth(policy, keyframe<std::remove_cvref_t<decltype(whole)>>{whole, {}, {}}, number,
-                                       kept_points);
-          });
-          const auto start = std::chrono::steady_clock::now();
-          if (auto scanned = into.scan(filtered, k, view_like(k.depth, std::as_const(depth).view())); !scanned)
-            return scanned;
-          time = std::chrono::steady_clock::now() - start;
-        }
-        ++number;
-        milliseconds.push_back(std::chrono::duration<double, std::milli>(time).count());
-      }
-      if (!on_progress(++done, total)) return fail(errc::cancelled, {}, "cancelled");
+  std::size_t number = 0, at = 0;
+  for (const auto& k : keyframes) {
+    const std::vector<removed_cell>& cells = moved[at++];
+    if (finite_pose(k)) {
+      static_cast<void>(standing.with(k.depth, &cells, moving, mask));
+      image<pixel> left = masked;
+      dense.remove_points(policy, view_like(k.depth, std::as_const(masked).view()), number++, kept_points, left.view());
+      const auto start = std::chrono::steady_clock::now();
+      if (auto scanned = into.scan_filtered(k, view_like(k.depth, std::as_const(left).view())); !scanned)
+        return fail(std::move(scanned.error()));
+      const auto time = std::chrono::steady_clock::now() - start;
+      map.insert_ms.push_back(std::chrono::duration<double, std::milli>(time).count());
     }
-    return {};
-  };
-  if (options.unfiltered_octree) {
-    if (auto scanned = scan_all(false, {}, map.insert_ms_unfiltered); !scanned) return fail(std::move(scanned.error()));
-    auto octree = into.complete(false);
-    if (!octree) return fail(std::move(octree.error()));
-    map.unfiltered_octree.emplace(*std::move(octree));
+    if (!on_progress(++done, total)) return fail(errc::cancelled, {}, "cancelled");
   }
-  if (auto scanned = scan_all(true, dense.select(std::move(kept)), map.insert_ms); !scanned)
-    return fail(std::move(scanned.error()));
-  auto octree = into.complete(true);
+  auto octree = into.filtered();
   if (!octree) return fail(std::move(octree.error()));
   map.octree = *std::move(octree);
   return map;
@@ -260,19 +279,24 @@ struct fresh_octrees {
   std::optional<Octree> octree{};  // options are checked before the first scan
 
   template <class Keyframe>
-  result<bool> wants(bool, const Keyframe&, bool) const {
+  result<bool> wants(const Keyframe&, bool) const {
     return true;
   }
   template <class Keyframe, class Depth>
-  result<void> scan(bool, const Keyframe& k, const Depth& depth) {
+  result<void> scan(const Keyframe& k, const Depth& depth) {
     if (!octree) octree.emplace(options.resolution);
     octree->integrate(policy, depth, camera, se3(k.T_world_camera), options.integration);
     return {};
   }
-  result<Octree> complete(bool) {
+  template <class Keyframe, class Depth>
+  result<void> scan_filtered(const Keyframe& k, const Depth& depth) {
+    return scan(k, depth);
+  }
+  result<Octree> unfiltered() {
     std::optional<Octree> whole = std::exchange(octree, std::nullopt);
     return whole ? *std::move(whole) : Octree{options.resolution};
   }
+  result<Octree> filtered() { return unfiltered(); }
 };
 
 /// Into a live map, which has most of the keyframes already.
@@ -283,33 +307,37 @@ struct live_octree {
   std::vector<keyframe_position> poses{};
 
   template <class Keyframe>
-  result<bool> wants(bool filtered, const Keyframe& k, bool whole) {
-    if (filtered) return true;
+  result<bool> wants(const Keyframe& k, bool whole) {
     if (!poses.empty() && !(poses.back().frame < k.frame))
       return fail(errc::invalid_argument, "keyframes", "their frame numbers do not ascend");
     poses.push_back({k.frame, se3(k.T_world_camera)});
     return !whole || !live.contains(k.frame) || live.is_filtered(k.frame);
   }
   template <class Keyframe, class Depth>
-  result<void> scan(bool filtered, const Keyframe& k, const Depth& depth) {
-    // Where the images' file cannot be written to, they stay in memory: nothing is lost.
-    const auto unless_kept = [](error e) -> result<void> {
-      if (e.code == errc::write_failed) return {};
-      return fail(std::move(e));
-    };
-    if (filtered) {
-      auto set = live.set_depth(policy, k.frame, depth);
-      return set ? result<void>{} : unless_kept(std::move(set.error()));
-    }
+  result<void> scan(const Keyframe& k, const Depth& depth) {
     // Not complete even before the filter: pixels of what moved away may be missing, and an end may come before the
     // filter's verdict.
-    auto added = live.add_keyframe(policy, k.frame, depth, poses.back().T_world_camera, completeness::filtered);
-    return added ? result<void>{} : unless_kept(std::move(added.error()));
+    return unless_kept(live.add_keyframe(policy, k.frame, depth, poses.back().T_world_camera, completeness::filtered));
   }
-  result<typename Live::octree_type> complete(bool filtered) {
-    if (!filtered) live.set_poses(poses, unlisted::hide);
+  template <class Keyframe, class Depth>
+  result<void> scan_filtered(const Keyframe& k, const Depth& depth) {
+    return unless_kept(live.set_depth(policy, k.frame, depth));
+  }
+  result<typename Live::octree_type> unfiltered() {
+    live.set_poses(poses, unlisted::hide);
+    return filtered();
+  }
+  result<typename Live::octree_type> filtered() {
     if (auto finished = live.finish(policy); !finished) return fail(std::move(finished.error()));
     return live.snapshot();
+  }
+
+ private:
+  /// Where the images' file cannot be written to, they stay in memory: nothing is lost.
+  template <class Done>
+  static result<void> unless_kept(Done done) {
+    if (done || done.error().code == errc::write_failed) return {};
+    return fail(std::move(done.error()));
   }
 };
 

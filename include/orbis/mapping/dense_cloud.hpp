@@ -184,18 +184,18 @@ class dense_cloud {
 
    private:
     friend class dense_cloud;
-    std::vector<char> kept_;
-    std::optional<cloud::voxel_sums::order> places_;
+    std::vector<char> kept_;                           ///< where points are not merged
+    std::optional<cloud::voxel_sums::choice> voxels_;  ///< where they are
     std::vector<std::size_t> first_of_frame_;
   };
   /// `kept`: one entry for each point of the cloud, not 0 where it is kept.
   [[nodiscard]] selection select(std::vector<char> kept) const {
     assert(kept.size() == size());
     selection out;
-    out.kept_ = std::move(kept);
     if (merging()) {
-      out.places_ = voxels_.in_order();
+      out.voxels_ = voxels_.choose(kept);
     } else {
+      out.kept_ = std::move(kept);
       std::size_t first = 0;
       for (const frame& f : frames_) {
         out.first_of_frame_.push_back(first);
@@ -215,30 +215,50 @@ class dense_cloud {
     assert(contains(number));
     keyframe_points reader;  // const functions share no memory
     auto out = reader.masked(policy, k.depth, rays_, point_options(options_));
-    if (!kept.places_ && kept.first_of_frame_.empty()) return out;
-    const auto depth = view_like(k.depth, image_view<const depth_pixel<std::remove_cvref_t<decltype(k.depth)>>>(out));
+    const auto whole = out;
+    remove_points(policy,
+                  view_like(k.depth, image_view<const depth_pixel<std::remove_cvref_t<decltype(k.depth)>>>(whole)),
+                  number, kept, out.view());
+    return out;
+  }
+  /// The second half of `masked_depth`: sets the pixels of `out`, a copy of what `depth` stores, to 0 whose point of
+  /// the cloud is not kept, or for which no point speaks. O(pixels). @pre `depth` is keyframe `number`'s image without
+  /// flying pixels
+  template <execution_policy Policy, camera::depth_source Depth>
+  void remove_points(const Policy& policy, const Depth& depth, std::size_t number, const selection& kept,
+                     image_view<depth_pixel<Depth>> out) const {
+    assert(contains(number));
+    if (!kept.voxels_ && kept.first_of_frame_.empty()) return;
     keyframe_point_options points = point_options(options_);
     points.flying_pixels.reset();  // they are gone
     const se3& T_world_camera = frames_[number].T_world_camera;
-    const auto is_kept = [&](const vec3f& point) -> std::optional<bool> {  // by its voxel
-      if (!kept.places_) return std::nullopt;
-      const auto place = kept.places_->find(point.cast<double>());
-      return place ? std::optional{kept.kept_[*place] != 0} : std::nullopt;
-    };
-    image<std::uint8_t> block_kept((rays_.width() + options_.stride - 1) / options_.stride,
-                                   (rays_.height() + options_.stride - 1) / options_.stride);
-    std::size_t next = kept.places_ ? 0 : kept.first_of_frame_[number];
-    reader.read(seq, depth, rays_, points, T_world_camera, [&](std::size_t, int x, int y, const vec3f& point, float) {
-      const bool keep = kept.places_ ? is_kept(point).value_or(false) : kept.kept_[next++] != 0;
-      block_kept(x / options_.stride, y / options_.stride) = keep ? 1 : 0;
-    });
+    keyframe_points reader;  // const functions share no memory
+    if (!kept.voxels_) {
+      image<std::uint8_t> block_kept((rays_.width() + options_.stride - 1) / options_.stride,
+                                     (rays_.height() + options_.stride - 1) / options_.stride);
+      std::size_t next = kept.first_of_frame_[number];
+      reader.read(seq, depth, rays_, points, T_world_camera, [&](std::size_t, int x, int y, const vec3f&, float) {
+        block_kept(x / options_.stride, y / options_.stride) = kept.kept_[next++] != 0 ? 1 : 0;
+      });
+      for (int y = 0; y != rays_.height(); ++y)
+        for (int x = 0; x != rays_.width(); ++x)
+          if (block_kept(x / options_.stride, y / options_.stride) == 0) out(x, y) = 0;
+      return;
+    }
     points.stride = 1;
-    reader.read(policy, depth, rays_, points, T_world_camera,
-                [&](std::size_t, int x, int y, const vec3f& point, float) {
-                  if (!is_kept(point).value_or(block_kept(x / options_.stride, y / options_.stride) != 0))
-                    out(x, y) = 0;
-                });
-    return out;
+    const camera::float_pose pose{T_world_camera};
+    std::vector<cloud::voxel_sums::choice::reader> readers(keyframe_points::parts(rays_, 1),
+                                                           cloud::voxel_sums::choice::reader{*kept.voxels_});
+    reader.read(
+        policy, depth, rays_, points, T_world_camera, [&](std::size_t part, int x, int y, const vec3f& point, float) {
+          std::optional<bool> is_kept = readers[part].find(point.cast<double>());
+          if (!is_kept) {  // by its block's point
+            const auto block =
+                keyframe_points::point_at(depth, x - x % options_.stride, y - y % options_.stride, rays_, points, pose);
+            is_kept = block && readers[part].find(block->template cast<double>()).value_or(false);
+          }
+          if (!*is_kept) out(x, y) = 0;
+        });
   }
   /// The measurements of keyframe `number` in the world, where it was added or moved to last, of those
   /// alone whose point of the cloud is in `kept`. Only the images of `k` are looked at. O(pixels).
@@ -247,7 +267,7 @@ class dense_cloud {
   [[nodiscard]] std::vector<vec3f> measurements(const Policy& policy, const Keyframe& k, std::size_t number,
                                                 const selection& kept = {}) const {
     assert(contains(number));
-    const bool all = !kept.places_ && kept.first_of_frame_.empty();
+    const bool all = !kept.voxels_ && kept.first_of_frame_.empty();
     std::vector<vec3f> out;
     if (!merging()) {
       const std::vector<vec3f>& points = frames_[number].cloud.points;
@@ -260,12 +280,11 @@ class dense_cloud {
     }
     keyframe_points reader;  // const functions share no memory
     std::vector<std::vector<vec3f>> parts(reader.parts(rays_, options_.stride));
+    std::vector<cloud::voxel_sums::choice::reader> readers;
+    if (!all) readers.assign(parts.size(), cloud::voxel_sums::choice::reader{*kept.voxels_});
     reader.read(policy, k.depth, rays_, point_options(options_), frames_[number].T_world_camera,
                 [&](std::size_t part, int, int, const vec3f& point, float) {
-                  if (!all) {
-                    const auto place = kept.places_->find(point.cast<double>());
-                    if (!place || kept.kept_[*place] == 0) return;
-                  }
+                  if (!all && !readers[part].find(point.cast<double>()).value_or(false)) return;
                   parts[part].push_back(point);
                 });
     for (const auto& part : parts) out.insert(out.end(), part.begin(), part.end());

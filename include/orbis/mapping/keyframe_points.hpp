@@ -62,13 +62,14 @@ class keyframe_points {
   [[nodiscard]] image<depth_pixel<Depth>> masked(const Policy& policy, const Depth& depth,
                                                  const camera::ray_table& rays, const keyframe_point_options& options) {
     image<depth_pixel<Depth>> out(rays.width(), rays.height());
-    mask(policy, depth, rays, options, out.view());
+    static_cast<void>(mask(policy, depth, rays, options, out.view()));
     return out;
   }
-  /// The same into `out`, which may be the pixels of `depth` itself. @pre `out` has the size of `depth`
+  /// The same into `out`, which may be the pixels of `depth` itself. Returns how many pixels the filter of flying
+  /// pixels has looked at and left out. @pre `out` has the size of `depth`
   template <execution_policy Policy, camera::depth_source Depth>
-  void mask(const Policy& policy, const Depth& depth, const camera::ray_table& rays,
-            const keyframe_point_options& options, image_view<depth_pixel<Depth>> out) {
+  cloud::flying_pixel_count mask(const Policy& policy, const Depth& depth, const camera::ray_table& rays,
+                                 const keyframe_point_options& options, image_view<depth_pixel<Depth>> out) {
     const auto keep = [&](const auto& valid) {
       for_each_index(policy, static_cast<std::size_t>(rays.height()), rows_of_part, [&](std::size_t row) {
         const int y = static_cast<int>(row);
@@ -80,11 +81,24 @@ class keyframe_points {
       });
     };
     if (options.flying_pixels) {
-      static_cast<void>(remove_flying(policy, depth, rays, options));
+      const auto count = remove_flying(policy, depth, rays, options);
       keep(camera::depth_view<float>(filtered_.view()));
-    } else {
-      keep(depth);
+      return count;
     }
+    keep(depth);
+    return {};
+  }
+  /// The point of one pixel in the world, by the same bits as `read`; empty where it has none.
+  /// @pre the pixel lies in the image; depth and rays have the same size
+  template <camera::depth_source Depth>
+  [[nodiscard]] static std::optional<vec3f> point_at(const Depth& depth, int x, int y, const camera::ray_table& rays,
+                                                     const keyframe_point_options& options,
+                                                     const camera::float_pose& T_world_camera) {
+    const float z = depth(x, y);
+    if (!is_in_range(z, options) || !std::isfinite(squared_norm(rays.at(x, y, z)))) return std::nullopt;
+    const vec2f& ray = rays(x, y);
+    const auto p = camera::world_point(T_world_camera, ray.x(), ray.y(), z);
+    return vec3f{p[0], p[1], p[2]};
   }
 
  private:

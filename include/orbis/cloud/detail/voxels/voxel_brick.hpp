@@ -67,10 +67,10 @@ class voxel_brick {
   }
   [[nodiscard]] std::size_t memory_bytes() const noexcept { return sums_.capacity() * sizeof(voxel_sum); }
   [[nodiscard]] bool contains(std::uint32_t cell) const noexcept { return (mask_[cell / 64] >> (cell % 64) & 1U) != 0; }
-  /// How many occupied cells come before this one.
-  [[nodiscard]] std::size_t rank(std::uint32_t cell) const noexcept {
-    const std::uint64_t below = mask_[cell / 64] & ((std::uint64_t{1} << (cell % 64)) - 1);
-    return before_[cell / 64] + static_cast<std::size_t>(std::popcount(below));
+  /// `f(cell)` for the occupied cells.
+  template <class F>
+  void for_each_cell(F&& f) const {
+    for_each_cell(mask_, f);
   }
   /// Forgets the sums, and keeps which cells are occupied.
   void drop_sums() noexcept { std::vector<voxel_sum>{}.swap(sums_); }

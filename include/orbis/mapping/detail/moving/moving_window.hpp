@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// What has moved away in keyframes that are gone through once, in their order.
+#pragma once
+
+#include <cassert>
+#include <concepts>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include <orbis/camera/depth.hpp>
+#include <orbis/camera/model.hpp>
+#include <orbis/core/execution.hpp>
+#include <orbis/core/image.hpp>
+#include <orbis/core/se3.hpp>
+#include <orbis/mapping/detail/moving/moving_judge.hpp>
+#include <orbis/mapping/keyframe.hpp>
+#include <orbis/mapping/moving_options.hpp>
+
+namespace orbis::mapping::detail {
+
+/// A depth image as a moving_judge wants it: itself, or a copy in quarters of a millimetre, without what is farther
+/// away than 16 m. `copy` keeps the pixels.
+template <camera::depth_source Depth>
+[[nodiscard]] camera::depth_view<std::uint16_t> stored_depths(const Depth& depth, image<std::uint16_t>& copy) {
+  if constexpr (std::same_as<Depth, camera::depth_view<std::uint16_t>>) {
+    return depth;
+  } else {
+    constexpr float scale = 4000.0F;
+    if (copy.width() != depth.width() || copy.height() != depth.height())
+      copy = image<std::uint16_t>(depth.width(), depth.height());
+    for (int y = 0; y != depth.height(); ++y)
+      for (int x = 0; x != depth.width(); ++x) {
+        const float stored = depth(x, y) * scale;
+        copy(x, y) = stored >= 1.0F && stored < 65535.0F ? static_cast<std::uint16_t>(stored) : std::uint16_t{0};
+      }
+    return camera::depth_view<std::uint16_t>{copy.view(), static_cast<double>(scale)};
+  }
+}
+
+/// Keeps keyframes until those before and after them have said which of their cells their rays pass through, and gives
+/// them back in order. A keyframe without a finite pose is not judged, nor does it judge. Without options none is.
+template <camera::camera_model Camera, keyframe_like Keyframe>
+class moving_window {
+ public:
+  struct judged_keyframe {
+    std::size_t number = 0;  ///< in the order that they came in
+    Keyframe keyframe;
+    std::vector<removed_cell> removed{};  ///< the cells of what has moved away
+  };
+
+  moving_window(const Camera& camera, const std::optional<moving_filter_options>& options) {
+    if (options) judge_.emplace(camera, *options);
+  }
+  /// Adds the next keyframe, and keeps a copy of it. O(pixels + cells x options.keyframes).
+  /// @pre the image has the camera's size
+  template <execution_policy Policy>
+  void push(const Policy& policy, const Keyframe& k) {
+    const se3 T_world_camera = k.T_world_camera;
+    kept_.push_back({{count_++, k}, T_world_camera});
+    if (!judge_ || !T_world_camera.to_matrix().allFinite()) {
+      kept_.back().is_judged = true;
+      return;
+    }
+    if (judge_->is_full()) settle(judge_->views().front());
+    const auto pose_of = [&](const auto& view) { return std::optional{at(view.frame).T_world_camera}; };
+    judge_->add(policy, kept_.back().item.number, stored_depths(k.depth, copy_), T_world_camera, pose_of);
+    for (auto& view : judge_->views()) judge_->ask_newest(policy, view, pose_of);
+  }
+  /// No keyframe will come: all that are left are judged.
+  void finish() {
+    if (judge_)
+      for (auto& view : judge_->views())
+        if (!at(view.frame).is_judged) settle(view);
+  }
+  /// The next keyframe whose judgement stands, if there is one.
+  [[nodiscard]] std::optional<judged_keyframe> pop() {
+    if (kept_.empty() || !kept_.front().is_judged) return std::nullopt;
+    judged_keyframe out = std::move(kept_.front().item);
+    kept_.pop_front();
+    return out;
+  }
+
+ private:
+  struct entry {
+    judged_keyframe item;
+    se3 T_world_camera;
+    bool is_judged = false;
+  };
+  [[nodiscard]] entry& at(std::uint64_t number) {
+    assert(!kept_.empty() && number >= kept_.front().item.number);
+    return kept_[static_cast<std::size_t>(number) - kept_.front().item.number];
+  }
+  template <class View>
+  void settle(View& view) {
+    static_cast<void>(judge_->judge(view));
+    judge_->accept(view);
+    entry& e = at(view.frame);
+    e.item.removed = view.removed_cells();
+    e.is_judged = true;
+  }
+
+  std::optional<moving_judge<Camera>> judge_;
+  std::size_t count_ = 0;
+  std::deque<entry> kept_;  // a judged one goes before the next is added: pop is called until it gives nothing
+  image<std::uint16_t> copy_;
+};
+
+}  // namespace orbis::mapping::detail
