@@ -83,7 +83,8 @@ result<built_map> map_frames(const posed_frames& frames, const frame_source& sou
   orbis::mapping::map_options options{
       .dense = dense_options(s), .filter = filter_options(s), .resolution = s.resolution};
   if (options.filter.kind == orbis::mapping::filter_kind::automatic) options.moving.emplace();
-  const auto policy = orbis::par.with(s.threads);
+  orbis::thread_pool threads{s.threads};
+  const auto policy = orbis::par.on(threads);
   const auto shown = console.progress();
   const auto progress = [&](std::size_t done, std::size_t total) {
     if (done % frames.size() == 1) give_back_memory();  // of the last pass over the frames

@@ -7,6 +7,7 @@
 /// | `types.hpp` | short names for vectors and matrices |
 /// | `so3.hpp, se3.hpp, sim3.hpp` | rotations, poses, similarities: Lie groups with exp and log |
 /// | `jacobi.hpp` | eigenvalues and singular values of small matrices, the rotation nearest to a matrix |
+/// | `thread_pool.hpp` | threads that wait for the loops of a policy |
 /// | `trajectory.hpp` | poses with times, poses between them, pairs of time stamps |
 /// | `point.hpp, point_cloud.hpp` | how algorithms read any point type in place; points with colours |
 /// | `image.hpp` | images and views of images |
@@ -39,6 +40,7 @@
 #include <orbis/core/sim3.hpp>
 #include <orbis/core/simd.hpp>
 #include <orbis/core/so3.hpp>
+#include <orbis/core/thread_pool.hpp>
 #include <orbis/core/trajectory.hpp>
 #include <orbis/core/types.hpp>
 #include <orbis/core/utf8.hpp>

@@ -21,6 +21,8 @@
 #include <utility>
 #include <vector>
 
+#include <orbis/core/thread_pool.hpp>
+
 namespace orbis {
 
 /// Everything on the calling thread.
@@ -28,12 +30,17 @@ struct sequential_policy {
   [[nodiscard]] static constexpr unsigned threads() noexcept { return 1; }
 };
 
-/// On several threads: as many as the machine has, or the number given to `with`.
+/// On several threads: as many as the machine has, or the number given to `with`. They are started for each loop, or
+/// are those of a pool.
 struct parallel_policy {
-  unsigned count = 0;  ///< 0: one thread for each hardware thread
+  unsigned count = 0;           ///< 0: one thread for each hardware thread
+  thread_pool* pool = nullptr;  ///< whose threads do the work; outlives the policy
 
-  [[nodiscard]] constexpr parallel_policy with(unsigned n) const noexcept { return {n}; }
+  [[nodiscard]] constexpr parallel_policy with(unsigned n) const noexcept { return {n, pool}; }
+  /// On the threads of `pool`, all of them if no number is given.
+  [[nodiscard]] constexpr parallel_policy on(thread_pool& threads) const noexcept { return {count, &threads}; }
   [[nodiscard]] unsigned threads() const noexcept {
+    if (count == 0 && pool != nullptr) return pool->threads();
     return count != 0 ? count : std::max(1U, std::thread::hardware_concurrency());
   }
 };
@@ -51,7 +58,7 @@ namespace detail {
 
 /// Calls `run(context, i)` for every i in [0, count), on the calling thread and `workers - 1` others. A function and
 /// not a template, so that not every loop of a program brings the handling of threads with it.
-inline void hand_out(std::size_t count, std::size_t workers, void (*run)(const void*, std::size_t),
+inline void hand_out(std::size_t count, std::size_t workers, thread_pool* pool, void (*run)(const void*, std::size_t),
                      const void* context) {
   if (workers <= 1) {
     for (std::size_t i = 0; i != count; ++i) run(context, i);
@@ -70,7 +77,10 @@ inline void hand_out(std::size_t count, std::size_t workers, void (*run)(const v
       if (!failure) failure = std::current_exception();
     }
   };
-  {
+  if (pool != nullptr) {
+    pool->run(
+        workers - 1, [](const void* it) { (*static_cast<const decltype(work)*>(it))(); }, &work);
+  } else {
     std::vector<std::jthread> others;
     others.reserve(workers - 1);
     try {
@@ -100,7 +110,9 @@ void for_each_chunk(const Policy& policy, std::size_t count, std::size_t grain, 
     const auto run_one = [](const void* context, std::size_t chunk) {
       (*static_cast<const decltype(run)*>(context))(chunk);
     };
-    detail::hand_out(chunks, std::min<std::size_t>(policy.threads(), chunks), run_one, &run);
+    thread_pool* pool = nullptr;
+    if constexpr (std::is_same_v<Policy, parallel_policy>) pool = policy.pool;
+    detail::hand_out(chunks, std::min<std::size_t>(policy.threads(), chunks), pool, run_one, &run);
   }
 }
 
