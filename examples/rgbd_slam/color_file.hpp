@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Colour images in a file, for frames that take longer to make again than to read.
+/// The colours of keyframes in a file, so that an image is not decoded, or made, a second time.
 #pragma once
 
 #include <cstddef>
@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <unordered_map>
 #include <utility>
+#include <vector>
 
 #include <fcntl.h>
 #include <unistd.h>
@@ -16,12 +17,19 @@
 
 namespace app {
 
-/// Colour images by number, all of one size, in a file that has no name once it is open.
+/// Colour images by number, all of one size: every `stride`-th pixel of every `stride`-th row, which is what becomes
+/// points. In a file that has no name once it is open.
 class color_file {
  public:
-  explicit color_file(std::filesystem::path path) : path_{std::move(path)} {}
+  /// The file takes no image beyond `most_bytes`. @pre stride > 0
+  color_file(std::filesystem::path path, int stride, std::uint64_t most_bytes)
+      : path_{std::move(path)}, stride_{stride}, most_bytes_{most_bytes} {}
   color_file(color_file&& other) noexcept
-      : path_{std::move(other.path_)}, file_{std::exchange(other.file_, -1)}, at_{std::move(other.at_)} {}
+      : path_{std::move(other.path_)},
+        stride_{other.stride_},
+        most_bytes_{other.most_bytes_},
+        file_{std::exchange(other.file_, -1)},
+        at_{std::move(other.at_)} {}
   color_file& operator=(color_file&&) = delete;
   ~color_file() {
     if (file_ >= 0) ::close(file_);
@@ -34,29 +42,43 @@ class color_file {
       if (file_ >= 0) ::unlink(path_.c_str());
     }
     const std::size_t place = at_.size();
-    const auto bytes = size_of(color);
-    if (file_ < 0 || ::pwrite(file_, color.pixels().data(), bytes, offset(place, bytes)) != static_cast<ssize_t>(bytes))
+    const std::vector<orbis::rgb8> pixels = sample(color);
+    const std::size_t bytes = pixels.size() * sizeof(orbis::rgb8);
+    if (file_ < 0 || (place + 1) * bytes > most_bytes_ ||
+        ::pwrite(file_, pixels.data(), bytes, offset(place, bytes)) != static_cast<ssize_t>(bytes))
       return false;
     at_[number] = place;
     return true;
   }
-  /// Whether it could be read. `out` has the size of the images. Any number of threads may call this.
+  /// Whether it could be read. `out` has the size of the images; its other pixels stay as they are. Any number of
+  /// threads may call this.
   bool get(std::uint64_t number, orbis::image<orbis::rgb8>& out) const {
     const auto found = at_.find(number);
     if (found == at_.end()) return false;
-    const auto bytes = size_of(out);
-    return ::pread(file_, out.pixels().data(), bytes, offset(found->second, bytes)) == static_cast<ssize_t>(bytes);
+    std::vector<orbis::rgb8> pixels = sample(out);
+    const std::size_t bytes = pixels.size() * sizeof(orbis::rgb8);
+    if (::pread(file_, pixels.data(), bytes, offset(found->second, bytes)) != static_cast<ssize_t>(bytes)) return false;
+    auto from = pixels.begin();
+    for (int y = 0; y < out.height(); y += stride_)
+      for (int x = 0; x < out.width(); x += stride_) out(x, y) = *from++;
+    return true;
   }
 
  private:
-  [[nodiscard]] static std::size_t size_of(const orbis::image<orbis::rgb8>& color) {
-    return color.pixels().size() * sizeof(orbis::rgb8);
+  [[nodiscard]] std::vector<orbis::rgb8> sample(const orbis::image<orbis::rgb8>& color) const {
+    std::vector<orbis::rgb8> pixels;
+    pixels.reserve(color.pixels().size() / static_cast<std::size_t>(stride_) + 1);
+    for (int y = 0; y < color.height(); y += stride_)
+      for (int x = 0; x < color.width(); x += stride_) pixels.push_back(color(x, y));
+    return pixels;
   }
   [[nodiscard]] static off_t offset(std::size_t place, std::size_t bytes) {
     return static_cast<off_t>(place) * static_cast<off_t>(bytes);
   }
 
   std::filesystem::path path_;
+  int stride_;
+  std::uint64_t most_bytes_;
   int file_ = -1;
   std::unordered_map<std::uint64_t, std::size_t> at_;
 };

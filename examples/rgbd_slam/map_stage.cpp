@@ -69,6 +69,7 @@ std::vector<voxel> occupied_voxels(const tree& map, const orbis::point_cloud& cl
 
 orbis::mapping::dense_options dense_options(const settings& s) {
   orbis::mapping::dense_options options;
+  options.stride = point_stride;
   options.max_depth = static_cast<float>(s.max_depth);
   // Finer than the octree's voxels, so that these see every surface; memory follows what there is to
   // see, not how long it was looked at.

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
 /// The frames that go into the map, as a range of keyframes that can be gone through again and again. Depth is kept
-/// compressed; colour, which is needed once, is read again, or from a file where frames are made and not read. One
-/// frame at a time is unpacked, and the next one on another thread.
+/// compressed. Colour, which is needed once, and of the pixels that become points only, is kept in a file, or read
+/// again if that is large. One frame at a time is unpacked, and the next one on another thread.
 #pragma once
 
 #include <cstddef>
@@ -10,6 +10,7 @@
 #include <filesystem>
 #include <future>
 #include <iterator>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <utility>
@@ -28,6 +29,12 @@ namespace app {
 
 /// The name of the spill file, in the folder where the files are made. The file has no name once it is open.
 inline constexpr const char* spill_name = "depth.spill";
+
+/// Every second pixel of every second row becomes a point.
+inline constexpr int point_stride = 2;
+
+/// Of the file of colours, if they can be read again.
+inline constexpr std::uint64_t most_color_bytes = std::uint64_t{256} << 20U;
 
 /// How a store of keyframes' depth images divides what there is between memory and file. There are two: of the images
 /// as they came, and of those in the live map.
@@ -49,7 +56,8 @@ class posed_frames {
       : source_{&source},
         background_{s.threads != 1},
         depths_{std::make_unique<kept_depths>(depth_options(s, spill_file), background_)},
-        colors_{spill_file.string() + ".colors"} {}
+        colors_{spill_file.string() + ".colors", point_stride,
+                source.made ? std::numeric_limits<std::uint64_t>::max() : most_color_bytes} {}
 
   /// Frame number `i` of the source, where the camera was at `T_world_camera`.
   void add(std::size_t i, const orbis::se3& T_world_camera, const orbis::camera::rgbd_frame& frame) {
@@ -79,7 +87,8 @@ class posed_frames {
     return poses;
   }
 
-  /// A frame's colours, which are read when they are asked for.
+  /// A frame's colours, which are read when they are asked for. Other pixels than those that become points may be
+  /// black.
   class colors {
    public:
     colors(const posed_frames& of, std::size_t index, std::shared_ptr<unpacked> images)
@@ -87,7 +96,6 @@ class posed_frames {
     operator orbis::image_view<const orbis::rgb8>() const {  // NOLINT(google-explicit-constructor)
       if (!images_->color) of_->read_color(index_, *images_);
       of_->tell(*images_);
-      of_->wants_color_ = index_ != of_->entries_.back().index;
       return images_->color->view();
     }
 
@@ -161,7 +169,7 @@ class posed_frames {
   void add(const entry& e, const orbis::camera::rgbd_frame& frame) {
     entries_.push_back(e);
     depths_->put(e.index, frame.depth);
-    if (source_->made) colors_.put(e.index, frame.color);
+    colors_.put(e.index, frame.color);
   }
   /// The images of entry `number`, from the other thread if that was at them.
   [[nodiscard]] std::shared_ptr<unpacked> unpack(std::size_t number) const {
@@ -170,23 +178,21 @@ class posed_frames {
       images = ahead_.get();
       if (ahead_number_ != number) images.reset();
     }
-    if (!images) images = read(number, false);
+    if (!images) images = read(number);
     tell(*images);
     if (background_ && number + 1 != entries_.size()) {
       ahead_number_ = number + 1;
-      ahead_ =
-          start_in_background([this, next = number + 1, with_color = wants_color_] { return read(next, with_color); });
+      ahead_ = start_in_background([this, next = number + 1] { return read(next); });
     }
     return images;
   }
-  [[nodiscard]] std::shared_ptr<unpacked> read(std::size_t number, bool with_color) const {
+  [[nodiscard]] std::shared_ptr<unpacked> read(std::size_t number) const {
     auto images = std::make_shared<unpacked>();
     const std::size_t index = entries_[number].index;
     if (auto done = depths_->get(index, images->depth); !done) {
       images->trouble = done.error();
       images->depth = orbis::image<std::uint16_t>(source_->camera.model.width(), source_->camera.model.height());
     }
-    if (with_color) read_color(index, *images);
     return images;
   }
   void read_color(std::size_t index, unpacked& images) const {
@@ -204,9 +210,8 @@ class posed_frames {
   bool background_;
   std::vector<entry> entries_;
   std::unique_ptr<kept_depths> depths_;
-  color_file colors_;  // where frames are made
+  color_file colors_;
   mutable std::optional<orbis::error> trouble_;
-  mutable bool wants_color_ = false;  // the next frame's colours will be asked for, too
   mutable std::size_t ahead_number_ = 0;
   mutable std::future<std::shared_ptr<unpacked>> ahead_;  // the last member: it ends before the others go
 };
