@@ -84,8 +84,8 @@ std::vector<std::string> run(const Policy& policy, std::uint64_t seed, double to
   live map{b.scene.camera, {.resolution = 0.08, .tolerance = tolerance, .keyframes_per_replay = 3}};
   std::vector<std::string> seen;
   std::size_t added = 0, corrected = 0;
-  for (int step = 0; step != 40; ++step) {
-    switch (random.below(8)) {
+  for (int step = 0; step != 50; ++step) {
+    switch (random.below(9)) {
       case 0: {  // a loop closes: drift that grows towards the newest keyframe is taken out
         const se3 drift = test::random_motion(random, 0.1, 0.03);
         double part = 0;
@@ -126,6 +126,23 @@ std::vector<std::string> run(const Policy& policy, std::uint64_t seed, double to
           CHECK(map.set_depth(policy, frame, b.depth_of(k)));
         }
         break;
+      case 5: {  // a filter takes pixels out of several keyframes
+        std::vector<std::uint64_t> frames;
+        for (const auto& [frame, k] : b.keyframes)
+          if (random.below(3) == 0) frames.push_back(frame);
+        const int column = static_cast<int>(random.below(60));
+        const auto edit = [&](std::size_t i, image_view<std::uint16_t> pixels) {
+          for (int y = 0; y != 48; ++y) pixels(column + static_cast<int>(i % 4), y) = 0;
+        };
+        CHECK(map.edit_depths(policy, frames, [&](std::size_t i, const depth_view& depth, const auto& pixels) {
+          if (depth.pixels()(5, 5) == pixels(5, 5)) edit(i, pixels);
+        }));
+        for (std::size_t i = 0; i != frames.size(); ++i) {
+          edit(i, b.keyframes[frames[i]].depth.view());
+          CHECK(map.is_filtered(frames[i]));
+        }
+        break;
+      }
       default:
         if (added != b.scene.depth.size()) {
           const std::uint64_t frame = 30 * (added ^ 1U);  // pairs come in the wrong order
@@ -309,11 +326,17 @@ TEST_CASE("A live map tells which depth image was lost, and goes on without its 
   CHECK(map.size() == 2);
   CHECK(ot_bytes(map.map()) == ot_bytes(expected));
   CHECK_FALSE(map.set_depth(seq, 1, scene.keyframe(1).depth));
+  const auto edit_nothing = [](std::size_t, const depth_view&, const image_view<std::uint16_t>&) {};
+  CHECK(map.edit_depths(seq, std::vector<std::uint64_t>{0, 1}, edit_nothing).error().code == errc::not_found);
+  const auto stop = [](std::size_t, std::size_t) { return false; };
+  CHECK(map.edit_depths(seq, std::vector<std::uint64_t>{0, 2}, edit_nothing, stop).error().code == errc::cancelled);
 
   live full{scene.camera, {.resolution = 0.05}, test::memory_depths{.images = {}, .lost = {}, .full = true}};
   CHECK_FALSE(full.add_keyframe(seq, 0, scene.keyframe(0).depth, scene.poses[0]));
   CHECK(full.contains(0));
   CHECK_FALSE(full.map().empty());
+  CHECK_FALSE(full.edit_depths(seq, std::vector<std::uint64_t>{0}, edit_nothing));
+  CHECK(full.contains(0));
 }
 
 TEST_CASE("A live map keeps its depth images compressed") {

@@ -85,6 +85,10 @@ struct built_map {
 
 namespace detail {
 
+[[nodiscard]] inline double milliseconds_since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+}
+
 [[nodiscard]] inline std::string reason_of(const moving_count& moving) {
   return std::to_string(moving.pixels) + " pixels of " + std::to_string(moving.keyframes) +
          (moving.keyframes == 1 ? " keyframe show" : " keyframes show") +
@@ -118,8 +122,8 @@ class standing_depth {
 
 /// The steps of `build_map`. `into.wants(k, whole)` says whether it lacks this keyframe's depth image, of which, unless
 /// it is `whole`, something has moved away; `into.scan(k, depth)` takes one depth image before the filter of the cloud;
-/// `into.unfiltered()` gives the map of these. `into.scan_filtered(k, depth)` and `into.filtered()` do the same after
-/// that filter.
+/// `into.unfiltered()` gives the map of these. `into.filtered(cloud, kept, depths, ms, progress)` gives the map after
+/// that filter: `depths(use)` calls `use(k, depth)` with what it leaves of each depth image.
 template <class Octree, execution_policy Policy, keyframe_range Keyframes, camera::camera_model Camera, class Into>
 [[nodiscard]] result<built_map<Octree>> build_map_into(const Policy& policy, const Keyframes& keyframes,
                                                        const Camera& camera, const map_options& options,
@@ -196,13 +200,10 @@ template <class Octree, execution_policy Policy, keyframe_range Keyframes, camer
     if (options.unfiltered_octree) {
       const result<bool> wanted = into.wants(k, judged.removed.empty());
       if (!wanted) return fail(wanted.error());
-      std::chrono::steady_clock::duration time{};
-      if (*wanted) {
-        const auto start = std::chrono::steady_clock::now();
+      const auto start = std::chrono::steady_clock::now();
+      if (*wanted)
         if (auto scanned = into.scan(k, depth); !scanned) return scanned;
-        time = std::chrono::steady_clock::now() - start;
-      }
-      map.insert_ms_unfiltered.push_back(std::chrono::duration<double, std::milli>(time).count());
+      map.insert_ms_unfiltered.push_back(*wanted ? milliseconds_since(start) : 0.0);
     }
     moved[judged.number] = std::move(judged.removed);
     return {};
@@ -249,22 +250,23 @@ template <class Octree, execution_policy Policy, keyframe_range Keyframes, camer
   for (const std::uint32_t i : map.inliers) kept[i] = 1;
   const dense_cloud::selection kept_points = dense.select(std::move(kept));
 
-  std::size_t number = 0, at = 0;
-  for (const auto& k : keyframes) {
-    const std::vector<removed_cell>& cells = moved[at++];
-    if (finite_pose(k)) {
-      static_cast<void>(standing.with(k.depth, &cells, moving, mask));
-      image<pixel> left = masked;
-      dense.remove_points(policy, view_like(k.depth, std::as_const(masked).view()), number++, kept_points, left.view());
-      const auto start = std::chrono::steady_clock::now();
-      if (auto scanned = into.scan_filtered(k, view_like(k.depth, std::as_const(left).view())); !scanned)
-        return fail(std::move(scanned.error()));
-      const auto time = std::chrono::steady_clock::now() - start;
-      map.insert_ms.push_back(std::chrono::duration<double, std::milli>(time).count());
+  const auto watched = [&](std::size_t passed, std::size_t) { return on_progress(done + passed, total); };
+  const auto filtered_depths = [&](const auto& use) -> result<void> {
+    std::size_t number = 0, at = 0;
+    for (const auto& k : keyframes) {
+      const std::vector<removed_cell>& cells = moved[at++];
+      if (finite_pose(k)) {
+        static_cast<void>(standing.with(k.depth, &cells, moving, mask));
+        image<pixel> left = masked;
+        dense.remove_points(policy, view_like(k.depth, std::as_const(masked).view()), number++, kept_points,
+                            left.view());
+        use(k, view_like(k.depth, std::as_const(left).view()));
+      }
+      if (!watched(at, moved.size())) return fail(errc::cancelled, {}, "cancelled");
     }
-    if (!on_progress(++done, total)) return fail(errc::cancelled, {}, "cancelled");
-  }
-  auto octree = into.filtered();
+    return {};
+  };
+  auto octree = into.filtered(dense, kept_points, filtered_depths, map.insert_ms, watched);
   if (!octree) return fail(std::move(octree.error()));
   map.octree = *std::move(octree);
   return map;
@@ -288,15 +290,21 @@ struct fresh_octrees {
     octree->integrate(policy, depth, camera, se3(k.T_world_camera), options.integration);
     return {};
   }
-  template <class Keyframe, class Depth>
-  result<void> scan_filtered(const Keyframe& k, const Depth& depth) {
-    return scan(k, depth);
-  }
   result<Octree> unfiltered() {
     std::optional<Octree> whole = std::exchange(octree, std::nullopt);
     return whole ? *std::move(whole) : Octree{options.resolution};
   }
-  result<Octree> filtered() { return unfiltered(); }
+  template <class Depths>
+  result<Octree> filtered(const dense_cloud&, const dense_cloud::selection&, const Depths& depths,
+                          std::vector<double>& milliseconds, const progress&) {
+    auto scanned = depths([&](const auto& k, const auto& depth) {
+      const auto start = std::chrono::steady_clock::now();
+      static_cast<void>(scan(k, depth));
+      milliseconds.push_back(milliseconds_since(start));
+    });
+    if (!scanned) return fail(std::move(scanned.error()));
+    return unfiltered();
+  }
 };
 
 /// Into a live map, which has most of the keyframes already.
@@ -319,20 +327,34 @@ struct live_octree {
     // filter's verdict.
     return unless_kept(live.add_keyframe(policy, k.frame, depth, poses.back().T_world_camera, completeness::filtered));
   }
-  template <class Keyframe, class Depth>
-  result<void> scan_filtered(const Keyframe& k, const Depth& depth) {
-    return unless_kept(live.set_depth(policy, k.frame, depth));
-  }
   result<typename Live::octree_type> unfiltered() {
     live.set_poses(poses, unlisted::hide);
-    return filtered();
+    return finished();
   }
-  result<typename Live::octree_type> filtered() {
-    if (auto finished = live.finish(policy); !finished) return fail(std::move(finished.error()));
-    return live.snapshot();
+  template <class Depths>
+  result<typename Live::octree_type> filtered(const dense_cloud& cloud, const dense_cloud::selection& kept,
+                                              const Depths&, std::vector<double>& milliseconds,
+                                              const progress& on_progress) {
+    std::vector<std::uint64_t> frames;
+    for (const keyframe_position& p : poses) frames.push_back(p.frame);
+    const auto start = std::chrono::steady_clock::now();
+    // What the live map has is without flying pixels and what has moved away.
+    auto edited = unless_kept(live.edit_depths(
+        policy, frames,
+        [&](std::size_t number, const auto& depth, const image_view<std::uint16_t>& pixels) {
+          cloud.remove_points(seq, depth, number, kept, pixels);
+        },
+        on_progress));
+    if (!edited) return fail(std::move(edited.error()));
+    milliseconds.assign(frames.size(), milliseconds_since(start) / static_cast<double>(frames.size()));
+    return finished();
   }
 
  private:
+  result<typename Live::octree_type> finished() {
+    if (auto done = live.finish(policy); !done) return fail(std::move(done.error()));
+    return live.snapshot();
+  }
   /// Where the images' file cannot be written to, they stay in memory: nothing is lost.
   template <class Done>
   static result<void> unless_kept(Done done) {
@@ -365,7 +387,8 @@ requires depth_map<Octree, Camera>
 /// As above, by a live map that grew while these keyframes were made: they are moved to the poses that they have now,
 /// those that it does not have are added, others are hidden, and then the filter's verdict is taken over. The octrees
 /// are bit for bit those of the function above. Keyframes have a member `frame`, the index by which the live map knows
-/// them, and come in the order of these. The times in the result are those of handing over images, without replaying.
+/// them, and come in the order of these. The times in the result are those of handing over images, without replaying;
+/// after the filter, their mean.
 /// `options.resolution` and `options.integration` are those of the live map, and the unfiltered octree is always made.
 /// Errors, in addition: `invalid_argument` if the frame numbers do not ascend; those of the live map, but for images
 /// that stay in memory because they cannot be written to their file. @pre what the live map has was added with the

@@ -23,7 +23,9 @@
 #include <limits>
 #include <optional>
 #include <ranges>
+#include <span>
 #include <string>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -153,6 +155,48 @@ class live_map {
     if (auto added = add_keyframe(policy, frame, depth, pose, completeness::filtered); !added)
       return fail(std::move(added.error()));
     return {};
+  }
+  /// Takes pixels out of the depth images of several keyframes, each of them named once:
+  /// `remove_pixels(i, depth, pixels)` sets to 0 in `pixels`, a copy of what `depth` stores, what is to go from the
+  /// image of `frames[i]`; it is called on several threads. The map follows with `correct`. Stops when `on_progress`,
+  /// which counts the keyframes, returns false. Errors: not_found; that of `Depths::get`; that of `Depths::put`, but
+  /// not before all is done; cancelled. For each keyframe O(pixels), Depths::get and put, and marking.
+  template <execution_policy Policy, class RemovePixels>
+  result<void> edit_depths(const Policy& policy, std::span<const std::uint64_t> frames,
+                           const RemovePixels& remove_pixels, progress on_progress = {}) {
+    for (const std::uint64_t frame : frames)
+      if (find(frame) == nullptr)
+        return fail(errc::not_found, "keyframe " + std::to_string(frame), "there is no such keyframe");
+    result<void> kept{};
+    const std::size_t at_once = std::max(1U, policy.threads());
+    for (std::size_t next = 0; next != frames.size();) {
+      const std::size_t count = std::min(at_once, frames.size() - next);
+      const auto group = frames.subspan(next, count);
+      const auto edit = [&](const auto& how, std::size_t i) {
+        worker& w = workers_[i];
+        const entry& k = *find(group[i]);
+        w.edited = w.depth;
+        remove_pixels(next + i, view_of(k, w.depth), w.edited.view());
+        w.pack();
+        if (k.wanted)
+          w.marker.mark(how, history_.grid(), view_of(k, w.edited), camera_, *k.wanted, options_.integration, w.voxels);
+      };
+      if (auto read = read_and_work(policy, group, edit); !read) return read;
+      for (std::size_t i = 0; i != count; ++i) {
+        worker& w = workers_[i];
+        entry& k = *find(group[i]);
+        if (k.used) drop_frames_of(k.frame);
+        k.filtered = true;
+        k.reach = std::min(detail::largest_depth(view_of(k, w.edited)), options_.integration.max_range);
+        set_waiting(k, false);
+        k.used = k.wanted;
+        if (k.used) history_.set(k.frame, w.voxels);
+        if (auto put = w.put(depths_, k.frame); !put) kept = std::move(put);
+      }
+      next += count;
+      if (!on_progress(next, frames.size())) return fail(errc::cancelled, {}, "cancelled");
+    }
+    return kept;
   }
   /// Adds a frame between keyframes, whose pose was measured relative to `keyframe`: it is marked from there, wherever
   /// the keyframe is in the map. It makes the map denser in time, and is not kept for corrections: it leaves the map
@@ -317,6 +361,9 @@ class live_map {
     bool filtered = false;
     std::uint64_t listed = 0;  ///< the last call of set_poses that named it
   };
+  static constexpr bool packs = std::is_same_v<Depths, depth_store>;
+  struct no_packer {};
+  using packer = std::conditional_t<packs, depth_store::packer, no_packer>;
   struct transient {
     std::uint64_t frame, keyframe;
   };
@@ -326,10 +373,22 @@ class live_map {
   };
   /// What one thread needs to mark a keyframe.
   struct worker {
-    image<std::uint16_t> depth;
+    image<std::uint16_t> depth, edited;
     result<void> read;
     octree::scan_marker marker;
     octree::scan_voxels voxels;
+    packer packed;
+
+    /// Compresses the edited image, if that can be done beside other threads.
+    void pack() {
+      if constexpr (packs) packed.pack(edited.view());
+    }
+    result<void> put(Depths& depths, std::uint64_t frame) {
+      if constexpr (packs)
+        return depths.put(frame, edited.view(), packed);
+      else
+        return depths.put(frame, edited.view());
+    }
   };
 
   [[nodiscard]] static std::optional<se3> if_finite(const se3& T) {
@@ -390,33 +449,14 @@ class live_map {
   /// Moves `count` keyframes of the queue, each on a thread of its own.
   template <class Policy>
   result<void> move_next(const Policy& policy, std::size_t next, std::size_t count) {
-    if (workers_.size() < count) workers_.resize(count);
-    const auto read = [&](std::size_t i) { workers_[i].read = depths_.get(queue_[next + i].frame, workers_[i].depth); };
+    group_.clear();
+    for (std::size_t i = 0; i != count; ++i) group_.push_back(queue_[next + i].frame);
     const auto mark = [&](const auto& how, std::size_t i) {
       worker& w = workers_[i];
-      if (!w.read) return;
-      const entry& k = *find(queue_[next + i].frame);
-      const depth_view depth{w.depth.view(), k.scale, k.min_depth, k.max_depth};
-      w.marker.mark(how, history_.grid(), depth, camera_, *k.wanted, options_.integration, w.voxels);
+      const entry& k = *find(group_[i]);
+      w.marker.mark(how, history_.grid(), view_of(k, w.depth), camera_, *k.wanted, options_.integration, w.voxels);
     };
-    constexpr bool reads_in_parallel = requires(const Depths& depths, image<std::uint16_t>& out) {
-      depths.get(0, out);
-    };
-    if (!reads_in_parallel || count == 1)
-      for (std::size_t i = 0; i != count; ++i) read(i);
-    if (count == 1) {
-      mark(policy, 0);
-    } else {
-      for_each_index(policy, count, 1, [&](std::size_t i) {
-        if (reads_in_parallel) read(i);
-        mark(seq, i);
-      });
-    }
-    for (std::size_t i = 0; i != count; ++i) {
-      if (workers_[i].read) continue;
-      remove(queue_[next + i].frame);
-      return fail(std::move(workers_[i].read.error()));
-    }
+    if (auto read = read_and_work(policy, group_, mark); !read) return read;
     for (std::size_t i = 0; i != count; ++i) {
       entry& k = *find(queue_[next + i].frame);
       drop_frames_of(k.frame);
@@ -425,6 +465,36 @@ class live_map {
       set_waiting(k, false);
     }
     return {};
+  }
+  /// Reads the depth images of these keyframes, and calls `work(policy, i)` for those that could be read, each on a
+  /// thread of its own if there are several. A keyframe whose image is lost is removed.
+  template <class Policy, class Work>
+  result<void> read_and_work(const Policy& policy, std::span<const std::uint64_t> frames, const Work& work) {
+    const std::size_t count = frames.size();
+    if (workers_.size() < count) workers_.resize(count);
+    const auto read = [&](std::size_t i) { workers_[i].read = depths_.get(frames[i], workers_[i].depth); };
+    constexpr bool reads_in_parallel = requires(const Depths& depths, image<std::uint16_t>& out) {
+      depths.get(0, out);
+    };
+    if (!reads_in_parallel || count == 1)
+      for (std::size_t i = 0; i != count; ++i) read(i);
+    if (count == 1) {
+      if (workers_[0].read) work(policy, 0);
+    } else {
+      for_each_index(policy, count, 1, [&](std::size_t i) {
+        if (reads_in_parallel) read(i);
+        if (workers_[i].read) work(seq, i);
+      });
+    }
+    for (std::size_t i = 0; i != count; ++i) {
+      if (workers_[i].read) continue;
+      remove(frames[i]);
+      return fail(std::move(workers_[i].read.error()));
+    }
+    return {};
+  }
+  [[nodiscard]] static depth_view view_of(const entry& k, const image<std::uint16_t>& pixels) {
+    return depth_view{pixels.view(), k.scale, k.min_depth, k.max_depth};
   }
   /// Drops frames between keyframes.
   void drop_oldest_frames(std::size_t count) {
@@ -450,6 +520,7 @@ class live_map {
   std::size_t moved_since_replay_ = 0;
   std::uint64_t round_ = 0;  ///< of set_poses
   std::vector<ranked> queue_;
+  std::vector<std::uint64_t> group_;  ///< keyframes that are moved together
   std::vector<worker> workers_;
 };
 
