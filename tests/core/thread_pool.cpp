@@ -30,19 +30,38 @@ TEST_CASE("a pool's threads visit every index once, loop after loop") {
   }
 }
 
-TEST_CASE("a pool lets no more threads work than the policy says, and some that do") {
+namespace {
+
+/// How many threads are in a loop at a time: each waits, at most `patience`, until `wanted` have been.
+unsigned at_a_time(const orbis::parallel_policy& policy, unsigned wanted, std::chrono::milliseconds patience) {
+  const auto end = std::chrono::steady_clock::now() + patience;
+  std::atomic<unsigned> at_work{0}, seen{0};
+  orbis::for_each_index(policy, 50, 1, [&](std::size_t) {
+    const unsigned now = ++at_work;
+    unsigned before = seen.load();
+    while (before < now && !seen.compare_exchange_weak(before, now)) {
+    }
+    while (seen < wanted && std::chrono::steady_clock::now() < end) std::this_thread::yield();
+    --at_work;
+  });
+  return seen;
+}
+
+}  // namespace
+
+TEST_CASE("a pool lets as many threads work as the policy says, and no more") {
   thread_pool pool{4};
   for (const unsigned most : {1U, 2U, 3U}) {
-    std::atomic<unsigned> at_work{0}, seen{0};
-    orbis::for_each_index(orbis::par.on(pool).with(most), 200, 1, [&](std::size_t) {
-      const unsigned now = ++at_work;
-      unsigned before = seen.load();
-      while (before < now && !seen.compare_exchange_weak(before, now)) {
-      }
-      std::this_thread::sleep_for(std::chrono::microseconds{50});
-      --at_work;
-    });
-    CHECK(seen == most);
+    CHECK(at_a_time(orbis::par.on(pool).with(most), most, std::chrono::seconds{20}) == most);
+    CHECK(at_a_time(orbis::par.on(pool).with(most), most + 1, std::chrono::milliseconds{20}) == most);
+  }
+}
+
+TEST_CASE("threads of a pool that sleep wake up for every loop") {
+  thread_pool pool{2};
+  for (int loop = 0; loop != 300; ++loop) {
+    if (loop % 3 != 0) std::this_thread::sleep_for(std::chrono::microseconds{20 * (loop % 20)});
+    REQUIRE(at_a_time(orbis::par.on(pool), 2, std::chrono::seconds{20}) == 2);
   }
 }
 

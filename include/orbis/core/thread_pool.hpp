@@ -3,9 +3,11 @@
 /// Threads that wait for work, for a parallel_policy: to start one takes as long as many a small loop does.
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <new>
 #include <system_error>
 #include <thread>
 #include <vector>
@@ -18,16 +20,20 @@ namespace orbis {
 ///   orbis::thread_pool pool{4};
 ///   cloud::statistical_filter(orbis::par.on(pool), points);
 /// @endcode
-/// Any number of threads may use it. Threads look for work for some microseconds before they sleep.
+/// Any number of threads may use it. Threads look for work for some microseconds before they sleep. A process that is
+/// forked has none of them: there a pool made before may be used, on the caller's thread alone, but not destroyed.
 class thread_pool {
  public:
   /// `threads`: with the caller's, so that one less is started; 0: as many as the machine has. Where the system gives
-  /// fewer there are fewer.
+  /// fewer there are fewer, and never more than 65536.
   explicit thread_pool(unsigned threads = 0) {
     if (threads == 0) threads = std::thread::hardware_concurrency();
+    threads = std::min(threads, static_cast<unsigned>(inside) + 1);
+    workers_.reserve(threads);  // where this fails no thread waits yet
     try {
       for (unsigned i = 1; i < threads; ++i) workers_.emplace_back([this] { wait_for_work(); });
     } catch (const std::system_error&) {
+    } catch (const std::bad_alloc&) {
     }
   }
   thread_pool(const thread_pool&) = delete;
@@ -75,7 +81,10 @@ class thread_pool {
       std::uint64_t now = state_.load();
       if ((now & stopped) != 0) return;
       if ((now & open) == 0 || now / one_job == done) {
-        if (++spins > patience) state_.wait(now);
+        if (spins < patience)
+          ++spins;
+        else
+          state_.wait(now);
         continue;
       }
       if (!state_.compare_exchange_weak(now, now + 1)) continue;

@@ -28,9 +28,9 @@
 #include <utility>
 #include <vector>
 
-#include <orbis/core/simd/dispatch.hpp>
 #include <orbis/core/image.hpp>
 #include <orbis/core/result.hpp>
+#include <orbis/core/simd/dispatch.hpp>
 #include <orbis/mapping/detail/depth/rans.hpp>
 
 namespace orbis::mapping::detail {
@@ -400,7 +400,7 @@ class depth_decoder {
 
   /// One pixel of one band.
   [[nodiscard]] static ORBIS_ALWAYS_INLINE std::uint32_t next_rank(rans_decoder& stream, const table* tables,
-                                               const neighbors& near) noexcept {
+                                                                   const neighbors& near) noexcept {
     const neighbors::prediction expected = near.predict();
     const std::uint32_t symbol = stream.get(tables[expected.context]);
     if (symbol == depth_symbol::no_depth) return 0;
