@@ -2,6 +2,7 @@
 //
 // bundle_adjust FILE.txt: adjusts cameras and points of a file of "Bundle Adjustment in the Large";
 // iteration table, or --json.
+#include <exception>
 #include <filesystem>
 #include <string>
 
@@ -9,7 +10,7 @@
 
 #include "adjust.hpp"
 
-int main(int argc, char** argv) {
+int main(int argc, char** argv) try {
   settings s;
   CLI::App cli{"Adjusts cameras and points of a file of Bundle Adjustment in the Large", "bundle_adjust"};
   cli.add_option("FILE", s.input, "the problem, unpacked")->required();
@@ -38,4 +39,6 @@ int main(int argc, char** argv) {
   auto problem = orbis::io::read_bal(std::filesystem::path{s.input});
   if (!problem) return complain(2, problem.error().to_string());
   return s.loss == "cauchy" || s.loss == "tukey" ? adjust_redescending(s, *problem) : adjust_convex(s, *problem);
+} catch (const std::exception& e) {  // no memory, no threads
+  return complain(2, std::string{"gave up: "} + e.what());
 }

@@ -2,6 +2,7 @@
 //
 // depth_to_octree DEPTH.png MAP.bt: a depth image and the camera's pose as an occupancy octree for octovis.
 #include <cstdio>
+#include <exception>
 #include <string>
 #include <vector>
 
@@ -25,7 +26,7 @@ orbis::result<orbis::camera::camera_settings> camera_named(const std::string& s,
   return orbis::camera::camera_settings{.model = orbis::camera::pinhole{k}};
 }
 
-int main(int argc, char** argv) {
+int main(int argc, char** argv) try {
   std::string input, output, camera_name = "525,525,319.5,239.5";
   std::vector<double> p{0, 0, 0, 0, 0, 0, 1};
   double resolution = 0.05, scale = 0.0;  // scale 0: the camera's
@@ -56,4 +57,6 @@ int main(int argc, char** argv) {
   const auto scan = map.integrate(metres, camera->model, orbis::se3{orbis::so3{q}, orbis::vec3{p.data()}});
   if (scan.used == 0) return complain(2, input + ": no depth in it lies in the map");
   if (const auto done = write_bt(map, output); !done) return complain(2, done.error().to_string());
+} catch (const std::exception& e) {  // no memory, no threads
+  return complain(2, std::string{"gave up: "} + e.what());
 }

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
+#include <exception>
 #include <limits>
 #include <string>
 #include <vector>
@@ -207,7 +208,7 @@ double coverage(const explorer& robot, const vec3& start, std::size_t& air) {
   return static_cast<double>(known) / static_cast<double>(std::max<std::size_t>(1, air));
 }
 
-int main(int argc, char** argv) {
+int main(int argc, char** argv) try {
   std::string output;
   double resolution = 0.05, radius = 0.2, range = 4.0;
   int budget = 600, width = 160;
@@ -274,4 +275,6 @@ int main(int argc, char** argv) {
               robot.travelled, 100.0 * share, static_cast<double>(air) * std::pow(resolution, 3),
               robot.frontiers.size(), why.c_str());
   if (const auto written = write_bt(robot.map, output); !written) return complain(2, written.error().to_string());
+} catch (const std::exception& e) {  // no memory, no threads
+  return complain(2, std::string{"gave up: "} + e.what());
 }

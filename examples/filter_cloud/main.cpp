@@ -2,6 +2,7 @@
 //
 // filter_cloud IN.{ply,pcd} OUT.ply: a cloud without its outliers, by the filter that suits it or one that is named.
 #include <cstdio>
+#include <exception>
 #include <optional>
 #include <string>
 #include <vector>
@@ -13,7 +14,7 @@
 
 int complain(int code, const std::string& why) { return std::fprintf(stderr, "filter_cloud: %s\n", why.c_str()), code; }
 
-int main(int argc, char** argv) {
+int main(int argc, char** argv) try {
   using namespace orbis::cloud;
   using orbis::par;
   std::string input, output, filter = "auto";
@@ -55,4 +56,6 @@ int main(int argc, char** argv) {
   const auto why = filter == "auto" ? to_string(best.choice.chain) + ": " + best.choice.reason : filter;
   if (auto ok = orbis::io::write_ply(output, extract(cloud, kept)); !ok) return complain(2, ok.error().to_string());
   std::printf("%zu points, %zu to filter, %zu kept; %s\n", read->size(), finite.size(), kept.size(), why.c_str());
+} catch (const std::exception& e) {  // no memory, no threads
+  return complain(2, std::string{"gave up: "} + e.what());
 }

@@ -2,6 +2,7 @@
 //
 // pose_graph FILE.g2o: optimises the poses of a g2o file; iteration table, or --json.
 #include <cstdio>
+#include <exception>
 #include <string>
 #include <vector>
 
@@ -80,7 +81,7 @@ int run(const settings& s, orbis::io::g2o_graph& graph, Loss loss) {
   return 0;
 }
 
-int main(int argc, char** argv) {
+int main(int argc, char** argv) try {
   settings s;
   CLI::App cli{"Optimises the poses of a g2o file (VERTEX_SE3:QUAT, EDGE_SE3:QUAT, FIX)", "pose_graph"};
   cli.add_option("FILE", s.input, "the graph")->required();
@@ -111,4 +112,6 @@ int main(int argc, char** argv) {
   if (s.loss == "cauchy") return run(s, *graph, optimize::cauchy{s.width});
   if (s.loss == "tukey") return run(s, *graph, optimize::tukey{s.width});
   return run(s, *graph, optimize::trivial{});
+} catch (const std::exception& e) {  // no memory, no threads
+  return complain(2, std::string{"gave up: "} + e.what());
 }

@@ -16,6 +16,7 @@
 #include <orbis/camera/presets.hpp>
 #include <orbis/core/file.hpp>
 #include <orbis/core/utf8.hpp>
+#include <orbis/io/camera_file.hpp>
 
 #include "filters.hpp"
 #include "viewer/backend.hpp"
@@ -213,7 +214,7 @@ std::string contradiction(const settings& s) {
 
 /// Fills what the command line left open from a TOML file whose keys are the options' long names.
 std::optional<exit_code> read_config(CLI::App& cmd, const std::string& path) {
-  const orbis::result<std::string> text = orbis::read_file(path);
+  const orbis::result<std::string> text = orbis::read_file(path, orbis::io::max_toml_bytes);
   if (!text) return complain(text.error().to_string(), bad_input);
   if (!orbis::is_utf8(*text)) return complain(path + ": not TOML: no UTF-8", bad_input);
   toml::table table;

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <cstdio>
+#include <exception>
 #include <iterator>
 #include <ostream>
 #include <span>
@@ -137,7 +138,7 @@ int judge(const settings& s) {
   return 0;
 }
 
-int main(int argc, char** argv) {
+int main(int argc, char** argv) try {
   settings s;
   CLI::App cli{"Vocabularies of visual words: learns, converts and measures them", "train_vocabulary"};
   cli.require_subcommand(1);
@@ -171,4 +172,6 @@ int main(int argc, char** argv) {
   }
   if (train_command->parsed()) return train(s);
   return convert_command->parsed() ? convert(s) : judge(s);
+} catch (const std::exception& e) {  // no memory, no threads
+  return complain(2, std::string{"gave up: "} + e.what());
 }

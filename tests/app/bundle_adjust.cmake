@@ -103,3 +103,7 @@ file(WRITE ${WORK}/empty.txt "0 0 0\n")
 app(0 empty.txt --json)
 get(status status)
 check(status STREQUAL "nothing to do")
+
+# Short of memory: one line, too.
+make_bal(larger.txt 20 3000 0.5 0)
+app_short_of_memory(bundle_adjust larger.txt --json)

@@ -29,6 +29,30 @@ macro(app_fails code message)
   endif()
 endmacro()
 
+# Runs the program within ever more memory, in steps of 1 MB: it does its work, or gives up with one line and exit code 2.
+# Skipped where the system limits no memory, and with sanitizers, which reserve too much of it.
+function(app_short_of_memory program)
+  execute_process(COMMAND bash -c "ulimit -v 200000 && \"${APP}\" --help" RESULT_VARIABLE result OUTPUT_QUIET ERROR_QUIET)
+  if(NOT result EQUAL 0)
+    message(STATUS "no limit on memory here: want of it is not tried")
+    return()
+  endif()
+  set(gave_up 0)
+  foreach(megabytes RANGE 8 300)
+    execute_process(COMMAND bash -c "ulimit -v ${megabytes}000; exec \"$@\"" limited ${APP} ${ARGN}
+                    WORKING_DIRECTORY ${WORK} RESULT_VARIABLE result OUTPUT_QUIET ERROR_VARIABLE err)
+    if(result EQUAL 0)
+      break()
+    elseif(result EQUAL 127)  # not even the libraries found room
+      continue()
+    elseif(NOT (result EQUAL 2 AND err MATCHES "^${program}: [^\n]+\n$"))
+      message(FATAL_ERROR "${program} ${ARGN}\nwithin ${megabytes} MB left with ${result} and said\n${err}")
+    endif()
+    math(EXPR gave_up "${gave_up} + 1")
+  endforeach()
+  check(result EQUAL 0 AND gave_up GREATER 0)
+endfunction()
+
 function(make_recording folder frames width)
   execute_process(COMMAND ${MAKE_RECORDING} ${folder} ${frames} ${width} RESULT_VARIABLE result)
   if(NOT result EQUAL 0)

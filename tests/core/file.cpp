@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <atomic>
 #include <csignal>
+#include <cstdint>
 #include <filesystem>
 #include <fstream>
 #include <ostream>
@@ -64,6 +65,30 @@ TEST_CASE("files that are not there or not readable are told apart") {
     CHECK(broken.error().code == errc::unreadable);
   }
   if (fs::exists("/proc/self/stat")) CHECK(!read_file("/proc/self/stat").value().empty());  // says it has size 0
+}
+
+TEST_CASE("what is no regular file is not read and nobody waits for it") {
+  const scratch_folder folder;
+  REQUIRE(::mkfifo((folder / "pipe").c_str(), 0600) == 0);
+  fs::create_symlink("/dev/zero", folder / "zeros");
+  for (const fs::path& path : {folder / "pipe", fs::path{"/dev/zero"}, folder / "zeros"}) {
+    const auto read = read_file(path);
+    REQUIRE(!read);
+    CHECK(read.error().code == errc::unreadable);
+    CHECK(read.error().to_string() == path.string() + ": is not a regular file");
+  }
+}
+
+TEST_CASE("a file beyond the limit is refused before it is read") {
+  const scratch_folder folder;
+  REQUIRE(write_text(folder / "ten", "0123456789"));
+  CHECK(read_file(folder / "ten", 10).value() == "0123456789");
+  CHECK(read_file(folder / "ten", 9).error().code == errc::malformed);
+  CHECK(read_file(folder / "ten", 9).error().message == "is larger than 9 bytes, and no such file is");
+  std::ofstream{folder / "holes"};
+  fs::resize_file(folder / "holes", std::uintmax_t{1} << 40);  // takes no space
+  CHECK(read_file(folder / "holes", 1 << 20).error().code == errc::malformed);
+  if (fs::exists("/proc/self/stat")) CHECK(read_file("/proc/self/stat", 3).error().code == errc::malformed);
 }
 
 TEST_CASE("a writer that gives up or throws leaves the old file and nothing else") {

@@ -7,9 +7,9 @@
 #include <orbis/camera/presets.hpp>
 #include <orbis/io/camera_file.hpp>
 
-#include "support/temporary_folder.hpp"
 #include "support/catch.hpp"
 #include "support/data.hpp"
+#include "support/temporary_folder.hpp"
 
 namespace io = orbis::io;
 namespace camera = orbis::camera;
@@ -139,4 +139,17 @@ TEST_CASE("the camera file of a real recording is read") {
   const auto settings = io::read_camera(orbis::test::data_dir() / "fr1_desk_9" / "camera.toml").value();
   CHECK(settings.model == camera::preset("tum_fr1").value().model);
   CHECK(settings.depth_scale == 5000.0);
+}
+
+TEST_CASE("tables nested without end are refused before they use up the stack") {
+  const orbis::test::temporary_folder folder;
+  for (const std::size_t depth : {8000U, 500'000U}) {
+    std::string text = "a";
+    for (std::size_t i = 0; i != depth; ++i) text += ".a";
+    text += " = 1\n";
+    CHECK(io::parse_camera(text).error().code == orbis::errc::malformed);
+    CHECK(io::read_camera(folder.write("deep.toml", text)).error().code == orbis::errc::malformed);
+  }
+  CHECK(io::parse_camera(camera_text() + std::string(20000, '#')).error().to_string() ==
+        "is too large for a camera file");
 }

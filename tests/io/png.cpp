@@ -6,13 +6,15 @@
 #include <vector>
 
 #include <png.h>
+#include <sys/resource.h>
+#include <zlib.h>
 
 #include <orbis/core/random.hpp>
 #include <orbis/io/png.hpp>
 
 #include "io/quiet.hpp"
-#include "support/temporary_folder.hpp"
 #include "support/catch.hpp"
+#include "support/temporary_folder.hpp"
 
 namespace io = orbis::io;
 using orbis::image;
@@ -178,6 +180,39 @@ TEST_CASE("a header that claims too many pixels allocates nothing") {
   const auto read = io::decode_png_depth(bytes);
   REQUIRE_FALSE(read);
   CHECK(read.error().message == "damaged PNG: claims more pixels than the file can hold");
+}
+
+TEST_CASE("compressed texts in a PNG take no memory") {
+  // 60 chunks zTXt, each of which stands for 4 MB.
+  const std::string text(4U << 20U, 'a');
+  std::vector<png_byte> packed(8192);
+  uLongf size = packed.size();
+  REQUIRE(compress2(packed.data(), &size, reinterpret_cast<const Bytef*>(text.data()), text.size(), 9) == Z_OK);
+  std::string chunk("zTXtnote\0\0", 10);
+  chunk.append(reinterpret_cast<const char*>(packed.data()), size);
+  const auto big_endian = [](std::uint32_t v) {
+    std::string bytes;
+    for (const unsigned shift : {24U, 16U, 8U, 0U}) bytes += static_cast<char>(v >> shift);
+    return bytes;
+  };
+  const auto crc = static_cast<std::uint32_t>(
+      crc32(0, reinterpret_cast<const Bytef*>(chunk.data()), static_cast<uInt>(chunk.size())));
+  const std::string whole = big_endian(static_cast<std::uint32_t>(chunk.size() - 4)) + chunk + big_endian(crc);
+  const auto original = pattern<std::uint16_t>(16, 12);
+  std::string bytes = io::encode_png(original);
+  for (const char* before : {"IDAT", "IEND"}) {
+    std::string notes;
+    for (int i = 0; i != 30; ++i) notes += whole;
+    bytes.insert(bytes.find(before) - 4, notes);
+  }
+  const auto peak_kilobytes = [] {
+    rusage usage{};
+    ::getrusage(RUSAGE_SELF, &usage);
+    return usage.ru_maxrss;
+  };
+  const auto before = peak_kilobytes();
+  CHECK(io::decode_png_depth(bytes).value() == original);
+  CHECK(peak_kilobytes() - before < 40'000);
 }
 
 TEST_CASE("an image file is written whole or the error says why not") {

@@ -9,6 +9,8 @@
 #include <filesystem>
 #include <fstream>
 #include <ios>
+#include <limits>
+#include <new>
 #include <ostream>
 #include <string>
 #include <system_error>
@@ -20,20 +22,35 @@
 
 namespace orbis {
 
-/// The bytes of a file. Errors: not_found, unreadable.
-[[nodiscard]] inline result<std::string> read_file(const std::filesystem::path& path) {
+/// The bytes of a regular file: what has no end (a device) or may wait for ever (a pipe) is refused, and so is a file
+/// of more than `max_bytes`. Errors: not_found, unreadable; malformed (too large).
+[[nodiscard]] inline result<std::string> read_file(const std::filesystem::path& path,
+                                                   std::uintmax_t max_bytes = std::numeric_limits<std::size_t>::max()) {
   std::error_code ec;
   const auto status = std::filesystem::status(path, ec);
   if (status.type() == std::filesystem::file_type::none)  // no permission to look, or no name for a file
     return fail(errc::unreadable, path.string(), "cannot be looked up: " + ec.message());
   if (!std::filesystem::exists(status)) return fail(errc::not_found, path.string(), "no such file");
   if (std::filesystem::is_directory(status)) return fail(errc::unreadable, path.string(), "is a directory");
+  if (!std::filesystem::is_regular_file(status)) return fail(errc::unreadable, path.string(), "is not a regular file");
+  const auto too_large = [&] {
+    return fail(errc::malformed, path.string(),
+                "is larger than " + std::to_string(max_bytes) + " bytes, and no such file is");
+  };
   std::ifstream in{path, std::ios::binary};
   if (!in) return fail(errc::unreadable, path.string(), "cannot be opened: " + std::generic_category().message(errno));
   std::string bytes;
-  if (const auto size = std::filesystem::file_size(path, ec); !ec) bytes.reserve(static_cast<std::size_t>(size));
+  if (const auto size = std::filesystem::file_size(path, ec); !ec) {
+    if (size > max_bytes) return too_large();
+    if (size > bytes.max_size()) throw std::bad_alloc{};
+    bytes.reserve(static_cast<std::size_t>(size));
+  }
   char buffer[65536];
-  while (in.read(buffer, sizeof buffer) || in.gcount() > 0) bytes.append(buffer, static_cast<std::size_t>(in.gcount()));
+  while (in.read(buffer, sizeof buffer) || in.gcount() > 0) {
+    const auto count = static_cast<std::size_t>(in.gcount());
+    if (count > max_bytes - bytes.size()) return too_large();  // it grows, or does not tell its size
+    bytes.append(buffer, count);
+  }
   if (in.bad())
     return fail(errc::unreadable, path.string(), "cannot be read: " + std::generic_category().message(errno));
   return bytes;

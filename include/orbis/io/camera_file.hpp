@@ -42,12 +42,17 @@
 
 namespace orbis::io {
 
+/// The largest text in TOML that is read. toml++ works its way down nested tables by recursion, as deep as there are
+/// dots in the text, and this much does not use up a stack.
+inline constexpr std::size_t max_toml_bytes = 16384;
+
 /// The camera that `text` in TOML describes. `where` names the source in errors.
 /// Errors: malformed, naming the field (missing, of the wrong type, NaN, out of range, a distortion
-/// list of a length the model does not have, a key that is no setting); unsupported (a model we do not
-/// know).
+/// list of a length the model does not have, a key that is no setting; more than `max_toml_bytes`); unsupported (a
+/// model we do not know).
 [[nodiscard]] inline result<camera::camera_settings> parse_camera(std::string_view text,
                                                                   const std::filesystem::path& where = {}) {
+  if (text.size() > max_toml_bytes) return fail(errc::malformed, where.string(), "is too large for a camera file");
   if (!is_utf8(text)) return fail(errc::malformed, where.string(), "not TOML: no UTF-8");
   toml::table table;
   try {
@@ -97,7 +102,7 @@ namespace orbis::io {
 
 /// Reads a camera file; see `parse_camera`. Errors: not_found, unreadable, malformed, unsupported.
 [[nodiscard]] inline result<camera::camera_settings> read_camera(const std::filesystem::path& path) {
-  const auto text = read_file(path);
+  const auto text = read_file(path, max_toml_bytes);
   if (!text) return fail(text.error());
   return parse_camera(*text, path);
 }

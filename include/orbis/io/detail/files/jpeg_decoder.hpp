@@ -27,10 +27,12 @@ class jpeg_decoder {
  public:
   explicit jpeg_decoder(std::string_view bytes) : size_{bytes.size()} {
     info_.err = errors_.manager();
-    // Warnings are counted by hand: a decoder that goes on after a bad code makes up pixels.
+    // A decoder that goes on after a bad code makes up pixels.
     errors_.base.emit_message = [](j_common_ptr info, int level) {
-      if (level < 0 && info->err->num_warnings++ == 0)
-        info->err->format_message(info, jpeg_errors::of(info->err).message);
+      jpeg_errors& own = jpeg_errors::of(info->err);
+      if (level >= 0 || info->err->num_warnings++ != 0) return;
+      info->err->format_message(info, own.message);
+      if (own.ends_at_warning) std::longjmp(own.jump, 1);
     };
 
     source_.next_input_byte = reinterpret_cast<const JOCTET*>(bytes.data());
@@ -58,7 +60,8 @@ class jpeg_decoder {
     jpeg_read_header(&info_, TRUE);
     // A Huffman-coded block of 64 pixels takes a bit at least; arithmetic coding a little less.
     const std::uint64_t pixels = std::uint64_t{info_.image_width} * info_.image_height;
-    if (pixels > (std::uint64_t{1} << 28) || (pixels > (1U << 20) && pixels > 2048 * std::uint64_t{size_}))
+    const std::uint64_t pixels_of_byte = info_.arith_code != FALSE ? 2048 : 512;
+    if (pixels > (std::uint64_t{1} << 28) || (pixels > (1U << 20) && pixels > pixels_of_byte * size_))
       return give_up("claims more pixels than the file can hold");
     if (jpeg_has_multiple_scans(&info_) != FALSE) {
       // Each scan goes over all pixels again, and a scan of few bytes may say nothing; the coefficients are all kept.
@@ -80,13 +83,13 @@ class jpeg_decoder {
     if (setjmp(errors_.jump) != 0) return false;
     info_.out_color_space = JCS_RGB;
     info_.err->num_warnings = 0;  // what a header is warned about does not change pixels
+    errors_.ends_at_warning = true;
     jpeg_start_decompress(&info_);
     while (info_.output_scanline < info_.output_height) {
       auto* row = reinterpret_cast<JSAMPROW>(to + std::size_t{info_.output_scanline} * info_.output_width);
       jpeg_read_scanlines(&info_, &row, 1);
-      if (info_.err->num_warnings != 0) return false;
     }
-    if (info_.err->num_warnings != 0) return false;
+    errors_.ends_at_warning = false;  // nor does what follows them
     jpeg_finish_decompress(&info_);
     return true;
   }

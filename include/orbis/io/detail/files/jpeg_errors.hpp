@@ -15,6 +15,7 @@ struct jpeg_errors {
   jpeg_error_mgr base{};  // first: libjpeg hands a pointer to it back to us
   std::jmp_buf jump{};
   char message[JMSG_LENGTH_MAX] = "";
+  bool ends_at_warning = false;  ///< of a decoder
 
   /// What libjpeg is to be given. Valid as long as this stays where it is.
   [[nodiscard]] jpeg_error_mgr* manager() {

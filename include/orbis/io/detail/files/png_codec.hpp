@@ -73,6 +73,8 @@ class png_decoder {
     if (info_ == nullptr) throw std::bad_alloc{};
     png_set_user_limits(png_, 1U << 20, 1U << 20);
     png_set_chunk_malloc_max(png_, 1U << 23);
+    // What is not needed for pixels is passed over: a thousand texts of 8 kB each may stand for 8 GB.
+    png_set_keep_unknown_chunks(png_, PNG_HANDLE_CHUNK_NEVER, nullptr, -1);
     png_set_read_fn(png_, &source_, png_take);
     png_read_info(png_, info_);
     width_ = png_get_image_width(png_, info_);
