@@ -54,7 +54,7 @@ class depth_store {
   /// Keeps `depth` under the number `frame`, in place of the image that was there. Error: write_failed, where an image
   /// had to go to the spill file and could not: the disk is full, the folder is not there, or the file exists already.
   /// Nothing is lost then: this image and the others are kept, in memory and beyond the budget, and the next call tries
-  /// again. Linear in the pixels, about 4 ms for 640 x 480.
+  /// again. Linear in the pixels, about 3 ms for 640 x 480.
   result<void> put(std::uint64_t frame, image_view<const std::uint16_t> depth) {
     return put(frame, depth, encoder_.encode(depth));
   }
@@ -78,7 +78,7 @@ class depth_store {
 
   /// Copies the image of `frame` to `out`, whose size changes to the image's. An image in the file stays there.
   /// Errors: not_found; unreadable or malformed, where the spill file fails or is damaged (`out` is empty then).
-  /// Linear in the pixels, about 4 ms for 640 x 480.
+  /// Linear in the pixels, about 1 ms for 640 x 480.
   result<void> get(std::uint64_t frame, image<std::uint16_t>& out) const {
     const auto at = entries_.find(frame);
     if (at == entries_.end()) return fail(errc::not_found, name(frame), "there is no depth image of it");

@@ -12,7 +12,8 @@
 /// III.B; but frequencies are counted first and coded (rANS), and a pixel without measurement (0) is a symbol of its
 /// own, which predicts nothing.
 ///
-/// The image is cut into bands of rows that are coded apart, so that a processor works on several at once.
+/// The image is cut into bands of rows that are coded apart, but take turns pixel by pixel in one stream of words, so
+/// that the decoder has a band in each lane of a vector.
 #pragma once
 
 #include <algorithm>
@@ -30,7 +31,7 @@
 
 #include <orbis/core/image.hpp>
 #include <orbis/core/result.hpp>
-#include <orbis/core/simd/dispatch.hpp>
+#include <orbis/core/simd.hpp>
 #include <orbis/mapping/detail/depth/rans.hpp>
 
 namespace orbis::mapping::detail {
@@ -70,6 +71,8 @@ struct depth_neighbors {
   std::uint32_t last = 0;  ///< the last pixel with a depth, in the order of rows
 
   static constexpr std::size_t levels = 12;
+  /// From where on the differences of the neighbours, added up, count as one level more.
+  static constexpr std::array<std::int32_t, levels - 1> first_steps{1, 2, 3, 4, 6, 9, 14, 21, 33, 61, 151};
   static constexpr std::size_t contexts = levels + 15;
 
   struct prediction {
@@ -110,17 +113,16 @@ struct depth_neighbors {
 
  private:
   static constexpr auto level_of = [] {
-    constexpr std::array<std::size_t, levels> first{0, 1, 2, 3, 4, 6, 9, 14, 21, 33, 61, 151};
-    std::array<std::uint8_t, 152> of{};
-    for (std::size_t level = 0; level != levels; ++level)
-      for (std::size_t steps = first[level]; steps != of.size(); ++steps) of[steps] = static_cast<std::uint8_t>(level);
+    std::array<std::uint8_t, first_steps.back() + 1> of{};
+    for (const std::int32_t first : first_steps)
+      for (auto steps = static_cast<std::size_t>(first); steps != of.size(); ++steps) ++of[steps];
     return of;
   }();
 };
 
 /// The bands of an image: equally many rows each, but for the last one, which has the rest as well.
 struct depth_bands {
-  static constexpr int count = 4;
+  static constexpr int count = 16;
   int rows_each, rows_last;
   explicit depth_bands(int height) noexcept : rows_each{height / count}, rows_last{height - (count - 1) * rows_each} {}
   [[nodiscard]] int first_row(int band) const noexcept { return band * rows_each; }
@@ -245,26 +247,31 @@ class depth_encoder {
     }
   }
 
+  /// Pixel by pixel, in each of them band by band, in the reverse order: what comes last is the rest of the last band.
   void write_bands(const depth_bands& bands, std::size_t columns) {
     words_.resize(2 * coded_.size());  // a symbol and its rest take at most a word each
-    std::array<std::span<const std::uint16_t>, depth_bands::count> words{};
-    std::array<std::uint32_t, depth_bands::count> states{};
-    for (int band = 0; band != depth_bands::count; ++band) {
-      const std::size_t first = static_cast<std::size_t>(bands.first_row(band)) * columns;
-      const std::size_t end = first + static_cast<std::size_t>(bands.rows(band)) * columns;
-      std::uint16_t* const stop = words_.data() + 2 * end;
-      rans_encoder encoder{stop};
-      for (std::size_t i = end; i-- != first;) {
-        const coded c = coded_[i];
-        if (const unsigned bits = depth_symbol::rest_bits(c.symbol); bits != 0) encoder.put_bits(c.rest, bits);
-        encoder.put(symbols_[c.context][c.symbol]);
-      }
-      words[static_cast<std::size_t>(band)] = {encoder.words(), stop};
-      states[static_cast<std::size_t>(band)] = encoder.state();
+    std::uint16_t* const stop = words_.data() + words_.size();
+    rans_sink sink{stop};
+    std::array<rans_encoder, depth_bands::count> encoders;
+    const auto put_rest = [&](rans_encoder& encoder, const coded& c) {
+      if (const unsigned bits = depth_symbol::rest_bits(c.symbol); bits != 0) encoder.put_bits(c.rest, bits, sink);
+    };
+    const auto put_symbol = [&](rans_encoder& encoder, const coded& c) {
+      encoder.put(symbols_[c.context][c.symbol], sink);
+    };
+    const std::size_t shared = columns * static_cast<std::size_t>(bands.rows_each);  // pixels that every band has
+    for (std::size_t i = coded_.size(); i-- != shared * depth_bands::count;) {
+      put_rest(encoders.back(), coded_[i]);
+      put_symbol(encoders.back(), coded_[i]);
     }
-    for (const auto& w : words) append_varint(out_, static_cast<std::uint32_t>(w.size()));
-    for (const std::uint32_t s : states) append_varint(out_, s);
-    for (const auto& w : words) append_words(w);
+    for (std::size_t i = shared; i-- != 0;) {
+      for (std::size_t b = encoders.size(); b-- != 0;) put_rest(encoders[b], coded_[b * shared + i]);
+      for (std::size_t b = encoders.size(); b-- != 0;) put_symbol(encoders[b], coded_[b * shared + i]);
+    }
+    const std::span<const std::uint16_t> words{sink.words(), stop};
+    append_varint(out_, static_cast<std::uint32_t>(words.size()));
+    for (const rans_encoder& e : encoders) append_varint(out_, e.state());
+    append_words(words);
   }
 
   void write_plain(image_view<const std::uint16_t> depth) {
@@ -299,7 +306,96 @@ class depth_encoder {
   std::array<std::array<rans_encoder_symbol, depth_symbol::count>, neighbors::contexts> symbols_{};
 };
 
-/// Reads compressed depth images. Keeps its buffers, about 120 kB.
+/// What the decoder of the rows that all bands have goes on with, from row to row.
+struct depth_row_reader {
+  static constexpr std::size_t lanes = depth_bands::count;
+  const std::uint32_t* slots = nullptr;  ///< of the contexts' tables, one after the other
+  int width = 0;
+  /// Of each column a rank for each band: of the row above, then of this one. Two columns more, with zeros.
+  std::vector<std::int32_t> ranks{};
+  alignas(64) std::array<std::int32_t, lanes> last{};  ///< depth_neighbors::last
+  alignas(64) std::array<std::uint32_t, lanes> states{};
+  rans_source words{};
+};
+
+/// Decodes a row of every band: `depth_neighbors` and `rans_symbol_of` for all of them at once.
+struct read_depth_ranks {
+  using signature = void(depth_row_reader&);
+  template <simd::target Target>
+  static ORBIS_ALWAYS_INLINE void run(depth_row_reader& row) {
+    constexpr std::size_t lanes = depth_row_reader::lanes;
+    using ints = simd::vec<std::int32_t, lanes, Target>;
+    using words = simd::vec<std::uint32_t, lanes, Target>;
+    const ints none = 0;
+    const auto load = [&](int x) ORBIS_INLINE_LAMBDA {
+      return ints::load(row.ranks.data() + static_cast<std::size_t>(x) * lanes);
+    };
+    const auto distance = [](const ints& a, const ints& b) ORBIS_INLINE_LAMBDA { return max(a - b, b - a); };
+    ints west = 0, north_west = 0, north = load(0), north_east = load(1), last = ints::load(row.last.data());
+    words state = words::load(row.states.data());
+    for (int x = 0; x != row.width; ++x) {
+      // What is expected: see depth_neighbors::predict.
+      const ints steps = distance(west, north_west) + distance(north, north_west) + distance(north, north_east);
+      ints context = 0;
+      for (const std::int32_t first : depth_neighbors::first_steps)
+        context = context + select(steps >= ints(first), ints(1), none);
+      ints rank = min(max(west + north - north_west, min(west, north)), max(west, north));
+      const auto inside = (min(min(west, north), min(north_west, north_east)) > none);
+      if (!all(inside)) {
+        const auto bit = [&](const ints& neighbor, std::int32_t value)
+                             ORBIS_INLINE_LAMBDA { return select(neighbor > none, ints(value), none); };
+        const ints known = bit(west, 1) | bit(north, 2) | bit(north_west, 4) | bit(north_east, 8);
+        const auto first_of = [&](const ints& a, const ints& b) ORBIS_INLINE_LAMBDA { return select(a > none, a, b); };
+        context = select(inside, context, ints(depth_neighbors::levels) + known);
+        rank = select(inside, rank, first_of(west, first_of(north, first_of(north_west, first_of(north_east, last)))));
+      }
+      const words slot = simd::gather(row.slots, (context << static_cast<int>(rans_scale_bits)) |
+                                                     (simd::bits_as<std::int32_t>(state) & ints(rans_scale - 1)));
+      state = (slot >> 18) * (state >> static_cast<int>(rans_scale_bits)) + ((slot >> 6) & words(rans_scale - 1));
+      const ints symbol = simd::bits_as<std::int32_t>(slot) & ints(rans_decoder_table::most_symbols - 1);
+      const ints folded = symbol - ints(1);
+      const ints residual =
+          simd::bits_as<std::int32_t>(simd::bits_as<std::uint32_t>(folded) >> 1) ^ (none - (folded & ints(1)));
+      ints found = select(symbol > none, (rank + residual) & ints(0xffff), none);
+      // Some bands have a word to take now and then, and some symbols have bits behind them.
+      const auto is_low = simd::bits_as<std::int32_t>(state >> 16) == none;
+      const auto is_long = symbol > ints(static_cast<std::int32_t>(depth_symbol::direct));
+      if (any(is_low | is_long)) {
+        alignas(64) std::uint32_t states[lanes];
+        state.store(states);
+        for (std::uint32_t left = bits(is_low); left != 0; left &= left - 1) {
+          const auto b = static_cast<std::size_t>(std::countr_zero(left));
+          states[b] = row.words.fill(states[b]);
+        }
+        if (any(is_long)) {
+          alignas(64) std::int32_t expected[lanes], symbols[lanes], ranks[lanes];
+          rank.store(expected);
+          symbol.store(symbols);
+          found.store(ranks);
+          for (std::uint32_t left = bits(is_long); left != 0; left &= left - 1) {
+            const auto b = static_cast<std::size_t>(std::countr_zero(left));
+            const auto s = static_cast<std::uint32_t>(symbols[b]);
+            const std::uint32_t rest = rans_bits_of(states[b], depth_symbol::rest_bits(s), row.words);
+            ranks[b] = static_cast<std::int32_t>(
+                (static_cast<std::uint32_t>(expected[b]) + depth_symbol::residual(s, rest)) & 0xffffU);
+          }
+          found = ints::load(ranks);
+        }
+        state = words::load(states);
+      }
+      found.store(row.ranks.data() + static_cast<std::size_t>(x) * lanes);
+      last = select(found > none, found, last);
+      north_west = north;
+      north = north_east;
+      north_east = load(x + 2);
+      west = found;
+    }
+    last.store(row.last.data());
+    state.store(row.states.data());
+  }
+};
+
+/// Reads compressed depth images. Keeps its buffers, about 450 kB, and 64 bytes a column.
 class depth_decoder {
  public:
   /// Puts the image into `out`, which has its size. Errors: malformed, with nothing said of what `out` holds then; any
@@ -317,9 +413,8 @@ class depth_decoder {
       default: return damaged("its coding is unknown");
     }
     if (!read_tables(bytes)) return damaged("its frequencies are wrong");
-    std::array<rans_decoder, depth_bands::count> streams;
-    if (!open_streams(bytes, streams)) return damaged("its length is wrong");
-    if (!read_ranks(streams, out)) return damaged("its pixels do not end where they should");
+    if (!open_words(bytes)) return damaged("its length is wrong");
+    if (!read_ranks(out)) return damaged("its pixels do not end where they should");
     if (static_cast<depth_coding>(coding) == depth_coding::ranks && !to_depths(out))
       return damaged("a pixel's depth is not in the list of depths");
     return {};
@@ -327,7 +422,7 @@ class depth_decoder {
 
  private:
   using neighbors = depth_neighbors;
-  using table = rans_decoder_table<depth_symbol::count>;
+  using table = rans_decoder_table;
 
   [[nodiscard]] static tl::unexpected<error> damaged(const char* what) {
     return fail(errc::malformed, "compressed depth image", what);
@@ -364,17 +459,14 @@ class depth_decoder {
     for (table& t : tables_) {
       std::uint32_t used = 0, start = 0;
       if (!take_varint(from, used) || used > depth_symbol::count) return false;
-      t.symbols = {};
       for (std::uint32_t s = 0; s != used; ++s) {
         std::uint32_t frequency = 0;
         if (!take_varint(from, frequency) || frequency > rans_scale - start) return false;
-        t.symbols[s] = {static_cast<std::uint16_t>(frequency), static_cast<std::uint16_t>(start)};
-        std::memset(t.symbol_of.data() + start, static_cast<int>(s), frequency);
+        t.set(s, start, frequency);
         start += frequency;
       }
       if (used == 0) {
-        t.symbols[0] = {static_cast<std::uint16_t>(rans_scale), 0};
-        t.symbol_of.fill(0);
+        t.set(depth_symbol::no_depth, 0, rans_scale);
       } else if (start != rans_scale) {
         return false;
       }
@@ -382,65 +474,61 @@ class depth_decoder {
     return true;
   }
 
-  [[nodiscard]] static bool open_streams(std::span<const std::byte> from,
-                                         std::array<rans_decoder, depth_bands::count>& streams) {
-    std::array<std::uint32_t, depth_bands::count> words{}, states{};
-    for (std::uint32_t& n : words)
-      if (!take_varint(from, n)) return false;
-    for (std::uint32_t& s : states)
+  [[nodiscard]] bool open_words(std::span<const std::byte> from) {
+    std::uint32_t words = 0;
+    if (!take_varint(from, words)) return false;
+    for (std::uint32_t& s : row_.states)
       if (!take_varint(from, s) || s < rans_lowest) return false;
-    for (std::size_t b = 0; b != streams.size(); ++b) {
-      const std::size_t bytes = 2 * std::size_t{words[b]};
-      if (bytes > from.size()) return false;
-      streams[b] = rans_decoder{states[b], from.first(bytes)};
-      from = from.subspan(bytes);
-    }
-    return from.empty();
+    if (from.size() != 2 * std::size_t{words}) return false;
+    row_.words = rans_source{from};
+    return true;
   }
 
-  /// One pixel of one band.
-  [[nodiscard]] static ORBIS_ALWAYS_INLINE std::uint32_t next_rank(rans_decoder& stream, const table* tables,
-                                                                   const neighbors& near) noexcept {
-    const neighbors::prediction expected = near.predict();
-    const std::uint32_t symbol = stream.get(tables[expected.context]);
-    if (symbol == depth_symbol::no_depth) return 0;
-    const unsigned bits = depth_symbol::rest_bits(symbol);
-    const std::uint32_t rest = bits == 0 ? 0 : stream.get_bits(bits);
-    return (expected.rank + depth_symbol::residual(symbol, rest)) & 0xffffU;
-  }
-
-  [[nodiscard]] bool read_ranks(std::array<rans_decoder, depth_bands::count>& streams, image_view<std::uint16_t> out) {
-    const int width = out.width();
+  [[nodiscard]] bool read_ranks(image_view<std::uint16_t> out) {
     if (out.empty()) return false;  // an image without pixels is written plain
+    constexpr std::size_t lanes = depth_row_reader::lanes;
     const depth_bands bands{out.height()};
-    no_row_.assign(static_cast<std::size_t>(width), 0);
-    std::array<neighbors, depth_bands::count> near{};
-    const table* const tables = tables_.data();
-    const auto read_rows = [&]<std::size_t... B>(std::index_sequence<B...>, int row, std::size_t first_band) {
-      std::array<std::uint16_t*, sizeof...(B)> here{};
-      std::array<const std::uint16_t*, sizeof...(B)> above{};
-      std::array<rans_decoder, sizeof...(B)> from{streams[first_band + B]...};
-      std::array<neighbors, sizeof...(B)> at{near[first_band + B]...};
-      for (std::size_t b = 0; b != sizeof...(B); ++b) {
-        const int y = bands.first_row(static_cast<int>(first_band + b)) + row;
-        here[b] = out.row(y).data();
-        above[b] = row == 0 ? no_row_.data() : out.row(y - 1).data();
-        at[b].begin_row(above[b], width);
+    const auto width = static_cast<std::size_t>(out.width());
+    row_.slots = tables_.front().slots.data();
+    row_.width = out.width();
+    row_.last.fill(0);
+    row_.ranks.assign((width + 2) * lanes, 0);
+    const auto read_row = simd::kernel<read_depth_ranks, read_depth_ranks::signature>();
+    for (int y = 0; y != bands.rows_each; ++y) {
+      read_row(row_);
+      std::array<std::uint16_t*, lanes> to{};
+      for (std::size_t b = 0; b != lanes; ++b) to[b] = out.row(bands.first_row(static_cast<int>(b)) + y).data();
+      for (std::size_t x = 0; x != width; ++x)
+        for (std::size_t b = 0; b != lanes; ++b) to[b][x] = static_cast<std::uint16_t>(row_.ranks[x * lanes + b]);
+    }
+    read_rest(bands, out);
+    return row_.words.at_end() &&
+           std::ranges::all_of(row_.states, [](std::uint32_t state) { return state == rans_lowest; });
+  }
+  /// The rows that only the last band has.
+  void read_rest(const depth_bands& bands, image_view<std::uint16_t> out) {
+    const std::vector<std::uint16_t> no_row(static_cast<std::size_t>(out.width()), 0);
+    std::uint32_t& state = row_.states.back();
+    neighbors near{};
+    near.last = static_cast<std::uint32_t>(row_.last.back());
+    const int first = bands.first_row(depth_bands::count - 1);
+    for (int y = first + bands.rows_each; y < out.height(); ++y) {
+      const std::uint16_t* const above = y == first ? no_row.data() : out.row(y - 1).data();
+      std::uint16_t* const here = out.row(y).data();
+      near.begin_row(above, out.width());
+      for (int x = 0; x != out.width(); ++x) {
+        const neighbors::prediction expected = near.predict();
+        const std::uint32_t symbol = rans_symbol_of(state, tables_[expected.context], row_.words);
+        std::uint32_t rank = 0;
+        if (symbol != depth_symbol::no_depth) {
+          const unsigned bits = depth_symbol::rest_bits(symbol);
+          const std::uint32_t rest = bits == 0 ? 0 : rans_bits_of(state, bits, row_.words);
+          rank = (expected.rank + depth_symbol::residual(symbol, rest)) & 0xffffU;
+        }
+        here[x] = static_cast<std::uint16_t>(rank);
+        near.advance(rank, x + 2 < out.width() ? above[x + 2] : 0U);
       }
-      for (int x = 0; x != width; ++x) {
-        const auto step = [&](std::size_t b) ORBIS_INLINE_LAMBDA {
-          const std::uint32_t rank = next_rank(from[b], tables, at[b]);
-          here[b][x] = static_cast<std::uint16_t>(rank);
-          at[b].advance(rank, x + 2 < width ? above[b][x + 2] : 0U);
-        };
-        (step(B), ...);
-      }
-      ((streams[first_band + B] = from[B], near[first_band + B] = at[B]), ...);
-    };
-    for (int row = 0; row != bands.rows_each; ++row) read_rows(std::make_index_sequence<depth_bands::count>{}, row, 0);
-    for (int row = bands.rows_each; row != bands.rows_last; ++row)
-      read_rows(std::make_index_sequence<1>{}, row, depth_bands::count - 1);
-    return std::all_of(streams.begin(), streams.end(), [](const rans_decoder& s) { return s.at_end(); });
+    }
   }
 
   [[nodiscard]] bool to_depths(image_view<std::uint16_t> ranks) const {
@@ -455,7 +543,7 @@ class depth_decoder {
 
   std::vector<std::uint16_t> depths_;  // by rank
   std::vector<table> tables_;
-  std::vector<std::uint16_t> no_row_;
+  depth_row_reader row_;
 };
 
 }  // namespace orbis::mapping::detail

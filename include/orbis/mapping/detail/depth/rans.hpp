@@ -71,83 +71,89 @@ struct rans_encoder_symbol {
         start{s.start} {}
 };
 
-/// Writes symbols; the last one first. The words go below `end`, downwards.
+/// Where encoders write words: below `end`, downwards. Several may share it; then decoders that take turns in the same
+/// order, forwards, can share a `rans_source`.
+class rans_sink {
+ public:
+  explicit rans_sink(std::uint16_t* end) noexcept : at_{end} {}
+  void put(std::uint16_t word) noexcept { *--at_ = word; }
+  /// The first word in the file, which was written last.
+  [[nodiscard]] const std::uint16_t* words() const noexcept { return at_; }
+
+ private:
+  std::uint16_t* at_;
+};
+
+/// Writes symbols; the last one first.
 class rans_encoder {
  public:
-  explicit rans_encoder(std::uint16_t* end) noexcept : at_{end} {}
-
-  void put(const rans_encoder_symbol& s) noexcept {
-    if (state_ >= s.highest) give_word();
+  void put(const rans_encoder_symbol& s, rans_sink& to) noexcept {
+    if (state_ >= s.highest) give_word(to);
     // state_ < frequency * 2^20 makes the product exact and less than 2^64.
     const auto quotient = static_cast<std::uint32_t>(state_ * s.reciprocal >> 44U);
     state_ = (std::uint64_t{quotient} << rans_scale_bits) + (state_ - quotient * s.frequency) + s.start;
   }
   /// `bits` bits as they are. @pre bits <= 16, value < 2^bits
-  void put_bits(std::uint32_t value, unsigned bits) noexcept {
-    if (state_ >= std::uint64_t{1} << (32U - bits)) give_word();
+  void put_bits(std::uint32_t value, unsigned bits, rans_sink& to) noexcept {
+    if (state_ >= std::uint64_t{1} << (32U - bits)) give_word(to);
     state_ = state_ << bits | value;
   }
-  /// The first word written so far, behind which the others follow.
-  [[nodiscard]] const std::uint16_t* words() const noexcept { return at_; }
   [[nodiscard]] std::uint32_t state() const noexcept { return static_cast<std::uint32_t>(state_); }
 
  private:
-  void give_word() noexcept {
-    *--at_ = static_cast<std::uint16_t>(state_);
+  void give_word(rans_sink& to) noexcept {
+    to.put(static_cast<std::uint16_t>(state_));
     state_ >>= 16U;
   }
-  std::uint16_t* at_;
   std::uint64_t state_ = rans_lowest;  // less than 2^32
 };
 
-/// The symbols of one table by slot, for the decoder.
-template <std::size_t Symbols>
+/// The symbols of one table by slot, for the decoder: 6 bits of the symbol, 12 of the slot less the symbol's first one,
+/// 13 of its frequency.
 struct rans_decoder_table {
-  std::array<rans_symbol, Symbols> symbols{};
-  std::array<std::uint8_t, rans_scale> symbol_of{};  ///< of each slot
+  static constexpr std::uint32_t most_symbols = 64;
+  std::array<std::uint32_t, rans_scale> slots{};
+
+  /// Gives `frequency` slots from `start` on to a symbol. @pre they are there; symbol < most_symbols
+  void set(std::uint32_t symbol, std::uint32_t start, std::uint32_t frequency) noexcept {
+    for (std::uint32_t i = 0; i != frequency; ++i) slots[start + i] = frequency << 18U | i << 6U | symbol;
+  }
 };
 
-/// Reads what `rans_encoder` wrote. Behind the last word come zeros.
-class rans_decoder {
+/// Where decoders get words from: two bytes each, little-endian. Behind the last word come zeros.
+class rans_source {
  public:
-  rans_decoder() = default;
-  /// `words`: two bytes each, little-endian.
-  rans_decoder(std::uint32_t state, std::span<const std::byte> words) noexcept
-      : at_{words.data()}, end_{words.data() + words.size() / 2 * 2}, state_{state} {}
-
-  template <std::size_t Symbols>
-  [[nodiscard]] std::uint32_t get(const rans_decoder_table<Symbols>& table) noexcept {
-    const std::uint32_t slot = state_ & (rans_scale - 1);
-    const std::uint32_t symbol = table.symbol_of[slot];
-    const rans_symbol s = table.symbols[symbol];
-    state_ = s.frequency * (state_ >> rans_scale_bits) + slot - s.start;
-    take_word_if_low();
-    return symbol;
+  rans_source() = default;
+  explicit rans_source(std::span<const std::byte> words) noexcept
+      : at_{words.data()}, end_{words.data() + words.size() / 2 * 2} {}
+  /// `state` with the next word, if it has become too low.
+  [[nodiscard]] std::uint32_t fill(std::uint32_t state) noexcept {
+    if (state >= rans_lowest) return state;
+    if (at_ == end_) return state << 16U;
+    const std::uint32_t word = std::to_integer<std::uint32_t>(at_[0]) | std::to_integer<std::uint32_t>(at_[1]) << 8U;
+    at_ += 2;
+    return state << 16U | word;
   }
-  /// @pre bits <= 16
-  [[nodiscard]] std::uint32_t get_bits(unsigned bits) noexcept {
-    const std::uint32_t value = state_ & ((1U << bits) - 1);
-    state_ >>= bits;
-    take_word_if_low();
-    return value;
-  }
-  /// Whether all words have been read and nothing else: what was written has come back.
-  [[nodiscard]] bool at_end() const noexcept { return at_ == end_ && state_ == rans_lowest; }
+  /// Whether all words have been read.
+  [[nodiscard]] bool at_end() const noexcept { return at_ == end_; }
 
  private:
-  /// Without branches: whether a word is due is as random as the symbols are.
-  void take_word_if_low() noexcept {
-    static constexpr std::array<std::byte, 2> zeros{};
-    const bool low = state_ < rans_lowest, left = at_ != end_;
-    const std::byte* from = left ? at_ : zeros.data();
-    const std::uint32_t word = std::to_integer<std::uint32_t>(from[0]) | std::to_integer<std::uint32_t>(from[1]) << 8U;
-    const std::uint32_t filled = state_ << 16U | word;
-    state_ = low ? filled : state_;
-    at_ += 2 * static_cast<std::ptrdiff_t>(low && left);
-  }
   const std::byte* at_ = nullptr;
   const std::byte* end_ = nullptr;
-  std::uint32_t state_ = rans_lowest;
 };
+
+/// Reads the next symbol of what a `rans_encoder` wrote. It wrote all if its state is `rans_lowest` in the end.
+[[nodiscard]] inline std::uint32_t rans_symbol_of(std::uint32_t& state, const rans_decoder_table& table,
+                                                  rans_source& from) noexcept {
+  const std::uint32_t slot = table.slots[state & (rans_scale - 1)];
+  state = from.fill((slot >> 18U) * (state >> rans_scale_bits) + (slot >> 6U & (rans_scale - 1)));
+  return slot & (rans_decoder_table::most_symbols - 1);
+}
+/// @pre bits <= 16
+[[nodiscard]] inline std::uint32_t rans_bits_of(std::uint32_t& state, unsigned bits, rans_source& from) noexcept {
+  const std::uint32_t value = state & ((1U << bits) - 1);
+  state = from.fill(state >> bits);
+  return value;
+}
 
 }  // namespace orbis::mapping::detail
