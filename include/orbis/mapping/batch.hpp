@@ -208,20 +208,22 @@ template <class Octree, execution_policy Policy, keyframe_range Keyframes, camer
     moved[judged.number] = std::move(judged.removed);
     return {};
   };
-  moving_window<Camera, keyframe_type> window{camera, options.moving};
-  const auto add_judged = [&]() -> result<void> {
-    while (auto judged = window.pop())
-      if (auto added = add(*judged); !added) return added;
-    return {};
-  };
-  for (const auto& k : keyframes) {
-    if (!fits(k.depth)) return fail(errc::invalid_argument, "keyframes", "an image is not of the camera's size");
-    window.push(policy, k);
+  {
+    moving_window<Camera, keyframe_type> window{camera, options.moving};
+    const auto add_judged = [&]() -> result<void> {
+      while (auto judged = window.pop())
+        if (auto added = add(*judged); !added) return added;
+      return {};
+    };
+    for (const auto& k : keyframes) {
+      if (!fits(k.depth)) return fail(errc::invalid_argument, "keyframes", "an image is not of the camera's size");
+      window.push(policy, k);
+      if (auto added = add_judged(); !added) return fail(std::move(added.error()));
+      if (!on_progress(++done, total)) return fail(errc::cancelled, {}, "cancelled");
+    }
+    window.finish();
     if (auto added = add_judged(); !added) return fail(std::move(added.error()));
-    if (!on_progress(++done, total)) return fail(errc::cancelled, {}, "cancelled");
-  }
-  window.finish();
-  if (auto added = add_judged(); !added) return fail(std::move(added.error()));
+  }  // the keyframes in the window are freed
   if (options.unfiltered_octree) {
     auto octree = into.unfiltered();
     if (!octree) return fail(std::move(octree.error()));
