@@ -5,6 +5,7 @@
 #include <cmath>
 #include <deque>
 #include <filesystem>
+#include <limits>
 #include <map>
 #include <utility>
 
@@ -49,7 +50,29 @@ template <class Make>
   return found != made.end() ? *found : made.emplace_back(make());
 }
 
+[[nodiscard]] points shuffled(points cloud) {
+  const std::size_t n = cloud.size();
+  random_bits random{n + 1};
+  for (std::size_t i = n; i-- > 1;) std::swap(cloud[i], cloud[random.below(static_cast<std::uint32_t>(i + 1))]);
+  return cloud;
+}
+
 [[nodiscard]] std::filesystem::path kitchen_folder() { return std::filesystem::path{ORBIS_DATA_DIR} / "kitchen"; }
+
+/// Every `step`-th frame, every `stride`-th pixel both ways, and at most the first n points.
+[[nodiscard]] points kitchen_frames(std::size_t step, int stride, std::size_t n) {
+  points out;
+  const auto recording = io::open_recording(kitchen_folder()).value();
+  for (std::size_t i = 0; i < recording.size() && out.size() < n; i += step) {
+    const auto frame = recording.frame(i).value();
+    const auto seen =
+        camera::unproject_depth(par, frame.depth_metres(), recording.camera().model,
+                                {.stride = stride, .max_depth = 5.0F}, frame.T_world_camera.value_or(se3{}));
+    out.insert(out.end(), seen.points.begin(), seen.points.end());
+  }
+  out.resize(std::min(n, out.size()));
+  return out;
+}
 
 }  // namespace
 
@@ -60,10 +83,20 @@ const points& room_cloud(std::size_t n) {
 
 const points& shuffled_cloud(std::size_t n) {
   static std::deque<points> made;
+  return kept(made, n, [n] { return shuffled(room_cloud(n)); });
+}
+
+const points& uniform_cloud(std::size_t n) {
+  static std::deque<points> made;
   return kept(made, n, [n] {
-    points out = room_cloud(n);
-    random_bits random{n + 1};
-    for (std::size_t i = n; i-- > 1;) std::swap(out[i], out[random.below(static_cast<std::uint32_t>(i + 1))]);
+    random_bits random{n};
+    points out;
+    for (std::size_t i = 0; i != n; ++i) {
+      const double x = random.uniform(-2.5, 2.5);
+      const double y = random.uniform(-1.3, 1.3);
+      const double z = random.uniform(-2.0, 2.0);
+      out.emplace_back(vec3{x, y, z}.cast<float>());
+    }
     return out;
   });
 }
@@ -76,18 +109,18 @@ const points& identical_cloud(std::size_t n) {
 bool have_kitchen_cloud() { return std::filesystem::exists(kitchen_folder() / "depth.txt"); }
 
 const points& kitchen_cloud() {
-  static const points merged = [] {
-    points out;
-    const auto recording = io::open_recording(kitchen_folder()).value();
-    for (std::size_t i = 0; i < recording.size(); i += 100) {
-      const auto frame = recording.frame(i).value();
-      const auto seen = camera::unproject_depth(par, frame.depth_metres(), recording.camera().model,
-                                                {.stride = 2, .max_depth = 5.0F}, frame.T_world_camera.value_or(se3{}));
-      out.insert(out.end(), seen.points.begin(), seen.points.end());
-    }
-    return out;
-  }();
+  static const points merged = kitchen_frames(100, 2, std::numeric_limits<std::size_t>::max());
   return merged;
+}
+
+const points& kitchen_scans(std::size_t n) {
+  static std::deque<points> made;
+  return kept(made, n, [n] { return kitchen_frames(30, 1, n); });
+}
+
+const points& shuffled_kitchen_scans(std::size_t n) {
+  static std::deque<points> made;
+  return kept(made, n, [n] { return shuffled(kitchen_scans(n)); });
 }
 
 #ifdef ORBIS_BENCH_WITH_PCL

@@ -32,10 +32,15 @@ using points = std::vector<vec3f>;
 [[nodiscard]] const points& room_cloud(std::size_t n);
 /// The same points in no order, as a k-d tree or a hash may hand them out.
 [[nodiscard]] const points& shuffled_cloud(std::size_t n);
+/// Points anywhere in a box of 5 x 2.6 x 4 m.
+[[nodiscard]] const points& uniform_cloud(std::size_t n);
 /// One point, n times.
 [[nodiscard]] const points& identical_cloud(std::size_t n);
 /// Five frames of a real kitchen, merged: about 300,000 points.
 [[nodiscard]] const points& kitchen_cloud();
+/// Frames of it at full resolution, one after another in the order of their pixels: n points.
+[[nodiscard]] const points& kitchen_scans(std::size_t n);
+[[nodiscard]] const points& shuffled_kitchen_scans(std::size_t n);
 [[nodiscard]] bool have_kitchen_cloud();
 
 /// A cloud for nanoflann.

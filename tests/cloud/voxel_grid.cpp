@@ -5,9 +5,12 @@
 #include <cstdint>
 #include <limits>
 #include <map>
+#include <span>
 #include <vector>
 
 #include <orbis/cloud/voxel_grid.hpp>
+#include <orbis/core/execution.hpp>
+#include <orbis/core/random.hpp>
 
 #include "cloud/clouds.hpp"
 #include "cloud/reference.hpp"
@@ -117,4 +120,111 @@ TEST_CASE("colours ride along, and the choice may be anyone's") {
   CHECK(chosen.colors == std::vector<orbis::rgb8>{cloud.colors[1], cloud.colors[2]});
   const auto random = orbis::cloud::voxel_grid(cloud, {.size = 1.0}, orbis::cloud::voxel_random{});
   CHECK(random.colors.size() == 2);
+}
+
+namespace {
+
+/// What `voxel_grid` and `voxel_grid_indices` with `voxel_random` must give, bit by bit.
+struct expected_voxels {
+  orbis::point_cloud centroids;
+  std::vector<std::uint32_t> first;
+  std::vector<std::uint32_t> random;
+};
+template <class Points>
+[[nodiscard]] expected_voxels voxels_one_by_one(const Points& points, std::span<const orbis::rgb8> colors,
+                                                double size) {
+  orbis::cloud::voxel_accumulator voxels{size};
+  expected_voxels out;
+  for (std::uint32_t i = 0; i != points.size(); ++i) {
+    const auto number = voxels.add(points[i], colors.empty() ? orbis::rgb8{} : colors[i]);
+    if (!number) continue;
+    if (*number == out.first.size()) {
+      out.first.push_back(i);
+      out.random.push_back(i);
+    } else if (orbis::cloud::voxel_random{.seed = 3}.replaces(out.random[*number], i)) {
+      out.random[*number] = i;
+    }
+  }
+  out.centroids = voxels.centroids(!colors.empty());
+  return out;
+}
+
+template <class Points>
+void check_voxels(const Points& points, std::span<const orbis::rgb8> colors, double size) {
+  using orbis::cloud::voxel_random;
+  const expected_voxels expected = voxels_one_by_one(points, colors, size);
+  const orbis::cloud::voxel_grid_options options{.size = size};
+  const auto check = [&](const auto& policy) {
+    const orbis::point_cloud grid = orbis::cloud::voxel_grid(policy, points, colors, options);
+    CHECK(grid.points == expected.centroids.points);
+    CHECK(grid.colors == expected.centroids.colors);
+    CHECK(orbis::cloud::voxel_grid(policy, points, options).points == expected.centroids.points);
+    CHECK(orbis::cloud::voxel_grid_indices(policy, points, options) == expected.first);
+    CHECK(orbis::cloud::voxel_grid_indices(policy, points, options, voxel_random{.seed = 3}) == expected.random);
+  };
+  check(orbis::seq);
+  check(orbis::par.with(2));
+  check(orbis::par.with(5));
+}
+
+}  // namespace
+
+TEST_CASE("a large cloud has the same voxels under every policy") {
+  // On both sides of the sizes and shares of occupied voxels at which the way to them changes.
+  for (const std::size_t n : {1'000U, 32'768U, 32'769U, 150'000U}) {
+    orbis::test::points cloud = orbis::test::uniform_cloud(n, n, 3.0, -1.0);
+    for (std::size_t i = 0; i < n; i += 97) cloud[i].y() = std::numeric_limits<float>::quiet_NaN();
+    for (std::size_t i = 1; i < n; i += 1013) cloud[i].z() = 3e8F;
+    for (std::size_t i = 2; i < n; i += 1013) cloud[i].x() = -std::numeric_limits<float>::infinity();
+    std::vector<orbis::rgb8> colors(n);
+    orbis::random_bits random{n};
+    for (orbis::rgb8& c : colors) {
+      const auto bits = random();
+      c = {static_cast<std::uint8_t>(bits), static_cast<std::uint8_t>(bits >> 8U),
+           static_cast<std::uint8_t>(bits >> 16U)};
+    }
+    for (const double size : {0.01, 0.08, 0.15, 0.6, 100.0}) {
+      INFO(n << " points, voxels of " << size);
+      check_voxels(cloud, colors, size);
+    }
+  }
+}
+
+TEST_CASE("few voxels at first and many later") {
+  orbis::test::points cloud = orbis::test::uniform_cloud(40'000, 1, 0.1);
+  const orbis::test::points wide = orbis::test::uniform_cloud(60'000, 2, 5.0, -2.5);
+  cloud.insert(cloud.end(), wide.begin(), wide.end());
+  check_voxels(cloud, {}, 0.05);
+  check_voxels(cloud, {}, 0.2);
+}
+
+TEST_CASE("the voxels of points in double precision") {
+  std::vector<std::array<double, 3>> cloud;
+  orbis::random_bits random{8};
+  for (int i = 0; i != 50'000; ++i)
+    cloud.push_back({4e5 + random.uniform(), 5e6 + random.uniform(), random.uniform()});  // as on a map
+  cloud[17][1] = std::numeric_limits<double>::quiet_NaN();
+  cloud[18][2] = 1e300;
+  for (const double size : {0.01, 0.3}) check_voxels(cloud, {}, size);
+}
+
+TEST_CASE("a large cloud at one place or without any finite point") {
+  check_voxels(orbis::test::points(50'000, orbis::vec3f{0.1F, -0.2F, 3.0F}), {}, 0.01);
+  check_voxels(orbis::test::points(50'000, orbis::vec3f::Constant(std::numeric_limits<float>::infinity())), {}, 0.01);
+}
+
+TEST_CASE("cells up to 2^31 from the origin are told apart") {
+  using limits = std::numeric_limits<double>;
+  const std::vector<std::array<double, 3>> cloud{{2147483646.5, 0, 0},
+                                                 {2147483647.0, 0, 0},
+                                                 {-2147483646.0, 0, 0},
+                                                 {-2147483646.5, 0, 0},
+                                                 {1e12, 0, 0},
+                                                 {-1e12, 0, 0},
+                                                 {limits::max(), 0, 0},
+                                                 {0, limits::lowest(), 0},
+                                                 {-0.0, -limits::denorm_min(), 0},
+                                                 {0, -0.0, limits::denorm_min()}};
+  check_voxels(cloud, {}, 1.0);
+  CHECK(orbis::cloud::voxel_grid_indices(cloud, {.size = 1.0}) == std::vector<std::uint32_t>{0, 2, 8, 9});
 }

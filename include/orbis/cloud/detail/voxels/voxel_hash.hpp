@@ -12,14 +12,12 @@
 #include <optional>
 #include <vector>
 
+#include <orbis/cloud/detail/voxels/voxel_cells.hpp>
 #include <orbis/core/hash_index.hpp>
 #include <orbis/core/point.hpp>
 #include <orbis/core/random.hpp>
 
 namespace orbis::cloud::detail {
-
-/// A cell of a grid through the origin.
-using voxel_key = std::array<std::int32_t, 3>;
 
 /// 64 well-mixed bits of a voxel's key.
 struct voxel_key_hash {

@@ -1,0 +1,303 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// The points of every occupied voxel, gathered in the order of the cloud.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <ranges>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include <orbis/cloud/detail/voxels/voxel_cells.hpp>
+#include <orbis/cloud/detail/voxels/voxel_table.hpp>
+#include <orbis/core/bits.hpp>
+#include <orbis/core/execution.hpp>
+#include <orbis/core/image.hpp>
+#include <orbis/core/point.hpp>
+
+namespace orbis::cloud::detail {
+
+/// What is left of a voxel in the end.
+struct voxel_summary {
+  std::array<std::uint32_t, 3> words{};
+  rgb8 color;
+};
+
+/// How points become voxels: each voxel has a record to which its points are added one after another in the order of
+/// the cloud, and `put(number, summary)` is called once for each voxel, numbered in the order in which they are first
+/// seen, after `resize(count)`. Different voxels at the same time.
+template <class F>
+concept voxel_fold = requires(const F& fold, F& out, typename F::record& r, std::uint32_t i) {
+  requires std::default_initializable<typename F::record>;
+  { F::has_colors } -> std::convertible_to<bool>;
+  fold.add(r, i, std::array<double, 3>{});
+  { fold.summary(std::as_const(r)) } -> std::same_as<voxel_summary>;
+  out.resize(std::size_t{});
+  out.put(i, voxel_summary{});
+};
+
+/// Calls `f(i, key, coordinates)` for the points of [begin, end) that have a voxel and, if it takes them, `g(i)` for
+/// the others.
+template <class S, point_range Points, class F, class G>
+void for_each_cell_of(point_block<S>& block, const Points& points, std::size_t begin, std::size_t end, F&& f, G&& g) {
+  const auto first = std::ranges::begin(points);
+  for (std::size_t from = begin; from != end;) {
+    const std::size_t count = std::min(end - from, point_block<S>::capacity);
+    block.assign(count, [&](std::size_t i) {
+      return coordinates<S>(first[static_cast<std::ranges::range_difference_t<const Points>>(from + i)]);
+    });
+    for (std::size_t i = 0; i != count; ++i) {
+      const voxel_key key = block.key(i);
+      if (is_cell(key))
+        f(static_cast<std::uint32_t>(from + i), key, block.point(i));
+      else
+        g(static_cast<std::uint32_t>(from + i));
+    }
+    from += count;
+  }
+}
+
+/// The number type in which cells are found: double holds all that a cloud can have.
+template <class Points>
+using voxel_scalar =
+    std::conditional_t<std::is_same_v<point_scalar_t<std::ranges::range_value_t<Points>>, float>, float, double>;
+
+/// One pass with one table, which gives up at more than `most` voxels: false.
+template <point_range Points, voxel_fold Fold>
+[[nodiscard]] bool fold_in_one_table(const Points& points, double size, std::size_t most, Fold& fold) {
+  voxel_table<typename Fold::record> table;
+  point_block<voxel_scalar<Points>> block{size};
+  const std::size_t count = std::ranges::size(points);
+  constexpr std::size_t piece = 4096;
+  for (std::size_t from = 0; from < count; from += piece) {
+    for_each_cell_of(
+        block, points, from, std::min(count, from + piece),
+        [&](std::uint32_t i, const voxel_key& key, const std::array<double, 3>& p) {
+          fold.add(table.at(key, i).record, i, p);
+        },
+        [](std::uint32_t) {});
+    if (table.rows().size() > most) return false;
+  }
+  fold.resize(table.rows().size());
+  std::uint32_t number = 0;
+  for (const auto& row : table.rows()) fold.put(number++, fold.summary(row.record));
+  return true;
+}
+
+/// A cloud cut into parts, each with all points of its voxels in their order, of so few voxels that their table stays
+/// in the cache. A part is a random choice of cubes of 8^3 voxels: neighbours in the cloud are mostly neighbours in a
+/// part.
+///
+/// Source: Shatdal, Kant, Naughton, "Cache conscious algorithms for relational query processing", VLDB 1994
+/// (partitioning before hashing).
+template <point_range Points, voxel_fold Fold>
+class voxel_parts {
+ public:
+  voxel_parts(const Points& points, double size)
+      : points_{points},
+        size_{size},
+        count_{std::ranges::size(points)},
+        bits_{std::clamp(std::bit_width(count_ / points_of_part), std::size_t{4}, std::size_t{11})},
+        starts_((std::size_t{1} << bits_) + 1),
+        part_of_{std::make_unique_for_overwrite<std::uint16_t[]>(count_)} {}
+
+  template <execution_policy Policy>
+  void fold(const Policy& policy, Fold& fold) {
+    distribute(policy);
+    std::unique_ptr<rgb8[]> colors;
+    if constexpr (Fold::has_colors) colors = std::make_unique_for_overwrite<rgb8[]>(starts_.back());
+    std::vector<std::uint32_t> voxels(parts());
+    for_each_chunk(policy, parts(), std::max<std::size_t>(1, parts() / 32), [&](std::size_t begin, std::size_t end) {
+      voxel_table<typename Fold::record> table;
+      point_block<voxel_scalar<Points>> block{size_};
+      for (std::size_t part = begin; part != end; ++part) {
+        fill(table, block, part, fold);
+        std::size_t at = starts_[part];
+        for (const auto& row : table.rows()) {  // what is left of them takes the place of the points
+          const voxel_summary summary = fold.summary(row.record);
+          if constexpr (Fold::has_colors) colors[at] = summary.color;
+          entries_[at++] = {summary.words, row.first};
+          part_of_[row.first] = first_of_voxel;
+        }
+        voxels[part] = static_cast<std::uint32_t>(table.rows().size());
+        table.clear();
+      }
+    });
+    const first_points firsts{policy, part_of_.get(), count_};
+    fold.resize(firsts.count());
+    for_each_index(policy, parts(), 8, [&](std::size_t part) {
+      for (std::size_t at = starts_[part]; at != starts_[part] + voxels[part]; ++at)
+        fold.put(firsts.number_of(entries_[at].index), {entries_[at].words, Fold::has_colors ? colors[at] : rgb8{}});
+    });
+  }
+
+ private:
+  static constexpr std::size_t points_of_part = 4096;
+  static constexpr std::size_t grain = std::size_t{1} << 15U;
+  static constexpr std::uint16_t no_part = 0xffff;
+  static constexpr std::uint16_t first_of_voxel = 0xfffe;
+  static constexpr bool keeps_coordinates = std::is_same_v<voxel_scalar<Points>, float>;
+
+  /// A point: its coordinates as float, or its key where they are double; later a voxel's words and first point.
+  struct entry {
+    std::array<std::uint32_t, 3> words;
+    std::uint32_t index;
+  };
+
+  /// The numbers of voxels by the first of their points.
+  class first_points {
+   public:
+    template <execution_policy Policy>
+    first_points(const Policy& policy, const std::uint16_t* marks, std::size_t count)
+        : words_((count + 63) / 64), before_(words_.size() + 1) {
+      for_each_index(policy, words_.size(), 1024, [&](std::size_t w) {
+        std::uint64_t word = 0;
+        const std::size_t end = std::min<std::size_t>(64, count - 64 * w);
+        for (std::size_t i = 0; i != end; ++i) word |= std::uint64_t{marks[64 * w + i] == first_of_voxel} << i;
+        words_[w] = word;
+      });
+      for (std::size_t w = 0; w != words_.size(); ++w) before_[w + 1] = before_[w] + count_ones(words_[w]);
+    }
+    [[nodiscard]] std::size_t count() const noexcept { return before_.back(); }
+    [[nodiscard]] std::uint32_t number_of(std::uint32_t first) const noexcept {
+      const std::uint64_t below = (std::uint64_t{1} << (first % 64)) - 1;
+      return before_[first / 64] + count_ones(words_[first / 64] & below);
+    }
+
+   private:
+    std::vector<std::uint64_t> words_;
+    std::vector<std::uint32_t> before_;
+  };
+
+  [[nodiscard]] std::size_t parts() const noexcept { return starts_.size() - 1; }
+  [[nodiscard]] std::uint16_t part_of(const voxel_key& key) const noexcept {
+    return static_cast<std::uint16_t>(mixed_key<0x2545f4914f6cdd1cULL>({key[0] >> 3, key[1] >> 3, key[2] >> 3}) >>
+                                      (64 - bits_));
+  }
+
+  template <execution_policy Policy>
+  void distribute(const Policy& policy) {
+    // How many points each piece of the cloud has for each part, then where those begin.
+    std::vector<std::uint32_t> at((count_ + grain - 1) / grain * parts());
+    for_each_chunk(policy, count_, grain, [&](std::size_t begin, std::size_t end) {
+      const auto counts = at.begin() + static_cast<std::ptrdiff_t>(begin / grain * parts());
+      point_block<voxel_scalar<Points>> block{size_};
+      for_each_cell_of(
+          block, points_, begin, end,
+          [&](std::uint32_t i, const voxel_key& key, const std::array<double, 3>&) {
+            part_of_[i] = part_of(key);
+            ++counts[part_of_[i]];
+          },
+          [&](std::uint32_t i) { part_of_[i] = no_part; });
+    });
+    std::uint32_t sum = 0;
+    for (std::size_t part = 0; part != parts(); ++part) {
+      starts_[part] = sum;
+      for (std::size_t i = part; i < at.size(); i += parts()) sum += std::exchange(at[i], sum);
+    }
+    starts_[parts()] = sum;
+
+    entries_ = std::make_unique_for_overwrite<entry[]>(sum);
+    for_each_chunk(policy, count_, grain, [&](std::size_t begin, std::size_t end) {
+      const auto next = at.begin() + static_cast<std::ptrdiff_t>(begin / grain * parts());
+      if constexpr (keeps_coordinates) {
+        const auto first = std::ranges::begin(points_);
+        for (std::size_t i = begin; i != end; ++i) {
+          if (part_of_[i] == no_part) continue;
+          const auto p = coordinates<float>(first[static_cast<std::ranges::range_difference_t<const Points>>(i)]);
+          entries_[next[part_of_[i]]++] = {std::bit_cast<std::array<std::uint32_t, 3>>(p),
+                                           static_cast<std::uint32_t>(i)};
+        }
+      } else {
+        point_block<voxel_scalar<Points>> block{size_};
+        for_each_cell_of(
+            block, points_, begin, end,
+            [&](std::uint32_t i, const voxel_key& key, const std::array<double, 3>&) {
+              entries_[next[part_of_[i]]++] = {std::bit_cast<std::array<std::uint32_t, 3>>(key), i};
+            },
+            [](std::uint32_t) {});
+      }
+    });
+  }
+
+  void fill(voxel_table<typename Fold::record>& table, point_block<voxel_scalar<Points>>& block, std::size_t part,
+            const Fold& fold) const {
+    const std::size_t end = starts_[part + 1];
+    if constexpr (keeps_coordinates) {
+      for (std::size_t from = starts_[part]; from != end;) {
+        const std::size_t count = std::min<std::size_t>(end - from, block.capacity);
+        block.assign(count,
+                     [&](std::size_t i) { return std::bit_cast<std::array<float, 3>>(entries_[from + i].words); });
+        for (std::size_t i = 0; i != count; ++i) {
+          const std::uint32_t index = entries_[from + i].index;
+          fold.add(table.at(block.key(i), index).record, index, block.point(i));
+        }
+        from += count;
+      }
+    } else {
+      const auto first = std::ranges::begin(points_);
+      for (std::size_t at = starts_[part]; at != end; ++at) {
+        const std::uint32_t index = entries_[at].index;
+        fold.add(table.at(std::bit_cast<voxel_key>(entries_[at].words), index).record, index,
+                 coordinates<double>(first[static_cast<std::ranges::range_difference_t<const Points>>(index)]));
+      }
+    }
+  }
+
+  const Points& points_;
+  double size_;
+  std::size_t count_;
+  std::size_t bits_;
+  std::vector<std::uint32_t> starts_;         ///< of each part in the entries, and the end
+  std::unique_ptr<std::uint16_t[]> part_of_;  ///< of each point; in the end also a mark
+  std::unique_ptr<entry[]> entries_;
+};
+
+/// Whether so many points share voxels that one table will do: judged by some of the points. @pre the cloud is not
+/// empty
+template <point_range Points>
+[[nodiscard]] bool voxels_are_few(const Points& points, double size) {
+  const std::size_t count = std::ranges::size(points);
+  const std::size_t sample = std::min<std::size_t>(4096, count / 64 + 1);
+  struct nothing {};
+  voxel_table<nothing> table;
+  point_block<voxel_scalar<Points>> block{size};
+  const auto first = std::ranges::begin(points);
+  for (std::size_t from = 0; from != sample;) {
+    const std::size_t taken = std::min<std::size_t>(sample - from, block.capacity);
+    block.assign(taken, [&](std::size_t i) {
+      const std::size_t at = (from + i) * (count / sample);
+      return coordinates<voxel_scalar<Points>>(first[static_cast<std::ranges::range_difference_t<const Points>>(at)]);
+    });
+    for (std::size_t i = 0; i != taken; ++i)
+      if (is_cell(block.key(i))) static_cast<void>(table.at(block.key(i), 0));
+    from += taken;
+  }
+  return 8 * table.rows().size() <= 7 * sample;
+}
+
+/// Gathers the points of every voxel, see `voxel_fold`; the same for every policy. Points that have no cell are left
+/// out. O(n). Memory: less than 24 bytes per point beyond 2^15 points.
+/// @pre size > 0, fewer than 2^32 points
+template <execution_policy Policy, point_range Points, voxel_fold Fold>
+void fold_voxels(const Policy& policy, const Points& points, double size, Fold&& fold) {
+  constexpr std::size_t small = std::size_t{1} << 15U;
+  const std::size_t count = std::ranges::size(points);
+  if (count <= small) {
+    static_cast<void>(fold_in_one_table(points, size, count, fold));
+    return;
+  }
+  if (policy.threads() == 1 && voxels_are_few(points, size) &&
+      fold_in_one_table(points, size, std::min(small, count / 8), fold))
+    return;
+  voxel_parts<Points, std::remove_cvref_t<Fold>>{points, size}.fold(policy, fold);
+}
+
+}  // namespace orbis::cloud::detail
