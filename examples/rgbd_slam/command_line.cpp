@@ -11,12 +11,9 @@
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
-#include <toml++/toml.h>
 
 #include <orbis/camera/presets.hpp>
-#include <orbis/core/file.hpp>
-#include <orbis/core/utf8.hpp>
-#include <orbis/io/camera_file.hpp>
+#include <orbis/io/toml.hpp>
 
 #include "filters.hpp"
 #include "viewer/backend.hpp"
@@ -214,17 +211,9 @@ std::string contradiction(const settings& s) {
 
 /// Fills what the command line left open from a TOML file whose keys are the options' long names.
 std::optional<exit_code> read_config(CLI::App& cmd, const std::string& path) {
-  const orbis::result<std::string> text = orbis::read_file(path, orbis::io::max_toml_bytes);
-  if (!text) return complain(text.error().to_string(), bad_input);
-  if (!orbis::is_utf8(*text)) return complain(path + ": not TOML: no UTF-8", bad_input);
-  toml::table table;
-  try {
-    table = toml::parse(*text);
-  } catch (const toml::parse_error& e) {
-    return complain(path + ":" + std::to_string(e.source().begin.line) + ": " + std::string{e.description()},
-                    bad_input);
-  }
-  for (const auto& [key, value] : table) {
+  const auto table = orbis::io::read_toml(path);
+  if (!table) return complain(table.error().to_string(), bad_input);
+  for (const auto& [key, value] : *table) {
     const std::string name{key.str()};
     CLI::Option* option = cmd.get_option_no_throw("--" + name);
     if (option == nullptr || name == "config" || name == "help")

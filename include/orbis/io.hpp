@@ -31,4 +31,5 @@
 #include <orbis/io/recording.hpp>
 #include <orbis/io/synthetic.hpp>
 #include <orbis/io/synthetic_options.hpp>
+#include <orbis/io/toml.hpp>
 #include <orbis/io/trajectory_file.hpp>

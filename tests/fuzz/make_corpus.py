@@ -3,11 +3,12 @@
 """Writes the hand-made inputs of the fuzz targets into corpus/: make_corpus.py
 
 Valid files, files cut short, files that declare more than they hold, and files made to hurt. What the
-fuzzers found besides is kept there as found_*.
+fuzzers found besides is kept there as found_*. The JPEG files in read_jpeg are libjpeg's.
 """
 import pathlib
 import random
 import struct
+import zlib
 
 here = pathlib.Path(__file__).parent / "corpus"
 FREE, OCCUPIED = 1, 2
@@ -454,7 +455,155 @@ def slam_maps():
     slam_map("surplus", three, line, seen, more=b"more")
 
 
+def png(width, height, bits, color, raw, *more, interlace=0, level=9):
+    """`raw`: rows as PNG has them; `more`: chunks between the header and the pixels."""
+    def chunk(name, content):
+        return struct.pack(">I", len(content)) + name + content + struct.pack(">I", zlib.crc32(name + content))
+
+    header = struct.pack(">IIBBBBB", width, height, bits, color, 0, 0, interlace)
+    return (b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + b"".join(chunk(n, c) for n, c in more)
+            + chunk(b"IDAT", zlib.compress(raw, level)) + chunk(b"IEND", b""))
+
+
+def images():
+    rng = random.Random(7)
+
+    def rows(count, length, filters=(0, 1, 2, 3, 4)):
+        return b"".join(bytes([filters[y % len(filters)]]) + rng.randbytes(length) for y in range(count))
+
+    depth = png(9, 7, 16, 0, rows(7, 18))
+    write("read_png", "depth", depth)
+    write("read_png", "color", png(9, 7, 8, 2, rows(7, 27)))
+    write("read_png", "color_16", png(5, 4, 16, 2, rows(4, 30)))
+    write("read_png", "alpha", png(5, 4, 8, 6, rows(4, 20)))
+    write("read_png", "grey_1", png(20, 3, 1, 0, rows(3, 3)))
+    write("read_png", "grey_alpha", png(5, 4, 8, 4, rows(4, 10)))
+    palette = (b"PLTE", rng.randbytes(12))
+    write("read_png", "palette", png(8, 4, 2, 3, rows(4, 2, (0,)), palette))
+    write("read_png", "palette_transparent", png(8, 4, 2, 3, rows(4, 2, (0,)), palette, (b"tRNS", b"\0\x80")))
+    write("read_png", "palette_too_short", png(8, 4, 8, 3, rows(4, 8, (0,)), palette))
+    write("read_png", "no_palette", png(8, 4, 8, 3, rows(4, 8, (0,))))
+    # Of 8 x 8 pixels interlaced: seven passes.
+    passes = ((1, 2), (1, 2), (1, 4), (2, 4), (2, 8), (4, 8), (4, 16))
+    write("read_png", "interlaced", png(8, 8, 16, 0, b"".join(rows(*p) for p in passes), interlace=1))
+    text = b"note\0\0" + zlib.compress(b"a" * 200000)
+    write("read_png", "texts", png(2, 2, 16, 0, rows(2, 4), *[(b"zTXt", text)] * 6))
+    write("read_png", "profile", png(2, 2, 8, 2, rows(2, 6), (b"iCCP", text), (b"gAMA", b"\0\0\0\1")))
+    write("read_png", "plain", png(600, 300, 16, 0, bytes(300 * 1201)))
+    write("read_png", "claims_more", png(1 << 19, 1 << 19, 16, 0, bytes(100)))
+    write("read_png", "too_few_rows", png(9, 7, 16, 0, rows(3, 18)))
+    write("read_png", "too_many_rows", png(9, 7, 16, 0, rows(300, 18)))
+    write("read_png", "bad_filter", png(9, 7, 16, 0, rows(7, 18, (9,))))
+    write("read_png", "cut", depth[:-30])
+    write("read_png", "signature", depth[:8])
+
+
+def clouds():
+    rng = random.Random(8)
+    ply = lambda kind, *lines: ("\n".join(["ply", f"format {kind} 1.0", *lines, "end_header", ""])).encode()
+    xyz = ("property float x", "property float y", "property float z")
+    rgb = ("property uchar red", "property uchar green", "property uchar blue")
+    text = b"".join(b"%g %g %g 1 2 255\n" % (rng.random(), rng.random(), rng.random()) for _ in range(5))
+    write("read_ply", "text", ply("ascii", "comment a cloud", "element vertex 5", *xyz, *rgb) + text)
+    write("read_ply", "crlf", (ply("ascii", "element vertex 5", *xyz, *rgb) + text).replace(b"\n", b"\r\n"))
+    little = struct.pack("<3f3B", 1, 2, 3, 4, 5, 6) * 4
+    write("read_ply", "little", ply("binary_little_endian", "element vertex 4", *xyz, *rgb) + little)
+    write("read_ply", "big", ply("binary_big_endian", "element vertex 2", "property double x", "property short y",
+                                 "property uint z") + struct.pack(">dhI", 1.5, -2, 7) * 2)
+    write("read_ply", "bytes", ply("binary_little_endian", "element vertex 64", "property char x", "property uchar y",
+                                   "property char z") + bytes(192))
+    write("read_ply", "float_colors", ply("ascii", "element vertex 1", *xyz, *(r.replace("uchar", "float") for r in rgb))
+          + b"nan inf -1e300 0.5 2 nan\n")
+    lists = ("element face 2", "property list uchar int vertex_indices")
+    write("read_ply", "lists_first", ply("binary_little_endian", *lists, "element vertex 1", *xyz)
+          + struct.pack("<B3iB2i3f", 3, 0, 1, 2, 2, 0, 1, 1, 2, 3))
+    write("read_ply", "list_in_vertex", ply("ascii", "element vertex 1", "property list uint float w", *xyz)
+          + b"2 1 2 3 4 5\n")
+    write("read_ply", "list_without_end", ply("ascii", "element face 1", "property list int int v",
+                                              "element vertex 1", *xyz) + b"2147483647 1 2 3\n")
+    write("read_ply", "no_properties", ply("ascii", "element nothing 18446744073709551615", "element vertex 1", *xyz)
+          + b"1 2 3\n")
+    write("read_ply", "declares_more", ply("binary_little_endian", "element vertex 5000000000", *xyz) + bytes(12))
+    write("read_ply", "twice", ply("ascii", "element vertex 1", *xyz, *xyz) + b"1 2 3 4 5 6\n")
+    write("read_ply", "many_properties", ply("ascii", "element vertex 1", *xyz, *["property char c"] * 300))
+    write("read_ply", "no_z", ply("ascii", "element vertex 1", *xyz[:2]) + b"1 2\n")
+    write("read_ply", "header_only", b"ply\nformat ascii 1.0\n")
+
+    def lzf(data):  # literals only
+        return b"".join(bytes([len(data[i:i + 32]) - 1]) + data[i:i + 32] for i in range(0, len(data), 32))
+
+    def pcd(fields, sizes, types, counts, width, height, kind, data, points=None):
+        points = width * height if points is None else points
+        return (f"# .PCD v0.7\nVERSION 0.7\nFIELDS {fields}\nSIZE {sizes}\nTYPE {types}\nCOUNT {counts}\nWIDTH {width}\n"
+                f"HEIGHT {height}\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS {points}\nDATA {kind}\n").encode() + data
+
+    xyz = ("x y z", "4 4 4", "F F F", "1 1 1")
+    colored = ("x y z rgb", "4 4 4 4", "F F F U", "1 1 1 1")
+    raw = struct.pack("<12f", *(rng.random() for _ in range(12)))
+    squeezed = lambda packed, size: struct.pack("<II", len(packed), size) + packed
+    write("read_pcd", "text", pcd(*colored, 2, 1, "ascii", b"1 2 3 255\nnan -1e9 0 4294967295\n"))
+    write("read_pcd", "text_float_color", pcd("x y z rgb", "4 4 4 4", "F F F F", "1 1 1 1", 1, 1, "ascii",
+                                              b"1 2 3 1e-39\n"))
+    write("read_pcd", "binary", pcd(*xyz, 2, 2, "binary", raw))
+    write("read_pcd", "compressed", pcd(*xyz, 2, 2, "binary_compressed", squeezed(lzf(raw), 48)))
+    zeros = b"\0\0" + b"\xe0\xff\0" * 8 + b"\xe0\xfe\0"  # 2376 of them
+    write("read_pcd", "compresses_well", pcd("x y z", "1 1 1", "I I I", "1 1 1", 2376 // 3, 1, "binary_compressed",
+                                             squeezed(zeros, 2376)))
+    write("read_pcd", "odd_types", pcd("n x y pad z", "8 8 2 1 8", "U F I U I", "1 1 1 3 1", 1, 1, "binary",
+                                       bytes(range(29))))
+    write("read_pcd", "bits_left", pcd(*xyz, 2, 2, "binary", raw[:-1]))
+    write("read_pcd", "declares_more", pcd(*xyz, 1 << 39, 1, "binary", raw))
+    write("read_pcd", "declares_much_text", pcd(*xyz, 1 << 39, 1, "ascii", b"1 2 3\n"))
+    write("read_pcd", "declares_compressed", pcd(*xyz, 1 << 28, 1, "binary_compressed", squeezed(zeros, (12 << 28) % 2**32)))
+    write("read_pcd", "no_count", pcd("x y z", "4 4 4", "F F F", "0 0 0", 2, 2, "binary", raw))
+    write("read_pcd", "large_count", pcd("x y z w", "4 4 4 8", "F F F F", "1 1 1 65535", 2, 2, "binary", raw))
+    write("read_pcd", "many_fields", b"FIELDS" + b" x" * 2000 + b"\nDATA ascii\n")
+    write("read_pcd", "other_points", pcd(*xyz, 2, 2, "binary", raw, points=5))
+
+    size = lambda n: struct.pack("<H", n)
+    write("read_lzf", "literals", size(40) + lzf(b"abcdefgh" * 5))
+    write("read_lzf", "copies", size(2 + 264) + b"\1ab\xe0\xff\1")
+    write("read_lzf", "short_copy", size(8) + b"\2abc\x60\2")
+    write("read_lzf", "before_the_start", size(9) + b"\0a\x3f\xff")
+    write("read_lzf", "cut", size(9) + b"\0a\xe0")
+    write("read_lzf", "too_much", size(3) + b"\1ab\xe0\xff\1")
+    write("read_lzf", "too_little", size(9999) + b"\1ab\xe0\xff\1")
+
+
+def texts():
+    camera = (b'model = "radtan"\nwidth = 640\nheight = 480\nfx = 517.3\nfy = 516.5\ncx = 318.6\ncy = 255.3\n'
+              b"distortion = [0.26, -0.95, -0.005, 0.002, 1.16]\ndepth_scale = 5000.0\nfps = 30.0\nbaseline = 0.075\n")
+    write("read_camera", "radtan", camera)
+    write("read_camera", "pinhole", camera.replace(b"radtan", b"pinhole").replace(b"distortion", b"#"))
+    write("read_camera", "kannala_brandt", camera.replace(b"radtan", b"kannala_brandt").replace(b", 1.16", b""))
+    write("read_camera", "other_types", camera.replace(b"640", b"0x280").replace(b"30.0", b"1e1_0").replace(b"5000.0", b"inf"))
+    write("read_camera", "latin", camera.replace(b"distortion", b"disttroion\xe5"))
+    write("read_camera", "dates", b"model = 1979-05-27T07:32:00.5-07:00\nwidth = 07:32:00\n")
+    write("read_camera", "strings", b'model = """pin\\\n  hole\\u00e9"""\nname = \'\'\'a\'\'\'\n')
+    write("read_camera", "tables", b"[a.b]\nc = {d = [1, 2.0, {e = 1}]}\n[[f]]\ng.h = 1\n[[f]]\n")
+    write("read_camera", "nested", b"a = " + b"[" * 255 + b"]" * 255)
+    write("read_camera", "dotted", b"a" + b".a" * 2000 + b" = 1\n")
+    write("read_camera", "matrix", b"585 0 320\n0 585 240\n0 0 1\n")
+    write("read_trajectory", "poses", b"# timestamp tx ty tz qx qy qz qw\n1.5 0 1 2 0 0 0 1\n1.25 1e3 -2 3 0.5 0.5 0.5 0.5\n")
+    write("read_trajectory", "long_quaternion", b"1 0 0 0 1e150 1e150 0 1e-9\n")
+    write("read_trajectory", "zero_quaternion", b"1 0 0 0 0 0 0 1e-7\n")
+    write("read_trajectory", "not_finite", b"1 0 nan 0 0 0 0 1\n")
+    write("read_trajectory", "nine_numbers", b"1 0 0 0 0 0 0 1 1\n")
+    write("read_trajectory", "mark", b"\xef\xbb\xbf1 0 0 0 0 0 0 1\r\n+2 0 0 0 0 0 0 1")
+    write("read_trajectory", "matrix", b"1 0 0 1\n0 0.001 -1 2\n0 1 0 3\n0 0 0 1\n")
+    write("read_trajectory", "mirror", b"1 0 0 1\n0 1 0 2\n0 0 -1 3\n0 0 0 1\n")
+    write("read_list", "images", b"# color images\n1.06 rgb/1.06.png\n1.00 rgb/1.00.png\n1.00 rgb/a b.png\n")
+    write("read_list", "pairs", b"1.0 rgb/1.png 1.01 depth/1.png\n2.0 depth/2.png 2.01 rgb/2.png\n")
+    write("read_list", "absolute", b"1 /a/../b//c.png 1 ////\n")
+    write("read_list", "rubbish", b"x\n" * 400)
+    write("read_list", "not_finite", b"nan a.png\ninf a.png\n-1e308 a.png\n")
+    write("read_list", "long_path", b"1 " + b"a/" * 900 + b"b\n")
+
+
 if __name__ == "__main__":
+    images()
+    clouds()
+    texts()
     slam_maps()
     vocabularies()
     readers()

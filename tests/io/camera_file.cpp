@@ -151,5 +151,5 @@ TEST_CASE("tables nested without end are refused before they use up the stack") 
     CHECK(io::read_camera(folder.write("deep.toml", text)).error().code == orbis::errc::malformed);
   }
   CHECK(io::parse_camera(camera_text() + std::string(20000, '#')).error().to_string() ==
-        "is too large for a camera file");
+        "is too large for a file of settings");
 }

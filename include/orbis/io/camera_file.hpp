@@ -37,14 +37,10 @@
 #include <orbis/camera/settings.hpp>
 #include <orbis/core/file.hpp>
 #include <orbis/core/result.hpp>
-#include <orbis/core/utf8.hpp>
 #include <orbis/io/detail/files/camera_fields.hpp>
+#include <orbis/io/toml.hpp>
 
 namespace orbis::io {
-
-/// The largest text in TOML that is read. toml++ works its way down nested tables by recursion, as deep as there are
-/// dots in the text, and this much does not use up a stack.
-inline constexpr std::size_t max_toml_bytes = 16384;
 
 /// The camera that `text` in TOML describes. `where` names the source in errors.
 /// Errors: malformed, naming the field (missing, of the wrong type, NaN, out of range, a distortion
@@ -52,15 +48,9 @@ inline constexpr std::size_t max_toml_bytes = 16384;
 /// model we do not know).
 [[nodiscard]] inline result<camera::camera_settings> parse_camera(std::string_view text,
                                                                   const std::filesystem::path& where = {}) {
-  if (text.size() > max_toml_bytes) return fail(errc::malformed, where.string(), "is too large for a camera file");
-  if (!is_utf8(text)) return fail(errc::malformed, where.string(), "not TOML: no UTF-8");
-  toml::table table;
-  try {
-    table = toml::parse(text, std::string_view{});
-  } catch (const toml::parse_error& e) {
-    return fail(errc::malformed, where.string() + ":" + std::to_string(e.source().begin.line),
-                "not TOML: " + std::string{e.description()});
-  }
+  const auto parsed = parse_toml(text, where);
+  if (!parsed) return fail(parsed.error());
+  const toml::table& table = *parsed;
   detail::camera_fields fields{table, where.string()};
   const std::string model = fields.text("model");
   const camera::intrinsics k{

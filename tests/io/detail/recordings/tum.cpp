@@ -98,10 +98,11 @@ TEST_CASE("what is missing in a TUM recording is named") {
   folder.write("rgb.txt", "1.00 rgb/1.00.png\n");
   CHECK(message_of(io::detail::index_tum(folder.path())) == (folder / "depth.txt").string() + ": no such file");
   folder.write("depth.txt", "# nothing\n\n");
-  CHECK(message_of(io::detail::index_tum(folder.path())) == (folder / "depth.txt").string() + ": the list names no image");
+  CHECK(message_of(io::detail::index_tum(folder.path())) ==
+        (folder / "depth.txt").string() + ": the list names no image");
   folder.write("depth.txt", "1.00 depth/1.00.png\n");
-  CHECK(message_of(io::detail::index_tum(folder.path())).find("1.00.png: the first image of the recording does not exist") !=
-        std::string::npos);
+  CHECK(message_of(io::detail::index_tum(folder.path()))
+            .find("1.00.png: the first image of the recording does not exist") != std::string::npos);
   folder.write("rgb/1.00.png", "x");
   CHECK(io::detail::index_tum(folder.path()).error().code == orbis::errc::not_found);
   folder.write("depth/1.00.png", "x");
@@ -176,4 +177,17 @@ TEST_CASE("a piece of the TUM benchmark is indexed as it was shipped") {
   for (const auto& frame : index.frames) CHECK(frame.T_world_camera.has_value());
   CHECK(index.frames[0].color.filename() == "1305031453.359684.png");
   CHECK(index.frames[0].depth.filename() == "1305031453.374112.png");
+}
+
+TEST_CASE("a list of nothing but rubbish is said so in few words") {
+  std::vector<std::string> notes;
+  std::string text = "1 a.png 2 b.png\n";
+  for (int i = 0; i != 5000; ++i) text += "x\n";
+  REQUIRE(io::detail::parse_image_list(text, "rgb.txt", notes).value().size() == 1);
+  REQUIRE(notes.size() == 11);
+  CHECK(notes.front() == "rgb.txt:2: left out, not a time stamp and a file name");
+  CHECK(notes.back() == "rgb.txt: 4990 more lines left out");
+  notes.clear();
+  REQUIRE(io::detail::parse_associations(text, "both.txt", notes).value().size() == 1);
+  CHECK(notes.size() == 11);
 }

@@ -28,17 +28,15 @@
 
 namespace orbis::io::detail {
 
-/// Reads the pose `T_world_camera` from a file with a 4x4 matrix. Its rotation may be off by a few
+/// The pose `T_world_camera` in a text with a 4x4 matrix. Its rotation may be off by a few
 /// parts in a thousand, as those of 7-Scenes are: the nearest rotation is taken.
-/// Errors: not_found, unreadable; malformed, with the line (not 16 numbers, NaN or infinity, a
-/// matrix that is no rigid transform by more than 5 %).
-[[nodiscard]] inline result<se3> read_pose_matrix(const std::filesystem::path& path) {
-  const auto text = read_file(path);
-  if (!text) return fail(text.error());
+/// Errors: malformed, with the line (not 16 numbers, NaN or infinity, a matrix that is no rigid transform by more than
+/// 5 %).
+[[nodiscard]] inline result<se3> parse_pose_matrix(std::string_view text, const std::filesystem::path& path) {
   double m[16];
   std::size_t count = 0, last_line = 0;
   std::string problem;
-  for_each_line(*text, [&](std::string_view line, std::size_t number) {
+  for_each_line(text, [&](std::string_view line, std::size_t number) {
     last_line = number;
     for (std::string_view field = next_field(line); !field.empty(); field = next_field(line)) {
       if (count == 16)
@@ -65,14 +63,19 @@ namespace orbis::io::detail {
   return se3(*rotation, vec3(m[3], m[7], m[11]));
 }
 
-/// Reads a 3x3 camera matrix as text. Errors: not_found, unreadable, malformed.
-[[nodiscard]] inline result<mat3> read_camera_matrix(const std::filesystem::path& path) {
+/// Reads a pose; see `parse_pose_matrix`. Errors: not_found, unreadable, malformed.
+[[nodiscard]] inline result<se3> read_pose_matrix(const std::filesystem::path& path) {
   const auto text = read_file(path);
   if (!text) return fail(text.error());
+  return parse_pose_matrix(*text, path);
+}
+
+/// A 3x3 camera matrix as text. Errors: malformed.
+[[nodiscard]] inline result<mat3> parse_camera_matrix(std::string_view text, const std::filesystem::path& path) {
   mat3 k;
   int count = 0;
   bool ok = true;
-  for_each_line(*text, [&](std::string_view line, std::size_t) {
+  for_each_line(text, [&](std::string_view line, std::size_t) {
     for (std::string_view field = next_field(line); ok && !field.empty(); field = next_field(line)) {
       double value = 0.0;
       ok = count < 9 && parse_number(field, value) && std::isfinite(value);
@@ -85,6 +88,13 @@ namespace orbis::io::detail {
   if (!(k(0, 0) > 0.0) || !(k(1, 1) > 0.0) || k(0, 1) != 0.0)
     return fail(errc::malformed, path.string(), "focal lengths must be above zero, and skew zero");
   return k;
+}
+
+/// Reads a camera matrix. Errors: not_found, unreadable, malformed.
+[[nodiscard]] inline result<mat3> read_camera_matrix(const std::filesystem::path& path) {
+  const auto text = read_file(path);
+  if (!text) return fail(text.error());
+  return parse_camera_matrix(*text, path);
 }
 
 inline constexpr std::string_view seven_scenes_color[] = {".color.png", ".color.jpg"};

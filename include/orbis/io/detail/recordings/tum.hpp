@@ -53,43 +53,72 @@ template <class Entry>
   return entries;
 }
 
-/// Reads a list of `timestamp filename` lines: comments, blank lines and CRLF are fine, the order is
+/// Notes lines of a list that are left out: the first ones one by one, the others by their number.
+class skipped_lines {
+ public:
+  skipped_lines(const std::filesystem::path& list, std::vector<std::string>& notes) : list_{list}, notes_{notes} {}
+  void add(std::size_t line, const char* why) {
+    if (++count_ <= most_) notes_.push_back(at_line(list_, line) + ": left out, " + why);
+  }
+  /// @pre called once, after the last line
+  void finish() {
+    if (count_ > most_)
+      notes_.push_back(list_.string() + ": " + std::to_string(count_ - most_) + " more lines left out");
+  }
+
+ private:
+  static constexpr std::size_t most_ = 10;
+  const std::filesystem::path& list_;
+  std::vector<std::string>& notes_;
+  std::size_t count_ = 0;
+};
+
+/// A list of `timestamp filename` lines: comments, blank lines and CRLF are fine, the order is
 /// made right, unreadable lines and repeated time stamps are left out and noted. File names are
-/// relative to the list's folder. Errors: not_found, unreadable, no_data (no line is left).
-[[nodiscard]] inline result<std::vector<stamped_file>> read_image_list(const std::filesystem::path& list,
-                                                                       std::vector<std::string>& notes) {
-  const auto text = read_file(list);
-  if (!text) return fail(text.error());
+/// relative to the folder of `list`. Errors: no_data (no line is left).
+[[nodiscard]] inline result<std::vector<stamped_file>> parse_image_list(std::string_view text,
+                                                                        const std::filesystem::path& list,
+                                                                        std::vector<std::string>& notes) {
   std::vector<stamped_file> files;
-  for_each_line(*text, [&](std::string_view line, std::size_t number) {
+  skipped_lines skipped{list, notes};
+  for_each_line(text, [&](std::string_view line, std::size_t number) {
     double t = 0.0;
     const std::string_view stamp = next_field(line);
     const std::string_view name = trimmed(line);
     if (!parse_number(stamp, t) || !std::isfinite(t) || name.empty())
-      notes.push_back(at_line(list, number) + ": left out, not a time stamp and a file name");
+      skipped.add(number, "not a time stamp and a file name");
     else
       files.push_back({t, list.parent_path() / std::filesystem::path{name}});
     return true;
   });
+  skipped.finish();
   return in_order_of_time(list, std::move(files), notes);
 }
 
-/// Reads `associations.txt`: four fields a line, a time stamp and a file for colour and for depth, in
-/// either order (the file whose path says "depth" is the depth image; colour first if neither or
-/// both do). Unreadable lines and repeated time stamps are left out and noted. Errors: as `read_image_list`.
-[[nodiscard]] inline result<std::vector<recording_entry>> read_associations(const std::filesystem::path& list,
-                                                                            std::vector<std::string>& notes) {
+/// Reads a list; see `parse_image_list`. Errors: not_found, unreadable, no_data.
+[[nodiscard]] inline result<std::vector<stamped_file>> read_image_list(const std::filesystem::path& list,
+                                                                       std::vector<std::string>& notes) {
   const auto text = read_file(list);
   if (!text) return fail(text.error());
+  return parse_image_list(*text, list, notes);
+}
+
+/// The text of `associations.txt`: four fields a line, a time stamp and a file for colour and for depth, in
+/// either order (the file whose path says "depth" is the depth image; colour first if neither or
+/// both do). Unreadable lines and repeated time stamps are left out and noted. Errors: as `parse_image_list`.
+[[nodiscard]] inline result<std::vector<recording_entry>> parse_associations(std::string_view text,
+                                                                             const std::filesystem::path& list,
+                                                                             std::vector<std::string>& notes) {
   std::vector<recording_entry> frames;
-  for_each_line(*text, [&](std::string_view line, std::size_t number) {
+  skipped_lines skipped{list, notes};
+  for_each_line(text, [&](std::string_view line, std::size_t number) {
     double t1 = 0.0, t2 = 0.0;
     const bool first_ok = parse_number(next_field(line), t1) && std::isfinite(t1);
     std::string_view file1 = next_field(line);
     const bool second_ok = parse_number(next_field(line), t2) && std::isfinite(t2);
     std::string_view file2 = next_field(line);
     if (!first_ok || !second_ok || file2.empty() || !trimmed(line).empty()) {
-      notes.push_back(at_line(list, number) + ": left out, not two pairs of time stamp and file name");
+      skipped.add(number, "not two pairs of time stamp and file name");
       return true;
     }
     const auto says_depth = [](std::string_view name) { return name.find("depth") != std::string_view::npos; };
@@ -101,7 +130,16 @@ template <class Entry>
     frames.push_back({t1, folder / std::filesystem::path{file1}, folder / std::filesystem::path{file2}, {}});
     return true;
   });
+  skipped.finish();
   return in_order_of_time(list, std::move(frames), notes);
+}
+
+/// Reads `associations.txt`; see `parse_associations`. Errors: as `read_image_list`.
+[[nodiscard]] inline result<std::vector<recording_entry>> read_associations(const std::filesystem::path& list,
+                                                                            std::vector<std::string>& notes) {
+  const auto text = read_file(list);
+  if (!text) return fail(text.error());
+  return parse_associations(*text, list, notes);
 }
 
 /// Whether `folder` looks like a TUM recording.

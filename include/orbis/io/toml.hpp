@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Settings in TOML from bytes that nobody has looked at, by toml++.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <filesystem>
+#include <string>
+#include <string_view>
+
+#include <toml++/toml.h>
+
+#include <orbis/core/file.hpp>
+#include <orbis/core/result.hpp>
+#include <orbis/core/utf8.hpp>
+
+namespace orbis::io {
+
+/// The largest text that is read. toml++ works its way down nested tables by recursion, as deep as there are dots in
+/// the text; this much does not use up a stack.
+inline constexpr std::size_t max_toml_bytes = 16384;
+
+namespace detail {
+
+/// Whether each line that begins as the head of a table has a key in it: toml++ 3.3 takes that for granted.
+[[nodiscard]] inline bool has_keys_in_heads(std::string_view text) noexcept {
+  const auto skip_blanks = [](std::string_view& line) {
+    line.remove_prefix(std::min(line.find_first_not_of(" \t"), line.size()));
+  };
+  if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
+  while (!text.empty()) {
+    std::string_view line = text.substr(0, text.find('\n'));
+    text.remove_prefix(std::min(line.size() + 1, text.size()));
+    skip_blanks(line);
+    if (!line.starts_with('[')) continue;
+    for (int brackets = 0; brackets != 2 && line.starts_with('['); ++brackets) {
+      line.remove_prefix(1);
+      skip_blanks(line);
+    }
+    if (line.empty()) return false;
+    const char c = line.front();
+    const bool begins_key = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+                            std::string_view{"_-\"'"}.find(c) != std::string_view::npos;
+    if (!begins_key) return false;
+  }
+  return true;
+}
+
+}  // namespace detail
+
+/// The table that `text` is. `where` names the source in errors. Errors: malformed, with the line where it is known (no
+/// TOML; more than `max_toml_bytes`; a list of lists over several lines, whose lines could be heads of tables).
+[[nodiscard]] inline result<toml::table> parse_toml(std::string_view text, const std::filesystem::path& where = {}) {
+  const auto reject = [&](const char* why) { return fail(errc::malformed, where.string(), why); };
+  if (text.size() > max_toml_bytes) return reject("is too large for a file of settings");
+  if (!is_utf8(text)) return reject("not TOML: no UTF-8");
+  if (!detail::has_keys_in_heads(text)) return reject("not TOML: a table without a name");
+  try {
+    return toml::parse(text, std::string_view{});
+  } catch (const toml::parse_error& e) {
+    return fail(errc::malformed, where.string() + ":" + std::to_string(e.source().begin.line),
+                "not TOML: " + std::string{e.description()});
+  }
+}
+
+/// Reads a file of settings; see `parse_toml`. Errors: not_found, unreadable, malformed.
+[[nodiscard]] inline result<toml::table> read_toml(const std::filesystem::path& path) {
+  const auto text = read_file(path, max_toml_bytes);
+  if (!text) return fail(text.error());
+  return parse_toml(*text, path);
+}
+
+}  // namespace orbis::io

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <string>
+
+#include <orbis/io/toml.hpp>
+
+#include "support/catch.hpp"
+#include "support/temporary_folder.hpp"
+
+namespace io = orbis::io;
+
+TEST_CASE("settings are read with their tables") {
+  const orbis::test::temporary_folder folder;
+  const auto file = folder.write("a.toml",
+                                 "\xEF\xBB\xBF"
+                                 "a = 1\n[ b.\"c d\" ]\nx = [1,\n  2]\n\t[[e]]\r\n[[ e ]]\n[-1]\n");
+  const auto table = io::read_toml(file).value();
+  CHECK(table["a"].value<int>() == 1);
+  CHECK(table["b"]["c d"]["x"][1].value<int>() == 2);
+  CHECK(table["e"].as_array()->size() == 2);
+  CHECK(io::parse_toml("").value().empty());
+}
+
+TEST_CASE("what is no TOML is refused with its place and ends no program") {
+  const auto message = [](const std::string& text) { return io::parse_toml(text, "f.toml").error().to_string(); };
+  CHECK(message("a = 1\nb = = 2\n").starts_with("f.toml:2: not TOML: "));
+  CHECK(message("# gr\xfcn\n") == "f.toml: not TOML: no UTF-8");
+  for (const std::string head : {"[", "[[", "[]", "[=", "[ \t=1]", "[[ ]]", "[\n]", "[[[a]]]", "[.a]", "[\xc3\xa9]"})
+    CHECK(message("a = 1\n " + head + "\nb = 1") == "f.toml: not TOML: a table without a name");
+}
+
+TEST_CASE("a file of settings has an end") {
+  const orbis::test::temporary_folder folder;
+  const std::string largest = "#" + std::string(io::max_toml_bytes - 1, '.');
+  CHECK(io::read_toml(folder.write("a.toml", largest)));
+  const auto more = io::read_toml(folder.write("b.toml", largest + "."));
+  CHECK(more.error().code == orbis::errc::malformed);
+  CHECK(io::parse_toml(largest + ".").error().to_string() == "is too large for a file of settings");
+}
