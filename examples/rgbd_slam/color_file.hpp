@@ -35,13 +35,14 @@ class color_file {
     if (file_ >= 0) ::close(file_);
   }
 
-  /// Whether it was written. Those that were not have to be had elsewhere.
+  /// Whether it was written, in place of the image that had this number. Those that were not have to be had elsewhere.
   bool put(std::uint64_t number, const orbis::image<orbis::rgb8>& color) {
     if (file_ < 0 && at_.empty()) {
       file_ = ::open(path_.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
       if (file_ >= 0) ::unlink(path_.c_str());
     }
-    const std::size_t place = at_.size();
+    const auto known = at_.find(number);
+    const std::size_t place = known != at_.end() ? known->second : at_.size();
     const std::vector<orbis::rgb8> pixels = sample(color);
     const std::size_t bytes = pixels.size() * sizeof(orbis::rgb8);
     if (file_ < 0 || (place + 1) * bytes > most_bytes_ ||
