@@ -11,6 +11,7 @@
 #include <orbis/cloud/radius.hpp>
 #include <orbis/cloud/select.hpp>
 #include <orbis/cloud/statistical.hpp>
+#include <orbis/cloud/view_samples.hpp>
 #include <orbis/cloud/voxel_grid.hpp>
 
 #include "cloud/clouds.hpp"
@@ -326,6 +327,34 @@ TEST_CASE("views show what no density can") {
   CHECK(again.inliers == result.inliers);
   CHECK(again.choice.reason == result.choice.reason);
 
+  SECTION("whoever drew the samples of the views") {
+    orbis::cloud::view_samples samples;
+    for (const auto& view : seen.views()) samples.add(seen.camera, view);
+    const auto drawn = filter_automatically(orbis::par.with(3), seen.points, seen.views(), seen.camera,
+                                            {.ranges = seen.ranges, .samples = &samples});
+    CHECK(drawn.inliers == result.inliers);
+    CHECK(drawn.choice.reason == result.choice.reason);
+  }
+  SECTION("if there are too few to outvote one, all count") {
+    auto few = seen.views();
+    few.erase(few.begin(), few.begin() + 5);
+    for (const std::size_t n : {3U, 1U}) {
+      few.resize(n);
+      std::size_t calls = 0;
+      const auto watch = [&](std::size_t done, std::size_t total) {
+        CHECK(done == ++calls);
+        CHECK(total == n);
+        return true;
+      };
+      const auto judged =
+          filter_automatically(orbis::par, seen.points, few, seen.camera, {.ranges = seen.ranges}, watch);
+      CHECK(calls == n);
+      for (const auto& s : judged.choice.chain)
+        if (const auto* rays = std::get_if<orbis::cloud::ray_step>(&s)) CHECK(rays->distrusted.empty());
+      CHECK(orbis::cloud::apply_filter(orbis::seq, seen.points, judged.choice.chain, few, seen.camera,
+                                       {.ranges = seen.ranges}) == judged.inliers);
+    }
+  }
   SECTION("unless they must not be asked") {
     const auto silent = filter_automatically(orbis::par, seen.points, seen.views(), seen.camera,
                                              {.ranges = seen.ranges, .forbidden = {filter_mode::ray_evidence}});

@@ -104,6 +104,7 @@ class ray_evidence_counter {
   template <execution_policy Policy, posed_depth View>
   void remove(const Policy& policy, const View& view) {
     assert(view.depth.width() == camera_.width() && view.depth.height() == camera_.height());
+    assert(refuted_.empty());
     if (blocks_.index.empty()) return;
     windows_.take(policy, view.depth, options_.window);
     change(policy, windows_, view.T_world_camera, kernels_.take_back);

@@ -217,7 +217,8 @@ template <execution_policy Policy, point_range Points, class Views>
 ///
 /// Deterministic, the same for every policy. `on_progress` counts the views; if it cancels, the
 /// chain is empty, the reason "cancelled", and all points stay. O(n log n + views (pixels + n)).
-/// @pre neighbors > 0; ranges is empty or as long as points; views' images have the camera's size
+/// @pre neighbors > 0; ranges is empty or as long as points; views' images have the camera's size; samples, if there
+/// are any, are of these views
 template <execution_policy Policy, point_range Points, posed_depth_range Views, camera::camera_model Camera>
 [[nodiscard]] automatic_result filter_automatically(const Policy& policy, const Points& points, const Views& views,
                                                     const Camera& camera, const select_options& options = {},

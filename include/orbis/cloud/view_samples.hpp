@@ -89,8 +89,10 @@ class view_samples {
       }
     }
   }
+  /// The next view has none.
+  void skip() noexcept { ++views_; }
 
-  /// How many views were added.
+  /// How many views were added or skipped.
   [[nodiscard]] std::uint32_t views() const noexcept { return views_; }
   /// In the world, metres, in the order of the views.
   [[nodiscard]] const std::vector<vec3f>& points() const noexcept { return points_; }

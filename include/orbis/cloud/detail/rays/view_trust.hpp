@@ -204,10 +204,9 @@ class view_verdicts {
 /// image, a moving object in a part of it alone, so the median over the tiles counts. The worst view is left
 /// out until none stands out; if that would be half of them, all are trusted. Deterministic. `also(view, cleaned
 /// view, its windows)` is called for each view as well, so that who has other questions needs no pass of its own: views
-/// may be costly to look at.
-/// `samples`: of the
-/// views, if they were drawn before; otherwise each view is looked at once more. O(views (pixels + samples of all
-/// views)), and O(views) memory. @pre views' images have the camera's size
+/// may be costly to look at. `samples`: of the views, if they were drawn before; otherwise each view is looked at once
+/// more. O(views (pixels + samples of all views)), and O(views) memory. @pre views' images have the camera's size; the
+/// samples are of these views
 template <execution_policy Policy, posed_depth_range Views, camera::camera_model Camera, class Also = ask_nothing>
 [[nodiscard]] view_trust find_distrusted_views(const Policy& policy, const Views& views, const Camera& camera,
                                                const ray_evidence_options& evidence = {},
