@@ -92,6 +92,26 @@ TEST_CASE("what is not in the store is not found") {
   CHECK(store.bytes_in_memory() == 0);
 }
 
+TEST_CASE("images that were packed on other threads are those that the store packs itself") {
+  depth_store direct, store;
+  std::vector<depth_store::packer> packers(4);
+  std::vector<depth_image> images;
+  for (std::uint32_t i = 0; i != 4; ++i) images.push_back(noise(i, 30 + static_cast<int>(i), 20));
+  CHECK(packers[0].bytes() == 0);
+  {
+    std::vector<std::jthread> threads;
+    for (std::size_t i = 0; i != 4; ++i) threads.emplace_back([&, i] { packers[i].pack(images[i]); });
+  }
+  CHECK(packers[0].bytes() > 30 * 20);
+  packers.reserve(100);  // they may be moved
+  for (std::size_t i = 0; i != 4; ++i) {
+    REQUIRE(store.put(i, images[i], packers[i]));
+    REQUIRE(direct.put(i, images[i]));
+    CHECK(get(store, i) == images[i]);
+  }
+  CHECK(store.bytes_in_memory() == direct.bytes_in_memory());
+}
+
 TEST_CASE("a second image of a frame takes the place of the first") {
   const scratch folder;
   for (const std::size_t budget : {std::size_t{1} << 20U, std::size_t{0}}) {

@@ -8,6 +8,7 @@
 #include <limits>
 #include <map>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -337,6 +338,73 @@ TEST_CASE("A live map tells which depth image was lost, and goes on without its 
   CHECK_FALSE(full.map().empty());
   CHECK_FALSE(full.edit_depths(seq, std::vector<std::uint64_t>{0}, edit_nothing));
   CHECK(full.contains(0));
+}
+
+TEST_CASE("Depth images of a live map are edited together or not at all") {
+  const auto scene = test::wall_scene(6);
+  const std::vector<std::uint64_t> all{0, 1, 2, 3, 4, 5};
+  const auto edit = [](std::size_t i, const depth_view& depth, const image_view<std::uint16_t>& pixels) {
+    for (int y = 0; y != 48; ++y)
+      if (depth(8, y) > 0.0F) pixels(8 + static_cast<int>(i), y) = 0;
+  };
+  const auto edited = [&](std::size_t i) {
+    auto depth = scene.depth[i];
+    edit(i, depth_view{scene.depth[i].view(), 1000.0}, depth.view());
+    return depth;
+  };
+  for (const unsigned threads : {1U, 4U}) {
+    const auto policy = par.with(threads);
+    live map{scene.camera, {.resolution = 0.05}};
+    for (std::size_t i = 0; i != 6; ++i) REQUIRE(map.add_keyframe(seq, i, scene.keyframe(i).depth, scene.poses[i]));
+    map.set_poses(std::vector<mapping::keyframe_position>{{2, se3{so3{}, vec3{std::nan(""), 0, 0}}}});
+    REQUIRE(map.finish(seq));
+    const auto before = ot_bytes(map.map());
+    CHECK_THROWS_AS(map.edit_depths(policy, all,
+                                    [&](std::size_t i, const depth_view& depth, const auto& pixels) {
+                                      edit(i, depth, pixels);
+                                      if (i == 0) throw std::runtime_error{"stop"};
+                                    }),
+                    std::runtime_error);
+    for (const std::uint64_t frame : all) CHECK_FALSE(map.is_filtered(frame));
+    REQUIRE(map.finish(seq));
+    CHECK(ot_bytes(map.map()) == before);
+
+    const std::size_t bytes = map.bytes();
+    REQUIRE(map.edit_depths(policy, all, edit));
+    CHECK(map.bytes() >= bytes + std::size_t{64} * 48 * 2 * threads);  // what is kept for the next time
+    CHECK_FALSE(map.used_pose(2));                                     // it stays hidden
+    map.set_poses(std::vector<mapping::keyframe_position>{{2, scene.poses[2]}});
+    REQUIRE(map.finish(seq));
+    octree_type expected{0.05};
+    for (std::size_t i = 0; i != 6; ++i) {
+      const auto depth = edited(i);
+      CHECK(map.is_filtered(i));
+      expected.integrate(depth_view{depth.view(), 1000.0}, scene.camera, scene.poses[i]);
+    }
+    CHECK(ot_bytes(map.map()) == ot_bytes(expected));
+  }
+  SECTION("one image is lost") {
+    live map{scene.camera, {.resolution = 0.05}, test::memory_depths{.images = {}, .lost = {4}}};
+    for (std::size_t i = 0; i != 6; ++i) REQUIRE(map.add_keyframe(seq, i, scene.keyframe(i).depth, scene.poses[i]));
+    const auto lost = map.edit_depths(par.with(3), all, edit);
+    REQUIRE_FALSE(lost);
+    CHECK(lost.error().where == "frame 4");
+    CHECK_FALSE(map.contains(4));
+    for (const std::uint64_t frame : {0U, 1U, 2U, 3U, 5U}) CHECK(map.is_filtered(frame) == (frame < 3));
+    REQUIRE(map.finish(seq));
+    octree_type expected{0.05};
+    for (std::size_t i = 0; i != 6; ++i) {
+      const auto depth = i < 3 ? edited(i) : scene.depth[i];
+      if (i != 4) expected.integrate(depth_view{depth.view(), 1000.0}, scene.camera, scene.poses[i]);
+    }
+    CHECK(ot_bytes(map.map()) == ot_bytes(expected));
+  }
+  SECTION("images that cannot be kept are told after all were edited") {
+    live map{scene.camera, {.resolution = 0.05}, test::memory_depths{.images = {}, .lost = {}, .full = true}};
+    for (std::size_t i = 0; i != 6; ++i) CHECK_FALSE(map.add_keyframe(seq, i, scene.keyframe(i).depth, scene.poses[i]));
+    CHECK(map.edit_depths(par.with(2), all, edit).error().code == errc::write_failed);
+    for (const std::uint64_t frame : all) CHECK(map.depths().images.at(frame) == edited(frame));
+  }
 }
 
 TEST_CASE("A live map keeps its depth images compressed") {

@@ -63,8 +63,13 @@ class depth_store {
   /// pixel.
   class packer {
    public:
+    packer() = default;
+    packer(packer&&) noexcept = default;  // a copy would refer to this one's bytes
+    packer& operator=(packer&&) noexcept = default;
     /// O(pixels).
     void pack(image_view<const std::uint16_t> depth) { packed_ = encoder_.encode(depth); }
+    /// On the heap.
+    [[nodiscard]] std::size_t bytes() const noexcept { return encoder_.bytes(); }
 
    private:
     friend class depth_store;

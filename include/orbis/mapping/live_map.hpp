@@ -156,14 +156,17 @@ class live_map {
       return fail(std::move(added.error()));
     return {};
   }
-  /// Takes pixels out of the depth images of several keyframes, each of them named once:
-  /// `remove_pixels(i, depth, pixels)` sets to 0 in `pixels`, a copy of what `depth` stores, what is to go from the
-  /// image of `frames[i]`; it is called on several threads. The map follows with `correct`. Stops when `on_progress`,
-  /// which counts the keyframes, returns false. Errors: not_found; that of `Depths::get`; that of `Depths::put`, but
-  /// not before all is done; cancelled. For each keyframe O(pixels), Depths::get and put, and marking.
+  /// Takes pixels out of the depth images of several keyframes: `remove_pixels(i, depth, pixels)` sets to 0 in
+  /// `pixels`, a copy of what `depth` stores, what is to go from the image of `frames[i]`; it is called on several
+  /// threads. As many keyframes as there are threads are changed together, or none of them if it throws. The map
+  /// follows with `correct`. Stops when `on_progress`, which counts the keyframes, returns false. Errors: not_found,
+  /// before anything is done; that of `Depths::get`, whose keyframe is removed while those together with it stay as
+  /// they are; that of `Depths::put`, but not before all is done; cancelled. For each keyframe O(pixels), Depths::get
+  /// and put, and marking. @pre no frame is named twice
   template <execution_policy Policy, class RemovePixels>
   result<void> edit_depths(const Policy& policy, std::span<const std::uint64_t> frames,
                            const RemovePixels& remove_pixels, progress on_progress = {}) {
+    assert(are_different(frames));
     for (const std::uint64_t frame : frames)
       if (find(frame) == nullptr)
         return fail(errc::not_found, "keyframe " + std::to_string(frame), "there is no such keyframe");
@@ -343,9 +346,13 @@ class live_map {
   [[nodiscard]] std::size_t bytes() const noexcept {
     std::size_t n = history_.bytes() + history_.buffer_bytes() + map().memory_bytes() + map().buffer_bytes() +
                     keyframes_.capacity() * sizeof(entry) + frames_.capacity() * sizeof(transient) +
-                    queue_.capacity() * sizeof(ranked);
-    for (const worker& w : workers_)
-      n += w.marker.bytes() + w.voxels.bytes() + w.depth.pixels().size() * sizeof(std::uint16_t);
+                    queue_.capacity() * sizeof(ranked) + group_.capacity() * sizeof(std::uint64_t) +
+                    workers_.capacity() * sizeof(worker);
+    for (const worker& w : workers_) {
+      n += w.marker.bytes() + w.voxels.bytes();
+      n += (w.depth.pixels().size() + w.edited.pixels().size()) * sizeof(std::uint16_t);
+      if constexpr (packs) n += w.packed.bytes();
+    }
     return n;
   }
 
@@ -393,6 +400,11 @@ class live_map {
 
   [[nodiscard]] static std::optional<se3> if_finite(const se3& T) {
     return T.to_matrix().allFinite() ? std::optional{T} : std::nullopt;
+  }
+  [[nodiscard]] static bool are_different(std::span<const std::uint64_t> frames) {
+    std::vector<std::uint64_t> sorted(frames.begin(), frames.end());
+    std::sort(sorted.begin(), sorted.end());
+    return std::adjacent_find(sorted.begin(), sorted.end()) == sorted.end();
   }
   [[nodiscard]] static bool differ(const se3& a, const se3& b) { return a.to_matrix() != b.to_matrix(); }
   [[nodiscard]] static bool is_before(const entry& k, std::uint64_t frame) noexcept { return k.frame < frame; }

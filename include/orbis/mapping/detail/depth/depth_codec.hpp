@@ -165,6 +165,12 @@ class depth_encoder {
     return out_;
   }
 
+  /// On the heap.
+  [[nodiscard]] std::size_t bytes() const noexcept {
+    return out_.capacity() + seen_.capacity() + coded_.capacity() * sizeof(coded) +
+           (rank_of_.capacity() + rows_.capacity() + words_.capacity()) * sizeof(std::uint16_t);
+  }
+
  private:
   using neighbors = depth_neighbors;
 
