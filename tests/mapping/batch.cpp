@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <iterator>
 #include <limits>
 #include <tuple>
 #include <utility>
@@ -124,6 +126,151 @@ TEST_CASE("bad keyframes are skipped or refused") {
   REQUIRE(map.has_value());
   CHECK(map->skipped == 1);
   CHECK(map->cloud.points == one->cloud.points);
+}
+
+TEST_CASE("keyframes that are skipped leave no gap in a batch or in a live map, and every keyframe is counted") {
+  struct numbered : orbis::mapping::keyframe<> {
+    std::uint64_t frame = 0;
+  };
+  auto scene = orbis::test::wall_scene(7, 20);
+  for (int y = 12; y != 36; ++y)
+    for (int x = 20; x != 44; ++x) scene.depth[3](x, y) = 1000;  // is there for one keyframe
+  for (const std::size_t i : {0U, 4U})
+    scene.poses[i] = orbis::se3{orbis::so3{}, orbis::vec3{std::numeric_limits<double>::quiet_NaN(), 0, 0}};
+  std::vector<numbered> all, finite;
+  for (std::size_t i = 0; i != scene.depth.size(); ++i) {
+    all.push_back({scene.keyframe(i), 10 * i});
+    if (i != 0 && i != 4) finite.push_back(all.back());
+  }
+  std::size_t last = 0, total = 0;
+  const auto watch = [&](std::size_t done, std::size_t of) {
+    CHECK(done > last);
+    last = done;
+    total = of;
+    return true;
+  };
+  using octree = orbis::octree::occupancy_octree<>;
+  for (const double voxel : {0.0, 0.03}) {
+    for (const int stride : {1, 5}) {  // 5 divides neither side of the image
+      orbis::mapping::map_options options{.dense = {.stride = stride, .voxel_size = voxel}};
+      options.moving.emplace();
+      options.dense.flying_pixels.emplace();
+      const auto expected = build_map(orbis::seq, finite, scene.camera, options);
+      REQUIRE(expected.has_value());
+      CHECK(expected->moving.pixels > 300);
+      last = 0;
+      const auto batch = build_map(orbis::seq, all, scene.camera, options, watch);
+      CHECK(last == total);
+      orbis::mapping::live_map<octree, orbis::camera::pinhole> live{scene.camera, {.resolution = options.resolution}};
+      last = 0;
+      const auto grown = build_map(orbis::par.with(3), all, live, options, watch);
+      CHECK(last == total);
+      for (const auto* map : {&batch, &grown}) {
+        REQUIRE(map->has_value());
+        CHECK((*map)->skipped == 2);
+        CHECK((*map)->insert_ms.size() == 5);
+        CHECK((*map)->cloud.points == expected->cloud.points);
+        CHECK((*map)->inliers == expected->inliers);
+        CHECK((*map)->flying_pixels.removed == expected->flying_pixels.removed);
+        CHECK(orbis::octree::ot_bytes(*(*map)->unfiltered_octree) ==
+              orbis::octree::ot_bytes(*expected->unfiltered_octree));
+        CHECK(orbis::octree::ot_bytes((*map)->octree) == orbis::octree::ot_bytes(expected->octree));
+      }
+      options.unfiltered_octree = false;
+      const auto filtered = build_map(orbis::seq, all, scene.camera, options);
+      REQUIRE(filtered.has_value());
+      CHECK_FALSE(filtered->unfiltered_octree.has_value());
+      CHECK(orbis::octree::ot_bytes(filtered->octree) == orbis::octree::ot_bytes(expected->octree));
+    }
+  }
+  // Of a keyframe that is skipped, too, the images have the camera's size.
+  for (const std::size_t at : {2U, 4U}) {
+    auto wrong = all;
+    wrong[at].color = {};
+    CHECK(build_map(orbis::seq, wrong, scene.camera).has_value());
+    const orbis::image<orbis::rgb8> small(32, 24);
+    wrong[at].color = small;
+    CHECK(build_map(orbis::seq, wrong, scene.camera).error().code == orbis::errc::invalid_argument);
+    wrong = all;
+    const orbis::image<std::uint16_t> low(32, 24, 1000);
+    wrong[at].depth = orbis::camera::depth_view<std::uint16_t>{low.view(), 1000.0};
+    CHECK(build_map(orbis::seq, wrong, scene.camera).error().code == orbis::errc::invalid_argument);
+  }
+}
+
+namespace {
+
+/// A keyframe that owns its images, can only be moved, and counts how many there are.
+struct owning {
+  struct counted {
+    std::size_t* alive;
+    explicit counted(std::size_t& n) : alive{&n} { ++n; }
+    counted(counted&& other) noexcept : alive{other.alive} { other.alive = nullptr; }
+    counted& operator=(counted&&) = delete;
+    ~counted() { *(alive != nullptr ? alive : &unused) -= 1; }
+    std::size_t unused = 1;
+  };
+  orbis::image<std::uint16_t> pixels;
+  orbis::camera::depth_view<std::uint16_t> depth;
+  orbis::image_view<const orbis::rgb8> color;
+  orbis::se3 T_world_camera;
+  counted count;
+};
+
+/// Makes its keyframes when their turn comes.
+struct made_anew {
+  const orbis::test::scene* scene;
+  std::size_t* alive;
+  std::size_t* most;
+
+  struct iterator {
+    using iterator_category = std::forward_iterator_tag;
+    using value_type = owning;
+    using difference_type = std::ptrdiff_t;
+    using reference = owning;
+    const made_anew* of = nullptr;
+    std::size_t at = 0;
+    owning operator*() const {
+      const auto k = of->scene->keyframe(at);
+      owning out{of->scene->depth[at], k.depth, k.color, k.T_world_camera, owning::counted{*of->alive}};
+      out.depth = orbis::camera::depth_view<std::uint16_t>{out.pixels.view(), 1000.0};
+      *of->most = std::max(*of->most, *of->alive);
+      return out;
+    }
+    iterator& operator++() {
+      ++at;
+      return *this;
+    }
+    iterator operator++(int) { return {of, at++}; }
+    bool operator==(const iterator& other) const { return at == other.at; }
+  };
+  [[nodiscard]] iterator begin() const { return {this, 0}; }
+  [[nodiscard]] iterator end() const { return {this, size()}; }
+  [[nodiscard]] std::size_t size() const { return scene->depth.size(); }
+};
+
+}  // namespace
+
+TEST_CASE("a range may make its keyframes anew, and few of them are kept") {
+  auto scene = orbis::test::wall_scene(9, 20);
+  for (const bool lost : {false, true}) {
+    if (lost)  // nothing waits for what comes after
+      for (std::size_t i = 2; i != 9; ++i)
+        scene.poses[i] = orbis::se3{orbis::so3{}, orbis::vec3{std::numeric_limits<double>::quiet_NaN(), 0, 0}};
+    for (const bool moving : {false, true}) {
+      orbis::mapping::map_options options;
+      if (moving) options.moving.emplace().keyframes = 3;
+      std::size_t alive = 0, most = 0;
+      const auto map = build_map(orbis::seq, made_anew{&scene, &alive, &most}, scene.camera, options);
+      REQUIRE(map.has_value());
+      CHECK(alive == 0);
+      CHECK(most == (!moving ? 1 : lost ? 3 : 4));
+      const auto kept = build_map(orbis::seq, scene.keyframes(), scene.camera, options);
+      REQUIRE(kept.has_value());
+      CHECK(orbis::octree::ot_bytes(map->octree) == orbis::octree::ot_bytes(kept->octree));
+      CHECK(map->cloud.points == kept->cloud.points);
+    }
+  }
 }
 
 TEST_CASE("a map without flying pixels says how many there were") {
@@ -285,6 +432,7 @@ TEST_CASE("a live map of the same depth images and poses is the same map") {
     CHECK(build_map(orbis::par, unordered, grown, options).error().code == orbis::errc::invalid_argument);
     const auto built = build_map(orbis::par, named, grown, options);
     REQUIRE(built.has_value());
+    CHECK(dense.cloud().points == map->cloud.points);
     CHECK(built->cloud.points == map->cloud.points);
     CHECK(built->inliers == map->inliers);
     CHECK(orbis::octree::ot_bytes(*built->unfiltered_octree) == orbis::octree::ot_bytes(*map->unfiltered_octree));

@@ -96,6 +96,28 @@ TEST_CASE("pixels without a ray, or a depth that is none, give no points") {
   for (const auto& s : seen) CHECK(std::isfinite(std::get<2>(s) + std::get<3>(s) + std::get<4>(s)));
 }
 
+TEST_CASE("the point of one pixel is the one that the image gives") {
+  auto scene = orbis::test::wall_scene(2, 20);
+  const auto k = scene.keyframe(1);
+  const orbis::camera::ray_table rays{scene.camera};
+  const keyframe_point_options options{.min_depth = 1.0F, .max_depth = 2.15F};
+  orbis::image<orbis::vec3f> points(64, 48, orbis::vec3f::Zero());
+  keyframe_points reader;
+  std::size_t all = 0;
+  reader.read(orbis::seq, k.depth, rays, options, k.T_world_camera,
+              [&](std::size_t, int x, int y, const orbis::vec3f& point, float) {
+                points(x, y) = point;
+                ++all;
+              });
+  CHECK(all > 100);
+  CHECK(all < 64 * 48);
+  const orbis::camera::float_pose pose{k.T_world_camera};
+  for (int y = 0; y != 48; ++y)
+    for (int x = 0; x != 64; ++x)
+      REQUIRE(keyframe_points::point_at(k.depth, x, y, rays, options, pose).value_or(orbis::vec3f::Zero()) ==
+              points(x, y));
+}
+
 TEST_CASE("a depth image is masked in place as into another one") {
   const auto scene = orbis::test::edge_scene(2);
   const auto k = scene.keyframe(1);

@@ -101,9 +101,9 @@ class standing_depth {
  public:
   /// Calls `use` with the image. Returns how many pixels were taken out.
   template <class Use>
-  std::size_t with(const Depth& depth, const std::vector<removed_cell>* cells, const moving_filter_options& options,
+  std::size_t with(const Depth& depth, const std::vector<removed_cell>& cells, const moving_filter_options& options,
                    const Use& use) {
-    if (cells == nullptr || cells->empty()) {
+    if (cells.empty()) {
       use(depth);
       return 0;
     }
@@ -111,7 +111,7 @@ class standing_depth {
       copy_ = image<mapping::depth_pixel<Depth>>(depth.width(), depth.height());
     for (int y = 0; y != depth.height(); ++y)
       for (int x = 0; x != depth.width(); ++x) copy_(x, y) = stored_depth(depth, x, y);
-    const std::size_t removed = remove_cells(depth, *cells, options, copy_.view());
+    const std::size_t removed = remove_cells(depth, cells, options, copy_.view());
     use(view_like(depth, std::as_const(copy_).view()));
     return removed;
   }
@@ -156,6 +156,9 @@ template <class Octree, execution_policy Policy, keyframe_range Keyframes, camer
   const auto fits = [&](const auto& image) {
     return image.width() == camera.width() && image.height() == camera.height();
   };
+  const auto wrong_size = [] {
+    return fail(errc::invalid_argument, "keyframes", "an image is not of the camera's size");
+  };
   const auto finite_pose = [](const auto& k) { return se3(k.T_world_camera).to_matrix().allFinite(); };
   const std::size_t looks = view_passes(options.filter);
   const std::size_t total = (2U + looks) * std::ranges::size(keyframes);
@@ -173,22 +176,21 @@ template <class Octree, execution_policy Policy, keyframe_range Keyframes, camer
   keyframe_points points;
   standing_depth<depth_type> standing;
   cloud::view_samples samples;
-  std::vector<std::vector<removed_cell>> moved(std::ranges::size(keyframes));
+  std::vector<std::vector<removed_cell>> moved;  // of those that are not skipped, as `place`: where they are among all
+  std::vector<std::size_t> place;
   image<pixel> masked(camera.width(), camera.height());
   const auto mask = [&](const auto& depth) {
     return points.mask(policy, depth, rays, point_options(options.dense), masked.view());
   };
   const auto add = [&](auto& judged) -> result<void> {
     const keyframe_type& k = judged.keyframe;
-    if (options.filter.kind == filter_kind::automatic) samples.add(camera, k);
-    if (!finite_pose(k)) {
-      ++map.skipped;
-      return {};
+    if (options.filter.kind == filter_kind::automatic) {
+      while (samples.views() != place[judged.number]) samples.skip();
+      samples.add(camera, k);
     }
     const image_view<const rgb8> color = k.color;
-    if (!color.empty() && !fits(color))
-      return fail(errc::invalid_argument, "keyframes", "an image is not of the camera's size");
-    const std::size_t removed = standing.with(k.depth, &judged.removed, moving, [&](const auto& depth) {
+    if (!color.empty() && !fits(color)) return wrong_size();
+    const std::size_t removed = standing.with(k.depth, judged.removed, moving, [&](const auto& depth) {
       const cloud::flying_pixel_count flying = mask(depth);
       map.flying_pixels.valid += flying.valid;
       map.flying_pixels.removed += flying.removed;
@@ -205,7 +207,7 @@ template <class Octree, execution_policy Policy, keyframe_range Keyframes, camer
         if (auto scanned = into.scan(k, depth); !scanned) return scanned;
       map.insert_ms_unfiltered.push_back(*wanted ? milliseconds_since(start) : 0.0);
     }
-    moved[judged.number] = std::move(judged.removed);
+    moved.push_back(std::move(judged.removed));
     return {};
   };
   {
@@ -215,14 +217,24 @@ template <class Octree, execution_policy Policy, keyframe_range Keyframes, camer
         if (auto added = add(*judged); !added) return added;
       return {};
     };
-    for (const auto& k : keyframes) {
-      if (!fits(k.depth)) return fail(errc::invalid_argument, "keyframes", "an image is not of the camera's size");
-      window.push(policy, k);
-      if (auto added = add_judged(); !added) return fail(std::move(added.error()));
+    std::size_t at = 0;
+    for (auto&& k : keyframes) {
+      if (!fits(k.depth)) return wrong_size();
+      if (finite_pose(k)) {
+        place.push_back(at);
+        window.push(policy, keyframe_type(std::forward<decltype(k)>(k)));
+        if (auto added = add_judged(); !added) return fail(std::move(added.error()));
+      } else {
+        const image_view<const rgb8> color = k.color;
+        if (!color.empty() && !fits(color)) return wrong_size();
+        ++map.skipped;
+      }
+      ++at;
       if (!on_progress(++done, total)) return fail(errc::cancelled, {}, "cancelled");
     }
     window.finish();
     if (auto added = add_judged(); !added) return fail(std::move(added.error()));
+    while (samples.views() != at) samples.skip();
   }  // the keyframes in the window are freed
   if (options.unfiltered_octree) {
     auto octree = into.unfiltered();
@@ -252,19 +264,17 @@ template <class Octree, execution_policy Policy, keyframe_range Keyframes, camer
   for (const std::uint32_t i : map.inliers) kept[i] = 1;
   const dense_cloud::selection kept_points = dense.select(std::move(kept));
 
+  if (map.skipped != 0 && !on_progress(done += map.skipped, total)) return fail(errc::cancelled, {}, "cancelled");
   const auto watched = [&](std::size_t passed, std::size_t) { return on_progress(done + passed, total); };
   const auto filtered_depths = [&](const auto& use) -> result<void> {
-    std::size_t number = 0, at = 0;
+    std::size_t number = 0;
     for (const auto& k : keyframes) {
-      const std::vector<removed_cell>& cells = moved[at++];
-      if (finite_pose(k)) {
-        static_cast<void>(standing.with(k.depth, &cells, moving, mask));
-        image<pixel> left = masked;
-        dense.remove_points(policy, view_like(k.depth, std::as_const(masked).view()), number++, kept_points,
-                            left.view());
-        use(k, view_like(k.depth, std::as_const(left).view()));
-      }
-      if (!watched(at, moved.size())) return fail(errc::cancelled, {}, "cancelled");
+      if (!finite_pose(k)) continue;
+      static_cast<void>(standing.with(k.depth, moved[number], moving, mask));
+      image<pixel> left = masked;
+      dense.remove_points(policy, view_like(k.depth, std::as_const(masked).view()), number++, kept_points, left.view());
+      use(k, view_like(k.depth, std::as_const(left).view()));
+      if (!watched(number, moved.size())) return fail(errc::cancelled, {}, "cancelled");
     }
     return {};
   };
@@ -373,6 +383,10 @@ struct live_octree {
 /// points judge another's; the automatic filter asks the keyframes' depth images as well which points their rays pass
 /// through. The octrees are those that a `live_map` makes of the same depth images and poses, bit for bit.
 ///
+/// The range is gone through twice and, as the filter asks, up to three times more. Of its values
+/// `options.moving->keyframes` + 1 are kept at a time, where that is asked for, otherwise one: they can be copied, or
+/// the range gives them anew, and what they refer to lasts as long as they do.
+///
 /// Keyframes whose pose is not finite are skipped and counted. Errors: `no_data` if there is no
 /// keyframe; `invalid_argument` if an image's size is not the camera's, or an option is out of range;
 /// `cancelled`. The same result for every policy. `on_progress` counts the keyframes of all passes.
@@ -393,7 +407,8 @@ requires depth_map<Octree, Camera>
 /// after the filter, their mean.
 /// `options.resolution` and `options.integration` are those of the live map, and the unfiltered octree is always made.
 /// Errors, in addition: `invalid_argument` if the frame numbers do not ascend; those of the live map, but for images
-/// that stay in memory because they cannot be written to their file. @pre what the live map has was added with the
+/// that stay in memory because they cannot be written to their file. After an error the live map may have some of the
+/// keyframes' images and poses already; another call sets it right. @pre what the live map has was added with the
 /// depth that `keyframe_points::masked` leaves under `point_options(options.dense)`, but for keyframes that are
 /// `live_map::is_filtered`, which get it again
 template <execution_policy Policy, keyframe_range Keyframes, octree::replayable_octree Octree,

@@ -222,8 +222,8 @@ class dense_cloud {
     return out;
   }
   /// The second half of `masked_depth`: sets the pixels of `out`, a copy of what `depth` stores, to 0 whose point of
-  /// the cloud is not kept, or for which no point speaks. O(pixels). @pre `depth` is keyframe `number`'s image without
-  /// flying pixels
+  /// the cloud is not kept, or for which no point speaks. O(pixels). @pre contains(number), and `depth` is its image as
+  /// `keyframe_points::masked` leaves it
   template <execution_policy Policy, camera::depth_source Depth>
   void remove_points(const Policy& policy, const Depth& depth, std::size_t number, const selection& kept,
                      image_view<depth_pixel<Depth>> out) const {
@@ -238,6 +238,7 @@ class dense_cloud {
                                      (rays_.height() + options_.stride - 1) / options_.stride);
       std::size_t next = kept.first_of_frame_[number];
       reader.read(seq, depth, rays_, points, T_world_camera, [&](std::size_t, int x, int y, const vec3f&, float) {
+        assert(next < kept.first_of_frame_[number] + frames_[number].cloud.size());
         block_kept(x / options_.stride, y / options_.stride) = kept.kept_[next++] != 0 ? 1 : 0;
       });
       for (int y = 0; y != rays_.height(); ++y)

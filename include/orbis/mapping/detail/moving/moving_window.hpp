@@ -43,7 +43,7 @@ template <camera::depth_source Depth>
 }
 
 /// Keeps keyframes until those before and after them have said which of their cells their rays pass through, and gives
-/// them back in order. A keyframe without a finite pose is not judged, nor does it judge. Without options none is.
+/// them back in order: `options.keyframes` + 1 at most. Without options none is judged.
 template <camera::camera_model Camera, keyframe_like Keyframe>
 class moving_window {
  public:
@@ -56,19 +56,21 @@ class moving_window {
   moving_window(const Camera& camera, const std::optional<moving_filter_options>& options) {
     if (options) judge_.emplace(camera, *options);
   }
-  /// Adds the next keyframe, and keeps a copy of it. O(pixels + cells x options.keyframes).
-  /// @pre the image has the camera's size
+  /// Adds the next keyframe, and keeps it. O(pixels + cells x options.keyframes).
+  /// @pre the image has the camera's size; the pose is finite; nothing is left to `pop`
   template <execution_policy Policy>
-  void push(const Policy& policy, const Keyframe& k) {
+  void push(const Policy& policy, Keyframe k) {
     const se3 T_world_camera = k.T_world_camera;
-    kept_.push_back({{count_++, k}, T_world_camera});
-    if (!judge_ || !T_world_camera.to_matrix().allFinite()) {
+    kept_.push_back({{count_++, std::move(k)}, T_world_camera});
+    assert(T_world_camera.to_matrix().allFinite());
+    if (!judge_) {
       kept_.back().is_judged = true;
       return;
     }
     if (judge_->is_full()) settle(judge_->views().front());
     const auto pose_of = [&](const auto& view) { return std::optional{at(view.frame).T_world_camera}; };
-    judge_->add(policy, kept_.back().item.number, stored_depths(k.depth, copy_), T_world_camera, pose_of);
+    const judged_keyframe& now = kept_.back().item;
+    judge_->add(policy, now.number, stored_depths(now.keyframe.depth, copy_), T_world_camera, pose_of);
     for (auto& view : judge_->views()) judge_->ask_newest(policy, view, pose_of);
   }
   /// No keyframe will come: all that are left are judged.
@@ -106,7 +108,7 @@ class moving_window {
 
   std::optional<moving_judge<Camera>> judge_;
   std::size_t count_ = 0;
-  std::deque<entry> kept_;  // a judged one goes before the next is added: pop is called until it gives nothing
+  std::deque<entry> kept_;
   image<std::uint16_t> copy_;
 };
 
