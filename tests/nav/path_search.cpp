@@ -102,6 +102,40 @@ TEST_CASE("Whether a ball is free is what the exact tests of the map say") {
   CHECK(view.is_free(vec3{0.0, 0.0, 1e6}) == (unknown == occupancy::free));
 }
 
+TEST_CASE("At the edge of the grid a ball is free where the exact tests say so") {
+  const occupancy unknown = GENERATE(occupancy::occupied, occupancy::free);
+  random_bits random{11};
+  map_type map{cell, 5};
+  const std::uint32_t cells = map.grid().cells();
+  for (std::uint32_t z = 0; z != cells; ++z)
+    for (std::uint32_t y = 0; y != cells; ++y)
+      for (std::uint32_t x = 0; x != cells; ++x)
+        map.edit_octant({x, y, z}, [&](octree::block<float>& b) {
+          const auto i = octree::morton_code({x, y, z}) & 63U;
+          b.known |= std::uint64_t{1} << i;
+          b.value[i] = random.uniform() < 0.01 ? 1.0F : -1.0F;
+        });
+  const nav::distance_field field{map, {.reach = 1.0, .unknown = unknown}};
+  const nav::planning_view view{map, field, 0.1};
+  std::array<int, 2> seen{};
+  int wrong = 0, falsely_sure = 0;
+  for (int i = 0; i != 6000; ++i) {
+    vec3 a{random.uniform(-1.6, 1.6), random.uniform(-1.6, 1.6), random.uniform(-1.6, 1.6)};
+    a[i % 3] = (i % 2 == 0 ? 1.6 : -1.6) + random.uniform(-0.15, 0.15);
+    const vec3 b = a + vec3{random.uniform(-0.2, 0.2), random.uniform(-0.2, 0.2), random.uniform(-0.2, 0.2)};
+    for (const vec3& to : {a, b}) {
+      const bool expected = is_free(map, a, to, 0.1, unknown);
+      ++seen[expected ? 1 : 0];
+      wrong += view.is_free(a, to) != expected ? 1 : 0;
+      falsely_sure += view.is_surely_free(a, to) && !expected ? 1 : 0;
+    }
+  }
+  CHECK(wrong == 0);
+  CHECK(falsely_sure == 0);
+  CHECK(seen[0] > 500);
+  if (unknown == occupancy::free) CHECK(seen[1] > 500);
+}
+
 TEST_CASE("A path over the voxels is as short as Dijkstra's, and shortening keeps it free") {
   random_bits random{2};
   const std::array<int, 3> size{16, 14, 10};
@@ -499,4 +533,10 @@ TEST_CASE("What the field alone calls free is free") {
   }
   CHECK(sure > 100);
   CHECK(sure * 10 > free * 7);
+  // Far beyond the grid the length of the way is not a number that steps could add up to.
+  const nav::distance_field open{map, {.reach = 1.0, .unknown = occupancy::free}};
+  const nav::planning_view outside{map, open, 0.12};
+  const vec3 a{-1.0, -1.0, -1.0};
+  CHECK(outside.is_surely_free(a, a));
+  CHECK_FALSE(outside.is_surely_free(a, vec3{-1e200, -1e200, 0.0}));
 }

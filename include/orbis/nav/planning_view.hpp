@@ -66,7 +66,7 @@ class planning_view {
   /// `overlaps` costs for each 4 voxels near them.
   [[nodiscard]] bool is_free(const vec3& a, const vec3& b) const {
     const double cell = resolution();
-    if (!is_in_region(a) || !is_in_region(b) || !((b - a).norm() <= 4.0 * cell * grid().cells())) return false;
+    if (!is_in_region(a) || !is_in_region(b) || !is_short(a, b)) return false;
     squared_distance_view::reader reader{field_->voxels()};
     return detail::is_way_free(
         a, b, cell, [&](const vec3& p) { return margin(reader, p); },
@@ -83,7 +83,7 @@ class planning_view {
   /// Whether a way is free as far as the field alone can tell: true only if `is_free(a, b)` is, and false also where
   /// that would have to ask the map. O(length / distance to the obstacles).
   [[nodiscard]] bool is_surely_free(const vec3& a, const vec3& b) const {
-    if (!is_in_region(a) || !is_in_region(b)) return false;
+    if (!is_in_region(a) || !is_in_region(b) || !is_short(a, b)) return false;
     squared_distance_view::reader reader{field_->voxels()};
     return detail::is_way_surely_free(a, b, resolution(), [&](const vec3& p) { return margin(reader, p); });
   }
@@ -144,6 +144,9 @@ class planning_view {
   [[nodiscard]] double radius() const noexcept { return shape_.radius; }
 
  private:
+  [[nodiscard]] bool is_short(const vec3& a, const vec3& b) const noexcept {
+    return (b - a).norm() <= 4.0 * resolution() * grid().cells();
+  }
   [[nodiscard]] bool is_in_region(const vec3& p) const noexcept {
     if (!p.allFinite()) return false;
     const auto& r = options_.region;
@@ -182,14 +185,15 @@ class planning_view {
     const auto is_certain = [&] {
       return most - 0.4999 * cell < cover_.inner || least - 0.8661 * cell - cover_.outer > 0.5 * cell;
     };
-    // Beyond the grid's last voxel there is another value, which says the truth as well.
+    // Beyond the grid's last voxel the field says nothing of obstacles in the grid.
     if (!is_certain() && !away.isZero())
       for (unsigned i = 1; i != 8; ++i) {
         const auto beside = [&](unsigned bit, int axis) { return (i & bit) == 0 ? 0 : away[axis] < 0.0 ? -1 : 1; };
         const int x = beside(1U, 0), y = beside(2U, 1), z = beside(4U, 2);
-        look({k->x + static_cast<std::uint32_t>(x), k->y + static_cast<std::uint32_t>(y),
-              k->z + static_cast<std::uint32_t>(z)},
-             away - cell * vec3{static_cast<double>(x), static_cast<double>(y), static_cast<double>(z)});
+        const octree::voxel_key at{k->x + static_cast<std::uint32_t>(x), k->y + static_cast<std::uint32_t>(y),
+                                   k->z + static_cast<std::uint32_t>(z)};
+        if (std::max({at.x, at.y, at.z}) < grid().cells())
+          look(at, away - cell * vec3{static_cast<double>(x), static_cast<double>(y), static_cast<double>(z)});
       }
     return most - 0.4999 * cell < cover_.inner ? detail::blocked : least - 0.8661 * cell - cover_.outer;
   }
