@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <span>
 #include <vector>
 
 #include <orbis/camera/pinhole.hpp>
@@ -135,6 +136,27 @@ TEST_CASE("The next best view is the one of the greatest utility, and can be rea
   options.gain.bounds = octree::bounding_box{vec3::Zero(), vec3{4.0, 4.0, 2.0}};  // all of it is known
   CHECK(status_at(middle, places) == next_view_status::nothing_to_see);
   CHECK(nav::to_string(next_view_status::nothing_to_see) == "nothing to see");
+}
+
+TEST_CASE("Where ways are very dear the nearest view is taken, though its utility rounds to zero") {
+  const map_type map = room();
+  const camera::pinhole camera{40, 30, 25.0, 25.0, 19.5, 14.5};
+  const nav::distance_field field{map, {.reach = 0.6}};
+  const nav::planning_view view{map, field, 0.25};
+  const auto places = nav::places_of(nav::frontiers{map}.clusters(), map.grid());
+  nav::next_view_options options{.gain = {.max_range = 3.0, .pixel_step = 4}, .lambda = 1e5};
+  for (const double x : {0.6, 3.4}) {
+    const vec3 position{x, 2.5, 1.0};
+    const auto next = nav::next_best_view(view, places, camera, position, options);
+    REQUIRE(next.status == next_view_status::found);
+    CHECK(next.utility == 0.0);
+    CHECK(next.gain > 0.0);
+    CHECK(std::abs(next.T_world_camera.translation().x() - x) < 2.0);
+    for (std::size_t i = 1; i <= places.size(); ++i) {  // the first of the same candidates: none of them is nearer
+      const auto fewer = nav::next_best_view(view, std::span{places}.first(i), camera, position, options);
+      if (fewer.status == next_view_status::found) CHECK(next.path.length <= fewer.path.length + 1e-3);
+    }
+  }
 }
 
 TEST_CASE("What cannot be reached is found out once, and what can be is found all the same") {

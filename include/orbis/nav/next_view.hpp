@@ -15,6 +15,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <span>
 #include <string_view>
@@ -102,7 +103,7 @@ struct next_view {
   se3 T_world_camera{};       ///< the camera's axes: x to the right, y down, z ahead; x is level
   vec3 place = vec3::Zero();  ///< that it looks at, metres
   double gain = 0.0;          ///< unknown space that it would see, cubic metres
-  double utility = 0.0;       ///< gain * exp(-lambda * length of the path)
+  double utility = 0.0;       ///< gain * exp(-lambda * length of the path); 0 if that is too small for a double
   found_path path{};
 };
 
@@ -137,7 +138,7 @@ template <planning_map Map, robot_shape Shape, camera::camera_model Camera>
   assert(options.max_elevation >= 0.0 && options.max_elevation < 1.5707963267948966);
   struct candidate {
     next_view view;
-    double bound = 0.0;  ///< of its utility, if the straight way is free
+    double bound = 0.0;  ///< of the logarithm of its utility, if the straight way is free
   };
   if (!view.key(position)) return {.status = next_view_status::start_outside};
   if (!view.is_free(position)) return {.status = next_view_status::start_blocked};
@@ -163,7 +164,7 @@ template <planning_map Map, robot_shape Shape, camera::camera_model Camera>
       c.view.T_world_camera = pose;
       c.view.place = place;
       c.view.gain = seen;
-      c.bound = seen * std::exp(-options.lambda * (from - position).norm());
+      c.bound = std::log(seen) - options.lambda * (from - position).norm();
     }
   std::stable_sort(candidates.begin(), candidates.end(),
                    [](const candidate& a, const candidate& b) { return a.bound > b.bound; });
@@ -172,8 +173,9 @@ template <planning_map Map, robot_shape Shape, camera::camera_model Camera>
   using search = detail::voxel_search<planning_view<Map, Shape>>;
   std::optional<search> reached;
   path_options how = options.path;
+  double most = -std::numeric_limits<double>::infinity();  // the logarithm of a utility that may itself round to 0
   for (candidate& c : candidates) {
-    if (best.utility >= c.bound) break;
+    if (most >= c.bound) break;
     const vec3 goal = c.view.T_world_camera.translation();
     if (reached && !(view.key(goal) && reached->has_reached(goal)) && !view.is_free(position, goal)) continue;
     c.view.path = find_path(view, position, goal, how);
@@ -187,7 +189,8 @@ template <planning_map Map, robot_shape Shape, camera::camera_model Camera>
     }
     if (c.view.path.status != path_status::found) continue;
     c.view.utility = c.view.gain * std::exp(-options.lambda * c.view.path.length);
-    if (c.view.utility > best.utility) best = std::move(c.view);
+    const double worth = std::log(c.view.gain) - options.lambda * c.view.path.length;
+    if (worth > most) most = worth, best = std::move(c.view);
   }
   return best;
 }
