@@ -3,8 +3,9 @@
 // The distance field that follows a map, beside DynamicEDT3D (B. Lau, C. Sprunk, W. Burgard, "Efficient grid-based
 // spatial representations for robot navigation in dynamic environments", Robotics and Autonomous Systems 61, 2013),
 // where it is installed: the update after each frame of a recording, and the field of the whole map made afresh.
-// DynamicEDT3D is told the box and the voxels that changed, and finding these is not counted; ours looks for them
-// itself. Times are CPU time.
+// And beside the distance transform of P. F. Felzenszwalb and D. P. Huttenlocher over the whole box
+// (bench/box_distances.hpp), which is made afresh each time. DynamicEDT3D is told the box and the voxels that changed,
+// and finding these is not counted; ours looks for them itself. Times are CPU time.
 #include <algorithm>
 #include <array>
 #include <bit>
@@ -24,6 +25,7 @@
 
 #include <orbis/nav/distance_field.hpp>
 
+#include "box_distances.hpp"
 #include "octree_insertion.hpp"
 #include "octree_support.hpp"
 
@@ -69,7 +71,6 @@ void bench_afresh(benchmark::State& state, const std::vector<scan>& scans, doubl
   }
 }
 
-#ifdef ORBIS_BENCH_WITH_DYNAMIC_EDT
 /// The box around what is known and what the field reaches beside it.
 octree::key_box box_of(const std::vector<scan>& scans, double resolution) {
   const map m = whole_map(scans, resolution);
@@ -79,6 +80,49 @@ octree::key_box box_of(const std::vector<scan>& scans, double resolution) {
 std::array<int, 3> place_in(const octree::key_box& box, const octree::voxel_key& k) {
   return {static_cast<int>(k.x - box.low.x), static_cast<int>(k.y - box.low.y), static_cast<int>(k.z - box.low.z)};
 }
+int reach_in_voxels(double resolution) { return static_cast<int>(std::ceil(reach / resolution - 1e-9)); }
+std::array<int, 3> size_of(const octree::key_box& box) {
+  return place_in(box, {box.high.x + 1, box.high.y + 1, box.high.z + 1});
+}
+/// `f(place)` for the occupied voxels.
+template <class F>
+void for_each_occupied(const map& m, const octree::key_box& box, const F& f) {
+  octree::for_each_octant(m, [&](const octree::voxel_key& k, int level, const octree::octant_states& s) {
+    if (level != 2) return;  // no leaf of this map is larger
+    for (std::uint64_t rest = s.occupied; rest != 0; rest &= rest - 1) {
+      const octree::voxel_key o = octree::morton_key(static_cast<std::uint64_t>(std::countr_zero(rest)));
+      f(place_in(box, {k.x + o.x, k.y + o.y, k.z + o.z}));
+    }
+  });
+}
+void bench_afresh_felzenszwalb(benchmark::State& state, const std::vector<scan>& scans, double resolution) {
+  const octree::key_box box = box_of(scans, resolution);
+  const auto size = size_of(box);
+  const map m = whole_map(scans, resolution);
+  box_distances theirs{size};
+  for (auto _ : state) {
+    theirs.clear();
+    for_each_occupied(m, box, [&](const std::array<int, 3>& p) { theirs.occupy(p); });
+    theirs.transform();
+  }
+  const nav::distance_field ours{m, {.reach = reach, .unknown = octree::occupancy::free}};
+  const int r = reach_in_voxels(resolution);
+  std::size_t wrong = 0;
+  for (int z = 0; z != size[2]; ++z)
+    for (int y = 0; y != size[1]; ++y)
+      for (int x = 0; x != size[0]; ++x) {
+        const std::uint16_t found =
+            ours.voxels().squared({box.low.x + static_cast<std::uint32_t>(x), box.low.y + static_cast<std::uint32_t>(y),
+                                   box.low.z + static_cast<std::uint32_t>(z)});
+        const float truth = theirs.squared({x, y, z});
+        const bool is_far = truth > static_cast<float>(r * r);
+        wrong += found == nav::squared_distances::far ? !is_far : static_cast<float>(found) != truth;
+      }
+  state.counters["ours_wrong"] = static_cast<double>(wrong);
+  state.counters["MB"] = 1e-6 * static_cast<double>(theirs.bytes());
+}
+
+#ifdef ORBIS_BENCH_WITH_DYNAMIC_EDT
 /// For the size of what it keeps of a voxel; the heap's own overhead is not counted.
 struct their_sizes : DynamicEDT3D {
   [[nodiscard]] static double megabytes(const std::array<int, 3>& size) {
@@ -86,11 +130,9 @@ struct their_sizes : DynamicEDT3D {
     return 1e-6 * (rows * size[2] * (sizeof(dataCell) + sizeof(bool)) + 2 * rows * sizeof(void*));
   }
 };
-int reach_in_voxels(double resolution) { return static_cast<int>(std::ceil(reach / resolution - 1e-9)); }
-
 void bench_update_dynamic_edt(benchmark::State& state, const std::vector<scan>& scans, double resolution) {
   const octree::key_box box = box_of(scans, resolution);
-  const auto size = place_in(box, {box.high.x + 1, box.high.y + 1, box.high.z + 1});
+  const auto size = size_of(box);
   const int r = reach_in_voxels(resolution);
   for (auto _ : state) {
     DynamicEDT3D theirs{r * r};
@@ -139,20 +181,13 @@ void bench_update_dynamic_edt(benchmark::State& state, const std::vector<scan>& 
 }
 void bench_afresh_dynamic_edt(benchmark::State& state, const std::vector<scan>& scans, double resolution) {
   const octree::key_box box = box_of(scans, resolution);
-  const auto size = place_in(box, {box.high.x + 1, box.high.y + 1, box.high.z + 1});
+  const auto size = size_of(box);
   const int r = reach_in_voxels(resolution);
   const map m = whole_map(scans, resolution);
   for (auto _ : state) {
     DynamicEDT3D theirs{r * r};
     theirs.initializeEmpty(size[0], size[1], size[2]);
-    octree::for_each_octant(m, [&](const octree::voxel_key& k, int level, const octree::octant_states& s) {
-      if (level != 2) return;  // no leaf of this map is larger
-      for (std::uint64_t rest = s.occupied; rest != 0; rest &= rest - 1) {
-        const octree::voxel_key o = octree::morton_key(static_cast<std::uint64_t>(std::countr_zero(rest)));
-        const auto p = place_in(box, {k.x + o.x, k.y + o.y, k.z + o.z});
-        theirs.occupyCell(p[0], p[1], p[2]);
-      }
-    });
+    for_each_occupied(m, box, [&](const std::array<int, 3>& p) { theirs.occupyCell(p[0], p[1], p[2]); });
     theirs.update(true);
     state.counters["MB"] = their_sizes::megabytes(size);
   }
@@ -168,6 +203,7 @@ void bench_afresh_dynamic_edt(benchmark::State& state, const std::vector<scan>& 
           row(group + "/update/orbis" + how, [=](auto& s) { bench_update(s, scans(), resolution, unknown); });
           add_row(group + "/afresh/orbis" + how, [=](auto& s) { bench_afresh(s, scans(), resolution, unknown); });
         }
+        add_row(group + "/afresh/felzenszwalb", [=](auto& s) { bench_afresh_felzenszwalb(s, scans(), resolution); });
 #ifdef ORBIS_BENCH_WITH_DYNAMIC_EDT
         row(group + "/update/dynamic_edt_3d", [=](auto& s) { bench_update_dynamic_edt(s, scans(), resolution); });
         add_row(group + "/afresh/dynamic_edt_3d", [=](auto& s) { bench_afresh_dynamic_edt(s, scans(), resolution); });
