@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <cstddef>
 #include <optional>
 #include <vector>
 
@@ -14,6 +16,7 @@
 #include "navigation.hpp"
 #include "output.hpp"
 #include "result_files.hpp"
+#include "source.hpp"
 #include "summary.hpp"
 #include "tracking_stage.hpp"
 #include "upright_world.hpp"
@@ -77,6 +80,19 @@ void keep_finite(orbis::point_cloud& cloud) {
   if (finite.size() != cloud.size()) cloud = orbis::cloud::extract(cloud, finite);
 }
 
+/// A point with half of the points on either side, along each axis: a few stray ones do not move it.
+orbis::vec3f middle_of(const std::vector<orbis::vec3f>& points) {
+  orbis::vec3f middle;
+  std::vector<float> along(points.size());
+  for (const int axis : {0, 1, 2}) {
+    std::transform(points.begin(), points.end(), along.begin(), [&](const orbis::vec3f& p) { return p[axis]; });
+    const auto half = along.begin() + static_cast<std::ptrdiff_t>(along.size() / 2);
+    std::nth_element(along.begin(), half, along.end());
+    middle[axis] = *half;
+  }
+  return middle;
+}
+
 orbis::result<mapped> map_cloud_file(const settings& s, const std::filesystem::path& folder, console& console) {
   if (filter_options(s).kind == orbis::mapping::filter_kind::ray_evidence)
     return orbis::fail(orbis::errc::invalid_argument, s.input.string(),
@@ -86,6 +102,13 @@ orbis::result<mapped> map_cloud_file(const settings& s, const std::filesystem::p
   if (!cloud) return orbis::fail(cloud.error());
   const std::size_t in_file = cloud->size();
   keep_finite(*cloud);
+  const orbis::vec3 origin =
+      cloud->empty() ? orbis::vec3::Zero() : nearby_origin(middle_of(cloud->points).cast<double>());
+  if (!origin.isZero()) {
+    cloud = orbis::io::read_cloud(s.input, origin);
+    if (!cloud) return orbis::fail(cloud.error());
+    keep_finite(*cloud);
+  }
   if (cloud->empty()) return orbis::fail(orbis::errc::no_data, s.input.string(), "the cloud has no finite points");
   const std::string name = s.input.filename().string();
   const std::string left_out =
@@ -94,7 +117,11 @@ orbis::result<mapped> map_cloud_file(const settings& s, const std::filesystem::p
   results r = begin_results(s, name, nullptr, folder);
   r.setup.emplace_back("points", count_text(cloud->size()) + left_out);
   r.truth_note = "A cloud, without SLAM.";
-  return mapped{std::move(r), map_cloud(*std::move(cloud), s, console), {}};
+  if (origin.isZero()) return mapped{std::move(r), map_cloud(*std::move(cloud), s, console), {}};
+  console.warn(r.warnings.emplace_back(origin_note(origin)));
+  settings moved = s;
+  if (moved.origin) *moved.origin -= origin;
+  return mapped{std::move(r), map_cloud(*std::move(cloud), moved, console), {}};
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 #include "source.hpp"
 
 #include <algorithm>
+#include <cstdio>
 #include <memory>
 #include <mutex>
 #include <utility>
@@ -52,11 +53,23 @@ result<frame_source> open_recording(const settings& s) {
   source.kind = "recording (" + std::string{to_string(recording->format())} + ")";
   source.camera = recording->camera();
   source.frames = limited(recording->size(), s);
-  source.frame = [recording, stride = s.stride](std::size_t i) { return recording->frame(i * stride); };
-  source.color = [recording, stride = s.stride](std::size_t i) { return recording->color(i * stride); };
   source.ground_truth = recording->ground_truth();
+  const orbis::vec3 origin = source.ground_truth.empty()
+                                 ? orbis::vec3::Zero()
+                                 : nearby_origin(source.ground_truth.front().T_world_camera.translation());
+  const auto moved = [origin](const orbis::se3& pose) {
+    return orbis::se3{pose.rotation(), pose.translation() - origin};
+  };
+  for (orbis::stamped_pose& p : source.ground_truth) p.T_world_camera = moved(p.T_world_camera);
+  source.frame = [recording, moved, stride = s.stride](std::size_t i) {
+    auto frame = recording->frame(i * stride);
+    if (frame && frame->T_world_camera) frame->T_world_camera = moved(*frame->T_world_camera);
+    return frame;
+  };
+  source.color = [recording, stride = s.stride](std::size_t i) { return recording->color(i * stride); };
   source.files = recording->files();
   source.notes.assign(recording->notes().begin(), recording->notes().end());
+  if (!origin.isZero()) source.notes.push_back(origin_note(origin));
   return source;
 }
 
@@ -117,6 +130,20 @@ std::string describe(const frame_source& source) {
 }
 
 }  // namespace
+
+orbis::vec3 nearby_origin(const orbis::vec3& place) {
+  constexpr double far = 1000.0;
+  if (!place.allFinite() || place.cwiseAbs().maxCoeff() < far) return orbis::vec3::Zero();
+  return place.array().round();
+}
+
+std::string origin_note(const orbis::vec3& origin) {
+  char text[1200];  // doubles may have 309 digits
+  std::snprintf(text, sizeof text,
+                "the coordinates are far from their origin: all results are relative to (%.0f, %.0f, %.0f)", origin.x(),
+                origin.y(), origin.z());
+  return text;
+}
 
 result<frame_source> open_source(const settings& s, console& console) {
   console.stage("opening");

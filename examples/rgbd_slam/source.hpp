@@ -38,6 +38,12 @@ struct frame_source {
   std::function<double(const orbis::vec3&)> surface_distance;
 };
 
+/// Where the results' world begins in coordinates as maps of the earth have them, metres: a place with whole numbers at
+/// `place`, or zero where `place` is so near to the origin that floats and octrees do for it.
+[[nodiscard]] orbis::vec3 nearby_origin(const orbis::vec3& place);
+/// What a user is told about it.
+[[nodiscard]] std::string origin_note(const orbis::vec3& origin);
+
 /// The recording that the settings name; says what it is.
 [[nodiscard]] orbis::result<frame_source> open_source(const settings& s, console& console);
 

@@ -25,8 +25,8 @@
 #include <orbis/core/point_cloud.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/core/types.hpp>
-#include <orbis/io/detail/files/pcd_format.hpp>
 #include <orbis/io/detail/files/lzf.hpp>
+#include <orbis/io/detail/files/pcd_format.hpp>
 
 namespace orbis::io {
 
@@ -44,9 +44,10 @@ struct pcd_options {
 };
 
 /// A PCD file in memory: `x y z` of any type, and `rgb` or `rgba` (packed, float or integer) where
-/// they are there. All else is passed over. Errors: malformed (damaged, truncated), unsupported (no
-/// x, y and z).
-[[nodiscard]] inline result<organized_cloud> parse_pcd(std::string_view bytes, const std::string& where = {}) {
+/// they are there. All else is passed over. `origin` is taken off the coordinates before they become floats.
+/// Errors: malformed (damaged, truncated), unsupported (no x, y and z).
+[[nodiscard]] inline result<organized_cloud> parse_pcd(std::string_view bytes, const std::string& where = {},
+                                                       const vec3& origin = vec3::Zero()) {
   using namespace detail;
   const auto header = take_pcd_header(bytes, where);
   if (!header) return fail(header.error());
@@ -61,14 +62,14 @@ struct pcd_options {
   out.width = static_cast<std::size_t>(header->width);
   out.height = static_cast<std::size_t>(header->height);
   if (header->data == pcd_data::ascii) {
-    auto cloud = read_pcd_text(bytes, *header, columns, where);
+    auto cloud = read_pcd_text(bytes, *header, columns, origin, where);
     if (!cloud) return fail(cloud.error());
     out.cloud = *std::move(cloud);
     return out;
   }
   if (header->data == pcd_data::binary) {
     if (header->points > bytes.size() / header->point_size) return ends_early();
-    out.cloud = read_pcd_binary(*header, columns, [&](const pcd_field& f, std::size_t i) {
+    out.cloud = read_pcd_binary(*header, columns, origin, [&](const pcd_field& f, std::size_t i) {
       return bytes.data() + i * header->point_size + f.offset;
     });
     return out;
@@ -82,7 +83,7 @@ struct pcd_options {
     return ends_early();
   const auto data = detail::lzf_decompress(bytes.substr(0, compressed_size), size);
   if (!data) return ends_early();
-  out.cloud = read_pcd_binary(*header, columns, [&](const pcd_field& f, std::size_t i) {
+  out.cloud = read_pcd_binary(*header, columns, origin, [&](const pcd_field& f, std::size_t i) {
     return data->data() + f.offset * header->points + i * f.size * f.count;
   });
   return out;

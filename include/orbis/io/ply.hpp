@@ -26,6 +26,7 @@
 #include <orbis/core/point.hpp>
 #include <orbis/core/point_cloud.hpp>
 #include <orbis/core/result.hpp>
+#include <orbis/core/types.hpp>
 #include <orbis/io/detail/files/ply_format.hpp>
 #include <orbis/io/detail/files/scalar_type.hpp>
 
@@ -38,9 +39,11 @@ struct ply_options {
 };
 
 /// The vertices of a PLY file in memory: `x y z` of any type and, where they are there, `red green
-/// blue` (8-bit as they are, 16-bit scaled, floating point from 0 to 1). All else is passed over.
+/// blue` (8-bit as they are, 16-bit scaled, floating point from 0 to 1). All else is passed over. `origin` is taken off
+/// the coordinates before they become floats, which are no finer than half a metre at 5000 km.
 /// Errors: malformed (damaged, truncated), unsupported (no vertices with x, y and z).
-[[nodiscard]] inline result<point_cloud> parse_ply(std::string_view bytes, const std::string& where = {}) {
+[[nodiscard]] inline result<point_cloud> parse_ply(std::string_view bytes, const std::string& where = {},
+                                                   const vec3& origin = vec3::Zero()) {
   using namespace detail;
   const auto header = take_ply_header(bytes, where);
   if (!header) return fail(header.error());
@@ -88,7 +91,8 @@ struct ply_options {
                                     : body.next(element.properties[k].type, v[static_cast<std::size_t>(role[k])]);
         if (!ok) return ends_early();
       }
-      cloud.points.emplace_back(static_cast<float>(v[0]), static_cast<float>(v[1]), static_cast<float>(v[2]));
+      cloud.points.emplace_back(static_cast<float>(v[0] - origin.x()), static_cast<float>(v[1] - origin.y()),
+                                static_cast<float>(v[2] - origin.z()));
       if (colored) cloud.colors.push_back({channel(v[3], type[3]), channel(v[4], type[4]), channel(v[5], type[5])});
     }
     return cloud;

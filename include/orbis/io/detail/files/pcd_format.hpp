@@ -16,6 +16,7 @@
 #include <orbis/core/image.hpp>
 #include <orbis/core/point_cloud.hpp>
 #include <orbis/core/result.hpp>
+#include <orbis/core/types.hpp>
 #include <orbis/io/detail/files/scalar_type.hpp>
 #include <orbis/io/detail/text.hpp>
 
@@ -144,7 +145,7 @@ inline std::uint32_t packed_rgb(const rgb8& c) {
 
 /// From lines of text. Errors: malformed, with the line.
 inline result<point_cloud> read_pcd_text(std::string_view body, const pcd_header& header, const pcd_columns& columns,
-                                         const std::string& where) {
+                                         const vec3& origin, const std::string& where) {
   if (header.points > body.size() / header.tokens + 1)
     return fail(errc::malformed, where,
                 "the data end early: there cannot be " + std::to_string(header.points) + " points in them");
@@ -160,7 +161,7 @@ inline result<point_cloud> read_pcd_text(std::string_view body, const pcd_header
     for (std::size_t k = 0; k != 3; ++k) {
       double value = 0.0;
       if (!parse_number(tokens[columns.xyz[k]->first_token], value)) return false;
-      xyz[k] = static_cast<float>(value);
+      xyz[k] = static_cast<float>(value - origin[static_cast<int>(k)]);
     }
     if (tokens.back().empty() || !trimmed(line).empty()) return false;
     if (columns.color != nullptr) {
@@ -182,7 +183,7 @@ inline result<point_cloud> read_pcd_text(std::string_view body, const pcd_header
 
 /// From binary data. `at(field, i)`: where the field of point i lies.
 template <class At>
-point_cloud read_pcd_binary(const pcd_header& header, const pcd_columns& columns, At&& at) {
+point_cloud read_pcd_binary(const pcd_header& header, const pcd_columns& columns, const vec3& origin, At&& at) {
   const auto n = static_cast<std::size_t>(header.points);
   point_cloud cloud;
   cloud.points.reserve(n);
@@ -191,7 +192,8 @@ point_cloud read_pcd_binary(const pcd_header& header, const pcd_columns& columns
   for (std::size_t i = 0; i != n; ++i) {
     float xyz[3];
     for (std::size_t k = 0; k != 3; ++k)
-      xyz[k] = static_cast<float>(load_as_double(at(*columns.xyz[k], i), types[k], std::endian::little));
+      xyz[k] = static_cast<float>(load_as_double(at(*columns.xyz[k], i), types[k], std::endian::little) -
+                                  origin[static_cast<int>(k)]);
     cloud.points.emplace_back(xyz[0], xyz[1], xyz[2]);
     if (columns.color != nullptr)
       cloud.colors.push_back(unpacked_rgb(load_number<std::uint32_t>(at(*columns.color, i), std::endian::little)));
