@@ -123,6 +123,41 @@ frame_source make_synthetic(const settings& s) {
   return source;
 }
 
+/// About how many voxels an octree has to keep for a depth image: those in the space before its surfaces, or, where
+/// rays are farther apart, some beside each voxel that a ray goes through. `depth(i)`: metres.
+template <class Depth>
+double voxels_in_view(const orbis::camera::intrinsics& k, double resolution, const Depth& depth) {
+  double lengths = 0.0, volume = 0.0;
+  for (std::size_t i = 0; i != static_cast<std::size_t>(k.width) * static_cast<std::size_t>(k.height); ++i) {
+    const double z = depth(i);
+    lengths += z;
+    volume += z * z * z / (3.0 * k.fx * k.fy);
+  }
+  return std::min(16.0 * lengths / resolution, volume / (resolution * resolution * resolution));
+}
+
+/// Says when the octree's voxels are so small that a frame takes seconds, and refuses those of which one frame alone
+/// may fill gigabytes. The first frame stands for all.
+result<void> check_resolution(frame_source& source, const settings& s) {
+  constexpr double slow = 1e8, too_many = 2e9;
+  const orbis::camera::intrinsics& k = source.camera.model.k();
+  if (source.frames == 0 || voxels_in_view(k, s.resolution, [&](std::size_t) { return s.max_depth; }) < slow) return {};
+  const auto first = source.frame(0);
+  if (!first) return {};  // whoever needs it will say why
+  const auto pixels = first->depth.pixels();
+  const double voxels = voxels_in_view(k, s.resolution, [&](std::size_t i) {
+    const double z = pixels[i] / first->depth_scale;
+    return z > s.max_depth ? 0.0 : z;
+  });
+  if (voxels < slow) return {};
+  char text[160];
+  std::snprintf(text, sizeof text, "voxels of %g mm: the first frame alone has about %.1f billion of them",
+                1000 * s.resolution, 1e-9 * voxels);
+  if (voxels >= too_many) return fail(orbis::errc::invalid_argument, "--resolution", text + std::string{", too many"});
+  source.notes.push_back(text + std::string{"; this takes long"});
+  return {};
+}
+
 std::string describe(const frame_source& source) {
   return source.title + ": " + std::to_string(source.frames) + " frames of " +
          std::to_string(source.camera.model.width()) + " x " + std::to_string(source.camera.model.height()) +
@@ -149,6 +184,8 @@ result<frame_source> open_source(const settings& s, console& console) {
   console.stage("opening");
   auto source = s.what == command::demo ? result<frame_source>{make_synthetic(s)} : open_recording(s);
   if (!source) return source;
+  if (!s.localize_only)
+    if (auto fine = check_resolution(*source, s); !fine) return fail(fine.error());
   console.finish(describe(*source));
   for (const std::string& note : source->notes) console.warn(note);
   return source;

@@ -64,6 +64,15 @@ app_fails(2 "file: " run file --out out)
 file(MAKE_DIRECTORY ${WORK}/nothing)
 app_fails(2 "nothing: " run nothing --out out)
 
+# Voxels of which one frame would fill the memory are refused before they do.
+make_recording(${WORK}/sharp 2 640)
+foreach(command run map)
+  app_fails(2 "--resolution: voxels of 1 mm: the first frame alone has about .* too many"
+            ${command} sharp --out out --resolution 0.001)
+endforeach()
+app_fails(2 "--resolution: voxels of 1 mm" demo --frames 2 --out out --resolution 0.001)
+check(NOT EXISTS ${WORK}/out/summary.json)
+
 recording(no_entries)
 file(WRITE ${WORK}/no_entries/rgb.txt "# nothing\n")
 app_fails(2 "no_entries/rgb.txt" run no_entries --out out)
