@@ -284,7 +284,7 @@ template <point_range Points>
 }
 
 /// Gathers the points of every voxel, see `voxel_fold`; the same for every policy. Points that have no cell are left
-/// out. O(n). Memory: less than 24 bytes per point beyond 2^15 points.
+/// out. O(n). Memory: about 20 bytes per point beyond 2^15 points, 30 with colours.
 /// @pre size > 0, fewer than 2^32 points
 template <execution_policy Policy, point_range Points, voxel_fold Fold>
 void fold_voxels(const Policy& policy, const Points& points, double size, Fold&& fold) {
