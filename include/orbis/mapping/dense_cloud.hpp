@@ -184,6 +184,7 @@ class dense_cloud {
 
    private:
     friend class dense_cloud;
+    [[nodiscard]] bool is_everything() const noexcept { return !voxels_ && first_of_frame_.empty(); }
     std::vector<char> kept_;                           ///< where points are not merged
     std::optional<cloud::voxel_sums::choice> voxels_;  ///< where they are
     std::vector<std::size_t> first_of_frame_;
@@ -215,6 +216,7 @@ class dense_cloud {
     assert(contains(number));
     keyframe_points reader;  // const functions share no memory
     auto out = reader.masked(policy, k.depth, rays_, point_options(options_));
+    if (kept.is_everything()) return out;
     const auto whole = out;
     remove_points(policy,
                   view_like(k.depth, image_view<const depth_pixel<std::remove_cvref_t<decltype(k.depth)>>>(whole)),
@@ -228,7 +230,7 @@ class dense_cloud {
   void remove_points(const Policy& policy, const Depth& depth, std::size_t number, const selection& kept,
                      image_view<depth_pixel<Depth>> out) const {
     assert(contains(number));
-    if (!kept.voxels_ && kept.first_of_frame_.empty()) return;
+    if (kept.is_everything()) return;
     keyframe_point_options points = point_options(options_);
     points.flying_pixels.reset();  // they are gone
     const se3& T_world_camera = frames_[number].T_world_camera;
@@ -268,7 +270,7 @@ class dense_cloud {
   [[nodiscard]] std::vector<vec3f> measurements(const Policy& policy, const Keyframe& k, std::size_t number,
                                                 const selection& kept = {}) const {
     assert(contains(number));
-    const bool all = !kept.voxels_ && kept.first_of_frame_.empty();
+    const bool all = kept.is_everything();
     std::vector<vec3f> out;
     if (!merging()) {
       const std::vector<vec3f>& points = frames_[number].cloud.points;

@@ -137,7 +137,9 @@ struct judge_by_windows {
   }
 };
 
-/// Adds one to the counters of the points with a bit in `words`, up to their largest number.
+/// Adds one to the counters of the points with a bit in `words`, up to their largest number; or takes one from them.
+/// @pre to take from, none of these is zero
+template <bool Add>
 struct count_points {
   template <simd::target Target>
   static ORBIS_ALWAYS_INLINE void run(const std::array<std::uint16_t, block_verdict::words>& words,
@@ -145,20 +147,11 @@ struct count_points {
     using lanes = simd::vec<std::uint16_t, 16, Target>;
     for (std::size_t w = 0; w != block_verdict::words; ++w) {
       const lanes one = select(lanes::mask_type::from_bits(words[w]), lanes(1), lanes(0));
-      simd::add_saturated(lanes::load(counters + 16 * w), one).store(counters + 16 * w);
-    }
-  }
-};
-
-/// Takes one from the counters of the points with a bit in `words`. @pre none of these is zero
-struct uncount_points {
-  template <simd::target Target>
-  static ORBIS_ALWAYS_INLINE void run(const std::array<std::uint16_t, block_verdict::words>& words,
-                                      std::uint16_t* counters) {
-    using lanes = simd::vec<std::uint16_t, 16, Target>;
-    for (std::size_t w = 0; w != block_verdict::words; ++w) {
-      const lanes one = select(lanes::mask_type::from_bits(words[w]), lanes(1), lanes(0));
-      (lanes::load(counters + 16 * w) - one).store(counters + 16 * w);
+      const lanes before = lanes::load(counters + 16 * w);
+      if constexpr (Add)
+        simd::add_saturated(before, one).store(counters + 16 * w);
+      else
+        (before - one).store(counters + 16 * w);
     }
   }
 };
@@ -170,9 +163,9 @@ struct ray_kernels {
   void (*judge)(const ray_view&, const seen_block&, block_verdict&) =
       simd::kernel<judge_by_windows, void(const ray_view&, const seen_block&, block_verdict&)>();
   void (*count)(const std::array<std::uint16_t, block_verdict::words>&, std::uint16_t*) =
-      simd::kernel<count_points, void(const std::array<std::uint16_t, block_verdict::words>&, std::uint16_t*)>();
+      simd::kernel<count_points<true>, void(const std::array<std::uint16_t, block_verdict::words>&, std::uint16_t*)>();
   void (*take_back)(const std::array<std::uint16_t, block_verdict::words>&, std::uint16_t*) =
-      simd::kernel<uncount_points, void(const std::array<std::uint16_t, block_verdict::words>&, std::uint16_t*)>();
+      simd::kernel<count_points<false>, void(const std::array<std::uint16_t, block_verdict::words>&, std::uint16_t*)>();
 };
 
 }  // namespace orbis::cloud::detail
@@ -183,9 +176,9 @@ ORBIS_COMPILED_KERNEL(orbis::cloud::detail::locate_in_pinhole,
 ORBIS_COMPILED_KERNEL(orbis::cloud::detail::judge_by_windows,
                       void(const orbis::cloud::detail::ray_view&, const orbis::cloud::detail::seen_block&,
                            orbis::cloud::detail::block_verdict&));
-ORBIS_COMPILED_KERNEL(orbis::cloud::detail::count_points,
+ORBIS_COMPILED_KERNEL(orbis::cloud::detail::count_points<true>,
                       void(const std::array<std::uint16_t, orbis::cloud::detail::block_verdict::words>&,
                            std::uint16_t*));
-ORBIS_COMPILED_KERNEL(orbis::cloud::detail::uncount_points,
+ORBIS_COMPILED_KERNEL(orbis::cloud::detail::count_points<false>,
                       void(const std::array<std::uint16_t, orbis::cloud::detail::block_verdict::words>&,
                            std::uint16_t*));
