@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -237,6 +238,115 @@ TEST_CASE("Distances in metres, their gradient, and what they promise") {
   CHECK(field.distance(vec3{std::nan(""), 0.0, 0.0}) == outside);
   CHECK(field.distance_and_gradient(vec3{1e9, 0.0, 0.0}).distance == outside);
   CHECK(field.clearance(vec3{1e9, 0.0, 0.0}) == 0.0);
+}
+
+TEST_CASE("Interpolated distances are continuous up to where the grid ends") {
+  const occupancy unknown = GENERATE(occupancy::occupied, occupancy::free);
+  const int depth = GENERATE(5, 16, 21);
+  constexpr double cell = 0.1, reach = 0.5;
+  map_type map{cell, depth};
+  const std::uint32_t cells = map.grid().cells();
+  const double half = cells / 2;
+  // What is known lies in the corners of the grid, of least and of greatest coordinates.
+  random_bits random{9};
+  const auto in_corner = [&] {
+    const auto along = [&] { return random.below(2) == 0 ? random.below(12) : cells - 1 - random.below(12); };
+    return voxel_key{along(), along(), along()};
+  };
+  for (int i = 0; i != 60'000; ++i) {
+    const voxel_key k = in_corner();
+    map.edit_octant(k, [&](octree::block<float>& b) {
+      const auto at = octree::morton_code(k) & 63U;
+      b.known |= std::uint64_t{1} << at;
+      b.value[at] = random.uniform() < 0.02 ? 1.0F : -1.0F;
+    });
+  }
+  const distance_field field{map, {.reach = reach, .unknown = unknown}};
+  // The values of voxels, by the definition: whoever is not known counts as `unknown`, and so does the outside.
+  const auto is_obstacle = [&](const voxel_key& k) {
+    if (std::max({k.x, k.y, k.z}) >= cells) return unknown == occupancy::occupied;
+    const auto v = map.store().value(k);
+    return v ? *v > 0.0F : unknown == occupancy::occupied;
+  };
+  const auto by_definition = [&](const voxel_key& k) {
+    int least = 26;
+    for (int z = -5; z <= 5; ++z)
+      for (int y = -5; y <= 5; ++y)
+        for (int x = -5; x <= 5; ++x)
+          if (x * x + y * y + z * z < least &&
+              is_obstacle({k.x + static_cast<std::uint32_t>(x), k.y + static_cast<std::uint32_t>(y),
+                           k.z + static_cast<std::uint32_t>(z)}))
+            least = x * x + y * y + z * z;
+    return std::min(reach, cell * std::sqrt(static_cast<double>(least)));
+  };
+  for (int i = 0; i != 200; ++i) {
+    const voxel_key k = in_corner();
+    CHECK(field.distance(k) == Approx(by_definition(k)).margin(1e-12));
+  }
+  const auto value = [&](std::array<std::int64_t, 3> at) {
+    const auto most = static_cast<std::int64_t>(cells) - 1;
+    for (std::int64_t& a : at) {
+      if (a >= 0 && a <= most) continue;
+      if (unknown == occupancy::occupied) return 0.0;
+      a = std::clamp<std::int64_t>(a, 0, most);
+    }
+    return field.distance(voxel_key{static_cast<std::uint32_t>(at[0]), static_cast<std::uint32_t>(at[1]),
+                                    static_cast<std::uint32_t>(at[2])});
+  };
+  const auto interpolated = [&](const vec3& p) {
+    std::array<std::int64_t, 3> low{};
+    vec3 part;
+    for (int i = 0; i != 3; ++i) {
+      const double at = p[i] / cell + half - 0.5;
+      low[static_cast<std::size_t>(i)] = static_cast<std::int64_t>(std::floor(at));
+      part[i] = at - std::floor(at);
+    }
+    double sum = 0.0;
+    for (int i = 0; i != 8; ++i) {
+      const int x = i & 1, y = i >> 1 & 1, z = i >> 2;
+      sum += (x == 0 ? 1.0 - part[0] : part[0]) * (y == 0 ? 1.0 - part[1] : part[1]) *
+             (z == 0 ? 1.0 - part[2] : part[2]) * value({low[0] + x, low[1] + y, low[2] + z});
+    }
+    return sum;
+  };
+  double worst = 0.0, worst_slope = 0.0, most = 0.0;
+  for (int i = 0; i != 3000; ++i) {
+    vec3 p = map.grid().center(in_corner());
+    for (int axis = 0; axis != 3; ++axis) p[axis] += random.uniform(-0.05, 0.05);
+    // Half of them between the centre of an outermost voxel and the edge, and what is outside if that is an obstacle.
+    if (i % 2 == 0)
+      p[i / 2 % 3] =
+          (i % 4 == 0 ? cell : -cell) * (half - random.uniform(unknown == occupancy::free ? 0.0 : -1.0, 0.5));
+    const auto [d, gradient] = field.distance_and_gradient(p);
+    most = std::max(most, d);
+    worst = std::max(worst, std::abs(d - interpolated(p)));
+    for (int axis = 0; axis != 3; ++axis) {
+      const double h = 1e-4, at = p[axis] / cell + half - 0.5;
+      if (std::abs(at - std::round(at)) < 0.01) continue;  // there the derivative jumps
+      vec3 step = vec3::Zero();
+      step[axis] = h;
+      const double slope = (interpolated(p + step) - interpolated(p - step)) / (2 * h);
+      worst_slope = std::max(worst_slope, std::abs(gradient[axis] - slope));
+    }
+  }
+  CHECK(worst < 1e-8);
+  CHECK(worst_slope < 1e-4);
+  CHECK(most > 0.15);
+  // The obstacle nearest to a voxel at the edge, which may lie outside.
+  std::size_t outside = 0;
+  for (int i = 0; i != 500; ++i) {
+    const vec3 p = map.grid().center(in_corner());
+    const auto nearest = field.nearest_obstacle(p);
+    CHECK(nearest.has_value() == (field.voxels().squared(*map.grid().key(p)) != nav::squared_distances::far));
+    if (!nearest) continue;
+    CHECK(std::min(reach, (*nearest - p).norm()) == Approx(field.distance(p)).margin(1e-6));
+    if (nearest->cwiseAbs().maxCoeff() > half * cell) ++outside;
+  }
+  CHECK((outside != 0) == (unknown == occupancy::occupied));
+  // Outside of the grid.
+  const vec3 far_away = vec3::Constant(2.0 * half * cell);
+  CHECK(field.distance_and_gradient(far_away).distance == (unknown == occupancy::free ? reach : 0.0));
+  CHECK(field.distance_and_gradient(far_away).gradient.isZero());
 }
 
 namespace {

@@ -63,18 +63,29 @@ class metric_distances {
   }
   [[nodiscard]] double distance(const octree::voxel_key& k) const noexcept { return metres(voxels_.squared(k)); }
   /// Interpolated linearly along each axis between the centres of the eight voxels around `p` (metres): continuous, and
-  /// the gradient is its derivative. O(1), about 50 ns.
+  /// the gradient is its derivative. Beyond the centres of the grid's outermost voxels there are no others: where the
+  /// outside is an obstacle it counts as one, else the outermost values stay as they are up to the grid's edge, and
+  /// outside of it there is `reach()`. O(1), about 50 ns.
   template <point_like P>
   [[nodiscard]] distance_with_gradient distance_and_gradient(const P& p) const noexcept {
     const auto c = coordinates<double>(p);
     const double cell = grid_.resolution();
+    const bool is_outside_free = voxels_.elsewhere() != 0;
+    if (is_outside_free && !grid_.key(p)) return {.distance = reach_};
     std::array<double, 3> part{};
     std::array<std::optional<std::uint32_t>, 3> low, high;
     for (std::size_t i = 0; i != 3; ++i) {
       const double shifted = c[i] - cell / 2;
       low[i] = grid_.key(shifted);
-      high[i] = low[i] ? std::optional{*low[i] + 1} : grid_.key(shifted + cell);
-      part[i] = low[i] ? std::clamp((c[i] - grid_.center(*low[i])) / cell, 0.0, 1.0) : 0.5;
+      if (low[i]) {
+        part[i] = std::clamp((c[i] - grid_.center(*low[i])) / cell, 0.0, 1.0);
+        if (*low[i] + 1 != grid_.cells()) high[i] = *low[i] + 1;
+      } else if (grid_.key(shifted + cell)) {
+        high[i] = 0;
+        part[i] = std::clamp((c[i] - grid_.center(0)) / cell + 1.0, 0.0, 1.0);
+      }
+      if (is_outside_free && !low[i]) low[i] = high[i];
+      if (is_outside_free && !high[i]) high[i] = low[i];
     }
     squared_distance_view::reader reader{voxels_};
     std::array<double, 8> d{};
@@ -82,7 +93,7 @@ class metric_distances {
       const auto& x = (i & 1U) != 0 ? high[0] : low[0];
       const auto& y = (i & 2U) != 0 ? high[1] : low[1];
       const auto& z = (i & 4U) != 0 ? high[2] : low[2];
-      d[i] = metres(x && y && z ? reader.squared({*x, *y, *z}) : voxels_.elsewhere());  // also beyond the last voxel
+      d[i] = metres(x && y && z ? reader.squared({*x, *y, *z}) : voxels_.elsewhere());
     }
     const auto mix = [](double a, double b, double t) { return a + t * (b - a); };
     const auto [u, v, w] = part;
