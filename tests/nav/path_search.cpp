@@ -213,6 +213,93 @@ TEST_CASE("The way to an obstacle in the open does not look at the whole world")
   CHECK((way.points.back() - goal).norm() < 0.5);
 }
 
+TEST_CASE("Where the goal cannot be reached the path leads to the nearest cell of all that can") {
+  random_bits random{17};
+  const std::array<int, 3> size{24, 24, 12};
+  std::array<int, 2> seen{};  // goals that are blocked, and enclosed
+  for (int round = 0; round != 10; ++round) {
+    // Rooms of all sizes, some of whose free voxels hang together by edges and corners alone, where no robot passes.
+    map_type map{cell};
+    const double share = random.uniform(0.35, 0.65);
+    for (int z = 0; z != size[2]; ++z)
+      for (int y = 0; y != size[1]; ++y)
+        for (int x = 0; x != size[0]; ++x) set(map, x, y, z, x % 8 == 0 || (x > 8 && random.uniform() < share));
+    if (round % 2 == 0) set(map, 8, 3, 3, false);
+    const nav::distance_field field{map, {.reach = 0.6}};
+    const nav::planning_view view{map, field, 0.03};
+    std::map<std::array<int, 3>, bool> reached;
+    const auto for_each_near = [&](const std::array<int, 3>& p, auto&& visit) {
+      for (int z = -1; z <= 1; ++z)
+        for (int y = -1; y <= 1; ++y)
+          for (int x = -1; x <= 1; ++x)
+            if (x != 0 || y != 0 || z != 0) visit(std::array{p[0] + x, p[1] + y, p[2] + z});
+    };
+    const auto middle = [&](const std::array<int, 3>& p) { return map.grid().center(key(p[0], p[1], p[2])); };
+    const vec3 start = middle({4, 4, 4});
+    std::vector<std::array<int, 3>> open{{4, 4, 4}};
+    reached[open[0]] = true;
+    while (!open.empty()) {
+      const auto p = open.back();
+      open.pop_back();
+      for_each_near(p, [&](const std::array<int, 3>& q) {
+        if (!view.is_free(middle(p), middle(q)) || !reached.emplace(q, true).second) return;
+        open.push_back(q);
+      });
+    }
+    for (int i = 0; i != 40; ++i) {
+      vec3 goal = random_point(random, size);
+      if (i % 2 == 0) goal = map.grid().center(*map.grid().key(goal));
+      if (i % 8 == 1) goal += vec3{1.0, -3.0, 2.0};  // in the unknown
+      if (view.is_free(goal) &&
+          (i % 2 != 0 || reached.contains({static_cast<int>(goal.x() / cell), static_cast<int>(goal.y() / cell),
+                                           static_cast<int>(goal.z() / cell)})))
+        continue;
+      ++seen[view.is_free(goal) ? 1 : 0];
+      double least = 1e9;
+      for (const auto& [p, is_reached] : reached) least = std::min(least, (middle(p) - goal).norm());
+      for (const path_method method : {path_method::grid, path_method::any_angle}) {
+        const auto path = nav::find_path(view, start, goal, {.method = method});
+        CHECK(path.status == (view.is_free(goal) ? path_status::unreachable : path_status::goal_blocked));
+        REQUIRE_FALSE(path.points.empty());
+        CHECK(path.points.front() == start);
+        CHECK((path.points.back() - goal).norm() == Approx(least).margin(1e-9));
+        for (std::size_t j = 1; j < path.points.size(); ++j) CHECK(view.is_free(path.points[j - 1], path.points[j]));
+      }
+    }
+  }
+  CHECK(seen[0] > 100);
+  CHECK(seen[1] > 30);
+}
+
+TEST_CASE("An enclosed goal or start is found to be so without a look at the whole world") {
+  // A hollow box in a world of which nothing else is known, and which is free.
+  map_type map{cell};
+  for (int z = 0; z != 12; ++z)
+    for (int y = 0; y != 12; ++y)
+      for (int x = 0; x != 12; ++x) set(map, x, y, z, std::min({x, y, z}) == 0 || std::max({x, y, z}) == 11);
+  const nav::distance_field field{map, {.reach = 0.8, .unknown = occupancy::free}};
+  const nav::planning_view view{map, field, 0.15};
+  const vec3 inside{0.6, 0.6, 0.6}, outside{-3.0, 0.6, 0.6};
+  for (const path_method method : {path_method::grid, path_method::any_angle})
+    for (const double weight : {1.0, 1.1}) {
+      const nav::path_options options{.method = method, .heuristic_weight = weight};
+      const auto in = nav::find_path(view, outside, inside, options);
+      CHECK(in.status == path_status::unreachable);
+      CHECK(in.expanded < 5'000);
+      CHECK((in.points.back() - inside).norm() < 0.9);  // in front of a face
+      const auto out = nav::find_path(view, inside, outside, options);
+      CHECK(out.status == path_status::unreachable);
+      CHECK(out.expanded < 2'000);
+      CHECK(out.points.back().x() == Approx(0.35));
+    }
+  for (int z = 4; z != 8; ++z)
+    for (int y = 4; y != 8; ++y) set(map, 11, y, z, false);
+  const nav::distance_field after{map, {.reach = 0.8, .unknown = occupancy::free}};
+  for (const path_method method : {path_method::grid, path_method::any_angle})
+    CHECK(nav::find_path(nav::planning_view{map, after, 0.15}, outside, inside, {.method = method}).status ==
+          path_status::found);
+}
+
 TEST_CASE("Why there is no path, and how near one comes") {
   // Two rooms of 2 m with a wall between them, and a hole in the wall that only a small robot passes.
   map_type map{cell};

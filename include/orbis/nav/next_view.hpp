@@ -180,8 +180,8 @@ template <planning_map Map, robot_shape Shape, camera::camera_model Camera>
     if (reached && !(view.key(goal) && reached->has_reached(goal)) && !view.is_free(position, goal)) continue;
     c.view.path = find_path(view, position, goal, how);
     if (c.view.path.status == path_status::unreachable && !reached) {
-      reached.emplace(view, false, how.max_expanded);
-      if (reached->run(position, goal, {}) != detail::search_end::exhausted) reached.reset();
+      reached.emplace(view);
+      if (reached->run(position, goal, {}, how.max_expanded) != detail::search_end::exhausted) reached.reset();
     }
     if (c.view.path.status == path_status::gave_up) {
       how.max_expanded /= 2;

@@ -48,16 +48,20 @@ enum class search_end : std::uint8_t {
 /// expensive edge evaluations via lazy best-first search over paths with edge selectors", ICAPS 2016.)
 ///
 /// The heuristic is the length that is left where nothing is in between, in steps or straight: it is admissible, as no
-/// way costs less than its length, and consistent, as it is a metric.
+/// way costs less than its length, and consistent, as it is a metric. At any angle, where no optimum is proven anyway,
+/// it may count more than that (I. Pohl, "First results on the effect of error in heuristic search", Machine
+/// Intelligence 5, 1970).
 template <class Space>
 class voxel_search {
  public:
   using key = octree::voxel_key;
 
-  voxel_search(const Space& space, bool any_angle, std::size_t max_expanded)
-      : space_{space}, any_angle_{any_angle}, is_uniform_{space.is_uniform()}, max_expanded_{max_expanded} {}
+  /// `weight`: of the heuristic at any angle, >= 1.
+  explicit voxel_search(const Space& space, bool any_angle = false, double weight = 1.0)
+      : space_{space}, any_angle_{any_angle}, is_uniform_{space.is_uniform()}, weight_{any_angle ? weight : 1.0} {}
 
   /// The cells to whose middles there is a free straight way from `p`: its own, or else its neighbours.
+  /// @pre `p` lies in the space
   [[nodiscard]] std::vector<key> doors(const vec3& p) const {
     const key own = *space_.key(p);
     const auto is_door = [&](const key& k) { return space_.contains(k) && space_.is_free(p, space_.center(k)); };
@@ -69,9 +73,10 @@ class voxel_search {
     return found;
   }
 
-  /// Looks for the cheapest way from `start` to `goal` through one of the cells `exits` (see doors). Without any, it
-  /// looks at all that can be reached.
-  [[nodiscard]] search_end run(const vec3& start, const vec3& goal, const std::vector<key>& exits) {
+  /// Looks for the cheapest way from `start` to `goal` through one of the cells `exits` (see doors), until that many
+  /// cells have been looked at. Without any exits, it looks at all that can be reached. Once.
+  [[nodiscard]] search_end run(const vec3& start, const vec3& goal, const std::vector<key>& exits,
+                               std::size_t max_expanded) {
     places_ = {start, goal};
     goal_ = space_.clamped(goal);  // outside, the nearest point of the grid stands for it
     exits_ = exits;
@@ -83,13 +88,21 @@ class voxel_search {
       const std::uint32_t n = number_of(k);
       offer(n, from, cost_of(space_, start, space_.center(k)), trust::sure);
     }
+    return go_on(max_expanded);
+  }
+  /// Goes on after it was stopped, until that many cells have been looked at altogether.
+  [[nodiscard]] search_end go_on(std::size_t max_expanded) {
     while (!open_.empty()) {
       std::pop_heap(open_.begin(), open_.end());
       const entry e = open_.back();
       open_.pop_back();
       if (at(e.number).is_closed || at(e.number).cost != e.cost) continue;  // it has been offered something else since
       if (!is_settled(e.number)) continue;
-      if (e.number != to && expanded_ == max_expanded_) return search_end::stopped;
+      if (e.number != to && expanded_ >= max_expanded) {
+        open_.push_back(e);
+        std::push_heap(open_.begin(), open_.end());
+        return search_end::stopped;
+      }
       at(e.number).is_closed = true;
       if (e.number == to) return search_end::found;
       ++expanded_;
@@ -106,12 +119,15 @@ class voxel_search {
   [[nodiscard]] std::size_t expanded() const noexcept { return expanded_; }
   /// What the way that was found costs.
   [[nodiscard]] double cost() const noexcept { return ends_[1].cost; }
-  /// From the start to the goal or, if it was not reached, to the middle of the cell nearest to it.
+  /// From the start to the goal or, if it was not reached, to the middle of the cell nearest to it. No point follows an
+  /// equal one.
   [[nodiscard]] std::vector<vec3> way() {
     std::vector<vec3> points;
-    for (std::uint32_t n = ends_[1].is_closed ? to : nearest_; n != from; n = at(n).parent)
-      points.push_back(position(n));
-    points.push_back(places_[0]);
+    const auto add = [&](const vec3& p) {
+      if (points.empty() || p != points.back()) points.push_back(p);
+    };
+    for (std::uint32_t n = ends_[1].is_closed ? to : nearest_; n != from; n = at(n).parent) add(position(n));
+    add(places_[0]);
     std::reverse(points.begin(), points.end());
     return points;
   }
@@ -219,7 +235,7 @@ class voxel_search {
     n.parent = parent;
     n.cost = cost;
     n.known = known;
-    open_.push_back({cost + ahead(number), cost, number});
+    open_.push_back({cost + weight_ * ahead(number), cost, number});
     std::push_heap(open_.begin(), open_.end());
   }
 
@@ -333,7 +349,7 @@ class voxel_search {
 
   const Space& space_;
   bool any_angle_, is_uniform_;
-  std::size_t max_expanded_;
+  double weight_;
   std::array<vec3, 2> places_{};  ///< start and goal
   vec3 goal_ = vec3::Zero();
   std::vector<key> doors_, exits_;

@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Which cells hang together.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <limits>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include <orbis/core/hash_index.hpp>
+#include <orbis/core/types.hpp>
+#include <orbis/octree/key.hpp>
+
+namespace orbis::nav::detail {
+
+/// Whether cells hang together with those that a robot starts from: by free cells of which each is one of the 26 (on a
+/// floor 8) neighbours of another one. No search over cells leads to what does not. What does is not always reached, as
+/// a step between two free cells may be blocked.
+///
+/// Two floods, from the start and from elsewhere, take turns, each towards the other one's place, until they meet or
+/// one has no more cells. So it costs little to find that either side is enclosed, however large the other one is.
+template <class Space>
+class cell_floods {
+ public:
+  using key = octree::voxel_key;
+
+  /// `doors`: the cells that it starts from. A flood gives up after `max_cells`. `goal`: finite.
+  cell_floods(const Space& space, const vec3& start, const std::vector<key>& doors, const vec3& goal,
+              std::size_t max_cells)
+      : space_{space}, start_{start}, goal_{space.clamped(goal)}, max_cells_{max_cells} {
+    for (const key& k : doors) begin(k, mark::near);
+  }
+
+  /// Whether one of `cells`, which are free, hangs together with the start; true also if that is not known after
+  /// `max_cells`. Once it has said so, nothing more can be asked.
+  [[nodiscard]] bool may_reach(const std::vector<key>& cells) {
+    far_.clear();
+    for (const key& k : cells) {
+      if (mark_of(k) == mark::near) return true;
+      begin(k, mark::far);
+    }
+    for (std::size_t n = 0; n != max_cells_; ++n) {
+      if (far_.empty() || near_.empty()) return false;
+      if (grow(far_, mark::far) || grow(near_, mark::near)) return true;
+    }
+    return true;
+  }
+  /// The cell nearest to the goal that hangs together with the start, as far as that is found within `max_cells`;
+  /// nothing without doors. O(cells around the goal that are nearer, or that are enclosed with one of these), or
+  /// O(cells that hang together with the start).
+  [[nodiscard]] std::optional<key> nearest() {
+    // Cells around the goal in the order of their distances, as long as they are fewer than what may have to be
+    // flooded.
+    constexpr double most = std::size_t{1} << 20U;
+    std::array<std::int64_t, 3> middle{};
+    const vec3 from_first = (goal_ - space_.center(key{})) / space_.resolution();
+    for (std::size_t i = 0; i != 3; ++i)
+      middle[i] = std::max<std::int64_t>(0, std::llround(from_first[static_cast<Eigen::Index>(i)]));
+    std::vector<std::pair<double, key>> open;
+    const auto is_later = [](const auto& a, const auto& b) { return a.first > b.first; };
+    for (std::int64_t r = 0; std::pow(static_cast<double>(2 * r + 1), Space::dimensions) <= most; ++r) {
+      for_each_in_shell(middle, r, [&](const key& k) {
+        if (!is_free(k)) return;
+        open.emplace_back((space_.center(k) - goal_).squaredNorm(), k);
+        std::push_heap(open.begin(), open.end(), is_later);
+      });
+      const double seen = (static_cast<double>(r) + 0.499) * space_.resolution();
+      for (; !open.empty() && open.front().first <= seen * seen; open.pop_back()) {
+        const key k = open.front().second;
+        if (mark_of(k) == mark::near || (mark_of(k) != mark::far && may_reach({k}))) return k;
+        if (near_.empty()) return nearest_;
+        std::pop_heap(open.begin(), open.end(), is_later);
+      }
+    }
+    for (std::size_t n = 0; n != max_cells_ && !near_.empty(); ++n) static_cast<void>(grow(near_, mark::near));
+    return nearest_;
+  }
+
+ private:
+  enum class mark : std::uint8_t { none, blocked, free, near, far };
+  struct entry {
+    double away;
+    key cell;
+    friend bool operator<(const entry& a, const entry& b) noexcept { return a.away > b.away; }
+  };
+  static constexpr bool is_flat = Space::dimensions == 2;
+  static constexpr std::uint32_t brick_bits = is_flat ? 6 : 9;
+
+  [[nodiscard]] mark& mark_of(const key& k) {
+    const std::uint64_t name = octree::morton_code(k) >> 9U;
+    if (name != last_name_) {
+      std::uint32_t i = index_.find(name);
+      if (i == hash_index::none) {
+        i = static_cast<std::uint32_t>(bricks_.size());
+        index_.set(name, i);
+        bricks_.emplace_back();
+      }
+      last_name_ = name;
+      last_brick_ = &bricks_[i];
+    }
+    return (*last_brick_)[(is_flat ? 0U : (k.z & 7U) << 6U) | (k.y & 7U) << 3U | (k.x & 7U)];
+  }
+  /// @pre in the space
+  [[nodiscard]] bool is_free(const key& k) {
+    mark& m = mark_of(k);
+    if (m == mark::none) m = space_.is_free(k) ? mark::free : mark::blocked;
+    return m != mark::blocked;
+  }
+  /// @pre in the space and free
+  void begin(const key& k, mark which) {
+    if (mark_of(k) <= mark::free) mark_of(k) = mark::free;
+    add(k, which);
+  }
+  /// Puts a cell into a flood, if it is in none. True if it is in the other one.
+  bool add(const key& k, mark which) {
+    if (!space_.contains(k) || !is_free(k)) return false;
+    mark& m = mark_of(k);
+    if (m != mark::free) return m != which;
+    m = which;
+    const vec3 p = space_.center(k);
+    if (which == mark::near) {
+      const double away = (p - goal_).squaredNorm();
+      if (away < nearest_away_) nearest_away_ = away, nearest_ = k;
+    }
+    auto& flood = which == mark::near ? near_ : far_;
+    flood.push_back({(p - (which == mark::near ? goal_ : start_)).squaredNorm(), k});
+    std::push_heap(flood.begin(), flood.end());
+    return false;
+  }
+  /// One more cell's neighbours. True if that is where the floods meet. @pre not empty
+  bool grow(std::vector<entry>& flood, mark which) {
+    std::pop_heap(flood.begin(), flood.end());
+    const key k = flood.back().cell;
+    flood.pop_back();
+    bool is_met = false;
+    for (unsigned d = is_flat ? 9 : 0; d != (is_flat ? 18U : 27U); ++d)
+      is_met = add({k.x + d % 3 - 1, k.y + d / 3 % 3 - 1, k.z + d / 9 - 1}, which) || is_met;
+    return is_met;
+  }
+  /// Calls visit(k) for the cells of the space that are `r` away from `middle` along one axis, and no more along
+  /// others.
+  template <class Visit>
+  void for_each_in_shell(const std::array<std::int64_t, 3>& middle, std::int64_t r, Visit&& visit) const {
+    const auto visit_if_inside = [&](std::int64_t x, std::int64_t y, std::int64_t z) {
+      const std::int64_t u = middle[0] + x, v = middle[1] + y, w = middle[2] + z;
+      constexpr std::int64_t end = std::int64_t{1} << octree::max_tree_depth;
+      if (std::min({u, v, w}) < 0 || std::max({u, v, w}) >= end) return;
+      const key k{static_cast<std::uint32_t>(u), static_cast<std::uint32_t>(v), static_cast<std::uint32_t>(w)};
+      if (space_.contains(k)) visit(k);
+    };
+    const std::int64_t high = is_flat ? 0 : r;
+    for (std::int64_t z = -high; z <= high; ++z)
+      for (std::int64_t y = -r; y <= r; ++y) {
+        const bool is_face = std::abs(y) == r || (!is_flat && std::abs(z) == r);
+        for (std::int64_t x = -r; x <= r; x += is_face || r == 0 ? 1 : 2 * r) visit_if_inside(x, y, z);
+      }
+  }
+
+  const Space& space_;
+  vec3 start_, goal_;
+  std::size_t max_cells_;
+  std::vector<entry> near_{}, far_{};  ///< cells of each flood whose neighbours have not been looked at
+  std::deque<std::array<mark, std::size_t{1} << brick_bits>> bricks_{};
+  hash_index index_{};
+  std::uint64_t last_name_ = ~std::uint64_t{0};
+  std::array<mark, std::size_t{1} << brick_bits>* last_brick_ = nullptr;
+  std::optional<key> nearest_{};  ///< to the goal, in the start's flood
+  double nearest_away_ = std::numeric_limits<double>::infinity();
+};
+
+}  // namespace orbis::nav::detail
