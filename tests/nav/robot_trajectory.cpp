@@ -292,6 +292,71 @@ TEST_CASE("Trajectories over a floor keep their bounds and touch no blocked cell
   CHECK(smooth > 3 * stops);
 }
 
+TEST_CASE("Legs that are next to nothing, or nothing, leave a trajectory within its bounds") {
+  random_bits random{23};
+  const map_type map = boxes(random, 0);
+  const nav::distance_field field{map, {.reach = 0.6, .unknown = octree::occupancy::free}};
+  const nav::planning_view view{map, field, 0.1};
+  constexpr std::array lengths{0.0,    5e-324, 1e-300, 1e-160, 1e-16, 1e-12, 9e-10, 1e-9,
+                               1.1e-9, 2e-9,   1e-8,   1e-6,   1e-3,  0.1,   1.0};
+  int moving = 0, rounded = 0;
+  for (int i = 0; i != 2000; ++i) {
+    // Where coordinates are 0 the legs are as short as they are said to be.
+    const vec3 first = i % 2 == 0 ? vec3{1.5, 1.5, 0.7} : vec3{0.0, 1.5, 0.7};
+    std::vector<vec3> points{first};
+    const std::uint32_t legs = 1 + random.below(8);
+    for (std::uint32_t j = 0; j != legs; ++j) {
+      const double length = lengths[random.below(i % 3 == 0 ? 11 : lengths.size())];
+      const vec3 direction =
+          i % 4 == 1 ? vec3{random.normal(), 0.0, 0.0} : vec3{random.normal(), random.normal(), 0.3 * random.normal()};
+      vec3 to = points.back() + length * direction;
+      if (j != 0 && random.below(8) == 0) to = points[points.size() - 2];  // and back again
+      points.push_back(to);
+    }
+    const nav::motion_limits limits{.speed = std::pow(10.0, random.uniform(-3.0, 2.0)),
+                                    .acceleration = std::pow(10.0, random.uniform(-3.0, 2.0))};
+    const auto motion = nav::make_trajectory(view, points, limits);
+    const double duration = motion.duration();
+    REQUIRE(std::isfinite(duration));
+    CHECK(motion.at(0.0).position == points.front());
+    CHECK((motion.at(duration).position - points.back()).norm() < 1e-14);
+    if (duration == 0.0) continue;
+    ++moving;
+    for (const nav::path_piece& p : motion.pieces()) rounded += p.direction != p.turned ? 1 : 0;
+    // In halves, so long as the direction changes: a corner may be over in a moment.
+    double top_speed = 0.0, top_acceleration = 0.0, jump = 0.0, slope = 0.0, length = 0.0;
+    const auto look = [&](const nav::motion_state& now) {
+      top_speed = std::max(top_speed, now.velocity.norm());
+      top_acceleration = std::max(top_acceleration, now.acceleration.norm());
+    };
+    const auto halve = [&](auto&& self, double t0, const nav::motion_state& s0, double t1, const nav::motion_state& s1,
+                           int halvings) -> void {
+      const double dt = t1 - t0, t = t0 + 0.5 * dt;
+      const bool turns = s0.velocity.dot(s1.velocity) < 0.99 * s0.velocity.norm() * s1.velocity.norm();
+      if (halvings > 0 && t0 < t && t < t1 && (halvings > 33 || turns)) {
+        const nav::motion_state middle = motion.at(t);
+        look(middle);
+        self(self, t0, s0, t, middle, halvings - 1);
+        self(self, t, middle, t1, s1, halvings - 1);
+        return;
+      }
+      jump = std::max(jump, (s1.velocity - s0.velocity).norm() - limits.acceleration * dt * (1.0 + 1e-6));
+      const vec3 moved = s1.position - s0.position;
+      slope = std::max(slope, (moved - 0.5 * dt * (s1.velocity + s0.velocity)).norm() - limits.acceleration * dt * dt);
+      length += moved.norm();
+    };
+    halve(halve, 0.0, motion.at(0.0), duration, motion.at(duration), 40);
+    // What is not a number is not less either.
+    CHECK(top_speed <= limits.speed * (1.0 + 1e-9));
+    CHECK(top_acceleration <= limits.acceleration * (1.0 + 1e-9));
+    CHECK(jump <= 1e-9 * limits.speed);
+    CHECK(slope <= 1e-14);
+    CHECK(length <= nav::length_of(points) + 1e-12);
+  }
+  CHECK(moving > 1000);
+  CHECK(rounded > 1000);
+}
+
 TEST_CASE("What is free for a thicker robot is free for the robot with all that is near it") {
   random_bits random{5};
   const map_type map = boxes(random, 60);

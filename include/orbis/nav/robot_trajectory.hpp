@@ -231,22 +231,24 @@ template <inflatable_space Space>
 /// On a floor (`floor_view`) the points keep the heights that they have. Between them height is linear, so that the
 /// robot may be at another one: `view.on_ground(position)` says which. The limits hold for the polyline's motion.
 ///
-/// Points that follow each other at the same place count once. O(points), and what `is_free` costs.
+/// Points that follow each other at the same place, or less than 1e-100 m apart, count once. O(points), and what
+/// `is_free` costs.
 /// @pre points is not empty; each segment is free (space.is_free), as those of find_path are; limits finite and > 0
 template <inflatable_space Space>
 [[nodiscard]] robot_trajectory make_trajectory(const Space& space, const std::vector<vec3>& points,
                                                const motion_limits& limits = {}) {
   assert(!points.empty());
+  constexpr double least = 1e-100;  // of a leg that has a direction: its square is a number
   std::vector<vec3> corners;
   for (const vec3& p : points)
-    if (corners.empty() || (p - corners.back()).norm() > 1e-9) corners.push_back(p);
+    if (corners.empty() || (p - corners.back()).norm() > least) corners.push_back(p);
   std::vector<path_piece> pieces;
   std::vector<bool> stops;
   vec3 from = corners.front();
   const std::size_t last = corners.size() - 1;
   const auto line_to = [&](const vec3& to, const vec3& direction, bool stop) {
     const double length = (to - from).norm();
-    if (length > 1e-9) {
+    if (length > least) {
       pieces.push_back({from, direction, direction, length});
       stops.push_back(stop);
     }
