@@ -227,16 +227,22 @@ TEST_CASE("Where more can be reached than is looked at it says so, and does not 
     asked = 0;
     return nav::next_best_view(view, at, camera, position, options);
   };
-  std::size_t alone = 0, gave_up = 0;
+  std::size_t alone = 0, most_alone = 0, gave_up = 0;
   for (const vec3& p : places) {
     const auto status = look_at({p}).status;
     CHECK((status == next_view_status::gave_up || status == next_view_status::nothing_to_see));
     gave_up += status == next_view_status::gave_up ? 1U : 0U;
     alone += asked;
+    most_alone = std::max(most_alone, asked);
   }
   REQUIRE(gave_up > 15);
   CHECK(look_at(places).status == next_view_status::gave_up);
   CHECK(5 * asked < alone);
+  CHECK(asked < 3 * most_alone);
+  // Where it may look at so many that the box is seen to be closed, no way leads there.
+  options.path.max_expanded = 200'000;
+  CHECK(look_at(places).status == next_view_status::unreachable);
+  options.path.max_expanded = 20'000;
   // What is near is found all the same.
   places.push_back({1.5, 1.5, 2.05});
   options.candidates = 20;

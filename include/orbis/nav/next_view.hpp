@@ -26,6 +26,7 @@
 #include <orbis/core/random.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/core/types.hpp>
+#include <orbis/nav/detail/path/cell_floods.hpp>
 #include <orbis/nav/detail/path/voxel_search.hpp>
 #include <orbis/nav/frontiers.hpp>
 #include <orbis/nav/path_search.hpp>
@@ -78,11 +79,13 @@ struct next_view_options {
 
 enum class next_view_status : std::uint8_t {
   found,
-  nothing_to_see,  ///< no view from where the robot is free shows enough: what can be explored is known
-  start_outside,   ///< the robot itself is outside of the grid or the region, or its position not finite
-  start_blocked,   ///< it touches an obstacle
-  unreachable,     ///< no way leads to any of the views
-  gave_up          ///< none was found after path.max_expanded cells, which does not say that there is none
+  /// None of the candidates shows enough from where the robot is free. They are random: where little is left to see, or
+  /// the robot barely fits, others may.
+  nothing_to_see,
+  start_outside,  ///< the robot itself is outside of the grid or the region, or its position not finite
+  start_blocked,  ///< it touches an obstacle
+  unreachable,    ///< no way leads to any of the candidates
+  gave_up         ///< none was found after path.max_expanded cells, which does not say that there is none
 };
 
 [[nodiscard]] constexpr std::string_view to_string(next_view_status s) noexcept {
@@ -121,12 +124,13 @@ struct next_view {
 /// to where a path leads, of those whose gain is more than 0 and at least `min_gain`. The best is the one
 /// of the greatest utility, gain * exp(-lambda * length of the path): H. H. Gonzalez-Banos, J.-C. Latombe, "Navigation
 /// strategies for exploring indoor environments", International Journal of Robotics Research 21, 2002. Paths are looked
-/// for only as long as a straight one could still be the best, and to what cannot be reached at most once. The world
-/// has z up.
+/// for only as long as a straight one could still be the best, and none to where no free cells lead. The world has z
+/// up.
 ///
-/// Where more can be reached than `path.max_expanded` cells, as where unknown space is free and no region is named, a
-/// search may give up. Each one after it may look at half as many cells as the one before, so that all of those that
-/// give up take no longer than two; then the best of the views to which a path was found is taken, if there is any.
+/// All searches that find no way expand less than 2 `path.max_expanded` cells together, whatever the number of
+/// candidates: each one at most half of what is left of that. So where more can be reached than so many cells, as where
+/// unknown space is free and no region is named, some may give up; then the best of the views to which a path was found
+/// is taken, if there is any.
 ///
 /// The same arguments give the same view. Usually a millisecond for each candidate, and what find_path costs.
 /// @pre 0 < min_distance <= max_distance; 0 <= max_elevation < pi / 2; lambda >= 0
@@ -155,7 +159,7 @@ template <planning_map Map, robot_shape Shape, camera::camera_model Camera>
       const vec3 ahead{std::cos(elevation) * std::cos(azimuth), std::cos(elevation) * std::sin(azimuth),
                        std::sin(elevation)};
       const vec3 from = place - distance * ahead;
-      if (!view.is_free(from)) continue;
+      if (!view.key(from) || !view.is_free(from)) continue;
       const se3 pose = looking_at(from, place);
       const double seen = voxel * static_cast<double>(gain(pose));
       if (!(seen > 0.0 && seen >= options.min_gain)) continue;
@@ -169,24 +173,21 @@ template <planning_map Map, robot_shape Shape, camera::camera_model Camera>
   std::stable_sort(candidates.begin(), candidates.end(),
                    [](const candidate& a, const candidate& b) { return a.bound > b.bound; });
   next_view best{.status = candidates.empty() ? next_view_status::nothing_to_see : next_view_status::unreachable};
-  // What cannot be reached is not looked for again and again: each time all that can be reached would be searched.
-  using search = detail::voxel_search<planning_view<Map, Shape>>;
-  std::optional<search> reached;
+  const detail::voxel_search doors{view};
+  detail::cell_floods floods{view, position, doors.doors(position), position};
   path_options how = options.path;
+  std::size_t left = 2 * std::min(options.path.max_expanded, std::numeric_limits<std::size_t>::max() / 2);
   double most = -std::numeric_limits<double>::infinity();  // the logarithm of a utility that may itself round to 0
   for (candidate& c : candidates) {
     if (most >= c.bound) break;
     const vec3 goal = c.view.T_world_camera.translation();
-    if (reached && !(view.key(goal) && reached->has_reached(goal)) && !view.is_free(position, goal)) continue;
+    how.max_expanded = left / 2;
+    const bool is_straight = how.shorten && view.is_uniform() && view.is_free(position, goal);
+    if (!is_straight && !floods.may_reach(doors.doors(goal), how.max_expanded)) continue;
     c.view.path = find_path(view, position, goal, how);
-    if (c.view.path.status == path_status::unreachable && !reached) {
-      reached.emplace(view);
-      if (reached->run(position, goal, {}, how.max_expanded) != detail::search_end::exhausted) reached.reset();
-    }
-    if (c.view.path.status == path_status::gave_up) {
-      how.max_expanded /= 2;
-      if (best.status != next_view_status::found) best.status = next_view_status::gave_up;
-    }
+    if (c.view.path.status != path_status::found) left -= std::min(left, c.view.path.expanded);
+    if (c.view.path.status == path_status::gave_up && best.status != next_view_status::found)
+      best.status = next_view_status::gave_up;
     if (c.view.path.status != path_status::found) continue;
     c.view.utility = c.view.gain * std::exp(-options.lambda * c.view.path.length);
     const double worth = std::log(c.view.gain) - options.lambda * c.view.path.length;

@@ -183,10 +183,10 @@ template <planning_space Space>
   auto search = make_search();
   search_end end = search.run(start, goal, exits, exits.empty() ? 0 : soon);
   if (!exits.empty() && (end != search_end::stopped || soon == most)) return ended(search, end);
-  cell_floods floods{space, start, search.doors(start), goal, most};
-  if (!exits.empty() && floods.may_reach(exits)) return ended(search, search.go_on(most));
+  cell_floods floods{space, start, search.doors(start), goal};
+  if (!exits.empty() && floods.may_reach(exits, most)) return ended(search, search.go_on(most));
   out.expanded += search.expanded();
-  if (const auto nearest = floods.nearest()) {
+  if (const auto nearest = floods.nearest(most)) {
     auto to_nearest = make_search();
     end = to_nearest.run(start, space.center(*nearest), {*nearest}, most);
     if (end == search_end::found) return ended(to_nearest, search_end::exhausted);

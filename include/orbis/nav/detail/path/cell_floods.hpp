@@ -31,31 +31,35 @@ class cell_floods {
  public:
   using key = octree::voxel_key;
 
-  /// `doors`: the cells that it starts from. A flood gives up after `max_cells`. `goal`: finite.
-  cell_floods(const Space& space, const vec3& start, const std::vector<key>& doors, const vec3& goal,
-              std::size_t max_cells)
-      : space_{space}, start_{start}, goal_{space.clamped(goal)}, max_cells_{max_cells} {
+  /// `doors`: the cells that it starts from. `goal`: finite.
+  cell_floods(const Space& space, const vec3& start, const std::vector<key>& doors, const vec3& goal)
+      : space_{space}, start_{start}, goal_{space.clamped(goal)} {
     for (const key& k : doors) begin(k, mark::near);
   }
 
-  /// Whether one of `cells`, which are free, hangs together with the start; true also if that is not known after
-  /// `max_cells`. Once it has said so, nothing more can be asked.
-  [[nodiscard]] bool may_reach(const std::vector<key>& cells) {
+  /// Whether one of `cells`, which are free, hangs together with the start; true also if that is not known after each
+  /// flood has looked at `max_cells`. What was found out before is not looked at again.
+  [[nodiscard]] bool may_reach(const std::vector<key>& cells, std::size_t max_cells) {
     far_.clear();
-    for (const key& k : cells) {
-      if (mark_of(k) == mark::near) return true;
-      begin(k, mark::far);
+    seen_far_.clear();
+    bool is_met = false;
+    for (const key& k : cells) is_met = begin(k, mark::far) || is_met;
+    std::size_t n = 0;
+    for (; !is_met && n != max_cells && !far_.empty() && !near_.empty(); ++n)
+      is_met = grow(far_, mark::far) || grow(near_, mark::near);
+    if (is_met) {
+      for (const entry& e : far_) push(e.cell, mark::near);
+      for (const key& k : seen_far_) mark_of(k) = mark::near, look_at(k);
+      return true;
     }
-    for (std::size_t n = 0; n != max_cells_; ++n) {
-      if (far_.empty() || near_.empty()) return false;
-      if (grow(far_, mark::far) || grow(near_, mark::near)) return true;
-    }
+    if (far_.empty() || near_.empty()) return false;
+    for (const key& k : seen_far_) mark_of(k) = mark::free;
     return true;
   }
-  /// The cell nearest to the goal that hangs together with the start, as far as that is found within `max_cells`;
+  /// The cell nearest to the goal that hangs together with the start, as far as a flood of `max_cells` finds it;
   /// nothing without doors. O(cells around the goal that are nearer, or that are enclosed with one of these), or
   /// O(cells that hang together with the start).
-  [[nodiscard]] std::optional<key> nearest() {
+  [[nodiscard]] std::optional<key> nearest(std::size_t max_cells) {
     // Cells around the goal in the order of their distances, as long as they are fewer than what may have to be
     // flooded.
     constexpr double most = std::size_t{1} << 20U;
@@ -74,12 +78,12 @@ class cell_floods {
       const double seen = (static_cast<double>(r) + 0.499) * space_.resolution();
       for (; !open.empty() && open.front().first <= seen * seen; open.pop_back()) {
         const key k = open.front().second;
-        if (mark_of(k) == mark::near || (mark_of(k) != mark::far && may_reach({k}))) return k;
+        if (mark_of(k) == mark::near || (mark_of(k) != mark::far && may_reach({k}, max_cells))) return k;
         if (near_.empty()) return nearest_;
         std::pop_heap(open.begin(), open.end(), is_later);
       }
     }
-    for (std::size_t n = 0; n != max_cells_ && !near_.empty(); ++n) static_cast<void>(grow(near_, mark::near));
+    for (std::size_t n = 0; n != max_cells && !near_.empty(); ++n) static_cast<void>(grow(near_, mark::near));
     return nearest_;
   }
 
@@ -113,10 +117,10 @@ class cell_floods {
     if (m == mark::none) m = space_.is_free(k) ? mark::free : mark::blocked;
     return m != mark::blocked;
   }
-  /// @pre in the space and free
-  void begin(const key& k, mark which) {
+  /// The same as `add`. @pre in the space and free
+  bool begin(const key& k, mark which) {
     if (mark_of(k) <= mark::free) mark_of(k) = mark::free;
-    add(k, which);
+    return add(k, which);
   }
   /// Puts a cell into a flood, if it is in none. True if it is in the other one.
   bool add(const key& k, mark which) {
@@ -124,15 +128,22 @@ class cell_floods {
     mark& m = mark_of(k);
     if (m != mark::free) return m != which;
     m = which;
-    const vec3 p = space_.center(k);
-    if (which == mark::near) {
-      const double away = (p - goal_).squaredNorm();
-      if (away < nearest_away_) nearest_away_ = away, nearest_ = k;
-    }
-    auto& flood = which == mark::near ? near_ : far_;
-    flood.push_back({(p - (which == mark::near ? goal_ : start_)).squaredNorm(), k});
-    std::push_heap(flood.begin(), flood.end());
+    if (which == mark::near)
+      look_at(k);
+    else
+      seen_far_.push_back(k);
+    push(k, which);
     return false;
+  }
+  void push(const key& k, mark which) {
+    auto& flood = which == mark::near ? near_ : far_;
+    flood.push_back({(space_.center(k) - (which == mark::near ? goal_ : start_)).squaredNorm(), k});
+    std::push_heap(flood.begin(), flood.end());
+  }
+  /// A cell that hangs together with the start.
+  void look_at(const key& k) {
+    if (const double away = (space_.center(k) - goal_).squaredNorm(); away < nearest_away_)
+      nearest_away_ = away, nearest_ = k;
   }
   /// One more cell's neighbours. True if that is where the floods meet. @pre not empty
   bool grow(std::vector<entry>& flood, mark which) {
@@ -165,8 +176,8 @@ class cell_floods {
 
   const Space& space_;
   vec3 start_, goal_;
-  std::size_t max_cells_;
   std::vector<entry> near_{}, far_{};  ///< cells of each flood whose neighbours have not been looked at
+  std::vector<key> seen_far_{};        ///< all of the other flood
   std::deque<std::array<mark, std::size_t{1} << brick_bits>> bricks_{};
   hash_index index_{};
   std::uint64_t last_name_ = ~std::uint64_t{0};

@@ -110,12 +110,6 @@ class voxel_search {
     }
     return search_end::exhausted;
   }
-  /// Whether one of the doors of `p` is among the cells that were looked at: after all that can be reached was, whether
-  /// a way leads there. @pre `p` lies in the space
-  [[nodiscard]] bool has_reached(const vec3& p) {
-    const std::vector<key> ways_in = doors(p);
-    return std::any_of(ways_in.begin(), ways_in.end(), [&](const key& k) { return at(number_of(k)).is_closed; });
-  }
   [[nodiscard]] std::size_t expanded() const noexcept { return expanded_; }
   /// What the way that was found costs.
   [[nodiscard]] double cost() const noexcept { return ends_[1].cost; }
