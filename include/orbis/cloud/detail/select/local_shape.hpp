@@ -66,7 +66,7 @@ struct smallest_of_columns {
 template <execution_policy Policy>
 [[nodiscard]] std::vector<float> smoothed_over_neighbors(const Policy& policy, const neighbor_graph& graph,
                                                          std::vector<float> values, int rounds = 4) {
-  constexpr float inf = std::numeric_limits<float>::infinity();  // of what does not count
+  static constexpr float inf = std::numeric_limits<float>::infinity();  // of what does not count
   constexpr std::size_t neighbors = smallest_of_columns::most_rows, columns = smallest_of_columns::columns;
   const auto rank_of = [](std::size_t count) {
     return static_cast<std::size_t>(0.35 * static_cast<double>(count - 1) + 0.5);
