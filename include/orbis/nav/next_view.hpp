@@ -183,7 +183,7 @@ template <planning_map Map, robot_shape Shape, camera::camera_model Camera>
     const vec3 goal = c.view.T_world_camera.translation();
     how.max_expanded = left / 2;
     const bool is_straight = how.shorten && view.is_uniform() && view.is_free(position, goal);
-    if (!is_straight && !floods.may_reach(doors.doors(goal), how.max_expanded)) continue;
+    if (!is_straight && !floods.may_reach_any(doors.doors(goal), how.max_expanded)) continue;
     c.view.path = find_path(view, position, goal, how);
     if (c.view.path.status != path_status::found) left -= std::min(left, c.view.path.expanded);
     if (c.view.path.status == path_status::gave_up && best.status != next_view_status::found)

@@ -184,7 +184,7 @@ template <planning_space Space>
   search_end end = search.run(start, goal, exits, exits.empty() ? 0 : soon);
   if (!exits.empty() && (end != search_end::stopped || soon == most)) return ended(search, end);
   cell_floods floods{space, start, search.doors(start), goal};
-  if (!exits.empty() && floods.may_reach(exits, most)) return ended(search, search.go_on(most));
+  if (!exits.empty() && floods.may_reach_any(exits, most)) return ended(search, search.go_on(most));
   out.expanded += search.expanded();
   if (const auto nearest = floods.nearest(most)) {
     auto to_nearest = make_search();

@@ -24,13 +24,13 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
-#include <deque>
 #include <limits>
 #include <optional>
 #include <span>
 #include <vector>
 
 #include <orbis/core/cow_pages.hpp>
+#include <orbis/nav/detail/field/block_vector.hpp>
 #include <orbis/nav/detail/field/brick_directory.hpp>
 #include <orbis/nav/detail/field/slice_kernels.hpp>
 #include <orbis/octree/key.hpp>
@@ -244,7 +244,7 @@ class squared_distances : public squared_distance_view {
   void make_space(std::uint32_t brick, unsigned slices);
 
   detail::slice_kernels kernels_;
-  std::deque<stages> stages_;  ///< by brick
+  detail::block_vector<stages> stages_;  ///< by brick
   int bricks_in_reach_;
   int squares_pad_;
   std::vector<std::uint16_t> squares_;
@@ -255,7 +255,7 @@ class squared_distances : public squared_distance_view {
   std::vector<std::uint32_t> line_;
   std::vector<std::uint8_t> line_bits_, left_, right_;
   std::vector<along_change> along_;
-  std::deque<kept_plane> kept_;
+  detail::block_vector<kept_plane> kept_;
   std::size_t used_kept_ = 0;
   std::vector<std::uint32_t> stale_plane_, stale_space_;
   std::vector<std::uint32_t> needless_;  ///< bricks that may be as elsewhere

@@ -162,8 +162,7 @@ ORBIS_COMPILED_ONCE void squared_distances::remove(std::uint32_t brick) {
 }
 
 ORBIS_COMPILED_ONCE std::size_t squared_distances::buffer_bytes() const noexcept {
-  return kept_.size() * sizeof(kept_plane) + rows_.capacity() * sizeof(std::uint64_t) +
-         along_.capacity() * sizeof(along_change) +
+  return kept_.memory_bytes() + rows_.capacity() * sizeof(std::uint64_t) + along_.capacity() * sizeof(along_change) +
          (stale_plane_.capacity() + stale_space_.capacity() + needless_.capacity() + line_.capacity()) *
              sizeof(std::uint32_t) +
          line_bits_.capacity() + left_.capacity() + right_.capacity();
@@ -534,7 +533,7 @@ ORBIS_COMPILED_ONCE std::optional<octree::voxel_key> squared_distances::nearest(
 }
 
 ORBIS_COMPILED_ONCE std::size_t squared_distances::memory_bytes() const noexcept {
-  return directory_.memory_bytes() + values_.memory_bytes() + places_.memory_bytes() + stages_.size() * sizeof(stages) +
+  return directory_.memory_bytes() + values_.memory_bytes() + places_.memory_bytes() + stages_.memory_bytes() +
          squares_.capacity() * sizeof(std::uint16_t) + buffer_bytes();
 }
 

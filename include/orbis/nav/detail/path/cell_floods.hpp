@@ -8,8 +8,8 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <deque>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -37,24 +37,26 @@ class cell_floods {
     for (const key& k : doors) begin(k, mark::near);
   }
 
-  /// Whether one of `cells`, which are free, hangs together with the start; true also if that is not known after each
-  /// flood has looked at `max_cells`. What was found out before is not looked at again.
-  [[nodiscard]] bool may_reach(const std::vector<key>& cells, std::size_t max_cells) {
+  /// Whether `k`, which is free, hangs together with the start; true also if that is not known after each flood has
+  /// looked at `max_cells`. What was found out before is not looked at again.
+  [[nodiscard]] bool may_reach(const key& k, std::size_t max_cells) {
     far_.clear();
     seen_far_.clear();
-    bool is_met = false;
-    for (const key& k : cells) is_met = begin(k, mark::far) || is_met;
-    std::size_t n = 0;
-    for (; !is_met && n != max_cells && !far_.empty() && !near_.empty(); ++n)
+    bool is_met = begin(k, mark::far);
+    for (std::size_t n = 0; !is_met && n != max_cells && !far_.empty() && !near_.empty(); ++n)
       is_met = grow(far_, mark::far) || grow(near_, mark::near);
     if (is_met) {
       for (const entry& e : far_) push(e.cell, mark::near);
-      for (const key& k : seen_far_) mark_of(k) = mark::near, look_at(k);
+      for (const key& seen : seen_far_) mark_of(seen) = mark::near, look_at(seen);
       return true;
     }
     if (far_.empty() || near_.empty()) return false;
-    for (const key& k : seen_far_) mark_of(k) = mark::free;
+    for (const key& seen : seen_far_) mark_of(seen) = mark::free;
     return true;
+  }
+  /// Whether one of them does.
+  [[nodiscard]] bool may_reach_any(const std::vector<key>& cells, std::size_t max_cells) {
+    return std::any_of(cells.begin(), cells.end(), [&](const key& k) { return may_reach(k, max_cells); });
   }
   /// The cell nearest to the goal that hangs together with the start, as far as a flood of `max_cells` finds it;
   /// nothing without doors. O(cells around the goal that are nearer, or that are enclosed with one of these), or
@@ -78,7 +80,7 @@ class cell_floods {
       const double seen = (static_cast<double>(r) + 0.499) * space_.resolution();
       for (; !open.empty() && open.front().first <= seen * seen; open.pop_back()) {
         const key k = open.front().second;
-        if (mark_of(k) == mark::near || (mark_of(k) != mark::far && may_reach({k}, max_cells))) return k;
+        if (mark_of(k) == mark::near || (mark_of(k) != mark::far && may_reach(k, max_cells))) return k;
         if (near_.empty()) return nearest_;
         std::pop_heap(open.begin(), open.end(), is_later);
       }
@@ -96,6 +98,7 @@ class cell_floods {
   };
   static constexpr bool is_flat = Space::dimensions == 2;
   static constexpr std::uint32_t brick_bits = is_flat ? 6 : 9;
+  using brick = std::array<mark, std::size_t{1} << brick_bits>;
 
   [[nodiscard]] mark& mark_of(const key& k) {
     const std::uint64_t name = octree::morton_code(k) >> 9U;
@@ -104,10 +107,10 @@ class cell_floods {
       if (i == hash_index::none) {
         i = static_cast<std::uint32_t>(bricks_.size());
         index_.set(name, i);
-        bricks_.emplace_back();
+        bricks_.push_back(std::make_unique<brick>());
       }
       last_name_ = name;
-      last_brick_ = &bricks_[i];
+      last_brick_ = bricks_[i].get();
     }
     return (*last_brick_)[(is_flat ? 0U : (k.z & 7U) << 6U) | (k.y & 7U) << 3U | (k.x & 7U)];
   }
@@ -178,10 +181,10 @@ class cell_floods {
   vec3 start_, goal_;
   std::vector<entry> near_{}, far_{};  ///< cells of each flood whose neighbours have not been looked at
   std::vector<key> seen_far_{};        ///< all of the other flood
-  std::deque<std::array<mark, std::size_t{1} << brick_bits>> bricks_{};
+  std::vector<std::unique_ptr<brick>> bricks_{};
   hash_index index_{};
   std::uint64_t last_name_ = ~std::uint64_t{0};
-  std::array<mark, std::size_t{1} << brick_bits>* last_brick_ = nullptr;
+  brick* last_brick_ = nullptr;
   std::optional<key> nearest_{};  ///< to the goal, in the start's flood
   double nearest_away_ = std::numeric_limits<double>::infinity();
 };

@@ -9,8 +9,8 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <deque>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -179,7 +179,7 @@ class voxel_search {
       if (last_brick_ == hash_index::none) {
         last_brick_ = static_cast<std::uint32_t>(bricks_.size());
         index_.set(name, last_brick_);
-        bricks_.emplace_back();
+        bricks_.push_back(std::make_unique<brick>());
         corners_.push_back(octree::node_key(k, 3));
       }
     }
@@ -191,7 +191,7 @@ class voxel_search {
   }
   [[nodiscard]] node& at(std::uint32_t number) {
     if (number >= from) return ends_[number - from];
-    return bricks_[number >> brick_bits][number & ((1U << brick_bits) - 1)];
+    return (*bricks_[number >> brick_bits])[number & ((1U << brick_bits) - 1)];
   }
   [[nodiscard]] vec3 position(std::uint32_t number) const {
     return number >= from ? places_[number - from] : space_.center(key_of(number));
@@ -350,7 +350,7 @@ class voxel_search {
   std::vector<double> exit_costs_;
   std::array<node, 2> ends_{};
   std::vector<entry> open_;
-  std::deque<brick> bricks_;
+  std::vector<std::unique_ptr<brick>> bricks_;
   std::vector<key> corners_;
   hash_index index_;
   std::uint64_t last_name_ = ~std::uint64_t{0};
