@@ -12,6 +12,7 @@
 /// | `presets.hpp, settings.hpp` | the cameras of the usual recordings; what `camera.toml` says |
 /// | `depth.hpp, rgbd_frame.hpp` | depth images; a colour image with its depth image |
 /// | `rays.hpp, world_point.hpp, cloud.hpp` | rays of pixels; points of pixels in the world; points of a depth image |
+/// | `shutter.hpp` | when the rows of the images are taken |
 /// | `undistort.hpp` | images without distortion |
 /// | `project_lanes.hpp` | eight points at a time, for adjustments; to be included by itself |
 #pragma once
@@ -29,5 +30,6 @@
 #include <orbis/camera/rays.hpp>
 #include <orbis/camera/rgbd_frame.hpp>
 #include <orbis/camera/settings.hpp>
+#include <orbis/camera/shutter.hpp>
 #include <orbis/camera/undistort.hpp>
 #include <orbis/camera/world_point.hpp>

@@ -208,3 +208,42 @@ TEST_CASE("depths are mostly those of a room") {
   CHECK(valid / all < 0.999);
   CHECK(near / all > 0.85);
 }
+
+TEST_CASE("Each row of a rolling shutter shows what is there to see at its time") {
+  io::synthetic_options o{.frames = 102, .seed = 4, .width = 160, .height = 120, .frames_around = 400};
+  o.sensor = io::synthetic_sensor_options::ideal();
+  o.path.jitter = 5.0;
+  const synthetic_recording global{o};
+  o.sensor.shutter = {.color_read_out = 0.03, .depth_read_out = 0.02, .depth_delay = 0.01};
+  const synthetic_recording rolling{o};
+  const camera::rgbd_frame f = rolling.frame(100).value();
+  CHECK((f.T_world_camera->translation() - global.T_world_camera(100).translation()).norm() == 0.0);
+  const double depth_unit = 1.0 / o.depth_scale;
+  const auto model = rolling.camera().model;
+  const auto motion = [&](std::size_t i) {  // per second, around frame i
+    return vec6((global.T_world_camera(i - 1).inverse() * global.T_world_camera(i + 1)).log() * (0.5 * o.fps));
+  };
+  // The middle of the depth image is 10 ms late: the camera is there then, and a row's time after that.
+  std::size_t closer = 0, all = 0;
+  const auto distance = [&](int x, int y, double time) {
+    const se3 T_world_row = *f.T_world_camera * se3::exp(time * motion(100));
+    return global.surface_distance(T_world_row * vec3(f.depth(x, y) * depth_unit * *model.unproject(vec2(x, y))));
+  };
+  for (int y = 0; y < 120; y += 7)
+    for (int x = 0; x < 160; x += 7) {
+      const double in_time = distance(x, y, rolling.options().sensor.shutter.depth_time(y, 120));
+      CHECK(in_time < 0.002);
+      closer += in_time < distance(x, y, 0.0) - depth_unit;
+      ++all;
+    }
+  CHECK(closer > all / 2);
+  // Rows in the middle of the colour image are those of the global shutter, and the first ones are not.
+  const image<rgb8> color = global.frame(100).value().color;
+  const auto differs = [&](int y) {
+    int sum = 0;
+    for (int x = 0; x != 160; ++x) sum += std::abs(color(x, y).g - f.color(x, y).g);
+    return sum;
+  };
+  CHECK(differs(59) + differs(60) < 320);
+  CHECK(differs(0) + differs(119) > 4 * (differs(59) + differs(60)));
+}

@@ -7,6 +7,8 @@
 #include <vector>
 
 #include <orbis/eval/ate.hpp>
+#include <orbis/eval/rpe.hpp>
+#include <orbis/io/synthetic.hpp>
 #include <orbis/slam/validate.hpp>
 
 #include "slam/tested_system.hpp"
@@ -192,4 +194,32 @@ TEST_CASE("Walls that all look the same, and walls with little on them, are told
   CHECK(seen.counters.lost == 0);
   CHECK(seen.ate < 0.02);
   CHECK(seen.end < 0.02);
+}
+
+TEST_CASE("A rolling shutter costs little where it is known, and much where it is not") {
+  io::synthetic_options o{.frames = 120, .fps = 30.0, .seed = 3, .width = 320, .height = 240, .frames_around = 400};
+  o.path.jitter = 5.0;
+  o.sensor = io::synthetic_sensor_options::ideal();
+  const auto error_of = [&](const camera::shutter& is, const camera::shutter& known) {
+    o.sensor.shutter = is;
+    const io::synthetic_recording frames{o};
+    slam::options settings;
+    settings.initial_pose = frames.T_world_camera(0);
+    settings.shutter = known;
+    test::slam_system slam{frames.camera().model, settings};
+    std::vector<slam::track_state> states;
+    for (std::size_t i = 0; i != frames.size(); ++i) states.push_back(slam.track(frames.frame(i).value()).state);
+    const outcome seen = judge(slam, frames, std::move(states));
+    CHECK(seen.counters.lost == 0);
+    return eval::rpe(slam.trajectory(), frames.ground_truth())->translation.rmse;  // from frame to frame
+  };
+  const camera::shutter rolling{.color_read_out = 0.03, .depth_read_out = 0.03};
+  const double global = error_of({}, {}), modelled = error_of(rolling, rolling), ignored = error_of(rolling, {});
+  CAPTURE(global, modelled, ignored);
+  CHECK(modelled < 1.6 * global);
+  CHECK(ignored > 2.5 * modelled);
+  const camera::shutter late{.color_read_out = 0.03, .depth_read_out = 0.03, .depth_delay = 0.015};
+  const double followed = error_of(late, late), missed = error_of(late, rolling);
+  CAPTURE(followed, missed);
+  CHECK(followed < 0.85 * missed);
 }

@@ -5,6 +5,8 @@
 
 #include <cstdint>
 
+#include <orbis/camera/shutter.hpp>
+
 namespace orbis::io {
 
 /// The room that is recorded.
@@ -60,6 +62,9 @@ struct synthetic_sensor_options {
   double exposure_jumps = 0.0;  ///< largest relative change of brightness; a new level every second or so
   int motion_blur = 1;          ///< pictures averaged over the exposure time; 1: none
   double exposure = 0.015;      ///< seconds; for motion blur
+
+  /// When the rows of an image are taken; a frame has the pose and the time of its colour image's middle.
+  camera::shutter shutter{};
 
   /// A camera that sees the truth: only the rounding to whole depth units is left.
   [[nodiscard]] static synthetic_sensor_options ideal() noexcept {

@@ -15,6 +15,14 @@
 
 namespace orbis::slam {
 
+/// A keypoint where a rolling shutter read it, at the time of its row.
+struct keypoint_as_read {
+  double ray_x = 0.0, ray_y = 0.0;  ///< of the ray through it, scaled to z = 1; NaN where the pixel has none
+  float x = 0.0F, y = 0.0F;         ///< pixels
+  float depth = 0.0F;               ///< at the time of the row, metres, 0 where it is not known
+  float stored_depth = 0.0F;        ///< that of the depth image at the keypoint, metres, 0 where it was not measured
+};
+
 /// An image as features of descriptor type `D`. All vectors have one entry for each keypoint.
 template <feature_descriptor D>
 struct basic_frame {
@@ -28,6 +36,10 @@ struct basic_frame {
   std::vector<vec3> rays;               ///< through each keypoint, scaled to z = 1; NaN where the pixel has no ray
   std::vector<landmark_id> landmarks;   ///< observed by each keypoint, or `no_id`
   orbis::features::keypoint_grid grid;  ///< of the keypoints
+  /// With a rolling shutter the keypoints as they were read; the other members hold where they are at the frame's time.
+  /// Empty with a global shutter.
+  std::vector<keypoint_as_read> as_read;
+  vec6 twist = vec6::Zero();  ///< of the camera in its own frame while it was read, per second, translation first
 
   /// The number of features.
   [[nodiscard]] std::size_t size() const noexcept { return features.size(); }

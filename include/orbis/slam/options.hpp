@@ -9,6 +9,7 @@
 #include <numbers>
 #include <optional>
 
+#include <orbis/camera/shutter.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/features/orb.hpp>
 
@@ -157,6 +158,7 @@ struct options {
   double motion_radius = 15.0;          ///< of the search around the last frame's points, pixels of a keypoint's level
   double search_radius = 4.0;           ///< of the search for landmarks around a refined pose, likewise
   std::size_t local_keyframes = 40;     ///< whose landmarks are searched for in a frame, at most
+  camera::shutter shutter{};            ///< when the rows of the images are taken; the default is a global shutter
   keyframe_options keyframes{};
   adjustment_options adjustment{};
   culling_options culling{};

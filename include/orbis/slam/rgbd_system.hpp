@@ -170,7 +170,8 @@ class rgbd_system {
   template <class... Images>
   [[nodiscard]] frame_type measure(double timestamp, const Images&... images) const;
   /// Localises a frame and makes a keyframe of it if that is due. `lap`: notes the time of localisation.
-  std::optional<map_keyframe> localize(frame_type f, track_result& result, detail::stopwatch& clock);
+  std::optional<map_keyframe> localize(frame_type f, const std::function<void(frame_type&, const vec6&)>& follow_rows,
+                                       track_result& result, detail::stopwatch& clock);
   /// Passes a new keyframe to the callbacks and the back end.
   void dispatch_keyframe(map_keyframe k);
   /// Fills in the result of a frame, and reports a change of state.
@@ -233,7 +234,11 @@ track_result ORBIS_SLAM_SYSTEM::track_images(double timestamp, const Images&... 
   frame_type f = measure(timestamp, images...);
   clock.lap(result.timings.features_ms);
   if (options_.threads.wait) back_end_.wait_for_room();
-  const std::optional<map_keyframe> made = localize(std::move(f), result, clock);
+  const auto follow_rows = [&](frame_type& seen, const vec6& twist) {
+    if constexpr (follows_rows<Sensor, descriptor_type, Camera, Images...>)
+      Sensor::follow_rows(shared_.rig, {front_end_.shutter(), twist}, seen, images...);
+  };
+  const std::optional<map_keyframe> made = localize(std::move(f), std::cref(follow_rows), result, clock);
   if (made) dispatch_keyframe(*made);
   report(result, made);
   clock.lap(result.timings.mapping_ms);
@@ -249,14 +254,19 @@ auto ORBIS_SLAM_SYSTEM::measure(double timestamp, const Images&... images) const
     return image.width() == camera().width() && image.height() == camera().height();
   };
   const bool timed = std::isfinite(timestamp);
-  if (timed && (fits(images) && ...)) f = Sensor::measure(shared_.rig, extract_, images...);
+  if (timed && (fits(images) && ...)) {
+    f = Sensor::measure(shared_.rig, extract_, images...);
+    if (!front_end_.shutter().is_global()) detail::keep_as_read(f);
+  }
   f.timestamp = timed ? timestamp : front_end_.last_timestamp();
   f.index = front_end_.counters().frames;
   return f;
 }
 
 ORBIS_SLAM_SYSTEM_TEMPLATE
-std::optional<map_keyframe> ORBIS_SLAM_SYSTEM::localize(frame_type f, track_result& result, detail::stopwatch& clock) {
+std::optional<map_keyframe> ORBIS_SLAM_SYSTEM::localize(
+    frame_type f, const std::function<void(frame_type&, const vec6&)>& follow_rows, track_result& result,
+    detail::stopwatch& clock) {
   const auto lock = shared_.lock();
   atlas_type& maps = shared_.atlas;
   const bool is_frozen = localization_only_;
@@ -267,7 +277,7 @@ std::optional<map_keyframe> ORBIS_SLAM_SYSTEM::localize(frame_type f, track_resu
     if (const auto edit = shared_.try_edit()) shared_.remove_map(m);
   };
   front_end_.sync_with_map(maps);
-  result.inliers = front_end_.localize(f, maps, is_frozen, similar, drop);
+  result.inliers = front_end_.localize(f, maps, is_frozen, follow_rows, similar, drop);
   clock.lap(result.timings.tracking_ms);
   std::optional<map_keyframe> made;
   if (result.inliers > 0) {

@@ -3,6 +3,7 @@
 /// Sensors: what a frame measures for each feature, and when a map can begin.
 #pragma once
 
+#include <cmath>
 #include <concepts>
 #include <cstddef>
 #include <limits>
@@ -10,9 +11,12 @@
 
 #include <orbis/camera/depth.hpp>
 #include <orbis/camera/model.hpp>
+#include <orbis/camera/shutter.hpp>
 #include <orbis/core/image.hpp>
+#include <orbis/core/types.hpp>
 #include <orbis/features/depth.hpp>
 #include <orbis/slam/camera_rig.hpp>
+#include <orbis/slam/detail/shutter/row_times.hpp>
 #include <orbis/slam/extractor.hpp>
 #include <orbis/slam/frame.hpp>
 #include <orbis/slam/options.hpp>
@@ -34,6 +38,20 @@ concept measures = requires(const camera_rig<Camera>& rig, const Extractor& extr
   { S::measure(rig, extract, images...) } -> std::same_as<basic_frame<descriptor_of_t<Extractor>>>;
 };
 
+/// How the camera moves while a frame is taken.
+struct frame_motion {
+  camera::shutter shutter{};  ///< the delay of the depth image is that of this frame
+  vec6 twist = vec6::Zero();  ///< of the camera in its own frame, per second, translation first
+};
+
+/// Whether a sensor brings what it measures to the times of a rolling shutter's rows, once the motion is known:
+/// `S::follow_rows(rig, motion, frame, images...)` sets `depth` of `frame.as_read`.
+template <class S, class D, class Camera, class... Images>
+concept follows_rows = requires(const camera_rig<Camera>& rig, const frame_motion& m, basic_frame<D>& f,
+                                const Images&... images) {
+  S::follow_rows(rig, m, f, images...);
+};
+
 /// A colour image with a registered depth image. The first frame with enough depth begins a map.
 struct rgbd {
   /// Extracts features and reads their depth. Depth outside of the rig's range is not used. @pre all images have the
@@ -43,6 +61,12 @@ struct rgbd {
                                                                        const Extractor& extract,
                                                                        image_view<const rgb8> color,
                                                                        const Depth& depth);
+
+  /// The depth that each keypoint's row of the colour image would have measured at its own time: it is read where the
+  /// camera, which moves on, sees the same point in the depth image. @pre all images have the size of the camera
+  template <camera::camera_model Camera, feature_descriptor D, camera::depth_source Depth>
+  static void follow_rows(const camera_rig<Camera>& rig, const frame_motion& m, basic_frame<D>& f,
+                          image_view<const rgb8> color, const Depth& depth);
 
   /// The number of features with depth, if there are `settings.min_start_points` or more, otherwise 0.
   template <feature_descriptor D>
@@ -72,6 +96,26 @@ basic_frame<descriptor_of_t<Extractor>> rgbd::measure(const camera_rig<Camera>& 
   }
   f.grid = features::keypoint_grid(f.features.keypoints);
   return f;
+}
+
+template <camera::camera_model Camera, feature_descriptor D, camera::depth_source Depth>
+void rgbd::follow_rows(const camera_rig<Camera>& rig, const frame_motion& m, basic_frame<D>& f, image_view<const rgb8>,
+                       const Depth& depth) {
+  for (keypoint_as_read& k : f.as_read) {
+    const double v = static_cast<double>(k.y);
+    const double later = m.shutter.depth_time(v, depth.height()) - m.shutter.color_time(v, depth.height());
+    if (later == 0.0 || !(k.stored_depth > 0.0F)) continue;
+    const auto stored = static_cast<double>(k.stored_depth);
+    const vec3 there = detail::moved_by(m.twist, -later, stored * vec3(k.ray_x, k.ray_y, 1.0));
+    const auto pixel = there.z() > 0.0 ? rig.camera().project(there) : std::nullopt;
+    const auto read = pixel ? features::depth_at(depth, static_cast<float>(pixel->x()), static_cast<float>(pixel->y()))
+                            : std::nullopt;
+    // Where the two readings lie on different surfaces, neither can be trusted.
+    constexpr double same_surface = 0.1;
+    const double change = read ? read->z - there.z() : 0.0, z = stored + change;
+    const bool usable = read && std::abs(change) < same_surface * stored && z >= rig.min_depth && z <= rig.max_depth;
+    k.depth = usable ? static_cast<float>(z) : 0.0F;
+  }
 }
 
 }  // namespace orbis::slam

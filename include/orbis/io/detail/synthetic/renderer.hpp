@@ -51,8 +51,12 @@ class renderer {
 
   /// Renders the pixels of one row of tiles into `out`, whose images have the camera's size.
   void render_tile_row(int row, exact_view& out) const {
+    render_rows(row * tile, std::min(row * tile + tile, k_.height), out);
+  }
+
+  /// Renders the pixels of the rows from `y0` to before `y1`.
+  void render_rows(int y0, int y1, exact_view& out) const {
     std::vector<const candidate*> band, near;
-    const int y0 = row * tile, y1 = std::min(y0 + tile, k_.height);
     const double top = (y0 - 0.5 - k_.cy) / k_.fy, bottom = (y1 - 0.5 - k_.cy) / k_.fy;
     // The planes through the camera's centre that bound the band, pointing inward.
     const triple below_top = pose_.down - top * pose_.forward;

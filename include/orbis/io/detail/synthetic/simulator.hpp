@@ -56,17 +56,36 @@ class simulator {
     return out;
   }
 
+  /// The same with row `y` of the image `row_time(y)` seconds after `time`, where `at(time)` is the `moment` of any
+  /// time.
+  template <execution_policy Policy, class At, class RowTime>
+  [[nodiscard]] exact_view exact_rows(const Policy& policy, const At& at, double time, const RowTime& row_time) const {
+    exact_view out{image<rgb8>(k_.width, k_.height), image<float>(k_.width, k_.height),
+                   image<float>(k_.width, k_.height)};
+    for_each_index(policy, static_cast<std::size_t>(k_.height), renderer::tile, [&](std::size_t row) {
+      const int y = static_cast<int>(row);
+      const moment m = at(time + row_time(y));
+      renderer{m.solids, *textures_, m.pose, k_}.render_rows(y, y + 1, out);
+    });
+    return out;
+  }
+
   /// What the sensor sees at `time`, where `at(time)` is the `moment` of any time. `key`: another one for each frame.
   template <execution_policy Policy, class At>
   [[nodiscard]] camera::rgbd_frame frame(const Policy& policy, const At& at, double time, std::uint64_t key) const {
-    const moment now = at(time);
-    exact_view seen = exact(policy, now);
+    exact_view seen = color_view(policy, at, time);
     if (sensor_.motion_blur > 1) blur(policy, at, time, seen.color);
+    if (!depth_is_simultaneous()) {
+      exact_view surface =
+          exact_rows(policy, at, time, [&](int y) { return sensor_.shutter.depth_time(y, k_.height); });
+      seen.depth = std::move(surface.depth);
+      seen.cosine = std::move(surface.cosine);
+    }
 
     camera::rgbd_frame f;
     f.timestamp = time;
     f.depth_scale = depth_scale_;
-    f.T_world_camera = now.pose.T_world_camera();
+    f.T_world_camera = at(time).pose.T_world_camera();
     f.depth = image<std::uint16_t>(k_.width, k_.height);
     const sensor errors{sensor_, k_.fx, depth_scale_, seed_, key};
     const double gain = exposure_gain(sensor_, seed_, time);
@@ -80,13 +99,24 @@ class simulator {
   }
 
  private:
+  [[nodiscard]] bool depth_is_simultaneous() const noexcept {
+    return sensor_.shutter.depth_delay == 0.0 && sensor_.shutter.depth_read_out == sensor_.shutter.color_read_out;
+  }
+
+  /// What there is to see while the colour image is read out around `time`.
+  template <execution_policy Policy, class At>
+  [[nodiscard]] exact_view color_view(const Policy& policy, const At& at, double time) const {
+    if (sensor_.shutter.color_read_out == 0.0) return exact(policy, at(time));
+    return exact_rows(policy, at, time, [&](int y) { return sensor_.shutter.color_time(y, k_.height); });
+  }
+
   /// Averages pictures spread evenly over the exposure time, which is centred on `time`.
   template <execution_policy Policy, class At>
   void blur(const Policy& policy, const At& at, double time, image<rgb8>& color) const {
     const int count = sensor_.motion_blur;
     std::vector<std::uint32_t> sums(3 * color.pixels().size());
     for (int k = 0; k != count; ++k) {
-      const exact_view part = exact(policy, at(time + sensor_.exposure * ((k + 0.5) / count - 0.5)));
+      const exact_view part = color_view(policy, at, time + sensor_.exposure * ((k + 0.5) / count - 0.5));
       for (std::size_t i = 0; i != color.pixels().size(); ++i) {
         const rgb8 c = part.color.pixels()[i];
         sums[3 * i] += c.r;

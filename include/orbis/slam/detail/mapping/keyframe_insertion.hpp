@@ -34,6 +34,7 @@ template <feature_descriptor D>
 /// id.
 template <feature_descriptor D>
 keyframe_id insert_keyframe(basic_map<D>& m, basic_frame<D> f, const options& o) {
+  f.as_read = {};  // nothing in the map looks at rows
   const keyframe_id id = m.add_keyframe(std::move(f));
   for (const landmark_id l : m.at(id).landmarks)
     if (l != no_id) m.update_landmark(l);

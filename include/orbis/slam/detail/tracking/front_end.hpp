@@ -15,6 +15,8 @@
 #include <orbis/slam/camera_rig.hpp>
 #include <orbis/slam/detail/map/local_map.hpp>
 #include <orbis/slam/detail/mapping/keyframe_insertion.hpp>
+#include <orbis/slam/detail/shutter/motion_refinement.hpp>
+#include <orbis/slam/detail/shutter/row_times.hpp>
 #include <orbis/slam/detail/tracking/frame_log.hpp>
 #include <orbis/slam/detail/tracking/keyframe_decision.hpp>
 #include <orbis/slam/detail/tracking/motion_model.hpp>
@@ -38,7 +40,11 @@ class front_end {
   using frame_type = basic_frame<D>;
   using atlas_type = basic_atlas<D>;
 
-  front_end(const camera_rig<Camera>& rig, const options& settings) : tracker_{rig, settings}, options_{settings} {}
+  front_end(const camera_rig<Camera>& rig, const options& settings)
+      : tracker_{rig, settings}, rig_{rig}, options_{settings} {}
+
+  /// When the rows of the images are taken.
+  [[nodiscard]] const camera::shutter& shutter() const noexcept { return options_.shutter; }
 
   [[nodiscard]] track_state state() const noexcept { return state_; }
   [[nodiscard]] bool is_tracking() const noexcept {
@@ -69,10 +75,12 @@ class front_end {
 
   /// Estimates the pose of a frame and sets `state()`. Returns the number of landmarks that agree with the pose (of
   /// points with depth, if the frame begins a map), 0 if it has none. `is_frozen`: nothing is changed in the maps, and
-  /// no map is begun. `similar(features, count)`: the keyframes with the most similar appearance, as ids; `drop(map)`:
-  /// called for a map that is left behind with few keyframes.
-  template <class Similar, class Drop>
-  std::size_t localize(frame_type& f, atlas_type& maps, bool is_frozen, Similar&& similar, Drop&& drop);
+  /// no map is begun. `follow_rows(frame, twist)`: sets what the sensor measures for the rows of a rolling shutter
+  /// (`as_read`), given the motion. `similar(features, count)`: the keyframes with the most similar appearance, as ids;
+  /// `drop(map)`: called for a map that is left behind with few keyframes.
+  template <class FollowRows, class Similar, class Drop>
+  std::size_t localize(frame_type& f, atlas_type& maps, bool is_frozen, FollowRows&& follow_rows, Similar&& similar,
+                       Drop&& drop);
 
   /// Makes the keyframe that shares most landmarks with the frame the reference.
   void update_reference(const frame_type& f, const atlas_type& maps) {
@@ -103,18 +111,31 @@ class front_end {
   template <class Drop>
   std::size_t begin_new_map(frame_type& f, atlas_type& maps, Drop&& drop);
   /// From the last frame, otherwise from the reference keyframe; refined on the local map.
-  std::size_t track_from_last(frame_type& f, atlas_type& maps, bool is_frozen);
+  template <class FollowRows>
+  std::size_t track_from_last(frame_type& f, atlas_type& maps, bool is_frozen, FollowRows&& follow_rows);
   /// From the reference and the keyframes with similar appearance, in any map.
-  template <class Similar>
-  std::size_t relocalize(frame_type& f, atlas_type& maps, bool is_frozen, Similar&& similar);
+  template <class FollowRows, class Similar>
+  std::size_t relocalize(frame_type& f, atlas_type& maps, bool is_frozen, FollowRows&& follow_rows, Similar&& similar);
   std::size_t track_local_map(frame_type& f, basic_map<D>& m, double radius, bool is_frozen) {
     return tracker_.on_local_map(
         f, m, reference_.keyframe, radius, [&](landmark_id l) { is_frozen ? void() : m.count_visible(l); },
         [&](landmark_id l) { is_frozen ? void() : m.count_found(l); });
   }
 
+  /// With a rolling shutter, moves the keypoints of a frame to its time, by the motion since the last frame to its
+  /// present pose.
+  void move_keypoints(frame_type& f) const {
+    if (!f.as_read.empty()) move_to_frame_time(f, rig_, shutter(), motion_between(last_, f));
+  }
+  /// With a rolling shutter, refines pose and twist of a frame by the landmarks that it observes, and moves its
+  /// keypoints accordingly. `is_next`: the frame follows the last one.
+  template <class FollowRows>
+  void refine_motion(frame_type& f, const basic_map<D>& m, bool is_next, FollowRows&& follow_rows);
+
   tracker<Camera, D, Matchers> tracker_;
+  const camera_rig<Camera>& rig_;
   const options& options_;
+  std::vector<row_observation> rows_;  ///< its memory is used again
 
   track_state state_ = track_state::not_started;
   std::optional<double> lost_since_;  ///< time stamp; empty: since the next frame
@@ -143,7 +164,9 @@ tracked_frame front_end<Camera, D, Matchers, Sensor>::last_frame() const {
   for (std::size_t i = 0; i != last_.size(); ++i) {
     const landmark_id l = last_.landmarks[i];
     const auto& at = last_.features.keypoints[i];
-    shown.features.push_back({at.x, at.y, l != no_id && l < first_new_});
+    const bool moved = !last_.as_read.empty();
+    shown.features.push_back(
+        {moved ? last_.as_read[i].x : at.x, moved ? last_.as_read[i].y : at.y, l != no_id && l < first_new_});
   }
   return shown;
 }
@@ -161,14 +184,14 @@ void front_end<Camera, D, Matchers, Sensor>::sync_with_map(const atlas_type& map
 }
 
 template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
-template <class Similar, class Drop>
+template <class FollowRows, class Similar, class Drop>
 std::size_t front_end<Camera, D, Matchers, Sensor>::localize(frame_type& f, atlas_type& maps, bool is_frozen,
-                                                             Similar&& similar, Drop&& drop) {
+                                                             FollowRows&& follow_rows, Similar&& similar, Drop&& drop) {
   first_new_ = no_id;
   if (state_ == track_state::not_started) return is_frozen ? 0 : begin_map(f);
   if (is_tracking())
-    if (const std::size_t inliers = track_from_last(f, maps, is_frozen); inliers > 0) return inliers;
-  if (const std::size_t inliers = relocalize(f, maps, is_frozen, similar); inliers > 0) return inliers;
+    if (const std::size_t inliers = track_from_last(f, maps, is_frozen, follow_rows); inliers > 0) return inliers;
+  if (const std::size_t inliers = relocalize(f, maps, is_frozen, follow_rows, similar); inliers > 0) return inliers;
   if (is_tracking()) lost_since_ = last_.timestamp;
   if (!lost_since_) lost_since_ = f.timestamp;
   state_ = track_state::lost;
@@ -199,21 +222,30 @@ std::size_t front_end<Camera, D, Matchers, Sensor>::begin_new_map(frame_type& f,
 }
 
 template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
-std::size_t front_end<Camera, D, Matchers, Sensor>::track_from_last(frame_type& f, atlas_type& maps, bool is_frozen) {
+template <class FollowRows>
+std::size_t front_end<Camera, D, Matchers, Sensor>::track_from_last(frame_type& f, atlas_type& maps, bool is_frozen,
+                                                                    FollowRows&& follow_rows) {
   const se3 predicted = motion_.predict({last_.timestamp, last_.T_world_camera}, f.timestamp);
+  if (!f.as_read.empty()) {
+    f.T_world_camera = predicted;
+    follow_rows(f, motion_between(last_, f));
+    move_keypoints(f);
+  }
   if (tracker_.by_motion(f, maps.active(), last_, predicted) == 0 &&
       tracker_.by_appearance(f, maps.active(), reference_.keyframe) == 0)
     return 0;
+  move_keypoints(f);
   const std::size_t inliers = track_local_map(f, maps.active(), options_.search_radius, is_frozen);
   if (inliers < options_.min_inliers) return 0;
+  refine_motion(f, maps.active(), true, follow_rows);
   state_ = track_state::tracking;
   return inliers;
 }
 
 template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
-template <class Similar>
+template <class FollowRows, class Similar>
 std::size_t front_end<Camera, D, Matchers, Sensor>::relocalize(frame_type& f, atlas_type& maps, bool is_frozen,
-                                                               Similar&& similar) {
+                                                               FollowRows&& follow_rows, Similar&& similar) {
   std::vector<map_keyframe> candidates = similar(f.features, options_.recovery.candidates);
   if (reference_.map == maps.active_id() && maps.active().has_keyframe(reference_.keyframe) &&
       std::find(candidates.begin(), candidates.end(), reference_) == candidates.end())
@@ -226,6 +258,7 @@ std::size_t front_end<Camera, D, Matchers, Sensor>::relocalize(frame_type& f, at
     reference_ = k;
     const std::size_t inliers = track_local_map(f, maps.active(), 3.0 * options_.search_radius, is_frozen);
     if (inliers >= options_.recovery.min_inliers) {
+      refine_motion(f, maps.active(), false, follow_rows);
       state_ = track_state::relocalized;
       return inliers;
     }
@@ -233,6 +266,27 @@ std::size_t front_end<Camera, D, Matchers, Sensor>::relocalize(frame_type& f, at
   maps.activate(active_before);
   reference_ = reference_before;
   return 0;
+}
+
+template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
+template <class FollowRows>
+void front_end<Camera, D, Matchers, Sensor>::refine_motion(frame_type& f, const basic_map<D>& m, bool is_next,
+                                                           FollowRows&& follow_rows) {
+  if (f.as_read.empty()) return;
+  twist_prior prior;
+  if (is_next && f.timestamp > last_.timestamp) {
+    f.twist = motion_between(last_, f);
+    prior = twist_prior::after({last_.T_world_camera, last_.twist}, f.timestamp - last_.timestamp, motion_.is_known());
+  }
+  follow_rows(f, f.twist);
+  find_row_observations(f, m, rig_, shutter(), rows_);
+  const moving_pose refined =
+      refine_moving_pose(std::span<const row_observation>(rows_), rig_.model, {f.T_world_camera, f.twist}, prior);
+  f.T_world_camera = refined.T_world_camera;
+  move_to_frame_time(f, rig_, shutter(), refined.twist, [&](std::size_t i) {
+    return f.landmarks[i] == no_id ? 0.0
+                                   : (refined.T_world_camera.inverse() * m.landmark_at(f.landmarks[i]).position).z();
+  });
 }
 
 template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>

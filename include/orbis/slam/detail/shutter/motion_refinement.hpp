@@ -1,0 +1,182 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// The pose of a frame together with the motion during its read-out.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include <Eigen/Cholesky>
+
+#include <orbis/camera/model.hpp>
+#include <orbis/camera/shutter.hpp>
+#include <orbis/core/se3.hpp>
+#include <orbis/core/types.hpp>
+#include <orbis/optimize/reprojection.hpp>
+#include <orbis/slam/camera_rig.hpp>
+#include <orbis/slam/detail/shutter/row_times.hpp>
+#include <orbis/slam/frame.hpp>
+#include <orbis/slam/map.hpp>
+
+namespace orbis::slam::detail {
+
+/// A pose and the camera's twist there.
+struct moving_pose {
+  se3 T_world_camera;
+  vec6 twist = vec6::Zero();  ///< of the camera in its own frame, per second, translation first
+};
+
+/// What is known of the twist before the frame is looked at: the mean motion since a former pose, which is followed
+/// further by a part of its change, up to the acceleration of a hand; otherwise that it is that of a hand.
+struct twist_prior {
+  std::optional<se3> T_world_before;   ///< the former pose ...
+  double interval = 0.0;               ///< ... and the seconds since
+  double trend = 0.0;                  ///< which part of the change from `twist_before` to the mean motion is added
+  vec6 twist_before = vec6::Zero();    ///< at the former pose
+  double translation_deviation = 0.5;  ///< metres per second
+  double rotation_deviation = 1.0;     ///< radians per second
+
+  /// The prior `interval` seconds after a former frame. With a constant acceleration a trend of 1 is exact, but errors
+  /// of the twist would alternate for ever; half of it damps them. @pre interval > 0
+  [[nodiscard]] static twist_prior after(const moving_pose& before, double interval, bool twist_is_known) {
+    constexpr double acceleration = 6.0;  // metres, or radians, per second squared
+    const twist_prior unknown;
+    const double deviation = 0.5 * acceleration * interval;
+    return {before.T_world_camera,
+            interval,
+            twist_is_known ? 0.5 : 0.0,
+            before.twist,
+            std::min(deviation, unknown.translation_deviation),
+            std::min(deviation, unknown.rotation_deviation)};
+  }
+
+  /// By how much a twist differs from what is expected at a pose.
+  [[nodiscard]] vec6 error(const se3& T_camera_world, const vec6& twist) const {
+    if (!T_world_before) return twist;
+    const vec6 mean = (T_camera_world * *T_world_before).inverse().log() / interval;
+    return twist - mean - trend * (mean - twist_before);
+  }
+};
+
+/// A keypoint as it was read, and the known point that it observes.
+struct row_observation {
+  optimize::pose_observation seen;
+  double time = 0.0;  ///< of its row, relative to the frame, seconds
+};
+
+/// The mean twist of the camera from a frame to a later one; zero if it is not later.
+template <feature_descriptor D>
+[[nodiscard]] vec6 motion_between(const basic_frame<D>& before, const basic_frame<D>& after) {
+  const double interval = after.timestamp - before.timestamp;
+  if (!(interval > 0.0)) return vec6::Zero();
+  return (before.T_world_camera.inverse() * after.T_world_camera).log() / interval;
+}
+
+/// What the keypoints of a frame that observe a landmark read. O(features). @pre the keypoints were kept as read
+template <feature_descriptor D, camera::camera_model Camera>
+void find_row_observations(const basic_frame<D>& f, const basic_map<D>& m, const camera_rig<Camera>& rig,
+                           const camera::shutter& shutter, std::vector<row_observation>& to) {
+  to.clear();
+  for (std::size_t i = 0; i != f.size(); ++i) {
+    if (f.landmarks[i] == no_id) continue;
+    const keypoint_as_read& read = f.as_read[i];
+    row_observation& o = to.emplace_back();
+    o.seen.point = m.landmark_at(f.landmarks[i]).position;
+    o.seen.pixel = {static_cast<double>(read.x), static_cast<double>(read.y)};
+    if (read.depth > 0.0F) o.seen.right = rig.model.right(o.seen.pixel.x(), static_cast<double>(read.depth));
+    o.seen.information = rig.scales.information(f.features.keypoints[i].octave);
+    o.time = shutter.color_time(o.seen.pixel.y(), rig.camera().height());
+  }
+}
+
+/// The residual of an observation, and its derivative by a motion of the camera frame (`exp(step) * T_camera_world`) at
+/// the time of its row; that by the twist is `-o.time` times as much. Empty where the point has no projection.
+template <camera::camera_model Camera>
+[[nodiscard]] std::optional<vec3> row_residual(const optimize::reprojection<Camera>& model, const se3& T_camera_world,
+                                               const vec6& twist, const row_observation& o, matrix<3, 6>& j) {
+  const vec3 q = moved_by(twist, -o.time, T_camera_world * o.seen.point);
+  mat3 by_point;
+  const auto r = model.residual(q, o.seen, by_point);
+  if (!r) return std::nullopt;
+  j.template leftCols<3>() = by_point;
+  j.template rightCols<3>() = -by_point * hat<double>(q);
+  return r;
+}
+
+/// The normal equations of pose and twist.
+struct moving_pose_equations {
+  matrix<12, 12> h;
+  matrix<12, 1> g;
+  double cost = 0.0;  ///< half the robust sum
+};
+
+template <camera::camera_model Camera>
+[[nodiscard]] moving_pose_equations linearize(std::span<const row_observation> observations,
+                                              const optimize::reprojection<Camera>& model, const se3& T_camera_world,
+                                              const vec6& twist, const twist_prior& prior) {
+  constexpr double width = 2.447;  // of Huber's loss, as in the refinement of the pose alone
+  moving_pose_equations e;
+  std::array<mat6, 3> h{mat6::Zero(), mat6::Zero(), mat6::Zero()};  // times 1, time, time squared
+  std::array<vec6, 2> g{vec6::Zero(), vec6::Zero()};
+  for (const row_observation& o : observations) {
+    matrix<3, 6> j;
+    const auto r = row_residual(model, T_camera_world, twist, o, j);
+    if (!r) continue;
+    const double error = std::sqrt(r->squaredNorm() * o.seen.information);
+    const double weight = o.seen.information * (error <= width ? 1.0 : width / error);
+    e.cost += error <= width ? 0.5 * error * error : width * (error - 0.5 * width);
+    const mat6 a = weight * (j.transpose() * j);
+    const vec6 b = weight * (j.transpose() * *r);
+    h[0] += a, h[1] -= o.time * a, h[2] += o.time * o.time * a;
+    g[0] += b, g[1] -= o.time * b;
+  }
+  e.h << h[0], h[1], h[1], h[2];
+  e.g << g[0], g[1];
+
+  const vec6 error = prior.error(T_camera_world, twist);
+  const double by_pose = prior.T_world_before ? (1.0 + prior.trend) / prior.interval : 0.0;  // to first order
+  for (int i = 0; i != 6; ++i) {
+    const double deviation = i < 3 ? prior.translation_deviation : prior.rotation_deviation;
+    const double weight = 1.0 / (deviation * deviation);
+    e.cost += 0.5 * weight * error[i] * error[i];
+    e.h(i, i) += weight * by_pose * by_pose;
+    e.h(i, 6 + i) += weight * by_pose;
+    e.h(6 + i, i) += weight * by_pose;
+    e.h(6 + i, 6 + i) += weight;
+    e.g[i] += weight * by_pose * error[i];
+    e.g[6 + i] += weight * error[i];
+  }
+  return e;
+}
+
+/// Refines pose and twist by Gauss-Newton steps as long as they lower the cost. The observations should hold few
+/// outliers. O(observations) for each step.
+template <camera::camera_model Camera>
+[[nodiscard]] moving_pose refine_moving_pose(std::span<const row_observation> observations,
+                                             const optimize::reprojection<Camera>& model, const moving_pose& start,
+                                             const twist_prior& prior, int iterations = 5) {
+  se3 T_camera_world = start.T_world_camera.inverse();
+  vec6 twist = start.twist;
+  moving_pose_equations now = linearize(observations, model, T_camera_world, twist, prior);
+  for (int k = 0; k != iterations; ++k) {
+    const matrix<12, 1> step = now.h.ldlt().solve(-now.g);
+    if (!step.allFinite()) break;
+    const se3 there = se3::exp(step.template head<6>()) * T_camera_world;
+    const vec6 moving = twist + step.template tail<6>();
+    const moving_pose_equations then = linearize(observations, model, there, moving, prior);
+    if (!(then.cost < now.cost)) break;
+    const double gain = now.cost - then.cost;
+    T_camera_world = there;
+    twist = moving;
+    now = then;
+    if (gain < 1e-5 * now.cost) break;
+  }
+  return {T_camera_world.inverse(), twist};
+}
+
+}  // namespace orbis::slam::detail

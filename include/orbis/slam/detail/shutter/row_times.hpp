@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Keypoints of a rolling shutter, moved to where they are at the time of the frame.
+///
+/// The camera moves by a constant body twist while an image is read out. A keypoint of a row that is read `t` seconds
+/// after the frame's time observes, in the camera frame of that moment, the point `p`; in the camera frame of the
+/// frame's time it is at `exp(t * twist) p`. Projected there, with its depth, it is a measurement of a global shutter,
+/// and all that uses it needs to know nothing of rows.
+///
+/// The model of constant velocity during the read-out: J. Hedborg, P.-E. Forssen, M. Felsberg, E. Ringaby, "Rolling
+/// shutter bundle adjustment", CVPR 2012.
+#pragma once
+
+#include <cmath>
+#include <cstddef>
+#include <optional>
+
+#include <orbis/camera/model.hpp>
+#include <orbis/camera/shutter.hpp>
+#include <orbis/core/types.hpp>
+#include <orbis/slam/camera_rig.hpp>
+#include <orbis/slam/frame.hpp>
+
+namespace orbis::slam::detail {
+
+/// `exp(t * twist) p` to second order: for the angles of one read-out (at most some hundredths of a radian) the rest is
+/// below a thousandth of a pixel. `twist`: of the camera in its own frame, per second, translation first.
+[[nodiscard]] inline vec3 moved_by(const vec6& twist, double t, const vec3& p) {
+  const vec3 v(t * twist[0], t * twist[1], t * twist[2]), w(t * twist[3], t * twist[4], t * twist[5]);
+  const vec3 a = w.cross(p) + v;
+  return p + a + 0.5 * w.cross(a);
+}
+
+/// Remembers the keypoints as they were read. Their rays and depths must be set.
+template <feature_descriptor D>
+void keep_as_read(basic_frame<D>& f) {
+  f.as_read.resize(f.size());
+  for (std::size_t i = 0; i != f.size(); ++i)
+    f.as_read[i] = {f.rays[i].x(), f.rays[i].y(), f.features.keypoints[i].x, f.features.keypoints[i].y,
+                    f.depth[i],    f.depth[i]};
+}
+
+/// Moves the keypoints from where they were read to where they are at the frame's time; sets their rays and depths, the
+/// grid and `f.twist`. `depth_of(i)`: the depth of what a keypoint without measured depth observes, where it is known;
+/// 0: it is far, and only the rotation counts. A keypoint that is not in the image then stays where it was read. Does
+/// nothing where the keypoints were not kept. O(features).
+template <feature_descriptor D, camera::camera_model Camera, class DepthOf>
+void move_to_frame_time(basic_frame<D>& f, const camera_rig<Camera>& rig, const camera::shutter& shutter,
+                        const vec6& twist, DepthOf&& depth_of) {
+  if (f.as_read.empty()) return;
+  f.twist = twist;
+  const int height = rig.camera().height();
+  for (std::size_t i = 0; i != f.as_read.size(); ++i) {
+    const keypoint_as_read& read = f.as_read[i];
+    auto& at = f.features.keypoints[i];
+    const double t = shutter.color_time(static_cast<double>(read.y), height);
+    const double known = read.depth > 0.0F ? static_cast<double>(read.depth) : depth_of(i);
+    constexpr double far = 1e6;  // metres
+    const vec3 moved = moved_by(twist, t, (known > 0.0 ? known : far) * vec3(read.ray_x, read.ray_y, 1.0));
+    const auto pixel = moved.z() > 0.0 ? rig.camera().project(moved) : std::nullopt;
+    if (!pixel) {  // or it has no ray
+      at.x = read.x, at.y = read.y;
+      f.rays[i] = {read.ray_x, read.ray_y, std::isnan(read.ray_x) ? read.ray_x : 1.0};
+      f.depth[i] = read.depth;
+      continue;
+    }
+    at.x = static_cast<float>(pixel->x()), at.y = static_cast<float>(pixel->y());
+    f.rays[i] = {moved.x() / moved.z(), moved.y() / moved.z(), 1.0};
+    f.depth[i] = read.depth > 0.0F ? static_cast<float>(moved.z()) : 0.0F;
+  }
+  f.grid.assign(f.features.keypoints);
+}
+
+/// As above; all keypoints without measured depth count as far.
+template <feature_descriptor D, camera::camera_model Camera>
+void move_to_frame_time(basic_frame<D>& f, const camera_rig<Camera>& rig, const camera::shutter& shutter,
+                        const vec6& twist) {
+  move_to_frame_time(f, rig, shutter, twist, [](std::size_t) { return 0.0; });
+}
+
+}  // namespace orbis::slam::detail
