@@ -54,7 +54,7 @@ struct floor_map_options {
 struct floor_map {
   double resolution = 0.0;     ///< the edge of a cell, metres
   vec2 origin = vec2::Zero();  ///< the low corner of cell (0, 0), metres
-  double floor = 0.0;          ///< height of the floor that was looked from, metres
+  double floor = 0.0;          ///< height of the floor that was looked from, metres; see find_floor
   image<floor_state> states{};
   image<float> heights{};  ///< of the floor, metres; NaN where the robot does not get to
 
@@ -78,8 +78,8 @@ struct floor_map {
 
 /// The height (metres) of the floor: the top of the lowest of the large horizontal layers, those that have at least
 /// half as much surface with free space right above it as the largest has. Two layers of voxels count as one, for a
-/// floor lies between them. Empty if there is no such surface. O(octants + tops of larger leaves in octants; of these
-/// not more than 2^24 count).
+/// floor lies between them. What was seen of it lies in these voxels: up to one lower. Empty if there is no such
+/// surface. O(octants + tops of larger leaves in octants; of these not more than 2^24 count).
 template <planning_map Map>
 [[nodiscard]] std::optional<double> find_floor(const Map& map);
 
