@@ -43,16 +43,18 @@ template <has_intrinsics Camera>
 /// it once, apply it to every frame. 8 bytes for each pixel.
 class undistortion {
  public:
-  /// O(pixels of `ideal`) projections.
+  /// The ideal camera stands where `camera` does, turned by `R_camera_ideal` (a rotation). O(pixels of `ideal`)
+  /// projections.
   template <camera_model Camera>
-  undistortion(const Camera& camera, const pinhole& ideal)
+  undistortion(const Camera& camera, const pinhole& ideal, const mat3& R_camera_ideal = mat3::Identity())
       : source_width_{camera.width()},
         source_height_{camera.height()},
         source_{ideal.width(), ideal.height(), vec2f::Constant(std::numeric_limits<float>::quiet_NaN())} {
     for (int y = 0; y != ideal.height(); ++y)
       for (int x = 0; x != ideal.width(); ++x) {
         const auto ray = ideal.unproject({x, y});
-        if (const auto pixel = ray ? camera.project(*ray) : std::nullopt) source_(x, y) = pixel->template cast<float>();
+        if (const auto pixel = ray ? camera.project(R_camera_ideal * *ray) : std::nullopt)
+          source_(x, y) = pixel->template cast<float>();
       }
   }
   /// To the pinhole with the camera's own size and matrix.

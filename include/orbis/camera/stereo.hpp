@@ -1,0 +1,214 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Two cameras side by side, and what makes both look straight ahead: rectification.
+///
+/// @code
+///   const stereo_rig rig{left_camera, right_camera, T_left_right};
+///   const rectification straight = rectify(rig).value();
+///   const auto left = straight.left().bilinear(left_image.view()), right =
+///   straight.right().bilinear(right_image.view());
+/// @endcode
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include <orbis/camera/intrinsics.hpp>
+#include <orbis/camera/model.hpp>
+#include <orbis/camera/pinhole.hpp>
+#include <orbis/camera/undistort.hpp>
+#include <orbis/core/result.hpp>
+#include <orbis/core/se3.hpp>
+#include <orbis/core/types.hpp>
+
+namespace orbis::camera {
+
+/// Two cameras that do not move against each other and take their images at the same time.
+template <camera_model Left, camera_model Right = Left>
+struct stereo_rig {
+  Left left;
+  Right right;
+  se3 T_left_right;  ///< from the right camera's frame to the left one's, metres
+
+  /// The distance between the two centres, metres.
+  [[nodiscard]] double baseline() const { return T_left_right.translation().norm(); }
+};
+
+template <class Left, class Right>
+stereo_rig(Left, Right, se3) -> stereo_rig<Left, Right>;
+
+/// The rig of two equal cameras that are rectified already. @pre baseline > 0, metres
+[[nodiscard]] inline stereo_rig<pinhole> rectified_rig(const pinhole& camera, double baseline) {
+  return {camera, camera, se3{so3{}, vec3{baseline, 0.0, 0.0}}};
+}
+
+/// How images are rectified.
+struct rectify_options {
+  int width = 0;                   ///< of the rectified images, pixels; 0: of the left camera
+  int height = 0;                  ///< likewise
+  std::optional<double> focal{};   ///< of the rectified camera, pixels; default: see `rectify`
+  double max_magnification = 1.5;  ///< of the default focal length, over that of the cameras in their middle
+};
+
+/// The images of a stereo rig as two equal pinhole cameras would have taken them that stand where the cameras of the
+/// rig do and both look straight ahead: x along the baseline. A point has the same row in both, and its column in the
+/// right image is that in the left one less `camera().k().fx * baseline() / depth`. Build it once (`rectify`), apply it
+/// to each pair: `left().bilinear(image)`. 16 bytes for each pixel.
+class rectification {
+ public:
+  /// Of images that need no change.
+  rectification(const pinhole& camera, double baseline) : camera_{camera}, baseline_{baseline} {}
+  /// @pre both are of the size of `camera`; `R_left_rectified` turns rays of the rectified cameras into the left one's
+  rectification(const pinhole& camera, double baseline, const so3& R_left_rectified, undistortion left,
+                undistortion right)
+      : camera_{camera}, baseline_{baseline}, R_left_rectified_{R_left_rectified} {
+    maps_.emplace(std::move(left), std::move(right));
+  }
+
+  /// The camera of both rectified images.
+  [[nodiscard]] const pinhole& camera() const noexcept { return camera_; }
+  /// Metres.
+  [[nodiscard]] double baseline() const noexcept { return baseline_; }
+  /// From the rectified left camera's frame to that of the left camera itself; both have the same origin.
+  [[nodiscard]] const so3& R_left_rectified() const noexcept { return R_left_rectified_; }
+  /// Whether the images are rectified already; then there is nothing to remap.
+  [[nodiscard]] bool is_identity() const noexcept { return !maps_; }
+  /// What makes rectified images of those of the left, or of the right camera. @pre !is_identity()
+  [[nodiscard]] const undistortion& left() const { return maps_.value().first; }
+  [[nodiscard]] const undistortion& right() const { return maps_.value().second; }
+
+ private:
+  pinhole camera_;
+  double baseline_ = 0.0;
+  so3 R_left_rectified_;
+  std::optional<std::pair<undistortion, undistortion>> maps_;
+};
+
+namespace detail {
+
+/// The axes of the rectified cameras as columns, in the left camera's frame: x along the baseline, z as near to the
+/// mean of both cameras' axes as that allows. Empty if the cameras do not stand side by side, or look apart.
+[[nodiscard]] inline std::optional<mat3> rectified_axes(const se3& T_left_right) {
+  const vec3 x = T_left_right.translation().normalized();
+  const vec3 left = vec3::UnitZ(), right = T_left_right.rotation() * left;
+  const vec3 y = (left + right).cross(x);
+  if (!x.allFinite() || !(x.x() > 0.5) || !(y.norm() > 0.1)) return std::nullopt;
+  mat3 axes;
+  axes << x, y.normalized(), x.cross(y.normalized());
+  const vec3 z = axes.col(2), upright = T_left_right.rotation() * vec3::UnitY();
+  if (z.dot(left) < 0.5 || z.dot(right) < 0.5 || !(axes.col(1).dot(upright) > 0.5)) return std::nullopt;
+  return axes;
+}
+
+/// The geometric mean of the two focal lengths in the middle of the image, pixels; empty without a ray there.
+template <camera_model Camera>
+[[nodiscard]] std::optional<double> middle_focal(const Camera& camera) {
+  const auto ray = camera.unproject({0.5 * (camera.width() - 1), 0.5 * (camera.height() - 1)});
+  matrix<2, 3> j;
+  if (!ray || !camera.project(*ray, j)) return std::nullopt;
+  const double area = j(0, 0) * j(1, 1) - j(0, 1) * j(1, 0);
+  return area > 0.0 ? std::optional{std::sqrt(area)} : std::nullopt;
+}
+
+/// Whether `camera` sees all that `ideal`, turned by `R_camera_ideal`, sees along the edge of its image.
+template <camera_model Camera>
+[[nodiscard]] bool sees_edge(const Camera& camera, const pinhole& ideal, const mat3& R_camera_ideal) {
+  const auto sees = [&](double x, double y) {
+    const auto pixel = camera.project(R_camera_ideal * *ideal.unproject({x, y}));
+    return pixel && pixel->x() >= 0.0 && pixel->y() >= 0.0 && pixel->x() <= camera.width() - 1.0 &&
+           pixel->y() <= camera.height() - 1.0;
+  };
+  const int right = ideal.width() - 1, bottom = ideal.height() - 1;
+  for (int x = 0; x <= right; ++x)
+    if (!sees(x, 0) || !sees(x, bottom)) return false;
+  for (int y = 0; y <= bottom; ++y)
+    if (!sees(0, y) || !sees(right, y)) return false;
+  return true;
+}
+
+/// Whether images of these cameras are rectified already.
+template <camera_model Left, camera_model Right>
+[[nodiscard]] bool is_rectified(const stereo_rig<Left, Right>& rig) {
+  constexpr double tiny = 1e-9;
+  const vec3& t = rig.T_left_right.translation();
+  if (!(rig.T_left_right.rotation().angle() < tiny) || !(t.x() > 0.0) || std::hypot(t.y(), t.z()) > tiny * t.x())
+    return false;
+  const int w = rig.left.width(), h = rig.left.height();
+  if (rig.right.width() != w || rig.right.height() != h || w == 0 || h == 0) return false;
+  // Pinhole cameras: rays differ by the same step everywhere. A few pixels tell, whatever the type says.
+  const auto like = [&](const auto& camera, const pinhole& k) {
+    for (const double v : {0.0, 0.3, 1.0})
+      for (const double u : {0.0, 0.6, 1.0}) {
+        const vec2 pixel{u * (w - 1), v * (h - 1)};
+        const auto ray = camera.unproject(pixel);
+        if (!ray || !((*k.project(*ray) - pixel).norm() < 1e-6)) return false;
+      }
+    return true;
+  };
+  const auto k = [&]() -> std::optional<pinhole> {
+    if constexpr (has_intrinsics<Left>) return pinhole{rig.left.k()};
+    return std::nullopt;
+  }();
+  return k && like(rig.left, *k) && like(rig.right, *k);
+}
+
+}  // namespace detail
+
+/// The rectification of a rig of any two camera models. Both cameras are turned by as little as possible: x along the
+/// baseline, z near the mean of both axes. The new camera has one focal length, the smaller of the two cameras' in
+/// their middle, longer by up to `max_magnification` if that leaves no pixel without a source; what is in the middle of
+/// the images stays there. Rigs that are rectified already give an identity. O(pixels) projections.
+///
+/// After A. Fusiello, E. Trucco, A. Verri, "A compact algorithm for rectification of stereo pairs", Machine Vision and
+/// Applications 12 (2000), who keep one axis of the left camera where this takes the mean of both.
+/// Errors: invalid_argument: the right camera does not stand to the right of the left one, the cameras look apart, or
+/// one has no ray in its middle.
+template <camera_model Left, camera_model Right>
+[[nodiscard]] result<rectification> rectify(const stereo_rig<Left, Right>& rig, const rectify_options& options = {}) {
+  const auto reject = [](const char* why) { return fail(errc::invalid_argument, "stereo rig", why); };
+  if constexpr (has_intrinsics<Left>) {
+    const bool as_is = (options.width == 0 || options.width == rig.left.width()) &&
+                       (options.height == 0 || options.height == rig.left.height()) && !options.focal;
+    if (as_is && detail::is_rectified(rig)) return rectification{pinhole{rig.left.k()}, rig.baseline()};
+  }
+  const auto axes = detail::rectified_axes(rig.T_left_right);
+  if (!axes) return reject("the right camera has to stand to the right of the left one and to look the same way");
+  const mat3 left = *axes, right = rig.T_left_right.rotation().inverse().rotation_matrix() * *axes;
+  const auto left_focal = detail::middle_focal(rig.left), right_focal = detail::middle_focal(rig.right);
+  if (!left_focal || !right_focal) return reject("a camera has no ray in the middle of its image");
+
+  const int width = options.width > 0 ? options.width : rig.left.width();
+  const int height = options.height > 0 ? options.height : rig.left.height();
+  vec2 middle = vec2::Zero();  // of what both see, on the plane z = 1
+  const auto add_middle = [&](const auto& camera, const mat3& R_camera_ideal) {
+    const auto ray = camera.unproject({0.5 * (camera.width() - 1), 0.5 * (camera.height() - 1)});
+    const vec3 seen = R_camera_ideal.transpose() * *ray;
+    if (!(seen.z() > 0.1 * seen.norm())) return false;
+    middle += 0.5 * seen.head<2>() / seen.z();
+    return true;
+  };
+  if (!add_middle(rig.left, left) || !add_middle(rig.right, right)) return reject("the cameras look apart");
+  const auto with_focal = [&](double f) {
+    return pinhole{width, height, f, f, 0.5 * (width - 1) - f * middle.x(), 0.5 * (height - 1) - f * middle.y()};
+  };
+  const double least = options.focal.value_or(std::min(*left_focal, *right_focal));
+  const double most = options.focal ? least : least * std::max(1.0, options.max_magnification);
+  double focal = least;
+  const auto is_filled = [&](double f) {
+    const pinhole k = with_focal(f);
+    return detail::sees_edge(rig.left, k, left) && detail::sees_edge(rig.right, k, right);
+  };
+  if (most > least && !is_filled(least)) {
+    double f = least;
+    while (f < most && !is_filled(f)) f *= 1.01;
+    if (f < most) focal = f;
+  }
+  const pinhole camera = with_focal(focal);
+  return rectification{camera, rig.baseline(), so3{left}, undistortion{rig.left, camera, left},
+                       undistortion{rig.right, camera, right}};
+}
+
+}  // namespace orbis::camera
