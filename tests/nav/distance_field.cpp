@@ -349,6 +349,63 @@ TEST_CASE("Interpolated distances are continuous up to where the grid ends") {
   CHECK(field.distance_and_gradient(far_away).gradient.isZero());
 }
 
+TEST_CASE("Signed distances are negative inside of obstacles, by how far it is out of them") {
+  const occupancy unknown = GENERATE(occupancy::occupied, occupancy::free);
+  random_bits random{12};
+  map_type map{0.1};
+  map.track_changes();
+  const nav::distance_field_options options{.reach = 0.5, .unknown = unknown};
+  nav::distance_field_options swapped = options;
+  swapped.inside = true;
+  distance_field outside{map, options}, inside{map, swapped};
+  const std::uint32_t o = map.grid().cells() / 2;
+  const auto set = [&](const voxel_key& k, float value) {
+    map.edit_octant(k, [&](octree::block<float>& b) {
+      const auto at = octree::morton_code(k) & 63U;
+      b.known |= std::uint64_t{1} << at;
+      b.value[at] = value;
+    });
+  };
+  for (int round = 0; round != 4; ++round) {
+    add_scan(map, random);
+    // A block that is solid, and less so each time.
+    for (std::uint32_t i = 0; i != 729; ++i)
+      set({o + i % 9, o + i / 9 % 9, o + i / 81}, i % 9 < static_cast<std::uint32_t>(9 - round) ? 1.0F : -1.0F);
+    outside.update(map);
+    inside.update(map);
+    CHECK(differences(inside, distance_field{map, swapped}) == 0);
+    const auto is_obstacle = [&](const voxel_key& k) {
+      const auto v = map.store().value(k);
+      return v ? *v > 0.0F : unknown == occupancy::occupied;
+    };
+    int wrong = 0;
+    std::array<int, 2> seen{};
+    for (int i = 0; i != 300; ++i) {
+      const voxel_key k{o - 12 + random.below(24), o - 12 + random.below(24), o - 12 + random.below(24)};
+      int least = 26;  // to the nearest voxel of the other kind, squared
+      for (int j = 0; j != 1331; ++j) {
+        const int x = j % 11 - 5, y = j / 11 % 11 - 5, z = j / 121 - 5;
+        if (x * x + y * y + z * z < least &&
+            is_obstacle({k.x + static_cast<std::uint32_t>(x), k.y + static_cast<std::uint32_t>(y),
+                         k.z + static_cast<std::uint32_t>(z)}) != is_obstacle(k))
+          least = x * x + y * y + z * z;
+      }
+      const double expected = (is_obstacle(k) ? -1.0 : 1.0) * std::min(0.5, 0.1 * std::sqrt(least));
+      const double found = nav::signed_distance(outside, inside, map.grid().center(k)).distance;
+      wrong += std::abs(found - expected) > 1e-9 ? 1 : 0;
+      ++seen[is_obstacle(k) ? 1 : 0];
+    }
+    CHECK(wrong == 0);
+    CHECK(std::min(seen[0], seen[1]) > 20);
+  }
+  // On a face of the block it is 0, and the gradient leads out.
+  const vec3 face{0.6, 0.45, 0.45};
+  const auto at_face = nav::signed_distance(outside.view(), inside.view(), face);
+  CHECK(at_face.distance == Approx(0.0).margin(1e-9));
+  CHECK(at_face.gradient.x() > 0.9);
+  CHECK(nav::signed_distance(outside, inside, vec3{face - vec3{0.2, 0.0, 0.0}}).gradient.x() > 0.9);
+}
+
 namespace {
 
 /// A scan inside of the leaf, or across its face: it splits it.

@@ -39,6 +39,9 @@ struct distance_field_options {
   double reach = 1.0;  ///< distances beyond are not told apart, metres; 1 to 181 voxels
   /// What a voxel of which nothing is known counts as: an obstacle, or free.
   octree::occupancy unknown = octree::occupancy::occupied;
+  /// Obstacles and what is none change places: how deep inside of obstacles it is, 0 where there is none. See
+  /// signed_distance.
+  bool inside = false;
   /// For how many bricks of 8x8x8 voxels (2.9 kB each) leaves of the map that are larger than a brick may make room:
   /// a file of a few bytes can be a leaf as large as the grid. What goes beyond is left out, see `is_complete`.
   std::size_t max_bricks = std::size_t{1} << 19U;
@@ -139,6 +142,22 @@ class metric_distances {
 /// The distances at one moment, for readers. It shares memory with the field it was taken of, and does not change.
 using distance_view = metric_distances<squared_distance_view>;
 
+/// The signed distance at `p` (metres) and its gradient, of two fields of one map: one as usual, and one that is made
+/// with `inside`. Positive outside of obstacles and negative in them, where it leads out along the gradient; from
+/// -reach to reach, and interpolated as both are. Where two voxels touch, one of which is an obstacle, it goes from
+/// minus to plus the edge of a voxel, and is 0 on the face between them. O(1).
+///
+/// @code
+///   const orbis::nav::distance_field outside{map, {.reach = 1.0}}, inside{map, {.reach = 0.5, .inside = true}};
+///   const auto [metres, gradient] = orbis::nav::signed_distance(outside, inside, p);
+/// @endcode
+template <class Outside, class Inside, point_like P>
+[[nodiscard]] distance_with_gradient signed_distance(const metric_distances<Outside>& outside,
+                                                     const metric_distances<Inside>& inside, const P& p) noexcept {
+  const distance_with_gradient to = outside.distance_and_gradient(p), out = inside.distance_and_gradient(p);
+  return {to.distance - out.distance, to.gradient - out.gradient};
+}
+
 /// The distance field of a map. It is, bit for bit, the one made afresh of the map as it is, whatever the order of
 /// changes, with obstacles that come and go; no box has to be named. See squared_distances.hpp for how.
 ///
@@ -149,7 +168,7 @@ class distance_field : public metric_distances<squared_distances> {
   explicit distance_field(const octree::voxel_grid& grid, const distance_field_options& options = {})
       : metric_distances{grid,
                          {static_cast<int>(std::ceil(options.reach / grid.resolution() - 1e-9)), grid.cells(),
-                          options.unknown == octree::occupancy::occupied},
+                          (options.unknown == octree::occupancy::occupied) != options.inside},
                          options.reach},
         options_{options} {}
   /// Of `map` as it is.
@@ -302,7 +321,8 @@ class distance_field : public metric_distances<squared_distances> {
     if (octants_.capacity() > std::max(few, 8 * voxels_.brick_count())) octants_ = std::vector<octant_obstacles>();
   }
   [[nodiscard]] std::uint64_t obstacles(const octree::octant_states& s) const noexcept {
-    return options_.unknown == octree::occupancy::occupied ? ~s.free() : s.occupied;
+    const std::uint64_t found = options_.unknown == octree::occupancy::occupied ? ~s.free() : s.occupied;
+    return options_.inside ? ~found : found;
   }
 
   distance_field_options options_;

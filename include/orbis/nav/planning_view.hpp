@@ -38,10 +38,10 @@ class planning_view {
 
   /// The field should reach at least two voxels farther than the robot's radius, and be complete (`is_complete`); if
   /// not, that costs time only: of a field that is not complete, just distances for costs are taken.
-  /// @pre the shape's; the options'; the field is that of the map, up to date
+  /// @pre the shape's; the options'; the field is that of the map, up to date, and of obstacles (not `inside`)
   planning_view(const Map& map, const distance_field& field, const Shape& shape, const planning_options& options = {})
       : map_{&map}, field_{&field}, shape_{shape}, cover_{cover_of(shape)}, options_{options} {
-    assert(cover_.inner > 0.0 && map_access<Map>::grid(map) == field.grid());
+    assert(cover_.inner > 0.0 && map_access<Map>::grid(map) == field.grid() && !field.options().inside);
     assert(options.clearance_weight >= 0.0 && options.preferred_clearance > 0.0 && options.unknown_cost >= 1.0);
   }
   /// A ball. `radius`: metres. @pre radius > 0
