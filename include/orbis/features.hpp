@@ -20,6 +20,7 @@
 /// | `features/epipolar.hpp` | the source that looks along epipolar lines |
 /// | `features/epipolar_geometry.hpp` | epipolar lines of two pinhole images, or of any two cameras |
 /// | `features/node_guided.hpp` | the source that compares under common vocabulary nodes |
+/// | `features/stereo.hpp` | `stereo_matcher`: the right coordinates of features of a stereo pair |
 /// | `features/grid.hpp` | an index of keypoints by position |
 /// | `features/depth.hpp` | the depth at a keypoint and its standard deviation |
 #pragma once
@@ -41,4 +42,5 @@
 #include <orbis/features/project_points.hpp>
 #include <orbis/features/projected.hpp>
 #include <orbis/features/stages.hpp>
+#include <orbis/features/stereo.hpp>
 #include <orbis/features/windowed.hpp>

@@ -1,0 +1,247 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// The right coordinates of features of a rectified stereo pair, between pixels.
+///
+/// @code
+///   const stereo_matcher match;
+///   const std::vector<float> columns = match(left_features, left, right_features, right, {.max_disparity = 300.0F});
+/// @endcode
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cassert>
+#include <cmath>
+#include <concepts>
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+#include <limits>
+#include <memory>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include <orbis/core/image.hpp>
+#include <orbis/features/descriptor.hpp>
+#include <orbis/features/detail/extract/kept_memory.hpp>
+#include <orbis/features/detail/extract/pyramid.hpp>
+#include <orbis/features/detail/match/search_among.hpp>
+#include <orbis/features/hamming.hpp>
+#include <orbis/features/match.hpp>
+
+namespace orbis::features {
+
+/// How `stereo_matcher` looks for the right coordinates. "Pixels of a level": of the keypoint's level of the pyramid.
+struct stereo_options {
+  int levels = 8;               ///< of the extractor's image pyramid
+  float scale_factor = 1.2F;    ///< between two of its levels
+  float min_disparity = 0.0F;   ///< left less right coordinate, pixels; what is found has to be larger
+  float max_disparity = 1e9F;   ///< likewise, at most
+  float rows = 2.0F;            ///< between the rows of both keypoints, pixels of a level, at most
+  int octaves = 1;              ///< between the levels of both keypoints, at most
+  std::uint32_t distance = 75;  ///< of descriptors, at most
+  int radius = 5;               ///< of the square that is compared, pixels of a level; at most 15
+  int slide = 5;                ///< to either side of the right keypoint, pixels of a level; at most 15
+  float outlier = 3.0F;         ///< matches whose difference is more than so many times the median are dropped
+};
+
+/// Finds where the right image of a rectified pair shows the features of the left one. A feature is compared with those
+/// of the right image that lie in the band of rows around it, by descriptor; then a square around it slides along the
+/// row around the best one, at the feature's pyramid level, and two lines of equal slope through the least differences
+/// place it between pixels. The differences are free of what makes one image brighter than the other. Calls on a const
+/// object may run at the same time.
+///
+/// After R. Mur-Artal, J. D. Tardos, "ORB-SLAM2: an open-source SLAM system for monocular, stereo and RGB-D cameras",
+/// T-RO 33 (2017), section III.A. The lines are those of M. Shimizu, M. Okutomi, "Precise sub-pixel estimation on
+/// area-based matching", ICCV 2001: sums of absolute differences are no parabola, through which errors are 1.4 times as
+/// large.
+template <class Distance = hamming>
+class stereo_matcher {
+ public:
+  stereo_matcher() = default;
+  explicit stereo_matcher(Distance distance) : distance_{std::move(distance)} {}
+
+  /// For each feature of the left image its column in the right image, pixels; NaN where there is none.
+  /// O(pixels + features x features in a band of rows).
+  /// @pre both images have the same size; levels >= 1, scale_factor > 1, 0 <= radius <= 15, 1 <= slide <= 15
+  template <feature_descriptor D>
+  requires descriptor_distance<Distance, D>
+  [[nodiscard]] std::vector<float> operator()(const basic_features<D>& left, image_view<const std::uint8_t> left_image,
+                                              const basic_features<D>& right,
+                                              image_view<const std::uint8_t> right_image,
+                                              const stereo_options& options = {}) const {
+    std::vector<float> columns;
+    into(columns, left, left_image, right, right_image, options);
+    return columns;
+  }
+
+  /// As above, into `columns`. Allocates nothing once images of this size with as many features have been seen.
+  template <feature_descriptor D>
+  requires descriptor_distance<Distance, D>
+  void into(std::vector<float>& columns, const basic_features<D>& left, image_view<const std::uint8_t> left_image,
+            const basic_features<D>& right, image_view<const std::uint8_t> right_image,
+            const stereo_options& options = {}) const {
+    assert(options.levels >= 1 && options.scale_factor > 1.0F);
+    assert(options.radius >= 0 && options.radius <= largest && options.slide >= 1 && options.slide <= largest);
+    assert(left_image.width() == right_image.width() && left_image.height() == right_image.height());
+    columns.assign(left.size(), std::numeric_limits<float>::quiet_NaN());
+    if (left.empty() || right.empty() || left_image.empty()) return;
+    auto kept = kept_.take();
+    workspace& memory = *kept;
+    memory.left.build(left_image, options.levels, static_cast<double>(options.scale_factor), 1);
+    memory.right.build(right_image, options.levels, static_cast<double>(options.scale_factor), 1);
+    scales_of(memory);
+    sort_by_row(memory, right.keypoints, left_image.height());
+    const auto list = [&](std::size_t q, auto&& add) {
+      list_band(options, memory, left.keypoints[q], right.keypoints, add);
+    };
+    detail::search_among(distance_, memory.candidates, memory.search, feature_view<D>{left.keypoints, left.descriptors},
+                         feature_view<D>{right.keypoints, right.descriptors}, {}, list);
+    memory.found.clear();
+    for (const candidate& c : memory.candidates) {
+      if (c.distance > options.distance) continue;
+      const placed at = place(options, memory, left.keypoints[c.query], right.keypoints[c.train]);
+      if (!(at.column <= left.keypoints[c.query].x - options.min_disparity) ||
+          !(at.column >= left.keypoints[c.query].x - options.max_disparity))
+        continue;
+      memory.found.push_back({c.query, at.column, at.difference});
+    }
+    keep_alike(options, memory);
+    for (const match_found& m : memory.found) columns[m.query] = m.column;
+    kept_.give(std::move(kept));
+  }
+
+ private:
+  static constexpr int largest = 15;
+
+  struct match_found {
+    std::uint32_t query;
+    float column;
+    float difference;  ///< a pixel
+  };
+  struct placed {
+    float column = std::numeric_limits<float>::quiet_NaN();
+    float difference = 0.0F;
+  };
+  struct workspace {
+    detail::image_pyramid left, right;
+    std::vector<double> scales;                     ///< pixels of the image per pixel of a level
+    std::vector<std::uint32_t> first_in_row, rows;  ///< right keypoints by row
+    detail::search_among_workspace search;
+    std::vector<candidate> candidates;
+    std::vector<match_found> found;
+    std::vector<float> differences;
+  };
+
+  static void scales_of(workspace& memory) {
+    memory.scales.clear();
+    for (std::size_t level = 0; level != memory.left.size(); ++level)
+      memory.scales.push_back(static_cast<double>(memory.left[0].width()) / memory.left[level].width());
+  }
+  [[nodiscard]] static int row_of(float y, int height) noexcept {  // rows outside of the image are those of its edge
+    return static_cast<int>(std::clamp(std::floor(y + 0.5F), 0.0F, static_cast<float>(height - 1)));
+  }
+
+  /// Counting sort, as `keypoint_grid` does it.
+  static void sort_by_row(workspace& memory, std::span<const keypoint> right, int height) {
+    std::vector<std::uint32_t>&first = memory.first_in_row, &rows = memory.rows;
+    first.assign(static_cast<std::size_t>(height) + 1, 0);
+    for (const keypoint& k : right) ++first[static_cast<std::size_t>(row_of(k.y, height))];
+    for (std::size_t row = 1; row != first.size(); ++row) first[row] += first[row - 1];
+    rows.resize(right.size());
+    for (std::size_t i = right.size(); i-- != 0;)
+      rows[--first[static_cast<std::size_t>(row_of(right[i].y, height))]] = static_cast<std::uint32_t>(i);
+  }
+
+  /// The right keypoints that a left one is compared with.
+  template <class Add>
+  static void list_band(const stereo_options& options, const workspace& memory, const keypoint& k,
+                        std::span<const keypoint> right, Add&& add) {
+    const int height = memory.left[0].height();
+    if (k.octave < 0 || static_cast<std::size_t>(k.octave) >= memory.scales.size() || !std::isfinite(k.x + k.y)) return;
+    const auto scale_of = [&](int octave) {
+      return static_cast<float>(memory.scales[std::min(static_cast<std::size_t>(octave), memory.scales.size() - 1)]);
+    };
+    const float widest = options.rows * scale_of(k.octave + options.octaves) + 0.5F;
+    const int from = row_of(k.y - widest, height), to = row_of(k.y + widest, height);
+    const std::uint32_t end = memory.first_in_row[static_cast<std::size_t>(to) + 1];
+    for (std::uint32_t at = memory.first_in_row[static_cast<std::size_t>(from)]; at != end; ++at) {
+      const std::uint32_t t = memory.rows[at];
+      const keypoint& r = right[t];
+      const float slack = static_cast<float>(options.slide) * scale_of(k.octave);
+      if (std::abs(r.octave - k.octave) <= options.octaves &&
+          std::abs(r.y - k.y) <= options.rows * scale_of(std::max(r.octave, k.octave)) &&
+          r.x <= k.x - options.min_disparity + slack && r.x >= k.x - options.max_disparity - slack)
+        add(t);
+    }
+  }
+
+  /// Where the right image shows the square around the left keypoint.
+  [[nodiscard]] static placed place(const stereo_options& options, const workspace& memory, const keypoint& left,
+                                    const keypoint& right) {
+    const auto level = static_cast<std::size_t>(left.octave);
+    const image_view<const std::uint8_t> a = memory.left[level], b = memory.right[level];
+    const double scale = memory.scales[level];
+    const auto to_level = [&](float at, int full, int size) {
+      return static_cast<int>(std::lround(detail::image_pyramid::full_coordinate(static_cast<double>(at), full, size)));
+    };
+    const int full_width = memory.left[0].width(), full_height = memory.left[0].height();
+    const int x = to_level(left.x, full_width, a.width()), y = to_level(left.y, full_height, a.height());
+    const int around = to_level(right.x, full_width, b.width());
+    const int r = options.radius;
+    if (x < r || y < r || x + r >= a.width() || y + r >= a.height()) return {};
+    const int first = std::max(around - options.slide, r), last = std::min(around + options.slide, b.width() - 1 - r);
+    if (last - first < 2) return {};
+    std::array<std::int32_t, 2 * largest + 1> sums;
+    int best = first;
+    for (int at = first; at <= last; ++at) {
+      sums[static_cast<std::size_t>(at - first)] = difference(a, x, b, at, y, r);
+      if (sums[static_cast<std::size_t>(at - first)] < sums[static_cast<std::size_t>(best - first)]) best = at;
+    }
+    if (best == first || best == last) return {};  // the least may lie outside
+    const auto sum = [&](int at) { return static_cast<double>(sums[static_cast<std::size_t>(at - first)]); };
+    const double before = sum(best - 1), after = sum(best + 1), bend = std::max(before, after) - sum(best);
+    const double within = bend > 0.0 ? 0.5 * (before - after) / bend : 0.0;
+    const double disparity = (static_cast<double>(x - best) - within) * scale;
+    return {static_cast<float>(static_cast<double>(left.x) - disparity),
+            static_cast<float>(sum(best)) / static_cast<float>((2 * r + 1) * (2 * r + 1))};
+  }
+
+  /// The sum of absolute differences of two squares, each less its mean, in grey values.
+  [[nodiscard]] static std::int32_t difference(image_view<const std::uint8_t> a, int ax,
+                                               image_view<const std::uint8_t> b, int bx, int y, int r) noexcept {
+    const int side = 2 * r + 1, n = side * side;
+    std::int32_t sum_a = 0, sum_b = 0;
+    for (int v = -r; v <= r; ++v) {
+      const std::uint8_t *p = &a(ax - r, y + v), *q = &b(bx - r, y + v);
+      for (int u = 0; u != side; ++u) {
+        sum_a += p[u];
+        sum_b += q[u];
+      }
+    }
+    const std::int32_t shift = sum_a - sum_b;
+    std::int32_t sum = 0;
+    for (int v = -r; v <= r; ++v) {
+      const std::uint8_t *p = &a(ax - r, y + v), *q = &b(bx - r, y + v);
+      for (int u = 0; u != side; ++u) sum += std::abs((static_cast<std::int32_t>(p[u]) - q[u]) * n - shift);
+    }
+    return sum / n;
+  }
+
+  /// Drops the matches whose difference is far above the median.
+  static void keep_alike(const stereo_options& options, workspace& memory) {
+    if (memory.found.empty()) return;
+    memory.differences.clear();
+    for (const match_found& m : memory.found) memory.differences.push_back(m.difference);
+    const auto middle = memory.differences.begin() + static_cast<std::ptrdiff_t>(memory.differences.size() / 2);
+    std::nth_element(memory.differences.begin(), middle, memory.differences.end());
+    const float limit = options.outlier * std::max(*middle, 1.0F);
+    std::erase_if(memory.found, [&](const match_found& m) { return m.difference > limit; });
+  }
+
+  [[no_unique_address]] Distance distance_{};
+  mutable detail::kept_memory<workspace> kept_;
+};
+
+}  // namespace orbis::features
