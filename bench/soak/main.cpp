@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// soak [RECORDING [FRAMES]]: a robot that does not stop. Plays a recording forwards and backwards, again and again, for so
-// many frames (10,000), through SLAM with threads and the live map, and prints a row for each tenth: what tracking takes,
-// how long a reader waits for the locks, the memory of the process, and how large the maps are. Without a recording, a
-// synthetic room. Ends with 1 if memory grows by more than a fifth after everything was seen twice, frames are lost, or
-// something was left out of the live map.
+// soak [RECORDING [FRAMES]]: a robot that does not stop. Plays a recording forwards and backwards, again and again, for
+// so many frames (10,000), through SLAM with threads and the live map, and prints a row for each tenth: what tracking
+// takes, how long a reader waits for the locks, the memory of the process, and how large the maps are. Without a
+// recording, a synthetic room. Ends with 1 if memory grows by more than a fifth after the second round, frames are
+// lost, or something was left out of the live map.
 #include <algorithm>
 #include <atomic>
 #include <charconv>
@@ -128,7 +128,7 @@ int soak(const Recording& recording, std::size_t frames) {
   std::printf("%8s %22s %22s %8s %10s %10s %8s %6s\n", "frames", "track ms (50/95/max)", "lock ms (50/95/max)", "MB",
               "keyframes", "landmarks", "leaves", "lost");
   std::vector<double> tracking;
-  const std::size_t seen_twice = 4 * recording.size();
+  const std::size_t two_rounds = 4 * recording.size();
   double memory_then = 0.0, memory_now = 0.0;
   {
     impatient_reader reader{slam};
@@ -149,7 +149,7 @@ int soak(const Recording& recording, std::size_t frames) {
       const std::vector<double> waited = reader.take();
       const std::size_t lost = slam.counters().lost;
       memory_now = resident_megabytes();
-      if (memory_then == 0.0 && i >= seen_twice) memory_then = memory_now;
+      if (memory_then == 0.0 && i >= two_rounds) memory_then = memory_now;
       std::printf("%8zu %6.1f %6.1f %8.1f %6.2f %6.2f %8.1f %8.0f %10zu %10zu %8zu %6zu\n", i + 1,
                   part_of(tracking, 0.5), part_of(tracking, 0.95), part_of(tracking, 1.0), part_of(waited, 0.5),
                   part_of(waited, 0.95), part_of(waited, 1.0), memory_now, slam.keyframes().size(),
