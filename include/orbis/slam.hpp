@@ -6,6 +6,7 @@
 /// | --- | --- |
 /// | `rgbd_system.hpp` | the SLAM system: give it frames, ask it for poses and the map |
 /// | `options.hpp` | all settings of the system |
+/// | `shutter_estimate.hpp` | what the frames tell of the shutter |
 /// | `track_result.hpp` | what tracking a frame returns: state, pose, timings, counters |
 /// | `events.hpp` | callbacks for new keyframes, corrections of the map and changes of state |
 /// | `ids.hpp` | the ids of landmarks, keyframes and maps |
@@ -41,6 +42,7 @@
 #include <orbis/slam/pyramid_scales.hpp>
 #include <orbis/slam/rgbd_system.hpp>
 #include <orbis/slam/sensor.hpp>
+#include <orbis/slam/shutter_estimate.hpp>
 #include <orbis/slam/spanning_tree.hpp>
 #include <orbis/slam/track_result.hpp>
 #include <orbis/slam/validate.hpp>

@@ -3,6 +3,7 @@
 // What recordings do to SLAM systems: loops, cuts, darkness, people, light, blur, low rates, walls that repeat. All are
 // made up, with exact poses.
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <vector>
 
@@ -222,4 +223,27 @@ TEST_CASE("A rolling shutter costs little where it is known, and much where it i
   const double followed = error_of(late, late), missed = error_of(late, rolling);
   CAPTURE(followed, missed);
   CHECK(followed < 0.85 * missed);
+}
+
+TEST_CASE("The shutter is found from the frames") {
+  io::synthetic_options o{.frames = 250, .fps = 30.0, .seed = 3, .width = 320, .height = 240, .frames_around = 400};
+  o.path.jitter = 3.0;
+  const auto estimate_of = [&](const camera::shutter& is) {
+    o.sensor.shutter = is;
+    const io::synthetic_recording frames{o};
+    slam::options settings;
+    settings.estimates_shutter = true;
+    test::slam_system slam{frames.camera().model, settings};
+    CHECK(std::isinf(slam.estimated_shutter()->read_out_deviation));
+    for (std::size_t i = 0; i != frames.size(); ++i) slam.track(frames.frame(i).value());
+    return *slam.estimated_shutter();
+  };
+  const slam::shutter_estimate rolling =
+      estimate_of({.color_read_out = 0.025, .depth_read_out = 0.025, .depth_delay = 0.012});
+  CHECK(std::abs(rolling.shutter.color_read_out - 0.025) < 0.002);
+  CHECK(rolling.read_out_deviation < 0.002);
+  CHECK(std::abs(rolling.shutter.depth_delay - 0.012) < 0.006);  // it takes longer to be known well
+  const slam::shutter_estimate global = estimate_of({});
+  CHECK(global.shutter.is_global());
+  CHECK(global.read_out_deviation < 0.002);
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "slam/tested_system.hpp"
 
+#include <optional>
 #include <utility>
 
 #include <orbis/features/orb.hpp>
@@ -23,6 +24,9 @@ slam_system::~slam_system() = default;
 void slam_system::listen(slam::listeners all) { held_->system.listen(std::move(all)); }
 slam::track_result slam_system::track(const camera::rgbd_frame& f) { return held_->system.track(f); }
 void slam_system::wait() const { held_->system.wait(); }
+std::optional<slam::shutter_estimate> slam_system::estimated_shutter() const {
+  return held_->system.estimated_shutter();
+}
 slam::track_state slam_system::state() const { return held_->system.state(); }
 void slam_system::set_initial_pose(std::function<se3()> find) { held_->system.set_initial_pose(std::move(find)); }
 bool slam_system::localizes_only() const { return held_->system.localizes_only(); }

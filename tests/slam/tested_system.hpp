@@ -17,6 +17,7 @@
 #include <orbis/slam/events.hpp>
 #include <orbis/slam/map.hpp>
 #include <orbis/slam/options.hpp>
+#include <orbis/slam/shutter_estimate.hpp>
 #include <orbis/slam/track_result.hpp>
 
 namespace orbis::test {
@@ -43,6 +44,7 @@ class slam_system {
   [[nodiscard]] orbis::trajectory keyframe_trajectory() const;
   [[nodiscard]] std::size_t landmark_count() const;
   [[nodiscard]] slam::track_counters counters() const;
+  [[nodiscard]] std::optional<slam::shutter_estimate> estimated_shutter() const;
   [[nodiscard]] slam::map_id active_map() const;
   [[nodiscard]] slam::map_id largest_map() const;
   [[nodiscard]] const slam::map& map() const;

@@ -159,6 +159,11 @@ struct options {
   double search_radius = 4.0;           ///< of the search for landmarks around a refined pose, likewise
   std::size_t local_keyframes = 40;     ///< whose landmarks are searched for in a frame, at most
   camera::shutter shutter{};            ///< when the rows of the images are taken; the default is a global shutter
+  /// Estimates the shutter from the frames, beginning with `shutter`, and takes to what is significant while it goes
+  /// on: after two seconds, and each time the number of frames has doubled. What the map holds by then stays as it is.
+  /// It costs a few milliseconds a frame. For recordings: estimate from the first seconds
+  /// (`rgbd_system::estimated_shutter`), then begin again with the result.
+  bool estimates_shutter = false;
   keyframe_options keyframes{};
   adjustment_options adjustment{};
   culling_options culling{};

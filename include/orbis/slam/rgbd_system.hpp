@@ -46,6 +46,7 @@
 #include <orbis/slam/options.hpp>
 #include <orbis/slam/place_recognition.hpp>
 #include <orbis/slam/sensor.hpp>
+#include <orbis/slam/shutter_estimate.hpp>
 #include <orbis/slam/track_result.hpp>
 
 namespace orbis::slam {
@@ -131,6 +132,8 @@ class rgbd_system {
   [[nodiscard]] std::optional<std::vector<keyframe_pose>> keyframes_since(pose_revision& seen) const;
   /// Time stamp and pose of each keyframe of the active map.
   [[nodiscard]] orbis::trajectory keyframe_trajectory() const;
+  /// What the frames tell of the shutter; empty without `options::estimates_shutter`. For the thread that tracks.
+  [[nodiscard]] std::optional<shutter_estimate> estimated_shutter() const { return front_end_.estimated_shutter(); }
   /// The number of landmarks of the active map.
   [[nodiscard]] std::size_t landmark_count() const;
   [[nodiscard]] track_counters counters() const;
@@ -170,7 +173,8 @@ class rgbd_system {
   template <class... Images>
   [[nodiscard]] frame_type measure(double timestamp, const Images&... images) const;
   /// Localises a frame and makes a keyframe of it if that is due. `lap`: notes the time of localisation.
-  std::optional<map_keyframe> localize(frame_type f, const std::function<void(frame_type&, const vec6&)>& follow_rows,
+  std::optional<map_keyframe> localize(frame_type f,
+                                       const std::function<void(frame_type&, const frame_motion&)>& follow_rows,
                                        track_result& result, detail::stopwatch& clock);
   /// Passes a new keyframe to the callbacks and the back end.
   void dispatch_keyframe(map_keyframe k);
@@ -234,9 +238,9 @@ track_result ORBIS_SLAM_SYSTEM::track_images(double timestamp, const Images&... 
   frame_type f = measure(timestamp, images...);
   clock.lap(result.timings.features_ms);
   if (options_.threads.wait) back_end_.wait_for_room();
-  const auto follow_rows = [&](frame_type& seen, const vec6& twist) {
+  const auto follow_rows = [&](frame_type& seen, const frame_motion& motion) {
     if constexpr (follows_rows<Sensor, descriptor_type, Camera, Images...>)
-      Sensor::follow_rows(shared_.rig, {front_end_.shutter(), twist}, seen, images...);
+      Sensor::follow_rows(shared_.rig, motion, seen, images...);
   };
   const std::optional<map_keyframe> made = localize(std::move(f), std::cref(follow_rows), result, clock);
   if (made) dispatch_keyframe(*made);
@@ -256,7 +260,7 @@ auto ORBIS_SLAM_SYSTEM::measure(double timestamp, const Images&... images) const
   const bool timed = std::isfinite(timestamp);
   if (timed && (fits(images) && ...)) {
     f = Sensor::measure(shared_.rig, extract_, images...);
-    if (!front_end_.shutter().is_global()) detail::keep_as_read(f);
+    if (front_end_.looks_at_rows()) detail::keep_as_read(f);
   }
   f.timestamp = timed ? timestamp : front_end_.last_timestamp();
   f.index = front_end_.counters().frames;
@@ -265,7 +269,7 @@ auto ORBIS_SLAM_SYSTEM::measure(double timestamp, const Images&... images) const
 
 ORBIS_SLAM_SYSTEM_TEMPLATE
 std::optional<map_keyframe> ORBIS_SLAM_SYSTEM::localize(
-    frame_type f, const std::function<void(frame_type&, const vec6&)>& follow_rows, track_result& result,
+    frame_type f, const std::function<void(frame_type&, const frame_motion&)>& follow_rows, track_result& result,
     detail::stopwatch& clock) {
   const auto lock = shared_.lock();
   atlas_type& maps = shared_.atlas;
@@ -285,7 +289,7 @@ std::optional<map_keyframe> ORBIS_SLAM_SYSTEM::localize(
     const bool may_grow = maps.active().keyframes().empty() || (!is_frozen && !back_end_.is_full());
     if (may_grow && front_end_.needs_keyframe(f, result.inliers, maps)) made = front_end_.make_keyframe(f, maps);
   }
-  front_end_.finish(std::move(f), maps);
+  front_end_.finish(std::move(f), maps, made);
   return made;
 }
 

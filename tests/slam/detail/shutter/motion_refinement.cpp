@@ -103,11 +103,11 @@ TEST_CASE("The prior expects the mean motion and half of its change, within what
   const moving_pose before{pose, 0.5 * motion};
   const se3 now = pose * se3::exp(0.04 * motion);
   const twist_prior prior = twist_prior::after(before, 0.04, true);
-  CHECK(prior.error(now.inverse(), 1.25 * motion).norm() < 1e-9);
+  CHECK((prior.expected(now.inverse()) - 1.25 * motion).norm() < 1e-9);
   CHECK(prior.translation_deviation == Approx(0.12));
   CHECK(prior.rotation_deviation == Approx(0.12));
   const twist_prior unknown_before = twist_prior::after(before, 0.04, false);
-  CHECK(unknown_before.error(now.inverse(), motion).norm() < 1e-9);
+  CHECK((unknown_before.expected(now.inverse()) - motion).norm() < 1e-9);
   const twist_prior long_ago = twist_prior::after(before, 2.0, true), unknown;
   CHECK(long_ago.translation_deviation == unknown.translation_deviation);
   CHECK(long_ago.rotation_deviation == unknown.rotation_deviation);

@@ -55,11 +55,11 @@ struct twist_prior {
             std::min(deviation, unknown.rotation_deviation)};
   }
 
-  /// By how much a twist differs from what is expected at a pose.
-  [[nodiscard]] vec6 error(const se3& T_camera_world, const vec6& twist) const {
-    if (!T_world_before) return twist;
+  /// The twist that is expected at a pose.
+  [[nodiscard]] vec6 expected(const se3& T_camera_world) const {
+    if (!T_world_before) return vec6::Zero();
     const vec6 mean = (T_camera_world * *T_world_before).inverse().log() / interval;
-    return twist - mean - trend * (mean - twist_before);
+    return mean + trend * (mean - twist_before);
   }
 };
 
@@ -138,7 +138,7 @@ template <camera::camera_model Camera>
   e.h << h[0], h[1], h[1], h[2];
   e.g << g[0], g[1];
 
-  const vec6 error = prior.error(T_camera_world, twist);
+  const vec6 error = twist - prior.expected(T_camera_world);
   const double by_pose = prior.T_world_before ? (1.0 + prior.trend) / prior.interval : 0.0;  // to first order
   for (int i = 0; i != 6; ++i) {
     const double deviation = i < 3 ? prior.translation_deviation : prior.rotation_deviation;

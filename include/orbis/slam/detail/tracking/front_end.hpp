@@ -17,6 +17,7 @@
 #include <orbis/slam/detail/mapping/keyframe_insertion.hpp>
 #include <orbis/slam/detail/shutter/motion_refinement.hpp>
 #include <orbis/slam/detail/shutter/row_times.hpp>
+#include <orbis/slam/detail/shutter/shutter_observer.hpp>
 #include <orbis/slam/detail/tracking/frame_log.hpp>
 #include <orbis/slam/detail/tracking/keyframe_decision.hpp>
 #include <orbis/slam/detail/tracking/motion_model.hpp>
@@ -41,10 +42,18 @@ class front_end {
   using atlas_type = basic_atlas<D>;
 
   front_end(const camera_rig<Camera>& rig, const options& settings)
-      : tracker_{rig, settings}, rig_{rig}, options_{settings} {}
+      : tracker_{rig, settings}, rig_{rig}, options_{settings}, shutter_{settings.shutter} {
+    if (settings.estimates_shutter) observer_.emplace();
+  }
 
-  /// When the rows of the images are taken.
-  [[nodiscard]] const camera::shutter& shutter() const noexcept { return options_.shutter; }
+  /// When the rows of the images are taken, as far as it is known.
+  [[nodiscard]] const camera::shutter& shutter() const noexcept { return shutter_; }
+  /// What the frames tell of it; empty if they are not asked.
+  [[nodiscard]] std::optional<shutter_estimate> estimated_shutter() const {
+    return observer_ ? std::optional{observer_->estimate()} : std::nullopt;
+  }
+  /// Whether frames need `as_read`.
+  [[nodiscard]] bool looks_at_rows() const noexcept { return observer_ || !shutter_.is_global(); }
 
   [[nodiscard]] track_state state() const noexcept { return state_; }
   [[nodiscard]] bool is_tracking() const noexcept {
@@ -75,7 +84,7 @@ class front_end {
 
   /// Estimates the pose of a frame and sets `state()`. Returns the number of landmarks that agree with the pose (of
   /// points with depth, if the frame begins a map), 0 if it has none. `is_frozen`: nothing is changed in the maps, and
-  /// no map is begun. `follow_rows(frame, twist)`: sets what the sensor measures for the rows of a rolling shutter
+  /// no map is begun. `follow_rows(frame, motion)`: sets what the sensor measures for the rows of a rolling shutter
   /// (`as_read`), given the motion. `similar(features, count)`: the keyframes with the most similar appearance, as ids;
   /// `drop(map)`: called for a map that is left behind with few keyframes.
   template <class FollowRows, class Similar, class Drop>
@@ -102,7 +111,8 @@ class front_end {
   }
 
   /// Counts a frame and, if it was localised, keeps it for the next prediction and in the log.
-  void finish(frame_type f, const atlas_type& maps);
+  /// `made`: the keyframe that it became.
+  void finish(frame_type f, const atlas_type& maps, const std::optional<map_keyframe>& made);
 
  private:
   /// Begins the active map with a frame, if the sensor says that it can. Returns the number of its points.
@@ -125,16 +135,24 @@ class front_end {
   /// With a rolling shutter, moves the keypoints of a frame to its time, by the motion since the last frame to its
   /// present pose.
   void move_keypoints(frame_type& f) const {
-    if (!f.as_read.empty()) move_to_frame_time(f, rig_, shutter(), motion_between(last_, f));
+    if (!shutter_.is_global()) move_to_frame_time(f, rig_, shutter_, motion_between(last_, f));
   }
+  /// Lets the observer see a tracked frame.
+  void observe(const frame_type& f, const atlas_type& maps, const std::optional<map_keyframe>& made);
   /// With a rolling shutter, refines pose and twist of a frame by the landmarks that it observes, and moves its
   /// keypoints accordingly. `is_next`: the frame follows the last one.
+  template <class FollowRows>
+  void observe_depth(const frame_type& f, const frame_motion& motion, FollowRows&& follow_rows) {
+    observer_->set_depths(f, motion, follow_rows);
+  }
   template <class FollowRows>
   void refine_motion(frame_type& f, const basic_map<D>& m, bool is_next, FollowRows&& follow_rows);
 
   tracker<Camera, D, Matchers> tracker_;
   const camera_rig<Camera>& rig_;
   const options& options_;
+  camera::shutter shutter_;
+  std::optional<shutter_observer> observer_;
   std::vector<row_observation> rows_;  ///< its memory is used again
 
   track_state state_ = track_state::not_started;
@@ -164,7 +182,7 @@ tracked_frame front_end<Camera, D, Matchers, Sensor>::last_frame() const {
   for (std::size_t i = 0; i != last_.size(); ++i) {
     const landmark_id l = last_.landmarks[i];
     const auto& at = last_.features.keypoints[i];
-    const bool moved = !last_.as_read.empty();
+    const bool moved = !last_.as_read.empty();  // shown where they are in the image
     shown.features.push_back(
         {moved ? last_.as_read[i].x : at.x, moved ? last_.as_read[i].y : at.y, l != no_id && l < first_new_});
   }
@@ -226,9 +244,9 @@ template <class FollowRows>
 std::size_t front_end<Camera, D, Matchers, Sensor>::track_from_last(frame_type& f, atlas_type& maps, bool is_frozen,
                                                                     FollowRows&& follow_rows) {
   const se3 predicted = motion_.predict({last_.timestamp, last_.T_world_camera}, f.timestamp);
-  if (!f.as_read.empty()) {
+  if (!shutter_.is_global()) {
     f.T_world_camera = predicted;
-    follow_rows(f, motion_between(last_, f));
+    follow_rows(f, {shutter_, motion_between(last_, f)});
     move_keypoints(f);
   }
   if (tracker_.by_motion(f, maps.active(), last_, predicted) == 0 &&
@@ -272,17 +290,25 @@ template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D
 template <class FollowRows>
 void front_end<Camera, D, Matchers, Sensor>::refine_motion(frame_type& f, const basic_map<D>& m, bool is_next,
                                                            FollowRows&& follow_rows) {
-  if (f.as_read.empty()) return;
+  if (!looks_at_rows()) return;
   twist_prior prior;
   if (is_next && f.timestamp > last_.timestamp) {
-    f.twist = motion_between(last_, f);
     prior = twist_prior::after({last_.T_world_camera, last_.twist}, f.timestamp - last_.timestamp, motion_.is_known());
+    f.twist = prior.expected(f.T_world_camera.inverse());
   }
-  follow_rows(f, f.twist);
-  find_row_observations(f, m, rig_, shutter(), rows_);
-  const moving_pose refined =
-      refine_moving_pose(std::span<const row_observation>(rows_), rig_.model, {f.T_world_camera, f.twist}, prior);
+  if (shutter_.is_global()) {
+    observe_depth(f, {shutter_, f.twist}, follow_rows);
+    return;
+  }
+  moving_pose refined{f.T_world_camera, f.twist};
+  const bool depth_is_simultaneous = shutter_.depth_delay == 0.0 && shutter_.depth_read_out == shutter_.color_read_out;
+  for (int round = 0; round != (depth_is_simultaneous ? 1 : 2); ++round) {  // the depth was read by the motion before
+    follow_rows(f, {shutter_, refined.twist});
+    find_row_observations(f, m, rig_, shutter_, rows_);
+    refined = refine_moving_pose(std::span<const row_observation>(rows_), rig_.model, refined, prior);
+  }
   f.T_world_camera = refined.T_world_camera;
+  if (observer_) observe_depth(f, {shutter_, refined.twist}, follow_rows);
   move_to_frame_time(f, rig_, shutter(), refined.twist, [&](std::size_t i) {
     return f.landmarks[i] == no_id ? 0.0
                                    : (refined.T_world_camera.inverse() * m.landmark_at(f.landmarks[i]).position).z();
@@ -290,12 +316,21 @@ void front_end<Camera, D, Matchers, Sensor>::refine_motion(frame_type& f, const 
 }
 
 template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
-void front_end<Camera, D, Matchers, Sensor>::finish(frame_type f, const atlas_type& maps) {
+void front_end<Camera, D, Matchers, Sensor>::observe(const frame_type& f, const atlas_type& maps,
+                                                     const std::optional<map_keyframe>& made) {
+  if (state_ != track_state::tracking || last_.index + 1 != f.index || last_.size() == 0) return observer_->interrupt();
+  if (const auto changed = observer_->add(last_, f, made, maps.active(), rig_, shutter_)) shutter_ = *changed;
+}
+
+template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
+void front_end<Camera, D, Matchers, Sensor>::finish(frame_type f, const atlas_type& maps,
+                                                    const std::optional<map_keyframe>& made) {
   ++counters_.frames;
   counters_.tracked += is_tracking();
   counters_.relocalized += state_ == track_state::relocalized;
   counters_.lost += state_ == track_state::lost;
   motion_.reset();
+  if (observer_) observe(f, maps, made);
   if (!is_tracking()) return;
   if (last_.index + 1 == f.index && state_ == track_state::tracking && last_.size() != 0)
     motion_.set({last_.timestamp, last_.T_world_camera}, {f.timestamp, f.T_world_camera});

@@ -1,0 +1,219 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// The read-out time of a camera, and the delay of its depth image, from the frames themselves.
+///
+/// A point that a keyframe and a frame observe is projected from the one into the other; by how much it misses depends
+/// on read-out and delay in a known way, as the motion of the camera is known from the poses around each. For each pair
+/// the relative pose is eliminated (it would explain a part); what is left are two linear equations, summed over all
+/// pairs. Their deviation is found from how much the keyframes' sums disagree, as the errors of the pairs of one
+/// keyframe are not independent.
+///
+/// Read-out from motion: P.-E. Forssen, E. Ringaby, "Rectifying rolling shutter video from hand-held devices", CVPR
+/// 2010. Deviations from sums over clusters: K.-Y. Liang, S. L. Zeger, "Longitudinal data analysis using generalized
+/// linear models", Biometrika 73 (1986).
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include <Eigen/LU>
+
+#include <orbis/camera/model.hpp>
+#include <orbis/camera/shutter.hpp>
+#include <orbis/core/se3.hpp>
+#include <orbis/core/types.hpp>
+#include <orbis/optimize/reprojection.hpp>
+#include <orbis/slam/camera_rig.hpp>
+#include <orbis/slam/detail/shutter/row_times.hpp>
+#include <orbis/slam/frame.hpp>
+#include <orbis/slam/ids.hpp>
+#include <orbis/slam/shutter_estimate.hpp>
+
+namespace orbis::slam::detail {
+
+/// How the depth of a keypoint would change if the depth image were `step` seconds later, and earlier, than assumed,
+/// metres; 0 where it is not known.
+struct depth_change {
+  static constexpr double step = 0.016;  ///< seconds: so much that the camera sees other pixels
+  float later = 0.0F, earlier = 0.0F;
+  /// Metres per second.
+  [[nodiscard]] double rate() const noexcept {
+    return (static_cast<double>(later) - static_cast<double>(earlier)) / (2.0 * step);
+  }
+};
+
+/// A frame as it was read, with its motion as its neighbours tell it.
+struct row_view {
+  se3 T_world_camera;
+  vec6 twist = vec6::Zero();
+  std::vector<keypoint_as_read> read;
+  std::vector<depth_change> changes;   ///< by keypoint
+  std::vector<landmark_id> landmarks;  ///< by keypoint
+  std::vector<double> information;     ///< by keypoint: 1 / variance of the pixel
+};
+
+/// Linear equations `h * (read-out, delay) = c`.
+struct shutter_equations {
+  matrix<2, 2> h = matrix<2, 2>::Zero();
+  vec2 c = vec2::Zero();
+};
+
+/// The equations of the points that two views share; empty where these are too few. `shutter`: by which `depth` of the
+/// keypoints was read, around which the equations are linear. O(keypoints).
+template <camera::camera_model Camera>
+[[nodiscard]] std::optional<shutter_equations> shutter_equations_of(const row_view& from, const row_view& to,
+                                                                    const camera_rig<Camera>& rig,
+                                                                    const camera::shutter& shutter) {
+  constexpr std::size_t enough = 30;
+  constexpr double width = 3.5;  // of Huber's loss: both keypoints have errors
+  std::vector<std::pair<landmark_id, std::uint32_t>> seen;
+  for (std::uint32_t i = 0; i != from.read.size(); ++i)
+    if (from.landmarks[i] != no_id && from.read[i].depth > 0.0F) seen.emplace_back(from.landmarks[i], i);
+  std::sort(seen.begin(), seen.end());
+
+  const int height = rig.camera().height();
+  const auto share = [&](float v) {
+    return camera::shutter{.color_read_out = 1.0}.color_time(static_cast<double>(v), height);
+  };
+  const auto speed = [](const vec6& twist, const vec3& p) {
+    return vec3(vec3(twist[3], twist[4], twist[5]).cross(p) + vec3(twist[0], twist[1], twist[2]));
+  };
+  const se3 T_to_from = to.T_world_camera.inverse() * from.T_world_camera;
+  mat6 pose = mat6::Zero();
+  matrix<6, 2> mixed = matrix<6, 2>::Zero();
+  vec6 pose_gradient = vec6::Zero();
+  shutter_equations e;
+  vec2 gradient = vec2::Zero();
+  std::size_t count = 0;
+  for (std::size_t i = 0; i != to.read.size(); ++i) {
+    if (to.landmarks[i] == no_id) continue;
+    const auto at = std::lower_bound(seen.begin(), seen.end(), std::pair{to.landmarks[i], std::uint32_t{0}});
+    if (at == seen.end() || at->first != to.landmarks[i]) continue;
+    const keypoint_as_read& a = from.read[at->second];
+    const keypoint_as_read& b = to.read[i];
+    const vec3 ray(a.ray_x, a.ray_y, 1.0);
+    const vec3 there = moved_by(from.twist, shutter.color_read_out * share(a.y), static_cast<double>(a.depth) * ray);
+    const vec3 q = moved_by(to.twist, -shutter.color_read_out * share(b.y), T_to_from * there);
+    optimize::pose_observation o;
+    o.pixel = {static_cast<double>(b.x), static_cast<double>(b.y)};
+    if (b.depth > 0.0F) o.right = rig.model.right(o.pixel.x(), static_cast<double>(b.depth));
+    mat3 by_point;
+    const auto r = rig.model.residual(q, o, by_point);
+    if (!r) continue;
+    const double information = std::min(from.information[at->second], to.information[i]);
+    const double error = std::sqrt(r->squaredNorm() * information);
+    const double weight = information * (error <= width ? 1.0 : width / error);
+    matrix<3, 6> by_pose;
+    by_pose.template leftCols<3>() = by_point;
+    by_pose.template rightCols<3>() = -by_point * hat<double>(q);
+    const depth_change &change_a = from.changes[at->second], &change_b = to.changes[i];
+    matrix<3, 2> by_shutter;
+    by_shutter.col(0) =
+        by_point * (T_to_from.rotation() * (share(a.y) * speed(from.twist, there)) - share(b.y) * speed(to.twist, q));
+    by_shutter.col(1) = by_point * (T_to_from.rotation() * vec3(change_a.rate() * ray));
+    const double z = static_cast<double>(b.depth);
+    const double by_depth = o.has_depth() ? rig.model.bf / (z * z) : 0.0;  // of what was measured
+    by_shutter(2, 1) -= by_depth * change_b.rate();
+    pose += weight * (by_pose.transpose() * by_pose);
+    mixed += weight * (by_pose.transpose() * by_shutter);
+    pose_gradient += weight * (by_pose.transpose() * *r);
+    e.h += weight * (by_shutter.transpose() * by_shutter);
+    gradient += weight * (by_shutter.transpose() * *r);
+    ++count;
+    // Depth is noisy, and so is its rate, whose square would be too large: the delay would come out too small. The
+    // squared errors of three readings with the same noise are a parabola without this bias.
+    const auto moved = [&](float in_a, float in_b) {
+      const vec3 row = by_point.row(2).transpose();
+      return (*r)[2] + row.dot(T_to_from.rotation() * vec3(static_cast<double>(in_a) * ray)) -
+             by_depth * static_cast<double>(in_b);
+    };
+    const auto squared = [](double x) { return x * x; };
+    const double now = squared((*r)[2]), later = squared(moved(change_a.later, change_b.later)),
+                 earlier = squared(moved(change_a.earlier, change_b.earlier));
+    constexpr double step = depth_change::step;
+    e.h(1, 1) += weight * ((later + earlier - 2.0 * now) / (2.0 * step * step) - squared(by_shutter(2, 1)));
+    gradient[1] += weight * ((later - earlier) / (4.0 * step) - by_shutter(2, 1) * (*r)[2]);
+  }
+  if (count < enough) return std::nullopt;
+  const matrix<6, 2> solved = pose.inverse() * mixed;
+  if (!solved.allFinite()) return std::nullopt;
+  e.h -= mixed.transpose() * solved;
+  gradient -= solved.transpose() * pose_gradient;
+  e.c = e.h * vec2(shutter.color_read_out, shutter.depth_delay) - gradient;
+  return e;
+}
+
+/// Sums equations over a run and decides what is significant.
+class shutter_estimator {
+ public:
+  /// Adds the equations of a pair. `block`: the same for all pairs of one keyframe.
+  void add(std::uint64_t block, const shutter_equations& e) {
+    if (blocks_.empty() || blocks_.back().first != block) {
+      const auto at = std::find_if(blocks_.begin(), blocks_.end(), [&](const auto& b) { return b.first == block; });
+      if (at != blocks_.end()) {
+        at->second.h += e.h;
+        at->second.c += e.c;
+        return;
+      }
+      blocks_.emplace_back(block, shutter_equations{});
+    }
+    blocks_.back().second.h += e.h;
+    blocks_.back().second.c += e.c;
+  }
+  /// Forgets all equations: after the shutter changed by which they were made.
+  void clear() { blocks_.clear(); }
+
+  /// The present estimate. What is assumed already is given up less easily than it was taken to. O(keyframes).
+  [[nodiscard]] shutter_estimate estimate(const camera::shutter& assumed = {}) const {
+    constexpr std::size_t enough = 8;
+    shutter_estimate result;
+    if (blocks_.size() < enough) return result;
+    shutter_equations sum;
+    for (const auto& [id, e] : blocks_) {
+      sum.h += e.h;
+      sum.c += e.c;
+    }
+    if (!(sum.h(0, 0) > 0.0)) return result;
+    const bool tells_delay = sum.h(1, 1) > 0.0 && sum.h.determinant() > 0.0;
+    matrix<2, 2> inverse = matrix<2, 2>::Zero();
+    if (tells_delay)
+      inverse = sum.h.inverse();
+    else
+      inverse(0, 0) = 1.0 / sum.h(0, 0);
+    const vec2 found = inverse * sum.c;
+    matrix<2, 2> spread = matrix<2, 2>::Zero();
+    for (const auto& [id, e] : blocks_) {
+      const vec2 apart = e.h * found - e.c;
+      spread += apart * apart.transpose();
+    }
+    const auto n = static_cast<double>(blocks_.size());
+    const matrix<2, 2> covariance = n / (n - 1.0) * (inverse * spread * inverse);
+    if (!found.allFinite() || !covariance.allFinite()) return result;
+    result.read_out = found[0];
+    result.read_out_deviation = std::sqrt(std::max(0.0, covariance(0, 0)));
+    if (tells_delay) {
+      result.delay = found[1];
+      result.delay_deviation = std::sqrt(std::max(0.0, covariance(1, 1)));
+    }
+    const auto holds = [](double value, double deviation, double before, double least, double most) {
+      const double sigmas = before == 0.0 ? 5.0 : 2.5;
+      return std::abs(value) > sigmas * deviation && std::abs(value) >= least && std::abs(value) <= most;
+    };
+    // A shorter read-out does no harm worth the trouble, and no camera needs longer for an image.
+    if (result.read_out > 0.0 && holds(result.read_out, result.read_out_deviation, assumed.color_read_out, 0.003, 0.07))
+      result.shutter.color_read_out = result.shutter.depth_read_out = result.read_out;
+    if (holds(result.delay, result.delay_deviation, assumed.depth_delay, 0.003, 0.05))
+      result.shutter.depth_delay = result.delay;
+    return result;
+  }
+
+ private:
+  std::vector<std::pair<std::uint64_t, shutter_equations>> blocks_;
+};
+
+}  // namespace orbis::slam::detail

@@ -1,0 +1,154 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Watches tracking and estimates the shutter.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include <orbis/camera/model.hpp>
+#include <orbis/camera/shutter.hpp>
+#include <orbis/core/types.hpp>
+#include <orbis/slam/camera_rig.hpp>
+#include <orbis/slam/detail/shutter/motion_refinement.hpp>
+#include <orbis/slam/detail/shutter/shutter_estimation.hpp>
+#include <orbis/slam/frame.hpp>
+#include <orbis/slam/ids.hpp>
+#include <orbis/slam/map.hpp>
+#include <orbis/slam/sensor.hpp>
+#include <orbis/slam/shutter_estimate.hpp>
+
+namespace orbis::slam::detail {
+
+/// Compares each tracked frame with the last keyframes once the next frame tells its motion from both sides, and from
+/// time to time proposes the shutter that follows.
+class shutter_observer {
+ public:
+  [[nodiscard]] shutter_estimate estimate() const { return estimate_; }
+
+  /// Reads the depth of the keypoints of the present frame as if its image had been taken at other times.
+  /// `read_depth(frame, motion)` sets that of `as_read`; `assumed`: the motion of the frame.
+  template <feature_descriptor D, class ReadDepth>
+  void set_depths(const basic_frame<D>& f, const frame_motion& assumed, ReadDepth&& read_depth) {
+    basic_frame<D> now, later, earlier;
+    now.as_read = later.as_read = earlier.as_read = f.as_read;
+    const auto read = [&](basic_frame<D>& at, double by) {
+      frame_motion motion = assumed;
+      motion.shutter.depth_delay += by;
+      read_depth(at, motion);
+    };
+    read(now, 0.0);
+    read(later, depth_change::step);
+    read(earlier, -depth_change::step);
+    changes_.assign(f.as_read.size(), {});
+    for (std::size_t i = 0; i != changes_.size(); ++i) {
+      const float a = earlier.as_read[i].depth, b = now.as_read[i].depth, c = later.as_read[i].depth;
+      if (a > 0.0F && b > 0.0F && c > 0.0F) changes_[i] = {c - b, a - b};
+    }
+  }
+
+  /// Takes in a tracked frame that follows `last` (as it was tracked, with its present pose). `keyframe`: the one that
+  /// the frame became. Returns the shutter that is to be assumed from the next frame on, if it changes.
+  template <feature_descriptor D, camera::camera_model Camera>
+  [[nodiscard]] std::optional<camera::shutter> add(const basic_frame<D>& last, const basic_frame<D>& f,
+                                                   const std::optional<map_keyframe>& keyframe, const basic_map<D>& m,
+                                                   const camera_rig<Camera>& rig, const camera::shutter& assumed) {
+    const vec6 motion = motion_between(last, f);
+    if (before_ && before_that_) {
+      // The velocity between two intervals, from the means of three: exact for motions that are cubic in time.
+      pending_.T_world_camera = last.T_world_camera;
+      pending_.twist = (-*before_that_ + 5.0 * *before_ + 2.0 * motion) / 6.0;
+      compare(m, rig, assumed);
+      if (pending_keyframe_) keep(*pending_keyframe_);
+    }
+    before_that_ = before_;
+    before_ = motion;
+    set_pending(f, keyframe, rig);
+    watched_ += f.timestamp - last.timestamp;
+    return decide(assumed);
+  }
+
+  /// The frame that comes next does not follow the last one.
+  void interrupt() {
+    before_.reset();
+    before_that_.reset();
+    pending_keyframe_.reset();
+  }
+
+ private:
+  static constexpr std::size_t kept = 4;  ///< keyframes that a frame is compared with
+
+  template <feature_descriptor D, camera::camera_model Camera>
+  void set_pending(const basic_frame<D>& f, const std::optional<map_keyframe>& keyframe,
+                   const camera_rig<Camera>& rig) {
+    pending_.read = f.as_read;
+    pending_.landmarks = f.landmarks;
+    pending_.changes = changes_;
+    pending_.changes.resize(f.size());
+    pending_.information.resize(f.size());
+    for (std::size_t i = 0; i != f.size(); ++i)
+      pending_.information[i] = rig.scales.information(f.features.keypoints[i].octave);
+    pending_keyframe_ = keyframe;
+  }
+
+  template <feature_descriptor D, camera::camera_model Camera>
+  void compare(const basic_map<D>& m, const camera_rig<Camera>& rig, const camera::shutter& assumed) {
+    for (auto& [id, view] : views_) {
+      if (!m.has_keyframe(id.keyframe)) continue;
+      view.T_world_camera = m.at(id.keyframe).T_world_camera;
+      if (const auto e = shutter_equations_of(view, pending_, rig, assumed)) estimator_.add(id.keyframe.value(), *e);
+    }
+  }
+
+  void keep(map_keyframe id) {
+    if (!views_.empty() && views_.front().first.map != id.map) views_.clear();
+    if (views_.size() == kept) views_.erase(views_.begin());
+    views_.emplace_back(id, pending_);
+  }
+
+  /// The estimate is revised each time the time of observation has doubled. What was measured by a shutter that was far
+  /// off is forgotten then: the equations are linear only around what was assumed, and gates of tracking have favoured
+  /// it.
+  [[nodiscard]] std::optional<camera::shutter> decide(const camera::shutter& assumed) {
+    constexpr double first = 2.0, same = 0.001, near = 0.003;  // seconds
+    if (watched_ < std::max(first, 2.0 * decided_)) {
+      if (watched_ - looked_ < 0.5) return std::nullopt;
+      looked_ = watched_;
+      estimate_ = best(estimator_.estimate(assumed));
+      return std::nullopt;
+    }
+    decided_ = looked_ = watched_;
+    estimate_ = best(estimator_.estimate(assumed));
+    const camera::shutter& now = estimate_.shutter;
+    const double change = std::max(std::abs(now.color_read_out - assumed.color_read_out),
+                                   std::abs(now.depth_delay - assumed.depth_delay));
+    if (change < same) return std::nullopt;
+    if (change > near) estimator_.clear();
+    views_.clear();  // their depths were read by the former delay
+    interrupt();
+    last_ = estimate_;
+    return now;
+  }
+
+  /// A new estimate, unless it is of too few equations yet: it is better than the one before, which was linear around a
+  /// shutter that was far off.
+  [[nodiscard]] shutter_estimate best(const shutter_estimate& now) const {
+    return last_ && !(now.read_out_deviation <= 2.0 * last_->read_out_deviation) ? *last_ : now;
+  }
+
+  shutter_estimator estimator_;
+  shutter_estimate estimate_;
+  std::optional<shutter_estimate> last_;  ///< at the last change
+  std::vector<std::pair<map_keyframe, row_view>> views_;
+  row_view pending_;
+  std::optional<map_keyframe> pending_keyframe_;
+  std::optional<vec6> before_, before_that_;             ///< the motion to the pending frame, and to the one before
+  std::vector<depth_change> changes_;                    ///< of the present frame
+  double watched_ = 0.0, decided_ = 0.0, looked_ = 0.0;  ///< seconds
+};
+
+}  // namespace orbis::slam::detail
