@@ -14,7 +14,7 @@
 /// | `rays.hpp, world_point.hpp, cloud.hpp` | rays of pixels; points of pixels in the world; points of a depth image |
 /// | `shutter.hpp` | when the rows of the images are taken |
 /// | `undistort.hpp` | images without distortion |
-/// | `stereo.hpp` | two cameras side by side, and their rectification |
+/// | `stereo.hpp, stereo_frame.hpp` | two cameras side by side, and their rectification; their two images |
 /// | `project_lanes.hpp` | eight points at a time, for adjustments; to be included by itself |
 #pragma once
 
@@ -33,5 +33,6 @@
 #include <orbis/camera/settings.hpp>
 #include <orbis/camera/shutter.hpp>
 #include <orbis/camera/stereo.hpp>
+#include <orbis/camera/stereo_frame.hpp>
 #include <orbis/camera/undistort.hpp>
 #include <orbis/camera/world_point.hpp>

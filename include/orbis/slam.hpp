@@ -5,6 +5,7 @@
 /// | header | what it is for |
 /// | --- | --- |
 /// | `rgbd_system.hpp` | the SLAM system: give it frames, ask it for poses and the map |
+/// | `stereo_system.hpp` | the same from a stereo camera |
 /// | `options.hpp` | all settings of the system |
 /// | `shutter_estimate.hpp` | what the frames tell of the shutter |
 /// | `track_result.hpp` | what tracking a frame returns: state, pose, timings, counters |
@@ -20,6 +21,7 @@
 /// | `map_file.hpp` | saving and loading a map |
 /// | `validate.hpp` | whether a map is consistent |
 /// | `sensor.hpp` | what a frame measures for each feature: RGB-D |
+/// | `stereo.hpp` | the same for a stereo camera, and the options that suit it |
 /// | `camera_rig.hpp` | the camera with its image pyramid and the weight of depth |
 /// | `pyramid_scales.hpp` | the scales of an image pyramid |
 /// | `matchers.hpp` | how tracking matches features, replaceable |
@@ -44,5 +46,7 @@
 #include <orbis/slam/sensor.hpp>
 #include <orbis/slam/shutter_estimate.hpp>
 #include <orbis/slam/spanning_tree.hpp>
+#include <orbis/slam/stereo.hpp>
+#include <orbis/slam/stereo_system.hpp>
 #include <orbis/slam/track_result.hpp>
 #include <orbis/slam/validate.hpp>

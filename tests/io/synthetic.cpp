@@ -247,3 +247,43 @@ TEST_CASE("Each row of a rolling shutter shows what is there to see at its time"
   CHECK(differs(59) + differs(60) < 320);
   CHECK(differs(0) + differs(119) > 4 * (differs(59) + differs(60)));
 }
+
+TEST_CASE("The right image of a stereo pair shows each point where its depth says") {
+  const synthetic_recording room{
+      {.frames = 12, .seed = 4, .width = 320, .height = 240, .sensor = io::synthetic_sensor_options::ideal()}};
+  const auto settings = room.stereo_camera();
+  REQUIRE(settings.baseline);
+  const double bf = settings.model.k().fx * *settings.baseline;
+  for (const std::size_t i : {0U, 7U}) {
+    const camera::stereo_frame pair = room.stereo_frame(i).value();
+    CHECK(pair.timestamp == room.timestamp(i));
+    CHECK(pair.left == room.frame(i).value().color);
+    CHECK(pair.T_world_camera->translation() == room.T_world_camera(i).translation());
+    const auto exact = room.exact(seq, i).value();
+    int same = 0, all = 0;
+    for (int y = 0; y != 240; ++y)
+      for (int x = 0; x != 320; ++x) {
+        const double u = x - bf / static_cast<double>(exact.depth(x, y));
+        const int u0 = static_cast<int>(std::floor(u));
+        if (u0 < 0) continue;
+        const double right = (1.0 - (u - u0)) * pair.right(u0, y).g + (u - u0) * pair.right(u0 + 1, y).g;
+        same += std::abs(right - pair.left(x, y).g) < 20.0;
+        ++all;
+      }
+    CHECK(same > 0.93 * all);
+    CHECK(pair.right != pair.left);
+  }
+}
+
+TEST_CASE("Stereo pairs are the same for every policy, and their noise is not that of one image") {
+  const camera::stereo_frame pair = small().stereo_frame(3).value(), again = small().render_stereo(seq, 3).value();
+  CHECK(pair.left == again.left);
+  CHECK(pair.right == again.right);
+  CHECK(pair.left == small().frame(3).value().color);
+  synthetic_recording twice{{.frames = 2, .width = 160, .height = 120, .sensor = {.stereo_baseline = 0.0}}};
+  const camera::stereo_frame from_one_place = twice.stereo_frame(0).value();
+  CHECK(from_one_place.left != from_one_place.right);
+  const auto none = small().stereo_frame(40);
+  REQUIRE(!none);
+  CHECK(none.error().code == errc::invalid_argument);
+}

@@ -15,7 +15,6 @@
 #include <concepts>
 #include <cstddef>
 #include <cstdint>
-#include <cstdlib>
 #include <limits>
 #include <memory>
 #include <span>
@@ -27,6 +26,7 @@
 #include <orbis/features/detail/extract/kept_memory.hpp>
 #include <orbis/features/detail/extract/pyramid.hpp>
 #include <orbis/features/detail/match/search_among.hpp>
+#include <orbis/features/detail/match/slide_differences.hpp>
 #include <orbis/features/hamming.hpp>
 #include <orbis/features/match.hpp>
 
@@ -132,6 +132,7 @@ class stereo_matcher {
     std::vector<candidate> candidates;
     std::vector<match_found> found;
     std::vector<float> differences;
+    detail::sliding_square sliding{};
   };
 
   static void scales_of(workspace& memory) {
@@ -178,7 +179,7 @@ class stereo_matcher {
   }
 
   /// Where the right image shows the square around the left keypoint.
-  [[nodiscard]] static placed place(const stereo_options& options, const workspace& memory, const keypoint& left,
+  [[nodiscard]] static placed place(const stereo_options& options, workspace& memory, const keypoint& left,
                                     const keypoint& right) {
     const auto level = static_cast<std::size_t>(left.octave);
     const image_view<const std::uint8_t> a = memory.left[level], b = memory.right[level];
@@ -193,40 +194,36 @@ class stereo_matcher {
     if (x < r || y < r || x + r >= a.width() || y + r >= a.height()) return {};
     const int first = std::max(around - options.slide, r), last = std::min(around + options.slide, b.width() - 1 - r);
     if (last - first < 2) return {};
-    std::array<std::int32_t, 2 * largest + 1> sums;
-    int best = first;
-    for (int at = first; at <= last; ++at) {
-      sums[static_cast<std::size_t>(at - first)] = difference(a, x, b, at, y, r);
-      if (sums[static_cast<std::size_t>(at - first)] < sums[static_cast<std::size_t>(best - first)]) best = at;
-    }
+    const int shifts = last - first + 1;
+    fill(memory.sliding, a, x, b, first, y, r, shifts);
+    alignas(64) std::array<std::int32_t, detail::sliding_square::max_shifts> sums;
+    detail::slide_differences(memory.sliding, shifts, sums.data());
+    const auto least = std::min_element(sums.begin(), sums.begin() + shifts);
+    const int best = first + static_cast<int>(least - sums.begin());
     if (best == first || best == last) return {};  // the least may lie outside
     const auto sum = [&](int at) { return static_cast<double>(sums[static_cast<std::size_t>(at - first)]); };
     const double before = sum(best - 1), after = sum(best + 1), bend = std::max(before, after) - sum(best);
     const double within = bend > 0.0 ? 0.5 * (before - after) / bend : 0.0;
     const double disparity = (static_cast<double>(x - best) - within) * scale;
     return {static_cast<float>(static_cast<double>(left.x) - disparity),
-            static_cast<float>(sum(best)) / static_cast<float>((2 * r + 1) * (2 * r + 1))};
+            static_cast<float>(sum(best)) / static_cast<float>(4 * (2 * r + 1) * (2 * r + 1))};
   }
 
-  /// The sum of absolute differences of two squares, each less its mean, in grey values.
-  [[nodiscard]] static std::int32_t difference(image_view<const std::uint8_t> a, int ax,
-                                               image_view<const std::uint8_t> b, int bx, int y, int r) noexcept {
-    const int side = 2 * r + 1, n = side * side;
-    std::int32_t sum_a = 0, sum_b = 0;
-    for (int v = -r; v <= r; ++v) {
-      const std::uint8_t *p = &a(ax - r, y + v), *q = &b(bx - r, y + v);
-      for (int u = 0; u != side; ++u) {
-        sum_a += p[u];
-        sum_b += q[u];
-      }
+  /// The square around (x, y) of `a`, and the strip of `b` that its squares around `first` and the columns after that
+  /// are in.
+  static void fill(detail::sliding_square& to, image_view<const std::uint8_t> a, int x,
+                   image_view<const std::uint8_t> b, int first, int y, int r, int shifts) noexcept {
+    const int side = 2 * r + 1, used = side - 1 + (shifts + 15) / 16 * 16;
+    to.side = side;
+    for (int v = 0; v != side; ++v) {
+      const std::uint8_t *p = &a(x - r, y - r + v), *q = &b(first - r, y - r + v);
+      const int there = std::min(used, b.width() - (first - r));  // what lies beyond belongs to no shift
+      std::int16_t* const square = to.square.data() + v * side;
+      std::int16_t* const strip = to.strip.data() + v * detail::sliding_square::stride;
+      for (int u = 0; u != side; ++u) square[u] = static_cast<std::int16_t>(4 * p[u]);
+      for (int u = 0; u != there; ++u) strip[u] = static_cast<std::int16_t>(4 * q[u]);
+      for (int u = there; u < used; ++u) strip[u] = 0;
     }
-    const std::int32_t shift = sum_a - sum_b;
-    std::int32_t sum = 0;
-    for (int v = -r; v <= r; ++v) {
-      const std::uint8_t *p = &a(ax - r, y + v), *q = &b(bx - r, y + v);
-      for (int u = 0; u != side; ++u) sum += std::abs((static_cast<std::int32_t>(p[u]) - q[u]) * n - shift);
-    }
-    return sum / n;
   }
 
   /// Drops the matches whose difference is far above the median.

@@ -23,6 +23,7 @@
 #include <orbis/camera/pinhole.hpp>
 #include <orbis/camera/rgbd_frame.hpp>
 #include <orbis/camera/settings.hpp>
+#include <orbis/camera/stereo_frame.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/image.hpp>
 #include <orbis/core/result.hpp>
@@ -80,6 +81,12 @@ class synthetic_recording {
             .fps = options_.fps,
             .baseline = options_.sensor.baseline};
   }
+  /// Both cameras of `stereo_frame`: as `camera()`, with the distance of the two.
+  [[nodiscard]] camera::camera_settings stereo_camera() const {
+    camera::camera_settings both = camera();
+    both.baseline = options_.sensor.stereo_baseline;
+    return both;
+  }
   /// The exact pose of frame `i`.
   [[nodiscard]] se3 T_world_camera(std::size_t i) const { return path_.at(timestamp(i)).T_world_camera(); }
   /// The exact poses of all frames.
@@ -99,6 +106,16 @@ class synthetic_recording {
     if (i >= size()) return no_such_frame(i);
     return simulator_.frame(
         policy, [this](double time) { return moment_at(time); }, timestamp(i), i);
+  }
+
+  /// Frame `i` as a stereo camera sees it, whose left camera is `camera()` and whose right one stands
+  /// `stereo_camera().baseline` to the right of it. Errors: as `frame`.
+  [[nodiscard]] result<camera::stereo_frame> stereo_frame(std::size_t i) const { return render_stereo(par, i); }
+  template <execution_policy Policy>
+  [[nodiscard]] result<camera::stereo_frame> render_stereo(const Policy& policy, std::size_t i) const {
+    if (i >= size()) return no_such_frame(i);
+    return simulator_.stereo(
+        policy, [this](double time) { return moment_at(time); }, timestamp(i), i, options_.sensor.stereo_baseline);
   }
 
   /// Colour, depth (metres) and angles of frame `i` without any error of the sensor.

@@ -57,6 +57,8 @@ struct synthetic_sensor_options {
   bool shadow = true;             ///< no depth where the projector (on the right) does not reach
   double dropouts = 0.002;        ///< share of pixels lost anywhere
 
+  double stereo_baseline = 0.12;  ///< from the camera to the second one of a stereo pair, metres
+
   double colour_noise = 2.0;    ///< deviation in grey values
   double vignetting = 0.0;      ///< loss of brightness in the image's corners, 0..1
   double exposure_jumps = 0.0;  ///< largest relative change of brightness; a new level every second or so

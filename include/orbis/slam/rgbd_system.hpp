@@ -19,6 +19,7 @@
 #include <cmath>
 #include <concepts>
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <optional>
@@ -88,12 +89,20 @@ class rgbd_system {
 
   /// Tracks the next frame. Frames of another size than the camera's, or without a finite time stamp, count as lost.
   /// @pre time stamps ascend
-  track_result track(const camera::rgbd_frame& f);
+  track_result track(const camera::rgbd_frame& f) requires
+      measures<Sensor, Camera, Extractor, image_view<const rgb8>, camera::depth_view<std::uint16_t>>;
   /// As above; the images are used in place. `timestamp`: seconds; `depth`: metres, registered to the colour image.
   template <camera::depth_source Depth>
-  track_result track(double timestamp, image_view<const rgb8> color, const Depth& depth) {
+  requires measures<Sensor, Camera, Extractor, image_view<const rgb8>, Depth> track_result
+  track(double timestamp, image_view<const rgb8> color, const Depth& depth) {
     return track_images(timestamp, color, depth);
   }
+  /// As above, for a sensor that takes the two images of a rectified stereo pair. `timestamp`: seconds.
+  track_result track(double timestamp, image_view<const rgb8> left, image_view<const rgb8> right) requires
+      measures<Sensor, Camera, Extractor, image_view<const rgb8>, image_view<const rgb8>>;
+  track_result track(double timestamp, image_view<const std::uint8_t> left,
+                     image_view<const std::uint8_t> right) requires
+      measures<Sensor, Camera, Extractor, image_view<const std::uint8_t>, image_view<const std::uint8_t>>;
 
   /// The state after the last frame.
   [[nodiscard]] track_state state() const;
@@ -183,6 +192,7 @@ class rgbd_system {
 
   options options_;
   Extractor extract_;
+  [[no_unique_address]] Sensor sensor_{};
   detail::shared_state<Camera, descriptor_type, Places> shared_;
   detail::front_end<Camera, descriptor_type, Matchers, Sensor> front_end_;
   track_state reported_state_ = track_state::not_started;
@@ -226,8 +236,23 @@ ORBIS_SLAM_SYSTEM_TEMPLATE
 void ORBIS_SLAM_SYSTEM::listen(listeners callbacks) { shared_.callbacks = std::move(callbacks); }
 
 ORBIS_SLAM_SYSTEM_TEMPLATE
-track_result ORBIS_SLAM_SYSTEM::track(const camera::rgbd_frame& f) {
+track_result ORBIS_SLAM_SYSTEM::track(const camera::rgbd_frame& f) requires
+    measures<Sensor, Camera, Extractor, image_view<const rgb8>, camera::depth_view<std::uint16_t>> {
   return track_images(f.timestamp, f.color.view(), f.depth_metres());
+}
+
+ORBIS_SLAM_SYSTEM_TEMPLATE
+track_result ORBIS_SLAM_SYSTEM::track(double timestamp, image_view<const rgb8> left,
+                                      image_view<const rgb8> right) requires
+    measures<Sensor, Camera, Extractor, image_view<const rgb8>, image_view<const rgb8>> {
+  return track_images(timestamp, left, right);
+}
+
+ORBIS_SLAM_SYSTEM_TEMPLATE
+track_result ORBIS_SLAM_SYSTEM::track(double timestamp, image_view<const std::uint8_t> left,
+                                      image_view<const std::uint8_t> right) requires
+    measures<Sensor, Camera, Extractor, image_view<const std::uint8_t>, image_view<const std::uint8_t>> {
+  return track_images(timestamp, left, right);
 }
 
 ORBIS_SLAM_SYSTEM_TEMPLATE
@@ -259,7 +284,7 @@ auto ORBIS_SLAM_SYSTEM::measure(double timestamp, const Images&... images) const
   };
   const bool timed = std::isfinite(timestamp);
   if (timed && (fits(images) && ...)) {
-    f = Sensor::measure(shared_.rig, extract_, images...);
+    f = sensor_.measure(shared_.rig, extract_, images...);
     if (front_end_.looks_at_rows()) detail::keep_as_read(f);
   }
   f.timestamp = timed ? timestamp : front_end_.last_timestamp();

@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <limits>
 #include <optional>
+#include <utility>
 
 #include <orbis/camera/depth.hpp>
 #include <orbis/camera/model.hpp>
@@ -23,19 +24,26 @@
 
 namespace orbis::slam {
 
-/// A kind of sensor, as a compile-time policy of the SLAM system: a type without state, with
-///  - `S::measure(rig, extract, images...)`: a frame with its features, their rays, and what the sensor measures for
-///    each (its depth, 0 where there is none); `images...` are those that the sensor takes at one moment;
+/// A kind of sensor, as a compile-time policy of the SLAM system, which holds one that is made by default (it may keep
+/// working memory). With `s` a const one,
+///  - `s.measure(rig, extract, images...)`: a frame with its features, their rays, and what the sensor measures for
+///  each
+///    besides its pixel: a right coordinate or none, as the depth that belongs to it (0 where there is none);
+///    `images...` are those that the sensor takes at one moment. What tracking and adjustments compare is the right
+///    coordinate
+///    (`optimize::reprojection`): that of a second camera, or of a virtual one that stands for the depth sensor;
 ///  - `S::begins_map(frame, options)`: the number of points with which this frame can begin a map; 0 if it cannot.
 template <class S, class D>
-concept sensor = feature_descriptor<D> && requires(const basic_frame<D>& f, const options& settings) {
+concept sensor = feature_descriptor<D> && std::default_initializable<S> &&
+    requires(const basic_frame<D>& f, const options& settings) {
   { S::begins_map(f, settings) } -> std::convertible_to<std::size_t>;
 };
 
 /// Whether a sensor makes frames of these images.
 template <class S, class Camera, class Extractor, class... Images>
-concept measures = requires(const camera_rig<Camera>& rig, const Extractor& extract, const Images&... images) {
-  { S::measure(rig, extract, images...) } -> std::same_as<basic_frame<descriptor_of_t<Extractor>>>;
+concept measures = requires(const S& s, const camera_rig<Camera>& rig, const Extractor& extract,
+                            const Images&... images) {
+  { s.measure(rig, extract, images...) } -> std::same_as<basic_frame<descriptor_of_t<Extractor>>>;
 };
 
 /// How the camera moves while a frame is taken.
@@ -77,24 +85,38 @@ struct rgbd {
   }
 };
 
-template <camera::camera_model Camera, feature_extractor Extractor, camera::depth_source Depth>
-basic_frame<descriptor_of_t<Extractor>> rgbd::measure(const camera_rig<Camera>& rig, const Extractor& extract,
-                                                      image_view<const rgb8> color, const Depth& depth) {
-  const auto usable = [&](double z) { return z >= rig.min_depth && z <= rig.max_depth; };
-  basic_frame<descriptor_of_t<Extractor>> f;
-  f.features = extract(color);
+namespace detail {
+
+/// A frame of features, with rays, before their depth is measured. Features whose pixel has no ray get NaN.
+template <camera::camera_model Camera, feature_descriptor D>
+[[nodiscard]] basic_frame<D> frame_of(const camera_rig<Camera>& rig, features::basic_features<D> features) {
+  basic_frame<D> f;
+  f.features = std::move(features);
   const std::size_t n = f.features.size();
   f.depth.resize(n);
   f.rays.resize(n);
   f.landmarks.assign(n, no_id);
   for (std::size_t i = 0; i < n; ++i) {
     const auto& k = f.features.keypoints[i];
-    const auto ray = rig.camera().unproject(vec2(k.x, k.y));
-    f.rays[i] = ray.value_or(vec3::Constant(std::numeric_limits<double>::quiet_NaN()));
-    const auto z = ray ? features::depth_at(depth, k.x, k.y) : std::nullopt;
-    f.depth[i] = z && usable(z->z) ? static_cast<float>(z->z) : 0.0F;
+    f.rays[i] =
+        rig.camera().unproject(vec2(k.x, k.y)).value_or(vec3::Constant(std::numeric_limits<double>::quiet_NaN()));
   }
   f.grid = features::keypoint_grid(f.features.keypoints);
+  return f;
+}
+
+}  // namespace detail
+
+template <camera::camera_model Camera, feature_extractor Extractor, camera::depth_source Depth>
+basic_frame<descriptor_of_t<Extractor>> rgbd::measure(const camera_rig<Camera>& rig, const Extractor& extract,
+                                                      image_view<const rgb8> color, const Depth& depth) {
+  const auto usable = [&](double z) { return z >= rig.min_depth && z <= rig.max_depth; };
+  auto f = detail::frame_of(rig, extract(color));
+  for (std::size_t i = 0; i < f.size(); ++i) {
+    const auto& k = f.features.keypoints[i];
+    const auto z = std::isnan(f.rays[i].x()) ? std::nullopt : features::depth_at(depth, k.x, k.y);
+    f.depth[i] = z && usable(z->z) ? static_cast<float>(z->z) : 0.0F;
+  }
   return f;
 }
 

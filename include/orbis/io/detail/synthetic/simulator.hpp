@@ -12,8 +12,10 @@
 
 #include <orbis/camera/intrinsics.hpp>
 #include <orbis/camera/rgbd_frame.hpp>
+#include <orbis/camera/stereo_frame.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/image.hpp>
+#include <orbis/core/random.hpp>
 #include <orbis/io/detail/synthetic/camera_path.hpp>
 #include <orbis/io/detail/synthetic/renderer.hpp>
 #include <orbis/io/detail/synthetic/sensor.hpp>
@@ -96,6 +98,29 @@ class simulator {
     });
     f.color = std::move(seen.color);
     return f;
+  }
+
+  /// What two cameras of this kind see at `time`, the second one `baseline` metres to the right of the first. As above.
+  template <execution_policy Policy, class At>
+  [[nodiscard]] camera::stereo_frame stereo(const Policy& policy, const At& at, double time, std::uint64_t key,
+                                            double baseline) const {
+    const auto beside = [&](double when) {
+      moment m = at(when);
+      m.pose.position = m.pose.position + baseline * m.pose.right;
+      return m;
+    };
+    const double gain = exposure_gain(sensor_, seed_, time);
+    const auto picture = [&](const auto& from, std::uint64_t noise) {
+      image<rgb8> color = color_view(policy, from, time).color;
+      if (sensor_.motion_blur > 1) blur(policy, from, time, color);
+      const sensor errors{sensor_, k_.fx, depth_scale_, noise, key};
+      for_each_index(policy, static_cast<std::size_t>(k_.height), renderer::tile, [&](std::size_t row) {
+        const int y = static_cast<int>(row);
+        errors.measure_colour(color.row(y), y, k_.width, k_.height, gain);
+      });
+      return color;
+    };
+    return {time, picture(at, seed_), picture(beside, mix64(seed_ ^ 0x7269676874ULL)), at(time).pose.T_world_camera()};
   }
 
  private:

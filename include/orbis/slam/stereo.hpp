@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// The stereo sensor: two rectified images that are taken at the same time, and the options that suit it.
+#pragma once
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <concepts>
+#include <cstddef>
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include <orbis/camera/model.hpp>
+#include <orbis/core/image.hpp>
+#include <orbis/features/grey.hpp>
+#include <orbis/features/stereo.hpp>
+#include <orbis/slam/camera_rig.hpp>
+#include <orbis/slam/extractor.hpp>
+#include <orbis/slam/frame.hpp>
+#include <orbis/slam/options.hpp>
+#include <orbis/slam/sensor.hpp>
+
+namespace orbis::slam {
+
+/// The left and the right image of a rectified pair (`camera::rectify`), in colour or, if the extractor takes them, in
+/// grey. A feature of the left image has the right coordinate that `features::stereo_matcher` finds for it, or none;
+/// its depth is `options::bf` over the disparity, where that lies within the rig's range. Features without a right
+/// coordinate are observed by their pixel alone and become landmarks once other keyframes see them under enough
+/// parallax. The first frame with enough depth begins a map. It keeps working memory: one call at a time.
+class stereo {
+ public:
+  /// @pre both images have the size of the camera
+  template <camera::camera_model Camera, feature_extractor Extractor>
+  [[nodiscard]] basic_frame<descriptor_of_t<Extractor>> measure(const camera_rig<Camera>& rig, const Extractor& extract,
+                                                                image_view<const rgb8> left,
+                                                                image_view<const rgb8> right) const {
+    const auto grey = [](image_view<const rgb8> color, image<std::uint8_t>& to) {
+      if (to.width() != color.width() || to.height() != color.height())
+        to = image<std::uint8_t>(color.width(), color.height());
+      features::luma(color, to.view());
+    };
+    grey(left, grey_left_);
+    grey(right, grey_right_);
+    if constexpr (takes_grey<Extractor>)
+      return measure(rig, extract, std::as_const(grey_left_).view(), std::as_const(grey_right_).view());
+    else
+      return frame_of(rig, extract(left), std::as_const(grey_left_).view(), extract(right),
+                      std::as_const(grey_right_).view());
+  }
+  template <camera::camera_model Camera, feature_extractor Extractor>
+  requires std::invocable<const Extractor&, image_view<const std::uint8_t>>
+  [[nodiscard]] basic_frame<descriptor_of_t<Extractor>> measure(const camera_rig<Camera>& rig, const Extractor& extract,
+                                                                image_view<const std::uint8_t> left,
+                                                                image_view<const std::uint8_t> right) const {
+    return frame_of(rig, extract(left), left, extract(right), right);
+  }
+
+  /// The number of features with depth, if there are `settings.min_start_points` or more, otherwise 0.
+  template <feature_descriptor D>
+  [[nodiscard]] static std::size_t begins_map(const basic_frame<D>& f, const options& settings) {
+    return rgbd::begins_map(f, settings);
+  }
+
+ private:
+  template <class Extractor>
+  static constexpr bool takes_grey = std::invocable<const Extractor&, image_view<const std::uint8_t>>;
+
+  template <camera::camera_model Camera, feature_descriptor D>
+  [[nodiscard]] basic_frame<D> frame_of(const camera_rig<Camera>& rig, features::basic_features<D> left,
+                                        image_view<const std::uint8_t> left_image,
+                                        const features::basic_features<D>& right,
+                                        image_view<const std::uint8_t> right_image) const {
+    auto f = detail::frame_of(rig, std::move(left));
+    const double bf = rig.model.bf;
+    match_.into(columns_, f.features, left_image, right, right_image,
+                {.levels = rig.scales.levels(),
+                 .scale_factor = static_cast<float>(rig.scales.factor()),
+                 .min_disparity = static_cast<float>(bf / rig.max_depth),
+                 .max_disparity = static_cast<float>(bf / rig.min_depth)});
+    for (std::size_t i = 0; i != f.size(); ++i)
+      if (!std::isnan(columns_[i]) && !std::isnan(f.rays[i].x()))
+        f.depth[i] = static_cast<float>(
+            bf / (static_cast<double>(f.features.keypoints[i].x) - static_cast<double>(columns_[i])));
+    return f;
+  }
+
+  features::stereo_matcher<> match_;
+  mutable image<std::uint8_t> grey_left_, grey_right_;
+  mutable std::vector<float> columns_;
+};
+
+/// Takes colour with depth, or a stereo pair, whichever it is given: for programs that learn at run time which of both
+/// they have. One system is to be given one kind of images.
+struct any_sensor : rgbd, stereo {
+  using rgbd::begins_map;  // both begin alike
+  using rgbd::measure;
+  using stereo::measure;
+};
+
+/// The settings of a rectified stereo camera of focal length `focal` (pixels) and `baseline` (metres), on top of
+/// others: `bf`, the range of depth from a baseline to a disparity of a pixel, and points as close as 40 baselines,
+/// whose depth a single pair tells well enough (R. Mur-Artal, J. D. Tardos, "ORB-SLAM2", T-RO 33 (2017), section
+/// III.A). Points farther than these become landmarks by parallax. @pre focal > 0, baseline > 0
+[[nodiscard]] inline options stereo_options(double focal, double baseline, options settings = {}) {
+  assert(focal > 0.0 && baseline > 0.0);
+  settings.bf = focal * baseline;
+  settings.min_depth = baseline;
+  settings.max_depth = settings.bf;
+  settings.close_depth = std::min(40.0 * baseline, settings.max_depth);
+  return settings;
+}
+
+}  // namespace orbis::slam

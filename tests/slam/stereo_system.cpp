@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <cmath>
+#include <cstddef>
+#include <fstream>
+#include <string>
+
+#include <orbis/camera/pinhole.hpp>
+#include <orbis/eval/ate.hpp>
+#include <orbis/io/camera_file.hpp>
+#include <orbis/io/image.hpp>
+#include <orbis/io/synthetic.hpp>
+#include <orbis/io/trajectory_file.hpp>
+#include <orbis/slam/stereo_system.hpp>
+#include <orbis/slam/validate.hpp>
+
+#include "support/catch.hpp"
+#include "support/data.hpp"
+
+using namespace orbis;
+
+namespace {
+
+double length(const trajectory& poses) {
+  double sum = 0.0;
+  for (std::size_t i = 1; i < poses.size(); ++i)
+    sum += (poses[i].T_world_camera.translation() - poses[i - 1].T_world_camera.translation()).norm();
+  return sum;
+}
+
+/// From the first to the last pose.
+se3 whole_way(const trajectory& poses) { return poses.front().T_world_camera.inverse() * poses.back().T_world_camera; }
+
+}  // namespace
+
+TEST_CASE("A stereo camera's round of a room is as exact as that of an RGB-D camera, and closes the loop") {
+  const io::synthetic_recording room{{.frames = 120, .fps = 10, .seed = 3, .width = 320, .height = 240}};
+  const auto both = room.stereo_camera(), one = room.camera();
+  slam::any_system stereo{both.model, slam::stereo_options(both.model.k().fx, *both.baseline)};
+  slam::any_system rgbd{one.model, slam::options{.bf = one.model.k().fx * *one.baseline}};
+  for (std::size_t i = 0; i != room.size(); ++i) {
+    const auto pair = room.stereo_frame(i).value();
+    CHECK(stereo.track(pair.timestamp, pair.left.view(), pair.right.view()).tracked());
+    CHECK(rgbd.track(room.frame(i).value()).tracked());
+  }
+  CHECK(stereo.counters().loops_closed >= 1);
+  const auto valid = slam::validate(stereo.map());
+  CHECK((valid ? "" : valid.error().to_string()) == "");
+  const auto ours = eval::ate(stereo.trajectory(), room.ground_truth());
+  const auto theirs = eval::ate(rgbd.trajectory(), room.ground_truth());
+  REQUIRE(ours);
+  REQUIRE(theirs);
+  CHECK(ours->translation.rmse < 1.5 * theirs->translation.rmse);
+  CHECK(ours->translation.rmse < 0.01);
+}
+
+TEST_CASE("A drive with a stereo camera is as long as it was") {
+  ORBIS_NEEDS_DATA("kitti_stereo_a");
+  const auto folder = test::data_dir() / "kitti_stereo_a";
+  const auto settings = io::read_camera(folder / "camera.toml").value();
+  slam::stereo_system slam{settings.model, slam::stereo_options(settings.model.k().fx, settings.baseline.value())};
+  std::ifstream left(folder / "rgb.txt"), right(folder / "right.txt");
+  double time = 0.0, right_time = 0.0;
+  std::string name, right_name;
+  while (left >> time >> name && right >> right_time >> right_name) {
+    REQUIRE(time == right_time);
+    const auto a = io::read_color(folder / name).value(), b = io::read_color(folder / right_name).value();
+    CHECK(slam.track(time, a.view(), b.view()).tracked());
+  }
+  const trajectory found = slam.trajectory(), truth = io::read_trajectory(folder / "groundtruth.txt").value();
+  REQUIRE(found.size() == 51);
+  const se3 error = whole_way(truth).inverse() * whole_way(found);
+  CHECK(error.translation().norm() < 0.015 * length(truth));
+  CHECK(error.rotation().angle() < 0.02);  // most of it within the first second, where the truth's is settling
+  CHECK(std::abs(length(found) / length(truth) - 1.0) < 0.015);
+}
+
+TEST_CASE("A system takes a stereo pair, or colour and depth, whichever it is given") {
+  const io::synthetic_recording room{{.frames = 3, .seed = 3, .width = 320, .height = 240, .frames_around = 300}};
+  const auto both = room.stereo_camera();
+  slam::stereo_system stereo{both.model, slam::stereo_options(both.model.k().fx, *both.baseline)};
+  slam::any_system any{both.model, slam::stereo_options(both.model.k().fx, *both.baseline)};
+  for (std::size_t i = 0; i != room.size(); ++i) {
+    const auto pair = room.stereo_frame(i).value();
+    CHECK(stereo.track(pair.timestamp, pair.left.view(), pair.right.view()).tracked());
+    CHECK(any.track(pair.timestamp, pair.left.view(), pair.right.view()).tracked());
+  }
+  CHECK(any.landmark_count() == stereo.landmark_count());
+  // Images of another size than the camera's are lost.
+  const image<rgb8> small(160, 120);
+  CHECK(!stereo.track(10.0, small.view(), small.view()).tracked());
+}
