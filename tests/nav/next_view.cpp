@@ -159,6 +159,23 @@ TEST_CASE("Where ways are very dear the nearest view is taken, though its utilit
   }
 }
 
+TEST_CASE("A view to which only the straight way leads is found whatever that costs") {
+  // A corridor in the middle of which alone the robot fits, between the middles of voxels.
+  map_type map{0.1};
+  fill(map, {0.0, 0.0, 0.0}, {2.0, 0.2, 0.2}, -1.0F);
+  const nav::distance_field field{map, {.reach = 0.6}};
+  const camera::pinhole camera{40, 30, 25.0, 25.0, 19.5, 14.5};
+  const vec3 place{1.0, 0.1, 0.1}, position{0.3, 0.1, 0.1};
+  for (const double weight : {0.0, 1.0}) {
+    const nav::planning_view view{map, field, 0.07, {.clearance_weight = weight}};
+    const auto next =
+        nav::next_best_view(view, std::vector{place}, camera, position,
+                            {.candidates = 100, .min_distance = 0.05, .max_distance = 0.3, .max_elevation = 0.1});
+    CHECK(next.status == next_view_status::found);
+    CHECK(next.path.points.size() == 2);
+  }
+}
+
 TEST_CASE("What cannot be reached is found out once, and what can be is found all the same") {
   map_type map = room();
   fill(map, {0.0, 3.0, 0.0}, {4.0, 3.1, 2.0}, 1.0F);    // a wall across

@@ -496,6 +496,23 @@ TEST_CASE("Leaves that are too large for the field are not gone through") {
     CHECK(is_free(map, path.points[j - 1], path.points[j], 0.3, occupancy::free));
 }
 
+TEST_CASE("Between the middles of cells the straight way is taken whatever it costs") {
+  // A corridor of 2 x 2 voxels, in the middle of which alone the robot fits.
+  map_type map{cell};
+  for (int i = 0; i != 80; ++i) set(map, i / 4, i % 2, i / 2 % 2, false);
+  const nav::distance_field field{map, {.reach = 0.6}};
+  const nav::planning_view view{map, field, 0.07, {.clearance_weight = 1.0}};
+  const vec3 start{0.25, 0.1, 0.1}, goal{1.65, 0.11, 0.1};
+  for (const path_method method : {path_method::grid, path_method::any_angle}) {
+    const auto path = nav::find_path(view, start, goal, {.method = method});
+    REQUIRE(path.status == path_status::found);
+    CHECK(path.points == std::vector{start, goal});
+    CHECK(path.length == Approx((goal - start).norm()));
+    CHECK(path.cost > 1.2 * path.length);
+    CHECK(nav::find_path(view, start, goal, {.method = method, .shorten = false}).status == path_status::unreachable);
+  }
+}
+
 TEST_CASE("A path keeps away from a wall if that is worth the way") {
   map_type map{cell};
   for (int x = 0; x != 30; ++x)

@@ -227,7 +227,7 @@ class distance_field : public metric_distances<squared_distances> {
   [[nodiscard]] distance_view view() const { return {grid_, voxels_.view(), reach_}; }
   /// False if leaves of the map were left out because of `max_bricks`: they count as unknown, at least in places where
   /// the field stores nothing. With unknown space as obstacle distances are then at most too short; with unknown space
-  /// as free, obstacles are missing.
+  /// as free, obstacles are missing. Of a field that is made with `inside` it is the other way round.
   [[nodiscard]] bool is_complete() const noexcept { return is_complete_; }
   [[nodiscard]] const distance_field_options& options() const noexcept { return options_; }
   /// Bytes on the heap.

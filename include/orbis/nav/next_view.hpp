@@ -124,8 +124,8 @@ struct next_view {
 /// to where a path leads, of those whose gain is more than 0 and at least `min_gain`. The best is the one
 /// of the greatest utility, gain * exp(-lambda * length of the path): H. H. Gonzalez-Banos, J.-C. Latombe, "Navigation
 /// strategies for exploring indoor environments", International Journal of Robotics Research 21, 2002. Paths are looked
-/// for only as long as a straight one could still be the best, and none to where no free cells lead. The world has z
-/// up.
+/// for only as long as a straight one could still be the best, and none to where neither the straight way nor free
+/// cells lead. The world has z up.
 ///
 /// All searches that find no way expand less than 2 `path.max_expanded` cells together, whatever the number of
 /// candidates: each one at most half of what is left of that. So where more can be reached than so many cells, as where
@@ -182,7 +182,7 @@ template <planning_map Map, robot_shape Shape, camera::camera_model Camera>
     if (most >= c.bound) break;
     const vec3 goal = c.view.T_world_camera.translation();
     how.max_expanded = left / 2;
-    const bool is_straight = how.shorten && view.is_uniform() && view.is_free(position, goal);
+    const bool is_straight = how.shorten && view.is_free(position, goal);
     if (!is_straight && !floods.may_reach_any(doors.doors(goal), how.max_expanded)) continue;
     c.view.path = find_path(view, position, goal, how);
     if (c.view.path.status != path_status::found) left -= std::min(left, c.view.path.expanded);

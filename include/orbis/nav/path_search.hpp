@@ -11,6 +11,7 @@
 
 #include <algorithm>
 #include <cassert>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <string_view>
@@ -60,12 +61,14 @@ enum class path_method : std::uint8_t {
 
 struct path_options {
   path_method method = path_method::any_angle;
-  /// Of `any_angle`: how many times as much what is left of the way counts as what lies behind; >= 1. At 1 it looks at
-  /// ten times as many cells, for paths that are mostly shorter by less than a tenth of a percent.
+  /// Of `any_angle`: how many times as much what is left of the way counts as what lies behind; finite and >= 1. At 1
+  /// it looks at ten times as many cells, for paths that are mostly shorter by less than a tenth of a percent.
   double heuristic_weight = 1.1;
-  bool shorten = true;                   ///< pull the path straight; else it goes from middle to middle of cells
-  std::size_t max_expanded = 2'000'000;  ///< cells to look at before giving up
-  std::size_t max_checks = 2'000;        ///< straight ways to check in shortening
+  bool shorten = true;  ///< pull the path straight; else it goes from middle to middle of cells
+  /// Cells to look at before giving up. Whether the goal can be reached at all, the nearest place that can, and the way
+  /// there are looked for with as many each.
+  std::size_t max_expanded = 2'000'000;
+  std::size_t max_checks = 2'000;  ///< straight ways to check in shortening
 };
 
 /// A path, or why there is none.
@@ -76,7 +79,7 @@ struct found_path {
   std::vector<vec3> points{};
   double length = 0.0;       ///< of the points, metres
   double cost = 0.0;         ///< see planning_options: the length where nothing else counts; heights of floors do not
-  std::size_t expanded = 0;  ///< cells that were looked at; 0 if the straight way was taken
+  std::size_t expanded = 0;  ///< cells that were looked at in searches; 0 if the straight way was taken at once
 };
 
 /// The length of a polyline, in the unit of its points.
@@ -163,12 +166,18 @@ void shorten_path(const Space& space, std::vector<vec3>& points, std::size_t max
 
 namespace detail {
 
+/// Whether the straight way, which is free, costs no more than its length: no other one is cheaper.
+template <planning_space Space>
+[[nodiscard]] bool costs_its_length(const Space& space, const vec3& a, const vec3& b) {
+  return space.is_uniform() || cost_of(space, a, b) <= (b - a).norm() * (1.0 + 1e-9);
+}
+
 /// Searches over the middles of cells, from a start that is free to a goal (finite) or, where none of `exits` can be
-/// reached, to the cell nearest to it of those that can. Sets the points, and what was expanded.
+/// reached and `or_near`, to the cell nearest to it of those that can. Sets the points, and what was expanded.
 template <planning_space Space>
 [[nodiscard]] search_end search_cells(const Space& space, const vec3& start, const vec3& goal,
                                       const std::vector<octree::voxel_key>& exits, const path_options& options,
-                                      found_path& out) {
+                                      bool or_near, found_path& out) {
   const auto make_search = [&] {
     return voxel_search{space, options.method == path_method::any_angle, options.heuristic_weight};
   };
@@ -186,6 +195,7 @@ template <planning_space Space>
   cell_floods floods{space, start, search.doors(start), goal};
   if (!exits.empty() && floods.may_reach_any(exits, most)) return ended(search, search.go_on(most));
   out.expanded += search.expanded();
+  if (!or_near) return search_end::exhausted;
   if (const auto nearest = floods.nearest(most)) {
     auto to_nearest = make_search();
     end = to_nearest.run(start, space.center(*nearest), {*nearest}, most);
@@ -200,8 +210,10 @@ template <planning_space Space>
 }  // namespace detail
 
 /// A way of the robot `from` a start `to` a goal (metres): the straight one if that is free and costs its length; else
-/// a cheap one over the middles of cells (see path_method), made shorter in continuous space afterwards. Every segment
-/// is free by `space.is_free`: the robot touches no obstacle anywhere on it. Where it cannot go, `status` says why
+/// a cheap one over the middles of cells (see path_method), made shorter in continuous space afterwards, or the
+/// straight one if no other one leads there. Without `shorten` always one over the middles of cells. Every
+/// segment is free by `space.is_free`: the robot touches no obstacle anywhere on it. Where it cannot go, `status` says
+/// why
 /// (also a passage between two middles of cells is not seen that is wide enough for the robot only off the grid), and
 /// the path leads to the nearest point that is reached.
 ///
@@ -209,10 +221,11 @@ template <planning_space Space>
 /// `max_checks` ways to check in shortening. A goal that cannot be reached costs little if it, or the start, is in a
 /// small enclosure, or if it lies in an obstacle. If not, as where unknown space is free and no region is named, it is
 /// looked for until `max_expanded` cells have been seen.
-/// @pre options.heuristic_weight >= 1
+/// @pre options.heuristic_weight is finite and >= 1
 template <planning_space Space>
 [[nodiscard]] found_path find_path(const Space& space, const vec3& from, const vec3& to,
                                    const path_options& options = {}) {
+  assert(options.heuristic_weight >= 1.0 && std::isfinite(options.heuristic_weight));
   found_path out;
   const vec3 start = space.placed(from), goal = space.placed(to);
   if (!space.key(start)) {
@@ -225,21 +238,24 @@ template <planning_space Space>
   }
   const bool is_inside = space.key(goal).has_value();
   const bool is_free = is_inside && space.is_free(goal);
-  assert(options.heuristic_weight >= 1.0);
   if (!goal.allFinite()) {
     out.status = path_status::goal_outside;
     return out;
   }
-  if (is_free && options.shorten && space.is_free(start, goal) &&
-      (space.is_uniform() || detail::cost_of(space, start, goal) <= (goal - start).norm() * (1.0 + 1e-9))) {
+  const bool is_straight = is_free && options.shorten && space.is_free(start, goal);
+  if (is_straight && detail::costs_its_length(space, start, goal)) {
     out.status = path_status::found;
     out.points = {start, goal};
   } else {
     const auto exits = is_free ? detail::voxel_search{space}.doors(goal) : std::vector<octree::voxel_key>{};
-    switch (detail::search_cells(space, start, goal, exits, options, out)) {
+    switch (detail::search_cells(space, start, goal, exits, options, !is_straight, out)) {
       case detail::search_end::found: out.status = path_status::found; break;
       case detail::search_end::exhausted: out.status = path_status::unreachable; break;
       case detail::search_end::stopped: out.status = path_status::gave_up; break;
+    }
+    if (is_straight && out.status == path_status::unreachable) {
+      out.status = path_status::found;
+      out.points = {start, goal};
     }
     if (!is_inside) out.status = path_status::goal_outside;
     if (is_inside && !is_free) out.status = path_status::goal_blocked;
