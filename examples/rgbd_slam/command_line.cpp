@@ -156,6 +156,16 @@ void add_frame_options(CLI::App& cmd, settings& s) {
 }
 
 void add_slam_options(CLI::App& cmd, settings& s) {
+  cmd.add_option_function<std::string>(
+         "--read-out-ms",
+         [&s](const std::string& value) {
+           if (value != "auto") s.read_out_ms = std::stod(value);
+         },
+         "in how many milliseconds the camera's rolling shutter reads an image, the top row first; 0: a global "
+         "shutter; "
+         "auto (default): as the camera file says, else estimated from the first ten seconds")
+      ->check(CLI::IsMember({"auto"}) | within(0.0, 200.0, " ms"))
+      ->type_name("MS");
   cmd.add_flag("--deterministic", s.deterministic,
                "the same bytes on every run: mapping and loop closing take place between the frames, not beside them");
   cmd.add_flag(

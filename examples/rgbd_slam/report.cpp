@@ -14,6 +14,7 @@
 #include <orbis/core/file.hpp>
 
 #include "formatted_text.hpp"
+#include "shutter_stage.hpp"
 #include "summary.hpp"
 
 namespace app {
@@ -279,6 +280,7 @@ std::string stretches(const std::vector<frame_range>& ranges) {
 
 std::string tracking_words(const slam_results& s) {
   std::vector<std::pair<std::string, std::string>> rows;
+  if (!s.shutter.from.empty()) rows.emplace_back("shutter", in_words(s.shutter) + " (" + s.shutter.from + ")");
   rows.emplace_back("map of landmarks",
                     count_text(s.landmarks) + " landmarks in " + count_text(s.keyframes.size()) + " keyframes");
   if (s.keyframes_culled != 0)

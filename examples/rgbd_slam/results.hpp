@@ -6,11 +6,13 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <limits>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include <orbis/camera/shutter.hpp>
 #include <orbis/core/point_cloud.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/core/trajectory.hpp>
@@ -69,6 +71,14 @@ struct world_results {
   std::optional<double> confidence;  ///< 0 ... 1, of what the depth image of the first frame says
 };
 
+/// When the rows of the images are taken.
+struct shutter_results {
+  std::string from;  ///< "given", "camera" or "estimated"
+  orbis::camera::shutter shutter{};
+  double read_out_deviation = std::numeric_limits<double>::quiet_NaN();  ///< of an estimate, seconds
+  double delay_deviation = std::numeric_limits<double>::quiet_NaN();     ///< likewise
+};
+
 /// Frames one after the other.
 struct frame_range {
   std::size_t first = 0, count = 0;
@@ -77,6 +87,7 @@ struct frame_range {
 struct slam_results {
   std::size_t frames = 0, tracked = 0, lost = 0, relocalized = 0, landmarks = 0;
   std::size_t loops_closed = 0, maps_merged = 0, keyframes_culled = 0;
+  shutter_results shutter;
   std::vector<frame_range> lost_stretches;
   std::vector<double> tracking_ms;  ///< of each frame: until tracking is ready for the next one
   std::vector<double> slam_ms;      ///< of it, in SLAM

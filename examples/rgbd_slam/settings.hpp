@@ -36,6 +36,8 @@ struct settings {
   std::optional<orbis::vec3> origin;   ///< of the rays to a cloud's points (map)
   std::optional<orbis::vec3> gravity;  ///< where it pulls, in the frame of the first camera
 
+  std::optional<double> read_out_ms;     ///< of the camera's images, milliseconds; empty: as the camera's settings say,
+                                         ///< or estimated
   double resolution = 0.05;              ///< octree, metres
   double max_depth = 4.0;                ///< depth beyond this is left out of the map, metres
   std::string filter = "auto";           ///< one of `filter_names`

@@ -67,6 +67,13 @@ std::string summary_json(const results& r) {
   j["wall_s"] = r.wall_s;
   j["fps"] = s && s->seconds > 0 ? json(static_cast<double>(s->frames) / s->seconds) : null;
   j["peak_rss_mb"] = peak_rss_mb();
+  const auto milliseconds = [&](double seconds) { return std::isfinite(seconds) ? json(1000.0 * seconds) : null; };
+  j["shutter"] = {{"from", s ? json(s->shutter.from) : null},
+                  {"read_out_ms", s ? milliseconds(s->shutter.shutter.color_read_out) : null},
+                  {"read_out_deviation_ms", s ? milliseconds(s->shutter.read_out_deviation) : null},
+                  {"depth_read_out_ms", s ? milliseconds(s->shutter.shutter.depth_read_out) : null},
+                  {"depth_delay_ms", s ? milliseconds(s->shutter.shutter.depth_delay) : null},
+                  {"depth_delay_deviation_ms", s ? milliseconds(s->shutter.delay_deviation) : null}};
   const auto& w = r.world;
   j["world"] = {{"up_from", w ? json(w->up_from) : null}, {"confidence", w ? or_null(w->confidence) : null}};
   j["ate_rmse_m"] = a ? json(a->ate_rmse_m) : null;

@@ -9,6 +9,7 @@
 #include <orbis/slam/rgbd_system.hpp>
 
 #include "interrupts.hpp"
+#include "shutter_stage.hpp"
 #include "upright_world.hpp"
 
 namespace app {
@@ -211,8 +212,11 @@ std::string in_words(const slam_results& slam) {
 orbis::result<tracked_frames> track(const frame_source& source, const settings& s,
                                     const std::filesystem::path& landmark_map, const std::filesystem::path& spill_file,
                                     viewer& viewer, console& console) {
+  const shutter_results shutter = find_shutter(source, s, console);
   console.stage("tracking");
-  slam_system slam{source.camera.model, options_for(source, s)};
+  orbis::slam::options options = options_for(source, s);
+  options.shutter = shutter.shutter;
+  slam_system slam{source.camera.model, options};
   if (!s.load_map.empty())
     if (auto loaded = slam.load_map(s.load_map); !loaded) return orbis::fail(loaded.error());
   const map_id first_map = slam.active_map();
@@ -242,6 +246,7 @@ orbis::result<tracked_frames> track(const frame_source& source, const settings& 
   out.missed_map = !s.load_map.empty() && !goes_on;
 
   collect(slam, out);
+  out.slam.shutter = shutter;
   if (goes_on)
     out.world = {"loaded map", {}};
   else if (!out.slam.trajectory.empty())

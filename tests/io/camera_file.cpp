@@ -153,3 +153,22 @@ TEST_CASE("tables nested without end are refused before they use up the stack") 
   CHECK(io::parse_camera(camera_text() + std::string(20000, '#')).error().to_string() ==
         "is too large for a file of settings");
 }
+
+TEST_CASE("A camera file may say when the rows of the images are taken") {
+  const std::string camera = "model = \"pinhole\"\nwidth = 640\nheight = 480\nfx = 525.0\nfy = 525.0\n";
+  const auto shutter_of = [&](const std::string& lines) {
+    return io::parse_camera(camera + "cx = 1.0\ncy = 1.0\n" + lines);
+  };
+  CHECK_FALSE(shutter_of("").value().shutter);
+  CHECK(shutter_of("read_out_ms = 0").value().shutter->is_global());
+  const auto both = shutter_of("read_out_ms = 30.0\n").value().shutter;
+  CHECK(both->color_read_out == Approx(0.03));
+  CHECK(both->depth_read_out == both->color_read_out);
+  CHECK(both->depth_delay == 0.0);
+  const auto all = shutter_of("read_out_ms = 30.0\ndepth_read_out_ms = 20\ndepth_delay_ms = -12.5\n").value();
+  CHECK(all.shutter->depth_read_out == Approx(0.02));
+  CHECK(all.shutter->depth_delay == Approx(-0.0125));
+  CHECK_FALSE(shutter_of("read_out_ms = -1.0"));
+  CHECK_FALSE(shutter_of("read_out_ms = \"fast\""));
+  CHECK_FALSE(shutter_of("depth_delay_ms = 2000.0"));
+}

@@ -14,6 +14,9 @@
 ///   depth_scale = 5000.0  # stored value / depth_scale = metres; default 1000
 ///   fps = 30.0            # default 30
 ///   baseline = 0.075      # metres, optional
+///   read_out_ms = 30.0    # of a rolling shutter, top row first, optional; 0: a global shutter
+///   depth_read_out_ms = 30.0  # of the depth image, if it differs
+///   depth_delay_ms = 0.0  # from the middle of the colour image to that of the depth image, if known
 /// @endcode
 #pragma once
 
@@ -63,8 +66,18 @@ namespace orbis::io {
   const std::vector<double> d = fields.numbers("distortion");
   camera::camera_settings settings{
       .model = {}, .depth_scale = fields.positive("depth_scale", 1000.0), .fps = fields.positive("fps", 30.0)};
-  fields.accept_only(
-      {"model", "width", "height", "fx", "fy", "cx", "cy", "distortion", "depth_scale", "fps", "baseline"});
+  fields.accept_only({"model", "width", "height", "fx", "fy", "cx", "cy", "distortion", "depth_scale", "fps",
+                      "baseline", "read_out_ms", "depth_read_out_ms", "depth_delay_ms"});
+  const auto seconds = [&](const char* name, double fallback, double least) {
+    return 0.001 * fields.number(name, 1000.0 * fallback, "a time in milliseconds, at most 1000",
+                                 [&](double v) { return v >= least && v <= 1000.0; });
+  };
+  if (table.contains("read_out_ms") || table.contains("depth_read_out_ms") || table.contains("depth_delay_ms")) {
+    camera::shutter& s = settings.shutter.emplace();
+    s.color_read_out = seconds("read_out_ms", 0.0, 0.0);
+    s.depth_read_out = seconds("depth_read_out_ms", s.color_read_out, 0.0);
+    s.depth_delay = seconds("depth_delay_ms", 0.0, -1000.0);
+  }
   if (table.contains("baseline")) settings.baseline = fields.positive("baseline");
   if (fields.failure()) return fail(*fields.failure());
 
@@ -97,7 +110,8 @@ namespace orbis::io {
   return parse_camera(*text, path);
 }
 
-/// Writes a camera file, whole or not at all, such that reading it gives the same settings exactly.
+/// Writes a camera file, whole or not at all, such that reading it gives the same settings exactly (the times of the
+/// shutter but for rounding).
 /// Errors: write_failed.
 inline result<void> write_camera(const std::filesystem::path& path, const camera::camera_settings& settings) {
   const auto number = [](double value) {
@@ -131,6 +145,10 @@ inline result<void> write_camera(const std::filesystem::path& path, const camera
         << "depth_scale = " << number(settings.depth_scale) << "  # stored value / depth_scale = metres\n"
         << "fps = " << number(settings.fps) << "\n";
     if (settings.baseline) out << "baseline = " << number(*settings.baseline) << "\n";
+    if (settings.shutter)
+      out << "read_out_ms = " << number(1000.0 * settings.shutter->color_read_out)
+          << "\ndepth_read_out_ms = " << number(1000.0 * settings.shutter->depth_read_out)
+          << "\ndepth_delay_ms = " << number(1000.0 * settings.shutter->depth_delay) << "\n";
   });
 }
 

@@ -79,7 +79,8 @@ class synthetic_recording {
     return {.model = camera::pinhole{k_},
             .depth_scale = options_.depth_scale,
             .fps = options_.fps,
-            .baseline = options_.sensor.baseline};
+            .baseline = options_.sensor.baseline,
+            .shutter = options_.sensor.shutter};
   }
   /// Both cameras of `stereo_frame`: as `camera()`, with the distance of the two.
   [[nodiscard]] camera::camera_settings stereo_camera() const {

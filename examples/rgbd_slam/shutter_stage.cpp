@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "shutter_stage.hpp"
+
+#include <cmath>
+#include <cstdio>
+#include <optional>
+#include <string>
+
+#include <orbis/slam/rgbd_system.hpp>
+
+#include "interrupts.hpp"
+
+namespace app {
+namespace {
+
+constexpr double watched = 10.0;  // seconds
+
+std::string milliseconds(double seconds, const char* format = "%.1f") {
+  char buffer[40];
+  std::snprintf(buffer, sizeof buffer, format, 1000.0 * seconds);
+  return buffer;
+}
+
+}  // namespace
+
+shutter_results find_shutter(const frame_source& source, const settings& s, console& console) {
+  shutter_results result;
+  if (s.read_out_ms) {
+    result.from = "given";
+    result.shutter.color_read_out = result.shutter.depth_read_out = 0.001 * *s.read_out_ms;
+    return result;
+  }
+  if (source.camera.shutter) {
+    result.from = "camera";
+    result.shutter = *source.camera.shutter;
+    return result;
+  }
+  result.from = "estimated";
+  console.stage("shutter");
+  orbis::slam::options options;
+  if (source.camera.baseline) options.bf = *source.camera.baseline * source.camera.model.k().fx;
+  options.estimates_shutter = true;
+  orbis::slam::rgbd_system<decltype(orbis::camera::camera_settings::model)> slam{source.camera.model, options};
+  read_ahead frames{source, s.threads != 1};
+  std::optional<double> begin;
+  for (std::size_t i = 0; frames.has_next() && !interrupts::requested(); ++i) {
+    const auto frame = frames.next();
+    if (!frame) break;  // it is told when the frame's turn comes
+    if (!begin) begin = frame->timestamp;
+    if (frame->timestamp - *begin > watched) break;
+    slam.track(*frame);
+    console.advance(i + 1, source.frames, "looking at the first seconds");
+  }
+  const auto found = *slam.estimated_shutter();
+  result.shutter = found.shutter;
+  result.read_out_deviation = found.read_out_deviation;
+  result.delay_deviation = found.delay_deviation;
+  console.finish(in_words(result));
+  return result;
+}
+
+std::string in_words(const shutter_results& r) {
+  const bool estimated = r.from == "estimated";
+  if (r.shutter.is_global())
+    return !estimated ? "global" : std::isfinite(r.read_out_deviation) ? "global, or nearly so" : "taken to be global";
+  const auto value = [&](double seconds, double deviation) {
+    return milliseconds(seconds) + (estimated ? " +- " + milliseconds(deviation) : "") + " ms";
+  };
+  std::string text = "images are read out in " + value(r.shutter.color_read_out, r.read_out_deviation);
+  if (r.shutter.depth_read_out != r.shutter.color_read_out)
+    text += ", depth images in " + milliseconds(r.shutter.depth_read_out) + " ms";
+  if (r.shutter.depth_delay != 0.0)
+    text += ", depth " + value(std::abs(r.shutter.depth_delay), r.delay_deviation) +
+            (r.shutter.depth_delay > 0.0 ? " after colour" : " before colour");
+  return text;
+}
+
+}  // namespace app

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// When the rows of the camera's images are taken: as it is said, or as the first seconds of the recording tell.
+#pragma once
+
+#include <string>
+
+#include "console.hpp"
+#include "results.hpp"
+#include "settings.hpp"
+#include "source.hpp"
+
+namespace app {
+
+/// As `--read-out-ms` says, otherwise as the camera's settings do, otherwise estimated from the first ten seconds,
+/// which are tracked for this alone. Frames that cannot be read end that.
+[[nodiscard]] shutter_results find_shutter(const frame_source& source, const settings& s, console& console);
+
+/// In words, with its deviation where it was estimated.
+[[nodiscard]] std::string in_words(const shutter_results& shutter);
+
+}  // namespace app
