@@ -36,7 +36,7 @@ struct scene {
     f.index = frames++;
     front_end.sync_with_map(maps);
     const std::size_t inliers = front_end.localize(
-        f, maps, is_frozen, [&](const auto&, std::size_t) { return similar; },
+        f, maps, is_frozen, [](const auto&...) {}, [&](const auto&, std::size_t) { return similar; },
         [&](slam::map_id m) {
           maps.remove(m);
           dropped.push_back(m);
