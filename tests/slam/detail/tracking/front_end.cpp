@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <cstddef>
+#include <optional>
 #include <vector>
 
 #include <orbis/camera/any.hpp>
@@ -36,16 +37,18 @@ struct scene {
     f.index = frames++;
     front_end.sync_with_map(maps);
     const std::size_t inliers = front_end.localize(
-        f, maps, is_frozen, [](const auto&...) {}, [&](const auto&, std::size_t) { return similar; },
+        f, maps, is_frozen, [](slam::frame&, const slam::frame_motion&) {},
+        [&](const auto&, std::size_t) { return similar; },
         [&](slam::map_id m) {
           maps.remove(m);
           dropped.push_back(m);
         });
+    std::optional<slam::map_keyframe> made;
     if (inliers > 0) {
       front_end.update_reference(f, maps);
-      if (!is_frozen && front_end.needs_keyframe(f, inliers, maps)) front_end.make_keyframe(f, maps);
+      if (!is_frozen && front_end.needs_keyframe(f, inliers, maps)) made = front_end.make_keyframe(f, maps);
     }
-    front_end.finish(std::move(f), maps);
+    front_end.finish(std::move(f), maps, made);
     return inliers;
   }
   std::size_t see(std::uint32_t step) { return feed(world.look(step, se3{})); }
