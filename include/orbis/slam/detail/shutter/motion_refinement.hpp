@@ -130,8 +130,9 @@ template <camera::camera_model Camera>
     const double error = std::sqrt(r->squaredNorm() * o.seen.information);
     const double weight = o.seen.information * (error <= width ? 1.0 : width / error);
     e.cost += error <= width ? 0.5 * error * error : width * (error - 0.5 * width);
-    const mat6 a = weight * (j.transpose() * j);
-    const vec6 b = weight * (j.transpose() * *r);
+    const matrix<6, 3> weighted = weight * j.transpose();
+    const mat6 a = weighted * j;
+    const vec6 b = weighted * *r;
     h[0] += a, h[1] -= o.time * a, h[2] += o.time * o.time * a;
     g[0] += b, g[1] -= o.time * b;
   }
