@@ -5,6 +5,7 @@
 /// | header                | what it is for                                                                   |
 /// | --------------------- | -------------------------------------------------------------------------------- |
 /// | `recording.hpp`       | RGB-D recordings in the layouts of TUM RGB-D, 7-Scenes and ICL-NUIM              |
+/// | `stereo_recording.hpp` | stereo recordings in the layouts of KITTI odometry and ASL (EuRoC), or of two folders |
 /// | `synthetic.hpp`       | a recording rendered on the fly, whose poses and surfaces are known exactly      |
 /// | `synthetic_options.hpp` | its room, its camera's path and its sensor's errors                            |
 /// | `camera_file.hpp`     | `camera.toml`: model, size, intrinsics, distortion, depth scale                  |
@@ -29,6 +30,7 @@
 #include <orbis/io/ply.hpp>
 #include <orbis/io/png.hpp>
 #include <orbis/io/recording.hpp>
+#include <orbis/io/stereo_recording.hpp>
 #include <orbis/io/synthetic.hpp>
 #include <orbis/io/synthetic_options.hpp>
 #include <orbis/io/toml.hpp>

@@ -592,6 +592,22 @@ def texts():
     write("read_trajectory", "mark", b"\xef\xbb\xbf1 0 0 0 0 0 0 1\r\n+2 0 0 0 0 0 0 1")
     write("read_trajectory", "matrix", b"1 0 0 1\n0 0.001 -1 2\n0 1 0 3\n0 0 0 1\n")
     write("read_trajectory", "mirror", b"1 0 0 1\n0 1 0 2\n0 0 -1 3\n0 0 0 1\n")
+    sensor = (b"# General.\nsensor_type: camera\nT_BS:\n  cols: 4\n  rows: 4\n"
+              b"  data: [0.0, -1.0, 0.0, 0.1,\n         1.0, 0.0, 0.0, -0.06,\n         0, 0, 1, 0.01,\n         0, 0, 0, 1]\n"
+              b"rate_hz: 20\nresolution: [752, 480]\ncamera_model: pinhole\n"
+              b"intrinsics: [458.654, 457.296, 367.215, 248.375] #fu, fv, cu, cv\n"
+              b"distortion_model: radial-tangential\ndistortion_coefficients: [-0.283, 0.07, 0.0002, 1.7e-05]\n")
+    write("read_stereo", "sensor", sensor)
+    write("read_stereo", "equidistant", b"%YAML:1.0\n---\n" + sensor.replace(b"radial-tangential", b'"equidistant"'))
+    write("read_stereo", "no_end", sensor.replace(b"1]", b"1"))
+    write("read_stereo", "empty_list", sensor.replace(b"[752, 480]", b"[]"))
+    write("read_stereo", "open_list", b"a: [")
+    write("read_stereo", "huge", sensor.replace(b"458.654", b"1e308").replace(b"0.01,", b"1e300,"))
+    write("read_stereo", "asl_list", b"#timestamp [ns],filename\r\n1403636579763555584,1.png\r\n2,\n3,a b.png\n")
+    write("read_stereo", "asl_poses", b"#t,p\n1403636579763555584,1,2,3,1,0,0,0,0.1\n5,1,2,3,0,0,0,1e-200\n")
+    write("read_stereo", "calibration", b"P0: 7 0 3.5 0 0 7 2.5 0 0 0 1 0\nP1: 7 0 3.5 -3.5 0 7 2.5 0 0 0 1 0\nTr: 1\n")
+    write("read_stereo", "times", b"0.000000e+00\n1.036e-01\n2.073e-01\n")
+    write("read_stereo", "poses", b"1 0 0 0 0 1 0 0 0 0 1 0\n0.999 0 0 0.5 0 1 0 0 0 0 1 1\n")
     write("read_list", "images", b"# color images\n1.06 rgb/1.06.png\n1.00 rgb/1.00.png\n1.00 rgb/a b.png\n")
     write("read_list", "pairs", b"1.0 rgb/1.png 1.01 depth/1.png\n2.0 depth/2.png 2.01 rgb/2.png\n")
     write("read_list", "absolute", b"1 /a/../b//c.png 1 ////\n")

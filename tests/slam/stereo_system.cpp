@@ -1,15 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <cmath>
 #include <cstddef>
-#include <fstream>
-#include <string>
 
-#include <orbis/camera/pinhole.hpp>
 #include <orbis/eval/ate.hpp>
-#include <orbis/io/camera_file.hpp>
-#include <orbis/io/image.hpp>
+#include <orbis/io/stereo_recording.hpp>
 #include <orbis/io/synthetic.hpp>
-#include <orbis/io/trajectory_file.hpp>
 #include <orbis/slam/stereo_system.hpp>
 #include <orbis/slam/validate.hpp>
 
@@ -56,17 +51,14 @@ TEST_CASE("A stereo camera's round of a room is as exact as that of an RGB-D cam
 TEST_CASE("A drive with a stereo camera is as long as it was") {
   ORBIS_NEEDS_DATA("kitti_stereo_a");
   const auto folder = test::data_dir() / "kitti_stereo_a";
-  const auto settings = io::read_camera(folder / "camera.toml").value();
-  slam::stereo_system slam{settings.model, slam::stereo_options(settings.model.k().fx, settings.baseline.value())};
-  std::ifstream left(folder / "rgb.txt"), right(folder / "right.txt");
-  double time = 0.0, right_time = 0.0;
-  std::string name, right_name;
-  while (left >> time >> name && right >> right_time >> right_name) {
-    REQUIRE(time == right_time);
-    const auto a = io::read_color(folder / name).value(), b = io::read_color(folder / right_name).value();
-    CHECK(slam.track(time, a.view(), b.view()).tracked());
+  const auto recording = io::open_stereo_recording(folder).value();
+  const auto settings = recording.camera();
+  slam::stereo_system slam{settings.model, slam::stereo_options(settings.model.k().fx, *settings.baseline)};
+  for (std::size_t i = 0; i != recording.size(); ++i) {
+    const auto pair = recording.frame(i).value();
+    CHECK(slam.track(pair.timestamp, pair.left.view(), pair.right.view()).tracked());
   }
-  const trajectory found = slam.trajectory(), truth = io::read_trajectory(folder / "groundtruth.txt").value();
+  const trajectory found = slam.trajectory(), &truth = recording.ground_truth();
   REQUIRE(found.size() == 51);
   const se3 error = whole_way(truth).inverse() * whole_way(found);
   CHECK(error.translation().norm() < 0.015 * length(truth));

@@ -1,0 +1,196 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Recordings in the ASL layout, as EuRoC MAV and TUM-VI have it: `mav0/cam0` and `mav0/cam1`, each with `data.csv`,
+/// `data/` and `sensor.yaml`, and `mav0/state_groundtruth_estimate0` (or `mocap0`).
+///
+/// Source: M. Burri et al., "The EuRoC micro aerial vehicle datasets", IJRR 35 (2016). Times are nanoseconds. Poses are
+/// those of a body; `T_BS` of `sensor.yaml` says where a sensor is on it.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include <orbis/camera/any.hpp>
+#include <orbis/core/file.hpp>
+#include <orbis/core/result.hpp>
+#include <orbis/core/se3.hpp>
+#include <orbis/core/trajectory.hpp>
+#include <orbis/io/detail/files/plain_yaml.hpp>
+#include <orbis/io/detail/recordings/recording_index.hpp>
+#include <orbis/io/detail/recordings/seven_scenes.hpp>
+#include <orbis/io/detail/recordings/stereo_index.hpp>
+#include <orbis/io/detail/recordings/tum.hpp>
+#include <orbis/io/detail/text.hpp>
+
+namespace orbis::io::detail {
+
+/// A camera and its place on the body.
+struct asl_camera {
+  camera::any_camera model;
+  se3 T_body_camera;
+  double rate = 20.0;  ///< images per second
+};
+
+/// The text of a camera's `sensor.yaml`. Errors: malformed (with file and line), unsupported (a model that we do not
+/// know).
+[[nodiscard]] inline result<asl_camera> parse_asl_camera(std::string_view text, const std::filesystem::path& where) {
+  const auto yaml = plain_yaml::parse(text, where);
+  if (!yaml) return fail(yaml.error());
+  const auto reject = [&](std::string why) { return fail(errc::malformed, where.string(), std::move(why)); };
+  const auto model = yaml->text("camera_model"), distortion = yaml->text("distortion_model");
+  const auto size = yaml->numbers("resolution", 2), f = yaml->numbers("intrinsics", 4),
+             T = yaml->numbers("T_BS.data", 16);
+  const auto d = yaml->numbers("distortion_coefficients");
+  for (const auto* read : {&model, &distortion})
+    if (!*read) return fail(read->error());
+  for (const auto* read : {&size, &f, &T, &d})
+    if (!*read) return fail(read->error());
+  const auto is_size = [](double v) { return v >= 1.0 && v <= 1e5 && v == std::floor(v); };
+  if (!is_size((*size)[0]) || !is_size((*size)[1])) return reject("resolution must be two whole numbers up to 100000");
+  for (const std::size_t i : {0U, 1U})
+    if (!((*f)[i] > 0.0 && (*f)[i] < 1e9 && std::abs((*f)[i + 2]) < 1e9))
+      return reject("intrinsics must be two focal lengths above zero and the principal point");
+  const camera::intrinsics k{
+      static_cast<int>((*size)[0]), static_cast<int>((*size)[1]), (*f)[0], (*f)[1], (*f)[2], (*f)[3]};
+  if (*model != "pinhole")
+    return fail(errc::unsupported, where.string(), "camera_model \"" + *model + "\" is not pinhole");
+  asl_camera camera;
+  if (*distortion == "radial-tangential" || *distortion == "radtan") {
+    if (d->size() != 4 && d->size() != 5) return reject("distortion_coefficients of radial-tangential are 4 or 5");
+    camera.model = camera::radial_tangential{k, {(*d)[0], (*d)[1], (*d)[2], (*d)[3], d->size() == 5 ? (*d)[4] : 0.0}};
+  } else if (*distortion == "equidistant") {
+    if (d->size() != 4) return reject("distortion_coefficients of equidistant are 4");
+    camera.model = camera::kannala_brandt{k, {(*d)[0], (*d)[1], (*d)[2], (*d)[3]}};
+  } else if (*distortion == "none") {
+    camera.model = camera::pinhole{k};
+  } else {
+    return fail(errc::unsupported, where.string(),
+                "distortion_model \"" + *distortion + "\" is not one of radial-tangential, equidistant, none");
+  }
+  std::string matrix = yaml->text("T_BS.data").value();
+  std::replace_if(
+      matrix.begin(), matrix.end(), [](char c) { return c == ',' || c == '[' || c == ']'; }, ' ');
+  const auto pose = parse_pose_matrix(matrix, where);
+  if (!pose) return reject("T_BS: " + pose.error().message);
+  camera.T_body_camera = *pose;
+  if (yaml->contains("rate_hz")) {
+    const auto rate = yaml->numbers("rate_hz", 1);
+    if (!rate) return fail(rate.error());
+    if (!((*rate)[0] > 0.0 && (*rate)[0] < 1e9)) return reject("rate_hz must be a number above zero");
+    camera.rate = (*rate)[0];
+  }
+  return camera;
+}
+
+/// The text of a camera's `data.csv`: `nanoseconds,file` a line; files are in `folder`. Unreadable lines are left out
+/// and noted. Errors: no_data (no line is left).
+[[nodiscard]] inline result<std::vector<stamped_file>> parse_asl_list(std::string_view text,
+                                                                      const std::filesystem::path& list,
+                                                                      const std::filesystem::path& folder,
+                                                                      std::vector<std::string>& notes) {
+  std::vector<stamped_file> files;
+  skipped_lines skipped{list, notes};
+  for_each_line(text, [&](std::string_view line, std::size_t number) {
+    const std::size_t comma = std::min(line.find(','), line.size());
+    std::int64_t nanoseconds = 0;
+    const std::string_view name = trimmed(line.substr(std::min(comma + 1, line.size())));
+    if (!parse_number(trimmed(line.substr(0, comma)), nanoseconds) || name.empty())
+      skipped.add(number, "not a time and a file name");
+    else
+      files.push_back({1e-9 * static_cast<double>(nanoseconds), folder / std::filesystem::path{name}});
+    return true;
+  });
+  skipped.finish();
+  return in_order_of_time(list, std::move(files), notes);
+}
+
+/// The text of the ground truth's `data.csv`: nanoseconds, position and quaternion (w first) of the body, and what else
+/// there is. Errors: malformed, with the line.
+[[nodiscard]] inline result<trajectory> parse_asl_poses(std::string_view text, const std::filesystem::path& where) {
+  trajectory poses;
+  std::size_t bad_line = 0;
+  for_each_line(text, [&](std::string_view line, std::size_t number) {
+    std::int64_t nanoseconds = 0;
+    double v[7];
+    const auto next = [&] {
+      const std::size_t comma = std::min(line.find(','), line.size());
+      const std::string_view field = trimmed(line.substr(0, comma));
+      line.remove_prefix(std::min(comma + 1, line.size()));
+      return field;
+    };
+    bool good = parse_number(next(), nanoseconds);
+    for (double& value : v) good = good && parse_number(next(), value) && std::isfinite(value);
+    const so3::quaternion q = good ? so3::quaternion(v[3], v[4], v[5], v[6]) : so3::quaternion(0.0, 0.0, 0.0, 0.0);
+    if (!(q.norm() > 1e-6) || !std::isfinite(q.norm())) return bad_line = number, false;
+    poses.push_back({1e-9 * static_cast<double>(nanoseconds), se3{so3{q}, vec3{v[0], v[1], v[2]}}});
+    return true;
+  });
+  if (bad_line != 0)
+    return fail(errc::malformed, at_line(where, bad_line), "a pose has a time, a position and a quaternion");
+  std::stable_sort(poses.begin(), poses.end(), [](const auto& a, const auto& b) { return a.timestamp < b.timestamp; });
+  return poses;
+}
+
+/// The folder that holds `cam0` and `cam1`; empty if there is none.
+[[nodiscard]] inline std::filesystem::path asl_root(const std::filesystem::path& folder) {
+  for (const auto& root : {folder / "mav0", folder})
+    if (present(root / "cam0" / "sensor.yaml") || present(root / "cam0" / "data.csv")) return root;
+  return {};
+}
+
+/// Whether `folder` looks like a recording in the ASL layout.
+[[nodiscard]] inline bool is_asl(const std::filesystem::path& folder) { return !asl_root(folder).empty(); }
+
+/// The index of a recording in the ASL layout. Images are paired within `max_time_difference` seconds; what finds no
+/// partner is noted. Errors: not_found (a file), unreadable, no_data, malformed (with file and line), unsupported.
+[[nodiscard]] inline result<stereo_index> index_asl(const std::filesystem::path& folder, double max_time_difference) {
+  const auto root = asl_root(folder);
+  if (root.empty())
+    return fail(errc::not_found, (folder / "mav0" / "cam0").string(), "no such folder with sensor.yaml");
+  stereo_index index;
+  recording_index& images = index.images;
+  asl_camera cameras[2];
+  std::vector<stamped_file> lists[2];
+  for (const int i : {0, 1}) {
+    const auto where = root / ("cam" + std::to_string(i));
+    const auto settings = read_file(where / "sensor.yaml", plain_yaml::max_bytes), list = read_file(where / "data.csv");
+    if (!settings) return fail(settings.error());
+    if (!list) return fail(list.error());
+    auto camera = parse_asl_camera(*settings, where / "sensor.yaml");
+    if (!camera) return fail(camera.error());
+    auto files = parse_asl_list(*list, where / "data.csv", where / "data", images.notes);
+    if (!files) return fail(files.error());
+    cameras[i] = *std::move(camera);
+    lists[i] = *std::move(files);
+    images.files.insert(images.files.end(), {where / "sensor.yaml", where / "data.csv"});
+  }
+  if (auto paired = pair_images(lists[0], lists[1], folder, max_time_difference, images); !paired)
+    return fail(paired.error());
+  index.cameras = {cameras[0].model, cameras[1].model, cameras[0].T_body_camera.inverse() * cameras[1].T_body_camera};
+  index.fps = cameras[0].rate;
+  for (const char* const name : {"state_groundtruth_estimate0", "mocap0"}) {
+    const auto file = root / name / "data.csv";
+    if (!present(file)) continue;
+    const auto text = read_file(file);
+    if (!text) return fail(text.error());
+    auto truth = parse_asl_poses(*text, file);
+    if (!truth) return fail(truth.error());
+    images.ground_truth = *std::move(truth);
+    for (stamped_pose& p : images.ground_truth) p.T_world_camera = p.T_world_camera * cameras[0].T_body_camera;
+    images.files.push_back(file);
+    attach_ground_truth(images, 0.02);
+    break;
+  }
+  return index;
+}
+
+}  // namespace orbis::io::detail
