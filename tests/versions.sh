@@ -15,4 +15,5 @@ names CHANGELOG.md "## [$version]"
 names cmake/packaging/debian/changelog "orbis ($version-"
 names cmake/packaging/vcpkg/vcpkg.json "\"version\": \"$version\""
 names cmake/packaging/conan/conanfile.py "version = \"$version\""
+names tests/consume/project/CMakeLists.txt "find_package(orbis ${version%.*} "
 exit $status
