@@ -63,25 +63,27 @@ struct asl_camera {
       static_cast<int>((*size)[0]), static_cast<int>((*size)[1]), (*f)[0], (*f)[1], (*f)[2], (*f)[3]};
   if (*model != "pinhole")
     return fail(errc::unsupported, where.string(), "camera_model \"" + *model + "\" is not pinhole");
-  asl_camera camera;
-  if (*distortion == "radial-tangential" || *distortion == "radtan") {
-    if (d->size() != 4 && d->size() != 5) return reject("distortion_coefficients of radial-tangential are 4 or 5");
-    camera.model = camera::radial_tangential{k, {(*d)[0], (*d)[1], (*d)[2], (*d)[3], d->size() == 5 ? (*d)[4] : 0.0}};
-  } else if (*distortion == "equidistant") {
-    if (d->size() != 4) return reject("distortion_coefficients of equidistant are 4");
-    camera.model = camera::kannala_brandt{k, {(*d)[0], (*d)[1], (*d)[2], (*d)[3]}};
-  } else if (*distortion == "none") {
-    camera.model = camera::pinhole{k};
-  } else {
+  const auto lens = [&]() -> result<camera::any_camera> {
+    const std::vector<double>& c = *d;
+    if (*distortion == "radial-tangential" || *distortion == "radtan") {
+      if (c.size() != 4 && c.size() != 5) return reject("distortion_coefficients of radial-tangential are 4 or 5");
+      return camera::any_camera{camera::radial_tangential{k, {c[0], c[1], c[2], c[3], c.size() == 5 ? c[4] : 0.0}}};
+    }
+    if (*distortion == "equidistant") {
+      if (c.size() != 4) return reject("distortion_coefficients of equidistant are 4");
+      return camera::any_camera{camera::kannala_brandt{k, {c[0], c[1], c[2], c[3]}}};
+    }
+    if (*distortion == "none") return camera::any_camera{camera::pinhole{k}};
     return fail(errc::unsupported, where.string(),
                 "distortion_model \"" + *distortion + "\" is not one of radial-tangential, equidistant, none");
-  }
+  }();
+  if (!lens) return fail(lens.error());
   std::string matrix = yaml->text("T_BS.data").value();
   std::replace_if(
       matrix.begin(), matrix.end(), [](char c) { return c == ',' || c == '[' || c == ']'; }, ' ');
   const auto pose = parse_pose_matrix(matrix, where);
   if (!pose) return reject("T_BS: " + pose.error().message);
-  camera.T_body_camera = *pose;
+  asl_camera camera{*lens, *pose};
   if (yaml->contains("rate_hz")) {
     const auto rate = yaml->numbers("rate_hz", 1);
     if (!rate) return fail(rate.error());
