@@ -134,9 +134,16 @@ void add_plan_options(CLI::App& cmd, settings& s, std::string& from, std::string
   cmd.add_flag("--quiet", s.quiet, "say nothing but errors");
 }
 
+void add_sensor_option(CLI::App& cmd, settings& s, const std::vector<std::string>& sensors) {
+  cmd.add_option("--sensor", s.sensor, "what takes the images: depth by itself, or two cameras")
+      ->check(CLI::IsMember(sensors))
+      ->type_name("S");
+}
+
 void add_recording_options(CLI::App& cmd, settings& s) {
+  add_sensor_option(cmd, s, {"auto", "rgbd", "stereo"});
   cmd.add_option("--format", s.format, "layout of the recording")
-      ->check(CLI::IsMember({"auto", "tum", "7scenes", "icl"}))
+      ->check(CLI::IsMember({"auto", "tum", "7scenes", "icl", "kitti", "asl", "pairs"}))
       ->capture_default_str()
       ->type_name("F");
   cmd.add_option("--camera", s.camera, "camera.toml, or tum_fr1, tum_fr2, tum_fr3, icl, kinect")
@@ -268,7 +275,7 @@ std::variant<settings, exit_code> read_command_line(int argc, char** argv) {
       "4 there is no way (plan).\n"
       "Interrupting a run keeps what it has reached (130).");
 
-  CLI::App* run = cli.add_subcommand("run", "SLAM on a recording (TUM, 7-Scenes, ICL-NUIM)");
+  CLI::App* run = cli.add_subcommand("run", "SLAM on a recording (TUM, 7-Scenes, ICL-NUIM; stereo: KITTI, ASL)");
   run->add_option("DATASET", s.input, "the recording's folder")->required()->type_name("");
   add_recording_options(*run, s);
   add_frame_options(*run, s);
@@ -277,6 +284,7 @@ std::variant<settings, exit_code> read_command_line(int argc, char** argv) {
   add_viewer_options(*run, s);
 
   CLI::App* demo = cli.add_subcommand("demo", "SLAM on a synthetic room made on the fly, with ground truth");
+  add_sensor_option(*demo, s, {"auto", "rgbd", "stereo"});
   add_frame_options(*demo, s);
   count(*demo, "--width", s.width, "width of the images, pixels; the height is 3/4 of it", 160, 1920)
       ->capture_default_str();

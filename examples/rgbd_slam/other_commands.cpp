@@ -33,9 +33,10 @@ orbis::result<posed_frames> frames_with_poses(const frame_source& source, const 
   orbis::se3 T_world_truth;
   read_ahead frames{source, s.threads != 1};
   for (std::size_t i = 0; frames.has_next(); ++i) {
-    const auto frame = frames.next();
+    auto frame = frames.next();
     if (!frame) return orbis::fail(frame.error());
     if (frame->T_world_camera) {
+      source.complete(*frame);
       if (posed.size() == 0) {
         upright_worlds worlds{source, s};
         T_world_truth = worlds.begin_with(*frame, true) * frame->T_world_camera->inverse();

@@ -26,6 +26,7 @@ struct settings {
   std::filesystem::path out;        ///< where the files go
   std::filesystem::path config;     ///< file with options; empty: none
 
+  std::string sensor = "auto";  ///< "rgbd" or "stereo", or as the recording is
   std::string format = "auto";
   std::string camera;                  ///< file or preset; empty: as the recording says
   std::size_t frames = 0;              ///< at most so many; 0: all

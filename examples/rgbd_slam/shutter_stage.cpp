@@ -35,6 +35,10 @@ shutter_results find_shutter(const frame_source& source, const settings& s, cons
     result.shutter = *source.camera.shutter;
     return result;
   }
+  if (source.is_stereo) {  // of which few have a rolling shutter, and none a depth image
+    result.from = "camera";
+    return result;
+  }
   result.from = "estimated";
   console.stage("shutter");
   orbis::slam::options options;

@@ -8,11 +8,14 @@
 #include <utility>
 
 #include <orbis/camera/presets.hpp>
+#include <orbis/camera/stereo_frame.hpp>
 #include <orbis/io/camera_file.hpp>
 #include <orbis/io/recording.hpp>
+#include <orbis/io/stereo_recording.hpp>
 #include <orbis/io/synthetic.hpp>
 
 #include "background.hpp"
+#include "stereo_depth.hpp"
 
 namespace app {
 namespace {
@@ -27,6 +30,75 @@ result<orbis::camera::camera_settings> named_camera(const std::string& name) {
 std::size_t limited(std::size_t available, const settings& s) {
   const std::size_t every = (available + s.stride - 1) / s.stride;
   return s.frames == 0 ? every : std::min(every, s.frames);
+}
+
+source_frame with_depth(orbis::camera::rgbd_frame frame) { return {std::move(frame), {}}; }
+source_frame with_right(orbis::camera::stereo_frame pair, double depth_scale) {
+  source_frame f;
+  f.timestamp = pair.timestamp;
+  f.color = std::move(pair.left);
+  f.right = std::move(pair.right);
+  f.depth_scale = depth_scale;
+  f.T_world_camera = pair.T_world_camera;
+  return f;
+}
+
+/// What is taken off all positions, so that results are near their origin; tells the user if that is something.
+orbis::vec3 take_origin_off(frame_source& source) {
+  const orbis::vec3 origin = source.ground_truth.empty()
+                                 ? orbis::vec3::Zero()
+                                 : nearby_origin(source.ground_truth.front().T_world_camera.translation());
+  for (orbis::stamped_pose& p : source.ground_truth)
+    p.T_world_camera = {p.T_world_camera.rotation(), p.T_world_camera.translation() - origin};
+  if (!origin.isZero()) source.notes.push_back(origin_note(origin));
+  return origin;
+}
+template <class Frame>
+result<Frame> moved(result<Frame> frame, const orbis::vec3& origin) {
+  if (frame && frame->T_world_camera) {
+    const orbis::se3& pose = *frame->T_world_camera;
+    frame->T_world_camera = orbis::se3{pose.rotation(), pose.translation() - origin};
+  }
+  return frame;
+}
+
+result<frame_source> open_stereo_recording(const settings& s) {
+  using orbis::io::stereo_format;
+  orbis::io::stereo_recording_options options{.format = s.format == "kitti"   ? stereo_format::kitti
+                                                        : s.format == "asl"   ? stereo_format::asl
+                                                        : s.format == "pairs" ? stereo_format::pairs
+                                                                              : stereo_format::automatic};
+  if (!s.camera.empty()) {
+    auto camera = named_camera(s.camera);
+    if (!camera) return fail(camera.error());
+    options.camera = *std::move(camera);
+  }
+  auto opened = orbis::io::open_stereo_recording(s.input, options);
+  if (!opened) return fail(opened.error());
+  const auto recording = std::make_shared<const orbis::io::stereo_recording>(*std::move(opened));
+  frame_source source;
+  source.title = std::filesystem::weakly_canonical(s.input).filename().string();
+  source.kind = "stereo recording (" + std::string{to_string(recording->format())} + ")";
+  source.camera = recording->camera();
+  source.is_stereo = true;
+  source.frames = limited(recording->size(), s);
+  source.ground_truth = recording->ground_truth();
+  source.notes.assign(recording->notes().begin(), recording->notes().end());
+  const orbis::vec3 origin = take_origin_off(source);
+  source.frame = [recording, origin, stride = s.stride](std::size_t i) -> result<source_frame> {
+    auto pair = moved(recording->frame(i * stride), origin);
+    if (!pair) return fail(pair.error());
+    return with_right(*std::move(pair), recording->camera().depth_scale);
+  };
+  source.color = [recording, stride = s.stride](std::size_t i) { return recording->left(i * stride); };
+  source.files = recording->files();
+  if (const double close = 20.0 * *source.camera.baseline; close > s.max_depth && !s.localize_only) {
+    char text[120];
+    std::snprintf(text, sizeof text, "depth beyond %g m is left out of the map; the cameras measure up to %.0f m well",
+                  s.max_depth, close);
+    source.notes.push_back(text + std::string{" (--max-depth)"});
+  }
+  return source;
 }
 
 result<frame_source> open_recording(const settings& s) {
@@ -44,6 +116,9 @@ result<frame_source> open_recording(const settings& s) {
   if (!opened) {
     orbis::error e = opened.error();
     if (e.code == orbis::errc::invalid_argument && s.camera.empty()) e.message += " with --camera";
+    if (e.code == orbis::errc::unsupported && s.sensor == "auto" && s.format == "auto")
+      if (const auto stereo = orbis::io::open_stereo_recording(s.input); !stereo)
+        if (stereo.error().message != e.message) e.message += "; and " + stereo.error().message;
     return fail(std::move(e));
   }
 
@@ -54,23 +129,26 @@ result<frame_source> open_recording(const settings& s) {
   source.camera = recording->camera();
   source.frames = limited(recording->size(), s);
   source.ground_truth = recording->ground_truth();
-  const orbis::vec3 origin = source.ground_truth.empty()
-                                 ? orbis::vec3::Zero()
-                                 : nearby_origin(source.ground_truth.front().T_world_camera.translation());
-  const auto moved = [origin](const orbis::se3& pose) {
-    return orbis::se3{pose.rotation(), pose.translation() - origin};
-  };
-  for (orbis::stamped_pose& p : source.ground_truth) p.T_world_camera = moved(p.T_world_camera);
-  source.frame = [recording, moved, stride = s.stride](std::size_t i) {
-    auto frame = recording->frame(i * stride);
-    if (frame && frame->T_world_camera) frame->T_world_camera = moved(*frame->T_world_camera);
-    return frame;
+  source.notes.assign(recording->notes().begin(), recording->notes().end());
+  const orbis::vec3 origin = take_origin_off(source);
+  source.frame = [recording, origin, stride = s.stride](std::size_t i) -> result<source_frame> {
+    auto frame = moved(recording->frame(i * stride), origin);
+    if (!frame) return fail(frame.error());
+    return with_depth(*std::move(frame));
   };
   source.color = [recording, stride = s.stride](std::size_t i) { return recording->color(i * stride); };
   source.files = recording->files();
-  source.notes.assign(recording->notes().begin(), recording->notes().end());
-  if (!origin.isZero()) source.notes.push_back(origin_note(origin));
   return source;
+}
+
+/// Whether the recording is to be read as a stereo one. A folder that has depth as well is one with depth.
+bool is_stereo(const settings& s) {
+  if (s.sensor != "auto") return s.sensor == "stereo";
+  if (s.format == "kitti" || s.format == "asl" || s.format == "pairs") return true;
+  std::error_code ignored;
+  for (const char* const depth : {"depth.txt", "associations.txt", "depth"})
+    if (std::filesystem::exists(s.input / depth, ignored)) return false;
+  return s.format == "auto" && orbis::io::detect_stereo_format(s.input) != orbis::io::stereo_format::automatic;
 }
 
 /// A synthetic recording whose textures, most of its memory, can be dropped.
@@ -107,10 +185,22 @@ frame_source make_synthetic(const settings& s) {
   const auto frames_of = std::make_shared<renderer>(options);
   frame_source source;
   source.title = "synthetic room";
-  source.kind = "rendered on the fly, seed " + std::to_string(s.seed) + (s.person ? ", with a person" : "");
-  source.camera = recording->camera();
+  source.kind = "rendered on the fly, seed " + std::to_string(s.seed) + (s.person ? ", with a person" : "") +
+                (s.sensor == "stereo" ? ", stereo" : "");
+  source.is_stereo = s.sensor == "stereo";
+  source.camera = source.is_stereo ? recording->stereo_camera() : recording->camera();
   source.frames = limited(recording->size(), s);
-  source.frame = [frames_of, stride = s.stride](std::size_t i) { return frames_of->get()->frame(i * stride); };
+  source.frame = [frames_of, stride = s.stride, stereo = source.is_stereo,
+                  scale = source.camera.depth_scale](std::size_t i) -> result<source_frame> {
+    if (stereo) {
+      auto pair = frames_of->get()->stereo_frame(i * stride);
+      if (!pair) return fail(pair.error());
+      return with_right(*std::move(pair), scale);
+    }
+    auto frame = frames_of->get()->frame(i * stride);
+    if (!frame) return fail(frame.error());
+    return with_depth(*std::move(frame));
+  };
   source.made = true;
   source.rest = [frames_of] { frames_of->drop(); };
   source.color = [frame = source.frame](std::size_t i) -> result<orbis::image<orbis::rgb8>> {
@@ -142,8 +232,9 @@ result<void> check_resolution(frame_source& source, const settings& s) {
   constexpr double slow = 1e8, too_many = 2e9;
   const orbis::camera::intrinsics& k = source.camera.model.k();
   if (source.frames == 0 || voxels_in_view(k, s.resolution, [&](std::size_t) { return s.max_depth; }) < slow) return {};
-  const auto first = source.frame(0);
+  auto first = source.frame(0);
   if (!first) return {};  // whoever needs it will say why
+  source.complete(*first);
   const auto pixels = first->depth.pixels();
   const double voxels = voxels_in_view(k, s.resolution, [&](std::size_t i) {
     const double z = pixels[i] / first->depth_scale;
@@ -182,7 +273,9 @@ std::string origin_note(const orbis::vec3& origin) {
 
 result<frame_source> open_source(const settings& s, console& console) {
   console.stage("opening");
-  auto source = s.what == command::demo ? result<frame_source>{make_synthetic(s)} : open_recording(s);
+  auto source = s.what == command::demo ? result<frame_source>{make_synthetic(s)}
+                : is_stereo(s)          ? open_stereo_recording(s)
+                                        : open_recording(s);
   if (!source) return source;
   if (!s.localize_only)
     if (auto fine = check_resolution(*source, s); !fine) return fail(fine.error());
@@ -191,7 +284,11 @@ result<frame_source> open_source(const settings& s, console& console) {
   return source;
 }
 
-result<orbis::camera::rgbd_frame> read_ahead::next() {
+void frame_source::complete(source_frame& f) const {
+  if (is_stereo && f.depth.empty()) f.depth = stereo_depth(f.color.view(), f.right.view(), camera);
+}
+
+result<source_frame> read_ahead::next() {
   auto frame = ahead_.valid() ? ahead_.get() : source_.frame(at_);
   ++at_;
   if (background_ && has_next()) ahead_ = start_in_background([this, i = at_] { return source_.frame(i); });

@@ -20,12 +20,21 @@
 
 namespace app {
 
+/// A frame with depth, or the two images of a stereo camera: then `color` is the left one, and `depth` is empty until
+/// `frame_source::complete` makes it.
+struct source_frame : orbis::camera::rgbd_frame {
+  orbis::image<orbis::rgb8> right;  ///< empty unless the sensor is a stereo camera
+};
+
 struct frame_source {
   std::string title, kind;
   orbis::camera::camera_settings camera;
+  bool is_stereo = false;
   std::size_t frames = 0;
   /// Reads or renders a frame; `--stride` is applied already. May be called from another thread.
-  std::function<orbis::result<orbis::camera::rgbd_frame>(std::size_t)> frame;
+  std::function<orbis::result<source_frame>(std::size_t)> frame;
+  /// Makes the depth image of a frame that has none yet; costly for stereo, nothing otherwise.
+  void complete(source_frame& f) const;
   /// Reads or renders the colour image of a frame alone. As above.
   std::function<orbis::result<orbis::image<orbis::rgb8>>(std::size_t)> color;
   bool made = false;  ///< frames are rendered, which takes longer than to read them
@@ -52,14 +61,14 @@ class read_ahead {
  public:
   read_ahead(const frame_source& source, bool in_background) : source_{source}, background_{in_background} {}
   /// The next frame. @pre has_next()
-  [[nodiscard]] orbis::result<orbis::camera::rgbd_frame> next();
+  [[nodiscard]] orbis::result<source_frame> next();
   [[nodiscard]] bool has_next() const { return at_ < source_.frames; }
 
  private:
   const frame_source& source_;
   bool background_;
   std::size_t at_ = 0;
-  std::future<orbis::result<orbis::camera::rgbd_frame>> ahead_;
+  std::future<orbis::result<source_frame>> ahead_;
 };
 
 }  // namespace app

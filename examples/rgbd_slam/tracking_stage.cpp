@@ -6,7 +6,7 @@
 #include <thread>
 #include <utility>
 
-#include <orbis/slam/rgbd_system.hpp>
+#include <orbis/slam/stereo_system.hpp>
 
 #include "interrupts.hpp"
 #include "shutter_stage.hpp"
@@ -17,13 +17,15 @@ namespace {
 
 using orbis::se3;
 using orbis::slam::map_id;
-using slam_system = orbis::slam::rgbd_system<decltype(orbis::camera::camera_settings::model)>;
+using slam_system = orbis::slam::any_system;
 
 orbis::slam::options options_for(const frame_source& source, const settings& s) {
   orbis::slam::options options;
   if (source.camera.baseline) options.bf = *source.camera.baseline * source.camera.model.k().fx;
   options.threads = {.enabled = !s.deterministic && s.threads != 1, .wait = true};
   options.localization_only = s.localize_only;
+  if (source.is_stereo)
+    return orbis::slam::stereo_options(source.camera.model.k().fx, source.camera.baseline.value(), std::move(options));
   return options;
 }
 
@@ -85,10 +87,14 @@ void track_frames(slam_system& slam, const frame_source& source, const settings&
     if (s.realtime) pace.wait_for(frame->timestamp);
     const auto start = console::clock::now();
     const auto took = [&] { return std::chrono::duration<double, std::milli>(console::clock::now() - start).count(); };
-    slam.set_initial_pose(
-        [&, is_first = slam.state() == track_state::not_started] { return worlds.begin_with(*frame, is_first); });
-    const orbis::slam::track_result found = slam.track(*frame);
+    slam.set_initial_pose([&, is_first = slam.state() == track_state::not_started] {
+      source.complete(*frame);
+      return worlds.begin_with(*frame, is_first);
+    });
+    const orbis::slam::track_result found =
+        source.is_stereo ? slam.track(frame->timestamp, frame->color.view(), frame->right.view()) : slam.track(*frame);
     out.slam.slam_ms.push_back(took());
+    if (found.keyframe || (out.live && s.map_every_frame && found.T_world_camera)) source.complete(*frame);
     if (found.keyframe) out.keyframes.add(i, {found.map, *found.keyframe}, *frame);
     if (out.live) hand_on(slam, found, i, *frame, s, *out.live);
     viewer.show([&] { return handed_over(slam, i, found, took(), *std::move(frame)); });

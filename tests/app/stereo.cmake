@@ -1,0 +1,30 @@
+# SPDX-License-Identifier: BSD-3-Clause
+#
+# Recordings of stereo cameras.
+include(${CMAKE_CURRENT_LIST_DIR}/support.cmake)
+
+app(0 demo --sensor stereo --frames 30 --width 320 --resolution 0.1 --deterministic --out demo)
+must_exist(${WORK}/demo trajectory.txt cloud.ply map.bt summary.json report.html)
+summary(tracked ${WORK}/demo tracked)
+check(tracked EQUAL 30)
+summary(ate ${WORK}/demo ate_rmse_m)
+check(ate LESS 0.02)
+summary(map_error ${WORK}/demo map_error_m)
+check(map_error LESS 0.15)
+summary(points ${WORK}/demo cloud points)
+check(points GREATER 10000)
+
+# A folder that is neither: both kinds are named.
+file(MAKE_DIRECTORY ${WORK}/nothing)
+app_fails(2 "rgb.txt and depth.txt.*and no known stereo recording: neither image_0" run nothing --out out)
+app_fails(2 "nothing: no known stereo recording" run nothing --sensor stereo --out out)
+app_fails(2 "nothing: no known recording: neither rgb.txt" run nothing --sensor rgbd --out out)
+
+# Two lists of images are stereo where there is no depth.
+if(EXISTS ${DATA}/kitti_stereo_a)
+  app(0 run ${DATA}/kitti_stereo_a --frames 6 --filter none --deterministic --out kitti)
+  check(err MATCHES "depth beyond 4 m is left out of the map")
+  summary(tracked ${WORK}/kitti tracked)
+  check(tracked EQUAL 6)
+  app_fails(2 "depth.txt" run ${DATA}/kitti_stereo_a --sensor rgbd --out out)
+endif()
