@@ -53,6 +53,21 @@ orbis::vec3 take_origin_off(frame_source& source) {
   if (!origin.isZero()) source.notes.push_back(origin_note(origin));
   return origin;
 }
+
+/// What is the same for recordings of any sensor.
+template <class Recording>
+frame_source describe(const Recording& recording, const char* kind, const settings& s) {
+  frame_source source;
+  source.title = std::filesystem::weakly_canonical(s.input).filename().string();
+  source.kind = std::string{kind} + " (" + std::string{to_string(recording.format())} + ")";
+  source.camera = recording.camera();
+  source.frames = limited(recording.size(), s);
+  source.ground_truth = recording.ground_truth();
+  source.notes.assign(recording.notes().begin(), recording.notes().end());
+  source.files = recording.files();
+  return source;
+}
+
 template <class Frame>
 result<Frame> moved(result<Frame> frame, const orbis::vec3& origin) {
   if (frame && frame->T_world_camera) {
@@ -76,14 +91,8 @@ result<frame_source> open_stereo_recording(const settings& s) {
   auto opened = orbis::io::open_stereo_recording(s.input, options);
   if (!opened) return fail(opened.error());
   const auto recording = std::make_shared<const orbis::io::stereo_recording>(*std::move(opened));
-  frame_source source;
-  source.title = std::filesystem::weakly_canonical(s.input).filename().string();
-  source.kind = "stereo recording (" + std::string{to_string(recording->format())} + ")";
-  source.camera = recording->camera();
+  frame_source source = describe(*recording, "stereo recording", s);
   source.is_stereo = true;
-  source.frames = limited(recording->size(), s);
-  source.ground_truth = recording->ground_truth();
-  source.notes.assign(recording->notes().begin(), recording->notes().end());
   const orbis::vec3 origin = take_origin_off(source);
   source.frame = [recording, origin, stride = s.stride](std::size_t i) -> result<source_frame> {
     auto pair = moved(recording->frame(i * stride), origin);
@@ -91,7 +100,6 @@ result<frame_source> open_stereo_recording(const settings& s) {
     return with_right(*std::move(pair), recording->camera().depth_scale);
   };
   source.color = [recording, stride = s.stride](std::size_t i) { return recording->left(i * stride); };
-  source.files = recording->files();
   if (const double close = 20.0 * *source.camera.baseline; close > s.max_depth && !s.localize_only) {
     char text[120];
     std::snprintf(text, sizeof text, "depth beyond %g m is left out of the map; the cameras measure up to %.0f m well",
@@ -123,13 +131,7 @@ result<frame_source> open_recording(const settings& s) {
   }
 
   const auto recording = std::make_shared<const orbis::io::recording>(*std::move(opened));
-  frame_source source;
-  source.title = std::filesystem::weakly_canonical(s.input).filename().string();
-  source.kind = "recording (" + std::string{to_string(recording->format())} + ")";
-  source.camera = recording->camera();
-  source.frames = limited(recording->size(), s);
-  source.ground_truth = recording->ground_truth();
-  source.notes.assign(recording->notes().begin(), recording->notes().end());
+  frame_source source = describe(*recording, "recording", s);
   const orbis::vec3 origin = take_origin_off(source);
   source.frame = [recording, origin, stride = s.stride](std::size_t i) -> result<source_frame> {
     auto frame = moved(recording->frame(i * stride), origin);
@@ -137,7 +139,6 @@ result<frame_source> open_recording(const settings& s) {
     return with_depth(*std::move(frame));
   };
   source.color = [recording, stride = s.stride](std::size_t i) { return recording->color(i * stride); };
-  source.files = recording->files();
   return source;
 }
 

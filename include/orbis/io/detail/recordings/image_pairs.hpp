@@ -25,7 +25,6 @@
 #include <orbis/io/detail/recordings/stereo_index.hpp>
 #include <orbis/io/detail/recordings/tum.hpp>
 #include <orbis/io/detail/text.hpp>
-#include <orbis/io/trajectory_file.hpp>
 
 namespace orbis::io::detail {
 
@@ -106,13 +105,7 @@ namespace orbis::io::detail {
   }
   if (auto paired = pair_images(lists[0], lists[1], folder, max_time_difference, images); !paired)
     return fail(paired.error());
-  if (const auto file = folder / "groundtruth.txt"; present(file)) {
-    auto truth = read_trajectory(file);
-    if (!truth) return fail(truth.error());
-    images.ground_truth = *std::move(truth);
-    images.files.push_back(file);
-    attach_ground_truth(images, max_time_difference);
-  }
+  if (const auto truth = read_ground_truth(folder, max_time_difference, images); !truth) return fail(truth.error());
   return index;
 }
 

@@ -142,6 +142,20 @@ class skipped_lines {
   return parse_associations(*text, list, notes);
 }
 
+/// Reads `groundtruth.txt` of a folder, if it is there, into an index whose frames are known, and gives these their
+/// poses (`attach_ground_truth`). Errors: unreadable, malformed (with its line).
+[[nodiscard]] inline result<void> read_ground_truth(const std::filesystem::path& folder, double max_time_difference,
+                                                    recording_index& index) {
+  const auto file = folder / "groundtruth.txt";
+  if (!present(file)) return {};
+  auto truth = read_trajectory(file);
+  if (!truth) return fail(truth.error());
+  index.ground_truth = *std::move(truth);
+  index.files.push_back(file);
+  attach_ground_truth(index, max_time_difference);
+  return {};
+}
+
 /// Whether `folder` looks like a TUM recording.
 [[nodiscard]] inline bool is_tum(const std::filesystem::path& folder) {
   return present(folder / "rgb.txt") || present(folder / "depth.txt") || present(folder / "associations.txt");
@@ -187,13 +201,7 @@ class skipped_lines {
   }
   if (const auto ok = check_first_frame(index, folder); !ok) return fail(ok.error());
 
-  if (const auto file = folder / "groundtruth.txt"; present(file)) {
-    auto truth = read_trajectory(file);
-    if (!truth) return fail(truth.error());
-    index.ground_truth = *std::move(truth);
-    index.files.push_back(file);
-    attach_ground_truth(index, max_time_difference);
-  }
+  if (const auto truth = read_ground_truth(folder, max_time_difference, index); !truth) return fail(truth.error());
 
   // Of several words in the path the last one tells: the sequence may lie in another one's folder.
   const std::string name = std::filesystem::absolute(folder).lexically_normal().string();
