@@ -21,6 +21,7 @@
 
 #include "background.hpp"
 #include "color_file.hpp"
+#include "corrected_frame.hpp"
 #include "kept_depths.hpp"
 #include "settings.hpp"
 #include "source.hpp"
@@ -52,8 +53,11 @@ class posed_frames {
 
  public:
   /// `spill_file`: for depth beyond what there is room for in memory; see `depth_store_options`.
-  posed_frames(const frame_source& source, const settings& s, const std::filesystem::path& spill_file)
+  /// `shutter`: by which the frames were corrected that are added with a twist.
+  posed_frames(const frame_source& source, const settings& s, const std::filesystem::path& spill_file,
+               const orbis::camera::shutter& shutter = {})
       : source_{&source},
+        shutter_{shutter},
         background_{s.threads != 1},
         depths_{std::make_unique<kept_depths>(depth_options(s, spill_file), background_)},
         colors_{spill_file.string() + ".colors", point_stride,
@@ -61,11 +65,13 @@ class posed_frames {
 
   /// Frame number `i` of the source, where the camera was at `T_world_camera`.
   void add(std::size_t i, const orbis::se3& T_world_camera, const orbis::camera::rgbd_frame& frame) {
-    add({i, {}, T_world_camera}, frame);
+    add({i, {}, T_world_camera, orbis::vec6::Zero()}, frame);
   }
-  /// Frame number `i` of the source, which has become a keyframe; `place` sets its pose later.
-  void add(std::size_t i, orbis::slam::map_keyframe keyframe, const orbis::camera::rgbd_frame& frame) {
-    add({i, keyframe, {}}, frame);
+  /// Frame number `i` of the source, which has become a keyframe; `place` sets its pose later. `twist`: by which its
+  /// images were corrected; zero: they are those of the source.
+  void add(std::size_t i, orbis::slam::map_keyframe keyframe, const orbis::vec6& twist,
+           const orbis::camera::rgbd_frame& frame) {
+    add({i, keyframe, {}, twist}, frame);
   }
   /// Gives each frame the pose `where(keyframe)`; frames without a pose are dropped.
   template <class Where>
@@ -91,17 +97,17 @@ class posed_frames {
   /// black.
   class colors {
    public:
-    colors(const posed_frames& of, std::size_t index, std::shared_ptr<unpacked> images)
-        : of_{&of}, index_{index}, images_{std::move(images)} {}
+    colors(const posed_frames& of, std::size_t entry, std::shared_ptr<unpacked> images)
+        : of_{&of}, entry_{entry}, images_{std::move(images)} {}
     operator orbis::image_view<const orbis::rgb8>() const {  // NOLINT(google-explicit-constructor)
-      if (!images_->color) of_->read_color(index_, *images_);
+      if (!images_->color) of_->read_color(of_->entries_[entry_], *images_);
       of_->tell(*images_);
       return images_->color->view();
     }
 
    private:
     const posed_frames* of_;
-    std::size_t index_;
+    std::size_t entry_;
     std::shared_ptr<unpacked> images_;
   };
   /// What `mapping::keyframe` is. Its images last as long as it does, or a copy of it.
@@ -126,7 +132,7 @@ class posed_frames {
       if (!images_) images_ = of_->unpack(at_);
       const entry& e = of_->entries_[at_];
       return {orbis::camera::depth_view<std::uint16_t>(images_->depth.view(), of_->source_->camera.depth_scale),
-              colors{*of_, e.index, images_}, e.T_world_camera, e.index};
+              colors{*of_, at_, images_}, e.T_world_camera, e.index};
     }
     iterator& operator++() {
       ++at_;
@@ -164,6 +170,7 @@ class posed_frames {
     std::size_t index;
     orbis::slam::map_keyframe keyframe;
     orbis::se3 T_world_camera;
+    orbis::vec6 twist;
   };
 
   void add(const entry& e, const orbis::camera::rgbd_frame& frame) {
@@ -195,18 +202,22 @@ class posed_frames {
     }
     return images;
   }
-  void read_color(std::size_t index, unpacked& images) const {
+  void read_color(const entry& e, unpacked& images) const {
     images.color.emplace(source_->camera.model.width(), source_->camera.model.height());
-    if (colors_.get(index, *images.color)) return;
-    auto read = source_->color(index);
+    if (colors_.get(e.index, *images.color)) return;
+    auto read = source_->color(e.index);
     if (!read) images.trouble = read.error();
     images.color = read ? *std::move(read) : orbis::image<orbis::rgb8>{};
+    const orbis::camera::depth_view depth{images.depth, source_->camera.depth_scale};
+    if (read && !e.twist.isZero(0.0))
+      frame_correction{source_->camera.model, shutter_}.correct_color(depth, e.twist, *images.color);
   }
   void tell(const unpacked& images) const {
     if (images.trouble) trouble_ = images.trouble;
   }
 
   const frame_source* source_;
+  orbis::camera::shutter shutter_;
   bool background_;
   std::vector<entry> entries_;
   std::unique_ptr<kept_depths> depths_;

@@ -8,6 +8,7 @@
 
 #include <orbis/slam/stereo_system.hpp>
 
+#include "corrected_frame.hpp"
 #include "interrupts.hpp"
 #include "shutter_stage.hpp"
 #include "upright_world.hpp"
@@ -73,10 +74,12 @@ void hand_on(const slam_system& slam, const orbis::slam::track_result& found, st
 }
 
 /// Feeds the frames to SLAM, up to the first that cannot be read, or to Ctrl-C. Every map begins in a world of its own.
-void track_frames(slam_system& slam, const frame_source& source, const settings& s, upright_worlds& worlds,
-                  tracked_frames& out, viewer& viewer, console& console) {
+void track_frames(slam_system& slam, const frame_source& source, const settings& s,
+                  const orbis::camera::shutter& shutter, upright_worlds& worlds, tracked_frames& out, viewer& viewer,
+                  console& console) {
   using orbis::slam::track_state;
   read_ahead frames{source, s.threads != 1};
+  frame_correction correct{source.camera.model, shutter};
   camera_pace pace;
   for (std::size_t i = 0; frames.has_next() && !interrupts::requested(); ++i) {
     auto frame = frames.next();
@@ -94,9 +97,13 @@ void track_frames(slam_system& slam, const frame_source& source, const settings&
     const orbis::slam::track_result found =
         source.is_stereo ? slam.track(frame->timestamp, frame->color.view(), frame->right.view()) : slam.track(*frame);
     out.slam.slam_ms.push_back(took());
-    if (found.keyframe || (out.live && s.map_every_frame && found.T_world_camera)) source.complete(*frame);
-    if (found.keyframe) out.keyframes.add(i, {found.map, *found.keyframe}, *frame);
-    if (out.live) hand_on(slam, found, i, *frame, s, *out.live);
+    const bool is_mapped = found.keyframe || (out.live && s.map_every_frame && found.T_world_camera);
+    if (is_mapped) source.complete(*frame);
+    const orbis::camera::rgbd_frame& at_once = is_mapped ? correct(*frame, found.twist) : *frame;
+    if (found.keyframe)
+      out.keyframes.add(i, {found.map, *found.keyframe},
+                        &at_once == &*frame ? orbis::vec6(orbis::vec6::Zero()) : found.twist, at_once);
+    if (out.live) hand_on(slam, found, i, at_once, s, *out.live);
     viewer.show([&] { return handed_over(slam, i, found, took(), *std::move(frame)); });
     out.slam.tracking_ms.push_back(took());
     viewer.tell_trouble(console);
@@ -229,7 +236,7 @@ orbis::result<tracked_frames> track(const frame_source& source, const settings& 
 
   tracked_frames out{.slam = {},
                      .world = {},
-                     .keyframes = posed_frames{source, s, spill_file},
+                     .keyframes = posed_frames{source, s, spill_file, shutter.shutter},
                      .live = {},
                      .stopped = {},
                      .unsaved = {}};
@@ -241,7 +248,7 @@ orbis::result<tracked_frames> track(const frame_source& source, const settings& 
                                : "\nrgbd_slam: stopping; what was reached is mapped and written. Once more: stop at "
                                  "once, and leave the folder as it was\n");
   upright_worlds worlds{source, s};
-  track_frames(slam, source, s, worlds, out, viewer, console);
+  track_frames(slam, source, s, shutter.shutter, worlds, out, viewer, console);
   slam.wait();
   if (out.live) out.live->stop();
 

@@ -12,10 +12,10 @@
 /// | `presets.hpp, settings.hpp` | the cameras of the usual recordings; what `camera.toml` says |
 /// | `depth.hpp, rgbd_frame.hpp` | depth images; a colour image with its depth image |
 /// | `rays.hpp, world_point.hpp, cloud.hpp` | rays of pixels; points of pixels in the world; points of a depth image |
-/// | `shutter.hpp` | when the rows of the images are taken |
-/// | `undistort.hpp` | images without distortion |
-/// | `stereo.hpp, stereo_frame.hpp` | two cameras side by side, and their rectification; their two images |
-/// | `project_lanes.hpp` | eight points at a time, for adjustments; to be included by itself |
+/// | `shutter.hpp, shutter_correction.hpp` | when the rows of the images are taken; images as if all were taken at once
+/// | | `undistort.hpp` | images without distortion | | `stereo.hpp, stereo_frame.hpp` | two cameras side by side, and
+/// their rectification; their two images | | `project_lanes.hpp` | eight points at a time, for adjustments; to be
+/// included by itself |
 #pragma once
 
 #include <orbis/camera/any.hpp>
@@ -32,6 +32,7 @@
 #include <orbis/camera/rgbd_frame.hpp>
 #include <orbis/camera/settings.hpp>
 #include <orbis/camera/shutter.hpp>
+#include <orbis/camera/shutter_correction.hpp>
 #include <orbis/camera/stereo.hpp>
 #include <orbis/camera/stereo_frame.hpp>
 #include <orbis/camera/undistort.hpp>

@@ -3,6 +3,8 @@
 /// When the rows of an RGB-D camera's images are taken.
 #pragma once
 
+#include <orbis/core/types.hpp>
+
 namespace orbis::camera {
 
 /// The times of the rows of a colour image and of its depth image. A rolling shutter reads the rows one after the
@@ -31,5 +33,17 @@ struct shutter {
  private:
   [[nodiscard]] static constexpr double share(double v, int height) noexcept { return (v + 0.5) / height - 0.5; }
 };
+
+/// Where a point of the camera's frame at time `t` is in the camera's frame at time 0, if the camera moves by a
+/// constant twist: `exp(t * twist) p` to second order, of which the rest is below a thousandth of a pixel for the
+/// angles of one read-out (some hundredths of a radian). `twist`: of the camera in its own frame, per second,
+/// translation first. The point is `p / inverse_scale`, and so is the result: with a ray for `p` and its inverse depth,
+/// points at any distance.
+[[nodiscard]] inline vec3 moved_by(const vec6& twist, double t, const vec3& p, double inverse_scale = 1.0) {
+  const vec3 w(t * twist[3], t * twist[4], t * twist[5]);
+  const vec3 v(inverse_scale * (t * twist[0]), inverse_scale * (t * twist[1]), inverse_scale * (t * twist[2]));
+  const vec3 a = w.cross(p) + v;
+  return p + a + 0.5 * w.cross(a);
+}
 
 }  // namespace orbis::camera

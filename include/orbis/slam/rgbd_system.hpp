@@ -331,7 +331,10 @@ void ORBIS_SLAM_SYSTEM::report(track_result& result, const std::optional<map_key
   result.state = front_end_.state();
   result.map = shared_.atlas.active_id();
   if (made) result.keyframe = shared_.atlas.current(*made).keyframe;
-  if (front_end_.is_tracking()) result.T_world_camera = front_end_.last_pose(shared_.atlas);
+  if (front_end_.is_tracking()) {
+    result.T_world_camera = front_end_.last_pose(shared_.atlas);
+    result.twist = front_end_.last_twist();
+  }
   const state_event changed{std::exchange(reported_state_, result.state), result.state,
                             front_end_.counters().frames - 1};
   lock.unlock();

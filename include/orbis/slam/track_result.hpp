@@ -10,6 +10,7 @@
 #include <vector>
 
 #include <orbis/core/se3.hpp>
+#include <orbis/core/types.hpp>
 #include <orbis/slam/ids.hpp>
 
 namespace orbis::slam {
@@ -46,6 +47,9 @@ struct track_result {
   map_id map = 0;                       ///< the active map
   std::size_t inliers = 0;              ///< landmarks that agree with the pose
   std::optional<keyframe_id> keyframe;  ///< the keyframe that the frame became, if it did
+  /// With a rolling shutter the motion of the camera, in its own frame, while the frame was taken: per second,
+  /// translation first. Zero where it is not known. `camera::shutter_correction` takes it.
+  vec6 twist = vec6::Zero();
   track_timings timings;
   [[nodiscard]] bool tracked() const noexcept { return T_world_camera.has_value(); }
 };
@@ -61,6 +65,7 @@ struct tracked_frame {
   map_keyframe reference;  ///< the keyframe that the frame's pose follows; `atlas::current` gives its present id
   se3 T_reference_camera;
   std::vector<tracked_feature> features;
+  vec6 twist = vec6::Zero();  ///< see `track_result::twist`
 };
 
 /// Counts over all frames so far. Frames before the first map begins are neither tracked nor lost.

@@ -23,13 +23,7 @@
 
 namespace orbis::slam::detail {
 
-/// `exp(t * twist) p` to second order: for the angles of one read-out (at most some hundredths of a radian) the rest is
-/// below a thousandth of a pixel. `twist`: of the camera in its own frame, per second, translation first.
-[[nodiscard]] inline vec3 moved_by(const vec6& twist, double t, const vec3& p) {
-  const vec3 v(t * twist[0], t * twist[1], t * twist[2]), w(t * twist[3], t * twist[4], t * twist[5]);
-  const vec3 a = w.cross(p) + v;
-  return p + a + 0.5 * w.cross(a);
-}
+using camera::moved_by;
 
 /// Remembers the keypoints as they were read. Their rays and depths must be set.
 template <feature_descriptor D>

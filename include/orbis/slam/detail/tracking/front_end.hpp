@@ -70,6 +70,9 @@ class front_end {
   /// That keyframe, by the id that it had then.
   [[nodiscard]] map_keyframe last_reference() const noexcept { return last_reference_; }
 
+  /// The motion during the read-out of the last tracked frame; zero with a global shutter.
+  [[nodiscard]] vec6 last_twist() const { return shutter_.is_global() ? vec6(vec6::Zero()) : last_.twist; }
+
   /// The last tracked frame with its features. For the thread that tracks; takes no look at the maps. O(features).
   [[nodiscard]] tracked_frame last_frame() const;
 
@@ -178,7 +181,7 @@ se3 front_end<Camera, D, Matchers, Sensor>::last_pose(const atlas_type& maps) co
 
 template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
 tracked_frame front_end<Camera, D, Matchers, Sensor>::last_frame() const {
-  tracked_frame shown{last_reference_, T_reference_last_, {}};
+  tracked_frame shown{last_reference_, T_reference_last_, {}, last_twist()};
   shown.features.reserve(last_.size());
   for (std::size_t i = 0; i != last_.size(); ++i) {
     const landmark_id l = last_.landmarks[i];

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Frames of a rolling shutter as a global one would have taken them, for the map.
+#pragma once
+
+#include <cstdint>
+#include <utility>
+
+#include <orbis/camera/any.hpp>
+#include <orbis/camera/rgbd_frame.hpp>
+#include <orbis/camera/shutter_correction.hpp>
+#include <orbis/core/types.hpp>
+
+namespace app {
+
+class frame_correction {
+ public:
+  frame_correction(orbis::camera::any_camera camera, const orbis::camera::shutter& shutter)
+      : shutter_{shutter}, correct_{std::move(camera)} {}
+
+  /// The frame's images at its time; the frame itself where nothing has to be done, or where the camera moved too fast.
+  /// `twist`: during the read-out. Valid until the next call.
+  [[nodiscard]] const orbis::camera::rgbd_frame& operator()(const orbis::camera::rgbd_frame& frame,
+                                                            const orbis::vec6& twist) {
+    if (!correct_.is_needed(shutter_, twist)) return frame;
+    if (corrected_.depth.width() != frame.depth.width() || corrected_.depth.height() != frame.depth.height()) {
+      corrected_.depth = orbis::image<std::uint16_t>(frame.depth.width(), frame.depth.height());
+      corrected_.color = orbis::image<orbis::rgb8>(frame.depth.width(), frame.depth.height());
+    }
+    corrected_.timestamp = frame.timestamp;
+    corrected_.depth_scale = frame.depth_scale;
+    corrected_.T_world_camera = frame.T_world_camera;
+    const bool done =
+        correct_.depth(shutter_, twist, frame.depth_metres(), corrected_.depth.view()) &&
+        correct_.color(shutter_, twist, corrected_.depth_metres(), frame.color.view(), corrected_.color.view());
+    return done ? corrected_ : frame;
+  }
+
+  /// The colours of a frame whose depth was corrected before, corrected in the same way.
+  void correct_color(const orbis::camera::depth_view<std::uint16_t>& corrected, const orbis::vec6& twist,
+                     orbis::image<orbis::rgb8>& color) {
+    if (!correct_.is_needed(shutter_, twist)) return;
+    orbis::image<orbis::rgb8> out(color.width(), color.height());
+    if (correct_.color(shutter_, twist, corrected, color.view(), out.view())) color = std::move(out);
+  }
+
+ private:
+  orbis::camera::shutter shutter_;
+  orbis::camera::shutter_correction<orbis::camera::any_camera> correct_;
+  orbis::camera::rgbd_frame corrected_;
+};
+
+}  // namespace app

@@ -1,0 +1,239 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Where the pixels of a rolling shutter's image are in that of a global one, and the other way round.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include <orbis/camera/model.hpp>
+#include <orbis/camera/shutter.hpp>
+#include <orbis/core/simd.hpp>
+#include <orbis/core/types.hpp>
+
+namespace orbis::camera::detail {
+
+/// What a row knows of its time, seconds: linear in the row.
+struct row_time {
+  double first = 0.0, per_row = 0.0;
+
+  [[nodiscard]] static row_time of_depth(const shutter& s, int height) {
+    return between(s.depth_time(0.0, height), s.depth_time(1.0, height));
+  }
+  [[nodiscard]] static row_time of_color(const shutter& s, int height) {
+    return between(s.color_time(0.0, height), s.color_time(1.0, height));
+  }
+  [[nodiscard]] double operator()(double v) const noexcept { return first + per_row * v; }
+  /// The largest time of the image, forwards or backwards.
+  [[nodiscard]] double largest(int height) const noexcept {
+    return std::max(std::abs((*this)(-0.5)), std::abs((*this)(height - 0.5)));
+  }
+  /// Whether all rows are of the frame's time.
+  [[nodiscard]] bool is_zero() const noexcept { return first == 0.0 && per_row == 0.0; }
+
+ private:
+  [[nodiscard]] static row_time between(double first, double second) noexcept { return {first, second - first}; }
+};
+
+/// The pixel that sees a point at another time, and its depth there as a multiple of its depth here.
+struct warped_pixel {
+  double x = 0.0, y = 0.0, ratio = 0.0;
+};
+
+/// The pixel at the frame's time of what the row of `y` reads at the given inverse depth. `ray`: through the pixel, at
+/// z = 1.
+template <camera_model Camera>
+[[nodiscard]] std::optional<warped_pixel> warp_to_frame(const Camera& camera, const row_time& time, const vec6& twist,
+                                                        const vec3& ray, double y, double inverse_depth) {
+  const vec3 p = moved_by(twist, time(y), ray, inverse_depth);
+  const auto pixel = p.z() > 0.0 ? camera.project(p) : std::nullopt;
+  if (!pixel) return std::nullopt;
+  return warped_pixel{pixel->x(), pixel->y(), p.z()};
+}
+
+/// The pixel that reads what the pixel of `ray` in row `y` would see at the frame's time. Which row that is, and so its
+/// time, is found by iteration; with a motion so fast that it does not settle there is none.
+template <camera_model Camera>
+[[nodiscard]] std::optional<warped_pixel> warp_to_row(const Camera& camera, const row_time& time, const vec6& twist,
+                                                      const vec3& ray, double y, double inverse_depth) {
+  constexpr int rounds = 12;
+  constexpr double settled = 1e-3;  // pixels
+  double row = y;
+  for (int round = 0; round != rounds; ++round) {
+    const vec3 p = moved_by(twist, -time(row), ray, inverse_depth);
+    const auto pixel = p.z() > 0.0 ? camera.project(p) : std::nullopt;
+    if (!pixel) return std::nullopt;
+    const double change = pixel->y() - row;
+    row = pixel->y();
+    if (std::abs(change) < settled) return warped_pixel{pixel->x(), row, p.z()};
+  }
+  return std::nullopt;
+}
+
+enum class warp_direction { to_frame, to_row };
+
+/// Pixels from node to node of a `row_warp`, and that are evaluated at once.
+inline constexpr int warp_cell = 16;
+/// Parabolas in inverse depth: of the displacement in x, of that in y, and of the ratio of depths.
+using warp_parabolas = std::array<float, 9>;
+
+/// What a row of pixels is elsewhere; NaN where there is none. All of whole cells.
+struct warped_row {
+  std::vector<float> x, y, ratio;
+  explicit warped_row(std::size_t size) : x(size), y(size), ratio(size) {}
+};
+
+/// Evaluates the parabolas of a row, interpolated between its nodes. Returns whether an inverse depth is larger than
+/// `most`.
+struct warp_row_kernel {
+  struct arguments {
+    const warp_parabolas* nodes;
+    std::size_t cells;
+    float row, most;
+    const float* inverse_depth;
+    float *x, *y, *ratio;
+  };
+  using signature = bool(const arguments&);
+
+  template <simd::target Target>
+  static ORBIS_ALWAYS_INLINE bool run(const arguments& a) {
+    using lanes = simd::vec<float, warp_cell, Target>;
+    const lanes u = lanes::iota();
+    lanes largest = 0.0F;
+    for (std::size_t i = 0; i != a.cells; ++i) {
+      const std::size_t at = i * warp_cell;
+      const warp_parabolas &left = a.nodes[i], &right = a.nodes[i + 1];
+      const lanes r = lanes::load(a.inverse_depth + at);
+      largest = max(largest, r);
+      const auto term = [&](std::size_t k) ORBIS_INLINE_LAMBDA {
+        return lanes(left[k]) + u * lanes((right[k] - left[k]) * (1.0F / warp_cell));
+      };
+      const auto value = [&](std::size_t k)
+                             ORBIS_INLINE_LAMBDA { return term(k) + r * (term(k + 1) + r * term(k + 2)); };
+      ((lanes(static_cast<float>(at)) + u) + value(0)).store(a.x + at);
+      (lanes(a.row) + value(3)).store(a.y + at);
+      value(6).store(a.ratio + at);
+    }
+    return any(largest > lanes(a.most));
+  }
+};
+
+/// One of the two functions above for all pixels of an image. Over a few pixels and over inverse depth both are smooth:
+/// they are computed at nodes, for three inverse depths, and interpolated: linearly between the nodes and by a parabola
+/// in inverse depth. The error is some thousandths of a pixel for the motions of a read-out, and no pixel costs a
+/// projection. What is very near, or lies beside a node that has no pixel, is computed by itself.
+template <camera_model Camera>
+class row_warp {
+ public:
+  /// O(nodes)
+  row_warp(const Camera& camera, warp_direction direction)
+      : direction_{direction}, across_{nodes(camera.width())}, down_{nodes(camera.height())} {
+    rays_.reserve(across_ * down_);
+    for (std::size_t j = 0; j != down_; ++j)
+      for (std::size_t i = 0; i != across_; ++i)
+        rays_.push_back(camera.unproject({place(i), place(j)}).value_or(vec3::Constant(unknown)));
+    nodes_.resize(across_ * down_);
+    row_.resize(across_);
+  }
+
+  /// For a motion. O(nodes) projections.
+  void assign(const Camera& camera, const row_time& time, const vec6& twist) {
+    time_ = time;
+    twist_ = twist;
+    const double shift = time.largest(camera.height()) * twist.head<3>().norm();
+    constexpr double nearest = 0.25, largest_angle = 0.1;  // metres; of the shift, seen from the point
+    most_inverse_ = shift > largest_angle * nearest ? largest_angle / shift : 1.0 / nearest;
+    for (std::size_t j = 0; j != down_; ++j)
+      for (std::size_t i = 0; i != across_; ++i) nodes_[j * across_ + i] = fit(camera, i, j);
+  }
+
+  /// The pixels of what the pixels of row `y` have at their inverse depths. Those of no depth may hold anything finite
+  /// and not negative. O(pixels). @pre `inverse_depth` and `out` have whole cells
+  void evaluate(const Camera& camera, int y, std::span<const float> inverse_depth, warped_row& out) {
+    const auto* const above = nodes_.data() + static_cast<std::size_t>(y / warp_cell) * across_;
+    const auto* const below = above + across_;
+    const float part = static_cast<float>(y % warp_cell) / warp_cell;
+    for (std::size_t i = 0; i != across_; ++i)
+      for (std::size_t k = 0; k != row_[i].size(); ++k) row_[i][k] = above[i][k] + part * (below[i][k] - above[i][k]);
+    const auto most = static_cast<float>(most_inverse_);
+    const bool has_near = simd::kernel<warp_row_kernel, warp_row_kernel::signature>()(
+        {row_.data(), across_ - 1, static_cast<float>(y), most, inverse_depth.data(), out.x.data(), out.y.data(),
+         out.ratio.data()});
+    for (std::size_t i = 0; i + 1 != across_; ++i) {
+      const bool is_known = is_finite(row_[i]) && is_finite(row_[i + 1]);
+      if (!is_known || has_near) evaluate_each(camera, i, y, inverse_depth, is_known ? most : -1.0F, out);
+    }
+  }
+
+  /// The number of pixels in the whole cells of a row.
+  [[nodiscard]] std::size_t padded_width() const noexcept { return (across_ - 1) * warp_cell; }
+
+ private:
+  static constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
+
+  [[nodiscard]] static std::size_t nodes(int size) noexcept {  // a row and a pixel past the last one
+    return static_cast<std::size_t>((size + warp_cell - 1) / warp_cell) + 1;
+  }
+  [[nodiscard]] static double place(std::size_t node) noexcept { return static_cast<double>(node) * warp_cell; }
+  [[nodiscard]] static bool is_finite(const warp_parabolas& p) noexcept {
+    float sum = 0.0F;
+    for (const float term : p) sum += term;
+    return std::isfinite(sum);
+  }
+
+  [[nodiscard]] std::optional<warped_pixel> exactly(const Camera& camera, const vec3& ray, double y,
+                                                    double inverse_depth) const {
+    if (!std::isfinite(ray.x())) return std::nullopt;
+    return direction_ == warp_direction::to_frame ? warp_to_frame(camera, time_, twist_, ray, y, inverse_depth)
+                                                  : warp_to_row(camera, time_, twist_, ray, y, inverse_depth);
+  }
+
+  [[nodiscard]] warp_parabolas fit(const Camera& camera, std::size_t i, std::size_t j) const {
+    const double h = 0.5 * most_inverse_;
+    std::array<vec3, 3> f;
+    for (std::size_t k = 0; k != 3; ++k) {
+      const auto p = exactly(camera, rays_[j * across_ + i], place(j), static_cast<double>(k) * h);
+      f[k] = p ? vec3(p->x - place(i), p->y - place(j), p->ratio) : vec3::Constant(unknown);
+    }
+    const vec3 second = (f[0] - 2.0 * f[1] + f[2]) / (2.0 * h * h), first = (f[1] - f[0]) / h - h * second;
+    warp_parabolas p;
+    for (std::size_t k = 0; k != 3; ++k) {
+      const auto axis = static_cast<Eigen::Index>(k);
+      p[3 * k] = static_cast<float>(f[0][axis]);
+      p[3 * k + 1] = static_cast<float>(first[axis]);
+      p[3 * k + 2] = static_cast<float>(second[axis]);
+    }
+    return p;
+  }
+
+  /// The pixels of a cell with a larger inverse depth than `above`, without parabolas.
+  void evaluate_each(const Camera& camera, std::size_t of, int y, std::span<const float> inverse_depth, float above,
+                     warped_row& out) const {
+    constexpr float none = std::numeric_limits<float>::quiet_NaN();
+    for (std::size_t x = of * warp_cell; x != (of + 1) * warp_cell; ++x) {
+      if (!(inverse_depth[x] > above)) continue;
+      const auto ray = camera.unproject({static_cast<double>(x), static_cast<double>(y)});
+      const auto p = ray ? exactly(camera, *ray, y, static_cast<double>(inverse_depth[x])) : std::nullopt;
+      out.x[x] = p ? static_cast<float>(p->x) : none;
+      out.y[x] = p ? static_cast<float>(p->y) : none;
+      out.ratio[x] = p ? static_cast<float>(p->ratio) : none;
+    }
+  }
+
+  warp_direction direction_;
+  std::size_t across_, down_;
+  std::vector<vec3> rays_;             // of the nodes; NaN where there is none
+  std::vector<warp_parabolas> nodes_;  // NaN where there is no pixel
+  std::vector<warp_parabolas> row_;    // of the present row
+  row_time time_;
+  vec6 twist_ = vec6::Zero();
+  double most_inverse_ = 0.0;  // up to which the parabolas hold, 1 / metre
+};
+
+}  // namespace orbis::camera::detail

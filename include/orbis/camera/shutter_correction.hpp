@@ -1,0 +1,233 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Images of a rolling shutter as a global one would have taken them at the frame's time.
+///
+/// @code
+///   orbis::camera::shutter_correction<orbis::camera::pinhole> correct{camera};
+///   if (correct.is_needed(shutter, twist)) {
+///     correct.depth(shutter, twist, frame.depth_metres(), depth.view());
+///     correct.color(shutter, twist, orbis::camera::depth_view{depth, scale}, frame.color.view(), color.view());
+///   }
+/// @endcode
+///
+/// While the rows are read the camera moves by a constant twist. Each depth is moved to where it is seen at the frame's
+/// time, the nearest one where several meet; this says which surface a pixel shows. Its depth is then read where the
+/// depth image saw that point of that surface: between pixels, by linear interpolation of inverse depth, which is exact
+/// on planes, over those pixels only that lie on the surface. So planes stay planes, and edges stay between two pixels.
+///
+/// The model of constant velocity during the read-out: J. Hedborg, P.-E. Forssen, M. Felsberg, E. Ringaby, "Rolling
+/// shutter bundle adjustment", CVPR 2012; depth images of a rolling shutter: E. Ringaby, P.-E. Forssen, "Scan
+/// rectification for structured light range sensors with rolling shutters", ICCV 2011.
+#pragma once
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <concepts>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <utility>
+#include <vector>
+
+#include <orbis/camera/depth.hpp>
+#include <orbis/camera/detail/shutter/row_warp.hpp>
+#include <orbis/camera/detail/shutter/warp_kernels.hpp>
+#include <orbis/camera/model.hpp>
+#include <orbis/camera/shutter.hpp>
+#include <orbis/core/image.hpp>
+#include <orbis/core/result.hpp>
+#include <orbis/core/simd.hpp>
+#include <orbis/core/types.hpp>
+
+namespace orbis::camera {
+
+/// Corrects the images of one camera. Keeps its working memory: for one camera nothing is allocated after the first
+/// image. For one thread at a time.
+template <camera_model Camera>
+class shutter_correction {
+ public:
+  /// O(width * height / 256)
+  explicit shutter_correction(Camera camera)
+      : camera_{std::move(camera)},
+        to_frame_{camera_, detail::warp_direction::to_frame},
+        to_row_{camera_, detail::warp_direction::to_row},
+        surface_(to_row_.padded_width()),
+        metres_(to_row_.padded_width()),
+        index_(to_row_.padded_width()),
+        warped_{to_row_.padded_width()} {}
+
+  /// Whether images taken during this motion differ from those of a global shutter. `twist`: of the camera in its own
+  /// frame, per second, translation first.
+  [[nodiscard]] static bool is_needed(const shutter& s, const vec6& twist) noexcept {
+    return !s.is_global() && !(twist.array() == 0.0).all();
+  }
+
+  /// The depth image of a global shutter at the frame's time. Where nothing was measured, or what was measured is not
+  /// seen from there, `out` is 0. `T` is what `depth` stores if it is a `depth_view` (`out` then has its scale),
+  /// otherwise float metres. Without a motion, or if all its rows are of the frame's time, `out` has the same values.
+  /// Errors: `invalid_argument` for a twist that is not finite, or turns the camera by more than 0.3 radians from the
+  /// frame's time to that of a row; `out` is not touched then. O(pixels).
+  /// @pre the images have the size of the camera and do not overlap
+  template <depth_source Depth, class T>
+  requires std::same_as<T, float> || std::same_as<T, std::uint16_t>
+  [[nodiscard]] result<void> depth(const shutter& s, const vec6& twist, const Depth& depth, image_view<T> out);
+
+  /// The colour image that belongs to a corrected depth image: of each pixel the colour that was read where its point
+  /// was seen; of a pixel without depth that of something far away; black where the image does not reach. Without a
+  /// motion, or if all rows are of the frame's time, a copy. Errors and preconditions as above. O(pixels).
+  template <depth_source Depth>
+  [[nodiscard]] result<void> color(const shutter& s, const vec6& twist, const Depth& corrected,
+                                   image_view<const rgb8> color, image_view<rgb8> out);
+
+  [[nodiscard]] const Camera& camera() const noexcept { return camera_; }
+
+ private:
+  static constexpr float no_depth = std::numeric_limits<float>::max();
+
+  [[nodiscard]] result<void> check(const detail::row_time& time, const vec6& twist) const {
+    if (!twist.allFinite()) return fail(errc::invalid_argument, "twist", "it is not finite");
+    constexpr double most = 0.3;
+    if (!(time.largest(camera_.height()) * twist.tail<3>().norm() <= most))
+      return fail(errc::invalid_argument, "twist", "the camera turns by more than 0.3 radians while the image is read");
+    return {};
+  }
+  template <class Image>
+  [[nodiscard]] bool has_size(const Image& image) const {
+    return image.width() == camera_.width() && image.height() == camera_.height();
+  }
+  /// The stored value of `metres`.
+  template <class T>
+  [[nodiscard]] static T stored(float metres, double scale) noexcept {
+    const double value = static_cast<double>(metres) * scale;
+    if constexpr (std::same_as<T, float>)
+      return static_cast<float>(value);
+    else
+      return value < 65534.5 ? static_cast<std::uint16_t>(value + 0.5) : T{};
+  }
+
+  /// Moves each depth to the frame's time, into `nearest_`; and keeps inverse depths in `inverse_`.
+  template <class Depth>
+  void move_depths(const Depth& depth);
+  /// The inverse depths of the surfaces that row `y` shows at the frame's time, 0 where there is none. What is
+  /// stretched has cracks: these lie between two pixels of one surface.
+  void find_surfaces(int y);
+
+  Camera camera_;
+  detail::row_warp<Camera> to_frame_, to_row_;
+  image<float> nearest_;  // depth at the frame's time, or no_depth
+  image<float> inverse_;  // as read, with a border of one pixel; 0: none
+  // Of one row, in whole cells.
+  std::vector<float> surface_, metres_;  // inverse depth, depth
+  std::vector<std::int32_t> index_;
+  detail::warped_row warped_;
+};
+
+template <camera_model Camera>
+template <class Depth>
+void shutter_correction<Camera>::move_depths(const Depth& depth) {
+  const int width = camera_.width(), height = camera_.height();
+  if (nearest_.width() != width || nearest_.height() != height) {
+    nearest_ = image<float>(width, height);
+    inverse_ = image<float>(width + 2, height + 2);
+  }
+  std::ranges::fill(nearest_.pixels(), no_depth);
+  std::ranges::fill(surface_, 0.0F);
+  const auto pixels_of = simd::kernel<detail::nearest_pixels_kernel, detail::nearest_pixels_kernel::signature>();
+  for (int y = 0; y != height; ++y) {
+    for (int x = 0; x != width; ++x) metres_[static_cast<std::size_t>(x)] = depth(x, y);
+    for (std::size_t x = 0; x != static_cast<std::size_t>(width); ++x)
+      surface_[x] = metres_[x] > 0.0F ? 1.0F / metres_[x] : 0.0F;
+    std::copy_n(surface_.begin(), width, &inverse_(1, y + 1));
+    to_frame_.evaluate(camera_, y, surface_, warped_);
+    pixels_of({index_.size(), width, height, width, warped_.x.data(), warped_.y.data(), index_.data()});
+    for (std::size_t x = 0; x != static_cast<std::size_t>(width); ++x) {
+      const float moved = metres_[x] * warped_.ratio[x];
+      if (index_[x] < 0 || !(moved > 0.0F)) continue;
+      float& nearest = nearest_.data()[index_[x]];
+      nearest = std::min(nearest, moved);
+    }
+  }
+}
+
+template <camera_model Camera>
+void shutter_correction<Camera>::find_surfaces(int y) {
+  const auto row = std::as_const(nearest_).row(y);
+  for (std::size_t x = 0; x != row.size(); ++x) surface_[x] = row[x] < no_depth ? 1.0F / row[x] : 0.0F;
+  const auto between = [](float a, float b) {
+    const bool is_one = a < no_depth && b < no_depth && std::abs(a - b) <= detail::same_surface * std::min(a, b);
+    return is_one ? 2.0F / (a + b) : 0.0F;
+  };
+  const bool has_both = y > 0 && y + 1 < nearest_.height();
+  for (std::size_t x = 0; x != row.size(); ++x) {
+    if (surface_[x] > 0.0F) continue;
+    if (x > 0 && x + 1 < row.size()) surface_[x] = between(row[x - 1], row[x + 1]);
+    const int column = static_cast<int>(x);
+    if (surface_[x] == 0.0F && has_both) surface_[x] = between(nearest_(column, y - 1), nearest_(column, y + 1));
+  }
+}
+
+template <camera_model Camera>
+template <depth_source Depth, class T>
+requires std::same_as<T, float> || std::same_as<T, std::uint16_t> result<void> shutter_correction<Camera>::depth(
+    const shutter& s, const vec6& twist, const Depth& depth, image_view<T> out) {
+  assert(has_size(depth) && has_size(out));
+  const int width = camera_.width(), height = camera_.height();
+  double scale = 1.0;
+  if constexpr (requires { depth.scale(); }) scale = depth.scale();
+  const auto time = detail::row_time::of_depth(s, height);
+  if (auto usable = check(time, twist); !usable) return usable;
+  if (time.is_zero() || !is_needed(s, twist)) {
+    for (int y = 0; y != height; ++y)
+      for (int x = 0; x != width; ++x) {
+        if constexpr (requires { requires std::same_as<decltype(depth.pixels()), image_view<const T>>; })
+          out(x, y) = depth.pixels()(x, y);
+        else
+          out(x, y) = stored<T>(depth(x, y), scale);
+      }
+    return {};
+  }
+  to_frame_.assign(camera_, time, twist);
+  to_row_.assign(camera_, time, twist);
+  move_depths(depth);
+  const auto read = simd::kernel<detail::read_surface_kernel, detail::read_surface_kernel::signature>();
+  for (int y = 0; y != height; ++y) {
+    find_surfaces(y);
+    to_row_.evaluate(camera_, y, surface_, warped_);
+    read({surface_.size(), width, height, surface_.data(), warped_.x.data(), warped_.y.data(), warped_.ratio.data(),
+          inverse_.data(), metres_.data()});
+    const auto row = out.row(y);
+    for (std::size_t x = 0; x != row.size(); ++x) row[x] = stored<T>(metres_[x], scale);
+  }
+  return {};
+}
+
+template <camera_model Camera>
+template <depth_source Depth>
+result<void> shutter_correction<Camera>::color(const shutter& s, const vec6& twist, const Depth& corrected,
+                                               image_view<const rgb8> color, image_view<rgb8> out) {
+  assert(has_size(corrected) && has_size(color) && has_size(out));
+  const int width = camera_.width(), height = camera_.height();
+  const auto time = detail::row_time::of_color(s, height);
+  if (auto usable = check(time, twist); !usable) return usable;
+  if (time.is_zero() || !is_needed(s, twist)) {
+    for (int y = 0; y != height; ++y) std::ranges::copy(color.row(y), out.row(y).begin());
+    return {};
+  }
+  to_row_.assign(camera_, time, twist);
+  std::ranges::fill(surface_, 0.0F);
+  const auto stride = static_cast<std::int32_t>(color.stride());
+  const auto pixels_of = simd::kernel<detail::nearest_pixels_kernel, detail::nearest_pixels_kernel::signature>();
+  for (int y = 0; y != height; ++y) {
+    for (int x = 0; x != width; ++x) metres_[static_cast<std::size_t>(x)] = corrected(x, y);
+    for (std::size_t x = 0; x != static_cast<std::size_t>(width); ++x)
+      surface_[x] = metres_[x] > 0.0F ? 1.0F / metres_[x] : 0.0F;
+    to_row_.evaluate(camera_, y, surface_, warped_);
+    pixels_of({index_.size(), width, height, stride, warped_.x.data(), warped_.y.data(), index_.data()});
+    const auto row = out.row(y);
+    for (std::size_t x = 0; x != row.size(); ++x) row[x] = index_[x] < 0 ? rgb8{} : color.data()[index_[x]];
+  }
+  return {};
+}
+
+}  // namespace orbis::camera
