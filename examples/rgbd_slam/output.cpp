@@ -8,6 +8,7 @@
 #include "filters.hpp"
 #include "plots.hpp"
 #include "report.hpp"
+#include "result_files.hpp"
 #include "summary.hpp"
 #include "view_frame.hpp"
 
@@ -76,6 +77,9 @@ results begin_results(const settings& s, const std::string& title, const frame_s
 
 result<void> write_trajectories(const slam_results& slam, const std::filesystem::path& folder) {
   if (auto done = orbis::io::write_trajectory(folder / "trajectory.txt", slam.trajectory); !done) return done;
+  for (std::size_t i = 0; i != slam.other_maps.size() && i + 2 <= most_maps; ++i)
+    if (auto done = orbis::io::write_trajectory(folder / trajectory_name(i + 2), slam.other_maps[i]); !done)
+      return done;
   return orbis::io::write_trajectory(folder / "keyframes.txt", slam.keyframes);
 }
 

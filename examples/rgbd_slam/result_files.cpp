@@ -29,10 +29,12 @@ constexpr std::array map_names = {"cloud.ply", "cloud_filtered.ply", "map_unfilt
 constexpr std::array report_names = {"summary.json", "report.html"};
 
 file_names all_names() {
-  return {"trajectory.txt",    "keyframes.txt",  "cloud.ply", "cloud_filtered.ply",
-          "map_unfiltered.bt", "map.bt",         "map.ot",    "summary.json",
-          "report.html",       "trajectory.png", "map.png",   "map_unfiltered.png",
-          "filter.png",        "navigation.png"};
+  file_names names = {"trajectory.txt",    "keyframes.txt",  "cloud.ply", "cloud_filtered.ply",
+                      "map_unfiltered.bt", "map.bt",         "map.ot",    "summary.json",
+                      "report.html",       "trajectory.png", "map.png",   "map_unfiltered.png",
+                      "filter.png",        "navigation.png"};
+  for (std::size_t map = most_maps; map != 1; --map) names.insert(names.begin() + 1, trajectory_name(map));
+  return names;
 }
 
 template <class Names>
@@ -82,10 +84,13 @@ std::mutex& end_of_run() {
 
 }  // namespace
 
+std::string trajectory_name(std::size_t number) { return "trajectory_" + std::to_string(number) + ".txt"; }
+
 file_names result_names(const settings& s) {
   file_names names;
   for (std::string& name : all_names()) {
-    const bool made = is_among(name, report_names) || (s.what != command::map && is_among(name, trajectory_names)) ||
+    const bool is_trajectory = is_among(name, trajectory_names) || name.starts_with("trajectory_");
+    const bool made = is_among(name, report_names) || (s.what != command::map && is_trajectory) ||
                       (!s.localize_only && is_among(name, map_names));
     if (made) names.push_back(std::move(name));
   }

@@ -23,6 +23,11 @@ namespace app {
 /// Names of files, in the order in which the documentation lists them.
 using file_names = std::vector<std::string>;
 
+/// The trajectory of a map that was never joined with the main one; the first of them is number 2.
+[[nodiscard]] std::string trajectory_name(std::size_t number);
+/// Of maps with a file of their own, the main one included.
+inline constexpr std::size_t most_maps = 9;
+
 /// The files that the command may make in the output folder.
 [[nodiscard]] file_names result_names(const settings& s);
 

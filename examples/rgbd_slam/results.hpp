@@ -93,6 +93,9 @@ struct slam_results {
   std::vector<double> slam_ms;      ///< of it, in SLAM
   double seconds = 0.0;             ///< reading and tracking
   orbis::trajectory trajectory, keyframes;
+  /// What was tracked in maps that were never joined with this one: those with most frames first, each in a world of
+  /// its own.
+  std::vector<orbis::trajectory> other_maps;
 };
 
 /// Of the map that grew while the camera moved.

@@ -12,6 +12,7 @@
 #include <orbis/core/file.hpp>
 
 #include "formatted_text.hpp"
+#include "result_files.hpp"
 
 namespace app {
 namespace {
@@ -74,6 +75,14 @@ std::string summary_json(const results& r) {
                   {"depth_read_out_ms", s ? milliseconds(s->shutter.shutter.depth_read_out) : null},
                   {"depth_delay_ms", s ? milliseconds(s->shutter.shutter.depth_delay) : null},
                   {"depth_delay_deviation_ms", s ? milliseconds(s->shutter.delay_deviation) : null}};
+  j["other_maps"] = json::array();
+  for (std::size_t i = 0; s && i != s->other_maps.size(); ++i) {
+    const auto& poses = s->other_maps[i];
+    j["other_maps"].push_back({{"file", i + 2 <= most_maps ? json(trajectory_name(i + 2)) : null},
+                               {"frames", poses.size()},
+                               {"first_timestamp", poses.front().timestamp},
+                               {"last_timestamp", poses.back().timestamp}});
+  }
   const auto& w = r.world;
   j["world"] = {{"up_from", w ? json(w->up_from) : null}, {"confidence", w ? or_null(w->confidence) : null}};
   j["ate_rmse_m"] = a ? json(a->ate_rmse_m) : null;

@@ -1,15 +1,18 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tracking_stage.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <string>
 #include <thread>
 #include <utility>
+#include <vector>
 
 #include <orbis/slam/stereo_system.hpp>
 
 #include "corrected_frame.hpp"
 #include "interrupts.hpp"
+#include "result_files.hpp"
 #include "shutter_stage.hpp"
 #include "upright_world.hpp"
 
@@ -195,6 +198,15 @@ void collect(const slam_system& slam, tracked_frames& out) {
   slam.inspect([&](const orbis::slam::atlas& maps) {
     out.keyframes.place([&](const orbis::slam::map_keyframe& made) { return present_pose(maps, made); });
   });
+  std::vector<map_id> others;
+  slam.inspect([&](const orbis::slam::atlas& maps) {
+    for (const auto& [id, map] : maps.maps())
+      if (id != maps.active_id()) others.push_back(id);
+  });
+  for (const map_id id : others)
+    if (auto poses = slam.trajectory(id); !poses.empty()) out.slam.other_maps.push_back(std::move(poses));
+  std::stable_sort(out.slam.other_maps.begin(), out.slam.other_maps.end(),
+                   [](const auto& a, const auto& b) { return a.size() > b.size(); });
   const orbis::slam::track_counters counters = slam.counters();
   out.slam.frames = counters.frames;
   out.slam.tracked = counters.tracked;
@@ -306,10 +318,19 @@ std::vector<std::string> mapping_notes(const posed_frames& frames, const std::op
 
 std::vector<std::string> tracking_notes(const tracked_frames& tracked, const settings& s) {
   std::vector<std::string> notes;
-  if (const std::size_t here = tracked.slam.trajectory.size(); here < tracked.slam.tracked)
-    notes.push_back(std::to_string(tracked.slam.tracked - here) + " of " + std::to_string(tracked.slam.tracked) +
-                    " tracked frames are left out: tracking was lost, and where it began anew was never joined with "
-                    "the rest");
+  std::size_t elsewhere = 0;
+  for (const auto& poses : tracked.slam.other_maps) elsewhere += poses.size();
+  const std::string of_all = " of " + std::to_string(tracked.slam.tracked) + " tracked frames ";
+  if (elsewhere != 0) {
+    const std::size_t last = std::min(tracked.slam.other_maps.size() + 1, most_maps);
+    notes.push_back(std::to_string(elsewhere) + of_all +
+                    "are in no cloud and no octree: tracking was lost, and where it began anew was never joined with "
+                    "the rest; their poses, in worlds of their own, are in " +
+                    trajectory_name(2) + (last > 2 ? " ... " + trajectory_name(last) : ""));
+  }
+  if (const std::size_t kept = tracked.slam.trajectory.size() + elsewhere; kept < tracked.slam.tracked)
+    notes.push_back(std::to_string(tracked.slam.tracked - kept) + of_all +
+                    "are left out: tracking was lost again before they had made a map");
   if (!s.localize_only && tracked.slam.tracked != 0 && tracked.keyframes.size() == 0)
     notes.emplace_back("no cloud and no octree: the loaded map shows all that was seen, so no frame became a keyframe");
   for (std::string& note : mapping_notes(tracked.keyframes, tracked.world)) notes.push_back(std::move(note));
