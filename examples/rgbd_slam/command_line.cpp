@@ -140,12 +140,7 @@ void add_sensor_option(CLI::App& cmd, settings& s, const std::vector<std::string
       ->type_name("S");
 }
 
-void add_recording_options(CLI::App& cmd, settings& s) {
-  add_sensor_option(cmd, s, {"auto", "rgbd", "stereo"});
-  cmd.add_option("--format", s.format, "layout of the recording")
-      ->check(CLI::IsMember({"auto", "tum", "7scenes", "icl", "kitti", "asl", "pairs"}))
-      ->capture_default_str()
-      ->type_name("F");
+void add_camera_option(CLI::App& cmd, settings& s) {
   cmd.add_option("--camera", s.camera, "camera.toml, or tum_fr1, tum_fr2, tum_fr3, icl, kinect")
       ->check(CLI::Validator(
           [](std::string& name) -> std::string {
@@ -157,12 +152,21 @@ void add_recording_options(CLI::App& cmd, settings& s) {
       ->type_name("FILE|NAME");
 }
 
+void add_recording_options(CLI::App& cmd, settings& s) {
+  add_sensor_option(cmd, s, {"auto", "rgbd", "stereo"});
+  cmd.add_option("--format", s.format, "layout of the recording")
+      ->check(CLI::IsMember({"auto", "tum", "7scenes", "icl", "kitti", "asl", "pairs"}))
+      ->capture_default_str()
+      ->type_name("F");
+  add_camera_option(cmd, s);
+}
+
 void add_frame_options(CLI::App& cmd, settings& s) {
   count(cmd, "--frames", s.frames, "use at most N frames");
   count(cmd, "--stride", s.stride, "use every N-th frame")->capture_default_str();
 }
 
-void add_slam_options(CLI::App& cmd, settings& s) {
+void add_shutter_option(CLI::App& cmd, settings& s) {
   cmd.add_option_function<std::string>(
          "--read-out-ms",
          [&s](const std::string& value) {
@@ -173,6 +177,10 @@ void add_slam_options(CLI::App& cmd, settings& s) {
          "auto (default): as the camera file says, else estimated from the first ten seconds")
       ->check(CLI::IsMember({"auto"}) | within(0.0, 200.0, " ms"))
       ->type_name("MS");
+}
+
+void add_slam_options(CLI::App& cmd, settings& s) {
+  add_shutter_option(cmd, s);
   cmd.add_flag("--deterministic", s.deterministic,
                "the same bytes on every run: mapping and loop closing take place between the frames, not beside them");
   cmd.add_flag(
@@ -209,6 +217,25 @@ void add_viewer_options(CLI::App& cmd, settings& s) {
       ->capture_default_str()
       ->type_name("N");
   cmd.add_flag("--viewer-hold", s.viewer_hold, "the viewer stays after the run, until the window is closed or Ctrl-C");
+}
+
+void add_calibration_options(CLI::App& cmd, settings& s) {
+  cmd.add_option("DATASET", s.input, "the folder of a recording with depth; its camera is where the search begins")
+      ->required()
+      ->type_name("");
+  cmd.add_option("--format", s.format, "layout of the recording")
+      ->check(CLI::IsMember({"auto", "tum", "7scenes", "icl"}))
+      ->capture_default_str()
+      ->type_name("F");
+  add_camera_option(cmd, s);
+  add_frame_options(cmd, s);
+  add_shutter_option(cmd, s);
+  cmd.add_flag("--distortion", s.distortion,
+               "estimate the lens's distortion (k1, k2, p1, p2) too, for a camera file that has none");
+  cmd.add_option("--out", s.out, "write the camera that was found: a file for --camera, or camera.toml of a recording")
+      ->check(not_empty)
+      ->type_name("FILE");
+  cmd.add_flag("--quiet", s.quiet, "say nothing but errors");
 }
 
 /// What of the options does not go together; empty if all does.
@@ -272,7 +299,7 @@ std::variant<settings, exit_code> read_command_line(int argc, char** argv) {
   cli.footer(
       "Exit codes: 0 done, 1 bad usage, 2 unreadable or damaged input (or output that cannot be\n"
       "written), 3 tracking never started, or the camera was never found in the loaded map,\n"
-      "4 there is no way (plan).\n"
+      "4 there is no way (plan), 5 the motion does not determine the camera (calibrate).\n"
       "Interrupting a run keeps what it has reached (130).");
 
   CLI::App* run = cli.add_subcommand("run", "SLAM on a recording (TUM, 7-Scenes, ICL-NUIM; stereo: KITTI, ASL)");
@@ -317,6 +344,9 @@ std::variant<settings, exit_code> read_command_line(int argc, char** argv) {
   CLI::App* way = cli.add_subcommand("plan", "the shortest way of a robot through an octree map");
   add_plan_options(*way, s, from, to);
 
+  CLI::App* calibration = cli.add_subcommand("calibrate", "the camera's intrinsics and depth scale from a recording");
+  add_calibration_options(*calibration, s);
+
   for (CLI::App* cmd : {run, demo, map}) add_robot_options(*cmd, s);
   for (CLI::App* cmd : {run, demo, map})
     cmd->add_option("--gravity", gravity,
@@ -325,12 +355,13 @@ std::variant<settings, exit_code> read_command_line(int argc, char** argv) {
         ->type_name("X,Y,Z");
   for (CLI::App* cmd : {run, demo, map})
     cmd->add_option("--config", s.config, "options from a TOML file: resolution = 0.02")->type_name("FILE");
-  for (CLI::App* cmd : {run, demo, eval, map, way}) cmd->get_formatter()->column_width(28);
+  for (CLI::App* cmd : {run, demo, eval, map, way, calibration}) cmd->get_formatter()->column_width(28);
 
   const auto is_asked_for = [&](const CLI::App* command) { return command->get_name() == argv[1]; };
   if (argc > 1 && argv[1][0] != '-' && cli.get_subcommands(is_asked_for).empty())
-    return complain("there is no command \"" + std::string{argv[1]} + "\", but run, demo, eval, map and plan",
-                    bad_usage);
+    return complain(
+        "there is no command \"" + std::string{argv[1]} + "\", but run, demo, eval, map, plan and calibrate",
+        bad_usage);
   try {
     cli.parse(argc, argv);
   } catch (const CLI::CallForHelp&) {
@@ -345,7 +376,8 @@ std::variant<settings, exit_code> read_command_line(int argc, char** argv) {
            : chosen == demo ? command::demo
            : chosen == eval ? command::eval
            : chosen == map  ? command::map
-                            : command::plan;
+           : chosen == way  ? command::plan
+                            : command::calibrate;
   if (!s.config.empty())
     if (const auto failed = read_config(*chosen, s.config.string())) return *failed;
   if (!origin.empty()) {

@@ -37,6 +37,7 @@ int main(int argc, char** argv) {
       case app::command::eval: return app::evaluate(settings, console);
       case app::command::map: return app::map_without_slam(settings, console);
       case app::command::plan: return app::plan(settings, console);
+      case app::command::calibrate: return app::calibrate(settings, console);
     }
   } catch (const std::exception& e) {  // no memory, no threads
     console.error({orbis::errc::unreadable, {}, std::string{"gave up: "} + e.what()});

@@ -14,9 +14,17 @@
 namespace app {
 
 /// The documented exit codes, and the shell's own for a run that was interrupted.
-enum exit_code : int { done = 0, bad_usage = 1, bad_input = 2, never_tracked = 3, no_path = 4, interrupted = 130 };
+enum exit_code : int {
+  done = 0,
+  bad_usage = 1,
+  bad_input = 2,
+  never_tracked = 3,
+  no_path = 4,
+  undetermined = 5,
+  interrupted = 130
+};
 
-enum class command { run, demo, eval, map, plan };
+enum class command { run, demo, eval, map, plan, calibrate };
 
 struct settings {
   command what = command::run;
@@ -39,6 +47,7 @@ struct settings {
 
   std::optional<double> read_out_ms;     ///< of the camera's images, milliseconds; empty: as the camera's settings say,
                                          ///< or estimated
+  bool distortion = false;               ///< of the lens, is estimated where the camera has none (calibrate)
   double resolution = 0.05;              ///< octree, metres
   double max_depth = 4.0;                ///< depth beyond this is left out of the map, metres
   std::string filter = "auto";           ///< one of `filter_names`

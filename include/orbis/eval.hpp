@@ -8,6 +8,7 @@
 /// | `ate.hpp` | absolute trajectory error |
 /// | `rpe.hpp` | relative pose error |
 /// | `cloud_error.hpp` | distances of points to the true surface |
+/// | `scale.hpp` | by how much a trajectory is too large or too small |
 /// | `statistics.hpp` | mean, median, RMSE and more of a list of errors |
 #pragma once
 
@@ -15,4 +16,5 @@
 #include <orbis/eval/ate.hpp>
 #include <orbis/eval/cloud_error.hpp>
 #include <orbis/eval/rpe.hpp>
+#include <orbis/eval/scale.hpp>
 #include <orbis/eval/statistics.hpp>

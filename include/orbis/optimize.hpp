@@ -20,6 +20,7 @@
 /// | reprojection.hpp | reprojection error for any camera model |
 /// | reprojection_with_intrinsics.hpp | the same with intrinsics among the unknowns; the camera of BAL files |
 /// | robust_loss.hpp | robust losses (Huber, Cauchy, Tukey, Geman-McClure), chi-squared gates |
+/// | self_calibration.hpp | bundle adjustment of images of one camera whose intrinsics are among the unknowns |
 /// | solver_policies.hpp | damping (Gauss-Newton, Levenberg-Marquardt, dogleg), solvers of the reduced system |
 /// | triangulation.hpp | points from two or more rays |
 /// | two_view.hpp | essential matrix, homography and relative pose of two images |
@@ -41,6 +42,7 @@
 #include <orbis/optimize/reprojection.hpp>
 #include <orbis/optimize/reprojection_with_intrinsics.hpp>
 #include <orbis/optimize/robust_loss.hpp>
+#include <orbis/optimize/self_calibration.hpp>
 #include <orbis/optimize/solver_policies.hpp>
 #include <orbis/optimize/triangulation.hpp>
 #include <orbis/optimize/two_view.hpp>

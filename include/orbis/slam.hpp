@@ -22,6 +22,7 @@
 /// | `validate.hpp` | whether a map is consistent |
 /// | `sensor.hpp` | what a frame measures for each feature: RGB-D |
 /// | `stereo.hpp` | the same for a stereo camera, and the options that suit it |
+/// | `calibration.hpp` | the camera refined by the map that was made with it |
 /// | `camera_rig.hpp` | the camera with its image pyramid and the weight of depth |
 /// | `pyramid_scales.hpp` | the scales of an image pyramid |
 /// | `matchers.hpp` | how tracking matches features, replaceable |
@@ -29,6 +30,7 @@
 #pragma once
 
 #include <orbis/slam/atlas.hpp>
+#include <orbis/slam/calibration.hpp>
 #include <orbis/slam/camera_rig.hpp>
 #include <orbis/slam/covisibility_graph.hpp>
 #include <orbis/slam/events.hpp>

@@ -3,9 +3,11 @@
 /// The numbers a camera model is made of, and how its pixels depend on them: for calibration.
 #pragma once
 
+#include <array>
 #include <cmath>
 #include <concepts>
 #include <optional>
+#include <string_view>
 
 #include <orbis/camera/intrinsics.hpp>
 #include <orbis/camera/kannala_brandt.hpp>
@@ -62,6 +64,7 @@ inline void by_camera_matrix(double x, double y, double* j) {
 template <>
 struct parameters_of<pinhole> {
   static constexpr int count = 4;
+  static constexpr std::array<std::string_view, count> names{"fx", "fy", "cx", "cy"};
 
   [[nodiscard]] static matrix<4> get(const pinhole& c) { return {c.k().fx, c.k().fy, c.k().cx, c.k().cy}; }
   [[nodiscard]] static std::optional<pinhole> with(const pinhole& c, const matrix<4>& p) {
@@ -81,6 +84,8 @@ struct parameters_of<pinhole> {
 template <>
 struct parameters_of<radial_tangential> {
   static constexpr int count = 12;
+  static constexpr std::array<std::string_view, count> names{"fx", "fy", "cx", "cy", "k1", "k2",
+                                                             "p1", "p2", "k3", "k4", "k5", "k6"};
 
   [[nodiscard]] static matrix<12> get(const radial_tangential& c) {
     const auto& d = c.distortion();
@@ -124,6 +129,7 @@ struct parameters_of<radial_tangential> {
 template <>
 struct parameters_of<kannala_brandt> {
   static constexpr int count = 8;
+  static constexpr std::array<std::string_view, count> names{"fx", "fy", "cx", "cy", "k1", "k2", "k3", "k4"};
 
   [[nodiscard]] static matrix<8> get(const kannala_brandt& c) {
     const auto& d = c.distortion();

@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// The camera's intrinsics and depth scale from a recording that it made: track, refine the camera by the map, and
+// again with that camera, until nothing changes.
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include <orbis/camera/settings.hpp>
+#include <orbis/eval/scale.hpp>
+#include <orbis/io/camera_file.hpp>
+#include <orbis/slam/calibration.hpp>
+#include <orbis/slam/rgbd_system.hpp>
+
+#include "commands.hpp"
+#include "interrupts.hpp"
+#include "output.hpp"
+#include "shutter_stage.hpp"
+#include "source.hpp"
+
+namespace app {
+namespace {
+
+using orbis::camera::any_camera;
+using calibration = orbis::slam::calibration<any_camera>;
+
+constexpr int most_rounds = 5;
+constexpr double most_scale_deviation = 0.005;  // of a depth scale that is believed
+
+struct refined {
+  calibration camera;
+  orbis::trajectory trajectory;
+};
+
+/// Tracks all frames with `model` and refines it by the map, the largest one if tracking was lost in between.
+orbis::result<refined> refine(const any_camera& model, const frame_source& source, const settings& s,
+                              const orbis::camera::shutter& shutter, console& console) {
+  orbis::slam::options options;
+  if (source.camera.baseline) options.bf = *source.camera.baseline * model.k().fx;
+  options.shutter = shutter;
+  orbis::slam::rgbd_system<any_camera> slam{model, options};
+  read_ahead frames{source, s.threads != 1};
+  for (std::size_t i = 0; frames.has_next(); ++i) {
+    if (interrupts::requested()) return orbis::fail(orbis::errc::cancelled, s.input.string(), "interrupted");
+    const auto frame = frames.next();
+    if (!frame) return orbis::fail(frame.error());
+    slam.track(*frame);
+    console.advance(i + 1, source.frames, "tracking");
+  }
+  const orbis::slam::map_id map = slam.largest_map();
+  orbis::trajectory poses = slam.trajectory(map);
+  if (poses.empty()) return orbis::fail(orbis::errc::no_data, s.input.string(), "tracking never started");
+  const auto found = slam.inspect([&](const orbis::slam::atlas& maps) {
+    return orbis::slam::calibrate(maps.at(map), orbis::slam::make_rig(model, options), {}, console.progress());
+  });
+  if (!found) return orbis::fail(orbis::errc::degenerate, s.input.string(), found.error().message);
+  return refined{*found, std::move(poses)};
+}
+
+/// Whether the round changed no parameter by more than so many deviations. Not every map has the same landmarks.
+bool is_settled(const calibration& c, double deviations) {
+  return std::all_of(c.parameters.begin(), c.parameters.end(), [&](const orbis::slam::calibrated_parameter& p) {
+    return p.is_held || std::abs(p.after - p.before) <= deviations * p.deviation;
+  });
+}
+
+/// The depth scale by the poses of the recording; empty if they do not tell.
+std::optional<orbis::slam::calibrated_parameter> find_depth_scale(const frame_source& source,
+                                                                  const orbis::trajectory& found) {
+  if (source.ground_truth.empty()) return std::nullopt;
+  const auto scale = orbis::eval::scale_of(found, source.ground_truth);
+  if (!scale) return std::nullopt;
+  const double before = source.camera.depth_scale, deviation = scale->deviation / scale->scale;
+  const bool is_vague = !(deviation <= most_scale_deviation);
+  return orbis::slam::calibrated_parameter{"depth_scale", before, is_vague ? before : before / scale->scale,
+                                           deviation * before / scale->scale, is_vague};
+}
+
+std::string line_of(const orbis::slam::calibrated_parameter& p) {
+  const int digits = std::max(std::abs(p.before), std::abs(p.after)) < 10.0 ? 5 : 2;
+  char text[160];
+  if (p.is_held && p.deviation > 0.0 && std::isfinite(p.deviation))
+    std::snprintf(text, sizeof text, "%-12s %12.*f %12s %12.*f  kept: not known better than this", p.name.data(),
+                  digits, p.before, "-", digits, p.deviation);
+  else if (p.is_held)
+    std::snprintf(text, sizeof text, "%-12s %12.*f %12s %12s  kept: the motion does not tell", p.name.data(), digits,
+                  p.before, "-", "-");
+  else
+    std::snprintf(text, sizeof text, "%-12s %12.*f %12.*f %12.*f", p.name.data(), digits, p.before, digits, p.after,
+                  digits, p.deviation);
+  return text;
+}
+
+std::optional<orbis::error> find_overwritten(const settings& s, const frame_source& source) {
+  std::error_code ignored;
+  if (s.out.empty()) return std::nullopt;
+  for (const auto& file : source.files)
+    if (std::filesystem::equivalent(file, s.out, ignored) && file.extension() != ".toml")
+      return orbis::error{orbis::errc::invalid_argument, s.out.string(),
+                          "is part of the recording, and would be written over"};
+  if (std::filesystem::is_directory(s.out, ignored))
+    return orbis::error{orbis::errc::invalid_argument, s.out.string(), "is a folder; a file is wanted"};
+  return std::nullopt;
+}
+
+}  // namespace
+
+exit_code calibrate(const settings& s, console& console) {
+  const auto give_up = [&](const orbis::error& e) {
+    console.error(e);
+    return e.code == orbis::errc::cancelled    ? interrupted
+           : e.code == orbis::errc::degenerate ? undetermined
+           : e.code == orbis::errc::no_data    ? never_tracked
+                                               : bad_input;
+  };
+  const auto source = open_source(s, console);
+  if (!source) return console.error(source.error()), bad_input;
+  if (source->is_stereo)
+    return console.error({orbis::errc::unsupported, s.input.string(), "only recordings with depth can be calibrated"}),
+           bad_input;
+  if (const auto lost = find_overwritten(s, *source)) return console.error(*lost), bad_usage;
+
+  orbis::camera::camera_settings camera = source->camera;
+  if (const auto* const plain = camera.model.get_if<orbis::camera::pinhole>(); plain && s.distortion)
+    camera.model = orbis::camera::radial_tangential{plain->k(), {}};
+  const any_camera given = camera.model;
+  const shutter_results shutter = find_shutter(*source, s, console);
+  std::optional<refined> last;
+  for (int round = 1; round <= most_rounds && !(last && is_settled(last->camera, 1.0)); ++round) {
+    console.stage("calibrating");
+    auto next = refine(camera.model, *source, s, shutter.shutter, console);
+    if (!next) return give_up(next.error());
+    last = *std::move(next);
+    camera.model = last->camera.camera;
+    char text[160];
+    std::snprintf(text, sizeof text, "round %d: %zu keyframes, %zu observations, their error %.3f -> %.3f deviations",
+                  round, last->camera.keyframes, last->camera.observations, last->camera.initial_rms,
+                  last->camera.final_rms);
+    console.finish(text);
+  }
+  if (!is_settled(last->camera, 3.0))
+    console.warn("the parameters still change from round to round: do not rely on them");
+
+  console.print("parameter           given        found    deviation");
+  auto parameters = last->camera.parameters;
+  any_camera{given}.visit([&](const auto& model) {  // the last round began with what the others had found
+    using of_model = orbis::camera::parameters_of<std::remove_cvref_t<decltype(model)>>;
+    const auto values = of_model::get(model);
+    for (auto& p : parameters)
+      for (std::size_t i = 0; i != of_model::names.size(); ++i)
+        if (of_model::names[i] == p.name) p.before = values[static_cast<int>(i)];
+  });
+  for (const auto& p : parameters) console.print(line_of(p));
+  const auto depth_scale = find_depth_scale(*source, last->trajectory);
+  if (depth_scale) {
+    console.print(line_of(*depth_scale));
+    camera.depth_scale = depth_scale->after;
+  } else {
+    console.print("depth_scale: images alone do not tell; poses of known size (groundtruth.txt) would");
+  }
+  if (!last->camera.is_complete())
+    console.warn("what was kept needs more motion: turn the camera about all axes, near and far from textured things");
+  if (s.out.empty()) return done;
+  if (s.read_out_ms || (shutter.from == "estimated" && !shutter.shutter.is_global())) camera.shutter = shutter.shutter;
+  if (const auto written = orbis::io::write_camera(s.out, camera); !written) return give_up(written.error());
+  console.print("camera       " + s.out.string());
+  return done;
+}
+
+}  // namespace app

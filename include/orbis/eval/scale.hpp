@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// How much larger a trajectory is than its reference says, and how certain that is.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <vector>
+
+#include <orbis/core/result.hpp>
+#include <orbis/core/trajectory.hpp>
+#include <orbis/eval/alignment.hpp>
+
+namespace orbis::eval {
+
+struct trajectory_scale {
+  double scale = 1.0;      ///< lengths of the reference over those of the estimate
+  double deviation = 0.0;  ///< one standard deviation; infinite where it cannot be told
+  std::size_t pairs = 0;   ///< poses that it was computed from
+};
+
+/// The scale of the similarity that aligns `estimate` with `reference` best. Its deviation comes from leaving out one
+/// tenth of the time after the other (jackknife), as errors of poses that follow each other are alike. For a depth
+/// camera whose depth is `stored / depth_scale`, the true depth scale is `depth_scale / scale`.
+/// Errors: as `align`. O(n log n).
+/// Source: B. Efron, "The jackknife, the bootstrap and other resampling plans", SIAM 1982.
+/// @pre both are sorted by time
+[[nodiscard]] inline result<trajectory_scale> scale_of(const trajectory& estimate, const trajectory& reference,
+                                                       double max_time_difference = 0.02) {
+  constexpr std::size_t parts = 10;
+  const auto pairs = pair_poses(estimate, reference, max_time_difference);
+  const auto whole = align(pairs, true);
+  if (!whole) return fail(whole.error());
+  trajectory_scale found{whole->scale, std::numeric_limits<double>::infinity(), pairs.size()};
+  if (pairs.size() < 3 * parts) return found;
+  std::vector<double> scales;
+  for (std::size_t part = 0; part != parts; ++part) {
+    std::vector<pose_pair> rest;
+    for (std::size_t i = 0; i != pairs.size(); ++i)
+      if (i * parts / pairs.size() != part) rest.push_back(pairs[i]);
+    const auto without = align(rest, true);
+    if (!without) return found;
+    scales.push_back(without->scale);
+  }
+  double mean = 0.0, squares = 0.0;
+  for (const double s : scales) mean += s / static_cast<double>(parts);
+  for (const double s : scales) squares += (s - mean) * (s - mean);
+  found.deviation = std::sqrt(squares * static_cast<double>(parts - 1) / static_cast<double>(parts));
+  return found;
+}
+
+}  // namespace orbis::eval

@@ -1,0 +1,357 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// The normal equations of poses, points and one camera that they share.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
+
+#include <orbis/camera/parameters.hpp>
+#include <orbis/core/se3.hpp>
+#include <orbis/core/types.hpp>
+#include <orbis/optimize/bundle_problem.hpp>
+#include <orbis/optimize/reprojection_with_intrinsics.hpp>
+#include <orbis/optimize/robust_loss.hpp>
+
+namespace orbis::optimize::detail {
+
+/// Levenberg-Marquardt with the points eliminated and a dense reduced system: six unknowns an image, but for the first
+/// one, then the parameters that are estimated.
+template <camera::parametric_camera Camera>
+class shared_intrinsics {
+  using parameters = camera::parameters_of<Camera>;
+  using residual_type = reprojection_with_intrinsics<Camera>;
+  using view_type = typename residual_type::view;
+  using by_theta_type = Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, parameters::count>;
+  using block_63 = matrix<6, 3>;
+  using block_t3 = Eigen::Matrix<double, Eigen::Dynamic, 3, 0, parameters::count, 3>;
+  using theta_vector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, parameters::count, 1>;
+  using basis_type = Eigen::Matrix<double, parameters::count, Eigen::Dynamic, 0, parameters::count, parameters::count>;
+
+  struct estimate {
+    Camera camera;
+    std::vector<se3> poses;
+    std::vector<vec3> points;
+  };
+  static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
+
+ public:
+  /// Points that fewer than two usable observations see are left out, and those seen from behind at the start.
+  shared_intrinsics(const Camera& start, double bf, std::uint32_t free, bool keeps_aspect, std::span<const se3> poses,
+                    std::span<const vec3> points, std::span<const bundle_observation> observations)
+      : residual_{bf}, now_{start, {poses.begin(), poses.end()}, {points.begin(), points.end()}} {
+    constexpr std::uint32_t focal_lengths = 0x3;
+    const bool ties = keeps_aspect && (free & focal_lengths) == focal_lengths;
+    for (int i = 0; i != parameters::count; ++i) {
+      if ((free >> i & 1U) == 0 || (ties && i == 1)) continue;
+      basis_.conservativeResize(Eigen::NoChange, count() + 1);
+      basis_.col(count() - 1).setZero();
+      basis_(i, count() - 1) = 1.0;
+    }
+    if (ties) basis_(1, 0) = parameters::get(start)[1] / parameters::get(start)[0];
+    choose(observations);
+    number_images();
+  }
+
+  [[nodiscard]] std::size_t observations() const noexcept { return observations_.size(); }
+  [[nodiscard]] bool has_depth() const {
+    return std::any_of(observations_.begin(), observations_.end(), [](const auto& o) { return !std::isnan(o.right); });
+  }
+  [[nodiscard]] const Camera& camera() const noexcept { return now_.camera; }
+  void write(std::span<se3> poses, std::span<vec3> points) const {
+    std::copy(now_.poses.begin(), now_.poses.end(), poses.begin());
+    std::copy(now_.points.begin(), now_.points.end(), points.begin());
+  }
+
+  /// Steps until the cost falls no more; counts them. Returns false if `go_on()` did.
+  template <class GoOn>
+  [[nodiscard]] bool descend(int limit, double relative_tolerance, int& steps, const GoOn& go_on) {
+    double cost = cost_of(now_), damping = 1e-4;
+    for (int taken = 0; taken != limit;) {
+      if (!go_on()) return false;
+      double gain = -1.0;
+      for (; damping < 1e8; damping *= 10.0) {
+        const std::optional<estimate> tried = step(damping);
+        gain = tried ? cost - cost_of(*tried) : -1.0;
+        if (!(gain >= 0.0)) continue;
+        now_ = *tried;
+        damping = std::max(damping * 0.1, 1e-12);
+        break;
+      }
+      if (!(gain >= 0.0)) return true;
+      ++taken, ++steps;
+      cost -= gain;
+      if (gain <= relative_tolerance * cost) return true;
+    }
+    return true;
+  }
+
+  /// Observations that disagree with the estimate take no part any more, those that agree again do. Returns their
+  /// number.
+  std::size_t leave_out_outliers() {
+    std::size_t count = 0;
+    const std::vector<view_type> views = views_of(now_);
+    for (std::size_t k = 0; k != observations_.size(); ++k) {
+      const double s = squared(views, now_.points, k);
+      is_out_[k] = s > chi_squared_gate(std::isnan(observations_[k].right) ? 2 : 3) ? 1 : 0;
+      count += is_out_[k];
+    }
+    return count;
+  }
+
+  /// Root mean square of the whitened residuals, an entry of them.
+  [[nodiscard]] double rms() const { return rms_of(now_.camera, now_.poses, now_.points); }
+  [[nodiscard]] double rms_of(const Camera& camera, std::span<const se3> poses, std::span<const vec3> points) const {
+    const estimate e{camera, {poses.begin(), poses.end()}, {points.begin(), points.end()}};
+    const std::vector<view_type> views = views_of(e);
+    double sum = 0.0, entries = 0.0;
+    for (std::size_t k = 0; k != observations_.size(); ++k) {
+      const double s = is_out_[k] != 0 ? std::numeric_limits<double>::infinity() : squared(views, e.points, k);
+      if (!std::isfinite(s)) continue;
+      sum += s;
+      entries += std::isnan(observations_[k].right) ? 2.0 : 3.0;
+    }
+    return entries > 0.0 ? std::sqrt(sum / entries) : 0.0;
+  }
+
+  /// The covariance of the parameters at the present estimate; false if they are not determined.
+  template <class Matrix>
+  [[nodiscard]] bool covariance(Matrix& out) {
+    out.setZero();
+    if (count() == 0) return true;
+    linearize(0.0);
+    const Eigen::Index size = reduced_.rows(), first = size - count();
+    const Eigen::LLT<Eigen::MatrixXd, Eigen::Lower> factor(reduced_);
+    if (factor.info() != Eigen::Success || !(factor.rcond() > 1e-14)) return false;
+    Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(size, count());  // of the inverse
+    for (Eigen::Index i = 0; i != count(); ++i) rows(first + i, i) = 1.0;
+    factor.solveInPlace(rows);
+    Eigen::MatrixXd spread = Eigen::MatrixXd::Zero(count(), count());
+    double points = 0.0;
+    for (std::size_t p = 0; p + 1 < begins_.size(); ++p) {
+      if (!eliminate(p, 0.0, false)) continue;
+      Eigen::VectorXd move = rows.bottomRows(count()).transpose() * point_.theta_gradient;
+      for (const seen& o : point_.by)
+        if (o.row != none) move += rows.template middleRows<6>(o.row).transpose() * o.gradient;
+      spread += move * move.transpose();
+      points += 1.0;
+    }
+    spread *= points / std::max(points - 1.0, 1.0);
+    out = basis_ * spread * basis_.transpose();
+    return out.allFinite();
+  }
+
+ private:
+  /// Of the unknowns of the camera.
+  [[nodiscard]] Eigen::Index count() const noexcept { return basis_.cols(); }
+
+  void choose(std::span<const bundle_observation> all) {
+    const std::vector<view_type> views = views_of(now_);
+    std::vector<std::vector<std::uint32_t>> by_point(now_.points.size());
+    for (std::size_t k = 0; k != all.size(); ++k) {
+      const bundle_observation& o = all[k];
+      if (residual_type::is_usable(o) && residual_.residual(views[o.pose], now_.points[o.point], o))
+        by_point[o.point].push_back(static_cast<std::uint32_t>(k));
+    }
+    begins_.assign(1, 0);
+    for (const auto& seen_by : by_point) {
+      if (seen_by.size() < 2) continue;
+      for (const std::uint32_t k : seen_by) observations_.push_back(all[k]);
+      begins_.push_back(observations_.size());
+    }
+    is_out_.assign(observations_.size(), 0);
+  }
+  void number_images() {
+    row_of_.assign(now_.poses.size(), none);
+    std::vector<std::uint8_t> has(now_.poses.size(), 0);
+    for (const bundle_observation& o : observations_) has[o.pose] = 1;
+    bool is_first = true;
+    std::uint32_t rows = 0;
+    for (std::size_t i = 0; i != has.size(); ++i) {
+      if (has[i] == 0) continue;
+      if (!is_first) row_of_[i] = rows, rows += 6;
+      is_first = false;
+    }
+    pose_rows_ = static_cast<Eigen::Index>(rows);
+  }
+
+  [[nodiscard]] static std::vector<view_type> views_of(const estimate& e) {
+    std::vector<view_type> views;
+    views.reserve(e.poses.size());
+    for (const se3& pose : e.poses) views.push_back(residual_type::prepare({pose, e.camera}));
+    return views;
+  }
+  [[nodiscard]] double squared(const std::vector<view_type>& views, const std::vector<vec3>& points,
+                               std::size_t k) const {
+    const bundle_observation& o = observations_[k];
+    const auto r = residual_.residual(views[o.pose], points[o.point], o);
+    return r ? o.information * r->squaredNorm() : std::numeric_limits<double>::infinity();
+  }
+  [[nodiscard]] double cost_of(const estimate& e) const {
+    const std::vector<view_type> views = views_of(e);
+    double sum = 0.0;
+    for (std::size_t k = 0; k != observations_.size(); ++k)
+      if (is_out_[k] == 0) sum += loss_.cost(squared(views, e.points, k));
+    return 0.5 * sum;
+  }
+
+  /// What an observation adds to the normal equations.
+  struct seen {
+    std::uint32_t row = none;  ///< of its image's unknowns
+    block_63 pose_point;
+    vec6 gradient;  ///< by the image
+  };
+  /// The part of a point, its own unknowns eliminated from the gradients.
+  struct eliminated {
+    std::vector<seen> by;
+    block_t3 theta_point;
+    theta_vector theta_gradient;
+    mat3 inverse;  ///< of its own block
+    vec3 gradient;
+  };
+
+  /// Makes `point_` of point `p`; with `adds`, adds what does not go by its own unknowns to the system. False if the
+  /// observations do not determine the point, which then adds nothing.
+  [[nodiscard]] bool eliminate(std::size_t p, double damping, bool adds) {
+    const vec3& at = now_.points[observations_[begins_[p]].point];
+    const Eigen::Index theta = pose_rows_;
+    mat3 own = mat3::Zero();
+    point_.gradient.setZero();
+    point_.theta_point.setZero(count(), 3);
+    point_.theta_gradient.setZero(count());
+    point_.by.clear();
+    rows_.clear();
+    for (std::size_t k = begins_[p]; k != begins_[p + 1]; ++k) {
+      if (is_out_[k] != 0) continue;
+      const bundle_observation& o = observations_[k];
+      const view_type& view = views_[o.pose];
+      const vec3 q = view.rotation * at + view.translation;
+      mat3 by_q;
+      matrix<3, parameters::count> by_all;
+      const auto r = residual_.linearize_in_camera(view, q, o, by_q, by_all);
+      if (!r) continue;
+      const double weight = o.information * loss_.weight(o.information * r->squaredNorm());
+      jacobians j{weight, {}, by_all * basis_};
+      j.by_pose.template leftCols<3>() = -by_q;
+      j.by_pose.template rightCols<3>() = by_q * hat<double>(q);
+      const mat3 by_point = by_q * view.rotation;
+      const mat3 weighted = weight * by_point;
+      const vec3 pull = weight * *r;
+      own += by_point.transpose() * weighted;
+      point_.gradient += by_point.transpose() * pull;
+      point_.theta_point += j.by_theta.transpose() * weighted;
+      point_.theta_gradient += j.by_theta.transpose() * pull;
+      seen s;
+      s.row = row_of_[o.pose];
+      s.pose_point = j.by_pose.transpose() * weighted;
+      s.gradient = j.by_pose.transpose() * pull;
+      point_.by.push_back(s);
+      if (adds) rows_.push_back(j);
+    }
+    own.diagonal() *= 1.0 + damping;
+    const Eigen::LLT<mat3> factor(own);
+    if (point_.by.size() < 2 || factor.info() != Eigen::Success || !(factor.rcond() > 1e-12)) return false;
+    point_.inverse = factor.solve(mat3::Identity());
+    const vec3 back = point_.inverse * point_.gradient;
+    point_.theta_gradient -= point_.theta_point * back;
+    for (seen& s : point_.by) s.gradient -= s.pose_point * back;
+    for (std::size_t i = 0; i != rows_.size(); ++i) {
+      const jacobians& j = rows_[i];
+      const matrix<6, 3> weighted = j.weight * j.by_pose.transpose();
+      reduced_.block(theta, theta, count(), count()) += j.by_theta.transpose() * (j.weight * j.by_theta);
+      if (point_.by[i].row == none) continue;
+      reduced_.template block<6, 6>(point_.by[i].row, point_.by[i].row) += weighted * j.by_pose;
+      reduced_.block(theta, point_.by[i].row, count(), 6) += (weighted * j.by_theta).transpose();
+    }
+    return true;
+  }
+
+  /// Takes away what goes by the unknowns of `point_`; the lower half of the system.
+  void take_away() {
+    const Eigen::Index theta = pose_rows_;
+    const block_t3 theta_inverse = point_.theta_point * point_.inverse;
+    removed_.block(theta, theta, count(), count()) += theta_inverse * point_.theta_point.transpose();
+    for (const seen& a : point_.by) {
+      if (a.row == none) continue;
+      const block_63 a_inverse = a.pose_point * point_.inverse;
+      removed_.block(theta, a.row, count(), 6) += theta_inverse * a.pose_point.transpose();
+      for (const seen& b : point_.by)
+        if (b.row <= a.row) removed_.template block<6, 6>(a.row, b.row) += a_inverse * b.pose_point.transpose();
+    }
+  }
+
+  /// The reduced system with `damping` times its diagonal added (before the points are eliminated), and its gradient.
+  void linearize(double damping) {
+    const Eigen::Index size = pose_rows_ + count();
+    views_ = views_of(now_);
+    reduced_.setZero(size, size);
+    removed_.setZero(size, size);
+    gradient_.setZero(size);
+    for (std::size_t p = 0; p + 1 < begins_.size(); ++p) {
+      if (!eliminate(p, damping, true)) continue;
+      take_away();
+      gradient_.tail(count()) += point_.theta_gradient;
+      for (const seen& s : point_.by)
+        if (s.row != none) gradient_.template segment<6>(s.row) += s.gradient;
+    }
+    reduced_.diagonal() *= 1.0 + damping;
+    reduced_ -= removed_;
+  }
+
+  /// Where a damped step leads; empty if there is none, or no such camera.
+  [[nodiscard]] std::optional<estimate> step(double damping) {
+    linearize(damping);
+    const Eigen::LLT<Eigen::MatrixXd, Eigen::Lower> factor(reduced_);
+    if (factor.info() != Eigen::Success) return std::nullopt;
+    const Eigen::VectorXd d = -factor.solve(gradient_);
+    if (!d.allFinite()) return std::nullopt;
+    const theta_vector theta = d.tail(count());
+    const std::optional<Camera> camera = parameters::with(now_.camera, parameters::get(now_.camera) + basis_ * theta);
+    if (!camera) return std::nullopt;
+    estimate to{*camera, now_.poses, now_.points};
+    for (std::size_t p = 0; p + 1 < begins_.size(); ++p) {
+      if (!eliminate(p, damping, false)) continue;
+      vec3 pull = point_.gradient + point_.theta_point.transpose() * theta;
+      for (const seen& s : point_.by)
+        if (s.row != none) pull += s.pose_point.transpose() * d.template segment<6>(s.row);
+      to.points[observations_[begins_[p]].point] -= point_.inverse * pull;
+    }
+    for (std::size_t i = 0; i != to.poses.size(); ++i)
+      if (row_of_[i] != none) to.poses[i] = to.poses[i] * se3::exp(vec6(d.template segment<6>(row_of_[i])));
+    return to;
+  }
+
+  /// The derivatives of one residual.
+  struct jacobians {
+    double weight;
+    matrix<3, 6> by_pose;
+    by_theta_type by_theta;
+  };
+
+  residual_type residual_;
+  huber loss_{2.447};  ///< the chi-squared gate of two coordinates
+  estimate now_;
+  basis_type basis_;                              ///< how the parameters follow the unknowns, a column each
+  std::vector<bundle_observation> observations_;  ///< by point
+  std::vector<std::size_t> begins_;               ///< of each point's, and the end
+  std::vector<std::uint8_t> is_out_;              ///< by observation
+  std::vector<std::uint32_t> row_of_;             ///< by image: its first unknown; `none` if its pose is held
+  Eigen::Index pose_rows_ = 0;
+
+  std::vector<view_type> views_;
+  Eigen::MatrixXd reduced_, removed_;  ///< lower halves
+  Eigen::VectorXd gradient_;
+  eliminated point_;
+  std::vector<jacobians> rows_;
+};
+
+}  // namespace orbis::optimize::detail

@@ -1,0 +1,33 @@
+# SPDX-License-Identifier: BSD-3-Clause
+#
+# A camera refined by a recording.
+include(${CMAKE_CURRENT_LIST_DIR}/support.cmake)
+make_recording(${WORK}/room 120 320)
+file(READ ${WORK}/room/camera.toml given)
+string(REGEX REPLACE "fx = [0-9.]+\nfy = [0-9.]+" "fx = 270.0\nfy = 270.0" wrong "${given}")
+file(WRITE ${WORK}/wrong.toml "${wrong}")
+
+app(0 calibrate room --camera wrong.toml --read-out-ms 0 --out found.toml)
+check(out MATCHES "fx +270\\.00 +26[0-9]\\.[0-9]+ +[0-9.]+\n")
+check(out MATCHES "cx +159\\.50 ")
+check(out MATCHES "depth_scale +5000")
+file(READ ${WORK}/found.toml found)
+string(REGEX MATCH "fx = ([0-9.]+)" fx "${found}")
+check(CMAKE_MATCH_1 GREATER 259.5 AND CMAKE_MATCH_1 LESS 265.5)  # true: 262.5
+
+# The file is one for --camera, and better than what it was made of.
+app(0 run room --camera found.toml --read-out-ms 0 --deterministic --filter none --resolution 0.1 --out better)
+app(0 run room --camera wrong.toml --read-out-ms 0 --deterministic --filter none --resolution 0.1 --out before)
+summary(better ${WORK}/better ate_rmse_m)
+summary(before ${WORK}/before ate_rmse_m)
+check(better LESS before)
+
+# Without poses the depth scale is nobody's to know; without motion nothing is, and no file is written.
+file(REMOVE ${WORK}/room/groundtruth.txt ${WORK}/found.toml)
+app(0 calibrate room --frames 60 --read-out-ms 0)
+check(out MATCHES "depth_scale: images alone do not tell")
+app_fails(5 "no point is seen by two images" calibrate room --frames 3 --read-out-ms 0 --out found.toml)
+check(NOT EXISTS ${WORK}/found.toml)
+app_fails(1 "would be written over" calibrate room --out room/rgb/000000.png)
+app_fails(1 "is a folder" calibrate room --out room)
+app_fails(2 "nothing" calibrate nothing)
