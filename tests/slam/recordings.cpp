@@ -14,6 +14,7 @@
 
 #include "slam/tested_system.hpp"
 #include "support/catch.hpp"
+#include "support/synthetic/close_people.hpp"
 #include "support/synthetic/effects.hpp"
 #include "support/synthetic/sequence.hpp"
 
@@ -163,6 +164,44 @@ TEST_CASE("Who walks through the view does not carry the map along") {
   CHECK(seen.counters.lost == 0);
   CHECK(seen.ate < 0.02);
   CHECK(seen.end < 0.02);
+}
+
+TEST_CASE("Who fills half of the view does not carry the camera along") {
+  syn::company_options o;
+  o.sequence = small(15);
+  SECTION("stops and goes on") { o.what = syn::company::stops; }
+  SECTION("goes along with the camera") { o.what = syn::company::goes_along; }
+  const auto frames = syn::with_company(o);
+  test::slam_system slam{frames.camera().model, options_for(frames)};
+  slam::options settings = options_for(frames);
+  settings.moving.enabled = false;
+  test::slam_system carried{frames.camera().model, settings};
+  std::vector<slam::track_state> states, others;
+  std::size_t on_body = 0, elsewhere = 0;  // of what is left out
+  for (std::size_t i = 0; i != frames.size(); ++i) {
+    const auto f = frames.frame(i).value();
+    states.push_back(slam.track(f).state);
+    others.push_back(carried.track(f).state);
+    const auto shown = slam.last_frame();
+    REQUIRE(shown);
+    for (const slam::tracked_feature& at : shown->features) {
+      if (!at.moving) continue;
+      const auto direction =
+          frames.camera().model.unproject(vec2(static_cast<double>(at.x), static_cast<double>(at.y)));
+      const se3 T = frames.T_world_camera(i);
+      const auto room = frames.place().cast(T.translation(), T.rotation() * *direction);
+      const auto z = f.depth_metres()(static_cast<int>(at.x), static_cast<int>(at.y));
+      if (!room || !(z > 0.0F)) continue;
+      ++(static_cast<double>(z) < *room - 0.1 ? on_body : elsewhere);
+    }
+  }
+  const outcome seen = judge(slam, frames, std::move(states)), off = judge(carried, frames, std::move(others));
+  CHECK(seen.counters.lost == 0);
+  CHECK(seen.ate < 0.02);
+  CHECK(seen.end < 0.02);
+  CHECK(off.ate > 0.1);
+  CHECK(on_body > 1000);
+  CHECK(on_body > 5 * elsewhere);
 }
 
 TEST_CASE("Jumps of exposure, motion blur and low rates are tracked through") {

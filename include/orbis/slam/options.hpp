@@ -132,6 +132,16 @@ struct place_options {
   global_adjustment_options adjustment{};
 };
 
+/// What moves through the view.
+struct moving_options {
+  bool enabled = true;            ///< off: every feature counts as part of the world
+  std::size_t min_features = 20;  ///< that move together, at least ...
+  double share = 0.15;            ///< ... where more than this share of the matches does not agree with one pose
+  double seasoned = 1.0;          ///< age at which a landmark is trusted fully to stand still, seconds
+  double reach = 0.2;             ///< around what moves, in which features of unknown motion are left out, metres
+  double hold = 3.0;              ///< seconds that what has moved stays left out while it stands still
+};
+
 /// Threads of the system.
 struct thread_options {
   /// Off: `track` does everything, and the same frames give the same bytes. On: mapping, loop closing and global
@@ -171,6 +181,7 @@ struct options {
   place_options places{};
   triangulation_options triangulation{};
   fusion_options fusion{};
+  moving_options moving{};
   thread_options threads{};
   bool localization_only = false;     ///< no keyframes are made, and the map is kept unchanged: for a loaded map
   std::optional<se3> initial_pose{};  ///< `T_world_camera` of the first frame of a map; default: the identity

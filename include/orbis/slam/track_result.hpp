@@ -58,6 +58,7 @@ struct track_result {
 struct tracked_feature {
   float x = 0.0F, y = 0.0F;  ///< pixels
   bool tracked = false;      ///< observes a landmark that was known before, in agreement with the pose
+  bool moving = false;       ///< lies on something that moves, and is left out of all else (`moving_options`)
 };
 
 /// What tracking knows of a frame, to be shown or logged.

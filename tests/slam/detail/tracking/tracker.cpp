@@ -20,6 +20,7 @@ struct scene {
   slam::options options;
   slam::map m{8, 1.2};
   slam::detail::tracker<camera::any_camera, descriptor, slam::orb_matchers> tracker{world.rig, options};
+  slam::detail::moving_features<camera::any_camera, descriptor, slam::orb_matchers> moving{world.rig, options};
   slam::frame next;
 
   scene() {
@@ -45,17 +46,17 @@ TEST_CASE("A frame is found from the last one and a rough prediction") {
   scene s;
   const slam::frame& last = s.m.at(9);
   const se3 predicted = s.world.truth(10) * se3(so3::exp(vec3(0.004, -0.004, 0.004)), vec3(0.01, 0.01, -0.01));
-  CHECK(s.tracker.by_motion(s.next, s.m, last, predicted) > 50);
+  CHECK(s.tracker.by_motion(s.next, s.m, last, predicted, s.moving) > 50);
   CHECK(s.error() < 0.01);
   CHECK(s.wrong_landmarks() == 0);
-  CHECK(s.tracker.by_motion(s.next, s.m, last, s.world.truth(40)) == 0);  // looks at another wall
+  CHECK(s.tracker.by_motion(s.next, s.m, last, s.world.truth(40), s.moving) == 0);  // looks at another wall
 }
 
 TEST_CASE("Points of the last frame that have no landmark are found by their depth") {
   scene s;
   slam::frame last = s.m.at(9);
   last.landmarks.assign(last.size(), slam::no_id);
-  CHECK(s.tracker.by_motion(s.next, s.m, last, s.world.truth(10)) > 50);
+  CHECK(s.tracker.by_motion(s.next, s.m, last, s.world.truth(10), s.moving) > 50);
   CHECK(s.error() < 0.01);
   CHECK(std::set(s.next.landmarks.begin(), s.next.landmarks.end()).size() == 1);  // none
 }
@@ -75,7 +76,7 @@ TEST_CASE("The local map adds landmarks that the last frame did not show") {
   s.next.T_world_camera = s.world.truth(10);
   std::set<slam::landmark_id> expected, found;
   const std::size_t inliers = s.tracker.on_local_map(
-      s.next, s.m, 9, 4.0, [&](slam::landmark_id l) { expected.insert(l); },
+      s.next, s.m, 9, 4.0, s.moving, [&](slam::landmark_id l) { expected.insert(l); },
       [&](slam::landmark_id l) { found.insert(l); });
   CHECK(inliers > 100);
   CHECK(inliers == found.size());

@@ -43,7 +43,7 @@ class front_end {
   using atlas_type = basic_atlas<D>;
 
   front_end(const camera_rig<Camera>& rig, const options& settings)
-      : tracker_{rig, settings}, rig_{rig}, options_{settings}, shutter_{settings.shutter} {
+      : tracker_{rig, settings}, moving_{rig, settings}, rig_{rig}, options_{settings}, shutter_{settings.shutter} {
     if (settings.estimates_shutter) observer_.emplace();
   }
 
@@ -132,7 +132,7 @@ class front_end {
   std::size_t relocalize(frame_type& f, atlas_type& maps, bool is_frozen, FollowRows&& follow_rows, Similar&& similar);
   std::size_t track_local_map(frame_type& f, basic_map<D>& m, double radius, bool is_frozen) {
     return tracker_.on_local_map(
-        f, m, reference_.keyframe, radius, [&](landmark_id l) { is_frozen ? void() : m.count_visible(l); },
+        f, m, reference_.keyframe, radius, moving_, [&](landmark_id l) { is_frozen ? void() : m.count_visible(l); },
         [&](landmark_id l) { is_frozen ? void() : m.count_found(l); });
   }
 
@@ -153,6 +153,7 @@ class front_end {
   void refine_motion(frame_type& f, const basic_map<D>& m, bool is_next, FollowRows&& follow_rows);
 
   tracker<Camera, D, Matchers> tracker_;
+  moving_features<Camera, D, Matchers> moving_;
   const camera_rig<Camera>& rig_;
   const options& options_;
   camera::shutter shutter_;
@@ -188,8 +189,10 @@ tracked_frame front_end<Camera, D, Matchers, Sensor>::last_frame() const {
     const auto& at = last_.features.keypoints[i];
     const bool moved = !last_.as_read.empty();  // shown where they are in the image
     shown.features.push_back(
-        {moved ? last_.as_read[i].x : at.x, moved ? last_.as_read[i].y : at.y, l != no_id && l < first_new_});
+        {moved ? last_.as_read[i].x : at.x, moved ? last_.as_read[i].y : at.y, l != no_id && l < first_new_, false});
   }
+  for (const vec2& at : moving_.pixels())
+    shown.features.push_back({static_cast<float>(at.x()), static_cast<float>(at.y()), false, true});
   return shown;
 }
 
@@ -253,13 +256,17 @@ std::size_t front_end<Camera, D, Matchers, Sensor>::track_from_last(frame_type& 
     follow_rows(f, {shutter_, motion_between(last_, f)});
     move_keypoints(f);
   }
-  if (tracker_.by_motion(f, maps.active(), last_, predicted) == 0 &&
+  moving_.set_last(last_.T_world_camera);
+  moving_.find(f);
+  if (tracker_.by_motion(f, maps.active(), last_, predicted, moving_) == 0 &&
       tracker_.by_appearance(f, maps.active(), reference_.keyframe) == 0)
     return 0;
+  moving_.spread(f);
   move_keypoints(f);
   const std::size_t inliers = track_local_map(f, maps.active(), options_.search_radius, is_frozen);
   if (inliers < options_.min_inliers) return 0;
   refine_motion(f, maps.active(), true, follow_rows);
+  moving_.take_out(f);
   state_ = track_state::tracking;
   return inliers;
 }
@@ -268,6 +275,7 @@ template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D
 template <class FollowRows, class Similar>
 std::size_t front_end<Camera, D, Matchers, Sensor>::relocalize(frame_type& f, atlas_type& maps, bool is_frozen,
                                                                FollowRows&& follow_rows, Similar&& similar) {
+  moving_.clear();
   std::vector<map_keyframe> candidates = similar(f.features, options_.recovery.candidates);
   if (reference_.map == maps.active_id() && maps.active().has_keyframe(reference_.keyframe) &&
       std::find(candidates.begin(), candidates.end(), reference_) == candidates.end())

@@ -16,6 +16,7 @@
 #include <orbis/features/project_points.hpp>
 #include <orbis/optimize/pnp.hpp>
 #include <orbis/slam/camera_rig.hpp>
+#include <orbis/slam/detail/dynamics/moving_features.hpp>
 #include <orbis/slam/detail/map/landmark_search.hpp>
 #include <orbis/slam/detail/map/local_map.hpp>
 #include <orbis/slam/detail/tracking/match_refinement.hpp>
@@ -38,8 +39,8 @@ class tracker {
 
   /// Searches for what the last frame observed: its landmarks, and its other points with depth. `last` has its present
   /// pose, and landmarks by ids of the map at that time. `predicted`: the expected `T_world_camera`.
-  std::size_t by_motion(basic_frame<D>& f, const basic_map<D>& m, const basic_frame<D>& last,
-                        const se3& predicted) const;
+  std::size_t by_motion(basic_frame<D>& f, const basic_map<D>& m, const basic_frame<D>& last, const se3& predicted,
+                        moving_features<Camera, D, Matchers>& moving) const;
 
   /// Matches a frame with a keyframe by appearance and estimates its pose by RANSAC. @pre the keyframe is there
   std::size_t by_appearance(basic_frame<D>& f, const basic_map<D>& m, keyframe_id id) const;
@@ -49,13 +50,15 @@ class tracker {
   /// for those that it does.
   template <class Expected, class Found>
   std::size_t on_local_map(basic_frame<D>& f, const basic_map<D>& m, keyframe_id reference, double radius,
-                           Expected&& expected, Found&& found) const {
+                           const moving_features<Camera, D, Matchers>& moving, Expected&& expected,
+                           Found&& found) const {
     const features::camera_projection project{rig_.camera(), f.T_world_camera};
     const features::projection_rule rule = rule_of(rig_.scales, radius);
     search_list<D> list;
     for (const landmark_id id : local_landmarks(m, f, reference, options_.local_keyframes))
-      if (add_landmark(list, project, rule, m.landmark_at(id), id)) expected(id);
-    const auto matches = Matchers::landmarks(list.descriptors, f.features, list.windows, f.grid);
+      if (!moving.avoids(m, id, f.timestamp) && add_landmark(list, project, rule, m.landmark_at(id), id)) expected(id);
+    std::vector<features::match> matches = Matchers::landmarks(list.descriptors, f.features, list.windows, f.grid);
+    moving.drop_left_out(matches);
     const std::size_t inliers = refine_on_matches<D>(f, list, matches, rig_);
     for (const landmark_id l : f.landmarks)
       if (l != no_id) found(l);
@@ -69,7 +72,8 @@ class tracker {
 
 template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers>
 std::size_t tracker<Camera, D, Matchers>::by_motion(basic_frame<D>& f, const basic_map<D>& m,
-                                                    const basic_frame<D>& last, const se3& predicted) const {
+                                                    const basic_frame<D>& last, const se3& predicted,
+                                                    moving_features<Camera, D, Matchers>& moving) const {
   for (const double widening : {1.0, 2.0}) {
     f.T_world_camera = predicted;
     const features::camera_projection project{rig_.camera(), predicted};
@@ -86,10 +90,12 @@ std::size_t tracker<Camera, D, Matchers>::by_motion(basic_frame<D>& f, const bas
       add_seen_point(list, project, rig_.scales, p, last.features.descriptors[i], last.features.keypoints[i],
                      widening * options_.motion_radius);
     }
-    const auto matches =
+    std::vector<features::match> matches =
         Matchers::motion(features::feature_view<D>{list.keypoints, list.descriptors}, f.features, list.windows, f.grid);
+    moving.drop_left_out(matches);
     if (matches.size() < options_.min_inliers) continue;
-    if (const std::size_t inliers = refine_on_matches<D>(f, list, matches, rig_); inliers >= 10) return inliers;
+    const std::size_t fitted = refine_on_matches<D>(f, list, matches, rig_);
+    if (const std::size_t inliers = moving.judge(f, m, list, matches, fitted, predicted); inliers >= 10) return inliers;
   }
   return 0;
 }

@@ -1,0 +1,251 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Tells the motion of the camera from that of something that moves before it.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cassert>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include <orbis/camera/model.hpp>
+#include <orbis/core/se3.hpp>
+#include <orbis/core/types.hpp>
+#include <orbis/optimize/pnp.hpp>
+#include <orbis/optimize/pose_refinement.hpp>
+#include <orbis/optimize/reprojection.hpp>
+#include <orbis/slam/detail/map/point_observation.hpp>
+#include <orbis/slam/options.hpp>
+
+namespace orbis::slam::detail {
+
+/// What is known of a frame whose matches do not all agree with one pose.
+struct motion_split {
+  se3 T_world_camera;                  ///< by what stands still
+  std::size_t inliers = 0;             ///< matches that agree with it
+  std::vector<std::uint8_t> outliers;  ///< 1 for each match that does not
+  std::vector<std::uint8_t> moving;    ///< 1 for each match on something that moves; these are outliers
+  bool by_trust = false;               ///< the pose is that of the trusted matches alone
+};
+
+/// The trust from which on a match counts as one of something that stands still.
+inline constexpr double enough_trust = 0.7;
+
+/// Whether so many outliers are worth a closer look.
+[[nodiscard]] inline bool may_hold_two_motions(std::size_t matches, std::size_t inliers,
+                                               const moving_options& o) noexcept {
+  const std::size_t outliers = matches - std::min(inliers, matches);
+  return outliers >= o.min_features && static_cast<double>(outliers) > o.share * static_cast<double>(matches);
+}
+
+/// Looks for a second rigid motion among matches of which one pose leaves many out, and for which of the two is that of
+/// the camera: the one with the greater sum of trust times spread. What has been part of the map for long is trusted;
+/// what carries the camera along has come lately, or is small beside the room behind it. Among the poses that are tried
+/// is the one that the trusted matches alone give, from the prediction. The second motion is found by RANSAC among what
+/// the first leaves out, as in P. H. S. Torr, "Geometric motion segmentation and model selection", Phil. Trans. R. Soc.
+/// A 356 (1998).
+template <camera::camera_model Camera>
+class motion_splitter {
+ public:
+  /// `trust`: of each match, 0 ... 1. `predicted`: where the camera is expected; `fitted`: by all matches, of which
+  /// these `outliers` do not agree. Empty if there is no second motion, and no better pose. O(matches), some tenths of
+  /// a millisecond. @pre one entry of `trust` and `outliers` for each observation
+  [[nodiscard]] static std::optional<motion_split> split(std::span<const optimize::pose_observation> observations,
+                                                         std::span<const double> trust,
+                                                         const optimize::reprojection<Camera>& model,
+                                                         const se3& predicted, const se3& fitted,
+                                                         std::span<const std::uint8_t> outliers,
+                                                         const moving_options& options, std::uint64_t seed) {
+    assert(trust.size() == observations.size() && outliers.size() == observations.size());
+    motion_splitter s{observations, trust, model, options, seed};
+    se3 pose = fitted;
+    double score = s.score(pose);
+    bool changed = false, by_trust = false;
+    const auto compete = [&](const std::optional<se3>& other, bool trusted) {
+      constexpr double clearly = 1.05;
+      const double value = other ? s.score(*other) : 0.0;
+      if (!(value > (changed ? 1.0 : clearly) * score)) return;
+      score = value, pose = *other, changed = true, by_trust = trusted;
+    };
+    const std::vector<std::uint8_t> trusted = s.trusted();
+    compete(s.refine_some(trusted, fitted), true);
+    compete(s.refine_some(trusted, predicted), true);
+    if (const std::optional<se3> second = s.second_motion(outliers)) compete(s.refine_on_agreeing(*second), false);
+    motion_split out{pose, 0, {}, std::vector<std::uint8_t>(observations.size()), by_trust};
+    if (changed) {
+      out.outliers.resize(observations.size());
+      s.judge(pose, out.outliers);
+    } else {
+      out.outliers.assign(outliers.begin(), outliers.end());
+    }
+    out.inliers = static_cast<std::size_t>(std::count(out.outliers.begin(), out.outliers.end(), std::uint8_t{0}));
+    const bool moves = s.mark_moving(out);
+    if (!changed && !moves) return std::nullopt;
+    return out;
+  }
+
+  /// Whether the others of the matches agree with the pose of all, but not with that of the trusted ones: something
+  /// moves so slowly that it draws the pose along. O(matches), some ten microseconds.
+  [[nodiscard]] static bool is_drawn_along(std::span<const optimize::pose_observation> observations,
+                                           std::span<const double> trust, const optimize::reprojection<Camera>& model,
+                                           const se3& fitted, const moving_options& options) {
+    motion_splitter s{observations, trust, model, options, 0};
+    const std::vector<std::uint8_t> trusted = s.trusted();
+    const auto count = static_cast<std::size_t>(std::count(trusted.begin(), trusted.end(), std::uint8_t{1}));
+    if (count < 2 * options.min_features || count + options.min_features > trusted.size()) return false;
+    const std::optional<se3> by_trusted = s.refine_some(trusted, fitted);
+    if (!by_trusted) return false;
+    const se3 before = fitted.inverse(), after = by_trusted->inverse();
+    std::size_t lost = 0;
+    for (std::size_t i = 0; i != trusted.size(); ++i) {
+      const double limit = error_limit(observations[i].has_depth());
+      lost += trusted[i] == 0 && s.error(before, i) <= limit && s.error(after, i) > limit;
+    }
+    return lost >= options.min_features;
+  }
+
+ private:
+  motion_splitter(std::span<const optimize::pose_observation> observations, std::span<const double> trust,
+                  const optimize::reprojection<Camera>& model, const moving_options& options, std::uint64_t seed)
+      : observations_{observations}, trust_{trust}, model_{model}, options_{options}, seed_{seed} {}
+
+  /// Trust, less where a match agrees less, times the spread of those that agree.
+  [[nodiscard]] double score(const se3& T_world_camera) const {
+    const se3 T_camera_world = T_world_camera.inverse();
+    double sum = 0.0, weight = 0.0;
+    vec3 mean = vec3::Zero(), squares = vec3::Zero();
+    for (std::size_t i = 0; i != observations_.size(); ++i) {
+      const double left = 1.0 - error(T_camera_world, i) / error_limit(observations_[i].has_depth());
+      if (!(left > 0.0)) continue;
+      const double w = std::max(trust_[i], 0.05);
+      const vec3& p = observations_[i].point;
+      sum += left * w;
+      weight += w;
+      mean += w * p;
+      squares += w * p.cwiseProduct(p);
+    }
+    if (!(weight > 0.0)) return 0.0;
+    const double variance = (squares / weight - (mean / weight).cwiseAbs2()).sum();
+    return sum * std::sqrt(std::max(variance, 0.0));
+  }
+
+  /// 1 for each match that is trusted.
+  [[nodiscard]] std::vector<std::uint8_t> trusted() const {
+    std::vector<std::uint8_t> all(observations_.size());
+    for (std::size_t i = 0; i != all.size(); ++i) all[i] = trust_[i] >= enough_trust ? 1 : 0;
+    return all;
+  }
+
+  /// The pose by the matches that are `chosen`, beginning with `start`.
+  [[nodiscard]] std::optional<se3> refine_some(std::span<const std::uint8_t> chosen, const se3& start) {
+    part_.clear();
+    for (std::size_t i = 0; i != chosen.size(); ++i)
+      if (chosen[i] != 0) part_.push_back(observations_[i]);
+    if (part_.size() < options_.min_features) return std::nullopt;
+    part_outliers_.assign(part_.size(), 0);
+    const auto refined = optimize::refine_pose(std::span<const optimize::pose_observation>(part_), model_, start,
+                                               std::span<std::uint8_t>(part_outliers_));
+    if (!refined.ok() || refined.inliers < options_.min_features) return std::nullopt;
+    return refined.T_world_camera;
+  }
+
+  /// Refines a pose on all that agree with it.
+  [[nodiscard]] std::optional<se3> refine_on_agreeing(se3 pose) {
+    std::vector<std::uint8_t> agree(observations_.size());
+    for (int round = 0; round != 2; ++round) {
+      judge(pose, agree);
+      for (std::uint8_t& a : agree) a = a == 0 ? 1 : 0;
+      const std::optional<se3> refined = refine_some(agree, pose);
+      if (!refined) return std::nullopt;
+      pose = *refined;
+    }
+    return pose;
+  }
+
+  /// Says which matches do not agree with a pose.
+  void judge(const se3& T_world_camera, std::span<std::uint8_t> outliers) const {
+    const se3 T_camera_world = T_world_camera.inverse();
+    for (std::size_t i = 0; i != observations_.size(); ++i)
+      outliers[i] = error(T_camera_world, i) <= error_limit(observations_[i].has_depth()) ? 0 : 1;
+  }
+  /// Chi-squared.
+  [[nodiscard]] double error(const se3& T_camera_world, std::size_t i) const {
+    const optimize::pose_observation& o = observations_[i];
+    const auto r = model_.residual(T_camera_world * o.point, o);
+    return r ? r->squaredNorm() * o.information : std::numeric_limits<double>::infinity();
+  }
+
+  /// A rigid motion among the outliers, by RANSAC.
+  [[nodiscard]] std::optional<se3> second_motion(std::span<const std::uint8_t> outliers) {
+    points_.clear();
+    pixels_.clear();
+    for (std::size_t i = 0; i != outliers.size(); ++i) {
+      if (outliers[i] == 0) continue;
+      points_.push_back(observations_[i].point);
+      pixels_.push_back(observations_[i].pixel);
+    }
+    const std::size_t enough =
+        std::max(options_.min_features, static_cast<std::size_t>(0.4 * static_cast<double>(points_.size())));
+    if (points_.size() < enough) return std::nullopt;
+    const auto found =
+        optimize::estimate_pose(std::span<const vec3>(points_), std::span<const vec2>(pixels_), model_.camera,
+                                {.threshold = 4.0, .max_iterations = 200, .min_inliers = enough, .seed = seed_});
+    if (!found) return std::nullopt;
+    return found->T_world_camera;
+  }
+
+  /// Marks the outliers that agree with one other motion, clearly not with that of the camera, and lie among outliers:
+  /// what moves is one body, but the outliers of a blurred image are everywhere.
+  [[nodiscard]] bool mark_moving(motion_split& s) {
+    const std::optional<se3> other = second_motion(s.outliers);
+    if (!other) return false;
+    const se3 T_camera_other = other->inverse(), T_camera_world = s.T_world_camera.inverse();
+    std::size_t count = 0;
+    for (std::size_t i = 0; i != observations_.size(); ++i) {
+      const double limit = error_limit(observations_[i].has_depth());
+      const bool moves = s.outliers[i] != 0 && error(T_camera_other, i) <= 2.0 * limit &&
+                         error(T_camera_world, i) > 2.0 * limit && lies_among(s.outliers, i);
+      s.moving[i] = moves ? 1 : 0;
+      count += s.moving[i];
+    }
+    if (count >= options_.min_features) return true;
+    std::fill(s.moving.begin(), s.moving.end(), std::uint8_t{0});
+    return false;
+  }
+
+  /// Whether most of the points nearest to one are outliers. O(matches).
+  [[nodiscard]] bool lies_among(std::span<const std::uint8_t> outliers, std::size_t which) const {
+    struct neighbour {
+      double distance = std::numeric_limits<double>::infinity();
+      bool out = false;
+    };
+    std::array<neighbour, 6> nearest;
+    for (std::size_t i = 0; i != observations_.size(); ++i) {
+      neighbour n{(observations_[i].point - observations_[which].point).squaredNorm(), outliers[i] != 0};
+      if (i == which || !(n.distance < nearest.back().distance)) continue;
+      nearest.back() = n;
+      for (std::size_t k = nearest.size() - 1; k != 0 && nearest[k].distance < nearest[k - 1].distance; --k)
+        std::swap(nearest[k], nearest[k - 1]);
+    }
+    return std::count_if(nearest.begin(), nearest.end(), [](const neighbour& n) { return n.out; }) >= 4;
+  }
+
+  std::span<const optimize::pose_observation> observations_;
+  std::span<const double> trust_;
+  const optimize::reprojection<Camera>& model_;
+  const moving_options& options_;
+  std::uint64_t seed_;
+  std::vector<optimize::pose_observation> part_;
+  std::vector<std::uint8_t> part_outliers_;
+  std::vector<vec3> points_;
+  std::vector<vec2> pixels_;
+};
+
+}  // namespace orbis::slam::detail

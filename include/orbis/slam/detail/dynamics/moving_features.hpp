@@ -1,0 +1,316 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// The features on what moves, followed from frame to frame and left out of all else.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include <orbis/camera/model.hpp>
+#include <orbis/core/se3.hpp>
+#include <orbis/core/types.hpp>
+#include <orbis/features/descriptor.hpp>
+#include <orbis/features/match.hpp>
+#include <orbis/features/windowed.hpp>
+#include <orbis/slam/camera_rig.hpp>
+#include <orbis/slam/detail/dynamics/motion_split.hpp>
+#include <orbis/slam/detail/map/landmark_search.hpp>
+#include <orbis/slam/detail/map/point_observation.hpp>
+#include <orbis/slam/frame.hpp>
+#include <orbis/slam/map.hpp>
+#include <orbis/slam/matchers.hpp>
+#include <orbis/slam/options.hpp>
+
+namespace orbis::slam::detail {
+
+/// Removes features of a frame, and keeps the order of the others. `leave_out`: one entry for each feature.
+template <feature_descriptor D>
+void remove_features(basic_frame<D>& f, std::span<const std::uint8_t> leave_out) {
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i != f.size(); ++i) {
+    if (leave_out[i] != 0) continue;
+    f.features.keypoints[kept] = f.features.keypoints[i];
+    f.features.descriptors[kept] = f.features.descriptors[i];
+    f.depth[kept] = f.depth[i];
+    f.rays[kept] = f.rays[i];
+    f.landmarks[kept] = f.landmarks[i];
+    if (!f.as_read.empty()) f.as_read[kept] = f.as_read[i];
+    ++kept;
+  }
+  f.features.keypoints.resize(kept);
+  f.features.descriptors.resize(kept);
+  f.depth.resize(kept);
+  f.rays.resize(kept);
+  f.landmarks.resize(kept);
+  if (!f.as_read.empty()) f.as_read.resize(kept);
+  f.grid = features::keypoint_grid(f.features.keypoints);
+}
+
+/// The features of the last frame that lie on something that moves. In each frame: `find`, then `judge` on matches of
+/// what stands still, `spread` when the pose is known, and `take_out` at the end. While nothing moves each of these
+/// returns at once and changes nothing.
+///
+/// Where a second motion is found, its features are left out from then on. A feature is followed by its appearance near
+/// where its own motion in the image leads, and its place in the world is compared with that of a little earlier. Those
+/// around them that nothing is known of are left out as well. Who stands still stays left out for a while
+/// (`moving_options::hold`), so that going on is no surprise.
+template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers>
+class moving_features {
+ public:
+  moving_features(const camera_rig<Camera>& rig, const options& settings) : rig_{rig}, options_{settings} {}
+
+  /// Forgets all.
+  void clear() {
+    tracks_.clear();
+    next_.clear();
+    is_left_out_.clear();
+    trusts_old_only_ = false;
+  }
+  [[nodiscard]] bool is_enabled() const noexcept { return options_.moving.enabled; }
+  /// Whether a feature of the present frame is left out.
+  [[nodiscard]] bool leaves_out(std::size_t feature) const noexcept {
+    return !is_left_out_.empty() && is_left_out_[feature] != 0;
+  }
+  /// How many features of the last frame were left out.
+  [[nodiscard]] std::size_t size() const noexcept { return tracks_.size(); }
+  /// Where these were, pixels.
+  [[nodiscard]] std::vector<vec2> pixels() const {
+    std::vector<vec2> all;
+    for (const track& t : tracks_) all.emplace_back(static_cast<double>(t.at.x), static_cast<double>(t.at.y));
+    return all;
+  }
+
+  /// Finds what moved in the last frame in the next one.
+  void find(const basic_frame<D>& f) {
+    is_left_out_.clear();
+    next_.clear();
+    trusts_old_only_ = false;
+    if (tracks_.empty()) return;
+    is_left_out_.assign(f.size(), 0);
+    agrees_.assign(f.size(), 0);
+    std::vector<D> descriptors;
+    std::vector<features::keypoint> keypoints;
+    std::vector<features::window> windows;
+    for (const track& t : tracks_) {
+      descriptors.push_back(t.descriptor);
+      keypoints.push_back(t.at);
+      windows.push_back({t.at.x + t.flow_x, t.at.y + t.flow_y,
+                         static_cast<float>(options_.motion_radius * rig_.scales.scale(t.at.octave)), t.at.octave - 1,
+                         t.at.octave + 1});
+    }
+    for (const features::match& m :
+         Matchers::motion(features::feature_view<D>{keypoints, descriptors}, f.features, windows, f.grid)) {
+      track t = tracks_[m.query];
+      const features::keypoint& k = f.features.keypoints[m.train];
+      t.flow_x = k.x - t.at.x;
+      t.flow_y = k.y - t.at.y;
+      t.at = k;
+      t.descriptor = f.features.descriptors[m.train];
+      t.feature = m.train;
+      is_left_out_[m.train] = 1;
+      next_.push_back(std::move(t));
+    }
+  }
+
+  /// Removes matches of features that are left out.
+  void drop_left_out(std::vector<features::match>& matches) const {
+    if (is_left_out_.empty()) return;
+    std::erase_if(matches, [&](const features::match& m) { return is_left_out_[m.train] != 0; });
+  }
+
+  /// After the pose of a frame was refined on matches of `list`: looks for a second motion, if many of them do not
+  /// agree. Sets pose and landmarks of the frame anew where there is one. Returns the number of matches that agree.
+  std::size_t judge(basic_frame<D>& f, const basic_map<D>& m, const search_list<D>& list,
+                    std::span<const features::match> matches, std::size_t inliers, const se3& predicted) {
+    if (!is_enabled() || inliers == 0) return inliers;
+    const std::size_t agreeing = split_motions(f, m, list, matches, inliers, predicted);
+    if (next_.empty()) return agreeing;
+    agrees_.assign(f.size(), 0);
+    const se3 T_camera_world = f.T_world_camera.inverse();
+    for (const features::match& found : matches)
+      agrees_[found.train] = agrees(rig_, f, T_camera_world, found.train, list.points[found.query].position) ? 1 : 0;
+    return agreeing;
+  }
+
+  /// The pose of the last frame.
+  void set_last(const se3& T_world_camera) { T_world_last_ = T_world_camera; }
+
+  /// Whether a landmark is to be left out of the search in the present frame: what is new may move.
+  [[nodiscard]] bool avoids(const basic_map<D>& m, landmark_id id, double now) const {
+    return trusts_old_only_ && trust_of(m, id, now) < enough_trust;
+  }
+
+  /// Leaves out what lies around features that move, nearer to them than to what agrees with the pose.
+  void spread(const basic_frame<D>& f) {
+    if (next_.empty()) return;
+    struct labelled {
+      vec3 point;
+      float x, y;
+      const track* moves;
+    };
+    std::vector<labelled> known;
+    for (const track& t : next_)
+      if (t.has_moved)
+        known.push_back({f.has_depth(t.feature) ? f.point_camera(t.feature) : vec3::Constant(1e9), t.at.x, t.at.y, &t});
+    if (known.size() < options_.moving.min_features / 2) return;
+    for (std::size_t i = 0; i != f.size(); ++i)
+      if (agrees_[i] != 0 && is_left_out_[i] == 0)
+        known.push_back({f.has_depth(i) ? f.point_camera(i) : vec3::Constant(1e9), f.features.keypoints[i].x,
+                         f.features.keypoints[i].y, nullptr});
+    std::vector<track> more;
+    for (std::size_t i = 0; i != f.size(); ++i) {
+      if (is_left_out_[i] != 0 || agrees_[i] != 0) continue;
+      const features::keypoint& k = f.features.keypoints[i];
+      const bool deep = f.has_depth(i);
+      const vec3 p = deep ? f.point_camera(i) : vec3::Zero();
+      constexpr double pixels = 25.0;
+      double nearest = deep ? options_.moving.reach * options_.moving.reach : pixels * pixels;
+      const track* by = nullptr;
+      for (const labelled& l : known) {
+        const auto dx = static_cast<double>(l.x - k.x), dy = static_cast<double>(l.y - k.y);
+        const double d = deep ? (l.point - p).squaredNorm() : dx * dx + dy * dy;
+        if (d < nearest) nearest = d, by = l.moves;
+      }
+      if (by == nullptr) continue;
+      track t;
+      t.feature = i;
+      t.at = k;
+      t.descriptor = f.features.descriptors[i];
+      t.flow_x = by->flow_x;
+      t.flow_y = by->flow_y;
+      t.moved = f.timestamp;
+      more.push_back(std::move(t));
+    }
+    for (track& t : more) {
+      is_left_out_[t.feature] = 1;
+      next_.push_back(std::move(t));
+    }
+  }
+
+  /// Takes what moves out of a frame whose pose is known, and follows it on.
+  void take_out(basic_frame<D>& f) {
+    std::swap(tracks_, next_);
+    next_.clear();
+    if (tracks_.empty()) return;
+    const moving_options& o = options_.moving;
+    const se3 T_camera_world = f.T_world_camera.inverse();
+    std::size_t moved = 0, proved = 0;
+    for (track& t : tracks_) {
+      const bool deep = f.has_depth(t.feature);
+      if (!t.has_anchor || f.timestamp - t.anchored > anchor_time) {
+        t.has_anchor = deep;
+        if (deep) t.anchor = f.point_world(t.feature);
+        t.anchored = f.timestamp;
+      } else if (away(f, T_camera_world, t)) {
+        t.moved = f.timestamp;
+        t.has_moved = true;
+        t.has_anchor = false;
+      }
+      moved += t.has_moved && f.timestamp - t.moved <= 1.5 * anchor_time;
+      proved += t.has_moved;
+    }
+    if (moved >= o.min_features / 2 && 4 * moved >= proved) moved_ = f.timestamp;
+    const bool moves_now = moved_ == f.timestamp;
+    std::erase_if(tracks_, [&](const track& t) {
+      const bool rests = f.timestamp - t.moved > (t.has_moved ? 4.0 : 2.0) * anchor_time && moves_now;
+      const bool stays = rests || f.timestamp - moved_ > o.hold;
+      if (stays) is_left_out_[t.feature] = 0;
+      return stays;
+    });
+    remove_features(f, std::span<const std::uint8_t>(is_left_out_));
+    is_left_out_.clear();
+  }
+
+ private:
+  static constexpr double anchor_time = 0.25;  ///< seconds
+
+  struct track {
+    std::size_t feature = 0;  ///< of the present frame
+    features::keypoint at;
+    D descriptor{};
+    float flow_x = 0.0F, flow_y = 0.0F;  ///< pixels since the frame before
+    vec3 anchor = vec3::Zero();          ///< where it was a little earlier, world
+    double anchored = 0.0;               ///< when that was, seconds
+    double moved = 0.0;                  ///< when it was last seen to move, or first seen
+    bool has_anchor = false;
+    bool has_moved = false;  ///< by itself; otherwise it is left out for what is beside it
+  };
+
+  std::size_t split_motions(basic_frame<D>& f, const basic_map<D>& m, const search_list<D>& list,
+                            std::span<const features::match> matches, std::size_t inliers, const se3& predicted) {
+    std::vector<optimize::pose_observation> observations;
+    std::vector<double> trust;
+    std::vector<std::uint8_t> outliers(matches.size(), 1);
+    for (const auto& found : matches) {
+      const candidate_point& p = list.points[found.query];
+      observations.push_back(observation_of(rig_, f, found.train, p.position));
+      trust.push_back(trust_of(m, p.landmark, f.timestamp));
+    }
+    if (!may_hold_two_motions(matches.size(), inliers, options_.moving) &&
+        !motion_splitter<Camera>::is_drawn_along(observations, trust, rig_.model, f.T_world_camera, options_.moving))
+      return inliers;
+    const se3 T_camera_world = f.T_world_camera.inverse();
+    for (std::size_t i = 0; i != matches.size(); ++i)
+      outliers[i] = agrees(rig_, f, T_camera_world, matches[i].train, observations[i].point) ? 0 : 1;
+    const auto split = motion_splitter<Camera>::split(observations, trust, rig_.model, predicted, f.T_world_camera,
+                                                      outliers, options_.moving, options_.seed);
+    if (!split) return inliers;
+    f.T_world_camera = split->T_world_camera;
+    f.landmarks.assign(f.size(), no_id);
+    trusts_old_only_ = split->by_trust;
+    if (is_left_out_.empty()) is_left_out_.assign(f.size(), 0);
+    for (std::size_t i = 0; i != matches.size(); ++i) {
+      const candidate_point& p = list.points[matches[i].query];
+      const std::size_t j = matches[i].train;
+      if (split->outliers[i] == 0) f.landmarks[j] = p.landmark;
+      if (split->moving[i] == 0 || is_left_out_[j] != 0) continue;
+      is_left_out_[j] = 1;
+      track t;
+      t.feature = j;
+      t.at = f.features.keypoints[j];
+      t.descriptor = f.features.descriptors[j];
+      if (const auto before = rig_.camera().project(T_world_last_.inverse() * p.position)) {
+        t.flow_x = t.at.x - static_cast<float>(before->x());
+        t.flow_y = t.at.y - static_cast<float>(before->y());
+      }
+      t.moved = f.timestamp;
+      t.has_moved = true;
+      next_.push_back(std::move(t));
+    }
+    return split->inliers;
+  }
+
+  /// Whether a feature is clearly not where it was a little earlier. Only its pixel is asked: the depth at the edge of
+  /// something leaps.
+  [[nodiscard]] bool away(const basic_frame<D>& f, const se3& T_camera_world, const track& t) const {
+    const auto expected = rig_.camera().project(T_camera_world * t.anchor);
+    if (!expected) return false;
+    const double information = rig_.scales.information(t.at.octave);
+    return (*expected - f.pixel(t.feature)).squaredNorm() * information > 2.0 * error_limit(false);
+  }
+
+  /// How much a landmark is to be trusted to stand still, by its age.
+  [[nodiscard]] double trust_of(const basic_map<D>& m, landmark_id id, double now) const {
+    if (id == no_id) return 0.0;
+    const keyframe_id by = m.landmark_at(id).created;
+    if (!m.has_keyframe(by)) return 1.0;
+    return std::clamp((now - m.at(by).timestamp) / options_.moving.seasoned, 0.0, 1.0);
+  }
+
+  const camera_rig<Camera>& rig_;
+  const options& options_;
+  std::vector<track> tracks_, next_;       ///< of the last frame, of the present one
+  std::vector<std::uint8_t> is_left_out_;  ///< of the present frame's features; empty: none is
+  std::vector<std::uint8_t> agrees_;       ///< which of these agree with the pose of what stands still
+  bool trusts_old_only_ = false;           ///< in the present frame
+  double moved_ = 0.0;                     ///< when something moved, seconds
+  se3 T_world_last_;
+};
+
+}  // namespace orbis::slam::detail
