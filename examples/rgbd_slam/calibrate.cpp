@@ -42,7 +42,7 @@ struct refined {
 orbis::result<refined> refine(const any_camera& model, const frame_source& source, const settings& s,
                               const orbis::camera::shutter& shutter, console& console) {
   orbis::slam::options options;
-  if (source.camera.baseline) options.bf = *source.camera.baseline * model.k().fx;
+  if (source.camera.baseline) options.bf = orbis::slam::depth_camera_bf(model.k().fx, *source.camera.baseline);
   options.shutter = shutter;
   orbis::slam::rgbd_system<any_camera> slam{model, options};
   read_ahead frames{source, s.threads != 1};

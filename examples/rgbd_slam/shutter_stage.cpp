@@ -42,7 +42,8 @@ shutter_results find_shutter(const frame_source& source, const settings& s, cons
   result.from = "estimated";
   console.stage("shutter");
   orbis::slam::options options;
-  if (source.camera.baseline) options.bf = *source.camera.baseline * source.camera.model.k().fx;
+  if (source.camera.baseline)
+    options.bf = orbis::slam::depth_camera_bf(source.camera.model.k().fx, *source.camera.baseline);
   options.estimates_shutter = true;
   orbis::slam::rgbd_system<decltype(orbis::camera::camera_settings::model)> slam{source.camera.model, options};
   read_ahead frames{source, s.threads != 1};

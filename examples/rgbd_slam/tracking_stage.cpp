@@ -25,7 +25,8 @@ using slam_system = orbis::slam::any_system;
 
 orbis::slam::options options_for(const frame_source& source, const settings& s) {
   orbis::slam::options options;
-  if (source.camera.baseline) options.bf = *source.camera.baseline * source.camera.model.k().fx;
+  if (source.camera.baseline)
+    options.bf = orbis::slam::depth_camera_bf(source.camera.model.k().fx, *source.camera.baseline);
   options.threads = {.enabled = !s.deterministic && s.threads != 1, .wait = true};
   options.localization_only = s.localize_only;
   if (source.is_stereo)
