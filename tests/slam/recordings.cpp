@@ -55,8 +55,8 @@ slam::options options_for(const Sequence& frames) {
 }
 
 template <class Sequence>
-outcome run(const Sequence& frames) {
-  test::slam_system slam{frames.camera().model, options_for(frames)};
+outcome run(const Sequence& frames, const slam::options& settings) {
+  test::slam_system slam{frames.camera().model, settings};
   std::vector<slam::track_state> states;
   for (std::size_t i = 0; i != frames.size(); ++i) {
     const slam::track_result r = slam.track(frames.frame(i).value());
@@ -65,6 +65,18 @@ outcome run(const Sequence& frames) {
       CHECK(slam.inspect([&](const slam::atlas& a) { return a.at(r.map).has_keyframe(*r.keyframe); }));
   }
   return judge(slam, frames, std::move(states));
+}
+
+template <class Sequence>
+outcome run(const Sequence& frames) {
+  return run(frames, options_for(frames));
+}
+/// As without a depth image in the pose.
+template <class Sequence>
+outcome run_on_features(const Sequence& frames) {
+  slam::options settings = options_for(frames);
+  settings.depth_term.enabled = settings.depth_term.recovers = false;
+  return run(frames, settings);
 }
 
 /// Frames cost time: few of them, and small ones.
@@ -234,6 +246,57 @@ TEST_CASE("Walls that all look the same, and walls with little on them, are told
   CHECK(seen.counters.lost == 0);
   CHECK(seen.ate < 0.02);
   CHECK(seen.end < 0.02);
+}
+
+TEST_CASE("Depth holds the camera where it is dark, and the map goes on") {
+  syn::room_options o;
+  o.sequence = small(10);
+  o.sequence.frames = 130;
+  o.duration = 30.0;
+  o.seed = 2;
+  const auto frames = syn::changed{syn::room_round(o), [](camera::rgbd_frame& f, std::size_t i) {
+                                     if (i >= 40 && i < 60)
+                                       std::fill(f.color.pixels().begin(), f.color.pixels().end(), rgb8{});
+                                   }};
+  const outcome held = run(frames), lost = run_on_features(frames);
+  CAPTURE(held.ate, held.end, lost.ate);
+  CHECK(lost.counters.lost == 20);
+  CHECK(held.counters.lost <= 5);
+  CHECK(held.maps == 1);
+  CHECK(held.ate < 0.015);
+  CHECK(held.end < 0.04);
+}
+
+TEST_CASE("Depth and few landmarks together hold a camera before bare walls that sees little of what it saw before") {
+  syn::room_options o;
+  o.sequence.fps = 1.5;
+  o.scene.poor_walls = 4;
+  o.scene.furniture = false;
+  o.scene.texture_density = 0.15;
+  o.seed = 3;
+  o.duration = 40.0;
+  const auto frames = syn::room_round(o);
+  const outcome held = run(frames), alone = run_on_features(frames);
+  CAPTURE(held.ate, held.in_map, alone.ate, alone.in_map, held.counters.lost, alone.counters.lost, held.maps);
+  CHECK(held.in_map > alone.in_map + 5);
+  CHECK(held.ate < 0.03);
+}
+
+TEST_CASE("Depth in the pose lowers the error from frame to frame") {
+  io::synthetic_options o{.frames = 100, .fps = 30.0, .seed = 3, .width = 320, .height = 240, .frames_around = 400};
+  const io::synthetic_recording frames{o};
+  const auto error_with = [&](bool depth) {
+    slam::options settings;
+    settings.initial_pose = frames.T_world_camera(0);
+    settings.depth_term.enabled = settings.depth_term.recovers = depth;
+    test::slam_system slam{frames.camera().model, settings};
+    for (std::size_t i = 0; i != frames.size(); ++i) slam.track(frames.frame(i).value());
+    CHECK(slam.counters().lost == 0);
+    return eval::rpe(slam.trajectory(), frames.ground_truth())->translation.rmse;
+  };
+  const double with = error_with(true), without = error_with(false);
+  CAPTURE(with, without);
+  CHECK(with < without);
 }
 
 TEST_CASE("A rolling shutter costs little where it is known, and much where it is not") {

@@ -144,6 +144,7 @@ TEST_CASE("Whoever shows the last frame gets its features, which of them are tra
   }
   camera::rgbd_frame dark = recorded[30];
   dark.color = image<rgb8>(320, 240);
+  dark.depth = image<std::uint16_t>(320, 240);
   CHECK_FALSE(slam.track(dark).tracked());
   CHECK_FALSE(slam.last_frame());
 }

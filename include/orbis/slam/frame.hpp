@@ -36,6 +36,9 @@ struct basic_frame {
   std::vector<vec3> rays;               ///< through each keypoint, scaled to z = 1; NaN where the pixel has no ray
   std::vector<landmark_id> landmarks;   ///< observed by each keypoint, or `no_id`
   orbis::features::keypoint_grid grid;  ///< of the keypoints
+  /// Few landmarks hold the pose, or none, and depth does: adjustments, which know of landmarks only, keep it. Map
+  /// files do not tell.
+  bool held_by_depth = false;
   /// With a rolling shutter the keypoints as they were read; the other members hold where they are at the frame's time.
   /// Empty with a global shutter.
   std::vector<keypoint_as_read> as_read;

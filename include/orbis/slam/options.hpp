@@ -47,6 +47,19 @@ struct culling_options {
   int coarser_levels = 1;               ///< ... at most so many pyramid levels coarser
 };
 
+/// The depth image in the pose: points of a frame against the surfaces of keyframes. For sensors with a depth image.
+struct depth_term_options {
+  bool enabled = true;           ///< joins the keypoints wherever a pose is refined
+  bool recovers = true;          ///< holds the camera where keypoints do not
+  std::size_t points = 400;      ///< of a frame, at most
+  double effective_points = 40;  ///< that they count as at most: neighbouring depths err together
+  std::size_t surfaces = 16;     ///< of keyframes that are kept, at most; about 130 kB each
+  double weakest = 0.002;        ///< mean square of the surfaces' directions below which these leave one free
+  double min_share = 0.7;        ///< of the points that lie on known surfaces, where depth alone holds the camera ...
+  std::size_t min_points = 100;  ///< ... and how many, at least
+  std::size_t min_inliers = 5;   ///< landmarks that hold what surfaces leave free
+};
+
 /// What is done when tracking is lost.
 struct recovery_options {
   std::size_t candidates = 8;         ///< keyframes that relocalisation is tried with, at most
@@ -185,6 +198,7 @@ struct options {
   adjustment_options adjustment{};
   culling_options culling{};
   recovery_options recovery{};
+  depth_term_options depth_term{};
   place_options places{};
   triangulation_options triangulation{};
   fusion_options fusion{};

@@ -178,6 +178,12 @@ class rgbd_system {
 
   template <class... Images>
   track_result track_images(double timestamp, const Images&... images);
+  /// Whether the images have the size of the camera, and a time.
+  template <class... Images>
+  [[nodiscard]] bool are_usable(double timestamp, const Images&... images) const {
+    return std::isfinite(timestamp) &&
+           ((images.width() == camera().width() && images.height() == camera().height()) && ...);
+  }
   /// The frame with its features; without any if the images do not fit or it has no time.
   template <class... Images>
   [[nodiscard]] frame_type measure(double timestamp, const Images&... images) const;
@@ -261,6 +267,9 @@ track_result ORBIS_SLAM_SYSTEM::track_images(double timestamp, const Images&... 
   track_result result;
   detail::stopwatch clock;
   frame_type f = measure(timestamp, images...);
+  front_end_.depth().see_nothing();
+  if constexpr (has_depth_image<Sensor, Images...>)
+    if (are_usable(timestamp, images...)) front_end_.depth().see(Sensor::depth_image(images...));
   clock.lap(result.timings.features_ms);
   if (options_.threads.wait) back_end_.wait_for_room();
   const auto follow_rows = [&](frame_type& seen, const frame_motion& motion) {
@@ -279,15 +288,11 @@ template <class... Images>
 auto ORBIS_SLAM_SYSTEM::measure(double timestamp, const Images&... images) const -> frame_type {
   static_assert(measures<Sensor, Camera, Extractor, Images...>, "orbis: the sensor does not take these images");
   frame_type f;
-  const auto fits = [&](const auto& image) {
-    return image.width() == camera().width() && image.height() == camera().height();
-  };
-  const bool timed = std::isfinite(timestamp);
-  if (timed && (fits(images) && ...)) {
+  if (are_usable(timestamp, images...)) {
     f = sensor_.measure(shared_.rig, extract_, images...);
     if (front_end_.looks_at_rows()) detail::keep_as_read(f);
   }
-  f.timestamp = timed ? timestamp : front_end_.last_timestamp();
+  f.timestamp = std::isfinite(timestamp) ? timestamp : front_end_.last_timestamp();
   f.index = front_end_.counters().frames;
   return f;
 }
@@ -309,7 +314,7 @@ std::optional<map_keyframe> ORBIS_SLAM_SYSTEM::localize(
   result.inliers = front_end_.localize(f, maps, is_frozen, follow_rows, similar, drop);
   clock.lap(result.timings.tracking_ms);
   std::optional<map_keyframe> made;
-  if (result.inliers > 0) {
+  if (front_end_.is_tracking()) {
     front_end_.update_reference(f, maps);
     const bool may_grow = maps.active().keyframes().empty() || (!is_frozen && !back_end_.is_full());
     if (may_grow && front_end_.needs_keyframe(f, result.inliers, maps)) made = front_end_.make_keyframe(f, maps);

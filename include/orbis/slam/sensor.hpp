@@ -60,6 +60,13 @@ concept follows_rows = requires(const camera_rig<Camera>& rig, const frame_motio
   S::follow_rows(rig, m, f, images...);
 };
 
+/// Whether a sensor's images hold a depth image: `S::depth_image(images...)`, of which frames keep surfaces
+/// (`options::depth_term`).
+template <class S, class... Images>
+concept has_depth_image = requires(const Images&... images) {
+  { S::depth_image(images...) } -> camera::depth_source;
+};
+
 /// A colour image with a registered depth image. The first frame with enough depth begins a map.
 struct rgbd {
   /// Extracts features and reads their depth. Depth outside of the rig's range is not used. @pre all images have the
@@ -75,6 +82,11 @@ struct rgbd {
   template <camera::camera_model Camera, feature_descriptor D, camera::depth_source Depth>
   static void follow_rows(const camera_rig<Camera>& rig, const frame_motion& m, basic_frame<D>& f,
                           image_view<const rgb8> color, const Depth& depth);
+
+  template <camera::depth_source Depth>
+  [[nodiscard]] static const Depth& depth_image(image_view<const rgb8>, const Depth& depth) {
+    return depth;
+  }
 
   /// The number of features with depth, if there are `settings.min_start_points` or more, otherwise 0.
   template <feature_descriptor D>

@@ -19,7 +19,7 @@ enum class track_state {
   not_started,  ///< no frame so far had enough keypoints with depth
   tracking,     ///< the pose of the last frame is known
   lost,         ///< the pose of the last frame is not known
-  relocalized   ///< the last frame was found again in a map by its appearance
+  relocalized   ///< the last frame was found again in a map
 };
 
 [[nodiscard]] constexpr std::string_view to_string(track_state state) noexcept {
@@ -45,7 +45,7 @@ struct track_result {
   track_state state = track_state::not_started;
   std::optional<se3> T_world_camera;    ///< the pose, in the world of `map`; empty where not tracked
   map_id map = 0;                       ///< the active map
-  std::size_t inliers = 0;              ///< landmarks that agree with the pose
+  std::size_t inliers = 0;              ///< landmarks that agree with the pose; few or none where depth holds it
   std::optional<keyframe_id> keyframe;  ///< the keyframe that the frame became, if it did
   /// With a rolling shutter the motion of the camera, in its own frame, while the frame was taken: per second,
   /// translation first. Zero where it is not known. `camera::shutter_correction` takes it.

@@ -1,9 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <array>
 #include <cstddef>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include <orbis/camera/any.hpp>
+#include <orbis/camera/depth.hpp>
+#include <orbis/core/image.hpp>
 #include <orbis/slam/detail/tracking/front_end.hpp>
 #include <orbis/slam/validate.hpp>
 
@@ -166,4 +171,58 @@ TEST_CASE("Tracking goes on when the map was merged, moved and culled between tw
   CHECK(s.maps.active_id() == 0);
   CHECK((s.front_end.last_pose(s.maps).inverse() * T * s.world.truth(26)).log().norm() < 0.03);
   CHECK(s.front_end.log().trajectory(s.maps, 0).size() == 7);
+}
+
+TEST_CASE("Where depth is not asked for, the image of it changes nothing") {
+  const auto last_pose = [](bool sees_depth) {
+    scene s;
+    s.options.depth_term.enabled = s.options.depth_term.recovers = false;
+    image<float> wall(640, 480);
+    for (int v = 0; v != 480; ++v)
+      for (int u = 0; u != 640; ++u) wall(u, v) = 2.0F + 0.001F * static_cast<float>(u);
+    for (std::uint32_t i = 0; i < 8; ++i) {
+      if (sees_depth) s.front_end.depth().see(camera::depth_view<float>{std::as_const(wall).view()});
+      CHECK(s.see(i) > 30);
+    }
+    return s.front_end.last_pose(s.maps);
+  };
+  CHECK(last_pose(true).to_matrix() == last_pose(false).to_matrix());
+}
+
+TEST_CASE("A frame without keypoints is held by the depth of a known corner, and its surface goes with the map") {
+  scene s;
+  // Walls in the camera frame of step 0, which the camera of step 1 sees from its own place.
+  const auto corner_from = [&](const se3& T_first_camera) {
+    image<float> depth(640, 480);
+    const mat3 turn = T_first_camera.rotation_matrix();
+    const std::array<std::pair<vec3, double>, 3> walls{
+        {{vec3(0, 0, 1), 2.0}, {vec3(0, 1, 0), 0.5}, {vec3(1, 0, 0.2).normalized(), 0.8}}};
+    for (int v = 0; v != 480; ++v)
+      for (int u = 0; u != 640; ++u) {
+        const vec3 ray = turn * *s.world.camera.unproject(vec2(u, v));
+        double nearest = 100.0;
+        for (const auto& [normal, distance] : walls) {
+          const double z = (distance - normal.dot(T_first_camera.translation())) / normal.dot(ray);
+          if (z > 0.0) nearest = std::min(nearest, z);
+        }
+        depth(u, v) = static_cast<float>(nearest);
+      }
+    return depth;
+  };
+  const auto show = [&](const se3& T_first_camera) {
+    const image<float> depth = corner_from(T_first_camera);
+    s.front_end.depth().see(camera::depth_view<float>{depth.view()});
+  };
+  show(se3{});
+  REQUIRE(s.see(0) > 30);
+  const se3 step(so3::exp(vec3(0.02, -0.06, 0.0)), vec3(0.1, 0.02, 0.05));
+  show(step);
+  CHECK(s.see_nothing(0.5) == 0);
+  CHECK(s.front_end.state() == track_state::tracking);
+  CHECK((s.front_end.last_pose(s.maps).inverse() * s.world.truth(0) * step).log().norm() < 0.01);
+  CHECK(s.maps.active().keyframes().size() == 1);  // nothing that a keyframe needs
+  CHECK(s.front_end.counters().lost == 0);
+  s.front_end.depth().see_nothing();
+  CHECK(s.see_nothing(1.0) == 0);
+  CHECK(s.front_end.state() == track_state::lost);
 }

@@ -53,8 +53,9 @@ struct snapshot : bundle_snapshot {
 }
 
 /// Copies keyframe `newest`, the keyframes that share most with it, and their landmarks. Other keyframes that observe
-/// these landmarks take part and are held, as is the root of the map. Empty if there is nothing to adjust. `memory`: a
-/// former snapshot, whose memory is used again. O(observations of the landmarks). @pre m.has_keyframe(newest)
+/// these landmarks take part and are held, as are the root of the map and keyframes that depth holds. Empty if there is
+/// nothing to adjust. `memory`: a former snapshot, whose memory is used again. O(observations of the landmarks). @pre
+/// m.has_keyframe(newest)
 template <feature_descriptor D, camera::camera_model Camera>
 [[nodiscard]] snapshot take(const basic_map<D>& m, keyframe_id newest, const camera_rig<Camera>& rig,
                             const adjustment_options& o, snapshot memory = {}) {
@@ -75,7 +76,8 @@ template <feature_descriptor D, camera::camera_model Camera>
   s.keyframes.erase(std::unique(s.keyframes.begin(), s.keyframes.end()), s.keyframes.end());
   bool any_fixed = false;
   for (const keyframe_id k : s.keyframes) {
-    const bool moves = k != m.tree().root() && std::find(s.moving.begin(), s.moving.end(), k) != s.moving.end();
+    const bool moves = k != m.tree().root() && !m.at(k).held_by_depth &&
+                       std::find(s.moving.begin(), s.moving.end(), k) != s.moving.end();
     any_fixed = any_fixed || !moves;
     s.is_fixed.push_back(moves ? 0 : 1);
     s.poses.push_back(m.at(k).T_world_camera);

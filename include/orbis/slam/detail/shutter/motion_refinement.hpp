@@ -19,6 +19,7 @@
 #include <orbis/core/types.hpp>
 #include <orbis/optimize/reprojection.hpp>
 #include <orbis/slam/camera_rig.hpp>
+#include <orbis/slam/detail/map/point_observation.hpp>
 #include <orbis/slam/detail/shutter/row_times.hpp>
 #include <orbis/slam/frame.hpp>
 #include <orbis/slam/map.hpp>
@@ -94,6 +95,15 @@ void find_row_observations(const basic_frame<D>& f, const basic_map<D>& m, const
   }
 }
 
+/// The same of a global shutter.
+template <feature_descriptor D, camera::camera_model Camera>
+void find_observations(const basic_frame<D>& f, const basic_map<D>& m, const camera_rig<Camera>& rig,
+                       std::vector<row_observation>& to) {
+  to.clear();
+  for (std::size_t i = 0; i != f.size(); ++i)
+    if (f.landmarks[i] != no_id) to.push_back({observation_of(rig, f, i, m.landmark_at(f.landmarks[i]).position)});
+}
+
 /// The residual of an observation, and its derivative by a motion of the camera frame (`exp(step) * T_camera_world`) at
 /// the time of its row; that by the twist is `-o.time` times as much. Empty where the point has no projection.
 template <camera::camera_model Camera>
@@ -108,6 +118,21 @@ template <camera::camera_model Camera>
   return r;
 }
 
+/// A cost of pose and twist, to second order around `at`: what other measurements than keypoints say. The steps are a
+/// motion of the camera frame (`exp(step) * T_camera_world`), then that of the twist.
+struct pose_quadratic {
+  moving_pose at;
+  matrix<12, 12> h = matrix<12, 12>::Zero();
+  matrix<12, 1> g = matrix<12, 1>::Zero();
+  double cost = 0.0;
+};
+
+/// What the refinement of a pose depends on besides the keypoints.
+struct refinement_terms {
+  const pose_quadratic* other = nullptr;  ///< a further cost, if there is one
+  bool moves = true;                      ///< whether the camera moves while it is read: else the twist stays as it is
+};
+
 /// The normal equations of pose and twist.
 struct moving_pose_equations {
   matrix<12, 12> h;
@@ -118,7 +143,8 @@ struct moving_pose_equations {
 template <camera::camera_model Camera>
 [[nodiscard]] moving_pose_equations linearize(std::span<const row_observation> observations,
                                               const optimize::reprojection<Camera>& model, const se3& T_camera_world,
-                                              const vec6& twist, const twist_prior& prior) {
+                                              const vec6& twist, const twist_prior& prior,
+                                              const refinement_terms& terms = {}) {
   constexpr double width = 2.447;  // of Huber's loss, as in the refinement of the pose alone
   moving_pose_equations e;
   std::array<mat6, 3> h{mat6::Zero(), mat6::Zero(), mat6::Zero()};  // times 1, time, time squared
@@ -138,6 +164,16 @@ template <camera::camera_model Camera>
   }
   e.h << h[0], h[1], h[1], h[2];
   e.g << g[0], g[1];
+  if (terms.other != nullptr) {
+    const pose_quadratic& q = *terms.other;
+    matrix<12, 1> step;
+    step << (T_camera_world * q.at.T_world_camera).log(), twist - q.at.twist;
+    const matrix<12, 1> slope = q.h * step;
+    e.h += q.h;
+    e.g += q.g + slope;
+    e.cost += q.cost + step.dot(q.g + 0.5 * slope);
+  }
+  if (!terms.moves) return e;
 
   const vec6 error = twist - prior.expected(T_camera_world);
   const double by_pose = prior.T_world_before ? (1.0 + prior.trend) / prior.interval : 0.0;  // to first order
@@ -155,21 +191,26 @@ template <camera::camera_model Camera>
   return e;
 }
 
-/// Refines pose and twist by Gauss-Newton steps as long as they lower the cost. The observations should hold few
-/// outliers. O(observations) for each step.
+/// Refines pose and twist, or the pose alone, by Gauss-Newton steps as long as they lower the cost. The observations
+/// should hold few outliers. O(observations) for each step.
 template <camera::camera_model Camera>
 [[nodiscard]] moving_pose refine_moving_pose(std::span<const row_observation> observations,
                                              const optimize::reprojection<Camera>& model, const moving_pose& start,
-                                             const twist_prior& prior, int iterations = 5) {
+                                             const twist_prior& prior, int iterations = 5,
+                                             const refinement_terms& terms = {}) {
   se3 T_camera_world = start.T_world_camera.inverse();
   vec6 twist = start.twist;
-  moving_pose_equations now = linearize(observations, model, T_camera_world, twist, prior);
+  moving_pose_equations now = linearize(observations, model, T_camera_world, twist, prior, terms);
   for (int k = 0; k != iterations; ++k) {
-    const matrix<12, 1> step = now.h.ldlt().solve(-now.g);
+    matrix<12, 1> step = matrix<12, 1>::Zero();
+    if (terms.moves)
+      step = now.h.ldlt().solve(-now.g);
+    else
+      step.template head<6>() = now.h.template topLeftCorner<6, 6>().ldlt().solve(-now.g.template head<6>());
     if (!step.allFinite()) break;
     const se3 there = se3::exp(step.template head<6>()) * T_camera_world;
     const vec6 moving = twist + step.template tail<6>();
-    const moving_pose_equations then = linearize(observations, model, there, moving, prior);
+    const moving_pose_equations then = linearize(observations, model, there, moving, prior, terms);
     if (!(then.cost < now.cost)) break;
     const double gain = now.cost - then.cost;
     T_camera_world = there;

@@ -14,6 +14,7 @@
 #include <orbis/core/se3.hpp>
 #include <orbis/slam/atlas.hpp>
 #include <orbis/slam/camera_rig.hpp>
+#include <orbis/slam/detail/depth/depth_tracker.hpp>
 #include <orbis/slam/detail/map/local_map.hpp>
 #include <orbis/slam/detail/mapping/keyframe_insertion.hpp>
 #include <orbis/slam/detail/shutter/motion_refinement.hpp>
@@ -43,7 +44,12 @@ class front_end {
   using atlas_type = basic_atlas<D>;
 
   front_end(const camera_rig<Camera>& rig, const options& settings)
-      : tracker_{rig, settings}, moving_{rig, settings}, rig_{rig}, options_{settings}, shutter_{settings.shutter} {
+      : tracker_{rig, settings},
+        moving_{rig, settings},
+        depth_{rig, settings.depth_term},
+        rig_{rig},
+        options_{settings},
+        shutter_{settings.shutter} {
     if (settings.estimates_shutter) observer_.emplace();
   }
 
@@ -55,6 +61,9 @@ class front_end {
   }
   /// Whether frames need `as_read`.
   [[nodiscard]] bool looks_at_rows() const noexcept { return observer_ || !shutter_.is_global(); }
+
+  /// What the depth image of the next frame is to be told to, before the frame is localised.
+  [[nodiscard]] depth_tracker<Camera>& depth() noexcept { return depth_; }
 
   [[nodiscard]] track_state state() const noexcept { return state_; }
   [[nodiscard]] bool is_tracking() const noexcept {
@@ -87,8 +96,9 @@ class front_end {
   void sync_with_map(const atlas_type& maps);
 
   /// Estimates the pose of a frame and sets `state()`. Returns the number of landmarks that agree with the pose (of
-  /// points with depth, if the frame begins a map), 0 if it has none. `is_frozen`: nothing is changed in the maps, and
-  /// no map is begun. `follow_rows(frame, motion)`: sets what the sensor measures for the rows of a rolling shutter
+  /// points with depth, if the frame begins a map), 0 if it has none; `is_tracking()` with 0 where depth alone holds
+  /// it. `is_frozen`: nothing is changed in the maps, and no map is begun. `follow_rows(frame, motion)`: sets what the
+  /// sensor measures for the rows of a rolling shutter
   /// (`as_read`), given the motion. `similar(features, count)`: the keyframes with the most similar appearance, as ids;
   /// `drop(map)`: called for a map that is left behind with few keyframes.
   template <class FollowRows, class Similar, class Drop>
@@ -100,8 +110,11 @@ class front_end {
     if (!maps.active().keyframes().empty())
       reference_ = {maps.active_id(), most_shared(maps.active(), f, reference_.keyframe)};
   }
-  /// Whether a localised frame should become a keyframe.
+  /// Whether a localised frame should become a keyframe. One that depth holds becomes one if landmarks have not held
+  /// the camera for some time, and if a map could begin with it.
   [[nodiscard]] bool needs_keyframe(const frame_type& f, std::size_t inliers, const atlas_type& maps) const {
+    if (f.held_by_depth)
+      return f.timestamp - held_since_ >= options_.keyframes.interval && Sensor::begins_map(f, options_) > 0;
     return maps.active().keyframes().empty() ||
            is_keyframe_due(gather_evidence(maps.active(), f, reference_.keyframe, inliers, options_),
                            options_.keyframes);
@@ -136,6 +149,18 @@ class front_end {
         [&](landmark_id l) { is_frozen ? void() : m.count_found(l); });
   }
 
+  /// Takes from a frame the landmarks that do not agree with its pose. Returns how many are left.
+  std::size_t drop_disagreeing(frame_type& f, const basic_map<D>& m) const {
+    const se3 T_camera_world = f.T_world_camera.inverse();
+    std::size_t left = 0;
+    for (std::size_t i = 0; i != f.size(); ++i) {
+      landmark_id& l = f.landmarks[i];
+      if (l != no_id && !agrees(rig_, f, T_camera_world, i, m.landmark_at(l).position)) l = no_id;
+      left += l != no_id;
+    }
+    return left;
+  }
+
   /// With a rolling shutter, moves the keypoints of a frame to its time, by the motion since the last frame to its
   /// present pose.
   void move_keypoints(frame_type& f) const {
@@ -150,15 +175,30 @@ class front_end {
     observer_->set_depths(f, motion, follow_rows);
   }
   template <class FollowRows>
-  void refine_motion(frame_type& f, const basic_map<D>& m, bool is_next, FollowRows&& follow_rows);
+  void refine_motion(frame_type& f, const atlas_type& maps, bool is_next, FollowRows&& follow_rows);
+  /// Aligns the depth of a frame around the last one with the surfaces of keyframes.
+  [[nodiscard]] std::optional<depth_alignment> align_depth(const frame_type& f, const atlas_type& maps);
+  /// From a pose that depth was aligned at, refined on the local map.
+  template <class FollowRows>
+  std::size_t track_from_depth(frame_type& f, atlas_type& maps, const depth_alignment& aligned, bool is_frozen,
+                               FollowRows&& follow_rows);
+  /// Where the depth of a frame that was tracked by `inliers` landmarks does not fit its pose, but another one: from
+  /// there. Returns as `localize`.
+  template <class FollowRows>
+  std::size_t settle(frame_type& f, atlas_type& maps, std::size_t inliers, bool is_frozen, FollowRows&& follow_rows);
+  /// Takes a pose from depth alone. False if that is not sure, or leaves a direction of it free.
+  bool hold_by_depth(frame_type& f, const depth_alignment& aligned);
 
   tracker<Camera, D, Matchers> tracker_;
   moving_features<Camera, D, Matchers> moving_;
+  depth_tracker<Camera> depth_;
   const camera_rig<Camera>& rig_;
   const options& options_;
   camera::shutter shutter_;
   std::optional<shutter_observer> observer_;
   std::vector<row_observation> rows_;  ///< its memory is used again
+
+  double held_since_ = 0.0;  ///< when the last frame was tracked whose pose depth did not hold, seconds
 
   track_state state_ = track_state::not_started;
   std::optional<double> lost_since_;  ///< time stamp; empty: since the next frame
@@ -215,8 +255,14 @@ std::size_t front_end<Camera, D, Matchers, Sensor>::localize(frame_type& f, atla
   first_new_ = no_id;
   if (state_ == track_state::not_started) return is_frozen ? 0 : begin_map(f);
   if (is_tracking())
-    if (const std::size_t inliers = track_from_last(f, maps, is_frozen, follow_rows); inliers > 0) return inliers;
+    if (const std::size_t inliers = track_from_last(f, maps, is_frozen, follow_rows); inliers > 0)
+      return settle(f, maps, inliers, is_frozen, follow_rows);
+  const auto aligned = align_depth(f, maps);
+  if (aligned)
+    if (const std::size_t inliers = track_from_depth(f, maps, *aligned, is_frozen, follow_rows); inliers > 0)
+      return inliers;
   if (const std::size_t inliers = relocalize(f, maps, is_frozen, follow_rows, similar); inliers > 0) return inliers;
+  if (aligned && is_tracking() && hold_by_depth(f, *aligned)) return 0;
   if (is_tracking()) lost_since_ = last_.timestamp;
   if (!lost_since_) lost_since_ = f.timestamp;
   state_ = track_state::lost;
@@ -265,7 +311,7 @@ std::size_t front_end<Camera, D, Matchers, Sensor>::track_from_last(frame_type& 
   move_keypoints(f);
   const std::size_t inliers = track_local_map(f, maps.active(), options_.search_radius, is_frozen);
   if (inliers < options_.min_inliers) return 0;
-  refine_motion(f, maps.active(), true, follow_rows);
+  refine_motion(f, maps, true, follow_rows);
   moving_.take_out(f);
   state_ = track_state::tracking;
   return inliers;
@@ -288,7 +334,7 @@ std::size_t front_end<Camera, D, Matchers, Sensor>::relocalize(frame_type& f, at
     reference_ = k;
     const std::size_t inliers = track_local_map(f, maps.active(), 3.0 * options_.search_radius, is_frozen);
     if (inliers >= options_.recovery.min_inliers) {
-      refine_motion(f, maps.active(), false, follow_rows);
+      refine_motion(f, maps, false, follow_rows);
       state_ = track_state::relocalized;
       return inliers;
     }
@@ -300,8 +346,23 @@ std::size_t front_end<Camera, D, Matchers, Sensor>::relocalize(frame_type& f, at
 
 template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
 template <class FollowRows>
-void front_end<Camera, D, Matchers, Sensor>::refine_motion(frame_type& f, const basic_map<D>& m, bool is_next,
+void front_end<Camera, D, Matchers, Sensor>::refine_motion(frame_type& f, const atlas_type& maps, bool is_next,
                                                            FollowRows&& follow_rows) {
+  const basic_map<D>& m = maps.active();
+  const bool with_depth = options_.depth_term.enabled && depth_.surround(maps, f.T_world_camera);
+  const auto refine = [&](const moving_pose& start, const twist_prior& prior) {
+    const auto other = with_depth ? depth_.term_at(start, shutter_) : std::nullopt;
+    return refine_moving_pose(std::span<const row_observation>(rows_), rig_.model, start, prior, with_depth ? 3 : 5,
+                              {.other = other ? &*other : nullptr, .moves = !shutter_.is_global()});
+  };
+  const int rounds = with_depth ? 3 : 1;
+  if (shutter_.is_global() && with_depth) {
+    find_observations(f, m, rig_, rows_);
+    moving_pose refined{f.T_world_camera, f.twist};
+    refined.twist.setZero();
+    for (int round = 0; round != rounds; ++round) refined = refine(refined, {});
+    f.T_world_camera = refined.T_world_camera;
+  }
   if (!looks_at_rows()) return;
   twist_prior prior;
   if (is_next && f.timestamp > last_.timestamp) {
@@ -314,10 +375,10 @@ void front_end<Camera, D, Matchers, Sensor>::refine_motion(frame_type& f, const 
   }
   moving_pose refined{f.T_world_camera, f.twist};
   const bool depth_is_simultaneous = shutter_.depth_delay == 0.0 && shutter_.depth_read_out == shutter_.color_read_out;
-  for (int round = 0; round != (depth_is_simultaneous ? 1 : 2); ++round) {  // the depth was read by the motion before
-    follow_rows(f, {shutter_, refined.twist});
+  for (int round = 0; round != std::max(rounds, depth_is_simultaneous ? 1 : 2); ++round) {
+    follow_rows(f, {shutter_, refined.twist});  // the depth was read by the motion before
     find_row_observations(f, m, rig_, shutter_, rows_);
-    refined = refine_moving_pose(std::span<const row_observation>(rows_), rig_.model, refined, prior);
+    refined = refine(refined, prior);
   }
   f.T_world_camera = refined.T_world_camera;
   if (observer_) observe_depth(f, {shutter_, refined.twist}, follow_rows);
@@ -325,6 +386,78 @@ void front_end<Camera, D, Matchers, Sensor>::refine_motion(frame_type& f, const 
     return f.landmarks[i] == no_id ? 0.0
                                    : (refined.T_world_camera.inverse() * m.landmark_at(f.landmarks[i]).position).z();
   });
+}
+
+template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
+std::optional<depth_alignment> front_end<Camera, D, Matchers, Sensor>::align_depth(const frame_type& f,
+                                                                                   const atlas_type& maps) {
+  constexpr double longest = 2.0;  // seconds
+  const double interval = f.timestamp - last_.timestamp;
+  if (!options_.depth_term.recovers || !(interval > 0.0 && interval < longest) ||
+      maps.current(last_reference_).map != maps.active_id())
+    return std::nullopt;
+  const se3 predicted = motion_.predict({last_.timestamp, last_.T_world_camera}, f.timestamp);
+  if (!depth_.surround(maps, predicted)) return std::nullopt;
+  return depth_.align(search_starts(last_.T_world_camera, predicted, interval), shutter_);
+}
+
+template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
+template <class FollowRows>
+std::size_t front_end<Camera, D, Matchers, Sensor>::track_from_depth(frame_type& f, atlas_type& maps,
+                                                                     const depth_alignment& aligned, bool is_frozen,
+                                                                     FollowRows&& follow_rows) {
+  f.T_world_camera = aligned.at.T_world_camera;
+  moving_.clear();
+  if (!shutter_.is_global()) {
+    follow_rows(f, {shutter_, motion_between(last_, f)});
+    move_keypoints(f);
+  }
+  if (tracker_.by_motion(f, maps.active(), last_, aligned.at.T_world_camera, moving_) == 0)
+    f.T_world_camera = aligned.at.T_world_camera;
+  const std::size_t inliers = track_local_map(f, maps.active(), 3.0 * options_.search_radius, is_frozen);
+  const std::size_t few =
+      options_.depth_term.min_inliers * static_cast<std::size_t>(std::max(1, 6 - aligned.determined));
+  if (inliers < (is_tracking() ? std::min(few, options_.min_inliers) : options_.recovery.min_inliers)) return 0;
+  refine_motion(f, maps, true, follow_rows);
+  if (inliers < options_.min_inliers) {
+    const std::size_t confirmed = drop_disagreeing(f, maps.active());
+    if (confirmed < few || !depth_.surround(maps, f.T_world_camera) ||
+        !depth_.holds(depth_.agreement({f.T_world_camera, f.twist}, shutter_)))
+      return 0;
+    f.held_by_depth = true;
+  }
+  state_ = is_tracking() ? track_state::tracking : track_state::relocalized;
+  return inliers;
+}
+
+template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
+template <class FollowRows>
+std::size_t front_end<Camera, D, Matchers, Sensor>::settle(frame_type& f, atlas_type& maps, std::size_t inliers,
+                                                           bool is_frozen, FollowRows&& follow_rows) {
+  // Where something moves in the view, that is what does not fit.
+  if (!options_.depth_term.recovers || !moving_.pixels().empty() || !depth_.surround(maps, f.T_world_camera))
+    return inliers;
+  const association seen = depth_.agreement({f.T_world_camera, f.twist}, shutter_);
+  if (seen.visible < options_.depth_term.min_points || seen.share() >= options_.depth_term.min_share) return inliers;
+  const auto aligned = align_depth(f, maps);
+  constexpr double better = 0.15;
+  if (!aligned || aligned->seen.share() < seen.share() + better) return inliers;
+  const frame_type before = f;
+  if (const std::size_t there = track_from_depth(f, maps, *aligned, is_frozen, follow_rows); there > 0) return there;
+  if (hold_by_depth(f, *aligned)) return 0;
+  f = before;
+  return inliers;
+}
+
+template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
+bool front_end<Camera, D, Matchers, Sensor>::hold_by_depth(frame_type& f, const depth_alignment& aligned) {
+  if (!depth_.holds_alone(aligned)) return false;
+  f.T_world_camera = aligned.at.T_world_camera;
+  f.landmarks.assign(f.size(), no_id);
+  move_keypoints(f);
+  state_ = track_state::tracking;
+  f.held_by_depth = true;
+  return true;
 }
 
 template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
@@ -349,6 +482,11 @@ void front_end<Camera, D, Matchers, Sensor>::finish(frame_type f, const atlas_ty
   last_reference_ = reference_;
   T_reference_last_ = maps.active().at(reference_.keyframe).T_world_camera.inverse() * f.T_world_camera;
   log_.add({f.timestamp, last_reference_, T_reference_last_});
+  if (!f.held_by_depth || made) held_since_ = f.timestamp;
+  if (made)
+    depth_.keep(*made, se3{}, f.twist, shutter_);
+  else if (depth_.needs_surface(maps, f.T_world_camera))
+    depth_.keep(last_reference_, T_reference_last_, f.twist, shutter_);
   last_ = std::move(f);
 }
 

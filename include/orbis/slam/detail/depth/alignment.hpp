@@ -1,0 +1,186 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// The pose of a frame from its depth: its points against the surfaces of keyframes.
+///
+/// Points meet surfaces by projection, and their distances from the planes there are minimised. Sources: G. Blais, M.
+/// D. Levine, "Registering multiview range data to create 3D computer objects", PAMI 17(8), 1995; Y. Chen, G. Medioni,
+/// "Object modelling by registration of multiple range images", Image and Vision Computing 10(3), 1992. What the
+/// surfaces leave free is left alone: J. Zhang, M. Kaess, S. Singh, "On degeneracy of optimization-based state
+/// estimation problems", ICRA 2016.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include <Eigen/Eigenvalues>
+
+#include <orbis/camera/model.hpp>
+#include <orbis/camera/shutter.hpp>
+#include <orbis/core/se3.hpp>
+#include <orbis/core/types.hpp>
+#include <orbis/optimize/point_to_plane.hpp>
+#include <orbis/slam/camera_rig.hpp>
+#include <orbis/slam/detail/depth/surface.hpp>
+#include <orbis/slam/detail/depth/surface_samples.hpp>
+#include <orbis/slam/detail/shutter/motion_refinement.hpp>
+#include <orbis/slam/detail/shutter/row_times.hpp>
+
+namespace orbis::slam::detail {
+
+/// A surface where it stands in the world.
+struct placed_surface {
+  const surface* seen = nullptr;
+  se3 T_world_camera;
+};
+
+/// How far a point may be from the plane that it is compared with.
+struct alignment_gate {
+  double distance = 0.05;   ///< metres ...
+  double deviations = 4.0;  ///< ... or so many standard deviations, if that is more
+  double cosine = 0.8;      ///< of the angle between the directions of both surfaces, at least
+};
+
+/// A point of the frame and the plane that it lies on.
+struct plane_observation_of_row {
+  optimize::point_to_plane seen;  ///< `measured` in the camera frame of the row's time
+  double time = 0.0;              ///< of the row, relative to the frame, seconds
+};
+
+/// What became of the samples.
+struct association {
+  std::size_t visible = 0;     ///< samples that project to where a surface is known
+  std::size_t consistent = 0;  ///< of these, those within the gate
+  [[nodiscard]] double share() const noexcept {
+    return visible == 0 ? 0.0 : static_cast<double>(consistent) / static_cast<double>(visible);
+  }
+};
+
+/// Finds the planes that samples lie on, given a pose: for each those of the first surface that agrees with it.
+/// `stride`: of the samples every how many-th is looked at. O(samples * surfaces).
+template <camera::camera_model Camera>
+association associate(std::span<const surface_sample> samples, std::size_t stride,
+                      std::span<const placed_surface> surfaces, const moving_pose& at, const camera::shutter& shutter,
+                      const camera_rig<Camera>& rig, const alignment_gate& gate,
+                      std::vector<plane_observation_of_row>& to) {
+  to.clear();
+  association count;
+  struct placed {
+    mat3 rotation;  // from the frame to the surface
+    vec3 translation;
+    mat3 to_world;
+  };
+  constexpr std::size_t most_surfaces = 4;
+  std::array<placed, most_surfaces> place;
+  const std::size_t surface_count = std::min(surfaces.size(), most_surfaces);
+  for (std::size_t k = 0; k != surface_count; ++k) {
+    const se3 T = surfaces[k].T_world_camera.inverse() * at.T_world_camera;
+    place[k] = {T.rotation_matrix(), T.translation(), surfaces[k].T_world_camera.rotation_matrix()};
+  }
+  for (std::size_t i = 0; i < samples.size(); i += stride) {
+    const surface_sample& s = samples[i];
+    const double time = shutter.depth_time(s.row, rig.camera().height());
+    const vec3 point = moved_by(at.twist, time, s.point);
+    bool visible = false;
+    for (std::size_t k = 0; k != surface_count; ++k) {
+      const vec3 there = place[k].rotation * point + place[k].translation;
+      const auto pixel = there.z() > 0.0 ? rig.camera().project(there) : std::nullopt;
+      const surface_cell* const cell = pixel ? surfaces[k].seen->at(*pixel) : nullptr;
+      if (cell == nullptr || !cell->is_there()) continue;
+      visible = true;
+      const vec3 normal = cell->normal();
+      const double off = normal.dot(there - cell->point());
+      const double deviation = std::max(0.002, s.point.z() * s.point.z() / rig.model.bf * std::abs(s.normal.z()));
+      if (std::abs(off) > std::max(gate.distance, gate.deviations * deviation) ||
+          normal.dot(place[k].rotation * s.normal) < gate.cosine)
+        continue;
+      ++count.consistent;
+      to.push_back({{s.point, surfaces[k].T_world_camera * cell->point(), place[k].to_world * normal,
+                     1.0 / (deviation * deviation)},
+                    time});
+      break;
+    }
+    count.visible += visible ? 1 : 0;
+  }
+  return count;
+}
+
+/// The residuals of the planes to second order in a motion of the camera frame (`exp(step) * T_camera_world`), without
+/// the directions that they leave free.
+struct depth_equations {
+  pose_quadratic term;     ///< the information is that of so many independent points as is allowed, at most
+  int determined = 0;      ///< directions of the pose, of six
+  double least = 0.0;      ///< what the normals have in the direction that they determine least, mean square
+  double deviation = 0.0;  ///< root mean square of the residuals, standard deviations
+};
+
+/// `points`: how many points the term may count as; more are weighed down to this. `weakest`: the mean square of what
+/// the normals have in a direction, below which it counts as free; rotations as if the points were at their mean
+/// depth, which is what turns an angle into metres. O(planes).
+[[nodiscard]] inline depth_equations equations_of(std::span<const plane_observation_of_row> planes,
+                                                  const moving_pose& at, double points, double weakest) {
+  depth_equations e;
+  e.term.at = at;
+  if (planes.empty()) return e;
+  constexpr double width = 2.0;  // of Huber's loss
+  std::array<mat6, 3> h{mat6::Zero(), mat6::Zero(), mat6::Zero()};
+  std::array<vec6, 2> g{vec6::Zero(), vec6::Zero()};
+  double weights = 0.0, squares = 0.0, range = 0.0, cost = 0.0;
+  for (const plane_observation_of_row& o : planes) {
+    optimize::point_to_plane seen = o.seen;
+    seen.measured = moved_by(at.twist, o.time, seen.measured);
+    matrix<1, 6> right;
+    const auto r = seen.linearize(at.T_world_camera, right);
+    if (!r) continue;
+    const vec6 j = -right.transpose();  // a step of the camera from the left is one of its pose from the right, back
+    const double error = std::abs((*r)[0]);
+    const double weight = error <= width ? 1.0 : width / error;
+    cost += 0.5 * weight * error * error;
+    squares += error * error;
+    weights += weight * seen.information;
+    range += seen.measured.norm();
+    const mat6 a = weight * j * j.transpose();
+    const vec6 b = weight * (*r)[0] * j;
+    h[0] += a, h[1] -= o.time * a, h[2] += o.time * o.time * a;
+    g[0] += b, g[1] -= o.time * b;
+  }
+  const auto n = static_cast<double>(planes.size());
+  e.deviation = std::sqrt(squares / n);
+
+  // Eigenvalues where a radian counts as the metres at the mean range.
+  vec6 scale = vec6::Ones();
+  scale.tail<3>().setConstant(n / range);
+  const mat6 scaled = scale.asDiagonal() * h[0] * scale.asDiagonal() / weights;
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> directions(scaled);
+  e.least = directions.eigenvalues()[0];
+  mat6 keep = mat6::Zero();
+  for (int i = 0; i != 6; ++i) {
+    if (!(directions.eigenvalues()[i] > weakest)) continue;
+    ++e.determined;
+    keep += directions.eigenvectors().col(i) * directions.eigenvectors().col(i).transpose();
+  }
+  keep = scale.cwiseInverse().asDiagonal() * keep * scale.asDiagonal();  // of scaled gradients: of gradients
+  const double share = std::min(1.0, points / n);
+  for (mat6& m : h) m = share * (keep * m * keep.transpose());
+  for (vec6& v : g) v = share * (keep * v);
+  e.term.h << h[0], h[1], h[1], h[2];
+  e.term.g << g[0], g[1];
+  e.term.cost = share * cost;
+  return e;
+}
+
+/// The motion of the camera frame to the least cost, where the planes determine one; zero in all other directions.
+[[nodiscard]] inline vec6 step_of(const depth_equations& e) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> h(e.term.h.topLeftCorner<6, 6>());
+  vec6 step = vec6::Zero();
+  for (int i = 6 - e.determined; i < 6; ++i)  // the others are zero
+    if (h.eigenvalues()[i] > 0.0)
+      step -= h.eigenvectors().col(i) * (h.eigenvectors().col(i).dot(e.term.g.head<6>()) / h.eigenvalues()[i]);
+  return step;
+}
+
+}  // namespace orbis::slam::detail

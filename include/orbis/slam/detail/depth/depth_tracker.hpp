@@ -1,0 +1,204 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// What the depth image of a frame says of its pose.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include <orbis/camera/depth.hpp>
+#include <orbis/camera/model.hpp>
+#include <orbis/camera/shutter.hpp>
+#include <orbis/core/se3.hpp>
+#include <orbis/slam/atlas.hpp>
+#include <orbis/slam/camera_rig.hpp>
+#include <orbis/slam/detail/depth/alignment.hpp>
+#include <orbis/slam/detail/depth/surface.hpp>
+#include <orbis/slam/detail/depth/surface_memory.hpp>
+#include <orbis/slam/detail/depth/surface_samples.hpp>
+#include <orbis/slam/detail/shutter/motion_refinement.hpp>
+#include <orbis/slam/detail/shutter/row_times.hpp>
+#include <orbis/slam/ids.hpp>
+#include <orbis/slam/options.hpp>
+
+namespace orbis::slam::detail {
+
+/// A pose that the depth of a frame was aligned at.
+struct depth_alignment {
+  moving_pose at;
+  int determined = 0;   ///< directions of the pose that the surfaces determine, of six
+  double least = 0.0;   ///< how well they do in the worst of these: `depth_equations::least`
+  association seen;     ///< there
+  bool is_only = true;  ///< no other pose fits nearly as well
+};
+
+/// Poses to align depth from: where the motion leads to, where the camera was, and turned from there both ways, and up
+/// and down, by what a hand turns it in the time. `interval`: seconds since `last`.
+[[nodiscard]] inline std::array<moving_pose, 8> search_starts(const se3& last, const se3& predicted, double interval) {
+  const double angle = std::clamp(interval, 0.05, 0.25);  // about a radian per second
+  std::array<moving_pose, 8> starts;
+  starts[0].T_world_camera = predicted;
+  starts[1].T_world_camera = last;
+  std::size_t next = 2;
+  for (const double sign : {-1.0, 1.0}) {
+    starts[next++].T_world_camera = last * se3(so3::exp(vec3(0.0, sign * angle, 0.0)), vec3::Zero());
+    starts[next++].T_world_camera = last * se3(so3::exp(vec3(0.0, 2.0 * sign * angle, 0.0)), vec3::Zero());
+    starts[next++].T_world_camera = last * se3(so3::exp(vec3(sign * angle, 0.0, 0.0)), vec3::Zero());
+  }
+  return starts;
+}
+
+/// Keeps surfaces of keyframes and compares frames with them. `see` begins a frame; `keep` may end it. Allocates
+/// nothing once its buffers have grown.
+template <camera::camera_model Camera>
+class depth_tracker {
+ public:
+  depth_tracker(const camera_rig<Camera>& rig, const depth_term_options& settings)
+      : rig_{rig}, options_{settings}, memory_{settings.surfaces} {}
+
+  [[nodiscard]] bool is_on() const noexcept { return options_.enabled || options_.recovers; }
+
+  /// The depth image of the next frame. About half a millisecond.
+  template <camera::depth_source Depth>
+  void see(const Depth& depth) {
+    samples_.clear();
+    now_.cells.clear();
+    if (!is_on() || depth.width() != rig_.camera().width() || depth.height() != rig_.camera().height()) return;
+    builder_.build(rig_.camera(), depth, 1.0 / rig_.model.bf, rig_.min_depth, rig_.max_depth, now_);
+    sampler_.choose(now_, options_.points, samples_);
+  }
+  /// The next frame has no depth image.
+  void see_nothing() {
+    samples_.clear();
+    now_.cells.clear();
+  }
+
+  /// Finds the surfaces around a pose in the active map, for what follows. Whether there are any.
+  template <feature_descriptor D>
+  bool surround(const basic_atlas<D>& maps, const se3& T_world_camera) {
+    placed_.clear();
+    if (samples_.size() < options_.min_points) return false;
+    memory_.around(maps, T_world_camera, 2, placed_);
+    return !placed_.empty();
+  }
+
+  /// What the surfaces say of a pose close to the true one; empty if that is nothing. @pre surround
+  [[nodiscard]] std::optional<pose_quadratic> term_at(const moving_pose& at, const camera::shutter& shutter) {
+    const association seen = associate<Camera>(samples_, 1, placed_, at, shutter, rig_, close, planes_);
+    if (seen.consistent < options_.min_points / 2) return std::nullopt;
+    const depth_equations e = equations_of(planes_, at, options_.effective_points, options_.weakest);
+    if (e.determined == 0) return std::nullopt;
+    return e.term;
+  }
+
+  /// How much of the frame lies on the surfaces around it at a pose. @pre surround
+  [[nodiscard]] association agreement(const moving_pose& at, const camera::shutter& shutter) {
+    return associate<Camera>(samples_, 1, placed_, at, shutter, rig_, close, planes_);
+  }
+  /// Whether that is enough for depth to hold the camera there.
+  [[nodiscard]] bool holds(const association& seen) const noexcept {
+    return seen.consistent >= options_.min_points && seen.share() >= options_.min_share;
+  }
+
+  /// Aligns the frame, from the best of several poses around a start; empty if it is not sure that it lies there. What
+  /// the surfaces leave free stays as it is at the start. About a millisecond. @pre surround
+  template <class Starts>
+  [[nodiscard]] std::optional<depth_alignment> align(const Starts& starts, const camera::shutter& shutter) {
+    found_.clear();
+    for (const moving_pose& start : starts) {
+      found_.push_back(descend(start, shutter, 4, 0.4, 12));
+      found_.back().seen =
+          associate<Camera>(samples_, 4, placed_, found_.back().at, shutter, rig_, {.distance = 0.06}, planes_);
+    }
+    const auto fits_less = [](const depth_alignment& a, const depth_alignment& b) {
+      return a.seen.consistent < b.seen.consistent;
+    };
+    const auto best = std::max_element(found_.begin(), found_.end(), fits_less);
+    if (best == found_.end()) return std::nullopt;
+    depth_alignment result = descend(best->at, shutter, 1, 0.1, 6);
+    result.seen = agreement(result.at, shutter);
+    if (!holds(result.seen)) return std::nullopt;
+    constexpr double apart = 0.1;
+    for (const depth_alignment& other : found_)
+      if (surface_memory::distance(other.at.T_world_camera, best->at.T_world_camera) > apart &&
+          static_cast<double>(other.seen.consistent) > 0.8 * static_cast<double>(best->seen.consistent))
+        result.is_only = false;
+    return result;
+  }
+  /// Whether an alignment is sure enough to go without landmarks.
+  [[nodiscard]] bool holds_alone(const depth_alignment& found) const noexcept {
+    constexpr double share = 0.85, visible = 0.35, least = 0.003;
+    return found.is_only && found.least >= least && found.seen.share() >= share &&
+           static_cast<double>(found.seen.visible) >= visible * static_cast<double>(samples_.size());
+  }
+
+  /// Keeps the surface of the frame, which was tracked at `at`, as that of a keyframe, or near one.
+  void keep(map_keyframe anchor, const se3& T_anchor_camera, const vec6& twist, const camera::shutter& shutter) {
+    if (now_.empty()) return;
+    if (!shutter.is_global()) move_to_frame_time(twist, shutter);
+    memory_.keep(anchor, T_anchor_camera, now_);
+    now_.cells.clear();
+  }
+  /// Whether the nearest surface is so far from a pose that another one is needed there.
+  template <feature_descriptor D>
+  [[nodiscard]] bool needs_surface(const basic_atlas<D>& maps, const se3& T_world_camera) {
+    constexpr double far = 0.5;
+    if (now_.empty()) return false;
+    memory_.around(maps, T_world_camera, 1, placed_);
+    return placed_.empty() || surface_memory::distance(placed_.front().T_world_camera, T_world_camera) > far;
+  }
+
+ private:
+  static constexpr alignment_gate close{.distance = 0.03, .deviations = 2.0, .cosine = 0.85};
+
+  /// Steps with a gate that closes from `distance`, metres.
+  depth_alignment descend(const moving_pose& start, const camera::shutter& shutter, std::size_t stride, double distance,
+                          int iterations) {
+    depth_alignment a;
+    a.at = start;
+    for (int i = 0; i != iterations; ++i) {
+      associate<Camera>(samples_, stride, placed_, a.at, shutter, rig_, {.distance = distance, .cosine = 0.7}, planes_);
+      if (planes_.size() < 12) break;
+      const depth_equations e = equations_of(planes_, a.at, options_.effective_points, options_.weakest);
+      a.determined = e.determined;
+      a.least = e.least;
+      const vec6 step = step_of(e);
+      if (!step.allFinite()) break;
+      a.at.T_world_camera = a.at.T_world_camera * se3::exp(-step);
+      distance = std::max(0.05, 0.8 * distance);
+      if (step.squaredNorm() < 1e-8 && distance <= 0.05) break;
+    }
+    return a;
+  }
+
+  void move_to_frame_time(const vec6& twist, const camera::shutter& shutter) {
+    const vec3 turning = twist.tail<3>();
+    for (std::size_t i = 0; i != now_.cells.size(); ++i) {
+      surface_cell& c = now_.cells[i];
+      if (!c.is_there()) continue;
+      const double t = shutter.depth_time(now_.pixel_row(i), rig_.camera().height());
+      const vec3 p = moved_by(twist, t, c.point());
+      const vec3 n = (c.normal() + t * turning.cross(c.normal())).normalized();
+      c.measured *= static_cast<float>(p.z()) / c.z;
+      c.x = static_cast<float>(p.x()), c.y = static_cast<float>(p.y()), c.z = static_cast<float>(p.z());
+      c.nx = static_cast<float>(n.x()), c.ny = static_cast<float>(n.y()), c.nz = static_cast<float>(n.z());
+    }
+  }
+
+  const camera_rig<Camera>& rig_;
+  const depth_term_options& options_;
+  surface_builder<Camera> builder_;
+  surface_sampler sampler_;
+  surface_memory memory_;
+  surface now_;  ///< of the frame
+  std::vector<surface_sample> samples_;
+  std::vector<placed_surface> placed_;
+  std::vector<plane_observation_of_row> planes_;
+  std::vector<depth_alignment> found_;
+};
+
+}  // namespace orbis::slam::detail

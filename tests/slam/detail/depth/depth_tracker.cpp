@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <cstddef>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include <orbis/slam/detail/depth/depth_tracker.hpp>
+
+#include "slam/detail/depth/planes.hpp"
+#include "support/allocations.hpp"
+#include "support/catch.hpp"
+
+using namespace orbis;
+using namespace orbis::slam::detail;
+
+namespace {
+
+using descriptor = features::binary_descriptor<256>;
+
+vec6 vector6(double a, double b, double c, double d, double e, double f) {
+  vec6 v;
+  v << a, b, c, d, e, f;
+  return v;
+}
+
+/// A map with one keyframe, in the origin of a room.
+struct scene {
+  slam::camera_rig<camera::pinhole> rig = test::small_rig();
+  slam::depth_term_options options;
+  std::vector<test::plane> room;
+  slam::basic_atlas<descriptor> maps;
+  depth_tracker<camera::pinhole> tracker{rig, options};
+
+  explicit scene(std::vector<test::plane> planes) : room{std::move(planes)} {
+    slam::basic_frame<descriptor> f;
+    const slam::keyframe_id id = maps.active().add_keyframe(f);
+    see(se3{});
+    CHECK(tracker.needs_surface(maps, se3{}));
+    tracker.keep({maps.active_id(), id}, se3{}, vec6::Zero(), {});
+  }
+  void see(const se3& pose) { tracker.see(test::metres(test::depth_of(room, pose, rig.camera()))); }
+  [[nodiscard]] std::optional<depth_alignment> align(const se3& last) {
+    if (!tracker.surround(maps, last)) return std::nullopt;
+    return tracker.align(search_starts(last, last, 0.5), {});
+  }
+};
+
+double error(const se3& a, const se3& b) { return (a.inverse() * b).log().norm(); }
+
+}  // namespace
+
+TEST_CASE("A corner holds the camera after a step of decimetres and ten degrees") {
+  scene s{test::corner()};
+  const se3 pose(so3::exp(vec3(0.04, -0.18, 0.03)), vec3(0.15, -0.05, 0.12));
+  s.see(pose);
+  const auto found = s.align(se3{});
+  REQUIRE(found);
+  CHECK(found->determined == 6);
+  CHECK(found->seen.share() > 0.9);
+  CHECK(error(found->at.T_world_camera, pose) < 6e-3);
+}
+
+TEST_CASE("A wall holds the distance to it and what can be told of the direction, and leaves the rest") {
+  scene s{test::wall()};
+  const se3 pose(so3::exp(vec3(0.05, -0.1, 0.0)), vec3(0.1, 0.0, 0.15));
+  s.see(pose);
+  const auto found = s.align(se3{});
+  REQUIRE(found);
+  CHECK(found->determined == 3);
+  const vec3 ahead = found->at.T_world_camera.rotation() * vec3::UnitZ(), truly = pose.rotation() * vec3::UnitZ();
+  CHECK((ahead - truly).norm() < 2e-3);
+  CHECK(found->at.T_world_camera.translation().z() == Catch::Approx(0.15).margin(2e-3));
+}
+
+TEST_CASE("What lies elsewhere is not held") {
+  scene s{test::corner()};
+  s.room = {{vec3(0.5, 0.5, 0.7).normalized(), 1.2}, {vec3(-0.7, 0.1, 0.7).normalized(), 0.9}};
+  s.see(se3{});
+  CHECK(!s.align(se3{}));
+  s.room.clear();  // no depth
+  s.see(se3{});
+  CHECK(!s.align(se3{}));
+  CHECK(!s.tracker.needs_surface(s.maps, se3{}));
+}
+
+TEST_CASE("The term of depth pulls towards the true pose, and is nothing where nothing is known") {
+  scene s{test::corner()};
+  const se3 pose = se3::exp(vector6(0.05, 0.02, -0.03, 0.02, 0.03, -0.02));
+  s.see(pose);
+  REQUIRE(s.tracker.surround(s.maps, pose));
+  const se3 off = pose * se3::exp(vector6(0.006, -0.005, 0.004, 0.002, -0.003, 0.002));
+  const auto term = s.tracker.term_at({off, vec6::Zero()}, {});
+  REQUIRE(term);
+  const vec6 step = term->h.topLeftCorner<6, 6>().ldlt().solve(-term->g.head<6>());
+  CHECK(error(off * se3::exp(-step), pose) < 0.25 * error(off, pose));
+  s.maps.create();
+  CHECK(!s.tracker.surround(s.maps, pose));
+}
+
+TEST_CASE("A surface that was read later than the colour is kept as it is at the time of the frame") {
+  scene s{test::corner()};
+  const vec6 twist = vector6(0.4, -0.2, 0.3, 0.5, -0.6, 0.4);
+  const camera::shutter late{.depth_delay = 0.02};
+  const se3 pose = se3::exp(vector6(0.3, 0.0, 0.1, 0.0, 0.1, 0.0));
+  s.see(pose * se3::exp(0.02 * twist));
+  s.tracker.keep({s.maps.active_id(), slam::keyframe_id{0}}, pose, twist, late);
+  s.see(pose);
+  REQUIRE(s.tracker.surround(s.maps, pose));
+  const moving_pose at{pose, vec6::Zero()};
+  const auto kept = s.tracker.term_at(at, {});
+  REQUIRE(kept);
+  CHECK(s.tracker.agreement(at, {}).share() > 0.95);
+  const vec6 step = kept->h.topLeftCorner<6, 6>().ldlt().solve(-kept->g.head<6>());
+  CHECK(step.norm() < 1.5e-3);  // of 15 mm
+  // And samples are moved likewise.
+  s.see(pose * se3::exp(0.02 * twist));
+  const auto moved = s.tracker.term_at({pose, twist}, late);
+  REQUIRE(moved);
+  CHECK(moved->h.topLeftCorner<6, 6>().ldlt().solve(-moved->g.head<6>()).norm() < 1.5e-3);
+}
+
+TEST_CASE("Depth in the pose allocates nothing once its buffers have grown") {
+  scene s{test::corner()};
+  const se3 pose = se3::exp(vector6(0.02, 0.02, -0.03, 0.02, 0.03, -0.02));
+  const image<float> depth = test::depth_of(s.room, pose, s.rig.camera());
+  const auto frame = [&] {
+    s.tracker.see(test::metres(depth));
+    if (!s.tracker.surround(s.maps, pose)) return false;
+    const bool there = s.tracker.term_at({pose, vec6::Zero()}, {}).has_value();
+    return s.tracker.align(search_starts(pose, pose, 0.1), {}).has_value() && there;
+  };
+  REQUIRE(frame());
+  const std::size_t before = test::allocations();
+  const bool again = frame();
+  const std::size_t after = test::allocations();
+  CHECK(again);
+  CHECK(after == before);
+}

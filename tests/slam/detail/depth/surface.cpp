@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+#include <orbis/slam/detail/depth/surface.hpp>
+
+#include "slam/detail/depth/planes.hpp"
+#include "support/catch.hpp"
+
+using namespace orbis;
+using slam::detail::surface;
+using slam::detail::surface_cell;
+
+namespace {
+
+surface surface_of(const image<float>& depth) {
+  const auto rig = test::small_rig();
+  slam::detail::surface_builder<camera::pinhole> builder;
+  surface s;
+  builder.build(rig.camera(), test::metres(depth), 1.0 / 400.0, 0.1, 10.0, s);
+  return s;
+}
+std::size_t count(const surface& s) {
+  return static_cast<std::size_t>(
+      std::count_if(s.cells.begin(), s.cells.end(), [](const surface_cell& c) { return c.is_there(); }));
+}
+
+}  // namespace
+
+TEST_CASE("The cells of a surface lie on the planes that a depth image shows, and know their directions") {
+  const auto camera = test::small_rig().camera();
+  const se3 pose(so3::exp(vec3(0.1, -0.2, 0.05)), vec3(0.1, 0.0, -0.2));
+  const auto planes = test::corner();
+  const surface s = surface_of(test::depth_of(planes, pose, camera));
+  CHECK(s.step == 4);
+  CHECK(s.columns == 80);
+  CHECK(s.rows == 60);
+  CHECK(count(s) > s.cells.size() * 7 / 10);
+  std::size_t exact = 0;
+  for (std::size_t i = 0; i != s.cells.size(); ++i) {
+    const surface_cell& c = s.cells[i];
+    if (!c.is_there()) continue;
+    CHECK(std::abs(c.normal().norm() - 1.0) < 1e-5);
+    CHECK(c.normal().dot(c.point()) < 0.0);  // towards the camera
+    const vec3 p = pose * c.point(), n = pose.rotation() * c.normal();
+    exact += std::any_of(planes.begin(), planes.end(), [&](const test::plane& q) {
+      return std::abs(q.normal.dot(p) - q.distance) < 1e-4 && (q.normal + n).norm() < 1e-3 &&
+             std::abs(c.measured - c.z) < 1e-4F;
+    });
+    const auto pixel = camera.project(c.point());
+    REQUIRE(pixel);
+    CHECK(s.at(*pixel) == &c);
+    CHECK(std::abs(pixel->y() - s.pixel_row(i)) < 0.01);
+  }
+  CHECK(exact > count(s) * 9 / 10);  // the others lie across an edge
+}
+
+TEST_CASE("A surface has no cells where depth is missing or jumps or is out of range") {
+  image<float> depth(320, 240);
+  CHECK(count(surface_of(depth)) == 0);
+  for (int v = 0; v != 240; ++v)
+    for (int u = 0; u != 320; ++u) depth(u, v) = u < 162 ? 1.0F : 2.0F;
+  const surface s = surface_of(depth);
+  const auto row = [&](int column) { return s.cells[static_cast<std::size_t>(30 * 80 + column)]; };
+  CHECK(row(39).is_there());
+  CHECK(row(39).z == Catch::Approx(1.0));
+  CHECK(!row(40).is_there());  // both sides
+  CHECK(row(41).is_there());
+  CHECK(row(41).z == Catch::Approx(2.0));
+  CHECK(std::abs(row(41).nz + 1.0F) < 1e-4F);
+  CHECK(s.at(vec2(-1.0, 3.0)) == nullptr);
+  CHECK(s.at(vec2(320.0, 3.0)) == nullptr);
+  for (int v = 0; v != 240; ++v)
+    for (int u = 0; u != 320; ++u) depth(u, v) = 11.0F;
+  CHECK(count(surface_of(depth)) == 0);
+}
