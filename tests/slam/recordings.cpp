@@ -181,6 +181,7 @@ TEST_CASE("Who walks through the view does not carry the map along") {
 TEST_CASE("Who fills half of the view does not carry the camera along") {
   syn::company_options o;
   o.sequence = small(15);
+  SECTION("crosses, slowly where it comes into view") { o.what = syn::company::crosses; }
   SECTION("stops and goes on") { o.what = syn::company::stops; }
   SECTION("goes along with the camera") { o.what = syn::company::goes_along; }
   const auto frames = syn::with_company(o);

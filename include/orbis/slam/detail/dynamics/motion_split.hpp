@@ -37,6 +37,8 @@ struct motion_split {
 
 /// The trust from which on a match counts as one of something that stands still.
 inline constexpr double enough_trust = 0.7;
+/// The weight of a match that is not trusted at all.
+inline constexpr double least_trust = 0.02;
 
 /// Whether so many outliers are worth a closer look.
 [[nodiscard]] inline bool may_hold_two_motions(std::size_t matches, std::size_t inliers,
@@ -69,9 +71,10 @@ class motion_splitter {
     double score = s.score(pose);
     bool changed = false, by_trust = false;
     const auto compete = [&](const std::optional<se3>& other, bool trusted) {
-      constexpr double clearly = 1.05;
+      constexpr double clearly = 1.02;
       const double value = other ? s.score(*other) : 0.0;
       if (!(value > (changed ? 1.0 : clearly) * score)) return;
+      if (trusted && !s.leaves_out_a_body(*other)) return;
       score = value, pose = *other, changed = true, by_trust = trusted;
     };
     const std::vector<std::uint8_t> trusted = s.trusted();
@@ -124,7 +127,7 @@ class motion_splitter {
     for (std::size_t i = 0; i != observations_.size(); ++i) {
       const double left = 1.0 - error(T_camera_world, i) / error_limit(observations_[i].has_depth());
       if (!(left > 0.0)) continue;
-      const double w = std::max(trust_[i], 0.05);
+      const double w = std::max(trust_[i], least_trust);
       const vec3& p = observations_[i].point;
       sum += left * w;
       weight += w;
@@ -218,6 +221,16 @@ class motion_splitter {
     if (count >= options_.min_features) return true;
     std::fill(s.moving.begin(), s.moving.end(), std::uint8_t{0});
     return false;
+  }
+
+  /// Whether enough of the new matches that do not agree with a pose lie among such.
+  [[nodiscard]] bool leaves_out_a_body(const se3& T_world_camera) const {
+    std::vector<std::uint8_t> out(observations_.size());
+    judge(T_world_camera, out);
+    std::size_t count = 0;
+    for (std::size_t i = 0; i != out.size(); ++i)
+      count += out[i] != 0 && trust_[i] < enough_trust && lies_among(out, i);
+    return count >= options_.min_features;
   }
 
   /// Whether most of the points nearest to one are outliers. O(matches).
