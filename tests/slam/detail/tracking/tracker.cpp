@@ -71,6 +71,19 @@ TEST_CASE("A frame is found by its appearance, without any prediction") {
   CHECK(s.tracker.by_appearance(elsewhere, s.m, 9) == 0);
 }
 
+TEST_CASE("A frame is found from the last one when the camera has turned far") {
+  scene s;
+  slam::frame last = s.m.at(9);
+  const vec3 turn = GENERATE(vec3(0.0, 0.3, 0.0), vec3(0.15, -0.35, 0.0), vec3(-0.2, 0.0, 0.05));
+  last.T_world_camera = s.world.truth(10) * se3(so3::exp(turn), vec3(0.05, -0.05, 0.02));  // as if it had looked there
+  CHECK(s.tracker.by_motion(s.next, s.m, last, last.T_world_camera, s.moving) == 0);
+  CHECK(s.tracker.by_turning(s.next, s.m, last) > 50);
+  CHECK(s.error() < 0.01);
+  CHECK(s.wrong_landmarks() == 0);
+  last.T_world_camera = s.world.truth(40);  // another wall
+  CHECK(s.tracker.by_turning(s.next, s.m, last) == 0);
+}
+
 TEST_CASE("The local map adds landmarks that the last frame did not show") {
   scene s;
   s.next.T_world_camera = s.world.truth(10);

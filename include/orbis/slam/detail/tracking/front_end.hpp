@@ -143,6 +143,9 @@ class front_end {
   /// From the reference and the keyframes with similar appearance, in any map.
   template <class FollowRows, class Similar>
   std::size_t relocalize(frame_type& f, atlas_type& maps, bool is_frozen, FollowRows&& follow_rows, Similar&& similar);
+  /// Around the last tracked frame's place, for a camera that has turned; by a frame that sees enough to begin a map.
+  template <class FollowRows>
+  std::size_t search_in_place(frame_type& f, atlas_type& maps, bool is_frozen, FollowRows&& follow_rows);
   std::size_t track_local_map(frame_type& f, basic_map<D>& m, double radius, bool is_frozen) {
     return tracker_.on_local_map(
         f, m, reference_.keyframe, radius, moving_, [&](landmark_id l) { is_frozen ? void() : m.count_visible(l); },
@@ -263,6 +266,7 @@ std::size_t front_end<Camera, D, Matchers, Sensor>::localize(frame_type& f, atla
       return inliers;
   if (const std::size_t inliers = relocalize(f, maps, is_frozen, follow_rows, similar); inliers > 0) return inliers;
   if (aligned && is_tracking() && hold_by_depth(f, *aligned)) return 0;
+  if (const std::size_t inliers = search_in_place(f, maps, is_frozen, follow_rows); inliers > 0) return inliers;
   if (is_tracking()) lost_since_ = last_.timestamp;
   if (!lost_since_) lost_since_ = f.timestamp;
   state_ = track_state::lost;
@@ -274,6 +278,7 @@ template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D
 std::size_t front_end<Camera, D, Matchers, Sensor>::begin_map(frame_type& f) {
   const std::size_t points = Sensor::begins_map(f, options_);
   if (points == 0) return 0;
+  f.landmarks.assign(f.size(), no_id);  // of searches in other maps
   f.T_world_camera = options_.find_initial_pose ? options_.find_initial_pose() : options_.initial_pose.value_or(se3{});
   state_ = track_state::tracking;
   return points;
@@ -342,6 +347,21 @@ std::size_t front_end<Camera, D, Matchers, Sensor>::relocalize(frame_type& f, at
   maps.activate(active_before);
   reference_ = reference_before;
   return 0;
+}
+
+template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
+template <class FollowRows>
+std::size_t front_end<Camera, D, Matchers, Sensor>::search_in_place(frame_type& f, atlas_type& maps, bool is_frozen,
+                                                                    FollowRows&& follow_rows) {
+  const bool is_here = last_.size() != 0 && reference_.map == maps.active_id() && maps.has(reference_);
+  const bool is_recent = f.timestamp - last_.timestamp < options_.recovery.new_map_after;
+  if (!is_here || (is_frozen && !is_recent) || Sensor::begins_map(f, options_) == 0) return 0;
+  if (tracker_.by_turning(f, maps.active(), last_) == 0) return 0;
+  const std::size_t inliers = track_local_map(f, maps.active(), 3.0 * options_.search_radius, is_frozen);
+  if (inliers < options_.recovery.min_inliers) return 0;
+  refine_motion(f, maps, false, follow_rows);
+  state_ = track_state::relocalized;
+  return inliers;
 }
 
 template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
