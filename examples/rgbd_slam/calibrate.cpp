@@ -8,7 +8,9 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <system_error>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -19,7 +21,6 @@
 #include <orbis/slam/rgbd_system.hpp>
 
 #include "commands.hpp"
-#include "interrupts.hpp"
 #include "output.hpp"
 #include "shutter_stage.hpp"
 #include "source.hpp"
@@ -47,7 +48,6 @@ orbis::result<refined> refine(const any_camera& model, const frame_source& sourc
   orbis::slam::rgbd_system<any_camera> slam{model, options};
   read_ahead frames{source, s.threads != 1};
   for (std::size_t i = 0; frames.has_next(); ++i) {
-    if (interrupts::requested()) return orbis::fail(orbis::errc::cancelled, s.input.string(), "interrupted");
     const auto frame = frames.next();
     if (!frame) return orbis::fail(frame.error());
     slam.track(*frame);
@@ -66,7 +66,31 @@ orbis::result<refined> refine(const any_camera& model, const frame_source& sourc
 /// Whether the round changed no parameter by more than so many deviations. Not every map has the same landmarks.
 bool is_settled(const calibration& c, double deviations) {
   return std::all_of(c.parameters.begin(), c.parameters.end(), [&](const orbis::slam::calibrated_parameter& p) {
-    return p.is_held || std::abs(p.after - p.before) <= deviations * p.deviation;
+    return std::abs(p.after - p.before) <= deviations * p.deviation;  // 0 for what was held
+  });
+}
+
+/// A parameter of a camera by its name.
+double value_of(const any_camera& camera, std::string_view name) {
+  return camera.visit([&](const auto& model) {
+    using of_model = orbis::camera::parameters_of<std::remove_cvref_t<decltype(model)>>;
+    const auto at = std::find(of_model::names.begin(), of_model::names.end(), name) - of_model::names.begin();
+    return static_cast<double>(of_model::get(model)[static_cast<int>(at)]);
+  });
+}
+
+/// The camera that was found, where what was held has the values that were given, not those of an earlier round.
+any_camera with_what_was_given(calibration& found, const any_camera& given) {
+  return found.camera.visit([&](const auto& model) -> any_camera {
+    using of_model = orbis::camera::parameters_of<std::remove_cvref_t<decltype(model)>>;
+    auto values = of_model::get(model);
+    for (auto& p : found.parameters) {
+      if (!p.is_held) continue;
+      const auto at = std::find(of_model::names.begin(), of_model::names.end(), p.name) - of_model::names.begin();
+      p.after = values[static_cast<int>(at)] = value_of(given, p.name);
+    }
+    const auto changed = of_model::with(model, values);
+    return changed ? any_camera{*changed} : found.camera;
   });
 }
 
@@ -100,10 +124,12 @@ std::string line_of(const orbis::slam::calibrated_parameter& p) {
 std::optional<orbis::error> find_overwritten(const settings& s, const frame_source& source) {
   std::error_code ignored;
   if (s.out.empty()) return std::nullopt;
-  for (const auto& file : source.files)
+  for (const auto& file : source.files)  // but for its camera file, which may be replaced
     if (std::filesystem::equivalent(file, s.out, ignored) && file.extension() != ".toml")
       return orbis::error{orbis::errc::invalid_argument, s.out.string(),
                           "is part of the recording, and would be written over"};
+  if (s.out.has_parent_path() && !std::filesystem::is_directory(s.out.parent_path(), ignored))
+    return orbis::error{orbis::errc::invalid_argument, s.out.string(), "would be in a folder that there is not"};
   if (std::filesystem::is_directory(s.out, ignored))
     return orbis::error{orbis::errc::invalid_argument, s.out.string(), "is a folder; a file is wanted"};
   return std::nullopt;
@@ -114,10 +140,9 @@ std::optional<orbis::error> find_overwritten(const settings& s, const frame_sour
 exit_code calibrate(const settings& s, console& console) {
   const auto give_up = [&](const orbis::error& e) {
     console.error(e);
-    return e.code == orbis::errc::cancelled    ? interrupted
-           : e.code == orbis::errc::degenerate ? undetermined
-           : e.code == orbis::errc::no_data    ? never_tracked
-                                               : bad_input;
+    return e.code == orbis::errc::degenerate ? undetermined
+           : e.code == orbis::errc::no_data  ? never_tracked
+                                             : bad_input;
   };
   const auto source = open_source(s, console);
   if (!source) return console.error(source.error()), bad_input;
@@ -137,7 +162,7 @@ exit_code calibrate(const settings& s, console& console) {
     auto next = refine(camera.model, *source, s, shutter.shutter, console);
     if (!next) return give_up(next.error());
     last = *std::move(next);
-    camera.model = last->camera.camera;
+    camera.model = with_what_was_given(last->camera, given);
     char text[160];
     std::snprintf(text, sizeof text, "round %d: %zu keyframes, %zu observations, their error %.3f -> %.3f deviations",
                   round, last->camera.keyframes, last->camera.observations, last->camera.initial_rms,
@@ -147,29 +172,30 @@ exit_code calibrate(const settings& s, console& console) {
   if (!is_settled(last->camera, 3.0))
     console.warn("the parameters still change from round to round: do not rely on them");
 
-  console.print("parameter           given        found    deviation");
-  auto parameters = last->camera.parameters;
-  any_camera{given}.visit([&](const auto& model) {  // the last round began with what the others had found
-    using of_model = orbis::camera::parameters_of<std::remove_cvref_t<decltype(model)>>;
-    const auto values = of_model::get(model);
-    for (auto& p : parameters)
-      for (std::size_t i = 0; i != of_model::names.size(); ++i)
-        if (of_model::names[i] == p.name) p.before = values[static_cast<int>(i)];
-  });
-  for (const auto& p : parameters) console.print(line_of(p));
-  const auto depth_scale = find_depth_scale(*source, last->trajectory);
-  if (depth_scale) {
-    console.print(line_of(*depth_scale));
-    camera.depth_scale = depth_scale->after;
-  } else {
-    console.print("depth_scale: images alone do not tell; poses of known size (groundtruth.txt) would");
+  bool printed = console.print("parameter           given        found    deviation");
+  for (auto p : last->camera.parameters) {
+    p.before = value_of(given, p.name);  // the last round began with what the others had found
+    printed = console.print(line_of(p)) && printed;
   }
+  const auto depth_scale = find_depth_scale(*source, last->trajectory);
+  if (depth_scale) camera.depth_scale = depth_scale->after;
+  printed = console.print(depth_scale ? line_of(*depth_scale)
+                                      : "depth_scale: images alone do not tell; poses of known size (groundtruth.txt) "
+                                        "would") &&
+            printed;
   if (!last->camera.is_complete())
     console.warn("what was kept needs more motion: turn the camera about all axes, near and far from textured things");
-  if (s.out.empty()) return done;
-  if (s.read_out_ms || (shutter.from == "estimated" && !shutter.shutter.is_global())) camera.shutter = shutter.shutter;
-  if (const auto written = orbis::io::write_camera(s.out, camera); !written) return give_up(written.error());
-  console.print("camera       " + s.out.string());
+  if (s.read_out_ms) {
+    if (!camera.shutter) camera.shutter.emplace();
+    camera.shutter->color_read_out = camera.shutter->depth_read_out = shutter.shutter.color_read_out;
+  } else if (shutter.from == "estimated" && !shutter.shutter.is_global()) {
+    camera.shutter = shutter.shutter;
+  }
+  if (!s.out.empty()) {
+    if (const auto written = orbis::io::write_camera(s.out, camera); !written) return give_up(written.error());
+    printed = console.print("camera       " + s.out.string()) && printed;
+  }
+  if (!printed) return give_up({orbis::errc::write_failed, "standard output", "cannot be written"});
   return done;
 }
 

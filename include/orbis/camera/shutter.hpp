@@ -3,6 +3,8 @@
 /// When the rows of an RGB-D camera's images are taken.
 #pragma once
 
+#include <Eigen/Geometry>
+
 #include <orbis/core/types.hpp>
 
 namespace orbis::camera {

@@ -22,7 +22,7 @@ struct trajectory_scale {
 };
 
 /// The scale of the similarity that aligns `estimate` with `reference` best. Its deviation comes from leaving out one
-/// tenth of the time after the other (jackknife), as errors of poses that follow each other are alike. For a depth
+/// tenth of the poses after the other (jackknife), as errors of poses that follow each other are alike. For a depth
 /// camera whose depth is `stored / depth_scale`, the true depth scale is `depth_scale / scale`.
 /// Errors: as `align`. O(n log n).
 /// Source: B. Efron, "The jackknife, the bootstrap and other resampling plans", SIAM 1982.

@@ -48,7 +48,8 @@ struct self_calibrated {
 /// first image with observations is held.
 ///
 /// Observations with depth (`right`) fix the size of the world. A wrong scale of all depths changes nothing but that
-/// size, so that images alone do not tell of it. Points with fewer than two observations take no part.
+/// size, so that images alone do not tell of it. Points with fewer than two observations take no part, nor do images
+/// with fewer than ten, nor those that no common points join to the most; their poses stay.
 ///
 /// Errors, which leave `poses` and `points` as they were: `invalid_argument` for observations of images or points that
 /// there are not; `no_data` without an observation that can be used; `degenerate` if the motion of the camera does not
@@ -83,7 +84,6 @@ template <camera::parametric_camera Camera>
     return fail(errc::no_data, where, "no point is seen by two images: the camera has hardly moved");
   if (!problem.has_depth()) return fail(errc::degenerate, where, "no observation has depth");
   self_calibrated<Camera> found{start};
-  found.observations = problem.observations();
   const int total = options.robust_iterations + options.iterations;
   const auto go_on = [&] {
     return callback(static_cast<std::size_t>(found.iterations), static_cast<std::size_t>(total));
@@ -91,11 +91,14 @@ template <camera::parametric_camera Camera>
   for (const int limit : {options.robust_iterations, options.iterations}) {
     if (!problem.descend(limit, options.relative_tolerance, found.iterations, go_on))
       return fail(errc::cancelled, where, "cancelled");
-    found.outliers = problem.leave_out_outliers();
+    problem.leave_out_outliers();
+    if (!problem.has_depth()) return fail(errc::degenerate, where, "no observation with depth agrees with the others");
   }
   if (!problem.covariance(found.covariance))
     return fail(errc::degenerate, where, "the motion of the camera does not determine its parameters");
   found.camera = problem.camera();
+  found.observations = problem.observations();
+  found.outliers = problem.outliers();
   found.final_rms = problem.rms();
   found.initial_rms = problem.rms_of(start, poses, points);
   problem.write(poses, points);

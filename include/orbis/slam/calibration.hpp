@@ -45,7 +45,8 @@ struct calibration_options {
   /// of the world.
   double depth_weight = 0.0025;
   bool keeps_aspect = true;  ///< the ratio of the focal lengths is known: pixels are square, or as they are given
-  std::size_t max_keyframes = 300;  ///< spread evenly; the work grows with the third power of their number
+  /// Made one after the other, where most was seen; the work grows with the third power of their number.
+  std::size_t max_keyframes = 300;
 };
 
 /// What the map tells of a parameter.
@@ -61,7 +62,7 @@ template <calibrated_camera Camera>
 struct calibration {
   Camera camera;
   std::vector<calibrated_parameter>
-      parameters;                            ///< those that the model has; k3 to k6 of `radial_tangential`: if not 0
+      parameters;  ///< those that the model has; of `radial_tangential` k3 if it is not 0, k4 to k6 never
   std::size_t keyframes = 0, landmarks = 0;  ///< that took part
   std::size_t observations = 0, outliers = 0;
   double initial_rms = 0.0;  ///< of the observations that are no outliers, in standard deviations
@@ -80,16 +81,30 @@ struct calibration_problem {
   std::vector<optimize::bundle_observation> observations;
 };
 
+/// Where the stretch of `count` keyframes begins that observes most landmarks. O(keypoints).
+template <feature_descriptor D>
+[[nodiscard]] std::size_t first_to_take(const basic_map<D>& m, std::size_t count) {
+  std::vector<std::size_t> up_to{0};  // so many observations by the keyframes before
+  for (const auto& k : m.keyframes())
+    up_to.push_back(up_to.back() +
+                    static_cast<std::size_t>(k.landmarks.size() - static_cast<std::size_t>(std::count(
+                                                                      k.landmarks.begin(), k.landmarks.end(), no_id))));
+  std::size_t first = 0;
+  for (std::size_t i = 0; i + count < up_to.size(); ++i)
+    if (up_to[i + count] - up_to[i] > up_to[first + count] - up_to[first]) first = i;
+  return first;
+}
+
 template <feature_descriptor D, class Camera>
 [[nodiscard]] calibration_problem calibration_problem_of(const basic_map<D>& m, const camera_rig<Camera>& rig,
                                                          std::size_t max_keyframes) {
   calibration_problem p;
   std::vector<std::uint32_t> index(m.keyframe_end().value(), std::numeric_limits<std::uint32_t>::max());
-  const std::size_t all = m.keyframes().size(), most = std::max<std::size_t>(max_keyframes, 2);
+  const std::size_t first = first_to_take(m, max_keyframes);
   std::size_t number = 0;
   for (const auto& k : m.keyframes()) {
     const std::size_t i = number++;
-    if (all > most && i * most / all == (i + 1) * most / all) continue;
+    if (i < first || i - first >= max_keyframes) continue;
     index[k.id.value()] = static_cast<std::uint32_t>(p.poses.size());
     p.poses.push_back(k.T_world_camera);
   }
@@ -169,11 +184,15 @@ template <camera::parametric_camera Camera>
       return (free & group) != 0 &&
              (!tried || effect_of(tried->camera, tried->covariance, free & group) > options.max_effect);
     };
-    const auto held = std::find_if(groups.begin(), groups.end(), is_vague);
-    if (held == groups.end())
+    if (std::none_of(groups.begin(), groups.end(), is_vague)) {
       found = *std::move(tried);
-    else if (free &= ~*held; free == 0)
-      return fail(errc::degenerate, "calibration", "the motion of the camera does not determine its parameters");
+      break;
+    }
+    // Distortion must not make up for a focal length that is held: the groups are given up in their order.
+    free &= ~*std::find_if(groups.begin(), groups.end(), [&](std::uint32_t group) { return (free & group) != 0; });
+    if (free == 0)
+      return fail(errc::degenerate, "calibration",
+                  tried ? "the motion of the camera does not determine its parameters" : tried.error().message);
   }
   calibration<Camera> out{found->camera,        {},
                           problem.poses.size(), problem.points.size(),

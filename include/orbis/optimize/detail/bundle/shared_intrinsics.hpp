@@ -43,6 +43,12 @@ class shared_intrinsics {
     std::vector<vec3> points;
   };
   static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
+  /// Why an observation takes no part.
+  enum class out : std::uint8_t {
+    no,
+    outlier,  ///< it disagrees with the estimate
+    alone     ///< its image or its point is not determined, or not together with the others
+  };
 
  public:
   /// Points that fewer than two usable observations see are left out, and those seen from behind at the start.
@@ -59,12 +65,21 @@ class shared_intrinsics {
     }
     if (ties) basis_(1, 0) = parameters::get(start)[1] / parameters::get(start)[0];
     choose(observations);
-    number_images();
+    keep_what_holds_together();
   }
 
-  [[nodiscard]] std::size_t observations() const noexcept { return observations_.size(); }
+  /// Those that take part, and outliers.
+  [[nodiscard]] std::size_t observations() const noexcept {
+    return static_cast<std::size_t>(std::count_if(out_.begin(), out_.end(), [](out o) { return o != out::alone; }));
+  }
+  [[nodiscard]] std::size_t outliers() const noexcept {
+    return static_cast<std::size_t>(std::count(out_.begin(), out_.end(), out::outlier));
+  }
+  /// Whether anything holds the size of the world.
   [[nodiscard]] bool has_depth() const {
-    return std::any_of(observations_.begin(), observations_.end(), [](const auto& o) { return !std::isnan(o.right); });
+    for (std::size_t k = 0; k != observations_.size(); ++k)
+      if (out_[k] == out::no && !std::isnan(observations_[k].right)) return true;
+    return false;
   }
   [[nodiscard]] const Camera& camera() const noexcept { return now_.camera; }
   void write(std::span<se3> poses, std::span<vec3> points) const {
@@ -75,8 +90,9 @@ class shared_intrinsics {
   /// Steps until the cost falls no more; counts them. Returns false if `go_on()` did.
   template <class GoOn>
   [[nodiscard]] bool descend(int limit, double relative_tolerance, int& steps, const GoOn& go_on) {
+    set_noise();
     double cost = cost_of(now_), damping = 1e-4;
-    for (int taken = 0; taken != limit;) {
+    for (int taken = 0; taken < limit;) {
       if (!go_on()) return false;
       double gain = -1.0;
       for (; damping < 1e8; damping *= 10.0) {
@@ -95,17 +111,16 @@ class shared_intrinsics {
     return true;
   }
 
-  /// Observations that disagree with the estimate take no part any more, those that agree again do. Returns their
-  /// number.
-  std::size_t leave_out_outliers() {
-    std::size_t count = 0;
+  /// Observations that disagree with the estimate take no part any more, those that agree again do.
+  void leave_out_outliers() {
+    constexpr double gates[] = {13.816, 16.266};  // the chi-squared quantiles of 99.9 %, of two and three coordinates
+    set_noise();
     const std::vector<view_type> views = views_of(now_);
     for (std::size_t k = 0; k != observations_.size(); ++k) {
-      const double s = squared(views, now_.points, k);
-      is_out_[k] = s > chi_squared_gate(std::isnan(observations_[k].right) ? 2 : 3) ? 1 : 0;
-      count += is_out_[k];
+      const double gate = gates[std::isnan(observations_[k].right) ? 0 : 1] * noise_ * noise_;
+      out_[k] = squared(views, now_.points, k) > gate ? out::outlier : out::no;
     }
-    return count;
+    keep_what_holds_together();
   }
 
   /// Root mean square of the whitened residuals, an entry of them.
@@ -115,7 +130,7 @@ class shared_intrinsics {
     const std::vector<view_type> views = views_of(e);
     double sum = 0.0, entries = 0.0;
     for (std::size_t k = 0; k != observations_.size(); ++k) {
-      const double s = is_out_[k] != 0 ? std::numeric_limits<double>::infinity() : squared(views, e.points, k);
+      const double s = out_[k] != out::no ? std::numeric_limits<double>::infinity() : squared(views, e.points, k);
       if (!std::isfinite(s)) continue;
       sum += s;
       entries += std::isnan(observations_[k].right) ? 2.0 : 3.0;
@@ -168,12 +183,91 @@ class shared_intrinsics {
       for (const std::uint32_t k : seen_by) observations_.push_back(all[k]);
       begins_.push_back(observations_.size());
     }
-    is_out_.assign(observations_.size(), 0);
+    out_.assign(observations_.size(), out::no);
+  }
+  /// The standard deviation of the residuals, as their median tells it.
+  void set_noise() {
+    constexpr double medians[] = {1.386, 2.366};  // of chi-squared, of two and three coordinates
+    constexpr double least = 0.01;                // where there is no noise, rounding is none either
+    const std::vector<view_type> views = views_of(now_);
+    std::vector<double> shares;
+    for (std::size_t k = 0; k != observations_.size(); ++k)
+      if (out_[k] == out::no) {
+        const double s = squared(views, now_.points, k) / medians[std::isnan(observations_[k].right) ? 0 : 1];
+        if (std::isfinite(s)) shares.push_back(s);
+      }
+    if (shares.empty()) return;
+    const auto middle = shares.begin() + static_cast<std::ptrdiff_t>(shares.size() / 2);
+    std::nth_element(shares.begin(), middle, shares.end());
+    noise_ = std::max(least, std::sqrt(*middle));
+    loss_.width = 2.447 * noise_;
+  }
+
+  /// Sets aside images that too few observations hold, points that fewer than two do or that these do not determine,
+  /// and what does not hang together with the most.
+  void keep_what_holds_together() {
+    for (out& o : out_)
+      if (o == out::alone) o = out::no;
+    views_ = views_of(now_);
+    row_of_.assign(now_.poses.size(), none);
+    for (std::size_t p = 0; p + 1 < begins_.size(); ++p)
+      if (!eliminate(p, 0.0, false)) set_aside(p);
+    drop_weak();
+    const std::vector<std::uint32_t> part = parts();
+    std::vector<std::size_t> sizes(now_.poses.size(), 0);
+    for (std::size_t k = 0; k != out_.size(); ++k) sizes[part[observations_[k].pose]] += out_[k] == out::no;
+    const auto largest = static_cast<std::uint32_t>(std::max_element(sizes.begin(), sizes.end()) - sizes.begin());
+    for (std::size_t k = 0; k != out_.size(); ++k)
+      if (out_[k] == out::no && part[observations_[k].pose] != largest) out_[k] = out::alone;
+    number_images();
+  }
+  /// All of a point's observations.
+  void set_aside(std::size_t p) {
+    for (std::size_t k = begins_[p]; k != begins_[p + 1]; ++k)
+      if (out_[k] == out::no) out_[k] = out::alone;
+  }
+  void drop_weak() {
+    constexpr std::size_t least = 10;
+    for (bool changed = true; changed;) {
+      changed = false;
+      std::vector<std::size_t> seen(now_.poses.size(), 0);
+      for (std::size_t k = 0; k != out_.size(); ++k) seen[observations_[k].pose] += out_[k] == out::no;
+      for (std::size_t p = 0; p + 1 < begins_.size(); ++p) {
+        std::size_t held = 0;
+        for (std::size_t k = begins_[p]; k != begins_[p + 1]; ++k) {
+          if (out_[k] == out::no && seen[observations_[k].pose] < least) out_[k] = out::alone, changed = true;
+          held += out_[k] == out::no;
+        }
+        if (held == 1) set_aside(p), changed = true;
+      }
+    }
+  }
+  /// By image: the first of those that it hangs together with by points.
+  [[nodiscard]] std::vector<std::uint32_t> parts() const {
+    std::vector<std::uint32_t> first(now_.poses.size());
+    for (std::uint32_t i = 0; i != first.size(); ++i) first[i] = i;
+    const auto find = [&](std::uint32_t i) {
+      while (first[i] != i) i = first[i] = first[first[i]];
+      return i;
+    };
+    for (std::size_t p = 0; p + 1 < begins_.size(); ++p) {
+      std::uint32_t with = none;
+      for (std::size_t k = begins_[p]; k != begins_[p + 1]; ++k) {
+        if (out_[k] != out::no) continue;
+        const std::uint32_t of = find(observations_[k].pose);
+        if (with == none) with = of;
+        first[std::max(with, of)] = std::min(with, of);
+        with = std::min(with, of);
+      }
+    }
+    for (std::uint32_t i = 0; i != first.size(); ++i) first[i] = find(i);
+    return first;
   }
   void number_images() {
     row_of_.assign(now_.poses.size(), none);
     std::vector<std::uint8_t> has(now_.poses.size(), 0);
-    for (const bundle_observation& o : observations_) has[o.pose] = 1;
+    for (std::size_t k = 0; k != out_.size(); ++k)
+      if (out_[k] == out::no) has[observations_[k].pose] = 1;
     bool is_first = true;
     std::uint32_t rows = 0;
     for (std::size_t i = 0; i != has.size(); ++i) {
@@ -193,14 +287,15 @@ class shared_intrinsics {
   [[nodiscard]] double squared(const std::vector<view_type>& views, const std::vector<vec3>& points,
                                std::size_t k) const {
     const bundle_observation& o = observations_[k];
-    const auto r = residual_.residual(views[o.pose], points[o.point], o);
+    auto r = residual_.residual(views[o.pose], points[o.point], o);
+    if (r && !std::isnan(o.right)) (*r)[2] -= (*r)[0];  // the depth alone: bf times the inverse depths' difference
     return r ? o.information * r->squaredNorm() : std::numeric_limits<double>::infinity();
   }
   [[nodiscard]] double cost_of(const estimate& e) const {
     const std::vector<view_type> views = views_of(e);
     double sum = 0.0;
     for (std::size_t k = 0; k != observations_.size(); ++k)
-      if (is_out_[k] == 0) sum += loss_.cost(squared(views, e.points, k));
+      if (out_[k] == out::no) sum += loss_.cost(squared(views, e.points, k));
     return 0.5 * sum;
   }
 
@@ -231,14 +326,19 @@ class shared_intrinsics {
     point_.by.clear();
     rows_.clear();
     for (std::size_t k = begins_[p]; k != begins_[p + 1]; ++k) {
-      if (is_out_[k] != 0) continue;
+      if (out_[k] != out::no) continue;
       const bundle_observation& o = observations_[k];
       const view_type& view = views_[o.pose];
       const vec3 q = view.rotation * at + view.translation;
       mat3 by_q;
       matrix<3, parameters::count> by_all;
-      const auto r = residual_.linearize_in_camera(view, q, o, by_q, by_all);
+      auto r = residual_.linearize_in_camera(view, q, o, by_q, by_all);
       if (!r) continue;
+      if (!std::isnan(o.right)) {
+        (*r)[2] -= (*r)[0];
+        by_q.row(2) -= by_q.row(0).eval();
+        by_all.row(2) -= by_all.row(0).eval();
+      }
       const double weight = o.information * loss_.weight(o.information * r->squaredNorm());
       jacobians j{weight, {}, by_all * basis_};
       j.by_pose.template leftCols<3>() = -by_q;
@@ -338,12 +438,13 @@ class shared_intrinsics {
   };
 
   residual_type residual_;
-  huber loss_{2.447};  ///< the chi-squared gate of two coordinates
+  double noise_ = 1.0;  ///< standard deviation of the whitened residuals
+  huber loss_{2.447};   ///< the chi-squared gate of two coordinates, times the noise
   estimate now_;
   basis_type basis_;                              ///< how the parameters follow the unknowns, a column each
   std::vector<bundle_observation> observations_;  ///< by point
   std::vector<std::size_t> begins_;               ///< of each point's, and the end
-  std::vector<std::uint8_t> is_out_;              ///< by observation
+  std::vector<out> out_;                          ///< by observation
   std::vector<std::uint32_t> row_of_;             ///< by image: its first unknown; `none` if its pose is held
   Eigen::Index pose_rows_ = 0;
 
