@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
 /// Two-view geometry: essential matrix and homography of two images from matched pixels, many of which may be wrong,
-/// and the relative poses that they stand for.
+/// the relative poses that they stand for, and the reconstruction of a scene from two images, or why there is none.
 ///
 /// Sources: D. Nister, PAMI 26(6), 2004, for five points and the choice among four decompositions; P. Sampson, "Fitting
 /// conic sections to very scattered data", CGIP 18 (1982), for the error; R. Hartley, A. Zisserman, "Multiple View
@@ -10,6 +10,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -136,8 +137,82 @@ struct plane_motion {
 [[nodiscard]] result<std::vector<plane_motion>> decompose_homography(const mat3& homography,
                                                                      const vec3& ray = vec3::UnitZ());
 
+struct two_view_options {
+  double deviation = 1.0;            ///< standard deviation of a matched pixel, along each axis, pixels
+  std::size_t min_points = 50;       ///< that a reconstruction must have
+  double min_parallax = 0.0175;      ///< median angle between the rays of its points, at least, radians
+  double max_rotation = 0.006;       ///< largest standard deviation of its rotation, radians ...
+  double max_direction = 0.05;       ///< ... and of the direction of its translation, radians
+  double max_depth = 0.3;            ///< largest standard deviation of a point's depth, relative to the depth
+  double confidence = 0.999;         ///< of RANSAC
+  std::size_t max_iterations = 300;  ///< of RANSAC, for either model
+  std::uint64_t seed = 1;
+};
+
+/// A scene and the motion between two images of it. The unit of length is the median depth of `points`.
+struct two_view_reconstruction {
+  se3 T_first_second;                  ///< the second camera in the first
+  std::vector<vec3> points;            ///< in the first camera; their median z is 1
+  std::vector<std::uint32_t> matches;  ///< which match each point belongs to, ascending
+  std::size_t inliers = 0;             ///< matches that agree with the motion; far ones among them give no point
+  double parallax = 0.0;               ///< median angle between the rays of a point, radians
+  double rmse = 0.0;                   ///< of the inliers' distances from their epipolar lines, pixels
+  double rotation_deviation = 0.0;     ///< standard deviation of the rotation, radians ...
+  double direction_deviation = 0.0;    ///< ... and of the direction of the translation, radians
+  bool from_homography = false;        ///< whether a homography described the images better than epipolar geometry
+};
+
+namespace detail {
+
+/// What `reconstruct_two_views` does with the usable matches of `n`.
+[[nodiscard]] result<two_view_reconstruction> reconstruction_of_matches(const std::vector<image_match>& matches,
+                                                                        std::size_t n, const two_view_options& options);
+
+}  // namespace detail
+
+/// The scene and the motion that matched pixels show, or why they do not show it. `first_pixels[i]` matches
+/// `second_pixels[i]`; many may be wrong. `deviations`: how much more or less exact than `options.deviation` each match
+/// is, as a factor (the scale of a keypoint's level); empty: all are alike. Made to be asked again with the next image:
+/// an answer is to be relied on, where there could be two there is none.
+/// Deterministic by `options.seed`. Errors: `invalid_argument` for spans of different length or options out of range;
+/// `no_data` if fewer matches than `min_points` can be used; `degenerate` where the motion is not determined: by
+/// rotation alone, too little parallax, two motions that explain the matches about as well (as those of a plane do),
+/// too few points or too large deviations. The message says which.
+template <camera::camera_model First, camera::camera_model Second>
+[[nodiscard]] result<two_view_reconstruction> reconstruct_two_views(
+    std::span<const vec2> first_pixels, std::span<const vec2> second_pixels, const First& first_camera,
+    const Second& second_camera, const two_view_options& options = {}, std::span<const double> deviations = {}) {
+  constexpr const char* where = "two views";
+  const std::size_t n = first_pixels.size();
+  if (n != second_pixels.size() || (!deviations.empty() && n != deviations.size()))
+    return fail(errc::invalid_argument, where, "the lists of pixels differ in length");
+  if (!(options.deviation > 0.0) || !std::isfinite(options.deviation))
+    return fail(errc::invalid_argument, where, "the deviation must be positive and finite");
+  if (!(options.confidence > 0.0 && options.confidence < 1.0))
+    return fail(errc::invalid_argument, where, "the confidence must lie between 0 and 1");
+  std::vector<detail::image_match> matches =
+      detail::read_matches(first_pixels, second_pixels, first_camera, second_camera, options.seed);
+  for (detail::image_match& m : matches) {
+    const double deviation = options.deviation * (deviations.empty() ? 1.0 : deviations[m.original]);
+    m.first.scale_metric(1.0 / deviation);
+    m.second.scale_metric(1.0 / deviation);
+  }
+  return detail::reconstruction_of_matches(matches, n, options);
+}
+
+/// As above, for two images of one camera.
+template <camera::camera_model Camera>
+[[nodiscard]] result<two_view_reconstruction> reconstruct_two_views(std::span<const vec2> first_pixels,
+                                                                    std::span<const vec2> second_pixels,
+                                                                    const Camera& camera,
+                                                                    const two_view_options& options = {},
+                                                                    std::span<const double> deviations = {}) {
+  return reconstruct_two_views(first_pixels, second_pixels, camera, camera, options, deviations);
+}
+
 }  // namespace orbis::optimize
 
 #ifndef ORBIS_COMPILED
 #include <orbis/optimize/detail/compiled/two_view_functions.hpp>
+#include <orbis/optimize/detail/compiled/two_view_reconstruction_functions.hpp>
 #endif

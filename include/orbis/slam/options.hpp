@@ -68,6 +68,18 @@ struct recovery_options {
   std::size_t min_map_keyframes = 3;  ///< a map with fewer keyframes is then removed, with the frames tracked in it
 };
 
+/// How the map of one camera without depth begins.
+struct start_options {
+  double radius = 100.0;           ///< of the search for a keypoint around its last place, pixels
+  std::uint32_t distance = 50;     ///< of descriptors, at most
+  float ratio = 0.9F;              ///< of the distance to that of the second best match, at most
+  std::size_t min_features = 100;  ///< of a frame that may be the first
+  std::size_t min_matches = 100;   ///< with the first frame, below which the present one takes its place
+  double deviation = 1.0;          ///< of a keypoint, pixels of its level
+  std::size_t min_points = 50;     ///< that a map begins with
+  double min_parallax = 0.0175;    ///< median angle between the rays of these, at least, radians
+};
+
 /// Triangulation of keypoints without landmark.
 struct triangulation_options {
   std::size_t neighbors = 10;    ///< keyframes around the new one that are searched
@@ -198,6 +210,7 @@ struct options {
   adjustment_options adjustment{};
   culling_options culling{};
   recovery_options recovery{};
+  start_options start{};
   depth_term_options depth_term{};
   place_options places{};
   triangulation_options triangulation{};

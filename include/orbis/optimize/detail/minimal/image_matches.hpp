@@ -23,6 +23,12 @@ struct metric_ray {
   double x = 0.0, y = 0.0;
   double xx = 1.0, xy = 0.0, yy = 1.0;
   [[nodiscard]] vec3 direction() const { return {x, y, 1.0}; }
+  /// Changes the unit of distances.
+  void scale_metric(double factor) {
+    xx *= factor;
+    xy *= factor;
+    yy *= factor;
+  }
 };
 
 /// False if the camera cannot unproject the pixel.
