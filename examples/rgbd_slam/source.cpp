@@ -126,7 +126,8 @@ result<frame_source> open_recording(const settings& s) {
     if (e.code == orbis::errc::invalid_argument && s.camera.empty()) e.message += " with --camera";
     if (e.code == orbis::errc::unsupported && s.sensor == "auto" && s.format == "auto")
       if (const auto stereo = orbis::io::open_stereo_recording(s.input); !stereo)
-        if (stereo.error().message != e.message) e.message += "; and " + stereo.error().message;
+        if (stereo.error().message != e.message)  // what there is in the folder is said once
+          e.message = e.message.substr(0, e.message.rfind("; the folder ")) + "; and " + stereo.error().message;
     return fail(std::move(e));
   }
 

@@ -12,10 +12,11 @@
 /// | `presets.hpp, settings.hpp` | the cameras of the usual recordings; what `camera.toml` says |
 /// | `depth.hpp, rgbd_frame.hpp` | depth images; a colour image with its depth image |
 /// | `rays.hpp, world_point.hpp, cloud.hpp` | rays of pixels; points of pixels in the world; points of a depth image |
-/// | `shutter.hpp, shutter_correction.hpp` | when the rows of the images are taken; images as if all were taken at once
-/// | | `undistort.hpp` | images without distortion | | `stereo.hpp, stereo_frame.hpp` | two cameras side by side, and
-/// their rectification; their two images | | `project_lanes.hpp` | eight points at a time, for adjustments; to be
-/// included by itself |
+/// | `shutter.hpp, shutter_correction.hpp` | when the rows of the images are taken; images as if that were at once |
+/// | `undistort.hpp` | images without distortion |
+/// | `stereo.hpp, stereo_frame.hpp` | two cameras side by side and their rectification; their two images |
+/// | `mono_frame.hpp` | the image of a single camera |
+/// | `project_lanes.hpp` | eight points at a time, for adjustments; to be included by itself |
 #pragma once
 
 #include <orbis/camera/any.hpp>
@@ -24,6 +25,7 @@
 #include <orbis/camera/intrinsics.hpp>
 #include <orbis/camera/kannala_brandt.hpp>
 #include <orbis/camera/model.hpp>
+#include <orbis/camera/mono_frame.hpp>
 #include <orbis/camera/parameters.hpp>
 #include <orbis/camera/pinhole.hpp>
 #include <orbis/camera/presets.hpp>

@@ -6,6 +6,7 @@
 /// | --------------------- | -------------------------------------------------------------------------------- |
 /// | `recording.hpp`       | RGB-D recordings in the layouts of TUM RGB-D, 7-Scenes and ICL-NUIM              |
 /// | `stereo_recording.hpp` | stereo recordings in the layouts of KITTI odometry and ASL (EuRoC), or of two folders |
+/// | `mono_recording.hpp`  | recordings of one camera: in the layouts above, or plain folders of images       |
 /// | `synthetic.hpp`       | a recording rendered on the fly, whose poses and surfaces are known exactly      |
 /// | `synthetic_options.hpp` | its room, its camera's path and its sensor's errors                            |
 /// | `camera_file.hpp`     | `camera.toml`: model, size, intrinsics, distortion, depth scale                  |
@@ -26,6 +27,7 @@
 #include <orbis/io/g2o_graph.hpp>
 #include <orbis/io/image.hpp>
 #include <orbis/io/jpeg.hpp>
+#include <orbis/io/mono_recording.hpp>
 #include <orbis/io/pcd.hpp>
 #include <orbis/io/ply.hpp>
 #include <orbis/io/png.hpp>

@@ -177,6 +177,26 @@ class recording {
   return recording_format::automatic;
 }
 
+namespace detail {
+
+/// The index of the recording in `folder`, and its format in place of `automatic`. Errors: as `open_recording`.
+[[nodiscard]] inline result<recording_index> index_recording(const std::filesystem::path& folder,
+                                                             recording_format& format, double max_time_difference) {
+  if (format == recording_format::automatic) format = detect_format(folder);
+  switch (format) {
+    case recording_format::tum: return index_tum(folder, max_time_difference);
+    case recording_format::seven_scenes: return index_seven_scenes(folder);
+    case recording_format::icl_nuim: return index_icl_nuim(folder);
+    case recording_format::automatic: break;
+  }
+  return fail(unknown_recording(
+      folder,
+      "no known recording: neither rgb.txt and depth.txt (TUM), nor frame-*.color.png (7-Scenes), nor "
+      "numbered images in rgb and depth (ICL-NUIM)"));
+}
+
+}  // namespace detail
+
 /// Opens the recording in `folder`: reads its lists, poses and camera, not yet its images.
 ///
 /// The camera is the option's; else that of `camera.toml` in the folder; else what the format's own
@@ -190,20 +210,8 @@ class recording {
   if (!std::filesystem::is_directory(folder, ignored))
     return fail(errc::unsupported, folder.string(), "a recording is a folder, this is a file");
 
-  const recording_format format =
-      options.format == recording_format::automatic ? detect_format(folder) : options.format;
-  const auto read_index = [&]() -> result<detail::recording_index> {
-    switch (format) {
-      case recording_format::tum: return detail::index_tum(folder, options.max_time_difference);
-      case recording_format::seven_scenes: return detail::index_seven_scenes(folder);
-      case recording_format::icl_nuim: return detail::index_icl_nuim(folder);
-      case recording_format::automatic: break;
-    }
-    return fail(errc::unsupported, folder.string(),
-                "no known recording: neither rgb.txt and depth.txt (TUM), nor frame-*.color.png (7-Scenes), nor "
-                "numbered images in rgb and depth (ICL-NUIM)");
-  };
-  auto index = read_index();
+  recording_format format = options.format;
+  auto index = detail::index_recording(folder, format, options.max_time_difference);
   if (!index) return fail(index.error());
 
   std::optional<camera::camera_settings> camera = options.camera;

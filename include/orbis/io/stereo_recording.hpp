@@ -156,10 +156,10 @@ class stereo_recording {
       case stereo_format::pairs: return detail::index_image_pairs(folder, options.max_time_difference, options.camera);
       case stereo_format::automatic: break;
     }
-    return fail(
-        errc::unsupported, folder.string(),
-        "no known stereo recording: neither image_0, image_1 and calib.txt (KITTI), nor mav0/cam0 and mav0/cam1 "
-        "(ASL, EuRoC), nor left.txt and right.txt or images in left and right");
+    return fail(detail::unknown_recording(
+        folder,
+        "no known stereo recording: neither image_0, image_1 and calib.txt (KITTI), nor mav0/cam0 and "
+        "mav0/cam1 (ASL, EuRoC), nor left.txt and right.txt or images in left and right"));
   };
   auto index = read_index();
   if (!index) return fail(index.error());

@@ -149,8 +149,51 @@ struct asl_camera {
   return {};
 }
 
-/// Whether `folder` looks like a recording in the ASL layout.
-[[nodiscard]] inline bool is_asl(const std::filesystem::path& folder) { return !asl_root(folder).empty(); }
+/// Whether `folder` looks like a recording in the ASL layout with two cameras.
+[[nodiscard]] inline bool is_asl(const std::filesystem::path& folder) {
+  const auto root = asl_root(folder);
+  return !root.empty() && present(root / "cam1");
+}
+
+/// A camera and its images.
+struct asl_images {
+  asl_camera camera;
+  std::vector<stamped_file> files;
+};
+
+/// What a camera's folder says: its `sensor.yaml` and `data.csv`, which are added to the files of `to`. Errors:
+/// not_found (a file), unreadable, no_data, malformed (with file and line), unsupported.
+[[nodiscard]] inline result<asl_images> read_asl_images(const std::filesystem::path& where, recording_index& to) {
+  const auto settings = read_file(where / "sensor.yaml", plain_yaml::max_bytes), list = read_file(where / "data.csv");
+  if (!settings) return fail(settings.error());
+  if (!list) return fail(list.error());
+  auto camera = parse_asl_camera(*settings, where / "sensor.yaml");
+  if (!camera) return fail(camera.error());
+  auto files = parse_asl_list(*list, where / "data.csv", where / "data", to.notes);
+  if (!files) return fail(files.error());
+  to.files.insert(to.files.end(), {where / "sensor.yaml", where / "data.csv"});
+  return asl_images{*std::move(camera), *std::move(files)};
+}
+
+/// Reads the ground truth beside the cameras' folders, if there is one, as poses of a camera, and gives the frames of
+/// `index` theirs. Errors: unreadable, malformed (with file and line).
+[[nodiscard]] inline result<void> read_asl_truth(const std::filesystem::path& root, const se3& T_body_camera,
+                                                 recording_index& index) {
+  for (const char* const name : {"state_groundtruth_estimate0", "mocap0"}) {
+    const auto file = root / name / "data.csv";
+    if (!present(file)) continue;
+    const auto text = read_file(file);
+    if (!text) return fail(text.error());
+    auto truth = parse_asl_poses(*text, file);
+    if (!truth) return fail(truth.error());
+    index.ground_truth = *std::move(truth);
+    for (stamped_pose& p : index.ground_truth) p.T_world_camera = p.T_world_camera * T_body_camera;
+    index.files.push_back(file);
+    attach_ground_truth(index, 0.02);
+    break;
+  }
+  return {};
+}
 
 /// The index of a recording in the ASL layout. Images are paired within `max_time_difference` seconds; what finds no
 /// partner is noted. Errors: not_found (a file), unreadable, no_data, malformed (with file and line), unsupported.
@@ -159,39 +202,16 @@ struct asl_camera {
   if (root.empty())
     return fail(errc::not_found, (folder / "mav0" / "cam0").string(), "no such folder with sensor.yaml");
   stereo_index index;
-  recording_index& images = index.images;
-  asl_camera cameras[2];
-  std::vector<stamped_file> lists[2];
-  for (const int i : {0, 1}) {
-    const auto where = root / ("cam" + std::to_string(i));
-    const auto settings = read_file(where / "sensor.yaml", plain_yaml::max_bytes), list = read_file(where / "data.csv");
-    if (!settings) return fail(settings.error());
-    if (!list) return fail(list.error());
-    auto camera = parse_asl_camera(*settings, where / "sensor.yaml");
-    if (!camera) return fail(camera.error());
-    auto files = parse_asl_list(*list, where / "data.csv", where / "data", images.notes);
-    if (!files) return fail(files.error());
-    cameras[i] = *std::move(camera);
-    lists[i] = *std::move(files);
-    images.files.insert(images.files.end(), {where / "sensor.yaml", where / "data.csv"});
-  }
-  if (auto paired = pair_images(lists[0], lists[1], folder, max_time_difference, images); !paired)
+  const auto left = read_asl_images(root / "cam0", index.images);
+  if (!left) return fail(left.error());
+  const auto right = read_asl_images(root / "cam1", index.images);
+  if (!right) return fail(right.error());
+  if (auto paired = pair_images(left->files, right->files, folder, max_time_difference, index.images); !paired)
     return fail(paired.error());
-  index.cameras = {cameras[0].model, cameras[1].model, cameras[0].T_body_camera.inverse() * cameras[1].T_body_camera};
-  index.fps = cameras[0].rate;
-  for (const char* const name : {"state_groundtruth_estimate0", "mocap0"}) {
-    const auto file = root / name / "data.csv";
-    if (!present(file)) continue;
-    const auto text = read_file(file);
-    if (!text) return fail(text.error());
-    auto truth = parse_asl_poses(*text, file);
-    if (!truth) return fail(truth.error());
-    images.ground_truth = *std::move(truth);
-    for (stamped_pose& p : images.ground_truth) p.T_world_camera = p.T_world_camera * cameras[0].T_body_camera;
-    images.files.push_back(file);
-    attach_ground_truth(images, 0.02);
-    break;
-  }
+  index.cameras = {left->camera.model, right->camera.model,
+                   left->camera.T_body_camera.inverse() * right->camera.T_body_camera};
+  index.fps = left->camera.rate;
+  if (auto truth = read_asl_truth(root, left->camera.T_body_camera, index.images); !truth) return fail(truth.error());
   return index;
 }
 

@@ -28,14 +28,6 @@
 
 namespace orbis::io::detail {
 
-/// The first of these that is in `folder`; empty if there is none.
-[[nodiscard]] inline std::filesystem::path first_present(const std::filesystem::path& folder,
-                                                         std::initializer_list<const char*> names) {
-  for (const char* const name : names)
-    if (present(folder / name)) return folder / name;
-  return {};
-}
-
 /// Whether `folder` looks like one of stereo images.
 [[nodiscard]] inline bool is_image_pairs(const std::filesystem::path& folder) {
   const bool lists = present(folder / "right.txt") && !first_present(folder, {"left.txt", "rgb.txt"}).empty();

@@ -44,30 +44,37 @@ struct kitti_calibration {
   double fx = 0.0, fy = 0.0, cx = 0.0, cy = 0.0, baseline = 0.0;
 };
 
+/// The projection matrix `P<camera>:` in the text of `calib.txt`, by rows. Errors: malformed (it is missing, is none,
+/// or has a focal length that is not above zero).
+[[nodiscard]] inline result<std::array<double, 12>> parse_kitti_projection(std::string_view text, int camera,
+                                                                           const std::filesystem::path& where) {
+  const std::string wanted = "P" + std::to_string(camera);
+  std::optional<std::array<double, 12>> found;
+  std::size_t bad_line = 0;
+  for_each_line(text, [&](std::string_view line, std::size_t number) {
+    if (next_field(line) != wanted + ":") return true;
+    found = numbers_of<12>(line);
+    if (!found) bad_line = number;
+    return found.has_value();
+  });
+  if (bad_line != 0) return fail(errc::malformed, at_line(where, bad_line), "a projection matrix has 12 numbers");
+  if (!found) return fail(errc::malformed, where.string(), wanted + " is missing");
+  const auto& p = *found;
+  if (!(p[0] > 0.0 && p[5] > 0.0 && p[0] < 1e9 && p[5] < 1e9 && std::abs(p[2]) < 1e9 && std::abs(p[6]) < 1e9))
+    return fail(errc::malformed, where.string(), "a focal length must be above zero");
+  return p;
+}
+
 /// The text of `calib.txt`: projection matrices `P<number>:` of 12 numbers. Errors: malformed (a matrix is missing or
 /// is none, or the cameras do not stand side by side).
 [[nodiscard]] inline result<kitti_calibration> parse_kitti_calibration(std::string_view text, int left, int right,
                                                                        const std::filesystem::path& where) {
-  std::optional<std::array<double, 12>> found[2];
-  std::size_t bad_line = 0;
-  for_each_line(text, [&](std::string_view line, std::size_t number) {
-    const std::string_view name = next_field(line);
-    for (const int i : {0, 1}) {
-      if (name != "P" + std::to_string(i == 0 ? left : right) + ":") continue;
-      found[i] = numbers_of<12>(line);
-      if (!found[i]) bad_line = number;
-    }
-    return bad_line == 0;
-  });
-  if (bad_line != 0) return fail(errc::malformed, at_line(where, bad_line), "a projection matrix has 12 numbers");
-  for (const int i : {0, 1})
-    if (!found[i])
-      return fail(errc::malformed, where.string(), "P" + std::to_string(i == 0 ? left : right) + " is missing");
-  const auto &l = *found[0], &r = *found[1];
-  const kitti_calibration k{l[0], l[5], l[2], l[6], (l[3] - r[3]) / l[0]};
-  const auto differs = [&](std::size_t i) { return std::abs(l[i] - r[i]) > 1e-6 * std::abs(l[0]); };
-  if (!(k.fx > 0.0 && k.fy > 0.0 && k.fx < 1e9 && k.fy < 1e9 && std::abs(k.cx) < 1e9 && std::abs(k.cy) < 1e9))
-    return fail(errc::malformed, where.string(), "a focal length must be above zero");
+  const auto l = parse_kitti_projection(text, left, where), r = parse_kitti_projection(text, right, where);
+  if (!l) return fail(l.error());
+  if (!r) return fail(r.error());
+  const auto& p = *l;
+  const kitti_calibration k{p[0], p[5], p[2], p[6], (p[3] - (*r)[3]) / p[0]};
+  const auto differs = [&](std::size_t i) { return std::abs(p[i] - (*r)[i]) > 1e-6 * std::abs(p[0]); };
   if (differs(0) || differs(2) || differs(5) || differs(6) || !(k.baseline > 0.0 && k.baseline < 1e6))
     return fail(errc::malformed, where.string(), "the two cameras are not a rectified pair, the left one first");
   return k;
@@ -106,6 +113,45 @@ struct kitti_calibration {
   return poses;
 }
 
+/// The poses of a sequence, of its camera 0: `poses.txt` in its folder, or the benchmark's file in `../../poses`; empty
+/// if there are none. Adds the file to those of `index`, and a note if there are not as many as `times`. Errors:
+/// unreadable, malformed (with the line).
+[[nodiscard]] inline result<std::vector<se3>> read_kitti_poses(const std::filesystem::path& folder, std::size_t times,
+                                                               recording_index& index) {
+  const auto name = std::filesystem::absolute(folder / "").lexically_normal().parent_path().filename().string();
+  for (const auto& file : {folder / "poses.txt", folder / ".." / ".." / "poses" / (name + ".txt")}) {
+    if (!present(file)) continue;
+    const auto text = read_file(file);
+    if (!text) return fail(text.error());
+    auto poses = parse_kitti_poses(*text, file);
+    if (!poses) return fail(poses.error());
+    index.files.push_back(file);
+    if (poses->size() != times)
+      index.notes.push_back(file.string() + ": " + std::to_string(poses->size()) + " poses for " +
+                            std::to_string(times) + " times");
+    return poses;
+  }
+  return std::vector<se3>{};
+}
+
+/// Adds frame number `n` with its time and its pose, where there is one.
+inline void add_kitti_frame(std::size_t n, const std::vector<double>& times, const std::vector<se3>& poses,
+                            const std::filesystem::path& color, const std::filesystem::path& depth,
+                            recording_index& index) {
+  index.frames.push_back({times[n], color, depth, {}});
+  if (n >= poses.size()) return;
+  index.frames.back().T_world_camera = poses[n];
+  index.ground_truth.push_back({times[n], poses[n]});
+}
+
+/// Brings the frames of a sequence into the order of time. Errors: as `check_first_frame`.
+[[nodiscard]] inline result<void> sort_kitti_frames(const std::filesystem::path& folder, recording_index& index) {
+  const auto earlier = [](const auto& a, const auto& b) { return a.timestamp < b.timestamp; };
+  std::sort(index.frames.begin(), index.frames.end(), earlier);
+  std::sort(index.ground_truth.begin(), index.ground_truth.end(), earlier);
+  return check_first_frame(index, folder);
+}
+
 /// The folders of the left and right images, and the numbers of these cameras; grey ones first. Empty if there are
 /// none.
 [[nodiscard]] inline std::optional<std::pair<int, int>> kitti_cameras(const std::filesystem::path& folder) {
@@ -140,21 +186,8 @@ struct kitti_calibration {
   const auto times = parse_kitti_times(*times_text, images.files[1]);
   if (!times) return fail(times.error());
 
-  std::vector<se3> poses;
-  const auto name = std::filesystem::absolute(folder / "").lexically_normal().parent_path().filename().string();
-  for (const auto& file : {folder / "poses.txt", folder / ".." / ".." / "poses" / (name + ".txt")}) {
-    if (!present(file)) continue;
-    const auto text = read_file(file);
-    if (!text) return fail(text.error());
-    auto read = parse_kitti_poses(*text, file);
-    if (!read) return fail(read.error());
-    poses = *std::move(read);
-    images.files.push_back(file);
-    break;
-  }
-  if (!poses.empty() && poses.size() != times->size())
-    images.notes.push_back(images.files.back().string() + ": " + std::to_string(poses.size()) + " poses for " +
-                           std::to_string(times->size()) + " times");
+  const auto poses = read_kitti_poses(folder, times->size(), images);
+  if (!poses) return fail(poses.error());
 
   std::size_t lonely = 0;
   for (const auto& image : list_folder(left)) {
@@ -164,18 +197,11 @@ struct kitti_calibration {
       ++lonely;
       continue;
     }
-    images.frames.push_back({(*times)[n], image, right / image.filename(), {}});
-    if (n < poses.size()) {
-      images.frames.back().T_world_camera = poses[n];
-      images.ground_truth.push_back({(*times)[n], poses[n]});
-    }
+    add_kitti_frame(n, *times, *poses, image, right / image.filename(), images);
   }
   if (lonely != 0)
     images.notes.push_back(std::to_string(lonely) + " left images have no right image or no time and are left out");
-  const auto earlier = [](const auto& a, const auto& b) { return a.timestamp < b.timestamp; };
-  std::sort(images.frames.begin(), images.frames.end(), earlier);
-  std::sort(images.ground_truth.begin(), images.ground_truth.end(), earlier);
-  if (const auto ok = check_first_frame(images, folder); !ok) return fail(ok.error());
+  if (const auto ok = sort_kitti_frames(folder, images); !ok) return fail(ok.error());
   const auto first = read_color(images.frames.front().color);
   if (!first) return fail(first.error());
   const camera::pinhole camera{first->width(), first->height(), k->fx, k->fy, k->cx, k->cy};

@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cstddef>
 #include <filesystem>
+#include <initializer_list>
+#include <map>
 #include <optional>
 #include <string>
 #include <system_error>
@@ -17,11 +19,11 @@
 
 namespace orbis::io::detail {
 
-/// One frame: two files and what is known about their moment.
+/// One frame: its files and what is known about their moment.
 struct recording_entry {
   double timestamp = 0.0;  ///< of the colour image, seconds
   std::filesystem::path color;
-  std::filesystem::path depth;
+  std::filesystem::path depth;        ///< empty where there is one camera only
   std::optional<se3> T_world_camera;  ///< ground truth, where there is one
 };
 
@@ -53,7 +55,7 @@ inline result<void> check_first_frame(const recording_index& index, const std::f
   if (index.frames.empty()) return fail(errc::no_data, where.string(), "there is not one frame in this recording");
   for (const std::filesystem::path& path : {index.frames.front().color, index.frames.front().depth}) {
     std::error_code ignored;
-    if (!std::filesystem::exists(path, ignored))
+    if (!path.empty() && !std::filesystem::exists(path, ignored))
       return fail(errc::not_found, path.string(), "the first image of the recording does not exist");
   }
   return {};
@@ -73,6 +75,46 @@ inline result<void> check_first_frame(const recording_index& index, const std::f
 [[nodiscard]] inline bool present(const std::filesystem::path& path) {
   std::error_code ignored;
   return std::filesystem::exists(path, ignored);
+}
+
+/// The first of these that is in `folder`; empty if there is none.
+[[nodiscard]] inline std::filesystem::path first_present(const std::filesystem::path& folder,
+                                                         std::initializer_list<const char*> names) {
+  for (const char* const name : names)
+    if (present(folder / name)) return folder / name;
+  return {};
+}
+
+/// What is in a folder, for a message: "holds calib.txt, 120 .png files, left/". At most eight items, each a folder, a
+/// file, or all files with one ending.
+[[nodiscard]] inline std::string describe_content(const std::filesystem::path& folder) {
+  constexpr std::size_t most = 8;
+  std::vector<std::string> items;
+  std::map<std::string, std::vector<std::string>> by_ending;
+  for (const auto& path : list_folder(folder)) {
+    std::error_code ignored;
+    if (std::filesystem::is_directory(path, ignored))
+      items.push_back(path.filename().string() + "/");
+    else
+      by_ending[path.extension().string()].push_back(path.filename().string());
+  }
+  for (const auto& [ending, names] : by_ending) {
+    if (names.size() <= 3)
+      items.insert(items.end(), names.begin(), names.end());
+    else
+      items.push_back(std::to_string(names.size()) +
+                      (ending.empty() ? " files without an ending" : " " + ending + " files"));
+  }
+  if (items.empty()) return "is empty";
+  std::string text = "holds ";
+  for (std::size_t i = 0; i != std::min(items.size(), most); ++i) text += (i == 0 ? "" : ", ") + items[i];
+  if (items.size() > most) text += " and " + std::to_string(items.size() - most) + " more";
+  return text;
+}
+
+/// That a folder is no recording: what was looked for, and what there is instead.
+[[nodiscard]] inline error unknown_recording(const std::filesystem::path& folder, const std::string& looked_for) {
+  return {errc::unsupported, folder.string(), looked_for + "; the folder " + describe_content(folder)};
 }
 
 }  // namespace orbis::io::detail

@@ -11,6 +11,7 @@
 #include <cmath>
 #include <cstddef>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -161,6 +162,22 @@ class skipped_lines {
   return present(folder / "rgb.txt") || present(folder / "depth.txt") || present(folder / "associations.txt");
 }
 
+/// The camera of a TUM recording with freiburg1, 2 or 3 in its path, or none. Of several such words the last one tells:
+/// the sequence may lie in another one's folder.
+[[nodiscard]] inline std::optional<camera::camera_settings> tum_camera(const std::filesystem::path& folder) {
+  std::optional<camera::camera_settings> found;
+  const std::string name = std::filesystem::absolute(folder).lexically_normal().string();
+  std::size_t last = 0;
+  for (const auto& [word, preset] :
+       {std::pair{"freiburg1", "tum_fr1"}, std::pair{"freiburg2", "tum_fr2"}, std::pair{"freiburg3", "tum_fr3"}}) {
+    const std::size_t at = name.rfind(word);
+    if (at == std::string::npos || at < last) continue;
+    last = at;
+    if (auto camera = camera::preset(preset)) found = *std::move(camera);
+  }
+  return found;
+}
+
 /// The index of a TUM recording. `associations.txt` decides where it is present; otherwise colour and
 /// depth images are paired by `associate` within `max_time_difference` seconds, and what finds no
 /// partner is noted. The ground truth is interpolated at the colour images' time stamps. The camera
@@ -203,16 +220,7 @@ class skipped_lines {
 
   if (const auto truth = read_ground_truth(folder, max_time_difference, index); !truth) return fail(truth.error());
 
-  // Of several words in the path the last one tells: the sequence may lie in another one's folder.
-  const std::string name = std::filesystem::absolute(folder).lexically_normal().string();
-  std::size_t last = 0;
-  for (const auto& [word, preset] :
-       {std::pair{"freiburg1", "tum_fr1"}, std::pair{"freiburg2", "tum_fr2"}, std::pair{"freiburg3", "tum_fr3"}}) {
-    const std::size_t at = name.rfind(word);
-    if (at == std::string::npos || at < last) continue;
-    last = at;
-    if (auto camera = camera::preset(preset)) index.camera = *std::move(camera);
-  }
+  index.camera = tum_camera(folder);
   return index;
 }
 

@@ -1,0 +1,246 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Recordings of one camera: the colour images of the TUM, KITTI and ASL layouts, and plain folders of images.
+#pragma once
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include <orbis/camera/pinhole.hpp>
+#include <orbis/camera/settings.hpp>
+#include <orbis/core/file.hpp>
+#include <orbis/core/result.hpp>
+#include <orbis/core/se3.hpp>
+#include <orbis/io/detail/recordings/asl.hpp>
+#include <orbis/io/detail/recordings/kitti.hpp>
+#include <orbis/io/detail/recordings/recording_index.hpp>
+#include <orbis/io/detail/recordings/tum.hpp>
+#include <orbis/io/detail/text.hpp>
+#include <orbis/io/image.hpp>
+
+namespace orbis::io::detail {
+
+/// How far a pose may be from an image, seconds, where the poses stand in a file of their own.
+inline constexpr double mono_pose_distance = 0.020;
+
+// --- lists as TUM has them ----------------------------------------------------------------------
+
+/// The list of a camera's images; empty if there is none.
+[[nodiscard]] inline std::filesystem::path image_list_of(const std::filesystem::path& folder) {
+  return first_present(folder, {"rgb.txt", "left.txt"});
+}
+
+/// The index of the images that `rgb.txt` or `left.txt` names. Errors: not_found, unreadable, no_data, malformed
+/// (ground truth, with its line).
+[[nodiscard]] inline result<recording_index> index_image_list(const std::filesystem::path& folder) {
+  recording_index index;
+  auto list = image_list_of(folder);
+  if (list.empty()) list = folder / "rgb.txt";  // an error that names it
+  const auto files = read_image_list(list, index.notes);
+  if (!files) return fail(files.error());
+  index.files.push_back(list);
+  for (const stamped_file& f : *files) index.frames.push_back({f.timestamp, f.path, {}, {}});
+  if (const auto ok = check_first_frame(index, folder); !ok) return fail(ok.error());
+  if (const auto truth = read_ground_truth(folder, mono_pose_distance, index); !truth) return fail(truth.error());
+  index.camera = tum_camera(folder);
+  return index;
+}
+
+// --- ASL (EuRoC) --------------------------------------------------------------------------------
+
+/// The folder with `sensor.yaml` and `data.csv`: `folder` itself, or `cam0` of a recording; empty if there is none.
+[[nodiscard]] inline std::filesystem::path asl_camera_folder(const std::filesystem::path& folder) {
+  if (present(folder / "sensor.yaml") && present(folder / "data.csv") && present(folder / "data")) return folder;
+  const auto root = asl_root(folder);
+  return root.empty() ? root : root / "cam0";
+}
+
+/// The index of one camera of a recording in the ASL layout. Errors: as `index_asl`.
+[[nodiscard]] inline result<recording_index> index_asl_camera(const std::filesystem::path& folder) {
+  auto where = asl_camera_folder(folder);
+  if (where.empty()) where = folder / "mav0" / "cam0";
+  recording_index index;
+  const auto images = read_asl_images(where, index);
+  if (!images) return fail(images.error());
+  for (const stamped_file& f : images->files) index.frames.push_back({f.timestamp, f.path, {}, {}});
+  if (const auto ok = check_first_frame(index, where); !ok) return fail(ok.error());
+  const auto root = std::filesystem::absolute(where / "").lexically_normal().parent_path().parent_path();
+  if (auto truth = read_asl_truth(root, images->camera.T_body_camera, index); !truth) return fail(truth.error());
+  index.camera = camera::camera_settings{.model = images->camera.model, .fps = images->camera.rate};
+  return index;
+}
+
+// --- KITTI --------------------------------------------------------------------------------------
+
+/// The number of the camera whose images a sequence of KITTI has: left ones first, grey ones first.
+[[nodiscard]] inline std::optional<int> kitti_camera(const std::filesystem::path& folder) {
+  for (const int i : {0, 2, 1, 3})
+    if (present(folder / ("image_" + std::to_string(i)))) return i;
+  return std::nullopt;
+}
+
+/// Whether `folder` looks like a sequence of KITTI odometry with at least one camera.
+[[nodiscard]] inline bool is_kitti_camera(const std::filesystem::path& folder) {
+  return kitti_camera(folder) && present(folder / "calib.txt");
+}
+
+/// The index of one camera of a sequence. The poses are those of this camera: the file's are of camera 0. Errors: as
+/// `index_kitti`.
+[[nodiscard]] inline result<recording_index> index_kitti_camera(const std::filesystem::path& folder) {
+  const auto camera = kitti_camera(folder);
+  if (!camera) return fail(errc::not_found, folder.string(), "has no folder image_0, image_1, image_2 or image_3");
+  recording_index index;
+  index.files = {folder / "calib.txt", folder / "times.txt"};
+  const auto calibration_text = read_file(index.files[0]), times_text = read_file(index.files[1]);
+  if (!calibration_text) return fail(calibration_text.error());
+  if (!times_text) return fail(times_text.error());
+  const auto projection = parse_kitti_projection(*calibration_text, *camera, index.files[0]);
+  if (!projection) return fail(projection.error());
+  const auto& p = *projection;
+  const auto times = parse_kitti_times(*times_text, index.files[1]);
+  if (!times) return fail(times.error());
+  auto poses = read_kitti_poses(folder, times->size(), index);
+  if (!poses) return fail(poses.error());
+  // P = K [I t]: where camera 0's origin is in this camera's frame.
+  const vec3 t{(p[3] - p[2] * p[11]) / p[0], (p[7] - p[6] * p[11]) / p[5], p[11]};
+  for (se3& pose : *poses) pose = pose * se3{so3{}, -t};
+
+  std::size_t lonely = 0;
+  for (const auto& image : list_folder(folder / ("image_" + std::to_string(*camera)))) {
+    std::size_t n = 0;
+    if (!parse_number(image.stem().string(), n)) continue;
+    if (n < times->size())
+      add_kitti_frame(n, *times, *poses, image, {}, index);
+    else
+      ++lonely;
+  }
+  if (lonely != 0) index.notes.push_back(std::to_string(lonely) + " images have no time and are left out");
+  if (const auto ok = sort_kitti_frames(folder, index); !ok) return fail(ok.error());
+  const auto first = read_color(index.frames.front().color);
+  if (!first) return fail(first.error());
+  index.camera = camera::camera_settings{
+      .model = camera::pinhole{first->width(), first->height(), p[0], p[5], p[2], p[6]}, .fps = 10.0};
+  return index;
+}
+
+// --- plain folders ------------------------------------------------------------------------------
+
+/// Whether a file's name ends as an image's that we read.
+[[nodiscard]] inline bool is_image_name(const std::filesystem::path& path) {
+  std::string ending = path.extension().string();
+  for (char& c : ending) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return ending == ".png" || ending == ".jpg" || ending == ".jpeg";
+}
+
+/// The images directly in `folder`, by name.
+[[nodiscard]] inline std::vector<std::filesystem::path> images_in(const std::filesystem::path& folder) {
+  auto paths = list_folder(folder);
+  std::erase_if(paths, [](const auto& path) { return !is_image_name(path); });
+  return paths;
+}
+
+/// Where a plain folder has its images: itself, or one of the usual names in it; empty if there are none.
+[[nodiscard]] inline std::filesystem::path image_folder_of(const std::filesystem::path& folder) {
+  if (!images_in(folder).empty()) return folder;
+  for (const char* const name : {"rgb", "color", "images", "left", "data"})
+    if (!images_in(folder / name).empty()) return folder / name;
+  return {};
+}
+
+/// What the names of images say about their times: `1305031102.1753.png` is a time in seconds,
+/// `1403636579763555584.png` one in nanoseconds (as long a number is no other), and `frame_000123.png` frame 123. Where
+/// names say nothing in common, their order is that of the images, which `in_order` tells.
+struct times_of_names {
+  std::vector<double> times;  ///< seconds, of each name
+  bool in_order = false;
+};
+[[nodiscard]] inline times_of_names times_from_names(const std::vector<std::filesystem::path>& names, double fps) {
+  constexpr std::size_t shortest_nanoseconds = 16;  // 1970 and 11 days
+  times_of_names found;
+  const auto all = [&](const auto& time_of) {
+    found.times.clear();
+    for (const auto& name : names) {
+      const std::optional<double> t = time_of(name.stem().string());
+      if (!t) return false;
+      found.times.push_back(*t);
+    }
+    return true;
+  };
+  const auto seconds = [](const std::string& stem) -> std::optional<double> {
+    double t = 0.0;
+    const bool is_time =
+        stem.find('.') != std::string::npos && stem.find_first_not_of("0123456789.") == std::string::npos;
+    return is_time && parse_number(stem, t) ? std::optional{t} : std::nullopt;
+  };
+  const auto nanoseconds = [](const std::string& stem) -> std::optional<double> {
+    std::int64_t t = 0;
+    if (stem.size() < shortest_nanoseconds || !parse_number(stem, t) || t < 0) return std::nullopt;
+    return 1e-9 * static_cast<double>(t);
+  };
+  std::optional<std::string> prefix;
+  const auto numbers = [&](const std::string& stem) -> std::optional<double> {
+    const std::string whole = stem.ends_with(".color") ? stem.substr(0, stem.size() - 6) : stem;
+    const std::size_t digits = whole.find_last_not_of("0123456789") + 1;
+    std::uint32_t number = 0;
+    if (!parse_number(std::string_view{whole}.substr(digits), number)) return std::nullopt;
+    if (!prefix) prefix = whole.substr(0, digits);
+    return *prefix == whole.substr(0, digits) ? std::optional{number / fps} : std::nullopt;
+  };
+  if (all(seconds) || all(nanoseconds) || all(numbers)) return found;
+  found.in_order = true;
+  found.times.clear();
+  for (std::size_t i = 0; i != names.size(); ++i) found.times.push_back(static_cast<double>(i) / fps);
+  return found;
+}
+
+/// The index of a plain folder of images, PNG or JPEG, in it or in `rgb`, `color`, `images`, `left` or `data`. Their
+/// times are those of `times.txt` (seconds, one a line, for the images in the order of their names) or of their names;
+/// see `times_from_names`. `fps`: of images that are numbered. Errors: no_data, unreadable, malformed (with file and
+/// line).
+[[nodiscard]] inline result<recording_index> index_image_folder(const std::filesystem::path& folder, double fps) {
+  recording_index index;
+  const auto where = image_folder_of(folder);
+  if (where.empty())
+    return fail(
+        errc::no_data, folder.string(),
+        "there are no images in it, nor in rgb, color, images, left or data; the folder " + describe_content(folder));
+  const auto names = images_in(where);
+  std::vector<stamped_file> files;
+  if (const auto file = folder / "times.txt"; present(file)) {
+    const auto text = read_file(file);
+    if (!text) return fail(text.error());
+    const auto times = parse_kitti_times(*text, file);
+    if (!times) return fail(times.error());
+    if (times->size() != names.size())
+      index.notes.push_back(file.string() + ": " + std::to_string(times->size()) + " times for " +
+                            std::to_string(names.size()) + " images");
+    for (std::size_t i = 0; i != std::min(names.size(), times->size()); ++i) files.push_back({(*times)[i], names[i]});
+    index.files.push_back(file);
+  } else {
+    const times_of_names found = times_from_names(names, fps);
+    for (std::size_t i = 0; i != names.size(); ++i) files.push_back({found.times[i], names[i]});
+    // Numbers without leading zeros are not in the order of their names.
+    std::stable_sort(files.begin(), files.end(),
+                     [](const auto& a, const auto& b) { return a.timestamp < b.timestamp; });
+    if (found.in_order)
+      index.notes.push_back(where.string() +
+                            ": the names of the images are no numbers and no times, they are taken in "
+                            "alphabetical order");
+  }
+  auto ordered = in_order_of_time(where, std::move(files), index.notes);
+  if (!ordered) return fail(ordered.error());
+  for (const stamped_file& f : *ordered) index.frames.push_back({f.timestamp, f.path, {}, {}});
+  if (const auto truth = read_ground_truth(folder, mono_pose_distance, index); !truth) return fail(truth.error());
+  return index;
+}
+
+}  // namespace orbis::io::detail
