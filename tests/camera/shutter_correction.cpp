@@ -16,6 +16,7 @@
 #include <orbis/core/se3.hpp>
 #include <orbis/core/simd.hpp>
 
+#include "support/allocations.hpp"
 #include "support/catch.hpp"
 
 using namespace orbis;
@@ -195,6 +196,54 @@ TEST_CASE("Stored depths and metres are corrected alike") {
   REQUIRE(correct.depth(rolling, swing(), camera::depth_view{stored, 5000.0}, units.view()));
   REQUIRE(correct.depth(rolling, swing(), camera::depth_view{metres}, depth.view()));
   CHECK(units == in_units(depth, 5000.0));
+}
+
+TEST_CASE("Depth has the unit that it is stored in") {
+  using correction = camera::shutter_correction<camera::pinhole>;
+  const auto takes = []<class Depth, class T>(const Depth&, image_view<T>) {
+    return requires(correction c, Depth depth, image_view<T> out) { c.depth(rolling, swing(), depth, out); };
+  };
+  const image_view<float> metres;
+  const image_view<std::uint16_t> units;
+  CHECK(takes(camera::depth_view<float>{}, metres));
+  CHECK(takes(camera::depth_view<std::uint16_t>{}, units));
+  CHECK_FALSE(takes(camera::depth_view<std::uint16_t>{}, metres));
+  CHECK_FALSE(takes(camera::depth_view<float>{}, units));
+}
+
+TEST_CASE("Depths too small to have an inverse are no depths") {
+  const camera::pinhole camera = small_camera();
+  images read = render(camera, rolling, swing());
+  images without{read.depth, {}};
+  for (int y = 20; y != 130; ++y)
+    for (int x = 30 + y % 3; x < 170; x += 5) read.depth(x, y) = 1e-39F, without.depth(x, y) = 0.0F;
+  camera::shutter_correction correct{camera};
+  image<float> depth(200, 150), expected(200, 150);
+  REQUIRE(correct.depth(rolling, swing(), camera::depth_view{read.depth}, depth.view()));
+  REQUIRE(correct.depth(rolling, swing(), camera::depth_view{without.depth}, expected.view()));
+  CHECK(depth == expected);
+  image<rgb8> color(200, 150), expected_color(200, 150);
+  REQUIRE(correct.color(rolling, swing(), camera::depth_view{read.depth}, read.color.view(), color.view()));
+  REQUIRE(correct.color(rolling, swing(), camera::depth_view{without.depth}, read.color.view(), expected_color.view()));
+  CHECK(color == expected_color);
+}
+
+TEST_CASE("A second image is corrected without an allocation") {
+  const camera::pinhole camera = small_camera();
+  const images read = render(camera, rolling, swing());
+  camera::shutter_correction correct{camera};
+  image<float> depth(200, 150);
+  image<rgb8> color(200, 150);
+  const auto both = [&](const vec6& twist) {
+    return correct.depth(rolling, twist, camera::depth_view{read.depth}, depth.view()) &&
+           correct.color(rolling, twist, camera::depth_view{depth}, read.color.view(), color.view());
+  };
+  REQUIRE(both(swing()));
+  const vec6 other = -0.5 * swing();
+  const std::size_t before = test::allocations();
+  const bool corrected = both(other);
+  CHECK(test::allocations() == before);
+  CHECK(corrected);
 }
 
 TEST_CASE("Every instruction set corrects alike") {

@@ -27,6 +27,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -41,6 +42,22 @@
 #include <orbis/core/types.hpp>
 
 namespace orbis::camera {
+
+namespace detail {
+
+/// What a depth image stores, if it is one in place; otherwise float metres.
+template <class Depth>
+struct stored_depth : std::type_identity<float> {};
+template <class T>
+struct stored_depth<depth_view<T>> : std::type_identity<T> {};
+
+/// 0 where there is no depth; nor is there one that has no inverse.
+[[nodiscard]] inline float inverse_depth_of(float metres) noexcept {
+  const float inverse = metres > 0.0F ? 1.0F / metres : 0.0F;
+  return inverse <= std::numeric_limits<float>::max() ? inverse : 0.0F;
+}
+
+}  // namespace detail
 
 /// Corrects the images of one camera. Keeps its working memory: for one camera nothing is allocated after the first
 /// image. For one thread at a time.
@@ -65,12 +82,12 @@ class shutter_correction {
 
   /// The depth image of a global shutter at the frame's time. Where nothing was measured, or what was measured is not
   /// seen from there, `out` is 0. `T` is what `depth` stores if it is a `depth_view` (`out` then has its scale),
-  /// otherwise float metres. Without a motion, or if all its rows are of the frame's time, `out` has the same values.
-  /// Errors: `invalid_argument` for a twist that is not finite, or turns the camera by more than 0.3 radians from the
-  /// frame's time to that of a row; `out` is not touched then. O(pixels).
+  /// otherwise `float` (metres). Without a motion, or if all its rows are of the frame's time, `out` has the same
+  /// values. Errors: `invalid_argument` for a twist that is not finite, or turns the camera by more than 0.3 radians
+  /// from the frame's time to that of a row; `out` is not touched then. O(pixels).
   /// @pre the images have the size of the camera and do not overlap
   template <depth_source Depth, class T>
-  requires std::same_as<T, float> || std::same_as<T, std::uint16_t>
+  requires std::same_as<T, typename detail::stored_depth<Depth>::type>
   [[nodiscard]] result<void> depth(const shutter& s, const vec6& twist, const Depth& depth, image_view<T> out);
 
   /// The colour image that belongs to a corrected depth image: of each pixel the colour that was read where its point
@@ -137,13 +154,13 @@ void shutter_correction<Camera>::move_depths(const Depth& depth) {
   for (int y = 0; y != height; ++y) {
     for (int x = 0; x != width; ++x) metres_[static_cast<std::size_t>(x)] = depth(x, y);
     for (std::size_t x = 0; x != static_cast<std::size_t>(width); ++x)
-      surface_[x] = metres_[x] > 0.0F ? 1.0F / metres_[x] : 0.0F;
+      surface_[x] = detail::inverse_depth_of(metres_[x]);
     std::copy_n(surface_.begin(), width, &inverse_(1, y + 1));
     to_frame_.evaluate(camera_, y, surface_, warped_);
     pixels_of({index_.size(), width, height, width, warped_.x.data(), warped_.y.data(), index_.data()});
     for (std::size_t x = 0; x != static_cast<std::size_t>(width); ++x) {
       const float moved = metres_[x] * warped_.ratio[x];
-      if (index_[x] < 0 || !(moved > 0.0F)) continue;
+      if (index_[x] < 0 || !(moved > 0.0F) || surface_[x] == 0.0F) continue;
       float& nearest = nearest_.data()[index_[x]];
       nearest = std::min(nearest, moved);
     }
@@ -153,10 +170,11 @@ void shutter_correction<Camera>::move_depths(const Depth& depth) {
 template <camera_model Camera>
 void shutter_correction<Camera>::find_surfaces(int y) {
   const auto row = std::as_const(nearest_).row(y);
-  for (std::size_t x = 0; x != row.size(); ++x) surface_[x] = row[x] < no_depth ? 1.0F / row[x] : 0.0F;
+  for (std::size_t x = 0; x != row.size(); ++x)
+    surface_[x] = row[x] < no_depth ? detail::inverse_depth_of(row[x]) : 0.0F;
   const auto between = [](float a, float b) {
     const bool is_one = a < no_depth && b < no_depth && std::abs(a - b) <= detail::same_surface * std::min(a, b);
-    return is_one ? 2.0F / (a + b) : 0.0F;
+    return is_one ? detail::inverse_depth_of(0.5F * (a + b)) : 0.0F;
   };
   const bool has_both = y > 0 && y + 1 < nearest_.height();
   for (std::size_t x = 0; x != row.size(); ++x) {
@@ -169,18 +187,19 @@ void shutter_correction<Camera>::find_surfaces(int y) {
 
 template <camera_model Camera>
 template <depth_source Depth, class T>
-requires std::same_as<T, float> || std::same_as<T, std::uint16_t> result<void> shutter_correction<Camera>::depth(
+requires std::same_as<T, typename detail::stored_depth<Depth>::type> result<void> shutter_correction<Camera>::depth(
     const shutter& s, const vec6& twist, const Depth& depth, image_view<T> out) {
   assert(has_size(depth) && has_size(out));
   const int width = camera_.width(), height = camera_.height();
+  constexpr bool is_view = std::same_as<Depth, depth_view<T>>;
   double scale = 1.0;
-  if constexpr (requires { depth.scale(); }) scale = depth.scale();
+  if constexpr (is_view) scale = depth.scale();
   const auto time = detail::row_time::of_depth(s, height);
   if (auto usable = check(time, twist); !usable) return usable;
   if (time.is_zero() || !is_needed(s, twist)) {
     for (int y = 0; y != height; ++y)
       for (int x = 0; x != width; ++x) {
-        if constexpr (requires { requires std::same_as<decltype(depth.pixels()), image_view<const T>>; })
+        if constexpr (is_view)
           out(x, y) = depth.pixels()(x, y);
         else
           out(x, y) = stored<T>(depth(x, y), scale);
@@ -221,7 +240,7 @@ result<void> shutter_correction<Camera>::color(const shutter& s, const vec6& twi
   for (int y = 0; y != height; ++y) {
     for (int x = 0; x != width; ++x) metres_[static_cast<std::size_t>(x)] = corrected(x, y);
     for (std::size_t x = 0; x != static_cast<std::size_t>(width); ++x)
-      surface_[x] = metres_[x] > 0.0F ? 1.0F / metres_[x] : 0.0F;
+      surface_[x] = detail::inverse_depth_of(metres_[x]);
     to_row_.evaluate(camera_, y, surface_, warped_);
     pixels_of({index_.size(), width, height, stride, warped_.x.data(), warped_.y.data(), index_.data()});
     const auto row = out.row(y);
