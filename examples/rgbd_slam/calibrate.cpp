@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -23,6 +24,7 @@
 #include "commands.hpp"
 #include "output.hpp"
 #include "shutter_stage.hpp"
+#include "slam_options.hpp"
 #include "source.hpp"
 
 namespace app {
@@ -42,8 +44,7 @@ struct refined {
 /// Tracks all frames with `model` and refines it by the map, the largest one if tracking was lost in between.
 orbis::result<refined> refine(const any_camera& model, const frame_source& source, const settings& s,
                               const orbis::camera::shutter& shutter, console& console) {
-  orbis::slam::options options;
-  if (source.camera.baseline) options.bf = orbis::slam::depth_camera_bf(model.k().fx, *source.camera.baseline);
+  orbis::slam::options options = slam_options(model, source.camera.baseline);
   options.shutter = shutter;
   orbis::slam::rgbd_system<any_camera> slam{model, options};
   read_ahead frames{source, s.threads != 1};
@@ -70,28 +71,38 @@ bool is_settled(const calibration& c, double deviations) {
   });
 }
 
-/// A parameter of a camera by its name.
-double value_of(const any_camera& camera, std::string_view name) {
-  return camera.visit([&](const auto& model) {
+/// The parameters of a camera by their names.
+using parameter_table = std::map<std::string_view, double>;
+
+parameter_table table_of(const any_camera& camera) {
+  return camera.visit([](const auto& model) {
     using of_model = orbis::camera::parameters_of<std::remove_cvref_t<decltype(model)>>;
-    const auto at = std::find(of_model::names.begin(), of_model::names.end(), name) - of_model::names.begin();
-    return static_cast<double>(of_model::get(model)[static_cast<int>(at)]);
+    const auto values = of_model::get(model);
+    parameter_table table;
+    for (int i = 0; i != of_model::count; ++i) table[of_model::names[static_cast<std::size_t>(i)]] = values[i];
+    return table;
+  });
+}
+
+/// `camera` with the parameters that stand in a table; as it is if there is no such camera.
+any_camera with_parameters(const any_camera& camera, const parameter_table& table) {
+  return camera.visit([&](const auto& model) -> any_camera {
+    using of_model = orbis::camera::parameters_of<std::remove_cvref_t<decltype(model)>>;
+    auto values = of_model::get(model);
+    for (int i = 0; i != of_model::count; ++i)
+      if (const auto at = table.find(of_model::names[static_cast<std::size_t>(i)]); at != table.end())
+        values[i] = at->second;
+    const auto changed = of_model::with(model, values);
+    return changed ? any_camera{*changed} : camera;
   });
 }
 
 /// The camera that was found, where what was held has the values that were given, not those of an earlier round.
-any_camera with_what_was_given(calibration& found, const any_camera& given) {
-  return found.camera.visit([&](const auto& model) -> any_camera {
-    using of_model = orbis::camera::parameters_of<std::remove_cvref_t<decltype(model)>>;
-    auto values = of_model::get(model);
-    for (auto& p : found.parameters) {
-      if (!p.is_held) continue;
-      const auto at = std::find(of_model::names.begin(), of_model::names.end(), p.name) - of_model::names.begin();
-      p.after = values[static_cast<int>(at)] = value_of(given, p.name);
-    }
-    const auto changed = of_model::with(model, values);
-    return changed ? any_camera{*changed} : found.camera;
-  });
+any_camera with_what_was_given(calibration& found, const parameter_table& given) {
+  parameter_table held;
+  for (auto& p : found.parameters)
+    if (p.is_held) p.after = held[p.name] = given.at(p.name);
+  return with_parameters(found.camera, held);
 }
 
 /// The depth scale by the poses of the recording; empty if they do not tell.
@@ -121,13 +132,12 @@ std::string line_of(const orbis::slam::calibrated_parameter& p) {
   return text;
 }
 
-std::optional<orbis::error> find_overwritten(const settings& s, const frame_source& source) {
+std::optional<orbis::error> find_trouble(const settings& s, const frame_source& source) {
   std::error_code ignored;
   if (s.out.empty()) return std::nullopt;
-  for (const auto& file : source.files)  // but for its camera file, which may be replaced
-    if (std::filesystem::equivalent(file, s.out, ignored) && file.extension() != ".toml")
-      return orbis::error{orbis::errc::invalid_argument, s.out.string(),
-                          "is part of the recording, and would be written over"};
+  std::vector<std::filesystem::path> kept = source.files;  // but for its camera file, which may be replaced
+  std::erase_if(kept, [](const std::filesystem::path& file) { return file.extension() == ".toml"; });
+  if (auto lost = find_overwritten({s.out}, kept)) return lost;
   if (s.out.has_parent_path() && !std::filesystem::is_directory(s.out.parent_path(), ignored))
     return orbis::error{orbis::errc::invalid_argument, s.out.string(), "would be in a folder that there is not"};
   if (std::filesystem::is_directory(s.out, ignored))
@@ -149,12 +159,12 @@ exit_code calibrate(const settings& s, console& console) {
   if (source->is_stereo)
     return console.error({orbis::errc::unsupported, s.input.string(), "only recordings with depth can be calibrated"}),
            bad_input;
-  if (const auto lost = find_overwritten(s, *source)) return console.error(*lost), bad_usage;
+  if (const auto trouble = find_trouble(s, *source)) return console.error(*trouble), bad_usage;
 
   orbis::camera::camera_settings camera = source->camera;
   if (const auto* const plain = camera.model.get_if<orbis::camera::pinhole>(); plain && s.distortion)
     camera.model = orbis::camera::radial_tangential{plain->k(), {}};
-  const any_camera given = camera.model;
+  const parameter_table given = table_of(camera.model);
   const shutter_results shutter = find_shutter(*source, s, console);
   std::optional<refined> last;
   for (int round = 1; round <= most_rounds && !(last && is_settled(last->camera, 1.0)); ++round) {
@@ -174,7 +184,7 @@ exit_code calibrate(const settings& s, console& console) {
 
   bool printed = console.print("parameter           given        found    deviation");
   for (auto p : last->camera.parameters) {
-    p.before = value_of(given, p.name);  // the last round began with what the others had found
+    p.before = given.at(p.name);  // the last round began with what the others had found
     printed = console.print(line_of(p)) && printed;
   }
   const auto depth_scale = find_depth_scale(*source, last->trajectory);

@@ -26,6 +26,7 @@
 #include "commands.hpp"
 #include "navigation.hpp"
 #include "navigation_picture.hpp"
+#include "result_files.hpp"
 
 namespace app {
 namespace {
@@ -58,20 +59,15 @@ orbis::result<void> write_path(const std::filesystem::path& path, const std::vec
 }
 
 /// What would be written over, if anything: the map, or one result by the other.
-std::optional<orbis::error> find_overwritten(const settings& s) {
+std::optional<orbis::error> find_conflict(const settings& s) {
   const auto are_one = [](const std::filesystem::path& a, const std::filesystem::path& b) {
     std::error_code ignored;
     return std::filesystem::equivalent(a, b, ignored) ||
            std::filesystem::absolute(a).lexically_normal() == std::filesystem::absolute(b).lexically_normal();
   };
-  const auto complain = [](const std::filesystem::path& path, const char* what) {
-    return orbis::error{orbis::errc::invalid_argument, path.string(), what};
-  };
-  for (const auto& path : {s.out, s.picture})
-    if (!path.empty() && are_one(path, s.input)) return complain(path, "is the map, and would be written over");
   if (!s.out.empty() && !s.picture.empty() && are_one(s.out, s.picture))
-    return complain(s.out, "would be both the path and the picture");
-  return std::nullopt;
+    return orbis::error{orbis::errc::invalid_argument, s.out.string(), "would be both the path and the picture"};
+  return find_overwritten({s.out, s.picture}, {s.input});
 }
 
 /// Around all that is known and the ends of the way: a search for what cannot be reached ends there.
@@ -102,7 +98,7 @@ bool is_only_unknown(const octree& map, const settings& s, const orbis::vec3& p)
 
 exit_code plan(const settings& s, console& console) {
   const auto give_up = [&](const orbis::error& e) { return console.error(e), bad_input; };
-  if (const auto lost = find_overwritten(s)) return console.error(*lost), bad_usage;
+  if (const auto lost = find_conflict(s)) return console.error(*lost), bad_usage;
   console.stage("reading");
   const auto map = read_map(s.input);
   if (!map) return give_up(map.error());

@@ -105,42 +105,41 @@ std::vector<fs::path> inputs_of(const settings& s, std::vector<fs::path> source_
   return inputs;
 }
 
-std::optional<orbis::error> find_overwritten(const settings& s, const std::vector<fs::path>& inputs) {
-  std::vector<std::pair<identity, fs::path>> targets;
-  const auto add = [&](const fs::path& path) {
-    if (const auto id = identity_of(path)) targets.emplace_back(*id, path);
-  };
-  for (const std::string& name : result_names(s)) add(s.out / name);
-  if (!s.floor_map.empty()) {
-    add(s.floor_map);
-    add(fs::path{s.floor_map}.replace_extension(".pgm"));
-  }
-  const std::size_t results = targets.size();
-  if (!s.save_map.empty()) add(s.save_map);
-  if (targets.empty()) return std::nullopt;
-
-  const auto complain = [](const fs::path& path, const std::string& what) {
-    return orbis::error{orbis::errc::invalid_argument, path.string(), what};
-  };
-  const auto find = [&](const fs::path& input, std::size_t count) -> std::optional<orbis::error> {
+std::optional<orbis::error> find_overwritten(const std::vector<fs::path>& targets,
+                                             const std::vector<fs::path>& inputs) {
+  std::vector<std::pair<identity, fs::path>> there;
+  for (const fs::path& target : targets)
+    if (const auto id = identity_of(target)) there.emplace_back(*id, target);
+  if (there.empty()) return std::nullopt;
+  for (const fs::path& input : inputs) {
     const auto id = identity_of(input);
-    for (std::size_t i = 0; id && i != count; ++i)
-      if (targets[i].first == *id)
-        return complain(targets[i].second, "is an input of this run (" + input.string() +
-                                               ") and would be written over: give another place for the results");
-    return std::nullopt;
-  };
-  for (const fs::path& input : inputs)
-    if (auto found = find(input, targets.size())) return found;
+    for (const auto& [of_target, target] : there)
+      if (id == of_target)
+        return orbis::error{orbis::errc::invalid_argument, target.string(),
+                            "is an input of this run (" + input.string() +
+                                ") and would be written over: give another place for the results"};
+  }
+  return std::nullopt;
+}
+
+std::optional<orbis::error> find_overwritten(const settings& s, const std::vector<fs::path>& inputs) {
+  std::vector<fs::path> targets;
+  for (const std::string& name : result_names(s)) targets.push_back(s.out / name);
+  if (!s.floor_map.empty()) {
+    targets.push_back(s.floor_map);
+    targets.push_back(fs::path{s.floor_map}.replace_extension(".pgm"));
+  }
   // A map of landmarks may be written over the one that it has grown from, if that is what was asked for.
-  if (auto found = find(s.load_map, results)) return found;
+  if (auto found = find_overwritten(targets, {s.load_map})) return found;
+  targets.push_back(s.save_map);
+  if (auto found = find_overwritten(targets, inputs)) return found;
 
   const file_names ours = recorded(s.out);
   for (const std::string& name : result_names(s))
     if (is_there(s.out / name) && !is_among(name, ours))
-      return complain(s.out / name,
-                      "is there already, and no summary.json beside it says that rgbd_slam made it: it is not "
-                      "replaced; move it, or give another --out");
+      return orbis::error{orbis::errc::invalid_argument, (s.out / name).string(),
+                          "is there already, and no summary.json beside it says that rgbd_slam made it: it is not "
+                          "replaced; move it, or give another --out"};
   return std::nullopt;
 }
 

@@ -34,6 +34,10 @@ inline constexpr std::size_t most_maps = 9;
 /// Every file that the run reads; `source_files`: those of the recording.
 [[nodiscard]] std::vector<std::filesystem::path> inputs_of(const settings& s,
                                                            std::vector<std::filesystem::path> source_files);
+/// Whether one of the files `targets` is one of `inputs`, compared as files, so that links do not matter. Nothing if
+/// not. Names may be empty.
+[[nodiscard]] std::optional<orbis::error> find_overwritten(const std::vector<std::filesystem::path>& targets,
+                                                           const std::vector<std::filesystem::path>& inputs);
 /// Whether the run would write over a file that is not its to replace: one of `inputs` (compared as files, so that
 /// links do not matter), or one that was not made by this program. Nothing if not. Cost: a look at each input's entry
 /// in its folder, where there is anything that might be replaced.

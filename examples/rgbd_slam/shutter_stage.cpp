@@ -9,6 +9,7 @@
 #include <orbis/slam/rgbd_system.hpp>
 
 #include "interrupts.hpp"
+#include "slam_options.hpp"
 
 namespace app {
 namespace {
@@ -41,9 +42,7 @@ shutter_results find_shutter(const frame_source& source, const settings& s, cons
   }
   result.from = "estimated";
   console.stage("shutter");
-  orbis::slam::options options;
-  if (source.camera.baseline)
-    options.bf = orbis::slam::depth_camera_bf(source.camera.model.k().fx, *source.camera.baseline);
+  orbis::slam::options options = slam_options(source.camera.model, source.camera.baseline);
   options.estimates_shutter = true;
   orbis::slam::rgbd_system<decltype(orbis::camera::camera_settings::model)> slam{source.camera.model, options};
   read_ahead frames{source, s.threads != 1};

@@ -14,6 +14,7 @@
 #include "interrupts.hpp"
 #include "result_files.hpp"
 #include "shutter_stage.hpp"
+#include "slam_options.hpp"
 #include "upright_world.hpp"
 
 namespace app {
@@ -24,9 +25,7 @@ using orbis::slam::map_id;
 using slam_system = orbis::slam::any_system;
 
 orbis::slam::options options_for(const frame_source& source, const settings& s) {
-  orbis::slam::options options;
-  if (source.camera.baseline)
-    options.bf = orbis::slam::depth_camera_bf(source.camera.model.k().fx, *source.camera.baseline);
+  orbis::slam::options options = slam_options(source.camera.model, source.camera.baseline);
   options.threads = {.enabled = !s.deterministic && s.threads != 1, .wait = true};
   options.localization_only = s.localize_only;
   if (source.is_stereo)

@@ -26,7 +26,7 @@
 #include <orbis/optimize/bundle_problem.hpp>
 #include <orbis/optimize/self_calibration.hpp>
 #include <orbis/slam/camera_rig.hpp>
-#include <orbis/slam/detail/map/point_observation.hpp>
+#include <orbis/slam/detail/mapping/map_bundle.hpp>
 #include <orbis/slam/map.hpp>
 
 namespace orbis::slam {
@@ -58,9 +58,8 @@ struct calibrated_parameter {
   bool is_held = false;    ///< the motion does not tell; `after` is `before`
 };
 
-template <calibrated_camera Camera>
-struct calibration {
-  Camera camera;
+/// What is known of a calibration, whatever the model of its camera.
+struct calibration_summary {
   std::vector<calibrated_parameter>
       parameters;  ///< those that the model has; of `radial_tangential` k3 if it is not 0, k4 to k6 never
   std::size_t keyframes = 0, landmarks = 0;  ///< that took part
@@ -72,14 +71,12 @@ struct calibration {
   }
 };
 
-namespace detail {
-
-/// Keyframes, landmarks and observations of a map, for calibration.
-struct calibration_problem {
-  std::vector<se3> poses;
-  std::vector<vec3> points;
-  std::vector<optimize::bundle_observation> observations;
+template <calibrated_camera Camera>
+struct calibration : calibration_summary {
+  Camera camera;
 };
+
+namespace detail {
 
 /// Where the stretch of `count` keyframes begins that observes most landmarks. O(keypoints).
 template <feature_descriptor D>
@@ -95,34 +92,22 @@ template <feature_descriptor D>
   return first;
 }
 
+/// The keyframes that take part, and the landmarks that two of them observe.
 template <feature_descriptor D, class Camera>
-[[nodiscard]] calibration_problem calibration_problem_of(const basic_map<D>& m, const camera_rig<Camera>& rig,
-                                                         std::size_t max_keyframes) {
-  calibration_problem p;
-  std::vector<std::uint32_t> index(m.keyframe_end().value(), std::numeric_limits<std::uint32_t>::max());
+[[nodiscard]] bundle_snapshot calibration_problem_of(const basic_map<D>& m, const camera_rig<Camera>& rig,
+                                                     std::size_t max_keyframes) {
+  bundle_snapshot s;
+  std::vector<std::uint32_t> index(m.keyframe_end().value(), no_id);
   const std::size_t first = first_to_take(m, max_keyframes);
   std::size_t number = 0;
   for (const auto& k : m.keyframes()) {
     const std::size_t i = number++;
     if (i < first || i - first >= max_keyframes) continue;
-    index[k.id.value()] = static_cast<std::uint32_t>(p.poses.size());
-    p.poses.push_back(k.T_world_camera);
+    index[k.id.value()] = static_cast<std::uint32_t>(s.keyframes.size());
+    s.add_keyframe(k.id, k.T_world_camera, false);
   }
-  for (const auto& l : m.landmarks()) {
-    const std::size_t before = p.observations.size();
-    const auto point = static_cast<std::uint32_t>(p.points.size());
-    for (const observation& by : l.observations) {
-      const std::uint32_t pose = index[by.keyframe.value()];
-      if (pose == std::numeric_limits<std::uint32_t>::max()) continue;
-      const auto seen = observation_of<Camera, D>(rig, m.at(by.keyframe), by.feature, l.position);
-      p.observations.push_back({pose, point, seen.pixel, seen.right, seen.information});
-    }
-    if (p.observations.size() < before + 2)
-      p.observations.resize(before);
-    else
-      p.points.push_back(l.position);
-  }
-  return p;
+  for (const auto& l : m.landmarks()) s.add_shared_landmark(m, l, rig, [&](keyframe_id k) { return index[k.value()]; });
+  return s;
 }
 
 /// Which of the parameters belong together, in the order in which they are given up.
@@ -165,7 +150,7 @@ template <camera::parametric_camera Camera, class Covariance>
 }
 
 template <camera::parametric_camera Camera>
-[[nodiscard]] result<calibration<Camera>> calibrate_model(const Camera& before, const calibration_problem& problem,
+[[nodiscard]] result<calibration<Camera>> calibrate_model(const Camera& before, const bundle_snapshot& problem,
                                                           double bf, const calibration_options& options,
                                                           const progress& callback) {
   using parameters = camera::parameters_of<Camera>;
@@ -194,10 +179,14 @@ template <camera::parametric_camera Camera>
       return fail(errc::degenerate, "calibration",
                   tried ? "the motion of the camera does not determine its parameters" : tried.error().message);
   }
-  calibration<Camera> out{found->camera,        {},
-                          problem.poses.size(), problem.points.size(),
-                          found->observations,  found->outliers,
-                          found->initial_rms,   found->final_rms};
+  calibration<Camera> out{{{},
+                           problem.poses.size(),
+                           problem.points.size(),
+                           found->observations,
+                           found->outliers,
+                           found->initial_rms,
+                           found->final_rms},
+                          found->camera};
   const auto from = parameters::get(before), to = parameters::get(found->camera);
   for (int i = 0; i != parameters::count; ++i)
     if ((usual >> i & 1U) != 0)
@@ -221,14 +210,12 @@ template <feature_descriptor D, calibrated_camera Camera>
                                                     const progress& callback = {}) {
   camera_rig<Camera> loose = rig;  // a depth error counts as many pixels as bf says
   loose.model.bf *= std::sqrt(options.depth_weight);
-  const detail::calibration_problem problem = detail::calibration_problem_of(m, loose, options.max_keyframes);
+  const detail::bundle_snapshot problem = detail::calibration_problem_of(m, loose, options.max_keyframes);
   if constexpr (std::same_as<Camera, camera::any_camera>) {
     return rig.camera().visit([&](const auto& model) -> result<calibration<Camera>> {
       auto found = detail::calibrate_model(model, problem, loose.model.bf, options, callback);
       if (!found) return fail(found.error());
-      return calibration<Camera>{
-          found->camera,   std::move(found->parameters), found->keyframes, found->landmarks, found->observations,
-          found->outliers, found->initial_rms,           found->final_rms};
+      return calibration<Camera>{std::move(*found), found->camera};
     });
   } else {
     return detail::calibrate_model(rig.camera(), problem, loose.model.bf, options, callback);

@@ -31,6 +31,19 @@ struct scene {
   slam::map_keyframe key(slam::keyframe_id k) { return {maps.active_id(), k}; }
 };
 
+/// Two keyframes a metre apart, each with its surface.
+struct two_keyframes : scene {
+  slam::keyframe_id a = add(0.0), b = add(1.0);
+  surface_memory memory;
+  std::vector<placed_surface> found;
+
+  explicit two_keyframes(std::size_t capacity) : memory{capacity} {
+    surface one = marked(1), two = marked(2);
+    memory.keep(key(a), se3{}, one);
+    memory.keep(key(b), se3{}, two);
+  }
+};
+
 std::vector<int> steps(const std::vector<placed_surface>& placed) {
   std::vector<int> all;
   for (const placed_surface& p : placed) all.push_back(p.seen->step);
@@ -40,43 +53,33 @@ std::vector<int> steps(const std::vector<placed_surface>& placed) {
 }  // namespace
 
 TEST_CASE("Surfaces are found by how near they are, and move with their keyframes") {
-  scene s;
-  surface_memory memory{4};
-  const auto a = s.add(0.0), b = s.add(1.0);
-  surface one = marked(1), two = marked(2), three = marked(3);
-  memory.keep(s.key(a), se3{}, one);
-  memory.keep(s.key(b), se3{}, two);
-  memory.keep(s.key(b), at(0.5), three);
-  std::vector<placed_surface> found;
-  memory.around(s.maps, at(0.1), 2, found);
-  CHECK(steps(found) == std::vector{1, 2});
-  memory.around(s.maps, at(1.4), 3, found);
-  CHECK(steps(found) == std::vector{3, 2, 1});
-  CHECK(found[0].T_world_camera.translation().x() == Catch::Approx(1.5));
-  s.maps.active().set_pose(b, at(5.0));
-  memory.around(s.maps, at(1.4), 3, found);
-  CHECK(steps(found) == std::vector{1, 2, 3});
-  CHECK(found[2].T_world_camera.translation().x() == Catch::Approx(5.5));
-  s.maps.active().erase_keyframe(b);  // still placed, relative to what replaced it
-  memory.around(s.maps, at(5.5), 1, found);
-  CHECK(steps(found) == std::vector{3});
+  two_keyframes s{4};
+  surface three = marked(3);
+  s.memory.keep(s.key(s.b), at(0.5), three);
+  s.memory.around(s.maps, at(0.1), 2, s.found);
+  CHECK(steps(s.found) == std::vector{1, 2});
+  s.memory.around(s.maps, at(1.4), 3, s.found);
+  CHECK(steps(s.found) == std::vector{3, 2, 1});
+  CHECK(s.found[0].T_world_camera.translation().x() == Catch::Approx(1.5));
+  s.maps.active().set_pose(s.b, at(5.0));
+  s.memory.around(s.maps, at(1.4), 3, s.found);
+  CHECK(steps(s.found) == std::vector{1, 2, 3});
+  CHECK(s.found[2].T_world_camera.translation().x() == Catch::Approx(5.5));
+  s.maps.active().erase_keyframe(s.b);  // still placed, relative to what replaced it
+  s.memory.around(s.maps, at(5.5), 1, s.found);
+  CHECK(steps(s.found) == std::vector{3});
   s.maps.create();
-  memory.around(s.maps, at(0.0), 3, found);
-  CHECK(found.empty());
+  s.memory.around(s.maps, at(0.0), 3, s.found);
+  CHECK(s.found.empty());
 }
 
 TEST_CASE("Where there is no room the surface goes that was asked for longest ago") {
-  scene s;
-  surface_memory memory{2};
-  const auto a = s.add(0.0), b = s.add(1.0);
-  surface one = marked(1), two = marked(2), three = marked(3);
-  memory.keep(s.key(a), se3{}, one);
-  memory.keep(s.key(b), se3{}, two);
-  std::vector<placed_surface> found;
-  memory.around(s.maps, at(0.0), 1, found);
-  CHECK(steps(found) == std::vector{1});
-  memory.keep(s.key(b), at(1.0), three);
+  two_keyframes s{2};
+  surface three = marked(3);
+  s.memory.around(s.maps, at(0.0), 1, s.found);
+  CHECK(steps(s.found) == std::vector{1});
+  s.memory.keep(s.key(s.b), at(1.0), three);
   CHECK(three.step == 2);  // whose memory is used again
-  memory.around(s.maps, at(0.0), 4, found);
-  CHECK(steps(found) == std::vector{1, 3});
+  s.memory.around(s.maps, at(0.0), 4, s.found);
+  CHECK(steps(s.found) == std::vector{1, 3});
 }

@@ -94,6 +94,7 @@ class shared_intrinsics {
     double cost = cost_of(now_), damping = 1e-4;
     for (int taken = 0; taken < limit;) {
       if (!go_on()) return false;
+      linearize();
       double gain = -1.0;
       for (; damping < 1e8; damping *= 10.0) {
         const std::optional<estimate> tried = step(damping);
@@ -143,7 +144,8 @@ class shared_intrinsics {
   [[nodiscard]] bool covariance(Matrix& out) {
     out.setZero();
     if (count() == 0) return true;
-    linearize(0.0);
+    linearize();
+    reduce(0.0);
     const Eigen::Index size = reduced_.rows(), first = size - count();
     const Eigen::LLT<Eigen::MatrixXd, Eigen::Lower> factor(reduced_);
     if (factor.info() != Eigen::Success || !(factor.rcond() > 1e-14)) return false;
@@ -153,7 +155,7 @@ class shared_intrinsics {
     Eigen::MatrixXd spread = Eigen::MatrixXd::Zero(count(), count());
     double points = 0.0;
     for (std::size_t p = 0; p + 1 < begins_.size(); ++p) {
-      if (!eliminate(p, 0.0, false)) continue;
+      if (!eliminate(p, 0.0)) continue;
       Eigen::VectorXd move = rows.bottomRows(count()).transpose() * point_.theta_gradient;
       for (const seen& o : point_.by)
         if (o.row != none) move += rows.template middleRows<6>(o.row).transpose() * o.gradient;
@@ -210,8 +212,12 @@ class shared_intrinsics {
       if (o == out::alone) o = out::no;
     views_ = views_of(now_);
     row_of_.assign(now_.poses.size(), none);
-    for (std::size_t p = 0; p + 1 < begins_.size(); ++p)
-      if (!eliminate(p, 0.0, false)) set_aside(p);
+    parts_.resize(begins_.size() - 1);
+    seen_.resize(observations_.size());
+    for (std::size_t p = 0; p + 1 < begins_.size(); ++p) {
+      linearize_point(p);
+      if (!eliminate(p, 0.0)) set_aside(p);
+    }
     drop_weak();
     const std::vector<std::uint32_t> part = parts();
     std::vector<std::size_t> sizes(now_.poses.size(), 0);
@@ -301,9 +307,18 @@ class shared_intrinsics {
 
   /// What an observation adds to the normal equations.
   struct seen {
+    bool takes_part = false;
     std::uint32_t row = none;  ///< of its image's unknowns
     block_63 pose_point;
     vec6 gradient;  ///< by the image
+  };
+  /// What a point's observations add together.
+  struct point_part {
+    bool is_determined = false;  ///< by them
+    mat3 own;
+    vec3 gradient;
+    block_t3 theta_point;
+    theta_vector theta_gradient;
   };
   /// The part of a point, its own unknowns eliminated from the gradients.
   struct eliminated {
@@ -314,18 +329,18 @@ class shared_intrinsics {
     vec3 gradient;
   };
 
-  /// Makes `point_` of point `p`; with `adds`, adds what does not go by its own unknowns to the system. False if the
-  /// observations do not determine the point, which then adds nothing.
-  [[nodiscard]] bool eliminate(std::size_t p, double damping, bool adds) {
+  /// Makes the part of point `p`, and the derivatives of its residuals.
+  void linearize_point(std::size_t p) {
     const vec3& at = now_.points[observations_[begins_[p]].point];
-    const Eigen::Index theta = pose_rows_;
-    mat3 own = mat3::Zero();
-    point_.gradient.setZero();
-    point_.theta_point.setZero(count(), 3);
-    point_.theta_gradient.setZero(count());
-    point_.by.clear();
+    point_part& part = parts_[p];
+    part.own.setZero();
+    part.gradient.setZero();
+    part.theta_point.setZero(count(), 3);
+    part.theta_gradient.setZero(count());
     rows_.clear();
     for (std::size_t k = begins_[p]; k != begins_[p + 1]; ++k) {
+      seen& s = seen_[k];
+      s.takes_part = false;
       if (out_[k] != out::no) continue;
       const bundle_observation& o = observations_[k];
       const view_type& view = views_[o.pose];
@@ -339,38 +354,56 @@ class shared_intrinsics {
         by_q.row(2) -= by_q.row(0).eval();
         by_all.row(2) -= by_all.row(0).eval();
       }
+      s.takes_part = true;
+      s.row = row_of_[o.pose];
       const double weight = o.information * loss_.weight(o.information * r->squaredNorm());
-      jacobians j{weight, {}, by_all * basis_};
+      jacobians j{s.row, weight, {}, by_all * basis_};
       j.by_pose.template leftCols<3>() = -by_q;
       j.by_pose.template rightCols<3>() = by_q * hat<double>(q);
       const mat3 by_point = by_q * view.rotation;
       const mat3 weighted = weight * by_point;
       const vec3 pull = weight * *r;
-      own += by_point.transpose() * weighted;
-      point_.gradient += by_point.transpose() * pull;
-      point_.theta_point += j.by_theta.transpose() * weighted;
-      point_.theta_gradient += j.by_theta.transpose() * pull;
-      seen s;
-      s.row = row_of_[o.pose];
+      part.own += by_point.transpose() * weighted;
+      part.gradient += by_point.transpose() * pull;
+      part.theta_point += j.by_theta.transpose() * weighted;
+      part.theta_gradient += j.by_theta.transpose() * pull;
       s.pose_point = j.by_pose.transpose() * weighted;
       s.gradient = j.by_pose.transpose() * pull;
-      point_.by.push_back(s);
-      if (adds) rows_.push_back(j);
+      rows_.push_back(j);
     }
+    part.is_determined = rows_.size() >= 2;
+  }
+
+  /// Adds what of the linearised point does not go by its own unknowns.
+  void add_directly() {
+    const Eigen::Index theta = pose_rows_;
+    for (const jacobians& j : rows_) {
+      const matrix<6, 3> weighted = j.weight * j.by_pose.transpose();
+      direct_.block(theta, theta, count(), count()) += j.by_theta.transpose() * (j.weight * j.by_theta);
+      if (j.row == none) continue;
+      direct_.template block<6, 6>(j.row, j.row) += weighted * j.by_pose;
+      direct_.block(theta, j.row, count(), 6) += (weighted * j.by_theta).transpose();
+    }
+  }
+
+  /// Makes `point_` of the part of point `p`. False if the observations do not determine it.
+  [[nodiscard]] bool eliminate(std::size_t p, double damping) {
+    const point_part& part = parts_[p];
+    if (!part.is_determined) return false;
+    mat3 own = part.own;
     own.diagonal() *= 1.0 + damping;
     const Eigen::LLT<mat3> factor(own);
-    if (point_.by.size() < 2 || factor.info() != Eigen::Success || !(factor.rcond() > 1e-12)) return false;
+    if (factor.info() != Eigen::Success || !(factor.rcond() > 1e-12)) return false;
     point_.inverse = factor.solve(mat3::Identity());
-    const vec3 back = point_.inverse * point_.gradient;
-    point_.theta_gradient -= point_.theta_point * back;
-    for (seen& s : point_.by) s.gradient -= s.pose_point * back;
-    for (std::size_t i = 0; i != rows_.size(); ++i) {
-      const jacobians& j = rows_[i];
-      const matrix<6, 3> weighted = j.weight * j.by_pose.transpose();
-      reduced_.block(theta, theta, count(), count()) += j.by_theta.transpose() * (j.weight * j.by_theta);
-      if (point_.by[i].row == none) continue;
-      reduced_.template block<6, 6>(point_.by[i].row, point_.by[i].row) += weighted * j.by_pose;
-      reduced_.block(theta, point_.by[i].row, count(), 6) += (weighted * j.by_theta).transpose();
+    point_.gradient = part.gradient;
+    const vec3 back = point_.inverse * part.gradient;
+    point_.theta_point = part.theta_point;
+    point_.theta_gradient = part.theta_gradient - part.theta_point * back;
+    point_.by.clear();
+    for (std::size_t k = begins_[p]; k != begins_[p + 1]; ++k) {
+      if (!seen_[k].takes_part) continue;
+      point_.by.push_back(seen_[k]);
+      point_.by.back().gradient -= seen_[k].pose_point * back;
     }
     return true;
   }
@@ -389,27 +422,38 @@ class shared_intrinsics {
     }
   }
 
-  /// The reduced system with `damping` times its diagonal added (before the points are eliminated), and its gradient.
-  void linearize(double damping) {
+  /// Linearises all residuals at the present estimate.
+  void linearize() {
     const Eigen::Index size = pose_rows_ + count();
     views_ = views_of(now_);
-    reduced_.setZero(size, size);
+    direct_.setZero(size, size);
+    for (std::size_t p = 0; p + 1 < begins_.size(); ++p) {
+      linearize_point(p);
+      parts_[p].is_determined = eliminate(p, 0.0);
+      if (parts_[p].is_determined) add_directly();
+    }
+  }
+
+  /// The reduced system with `damping` times its diagonal added (before the points are eliminated), and its gradient.
+  void reduce(double damping) {
+    const Eigen::Index size = direct_.rows();
     removed_.setZero(size, size);
     gradient_.setZero(size);
     for (std::size_t p = 0; p + 1 < begins_.size(); ++p) {
-      if (!eliminate(p, damping, true)) continue;
+      if (!eliminate(p, damping)) continue;
       take_away();
       gradient_.tail(count()) += point_.theta_gradient;
       for (const seen& s : point_.by)
         if (s.row != none) gradient_.template segment<6>(s.row) += s.gradient;
     }
+    reduced_ = direct_;
     reduced_.diagonal() *= 1.0 + damping;
     reduced_ -= removed_;
   }
 
-  /// Where a damped step leads; empty if there is none, or no such camera.
+  /// Where a damped step leads from what was linearised; empty if there is none, or no such camera.
   [[nodiscard]] std::optional<estimate> step(double damping) {
-    linearize(damping);
+    reduce(damping);
     const Eigen::LLT<Eigen::MatrixXd, Eigen::Lower> factor(reduced_);
     if (factor.info() != Eigen::Success) return std::nullopt;
     const Eigen::VectorXd d = -factor.solve(gradient_);
@@ -419,7 +463,7 @@ class shared_intrinsics {
     if (!camera) return std::nullopt;
     estimate to{*camera, now_.poses, now_.points};
     for (std::size_t p = 0; p + 1 < begins_.size(); ++p) {
-      if (!eliminate(p, damping, false)) continue;
+      if (!eliminate(p, damping)) continue;
       vec3 pull = point_.gradient + point_.theta_point.transpose() * theta;
       for (const seen& s : point_.by)
         if (s.row != none) pull += s.pose_point.transpose() * d.template segment<6>(s.row);
@@ -432,6 +476,7 @@ class shared_intrinsics {
 
   /// The derivatives of one residual.
   struct jacobians {
+    std::uint32_t row;  ///< of its image's unknowns
     double weight;
     matrix<3, 6> by_pose;
     by_theta_type by_theta;
@@ -449,10 +494,12 @@ class shared_intrinsics {
   Eigen::Index pose_rows_ = 0;
 
   std::vector<view_type> views_;
-  Eigen::MatrixXd reduced_, removed_;  ///< lower halves
+  std::vector<seen> seen_;                      ///< by observation: as it was linearised last
+  std::vector<point_part> parts_;               ///< by point: the same
+  std::vector<jacobians> rows_;                 ///< of the residuals of the point that was linearised last
+  Eigen::MatrixXd direct_, reduced_, removed_;  ///< lower halves; `direct_`: without elimination and damping
   Eigen::VectorXd gradient_;
   eliminated point_;
-  std::vector<jacobians> rows_;
 };
 
 }  // namespace orbis::optimize::detail

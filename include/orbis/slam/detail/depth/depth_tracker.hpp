@@ -85,6 +85,8 @@ class depth_tracker {
     memory_.around(maps, T_world_camera, 2, placed_);
     return !placed_.empty();
   }
+  /// What it returned last.
+  [[nodiscard]] bool is_surrounded() const noexcept { return !placed_.empty(); }
 
   /// What the surfaces say of a pose close to the true one; empty if that is nothing. @pre surround
   [[nodiscard]] std::optional<pose_quadratic> term_at(const moving_pose& at, const camera::shutter& shutter) {

@@ -81,10 +81,7 @@ void take_landmarks(snapshot& s, const basic_map<D>& m, const camera_rig<Camera>
   const landmark_id end = s.next_landmark + std::min(count, s.end_landmark - s.next_landmark);
   for (; s.next_landmark != end; ++s.next_landmark) {
     if (!m.has_landmark(s.next_landmark)) continue;
-    const auto& l = m.landmark_at(s.next_landmark);
-    std::size_t seen = 0;
-    for (const observation& by : l.observations) seen += s.index_of(by.keyframe) != no_id;
-    if (seen >= 2) s.add_landmark(m, l, rig, [&](keyframe_id k) { return s.index_of(k); });
+    s.add_shared_landmark(m, m.landmark_at(s.next_landmark), rig, [&](keyframe_id k) { return s.index_of(k); });
   }
 }
 

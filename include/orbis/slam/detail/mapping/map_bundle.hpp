@@ -70,6 +70,13 @@ struct bundle_snapshot {
       sources.push_back(seen);
     }
   }
+  /// The same, if there are at least two.
+  template <feature_descriptor D, camera::camera_model Camera, class IndexOf>
+  void add_shared_landmark(const basic_map<D>& m, const basic_landmark<D>& l, const camera_rig<Camera>& rig,
+                           IndexOf&& index_of) {
+    const auto takes_part = [&](const observation& by) { return index_of(by.keyframe) != no_id; };
+    if (std::count_if(l.observations.begin(), l.observations.end(), takes_part) >= 2) add_landmark(m, l, rig, index_of);
+  }
 };
 
 /// The result of an adjustment, index by index as the snapshot.

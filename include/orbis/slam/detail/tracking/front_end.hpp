@@ -171,14 +171,14 @@ class front_end {
   }
   /// Lets the observer see a tracked frame.
   void observe(const frame_type& f, const atlas_type& maps, const std::optional<map_keyframe>& made);
-  /// With a rolling shutter, refines pose and twist of a frame by the landmarks that it observes, and moves its
-  /// keypoints accordingly. `is_next`: the frame follows the last one.
-  template <class FollowRows>
-  void observe_depth(const frame_type& f, const frame_motion& motion, FollowRows&& follow_rows) {
-    observer_->set_depths(f, motion, follow_rows);
-  }
+  /// Refines a frame by the landmarks that it observes and, if it joins in, by depth: the pose and, with a rolling
+  /// shutter, the twist, to which the keypoints are moved then. `is_next`: the frame follows the last one.
   template <class FollowRows>
   void refine_motion(frame_type& f, const atlas_type& maps, bool is_next, FollowRows&& follow_rows);
+  /// From a pose that was found by a search, in the active map around the reference: refined on the local map. Sets
+  /// `state()` if the frame is found again.
+  template <class FollowRows>
+  std::size_t track_found(frame_type& f, atlas_type& maps, bool is_frozen, FollowRows&& follow_rows);
   /// Aligns the depth of a frame around the last one with the surfaces of keyframes.
   [[nodiscard]] std::optional<depth_alignment> align_depth(const frame_type& f, const atlas_type& maps);
   /// From a pose that depth was aligned at, refined on the local map.
@@ -200,6 +200,7 @@ class front_end {
   camera::shutter shutter_;
   std::optional<shutter_observer> observer_;
   std::vector<row_observation> rows_;  ///< its memory is used again
+  frame_type unsettled_;               ///< the same
 
   double held_since_ = 0.0;  ///< when the last frame was tracked whose pose depth did not hold, seconds
 
@@ -337,12 +338,7 @@ std::size_t front_end<Camera, D, Matchers, Sensor>::relocalize(frame_type& f, at
     if (tracker_.by_appearance(f, maps.at(k.map), k.keyframe) == 0) continue;
     maps.activate(k.map);
     reference_ = k;
-    const std::size_t inliers = track_local_map(f, maps.active(), 3.0 * options_.search_radius, is_frozen);
-    if (inliers >= options_.recovery.min_inliers) {
-      refine_motion(f, maps, false, follow_rows);
-      state_ = track_state::relocalized;
-      return inliers;
-    }
+    if (const std::size_t inliers = track_found(f, maps, is_frozen, follow_rows); inliers > 0) return inliers;
   }
   maps.activate(active_before);
   reference_ = reference_before;
@@ -356,7 +352,13 @@ std::size_t front_end<Camera, D, Matchers, Sensor>::search_in_place(frame_type& 
   const bool is_here = last_.size() != 0 && reference_.map == maps.active_id() && maps.has(reference_);
   const bool is_recent = f.timestamp - last_.timestamp < options_.recovery.new_map_after;
   if (!is_here || (is_frozen && !is_recent) || Sensor::begins_map(f, options_) == 0) return 0;
-  if (tracker_.by_turning(f, maps.active(), last_) == 0) return 0;
+  return tracker_.by_turning(f, maps.active(), last_) == 0 ? 0 : track_found(f, maps, is_frozen, follow_rows);
+}
+
+template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
+template <class FollowRows>
+std::size_t front_end<Camera, D, Matchers, Sensor>::track_found(frame_type& f, atlas_type& maps, bool is_frozen,
+                                                                FollowRows&& follow_rows) {
   const std::size_t inliers = track_local_map(f, maps.active(), 3.0 * options_.search_radius, is_frozen);
   if (inliers < options_.recovery.min_inliers) return 0;
   refine_motion(f, maps, false, follow_rows);
@@ -369,39 +371,33 @@ template <class FollowRows>
 void front_end<Camera, D, Matchers, Sensor>::refine_motion(frame_type& f, const atlas_type& maps, bool is_next,
                                                            FollowRows&& follow_rows) {
   const basic_map<D>& m = maps.active();
-  const bool with_depth = options_.depth_term.enabled && depth_.surround(maps, f.T_world_camera);
-  const auto refine = [&](const moving_pose& start, const twist_prior& prior) {
-    const auto other = with_depth ? depth_.term_at(start, shutter_) : std::nullopt;
-    return refine_moving_pose(std::span<const row_observation>(rows_), rig_.model, start, prior, with_depth ? 3 : 5,
-                              {.other = other ? &*other : nullptr, .moves = !shutter_.is_global()});
-  };
-  const int rounds = with_depth ? 3 : 1;
-  if (shutter_.is_global() && with_depth) {
-    find_observations(f, m, rig_, rows_);
-    moving_pose refined{f.T_world_camera, f.twist};
-    refined.twist.setZero();
-    for (int round = 0; round != rounds; ++round) refined = refine(refined, {});
-    f.T_world_camera = refined.T_world_camera;
-  }
-  if (!looks_at_rows()) return;
+  const bool rolls = !shutter_.is_global();
+  const bool with_depth = depth_.surround(maps, f.T_world_camera) && options_.depth_term.enabled;
   twist_prior prior;
-  if (is_next && f.timestamp > last_.timestamp) {
+  if (looks_at_rows() && is_next && f.timestamp > last_.timestamp)
     prior = twist_prior::after({last_.T_world_camera, last_.twist}, f.timestamp - last_.timestamp, motion_.is_known());
-    f.twist = prior.expected(f.T_world_camera.inverse());
-  }
-  if (shutter_.is_global()) {
-    observe_depth(f, {shutter_, f.twist}, follow_rows);
-    return;
-  }
-  moving_pose refined{f.T_world_camera, f.twist};
+  const auto expected_twist = [&] {
+    return prior.T_world_before ? prior.expected(f.T_world_camera.inverse()) : f.twist;
+  };
+  moving_pose refined{f.T_world_camera, rolls ? expected_twist() : vec6(vec6::Zero())};
   const bool depth_is_simultaneous = shutter_.depth_delay == 0.0 && shutter_.depth_read_out == shutter_.color_read_out;
-  for (int round = 0; round != std::max(rounds, depth_is_simultaneous ? 1 : 2); ++round) {
-    follow_rows(f, {shutter_, refined.twist});  // the depth was read by the motion before
-    find_row_observations(f, m, rig_, shutter_, rows_);
-    refined = refine(refined, prior);
+  const int rounds = with_depth ? 3 : !rolls ? 0 : depth_is_simultaneous ? 1 : 2;
+  if (!rolls && with_depth) find_observations(f, m, rig_, rows_);
+  for (int round = 0; round != rounds; ++round) {
+    if (rolls) {
+      follow_rows(f, {shutter_, refined.twist});  // the depth was read by the motion before
+      find_row_observations(f, m, rig_, shutter_, rows_);
+    }
+    const auto depth = with_depth ? depth_.term_at(refined, shutter_) : std::nullopt;
+    refined = refine_moving_pose(std::span<const row_observation>(rows_), rig_.model, refined, prior,
+                                 with_depth ? 3 : 5, {.other = depth ? &*depth : nullptr, .moves = rolls});
   }
   f.T_world_camera = refined.T_world_camera;
-  if (observer_) observe_depth(f, {shutter_, refined.twist}, follow_rows);
+  if (observer_) observer_->set_depths(f, {shutter_, rolls ? refined.twist : expected_twist()}, follow_rows);
+  if (!rolls) {
+    f.twist = expected_twist();
+    return;
+  }
   move_to_frame_time(f, rig_, shutter(), refined.twist, [&](std::size_t i) {
     return f.landmarks[i] == no_id ? 0.0
                                    : (refined.T_world_camera.inverse() * m.landmark_at(f.landmarks[i]).position).z();
@@ -441,7 +437,7 @@ std::size_t front_end<Camera, D, Matchers, Sensor>::track_from_depth(frame_type&
   refine_motion(f, maps, true, follow_rows);
   if (inliers < options_.min_inliers) {
     const std::size_t confirmed = drop_disagreeing(f, maps.active());
-    if (confirmed < few || !depth_.surround(maps, f.T_world_camera) ||
+    if (confirmed < few || !depth_.is_surrounded() ||
         !depth_.holds(depth_.agreement({f.T_world_camera, f.twist}, shutter_)))
       return 0;
     f.held_by_depth = true;
@@ -455,17 +451,16 @@ template <class FollowRows>
 std::size_t front_end<Camera, D, Matchers, Sensor>::settle(frame_type& f, atlas_type& maps, std::size_t inliers,
                                                            bool is_frozen, FollowRows&& follow_rows) {
   // Where something moves in the view, that is what does not fit.
-  if (!options_.depth_term.recovers || !moving_.pixels().empty() || !depth_.surround(maps, f.T_world_camera))
-    return inliers;
+  if (!options_.depth_term.recovers || moving_.size() != 0 || !depth_.is_surrounded()) return inliers;
   const association seen = depth_.agreement({f.T_world_camera, f.twist}, shutter_);
   if (seen.visible < options_.depth_term.min_points || seen.share() >= options_.depth_term.min_share) return inliers;
   const auto aligned = align_depth(f, maps);
   constexpr double better = 0.15;
   if (!aligned || aligned->seen.share() < seen.share() + better) return inliers;
-  const frame_type before = f;
+  unsettled_ = f;
   if (const std::size_t there = track_from_depth(f, maps, *aligned, is_frozen, follow_rows); there > 0) return there;
   if (hold_by_depth(f, *aligned)) return 0;
-  f = before;
+  std::swap(f, unsettled_);
   return inliers;
 }
 

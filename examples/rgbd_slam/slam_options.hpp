@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// The options of SLAM that follow from the camera.
+#pragma once
+
+#include <optional>
+
+#include <orbis/camera/any.hpp>
+#include <orbis/slam/options.hpp>
+
+namespace app {
+
+/// For a depth camera; a known `baseline`, metres, says how exact its depth is.
+[[nodiscard]] inline orbis::slam::options slam_options(const orbis::camera::any_camera& camera,
+                                                       const std::optional<double>& baseline) {
+  orbis::slam::options options;
+  if (baseline) options.bf = orbis::slam::depth_camera_bf(camera.k().fx, *baseline);
+  return options;
+}
+
+}  // namespace app
