@@ -155,7 +155,7 @@ void add_camera_option(CLI::App& cmd, settings& s) {
 void add_recording_options(CLI::App& cmd, settings& s) {
   add_sensor_option(cmd, s, {"auto", "rgbd", "stereo"});
   cmd.add_option("--format", s.format, "layout of the recording")
-      ->check(CLI::IsMember({"auto", "tum", "7scenes", "icl", "kitti", "asl", "pairs"}))
+      ->check(CLI::IsMember({"auto", "tum", "7scenes", "icl", "scannet", "kitti", "asl", "pairs"}))
       ->capture_default_str()
       ->type_name("F");
   add_camera_option(cmd, s);
@@ -224,7 +224,7 @@ void add_calibration_options(CLI::App& cmd, settings& s) {
       ->required()
       ->type_name("");
   cmd.add_option("--format", s.format, "layout of the recording")
-      ->check(CLI::IsMember({"auto", "tum", "7scenes", "icl"}))
+      ->check(CLI::IsMember({"auto", "tum", "7scenes", "icl", "scannet"}))
       ->capture_default_str()
       ->type_name("F");
   add_camera_option(cmd, s);
@@ -302,7 +302,8 @@ std::variant<settings, exit_code> read_command_line(int argc, char** argv) {
       "4 there is no way (plan), 5 the motion does not determine the camera (calibrate).\n"
       "Interrupting a run keeps what it has reached (130).");
 
-  CLI::App* run = cli.add_subcommand("run", "SLAM on a recording (TUM, 7-Scenes, ICL-NUIM; stereo: KITTI, ASL)");
+  CLI::App* run =
+      cli.add_subcommand("run", "SLAM on a recording (TUM, 7-Scenes, ICL-NUIM, ScanNet; stereo: KITTI, ASL)");
   run->add_option("DATASET", s.input, "the recording's folder")->required()->type_name("");
   add_recording_options(*run, s);
   add_frame_options(*run, s);

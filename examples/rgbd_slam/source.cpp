@@ -114,6 +114,7 @@ result<frame_source> open_recording(const settings& s) {
   orbis::io::recording_options options{.format = s.format == "tum"       ? recording_format::tum
                                                  : s.format == "7scenes" ? recording_format::seven_scenes
                                                  : s.format == "icl"     ? recording_format::icl_nuim
+                                                 : s.format == "scannet" ? recording_format::scannet
                                                                          : recording_format::automatic};
   if (!s.camera.empty()) {
     auto camera = named_camera(s.camera);

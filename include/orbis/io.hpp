@@ -4,7 +4,7 @@
 ///
 /// | header                | what it is for                                                                   |
 /// | --------------------- | -------------------------------------------------------------------------------- |
-/// | `recording.hpp`       | RGB-D recordings in the layouts of TUM RGB-D, 7-Scenes and ICL-NUIM              |
+/// | `recording.hpp`       | RGB-D recordings in the layouts of TUM RGB-D, 7-Scenes, ICL-NUIM and ScanNet     |
 /// | `stereo_recording.hpp` | stereo recordings in the layouts of KITTI odometry and ASL (EuRoC), or of two folders |
 /// | `mono_recording.hpp`  | recordings of one camera: in the layouts above, or plain folders of images       |
 /// | `synthetic.hpp`       | a recording rendered on the fly, whose poses and surfaces are known exactly      |

@@ -166,6 +166,7 @@ class mono_recording {
   if (!index) return fail(index.error());
   if (camera_file) index->files.push_back(*camera_file);
   if (!camera) camera = index->camera;
+  if (!options.camera && !camera_file && index->color) camera->model = index->color->model;  // images as they are
   if (!camera)
     return fail(errc::invalid_argument, folder.string(),
                 "the camera is not known: put a camera.toml into the folder, or name a camera");

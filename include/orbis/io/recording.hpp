@@ -9,6 +9,7 @@
 
 #include <cassert>
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <iterator>
 #include <memory>
@@ -26,6 +27,7 @@
 #include <orbis/io/camera_file.hpp>
 #include <orbis/io/detail/recordings/icl_nuim.hpp>
 #include <orbis/io/detail/recordings/recording_index.hpp>
+#include <orbis/io/detail/recordings/scannet.hpp>
 #include <orbis/io/detail/recordings/seven_scenes.hpp>
 #include <orbis/io/detail/recordings/tum.hpp>
 #include <orbis/io/image.hpp>
@@ -33,15 +35,16 @@
 namespace orbis::io {
 
 /// The layouts we read. `automatic`: look which one it is.
-enum class recording_format { automatic, tum, seven_scenes, icl_nuim };
+enum class recording_format { automatic, tum, seven_scenes, icl_nuim, scannet };
 
-/// The name of a format: "tum", "7scenes", "icl", "auto".
+/// The name of a format: "tum", "7scenes", "icl", "scannet", "auto".
 [[nodiscard]] constexpr std::string_view to_string(recording_format format) noexcept {
   switch (format) {
     case recording_format::automatic: return "auto";
     case recording_format::tum: return "tum";
     case recording_format::seven_scenes: return "7scenes";
     case recording_format::icl_nuim: return "icl";
+    case recording_format::scannet: return "scannet";
   }
   return "unknown";
 }
@@ -60,6 +63,8 @@ class recording {
   recording(detail::recording_index index, camera::camera_settings camera, recording_format format)
       : index_{std::move(index)}, camera_{std::move(camera)}, format_{format} {
     assert(!index_.frames.empty());
+    if (const auto* depth = camera_.model.get_if<camera::pinhole>(); index_.color && depth != nullptr)
+      registration_.emplace(*index_.color, *depth);
   }
 
   [[nodiscard]] std::size_t size() const noexcept { return index_.frames.size(); }
@@ -82,12 +87,12 @@ class recording {
   /// Reads frame `i`. Colour and depth have the camera's size. Errors: not_found, unreadable,
   /// malformed (damaged, or of another size than the camera's), unsupported. @pre i < size()
   [[nodiscard]] result<camera::rgbd_frame> frame(std::size_t i) const {
-    auto image = color(i);
-    if (!image) return fail(image.error());
+    assert(i < size());
     const detail::recording_entry& entry = index_.frames[i];
-    auto depth = read_depth(entry.depth);
+    auto depth = read_sized_depth(entry.depth);
     if (!depth) return fail(depth.error());
-    if (!has_size(*depth)) return size_error(entry.depth, depth->width(), depth->height());
+    auto image = read_registered(entry.color, depth->view());
+    if (!image) return fail(image.error());
     return camera::rgbd_frame{.timestamp = entry.timestamp,
                               .color = *std::move(image),
                               .depth = *std::move(depth),
@@ -97,10 +102,11 @@ class recording {
   /// Reads the colour image of frame `i` alone. Errors as above. @pre i < size()
   [[nodiscard]] result<image<rgb8>> color(std::size_t i) const {
     assert(i < size());
-    const std::filesystem::path& path = index_.frames[i].color;
-    auto image = read_color(path);
-    if (image && !has_size(*image)) return size_error(path, image->width(), image->height());
-    return image;
+    const detail::recording_entry& entry = index_.frames[i];
+    if (!registration_ || !registration_->needs_depth()) return read_registered(entry.color, {});
+    const auto depth = read_sized_depth(entry.depth);
+    if (!depth) return fail(depth.error());
+    return read_registered(entry.color, depth->view());
   }
 
   /// Goes over the frames once, reading each when it is reached. Ends at the first frame that cannot
@@ -153,19 +159,29 @@ class recording {
   [[nodiscard]] const result<void>& status() const noexcept { return status_; }
 
  private:
+  /// An image that was read, if it has the camera's size.
   template <class T>
-  [[nodiscard]] bool has_size(const image<T>& read) const {
-    return read.width() == camera_.model.width() && read.height() == camera_.model.height();
-  }
-  tl::unexpected<error> size_error(const std::filesystem::path& path, int width, int height) const {
+  static result<image<T>> sized(result<image<T>> read, const std::filesystem::path& path, const camera::intrinsics& k) {
+    if (!read || (read->width() == k.width && read->height() == k.height)) return read;
     return fail(errc::malformed, path.string(),
-                "the image has " + std::to_string(width) + "x" + std::to_string(height) + " pixels, the camera " +
-                    std::to_string(camera_.model.width()) + "x" + std::to_string(camera_.model.height()));
+                "the image has " + std::to_string(read->width()) + "x" + std::to_string(read->height()) +
+                    " pixels, the camera " + std::to_string(k.width) + "x" + std::to_string(k.height));
+  }
+  [[nodiscard]] result<image<std::uint16_t>> read_sized_depth(const std::filesystem::path& path) const {
+    return sized(read_depth(path), path, camera_.model.k());
+  }
+  /// The colour image as the camera of depth sees it.
+  [[nodiscard]] result<image<rgb8>> read_registered(const std::filesystem::path& path,
+                                                    image_view<const std::uint16_t> depth) const {
+    auto image = sized(read_color(path), path, registration_ ? registration_->color().k() : camera_.model.k());
+    if (image && registration_) image = registration_->register_color(image->view(), depth, camera_.depth_scale);
+    return image;
   }
 
   detail::recording_index index_;
   camera::camera_settings camera_;
   recording_format format_;
+  std::optional<detail::color_registration> registration_;
   result<void> status_;
 };
 
@@ -174,6 +190,7 @@ class recording {
   if (detail::is_icl_nuim(folder)) return recording_format::icl_nuim;
   if (detail::is_tum(folder)) return recording_format::tum;
   if (detail::is_seven_scenes(folder)) return recording_format::seven_scenes;
+  if (detail::is_scannet(folder)) return recording_format::scannet;
   return recording_format::automatic;
 }
 
@@ -187,12 +204,13 @@ namespace detail {
     case recording_format::tum: return index_tum(folder, max_time_difference);
     case recording_format::seven_scenes: return index_seven_scenes(folder);
     case recording_format::icl_nuim: return index_icl_nuim(folder);
+    case recording_format::scannet: return index_scannet(folder);
     case recording_format::automatic: break;
   }
   return fail(unknown_recording(
       folder,
       "no known recording: neither rgb.txt and depth.txt (TUM), nor frame-*.color.png (7-Scenes), nor "
-      "numbered images in rgb and depth (ICL-NUIM)"));
+      "numbered images in rgb and depth (ICL-NUIM), nor color, depth and intrinsic_depth.txt (ScanNet)"));
 }
 
 }  // namespace detail
@@ -225,6 +243,13 @@ namespace detail {
   if (!camera)
     return fail(errc::invalid_argument, folder.string(),
                 "the camera is not known: put a camera.toml into the folder, or name a camera");
+  if (index->color) {
+    const auto size = [](const camera::intrinsics& k) {
+      return std::to_string(k.width) + " x " + std::to_string(k.height);
+    };
+    index->notes.push_back("colour images of " + size(index->color->model.k()) +
+                           " pixels are resampled to the depth camera, " + size(camera->model.k()));
+  }
   return recording(*std::move(index), *std::move(camera), format);
 }
 

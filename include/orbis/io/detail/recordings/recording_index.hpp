@@ -16,6 +16,7 @@
 #include <orbis/camera/settings.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/core/trajectory.hpp>
+#include <orbis/io/detail/recordings/color_registration.hpp>
 
 namespace orbis::io::detail {
 
@@ -32,6 +33,7 @@ struct recording_index {
   std::vector<recording_entry> frames;  ///< in the order of time, never empty when handed out
   trajectory ground_truth;
   std::optional<camera::camera_settings> camera;  ///< where the format's own files tell
+  std::optional<color_camera> color;              ///< where colour is to be resampled to the camera of depth
   std::vector<std::string> notes;                 ///< what a user should be warned about
   std::vector<std::filesystem::path> files;       ///< that were read for this; images are not among them
 };

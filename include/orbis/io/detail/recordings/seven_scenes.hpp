@@ -70,21 +70,23 @@ namespace orbis::io::detail {
   return parse_pose_matrix(*text, path);
 }
 
-/// A 3x3 camera matrix as text. Errors: malformed.
+/// A 3x3 camera matrix as text, possibly as the upper left part of a 4x4 one. Errors: malformed.
 [[nodiscard]] inline result<mat3> parse_camera_matrix(std::string_view text, const std::filesystem::path& path) {
-  mat3 k;
+  double values[16];
   int count = 0;
   bool ok = true;
   for_each_line(text, [&](std::string_view line, std::size_t) {
     for (std::string_view field = next_field(line); ok && !field.empty(); field = next_field(line)) {
-      double value = 0.0;
-      ok = count < 9 && parse_number(field, value) && std::isfinite(value);
-      if (ok) k(count / 3, count % 3) = value;
+      ok = count < 16 && parse_number(field, values[count]) && std::isfinite(values[count]);
       ++count;
     }
     return ok;
   });
-  if (!ok || count != 9) return fail(errc::malformed, path.string(), "a camera matrix has 9 finite numbers");
+  if (!ok || (count != 9 && count != 16))
+    return fail(errc::malformed, path.string(), "a camera matrix has 9 finite numbers, or 16");
+  mat3 k;
+  for (int row = 0; row != 3; ++row)
+    for (int column = 0; column != 3; ++column) k(row, column) = values[row * (count == 9 ? 3 : 4) + column];
   if (!(k(0, 0) > 0.0) || !(k(1, 1) > 0.0) || k(0, 1) != 0.0)
     return fail(errc::malformed, path.string(), "focal lengths must be above zero, and skew zero");
   return k;

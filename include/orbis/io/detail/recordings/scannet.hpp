@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// ScanNet's scenes as its tools export them: `color/N.jpg`, `depth/N.png`, `pose/N.txt`, and in `intrinsic` (or beside
+/// the folders) `intrinsic_color.txt`, `intrinsic_depth.txt`, `extrinsic_color.txt`, `extrinsic_depth.txt`.
+///
+/// Source: A. Dai et al., "ScanNet: richly-annotated 3D reconstructions of indoor scenes", CVPR 2017, and the data
+/// set's page. Depth is in millimetres and has fewer pixels than colour; poses are from camera to world, with
+/// infinities where the camera was lost. The extrinsics are from a camera to what both share, and mostly the identity.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include <orbis/camera/pinhole.hpp>
+#include <orbis/camera/settings.hpp>
+#include <orbis/core/file.hpp>
+#include <orbis/core/result.hpp>
+#include <orbis/core/se3.hpp>
+#include <orbis/io/detail/recordings/color_registration.hpp>
+#include <orbis/io/detail/recordings/recording_index.hpp>
+#include <orbis/io/detail/recordings/seven_scenes.hpp>
+#include <orbis/io/detail/text.hpp>
+#include <orbis/io/image.hpp>
+
+namespace orbis::io::detail {
+
+/// The file of a ScanNet scene that says `what` ("intrinsic_depth"); empty if there is none.
+[[nodiscard]] inline std::filesystem::path scannet_file(const std::filesystem::path& folder, const std::string& what) {
+  std::string plural = what;  // so in the data set's smaller edition
+  plural.insert(plural.find('_'), "s");
+  for (const auto& path :
+       {folder / "intrinsic" / (what + ".txt"), folder / (what + ".txt"), folder / (plural + ".txt")})
+    if (present(path)) return path;
+  return {};
+}
+
+/// Whether `folder` looks like an exported scene of ScanNet.
+[[nodiscard]] inline bool is_scannet(const std::filesystem::path& folder) {
+  return present(folder / "color") && present(folder / "depth") && !scannet_file(folder, "intrinsic_depth").empty();
+}
+
+/// The index of an exported scene, at 30 frames per second by the frames' numbers. Its frames are those of the depth
+/// camera; see `color_registration`. Errors: not_found, unreadable, no_data, malformed (with the file).
+[[nodiscard]] inline result<recording_index> index_scannet(const std::filesystem::path& folder) {
+  constexpr double frames_per_second = 30.0;
+  recording_index index;
+  std::size_t without_depth = 0, without_pose = 0;
+  for (const auto& color : list_folder(folder / "color")) {
+    unsigned number = 0;
+    const std::string stem = color.stem().string(), ending = color.extension().string();
+    if (!parse_number(stem, number) || (ending != ".jpg" && ending != ".png")) continue;
+    recording_entry frame{number / frames_per_second, color, folder / "depth" / (stem + ".png"), {}};
+    if (!present(frame.depth)) {
+      ++without_depth;
+      continue;
+    }
+    if (const auto file = folder / "pose" / (stem + ".txt"); present(file)) {
+      const auto text = read_file(file);
+      if (!text) return fail(text.error());
+      index.files.push_back(file);
+      if (text->find("inf") != std::string::npos || text->find("nan") != std::string::npos) {
+        ++without_pose;
+      } else {
+        const auto pose = parse_pose_matrix(*text, file);
+        if (!pose) return fail(pose.error());
+        frame.T_world_camera = *pose;
+        index.ground_truth.push_back({frame.timestamp, *pose});
+      }
+    }
+    index.frames.push_back(std::move(frame));
+  }
+  const auto earlier = [](const auto& a, const auto& b) { return a.timestamp < b.timestamp; };
+  std::stable_sort(index.frames.begin(), index.frames.end(), earlier);
+  std::stable_sort(index.ground_truth.begin(), index.ground_truth.end(), earlier);
+  if (const auto ok = check_first_frame(index, folder); !ok) return fail(ok.error());
+  if (without_depth != 0)
+    index.notes.push_back(std::to_string(without_depth) + " colour images have no depth image and are left out");
+  if (without_pose != 0)
+    index.notes.push_back(std::to_string(without_pose) + " of " + std::to_string(index.frames.size()) +
+                          " frames have no pose: the camera was lost there");
+
+  const auto first_color = read_color(index.frames.front().color);
+  if (!first_color) return fail(first_color.error());
+  const auto first_depth = read_depth(index.frames.front().depth);
+  if (!first_depth) return fail(first_depth.error());
+  const auto camera_of = [&](const char* what, int width, int height) -> result<camera::pinhole> {
+    auto file = scannet_file(folder, what);
+    if (file.empty()) file = folder / "intrinsic" / (std::string{what} + ".txt");  // an error that names it
+    const auto k = read_camera_matrix(file);
+    if (!k) return fail(k.error());
+    index.files.push_back(file);
+    return camera::pinhole{width, height, (*k)(0, 0), (*k)(1, 1), (*k)(0, 2), (*k)(1, 2)};
+  };
+  const auto place_of = [&](const char* what) -> result<se3> {
+    const auto file = scannet_file(folder, what);
+    if (file.empty()) return se3{};
+    index.files.push_back(file);
+    return read_pose_matrix(file);
+  };
+  const auto color = camera_of("intrinsic_color", first_color->width(), first_color->height());
+  if (!color) return fail(color.error());
+  const auto depth = camera_of("intrinsic_depth", first_depth->width(), first_depth->height());
+  if (!depth) return fail(depth.error());
+  const auto T_rig_color = place_of("extrinsic_color"), T_rig_depth = place_of("extrinsic_depth");
+  if (!T_rig_color) return fail(T_rig_color.error());
+  if (!T_rig_depth) return fail(T_rig_depth.error());
+  index.camera = camera::camera_settings{.model = *depth, .depth_scale = 1000.0, .fps = frames_per_second};
+  const color_camera beside{*color, T_rig_color->inverse() * *T_rig_depth};
+  if (!(color->k() == depth->k()) || beside.T_color_depth.log().norm() > 1e-6) index.color = beside;
+  return index;
+}
+
+}  // namespace orbis::io::detail
