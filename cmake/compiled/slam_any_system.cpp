@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include <orbis/slam/stereo_system.hpp>
+#include <orbis/slam/any_system.hpp>
 
 namespace orbis::slam {
 

@@ -6,6 +6,8 @@
 /// | --- | --- |
 /// | `rgbd_system.hpp` | the SLAM system: give it frames, ask it for poses and the map |
 /// | `stereo_system.hpp` | the same from a stereo camera |
+/// | `monocular_system.hpp` | the same from one camera without depth |
+/// | `any_system.hpp` | the same for programs that learn at run time which of these they have |
 /// | `options.hpp` | all settings of the system |
 /// | `shutter_estimate.hpp` | what the frames tell of the shutter |
 /// | `track_result.hpp` | what tracking a frame returns: state, pose, timings, counters |
@@ -22,6 +24,8 @@
 /// | `validate.hpp` | whether a map is consistent |
 /// | `sensor.hpp` | what a frame measures for each feature: RGB-D |
 /// | `stereo.hpp` | the same for a stereo camera, and the options that suit it |
+/// | `monocular.hpp` | the same for one camera without depth, and the options that suit it |
+/// | `any_sensor.hpp` | the same for any of these |
 /// | `calibration.hpp` | the camera refined by the map that was made with it |
 /// | `camera_rig.hpp` | the camera with its image pyramid and the weight of depth |
 /// | `pyramid_scales.hpp` | the scales of an image pyramid |
@@ -29,6 +33,8 @@
 /// | `place_recognition.hpp` | how similar keyframes are found, replaceable |
 #pragma once
 
+#include <orbis/slam/any_sensor.hpp>
+#include <orbis/slam/any_system.hpp>
 #include <orbis/slam/atlas.hpp>
 #include <orbis/slam/calibration.hpp>
 #include <orbis/slam/camera_rig.hpp>
@@ -41,6 +47,8 @@
 #include <orbis/slam/map.hpp>
 #include <orbis/slam/map_file.hpp>
 #include <orbis/slam/matchers.hpp>
+#include <orbis/slam/monocular.hpp>
+#include <orbis/slam/monocular_system.hpp>
 #include <orbis/slam/options.hpp>
 #include <orbis/slam/place_recognition.hpp>
 #include <orbis/slam/pyramid_scales.hpp>

@@ -35,6 +35,42 @@ TEST_CASE("A map is whole after any sequence of operations") {
   }
 }
 
+TEST_CASE("Where corrections change the scale, erased keyframes and what hangs on keyframes follow") {
+  random_bits random(31);
+  slam::map m(8, 1.2);
+  for (int i = 0; i < 6; ++i) test::add_random_keyframe(random, m, 30, 20);
+  const se3 T_old = m.at(2).T_world_camera;
+  m.move_keyframe(2, sim3(so3{}, vec3(1, 0, 0), 2.0));
+  CHECK((m.at(2).T_world_camera.translation() - (2.0 * T_old.translation() + vec3(1, 0, 0))).norm() < 1e-12);
+  CHECK(m.scale_of(2) == 2.0);
+  m.move_keyframe(4, sim3(so3{}, vec3(0, 0, 0), 0.25));
+  // Erased, one after the other: poses stay, scales stay.
+  const se3 at_4 = m.at(4).T_world_camera, at_2 = m.at(2).T_world_camera;
+  m.erase_keyframe(4);
+  m.erase_keyframe(2);
+  CHECK((m.pose_of(4).inverse() * at_4).log().norm() < 1e-9);
+  CHECK((m.pose_of(2).inverse() * at_2).log().norm() < 1e-9);
+  CHECK(m.scale_of(4) == Approx(0.25));
+  CHECK(m.scale_of(2) == Approx(2.0));
+  // All is moved alike: as if nothing had been erased.
+  const sim3 all(so3::exp(vec3(0.3, -0.2, 0.1)), vec3(1, 2, 3), 3.0);
+  m.transform(all);
+  CHECK((m.pose_of(4).translation() - all * at_4.translation()).norm() < 1e-9);
+  CHECK((m.pose_of(2).translation() - all * at_2.translation()).norm() < 1e-9);
+  CHECK(m.scale_of(4) == Approx(0.75));
+  CHECK(m.scale_of(2) == Approx(6.0));
+  // Of a map without keyframes as well, and as a part of another one.
+  const se3 before_4 = m.pose_of(4);
+  for (slam::keyframe_id k = 0; k != m.keyframe_end(); ++k)
+    if (m.has_keyframe(k)) m.erase_keyframe(k);
+  CHECK((m.pose_of(4).inverse() * before_4).log().norm() < 1e-9);
+  slam::map other(8, 1.2);
+  test::add_random_keyframe(random, other, 30, 20);
+  const auto offsets = other.append(std::move(m), all, {0, slam::no_id});
+  CHECK((other.pose_of(4 + offsets.keyframes).translation() - all * before_4.translation()).norm() < 1e-9);
+  CHECK(other.scale_of(4 + offsets.keyframes) == Approx(2.25));
+}
+
 TEST_CASE("Keyframes that share landmarks come most shared first") {
   random_bits random(3);
   slam::map m(8, 1.2);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <fstream>
 #include <limits>
@@ -7,6 +8,7 @@
 #include <string>
 
 #include <orbis/core/random.hpp>
+#include <orbis/slam/detail/map/file_sections.hpp>
 #include <orbis/slam/map_file.hpp>
 
 #include "slam/random_map.hpp"
@@ -77,7 +79,7 @@ TEST_CASE("A file that is cut off says in which section") {
   CHECK(fault_of(bytes.substr(0, 10)) == "some.map: ends before its version");
   CHECK(fault_of(bytes.substr(0, 20)) == "some.map: section \"size\" is missing: the file ends at byte 20");
   CHECK(fault_of(bytes.substr(0, 100)) ==
-        "some.map: section \"kfrm\" from byte 52 is cut off: the file ends at byte 100");
+        "some.map: section \"kfrm\" from byte 56 is cut off: the file ends at byte 100");
   for (std::size_t size = 0; size < bytes.size(); size += 1 + size / 100) {
     const auto cut = parsed(bytes.substr(0, size));
     REQUIRE_FALSE(cut.has_value());
@@ -97,13 +99,60 @@ TEST_CASE("A file with one wrong bit says in which section") {
   }
   std::string damaged = bytes;
   damaged[100] = static_cast<char>(damaged[100] ^ 1);
-  CHECK(fault_of(damaged) == "some.map: section \"kfrm\" from byte 52 is damaged: its checksum does not fit");
+  CHECK(fault_of(damaged) == "some.map: section \"kfrm\" from byte 56 is damaged: its checksum does not fit");
   std::string newer = bytes;
-  newer[8] = 2;
+  newer[8] = 3;
   const auto m = parsed(newer);
   REQUIRE_FALSE(m.has_value());
   CHECK(m.error().code == errc::unsupported);
-  CHECK(m.error().message == "version 2, this reads version 1");
+  CHECK(m.error().message == "version 3, this reads versions 1 and 2");
+}
+
+TEST_CASE("A file says what sensor the map was made with, and one of version 1 is read, which does not") {
+  random_bits random(9);
+  slam::map m(8, 1.2);
+  auto f = test::random_frame(random, 5, 0);
+  f.sensor = slam::sensor_kind::monocular;
+  m.add_keyframe(f);
+  f.sensor = slam::sensor_kind::rgbd;  // that of the first one counts
+  m.add_keyframe(f);
+  const std::string bytes = slam::map_bytes(m);
+  const auto again = parsed(bytes);
+  REQUIRE(again.has_value());
+  CHECK(again->sensor() == slam::sensor_kind::monocular);
+  CHECK(to_string(again->sensor()) == "monocular");
+
+  constexpr std::size_t head = 12, begin = head + 12, size = 24;  // of the section "size" in version 1
+  std::string older = bytes.substr(0, head);
+  older[8] = 1;
+  slam::detail::put_section(older, "size", [&](std::string& to) { to += bytes.substr(begin, size); });
+  older += bytes.substr(begin + size + 4 + 4);
+  const auto old = parsed(older);
+  CHECK((old ? "" : old.error().to_string()) == "");
+  REQUIRE(old.has_value());
+  CHECK(old->sensor() == slam::sensor_kind::unknown);
+  CHECK(old->keyframes().size() == 2);
+
+  std::string none = bytes.substr(0, head);
+  slam::detail::put_section(none, "size", [&](std::string& to) {
+    to += bytes.substr(begin, size);
+    slam::detail::put(to, std::uint32_t{9});
+  });
+  CHECK(fault_of(none) == "some.map: a sensor of kind 9");
+}
+
+TEST_CASE("Corrections of the scale are in the lengths that a file holds") {
+  slam::map m = test::random_map(6, 600, 8);
+  slam::keyframe_id gone;
+  for (const auto& k : m.keyframes())
+    if (k.id != m.tree().root()) gone = k.id;
+  m.erase_keyframe(gone);
+  m.transform(sim3(so3{}, vec3(1, 2, 3), 2.5));
+  const auto again = parsed(slam::map_bytes(m));
+  REQUIRE(again.has_value());
+  CHECK((again->pose_of(gone).translation() - m.pose_of(gone).translation()).norm() < 1e-9);
+  CHECK(again->scale_of(gone) == 1.0);
+  CHECK(m.scale_of(gone) == 2.5);
 }
 
 TEST_CASE("Maps go to files and come back") {

@@ -29,6 +29,7 @@ struct ring_options {
   std::uint32_t symmetry = 1;  ///< the wall looks the same after each of so many parts of the round
   std::uint32_t memory = 8;    ///< keyframes after which a point that was not seen is not known again
   double drift = 1.0;          ///< how much of it
+  double shrinks = 0.0;        ///< lengths, by this share with each keyframe; then no depth is measured
   std::uint64_t seed = 1;
 };
 
@@ -39,6 +40,7 @@ class ring_world {
   slam::camera_rig<camera::any_camera> rig{{camera, 400.0}};
 
   explicit ring_world(const ring_options& o = {}) : o_{o}, radius_{0.15 * o.steps / (2 * std::numbers::pi)} {
+    rig.scale_is_known = o.shrinks == 0.0;
     random_bits random(o.seed);
     const double turn = 2 * std::numbers::pi / o.symmetry, wall = radius_ + 2.0;
     const auto count = static_cast<std::size_t>(o.density * turn * wall * 2.4);
@@ -100,7 +102,7 @@ class ring_world {
       f.features.descriptors.push_back(w.descriptor);
       for (int flips = 0; flips < 8; ++flips)
         f.features.descriptors.back().words[random.below(4)] ^= std::uint64_t{1} << random.below(64);
-      f.depth.push_back(static_cast<float>(rig.model.bf / (rig.model.bf / at.z() + dz)));
+      f.depth.push_back(rig.scale_is_known ? static_cast<float>(rig.model.bf / (rig.model.bf / at.z() + dz)) : 0.0F);
       f.rays.push_back(*camera.unproject(pixel));
       f.landmarks.push_back(slam::no_id);
       shown_[i].push_back(p);
@@ -110,8 +112,9 @@ class ring_world {
   }
 
   /// Adds keyframes for the steps `from` to `to` (exclusive), the first at `pose`, each a little wrong as seen from the
-  /// one before. Points that the last ones saw are known again. Keyframes are numbered as they come.
-  void walk(slam::map& m, std::uint32_t from, std::uint32_t to, se3 pose) {
+  /// one before. Points that the last ones saw are known again. Keyframes are numbered as they come. `scale`: of the
+  /// lengths at the first one.
+  void walk(slam::map& m, std::uint32_t from, std::uint32_t to, se3 pose, double scale = 1.0) {
     random_bits random(mix64(o_.seed + 77));
     std::vector<slam::landmark_id> known(points_.size(), slam::no_id);
     std::vector<std::uint32_t> last(points_.size(), 0);
@@ -120,7 +123,8 @@ class ring_world {
         const double a = o_.drift * 2e-4 * random.normal(), b = o_.drift * 3e-4 * random.normal();
         const se3 wrong(so3::exp(o_.drift * vec3(1e-4, 1.5e-3, -1e-4) + vec3(a, a, -a)),
                         o_.drift * vec3(5e-4, -2e-4, 5e-4) + vec3(b, -b, b));
-        pose = pose * (truth(i - 1).inverse() * truth(i)) * wrong;
+        scale *= 1.0 - o_.shrinks;
+        pose = pose * slam::detail::scaled((truth(i - 1).inverse() * truth(i)) * wrong, scale);
       }
       slam::frame f = look(i, pose);
       for (std::uint32_t k = 0; k < f.size(); ++k) {
@@ -128,6 +132,9 @@ class ring_world {
         if (known[p] != slam::no_id && i - last[p] <= o_.memory) f.landmarks[k] = known[p];
       }
       const slam::keyframe_id id = slam::detail::insert_keyframe(m, std::move(f), {});
+      for (std::uint32_t k = 0; !rig.scale_is_known && k < m.at(id).size(); ++k)
+        if (m.at(id).landmarks[k] == slam::no_id)
+          m.add_landmark(id, k, pose * vec3(scale * (truth(i).inverse() * points_[shown_[i][k]].position)));
       for (std::uint32_t k = 0; k < m.at(id).size(); ++k) {
         const std::size_t p = shown_[i][k];
         known[p] = m.at(id).landmarks[k];

@@ -29,12 +29,6 @@ static_assert(!slam::measures<slam::stereo, camera::pinhole, features::orb_extra
 static_assert(!slam::measures<slam::rgbd, camera::pinhole, features::orb_extractor, image_view<const rgb8>,
                               image_view<const rgb8>>);
 
-static_assert(slam::sensor<slam::any_sensor, descriptor>);
-static_assert(slam::measures<slam::any_sensor, camera::pinhole, features::orb_extractor, image_view<const rgb8>,
-                             image_view<const rgb8>>);
-static_assert(slam::measures<slam::any_sensor, camera::pinhole, features::orb_extractor, image_view<const rgb8>,
-                             camera::depth_view<float>>);
-
 /// Blocks of random brightness.
 image<std::uint8_t> blocks(int width, int height) {
   image<std::uint8_t> im(width, height);

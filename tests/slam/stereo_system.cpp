@@ -5,6 +5,7 @@
 #include <orbis/eval/ate.hpp>
 #include <orbis/io/stereo_recording.hpp>
 #include <orbis/io/synthetic.hpp>
+#include <orbis/slam/any_system.hpp>
 #include <orbis/slam/stereo_system.hpp>
 #include <orbis/slam/validate.hpp>
 

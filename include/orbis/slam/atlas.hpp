@@ -13,6 +13,7 @@
 #include <utility>
 
 #include <orbis/core/se3.hpp>
+#include <orbis/core/sim3.hpp>
 #include <orbis/slam/ids.hpp>
 #include <orbis/slam/map.hpp>
 
@@ -75,13 +76,16 @@ class basic_atlas {
   /// Makes map `from` a part of map `into`: it is moved by `T_into_from` and its spanning tree attached at `link`. If
   /// it was the active map, `into` becomes it. No landmarks are fused, and no loop edge is added. O(both maps).
   /// @pre from != into; `link` refers to keyframes that are there, unless either map is empty
-  id_offsets merge(map_id from, map_id into, const se3& T_into_from, const map_link& link) {
+  id_offsets merge(map_id from, map_id into, const sim3& T_into_from, const map_link& link) {
     assert(from != into && contains(from) && contains(into));
     const id_offsets offsets = at(into).append(std::move(at(from)), T_into_from, link);
     maps_.erase(from);
     merged_[from] = {into, offsets};
     if (active_ == from) active_ = into;
     return offsets;
+  }
+  id_offsets merge(map_id from, map_id into, const se3& T_into_from, const map_link& link) {
+    return merge(from, into, sim3(T_into_from), link);
   }
   /// As above, where no pair of keyframes is known: the root of `from` becomes a child of the keyframe of `into` that
   /// is nearest to it. O(both maps).

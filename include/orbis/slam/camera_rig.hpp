@@ -3,6 +3,7 @@
 /// The camera as the SLAM system uses it: its model, its image pyramid, and how much its depth is worth.
 #pragma once
 
+#include <cmath>
 #include <utility>
 
 #include <orbis/camera/model.hpp>
@@ -20,6 +21,7 @@ struct camera_rig {
   pyramid_scales scales{};               ///< of the extractor's image pyramid
   double min_depth = 0.1;                ///< metres; depth outside of min_depth ... max_depth is not used
   double max_depth = 10.0;               ///< metres
+  bool scale_is_known = true;            ///< false if no depth is measured: lengths are in a unit of the map's own
 
   [[nodiscard]] const Camera& camera() const noexcept { return model.camera; }
   /// The standard deviation of a depth (metres) that was measured at a keypoint of a pyramid level, metres.
@@ -33,11 +35,19 @@ camera_rig(optimize::reprojection<Camera>, pyramid_scales) -> camera_rig<Camera>
 
 /// The rig of a camera with the settings of a system.
 template <camera::camera_model Camera>
-[[nodiscard]] camera_rig<Camera> make_rig(Camera camera, const options& settings) {
+[[nodiscard]] camera_rig<Camera> make_rig(Camera camera, const options& settings, bool scale_is_known = true) {
   return {{std::move(camera), settings.bf},
           {settings.features.levels, static_cast<double>(settings.features.scale_factor)},
           settings.min_depth,
-          settings.max_depth};
+          settings.max_depth,
+          scale_is_known};
+}
+
+/// The focal length in the middle of the image, pixels per radian; 0 if the camera cannot project there.
+template <camera::camera_model Camera>
+[[nodiscard]] double focal_length(const Camera& camera) {
+  matrix<2, 3> j = matrix<2, 3>::Zero();
+  return camera.project(vec3(0.0, 0.0, 1.0), j) ? std::sqrt(std::abs(j(0, 0) * j(1, 1))) : 0.0;
 }
 
 }  // namespace orbis::slam

@@ -9,6 +9,7 @@
 #include <string_view>
 
 #include <orbis/core/se3.hpp>
+#include <orbis/core/sim3.hpp>
 #include <orbis/slam/ids.hpp>
 #include <orbis/slam/track_result.hpp>
 
@@ -44,7 +45,7 @@ struct correction_event {
   map_keyframe from{}, to{};  ///< of a loop or merger: the keyframes of the same place (`from` by its new id)
   map_id merged = 0;          ///< of a merger: the map that became a part of `map`
   id_offsets offsets{};       ///< of a merger: by how much the ids of `merged` grew
-  se3 T_corrected_before{};   ///< the correction at keyframe `from`, in the world of the map
+  sim3 T_corrected_before{};  ///< the correction at keyframe `from`, in the world of the map; with depth of scale 1
   double milliseconds = 0.0;  ///< wall time
 };
 

@@ -4,6 +4,8 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
+#include <string_view>
 #include <vector>
 
 #include <orbis/core/se3.hpp>
@@ -14,6 +16,19 @@
 #include <orbis/slam/ids.hpp>
 
 namespace orbis::slam {
+
+/// What took a frame.
+enum class sensor_kind : std::uint8_t { unknown, rgbd, stereo, monocular };
+
+[[nodiscard]] constexpr std::string_view to_string(sensor_kind kind) noexcept {
+  switch (kind) {
+    case sensor_kind::unknown: return "unknown";
+    case sensor_kind::rgbd: return "rgbd";
+    case sensor_kind::stereo: return "stereo";
+    case sensor_kind::monocular: return "monocular";
+  }
+  return "unknown";
+}
 
 /// A keypoint where a rolling shutter read it, at the time of its row.
 struct keypoint_as_read {
@@ -36,6 +51,7 @@ struct basic_frame {
   std::vector<vec3> rays;               ///< through each keypoint, scaled to z = 1; NaN where the pixel has no ray
   std::vector<landmark_id> landmarks;   ///< observed by each keypoint, or `no_id`
   orbis::features::keypoint_grid grid;  ///< of the keypoints
+  sensor_kind sensor = sensor_kind::unknown;
   /// Few landmarks hold the pose, or none, and depth does: adjustments, which know of landmarks only, keep it. Map
   /// files do not tell.
   bool held_by_depth = false;
@@ -58,6 +74,9 @@ struct basic_frame {
 template <feature_descriptor D>
 struct basic_keyframe : basic_frame<D> {
   keyframe_id id;
+  /// By how much corrections have multiplied the lengths around the keyframe since it was made, in maps whose scale is
+  /// not measured. What was noted relative to the keyframe is to be multiplied by how much this has changed.
+  double scale = 1.0;
 };
 
 /// Frames and keyframes with the descriptors of ORB.

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include <orbis/core/se3.hpp>
+#include <orbis/core/sim3.hpp>
 #include <orbis/slam/covisibility_graph.hpp>
 #include <orbis/slam/detail/map/counter.hpp>
 #include <orbis/slam/detail/map/map_content.hpp>
@@ -54,6 +55,8 @@ class basic_map {
   /// @pre the content is consistent: ids refer to what is there, and no keypoint observes two landmarks
   explicit basic_map(detail::map_content<D> content);
 
+  /// What took the map's first keyframe. Lengths of a monocular map are in a unit of its own.
+  [[nodiscard]] sensor_kind sensor() const noexcept { return content_.sensor; }
   /// The keyframes by ascending id: a range with `size()`, `empty()`, `front()` and `back()`.
   [[nodiscard]] const auto& keyframes() const noexcept { return content_.keyframes; }
   /// The landmarks by ascending id: a range as `keyframes()`.
@@ -84,6 +87,8 @@ class basic_map {
   [[nodiscard]] std::uint64_t pose_changes() const noexcept { return pose_changes_; }
   /// `T_world_camera` of a keyframe. An erased keyframe moves with the one that replaced it. @pre id < keyframe_end()
   [[nodiscard]] se3 pose_of(keyframe_id id) const;
+  /// `basic_keyframe::scale`, that of an erased keyframe as well. @pre id < keyframe_end()
+  [[nodiscard]] double scale_of(keyframe_id id) const;
 
   [[nodiscard]] const covisibility_graph& covisibility() const noexcept { return covisibility_; }
   [[nodiscard]] const spanning_tree& tree() const noexcept { return content_.tree; }
@@ -100,14 +105,22 @@ class basic_map {
   }
   /// @pre has_landmark(id)
   void set_position(landmark_id id, const vec3& position) { content_.landmarks[id].position = position; }
+  /// Moves a keyframe by `T_new_old`, a motion in the world, whose scale counts in `scale_of`. @pre has_keyframe(id)
+  void move_keyframe(keyframe_id id, const sim3& T_new_old) {
+    set_pose(id, moved(T_new_old, at(id).T_world_camera));
+    content_.keyframes[id].scale *= T_new_old.scale();
+  }
   /// Moves a landmark and its normal by `T_new_old`, a motion in the world. @pre has_landmark(id)
-  void move_landmark(landmark_id id, const se3& T_new_old) {
+  void move_landmark(landmark_id id, const sim3& T_new_old) {
     landmark_type& l = content_.landmarks[id];
     l.position = T_new_old * l.position;
     l.normal = T_new_old.rotation() * l.normal;
+    l.min_distance *= T_new_old.scale();
+    l.max_distance *= T_new_old.scale();
   }
   /// Changes the world frame of the whole map: poses and positions are multiplied by `T_new_old`. O(map).
-  void transform(const se3& T_new_old);
+  void transform(const sim3& T_new_old);
+  void transform(const se3& T_new_old) { transform(sim3(T_new_old)); }
 
   /// Adds a frame as a keyframe. It observes `f.landmarks` (fused ones by their replacement). Its parent in the
   /// spanning tree is the keyframe that it shares most landmarks with, or the newest one if it shares none.
@@ -148,13 +161,20 @@ class basic_map {
   /// Makes another map a part of this one: its world is moved by `T_this_other`, its spanning tree attached at `link`.
   /// No landmarks are fused. Returns by how much its ids have grown. O(both maps).
   /// @pre both have the same pyramid; `link` refers to keyframes that are there, unless either map is empty
-  id_offsets append(basic_map&& other, const se3& T_this_other, const map_link& link);
+  id_offsets append(basic_map&& other, const sim3& T_this_other, const map_link& link);
+  id_offsets append(basic_map&& other, const se3& T_this_other, const map_link& link) {
+    return append(std::move(other), sim3(T_this_other), link);
+  }
 
   /// The keyframes that observe any of the given landmarks, with how many they observe: most first, older first where
   /// equal. O(observations of these landmarks).
   [[nodiscard]] std::vector<covisible> observers_of(const std::vector<landmark_id>& landmarks) const;
 
  private:
+  /// A pose after a motion in the world.
+  [[nodiscard]] static se3 moved(const sim3& T_new_old, const se3& T_old_camera) {
+    return {T_new_old.rotation() * T_old_camera.rotation(), vec3(T_new_old * T_old_camera.translation())};
+  }
   /// Adds both sides of an observation, without the covisibility graph.
   bool attach(landmark_id id, keyframe_id k, std::uint32_t feature);
   /// Removes both sides of an observation, without the covisibility graph. @pre there is one
@@ -186,26 +206,42 @@ se3 basic_map<D>::pose_of(keyframe_id id) const {
   se3 T_below_camera;
   while (!has_keyframe(id)) {
     const detail::erased_keyframe& e = content_.erased.at(id);
-    T_below_camera = e.T_replacement_camera * T_below_camera;
+    T_below_camera = e.T_replacement_camera * detail::scaled(T_below_camera, e.scale);
     if (e.replacement == no_id) return T_below_camera;
     id = e.replacement;
   }
-  return at(id).T_world_camera * T_below_camera;
+  return at(id).T_world_camera * detail::scaled(T_below_camera, at(id).scale);
 }
 
 template <feature_descriptor D>
-void basic_map<D>::transform(const se3& T_new_old) {
+double basic_map<D>::scale_of(keyframe_id id) const {
+  double scale = 1.0;
+  while (!has_keyframe(id)) {
+    const detail::erased_keyframe& e = content_.erased.at(id);
+    scale *= e.scale;
+    if (e.replacement == no_id) return scale;
+    id = e.replacement;
+  }
+  return scale * at(id).scale;
+}
+
+template <feature_descriptor D>
+void basic_map<D>::transform(const sim3& T_new_old) {
   for (keyframe_id k = 0; k != keyframe_end(); ++k)
-    if (has_keyframe(k)) set_pose(k, T_new_old * at(k).T_world_camera);
+    if (has_keyframe(k)) move_keyframe(k, T_new_old);
   for (landmark_id l = 0; l != landmark_end(); ++l)
     if (has_landmark(l)) move_landmark(l, T_new_old);
   for (auto& [id, e] : content_.erased)
-    if (e.replacement == no_id) e.T_replacement_camera = T_new_old * e.T_replacement_camera;
+    if (e.replacement == no_id) {
+      e.T_replacement_camera = moved(T_new_old, e.T_replacement_camera);
+      e.scale *= T_new_old.scale();
+    }
 }
 
 template <feature_descriptor D>
 keyframe_id basic_map<D>::add_keyframe(frame_type f) {
   ++pose_changes_;
+  if (content_.sensor == sensor_kind::unknown) content_.sensor = f.sensor;
   const keyframe_id before = content_.keyframes.empty() ? no_id : content_.keyframes.back().id;
   const std::vector<landmark_id> seen = std::exchange(f.landmarks, std::vector<landmark_id>(f.features.size(), no_id));
   const keyframe_id id = content_.keyframes.add({std::move(f), keyframe_end()});
@@ -226,9 +262,13 @@ void basic_map<D>::erase_keyframe(keyframe_id id) {
   const keyframe_id replacement =
       content_.tree.erase(id, [&](keyframe_id a, keyframe_id b) { return covisibility_.shared(a, b); });
   covisibility_.erase(id);
-  const se3& T_world_camera = at(id).T_world_camera;
-  content_.erased[id] = {
-      replacement, replacement == no_id ? T_world_camera : at(replacement).T_world_camera.inverse() * T_world_camera};
+  const keyframe_type& gone = at(id);
+  detail::erased_keyframe& kept = content_.erased[id] = {replacement, gone.T_world_camera, gone.scale};
+  if (replacement != no_id) {
+    const keyframe_type& by = at(replacement);
+    kept.T_replacement_camera = detail::scaled(by.T_world_camera.inverse() * gone.T_world_camera, 1.0 / by.scale);
+    kept.scale /= by.scale;
+  }
   content_.keyframes.erase(id, replacement);
 }
 
@@ -299,18 +339,19 @@ void basic_map<D>::update_landmark(landmark_id id) {
 }
 
 template <feature_descriptor D>
-id_offsets basic_map<D>::append(basic_map&& other, const se3& T_this_other, const map_link& link) {
+id_offsets basic_map<D>::append(basic_map&& other, const sim3& T_this_other, const map_link& link) {
   ++pose_changes_;
   assert(content_.levels == other.content_.levels && content_.scale_factor == other.content_.scale_factor);
   other.transform(T_this_other);
   const id_offsets offsets{keyframe_end().value(), landmark_end().value()};
   for (const auto& [id, e] : other.content_.erased)
     content_.erased[id + offsets.keyframes] = {
-        e.replacement == no_id ? keyframe_id{} : e.replacement + offsets.keyframes, e.T_replacement_camera};
+        e.replacement == no_id ? keyframe_id{} : e.replacement + offsets.keyframes, e.T_replacement_camera, e.scale};
   content_.tree.append(std::move(other.content_.tree), offsets.keyframes, link.into, link.from);
   covisibility_.append(std::move(other.covisibility_), offsets.keyframes);
   content_.keyframes.append(std::move(other.content_.keyframes));
   content_.landmarks.append(std::move(other.content_.landmarks));
+  if (content_.sensor == sensor_kind::unknown) content_.sensor = other.content_.sensor;
   for (keyframe_id id = offsets.keyframes; id != keyframe_end(); ++id) {
     if (!has_keyframe(id)) continue;
     keyframe_type& k = content_.keyframes[id];

@@ -5,14 +5,15 @@
 /// A file is little-endian; equal maps give equal bytes on every machine:
 ///
 ///     0   "orbismap"
-///     8   version (u32), 1
+///     8   version (u32), 2; version 1 is read as well
 ///     12  the sections "size", "kfrm", "tree" and "land", each: its name (4 bytes), the length of its content (u64),
 ///         the content, CRC-32C of all three (u32)
 ///
 /// Poses are tx ty tz qx qy qz qw (f64); ids are u32, ffffffff for none.
 ///
 ///     size  levels of the pyramid (u32), shared landmarks that make an edge (u32), scale factor (f64), number of ids
-///           given to keyframes (u32) and to landmarks (u32) so far
+///           given to keyframes (u32) and to landmarks (u32) so far, sensor (u32: 1 RGB-D, 2 stereo, 3 monocular, 0 not
+///           known; not in version 1)
 ///     kfrm  for each keyframe id a byte. 0: it was erased; its replacement (id) and its pose relative to that. 1: time
 ///           stamp (f64), frame index (u64), pose, number of keypoints (u32), and for each keypoint x, y, size, angle,
 ///           response (f32), octave (i32), depth (f32), x and y of the ray (f64; NaN without one), descriptor (32

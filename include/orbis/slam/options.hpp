@@ -210,6 +210,7 @@ struct options {
   adjustment_options adjustment{};
   culling_options culling{};
   recovery_options recovery{};
+  bool scale_is_measured = true;  ///< for `any_sensor`: off for images of one camera, see `monocular_options`
   start_options start{};
   depth_term_options depth_term{};
   place_options places{};

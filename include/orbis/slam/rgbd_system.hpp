@@ -104,6 +104,12 @@ class rgbd_system {
                      image_view<const std::uint8_t> right) requires
       measures<Sensor, Camera, Extractor, image_view<const std::uint8_t>, image_view<const std::uint8_t>>;
 
+  /// As above, for a sensor that takes one image.
+  track_result track(double timestamp,
+                     image_view<const rgb8> color) requires measures<Sensor, Camera, Extractor, image_view<const rgb8>>;
+  track_result track(double timestamp, image_view<const std::uint8_t> grey) requires
+      measures<Sensor, Camera, Extractor, image_view<const std::uint8_t>>;
+
   /// The state after the last frame.
   [[nodiscard]] track_state state() const;
   /// Whether the map is kept unchanged.
@@ -168,8 +174,8 @@ class rgbd_system {
       const requires std::same_as<descriptor_of_t<Extractor>, features::binary_descriptor<256>>;
   /// Reads a map from a file and makes it the active one; the camera is searched for in it. The map so far is kept, and
   /// merged into the loaded one where that is recognised; without keyframes it is removed. For the descriptors of ORB.
-  /// Errors: those of `read_map`, `unsupported` for a map of another image pyramid, `no_data` for one without
-  /// keyframes.
+  /// Errors: those of `read_map`, `unsupported` for a map of another image pyramid, or one with a scale of its own
+  /// where the sensor measures lengths, and the other way round, `no_data` for one without keyframes.
   [[nodiscard]] result<void> load_map(const std::filesystem::path& path) requires
       std::same_as<descriptor_of_t<Extractor>, features::binary_descriptor<256>>;
 
@@ -230,7 +236,7 @@ ORBIS_SLAM_SYSTEM_TEMPLATE
 ORBIS_SLAM_SYSTEM::rgbd_system(Camera camera, const options& settings, Extractor extractor, Places places)
     : options_{settings},
       extract_{std::move(extractor)},
-      shared_{make_rig(std::move(camera), settings), options_, std::move(places)},
+      shared_{make_rig(std::move(camera), settings, measures_scale<Sensor>(settings)), options_, std::move(places)},
       front_end_{shared_.rig, options_},
       localization_only_{settings.localization_only},
       back_end_{shared_} {}
@@ -262,6 +268,18 @@ track_result ORBIS_SLAM_SYSTEM::track(double timestamp, image_view<const std::ui
 }
 
 ORBIS_SLAM_SYSTEM_TEMPLATE
+track_result ORBIS_SLAM_SYSTEM::track(double timestamp, image_view<const rgb8> color) requires
+    measures<Sensor, Camera, Extractor, image_view<const rgb8>> {
+  return track_images(timestamp, color);
+}
+
+ORBIS_SLAM_SYSTEM_TEMPLATE
+track_result ORBIS_SLAM_SYSTEM::track(double timestamp, image_view<const std::uint8_t> grey) requires
+    measures<Sensor, Camera, Extractor, image_view<const std::uint8_t>> {
+  return track_images(timestamp, grey);
+}
+
+ORBIS_SLAM_SYSTEM_TEMPLATE
 template <class... Images>
 track_result ORBIS_SLAM_SYSTEM::track_images(double timestamp, const Images&... images) {
   track_result result;
@@ -277,7 +295,10 @@ track_result ORBIS_SLAM_SYSTEM::track_images(double timestamp, const Images&... 
       Sensor::follow_rows(shared_.rig, motion, seen, images...);
   };
   const std::optional<map_keyframe> made = localize(std::move(f), std::cref(follow_rows), result, clock);
-  if (made) dispatch_keyframe(*made);
+  if (made) {
+    if (const auto& first = front_end_.first_keyframe()) dispatch_keyframe(*first);
+    dispatch_keyframe(*made);
+  }
   report(result, made);
   clock.lap(result.timings.mapping_ms);
   return result;
@@ -316,7 +337,7 @@ std::optional<map_keyframe> ORBIS_SLAM_SYSTEM::localize(
   std::optional<map_keyframe> made;
   if (front_end_.is_tracking()) {
     front_end_.update_reference(f, maps);
-    const bool may_grow = maps.active().keyframes().empty() || (!is_frozen && !back_end_.is_full());
+    const bool may_grow = front_end_.begins_map() || (!is_frozen && !back_end_.is_full());
     if (may_grow && front_end_.needs_keyframe(f, result.inliers, maps)) made = front_end_.make_keyframe(f, maps);
   }
   front_end_.finish(std::move(f), maps, made);
@@ -448,6 +469,10 @@ result<void> ORBIS_SLAM_SYSTEM::load_map(const std::filesystem::path& path) requ
   const auto& content = loaded->content();
   if (content.levels != shared_.rig.scales.levels() || !(content.scale_factor == shared_.rig.scales.factor()))
     return fail(errc::unsupported, path.string(), "the map was made with another image pyramid");
+  if ((loaded->sensor() == sensor_kind::monocular) == shared_.rig.scale_is_known)
+    return fail(errc::unsupported, path.string(),
+                shared_.rig.scale_is_known ? "the map was made without depth, its unit of length is not the metre"
+                                           : "the map was made with depth, and this sensor measures none");
   if (loaded->keyframes().empty()) return fail(errc::no_data, path.string(), "the map has no keyframes");
   std::vector<std::pair<keyframe_id, typename Places::signature>> bow_vectors;  // before tracking has to wait
   for (const auto& k : loaded->keyframes()) bow_vectors.emplace_back(k.id, shared_.places.describe(k.features));

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <concepts>
 #include <cstddef>
+#include <cstdint>
 #include <limits>
 #include <optional>
 #include <utility>
@@ -24,6 +25,13 @@
 
 namespace orbis::slam {
 
+/// Where the scale of a sensor's maps comes from.
+enum class scale_source : std::uint8_t {
+  sensor,  ///< depth, or a baseline, is measured
+  free,    ///< nothing tells it
+  options  ///< the sensor is known at run time only: `options::scale_is_measured` tells
+};
+
 /// A kind of sensor, as a compile-time policy of the SLAM system, which holds one that is made by default (it may keep
 /// working memory). With `s` a const one,
 ///  - `s.measure(rig, extract, images...)`: a frame with its features, their rays, and what the sensor measures for
@@ -32,12 +40,22 @@ namespace orbis::slam {
 ///    `images...` are those that the sensor takes at one moment. What tracking and adjustments compare is the right
 ///    coordinate
 ///    (`optimize::reprojection`): that of a second camera, or of a virtual one that stands for the depth sensor;
-///  - `S::begins_map(frame, options)`: the number of points with which this frame can begin a map; 0 if it cannot.
+///  - `S::begins_map(frame, options)`: the number of points with which this frame can begin a map; 0 if it cannot;
+///  - `S::scale`: whether lengths are measured. Without, a map begins with two frames that `begins_map` lets through
+///  and
+///    enough parallax between them, lengths are in a unit of the map's own, and their drift is corrected at loops.
 template <class S, class D>
 concept sensor = feature_descriptor<D> && std::default_initializable<S> &&
     requires(const basic_frame<D>& f, const options& settings) {
   { S::begins_map(f, settings) } -> std::convertible_to<std::size_t>;
+  { S::scale } -> std::convertible_to<scale_source>;
 };
+
+/// Whether a sensor measures lengths, with these options.
+template <class S>
+[[nodiscard]] bool measures_scale(const options& settings) {
+  return S::scale == scale_source::sensor || (S::scale == scale_source::options && settings.scale_is_measured);
+}
 
 /// Whether a sensor makes frames of these images.
 template <class S, class Camera, class Extractor, class... Images>
@@ -69,6 +87,8 @@ concept has_depth_image = requires(const Images&... images) {
 
 /// A colour image with a registered depth image. The first frame with enough depth begins a map.
 struct rgbd {
+  static constexpr scale_source scale = scale_source::sensor;
+
   /// Extracts features and reads their depth. Depth outside of the rig's range is not used. @pre all images have the
   /// size of the camera
   template <camera::camera_model Camera, feature_extractor Extractor, camera::depth_source Depth>
@@ -101,8 +121,10 @@ namespace detail {
 
 /// A frame of features, with rays, before their depth is measured. Features whose pixel has no ray get NaN.
 template <camera::camera_model Camera, feature_descriptor D>
-[[nodiscard]] basic_frame<D> frame_of(const camera_rig<Camera>& rig, features::basic_features<D> features) {
+[[nodiscard]] basic_frame<D> frame_of(const camera_rig<Camera>& rig, features::basic_features<D> features,
+                                      sensor_kind sensor) {
   basic_frame<D> f;
+  f.sensor = sensor;
   f.features = std::move(features);
   const std::size_t n = f.features.size();
   f.depth.resize(n);
@@ -123,7 +145,7 @@ template <camera::camera_model Camera, feature_extractor Extractor, camera::dept
 basic_frame<descriptor_of_t<Extractor>> rgbd::measure(const camera_rig<Camera>& rig, const Extractor& extract,
                                                       image_view<const rgb8> color, const Depth& depth) {
   const auto usable = [&](double z) { return z >= rig.min_depth && z <= rig.max_depth; };
-  auto f = detail::frame_of(rig, extract(color));
+  auto f = detail::frame_of(rig, extract(color), sensor_kind::rgbd);
   for (std::size_t i = 0; i < f.size(); ++i) {
     const auto& k = f.features.keypoints[i];
     const auto z = std::isnan(f.rays[i].x()) ? std::nullopt : features::depth_at(depth, k.x, k.y);

@@ -31,6 +31,8 @@ namespace orbis::slam {
 /// parallax. The first frame with enough depth begins a map. It keeps working memory: one call at a time.
 class stereo {
  public:
+  static constexpr scale_source scale = scale_source::sensor;
+
   /// @pre both images have the size of the camera
   template <camera::camera_model Camera, feature_extractor Extractor>
   [[nodiscard]] basic_frame<descriptor_of_t<Extractor>> measure(const camera_rig<Camera>& rig, const Extractor& extract,
@@ -72,7 +74,7 @@ class stereo {
                                         image_view<const std::uint8_t> left_image,
                                         const features::basic_features<D>& right,
                                         image_view<const std::uint8_t> right_image) const {
-    auto f = detail::frame_of(rig, std::move(left));
+    auto f = detail::frame_of(rig, std::move(left), sensor_kind::stereo);
     const double bf = rig.model.bf;
     match_.into(columns_, f.features, left_image, right, right_image,
                 {.levels = rig.scales.levels(),
@@ -89,14 +91,6 @@ class stereo {
   features::stereo_matcher<> match_;
   mutable image<std::uint8_t> grey_left_, grey_right_;
   mutable std::vector<float> columns_;
-};
-
-/// Takes colour with depth, or a stereo pair, whichever it is given: for programs that learn at run time which of both
-/// they have. One system is to be given one kind of images.
-struct any_sensor : rgbd, stereo {
-  using rgbd::begins_map;  // both begin alike
-  using rgbd::measure;
-  using stereo::measure;
 };
 
 /// The settings of a rectified stereo camera of focal length `focal` (pixels) and `baseline` (metres), on top of

@@ -24,12 +24,4 @@ namespace orbis::slam {
 using stereo_system =
     rgbd_system<camera::any_camera, features::orb_extractor, orb_matchers, bag_of_words_places, stereo>;
 
-/// A system whose sensor, as its camera, is known at run time only.
-using any_system =
-    rgbd_system<camera::any_camera, features::orb_extractor, orb_matchers, bag_of_words_places, any_sensor>;
-
 }  // namespace orbis::slam
-
-#ifdef ORBIS_COMPILED
-#include <orbis/slam/detail/compiled/stereo_system.hpp>
-#endif

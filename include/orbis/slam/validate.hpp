@@ -53,6 +53,7 @@ class map_check {
       if (k.features.descriptors.size() != n || k.depth.size() != n || k.rays.size() != n || k.landmarks.size() != n)
         return wrong_keyframe(id, "does not have one descriptor, depth, ray and landmark for each keypoint");
       if (!is_finite(k.T_world_camera)) return wrong_keyframe(id, "has a pose that is not finite");
+      if (!(k.scale > 0.0 && std::isfinite(k.scale))) return wrong_keyframe(id, "has a scale that is none");
       for (std::size_t i = 0; i != n; ++i) {
         const landmark_id l = k.landmarks[i];
         const auto at = "keypoint " + std::to_string(i) + " shows landmark " + to_string(l);

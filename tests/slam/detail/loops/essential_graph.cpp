@@ -1,5 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <numbers>
 #include <set>
 #include <utility>
 #include <vector>
@@ -15,8 +18,6 @@
 using namespace orbis;
 using slam::detail::edge_kind;
 
-static_assert(optimize::relative_measurement<slam::detail::essential_edge, se3>);
-
 TEST_CASE("The essential graph has the tree, the loops, and the strong pairs, each once") {
   for (std::uint64_t seed = 80; seed < 90; ++seed) {
     const slam::map m = test::random_map(seed, 1500);
@@ -26,7 +27,7 @@ TEST_CASE("The essential graph has the tree, the loops, and the strong pairs, ea
       REQUIRE(pairs.insert(std::minmax(e.from, e.to)).second);
       (e.kind == edge_kind::tree ? tree : e.kind == edge_kind::loop ? loops : strong).insert(std::minmax(e.from, e.to));
       CHECK(e.shared == m.covisibility().shared(e.from, e.to));
-      const se3 expected = m.at(e.from).T_world_camera.inverse() * m.at(e.to).T_world_camera;
+      const sim3 expected(m.at(e.from).T_world_camera.inverse() * m.at(e.to).T_world_camera);
       CHECK((expected.inverse() * e.measurement).log().norm() < 1e-12);
     }
     CHECK(std::is_sorted(edges.begin(), edges.end(), [](const auto& a, const auto& b) { return a.from < b.from; }));
@@ -42,6 +43,45 @@ TEST_CASE("The essential graph has the tree, the loops, and the strong pairs, ea
         REQUIRE(strong.contains({a.id, b.id}) == (m.covisibility().shared(a.id, b.id) >= 4 && !in_tree && !in_loop));
       }
   }
+}
+
+TEST_CASE("Poses on a loop: without a known scale its drift is spread over the keyframes with the rest") {
+  // A walk round a square, one step a corner, each step's lengths 3 % less than they were before.
+  constexpr int steps = 24;
+  const sim3 right(so3::exp(vec3(0, 0, std::numbers::pi / 12)), vec3(1, 0, 0), 1.0);
+  const sim3 measured(right.rotation(), right.translation(), 0.97);
+  std::vector<sim3> truth(1), poses(1);
+  for (int i = 1; i != steps; ++i) {
+    truth.push_back(truth.back() * right);
+    const sim3 next = poses.back() * measured;
+    poses.push_back(next);
+  }
+  std::vector<slam::detail::essential_edge> edges;
+  for (std::uint32_t i = 1; i != steps; ++i) {
+    // What a map knows: poses without scale, whose lengths have shrunk so far.
+    poses[i] = sim3(poses[i].rotation(), poses[i].translation(), 1.0);
+    edges.push_back({i, i - 1, edge_kind::tree, 100, poses[i].inverse() * poses[i - 1]});
+  }
+  const double shrunk = std::pow(0.97, steps - 1);
+  const sim3 closes = truth.front().inverse() * truth.back();
+  edges.push_back(
+      {0, steps - 1, edge_kind::loop, 100, sim3(closes.rotation(), closes.translation(), 1.0 / shrunk), 100.0});
+  std::vector<std::uint8_t> fixed(steps, 0);
+  fixed[0] = 1;
+  const auto error_of = [&](const std::vector<sim3>& p) {
+    double worst = 0.0;
+    for (int i = 0; i != steps; ++i) worst = std::max(worst, (p[i].translation() - truth[i].translation()).norm());
+    return worst;
+  };
+  std::vector<sim3> rigid = poses, similar = poses;
+  REQUIRE(slam::detail::optimize_poses(rigid, edges, fixed, true, 50));
+  REQUIRE(slam::detail::optimize_poses(similar, edges, fixed, false, 50));
+  for (const sim3& p : rigid) CHECK(p.scale() == 1.0);
+  CHECK(similar.front().scale() == 1.0);
+  CHECK(similar.back().scale() == Approx(1.0 / shrunk).epsilon(0.02));
+  CHECK(error_of(poses) > 1.0);
+  CHECK(error_of(similar) < 0.2 * error_of(poses));
+  CHECK(error_of(similar) < 0.5 * error_of(rigid));
 }
 
 TEST_CASE("Only the tree is left when nothing is strong, and nothing when there is no keyframe") {

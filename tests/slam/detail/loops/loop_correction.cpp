@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <utility>
 #include <vector>
 
+#include <orbis/slam/detail/loops/global_adjustment.hpp>
 #include <orbis/slam/detail/loops/loop_correction.hpp>
 
 #include "slam/random_map.hpp"
@@ -84,6 +86,39 @@ TEST_CASE("Closing a loop takes the drift out of keyframes and landmarks, erased
   CHECK(again.moved < 0.01);
   CHECK(again.fusion.fused < report.fusion.fused / 20);
   CHECK(test::fault_of(r.m) == "");
+}
+
+TEST_CASE("Without depth a loop takes out the drift of the scale as well") {
+  test::ring_world world{{.shrinks = 0.004}};
+  slam::map m = world.round(4);
+  m.erase_keyframe(40);
+  const slam::keyframe_id last = m.keyframes().back().id;
+  const auto check = slam::detail::verify_loop(m, last, m, 3, world.rig, {.max_rotation = 1.0});
+  CHECK(to_string(check.verdict) == "accepted");
+  const double shrunk = std::pow(1.0 - 0.004, 100);
+  CHECK(check.match.scale == Approx(1.0 / shrunk).epsilon(0.01));
+  const slam::map before = m;
+  const auto report = slam::detail::loop_correction::close(m, check.match, world.rig);
+  CHECK(report.corrected);
+  CHECK(report.scale == Approx(1.0 / shrunk).epsilon(0.02));
+  CHECK(test::fault_of(m) == "");
+  const auto [worst_before, mean_before] = world.errors(before);
+  const auto [worst, mean] = world.errors(m);
+  CHECK(worst_before > 0.5);
+  CHECK(worst < 0.3 * worst_before);
+  CHECK(mean < 0.3 * mean_before);
+  // An erased keyframe, and what was noted relative to one, follow.
+  const auto error_of = [&](slam::keyframe_id k) {
+    return (m.pose_of(k).translation() - world.truth(k.value()).translation()).norm();
+  };
+  CHECK(error_of(40) < 1.1 * std::max(error_of(39), error_of(41)));
+  CHECK(m.scale_of(40) == Approx(m.scale_of(41)).epsilon(0.01));
+  CHECK(m.scale_of(0) == 1.0);
+  CHECK(m.scale_of(last) == Approx(report.scale));
+  // Global adjustment takes the rest out, and does not lose the scale.
+  slam::detail::global_adjustment::adjust(m, world.rig);
+  CHECK(test::fault_of(m) == "");
+  CHECK(world.errors(m)[1] < 1.2 * mean);
 }
 
 TEST_CASE("What is added while a loop is solved goes along") {

@@ -45,8 +45,8 @@ TEST_CASE("Two maps that show the same place become one") {
     CHECK(m.at(k).T_world_camera.to_matrix() == first.at(k).T_world_camera.to_matrix());
   for (slam::keyframe_id k = 0; k < 20; ++k)
     if (k != 10) {
-      const se3 T = report.T_into_from * second.at(k).T_world_camera;
-      CHECK((T.inverse() * m.at(k + 20).T_world_camera).log().norm() < 1e-9);
+      const sim3 T = report.T_into_from * sim3(second.at(k).T_world_camera);
+      CHECK((T.inverse() * sim3(m.at(k + 20).T_world_camera)).log().norm() < 1e-9);
     }
   slam::map in_one(8, 1.2);  // as if tracking had never been lost
   world.walk(in_one, 0, 35, world.truth(0));
@@ -92,4 +92,24 @@ TEST_CASE("Maps that grow while they are compared are merged whole, without thei
   CHECK(without.size() == 2);
   CHECK_FALSE(merging::take(without, from, into, match));
   CHECK_FALSE(slam::detail::map_merging::merge(without, into, into, match, world.rig).merged);
+}
+
+TEST_CASE("A map without depth takes on the unit of the one that it becomes a part of") {
+  test::ring_world world{{.drift = 0.0, .shrinks = 1e-9}};
+  slam::atlas maps(8, 1.2);
+  const slam::map_id into = maps.active_id();
+  world.walk(maps.active(), 0, 20, world.truth(0));
+  const slam::map_id from = maps.create();
+  const se3 start(so3::exp(vec3(0.1, 0.2, 0.3)), vec3(5, 6, 7));
+  constexpr double unit = 0.3;
+  world.walk(maps.active(), 15, 35, start, unit);
+  const auto check = slam::detail::verify_loop(maps.at(from), 2, maps.at(into), 16, world.rig);
+  CHECK(to_string(check.verdict) == "accepted");
+  CHECK(check.match.scale == Approx(1.0 / unit).epsilon(0.01));
+  const auto report = slam::detail::map_merging::merge(maps, from, into, check.match, world.rig);
+  REQUIRE(report.merged);
+  CHECK(test::fault_of(maps.active()) == "");
+  CHECK(report.fusion.fused > 100);
+  CHECK(maps.active().scale_of(30) == Approx(1.0 / unit).epsilon(0.01));
+  CHECK(world.errors(maps.active())[0] < 0.03);
 }

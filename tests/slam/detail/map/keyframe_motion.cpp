@@ -50,15 +50,21 @@ TEST_CASE("All keyframes move, landmarks with the oldest one that observes them,
   random_bits random(7);
   const slam::map before = test::random_map(8, 1500, 25);
   slam::map all = before;
-  std::vector<se3> motion;
-  for (slam::keyframe_id k = 0; k != before.keyframe_end(); ++k) motion.push_back(test::random_motion(random));
+  std::vector<sim3> motion;
+  for (slam::keyframe_id k = 0; k != before.keyframe_end(); ++k) {
+    const se3 T = test::random_motion(random);
+    motion.emplace_back(T.rotation(), T.translation(), k.value() % 2 == 0 ? 1.0 : random.uniform(0.5, 2.0));
+  }
   slam::detail::move_all(all, motion);
-  for (const auto& k : before.keyframes())
-    CHECK(distance(all.at(k.id).T_world_camera, motion[k.id.value()] * k.T_world_camera) < 1e-12);
+  for (const auto& k : before.keyframes()) {
+    const sim3 expected = motion[k.id.value()] * sim3(k.T_world_camera);
+    CHECK(distance(all.at(k.id).T_world_camera, se3(expected.rotation(), expected.translation())) < 1e-12);
+    CHECK(all.scale_of(k.id) == motion[k.id.value()].scale());
+  }
   for (const auto& l : before.landmarks()) {
     const auto oldest = l.observations.front().keyframe;
     CHECK((all.at(oldest).T_world_camera.inverse() * all.landmark_at(l.id).position -
-           before.at(oldest).T_world_camera.inverse() * l.position)
+           motion[oldest.value()].scale() * (before.at(oldest).T_world_camera.inverse() * l.position))
               .norm() < 1e-9);
   }
 
@@ -79,11 +85,12 @@ TEST_CASE("Keyframes without a new pose move with their parent in the tree") {
   random_bits random(9);
   slam::map m = test::random_map(10, 1500, 25);
   std::vector<slam::keyframe_id> solved;
-  std::vector<se3> poses;
+  std::vector<sim3> poses;
   for (const auto& k : m.keyframes())
     if (k.id.value() % 3 == 0) {
       solved.push_back(k.id);
-      poses.push_back(test::random_motion(random));
+      const se3 T = test::random_motion(random);
+      poses.emplace_back(T.rotation(), T.translation(), random.uniform(0.5, 2.0));
     }
   REQUIRE(!solved.empty());
   const auto gone = std::find_if(solved.begin(), solved.end(), [&](auto k) { return k != m.tree().root(); });
@@ -97,10 +104,11 @@ TEST_CASE("Keyframes without a new pose move with their parent in the tree") {
     const auto at = std::find(solved.begin(), solved.end(), k.id);
     const auto parent = m.tree().parent(k.id);
     if (at != solved.end()) {
-      const se3& to = poses[static_cast<std::size_t>(at - solved.begin())];
-      CHECK(distance(motion[k.id.value()] * k.T_world_camera, to) < 1e-9);
+      const sim3& to = poses[static_cast<std::size_t>(at - solved.begin())];
+      CHECK((motion[k.id.value()] * sim3(k.T_world_camera) * to.inverse()).log().norm() < 1e-9);
     } else {
-      CHECK(distance(motion[k.id.value()], parent == slam::no_id ? se3{} : motion[parent.value()]) < 1e-12);
+      const sim3 expected = parent == slam::no_id ? sim3{} : motion[parent.value()];
+      CHECK((motion[k.id.value()] * expected.inverse()).log().norm() < 1e-12);
     }
   }
 }

@@ -26,6 +26,13 @@ TEST_CASE("Frames follow their keyframe, through erasing and merging, and are li
   CHECK(log.trajectory(maps, second).size() == 1);
   CHECK(log.trajectory(maps, 9).empty());
 
+  // Where lengths have grown, those to frames have.
+  maps.at(first).move_keyframe(2, sim3(so3{}, vec3::Zero(), 3.0));
+  CHECK((maps.at(first).at(2).T_world_camera.inverse() * log.trajectory(maps, first)[1].T_world_camera * vec3::Zero() -
+         vec3(1.5, 0, 0))
+            .norm() < 1e-9);
+  maps.at(first).move_keyframe(2, sim3(so3{}, vec3::Zero(), 1.0 / 3.0));
+
   const se3 moved = test::random_motion(random);
   maps.at(first).set_pose(1, moved);
   CHECK((log.trajectory(maps, first)[0].T_world_camera.inverse() * moved * T).log().norm() < 1e-12);

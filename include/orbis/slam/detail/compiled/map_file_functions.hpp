@@ -31,12 +31,12 @@ ORBIS_COMPILED_ONCE result<map> parse_map(std::span<const std::byte> bytes, cons
   if (text.substr(0, detail::map_magic.size()) != detail::map_magic)
     return fail(errc::malformed, where, "not a map of orbis: it does not begin with \"orbismap\"");
   if (text.size() < head) return fail(errc::malformed, where, "ends before its version");
-  if (const auto version = load_number<std::uint32_t>(text.data() + detail::map_magic.size());
-      version != detail::map_version)
-    return fail(errc::unsupported, where, "version " + std::to_string(version) + ", this reads version 1");
+  const auto version = load_number<std::uint32_t>(text.data() + detail::map_magic.size());
+  if (version == 0 || version > detail::map_version)
+    return fail(errc::unsupported, where, "version " + std::to_string(version) + ", this reads versions 1 and 2");
 
   detail::map_reader::content parts;
-  detail::map_reader read{parts};
+  detail::map_reader read{parts, version};
   detail::section_finder next{text, head};
   using section = std::pair<std::string_view, bool (detail::map_reader::*)(detail::section_reader)>;
   for (const auto& [name, take] :

@@ -14,8 +14,7 @@
 #include <vector>
 
 #include <orbis/core/execution.hpp>
-#include <orbis/core/se3.hpp>
-#include <orbis/core/types.hpp>
+#include <orbis/core/sim3.hpp>
 #include <orbis/slam/map.hpp>
 
 namespace orbis::slam::detail {
@@ -31,14 +30,14 @@ enum class edge_kind { tree, loop, covisibility };
   return "unknown";
 }
 
-/// An edge of a pose graph (`optimize::relative_measurement`): its ends index `poses_of(map)`.
+/// An edge of a pose graph: its ends index `poses_of(map)`.
 struct essential_edge {
   std::uint32_t from = no_id;  ///< a keyframe's id
   std::uint32_t to = no_id;    ///< a keyframe's id
   edge_kind kind = edge_kind::tree;
   std::uint32_t shared = 0;  ///< landmarks that both observe
-  se3 measurement;           ///< `T_from_to`
-  matrix<6, 6> information = matrix<6, 6>::Identity();
+  sim3 measurement;          ///< `T_from_to`; lengths at `from` are its scale times those at `to`
+  double weight = 1.0;       ///< of its squared error
 };
 
 /// The edges of the spanning tree, the loop edges, and the pairs that share at least `threshold` landmarks; each pair
@@ -51,7 +50,7 @@ template <feature_descriptor D>
   for (const auto& k : m.keyframes()) {
     const auto add = [&](keyframe_id to, edge_kind kind) {
       edges.push_back({k.id.value(), to.value(), kind, m.covisibility().shared(k.id, to),
-                       k.T_world_camera.inverse() * m.at(to).T_world_camera, matrix<6, 6>::Identity()});
+                       sim3(k.T_world_camera.inverse() * m.at(to).T_world_camera)});
     };
     const spanning_tree& tree = m.tree();
     const auto in_tree = [&](keyframe_id other) { return tree.parent(k.id) == other || tree.parent(other) == k.id; };
@@ -71,17 +70,18 @@ template <feature_descriptor D>
 
 /// `T_world_camera` of every keyframe, by id; the identity for erased ones, which no edge touches.
 template <feature_descriptor D>
-[[nodiscard]] std::vector<se3> poses_of(const basic_map<D>& m) {
-  std::vector<se3> poses(m.keyframe_end().value());
-  for (const auto& k : m.keyframes()) poses[k.id.value()] = k.T_world_camera;
+[[nodiscard]] std::vector<sim3> poses_of(const basic_map<D>& m) {
+  std::vector<sim3> poses(m.keyframe_end().value());
+  for (const auto& k : m.keyframes()) poses[k.id.value()] = sim3(k.T_world_camera);
   return poses;
 }
 
 /// Moves poses, as `poses_of`, such that they agree with the edges; those with a nonzero entry in `is_fixed` stay.
-/// Returns the number of iterations; empty, and the poses are of no use, if it fails or `callback` cancels it.
-[[nodiscard]] std::optional<int> optimize_poses(std::span<se3> poses, const std::vector<essential_edge>& edges,
-                                                std::span<const std::uint8_t> is_fixed, int max_iterations,
-                                                const progress& callback = {});
+/// `scale_is_known`: all scales are and remain 1; otherwise scales are adjusted as well. Returns the number of
+/// iterations; empty, and the poses are of no use, if it fails or `callback` cancels it.
+[[nodiscard]] std::optional<int> optimize_poses(std::span<sim3> poses, const std::vector<essential_edge>& edges,
+                                                std::span<const std::uint8_t> is_fixed, bool scale_is_known,
+                                                int max_iterations, const progress& callback = {});
 
 }  // namespace orbis::slam::detail
 

@@ -15,7 +15,7 @@
 #include <vector>
 
 #include <orbis/camera/model.hpp>
-#include <orbis/core/se3.hpp>
+#include <orbis/core/sim3.hpp>
 #include <orbis/optimize/robust_loss.hpp>
 #include <orbis/slam/camera_rig.hpp>
 #include <orbis/slam/detail/map/keyframe_motion.hpp>
@@ -98,7 +98,10 @@ template <feature_descriptor D, camera::camera_model Camera>
 /// to the caller. @pre solved.usable
 template <feature_descriptor D>
 report apply_poses(basic_map<D>& m, const snapshot& s, const bundle_solution& solved) {
-  const std::vector<se3> motion = propagate_motion<D>(m, s.keyframes, solved.poses);
+  std::vector<sim3> poses;
+  poses.reserve(solved.poses.size());
+  for (const se3& p : solved.poses) poses.emplace_back(p);
+  const std::vector<sim3> motion = propagate_motion<D>(m, s.keyframes, poses);
   // Landmarks that take no part move with a keyframe; the others then get their own position.
   std::size_t next = 0;
   for (landmark_id l = 0; l != m.landmark_end(); ++l) {
@@ -111,7 +114,7 @@ report apply_poses(basic_map<D>& m, const snapshot& s, const bundle_solution& so
     if (adjusted) m.set_position(l, solved.points[next]);
   }
   for (keyframe_id k = 0; k != m.keyframe_end(); ++k)
-    if (m.has_keyframe(k)) m.set_pose(k, motion[k.value()] * m.at(k).T_world_camera);
+    if (m.has_keyframe(k)) m.move_keyframe(k, motion[k.value()]);
   report done{s.keyframes.size(), s.landmarks.size(),  s.observations.size(), 0,
               solved.iterations,  solved.initial_cost, solved.final_cost};
   for (std::size_t i = 0; i != s.observations.size(); ++i)

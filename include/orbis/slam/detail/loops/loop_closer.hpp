@@ -174,8 +174,10 @@ bool loop_closer<Camera, D, Places>::correct(map_keyframe k, map_keyframe candid
     if (!solved) return false;
     if (!shared_.locked([&] {
           basic_map<D>& m = shared_.atlas.at(k.map);
-          if (!loop_correction::apply_poses(m, *taken, *solved).corrected) return false;
-          event.T_corrected_before = m.at(k.keyframe).T_world_camera * before.inverse();
+          const loop_correction::report done = loop_correction::apply_poses(m, *taken, *solved);
+          if (!done.corrected) return false;
+          const se3& after = m.at(k.keyframe).T_world_camera;
+          event.T_corrected_before = sim3(after.rotation(), after.translation(), done.scale) * sim3(before.inverse());
           ++shared_.loops_closed;
           ++corrections_;
           return true;
@@ -209,7 +211,7 @@ bool loop_closer<Camera, D, Places>::merge(map_keyframe k, map_keyframe candidat
     event.T_corrected_before = done.T_into_from;
     if (k.map < candidate.map) {  // the world stays that of the older map
       shared_.atlas.at(candidate.map).transform(done.T_into_from.inverse());
-      event.T_corrected_before = se3{};
+      event.T_corrected_before = sim3{};
     }
     ++shared_.maps_merged;
     ++corrections_;

@@ -8,7 +8,8 @@
 /// parent.
 ///
 /// Source: R. Mur-Artal, J. M. M. Montiel, J. D. Tardos, "ORB-SLAM: a versatile and accurate monocular SLAM system",
-/// T-RO 31 (2015), sections VII.C and VII.D, for cameras with depth: poses without scale.
+/// T-RO 31 (2015), sections VII.C and VII.D; with depth, poses have no scale. H. Strasdat, J. M. M. Montiel, A. J.
+/// Davison, "Scale drift-aware large scale monocular SLAM", RSS 2010, for the scale without depth.
 #pragma once
 
 #include <algorithm>
@@ -21,6 +22,7 @@
 #include <orbis/camera/model.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/se3.hpp>
+#include <orbis/core/sim3.hpp>
 #include <orbis/slam/camera_rig.hpp>
 #include <orbis/slam/detail/loops/essential_graph.hpp>
 #include <orbis/slam/detail/loops/loop_fusion.hpp>
@@ -38,6 +40,7 @@ struct report {
   fusion_counts fusion;       ///< of landmarks
   double moved = 0.0;         ///< of the keyframe, metres
   double turned = 0.0;        ///< of the keyframe, radians
+  double scale = 1.0;         ///< by how much lengths at the keyframe grew
   std::size_t keyframes = 0;  ///< that were corrected
   int iterations = 0;         ///< of the pose graph
 };
@@ -47,13 +50,13 @@ struct snapshot {
   loop_match match;
   loop_fusion::snapshot<D> fusion;
   std::vector<keyframe_id> keyframes;
-  std::vector<se3> poses;  ///< by keyframe id
+  std::vector<sim3> poses;  ///< by keyframe id
   std::vector<essential_edge> edges;
   std::vector<std::uint8_t> is_fixed;  ///< by keyframe id
 };
 
 struct solution {
-  std::vector<se3> poses;  ///< by keyframe id
+  std::vector<sim3> poses;  ///< by keyframe id
   std::vector<loop_fusion::pair> pairs;
   int iterations = 0;
 };
@@ -75,9 +78,9 @@ template <feature_descriptor D>
            std::max(e.from, e.to) == std::max(a, b);
   });
   for (essential_edge& e : s.edges)  // the more landmarks they share, the better their relative pose is known
-    e.information *= static_cast<double>(std::clamp(e.shared, 1U, o.strong)) / o.strong;
-  s.edges.push_back({b, a, edge_kind::loop, static_cast<std::uint32_t>(match.inliers), match.T_candidate_keyframe,
-                     o.loop_weight * matrix<6, 6>::Identity()});
+    e.weight *= static_cast<double>(std::clamp(e.shared, 1U, o.strong)) / o.strong;
+  s.edges.push_back(
+      {b, a, edge_kind::loop, static_cast<std::uint32_t>(match.inliers), match.scaled_motion(), o.loop_weight});
   return s;
 }
 
@@ -86,7 +89,7 @@ template <feature_descriptor D, camera::camera_model Camera>
 [[nodiscard]] std::optional<solution> solve(const snapshot<D>& s, const camera_rig<Camera>& rig,
                                             const loop_correction_options& o = {}, const progress& callback = {}) {
   solution found{s.poses, loop_fusion::find_pairs(s.fusion, rig, o.fusion), 0};
-  const auto iterations = optimize_poses(found.poses, s.edges, s.is_fixed, o.iterations, callback);
+  const auto iterations = optimize_poses(found.poses, s.edges, s.is_fixed, rig.scale_is_known, o.iterations, callback);
   if (!iterations) return std::nullopt;
   found.iterations = *iterations;
   return found;
@@ -98,9 +101,9 @@ template <feature_descriptor D>
 report apply_poses(basic_map<D>& m, const snapshot<D>& s, const solution& solved) {
   report done;
   done.iterations = solved.iterations;
-  std::vector<se3> poses;
+  std::vector<sim3> poses;
   for (const keyframe_id k : s.keyframes) poses.push_back(solved.poses[k.value()]);
-  const std::vector<se3> motion = propagate_motion<D>(m, s.keyframes, poses);
+  const std::vector<sim3> motion = propagate_motion<D>(m, s.keyframes, poses);
   const keyframe_id a = m.replacement_of(s.match.keyframe), b = m.replacement_of(s.match.candidate);
   if (a == no_id || b == no_id) return done;
   const se3 before = m.at(a).T_world_camera;
@@ -110,6 +113,7 @@ report apply_poses(basic_map<D>& m, const snapshot<D>& s, const solution& solved
   done.corrected = true;
   done.keyframes = m.keyframes().size();
   done.moved = (m.at(a).T_world_camera.translation() - before.translation()).norm();
+  done.scale = motion[a.value()].scale();
   done.turned = (before.rotation().inverse() * m.at(a).T_world_camera.rotation()).log().norm();
   return done;
 }

@@ -70,7 +70,8 @@ template <camera::camera_model Camera, feature_descriptor D>
   std::vector<pair> pairs;
   for (const loop_pair& p : s.match.matches) pairs.push_back({s.match.keyframe, p});
   for (const image<D>& i : s.images) {
-    const se3 T_world_camera = s.landmarks.T_world_camera * s.match.T_candidate_keyframe * i.T_keyframe_camera;
+    const se3 T_world_camera =
+        s.landmarks.T_world_camera * s.match.T_candidate_keyframe * scaled(i.T_keyframe_camera, s.match.scale);
     const se3 T_camera_world = T_world_camera.inverse();
     for (const features::match& m : find_landmarks(s.landmarks, i.seen, T_world_camera, rig, o.radius, o.distance)) {
       const snapshot_landmark& l = s.landmarks.landmarks[m.query];

@@ -8,8 +8,9 @@
 /// and, within one map, that the motion contradicts the poses by no more than the drift between the two can explain.
 ///
 /// Source of the procedure: C. Campos, R. Elvira, J. J. Gomez Rodriguez, J. M. M. Montiel, J. D. Tardos, "ORB-SLAM3: an
-/// accurate open-source library for visual, visual-inertial and multi-map SLAM", T-RO 37 (2021), section VI, for
-/// cameras with depth, where the scale is known.
+/// accurate open-source library for visual, visual-inertial and multi-map SLAM", T-RO 37 (2021), section VI. Where the
+/// scale is not measured, it is found as well: by the points of the matches, then by the landmarks that both sides
+/// have.
 #pragma once
 
 #include <algorithm>
@@ -24,6 +25,7 @@
 
 #include <orbis/camera/model.hpp>
 #include <orbis/core/se3.hpp>
+#include <orbis/core/sim3.hpp>
 #include <orbis/features/brute_force.hpp>
 #include <orbis/features/descriptor.hpp>
 #include <orbis/features/match.hpp>
@@ -33,6 +35,8 @@
 #include <orbis/optimize/pose_refinement.hpp>
 #include <orbis/slam/camera_rig.hpp>
 #include <orbis/slam/detail/loops/landmark_snapshot.hpp>
+#include <orbis/slam/detail/map/local_map.hpp>
+#include <orbis/slam/detail/map/map_content.hpp>
 #include <orbis/slam/detail/map/point_observation.hpp>
 #include <orbis/slam/map.hpp>
 #include <orbis/slam/options.hpp>
@@ -50,10 +54,16 @@ struct loop_pair {
 struct loop_match {
   keyframe_id keyframe;
   keyframe_id candidate;           ///< of the same map or another one
-  se3 T_candidate_keyframe;        ///< camera to camera, by the matches
+  se3 T_candidate_keyframe;        ///< camera to camera, by the matches; in lengths at the candidate
+  double scale = 1.0;              ///< lengths at the candidate over those at the keyframe; 1 where depth is measured
   std::vector<loop_pair> matches;  ///< the inliers, by ascending landmark
   std::size_t inliers = 0;         ///< their number
   std::size_t supporters = 0;      ///< neighbours of the keyframe that agree
+
+  /// What takes points from the keyframe's camera to the candidate's.
+  [[nodiscard]] sim3 scaled_motion() const {
+    return {T_candidate_keyframe.rotation(), T_candidate_keyframe.translation(), scale};
+  }
 };
 
 enum class loop_verdict {
@@ -92,8 +102,9 @@ template <feature_descriptor D>
 struct view {
   basic_frame<D> image;
   orbis::features::basic_features<D> features;
-  std::vector<vec3> points;        ///< by feature: in the camera frame, metres
-  std::vector<double> deviations;  ///< by feature: standard deviation of the depth, metres
+  std::vector<vec3> points;          ///< by feature: in the camera frame, metres
+  std::vector<std::uint32_t> index;  ///< by feature: its keypoint
+  std::vector<double> deviations;    ///< by feature: standard deviation of the depth, metres
 };
 
 template <feature_descriptor D>
@@ -113,6 +124,22 @@ struct snapshot {
   double path_length = 0.0;  ///< along the keyframes between the two, metres
 };
 
+/// The standard deviation of a landmark's depth in keyframe `k` where none is measured, in the map's unit: of its rays
+/// by a pixel's error, over the largest angle between them. Infinite with one observation.
+template <feature_descriptor D, camera::camera_model Camera>
+[[nodiscard]] double deviation_by_parallax(const basic_map<D>& m, const basic_keyframe<D>& k, std::uint32_t feature,
+                                           const camera_rig<Camera>& rig) {
+  const auto& l = m.landmark_at(k.landmarks[feature]);
+  const vec3 ray = l.position - k.T_world_camera.translation();
+  double sine = 0.0;
+  for (const observation& o : l.observations) {
+    const vec3 other = l.position - m.at(o.keyframe).T_world_camera.translation();
+    sine = std::max(sine, ray.cross(other).norm() / (ray.norm() * other.norm()));
+  }
+  const double angle = rig.scales.scale(k.features.keypoints[feature].octave) / focal_length(rig.camera());
+  return ray.norm() * angle / sine;
+}
+
 template <feature_descriptor D, camera::camera_model Camera>
 [[nodiscard]] view<D> view_of(const basic_map<D>& m, keyframe_id id, const camera_rig<Camera>& rig) {
   const auto& k = m.at(id);
@@ -128,7 +155,9 @@ template <feature_descriptor D, camera::camera_model Camera>
     v.features.keypoints.push_back(k.features.keypoints[i]);
     v.features.descriptors.push_back(k.features.descriptors[i]);
     v.points.push_back(point);
-    v.deviations.push_back(rig.depth_deviation(point.z(), k.features.keypoints[i].octave));
+    v.index.push_back(i);
+    v.deviations.push_back(rig.scale_is_known ? rig.depth_deviation(point.z(), k.features.keypoints[i].octave)
+                                              : deviation_by_parallax(m, k, i, rig));
   }
   return v;
 }
@@ -191,9 +220,10 @@ class checker {
     if (matches.size() < options_.min_matches) return loop_verdict::few_matches;
     if (!align(matches, found)) return loop_verdict::not_aligned;
     if (!refine(found)) return loop_verdict::few_inliers;
+    if (!rig_.scale_is_known) measure_scale(found);
     const std::size_t wanted = std::min(options_.min_supporters, s_.supporters.size());
     for (std::size_t i = 0; i != s_.supporters.size() && found.supporters < wanted; ++i)
-      found.supporters += supports(s_.supporters[i], found.T_candidate_keyframe);
+      found.supporters += supports(s_.supporters[i], found);
     if (found.supporters < wanted) return loop_verdict::not_supported;
     if (s_.same_map && !is_plausible(found.T_candidate_keyframe)) return loop_verdict::too_far;
     return loop_verdict::accepted;
@@ -217,17 +247,36 @@ class checker {
     return second.inliers >= options_.min_inliers;
   }
 
-  [[nodiscard]] bool supports(const neighbor<D>& n, const se3& T_candidate_keyframe) const {
-    const se3 T_world_camera = s_.landmarks.T_world_camera * T_candidate_keyframe * n.T_keyframe_camera;
+  /// The scale by the depths of landmarks that both sides have: their median ratio. Left as it is with few of them.
+  void measure_scale(loop_match& found) const {
+    std::vector<vec3> at(s_.seen.image.size(), vec3::Zero());
+    for (std::size_t i = 0; i != s_.seen.points.size(); ++i) at[s_.seen.index[i]] = s_.seen.points[i];
+    const se3 T_keyframe_world = (s_.landmarks.T_world_camera * found.T_candidate_keyframe).inverse();
+    std::vector<double> ratios;
+    for (const loop_pair& p : found.matches) {
+      const auto l = std::lower_bound(s_.landmarks.landmarks.begin(), s_.landmarks.landmarks.end(), p.landmark,
+                                      [](const snapshot_landmark& a, landmark_id id) { return a.id < id; });
+      const double here = at[p.feature].z(), there = (T_keyframe_world * l->position).z();
+      if (here > 0.0 && there > 0.0) ratios.push_back(there / here);
+    }
+    if (ratios.size() < options_.min_aligned) return;
+    found.scale = median_of(ratios);
+  }
+
+  [[nodiscard]] bool supports(const neighbor<D>& n, const loop_match& found) const {
+    const se3 T_world_camera =
+        s_.landmarks.T_world_camera * found.T_candidate_keyframe * scaled(n.T_keyframe_camera, found.scale);
     const auto localized = localize(n.image, T_world_camera, options_.radius, nullptr);
     return localized.ok() && localized.inliers >= options_.supporter_inliers;
   }
 
+  /// Drift of the scale has no bound that is known beforehand; only the rotation is limited then.
   [[nodiscard]] bool is_plausible(const se3& T_candidate_keyframe) const {
     const se3& was = s_.seen.image.T_world_camera;
     const se3 is = s_.landmarks.T_world_camera * T_candidate_keyframe;
     const double moved = (is.translation() - was.translation()).norm();
     const double turned = (was.rotation().inverse() * is.rotation()).log().norm();
+    if (!rig_.scale_is_known) return turned <= options_.max_rotation;
     return moved <= options_.max_translation + options_.translation_per_metre * s_.path_length &&
            turned <= options_.max_rotation + options_.rotation_per_metre * s_.path_length;
   }
@@ -255,16 +304,29 @@ bool checker<Camera, D>::align(const std::vector<features::match>& matches, loop
     to.push_back(s_.known.points[m.train]);
     deviations.push_back(std::hypot(s_.seen.deviations[m.query], s_.known.deviations[m.train]));
   }
-  const auto aligned = optimize::estimate_alignment<se3>(from, to,
-                                                         {.threshold = options_.alignment_threshold,
-                                                          .confidence = 0.999,
-                                                          .max_iterations = 3000,
-                                                          .min_inliers = options_.min_aligned,
-                                                          .seed = options_.seed,
-                                                          .deviations = deviations});
-  found.inliers = aligned ? aligned->inliers.size() : 0;
-  if (aligned) found.T_candidate_keyframe = aligned->T_to_from;
-  return aligned.has_value();
+  const optimize::alignment_options settings{.threshold = options_.alignment_threshold,
+                                             .confidence = 0.999,
+                                             .max_iterations = 3000,
+                                             .min_inliers = options_.min_aligned,
+                                             .seed = options_.seed,
+                                             .deviations = deviations};
+  const auto take_over = [&](const auto& aligned) {
+    found.inliers = aligned ? aligned->inliers.size() : 0;
+    if (aligned) found.T_candidate_keyframe = se3(aligned->T_to_from.rotation(), aligned->T_to_from.translation());
+    return aligned.has_value();
+  };
+  if (rig_.scale_is_known) return take_over(optimize::estimate_alignment<se3>(from, to, settings));
+  // Both sides in about the same unit, for what the deviations of a pair add up to.
+  std::vector<double> ratios;
+  for (std::size_t i = 0; i != from.size(); ++i) ratios.push_back(to[i].z() / from[i].z());
+  const double ratio = median_of(ratios);
+  for (std::size_t i = 0; i != from.size(); ++i) {
+    from[i] *= ratio;
+    deviations[i] = std::hypot(ratio * s_.seen.deviations[matches[i].query], s_.known.deviations[matches[i].train]);
+  }
+  const auto similar = optimize::estimate_alignment<sim3>(from, to, settings);
+  if (similar) found.scale = ratio * similar->T_to_from.scale();
+  return take_over(similar);
 }
 
 template <camera::camera_model Camera, feature_descriptor D>

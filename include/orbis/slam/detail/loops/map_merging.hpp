@@ -12,7 +12,7 @@
 #include <vector>
 
 #include <orbis/camera/model.hpp>
-#include <orbis/core/se3.hpp>
+#include <orbis/core/sim3.hpp>
 #include <orbis/slam/atlas.hpp>
 #include <orbis/slam/camera_rig.hpp>
 #include <orbis/slam/detail/loops/loop_fusion.hpp>
@@ -30,7 +30,7 @@ struct report {
   keyframe_id keyframe;   ///< that of the match, by its new id
   keyframe_id candidate;  ///< that of the match
   fusion_counts fusion;   ///< of landmarks
-  se3 T_into_from;        ///< how the one map was moved
+  sim3 T_into_from;       ///< how the one map was moved
 };
 
 template <feature_descriptor D>
@@ -72,8 +72,8 @@ report apply(basic_atlas<D>& maps, const snapshot<D>& s, const solution& solved)
   report done;
   if (!is_possible(maps, s.from, s.into, s.match)) return done;
   basic_map<D>& m = maps.at(s.into);
-  done.T_into_from = m.at(s.match.candidate).T_world_camera * s.match.T_candidate_keyframe *
-                     maps.at(s.from).at(s.match.keyframe).T_world_camera.inverse();
+  done.T_into_from = sim3(m.at(s.match.candidate).T_world_camera) * s.match.scaled_motion() *
+                     sim3(maps.at(s.from).at(s.match.keyframe).T_world_camera.inverse());
   done.offsets = maps.merge(s.from, s.into, done.T_into_from, {s.match.candidate, s.match.keyframe});
   done.keyframe = s.match.keyframe + done.offsets.keyframes;
   done.candidate = s.match.candidate;

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include <orbis/core/se3.hpp>
+#include <orbis/core/sim3.hpp>
 #include <orbis/slam/map.hpp>
 
 namespace orbis::slam::detail {
@@ -19,12 +20,12 @@ namespace orbis::slam::detail {
 /// observes it. `map.update_landmark` is not called: see `update_landmarks`. O(map).
 /// @pre T_new_old.size() == m.keyframe_end()
 template <feature_descriptor D>
-void move_all(basic_map<D>& m, std::span<const se3> T_new_old) {
+void move_all(basic_map<D>& m, std::span<const sim3> T_new_old) {
   assert(T_new_old.size() == m.keyframe_end().value());
   for (landmark_id l = 0; l != m.landmark_end(); ++l)
     if (m.has_landmark(l)) m.move_landmark(l, T_new_old[m.landmark_at(l).observations.front().keyframe.value()]);
   for (keyframe_id k = 0; k != m.keyframe_end(); ++k)
-    if (m.has_keyframe(k)) m.set_pose(k, T_new_old[k.value()] * m.at(k).T_world_camera);
+    if (m.has_keyframe(k)) m.move_keyframe(k, T_new_old[k.value()]);
 }
 
 /// Calls `map.update_landmark` for `count` ids from `first` on. Returns whether more ids follow, so that a caller who
@@ -49,19 +50,20 @@ template <feature_descriptor D>
   return around;
 }
 
-/// The motion of every keyframe of a map (`T_new_old`, in the world, by id), given new poses for some of them. The
-/// others move with their parent in the spanning tree. The identity where there is no keyframe, and where no keyframe
-/// up to the root has a new pose. New poses of erased keyframes are ignored. O(ids of keyframes).
+/// The motion of every keyframe of a map (`T_new_old`, in the world, by id), given new poses for some of them, with the
+/// scale of the lengths in their views. The others move with their parent in the spanning tree. The identity where
+/// there is no keyframe, and where no keyframe up to the root has a new pose. New poses of erased keyframes are
+/// ignored. O(ids of keyframes).
 template <feature_descriptor D>
-[[nodiscard]] std::vector<se3> propagate_motion(const basic_map<D>& m, std::span<const keyframe_id> solved,
-                                                std::span<const se3> T_world_camera) {
+[[nodiscard]] std::vector<sim3> propagate_motion(const basic_map<D>& m, std::span<const keyframe_id> solved,
+                                                 std::span<const sim3> T_world_camera) {
   assert(solved.size() == T_world_camera.size());
-  std::vector<se3> motion(m.keyframe_end().value());
+  std::vector<sim3> motion(m.keyframe_end().value());
   std::vector<std::uint8_t> known(m.keyframe_end().value(), 0);
   for (std::size_t i = 0; i != solved.size(); ++i) {
     const keyframe_id k = solved[i];
     if (!m.has_keyframe(k)) continue;
-    motion[k.value()] = T_world_camera[i] * m.at(k).T_world_camera.inverse();
+    motion[k.value()] = T_world_camera[i] * sim3(m.at(k).T_world_camera.inverse());
     known[k.value()] = 1;
   }
   std::vector<keyframe_id> path;

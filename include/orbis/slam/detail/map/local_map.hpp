@@ -19,6 +19,24 @@ template <feature_descriptor D>
   return order.empty() ? otherwise : order.front().keyframe;
 }
 
+/// The median; changes the order of the values. @pre there are any
+[[nodiscard]] inline double median_of(std::vector<double>& values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+/// The median depth of the landmarks that a frame observes, in the unit of the map; 0 if it observes none.
+/// O(keypoints).
+template <feature_descriptor D>
+[[nodiscard]] double median_depth(const basic_map<D>& m, const basic_frame<D>& f) {
+  const se3 T_camera_world = f.T_world_camera.inverse();
+  std::vector<double> depths;
+  for (const landmark_id l : f.landmarks)
+    if (l != no_id && m.has_landmark(l)) depths.push_back((T_camera_world * m.landmark_at(l).position).z());
+  return depths.empty() ? 0.0 : median_of(depths);
+}
+
 /// The keyframes around a frame, at most `limit`: the reference, those that share landmarks with the frame (most
 /// first), then the neighbours of the nearest of these in the covisibility graph and in the spanning tree. The cost
 /// depends on the observations of the frame's landmarks and on these neighbours, not on the size of the map.

@@ -15,17 +15,22 @@
 
 namespace orbis::slam::detail {
 
+/// A rigid motion, with its translation multiplied.
+[[nodiscard]] inline se3 scaled(const se3& T, double factor) { return {T.rotation(), vec3(factor * T.translation())}; }
+
 /// Where an erased keyframe was, relative to the keyframe that replaced it.
 struct erased_keyframe {
   keyframe_id replacement;   ///< may be erased itself; `no_id` if no keyframe was left
-  se3 T_replacement_camera;  ///< without a replacement: `T_world_camera`
+  se3 T_replacement_camera;  ///< in lengths over the replacement's `scale`; without a replacement: `T_world_camera`
+  double scale = 1.0;        ///< over that of the replacement
 };
 
 template <feature_descriptor D>
 struct map_content {
-  int levels = 8;                 ///< of the image pyramid
-  double scale_factor = 1.2;      ///< between two levels
-  std::uint32_t min_shared = 15;  ///< shared landmarks that make an edge of the covisibility graph
+  int levels = 8;                             ///< of the image pyramid
+  double scale_factor = 1.2;                  ///< between two levels
+  std::uint32_t min_shared = 15;              ///< shared landmarks that make an edge of the covisibility graph
+  sensor_kind sensor = sensor_kind::unknown;  ///< of the first keyframe
   slot_map<basic_keyframe<D>, keyframe_id> keyframes;
   slot_map<basic_landmark<D>, landmark_id> landmarks;
   spanning_tree tree;

@@ -49,7 +49,7 @@ inline constexpr std::size_t bytes_of_keypoint = 76, bytes_of_observation = 8;
 class map_reader {
  public:
   using content = map_content<features::binary_descriptor<256>>;
-  explicit map_reader(content& to) : to_{to} {}
+  map_reader(content& to, std::uint32_t version) : to_{to}, version_{version} {}
 
   std::string problem;
 
@@ -59,6 +59,10 @@ class map_reader {
     to_.scale_factor = in.take<double>();
     keyframe_ids_ = in.take<std::uint32_t>();
     landmark_ids_ = in.take<std::uint32_t>();
+    const auto sensor = version_ < 2 ? 0 : in.take<std::uint32_t>();
+    if (sensor > static_cast<std::uint32_t>(sensor_kind::monocular))
+      return wrong("a sensor of kind " + std::to_string(sensor));
+    to_.sensor = static_cast<sensor_kind>(sensor);
     to_.levels = static_cast<int>(levels);
     if (levels == 0 || levels > 64) return wrong("a pyramid of " + std::to_string(levels) + " levels");
     if (!(to_.scale_factor > 1.0 && to_.scale_factor < 100.0)) return wrong("a scale factor that is none");
@@ -243,6 +247,7 @@ class map_reader {
   }
 
   content& to_;
+  std::uint32_t version_;
   std::uint32_t keyframe_ids_ = 0, landmark_ids_ = 0;
   std::vector<landmark_id> replacements_;
 };

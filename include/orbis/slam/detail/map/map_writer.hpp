@@ -15,7 +15,8 @@
 namespace orbis::slam::detail {
 
 inline constexpr std::string_view map_magic = "orbismap";
-inline constexpr std::uint32_t map_version = 1;
+inline constexpr std::uint32_t map_version = 2;
+
 inline void put_pose(std::string& to, const se3& pose) {
   const auto& q = pose.rotation().unit_quaternion();
   put(to, pose.translation().x(), pose.translation().y(), pose.translation().z(), q.x(), q.y(), q.z(), q.w());
@@ -49,7 +50,7 @@ inline void put_landmark(std::string& to, const landmark& l) {
   put_section(bytes, "size", [&](std::string& to) {
     const auto& all = m.content();
     put(to, static_cast<std::uint32_t>(all.levels), all.min_shared, all.scale_factor, m.keyframe_end().value(),
-        m.landmark_end().value());
+        m.landmark_end().value(), static_cast<std::uint32_t>(all.sensor));
   });
   put_section(bytes, "kfrm", [&](std::string& to) {
     for (keyframe_id id = 0; id != m.keyframe_end(); ++id) {
@@ -59,7 +60,8 @@ inline void put_landmark(std::string& to, const landmark& l) {
       } else {
         const erased_keyframe& e = m.content().erased.at(id);
         put(to, e.replacement.value());
-        put_pose(to, e.T_replacement_camera);
+        const double scale = e.replacement == no_id ? 1.0 : m.scale_of(e.replacement);
+        put_pose(to, scaled(e.T_replacement_camera, scale));  // the scales of a map that is read are 1
       }
     }
   });

@@ -28,6 +28,7 @@
 #include <orbis/optimize/triangulation.hpp>
 #include <orbis/slam/camera_rig.hpp>
 #include <orbis/slam/covisibility_graph.hpp>
+#include <orbis/slam/detail/map/local_map.hpp>
 #include <orbis/slam/detail/map/point_observation.hpp>
 #include <orbis/slam/map.hpp>
 #include <orbis/slam/options.hpp>
@@ -55,13 +56,6 @@ struct free_keypoints {
     }
   }
 };
-
-/// The focal length in the middle of the image, pixels per radian; 0 if the camera cannot project there.
-template <camera::camera_model Camera>
-[[nodiscard]] double focal_length(const Camera& camera) {
-  matrix<2, 3> j = matrix<2, 3>::Zero();
-  return camera.project(vec3(0.0, 0.0, 1.0), j) ? std::sqrt(std::abs(j(0, 0) * j(1, 1))) : 0.0;
-}
 
 /// Two keyframes whose keypoints are triangulated.
 template <camera::camera_model Camera, feature_descriptor D>
@@ -130,7 +124,8 @@ std::size_t triangulate_landmarks(basic_map<D>& m, keyframe_id newest, const cam
   for (const covisible& n : m.covisibility().neighbors(newest, o.neighbors)) {
     const auto& other = m.at(n.keyframe);
     const se3 T_other_k = other.T_world_camera.inverse() * k.T_world_camera;
-    if (!(T_other_k.translation().norm() >= o.min_baseline)) continue;
+    const double unit = rig.scale_is_known ? 1.0 : median_depth(m, other);
+    if (!(T_other_k.translation().norm() >= o.min_baseline * unit)) continue;
     own.assign(k);
     others.assign(other);
     const view_pair<Camera, D> pair{rig, o, k, other, focal};

@@ -28,6 +28,7 @@
 #include <orbis/camera/model.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/se3.hpp>
+#include <orbis/core/sim3.hpp>
 #include <orbis/slam/camera_rig.hpp>
 #include <orbis/slam/covisibility_graph.hpp>
 #include <orbis/slam/detail/map/local_map.hpp>
@@ -126,7 +127,7 @@ void apply(basic_map<D>& m, const snapshot& s, const bundle_solution& solved) {
   for (landmark_id l = s.end_landmark; l < m.landmark_end(); ++l) {
     if (!m.has_landmark(l)) continue;
     if (const auto T_new_old = motion_of(m, m.landmark_at(l).created, s, solved)) {
-      m.move_landmark(l, *T_new_old);
+      m.move_landmark(l, sim3(*T_new_old));
       m.update_landmark(l);
     }
   }

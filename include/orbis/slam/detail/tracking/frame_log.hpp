@@ -18,7 +18,7 @@ namespace orbis::slam::detail {
 struct logged_frame {
   double timestamp = 0.0;  ///< seconds
   map_keyframe reference;
-  se3 T_reference_camera;
+  se3 T_reference_camera;  ///< in lengths over the reference's scale (`basic_map::scale_of`)
 };
 
 class frame_log {
@@ -33,7 +33,8 @@ class frame_log {
     for (const logged_frame& f : frames_) {
       const map_keyframe k = maps.current(f.reference);
       if (k.map == map && maps.contains(map))
-        all.push_back({f.timestamp, maps.at(map).pose_of(k.keyframe) * f.T_reference_camera});
+        all.push_back({f.timestamp, maps.at(map).pose_of(k.keyframe) *
+                                        scaled(f.T_reference_camera, maps.at(map).scale_of(k.keyframe))});
     }
     return all;
   }

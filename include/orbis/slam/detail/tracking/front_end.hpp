@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <optional>
 #include <span>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -22,6 +23,7 @@
 #include <orbis/slam/detail/shutter/shutter_observer.hpp>
 #include <orbis/slam/detail/tracking/frame_log.hpp>
 #include <orbis/slam/detail/tracking/keyframe_decision.hpp>
+#include <orbis/slam/detail/tracking/monocular_start.hpp>
 #include <orbis/slam/detail/tracking/motion_model.hpp>
 #include <orbis/slam/detail/tracking/tracker.hpp>
 #include <orbis/slam/ids.hpp>
@@ -31,6 +33,13 @@
 #include <orbis/slam/track_result.hpp>
 
 namespace orbis::slam::detail {
+
+/// Takes the place of `monocular_start` where a sensor always measures depth.
+struct no_start {
+  template <class... T>
+  explicit no_start(const T&...) {}
+  void reset() noexcept {}
+};
 
 /// Tracks the frames of one camera. It takes no lock: the caller makes sure that the maps are not changed during a
 /// call. For each frame, in this order: `sync_with_map`, `localize`, `update_reference` and, if `needs_keyframe`,
@@ -47,6 +56,7 @@ class front_end {
       : tracker_{rig, settings},
         moving_{rig, settings},
         depth_{rig, settings.depth_term},
+        start_{rig, settings.start, settings.seed},
         rig_{rig},
         options_{settings},
         shutter_{settings.shutter} {
@@ -113,12 +123,17 @@ class front_end {
   /// Whether a localised frame should become a keyframe. One that depth holds becomes one if landmarks have not held
   /// the camera for some time, and if a map could begin with it.
   [[nodiscard]] bool needs_keyframe(const frame_type& f, std::size_t inliers, const atlas_type& maps) const {
+    if (begins_map()) return true;
     if (f.held_by_depth)
       return f.timestamp - held_since_ >= options_.keyframes.interval && Sensor::begins_map(f, options_) > 0;
-    return maps.active().keyframes().empty() ||
-           is_keyframe_due(gather_evidence(maps.active(), f, reference_.keyframe, inliers, options_),
-                           options_.keyframes);
+    return is_keyframe_due(
+        gather_evidence(maps.active(), f, reference_.keyframe, inliers, options_, rig_.scale_is_known),
+        options_.keyframes);
   }
+  /// Whether the last frame begins a map.
+  [[nodiscard]] bool begins_map() const noexcept { return begins_map_; }
+  /// A keyframe before that of the last frame, with which a map begins that needs two.
+  [[nodiscard]] const std::optional<map_keyframe>& first_keyframe() const noexcept { return first_keyframe_; }
   /// Adds a frame to the active map as a keyframe, which becomes the reference.
   map_keyframe make_keyframe(frame_type& f, atlas_type& maps) {
     first_new_ = maps.active().landmark_end();
@@ -132,11 +147,18 @@ class front_end {
   void finish(frame_type f, const atlas_type& maps, const std::optional<map_keyframe>& made);
 
  private:
-  /// Begins the active map with a frame, if the sensor says that it can. Returns the number of its points.
-  std::size_t begin_map(frame_type& f);
-  /// Begins a new map, which becomes the active one.
+  static constexpr bool may_lack_scale = Sensor::scale != scale_source::sensor;
+  using start_type = std::conditional_t<may_lack_scale, monocular_start<Camera, D>, no_start>;
+
+  /// Begins a map with a frame, if the sensor says that it can; without depth, with a frame before it as well. The map
+  /// becomes the active one. Returns the number of its points.
   template <class Drop>
-  std::size_t begin_new_map(frame_type& f, atlas_type& maps, Drop&& drop);
+  std::size_t begin_map(frame_type& f, atlas_type& maps, Drop&& drop);
+  /// Makes a new map the active one, unless that is new. One with few keyframes is left behind.
+  template <class Drop>
+  void enter_new_map(atlas_type& maps, Drop&& drop);
+  /// Adds the first of two frames that a map begins with, with their points, which `f`, the second one, observes.
+  void add_start(monocular_start_result<D> start, frame_type& f, atlas_type& maps);
   /// From the last frame, otherwise from the reference keyframe; refined on the local map.
   template <class FollowRows>
   std::size_t track_from_last(frame_type& f, atlas_type& maps, bool is_frozen, FollowRows&& follow_rows);
@@ -195,6 +217,7 @@ class front_end {
   tracker<Camera, D, Matchers> tracker_;
   moving_features<Camera, D, Matchers> moving_;
   depth_tracker<Camera> depth_;
+  [[no_unique_address]] start_type start_;
   const camera_rig<Camera>& rig_;
   const options& options_;
   camera::shutter shutter_;
@@ -205,11 +228,13 @@ class front_end {
   double held_since_ = 0.0;  ///< when the last frame was tracked whose pose depth did not hold, seconds
 
   track_state state_ = track_state::not_started;
+  bool begins_map_ = false;
+  std::optional<map_keyframe> first_keyframe_;
   std::optional<double> lost_since_;  ///< time stamp; empty: since the next frame
   map_keyframe reference_;            ///< the keyframe that the current frame shares most with
   frame_type last_;                   ///< the last frame that was tracked
   map_keyframe last_reference_;       ///< its reference ...
-  se3 T_reference_last_;              ///< ... and its pose relative to that
+  se3 T_reference_last_;              ///< ... and its pose relative to that, in lengths over its scale
   landmark_id first_new_;             ///< landmarks from this on were made of the last frame; `no_id`: none were
   motion_model motion_;
   track_counters counters_;
@@ -220,7 +245,7 @@ template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D
 se3 front_end<Camera, D, Matchers, Sensor>::last_pose(const atlas_type& maps) const {
   const map_keyframe k = maps.current(last_reference_);
   return maps.contains(k.map) && k.keyframe < maps.at(k.map).keyframe_end()
-             ? maps.at(k.map).pose_of(k.keyframe) * T_reference_last_
+             ? maps.at(k.map).pose_of(k.keyframe) * scaled(T_reference_last_, maps.at(k.map).scale_of(k.keyframe))
              : last_.T_world_camera;
 }
 
@@ -257,7 +282,9 @@ template <class FollowRows, class Similar, class Drop>
 std::size_t front_end<Camera, D, Matchers, Sensor>::localize(frame_type& f, atlas_type& maps, bool is_frozen,
                                                              FollowRows&& follow_rows, Similar&& similar, Drop&& drop) {
   first_new_ = no_id;
-  if (state_ == track_state::not_started) return is_frozen ? 0 : begin_map(f);
+  begins_map_ = false;
+  first_keyframe_.reset();
+  if (state_ == track_state::not_started) return is_frozen ? 0 : begin_map(f, maps, drop);
   if (is_tracking())
     if (const std::size_t inliers = track_from_last(f, maps, is_frozen, follow_rows); inliers > 0)
       return settle(f, maps, inliers, is_frozen, follow_rows);
@@ -271,31 +298,62 @@ std::size_t front_end<Camera, D, Matchers, Sensor>::localize(frame_type& f, atla
   if (is_tracking()) lost_since_ = last_.timestamp;
   if (!lost_since_) lost_since_ = f.timestamp;
   state_ = track_state::lost;
-  if (is_frozen || f.timestamp - *lost_since_ < options_.recovery.new_map_after) return 0;
-  return begin_new_map(f, maps, drop);
+  // Two frames take a while to find: where little is lost, that begins at once.
+  const bool at_once = !rig_.scale_is_known && maps.active().keyframes().size() < options_.recovery.min_map_keyframes;
+  if (is_frozen || (!at_once && f.timestamp - *lost_since_ < options_.recovery.new_map_after)) return 0;
+  return begin_map(f, maps, drop);
 }
 
 template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
-std::size_t front_end<Camera, D, Matchers, Sensor>::begin_map(frame_type& f) {
-  const std::size_t points = Sensor::begins_map(f, options_);
+template <class Drop>
+std::size_t front_end<Camera, D, Matchers, Sensor>::begin_map(frame_type& f, atlas_type& maps, Drop&& drop) {
+  std::size_t points = Sensor::begins_map(f, options_);
   if (points == 0) return 0;
+  std::optional<monocular_start_result<D>> start;
+  if constexpr (may_lack_scale)
+    if (!rig_.scale_is_known) {
+      start = start_.see(f);
+      if (!start) return 0;
+      points = start->points.size();
+    }
+  enter_new_map(maps, drop);
   f.landmarks.assign(f.size(), no_id);  // of searches in other maps
   f.T_world_camera = options_.find_initial_pose ? options_.find_initial_pose() : options_.initial_pose.value_or(se3{});
+  if (start) add_start(*std::move(start), f, maps);
+  begins_map_ = true;
   state_ = track_state::tracking;
   return points;
 }
 
 template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
 template <class Drop>
-std::size_t front_end<Camera, D, Matchers, Sensor>::begin_new_map(frame_type& f, atlas_type& maps, Drop&& drop) {
-  const std::size_t points = begin_map(f);
-  if (points == 0) return 0;
+void front_end<Camera, D, Matchers, Sensor>::enter_new_map(atlas_type& maps, Drop&& drop) {
+  if (state_ == track_state::not_started) return;
   const map_id before = maps.active_id();
   maps.create();
   if (maps.at(before).keyframes().size() < options_.recovery.min_map_keyframes) drop(before);
   last_ = {};
   motion_.reset();
-  return points;
+}
+
+template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
+void front_end<Camera, D, Matchers, Sensor>::add_start(monocular_start_result<D> start, frame_type& f,
+                                                       atlas_type& maps) {
+  // An initial pose that was asked for just now is that of `f`, otherwise that of the first frame.
+  const se3 T_first_second = start.second.T_world_camera;
+  const se3 T_world_first =
+      options_.find_initial_pose ? f.T_world_camera * T_first_second.inverse() : se3(f.T_world_camera);
+  f.T_world_camera = T_world_first * T_first_second;
+  frame_type& first = start.first;
+  first.T_world_camera = T_world_first;
+  first.landmarks.assign(first.size(), no_id);
+  const double timestamp = first.timestamp;
+  basic_map<D>& m = maps.active();
+  const keyframe_id id = insert_keyframe(m, std::move(first), options_);
+  for (const start_point& p : start.points)
+    f.landmarks[p.second] = m.add_landmark(id, p.first, T_world_first * p.position);
+  first_keyframe_ = reference_ = {maps.active_id(), id};
+  log_.add({timestamp, reference_, se3{}});
 }
 
 template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
@@ -495,7 +553,9 @@ void front_end<Camera, D, Matchers, Sensor>::finish(frame_type f, const atlas_ty
   if (last_.index + 1 == f.index && state_ == track_state::tracking && last_.size() != 0)
     motion_.set({last_.timestamp, last_.T_world_camera}, {f.timestamp, f.T_world_camera});
   last_reference_ = reference_;
-  T_reference_last_ = maps.active().at(reference_.keyframe).T_world_camera.inverse() * f.T_world_camera;
+  start_.reset();
+  const basic_keyframe<D>& reference = maps.active().at(reference_.keyframe);
+  T_reference_last_ = scaled(reference.T_world_camera.inverse() * f.T_world_camera, 1.0 / reference.scale);
   log_.add({f.timestamp, last_reference_, T_reference_last_});
   if (!f.held_by_depth || made) held_since_ = f.timestamp;
   if (made)

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cstddef>
 
+#include <orbis/slam/detail/map/local_map.hpp>
 #include <orbis/slam/map.hpp>
 #include <orbis/slam/options.hpp>
 
@@ -14,7 +15,7 @@ namespace orbis::slam::detail {
 /// What the decision depends on.
 struct keyframe_evidence {
   double since = 0.0;               ///< the last keyframe, seconds
-  double moved = 0.0;               ///< since then, metres
+  double moved = 0.0;               ///< since then, metres; if the scale is not known, over the depth of the scene
   double turned = 0.0;              ///< since then, radians
   std::size_t inliers = 0;          ///< landmarks tracked in the frame
   std::size_t reference = 0;        ///< landmarks of the reference keyframe that other keyframes observe as well
@@ -26,12 +27,16 @@ struct keyframe_evidence {
 /// @pre the map has keyframes, and `reference` is one
 template <feature_descriptor D>
 [[nodiscard]] keyframe_evidence gather_evidence(const basic_map<D>& m, const basic_frame<D>& f, keyframe_id reference,
-                                                std::size_t inliers, const options& o) {
+                                                std::size_t inliers, const options& o, bool scale_is_known = true) {
   keyframe_evidence e;
   const auto& last = m.keyframes().back();
   e.since = f.timestamp - last.timestamp;
   const se3 motion = last.T_world_camera.inverse() * f.T_world_camera;
   e.moved = motion.translation().norm();
+  if (!scale_is_known) {
+    const double depth = median_depth(m, f);
+    e.moved = depth > 0.0 ? e.moved / depth : 0.0;
+  }
   e.turned = motion.rotation().angle();
   e.inliers = inliers;
   e.keyframes = m.keyframes().size();

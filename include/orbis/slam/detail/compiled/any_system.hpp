@@ -5,9 +5,9 @@
 #pragma once
 
 #include <orbis/camera/any.hpp>
+#include <orbis/slam/any_system.hpp>
 #include <orbis/slam/detail/compiled/rgbd_system.hpp>
 #include <orbis/slam/detail/tracking/front_end.hpp>
-#include <orbis/slam/stereo_system.hpp>
 
 namespace orbis::slam {
 
