@@ -9,26 +9,30 @@
 
 namespace app {
 
-orbis::result<accuracy> compare(const orbis::trajectory& estimate, const orbis::trajectory& truth) {
-  const auto ate = orbis::eval::ate(estimate, truth);
+orbis::result<accuracy> compare(const orbis::trajectory& estimate, const orbis::trajectory& truth, bool with_scale) {
+  const auto ate = orbis::eval::ate(estimate, truth, {.with_scale = with_scale});
   if (!ate) return orbis::fail(ate.error());
   accuracy a;
+  a.scale = ate->aligned.scale;
+  orbis::trajectory in_metres = estimate;
+  for (orbis::stamped_pose& p : in_metres)
+    p.T_world_camera = {p.T_world_camera.rotation(), a.scale * p.T_world_camera.translation()};
   a.ate_rmse_m = ate->translation.rmse;
   a.ate_mean_m = ate->translation.mean;
   a.ate_median_m = ate->translation.median;
   a.ate_max_m = ate->translation.max;
   a.T_truth_estimate = ate->aligned.T_reference_estimate;
-  if (const auto rpe = orbis::eval::rpe(estimate, truth)) {
+  if (const auto rpe = orbis::eval::rpe(in_metres, truth)) {
     a.rpe_trans_rmse_m = rpe->translation.rmse;
     a.rpe_rot_rmse_deg = rpe->rotation.rmse;
   }
-  const auto pairs = orbis::eval::pair_poses(estimate, truth, orbis::eval::alignment_options{}.max_time_difference);
+  const auto pairs = orbis::eval::pair_poses(in_metres, truth, orbis::eval::alignment_options{}.max_time_difference);
   if (const auto by_pose = orbis::eval::align_poses(pairs)) a.T_truth_map = by_pose->T_reference_estimate;
   const orbis::se3 T_estimate_truth = a.T_truth_estimate.inverse();
   for (const auto& pair : pairs) {
     const orbis::vec3 p = pair.estimate.translation();
     const orbis::vec3 q = T_estimate_truth * pair.reference.translation();
-    a.poses.push_back({pair.timestamp, p, q, (p - q).norm()});
+    a.poses.push_back({pair.timestamp, p / a.scale, q / a.scale, (p - q).norm()});
   }
   return a;
 }
@@ -50,14 +54,16 @@ void compare_with_truth(results& r, const frame_source& source, console& console
     return;
   }
   console.stage("comparing");
-  auto compared = compare(r.slam->trajectory, source.ground_truth);
+  auto compared = compare(r.slam->trajectory, source.ground_truth, source.is_monocular());
   if (!compared) {
     r.truth_note = "Not compared with ground truth.";
     r.warnings.push_back(compared.error().to_string());
     console.warn(compared.error().to_string());
     return;
   }
-  r.truth_note = "Compared with ground truth after aligning the trajectories by a rigid motion.";
+  r.truth_note = source.is_monocular()
+                     ? "Compared with ground truth after aligning the trajectories by a motion and a scale."
+                     : "Compared with ground truth after aligning the trajectories by a rigid motion.";
   if (source.surface_distance && r.map) {
     const auto error = map_error(r.map->cloud, r.map->kept, compared->T_truth_map, source.surface_distance);
     if (error) r.map->error_m = *error;

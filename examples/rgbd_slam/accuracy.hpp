@@ -14,7 +14,8 @@
 namespace app {
 
 /// ATE after alignment by a rigid motion, and RPE from one pose to the next.
-[[nodiscard]] orbis::result<accuracy> compare(const orbis::trajectory& estimate, const orbis::trajectory& truth);
+[[nodiscard]] orbis::result<accuracy> compare(const orbis::trajectory& estimate, const orbis::trajectory& truth,
+                                              bool with_scale = false);
 
 /// RMS distance of a cloud to the true surface, in metres; the cloud is brought into the truth's
 /// world by the alignment of the trajectories.

@@ -156,7 +156,7 @@ exit_code calibrate(const settings& s, console& console) {
   };
   const auto source = open_source(s, console);
   if (!source) return console.error(source.error()), bad_input;
-  if (source->is_stereo)
+  if (source->sensor != orbis::slam::sensor_kind::rgbd)
     return console.error({orbis::errc::unsupported, s.input.string(), "only recordings with depth can be calibrated"}),
            bad_input;
   if (const auto trouble = find_trouble(s, *source)) return console.error(*trouble), bad_usage;

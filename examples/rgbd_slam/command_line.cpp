@@ -135,7 +135,7 @@ void add_plan_options(CLI::App& cmd, settings& s, std::string& from, std::string
 }
 
 void add_sensor_option(CLI::App& cmd, settings& s, const std::vector<std::string>& sensors) {
-  cmd.add_option("--sensor", s.sensor, "what takes the images: depth by itself, or two cameras")
+  cmd.add_option("--sensor", s.sensor, "what takes the images: depth by itself (rgbd), two cameras, or one")
       ->check(CLI::IsMember(sensors))
       ->type_name("S");
 }
@@ -153,9 +153,9 @@ void add_camera_option(CLI::App& cmd, settings& s) {
 }
 
 void add_recording_options(CLI::App& cmd, settings& s) {
-  add_sensor_option(cmd, s, {"auto", "rgbd", "stereo"});
+  add_sensor_option(cmd, s, {"auto", "rgbd", "stereo", "mono"});
   cmd.add_option("--format", s.format, "layout of the recording")
-      ->check(CLI::IsMember({"auto", "tum", "7scenes", "icl", "scannet", "kitti", "asl", "pairs"}))
+      ->check(CLI::IsMember({"auto", "tum", "7scenes", "icl", "scannet", "kitti", "asl", "pairs", "images"}))
       ->capture_default_str()
       ->type_name("F");
   add_camera_option(cmd, s);
@@ -302,8 +302,8 @@ std::variant<settings, exit_code> read_command_line(int argc, char** argv) {
       "4 there is no way (plan), 5 the motion does not determine the camera (calibrate).\n"
       "Interrupting a run keeps what it has reached (130).");
 
-  CLI::App* run =
-      cli.add_subcommand("run", "SLAM on a recording (TUM, 7-Scenes, ICL-NUIM, ScanNet; stereo: KITTI, ASL)");
+  CLI::App* run = cli.add_subcommand(
+      "run", "SLAM on a recording (TUM, 7-Scenes, ICL-NUIM, ScanNet; stereo or one camera: KITTI, ASL, images)");
   run->add_option("DATASET", s.input, "the recording's folder")->required()->type_name("");
   add_recording_options(*run, s);
   add_frame_options(*run, s);
@@ -312,7 +312,7 @@ std::variant<settings, exit_code> read_command_line(int argc, char** argv) {
   add_viewer_options(*run, s);
 
   CLI::App* demo = cli.add_subcommand("demo", "SLAM on a synthetic room made on the fly, with ground truth");
-  add_sensor_option(*demo, s, {"auto", "rgbd", "stereo"});
+  add_sensor_option(*demo, s, {"auto", "rgbd", "stereo", "mono"});
   add_frame_options(*demo, s);
   count(*demo, "--width", s.width, "width of the images, pixels; the height is 3/4 of it", 160, 1920)
       ->capture_default_str();
@@ -328,6 +328,7 @@ std::variant<settings, exit_code> read_command_line(int argc, char** argv) {
   eval->add_option("TRAJECTORY", s.input, "the estimate")->required()->type_name("");
   eval->add_option("GROUNDTRUTH", s.reference, "the reference")->required()->type_name("");
   eval->add_flag("--json", s.json, "print JSON");
+  eval->add_flag("--scale", s.with_scale, "the estimate has a unit of its own (one camera): find its scale as well");
 
   CLI::App* map = cli.add_subcommand("map", "cloud -> filter -> octree, without SLAM");
   map->add_option("INPUT", s.input,

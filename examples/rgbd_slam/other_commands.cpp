@@ -133,7 +133,7 @@ exit_code evaluate(const settings& s, console& console) {
   if (!estimate) return give_up(estimate.error());
   const auto truth = orbis::io::read_trajectory(s.reference);
   if (!truth) return give_up(truth.error());
-  const auto compared = compare(*estimate, *truth);
+  const auto compared = compare(*estimate, *truth, s.with_scale);
   if (!compared) return give_up({compared.error().code, s.input.string(), compared.error().message});
   std::string text = s.json ? accuracy_json(*compared) : accuracy_lines(*compared) + "\n";
   text.pop_back();

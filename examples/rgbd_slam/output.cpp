@@ -47,10 +47,11 @@ results begin_results(const settings& s, const std::string& title, const frame_s
     const auto& camera = source->camera;
     const auto& k = camera.model.k();
     r.setup.emplace_back("input", source->kind);
-    r.setup.emplace_back("camera", std::string{camera.model.model_name()} + ", " + std::to_string(k.width) + " x " +
-                                       std::to_string(k.height) + number(", fx %.1f", k.fx) +
-                                       number(", fy %.1f", k.fy) + number(", cx %.1f", k.cx) +
-                                       number(", cy %.1f", k.cy) + number(", depth / %g = metres", camera.depth_scale));
+    r.setup.emplace_back("camera",
+                         std::string{camera.model.model_name()} + ", " + std::to_string(k.width) + " x " +
+                             std::to_string(k.height) + number(", fx %.1f", k.fx) + number(", fy %.1f", k.fy) +
+                             number(", cx %.1f", k.cx) + number(", cy %.1f", k.cy) +
+                             (source->is_monocular() ? "" : number(", depth / %g = metres", camera.depth_scale)));
     r.setup.emplace_back(
         "frames", std::to_string(source->frames) + (s.stride > 1 ? ", every " + std::to_string(s.stride) + "th" : ""));
     if (s.what == command::run || s.what == command::demo) {
@@ -68,7 +69,7 @@ results begin_results(const settings& s, const std::string& title, const frame_s
                                                 number("%g", s.origin->z())
                                           : "none: points are marked occupied, nothing is marked free");
   }
-  if (s.localize_only) return r;
+  if (s.localize_only || (source != nullptr && source->is_monocular())) return r;
   r.setup.emplace_back("octree",
                        number("%g cm voxels", 100 * s.resolution) + number(", measurements up to %g m", s.max_depth));
   r.setup.emplace_back("filter asked for", filter_in_words(s));
@@ -104,9 +105,12 @@ result<void> write_report_files(results& r, const orbis::trajectory& cameras, re
 }
 
 orbis::error explain_no_start(const results& r, const settings& s) {
-  return {
-      orbis::errc::no_data, s.what == command::demo ? r.title : s.input.string(),
-      "tracking never started: none of " + std::to_string(r.slam->frames) + " frames shows enough texture with depth"};
+  const std::string frames = std::to_string(r.slam->frames) + " frames ";
+  return {orbis::errc::no_data, s.what == command::demo ? r.title : s.input.string(),
+          r.slam->sensor == orbis::slam::sensor_kind::monocular
+              ? "tracking never started: no two of " + frames +
+                    "show enough of the same texture from places that are surely far enough apart"
+              : "tracking never started: none of " + frames + "shows enough texture with depth"};
 }
 
 exit_code report_no_start(results& r, const orbis::error& why, result_files& files, console& console) {

@@ -62,7 +62,8 @@ orbis::result<void> write_trajectory_picture(const results& r, const view_frame&
 
   axes plan{s, 80, 125, 640, 630, x.padded(0.06, 0.2), y.padded(0.06, 0.2), true};
   s.text(view_frame_note, {60, 806}, faint, 11);
-  plan.frame("from above", "x, m", "y, m");
+  const std::string unit = r.slam->unit();
+  plan.frame("from above", "x, " + unit, "y, " + unit);
   plan.curve(true_above, truth_color, 2.6);
   plan.curve(above, estimate_color, 1.5);
   for (const orbis::stamped_pose& k : r.slam->keyframes) {
@@ -74,7 +75,7 @@ orbis::result<void> write_trajectory_picture(const results& r, const view_frame&
 
   const axes::range time = t.padded(0.0, 0.1);
   axes profile{s, 830, 125, 610, compared ? 260.0 : 630.0, time, z.padded(0.1, 0.1), false};
-  profile.frame("height", "time, s", "m");
+  profile.frame("height", "time, s", unit);
   profile.curve(true_height, truth_color, 2.6);
   profile.curve(height, estimate_color, 1.5);
   if (compared) {

@@ -402,6 +402,7 @@ orbis::result<void> write_report(const results& r, const view_frame& frame) {
                                          {"header", header(r)},
                                          {"frame_note", std::string{"Everything is "} + view_frame_note + "."},
                                          {"picture", picture ? "data:image/png;base64," + base64(*picture) : "data:,"},
+                                         {"unit", r.slam ? r.slam->unit() : "metres"},
                                          {"profile_height", r.against_truth ? "185" : "420"},
                                          {"tables", tables(r, frame)},
                                          {"tracking_table", r.slam ? time_table(r.slam->tracking_ms) : ""},

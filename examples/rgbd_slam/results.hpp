@@ -16,6 +16,7 @@
 #include <orbis/core/point_cloud.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/core/trajectory.hpp>
+#include <orbis/slam/frame.hpp>
 
 namespace app {
 
@@ -61,6 +62,7 @@ struct accuracy {
   double ate_rmse_m, ate_mean_m, ate_median_m, ate_max_m;
   std::optional<double> rpe_trans_rmse_m, rpe_rot_rmse_deg;
   std::vector<compared_pose> poses;
+  double scale = 1.0;           ///< metres of the truth per unit of length of the estimate
   orbis::se3 T_truth_estimate;  ///< aligns the estimate's world with the truth's, by the positions (ATE)
   orbis::se3 T_truth_map;       ///< aligns them by positions and orientations: well determined on a short path too
 };
@@ -85,6 +87,10 @@ struct frame_range {
 };
 
 struct slam_results {
+  orbis::slam::sensor_kind sensor = orbis::slam::sensor_kind::rgbd;
+  std::size_t keyframes_made = 0;
+  /// Of lengths, for people.
+  [[nodiscard]] const char* unit() const { return sensor == orbis::slam::sensor_kind::monocular ? "units" : "metres"; }
   std::size_t frames = 0, tracked = 0, lost = 0, relocalized = 0, landmarks = 0;
   std::size_t loops_closed = 0, maps_merged = 0, keyframes_culled = 0;
   shutter_results shutter;

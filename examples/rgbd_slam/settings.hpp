@@ -34,7 +34,7 @@ struct settings {
   std::filesystem::path out;        ///< where the files go
   std::filesystem::path config;     ///< file with options; empty: none
 
-  std::string sensor = "auto";  ///< "rgbd" or "stereo", or as the recording is
+  std::string sensor = "auto";  ///< "rgbd", "stereo" or "mono", or as the recording is
   std::string format = "auto";
   std::string camera;                  ///< file or preset; empty: as the recording says
   std::size_t frames = 0;              ///< at most so many; 0: all
@@ -81,6 +81,7 @@ struct settings {
   bool deterministic = false;
   bool quiet = false;
   bool json = false;
+  bool with_scale = false;  ///< lengths of the estimate are in a unit of their own
 };
 
 /// Whether a camera is named by its file rather than by its name.

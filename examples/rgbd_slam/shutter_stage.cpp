@@ -36,7 +36,7 @@ shutter_results find_shutter(const frame_source& source, const settings& s, cons
     result.shutter = *source.camera.shutter;
     return result;
   }
-  if (source.is_stereo) {  // of which few have a rolling shutter, and none a depth image
+  if (source.sensor != orbis::slam::sensor_kind::rgbd) {  // only depth tells
     result.from = "camera";
     return result;
   }

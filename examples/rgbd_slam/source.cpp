@@ -10,6 +10,7 @@
 #include <orbis/camera/presets.hpp>
 #include <orbis/camera/stereo_frame.hpp>
 #include <orbis/io/camera_file.hpp>
+#include <orbis/io/mono_recording.hpp>
 #include <orbis/io/recording.hpp>
 #include <orbis/io/stereo_recording.hpp>
 #include <orbis/io/synthetic.hpp>
@@ -22,6 +23,7 @@ namespace {
 
 using orbis::fail;
 using orbis::result;
+using orbis::slam::sensor_kind;
 
 result<orbis::camera::camera_settings> named_camera(const std::string& name) {
   return is_file_name(name) ? orbis::io::read_camera(name) : orbis::camera::preset(name);
@@ -33,6 +35,12 @@ std::size_t limited(std::size_t available, const settings& s) {
 }
 
 source_frame with_depth(orbis::camera::rgbd_frame frame) { return {std::move(frame), {}}; }
+source_frame without_depth(double timestamp, orbis::image<orbis::rgb8> color) {
+  source_frame f;
+  f.timestamp = timestamp;
+  f.color = std::move(color);
+  return f;
+}
 source_frame with_right(orbis::camera::stereo_frame pair, double depth_scale) {
   source_frame f;
   f.timestamp = pair.timestamp;
@@ -92,7 +100,7 @@ result<frame_source> open_stereo_recording(const settings& s) {
   if (!opened) return fail(opened.error());
   const auto recording = std::make_shared<const orbis::io::stereo_recording>(*std::move(opened));
   frame_source source = describe(*recording, "stereo recording", s);
-  source.is_stereo = true;
+  source.sensor = sensor_kind::stereo;
   const orbis::vec3 origin = take_origin_off(source);
   source.frame = [recording, origin, stride = s.stride](std::size_t i) -> result<source_frame> {
     auto pair = moved(recording->frame(i * stride), origin);
@@ -125,10 +133,14 @@ result<frame_source> open_recording(const settings& s) {
   if (!opened) {
     orbis::error e = opened.error();
     if (e.code == orbis::errc::invalid_argument && s.camera.empty()) e.message += " with --camera";
-    if (e.code == orbis::errc::unsupported && s.sensor == "auto" && s.format == "auto")
-      if (const auto stereo = orbis::io::open_stereo_recording(s.input); !stereo)
-        if (stereo.error().message != e.message)  // what there is in the folder is said once
-          e.message = e.message.substr(0, e.message.rfind("; the folder ")) + "; and " + stereo.error().message;
+    if (e.code == orbis::errc::unsupported && s.sensor == "auto" && s.format == "auto") {
+      const auto add = [&](const orbis::error& other) {
+        if (other.message == e.message) return;  // what there is in the folder is said once
+        e.message = e.message.substr(0, e.message.rfind("; the folder ")) + "; and " + other.message;
+      };
+      if (const auto stereo = orbis::io::open_stereo_recording(s.input); !stereo) add(stereo.error());
+      if (const auto mono = orbis::io::open_mono_recording(s.input); !mono) add(mono.error());
+    }
     return fail(std::move(e));
   }
 
@@ -144,14 +156,55 @@ result<frame_source> open_recording(const settings& s) {
   return source;
 }
 
-/// Whether the recording is to be read as a stereo one. A folder that has depth as well is one with depth.
-bool is_stereo(const settings& s) {
-  if (s.sensor != "auto") return s.sensor == "stereo";
-  if (s.format == "kitti" || s.format == "asl" || s.format == "pairs") return true;
+result<frame_source> open_mono_recording(const settings& s) {
+  using orbis::io::mono_format;
+  orbis::io::mono_recording_options options{.format = s.format == "tum"      ? mono_format::tum
+                                                      : s.format == "kitti"  ? mono_format::kitti
+                                                      : s.format == "asl"    ? mono_format::asl
+                                                      : s.format == "images" ? mono_format::images
+                                                                             : mono_format::automatic};
+  if (!s.camera.empty()) {
+    auto camera = named_camera(s.camera);
+    if (!camera) return fail(camera.error());
+    options.camera = *std::move(camera);
+  }
+  auto opened = orbis::io::open_mono_recording(s.input, options);
+  if (!opened) {
+    orbis::error e = opened.error();
+    if (e.code == orbis::errc::invalid_argument && s.camera.empty()) e.message += " with --camera";
+    return fail(std::move(e));
+  }
+  const auto recording = std::make_shared<const orbis::io::mono_recording>(*std::move(opened));
+  frame_source source = describe(*recording, "recording of one camera", s);
+  source.sensor = sensor_kind::monocular;
+  take_origin_off(source);
+  source.color = [recording, stride = s.stride](std::size_t i) { return recording->color(i * stride); };
+  source.frame = [recording, stride = s.stride](std::size_t i) -> result<source_frame> {
+    auto frame = recording->frame(i * stride);
+    if (!frame) return fail(frame.error());
+    return without_depth(frame->timestamp, std::move(frame->color));
+  };
+  return source;
+}
+
+/// What took the recording, where that is not said. A folder that has depth as well as a second camera is one with
+/// depth.
+sensor_kind sensor_of(const settings& s) {
+  if (s.sensor == "rgbd") return sensor_kind::rgbd;
+  if (s.sensor == "stereo") return sensor_kind::stereo;
+  if (s.sensor == "mono") return sensor_kind::monocular;
+  if (s.format == "images") return sensor_kind::monocular;
+  if (s.format == "kitti" || s.format == "asl" || s.format == "pairs") return sensor_kind::stereo;
   std::error_code ignored;
   for (const char* const depth : {"depth.txt", "associations.txt", "depth"})
-    if (std::filesystem::exists(s.input / depth, ignored)) return false;
-  return s.format == "auto" && orbis::io::detect_stereo_format(s.input) != orbis::io::stereo_format::automatic;
+    if (std::filesystem::exists(s.input / depth, ignored)) return sensor_kind::rgbd;
+  using orbis::io::recording_format;
+  const auto with_depth = orbis::io::detect_format(s.input);  // which of TUM's would have had one of these lists
+  if (s.format != "auto" || (with_depth != recording_format::automatic && with_depth != recording_format::tum))
+    return sensor_kind::rgbd;
+  if (orbis::io::detect_stereo_format(s.input) != orbis::io::stereo_format::automatic) return sensor_kind::stereo;
+  return orbis::io::detect_mono_format(s.input) != orbis::io::mono_format::automatic ? sensor_kind::monocular
+                                                                                     : sensor_kind::rgbd;
 }
 
 /// A synthetic recording whose textures, most of its memory, can be dropped.
@@ -189,11 +242,15 @@ frame_source make_synthetic(const settings& s) {
   frame_source source;
   source.title = "synthetic room";
   source.kind = "rendered on the fly, seed " + std::to_string(s.seed) + (s.person ? ", with a person" : "") +
-                (s.sensor == "stereo" ? ", stereo" : "");
-  source.is_stereo = s.sensor == "stereo";
-  source.camera = source.is_stereo ? recording->stereo_camera() : recording->camera();
+                (s.sensor == "stereo" ? ", stereo"
+                 : s.sensor == "mono" ? ", one camera"
+                                      : "");
+  source.sensor = s.sensor == "stereo" ? sensor_kind::stereo
+                  : s.sensor == "mono" ? sensor_kind::monocular
+                                       : sensor_kind::rgbd;
+  source.camera = source.is_stereo() ? recording->stereo_camera() : recording->camera();
   source.frames = limited(recording->size(), s);
-  source.frame = [frames_of, stride = s.stride, stereo = source.is_stereo,
+  source.frame = [frames_of, stride = s.stride, stereo = source.is_stereo(), mono = source.is_monocular(),
                   scale = source.camera.depth_scale](std::size_t i) -> result<source_frame> {
     if (stereo) {
       auto pair = frames_of->get()->stereo_frame(i * stride);
@@ -202,7 +259,7 @@ frame_source make_synthetic(const settings& s) {
     }
     auto frame = frames_of->get()->frame(i * stride);
     if (!frame) return fail(frame.error());
-    return with_depth(*std::move(frame));
+    return mono ? without_depth(frame->timestamp, std::move(frame->color)) : with_depth(*std::move(frame));
   };
   source.made = true;
   source.rest = [frames_of] { frames_of->drop(); };
@@ -234,7 +291,8 @@ double voxels_in_view(const orbis::camera::intrinsics& k, double resolution, con
 result<void> check_resolution(frame_source& source, const settings& s) {
   constexpr double slow = 1e8, too_many = 2e9;
   const orbis::camera::intrinsics& k = source.camera.model.k();
-  if (source.frames == 0 || voxels_in_view(k, s.resolution, [&](std::size_t) { return s.max_depth; }) < slow) return {};
+  if (source.frames == 0 || source.is_monocular()) return {};
+  if (voxels_in_view(k, s.resolution, [&](std::size_t) { return s.max_depth; }) < slow) return {};
   auto first = source.frame(0);
   if (!first) return {};  // whoever needs it will say why
   source.complete(*first);
@@ -276,9 +334,14 @@ std::string origin_note(const orbis::vec3& origin) {
 
 result<frame_source> open_source(const settings& s, console& console) {
   console.stage("opening");
-  auto source = s.what == command::demo ? result<frame_source>{make_synthetic(s)}
-                : is_stereo(s)          ? open_stereo_recording(s)
-                                        : open_recording(s);
+  const auto open = [&] {
+    switch (sensor_of(s)) {
+      case sensor_kind::stereo: return open_stereo_recording(s);
+      case sensor_kind::monocular: return open_mono_recording(s);
+      default: return open_recording(s);
+    }
+  };
+  auto source = s.what == command::demo ? result<frame_source>{make_synthetic(s)} : open();
   if (!source) return source;
   if (!s.localize_only)
     if (auto fine = check_resolution(*source, s); !fine) return fail(fine.error());
@@ -288,7 +351,7 @@ result<frame_source> open_source(const settings& s, console& console) {
 }
 
 void frame_source::complete(source_frame& f) const {
-  if (is_stereo && f.depth.empty()) f.depth = stereo_depth(f.color.view(), f.right.view(), camera);
+  if (is_stereo() && f.depth.empty()) f.depth = stereo_depth(f.color.view(), f.right.view(), camera);
 }
 
 result<source_frame> read_ahead::next() {

@@ -14,6 +14,7 @@
 #include <orbis/camera/settings.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/core/trajectory.hpp>
+#include <orbis/slam/frame.hpp>
 
 #include "console.hpp"
 #include "settings.hpp"
@@ -21,7 +22,7 @@
 namespace app {
 
 /// A frame with depth, or the two images of a stereo camera: then `color` is the left one, and `depth` is empty until
-/// `frame_source::complete` makes it.
+/// `frame_source::complete` makes it; or the image of one camera, which never has depth.
 struct source_frame : orbis::camera::rgbd_frame {
   orbis::image<orbis::rgb8> right;  ///< empty unless the sensor is a stereo camera
 };
@@ -29,7 +30,10 @@ struct source_frame : orbis::camera::rgbd_frame {
 struct frame_source {
   std::string title, kind;
   orbis::camera::camera_settings camera;
-  bool is_stereo = false;
+  orbis::slam::sensor_kind sensor = orbis::slam::sensor_kind::rgbd;
+  [[nodiscard]] bool is_stereo() const { return sensor == orbis::slam::sensor_kind::stereo; }
+  /// One camera without depth: lengths are in a unit of their own, and there is no dense map.
+  [[nodiscard]] bool is_monocular() const { return sensor == orbis::slam::sensor_kind::monocular; }
   std::size_t frames = 0;
   /// Reads or renders a frame; `--stride` is applied already. May be called from another thread.
   std::function<orbis::result<source_frame>(std::size_t)> frame;

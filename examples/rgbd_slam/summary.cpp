@@ -52,6 +52,7 @@ std::string summary_json(const results& r) {
   const auto& s = r.slam;
   const auto& m = r.map;
   const auto& a = r.against_truth;
+  j["sensor"] = s ? json(to_string(s->sensor)) : null;
   j["frames"] = s ? json(s->frames) : null;
   j["tracked"] = s ? json(s->tracked) : null;
   j["lost"] = s ? json(s->lost) : null;
@@ -85,6 +86,7 @@ std::string summary_json(const results& r) {
   }
   const auto& w = r.world;
   j["world"] = {{"up_from", w ? json(w->up_from) : null}, {"confidence", w ? or_null(w->confidence) : null}};
+  j["scale"] = a ? json(a->scale) : null;
   j["ate_rmse_m"] = a ? json(a->ate_rmse_m) : null;
   j["rpe_trans_rmse_m"] = a ? or_null(a->rpe_trans_rmse_m) : null;
   j["rpe_rot_rmse_deg"] = a ? or_null(a->rpe_rot_rmse_deg) : null;
@@ -233,6 +235,7 @@ std::string accuracy_lines(const accuracy& a) {
                            a.ate_mean_m, a.ate_median_m, a.ate_max_m, a.poses.size());
   if (a.rpe_trans_rmse_m && a.rpe_rot_rmse_deg)
     lines += text("\n  RPE  RMSE %.4f m, %.3f deg, from pose to pose", *a.rpe_trans_rmse_m, *a.rpe_rot_rmse_deg);
+  if (a.scale != 1.0) lines += text("\n       after scaling by %.4g", a.scale);
   return lines;
 }
 

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include <orbis/slam/stereo_system.hpp>
+#include <orbis/slam/any_system.hpp>
 
 #include "corrected_frame.hpp"
 #include "interrupts.hpp"
@@ -28,7 +28,8 @@ orbis::slam::options options_for(const frame_source& source, const settings& s) 
   orbis::slam::options options = slam_options(source.camera.model, source.camera.baseline);
   options.threads = {.enabled = !s.deterministic && s.threads != 1, .wait = true};
   options.localization_only = s.localize_only;
-  if (source.is_stereo)
+  if (source.is_monocular()) return orbis::slam::monocular_options(std::move(options));
+  if (source.is_stereo())
     return orbis::slam::stereo_options(source.camera.model.k().fx, source.camera.baseline.value(), std::move(options));
   return options;
 }
@@ -76,6 +77,12 @@ void hand_on(const slam_system& slam, const orbis::slam::track_result& found, st
   if (reference) live.add_frame(i, *reference, tracked->T_reference_camera, frame);
 }
 
+orbis::slam::track_result track_frame(slam_system& slam, const frame_source& source, const source_frame& f) {
+  if (source.is_monocular()) return slam.track(f.timestamp, f.color.view());
+  if (source.is_stereo()) return slam.track(f.timestamp, f.color.view(), f.right.view());
+  return slam.track(f);
+}
+
 /// Feeds the frames to SLAM, up to the first that cannot be read, or to Ctrl-C. Every map begins in a world of its own.
 void track_frames(slam_system& slam, const frame_source& source, const settings& s,
                   const orbis::camera::shutter& shutter, upright_worlds& worlds, tracked_frames& out, viewer& viewer,
@@ -97,13 +104,14 @@ void track_frames(slam_system& slam, const frame_source& source, const settings&
       source.complete(*frame);
       return worlds.begin_with(*frame, is_first);
     });
-    const orbis::slam::track_result found =
-        source.is_stereo ? slam.track(frame->timestamp, frame->color.view(), frame->right.view()) : slam.track(*frame);
+    const orbis::slam::track_result found = track_frame(slam, source, *frame);
     out.slam.slam_ms.push_back(took());
-    const bool is_mapped = found.keyframe || (out.live && s.map_every_frame && found.T_world_camera);
+    const bool has_keyframe = found.keyframe && !source.is_monocular();
+    const bool is_mapped = has_keyframe || (out.live && s.map_every_frame && found.T_world_camera);
     if (is_mapped) source.complete(*frame);
     const orbis::camera::rgbd_frame& at_once = is_mapped ? correct(*frame, found.twist) : *frame;
-    if (found.keyframe)
+    out.slam.keyframes_made += found.keyframe.has_value();
+    if (has_keyframe)
       out.keyframes.add(i, {found.map, *found.keyframe},
                         &at_once == &*frame ? orbis::vec6(orbis::vec6::Zero()) : found.twist, at_once);
     if (out.live) hand_on(slam, found, i, at_once, s, *out.live);
@@ -115,8 +123,9 @@ void track_frames(slam_system& slam, const frame_source& source, const settings&
       if (lost.empty() || lost.back().first + lost.back().count != i) lost.push_back({i, 0});
       ++lost.back().count;
     }
-    console.advance(i + 1, source.frames,
-                    std::string{to_string(found.state)} + ", " + std::to_string(out.keyframes.size()) + " keyframes");
+    console.advance(
+        i + 1, source.frames,
+        std::string{to_string(found.state)} + ", " + std::to_string(out.slam.keyframes_made) + " keyframes");
   }
   slam.set_initial_pose(se3{});
 }
@@ -252,7 +261,8 @@ orbis::result<tracked_frames> track(const frame_source& source, const settings& 
                      .live = {},
                      .stopped = {},
                      .unsaved = {}};
-  if (s.live_map && !s.localize_only)
+  out.slam.sensor = source.sensor;
+  if (s.live_map && !s.localize_only && !source.is_monocular())
     out.live = std::make_unique<live_mapping>(source, s, spill_file.string() + ".live", poses_of(slam));
   const viewer::connection connection{viewer, sources_of(slam, out.live.get())};  // goes before what it asks
   interrupts::keep_results(s.quiet
@@ -331,7 +341,10 @@ std::vector<std::string> tracking_notes(const tracked_frames& tracked, const set
   if (const std::size_t kept = tracked.slam.trajectory.size() + elsewhere; kept < tracked.slam.tracked)
     notes.push_back(std::to_string(tracked.slam.tracked - kept) + of_all +
                     "are left out: tracking was lost again before they had made a map");
-  if (!s.localize_only && tracked.slam.tracked != 0 && tracked.keyframes.size() == 0)
+  if (tracked.slam.sensor == orbis::slam::sensor_kind::monocular && tracked.slam.tracked != 0)
+    notes.emplace_back(
+        "one camera without depth: lengths are in a unit of their own, and there is no cloud and no octree");
+  else if (!s.localize_only && tracked.slam.tracked != 0 && tracked.keyframes.size() == 0)
     notes.emplace_back("no cloud and no octree: the loaded map shows all that was seen, so no frame became a keyframe");
   for (std::string& note : mapping_notes(tracked.keyframes, tracked.world)) notes.push_back(std::move(note));
   return notes;

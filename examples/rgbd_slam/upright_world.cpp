@@ -22,7 +22,11 @@ upright_worlds::upright_worlds(const frame_source& source, const settings& s)
 se3 upright_worlds::begin_with(const orbis::camera::rgbd_frame& frame, bool is_first) {
   orbis::mapping::upright_options options;
   if (is_first) options.gravity_camera = gravity_;
-  const auto view = orbis::mapping::find_upright(frame.depth_metres(), rays_, options);
+  // One camera sees no floor: as an image without depth.
+  const orbis::image<std::uint16_t> nothing(frame.color.width(), frame.color.height());
+  const auto view = orbis::mapping::find_upright(
+      frame.depth.empty() ? orbis::camera::depth_view<std::uint16_t>{nothing.view(), 1.0} : frame.depth_metres(), rays_,
+      options);
   world_results& how = begun_[frame.timestamp];
   how = {std::string{to_string(view.source)}, view.confidence};
   if (!frame.T_world_camera) return {view.R_world_camera, vec3::Zero()};
@@ -39,7 +43,7 @@ se3 upright_worlds::begin_with(const orbis::camera::rgbd_frame& frame, bool is_f
 }
 
 std::optional<world_results> upright_worlds::begun_at(double timestamp) const {
-  const auto at = begun_.find(timestamp);
+  const auto at = begun_.lower_bound(timestamp);  // one camera begins with two frames, and asks with the second
   if (at == begun_.end()) return std::nullopt;
   return at->second;
 }
