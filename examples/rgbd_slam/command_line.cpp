@@ -179,8 +179,21 @@ void add_shutter_option(CLI::App& cmd, settings& s) {
       ->type_name("MS");
 }
 
+/// An option that is "on" or "off".
+void add_switch(CLI::App& cmd, const std::string& name, bool& value, const std::string& what) {
+  cmd.add_option_function<std::string>(
+         name, [&value](const std::string& given) { value = given == "on"; }, what)
+      ->check(CLI::IsMember({"on", "off"}))
+      ->default_str(value ? "on" : "off")
+      ->type_name("W");
+}
+
 void add_slam_options(CLI::App& cmd, settings& s) {
   add_shutter_option(cmd, s);
+  add_switch(cmd, "--moving", s.moving,
+             "tell who moves before the camera from the room, and leave them out of tracking and map");
+  add_switch(cmd, "--depth-term", s.depth_term,
+             "depth images join the features where poses are estimated, and hold the camera where these do not");
   cmd.add_flag("--deterministic", s.deterministic,
                "the same bytes on every run: mapping and loop closing take place between the frames, not beside them");
   cmd.add_flag(

@@ -4,13 +4,16 @@
 #include <optional>
 #include <vector>
 
+#include <orbis/camera/shutter.hpp>
 #include <orbis/cloud/extract.hpp>
 #include <orbis/core/point.hpp>
+#include <orbis/core/trajectory.hpp>
 #include <orbis/io/cloud_file.hpp>
 #include <orbis/io/trajectory_file.hpp>
 
 #include "accuracy.hpp"
 #include "commands.hpp"
+#include "corrected_frame.hpp"
 #include "filters.hpp"
 #include "map_stage.hpp"
 #include "navigation.hpp"
@@ -24,12 +27,23 @@
 namespace app {
 namespace {
 
+/// The camera's motion at a time, per second, by the ground truth around it; zero where that does not know.
+orbis::vec6 twist_at(const orbis::trajectory& truth, double time) {
+  constexpr double around = 0.02, longest_gap = 0.2;  // seconds
+  const auto before = orbis::interpolate(truth, time - around, longest_gap, 0.0);
+  const auto after = orbis::interpolate(truth, time + around, longest_gap, 0.0);
+  if (!before || !after) return orbis::vec6::Zero();
+  return (before->inverse() * *after).log() / (2.0 * around);
+}
+
 /// All frames whose pose the ground truth knows.
 orbis::result<posed_frames> frames_with_poses(const frame_source& source, const settings& s,
                                               const std::filesystem::path& spill_file,
                                               std::optional<world_results>& world, console& console) {
   console.stage("reading");
-  posed_frames posed{source, s, spill_file};
+  const auto shutter = source.camera.shutter.value_or(orbis::camera::shutter{});
+  posed_frames posed{source, s, spill_file, shutter};
+  frame_correction correct{source.camera.model, shutter};
   orbis::se3 T_world_truth;
   read_ahead frames{source, s.threads != 1};
   for (std::size_t i = 0; frames.has_next(); ++i) {
@@ -43,7 +57,10 @@ orbis::result<posed_frames> frames_with_poses(const frame_source& source, const 
         world = worlds.begun_at(frame->timestamp);
         if (world->up_from == "ground truth") T_world_truth = {};
       }
-      posed.add(i, T_world_truth * *frame->T_world_camera, *frame);
+      const orbis::vec6 twist = twist_at(source.ground_truth, frame->timestamp);
+      const orbis::camera::rgbd_frame& at_once = correct(*frame, twist);
+      posed.add(i, T_world_truth * *frame->T_world_camera,
+                &at_once == &*frame ? orbis::vec6(orbis::vec6::Zero()) : twist, at_once);
     }
     console.advance(i + 1, source.frames);
   }

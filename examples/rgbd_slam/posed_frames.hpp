@@ -63,9 +63,10 @@ class posed_frames {
         colors_{spill_file.string() + ".colors", point_stride,
                 source.made ? std::numeric_limits<std::uint64_t>::max() : most_color_bytes} {}
 
-  /// Frame number `i` of the source, where the camera was at `T_world_camera`.
-  void add(std::size_t i, const orbis::se3& T_world_camera, const orbis::camera::rgbd_frame& frame) {
-    add({i, {}, T_world_camera, orbis::vec6::Zero()}, frame);
+  /// Frame number `i` of the source, where the camera was at `T_world_camera`. `twist`: see below.
+  void add(std::size_t i, const orbis::se3& T_world_camera, const orbis::vec6& twist,
+           const orbis::camera::rgbd_frame& frame) {
+    add({i, {}, T_world_camera, twist}, frame);
   }
   /// Frame number `i` of the source, which has become a keyframe; `place` sets its pose later. `twist`: by which its
   /// images were corrected; zero: they are those of the source.

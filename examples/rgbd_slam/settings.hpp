@@ -62,6 +62,8 @@ struct settings {
   bool map_every_frame = false;    ///< into the live map, until it takes over the filter's verdict
   bool realtime = false;           ///< frames come at the pace of their time stamps
   bool localize_only = false;      ///< the loaded map stays as it is
+  bool moving = true;              ///< what moves before the camera is looked for
+  bool depth_term = true;          ///< depth joins in where poses are estimated
 
   double robot_radius = 0.2;         ///< metres
   double robot_height = 0.5;         ///< metres

@@ -15,6 +15,7 @@
 #include "result_files.hpp"
 #include "shutter_stage.hpp"
 #include "slam_options.hpp"
+#include "standing_frame.hpp"
 #include "upright_world.hpp"
 
 namespace app {
@@ -28,6 +29,8 @@ orbis::slam::options options_for(const frame_source& source, const settings& s) 
   orbis::slam::options options = slam_options(source.camera.model, source.camera.baseline);
   options.threads = {.enabled = !s.deterministic && s.threads != 1, .wait = true};
   options.localization_only = s.localize_only;
+  options.moving.enabled = s.moving;
+  options.depth_term.enabled = options.depth_term.recovers = s.depth_term;
   if (source.is_monocular()) return orbis::slam::monocular_options(std::move(options));
   if (source.is_stereo())
     return orbis::slam::stereo_options(source.camera.model.k().fx, source.camera.baseline.value(), std::move(options));
@@ -90,6 +93,7 @@ void track_frames(slam_system& slam, const frame_source& source, const settings&
   using orbis::slam::track_state;
   read_ahead frames{source, s.threads != 1};
   frame_correction correct{source.camera.model, shutter};
+  standing_frames without_moving{source.camera.model};
   camera_pace pace;
   for (std::size_t i = 0; frames.has_next() && !interrupts::requested(); ++i) {
     auto frame = frames.next();
@@ -110,11 +114,12 @@ void track_frames(slam_system& slam, const frame_source& source, const settings&
     const bool is_mapped = has_keyframe || (out.live && s.map_every_frame && found.T_world_camera);
     if (is_mapped) source.complete(*frame);
     const orbis::camera::rgbd_frame& at_once = is_mapped ? correct(*frame, found.twist) : *frame;
+    const orbis::camera::rgbd_frame& for_map = is_mapped ? without_moving(at_once, slam.last_frame()) : at_once;
     out.slam.keyframes_made += found.keyframe.has_value();
     if (has_keyframe)
       out.keyframes.add(i, {found.map, *found.keyframe},
-                        &at_once == &*frame ? orbis::vec6(orbis::vec6::Zero()) : found.twist, at_once);
-    if (out.live) hand_on(slam, found, i, at_once, s, *out.live);
+                        &at_once == &*frame ? orbis::vec6(orbis::vec6::Zero()) : found.twist, for_map);
+    if (out.live) hand_on(slam, found, i, for_map, s, *out.live);
     viewer.show([&] { return handed_over(slam, i, found, took(), *std::move(frame)); });
     out.slam.tracking_ms.push_back(took());
     viewer.tell_trouble(console);

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Frames without the depth of what moves, for the map.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include <orbis/camera/any.hpp>
+#include <orbis/camera/rgbd_frame.hpp>
+#include <orbis/mapping/moving_regions.hpp>
+#include <orbis/slam/track_result.hpp>
+
+namespace app {
+
+class standing_frames {
+ public:
+  explicit standing_frames(const orbis::camera::any_camera& camera) : regions_{camera} {}
+
+  /// The frame without what lies on surfaces of features that move; the frame itself if there are none. `tracked`: what
+  /// SLAM knows of it. Valid until the next call.
+  [[nodiscard]] const orbis::camera::rgbd_frame& operator()(const orbis::camera::rgbd_frame& frame,
+                                                            const std::optional<orbis::slam::tracked_frame>& tracked) {
+    if (!tracked) return frame;
+    marks_.clear();
+    for (const orbis::slam::tracked_feature& f : tracked->features)
+      if (f.moving || f.tracked) marks_.push_back({f.x, f.y, f.moving});
+    if (!regions_.find(frame.depth_metres(), marks_)) return frame;
+    standing_ = frame;
+    regions_.remove(frame.depth_metres(), standing_.depth.view());
+    return standing_;
+  }
+
+ private:
+  orbis::mapping::moving_regions<orbis::camera::any_camera> regions_;
+  std::vector<orbis::mapping::marked_pixel> marks_;
+  orbis::camera::rgbd_frame standing_;
+};
+
+}  // namespace app

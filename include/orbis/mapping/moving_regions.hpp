@@ -1,0 +1,177 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// What moves in a depth image, by some pixels of which it is known whether they show something that moves.
+///
+/// @code
+///   orbis::mapping::moving_regions<orbis::camera::pinhole> regions{camera};
+///   std::vector<orbis::mapping::marked_pixel> marks;
+///   for (const auto& f : slam.last_frame().value().features)
+///     if (f.moving || f.tracked) marks.push_back({f.x, f.y, f.moving});
+///   if (regions.find(depth, marks)) regions.remove(depth, copy.view());  // copy: of what depth stores
+/// @endcode
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include <orbis/camera/depth.hpp>
+#include <orbis/camera/model.hpp>
+#include <orbis/core/image.hpp>
+#include <orbis/core/types.hpp>
+#include <orbis/mapping/detail/moving/depth_cells.hpp>
+#include <orbis/mapping/detail/moving/moving_judge.hpp>
+#include <orbis/mapping/masked_depth.hpp>
+#include <orbis/mapping/moving_options.hpp>
+
+namespace orbis::mapping {
+
+/// A pixel of which it is known whether it shows something that moves.
+struct marked_pixel {
+  float x = 0.0F, y = 0.0F;
+  bool moves = false;
+};
+
+struct moving_region_options {
+  /// How far along a surface what a marked pixel shows may reach, metres.
+  float reach = 0.8F;
+  /// So many marked pixels that move there have to be at least, else nothing is taken out.
+  std::size_t least_marks = 5;
+};
+
+/// Grows marked pixels along the surfaces of a depth image, those that move and those that stand still at once: what is
+/// nearer to one that moves, moves with it. Surfaces end where depth leaps. A keyframe without what moves in it can go
+/// into a map: tracking tells of what moves before the camera at once (`slam::tracked_feature::moving`), also of
+/// somebody who goes along with it, whom no later ray passes through; `moving_filter` tells of what tracking has not
+/// seen.
+///
+/// Works on cells of 4x4 pixels. Keeps its memory: nothing is allocated after some images. For one thread at a time.
+template <camera::camera_model Camera>
+class moving_regions {
+ public:
+  /// @pre options.reach >= 0
+  explicit moving_regions(const Camera& camera, const moving_region_options& options = {})
+      : options_{options}, grid_{camera} {}
+
+  /// Finds the regions that move. Returns whether there are any. O(pixels + cells log cells), at once where no mark
+  /// moves. @pre the image has the camera's size
+  template <camera::depth_source Depth>
+  [[nodiscard]] bool find(const Depth& depth, std::span<const marked_pixel> marks) {
+    removed_.clear();
+    const auto moving = std::count_if(marks.begin(), marks.end(), [](const marked_pixel& m) { return m.moves; });
+    if (moving == 0 || static_cast<std::size_t>(moving) < options_.least_marks) return false;
+    take(depth);
+    begin(marks);
+    grow();
+    for (std::size_t i = 0; i != label_.size(); ++i)
+      if (label_[i] == label::moves) removed_.push_back({static_cast<std::uint32_t>(i), depth_[i]});
+    return !removed_.empty();
+  }
+
+  /// Writes what `depth` stores to `out`, with 0 where it shows something that moves. Returns how many pixels these
+  /// are. O(pixels). @pre the image that `find` was called with; `out` has its size
+  template <camera::depth_source Depth>
+  std::size_t remove(const Depth& depth, image_view<depth_pixel<Depth>> out) const {
+    for (int y = 0; y != depth.height(); ++y)
+      for (int x = 0; x != depth.width(); ++x) out(x, y) = stored_depth(depth, x, y);
+    return detail::remove_cells(depth, removed_, same_surface_, out);
+  }
+
+ private:
+  enum class label : std::uint8_t { unknown, stands, moves };
+  /// A cell that is reached, from a mark on its surface.
+  struct step {
+    float way;  ///< metres
+    std::uint32_t cell;
+    label what;
+    [[nodiscard]] friend bool operator<(const step& a, const step& b) noexcept {  // the nearest is the last in a heap
+      return a.way > b.way || (a.way == b.way && a.cell > b.cell);
+    }
+  };
+
+  template <class Depth>
+  void take(const Depth& depth) {
+    constexpr int edge = detail::cell_grid::edge;
+    depth_.assign(grid_.size(), 0.0F);
+    for (int y = 0; y != depth.height(); ++y)
+      for (int x = 0; x != depth.width(); ++x) {
+        const float z = depth(x, y);
+        float& nearest = depth_[static_cast<std::size_t>(y / edge * grid_.across + x / edge)];
+        if (z > 0.0F && (nearest == 0.0F || z < nearest)) nearest = z;
+      }
+    for (std::size_t i = 0; i != depth_.size(); ++i)
+      if (std::isnan(grid_.rays[i].x())) depth_[i] = 0.0F;
+  }
+
+  /// `visit(neighbour)` for the cells around one that lie on the same surface; returns whether all do that have depth.
+  template <class Visit>
+  bool around(std::size_t cell, const Visit& visit) const {
+    const int x = static_cast<int>(cell) % grid_.across, y = static_cast<int>(cell) / grid_.across;
+    const float z = depth_[cell];
+    bool all = true;
+    for (int v = std::max(0, y - 1); v <= std::min(grid_.down - 1, y + 1); ++v)
+      for (int u = std::max(0, x - 1); u <= std::min(grid_.across - 1, x + 1); ++u) {
+        const auto j = static_cast<std::size_t>(v * grid_.across + u);
+        if (j == cell || depth_[j] == 0.0F) continue;
+        const float nearer = std::min(z, depth_[j]);
+        if (std::abs(depth_[j] - z) <= 2.0F * detail::depth_margin(same_surface_, nearer))
+          visit(j);
+        else
+          all = false;
+      }
+    return all;
+  }
+  [[nodiscard]] vec3f point(std::size_t cell) const {
+    return depth_[cell] * vec3f(grid_.rays[cell].x(), grid_.rays[cell].y(), 1.0F);
+  }
+
+  void push(const step& s) {
+    open_.push_back(s);
+    std::push_heap(open_.begin(), open_.end());
+  }
+  void begin(std::span<const marked_pixel> marks) {
+    label_.assign(grid_.size(), label::unknown);
+    open_.clear();
+    for (const marked_pixel& m : marks) {
+      const int x = static_cast<int>(m.x + 0.5F) / detail::cell_grid::edge,
+                y = static_cast<int>(m.y + 0.5F) / detail::cell_grid::edge;
+      if (!(m.x >= 0.0F && m.y >= 0.0F) || x >= grid_.across || y >= grid_.down) continue;
+      const auto cell = static_cast<std::size_t>(y * grid_.across + x);
+      if (depth_[cell] == 0.0F) continue;
+      // At an edge it is not clear which of the surfaces a mark is for.
+      if (around(cell, [](std::size_t) {}))
+        push({0.0F, static_cast<std::uint32_t>(cell), m.moves ? label::moves : label::stands});
+    }
+  }
+  /// Dijkstra's algorithm from all marks at once.
+  void grow() {
+    while (!open_.empty()) {
+      std::pop_heap(open_.begin(), open_.end());
+      const step s = open_.back();
+      open_.pop_back();
+      if (label_[s.cell] != label::unknown) continue;
+      label_[s.cell] = s.what;
+      around(s.cell, [&](std::size_t next) {
+        const float way = s.way + (point(next) - point(s.cell)).norm();
+        if (label_[next] == label::unknown && way <= options_.reach)
+          push({way, static_cast<std::uint32_t>(next), s.what});
+      });
+    }
+  }
+
+  moving_region_options options_;
+  moving_filter_options same_surface_;
+  detail::cell_grid grid_;
+  std::vector<float> depth_;  ///< of each cell's nearest pixel, metres; 0: none
+  std::vector<label> label_;
+  std::vector<step> open_;
+  std::vector<detail::removed_cell> removed_;
+};
+
+}  // namespace orbis::mapping
