@@ -26,6 +26,10 @@ std::string milliseconds(double seconds, const char* format = "%.1f") {
 
 shutter_results find_shutter(const frame_source& source, const settings& s, console& console) {
   shutter_results result;
+  if (source.is_monocular()) {  // what is known of motion while an image is read is in metres
+    result.from = "camera";
+    return result;
+  }
   if (s.read_out_ms) {
     result.from = "given";
     result.shutter.color_read_out = result.shutter.depth_read_out = 0.001 * *s.read_out_ms;

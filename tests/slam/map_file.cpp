@@ -79,7 +79,7 @@ TEST_CASE("A file that is cut off says in which section") {
   CHECK(fault_of(bytes.substr(0, 10)) == "some.map: ends before its version");
   CHECK(fault_of(bytes.substr(0, 20)) == "some.map: section \"size\" is missing: the file ends at byte 20");
   CHECK(fault_of(bytes.substr(0, 100)) ==
-        "some.map: section \"kfrm\" from byte 56 is cut off: the file ends at byte 100");
+        "some.map: section \"kfrm\" from byte 60 is cut off: the file ends at byte 100");
   for (std::size_t size = 0; size < bytes.size(); size += 1 + size / 100) {
     const auto cut = parsed(bytes.substr(0, size));
     REQUIRE_FALSE(cut.has_value());
@@ -99,7 +99,7 @@ TEST_CASE("A file with one wrong bit says in which section") {
   }
   std::string damaged = bytes;
   damaged[100] = static_cast<char>(damaged[100] ^ 1);
-  CHECK(fault_of(damaged) == "some.map: section \"kfrm\" from byte 56 is damaged: its checksum does not fit");
+  CHECK(fault_of(damaged) == "some.map: section \"kfrm\" from byte 60 is damaged: its checksum does not fit");
   std::string newer = bytes;
   newer[8] = 3;
   const auto m = parsed(newer);
@@ -113,24 +113,28 @@ TEST_CASE("A file says what sensor the map was made with, and one of version 1 i
   slam::map m(8, 1.2);
   auto f = test::random_frame(random, 5, 0);
   f.sensor = slam::sensor_kind::monocular;
+  f.scale_is_known = false;
   m.add_keyframe(f);
   f.sensor = slam::sensor_kind::rgbd;  // that of the first one counts
+  f.scale_is_known = true;
   m.add_keyframe(f);
   const std::string bytes = slam::map_bytes(m);
   const auto again = parsed(bytes);
   REQUIRE(again.has_value());
   CHECK(again->sensor() == slam::sensor_kind::monocular);
   CHECK(to_string(again->sensor()) == "monocular");
+  CHECK_FALSE(again->scale_is_known());
 
   constexpr std::size_t head = 12, begin = head + 12, size = 24;  // of the section "size" in version 1
   std::string older = bytes.substr(0, head);
   older[8] = 1;
   slam::detail::put_section(older, "size", [&](std::string& to) { to += bytes.substr(begin, size); });
-  older += bytes.substr(begin + size + 4 + 4);
+  older += bytes.substr(begin + size + 8 + 4);
   const auto old = parsed(older);
   CHECK((old ? "" : old.error().to_string()) == "");
   REQUIRE(old.has_value());
   CHECK(old->sensor() == slam::sensor_kind::unknown);
+  CHECK(old->scale_is_known());
   CHECK(old->keyframes().size() == 2);
 
   std::string none = bytes.substr(0, head);

@@ -96,11 +96,12 @@ TEST_CASE("A camera that only turns begins no map") {
   CHECK(slam.keyframes().empty());
 }
 
-TEST_CASE("A map that is lost young is begun anew at once; an old one is found again") {
+TEST_CASE("A map that is lost young is begun anew at once") {
   const io::synthetic_recording room{{.frames = 160, .fps = 20, .seed = 1, .width = 320, .height = 240}};
   const image<rgb8> black(320, 240);
   auto options = slam::monocular_options();
   options.recovery.min_map_keyframes = 1000;  // every map is young
+  options.recovery.new_map_after = 1000.0;
   slam::any_system slam{room.camera().model, options};
   std::size_t i = 0;
   const auto track_until = [&](auto&& done) {
@@ -119,6 +120,35 @@ TEST_CASE("A map that is lost young is begun anew at once; an old one is found a
   CHECK(slam.inspect([&](const slam::atlas& maps) { return maps.size(); }) == 1);  // the young one is gone
   CHECK(fault_of(slam) == "");
 }
+
+TEST_CASE("A camera that comes back to a map is found in it") {
+  const io::synthetic_recording room{{.frames = 100, .fps = 20, .seed = 1, .width = 320, .height = 240}};
+  const image<rgb8> black(320, 240);
+  slam::any_system slam{room.camera().model, slam::monocular_options()};
+  track_all(slam, room);
+  const slam::map_id first = slam.active_map();
+  double time = room.ground_truth().back().timestamp;
+  for (int i = 0; i != 10; ++i) CHECK(slam.track(time += 0.05, black.view()).state == slam::track_state::lost);
+  CHECK(slam.track(time + 0.05, room.frame(60).value().color.view()).state == slam::track_state::relocalized);
+  CHECK(slam.active_map() == first);
+}
+
+/// A sensor of a user's own that measures no lengths, and does not say what it is.
+struct own_sensor {
+  static constexpr slam::scale_source scale = slam::scale_source::free;
+  template <camera::camera_model Camera, slam::feature_extractor Extractor>
+  [[nodiscard]] static slam::basic_frame<slam::descriptor_of_t<Extractor>> measure(const slam::camera_rig<Camera>& rig,
+                                                                                   const Extractor& extract,
+                                                                                   image_view<const rgb8> color) {
+    auto f = slam::monocular::measure(rig, extract, color);
+    f.sensor = slam::sensor_kind::unknown;
+    return f;
+  }
+  template <slam::feature_descriptor D>
+  [[nodiscard]] static std::size_t begins_map(const slam::basic_frame<D>& f, const slam::options&) {
+    return f.size();
+  }
+};
 
 TEST_CASE("A map without depth is loaded by a system without depth only, which is then found in it") {
   const test::temporary_folder folder;
@@ -158,11 +188,18 @@ TEST_CASE("A drive with one camera has the shape of the truth") {
   CHECK(error->translation.rmse < 0.01 * length(truth));
 }
 
-TEST_CASE("The system of one camera needs no sensor of run time") {
+TEST_CASE("The system of one camera needs no sensor of run time, and takes one of the user's own") {
+  const test::temporary_folder folder;
   const io::synthetic_recording room{{.frames = 40, .fps = 20, .seed = 1, .width = 320, .height = 240}};
-  slam::monocular_system slam{room.camera().model, slam::monocular_options()};
+  slam::rgbd_system<camera::any_camera, features::orb_extractor, slam::orb_matchers, slam::bag_of_words_places,
+                    own_sensor>
+      slam{room.camera().model, slam::monocular_options()};
   slam::any_system any{room.camera().model, slam::monocular_options()};
   CHECK(track_all(slam, room).first == track_all(any, room).first);
   CHECK(slam.landmark_count() == any.landmark_count());
   CHECK(slam.landmark_count() > 200);
+  CHECK_FALSE(slam.map().scale_is_known());
+  REQUIRE(slam.save_map(folder.path() / "own.map"));
+  CHECK(slam.load_map(folder.path() / "own.map"));
+  CHECK(any.load_map(folder.path() / "own.map"));
 }

@@ -46,6 +46,8 @@ struct correction_event {
   map_id merged = 0;          ///< of a merger: the map that became a part of `map`
   id_offsets offsets{};       ///< of a merger: by how much the ids of `merged` grew
   sim3 T_corrected_before{};  ///< the correction at keyframe `from`, in the world of the map; with depth of scale 1
+  /// Of a merger: how the world of `map` changed, where `merged` is the older one, whose world stays.
+  sim3 T_map_before{};
   double milliseconds = 0.0;  ///< wall time
 };
 

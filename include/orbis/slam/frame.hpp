@@ -51,7 +51,8 @@ struct basic_frame {
   std::vector<vec3> rays;               ///< through each keypoint, scaled to z = 1; NaN where the pixel has no ray
   std::vector<landmark_id> landmarks;   ///< observed by each keypoint, or `no_id`
   orbis::features::keypoint_grid grid;  ///< of the keypoints
-  sensor_kind sensor = sensor_kind::unknown;
+  sensor_kind sensor = sensor_kind::unknown;  ///< a sensor of one's own may leave it
+  bool scale_is_known = true;                 ///< false if no lengths are measured; the system sets it
   /// Few landmarks hold the pose, or none, and depth does: adjustments, which know of landmarks only, keep it. Map
   /// files do not tell.
   bool held_by_depth = false;

@@ -55,8 +55,10 @@ class basic_map {
   /// @pre the content is consistent: ids refer to what is there, and no keypoint observes two landmarks
   explicit basic_map(detail::map_content<D> content);
 
-  /// What took the map's first keyframe. Lengths of a monocular map are in a unit of its own.
+  /// What took the map's first keyframe.
   [[nodiscard]] sensor_kind sensor() const noexcept { return content_.sensor; }
+  /// Whether lengths are metres; otherwise they are in a unit of the map's own.
+  [[nodiscard]] bool scale_is_known() const noexcept { return content_.scale_is_known; }
   /// The keyframes by ascending id: a range with `size()`, `empty()`, `front()` and `back()`.
   [[nodiscard]] const auto& keyframes() const noexcept { return content_.keyframes; }
   /// The landmarks by ascending id: a range as `keyframes()`.
@@ -241,7 +243,10 @@ void basic_map<D>::transform(const sim3& T_new_old) {
 template <feature_descriptor D>
 keyframe_id basic_map<D>::add_keyframe(frame_type f) {
   ++pose_changes_;
-  if (content_.sensor == sensor_kind::unknown) content_.sensor = f.sensor;
+  if (content_.keyframes.end_id() == keyframe_id{0}) {
+    content_.sensor = f.sensor;
+    content_.scale_is_known = f.scale_is_known;
+  }
   const keyframe_id before = content_.keyframes.empty() ? no_id : content_.keyframes.back().id;
   const std::vector<landmark_id> seen = std::exchange(f.landmarks, std::vector<landmark_id>(f.features.size(), no_id));
   const keyframe_id id = content_.keyframes.add({std::move(f), keyframe_end()});
@@ -351,7 +356,10 @@ id_offsets basic_map<D>::append(basic_map&& other, const sim3& T_this_other, con
   covisibility_.append(std::move(other.covisibility_), offsets.keyframes);
   content_.keyframes.append(std::move(other.content_.keyframes));
   content_.landmarks.append(std::move(other.content_.landmarks));
-  if (content_.sensor == sensor_kind::unknown) content_.sensor = other.content_.sensor;
+  if (offsets.keyframes == 0) {
+    content_.sensor = other.content_.sensor;
+    content_.scale_is_known = other.content_.scale_is_known;
+  }
   for (keyframe_id id = offsets.keyframes; id != keyframe_end(); ++id) {
     if (!has_keyframe(id)) continue;
     keyframe_type& k = content_.keyframes[id];

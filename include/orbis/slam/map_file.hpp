@@ -13,7 +13,7 @@
 ///
 ///     size  levels of the pyramid (u32), shared landmarks that make an edge (u32), scale factor (f64), number of ids
 ///           given to keyframes (u32) and to landmarks (u32) so far, sensor (u32: 1 RGB-D, 2 stereo, 3 monocular, 0 not
-///           known; not in version 1)
+///           known) and whether lengths are metres (u32: 1, otherwise 0); version 1 has neither of the last two
 ///     kfrm  for each keyframe id a byte. 0: it was erased; its replacement (id) and its pose relative to that. 1: time
 ///           stamp (f64), frame index (u64), pose, number of keypoints (u32), and for each keypoint x, y, size, angle,
 ///           response (f32), octave (i32), depth (f32), x and y of the ray (f64; NaN without one), descriptor (32

@@ -56,6 +56,7 @@ struct monocular {
   settings.keyframes.moved = 0.03;
   settings.keyframes.inlier_ratio = settings.keyframes.inlier_ratio_start = 0.9;
   settings.culling.min_support = 3;
+  settings.culling.least_support = 2;
   settings.triangulation.neighbors = 20;
   settings.triangulation.min_baseline = 0.01;
   settings.triangulation.min_parallax = 0.02;

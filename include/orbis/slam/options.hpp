@@ -17,8 +17,9 @@ namespace orbis::slam {
 
 /// When a frame becomes a keyframe.
 struct keyframe_options {
-  double interval = 0.3;             ///< seconds since the last keyframe, after which motion is a sufficient reason
-  double moved = 0.06;               ///< metres since the last keyframe that count as motion ...
+  double interval = 0.3;  ///< seconds since the last keyframe, after which motion is a sufficient reason
+  double moved =
+      0.06;  ///< metres (without depth, median depths of the view) since the last keyframe that count as motion ...
   double turned = 0.06;              ///< ... or radians
   double inlier_ratio = 0.75;        ///< a keyframe is made below this share of the reference keyframe's landmarks
   double inlier_ratio_start = 0.4;   ///< the share while the map has one keyframe
@@ -37,12 +38,13 @@ struct adjustment_options {
 
 /// Removal of unreliable landmarks and redundant keyframes.
 struct culling_options {
-  double found_ratio = 0.25;      ///< share of the frames in which a landmark is expected that have to show it ...
-  std::uint32_t min_visible = 8;  ///< ... once it was expected in so many frames
-  std::uint32_t age = 2;          ///< keyframes after the one that created it, when a landmark must have ...
-  std::uint32_t min_support = 4;  ///< ... so many observations, where those with depth count twice
-  std::size_t neighborhood = 20;  ///< keyframes around the newest one that are examined
-  double redundant = 0.9;         ///< a keyframe is redundant if this share of its close landmarks is observed by ...
+  double found_ratio = 0.25;        ///< share of the frames in which a landmark is expected that have to show it ...
+  std::uint32_t min_visible = 8;    ///< ... once it was expected in so many frames
+  std::uint32_t age = 2;            ///< keyframes after the one that created it, when a landmark must have ...
+  std::uint32_t min_support = 4;    ///< ... so many observations, where those with depth count twice
+  std::uint32_t least_support = 0;  ///< of a landmark of any higher age, below which it is removed
+  std::size_t neighborhood = 20;    ///< keyframes around the newest one that are examined
+  double redundant = 0.9;           ///< a keyframe is redundant if this share of its close landmarks is observed by ...
   std::size_t redundant_observers = 3;  ///< ... so many other keyframes ...
   int coarser_levels = 1;               ///< ... at most so many pyramid levels coarser
 };
@@ -83,7 +85,7 @@ struct start_options {
 /// Triangulation of keypoints without landmark.
 struct triangulation_options {
   std::size_t neighbors = 10;    ///< keyframes around the new one that are searched
-  double min_baseline = 0.03;    ///< metres between two keyframes, at least
+  double min_baseline = 0.03;    ///< metres (without depth, median depths) between two keyframes, at least
   double min_parallax = 0.05;    ///< radians between two rays, at least
   std::uint32_t distance = 50;   ///< of descriptors, at most
   float ratio = 0.6F;            ///< of the distance to that of the second best match, at most
@@ -119,7 +121,10 @@ struct loop_options {
   double translation_per_metre = 0.05;   ///< ... and in addition per metre of the path between the two keyframes
   double max_rotation = 5.0 * std::numbers::pi / 180.0;        ///< rotation that is always plausible, radians ...
   double rotation_per_metre = 1.0 * std::numbers::pi / 180.0;  ///< ... and in addition per metre of the path
-  std::uint64_t seed = 1;                                      ///< of RANSAC
+  /// Where no lengths are measured, standard deviation of the logarithm of the scale between both ends, at most; drift
+  /// of the scale has no bound, and of the four above only `max_rotation` counts.
+  double max_scale_deviation = 0.02;
+  std::uint64_t seed = 1;  ///< of RANSAC
 };
 
 /// Fusion of the landmarks of both ends of a loop, or of two maps.
@@ -195,7 +200,7 @@ struct options {
   double max_depth = 10.0;              ///< metres
   double close_depth = 3.2;             ///< metres; nearer points become landmarks at once
   std::size_t min_new_landmarks = 100;  ///< new landmarks of a keyframe, even if they are not close
-  std::size_t min_start_points = 100;   ///< keypoints with depth that a map needs to begin
+  std::size_t min_start_points = 100;   ///< keypoints with depth (if it is measured) that a map needs to begin
   std::size_t min_inliers = 20;         ///< of a tracked frame
   double motion_radius = 15.0;          ///< of the search around the last frame's points, pixels of a keypoint's level
   double search_radius = 4.0;           ///< of the search for landmarks around a refined pose, likewise
@@ -220,8 +225,8 @@ struct options {
   thread_options threads{};
   bool localization_only = false;     ///< no keyframes are made, and the map is kept unchanged: for a loaded map
   std::optional<se3> initial_pose{};  ///< `T_world_camera` of the first frame of a map; default: the identity
-  /// The same, asked for by tracking's thread when a map begins with a frame; `initial_pose` does not count then. It
-  /// must not call the system.
+  /// The same, asked for by tracking's thread when a map begins with a frame (of two, without depth, it is the pose of
+  /// the second one, with which it is asked for); `initial_pose` does not count then. It must not call the system.
   std::function<se3()> find_initial_pose{};
   std::uint64_t seed = 1;  ///< of RANSAC
 };

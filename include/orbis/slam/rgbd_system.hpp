@@ -15,6 +15,7 @@
 /// Tardos, J. M. M. Montiel, "ORBSLAM-Atlas", IROS 2019.
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <concepts>
@@ -311,6 +312,8 @@ auto ORBIS_SLAM_SYSTEM::measure(double timestamp, const Images&... images) const
   frame_type f;
   if (are_usable(timestamp, images...)) {
     f = sensor_.measure(shared_.rig, extract_, images...);
+    f.scale_is_known = shared_.rig.scale_is_known;
+    if (!f.scale_is_known) std::fill(f.depth.begin(), f.depth.end(), 0.0F);  // what a sensor of run time may measure
     if (front_end_.looks_at_rows()) detail::keep_as_read(f);
   }
   f.timestamp = std::isfinite(timestamp) ? timestamp : front_end_.last_timestamp();
@@ -469,7 +472,7 @@ result<void> ORBIS_SLAM_SYSTEM::load_map(const std::filesystem::path& path) requ
   const auto& content = loaded->content();
   if (content.levels != shared_.rig.scales.levels() || !(content.scale_factor == shared_.rig.scales.factor()))
     return fail(errc::unsupported, path.string(), "the map was made with another image pyramid");
-  if ((loaded->sensor() == sensor_kind::monocular) == shared_.rig.scale_is_known)
+  if (loaded->scale_is_known() != shared_.rig.scale_is_known)
     return fail(errc::unsupported, path.string(),
                 shared_.rig.scale_is_known ? "the map was made without depth, its unit of length is not the metre"
                                            : "the map was made with depth, and this sensor measures none");

@@ -21,7 +21,12 @@ TEST_CASE("Constant motion goes on in proportion to time, for three intervals at
   CHECK(error(motion.predict(second, 1.15), second.T_world_camera * se3::exp(0.5 * step)) < 1e-9);
   CHECK(error(motion.predict(second, 9.0), second.T_world_camera * se3::exp(3.0 * step)) < 1e-9);
   CHECK(error(motion.predict(second, 0.5), second.T_world_camera) < 1e-9);
+  motion.scale_by(5.0);
+  vec6 longer = step;
+  longer.head<3>() *= 5.0;
+  CHECK(error(motion.predict(second, 1.2), second.T_world_camera * se3::exp(longer)) < 1e-9);
   motion.reset();
+  motion.scale_by(5.0);
   CHECK(error(motion.predict(second, 1.2), second.T_world_camera) == 0.0);
 }
 

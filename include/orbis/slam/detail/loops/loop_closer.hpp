@@ -210,7 +210,8 @@ bool loop_closer<Camera, D, Places>::merge(map_keyframe k, map_keyframe candidat
     event.from = {candidate.map, done.keyframe};
     event.T_corrected_before = done.T_into_from;
     if (k.map < candidate.map) {  // the world stays that of the older map
-      shared_.atlas.at(candidate.map).transform(done.T_into_from.inverse());
+      event.T_map_before = done.T_into_from.inverse();
+      shared_.atlas.at(candidate.map).transform(event.T_map_before);
       event.T_corrected_before = sim3{};
     }
     ++shared_.maps_merged;

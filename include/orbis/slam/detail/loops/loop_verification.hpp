@@ -73,6 +73,7 @@ enum class loop_verdict {
   not_aligned,    ///< no rigid motion explains enough of the matches
   few_inliers,    ///< the keyframe observes too few of the landmarks around the candidate
   not_supported,  ///< too few neighbours of the keyframe observe them
+  unsure_scale,   ///< the scale is not determined
   too_far         ///< the drift would be implausible: probably another place with the same appearance
 };
 
@@ -84,6 +85,7 @@ enum class loop_verdict {
     case loop_verdict::not_aligned: return "not aligned";
     case loop_verdict::few_inliers: return "few inliers";
     case loop_verdict::not_supported: return "not supported";
+    case loop_verdict::unsure_scale: return "unsure scale";
     case loop_verdict::too_far: return "too far";
   }
   return "unknown";
@@ -105,6 +107,7 @@ struct view {
   std::vector<vec3> points;          ///< by feature: in the camera frame, metres
   std::vector<std::uint32_t> index;  ///< by feature: its keypoint
   std::vector<double> deviations;    ///< by feature: standard deviation of the depth, metres
+  double median_depth = 0.0;         ///< of the points
 };
 
 template <feature_descriptor D>
@@ -159,6 +162,7 @@ template <feature_descriptor D, camera::camera_model Camera>
     v.deviations.push_back(rig.scale_is_known ? rig.depth_deviation(point.z(), k.features.keypoints[i].octave)
                                               : deviation_by_parallax(m, k, i, rig));
   }
+  v.median_depth = rig.scale_is_known ? 0.0 : median_depth(m, k);
   return v;
 }
 
@@ -220,7 +224,7 @@ class checker {
     if (matches.size() < options_.min_matches) return loop_verdict::few_matches;
     if (!align(matches, found)) return loop_verdict::not_aligned;
     if (!refine(found)) return loop_verdict::few_inliers;
-    if (!rig_.scale_is_known) measure_scale(found);
+    if (!rig_.scale_is_known && !measure_scale(found)) return loop_verdict::unsure_scale;
     const std::size_t wanted = std::min(options_.min_supporters, s_.supporters.size());
     for (std::size_t i = 0; i != s_.supporters.size() && found.supporters < wanted; ++i)
       found.supporters += supports(s_.supporters[i], found);
@@ -247,8 +251,8 @@ class checker {
     return second.inliers >= options_.min_inliers;
   }
 
-  /// The scale by the depths of landmarks that both sides have: their median ratio. Left as it is with few of them.
-  void measure_scale(loop_match& found) const {
+  /// The scale by the depths of landmarks that both sides have: their median ratio. False if that is not sure.
+  [[nodiscard]] bool measure_scale(loop_match& found) const {
     std::vector<vec3> at(s_.seen.image.size(), vec3::Zero());
     for (std::size_t i = 0; i != s_.seen.points.size(); ++i) at[s_.seen.index[i]] = s_.seen.points[i];
     const se3 T_keyframe_world = (s_.landmarks.T_world_camera * found.T_candidate_keyframe).inverse();
@@ -259,15 +263,27 @@ class checker {
       const double here = at[p.feature].z(), there = (T_keyframe_world * l->position).z();
       if (here > 0.0 && there > 0.0) ratios.push_back(there / here);
     }
-    if (ratios.size() < options_.min_aligned) return;
+    if (ratios.size() < options_.min_matches || ratios.empty()) return false;
     found.scale = median_of(ratios);
+    std::vector<double> off;
+    for (const double r : ratios) off.push_back(std::abs(std::log(r / found.scale)));
+    constexpr double deviation_by_median = 1.4826;  // of a normal distribution
+    const double deviation = deviation_by_median * median_of(off) / std::sqrt(static_cast<double>(off.size()));
+    return deviation <= options_.max_scale_deviation;
   }
 
   [[nodiscard]] bool supports(const neighbor<D>& n, const loop_match& found) const {
     const se3 T_world_camera =
         s_.landmarks.T_world_camera * found.T_candidate_keyframe * scaled(n.T_keyframe_camera, found.scale);
     const auto localized = localize(n.image, T_world_camera, options_.radius, nullptr);
-    return localized.ok() && localized.inliers >= options_.supporter_inliers;
+    if (!localized.ok() || localized.inliers < options_.supporter_inliers) return false;
+    if (rig_.scale_is_known) return true;
+    // Where the neighbour is clearly apart, it is found there as far away as the scale says.
+    const se3 T_keyframe_neighbor =
+        (s_.landmarks.T_world_camera * found.T_candidate_keyframe).inverse() * localized.T_world_camera;
+    const double expected = found.scale * n.T_keyframe_camera.translation().norm();
+    const double off = (T_keyframe_neighbor.translation() - found.scale * n.T_keyframe_camera.translation()).norm();
+    return off <= 0.3 * expected || expected <= 0.02 * found.scale * s_.seen.median_depth;
   }
 
   /// Drift of the scale has no bound that is known beforehand; only the rotation is limited then.
@@ -316,6 +332,7 @@ bool checker<Camera, D>::align(const std::vector<features::match>& matches, loop
     return aligned.has_value();
   };
   if (rig_.scale_is_known) return take_over(optimize::estimate_alignment<se3>(from, to, settings));
+  if (matches.empty()) return false;
   // Both sides in about the same unit, for what the deviations of a pair add up to.
   std::vector<double> ratios;
   for (std::size_t i = 0; i != from.size(); ++i) ratios.push_back(to[i].z() / from[i].z());
@@ -325,7 +342,10 @@ bool checker<Camera, D>::align(const std::vector<features::match>& matches, loop
     deviations[i] = std::hypot(ratio * s_.seen.deviations[matches[i].query], s_.known.deviations[matches[i].train]);
   }
   const auto similar = optimize::estimate_alignment<sim3>(from, to, settings);
-  if (similar) found.scale = ratio * similar->T_to_from.scale();
+  // Points far away under little parallax would agree with any scene that is shrunk to nothing.
+  const double remaining = similar ? similar->T_to_from.scale() : 1.0;
+  if (remaining < 0.5 || remaining > 2.0) return false;
+  found.scale = ratio * remaining;
   return take_over(similar);
 }
 

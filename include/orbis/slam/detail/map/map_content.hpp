@@ -31,6 +31,7 @@ struct map_content {
   double scale_factor = 1.2;                  ///< between two levels
   std::uint32_t min_shared = 15;              ///< shared landmarks that make an edge of the covisibility graph
   sensor_kind sensor = sensor_kind::unknown;  ///< of the first keyframe
+  bool scale_is_known = true;                 ///< of the first keyframe
   slot_map<basic_keyframe<D>, keyframe_id> keyframes;
   slot_map<basic_landmark<D>, landmark_id> landmarks;
   spanning_tree tree;

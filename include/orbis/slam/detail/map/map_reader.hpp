@@ -62,7 +62,10 @@ class map_reader {
     const auto sensor = version_ < 2 ? 0 : in.take<std::uint32_t>();
     if (sensor > static_cast<std::uint32_t>(sensor_kind::monocular))
       return wrong("a sensor of kind " + std::to_string(sensor));
+    const auto scale_is_known = version_ < 2 ? 1 : in.take<std::uint32_t>();
+    if (scale_is_known > 1) return wrong("a scale that is neither known nor unknown");
     to_.sensor = static_cast<sensor_kind>(sensor);
+    to_.scale_is_known = scale_is_known == 1;
     to_.levels = static_cast<int>(levels);
     if (levels == 0 || levels > 64) return wrong("a pyramid of " + std::to_string(levels) + " levels");
     if (!(to_.scale_factor > 1.0 && to_.scale_factor < 100.0)) return wrong("a scale factor that is none");

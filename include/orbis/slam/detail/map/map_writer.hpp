@@ -50,7 +50,7 @@ inline void put_landmark(std::string& to, const landmark& l) {
   put_section(bytes, "size", [&](std::string& to) {
     const auto& all = m.content();
     put(to, static_cast<std::uint32_t>(all.levels), all.min_shared, all.scale_factor, m.keyframe_end().value(),
-        m.landmark_end().value(), static_cast<std::uint32_t>(all.sensor));
+        m.landmark_end().value(), static_cast<std::uint32_t>(all.sensor), std::uint32_t{all.scale_is_known});
   });
   put_section(bytes, "kfrm", [&](std::string& to) {
     for (keyframe_id id = 0; id != m.keyframe_end(); ++id) {

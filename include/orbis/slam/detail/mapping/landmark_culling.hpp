@@ -32,6 +32,7 @@ template <feature_descriptor D>
   if (l.visible >= o.min_visible && static_cast<double>(l.found) < o.found_ratio * static_cast<double>(l.visible))
     return true;
   const std::uint32_t age = newest - l.created;
+  if (age >= o.age && o.least_support != 0 && support(m, l) < o.least_support) return true;
   return age >= o.age && age <= o.age + 1 && support(m, l) < o.min_support;
 }
 

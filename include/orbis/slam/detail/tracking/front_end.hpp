@@ -234,6 +234,7 @@ class front_end {
   map_keyframe reference_;            ///< the keyframe that the current frame shares most with
   frame_type last_;                   ///< the last frame that was tracked
   map_keyframe last_reference_;       ///< its reference ...
+  double last_scale_ = 1.0;           ///< of that keyframe, when the frame was last looked at
   se3 T_reference_last_;              ///< ... and its pose relative to that, in lengths over its scale
   landmark_id first_new_;             ///< landmarks from this on were made of the last frame; `no_id`: none were
   motion_model motion_;
@@ -274,6 +275,13 @@ void front_end<Camera, D, Matchers, Sensor>::sync_with_map(const atlas_type& map
   reference_ = now;
   if (!maps.contains(now.map)) return;
   last_.T_world_camera = last_pose(maps);
+  const map_keyframe last = maps.current(last_reference_);
+  if (last.map == now.map && last.keyframe < maps.at(now.map).keyframe_end()) {
+    const double scale = maps.at(now.map).scale_of(last.keyframe);
+    const double grown = scale / std::exchange(last_scale_, scale);
+    motion_.scale_by(grown);
+    last_.twist.template head<3>() *= grown;
+  }
   reference_.keyframe = maps.at(now.map).replacement_of(now.keyframe);
 }
 
@@ -299,7 +307,9 @@ std::size_t front_end<Camera, D, Matchers, Sensor>::localize(frame_type& f, atla
   if (!lost_since_) lost_since_ = f.timestamp;
   state_ = track_state::lost;
   // Two frames take a while to find: where little is lost, that begins at once.
-  const bool at_once = !rig_.scale_is_known && maps.active().keyframes().size() < options_.recovery.min_map_keyframes;
+  const bool is_here = last_.size() != 0 && maps.current(last_reference_).map == maps.active_id();
+  const bool at_once =
+      is_here && !rig_.scale_is_known && maps.active().keyframes().size() < options_.recovery.min_map_keyframes;
   if (is_frozen || (!at_once && f.timestamp - *lost_since_ < options_.recovery.new_map_after)) return 0;
   return begin_map(f, maps, drop);
 }
@@ -555,6 +565,7 @@ void front_end<Camera, D, Matchers, Sensor>::finish(frame_type f, const atlas_ty
   last_reference_ = reference_;
   start_.reset();
   const basic_keyframe<D>& reference = maps.active().at(reference_.keyframe);
+  last_scale_ = reference.scale;
   T_reference_last_ = scaled(reference.T_world_camera.inverse() * f.T_world_camera, 1.0 / reference.scale);
   log_.add({f.timestamp, last_reference_, T_reference_last_});
   if (!f.held_by_depth || made) held_since_ = f.timestamp;

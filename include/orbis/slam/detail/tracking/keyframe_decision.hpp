@@ -40,7 +40,8 @@ template <feature_descriptor D>
   e.turned = motion.rotation().angle();
   e.inliers = inliers;
   e.keyframes = m.keyframes().size();
-  const std::size_t seen_by_others = std::min<std::size_t>(2, e.keyframes);
+  // Without depth two observations make a landmark, and only a third one says something for it.
+  const std::size_t seen_by_others = std::min<std::size_t>(scale_is_known ? 2 : 3, e.keyframes);
   for (const landmark_id l : m.at(reference).landmarks)
     if (l != no_id && m.landmark_at(l).observations.size() >= seen_by_others) ++e.reference;
   for (std::size_t i = 0; i < f.size(); ++i) {

@@ -27,6 +27,10 @@ class motion_model {
     velocity_ = (before.T_world_camera.inverse() * after.T_world_camera).log();
     interval_ = after.timestamp - before.timestamp;
   }
+  /// Lengths are so many times what they were.
+  void scale_by(double factor) {
+    if (velocity_) velocity_->head<3>() *= factor;
+  }
   [[nodiscard]] bool is_known() const noexcept { return velocity_.has_value(); }
 
   /// `T_world_camera` at `timestamp` if the motion goes on from `last`, for three times the last interval at most;
