@@ -339,6 +339,24 @@ TEST_CASE("A rolling shutter costs little where it is known, and much where it i
   CHECK(followed < 0.85 * missed);
 }
 
+TEST_CASE("Depth that lags or comes early is found to two milliseconds") {
+  io::synthetic_options o{.frames = 420, .fps = 30.0, .seed = 3, .width = 320, .height = 240, .frames_around = 400};
+  o.path.jitter = 3.0;
+  for (const double delay : {-0.008, 0.0, 0.008, 0.015}) {
+    o.sensor.shutter.depth_delay = delay;
+    const io::synthetic_recording frames{o};
+    slam::options settings;
+    settings.estimates_shutter = true;
+    test::slam_system slam{frames.camera().model, settings};
+    for (std::size_t i = 0; i != frames.size(); ++i) slam.track(frames.frame(i).value());
+    const slam::shutter_estimate found = *slam.estimated_shutter();
+    CAPTURE(delay, found.delay, found.delay_deviation, found.read_out);
+    CHECK(std::abs(found.delay - delay) < 0.002);
+    CHECK(std::abs(found.shutter.depth_delay - delay) < 0.002);
+    CHECK(found.delay_deviation < 0.002);
+  }
+}
+
 TEST_CASE("The shutter is found from the frames") {
   io::synthetic_options o{.frames = 250, .fps = 30.0, .seed = 3, .width = 320, .height = 240, .frames_around = 400};
   o.path.jitter = 3.0;

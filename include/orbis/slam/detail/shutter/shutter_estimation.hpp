@@ -39,8 +39,14 @@ namespace orbis::slam::detail {
 /// How the depth of a keypoint would change if the depth image were `step` seconds later, and earlier, than assumed,
 /// metres; 0 where it is not known.
 struct depth_change {
-  static constexpr double step = 0.016;  ///< seconds: so much that the camera sees other pixels
+  static constexpr double step = 0.008;  ///< seconds: so little that few edges lie between
   float later = 0.0F, earlier = 0.0F;
+  /// This, if depth changes evenly there, as on a surface; otherwise an edge lies between the readings, which would be
+  /// taken for a motion: nothing is known then.
+  [[nodiscard]] depth_change if_even(float depth) const noexcept {
+    constexpr float limit = 0.02F;  // 1 / metres: some deviations of a depth camera's noise
+    return std::abs(later + earlier) <= limit * depth * depth ? *this : depth_change{};
+  }
   /// Metres per second.
   [[nodiscard]] double rate() const noexcept {
     return (static_cast<double>(later) - static_cast<double>(earlier)) / (2.0 * step);
@@ -111,7 +117,7 @@ template <camera::camera_model Camera>
     matrix<3, 6> by_pose;
     by_pose.template leftCols<3>() = by_point;
     by_pose.template rightCols<3>() = -by_point * hat<double>(q);
-    const depth_change &change_a = from.changes[at->second], &change_b = to.changes[i];
+    const depth_change change_a = from.changes[at->second].if_even(a.depth), change_b = to.changes[i].if_even(b.depth);
     matrix<3, 2> by_shutter;
     by_shutter.col(0) =
         by_point * (T_to_from.rotation() * (share(a.y) * speed(from.twist, there)) - share(b.y) * speed(to.twist, q));

@@ -110,28 +110,27 @@ class shutter_observer {
     views_.emplace_back(id, pending_);
   }
 
-  /// The estimate is revised each time the time of observation has doubled. What was measured by a shutter that was far
-  /// off is forgotten then: the equations are linear only around what was assumed, and gates of tracking have favoured
-  /// it.
+  /// The estimate is revised each time the time of observation has grown by half, and what was measured by the former
+  /// shutter is forgotten then: the equations are linear only around what was assumed, and gates of tracking have
+  /// favoured it. Slopes of depth are noisy, and their squares too large, so that a step towards the delay is about
+  /// half as long as it should be: it takes several.
   [[nodiscard]] std::optional<camera::shutter> decide(const camera::shutter& assumed) {
-    constexpr double first = 2.0, same = 0.001, near = 0.003;  // seconds
-    if (watched_ < std::max(first, 2.0 * decided_)) {
-      if (watched_ - looked_ < 0.5) return std::nullopt;
-      looked_ = watched_;
-      estimate_ = best(estimator_.estimate(assumed));
-      return std::nullopt;
-    }
-    decided_ = looked_ = watched_;
-    estimate_ = best(estimator_.estimate(assumed));
-    const camera::shutter& now = estimate_.shutter;
-    const double change = std::max(std::abs(now.color_read_out - assumed.color_read_out),
-                                   std::abs(now.depth_delay - assumed.depth_delay));
+    constexpr double first = 2.0, often = 0.5, same = 0.001;  // seconds
+    if (watched_ - looked_ < often) return std::nullopt;
+    looked_ = watched_;
+    const shutter_estimate now = estimator_.estimate(assumed);
+    estimate_ = best(now);
+    if (watched_ < std::max(first, 1.5 * decided_) || !std::isfinite(now.read_out_deviation)) return std::nullopt;
+    decided_ = watched_;
+    const camera::shutter& next = estimate_.shutter;
+    const double change = std::max(std::abs(next.color_read_out - assumed.color_read_out),
+                                   std::abs(next.depth_delay - assumed.depth_delay));
     if (change < same) return std::nullopt;
-    if (change > near) estimator_.clear();
+    estimator_.clear();
     views_.clear();  // their depths were read by the former delay
     interrupt();
     last_ = estimate_;
-    return now;
+    return next;
   }
 
   /// A new estimate, unless it is of too few equations yet: it is better than the one before, which was linear around a
