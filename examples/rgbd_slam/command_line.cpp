@@ -16,6 +16,7 @@
 #include <orbis/io/toml.hpp>
 
 #include "filters.hpp"
+#include "inputs/camera_device.hpp"
 #include "viewer/backend.hpp"
 
 namespace app {
@@ -158,6 +159,10 @@ void add_recording_options(CLI::App& cmd, settings& s) {
       ->check(CLI::IsMember({"auto", "tum", "7scenes", "icl", "scannet", "kitti", "asl", "pairs", "images"}))
       ->capture_default_str()
       ->type_name("F");
+  cmd.add_option("--topics", s.topics, "of a ROS bag: COLOUR,DEPTH or LEFT,RIGHT; without it they are found")
+      ->delimiter(',')
+      ->expected(1, 2)
+      ->type_name("A,B");
   add_camera_option(cmd, s);
 }
 
@@ -202,7 +207,8 @@ void add_slam_options(CLI::App& cmd, settings& s) {
   cmd.add_flag(
       "--map-every-frame", s.map_every_frame,
       "the live map takes every tracked frame, not keyframes alone; the files are made of keyframes all the same");
-  cmd.add_flag("--realtime", s.realtime, "frames come at the pace of their time stamps, as from a camera");
+  if (cmd.get_name() != "live")
+    cmd.add_flag("--realtime", s.realtime, "frames come at the pace of their time stamps, as from a camera");
   cmd.add_option("--save-map", s.save_map, "write the map of landmarks when all is tracked")
       ->check(not_empty)
       ->type_name("FILE");
@@ -249,6 +255,17 @@ void add_calibration_options(CLI::App& cmd, settings& s) {
       ->check(not_empty)
       ->type_name("FILE");
   cmd.add_flag("--quiet", s.quiet, "say nothing but errors");
+}
+
+/// What of the libraries for cameras this program was built with.
+std::string in_this_build() {
+  const auto say = [](bool has, const char* what, const char* package) {
+    return std::string{what} + (has ? "" : std::string{": not in this build ("} + package + ")");
+  };
+  return say(has_openni(), "Depth cameras", "libopenni2-dev") + "\n" +
+         say(has_video_cameras(), "Video cameras; with --sensor stereo the left and the right image side by side",
+             "libopencv-videoio-dev") +
+         "\nFrames that come while the last one is tracked are dropped, and counted in summary.json.";
 }
 
 /// What of the options does not go together; empty if all does.
@@ -317,7 +334,9 @@ std::variant<settings, exit_code> read_command_line(int argc, char** argv) {
 
   CLI::App* run = cli.add_subcommand(
       "run", "SLAM on a recording (TUM, 7-Scenes, ICL-NUIM, ScanNet; stereo or one camera: KITTI, ASL, images)");
-  run->add_option("DATASET", s.input, "the recording's folder")->required()->type_name("");
+  run->add_option("DATASET", s.input, "the recording's folder; a ROS 1 bag (.bag), or a video")
+      ->required()
+      ->type_name("");
   add_recording_options(*run, s);
   add_frame_options(*run, s);
   add_map_options(*run, s);
@@ -336,6 +355,20 @@ std::variant<settings, exit_code> read_command_line(int argc, char** argv) {
   add_map_options(*demo, s);
   add_slam_options(*demo, s);
   add_viewer_options(*demo, s);
+
+  CLI::App* live =
+      cli.add_subcommand("live", "SLAM with a camera as it goes, until Ctrl-C or until it is disconnected");
+  live->add_option("DEVICE", s.input,
+                   "without it the first depth camera (OpenNI2: Astra, Xtion, PrimeSense). Its URI, or an .oni file; "
+                   "/dev/video0 or 0 for a video camera; a recording's folder, which plays at its pace")
+      ->type_name("");
+  add_sensor_option(*live, s, {"auto", "rgbd", "stereo", "mono"});
+  add_camera_option(*live, s);
+  count(*live, "--frames", s.frames, "end after N frames");
+  add_map_options(*live, s);
+  add_slam_options(*live, s);
+  add_viewer_options(*live, s);
+  live->footer(in_this_build());
 
   CLI::App* eval = cli.add_subcommand("eval", "compare a trajectory with ground truth (TUM format): ATE and RPE");
   eval->add_option("TRAJECTORY", s.input, "the estimate")->required()->type_name("");
@@ -362,20 +395,20 @@ std::variant<settings, exit_code> read_command_line(int argc, char** argv) {
   CLI::App* calibration = cli.add_subcommand("calibrate", "the camera's intrinsics and depth scale from a recording");
   add_calibration_options(*calibration, s);
 
-  for (CLI::App* cmd : {run, demo, map}) add_robot_options(*cmd, s);
-  for (CLI::App* cmd : {run, demo, map})
+  for (CLI::App* cmd : {run, live, demo, map}) add_robot_options(*cmd, s);
+  for (CLI::App* cmd : {run, live, demo, map})
     cmd->add_option("--gravity", gravity,
                     "where it pulls at the first frame, in the camera's frame: x right, y down, z forward. Without it "
                     "the depth image has to tell")
         ->type_name("X,Y,Z");
-  for (CLI::App* cmd : {run, demo, map})
+  for (CLI::App* cmd : {run, live, demo, map})
     cmd->add_option("--config", s.config, "options from a TOML file: resolution = 0.02")->type_name("FILE");
-  for (CLI::App* cmd : {run, demo, eval, map, way, calibration}) cmd->get_formatter()->column_width(28);
+  for (CLI::App* cmd : {run, live, demo, eval, map, way, calibration}) cmd->get_formatter()->column_width(28);
 
   const auto is_asked_for = [&](const CLI::App* command) { return command->get_name() == argv[1]; };
   if (argc > 1 && argv[1][0] != '-' && cli.get_subcommands(is_asked_for).empty())
     return complain(
-        "there is no command \"" + std::string{argv[1]} + "\", but run, demo, eval, map, plan and calibrate",
+        "there is no command \"" + std::string{argv[1]} + "\", but run, live, demo, eval, map, plan and calibrate",
         bad_usage);
   try {
     cli.parse(argc, argv);
@@ -392,6 +425,7 @@ std::variant<settings, exit_code> read_command_line(int argc, char** argv) {
            : chosen == eval ? command::eval
            : chosen == map  ? command::map
            : chosen == way  ? command::plan
+           : chosen == live ? command::live
                             : command::calibrate;
   if (!s.config.empty())
     if (const auto failed = read_config(*chosen, s.config.string())) return *failed;

@@ -8,7 +8,7 @@
 
 namespace app {
 
-[[nodiscard]] exit_code run_slam(const settings& s, console& console);          ///< run, demo
+[[nodiscard]] exit_code run_slam(const settings& s, console& console);          ///< run, demo, live
 [[nodiscard]] exit_code evaluate(const settings& s, console& console);          ///< eval
 [[nodiscard]] exit_code map_without_slam(const settings& s, console& console);  ///< map
 [[nodiscard]] exit_code plan(const settings& s, console& console);              ///< plan

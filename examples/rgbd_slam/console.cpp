@@ -48,14 +48,15 @@ void console::advance(std::size_t done, std::size_t total, const std::string& no
   last_shown_ = now;
   const double seconds = elapsed();
   const double rate = seconds > 0 ? static_cast<double>(done) / seconds : 0.0;
-  std::string tail = fmt::format("{}/{}", done, total);
+  const bool is_known = total != std::numeric_limits<std::size_t>::max();  // a camera has no last frame
+  std::string tail = is_known ? fmt::format("{}/{}", done, total) : fmt::format("{}", done);
   if (!note.empty()) tail += fmt::format("  {:.1f} fps  {}", rate, note);
   if (!terminal_) {
     log_->info("{:<10} {}", stage_, tail);
     return;
   }
   constexpr std::size_t cells = 28;
-  const std::size_t full = std::min(cells, done * cells / total);
+  const std::size_t full = is_known ? std::min(cells, done * cells / total) : 0;
   std::fprintf(stderr, "\r\033[2K%-10s [%s%s] %s", stage_.c_str(), std::string(full, '#').c_str(),
                std::string(cells - full, '.').c_str(), tail.c_str());
   std::fflush(stderr);

@@ -33,7 +33,8 @@ int main(int argc, char** argv) {
   try {
     switch (settings.what) {
       case app::command::run:
-      case app::command::demo: return app::run_slam(settings, console);
+      case app::command::demo:
+      case app::command::live: return app::run_slam(settings, console);
       case app::command::eval: return app::evaluate(settings, console);
       case app::command::map: return app::map_without_slam(settings, console);
       case app::command::plan: return app::plan(settings, console);

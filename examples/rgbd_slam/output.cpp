@@ -32,7 +32,7 @@ void list_files(results& r, const result_files& files, const file_names& coming,
 
 results begin_results(const settings& s, const std::string& title, const frame_source* source,
                       const std::filesystem::path& folder) {
-  constexpr const char* names[] = {"run", "demo", "eval", "map", "plan"};
+  constexpr const char* names[] = {"run", "demo", "eval", "map", "plan", "calibrate", "live"};
   results r;
   r.command = names[static_cast<int>(s.what)];
   r.title = title;
@@ -52,9 +52,11 @@ results begin_results(const settings& s, const std::string& title, const frame_s
                              std::to_string(k.height) + number(", fx %.1f", k.fx) + number(", fy %.1f", k.fy) +
                              number(", cx %.1f", k.cx) + number(", cy %.1f", k.cy) +
                              (source->is_monocular() ? "" : number(", depth / %g = metres", camera.depth_scale)));
-    r.setup.emplace_back(
-        "frames", std::to_string(source->frames) + (s.stride > 1 ? ", every " + std::to_string(s.stride) + "th" : ""));
-    if (s.what == command::run || s.what == command::demo) {
+    r.setup.emplace_back("frames", source->is_live
+                                       ? "as they come"
+                                       : std::to_string(source->frames) +
+                                             (s.stride > 1 ? ", every " + std::to_string(s.stride) + "th" : ""));
+    if (s.what != command::map) {
       if (!s.load_map.empty())
         r.setup.emplace_back("map of landmarks", "begun with " + s.load_map.filename().string() +
                                                      (s.localize_only ? ", which stays as it is" : ""));
@@ -106,7 +108,7 @@ result<void> write_report_files(results& r, const orbis::trajectory& cameras, re
 
 orbis::error explain_no_start(const results& r, const settings& s) {
   const std::string frames = std::to_string(r.slam->frames) + " frames ";
-  return {orbis::errc::no_data, s.what == command::demo ? r.title : s.input.string(),
+  return {orbis::errc::no_data, s.what == command::run ? s.input.string() : r.title,
           r.slam->sensor == orbis::slam::sensor_kind::monocular
               ? "tracking never started: no two of " + frames +
                     "show enough of the same texture from places that are surely far enough apart"

@@ -287,6 +287,7 @@ std::string tracking_words(const slam_results& s) {
     rows.emplace_back("keyframes culled", count_text(s.keyframes_culled) + ", as others show the same landmarks");
   rows.emplace_back("loops closed", count_text(s.loops_closed));
   if (s.maps_merged != 0) rows.emplace_back("maps merged", count_text(s.maps_merged));
+  if (s.dropped) rows.emplace_back("dropped", count_text(*s.dropped) + " frames of the camera, which was ahead");
   rows.emplace_back("lost", s.lost == 0 ? std::string{"never"}
                                         : count_text(s.lost) + " frames (" + stretches(s.lost_stretches) + ")");
   if (s.relocalized != 0)

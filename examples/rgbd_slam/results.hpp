@@ -92,6 +92,7 @@ struct slam_results {
   /// Of lengths, for people.
   [[nodiscard]] const char* unit() const { return sensor == orbis::slam::sensor_kind::monocular ? "units" : "metres"; }
   std::size_t frames = 0, tracked = 0, lost = 0, relocalized = 0, landmarks = 0;
+  std::optional<std::size_t> dropped;  ///< frames of a camera that came while tracking was busy; empty: no camera
   std::size_t loops_closed = 0, maps_merged = 0, keyframes_culled = 0;
   shutter_results shutter;
   std::vector<frame_range> lost_stretches;

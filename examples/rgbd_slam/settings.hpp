@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include <orbis/core/types.hpp>
 
@@ -24,18 +25,19 @@ enum exit_code : int {
   interrupted = 130
 };
 
-enum class command { run, demo, eval, map, plan, calibrate };
+enum class command { run, demo, eval, map, plan, calibrate, live };
 
 struct settings {
   command what = command::run;
 
-  std::filesystem::path input;      ///< recording, cloud, octree map (plan) or estimated trajectory
+  std::filesystem::path input;      ///< recording, cloud, octree map (plan), estimated trajectory, or device (live)
   std::filesystem::path reference;  ///< ground truth (eval)
   std::filesystem::path out;        ///< where the files go
   std::filesystem::path config;     ///< file with options; empty: none
 
   std::string sensor = "auto";  ///< "rgbd", "stereo" or "mono", or as the recording is
   std::string format = "auto";
+  std::vector<std::string> topics;     ///< of a ROS bag: images, and their depth or the right ones; empty: found
   std::string camera;                  ///< file or preset; empty: as the recording says
   std::size_t frames = 0;              ///< at most so many; 0: all
   std::size_t stride = 1;              ///< every so many frames

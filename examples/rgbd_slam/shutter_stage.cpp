@@ -40,7 +40,8 @@ shutter_results find_shutter(const frame_source& source, const settings& s, cons
     result.shutter = *source.camera.shutter;
     return result;
   }
-  if (source.sensor != orbis::slam::sensor_kind::rgbd) {  // only depth tells
+  // Only depth tells, and a camera shows its first seconds once.
+  if (source.sensor != orbis::slam::sensor_kind::rgbd || source.is_live) {
     result.from = "camera";
     return result;
   }

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <limits>
 #include <memory>
 #include <mutex>
 #include <utility>
@@ -16,6 +17,9 @@
 #include <orbis/io/synthetic.hpp>
 
 #include "background.hpp"
+#include "inputs/file_recording.hpp"
+#include "inputs/live_source.hpp"
+#include "interrupts.hpp"
 #include "stereo_depth.hpp"
 
 namespace app {
@@ -187,6 +191,80 @@ result<frame_source> open_mono_recording(const settings& s) {
   return source;
 }
 
+std::optional<sensor_kind> wanted_sensor(const settings& s) {
+  if (s.sensor == "auto") return std::nullopt;
+  return s.sensor == "stereo" ? sensor_kind::stereo : s.sensor == "mono" ? sensor_kind::monocular : sensor_kind::rgbd;
+}
+
+result<frame_source> open_file(const settings& s) {
+  file_recording_options options{.sensor = wanted_sensor(s), .topics = s.topics};
+  if (!s.camera.empty()) {
+    auto camera = named_camera(s.camera);
+    if (!camera) return fail(camera.error());
+    options.camera = *std::move(camera);
+  }
+  auto opened = s.input.extension() == ".bag" ? open_bag(s.input, options) : open_video(s.input, options);
+  if (!opened) return fail(opened.error());
+  const std::shared_ptr<const file_recording> recording = *std::move(opened);
+  frame_source source;
+  source.title = s.input.filename().string();
+  source.kind = recording->kind;
+  source.camera = recording->camera;
+  source.sensor = recording->sensor;
+  source.frames = limited(recording->size(), s);
+  source.notes = recording->notes;
+  source.files = {s.input};
+  source.frame = [recording, stride = s.stride](std::size_t i) { return recording->frame(i * stride); };
+  source.color = [recording, stride = s.stride](std::size_t i) { return recording->color(i * stride); };
+  return source;
+}
+
+/// A folder is played as if it were a camera; /dev/video0 and numbers are video cameras; anything else is OpenNI2's.
+result<std::unique_ptr<camera_device>> open_device(const settings& s) {
+  device_options options{.name = s.input.string(), .sensor = wanted_sensor(s)};
+  if (!s.camera.empty()) {
+    auto camera = named_camera(s.camera);
+    if (!camera) return fail(camera.error());
+    options.camera = *std::move(camera);
+  }
+  std::error_code ignored;
+  if (std::filesystem::is_directory(s.input, ignored)) return open_playback(options);
+  const bool is_number = !options.name.empty() && options.name.find_first_not_of("0123456789") == std::string::npos;
+  const bool wants_video = options.name.empty() && options.sensor && *options.sensor != sensor_kind::rgbd;
+  if (is_number || wants_video || options.name.starts_with("/dev/video")) return open_video_camera(options);
+  return open_openni(options);
+}
+
+/// A camera, from which frames are taken from the first that is asked for on.
+struct begun_on_demand {
+  std::unique_ptr<camera_device> device;
+  std::optional<live_source> live;
+};
+
+result<frame_source> open_live(const settings& s) {
+  auto opened = open_device(s);
+  if (!opened) return fail(opened.error());
+  const auto feed = std::make_shared<begun_on_demand>();
+  feed->device = *std::move(opened);
+  frame_source source;
+  source.title = feed->device->name;
+  source.sensor = feed->device->sensor;
+  source.kind = source.is_stereo() ? "stereo camera" : source.is_monocular() ? "camera" : "depth camera";
+  source.camera = feed->device->camera;
+  source.is_live = source.made = true;
+  source.frames = s.frames == 0 ? std::numeric_limits<std::size_t>::max() : s.frames;
+  source.notes = feed->device->notes;
+  source.frame = [feed](std::size_t) {
+    if (!feed->live) feed->live.emplace(std::move(feed->device));
+    return feed->live->next([] { return interrupts::requested(); });
+  };
+  source.color = [name = source.title](std::size_t) -> result<orbis::image<orbis::rgb8>> {
+    return fail(orbis::errc::unreadable, name, "a camera shows nothing twice");
+  };
+  source.dropped = [feed] { return feed->live ? feed->live->dropped() : std::size_t{0}; };
+  return source;
+}
+
 /// What took the recording, where that is not said. A folder that has depth as well as a second camera is one with
 /// depth.
 sensor_kind sensor_of(const settings& s) {
@@ -291,7 +369,7 @@ double voxels_in_view(const orbis::camera::intrinsics& k, double resolution, con
 result<void> check_resolution(frame_source& source, const settings& s) {
   constexpr double slow = 1e8, too_many = 2e9;
   const orbis::camera::intrinsics& k = source.camera.model.k();
-  if (source.frames == 0 || source.is_monocular()) return {};
+  if (source.frames == 0 || source.is_monocular() || source.is_live) return {};  // a camera's frames are seen once
   if (voxels_in_view(k, s.resolution, [&](std::size_t) { return s.max_depth; }) < slow) return {};
   auto first = source.frame(0);
   if (!first) return {};  // whoever needs it will say why
@@ -311,7 +389,7 @@ result<void> check_resolution(frame_source& source, const settings& s) {
 }
 
 std::string describe(const frame_source& source) {
-  return source.title + ": " + std::to_string(source.frames) + " frames of " +
+  return source.title + ": " + (source.is_live ? "a camera" : std::to_string(source.frames) + " frames") + " of " +
          std::to_string(source.camera.model.width()) + " x " + std::to_string(source.camera.model.height()) +
          (source.ground_truth.empty() ? "" : ", with ground truth");
 }
@@ -334,7 +412,10 @@ std::string origin_note(const orbis::vec3& origin) {
 
 result<frame_source> open_source(const settings& s, console& console) {
   console.stage("opening");
+  std::error_code ignored;
   const auto open = [&] {
+    if (s.what == command::live) return open_live(s);
+    if (std::filesystem::is_regular_file(s.input, ignored)) return open_file(s);
     switch (sensor_of(s)) {
       case sensor_kind::stereo: return open_stereo_recording(s);
       case sensor_kind::monocular: return open_mono_recording(s);

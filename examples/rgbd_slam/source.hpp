@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Where the frames come from: a recording on disk or a synthetic one.
+/// Where the frames come from: a recording on disk, a synthetic one, or a camera.
 #pragma once
 
 #include <cstddef>
@@ -34,14 +34,17 @@ struct frame_source {
   [[nodiscard]] bool is_stereo() const { return sensor == orbis::slam::sensor_kind::stereo; }
   /// One camera without depth: lengths are in a unit of their own, and there is no dense map.
   [[nodiscard]] bool is_monocular() const { return sensor == orbis::slam::sensor_kind::monocular; }
-  std::size_t frames = 0;
+  bool is_live = false;    ///< a camera: frames come one after the other, whatever number is asked for, and only once
+  std::size_t frames = 0;  ///< of a camera: at most so many
+  /// Of a camera: how many frames were dropped so far, as nobody asked for them in time. Empty: none can be.
+  std::function<std::size_t()> dropped;
   /// Reads or renders a frame; `--stride` is applied already. May be called from another thread.
   std::function<orbis::result<source_frame>(std::size_t)> frame;
   /// Makes the depth image of a frame that has none yet; costly for stereo, nothing otherwise.
   void complete(source_frame& f) const;
   /// Reads or renders the colour image of a frame alone. As above.
   std::function<orbis::result<orbis::image<orbis::rgb8>>(std::size_t)> color;
-  bool made = false;  ///< frames are rendered, which takes longer than to read them
+  bool made = false;  ///< frames are rendered or come from a camera: to keep them is cheaper than to ask once more
   /// Frees what the making of frames needs; it is there again when a frame is asked for. Empty: nothing is.
   std::function<void()> rest;
   orbis::trajectory ground_truth;            ///< empty if not known

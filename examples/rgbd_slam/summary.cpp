@@ -55,6 +55,7 @@ std::string summary_json(const results& r) {
   j["sensor"] = s ? json(to_string(s->sensor)) : null;
   j["frames"] = s ? json(s->frames) : null;
   j["tracked"] = s ? json(s->tracked) : null;
+  j["dropped"] = s && s->dropped ? json(*s->dropped) : null;
   j["lost"] = s ? json(s->lost) : null;
   j["relocalized"] = s ? json(s->relocalized) : null;
   j["keyframes"] = s ? json(s->keyframes.size()) : null;

@@ -86,19 +86,24 @@ orbis::slam::track_result track_frame(slam_system& slam, const frame_source& sou
   return slam.track(f);
 }
 
+/// Whether a camera's frames end as they should: a recording that plays as one is over, or the user ended the run.
+bool is_planned_end(const orbis::error& e) {
+  return e.code == orbis::errc::no_data || e.code == orbis::errc::cancelled;
+}
+
 /// Feeds the frames to SLAM, up to the first that cannot be read, or to Ctrl-C. Every map begins in a world of its own.
 void track_frames(slam_system& slam, const frame_source& source, const settings& s,
                   const orbis::camera::shutter& shutter, upright_worlds& worlds, tracked_frames& out, viewer& viewer,
                   console& console) {
   using orbis::slam::track_state;
-  read_ahead frames{source, s.threads != 1};
+  read_ahead frames{source, s.threads != 1 && !source.is_live};
   frame_correction correct{source.camera.model, shutter};
   standing_frames without_moving{source.camera.model};
   camera_pace pace;
   for (std::size_t i = 0; frames.has_next() && !interrupts::requested(); ++i) {
     auto frame = frames.next();
     if (!frame) {
-      out.stopped = frame.error();
+      if (!source.is_live || !is_planned_end(frame.error())) out.stopped = frame.error();
       break;
     }
     if (s.realtime) pace.wait_for(frame->timestamp);
@@ -128,11 +133,12 @@ void track_frames(slam_system& slam, const frame_source& source, const settings&
       if (lost.empty() || lost.back().first + lost.back().count != i) lost.push_back({i, 0});
       ++lost.back().count;
     }
-    console.advance(
-        i + 1, source.frames,
-        std::string{to_string(found.state)} + ", " + std::to_string(out.slam.keyframes_made) + " keyframes");
+    console.advance(i + 1, source.frames,
+                    std::string{to_string(found.state)} + ", " + std::to_string(out.slam.keyframes_made) +
+                        " keyframes" + (source.dropped ? ", " + std::to_string(source.dropped()) + " dropped" : ""));
   }
   slam.set_initial_pose(se3{});
+  if (source.dropped) out.slam.dropped = source.dropped();
 }
 
 /// The pose of a keyframe that was made in the active map or in one that was merged with it. Keyframes have moved since
@@ -243,7 +249,8 @@ std::string in_words(const slam_results& slam) {
   };
   return std::to_string(slam.tracked) + " of " + std::to_string(slam.frames) + " frames, " +
          std::to_string(slam.keyframes.size()) + " keyframes, " + std::to_string(slam.landmarks) + " landmarks" +
-         count(slam.loops_closed, "loop") + count(slam.maps_merged, "merged map");
+         count(slam.loops_closed, "loop") + count(slam.maps_merged, "merged map") +
+         count(slam.dropped.value_or(0), "dropped frame");
 }
 
 }  // namespace
@@ -308,8 +315,8 @@ orbis::result<tracked_frames> track(const frame_source& source, const settings& 
 
 orbis::error explain_stop(const tracked_frames& tracked, const frame_source& source) {
   orbis::error e = *tracked.stopped;
-  e.message += "; stopped after " + std::to_string(tracked.slam.frames) + " of " + std::to_string(source.frames) +
-               " frames, what they gave is kept";
+  e.message += "; stopped after " + std::to_string(tracked.slam.frames) +
+               (source.is_live ? "" : " of " + std::to_string(source.frames)) + " frames, what they gave is kept";
   return e;
 }
 
@@ -343,6 +350,9 @@ std::vector<std::string> tracking_notes(const tracked_frames& tracked, const set
                     "the rest; their poses, in worlds of their own, are in " +
                     trajectory_name(2) + (last > 2 ? " ... " + trajectory_name(last) : ""));
   }
+  if (const std::size_t dropped = tracked.slam.dropped.value_or(0); dropped > (dropped + tracked.slam.frames) / 10)
+    notes.push_back(std::to_string(dropped) + " of " + std::to_string(dropped + tracked.slam.frames) +
+                    " frames of the camera were dropped: tracking was behind");
   if (const std::size_t kept = tracked.slam.trajectory.size() + elsewhere; kept < tracked.slam.tracked)
     notes.push_back(std::to_string(tracked.slam.tracked - kept) + of_all +
                     "are left out: tracking was lost again before they had made a map");

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "inputs/live_source.hpp"
+
+#include <chrono>
+#include <utility>
+
+namespace app {
+
+using namespace std::chrono_literals;
+using orbis::errc;
+using orbis::fail;
+
+namespace {
+constexpr auto glance = 50ms;       // how long a wait lasts before it looks whether all is over
+constexpr auto longest_wait = 10s;  // for a frame, before the camera counts as gone
+}  // namespace
+
+live_source::live_source(std::unique_ptr<camera_device> device)
+    : device_{std::move(device)}, thread_{[this] { take_frames(); }} {}
+
+live_source::~live_source() {
+  stops_ = true;
+  thread_.join();
+}
+
+void live_source::take_frames() {
+  while (!stops_) {
+    auto frame = device_->next(glance);
+    const std::lock_guard lock{mutex_};
+    if (!frame) {
+      ended_ = std::move(frame.error());
+      changed_.notify_all();
+      return;
+    }
+    if (!*frame) continue;
+    if (newest_) ++dropped_;
+    newest_ = **std::move(frame);
+    changed_.notify_all();
+  }
+}
+
+orbis::result<source_frame> live_source::next(const std::function<bool()>& is_over) {
+  const auto begin = std::chrono::steady_clock::now();
+  std::unique_lock lock{mutex_};
+  while (!newest_) {
+    if (ended_) return fail(*ended_);
+    if (is_over()) return fail(errc::cancelled, device_->name, "no frame is waited for any more");
+    if (std::chrono::steady_clock::now() - begin > longest_wait)
+      return fail(errc::unreadable, device_->name, "no frame has come for 10 s");
+    changed_.wait_for(lock, glance);
+  }
+  return *std::exchange(newest_, std::nullopt);
+}
+
+}  // namespace app

@@ -1,0 +1,195 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "inputs/camera_device.hpp"
+
+#ifdef RGBD_SLAM_OPENNI
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <utility>
+
+#include <OpenNI.h>
+
+#include <orbis/core/trajectory.hpp>
+
+namespace app {
+namespace {
+
+using orbis::errc;
+using orbis::fail;
+using orbis::result;
+
+/// The first line of what the library says went wrong.
+std::string reason() {
+  const std::string text = openni::OpenNI::getExtendedError();
+  const std::size_t begin = std::min(text.find_first_not_of(" \t"), text.size());
+  return text.substr(begin, text.find('\n', begin) - begin);
+}
+
+/// The mode of a stream with this pixel format: of the wanted size, else the largest up to it or 640x480, at the
+/// highest rate.
+std::optional<openni::VideoMode> mode_of(const openni::SensorInfo& info, openni::PixelFormat format, int width) {
+  std::optional<openni::VideoMode> best;
+  const auto& modes = info.getSupportedVideoModes();
+  for (int i = 0; i != modes.getSize(); ++i) {
+    const auto& m = modes[i];
+    if (m.getPixelFormat() != format || m.getResolutionX() > width) continue;
+    if (!best || std::pair{m.getResolutionX(), m.getFps()} > std::pair{best->getResolutionX(), best->getFps()})
+      best = m;
+  }
+  return best;
+}
+
+class openni_camera final : public camera_device {
+ public:
+  // OpenNI2 itself is left as it is: to shut it down unloads drivers whose threads may still run.
+  ~openni_camera() override {
+    for (openni::VideoStream* s : {&depth_, &color_}) s->destroy();
+    device_.close();
+  }
+
+  result<void> open(const device_options& options) {
+    name = options.name.empty() ? "OpenNI2" : options.name;
+    if (openni::OpenNI::initialize() != openni::STATUS_OK) return fail(errc::unreadable, name, reason());
+    if (device_.open(options.name.empty() ? openni::ANY_DEVICE : options.name.c_str()) != openni::STATUS_OK)
+      return fail(errc::not_found, name, "no depth camera is connected (" + reason() + ")");
+    if (options.name.empty()) name = device_.getDeviceInfo().getName();
+    const int width = options.camera ? options.camera->model.width() : 640;
+    if (auto ok = start(color_, openni::SENSOR_COLOR, openni::PIXEL_FORMAT_RGB888, width, "colour"); !ok) return ok;
+    const auto mode = color_.getVideoMode();
+    if (auto ok = start(depth_, openni::SENSOR_DEPTH, openni::PIXEL_FORMAT_DEPTH_1_MM, mode.getResolutionX(), "depth");
+        !ok)
+      return ok;
+    if (depth_.getVideoMode().getResolutionX() != mode.getResolutionX() ||
+        depth_.getVideoMode().getResolutionY() != mode.getResolutionY())
+      return fail(errc::unsupported, name, "has no depth of the size of its colour images");
+    if (device_.isFile()) {
+      device_.getPlaybackControl()->setRepeatEnabled(false);
+      last_ = std::min(device_.getPlaybackControl()->getNumberOfFrames(color_),
+                       device_.getPlaybackControl()->getNumberOfFrames(depth_));
+    } else if (device_.isImageRegistrationModeSupported(openni::IMAGE_REGISTRATION_DEPTH_TO_COLOR)) {
+      device_.setImageRegistrationMode(openni::IMAGE_REGISTRATION_DEPTH_TO_COLOR);
+    } else {
+      notes.emplace_back("the camera does not register depth to colour: colours may be a little off");
+    }
+    device_.setDepthColorSyncEnabled(true);
+    return choose_camera(options, mode);
+  }
+
+  result<std::optional<source_frame>> next(std::chrono::milliseconds patience) override {
+    openni::VideoStream* streams[] = {&color_, &depth_};
+    int ready = 0;
+    const auto status = openni::OpenNI::waitForAnyStream(streams, 2, &ready, static_cast<int>(patience.count()));
+    if (status == openni::STATUS_TIME_OUT) {
+      if (last_ && newest_index_ >= *last_) return fail(errc::no_data, name, "is at its end");
+      return std::optional<source_frame>{};
+    }
+    if (status != openni::STATUS_OK) return fail(errc::unreadable, name, "gives no more frames (" + reason() + ")");
+    openni::VideoFrameRef frame;
+    if (streams[ready]->readFrame(&frame) != openni::STATUS_OK || !frame.isValid())
+      return fail(errc::unreadable, name, "was disconnected (" + reason() + ")");
+    newest_index_ = std::max(newest_index_, frame.getFrameIndex());
+    (ready == 0 ? color_frame_ : depth_frame_) = frame;
+    if (!color_frame_.isValid() || !depth_frame_.isValid()) return std::optional<source_frame>{};
+    constexpr double most_apart = 0.020;  // seconds, as of recordings
+    const double t = 1e-6 * static_cast<double>(color_frame_.getTimestamp()),
+                 t_depth = 1e-6 * static_cast<double>(depth_frame_.getTimestamp());
+    if (std::abs(t - t_depth) > most_apart) return std::optional<source_frame>{};  // the partner is still to come
+    auto f = frame_of(t);
+    color_frame_.release();
+    depth_frame_.release();
+    return f;
+  }
+
+ private:
+  result<void> start(openni::VideoStream& stream, openni::SensorType type, openni::PixelFormat format, int width,
+                     const std::string& what) {
+    const openni::SensorInfo* info = device_.getSensorInfo(type);
+    const auto mode = info != nullptr ? mode_of(*info, format, width) : std::nullopt;
+    if (!mode) return fail(errc::unsupported, name, "gives no " + what + " images of a kind that is known");
+    if (stream.create(device_, type) != openni::STATUS_OK) return fail(errc::unreadable, name, reason());
+    if (!device_.isFile()) stream.setVideoMode(*mode);
+    stream.setMirroringEnabled(false);  // which is how these cameras come
+    if (stream.start() != openni::STATUS_OK) return fail(errc::unreadable, name, reason());
+    return {};
+  }
+
+  /// That of the options, or one without distortion by the field of view.
+  result<void> choose_camera(const device_options& options, const openni::VideoMode& mode) {
+    const int width = mode.getResolutionX(), height = mode.getResolutionY();
+    if (options.camera) {
+      camera = *options.camera;
+      camera.depth_scale = 1000.0;
+      if (camera.model.width() == width && camera.model.height() == height) return {};
+      return fail(errc::invalid_argument, name,
+                  "gives images of " + std::to_string(width) + "x" + std::to_string(height) +
+                      " pixels, the camera has " + std::to_string(camera.model.width()) + "x" +
+                      std::to_string(camera.model.height()));
+    }
+    const double angle = color_.getHorizontalFieldOfView();
+    const bool is_known = std::isfinite(angle) && angle > 0.2 && angle < 2.5;
+    const double f = is_known ? 0.5 * width / std::tan(0.5 * angle) : 525.0 * width / 640.0;
+    notes.emplace_back(is_known ? "the camera is not calibrated: its field of view gives the focal length (--camera)"
+                                : "the camera is not calibrated, and taken to be like a Kinect (--camera)");
+    camera = {.model = orbis::camera::pinhole{width, height, f, f, 0.5 * (width - 1), 0.5 * (height - 1)},
+              .depth_scale = 1000.0,
+              .fps = static_cast<double>(std::max(1, mode.getFps()))};
+    return {};
+  }
+
+  [[nodiscard]] result<std::optional<source_frame>> frame_of(double t) const {
+    const int width = camera.model.width(), height = camera.model.height();
+    for (const auto* f : {&color_frame_, &depth_frame_})
+      if (f->getWidth() != width || f->getHeight() != height)
+        return fail(errc::malformed, name, "gives images of another size than at first");
+    source_frame out;
+    out.timestamp = t;
+    out.depth_scale = camera.depth_scale;
+    out.color = orbis::image<orbis::rgb8>(width, height);
+    out.depth = orbis::image<std::uint16_t>(width, height);
+    const auto copy = [&](const openni::VideoFrameRef& from, auto& to, std::size_t bytes) {
+      const auto* row = static_cast<const char*>(from.getData());
+      for (int y = 0; y != height; ++y, row += from.getStrideInBytes())
+        std::memcpy(&to(0, y), row, static_cast<std::size_t>(width) * bytes);
+    };
+    static_assert(sizeof(orbis::rgb8) == 3);
+    copy(color_frame_, out.color, 3);
+    copy(depth_frame_, out.depth, 2);
+    return std::optional{std::move(out)};
+  }
+
+  openni::Device device_;
+  openni::VideoStream color_, depth_;
+  openni::VideoFrameRef color_frame_, depth_frame_;
+  std::optional<int> last_;  // frames of a file
+  int newest_index_ = 0;
+};
+
+}  // namespace
+
+bool has_openni() { return true; }
+
+result<std::unique_ptr<camera_device>> open_openni(const device_options& options) {
+  if (options.sensor && *options.sensor != orbis::slam::sensor_kind::rgbd)
+    return fail(errc::unsupported, options.name.empty() ? "OpenNI2" : options.name, "is a camera with depth");
+  auto device = std::make_unique<openni_camera>();
+  if (auto opened = device->open(options); !opened) return fail(opened.error());
+  return device;
+}
+
+}  // namespace app
+
+#else
+
+namespace app {
+
+bool has_openni() { return false; }
+
+orbis::result<std::unique_ptr<camera_device>> open_openni(const device_options& options) {
+  return orbis::fail(orbis::errc::unsupported, options.name.empty() ? "OpenNI2" : options.name,
+                     "this build knows no depth cameras: it was made without OpenNI2 (libopenni2-dev)");
+}
+
+}  // namespace app
+
+#endif

@@ -1,0 +1,259 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// Recordings in one file, as far as this build has libraries for them.
+#include <cmath>
+#include <filesystem>
+#include <string>
+
+#include "inputs/file_recording.hpp"
+#include "io/recordings.hpp"
+#include "support/catch.hpp"
+
+#ifdef RGBD_SLAM_VIDEO
+#include <opencv2/videoio.hpp>
+#endif
+#ifdef RGBD_SLAM_BAG
+#include <orbis/io/jpeg.hpp>
+
+#include "ros_bag_writer.hpp"
+#endif
+
+using namespace orbis;
+using Catch::Matchers::Contains;
+using slam::sensor_kind;
+using test::message_of;
+using test::temporary_folder;
+
+namespace {
+
+[[maybe_unused]] constexpr camera::intrinsics k{32, 24, 30.0, 30.0, 15.5, 11.5};
+[[maybe_unused]] const camera::camera_settings settings{.model = camera::pinhole{k}, .baseline = 0.1};
+
+}  // namespace
+
+TEST_CASE("a build without a library says which one is missing") {
+  const temporary_folder folder;
+  folder.write("a.bag", "");
+  if (!app::has_bags())
+    CHECK_THAT(message_of(app::open_bag(folder.path() / "a.bag", {})), Contains("librosbag-storage-dev"));
+  if (!app::has_videos())
+    CHECK_THAT(message_of(app::open_video(folder.path() / "a.bag", {})), Contains("libopencv-videoio-dev"));
+  CHECK(!app::open_bag(folder.path() / "a.bag", {}));
+  CHECK(!app::open_video(folder.path() / "a.bag", {.camera = settings}));
+}
+
+#ifdef RGBD_SLAM_VIDEO
+namespace {
+
+/// Frames whose grey value is 20 more from one to the next, and 10 more in the right half.
+std::filesystem::path write_video(const temporary_folder& folder, int frames, int width) {
+  const auto path = folder.path() / "video.avi";
+  cv::VideoWriter writer{path.string(), cv::VideoWriter::fourcc('M', 'J', 'P', 'G'), 12.5, {width, k.height}};
+  REQUIRE(writer.isOpened());
+  for (int i = 0; i != frames; ++i) {
+    cv::Mat image(k.height, width, CV_8UC3, cv::Scalar(40 + 20 * i, 50, 60));
+    image.colRange(width / 2, width) += cv::Scalar(10, 0, 0);
+    writer.write(image);
+  }
+  return path;
+}
+
+bool is_near(const rgb8& a, int r, int g, int b) {
+  return std::abs(a.r - r) < 8 && std::abs(a.g - g) < 8 && std::abs(a.b - b) < 8;
+}
+
+}  // namespace
+
+TEST_CASE("a video is read forwards and backwards with the container's times") {
+  const temporary_folder folder;
+  const auto path = write_video(folder, 6, 32);
+  const auto video = app::open_video(path, {.camera = settings}).value();
+  REQUIRE(video->size() == 6);
+  CHECK(video->sensor == sensor_kind::monocular);
+  CHECK(video->notes.empty());
+  for (const std::size_t i : {0U, 1U, 5U, 2U, 2U}) {
+    const auto frame = video->frame(i).value();
+    CHECK(frame.timestamp - video->frame(0).value().timestamp == Approx(0.08 * static_cast<double>(i)));
+    CHECK(is_near(frame.color(4, 4), 60, 50, 40 + 20 * static_cast<int>(i)));
+    CHECK(frame.depth.empty());
+    CHECK(video->color(i).value() == frame.color);
+  }
+}
+
+TEST_CASE("a video of two images side by side is a stereo recording") {
+  const temporary_folder folder;
+  const auto path = write_video(folder, 2, 64);
+  const auto video = app::open_video(path, {.sensor = sensor_kind::stereo, .camera = settings}).value();
+  const auto frame = video->frame(1).value();
+  CHECK(frame.color.width() == 32);
+  CHECK(is_near(frame.color(20, 4), 60, 50, 60));
+  CHECK(is_near(frame.right(8, 4), 60, 50, 70));
+  CHECK_THAT(message_of(app::open_video(path, {.camera = settings})), Contains("64x24 pixels, the camera 32x24"));
+  auto lone = settings;
+  lone.baseline.reset();
+  CHECK_THAT(message_of(app::open_video(path, {.sensor = sensor_kind::stereo, .camera = lone})), Contains("baseline"));
+}
+
+TEST_CASE("what is no video or has no camera is refused in words") {
+  const temporary_folder folder;
+  CHECK_THAT(message_of(app::open_video(folder.path() / "none.avi", {})), Contains("no such file"));
+  folder.write("notes.txt", "hello");
+  CHECK_THAT(message_of(app::open_video(folder.path() / "notes.txt", {.camera = settings})), Contains("no video that"));
+  const auto path = write_video(folder, 2, 32);
+  CHECK_THAT(message_of(app::open_video(path, {})), Contains("put a camera.toml beside the video"));
+  CHECK_THAT(message_of(app::open_video(path, {.sensor = sensor_kind::rgbd})), Contains("no depth"));
+  folder.write("camera.toml", "model = 'pinhole'\nwidth = 32\nheight = 24\nfx = 30\nfy = 30\ncx = 15.5\ncy = 11.5\n");
+  CHECK(app::open_video(path, {}).value()->size() == 2);
+}
+#endif
+
+#ifdef RGBD_SLAM_BAG
+namespace {
+
+image<rgb8> plain(std::uint8_t r, std::uint8_t g, std::uint8_t b, int width = 32) { return {width, 24, {r, g, b}}; }
+
+template <class T>
+image_view<const T> view(const image<T>& im) {
+  return im.view();
+}
+
+}  // namespace
+
+TEST_CASE("colour and depth of a bag are found and paired by the times in their headers") {
+  const temporary_folder folder;
+  const auto path = folder.path() / "a.bag";
+  const bool in_metres = GENERATE(false, true);
+  {
+    test::ros_bag_writer bag{path};
+    bag.info("/camera/rgb/camera_info", 1.0, k);
+    for (int i = 0; i != 3; ++i) {
+      const double t = 1.0 + 0.1 * i;
+      bag.image("/camera/rgb/image_color", t, "bgr8", view(plain(static_cast<std::uint8_t>(i), 20, 30)));
+      bag.image("/camera/rgb/image_mono", t, "mono8", view(image<std::uint8_t>(32, 24, 9)));
+      if (i == 1) continue;
+      if (in_metres)
+        bag.image("/camera/depth_registered/image", t + 0.01, "32FC1", view(image<float>(32, 24, i == 0 ? NAN : 1.5F)));
+      else
+        bag.image("/camera/depth_registered/image", t + 0.01, "16UC1", view(image<std::uint16_t>(32, 24, 1500)));
+      bag.image("/camera/depth/image_raw", t, "16UC1", view(image<std::uint16_t>(16, 12, 1)));
+    }
+    bag.close();
+  }
+  const auto bag = app::open_bag(path, {}).value();
+  CHECK(bag->sensor == sensor_kind::rgbd);
+  REQUIRE(bag->size() == 2);
+  CHECK(bag->notes.size() == 2);  // which topics, and an image without a partner
+  CHECK(bag->camera.model.k() == k);
+  CHECK(bag->camera.model.model_name() == "pinhole");
+  const auto frame = bag->frame(1).value();
+  CHECK(frame.timestamp == Approx(1.2).epsilon(1e-12));
+  CHECK(frame.color(31, 23) == rgb8{30, 20, 2});
+  CHECK(frame.depth_scale == (in_metres ? 5000.0 : 1000.0));
+  CHECK(frame.depth(31, 23) == (in_metres ? 7500 : 1500));
+  CHECK(bag->frame(0).value().depth(5, 5) == (in_metres ? 0 : 1500));
+  CHECK(bag->color(1).value() == frame.color);
+
+  CHECK(app::open_bag(path, {.sensor = sensor_kind::monocular}).value()->size() == 3);
+  CHECK(app::open_bag(path, {.topics = {"/camera/rgb/image_mono"}}).value()->color(0).value()(1, 1) == rgb8{9, 9, 9});
+  CHECK_THAT(message_of(app::open_bag(path, {.topics = {"/camera/rgb/image_color", "/camera/depth/image_raw"}})),
+             Contains("16x12 pixels, the camera 32x24: depth is not registered"));
+  CHECK_THAT(message_of(app::open_bag(path, {.topics = {"/nothing"}})),
+             Contains("has no images in /nothing; there are /camera/depth/image_raw (16UC1)"));
+  CHECK_THAT(message_of(app::open_bag(path, {.sensor = sensor_kind::stereo})), Contains("has not the images"));
+}
+
+TEST_CASE("the images of a stereo camera in a bag are rectified if they are not") {
+  const temporary_folder folder;
+  const auto path = folder.path() / "a.bag";
+  const bool is_rectified = GENERATE(false, true);
+  const std::string image_name = is_rectified ? "image_rect" : "image_raw";
+  const std::vector<double> distortion =
+      is_rectified ? std::vector<double>{0, 0, 0, 0, 0} : std::vector<double>{-0.3, 0.01, 0, 0, 0};
+  image<std::uint8_t> left(32, 24);
+  for (int y = 0; y != 24; ++y)
+    for (int x = 0; x != 32; ++x) left(x, y) = static_cast<std::uint8_t>(4 * x);
+  {
+    test::ros_bag_writer bag{path};
+    for (int i = 0; i != 2; ++i) {
+      const double t = 5.0 + 0.05 * i;
+      bag.image("/stereo/left/" + image_name, t, "mono8", view(left));
+      bag.image("/stereo/right/" + image_name, t + 0.001, "mono8", view(image<std::uint8_t>(32, 24, 120)));
+      bag.info("/stereo/left/camera_info", t, k, 0.0, distortion);
+      bag.info("/stereo/right/camera_info", t, k, 30.0 * 0.25, distortion);
+    }
+    bag.close();
+  }
+  const auto bag = app::open_bag(path, {}).value();
+  CHECK(bag->sensor == sensor_kind::stereo);
+  REQUIRE(bag->size() == 2);
+  CHECK(bag->camera.baseline.value() == Approx(0.25));
+  CHECK(bag->camera.model.model_name() == "pinhole");
+  CHECK(bag->camera.fps == Approx(20.0));
+  const auto frame = bag->frame(1).value();
+  CHECK((frame.color(2, 12).g == 8) == is_rectified);  // pulled outwards by the lens, otherwise
+  CHECK(frame.color(2, 12).g < 16);
+  CHECK(frame.right(16, 12) == rgb8{120, 120, 120});
+}
+
+TEST_CASE("bags with one camera give compressed images and lenses") {
+  const temporary_folder folder;
+  const auto path = folder.path() / "a.bag";
+  {
+    test::ros_bag_writer bag{path};
+    app::ros_messages::compressed_image m;
+    bag.set_time(m.header, 3.0);
+    m.format = "png";
+    const std::string bytes = io::encode_png(plain(1, 2, 3));
+    m.data.assign(bytes.begin(), bytes.end());
+    bag.write("/cam/image_raw/compressed", 3.0, m);
+    bag.info("/cam/camera_info", 3.0, k, 0.0, {-0.1, 0.01, 0.001, 0.002, 0.003});
+    bag.close();
+  }
+  const auto bag = app::open_bag(path, {}).value();
+  CHECK(bag->sensor == sensor_kind::monocular);
+  CHECK(bag->frame(0).value().color(3, 3) == rgb8{1, 2, 3});
+  const auto* lens = bag->camera.model.get_if<camera::radial_tangential>();
+  REQUIRE(lens != nullptr);
+  CHECK(lens->distortion().p2 == 0.002);
+  CHECK(lens->distortion().k3 == 0.003);
+}
+
+TEST_CASE("damaged bags and images are refused in words") {
+  const temporary_folder folder;
+  const auto path = folder.path() / "a.bag";
+  const auto write = [&](const std::string& encoding, bool has_camera, std::uint32_t height) {
+    test::ros_bag_writer bag{path};
+    app::ros_messages::image m;
+    bag.set_time(m.header, 1.0);
+    m.encoding = encoding;
+    m.width = 32;
+    m.height = height;
+    m.step = 96;
+    m.data.resize(96 * 24);
+    bag.write("/cam/image_raw", 1.0, m);
+    if (has_camera) bag.info("/cam/camera_info", 1.0, k);
+    bag.close();
+  };
+  write("rgb8", true, 24);
+  CHECK(app::open_bag(path, {}));
+  write("rgb8", true, 25);
+  CHECK_THAT(message_of(app::open_bag(path, {})), Contains("/cam/image_raw: an image has fewer pixels"));
+  write("rgb8", true, 23);
+  CHECK_THAT(message_of(app::open_bag(path, {})), Contains("32x23 pixels, the camera 32x24"));
+  write("rgb8", false, 24);
+  CHECK_THAT(message_of(app::open_bag(path, {})), Contains("no sensor_msgs/CameraInfo beside /cam/image_raw"));
+  CHECK(app::open_bag(path, {.camera = settings}));
+  write("bayer_rggb8", true, 24);
+  CHECK_THAT(message_of(app::open_bag(path, {})), Contains("/cam/image_raw (bayer_rggb8)"));
+  CHECK_THAT(message_of(app::open_bag(path, {.topics = {"/cam/image_raw"}})), Contains("in the encoding bayer_rggb8"));
+  folder.write("b.bag", "#ROSBAG V2.0\nand then nothing");
+  CHECK_THAT(message_of(app::open_bag(folder.path() / "b.bag", {})), Contains("is no ROS 1 bag that can be read"));
+  CHECK_THAT(message_of(app::open_bag(folder.path() / "c.bag", {})), Contains("no such file"));
+  {
+    test::ros_bag_writer bag{path};
+    bag.info("/cam/camera_info", 1.0, k);
+    bag.close();
+  }
+  CHECK_THAT(message_of(app::open_bag(path, {})), Contains("there are no images in this bag"));
+}
+#endif

@@ -1,0 +1,34 @@
+# SPDX-License-Identifier: BSD-3-Clause
+#
+# Recordings in one file: ROS bags and videos, as far as this build reads them.
+include(${CMAKE_CURRENT_LIST_DIR}/support.cmake)
+
+execute_process(COMMAND ${MAKE_INPUTS} ${WORK}/in 20 320 RESULT_VARIABLE result OUTPUT_VARIABLE made)
+check(result EQUAL 0)
+
+file(WRITE ${WORK}/empty.bag "")
+if(made MATCHES "room.bag")
+  app(0 run in/room.bag --deterministic --resolution 0.1 --out bag)
+  check(err MATCHES "images of /camera/color/image_raw and /camera/depth_registered/image")
+  summary(tracked ${WORK}/bag tracked)
+  check(tracked EQUAL 20)
+  must_exist(${WORK}/bag trajectory.txt cloud.ply map.bt summary.json report.html)
+  app(0 run in/room.bag --topics /camera/color/image_raw,/camera/depth_registered/image --deterministic --frames 3 --resolution 0.1 --out two)
+  app_fails(2 "has no images in /none; there are /camera/color/image_raw .rgb8., /camera/depth_registered/image .32FC1."
+            run in/room.bag --topics /none --out out)
+  app_fails(2 "is no ROS 1 bag that can be read" run empty.bag --out out)
+  app_fails(3 "tracking never started" run in/room.bag --topics /camera/color/image_raw --frames 2 --out out)
+else()
+  app_fails(2 "empty.bag: this build reads no ROS bags: it was made without .*librosbag-storage-dev" run empty.bag --out out)
+endif()
+
+file(WRITE ${WORK}/no.avi "no video")
+if(made MATCHES "pair.avi")
+  app(0 run in/pair.avi --sensor stereo --deterministic --filter none --resolution 0.1 --out video)
+  summary(tracked ${WORK}/video tracked)
+  check(tracked EQUAL 20)
+  app_fails(2 "pair.avi: the image has 640x240 pixels, the camera 320x240" run in/pair.avi --out out)
+  app_fails(2 "no.avi: is no folder, no bag, and no video that OpenCV can read" run no.avi --out out)
+else()
+  app_fails(2 "no.avi: is no folder, and this build reads no videos: .*libopencv-videoio-dev" run no.avi --out out)
+endif()

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// make_inputs FOLDER FRAMES WIDTH: a synthetic recording as a ROS bag (room.bag, if this build has a library for it)
+// and as a video of two images side by side (pair.avi, likewise) with camera.toml. Names the files that it made.
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <vector>
+
+#include <orbis/io/camera_file.hpp>
+#include <orbis/io/synthetic.hpp>
+
+#ifdef RGBD_SLAM_VIDEO
+#include <opencv2/videoio.hpp>
+#endif
+#ifdef RGBD_SLAM_BAG
+#include "ros_bag_writer.hpp"
+#endif
+
+int main(int argc, char** argv) {
+  if (argc != 4) return 1;
+  const std::filesystem::path folder = argv[1];
+  const int width = std::atoi(argv[3]);
+  const orbis::io::synthetic_recording recording{
+      {.frames = std::atoi(argv[2]), .width = width, .height = width / 4 * 3, .frames_around = 360}};
+  std::filesystem::create_directories(folder);
+  if (!orbis::io::write_camera(folder / "camera.toml", recording.stereo_camera())) return 1;
+
+#ifdef RGBD_SLAM_BAG
+  orbis::test::ros_bag_writer bag{folder / "room.bag"};
+  for (std::size_t i = 0; i != recording.size(); ++i) {
+    const auto frame = recording.frame(i).value();
+    const double t = 1000.0 + frame.timestamp;
+    orbis::image<float> depth(frame.depth.width(), frame.depth.height());
+    for (int y = 0; y != depth.height(); ++y)
+      for (int x = 0; x != depth.width(); ++x) depth(x, y) = static_cast<float>(frame.depth(x, y) / frame.depth_scale);
+    bag.image("/camera/color/image_raw", t, "rgb8", frame.color.view());
+    bag.image<float>("/camera/depth_registered/image", t, "32FC1", depth.view());
+  }
+  bag.info("/camera/color/camera_info", 1000.0, recording.camera().model.k());
+  bag.close();
+  std::puts("room.bag");
+#endif
+#ifdef RGBD_SLAM_VIDEO
+  const int height = width / 4 * 3;
+  cv::VideoWriter video{
+      (folder / "pair.avi").string(), cv::VideoWriter::fourcc('M', 'J', 'P', 'G'), 30.0, {2 * width, height}};
+  if (!video.isOpened()) return 1;
+  for (std::size_t i = 0; i != recording.size(); ++i) {
+    const auto pair = recording.stereo_frame(i).value();
+    cv::Mat both(height, 2 * width, CV_8UC3);
+    for (int y = 0; y != height; ++y)
+      for (int x = 0; x != 2 * width; ++x) {
+        const orbis::rgb8& p = x < width ? pair.left(x, y) : pair.right(x - width, y);
+        both.at<cv::Vec3b>(y, x) = {p.b, p.g, p.r};
+      }
+    video.write(both);
+  }
+  std::puts("pair.avi");
+#endif
+  return 0;
+}
