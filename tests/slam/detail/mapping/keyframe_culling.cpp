@@ -2,6 +2,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <utility>
+#include <limits>
 #include <vector>
 
 #include <orbis/core/random.hpp>
@@ -49,7 +50,7 @@ TEST_CASE("A keyframe is redundant when three others see nine tenths of its clos
   CHECK_FALSE(slam::detail::is_redundant(m, 1, close_depth, {.redundant_observers = 4}));
   CHECK_FALSE(slam::detail::is_redundant(m, 0, close_depth, {}));
   CHECK_FALSE(slam::detail::is_redundant(m, 1, 1.0, {}));  // nothing is close
-  CHECK(slam::detail::is_redundant(m, 1, std::nullopt, {}));
+  CHECK(slam::detail::is_redundant(m, 1, std::numeric_limits<double>::infinity(), {}));
 }
 
 TEST_CASE("Those that see it worse do not make a keyframe redundant") {

@@ -3,10 +3,10 @@
 /// Erases redundant keyframes.
 #pragma once
 
+#include <cmath>
 #include <concepts>
 #include <cstddef>
 #include <cstdint>
-#include <optional>
 #include <vector>
 
 #include <orbis/slam/map.hpp>
@@ -14,19 +14,18 @@
 
 namespace orbis::slam::detail {
 
-/// Whether enough of a keyframe's landmarks that are closer than `close_depth` (metres; empty: all, where no depth is
-/// measured) are observed by enough other
-/// keyframes at the same or a finer pyramid level. False for a keyframe without close landmarks. O(observations of its
-/// landmarks).
-/// Source: R. Mur-Artal, J. D. Tardos, "ORB-SLAM2", T-RO 33 (2017), section III.C, after ORB-SLAM (2015), VI.E.
+/// Whether enough of a keyframe's landmarks that are closer than `close_depth` (metres; infinite: all, where no depth
+/// is measured) are observed by enough other keyframes at the same or a finer pyramid level. False for a keyframe
+/// without close landmarks. O(observations of its landmarks). Source: R. Mur-Artal, J. D. Tardos, "ORB-SLAM2", T-RO 33
+/// (2017), section III.C, after ORB-SLAM (2015), VI.E.
 template <feature_descriptor D>
-[[nodiscard]] bool is_redundant(const basic_map<D>& m, keyframe_id id, std::optional<double> close_depth,
-                                const culling_options& o) {
+[[nodiscard]] bool is_redundant(const basic_map<D>& m, keyframe_id id, double close_depth, const culling_options& o) {
   const auto& k = m.at(id);
+  const bool needs_depth = std::isfinite(close_depth);
   std::size_t close = 0, seen_by_others = 0;
   for (std::uint32_t i = 0; i < k.size(); ++i) {
     if (k.landmarks[i] == no_id) continue;
-    if (close_depth && (!k.has_depth(i) || static_cast<double>(k.depth[i]) > *close_depth)) continue;
+    if (needs_depth && (!k.has_depth(i) || static_cast<double>(k.depth[i]) > close_depth)) continue;
     ++close;
     const int coarsest = k.features.keypoints[i].octave + o.coarser_levels;
     std::size_t others = 0;
@@ -46,7 +45,7 @@ struct keep_none {
 /// were erased. Kept are the root, keyframes with loop edges, and those for which `keep(id)` is true. Returns the
 /// erased ones.
 template <feature_descriptor D, std::predicate<keyframe_id> Keep = keep_none>
-std::vector<keyframe_id> cull_keyframes(basic_map<D>& m, keyframe_id newest, std::optional<double> close_depth,
+std::vector<keyframe_id> cull_keyframes(basic_map<D>& m, keyframe_id newest, double close_depth,
                                         const culling_options& o, Keep&& keep = {}) {
   std::vector<keyframe_id> erased;
   for (const covisible& n : m.covisibility().neighbors(newest, o.neighborhood)) {

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <functional>
-#include <optional>
+#include <limits>
 #include <utility>
 #include <vector>
 
@@ -95,7 +95,8 @@ std::vector<keyframe_event> local_mapper<Camera, D, Places>::cull(basic_map<D>& 
       judged.push_back(shared_.event_of({newest.map, k}));
       return false;
     };
-    const auto close = shared_.rig.scale_is_known ? std::optional{shared_.settings.close_depth} : std::nullopt;
+    const double close =
+        shared_.rig.scale_is_known ? shared_.settings.close_depth : std::numeric_limits<double>::infinity();
     const std::vector<keyframe_id> erased = cull_keyframes(m, newest.keyframe, close, shared_.settings.culling, keep);
     std::erase_if(judged, [&](const keyframe_event& e) {
       return std::find(erased.begin(), erased.end(), e.id.keyframe) == erased.end();
