@@ -23,7 +23,7 @@
 /// | self_calibration.hpp | bundle adjustment of images of one camera whose intrinsics are among the unknowns |
 /// | solver_policies.hpp | damping (Gauss-Newton, Levenberg-Marquardt, dogleg), solvers of the reduced system |
 /// | triangulation.hpp | points from two or more rays |
-/// | two_view.hpp | essential matrix, homography and relative pose of two images |
+/// | two_view.hpp | essential matrix, homography and relative pose of two images; scene and motion that they show |
 #pragma once
 
 #include <orbis/optimize/alignment.hpp>

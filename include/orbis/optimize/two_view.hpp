@@ -140,12 +140,12 @@ struct plane_motion {
 struct two_view_options {
   double deviation = 1.0;            ///< standard deviation of a matched pixel, along each axis, pixels
   std::size_t min_points = 50;       ///< that a reconstruction must have
-  double min_parallax = 0.0175;      ///< median angle between the rays of its points, at least, radians
-  double max_rotation = 0.006;       ///< largest standard deviation of its rotation, radians ...
-  double max_direction = 0.05;       ///< ... and of the direction of its translation, radians
+  double min_parallax = 0.02;        ///< median angle between the rays of its points, at least, radians
+  double max_rotation = 0.01;        ///< largest standard deviation of its rotation, radians ...
+  double max_direction = 0.035;      ///< ... and of the direction of its translation, radians
   double max_depth = 0.3;            ///< largest standard deviation of a point's depth, relative to the depth
   double confidence = 0.999;         ///< of RANSAC
-  std::size_t max_iterations = 300;  ///< of RANSAC, for either model
+  std::size_t max_iterations = 500;  ///< of RANSAC, for either model
   std::uint64_t seed = 1;
 };
 

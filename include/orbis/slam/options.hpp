@@ -77,9 +77,9 @@ struct start_options {
   float ratio = 0.9F;              ///< of the distance to that of the second best match, at most
   std::size_t min_features = 100;  ///< of a frame that may be the first
   std::size_t min_matches = 100;   ///< with the first frame, below which the present one takes its place
-  double deviation = 1.0;          ///< of a keypoint, pixels of its level
+  double deviation = 0.6;          ///< of a keypoint, pixels of its level
   std::size_t min_points = 50;     ///< that a map begins with
-  double min_parallax = 0.0175;    ///< median angle between the rays of these, at least, radians
+  double min_parallax = 0.02;      ///< median angle between the rays of these, at least, radians
 };
 
 /// Triangulation of keypoints without landmark.

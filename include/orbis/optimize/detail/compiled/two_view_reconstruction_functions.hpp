@@ -5,56 +5,327 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include <orbis/core/compiled_once.hpp>
+#include <orbis/core/jacobi.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/core/types.hpp>
+#include <orbis/optimize/detail/minimal/epipolar_motion.hpp>
+#include <orbis/optimize/detail/minimal/essential_estimator.hpp>
 #include <orbis/optimize/detail/minimal/image_matches.hpp>
+#include <orbis/optimize/detail/minimal/ray_homography_estimator.hpp>
+#include <orbis/optimize/detail/minimal/small_cholesky.hpp>
+#include <orbis/optimize/detail/minimal/two_view_hypotheses.hpp>
+#include <orbis/optimize/ransac.hpp>
 #include <orbis/optimize/triangulation.hpp>
 #include <orbis/optimize/two_view.hpp>
 
 namespace orbis::optimize::detail {
 
+/// The search for the motion between two views among all that may be meant.
+class two_view_search {
+ public:
+  struct hypothesis {
+    epipolar_motion motion;
+    motion_support support;
+  };
+
+  explicit two_view_search(const std::vector<image_match>& matches) : matches_{matches} {}
+
+  /// Refines a motion and takes in all four that its essential matrix stands for.
+  void add(const epipolar_motion& start) {
+    constexpr std::array scales{3.0, 3.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0};
+    const auto refined = refined_motion(matches_, start, scales);
+    if (!refined) return;
+    for (const se3& pose : decompose_essential(refined->e)) {
+      const epipolar_motion m(pose.rotation(), pose.translation());
+      all_.push_back({m, support_of(matches_, m)});
+    }
+  }
+  /// Whether one motion of a plane explains the plane's own matches clearly better than `best` does, which then comes
+  /// from what the plane and something else that moves have in common.
+  [[nodiscard]] static bool contradicts(const std::vector<image_match>& plane,
+                                        const std::vector<epipolar_motion>& motions, const epipolar_motion& best) {
+    constexpr std::array scales{3.0, 2.0, 2.0, 2.0, 2.0, 2.0};
+    const auto score = [&](const mat3& e) {
+      double sum = 0.0;
+      for (const image_match& m : plane) sum += std::max(0.0, 1.5 * line_gate - squared_sampson(e, m));
+      return sum;
+    };
+    const double enough = 1.05 * score(best.e);
+    return std::any_of(motions.begin(), motions.end(), [&](const epipolar_motion& m) {
+      const auto refined = refined_motion(plane, m, scales);
+      return refined && score(refined->e) > enough;
+    });
+  }
+  /// Looks for further motions: from directions of translation all around, with any rotation that goes with them.
+  void look_around(const so3& turn) {
+    constexpr std::array scales{20.0, 20.0, 10.0, 10.0, 5.0, 5.0};
+    constexpr std::size_t few = 150;
+    for (const vec3& t : hemisphere<16>())
+      if (const auto rough = refined_motion(matches_, epipolar_motion(turn, t), scales, few); rough && !knows(*rough))
+        add(*rough);
+  }
+
+  /// Null if there is none.
+  [[nodiscard]] const hypothesis* best() const {
+    const auto found = std::max_element(all_.begin(), all_.end(), [](const hypothesis& a, const hypothesis& b) {
+      return a.support.score < b.support.score;
+    });
+    return found == all_.end() ? nullptr : &*found;
+  }
+  /// The greatest score of a motion that is another one than `best`.
+  [[nodiscard]] double rival_score(const hypothesis& best) const {
+    double score = 0.0;
+    for (const hypothesis& h : all_)
+      if (!same(h.motion, best.motion)) score = std::max(score, h.support.score);
+    return score;
+  }
+
+ private:
+  /// Whether two motions, refined, are one.
+  [[nodiscard]] static bool same(const epipolar_motion& a, const epipolar_motion& b) {
+    constexpr double turned = 0.02, apart = 0.1;  // radians
+    return (a.rotation.inverse() * b.rotation).angle() < turned &&
+           angle_between_directions(a.direction, b.direction) < apart;
+  }
+  /// Whether a motion, or its opposite, was refined before.
+  [[nodiscard]] bool knows(const epipolar_motion& m) const {
+    return std::any_of(all_.begin(), all_.end(), [&](const hypothesis& h) {
+      return same(h.motion, m) || same(h.motion, {m.rotation, vec3(-m.direction)});
+    });
+  }
+
+  const std::vector<image_match>& matches_;
+  std::vector<hypothesis> all_;
+};
+
+/// The matches that agree with a motion, and what they leave open.
+struct two_view_inliers {
+  std::vector<const image_match*> all, near;
+  double rms = 0.0;    ///< Sampson distance
+  double sigma = 0.0;  ///< standard deviation of a match
+  double rotation_deviation = 0.0, direction_deviation = 0.0;
+
+  two_view_inliers(const std::vector<image_match>& matches, const epipolar_motion& motion) {
+    std::vector<double> squares;
+    const mat3 rotation = motion.rotation.rotation_matrix();
+    for (const image_match& m : matches) {
+      double squared = 0.0;
+      const agreement a = agreement_of(rotation, motion.direction, motion.e, m, squared);
+      if (a != agreement::far && a != agreement::near) continue;
+      all.push_back(&m);
+      if (a == agreement::near) near.push_back(&m);
+      squares.push_back(squared);
+      rms += squared;
+    }
+    rotation_deviation = direction_deviation = std::numeric_limits<double>::infinity();
+    if (all.empty()) return;
+    rms = std::sqrt(rms / static_cast<double>(all.size()));
+    // Matches better than they were said to be are not believed to be so by far.
+    sigma = std::max(0.5, 1.4826 * std::sqrt(middle_of(squares)));
+    estimate_deviations(motion);
+  }
+
+ private:
+  /// Two estimates, of which the larger counts: by the noise of matches that err independently of each other, and by
+  /// how the motion changes where the matches of a part of the image are left out (the delete-a-group jackknife), which
+  /// tells what errs together: neighbours, what moves, the rows of a rolling shutter.
+  void estimate_deviations(const epipolar_motion& motion) {
+    constexpr std::size_t side = 3, parts = side * side;
+    std::vector<const image_match*> order = all;
+    const auto by = [](double metric_ray::*axis) {
+      return [axis](const image_match* a, const image_match* b) { return a->first.*axis < b->first.*axis; };
+    };
+    std::sort(order.begin(), order.end(), by(&metric_ray::x));
+    std::array<epipolar_equations, parts> of_part;
+    epipolar_equations whole;
+    const auto at = [](std::size_t k, std::size_t n, std::size_t count) { return k * n / count; };
+    for (std::size_t column = 0; column != side; ++column) {
+      const std::size_t begin = at(column, order.size(), side), n = at(column + 1, order.size(), side) - begin;
+      const auto first = order.begin() + static_cast<std::ptrdiff_t>(begin);
+      std::sort(first, first + static_cast<std::ptrdiff_t>(n), by(&metric_ray::y));
+      for (std::size_t i = 0; i != n; ++i) {
+        epipolar_equations& sum = of_part[side * column + i * side / n];
+        sum.add(motion.e, *order[begin + i], [](double squared) { return falling_weight(0.25 * squared); });
+      }
+    }
+    for (epipolar_equations& part : of_part) {
+      part.mirror();
+      whole.h += part.h;
+      whole.g += part.g;
+    }
+    const auto [h, g] = whole.by_motion(motion);
+    small_cholesky<5> factors;
+    if (!factors.set(h) || !(factors.factor(0.0) > small_cholesky<5>::determined)) return;
+    matrix<5, 5> covariance = factors.inverse() * square(sigma);
+    matrix<5, 5> jackknife = matrix<5, 5>::Zero();
+    for (const epipolar_equations& part : of_part) {
+      const auto [part_h, part_g] = part.by_motion(motion);
+      if (!factors.set(matrix<5, 5>(h - part_h)) || !(factors.factor(0.0) > small_cholesky<5>::determined)) return;
+      const matrix<5> step = factors.solve(matrix<5>(part_g - g));
+      jackknife += step * step.transpose();
+    }
+    jackknife *= static_cast<double>(parts - 1) / static_cast<double>(parts);
+    const auto largest = [](const auto& c) {
+      return std::pair{eigen_of_symmetric<3>(mat3(c.template topLeftCorner<3, 3>())).values[2],
+                       eigen_of_symmetric<2>(mat2(c.template bottomRightCorner<2, 2>())).values[1]};
+    };
+    const auto [turn, direction] = largest(covariance);
+    const auto [turn_of_parts, direction_of_parts] = largest(jackknife);
+    rotation_deviation = std::sqrt(std::max(turn, turn_of_parts));
+    direction_deviation = std::sqrt(std::max(direction, direction_of_parts));
+  }
+
+ public:
+  /// The middle one of some values. @pre there are some
+  [[nodiscard]] static double middle_of(std::vector<double>& values) {
+    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+    std::nth_element(values.begin(), middle, values.end());
+    return *middle;
+  }
+};
+
 ORBIS_COMPILED_ONCE result<two_view_reconstruction> reconstruction_of_matches(const std::vector<image_match>& matches,
                                                                               std::size_t n,
                                                                               const two_view_options& options) {
   constexpr const char* where = "two views";
-  if (matches.size() < std::max<std::size_t>(options.min_points, 8))
+  const std::size_t least = std::max<std::size_t>(options.min_points, 8), usable = matches.size();
+  const auto refuse = [&](const std::string& why) { return fail(errc::degenerate, where, why); };
+  const auto of = [](std::size_t part, std::size_t whole) {
+    return std::to_string(part) + " of " + std::to_string(whole);
+  };
+  if (usable < least)
     return fail(errc::no_data, where,
-                "of " + std::to_string(n) + " matches " + std::to_string(matches.size()) + " can be used, " +
-                    std::to_string(std::max<std::size_t>(options.min_points, 8)) + " are needed");
-  auto motion = essential_of_matches(matches, n, {.threshold = 2.0, .max_iterations = options.max_iterations});
-  if (!motion) return fail(std::move(motion.error()));
+                "of " + std::to_string(n) + " matches " + std::to_string(usable) + " can be used, " +
+                    std::to_string(least) + " are needed");
+
+  // The cheapest answer first: the camera has only turned.
+  const so3 turn = prevailing_rotation(matches);
+  const mat3 turned = turn.rotation_matrix();
+  const auto is_still = [&](const image_match& m, double sigma) {
+    return squared_disparity(turned, m) < square(least_disparity * sigma);
+  };
+  const auto still = static_cast<std::size_t>(
+      std::count_if(matches.begin(), matches.end(), [&](const image_match& m) { return is_still(m, 0.75); }));
+  if (usable - still < least || 5 * still > 4 * usable)
+    return refuse("no parallax: a rotation alone explains " + of(still, usable) + " matches");
+
+  ransac_options asked{.threshold = std::sqrt(line_gate),
+                       .confidence = options.confidence,
+                       .max_iterations = options.max_iterations,
+                       .seed = options.seed};
+  const essential_estimator lines(matches);
+  const auto essential =
+      ransac(lines, asked, ransac_policies{msac{}, uniform_sampling{}, sprt(2000.0), iterated_refinement{}});
+  if (!essential) return refuse(essential.error().message);
+  if (5 * essential->inliers.size() < 2 * usable || essential->inliers.size() < least)
+    return refuse("no motion explains more than " + of(essential->inliers.size(), usable) + " matches");
+  asked.threshold = std::sqrt(point_gate);
+  const ray_homography_estimator planes(matches);
+  const auto plane = ransac(planes, asked, ransac_policies{msac{}, uniform_sampling{}, sprt{}, iterated_refinement{}});
+
+  // The motions of both models. That of the model that describes the images worse is a rival all the same.
+  two_view_search search(matches);
+  const se3 first_of_four = decompose_essential(essential->model)[0];
+  search.add({first_of_four.rotation(), first_of_four.translation()});
+  bool from_homography = false;
+  std::vector<image_match> of_plane;
+  std::vector<epipolar_motion> plane_motions;
+  if (plane) {
+    const auto& [forward, backward] = plane->model;
+    from_homography = scores_of(matches, forward, backward, essential->model).ratio() > 0.45;
+    const vec3 ray = matches[plane->inliers.empty() ? 0 : plane->inliers.front()].first.direction();
+    if (const auto motions = decompose_homography(forward, ray))
+      for (const plane_motion& m : *motions)
+        if (m.translation.squaredNorm() > 0.0)
+          plane_motions.emplace_back(m.R_second_first, vec3(m.translation.normalized()));
+    for (const epipolar_motion& m : plane_motions) search.add(m);
+    for (const std::uint32_t i : plane->inliers) of_plane.push_back(matches[i]);
+  }
+  const auto* best = search.best();
+  if (best == nullptr) return refuse("no motion can be refined");
+  constexpr double clearly = 0.9;  // the share of the score that a rival may have
+  const auto ambiguous = [&] { return search.rival_score(*best) > clearly * best->support.score; };
+  constexpr const char* two = "two motions explain the matches about as well";
+  if (ambiguous()) return refuse(two);
+
+  const epipolar_motion motion = best->motion;
+  const two_view_inliers inliers(matches, motion);
+  const auto unmoved = static_cast<std::size_t>(std::count_if(
+      inliers.all.begin(), inliers.all.end(), [&](const image_match* m) { return is_still(*m, inliers.sigma); }));
+  if (2 * unmoved > inliers.all.size())
+    return refuse("no parallax: a rotation alone explains " + of(unmoved, inliers.all.size()) + " matches that agree");
+  if (10 * best->support.behind > inliers.all.size())
+    return refuse("behind a camera are " + of(best->support.behind, usable) + " matches");
+  if (!(inliers.rotation_deviation <= options.max_rotation) || !(inliers.direction_deviation <= options.max_direction))
+    return refuse("the motion is uncertain");
+
+  struct seen_point {
+    std::uint32_t match;
+    vec3 position;
+    double parallax;
+  };
+  std::vector<seen_point> found;
+  const se3 T_first_second = se3(motion.rotation, motion.direction).inverse();
+  const double least_seen = std::sqrt(2.0) * inliers.sigma / options.max_depth;
+  for (const image_match* m : inliers.near) {
+    if (squared_disparity(motion.rotation.rotation_matrix(), *m) < square(least_seen)) continue;
+    const triangulation t = triangulate(se3(), m->first.direction(), T_first_second, m->second.direction());
+    if (t.ok()) found.push_back({m->original, t.point, t.parallax});
+  }
+  if (found.size() < least || 2 * found.size() < inliers.all.size())
+    return refuse("too little parallax: it shows the depth of " + of(found.size(), inliers.all.size()) +
+                  " matches that agree");
+  std::sort(found.begin(), found.end(), [](const auto& a, const auto& b) { return a.match < b.match; });
+  std::vector<double> depths, angles;
+  for (const seen_point& p : found) {
+    depths.push_back(p.position.z());
+    angles.push_back(p.parallax);
+  }
   two_view_reconstruction out;
-  out.inliers = motion->inliers.size();
-  std::vector<double> depths;
-  std::vector<std::pair<std::uint32_t, vec3>> found;
-  for (const image_match& m : matches) {
-    if (!std::binary_search(motion->inliers.begin(), motion->inliers.end(), m.original)) continue;
-    const triangulation t = triangulate(se3(), m.first.direction(), motion->T_first_second, m.second.direction(),
-                                        {.min_parallax = options.min_parallax});
-    if (!t.ok()) continue;
-    found.emplace_back(m.original, t.point);
-    depths.push_back(t.point.z());
+  out.parallax = two_view_inliers::middle_of(angles);
+  if (!(out.parallax >= options.min_parallax)) return refuse("too little parallax between the rays of a point");
+
+  // Only one that would be the answer is compared with all others.
+  const double score = best->support.score;
+  search.look_around(turn);
+  best = search.best();
+  if (best->support.score > 1.02 * score || ambiguous()) return refuse(two);
+  constexpr const char* shared = "two motions share the matches";
+  if (5 * of_plane.size() > 2 * inliers.all.size() && two_view_search::contradicts(of_plane, plane_motions, motion))
+    return refuse(shared);
+  std::vector<image_match> others;
+  for (const image_match& m : matches)
+    if (!(squared_sampson(motion.e, m) < 2.0 * line_gate)) others.push_back(m);
+  if (2 * others.size() > inliers.all.size()) {
+    asked.threshold = std::sqrt(line_gate);
+    const essential_estimator rest(others);
+    const auto second =
+        ransac(rest, asked, ransac_policies{msac{}, uniform_sampling{}, sprt(2000.0), iterated_refinement{}});
+    if (second && 2 * second->inliers.size() > inliers.all.size()) return refuse(shared);
   }
-  if (found.size() < options.min_points || 2 * found.size() < out.inliers)
-    return fail(errc::degenerate, where, "too little parallax");
-  std::nth_element(depths.begin(), depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2), depths.end());
-  const double unit = 1.0 / depths[depths.size() / 2];
-  std::sort(found.begin(), found.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
-  for (const auto& [match, point] : found) {
-    out.matches.push_back(match);
-    out.points.push_back(unit * point);
+
+  const double unit = 1.0 / two_view_inliers::middle_of(depths);
+  for (const seen_point& p : found) {
+    out.matches.push_back(p.match);
+    out.points.push_back(unit * p.position);
   }
-  out.parallax = motion->parallax;
-  out.rmse = motion->rmse;
-  out.T_first_second = se3(motion->T_first_second.rotation(), unit * motion->T_first_second.translation());
+  out.inliers = inliers.all.size();
+  out.rmse = options.deviation * inliers.rms;
+  out.rotation_deviation = inliers.rotation_deviation;
+  out.direction_deviation = inliers.direction_deviation;
+  out.from_homography = from_homography;
+  out.T_first_second = se3(T_first_second.rotation(), unit * T_first_second.translation());
   return out;
 }
 

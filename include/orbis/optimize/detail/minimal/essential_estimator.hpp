@@ -21,11 +21,11 @@
 #include <orbis/core/simd/vec.hpp>
 #include <orbis/core/types.hpp>
 #include <orbis/optimize/detail/minimal/descent.hpp>
+#include <orbis/optimize/detail/minimal/epipolar_motion.hpp>
 #include <orbis/optimize/detail/minimal/five_point.hpp>
 #include <orbis/optimize/detail/minimal/horn.hpp>
 #include <orbis/optimize/detail/minimal/image_matches.hpp>
 #include <orbis/optimize/detail/minimal/small_cholesky.hpp>
-#include <orbis/optimize/detail/minimal/unit_sphere.hpp>
 #include <orbis/optimize/detail/unroll.hpp>
 #include <orbis/optimize/ransac.hpp>
 
@@ -42,15 +42,6 @@ namespace orbis::optimize::detail {
   const vec3 t = u.col(2);
   return {se3(one, t), se3(one, -t), se3(other, t), se3(other, -t)};
 }
-
-/// Turns gradients by the point at z = 1 into gradients by the pixel.
-struct pixel_gradient {
-  double xx, yx, yy;
-  explicit pixel_gradient(const metric_ray& r) : xx{1.0 / r.xx}, yx{-r.xy / (r.xx * r.yy)}, yy{1.0 / r.yy} {}
-  [[nodiscard]] vec2 operator()(double gx, double gy) const { return {xx * gx, yx * gx + yy * gy}; }
-  /// The transpose.
-  [[nodiscard]] vec2 back(const vec2& g) const { return {xx * g.x() + yx * g.y(), yy * g.y()}; }
-};
 
 class essential_estimator {
  public:
@@ -78,15 +69,7 @@ class essential_estimator {
     return five_point(first, second);
   }
 
-  [[nodiscard]] double squared_error(const mat3& e, std::size_t i) const {
-    const image_match& m = matches_[i];
-    const vec3 first = m.first.direction(), second = m.second.direction();
-    const vec3 line = e * first, other = e.transpose() * second;
-    const double c = second.dot(line);
-    return c * c /
-           (pixel_gradient(m.second)(line.x(), line.y()).squaredNorm() +
-            pixel_gradient(m.first)(other.x(), other.y()).squaredNorm());
-  }
+  [[nodiscard]] double squared_error(const mat3& e, std::size_t i) const { return squared_sampson(e, matches_[i]); }
 
   void squared_errors(const mat3& e, std::size_t first, std::span<float, consensus_block> out) const {
     using V = simd::vec<float, 4, simd::portable>;
@@ -119,77 +102,28 @@ class essential_estimator {
   [[nodiscard]] std::optional<mat3> refine(const mat3& start, std::span<const std::uint32_t> inliers, int steps) const {
     if (inliers.size() < 6) return std::nullopt;
     const se3 pose = decompose_essential(start)[0];
-    const auto step = [](const motion& m, const equations& at) -> std::optional<motion> {
-      // How the entries of E = [t]x R (row by row) move with exp(phi) R and with t on the sphere.
-      matrix<9, 5> by_step;
-      const matrix<3, 2> basis = tangent_basis(m.direction);
-      for (int j = 0; j != 5; ++j) {
-        const mat3 d =
-            j < 3 ? mat3(hat<double>(m.direction) * hat<double>(vec3(vec3::Unit(j))) * m.rotation.rotation_matrix())
-                  : mat3(hat<double>(vec3(basis.col(j - 3))) * m.rotation.rotation_matrix());
-        for (int entry = 0; entry != 9; ++entry) by_step(entry, j) = d(entry / 3, entry % 3);
-      }
-      const matrix<9, 5> h_by_step = at.h.lazyProduct(by_step);
-      matrix<5, 5> a = by_step.transpose().lazyProduct(h_by_step);
+    const auto step = [](const epipolar_motion& m, const epipolar_equations& at) -> std::optional<epipolar_motion> {
+      auto [a, g] = at.by_motion(m);
       a.diagonal() *= 1.0 + 1e-9;
       a.diagonal().array() += 1e-12 * a.diagonal().maxCoeff();
       small_cholesky<5> factors;
       if (!factors.set(a) || !(factors.factor(0.0) > 0.0)) return std::nullopt;
-      const matrix<5> d = -factors.solve(matrix<5>(by_step.transpose().lazyProduct(at.g)));
+      const matrix<5> d = -factors.solve(g);
       if (!(d.norm() < 1.0)) return std::nullopt;
-      return motion(so3::exp(vec3(d.template head<3>())) * m.rotation,
-                    step_on_sphere(m.direction, d.template tail<2>()));
+      return m.moved(d);
     };
     const auto found = descend(
-        motion(pose.rotation(), pose.translation()), steps, [&](const motion& m) { return sum_up(m.e, inliers); },
-        step);
+        epipolar_motion(pose.rotation(), pose.translation()), steps,
+        [&](const epipolar_motion& m) { return sum_up(m.e, inliers); }, step);
     if (!found) return std::nullopt;
     return found->e;
   }
 
  private:
-  /// An essential matrix and the motion that it stands for.
-  struct motion {
-    so3 rotation;
-    vec3 direction;
-    mat3 e;
-    motion(const so3& r, const vec3& t) : rotation{r}, direction{t}, e{hat<double>(t) * r.rotation_matrix()} {}
-  };
-
-  /// Normal equations for the nine entries of E, row by row; `cost` is the sum of squares.
-  struct equations {
-    matrix<9, 9> h = matrix<9, 9>::Zero();
-    matrix<9> g = matrix<9>::Zero();
-    double cost = 0.0;
-  };
-  [[nodiscard]] equations sum_up(const mat3& e, std::span<const std::uint32_t> inliers) const {
-    equations sum;
-    for (const std::uint32_t i : inliers) {
-      const image_match& m = matches_[i];
-      const pixel_gradient by_first(m.first), by_second(m.second);
-      const vec3 first = m.first.direction(), second = m.second.direction();
-      const vec3 line = e * first, other = e.transpose() * second;
-      const double c = second.dot(line);
-      const vec2 p = by_second(line.x(), line.y()), q = by_first(other.x(), other.y());
-      const double inverse = 1.0 / std::sqrt(p.squaredNorm() + q.squaredNorm());
-      const double r = c * inverse;
-      // r = c / s: dr = (dc - r ds) / s, and s ds = p dp + q dq.
-      vec3 dp = vec3::Zero(), dq = vec3::Zero();
-      dp.template head<2>() = by_second.back(p) * (r * inverse);
-      dq.template head<2>() = by_first.back(q) * (r * inverse);
-      matrix<9> d;
-      for (int row = 0; row != 3; ++row)
-        for (int column = 0; column != 3; ++column)
-          d[3 * row + column] =
-              inverse * (second[row] * first[column] - dp[row] * first[column] - second[row] * dq[column]);
-      for (int a = 0; a != 9; ++a) {
-        for (int b = 0; b <= a; ++b) sum.h(a, b) += d[a] * d[b];
-        sum.g[a] += r * d[a];
-      }
-      sum.cost += r * r;
-    }
-    for (int a = 0; a != 9; ++a)
-      for (int b = a + 1; b != 9; ++b) sum.h(a, b) = sum.h(b, a);
+  [[nodiscard]] epipolar_equations sum_up(const mat3& e, std::span<const std::uint32_t> inliers) const {
+    epipolar_equations sum;
+    for (const std::uint32_t i : inliers) sum.add(e, matches_[i]);
+    sum.mirror();
     return sum;
   }
 

@@ -38,8 +38,10 @@ struct start_point {
 template <feature_descriptor D>
 struct monocular_start_result {
   basic_frame<D> first, second;
-  std::vector<start_point> points;  ///< by ascending keypoints of the first frame
-  double parallax = 0.0;            ///< median angle between the rays of a point, radians
+  std::vector<start_point> points;   ///< by ascending keypoints of the first frame
+  double parallax = 0.0;             ///< median angle between the rays of a point, radians
+  double rotation_deviation = 0.0;   ///< standard deviation of the rotation, radians ...
+  double direction_deviation = 0.0;  ///< ... and of the direction of the translation, radians
 };
 
 /// Waits for two frames that a map can begin with. Keeps a frame as the first, follows its keypoints from frame to
@@ -132,7 +134,8 @@ std::optional<monocular_start_result<D>> monocular_start<Camera, D>::see(const b
     why_ = std::move(found.error());
     return std::nullopt;
   }
-  monocular_start_result<D> start{*std::move(first_), f, {}, found->parallax};
+  monocular_start_result<D> start{*std::move(first_),        f, {}, found->parallax, found->rotation_deviation,
+                                  found->direction_deviation};
   start.first.T_world_camera = se3();
   start.second.T_world_camera = found->T_first_second;
   for (std::size_t i = 0; i != found->points.size(); ++i) {

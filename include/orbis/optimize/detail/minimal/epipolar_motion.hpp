@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// The motion between two views as epipolar geometry sees it, and normal equations of Sampson distances for it.
+#pragma once
+
+#include <cmath>
+
+#include <orbis/core/so3.hpp>
+#include <orbis/core/types.hpp>
+#include <orbis/optimize/detail/minimal/image_matches.hpp>
+#include <orbis/optimize/detail/minimal/unit_sphere.hpp>
+
+namespace orbis::optimize::detail {
+
+/// Turns gradients by the point at z = 1 into gradients by the pixel.
+struct pixel_gradient {
+  double xx, yx, yy;
+  explicit pixel_gradient(const metric_ray& r) : xx{1.0 / r.xx}, yx{-r.xy / (r.xx * r.yy)}, yy{1.0 / r.yy} {}
+  [[nodiscard]] vec2 operator()(double gx, double gy) const { return {xx * gx, yx * gx + yy * gy}; }
+  /// The transpose.
+  [[nodiscard]] vec2 back(const vec2& g) const { return {xx * g.x() + yx * g.y(), yy * g.y()}; }
+};
+
+/// An essential matrix and the motion that it stands for: rotation and direction of the translation of
+/// `T_second_first`.
+struct epipolar_motion {
+  so3 rotation;
+  vec3 direction;
+  mat3 e;
+  epipolar_motion(const so3& r, const vec3& t) : rotation{r}, direction{t}, e{hat<double>(t) * r.rotation_matrix()} {}
+  /// After a step: `exp(d.head<3>())` on the left of the rotation, the rest on the sphere of directions.
+  [[nodiscard]] epipolar_motion moved(const matrix<5>& d) const {
+    return {so3::exp(vec3(d.template head<3>())) * rotation, step_on_sphere(direction, vec2(d.template tail<2>()))};
+  }
+};
+
+/// The squared Sampson distance of a match in units of its metric.
+[[nodiscard]] inline double squared_sampson(const mat3& e, const image_match& m) {
+  const vec3 first = m.first.direction(), second = m.second.direction();
+  const vec3 line = e * first, other = e.transpose() * second;
+  const double c = second.dot(line);
+  return c * c /
+         (pixel_gradient(m.second)(line.x(), line.y()).squaredNorm() +
+          pixel_gradient(m.first)(other.x(), other.y()).squaredNorm());
+}
+
+/// Normal equations of Sampson distances for the nine entries of E, row by row; `cost` is the sum of squares.
+struct epipolar_equations {
+  matrix<9, 9> h = matrix<9, 9>::Zero();
+  matrix<9> g = matrix<9>::Zero();
+  double cost = 0.0;
+
+  /// Adds a match, to the lower triangle of `h`. `weight(squared distance)` is its weight.
+  template <class Weight>
+  void add(const mat3& e, const image_match& m, const Weight& weight) {
+    const pixel_gradient by_first(m.first), by_second(m.second);
+    const vec3 first = m.first.direction(), second = m.second.direction();
+    const vec3 line = e * first, other = e.transpose() * second;
+    const double c = second.dot(line);
+    const vec2 p = by_second(line.x(), line.y()), q = by_first(other.x(), other.y());
+    const double inverse = 1.0 / std::sqrt(p.squaredNorm() + q.squaredNorm());
+    const double r = c * inverse;
+    const double w = weight(r * r);
+    if (!(w > 0.0)) return;
+    // r = c / s: dr = (dc - r ds) / s, and s ds = p dp + q dq.
+    vec3 dp = vec3::Zero(), dq = vec3::Zero();
+    dp.template head<2>() = by_second.back(p) * (r * inverse);
+    dq.template head<2>() = by_first.back(q) * (r * inverse);
+    matrix<9> d;
+    for (int row = 0; row != 3; ++row)
+      for (int column = 0; column != 3; ++column)
+        d[3 * row + column] =
+            inverse * (second[row] * first[column] - dp[row] * first[column] - second[row] * dq[column]);
+    for (int a = 0; a != 9; ++a) {
+      const double weighted = w * d[a];
+      for (int b = 0; b <= a; ++b) h(a, b) += weighted * d[b];
+      g[a] += weighted * r;
+    }
+    cost += w * r * r;
+  }
+  void add(const mat3& e, const image_match& m) {
+    add(e, m, [](double) { return 1.0; });
+  }
+  /// Fills the upper triangle of `h`.
+  void mirror() {
+    for (int a = 0; a != 9; ++a)
+      for (int b = a + 1; b != 9; ++b) h(a, b) = h(b, a);
+  }
+
+  struct motion_equations {
+    matrix<5, 5> h;
+    matrix<5> g;
+  };
+  /// The equations for a step of the motion (`epipolar_motion::moved`). @pre mirrored
+  [[nodiscard]] motion_equations by_motion(const epipolar_motion& m) const {
+    // How the entries of E = [t]x R move with exp(phi) R and with t on the sphere.
+    matrix<9, 5> by_step;
+    const matrix<3, 2> basis = tangent_basis(m.direction);
+    for (int j = 0; j != 5; ++j) {
+      const mat3 d =
+          j < 3 ? mat3(hat<double>(m.direction) * hat<double>(vec3(vec3::Unit(j))) * m.rotation.rotation_matrix())
+                : mat3(hat<double>(vec3(basis.col(j - 3))) * m.rotation.rotation_matrix());
+      for (int entry = 0; entry != 9; ++entry) by_step(entry, j) = d(entry / 3, entry % 3);
+    }
+    const matrix<9, 5> h_by_step = h.lazyProduct(by_step);
+    return {by_step.transpose().lazyProduct(h_by_step), by_step.transpose().lazyProduct(g)};
+  }
+};
+
+}  // namespace orbis::optimize::detail

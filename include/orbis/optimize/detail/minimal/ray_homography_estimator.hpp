@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// The estimator of RANSAC for homographies between the rays of two cameras of any model, with errors in pixels.
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include <Eigen/LU>
+
+#include <orbis/core/types.hpp>
+#include <orbis/optimize/detail/minimal/descent.hpp>
+#include <orbis/optimize/detail/minimal/homography_estimator.hpp>
+#include <orbis/optimize/detail/minimal/image_matches.hpp>
+#include <orbis/optimize/detail/minimal/small_cholesky.hpp>
+
+namespace orbis::optimize::detail {
+
+/// The squared distance of a transferred ray from the one that was seen, in units of the metric; infinite behind the
+/// camera.
+[[nodiscard]] inline double squared_transfer(const vec3& p, const metric_ray& seen) {
+  if (!(p.z() > 0.0)) return std::numeric_limits<double>::infinity();
+  const double dx = p.x() / p.z() - seen.x, dy = p.y() / p.z() - seen.y;
+  const double u = seen.xx * dx + seen.xy * dy, v = seen.yy * dy;
+  return u * u + v * v;
+}
+
+class ray_homography_estimator {
+ public:
+  struct model {
+    mat3 forward, backward;  ///< both with positive z for rays that the homography transfers to the front
+  };
+  static constexpr std::size_t sample_size = 4;
+
+  explicit ray_homography_estimator(const std::vector<image_match>& matches) : matches_{matches} {}
+
+  [[nodiscard]] std::size_t size() const noexcept { return matches_.size(); }
+
+  struct candidates {
+    std::optional<model> found;
+    [[nodiscard]] const model* begin() const noexcept { return found ? &*found : nullptr; }
+    [[nodiscard]] const model* end() const noexcept { return found ? &*found + 1 : nullptr; }
+  };
+  [[nodiscard]] candidates fit(const std::array<std::uint32_t, 4>& s) const {
+    std::array<vec2, 4> first, second;
+    for (std::size_t i = 0; i != 4; ++i) {
+      const image_match& m = matches_[s[i]];
+      first[i] = {m.first.x, m.first.y};
+      second[i] = {m.second.x, m.second.y};
+    }
+    mat3 h;
+    if (!homography_of_four(first, second, h)) return {};
+    const std::optional<model> made = made_of(h, matches_[s[0]].first.direction());
+    return {made};
+  }
+
+  /// The mean of both transfers.
+  [[nodiscard]] double squared_error(const model& m, std::size_t i) const {
+    const image_match& x = matches_[i];
+    return 0.5 * (squared_transfer(m.forward * x.first.direction(), x.second) +
+                  squared_transfer(m.backward * x.second.direction(), x.first));
+  }
+
+  /// Gauss-Newton on the transfer errors in both images.
+  [[nodiscard]] std::optional<model> refine(const model& start, std::span<const std::uint32_t> inliers) const {
+    return refine(start, inliers, 4);
+  }
+  [[nodiscard]] std::optional<model> refine(const model& start, std::span<const std::uint32_t> inliers,
+                                            int steps) const {
+    if (inliers.empty()) return std::nullopt;
+    const vec3 in_front = matches_[inliers.front()].first.direction();
+    const auto step = [&](const model& m, const equations& e) -> std::optional<model> {
+      small_cholesky<8> factors;
+      if (!factors.set(e.h) || !(factors.factor(1e-9) > 0.0)) return std::nullopt;
+      const matrix<8> entries = -factors.solve(e.g);
+      if (!entries.allFinite()) return std::nullopt;
+      mat3 d = mat3::Identity();
+      for (int j = 0; j != 8; ++j) d(j / 3, j % 3) += entries[j];
+      return made_of(d * m.forward, in_front);
+    };
+    return descend(
+        start, steps, [&](const model& m) { return sum_up(m, inliers); }, step);
+  }
+
+ private:
+  /// Empty if singular.
+  [[nodiscard]] static std::optional<model> made_of(const mat3& h, const vec3& in_front) {
+    model m{h / h.norm(), h.inverse()};
+    if ((m.forward * in_front).z() < 0.0) m.forward = -m.forward;
+    m.backward /= m.backward.norm();
+    if ((m.backward * (m.forward * in_front)).z() < 0.0) m.backward = -m.backward;
+    if (!m.forward.allFinite() || !m.backward.allFinite()) return std::nullopt;
+    return m;
+  }
+
+  /// Normal equations for D in (I + D) H, whose last entry is 0; the lower triangle of `h`. `cost` is the sum of
+  /// squares.
+  struct equations {
+    matrix<8, 8> h = matrix<8, 8>::Zero();
+    matrix<8> g = matrix<8>::Zero();
+    double cost = 0.0;
+  };
+  [[nodiscard]] equations sum_up(const model& m, std::span<const std::uint32_t> inliers) const {
+    equations e;
+    for (const std::uint32_t i : inliers) {
+      const image_match& x = matches_[i];
+      const auto add = [&](const vec3& p, const metric_ray& seen, const mat3& by_d, const vec3& moved) {
+        // p moves by by_d * D * moved.
+        const double inverse = 1.0 / p.z();
+        const vec2 xy = p.template head<2>() * inverse;
+        matrix<2, 3> projection;
+        projection << inverse, 0.0, -xy.x() * inverse, 0.0, inverse, -xy.y() * inverse;
+        mat2 metric;
+        metric << seen.xx, seen.xy, 0.0, seen.yy;
+        const matrix<2, 3> a = metric * projection * by_d;
+        matrix<2, 8> j;
+        for (int k = 0; k != 8; ++k) j.col(k) = a.col(k / 3) * moved[k % 3];
+        const vec2 r = metric * vec2(xy.x() - seen.x, xy.y() - seen.y);
+        for (int k = 0; k != 8; ++k) {
+          for (int l = k; l != 8; ++l) e.h(l, k) += j(0, l) * j(0, k) + j(1, l) * j(1, k);
+          e.g[k] += j(0, k) * r[0] + j(1, k) * r[1];
+        }
+        e.cost += r.squaredNorm();
+      };
+      const vec3 p = m.forward * x.first.direction();
+      add(p, x.second, mat3::Identity(), p);
+      add(m.backward * x.second.direction(), x.first, -m.backward, x.second.direction());
+    }
+    return e;
+  }
+
+  const std::vector<image_match>& matches_;
+};
+
+}  // namespace orbis::optimize::detail

@@ -1,0 +1,173 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Motions between two views as hypotheses: how well each explains the matches, and which others do as well.
+///
+/// Distances are in units of the matches' metric, which is their standard deviation.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <numbers>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include <Eigen/LU>
+
+#include <orbis/core/se3.hpp>
+#include <orbis/core/so3.hpp>
+#include <orbis/core/types.hpp>
+#include <orbis/optimize/detail/minimal/epipolar_motion.hpp>
+#include <orbis/optimize/detail/minimal/essential_estimator.hpp>
+#include <orbis/optimize/detail/minimal/horn.hpp>
+#include <orbis/optimize/detail/minimal/image_matches.hpp>
+#include <orbis/optimize/detail/minimal/ray_homography_estimator.hpp>
+#include <orbis/optimize/detail/minimal/small_cholesky.hpp>
+
+namespace orbis::optimize::detail {
+
+/// Chi-squared, 95 %, for distances from a line and from a point.
+inline constexpr double line_gate = 3.841, point_gate = 5.991;
+
+[[nodiscard]] inline double square(double x) { return x * x; }
+
+/// The weight of Geman and McClure's loss, in units of its scale.
+[[nodiscard]] inline double falling_weight(double squared) {
+  const double w = 1.0 / (1.0 + squared);
+  return w * w;
+}
+
+/// The rotation of the camera that explains the most matches, by weights that fall with the distance, first slowly and
+/// then fast. The identity where there is none.
+[[nodiscard]] inline so3 prevailing_rotation(const std::vector<image_match>& matches) {
+  so3 rotation;
+  for (const double scale : {100.0, 50.0, 25.0, 12.0, 6.0, 4.0, 3.0, 3.0, 3.0}) {
+    mat3 products = mat3::Zero();
+    const mat3 r = rotation.rotation_matrix();
+    for (const image_match& m : matches) {
+      const vec3 from = m.first.direction();
+      const double weight = falling_weight(squared_transfer(r * from, m.second) / (scale * scale));
+      if (weight > 0.0) products += weight * from.normalized() * m.second.direction().normalized().transpose();
+    }
+    const auto turn = find_best_rotation(products, 1e-12);
+    if (!turn) break;
+    rotation = so3(turn->quaternion);
+  }
+  return rotation;
+}
+
+/// Sampson distances made small by Gauss-Newton with weights that fall with the distance, at one scale after the other.
+[[nodiscard]] inline std::optional<epipolar_motion> refined_motion(const std::vector<image_match>& matches,
+                                                                   epipolar_motion motion,
+                                                                   std::span<const double> scales,
+                                                                   std::size_t most = ~std::size_t{0}) {
+  for (const double scale : scales) {
+    epipolar_equations sum;
+    const double inverse = 1.0 / (scale * scale);
+    const std::size_t n = std::min(most, matches.size());
+    for (std::size_t i = 0; i != n; ++i)
+      sum.add(motion.e, matches[i], [&](double squared) { return falling_weight(squared * inverse); });
+    sum.mirror();
+    const auto [h, g] = sum.by_motion(motion);
+    small_cholesky<5> factors;
+    if (!factors.set(h) || !(factors.factor(1e-6) > 0.0)) return std::nullopt;
+    matrix<5> step = -factors.solve(g);
+    if (!step.allFinite()) return std::nullopt;
+    const double size = step.norm();
+    if (size > 0.3) step *= 0.3 / size;
+    motion = motion.moved(step);
+    if (size < 1e-5 && scale == scales.back()) break;
+  }
+  return motion;
+}
+
+/// How a match agrees with a motion.
+enum class agreement : std::uint8_t {
+  none,    ///< it does not
+  far,     ///< it does, at a distance that cannot be told from infinity
+  near,    ///< it does, in front of both cameras
+  behind,  ///< its rays are in one plane with the translation, but do not meet in front of both cameras
+};
+
+/// What supports a motion. `score`: sum over the matches that agree of the gate less the squared distance.
+struct motion_support {
+  double score = 0.0;
+  std::size_t far = 0, near = 0, behind = 0;
+  [[nodiscard]] std::size_t inliers() const noexcept { return far + near; }
+};
+
+/// Parallax, in deviations of its own, below which nothing tells a point from one at infinity.
+inline constexpr double least_disparity = 4.0;
+
+/// The squared distance between where a ray would be seen at infinity and where it is seen.
+[[nodiscard]] inline double squared_disparity(const mat3& rotation, const image_match& m) {
+  return squared_transfer(rotation * m.first.direction(), m.second);
+}
+
+[[nodiscard]] inline agreement agreement_of(const mat3& rotation, const vec3& t, const mat3& e, const image_match& m,
+                                            double& squared) {
+  squared = squared_sampson(e, m);
+  if (!(squared < 1.5 * line_gate)) return agreement::none;
+  if (squared_disparity(rotation, m) < least_disparity * least_disparity) return agreement::far;
+  // t + depth_1 u = depth_2 v.
+  const vec3 u = rotation * m.first.direction(), v = m.second.direction();
+  const vec3 normal = u.cross(v);
+  return v.cross(t).dot(normal) > 0.0 && u.cross(t).dot(normal) > 0.0 ? agreement::near : agreement::behind;
+}
+
+[[nodiscard]] inline motion_support support_of(const std::vector<image_match>& matches, const epipolar_motion& motion) {
+  motion_support sum;
+  const mat3 rotation = motion.rotation.rotation_matrix();
+  for (const image_match& m : matches) {
+    double squared = 0.0;
+    switch (agreement_of(rotation, motion.direction, motion.e, m, squared)) {
+      case agreement::none: continue;
+      case agreement::behind: ++sum.behind; continue;
+      case agreement::far: ++sum.far; break;
+      case agreement::near: ++sum.near; break;
+    }
+    sum.score += 1.5 * line_gate - squared;
+  }
+  return sum;
+}
+
+/// The scores of a homography and of an essential matrix: over both images, the gate of a point less the squared
+/// distance, where that passes the model's own gate.
+/// Source: R. Mur-Artal, J. M. M. Montiel, J. D. Tardos, "ORB-SLAM", T-RO 31 (2015), equations 1 and 2.
+struct model_scores {
+  double homography = 0.0, essential = 0.0;
+  [[nodiscard]] double ratio() const { return homography / std::max(1e-300, homography + essential); }
+};
+[[nodiscard]] inline model_scores scores_of(const std::vector<image_match>& matches, const mat3& forward,
+                                            const mat3& backward, const mat3& e) {
+  model_scores sum;
+  for (const image_match& m : matches) {
+    const vec3 first = m.first.direction(), second = m.second.direction();
+    for (const double d : {squared_transfer(forward * first, m.second), squared_transfer(backward * second, m.first)})
+      if (d < point_gate) sum.homography += point_gate - d;
+    const vec3 line = e * first, other = e.transpose() * second;
+    const double c = second.dot(line);
+    for (const double g : {pixel_gradient(m.second)(line.x(), line.y()).squaredNorm(),
+                           pixel_gradient(m.first)(other.x(), other.y()).squaredNorm()})
+      if (const double d = c * c / g; d < line_gate) sum.essential += point_gate - d;
+  }
+  return sum;
+}
+
+/// Directions that cover a hemisphere evenly (the Fibonacci lattice); the other one has the same essential matrices.
+template <std::size_t N>
+[[nodiscard]] std::array<vec3, N> hemisphere() {
+  std::array<vec3, N> out;
+  for (std::size_t i = 0; i != N; ++i) {
+    const double z = (static_cast<double>(i) + 0.5) / static_cast<double>(N), r = std::sqrt(1.0 - z * z);
+    const double turn = static_cast<double>(i) * std::numbers::pi * (3.0 - std::sqrt(5.0));
+    out[i] = {r * std::cos(turn), r * std::sin(turn), z};
+  }
+  return out;
+}
+
+}  // namespace orbis::optimize::detail
