@@ -219,7 +219,7 @@ struct owning {
 
 /// Makes its keyframes when their turn comes.
 struct made_anew {
-  const orbis::test::scene* scene;
+  const orbis::test::seen_scene* scene;
   std::size_t* alive;
   std::size_t* most;
 

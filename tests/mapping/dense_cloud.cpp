@@ -25,7 +25,7 @@ bool same(const dense_cloud& a, const dense_cloud& b) {
 }
 
 /// The scene with poses that have drifted, more and more.
-orbis::test::scene drifted(orbis::test::scene scene) {
+orbis::test::seen_scene drifted(orbis::test::seen_scene scene) {
   for (std::size_t i = 0; i != scene.poses.size(); ++i) {
     const double t = 0.01 * static_cast<double>(i);
     const orbis::vec6 xi = orbis::vec6{{t, -0.7 * t, 0.4 * t, 0.3 * t, 0.2 * t, -t}};

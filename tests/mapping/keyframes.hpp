@@ -15,7 +15,7 @@
 
 namespace orbis::test {
 
-struct scene {
+struct seen_scene {
   camera::pinhole camera;
   std::vector<image<std::uint16_t>> depth;
   std::vector<image<rgb8>> color;
@@ -33,8 +33,8 @@ struct scene {
 
 /// The wall z = 2 m, seen from different places near the origin; depth noise of 2 mm, some pixels
 /// without depth, and `wild` of a thousand anywhere before the wall.
-inline scene wall_scene(std::size_t frames, std::uint32_t wild = 0) {
-  scene out{camera::pinhole{{.width = 64, .height = 48, .fx = 55, .fy = 55, .cx = 31.5, .cy = 23.5}}, {}, {}, {}};
+inline seen_scene wall_scene(std::size_t frames, std::uint32_t wild = 0) {
+  seen_scene out{camera::pinhole{{.width = 64, .height = 48, .fx = 55, .fy = 55, .cx = 31.5, .cy = 23.5}}, {}, {}, {}};
   random_bits random{42};
   for (std::size_t f = 0; f != frames; ++f) {
     const vec3 rotation{0.03 * static_cast<double>(f), -0.05 * static_cast<double>(f), 0.02};
@@ -61,8 +61,8 @@ inline scene wall_scene(std::size_t frames, std::uint32_t wild = 0) {
 
 /// The wall with a board before it, and along the board's sides pixels that measure something between
 /// the two.
-inline scene edge_scene(std::size_t frames) {
-  scene out = wall_scene(frames);
+inline seen_scene edge_scene(std::size_t frames) {
+  seen_scene out = wall_scene(frames);
   for (auto& depth : out.depth) {
     for (int y = 8; y != 40; ++y) {
       for (int x = 20; x <= 44; ++x) depth(x, y) = x == 20 || x == 44 ? 1500 : 1000;

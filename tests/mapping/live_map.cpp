@@ -40,7 +40,7 @@ struct belief {
     se3 T_world_camera;
     int map = 0;
   };
-  test::scene scene = test::edge_scene(24);
+  test::seen_scene scene = test::edge_scene(24);
   std::map<std::uint64_t, keyframe> keyframes;
   int active = 0;
 

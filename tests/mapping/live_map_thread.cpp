@@ -38,18 +38,18 @@ using listeners = mapping::live_map_listeners<octree_type>;
 using snapshot = mapping::live_map_snapshot<octree_type>;
 using poses = std::vector<mapping::keyframe_position>;
 
-poses shifted(const test::scene& scene, std::size_t count, double x, double turn) {
+poses shifted(const test::seen_scene& scene, std::size_t count, double x, double turn) {
   poses all;
   for (std::size_t i = 0; i != count; ++i)
     all.push_back({i, se3{so3::exp(vec3{0, turn, 0}), vec3{x, 0, 0}} * scene.poses[i]});
   return all;
 }
-octree_type fresh(const test::scene& scene, const poses& at) {
+octree_type fresh(const test::seen_scene& scene, const poses& at) {
   octree_type map{0.05};
   for (const auto& [frame, T] : at) map.integrate(scene.keyframe(frame).depth, scene.camera, T);
   return map;
 }
-bool add(live& map, const test::scene& scene, std::size_t i) {
+bool add(live& map, const test::seen_scene& scene, std::size_t i) {
   return map.add_keyframe(i, scene.keyframe(i).depth, scene.poses[i]);
 }
 
