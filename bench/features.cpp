@@ -115,7 +115,7 @@ struct stages {
   }
   void detect(std::size_t i) { fast(pyramid[i], levels[i].area, {14, 3}, corners, levels[i].corners); }
 
-  features::detail::image_pyramid pyramid;
+  features::image_pyramid pyramid;
   features::fast9 fast;
   features::fast9::workspace corners;
   features::cover_first choose;

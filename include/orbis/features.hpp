@@ -7,6 +7,7 @@
 /// | `features/descriptor.hpp` | `keypoint`, `binary_descriptor`, `features` |
 /// | `features/extractor.hpp` | concepts of extractors and of their parts |
 /// | `features/orb.hpp` | `orb_extractor`: ORB features, spread evenly |
+/// | `features/pyramid.hpp` | `image_pyramid`: an image at several scales |
 /// | `features/grey.hpp` | grey images of colour and 16-bit images |
 /// | `features/hamming.hpp` | `hamming`, the distance of binary descriptors |
 /// | `features/match.hpp` | `match`, `candidate`, concepts of sources and stages |
@@ -41,6 +42,7 @@
 #include <orbis/features/orb.hpp>
 #include <orbis/features/project_points.hpp>
 #include <orbis/features/projected.hpp>
+#include <orbis/features/pyramid.hpp>
 #include <orbis/features/stages.hpp>
 #include <orbis/features/stereo.hpp>
 #include <orbis/features/windowed.hpp>

@@ -179,6 +179,32 @@ TEST_CASE("pairs without features, and features that lie nowhere, have no right 
   CHECK(std::isnan(match(some, blank, none, blank)[0]));
 }
 
+TEST_CASE("right coordinates found with the extractor's pyramids are those found with the images") {
+  const features::orb_extractor extract{{.max_features = 500, .levels = 5, .scale_factor = 1.3F}};
+  static_assert(features::pyramid_extractor<features::orb_extractor>);
+  const features::stereo_matcher match;
+  const stereo_pair pair = seen(1.0);
+  features::image_pyramid left_pyramid, right_pyramid;
+  features::features left, right;
+  extract.into(left, left_pyramid, pair.left);
+  extract.into(right, right_pyramid, pair.right);
+  CHECK(left_pyramid.size() == 5);
+  const auto alone = extract(pair.left);
+  CHECK(left.keypoints == alone.keypoints);
+  CHECK(left.descriptors == alone.descriptors);
+  std::vector<float> columns;
+  match.into(columns, left, left_pyramid, right, right_pyramid, {.max_disparity = 200.0F});
+  const auto expected =
+      match(left, pair.left, right, pair.right, {.levels = 5, .scale_factor = 1.3F, .max_disparity = 200.0F});
+  REQUIRE(columns.size() == expected.size());
+  std::size_t found = 0;
+  for (std::size_t i = 0; i != columns.size(); ++i) {
+    CHECK((columns[i] == expected[i] || (std::isnan(columns[i]) && std::isnan(expected[i]))));
+    found += !std::isnan(columns[i]);
+  }
+  CHECK(found > 200);
+}
+
 TEST_CASE("matching another pair of the same size allocates nothing") {
   const features::orb_extractor extract;
   const features::stereo_matcher match;

@@ -5,6 +5,7 @@
 /// | concept | what it does | ours |
 /// | --- | --- | --- |
 /// | `feature_extractor` | finds and describes the keypoints of an image | `orb_extractor` |
+/// | `pyramid_extractor` | hands out the image pyramid as well | `orb_extractor` |
 /// | `corner_detector` | finds the corners of a pyramid level | `fast9` |
 /// | `corner_selection` | chooses among the corners of all levels | `cover_first`, `strongest` |
 /// | `orientation_estimator` | gives a keypoint its direction | `intensity_centroid`, `upright` |
@@ -14,6 +15,7 @@
 #include <concepts>
 #include <cstdint>
 #include <span>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -21,6 +23,8 @@
 #include <orbis/features/descriptor.hpp>
 
 namespace orbis::features {
+
+class image_pyramid;
 
 namespace detail {
 template <class T>
@@ -34,6 +38,15 @@ inline constexpr bool is_features<basic_features<D>> = true;
 template <class E>
 concept feature_extractor = requires(const E& extract, image_view<const rgb8> image) {
   requires detail::is_features<decltype(extract(image))>;
+};
+
+/// An extractor that takes grey images and leaves the pyramid that it makes of an image to its caller, who needs not
+/// make it again: `extract.into(found, pyramid, image)`. The octave of a keypoint is its level there.
+template <class E>
+concept pyramid_extractor = feature_extractor<E> &&
+    requires(const E& extract, std::remove_cvref_t<decltype(extract(std::declval<image_view<const rgb8>>()))>& found,
+             image_pyramid& pyramid, image_view<const std::uint8_t> image) {
+  extract.into(found, pyramid, image);
 };
 
 /// The type of the descriptors that an extractor makes.

@@ -21,11 +21,11 @@
 #include <orbis/features/detail/extract/fast.hpp>
 #include <orbis/features/detail/extract/kept_memory.hpp>
 #include <orbis/features/detail/extract/orientation.hpp>
-#include <orbis/features/detail/extract/pyramid.hpp>
 #include <orbis/features/detail/extract/spread.hpp>
 #include <orbis/features/detail/extract/steered_brief.hpp>
 #include <orbis/features/extractor.hpp>
 #include <orbis/features/grey.hpp>
+#include <orbis/features/pyramid.hpp>
 
 namespace orbis::features {
 
@@ -102,7 +102,14 @@ class basic_orb_extractor {
   void into(features_type& found, image_view<const std::uint8_t> image, image_view<const std::uint8_t> mask = {},
             std::span<const region> regions = {}) const {
     auto memory = kept_.take();
-    extract(found, *memory, image, mask, regions);
+    extract(found, *memory, memory->pyramid, image, mask, regions);
+    kept_.give(std::move(memory));
+  }
+  /// As above, with the image's pyramid left in `pyramid` for others to use: a keypoint's octave is its level there.
+  void into(features_type& found, image_pyramid& pyramid, image_view<const std::uint8_t> image,
+            image_view<const std::uint8_t> mask = {}, std::span<const region> regions = {}) const {
+    auto memory = kept_.take();
+    extract(found, *memory, pyramid, image, mask, regions);
     kept_.give(std::move(memory));
   }
   void into(features_type& found, image_view<const rgb8> image, image_view<const std::uint8_t> mask = {},
@@ -112,31 +119,31 @@ class basic_orb_extractor {
     if (memory->grey.size() < pixels) memory->grey.resize(pixels);
     const image_view<std::uint8_t> grey{memory->grey.data(), image.width(), image.height()};
     luma(image, grey);
-    extract(found, *memory, grey, mask, regions);
+    extract(found, *memory, memory->pyramid, grey, mask, regions);
     kept_.give(std::move(memory));
   }
 
  private:
   struct workspace {
     std::vector<std::uint8_t> grey;
-    detail::image_pyramid pyramid;
+    image_pyramid pyramid;
     std::vector<level_corners> levels;
     typename Detector::workspace detector;
     typename Distribution::workspace distribution;
     typename Descriptor::workspace descriptor;
   };
 
-  void extract(features_type& found, workspace& memory, image_view<const std::uint8_t> image,
+  void extract(features_type& found, workspace& memory, image_pyramid& pyramid, image_view<const std::uint8_t> image,
                image_view<const std::uint8_t> mask, std::span<const region> regions) const {
     assert(mask.empty() || (mask.width() == image.width() && mask.height() == image.height()));
     found.keypoints.clear();
     found.descriptors.clear();
-    if (image.empty() || options_.max_features == 0) return;
-    memory.pyramid.build(image, options_.levels, static_cast<double>(options_.scale_factor), 2 * border + 1);
-    const std::size_t levels = memory.pyramid.size();
+    pyramid.build(image, options_.levels, static_cast<double>(options_.scale_factor), 2 * border + 1);
+    const std::size_t levels = pyramid.size();
+    if (levels == 0 || options_.max_features == 0) return;
     if (memory.levels.size() < levels) memory.levels.resize(levels);
     for (std::size_t level = 0; level != levels; ++level) {
-      const image_view<const std::uint8_t> pixels = memory.pyramid[level];
+      const image_view<const std::uint8_t> pixels = pyramid[level];
       level_corners& on = memory.levels[level];
       on.area = area_of(pixels, image, regions);
       on.scale = static_cast<double>(image.width()) / pixels.width();
@@ -144,7 +151,8 @@ class basic_orb_extractor {
       drop_unwanted(on.corners, pixels, image, mask, regions);
     }
     choose_(std::span{memory.levels}.first(levels), options_.max_features, memory.distribution);
-    for (std::size_t level = 0; level != levels; ++level) describe(found, memory, static_cast<int>(level), image);
+    for (std::size_t level = 0; level != levels; ++level)
+      describe(found, memory, pyramid[level], static_cast<int>(level), image);
   }
 
   /// The part of a level in which keypoints can lie: what surrounds all regions, without the border.
@@ -161,9 +169,7 @@ class basic_orb_extractor {
           last = std::max(last, static_cast<double>(r.*from) + r.*size - 1.0);
         }
       }
-      const auto to_level = [&](double at) {
-        return detail::image_pyramid::full_coordinate(at, full_size, level_size);
-      };
+      const auto to_level = [&](double at) { return image_pyramid::full_coordinate(at, full_size, level_size); };
       // Half a pixel more on both sides, because the position of a keypoint is rounded to a pixel.
       const double begin = std::clamp(std::floor(to_level(first - 0.5)), static_cast<double>(border), 1e9);
       const double end =
@@ -180,8 +186,8 @@ class basic_orb_extractor {
                             std::span<const region> regions) {
     if (mask.empty() && regions.empty()) return;
     const auto pixel = [](int at, float within, int level_size, int full_size) {
-      return std::clamp(static_cast<int>(std::lround(detail::image_pyramid::full_coordinate(
-                            at + static_cast<double>(within), level_size, full_size))),
+      return std::clamp(static_cast<int>(std::lround(
+                            image_pyramid::full_coordinate(at + static_cast<double>(within), level_size, full_size))),
                         0, full_size - 1);
     };
     std::erase_if(corners, [&](const corner& c) {
@@ -194,19 +200,19 @@ class basic_orb_extractor {
   }
 
   /// Appends the chosen corners of a level with orientation and descriptor.
-  void describe(features_type& found, workspace& memory, int octave, image_view<const std::uint8_t> image) const {
+  void describe(features_type& found, workspace& memory, image_view<const std::uint8_t> level, int octave,
+                image_view<const std::uint8_t> image) const {
     const std::vector<corner>& corners = memory.levels[static_cast<std::size_t>(octave)].corners;
     if (corners.empty()) return;
-    const image_view<const std::uint8_t> level = memory.pyramid[static_cast<std::size_t>(octave)];
     describe_.prepare(level, corners.front().y, corners.back().y + 1, memory.descriptor);
     const float size = static_cast<float>(Descriptor::diameter) * static_cast<float>(image.width()) /
                        static_cast<float>(level.width());
     for (const corner& c : corners) {
       const orientation o = orient_(level, c.x, c.y);
       found.descriptors.push_back(describe_(memory.descriptor, c.x, c.y, o));
-      found.keypoints.push_back({.x = static_cast<float>(detail::image_pyramid::full_coordinate(
-                                     c.x + static_cast<double>(c.dx), level.width(), image.width())),
-                                 .y = static_cast<float>(detail::image_pyramid::full_coordinate(
+      found.keypoints.push_back({.x = static_cast<float>(image_pyramid::full_coordinate(c.x + static_cast<double>(c.dx),
+                                                                                        level.width(), image.width())),
+                                 .y = static_cast<float>(image_pyramid::full_coordinate(
                                      c.y + static_cast<double>(c.dy), level.height(), image.height())),
                                  .size = size,
                                  .angle = o.angle,

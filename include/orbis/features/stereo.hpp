@@ -24,18 +24,18 @@
 #include <orbis/core/image.hpp>
 #include <orbis/features/descriptor.hpp>
 #include <orbis/features/detail/extract/kept_memory.hpp>
-#include <orbis/features/detail/extract/pyramid.hpp>
 #include <orbis/features/detail/match/search_among.hpp>
 #include <orbis/features/detail/match/slide_differences.hpp>
 #include <orbis/features/hamming.hpp>
 #include <orbis/features/match.hpp>
+#include <orbis/features/pyramid.hpp>
 
 namespace orbis::features {
 
 /// How `stereo_matcher` looks for the right coordinates. "Pixels of a level": of the keypoint's level of the pyramid.
 struct stereo_options {
-  int levels = 8;               ///< of the extractor's image pyramid
-  float scale_factor = 1.2F;    ///< between two of its levels
+  int levels = 8;               ///< of the extractor's image pyramid; not used where the pyramids are given
+  float scale_factor = 1.2F;    ///< between two of its levels; likewise
   float min_disparity = 0.0F;   ///< left less right coordinate, pixels; what is found has to be larger
   float max_disparity = 1e9F;   ///< likewise, at most
   float rows = 2.0F;            ///< between the rows of both keypoints, pixels of a level, at most
@@ -83,32 +83,23 @@ class stereo_matcher {
             const basic_features<D>& right, image_view<const std::uint8_t> right_image,
             const stereo_options& options = {}) const {
     assert(options.levels >= 1 && options.scale_factor > 1.0F);
-    assert(options.radius >= 0 && options.radius <= largest && options.slide >= 1 && options.slide <= largest);
     assert(left_image.width() == right_image.width() && left_image.height() == right_image.height());
-    columns.assign(left.size(), std::numeric_limits<float>::quiet_NaN());
-    if (left.empty() || right.empty() || left_image.empty()) return;
     auto kept = kept_.take();
-    workspace& memory = *kept;
-    memory.left.build(left_image, options.levels, static_cast<double>(options.scale_factor), 1);
-    memory.right.build(right_image, options.levels, static_cast<double>(options.scale_factor), 1);
-    scales_of(memory);
-    sort_by_row(memory, right.keypoints, left_image.height());
-    const auto list = [&](std::size_t q, auto&& add) {
-      list_band(options, memory, left.keypoints[q], right.keypoints, add);
-    };
-    detail::search_among(distance_, memory.candidates, memory.search, feature_view<D>{left.keypoints, left.descriptors},
-                         feature_view<D>{right.keypoints, right.descriptors}, {}, list);
-    memory.found.clear();
-    for (const candidate& c : memory.candidates) {
-      if (c.distance > options.distance) continue;
-      const placed at = place(options, memory, left.keypoints[c.query], right.keypoints[c.train]);
-      if (!(at.column <= left.keypoints[c.query].x - options.min_disparity) ||
-          !(at.column >= left.keypoints[c.query].x - options.max_disparity))
-        continue;
-      memory.found.push_back({c.query, at.column, at.difference});
-    }
-    keep_alike(options, memory);
-    for (const match_found& m : memory.found) columns[m.query] = m.column;
+    kept->left.build(left_image, options.levels, static_cast<double>(options.scale_factor), 1);
+    kept->right.build(right_image, options.levels, static_cast<double>(options.scale_factor), 1);
+    find(*kept, columns, left, kept->left, right, kept->right, options);
+    kept_.give(std::move(kept));
+  }
+
+  /// As above, with the pyramids of both images that an extractor has made (`pyramid_extractor`). O(features x features
+  /// in a band of rows). @pre both pyramids are of images of the same size, and made alike
+  template <feature_descriptor D>
+  requires descriptor_distance<Distance, D>
+  void into(std::vector<float>& columns, const basic_features<D>& left, const image_pyramid& left_pyramid,
+            const basic_features<D>& right, const image_pyramid& right_pyramid,
+            const stereo_options& options = {}) const {
+    auto kept = kept_.take();
+    find(*kept, columns, left, left_pyramid, right, right_pyramid, options);
     kept_.give(std::move(kept));
   }
 
@@ -124,21 +115,56 @@ class stereo_matcher {
     float column = std::numeric_limits<float>::quiet_NaN();
     float difference = 0.0F;
   };
+  /// A right keypoint, in the order of rows.
+  struct right_place {
+    float x, y;
+    std::int32_t octave;
+    std::uint32_t index;
+  };
   struct workspace {
-    detail::image_pyramid left, right;
-    std::vector<double> scales;                     ///< pixels of the image per pixel of a level
-    std::vector<std::uint32_t> first_in_row, rows;  ///< right keypoints by row
+    image_pyramid left, right;                ///< where none are given
+    std::vector<double> scales;               ///< pixels of the image per pixel of a level
+    std::vector<std::uint32_t> first_in_row;  ///< of `rows`
+    std::vector<right_place> rows;            ///< right keypoints by row
     detail::search_among_workspace search;
     std::vector<candidate> candidates;
     std::vector<match_found> found;
     std::vector<float> differences;
-    detail::sliding_square sliding{};
   };
 
-  static void scales_of(workspace& memory) {
+  template <feature_descriptor D>
+  void find(workspace& memory, std::vector<float>& columns, const basic_features<D>& left,
+            const image_pyramid& left_pyramid, const basic_features<D>& right, const image_pyramid& right_pyramid,
+            const stereo_options& options) const {
+    assert(options.radius >= 0 && options.radius <= largest && options.slide >= 1 && options.slide <= largest);
+    assert(left_pyramid.size() == right_pyramid.size());
+    columns.assign(left.size(), std::numeric_limits<float>::quiet_NaN());
+    if (left.empty() || right.empty() || left_pyramid.empty()) return;
+    const int height = left_pyramid[0].height();
+    scales_of(memory, left_pyramid);
+    sort_by_row(memory, right.keypoints, height);
+    const auto list = [&](std::size_t q, auto&& add) { list_band(options, memory, height, left.keypoints[q], add); };
+    detail::search_among(distance_, memory.candidates, memory.search, feature_view<D>{left.keypoints, left.descriptors},
+                         feature_view<D>{right.keypoints, right.descriptors}, {}, list);
+    memory.found.clear();
+    for (const candidate& c : memory.candidates) {
+      if (c.distance > options.distance) continue;
+      const auto octave = static_cast<std::size_t>(left.keypoints[c.query].octave);
+      const placed at = place(options, left_pyramid[octave], left_pyramid[0], left.keypoints[c.query],
+                              right_pyramid[octave], right.keypoints[c.train], memory.scales[octave]);
+      if (!(at.column <= left.keypoints[c.query].x - options.min_disparity) ||
+          !(at.column >= left.keypoints[c.query].x - options.max_disparity))
+        continue;
+      memory.found.push_back({c.query, at.column, at.difference});
+    }
+    keep_alike(options, memory);
+    for (const match_found& m : memory.found) columns[m.query] = m.column;
+  }
+
+  static void scales_of(workspace& memory, const image_pyramid& pyramid) {
     memory.scales.clear();
-    for (std::size_t level = 0; level != memory.left.size(); ++level)
-      memory.scales.push_back(static_cast<double>(memory.left[0].width()) / memory.left[level].width());
+    for (std::size_t level = 0; level != pyramid.size(); ++level)
+      memory.scales.push_back(static_cast<double>(pyramid[0].width()) / pyramid[level].width());
   }
   [[nodiscard]] static int row_of(float y, int height) noexcept {  // rows outside of the image are those of its edge
     return static_cast<int>(std::clamp(std::floor(y + 0.5F), 0.0F, static_cast<float>(height - 1)));
@@ -146,58 +172,56 @@ class stereo_matcher {
 
   /// Counting sort, as `keypoint_grid` does it.
   static void sort_by_row(workspace& memory, std::span<const keypoint> right, int height) {
-    std::vector<std::uint32_t>&first = memory.first_in_row, &rows = memory.rows;
+    std::vector<std::uint32_t>& first = memory.first_in_row;
     first.assign(static_cast<std::size_t>(height) + 1, 0);
     for (const keypoint& k : right) ++first[static_cast<std::size_t>(row_of(k.y, height))];
     for (std::size_t row = 1; row != first.size(); ++row) first[row] += first[row - 1];
-    rows.resize(right.size());
+    memory.rows.resize(right.size());
     for (std::size_t i = right.size(); i-- != 0;)
-      rows[--first[static_cast<std::size_t>(row_of(right[i].y, height))]] = static_cast<std::uint32_t>(i);
+      memory.rows[--first[static_cast<std::size_t>(row_of(right[i].y, height))]] = {
+          right[i].x, right[i].y, right[i].octave, static_cast<std::uint32_t>(i)};
   }
 
   /// The right keypoints that a left one is compared with.
   template <class Add>
-  static void list_band(const stereo_options& options, const workspace& memory, const keypoint& k,
-                        std::span<const keypoint> right, Add&& add) {
-    const int height = memory.left[0].height();
+  static void list_band(const stereo_options& options, const workspace& memory, int height, const keypoint& k,
+                        Add&& add) {
     if (k.octave < 0 || static_cast<std::size_t>(k.octave) >= memory.scales.size() || !std::isfinite(k.x + k.y)) return;
     const auto scale_of = [&](int octave) {
       return static_cast<float>(memory.scales[std::min(static_cast<std::size_t>(octave), memory.scales.size() - 1)]);
     };
     const float widest = options.rows * scale_of(k.octave + options.octaves) + 0.5F;
     const int from = row_of(k.y - widest, height), to = row_of(k.y + widest, height);
-    const std::uint32_t end = memory.first_in_row[static_cast<std::size_t>(to) + 1];
-    for (std::uint32_t at = memory.first_in_row[static_cast<std::size_t>(from)]; at != end; ++at) {
-      const std::uint32_t t = memory.rows[at];
-      const keypoint& r = right[t];
-      const float slack = static_cast<float>(options.slide) * scale_of(k.octave);
-      if (std::abs(r.octave - k.octave) <= options.octaves &&
-          std::abs(r.y - k.y) <= options.rows * scale_of(std::max(r.octave, k.octave)) &&
-          r.x <= k.x - options.min_disparity + slack && r.x >= k.x - options.max_disparity - slack)
-        add(t);
-    }
+    const float slack = static_cast<float>(options.slide) * scale_of(k.octave);
+    const float least = k.x - options.max_disparity - slack, most = k.x - options.min_disparity + slack;
+    const right_place* const first = memory.rows.data() + memory.first_in_row[static_cast<std::size_t>(from)];
+    const right_place* const end = memory.rows.data() + memory.first_in_row[static_cast<std::size_t>(to) + 1];
+    for (const right_place* r = first; r != end; ++r)
+      if (r->x >= least && r->x <= most && std::abs(r->octave - k.octave) <= options.octaves &&
+          std::abs(r->y - k.y) <= options.rows * scale_of(std::max(r->octave, k.octave)))
+        add(r->index);
   }
 
-  /// Where the right image shows the square around the left keypoint.
-  [[nodiscard]] static placed place(const stereo_options& options, workspace& memory, const keypoint& left,
-                                    const keypoint& right) {
-    const auto level = static_cast<std::size_t>(left.octave);
-    const image_view<const std::uint8_t> a = memory.left[level], b = memory.right[level];
-    const double scale = memory.scales[level];
-    const auto to_level = [&](float at, int full, int size) {
-      return static_cast<int>(std::lround(detail::image_pyramid::full_coordinate(static_cast<double>(at), full, size)));
+  /// Where the right image shows the square around the left keypoint: levels `a` and `b` of both images, `scale` pixels
+  /// of the `full` image per pixel of these.
+  [[nodiscard]] static placed place(const stereo_options& options, image_view<const std::uint8_t> a,
+                                    image_view<const std::uint8_t> full, const keypoint& left,
+                                    image_view<const std::uint8_t> b, const keypoint& right, double scale) {
+    const auto to_level = [](float at, int full_size, int size) {
+      return static_cast<int>(std::lround(image_pyramid::full_coordinate(static_cast<double>(at), full_size, size)));
     };
-    const int full_width = memory.left[0].width(), full_height = memory.left[0].height();
-    const int x = to_level(left.x, full_width, a.width()), y = to_level(left.y, full_height, a.height());
-    const int around = to_level(right.x, full_width, b.width());
+    const int x = to_level(left.x, full.width(), a.width()), y = to_level(left.y, full.height(), a.height());
+    const int around = to_level(right.x, full.width(), b.width());
     const int r = options.radius;
     if (x < r || y < r || x + r >= a.width() || y + r >= a.height()) return {};
     const int first = std::max(around - options.slide, r), last = std::min(around + options.slide, b.width() - 1 - r);
     if (last - first < 2) return {};
     const int shifts = last - first + 1;
-    fill(memory.sliding, a, x, b, first, y, r, shifts);
+    const detail::sliding_square sliding{.side = 2 * r + 1,
+                                         .square = {&a(x - r, y - r), a.stride(), a.width() - (x - r)},
+                                         .strip = {&b(first - r, y - r), b.stride(), b.width() - (first - r)}};
     alignas(64) std::array<std::int32_t, detail::sliding_square::max_shifts> sums;
-    detail::slide_differences(memory.sliding, shifts, sums.data());
+    detail::slide_differences(sliding, shifts, sums.data());
     const auto least = std::min_element(sums.begin(), sums.begin() + shifts);
     const int best = first + static_cast<int>(least - sums.begin());
     if (best == first || best == last) return {};  // the least may lie outside
@@ -207,23 +231,6 @@ class stereo_matcher {
     const double disparity = (static_cast<double>(x - best) - within) * scale;
     return {static_cast<float>(static_cast<double>(left.x) - disparity),
             static_cast<float>(sum(best)) / static_cast<float>(4 * (2 * r + 1) * (2 * r + 1))};
-  }
-
-  /// The square around (x, y) of `a`, and the strip of `b` that its squares around `first` and the columns after that
-  /// are in.
-  static void fill(detail::sliding_square& to, image_view<const std::uint8_t> a, int x,
-                   image_view<const std::uint8_t> b, int first, int y, int r, int shifts) noexcept {
-    const int side = 2 * r + 1, used = side - 1 + (shifts + 15) / 16 * 16;
-    to.side = side;
-    for (int v = 0; v != side; ++v) {
-      const std::uint8_t *p = &a(x - r, y - r + v), *q = &b(first - r, y - r + v);
-      const int there = std::min(used, b.width() - (first - r));  // what lies beyond belongs to no shift
-      std::int16_t* const square = to.square.data() + v * side;
-      std::int16_t* const strip = to.strip.data() + v * detail::sliding_square::stride;
-      for (int u = 0; u != side; ++u) square[u] = static_cast<std::int16_t>(4 * p[u]);
-      for (int u = 0; u != there; ++u) strip[u] = static_cast<std::int16_t>(4 * q[u]);
-      for (int u = there; u < used; ++u) strip[u] = 0;
-    }
   }
 
   /// Drops the matches whose difference is far above the median.

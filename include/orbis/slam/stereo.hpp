@@ -14,7 +14,9 @@
 
 #include <orbis/camera/model.hpp>
 #include <orbis/core/image.hpp>
+#include <orbis/features/extractor.hpp>
 #include <orbis/features/grey.hpp>
+#include <orbis/features/pyramid.hpp>
 #include <orbis/features/stereo.hpp>
 #include <orbis/slam/camera_rig.hpp>
 #include <orbis/slam/extractor.hpp>
@@ -28,7 +30,8 @@ namespace orbis::slam {
 /// grey. A feature of the left image has the right coordinate that `features::stereo_matcher` finds for it, or none;
 /// its depth is `options::bf` over the disparity, where that lies within the rig's range. Features without a right
 /// coordinate are observed by their pixel alone and become landmarks once other keyframes see them under enough
-/// parallax. The first frame with enough depth begins a map. It keeps working memory: one call at a time.
+/// parallax. The first frame with enough depth begins a map. It keeps working memory: one call at a time, and no
+/// copies.
 class stereo {
  public:
   static constexpr scale_source scale = scale_source::sensor;
@@ -38,25 +41,31 @@ class stereo {
   [[nodiscard]] basic_frame<descriptor_of_t<Extractor>> measure(const camera_rig<Camera>& rig, const Extractor& extract,
                                                                 image_view<const rgb8> left,
                                                                 image_view<const rgb8> right) const {
-    const auto grey = [](image_view<const rgb8> color, image<std::uint8_t>& to) {
+    const auto grey_of = [](image_view<const rgb8> color, image<std::uint8_t>& to) {
       if (to.width() != color.width() || to.height() != color.height())
         to = image<std::uint8_t>(color.width(), color.height());
       features::luma(color, to.view());
+      return std::as_const(to).view();
     };
-    grey(left, grey_left_);
-    grey(right, grey_right_);
-    if constexpr (takes_grey<Extractor>)
-      return measure(rig, extract, std::as_const(grey_left_).view(), std::as_const(grey_right_).view());
+    const auto grey_left = grey_of(left, memory_.grey_left), grey_right = grey_of(right, memory_.grey_right);
+    if constexpr (std::invocable<const Extractor&, image_view<const std::uint8_t>>)
+      return measure(rig, extract, grey_left, grey_right);
     else
-      return frame_of(rig, extract(left), std::as_const(grey_left_).view(), extract(right),
-                      std::as_const(grey_right_).view());
+      return match(rig, extract(left), grey_left, extract(right), grey_right);
   }
   template <camera::camera_model Camera, feature_extractor Extractor>
   requires std::invocable<const Extractor&, image_view<const std::uint8_t>>
   [[nodiscard]] basic_frame<descriptor_of_t<Extractor>> measure(const camera_rig<Camera>& rig, const Extractor& extract,
                                                                 image_view<const std::uint8_t> left,
                                                                 image_view<const std::uint8_t> right) const {
-    return frame_of(rig, extract(left), left, extract(right), right);
+    if constexpr (features::pyramid_extractor<Extractor>) {
+      decltype(extract(left)) left_features, right_features;
+      extract.into(left_features, memory_.pyramid_left, left);
+      extract.into(right_features, memory_.pyramid_right, right);
+      return match(rig, std::move(left_features), memory_.pyramid_left, right_features, memory_.pyramid_right);
+    } else {
+      return match(rig, extract(left), left, extract(right), right);
+    }
   }
 
   /// The number of features with depth, if there are `settings.min_start_points` or more, otherwise 0.
@@ -66,31 +75,34 @@ class stereo {
   }
 
  private:
-  template <class Extractor>
-  static constexpr bool takes_grey = std::invocable<const Extractor&, image_view<const std::uint8_t>>;
+  struct workspace {
+    image<std::uint8_t> grey_left, grey_right;
+    features::image_pyramid pyramid_left, pyramid_right;
+    std::vector<float> columns;
+  };
 
-  template <camera::camera_model Camera, feature_descriptor D>
-  [[nodiscard]] basic_frame<D> frame_of(const camera_rig<Camera>& rig, features::basic_features<D> left,
-                                        image_view<const std::uint8_t> left_image,
-                                        const features::basic_features<D>& right,
-                                        image_view<const std::uint8_t> right_image) const {
+  /// A frame of the left features. `Pixels`: the images, or the pyramids that the extractor has made of them.
+  template <camera::camera_model Camera, feature_descriptor D, class Pixels>
+  [[nodiscard]] basic_frame<D> match(const camera_rig<Camera>& rig, features::basic_features<D> left,
+                                     const Pixels& left_pixels, const features::basic_features<D>& right,
+                                     const Pixels& right_pixels) const {
     auto f = detail::frame_of(rig, std::move(left), sensor_kind::stereo);
     const double bf = rig.model.bf;
-    match_.into(columns_, f.features, left_image, right, right_image,
+    const std::vector<float>& columns = memory_.columns;
+    match_.into(memory_.columns, f.features, left_pixels, right, right_pixels,
                 {.levels = rig.scales.levels(),
                  .scale_factor = static_cast<float>(rig.scales.factor()),
                  .min_disparity = static_cast<float>(bf / rig.max_depth),
                  .max_disparity = static_cast<float>(bf / rig.min_depth)});
     for (std::size_t i = 0; i != f.size(); ++i)
-      if (!std::isnan(columns_[i]) && !std::isnan(f.rays[i].x()))
-        f.depth[i] = static_cast<float>(
-            bf / (static_cast<double>(f.features.keypoints[i].x) - static_cast<double>(columns_[i])));
+      if (!std::isnan(columns[i]) && !std::isnan(f.rays[i].x()))
+        f.depth[i] =
+            static_cast<float>(bf / (static_cast<double>(f.features.keypoints[i].x) - static_cast<double>(columns[i])));
     return f;
   }
 
   features::stereo_matcher<> match_;
-  mutable image<std::uint8_t> grey_left_, grey_right_;
-  mutable std::vector<float> columns_;
+  mutable workspace memory_;
 };
 
 /// The settings of a rectified stereo camera of focal length `focal` (pixels) and `baseline` (metres), on top of

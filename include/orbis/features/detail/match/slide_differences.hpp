@@ -3,6 +3,7 @@
 /// How unlike a square of pixels is to those that a strip shows at each shift.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -13,57 +14,89 @@
 
 namespace orbis::features::detail {
 
-/// A square of `side` x `side` pixels, and the strip of as many rows along which it slides. All pixels are four times
-/// their value.
+/// Rows of pixels in an image.
+struct pixel_rows {
+  const std::uint8_t* first = nullptr;
+  std::ptrdiff_t stride = 0;  ///< from row to row
+  int readable = 0;           ///< pixels of each row, what lies behind those that are asked for included
+};
+
+/// A square of `side` x `side` pixels, and the strip of as many rows along which it slides.
 struct sliding_square {
   static constexpr int max_side = 31, max_shifts = 32;
-  static constexpr int stride = 64;  ///< of the strip: `max_side` + `max_shifts`, rounded up
 
   int side = 0;
-  alignas(64) std::array<std::int16_t, max_side * max_side> square;  ///< row after row, `side` each
-  alignas(64) std::array<std::int16_t, max_side * stride> strip;     ///< of a row the first `side` + 15, or + 31, count
+  pixel_rows square;  ///< with `side` readable pixels or more
+  pixel_rows strip;   ///< likewise `side` + `shifts` - 1
 };
 
 struct slide_differences_kernel {
   using signature = void(const sliding_square&, int shifts, std::int32_t* sums);
 
-  /// Lanes are shifts.
+  /// Lanes are shifts. Pixels are taken four times, so that means are whole numbers to a quarter of a grey value.
   template <class Target>
   static ORBIS_ALWAYS_INLINE void run(const sliding_square& s, int shifts, std::int32_t* sums) {
+    using bytes = simd::vec<std::uint8_t, 16, Target>;
     using words = simd::vec<std::int16_t, 16, Target>;
     using numbers = simd::vec<std::int32_t, 16, Target>;
-    constexpr int flush = 16;  // so many terms of at most 2040 fit into a word
+    constexpr int max_side = sliding_square::max_side;
+    constexpr int square_stride = 32, strip_stride = 64;  // the largest sides, rounded up
+    constexpr int flush = 16;                             // so many terms of at most 2040 fit into a word
+    alignas(64) std::array<std::int16_t, max_side * square_stride> square;
+    alignas(64) std::array<std::int16_t, max_side * strip_stride> strip;
+    alignas(64) std::array<std::int16_t, strip_stride> columns;  // sums of the strip's, at most 31620
     const int side = s.side, n = side * side;
+    // What lies beyond the readable pixels belongs to no shift that is asked for.
+    const auto widen = [side](const pixel_rows& from, int width, int stride, std::int16_t* to,
+                              auto&& sum_up) ORBIS_INLINE_LAMBDA {
+      for (int u = 0; u < width; u += 16) {
+        const int there = std::clamp(from.readable - u, 0, 16);
+        words sum(0);
+        for (int v = 0; v != side; ++v) {
+          const std::uint8_t* const p = from.first + v * from.stride + std::min(u, from.readable);
+          const bytes b = there == 16 ? bytes::load(p) : bytes::load(p, static_cast<std::size_t>(there));
+          const words w = simd::convert<std::int16_t>(b) << 2;
+          w.store(to + v * stride + u);
+          sum = sum + w;
+        }
+        sum_up(u, sum);
+      }
+    };
+    alignas(64) std::array<std::int16_t, square_stride> square_columns;
+    widen(s.square, side, square_stride, square.data(),
+          [&](int u, const words& sum) ORBIS_INLINE_LAMBDA { sum.store(square_columns.data() + u); });
+    widen(s.strip, side - 1 + (shifts + 15) / 16 * 16, strip_stride, strip.data(),
+          [&](int u, const words& sum) ORBIS_INLINE_LAMBDA { sum.store(columns.data() + u); });
     std::int32_t own = 0;
-    for (int i = 0; i != n; ++i) own += s.square[static_cast<std::size_t>(i)];
+    for (int u = 0; u != side; ++u) own += square_columns[static_cast<std::size_t>(u)];
     for (int first = 0; first < shifts; first += 16) {
-      const auto add_up = [&](auto&& term) ORBIS_INLINE_LAMBDA {
-        numbers total(0);
-        for (int v = 0; v != side; ++v)
-          for (int begin = 0; begin < side; begin += flush) {
-            words part(0);
-            for (int u = begin; u < side && u < begin + flush; ++u)
-              part = part + term(v, u, words::load(s.strip.data() + v * sliding_square::stride + u + first));
-            total = total + simd::convert<std::int32_t>(part);
-          }
-        return total;
-      };
+      numbers there(0);
+      for (int u = 0; u != side; ++u)
+        there = there + simd::convert<std::int32_t>(words::load(columns.data() + u + first));
       alignas(64) std::array<std::int32_t, 16> total;
       alignas(64) std::array<std::int16_t, 16> offset;  // of the means
-      add_up([](int, int, const words& w) ORBIS_INLINE_LAMBDA { return w; }).store(total.data());
+      there.store(total.data());
       for (std::size_t i = 0; i != 16; ++i) offset[i] = static_cast<std::int16_t>((own - total[i]) / n);
       const words offsets = words::load(offset.data());
-      add_up([&](int v, int u, const words& w) ORBIS_INLINE_LAMBDA {
-        const words d = words(s.square[static_cast<std::size_t>(v * side + u)]) - offsets - w;
-        return max(d, words(0) - d);
-      }).store(sums + first);
+      numbers sum(0);
+      for (int begin = 0; begin < side; begin += flush)
+        for (int v = 0; v != side; ++v) {
+          words part(0);
+          for (int u = begin; u < side && u < begin + flush; ++u) {
+            const words d = words(square[static_cast<std::size_t>(v * square_stride + u)]) - offsets -
+                            words::load(strip.data() + v * strip_stride + u + first);
+            part = part + max(d, words(0) - d);
+          }
+          sum = sum + simd::convert<std::int32_t>(part);
+        }
+      sum.store(sums + first);
     }
   }
 };
 
 /// `sums[k]` becomes four times the sum of absolute differences between the square and the strip from column `k` on,
-/// each less its mean (to a quarter of a grey value), for k < `shifts`. Writes a multiple of 16 sums.
-/// @pre 1 <= side <= max_side, shifts <= max_shifts; all pixels of the strip that count are set
+/// each less its mean (to a quarter of a grey value), for k < `shifts`. Writes a multiple of 16 sums, of which those
+/// from `shifts` on mean nothing. @pre 1 <= side <= max_side, 1 <= shifts <= max_shifts
 inline void slide_differences(const sliding_square& s, int shifts, std::int32_t* sums) {
   simd::kernel<slide_differences_kernel, slide_differences_kernel::signature, simd::avx2>()(s, shifts, sums);
 }

@@ -13,14 +13,22 @@
 #include <orbis/core/image.hpp>
 #include <orbis/features/detail/extract/resize.hpp>
 
-namespace orbis::features::detail {
+namespace orbis::features {
 
-/// An image and its shrunk copies, each made of the one before it (`resize`). Level k is `scale_factor`^k
-/// times smaller than the image, sides rounded to whole pixels. Keeps its memory from image to image.
+/// A grey image and its shrunk copies, each made of the one before it by bilinear interpolation. Level k is
+/// `scale_factor`^k times smaller than the image, sides rounded to whole pixels. Keeps its memory from image to image.
 class image_pyramid {
  public:
-  /// Level 0 is `image` itself, not a copy: it must live as long as the levels are used. Levels with a side
-  /// of less than `min_side` pixels, and what follows them, are left out. O(pixels).
+  image_pyramid() = default;
+  image_pyramid(image_pyramid&&) noexcept = default;
+  image_pyramid& operator=(image_pyramid&&) noexcept = default;
+  image_pyramid(const image_pyramid&) = delete;  // a copy's levels would be those of the other one
+  image_pyramid& operator=(const image_pyramid&) = delete;
+  ~image_pyramid() = default;
+
+  /// Level 0 is `image` itself, not a copy: it must live as long as the levels are used. Levels with a side of less
+  /// than `min_side` pixels, and what follows them, are left out. O(pixels). Allocates nothing once an image of this
+  /// size has been seen.
   /// @pre levels >= 0, scale_factor > 1, min_side >= 1
   void build(image_view<const std::uint8_t> image, int levels, double scale_factor, int min_side) {
     assert(levels >= 0 && scale_factor > 1.0 && min_side >= 1);
@@ -40,20 +48,22 @@ class image_pyramid {
       const std::size_t needed = static_cast<std::size_t>(stride) * static_cast<std::size_t>(height);
       if (to.pixels.size() < needed) to.pixels.resize(needed);
       const image_view<std::uint8_t> view{to.pixels.data(), width, height, stride};
-      resize(views_.back(), view, to.memory);
+      detail::resize(views_.back(), view, to.memory);
       views_.push_back(view);
     }
   }
 
+  /// The number of levels.
   [[nodiscard]] std::size_t size() const noexcept { return views_.size(); }
-  /// @pre level < size()
+  [[nodiscard]] bool empty() const noexcept { return views_.empty(); }
+  /// A level, 0 being the image. @pre level < size()
   [[nodiscard]] image_view<const std::uint8_t> operator[](std::size_t level) const {
     assert(level < views_.size());
     return views_[level];
   }
 
-  /// From a pixel of a level to the image: pixels are areas whose centres lie at integers, so that
-  /// plain multiplication would shift coarse keypoints by up to a pixel.
+  /// From a coordinate of a level to that of the image, pixels, or back if the sizes are exchanged: pixels are areas
+  /// whose centres lie at integers, so that plain multiplication would shift coarse keypoints by up to a pixel.
   [[nodiscard]] static double full_coordinate(double at, int level_size, int full_size) noexcept {
     return (at + 0.5) * full_size / level_size - 0.5;
   }
@@ -61,10 +71,10 @@ class image_pyramid {
  private:
   struct shrunk_level {
     std::vector<std::uint8_t> pixels;
-    resize_workspace memory;
+    detail::resize_workspace memory;
   };
   std::vector<image_view<const std::uint8_t>> views_;
   std::vector<shrunk_level> shrunk_;
 };
 
-}  // namespace orbis::features::detail
+}  // namespace orbis::features

@@ -5,7 +5,7 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include <orbis/features/detail/extract/pyramid.hpp>
+#include <orbis/features/pyramid.hpp>
 #include <orbis/interop/opencv.hpp>
 
 #include "features/images.hpp"
@@ -13,7 +13,6 @@
 
 using namespace orbis;
 using namespace orbis::features;
-using namespace orbis::features::detail;
 
 TEST_CASE("each level of a pyramid is made of the one before it") {
   image_pyramid pyramid;
