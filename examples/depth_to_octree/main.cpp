@@ -12,6 +12,8 @@
 #include <orbis/io.hpp>
 #include <orbis/octree.hpp>
 
+#include "../common/voxel_estimate.hpp"
+
 int complain(int code, const std::string& why) {
   std::fprintf(stderr, "depth_to_octree: %s\n", why.c_str());
   return code;
@@ -52,8 +54,15 @@ int main(int argc, char** argv) try {
   if (!camera) return complain(camera.error().where == "--camera" ? 1 : 2, camera.error().to_string());
   if (camera->model.width() != depth->width() || camera->model.height() != depth->height())
     return complain(2, camera_name + ": the camera's images have another size than " + input);
+  const double units = scale > 0.0 ? scale : camera->depth_scale;
+  const auto voxels =
+      examples::voxels_of_depth(camera->model.k(), [&](std::size_t i) { return depth->pixels()[i] / units; });
+  if (voxels.is_too_large(resolution))
+    return complain(2, "--resolution: " + voxels.in_words(resolution, "the image") + ", too many");
+  if (voxels.takes_long(resolution))
+    std::fprintf(stderr, "depth_to_octree: %s; this takes long\n", voxels.in_words(resolution, "the image").c_str());
   orbis::octree::occupancy_octree<> map{resolution};
-  const orbis::camera::depth_view metres{*depth, scale > 0.0 ? scale : camera->depth_scale};
+  const orbis::camera::depth_view metres{*depth, units};
   const auto scan = map.integrate(metres, camera->model, orbis::se3{orbis::so3{q}, orbis::vec3{p.data()}});
   if (scan.used == 0) return complain(2, input + ": no depth in it lies in the map");
   if (const auto done = write_bt(map, output); !done) return complain(2, done.error().to_string());

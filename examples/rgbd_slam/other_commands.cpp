@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 #include <cstddef>
+#include <numbers>
 #include <optional>
 #include <vector>
 
@@ -11,6 +12,7 @@
 #include <orbis/io/cloud_file.hpp>
 #include <orbis/io/trajectory_file.hpp>
 
+#include "../common/voxel_estimate.hpp"
 #include "accuracy.hpp"
 #include "commands.hpp"
 #include "corrected_frame.hpp"
@@ -111,6 +113,26 @@ orbis::vec3f middle_of(const std::vector<orbis::vec3f>& points) {
   return middle;
 }
 
+/// Says when the octree's voxels are so small that the rays to the points take long, and refuses those that may fill
+/// gigabytes.
+orbis::result<void> check_resolution(const std::vector<orbis::vec3f>& points, const orbis::vec3& origin,
+                                     const settings& s, results& r, console& console) {
+  examples::voxel_estimate rays;
+  double longest = 0.0;
+  for (const orbis::vec3f& p : points) {
+    const double length = std::min((p.cast<double>() - origin).norm(), s.max_depth);
+    rays.add(length, 0.0);
+    longest = std::max(longest, length);
+  }
+  rays.add(0.0, 4.0 / 3.0 * std::numbers::pi * longest * longest * longest);  // together at most a ball
+  if (!rays.takes_long(s.resolution)) return {};
+  const std::string text = rays.in_words(s.resolution, "the space before the points");
+  if (rays.is_too_large(s.resolution))
+    return orbis::fail(orbis::errc::invalid_argument, "--resolution", text + ", too many");
+  console.warn(r.warnings.emplace_back(text + "; this takes long"));
+  return {};
+}
+
 orbis::result<mapped> map_cloud_file(const settings& s, const std::filesystem::path& folder, console& console) {
   if (filter_options(s).kind == orbis::mapping::filter_kind::ray_evidence)
     return orbis::fail(orbis::errc::invalid_argument, s.input.string(),
@@ -135,10 +157,13 @@ orbis::result<mapped> map_cloud_file(const settings& s, const std::filesystem::p
   results r = begin_results(s, name, nullptr, folder);
   r.setup.emplace_back("points", count_text(cloud->size()) + left_out);
   r.truth_note = "A cloud, without SLAM.";
-  if (origin.isZero()) return mapped{std::move(r), map_cloud(*std::move(cloud), s, console), {}};
-  console.warn(r.warnings.emplace_back(origin_note(origin)));
   settings moved = s;
-  if (moved.origin) *moved.origin -= origin;
+  if (!origin.isZero()) console.warn(r.warnings.emplace_back(origin_note(origin)));
+  if (moved.origin) {
+    *moved.origin -= origin;
+    if (auto fine = check_resolution(cloud->points, *moved.origin, s, r, console); !fine)
+      return orbis::fail(fine.error());
+  }
   return mapped{std::move(r), map_cloud(*std::move(cloud), moved, console), {}};
 }
 

@@ -16,6 +16,7 @@
 #include <orbis/io/stereo_recording.hpp>
 #include <orbis/io/synthetic.hpp>
 
+#include "../common/voxel_estimate.hpp"
 #include "background.hpp"
 #include "inputs/file_recording.hpp"
 #include "inputs/live_source.hpp"
@@ -351,40 +352,25 @@ frame_source make_synthetic(const settings& s) {
   return source;
 }
 
-/// About how many voxels an octree has to keep for a depth image: those in the space before its surfaces, or, where
-/// rays are farther apart, some beside each voxel that a ray goes through. `depth(i)`: metres.
-template <class Depth>
-double voxels_in_view(const orbis::camera::intrinsics& k, double resolution, const Depth& depth) {
-  double lengths = 0.0, volume = 0.0;
-  for (std::size_t i = 0; i != static_cast<std::size_t>(k.width) * static_cast<std::size_t>(k.height); ++i) {
-    const double z = depth(i);
-    lengths += z;
-    volume += z * z * z / (3.0 * k.fx * k.fy);
-  }
-  return std::min(16.0 * lengths / resolution, volume / (resolution * resolution * resolution));
-}
-
 /// Says when the octree's voxels are so small that a frame takes seconds, and refuses those of which one frame alone
 /// may fill gigabytes. The first frame stands for all.
 result<void> check_resolution(frame_source& source, const settings& s) {
-  constexpr double slow = 1e8, too_many = 2e9;
   const orbis::camera::intrinsics& k = source.camera.model.k();
   if (source.frames == 0 || source.is_monocular() || source.is_live) return {};  // a camera's frames are seen once
-  if (voxels_in_view(k, s.resolution, [&](std::size_t) { return s.max_depth; }) < slow) return {};
+  if (!examples::voxels_of_depth(k, [&](std::size_t) { return s.max_depth; }).takes_long(s.resolution)) return {};
   auto first = source.frame(0);
   if (!first) return {};  // whoever needs it will say why
   source.complete(*first);
   const auto pixels = first->depth.pixels();
-  const double voxels = voxels_in_view(k, s.resolution, [&](std::size_t i) {
+  const auto voxels = examples::voxels_of_depth(k, [&](std::size_t i) {
     const double z = pixels[i] / first->depth_scale;
     return z > s.max_depth ? 0.0 : z;
   });
-  if (voxels < slow) return {};
-  char text[160];
-  std::snprintf(text, sizeof text, "voxels of %g mm: the first frame alone has about %.1f billion of them",
-                1000 * s.resolution, 1e-9 * voxels);
-  if (voxels >= too_many) return fail(orbis::errc::invalid_argument, "--resolution", text + std::string{", too many"});
-  source.notes.push_back(text + std::string{"; this takes long"});
+  if (!voxels.takes_long(s.resolution)) return {};
+  const std::string text = voxels.in_words(s.resolution, "the first frame alone");
+  if (voxels.is_too_large(s.resolution))
+    return fail(orbis::errc::invalid_argument, "--resolution", text + ", too many");
+  source.notes.push_back(text + "; this takes long");
   return {};
 }
 

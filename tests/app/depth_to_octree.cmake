@@ -52,6 +52,9 @@ fails(2 "nikon: no such file" ${depth} no.bt --camera nikon)
 # Nothing of it ends up in the map: too far away to have a key.
 fails(2 "000000.png: no depth" ${depth} no.bt --pose 0 0 90000 0 0 0 1)
 
+# Voxels so small that one image has billions of them; some that only take long are warned of.
+fails(2 "--resolution: voxels of 0.2 mm: the image has about .* too many" ${depth} no.bt --resolution 0.0002 --scale 1000)
+
 # The same camera, as a file and as numbers.
 app(0 ${depth} map.bt --camera room/camera.toml --pose 1 2 0.5 0 0 0 1)
 app(0 ${depth} again.bt --camera 262.5,262.5,159.5,119.5 --scale 5000 --pose 1 2 0.5 0 0 0 2)

@@ -15,6 +15,14 @@ app(0 map cloud.ply --out out --resolution 0.1 --filter none --origin 0.5,0.5,0.
 summary(free ${WORK}/out octree free)
 check(free GREATER 100)
 
+# Many rays of metres through voxels of a millimetre: refused at once; without rays the points' voxels are all.
+string(REPEAT "5.05 5.05 1.05\n" 40000 points)
+file(WRITE ${WORK}/many.ply "ply\nformat ascii 1.0\nelement vertex 40000\nproperty float x\nproperty float y\n"
+     "property float z\nend_header\n${points}")
+app_fails(2 "--resolution: voxels of 1 mm: the space before the points has about .* too many"
+          map many.ply --out no --resolution 0.001 --filter none --origin 0,0,0)
+app(0 map many.ply --out fine --resolution 0.001 --filter none)
+
 app(0 map out/cloud_filtered.ply --out again --resolution 0.1 --filter statistical --neighbors 8 --sigma 3)
 summary(mode ${WORK}/again filter mode)
 check(mode STREQUAL "statistical")
