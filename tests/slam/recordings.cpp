@@ -337,12 +337,19 @@ TEST_CASE("A rolling shutter costs little where it is known, and much where it i
   const double followed = error_of(late, late), missed = error_of(late, rolling);
   CAPTURE(followed, missed);
   CHECK(followed < 0.85 * missed);
+  // Where all rows are of one time, only the poses around a frame tell how it moves.
+  const camera::shutter early{.depth_delay = -0.015}, much_earlier{.depth_delay = -0.03};
+  const double early_followed = error_of(early, early), early_missed = error_of(early, {});
+  const double much_earlier_followed = error_of(much_earlier, much_earlier);
+  CAPTURE(early_followed, early_missed, much_earlier_followed);
+  CHECK(early_followed < 0.95 * early_missed);
+  CHECK(much_earlier_followed < 2.0 * global);
 }
 
 TEST_CASE("Depth that lags or comes early is found to two milliseconds") {
   io::synthetic_options o{.frames = 420, .fps = 30.0, .seed = 3, .width = 320, .height = 240, .frames_around = 400};
   o.path.jitter = 3.0;
-  for (const double delay : {-0.008, 0.0, 0.008, 0.015}) {
+  for (const double delay : {-0.015, -0.008, 0.0, 0.008, 0.015}) {
     o.sensor.shutter.depth_delay = delay;
     const io::synthetic_recording frames{o};
     slam::options settings;

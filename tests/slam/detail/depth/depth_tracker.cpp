@@ -117,6 +117,15 @@ TEST_CASE("A surface that was read later than the colour is kept as it is at the
   const auto moved = s.tracker.term_at({pose, twist}, late);
   REQUIRE(moved);
   CHECK(moved->h.topLeftCorner<6, 6>().ldlt().solve(-moved->g.head<6>()).norm() < 1.5e-3);
+  CHECK(moved->h.bottomRightCorner<6, 6>().norm() > 0.0);
+  // What was read before the colour does not pull at the twist.
+  s.see(pose * se3::exp(-0.02 * twist));
+  const auto early = s.tracker.term_at({pose, twist}, {.depth_delay = -0.02});
+  REQUIRE(early);
+  CHECK(early->h.topLeftCorner<6, 6>().ldlt().solve(-early->g.head<6>()).norm() < 1.5e-3);
+  CHECK(early->h.rightCols<6>().isZero());
+  CHECK(early->h.bottomRows<6>().isZero());
+  CHECK(early->g.tail<6>().isZero());
 }
 
 TEST_CASE("Depth in the pose allocates nothing once its buffers have grown") {

@@ -131,3 +131,34 @@ TEST_CASE("Gradient and prior of the normal equations are those of their cost") 
     CHECK(std::abs(slope - at.g[k]) < 0.03 * (k < 6 ? at.g.head<6>().norm() : at.g.tail<6>().norm()));
   }
 }
+
+TEST_CASE("Early depth follows the refined twist as far as pixels determine it, and the former twist otherwise") {
+  const se3 before = pose * se3::exp(-0.033 * motion);
+  // How much of the way from the former twist, which was off by this, to the refined one.
+  const auto followed = [&](const std::vector<row_observation>& seen, const vec6& off) {
+    const vec6 former = motion + off;
+    const twist_prior prior = twist_prior::after({before, former}, 0.033, true);
+    early_depth_twist twist;
+    twist.see(std::span<const row_observation>(seen), model, {before, former}, {});
+    CHECK(twist.between({}, motion) == motion);  // no former frame
+    twist.advance();
+    twist.see(std::span<const row_observation>(seen), model, {pose, motion}, prior);
+    return (former - twist.between(prior, motion)).dot(off) / off.squaredNorm();
+  };
+  const vec6 sideways_or_turning = vector6(0.2, 0.0, 0.0, 0.0, -0.1, 0.0), rolling = vector6(0, 0, 0, 0, 0, 0.2);
+  auto seen = observations_of(1000, 0.0);
+  CHECK(followed(seen, sideways_or_turning) > 0.7);  // its rows tell
+  CHECK(followed(seen, rolling) > 0.7);
+  for (row_observation& o : seen) o.time = 0.0;
+  CHECK(followed(seen, sideways_or_turning) > 0.5);
+  CHECK(followed(seen, rolling) > 0.7);
+  // Points two metres away in the middle of the image: moving to a side and turning look alike, rolling does not.
+  for (row_observation& o : seen) {
+    const vec3 p = pose.inverse() * o.seen.point, q(0.4 * p.x() / p.z(), 0.4 * p.y() / p.z(), 2.0);
+    o.seen.point = pose * q;
+    o.seen.pixel = *model.camera.project(q);
+  }
+  CHECK(followed(seen, sideways_or_turning) < 0.1);
+  CHECK(followed(seen, rolling) > 0.3);
+  CHECK(followed({}, rolling) < 0.01);
+}

@@ -92,8 +92,9 @@ class depth_tracker {
   [[nodiscard]] std::optional<pose_quadratic> term_at(const moving_pose& at, const camera::shutter& shutter) {
     const association seen = associate<Camera>(samples_, 1, placed_, at, shutter, rig_, close, planes_);
     if (seen.consistent < options_.min_points / 2) return std::nullopt;
-    const depth_equations e = equations_of(planes_, at, options_.effective_points, options_.weakest);
+    depth_equations e = equations_of(planes_, at, options_.effective_points, options_.weakest);
     if (e.determined == 0) return std::nullopt;
+    if (shutter.depth_delay < 0.0) e.term.hold_twist();  // see `early_depth_twist`
     return e.term;
   }
 

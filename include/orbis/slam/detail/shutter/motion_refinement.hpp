@@ -125,6 +125,13 @@ struct pose_quadratic {
   matrix<12, 12> h = matrix<12, 12>::Zero();
   matrix<12, 1> g = matrix<12, 1>::Zero();
   double cost = 0.0;
+
+  /// Takes the twist for known: the cost no longer depends on it.
+  void hold_twist() {
+    h.template rightCols<6>().setZero();
+    h.template bottomRows<6>().setZero();
+    g.template tail<6>().setZero();
+  }
 };
 
 /// What the refinement of a pose depends on besides the keypoints.
@@ -190,6 +197,66 @@ template <camera::camera_model Camera>
   }
   return e;
 }
+
+/// The twist by which a depth image that was taken before its frame is brought to the frame's time.
+///
+/// A twist follows from the poses around it, and the pose of the frame from depth that was moved by the twist. Where
+/// depth comes after the frame, an error of the pose meets itself with the opposite sign and fades; where it comes
+/// before, a direction that pixels hardly determine would swing from frame to frame, wider each time. So such a depth
+/// image follows the refined twist only as far as pixels alone determine that, and the former twist otherwise, by the
+/// gain of R. E. Kalman, "A new approach to linear filtering and prediction problems", J. Basic Engineering 82 (1960).
+class early_depth_twist {
+ public:
+  /// What the pixels of a frame's observations determine. Call before `between`. O(observations).
+  template <camera::camera_model Camera>
+  void see(std::span<const row_observation> observations, const optimize::reprojection<Camera>& model,
+           const moving_pose& at, const twist_prior& prior) {
+    constexpr double width = 2.447;
+    constexpr double share = 0.25;  // of the information of independent errors: landmarks that are near err together
+    const se3 T_camera_world = at.T_world_camera.inverse();
+    std::array<mat6, 3> h{mat6::Identity(), mat6::Zero(), mat6::Zero()};  // a metre or a radian, if nothing is seen
+    for (const row_observation& o : observations) {
+      matrix<3, 6> j;
+      const auto r = row_residual(model, T_camera_world, at.twist, o, j);
+      if (!r) continue;
+      const auto by_pixel = j.template topRows<2>();
+      const double error = std::sqrt(r->template head<2>().squaredNorm() * o.seen.information);
+      const double weight = share * o.seen.information * (error <= width ? 1.0 : width / error);
+      const mat6 a = weight * by_pixel.transpose() * by_pixel;
+      h[0] += a, h[1] -= o.time * a, h[2] += o.time * o.time * a;
+    }
+    pose_covariance_ = h[0].inverse();
+    if (!prior.T_world_before) return;
+    // The prior ties the twist to both poses, of which the former one is not exact either.
+    const double by_pose = (1.0 + prior.trend) / prior.interval;
+    const mat6 tie =
+        (mat6(deviations(prior).cwiseAbs2().asDiagonal()) + by_pose * by_pose * former_covariance_).inverse();
+    const mat6 mixed = h[1] + by_pose * tie;
+    const mat6 of_twist = h[2] + tie - mixed.transpose() * (h[0] + by_pose * by_pose * tie).inverse() * mixed;
+    // From one frame to the next a twist changes by twice the deviation of the prior, which is that from the mean.
+    const mat6 change = mat6((2.0 * deviations(prior)).cwiseAbs2().asDiagonal());
+    gain_ = change * (change + of_twist.inverse()).inverse();
+  }
+
+  /// Between the twist of the former frame and that of this one.
+  [[nodiscard]] vec6 between(const twist_prior& prior, const vec6& refined) const {
+    if (!prior.T_world_before || !gain_.allFinite()) return refined;
+    return prior.twist_before + gain_ * (refined - prior.twist_before);
+  }
+
+  /// The frame that was seen becomes the former one.
+  void advance() { former_covariance_ = pose_covariance_; }
+
+ private:
+  [[nodiscard]] static vec6 deviations(const twist_prior& prior) {
+    vec6 d;
+    d << vec3::Constant(prior.translation_deviation), vec3::Constant(prior.rotation_deviation);
+    return d;
+  }
+
+  mat6 pose_covariance_ = mat6::Zero(), former_covariance_ = mat6::Zero();  ///< by pixels alone
+  mat6 gain_ = mat6::Identity();
+};
 
 /// Refines pose and twist, or the pose alone, by Gauss-Newton steps as long as they lower the cost. The observations
 /// should hold few outliers. O(observations) for each step.

@@ -223,6 +223,7 @@ class front_end {
   camera::shutter shutter_;
   std::optional<shutter_observer> observer_;
   std::vector<row_observation> rows_;  ///< its memory is used again
+  early_depth_twist early_depth_;
   frame_type unsettled_;               ///< the same
 
   double held_since_ = 0.0;  ///< when the last frame was tracked whose pose depth did not hold, seconds
@@ -449,6 +450,7 @@ void front_end<Camera, D, Matchers, Sensor>::refine_motion(frame_type& f, const 
   };
   moving_pose refined{f.T_world_camera, rolls ? expected_twist() : vec6(vec6::Zero())};
   const bool depth_is_simultaneous = shutter_.depth_delay == 0.0 && shutter_.depth_read_out == shutter_.color_read_out;
+  const bool is_depth_early = shutter_.depth_delay < 0.0;
   const int rounds = with_depth ? 3 : !rolls ? 0 : depth_is_simultaneous ? 1 : 2;
   if (!rolls && with_depth) find_observations(f, m, rig_, rows_);
   for (int round = 0; round != rounds; ++round) {
@@ -459,7 +461,12 @@ void front_end<Camera, D, Matchers, Sensor>::refine_motion(frame_type& f, const 
     const auto depth = with_depth ? depth_.term_at(refined, shutter_) : std::nullopt;
     refined = refine_moving_pose(std::span<const row_observation>(rows_), rig_.model, refined, prior,
                                  with_depth ? 3 : 5, {.other = depth ? &*depth : nullptr, .moves = rolls});
+    if (is_depth_early) {
+      early_depth_.see(std::span<const row_observation>(rows_), rig_.model, refined, prior);
+      refined.twist = early_depth_.between(prior, refined.twist);
+    }
   }
+  if (is_depth_early) early_depth_.advance();
   f.T_world_camera = refined.T_world_camera;
   if (observer_) observer_->set_depths(f, {shutter_, rolls ? refined.twist : expected_twist()}, follow_rows);
   if (!rolls) {
