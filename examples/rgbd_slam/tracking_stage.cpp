@@ -10,6 +10,7 @@
 
 #include <orbis/slam/any_system.hpp>
 
+#include "camera_check.hpp"
 #include "corrected_frame.hpp"
 #include "interrupts.hpp"
 #include "result_files.hpp"
@@ -272,7 +273,8 @@ orbis::result<tracked_frames> track(const frame_source& source, const settings& 
                      .keyframes = posed_frames{source, s, spill_file, shutter.shutter},
                      .live = {},
                      .stopped = {},
-                     .unsaved = {}};
+                     .unsaved = {},
+                     .camera_doubt = {}};
   out.slam.sensor = source.sensor;
   if (s.live_map && !s.localize_only && !source.is_monocular())
     out.live = std::make_unique<live_mapping>(source, s, spill_file.string() + ".live", poses_of(slam));
@@ -294,6 +296,8 @@ orbis::result<tracked_frames> track(const frame_source& source, const settings& 
 
   collect(slam, out);
   out.slam.shutter = shutter;
+  if (source.sensor == orbis::slam::sensor_kind::rgbd && s.load_map.empty())
+    out.camera_doubt = doubt_focal_length(slam, source.camera.model, options);
   if (goes_on)
     out.world = {"loaded map", {}};
   else if (!out.slam.trajectory.empty())
@@ -361,6 +365,7 @@ std::vector<std::string> tracking_notes(const tracked_frames& tracked, const set
         "one camera without depth: lengths are in a unit of their own, and there is no cloud and no octree");
   else if (!s.localize_only && tracked.slam.tracked != 0 && tracked.keyframes.size() == 0)
     notes.emplace_back("no cloud and no octree: the loaded map shows all that was seen, so no frame became a keyframe");
+  if (tracked.camera_doubt) notes.push_back(*tracked.camera_doubt);
   for (std::string& note : mapping_notes(tracked.keyframes, tracked.world)) notes.push_back(std::move(note));
   return notes;
 }

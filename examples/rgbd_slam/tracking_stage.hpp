@@ -23,12 +23,13 @@ namespace app {
 
 struct tracked_frames {
   slam_results slam;
-  std::optional<world_results> world;   ///< of the poses
-  posed_frames keyframes;               ///< with their images, for the map
-  std::unique_ptr<live_mapping> live;   ///< the octree that grew meanwhile, if that was asked for; stopped
-  std::optional<orbis::error> stopped;  ///< why not all frames were read
-  std::optional<orbis::error> unsaved;  ///< why the map of landmarks could not be saved
-  bool missed_map = false;              ///< a map was loaded, and the camera never found in it
+  std::optional<world_results> world;       ///< of the poses
+  posed_frames keyframes;                   ///< with their images, for the map
+  std::unique_ptr<live_mapping> live;       ///< the octree that grew meanwhile, if that was asked for; stopped
+  std::optional<orbis::error> stopped;      ///< why not all frames were read
+  std::optional<orbis::error> unsaved;      ///< why the map of landmarks could not be saved
+  std::optional<std::string> camera_doubt;  ///< why the camera may be another than it is said to be
+  bool missed_map = false;                  ///< a map was loaded, and the camera never found in it
 };
 
 /// Tracks the source's frames, up to the first that cannot be read, or to Ctrl-C. Errors: a map that cannot be loaded.
