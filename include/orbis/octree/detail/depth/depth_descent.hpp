@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The descent through the octree that finds the voxels which a depth image observes free.
+/// The descent through the octree that finds the voxels which the rays of a view observe free.
 #pragma once
 
 #include <algorithm>
@@ -10,7 +10,8 @@
 #include <cstdint>
 #include <vector>
 
-#include <orbis/octree/detail/depth/depth_frame.hpp>
+#include <orbis/octree/detail/depth/view_frame.hpp>
+#include <orbis/octree/detail/depth/voxel_ray_test.hpp>
 #include <orbis/octree/detail/storage/node_name.hpp>
 #include <orbis/octree/detail/storage/scan_masks.hpp>
 
@@ -23,19 +24,22 @@ struct descent_worker {
     std::array<std::uint64_t, 8> free;
   };
   std::vector<free_brick> bricks;
-  std::vector<std::array<std::int32_t, 2>> unsure;  ///< pixels of the voxel at hand
+  std::vector<std::uint32_t> unsure;  ///< rays that may cross the voxel at hand
+
+  [[nodiscard]] std::size_t memory_bytes() const noexcept {
+    return bricks.capacity() * sizeof(bricks[0]) + unsure.capacity() * sizeof(unsure[0]);
+  }
 };
 
-/// What one thread does with the nodes it is given. `EndOf`: the ray_endpoint of pixel (u, v). `Saturated`: see
-/// depth_integrator::mark.
-template <class EndOf, class Saturated>
+/// What one thread does with the nodes it is given. `Rays`: see depth_rays. `Saturated`: see depth_integrator::mark.
+template <class Rays, class Saturated>
 struct depth_descent {
   using words = std::array<std::uint64_t, 8>;
 
-  const depth_frame& frame;
+  const view_frame& frame;
   descent_worker& own;
   const depth_sensor& sensor;
-  const EndOf& end_of;
+  const Rays& rays;
   const scan_masks& hits;  ///< the voxels that rays end in
   Saturated& saturated;
   bool on_face;  ///< the camera's centre lies close to a face of its voxel
@@ -146,7 +150,7 @@ struct depth_descent {
     const float edge = frame.scene.voxel;
     const auto middle = [&](std::size_t i, std::uint32_t at) { return low[i] + edge * static_cast<float>(at + 1); };
     const float3 center{middle(0, p.x), middle(1, p.y), middle(2, p.z)};
-    unsigned free = voxels.full | frame.sample(frame.scene, offsets(0), center, voxels, left);
+    unsigned free = voxels.full | rays.sample(offsets(0), center, voxels, left);
     for (left &= ~free; left != 0; left &= left - 1) {
       const auto i = static_cast<unsigned>(std::countr_zero(left));
       const auto& o = offsets(0);
@@ -161,13 +165,13 @@ struct depth_descent {
     own.unsure.clear();
     const voxel_test test{frame.scene, at, 0.5F * frame.scene.voxel};
     if (test_box(test, box, near_z)) return true;
-    for (const auto& [u, v] : own.unsure)
-      if (crosses(sensor, end_of(u, v), voxel)) return true;
+    for (const std::uint32_t ray : own.unsure)
+      if (rays.visits(ray, voxel)) return true;
     return false;
   }
   [[nodiscard]] bool test_box(const voxel_test& test, const pixel_box& box, float near_z) const {
     if ((box.u1 - box.u0) * (box.v1 - box.v0) < 1024)
-      return frame.test_pixels(frame.scene, test, box, near_z, own.unsure);
+      return rays.test(test, box, near_z, own.unsure);
     // A voxel at the camera: most of its box are rays that pass it by, tile by tile.
     constexpr std::int32_t size = 128;
     for (std::int32_t v = box.v0 & -size; v <= box.v1; v += size)
@@ -180,14 +184,8 @@ struct depth_descent {
     const pixel_box part{std::max(box.u0, u), std::min(box.u1, u + size - 1), std::max(box.v0, v),
                          std::min(box.v1, v + size - 1)};
     if (part.u0 > part.u1 || part.v0 > part.v1 || !frame.pyramid.reaches(u, v, size, near_z)) return false;
-    const pixel_rays& rays = frame.ends.rays();
-    if (rays.separable()) {
-      if (!test.may_cross(rays.x(0)[part.u0], rays.x(0)[part.u1], *rays.y(part.v0), *rays.y(part.v1))) return false;
-    } else {
-      const auto& t = frame.map.tile_at(u, v, size);
-      if (!(t.x0 <= t.x1) || !test.may_cross(t.x0, t.x1, t.y0, t.y1)) return false;
-    }
-    if (size == 16) return frame.test_pixels(frame.scene, test, part, near_z, own.unsure);
+    if (!rays.may_cross(test, part, u, v, size)) return false;
+    if (size == 16) return rays.test(test, part, near_z, own.unsure);
     const std::int32_t half = size / 2;
     return test_tile(test, box, near_z, u, v, half) || test_tile(test, box, near_z, u + half, v, half) ||
            test_tile(test, box, near_z, u, v + half, half) || test_tile(test, box, near_z, u + half, v + half, half);

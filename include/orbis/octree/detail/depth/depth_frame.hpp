@@ -1,120 +1,50 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// One depth image as the descent through the octree sees it: the ends of its rays, the pyramid over them, and the
-/// nodes to begin with.
+/// One depth image as the descent through the octree sees it.
 #pragma once
 
 #include <algorithm>
-#include <array>
-#include <bit>
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <optional>
-#include <utility>
 #include <vector>
 
 #include <orbis/core/simd.hpp>
-#include <orbis/octree/detail/depth/depth_pyramid.hpp>
 #include <orbis/octree/detail/depth/direction_index.hpp>
 #include <orbis/octree/detail/depth/endpoint_image.hpp>
 #include <orbis/octree/detail/depth/endpoint_rows.hpp>
-#include <orbis/octree/detail/depth/node_classifier.hpp>
+#include <orbis/octree/detail/depth/view_frame.hpp>
 #include <orbis/octree/detail/depth/voxel_ray_test.hpp>
 
 namespace orbis::octree::detail {
 
-/// Keeps its memory from image to image. Fill `ends`, then call set_scene, build `pyramid`, call list_nodes.
-struct depth_frame {
-  using classify_kernel = void(const depth_scene&, const child_offsets&, const float3&, bool, children&);
-  using sample_kernel = unsigned(const depth_scene&, const child_offsets&, const float3&, const children&, unsigned);
-  using test_kernel = bool(const depth_scene&, const voxel_test&, const pixel_box&, float,
-                           std::vector<std::array<std::int32_t, 2>>&);
-  static constexpr int list_level = 5;  ///< of the nodes that threads share out among them
+/// The view of a depth image: a ray for each pixel. Fill `ends` and, if need be, `map`, then call set_scene; see
+/// view_frame for the rest.
+struct depth_frame : view_frame {
+  using sample_kernel = unsigned(const depth_scene&, const endpoint_image&, const child_offsets&, const float3&,
+                                 const children&, unsigned);
+  using test_kernel = bool(const endpoint_image&, const voxel_test&, const pixel_box&, float,
+                           std::vector<std::uint32_t>&);
 
-  struct node {
-    voxel_key key;
-    float3 center;  ///< in the camera frame
-    bool inside;    ///< projects into the image
-  };
-
-  // Kernels of eight lanes are no faster on AVX-512.
-  classify_kernel* classify = simd::kernel<classify_children_kernel, classify_kernel, simd::avx2>();
   sample_kernel* sample = simd::kernel<sample_children_kernel, sample_kernel, simd::avx2>();
   test_kernel* test_pixels = simd::kernel<test_pixels_kernel, test_kernel>();
   endpoint_image ends;
-  depth_pyramid pyramid;
   direction_index map;  ///< of cameras that are not pinholes
-  depth_scene scene;
-  std::vector<child_offsets> offsets;  ///< for each level, of a node's children at that level
-  std::vector<node> nodes;             ///< that rays may touch, at list_level
 
-  /// Works out what the tests need to know about the frame. @pre `ends` and, if need be, `map` are those of the image
+  /// Works out what the tests need to know about the image. @pre `ends` and, if need be, `map` are its own
   void set_scene(const depth_sensor& sensor) {
-    depth_scene& s = scene;
-    const auto& rows = sensor.pose.rows;
-    for (std::size_t i = 0; i != 3; ++i) {
-      s.x_axis[i] = rows[i][0];
-      s.y_axis[i] = rows[i][1];
-      s.z_axis[i] = rows[i][2];
-    }
     const pixel_rays& rays = ends.rays();
-    s.map = rays.separable() ? nullptr : &map;
-    const vec2f focal = s.map != nullptr ? map.focal() : vec2f(rays.focal().cast<float>());
-    const vec2f center = s.map != nullptr ? map.center() : vec2f(rays.center().cast<float>());
-    s.fx = focal.x();
-    s.fy = focal.y();
-    s.per_fx = 1.0F / s.fx;
-    s.per_fy = 1.0F / s.fy;
-    s.cx = center.x();
-    s.cy = center.y();
-    s.last_u = static_cast<float>(rays.width() - 1);
-    s.last_v = static_cast<float>(rays.height() - 1);
-    s.min_x = s.map != nullptr ? map.min_x() : rays.x(0)[0];
-    s.max_x = s.map != nullptr ? map.max_x() : rays.x(0)[rays.width() - 1];
-    s.min_y = s.map != nullptr ? map.min_y() : *rays.y(0);
-    s.max_y = s.map != nullptr ? map.max_y() : *rays.y(rays.height() - 1);
-    constexpr float u = 0x1p-24F;
-    float l1 = 0.0F;
-    for (const float c : sensor.pose.centre) l1 += std::fabs(c);
-    s.voxel = static_cast<float>(sensor.grid.resolution());
-    s.margin_0 = u * (8.0F * l1 + 8.0F * s.voxel);
-    s.margin_1 = 64.0F * u;
-    s.pixel_margin = 0.01F + 1e-6F * (s.last_u + s.last_v);
-    s.near_z = 0.1F * s.voxel;
-    const float slope = 2.0F * (1.0F + std::max(std::fabs(s.min_x), std::fabs(s.max_x)) +
-                                std::max(std::fabs(s.min_y), std::fabs(s.max_y)));
-    s.ball = 0.5F * s.voxel - 2.0F * s.margin_0;
-    s.ball_slope = 2.0F * s.margin_1 * slope;
-    const float spacing = 0.5F * std::sqrt(1.0F / (s.fx * s.fx) + 1.0F / (s.fy * s.fy));
-    for (std::size_t kind = 0; kind != 3; ++kind) s.dense_z[kind] = s.dense(kind, spacing);
-    s.pyramid = &pyramid;
-    s.rays = &ends;
-  }
-  /// The lowest and the highest voxel of a box around all rays; empty if it comes close to the border
-  /// of the grid, where walks may end early.
-  [[nodiscard]] std::optional<std::pair<voxel_key, voxel_key>> bounds_of(const depth_sensor& sensor,
-                                                                         float max_z) const {
-    std::array<std::array<std::uint32_t, 2>, 3> range;
-    for (std::size_t i = 0; i != 3; ++i) {
-      const double centre = static_cast<double>(sensor.pose.centre[i]);
-      double low = centre, high = centre;
-      for (const float x : {scene.min_x, scene.max_x})
-        for (const float y : {scene.min_y, scene.max_y}) {
-          const double reach =
-              static_cast<double>(max_z) *
-              (static_cast<double>(scene.x_axis[i]) * static_cast<double>(x) +
-               static_cast<double>(scene.y_axis[i]) * static_cast<double>(y) + static_cast<double>(scene.z_axis[i]));
-          low = std::min(low, centre + reach * 1.00001);
-          high = std::max(high, centre + reach * 1.00001);
-        }
-      const double room = 2.0 * sensor.grid.resolution() + 1e-5 * (std::fabs(centre) + (high - low));
-      const auto first = sensor.grid.key(low - room), last = sensor.grid.key(high + room);
-      if (!first || !last) return std::nullopt;
-      range[i] = {*first, *last};
+    const int width = rays.width(), height = rays.height();
+    if (rays.separable()) {
+      scene.map = nullptr;
+      const vec2f focal = rays.focal().cast<float>(), center = rays.center().cast<float>();
+      set_view(sensor, {focal.x(), focal.y(), center.x(), center.y(), width, height, rays.x(0)[0],
+                        rays.x(0)[width - 1], *rays.y(0), *rays.y(height - 1)});
+    } else {
+      scene.map = &map;
+      set_view(sensor, {map.focal().x(), map.focal().y(), map.center().x(), map.center().y(), width, height,
+                        map.min_x(), map.max_x(), map.min_y(), map.max_y()});
     }
-    return std::pair{voxel_key{range[0][0], range[1][0], range[2][0]},
-                     voxel_key{range[0][1], range[1][1], range[2][1]}};
+    set_spacing(half_diagonal());
   }
   /// Whether there are so many rays that it is better to look at voxels than to walk them: where there
   /// is less than a pixel for half a voxel's edge, most voxels would have to be tested one by one.
@@ -122,69 +52,44 @@ struct depth_frame {
     const double mean_z = counts.sum_z / static_cast<double>(counts.used + counts.truncated);
     return mean_z < 0.45 * static_cast<double>(scene.voxel) * static_cast<double>(std::max(scene.fx, scene.fy));
   }
-  /// Whether the camera's centre is so close to a face of its voxel that the rounding of rays decides
-  /// for many of them on which side they leave.
-  [[nodiscard]] bool is_on_face(const depth_sensor& sensor) const {
-    const double close = 64.0 * static_cast<double>(scene.margin(scene.voxel));
-    const voxel_key& k = *sensor.key;
-    const std::array<std::uint32_t, 3> at{k.x, k.y, k.z};
-    for (std::size_t i = 0; i != 3; ++i) {
-      const double off = std::fabs(static_cast<double>(sensor.pose.centre[i]) - sensor.grid.center(at[i]));
-      if (off > 0.5 * sensor.grid.resolution() - close) return true;
-    }
-    return false;
-  }
-
-  /// The nodes at list_level that rays may touch.
-  void list_nodes(const depth_sensor& sensor, const voxel_key& low, const voxel_key& high) {
-    const std::uint32_t span = std::max({high.x - low.x, high.y - low.y, high.z - low.z});
-    const int root_level = std::max(list_level, static_cast<int>(std::bit_width(span)));
-    offsets.resize(static_cast<std::size_t>(root_level));
-    for (int level = 0; level != root_level; ++level)
-      offsets[static_cast<std::size_t>(level)] =
-          child_offsets{scene, 0.5F * scene.voxel * static_cast<float>(node_cells(level))};
-    nodes.clear();
-    const std::uint32_t size = node_cells(root_level);
-    const voxel_key first = node_key(low, root_level), last = node_key(high, root_level);
-    for (std::uint64_t z = first.z; z <= last.z; z += size)
-      for (std::uint64_t y = first.y; y <= last.y; y += size)
-        for (std::uint64_t x = first.x; x <= last.x; x += size) {
-          const voxel_key k{static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(y),
-                            static_cast<std::uint32_t>(z)};
-          list_nodes(k, in_camera(sensor.corner(k), 0.5F * scene.voxel * static_cast<float>(size)), root_level, false);
-        }
-  }
-  void list_nodes(const voxel_key& k, const float3& center, int level, bool inside) {
-    if (level == list_level) {
-      nodes.push_back({k, center, inside});
-      return;
-    }
-    children c;
-    classify(scene, offsets[static_cast<std::size_t>(level - 1)], center, inside, c);
-    for (unsigned bits = c.live; bits != 0; bits &= bits - 1) {
-      const auto i = static_cast<unsigned>(std::countr_zero(bits));
-      list_nodes(child_key(k, i, node_cells(level - 1)), {c.x[i], c.y[i], c.z[i]}, level - 1,
-                 (c.inside >> i & 1U) != 0);
-    }
-  }
   [[nodiscard]] std::size_t memory_bytes() const noexcept {
-    return ends.memory_bytes() + pyramid.memory_bytes() + map.memory_bytes() + nodes.capacity() * sizeof(node) +
-           offsets.capacity() * sizeof(child_offsets);
+    return view_frame::memory_bytes() + ends.memory_bytes() + map.memory_bytes();
   }
+};
 
- private:
-  /// A node's centre in the camera frame.
-  [[nodiscard]] float3 in_camera(const float3& corner, float half_edge) const {
-    const float3 c{corner[0] + half_edge, corner[1] + half_edge, corner[2] + half_edge};
-    const auto along = [&](const float3& axis) { return axis[0] * c[0] + axis[1] * c[1] + axis[2] * c[2]; };
-    return {along(scene.x_axis), along(scene.y_axis), along(scene.z_axis)};
+/// The rays of a depth image for the descent. `EndOf`: the ray_endpoint of pixel (u, v).
+template <class EndOf>
+struct depth_rays {
+  const depth_frame& frame;
+  const depth_sensor& sensor;
+  const EndOf& end_of;
+
+  [[nodiscard]] unsigned sample(const child_offsets& o, const float3& world, const children& c,
+                                unsigned wanted) const {
+    return frame.sample(frame.scene, frame.ends, o, world, c, wanted);
+  }
+  [[nodiscard]] bool test(const voxel_test& t, const pixel_box& box, float near_z,
+                          std::vector<std::uint32_t>& unsure) const {
+    return frame.test_pixels(frame.ends, t, box, near_z, unsure);
+  }
+  /// Whether a ray of `part` may cross the voxel, which lies in the tile of `size` x `size` pixels at (u, v).
+  [[nodiscard]] bool may_cross(const voxel_test& t, const pixel_box& part, std::int32_t u, std::int32_t v,
+                               std::int32_t size) const {
+    const pixel_rays& rays = frame.ends.rays();
+    if (rays.separable())
+      return t.may_cross(rays.x(0)[part.u0], rays.x(0)[part.u1], *rays.y(part.v0), *rays.y(part.v1));
+    const auto& tile = frame.map.tile_at(u, v, size);
+    return tile.x0 <= tile.x1 && t.may_cross(tile.x0, tile.x1, tile.y0, tile.y1);
+  }
+  /// Whether the walk of a ray that `test` was not sure of visits the voxel.
+  [[nodiscard]] bool visits(std::uint32_t number, const voxel_key& voxel) const {
+    const auto [u, v] = frame.ends.pixel(number);
+    return crosses(sensor, end_of(u, v), voxel);
   }
 };
 
 }  // namespace orbis::octree::detail
 
-ORBIS_COMPILED_KERNEL_AVX2(orbis::octree::detail::classify_children_kernel,
-                           orbis::octree::detail::depth_frame::classify_kernel);
 ORBIS_COMPILED_KERNEL_AVX2(orbis::octree::detail::sample_children_kernel,
                            orbis::octree::detail::depth_frame::sample_kernel);
 ORBIS_COMPILED_KERNEL(orbis::octree::detail::test_pixels_kernel, orbis::octree::detail::depth_frame::test_kernel);

@@ -84,8 +84,7 @@ class depth_integrator {
   [[nodiscard]] std::size_t memory_bytes() const noexcept {
     std::size_t bytes = frame_.memory_bytes() + walker_.memory_bytes() + points_.capacity() * sizeof(vec3f) +
                         workers_.capacity() * sizeof(descent_worker);
-    for (const descent_worker& w : workers_)
-      bytes += w.bricks.capacity() * sizeof(w.bricks[0]) + w.unsure.capacity() * sizeof(w.unsure[0]);
+    for (const descent_worker& w : workers_) bytes += w.memory_bytes();
     return bytes;
   }
 
@@ -106,11 +105,12 @@ class depth_integrator {
 
     workers_.resize(std::clamp<std::size_t>(policy.threads(), 1, std::max<std::size_t>(1, frame_.nodes.size())));
     const auto end = [&](int u, int v) { return end_of(sensor, depth, u, v); };
+    const depth_rays<decltype(end)> rays{frame_, sensor, end};
     std::atomic<std::size_t> next{0};
     for_each_index(policy, workers_.size(), 1, [&](std::size_t i) {
       workers_[i].bricks.clear();
-      const depth_descent<decltype(end), Saturated> descent{frame_, workers_[i], sensor, end,
-                                                            masks,  saturated,   on_face};
+      const depth_descent<depth_rays<decltype(end)>, Saturated> descent{frame_, workers_[i], sensor, rays,
+                                                                        masks,  saturated,   on_face};
       for (std::size_t n; (n = next.fetch_add(1, std::memory_order_relaxed)) < frame_.nodes.size();) {
         const depth_frame::node& node = frame_.nodes[n];
         descent.descend(node.key, node.center, depth_frame::list_level, node.inside);

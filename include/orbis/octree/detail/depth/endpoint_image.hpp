@@ -69,6 +69,13 @@ class endpoint_image {
   [[nodiscard]] const float* z(int v) const noexcept { return z_.data() + static_cast<std::size_t>(v) * stride_; }
   /// From row to row of `z`.
   [[nodiscard]] std::size_t stride() const noexcept { return stride_; }
+  /// One number for a pixel, and back.
+  [[nodiscard]] std::uint32_t number(int u, int v) const noexcept {
+    return static_cast<std::uint32_t>(static_cast<std::size_t>(v) * stride_ + static_cast<std::size_t>(u));
+  }
+  [[nodiscard]] std::array<int, 2> pixel(std::uint32_t number) const noexcept {
+    return {static_cast<int>(number % stride_), static_cast<int>(number / stride_)};
+  }
   [[nodiscard]] std::size_t memory_bytes() const noexcept {
     std::size_t bytes = rays_.memory_bytes() + z_.capacity() * sizeof(float) + workers_.capacity() * sizeof(worker);
     for (const worker& w : workers_) bytes += w.masks.memory_bytes() + w.keys.capacity() * sizeof(std::int32_t);

@@ -15,7 +15,7 @@
 #include <orbis/core/simd.hpp>
 #include <orbis/octree/detail/depth/depth_pyramid.hpp>
 #include <orbis/octree/detail/depth/direction_index.hpp>
-#include <orbis/octree/detail/depth/endpoint_image.hpp>
+#include <orbis/octree/detail/points/ray_traversal.hpp>
 
 namespace orbis::octree::detail {
 
@@ -47,11 +47,11 @@ struct depth_scene {
   float voxel = 0;                       ///< metres
   const direction_index* map = nullptr;  ///< of cameras that are not pinholes
   const depth_pyramid* pyramid = nullptr;
-  const endpoint_image* rays = nullptr;
+  /// Where every direction has a ray within a spacing (at z = 1), all rays of a tile of 1, 2x2 or 4x4 pixels that
+  /// contains the nearest ray lie within so many times the spacing.
+  std::array<float, 3> tiles{1.02F, 3.06F, 7.14F};
 
-  /// dense_z where every direction has a ray within `spacing` (at z = 1). All rays of a tile of 1, 2x2 or 4x4 pixels
-  /// that contains the nearest ray lie within `tiles[kind]` times the spacing.
-  static constexpr std::array<float, 3> tiles{1.02F, 3.06F, 7.14F};
+  /// dense_z where every direction has a ray within `spacing`.
   [[nodiscard]] float dense(std::size_t kind, float spacing) const noexcept {
     return ball / (tiles[kind] * spacing + ball_slope);
   }
@@ -163,7 +163,7 @@ struct classify_children_kernel {
       v1 += simd::gather(entries + 3, at);
       const floats spacing = simd::gather(entries + 4, at);
       for (std::size_t kind = 0; kind != 3; ++kind)
-        dense_z[kind] = s.ball / multiply_add(depth_scene::tiles[kind], spacing, s.ball_slope);
+        dense_z[kind] = s.ball / multiply_add(s.tiles[kind], spacing, s.ball_slope);
     }
     u0 = select(projects, u0, floats(0.0F));
     v0 = select(projects, v0, floats(0.0F));

@@ -155,30 +155,30 @@ template <class V>
   return out;
 }
 
-/// Whether a ray of the box surely crosses the voxel. If not, the pixels whose rays may cross it are appended to
-/// `unsure`. Rays that end before `near_z` do not.
+/// Whether a ray of the box surely crosses the voxel. If not, the numbers of the pixels whose rays may cross it are
+/// appended to `unsure`, see endpoint_image::number. Rays that end before `near_z` do not.
 struct test_pixels_kernel {
   template <simd::target Target>
-  static ORBIS_ALWAYS_INLINE bool run(const depth_scene& s, const voxel_test& t, const pixel_box& box, float near_z,
-                                      std::vector<std::array<std::int32_t, 2>>& unsure) {
+  static ORBIS_ALWAYS_INLINE bool run(const endpoint_image& ends, const voxel_test& t, const pixel_box& box,
+                                      float near_z, std::vector<std::uint32_t>& unsure) {
     using floats = simd::native_vec<float, Target>;
     constexpr auto n = static_cast<std::int32_t>(floats::count);
     const float least_z = std::max(near_z, std::numeric_limits<float>::min());
-    const bool separable = s.rays->rays().separable();
+    const pixel_rays& rays = ends.rays();
     for (std::int32_t v = box.v0; v <= box.v1; ++v) {
-      const float* const row_z = s.rays->z(v);
-      const float* const row_x = s.rays->rays().x(v);
-      const float* const row_y = s.rays->rays().y(v);
+      const float* const row_z = ends.z(v);
+      const float* const row_x = rays.x(v);
+      const float* const row_y = rays.y(v);
       for (std::int32_t u = box.u0; u <= box.u1; u += n) {
         const floats z = floats::load(row_z + u);
         const auto reaches = z >= least_z;
         if (none(reaches)) continue;
-        const floats y = separable ? floats(*row_y) : floats::load(row_y + u);
+        const floats y = rays.separable() ? floats(*row_y) : floats::load(row_y + u);
         const auto [may, sure] = test_rays(t, floats::load(row_x + u), y, z, reaches);
         if (none(may)) continue;
         if (any(sure)) return true;
         for (std::uint64_t left = simd::bits(may); left != 0; left &= left - 1)
-          unsure.push_back({u + std::countr_zero(left), v});
+          unsure.push_back(ends.number(u + std::countr_zero(left), v));
       }
     }
     return false;
@@ -189,70 +189,93 @@ struct test_pixels_kernel {
 inline constexpr std::array<std::array<float, 2>, 5> sample_places{{{0, 0}, {-1, -1}, {1, -1}, {-1, 1}, {1, 1}}};
 inline constexpr float sample_spread = 0.3F;
 
-/// The children that are surely crossed by the deepest of a few rays that pass close to their centres. `world`: the
-/// parent's centre relative to the camera's.
-struct sample_children_kernel {
-  template <simd::target Target>
-  static ORBIS_ALWAYS_INLINE unsigned run(const depth_scene& s, const child_offsets& o, const float3& world,
-                                          const children& c, unsigned wanted) noexcept {
-    using floats = simd::vec<float, 8, Target>;
-    using integers = simd::vec<std::int32_t, 8, Target>;
-    using mask = typename floats::mask_type;
-    const mask asked = mask::from_bits(wanted), projects = floats::load(c.near_z.data()) > s.near_z;
+/// For each child a pixel close to its centre, the one of a few that is deepest. z < 0: none is wanted
+template <class Floats, class Integers>
+struct sampled_pixels {
+  Floats z{-1.0F};
+  Integers u{0}, v{0};
+
+  /// `depth_at(u, v)`: the depths of pixels.
+  template <class Depth>
+  ORBIS_ALWAYS_INLINE sampled_pixels(const depth_scene& s, const children& c, unsigned wanted,
+                                     const Depth& depth_at) noexcept {
+    using mask = typename Floats::mask_type;
+    const mask asked = mask::from_bits(wanted), projects = Floats::load(c.near_z.data()) > s.near_z;
     const mask at_middle = s.map != nullptr ? mask::first(8) : !projects;  // of the pixels that may see it
-    const floats per_z = select(projects, 1.0F / floats::load(c.z.data()), floats(0.0F));
-    const integers u0 = integers::load(c.u0.data()), u1 = integers::load(c.u1.data());
-    const integers v0 = integers::load(c.v0.data()), v1 = integers::load(c.v1.data());
-    const auto middle = [&](const float* p, float f, float centre, const integers& first, const integers& last)
+    const Floats per_z = select(projects, 1.0F / Floats::load(c.z.data()), Floats(0.0F));
+    const Integers u0 = Integers::load(c.u0.data()), u1 = Integers::load(c.u1.data());
+    const Integers v0 = Integers::load(c.v0.data()), v1 = Integers::load(c.v1.data());
+    const auto middle = [&](const float* p, float f, float centre, const Integers& first, const Integers& last)
                             ORBIS_INLINE_LAMBDA {
-                              const floats at = multiply_add(f, floats::load(p) * per_z, centre);
+                              const Floats at = multiply_add(f, Floats::load(p) * per_z, centre);
                               return select(at_middle, 0.5F * simd::convert<float>(first + last), at);
                             };
-    const auto nearest = [&](const floats& at, const integers& first, const integers& last) ORBIS_INLINE_LAMBDA {
-      return select(asked, min(max(simd::convert<std::int32_t>(at + 0.5F), first), last), integers(0));
+    const auto nearest = [&](const Floats& at, const Integers& first, const Integers& last) ORBIS_INLINE_LAMBDA {
+      return select(asked, min(max(simd::convert<std::int32_t>(at + 0.5F), first), last), Integers(0));
     };
-    const floats mid_u = middle(c.x.data(), s.fx, s.cx, u0, u1), mid_v = middle(c.y.data(), s.fy, s.cy, v0, v1);
-    const floats spread = s.voxel * sample_spread * per_z, spread_u = spread * s.fx, spread_v = spread * s.fy;
-    const pixel_rays& rays = s.rays->rays();
-    const integers row_size(static_cast<std::int32_t>(s.rays->stride()));
-    floats z(-1.0F);
-    integers u(0), v(0);
+    const Floats mid_u = middle(c.x.data(), s.fx, s.cx, u0, u1), mid_v = middle(c.y.data(), s.fy, s.cy, v0, v1);
+    const Floats spread = s.voxel * sample_spread * per_z, spread_u = spread * s.fx, spread_v = spread * s.fy;
     for (const auto& [du, dv] : sample_places) {
-      const integers at_u = nearest(multiply_add(du, spread_u, mid_u), u0, u1);
-      const integers at_v = nearest(multiply_add(dv, spread_v, mid_v), v0, v1);
-      const floats at_z = simd::gather(s.rays->z(0), at_v * row_size + at_u);
+      const Integers at_u = nearest(multiply_add(du, spread_u, mid_u), u0, u1);
+      const Integers at_v = nearest(multiply_add(dv, spread_v, mid_v), v0, v1);
+      const Floats at_z = depth_at(at_u, at_v);
       const mask deeper = at_z > z;
       z = select(deeper, at_z, z);
       u = select(deeper, at_u, u);
       v = select(deeper, at_v, v);
     }
+  }
+};
+
+/// The children that a ray each, through (x, y, 1) to depth `z`, surely crosses. `world`: the parent's centre relative
+/// to the camera's. z <= 0: no ray
+template <class Floats>
+[[nodiscard]] ORBIS_ALWAYS_INLINE auto children_crossed(const depth_scene& s, const child_offsets& o,
+                                                        const float3& world, const Floats& x, const Floats& y,
+                                                        const Floats& z) noexcept {
+  const std::array<Floats, 3> centre{world[0] + Floats::load(o.world_x.data()),
+                                     world[1] + Floats::load(o.world_y.data()),
+                                     world[2] + Floats::load(o.world_z.data())};
+  const ray_and_cube<Floats> ray{s.x_axis, s.y_axis, s.z_axis, x, y};
+  const Floats l1 = abs(centre[0]) + abs(centre[1]) + abs(centre[2]);
+  const Floats margin = multiply_add(s.margin_1, l1, s.margin_0), twice = margin + margin;
+  const Floats loose = 4.0F * o.half * margin / max(l1, Floats(o.half)) * ray.length, inner = o.half - twice;
+  const Floats close = multiply_add(s.margin_1, z * ray.length, margin), room = o.half + close;
+  auto sure = z > 0.0F;
+  Floats beyond(0.0F);
+  for (std::size_t i = 0; i != 3; ++i) {
+    const Floats d = multiply_add(z, ray.direction[i], -centre[i]);
+    const Floats forward = select(centre[i] < 0.0F, -d, d);  // away from the camera
+    sure = sure & (ray.off(i, centre) < multiply_add(inner, ray.width(i), -loose)) &
+           ((forward + room >= 0.0F) | (abs(centre[i]) < o.half + twice));
+    beyond = max(beyond, abs(d));
+  }
+  return sure & (beyond > room);
+}
+
+/// The children that are surely crossed by the deepest of a few rays that pass close to their centres. `world`: the
+/// parent's centre relative to the camera's.
+struct sample_children_kernel {
+  template <simd::target Target>
+  static ORBIS_ALWAYS_INLINE unsigned run(const depth_scene& s, const endpoint_image& ends, const child_offsets& o,
+                                          const float3& world, const children& c, unsigned wanted) noexcept {
+    using floats = simd::vec<float, 8, Target>;
+    using integers = simd::vec<std::int32_t, 8, Target>;
+    const integers row_size(static_cast<std::int32_t>(ends.stride()));
+    const sampled_pixels<floats, integers> at{
+        s, c, wanted, [&](const integers& u, const integers& v)
+                          ORBIS_INLINE_LAMBDA { return simd::gather(ends.z(0), v * row_size + u); }};
+    const pixel_rays& rays = ends.rays();
     floats x, y;
     if (rays.separable()) {
-      x = (simd::convert<float>(u) - s.cx) * s.per_fx;
-      y = (simd::convert<float>(v) - s.cy) * s.per_fy;
+      x = (simd::convert<float>(at.u) - s.cx) * s.per_fx;
+      y = (simd::convert<float>(at.v) - s.cy) * s.per_fy;
     } else {
-      const integers i = v * integers(static_cast<std::int32_t>(rays.x(1) - rays.x(0))) + u;
+      const integers i = at.v * integers(static_cast<std::int32_t>(rays.x(1) - rays.x(0))) + at.u;
       x = simd::gather(rays.x(0), i);
       y = simd::gather(rays.y(0), i);
     }
-    const std::array<floats, 3> centre{world[0] + floats::load(o.world_x.data()),
-                                       world[1] + floats::load(o.world_y.data()),
-                                       world[2] + floats::load(o.world_z.data())};
-    const ray_and_cube<floats> ray{s.x_axis, s.y_axis, s.z_axis, x, y};
-    const floats l1 = abs(centre[0]) + abs(centre[1]) + abs(centre[2]);
-    const floats margin = multiply_add(s.margin_1, l1, s.margin_0), twice = margin + margin;
-    const floats loose = 4.0F * o.half * margin / max(l1, floats(o.half)) * ray.length, inner = o.half - twice;
-    const floats close = multiply_add(s.margin_1, z * ray.length, margin), room = o.half + close;
-    mask sure = z > 0.0F;
-    floats beyond(0.0F);
-    for (std::size_t i = 0; i != 3; ++i) {
-      const floats d = multiply_add(z, ray.direction[i], -centre[i]);
-      const floats forward = select(centre[i] < 0.0F, -d, d);  // away from the camera
-      sure = sure & (ray.off(i, centre) < multiply_add(inner, ray.width(i), -loose)) &
-             ((forward + room >= 0.0F) | (abs(centre[i]) < o.half + twice));
-      beyond = max(beyond, abs(d));
-    }
-    return simd::bits(sure & (beyond > room)) & wanted;
+    return simd::bits(children_crossed(s, o, world, x, y, at.z)) & wanted;
   }
 };
 
