@@ -46,7 +46,7 @@ struct integration_summary {
   std::size_t used = 0;       ///< points within range
   std::size_t truncated = 0;  ///< points beyond the range
   std::size_t rejected = 0;   ///< points that are NaN, infinite, or too far outside the grid
-  std::size_t free = 0;       ///< voxels observed free
+  std::size_t free = 0;       ///< voxels observed free; in a map without those that are free already and saturated
   std::size_t occupied = 0;   ///< voxels observed occupied
 };
 

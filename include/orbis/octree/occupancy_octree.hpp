@@ -96,7 +96,9 @@ class occupancy_octree {
   /// is observed free once and every voxel that holds a point is observed occupied once, however many rays and
   /// points there are; where both is the case, it is observed occupied. Coordinates are rounded to float first.
   /// The result does not depend on the policy or on the order of the points. Points that are not finite or lie
-  /// outside the grid are counted as rejected; if the origin is not finite, all are. O(points x voxels per ray).
+  /// outside the grid are counted as rejected; if the origin is not finite, all are. In mode every_ray, a scan with
+  /// many points for its voxels, as of a depth image, costs little more than the image: O(points + voxels near
+  /// surfaces); and another O(points x voxels per ray).
   template <execution_policy Policy, point_range Points, point_like Origin>
   integration_summary integrate(const Policy& policy, const Points& points, const Origin& origin,
                                 const integration_options& options = {}) {
@@ -108,7 +110,6 @@ class occupancy_octree {
   }
   /// Integrates a depth image (depths in metres along the optical axis). The map is the one that the image's world
   /// points (see append_world_points) make when seen from the camera's centre, but this is many times as fast.
-  /// Voxels that are free already and saturated are skipped and not counted in the summary's `free`.
   /// O(pixels + voxels near surfaces).
   /// @pre depth and camera have the same size; options.beam_ranges is empty
   template <execution_policy Policy, camera::depth_source Depth, camera::camera_model Camera>
@@ -481,7 +482,9 @@ integration_summary occupancy_octree<Model>::integrate_points(const Policy& poli
                                                               const integration_options& options) {
   begin_change();
   detail::point_integrator& marker = scratch_.get().marker;
-  integration_summary summary = marker.mark(policy, grid_, points, origin, options);
+  integration_summary summary = marker.mark(
+      policy, grid_, points, origin, options,
+      [this](std::uint64_t name, auto& saturated) { detail::find_saturated<Model>(store_, name, saturated); });
   apply_scan(marker.masks(), summary);
   return summary;
 }

@@ -267,7 +267,7 @@ class scan_history {
         const voxel_key key = detail::named_key(p.name);
         auto& b = store.make(key);
         voxels.for_each_octant(p, [&](unsigned octant, std::uint64_t free, std::uint64_t occupied) {
-          const std::uint64_t changed = detail::apply_octant<model>(store, b, octant, occupied, free);
+          const std::uint64_t changed = detail::apply_octant<model>(store, b, octant, occupied, free).changed;
           if (log != nullptr) log->record(child_key(key, octant, node_cells(detail::octant_level)), changed);
         });
       }

@@ -110,3 +110,35 @@ TEST_CASE("A ray ends at its point or at its limit") {
     CHECK(std::abs(rays->end[0][1] - 1.56F) < 1e-6F);
   }
 }
+
+TEST_CASE("Hits in the voxel of the ray before are left out, and no others but a few") {
+  random_bits random{212};
+  auto rays = std::make_unique<ray_batch>();
+  std::size_t repeated = 0, kept = 0;
+  for (const simd::level level : simd::available_levels()) {
+    const simd::level_limit limit{level};
+    for (int run = 0; run != 100; ++run) {
+      const std::size_t count = random.below(ray_batch::capacity + 1);
+      rays->clear();
+      std::array<std::int32_t, 3> cell{};
+      for (std::size_t i = 0; i != count; ++i) {
+        if (random.below(3) == 0) cell[random.below(3)] += random.below(2) == 0 ? 1 : -1;
+        if (random.below(10) != 0) rays->set(i, {}, cell, random.below(10) != 0);
+      }
+      ray_batch::bits fresh;
+      find_fresh_hits()(*rays, count, fresh);
+      for (std::size_t i = 0; i != ray_batch::capacity; ++i) {
+        if (i >= count || !has(rays->hit, i)) {
+          REQUIRE_FALSE(has(fresh, i));
+          continue;
+        }
+        const bool repeats = i != 0 && has(rays->hit, i - 1) && rays->way[0][i] == rays->way[0][i - 1] &&
+                             rays->way[1][i] == rays->way[1][i - 1] && rays->way[2][i] == rays->way[2][i - 1];
+        if (!repeats) REQUIRE(has(fresh, i));
+        repeated += repeats ? 1 : 0;
+        kept += repeats && has(fresh, i) ? 1 : 0;
+      }
+    }
+  }
+  CHECK(8 * kept < repeated);
+}

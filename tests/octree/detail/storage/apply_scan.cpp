@@ -35,8 +35,9 @@ TEST_CASE("A scan gives every voxel its hit or its miss, and says which voxels c
         const bool miss = !hit && (b.free[place >> 6U] >> (place & 63U) & 1U) != 0;
         if (!hit && !miss) continue;
         float& v = expected[{low.x + in.x, low.y + in.y, low.z + in.z}];
+        occupied += hit ? 1 : 0;
+        free += miss && v > model::clamp_min ? 1 : 0;
         v = hit ? after_hit<model>(v) : after_miss<model>(v);
-        (hit ? occupied : free) += 1;
       }
     log.begin_revision();
     integration_summary summary;

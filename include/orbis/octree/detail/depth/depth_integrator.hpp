@@ -24,17 +24,13 @@
 #include <orbis/octree/detail/depth/depth_descent.hpp>
 #include <orbis/octree/detail/depth/depth_frame.hpp>
 #include <orbis/octree/detail/depth/endpoint_rows.hpp>
+#include <orbis/octree/detail/depth/first_steps.hpp>
 #include <orbis/octree/detail/points/point_integrator.hpp>
 #include <orbis/octree/detail/storage/node_name.hpp>
 #include <orbis/octree/detail/storage/scan_masks.hpp>
 #include <orbis/octree/integration.hpp>
 
 namespace orbis::octree::detail {
-
-/// No voxel is saturated: a miss may change each of them.
-struct nothing_saturated {
-  void operator()(std::uint64_t, std::array<std::uint64_t, 8>&) const noexcept {}
-};
 
 /// Marks the voxels of depth images. Keeps its memory from image to image.
 ///
@@ -96,7 +92,6 @@ class depth_integrator {
   template <class Policy, class Depth, class Saturated>
   void mark_free(const Policy& policy, const depth_sensor& sensor, const Depth& depth, float max_z,
                  const std::pair<voxel_key, voxel_key>& bounds, scan_masks& masks, Saturated& saturated) {
-    const voxel_key& from = *sensor.key;
     if (frame_.scene.map != nullptr) walk_outer(sensor, depth, masks);
     frame_.pyramid.build(frame_.ends.rays().width(), frame_.ends.rays().height(), max_z,
                          [&](int v) { return frame_.ends.z(v); });
@@ -118,9 +113,12 @@ class depth_integrator {
     });
     for (const descent_worker& w : workers_)
       for (const auto& b : w.bricks) join(masks.at(named_key(b.name)).free, b.free);
-    const std::uint32_t place = place_in_brick(from);
-    masks.at(from).free[place >> 6U] |= std::uint64_t{1} << (place & 63U);
-    if (on_face) walk_first_steps(sensor, depth, masks);
+    masks.mark_free(*sensor.key);
+    if (on_face) {
+      first_voxels around{sensor};
+      for_each_end(sensor, depth, [&](const ray_endpoint& e) { around.add(e); });
+      around.mark(masks);
+    }
   }
 
   // -- every ray, for the few cases that need it
@@ -159,34 +157,6 @@ class depth_integrator {
   static void join(words& to, const words& from) noexcept {
     for (std::size_t i = 0; i != 8; ++i) to[i] |= from[i];
   }
-  /// Marks the neighbours of the camera's voxel.
-  template <class Depth>
-  void walk_first_steps(const depth_sensor& sensor, const Depth& depth, scan_masks& masks) const {
-    const voxel_key from = *sensor.key;
-    std::uint32_t seen = 0;  // of 3x3x3 voxels
-    for_each_end(sensor, depth, [&](const ray_endpoint& e) {
-      if (e.key == from) return;
-      auto cursor = ray_traversal::between(sensor.grid, from, sensor.pose.centre, e.point);
-      if (!cursor) return;
-      for (;;) {
-        const std::size_t axis = cursor->axis();
-        if (!cursor->can_step(axis)) return;
-        cursor->advance(axis);
-        const voxel_key k = cursor->key();
-        const std::uint32_t x = k.x - from.x + 1, y = k.y - from.y + 1, z = k.z - from.z + 1;
-        if (x > 2 || y > 2 || z > 2 || k == e.key) return;
-        if (std::min(std::min(cursor->next[0], cursor->next[1]), cursor->next[2]) > cursor->reach) return;
-        seen |= 1U << (x + 3 * y + 9 * z);
-      }
-    });
-    for (; seen != 0; seen &= seen - 1) {
-      const auto i = static_cast<std::uint32_t>(std::countr_zero(seen));
-      const voxel_key k{from.x + i % 3 - 1, from.y + i / 3 % 3 - 1, from.z + i / 9 - 1};
-      const std::uint32_t place = place_in_brick(k);
-      masks.at(k).free[place >> 6U] |= std::uint64_t{1} << (place & 63U);
-    }
-  }
-
   depth_frame frame_;
   point_integrator walker_;
   std::vector<vec3f> points_;

@@ -112,15 +112,6 @@ struct end_counts {
   }
 };
 
-/// The voxels along one axis as far as float arithmetic can tell; where it cannot, `sure` is cleared. The product errs
-/// by two roundings, so that a voxel is certain four of them away from its faces.
-template <class Floats, class Mask>
-[[nodiscard]] ORBIS_ALWAYS_INLINE auto likely_keys(const Floats& at, float per_metre, float half, Mask& sure) noexcept {
-  const Floats cells = at * per_metre, whole = floor(cells), above = cells - whole, size = abs(cells);
-  sure = sure & (min(above, 1.0F - above) > size * 0x1p-22F) & (size < half - 2.0F);
-  return simd::convert<std::int32_t>(whole) + static_cast<std::int32_t>(half);
-}
-
 /// Fills in where the rays of a row end.
 struct find_ends_kernel {
   template <simd::target Target>

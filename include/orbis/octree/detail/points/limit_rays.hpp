@@ -66,46 +66,88 @@ struct limit_rays_kernel {
   template <simd::target Target>
   static ORBIS_ALWAYS_INLINE void run(const ray_frame& f, const point_batch& points, const double* limits,
                                       std::size_t count, ray_batch& rays) noexcept {
-    constexpr std::size_t n = Target::bytes == 64 ? 8 : 4;
-    using floats = simd::vec<float, n, Target>;
+    using floats = simd::native_vec<float, Target>;
+    using integers = simd::native_vec<std::int32_t, Target>;
+    constexpr std::size_t n = floats::count;
     using doubles = simd::vec<double, n, Target>;
-    using integers = simd::vec<std::int32_t, n, Target>;
+    using mask = typename floats::mask_type;
     rays.clear();
     const std::array<const float*, 3> at{points.x.data(), points.y.data(), points.z.data()};
     const std::array<std::uint32_t, 3> from{f.from.x, f.from.y, f.from.z};
     const double per_metre = 1.0 / f.grid.resolution(), half = 0.5 * f.grid.cells();
-    const auto to_way = [&](std::size_t axis) ORBIS_INLINE_LAMBDA {
-      return integers(static_cast<int>((f.grid.cells() >> 1U) - from[axis]));
-    };
-    const std::array<integers, 3> ways{to_way(0), to_way(1), to_way(2)};
+    const auto per_metre_f = static_cast<float>(per_metre), half_f = static_cast<float>(half);
+    constexpr double less = 1.0 - 0x1p-50;  // than one by more than the rounding of a square and of a root
     for (std::size_t i = 0; i < count; i += n) {
       const auto along = [&](std::size_t axis)
                              ORBIS_INLINE_LAMBDA { return floats::load(at[axis] + i) - floats(f.origin[axis]); };
       const std::array<floats, 3> ray{along(0), along(1), along(2)};
-      const doubles distance = sqrt(simd::convert<double>(ray[0] * ray[0] + ray[1] * ray[1] + ray[2] * ray[2]));
+      const floats square = ray[0] * ray[0] + ray[1] * ray[1] + ray[2] * ray[2];
       const doubles limit = doubles::load(limits + i);
-      const auto is_hit = simd::mask_as<4>(distance <= limit);
-      const floats scale = simd::convert<float>(distance), range = simd::convert<float>(limit);
-      auto inside = floats::mask_type::first(count - i);
-      for (std::size_t axis = 0; axis != 3; ++axis) {
-        floats end = floats::load(at[axis] + i);
-        if (!all(is_hit)) end = select(is_hit, end, f.origin[axis] + ray[axis] / scale * range);
-        end.store(rays.end[axis].data() + i);
-        (cells_along(end, per_metre, half, inside) + ways[axis]).store(rays.way[axis].data() + i);
+      mask inside = mask::first(count - i), is_cut = mask::first(0);
+      mask is_hit = simd::mask_as<4>((simd::convert<double>(square) <= limit * limit * less) & (limit >= 0.0));
+      std::array<floats, 3> end{floats::load(at[0] + i), floats::load(at[1] + i), floats::load(at[2] + i)};
+      if (any(and_not(inside, is_hit))) {
+        const doubles distance = sqrt(simd::convert<double>(square));
+        is_hit = simd::mask_as<4>(distance <= limit);
+        const floats scale = simd::convert<float>(distance), range = simd::convert<float>(limit);
+        for (std::size_t axis = 0; axis != 3; ++axis)
+          end[axis] = select(is_hit, end[axis], f.origin[axis] + ray[axis] / scale * range);
+        is_cut = and_not(simd::mask_as<4>(limit >= 0.0) & (scale <= floats(std::numeric_limits<float>::max())), is_hit);
       }
-      const auto may_be_cut = simd::mask_as<4>(limit >= 0.0) & (scale <= floats(std::numeric_limits<float>::max()));
+      mask sure = inside;
+      std::array<integers, 3> cell;
+      for (std::size_t axis = 0; axis != 3; ++axis) cell[axis] = likely_keys(end[axis], per_metre_f, half_f, sure);
+      if (any(and_not(inside, sure)))
+        for (std::size_t axis = 0; axis != 3; ++axis)
+          cell[axis] = cells_along(end[axis], per_metre, half, inside) + static_cast<std::int32_t>(half);
+      for (std::size_t axis = 0; axis != 3; ++axis) {
+        end[axis].store(rays.end[axis].data() + i);
+        (cell[axis] - static_cast<std::int32_t>(from[axis])).store(rays.way[axis].data() + i);
+      }
       rays.hit[i >> 6U] |= std::uint64_t{simd::bits(inside & is_hit)} << (i & 63U);
-      rays.cut[i >> 6U] |= std::uint64_t{simd::bits(and_not(inside & may_be_cut, is_hit))} << (i & 63U);
+      rays.cut[i >> 6U] |= std::uint64_t{simd::bits(inside & is_cut)} << (i & 63U);
     }
   }
 };
 
+/// The hits of a batch whose voxel is not that of the ray before: neighbouring points mostly end in the same one.
+struct fresh_hits_kernel {
+  template <simd::target Target>
+  static ORBIS_ALWAYS_INLINE void run(const ray_batch& rays, std::size_t count, ray_batch::bits& fresh) noexcept {
+    using integers = simd::native_vec<std::int32_t, Target>;
+    constexpr std::size_t n = integers::count;
+    fresh = {};
+    for (std::size_t i = 0; i < count; i += n) {
+      const auto differs = [&](std::size_t axis) ORBIS_INLINE_LAMBDA {
+        const std::int32_t* const way = rays.way[axis].data() + i;
+        return integers::load(way) ^ integers::load(way - 1);
+      };
+      std::uint64_t changed = (std::uint64_t{1} << n) - 1;  // the first have none before them
+      if (i != 0) changed = simd::bits((differs(0) | differs(1) | differs(2)) != integers(0));
+      fresh[i >> 6U] |= changed << (i & 63U);
+    }
+    // A ray after one that is no hit counts as well.
+    std::uint64_t before = 0;
+    for (std::size_t w = 0; w != fresh.size(); ++w) {
+      const std::uint64_t follows = rays.hit[w] << 1U | before;
+      before = rays.hit[w] >> 63U;
+      fresh[w] = rays.hit[w] & (fresh[w] | ~follows);
+    }
+  }
+};
+
+using fresh_kernel = void(const ray_batch&, std::size_t, ray_batch::bits&);
+[[nodiscard]] inline fresh_kernel* find_fresh_hits() noexcept {
+  return simd::kernel<fresh_hits_kernel, fresh_kernel>();
+}
+
 using limit_kernel = void(const ray_frame&, const point_batch&, const double*, std::size_t, ray_batch&);
 
 /// Finds the rays to `count` points, each cut off at its limit in metres. A limit that is negative or NaN, or an end
-/// that lies outside the grid: no ray. @pre points and limits can be read up to a multiple of 8
+/// that lies outside the grid: no ray. @pre points and limits can be read up to a multiple of 16
 [[nodiscard]] inline limit_kernel* limit_rays() noexcept { return simd::kernel<limit_rays_kernel, limit_kernel>(); }
 
 }  // namespace orbis::octree::detail
 
 ORBIS_COMPILED_KERNEL(orbis::octree::detail::limit_rays_kernel, orbis::octree::detail::limit_kernel);
+ORBIS_COMPILED_KERNEL(orbis::octree::detail::fresh_hits_kernel, orbis::octree::detail::fresh_kernel);

@@ -15,10 +15,12 @@
 #include <optional>
 #include <ranges>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include <orbis/core/execution.hpp>
 #include <orbis/core/rounded.hpp>
+#include <orbis/octree/detail/points/dense_rays.hpp>
 #include <orbis/octree/detail/points/limit_rays.hpp>
 #include <orbis/octree/detail/points/point_keys.hpp>
 #include <orbis/octree/detail/points/ray_rasterizer.hpp>
@@ -27,6 +29,11 @@
 #include <orbis/octree/key.hpp>
 
 namespace orbis::octree::detail {
+
+/// No voxel is saturated: a miss may change each of them.
+struct nothing_saturated {
+  void operator()(std::uint64_t, std::array<std::uint64_t, 8>&) const noexcept {}
+};
 
 /// Removes the voxels outside `bounds` from a scan; does nothing without bounds.
 inline void clip(scan_masks& masks, const voxel_grid& grid, const std::optional<bounding_box>& bounds) {
@@ -44,19 +51,28 @@ class point_integrator {
   /// The voxels of the last scan; a voxel both free and occupied counts as occupied.
   [[nodiscard]] const scan_masks& masks() const noexcept { return workers_.front().masks; }
 
-  /// Marks the scan of `count` points, `point(i)` being the i-th as float3, seen from `origin`. The
+  /// Marks the scan of `count` points, `point(i)` being the i-th as float3, seen from `origin`. In mode every_ray,
+  /// voxels for which `saturated` says that a miss would not change them may be missing among the free ones, see
+  /// depth_integrator::mark. The
   /// summary's voxel counts stay zero. Nothing is marked if the origin is not finite; rays are not
-  /// traversed if it lies outside the grid. O(points x voxels along a ray).
-  template <execution_policy Policy, class Point>
+  /// traversed if it lies outside the grid. O(points + voxels at surfaces), or O(points x voxels along a ray) where
+  /// there are few points for that many voxels.
+  template <execution_policy Policy, class Point, class Saturated = nothing_saturated>
   integration_summary mark(const Policy& policy, const voxel_grid& grid, std::size_t count, Point&& point,
-                           const float3& origin, const integration_options& options) {
+                           const float3& origin, const integration_options& options, Saturated&& saturated = {}) {
     assert(options.beam_ranges.empty() || options.beam_ranges.size() == count);
     prepare(policy.threads(), count);
     if (!is_finite(origin)) return {.used = 0, .truncated = 0, .rejected = count};
     const sensor from = start(grid, origin, options);
     if (options.mode == ray_mode::every_ray) {
+      const auto limit = [&](std::size_t i) { return from.limit(i); };
+      if (from.key && dense_.plan(grid, origin, count, point, limit)) {
+        if (const auto done = mark_dense(policy, from, count, point, options, saturated)) return *done;
+        for (worker& w : active_) w.clear();  // too close to the border of the grid
+        start(grid, origin, options);
+      }
       for_each_with_worker(policy, count, 4096, [&](worker& w, std::size_t begin, std::size_t end) {
-        w.add_points(from, begin, end, point);
+        w.add_points(from, begin, end, point, [](std::size_t, std::size_t) {});
       });
     } else {
       for_each_with_worker(policy, count, 4096, [&](worker& w, std::size_t begin, std::size_t end) {
@@ -72,11 +88,11 @@ class point_integrator {
   }
 
   /// Marks the scan of a range of points.
-  template <execution_policy Policy, point_range Points>
+  template <execution_policy Policy, point_range Points, class Saturated = nothing_saturated>
   integration_summary mark(const Policy& policy, const voxel_grid& grid, const Points& points, const float3& origin,
-                           const integration_options& options) {
+                           const integration_options& options, Saturated&& saturated = {}) {
     return mark(policy, grid, static_cast<std::size_t>(std::ranges::size(points)), point_source<Points>{points}, origin,
-                options);
+                options, saturated);
   }
 
   /// The second half of mode `discretized` alone: marks the rays to the centres of the voxels that are
@@ -91,7 +107,7 @@ class point_integrator {
   }
 
   [[nodiscard]] std::size_t memory_bytes() const noexcept {
-    std::size_t bytes = workers_.capacity() * sizeof(worker);
+    std::size_t bytes = workers_.capacity() * sizeof(worker) + dense_.memory_bytes();
     for (const worker& w : workers_) bytes += w.masks.memory_bytes() + w.ends.memory_bytes() + w.sweep.memory_bytes();
     return bytes;
   }
@@ -104,6 +120,7 @@ class point_integrator {
     double max_range;
     std::span<const float> beam_ranges;
     limit_kernel* limit_batch = limit_rays();
+    fresh_kernel* fresh_hits = find_fresh_hits();
 
     /// Of the i-th point; negative or NaN if it is to be rejected.
     [[nodiscard]] double limit(std::size_t i) const noexcept {
@@ -111,9 +128,16 @@ class point_integrator {
       const auto own = static_cast<double>(beam_ranges[i]);
       return own > max_range ? max_range : own;
     }
+    /// Where the ray to a point ends that is known to be one; what limit_rays finds.
+    [[nodiscard]] ray_endpoint end(const float3& p, double limit) const noexcept {
+      const float3 ray = difference(p, origin);
+      const double distance = length(ray);
+      ray_endpoint e;
+      e.point = distance <= limit ? p : cut_off(origin, ray, distance, limit);
+      e.key = *grid.key(e.point);
+      return e;
+    }
   };
-
-  static constexpr voxel_key no_key{~std::uint32_t{0}, 0, 0};
 
   /// What one thread collects.
   struct worker {
@@ -121,49 +145,60 @@ class point_integrator {
     scan_masks ends;  ///< mode discretized: voxels that hold points, as occupied, and ends of rays cut off, as free
     integration_summary summary;
     ray_rasterizer sweep;
-    voxel_key last_end = no_key;
     point_batch batch;
     std::size_t batched = 0;  ///< centres that are waiting in the batch
     std::array<double, point_batch::capacity> limits;
     batch_keys keys;
     ray_batch rays;
+    std::array<voxel_key, 1024> marked;  ///< some that are: points of the next row of an image end in the same voxels
 
     void clear() noexcept {
-      last_end = no_key;
+      marked.fill({~std::uint32_t{0}, 0, 0});
       masks.clear();
       ends.clear();
       summary = {};
     }
-    /// The points [begin, end) in mode every_ray.
-    template <class Point>
-    void add_points(const sensor& from, std::size_t begin, std::size_t end, Point&& point) {
+    /// The points [begin, end) in mode every_ray. `take(begin, count)` may take rays out of `rays`, see
+    /// binned_rays::add.
+    template <class Point, class Take>
+    void add_points(const sensor& from, std::size_t begin, std::size_t end, Point&& point, Take&& take) {
       if (from.beam_ranges.empty()) limits.fill(from.max_range);
       while (begin != end) {
         const std::size_t n = std::min(end - begin, point_batch::capacity);
         load_points(point, begin, n, batch);
         if (!from.beam_ranges.empty())
           for (std::size_t i = 0; i != n; ++i) limits[i] = from.limit(begin + i);
+        find_rays(from, n);
+        take(begin, n);
+        if (from.key) sweep.add(rays, n, masks);
         begin += n;
-        add_batch(from, n);
       }
     }
     /// The first `count` points of the batch, each with its limit.
     void add_batch(const sensor& from, std::size_t count) {
+      find_rays(from, count);
+      if (from.key) sweep.add(rays, count, masks);
+    }
+    /// The rays of the batch; their points are marked and counted.
+    void find_rays(const sensor& from, std::size_t count) {
       const voxel_key base = from.key.value_or(voxel_key{});
       from.limit_batch({from.grid, from.origin, base}, batch, limits.data(), count, rays);
       const std::size_t used = ray_batch::count(rays.hit), cut = ray_batch::count(rays.cut);
       summary.used += used;
       summary.truncated += cut;
       summary.rejected += count - used - cut;
-      for (std::size_t word = 0; word != rays.hit.size(); ++word)
-        for (std::uint64_t left = rays.hit[word]; left != 0; left &= left - 1) {
+      ray_batch::bits fresh;
+      from.fresh_hits(rays, count, fresh);
+      for (std::size_t word = 0; word != fresh.size(); ++word)
+        for (std::uint64_t left = fresh[word]; left != 0; left &= left - 1) {
           const std::size_t i = 64 * word + static_cast<std::size_t>(std::countr_zero(left));
           const auto at = [&](std::size_t axis) { return static_cast<std::uint32_t>(rays.way[axis][i]); };
           const voxel_key k{base.x + at(0), base.y + at(1), base.z + at(2)};
-          if (k != last_end) masks.mark_occupied(k);  // neighbouring pixels mostly end in the same voxel
-          last_end = k;
+          voxel_key& last = marked[(k.x * 5 + k.y * 37 + k.z * 331) % marked.size()];
+          if (k == last) continue;
+          last = k;
+          masks.mark_occupied(k);
         }
-      if (from.key) sweep.add(rays, count, masks);
     }
     /// The points [begin, end) in mode discretized.
     template <class Point>
@@ -254,9 +289,41 @@ class point_integrator {
     });
     for (worker& w : active_) w.add_batched(from);
   }
+  /// A scan for which dense_ has a plan; empty if it cannot be done.
+  template <class Policy, class Point, class Saturated>
+  std::optional<integration_summary> mark_dense(const Policy& policy, const sensor& from, std::size_t count,
+                                                Point&& point, const integration_options& options,
+                                                Saturated& saturated) {
+    const std::size_t workers = active_.size();
+    dense_.start(from.origin, count, workers);
+    const auto range = [&](std::size_t i) {
+      const std::size_t share = (count / workers + point_batch::capacity) & ~(point_batch::capacity - 1);
+      return std::pair{std::min(count, i * share), std::min(count, (i + 1) * share)};
+    };
+    for_each_index(policy, workers, 1, [&](std::size_t i) {
+      worker& w = workers_[i];
+      const auto [begin, end] = range(i);
+      w.add_points(from, begin, end, point, [&](std::size_t first, std::size_t n) { dense_.add(i, w.rays, first, n); });
+      w.sweep.flush(w.masks);
+    });
+    worker& all = join_workers();
+    const se3 pose{so3{}, vec3{static_cast<double>(from.origin[0]), static_cast<double>(from.origin[1]),
+                               static_cast<double>(from.origin[2])}};
+    const depth_sensor camera{from.grid, pose, from.max_range};
+    const auto end_of = [&](std::uint32_t i) { return from.end(point(i), from.limit(i)); };
+    if (!dense_.mark(policy, camera, range, end_of, all.masks, saturated)) return std::nullopt;
+    clip(all.masks, from.grid, options.bounds);
+    return all.summary;
+  }
   template <class Policy>
   integration_summary finish(const Policy& policy, const voxel_grid& grid, const integration_options& options) {
     for_each_index(policy, active_.size(), 1, [&](std::size_t i) { workers_[i].sweep.flush(workers_[i].masks); });
+    worker& all = join_workers();
+    clip(all.masks, grid, options.bounds);
+    return all.summary;
+  }
+  /// Adds what the others have to the first one.
+  worker& join_workers() {
     worker& all = workers_.front();
     for (std::size_t i = 1; i != active_.size(); ++i) {
       all.masks.merge(workers_[i].masks);
@@ -264,8 +331,7 @@ class point_integrator {
       all.summary.truncated += workers_[i].summary.truncated;
       all.summary.rejected += workers_[i].summary.rejected;
     }
-    clip(all.masks, grid, options.bounds);
-    return all.summary;
+    return all;
   }
   /// Calls `body(worker, begin, end)` for parts of [0, count), each worker on one thread.
   template <class Policy, class Body>
@@ -277,6 +343,7 @@ class point_integrator {
     });
   }
 
+  dense_rays dense_;
   std::vector<worker> workers_ = std::vector<worker>(1);  ///< only ever more: their memory is kept
   std::span<worker> active_;                              ///< those of the current scan
 };

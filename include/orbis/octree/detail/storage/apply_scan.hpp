@@ -43,21 +43,25 @@ void find_saturated(const brick_store<typename Model::value_type>& store, std::u
   for (std::uint32_t i = 0; i != 8; ++i) saturated[i] |= store.voxels_where(*b, i, is_saturated_free<Model>);
 }
 
-/// Gives the voxels `occupied` of octant `octant` of `b` a hit and the voxels `free` a miss. Returns the
-/// voxels that changed. @pre the two are disjoint
+/// Of an octant, the voxels that changed, and those that had a miss without being saturated.
+struct octant_change {
+  std::uint64_t changed = 0, missed = 0;
+};
+
+/// Gives the voxels `occupied` of octant `octant` of `b` a hit and the voxels `free` a miss. @pre the two are disjoint
 template <sensor_model Model>
-std::uint64_t apply_octant(brick_store<typename Model::value_type>& store, brick<typename Model::value_type>& b,
+octant_change apply_octant(brick_store<typename Model::value_type>& store, brick<typename Model::value_type>& b,
                            std::uint32_t octant, std::uint64_t occupied, std::uint64_t free) {
   using T = typename Model::value_type;
   // Most of a room is saturated already: where nothing can change, nothing is unpacked.
   if (free != 0) free &= ~store.voxels_where(b, octant, is_saturated_free<Model>);
   if (occupied != 0) occupied &= ~store.voxels_where(b, octant, [](T v) { return v >= Model::clamp_max; });
-  if ((free | occupied) == 0) return 0;
+  if ((free | occupied) == 0) return {};
   block<T> voxels;
   store.read_octant(b, octant, voxels);
   const std::uint64_t changed = update_block<Model>(voxels, free, occupied);
   store.write_octant(b, octant, voxels);
-  return changed;
+  return {changed, free};
 }
 
 /// Applies a scan: every voxel marked occupied gets a hit, every other one marked free a miss. Counts them in
@@ -71,14 +75,14 @@ void apply_scan(brick_store<typename Model::value_type>& store, const scan_masks
     for (std::uint32_t i = 0; i != 8; ++i) {
       const std::uint64_t occupied = s.occupied[i];
       summary.occupied += static_cast<std::size_t>(std::popcount(occupied));
-      summary.free += static_cast<std::size_t>(std::popcount(s.free[i] & ~occupied));
       matters = matters || occupied != 0;
     }
     if (!matters) continue;  // a large leaf is split only where something changes
     auto& b = store.make(key);
     for (std::uint32_t i = 0; i != 8; ++i) {
       if ((s.occupied[i] | s.free[i]) == 0) continue;
-      const std::uint64_t changed = apply_octant<Model>(store, b, i, s.occupied[i], s.free[i] & ~s.occupied[i]);
+      const auto [changed, missed] = apply_octant<Model>(store, b, i, s.occupied[i], s.free[i] & ~s.occupied[i]);
+      summary.free += static_cast<std::size_t>(std::popcount(missed));
       if (log != nullptr) log->record(child_key(key, i, node_cells(octant_level)), changed);
     }
   }

@@ -1,0 +1,250 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// The voxels that many rays of a point cloud cross, found voxel by voxel instead of ray by ray.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include <orbis/core/execution.hpp>
+#include <orbis/core/simd.hpp>
+#include <orbis/octree/detail/depth/depth_descent.hpp>
+#include <orbis/octree/detail/depth/first_steps.hpp>
+#include <orbis/octree/detail/depth/view_frame.hpp>
+#include <orbis/octree/detail/depth/voxel_ray_test.hpp>
+#include <orbis/octree/detail/points/binned_rays.hpp>
+#include <orbis/octree/detail/points/cell_tests.hpp>
+#include <orbis/octree/detail/points/direction_windows.hpp>
+#include <orbis/octree/detail/storage/scan_masks.hpp>
+
+namespace orbis::octree::detail {
+
+/// One window of a scan as the descent sees it.
+struct window_frame : view_frame {
+  using sample_kernel = unsigned(const depth_scene&, const window_rays&, const child_offsets&, const float3&,
+                                 const children&, unsigned);
+  using test_kernel = bool(const depth_scene&, const window_rays&, const voxel_test&, const pixel_box&, float,
+                           std::vector<std::uint32_t>&);
+
+  sample_kernel* sample = simd::kernel<sample_cells_kernel, sample_kernel, simd::avx2>();
+  test_kernel* test_cells = simd::kernel<test_cells_kernel, test_kernel>();
+  depth_sensor sensor{voxel_grid{1.0}, se3{}, 0.0};
+  window_rays rays;
+
+  /// @pre there are rays in the window
+  void set_window(const direction_window& w, float cell, const window_rays& of) {
+    rays = of;
+    for (std::size_t i = 0; i != 3; ++i) sensor.pose.rows[i] = {w.axes[0][i], w.axes[1][i], w.axes[2][i]};
+    const float focal = 1.0F / cell;
+    scene.map = nullptr;
+    set_view(sensor,
+             {focal, focal, -w.min_x * focal - 0.5F, -w.min_y * focal - 0.5F, w.width, w.height, w.min_x,
+              w.min_x + static_cast<float>(w.width) * cell, w.min_y, w.min_y + static_cast<float>(w.height) * cell});
+    // A cell's rays are anywhere in it, not in its middle.
+    scene.pixel_margin += 0.5F + 4e-6F * focal;
+    scene.tiles = {2.05F, 4.1F, 8.2F};
+    set_spacing(half_diagonal());
+  }
+  [[nodiscard]] pixel_box all_cells() const noexcept {
+    return {0, static_cast<std::int32_t>(scene.last_u), 0, static_cast<std::int32_t>(scene.last_v)};
+  }
+  /// Where the rays of a box of cells are, at z = 1.
+  struct bounds_at_1 {
+    float x0, x1, y0, y1;
+  };
+  [[nodiscard]] bounds_at_1 bounds(const pixel_box& box) const noexcept {
+    const float room = 0.51F + 4e-6F * scene.fx;  // beside the middle of a cell
+    const auto edge = [&](std::int32_t cell, float off, float centre) {
+      return (static_cast<float>(cell) + off - centre) * scene.per_fx;
+    };
+    return {edge(box.u0, -room, scene.cx), edge(box.u1, room, scene.cx), edge(box.v0, -room, scene.cy),
+            edge(box.v1, room, scene.cy)};
+  }
+  /// The same in the world.
+  [[nodiscard]] std::pair<float3, float3> directions(const pixel_box& box) const noexcept {
+    const auto [x0, x1, y0, y1] = bounds(box);
+    std::pair<float3, float3> range;
+    for (std::size_t i = 0; i != 3; ++i) {
+      const float middle = 0.5F * ((x0 + x1) * scene.x_axis[i] + (y0 + y1) * scene.y_axis[i]) + scene.z_axis[i];
+      const float half = 0.5F * ((x1 - x0) * std::fabs(scene.x_axis[i]) + (y1 - y0) * std::fabs(scene.y_axis[i]));
+      range.first[i] = middle - half;
+      range.second[i] = middle + half;
+    }
+    return range;
+  }
+};
+
+/// The rays of a window for the descent, see depth_rays. `EndOf`: the ray_endpoint of a ray.
+template <class EndOf>
+struct cell_rays {
+  const window_frame& frame;
+  const EndOf& end_of;
+
+  [[nodiscard]] unsigned sample(const child_offsets& o, const float3& world, const children& c, unsigned wanted) const {
+    return frame.sample(frame.scene, frame.rays, o, world, c, wanted);
+  }
+  [[nodiscard]] bool test(const voxel_test& t, const pixel_box& box, float near_z,
+                          std::vector<std::uint32_t>& unsure) const {
+    return frame.test_cells(frame.scene, frame.rays, t, box, near_z, unsure);
+  }
+  [[nodiscard]] bool may_cross(const voxel_test& t, const pixel_box& part, std::int32_t, std::int32_t,
+                               std::int32_t) const {
+    const auto [x0, x1, y0, y1] = frame.bounds(part);
+    return t.may_cross(x0, x1, y0, y1);
+  }
+  [[nodiscard]] bool visits(std::uint32_t number, const voxel_key& voxel) const {
+    return crosses(frame.sensor, end_of(number), voxel);
+  }
+};
+
+/// Collects the rays of a scan and marks their voxels. Keeps its memory from scan to scan.
+class dense_rays {
+ public:
+  /// Looks at a sample of the scan's points, and says whether there are so many rays for its voxels that this is the
+  /// way to mark them. Nothing is done otherwise. O(1). `limit(i)`: how far the i-th ray goes at most, metres
+  template <class Point, class Limit>
+  [[nodiscard]] bool plan(const voxel_grid& grid, const float3& origin, std::size_t count, Point&& point,
+                          Limit&& limit) {
+    if (count < fewest_rays || count > binned_rays::most_rays) return false;
+    sample(origin, count, point, limit);
+    if (sample_.directions.size() < most_sampled / 16) return false;
+    const std::size_t rays = count / most_sampled * sample_.directions.size();
+    windows_.fit(sample_, rays, cell_edge * grid.resolution() / sample_.length, fewest_in_cell, most_in_cell);
+    return is_worthwhile(grid.resolution());
+  }
+  /// Begins a scan that is planned, and that `workers` threads add.
+  void start(const float3& origin, std::size_t count, std::size_t workers) {
+    rays_.start(windows_, origin, count, workers);
+  }
+  /// See binned_rays::add.
+  void add(std::size_t worker, ray_batch& rays, std::size_t first, std::size_t count) {
+    rays_.add(worker, rays, first, count);
+  }
+  /// Marks the voxels of the rays that have been added, except that voxels for which `saturated` says that a miss would
+  /// not change them may be missing, see depth_integrator::mark, and those that are occupied in `masks`. False, and
+  /// nothing is marked, if rays come too close to the border of the grid. `end_of(i)`: the ray_endpoint of the i-th
+  /// point.
+  template <execution_policy Policy, class Range, class EndOf, class Saturated>
+  [[nodiscard]] bool mark(const Policy& policy, const depth_sensor& sensor, Range&& range, const EndOf& end_of,
+                          scan_masks& masks, Saturated& saturated) {
+    rays_.sort(policy, range);
+    if (rays_.size() == 0) return true;
+    bool on_face = false;
+    std::size_t nodes = 0;
+    for (std::size_t i = 0; i != direction_windows::faces; ++i) {
+      window_frame& f = frames_[i];
+      f.nodes.clear();
+      const direction_window& w = windows_.window[i];
+      if (w.width == 0) continue;
+      f.sensor = sensor;
+      f.set_window(w, windows_.cell, rays_.window(w));
+      const auto bounds = f.bounds_of(f.sensor, rays_.max_z());
+      if (!bounds) return false;
+      f.pyramid.build(w.width, w.height, rays_.max_z(),
+                      [&](int v) { return f.rays.z + static_cast<std::ptrdiff_t>(v) * w.stride; });
+      f.list_nodes(f.sensor, bounds->first, bounds->second);
+      on_face = on_face || f.is_on_face(f.sensor);
+      nodes += f.nodes.size();
+    }
+    workers_.resize(std::clamp<std::size_t>(policy.threads(), 1, std::max<std::size_t>(1, nodes)));
+    std::atomic<std::size_t> next{0};
+    for_each_index(policy, workers_.size(), 1, [&](std::size_t i) {
+      workers_[i].bricks.clear();
+      for (std::size_t n; (n = next.fetch_add(1, std::memory_order_relaxed)) < nodes;) {
+        const window_frame* f = frames_.data();
+        for (; n >= f->nodes.size(); ++f) n -= f->nodes.size();
+        const cell_rays<EndOf> rays{*f, end_of};
+        const depth_descent<cell_rays<EndOf>, Saturated> descent{*f,    workers_[i], f->sensor, rays,
+                                                                 masks, saturated,   on_face};
+        descent.descend(f->nodes[n].key, f->nodes[n].center, view_frame::list_level, f->nodes[n].inside);
+      }
+    });
+    for (const descent_worker& w : workers_)
+      for (const auto& b : w.bricks) {
+        auto& free = masks.at(named_key(b.name)).free;
+        for (std::size_t i = 0; i != 8; ++i) free[i] |= b.free[i];
+      }
+    masks.mark_free(*sensor.key);
+    if (on_face) walk_first_steps(sensor, end_of, masks);
+    return true;
+  }
+  [[nodiscard]] std::size_t memory_bytes() const noexcept {
+    std::size_t bytes = rays_.memory_bytes() + sample_.directions.capacity() * sizeof(vec3) +
+                        workers_.capacity() * sizeof(descent_worker);
+    for (const window_frame& f : frames_) bytes += f.memory_bytes();
+    for (const descent_worker& w : workers_) bytes += w.memory_bytes();
+    return bytes;
+  }
+
+ private:
+  static constexpr std::size_t fewest_rays = 4096;
+  static constexpr std::size_t most_sampled = 1024;
+  static constexpr double cell_edge = 0.25;                           ///< of a cell where rays end, in voxels
+  static constexpr double fewest_in_cell = 2.0, most_in_cell = 16.0;  ///< rays in a cell, on average
+
+  template <class EndOf>
+  void walk_first_steps(const depth_sensor& sensor, const EndOf& end_of, scan_masks& masks) const {
+    first_voxels around{sensor};
+    const first_step_order order{sensor};
+    for (const window_frame& f : frames_) {
+      if (f.nodes.empty()) continue;
+      const auto for_each = [&](const pixel_box& box, auto&& use) {
+        for (std::int32_t v = box.v0; v <= box.v1; ++v) {
+          const std::uint32_t* const row = f.rays.begin + static_cast<std::ptrdiff_t>(v) * f.rays.stride;
+          for (std::uint32_t i = row[box.u0]; i != row[box.u1 + 1]; ++i)
+            if (!use(end_of(f.rays.sorted[i].number))) return;
+        }
+      };
+      around.add(
+          order, f.all_cells(), [&](const pixel_box& box) { return f.directions(box); }, for_each);
+    }
+    around.mark(masks);
+  }
+  /// Nanoseconds for a ray, as measured. A walk costs as much for each plane of voxels that the ray crosses. Here a ray
+  /// costs something in itself, and the fewer rays there are for a voxel, the more voxels must be tested one by one.
+  [[nodiscard]] bool is_worthwhile(double voxel) const {
+    const double planes = sample_.length / voxel, apart = windows_.spacing * planes;  // apart: voxels, where rays end
+    return 6.0 + 1000.0 * apart * apart < 20.0 + 0.5 * planes;
+  }
+  template <class Point, class Limit>
+  void sample(const float3& origin, std::size_t count, Point&& point, Limit&& limit) {
+    sample_.directions.clear();
+    sample_.length = 0.0;
+    double part = 0.0;
+    for (std::size_t k = 0; k != most_sampled; ++k) {
+      // One of each stretch, not always at the same place: scans repeat themselves row by row.
+      part += 0.6180339887498949;
+      part -= part >= 1.0 ? 1.0 : 0.0;
+      const double place = (static_cast<double>(k) + part) * static_cast<double>(count) / most_sampled;
+      const std::size_t i = std::min(static_cast<std::size_t>(place), count - 1);
+      const float3 p = point(i);
+      vec3 d;
+      for (int axis = 0; axis != 3; ++axis)
+        d[axis] = static_cast<double>(p[static_cast<std::size_t>(axis)]) -
+                  static_cast<double>(origin[static_cast<std::size_t>(axis)]);
+      const double length = d.norm();
+      if (!(length > 0.0 && length < 1e30 && limit(i) >= 0.0)) continue;
+      sample_.directions.push_back(d / length);
+      sample_.length += std::min(length, limit(i));
+    }
+    sample_.length /= static_cast<double>(std::max<std::size_t>(1, sample_.directions.size()));
+  }
+
+  sampled_rays sample_;
+  direction_windows windows_;
+  binned_rays rays_;
+  std::array<window_frame, direction_windows::faces> frames_;
+  std::vector<descent_worker> workers_;
+};
+
+}  // namespace orbis::octree::detail
+
+ORBIS_COMPILED_KERNEL_AVX2(orbis::octree::detail::sample_cells_kernel,
+                           orbis::octree::detail::window_frame::sample_kernel);
+ORBIS_COMPILED_KERNEL(orbis::octree::detail::test_cells_kernel, orbis::octree::detail::window_frame::test_kernel);

@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// The directions of a scan's rays, as windows on the faces of a cube around its origin.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include <Eigen/Eigenvalues>
+
+#include <orbis/core/types.hpp>
+#include <orbis/octree/detail/points/ray_traversal.hpp>
+
+namespace orbis::octree::detail {
+
+/// A window on one face of the cube |x|, |y|, |z| <= 1, cut into square cells. Face 2 i is on the positive side of the
+/// cube's i-th axis, face 2 i + 1 on the negative one. Seen from the middle, z is the way to the face.
+struct direction_window {
+  static constexpr std::int32_t padding = 16;  ///< empty cells after a row, at least
+
+  std::array<float3, 3> axes{};  ///< x, y and z of the window, in the world
+  float min_x = 0, min_y = 0;    ///< where the first cell begins, at z = 1
+  std::int32_t width = 0, height = 0;
+  std::int32_t stride = 0;  ///< from row to row
+  std::uint32_t begin = 0;  ///< number of the first cell
+};
+
+/// What is known of some rays of a scan: those of a sample of its points.
+struct sampled_rays {
+  std::vector<vec3> directions;  ///< of length 1
+  double length = 0.0;           ///< mean, metres
+};
+
+/// Windows that hold nearly all of a scan's rays. The cube is turned so that the rays of a camera, if they are, go
+/// through the middle of one face, along its sides.
+struct direction_windows {
+  static constexpr std::size_t faces = 6;
+  static constexpr std::uint32_t most_cells = 1U << 22U;
+
+  std::array<direction_window, faces> window{};
+  double spacing = 1;       ///< of the rays, at z = 1, if they are spread evenly over the windows
+  float cell = 1;           ///< edge of a cell, at z = 1
+  std::uint32_t cells = 0;  ///< of all windows
+
+  /// Chooses windows for `count` rays of which a sample is known, with cells of edge `wanted` (at z = 1) or, where
+  /// these would hold few rays or many, such that they hold `fewest` or `most` on average. O(sample)
+  void fit(const sampled_rays& sample, std::size_t count, double wanted, double fewest, double most) {
+    const mat3 turned = turn(sample.directions);
+    std::array<float3, 3> axes;  // of the cube, in the world
+    for (int i = 0; i != 3; ++i)
+      for (int k = 0; k != 3; ++k)
+        axes[static_cast<std::size_t>(i)][static_cast<std::size_t>(k)] = static_cast<float>(turned(i, k));
+    struct box {
+      float x0 = std::numeric_limits<float>::infinity(), x1 = -x0, y0 = x0, y1 = x1;
+      std::size_t rays = 0;
+    };
+    std::array<box, faces> boxes;
+    for (const vec3& direction : sample.directions) {
+      const vec3 d = turned * direction;
+      int axis = 0;
+      d.cwiseAbs().maxCoeff(&axis);
+      box& b = boxes[static_cast<std::size_t>(2 * axis + (d[axis] < 0.0 ? 1 : 0))];
+      const auto x = static_cast<float>(d[axis_x(axis)] / std::fabs(d[axis]));
+      const auto y = static_cast<float>(d[axis_y(axis)] / std::fabs(d[axis]));
+      b = {std::min(b.x0, x), std::max(b.x1, x), std::min(b.y0, y), std::max(b.y1, y), b.rays + 1};
+    }
+    double area = 0.0;
+    float longest = 0.0F;
+    for (box& b : boxes) {
+      if (b.rays == 0) continue;
+      // The sample may miss what is furthest aside.
+      const float room = 1e-3F + 0.01F * std::max(b.x1 - b.x0, b.y1 - b.y0);
+      b = {std::max(b.x0 - room, -1.0F), std::min(b.x1 + room, 1.0F), std::max(b.y0 - room, -1.0F),
+           std::min(b.y1 + room, 1.0F), b.rays};
+      area += static_cast<double>(b.x1 - b.x0) * static_cast<double>(b.y1 - b.y0);
+      longest = std::max({longest, b.x1 - b.x0, b.y1 - b.y0});
+    }
+    const double finest = std::sqrt(area / (0.25 * most_cells));
+    spacing = std::sqrt(area / static_cast<double>(count));
+    const double edge = std::clamp(wanted, std::sqrt(fewest) * spacing, std::sqrt(most) * spacing);
+    cell = static_cast<float>(std::max({edge, finest, static_cast<double>(longest) / 4096.0, 1e-4}));
+    cells = 0;
+    for (std::size_t i = 0; i != faces; ++i) {
+      const box& b = boxes[i];
+      direction_window& w = window[i];
+      const auto axis = static_cast<int>(i / 2);
+      w.axes = {axes[static_cast<std::size_t>(axis_x(axis))], axes[static_cast<std::size_t>(axis_y(axis))],
+                axes[static_cast<std::size_t>(axis)]};
+      if (i % 2 != 0)
+        for (float& c : w.axes[2]) c = -c;
+      w.width = w.height = w.stride = 0;
+      w.begin = cells;
+      if (b.rays == 0) continue;
+      w.min_x = b.x0;
+      w.min_y = b.y0;
+      w.width = 1 + static_cast<std::int32_t>((b.x1 - b.x0) / cell);
+      w.height = 1 + static_cast<std::int32_t>((b.y1 - b.y0) / cell);
+      w.stride = (w.width + 2 * direction_window::padding - 1) & ~15;
+      cells += static_cast<std::uint32_t>(w.stride) * static_cast<std::uint32_t>(w.height) + direction_window::padding;
+    }
+  }
+  /// The cube's axes that are x and y on the faces of an axis.
+  [[nodiscard]] static constexpr int axis_x(int axis) noexcept { return axis == 0 ? 1 : 0; }
+  [[nodiscard]] static constexpr int axis_y(int axis) noexcept { return axis == 2 ? 1 : 2; }
+
+ private:
+  /// From the world to the cube. Rays all around: any will do.
+  [[nodiscard]] static mat3 turn(const std::vector<vec3>& directions) {
+    vec3 mean = vec3::Zero();
+    mat3 moments = mat3::Zero();
+    for (const vec3& d : directions) {
+      mean += d;
+      moments += d * d.transpose();
+    }
+    if (!(mean.norm() > 0.6 * static_cast<double>(directions.size()))) return mat3::Identity();
+    mean.normalize();
+    // Across the mean the rays spread furthest along a side of the image.
+    const mat3 across = mat3::Identity() - mean * mean.transpose();
+    const Eigen::SelfAdjointEigenSolver<mat3> spread{across * moments * across};
+    const vec3 x = (across * spread.eigenvectors().col(2)).normalized();
+    mat3 turned;
+    if (!x.allFinite()) return mat3::Identity();
+    turned << x.transpose(), mean.cross(x).transpose(), mean.transpose();
+    return turned;
+  }
+};
+
+}  // namespace orbis::octree::detail

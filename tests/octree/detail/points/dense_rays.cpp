@@ -1,0 +1,288 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <map>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include <orbis/core/random.hpp>
+#include <orbis/octree/detail/points/dense_rays.hpp>
+#include <orbis/octree/detail/points/point_integrator.hpp>
+
+#include "support/allocations.hpp"
+#include "support/catch.hpp"
+
+using namespace orbis;
+using namespace orbis::octree;
+using namespace orbis::octree::detail;
+using octree::detail::dense_rays;
+using octree::detail::ray_batch;
+
+namespace {
+
+/// The free voxels of some bricks, by name.
+using voxels = std::map<std::uint64_t, std::array<std::uint64_t, 8>>;
+
+/// Without `hidden`, if any.
+[[nodiscard]] voxels free_voxels(const scan_masks& masks, const scan_masks* hidden) {
+  voxels all;
+  for (const scan_brick& b : masks.bricks()) {
+    auto free = b.free;
+    std::uint64_t any = 0;
+    const scan_brick* const hide = hidden != nullptr ? hidden->find(b.name) : nullptr;
+    for (std::size_t i = 0; i != 8; ++i) {
+      free[i] &= ~b.occupied[i];
+      if (hide != nullptr) free[i] &= ~hide->free[i];
+      any |= free[i];
+    }
+    if (any != 0) all[b.name] = free;
+  }
+  return all;
+}
+
+struct scan {
+  voxel_grid grid;
+  float3 origin;
+  std::vector<float3> points{};
+  double limit = std::numeric_limits<double>::infinity();
+
+  [[nodiscard]] ray_endpoint end_of(std::size_t i) const {
+    const float3 ray = difference(points[i], origin);
+    ray_endpoint e;
+    e.point = length(ray) <= limit ? points[i] : cut_off(origin, ray, length(ray), limit);
+    if (const auto k = grid.key(e.point)) e.key = *k;
+    return e;
+  }
+};
+
+/// Marks a scan however many or few its rays are for the voxels; false if it cannot be done.
+template <class Policy>
+[[nodiscard]] bool mark(const Policy& policy, dense_rays& rays, const scan& s, scan_masks& masks,
+                        const scan_masks* hidden = nullptr) {
+  const std::size_t count = s.points.size();
+  const auto point = [&](std::size_t i) { return s.points[i]; };
+  // Whether it is the fastest way does not matter here.
+  [[maybe_unused]] const bool pays = rays.plan(s.grid, s.origin, count, point, [&](std::size_t) { return s.limit; });
+  const std::size_t workers = policy.threads(), share = (count / workers + 256) & ~std::size_t{255};
+  const auto range = [&](std::size_t w) {
+    return std::pair{std::min(count, w * share), std::min(count, (w + 1) * share)};
+  };
+  const voxel_key from = *s.grid.key(s.origin);
+  const auto points = std::make_unique<point_batch>();
+  const auto batch = std::make_unique<ray_batch>();
+  std::array<double, point_batch::capacity> limits;
+  limits.fill(s.limit);
+  masks.clear();
+  rays.start(s.origin, count, workers);
+  for (std::size_t w = 0; w != workers; ++w) {
+    const auto [begin, end] = range(w);
+    for (std::size_t i = begin; i < end; i += point_batch::capacity) {
+      const std::size_t n = std::min(end - i, point_batch::capacity);
+      load_points(point, i, n, *points);
+      limit_rays()({s.grid, s.origin, from}, *points, limits.data(), n, *batch);
+      for (std::size_t k = 0; k != n; ++k)
+        if ((batch->hit[k >> 6U] >> (k & 63U) & 1U) != 0) masks.mark_occupied(s.end_of(i + k).key);
+      rays.add(w, *batch, i, n);
+      for (std::size_t k = 0; k != n; ++k)
+        if (((batch->hit[k >> 6U] | batch->cut[k >> 6U]) >> (k & 63U) & 1U) != 0)
+          masks.mark_ray(s.grid, s.origin, from, s.end_of(i + k).point, s.end_of(i + k).key);
+    }
+  }
+  const vec3 centre{static_cast<double>(s.origin[0]), static_cast<double>(s.origin[1]),
+                    static_cast<double>(s.origin[2])};
+  const auto saturated = [&](std::uint64_t name, std::array<std::uint64_t, 8>& mask) {
+    const scan_brick* const hide = hidden != nullptr ? hidden->find(name) : nullptr;
+    if (hide != nullptr)
+      for (std::size_t i = 0; i != 8; ++i) mask[i] |= hide->free[i];
+  };
+  const auto end_of = [&](std::uint32_t i) { return s.end_of(i); };
+  return rays.mark(policy, depth_sensor{s.grid, se3{so3{}, centre}, s.limit}, range, end_of, masks, saturated);
+}
+
+/// Ray by ray.
+void walk(const scan& s, scan_masks& masks) {
+  masks.clear();
+  const voxel_key from = *s.grid.key(s.origin);
+  for (std::size_t i = 0; i != s.points.size(); ++i) {
+    const double distance = length(difference(s.points[i], s.origin));
+    const ray_endpoint e = s.end_of(i);
+    if (!std::isfinite(static_cast<float>(distance)) || !s.grid.key(e.point)) continue;
+    masks.mark_ray(s.grid, s.origin, from, e.point, e.key);
+    if (distance <= s.limit) masks.mark_occupied(e.key);
+  }
+}
+
+/// A scan of one of several kinds.
+[[nodiscard]] scan random_scan(random_bits& random, std::uint64_t kind, double voxel, const vec3& origin) {
+  const auto at = [&](double half) { return random.uniform(-half, half); };
+  scan s{voxel_grid{voxel},
+         {static_cast<float>(origin.x()), static_cast<float>(origin.y()), static_cast<float>(origin.z())}};
+  const so3 turned = random.below(4) == 0 ? so3{} : so3::exp({at(2.0), at(2.0), at(2.0)});
+  const double reach = voxel * random.uniform(3.0, 40.0), fov = random.uniform(0.05, 1.0);
+  constexpr int width = 90, height = 60;
+  for (int i = 0; i != width * height; ++i) {
+    vec3 d{(i % width - 0.5 * width) / width * 2.0 * fov, (i / width - 0.5 * height) / width * 2.0 * fov, 1.0};
+    double distance = reach;
+    switch (kind) {
+      case 0: distance *= 0.7 + 0.3 * std::sin(9.0 * d.x()) * std::cos(7.0 * d.y()); break;  // a camera
+      case 1: distance *= i % 11 == 0 ? 0.2 : 0.9; break;                                    // with edges
+      case 2: d = {at(1.0), at(1.0), at(1.0)}; break;                                        // all around
+      case 3: d = {std::cos(0.01 * i), std::sin(0.01 * i), 0.0}; break;                      // a fan
+      case 4: d = {1e-5 * at(1.0), 1e-5 * at(1.0), 1.0}; break;                              // a beam
+      case 5:
+        d = {0.3, 0.2, 1.0};
+        distance *= random.uniform(0.0, 1.0);
+        break;  // one direction
+      case 6: d = {random.below(5) - 2.0, random.below(5) - 2.0, random.below(5) - 2.0}; break;
+      default:
+        if (i % 2 == 0)
+          d = {at(0.02), at(0.02), 1.0};
+        else
+          d = {at(1.0), at(1.0), at(1.0)};
+    }
+    if (kind != 6) d = turned * d;
+    if (d.norm() > 0.0) d *= distance / d.norm();
+    const vec3 p = origin + d;
+    s.points.push_back({static_cast<float>(p.x()), static_cast<float>(p.y()), static_cast<float>(p.z())});
+    if (random.below(500) == 0) s.points.back() = s.origin;
+    if (random.below(500) == 0) s.points.back()[i % 3U] = std::numeric_limits<float>::quiet_NaN();
+    if (random.below(500) == 0) s.points.back()[i % 3U] = -1e30F;
+  }
+  if (random.below(3) == 0) s.limit = reach * random.uniform(0.1, 0.9);
+  return s;
+}
+
+[[nodiscard]] vec3 random_origin(random_bits& random, double voxel) {
+  vec3 origin{random.uniform(-2.0, 2.0), random.uniform(-2.0, 2.0), random.uniform(-2.0, 2.0)};
+  switch (random.below(6)) {
+    case 0: origin.setZero(); break;
+    case 1: origin[static_cast<int>(random.below(3))] = voxel * random.below(9); break;
+    case 2: origin = voxel * vec3{1.0, 2.0, 3.0}; break;
+    case 3: origin *= 300.0; break;
+    case 4: origin = vec3::Constant(0.5 * voxel); break;
+    default: break;
+  }
+  return origin;
+}
+
+}  // namespace
+
+TEST_CASE("Rays of any kind from any place mark the voxels that they cross one by one") {
+  random_bits random{71};
+  dense_rays rays;
+  scan_masks want, got;
+  for (int run = 0; run != 120; ++run) {
+    const auto kind = static_cast<std::uint64_t>(run % 8);
+    const double voxel = std::array{0.05, 0.1, 0.02, 1.0 / 3.0}[random.below(4)];
+    const scan s = random_scan(random, kind, voxel, random_origin(random, voxel));
+    walk(s, want);
+    INFO("kind " << kind << ", run " << run);
+    REQUIRE(mark(seq, rays, s, got));
+    REQUIRE(free_voxels(got, nullptr) == free_voxels(want, nullptr));
+    REQUIRE(mark(par.with(3), rays, s, got));
+    REQUIRE(free_voxels(got, nullptr) == free_voxels(want, nullptr));
+  }
+}
+
+TEST_CASE("Every instruction set marks the same voxels") {
+  random_bits random{72};
+  scan_masks want, got;
+  for (std::uint64_t kind = 0; kind != 8; ++kind) {
+    const scan s = random_scan(random, kind, 0.05, random_origin(random, 0.05));
+    walk(s, want);
+    for (const simd::level level : simd::available_levels()) {
+      const simd::level_limit limit{level};
+      dense_rays rays;
+      REQUIRE(mark(seq, rays, s, got));
+      REQUIRE(free_voxels(got, nullptr) == free_voxels(want, nullptr));
+    }
+  }
+}
+
+TEST_CASE("Saturated voxels may be left out and no others are") {
+  random_bits random{73};
+  dense_rays rays;
+  scan_masks want, got, hidden;
+  for (int run = 0; run != 10; ++run) {
+    const scan s = random_scan(random, 0, 0.05, random_origin(random, 0.05));
+    walk(s, want);
+    hidden.clear();
+    for (const scan_brick& b : want.bricks())
+      for (std::size_t i = 0; i != 8; ++i)
+        if (random.below(2) == 0) hidden.at(named_key(b.name)).free[i] = b.free[i];
+    REQUIRE(mark(seq, rays, s, got, &hidden));
+    REQUIRE(free_voxels(got, &hidden) == free_voxels(want, &hidden));
+    for (const auto& [name, free] : free_voxels(got, nullptr)) {
+      const scan_brick* const b = want.find(name);
+      REQUIRE(b != nullptr);
+      for (std::size_t i = 0; i != 8; ++i) REQUIRE((free[i] & ~b->free[i]) == 0);
+    }
+  }
+}
+
+TEST_CASE("Close to the border of the grid rays have to be walked") {
+  random_bits random{74};
+  dense_rays rays;
+  scan_masks masks;
+  const voxel_grid grid{0.1, 8};  // 25.6 m wide
+  scan s = random_scan(random, 2, 0.1, {12.6, 0.0, 0.0});
+  s.grid = grid;
+  CHECK_FALSE(mark(seq, rays, s, masks));
+  s = random_scan(random, 0, 0.1, vec3::Zero());
+  s.grid = grid;
+  CHECK(mark(seq, rays, s, masks));
+}
+
+TEST_CASE("Many rays for the voxels pay and few do not") {
+  random_bits random{75};
+  dense_rays rays;
+  const scan s = random_scan(random, 0, 1.0, vec3::Zero());
+  const auto pays = [&](double voxel, std::size_t count) {
+    const auto point = [&](std::size_t i) { return s.points[i]; };
+    const auto limit = [&](std::size_t) { return s.limit; };
+    return rays.plan(voxel_grid{voxel}, s.origin, count, point, limit);
+  };
+  CHECK(pays(1.0, s.points.size()));
+  CHECK_FALSE(pays(0.01, s.points.size()));
+  CHECK_FALSE(pays(1.0, 100));
+}
+
+TEST_CASE("A cloud takes the same voxels to the map whichever way its rays are marked") {
+  random_bits random{76};
+  scan_masks want;
+  point_integrator marker;
+  for (int run = 0; run != 16; ++run) {
+    const double voxel = std::array{0.2, 0.05}[run % 2U];
+    const scan s = random_scan(random, static_cast<std::uint64_t>(run / 2), voxel, random_origin(random, voxel));
+    walk(s, want);
+    const integration_options options{.max_range = s.limit};
+    for (const unsigned threads : {1U, 3U}) {
+      marker.mark(par.with(threads), s.grid, s.points, s.origin, options);
+      REQUIRE(free_voxels(marker.masks(), nullptr) == free_voxels(want, nullptr));
+    }
+  }
+}
+
+TEST_CASE("The second of two equal scans takes no memory") {
+  random_bits random{77};
+  dense_rays rays;
+  const scan s = random_scan(random, 0, 0.05, {0.01, 0.02, 0.03});
+  scan_masks masks;
+  CHECK(mark(seq, rays, s, masks));
+  const std::size_t bytes = rays.memory_bytes();
+  CHECK(bytes > 0);
+  CHECK(mark(seq, rays, s, masks));
+  CHECK(rays.memory_bytes() == bytes);
+
+  point_integrator marker;
+  const auto scan_again = [&] { return marker.mark(seq, s.grid, s.points, s.origin, {}); };
+  scan_again();
+  const std::size_t before = test::allocations();
+  scan_again();
+  if (test::counts_allocations()) CHECK(test::allocations() == before);
+}
