@@ -59,6 +59,7 @@ reached adjust_locally(const Policy& policy, const test::synthetic_local_map& ma
   static bundle_adjuster ba{reprojection{map.camera, map.bf}, huber{std::sqrt(gate)}};
   static std::vector<bundle_observation> observations;
   static std::vector<std::uint8_t> outliers;
+  static std::vector<double> squared;
   std::vector<se3> poses = map.poses;
   std::vector<vec3> points = map.points;
   observations.clear();
@@ -66,9 +67,10 @@ reached adjust_locally(const Policy& policy, const test::synthetic_local_map& ma
   const std::span<const bundle_observation> seen{observations};
   const auto first = ba.solve(policy, std::span{poses}, std::span{points}, seen,
                               {.max_iterations = first_phase, .relative_tolerance = 0.0, .fixed_poses = map.fixed});
+  squared.resize(observations.size());
+  ba.chi2(poses, points, seen, squared);
   outliers.assign(observations.size(), 0);
-  for (std::size_t k = 0; k != outliers.size(); ++k)
-    outliers[k] = ba.chi2(poses[seen[k].pose], points[seen[k].point], seen[k]) > gate ? 1 : 0;
+  for (std::size_t k = 0; k != outliers.size(); ++k) outliers[k] = squared[k] > gate ? 1 : 0;
   const auto second = ba.solve_again(
       policy, std::span{poses}, std::span{points},
       {.max_iterations = second_phase, .relative_tolerance = 0.0, .fixed_poses = map.fixed, .ignored = outliers});

@@ -21,10 +21,10 @@ ORBIS_INSTANTIATE_BUNDLE_KERNELS(ORBIS_TEST_INSTANCES, reprojection<camera::pinh
 // Cameras with nine numbers.
 ORBIS_KERNEL_INSTANCE(ORBIS_TEST_INSTANCES, optimize::detail::panel_product_kernel<9>, optimize::detail::panel_product);
 ORBIS_KERNEL_INSTANCE(ORBIS_TEST_INSTANCES, optimize::detail::panel_solve_kernel<9>, optimize::detail::panel_solve);
-ORBIS_KERNEL_INSTANCE(ORBIS_TEST_INSTANCES, optimize::detail::eliminate_kernel<9>,
-                      optimize::detail::schur_kernels<9>::eliminator);
-ORBIS_KERNEL_INSTANCE(ORBIS_TEST_INSTANCES, optimize::detail::substitute_kernel<9>,
-                      optimize::detail::schur_kernels<9>::substituter);
+ORBIS_KERNEL_INSTANCE(ORBIS_TEST_INSTANCES, optimize::detail::eliminate_kernel<9, true>,
+                      optimize::detail::schur_kernels<9, true>::eliminator);
+ORBIS_KERNEL_INSTANCE(ORBIS_TEST_INSTANCES, optimize::detail::substitute_kernel<9, true>,
+                      optimize::detail::schur_kernels<9, true>::substituter);
 namespace optimize::detail {
 ORBIS_TEST_INSTANCES class block_cholesky<9>;
 ORBIS_TEST_INSTANCES class automatic_block_solver<9>;

@@ -155,8 +155,7 @@ struct levenberg_marquardt {
       w.damping = s.lambda * w.metric;
       if (problem.factor(w.damping)) {
         detail::newton_step(problem, w.step);
-        w.scratch = w.step.cwiseProduct(w.damping);
-        const double predicted = 0.5 * (w.scratch.dot(w.step) - problem.gradient().dot(w.step));
+        const double predicted = 0.5 * (w.step.cwiseProduct(w.damping) - problem.gradient()).dot(w.step);
         if (detail::is_rounding(predicted, problem.cost())) return detail::bottom_or_stuck(problem);
         const double gain = (problem.cost() - problem.try_step(w.step)) / predicted;
         if (gain > 0.0) {

@@ -36,31 +36,63 @@ bundle_structure structure_of(std::size_t cameras, std::size_t points, const std
 
 }  // namespace
 
-TEST_CASE("Every usable observation has one place by camera and one by point") {
-  auto all = random_observations(1, 9, 40, 300);
+TEST_CASE("Every usable observation has one place in a chunk and one by point") {
+  auto all = random_observations(1, 9, 400, 9000);                            // several chunks
   for (std::size_t k = 0; k < all.size(); k += 11) all[k].information = 0.0;  // not usable
   std::erase_if(all, [](const auto& o) { return o.pose == 4 || o.point == 7; });
-  const auto s = structure_of(9, 40, all, {1, 0, 0, 0, 0, 0, 0, 0, 1});
-  std::vector<int> seen(all.size()), numbered(s.first.back());
-  for (std::size_t c = 0; c != 9; ++c) {
-    CHECK(s.first_tile[c + 1] - s.first_tile[c] == (s.count[c] + 7) / 8);
-    for (std::size_t i = 0; i != 8 * (s.first_tile[c + 1] - s.first_tile[c]); ++i) {
-      const std::size_t at = 8 * s.first_tile[c] + i;
-      CHECK((s.source[at] != bundle_structure::none) == (i < s.count[c]));
-      if (i >= s.count[c]) continue;
-      const auto& o = all[s.source[at]];
-      CHECK(o.pose == c);
-      CHECK(o.point == s.point_source[s.point[at]]);
-      CHECK(s.by_point[at] >= s.first[s.point[at]]);
-      CHECK(s.by_point[at] < s.first[s.point[at] + 1]);
-      CHECK((s.mixed_by_point[at] != bundle_structure::none) == (s.unknown[c] != bundle_structure::none));
-      if (s.mixed_by_point[at] != bundle_structure::none) CHECK(s.mixed_unknown[s.mixed_by_point[at]] == s.unknown[c]);
-      ++seen[s.source[at]];
-      ++numbered[s.by_point[at]];
+  const auto s = structure_of(9, 400, all, {1, 0, 0, 0, 0, 0, 0, 0, 1});
+  REQUIRE(s.chunks() > 2);
+  REQUIRE(s.chunk_begin.front().first_point == 0);
+  REQUIRE(s.chunk_begin.back().first_point == s.points());
+  std::vector<int> seen(all.size()), numbered(s.mixed_unknown.size());
+  std::vector<std::uint32_t> by_camera(9), point_of_number(s.mixed_unknown.size());
+  for (const auto& g : s.groups)
+    for (std::uint32_t i = 0; i != g.points * g.cameras; ++i)
+      point_of_number[g.first_mixed + i] = g.first_point + i % g.points;
+  std::size_t tiles = 0, mixed_tiles = 0;
+  for (std::size_t chunk = 0; chunk != s.chunks(); ++chunk) {
+    const auto &begin = s.chunk_begin[chunk], &end = s.chunk_begin[chunk + 1];
+    CHECK((end.first_point % 8 == 0 || end.first_point == s.points()));
+    for (std::size_t k = begin.first_segment; k != end.first_segment; ++k) {
+      const auto& segment = s.segments[k];
+      if (k != begin.first_segment) CHECK(segment.camera > s.segments[k - 1].camera);
+      const std::uint32_t unknown = s.unknown[segment.camera];
+      CHECK(segment.first_tile == tiles);
+      tiles += (segment.count + 7) / 8;
+      by_camera[segment.camera] += segment.count;
+      const bool moves = unknown != bundle_structure::none;
+      if (moves) {
+        CHECK(segment.first_mixed_tile == mixed_tiles);
+        mixed_tiles += (segment.count + 7) / 8;
+      }
+      for (std::size_t at = 8 * segment.first_tile; at != 8 * tiles; ++at) {
+        CHECK(s.point[at] >= begin.first_point);
+        CHECK(s.point[at] < end.first_point);
+        const bool is_filled = at < 8 * segment.first_tile + segment.count;
+        CHECK((s.source[at] != bundle_structure::none) == is_filled);
+        CHECK((s.mixed_number[at] != bundle_structure::none) == (is_filled && moves));
+        if (!is_filled) continue;
+        const auto& o = all[s.source[at]];
+        CHECK(o.pose == segment.camera);
+        CHECK(o.point == s.point_source[s.point[at]]);
+        ++seen[s.source[at]];
+        if (!moves) continue;
+        const std::uint32_t number = s.mixed_number[at];
+        CHECK(number >= begin.first_mixed);
+        CHECK(number < end.first_mixed);
+        CHECK(s.mixed_unknown[number] == unknown);
+        CHECK(s.mixed_place[number] == 8 * segment.first_mixed_tile + (at - 8 * segment.first_tile));
+        CHECK(point_of_number[number] == s.point[at]);
+        ++numbered[number];
+      }
     }
+    CHECK(end.first_mixed - begin.first_mixed <= s.largest_chunk());
   }
+  CHECK(s.places() == 8 * tiles);
+  CHECK(s.mixed_tiles() == mixed_tiles);
   for (std::size_t k = 0; k != all.size(); ++k) CHECK(seen[k] == (all[k].information > 0.0 ? 1 : 0));
   CHECK(std::all_of(numbered.begin(), numbered.end(), [](int n) { return n == 1; }));
+  CHECK(by_camera == s.count);
   CHECK(s.count[4] == 0);
   CHECK(s.unknown[0] == bundle_structure::none);
   CHECK(s.unknown[4] == bundle_structure::none);
@@ -80,16 +112,41 @@ TEST_CASE("The reduced system has a block for each pair of cameras that share a 
   for (const auto& slot : s.slots) found.insert({slot.row, slot.column});
   CHECK(found == expected);
   CHECK(found.size() == s.slots.size());
-  for (std::size_t p = 0; p != s.points(); ++p) {
-    std::size_t pair = s.first_pair[p];
-    for (std::uint32_t a = s.first_mixed[p]; a != s.first_mixed[p + 1]; ++a)
-      for (std::uint32_t b = s.first_mixed[p]; b <= a; ++b, ++pair) {
-        const auto& slot = s.slots[s.pair_slot[pair]];
-        CHECK((slot.row == s.mixed_unknown[a] && slot.column == s.mixed_unknown[b]));
-      }
-    CHECK(pair == s.first_pair[p + 1]);
-    CHECK(s.first_mixed[p + 1] - s.first_mixed[p] <= s.longest());
-  }
+  for (std::uint32_t u = 0; u != s.unknowns(); ++u)
+    CHECK(s.slots[s.diagonal_slot[u]] == optimize::detail::block_place{u, u});
+  std::size_t pairs = 0;
+  for (const auto& g : s.groups)
+    for (std::size_t i = 0; i != g.points; ++i) {
+      std::size_t pair = g.first_pair;
+      const auto unknown = [&](std::size_t a) { return s.mixed_unknown[g.first_mixed + a * g.points + i]; };
+      for (std::size_t a = 1; a < g.cameras; ++a)
+        for (std::size_t b = 0; b != a; ++b, ++pair, ++pairs)
+          CHECK(s.slots[s.pair_slot[pair]] == optimize::detail::block_place{unknown(a), unknown(b)});
+    }
+  CHECK(pairs == s.pairs());
+}
+
+TEST_CASE("Points that the same cameras see form groups") {
+  std::vector<bundle_observation> all;
+  const std::vector<std::vector<std::uint32_t>> sets = {{0, 1, 4},    {1, 2}, {0, 1, 4}, {0, 3},   {1, 2},
+                                                        {0, 1, 4, 5}, {5},    {1, 3},    {0, 2, 4}};
+  for (std::uint32_t p = 0; p != sets.size(); ++p)
+    for (const std::uint32_t c : sets[p]) all.push_back({.pose = c, .point = p});
+  const auto s = structure_of(6, sets.size(), all, {0, 0, 0, 0, 0, 1});
+  CHECK(s.point_source == std::vector<std::uint32_t>{3, 0, 2, 5, 8, 1, 4, 7, 6});
+  std::vector<std::uint32_t> points;
+  for (const auto& g : s.groups) points.push_back(g.points);
+  CHECK(points == std::vector<std::uint32_t>{1, 3, 1, 2, 1, 1});
+  CHECK(s.pairs() == 1 + 3 * 3 + 3 + 2 * 1 + 1);
+
+  all.clear();
+  for (std::uint32_t p = 0; p != 200; ++p)  // more than fit into one group: they share their pairs
+    for (std::uint32_t c = 0; c != 3; ++c) all.push_back({.pose = c, .point = p});
+  const auto large = structure_of(3, 200, all);
+  REQUIRE(large.groups.size() > 2);
+  CHECK(large.pair_slot.size() == 3);
+  for (const auto& g : large.groups) CHECK(g.first_pair == 0);
+  CHECK(large.pairs() == 600);
 }
 
 TEST_CASE("The first camera with observations can be held, unless another is fixed") {

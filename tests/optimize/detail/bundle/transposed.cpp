@@ -19,9 +19,11 @@ using columns = std::array<std::array<double, 8>, 4>;
 struct read_columns {
   template <simd::target Target>
   static ORBIS_ALWAYS_INLINE void run(const double* const* from, columns& out) {
-    simd::vec<double, 8, Target> v[3];
-    optimize::detail::load_transposed(from, v);
-    for (std::size_t k = 0; k != 3; ++k) v[k].store(out[k].data());
+    simd::vec<double, 8, Target> v[4];
+    optimize::detail::load_transposed<4>(from, v);
+    for (std::size_t k = 0; k != 4; ++k) v[k].store(out[k].data());
+    optimize::detail::load_transposed<3>(from, v);
+    for (std::size_t k = 0; k != 3; ++k) (v[k] + v[k]).store(out[k].data());
   }
 };
 struct write_rows {
@@ -30,6 +32,14 @@ struct write_rows {
     using V = simd::vec<double, 8, Target>;
     optimize::detail::store_transposed(V::load(in[0].data()), V::load(in[1].data()), V::load(in[2].data()),
                                        V::load(in[3].data()), to, offset);
+  }
+};
+struct add_rows {
+  template <simd::target Target>
+  static ORBIS_ALWAYS_INLINE void run(const columns& in, double* const* to, int offset) {
+    using V = simd::vec<double, 8, Target>;
+    optimize::detail::add_transposed(V::load(in[0].data()), V::load(in[1].data()), V::load(in[2].data()),
+                                     V::load(in[3].data()), to, offset);
   }
 };
 
@@ -47,9 +57,10 @@ TEST_CASE("Eight rows anywhere are read as columns, and columns written as rows,
     columns read{};
     simd::kernel<read_columns, void(const double* const*, columns&)>()(from, read);
     for (std::size_t i = 0; i != 8; ++i)
-      for (std::size_t k = 0; k != 3; ++k) CHECK(read[k][i] == numbers[7 - i][k]);
+      for (std::size_t k = 0; k != 4; ++k) CHECK(read[k][i] == (k == 3 ? 1.0 : 2.0) * numbers[7 - i][k]);
 
-    for (std::size_t i = 0; i != 8; ++i) read[3][i] = numbers[7 - i][3];
+    for (std::size_t k = 0; k != 3; ++k)
+      for (double& number : read[k]) number *= 0.5;
     std::array<std::array<double, 6>, 8> written{};
     double* to[8];
     for (std::size_t i = 0; i != 8; ++i) to[i] = written[7 - i].data();
@@ -59,5 +70,12 @@ TEST_CASE("Eight rows anywhere are read as columns, and columns written as rows,
       for (std::size_t k = 0; k != 4; ++k) CHECK(written[i][1 + k] == numbers[i][k]);
       CHECK(written[i][5] == 0.0);
     }
+    to[2] = to[5];  // the same row twice
+    simd::kernel<add_rows, void(const columns&, double* const*, int)>()(read, to, 1);
+    for (std::size_t i = 0; i != 8; ++i)
+      for (std::size_t k = 0; k != 4; ++k)
+        CHECK(written[i][1 + k] == (i == 5   ? numbers[5][k]
+                                    : i == 2 ? 2.0 * numbers[2][k] + numbers[5][k]
+                                             : 2.0 * numbers[i][k]));
   }
 }

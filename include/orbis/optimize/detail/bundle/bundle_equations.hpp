@@ -12,12 +12,15 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
 #include <Eigen/Core>
 
 #include <orbis/core/execution.hpp>
+#include <orbis/core/so3.hpp>
+#include <orbis/core/types.hpp>
 #include <orbis/optimize/bundle_problem.hpp>
 #include <orbis/optimize/detail/bundle/bundle_kernels.hpp>
 #include <orbis/optimize/detail/bundle/bundle_structure.hpp>
@@ -76,24 +79,23 @@ class bundle_equations {
   /// Residuals, weights and normal equations at the estimate.
   template <class Policy>
   void linearize(const Policy& policy) {
-    for_each_camera(policy, [&](std::size_t c) {
-      camera_work<R> work = work_of(c, views_, positions_);
-      const std::uint32_t u = structure_.unknown[c];
-      work.shares = shares_.data();
-      if (u != bundle_structure::none) {
-        work.mixed = mixed_.data();
-        work.hessian = camera_hessian_[u].data();
-        work.gradient = gradient_.data() + camera_size * u;
-      }
-      camera_cost_[c] = kernels_.linearize(work, loss_);
+    for_each_index(policy, structure_.chunks(), 1, [&](std::size_t chunk) {
+      const std::size_t begin = structure_.chunk_begin[chunk].first_point;
+      const std::size_t end = structure_.chunk_begin[chunk + 1].first_point;
+      std::fill_n(normal_.data() + point_size * begin, point_size * (end - begin), 0.0);
+      for_each_segment(chunk, [&](std::size_t s) {
+        camera_work<R> work = work_of(s, views_, positions_);
+        work.normal = normal_.data();
+        if (moves_camera(s)) {
+          work.mixed = mixed_.data() + mixed_block_tile::size * structure_.segments[s].first_mixed_tile;
+          work.sums = segment_sums_.data() + segment_size * s;
+        }
+        segment_cost_[s] = kernels_.linearize(work, loss_);
+      });
+      for (std::size_t p = begin; p != end; ++p) finish_point(p);
     });
-    cost_ = sum_of_cameras();
-    for_each_chunk(policy, structure_.points(), point_grain, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t p = begin; p != end; ++p) gather(p);
-    });
-    for (std::size_t u = 0; u != structure_.unknowns(); ++u)
-      for (int i = 0; i != camera_size; ++i)
-        diagonal_[static_cast<Eigen::Index>(camera_size * u) + i] = camera_hessian_[u](i, i);
+    cost_ = sum_of_segments();
+    add_up_cameras();
   }
 
   [[nodiscard]] double cost() const { return cost_; }
@@ -109,13 +111,15 @@ class bundle_equations {
       sum += part.dot(camera_hessian_[u] * part);
     }
     for (std::size_t p = 0; p != structure_.points(); ++p) {
-      const mat3 h = point_hessian(p);
       const auto y = x.template segment<3>(point_row(p));
-      vec3 pulled = vec3::Zero();
-      for (std::uint32_t a = structure_.first_mixed[p]; a != structure_.first_mixed[p + 1]; ++a)
-        pulled.noalias() += mixed_block(a).transpose() * camera_part(x, structure_.mixed_unknown[a]);
-      sum += y.dot(h * y) + 2.0 * y.dot(pulled);
+      sum += y.dot(point_hessian(p) * y);
     }
+    for (const bundle_structure::group& g : structure_.groups)
+      for (std::uint32_t i = 0; i != g.points * g.cameras; ++i) {
+        const std::size_t number = g.first_mixed + i;
+        sum += 2.0 * camera_part(x, structure_.mixed_unknown[number])
+                         .dot(mixed_block(number) * x.template segment<3>(point_row(g.first_point + i % g.points)));
+      }
     return sum;
   }
 
@@ -125,46 +129,36 @@ class bundle_equations {
   [[nodiscard]] bool eliminate(const Policy& policy, const Eigen::VectorXd& damping) {
     const std::size_t n = structure_.unknowns();
     const double* const point_damping = damping.size() == 0 ? nullptr : damping.data() + camera_size * n;
-    for_each_chunk(policy, structure_.points(), chunk_, [&](std::size_t begin, std::size_t end) {
-      partial& sum = partials_[begin / chunk_];
-      std::fill(sum.blocks.begin() + static_cast<std::ptrdiff_t>(block_size * sum.first_slot),
-                sum.blocks.begin() + static_cast<std::ptrdiff_t>(block_size * sum.end_slot), 0.0);
-      std::fill(sum.right.begin(), sum.right.end(), 0.0);
-      const std::size_t stopped = schur_.eliminate_points({.begin = begin,
-                                                           .end = end,
-                                                           .normal = normal_.data(),
-                                                           .damping = point_damping,
-                                                           .mixed = mixed_.data(),
-                                                           .first_mixed = structure_.first_mixed.data(),
-                                                           .mixed_unknown = structure_.mixed_unknown.data(),
-                                                           .first_pair = structure_.first_pair.data(),
-                                                           .pair_slot = structure_.pair_slot.data(),
-                                                           .inverse = inverse_.data(),
-                                                           .blocks = sum.blocks.data(),
-                                                           .right = sum.right.data(),
-                                                           .scratch = sum.scratch.data()});
-      sum.failed = stopped == end ? structure_.points() : stopped;
-    });
-    for (const partial& sum : partials())
-      if (sum.failed != structure_.points()) {
-        failed_camera_ = structure_.point[0];
-        for (std::size_t at = 0; at != structure_.point.size(); ++at)
-          if (structure_.source[at] != bundle_structure::none && structure_.point[at] == sum.failed) {
-            const auto after = std::upper_bound(structure_.first_tile.begin(), structure_.first_tile.end(), at / 8);
-            failed_camera_ = static_cast<std::size_t>(after - structure_.first_tile.begin()) - 1;
-            break;
-          }
-        return false;
+    constexpr bool one_by_one = std::is_same_v<Policy, sequential_policy>;
+    if (const std::size_t buffers = one_by_one ? std::min<std::size_t>(1, runs_.size()) : runs_.size();
+        buffers_.size() < buffers)
+      buffers_.resize(buffers);
+    for (std::size_t s = 0; s != structure_.slots.size(); ++s) begin_reduced(s);
+    for (std::size_t i = 0; i != reduced_right_.size(); ++i) reduced_right_[i] = -gradient_.data()[i];
+    if constexpr (one_by_one) {  // with one buffer, which stays in the cache
+      for (std::size_t k = 0; k != runs_.size(); ++k) {
+        if (!is_regular(eliminate_run(runs_[k], point_damping, buffers_[0]))) return false;
+        for (std::size_t s = runs_[k].first_slot; s != runs_[k].end_slot; ++s) subtract(s, buffers_[0]);
+        add_to_right(buffers_[0]);
       }
-    for_each_chunk(policy, structure_.slots.size(), slot_grain, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t s = begin; s != end; ++s) assemble(s, damping);
-    });
-    for (std::size_t u = 0; u != n; ++u)
-      for (std::size_t i = 0; i != camera_size; ++i) {
-        double sum = 0.0;
-        for (const partial& part : partials()) sum += part.right[pad * u + i];
-        reduced_right_[camera_size * u + i] = sum - gradient_[static_cast<Eigen::Index>(camera_size * u + i)];
+    } else {
+      for_each_index(policy, runs_.size(), 1,
+                     [&](std::size_t k) { failed_point_[k] = eliminate_run(runs_[k], point_damping, buffers_[k]); });
+      for (const std::size_t failed : failed_point_)
+        if (!is_regular(failed)) return false;
+      for_each_index(policy, structure_.slots.size(), slot_grain, [&](std::size_t s) {
+        for (std::size_t k = 0; k != runs_.size(); ++k)
+          if (s >= runs_[k].first_slot && s < runs_[k].end_slot) subtract(s, buffers_[k]);
+      });
+      for (std::size_t k = 0; k != runs_.size(); ++k) add_to_right(buffers_[k]);
+    }
+    for (std::size_t u = 0; u != n; ++u) {
+      camera_block& to = reduced_diagonal_[u];
+      for (int i = 0; i != camera_size; ++i) {
+        if (damping.size() != 0) to(i, i) += damping[static_cast<Eigen::Index>(camera_size * u) + i];
+        if (camera_hessian_[u](i, i) == 0.0) to(i, i) = 1.0;  // not determined at all: it stays
       }
+    }
     return true;
   }
   /// Factors the reduced system; false if it is not positive definite.
@@ -187,18 +181,14 @@ class bundle_equations {
   /// The step of the points, for that of the cameras in `step`.
   template <class Policy>
   void solve_points(const Policy& policy, Eigen::VectorXd& step) {
-    const std::size_t n = structure_.unknowns();
-    for (std::size_t u = 0; u != n; ++u)
-      std::copy_n(step.data() + camera_size * u, camera_size, &padded_step_[pad * u]);
-    for_each_chunk(policy, structure_.points(), point_grain, [&](std::size_t begin, std::size_t end) {
-      schur_.substitute_points({.begin = begin,
-                                .end = end,
+    for_each_index(policy, structure_.chunks(), 1, [&](std::size_t chunk) {
+      schur_.substitute_points({.structure = structure_,
+                                .chunk = chunk,
                                 .mixed = mixed_.data(),
-                                .first_mixed = structure_.first_mixed.data(),
-                                .mixed_unknown = structure_.mixed_unknown.data(),
                                 .inverse = inverse_.data(),
-                                .cameras = padded_step_.data(),
-                                .steps = step.data() + camera_size * n});
+                                .cameras = step.data(),
+                                .pulled = pulled_.data(),
+                                .steps = step.data() + camera_size * structure_.unknowns()});
     });
   }
 
@@ -211,12 +201,15 @@ class bundle_equations {
       tried_views_[c] = residual_.prepare(tried_states_[c]);
     }
     const double* const moves = step.data() + camera_size * structure_.unknowns();
-    for (std::size_t p = 0; p != structure_.points(); ++p)
-      for (std::size_t i = 0; i != 3; ++i) tried_positions_[4 * p + i] = positions_[4 * p + i] + moves[3 * p + i];
-    for_each_camera(policy, [&](std::size_t c) {
-      camera_cost_[c] = kernels_.cost(work_of(c, tried_views_, tried_positions_), loss_);
+    for_each_index(policy, structure_.chunks(), 1, [&](std::size_t chunk) {
+      const std::size_t end = structure_.chunk_begin[chunk + 1].first_point;
+      for (std::size_t p = structure_.chunk_begin[chunk].first_point; p != end; ++p)
+        for (std::size_t i = 0; i != 3; ++i) tried_positions_[4 * p + i] = positions_[4 * p + i] + moves[3 * p + i];
+      for_each_segment(chunk, [&](std::size_t s) {
+        segment_cost_[s] = kernels_.cost(work_of(s, tried_views_, tried_positions_), loss_);
+      });
     });
-    return tried_cost_ = sum_of_cameras();
+    return tried_cost_ = sum_of_segments();
   }
   void accept() {
     states_.swap(tried_states_);
@@ -239,31 +232,43 @@ class bundle_equations {
   // The blocks of the normal equations at the estimate last linearised.
   [[nodiscard]] const camera_block& camera_hessian(std::size_t unknown) const { return camera_hessian_[unknown]; }
   [[nodiscard]] mat3 point_hessian(std::size_t point) const {
-    const double* const v = normal_.data() + point_at(point);
+    const double* const v = normal_.data() + point_size * point;
     mat3 h;
-    h << v[0], v[8], v[16], v[8], v[24], v[32], v[16], v[32], v[40];
+    h << v[0], v[1], v[2], v[1], v[3], v[4], v[2], v[4], v[5];
     return h;
   }
-  /// The block of camera and point of an observation by a camera that may move, in the order of
-  /// `structure().mixed_unknown`.
-  [[nodiscard]] auto mixed_block(std::size_t observation_by_point) const {
-    return Eigen::Map<const matrix<camera_size, 3>, Eigen::Unaligned, Eigen::OuterStride<>>(
-        mixed_.data() + 3 * pad * observation_by_point, Eigen::OuterStride<>(pad));
+  /// The block of camera and point of an observation by a camera that may move, by its number in `structure()`.
+  [[nodiscard]] matrix<camera_size, 3> mixed_block(std::size_t number) const {
+    const std::size_t place = structure_.mixed_place[number];
+    const double* const tile = mixed_.data() + mixed_block_tile::size * (place / 8) + place % 8;
+    matrix<camera_size, 3> block;
+    for (int i = 0; i != camera_size; ++i)
+      for (int k = 0; k != 3; ++k)
+        if (!through_camera || i < 3 || i >= 6) block(i, k) = tile[mixed_block_tile::row(i) + 8 * k];
+    if constexpr (through_camera) {
+      const double* const q = tile + mixed_block_tile::q;
+      block.template middleRows<3>(3) = hat<double>(vec3{q[0], q[8], q[16]}) * block.template topRows<3>();
+    }
+    return block;
   }
 
  private:
-  static constexpr std::size_t pad = padded<camera_size>;
-  static constexpr std::size_t block_size = pad * camera_size;
-  static constexpr std::size_t point_grain = 256, slot_grain = 256;
+  using rows = row_layout<camera_size>;
+  static constexpr std::size_t segment_size = camera_numbers<camera_size>;
+  static constexpr std::size_t slot_grain = 256;
+  static constexpr bool through_camera = camera_frame_residual<R>;
+  using mixed_block_tile = mixed_tile<camera_size, through_camera>;
 
-  /// What a chunk of points subtracts from the reduced system.
-  struct partial {
+  /// Chunks whose points are eliminated one after the other, and the slots that they touch. The bounds depend only on
+  /// the problem.
+  struct elimination_run {
+    std::size_t first_chunk = 0, end_chunk = 0, first_slot = 0, end_slot = 0;
+  };
+  /// What they subtract from the reduced system.
+  struct elimination_buffer {
     std::vector<double> blocks, right, scratch;
-    std::size_t first_slot = 0, end_slot = 0;  ///< the slots that the chunk touches
-    std::size_t failed = 0;
   };
 
-  [[nodiscard]] std::span<const partial> partials() const { return std::span{partials_}.first(used_partials_); }
   [[nodiscard]] auto camera_part(const Eigen::VectorXd& x, std::size_t u) const {
     return x.template segment<camera_size>(static_cast<Eigen::Index>(camera_size * u));
   }
@@ -273,38 +278,41 @@ class bundle_equations {
 
   void make_room() {
     const std::size_t n = structure_.unknowns(), points = structure_.points();
-    camera_cost_.assign(structure_.count.size(), 0.0);
+    segment_cost_.assign(structure_.segments.size(), 0.0);
+    segment_sums_.resize(segment_size * structure_.segments.size());
     camera_hessian_.assign(n, camera_block::Zero());
-    shares_.resize(share_size * static_cast<std::size_t>(structure_.first.back()));
-    mixed_.resize(3 * pad * structure_.mixed_unknown.size());
-    normal_.assign(point_size * ((points + 7) / 8 * 8), 0.0);
+    mixed_.resize(mixed_block_tile::size * structure_.mixed_tiles());
+    normal_.resize(point_size * points);
     inverse_.resize(normal_.size());
     gradient_.setZero(static_cast<Eigen::Index>(camera_size * n + 3 * points));
     diagonal_.setZero(gradient_.size());
-    padded_step_.assign(pad * n, 0.0);
+    pulled_.resize(4 * points);
     reduced_right_.resize(camera_size * n);
 
-    // Chunks of points whose bounds depend only on the problem; fewer where the reduced system is large compared to the
-    // work that goes into it.
-    const std::size_t runs = std::clamp<std::size_t>(
-        structure_.pair_slot.size() / (8 * std::max<std::size_t>(1, structure_.slots.size())), 1, 8);
-    chunk_ = std::max<std::size_t>(8, (points + 8 * runs - 1) / (8 * runs) * 8);
-    used_partials_ = (points + chunk_ - 1) / chunk_;
-    if (partials_.size() < used_partials_) partials_.resize(used_partials_);
-    for (std::size_t k = 0; k != used_partials_; ++k) {
-      partial& sum = partials_[k];
-      sum.blocks.resize(block_size * structure_.slots.size());
-      sum.right.resize(pad * n);
-      sum.scratch.resize(3 * pad * structure_.longest());
-      sum.first_slot = structure_.slots.size();
-      sum.end_slot = 0;
-      const std::size_t end = structure_.first_pair[std::min(points, (k + 1) * chunk_)];
-      for (std::size_t at = structure_.first_pair[k * chunk_]; at != end; ++at) {
-        sum.first_slot = std::min<std::size_t>(sum.first_slot, structure_.pair_slot[at]);
-        sum.end_slot = std::max<std::size_t>(sum.end_slot, structure_.pair_slot[at] + std::size_t{1});
+    // Fewer runs where the reduced system is large compared to the work that goes into it.
+    const std::size_t chunks = structure_.chunks();
+    const std::size_t most =
+        std::clamp<std::size_t>(structure_.pairs() / (20 * std::max<std::size_t>(1, structure_.slots.size())), 1, 8);
+    const std::size_t length = (chunks + most - 1) / most;
+    runs_.clear();
+    for (std::size_t begin = 0; begin < chunks; begin += length) {
+      elimination_run run{begin, std::min(chunks, begin + length), structure_.slots.size(), 0};
+      const auto touch = [&](std::size_t slot) {
+        run.first_slot = std::min(run.first_slot, slot);
+        run.end_slot = std::max(run.end_slot, slot + 1);
+      };
+      const std::size_t end_group = structure_.chunk_begin[run.end_chunk].first_group;
+      for (std::size_t g = structure_.chunk_begin[begin].first_group; g != end_group; ++g) {
+        const bundle_structure::group& group = structure_.groups[g];
+        if (group.cameras == 0) continue;  // slots of the others lie between those on the diagonal
+        touch(structure_.diagonal_slot[structure_.mixed_unknown[group.first_mixed]]);
+        touch(structure_.diagonal_slot[structure_.mixed_unknown[group.first_mixed +
+                                                                std::size_t{group.points} * (group.cameras - 1)]]);
       }
-      sum.first_slot = std::min(sum.first_slot, sum.end_slot);
+      run.first_slot = std::min(run.first_slot, run.end_slot);
+      runs_.push_back(run);
     }
+    failed_point_.assign(runs_.size(), bundle_structure::none);
   }
 
   void analyze_reduced() {
@@ -325,32 +333,61 @@ class bundle_equations {
     if (n != 0) reduced_.analyze(n, off_diagonal_places_);
   }
 
-  /// One block of the reduced system.
-  void assemble(std::size_t s, const Eigen::VectorXd& damping) {
-    using taken_block = Eigen::Map<const camera_block, Eigen::Unaligned, Eigen::OuterStride<>>;
+  [[nodiscard]] camera_block& reduced_block(std::size_t s) {
+    const bool on_diagonal = structure_.slots[s].row == structure_.slots[s].column;
+    return on_diagonal ? reduced_diagonal_[place_of_slot_[s]] : reduced_off_diagonal_[place_of_slot_[s]];
+  }
+  void begin_reduced(std::size_t s) {
     const block_place& slot = structure_.slots[s];
-    const bool on_diagonal = slot.row == slot.column;
-    camera_block& to = on_diagonal ? reduced_diagonal_[place_of_slot_[s]] : reduced_off_diagonal_[place_of_slot_[s]];
-    if (on_diagonal)
-      to = camera_hessian_[slot.row];
+    if (slot.row == slot.column)
+      reduced_block(s) = camera_hessian_[slot.row];
     else
-      to.setZero();
-    for (const partial& sum : partials())
-      if (s >= sum.first_slot && s < sum.end_slot)
-        to -= taken_block(sum.blocks.data() + block_size * s, Eigen::OuterStride<>(pad));
-    if (!on_diagonal) return;
-    for (int i = 0; i != camera_size; ++i) {
-      if (damping.size() != 0) to(i, i) += damping[static_cast<Eigen::Index>(camera_size * slot.row) + i];
-      if (camera_hessian_[slot.row](i, i) == 0.0) to(i, i) = 1.0;  // not determined at all: it stays
+      reduced_block(s).setZero();
+  }
+  /// Eliminates the points of a run. Returns the first one whose block is not positive definite, or `none`.
+  [[nodiscard]] std::size_t eliminate_run(const elimination_run& run, const double* point_damping,
+                                          elimination_buffer& to) {
+    to.blocks.resize(rows::block * structure_.slots.size());
+    to.right.assign(camera_size * structure_.unknowns(), 0.0);
+    to.scratch.resize(3 * rows::size * structure_.largest_chunk());
+    std::fill(to.blocks.begin() + static_cast<std::ptrdiff_t>(rows::block * run.first_slot),
+              to.blocks.begin() + static_cast<std::ptrdiff_t>(rows::block * run.end_slot), 0.0);
+    for (std::size_t chunk = run.first_chunk; chunk != run.end_chunk; ++chunk) {
+      const std::size_t failed = schur_.eliminate_points({.structure = structure_,
+                                                          .chunk = chunk,
+                                                          .normal = normal_.data(),
+                                                          .damping = point_damping,
+                                                          .mixed = mixed_.data(),
+                                                          .inverse = inverse_.data(),
+                                                          .blocks = to.blocks.data(),
+                                                          .right = to.right.data(),
+                                                          .scratch = to.scratch.data()});
+      if (failed != bundle_structure::none) return failed;
     }
+    return bundle_structure::none;
+  }
+  void subtract(std::size_t s, const elimination_buffer& sum) {
+    using body_block = Eigen::Matrix<double, rows::has_last ? rows::body : camera_size, camera_size>;
+    const double* const taken = sum.blocks.data() + rows::block * s;
+    camera_block& to = reduced_block(s);
+    to.template topRows<body_block::RowsAtCompileTime>() -=
+        Eigen::Map<const body_block, Eigen::Unaligned, Eigen::OuterStride<>>(taken, Eigen::OuterStride<>(rows::body));
+    if constexpr (rows::has_last)
+      to.row(camera_size - 1) -=
+          Eigen::Map<const Eigen::Matrix<double, 1, camera_size>>(taken + rows::at(camera_size - 1, 0));
+  }
+  void add_to_right(const elimination_buffer& sum) {
+    for (std::size_t i = 0; i != reduced_right_.size(); ++i) reduced_right_[i] += sum.right[i];
   }
 
   template <class Policy>
   void choose_observations(const Policy& policy, std::span<const std::uint8_t> ignored, bundle_summary& summary) {
     information_ = base_information_;
     flags_.resize(information_.size());
-    for_each_camera(policy, [&](std::size_t c) {
-      find_visible(work_of(c, views_, positions_), flags_.data() + 8 * structure_.first_tile[c]);
+    for_each_index(policy, structure_.chunks(), 1, [&](std::size_t chunk) {
+      for_each_segment(chunk, [&](std::size_t s) {
+        find_visible(work_of(s, views_, positions_), flags_.data() + 8 * structure_.segments[s].first_tile);
+      });
     });
     for (std::size_t at = 0; at != information_.size(); ++at) {
       const std::uint32_t source = structure_.source[at];
@@ -367,17 +404,20 @@ class bundle_equations {
     }
   }
 
-  template <class Policy, class F>
-  void for_each_camera(const Policy& policy, const F& f) {
-    for_each_index(policy, structure_.count.size(), 1, [&](std::size_t c) {
-      if (structure_.count[c] != 0) f(c);
-    });
+  template <class F>
+  void for_each_segment(std::size_t chunk, const F& f) const {
+    const std::size_t end = structure_.chunk_begin[chunk + 1].first_segment;
+    for (std::size_t s = structure_.chunk_begin[chunk].first_segment; s != end; ++s) f(s);
+  }
+  [[nodiscard]] bool moves_camera(std::size_t segment) const {
+    return structure_.unknown[structure_.segments[segment].camera] != bundle_structure::none;
   }
 
-  [[nodiscard]] camera_work<R> work_of(std::size_t c, const std::vector<typename R::view>& views,
+  [[nodiscard]] camera_work<R> work_of(std::size_t s, const std::vector<typename R::view>& views,
                                        const std::vector<double>& positions) const {
-    const std::size_t at = 8 * structure_.first_tile[c];
-    camera_work<R> work{.residual = residual_, .view = views[c], .count = structure_.count[c]};
+    const bundle_structure::segment& segment = structure_.segments[s];
+    const std::size_t at = 8 * segment.first_tile;
+    camera_work<R> work{.residual = residual_, .view = views[segment.camera], .count = segment.count};
     if constexpr (lane_residual<R>)
       work.measurements = measurements_.data() + static_cast<std::size_t>(R::measured) * at;
     else
@@ -385,27 +425,19 @@ class bundle_equations {
     work.information = information_.data() + at;
     work.point = structure_.point.data() + at;
     work.positions = positions.data();
-    work.by_point = structure_.by_point.data() + at;
-    work.mixed_by_point = structure_.mixed_by_point.data() + at;
     return work;
   }
 
-  [[nodiscard]] double sum_of_cameras() const {
+  [[nodiscard]] double sum_of_segments() const {
     double sum = 0.0;
-    for (const double cost : camera_cost_) sum += cost;
+    for (const double cost : segment_cost_) sum += cost;
     return sum;
   }
 
-  /// Adds up the contributions of the observations of a point.
-  void gather(std::size_t p) {
-    double sum[point_size] = {};
-    if (holds_point_[p] == 0)
-      for (std::uint32_t at = structure_.first[p]; at != structure_.first[p + 1]; ++at) {
-        const double* const share = shares_.data() + share_size * std::size_t{at};
-        for (std::size_t i = 0; i != point_size; ++i) sum[i] += share[i];
-      }
-    double* const to = normal_.data() + point_at(p);
-    for (std::size_t i = 0; i != point_size; ++i) to[8 * i] = sum[i];
+  /// Once all observations of a point have added their parts.
+  void finish_point(std::size_t p) {
+    double* const sum = normal_.data() + point_size * p;
+    if (holds_point_[p] != 0) std::fill_n(sum, point_size, 0.0);
     double* const gradient = gradient_.data() + point_row(p);
     double* const diagonal = diagonal_.data() + point_row(p);
     for (std::size_t i = 0; i != 3; ++i) gradient[i] = sum[6 + i];
@@ -413,13 +445,42 @@ class bundle_equations {
     diagonal[1] = sum[3];
     diagonal[2] = sum[5];
   }
+  void add_up_cameras() {
+    gradient_.head(static_cast<Eigen::Index>(camera_size * structure_.unknowns())).setZero();
+    for (camera_block& h : camera_hessian_) h.setZero();
+    for (std::size_t s = 0; s != structure_.segments.size(); ++s) {
+      if (!moves_camera(s)) continue;
+      const std::size_t u = structure_.unknown[structure_.segments[s].camera];
+      const double* sum = segment_sums_.data() + segment_size * s;
+      camera_block& h = camera_hessian_[u];
+      for (int i = 0; i != camera_size; ++i)
+        for (int j = 0; j <= i; ++j) h(j, i) += *sum++;
+      for (std::size_t i = 0; i != camera_size; ++i) gradient_.data()[camera_size * u + i] += *sum++;
+    }
+    for (std::size_t u = 0; u != structure_.unknowns(); ++u) {
+      camera_block& h = camera_hessian_[u];
+      h.template triangularView<Eigen::StrictlyLower>() = h.transpose();
+      for (int i = 0; i != camera_size; ++i) diagonal_[static_cast<Eigen::Index>(camera_size * u) + i] = h(i, i);
+    }
+  }
+  /// Whether there is no such point; else remembers the first camera that sees it.
+  [[nodiscard]] bool is_regular(std::size_t failed_point) {
+    if (failed_point == bundle_structure::none) return true;
+    for (const bundle_structure::segment& s : structure_.segments) {
+      const auto begin = structure_.point.begin() + static_cast<std::ptrdiff_t>(8 * s.first_tile);
+      if (std::find(begin, begin + s.count, failed_point) == begin + s.count) continue;
+      failed_camera_ = s.camera;
+      break;
+    }
+    return false;
+  }
 
   R residual_;
   Loss loss_;
   typename R::camera_manifold manifold_{};
   reduced_type reduced_;
   bundle_kernels<R, Loss> kernels_;
-  schur_kernels<camera_size> schur_;
+  schur_kernels<camera_size, camera_frame_residual<R>> schur_;
   bundle_structure structure_;
 
   // Of each place in the order by camera.
@@ -432,19 +493,20 @@ class bundle_equations {
   std::vector<std::uint8_t> holds_point_;
   // The normal equations.
   double cost_ = 0.0, tried_cost_ = 0.0;
-  std::vector<double> camera_cost_;
+  std::vector<double> segment_cost_, segment_sums_;
   std::vector<camera_block> camera_hessian_;
-  std::vector<double> shares_, mixed_;    // of each observation
+  std::vector<double> mixed_;             // of each observation by a camera that moves
   std::vector<double> normal_, inverse_;  // of each point
   Eigen::VectorXd gradient_, diagonal_;
   // The reduced system.
-  std::size_t chunk_ = 1, failed_camera_ = 0;
-  std::vector<partial> partials_;  // of which the last may be left from a larger problem
-  std::size_t used_partials_ = 0;
+  std::size_t failed_camera_ = 0;
+  std::vector<elimination_run> runs_;
+  std::vector<std::size_t> failed_point_;  // of each run, or `none`
+  std::vector<elimination_buffer> buffers_;
   std::vector<block_place> off_diagonal_places_;
   std::vector<std::uint32_t> place_of_slot_;  // among the blocks on, or off, the diagonal
   std::vector<camera_block> reduced_diagonal_, reduced_off_diagonal_;
-  std::vector<double> reduced_right_, padded_step_;
+  std::vector<double> reduced_right_, pulled_;
 };
 
 template <bundle_residual R, robust_loss Loss, reduced_solver Reduced>
@@ -457,7 +519,7 @@ void bundle_equations<R, Loss, Reduced>::set_structure(std::size_t cameras, std:
                                                        std::span<const std::uint8_t> fixed, bool hold_first) {
   structure_.build(cameras, points, observations, fixed, hold_first,
                    [&](std::uint32_t k) { return residual_.is_usable(observations[k]); });
-  const std::size_t places = structure_.source.size();
+  const std::size_t places = structure_.places();
   base_information_.assign(places, 0.0);
   if constexpr (lane_residual<R>)
     measurements_.assign(static_cast<std::size_t>(R::measured) * places, 0.0);

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Linearisation and cost of all observations by one camera, eight at a time.
+/// Linearisation and cost of observations by one camera, eight at a time.
 ///
 /// With q = R X + t and M = J_q^T W J_q all blocks of the normal equations of an observation are products of M with R
 /// and hat(q), which saves half of the arithmetic; see `camera_frame_residual`.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -28,14 +29,40 @@ namespace orbis::optimize::detail {
 /// step gains by losing observations.
 inline constexpr double out_of_sight = 0.5e6;
 
-/// Rows of the camera-point block of an observation, rounded up to whole registers.
-template <int C>
-inline constexpr int padded = (C + 3) / 4 * 4;
-/// Size of the contribution of an observation to its point: the upper triangle of the block, row by row, then the
-/// gradient.
-inline constexpr int share_size = 12;
+/// Camera-point blocks of eight observations in memory, row by row in vectors of eight. Through the camera frame rows 3
+/// to 5 are hat(q) times rows 0 to 2, and q takes their place.
+template <int C, bool ThroughCamera>
+struct mixed_tile {
+  static constexpr int vectors = 3 * C - (ThroughCamera ? 6 : 0);
+  static constexpr std::size_t size = 8 * vectors;
 
-/// All observations by one camera.
+  /// Where row `i` begins; through the camera frame, not for rows 3 to 5.
+  [[nodiscard]] static constexpr int row(int i) { return 24 * (ThroughCamera && i >= 6 ? i - 2 : i); }
+  static constexpr int q = 72;  ///< where q is
+
+  template <class L>
+  static ORBIS_ALWAYS_INLINE void load(const double* from, L (*rows)[3]) {
+    unroll<C>([&](auto i) ORBIS_INLINE_LAMBDA {
+      if constexpr (!ThroughCamera || i < 3 || i >= 6)
+        unroll<3>([&](auto k) ORBIS_INLINE_LAMBDA { rows[i][k] = L::load(from + row(i) + 8 * k); });
+    });
+    if constexpr (ThroughCamera) {
+      const L x = L::load(from + q), y = L::load(from + q + 8), z = L::load(from + q + 16);
+      unroll<3>([&](auto k) ORBIS_INLINE_LAMBDA {
+        rows[3][k] = y * rows[2][k] - z * rows[1][k];
+        rows[4][k] = z * rows[0][k] - x * rows[2][k];
+        rows[5][k] = x * rows[1][k] - y * rows[0][k];
+      });
+    }
+  }
+};
+/// Numbers of a point: the upper triangle of its block of the normal equations, row by row, then its gradient.
+inline constexpr int point_size = 12;
+/// Numbers of a camera: the lower triangle of its block, row by row, then its gradient.
+template <int C>
+inline constexpr int camera_numbers = C*(C + 1) / 2 + C;
+
+/// Observations by one camera.
 template <class R>
 struct camera_work {
   const R& residual;
@@ -47,12 +74,9 @@ struct camera_work {
   const std::uint32_t* point = nullptr;
   const double* positions = nullptr;  ///< of the points, four numbers each
   // Where results go.
-  const std::uint32_t* by_point = nullptr;
-  const std::uint32_t* mixed_by_point = nullptr;
-  double* shares = nullptr;
-  double* mixed = nullptr;    ///< null for a camera that does not move
-  double* hessian = nullptr;  ///< C x C of the camera
-  double* gradient = nullptr;
+  double* normal = nullptr;  ///< `point_size` of each point, to which observations add
+  double* mixed = nullptr;   ///< a `mixed_tile` for each eight observations, if the camera moves
+  double* sums = nullptr;    ///< `camera_numbers` of the camera; null if it does not move
 };
 
 /// Residuals of eight observations, for residuals that are evaluated one at a time. Not inlined into the kernels, which
@@ -133,7 +157,7 @@ ORBIS_ALWAYS_INLINE void points_of_tile(const camera_work<R>& work, std::size_t 
   const double* from[8];
   for (std::size_t i = 0; i != 8; ++i) from[i] = work.positions + 4 * std::size_t{work.point[first + i]};
   L p[3];
-  load_transposed(from, p);
+  load_transposed<3>(from, p);
   if constexpr (camera_frame_residual<R>) {
     const double* const m = work.view.rotation.data();
     for (int i = 0; i != 3; ++i)
@@ -181,29 +205,61 @@ ORBIS_ALWAYS_INLINE void camera_visibility(const camera_work<R>& work, double* f
   }
 }
 
-/// Writes the contributions of eight observations to their points, and their camera-point blocks.
-template <int C, class R, class L>
-ORBIS_ALWAYS_INLINE void scatter(const camera_work<R>& work, std::size_t first, const L* share, const L (*mixed)[3]) {
-  constexpr int pad = padded<C>;
-  const std::size_t count = work.count - first;
-  double nowhere[3 * pad > share_size ? 3 * pad : share_size];  // for the empty places of the last tile
+/// Adds the contributions of eight observations to their points.
+template <class R, class L>
+ORBIS_ALWAYS_INLINE void add_to_points(const camera_work<R>& work, std::size_t first, const L* share) {
   double* to[8];
-  for (std::size_t i = 0; i != 8; ++i)
-    to[i] = i < count ? work.shares + share_size * std::size_t{work.by_point[first + i]} : nowhere;
   const L none = 0.0;
-  store_transposed(share[0], share[1], share[2], share[3], to, 0);
-  store_transposed(share[4], share[5], share[6], share[7], to, 4);
-  store_transposed(share[8], none, none, none, to, 8);
-  if (work.mixed == nullptr) return;
-  for (std::size_t i = 0; i != 8; ++i)
-    to[i] = i < count ? work.mixed + 3 * pad * std::size_t{work.mixed_by_point[first + i]} : nowhere;
-  unroll<3>([&](auto k) ORBIS_INLINE_LAMBDA {
-    unroll<pad / 4>([&](auto quarter_of) ORBIS_INLINE_LAMBDA {
-      constexpr int row = 4 * decltype(quarter_of)::value;
-      const auto at = [&](int i) ORBIS_INLINE_LAMBDA -> const L& { return i < C ? mixed[i][k] : none; };
-      store_transposed(at(row), at(row + 1), at(row + 2), at(row + 3), to, pad * k + row);
-    });
-  });
+  for (std::size_t i = 0; i != 8; ++i) to[i] = work.normal + point_size * std::size_t{work.point[first + i]};
+  add_transposed(share[0], share[1], share[2], share[3], to, 0);
+  add_transposed(share[4], share[5], share[6], share[7], to, 4);
+  add_transposed(share[8], none, none, none, to, 8);
+}
+
+/// Unknowns of a camera beside its position and rotation; all of them for general residuals.
+template <class R>
+inline constexpr int other_unknowns = R::camera_manifold::dimension - (camera_frame_residual<R> ? 6 : 0);
+
+/// Eight observations linearised: all zero where one takes no part.
+template <class R, class L>
+struct linear_tile {
+  L q[3];                   ///< the points, as `points_of_tile` has them
+  L r[R::dimension];        ///< residuals
+  L by_q[R::dimension][3];  ///< their derivatives
+  L by_rest[R::dimension][std::max(1, other_unknowns<R>)];
+  L weight;  ///< with the information and that of the loss
+};
+
+/// Linearises eight observations; returns their costs.
+template <class R, class Loss, class L>
+ORBIS_ALWAYS_INLINE L linearize_tile(const camera_work<R>& work, const Loss& loss, std::size_t first,
+                                     linear_tile<R, L>& out) {
+  constexpr int rows = R::dimension, columns = other_unknowns<R>;
+  L q[3], r[rows], by_q[rows][3], by_rest[rows][std::max(1, columns)];
+  points_of_tile(work, first, q);
+  const auto valid = residuals_of_tile<true, R, columns>(work, first, q, r, by_q, by_rest);
+  const L information = L::load(work.information + first);
+  L squared = r[0] * r[0];
+  L size = squared;  // anything that is not finite makes this so
+  for (int d = 0; d != rows; ++d) {
+    if (d != 0) squared = squared + r[d] * r[d];
+    for (int k = 0; k != 3; ++k) size = size + by_q[d][k] * by_q[d][k];
+    for (int k = 0; k != columns; ++k) size = size + by_rest[d][k] * by_rest[d][k];
+  }
+  squared = information * squared;
+  const auto seen = valid & (squared <= L(1e100));
+  L rho, weight;
+  lanes_of_loss<Loss>::weigh(loss, select(seen, squared, L(0.0)), rho, weight);
+  const auto used = seen & (information * size <= L(1e100));
+  const auto kept = [&](const L& x) ORBIS_INLINE_LAMBDA { return select(used, x, L(0.0)); };
+  out.weight = kept(information * weight);
+  for (int k = 0; k != 3; ++k) out.q[k] = kept(q[k]);
+  for (int d = 0; d != rows; ++d) {
+    out.r[d] = kept(r[d]);
+    for (int k = 0; k != 3; ++k) out.by_q[d][k] = kept(by_q[d][k]);
+    for (int k = 0; k != columns; ++k) out.by_rest[d][k] = kept(by_rest[d][k]);
+  }
+  return select(L(0.0) < information, select(seen, 0.5 * rho, L(out_of_sight)), L(0.0));
 }
 
 /// Normal equations of a camera's observations; returns their cost.
@@ -213,8 +269,8 @@ ORBIS_ALWAYS_INLINE double linearize_camera(const camera_work<R>& work, const Lo
   constexpr int rows = R::dimension;
   constexpr int C = R::camera_manifold::dimension;
   constexpr bool through_camera = camera_frame_residual<R>;
-  constexpr int columns = through_camera ? C - 6 : C;
-  constexpr int room = columns == 0 ? 1 : columns;
+  constexpr int columns = other_unknowns<R>;
+  using mixed_block = mixed_tile<C, through_camera>;
   L hessian[C * (C + 1) / 2], gradient[C];
   for (auto& h : hessian) h = 0.0;
   for (auto& g : gradient) g = 0.0;
@@ -224,31 +280,15 @@ ORBIS_ALWAYS_INLINE double linearize_camera(const camera_work<R>& work, const Lo
     for (int i = 0; i != 9; ++i) minus_rotation[i] = -work.view.rotation.data()[i];
   const auto at = [](int i, int j) ORBIS_INLINE_LAMBDA { return i * (i + 1) / 2 + j; };  // of the lower triangle
 
+  // Linearisation is one long chain of operations, normal equations are many short ones: apart from each other the
+  // processor works at several tiles at once.
+  constexpr std::size_t group = 8;
+  linear_tile<R, L> tiles[group];
   for (std::size_t first = 0; first < work.count; first += 8) {
-    L q[3], r[rows], by_q[rows][3], by_rest[rows][room];
-    points_of_tile(work, first, q);
-    auto valid = residuals_of_tile<true, R, columns>(work, first, q, r, by_q, by_rest);
-    const L information = L::load(work.information + first);
-    L squared = r[0] * r[0];
-    L size = squared;  // anything that is not finite makes this so
-    for (int d = 0; d != rows; ++d) {
-      if (d != 0) squared = squared + r[d] * r[d];
-      for (int k = 0; k != 3; ++k) size = size + by_q[d][k] * by_q[d][k];
-      for (int k = 0; k != columns; ++k) size = size + by_rest[d][k] * by_rest[d][k];
-    }
-    squared = information * squared;
-    const auto seen = valid & (squared <= L(1e100));
-    L rho, weight;
-    lanes_of_loss<Loss>::weigh(loss, select(seen, squared, L(0.0)), rho, weight);
-    cost = cost + select(L(0.0) < information, select(seen, 0.5 * rho, L(out_of_sight)), L(0.0));
-    const auto used = seen & (information * size <= L(1e100));
-    const L w = select(used, information * weight, L(0.0));
-    for (auto& coordinate : q) coordinate = select(used, coordinate, L(0.0));
-    for (int d = 0; d != rows; ++d) {
-      r[d] = select(used, r[d], L(0.0));
-      for (int k = 0; k != 3; ++k) by_q[d][k] = select(used, by_q[d][k], L(0.0));
-      for (int k = 0; k != columns; ++k) by_rest[d][k] = select(used, by_rest[d][k], L(0.0));
-    }
+    if (first % (8 * group) == 0)
+      for (std::size_t t = 0; t != group && first + 8 * t < work.count; ++t)
+        cost = cost + linearize_tile(work, loss, first + 8 * t, tiles[t]);
+    const auto& [q, r, by_q, by_rest, w] = tiles[first / 8 % group];
 
     L weighted[rows][3];  // W J_q
     unroll<rows>([&](auto d) ORBIS_INLINE_LAMBDA {
@@ -274,37 +314,36 @@ ORBIS_ALWAYS_INLINE double linearize_camera(const camera_work<R>& work, const Lo
       b[i] = times_residual([&](int d) ORBIS_INLINE_LAMBDA -> const L& { return weighted[d][i]; });
     });
 
-    L share[9], mixed[C][3];
+    L share[9];
+    double* const mixed = work.mixed + mixed_block::size * (first / 8);
     if constexpr (through_camera) {
-      unroll<C - 6>([&](auto i) ORBIS_INLINE_LAMBDA {  // fixed cameras write nothing there, and the compiler warns
-        unroll<3>([&](auto k) ORBIS_INLINE_LAMBDA { mixed[6 + i][k] = L(0.0); });
-      });
       unroll<3>([&](auto i) ORBIS_INLINE_LAMBDA { b[i] = L(0.0) - b[i]; });
       const auto cross = [&](const L* v, L* out) ORBIS_INLINE_LAMBDA {  // hat(q) v
         out[0] = q[1] * v[2] - q[2] * v[1];
         out[1] = q[2] * v[0] - q[0] * v[2];
         out[2] = q[0] * v[1] - q[1] * v[0];
       };
+      L top[3][3];  // -M R
       unroll<3>([&](auto k) ORBIS_INLINE_LAMBDA {
-        L top[3], bottom[3];
         const L* const column = minus_rotation + 3 * k;
         unroll<3>([&](auto i) ORBIS_INLINE_LAMBDA {
-          top[i] = (m[i][0] * column[0] + m[i][1] * column[1]) + m[i][2] * column[2];
-          mixed[i][k] = top[i];
+          top[i][k] = (m[i][0] * column[0] + m[i][1] * column[1]) + m[i][2] * column[2];
         });
-        cross(top, bottom);
-        unroll<3>([&](auto i) ORBIS_INLINE_LAMBDA { mixed[3 + i][k] = bottom[i]; });
       });
       int next = 0;
       unroll<3>([&](auto i) ORBIS_INLINE_LAMBDA {
         const L* const row = minus_rotation + 3 * i;
         unroll<3 - i>([&](auto d) ORBIS_INLINE_LAMBDA {
           constexpr int k = decltype(i)::value + decltype(d)::value;
-          share[next++] = (row[0] * mixed[0][k] + row[1] * mixed[1][k]) + row[2] * mixed[2][k];
+          share[next++] = (row[0] * top[0][k] + row[1] * top[1][k]) + row[2] * top[2][k];
         });
         share[6 + i] = (row[0] * b[0] + row[1] * b[1]) + row[2] * b[2];
       });
-      if (work.mixed != nullptr) {
+      if (work.sums != nullptr) {
+        unroll<3>([&](auto i) ORBIS_INLINE_LAMBDA {
+          unroll<3>([&](auto k) ORBIS_INLINE_LAMBDA { top[i][k].store(mixed + mixed_block::row(i) + 8 * k); });
+          q[i].store(mixed + mixed_block::q + 8 * i);
+        });
         L turned[3][3];  // hat(q) M, by column
         unroll<3>([&](auto k) ORBIS_INLINE_LAMBDA { cross(m[k], turned[k]); });
         unroll<3>([&](auto i) ORBIS_INLINE_LAMBDA {
@@ -332,7 +371,8 @@ ORBIS_ALWAYS_INLINE double linearize_camera(const camera_work<R>& work, const Lo
             hessian[at(6 + c, i)] = hessian[at(6 + c, i)] + n[i];
             hessian[at(6 + c, 3 + i)] = hessian[at(6 + c, 3 + i)] + swung[i];
             const L* const column = minus_rotation + 3 * i;
-            mixed[6 + c][i] = (n[0] * column[0] + n[1] * column[1]) + n[2] * column[2];
+            const L entry = (n[0] * column[0] + n[1] * column[1]) + n[2] * column[2];
+            entry.store(mixed + mixed_block::row(6 + c) + 8 * i);
           });
           unroll<c + 1>([&](auto e) ORBIS_INLINE_LAMBDA {
             L sum = by_rest[0][c] * (w * by_rest[0][e]);
@@ -351,12 +391,12 @@ ORBIS_ALWAYS_INLINE double linearize_camera(const camera_work<R>& work, const Lo
         unroll<3 - i>([&](auto d) ORBIS_INLINE_LAMBDA { share[next++] = m[i][i + d]; });
         share[6 + i] = b[i];
       });
-      if (work.mixed != nullptr) {
+      if (work.sums != nullptr) {
         for (int c = 0; c != C; ++c) {
           for (int k = 0; k != 3; ++k) {
             L sum = by_rest[0][c] * weighted[0][k];
             for (int d = 1; d < rows; ++d) sum = sum + by_rest[d][c] * weighted[d][k];
-            mixed[c][k] = sum;
+            sum.store(mixed + mixed_block::row(c) + 8 * k);
           }
           L pulled[rows];
           for (int d = 0; d != rows; ++d) pulled[d] = w * by_rest[d][c];
@@ -371,13 +411,12 @@ ORBIS_ALWAYS_INLINE double linearize_camera(const camera_work<R>& work, const Lo
         }
       }
     }
-    scatter<C>(work, first, share, mixed);
+    add_to_points(work, first, share);
   }
-  if (work.mixed != nullptr)
-    for (int i = 0; i != C; ++i) {
-      work.gradient[i] = simd::sum(gradient[i]);
-      for (int j = 0; j <= i; ++j) work.hessian[i * C + j] = work.hessian[j * C + i] = simd::sum(hessian[at(i, j)]);
-    }
+  if (work.sums != nullptr) {
+    for (int i = 0; i != C * (C + 1) / 2; ++i) work.sums[i] = simd::sum(hessian[i]);
+    for (int i = 0; i != C; ++i) work.sums[C * (C + 1) / 2 + i] = simd::sum(gradient[i]);
+  }
   return simd::sum(cost);
 }
 

@@ -15,9 +15,11 @@
 
 namespace orbis::optimize::detail {
 
-/// Observations in two orders. By camera, in tiles of eight (the last may have empty places), for arithmetic that is
-/// the same for each observation. By point, cameras ascending, for the elimination of the points. Points with the same
-/// first camera are neighbours, so that their elimination touches one part of the reduced system. Keeps its memory.
+/// Observations in two orders. For arithmetic that is the same for each observation: by camera, within chunks of points
+/// that fit into the cache; such segments are made of tiles of eight places, of which the last may stay empty. And by
+/// point, cameras ascending, for products of pairs of observations of a point: points that the same cameras see are
+/// neighbours and form groups, and points with the same first camera are neighbours, too, so that their pairs touch one
+/// part of the reduced system. Keeps its memory.
 ///
 /// O(observations + pairs of observations of one point + pairs of cameras that may move); one bit for each of the last.
 class bundle_structure {
@@ -25,28 +27,51 @@ class bundle_structure {
   static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
   static constexpr std::size_t tile = 8;
 
-  // By camera. Camera c has `count[c]` observations at the places [8 * first_tile[c], ...).
-  std::vector<std::size_t> first_tile;
-  std::vector<std::uint32_t> count;
-  std::vector<std::uint32_t> source;                    ///< index of the caller's observation at a place
-  std::vector<std::uint32_t> point;                     ///< of each place; that of the first place where it is empty
-  std::vector<std::uint32_t> by_point, mixed_by_point;  ///< of each place, its number in the orders by point
+  /// The observations of a chunk's points by one camera, at the places [8 * first_tile, 8 * first_tile + count).
+  struct segment {
+    std::uint32_t camera = 0;
+    std::uint32_t count = 0;
+    std::size_t first_tile = 0;
+    std::size_t first_mixed_tile = 0;  ///< the same, if tiles of cameras that may move are counted alone
+  };
+  /// Points that the same `cameras` cameras that may move see. Observation a of the i-th of them by such cameras has
+  /// the number `first_mixed + a * points + i`.
+  struct group {
+    std::uint32_t first_point = 0, points = 0;
+    std::uint32_t first_mixed = 0, cameras = 0;
+    std::size_t first_pair = 0;  ///< of its pairs a > b, a ascending; shared by groups alike
+  };
+  /// Points that are neighbours, with all their observations; its end is where the next begins.
+  struct chunk {
+    std::size_t first_point = 0, first_segment = 0, first_group = 0, first_mixed = 0;
+  };
 
-  // By point. Number p is the caller's `point_source[p]`.
-  std::vector<std::uint32_t> point_source;
-  std::vector<std::uint32_t> first, first_mixed;  ///< of each point: all observations; those by cameras that may move
-  std::vector<std::uint32_t> mixed_unknown;       ///< of each observation by a camera that may move, which one
-  std::vector<std::uint32_t> pair_slot;           ///< slots of all pairs a >= b of those of a point, a ascending
-  std::vector<std::size_t> first_pair;            ///< of each point
+  std::vector<chunk> chunk_begin;           ///< of each chunk, and the end
+  std::vector<segment> segments;            ///< by chunk, then by camera
+  std::vector<std::uint32_t> source;        ///< index of the caller's observation at a place
+  std::vector<std::uint32_t> point;         ///< of each place; that of the segment's first place where it is empty
+  std::vector<std::uint32_t> mixed_number;  ///< of each place: its number among observations by cameras that may move
+
+  std::vector<std::uint32_t> point_source;  ///< number p is this one of the caller's points
+  std::vector<group> groups;
+  std::vector<std::uint32_t> mixed_unknown;  ///< of each observation by a camera that may move, which one
+  std::vector<std::uint32_t> mixed_place;    ///< where it is if places of cameras that may move are counted alone
+  std::vector<std::uint32_t> pair_slot;      ///< of pairs of observations, the slot
 
   // Cameras that may move, and blocks of the reduced system: lower triangle with diagonal, row by row.
+  std::vector<std::uint32_t> count;            ///< observations by each camera
   std::vector<std::uint32_t> unknown, camera;  ///< of each camera, its number or `none`; and back
   std::vector<block_place> slots;
+  std::vector<std::uint32_t> diagonal_slot;  ///< of each camera that may move
 
   [[nodiscard]] std::size_t unknowns() const { return camera.size(); }
   [[nodiscard]] std::size_t points() const { return point_source.size(); }
-  [[nodiscard]] std::size_t tiles() const { return first_tile.empty() ? 0 : first_tile.back(); }
-  [[nodiscard]] std::size_t longest() const { return longest_; }  ///< most observations of a point
+  [[nodiscard]] std::size_t chunks() const { return chunk_begin.empty() ? 0 : chunk_begin.size() - 1; }
+  [[nodiscard]] std::size_t places() const { return source.size(); }
+  [[nodiscard]] std::size_t mixed_tiles() const { return mixed_tiles_; }
+  [[nodiscard]] std::size_t pairs() const { return pairs_; }  ///< of observations of one point
+  /// Most observations of a chunk by cameras that may move.
+  [[nodiscard]] std::size_t largest_chunk() const { return largest_chunk_; }
 
   /// Orders the observations for which `is_usable(index)`. Cameras without any do not move. With `hold_first` the first
   /// camera with observations does not move either, unless another is fixed.
@@ -56,34 +81,47 @@ class bundle_structure {
              std::span<const std::uint8_t> fixed, bool hold_first, const Usable& is_usable) {
     sort(cameras, points, observations, is_usable);
     number_cameras(cameras, fixed, hold_first);
-    order_points(points, observations);
-    lay_out(cameras, observations);
+    order_points(points);
+    find_points_alike();
+    lay_out(cameras);
     find_blocks();
   }
 
  private:
-  /// By camera, then by point: `sorted_` has the observations of each point by ascending camera.
+  struct entry {
+    std::uint32_t observation, other;  ///< `other`: its point or its camera, whichever the order does not say
+  };
+  struct span_of_cameras {
+    std::uint32_t first = none, last = none, seen = 0;  ///< of a point, among those that may move
+  };
+
+  [[nodiscard]] std::span<const entry> observations_of(std::size_t source_point) const {
+    return std::span{by_point_}.subspan(of_point_[source_point], of_point_[source_point + 1] - of_point_[source_point]);
+  }
+
+  /// By camera, then by point: `by_point_` has the observations of each point by ascending camera.
   template <class Observation, class Usable>
   void sort(std::size_t cameras, std::size_t points, std::span<const Observation> observations,
             const Usable& is_usable) {
     count.assign(cameras, 0);
     of_point_.assign(points + 1, 0);
-    usable_.clear();
-    usable_.reserve(observations.size());
     for (std::uint32_t k = 0; k != observations.size(); ++k)
       if (is_usable(k)) {
-        usable_.push_back(k);
         ++count[observations[k].pose];
         ++of_point_[observations[k].point + 1];
       }
+    for (std::size_t p = 0; p != points; ++p) of_point_[p + 1] += of_point_[p];
     cursor_.assign(cameras + 1, 0);
     for (std::size_t c = 0; c != cameras; ++c) cursor_[c + 1] = cursor_[c] + count[c];
-    by_camera_.resize(usable_.size());
-    for (const std::uint32_t k : usable_) by_camera_[cursor_[observations[k].pose]++] = k;
-    for (std::size_t p = 0; p != points; ++p) of_point_[p + 1] += of_point_[p];
+    by_camera_.resize(of_point_[points]);
+    for (std::uint32_t k = 0; k != observations.size(); ++k)
+      if (is_usable(k)) by_camera_[cursor_[observations[k].pose]++] = {k, observations[k].point};
     cursor_.assign(of_point_.begin(), of_point_.end());
-    sorted_.resize(usable_.size());
-    for (const std::uint32_t k : by_camera_) sorted_[cursor_[observations[k].point]++] = k;
+    by_point_.resize(by_camera_.size());
+    const entry* at = by_camera_.data();
+    for (std::uint32_t c = 0; c != cameras; ++c)
+      for (const entry* const end = at + count[c]; at != end; ++at)
+        by_point_[cursor_[at->other]++] = {at->observation, c};
   }
 
   void number_cameras(std::size_t cameras, std::span<const std::uint8_t> fixed, bool hold_first) {
@@ -103,74 +141,146 @@ class bundle_structure {
       }
   }
 
-  /// By their first camera that may move.
-  template <class Observation>
-  void order_points(std::size_t points, std::span<const Observation> observations) {
-    const std::size_t keys = camera.size() + 1;
-    key_.assign(points, 0);
-    cursor_.assign(keys + 1, 0);
-    for (std::size_t p = 0; p != points; ++p) {
+  /// By the first camera that may move, the last one, and how many.
+  void order_points(std::size_t points) {
+    const auto n = static_cast<std::uint32_t>(unknowns());
+    spans_.assign(points, {});
+    point_source.clear();
+    for (std::uint32_t p = 0; p != points; ++p) {
       if (of_point_[p] == of_point_[p + 1]) continue;
-      std::size_t key = keys - 1;
-      for (std::uint32_t at = of_point_[p]; at != of_point_[p + 1] && key == keys - 1; ++at)
-        key = std::min<std::size_t>(key, unknown[observations[sorted_[at]].pose]);
-      key_[p] = static_cast<std::uint32_t>(key);
-      ++cursor_[key + 1];
+      point_source.push_back(p);
+      span_of_cameras& s = spans_[p];
+      for (const entry& o : observations_of(p))
+        if (const std::uint32_t u = unknown[o.other]; u != none) {
+          s.first = std::min(s.first, u);
+          s.last = u;
+          ++s.seen;
+        }
     }
-    for (std::size_t k = 0; k != keys; ++k) cursor_[k + 1] += cursor_[k];
-    point_source.resize(cursor_[keys]);
-    for (std::uint32_t p = 0; p != points; ++p)
-      if (of_point_[p] != of_point_[p + 1]) point_source[cursor_[key_[p]]++] = p;
+    sort_points(n, [&](std::uint32_t p) { return std::min(spans_[p].seen, n); });
+    sort_points(n, [&](std::uint32_t p) { return std::min(spans_[p].last, n); });
+    sort_points(n, [&](std::uint32_t p) { return std::min(spans_[p].first, n); });
+  }
+  /// Sorts `point_source` by a key that is at most `largest`; those of the same key keep their order.
+  template <class Key>
+  void sort_points(std::uint32_t largest, const Key& key) {
+    cursor_.assign(std::size_t{largest} + 2, 0);
+    for (const std::uint32_t p : point_source) ++cursor_[key(p) + 1];
+    for (std::size_t k = 0; k != std::size_t{largest} + 1; ++k) cursor_[k + 1] += cursor_[k];
+    moved_.resize(point_source.size());
+    for (const std::uint32_t p : point_source) moved_[cursor_[key(p)]++] = p;
+    point_source.swap(moved_);
   }
 
-  template <class Observation>
-  void lay_out(std::size_t cameras, std::span<const Observation> observations) {
-    first_tile.assign(cameras + 1, 0);
-    for (std::size_t c = 0; c != cameras; ++c) first_tile[c + 1] = first_tile[c] + (count[c] + tile - 1) / tile;
-    source.assign(tile * first_tile.back(), none);
-    point.assign(source.size(), 0);
-    by_point.assign(source.size(), none);
-    mixed_by_point.assign(source.size(), none);
-    next_place_.resize(cameras);
-    for (std::size_t c = 0; c != cameras; ++c) next_place_[c] = tile * first_tile[c];
-
-    first.assign(1, 0);
-    first_mixed.assign(1, 0);
-    first_pair.assign(1, 0);
-    mixed_unknown.clear();
-    longest_ = 0;
-    for (std::uint32_t p = 0; p != point_source.size(); ++p) {
-      const std::uint32_t begin = of_point_[point_source[p]], end = of_point_[point_source[p] + 1];
-      for (std::uint32_t at = begin; at != end; ++at) {
-        const std::uint32_t c = observations[sorted_[at]].pose;
-        const std::size_t place = next_place_[c]++;
-        source[place] = sorted_[at];
-        point[place] = p;
-        by_point[place] = first.back() + (at - begin);
-        if (unknown[c] == none) continue;
-        mixed_by_point[place] = static_cast<std::uint32_t>(mixed_unknown.size());
-        mixed_unknown.push_back(unknown[c]);
+  void find_points_alike() {
+    is_like_last_.assign(points(), 0);
+    for (std::size_t p = 1; p < points(); ++p) {
+      const std::span<const entry> one = observations_of(point_source[p - 1]), other = observations_of(point_source[p]);
+      const auto moves = [&](const entry& o) { return unknown[o.other] != none; };
+      auto a = one.begin(), b = other.begin();
+      for (;; ++a, ++b) {
+        a = std::find_if(a, one.end(), moves), b = std::find_if(b, other.end(), moves);
+        if (a == one.end() || b == other.end() || a->other != b->other) break;
       }
-      first.push_back(first.back() + (end - begin));
-      const std::size_t seen = mixed_unknown.size() - first_mixed.back();
-      longest_ = std::max(longest_, seen);
-      first_mixed.push_back(static_cast<std::uint32_t>(mixed_unknown.size()));
-      first_pair.push_back(first_pair.back() + seen * (seen + 1) / 2);
+      is_like_last_[p] = a == one.end() && b == other.end() ? 1 : 0;
     }
-    for (std::size_t c = 0; c != cameras; ++c)
-      if (count[c] != 0)
-        for (std::size_t place = next_place_[c]; place != tile * first_tile[c + 1]; ++place)
-          point[place] = point[tile * first_tile[c]];
   }
 
-  /// Calls `f(row * (row + 1) / 2 + column)` for every pair of observations of a point.
+  /// Chunks end where they have observations enough to be worth while, for all of them and for each camera.
+  void lay_out(std::size_t cameras) {
+    constexpr std::size_t enough = 2048, enough_of_camera = 48;
+    segments.clear();
+    groups.clear();
+    chunk_begin.assign(1, {});
+    point.clear();
+    source.clear();
+    mixed_number.clear();
+    mixed_unknown.clear();
+    mixed_place.clear();
+    in_chunk_.assign(cameras, 0);
+    mixed_in_chunk_.assign(cameras, 0);
+    mixed_tiles_ = largest_chunk_ = 0;
+    std::size_t tiles = 0;
+    for (std::size_t begin = 0, end = 0; begin != points(); begin = end) {
+      std::size_t observations = 0;
+      touched_.clear();
+      while (end != points() && observations < std::max(enough, enough_of_camera * touched_.size()))
+        for (const std::size_t stop = std::min(points(), end + tile); end != stop; ++end)
+          for (const entry& o : observations_of(point_source[end])) {
+            if (in_chunk_[o.other]++ == 0) touched_.push_back(o.other);
+            ++observations;
+          }
+      std::sort(touched_.begin(), touched_.end());
+      for (const std::uint32_t c : touched_) {
+        segments.push_back({c, in_chunk_[c], tiles, mixed_tiles_});
+        in_chunk_[c] = static_cast<std::uint32_t>(tile * tiles);  // the next places
+        mixed_in_chunk_[c] = static_cast<std::uint32_t>(tile * mixed_tiles_);
+        const std::size_t own = (segments.back().count + tile - 1) / tile;
+        tiles += own;
+        if (unknown[c] != none) mixed_tiles_ += own;
+      }
+      source.resize(tile * tiles, none);
+      point.resize(source.size(), none);
+      mixed_number.resize(source.size(), none);
+      for (std::size_t p = begin, next = 0; p != end; p = next) {
+        next = end_of_group(p, end);
+        place_group(p, next);
+      }
+      for (const std::uint32_t c : touched_) in_chunk_[c] = 0;
+      for (std::size_t s = chunk_begin.back().first_segment; s != segments.size(); ++s) {
+        const std::size_t at = tile * segments[s].first_tile;
+        for (std::size_t place = at + segments[s].count; place % tile != 0; ++place) point[place] = point[at];
+      }
+      largest_chunk_ = std::max(largest_chunk_, mixed_unknown.size() - chunk_begin.back().first_mixed);
+      chunk_begin.push_back({end, segments.size(), groups.size(), mixed_unknown.size()});
+    }
+  }
+  /// Groups are small enough for the nearest cache.
+  [[nodiscard]] std::size_t end_of_group(std::size_t p, std::size_t end) const {
+    constexpr std::size_t room = 96;
+    const std::size_t most = std::max<std::size_t>(1, room / std::max(1U, spans_[point_source[p]].seen));
+    std::size_t next = p + 1;
+    while (next != end && next - p < most && is_like_last_[next] != 0) ++next;
+    return next;
+  }
+  void place_group(std::size_t begin, std::size_t end) {
+    group g;
+    g.first_point = static_cast<std::uint32_t>(begin);
+    g.points = static_cast<std::uint32_t>(end - begin);
+    g.first_mixed = static_cast<std::uint32_t>(mixed_unknown.size());
+    g.cameras = spans_[point_source[begin]].seen;
+    groups.push_back(g);
+    mixed_unknown.resize(mixed_unknown.size() + std::size_t{g.points} * g.cameras);
+    mixed_place.resize(mixed_unknown.size());
+    for (std::size_t p = begin; p != end; ++p) {
+      std::size_t number = g.first_mixed + (p - begin);
+      for (const entry& o : observations_of(point_source[p])) {
+        const std::size_t place = in_chunk_[o.other]++;
+        source[place] = o.observation;
+        point[place] = static_cast<std::uint32_t>(p);
+        if (unknown[o.other] == none) continue;
+        mixed_number[place] = static_cast<std::uint32_t>(number);
+        mixed_unknown[number] = unknown[o.other];
+        mixed_place[number] = mixed_in_chunk_[o.other]++;
+        number += g.points;
+      }
+    }
+  }
+
+  /// Whether the group has the pairs of the one before.
+  [[nodiscard]] bool shares_pairs(std::size_t g) const { return g != 0 && is_like_last_[groups[g].first_point] != 0; }
+  /// Calls `f(row * (row + 1) / 2 + column)` for the pairs of each group that does not share them.
   template <class F>
   void for_each_pair(const F& f) const {
-    for (std::size_t p = 0; p != points(); ++p)
-      for (std::uint32_t a = first_mixed[p]; a != first_mixed[p + 1]; ++a) {
-        const std::size_t row = mixed_unknown[a];
-        for (std::uint32_t b = first_mixed[p]; b <= a; ++b) f(row * (row + 1) / 2 + mixed_unknown[b]);
+    for (std::size_t k = 0; k != groups.size(); ++k) {
+      if (shares_pairs(k)) continue;
+      const group& g = groups[k];
+      const auto unknown_of = [&](std::size_t a) { return std::size_t{mixed_unknown[g.first_mixed + a * g.points]}; };
+      for (std::size_t a = 1; a < g.cameras; ++a) {
+        const std::size_t row = unknown_of(a);
+        for (std::size_t b = 0; b != a; ++b) f(row * (row + 1) / 2 + unknown_of(b));
       }
+    }
   }
 
   void find_blocks() {
@@ -190,18 +300,31 @@ class bundle_structure {
     };
     slots.clear();
     slots.reserve(total);
+    diagonal_slot.resize(n);
     std::size_t at = 0;
-    for (std::uint32_t i = 0; i != n; ++i)
+    for (std::uint32_t i = 0; i != n; ++i) {
       for (std::uint32_t j = 0; j <= i; ++j, ++at)
         if ((present_[at / 64] & bit(at)) != 0) slots.push_back({i, j});
+      diagonal_slot[i] = static_cast<std::uint32_t>(slots.size() - 1);
+    }
     pair_slot.clear();
-    pair_slot.reserve(first_pair.back());
     for_each_pair([&](std::size_t pair) { pair_slot.push_back(slot_of(pair)); });
+    pairs_ = 0;
+    std::size_t distinct = 0;  // pairs up to this group
+    for (std::size_t k = 0; k != groups.size(); ++k) {
+      group& g = groups[k];
+      const std::size_t own = std::size_t{g.cameras} * (std::max(1U, g.cameras) - 1) / 2;
+      pairs_ += own * g.points;
+      if (!shares_pairs(k)) distinct += own;
+      g.first_pair = distinct - own;
+    }
   }
 
-  std::size_t longest_ = 0;
-  std::vector<std::uint32_t> usable_, by_camera_, sorted_, of_point_, cursor_, key_;
-  std::vector<std::size_t> next_place_;
+  std::size_t mixed_tiles_ = 0, largest_chunk_ = 0, pairs_ = 0;
+  std::vector<entry> by_camera_, by_point_;
+  std::vector<std::uint32_t> of_point_, cursor_, moved_, in_chunk_, mixed_in_chunk_, touched_;
+  std::vector<std::uint8_t> is_like_last_;  // of each point: whether the same cameras that may move see the one before
+  std::vector<span_of_cameras> spans_;
   std::vector<std::uint64_t> present_;
   std::vector<std::uint32_t> rank_;
 };

@@ -177,23 +177,29 @@ class covariance_computation {
     out.points.assign(points, mat3::Constant(std::numeric_limits<double>::quiet_NaN()));
     for (std::size_t j = 0; j != points; ++j)
       if (!options.fixed_points.empty() && options.fixed_points[j] != 0) out.points[j].setZero();
-    for_each_index(policy, points_, 64, [&](std::size_t p) {
-      const std::size_t source = structure().point_source[p];
-      if (!moves_point(p)) return;
-      const std::uint32_t begin = structure().first_mixed[p], end = structure().first_mixed[p + 1];
-      mat3 sum = mat3::Zero();
-      std::size_t pair = structure().first_pair[p];
-      for (std::uint32_t a = begin; a != end; ++a)
-        for (std::uint32_t b = begin; b <= a; ++b, ++pair) {
-          const mat3 share = equations_.mixed_block(a).transpose() * block_at_[structure().pair_slot[pair]] *
-                             equations_.mixed_block(b);
-          sum += share;
-          if (a != b) sum += share.transpose();
-        }
-      const mat3 inverse = point_inverse(p);
-      const mat3 block = inverse + inverse * sum * inverse;
-      out.points[source] = 0.5 * (block + block.transpose());
+    if (points_ == 0) return;
+    for_each_index(policy, structure().groups.size(), 16, [&](std::size_t k) {
+      const bundle_structure::group& g = structure().groups[k];
+      for (std::size_t i = 0; i != g.points; ++i) write_point(out, g, i);
     });
+  }
+  void write_point(Output& out, const bundle_structure::group& g, std::size_t i) const {
+    const std::size_t p = g.first_point + i, source = structure().point_source[p];
+    if (!moves_point(p)) return;
+    const auto number = [&](std::size_t a) { return g.first_mixed + a * g.points + i; };
+    mat3 sum = mat3::Zero();
+    std::size_t pair = g.first_pair;
+    for (std::size_t a = 0; a != g.cameras; ++a) {
+      const auto own = equations_.mixed_block(number(a));
+      sum += own.transpose() * block_at_[structure().diagonal_slot[structure().mixed_unknown[number(a)]]] * own;
+      for (std::size_t b = 0; b != a; ++b, ++pair) {
+        const mat3 share = own.transpose() * block_at_[structure().pair_slot[pair]] * equations_.mixed_block(number(b));
+        sum += share + share.transpose();
+      }
+    }
+    const mat3 inverse = point_inverse(p);
+    const mat3 block = inverse + inverse * sum * inverse;
+    out.points[source] = 0.5 * (block + block.transpose());
   }
 
   [[nodiscard]] mat3 point_inverse(std::size_t p) const {

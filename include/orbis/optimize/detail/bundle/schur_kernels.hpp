@@ -16,235 +16,340 @@
 #include <orbis/core/simd/math.hpp>
 #include <orbis/core/simd/vec.hpp>
 #include <orbis/optimize/detail/bundle/bundle_kernels.hpp>
+#include <orbis/optimize/detail/bundle/bundle_structure.hpp>
+#include <orbis/optimize/detail/bundle/transposed.hpp>
 #include <orbis/optimize/detail/unroll.hpp>
 
 namespace orbis::optimize::detail {
 
-/// Numbers of a point: the upper triangle of its block of the normal equations, row by row, then its gradient. Points
-/// are stored in tiles of eight: number k of point p is `tile[8 * k + p % 8]`.
-inline constexpr std::size_t point_size = 9;
-[[nodiscard]] ORBIS_ALWAYS_INLINE std::size_t point_at(std::size_t p) { return point_size * (p / 8 * 8) + p % 8; }
+/// How the kernels hold C rows: in whole registers, but one that would be alone in a register stands apart.
+template <int C>
+struct row_layout {
+  static constexpr bool has_last = C > 8 && C % 8 == 1;
+  static constexpr int body = has_last ? C - 1 : (C + 3) / 4 * 4;  ///< rows in registers
+  static constexpr int size = has_last ? body + 4 : body;          ///< numbers of a vector of C rows
+  /// Numbers of a C x C block: C columns of `body` rows, then the last row if it stands apart.
+  static constexpr int block = C * body + (has_last ? size : 0);
+  /// Where the number of a row and a column of a block is.
+  [[nodiscard]] static constexpr int at(int row, int column) {
+    return row < body ? body * column + row : C * body + column;
+  }
+};
+/// Rows in a register.
+template <int C, simd::target Target>
+inline constexpr int row_width = row_layout<C>::body % static_cast<int>(Target::bytes / 8) == 0 ? Target::bytes / 8 : 4;
+/// Whether two rows of blocks fit into the registers: the sums, and two rows and a factor.
+template <int C, simd::target Target>
+inline constexpr bool has_room_for_two = 2 * C + 3 <= (Target::bytes == 64 ? 32 : 16);
 
 /// The elimination of a chunk of points, for cameras with C unknowns.
 struct elimination {
-  std::size_t begin = 0, end = 0;   ///< `begin` is a multiple of eight
+  const bundle_structure& structure;
+  std::size_t chunk = 0;
   const double* normal = nullptr;   ///< `point_size` of each point; all zero: the point stays
   const double* damping = nullptr;  ///< three of each point, or null
-  const double* mixed = nullptr;    ///< 3 * padded<C> of each observation
-  const std::uint32_t* first_mixed = nullptr;
-  const std::uint32_t* mixed_unknown = nullptr;
-  const std::size_t* first_pair = nullptr;
-  const std::uint32_t* pair_slot = nullptr;
-  double* inverse = nullptr;  ///< `point_size` of each point: L^-1, row by row, and L^-1 g
+  const double* mixed = nullptr;    ///< tiles of blocks of cameras and points
+  double* inverse = nullptr;        ///< `point_size` of each point: L^-1, row by row, and L^-1 g
   // What is subtracted from the reduced system.
-  double* blocks = nullptr;   ///< C columns of padded<C> rows for each slot
-  double* right = nullptr;    ///< padded<C> of each unknown
-  double* scratch = nullptr;  ///< 3 * padded<C> * most observations of a point
+  double* blocks = nullptr;   ///< `row_layout<C>::block` for each slot
+  double* right = nullptr;    ///< C of each unknown
+  double* scratch = nullptr;  ///< three vectors for each observation of the chunk by a camera that may move
 };
 
-/// Computes L^-1 and L^-1 g of eight points from `p` on. Returns the first of them before `work.end` whose block is not
-/// positive definite, or `work.end`.
+/// Computes L^-1 and L^-1 g of the eight points from `p` on, or up to `end`. Returns the first of them whose block is
+/// not positive definite, or `end`.
 template <simd::target Target>
-ORBIS_ALWAYS_INLINE std::size_t invert_factors(const elimination& work, std::size_t p) {
+ORBIS_ALWAYS_INLINE std::size_t invert_factors(const elimination& work, std::size_t p, std::size_t end) {
   using L = simd::vec<double, 8, Target>;
   constexpr double least = 1e-14;
-  const double* const v = work.normal + point_at(p);
-  double* const out = work.inverse + point_at(p);
+  const std::size_t count = std::min<std::size_t>(8, end - p);
+  const double nothing[point_size] = {};
+  double nowhere[point_size];
+  const double* from[8];
+  double* to[8];
+  for (std::size_t i = 0; i != 8; ++i) {
+    from[i] = i < count ? work.normal + point_size * (p + i) : nothing;
+    to[i] = i < count ? work.inverse + point_size * (p + i) : nowhere;
+  }
+  L v[point_size];
+  unroll<3>([&](auto k) ORBIS_INLINE_LAMBDA {
+    load_transposed<4>(from, v + 4 * k);
+    for (const double*& row : from) row += 4;
+  });
   const L none = 0.0, one = 1.0;
   L d[3] = {none, none, none};
   if (work.damping != nullptr) {
     double gathered[3][8] = {};
-    for (std::size_t i = 0; i != std::min<std::size_t>(8, work.end - p); ++i)
+    for (std::size_t i = 0; i != count; ++i)
       for (std::size_t k = 0; k != 3; ++k) gathered[k][i] = work.damping[3 * (p + i) + k];
     for (int k = 0; k != 3; ++k) d[k] = L::load(gathered[k]);
   }
-  const L h00 = L::load(v), h11 = L::load(v + 24), h22 = L::load(v + 40);
-  const auto moves = !((h00 == none) & (h11 == none) & (h22 == none));
-  const L v00 = h00 + d[0], v11 = h11 + d[1], v22 = h22 + d[2];
+  const auto moves = !((v[0] == none) & (v[3] == none) & (v[5] == none));
+  const L v00 = v[0] + d[0], v11 = v[3] + d[1], v22 = v[5] + d[2];
   auto definite = (L(1e-290) < v00) & (v00 < L(1e290));
   const L i00 = simd::reciprocal_root(select(definite, v00, one));
-  const L l10 = L::load(v + 8) * i00, l20 = L::load(v + 16) * i00;
+  const L l10 = v[1] * i00, l20 = v[2] * i00;
   const L p11 = v11 - l10 * l10;
   definite = definite & (least * v11 < p11) & (L(1e-290) < p11) & (p11 < L(1e290));
   const L i11 = simd::reciprocal_root(select(definite, p11, one));
-  const L l21 = (L::load(v + 32) - l20 * l10) * i11;
+  const L l21 = (v[4] - l20 * l10) * i11;
   const L p22 = v22 - (l20 * l20 + l21 * l21);
   definite = definite & (least * v22 < p22) & (L(1e-290) < p22) & (p22 < L(1e290));
   const L i22 = simd::reciprocal_root(select(definite, p22, one));
   const L i10 = none - (l10 * i00) * i11;
   const L i20 = none - (l20 * i00 + l21 * i10) * i22;
   const L i21 = none - (l21 * i11) * i22;
-  const L g0 = L::load(v + 48), g1 = L::load(v + 56), g2 = L::load(v + 64);
-  const L results[point_size] = {
-      i00, i10, i11, i20, i21, i22, i00 * g0, i10 * g0 + i11 * g1, i20 * g0 + (i21 * g1 + i22 * g2)};
-  for (std::size_t k = 0; k != point_size; ++k) select(moves, results[k], none).store(out + 8 * k);
-  double failed[8];
-  select(moves & !definite, one, none).store(failed);
-  for (std::size_t i = 0; i != 8; ++i)
-    if (failed[i] != 0.0 && p + i < work.end) return p + i;
-  return work.end;
+  const L s0 = i00 * v[6], s1 = i10 * v[6] + i11 * v[7], s2 = i20 * v[6] + (i21 * v[7] + i22 * v[8]);
+  const auto kept = [&](const L& x) ORBIS_INLINE_LAMBDA { return select(moves, x, none); };
+  store_transposed(kept(i00), kept(i10), kept(i11), kept(i20), to, 0);
+  store_transposed(kept(i21), kept(i22), kept(s0), kept(s1), to, 4);
+  store_transposed(kept(s2), none, none, none, to, 8);
+  const auto failed = moves & !definite;
+  if (!any(failed)) return end;
+  double flags[8];
+  select(failed, one, none).store(flags);
+  std::size_t i = 0;
+  while (flags[i] == 0.0) ++i;
+  return p + i;
 }
 
-/// Rows of a block in registers.
-template <int C, simd::target Target>
-inline constexpr int row_width = padded<C> % static_cast<int>(Target::bytes / 8) == 0 ? Target::bytes / 8 : 4;
-
-/// Returns the first point whose block is not positive definite, or `work.end`.
-template <int C, simd::target Target>
-ORBIS_ALWAYS_INLINE std::size_t eliminate(const elimination& work) {
-  constexpr int pad = padded<C>, width = row_width<C, Target>, parts = pad / width;
-  using row = simd::vec<double, width, Target>;
-  for (std::size_t p = work.begin; p < work.end; p += 8)
-    if (const std::size_t failed = invert_factors<Target>(work, p); failed != work.end) return failed;
-
-  for (std::size_t p = work.begin; p != work.end; ++p) {
-    const double* const inverse = work.inverse + point_at(p);
-    const std::uint32_t first = work.first_mixed[p], count = work.first_mixed[p + 1] - first;
-    if (inverse[0] == 0.0) continue;
-    const std::uint32_t* slot = work.pair_slot + work.first_pair[p];
-    // Y of an observation, which later ones need as well, and what is subtracted from the right-hand side.
-    const auto make = [&](std::uint32_t a, row(*y)[parts]) ORBIS_INLINE_LAMBDA {
-      const double* const w = work.mixed + 3 * pad * std::size_t{first + a};
-      double* const kept = work.scratch + 3 * pad * std::size_t{a};
-      double* const right = work.right + pad * std::size_t{work.mixed_unknown[first + a]};
-      const row i00 = inverse[0], i10 = inverse[8], i11 = inverse[16], i20 = inverse[24], i21 = inverse[32],
-                i22 = inverse[40], s0 = inverse[48], s1 = inverse[56], s2 = inverse[64];
-      unroll<parts>([&](auto i) ORBIS_INLINE_LAMBDA {
-        const row w0 = row::load(w + width * i), w1 = row::load(w + pad + width * i),
-                  w2 = row::load(w + 2 * pad + width * i);
-        y[0][i] = w0 * i00;
-        y[1][i] = w0 * i10 + w1 * i11;
-        y[2][i] = w0 * i20 + (w1 * i21 + w2 * i22);
-        y[0][i].store(kept + width * i);
-        y[1][i].store(kept + pad + width * i);
-        y[2][i].store(kept + 2 * pad + width * i);
-        double* const to = right + width * i;
-        (row::load(to) + ((y[0][i] * s0 + y[1][i] * s1) + y[2][i] * s2)).store(to);
-      });
-    };
-    const auto add = [&](double* block, const row(*y)[parts], const auto& column, const row& f0, const row& f1,
-                         const row& f2) ORBIS_INLINE_LAMBDA {
-      unroll<parts>([&](auto i) ORBIS_INLINE_LAMBDA {
-        double* const to = block + pad * column + width * i;
-        (((row::load(to) + y[0][i] * f0) + y[1][i] * f1) + y[2][i] * f2).store(to);
-      });
-    };
-    const auto block_at = [&](const std::uint32_t* at)
-                              ORBIS_INLINE_LAMBDA { return work.blocks + C * pad * std::size_t{*at}; };
-    // A camera that sees the point twice: the pair counts in both orders.
-    const auto mirror = [&](std::uint32_t a, std::uint32_t b, double* block) ORBIS_INLINE_LAMBDA {
-      if (a == b || work.mixed_unknown[first + a] != work.mixed_unknown[first + b]) return;
-      const double *const one = work.scratch + 3 * pad * std::size_t{a}, *const other =
-                                                                             work.scratch + 3 * pad * std::size_t{b};
-      for (int c = 0; c != C; ++c)
-        for (int r = 0; r != C; ++r)
-          for (int k = 0; k != 3; ++k) block[pad * c + r] += rounded_product(other[pad * k + r], one[pad * k + c]);
-    };
-    std::uint32_t a = 0;
-    for (; a + 1 < count; a += 2) {  // two rows of blocks share the loads of their factors
-      row upper[3][parts], lower[3][parts];
-      make(a, upper);
-      make(a + 1, lower);
-      const std::uint32_t* const below = slot + a + 1;
-      for (std::uint32_t b = 0; b <= a; ++b) {
-        const double* const f = work.scratch + 3 * pad * std::size_t{b};
-        double *const first_block = block_at(slot + b), *const second_block = block_at(below + b);
-        unroll<C>([&](auto c) ORBIS_INLINE_LAMBDA {
-          const row f0 = f[c], f1 = f[pad + c], f2 = f[2 * pad + c];
-          add(first_block, upper, c, f0, f1, f2);
-          add(second_block, lower, c, f0, f1, f2);
-        });
-        mirror(a, b, first_block);
-        mirror(a + 1, b, second_block);
-      }
-      const double* const f = work.scratch + 3 * pad * std::size_t{a + 1};
-      double* const last = block_at(below + a + 1);
-      unroll<C>([&](auto c) ORBIS_INLINE_LAMBDA { add(last, lower, c, f[c], f[pad + c], f[2 * pad + c]); });
-      slot = below + a + 2;
+/// Computes Y of the observations of a chunk by one camera, its sum of Y Y^T, and what is subtracted from the
+/// right-hand side.
+template <int C, bool ThroughCamera, simd::target Target>
+ORBIS_ALWAYS_INLINE void make_factors(const elimination& work, const bundle_structure::segment& segment,
+                                      std::size_t unknown) {
+  using L = simd::vec<double, 8, Target>;
+  using rows = row_layout<C>;
+  using mixed_block = mixed_tile<C, ThroughCamera>;
+  const std::size_t first_number = work.structure.chunk_begin[work.chunk].first_mixed;
+  L square[C * (C + 1) / 2], right[C];
+  for (auto& entry : square) entry = 0.0;
+  for (auto& entry : right) entry = 0.0;
+  const double* mixed = work.mixed + mixed_block::size * segment.first_mixed_tile;
+  for (std::size_t first = 0; first < segment.count; first += 8, mixed += mixed_block::size) {
+    const std::uint32_t* const point = work.structure.point.data() + 8 * segment.first_tile + first;
+    const std::uint32_t* const number = work.structure.mixed_number.data() + 8 * segment.first_tile + first;
+    double nowhere[3 * rows::size];  // for the empty places of the last tile
+    const double* from[8];
+    double* to[8];
+    for (std::size_t i = 0; i != 8; ++i) {
+      from[i] = work.inverse + point_size * std::size_t{point[i]};
+      to[i] = first + i < segment.count ? work.scratch + 3 * rows::size * (number[i] - first_number) : nowhere;
     }
-    if (a != count) {
-      row y[3][parts];
-      make(a, y);
-      for (std::uint32_t b = 0; b <= a; ++b) {
-        const double* const f = work.scratch + 3 * pad * std::size_t{b};
-        double* const block = block_at(slot + b);
-        unroll<C>([&](auto c) ORBIS_INLINE_LAMBDA { add(block, y, c, f[c], f[pad + c], f[2 * pad + c]); });
-        mirror(a, b, block);
-      }
+    L f[point_size], w[C][3];
+    load_transposed<4>(from, f);
+    for (const double*& row : from) row += 4;
+    load_transposed<4>(from, f + 4);
+    for (const double*& row : from) row += 4;
+    load_transposed<3>(from, f + 8);
+    mixed_block::load(mixed, w);
+    unroll<C>([&](auto i) ORBIS_INLINE_LAMBDA {
+      w[i][2] = w[i][0] * f[3] + (w[i][1] * f[4] + w[i][2] * f[5]);
+      w[i][1] = w[i][0] * f[1] + w[i][1] * f[2];
+      w[i][0] = w[i][0] * f[0];
+      right[i] += (w[i][0] * f[6] + w[i][1] * f[7]) + w[i][2] * f[8];
+    });
+    const L none = 0.0;
+    unroll<3>([&](auto k) ORBIS_INLINE_LAMBDA {
+      unroll<rows::size / 4>([&](auto quarter) ORBIS_INLINE_LAMBDA {
+        constexpr int start = 4 * decltype(quarter)::value;
+        const auto at = [&](int i) ORBIS_INLINE_LAMBDA -> const L& { return i < C ? w[i][k] : none; };
+        store_transposed(at(start), at(start + 1), at(start + 2), at(start + 3), to, rows::size * k + start);
+      });
+    });
+    int next = 0;
+    unroll<C>([&](auto i) ORBIS_INLINE_LAMBDA {
+      unroll<i + 1>([&](auto j) ORBIS_INLINE_LAMBDA {
+        square[next] += (w[i][0] * w[j][0] + w[i][1] * w[j][1]) + w[i][2] * w[j][2];
+        ++next;
+      });
+    });
+  }
+  double* const block = work.blocks + rows::block * std::size_t{work.structure.diagonal_slot[unknown]};
+  int next = 0;
+  for (int i = 0; i != C; ++i) {
+    work.right[C * unknown + static_cast<std::size_t>(i)] += simd::sum(right[i]);
+    for (int j = 0; j <= i; ++j) {
+      const double entry = simd::sum(square[next++]);
+      block[rows::at(i, j)] += entry;
+      if (j != i) block[rows::at(j, i)] += entry;
     }
   }
-  return work.end;
 }
 
-/// The steps of the points, `-V^-1 (g + W^T x)`, for the steps x of the cameras, padded like the blocks.
+/// Adds Y_a Y_c^T, summed over a group of points, to a block, for `Count` cameras a to one block each. The Y of a
+/// camera are `columns` vectors, those of the next camera a follow after them.
+template <int C, int Count, simd::target Target>
+ORBIS_ALWAYS_INLINE void add_products(const double* ya, const double* yc, std::size_t columns,
+                                      double* const (&blocks)[Count]) {
+  using rows = row_layout<C>;
+  constexpr int width = row_width<C, Target>, parts = rows::body / width;
+  using row = simd::vec<double, width, Target>;
+  unroll<parts>([&](auto i) ORBIS_INLINE_LAMBDA {
+    row sum[Count][C];
+    unroll<Count>([&](auto r) ORBIS_INLINE_LAMBDA {
+      unroll<C>([&](auto c) ORBIS_INLINE_LAMBDA { sum[r][c] = row::load(blocks[r] + rows::body * c + width * i); });
+    });
+    const double *a = ya + width * i, *b = yc;
+    for (std::size_t k = 0; k != columns; ++k, a += rows::size, b += rows::size) {  // unrolled it would not fit
+      row own[Count];
+      unroll<Count>([&](auto r) ORBIS_INLINE_LAMBDA { own[r] = row::load(a + r * columns * rows::size); });
+      unroll<C>([&](auto c) ORBIS_INLINE_LAMBDA {
+        const row other = b[c];
+        unroll<Count>([&](auto r) ORBIS_INLINE_LAMBDA { sum[r][c] += own[r] * other; });
+      });
+    }
+    unroll<Count>([&](auto r) ORBIS_INLINE_LAMBDA {
+      unroll<C>([&](auto c) ORBIS_INLINE_LAMBDA { sum[r][c].store(blocks[r] + rows::body * c + width * i); });
+    });
+  });
+  if constexpr (rows::has_last)
+    unroll<Count>([&](auto r) ORBIS_INLINE_LAMBDA {
+      constexpr int last = C - 1;
+      double* const to = blocks[r] + C * rows::body;
+      row sum[parts];
+      unroll<parts>([&](auto i) ORBIS_INLINE_LAMBDA { sum[i] = row::load(to + width * i); });
+      double corner = to[last];
+      const double *a = ya + r * columns * rows::size, *b = yc;
+      for (std::size_t k = 0; k != columns; ++k, a += rows::size, b += rows::size) {
+        unroll<parts>([&](auto i) ORBIS_INLINE_LAMBDA { sum[i] += row(a[last]) * row::load(b + width * i); });
+        corner += rounded_product(a[last], b[last]);
+      }
+      unroll<parts>([&](auto i) ORBIS_INLINE_LAMBDA { sum[i].store(to + width * i); });
+      to[last] = corner;
+    });
+}
+
+/// Returns the first point whose block is not positive definite, or `bundle_structure::none`.
+template <int C, bool ThroughCamera, simd::target Target>
+ORBIS_ALWAYS_INLINE std::size_t eliminate(const elimination& work) {
+  using rows = row_layout<C>;
+  const bundle_structure& structure = work.structure;
+  const bundle_structure::chunk &begin = structure.chunk_begin[work.chunk],
+                                &end = structure.chunk_begin[work.chunk + 1];
+  for (std::size_t p = begin.first_point; p < end.first_point; p += 8)
+    if (const std::size_t failed = invert_factors<Target>(work, p, end.first_point); failed != end.first_point)
+      return failed;
+  for (std::size_t s = begin.first_segment; s != end.first_segment; ++s) {
+    const bundle_structure::segment& segment = structure.segments[s];
+    const std::uint32_t unknown = structure.unknown[segment.camera];
+    if (unknown != bundle_structure::none) make_factors<C, ThroughCamera, Target>(work, segment, unknown);
+  }
+  for (std::size_t k = begin.first_group; k != end.first_group; ++k) {
+    const bundle_structure::group& group = structure.groups[k];
+    const std::size_t count = group.cameras, columns = 3 * std::size_t{group.points};
+    if (count < 2) continue;
+    const std::uint32_t* const slots = structure.pair_slot.data() + group.first_pair;
+    const auto block_at = [&](std::size_t a, std::size_t c) ORBIS_INLINE_LAMBDA {
+      return work.blocks + rows::block * std::size_t{slots[a * (a - 1) / 2 + c]};
+    };
+    const auto y = [&](std::size_t a) ORBIS_INLINE_LAMBDA {
+      return work.scratch + rows::size * (3 * (group.first_mixed - begin.first_mixed) + columns * a);
+    };
+    const auto unknown = [&](std::size_t a) { return structure.mixed_unknown[group.first_mixed + a * group.points]; };
+    bool is_seen_twice = false;  // by one camera
+    for (std::size_t a = 1; a != count; ++a) is_seen_twice |= unknown(a) == unknown(a - 1);
+    std::size_t a = 1;
+    if constexpr (has_room_for_two<C, Target>)  // two rows of blocks share the loads of their factors
+      for (; a + 1 < count && !is_seen_twice; a += 2) {
+        for (std::size_t c = 0; c != a; ++c)
+          add_products<C, 2, Target>(y(a), y(c), columns, {block_at(a, c), block_at(a + 1, c)});
+        add_products<C, 1, Target>(y(a + 1), y(a), columns, {block_at(a + 1, a)});
+      }
+    for (; a != count; ++a)
+      for (std::size_t c = 0; c != a; ++c) {
+        add_products<C, 1, Target>(y(a), y(c), columns, {block_at(a, c)});
+        if (is_seen_twice && unknown(c) == unknown(a))  // on the diagonal, where the other order counts, too
+          add_products<C, 1, Target>(y(c), y(a), columns, {block_at(a, c)});
+      }
+  }
+  return bundle_structure::none;
+}
+
+/// The steps of a chunk of points, `-V^-1 (g + W^T x)`, for the steps x of the cameras.
 struct substitution {
-  std::size_t begin = 0, end = 0;
+  const bundle_structure& structure;
+  std::size_t chunk = 0;
   const double* mixed = nullptr;
-  const std::uint32_t* first_mixed = nullptr;
-  const std::uint32_t* mixed_unknown = nullptr;
   const double* inverse = nullptr;
   const double* cameras = nullptr;
-  double* steps = nullptr;  ///< three of each point
+  double* pulled = nullptr;  ///< four numbers for each point
+  double* steps = nullptr;   ///< three of each point
 };
 
-template <int C, simd::target Target>
+template <int C, bool ThroughCamera, simd::target Target>
 ORBIS_ALWAYS_INLINE void substitute(const substitution& work) {
-  constexpr int pad = padded<C>, width = row_width<C, Target>, parts = pad / width;
-  using row = simd::vec<double, width, Target>;
-  for (std::size_t p = work.begin; p != work.end; ++p) {
-    row sum[3][parts];
-    unroll<parts>([&](auto i) ORBIS_INLINE_LAMBDA { sum[0][i] = sum[1][i] = sum[2][i] = row(0.0); });
-    for (std::uint32_t a = work.first_mixed[p]; a != work.first_mixed[p + 1]; ++a) {
-      const double* const w = work.mixed + 3 * pad * std::size_t{a};
-      const double* const x = work.cameras + pad * std::size_t{work.mixed_unknown[a]};
-      unroll<parts>([&](auto i) ORBIS_INLINE_LAMBDA {
-        const row xi = row::load(x + width * i);
-        unroll<3>([&](auto k) ORBIS_INLINE_LAMBDA { sum[k][i] = sum[k][i] + row::load(w + pad * k + width * i) * xi; });
-      });
+  using L = simd::vec<double, 8, Target>;
+  using mixed_block = mixed_tile<C, ThroughCamera>;
+  const bundle_structure& structure = work.structure;
+  const bundle_structure::chunk &begin = structure.chunk_begin[work.chunk],
+                                &end = structure.chunk_begin[work.chunk + 1];
+  std::fill(work.pulled + 4 * begin.first_point, work.pulled + 4 * end.first_point, 0.0);
+  const L none = 0.0;
+  for (std::size_t s = begin.first_segment; s != end.first_segment; ++s) {
+    const bundle_structure::segment& segment = structure.segments[s];
+    const std::uint32_t unknown = structure.unknown[segment.camera];
+    if (unknown == bundle_structure::none) continue;
+    const double* mixed = work.mixed + mixed_block::size * segment.first_mixed_tile;
+    const double* const x = work.cameras + C * std::size_t{unknown};
+    for (std::size_t first = 0; first < segment.count; first += 8, mixed += mixed_block::size) {
+      L pulled[3] = {none, none, none};
+      const auto add = [&](int row, const L& factor) ORBIS_INLINE_LAMBDA {
+        unroll<3>([&](auto k)
+                      ORBIS_INLINE_LAMBDA { pulled[k] += L::load(mixed + mixed_block::row(row) + 8 * k) * factor; });
+      };
+      if constexpr (ThroughCamera) {  // rows 3 to 5 are hat(q) times the first ones
+        const L q[3] = {L::load(mixed + mixed_block::q), L::load(mixed + mixed_block::q + 8),
+                        L::load(mixed + mixed_block::q + 16)};
+        add(0, x[0] + (x[4] * q[2] - x[5] * q[1]));
+        add(1, x[1] + (x[5] * q[0] - x[3] * q[2]));
+        add(2, x[2] + (x[3] * q[1] - x[4] * q[0]));
+        unroll<C - 6>([&](auto i) ORBIS_INLINE_LAMBDA { add(6 + i, x[6 + i]); });
+      } else {
+        unroll<C>([&](auto i) ORBIS_INLINE_LAMBDA { add(i, x[i]); });
+      }
+      double* to[8];
+      for (std::size_t i = 0; i != 8; ++i)
+        to[i] = work.pulled + 4 * std::size_t{structure.point[8 * segment.first_tile + first + i]};
+      add_transposed(pulled[0], pulled[1], pulled[2], none, to, 0);
     }
-    const double* const m = work.inverse + point_at(p);
-    double t[3];
-    for (int k = 0; k != 3; ++k) {
-      double entries[pad];
-      unroll<parts>([&](auto i) ORBIS_INLINE_LAMBDA { sum[k][i].store(entries + width * i); });
-      double total = entries[0];
-      for (int i = 1; i != C; ++i) total += entries[i];
-      t[k] = total;
-    }
-    const double u0 = -(m[48] + rounded_product(m[0], t[0]));
-    const double u1 = -(m[56] + (rounded_product(m[8], t[0]) + rounded_product(m[16], t[1])));
+  }
+  for (std::size_t p = begin.first_point; p != end.first_point; ++p) {
+    const double *const m = work.inverse + point_size * p, *const t = work.pulled + 4 * p;
+    const double u0 = -(m[6] + rounded_product(m[0], t[0]));
+    const double u1 = -(m[7] + (rounded_product(m[1], t[0]) + rounded_product(m[2], t[1])));
     const double u2 =
-        -(m[64] + (rounded_product(m[24], t[0]) + (rounded_product(m[32], t[1]) + rounded_product(m[40], t[2]))));
+        -(m[8] + (rounded_product(m[3], t[0]) + (rounded_product(m[4], t[1]) + rounded_product(m[5], t[2]))));
     double* const step = work.steps + 3 * p;
-    step[0] = rounded_product(m[0], u0) + (rounded_product(m[8], u1) + rounded_product(m[24], u2));
-    step[1] = rounded_product(m[16], u1) + rounded_product(m[32], u2);
-    step[2] = m[40] * u2;
+    step[0] = rounded_product(m[0], u0) + (rounded_product(m[1], u1) + rounded_product(m[3], u2));
+    step[1] = rounded_product(m[2], u1) + rounded_product(m[4], u2);
+    step[2] = m[5] * u2;
   }
 }
 
-/// The two loops over points, compiled for every instruction set.
-template <int C>
+/// The two loops over a chunk, compiled for every instruction set.
+template <int C, bool ThroughCamera>
 struct eliminate_kernel {
   template <simd::target Target>
   static ORBIS_ALWAYS_INLINE std::size_t run(const elimination& work) {
-    return eliminate<C, Target>(work);
+    return eliminate<C, ThroughCamera, Target>(work);
   }
 };
-template <int C>
+template <int C, bool ThroughCamera>
 struct substitute_kernel {
   template <simd::target Target>
   static ORBIS_ALWAYS_INLINE void run(const substitution& work) {
-    substitute<C, Target>(work);
+    substitute<C, ThroughCamera, Target>(work);
   }
 };
 
 /// The kernels for this processor.
-template <int C>
+template <int C, bool ThroughCamera>
 struct schur_kernels {
   using eliminator = std::size_t(const elimination&);
   using substituter = void(const substitution&);
-  eliminator* eliminate_points = simd::kernel<eliminate_kernel<C>, eliminator>();
-  substituter* substitute_points = simd::kernel<substitute_kernel<C>, substituter>();
+  eliminator* eliminate_points = simd::kernel<eliminate_kernel<C, ThroughCamera>, eliminator>();
+  substituter* substitute_points = simd::kernel<substitute_kernel<C, ThroughCamera>, substituter>();
 };
 
 }  // namespace orbis::optimize::detail

@@ -22,10 +22,10 @@
 
 namespace orbis {
 
-ORBIS_KERNEL_INSTANCE(ORBIS_INSTANTIATE_OPTIMIZE, optimize::detail::eliminate_kernel<6>,
-                      optimize::detail::schur_kernels<6>::eliminator);
-ORBIS_KERNEL_INSTANCE(ORBIS_INSTANTIATE_OPTIMIZE, optimize::detail::substitute_kernel<6>,
-                      optimize::detail::schur_kernels<6>::substituter);
+ORBIS_KERNEL_INSTANCE(ORBIS_INSTANTIATE_OPTIMIZE, optimize::detail::eliminate_kernel<6, true>,
+                      optimize::detail::schur_kernels<6, true>::eliminator);
+ORBIS_KERNEL_INSTANCE(ORBIS_INSTANTIATE_OPTIMIZE, optimize::detail::substitute_kernel<6, true>,
+                      optimize::detail::schur_kernels<6, true>::substituter);
 
 /// The kernels, the constructor and the loops for a residual, a loss and the default policies.
 #define ORBIS_INSTANTIATE_BUNDLE_KERNELS(what, residual, loss)                                                    \
