@@ -160,6 +160,14 @@ TEST_CASE("Of a plane there is the right motion or none and few points beside it
   const tally t = reconstruct(pinhole_camera, {.baseline = 0.5, .in_plane = 0.8});
   CHECK(t.wrong == 0);
   CHECK(t.right >= 40);
+  // The more matches there are, the smaller is the share of them that suffices.
+  const view_options nearly_plane{.baseline = 0.5, .in_plane = 0.93, .wrong = 0.1};
+  view_options many = nearly_plane;
+  many.n = 1600;
+  const tally of_few = reconstruct(pinhole_camera, nearly_plane), of_many = reconstruct(pinhole_camera, many);
+  CHECK(of_few.wrong + of_many.wrong == 0);
+  CHECK(of_many.right >= 40);
+  CHECK(of_many.right > of_few.right);
   for (const double moving : {0.2, 0.3, 0.4})
     CHECK(reconstruct(pinhole_camera, {.in_plane = 1.0, .wrong = 0.1, .moving = moving}).wrong == 0);
 }

@@ -76,7 +76,8 @@ struct start_options {
   std::uint32_t distance = 50;     ///< of descriptors, at most
   float ratio = 0.9F;              ///< of the distance to that of the second best match, at most
   std::size_t min_features = 100;  ///< of a frame that may be the first
-  std::size_t min_matches = 100;   ///< with the first frame, below which the present one takes its place
+  std::size_t min_matches = 100;   ///< with the first frame, below which it is given up
+  std::size_t max_candidates = 3;  ///< frames that may be the first, at a time, 1 or more
   double deviation = 0.6;          ///< of a keypoint, pixels of its level
   std::size_t min_points = 50;     ///< that a map begins with
   double min_parallax = 0.02;      ///< median angle between the rays of these, at least, radians

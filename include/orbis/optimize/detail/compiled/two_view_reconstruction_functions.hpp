@@ -83,12 +83,24 @@ class two_view_search {
     });
     return found == all_.end() ? nullptr : &*found;
   }
-  /// The greatest score of a motion that is another one than `best`.
-  [[nodiscard]] double rival_score(const hypothesis& best) const {
-    double score = 0.0;
-    for (const hypothesis& h : all_)
-      if (!same(h.motion, best.motion)) score = std::max(score, h.support.score);
-    return score;
+  /// Whether a motion that is another one than `best` explains the matches about as well: the test of two models that
+  /// may both be wrong. It adds up over the matches by how much each speaks for `best`, in logarithms of a likelihood,
+  /// and asks how far this is from nothing, in deviations by how much they differ.
+  /// Source: Q. Vuong, "Likelihood ratio tests for model selection and non-nested hypotheses", Econometrica 57 (1989).
+  [[nodiscard]] bool has_rival(const hypothesis& best) const {
+    const mat3 rotation = best.motion.rotation.rotation_matrix();
+    return std::any_of(all_.begin(), all_.end(), [&](const hypothesis& h) {
+      if (same(h.motion, best.motion)) return false;
+      const mat3 other = h.motion.rotation.rotation_matrix();
+      double sum = 0.0, squares = 0.0;
+      for (const image_match& m : matches_) {
+        const double more = score_of(rotation, best.motion, m) - score_of(other, h.motion, m);
+        sum += more;
+        squares += more * more;
+      }
+      constexpr double least = 50.0, deviations = 4.5;  // scores are twice a logarithm
+      return !(sum >= least && sum >= deviations * std::sqrt(squares));
+    });
   }
 
  private:
@@ -254,10 +266,8 @@ ORBIS_COMPILED_ONCE result<two_view_reconstruction> reconstruction_of_matches(co
   }
   const auto* best = search.best();
   if (best == nullptr) return refuse("no motion can be refined");
-  constexpr double clearly = 0.9;  // the share of the score that a rival may have
-  const auto ambiguous = [&] { return search.rival_score(*best) > clearly * best->support.score; };
   constexpr const char* two = "two motions explain the matches about as well";
-  if (ambiguous()) return refuse(two);
+  if (search.has_rival(*best)) return refuse(two);
 
   const epipolar_motion motion = best->motion;
   const two_view_inliers inliers(matches, motion);
@@ -300,7 +310,7 @@ ORBIS_COMPILED_ONCE result<two_view_reconstruction> reconstruction_of_matches(co
   const double score = best->support.score;
   search.look_around(turn);
   best = search.best();
-  if (best->support.score > 1.02 * score || ambiguous()) return refuse(two);
+  if (best->support.score > 1.02 * score || search.has_rival(*best)) return refuse(two);
   constexpr const char* shared = "two motions share the matches";
   if (5 * of_plane.size() > 2 * inliers.all.size() && two_view_search::contradicts(of_plane, plane_motions, motion))
     return refuse(shared);

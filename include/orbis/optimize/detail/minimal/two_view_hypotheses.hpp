@@ -119,6 +119,13 @@ inline constexpr double least_disparity = 4.0;
   return v.cross(t).dot(normal) > 0.0 && u.cross(t).dot(normal) > 0.0 ? agreement::near : agreement::behind;
 }
 
+/// What a match adds to the score of a motion.
+[[nodiscard]] inline double score_of(const mat3& rotation, const epipolar_motion& motion, const image_match& m) {
+  double squared = 0.0;
+  const agreement a = agreement_of(rotation, motion.direction, motion.e, m, squared);
+  return a == agreement::near || a == agreement::far ? 1.5 * line_gate - squared : 0.0;
+}
+
 [[nodiscard]] inline motion_support support_of(const std::vector<image_match>& matches, const epipolar_motion& motion) {
   motion_support sum;
   const mat3 rotation = motion.rotation.rotation_matrix();

@@ -3,6 +3,7 @@
 /// The beginning of a map without depth: two frames from which the scene and the motion between them are certain.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -44,34 +45,38 @@ struct monocular_start_result {
   double direction_deviation = 0.0;  ///< ... and of the direction of the translation, radians
 };
 
-/// Waits for two frames that a map can begin with. Keeps a frame as the first, follows its keypoints from frame to
-/// frame, and reconstructs the scene once this is certain (`optimize::reconstruct_two_views`). Where too few keypoints
-/// can be followed, the present frame becomes the first.
+/// Waits for two frames that a map can begin with. Keeps some frames of different age that may be the first, follows
+/// the keypoints of each from frame to frame, and reconstructs the scene once this is certain
+/// (`optimize::reconstruct_two_views`). A frame is given up where too few of its keypoints can be followed; there are
+/// younger ones by then, so that the waiting does not begin anew. A frame costs about a millisecond for each of them.
 ///
 /// Source of the scheme: R. Mur-Artal, J. M. M. Montiel, J. D. Tardos, "ORB-SLAM: a versatile and accurate monocular
-/// SLAM system", T-RO 31 (2015), section IV.
+/// SLAM system", T-RO 31 (2015), section IV, which keeps one frame.
 template <camera::camera_model Camera, feature_descriptor D>
 class monocular_start {
  public:
+  /// A frame that may be the first of a map.
+  struct candidate {
+    basic_frame<D> frame;
+    std::vector<features::match> matches;   ///< of its keypoints (query) with those of the last frame (train)
+    std::vector<features::window> windows;  ///< one for each keypoint, where it was seen last
+    std::size_t most = 0;                   ///< matches that there were with any frame
+  };
+
   monocular_start(const camera_rig<Camera>& rig, const start_options& options, std::uint64_t seed = 1)
       : rig_{rig}, options_{options}, seed_{seed} {}
 
-  /// Takes the next frame; its pose does not matter. The beginning of a map, after which the first frame is forgotten,
-  /// or nothing.
+  /// Takes the next frame; its pose does not matter. The beginning of a map, after which all frames are forgotten, or
+  /// nothing.
   [[nodiscard]] std::optional<monocular_start_result<D>> see(const basic_frame<D>& f);
 
-  /// Forgets the first frame.
-  void reset() {
-    first_.reset();
-    matches_.clear();
-  }
+  /// Forgets all frames.
+  void reset() { candidates_.clear(); }
 
-  /// Why the last frame began no map.
+  /// Why the last frame began no map, with the oldest frame before it.
   [[nodiscard]] const error& why() const noexcept { return why_; }
-  /// The first frame, if there is one.
-  [[nodiscard]] const std::optional<basic_frame<D>>& first() const noexcept { return first_; }
-  /// Matches of the first frame (query) with the last one (train).
-  [[nodiscard]] const std::vector<features::match>& matches() const noexcept { return matches_; }
+  /// The frames that may be the first, the oldest one first.
+  [[nodiscard]] const std::vector<candidate>& candidates() const noexcept { return candidates_; }
 
  private:
   static constexpr auto chain(const start_options& o) {
@@ -79,70 +84,80 @@ class monocular_start {
            features::unique{} | features::rotation_consistency{};
   }
 
-  /// Makes `f` the first frame if it has enough features.
-  void begin_with(const basic_frame<D>& f) {
-    reset();
-    if (f.size() < options_.min_features) return;
-    first_ = f;
-    windows_.clear();
-    for (const auto& k : f.features.keypoints)
-      windows_.push_back({k.x, k.y, static_cast<float>(options_.radius), k.octave - 1, k.octave + 1});
+  /// Follows the keypoints of a candidate to the next frame. False if they are too few.
+  bool follow(candidate& c, const basic_frame<D>& f) {
+    chain(options_).match_into(c.matches, memory_, c.frame.features, f.features,
+                               std::span<const features::window>(c.windows), f.grid);
+    c.most = std::max(c.most, c.matches.size());
+    for (const features::match& m : c.matches) {
+      c.windows[m.query].x = f.features.keypoints[m.train].x;
+      c.windows[m.query].y = f.features.keypoints[m.train].y;
+    }
+    return c.matches.size() >= options_.min_matches;
   }
+  /// Makes `f` a candidate if it has enough features, and differs from the youngest one.
+  void add(const basic_frame<D>& f) {
+    constexpr double faded = 0.6;  // the share of matches that the youngest one has left by then
+    if (f.size() < options_.min_features || candidates_.size() == options_.max_candidates) return;
+    if (!candidates_.empty() &&
+        static_cast<double>(candidates_.back().matches.size()) > faded * static_cast<double>(candidates_.back().most))
+      return;
+    candidates_.push_back({f, {}, {}, 0});
+    for (const auto& k : f.features.keypoints)
+      candidates_.back().windows.push_back({k.x, k.y, static_cast<float>(options_.radius), k.octave - 1, k.octave + 1});
+  }
+  [[nodiscard]] result<monocular_start_result<D>> reconstruct(const candidate& c, const basic_frame<D>& f) const;
 
   const camera_rig<Camera>& rig_;
   const start_options& options_;
   std::uint64_t seed_;
-  std::optional<basic_frame<D>> first_;
-  std::vector<features::window> windows_;  // one for each keypoint of the first frame, where it was seen last
-  std::vector<features::match> matches_;
+  std::vector<candidate> candidates_;
   typename decltype(chain(start_options{}))::workspace memory_;
   error why_;
 };
 
 template <camera::camera_model Camera, feature_descriptor D>
 std::optional<monocular_start_result<D>> monocular_start<Camera, D>::see(const basic_frame<D>& f) {
-  constexpr const char* where = "start of a map";
-  if (!first_) {
-    begin_with(f);
-    why_ = {errc::no_data, where, first_ ? "the first frame" : "too few features"};
-    return std::nullopt;
+  why_ = {errc::no_data, "start of a map", "no frame before it has enough matches"};
+  std::erase_if(candidates_, [&](candidate& c) { return !follow(c, f); });
+  for (const candidate& c : candidates_) {
+    auto start = reconstruct(c, f);
+    if (start) {
+      reset();
+      return *std::move(start);
+    }
+    if (&c == &candidates_.front()) why_ = std::move(start.error());
   }
-  chain(options_).match_into(matches_, memory_, first_->features, f.features,
-                             std::span<const features::window>(windows_), f.grid);
-  if (matches_.size() < options_.min_matches) {
-    why_ = {errc::no_data, where, "too few matches: " + std::to_string(matches_.size())};
-    begin_with(f);
-    return std::nullopt;
-  }
+  add(f);
+  return std::nullopt;
+}
+
+template <camera::camera_model Camera, feature_descriptor D>
+result<monocular_start_result<D>> monocular_start<Camera, D>::reconstruct(const candidate& c,
+                                                                          const basic_frame<D>& f) const {
   std::vector<vec2> first, second;
   std::vector<double> deviations;
-  for (const features::match& m : matches_) {
-    first.push_back(first_->pixel(m.query));
+  for (const features::match& m : c.matches) {
+    first.push_back(c.frame.pixel(m.query));
     second.push_back(f.pixel(m.train));
-    deviations.push_back(rig_.scales.scale(first_->features.keypoints[m.query].octave));
-    windows_[m.query].x = f.features.keypoints[m.train].x;
-    windows_[m.query].y = f.features.keypoints[m.train].y;
+    deviations.push_back(rig_.scales.scale(c.frame.features.keypoints[m.query].octave));
   }
-  auto found =
+  const auto found =
       optimize::reconstruct_two_views(std::span<const vec2>(first), std::span<const vec2>(second), rig_.camera(),
                                       {.deviation = options_.deviation,
                                        .min_points = options_.min_points,
                                        .min_parallax = options_.min_parallax,
                                        .seed = seed_},
                                       deviations);
-  if (!found) {
-    why_ = std::move(found.error());
-    return std::nullopt;
-  }
-  monocular_start_result<D> start{*std::move(first_),        f, {}, found->parallax, found->rotation_deviation,
-                                  found->direction_deviation};
+  if (!found) return fail(found.error());
+  monocular_start_result<D> start{
+      c.frame, f, {}, found->parallax, found->rotation_deviation, found->direction_deviation};
   start.first.T_world_camera = se3();
   start.second.T_world_camera = found->T_first_second;
   for (std::size_t i = 0; i != found->points.size(); ++i) {
-    const features::match& m = matches_[found->matches[i]];
+    const features::match& m = c.matches[found->matches[i]];
     start.points.push_back({m.query, m.train, found->points[i]});
   }
-  reset();
   return start;
 }
 
