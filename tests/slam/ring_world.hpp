@@ -77,6 +77,7 @@ class ring_world {
     slam::frame f;
     f.index = i;
     f.timestamp = 0.5 * i;
+    f.scale_is_known = rig.scale_is_known;
     f.T_world_camera = T_world_camera;
     const se3 T_camera_world = truth(i).inverse();
     const double mine = angle_of(i);

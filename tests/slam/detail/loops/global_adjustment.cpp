@@ -120,6 +120,68 @@ TEST_CASE("What is added while a map is adjusted goes along, and what is gone is
   CHECK(went_along > 10);
 }
 
+TEST_CASE("Without depth what hangs on keyframes follows the lengths around them when a whole map is adjusted") {
+  for (const bool with_depth : {false, true}) {
+    test::ring_world world({.steps = 60, .drift = 0.2, .shrinks = with_depth ? 0.0 : 0.001});
+    slam::map m(8, 1.2);
+    world.walk(m, 0, 12, world.truth(0));
+    const slam::keyframe_id last = m.keyframes().back().id;
+    const slam::map before = m;
+    const auto taken = global::take(m, world.rig);
+    // A solution that makes everything larger as seen from the first keyframe, but for some points.
+    constexpr double larger = 1.25;
+    const vec3 centre = taken.poses.front().translation();
+    slam::detail::bundle_solution solved;
+    for (const se3& p : taken.poses)
+      solved.poses.emplace_back(p.rotation(), vec3(centre + larger * (p.translation() - centre)));
+    for (std::size_t i = 0; i != taken.points.size(); ++i)
+      solved.points.emplace_back(centre + (i % 5 == 0 ? 0.8 : larger) * (taken.points[i] - centre));
+    solved.outliers.assign(taken.observations.size(), 0);
+    solved.usable = true;
+    global::apply(m, taken, solved);
+    CHECK(test::fault_of(m) == "");
+    const double expected = with_depth ? 1.0 : larger;
+    std::size_t alone = 0;
+    for (const auto& l : before.landmarks()) {
+      if (l.observations.size() != 1 || l.created != last) continue;
+      ++alone;
+      const vec3 seen = before.at(last).T_world_camera.inverse() * l.position;
+      const vec3 now = m.at(last).T_world_camera.inverse() * m.landmark_at(l.id).position;
+      CHECK((now - expected * seen).norm() < 1e-9);
+    }
+    CHECK(alone > 10);
+    CHECK(m.at(last).scale == Approx(expected));
+    CHECK((m.at(last).T_world_camera.translation() - solved.poses.back().translation()).norm() < 1e-12);
+  }
+}
+
+TEST_CASE("Without depth an adjusted map keeps no landmark that nothing determines any more") {
+  test::ring_world world({.steps = 60, .drift = 0.2, .shrinks = 0.001});
+  slam::map m(8, 1.2);
+  world.walk(m, 0, 12, world.truth(0));
+  // One of two observations of a landmark is that of another one.
+  std::vector<slam::landmark_id> wrong;
+  for (const auto& l : m.landmarks()) {
+    if (l.observations.size() != 2 || wrong.size() == 3) continue;
+    const auto [k, feature] = l.observations.back();
+    for (std::uint32_t i = 0; i != m.at(k).size(); ++i)
+      if (m.at(k).landmarks[i] == slam::no_id || (m.at(k).pixel(i) - m.at(k).pixel(feature)).norm() < 100)
+        continue;
+      else if (m.landmark_at(m.at(k).landmarks[i]).observations.size() == 1) {
+        m.remove_landmark(m.at(k).landmarks[i]);
+        m.erase_observation(l.id, k);
+        REQUIRE(m.add_observation(l.id, k, i));
+        wrong.push_back(l.id);
+        break;
+      }
+  }
+  REQUIRE(wrong.size() == 3);
+  const auto report = slam::detail::global_adjustment::adjust(m, world.rig);
+  CHECK(report.outliers >= 3);
+  CHECK(test::fault_of(m) == "");
+  for (const slam::landmark_id l : wrong) CHECK_FALSE(m.has_landmark(l));
+}
+
 TEST_CASE("Adjustment is the same every time, and may be stopped") {
   test::ring_world world({.steps = 60, .density = 12.0});
   slam::map m(8, 1.2);

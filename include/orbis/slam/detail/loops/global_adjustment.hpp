@@ -4,7 +4,8 @@
 ///
 /// `take` and `apply` touch the map, solving works on the snapshot. Between them keyframes, landmarks and observations
 /// may be added: keyframes follow their parent in the spanning tree, landmarks the keyframe that created them. So does
-/// a landmark with a single observation, which takes no part. The root of the map is held.
+/// a landmark with a single observation, which takes no part. The root of the map is held. Where lengths are not
+/// measured, what hangs on a keyframe grows or shrinks as the lengths in its view do.
 ///
 /// Source: R. Mur-Artal, J. D. Tardos, "ORB-SLAM2", T-RO 33 (2017), section III.E.
 #pragma once
@@ -19,6 +20,7 @@
 #include <orbis/optimize/robust_loss.hpp>
 #include <orbis/slam/camera_rig.hpp>
 #include <orbis/slam/detail/map/keyframe_motion.hpp>
+#include <orbis/slam/detail/map/local_map.hpp>
 #include <orbis/slam/detail/mapping/map_bundle.hpp>
 #include <orbis/slam/map.hpp>
 #include <orbis/slam/options.hpp>
@@ -94,13 +96,32 @@ template <feature_descriptor D, camera::camera_model Camera>
   return s;
 }
 
-/// Writes a solution into the map that the snapshot was taken of, and erases the outliers. `update_landmarks` is left
-/// to the caller. @pre solved.usable
+/// By how much a solution multiplies the lengths in the view of each keyframe: the median over its landmarks. 1 where
+/// lengths are measured. O(observations).
+[[nodiscard]] inline std::vector<double> growth_of(const snapshot& s, const bundle_solution& solved, bool is_measured) {
+  std::vector<double> growth(s.keyframes.size(), 1.0);
+  if (is_measured) return growth;
+  std::vector<std::vector<double>> ratios(s.keyframes.size());
+  for (std::size_t i = 0; i != s.observations.size(); ++i) {
+    const std::uint32_t pose = s.observations[i].pose, point = s.observations[i].point;
+    const double before = (s.points[point] - s.poses[pose].translation()).norm();
+    const double after = (solved.points[point] - solved.poses[pose].translation()).norm();
+    if (solved.outliers[i] == 0 && before > 0.0 && after > 0.0) ratios[pose].push_back(after / before);
+  }
+  for (std::size_t k = 0; k != growth.size(); ++k)
+    if (!ratios[k].empty()) growth[k] = median_of(ratios[k]);
+  return growth;
+}
+
+/// Writes a solution into the map that the snapshot was taken of, and erases the outliers, with landmarks whose
+/// position nothing determines any more. `update_landmarks` is left to the caller. @pre solved.usable
 template <feature_descriptor D>
 report apply_poses(basic_map<D>& m, const snapshot& s, const bundle_solution& solved) {
   std::vector<sim3> poses;
   poses.reserve(solved.poses.size());
-  for (const se3& p : solved.poses) poses.emplace_back(p);
+  const std::vector<double> growth = growth_of(s, solved, m.scale_is_known());
+  for (std::size_t k = 0; k != solved.poses.size(); ++k)
+    poses.emplace_back(solved.poses[k].rotation(), solved.poses[k].translation(), growth[k]);
   const std::vector<sim3> motion = propagate_motion<D>(m, s.keyframes, poses);
   // Landmarks that take no part move with a keyframe; the others then get their own position.
   std::size_t next = 0;
@@ -118,7 +139,7 @@ report apply_poses(basic_map<D>& m, const snapshot& s, const bundle_solution& so
   report done{s.keyframes.size(), s.landmarks.size(),  s.observations.size(), 0,
               solved.iterations,  solved.initial_cost, solved.final_cost};
   for (std::size_t i = 0; i != s.observations.size(); ++i)
-    if (solved.outliers[i] != 0 && m.erase_observation(s.landmarks[s.observations[i].point], s.sources[i]))
+    if (solved.outliers[i] != 0 && erase_outlier(m, s.landmarks[s.observations[i].point], s.sources[i]))
       ++done.outliers;
   return done;
 }

@@ -104,15 +104,6 @@ template <feature_descriptor D>
   return solved.poses[i] * s.poses[i].inverse();
 }
 
-/// Erases an observation. A landmark whose position is not determined any more (one observation, without depth) is
-/// removed.
-template <feature_descriptor D>
-void erase_outlier(basic_map<D>& m, landmark_id l, const observation& source) {
-  if (!m.erase_observation(l, source) || !m.has_landmark(l) || m.landmark_at(l).observations.size() > 1) return;
-  const observation& last = m.landmark_at(l).observations.front();
-  if (!m.at(last.keyframe).has_depth(last.feature)) m.remove_landmark(l);
-}
-
 /// Writes a solution into the map, if it is usable. Keyframes that were added since `take` move along with their
 /// ancestor in the spanning tree, landmarks with the keyframe that created them. Outliers are erased, and landmarks
 /// whose position nothing determines any more.

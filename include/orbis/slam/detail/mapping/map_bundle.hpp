@@ -79,6 +79,17 @@ struct bundle_snapshot {
   }
 };
 
+/// Erases an observation, if it is still there, and returns whether it was. A landmark whose position is not determined
+/// any more (one observation, without depth) is removed.
+template <feature_descriptor D>
+bool erase_outlier(basic_map<D>& m, landmark_id l, const observation& source) {
+  if (!m.erase_observation(l, source)) return false;
+  if (!m.has_landmark(l) || m.landmark_at(l).observations.size() > 1) return true;
+  const observation& last = m.landmark_at(l).observations.front();
+  if (!m.at(last.keyframe).has_depth(last.feature)) m.remove_landmark(l);
+  return true;
+}
+
 /// The result of an adjustment, index by index as the snapshot.
 struct bundle_solution {
   std::vector<se3> poses;
