@@ -181,6 +181,31 @@ TEST_CASE("Absolute orientation finds the rigid transform and agrees with Eigen'
   }
 }
 
+TEST_CASE("Absolute orientation counts a pair as often as its weight says") {
+  random_bits random(8);
+  std::vector<vec3> from, to, from_often, to_often;
+  std::vector<double> weights;
+  for (int i = 0; i < 12; ++i) {
+    from.push_back(test::random_vector(random, 2.0));
+    to.push_back(test::random_vector(random, 2.0));
+    weights.push_back(i % 4);
+    for (int times = 0; times != i % 4; ++times) {
+      from_often.push_back(from.back());
+      to_often.push_back(to.back());
+    }
+  }
+  const auto found = optimize::absolute_orientation_with_scale(from, to, weights);
+  const auto often = optimize::absolute_orientation_with_scale(from_often, to_often);
+  REQUIRE((found.has_value() && often.has_value()));
+  CHECK((found->to_matrix() - often->to_matrix()).norm() < 1e-9);
+  weights.back() = -1.0;
+  CHECK(optimize::absolute_orientation_with_scale(from, to, weights).error().code == errc::invalid_argument);
+  weights.back() = std::numeric_limits<double>::quiet_NaN();
+  CHECK(optimize::absolute_orientation_with_scale(from, to, weights).error().code == errc::invalid_argument);
+  weights.pop_back();
+  CHECK(optimize::absolute_orientation_with_scale(from, to, weights).error().code == errc::invalid_argument);
+}
+
 TEST_CASE("Absolute orientation takes any point type and planar points") {
   const std::vector<std::array<float, 3>> from{{0, 0, 0}, {1, 0, 0}, {0, 2, 0}, {1, 1, 0}};
   std::vector<vec3> to;

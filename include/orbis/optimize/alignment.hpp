@@ -43,10 +43,13 @@ template <point_range From, point_range To>
   return se3(s->rotation(), s->translation());
 }
 
-/// Absolute orientation with a free scale: minimises the sum of `|s R from[i] + t - to[i]|^2`. O(n). Errors as above.
+/// Absolute orientation with a free scale: minimises the sum of `|s R from[i] + t - to[i]|^2`, each times `weights[i]`
+/// if there are weights. O(n). Errors as above; `invalid_argument` also unless there is a weight for each pair, finite
+/// and not negative.
 template <point_range From, point_range To>
-[[nodiscard]] result<sim3> absolute_orientation_with_scale(const From& from, const To& to) {
-  return detail::align(from, to, true);
+[[nodiscard]] result<sim3> absolute_orientation_with_scale(const From& from, const To& to,
+                                                           std::span<const double> weights = {}) {
+  return detail::align(from, to, true, weights);
 }
 
 struct alignment_options {

@@ -108,7 +108,8 @@ struct loop_options {
   std::uint32_t distance = 64;           ///< of descriptors of the two keyframes, at most ...
   float ratio = 0.85F;                   ///< ... and of that of the second best match
   std::size_t min_matches = 20;          ///< by appearance, between the two keyframes
-  double alignment_threshold = 3.0;      ///< of an inlier among these, standard deviations of the depth
+  double alignment_threshold = 3.0;      ///< of an inlier among these, standard deviations of the depth or, where no
+                                         ///< lengths are measured, of the pixels in both images
   std::size_t min_aligned = 12;          ///< inliers among these, at least
   std::size_t neighbors = 10;            ///< of the candidate, whose landmarks are searched for as well
   double wide_radius = 12.0;             ///< of the search for landmarks around the first estimate of the pose, pixels

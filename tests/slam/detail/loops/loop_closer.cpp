@@ -17,13 +17,13 @@ namespace {
 using descriptor = features::binary_descriptor<256>;
 
 struct scene {
-  test::ring_world world{{.steps = 60}};
+  test::ring_world world;
   slam::options options;
   slam::detail::shared_state<camera::any_camera, descriptor, test::known_places> shared{world.rig, options, {}};
   slam::detail::loop_closer<camera::any_camera, descriptor, test::known_places> closer{shared};
   std::vector<slam::correction_event> told;
 
-  scene() {
+  explicit scene(const test::ring_options& o = {.steps = 60}) : world{o} {
     shared.callbacks.map_corrected = [this](const slam::correction_event& e) { told.push_back(e); };
   }
   [[nodiscard]] slam::map& m() { return shared.atlas.active(); }
@@ -94,6 +94,38 @@ TEST_CASE("Maps that meet become one, in the world of the older one") {
   CHECK(s.shared.places.contains({0, 16}));
   CHECK_FALSE(s.shared.places.contains({1, 2}));
   CHECK(slam::validate(s.m()));
+}
+
+TEST_CASE("Without depth maps that meet become one, in world and unit of the older one, whichever sees the other") {
+  for (const bool older_sees : {false, true}) {
+    scene s({.steps = 60, .drift = 0.1, .shrinks = 1e-5});
+    s.options.places.loop.max_rotation = 1.0;
+    s.options.places.candidates = 20;  // all of them
+    const se3 elsewhere(so3::exp(vec3(0.3, -0.2, 0.9)), vec3(5, 4, 3));
+    constexpr double unit = 2.5;  // lengths of the newer map over those of the older one
+    s.world.walk(s.m(), 0, 14, s.world.truth(0));
+    s.shared.atlas.create();
+    s.world.walk(s.m(), 8, 22, elsewhere * s.world.truth(8), unit);
+    s.know_all();
+    const slam::map_keyframe of_older{0, 3}, of_newer{1, 10},
+        sees = older_sees ? slam::map_keyframe{0, 10} : slam::map_keyframe{1, 2};
+    const se3 before = s.shared.atlas.at(of_older).T_world_camera;
+    REQUIRE(s.closer.close(sees));
+    REQUIRE(s.shared.atlas.size() == 1);
+    REQUIRE(s.told.size() == 1);
+    CHECK(s.told[0].map == (older_sees ? 1U : 0U));
+    CHECK(s.told[0].merged == (older_sees ? 0U : 1U));
+    CHECK(s.told[0].T_corrected_before.scale() == Approx(older_sees ? 1.0 : 1.0 / unit).epsilon(0.01));
+    CHECK(s.told[0].T_map_before.scale() == Approx(older_sees ? 1.0 / unit : 1.0).epsilon(0.01));
+    CHECK(slam::validate(s.m()));
+    const auto older = s.shared.atlas.current(of_older), newer = s.shared.atlas.current(of_newer);
+    CHECK((s.m().at(older.keyframe).T_world_camera.inverse() * before).log().norm() < 1e-9);
+    CHECK(s.m().scale_of(older.keyframe) == Approx(1.0));
+    CHECK(s.m().scale_of(newer.keyframe) == Approx(1.0 / unit).epsilon(0.01));
+    const double apart = (s.m().at(newer.keyframe).T_world_camera.translation() - before.translation()).norm();
+    const vec3 truth = s.world.truth(18).translation() - s.world.truth(3).translation();
+    CHECK(apart == Approx(truth.norm()).epsilon(0.02));
+  }
 }
 
 TEST_CASE("What is stopped changes nothing") {

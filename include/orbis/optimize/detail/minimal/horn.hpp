@@ -14,6 +14,7 @@
 #include <iterator>
 #include <optional>
 #include <ranges>
+#include <span>
 #include <string>
 #include <type_traits>
 
@@ -159,13 +160,20 @@ template <class Pair>
   return sim3(rotation, moments.to_mean - scale * (rotation * moments.from_mean), scale);
 }
 
-/// The transform between two lists of points.
+/// The transform between two lists of points. Without weights all pairs are equal.
 template <point_range From, point_range To>
-[[nodiscard]] result<sim3> align(const From& from, const To& to, bool with_scale) {
+[[nodiscard]] result<sim3> align(const From& from, const To& to, bool with_scale,
+                                 std::span<const double> weights = {}) {
   constexpr const char* where = "absolute orientation";
   const auto n = static_cast<std::size_t>(std::ranges::size(from));
   if (n != static_cast<std::size_t>(std::ranges::size(to)))
     return fail(errc::invalid_argument, where, "the two lists of points differ in length");
+  if (!weights.empty() && weights.size() != n)
+    return fail(errc::invalid_argument, where, "there are not as many weights as pairs");
+  for (std::size_t i = 0; i != weights.size(); ++i)
+    if (!(weights[i] >= 0.0 && std::isfinite(weights[i])))
+      return fail(errc::invalid_argument, where,
+                  "the weight of pair " + std::to_string(i) + " is negative or not finite");
   if (n < 3) return fail(errc::no_data, where, "fewer than three pairs of points");
   const auto read = [](const auto& points, std::size_t i, double* out) {
     using range = std::remove_cvref_t<decltype(points)>;
@@ -176,7 +184,7 @@ template <point_range From, point_range To>
   const auto pair = [&](std::size_t i, double* a, double* b) {
     read(from, i, a);
     read(to, i, b);
-    return 1.0;
+    return weights.empty() ? 1.0 : weights[i];
   };
   if (const auto found = align_pairs(n, pair, with_scale)) return *found;
   for (std::size_t i = 0; i != n; ++i) {

@@ -24,6 +24,7 @@
 #include <vector>
 
 #include <orbis/camera/model.hpp>
+#include <orbis/core/random.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/core/sim3.hpp>
 #include <orbis/features/brute_force.hpp>
@@ -33,8 +34,10 @@
 #include <orbis/features/stages.hpp>
 #include <orbis/optimize/alignment.hpp>
 #include <orbis/optimize/pose_refinement.hpp>
+#include <orbis/optimize/ransac.hpp>
 #include <orbis/slam/camera_rig.hpp>
 #include <orbis/slam/detail/loops/landmark_snapshot.hpp>
+#include <orbis/slam/detail/loops/scaled_alignment.hpp>
 #include <orbis/slam/detail/map/local_map.hpp>
 #include <orbis/slam/detail/map/map_content.hpp>
 #include <orbis/slam/detail/map/point_observation.hpp>
@@ -234,8 +237,9 @@ class checker {
   }
 
   [[nodiscard]] std::vector<features::match> match_by_appearance() const;
-  /// The rigid motion between the points of the matches, by RANSAC.
+  /// The rigid motion between the points of the matches, by RANSAC; where lengths are not measured, with the scale.
   [[nodiscard]] bool align(const std::vector<features::match>& matches, loop_match& found) const;
+  [[nodiscard]] bool align_scaled(const std::vector<features::match>& matches, loop_match& found) const;
   /// The landmarks around the candidate that a frame observes, and its pose by them, starting from `T_world_camera`.
   [[nodiscard]] optimize::pose_refinement localize(const basic_frame<D>& f, const se3& T_world_camera, double radius,
                                                    std::vector<loop_pair>* observed) const;
@@ -313,6 +317,7 @@ std::vector<features::match> checker<Camera, D>::match_by_appearance() const {
 
 template <camera::camera_model Camera, feature_descriptor D>
 bool checker<Camera, D>::align(const std::vector<features::match>& matches, loop_match& found) const {
+  if (!rig_.scale_is_known) return align_scaled(matches, found);
   std::vector<vec3> from, to;
   std::vector<double> deviations;
   for (const features::match& m : matches) {
@@ -320,33 +325,48 @@ bool checker<Camera, D>::align(const std::vector<features::match>& matches, loop
     to.push_back(s_.known.points[m.train]);
     deviations.push_back(std::hypot(s_.seen.deviations[m.query], s_.known.deviations[m.train]));
   }
-  const optimize::alignment_options settings{.threshold = options_.alignment_threshold,
-                                             .confidence = 0.999,
-                                             .max_iterations = 3000,
-                                             .min_inliers = options_.min_aligned,
-                                             .seed = options_.seed,
-                                             .deviations = deviations};
-  const auto take_over = [&](const auto& aligned) {
-    found.inliers = aligned ? aligned->inliers.size() : 0;
-    if (aligned) found.T_candidate_keyframe = se3(aligned->T_to_from.rotation(), aligned->T_to_from.translation());
-    return aligned.has_value();
-  };
-  if (rig_.scale_is_known) return take_over(optimize::estimate_alignment<se3>(from, to, settings));
+  const auto aligned = optimize::estimate_alignment<se3>(from, to,
+                                                         {.threshold = options_.alignment_threshold,
+                                                          .confidence = 0.999,
+                                                          .max_iterations = 3000,
+                                                          .min_inliers = options_.min_aligned,
+                                                          .seed = options_.seed,
+                                                          .deviations = deviations});
+  found.inliers = aligned ? aligned->inliers.size() : 0;
+  if (aligned) found.T_candidate_keyframe = aligned->T_to_from;
+  return aligned.has_value();
+}
+
+template <camera::camera_model Camera, feature_descriptor D>
+bool checker<Camera, D>::align_scaled(const std::vector<features::match>& matches, loop_match& found) const {
+  using estimator = scaled_alignment<Camera>;
   if (matches.empty()) return false;
-  // Both sides in about the same unit, for what the deviations of a pair add up to.
   std::vector<double> ratios;
-  for (std::size_t i = 0; i != from.size(); ++i) ratios.push_back(to[i].z() / from[i].z());
-  const double ratio = median_of(ratios);
-  for (std::size_t i = 0; i != from.size(); ++i) {
-    from[i] *= ratio;
-    deviations[i] = std::hypot(ratio * s_.seen.deviations[matches[i].query], s_.known.deviations[matches[i].train]);
+  for (const features::match& m : matches) ratios.push_back(s_.known.points[m.train].z() / s_.seen.points[m.query].z());
+  const double ratio = median_of(ratios);  // both sides in about the same unit, for what the deviations add up to
+  const auto known = [&](const view<D>& v, std::uint32_t i) {
+    return known_point{v.points[i], v.image.pixel(v.index[i]), rig_.scales.information(v.features.keypoints[i].octave)};
+  };
+  std::vector<typename estimator::pair> pairs;
+  for (const features::match& m : matches) {
+    const double deviation = std::hypot(ratio * s_.seen.deviations[m.query], s_.known.deviations[m.train]);
+    if (deviation > 0.0 && std::isfinite(deviation))
+      pairs.push_back({known(s_.seen, m.query), known(s_.known, m.train), 1.0 / (deviation * deviation)});
   }
-  const auto similar = optimize::estimate_alignment<sim3>(from, to, settings);
-  // Points far away under little parallax would agree with any scene that is shrunk to nothing.
-  const double remaining = similar ? similar->T_to_from.scale() : 1.0;
-  if (remaining < 0.5 || remaining > 2.0) return false;
-  found.scale = ratio * remaining;
-  return take_over(similar);
+  random_bits random(mix64(options_.seed));
+  shuffle(pairs, random);
+  const auto aligned =
+      optimize::ransac(estimator(rig_.camera(), std::move(pairs)), {.threshold = options_.alignment_threshold,
+                                                                    .confidence = 0.999,
+                                                                    .max_iterations = 3000,
+                                                                    .min_inliers = options_.min_aligned,
+                                                                    .seed = options_.seed});
+  found.inliers = aligned ? aligned->inliers.size() : 0;
+  if (!aligned) return false;
+  const sim3& T = aligned->model.T_to_from;
+  found.T_candidate_keyframe = se3(T.rotation(), T.translation());
+  found.scale = T.scale();
+  return true;
 }
 
 template <camera::camera_model Camera, feature_descriptor D>
