@@ -82,6 +82,27 @@ TEST_CASE("One camera's round of a room has the shape of the truth, in a unit of
   }
 }
 
+TEST_CASE("One camera's round of a room is as good with threads, and goes on after its loop") {
+  const io::synthetic_recording room{
+      {.frames = 230, .fps = 20, .seed = 4, .width = 640, .height = 480, .frames_around = 200}};
+  auto options = slam::monocular_options();
+  options.threads.enabled = options.threads.wait = true;
+  slam::any_system slam{room.camera().model, options};
+  const tracked sum = track_all(slam, room);
+  slam.wait();
+  REQUIRE(sum.first.has_value());
+  CHECK(*sum.first < 30);
+  CHECK(sum.lost == 0);
+  CHECK(slam.counters().loops_closed >= 1);
+  CHECK(slam.counters().tracked == room.size() - *sum.first + 1);
+  CHECK(fault_of(slam) == "");
+  const trajectory found = slam.trajectory();
+  CHECK(found.size() == slam.counters().tracked);
+  const auto error = eval::ate(found, room.ground_truth(), {.with_scale = true});
+  REQUIRE(error);
+  CHECK(error->translation.rmse < 0.01 * extent_of(room.ground_truth()));
+}
+
 TEST_CASE("A camera that only turns begins no map") {
   const io::synthetic_recording room{{.frames = 40,
                                       .seed = 4,

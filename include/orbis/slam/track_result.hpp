@@ -16,7 +16,8 @@
 namespace orbis::slam {
 
 enum class track_state {
-  not_started,  ///< no frame so far had enough keypoints with depth
+  not_started,  ///< no map has begun: no frame so far had enough keypoints with depth or, where none is measured, no
+                ///< two frames showed a scene beyond doubt
   tracking,     ///< the pose of the last frame is known
   lost,         ///< the pose of the last frame is not known
   relocalized   ///< the last frame was found again in a map
@@ -72,7 +73,7 @@ struct tracked_frame {
 /// Counts over all frames so far. Frames before the first map begins are neither tracked nor lost.
 struct track_counters {
   std::size_t frames = 0;
-  std::size_t tracked = 0;  ///< relocalised frames included
+  std::size_t tracked = 0;  ///< relocalised frames included, and the first of two that a map without depth begins with
   std::size_t lost = 0;
   std::size_t relocalized = 0;
   std::size_t loops_closed = 0;

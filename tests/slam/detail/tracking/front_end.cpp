@@ -9,7 +9,9 @@
 #include <orbis/camera/any.hpp>
 #include <orbis/camera/depth.hpp>
 #include <orbis/core/image.hpp>
+#include <orbis/core/sim3.hpp>
 #include <orbis/slam/detail/tracking/front_end.hpp>
+#include <orbis/slam/monocular.hpp>
 #include <orbis/slam/validate.hpp>
 
 #include "slam/ring_world.hpp"
@@ -23,17 +25,18 @@ namespace {
 using descriptor = features::binary_descriptor<256>;
 
 /// The front end on its own: keyframes are made, and nothing else is done with them.
-struct scene {
-  test::ring_world world{{.steps = 60, .drift = 0.0}};
+template <class Sensor>
+struct scene_of {
+  test::ring_world world;
   slam::options options;
   slam::atlas maps{8, 1.2};
-  slam::detail::front_end<camera::any_camera, descriptor, slam::orb_matchers, slam::rgbd> front_end{world.rig, options};
+  slam::detail::front_end<camera::any_camera, descriptor, slam::orb_matchers, Sensor> front_end{world.rig, options};
   std::vector<slam::map_keyframe> similar;  ///< what place recognition says
   std::vector<slam::map_id> dropped;
   bool is_frozen = false;
   std::size_t frames = 0;
 
-  scene() {
+  explicit scene_of(const test::ring_options& o = {.steps = 60, .drift = 0.0}) : world{o} {
     options.initial_pose = world.truth(0);
     options.min_start_points = 50;
   }
@@ -66,6 +69,7 @@ struct scene {
     return (world.truth(step).inverse() * front_end.last_pose(maps)).log().norm();
   }
 };
+using scene = scene_of<slam::rgbd>;
 
 }  // namespace
 
@@ -171,6 +175,63 @@ TEST_CASE("Tracking goes on when the map was merged, moved and culled between tw
   CHECK(s.maps.active_id() == 0);
   CHECK((s.front_end.last_pose(s.maps).inverse() * T * s.world.truth(26)).log().norm() < 0.03);
   CHECK(s.front_end.log().trajectory(s.maps, 0).size() == 7);
+}
+
+TEST_CASE("Tracking goes on when a correction has changed the lengths of a map without depth") {
+  scene_of<slam::monocular> s({.steps = 60, .density = 60.0, .drift = 0.0, .shrinks = 1e-9});
+  s.options = slam::monocular_options(s.options);
+  s.is_frozen = true;
+  s.world.walk(s.maps.active(), 0, 20, s.world.truth(0));
+  s.front_end.set_lost();
+  s.similar = {{0, 6}};
+  for (std::uint32_t i = 7; i != 10; ++i) CHECK(s.see(i) > 40);
+  CHECK(s.front_end.state() == track_state::tracking);
+  s.similar.clear();
+  const sim3 T(so3::exp(vec3(0.2, -0.1, 0.7)), vec3(3, -2, 1), 2.5);
+  s.maps.active().transform(T);
+  const auto off = [&](const se3& found, std::uint32_t step) {
+    const sim3 truth = T * sim3(s.world.truth(step));
+    return (se3(truth.rotation(), truth.translation()).inverse() * found).log().norm();
+  };
+  CHECK(off(s.front_end.last_pose(s.maps), 9) < 0.05);
+  for (std::uint32_t i = 10; i != 14; ++i) {
+    CHECK(s.see(i) > 40);
+    CHECK(s.front_end.state() == track_state::tracking);
+    CHECK(off(s.front_end.last_pose(s.maps), i) < 0.05);
+  }
+  const trajectory all = s.front_end.log().trajectory(s.maps, 0);
+  REQUIRE(all.size() == 7);
+  for (std::uint32_t i = 0; i != 7; ++i) CHECK(off(all[i].T_world_camera, i + 7) < 0.05);
+}
+
+TEST_CASE("The first two frames of a map without depth both count, and so do their landmarks for the second") {
+  scene_of<slam::monocular> s({.steps = 60, .density = 60.0, .drift = 0.0, .shrinks = 1e-9});
+  s.options = slam::monocular_options(s.options);
+  s.options.start.min_matches = 60;
+  s.options.initial_pose.reset();
+  std::uint32_t step = 0;
+  while (step != 6 && s.see(step) == 0) ++step;
+  REQUIRE(s.front_end.state() == track_state::tracking);
+  const slam::map& m = s.maps.active();
+  CHECK(slam::validate(m));
+  REQUIRE(m.keyframes().size() == 2);
+  REQUIRE(m.landmark_count() >= s.options.start.min_points);
+  for (const auto& l : m.landmarks()) {
+    CHECK(l.created == m.keyframes().back().id);
+    CHECK(l.observations.size() == 2);
+  }
+  CHECK(m.tree().parent(m.keyframes().back().id) == m.keyframes().front().id);
+  CHECK(s.front_end.counters().tracked == 2);
+  CHECK(s.front_end.log().trajectory(s.maps, 0).size() == 2);
+  // One that is begun after the camera was lost takes its first frame from the lost ones.
+  s.options.recovery.new_map_after = 0.0;
+  s.options.recovery.min_map_keyframes = 2;
+  const std::size_t before = s.front_end.counters().frames;
+  for (step = 30; step != 50 && s.see(step) == 0;) ++step;
+  REQUIRE(s.front_end.state() == track_state::tracking);
+  REQUIRE(s.maps.size() == 2);
+  CHECK(s.front_end.counters().tracked == 4);
+  CHECK(s.front_end.counters().lost == s.front_end.counters().frames - before - 2);
 }
 
 TEST_CASE("Where depth is not asked for, the image of it changes nothing") {

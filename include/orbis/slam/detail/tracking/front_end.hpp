@@ -136,9 +136,15 @@ class front_end {
   [[nodiscard]] const std::optional<map_keyframe>& first_keyframe() const noexcept { return first_keyframe_; }
   /// Adds a frame to the active map as a keyframe, which becomes the reference.
   map_keyframe make_keyframe(frame_type& f, atlas_type& maps) {
-    first_new_ = maps.active().landmark_end();
-    const keyframe_id id = insert_keyframe(maps.active(), f, options_);
-    f.landmarks = maps.active().at(id).landmarks;
+    basic_map<D>& m = maps.active();
+    first_new_ = m.landmark_end();
+    const keyframe_id id = insert_keyframe(m, f, options_);
+    for (const start_point& p : std::exchange(start_points_, {})) {
+      const landmark_id l = m.add_landmark(id, p.second, p.position);
+      m.add_observation(l, first_keyframe_->keyframe, p.first);
+      m.update_landmark(l);
+    }
+    f.landmarks = m.at(id).landmarks;
     return reference_ = {maps.active_id(), id};
   }
 
@@ -157,7 +163,8 @@ class front_end {
   /// Makes a new map the active one, unless that is new. One with few keyframes is left behind.
   template <class Drop>
   void enter_new_map(atlas_type& maps, Drop&& drop);
-  /// Adds the first of two frames that a map begins with, with their points, which `f`, the second one, observes.
+  /// Adds the first of two frames that a map begins with; with `f`, the second one, their points follow
+  /// (`make_keyframe`).
   void add_start(monocular_start_result<D> start, frame_type& f, atlas_type& maps);
   /// From the last frame, otherwise from the reference keyframe; refined on the local map.
   template <class FollowRows>
@@ -231,6 +238,7 @@ class front_end {
   track_state state_ = track_state::not_started;
   bool begins_map_ = false;
   std::optional<map_keyframe> first_keyframe_;
+  std::vector<start_point> start_points_;  ///< of both, in the world, until the second one is a keyframe
   std::optional<double> lost_since_;  ///< time stamp; empty: since the next frame
   map_keyframe reference_;            ///< the keyframe that the current frame shares most with
   frame_type last_;                   ///< the last frame that was tracked
@@ -359,12 +367,12 @@ void front_end<Camera, D, Matchers, Sensor>::add_start(monocular_start_result<D>
   first.T_world_camera = T_world_first;
   first.landmarks.assign(first.size(), no_id);
   const double timestamp = first.timestamp;
-  basic_map<D>& m = maps.active();
-  const keyframe_id id = insert_keyframe(m, std::move(first), options_);
-  for (const start_point& p : start.points)
-    f.landmarks[p.second] = m.add_landmark(id, p.first, T_world_first * p.position);
-  first_keyframe_ = reference_ = {maps.active_id(), id};
+  first_keyframe_ = reference_ = {maps.active_id(), insert_keyframe(maps.active(), std::move(first), options_)};
+  start_points_ = std::move(start.points);
+  for (start_point& p : start_points_) p.position = T_world_first * p.position;
   log_.add({timestamp, reference_, se3{}});
+  ++counters_.tracked;
+  if (state_ == track_state::lost) --counters_.lost;
 }
 
 template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
