@@ -17,7 +17,9 @@ check(CMAKE_MATCH_1 GREATER 259.5 AND CMAKE_MATCH_1 LESS 265.5)  # true: 262.5
 
 # The file is one for --camera, and better than what it was made of.
 app(0 run room --camera found.toml --read-out-ms 0 --deterministic --filter none --resolution 0.1 --out better)
+check(NOT err MATCHES "doubtful")
 app(0 run room --camera wrong.toml --read-out-ms 0 --deterministic --filter none --resolution 0.1 --out before)
+check(err MATCHES "focal length is doubtful")
 summary(better ${WORK}/better ate_rmse_m)
 summary(before ${WORK}/before ate_rmse_m)
 check(better LESS before)
