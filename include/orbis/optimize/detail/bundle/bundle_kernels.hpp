@@ -288,7 +288,12 @@ ORBIS_ALWAYS_INLINE double linearize_camera(const camera_work<R>& work, const Lo
     if (first % (8 * group) == 0)
       for (std::size_t t = 0; t != group && first + 8 * t < work.count; ++t)
         cost = cost + linearize_tile(work, loss, first + 8 * t, tiles[t]);
-    const auto& [q, r, by_q, by_rest, w] = tiles[first / 8 % group];
+    const auto& tile = tiles[first / 8 % group];
+    const auto& q = tile.q;
+    const auto& r = tile.r;
+    const auto& by_q = tile.by_q;
+    const auto& by_rest = tile.by_rest;
+    const L& w = tile.weight;
 
     L weighted[rows][3];  // W J_q
     unroll<rows>([&](auto d) ORBIS_INLINE_LAMBDA {
