@@ -121,7 +121,6 @@ void track_frames(slam_system& slam, const frame_source& source, const settings&
     if (is_mapped) source.complete(*frame);
     const orbis::camera::rgbd_frame& at_once = is_mapped ? correct(*frame, found.twist) : *frame;
     const orbis::camera::rgbd_frame& for_map = is_mapped ? without_moving(at_once, slam.last_frame()) : at_once;
-    out.slam.keyframes_made += found.keyframe.has_value();
     if (has_keyframe)
       out.keyframes.add(i, {found.map, *found.keyframe},
                         &at_once == &*frame ? orbis::vec6(orbis::vec6::Zero()) : found.twist, for_map);
@@ -178,7 +177,12 @@ auto graph_of(const slam_system& slam) {
       const orbis::slam::pose_revision now{maps.active_id(), map.pose_changes()};
       if (std::exchange(seen, now) == now && !always) return false;
       graph.poses.clear();
-      for (const auto& asked : graph.asked) graph.poses.push_back(present_pose(maps, asked));
+      for (const auto& asked : graph.asked) {
+        const auto pose = present_pose(maps, asked);
+        graph.poses.push_back(pose ? std::optional<orbis::sim3>{{pose->rotation(), pose->translation(),
+                                                                 map.scale_of(maps.current(asked).keyframe)}}
+                                   : std::nullopt);
+      }
       graph.keyframes.clear();
       graph.edges.clear();
       std::vector<std::uint32_t> place(map.keyframe_end().value());  // of each keyframe in the list
@@ -284,6 +288,7 @@ orbis::result<tracked_frames> track(const frame_source& source, const settings& 
                                : "\nrgbd_slam: stopping; what was reached is mapped and written. Once more: stop at "
                                  "once, and leave the folder as it was\n");
   upright_worlds worlds{source, s};
+  slam.listen({.keyframe_made = [&out](const auto&) { ++out.slam.keyframes_made; }});
   track_frames(slam, source, s, shutter.shutter, worlds, out, viewer, console);
   slam.wait();
   if (out.live) out.live->stop();

@@ -78,6 +78,7 @@ handed_frame frame_at(std::uint64_t number, map_keyframe reference, const se3& T
 /// Some keyframes of a map that can be moved.
 struct told_graph {
   std::vector<se3> poses;  // of the keyframes of map 0, by id
+  double scale = 1.0;      // of all of them
   bool changed = true;
   int answers = 0;
   scene_sources sources() {
@@ -87,8 +88,12 @@ struct told_graph {
       ++answers;
       g.poses.clear();
       for (const map_keyframe& k : g.asked)
-        g.poses.push_back(k.map == 0 && k.keyframe.value() < poses.size() ? std::optional{poses[k.keyframe.value()]}
-                                                                          : std::nullopt);
+        if (k.map == 0 && k.keyframe.value() < poses.size()) {
+          const se3& pose = poses[k.keyframe.value()];
+          g.poses.emplace_back(orbis::sim3(pose.rotation(), pose.translation(), scale));
+        } else {
+          g.poses.emplace_back();
+        }
       g.keyframes = poses;
       g.edges.clear();
       for (std::uint32_t i = 1; i < poses.size(); ++i) g.edges.push_back({i, i - 1, edge_kind::tree});
@@ -180,6 +185,15 @@ TEST_CASE("Path and keyframes follow corrections, and what is of another map is 
   static_cast<void>(builder.update_at_once(told.sources()));
   CHECK(scene.graph.revision > before);
   CHECK(positions(scene) == std::vector<vec3f>{{0.5F, 0, 0}, {10.5F, 3, 0}});
+}
+
+TEST_CASE("The path follows corrections of the scale") {
+  told_graph told{{at(0), at(10)}};
+  scene_builder builder{"", 0, rays(), 0.05};
+  builder.hand_over(frame_at(0, {0, 0}, at(0.5)));
+  builder.hand_over(frame_at(1, {0, 1}, at(0.5)));
+  told.scale = 3.0;
+  CHECK(positions(builder.update_at_once(told.sources())) == std::vector<vec3f>{{1.5F, 0, 0}, {11.5F, 0, 0}});
 }
 
 TEST_CASE("SLAM is asked from time to time only, and at once where that is wanted") {

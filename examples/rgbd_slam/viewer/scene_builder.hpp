@@ -18,6 +18,7 @@
 #include <orbis/camera/rays.hpp>
 #include <orbis/core/image.hpp>
 #include <orbis/core/se3.hpp>
+#include <orbis/core/sim3.hpp>
 #include <orbis/slam/ids.hpp>
 #include <orbis/slam/track_result.hpp>
 
@@ -43,9 +44,11 @@ struct handed_frame {
 /// Keyframes and their graph, as SLAM has them.
 struct slam_graph {
   std::vector<orbis::slam::map_keyframe> asked;  ///< keyframes whose poses are wanted, by the ids that they once had
-  std::vector<std::optional<orbis::se3>> poses;  ///< of these; empty where they are not in the active map
-  std::vector<orbis::se3> keyframes;             ///< of the active map
-  std::vector<shown_edge> edges;                 ///< between them
+  /// Of these, with the scale of what was noted relative to them (1 with depth); empty where they are not in the active
+  /// map.
+  std::vector<std::optional<orbis::sim3>> poses;
+  std::vector<orbis::se3> keyframes;  ///< of the active map
+  std::vector<shown_edge> edges;      ///< between them
 };
 
 /// Where the scene comes from besides frames. All are called by `update`; any may be empty.
@@ -112,7 +115,7 @@ class scene_builder {
   };
   struct passed_point {
     orbis::slam::map_keyframe reference;
-    orbis::vec3f at;  // in the reference's frame
+    orbis::vec3f at;  // in the reference's frame, in lengths over its scale
     bool begins;
   };
   struct trail_item {
