@@ -63,7 +63,11 @@ void add_map_options(CLI::App& cmd, settings& s) {
       ->check(not_empty)
       ->type_name("DIR");
   metres(cmd, "--resolution", s.resolution, "edge of the octree's smallest voxels, metres", 0.001, 10.0);
-  metres(cmd, "--max-depth", s.max_depth, "farther measurements do not enter the map, metres", 0.1, 1000.0);
+  cmd.add_option("--max-depth", s.max_depth,
+                 "farther measurements do not enter the map, metres; 4 if not given, or, of stereo cameras, 20 times "
+                 "their baseline if that is more")
+      ->check(within(0.1, 1000.0, " m"))
+      ->type_name("M");
   cmd.add_option("--filter", s.filter, "how outliers are removed; auto: as the cloud suggests")
       ->check(CLI::IsMember(filter_names()))
       ->capture_default_str()

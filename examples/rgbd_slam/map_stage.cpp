@@ -70,7 +70,7 @@ std::vector<voxel> occupied_voxels(const tree& map, const orbis::point_cloud& cl
 orbis::mapping::dense_options dense_options(const settings& s) {
   orbis::mapping::dense_options options;
   options.stride = point_stride;
-  options.max_depth = static_cast<float>(s.max_depth);
+  options.max_depth = static_cast<float>(s.depth_limit());
   // Finer than the octree's voxels, so that these see every surface; memory follows what there is to
   // see, not how long it was looked at.
   options.voxel_size = s.resolution / 5;
@@ -114,7 +114,7 @@ built_map map_cloud(orbis::point_cloud cloud, const settings& s, console& consol
     if (!s.origin) return occupied_only(points, s.resolution);
     tree scanned{s.resolution};
     const auto start = console::clock::now();
-    scanned.integrate(orbis::par.with(s.threads), points, *s.origin, {.max_range = s.max_depth});
+    scanned.integrate(orbis::par.with(s.threads), points, *s.origin, {.max_range = s.depth_limit()});
     milliseconds.push_back(std::chrono::duration<double, std::milli>(console::clock::now() - start).count());
     return scanned;
   };

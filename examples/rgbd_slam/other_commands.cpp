@@ -120,7 +120,7 @@ orbis::result<void> check_resolution(const std::vector<orbis::vec3f>& points, co
   examples::voxel_estimate rays;
   double longest = 0.0;
   for (const orbis::vec3f& p : points) {
-    const double length = std::min((p.cast<double>() - origin).norm(), s.max_depth);
+    const double length = std::min((p.cast<double>() - origin).norm(), s.depth_limit());
     rays.add(length, 0.0);
     longest = std::max(longest, length);
   }
@@ -183,7 +183,7 @@ exit_code evaluate(const settings& s, console& console) {
   return done;
 }
 
-exit_code map_without_slam(const settings& s, console& console) {
+exit_code map_without_slam(settings s, console& console) {
   const auto give_up = [&](const orbis::error& e) { return console.error(e), bad_input; };
   std::error_code ignored;
   std::optional<frame_source> recording;

@@ -72,8 +72,8 @@ results begin_results(const settings& s, const std::string& title, const frame_s
                                           : "none: points are marked occupied, nothing is marked free");
   }
   if (s.localize_only || (source != nullptr && source->is_monocular())) return r;
-  r.setup.emplace_back("octree",
-                       number("%g cm voxels", 100 * s.resolution) + number(", measurements up to %g m", s.max_depth));
+  r.setup.emplace_back(
+      "octree", number("%g cm voxels", 100 * s.resolution) + number(", measurements up to %g m", s.depth_limit()));
   r.setup.emplace_back("filter asked for", filter_in_words(s));
   return r;
 }

@@ -51,7 +51,8 @@ struct settings {
                                          ///< or estimated
   bool distortion = false;               ///< of the lens, is estimated where the camera has none (calibrate)
   double resolution = 0.05;              ///< octree, metres
-  double max_depth = 4.0;                ///< depth beyond this is left out of the map, metres
+  std::optional<double> max_depth;       ///< depth beyond this is left out of the map, metres; empty: `usual_max_depth`
+  double usual_max_depth = 4.0;          ///< metres; `open_source` sets that of the camera
   std::string filter = "auto";           ///< one of `filter_names`
   std::optional<std::size_t> neighbors;  ///< empty: the filter's own number
   double sigma = 1.0;
@@ -86,6 +87,9 @@ struct settings {
   bool quiet = false;
   bool json = false;
   bool with_scale = false;  ///< lengths of the estimate are in a unit of their own
+
+  /// Depth beyond this is left out of the map, metres.
+  [[nodiscard]] double depth_limit() const { return max_depth.value_or(usual_max_depth); }
 };
 
 /// Whether a camera is named by its file rather than by its name.

@@ -113,12 +113,6 @@ result<frame_source> open_stereo_recording(const settings& s) {
     return with_right(*std::move(pair), recording->camera().depth_scale);
   };
   source.color = [recording, stride = s.stride](std::size_t i) { return recording->left(i * stride); };
-  if (const double close = 20.0 * *source.camera.baseline; close > s.max_depth && !s.localize_only) {
-    char text[120];
-    std::snprintf(text, sizeof text, "depth beyond %g m is left out of the map; the cameras measure up to %.0f m well",
-                  s.max_depth, close);
-    source.notes.push_back(text + std::string{" (--max-depth)"});
-  }
   return source;
 }
 
@@ -357,14 +351,14 @@ frame_source make_synthetic(const settings& s) {
 result<void> check_resolution(frame_source& source, const settings& s) {
   const orbis::camera::intrinsics& k = source.camera.model.k();
   if (source.frames == 0 || source.is_monocular() || source.is_live) return {};  // a camera's frames are seen once
-  if (!examples::voxels_of_depth(k, [&](std::size_t) { return s.max_depth; }).takes_long(s.resolution)) return {};
+  if (!examples::voxels_of_depth(k, [&](std::size_t) { return s.depth_limit(); }).takes_long(s.resolution)) return {};
   auto first = source.frame(0);
   if (!first) return {};  // whoever needs it will say why
   source.complete(*first);
   const auto pixels = first->depth.pixels();
   const auto voxels = examples::voxels_of_depth(k, [&](std::size_t i) {
     const double z = pixels[i] / first->depth_scale;
-    return z > s.max_depth ? 0.0 : z;
+    return z > s.depth_limit() ? 0.0 : z;
   });
   if (!voxels.takes_long(s.resolution)) return {};
   const std::string text = voxels.in_words(s.resolution, "the first frame alone");
@@ -396,7 +390,7 @@ std::string origin_note(const orbis::vec3& origin) {
   return text;
 }
 
-result<frame_source> open_source(const settings& s, console& console) {
+result<frame_source> open_source(settings& s, console& console) {
   console.stage("opening");
   std::error_code ignored;
   const auto open = [&] {
@@ -410,6 +404,10 @@ result<frame_source> open_source(const settings& s, console& console) {
   };
   auto source = s.what == command::demo ? result<frame_source>{make_synthetic(s)} : open();
   if (!source) return source;
+  // As far as a quarter of a pixel of disparity is about a hundredth of the depth.
+  constexpr double baselines = 20.0;
+  if (source->is_stereo())
+    s.usual_max_depth = std::max(s.usual_max_depth, baselines * source->camera.baseline.value_or(0.0));
   if (!s.localize_only)
     if (auto fine = check_resolution(*source, s); !fine) return fail(fine.error());
   console.finish(describe(*source));

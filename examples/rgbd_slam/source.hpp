@@ -60,8 +60,8 @@ struct frame_source {
 /// What a user is told about it.
 [[nodiscard]] std::string origin_note(const orbis::vec3& origin);
 
-/// The recording that the settings name; says what it is.
-[[nodiscard]] orbis::result<frame_source> open_source(const settings& s, console& console);
+/// The recording that the settings name; says what it is, and sets `usual_max_depth`.
+[[nodiscard]] orbis::result<frame_source> open_source(settings& s, console& console);
 
 /// Reads the frames of a source in order, one ahead of who asks.
 class read_ahead {
