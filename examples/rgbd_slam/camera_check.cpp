@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdio>
+#include <utility>
 
 #include <orbis/slam/calibration.hpp>
 
@@ -14,11 +15,11 @@ std::optional<std::string> doubt_focal_length(const orbis::slam::any_system& sla
                                               const orbis::slam::options& options) {
   constexpr std::size_t few = 8;  // keyframes
   constexpr double least_change = 0.015, sigmas = 6.0;
-  const auto found = slam.inspect([&](const orbis::slam::atlas& maps) {
-    return maps.active().keyframes().size() < few
-               ? orbis::result<orbis::slam::calibration<orbis::camera::any_camera>>{orbis::fail(
-                     orbis::errc::degenerate, "map", "has few keyframes")}
-               : orbis::slam::calibrate(maps.active(), orbis::slam::make_rig(camera, options), {.max_keyframes = 60});
+  using calibration = orbis::slam::calibration<orbis::camera::any_camera>;
+  const auto found = slam.inspect([&](const orbis::slam::atlas& maps) -> std::optional<calibration> {
+    if (maps.active().keyframes().size() < few) return std::nullopt;
+    auto refined = orbis::slam::calibrate(maps.active(), orbis::slam::make_rig(camera, options), {.max_keyframes = 60});
+    return refined ? std::optional{*std::move(refined)} : std::nullopt;
   });
   if (!found) return std::nullopt;
   for (const auto& p : found->parameters) {

@@ -104,6 +104,9 @@ void find_observations(const basic_frame<D>& f, const basic_map<D>& m, const cam
     if (f.landmarks[i] != no_id) to.push_back({observation_of(rig, f, i, m.landmark_at(f.landmarks[i]).position)});
 }
 
+/// Of Huber's loss of these residuals, standard deviations: as in the refinement of the pose alone.
+inline constexpr double row_loss_width = 2.447;
+
 /// The residual of an observation, and its derivative by a motion of the camera frame (`exp(step) * T_camera_world`) at
 /// the time of its row; that by the twist is `-o.time` times as much. Empty where the point has no projection.
 template <camera::camera_model Camera>
@@ -152,7 +155,7 @@ template <camera::camera_model Camera>
                                               const optimize::reprojection<Camera>& model, const se3& T_camera_world,
                                               const vec6& twist, const twist_prior& prior,
                                               const refinement_terms& terms = {}) {
-  constexpr double width = 2.447;  // of Huber's loss, as in the refinement of the pose alone
+  constexpr double width = row_loss_width;
   moving_pose_equations e;
   std::array<mat6, 3> h{mat6::Zero(), mat6::Zero(), mat6::Zero()};  // times 1, time, time squared
   std::array<vec6, 2> g{vec6::Zero(), vec6::Zero()};
@@ -211,7 +214,7 @@ class early_depth_twist {
   template <camera::camera_model Camera>
   void see(std::span<const row_observation> observations, const optimize::reprojection<Camera>& model,
            const moving_pose& at, const twist_prior& prior) {
-    constexpr double width = 2.447;
+    constexpr double width = row_loss_width;
     constexpr double share = 0.25;  // of the information of independent errors: landmarks that are near err together
     const se3 T_camera_world = at.T_world_camera.inverse();
     std::array<mat6, 3> h{mat6::Identity(), mat6::Zero(), mat6::Zero()};  // a metre or a radian, if nothing is seen
