@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <orbis/slam/any_system.hpp>
 
-namespace orbis::slam {
-
-template class detail::front_end<camera::any_camera, detail::compiled_descriptor, orb_matchers, any_sensor>;
-template class rgbd_system<camera::any_camera, features::orb_extractor, orb_matchers, bag_of_words_places, any_sensor>;
-
-}  // namespace orbis::slam
+template class orbis::slam::rgbd_system<orbis::camera::any_camera, orbis::features::orb_extractor,
+                                        orbis::slam::orb_matchers, orbis::slam::bag_of_words_places,
+                                        orbis::slam::any_sensor>;

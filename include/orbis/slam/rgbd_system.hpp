@@ -308,14 +308,15 @@ track_result ORBIS_SLAM_SYSTEM::track_images(double timestamp, const Images&... 
 ORBIS_SLAM_SYSTEM_TEMPLATE
 template <class... Images>
 auto ORBIS_SLAM_SYSTEM::measure(double timestamp, const Images&... images) const -> frame_type {
-  static_assert(measures<Sensor, Camera, Extractor, Images...>, "orbis: the sensor does not take these images");
   frame_type f;
-  if (are_usable(timestamp, images...)) {
-    f = sensor_.measure(shared_.rig, extract_, images...);
-    f.scale_is_known = shared_.rig.scale_is_known;
-    if (!f.scale_is_known) std::fill(f.depth.begin(), f.depth.end(), 0.0F);  // what a sensor of run time may measure
-    if (front_end_.looks_at_rows()) detail::keep_as_read(f);
-  }
+  // Others do not come here; clang before 16 instantiates members of which the constraints do not hold.
+  if constexpr (measures<Sensor, Camera, Extractor, Images...>)
+    if (are_usable(timestamp, images...)) {
+      f = sensor_.measure(shared_.rig, extract_, images...);
+      f.scale_is_known = shared_.rig.scale_is_known;
+      if (!f.scale_is_known) std::fill(f.depth.begin(), f.depth.end(), 0.0F);  // what a sensor of run time may measure
+      if (front_end_.looks_at_rows()) detail::keep_as_read(f);
+    }
   f.timestamp = std::isfinite(timestamp) ? timestamp : front_end_.last_timestamp();
   f.index = front_end_.counters().frames;
   return f;
@@ -328,10 +329,10 @@ std::optional<map_keyframe> ORBIS_SLAM_SYSTEM::localize(
   const auto lock = shared_.lock();
   atlas_type& maps = shared_.atlas;
   const bool is_frozen = localization_only_;
-  const auto similar = [&](const auto& features, std::size_t count) {
+  const auto similar = [this](const auto& features, std::size_t count) {
     return shared_.similar(shared_.places.describe(features), count, [](map_keyframe) { return false; });
   };
-  const auto drop = [&](map_id m) {  // unless mapping works on it; then it stays
+  const auto drop = [this](map_id m) {  // unless mapping works on it; then it stays
     if (const auto edit = shared_.try_edit()) shared_.remove_map(m);
   };
   front_end_.sync_with_map(maps);

@@ -11,8 +11,7 @@
 #include <limits>
 #include <vector>
 
-#include <Eigen/Eigenvalues>
-
+#include <orbis/core/jacobi.hpp>
 #include <orbis/core/types.hpp>
 #include <orbis/octree/detail/points/ray_traversal.hpp>
 
@@ -121,8 +120,8 @@ struct direction_windows {
     mean.normalize();
     // Across the mean the rays spread furthest along a side of the image.
     const mat3 across = mat3::Identity() - mean * mean.transpose();
-    const Eigen::SelfAdjointEigenSolver<mat3> spread{across * moments * across};
-    const vec3 x = (across * spread.eigenvectors().col(2)).normalized();
+    const symmetric_eigen<3> spread = eigen_of_symmetric<3>(across * moments * across);
+    const vec3 x = (across * spread.vectors.col(2)).normalized();
     mat3 turned;
     if (!x.allFinite()) return mat3::Identity();
     turned << x.transpose(), mean.cross(x).transpose(), mean.transpose();

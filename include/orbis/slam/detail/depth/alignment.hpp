@@ -17,8 +17,6 @@
 #include <span>
 #include <vector>
 
-#include <Eigen/Eigenvalues>
-
 #include <orbis/camera/model.hpp>
 #include <orbis/camera/shutter.hpp>
 #include <orbis/core/se3.hpp>
@@ -121,66 +119,14 @@ struct depth_equations {
 /// `points`: how many points the term may count as; more are weighed down to this. `weakest`: the mean square of what
 /// the normals have in a direction, below which it counts as free; rotations as if the points were at their mean
 /// depth, which is what turns an angle into metres. O(planes).
-[[nodiscard]] inline depth_equations equations_of(std::span<const plane_observation_of_row> planes,
-                                                  const moving_pose& at, double points, double weakest) {
-  depth_equations e;
-  e.term.at = at;
-  if (planes.empty()) return e;
-  constexpr double width = 2.0;  // of Huber's loss
-  std::array<mat6, 3> h{mat6::Zero(), mat6::Zero(), mat6::Zero()};
-  std::array<vec6, 2> g{vec6::Zero(), vec6::Zero()};
-  double weights = 0.0, squares = 0.0, range = 0.0, cost = 0.0;
-  for (const plane_observation_of_row& o : planes) {
-    optimize::point_to_plane seen = o.seen;
-    seen.measured = moved_by(at.twist, o.time, seen.measured);
-    matrix<1, 6> right;
-    const auto r = seen.linearize(at.T_world_camera, right);
-    if (!r) continue;
-    const vec6 j = -right.transpose();  // a step of the camera from the left is one of its pose from the right, back
-    const double error = std::abs((*r)[0]);
-    const double weight = error <= width ? 1.0 : width / error;
-    cost += 0.5 * weight * error * error;
-    squares += error * error;
-    weights += weight * seen.information;
-    range += seen.measured.norm();
-    const mat6 a = weight * j * j.transpose();
-    const vec6 b = weight * (*r)[0] * j;
-    h[0] += a, h[1] -= o.time * a, h[2] += o.time * o.time * a;
-    g[0] += b, g[1] -= o.time * b;
-  }
-  const auto n = static_cast<double>(planes.size());
-  e.deviation = std::sqrt(squares / n);
-
-  // Eigenvalues where a radian counts as the metres at the mean range.
-  vec6 scale = vec6::Ones();
-  scale.tail<3>().setConstant(n / range);
-  const mat6 scaled = scale.asDiagonal() * h[0] * scale.asDiagonal() / weights;
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> directions(scaled);
-  e.least = directions.eigenvalues()[0];
-  mat6 keep = mat6::Zero();
-  for (int i = 0; i != 6; ++i) {
-    if (!(directions.eigenvalues()[i] > weakest)) continue;
-    ++e.determined;
-    keep += directions.eigenvectors().col(i) * directions.eigenvectors().col(i).transpose();
-  }
-  keep = scale.cwiseInverse().asDiagonal() * keep * scale.asDiagonal();  // of scaled gradients: of gradients
-  const double share = std::min(1.0, points / n);
-  for (mat6& m : h) m = share * (keep * m * keep.transpose());
-  for (vec6& v : g) v = share * (keep * v);
-  e.term.h << h[0], h[1], h[1], h[2];
-  e.term.g << g[0], g[1];
-  e.term.cost = share * cost;
-  return e;
-}
+[[nodiscard]] depth_equations equations_of(std::span<const plane_observation_of_row> planes, const moving_pose& at,
+                                           double points, double weakest);
 
 /// The motion of the camera frame to the least cost, where the planes determine one; zero in all other directions.
-[[nodiscard]] inline vec6 step_of(const depth_equations& e) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> h(e.term.h.topLeftCorner<6, 6>());
-  vec6 step = vec6::Zero();
-  for (int i = 6 - e.determined; i < 6; ++i)  // the others are zero
-    if (h.eigenvalues()[i] > 0.0)
-      step -= h.eigenvectors().col(i) * (h.eigenvectors().col(i).dot(e.term.g.head<6>()) / h.eigenvalues()[i]);
-  return step;
-}
+[[nodiscard]] vec6 step_of(const depth_equations& e);
 
 }  // namespace orbis::slam::detail
+
+#ifndef ORBIS_COMPILED
+#include <orbis/slam/detail/compiled/alignment_functions.hpp>
+#endif

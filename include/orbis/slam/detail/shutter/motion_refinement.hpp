@@ -11,8 +11,6 @@
 #include <span>
 #include <vector>
 
-#include <Eigen/Cholesky>
-
 #include <orbis/camera/model.hpp>
 #include <orbis/camera/shutter.hpp>
 #include <orbis/core/se3.hpp>
@@ -57,11 +55,7 @@ struct twist_prior {
   }
 
   /// The twist that is expected at a pose.
-  [[nodiscard]] vec6 expected(const se3& T_camera_world) const {
-    if (!T_world_before) return vec6::Zero();
-    const vec6 mean = (T_camera_world * *T_world_before).inverse().log() / interval;
-    return mean + trend * (mean - twist_before);
-  }
+  [[nodiscard]] vec6 expected(const se3& T_camera_world) const;
 };
 
 /// A keypoint as it was read, and the known point that it observes.
@@ -130,11 +124,7 @@ struct pose_quadratic {
   double cost = 0.0;
 
   /// Takes the twist for known: the cost no longer depends on it.
-  void hold_twist() {
-    h.template rightCols<6>().setZero();
-    h.template bottomRows<6>().setZero();
-    g.template tail<6>().setZero();
-  }
+  void hold_twist();
 };
 
 /// What the refinement of a pose depends on besides the keypoints.
@@ -149,6 +139,15 @@ struct moving_pose_equations {
   matrix<12, 1> g;
   double cost = 0.0;  ///< half the robust sum
 };
+
+/// Adds to equations of the keypoints, which are given by powers of the rows' times, what else determines pose and
+/// twist.
+void add_terms(moving_pose_equations& e, const std::array<mat6, 3>& h, const std::array<vec6, 2>& g,
+               const se3& T_camera_world, const vec6& twist, const twist_prior& prior, const refinement_terms& terms);
+
+/// The step of Gauss and Newton: the motion of the camera frame, then that of the twist, which is zero unless it
+/// `moves`.
+[[nodiscard]] matrix<12, 1> newton_step(const moving_pose_equations& e, bool moves);
 
 template <camera::camera_model Camera>
 [[nodiscard]] moving_pose_equations linearize(std::span<const row_observation> observations,
@@ -172,32 +171,7 @@ template <camera::camera_model Camera>
     h[0] += a, h[1] -= o.time * a, h[2] += o.time * o.time * a;
     g[0] += b, g[1] -= o.time * b;
   }
-  e.h << h[0], h[1], h[1], h[2];
-  e.g << g[0], g[1];
-  if (terms.other != nullptr) {
-    const pose_quadratic& q = *terms.other;
-    matrix<12, 1> step;
-    step << (T_camera_world * q.at.T_world_camera).log(), twist - q.at.twist;
-    const matrix<12, 1> slope = q.h * step;
-    e.h += q.h;
-    e.g += q.g + slope;
-    e.cost += q.cost + step.dot(q.g + 0.5 * slope);
-  }
-  if (!terms.moves) return e;
-
-  const vec6 error = twist - prior.expected(T_camera_world);
-  const double by_pose = prior.T_world_before ? (1.0 + prior.trend) / prior.interval : 0.0;  // to first order
-  for (int i = 0; i != 6; ++i) {
-    const double deviation = i < 3 ? prior.translation_deviation : prior.rotation_deviation;
-    const double weight = 1.0 / (deviation * deviation);
-    e.cost += 0.5 * weight * error[i] * error[i];
-    e.h(i, i) += weight * by_pose * by_pose;
-    e.h(i, 6 + i) += weight * by_pose;
-    e.h(6 + i, i) += weight * by_pose;
-    e.h(6 + i, 6 + i) += weight;
-    e.g[i] += weight * by_pose * error[i];
-    e.g[6 + i] += weight * error[i];
-  }
+  add_terms(e, h, g, T_camera_world, twist, prior, terms);
   return e;
 }
 
@@ -228,34 +202,18 @@ class early_depth_twist {
       const mat6 a = weight * by_pixel.transpose() * by_pixel;
       h[0] += a, h[1] -= o.time * a, h[2] += o.time * o.time * a;
     }
-    pose_covariance_ = h[0].inverse();
-    if (!prior.T_world_before) return;
-    // The prior ties the twist to both poses, of which the former one is not exact either.
-    const double by_pose = (1.0 + prior.trend) / prior.interval;
-    const mat6 tie =
-        (mat6(deviations(prior).cwiseAbs2().asDiagonal()) + by_pose * by_pose * former_covariance_).inverse();
-    const mat6 mixed = h[1] + by_pose * tie;
-    const mat6 of_twist = h[2] + tie - mixed.transpose() * (h[0] + by_pose * by_pose * tie).inverse() * mixed;
-    // From one frame to the next a twist changes by twice the deviation of the prior, which is that from the mean.
-    const mat6 change = mat6((2.0 * deviations(prior)).cwiseAbs2().asDiagonal());
-    gain_ = change * (change + of_twist.inverse()).inverse();
+    determine(h, prior);
   }
 
   /// Between the twist of the former frame and that of this one.
-  [[nodiscard]] vec6 between(const twist_prior& prior, const vec6& refined) const {
-    if (!prior.T_world_before || !gain_.allFinite()) return refined;
-    return prior.twist_before + gain_ * (refined - prior.twist_before);
-  }
+  [[nodiscard]] vec6 between(const twist_prior& prior, const vec6& refined) const;
 
   /// The frame that was seen becomes the former one.
   void advance() { former_covariance_ = pose_covariance_; }
 
  private:
-  [[nodiscard]] static vec6 deviations(const twist_prior& prior) {
-    vec6 d;
-    d << vec3::Constant(prior.translation_deviation), vec3::Constant(prior.rotation_deviation);
-    return d;
-  }
+  /// From what the pixels determine, by powers of the rows' times.
+  void determine(const std::array<mat6, 3>& h, const twist_prior& prior);
 
   mat6 pose_covariance_ = mat6::Zero(), former_covariance_ = mat6::Zero();  ///< by pixels alone
   mat6 gain_ = mat6::Identity();
@@ -272,11 +230,7 @@ template <camera::camera_model Camera>
   vec6 twist = start.twist;
   moving_pose_equations now = linearize(observations, model, T_camera_world, twist, prior, terms);
   for (int k = 0; k != iterations; ++k) {
-    matrix<12, 1> step = matrix<12, 1>::Zero();
-    if (terms.moves)
-      step = now.h.ldlt().solve(-now.g);
-    else
-      step.template head<6>() = now.h.template topLeftCorner<6, 6>().ldlt().solve(-now.g.template head<6>());
+    const matrix<12, 1> step = newton_step(now, terms.moves);
     if (!step.allFinite()) break;
     const se3 there = se3::exp(step.template head<6>()) * T_camera_world;
     const vec6 moving = twist + step.template tail<6>();
@@ -292,3 +246,7 @@ template <camera::camera_model Camera>
 }
 
 }  // namespace orbis::slam::detail
+
+#ifndef ORBIS_COMPILED
+#include <orbis/slam/detail/compiled/motion_refinement_functions.hpp>
+#endif

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <functional>
 #include <optional>
 #include <span>
 #include <type_traits>
@@ -51,17 +52,15 @@ class front_end {
  public:
   using frame_type = basic_frame<D>;
   using atlas_type = basic_atlas<D>;
+  /// Sets what the sensor measures for the rows of a rolling shutter (`as_read`), given the motion.
+  using row_follower = std::function<void(frame_type&, const frame_motion&)>;
+  /// The keyframes with the most similar appearance, as ids.
+  using appearance_search =
+      std::function<std::vector<map_keyframe>(const decltype(frame_type::features)&, std::size_t count)>;
+  /// Called for a map that is left behind with few keyframes.
+  using map_drop = std::function<void(map_id)>;
 
-  front_end(const camera_rig<Camera>& rig, const options& settings)
-      : tracker_{rig, settings},
-        moving_{rig, settings},
-        depth_{rig, settings.depth_term},
-        start_{rig, settings.start, settings.seed},
-        rig_{rig},
-        options_{settings},
-        shutter_{settings.shutter} {
-    if (settings.estimates_shutter) observer_.emplace();
-  }
+  front_end(const camera_rig<Camera>& rig, const options& settings);
 
   /// When the rows of the images are taken, as far as it is known.
   [[nodiscard]] const camera::shutter& shutter() const noexcept { return shutter_; }
@@ -107,46 +106,21 @@ class front_end {
 
   /// Estimates the pose of a frame and sets `state()`. Returns the number of landmarks that agree with the pose (of
   /// points with depth, if the frame begins a map), 0 if it has none; `is_tracking()` with 0 where depth alone holds
-  /// it. `is_frozen`: nothing is changed in the maps, and no map is begun. `follow_rows(frame, motion)`: sets what the
-  /// sensor measures for the rows of a rolling shutter
-  /// (`as_read`), given the motion. `similar(features, count)`: the keyframes with the most similar appearance, as ids;
-  /// `drop(map)`: called for a map that is left behind with few keyframes.
-  template <class FollowRows, class Similar, class Drop>
-  std::size_t localize(frame_type& f, atlas_type& maps, bool is_frozen, FollowRows&& follow_rows, Similar&& similar,
-                       Drop&& drop);
+  /// it. `is_frozen`: nothing is changed in the maps, and no map is begun.
+  std::size_t localize(frame_type& f, atlas_type& maps, bool is_frozen, const row_follower& follow_rows,
+                       const appearance_search& similar, const map_drop& drop);
 
   /// Makes the keyframe that shares most landmarks with the frame the reference.
-  void update_reference(const frame_type& f, const atlas_type& maps) {
-    if (!maps.active().keyframes().empty())
-      reference_ = {maps.active_id(), most_shared(maps.active(), f, reference_.keyframe)};
-  }
+  void update_reference(const frame_type& f, const atlas_type& maps);
   /// Whether a localised frame should become a keyframe. One that depth holds becomes one if landmarks have not held
   /// the camera for some time, and if a map could begin with it.
-  [[nodiscard]] bool needs_keyframe(const frame_type& f, std::size_t inliers, const atlas_type& maps) const {
-    if (begins_map()) return true;
-    if (f.held_by_depth)
-      return f.timestamp - held_since_ >= options_.keyframes.interval && Sensor::begins_map(f, options_) > 0;
-    return is_keyframe_due(
-        gather_evidence(maps.active(), f, reference_.keyframe, inliers, options_, rig_.scale_is_known),
-        options_.keyframes);
-  }
+  [[nodiscard]] bool needs_keyframe(const frame_type& f, std::size_t inliers, const atlas_type& maps) const;
   /// Whether the last frame begins a map.
   [[nodiscard]] bool begins_map() const noexcept { return begins_map_; }
   /// A keyframe before that of the last frame, with which a map begins that needs two.
   [[nodiscard]] const std::optional<map_keyframe>& first_keyframe() const noexcept { return first_keyframe_; }
   /// Adds a frame to the active map as a keyframe, which becomes the reference.
-  map_keyframe make_keyframe(frame_type& f, atlas_type& maps) {
-    basic_map<D>& m = maps.active();
-    first_new_ = m.landmark_end();
-    const keyframe_id id = insert_keyframe(m, f, options_);
-    for (const start_point& p : std::exchange(start_points_, {})) {
-      const landmark_id l = m.add_landmark(id, p.second, p.position);
-      m.add_observation(l, first_keyframe_->keyframe, p.first);
-      m.update_landmark(l);
-    }
-    f.landmarks = m.at(id).landmarks;
-    return reference_ = {maps.active_id(), id};
-  }
+  map_keyframe make_keyframe(frame_type& f, atlas_type& maps);
 
   /// Counts a frame and, if it was localised, keeps it for the next prediction and in the log.
   /// `made`: the keyframe that it became.
@@ -158,40 +132,23 @@ class front_end {
 
   /// Begins a map with a frame, if the sensor says that it can; without depth, with a frame before it as well. The map
   /// becomes the active one. Returns the number of its points.
-  template <class Drop>
-  std::size_t begin_map(frame_type& f, atlas_type& maps, Drop&& drop);
+  std::size_t begin_map(frame_type& f, atlas_type& maps, const map_drop& drop);
   /// Makes a new map the active one, unless that is new. One with few keyframes is left behind.
-  template <class Drop>
-  void enter_new_map(atlas_type& maps, Drop&& drop);
+  void enter_new_map(atlas_type& maps, const map_drop& drop);
   /// Adds the first of two frames that a map begins with; with `f`, the second one, their points follow
   /// (`make_keyframe`).
   void add_start(monocular_start_result<D> start, frame_type& f, atlas_type& maps);
   /// From the last frame, otherwise from the reference keyframe; refined on the local map.
-  template <class FollowRows>
-  std::size_t track_from_last(frame_type& f, atlas_type& maps, bool is_frozen, FollowRows&& follow_rows);
+  std::size_t track_from_last(frame_type& f, atlas_type& maps, bool is_frozen, const row_follower& follow_rows);
   /// From the reference and the keyframes with similar appearance, in any map.
-  template <class FollowRows, class Similar>
-  std::size_t relocalize(frame_type& f, atlas_type& maps, bool is_frozen, FollowRows&& follow_rows, Similar&& similar);
+  std::size_t relocalize(frame_type& f, atlas_type& maps, bool is_frozen, const row_follower& follow_rows,
+                         const appearance_search& similar);
   /// Around the last tracked frame's place, for a camera that has turned; by a frame that sees enough to begin a map.
-  template <class FollowRows>
-  std::size_t search_in_place(frame_type& f, atlas_type& maps, bool is_frozen, FollowRows&& follow_rows);
-  std::size_t track_local_map(frame_type& f, basic_map<D>& m, double radius, bool is_frozen) {
-    return tracker_.on_local_map(
-        f, m, reference_.keyframe, radius, moving_, [&](landmark_id l) { is_frozen ? void() : m.count_visible(l); },
-        [&](landmark_id l) { is_frozen ? void() : m.count_found(l); });
-  }
+  std::size_t search_in_place(frame_type& f, atlas_type& maps, bool is_frozen, const row_follower& follow_rows);
+  std::size_t track_local_map(frame_type& f, basic_map<D>& m, double radius, bool is_frozen);
 
   /// Takes from a frame the landmarks that do not agree with its pose. Returns how many are left.
-  std::size_t drop_disagreeing(frame_type& f, const basic_map<D>& m) const {
-    const se3 T_camera_world = f.T_world_camera.inverse();
-    std::size_t left = 0;
-    for (std::size_t i = 0; i != f.size(); ++i) {
-      landmark_id& l = f.landmarks[i];
-      if (l != no_id && !agrees(rig_, f, T_camera_world, i, m.landmark_at(l).position)) l = no_id;
-      left += l != no_id;
-    }
-    return left;
-  }
+  std::size_t drop_disagreeing(frame_type& f, const basic_map<D>& m) const;
 
   /// With a rolling shutter, moves the keypoints of a frame to its time, by the motion since the last frame to its
   /// present pose.
@@ -202,22 +159,19 @@ class front_end {
   void observe(const frame_type& f, const atlas_type& maps, const std::optional<map_keyframe>& made);
   /// Refines a frame by the landmarks that it observes and, if it joins in, by depth: the pose and, with a rolling
   /// shutter, the twist, to which the keypoints are moved then. `is_next`: the frame follows the last one.
-  template <class FollowRows>
-  void refine_motion(frame_type& f, const atlas_type& maps, bool is_next, FollowRows&& follow_rows);
+  void refine_motion(frame_type& f, const atlas_type& maps, bool is_next, const row_follower& follow_rows);
   /// From a pose that was found by a search, in the active map around the reference: refined on the local map. Sets
   /// `state()` if the frame is found again.
-  template <class FollowRows>
-  std::size_t track_found(frame_type& f, atlas_type& maps, bool is_frozen, FollowRows&& follow_rows);
+  std::size_t track_found(frame_type& f, atlas_type& maps, bool is_frozen, const row_follower& follow_rows);
   /// Aligns the depth of a frame around the last one with the surfaces of keyframes.
   [[nodiscard]] std::optional<depth_alignment> align_depth(const frame_type& f, const atlas_type& maps);
   /// From a pose that depth was aligned at, refined on the local map.
-  template <class FollowRows>
   std::size_t track_from_depth(frame_type& f, atlas_type& maps, const depth_alignment& aligned, bool is_frozen,
-                               FollowRows&& follow_rows);
+                               const row_follower& follow_rows);
   /// Where the depth of a frame that was tracked by `inliers` landmarks does not fit its pose, but another one: from
   /// there. Returns as `localize`.
-  template <class FollowRows>
-  std::size_t settle(frame_type& f, atlas_type& maps, std::size_t inliers, bool is_frozen, FollowRows&& follow_rows);
+  std::size_t settle(frame_type& f, atlas_type& maps, std::size_t inliers, bool is_frozen,
+                     const row_follower& follow_rows);
   /// Takes a pose from depth alone. False if that is not sure, or leaves a direction of it free.
   bool hold_by_depth(frame_type& f, const depth_alignment& aligned);
 
@@ -231,7 +185,7 @@ class front_end {
   std::optional<shutter_observer> observer_;
   std::vector<row_observation> rows_;  ///< its memory is used again
   early_depth_twist early_depth_;
-  frame_type unsettled_;               ///< the same
+  frame_type unsettled_;  ///< the same
 
   double held_since_ = 0.0;  ///< when the last frame was tracked whose pose depth did not hold, seconds
 
@@ -239,17 +193,81 @@ class front_end {
   bool begins_map_ = false;
   std::optional<map_keyframe> first_keyframe_;
   std::vector<start_point> start_points_;  ///< of both, in the world, until the second one is a keyframe
-  std::optional<double> lost_since_;  ///< time stamp; empty: since the next frame
-  map_keyframe reference_;            ///< the keyframe that the current frame shares most with
-  frame_type last_;                   ///< the last frame that was tracked
-  map_keyframe last_reference_;       ///< its reference ...
-  double last_scale_ = 1.0;           ///< of that keyframe, when the frame was last looked at
-  se3 T_reference_last_;              ///< ... and its pose relative to that, in lengths over its scale
-  landmark_id first_new_;             ///< landmarks from this on were made of the last frame; `no_id`: none were
+  std::optional<double> lost_since_;       ///< time stamp; empty: since the next frame
+  map_keyframe reference_;                 ///< the keyframe that the current frame shares most with
+  frame_type last_;                        ///< the last frame that was tracked
+  map_keyframe last_reference_;            ///< its reference ...
+  double last_scale_ = 1.0;                ///< of that keyframe, when the frame was last looked at
+  se3 T_reference_last_;                   ///< ... and its pose relative to that, in lengths over its scale
+  landmark_id first_new_;                  ///< landmarks from this on were made of the last frame; `no_id`: none were
   motion_model motion_;
   track_counters counters_;
   frame_log log_;
 };
+
+// The members are defined outside of the class, so that a compiled instantiation of it (`extern template`) covers them.
+
+template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
+front_end<Camera, D, Matchers, Sensor>::front_end(const camera_rig<Camera>& rig, const options& settings)
+    : tracker_{rig, settings},
+      moving_{rig, settings},
+      depth_{rig, settings.depth_term},
+      start_{rig, settings.start, settings.seed},
+      rig_{rig},
+      options_{settings},
+      shutter_{settings.shutter} {
+  if (settings.estimates_shutter) observer_.emplace();
+}
+
+template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
+void front_end<Camera, D, Matchers, Sensor>::update_reference(const frame_type& f, const atlas_type& maps) {
+  if (!maps.active().keyframes().empty())
+    reference_ = {maps.active_id(), most_shared(maps.active(), f, reference_.keyframe)};
+}
+
+template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
+bool front_end<Camera, D, Matchers, Sensor>::needs_keyframe(const frame_type& f, std::size_t inliers,
+                                                            const atlas_type& maps) const {
+  if (begins_map()) return true;
+  if (f.held_by_depth)
+    return f.timestamp - held_since_ >= options_.keyframes.interval && Sensor::begins_map(f, options_) > 0;
+  return is_keyframe_due(gather_evidence(maps.active(), f, reference_.keyframe, inliers, options_, rig_.scale_is_known),
+                         options_.keyframes);
+}
+
+template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
+map_keyframe front_end<Camera, D, Matchers, Sensor>::make_keyframe(frame_type& f, atlas_type& maps) {
+  basic_map<D>& m = maps.active();
+  first_new_ = m.landmark_end();
+  const keyframe_id id = insert_keyframe(m, f, options_);
+  for (const start_point& p : std::exchange(start_points_, {})) {
+    const landmark_id l = m.add_landmark(id, p.second, p.position);
+    m.add_observation(l, first_keyframe_->keyframe, p.first);
+    m.update_landmark(l);
+  }
+  f.landmarks = m.at(id).landmarks;
+  return reference_ = {maps.active_id(), id};
+}
+
+template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
+std::size_t front_end<Camera, D, Matchers, Sensor>::track_local_map(frame_type& f, basic_map<D>& m, double radius,
+                                                                    bool is_frozen) {
+  return tracker_.on_local_map(
+      f, m, reference_.keyframe, radius, moving_, [&](landmark_id l) { is_frozen ? void() : m.count_visible(l); },
+      [&](landmark_id l) { is_frozen ? void() : m.count_found(l); });
+}
+
+template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
+std::size_t front_end<Camera, D, Matchers, Sensor>::drop_disagreeing(frame_type& f, const basic_map<D>& m) const {
+  const se3 T_camera_world = f.T_world_camera.inverse();
+  std::size_t left = 0;
+  for (std::size_t i = 0; i != f.size(); ++i) {
+    landmark_id& l = f.landmarks[i];
+    if (l != no_id && !agrees(rig_, f, T_camera_world, i, m.landmark_at(l).position)) l = no_id;
+    left += l != no_id;
+  }
+  return left;
+}
 
 template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
 se3 front_end<Camera, D, Matchers, Sensor>::last_pose(const atlas_type& maps) const {
@@ -295,9 +313,9 @@ void front_end<Camera, D, Matchers, Sensor>::sync_with_map(const atlas_type& map
 }
 
 template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
-template <class FollowRows, class Similar, class Drop>
 std::size_t front_end<Camera, D, Matchers, Sensor>::localize(frame_type& f, atlas_type& maps, bool is_frozen,
-                                                             FollowRows&& follow_rows, Similar&& similar, Drop&& drop) {
+                                                             const row_follower& follow_rows,
+                                                             const appearance_search& similar, const map_drop& drop) {
   first_new_ = no_id;
   begins_map_ = false;
   first_keyframe_.reset();
@@ -324,8 +342,7 @@ std::size_t front_end<Camera, D, Matchers, Sensor>::localize(frame_type& f, atla
 }
 
 template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
-template <class Drop>
-std::size_t front_end<Camera, D, Matchers, Sensor>::begin_map(frame_type& f, atlas_type& maps, Drop&& drop) {
+std::size_t front_end<Camera, D, Matchers, Sensor>::begin_map(frame_type& f, atlas_type& maps, const map_drop& drop) {
   std::size_t points = Sensor::begins_map(f, options_);
   if (points == 0) return 0;
   std::optional<monocular_start_result<D>> start;
@@ -345,8 +362,7 @@ std::size_t front_end<Camera, D, Matchers, Sensor>::begin_map(frame_type& f, atl
 }
 
 template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
-template <class Drop>
-void front_end<Camera, D, Matchers, Sensor>::enter_new_map(atlas_type& maps, Drop&& drop) {
+void front_end<Camera, D, Matchers, Sensor>::enter_new_map(atlas_type& maps, const map_drop& drop) {
   if (state_ == track_state::not_started) return;
   const map_id before = maps.active_id();
   maps.create();
@@ -376,9 +392,8 @@ void front_end<Camera, D, Matchers, Sensor>::add_start(monocular_start_result<D>
 }
 
 template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
-template <class FollowRows>
 std::size_t front_end<Camera, D, Matchers, Sensor>::track_from_last(frame_type& f, atlas_type& maps, bool is_frozen,
-                                                                    FollowRows&& follow_rows) {
+                                                                    const row_follower& follow_rows) {
   const se3 predicted = motion_.predict({last_.timestamp, last_.T_world_camera}, f.timestamp);
   if (!shutter_.is_global()) {
     f.T_world_camera = predicted;
@@ -401,9 +416,9 @@ std::size_t front_end<Camera, D, Matchers, Sensor>::track_from_last(frame_type& 
 }
 
 template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
-template <class FollowRows, class Similar>
 std::size_t front_end<Camera, D, Matchers, Sensor>::relocalize(frame_type& f, atlas_type& maps, bool is_frozen,
-                                                               FollowRows&& follow_rows, Similar&& similar) {
+                                                               const row_follower& follow_rows,
+                                                               const appearance_search& similar) {
   moving_.clear();
   std::vector<map_keyframe> candidates = similar(f.features, options_.recovery.candidates);
   if (reference_.map == maps.active_id() && maps.active().has_keyframe(reference_.keyframe) &&
@@ -423,9 +438,8 @@ std::size_t front_end<Camera, D, Matchers, Sensor>::relocalize(frame_type& f, at
 }
 
 template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
-template <class FollowRows>
 std::size_t front_end<Camera, D, Matchers, Sensor>::search_in_place(frame_type& f, atlas_type& maps, bool is_frozen,
-                                                                    FollowRows&& follow_rows) {
+                                                                    const row_follower& follow_rows) {
   const bool is_here = last_.size() != 0 && reference_.map == maps.active_id() && maps.has(reference_);
   const bool is_recent = f.timestamp - last_.timestamp < options_.recovery.new_map_after;
   if (!is_here || (is_frozen && !is_recent) || Sensor::begins_map(f, options_) == 0) return 0;
@@ -433,9 +447,8 @@ std::size_t front_end<Camera, D, Matchers, Sensor>::search_in_place(frame_type& 
 }
 
 template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
-template <class FollowRows>
 std::size_t front_end<Camera, D, Matchers, Sensor>::track_found(frame_type& f, atlas_type& maps, bool is_frozen,
-                                                                FollowRows&& follow_rows) {
+                                                                const row_follower& follow_rows) {
   const std::size_t inliers = track_local_map(f, maps.active(), 3.0 * options_.search_radius, is_frozen);
   if (inliers < options_.recovery.min_inliers) return 0;
   refine_motion(f, maps, false, follow_rows);
@@ -444,9 +457,8 @@ std::size_t front_end<Camera, D, Matchers, Sensor>::track_found(frame_type& f, a
 }
 
 template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
-template <class FollowRows>
 void front_end<Camera, D, Matchers, Sensor>::refine_motion(frame_type& f, const atlas_type& maps, bool is_next,
-                                                           FollowRows&& follow_rows) {
+                                                           const row_follower& follow_rows) {
   const basic_map<D>& m = maps.active();
   const bool rolls = !shutter_.is_global();
   const bool with_depth = depth_.surround(maps, f.T_world_camera) && options_.depth_term.enabled;
@@ -501,10 +513,9 @@ std::optional<depth_alignment> front_end<Camera, D, Matchers, Sensor>::align_dep
 }
 
 template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
-template <class FollowRows>
 std::size_t front_end<Camera, D, Matchers, Sensor>::track_from_depth(frame_type& f, atlas_type& maps,
                                                                      const depth_alignment& aligned, bool is_frozen,
-                                                                     FollowRows&& follow_rows) {
+                                                                     const row_follower& follow_rows) {
   f.T_world_camera = aligned.at.T_world_camera;
   moving_.clear();
   if (!shutter_.is_global()) {
@@ -530,9 +541,8 @@ std::size_t front_end<Camera, D, Matchers, Sensor>::track_from_depth(frame_type&
 }
 
 template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
-template <class FollowRows>
 std::size_t front_end<Camera, D, Matchers, Sensor>::settle(frame_type& f, atlas_type& maps, std::size_t inliers,
-                                                           bool is_frozen, FollowRows&& follow_rows) {
+                                                           bool is_frozen, const row_follower& follow_rows) {
   // Where something moves in the view, that is what does not fit.
   if (!options_.depth_term.recovers || moving_.size() != 0 || !depth_.is_surrounded()) return inliers;
   const association seen = depth_.agreement({f.T_world_camera, f.twist}, shutter_);

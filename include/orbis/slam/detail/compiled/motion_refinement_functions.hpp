@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// The functions of motion_refinement.hpp that no camera enters: inline, or, with ORBIS_COMPILED, compiled once, by
+/// cmake/compiled/slam_motion.cpp.
+#pragma once
+
+#include <array>
+#include <cmath>
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+
+#include <orbis/core/compiled_once.hpp>
+#include <orbis/core/se3.hpp>
+#include <orbis/core/types.hpp>
+#include <orbis/slam/detail/shutter/motion_refinement.hpp>
+
+namespace orbis::slam::detail {
+
+ORBIS_COMPILED_ONCE vec6 twist_prior::expected(const se3& T_camera_world) const {
+  if (!T_world_before) return vec6::Zero();
+  const vec6 mean = (T_camera_world * *T_world_before).inverse().log() / interval;
+  return mean + trend * (mean - twist_before);
+}
+
+ORBIS_COMPILED_ONCE void pose_quadratic::hold_twist() {
+  h.rightCols<6>().setZero();
+  h.bottomRows<6>().setZero();
+  g.tail<6>().setZero();
+}
+
+ORBIS_COMPILED_ONCE void add_terms(moving_pose_equations& e, const std::array<mat6, 3>& h, const std::array<vec6, 2>& g,
+                                   const se3& T_camera_world, const vec6& twist, const twist_prior& prior,
+                                   const refinement_terms& terms) {
+  e.h << h[0], h[1], h[1], h[2];
+  e.g << g[0], g[1];
+  if (terms.other != nullptr) {
+    const pose_quadratic& q = *terms.other;
+    matrix<12, 1> step;
+    step << (T_camera_world * q.at.T_world_camera).log(), twist - q.at.twist;
+    const matrix<12, 1> slope = q.h * step;
+    e.h += q.h;
+    e.g += q.g + slope;
+    e.cost += q.cost + step.dot(q.g + 0.5 * slope);
+  }
+  if (!terms.moves) return;
+
+  const vec6 error = twist - prior.expected(T_camera_world);
+  const double by_pose = prior.T_world_before ? (1.0 + prior.trend) / prior.interval : 0.0;  // to first order
+  for (int i = 0; i != 6; ++i) {
+    const double deviation = i < 3 ? prior.translation_deviation : prior.rotation_deviation;
+    const double weight = 1.0 / (deviation * deviation);
+    e.cost += 0.5 * weight * error[i] * error[i];
+    e.h(i, i) += weight * by_pose * by_pose;
+    e.h(i, 6 + i) += weight * by_pose;
+    e.h(6 + i, i) += weight * by_pose;
+    e.h(6 + i, 6 + i) += weight;
+    e.g[i] += weight * by_pose * error[i];
+    e.g[6 + i] += weight * error[i];
+  }
+}
+
+ORBIS_COMPILED_ONCE matrix<12, 1> newton_step(const moving_pose_equations& e, bool moves) {
+  if (moves) return e.h.ldlt().solve(-e.g);
+  matrix<12, 1> step = matrix<12, 1>::Zero();
+  step.head<6>() = e.h.topLeftCorner<6, 6>().ldlt().solve(-e.g.head<6>());
+  return step;
+}
+
+[[nodiscard]] inline vec6 deviations_of(const twist_prior& prior) {
+  vec6 d;
+  d << vec3::Constant(prior.translation_deviation), vec3::Constant(prior.rotation_deviation);
+  return d;
+}
+
+ORBIS_COMPILED_ONCE void early_depth_twist::determine(const std::array<mat6, 3>& h, const twist_prior& prior) {
+  pose_covariance_ = h[0].inverse();
+  if (!prior.T_world_before) return;
+  // The prior ties the twist to both poses, of which the former one is not exact either.
+  const double by_pose = (1.0 + prior.trend) / prior.interval;
+  const mat6 tie =
+      (mat6(deviations_of(prior).cwiseAbs2().asDiagonal()) + by_pose * by_pose * former_covariance_).inverse();
+  const mat6 mixed = h[1] + by_pose * tie;
+  const mat6 of_twist = h[2] + tie - mixed.transpose() * (h[0] + by_pose * by_pose * tie).inverse() * mixed;
+  // From one frame to the next a twist changes by twice the deviation of the prior, which is that from the mean.
+  const mat6 change = mat6((2.0 * deviations_of(prior)).cwiseAbs2().asDiagonal());
+  gain_ = change * (change + of_twist.inverse()).inverse();
+}
+
+ORBIS_COMPILED_ONCE vec6 early_depth_twist::between(const twist_prior& prior, const vec6& refined) const {
+  if (!prior.T_world_before || !gain_.allFinite()) return refined;
+  return prior.twist_before + gain_ * (refined - prior.twist_before);
+}
+
+}  // namespace orbis::slam::detail
