@@ -6,15 +6,26 @@
 #include <optional>
 #include <string>
 
-#include <orbis/slam/any_system.hpp>
+#include <orbis/slam/calibration.hpp>
+#include <orbis/slam/map.hpp>
+#include <orbis/slam/options.hpp>
 
 namespace app {
 
-/// What the user should know where the images of the active map fit another focal length clearly better than the
-/// camera's; empty where they do not, or do not tell. Poses of a wrong camera are some percent too near to each other
-/// or too far apart. A small self-calibration: some tenths of a second.
-[[nodiscard]] std::optional<std::string> doubt_focal_length(const orbis::slam::any_system& slam,
-                                                            const orbis::camera::any_camera& camera,
-                                                            const orbis::slam::options& options);
+/// That images fit another focal length clearly better than the camera's, pixels.
+struct focal_doubt {
+  double given, found;
+};
+
+/// Of a calibration by a map; empty where it does not tell.
+[[nodiscard]] std::optional<focal_doubt> find_doubt(
+    const orbis::slam::calibration<orbis::camera::any_camera>& calibrated);
+/// Of a map made with the camera. Poses of a wrong camera are some percent too near to each other or too far apart. A
+/// small self-calibration: some tenths of a second.
+[[nodiscard]] std::optional<focal_doubt> find_doubt(const orbis::slam::map& map,
+                                                    const orbis::camera::any_camera& camera,
+                                                    const orbis::slam::options& options);
+/// What the user should know.
+[[nodiscard]] std::string in_words(const focal_doubt& doubt);
 
 }  // namespace app

@@ -197,8 +197,21 @@ void add_switch(CLI::App& cmd, const std::string& name, bool& value, const std::
       ->type_name("W");
 }
 
+void add_intrinsics_option(CLI::App& cmd, settings& s) {
+  cmd.add_option_function<std::string>(
+         "--intrinsics", [&s](const std::string& value) { s.refines_camera = value == "auto"; },
+         "auto: where the first ten seconds are looked at (see --read-out-ms) and clearly do not fit the focal length "
+         "of the recording's camera, it is calibrated by the recording first; given: the camera is as it is said to "
+         "be, "
+         "as with --camera")
+      ->check(CLI::IsMember({"auto", "given"}))
+      ->default_str("auto")
+      ->type_name("W");
+}
+
 void add_slam_options(CLI::App& cmd, settings& s) {
   add_shutter_option(cmd, s);
+  if (cmd.get_name() == "run") add_intrinsics_option(cmd, s);
   add_switch(cmd, "--moving", s.moving,
              "tell who moves before the camera from the room, and leave them out of tracking and map");
   add_switch(cmd, "--depth-term", s.depth_term,

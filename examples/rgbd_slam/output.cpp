@@ -51,6 +51,7 @@ results begin_results(const settings& s, const std::string& title, const frame_s
                          std::string{camera.model.model_name()} + ", " + std::to_string(k.width) + " x " +
                              std::to_string(k.height) + number(", fx %.1f", k.fx) + number(", fy %.1f", k.fy) +
                              number(", cx %.1f", k.cx) + number(", cy %.1f", k.cy) +
+                             (source->camera_is_refined ? " (refined by the recording)" : "") +
                              (source->is_monocular() ? "" : number(", depth / %g = metres", camera.depth_scale)));
     r.setup.emplace_back("frames", source->is_live
                                        ? "as they come"

@@ -2,6 +2,7 @@
 //
 // The whole program in one screen; each call stands in a small file beside this one.
 #include "accuracy.hpp"
+#include "camera_stage.hpp"
 #include "commands.hpp"
 #include "interrupts.hpp"
 #include "map_stage.hpp"
@@ -17,9 +18,10 @@ exit_code run_slam(settings s, console& console) {
   const auto give_up = [&](const orbis::error& e) { return console.error(e), bad_input; };
 
   // Read.
-  const auto source = open_source(s, console);
+  auto source = open_source(s, console);
   if (!source) return give_up(source.error());
   if (const auto lost = find_overwritten(s, inputs_of(s, source->files))) return console.error(*lost), bad_usage;
+  const shutter_results shutter = get_to_know_camera(*source, s, console);
   auto shown = viewer::open(s, *source, console);
   if (!shown) return console.error(shown.error()), bad_usage;
   auto files = result_files::begin(s);
@@ -27,7 +29,7 @@ exit_code run_slam(settings s, console& console) {
   results r = begin_results(s, source->title, &*source, files->folder());
 
   // Track; some frames become keyframes.
-  const auto attempt = track(*source, s, files->landmark_map(), files->folder() / spill_name, *shown, console);
+  const auto attempt = track(*source, shutter, s, files->landmark_map(), files->folder() / spill_name, *shown, console);
   if (!attempt) return give_up(attempt.error());
   const tracked_frames& tracked = *attempt;
   if (source->rest) source->rest();

@@ -81,6 +81,12 @@ struct shutter_results {
   double delay_deviation = std::numeric_limits<double>::quiet_NaN();     ///< likewise
 };
 
+/// The camera's intrinsics that were used, pixels.
+struct intrinsics_results {
+  std::string from;  ///< "given", or "refined" by the recording
+  double fx = 0.0, fy = 0.0, cx = 0.0, cy = 0.0;
+};
+
 /// Frames one after the other.
 struct frame_range {
   std::size_t first = 0, count = 0;
@@ -95,6 +101,7 @@ struct slam_results {
   std::optional<std::size_t> dropped;  ///< frames of a camera that came while tracking was busy; empty: no camera
   std::size_t loops_closed = 0, maps_merged = 0, keyframes_culled = 0;
   shutter_results shutter;
+  intrinsics_results intrinsics;
   std::vector<frame_range> lost_stretches;
   std::vector<double> tracking_ms;  ///< of each frame: until tracking is ready for the next one
   std::vector<double> slam_ms;      ///< of it, in SLAM

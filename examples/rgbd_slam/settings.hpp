@@ -49,6 +49,7 @@ struct settings {
 
   std::optional<double> read_out_ms;     ///< of the camera's images, milliseconds; empty: as the camera's settings say,
                                          ///< or estimated
+  bool refines_camera = true;            ///< where the recording does not fit it
   bool distortion = false;               ///< of the lens, is estimated where the camera has none (calibrate)
   double resolution = 0.05;              ///< octree, metres
   std::optional<double> max_depth;       ///< depth beyond this is left out of the map, metres; empty: `usual_max_depth`

@@ -24,26 +24,27 @@ std::string milliseconds(double seconds, const char* format = "%.1f") {
 
 }  // namespace
 
-shutter_results find_shutter(const frame_source& source, const settings& s, console& console) {
-  shutter_results result;
+first_look find_shutter(const frame_source& source, const settings& s, console& console) {
+  first_look look;
+  shutter_results& result = look.shutter;
   if (source.is_monocular()) {  // what is known of motion while an image is read is in metres
     result.from = "camera";
-    return result;
+    return look;
   }
   if (s.read_out_ms) {
     result.from = "given";
     result.shutter.color_read_out = result.shutter.depth_read_out = 0.001 * *s.read_out_ms;
-    return result;
+    return look;
   }
   if (source.camera.shutter) {
     result.from = "camera";
     result.shutter = *source.camera.shutter;
-    return result;
+    return look;
   }
   // Only depth tells, and a camera shows its first seconds once.
   if (source.sensor != orbis::slam::sensor_kind::rgbd || source.is_live) {
     result.from = "camera";
-    return result;
+    return look;
   }
   result.from = "estimated";
   console.stage("shutter");
@@ -65,7 +66,10 @@ shutter_results find_shutter(const frame_source& source, const settings& s, cons
   result.read_out_deviation = found.read_out_deviation;
   result.delay_deviation = found.delay_deviation;
   console.finish(in_words(result));
-  return result;
+  const orbis::slam::map_id most = slam.largest_map();
+  look.doubt = slam.inspect(
+      [&](const orbis::slam::atlas& maps) { return find_doubt(maps.at(most), source.camera.model, options); });
+  return look;
 }
 
 std::string in_words(const shutter_results& r) {

@@ -3,8 +3,10 @@
 /// When the rows of the camera's images are taken: as it is said, or as the first seconds of the recording tell.
 #pragma once
 
+#include <optional>
 #include <string>
 
+#include "camera_check.hpp"
 #include "console.hpp"
 #include "results.hpp"
 #include "settings.hpp"
@@ -12,9 +14,14 @@
 
 namespace app {
 
+struct first_look {
+  shutter_results shutter;
+  std::optional<focal_doubt> doubt;  ///< of those seconds' map, where they were looked at
+};
+
 /// As `--read-out-ms` says, otherwise as the camera's settings do, otherwise estimated from the first ten seconds,
 /// which are tracked for this alone. Frames that cannot be read end that.
-[[nodiscard]] shutter_results find_shutter(const frame_source& source, const settings& s, console& console);
+[[nodiscard]] first_look find_shutter(const frame_source& source, const settings& s, console& console);
 
 /// In words, with its deviation where it was estimated.
 [[nodiscard]] std::string in_words(const shutter_results& shutter);

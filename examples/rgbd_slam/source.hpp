@@ -30,6 +30,7 @@ struct source_frame : orbis::camera::rgbd_frame {
 struct frame_source {
   std::string title, kind;
   orbis::camera::camera_settings camera;
+  bool camera_is_refined = false;  ///< by the recording itself
   orbis::slam::sensor_kind sensor = orbis::slam::sensor_kind::rgbd;
   [[nodiscard]] bool is_stereo() const { return sensor == orbis::slam::sensor_kind::stereo; }
   /// One camera without depth: lengths are in a unit of their own, and there is no dense map.

@@ -77,6 +77,11 @@ std::string summary_json(const results& r) {
                   {"depth_read_out_ms", s ? milliseconds(s->shutter.shutter.depth_read_out) : null},
                   {"depth_delay_ms", s ? milliseconds(s->shutter.shutter.depth_delay) : null},
                   {"depth_delay_deviation_ms", s ? milliseconds(s->shutter.delay_deviation) : null}};
+  j["intrinsics"] = {{"from", s ? json(s->intrinsics.from) : null},
+                     {"fx", s ? json(s->intrinsics.fx) : null},
+                     {"fy", s ? json(s->intrinsics.fy) : null},
+                     {"cx", s ? json(s->intrinsics.cx) : null},
+                     {"cy", s ? json(s->intrinsics.cy) : null}};
   j["other_maps"] = json::array();
   for (std::size_t i = 0; s && i != s->other_maps.size(); ++i) {
     const auto& poses = s->other_maps[i];

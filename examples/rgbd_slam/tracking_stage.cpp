@@ -10,11 +10,9 @@
 
 #include <orbis/slam/any_system.hpp>
 
-#include "camera_check.hpp"
 #include "corrected_frame.hpp"
 #include "interrupts.hpp"
 #include "result_files.hpp"
-#include "shutter_stage.hpp"
 #include "slam_options.hpp"
 #include "standing_frame.hpp"
 #include "upright_world.hpp"
@@ -260,10 +258,9 @@ std::string in_words(const slam_results& slam) {
 
 }  // namespace
 
-orbis::result<tracked_frames> track(const frame_source& source, const settings& s,
+orbis::result<tracked_frames> track(const frame_source& source, const shutter_results& shutter, const settings& s,
                                     const std::filesystem::path& landmark_map, const std::filesystem::path& spill_file,
                                     viewer& viewer, console& console) {
-  const shutter_results shutter = find_shutter(source, s, console);
   console.stage("tracking");
   orbis::slam::options options = options_for(source, s);
   options.shutter = shutter.shutter;
@@ -301,8 +298,11 @@ orbis::result<tracked_frames> track(const frame_source& source, const settings& 
 
   collect(slam, out);
   out.slam.shutter = shutter;
+  const auto& k = source.camera.model.k();
+  out.slam.intrinsics = {source.camera_is_refined ? "refined" : "given", k.fx, k.fy, k.cx, k.cy};
   if (source.sensor == orbis::slam::sensor_kind::rgbd && s.load_map.empty())
-    out.camera_doubt = doubt_focal_length(slam, source.camera.model, options);
+    out.camera_doubt = slam.inspect(
+        [&](const orbis::slam::atlas& maps) { return find_doubt(maps.active(), source.camera.model, options); });
   if (goes_on)
     out.world = {"loaded map", {}};
   else if (!out.slam.trajectory.empty())
@@ -370,7 +370,7 @@ std::vector<std::string> tracking_notes(const tracked_frames& tracked, const set
         "one camera without depth: lengths are in a unit of their own, and there is no cloud and no octree");
   else if (!s.localize_only && tracked.slam.tracked != 0 && tracked.keyframes.size() == 0)
     notes.emplace_back("no cloud and no octree: the loaded map shows all that was seen, so no frame became a keyframe");
-  if (tracked.camera_doubt) notes.push_back(*tracked.camera_doubt);
+  if (tracked.camera_doubt) notes.push_back(in_words(*tracked.camera_doubt));
   for (std::string& note : mapping_notes(tracked.keyframes, tracked.world)) notes.push_back(std::move(note));
   return notes;
 }

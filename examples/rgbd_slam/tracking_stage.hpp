@@ -11,6 +11,7 @@
 
 #include <orbis/core/result.hpp>
 
+#include "camera_check.hpp"
 #include "console.hpp"
 #include "live_stage.hpp"
 #include "posed_frames.hpp"
@@ -28,15 +29,15 @@ struct tracked_frames {
   std::unique_ptr<live_mapping> live;       ///< the octree that grew meanwhile, if that was asked for; stopped
   std::optional<orbis::error> stopped;      ///< why not all frames were read
   std::optional<orbis::error> unsaved;      ///< why the map of landmarks could not be saved
-  std::optional<std::string> camera_doubt;  ///< why the camera may be another than it is said to be
+  std::optional<focal_doubt> camera_doubt;  ///< that the camera may be another than it is said to be
   bool missed_map = false;                  ///< a map was loaded, and the camera never found in it
 };
 
 /// Tracks the source's frames, up to the first that cannot be read, or to Ctrl-C. Errors: a map that cannot be loaded.
 /// `viewer` is shown what goes on. `landmark_map`: where the map of landmarks is written, if it is to be saved.
 /// `spill_file`: see posed_frames.
-[[nodiscard]] orbis::result<tracked_frames> track(const frame_source& source, const settings& s,
-                                                  const std::filesystem::path& landmark_map,
+[[nodiscard]] orbis::result<tracked_frames> track(const frame_source& source, const shutter_results& shutter,
+                                                  const settings& s, const std::filesystem::path& landmark_map,
                                                   const std::filesystem::path& spill_file, viewer& viewer,
                                                   console& console);
 

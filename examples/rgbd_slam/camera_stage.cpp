@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "camera_stage.hpp"
+
+#include <cstdio>
+
+#include "calibration_rounds.hpp"
+#include "shutter_stage.hpp"
+
+namespace app {
+
+shutter_results get_to_know_camera(frame_source& source, const settings& s, console& console) {
+  const first_look look = find_shutter(source, s, console);
+  if (!look.doubt || !s.refines_camera || !s.camera.empty() || !s.load_map.empty()) return look.shutter;
+  const auto found = calibrate_by(source, s, look.shutter.shutter, source.camera.model, {2, 60.0}, console);
+  constexpr double enough = 0.9;  // of the error before
+  if (!found || !(found->last.final_rms < enough * found->initial_rms)) return look.shutter;
+  auto all_rounds = found->last;
+  all_rounds.parameters = found->parameters;
+  const auto change = find_doubt(all_rounds);
+  if (!change) return look.shutter;
+  source.camera.model = found->last.camera;
+  source.camera_is_refined = true;
+  char text[240];
+  std::snprintf(
+      text, sizeof text,
+      "the images do not fit the camera's focal length of %.1f pixels: used is the camera that they fit, with "
+      "%.1f (--intrinsics given keeps the camera; rgbd_slam calibrate writes a file)",
+      change->given, change->found);
+  console.warn(source.notes.emplace_back(text));
+  return look.shutter;
+}
+
+}  // namespace app
