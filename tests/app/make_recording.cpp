@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// make_recording FOLDER FRAMES WIDTH: a synthetic recording as a folder in TUM's format.
+// make_recording FOLDER FRAMES WIDTH [READ_OUT_MS]: a synthetic recording as a folder in TUM's format; with a read-out, by
+// a hand that shakes.
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
@@ -12,11 +13,16 @@
 #include <orbis/io/trajectory_file.hpp>
 
 int main(int argc, char** argv) {
-  if (argc != 4) return 1;
+  if (argc != 4 && argc != 5) return 1;
   const std::filesystem::path folder = argv[1];
   const int width = std::atoi(argv[3]);
-  const orbis::io::synthetic_recording recording{
-      {.frames = std::atoi(argv[2]), .width = width, .height = width / 4 * 3, .frames_around = 360}};
+  orbis::io::synthetic_options options{
+      .frames = std::atoi(argv[2]), .width = width, .height = width / 4 * 3, .frames_around = 360};
+  if (argc == 5) {
+    options.path.jitter = 5.0;
+    options.sensor.shutter.color_read_out = options.sensor.shutter.depth_read_out = 0.001 * std::atof(argv[4]);
+  }
+  const orbis::io::synthetic_recording recording{options};
 
   std::filesystem::create_directories(folder / "rgb");
   std::filesystem::create_directories(folder / "depth");
@@ -36,6 +42,7 @@ int main(int argc, char** argv) {
   camera << "model = \"pinhole\"\nwidth = " << k.width << "\nheight = " << k.height << "\nfx = " << k.fx
          << "\nfy = " << k.fy << "\ncx = " << k.cx << "\ncy = " << k.cy << "\ndepth_scale = " << settings.depth_scale
          << "\nfps = " << settings.fps << '\n';
+  if (argc == 5) camera << "read_out_ms = " << argv[4] << "\ndepth_read_out_ms = " << argv[4] << '\n';
   if (!orbis::io::write_trajectory(folder / "groundtruth.txt", recording.ground_truth())) return 1;
   return colors && depths && camera ? 0 : 1;
 }

@@ -45,6 +45,22 @@ summary(free ${WORK}/out octree free)
 check(free GREATER 100)
 check(NOT EXISTS ${WORK}/out/trajectory.txt)
 
+# A rolling shutter that the camera file knows of: the walls become less thick than without it.
+foreach(read_out 0 40)
+  make_recording(${WORK}/read_${read_out} 30 160 ${read_out})
+  app(0 map read_${read_out} --out out --resolution 0.05 --filter none --quiet)
+  summary(occupied_${read_out} ${WORK}/out octree occupied)
+endforeach()
+file(STRINGS ${WORK}/read_40/camera.toml camera)
+list(FILTER camera EXCLUDE REGEX read_out)
+list(JOIN camera "\n" camera)
+file(WRITE ${WORK}/unknown.toml "${camera}\n")
+app(0 map read_40 --camera unknown.toml --out out --resolution 0.05 --filter none --quiet)
+summary(occupied ${WORK}/out octree occupied)
+math(EXPR thicker "(${occupied_40} - ${occupied_0}) * 4")
+math(EXPR unknown_thicker "(${occupied} - ${occupied_0}) * 3")
+check(thicker LESS unknown_thicker)
+
 # Every filter by its name; its name in the summary.
 foreach(filter none statistical radius log-statistical cluster ray-evidence)
   app(0 map room --out named --resolution 0.2 --quiet --filter ${filter})
