@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// make_recording FOLDER FRAMES WIDTH [READ_OUT_MS]: a synthetic recording as a folder in TUM's format; with a read-out, by
-// a hand that shakes.
+// make_recording FOLDER FRAMES WIDTH [READ_OUT_MS]: a synthetic recording as a folder in TUM's format; with a read-out,
+// by a hand that shakes.
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
