@@ -158,6 +158,23 @@ struct near_in_leaf {
   }
 };
 
+/// Writes the numbers of the leaves of `near` whose boxes are within `bound` of a point; returns how many they are. May
+/// write sixteen more.
+struct chosen_leaves {
+  template <simd::vector V, simd::vector Numbers>
+  static ORBIS_ALWAYS_INLINE std::size_t find(const nearby_leaves& near, const spread_point<V>& q, const V& bound,
+                                              std::uint32_t* chosen) noexcept {
+    std::size_t count = 0;
+    for (std::size_t first = 0; first < near.count; first += V::count) {
+      const auto within = box_distances(near.row(0), first, q, q) <= bound;
+      if constexpr (V::count == 4)
+        if (simd::none(within)) continue;
+      count += simd::compress_store(chosen + count, Numbers::load(near.leaves.data() + first), within);
+    }
+    return count;
+  }
+};
+
 /// Writes the squared distances within `bound` from a point to those of the leaves of `near` whose boxes are within
 /// `bound`, then sixteen times infinity. Returns how many they are. Ends
 /// early with more than `capacity` of them; touches no more than `capacity + 3 * leaf_width`. `scratch`: longer by
@@ -168,20 +185,44 @@ struct near_in_leaves {
                                              const std::array<float, 3>& query, float bound, std::uint32_t* scratch,
                                              float* found, std::size_t capacity) {
     using lanes = simd::native_vec<float, Target>;
-    using numbers = simd::native_vec<std::uint32_t, Target>;
     const spread_point<lanes> q{query};
     const lanes border = bound;
-    std::size_t chosen = 0;
-    for (std::size_t first = 0; first < near.count; first += lanes::count) {
-      const auto within = box_distances(near.row(0), first, q, q) <= border;
-      if constexpr (lanes::count == 4)
-        if (simd::none(within)) continue;
-      chosen += simd::compress_store(scratch + chosen, numbers::load(near.leaves.data() + first), within);
-    }
+    const std::size_t chosen =
+        chosen_leaves::find<lanes, simd::native_vec<std::uint32_t, Target>>(near, q, border, scratch);
     std::size_t count = 0;
     for (std::size_t i = 0; i != chosen; ++i) {
       count += near_in_leaf::keep(leaves[scratch[i]], q, border, found + count);
       if (count > capacity) break;
+    }
+    simd::vec<float, leaf_width, Target>(std::numeric_limits<float>::infinity()).store(found + count);
+    return count;
+  }
+};
+
+/// As `near_in_leaves`, and writes which points they are, as places in `leaf_hierarchy::members`, beside them.
+struct places_in_leaves {
+  template <simd::target Target>
+  static ORBIS_ALWAYS_INLINE std::size_t run(const point_row* leaves, const nearby_leaves& near,
+                                             const std::array<float, 3>& query, float bound, std::uint32_t* scratch,
+                                             float* found, std::uint32_t* places, std::size_t capacity) {
+    using lanes = simd::native_vec<float, Target>;
+    using numbers = simd::native_vec<std::uint32_t, Target>;
+    const spread_point<lanes> q{query};
+    const lanes border = bound;
+    const std::size_t chosen = chosen_leaves::find<lanes, numbers>(near, q, border, scratch);
+    std::size_t count = 0;
+    for (std::size_t i = 0; i != chosen && count <= capacity; ++i) {
+      const point_row& leaf = leaves[scratch[i]];
+      for (std::size_t at = 0; at != leaf_width; at += lanes::count) {
+        const lanes d = point_distances(leaf, at, q);
+        const auto within = d <= border;
+        if constexpr (lanes::count == 4)
+          if (simd::none(within)) continue;
+        const numbers place = numbers::iota() + numbers(scratch[i] * static_cast<std::uint32_t>(leaf_width) +
+                                                        static_cast<std::uint32_t>(at));
+        simd::compress_store(places + count, place, within);
+        count += simd::compress_store(found + count, d, within);
+      }
     }
     simd::vec<float, leaf_width, Target>(std::numeric_limits<float>::infinity()).store(found + count);
     return count;
@@ -352,6 +393,8 @@ struct knn_kernels {
   using gather_code = void(const box_row&, std::uint32_t, std::uint32_t, nearby_leaves&);
   using leaves_code = std::size_t(const point_row*, const nearby_leaves&, const point&, float, std::uint32_t*, float*,
                                   std::size_t);
+  using places_code = std::size_t(const point_row*, const nearby_leaves&, const point&, float, std::uint32_t*, float*,
+                                  std::uint32_t*, std::size_t);
   using leaf_code = std::size_t(const point_row&, const point&, float, float*);
   using distances_code = std::uint32_t(const point_row&, const point&, float, float*);
   using sum_code = nearest_sum(const float*, std::size_t, std::size_t, float);
@@ -359,6 +402,7 @@ struct knn_kernels {
   boxes_code* near_boxes = simd::kernel<detail::near_boxes, boxes_code>();
   gather_code* gather = simd::kernel<gather_leaves, gather_code>();
   leaves_code* near_points = simd::kernel<near_in_leaves, leaves_code>();
+  places_code* near_places = simd::kernel<places_in_leaves, places_code>();
   leaf_code* in_leaf = simd::kernel<near_in_leaf, leaf_code>();
   distances_code* distances = simd::kernel<leaf_distances, distances_code>();
   sum_code* sum_nearest = simd::kernel<detail::sum_nearest, sum_code>();
@@ -369,6 +413,7 @@ struct knn_kernels {
 ORBIS_COMPILED_KERNEL(orbis::cloud::detail::near_boxes, orbis::cloud::detail::knn_kernels::boxes_code);
 ORBIS_COMPILED_KERNEL(orbis::cloud::detail::gather_leaves, orbis::cloud::detail::knn_kernels::gather_code);
 ORBIS_COMPILED_KERNEL(orbis::cloud::detail::near_in_leaves, orbis::cloud::detail::knn_kernels::leaves_code);
+ORBIS_COMPILED_KERNEL(orbis::cloud::detail::places_in_leaves, orbis::cloud::detail::knn_kernels::places_code);
 ORBIS_COMPILED_KERNEL(orbis::cloud::detail::near_in_leaf, orbis::cloud::detail::knn_kernels::leaf_code);
 ORBIS_COMPILED_KERNEL(orbis::cloud::detail::leaf_distances, orbis::cloud::detail::knn_kernels::distances_code);
 ORBIS_COMPILED_KERNEL(orbis::cloud::detail::sum_nearest, orbis::cloud::detail::knn_kernels::sum_code);

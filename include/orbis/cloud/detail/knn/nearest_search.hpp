@@ -95,8 +95,9 @@ void for_each_within(const leaf_hierarchy& tree, const knn_kernels& kernels, con
 /// spatial databases", ACM TODS 24, 1999.
 class nearest_search {
  public:
+  /// `with_places`: it is to be found as well which points they are.
   /// @pre 0 < wanted <= points in the leaves
-  nearest_search(const leaf_hierarchy& tree, const knn_kernels& kernels, std::size_t wanted)
+  nearest_search(const leaf_hierarchy& tree, const knn_kernels& kernels, std::size_t wanted, bool with_places = false)
       : tree_{&tree},
         kernels_{kernels},
         wanted_{wanted},
@@ -106,18 +107,19 @@ class nearest_search {
         own_{192 + 2 * wanted},
         chosen_(own_.leaves.size() + leaf_width),
         found_(leaf_width * stride_),
+        places_(with_places ? leaf_width * stride_ : 0),
         hoped_{1.0F + 2.1F / std::sqrt(static_cast<float>(wanted))},
         reach_{1.35F * hoped_} {}
 
   /// Searches for the points of one leaf, then calls `f(i, found, bound)` for the i-th of them in any
   /// order. `found`: squared distances up to `bound`, the nearest among them; fewer than `wanted` where
   /// squared distances overflow; sixteen times infinity stands after them. `f` may reorder them, and
-  /// returns the `wanted`-th smallest.
+  /// returns the `wanted`-th smallest. `places_of` tells which points they are.
   template <class F>
   void visit_leaf(std::size_t l, F&& f) {
     const std::size_t size = tree_->size_of(l);
     if (!(usual_ >= 0)) {
-      const found_within first = search_alone(l, 0, found_.data());
+      const found_within first = search_alone(l, 0);
       usual_ = first.count < wanted_ ? 0.0F : first.bound;
     }
     std::array<float, 2 * leaf_width> largest;
@@ -132,6 +134,12 @@ class nearest_search {
     // The median: an outlier says nothing about its neighbours.
     const float median = kernels_.sum_nearest(largest.data(), size, size / 2 + 1, most).largest_squared;
     if (median <= most) usual_ = median;
+  }
+
+  /// Which points were found for the i-th of the leaf that is being visited, in the order of `found`, as places in
+  /// `leaf_hierarchy::members`; null where that is not known, as for outliers.
+  [[nodiscard]] const std::uint32_t* places_of(std::size_t i) const noexcept {
+    return results_[i].has_places ? places_.data() + i * stride_ : nullptr;
   }
 
   /// Calls `f(member, squared distance)` for every point within `bound` of the i-th of the leaf that is being
@@ -166,6 +174,7 @@ class nearest_search {
   struct found_within {
     std::size_t count;
     float bound;
+    bool has_places = false;
   };
   static constexpr float infinity = std::numeric_limits<float>::infinity();
   static constexpr float most = std::numeric_limits<float>::max();
@@ -193,24 +202,26 @@ class nearest_search {
     const float reach = std::min(usual_ * reach_, most);
     const bool shared = gather_near(box, reach, shared_);
     shared_reach_ = shared ? reach : -1.0F;
-    std::array<found_within, leaf_width> results;
     for (std::size_t i = first; i != last; ++i) {
-      float* const found = found_.data() + i * stride_;
       found_within result{0, hoped};
       if (shared) {
-        result.count = search_near(shared_, query(l, i), hoped, found);
-        if (result.count < wanted_) result = {search_near(shared_, query(l, i), reach, found), reach};
+        result = search_near(shared_, l, i, hoped);
+        if (result.count < wanted_) result = search_near(shared_, l, i, reach);
       }
-      if (result.count < wanted_ || result.count > capacity_) result = search_alone(l, i, found);
-      results[i] = result;
+      if (result.count < wanted_ || result.count > capacity_) result = search_alone(l, i);
+      results_[i] = result;
     }
     for (std::size_t i = first; i != last; ++i) {
-      largest[i] = f(i, std::span{found_.data() + i * stride_, results[i].count}, results[i].bound);
+      largest[i] = f(i, std::span{found_.data() + i * stride_, results_[i].count}, results_[i].bound);
     }
   }
-  [[nodiscard]] std::size_t search_near(const nearby_leaves& near, const std::array<float, 3>& q, float bound,
-                                        float* found) {
-    return kernels_.near_points(tree_->leaves.data(), near, q, bound, chosen_.data(), found, capacity_);
+  [[nodiscard]] found_within search_near(const nearby_leaves& near, std::size_t l, std::size_t i, float bound) {
+    const point_row* const leaves = tree_->leaves.data();
+    const std::array<float, 3> q = query(l, i);
+    float* const found = found_.data() + i * stride_;
+    if (places_.empty()) return {kernels_.near_points(leaves, near, q, bound, chosen_.data(), found, capacity_), bound};
+    std::uint32_t* const places = places_.data() + i * stride_;
+    return {kernels_.near_places(leaves, near, q, bound, chosen_.data(), found, places, capacity_), bound, true};
   }
 
   [[nodiscard]] bool gather_near(const box3& box, float bound, nearby_leaves& near) {
@@ -218,8 +229,9 @@ class nearest_search {
   }
 
   /// The `wanted` nearest and perhaps some more; fewer where squared distances overflow.
-  [[nodiscard]] found_within search_alone(std::size_t l, std::size_t i, float* found) {
+  [[nodiscard]] found_within search_alone(std::size_t l, std::size_t i) {
     const std::array<float, 3> q = query(l, i);
+    float* const found = found_.data() + i * stride_;
     const std::size_t side = wanted_ / leaf_width + 1;
     const std::size_t begin = l - std::min(l, side);
     const std::size_t end = std::min(l + side + 1, tree_->leaves.size());
@@ -232,7 +244,7 @@ class nearest_search {
     float bound = kernels_.sum_nearest(found, result.count, wanted_, most).largest_squared;
     if (!gather_near({q, q}, bound, own_)) return search_outwards(q, found);
     for (;;) {
-      result = {search_near(own_, q, bound, found), bound};
+      result = search_near(own_, l, i, bound);
       if (result.count <= capacity_) return result;
       // Too many: of those seen so far, enough are nearer.
       bound = kernels_.sum_nearest(found, result.count, wanted_, bound).largest_squared;
@@ -293,8 +305,10 @@ class nearest_search {
   nearby_leaves own_;     ///< of one point
   std::vector<std::uint32_t> chosen_;
   std::vector<float> found_;
+  std::vector<std::uint32_t> places_;  ///< of what was found; empty where nobody asks
   std::vector<pending> pending_;
   std::vector<open_row> open_;
+  std::array<found_within, leaf_width> results_{};  ///< of the leaf that is being visited
   float hoped_;              ///< what of `usual_` should suffice: its scatter falls with the number of neighbours
   float reach_;              ///< what of `usual_` should suffice in any case
   float shared_reach_ = -1;  ///< squared distance from the run's box within which `shared_` is all there is

@@ -19,16 +19,24 @@
 
 namespace orbis::cloud::detail {
 
-/// Writes the nearest of what was gathered as a row, the point itself left out already.
-inline void write_row(rank_sorter& gathered, std::span<neighbor<float>> row) {
-  gathered.for_each([&](std::size_t rank, std::uint32_t index, float distance_squared) {
-    row[rank] = {index, std::sqrt(distance_squared)};
-    return rank + 1 != row.size();
+/// Writes the nearest of what was gathered, but for the point itself, as a row. Returns the squared distance to the
+/// last of them.
+inline float write_row(rank_sorter& gathered, std::uint32_t self, std::span<neighbor<float>> row) {
+  std::size_t written = 0;
+  float last = 0.0F, last_squared = 0.0F;
+  bool in_order = true;
+  gathered.for_each([&](std::size_t, std::uint32_t index, float distance_squared) {
+    if (index == self) return true;
+    const float distance = std::sqrt(distance_squared);
+    // Different squares can have the same root.
+    in_order = in_order && (written == 0 || distance != last || index > row[written - 1].index);
+    row[written++] = {index, distance};
+    last = distance;
+    last_squared = distance_squared;
+    return written != row.size();
   });
-  // Different squares can have the same root.
-  if (!std::is_sorted(row.begin(), row.end(), nearest_sink<float>::less)) {
-    std::sort(row.begin(), row.end(), nearest_sink<float>::less);
-  }
+  if (!in_order) std::sort(row.begin(), row.end(), nearest_sink<float>::less);
+  return last_squared;
 }
 
 /// For the points of the leaves [begin, end), calls `row_of(l, i)` for the i-th point of leaf `l`, writes its `width`
@@ -38,19 +46,21 @@ template <class RowOf, class Done>
 void find_neighbor_rows(const leaf_hierarchy& tree, const knn_kernels& kernels, std::size_t width, std::size_t begin,
                         std::size_t end, RowOf&& row_of, Done&& done) {
   const std::size_t wanted = width + 1;  // with the point itself
-  nearest_search search{tree, kernels, wanted};
+  nearest_search search{tree, kernels, wanted, true};
   rank_sorter gathered;
   for (std::size_t l = begin; l != end; ++l) {
     search.visit_leaf(l, [&](std::size_t i, std::span<float> found, float bound) {
+      const std::uint32_t self = tree.members[l * leaf_width + i];
+      if (const std::uint32_t* const places = search.places_of(i)) {
+        gathered.assign(found, places, tree.members.data());
+        return write_row(gathered, self, row_of(l, i));
+      }
       const float largest = found.size() < wanted
                                 ? std::numeric_limits<float>::infinity()
                                 : kernels.sum_nearest(found.data(), found.size(), wanted, bound).largest_squared;
-      const std::uint32_t self = tree.members[l * leaf_width + i];
       gathered.clear();
-      search.visit_within(l, i, largest, [&](std::uint32_t member, float d) {
-        if (member != self) gathered.add(member, d);
-      });
-      write_row(gathered, row_of(l, i));
+      search.visit_within(l, i, largest, [&](std::uint32_t member, float d) { gathered.add(member, d); });
+      write_row(gathered, self, row_of(l, i));
       return largest;
     });
     done(l);

@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <cstring>
 #include <limits>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -23,21 +24,24 @@ struct count_smaller {
     using lanes = simd::native_vec<std::int32_t, Target>;
     constexpr std::size_t n = lanes::count;
     // In variables of their own, not in arrays: those would be kept in memory.
-    for (std::size_t i = 0; i < count; i += 4 * n) {
+    const lanes one = -1, none = 0;
+    if (count <= n) {
+      const lanes v0 = lanes::load(values);
+      lanes n0 = 0;
+      for (std::size_t j = 0; j != count; ++j) n0 -= select(lanes(values[j]) < v0, one, none);
+      n0.store(smaller);
+      return;
+    }
+    for (std::size_t i = 0; i < count; i += 2 * n) {
       const lanes v0 = lanes::load(values + i), v1 = lanes::load(values + i + n);
-      const lanes v2 = lanes::load(values + i + 2 * n), v3 = lanes::load(values + i + 3 * n);
-      lanes n0 = 0, n1 = 0, n2 = 0, n3 = 0;
+      lanes n0 = 0, n1 = 0;
       for (std::size_t j = 0; j != count; ++j) {
-        const lanes other = values[j], one = -1, none = 0;
+        const lanes other = values[j];
         n0 -= select(other < v0, one, none);
         n1 -= select(other < v1, one, none);
-        n2 -= select(other < v2, one, none);
-        n3 -= select(other < v3, one, none);
       }
       n0.store(smaller + i);
       n1.store(smaller + i + n);
-      n2.store(smaller + i + 2 * n);
-      n3.store(smaller + i + 3 * n);
     }
   }
 };
@@ -52,6 +56,13 @@ class rank_sorter {
     if (count_ + 2 * room > keys_.size()) grow();
     std::memcpy(&keys_[count_], &distance_squared, sizeof distance_squared);
     indices_[count_++] = index;
+  }
+  /// Takes the points at some places of `members` instead of all that were added. @pre as for `add`
+  void assign(std::span<const float> squared, const std::uint32_t* places, const std::uint32_t* members) {
+    while (squared.size() + 2 * room > keys_.size()) grow();
+    count_ = squared.size();
+    std::memcpy(keys_.data(), squared.data(), squared.size_bytes());
+    for (std::size_t i = 0; i != count_; ++i) indices_[i] = members[places[i]];
   }
   /// Calls `f(rank, index, distance_squared)` for all, nearest first, until it returns false.
   template <class F>
