@@ -255,7 +255,7 @@ class lane_counter {
 /// The sum of the roots of the `wanted` smallest distances, and the largest of them.
 /// @pre 0 < wanted <= count, no distance above `bound`, and sixteen times infinity after them
 struct sum_nearest {
-  /// The `rank`-th smallest (from 1) of sixteen values.
+  /// The `rank`-th smallest (from 1) of sixteen values: by counting, for each of them, how many are smaller.
   template <simd::target Target>
   static ORBIS_ALWAYS_INLINE float ranked(const float* values, std::size_t rank) noexcept {
     using lanes = simd::vec<float, leaf_width, Target>;
@@ -264,6 +264,22 @@ struct sum_nearest {
     numbers smaller = 0;  // for each value, minus how many are
     for (std::size_t i = 0; i != leaf_width; ++i) smaller += select(lanes(values[i]) < v, numbers(-1), numbers(0));
     return simd::greatest(select(smaller > numbers(-static_cast<std::int32_t>(rank)), v, lanes(0.0F)));
+  }
+  /// The same of thirty-two values, of which those from `count` on are infinite.
+  template <simd::target Target>
+  static ORBIS_ALWAYS_INLINE float ranked_of_two(const float* values, std::size_t count, std::size_t rank) noexcept {
+    using lanes = simd::vec<float, leaf_width, Target>;
+    using numbers = simd::vec<std::int32_t, leaf_width, Target>;
+    const lanes v0 = lanes::load(values), v1 = lanes::load(values + leaf_width);
+    const numbers one = -1, none = 0, least = -static_cast<std::int32_t>(rank);
+    numbers smaller0 = 0, smaller1 = 0;
+    for (std::size_t i = 0; i != count; ++i) {
+      const lanes other = values[i];
+      smaller0 += select(other < v0, one, none);
+      smaller1 += select(other < v1, one, none);
+    }
+    const lanes zero = 0.0F;
+    return simd::greatest(max(select(smaller0 > least, v0, zero), select(smaller1 > least, v1, zero)));
   }
 
   /// Adds the roots of the lanes of `v` that are set in `in`, in double. Where multiplications are fused with sums,
@@ -322,10 +338,13 @@ struct sum_nearest {
       }
       return std::array<std::size_t, 3>{n0.total(), n1.total(), n2.total()};
     };
-    const rank_bracket bracket = bracket_rank(bound, count, wanted, count_within, count_three);
-    nearest_sum out;
-    out.largest_squared = bracket.high;
-    if (bracket.at_high - bracket.at_low <= leaf_width) {
+    const auto largest = [&]() ORBIS_INLINE_LAMBDA {
+      if (count <= leaf_width) return ranked<Target>(found, wanted);
+      // With fewer lanes, or where often more than these are found, guesses are faster.
+      if constexpr (lanes::count == leaf_width)
+        if (wanted <= leaf_width && count <= 2 * leaf_width) return ranked_of_two<Target>(found, count, wanted);
+      const rank_bracket bracket = bracket_rank(bound, count, wanted, count_within, count_three);
+      if (bracket.at_high - bracket.at_low > leaf_width) return bracket.high;
       std::array<float, 2 * leaf_width> between;
       std::size_t n = 0;
       for (std::size_t i = 0; i < count; i += lanes::count) {
@@ -336,8 +355,10 @@ struct sum_nearest {
         n += simd::compress_store(between.data() + n, v, in);
       }
       simd::vec<float, leaf_width, Target>(std::numeric_limits<float>::infinity()).store(between.data() + n);
-      out.largest_squared = ranked<Target>(between.data(), wanted - bracket.at_low);
-    }
+      return ranked<Target>(between.data(), wanted - bracket.at_low);
+    };
+    nearest_sum out;
+    out.largest_squared = largest();
     // Those below the largest, and the largest as often as it takes.
     root_sum<Target> roots;
     lane_counter<Target> smaller;

@@ -108,8 +108,8 @@ class nearest_search {
         chosen_(own_.leaves.size() + leaf_width),
         found_(leaf_width * stride_),
         places_(with_places ? leaf_width * stride_ : 0),
-        hoped_{1.0F + 2.1F / std::sqrt(static_cast<float>(wanted))},
-        reach_{1.35F * hoped_} {}
+        hoped_{1.0F + 1.7F / std::sqrt(static_cast<float>(wanted))},
+        reach_{1.5F * hoped_} {}
 
   /// Searches for the points of one leaf, then calls `f(i, found, bound)` for the i-th of them in any
   /// order. `found`: squared distances up to `bound`, the nearest among them; fewer than `wanted` where
@@ -190,7 +190,7 @@ class nearest_search {
       grown.low[a] = std::min(box.low[a], p[a]);
       grown.high[a] = std::max(box.high[a], p[a]);
     }
-    if (squared_distance(grown.low, grown.high) > 16.0F * usual_) return false;
+    if (squared_distance(grown.low, grown.high) > 32.0F * usual_) return false;
     box = grown;
     return true;
   }

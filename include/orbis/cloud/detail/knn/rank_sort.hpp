@@ -17,31 +17,26 @@
 
 namespace orbis::cloud::detail {
 
-/// For each of `count` values, the number of smaller ones. @pre 32 more values can be read and written
-struct count_smaller {
+/// For each of `count` values its rank: the number of smaller ones, and of equal ones before it. @pre 64 more values
+/// can be read and written
+struct find_ranks {
   template <simd::target Target>
-  static ORBIS_ALWAYS_INLINE void run(const std::int32_t* values, std::size_t count, std::int32_t* smaller) {
+  static ORBIS_ALWAYS_INLINE void run(const std::int32_t* values, std::size_t count, std::int32_t* ranks) {
     using lanes = simd::native_vec<std::int32_t, Target>;
     constexpr std::size_t n = lanes::count;
-    // In variables of their own, not in arrays: those would be kept in memory.
-    const lanes one = -1, none = 0;
-    if (count <= n) {
-      const lanes v0 = lanes::load(values);
-      lanes n0 = 0;
-      for (std::size_t j = 0; j != count; ++j) n0 -= select(lanes(values[j]) < v0, one, none);
-      n0.store(smaller);
-      return;
-    }
-    for (std::size_t i = 0; i < count; i += 2 * n) {
-      const lanes v0 = lanes::load(values + i), v1 = lanes::load(values + i + n);
-      lanes n0 = 0, n1 = 0;
-      for (std::size_t j = 0; j != count; ++j) {
-        const lanes other = values[j];
-        n0 -= select(other < v0, one, none);
-        n1 -= select(other < v1, one, none);
-      }
-      n0.store(smaller + i);
-      n1.store(smaller + i + n);
+    const lanes one = 1, none = 0;
+    for (std::size_t i = 0; i < count; i += n) {
+      const lanes v = lanes::load(values + i);
+      lanes rank = 0;
+      const std::size_t here = std::min(i + n, count);
+      std::size_t j = 0;
+      for (; j != i; ++j) rank += select(v < lanes(values[j]), none, one);
+      const lanes place = lanes::iota() + lanes(static_cast<std::int32_t>(i));
+      for (; j != here; ++j)
+        rank +=
+            select(lanes(values[j]) < v + select(lanes(static_cast<std::int32_t>(j)) < place, one, none), one, none);
+      for (; j < count; ++j) rank += select(lanes(values[j]) < v, one, none);
+      rank.store(ranks + i);
     }
   }
 };
@@ -69,15 +64,19 @@ class rank_sorter {
   void for_each(F&& f) {
     if (count_ == 0) return;
     if (count_ <= most_ranked) {
-      std::fill_n(keys_.begin() + static_cast<std::ptrdiff_t>(count_), room, std::numeric_limits<std::int32_t>::max());
-      std::fill_n(taken_.begin(), count_, std::uint16_t{0});
-      count_smaller_(keys_.data(), count_, ranks_.data());
-      for (std::size_t i = 0; i != count_; ++i) {
-        const auto rank = static_cast<std::size_t>(ranks_[i]);
-        sorted_[rank + taken_[rank]++] = pack(i);  // equal ones side by side
-      }
+      find_ranks_(keys_.data(), count_, ranks_.data());
+      for (std::size_t i = 0; i != count_; ++i) sorted_[static_cast<std::size_t>(ranks_[i])] = pack(i);
+      // Equal ones by index. They are few, and what was just written one by one is read one by one.
+      std::uint64_t before = sorted_[0];
       for (std::size_t i = 1; i < count_; ++i) {
-        for (std::size_t j = i; j != 0 && sorted_[j] < sorted_[j - 1]; --j) std::swap(sorted_[j], sorted_[j - 1]);
+        const std::uint64_t here = sorted_[i];
+        if (here < before) {
+          std::size_t at = i;
+          for (; at != 0 && here < sorted_[at - 1]; --at) sorted_[at] = sorted_[at - 1];
+          sorted_[at] = here;
+        } else {
+          before = here;
+        }
       }
     } else {
       for (std::size_t i = 0; i != count_; ++i) sorted_[i] = pack(i);
@@ -92,7 +91,7 @@ class rank_sorter {
   }
 
  private:
-  static constexpr std::size_t room = 32;          // read and written beyond the last
+  static constexpr std::size_t room = 64;          // read and written beyond the last
   static constexpr std::size_t most_ranked = 384;  // beyond this n log n wins
 
   [[nodiscard]] std::uint64_t pack(std::size_t i) const noexcept {
@@ -103,20 +102,18 @@ class rank_sorter {
     keys_.resize(size);
     indices_.resize(size);
     ranks_.resize(size);
-    taken_.resize(size);
     sorted_.resize(size);
   }
 
-  void (*count_smaller_)(const std::int32_t*, std::size_t, std::int32_t*) =
-      simd::kernel<count_smaller, void(const std::int32_t*, std::size_t, std::int32_t*), simd::avx2>();
+  void (*find_ranks_)(const std::int32_t*, std::size_t, std::int32_t*) =
+      simd::kernel<find_ranks, void(const std::int32_t*, std::size_t, std::int32_t*)>();
   std::size_t count_ = 0;
   std::vector<std::int32_t> keys_;
   std::vector<std::uint32_t> indices_;
   std::vector<std::int32_t> ranks_;
-  std::vector<std::uint16_t> taken_;
   std::vector<std::uint64_t> sorted_;
 };
 
 }  // namespace orbis::cloud::detail
 
-ORBIS_COMPILED_KERNEL_AVX2(orbis::cloud::detail::count_smaller, void(const std::int32_t*, std::size_t, std::int32_t*));
+ORBIS_COMPILED_KERNEL(orbis::cloud::detail::find_ranks, void(const std::int32_t*, std::size_t, std::int32_t*));
