@@ -106,3 +106,7 @@ template <camera::parametric_camera Camera>
 }
 
 }  // namespace orbis::optimize
+
+#ifdef ORBIS_COMPILED
+#include <orbis/optimize/detail/compiled/self_calibration.hpp>
+#endif
