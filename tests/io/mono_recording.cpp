@@ -139,6 +139,14 @@ TEST_CASE("the names of images in a plain folder tell their times") {
     CHECK(times({"color/a1.png", "color/b1.png"}) == std::vector<double>{0.0, 0.1});
     CHECK_THAT(io::open_mono_recording(folder.path()).value().notes()[0], Contains("alphabetical order"));
   }
+  SECTION("a list of times is for the images by their numbers, not by the alphabet") {
+    folder.write("times.txt", "3.5\n4.5\n5.5\n");
+    CHECK(times({"2.png", "10.png", "9.png"}) == std::vector<double>{3.5, 4.5, 5.5});
+    const auto recording = io::open_mono_recording(folder.path()).value();
+    CHECK(recording.path(1).filename() == "9.png");
+    CHECK(recording.path(2).filename() == "10.png");
+    CHECK(recording.notes().empty());
+  }
   SECTION("a list of times has the last word") {
     folder.write("times.txt", "3.5\n4.5\n5.5\n");
     CHECK(times({"000000.png", "000007.png"}) == std::vector<double>{3.5, 4.5});

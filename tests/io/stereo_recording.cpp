@@ -100,6 +100,52 @@ TEST_CASE("poses of KITTI are found beside the sequences, and what has no partne
   CHECK(recording.notes().size() == 2);  // the lonely image, and one pose too few
 }
 
+TEST_CASE("poses of KITTI are those of the left camera, whichever that is") {
+  const temporary_folder folder;
+  write_kitti(folder);
+  std::filesystem::rename(folder.path() / "image_0", folder.path() / "image_2");
+  std::filesystem::rename(folder.path() / "image_1", folder.path() / "image_3");
+  // Camera 0's origin lies at (0.05, 0.05, 0.1) in camera 2's frame.
+  folder.write("calib.txt", "P2: 7 0 3.5 0.7 0 7 2.5 0.6 0 0 1 0.1\nP3: 7 0 3.5 -2.8 0 7 2.5 0.6 0 0 1 0.1\n");
+  const auto recording = io::open_stereo_recording(folder.path()).value();
+  CHECK(recording.camera().baseline.value() == Approx(0.5));
+  const se3 T_world_2 = recording.frame(1).value().T_world_camera.value();
+  CHECK((T_world_2 * vec3(0.05, 0.05, 0.1) - vec3(0.5, 0, 1)).norm() < 1e-12);
+  CHECK((recording.ground_truth()[2].T_world_camera * vec3(0.05, 0.05, 0.1) - vec3(1, 0, 2)).norm() < 1e-12);
+}
+
+TEST_CASE("of KITTI's folders only images count, each number once") {
+  const temporary_folder folder;
+  write_kitti(folder);
+  for (const char* const camera : {"image_0", "image_1"}) {
+    folder.write(std::string{camera} + "/000001.jpeg", "another");
+    folder.write(std::string{camera} + "/000002.txt", "no image");
+  }
+  const auto recording = io::open_stereo_recording(folder.path()).value();
+  REQUIRE(recording.size() == 3);
+  CHECK(recording.ground_truth().size() == 3);
+  REQUIRE(recording.notes().size() == 1);
+  CHECK_THAT(recording.notes()[0], Catch::Matchers::Contains("1 images whose number there is twice"));
+  for (const char* const image : {"000000.png", "000001.jpeg", "000001.png", "000002.png"})
+    std::filesystem::remove(folder.path() / "image_1" / image);
+  CHECK_THAT(message_of(io::open_stereo_recording(folder.path())),
+             Catch::Matchers::Contains("none of 4 images makes a frame"));
+}
+
+TEST_CASE("a format that has its cameras takes no other") {
+  const temporary_folder folder;
+  const bool is_kitti = GENERATE(true, false);
+  is_kitti ? write_kitti(folder) : write_asl(folder);
+  const std::string file = is_kitti ? "calib.txt" : "sensor.yaml";
+  const camera::camera_settings other{.model = camera::pinhole{8, 6, 9.0, 9.0, 3.5, 2.5}, .baseline = 1.0};
+  CHECK_THAT(message_of(io::open_stereo_recording(folder.path(), {.camera = other})),
+             Catch::Matchers::Contains("the two cameras are those of " + file));
+  folder.write("camera.toml", test::tiny_camera);
+  const auto recording = io::open_stereo_recording(folder.path()).value();
+  REQUIRE(recording.notes().size() == 1);
+  CHECK_THAT(recording.notes()[0], Catch::Matchers::Contains("camera.toml: not used"));
+}
+
 TEST_CASE("damaged files of KITTI are named with their line") {
   const temporary_folder folder;
   write_kitti(folder);
@@ -191,7 +237,10 @@ TEST_CASE("two lists or two folders of images are a stereo recording, rectified 
     CHECK(recording.timestamp(2) == 0.2);
     CHECK(recording.camera().baseline == 0.2);
     CHECK(recording.frame(0).value().right(0, 0) == rgb8{31, 31, 31});
+    CHECK(!recording.camera().shutter);
   }
+  folder.write("camera.toml", test::tiny_camera + std::string{"baseline = 0.2\nfps = 10\nread_out_ms = 20\n"});
+  CHECK(io::open_stereo_recording(folder.path()).value().camera().shutter.value().color_read_out == Approx(0.02));
   folder.write("left.txt", "1.0 left/0.png\n2.0 left/1.png\n3.0 left/2.png\n");
   folder.write("right.txt", "1.001 right/0.png\n3.001 right/2.png\n");
   folder.write("groundtruth.txt", "1 0 0 0 0 0 0 1\n3 2 0 0 0 0 0 1\n");
@@ -225,6 +274,19 @@ TEST_CASE("an image of another size than its camera's is refused") {
   const auto recording = io::open_stereo_recording(folder.path()).value();
   CHECK(recording.frame(1));
   CHECK_THAT(message_of(recording.frame(2)), Catch::Matchers::Contains("8x7 pixels, the camera 8x6"));
+}
+
+TEST_CASE("a size that is far from that of the images is refused before there is memory for it") {
+  const temporary_folder folder;
+  write_asl(folder);
+  for (const char* const camera : {"mav0/cam0", "mav0/cam1"}) {
+    std::string text = sensor_yaml("0.0");
+    text.replace(text.find("[8, 6]"), 6, "[100000, 100000]");
+    if (std::string{camera} == "mav0/cam1") text.replace(text.find("-0.06"), 5, "0.05");
+    folder.write(std::string{camera} + "/sensor.yaml", text);
+  }
+  CHECK_THAT(message_of(io::open_stereo_recording(folder.path())),
+             Catch::Matchers::Contains("8x6 pixels, the camera 100000x100000"));
 }
 
 TEST_CASE("the stereo excerpt of KITTI opens as a pair of lists") {

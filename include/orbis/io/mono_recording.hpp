@@ -29,6 +29,7 @@
 #include <orbis/io/camera_file.hpp>
 #include <orbis/io/detail/recordings/one_camera.hpp>
 #include <orbis/io/detail/recordings/recording_index.hpp>
+#include <orbis/io/detail/recordings/sized_image.hpp>
 #include <orbis/io/image.hpp>
 #include <orbis/io/recording.hpp>
 
@@ -98,13 +99,7 @@ class mono_recording {
   [[nodiscard]] result<image<rgb8>> color(std::size_t i) const {
     assert(i < size());
     const std::filesystem::path& file = index_.frames[i].color;
-    auto image = read_color(file);
-    if (image && (image->width() != camera_.model.width() || image->height() != camera_.model.height()))
-      return fail(errc::malformed, file.string(),
-                  "the image has " + std::to_string(image->width()) + "x" + std::to_string(image->height()) +
-                      " pixels, the camera " + std::to_string(camera_.model.width()) + "x" +
-                      std::to_string(camera_.model.height()));
-    return image;
+    return detail::sized(read_color(file), file, camera_.model.width(), camera_.model.height());
   }
 
  private:

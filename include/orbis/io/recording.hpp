@@ -29,6 +29,7 @@
 #include <orbis/io/detail/recordings/recording_index.hpp>
 #include <orbis/io/detail/recordings/scannet.hpp>
 #include <orbis/io/detail/recordings/seven_scenes.hpp>
+#include <orbis/io/detail/recordings/sized_image.hpp>
 #include <orbis/io/detail/recordings/tum.hpp>
 #include <orbis/io/image.hpp>
 
@@ -159,21 +160,14 @@ class recording {
   [[nodiscard]] const result<void>& status() const noexcept { return status_; }
 
  private:
-  /// An image that was read, if it has the camera's size.
-  template <class T>
-  static result<image<T>> sized(result<image<T>> read, const std::filesystem::path& path, const camera::intrinsics& k) {
-    if (!read || (read->width() == k.width && read->height() == k.height)) return read;
-    return fail(errc::malformed, path.string(),
-                "the image has " + std::to_string(read->width()) + "x" + std::to_string(read->height()) +
-                    " pixels, the camera " + std::to_string(k.width) + "x" + std::to_string(k.height));
-  }
   [[nodiscard]] result<image<std::uint16_t>> read_sized_depth(const std::filesystem::path& path) const {
-    return sized(read_depth(path), path, camera_.model.k());
+    return detail::sized(read_depth(path), path, camera_.model.width(), camera_.model.height());
   }
   /// The colour image as the camera of depth sees it.
   [[nodiscard]] result<image<rgb8>> read_registered(const std::filesystem::path& path,
                                                     image_view<const std::uint16_t> depth) const {
-    auto image = sized(read_color(path), path, registration_ ? registration_->color().k() : camera_.model.k());
+    const camera::intrinsics& k = registration_ ? registration_->color().k() : camera_.model.k();
+    auto image = detail::sized(read_color(path), path, k.width, k.height);
     if (image && registration_) image = registration_->register_color(image->view(), depth, camera_.depth_scale);
     return image;
   }

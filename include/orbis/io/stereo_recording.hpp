@@ -30,6 +30,7 @@
 #include <orbis/io/detail/recordings/asl.hpp>
 #include <orbis/io/detail/recordings/image_pairs.hpp>
 #include <orbis/io/detail/recordings/kitti.hpp>
+#include <orbis/io/detail/recordings/sized_image.hpp>
 #include <orbis/io/detail/recordings/stereo_index.hpp>
 #include <orbis/io/image.hpp>
 
@@ -52,7 +53,7 @@ enum class stereo_format { automatic, kitti, asl, pairs };
 
 struct stereo_recording_options {
   stereo_format format = stereo_format::automatic;
-  std::optional<camera::camera_settings> camera{};  ///< of `pairs`, instead of camera.toml
+  std::optional<camera::camera_settings> camera{};  ///< instead of camera.toml; of `pairs` only
   double max_time_difference = 0.005;               ///< between a left and its right image, seconds
   camera::rectify_options rectify{};
 };
@@ -77,7 +78,8 @@ class stereo_recording {
   [[nodiscard]] double timestamp(std::size_t i) const { return index_.images.frames[i].timestamp; }
   /// The rectified camera of both images, with the baseline.
   [[nodiscard]] camera::camera_settings camera() const {
-    return {.model = straight_.camera(), .fps = index_.fps, .baseline = straight_.baseline()};
+    return {
+        .model = straight_.camera(), .fps = index_.fps, .baseline = straight_.baseline(), .shutter = index_.shutter};
   }
   /// The cameras as they are.
   [[nodiscard]] const camera::stereo_rig<camera::any_camera>& cameras() const noexcept { return index_.cameras; }
@@ -116,12 +118,7 @@ class stereo_recording {
 
  private:
   [[nodiscard]] static result<image<rgb8>> read(const std::filesystem::path& path, const camera::any_camera& camera) {
-    auto image = read_color(path);
-    if (image && (image->width() != camera.width() || image->height() != camera.height()))
-      return fail(errc::malformed, path.string(),
-                  "the image has " + std::to_string(image->width()) + "x" + std::to_string(image->height()) +
-                      " pixels, the camera " + std::to_string(camera.width()) + "x" + std::to_string(camera.height()));
-    return image;
+    return detail::sized(read_color(path), path, camera.width(), camera.height());
   }
 
   detail::stereo_index index_;
@@ -137,10 +134,11 @@ class stereo_recording {
   return stereo_format::automatic;
 }
 
-/// Opens the stereo recording in `folder`: reads its lists, poses and cameras, and rectifies the cameras; not yet its
-/// images (of KITTI one, for its size).
+/// Opens the stereo recording in `folder`: reads its lists, poses and cameras, and rectifies the cameras; of its images
+/// only the first left one, for its size.
 /// Errors: not_found, unreadable, unsupported (no known format, or a camera of an unknown model), no_data (nothing in
-/// it), malformed (with file and line), invalid_argument (no camera known, or cameras that cannot be rectified).
+/// it), malformed (with file and line; an image of another size than its camera's), invalid_argument (no camera known,
+/// another camera for a format that has its own, or cameras that cannot be rectified).
 [[nodiscard]] inline result<stereo_recording> open_stereo_recording(const std::filesystem::path& folder,
                                                                     const stereo_recording_options& options = {}) {
   std::error_code ignored;
@@ -149,6 +147,11 @@ class stereo_recording {
     return fail(errc::unsupported, folder.string(), "a recording is a folder, this is a file");
   const stereo_format format =
       options.format == stereo_format::automatic ? detect_stereo_format(folder) : options.format;
+  const bool has_cameras = format == stereo_format::kitti || format == stereo_format::asl;
+  const char* const cameras = format == stereo_format::kitti ? "calib.txt" : "sensor.yaml";
+  if (has_cameras && options.camera)
+    return fail(errc::invalid_argument, folder.string(),
+                std::string{"the two cameras are those of "} + cameras + ", no other one can be named");
   const auto read_index = [&]() -> result<detail::stereo_index> {
     switch (format) {
       case stereo_format::kitti: return detail::index_kitti(folder);
@@ -163,6 +166,13 @@ class stereo_recording {
   };
   auto index = read_index();
   if (!index) return fail(index.error());
+  if (const auto unused = folder / "camera.toml"; has_cameras && detail::present(unused))
+    index->images.notes.push_back(unused.string() + ": not used, the two cameras are those of " + cameras);
+  // Before the maps of the rectification are made, whose size a wrong number may put beyond all memory.
+  const auto& file = index->images.frames.front().color;
+  const camera::any_camera& left = index->cameras.left;
+  if (const auto first = detail::sized(read_color(file), file, left.width(), left.height()); !first)
+    return fail(first.error());
   auto straight = camera::rectify(index->cameras, options.rectify);
   if (!straight) return fail(straight.error().code, folder.string(), straight.error().message);
   return stereo_recording(*std::move(index), *std::move(straight), format);

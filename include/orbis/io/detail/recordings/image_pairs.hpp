@@ -40,9 +40,7 @@ namespace orbis::io::detail {
   std::vector<stamped_file> files;
   for (const auto& path : list_folder(folder)) {
     unsigned number = 0;
-    const std::string extension = path.extension().string();
-    if (parse_number(path.stem().string(), number) && (extension == ".png" || extension == ".jpg"))
-      files.push_back({number / fps, path});
+    if (parse_number(path.stem().string(), number) && is_image_name(path)) files.push_back({number / fps, path});
   }
   if (files.empty()) return fail(errc::no_data, folder.string(), "there are no numbered images (000000.png) in it");
   return in_order_of_time(folder, std::move(files), notes);
@@ -67,6 +65,7 @@ namespace orbis::io::detail {
     return fail(errc::invalid_argument, folder.string(),
                 "the camera is not known: put a camera.toml into the folder, or name a camera");
   index.fps = camera->fps;
+  index.shutter = camera->shutter;
   if (present(right_file)) {
     const auto right = read_camera(right_file);
     if (!right) return fail(right.error());

@@ -39,9 +39,15 @@ template <std::size_t N>
   return trimmed(line).empty() ? std::optional{all} : std::nullopt;
 }
 
+/// The place of a camera with this projection matrix, K [I t], in the frame of camera 0, metres.
+[[nodiscard]] inline se3 kitti_place(const std::array<double, 12>& p) {
+  return se3{so3{}, -vec3{(p[3] - p[2] * p[11]) / p[0], (p[7] - p[6] * p[11]) / p[5], p[11]}};
+}
+
 /// The camera of a rectified pair: focal lengths, principal point, and metres between the two.
 struct kitti_calibration {
   double fx = 0.0, fy = 0.0, cx = 0.0, cy = 0.0, baseline = 0.0;
+  se3 T_first_left;  ///< the left camera's place in the frame of camera 0
 };
 
 /// The projection matrix `P<camera>:` in the text of `calib.txt`, by rows. Errors: malformed (it is missing, is none,
@@ -73,7 +79,7 @@ struct kitti_calibration {
   if (!l) return fail(l.error());
   if (!r) return fail(r.error());
   const auto& p = *l;
-  const kitti_calibration k{p[0], p[5], p[2], p[6], (p[3] - (*r)[3]) / p[0]};
+  const kitti_calibration k{p[0], p[5], p[2], p[6], (p[3] - (*r)[3]) / p[0], kitti_place(p)};
   const auto differs = [&](std::size_t i) { return std::abs(p[i] - (*r)[i]) > 1e-6 * std::abs(p[0]); };
   if (differs(0) || differs(2) || differs(5) || differs(6) || !(k.baseline > 0.0 && k.baseline < 1e6))
     return fail(errc::malformed, where.string(), "the two cameras are not a rectified pair, the left one first");
@@ -144,11 +150,26 @@ inline void add_kitti_frame(std::size_t n, const std::vector<double>& times, con
   index.ground_truth.push_back({times[n], poses[n]});
 }
 
-/// Brings the frames of a sequence into the order of time. Errors: as `check_first_frame`.
-[[nodiscard]] inline result<void> sort_kitti_frames(const std::filesystem::path& folder, recording_index& index) {
-  const auto earlier = [](const auto& a, const auto& b) { return a.timestamp < b.timestamp; };
-  std::sort(index.frames.begin(), index.frames.end(), earlier);
-  std::sort(index.ground_truth.begin(), index.ground_truth.end(), earlier);
+/// Brings the frames of a sequence into the order of time; of two with one number the first stays. `left_out`: images
+/// that became no frame. Errors: no_data, and those of `check_first_frame`.
+[[nodiscard]] inline result<void> sort_kitti_frames(const std::filesystem::path& folder, std::size_t left_out,
+                                                    recording_index& index) {
+  if (index.frames.empty() && left_out != 0)
+    return fail(errc::no_data, folder.string(),
+                "none of " + std::to_string(left_out) + " images makes a frame: " +
+                    "each wants a time in times.txt, and of two cameras a partner of "
+                    "the same name");
+  const auto keep_first = [](auto& list) {
+    const auto earlier = [](const auto& a, const auto& b) { return a.timestamp < b.timestamp; };
+    const auto same = [](const auto& a, const auto& b) { return a.timestamp == b.timestamp; };
+    std::stable_sort(list.begin(), list.end(), earlier);
+    list.erase(std::unique(list.begin(), list.end(), same), list.end());
+  };
+  const std::size_t all = index.frames.size();
+  keep_first(index.frames);
+  keep_first(index.ground_truth);
+  if (const std::size_t twice = all - index.frames.size(); twice != 0)
+    index.notes.push_back(std::to_string(twice) + " images whose number there is twice are left out");
   return check_first_frame(index, folder);
 }
 
@@ -186,13 +207,14 @@ inline void add_kitti_frame(std::size_t n, const std::vector<double>& times, con
   const auto times = parse_kitti_times(*times_text, images.files[1]);
   if (!times) return fail(times.error());
 
-  const auto poses = read_kitti_poses(folder, times->size(), images);
+  auto poses = read_kitti_poses(folder, times->size(), images);
   if (!poses) return fail(poses.error());
+  for (se3& pose : *poses) pose = pose * k->T_first_left;
 
   std::size_t lonely = 0;
   for (const auto& image : list_folder(left)) {
     std::size_t n = 0;
-    if (!parse_number(image.stem().string(), n)) continue;
+    if (!is_image_name(image) || !parse_number(image.stem().string(), n)) continue;
     if (n >= times->size() || !present(right / image.filename())) {
       ++lonely;
       continue;
@@ -201,7 +223,7 @@ inline void add_kitti_frame(std::size_t n, const std::vector<double>& times, con
   }
   if (lonely != 0)
     images.notes.push_back(std::to_string(lonely) + " left images have no right image or no time and are left out");
-  if (const auto ok = sort_kitti_frames(folder, images); !ok) return fail(ok.error());
+  if (const auto ok = sort_kitti_frames(folder, lonely, images); !ok) return fail(ok.error());
   const auto first = read_color(images.frames.front().color);
   if (!first) return fail(first.error());
   const camera::pinhole camera{first->width(), first->height(), k->fx, k->fy, k->cx, k->cy};

@@ -4,7 +4,6 @@
 #pragma once
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -110,21 +109,19 @@ inline constexpr double mono_pose_distance = 0.020;
   if (!times) return fail(times.error());
   auto poses = read_kitti_poses(folder, times->size(), index);
   if (!poses) return fail(poses.error());
-  // P = K [I t]: where camera 0's origin is in this camera's frame.
-  const vec3 t{(p[3] - p[2] * p[11]) / p[0], (p[7] - p[6] * p[11]) / p[5], p[11]};
-  for (se3& pose : *poses) pose = pose * se3{so3{}, -t};
+  for (se3& pose : *poses) pose = pose * kitti_place(p);
 
   std::size_t lonely = 0;
   for (const auto& image : list_folder(folder / ("image_" + std::to_string(*camera)))) {
     std::size_t n = 0;
-    if (!parse_number(image.stem().string(), n)) continue;
+    if (!is_image_name(image) || !parse_number(image.stem().string(), n)) continue;
     if (n < times->size())
       add_kitti_frame(n, *times, *poses, image, {}, index);
     else
       ++lonely;
   }
   if (lonely != 0) index.notes.push_back(std::to_string(lonely) + " images have no time and are left out");
-  if (const auto ok = sort_kitti_frames(folder, index); !ok) return fail(ok.error());
+  if (const auto ok = sort_kitti_frames(folder, lonely, index); !ok) return fail(ok.error());
   const auto first = read_color(index.frames.front().color);
   if (!first) return fail(first.error());
   index.camera = camera::camera_settings{
@@ -133,13 +130,6 @@ inline constexpr double mono_pose_distance = 0.020;
 }
 
 // --- plain folders ------------------------------------------------------------------------------
-
-/// Whether a file's name ends as an image's that we read.
-[[nodiscard]] inline bool is_image_name(const std::filesystem::path& path) {
-  std::string ending = path.extension().string();
-  for (char& c : ending) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return ending == ".png" || ending == ".jpg" || ending == ".jpeg";
-}
 
 /// The images directly in `folder`, by name.
 [[nodiscard]] inline std::vector<std::filesystem::path> images_in(const std::filesystem::path& folder) {
@@ -203,8 +193,8 @@ struct times_of_names {
 }
 
 /// The index of a plain folder of images, PNG or JPEG, in it or in `rgb`, `color`, `images`, `left` or `data`. Their
-/// times are those of `times.txt` (seconds, one a line, for the images in the order of their names) or of their names;
-/// see `times_from_names`. `fps`: of images that are numbered. Errors: no_data, unreadable, malformed (with file and
+/// order is that which their names tell (`times_from_names`), and their times are those of `times.txt` (seconds, one a
+/// line), or of the names. `fps`: of images that are numbered. Errors: no_data, unreadable, malformed (with file and
 /// line).
 [[nodiscard]] inline result<recording_index> index_image_folder(const std::filesystem::path& folder, double fps) {
   recording_index index;
@@ -214,7 +204,11 @@ struct times_of_names {
         errc::no_data, folder.string(),
         "there are no images in it, nor in rgb, color, images, left or data; the folder " + describe_content(folder));
   const auto names = images_in(where);
+  const times_of_names found = times_from_names(names, fps);
   std::vector<stamped_file> files;
+  for (std::size_t i = 0; i != names.size(); ++i) files.push_back({found.times[i], names[i]});
+  // Numbers without leading zeros are not in the order of their names.
+  std::stable_sort(files.begin(), files.end(), [](const auto& a, const auto& b) { return a.timestamp < b.timestamp; });
   if (const auto file = folder / "times.txt"; present(file)) {
     const auto text = read_file(file);
     if (!text) return fail(text.error());
@@ -223,18 +217,13 @@ struct times_of_names {
     if (times->size() != names.size())
       index.notes.push_back(file.string() + ": " + std::to_string(times->size()) + " times for " +
                             std::to_string(names.size()) + " images");
-    for (std::size_t i = 0; i != std::min(names.size(), times->size()); ++i) files.push_back({(*times)[i], names[i]});
+    files.resize(std::min(files.size(), times->size()));
+    for (std::size_t i = 0; i != files.size(); ++i) files[i].timestamp = (*times)[i];
     index.files.push_back(file);
-  } else {
-    const times_of_names found = times_from_names(names, fps);
-    for (std::size_t i = 0; i != names.size(); ++i) files.push_back({found.times[i], names[i]});
-    // Numbers without leading zeros are not in the order of their names.
-    std::stable_sort(files.begin(), files.end(),
-                     [](const auto& a, const auto& b) { return a.timestamp < b.timestamp; });
-    if (found.in_order)
-      index.notes.push_back(where.string() +
-                            ": the names of the images are no numbers and no times, they are taken in "
-                            "alphabetical order");
+  } else if (found.in_order) {
+    index.notes.push_back(where.string() +
+                          ": the names of the images are no numbers and no times, they are taken in "
+                          "alphabetical order");
   }
   auto ordered = in_order_of_time(where, std::move(files), index.notes);
   if (!ordered) return fail(ordered.error());

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cctype>
 #include <cstddef>
 #include <filesystem>
 #include <initializer_list>
@@ -71,6 +72,13 @@ inline result<void> check_first_frame(const recording_index& index, const std::f
     paths.push_back(it->path());
   std::sort(paths.begin(), paths.end());
   return paths;
+}
+
+/// Whether a file's name ends as an image's that we read.
+[[nodiscard]] inline bool is_image_name(const std::filesystem::path& path) {
+  std::string ending = path.extension().string();
+  for (char& c : ending) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return ending == ".png" || ending == ".jpg" || ending == ".jpeg";
 }
 
 /// Whether there is something called `path`.

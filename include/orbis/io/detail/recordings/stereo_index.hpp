@@ -5,11 +5,13 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include <orbis/camera/any.hpp>
+#include <orbis/camera/shutter.hpp>
 #include <orbis/camera/stereo.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/core/trajectory.hpp>
@@ -24,6 +26,7 @@ struct stereo_index {
   recording_index images;
   camera::stereo_rig<camera::any_camera> cameras;
   double fps = 30.0;
+  std::optional<camera::shutter> shutter{};  ///< of both cameras, if it is known
 };
 
 /// Pairs left with right images within `max_time_difference` seconds and makes frames of them; what finds no partner is
