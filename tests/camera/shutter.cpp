@@ -23,3 +23,13 @@ TEST_CASE("A shutter is global if both images are of one time") {
   CHECK_FALSE(camera::shutter{.depth_read_out = 0.03}.is_global());
   CHECK_FALSE(camera::shutter{.depth_delay = -0.01}.is_global());
 }
+
+TEST_CASE("A depth image is of its frame's time, or comes before or after it") {
+  CHECK(camera::shutter{}.is_depth_simultaneous());
+  CHECK(camera::shutter{.color_read_out = 0.03, .depth_read_out = 0.03}.is_depth_simultaneous());
+  CHECK_FALSE(camera::shutter{.color_read_out = 0.03}.is_depth_simultaneous());
+  CHECK_FALSE(camera::shutter{.depth_delay = 0.01}.is_depth_simultaneous());
+  CHECK(camera::shutter{.depth_delay = -0.01}.is_depth_early());
+  CHECK_FALSE(camera::shutter{.depth_delay = 0.01}.is_depth_early());
+  CHECK_FALSE(camera::shutter{.color_read_out = 0.03}.is_depth_early());
+}

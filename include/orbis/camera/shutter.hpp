@@ -21,6 +21,12 @@ struct shutter {
   [[nodiscard]] constexpr bool is_global() const noexcept {
     return color_read_out == 0.0 && depth_read_out == 0.0 && depth_delay == 0.0;
   }
+  /// Whether each row of the depth image is taken together with that of the colour image.
+  [[nodiscard]] constexpr bool is_depth_simultaneous() const noexcept {
+    return depth_delay == 0.0 && depth_read_out == color_read_out;
+  }
+  /// Whether the depth image is taken before the time of the frame.
+  [[nodiscard]] constexpr bool is_depth_early() const noexcept { return depth_delay < 0.0; }
   /// When row `v` (the centre of the top row is 0) of a colour image with `height` rows is taken, seconds.
   [[nodiscard]] constexpr double color_time(double v, int height) const noexcept {
     return color_read_out * share(v, height);

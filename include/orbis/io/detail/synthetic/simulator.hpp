@@ -77,7 +77,7 @@ class simulator {
   [[nodiscard]] camera::rgbd_frame frame(const Policy& policy, const At& at, double time, std::uint64_t key) const {
     exact_view seen = color_view(policy, at, time);
     if (sensor_.motion_blur > 1) blur(policy, at, time, seen.color);
-    if (!depth_is_simultaneous()) {
+    if (!sensor_.shutter.is_depth_simultaneous()) {
       exact_view surface =
           exact_rows(policy, at, time, [&](int y) { return sensor_.shutter.depth_time(y, k_.height); });
       seen.depth = std::move(surface.depth);
@@ -124,10 +124,6 @@ class simulator {
   }
 
  private:
-  [[nodiscard]] bool depth_is_simultaneous() const noexcept {
-    return sensor_.shutter.depth_delay == 0.0 && sensor_.shutter.depth_read_out == sensor_.shutter.color_read_out;
-  }
-
   /// What there is to see while the colour image is read out around `time`.
   template <execution_policy Policy, class At>
   [[nodiscard]] exact_view color_view(const Policy& policy, const At& at, double time) const {

@@ -94,7 +94,7 @@ class depth_tracker {
     if (seen.consistent < options_.min_points / 2) return std::nullopt;
     depth_equations e = equations_of(planes_, at, options_.effective_points, options_.weakest);
     if (e.determined == 0) return std::nullopt;
-    if (shutter.depth_delay < 0.0) e.term.hold_twist();  // see `early_depth_twist`
+    if (shutter.is_depth_early()) e.term.hold_twist();  // see `early_depth_twist`
     return e.term;
   }
 
