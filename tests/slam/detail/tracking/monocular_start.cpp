@@ -93,9 +93,10 @@ outcome begin(const Frames& frames) {
     const auto begun = start.see(f);
     if (!begun) continue;
     CHECK(start.candidates().empty());
-    CHECK(begun->second.index == i);
-    const se3 truth = frames.T_world_camera(begun->first.index).inverse() * frames.T_world_camera(begun->second.index);
-    const se3& found = begun->second.T_world_camera;
+    CHECK(begun->first.size() >= settings.start.min_features);  // it is the whole frame that is handed over
+    CHECK(begun->first.landmarks.size() == begun->first.size());
+    const se3 truth = frames.T_world_camera(begun->first.index).inverse() * frames.T_world_camera(i);
+    const se3& found = begun->T_first_second;
     outcome o{i, (truth.rotation().inverse() * found.rotation()).angle(),
               optimize::detail::angle_between_directions(truth.translation(), found.translation())};
     const double unit = truth.translation().norm() / found.translation().norm();

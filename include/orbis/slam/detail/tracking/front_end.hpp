@@ -375,10 +375,9 @@ template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D
 void front_end<Camera, D, Matchers, Sensor>::add_start(monocular_start_result<D> start, frame_type& f,
                                                        atlas_type& maps) {
   // An initial pose that was asked for just now is that of `f`, otherwise that of the first frame.
-  const se3 T_first_second = start.second.T_world_camera;
   const se3 T_world_first =
-      options_.find_initial_pose ? f.T_world_camera * T_first_second.inverse() : se3(f.T_world_camera);
-  f.T_world_camera = T_world_first * T_first_second;
+      options_.find_initial_pose ? f.T_world_camera * start.T_first_second.inverse() : se3(f.T_world_camera);
+  f.T_world_camera = T_world_first * start.T_first_second;
   frame_type& first = start.first;
   first.T_world_camera = T_world_first;
   first.landmarks.assign(first.size(), no_id);
@@ -469,9 +468,7 @@ void front_end<Camera, D, Matchers, Sensor>::refine_motion(frame_type& f, const 
     return prior.T_world_before ? prior.expected(f.T_world_camera.inverse()) : f.twist;
   };
   moving_pose refined{f.T_world_camera, rolls ? expected_twist() : vec6(vec6::Zero())};
-  const bool depth_is_simultaneous = shutter_.depth_delay == 0.0 && shutter_.depth_read_out == shutter_.color_read_out;
-  const bool is_depth_early = shutter_.depth_delay < 0.0;
-  const int rounds = with_depth ? 3 : !rolls ? 0 : depth_is_simultaneous ? 1 : 2;
+  const int rounds = with_depth ? 3 : !rolls ? 0 : shutter_.is_depth_simultaneous() ? 1 : 2;
   if (!rolls && with_depth) find_observations(f, m, rig_, rows_);
   for (int round = 0; round != rounds; ++round) {
     if (rolls) {
@@ -481,12 +478,12 @@ void front_end<Camera, D, Matchers, Sensor>::refine_motion(frame_type& f, const 
     const auto depth = with_depth ? depth_.term_at(refined, shutter_) : std::nullopt;
     refined = refine_moving_pose(std::span<const row_observation>(rows_), rig_.model, refined, prior,
                                  with_depth ? 3 : 5, {.other = depth ? &*depth : nullptr, .moves = rolls});
-    if (is_depth_early) {
+    if (shutter_.is_depth_early()) {
       early_depth_.see(std::span<const row_observation>(rows_), rig_.model, refined, prior);
       refined.twist = early_depth_.between(prior, refined.twist);
     }
   }
-  if (is_depth_early) early_depth_.advance();
+  if (shutter_.is_depth_early()) early_depth_.advance();
   f.T_world_camera = refined.T_world_camera;
   if (observer_) observer_->set_depths(f, {shutter_, rolls ? refined.twist : expected_twist()}, follow_rows);
   if (!rolls) {

@@ -38,7 +38,8 @@ struct start_point {
 /// median depth of the points in it.
 template <feature_descriptor D>
 struct monocular_start_result {
-  basic_frame<D> first, second;
+  basic_frame<D> first;              ///< its pose is the identity
+  se3 T_first_second;                ///< of the frame that was seen last
   std::vector<start_point> points;   ///< by ascending keypoints of the first frame
   double parallax = 0.0;             ///< median angle between the rays of a point, radians
   double rotation_deviation = 0.0;   ///< standard deviation of the rotation, radians ...
@@ -106,7 +107,8 @@ class monocular_start {
     for (const auto& k : f.features.keypoints)
       candidates_.back().windows.push_back({k.x, k.y, static_cast<float>(options_.radius), k.octave - 1, k.octave + 1});
   }
-  [[nodiscard]] result<monocular_start_result<D>> reconstruct(const candidate& c, const basic_frame<D>& f) const;
+  /// The beginning with a candidate, whose frame is handed over then, and the next frame.
+  [[nodiscard]] result<monocular_start_result<D>> reconstruct(candidate& c, const basic_frame<D>& f) const;
 
   const camera_rig<Camera>& rig_;
   const start_options& options_;
@@ -120,7 +122,7 @@ template <camera::camera_model Camera, feature_descriptor D>
 std::optional<monocular_start_result<D>> monocular_start<Camera, D>::see(const basic_frame<D>& f) {
   why_ = {errc::no_data, "start of a map", "no frame before it has enough matches"};
   std::erase_if(candidates_, [&](candidate& c) { return !follow(c, f); });
-  for (const candidate& c : candidates_) {
+  for (candidate& c : candidates_) {
     auto start = reconstruct(c, f);
     if (start) {
       reset();
@@ -133,8 +135,7 @@ std::optional<monocular_start_result<D>> monocular_start<Camera, D>::see(const b
 }
 
 template <camera::camera_model Camera, feature_descriptor D>
-result<monocular_start_result<D>> monocular_start<Camera, D>::reconstruct(const candidate& c,
-                                                                          const basic_frame<D>& f) const {
+result<monocular_start_result<D>> monocular_start<Camera, D>::reconstruct(candidate& c, const basic_frame<D>& f) const {
   std::vector<vec2> first, second;
   std::vector<double> deviations;
   for (const features::match& m : c.matches) {
@@ -150,10 +151,9 @@ result<monocular_start_result<D>> monocular_start<Camera, D>::reconstruct(const 
                                        .seed = seed_},
                                       deviations);
   if (!found) return fail(found.error());
-  monocular_start_result<D> start{
-      c.frame, f, {}, found->parallax, found->rotation_deviation, found->direction_deviation};
+  monocular_start_result<D> start{std::move(c.frame), found->T_first_second,     {},
+                                  found->parallax,    found->rotation_deviation, found->direction_deviation};
   start.first.T_world_camera = se3();
-  start.second.T_world_camera = found->T_first_second;
   for (std::size_t i = 0; i != found->points.size(); ++i) {
     const features::match& m = c.matches[found->matches[i]];
     start.points.push_back({m.query, m.train, found->points[i]});
