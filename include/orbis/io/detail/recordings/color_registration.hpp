@@ -50,7 +50,7 @@ class color_registration {
   color_registration(const color_camera& color, const camera::pinhole& depth)
       : color_{color},
         depth_{depth},
-        shrink_{std::max(1, static_cast<int>(std::lround(color.model.k().fx / depth.k().fx)))} {}
+        shrink_{static_cast<int>(std::lround(std::clamp(color.model.k().fx / depth.k().fx, 1.0, most(color.model))))} {}
 
   /// Whether `register_color` wants the depth image: the two cameras are more than a tenth of a millimetre apart.
   [[nodiscard]] bool needs_depth() const noexcept { return color_.T_color_depth.translation().norm() > 1e-4; }
@@ -78,6 +78,10 @@ class color_registration {
   }
 
  private:
+  /// A pixel is to be left.
+  [[nodiscard]] static double most(const camera::pinhole& color) {
+    return std::max(1, std::min(color.width(), color.height()));
+  }
   /// Bilinear, at `pixel` of the image that was not reduced.
   void sample(image_view<const rgb8> from, const vec2& pixel, rgb8& to) const {
     const vec2 at = (pixel.array() + 0.5) / shrink_ - 0.5;
