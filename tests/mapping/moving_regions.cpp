@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include <orbis/camera/depth.hpp>
@@ -67,6 +69,17 @@ TEST_CASE("Few marks that move take nothing out, nor do marks beside what was me
   CHECK_FALSE(found.find(metres(nothing), marks_in(50, 30, 70, 90, true)));
   CHECK_FALSE(found.find(metres(depth), marks_in(-20, -20, -5, -5, true) + marks_in(160, 120, 170, 125, true)));
   CHECK_FALSE(found.find(metres(depth), marks_in(39, 40, 39, 80, true)));  // at the board's edge
+}
+
+TEST_CASE("Marks that are nowhere in the image are passed over") {
+  const image<std::uint16_t> depth = board_before_wall();
+  regions found{model};
+  std::vector<marked_pixel> marks;
+  for (const float far : {1e30F, -1e30F, std::numeric_limits<float>::infinity(), std::nanf(""), 160.0F, -1.0F}) {
+    marks.push_back({far, 50.0F, true});
+    marks.push_back({60.0F, far, true});
+  }
+  CHECK_FALSE(found.find(metres(depth), marks));
 }
 
 TEST_CASE("One surface is divided between the marks that move and those that do not") {

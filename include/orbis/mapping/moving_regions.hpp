@@ -139,10 +139,11 @@ class moving_regions {
     label_.assign(grid_.size(), label::unknown);
     open_.clear();
     for (const marked_pixel& m : marks) {
-      const int x = static_cast<int>(m.x + 0.5F) / detail::cell_grid::edge,
-                y = static_cast<int>(m.y + 0.5F) / detail::cell_grid::edge;
-      if (!(m.x >= 0.0F && m.y >= 0.0F) || x >= grid_.across || y >= grid_.down) continue;
-      const auto cell = static_cast<std::size_t>(y * grid_.across + x);
+      constexpr float edge = detail::cell_grid::edge;
+      const float x = (m.x + 0.5F) / edge, y = (m.y + 0.5F) / edge;
+      if (!(m.x >= 0.0F && m.y >= 0.0F && x < static_cast<float>(grid_.across) && y < static_cast<float>(grid_.down)))
+        continue;
+      const auto cell = static_cast<std::size_t>(static_cast<int>(y) * grid_.across + static_cast<int>(x));
       if (depth_[cell] == 0.0F) continue;
       // At an edge it is not clear which of the surfaces a mark is for.
       if (around(cell, [](std::size_t) {}))
