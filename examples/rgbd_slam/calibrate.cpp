@@ -69,7 +69,7 @@ std::optional<orbis::error> find_trouble(const settings& s, const frame_source& 
 
 }  // namespace
 
-exit_code calibrate(settings s, console& console) {
+exit_code calibrate(const settings& s, console& console) {
   const auto give_up = [&](const orbis::error& e) {
     console.error(e);
     return e.code == orbis::errc::degenerate ? undetermined

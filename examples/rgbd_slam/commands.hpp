@@ -8,10 +8,10 @@
 
 namespace app {
 
-[[nodiscard]] exit_code run_slam(settings s, console& console);          ///< run, demo, live
-[[nodiscard]] exit_code evaluate(const settings& s, console& console);   ///< eval
-[[nodiscard]] exit_code map_without_slam(settings s, console& console);  ///< map
-[[nodiscard]] exit_code plan(const settings& s, console& console);       ///< plan
-[[nodiscard]] exit_code calibrate(settings s, console& console);         ///< calibrate
+[[nodiscard]] exit_code run_slam(const settings& s, console& console);          ///< run, demo, live
+[[nodiscard]] exit_code evaluate(const settings& s, console& console);          ///< eval
+[[nodiscard]] exit_code map_without_slam(const settings& s, console& console);  ///< map
+[[nodiscard]] exit_code plan(const settings& s, console& console);              ///< plan
+[[nodiscard]] exit_code calibrate(const settings& s, console& console);         ///< calibrate
 
 }  // namespace app

@@ -31,7 +31,7 @@ live_mapping::live_mapping(const frame_source& source, const settings& s, std::f
       depth_scale_{source.camera.depth_scale},
       waits_{s.threads == 1},
       rays_{source.camera.model},
-      points_{point_options(dense_options(s))},
+      points_{point_options(dense_options(source, s))},
       live_{source.camera.model,
             thread_options(s),
             {.started = [] { lower_priority(live_map_niceness); },

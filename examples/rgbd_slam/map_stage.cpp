@@ -67,10 +67,10 @@ std::vector<voxel> occupied_voxels(const tree& map, const orbis::point_cloud& cl
 
 }  // namespace
 
-orbis::mapping::dense_options dense_options(const settings& s) {
+orbis::mapping::dense_options dense_options(const frame_source& source, const settings& s) {
   orbis::mapping::dense_options options;
   options.stride = point_stride;
-  options.max_depth = static_cast<float>(s.depth_limit());
+  options.max_depth = static_cast<float>(source.depth_limit(s));
   // Finer than the octree's voxels, so that these see every surface; memory follows what there is to
   // see, not how long it was looked at.
   options.voxel_size = s.resolution / 5;
@@ -82,7 +82,7 @@ result<built_map> map_frames(const posed_frames& frames, const frame_source& sou
                              const settings& s, console& console) {
   console.stage("mapping");
   orbis::mapping::map_options options{
-      .dense = dense_options(s), .filter = filter_options(s), .resolution = s.resolution};
+      .dense = dense_options(source, s), .filter = filter_options(s), .resolution = s.resolution};
   if (options.filter.kind == orbis::mapping::filter_kind::automatic) options.moving.emplace();
   orbis::thread_pool threads{s.threads};
   const auto policy = orbis::par.on(threads);

@@ -20,7 +20,7 @@ using built_map = orbis::mapping::built_map<orbis::octree::occupancy_octree<>>;
 using live_octree = orbis::mapping::live_map<orbis::octree::occupancy_octree<>, orbis::camera::any_camera>;
 
 /// Which pixels of a keyframe become points, and how dense these are.
-[[nodiscard]] orbis::mapping::dense_options dense_options(const settings& s);
+[[nodiscard]] orbis::mapping::dense_options dense_options(const frame_source& source, const settings& s);
 /// Keyframes -> dense cloud -> filter -> octree; by the map that grew while they were made, if there is one.
 [[nodiscard]] orbis::result<built_map> map_frames(const posed_frames& frames, const frame_source& source,
                                                   live_octree* live, const settings& s, console& console);

@@ -183,7 +183,7 @@ exit_code evaluate(const settings& s, console& console) {
   return done;
 }
 
-exit_code map_without_slam(settings s, console& console) {
+exit_code map_without_slam(const settings& s, console& console) {
   const auto give_up = [&](const orbis::error& e) { return console.error(e), bad_input; };
   std::error_code ignored;
   std::optional<frame_source> recording;

@@ -74,7 +74,8 @@ results begin_results(const settings& s, const std::string& title, const frame_s
   }
   if (s.localize_only || (source != nullptr && source->is_monocular())) return r;
   r.setup.emplace_back(
-      "octree", number("%g cm voxels", 100 * s.resolution) + number(", measurements up to %g m", s.depth_limit()));
+      "octree", number("%g cm voxels", 100 * s.resolution) +
+                    number(", measurements up to %g m", source != nullptr ? source->depth_limit(s) : s.depth_limit()));
   r.setup.emplace_back("filter asked for", filter_in_words(s));
   return r;
 }

@@ -14,7 +14,7 @@
 
 namespace app {
 
-exit_code run_slam(settings s, console& console) {
+exit_code run_slam(const settings& s, console& console) {
   const auto give_up = [&](const orbis::error& e) { return console.error(e), bad_input; };
 
   // Read.

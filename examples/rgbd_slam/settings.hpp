@@ -25,6 +25,9 @@ enum exit_code : int {
   interrupted = 130
 };
 
+/// Of depth that enters a map, metres.
+inline constexpr double usual_max_depth = 4.0;
+
 enum class command { run, demo, eval, map, plan, calibrate, live };
 
 struct settings {
@@ -52,8 +55,7 @@ struct settings {
   bool refines_camera = true;            ///< where the recording does not fit it
   bool distortion = false;               ///< of the lens, is estimated where the camera has none (calibrate)
   double resolution = 0.05;              ///< octree, metres
-  std::optional<double> max_depth;       ///< depth beyond this is left out of the map, metres; empty: `usual_max_depth`
-  double usual_max_depth = 4.0;          ///< metres; `open_source` sets that of the camera
+  std::optional<double> max_depth;       ///< depth beyond this is left out of the map, metres; empty: as is usual
   std::string filter = "auto";           ///< one of `filter_names`
   std::optional<std::size_t> neighbors;  ///< empty: the filter's own number
   double sigma = 1.0;
@@ -89,8 +91,8 @@ struct settings {
   bool json = false;
   bool with_scale = false;  ///< lengths of the estimate are in a unit of their own
 
-  /// Depth beyond this is left out of the map, metres.
-  [[nodiscard]] double depth_limit() const { return max_depth.value_or(usual_max_depth); }
+  /// Depth beyond this is left out of the map, metres, if beyond `usual` is where nothing is asked for.
+  [[nodiscard]] double depth_limit(double usual = usual_max_depth) const { return max_depth.value_or(usual); }
 };
 
 /// Whether a camera is named by its file rather than by its name.

@@ -46,12 +46,11 @@ source_frame without_depth(double timestamp, orbis::image<orbis::rgb8> color) {
   f.color = std::move(color);
   return f;
 }
-source_frame with_right(orbis::camera::stereo_frame pair, double depth_scale) {
+source_frame with_right(orbis::camera::stereo_frame pair) {
   source_frame f;
   f.timestamp = pair.timestamp;
   f.color = std::move(pair.left);
   f.right = std::move(pair.right);
-  f.depth_scale = depth_scale;
   f.T_world_camera = pair.T_world_camera;
   return f;
 }
@@ -110,7 +109,7 @@ result<frame_source> open_stereo_recording(const settings& s) {
   source.frame = [recording, origin, stride = s.stride](std::size_t i) -> result<source_frame> {
     auto pair = moved(recording->frame(i * stride), origin);
     if (!pair) return fail(pair.error());
-    return with_right(*std::move(pair), recording->camera().depth_scale);
+    return with_right(*std::move(pair));
   };
   source.color = [recording, stride = s.stride](std::size_t i) { return recording->left(i * stride); };
   return source;
@@ -323,12 +322,12 @@ frame_source make_synthetic(const settings& s) {
                                        : sensor_kind::rgbd;
   source.camera = source.is_stereo() ? recording->stereo_camera() : recording->camera();
   source.frames = limited(recording->size(), s);
-  source.frame = [frames_of, stride = s.stride, stereo = source.is_stereo(), mono = source.is_monocular(),
-                  scale = source.camera.depth_scale](std::size_t i) -> result<source_frame> {
+  source.frame = [frames_of, stride = s.stride, stereo = source.is_stereo(),
+                  mono = source.is_monocular()](std::size_t i) -> result<source_frame> {
     if (stereo) {
       auto pair = frames_of->get()->stereo_frame(i * stride);
       if (!pair) return fail(pair.error());
-      return with_right(*std::move(pair), scale);
+      return with_right(*std::move(pair));
     }
     auto frame = frames_of->get()->frame(i * stride);
     if (!frame) return fail(frame.error());
@@ -351,14 +350,15 @@ frame_source make_synthetic(const settings& s) {
 result<void> check_resolution(frame_source& source, const settings& s) {
   const orbis::camera::intrinsics& k = source.camera.model.k();
   if (source.frames == 0 || source.is_monocular() || source.is_live) return {};  // a camera's frames are seen once
-  if (!examples::voxels_of_depth(k, [&](std::size_t) { return s.depth_limit(); }).takes_long(s.resolution)) return {};
+  if (!examples::voxels_of_depth(k, [&](std::size_t) { return source.depth_limit(s); }).takes_long(s.resolution))
+    return {};
   auto first = source.frame(0);
   if (!first) return {};  // whoever needs it will say why
   source.complete(*first);
   const auto pixels = first->depth.pixels();
   const auto voxels = examples::voxels_of_depth(k, [&](std::size_t i) {
     const double z = pixels[i] / first->depth_scale;
-    return z > s.depth_limit() ? 0.0 : z;
+    return z > source.depth_limit(s) ? 0.0 : z;
   });
   if (!voxels.takes_long(s.resolution)) return {};
   const std::string text = voxels.in_words(s.resolution, "the first frame alone");
@@ -390,7 +390,7 @@ std::string origin_note(const orbis::vec3& origin) {
   return text;
 }
 
-result<frame_source> open_source(settings& s, console& console) {
+result<frame_source> open_source(const settings& s, console& console) {
   console.stage("opening");
   std::error_code ignored;
   const auto open = [&] {
@@ -404,10 +404,18 @@ result<frame_source> open_source(settings& s, console& console) {
   };
   auto source = s.what == command::demo ? result<frame_source>{make_synthetic(s)} : open();
   if (!source) return source;
-  // As far as a quarter of a pixel of disparity is about a hundredth of the depth.
-  constexpr double baselines = 20.0;
-  if (source->is_stereo())
-    s.usual_max_depth = std::max(s.usual_max_depth, baselines * source->camera.baseline.value_or(0.0));
+  if (source->is_stereo()) {
+    // As far as a quarter of a pixel of disparity is about a hundredth of the depth.
+    constexpr double baselines = 20.0;
+    source->usual_max_depth = std::max(source->usual_max_depth, baselines * source->camera.baseline.value_or(0.0));
+    // Depth is made here: in millimetres, or in coarser steps where these do not reach as far.
+    source->camera.depth_scale = std::min(1000.0, 65000.0 / source->depth_limit(s));
+  }
+  if (source->is_monocular()) {
+    const bool rolls =
+        s.read_out_ms ? *s.read_out_ms != 0.0 : !source->camera.shutter.value_or(orbis::camera::shutter{}).is_global();
+    if (rolls) source->notes.emplace_back("without depth a rolling shutter is not corrected for");
+  }
   if (!s.localize_only)
     if (auto fine = check_resolution(*source, s); !fine) return fail(fine.error());
   console.finish(describe(*source));
@@ -416,7 +424,9 @@ result<frame_source> open_source(settings& s, console& console) {
 }
 
 void frame_source::complete(source_frame& f) const {
-  if (is_stereo() && f.depth.empty()) f.depth = stereo_depth(f.color.view(), f.right.view(), camera);
+  if (!is_stereo() || !f.depth.empty()) return;
+  f.depth = stereo_depth(f.color.view(), f.right.view(), camera);
+  f.depth_scale = camera.depth_scale;
 }
 
 result<source_frame> read_ahead::next() {

@@ -21,8 +21,9 @@
 
 namespace app {
 
-/// A frame with depth, or the two images of a stereo camera: then `color` is the left one, and `depth` is empty until
-/// `frame_source::complete` makes it; or the image of one camera, which never has depth.
+/// A frame with depth, or the two images of a stereo camera: then `color` is the left one, and `depth` is empty, and
+/// `depth_scale` of no meaning, until `frame_source::complete` makes it; or the image of one camera, which never has
+/// depth.
 struct source_frame : orbis::camera::rgbd_frame {
   orbis::image<orbis::rgb8> right;  ///< empty unless the sensor is a stereo camera
 };
@@ -31,6 +32,9 @@ struct frame_source {
   std::string title, kind;
   orbis::camera::camera_settings camera;
   bool camera_is_refined = false;  ///< by the recording itself
+  double usual_max_depth = app::usual_max_depth;  ///< of its depth that enters a map, metres
+  /// Depth beyond this is left out of the map, metres.
+  [[nodiscard]] double depth_limit(const settings& s) const { return s.depth_limit(usual_max_depth); }
   orbis::slam::sensor_kind sensor = orbis::slam::sensor_kind::rgbd;
   [[nodiscard]] bool is_stereo() const { return sensor == orbis::slam::sensor_kind::stereo; }
   /// One camera without depth: lengths are in a unit of their own, and there is no dense map.
@@ -61,8 +65,8 @@ struct frame_source {
 /// What a user is told about it.
 [[nodiscard]] std::string origin_note(const orbis::vec3& origin);
 
-/// The recording that the settings name; says what it is, and sets `usual_max_depth`.
-[[nodiscard]] orbis::result<frame_source> open_source(settings& s, console& console);
+/// The recording that the settings name; says what it is.
+[[nodiscard]] orbis::result<frame_source> open_source(const settings& s, console& console);
 
 /// Reads the frames of a source in order, one ahead of who asks.
 class read_ahead {

@@ -19,6 +19,12 @@ check(ate LESS 0.01)
 summary(scale ${WORK}/demo scale)
 check(scale GREATER 1.2)
 
+# What is not corrected for is said.
+app(3 demo --sensor mono --frames 3 --read-out-ms 30 --out rolling)
+check(err MATCHES "without depth a rolling shutter is not corrected for")
+app(3 demo --sensor mono --frames 3 --read-out-ms 0 --out global)
+check(NOT err MATCHES "rolling shutter")
+
 # The map of landmarks is used again, by one camera only.
 app(0 demo --sensor mono --frames 20 --load-map room.map --localize-only --deterministic --out again)
 summary(found ${WORK}/again tracked)

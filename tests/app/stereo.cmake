@@ -14,6 +14,11 @@ check(map_error LESS 0.15)
 summary(points ${WORK}/demo cloud points)
 check(points GREATER 10000)
 
+# Depth beyond what millimetres in 16 bits reach is kept in coarser steps.
+app(0 demo --sensor stereo --frames 3 --width 160 --resolution 0.2 --filter none --max-depth 130 --out far)
+file(READ ${WORK}/far/report.html page)
+check(page MATCHES "depth / 500 = metres" AND page MATCHES "measurements up to 130 m")
+
 # A folder that is neither: both kinds are named.
 file(MAKE_DIRECTORY ${WORK}/nothing)
 app_fails(2 "rgb.txt and depth.txt.*and no known stereo recording: neither image_0" run nothing --out out)

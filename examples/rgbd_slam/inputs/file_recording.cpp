@@ -9,11 +9,10 @@ namespace app {
 using orbis::errc;
 using orbis::fail;
 
-source_frame side_by_side(double timestamp, const orbis::image<orbis::rgb8>& both, double depth_scale) {
+source_frame side_by_side(double timestamp, const orbis::image<orbis::rgb8>& both) {
   assert(both.width() % 2 == 0);
   source_frame f;
   f.timestamp = timestamp;
-  f.depth_scale = depth_scale;
   f.color = orbis::image<orbis::rgb8>(both.width() / 2, both.height());
   f.right = f.color;
   for (int y = 0; y != both.height(); ++y) {

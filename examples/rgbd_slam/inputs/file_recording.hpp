@@ -60,7 +60,7 @@ struct file_recording_options {
                                                                       const file_recording_options& options);
 
 /// The left and the right half of an image. @pre its width is even
-[[nodiscard]] source_frame side_by_side(double timestamp, const orbis::image<orbis::rgb8>& both, double depth_scale);
+[[nodiscard]] source_frame side_by_side(double timestamp, const orbis::image<orbis::rgb8>& both);
 
 /// Whether a camera's settings do for a sensor; where not, why. `width`, `height`: of an image (both, if two stand side
 /// by side).

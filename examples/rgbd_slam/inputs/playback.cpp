@@ -66,7 +66,6 @@ result<std::unique_ptr<camera_device>> open_playback(const device_options& optio
                   f.timestamp = pair->timestamp;
                   f.color = std::move(pair->left);
                   f.right = std::move(pair->right);
-                  f.depth_scale = r.camera().depth_scale;
                   return f;
                 });
   }

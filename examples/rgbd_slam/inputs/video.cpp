@@ -32,7 +32,7 @@ class video_recording final : public file_recording {
   [[nodiscard]] result<source_frame> frame(std::size_t i) const override {
     auto image = read(i);
     if (!image) return fail(image.error());
-    if (sensor == orbis::slam::sensor_kind::stereo) return side_by_side(times_[i], *image, camera.depth_scale);
+    if (sensor == orbis::slam::sensor_kind::stereo) return side_by_side(times_[i], *image);
     source_frame f;
     f.timestamp = times_[i];
     f.color = *std::move(image);

@@ -33,8 +33,7 @@ class video_camera final : public camera_device {
     if (!converted) return fail(converted.error());
     if (auto fits = check_camera(camera, sensor, converted->width(), converted->height(), name); !fits)
       return fail(fits.error());
-    if (sensor == orbis::slam::sensor_kind::stereo)
-      return std::optional{side_by_side(time, *converted, camera.depth_scale)};
+    if (sensor == orbis::slam::sensor_kind::stereo) return std::optional{side_by_side(time, *converted)};
     source_frame f;
     f.timestamp = time;
     f.color = *std::move(converted);
