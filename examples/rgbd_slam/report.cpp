@@ -266,7 +266,7 @@ std::string words(const std::vector<std::pair<std::string, std::string>>& rows) 
 }
 
 /// "4, 100 ... 120": the first stretches, and how many more there are.
-std::string stretches(const std::vector<frame_range>& ranges) {
+std::string stretches(std::span<const frame_range> ranges) {
   constexpr std::size_t most = 12;
   std::string list;
   for (std::size_t i = 0; i != std::min(ranges.size(), most); ++i) {
@@ -289,7 +289,7 @@ std::string tracking_words(const slam_results& s) {
   if (s.maps_merged != 0) rows.emplace_back("maps merged", count_text(s.maps_merged));
   if (s.dropped) rows.emplace_back("dropped", count_text(*s.dropped) + " frames of the camera, which was ahead");
   rows.emplace_back("lost", s.lost == 0 ? std::string{"never"}
-                                        : count_text(s.lost) + " frames (" + stretches(s.lost_stretches) + ")");
+                                        : count_text(s.lost) + " frames (" + stretches(s.lost_frames.ranges()) + ")");
   if (s.relocalized != 0)
     rows.emplace_back("found by looks", count_text(s.relocalized) + " frames, without a pose before");
   return "<h2>Tracking</h2>\n" + words(rows);

@@ -18,6 +18,8 @@
 #include <orbis/core/trajectory.hpp>
 #include <orbis/slam/frame.hpp>
 
+#include "frame_ranges.hpp"
+
 namespace app {
 
 /// Median, 95th percentile and mean of a list; NaN where it is empty.
@@ -87,11 +89,6 @@ struct intrinsics_results {
   double fx = 0.0, fy = 0.0, cx = 0.0, cy = 0.0;
 };
 
-/// Frames one after the other.
-struct frame_range {
-  std::size_t first = 0, count = 0;
-};
-
 struct slam_results {
   orbis::slam::sensor_kind sensor = orbis::slam::sensor_kind::rgbd;
   std::size_t keyframes_made = 0;
@@ -102,7 +99,7 @@ struct slam_results {
   std::size_t loops_closed = 0, maps_merged = 0, keyframes_culled = 0;
   shutter_results shutter;
   intrinsics_results intrinsics;
-  std::vector<frame_range> lost_stretches;
+  frame_ranges lost_frames;
   std::vector<double> tracking_ms;  ///< of each frame: until tracking is ready for the next one
   std::vector<double> slam_ms;      ///< of it, in SLAM
   double seconds = 0.0;             ///< reading and tracking

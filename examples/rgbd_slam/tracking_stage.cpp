@@ -126,11 +126,7 @@ void track_frames(slam_system& slam, const frame_source& source, const settings&
     viewer.show([&] { return handed_over(slam, i, found, took(), *std::move(frame)); });
     out.slam.tracking_ms.push_back(took());
     viewer.tell_trouble(console);
-    if (found.state == track_state::lost) {
-      auto& lost = out.slam.lost_stretches;
-      if (lost.empty() || lost.back().first + lost.back().count != i) lost.push_back({i, 0});
-      ++lost.back().count;
-    }
+    if (found.state == track_state::lost) out.slam.lost_frames.add(i);
     console.advance(i + 1, source.frames,
                     std::string{to_string(found.state)} + ", " + std::to_string(out.slam.keyframes_made) +
                         " keyframes" + (source.dropped ? ", " + std::to_string(source.dropped()) + " dropped" : ""));
@@ -285,7 +281,10 @@ orbis::result<tracked_frames> track(const frame_source& source, const shutter_re
                                : "\nrgbd_slam: stopping; what was reached is mapped and written. Once more: stop at "
                                  "once, and leave the folder as it was\n");
   upright_worlds worlds{source, s};
-  slam.listen({.keyframe_made = [&out](const auto&) { ++out.slam.keyframes_made; }});
+  slam.listen({.keyframe_made = [&out](const orbis::slam::keyframe_event& made) {
+    ++out.slam.keyframes_made;
+    out.slam.lost_frames.remove(made.frame);  // the first of two frames that a map without depth begins with
+  }});
   track_frames(slam, source, s, shutter.shutter, worlds, out, viewer, console);
   slam.wait();
   if (out.live) out.live->stop();

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Frames as stretches of frames one after the other.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <span>
+#include <vector>
+
+namespace app {
+
+/// Frames one after the other.
+struct frame_range {
+  std::size_t first = 0, count = 0;
+  friend bool operator==(const frame_range&, const frame_range&) = default;
+};
+
+class frame_ranges {
+ public:
+  /// @pre no frame from this one on was added
+  void add(std::size_t frame) {
+    if (ranges_.empty() || ranges_.back().first + ranges_.back().count != frame) ranges_.push_back({frame, 0});
+    ++ranges_.back().count;
+  }
+  /// Takes a frame out, if it is one of them.
+  void remove(std::size_t frame) {
+    const auto at = std::find_if(ranges_.begin(), ranges_.end(),
+                                 [&](const frame_range& r) { return r.first <= frame && frame < r.first + r.count; });
+    if (at == ranges_.end()) return;
+    const frame_range after{frame + 1, at->first + at->count - frame - 1};
+    at->count = frame - at->first;
+    const auto next = at->count == 0 ? ranges_.erase(at) : at + 1;
+    if (after.count != 0) ranges_.insert(next, after);
+  }
+  /// Ascending.
+  [[nodiscard]] std::span<const frame_range> ranges() const noexcept { return ranges_; }
+
+ private:
+  std::vector<frame_range> ranges_;
+};
+
+}  // namespace app
