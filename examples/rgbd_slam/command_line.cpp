@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "command_line.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <sstream>
@@ -285,8 +286,21 @@ std::string in_this_build() {
          "\nFrames that come while the last one is tracked are dropped, and counted in summary.json.";
 }
 
+/// That a sensor's recordings do not come in a layout; empty if they do.
+std::string wrong_format(const settings& s) {
+  using list = std::vector<std::string>;
+  const list formats = s.sensor == "rgbd"     ? list{"tum", "7scenes", "icl", "scannet"}
+                       : s.sensor == "stereo" ? list{"kitti", "asl", "pairs"}
+                       : s.sensor == "mono"   ? list{"tum", "kitti", "asl", "images"}
+                                              : list{s.format};
+  if (s.format == "auto" || std::find(formats.begin(), formats.end(), s.format) != formats.end()) return {};
+  return "--format " + s.format + " is not for --sensor " + s.sensor + ", which has " +
+         CLI::detail::join(formats, ", ");
+}
+
 /// What of the options does not go together; empty if all does.
 std::string contradiction(const settings& s) {
+  if (std::string wrong = wrong_format(s); !wrong.empty()) return wrong;
   if (s.localize_only && s.load_map.empty())
     return "--localize-only wants a map to find the camera in: --load-map FILE";
   if (s.map_every_frame && (!s.live_map || s.localize_only))

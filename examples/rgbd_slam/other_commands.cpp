@@ -190,6 +190,8 @@ exit_code map_without_slam(const settings& s, console& console) {
   if (std::filesystem::is_directory(s.input, ignored)) {
     auto source = open_source(s, console);
     if (!source) return give_up(source.error());
+    if (source->is_monocular())
+      return give_up({orbis::errc::unsupported, s.input.string(), "one camera without depth gives no map"});
     recording = *std::move(source);
   }
   const auto inputs = inputs_of(s, recording ? recording->files : std::vector<std::filesystem::path>{});

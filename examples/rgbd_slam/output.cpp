@@ -117,14 +117,14 @@ orbis::error explain_no_start(const results& r, const settings& s) {
               : "tracking never started: none of " + frames + "shows enough texture with depth"};
 }
 
-exit_code report_no_start(results& r, const orbis::error& why, result_files& files, console& console) {
+exit_code report_no_start(results& r, const orbis::error& why, exit_code code, result_files& files, console& console) {
   list_files(r, files, {"summary.json"}, console);
   r.wall_s = console.total();
   auto done = write_summary(r);
   if (done) done = files.put_in_place();
   if (!done) return console.error(done.error()), bad_input;
   console.error(why);
-  return never_tracked;
+  return code;
 }
 
 void print_results(const results& r, console& console) {

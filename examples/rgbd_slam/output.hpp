@@ -25,7 +25,8 @@ namespace app {
 /// That no frame had what it takes.
 [[nodiscard]] orbis::error explain_no_start(const results& r, const settings& s);
 /// Where not a single frame was tracked: summary.json, `why` as a line on stderr, and the code for it.
-[[nodiscard]] exit_code report_no_start(results& r, const orbis::error& why, result_files& files, console& console);
+[[nodiscard]] exit_code report_no_start(results& r, const orbis::error& why, exit_code code, result_files& files,
+                                        console& console);
 /// The tables, and where the files are, on the terminal.
 void print_results(const results& r, console& console);
 

@@ -49,7 +49,11 @@ exit_code run_slam(const settings& s, console& console) {
     return give_up({orbis::errc::cancelled, s.out.string(), "interrupted before a frame was tracked: left as it was"}),
            interrupted;
   if (r.slam->tracked == 0)
-    return report_no_start(r, tracked.missed_map ? explain_miss(tracked, s) : explain_no_start(r, s), *files, console);
+    return report_no_start(r,
+                           tracked.stopped      ? explain_stop(tracked, *source)
+                           : tracked.missed_map ? explain_miss(tracked, s)
+                                                : explain_no_start(r, s),
+                           tracked.stopped ? bad_input : never_tracked, *files, console);
   if (auto done = write_trajectories(*r.slam, files->folder()); !done) return give_up(done.error());
 
   // Keyframes -> dense cloud -> filter -> octree -> floor map, path -> files.

@@ -34,6 +34,12 @@ result<orbis::camera::camera_settings> named_camera(const std::string& name) {
   return is_file_name(name) ? orbis::io::read_camera(name) : orbis::camera::preset(name);
 }
 
+/// Where a reader asks for a camera: by which option it is named.
+orbis::error with_option(orbis::error e) {
+  if (e.message.ends_with("name a camera")) e.message += " with --camera";
+  return e;
+}
+
 std::size_t limited(std::size_t available, const settings& s) {
   const std::size_t every = (available + s.stride - 1) / s.stride;
   return s.frames == 0 ? every : std::min(every, s.frames);
@@ -101,7 +107,7 @@ result<frame_source> open_stereo_recording(const settings& s) {
     options.camera = *std::move(camera);
   }
   auto opened = orbis::io::open_stereo_recording(s.input, options);
-  if (!opened) return fail(opened.error());
+  if (!opened) return fail(with_option(opened.error()));
   const auto recording = std::make_shared<const orbis::io::stereo_recording>(*std::move(opened));
   frame_source source = describe(*recording, "stereo recording", s);
   source.sensor = sensor_kind::stereo;
@@ -129,8 +135,7 @@ result<frame_source> open_recording(const settings& s) {
   }
   auto opened = orbis::io::open_recording(s.input, options);
   if (!opened) {
-    orbis::error e = opened.error();
-    if (e.code == orbis::errc::invalid_argument && s.camera.empty()) e.message += " with --camera";
+    orbis::error e = with_option(opened.error());
     if (e.code == orbis::errc::unsupported && s.sensor == "auto" && s.format == "auto") {
       const auto add = [&](const orbis::error& other) {
         if (other.message == e.message) return;  // what there is in the folder is said once
@@ -167,11 +172,7 @@ result<frame_source> open_mono_recording(const settings& s) {
     options.camera = *std::move(camera);
   }
   auto opened = orbis::io::open_mono_recording(s.input, options);
-  if (!opened) {
-    orbis::error e = opened.error();
-    if (e.code == orbis::errc::invalid_argument && s.camera.empty()) e.message += " with --camera";
-    return fail(std::move(e));
-  }
+  if (!opened) return fail(with_option(opened.error()));
   const auto recording = std::make_shared<const orbis::io::mono_recording>(*std::move(opened));
   frame_source source = describe(*recording, "recording of one camera", s);
   source.sensor = sensor_kind::monocular;
@@ -198,7 +199,7 @@ result<frame_source> open_file(const settings& s) {
     options.camera = *std::move(camera);
   }
   auto opened = s.input.extension() == ".bag" ? open_bag(s.input, options) : open_video(s.input, options);
-  if (!opened) return fail(opened.error());
+  if (!opened) return fail(with_option(opened.error()));
   const std::shared_ptr<const file_recording> recording = *std::move(opened);
   frame_source source;
   source.title = s.input.filename().string();
@@ -237,7 +238,7 @@ struct begun_on_demand {
 
 result<frame_source> open_live(const settings& s) {
   auto opened = open_device(s);
-  if (!opened) return fail(opened.error());
+  if (!opened) return fail(with_option(opened.error()));
   const auto feed = std::make_shared<begun_on_demand>();
   feed->device = *std::move(opened);
   frame_source source;
@@ -395,6 +396,9 @@ result<frame_source> open_source(const settings& s, console& console) {
   std::error_code ignored;
   const auto open = [&] {
     if (s.what == command::live) return open_live(s);
+    if (!s.topics.empty() && s.input.extension() != ".bag")
+      return result<frame_source>{
+          fail(orbis::errc::invalid_argument, "--topics", "is for ROS bags, and " + s.input.string() + " is none")};
     if (std::filesystem::is_regular_file(s.input, ignored)) return open_file(s);
     switch (sensor_of(s)) {
       case sensor_kind::stereo: return open_stereo_recording(s);

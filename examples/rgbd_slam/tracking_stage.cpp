@@ -324,7 +324,8 @@ orbis::result<tracked_frames> track(const frame_source& source, const shutter_re
 orbis::error explain_stop(const tracked_frames& tracked, const frame_source& source) {
   orbis::error e = *tracked.stopped;
   e.message += "; stopped after " + std::to_string(tracked.slam.frames) +
-               (source.is_live ? "" : " of " + std::to_string(source.frames)) + " frames, what they gave is kept";
+               (source.is_live ? "" : " of " + std::to_string(source.frames)) + " frames, " +
+               (tracked.slam.tracked == 0 ? "of which none could be tracked" : "what they gave is kept");
   return e;
 }
 

@@ -33,6 +33,9 @@ app_fails(1 "--radius" run good --out out --filter radius --radius nan)
 app_fails(1 "--neighbors" run good --out out --neighbors 0)
 app_fails(1 "--threads" run good --out out --threads 0)
 app_fails(1 "--format" run good --out out --format raw)
+app_fails(1 "--format kitti is not for --sensor rgbd, which has tum, 7scenes" run good --out out --sensor rgbd --format kitti)
+app_fails(1 "--format images is not for --sensor stereo" run good --out out --sensor stereo --format images)
+app_fails(1 "--format pairs is not for --sensor mono" run good --out out --sensor mono --format pairs)
 app_fails(1 "nikon" run good --out out --camera nikon)
 app_fails(1 "--origin" map cloud.ply --out out --origin 1,2)
 file(WRITE ${WORK}/unknown.toml "colour = 3\n")
@@ -128,6 +131,24 @@ must_exist(${WORK}/partial trajectory.txt cloud.ply map.bt summary.json report.h
 must_not_be_half_written(${WORK}/partial)
 summary(frames ${WORK}/partial frames)
 check(frames EQUAL 8)
+
+# Before anything could be tracked: what is wrong is the image, not that tracking never started.
+make_recording(${WORK}/dark_and_damaged 6 16)
+file(WRITE ${WORK}/dark_and_damaged/depth/000003.png "this is no picture")
+app_fails(2 "depth/000003.png: .*stopped after 3 of 6 frames, of which none could be tracked" run dark_and_damaged --out dark --quiet)
+summary(frames ${WORK}/dark frames)
+check(frames EQUAL 3)
+
+# What only some recordings have.
+app_fails(2 "--topics: is for ROS bags, and good is none" run good --out out --topics /a,/b)
+app_fails(2 "good: one camera without depth gives no map" map good --out out --sensor mono)
+foreach(sequence seq-01 seq-02)
+  file(COPY_FILE ${WORK}/good/rgb/000000.png ${WORK}/${sequence}.png)
+  file(COPY ${WORK}/${sequence}.png DESTINATION ${WORK}/scene/${sequence})
+  file(RENAME ${WORK}/scene/${sequence}/${sequence}.png ${WORK}/scene/${sequence}/frame-000000.color.png)
+endforeach()
+app_fails(2 "scene: holds 2 sequences, name one of them, for example seq-01" run scene --out out)
+check(NOT err MATCHES "--camera")
 
 # Clouds.
 app_fails(2 "cloud.ply: no such file" map cloud.ply --out out)
