@@ -208,13 +208,32 @@ result<frame_source> open_file(const settings& s) {
   source.sensor = recording->sensor;
   source.frames = limited(recording->size(), s);
   source.notes = recording->notes;
-  source.files = {s.input};
+  source.files = recording->files;
   source.frame = [recording, stride = s.stride](std::size_t i) { return recording->frame(i * stride); };
   source.color = [recording, stride = s.stride](std::size_t i) { return recording->color(i * stride); };
   return source;
 }
 
-/// A folder is played as if it were a camera; /dev/video0 and numbers are video cameras; anything else is OpenNI2's.
+/// What took the recording, where that is not said. A folder that has depth as well as a second camera is one with
+/// depth.
+sensor_kind sensor_of(const settings& s) {
+  if (const auto wanted = wanted_sensor(s)) return *wanted;
+  if (s.format == "images") return sensor_kind::monocular;
+  if (s.format == "kitti" || s.format == "asl" || s.format == "pairs") return sensor_kind::stereo;
+  std::error_code ignored;
+  for (const char* const depth : {"depth.txt", "associations.txt", "depth"})
+    if (std::filesystem::exists(s.input / depth, ignored)) return sensor_kind::rgbd;
+  using orbis::io::recording_format;
+  const auto with_depth = orbis::io::detect_format(s.input);  // which of TUM's would have had one of these lists
+  if (s.format != "auto" || (with_depth != recording_format::automatic && with_depth != recording_format::tum))
+    return sensor_kind::rgbd;
+  if (orbis::io::detect_stereo_format(s.input) != orbis::io::stereo_format::automatic) return sensor_kind::stereo;
+  return orbis::io::detect_mono_format(s.input) != orbis::io::mono_format::automatic ? sensor_kind::monocular
+                                                                                     : sensor_kind::rgbd;
+}
+
+/// A folder is played as if it were a camera; numbers and files in /dev are video cameras, and whatever is to be one
+/// without depth; anything else is OpenNI2's.
 result<std::unique_ptr<camera_device>> open_device(const settings& s) {
   device_options options{.name = s.input.string(), .sensor = wanted_sensor(s)};
   if (!s.camera.empty()) {
@@ -223,10 +242,13 @@ result<std::unique_ptr<camera_device>> open_device(const settings& s) {
     options.camera = *std::move(camera);
   }
   std::error_code ignored;
-  if (std::filesystem::is_directory(s.input, ignored)) return open_playback(options);
+  if (std::filesystem::is_directory(s.input, ignored)) {
+    options.sensor = sensor_of(s);
+    return open_playback(options);
+  }
   const bool is_number = !options.name.empty() && options.name.find_first_not_of("0123456789") == std::string::npos;
-  const bool wants_video = options.name.empty() && options.sensor && *options.sensor != sensor_kind::rgbd;
-  if (is_number || wants_video || options.name.starts_with("/dev/video")) return open_video_camera(options);
+  const bool wants_video = options.sensor && *options.sensor != sensor_kind::rgbd;
+  if (is_number || wants_video || options.name.starts_with("/dev/")) return open_video_camera(options);
   return open_openni(options);
 }
 
@@ -249,6 +271,7 @@ result<frame_source> open_live(const settings& s) {
   source.is_live = source.made = true;
   source.frames = s.frames == 0 ? std::numeric_limits<std::size_t>::max() : s.frames;
   source.notes = feed->device->notes;
+  source.files = feed->device->files;
   source.frame = [feed](std::size_t) {
     if (!feed->live) feed->live.emplace(std::move(feed->device));
     return feed->live->next([] { return interrupts::requested(); });
@@ -258,26 +281,6 @@ result<frame_source> open_live(const settings& s) {
   };
   source.dropped = [feed] { return feed->live ? feed->live->dropped() : std::size_t{0}; };
   return source;
-}
-
-/// What took the recording, where that is not said. A folder that has depth as well as a second camera is one with
-/// depth.
-sensor_kind sensor_of(const settings& s) {
-  if (s.sensor == "rgbd") return sensor_kind::rgbd;
-  if (s.sensor == "stereo") return sensor_kind::stereo;
-  if (s.sensor == "mono") return sensor_kind::monocular;
-  if (s.format == "images") return sensor_kind::monocular;
-  if (s.format == "kitti" || s.format == "asl" || s.format == "pairs") return sensor_kind::stereo;
-  std::error_code ignored;
-  for (const char* const depth : {"depth.txt", "associations.txt", "depth"})
-    if (std::filesystem::exists(s.input / depth, ignored)) return sensor_kind::rgbd;
-  using orbis::io::recording_format;
-  const auto with_depth = orbis::io::detect_format(s.input);  // which of TUM's would have had one of these lists
-  if (s.format != "auto" || (with_depth != recording_format::automatic && with_depth != recording_format::tum))
-    return sensor_kind::rgbd;
-  if (orbis::io::detect_stereo_format(s.input) != orbis::io::stereo_format::automatic) return sensor_kind::stereo;
-  return orbis::io::detect_mono_format(s.input) != orbis::io::mono_format::automatic ? sensor_kind::monocular
-                                                                                     : sensor_kind::rgbd;
 }
 
 /// A synthetic recording whose textures, most of its memory, can be dropped.

@@ -54,7 +54,8 @@ class camera_pace {
  public:
   void wait_for(double timestamp) {
     if (!std::exchange(has_begun_, true)) first_ = timestamp;
-    const std::chrono::duration<double> since_first{timestamp - first_};
+    constexpr double longest = 1e6;  // seconds, which a clock can count
+    const std::chrono::duration<double> since_first{std::min(timestamp - first_, longest)};
     std::this_thread::sleep_until(begin_ + std::chrono::duration_cast<console::clock::duration>(since_first));
   }
 

@@ -25,6 +25,9 @@ file(READ ${WORK}/recorded/summary.json text)
 string(JSON kind TYPE "${text}" dropped)
 check(kind STREQUAL NULL)
 
+# Its files are not written over.
+app_fails(1 "room/rgb.txt: is an input of this run" live room --resolution 0.1 --out out --save-map room/rgb.txt)
+
 # After so many frames.
 app(0 live room --frames 3 --resolution 0.1 --filter none --quiet --out three)
 summary(frames ${WORK}/three frames)
@@ -39,6 +42,9 @@ app(2 live room --resolution 0.1 --filter none --out out)
 check(err MATCHES "rgbd_slam: [^\n]*000030.png[^\n]*stopped after [0-9]+ frames, what they gave is kept\n$")
 must_exist(${WORK}/out trajectory.txt cloud.ply map.bt summary.json report.html)
 
+# A folder without depth is one camera's, though nobody says so.
+file(COPY ${WORK}/room/rgb/000000.png ${WORK}/room/rgb/000001.png ${WORK}/room/camera.toml DESTINATION ${WORK}/images)
+app_fails(3 "tracking never started: no two of" live images --out one)
 # Its images alone: two frames are no map.
 app_fails(3 "tracking never started" live room --sensor mono --frames 2 --out one)
 
@@ -67,5 +73,7 @@ check(frames LESS 10)
 app_fails(2 "no depth camera is connected|this build knows no depth cameras: .*libopenni2-dev" live /no/such/device --out none)
 app_fails(2 "the camera is not known: name it with --camera|knows no video cameras: .*libopencv-videoio-dev"
           live /dev/video99 --sensor stereo --out none)
+app_fails(2 "by-id/usb: is no video camera that can be opened|knows no video cameras"
+          live /dev/v4l/by-id/usb --camera kinect --out none)
 app_fails(1 "sonar" live --sensor sonar --out none)
 check(NOT EXISTS ${WORK}/none)

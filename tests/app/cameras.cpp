@@ -7,6 +7,8 @@
 #include <condition_variable>
 #include <memory>
 #include <mutex>
+#include <optional>
+#include <stdexcept>
 #include <string>
 #include <thread>
 #include <utility>
@@ -107,6 +109,18 @@ TEST_CASE("a camera that is disconnected gives its last frame and then says so")
   CHECK(live.dropped() == 1);
 }
 
+TEST_CASE("what a camera's library throws is how the camera ends") {
+  class thrower final : public app::camera_device {
+   public:
+    thrower() { name = "thrower"; }
+    result<std::optional<app::source_frame>> next(std::chrono::milliseconds) override {
+      throw std::runtime_error{"the wire is cut"};
+    }
+  };
+  app::live_source live{std::make_unique<thrower>()};
+  CHECK_THAT(message_of(live.next(never)), Contains("thrower: the wire is cut"));
+}
+
 TEST_CASE("nobody waits for a camera when the run is over") {
   switchboard by;
   app::live_source live{std::make_unique<fake_camera>(by)};
@@ -146,6 +160,18 @@ TEST_CASE("a recording plays at its pace and ends") {
   CHECK(frames == 3);
   CHECK(waits > 0);
   CHECK(std::chrono::steady_clock::now() - begin >= 200ms);
+}
+
+TEST_CASE("a time stamp that is farther away than a clock can count is waited for") {
+  const temporary_folder folder;
+  folder.write("camera.toml", test::tiny_camera);
+  folder.write("a.png", test::tiny_color(1));
+  folder.write("d.png", test::tiny_depth(1));
+  folder.write("rgb.txt", "5.0 a.png\n1e300 a.png\n");
+  folder.write("depth.txt", "5.0 d.png\n1e300 d.png\n");
+  const auto device = app::open_playback({.name = folder.path().string()}).value();
+  CHECK(device->next(20ms).value());
+  CHECK(!device->next(20ms).value());
 }
 
 TEST_CASE("a camera that is not there or not known to this build is refused in words") {

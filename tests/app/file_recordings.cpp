@@ -103,7 +103,9 @@ TEST_CASE("what is no video or has no camera is refused in words") {
   CHECK_THAT(message_of(app::open_video(path, {})), Contains("put a camera.toml beside the video"));
   CHECK_THAT(message_of(app::open_video(path, {.sensor = sensor_kind::rgbd})), Contains("no depth"));
   folder.write("camera.toml", "model = 'pinhole'\nwidth = 32\nheight = 24\nfx = 30\nfy = 30\ncx = 15.5\ncy = 11.5\n");
-  CHECK(app::open_video(path, {}).value()->size() == 2);
+  const auto video = app::open_video(path, {}).value();
+  CHECK(video->size() == 2);
+  CHECK(video->files == std::vector<std::filesystem::path>{path, folder.path() / "camera.toml"});
 }
 #endif
 

@@ -160,6 +160,7 @@ class bag_recording final : public file_recording {
 
   result<void> open(const std::filesystem::path& path, const file_recording_options& options) {
     path_ = path.string();
+    files = {path};
     try {
       bag_.open(path_, rosbag::bagmode::Read);
       return set_up(options);

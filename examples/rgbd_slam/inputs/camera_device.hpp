@@ -4,6 +4,7 @@
 #pragma once
 
 #include <chrono>
+#include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
@@ -26,7 +27,8 @@ class camera_device {
   std::string name;
   orbis::slam::sensor_kind sensor = orbis::slam::sensor_kind::rgbd;
   orbis::camera::camera_settings camera;
-  std::vector<std::string> notes;  ///< worth a warning
+  std::vector<std::string> notes;            ///< worth a warning
+  std::vector<std::filesystem::path> files;  ///< that it is read from, if it is a recording
 };
 
 /// Which camera, and how.

@@ -32,7 +32,8 @@ class file_recording {
   orbis::slam::sensor_kind sensor = orbis::slam::sensor_kind::monocular;
   std::string kind;  ///< "video", "ROS bag"
   orbis::camera::camera_settings camera;
-  std::vector<std::string> notes;  ///< worth a warning
+  std::vector<std::string> notes;            ///< worth a warning
+  std::vector<std::filesystem::path> files;  ///< that it is read from
 };
 
 struct file_recording_options {

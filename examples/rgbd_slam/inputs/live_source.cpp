@@ -2,6 +2,7 @@
 #include "inputs/live_source.hpp"
 
 #include <chrono>
+#include <exception>
 #include <utility>
 
 namespace app {
@@ -23,9 +24,17 @@ live_source::~live_source() {
   thread_.join();
 }
 
+orbis::result<std::optional<source_frame>> live_source::next_of_device() {
+  try {
+    return device_->next(glance);
+  } catch (const std::exception& e) {  // of its library, or no memory
+    return fail(errc::unreadable, device_->name, e.what());
+  }
+}
+
 void live_source::take_frames() {
   while (!stops_) {
-    auto frame = device_->next(glance);
+    auto frame = next_of_device();
     const std::lock_guard lock{mutex_};
     if (!frame) {
       ended_ = std::move(frame.error());

@@ -37,6 +37,7 @@ class live_source {
   [[nodiscard]] std::size_t dropped() const { return dropped_; }
 
  private:
+  [[nodiscard]] orbis::result<std::optional<source_frame>> next_of_device();
   void take_frames();
 
   std::unique_ptr<camera_device> device_;

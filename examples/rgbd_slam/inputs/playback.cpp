@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
 #include <thread>
 #include <utility>
 
@@ -25,11 +26,13 @@ class playback final : public camera_device {
       : recording_{std::move(recording)}, read_{std::move(read)} {
     name = std::move(from);
     camera = recording_.camera();
+    files = recording_.files();
   }
   result<std::optional<source_frame>> next(std::chrono::milliseconds patience) override {
     if (at_ == recording_.size()) return fail(errc::no_data, name, "is at its end");
     if (at_ == 0) begin_ = clock::now();
-    const std::chrono::duration<double> after{recording_.timestamp(at_) - recording_.timestamp(0)};
+    constexpr double longest = 1e6;  // seconds, which a clock can count
+    const std::chrono::duration<double> after{std::min(recording_.timestamp(at_) - recording_.timestamp(0), longest)};
     const auto due = begin_ + std::chrono::duration_cast<clock::duration>(after);
     const auto give_up = clock::now() + patience;
     std::this_thread::sleep_until(std::min(due, give_up));

@@ -27,6 +27,7 @@ class video_recording final : public file_recording {
   video_recording(std::filesystem::path path, cv::VideoCapture reader, std::vector<double> times)
       : path_{std::move(path)}, reader_{std::move(reader)}, times_{std::move(times)} {
     kind = "video";
+    files = {path_};
   }
   [[nodiscard]] std::size_t size() const override { return times_.size(); }
   [[nodiscard]] result<source_frame> frame(std::size_t i) const override {
@@ -97,10 +98,12 @@ result<std::unique_ptr<file_recording>> read_video(const std::filesystem::path& 
   if (options.sensor == orbis::slam::sensor_kind::rgbd)
     return fail(errc::unsupported, path.string(), "a video has no depth");
   auto camera = options.camera;
+  std::optional<std::filesystem::path> camera_file;
   if (const auto beside = path.parent_path() / "camera.toml"; !camera && std::filesystem::exists(beside, ignored)) {
     auto read = orbis::io::read_camera(beside);
     if (!read) return fail(read.error());
     camera = *std::move(read);
+    camera_file = beside;
   }
   cv::VideoCapture reader{path.string()};
   if (!reader.isOpened())
@@ -116,6 +119,7 @@ result<std::unique_ptr<file_recording>> read_video(const std::filesystem::path& 
   video->sensor = options.sensor.value_or(orbis::slam::sensor_kind::monocular);
   video->camera = *std::move(camera);
   video->notes = std::move(notes);
+  if (camera_file) video->files.push_back(*camera_file);
   if (auto first = video->color(0); !first) return fail(first.error());
   return video;
 }

@@ -24,9 +24,8 @@ class video_camera final : public camera_device {
   explicit video_camera(cv::VideoCapture reader) : reader_{std::move(reader)} {}
   /// V4L2 waits for a frame by itself, for at most ten seconds.
   result<std::optional<source_frame>> next(std::chrono::milliseconds) override {
-    using seconds = std::chrono::duration<double>;
     if (!reader_.grab()) return fail(errc::unreadable, name, "gives no more images: was it disconnected?");
-    const double time = seconds{std::chrono::system_clock::now().time_since_epoch()}.count();
+    const double time = opened_at_ + seconds_of<std::chrono::steady_clock>() - opened_;
     cv::Mat image;
     if (!reader_.retrieve(image)) return std::optional<source_frame>{};  // damaged on its way
     auto converted = rgb_of(image, name);
@@ -41,7 +40,14 @@ class video_camera final : public camera_device {
   }
 
  private:
+  template <class Clock>
+  [[nodiscard]] static double seconds_of() {
+    return std::chrono::duration<double>{Clock::now().time_since_epoch()}.count();
+  }
+
   cv::VideoCapture reader_;
+  // The time of day, which goes on evenly even where that is set anew.
+  double opened_at_ = seconds_of<std::chrono::system_clock>(), opened_ = seconds_of<std::chrono::steady_clock>();
 };
 
 result<std::unique_ptr<camera_device>> video_camera_of(const device_options& options) {
