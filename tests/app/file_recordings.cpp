@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // Recordings in one file, as far as this build has libraries for them.
+#include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <filesystem>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "inputs/file_recording.hpp"
 #include "io/recordings.hpp"
@@ -13,7 +17,7 @@
 #include <opencv2/videoio.hpp>
 #endif
 #ifdef RGBD_SLAM_BAG
-#include <orbis/io/jpeg.hpp>
+#include <orbis/io/png.hpp>
 
 #include "ros_bag_writer.hpp"
 #endif
@@ -220,6 +224,110 @@ TEST_CASE("bags with one camera give compressed images and lenses") {
   CHECK(lens->distortion().k3 == 0.003);
 }
 
+TEST_CASE("the mosaic of a colour filter becomes a colour image") {
+  const temporary_folder folder;
+  const auto path = folder.path() / "a.bag";
+  // The colours of the upper left four pixels.
+  const std::string order = GENERATE("rggb", "bggr", "gbrg", "grbg");
+  {
+    test::ros_bag_writer bag{path};
+    image<std::uint8_t> mosaic(32, 24);
+    for (int y = 0; y != 24; ++y)
+      for (int x = 0; x != 32; ++x) {
+        const char color = order[static_cast<std::size_t>(2 * (y % 2) + x % 2)];
+        mosaic(x, y) = color == 'r' ? 200 : color == 'g' ? 100 : 50;
+      }
+    bag.image("/cam/image_raw", 1.0, "bayer_" + order + "8", view(mosaic));
+    bag.image("/cam/image_mono", 1.0, "mono8", view(image<std::uint8_t>(32, 24, 9)));  // less is known by it
+    bag.info("/cam/camera_info", 1.0, k);
+    bag.close();
+  }
+  const auto color = app::open_bag(path, {}).value()->color(0).value();
+  for (const auto& [x, y] : {std::pair{4, 4}, {5, 4}, {4, 5}, {31, 23}, {0, 0}})
+    CHECK(color(x, y) == rgb8{200, 100, 50});
+}
+
+TEST_CASE("compressed depth is read, in millimetres and in metres") {
+  const temporary_folder folder;
+  const auto path = folder.path() / "a.bag";
+  const float a = 30000.0F, b = -5.5F;  // stored = a / z + b
+  image<std::uint16_t> millimetres(32, 24, 1500), inverse(32, 24);
+  millimetres(3, 4) = 0;
+  for (int y = 0; y != 24; ++y)
+    for (int x = 0; x != 32; ++x)
+      inverse(x, y) = static_cast<std::uint16_t>(std::lround(a / (0.5F + 0.1F * static_cast<float>(x)) + b));
+  inverse(3, 4) = 0;
+  const auto write = [&](const std::string& format, const image<std::uint16_t>& pixels, float scale, bool has_header) {
+    test::ros_bag_writer bag{path};
+    app::ros_messages::compressed_image m;
+    bag.set_time(m.header, 3.0);
+    m.format = format;
+    if (has_header) m.data.resize(12);
+    if (has_header) std::memcpy(&m.data[4], &scale, 4), std::memcpy(&m.data[8], &b, 4);
+    const std::string png = io::encode_png(pixels.view());
+    m.data.insert(m.data.end(), png.begin(), png.end());
+    bag.write(has_header ? "/cam/aligned_depth/compressedDepth" : "/cam/aligned_depth/compressed", 3.0, m);
+    bag.image("/cam/image_raw", 3.0, "rgb8", view(plain(1, 2, 3)));
+    bag.info("/cam/camera_info", 3.0, k);
+    bag.close();
+  };
+  for (const bool has_header : {false, true}) {
+    write(has_header ? "16UC1; compressedDepth png" : "16UC1; png compressed ", millimetres, 0.0F, has_header);
+    const auto bag = app::open_bag(path, {}).value();
+    CHECK(bag->sensor == sensor_kind::rgbd);
+    CHECK(bag->camera.depth_scale == 1000.0);
+    CHECK(bag->frame(0).value().depth == millimetres);
+  }
+  write("32FC1; compressedDepth", inverse, a, true);
+  const auto bag = app::open_bag(path, {}).value();
+  CHECK(bag->camera.depth_scale == 5000.0);
+  const auto depth = bag->frame(0).value().depth;
+  for (int x = 0; x != 32; ++x) CHECK(depth(x, 9) / 5000.0 == Approx(0.5 + 0.1 * x).epsilon(1e-3));
+  CHECK(depth(3, 4) == 0);
+
+  write("32FC1; compressedDepth png", inverse, 0.0F, true);
+  CHECK_THAT(message_of(app::open_bag(path, {})), Contains("the header of a compressed depth image has no scale"));
+  write("16UC1; compressedDepth rvl", millimetres, 0.0F, true);
+  CHECK_THAT(message_of(app::open_bag(path, {})), Contains("in the format \"16UC1; compressedDepth rvl\" is not read"));
+  write("png", millimetres, 0.0F, true);  // what is in it is not said
+  CHECK_THAT(message_of(app::open_bag(path, {})), Contains("in the format \"png\" is not read"));
+}
+
+TEST_CASE("only a name that says so is that of a rectified image") {
+  const temporary_folder folder;
+  const auto path = folder.path() / "a.bag";
+  const auto model = [&](const std::string& topic) {
+    test::ros_bag_writer bag{path};
+    bag.image(topic, 1.0, "rgb8", view(plain(1, 2, 3)));
+    bag.info(topic.substr(0, topic.rfind('/')) + "/camera_info", 1.0, k, 0.0, {-0.1, 0.01, 0, 0, 0});
+    bag.close();
+    return std::string{app::open_bag(path, {}).value()->camera.model.model_name()};
+  };
+  CHECK(model("/cam/image_rect_color") == "pinhole");
+  CHECK(model("/cam/image_rect") == "pinhole");
+  CHECK(model("/direct/image_raw") == "radtan");
+  CHECK(model("/corrected/image_raw") == "radtan");
+}
+
+TEST_CASE("bags are read whichever way they are compressed, and refused in words where they are cut off") {
+  const temporary_folder folder;
+  const auto path = folder.path() / "a.bag";
+  const auto compression =
+      GENERATE(rosbag::compression::Uncompressed, rosbag::compression::BZ2, rosbag::compression::LZ4);
+  {
+    test::ros_bag_writer bag{path, compression};
+    for (int i = 0; i != 3; ++i) bag.image("/cam/image_raw", 1.0 + i, "rgb8", view(plain(1, 2, 3)));
+    bag.info("/cam/camera_info", 1.0, k);
+    bag.close();
+  }
+  CHECK(app::open_bag(path, {}).value()->color(2).value()(0, 0) == rgb8{1, 2, 3});
+  const auto size = std::filesystem::file_size(path);
+  for (const auto part : {size - 1, size / 2, size / 4, std::uintmax_t{5000}, std::uintmax_t{20}, std::uintmax_t{0}}) {
+    std::filesystem::resize_file(path, std::min(part, std::filesystem::file_size(path)));
+    CHECK_THAT(message_of(app::open_bag(path, {})), Contains("is no ROS 1 bag that can be read"));
+  }
+}
+
 TEST_CASE("damaged bags and images are refused in words") {
   const temporary_folder folder;
   const auto path = folder.path() / "a.bag";
@@ -245,9 +353,10 @@ TEST_CASE("damaged bags and images are refused in words") {
   write("rgb8", false, 24);
   CHECK_THAT(message_of(app::open_bag(path, {})), Contains("no sensor_msgs/CameraInfo beside /cam/image_raw"));
   CHECK(app::open_bag(path, {.camera = settings}));
-  write("bayer_rggb8", true, 24);
-  CHECK_THAT(message_of(app::open_bag(path, {})), Contains("/cam/image_raw (bayer_rggb8)"));
-  CHECK_THAT(message_of(app::open_bag(path, {.topics = {"/cam/image_raw"}})), Contains("in the encoding bayer_rggb8"));
+  write("bayer_rggb16", true, 24);
+  CHECK_THAT(message_of(app::open_bag(path, {})),
+             Contains("in an encoding that is read") && Contains("/cam/image_raw (bayer_rggb16)"));
+  CHECK_THAT(message_of(app::open_bag(path, {.topics = {"/cam/image_raw"}})), Contains("in the encoding bayer_rggb16"));
   folder.write("b.bag", "#ROSBAG V2.0\nand then nothing");
   CHECK_THAT(message_of(app::open_bag(folder.path() / "b.bag", {})), Contains("is no ROS 1 bag that can be read"));
   CHECK_THAT(message_of(app::open_bag(folder.path() / "c.bag", {})), Contains("no such file"));

@@ -19,7 +19,11 @@ namespace orbis::test {
 
 class ros_bag_writer {
  public:
-  explicit ros_bag_writer(const std::filesystem::path& path) : bag_{path.string(), rosbag::bagmode::Write} {}
+  explicit ros_bag_writer(const std::filesystem::path& path,
+                          rosbag::CompressionType compression = rosbag::compression::Uncompressed)
+      : bag_{path.string(), rosbag::bagmode::Write} {
+    bag_.setCompression(compression);
+  }
 
   template <class T>
   void image(const std::string& topic, double time, const std::string& encoding, image_view<const T> pixels) {

@@ -4,11 +4,8 @@
 #ifdef RGBD_SLAM_BAG
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
 #include <cstdint>
-#include <cstring>
-#include <limits>
 #include <map>
 #include <mutex>
 #include <string_view>
@@ -19,9 +16,8 @@
 
 #include <orbis/camera/stereo.hpp>
 #include <orbis/core/trajectory.hpp>
-#include <orbis/io/jpeg.hpp>
-#include <orbis/io/png.hpp>
 
+#include "inputs/ros_images.hpp"
 #include "inputs/ros_messages.hpp"
 
 namespace app {
@@ -32,79 +28,6 @@ using orbis::fail;
 using orbis::result;
 using color_image = orbis::image<orbis::rgb8>;
 using depth_image = orbis::image<std::uint16_t>;
-
-/// Of depth in metres: a fifth of a millimetre, up to 13 m.
-constexpr double metres_scale = 5000.0;
-
-/// Bytes of each pixel of an encoding; zero if we do not read it.
-std::size_t bytes_of(std::string_view encoding) {
-  for (const auto& [name, bytes] :
-       {std::pair{"mono8", 1U}, std::pair{"8UC1", 1U}, std::pair{"rgb8", 3U}, std::pair{"bgr8", 3U},
-        std::pair{"8UC3", 3U}, std::pair{"rgba8", 4U}, std::pair{"bgra8", 4U}, std::pair{"16UC1", 2U},
-        std::pair{"mono16", 2U}, std::pair{"32FC1", 4U}})
-    if (encoding == name) return bytes;
-  return 0;
-}
-bool is_depth_encoding(std::string_view encoding) {
-  return encoding == "16UC1" || encoding == "mono16" || encoding == "32FC1";
-}
-
-/// Errors: malformed, if a message has not the pixels that it says it has.
-result<void> check_pixels(const ros_messages::image& m, const std::string& where) {
-  const std::size_t bytes = bytes_of(m.encoding);
-  if (bytes == 0) return fail(errc::unsupported, where, "images in the encoding " + m.encoding + " are not read");
-  if (m.width == 0 || m.height == 0 || m.width > 65536 || m.height > 65536 || m.step < m.width * bytes ||
-      m.data.size() < std::size_t{m.step} * m.height)
-    return fail(errc::malformed, where, "an image has fewer pixels than its size says");
-  return {};
-}
-
-result<color_image> color_of(const ros_messages::image& m, const std::string& where) {
-  if (auto ok = check_pixels(m, where); !ok) return fail(ok.error());
-  if (is_depth_encoding(m.encoding)) return fail(errc::unsupported, where, "is depth, and no colour image");
-  const std::size_t bytes = bytes_of(m.encoding);
-  const bool is_rgb = m.encoding.starts_with("rgb");
-  color_image out(static_cast<int>(m.width), static_cast<int>(m.height));
-  for (int y = 0; y != out.height(); ++y) {
-    const std::uint8_t* p = m.data.data() + std::size_t{m.step} * static_cast<std::size_t>(y);
-    for (int x = 0; x != out.width(); ++x, p += bytes)
-      out(x, y) = bytes == 1 ? orbis::rgb8{*p, *p, *p}
-                  : is_rgb   ? orbis::rgb8{p[0], p[1], p[2]}
-                             : orbis::rgb8{p[2], p[1], p[0]};
-  }
-  return out;
-}
-
-template <class T>
-T read_as(const std::uint8_t* p, bool swap) {
-  std::array<std::uint8_t, sizeof(T)> bytes;
-  std::memcpy(bytes.data(), p, sizeof(T));
-  if (swap) std::reverse(bytes.begin(), bytes.end());
-  return std::bit_cast<T>(bytes);
-}
-
-/// Metres become fifths of a millimetre; whole numbers stay.
-result<depth_image> depth_of(const ros_messages::image& m, const std::string& where) {
-  if (auto ok = check_pixels(m, where); !ok) return fail(ok.error());
-  if (!is_depth_encoding(m.encoding))
-    return fail(errc::unsupported, where, "is no depth image: its encoding is " + m.encoding);
-  const bool in_metres = m.encoding == "32FC1",
-             swap = (m.is_bigendian != 0) == (std::endian::native == std::endian::little);
-  depth_image out(static_cast<int>(m.width), static_cast<int>(m.height));
-  for (int y = 0; y != out.height(); ++y) {
-    const std::uint8_t* p = m.data.data() + std::size_t{m.step} * static_cast<std::size_t>(y);
-    for (int x = 0; x != out.width(); ++x, p += in_metres ? 4 : 2) {
-      if (!in_metres) {
-        out(x, y) = read_as<std::uint16_t>(p, swap);
-        continue;
-      }
-      const float z = read_as<float>(p, swap);
-      const double stored = std::isfinite(z) && z > 0.0F ? metres_scale * z + 0.5 : 0.0;
-      out(x, y) = stored < 65535.0 ? static_cast<std::uint16_t>(stored) : std::uint16_t{0};
-    }
-  }
-  return out;
-}
 
 /// The camera of `info`. `rectified`: of images that have been rectified.
 result<orbis::camera::any_camera> camera_of(const ros_messages::camera_info& info, bool rectified,
@@ -117,6 +40,8 @@ result<orbis::camera::any_camera> camera_of(const ros_messages::camera_info& inf
   if (!orbis::camera::is_valid(k))
     return fail(errc::malformed, where, "has no camera matrix: is the camera calibrated?");
   const auto& d = info.D;
+  if (!std::all_of(d.begin(), d.end(), [](double v) { return std::isfinite(v); }))
+    return fail(errc::malformed, where, "has a distortion that is no number");
   const bool is_straight = std::all_of(d.begin(), d.end(), [](double v) { return v == 0.0; });
   if (rectified || is_straight) return orbis::camera::any_camera{orbis::camera::pinhole{k}};
   const auto at = [&](std::size_t i) { return i < d.size() ? d[i] : 0.0; };
@@ -133,10 +58,18 @@ result<orbis::camera::any_camera> camera_of(const ros_messages::camera_info& inf
 
 /// The messages of a topic.
 struct topic {
-  std::string name, type, encoding;  ///< encoding: of the first image
+  std::string name, type, encoding;  ///< encoding: of the first image, or its format if it is compressed
   std::vector<double> times;         ///< of their headers, ascending
   std::vector<rosbag::MessageInstance> messages;
-  [[nodiscard]] bool is_depth() const { return is_depth_encoding(encoding); }
+  [[nodiscard]] bool is_compressed() const { return type == "sensor_msgs/CompressedImage"; }
+  [[nodiscard]] bool is_depth() const { return is_depth_encoding(encoding) || name.ends_with("/compressedDepth"); }
+  [[nodiscard]] bool is_read() const { return is_compressed() || is_known_encoding(encoding); }
+  /// The name says that its images are rectified: "image_rect", "rect", but not "direct".
+  [[nodiscard]] bool is_rectified() const {
+    for (std::size_t at = name.find("rect"); at != std::string::npos; at = name.find("rect", at + 1))
+      if (at == 0 || name[at - 1] == '/' || name[at - 1] == '_') return true;
+    return false;
+  }
 };
 
 bool contains(const std::string& text, std::string_view part) { return text.find(part) != std::string::npos; }
@@ -219,15 +152,16 @@ class bag_recording final : public file_recording {
     rosbag::View all{bag_};
     for (const rosbag::ConnectionInfo* c : all.getConnections())
       if (c->datatype == "sensor_msgs/Image" || c->datatype == "sensor_msgs/CompressedImage")
-        if (!contains(c->topic, "compressedDepth")) topics_[c->topic].type = c->datatype;
+        topics_[c->topic].type = c->datatype;
     for (auto& [name, t] : topics_) {
       t.name = name;
       rosbag::View view{bag_, rosbag::TopicQuery(name)};
       for (const rosbag::MessageInstance& m : view) t.messages.push_back(m);
-      if (t.type == "sensor_msgs/CompressedImage") {
-        t.encoding = "compressed";
-      } else if (!t.messages.empty()) {
-        if (const auto m = t.messages.front().instantiate<ros_messages::image>()) t.encoding = m->encoding;
+      if (t.messages.empty()) continue;
+      if (t.is_compressed()) {
+        if (const auto m = t.messages.front().instantiate<ros_messages::compressed_image>()) t.encoding = m->format;
+      } else if (const auto m = t.messages.front().instantiate<ros_messages::image>()) {
+        t.encoding = m->encoding;
       }
     }
     std::erase_if(topics_, [](const auto& t) { return t.second.messages.empty(); });
@@ -256,20 +190,23 @@ class bag_recording final : public file_recording {
       if (options.sensor && *options.sensor != sensor) return wrong("these topics are not what the sensor gives");
       return {};
     }
-    // Colour before grey, rectified before raw, and what is not compressed; depth that says it is registered.
+    // Colour before grey, rectified before raw, and before both what is not compressed; depth that says it is
+    // registered.
     topic *color = nullptr, *depth = nullptr, *left = nullptr, *right = nullptr;
     int best_color = -1, best_depth = -1, best_left = -1;
     const auto worth = [](const topic& t) {
-      return 4 * (t.encoding != "compressed") + 2 * (contains(t.encoding, "rgb") || contains(t.encoding, "bgr")) +
-             contains(t.name, "rect");
+      const bool is_mosaic = t.encoding.starts_with("bayer");
+      const bool is_color = !is_mosaic && (contains(t.encoding, "rgb") || contains(t.encoding, "bgr"));
+      return 8 * !t.is_compressed() + 4 * is_color + 2 * is_mosaic + t.is_rectified();
     };
     for (auto& [name, t] : topics_) {
       if (t.is_depth()) {
-        const int value = contains(name, "registered") || contains(name, "aligned") ? 1 : 0;
+        if (!t.is_read()) continue;
+        const int value = 2 * (contains(name, "registered") || contains(name, "aligned")) + !t.is_compressed();
         if (value > best_depth) depth = &t, best_depth = value;
         continue;
       }
-      if (t.encoding != "compressed" && bytes_of(t.encoding) == 0) continue;
+      if (!t.is_read()) continue;
       if (worth(t) > best_color) color = &t, best_color = worth(t);
       for (auto& [other_name, other] : topics_)
         if (is_pair(name, other_name) && !other.is_depth() && worth(t) > best_left)
@@ -284,7 +221,12 @@ class bag_recording final : public file_recording {
     for (const orbis::slam::sensor_kind s :
          {orbis::slam::sensor_kind::rgbd, orbis::slam::sensor_kind::stereo, orbis::slam::sensor_kind::monocular})
       if (!found && possible(s)) found = s;
-    if (!found || !possible(*found)) return wrong("has not the images that are wanted");
+    if (!found || !possible(*found)) {
+      const bool any_unread =
+          std::any_of(topics_.begin(), topics_.end(), [](const auto& t) { return !t.second.is_read(); });
+      return wrong(any_unread ? "has not the images that are wanted in an encoding that is read"
+                              : "has not the images that are wanted");
+    }
     sensor = *found;
     first_ = sensor == orbis::slam::sensor_kind::stereo ? left : color;
     second_ = sensor == orbis::slam::sensor_kind::rgbd     ? depth
@@ -327,7 +269,7 @@ class bag_recording final : public file_recording {
   /// The first `CameraInfo` beside the images of `of`; null if there is none.
   boost::shared_ptr<ros_messages::camera_info> info_of(const topic& of) {
     std::string name = of.name;
-    if (of.encoding == "compressed") name = name.substr(0, name.rfind('/'));
+    if (of.is_compressed()) name = name.substr(0, name.rfind('/'));
     name = name.substr(0, name.rfind('/') + 1) + "camera_info";
     rosbag::View view{bag_, rosbag::TopicQuery(name)};
     for (const rosbag::MessageInstance& m : view)
@@ -336,7 +278,7 @@ class bag_recording final : public file_recording {
   }
 
   result<void> find_camera(const file_recording_options& options) {
-    const bool in_metres = sensor == orbis::slam::sensor_kind::rgbd && second_->encoding == "32FC1";
+    const bool in_metres = sensor == orbis::slam::sensor_kind::rgbd && is_in_metres(second_->encoding);
     if (options.camera) {
       camera = *options.camera;
       if (in_metres) camera.depth_scale = metres_scale;
@@ -349,8 +291,7 @@ class bag_recording final : public file_recording {
       return fail(
           errc::invalid_argument, path_,
           "the camera is not known: there is no sensor_msgs/CameraInfo beside " + first_->name + "; name a camera");
-    const auto rectified = [](const topic& t) { return contains(t.name, "rect"); };
-    auto model = camera_of(*info, rectified(*first_), where(*first_));
+    auto model = camera_of(*info, first_->is_rectified(), where(*first_));
     if (!model) return fail(model.error());
     camera = {.model = *std::move(model), .depth_scale = in_metres ? metres_scale : 1000.0, .fps = rate()};
     if (sensor != orbis::slam::sensor_kind::stereo) return {};
@@ -358,18 +299,19 @@ class bag_recording final : public file_recording {
     const auto other = info_of(*second_);
     if (!other)
       return fail(errc::invalid_argument, path_, "there is no sensor_msgs/CameraInfo beside " + second_->name);
-    const auto right = camera_of(*other, rectified(*second_), where(*second_));
+    const auto right = camera_of(*other, second_->is_rectified(), where(*second_));
     if (!right) return fail(right.error());
     // P of the right camera is that of the left one, moved along x; R turns a camera's rays to the rectified ones.
     const double baseline = other->P[0] > 0.0 ? (info->P[3] - other->P[3]) / other->P[0] : 0.0;
     if (!(baseline > 0.0))
       return fail(errc::malformed, where(*second_), "P of its CameraInfo does not say how far the cameras are apart");
     orbis::se3 T_left_right{orbis::so3{}, orbis::vec3{baseline, 0.0, 0.0}};
-    if (!rectified(*first_)) {
+    if (!first_->is_rectified()) {
       const auto rotation = [](const auto& R) -> std::optional<orbis::so3> {
         orbis::mat3 m;
         m << R[0], R[1], R[2], R[3], R[4], R[5], R[6], R[7], R[8];
-        if ((m.transpose() * m - orbis::mat3::Identity()).norm() > 1e-3 || m.determinant() < 0.0) return std::nullopt;
+        if (!((m.transpose() * m - orbis::mat3::Identity()).norm() < 1e-3) || m.determinant() < 0.0)
+          return std::nullopt;
         return orbis::so3{orbis::so3::quaternion(m)};
       };
       const auto l = rotation(info->R), r = rotation(other->R);
@@ -405,25 +347,25 @@ class bag_recording final : public file_recording {
                 "the image has " + std::to_string(image->width()) + "x" + std::to_string(image->height()) +
                     " pixels, the camera " + std::to_string(k.width) + "x" + std::to_string(k.height) + why);
   }
-  [[nodiscard]] result<color_image> read_color(const topic& of, std::size_t i) const try {
-    if (of.encoding == "compressed") {
-      const auto m = of.messages[i].instantiate<ros_messages::compressed_image>();
-      if (!m) return fail(errc::malformed, where(of), "is no sensor_msgs/CompressedImage");
-      const std::string_view bytes{reinterpret_cast<const char*>(m->data.data()), m->data.size()};
-      return sized(orbis::io::is_png(bytes) ? orbis::io::decode_png_color(bytes, where(of))
-                                            : orbis::io::decode_jpeg(bytes, where(of)),
-                   of);
+  /// `decode` of a message, whichever it is.
+  template <class Decode>
+  [[nodiscard]] auto decoded(const topic& of, std::size_t i, const Decode& decode) const
+      -> decltype(decode(ros_messages::image{}, std::string{})) {
+    if (of.is_compressed()) {
+      if (const auto m = of.messages[i].instantiate<ros_messages::compressed_image>()) return decode(*m, where(of));
+    } else if (const auto m = of.messages[i].instantiate<ros_messages::image>()) {
+      return decode(*m, where(of));
     }
-    const auto m = of.messages[i].instantiate<ros_messages::image>();
-    if (!m) return fail(errc::malformed, where(of), "is no sensor_msgs/Image");
-    return sized(color_of(*m, where(of)), of);
+    return fail(errc::malformed, where(of), "is no " + of.type);
+  }
+  [[nodiscard]] result<color_image> read_color(const topic& of, std::size_t i) const try {
+    return sized(decoded(of, i, [](const auto& m, const std::string& from) { return color_of(m, from); }), of);
   } catch (const std::exception& e) {  // of the library
     return fail(errc::malformed, where(of), e.what());
   }
   [[nodiscard]] result<depth_image> read_depth(std::size_t i) const try {
-    const auto m = second_->messages[i].instantiate<ros_messages::image>();
-    if (!m) return fail(errc::malformed, where(*second_), "is no sensor_msgs/Image");
-    return sized(depth_of(*m, where(*second_)), *second_);
+    return sized(decoded(*second_, i, [](const auto& m, const std::string& from) { return depth_of(m, from); }),
+                 *second_);
   } catch (const std::exception& e) {
     return fail(errc::malformed, where(*second_), e.what());
   }

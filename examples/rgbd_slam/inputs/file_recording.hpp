@@ -53,9 +53,9 @@ struct file_recording_options {
 [[nodiscard]] orbis::result<std::unique_ptr<file_recording>> open_video(const std::filesystem::path& path,
                                                                         const file_recording_options& options);
 
-/// A ROS 1 bag with `sensor_msgs/Image` (for colour `sensor_msgs/CompressedImage` as well) and
-/// `sensor_msgs/CameraInfo`: colour and depth that is registered to it (16UC1 in millimetres, 32FC1 in metres), the
-/// images of a stereo camera, or one camera's. Goes through the bag once, for the times in its messages. Errors: as
+/// A ROS 1 bag with `sensor_msgs/Image` or `sensor_msgs/CompressedImage`, and `sensor_msgs/CameraInfo`: colour and
+/// depth that is registered to it (16UC1 in millimetres, 32FC1 in metres), the images of a stereo camera, or one
+/// camera's. See ros_images.hpp for the encodings. Goes through the bag once, for the times in its messages. Errors: as
 /// above, and invalid_argument (topics that are not there; the message names those that are).
 [[nodiscard]] orbis::result<std::unique_ptr<file_recording>> open_bag(const std::filesystem::path& path,
                                                                       const file_recording_options& options);
