@@ -93,7 +93,13 @@ TEST_CASE("after any additions and erasures a query finds what a look at all key
   std::size_t candidates = 0, grouped = 0;
   for (int step = 0; step != 400; ++step) {
     const std::uint32_t id = random.below(90);
-    if (random.below(3) != 0) {
+    if (random.below(4) == 0) {
+      const std::uint32_t to = random.below(90);
+      const bool can = all.contains(id) && !all.contains(to);
+      CHECK(database.rename(id, to) == can);
+      if (can) all[to] = std::move(all.extract(id).mapped());
+      if (can) CHECK(database.bag(to) == all[to]);
+    } else if (random.below(3) != 0) {
       const auto bag = random_bag(random, 400, id / 10);
       CHECK(database.add(id, bag) == !all.contains(id));
       all.try_emplace(id, bag);

@@ -122,6 +122,15 @@ class basic_keyframe_database {
     return true;
   }
 
+  /// Gives a keyframe another id; false, and nothing changes, if there is none of this id, or `to` is in use. O(1).
+  bool rename(const Id& from, const Id& to) {
+    if (!contains(from) || contains(to)) return false;
+    auto renamed = slots_.extract(from);
+    keyframes_[renamed.mapped()].id = renamed.key() = to;
+    slots_.insert(std::move(renamed));
+    return true;
+  }
+
   void clear() {
     slots_.clear();
     keyframes_.clear();

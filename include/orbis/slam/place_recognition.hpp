@@ -61,12 +61,7 @@ class bag_of_words_places {
   /// False if the keyframe is not in the database.
   bool erase(map_keyframe k) { return database_.erase(packed(k)); }
   /// Gives a keyframe another id. False if `from` is not in the database, or `to` is.
-  bool rename(map_keyframe from, map_keyframe to) {
-    if (!database_.contains(packed(from)) || database_.contains(packed(to))) return false;
-    const signature bow_vector = database_.bag(packed(from));
-    database_.erase(packed(from));
-    return database_.add(packed(to), bow_vector);
-  }
+  bool rename(map_keyframe from, map_keyframe to) { return database_.rename(packed(from), packed(to)); }
 
   /// At most `count` keyframes with similar words, the most similar first (see `place_recognizer`).
   template <std::predicate<map_keyframe> Exclude, std::invocable<map_keyframe> Neighbors>
