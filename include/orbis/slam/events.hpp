@@ -48,7 +48,8 @@ struct correction_event {
   sim3 T_corrected_before{};  ///< the correction at keyframe `from`, in the world of the map; with depth of scale 1
   /// Of a merger: how the world of `map` changed, where `merged` is the older one, whose world stays.
   sim3 T_map_before{};
-  double milliseconds = 0.0;  ///< wall time
+  double milliseconds = 0.0;         ///< wall time
+  double locked_milliseconds = 0.0;  ///< the longest time at once, of this, for which tracking and queries had to wait
 };
 
 /// Tracking changed its state.

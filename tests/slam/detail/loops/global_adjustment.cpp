@@ -246,3 +246,26 @@ TEST_CASE("A map may be gathered part by part, what is added in between takes no
   REQUIRE(parts.landmark_count() == whole.landmark_count());
   for (const auto& l : whole.landmarks()) CHECK(parts.landmark_at(l.id).position == l.position);
 }
+
+TEST_CASE("Outliers may be erased part by part") {
+  test::ring_world world({.steps = 60});
+  slam::map m = closed_ring(world);
+  const global::snapshot taken = global::take(m, world.rig);
+  slam::detail::bundle_solution solved = solve(taken, world.rig);
+  REQUIRE(solved.usable);
+  for (std::size_t i = 0; i < solved.outliers.size(); i += 7) solved.outliers[i] = 1;
+  slam::map parts = m;
+  const slam::map before = m;
+  const auto report = global::apply(m, taken, solved);
+  CHECK(report.outliers > solved.outliers.size() / 10);
+  global::apply_poses(parts, taken, solved);
+  std::size_t erased = 0, steps = 0;
+  for (std::size_t at = 0; at < taken.observations.size(); at += 1000, ++steps)
+    erased += global::erase_outliers(parts, taken, solved, at, 1000);
+  CHECK(steps > 3);
+  CHECK(erased == report.outliers);
+  slam::detail::update_landmarks(parts);
+  CHECK(test::same(m, parts));
+  CHECK_FALSE(test::same(m, before));
+  CHECK(test::fault_of(parts) == "");
+}

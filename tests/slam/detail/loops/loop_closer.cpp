@@ -53,6 +53,10 @@ TEST_CASE("A loop is closed once, reported, and adjusted globally") {
   s.closer.adjust_globally(0);
   REQUIRE(s.told.size() == 2);
   CHECK(s.told[1].kind == slam::correction_kind::global_adjustment);
+  for (const slam::correction_event& e : s.told) {
+    CHECK(e.locked_milliseconds > 0.0);
+    CHECK(e.locked_milliseconds < e.milliseconds);
+  }
   CHECK(s.world.errors(s.m())[0] < closed);
   CHECK(slam::validate(s.m()));
 }
@@ -88,6 +92,8 @@ TEST_CASE("Maps that meet become one, in the world of the older one") {
   CHECK(s.told[0].kind == slam::correction_kind::merge);
   CHECK(s.told[0].merged == 1);
   CHECK(s.told[0].map == 0);
+  CHECK(s.told[0].locked_milliseconds > 0.0);
+  CHECK(s.told[0].locked_milliseconds < s.told[0].milliseconds);
   CHECK(s.told[0].offsets.keyframes == 14);
   CHECK(s.told[0].from == slam::map_keyframe{0, 16});
   CHECK(s.m().at(3).T_world_camera.to_matrix() == before.to_matrix());

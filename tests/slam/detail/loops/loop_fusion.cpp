@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 #include <cstddef>
+#include <span>
 
 #include <orbis/slam/detail/loops/loop_fusion.hpp>
 #include <orbis/slam/validate.hpp>
@@ -68,6 +69,29 @@ TEST_CASE("Landmarks of both ends are found to be the same and fused, those of t
   CHECK((valid ? "" : valid.error().to_string()) == "");
   const auto again = fusion::fuse<features::binary_descriptor<256>>(s.m, pairs);
   CHECK(again.fused + again.observed == 0);
+}
+
+TEST_CASE("Fused part by part, a map is the same") {
+  scene s;
+  const auto pairs = fusion::find_pairs(fusion::take(s.m, s.m, s.match, {}), s.world.rig, {});
+  slam::map parts = s.m;
+  const auto whole = fusion::fuse<features::binary_descriptor<256>>(s.m, pairs);
+  slam::detail::fusion_counts counts;
+  std::size_t steps = 0;
+  for (std::size_t at = 0; at < pairs.size(); at += 37, ++steps) {
+    const auto some = std::span{pairs}.subspan(at, std::min<std::size_t>(37, pairs.size() - at));
+    const auto part = fusion::fuse<features::binary_descriptor<256>>(parts, some);
+    counts.fused += part.fused;
+    counts.observed += part.observed;
+  }
+  CHECK(steps > 5);
+  CHECK(counts.fused == whole.fused);
+  CHECK(counts.observed == whole.observed);
+  CHECK(test::same(s.m, parts));
+  for (const auto& l : s.m.landmarks()) {
+    const auto& other = parts.landmark_at(l.id);
+    CHECK((l.descriptor == other.descriptor && l.normal == other.normal && l.max_distance == other.max_distance));
+  }
 }
 
 TEST_CASE("Pairs whose keyframe or landmark is gone are left out") {

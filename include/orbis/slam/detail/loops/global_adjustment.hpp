@@ -64,7 +64,9 @@ template <feature_descriptor D>
   s.index.assign(m.keyframe_end().value(), no_id);
   s.end_keyframe = m.keyframe_end();
   s.end_landmark = m.landmark_end();
+  std::size_t keypoints = 0;
   for (const auto& k : m.keyframes()) {
+    keypoints += k.size();
     std::size_t shared = 0;
     for (auto l = k.landmarks.begin(); l != k.landmarks.end() && shared < o.min_observations; ++l)
       shared += *l != no_id && m.landmark_at(*l).observations.size() > 1;
@@ -73,6 +75,11 @@ template <feature_descriptor D>
     s.index[k.id.value()] = static_cast<std::uint32_t>(s.keyframes.size());
     s.add_keyframe(k.id, k.T_world_camera, is_root);
   }
+  // Arrays that grow are copied, and whoever waits for a part of the landmarks would wait for that as well.
+  s.landmarks.reserve(m.landmark_count());
+  s.points.reserve(m.landmark_count());
+  s.observations.reserve(keypoints);
+  s.sources.reserve(keypoints);
   return s;
 }
 
@@ -113,8 +120,8 @@ template <feature_descriptor D, camera::camera_model Camera>
   return growth;
 }
 
-/// Writes a solution into the map that the snapshot was taken of, and erases the outliers, with landmarks whose
-/// position nothing determines any more. `update_landmarks` is left to the caller. @pre solved.usable
+/// Writes the poses and positions of a solution into the map that the snapshot was taken of. `erase_outliers`, then
+/// `update_landmarks`, are left to the caller. @pre solved.usable
 template <feature_descriptor D>
 report apply_poses(basic_map<D>& m, const snapshot& s, const bundle_solution& solved) {
   std::vector<sim3> poses;
@@ -136,18 +143,27 @@ report apply_poses(basic_map<D>& m, const snapshot& s, const bundle_solution& so
   }
   for (keyframe_id k = 0; k != m.keyframe_end(); ++k)
     if (m.has_keyframe(k)) m.move_keyframe(k, motion[k.value()]);
-  report done{s.keyframes.size(), s.landmarks.size(),  s.observations.size(), 0,
-              solved.iterations,  solved.initial_cost, solved.final_cost};
-  for (std::size_t i = 0; i != s.observations.size(); ++i)
-    if (solved.outliers[i] != 0 && erase_outlier(m, s.landmarks[s.observations[i].point], s.sources[i]))
-      ++done.outliers;
-  return done;
+  return {s.keyframes.size(), s.landmarks.size(),  s.observations.size(), 0,
+          solved.iterations,  solved.initial_cost, solved.final_cost};
 }
 
-/// As `apply_poses`, and updates all landmarks. @pre solved.usable
+/// Erases the outliers among the `count` observations from `first` on, with landmarks whose position nothing determines
+/// any more, so that a caller who shares the map can do it part by part. Returns how many were there. O(count).
+/// @pre solved.usable
+template <feature_descriptor D>
+std::size_t erase_outliers(basic_map<D>& m, const snapshot& s, const bundle_solution& solved, std::size_t first,
+                           std::size_t count) {
+  std::size_t erased = 0;
+  for (std::size_t i = first; i != s.observations.size() && i - first != count; ++i)
+    erased += solved.outliers[i] != 0 && erase_outlier(m, s.landmarks[s.observations[i].point], s.sources[i]);
+  return erased;
+}
+
+/// As `apply_poses`, erases the outliers and updates all landmarks. @pre solved.usable
 template <feature_descriptor D>
 report apply(basic_map<D>& m, const snapshot& s, const bundle_solution& solved) {
-  const report done = apply_poses(m, s, solved);
+  report done = apply_poses(m, s, solved);
+  done.outliers = erase_outliers(m, s, solved, 0, s.observations.size());
   update_landmarks(m);
   return done;
 }

@@ -3,17 +3,22 @@
 /// Recognises places that a new keyframe observes again, and corrects the maps accordingly.
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <concepts>
 #include <cstddef>
 #include <cstdint>
+#include <mutex>
 #include <optional>
+#include <span>
 #include <utility>
 #include <vector>
 
 #include <orbis/camera/model.hpp>
 #include <orbis/slam/detail/loops/global_adjustment.hpp>
 #include <orbis/slam/detail/loops/loop_correction.hpp>
+#include <orbis/slam/detail/loops/loop_fusion.hpp>
 #include <orbis/slam/detail/loops/loop_verification.hpp>
 #include <orbis/slam/detail/loops/map_merging.hpp>
 #include <orbis/slam/detail/map/keyframe_motion.hpp>
@@ -41,24 +46,62 @@ class loop_closer {
 
  private:
   using clock = std::chrono::steady_clock;
-  static constexpr std::uint32_t at_once = 4096;  ///< landmarks per lock: tracking waits for about a millisecond
+  // What is done per lock, so that tracking waits for about a millisecond:
+  static constexpr std::uint32_t at_once = 4096;              ///< landmarks
+  static constexpr std::size_t pairs_at_once = 512;           ///< of landmarks that are fused
+  static constexpr std::size_t observations_at_once = 65536;  ///< among which are outliers
+
+  /// How long a correction takes.
+  struct effort {
+    clock::time_point start = clock::now();
+    double locked = 0.0;  ///< milliseconds, the longest time at once
+  };
+  /// Holds the lock, and notes for how long.
+  struct noted_lock {
+    std::unique_lock<std::mutex> held;
+    effort& by;
+    clock::time_point since = clock::now();
+    ~noted_lock() { by.locked = std::max(by.locked, milliseconds_since(since)); }
+  };
+  [[nodiscard]] static double milliseconds_since(clock::time_point start) {
+    return std::chrono::duration<double, std::milli>(clock::now() - start).count();
+  }
+  /// Calls `f` with the lock held.
+  template <std::invocable F>
+  decltype(auto) locked(effort& by, F&& f) const {
+    const noted_lock lock{shared_.lock(), by};
+    return std::forward<F>(f)();
+  }
 
   /// The keyframes with similar appearance; `k` gets its present id. In its own map only keyframes that it shares no
   /// landmark with and that are some keyframes older.
   std::vector<map_keyframe> candidates_of(map_keyframe& k);
   std::optional<loop_verification::snapshot<D>> take(map_keyframe& k, map_keyframe& candidate);
-  bool correct(map_keyframe k, map_keyframe candidate, const loop_match& match, clock::time_point start);
+  bool correct(map_keyframe k, map_keyframe candidate, const loop_match& match, effort by);
   /// The map of `k` becomes a part of the candidate's.
-  bool merge(map_keyframe k, map_keyframe candidate, const loop_match& match, clock::time_point start);
+  bool merge(map_keyframe k, map_keyframe candidate, const loop_match& match, effort by);
 
-  /// Updates all landmarks of a map, part by part, so that tracking does not wait for all of it.
-  /// @pre edit() is held, and the map is there
-  void update(map_id id) {
-    for (landmark_id at = 0; shared_.locked([&] { return update_landmarks(shared_.atlas.at(id), at, at_once); });)
+  // Part by part, so that tracking does not wait for all of it. @pre edit() is held, and the map is there
+
+  /// Updates all landmarks of a map.
+  void update(map_id id, effort& by) {
+    for (landmark_id at = 0; locked(by, [&] { return update_landmarks(shared_.atlas.at(id), at, at_once); });)
       at += at_once;
   }
-  void report(correction_event event, clock::time_point start) const {
-    event.milliseconds = std::chrono::duration<double, std::milli>(clock::now() - start).count();
+  void fuse(map_id id, std::span<const loop_fusion::pair> pairs, const id_offsets& offsets, effort& by) {
+    for (; !pairs.empty(); pairs = pairs.subspan(std::min(pairs_at_once, pairs.size())))
+      locked(by, [&] {
+        loop_fusion::fuse<D>(shared_.atlas.at(id), pairs.first(std::min(pairs_at_once, pairs.size())), offsets);
+      });
+  }
+  void erase_outliers(map_id id, const global_adjustment::snapshot& s, const bundle_solution& solved, effort& by) {
+    for (std::size_t at = 0; at < s.observations.size(); at += observations_at_once)
+      locked(by, [&] { global_adjustment::erase_outliers(shared_.atlas.at(id), s, solved, at, observations_at_once); });
+  }
+
+  void report(correction_event event, const effort& by) const {
+    event.milliseconds = milliseconds_since(by.start);
+    event.locked_milliseconds = by.locked;
     if (shared_.callbacks.map_corrected) shared_.callbacks.map_corrected(event);
   }
 
@@ -72,13 +115,13 @@ template <camera::camera_model Camera, feature_descriptor D, place_recognizer<D>
 bool loop_closer<Camera, D, Places>::close(map_keyframe k) {
   if (!shared_.settings.places.enabled) return false;
   for (map_keyframe& candidate : candidates_of(k)) {
-    const auto start = clock::now();
-    const auto taken = shared_.locked([&] { return take(k, candidate); });
+    effort by;
+    const auto taken = locked(by, [&] { return take(k, candidate); });
     if (!taken || taken->connected) continue;
     const loop_check check = loop_verification::verify(*taken, shared_.rig, shared_.settings.places.loop);
     if (!check) continue;
     const bool closed =
-        k.map == candidate.map ? correct(k, candidate, check.match, start) : merge(k, candidate, check.match, start);
+        k.map == candidate.map ? correct(k, candidate, check.match, by) : merge(k, candidate, check.match, by);
     if (closed) return true;
   }
   return false;
@@ -88,17 +131,17 @@ template <camera::camera_model Camera, feature_descriptor D, place_recognizer<D>
 void loop_closer<Camera, D, Places>::adjust_globally(map_id id) {
   if (!shared_.settings.places.adjusts_globally) return;
   const global_adjustment_options& o = shared_.settings.places.adjustment;
-  const auto start = clock::now();
+  effort by;
   std::uint64_t before = 0;
   global_adjustment::snapshot s;
   {
     const auto edit = shared_.edit();
     before = corrections_;
-    shared_.locked([&] {
+    locked(by, [&] {
       if (shared_.atlas.contains(id)) s = global_adjustment::take_keyframes(shared_.atlas.at(id), o);
     });
     while (s.has_more())
-      shared_.locked([&] { global_adjustment::take_landmarks(s, shared_.atlas.at(id), shared_.rig, at_once); });
+      locked(by, [&] { global_adjustment::take_landmarks(s, shared_.atlas.at(id), shared_.rig, at_once); });
   }
   if (s.empty()) return;
   const auto go_on = [&](std::size_t, std::size_t) { return !stopped_ && corrections_ == before; };
@@ -107,15 +150,16 @@ void loop_closer<Camera, D, Places>::adjust_globally(map_id id) {
   if (!solved.usable) return;
   {
     const auto edit = shared_.edit();
-    if (!shared_.locked([&] {
+    if (!locked(by, [&] {
           if (corrections_ != before || !shared_.atlas.contains(id)) return false;
           global_adjustment::apply_poses(shared_.atlas.at(id), s, solved);
           return true;
         }))
       return;
-    update(id);
+    erase_outliers(id, s, solved, by);
+    update(id, by);
   }
-  report({.kind = correction_kind::global_adjustment, .map = id}, start);
+  report({.kind = correction_kind::global_adjustment, .map = id}, by);
 }
 
 template <camera::camera_model Camera, feature_descriptor D, place_recognizer<D> Places>
@@ -157,13 +201,13 @@ std::optional<loop_verification::snapshot<D>> loop_closer<Camera, D, Places>::ta
 
 template <camera::camera_model Camera, feature_descriptor D, place_recognizer<D> Places>
 bool loop_closer<Camera, D, Places>::correct(map_keyframe k, map_keyframe candidate, const loop_match& match,
-                                             clock::time_point start) {
+                                             effort by) {
   const loop_correction_options& o = shared_.settings.places.correction;
   correction_event event{.kind = correction_kind::loop, .map = k.map, .from = k, .to = candidate};
   {
     const auto edit = shared_.edit();
     se3 before;
-    const auto taken = shared_.locked([&]() -> std::optional<loop_correction::snapshot<D>> {
+    const auto taken = locked(by, [&]() -> std::optional<loop_correction::snapshot<D>> {
       if (!shared_.atlas.has(k)) return std::nullopt;
       before = shared_.atlas.at(k).T_world_camera;
       return loop_correction::take(shared_.atlas.at(k.map), match, o);
@@ -172,7 +216,7 @@ bool loop_closer<Camera, D, Places>::correct(map_keyframe k, map_keyframe candid
     const auto go_on = [&](std::size_t, std::size_t) { return !stopped_.load(); };
     const auto solved = loop_correction::solve(*taken, shared_.rig, o, go_on);
     if (!solved) return false;
-    if (!shared_.locked([&] {
+    if (!locked(by, [&] {
           basic_map<D>& m = shared_.atlas.at(k.map);
           const loop_correction::report done = loop_correction::apply_poses(m, *taken, *solved);
           if (!done.corrected) return false;
@@ -184,41 +228,45 @@ bool loop_closer<Camera, D, Places>::correct(map_keyframe k, map_keyframe candid
         }))
       return false;
     last_closed_ = k;
-    update(k.map);
+    fuse(k.map, solved->pairs, {}, by);
+    update(k.map, by);
   }
-  report(std::move(event), start);
+  report(std::move(event), by);
   return true;
 }
 
 template <camera::camera_model Camera, feature_descriptor D, place_recognizer<D> Places>
-bool loop_closer<Camera, D, Places>::merge(map_keyframe k, map_keyframe candidate, const loop_match& match,
-                                           clock::time_point start) {
+bool loop_closer<Camera, D, Places>::merge(map_keyframe k, map_keyframe candidate, const loop_match& match, effort by) {
   const loop_fusion_options& o = shared_.settings.places.correction.fusion;
   correction_event event{.kind = correction_kind::merge, .map = candidate.map, .to = candidate, .merged = k.map};
   {
     const auto edit = shared_.edit();
-    const auto taken = shared_.locked([&] { return map_merging::take(shared_.atlas, k.map, candidate.map, match, o); });
+    const auto taken = locked(by, [&] { return map_merging::take(shared_.atlas, k.map, candidate.map, match, o); });
     if (!taken) return false;
     const map_merging::solution solved = map_merging::solve(*taken, shared_.rig, o);
-    const auto lock = shared_.lock();
-    std::vector<keyframe_id> ids;
-    for (const auto& each : shared_.atlas.at(k.map).keyframes()) ids.push_back(each.id);
-    const map_merging::report done = map_merging::apply(shared_.atlas, *taken, solved);
-    if (!done.merged) return false;
-    for (const keyframe_id id : ids) shared_.places.rename({k.map, id}, {candidate.map, id + done.offsets.keyframes});
-    event.offsets = done.offsets;
-    event.from = {candidate.map, done.keyframe};
-    event.T_corrected_before = done.T_into_from;
-    if (k.map < candidate.map) {  // the world stays that of the older map
-      event.T_map_before = done.T_into_from.inverse();
-      shared_.atlas.at(candidate.map).transform(event.T_map_before);
-      event.T_corrected_before = sim3{};
-    }
-    ++shared_.maps_merged;
-    ++corrections_;
+    const bool merged = locked(by, [&] {
+      std::vector<keyframe_id> ids;
+      for (const auto& each : shared_.atlas.at(k.map).keyframes()) ids.push_back(each.id);
+      const map_merging::report done = map_merging::join(shared_.atlas, *taken);
+      if (!done.merged) return false;
+      for (const keyframe_id id : ids) shared_.places.rename({k.map, id}, {candidate.map, id + done.offsets.keyframes});
+      event.offsets = done.offsets;
+      event.from = {candidate.map, done.keyframe};
+      event.T_corrected_before = done.T_into_from;
+      if (k.map < candidate.map) {  // the world stays that of the older map
+        event.T_map_before = done.T_into_from.inverse();
+        shared_.atlas.at(candidate.map).transform(event.T_map_before);
+        event.T_corrected_before = sim3{};
+      }
+      ++shared_.maps_merged;
+      ++corrections_;
+      return true;
+    });
+    if (!merged) return false;
     last_closed_ = event.from;
+    fuse(candidate.map, solved.pairs, event.offsets, by);
   }
-  report(std::move(event), start);
+  report(std::move(event), by);
   return true;
 }
 

@@ -95,8 +95,9 @@ template <feature_descriptor D, camera::camera_model Camera>
   return found;
 }
 
-/// Writes a solution into the map that the snapshot was taken of. `update_landmarks` is left to the caller, if the
-/// report says that the map was corrected: it is not if no keyframe stands for an end of the loop any more.
+/// Writes the poses of a solution into the map that the snapshot was taken of. `loop_fusion::fuse`, then
+/// `update_landmarks`, are left to the caller, if the report says that the map was corrected: it is not if no keyframe
+/// stands for an end of the loop any more.
 template <feature_descriptor D>
 report apply_poses(basic_map<D>& m, const snapshot<D>& s, const solution& solved) {
   report done;
@@ -109,7 +110,6 @@ report apply_poses(basic_map<D>& m, const snapshot<D>& s, const solution& solved
   const se3 before = m.at(a).T_world_camera;
   move_all<D>(m, motion);
   if (a != b) m.add_loop_edge(a, b);
-  done.fusion = loop_fusion::fuse<D>(m, solved.pairs);
   done.corrected = true;
   done.keyframes = m.keyframes().size();
   done.moved = (m.at(a).T_world_camera.translation() - before.translation()).norm();
@@ -118,11 +118,13 @@ report apply_poses(basic_map<D>& m, const snapshot<D>& s, const solution& solved
   return done;
 }
 
-/// As `apply_poses`, and updates all landmarks.
+/// As `apply_poses`, fuses landmarks, and updates all of them.
 template <feature_descriptor D>
 report apply(basic_map<D>& m, const snapshot<D>& s, const solution& solved) {
-  const report done = apply_poses(m, s, solved);
-  if (done.corrected) update_landmarks(m);
+  report done = apply_poses(m, s, solved);
+  if (!done.corrected) return done;
+  done.fusion = loop_fusion::fuse<D>(m, solved.pairs);
+  update_landmarks(m);
   return done;
 }
 

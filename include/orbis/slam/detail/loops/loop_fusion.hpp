@@ -83,7 +83,7 @@ template <camera::camera_model Camera, feature_descriptor D>
 
 /// Fuses landmarks that the pairs say are the same; those of the candidate's side stay. `offsets`: by how much the ids
 /// of the keyframe's side have grown, if it was a map of its own. Pairs whose keyframe or landmark is gone are left
-/// out. Changed landmarks are updated.
+/// out. Changed landmarks are updated. A caller who shares the map can do it part by part: the result is the same.
 template <feature_descriptor D>
 fusion_counts fuse(basic_map<D>& m, std::span<const pair> pairs, const id_offsets& offsets = {}) {
   fusion_counts counts;

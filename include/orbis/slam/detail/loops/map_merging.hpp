@@ -2,7 +2,8 @@
 /// @file
 /// Merges two maps that observe the same place.
 ///
-/// `take` and `apply` touch the maps, `solve` works on the snapshot. Between them both maps may grow.
+/// `take` and `apply` touch the maps, `solve` works on the snapshot. Between them both maps may grow. Who shares the
+/// maps locks them for `take`, `join` and each part of `loop_fusion::fuse`.
 ///
 /// Source: C. Campos, R. Elvira, J. J. Gomez Rodriguez, J. M. M. Montiel, J. D. Tardos, "ORB-SLAM3", T-RO 37 (2021),
 /// section VI.
@@ -65,10 +66,11 @@ template <feature_descriptor D, camera::camera_model Camera>
   return {loop_fusion::find_pairs(s.fusion, rig, o)};
 }
 
-/// Moves `from` as the match says, makes it a part of `into`, adds a loop edge at the match, and fuses landmarks. If
-/// `from` was the active map, `into` becomes it. Nothing is changed if a map or keyframe is gone. O(both maps).
+/// Moves `from` as the match says, makes it a part of `into`, and adds a loop edge at the match. If `from` was the
+/// active map, `into` becomes it. Nothing is changed if a map or keyframe is gone. O(`from`). `loop_fusion::fuse` is
+/// left to the caller, if the report says that the maps were merged.
 template <feature_descriptor D>
-report apply(basic_atlas<D>& maps, const snapshot<D>& s, const solution& solved) {
+report join(basic_atlas<D>& maps, const snapshot<D>& s) {
   report done;
   if (!is_possible(maps, s.from, s.into, s.match)) return done;
   basic_map<D>& m = maps.at(s.into);
@@ -78,8 +80,15 @@ report apply(basic_atlas<D>& maps, const snapshot<D>& s, const solution& solved)
   done.keyframe = s.match.keyframe + done.offsets.keyframes;
   done.candidate = s.match.candidate;
   m.add_loop_edge(done.keyframe, done.candidate);
-  done.fusion = loop_fusion::fuse<D>(m, solved.pairs, done.offsets);
   done.merged = true;
+  return done;
+}
+
+/// As `join`, and fuses landmarks.
+template <feature_descriptor D>
+report apply(basic_atlas<D>& maps, const snapshot<D>& s, const solution& solved) {
+  report done = join(maps, s);
+  if (done.merged) done.fusion = loop_fusion::fuse<D>(maps.at(s.into), solved.pairs, done.offsets);
   return done;
 }
 
