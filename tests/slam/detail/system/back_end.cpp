@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <atomic>
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <stdexcept>
+#include <thread>
 
 #include <orbis/camera/any.hpp>
 #include <orbis/slam/detail/system/back_end.hpp>
@@ -53,6 +56,27 @@ TEST_CASE("A back end that ends does not wait for what is in its queue") {
     slam::detail::back_end<camera::any_camera, features::binary_descriptor<256>, bow_places> back_end{s.shared};
     for (std::uint32_t k = 0; k != 64; ++k) back_end.process({0, k});
   }
+  CHECK(slam::validate(s.shared.atlas.active()));
+}
+
+TEST_CASE("Where loop closing takes long, keyframes wait for mapping, not in a queue behind it") {
+  scene s{true};
+  std::atomic<bool> may_end{false};
+  s.shared.callbacks.map_corrected = [&](const slam::correction_event&) {
+    while (!may_end) std::this_thread::sleep_for(std::chrono::milliseconds{1});
+  };
+  slam::detail::back_end<camera::any_camera, features::binary_descriptor<256>, bow_places> back_end{s.shared};
+  for (std::uint32_t k = 63; k != 54; --k) back_end.process({0, k});
+  bool always_full = true;
+  for (int i = 0; i != 500 && always_full; ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds{1});
+    always_full = back_end.is_full();
+  }
+  CHECK(always_full);
+  may_end = true;
+  back_end.wait();
+  CHECK_FALSE(back_end.is_full());
+  CHECK(s.shared.loops_closed >= 1);
   CHECK(slam::validate(s.shared.atlas.active()));
 }
 

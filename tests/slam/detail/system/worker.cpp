@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <atomic>
 #include <stdexcept>
+#include <thread>
 #include <vector>
 
 #include <orbis/slam/detail/system/worker.hpp>
@@ -27,4 +29,21 @@ TEST_CASE("What a job throws comes to those who wait and to those who push") {
   CHECK(w.idle());
   CHECK(done == std::vector<int>{0, 1});
   w.stop();
+}
+
+TEST_CASE("A job that waits already is not pushed twice, one that runs is") {
+  std::atomic<bool> begun{false}, may_end{false};
+  std::vector<int> done;
+  worker<int> w{[&](int job) {
+    begun = true;
+    while (!may_end) std::this_thread::yield();
+    done.push_back(job);
+  }};
+  w.push_once(1);
+  while (!begun) std::this_thread::yield();
+  for (const int job : {1, 2, 1, 2, 3, 2}) w.push_once(job);
+  CHECK(w.waiting() == 3);
+  may_end = true;
+  w.wait();
+  CHECK(done == std::vector<int>{1, 1, 2, 3});
 }

@@ -15,7 +15,8 @@
 namespace orbis::slam::detail {
 
 /// Works on each new keyframe: local mapping, then loop closing, then, if a loop was closed, global adjustment. With
-/// threads each of the three has one, and passes the keyframe on to the next.
+/// threads each of the three has one, and passes the keyframe on to the next. No queue grows without a bound: mapping
+/// waits while too many keyframes wait for loop closing, and a map waits once for its adjustment.
 template <camera::camera_model Camera, feature_descriptor D, place_recognizer<D> Places>
 class back_end {
  public:
@@ -58,10 +59,11 @@ back_end<Camera, D, Places>::back_end(shared_state<Camera, D, Places>& shared)
   if (!shared.settings.threads.enabled) return;
   global_ = std::make_unique<worker<map_id>>([this](map_id m) { closer_.adjust_globally(m); });
   loops_ = std::make_unique<worker<map_keyframe>>([this](map_keyframe k) {
-    if (closer_.close(k)) global_->push(shared_.locked([&] { return shared_.atlas.current(k).map; }));
+    if (closer_.close(k)) global_->push_once(shared_.locked([&] { return shared_.atlas.current(k).map; }));
   });
   mapping_ = std::make_unique<worker<map_keyframe>>([this](map_keyframe k) {
     mapper_.process(k, [this] { return mapping_->waiting() != 0; });
+    loops_->wait_for_room(most_waiting());
     loops_->push(k);
   });
 }

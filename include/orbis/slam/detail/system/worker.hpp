@@ -3,6 +3,7 @@
 /// A thread with a queue of jobs.
 #pragma once
 
+#include <algorithm>
 #include <concepts>
 #include <condition_variable>
 #include <cstddef>
@@ -39,13 +40,13 @@ class worker {
 
   /// Appends a job; drops it after `stop`.
   void push(Job job) {
-    {
-      const std::lock_guard lock(mutex_);
-      rethrow_failure();
-      if (ends_) return;
-      jobs_.push_back(std::move(job));
-    }
-    changed_.notify_all();
+    push_unless(std::move(job), [](const auto&, const Job&) { return false; });
+  }
+  /// As `push`, unless an equal job is in the queue already.
+  void push_once(Job job) requires std::equality_comparable<Job> {
+    push_unless(std::move(job), [](const auto& jobs, const Job& other) {
+      return std::find(jobs.begin(), jobs.end(), other) != jobs.end();
+    });
   }
 
   /// The number of jobs in the queue, without the running one.
@@ -72,6 +73,16 @@ class worker {
   }
 
  private:
+  template <class Unwanted>
+  void push_unless(Job job, Unwanted&& is_unwanted) {
+    {
+      const std::lock_guard lock(mutex_);
+      rethrow_failure();
+      if (ends_ || is_unwanted(jobs_, job)) return;
+      jobs_.push_back(std::move(job));
+    }
+    changed_.notify_all();
+  }
   void rethrow_failure() const {
     if (failure_) std::rethrow_exception(failure_);
   }
