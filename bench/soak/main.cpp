@@ -2,9 +2,10 @@
 //
 // soak [RECORDING [FRAMES]]: a robot that does not stop. Plays a recording forwards and backwards, again and again, for
 // so many frames (10,000), through SLAM with threads and the live map, and prints a row for each tenth: what tracking
-// takes, how long a reader waits for the locks, the memory of the process, and how large the maps are. Without a
-// recording, a synthetic room. Ends with 1 if memory grows by more than a fifth after the second round, frames are
-// lost, or something was left out of the live map.
+// takes, how long a reader waits for the locks, and corrections hold them at most, the memory of the process, and how
+// large the maps are. Then two copies of the map are merged while the recording goes on. Without a recording, a
+// synthetic room. Ends with 1 if memory grows by more than a fifth after the second round, frames are lost, something
+// was left out of the live map, the copies do not become one map, or their merger holds the locks for more than 20 ms.
 #include <algorithm>
 #include <atomic>
 #include <charconv>
@@ -13,6 +14,7 @@
 #include <cstdint>
 #include <cstdio>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 #include <memory>
 #include <mutex>
@@ -93,11 +95,67 @@ class impatient_reader {
   std::thread thread_;
 };
 
+/// The longest time for which a correction held the locks, milliseconds. The calls come from threads of the system.
+class longest_hold {
+ public:
+  [[nodiscard]] auto listener() {
+    return [this](const slam::correction_event& e) {
+      const std::lock_guard lock{mutex_};
+      longest_ = std::max(longest_, e.locked_milliseconds);
+    };
+  }
+  /// Since the last call.
+  [[nodiscard]] double take() {
+    const std::lock_guard lock{mutex_};
+    return std::exchange(longest_, 0.0);
+  }
+
+ private:
+  std::mutex mutex_;
+  double longest_ = 0.0;
+};
+
 /// The frame of the recording that comes `i`-th when it is played to and fro.
 std::size_t to_and_fro(std::size_t i, std::size_t size) {
   if (size < 2) return 0;
   const std::size_t at = i % (2 * (size - 1));
   return at < size ? at : 2 * (size - 1) - at;
+}
+
+/// Loads two copies of a map and goes on with the recording until they are one map, at most once to and fro. Returns
+/// how long the locks were held at once, at most; nothing if the copies did not become one map.
+template <class Recording>
+std::optional<double> merge_copies(const Recording& recording, const slam::options& settings,
+                                   const std::filesystem::path& map) {
+  longest_hold hold;
+  slam::rgbd_system<camera::any_camera> slam{recording.camera().model, settings};
+  slam.listen({.map_corrected = hold.listener()});
+  if (!slam.load_map(map) || !slam.load_map(map)) return std::nullopt;
+  for (std::size_t i = 0; i != 2 * recording.size() && slam.counters().maps_merged == 0; ++i) {
+    auto frame = recording.frame(to_and_fro(i, recording.size()));
+    if (!frame) return std::nullopt;
+    frame->timestamp = static_cast<double>(i) / 30.0;
+    slam.track(*frame);
+  }
+  slam.wait();
+  return slam.counters().maps_merged == 1 ? std::optional{hold.take()} : std::nullopt;
+}
+
+/// Merges copies of a map several times. Returns how long the locks were held in the best case: in others, a thread
+/// that held them may have been left without a processor.
+template <class Recording>
+std::optional<double> merge_copies(const Recording& recording, const slam::rgbd_system<camera::any_camera>& slam,
+                                   const slam::options& settings) {
+  const auto file = std::filesystem::temp_directory_path() / ("soak_" + std::to_string(getpid()) + ".map");
+  std::optional<double> least;
+  bool all = slam.save_map(file).has_value();
+  for (int i = 0; all && i != 5; ++i) {
+    const std::optional<double> held = merge_copies(recording, settings, file);
+    all = held.has_value();
+    if (held) least = std::min(*held, least.value_or(*held));
+  }
+  std::filesystem::remove(file);
+  return all ? least : std::nullopt;
 }
 
 template <class Recording>
@@ -108,6 +166,7 @@ int soak(const Recording& recording, std::size_t frames) {
   };
   slam::options settings;
   settings.threads = {.enabled = true, .wait = true};
+  longest_hold hold;
   slam::rgbd_system<camera::any_camera> slam{camera.model, settings};
 
   using live_map = mapping::live_map_thread<octree::occupancy_octree<>, camera::any_camera>;
@@ -123,10 +182,10 @@ int soak(const Recording& recording, std::size_t frames) {
   map_options.patience = std::chrono::seconds{10};  // the recording is played faster than a camera would bring it
   map_options.moving.emplace();
   live_map map{camera.model, map_options, std::move(events)};
-  slam.listen({.keyframe_culled = [&map](const auto& e) { map.remove(e.frame); }});
+  slam.listen({.keyframe_culled = [&map](const auto& e) { map.remove(e.frame); }, .map_corrected = hold.listener()});
 
-  std::printf("%8s %22s %22s %8s %10s %10s %8s %6s\n", "frames", "track ms (50/95/max)", "lock ms (50/95/max)", "MB",
-              "keyframes", "landmarks", "leaves", "lost");
+  std::printf("%8s %22s %22s %8s %8s %10s %10s %8s %6s\n", "frames", "track ms (50/95/max)", "lock ms (50/95/max)",
+              "held ms", "MB", "keyframes", "landmarks", "leaves", "lost");
   std::vector<double> tracking;
   const std::size_t two_rounds = 4 * recording.size();
   double memory_then = 0.0, memory_now = 0.0;
@@ -150,9 +209,9 @@ int soak(const Recording& recording, std::size_t frames) {
       const std::size_t lost = slam.counters().lost;
       memory_now = resident_megabytes();
       if (memory_then == 0.0 && i >= two_rounds) memory_then = memory_now;
-      std::printf("%8zu %6.1f %6.1f %8.1f %6.2f %6.2f %8.1f %8.0f %10zu %10zu %8zu %6zu\n", i + 1,
+      std::printf("%8zu %6.1f %6.1f %8.1f %6.2f %6.2f %8.1f %8.2f %8.0f %10zu %10zu %8zu %6zu\n", i + 1,
                   part_of(tracking, 0.5), part_of(tracking, 0.95), part_of(tracking, 1.0), part_of(waited, 0.5),
-                  part_of(waited, 0.95), part_of(waited, 1.0), memory_now, slam.keyframes().size(),
+                  part_of(waited, 0.95), part_of(waited, 1.0), hold.take(), memory_now, slam.keyframes().size(),
                   slam.landmark_count(), map.latest()->map.counts().leaves, lost - lost_before);
       std::fflush(stdout);
       lost_before = lost;
@@ -170,6 +229,13 @@ int soak(const Recording& recording, std::size_t frames) {
   if (counters.dropped_keyframes != 0) complain(std::to_string(counters.dropped_keyframes) + " keyframes left out");
   if (slam.counters().lost != 0) complain(std::to_string(slam.counters().lost) + " frames lost");
   if (memory_then != 0.0 && memory_now > 1.2 * memory_then) complain("memory grows by more than a fifth");
+  constexpr double longest = 20.0;  // milliseconds
+  if (const auto held = merge_copies(recording, slam, settings); !held) {
+    complain("two copies of the map did not become one");
+  } else {
+    std::printf("two copies of the map were merged, with the locks held for %.2f ms at once\n", *held);
+    if (*held > longest) complain("the locks were held for too long");
+  }
   return status;
 }
 
