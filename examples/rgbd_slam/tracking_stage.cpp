@@ -49,14 +49,17 @@ handed_frame handed_over(const slam_system& slam, std::size_t i, const orbis::sl
   return handed;
 }
 
-/// Lets time go by until a frame with this time stamp comes from the camera.
 class camera_pace {
  public:
+  /// Lets time go by until a frame with this time stamp comes from the camera, or the run is interrupted.
   void wait_for(double timestamp) {
     if (!std::exchange(has_begun_, true)) first_ = timestamp;
     constexpr double longest = 1e6;  // seconds, which a clock can count
     const std::chrono::duration<double> since_first{std::min(timestamp - first_, longest)};
-    std::this_thread::sleep_until(begin_ + std::chrono::duration_cast<console::clock::duration>(since_first));
+    const auto due = begin_ + std::chrono::duration_cast<console::clock::duration>(since_first);
+    constexpr std::chrono::milliseconds glance{50};
+    while (!interrupts::requested() && console::clock::now() < due)
+      std::this_thread::sleep_until(std::min(due, console::clock::now() + glance));
   }
 
  private:

@@ -69,6 +69,13 @@ must_exist(${WORK}/stopped trajectory.txt map.bt summary.json report.html)
 summary(frames ${WORK}/stopped frames)
 check(frames LESS 10)
 
+# The same where a recording comes at its pace.
+execute_process(COMMAND timeout --preserve-status -k 8 -s INT 4 ${APP} run room --realtime --resolution 0.1 --filter none --out paced
+                WORKING_DIRECTORY ${WORK} RESULT_VARIABLE result ERROR_VARIABLE err)
+check(result EQUAL 130)
+summary(frames ${WORK}/paced frames)
+check(frames LESS 10)
+
 # No device, or no library for it.
 app_fails(2 "no depth camera is connected|this build knows no depth cameras: .*libopenni2-dev" live /no/such/device --out none)
 app_fails(2 "the camera is not known: name it with --camera|knows no video cameras: .*libopencv-videoio-dev"
