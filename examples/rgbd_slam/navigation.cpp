@@ -108,8 +108,8 @@ orbis::result<navigation_results> navigate(const octree& map, const orbis::traje
   if (r.path.empty())
     std::snprintf(text, sizeof text, "no way: %s", r.path_status.c_str());
   else
-    std::snprintf(text, sizeof text, "way of a ball of %g m: %.2f m, straight %.2f m, found in %.1f ms", s.robot_radius,
-                  r.path_m, r.straight_m, r.planning_ms);
+    std::snprintf(text, sizeof text, "way of a ball of %g m: %.2f m, straight %.2f m", s.robot_radius, r.path_m,
+                  r.straight_m);
   if (floor || !cameras.empty()) {
     const double height = !r.path.empty() ? r.path.front().z() : floor ? floor->floor + 0.5 * s.robot_height : 0.0;
     const auto drawn = write_navigation_picture({.title = "Floor and distances",

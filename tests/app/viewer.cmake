@@ -48,6 +48,7 @@ app(0 ${common} --frames 4 --out batch --batch-map --viewer web --viewer-port 0 
 file(WRITE ${WORK}/viewer.toml "viewer = \"web\"\nviewer-port = 0\nviewer-hold = true\n")
 execute_process(COMMAND bash -c "
   set -e
+  : >held.log  # there before it is read
   '${APP}' demo --frames 3 --width 160 --out held --config viewer.toml 2>held.log &
   run=$!
   trap 'kill -9 $run 2>/dev/null || true' EXIT
