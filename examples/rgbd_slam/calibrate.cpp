@@ -16,6 +16,7 @@
 #include <orbis/slam/calibration.hpp>
 
 #include "calibration_rounds.hpp"
+#include "camera_check.hpp"
 #include "commands.hpp"
 #include "output.hpp"
 #include "shutter_stage.hpp"
@@ -84,8 +85,7 @@ exit_code calibrate(const settings& s, console& console) {
   if (const auto trouble = find_trouble(s, *source)) return console.error(*trouble), bad_usage;
 
   orbis::camera::camera_settings camera = source->camera;
-  if (const auto* const plain = camera.model.get_if<orbis::camera::pinhole>(); plain && s.distortion)
-    camera.model = orbis::camera::radial_tangential{plain->k(), {}};
+  if (s.distortion) camera.model = with_lens(camera.model);
   const shutter_results shutter = find_shutter(*source, s, console).shutter;
   const auto found = calibrate_by(*source, s, shutter.shutter, camera.model, {}, console);
   if (!found) return give_up(found.error());

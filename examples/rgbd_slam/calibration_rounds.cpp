@@ -105,7 +105,6 @@ orbis::result<calibration_rounds> calibrate_by(const frame_source& source, const
     console.stage("calibrating");
     auto next = refine(camera, source, s, shutter, effort.longest, console);
     if (!next) return orbis::fail(next.error());
-    if (round == 1) rounds.initial_rms = next->camera.initial_rms;
     rounds.last = std::move(next->camera);
     rounds.trajectory = std::move(next->trajectory);
     rounds.last.camera = camera = with_what_was_given(rounds.last, given_values);

@@ -21,8 +21,7 @@ namespace app {
 struct calibration_rounds {
   orbis::slam::calibration<orbis::camera::any_camera> last;   ///< the last round; what was held has the values given
   std::vector<orbis::slam::calibrated_parameter> parameters;  ///< over all rounds: `before` is what was given
-  double initial_rms = 0.0;      ///< of the first round: the error of the camera that was given, standard deviations
-  orbis::trajectory trajectory;  ///< of the last round
+  orbis::trajectory trajectory;                               ///< of the last round
 };
 
 struct calibration_effort {

@@ -7,10 +7,16 @@
 
 namespace app {
 
+orbis::camera::any_camera with_lens(const orbis::camera::any_camera& camera) {
+  const auto* const plain = camera.get_if<orbis::camera::pinhole>();
+  return plain != nullptr ? orbis::camera::radial_tangential{plain->k(), {}} : camera;
+}
+
 std::optional<focal_doubt> find_doubt(const orbis::slam::calibration<orbis::camera::any_camera>& calibrated) {
+  if (!calibrated.is_complete()) return std::nullopt;
   constexpr double least_change = 0.015, sigmas = 6.0;
   for (const auto& p : calibrated.parameters) {
-    if (p.name != "fx" || p.is_held) continue;
+    if (p.name != "fx") continue;
     const double change = std::abs(p.after - p.before);
     if (change > sigmas * p.deviation && change > least_change * p.before) return focal_doubt{p.before, p.after};
   }
@@ -21,7 +27,8 @@ std::optional<focal_doubt> find_doubt(const orbis::slam::map& map, const orbis::
                                       const orbis::slam::options& options) {
   constexpr std::size_t few = 8;  // keyframes
   if (map.keyframes().size() < few) return std::nullopt;
-  const auto refined = orbis::slam::calibrate(map, orbis::slam::make_rig(camera, options), {.max_keyframes = 60});
+  const auto refined =
+      orbis::slam::calibrate(map, orbis::slam::make_rig(with_lens(camera), options), {.max_keyframes = 60});
   return refined ? find_doubt(*refined) : std::nullopt;
 }
 

@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 
+#include <orbis/camera/any.hpp>
 #include <orbis/slam/calibration.hpp>
 #include <orbis/slam/map.hpp>
 #include <orbis/slam/options.hpp>
@@ -17,11 +18,15 @@ struct focal_doubt {
   double given, found;
 };
 
-/// Of a calibration by a map; empty where it does not tell.
+/// The camera; a pinhole with a lens without distortion, which can be estimated.
+[[nodiscard]] orbis::camera::any_camera with_lens(const orbis::camera::any_camera& camera);
+
+/// Of a calibration by a map; empty where it does not tell, as where a parameter was held.
 [[nodiscard]] std::optional<focal_doubt> find_doubt(
     const orbis::slam::calibration<orbis::camera::any_camera>& calibrated);
-/// Of a map made with the camera. Poses of a wrong camera are some percent too near to each other or too far apart. A
-/// small self-calibration: some tenths of a second.
+/// Of a map made with the camera. Poses of a wrong camera are some percent too near to each other or too far apart, but
+/// distortion that is not modelled moves them as well: it is estimated, even for a pinhole. A small self-calibration:
+/// some tenths of a second.
 [[nodiscard]] std::optional<focal_doubt> find_doubt(const orbis::slam::map& map,
                                                     const orbis::camera::any_camera& camera,
                                                     const orbis::slam::options& options);

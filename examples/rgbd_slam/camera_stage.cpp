@@ -1,23 +1,26 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "camera_stage.hpp"
 
+#include <cmath>
 #include <cstdio>
 
 #include "calibration_rounds.hpp"
+#include "camera_check.hpp"
 #include "shutter_stage.hpp"
 
 namespace app {
 
 shutter_results get_to_know_camera(frame_source& source, const settings& s, console& console) {
   const first_look look = find_shutter(source, s, console);
-  if (!look.doubt || !s.refines_camera || !s.camera.empty() || !s.load_map.empty()) return look.shutter;
+  if (!look.doubt || !s.refines_camera || !s.camera.empty()) return look.shutter;
+  if (!s.load_map.empty() || !s.save_map.empty()) return look.shutter;  // runs that share a map share a camera
   const auto found = calibrate_by(source, s, look.shutter.shutter, source.camera.model, {2, 60.0}, console);
-  constexpr double enough = 0.9;  // of the error before
-  if (!found || !(found->last.final_rms < enough * found->initial_rms)) return look.shutter;
+  if (!found) return look.shutter;
   auto all_rounds = found->last;
   all_rounds.parameters = found->parameters;
   const auto change = find_doubt(all_rounds);
-  if (!change) return look.shutter;
+  constexpr double alike = 0.01;  // the look knew of distortion, which the camera may not have
+  if (!change || std::abs(change->found - look.doubt->found) > alike * change->found) return look.shutter;
   source.camera.model = found->last.camera;
   source.camera_is_refined = true;
   char text[240];

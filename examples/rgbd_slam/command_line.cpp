@@ -203,8 +203,7 @@ void add_intrinsics_option(CLI::App& cmd, settings& s) {
          "--intrinsics", [&s](const std::string& value) { s.refines_camera = value == "auto"; },
          "auto: where the first ten seconds are looked at (see --read-out-ms) and clearly do not fit the focal length "
          "of the recording's camera, it is calibrated by the recording first; given: the camera is as it is said to "
-         "be, "
-         "as with --camera")
+         "be, as with --camera, --load-map and --save-map")
       ->check(CLI::IsMember({"auto", "given"}))
       ->default_str("auto")
       ->type_name("W");

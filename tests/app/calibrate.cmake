@@ -43,7 +43,17 @@ app(0 run room --intrinsics given --deterministic --filter none --resolution 0.1
 check(err MATCHES "focal length is doubtful")
 summary(fx ${WORK}/as_given intrinsics fx)
 check(fx EQUAL 270.0)
+app(0 run room --save-map room.map --deterministic --filter none --resolution 0.1 --out shared)
+summary(fx ${WORK}/shared intrinsics fx)
+check(fx EQUAL 270.0)
 file(WRITE ${WORK}/room/camera.toml "${given}")
+
+# A lens that the camera file does not know of is not another focal length.
+make_recording(${WORK}/bent 120 320 - 0.15)
+app(0 run bent --deterministic --filter none --resolution 0.1 --out bent_out)
+check(NOT err MATCHES "focal length")
+summary(fx ${WORK}/bent_out intrinsics fx)
+check(fx GREATER 260 AND fx LESS 265)
 
 # Without poses the depth scale is nobody's to know; without motion nothing is, and no file is written.
 file(REMOVE ${WORK}/room/groundtruth.txt ${WORK}/found.toml)

@@ -53,7 +53,7 @@ function(app_short_of_memory program)
   check(result EQUAL 0 AND gave_up GREATER 0)
 endfunction()
 
-function(make_recording folder frames width)  # [read-out, milliseconds]
+function(make_recording folder frames width)  # [read-out in milliseconds, or -; distortion k1]
   execute_process(COMMAND ${MAKE_RECORDING} ${folder} ${frames} ${width} ${ARGN} RESULT_VARIABLE result)
   if(NOT result EQUAL 0)
     message(FATAL_ERROR "no recording: ${result}")
