@@ -89,6 +89,11 @@ exit_code calibrate(const settings& s, console& console) {
   const shutter_results shutter = find_shutter(*source, s, console).shutter;
   const auto found = calibrate_by(*source, s, shutter.shutter, camera.model, {}, console);
   if (!found) return give_up(found.error());
+  const auto is_held_distortion = [](const calibrated_parameter& p) { return p.name == "k1" && p.is_held; };
+  if (s.distortion && std::ranges::any_of(found->parameters, is_held_distortion))
+    return give_up({orbis::errc::degenerate, s.input.string(),
+                    "the motion does not determine the distortion of the lens, and the focal length would make up for "
+                    "it; without --distortion the lens is taken to be as the camera file says"});
   camera.model = found->last.camera;
   if (!is_settled(found->last, 3.0))
     console.warn("the parameters still change from round to round: do not rely on them");

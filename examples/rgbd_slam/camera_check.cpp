@@ -27,9 +27,19 @@ std::optional<focal_doubt> find_doubt(const orbis::slam::map& map, const orbis::
                                       const orbis::slam::options& options) {
   constexpr std::size_t few = 8;  // keyframes
   if (map.keyframes().size() < few) return std::nullopt;
-  const auto refined =
-      orbis::slam::calibrate(map, orbis::slam::make_rig(with_lens(camera), options), {.max_keyframes = 60});
-  return refined ? find_doubt(*refined) : std::nullopt;
+  const auto calibrate_as = [&](const orbis::camera::any_camera& model) {
+    return orbis::slam::calibrate(map, orbis::slam::make_rig(model, options), {.max_keyframes = 60});
+  };
+  const auto as_given = calibrate_as(camera);
+  auto doubt = as_given ? find_doubt(*as_given) : std::nullopt;
+  if (!doubt || camera.get_if<orbis::camera::pinhole>() == nullptr) return doubt;
+  // A focal length makes up for a lens that bends, to some extent: images that such a lens explains better, or that do
+  // not tell, say little about the focal length.
+  constexpr double somewhat = 0.98, clearly = 0.95;  // of the error
+  const auto bent = calibrate_as(with_lens(camera));
+  if (!bent || !bent->is_complete() || bent->final_rms < clearly * as_given->final_rms) return std::nullopt;
+  doubt->is_sure = bent->final_rms >= somewhat * as_given->final_rms;
+  return doubt;
 }
 
 std::string in_words(const focal_doubt& doubt) {

@@ -16,6 +16,7 @@ namespace app {
 /// That images fit another focal length clearly better than the camera's, pixels.
 struct focal_doubt {
   double given, found;
+  bool is_sure = true;  ///< false where a lens that bends would explain the images a little better
 };
 
 /// The camera; a pinhole with a lens without distortion, which can be estimated.
@@ -25,8 +26,8 @@ struct focal_doubt {
 [[nodiscard]] std::optional<focal_doubt> find_doubt(
     const orbis::slam::calibration<orbis::camera::any_camera>& calibrated);
 /// Of a map made with the camera. Poses of a wrong camera are some percent too near to each other or too far apart, but
-/// distortion that is not modelled moves them as well: it is estimated, even for a pinhole. A small self-calibration:
-/// some tenths of a second.
+/// distortion that a pinhole does not model moves them as well: empty where that explains the images clearly better, or
+/// where they do not tell. One or two small self-calibrations: some tenths of a second.
 [[nodiscard]] std::optional<focal_doubt> find_doubt(const orbis::slam::map& map,
                                                     const orbis::camera::any_camera& camera,
                                                     const orbis::slam::options& options);

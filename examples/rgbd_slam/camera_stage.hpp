@@ -11,10 +11,9 @@
 namespace app {
 
 /// Finds the shutter (`find_shutter`). Where that looked at the first seconds, and they clearly do not fit the camera's
-/// focal length, the camera is calibrated by the recording, at most by its first minute. It is replaced if both find
-/// the same focal length, within a percent, though the first seconds are looked at with distortion; unless
-/// `--intrinsics given` or `--camera` say which camera it is, or a map of landmarks is loaded or saved: runs that share
-/// one need the same camera.
+/// focal length (`focal_doubt::is_sure`), the camera is calibrated by the recording, at most by its first minute, and
+/// replaced if that finds the same focal length, within two percent; unless `--intrinsics given` or `--camera` say
+/// which camera it is, or a map of landmarks is loaded or saved: runs that share one need the same camera.
 [[nodiscard]] shutter_results get_to_know_camera(frame_source& source, const settings& s, console& console);
 
 }  // namespace app

@@ -31,7 +31,7 @@ struct source_frame : orbis::camera::rgbd_frame {
 struct frame_source {
   std::string title, kind;
   orbis::camera::camera_settings camera;
-  bool camera_is_refined = false;  ///< by the recording itself
+  bool camera_is_refined = false;                 ///< by the recording itself
   double usual_max_depth = app::usual_max_depth;  ///< of its depth that enters a map, metres
   /// Depth beyond this is left out of the map, metres.
   [[nodiscard]] double depth_limit(const settings& s) const { return s.depth_limit(usual_max_depth); }

@@ -54,6 +54,7 @@ app(0 run bent --deterministic --filter none --resolution 0.1 --out bent_out)
 check(NOT err MATCHES "focal length")
 summary(fx ${WORK}/bent_out intrinsics fx)
 check(fx GREATER 260 AND fx LESS 265)
+app_fails(5 "does not determine the distortion" calibrate bent --distortion --read-out-ms 0 --out found.toml)
 
 # Without poses the depth scale is nobody's to know; without motion nothing is, and no file is written.
 file(REMOVE ${WORK}/room/groundtruth.txt ${WORK}/found.toml)
