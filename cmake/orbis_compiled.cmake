@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 #
 # orbis::compiled: a static library of what most programs instantiate, so that they need not compile it themselves. Its
-# sources, cmake/compiled/<component>*.cpp, only instantiate templates of the headers. Who links it compiles with
-# ORBIS_COMPILED, which makes the headers declare these instantiations (include/orbis/<component>/detail/compiled) and
-# changes nothing else: programs with and without it can be linked together.
+# sources, cmake/compiled/<component>*.cpp, instantiate templates and kernels of the headers and hold the functions marked
+# ORBIS_COMPILED_ONCE. Who links it compiles with ORBIS_COMPILED, which makes the headers declare all of this
+# (include/orbis/<component>/detail/compiled) and changes nothing else: programs with and without it can be linked
+# together.
 if(PROJECT_IS_TOP_LEVEL AND NOT CMAKE_BUILD_TYPE AND NOT CMAKE_CONFIGURATION_TYPES)
   set(CMAKE_BUILD_TYPE Release)
 endif()

@@ -22,10 +22,13 @@ flags=(-std=c++20 -O1 -w -Wno-psabi -Iinclude -Itests -isystem "$out/include" '-
 
 # Where the kernels' tests stand; those that compare with a library that is not here are left out.
 places=(tests/core/simd.cpp tests/core/simd tests/core/rounded.cpp tests/core/bytes.cpp tests/camera/project_lanes.cpp
+  tests/camera/shutter_correction.cpp
   tests/features/detail tests/places/detail tests/cloud/detail/knn tests/cloud/detail/rays
+  tests/cloud/detail/select/local_shape.cpp tests/optimize/pnp.cpp
   tests/optimize/detail/bundle tests/optimize/detail/sparse tests/optimize/detail/pose
   tests/optimize/bundle_instances.cpp  # what those of bundle adjustment share
-  tests/octree/detail/storage tests/octree/detail/points tests/octree/detail/depth tests/nav/detail/floor)
+  tests/octree/detail/storage tests/octree/detail/points tests/octree/detail/depth tests/nav/detail/floor
+  tests/nav/squared_distances.cpp)
 sources=()
 while read -r source; do
   grep -qE 'opencv|octomap|orbis/io|interop' "$source" || sources+=("$source")

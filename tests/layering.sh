@@ -14,8 +14,8 @@ declare -A allowed=(
   [core]="" [camera]="" [features]="" [places]="" [optimize]="" [cloud]="" [octree]="" [io]=""
   [eval]="" [nav]="octree"
   [interop]="features cloud octree nav"
-  [slam]="features places optimize cloud octree io interop"
-  [mapping]="features places optimize cloud octree io interop"
+  [slam]="features places optimize"
+  [mapping]="cloud octree"
 )
 
 while IFS=: read -r file line text; do

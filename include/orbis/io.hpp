@@ -10,6 +10,7 @@
 /// | `synthetic.hpp`       | a recording rendered on the fly, whose poses and surfaces are known exactly      |
 /// | `synthetic_options.hpp` | its room, its camera's path and its sensor's errors                            |
 /// | `camera_file.hpp`     | `camera.toml`: model, size, intrinsics, distortion, depth scale                  |
+/// | `toml.hpp`            | settings in TOML from bytes that nobody has looked at                            |
 /// | `trajectory_file.hpp` | trajectories in TUM format                                                       |
 /// | `image.hpp`           | colour and depth images, whatever their format                                   |
 /// | `png.hpp`, `jpeg.hpp` | images of one format, read and written                                           |

@@ -15,6 +15,7 @@
 /// | `keyframe.hpp` | what mapping needs of a keyframe |
 /// | `masked_depth.hpp` | depth images from which pixels were removed |
 /// | `moving_filter.hpp` | takes out of a live map what has moved away, while the camera moves |
+/// | `moving_options.hpp` | how what has moved away is told from what is there |
 /// | `moving_regions.hpp` | takes out of a depth image what tracking has seen to move |
 /// | `keyframe_points.hpp` | the points of one keyframe |
 /// | `upright.hpp` | which way is up in a depth image, so that a map can begin upright |
@@ -32,5 +33,6 @@
 #include <orbis/mapping/live_map_thread.hpp>
 #include <orbis/mapping/masked_depth.hpp>
 #include <orbis/mapping/moving_filter.hpp>
+#include <orbis/mapping/moving_options.hpp>
 #include <orbis/mapping/moving_regions.hpp>
 #include <orbis/mapping/upright.hpp>
