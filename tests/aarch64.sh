@@ -26,7 +26,7 @@ places=(tests/core/simd.cpp tests/core/simd tests/core/rounded.cpp tests/core/by
   tests/features/detail tests/places/detail tests/cloud/detail/knn tests/cloud/detail/rays
   tests/cloud/detail/select/local_shape.cpp tests/optimize/pnp.cpp
   tests/optimize/detail/bundle tests/optimize/detail/sparse tests/optimize/detail/pose
-  tests/optimize/bundle_instances.cpp  # what those of bundle adjustment share
+  tests/optimize/bundle_instances*.cpp  # what those of bundle adjustment share
   tests/octree/detail/storage tests/octree/detail/points tests/octree/detail/depth tests/nav/detail/floor
   tests/nav/squared_distances.cpp)
 sources=()
