@@ -86,7 +86,7 @@ exit_code calibrate(const settings& s, console& console) {
 
   orbis::camera::camera_settings camera = source->camera;
   if (s.distortion) camera.model = with_lens(camera.model);
-  const shutter_results shutter = find_shutter(*source, s, console).shutter;
+  const shutter_results shutter = find_shutter(*source, s, false, console).shutter;
   const auto found = calibrate_by(*source, s, shutter.shutter, camera.model, {}, console);
   if (!found) return give_up(found.error());
   const auto is_held_distortion = [](const calibrated_parameter& p) { return p.name == "k1" && p.is_held; };

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "camera_check.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdio>
@@ -12,10 +13,10 @@ orbis::camera::any_camera with_lens(const orbis::camera::any_camera& camera) {
   return plain != nullptr ? orbis::camera::radial_tangential{plain->k(), {}} : camera;
 }
 
-std::optional<focal_doubt> find_doubt(const orbis::slam::calibration<orbis::camera::any_camera>& calibrated) {
-  if (!calibrated.is_complete()) return std::nullopt;
+std::optional<focal_doubt> find_doubt(std::span<const orbis::slam::calibrated_parameter> found) {
+  if (std::ranges::any_of(found, &orbis::slam::calibrated_parameter::is_held)) return std::nullopt;
   constexpr double least_change = 0.015, sigmas = 6.0;
-  for (const auto& p : calibrated.parameters) {
+  for (const auto& p : found) {
     if (p.name != "fx") continue;
     const double change = std::abs(p.after - p.before);
     if (change > sigmas * p.deviation && change > least_change * p.before) return focal_doubt{p.before, p.after};
@@ -31,7 +32,7 @@ std::optional<focal_doubt> find_doubt(const orbis::slam::map& map, const orbis::
     return orbis::slam::calibrate(map, orbis::slam::make_rig(model, options), {.max_keyframes = 60});
   };
   const auto as_given = calibrate_as(camera);
-  auto doubt = as_given ? find_doubt(*as_given) : std::nullopt;
+  auto doubt = as_given ? find_doubt(as_given->parameters) : std::nullopt;
   if (!doubt || camera.get_if<orbis::camera::pinhole>() == nullptr) return doubt;
   // A focal length makes up for a lens that bends, to some extent: images that such a lens explains better, or that do
   // not tell, say little about the focal length.

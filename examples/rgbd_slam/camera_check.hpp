@@ -4,6 +4,7 @@
 #pragma once
 
 #include <optional>
+#include <span>
 #include <string>
 
 #include <orbis/camera/any.hpp>
@@ -22,9 +23,8 @@ struct focal_doubt {
 /// The camera; a pinhole with a lens without distortion, which can be estimated.
 [[nodiscard]] orbis::camera::any_camera with_lens(const orbis::camera::any_camera& camera);
 
-/// Of a calibration by a map; empty where it does not tell, as where a parameter was held.
-[[nodiscard]] std::optional<focal_doubt> find_doubt(
-    const orbis::slam::calibration<orbis::camera::any_camera>& calibrated);
+/// Of the parameters that a calibration found; empty where it does not tell, as where one was held.
+[[nodiscard]] std::optional<focal_doubt> find_doubt(std::span<const orbis::slam::calibrated_parameter> found);
 /// Of a map made with the camera. Poses of a wrong camera are some percent too near to each other or too far apart, but
 /// distortion that a pinhole does not model moves them as well: empty where that explains the images clearly better, or
 /// where they do not tell. One or two small self-calibrations: some tenths of a second.

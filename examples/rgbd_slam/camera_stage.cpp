@@ -11,14 +11,12 @@
 namespace app {
 
 shutter_results get_to_know_camera(frame_source& source, const settings& s, console& console) {
-  const first_look look = find_shutter(source, s, console);
-  if (!look.doubt || !look.doubt->is_sure || !s.refines_camera || !s.camera.empty()) return look.shutter;
-  if (!s.load_map.empty() || !s.save_map.empty()) return look.shutter;  // runs that share a map share a camera
+  const bool shares_map = !s.load_map.empty() || !s.save_map.empty();  // and so the camera of other runs
+  const first_look look = find_shutter(source, s, s.refines_camera && s.camera.empty() && !shares_map, console);
+  if (!look.doubt || !look.doubt->is_sure) return look.shutter;
   const auto found = calibrate_by(source, s, look.shutter.shutter, source.camera.model, {2, 60.0}, console);
   if (!found) return look.shutter;
-  auto all_rounds = found->last;
-  all_rounds.parameters = found->parameters;
-  const auto change = find_doubt(all_rounds);
+  const auto change = find_doubt(found->parameters);
   constexpr double alike = 0.02;  // what the first seconds tell, and what more of them
   if (!change || std::abs(change->found - look.doubt->found) > alike * change->found) return look.shutter;
   source.camera.model = found->last.camera;

@@ -24,7 +24,7 @@ std::string milliseconds(double seconds, const char* format = "%.1f") {
 
 }  // namespace
 
-first_look find_shutter(const frame_source& source, const settings& s, console& console) {
+first_look find_shutter(const frame_source& source, const settings& s, bool checks_camera, console& console) {
   first_look look;
   shutter_results& result = look.shutter;
   if (source.is_monocular()) {  // what is known of motion while an image is read is in metres
@@ -66,6 +66,7 @@ first_look find_shutter(const frame_source& source, const settings& s, console& 
   result.read_out_deviation = found.read_out_deviation;
   result.delay_deviation = found.delay_deviation;
   console.finish(in_words(result));
+  if (!checks_camera) return look;
   const orbis::slam::map_id most = slam.largest_map();
   look.doubt = slam.inspect(
       [&](const orbis::slam::atlas& maps) { return find_doubt(maps.at(most), source.camera.model, options); });

@@ -16,12 +16,13 @@ namespace app {
 
 struct first_look {
   shutter_results shutter;
-  std::optional<focal_doubt> doubt;  ///< of those seconds' map, where they were looked at
+  std::optional<focal_doubt> doubt;  ///< of those seconds' map, where they were looked at and it was asked for
 };
 
 /// As `--read-out-ms` says, otherwise as the camera's settings do, otherwise estimated from the first ten seconds,
 /// which are tracked for this alone. Frames that cannot be read end that.
-[[nodiscard]] first_look find_shutter(const frame_source& source, const settings& s, console& console);
+[[nodiscard]] first_look find_shutter(const frame_source& source, const settings& s, bool checks_camera,
+                                      console& console);
 
 /// In words, with its deviation where it was estimated.
 [[nodiscard]] std::string in_words(const shutter_results& shutter);

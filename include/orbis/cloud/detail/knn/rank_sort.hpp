@@ -8,16 +8,14 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
-#include <limits>
 #include <span>
-#include <utility>
 #include <vector>
 
 #include <orbis/core/simd.hpp>
 
 namespace orbis::cloud::detail {
 
-/// For each of `count` values its rank: the number of smaller ones, and of equal ones before it. @pre 64 more values
+/// For each of `count` values its rank: the number of smaller ones, and of equal ones before it. @pre 16 more values
 /// can be read and written
 struct find_ranks {
   template <simd::target Target>
@@ -91,7 +89,7 @@ class rank_sorter {
   }
 
  private:
-  static constexpr std::size_t room = 64;          // read and written beyond the last
+  static constexpr std::size_t room = 16;          // read and written beyond the last
   static constexpr std::size_t most_ranked = 384;  // beyond this n log n wins
 
   [[nodiscard]] std::uint64_t pack(std::size_t i) const noexcept {
