@@ -47,6 +47,7 @@ results begin_results(const settings& s, const std::string& title, const frame_s
     const auto& camera = source->camera;
     const auto& k = camera.model.k();
     r.setup.emplace_back("input", source->kind);
+    if (!source->images_of.empty()) r.setup.emplace_back("images of", source->images_of);
     r.setup.emplace_back("camera",
                          std::string{camera.model.model_name()} + ", " + std::to_string(k.width) + " x " +
                              std::to_string(k.height) + number(", fx %.1f", k.fx) + number(", fy %.1f", k.fy) +

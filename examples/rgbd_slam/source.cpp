@@ -204,6 +204,7 @@ result<frame_source> open_file(const settings& s) {
   frame_source source;
   source.title = s.input.filename().string();
   source.kind = recording->kind;
+  source.images_of = recording->images_of;
   source.camera = recording->camera;
   source.sensor = recording->sensor;
   source.frames = limited(recording->size(), s);
@@ -375,6 +376,7 @@ result<void> check_resolution(frame_source& source, const settings& s) {
 std::string describe(const frame_source& source) {
   return source.title + ": " + (source.is_live ? "a camera" : std::to_string(source.frames) + " frames") + " of " +
          std::to_string(source.camera.model.width()) + " x " + std::to_string(source.camera.model.height()) +
+         (source.images_of.empty() ? "" : ", images of " + source.images_of) +
          (source.ground_truth.empty() ? "" : ", with ground truth");
 }
 

@@ -30,6 +30,7 @@ struct source_frame : orbis::camera::rgbd_frame {
 
 struct frame_source {
   std::string title, kind;
+  std::string images_of;  ///< the topics of a bag; empty: there is nothing to choose from
   orbis::camera::camera_settings camera;
   bool camera_is_refined = false;                 ///< by the recording itself
   double usual_max_depth = app::usual_max_depth;  ///< of its depth that enters a map, metres

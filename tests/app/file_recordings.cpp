@@ -148,7 +148,8 @@ TEST_CASE("colour and depth of a bag are found and paired by the times in their 
   const auto bag = app::open_bag(path, {}).value();
   CHECK(bag->sensor == sensor_kind::rgbd);
   REQUIRE(bag->size() == 2);
-  CHECK(bag->notes.size() == 2);  // which topics, and an image without a partner
+  CHECK(bag->images_of == "/camera/rgb/image_color and /camera/depth_registered/image");
+  CHECK(bag->notes.size() == 1);  // an image without a partner
   CHECK(bag->camera.model.k() == k);
   CHECK(bag->camera.model.model_name() == "pinhole");
   const auto frame = bag->frame(1).value();

@@ -142,7 +142,7 @@ class bag_recording final : public file_recording {
                   second_ == nullptr
                       ? "no image in " + first_->name
                       : "no image of " + first_->name + " has a partner in " + second_->name + " at its time");
-    notes.push_back("images of " + first_->name + (second_ != nullptr ? " and " + second_->name : ""));
+    images_of = first_->name + (second_ != nullptr ? " and " + second_->name : "");
     if (auto known = find_camera(options); !known) return known;
     if (auto fits = frame(0); !fits) return fail(fits.error());
     return {};

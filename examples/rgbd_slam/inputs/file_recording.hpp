@@ -30,7 +30,8 @@ class file_recording {
   [[nodiscard]] virtual orbis::result<orbis::image<orbis::rgb8>> color(std::size_t i) const = 0;
 
   orbis::slam::sensor_kind sensor = orbis::slam::sensor_kind::monocular;
-  std::string kind;  ///< "video", "ROS bag"
+  std::string kind;       ///< "video", "ROS bag"
+  std::string images_of;  ///< what of the file they come from: the topics of a bag; empty: it holds nothing else
   orbis::camera::camera_settings camera;
   std::vector<std::string> notes;            ///< worth a warning
   std::vector<std::filesystem::path> files;  ///< that it is read from
