@@ -108,12 +108,7 @@ exit_code calibrate(const settings& s, console& console) {
             printed;
   if (!found->last.is_complete())
     console.warn("what was kept needs more motion: turn the camera about all axes, near and far from textured things");
-  if (s.read_out_ms) {
-    if (!camera.shutter) camera.shutter.emplace();
-    camera.shutter->color_read_out = camera.shutter->depth_read_out = shutter.shutter.color_read_out;
-  } else if (shutter.from == "estimated" && !shutter.shutter.is_global()) {
-    camera.shutter = shutter.shutter;
-  }
+  camera = with_shutter(std::move(camera), shutter);
   if (!s.out.empty()) {
     if (const auto written = orbis::io::write_camera(s.out, camera); !written) return give_up(written.error());
     printed = console.print("camera       " + s.out.string()) && printed;

@@ -3,12 +3,14 @@
 
 #include <cstdio>
 
+#include <orbis/io/camera_file.hpp>
 #include <orbis/io/trajectory_file.hpp>
 
 #include "filters.hpp"
 #include "plots.hpp"
 #include "report.hpp"
 #include "result_files.hpp"
+#include "shutter_stage.hpp"
 #include "summary.hpp"
 #include "view_frame.hpp"
 
@@ -87,6 +89,11 @@ result<void> write_trajectories(const slam_results& slam, const std::filesystem:
     if (auto done = orbis::io::write_trajectory(folder / trajectory_name(i + 2), slam.other_maps[i]); !done)
       return done;
   return orbis::io::write_trajectory(folder / "keyframes.txt", slam.keyframes);
+}
+
+result<void> write_camera_used(const frame_source& source, const shutter_results& shutter,
+                               const std::filesystem::path& folder) {
+  return orbis::io::write_camera(folder / "camera_used.toml", with_shutter(source.camera, shutter));
 }
 
 result<void> write_report_files(results& r, const orbis::trajectory& cameras, result_files& files, console& console) {

@@ -19,6 +19,9 @@ namespace app {
 
 /// Writes trajectory.txt and keyframes.txt.
 [[nodiscard]] orbis::result<void> write_trajectories(const slam_results& slam, const std::filesystem::path& folder);
+/// Writes camera_used.toml: the camera and its shutter as the run found them to be.
+[[nodiscard]] orbis::result<void> write_camera_used(const frame_source& source, const shutter_results& shutter,
+                                                    const std::filesystem::path& folder);
 /// Writes pictures, report.html and summary.json, and puts all files in place.
 [[nodiscard]] orbis::result<void> write_report_files(results& r, const orbis::trajectory& cameras, result_files& files,
                                                      console& console);

@@ -21,11 +21,11 @@ exit_code run_slam(const settings& s, console& console) {
   auto source = open_source(s, console);
   if (!source) return give_up(source.error());
   if (const auto lost = find_overwritten(s, inputs_of(s, source->files))) return console.error(*lost), bad_usage;
+  auto files = result_files::begin(s);
+  if (!files) return give_up(files.error());
   const shutter_results shutter = get_to_know_camera(*source, s, console);
   auto shown = viewer::open(s, *source, console);
   if (!shown) return console.error(shown.error()), bad_usage;
-  auto files = result_files::begin(s);
-  if (!files) return give_up(files.error());
   results r = begin_results(s, source->title, &*source, files->folder());
 
   // Track; some frames become keyframes.
@@ -55,6 +55,7 @@ exit_code run_slam(const settings& s, console& console) {
                                                 : explain_no_start(r, s),
                            tracked.stopped ? bad_input : never_tracked, *files, console);
   if (auto done = write_trajectories(*r.slam, files->folder()); !done) return give_up(done.error());
+  if (auto done = write_camera_used(*source, shutter, files->folder()); !done) return give_up(done.error());
 
   // Keyframes -> dense cloud -> filter -> octree -> floor map, path -> files.
   if (tracked.keyframes.size() != 0) {

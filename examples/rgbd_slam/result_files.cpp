@@ -23,16 +23,16 @@ using orbis::result;
 
 namespace {
 
-constexpr std::array trajectory_names = {"trajectory.txt", "keyframes.txt", "trajectory.png"};
+constexpr std::array trajectory_names = {"trajectory.txt", "keyframes.txt", "camera_used.toml", "trajectory.png"};
 constexpr std::array map_names = {"cloud.ply", "cloud_filtered.ply", "map_unfiltered.bt", "map.bt",        "map.ot",
                                   "map.png",   "map_unfiltered.png", "filter.png",        "navigation.png"};
 constexpr std::array report_names = {"summary.json", "report.html"};
 
 file_names all_names() {
-  file_names names = {"trajectory.txt",    "keyframes.txt",  "cloud.ply", "cloud_filtered.ply",
-                      "map_unfiltered.bt", "map.bt",         "map.ot",    "summary.json",
-                      "report.html",       "trajectory.png", "map.png",   "map_unfiltered.png",
-                      "filter.png",        "navigation.png"};
+  file_names names = {"trajectory.txt",     "keyframes.txt",     "camera_used.toml", "cloud.ply",
+                      "cloud_filtered.ply", "map_unfiltered.bt", "map.bt",           "map.ot",
+                      "summary.json",       "report.html",       "trajectory.png",   "map.png",
+                      "map_unfiltered.png", "filter.png",        "navigation.png"};
   for (std::size_t map = most_maps; map != 1; --map) names.insert(names.begin() + 1, trajectory_name(map));
   return names;
 }

@@ -73,6 +73,12 @@ first_look find_shutter(const frame_source& source, const settings& s, bool chec
   return look;
 }
 
+orbis::camera::camera_settings with_shutter(orbis::camera::camera_settings camera, const shutter_results& shutter) {
+  const bool is_estimated = shutter.from == "estimated" && !shutter.shutter.is_global();
+  if (shutter.from == "given" || is_estimated) camera.shutter = shutter.shutter;
+  return camera;
+}
+
 std::string in_words(const shutter_results& r) {
   const bool estimated = r.from == "estimated";
   if (r.shutter.is_global())

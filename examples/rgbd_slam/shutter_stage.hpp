@@ -24,6 +24,10 @@ struct first_look {
 [[nodiscard]] first_look find_shutter(const frame_source& source, const settings& s, bool checks_camera,
                                       console& console);
 
+/// The camera with that shutter, for a camera file. An estimate of zero is left out: another recording may tell more.
+[[nodiscard]] orbis::camera::camera_settings with_shutter(orbis::camera::camera_settings camera,
+                                                          const shutter_results& shutter);
+
 /// In words, with its deviation where it was estimated.
 [[nodiscard]] std::string in_words(const shutter_results& shutter);
 

@@ -2,7 +2,7 @@
 include(${CMAKE_CURRENT_LIST_DIR}/support.cmake)
 
 app(0 demo --frames 40 --width 320 --resolution 0.1 --deterministic --save-map room.map --out demo)
-set(files trajectory.txt keyframes.txt cloud.ply cloud_filtered.ply map_unfiltered.bt map.bt map.ot summary.json
+set(files trajectory.txt keyframes.txt camera_used.toml cloud.ply cloud_filtered.ply map_unfiltered.bt map.bt map.ot summary.json
           report.html trajectory.png map.png map_unfiltered.png filter.png)
 must_exist(${WORK}/demo ${files})
 must_not_be_half_written(${WORK}/demo)
@@ -113,7 +113,7 @@ check(map_error LESS 0.02)
 app(0 demo --frames 40 --width 320 --resolution 0.1 --out again --save-map again.map --quiet --threads 1)
 string(LENGTH "${out}${err}" said)
 check(said EQUAL 0)
-foreach(name trajectory.txt keyframes.txt cloud.ply cloud_filtered.ply map_unfiltered.bt map.bt map.ot trajectory.png
+foreach(name trajectory.txt keyframes.txt camera_used.toml cloud.ply cloud_filtered.ply map_unfiltered.bt map.bt map.ot trajectory.png
              map.png map_unfiltered.png filter.png)
   file(SHA256 ${WORK}/demo/${name} first)
   file(SHA256 ${WORK}/again/${name} second)

@@ -72,6 +72,12 @@ function(make_plate file)
        "property float z\nend_header\n${points}")
 endfunction()
 
+function(must_equal a b)  # files
+  file(SHA256 ${WORK}/${a} first)
+  file(SHA256 ${WORK}/${b} second)
+  check(first STREQUAL second)
+endfunction()
+
 function(must_exist folder)  # names...
   foreach(name IN LISTS ARGN)
     if(NOT EXISTS ${folder}/${name})
