@@ -53,7 +53,7 @@ count features_600 features "$data/kitchen" 8 600 6
 count octree_5cm octree "$data/kitchen" 6 0.05
 count octree_10cm octree "$data/kitchen" 6 0.1
 for profile in default small; do
-  for recording in kitchen fr1_desk_9; do
+  for recording in kitchen livingroom; do
     count "slam_${recording}_$profile" slam "$data/$recording" 0 "$frames" "$profile"
   done
 done

@@ -5,6 +5,7 @@
 // around a keyframe's insertion into the live map, "correct" around the corrections that follow.
 //
 // usage: slam RECORDING FIRST FRAMES default|small [RESOLUTION]
+#include <algorithm>
 #include <cstddef>
 #include <cstdio>
 #include <cstdlib>
@@ -47,8 +48,8 @@ int main(int argc, char** argv) {
   if (argc < 5) return std::fputs("usage: slam RECORDING FIRST FRAMES default|small [RESOLUTION]\n", stderr), 1;
   const auto recording = io::open_recording(argv[1]);
   if (!recording) return std::fprintf(stderr, "%s\n", recording.error().to_string().c_str()), 2;
-  const auto first = static_cast<std::size_t>(std::atoi(argv[2])),
-             wanted = static_cast<std::size_t>(std::atoi(argv[3]));
+  const auto first = static_cast<std::size_t>(std::atoi(argv[2]));
+  const std::size_t end = std::min(recording->size(), first + static_cast<std::size_t>(std::atoi(argv[3])));
   const std::string profile = argv[4];
 
   slam::options settings;
@@ -63,7 +64,7 @@ int main(int argc, char** argv) {
   std::vector<mapping::keyframe_position> poses;
   std::vector<slam::keyframe_id> made;
   std::size_t tracked = 0;
-  for (std::size_t i = first; i != first + wanted; ++i) {
+  for (std::size_t i = first; i < end; ++i) {
     mark("read");
     auto frame = recording->frame(i);
     mark("end");
@@ -90,5 +91,5 @@ int main(int argc, char** argv) {
       static_cast<void>(map.correct(seq));
     });
   }
-  std::printf("%zu frames, %zu tracked, %zu keyframes\n", wanted, tracked, made.size());
+  std::printf("%zu tracked, %zu keyframes\n", tracked, made.size());
 }
