@@ -18,6 +18,7 @@
 
 #include "filters.hpp"
 #include "inputs/camera_device.hpp"
+#include "profiles.hpp"
 #include "viewer/backend.hpp"
 
 namespace app {
@@ -59,6 +60,12 @@ CLI::Option* metres(CLI::App& cmd, const std::string& name, double& value, const
 std::string not_empty(const std::string& path) { return path.empty() ? "must not be empty" : ""; }
 
 void add_map_options(CLI::App& cmd, settings& s) {
+  cmd.add_option("--profile", s.profile,
+                 "small: for boards with four small cores, such as the Raspberry Pi 4. Fewer features, a smaller "
+                 "neighbourhood in mapping, --resolution 0.1, --depth-memory 8; options that are given win")
+      ->check(CLI::IsMember(profile_names()))
+      ->capture_default_str()
+      ->type_name("P");
   cmd.add_option("--out", s.out, "where the files go; made if it is not there")
       ->required()
       ->check(not_empty)
@@ -339,6 +346,14 @@ std::optional<exit_code> read_config(CLI::App& cmd, const std::string& path) {
   return std::nullopt;
 }
 
+/// Sets what the profile says of options that neither the command line nor the file gives.
+void set_profile_defaults(const CLI::App& cmd, settings& s) {
+  if (s.profile != "small") return;
+  const auto is_open = [&](const char* name) { return cmd.get_option(name)->count() == 0; };
+  if (is_open("--resolution")) s.resolution = small_settings::resolution;
+  if (is_open("--depth-memory")) s.depth_memory = small_settings::depth_memory;
+}
+
 /// "x,y,z"; nothing if it is not.
 std::optional<orbis::vec3> vector_of(const std::string& text) {
   orbis::vec3 p;
@@ -459,6 +474,7 @@ std::variant<settings, exit_code> read_command_line(int argc, char** argv) {
                             : command::calibrate;
   if (!s.config.empty())
     if (const auto failed = read_config(*chosen, s.config.string())) return *failed;
+  set_profile_defaults(*chosen, s);
   if (!origin.empty()) {
     s.origin = vector_of(origin);
     if (!s.origin) return complain("--origin: \"" + origin + "\" is not x,y,z in metres", bad_usage);

@@ -38,6 +38,7 @@ results begin_results(const settings& s, const std::string& title, const frame_s
   results r;
   r.command = names[static_cast<int>(s.what)];
   r.title = title;
+  r.profile = s.profile;
   r.folder = folder;
   r.out = s.out;
   const auto number = [](const char* format, double v) {
@@ -75,6 +76,7 @@ results begin_results(const settings& s, const std::string& title, const frame_s
                                                 number("%g", s.origin->z())
                                           : "none: points are marked occupied, nothing is marked free");
   }
+  if (s.profile != "default") r.setup.emplace_back("profile", s.profile);
   if (s.localize_only || (source != nullptr && source->is_monocular())) return r;
   r.setup.emplace_back(
       "octree", number("%g cm voxels", 100 * s.resolution) +

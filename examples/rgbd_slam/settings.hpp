@@ -37,6 +37,7 @@ struct settings {
   std::filesystem::path reference;  ///< ground truth (eval)
   std::filesystem::path out;        ///< where the files go
   std::filesystem::path config;     ///< file with options; empty: none
+  std::string profile = "default";  ///< one of `profile_names`
 
   std::string sensor = "auto";  ///< "rgbd", "stereo" or "mono", or as the recording is
   std::string format = "auto";

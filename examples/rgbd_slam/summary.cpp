@@ -52,6 +52,7 @@ std::string summary_json(const results& r) {
   const auto& s = r.slam;
   const auto& m = r.map;
   const auto& a = r.against_truth;
+  j["profile"] = r.profile;
   j["sensor"] = s ? json(to_string(s->sensor)) : null;
   j["frames"] = s ? json(s->frames) : null;
   j["tracked"] = s ? json(s->tracked) : null;

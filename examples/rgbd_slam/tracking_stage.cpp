@@ -12,6 +12,7 @@
 
 #include "corrected_frame.hpp"
 #include "interrupts.hpp"
+#include "profiles.hpp"
 #include "result_files.hpp"
 #include "slam_options.hpp"
 #include "standing_frame.hpp"
@@ -26,6 +27,7 @@ using slam_system = orbis::slam::any_system;
 
 orbis::slam::options options_for(const frame_source& source, const settings& s) {
   orbis::slam::options options = slam_options(source.camera.model, source.camera.baseline);
+  set_profile(s.profile, options);
   options.threads = {.enabled = !s.deterministic && s.threads != 1, .wait = true};
   options.localization_only = s.localize_only;
   options.moving.enabled = s.moving;

@@ -1,0 +1,61 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: BSD-3-Clause
+#
+# What a frame asks of a Raspberry Pi 4, counted under emulation: builds the plugin and the programs of this folder and
+# prints the table. See README.md.
+#
+# usage: bench/board/run.sh SYSROOT [FRAMES]
+# Needs gcc, g++-aarch64-linux-gnu, qemu-user (with plugins: 4.2 or later), python3, libeigen3-dev, libexpected-dev and
+# libtomlplusplus-dev, the recordings of ORBIS_DATA_DIR (../shared/data), and SYSROOT, which bench/board/sysroot.sh makes.
+# The first time takes ten minutes, most of it one compiler run of 4 GB. Results are kept in build/board.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/../.."
+[[ $# -ge 1 && -d $1/usr/include/octomap ]] || { sed -n '4,11s/^# \{0,1\}//p' bench/board/run.sh >&2; exit 1; }
+root=$(cd "$1" && pwd)
+frames=${2:-120}
+data=${ORBIS_DATA_DIR:-../shared/data}
+out=build/board
+mkdir -p "$out/include"
+
+lib=$root/usr/lib/aarch64-linux-gnu
+for library in eigen3/Eigen eigen3/unsupported tl toml++; do
+  ln -sfn "/usr/include/$library" "$out/include/${library##*/}"
+done
+flags=(-std=c++20 -O3 -DNDEBUG -ffp-contract=off -w -Wno-psabi -Iinclude -MMD -isystem "$root/usr/include"
+  -isystem "$root/usr/include/aarch64-linux-gnu" -isystem "$root/usr/include/opencv4" -isystem "$out/include")
+
+# Whether a program is older than what it was made of.
+outdated() {
+  [[ -e $out/$1 && -e $out/$1.d ]] || return 0
+  local source
+  for source in $(sed -e 's/^[^:]*://' -e 's/\\$//' "$out/$1.d"); do [[ $source -nt $out/$1 ]] && return 0; done
+  return 1
+}
+build() {
+  outdated "$1" || return 0
+  echo "compiling $1" >&2
+  "${AARCH64_CXX:-aarch64-linux-gnu-g++}" "${flags[@]}" -MF "$out/$1.d" -o "$out/$1" "bench/board/$1.cpp" -L"$lib" \
+    "${@:2}" -lpng16 -ljpeg -lz -Wl,--allow-shlib-undefined
+}
+${CC:-gcc} -O2 -Wall -Wextra -fPIC -shared -fvisibility=hidden -o "$out/libcount.so" bench/board/count.c
+build features -lopencv_features2d -lopencv_core
+build octree -loctomap -loctomath
+build slam
+
+libraries=$lib:$root/lib/aarch64-linux-gnu:$lib/blas:$lib/lapack
+count() {  # name of the counts, program and its arguments
+  echo "counting $*" >&2
+  qemu-aarch64 -L "${AARCH64_ROOT:-/usr/aarch64-linux-gnu}" -E "LD_LIBRARY_PATH=$libraries" \
+    -plugin "./$out/libcount.so,out=$out/$1.tsv" "$out/$2" "${@:3}" >&2
+}
+count features_1000 features "$data/kitchen" 8 1000 8
+count features_600 features "$data/kitchen" 8 600 6
+count octree_5cm octree "$data/kitchen" 6 0.05
+count octree_10cm octree "$data/kitchen" 6 0.1
+for profile in default small; do
+  for recording in kitchen livingroom; do
+    count "slam_${recording}_$profile" slam "$data/$recording" 0 "$frames" "$profile"
+  done
+done
+python3 bench/board/table.py "$out"/features_*.tsv "$out"/octree_*.tsv
+python3 bench/board/table.py --stages "$out"/slam_*.tsv

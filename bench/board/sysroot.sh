@@ -1,0 +1,28 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: BSD-3-Clause
+#
+# Fetches the libraries of Debian for 64-bit ARM that run.sh wants, and unpacks them into a folder. Nothing is installed,
+# and the lists of packages of this system stay as they are.
+#
+# usage: bench/board/sysroot.sh FOLDER
+set -euo pipefail
+[[ $# == 1 ]] || { sed -n '4,8s/^# \{0,1\}//p' "$0" >&2; exit 1; }
+mkdir -p "$1"
+root=$(cd "$1" && pwd)
+mkdir -p "$root/.apt/state/lists/partial" "$root/.apt/cache/archives/partial"
+: >"$root/.apt/status"
+cat >"$root/.apt/conf" <<EOF
+APT::Architecture "arm64";
+APT::Architectures { "arm64"; };
+Dir::State "$root/.apt/state";
+Dir::State::status "$root/.apt/status";
+Dir::Cache "$root/.apt/cache";
+APT::Sandbox::User "root";
+EOF
+export APT_CONFIG="$root/.apt/conf"
+apt-get update
+cd "$root/.apt"
+apt-get download zlib1g{,-dev} libpng16-16 libpng-dev libjpeg62-turbo{,-dev} liboctomap{1.9,-dev} libtbb12 \
+  libopencv-{core,flann,imgproc,features2d}{406,-dev} liblapack3 libblas3 libgfortran5 \
+  libgl1 libglx0 libglvnd0 libx11-6 libxcb1 libxau6 libxdmcp6 libbsd0 libmd0
+for package in *.deb; do dpkg -x "$package" "$root"; done

@@ -1,0 +1,116 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""Turns the counts of count.c into a table of work and implied times on a Raspberry Pi 4.
+
+usage: table.py COUNTS.tsv... [--stages]
+
+Each file is what one program has written. Without --stages a row is the mean over the pieces between a label and "end";
+with it (slam.cpp) the frames are taken apart into the stages of `track`.
+"""
+import csv
+import sys
+
+HERTZ = 1.5e9
+# Cycles; (fast, likely, slow). README.md says where they come from.
+MODEL = {
+    "per instruction": (1 / 2.0, 1 / 1.5, 1 / 1.1),
+    "wide": (0.0, 0.25, 0.5),  # a vector of 128 bits keeps its pipe for longer
+    "slow": (5, 10, 18),  # divisions and roots
+    "mispredicted": (11, 14, 17),
+    "l2 hit": (6, 12, 19),
+    "l2 hit, ahead": (1, 3, 7),
+    "memory": (110, 150, 225),
+    "memory, ahead": (20, 35, 75),
+}
+
+
+def milliseconds(c):
+    l2_hits, l2_hits_ahead = c["l1"] - c["l2"], c["l1_ahead"] - c["l2_ahead"]
+    amounts = {
+        "per instruction": c["instructions"],
+        "wide": c["wide"],
+        "slow": c["slow"],
+        "mispredicted": c["mispredicted"],
+        "l2 hit": l2_hits - l2_hits_ahead,
+        "l2 hit, ahead": l2_hits_ahead,
+        "memory": c["l2"] - c["l2_ahead"],
+        "memory, ahead": c["l2_ahead"],
+    }
+    return [1e3 / HERTZ * sum(amounts[k] * MODEL[k][i] for k in MODEL) for i in range(3)]
+
+
+def read(name):
+    with open(name, newline="") as file:
+        rows = [(r.pop("label"), {k: int(v) for k, v in r.items()}) for r in csv.DictReader(file, delimiter="\t")]
+    return rows
+
+
+def difference(a, b):
+    return {k: b[k] - a[k] for k in a}
+
+
+def pieces(rows):
+    """By label, the counts between it and the next "end"; a piece in a piece counts for both."""
+    found, begun = {}, []
+    for label, counts in rows:
+        if label == "end":
+            name, before = begun.pop()
+            found.setdefault(name, []).append(difference(before, counts))
+        elif label not in ("clock", "exit"):
+            begun.append((label, counts))
+    found.pop("first", None)
+    return found
+
+
+def stages(rows):
+    """The same for slam.cpp: of a frame, the clock is read before and after extraction, after tracking, and in the end."""
+    found = {}
+    frame, adjusting, clocks, adjusted = None, None, [], None
+    other = []
+    for label, counts in rows:
+        if label == "frame":
+            frame, clocks, adjusted = counts, [], None
+        elif frame is not None:
+            if label == "clock":
+                clocks.append(counts)
+            elif label == "adjust":
+                adjusting = counts
+            elif label == "end" and adjusting is not None:
+                adjusted, adjusting = difference(adjusting, counts), None
+            elif label == "end":
+                found.setdefault("features", []).append(difference(clocks[0], clocks[1]))
+                found.setdefault("tracking", []).append(difference(clocks[1], clocks[2]))
+                rest = difference(clocks[2], counts)
+                if adjusted is not None:
+                    found.setdefault("keyframe: adjustment", []).append(adjusted)
+                    found.setdefault("keyframe: rest of mapping", []).append(difference(adjusted, rest))
+                else:
+                    found.setdefault("no keyframe or first", []).append(rest)
+                frame = None
+        else:
+            other.append((label, counts))
+    found.update({"live map: " + k: v for k, v in pieces(other).items()})
+    return found
+
+
+def main():
+    names = [a for a in sys.argv[1:] if not a.startswith("--")]
+    by_stage = "--stages" in sys.argv
+    if not names:
+        sys.exit(__doc__)
+    print(f"{'':32} {'pieces':>6} {'instr.':>8} {'vector':>7} {'wide':>7} {'slow':>6} {'mispr.':>7} "
+          f"{'L1':>8} {'ahead':>6} {'L2':>8} {'ahead':>6} {'ms':>8} {'fast':>8} {'slow':>8}")
+    for name in names:
+        print(name)
+        for label, all_of in (stages if by_stage else pieces)(read(name)).items():
+            mean = {k: sum(c[k] for c in all_of) / len(all_of) for k in all_of[0]}
+            fast, likely, slow = milliseconds(mean)
+            share = lambda part, whole: f"{100 * mean[part] / max(1, mean[whole]):.0f} %"
+            thousands = lambda k: f"{mean[k] / 1e3:.1f}k"
+            print(f"  {label:30} {len(all_of):6} {mean['instructions'] / 1e6:7.2f}M {share('vector', 'instructions'):>7} "
+                  f"{share('wide', 'instructions'):>7} {thousands('slow'):>6} {thousands('mispredicted'):>7} "
+                  f"{thousands('l1'):>8} {share('l1_ahead', 'l1'):>6} {thousands('l2'):>8} {share('l2_ahead', 'l2'):>6} "
+                  f"{likely:8.1f} {fast:8.1f} {slow:8.1f}")
+
+
+main()
