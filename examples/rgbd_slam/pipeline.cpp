@@ -21,11 +21,12 @@ exit_code run_slam(const settings& s, console& console) {
   auto source = open_source(s, console);
   if (!source) return give_up(source.error());
   if (const auto lost = find_overwritten(s, inputs_of(s, source->files))) return console.error(*lost), bad_usage;
-  auto files = result_files::begin(s);
-  if (!files) return give_up(files.error());
+  if (const auto locked = find_unwritable(s)) return give_up(*locked);
   const shutter_results shutter = get_to_know_camera(*source, s, console);
   auto shown = viewer::open(s, *source, console);
   if (!shown) return console.error(shown.error()), bad_usage;
+  auto files = result_files::begin(s);
+  if (!files) return give_up(files.error());
   results r = begin_results(s, source->title, &*source, files->folder());
 
   // Track; some frames become keyframes.

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <mutex>
 #include <string_view>
 #include <system_error>
@@ -140,6 +141,20 @@ std::optional<orbis::error> find_overwritten(const settings& s, const std::vecto
       return orbis::error{orbis::errc::invalid_argument, (s.out / name).string(),
                           "is there already, and no summary.json beside it says that rgbd_slam made it: it is not "
                           "replaced; move it, or give another --out"};
+  return std::nullopt;
+}
+
+std::optional<orbis::error> find_unwritable(const settings& s) {
+  std::vector<fs::path> folders{s.out};
+  for (const fs::path& file : {s.save_map, s.floor_map})
+    if (!file.empty()) folders.push_back(folder_of(file));
+  for (const fs::path& folder : folders) {
+    fs::path there = folder;
+    while (!is_there(there) && there.has_relative_path()) there = folder_of(there);
+    if (::access((there / "").c_str(), W_OK | X_OK) != 0)
+      return orbis::error{orbis::errc::write_failed, folder.string(),
+                          "no file can be made in it: " + std::generic_category().message(errno)};
+  }
   return std::nullopt;
 }
 

@@ -44,6 +44,10 @@ inline constexpr std::size_t most_maps = 9;
 [[nodiscard]] std::optional<orbis::error> find_overwritten(const settings& s,
                                                            const std::vector<std::filesystem::path>& inputs);
 
+/// Whether a folder that the results go to cannot be written or made, as far as that can be told without making it: so
+/// that a user need not wait to be told. Nothing if not. Errors: write_failed.
+[[nodiscard]] std::optional<orbis::error> find_unwritable(const settings& s);
+
 class result_files {
  public:
   /// Makes the folders, and sees whether files can be made in them. Errors: write_failed.

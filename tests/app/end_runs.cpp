@@ -292,7 +292,7 @@ int main(int argc, char** argv) {
   };
   check(run{demo("1", "6")}.wait() == 0, "no demo");
   const folder_content room = content_of(work / "demo");
-  check(room.size() == 15, "a demo makes " + std::to_string(room.size()) + " files");
+  check(room.size() == 16, "a demo makes " + std::to_string(room.size()) + " files");
   for (const int signal : {SIGINT, SIGTERM}) {
     bool kept = false;
     for (seconds wait{0.5}; !kept; wait *= 2) {  // until it has come to tracking
