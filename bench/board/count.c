@@ -9,8 +9,8 @@
 // reading the clock is a place of its own, labelled "clock". At each, a line with the label and all counts so far is
 // written, as in `heading` below: what lies between two places is the difference of their lines.
 //
-// What is simulated: data cache of 32 kB, 2 ways; second level of 1 MB, 16 ways; lines of 64 bytes, least recently used
-// goes, a write brings the line in. The program has the second level for itself, and instructions do not enter it. No
+// What is simulated: data cache of 32 kB, 2 ways; L2 cache of 1 MB, 16 ways; lines of 64 bytes, least recently used
+// goes, a write brings the line in. The program has the L2 cache for itself, and instructions do not enter it. No
 // line is fetched ahead; instead a miss next to one of the last 16 misses is also counted as `ahead`: one that the
 // A72, which fetches ahead along such streams, would have on its way. Branches: two tables of two-bit counters, by
 // address and by address and history, with a third that chooses; indirect jumps and returns count as predicted.
@@ -46,9 +46,9 @@ EXPORTED int qemu_plugin_version = 1;
 
 // --- counts --------------------------------------------------------------------------------------
 
-enum count { instructions, memory, branches, vector, wide, slow, mispredicted, l1, l1_ahead, l2, l2_ahead, kinds };
+enum count { instructions, memory, branches, vector, wide, slow, mispredicted, l1, l2_hit_ahead, l2, l2_ahead, kinds };
 static const char heading[] =
-    "label\tinstructions\tmemory\tbranches\tvector\twide\tslow\tmispredicted\tl1\tl1_ahead\tl2\tl2_ahead\n";
+    "label\tinstructions\tmemory\tbranches\tvector\twide\tslow\tmispredicted\tl1\tl2_hit_ahead\tl2\tl2_ahead\n";
 static uint64_t counts[kinds];
 static FILE* out;
 
@@ -90,8 +90,11 @@ static void access_line(uint64_t line) {
   static unsigned oldest[2];
   if (l1_lines[line % l1_sets][0] == line || touch(l1_lines[line % l1_sets], l1_ways, line)) return;
   ++counts[l1];
-  counts[l1_ahead] += is_ahead(recent[0], &oldest[0], line);
-  if (touch(l2_lines[line % l2_sets], l2_ways, line)) return;
+  const bool ahead = is_ahead(recent[0], &oldest[0], line);
+  if (touch(l2_lines[line % l2_sets], l2_ways, line)) {
+    counts[l2_hit_ahead] += ahead;
+    return;
+  }
   ++counts[l2];
   counts[l2_ahead] += is_ahead(recent[1], &oldest[1], line);
 }
@@ -157,7 +160,7 @@ static void classify(uint32_t word, struct block* b) {
     const bool takes_root = (word & 0xff3ffc00u) == 0x1e21c000u || (word & 0xbfbffc00u) == 0x2ea1f800u;
     if (divides || takes_root) b->counts[slow] += is_wide ? 2 : 1;
   } else if ((word & 0x7fe0f800u) == 0x1ac00800u) {
-    ++b->counts[slow];  // whole numbers
+    ++b->counts[slow];  // integers
   }
 }
 

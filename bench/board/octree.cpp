@@ -55,6 +55,8 @@ int main(int argc, char** argv) {
   }
   std::ostringstream bytes;
   theirs.write(bytes);
+  const bool are_equal = bytes.str() == octree::ot_bytes(ours);
   std::printf("leaves: orbis %zu, OctoMap %zu; the files are %s\n", ours.num_leaves(), theirs.getNumLeafNodes(),
-              bytes.str() == octree::ot_bytes(ours) ? "equal" : "different");
+              are_equal ? "equal" : "different");
+  return are_equal ? 0 : 1;
 }

@@ -5,15 +5,30 @@
 # prints the table. See README.md.
 #
 # usage: bench/board/run.sh SYSROOT [FRAMES]
-# Needs gcc, g++-aarch64-linux-gnu, qemu-user (with plugins: 4.2 or later), python3, libeigen3-dev, libexpected-dev and
-# libtomlplusplus-dev, the recordings of ORBIS_DATA_DIR (../shared/data), and SYSROOT, which bench/board/sysroot.sh makes.
-# The first time takes ten minutes, most of it one compiler run of 4 GB. Results are kept in build/board.
+# Needs gcc, g++-aarch64-linux-gnu, qemu-user (6 to 8, as in Debian 12: later ones have another plugin API), python3,
+# libeigen3-dev, libexpected-dev and libtomlplusplus-dev, the recordings of ORBIS_DATA_DIR (../shared/data), and SYSROOT,
+# which bench/board/sysroot.sh makes. The first time takes ten minutes, most of it one compiler run of 4 GB. Results are
+# kept in build/board.
 set -euo pipefail
-cd "$(dirname "${BASH_SOURCE[0]}")/../.."
-[[ $# -ge 1 && -d $1/usr/include/octomap ]] || { sed -n '4,11s/^# \{0,1\}//p' bench/board/run.sh >&2; exit 1; }
+usage() {
+  sed -n '4,12s/^# \{0,1\}//p' "$here/run.sh" >&2
+  printf 'run.sh: %s\n' "$1" >&2
+  exit 1
+}
+here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
+[[ $# -ge 1 ]] || usage "no SYSROOT is given"
+[[ -d $1/usr/include/octomap ]] || usage "$1 has no usr/include/octomap: bench/board/sysroot.sh makes a SYSROOT"
 root=$(cd "$1" && pwd)
+data=${ORBIS_DATA_DIR:-$here/../../../shared/data}
+for recording in kitchen livingroom; do
+  [[ -d $data/$recording ]] || usage "no recording $data/$recording (ORBIS_DATA_DIR)"
+done
+data=$(cd "$data" && pwd)
+for tool in "${CC:-gcc}" "${AARCH64_CXX:-aarch64-linux-gnu-g++}" qemu-aarch64 python3; do
+  command -v "$tool" >/dev/null || usage "$tool is not here"
+done
+cd "$here/../.."
 frames=${2:-120}
-data=${ORBIS_DATA_DIR:-../shared/data}
 out=build/board
 mkdir -p "$out/include"
 
@@ -45,7 +60,7 @@ build slam
 libraries=$lib:$root/lib/aarch64-linux-gnu:$lib/blas:$lib/lapack
 count() {  # name of the counts, program and its arguments
   echo "counting $*" >&2
-  qemu-aarch64 -L "${AARCH64_ROOT:-/usr/aarch64-linux-gnu}" -E "LD_LIBRARY_PATH=$libraries" \
+  qemu-aarch64 -cpu cortex-a72 -L "${AARCH64_ROOT:-/usr/aarch64-linux-gnu}" -E "LD_LIBRARY_PATH=$libraries" \
     -plugin "./$out/libcount.so,out=$out/$1.tsv" "$out/$2" "${@:3}" >&2
 }
 count features_1000 features "$data/kitchen" 8 1000 8

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
 #
-# Fetches the libraries of Debian for 64-bit ARM that run.sh wants, and unpacks them into a folder. Nothing is installed,
+# Fetches the libraries of Debian 12 for 64-bit ARM that run.sh wants, and unpacks them into a folder. Nothing is installed,
 # and the lists of packages of this system stay as they are.
 #
 # usage: bench/board/sysroot.sh FOLDER

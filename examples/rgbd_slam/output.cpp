@@ -50,6 +50,7 @@ results begin_results(const settings& s, const std::string& title, const frame_s
     const auto& camera = source->camera;
     const auto& k = camera.model.k();
     r.setup.emplace_back("input", source->kind);
+    r.images_of = source->images_of;
     if (!source->images_of.empty()) r.setup.emplace_back("images of", source->images_of);
     r.setup.emplace_back("camera",
                          std::string{camera.model.model_name()} + ", " + std::to_string(k.width) + " x " +

@@ -151,9 +151,11 @@ std::optional<orbis::error> find_unwritable(const settings& s) {
   for (const fs::path& folder : folders) {
     fs::path there = folder;
     while (!is_there(there) && there.has_relative_path()) there = folder_of(there);
-    if (::access((there / "").c_str(), W_OK | X_OK) != 0)
-      return orbis::error{orbis::errc::write_failed, folder.string(),
-                          "no file can be made in it: " + std::generic_category().message(errno)};
+    const std::string text = (there / "").string();  // must be a folder
+    if (::access(text.c_str(), W_OK | X_OK) == 0) continue;
+    const int why = errno;
+    return orbis::error{orbis::errc::write_failed, folder.string(),
+                        "no file can be made in " + there.string() + ": " + std::generic_category().message(why)};
   }
   return std::nullopt;
 }

@@ -138,6 +138,7 @@ struct navigation_results {
 struct results {
   std::string command, title;
   std::string profile;                                     ///< one of `profile_names`
+  std::string images_of;                                   ///< as in `frame_source`
   std::filesystem::path folder;                            ///< where the files are made
   std::filesystem::path out;                               ///< where they are in the end
   std::vector<std::string> files, files_of_earlier_runs;   ///< names of what is in `out` in the end

@@ -9,6 +9,7 @@
 #include <orbis/slam/rgbd_system.hpp>
 
 #include "interrupts.hpp"
+#include "profiles.hpp"
 #include "slam_options.hpp"
 
 namespace app {
@@ -33,6 +34,7 @@ first_look find_shutter(const frame_source& source, const settings& s, bool chec
   }
   if (s.read_out_ms) {
     result.from = "given";
+    result.shutter = source.camera.shutter.value_or(orbis::camera::shutter{});
     result.shutter.color_read_out = result.shutter.depth_read_out = 0.001 * *s.read_out_ms;
     return look;
   }
@@ -49,6 +51,7 @@ first_look find_shutter(const frame_source& source, const settings& s, bool chec
   result.from = "estimated";
   console.stage("shutter");
   orbis::slam::options options = slam_options(source.camera.model, source.camera.baseline);
+  set_profile(s.profile, options);
   options.estimates_shutter = true;
   orbis::slam::rgbd_system<decltype(orbis::camera::camera_settings::model)> slam{source.camera.model, options};
   read_ahead frames{source, s.threads != 1};

@@ -53,6 +53,7 @@ std::string summary_json(const results& r) {
   const auto& m = r.map;
   const auto& a = r.against_truth;
   j["profile"] = r.profile;
+  j["images_of"] = r.images_of.empty() ? null : json(r.images_of);
   j["sensor"] = s ? json(to_string(s->sensor)) : null;
   j["frames"] = s ? json(s->frames) : null;
   j["tracked"] = s ? json(s->tracked) : null;

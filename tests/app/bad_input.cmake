@@ -161,6 +161,7 @@ app_fails(2 "cut.ply: .*ray-evidence wants a recording" map cut.ply --out out --
 
 # Output that cannot be: 2.
 app_fails(2 "file/out" run good --out file/out)
+check(NOT err MATCHES "\nshutter")  # before the first seconds are looked at
 app_fails(2 "file" run good --out file)
 
 # Nothing to see: 3.

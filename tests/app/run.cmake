@@ -8,6 +8,14 @@ check(tracked EQUAL 30)
 summary(map_error_m ${WORK}/out map_error_m)
 check(NOT map_error_m)  # null: a recording on disk knows no surface
 
+# The camera as it was used: a shutter that was given is in its file, one that was found to be global is not.
+check(err MATCHES "\nshutter +")
+file(READ ${WORK}/out/camera_used.toml camera)
+check(camera MATCHES "fx = 262.5\n" AND NOT camera MATCHES "read_out")
+app(0 run room --out rolling --read-out-ms 20 --frames 5 --resolution 0.2 --filter none)
+file(READ ${WORK}/rolling/camera_used.toml camera)
+check(camera MATCHES "\nread_out_ms = 20.0\ndepth_read_out_ms = 20.0\n")
+
 # Options from a file; the command line has the last word.
 file(WRITE ${WORK}/options.toml "resolution = 0.2\nstride = 2\nfilter = \"none\"\n")
 app(0 run room --out out --config options.toml --stride 3 --quiet)
