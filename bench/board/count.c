@@ -11,7 +11,7 @@
 //
 // What is simulated: data cache of 32 kB, 2 ways; L2 cache of 1 MB, 16 ways; lines of 64 bytes, least recently used
 // goes, a write brings the line in. The program has the L2 cache for itself, and instructions do not enter it. No
-// line is fetched ahead; instead a miss next to one of the last 16 misses is also counted as `ahead`: one that the
+// line is prefetched; instead a miss next to one of the last 16 misses is also counted as `ahead`: one that the
 // A72, which fetches ahead along such streams, would have on its way. Branches: two tables of two-bit counters, by
 // address and by address and history, with a third that chooses; indirect jumps and returns count as predicted.
 #include <stdbool.h>
