@@ -72,10 +72,13 @@ function(make_plate file)
        "property float z\nend_header\n${points}")
 endfunction()
 
-function(must_equal a b)  # files
+# Two files must have the same bytes.
+function(must_equal a b)
   file(SHA256 ${WORK}/${a} first)
   file(SHA256 ${WORK}/${b} second)
-  check(first STREQUAL second)
+  if(NOT first STREQUAL second)
+    message(FATAL_ERROR "${a} and ${b} differ")
+  endif()
 endfunction()
 
 function(must_exist folder)  # names...

@@ -36,11 +36,7 @@ list(REMOVE_ITEM names summary.json report.html)  # which say how long things to
 list(LENGTH names count)
 check(count GREATER 6)
 foreach(name IN LISTS names)
-  file(SHA256 ${WORK}/plain/${name} plain)
-  file(SHA256 ${WORK}/shown/${name} shown)
-  if(NOT plain STREQUAL shown)
-    message(FATAL_ERROR "${name} is not the same with --viewer")
-  endif()
+  must_equal(plain/${name} shown/${name})
 endforeach()
 app(0 ${common} --frames 4 --out batch --batch-map --viewer web --viewer-port 0 --quiet)
 
