@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <memory>
 #include <mutex>
 #include <string_view>
 #include <system_error>
@@ -77,7 +78,7 @@ std::optional<identity> identity_of(const fs::path& path) {
   return identity{status.st_dev, status.st_ino};
 }
 
-/// Held while files are put in place, and while an interrupt removes what is not.
+/// Held while the hidden folders are made, while files are put in place, and while an interrupt removes what is not.
 std::mutex& end_of_run() {
   static std::mutex& mutex = *new std::mutex;
   return mutex;
@@ -202,23 +203,28 @@ result<result_files> result_files::begin(const settings& s) {
     if (auto added = add(s.floor_map, {files.floor_name_, picture}, files.floor_folder_); !added)
       return orbis::fail(added.error());
   }
+  const auto temporary = std::make_shared<std::vector<fs::path>>();
+  interrupts::before_end([temporary] {
+    const std::lock_guard lock{end_of_run()};
+    std::error_code ignored;
+    // Again where another thread made a file meanwhile. Without its folder it makes none.
+    for (const fs::path& path : *temporary)
+      for (int i = 0; i != 1000 && fs::exists(path, ignored); ++i) fs::remove_all(path, ignored);
+  });
+  const std::lock_guard lock{end_of_run()};
   for (place& p : places) {
     auto folder = staged_folder::open(p.folder, std::move(p.names));
     if (!folder) return orbis::fail(folder.error());
     files.folders_.push_back(*std::move(folder));
+    temporary->push_back(files.folders_.back().path());
   }
-  std::vector<fs::path> temporary;
-  for (const staged_folder& f : files.folders_) temporary.push_back(f.path());
-  interrupts::before_end([temporary] {
-    const std::lock_guard lock{end_of_run()};
-    std::error_code ignored;
-    for (const fs::path& path : temporary) fs::remove_all(path, ignored);
-  });
   return files;
 }
 
 result_files::~result_files() {
-  if (!folders_.empty()) interrupts::before_end({});
+  if (folders_.empty()) return;
+  folders_.clear();
+  interrupts::before_end({});
 }
 
 file_names result_files::made(const file_names& coming) const {

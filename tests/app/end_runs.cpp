@@ -337,10 +337,21 @@ int main(int argc, char** argv) {
         check(entry.path().filename().string().find("spill") == std::string::npos, "a spill file is left");
     }
 
+  // Ended as soon as its hidden folder is there.
   put_back(work / "demo", room);
-  for (int i = 0; i != 6; ++i) {
+  for (int i = 0; i != 20; ++i) {
     run endless{demo("2", "100000")};
-    std::this_thread::sleep_for(std::chrono::milliseconds{30 + 120 * i});
+    while (!endless.is_over() && hidden_in(work / "demo") == 0) {
+    }
+    endless.send(i % 2 == 0 ? SIGINT : SIGTERM);
+    endless.wait();
+    check(hidden_in(work / "demo") == 0, "a run that is ended at its beginning leaves hidden files");
+  }
+
+  // Ended while it begins, and a second time while it makes its files.
+  for (int i = 0; i != 60; ++i) {
+    run endless{demo("2", "100000")};
+    std::this_thread::sleep_for(std::chrono::milliseconds{i < 50 ? i : 60 * (i - 49)});
     // Stopped in between, as a busy machine may let the run end by the first signal before the second is sent.
     endless.send(SIGSTOP);
     endless.send(SIGINT);
