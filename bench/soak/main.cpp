@@ -26,6 +26,7 @@
 #include <utility>
 #include <vector>
 
+#include <malloc.h>
 #include <unistd.h>
 
 #include <orbis/camera/any.hpp>
@@ -51,6 +52,12 @@ double resident_megabytes() {
   double pages = 0.0, resident = 0.0;
   statm >> pages >> resident;
   return 1e-6 * resident * static_cast<double>(sysconf(_SC_PAGESIZE));
+}
+
+/// Megabytes of the heap that are in use: what is kept, without what malloc holds for later.
+double heap_megabytes() {
+  const struct mallinfo2 heap = mallinfo2();
+  return 1e-6 * static_cast<double>(heap.uordblks + heap.hblkhd);
 }
 
 double part_of(std::vector<double> values, double part) {
@@ -184,8 +191,8 @@ int soak(const Recording& recording, std::size_t frames) {
   live_map map{camera.model, map_options, std::move(events)};
   slam.listen({.keyframe_culled = [&map](const auto& e) { map.remove(e.frame); }, .map_corrected = hold.listener()});
 
-  std::printf("%8s %22s %22s %8s %8s %10s %10s %8s %6s\n", "frames", "track ms (50/95/max)", "lock ms (50/95/max)",
-              "held ms", "MB", "keyframes", "landmarks", "leaves", "lost");
+  std::printf("%8s %22s %22s %8s %8s %8s %10s %10s %8s %6s\n", "frames", "track ms (50/95/max)", "lock ms (50/95/max)",
+              "held ms", "MB", "heap MB", "keyframes", "landmarks", "leaves", "lost");
   std::vector<double> tracking;
   const std::size_t two_rounds = 4 * recording.size();
   double memory_then = 0.0, memory_now = 0.0;
@@ -209,9 +216,9 @@ int soak(const Recording& recording, std::size_t frames) {
       const std::size_t lost = slam.counters().lost;
       memory_now = resident_megabytes();
       if (memory_then == 0.0 && i >= two_rounds) memory_then = memory_now;
-      std::printf("%8zu %6.1f %6.1f %8.1f %6.2f %6.2f %8.1f %8.2f %8.0f %10zu %10zu %8zu %6zu\n", i + 1,
+      std::printf("%8zu %6.1f %6.1f %8.1f %6.2f %6.2f %8.1f %8.2f %8.0f %8.1f %10zu %10zu %8zu %6zu\n", i + 1,
                   part_of(tracking, 0.5), part_of(tracking, 0.95), part_of(tracking, 1.0), part_of(waited, 0.5),
-                  part_of(waited, 0.95), part_of(waited, 1.0), hold.take(), memory_now, slam.keyframes().size(),
+                  part_of(waited, 0.95), part_of(waited, 1.0), hold.take(), memory_now, heap_megabytes(), slam.keyframes().size(),
                   slam.landmark_count(), map.latest()->map.counts().leaves, lost - lost_before);
       std::fflush(stdout);
       lost_before = lost;
