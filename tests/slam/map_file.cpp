@@ -9,6 +9,7 @@
 
 #include <orbis/core/random.hpp>
 #include <orbis/slam/detail/map/file_sections.hpp>
+#include <orbis/slam/detail/map/map_writer.hpp>
 #include <orbis/slam/map_file.hpp>
 
 #include "slam/random_map.hpp"
@@ -101,11 +102,11 @@ TEST_CASE("A file with one wrong bit says in which section") {
   damaged[100] = static_cast<char>(damaged[100] ^ 1);
   CHECK(fault_of(damaged) == "some.map: section \"kfrm\" from byte 60 is damaged: its checksum does not fit");
   std::string newer = bytes;
-  newer[8] = 3;
+  newer[8] = 4;
   const auto m = parsed(newer);
   REQUIRE_FALSE(m.has_value());
   CHECK(m.error().code == errc::unsupported);
-  CHECK(m.error().message == "version 3, this reads versions 1 and 2");
+  CHECK(m.error().message == "version 4, this reads versions 1 to 3");
 }
 
 TEST_CASE("A file says what sensor the map was made with, and one of version 1 is read, which does not") {
@@ -143,6 +144,43 @@ TEST_CASE("A file says what sensor the map was made with, and one of version 1 i
     slam::detail::put(to, std::uint32_t{9});
   });
   CHECK(fault_of(none) == "some.map: a sensor of kind 9");
+}
+
+TEST_CASE("Erased landmarks take few bytes of a file, in version 2 eight each") {
+  random_bits random(12);
+  slam::map m = test::random_map(12, 1200);
+  const std::string few = slam::map_bytes(m);
+  const slam::landmark_id last = m.landmark_end();
+  auto content = m.content();
+  content.landmarks.add_gone(1000000);
+  const std::string many = slam::map_bytes(slam::map{content});
+  CHECK(many.size() <= few.size() + 8);
+  const auto again = parsed(many);
+  REQUIRE(again.has_value());
+  CHECK(again->landmark_end() == last + 1000000);
+  CHECK(again->landmark_count() == m.landmark_count());
+  CHECK(test::fault_of(*again) == "");
+
+  // As version 2 wrote it.
+  std::string land, older = few;
+  std::size_t gone = 0, replaced = 0;
+  for (slam::landmark_id id = 0; id != last; ++id)
+    if (m.has_landmark(id)) {
+      slam::detail::put(land, static_cast<std::uint32_t>(m.landmark_at(id).observations.size()));
+      slam::detail::put_landmark(land, m.landmark_at(id));
+    } else {
+      ++(m.replacement_of(id) == slam::no_id ? gone : replaced);
+      slam::detail::put(land, std::uint32_t{0}, m.replacement_of(id).value());
+    }
+  CHECK(gone > 10);
+  CHECK(replaced > 10);
+  older.resize(few.rfind("land"));
+  older[8] = 2;
+  slam::detail::put_section(older, "land", [&](std::string& to) { to += land; });
+  const auto old = parsed(older);
+  CHECK((old ? "" : old.error().to_string()) == "");
+  REQUIRE(old.has_value());
+  CHECK(slam::map_bytes(*old) == few);
 }
 
 TEST_CASE("Corrections of the scale are in the lengths that a file holds") {

@@ -68,6 +68,8 @@ class basic_map {
   [[nodiscard]] keyframe_id keyframe_end() const noexcept { return content_.keyframes.end_id(); }
   /// The id that the next landmark will get.
   [[nodiscard]] landmark_id landmark_end() const noexcept { return content_.landmarks.end_id(); }
+  /// The first landmark from `id` on; `landmark_end()` if there is none. O(erased ids in between).
+  [[nodiscard]] landmark_id next_landmark(landmark_id id) const noexcept { return content_.landmarks.next_id(id); }
   [[nodiscard]] bool has_keyframe(keyframe_id id) const noexcept { return content_.keyframes.contains(id); }
   [[nodiscard]] bool has_landmark(landmark_id id) const noexcept { return content_.landmarks.contains(id); }
   /// @pre has_keyframe(id)
@@ -76,7 +78,7 @@ class basic_map {
   [[nodiscard]] const landmark_type& landmark_at(landmark_id id) const { return content_.landmarks[id]; }
 
   /// The landmark that stands for `id` now: itself while it is there, otherwise the one it was fused into; `no_id` if
-  /// it was removed.
+  /// it was removed, or erased so long ago that 2^18 landmarks or more were added since.
   [[nodiscard]] landmark_id replacement_of(landmark_id id) const noexcept {
     return content_.landmarks.replacement_of(id);
   }
@@ -231,8 +233,7 @@ template <feature_descriptor D>
 void basic_map<D>::transform(const sim3& T_new_old) {
   for (keyframe_id k = 0; k != keyframe_end(); ++k)
     if (has_keyframe(k)) move_keyframe(k, T_new_old);
-  for (landmark_id l = 0; l != landmark_end(); ++l)
-    if (has_landmark(l)) move_landmark(l, T_new_old);
+  for (landmark_id l = next_landmark(0); l != landmark_end(); l = next_landmark(l + 1)) move_landmark(l, T_new_old);
   for (auto& [id, e] : content_.erased)
     if (e.replacement == no_id) {
       e.T_replacement_camera = moved(T_new_old, e.T_replacement_camera);
@@ -367,8 +368,7 @@ id_offsets basic_map<D>::append(basic_map&& other, const sim3& T_this_other, con
     for (landmark_id& l : k.landmarks)
       if (l != no_id) l += offsets.landmarks;
   }
-  for (landmark_id id = offsets.landmarks; id != landmark_end(); ++id) {
-    if (!has_landmark(id)) continue;
+  for (landmark_id id = next_landmark(offsets.landmarks); id != landmark_end(); id = next_landmark(id + 1)) {
     landmark_type& l = content_.landmarks[id];
     l.id = id;
     l.created += offsets.keyframes;

@@ -5,7 +5,7 @@
 /// A file is little-endian; equal maps give equal bytes on every machine:
 ///
 ///     0   "orbismap"
-///     8   version (u32), 2; version 1 is read as well
+///     8   version (u32), 3; versions 1 and 2 are read as well
 ///     12  the sections "size", "kfrm", "tree" and "land", each: its name (4 bytes), the length of its content (u64),
 ///         the content, CRC-32C of all three (u32)
 ///
@@ -19,8 +19,9 @@
 ///           response (f32), octave (i32), depth (f32), x and y of the ray (f64; NaN without one), descriptor (32
 ///           bytes)
 ///     tree  for each keyframe: parent (id), number of loop edges (u32), their other ends (ids)
-///     land  for each landmark id the number of observations (u32). 0: it was removed; its replacement (id). Otherwise
-///           position, normal (3 f64 each), least and greatest distance (f64), descriptor (32 bytes), keyframe that
+///     land  for each landmark id the number of observations (u32). 0: it was erased; its replacement (id). ffffffff:
+///           it was erased, and nothing replaced it, nor so many ids from it on (u32, at least 1); in versions 1 and 2
+///           the replacement is ffffffff then. Otherwise position, normal (3 f64 each), least and greatest distance (f64), descriptor (32 bytes), keyframe that
 ///           created it (id), times visible, times found (u32 each), whether the descriptor is current (a byte), and
 ///           the observations: keyframe (id), keypoint (u32)
 ///

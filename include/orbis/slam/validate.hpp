@@ -70,8 +70,7 @@ class map_check {
 
   [[nodiscard]] result<void> landmarks() const {
     std::size_t count = 0;
-    for (landmark_id id = 0; id != m_.landmark_end(); ++id) {
-      if (!m_.has_landmark(id)) continue;
+    for (landmark_id id = m_.next_landmark(0); id != m_.landmark_end(); id = m_.next_landmark(id + 1)) {
       ++count;
       const auto& l = m_.landmark_at(id);
       if (l.id != id) return wrong_landmark(id, "calls itself " + to_string(l.id));
@@ -169,7 +168,8 @@ class map_check {
     }
     if (m_.content().erased.size() + m_.keyframes().size() != m_.keyframe_end().value())
       return fail(errc::malformed, "keyframes", "are remembered as erased that never were");
-    for (landmark_id id = 0; id != m_.landmark_end(); ++id)
+    const auto& all = m_.landmarks();
+    for (landmark_id id = all.next_known_id(0); id != m_.landmark_end(); id = all.next_known_id(id + 1))
       if (const landmark_id now = m_.replacement_of(id); now != no_id && !m_.has_landmark(now))
         return wrong_landmark(id, "became one that is not there");
     return {};

@@ -122,3 +122,37 @@ TEST_CASE("A store behaves as a map from numbers after any sequence of operation
   check(a);
   CHECK(a.end > 500);
 }
+
+TEST_CASE("A store that need not remember forgets what replaced an object long ago, and takes little memory") {
+  slam::detail::slot_map<int, slam::landmark_id, 1000> all;
+  for (int i = 0; i != 5; ++i) all.add(i);
+  all.erase(0, 4);
+  all.erase(1, 4);
+  for (std::uint32_t i = 5; i != 505; ++i) {
+    all.add(static_cast<int>(i));
+    all.erase(i, 4);
+  }
+  CHECK(all.replacement_of(0) == 4);
+  CHECK(all.replacement_of(300) == 4);
+  for (std::uint32_t i = 505; i != 3000; ++i) {
+    all.add(static_cast<int>(i));
+    all.erase(i);
+  }
+  CHECK(all.replacement_of(0) == 4);  // its neighbours are there
+  CHECK(all.replacement_of(300) == no_id);
+  CHECK(all.size() == 3);
+  CHECK(std::vector<int>(all.begin(), all.end()) == std::vector{2, 3, 4});
+  CHECK(all.next_id(0) == 2);
+  CHECK(all.next_id(5) == all.end_id());
+  CHECK(all.next_known_id(0) == 0);
+
+  decltype(all) other;
+  other.add_gone(100);
+  other.add(77);
+  other.add_erased(100);
+  CHECK(all.append(std::move(other)) == 3000);
+  CHECK(all.end_id() == 3102);
+  CHECK(all[3100] == 77);
+  CHECK(all.replacement_of(3101) == 3100);
+  CHECK(all.replacement_of(3050) == no_id);
+}

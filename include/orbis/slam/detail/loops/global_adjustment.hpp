@@ -132,9 +132,8 @@ report apply_poses(basic_map<D>& m, const snapshot& s, const bundle_solution& so
   const std::vector<sim3> motion = propagate_motion<D>(m, s.keyframes, poses);
   // Landmarks that take no part move with a keyframe; the others then get their own position.
   std::size_t next = 0;
-  for (landmark_id l = 0; l != m.landmark_end(); ++l) {
+  for (landmark_id l = m.next_landmark(0); l != m.landmark_end(); l = m.next_landmark(l + 1)) {
     while (next != s.landmarks.size() && s.landmarks[next] < l) ++next;
-    if (!m.has_landmark(l)) continue;
     const bool adjusted = next != s.landmarks.size() && s.landmarks[next] == l;
     const auto& seen = m.landmark_at(l);
     const keyframe_id by = m.has_keyframe(seen.created) ? seen.created : seen.observations.front().keyframe;

@@ -85,8 +85,13 @@ class loop_closer {
 
   /// Updates all landmarks of a map.
   void update(map_id id, effort& by) {
-    for (landmark_id at = 0; locked(by, [&] { return update_landmarks(shared_.atlas.at(id), at, at_once); });)
-      at += at_once;
+    const auto is_behind_all = [&](landmark_id& at) {
+      auto& m = shared_.atlas.at(id);
+      at = update_landmarks(m, at, at_once);
+      return at == m.landmark_end();
+    };
+    for (landmark_id at = 0; !locked(by, [&] { return is_behind_all(at); });) {
+    }
   }
   void fuse(map_id id, std::span<const loop_fusion::pair> pairs, const id_offsets& offsets, effort& by) {
     for (; !pairs.empty(); pairs = pairs.subspan(std::min(pairs_at_once, pairs.size())))

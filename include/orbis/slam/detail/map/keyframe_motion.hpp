@@ -22,24 +22,24 @@ namespace orbis::slam::detail {
 template <feature_descriptor D>
 void move_all(basic_map<D>& m, std::span<const sim3> T_new_old) {
   assert(T_new_old.size() == m.keyframe_end().value());
-  for (landmark_id l = 0; l != m.landmark_end(); ++l)
-    if (m.has_landmark(l)) m.move_landmark(l, T_new_old[m.landmark_at(l).observations.front().keyframe.value()]);
+  for (landmark_id l = m.next_landmark(0); l != m.landmark_end(); l = m.next_landmark(l + 1))
+    m.move_landmark(l, T_new_old[m.landmark_at(l).observations.front().keyframe.value()]);
   for (keyframe_id k = 0; k != m.keyframe_end(); ++k)
     if (m.has_keyframe(k)) m.move_keyframe(k, T_new_old[k.value()]);
 }
 
-/// Calls `map.update_landmark` for `count` ids from `first` on. Returns whether more ids follow, so that a caller who
-/// shares the map can do it part by part. Until then, landmarks are searched for by their old normals and distances.
+/// Calls `map.update_landmark` for `count` landmarks from the id `first` on, or for all that are left. Returns the id
+/// behind them, at most `landmark_end()`, so that a caller who shares the map can go on there later. Until then,
+/// landmarks are searched for by their old normals and distances.
 template <feature_descriptor D>
-bool update_landmarks(basic_map<D>& m, landmark_id first, std::uint32_t count) {
-  const landmark_id end = first + std::min(count, m.landmark_end() - std::min(first, m.landmark_end()));
-  for (landmark_id l = first; l < end; ++l)
-    if (m.has_landmark(l)) m.update_landmark(l);
-  return end < m.landmark_end();
+landmark_id update_landmarks(basic_map<D>& m, landmark_id first, std::size_t count) {
+  landmark_id l = m.next_landmark(first);
+  for (; count != 0 && l != m.landmark_end(); --count, l = m.next_landmark(l + 1)) m.update_landmark(l);
+  return l;
 }
 template <feature_descriptor D>
 void update_landmarks(basic_map<D>& m) {
-  update_landmarks(m, 0, m.landmark_end().value());
+  update_landmarks(m, 0, m.landmark_count());
 }
 
 /// A keyframe and its neighbours in the covisibility graph.

@@ -25,6 +25,10 @@ struct erased_keyframe {
   double scale = 1.0;        ///< over that of the replacement
 };
 
+/// How many ids later an erased landmark may be forgotten: who still asks for its replacement holds a frame, or what a
+/// loop was found by, of the last seconds; in a hundred seconds a camera at 30 Hz makes so many landmarks.
+inline constexpr std::uint32_t remembered_landmarks = 1U << 18U;
+
 template <feature_descriptor D>
 struct map_content {
   int levels = 8;                             ///< of the image pyramid
@@ -33,9 +37,12 @@ struct map_content {
   sensor_kind sensor = sensor_kind::unknown;  ///< of the first keyframe
   bool scale_is_known = true;                 ///< of the first keyframe
   slot_map<basic_keyframe<D>, keyframe_id> keyframes;
-  slot_map<basic_landmark<D>, landmark_id> landmarks;
+  slot_map<basic_landmark<D>, landmark_id, remembered_landmarks> landmarks;
   spanning_tree tree;
   std::map<keyframe_id, erased_keyframe> erased;
 };
+
+/// In a file, instead of a landmark's number of observations: a number of ids follows that are gone.
+inline constexpr std::uint32_t run_of_gone = 0xffffffffU;
 
 }  // namespace orbis::slam::detail

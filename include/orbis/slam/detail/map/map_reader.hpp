@@ -59,6 +59,8 @@ class map_reader {
     to_.scale_factor = in.take<double>();
     keyframe_ids_ = in.take<std::uint32_t>();
     landmark_ids_ = in.take<std::uint32_t>();
+    if (constexpr std::uint32_t most = decltype(to_.landmarks)::most_ids; keyframe_ids_ > most || landmark_ids_ > most)
+      return wrong("more ids than there can be");
     const auto sensor = version_ < 2 ? 0 : in.take<std::uint32_t>();
     if (sensor > static_cast<std::uint32_t>(sensor_kind::monocular))
       return wrong("a sensor of kind " + std::to_string(sensor));
@@ -126,15 +128,15 @@ class map_reader {
   }
 
   bool landmarks(section_reader in) {
-    for (landmark_id id = 0; id != landmark_ids_; ++id) {
+    for (landmark_id id = 0; id != landmark_ids_; id = to_.landmarks.end_id()) {
       const auto count = in.take<std::uint32_t>();
-      const bool whole = count == 0 ? removed(in) : landmark_at(in, id, count);
+      const bool is_run = version_ >= 3 && count == run_of_gone;
+      const bool whole = is_run ? gone(in, id) : count == 0 ? removed(in, id) : landmark_at(in, id, count);
       if (in.ended()) problem = "the section ends within it";
       if (!whole || in.ended()) return wrong("landmark " + to_string(id) + ": " + problem);
     }
-    for (landmark_id id = 0; id != landmark_ids_; ++id)
-      if (!to_.landmarks.contains(id) && replacements_[id.value()] != no_id &&
-          !to_.landmarks.contains(replacements_[id.value()]))
+    for (const auto& [id, replacement] : replacements_)
+      if (!to_.landmarks.contains(replacement))
         return wrong("landmark " + to_string(id) + ": became one that is not there");
     return ends(in, "land");
   }
@@ -206,11 +208,19 @@ class map_reader {
     return true;
   }
 
-  bool removed(section_reader& in) {
-    replacements_.push_back(in.take<std::uint32_t>());
-    if (replacements_.back() != no_id && replacements_.back() >= landmark_ids_)
-      return wrong("became one that never was");
-    to_.landmarks.add_erased(replacements_.back());
+  bool removed(section_reader& in, landmark_id id) {
+    const landmark_id replacement = in.take<std::uint32_t>();
+    if (replacement != no_id && replacement >= landmark_ids_) return wrong("became one that never was");
+    if (replacement != no_id) replacements_.emplace_back(id, replacement);
+    to_.landmarks.add_erased(replacement);
+    return true;
+  }
+
+  bool gone(section_reader& in, landmark_id id) {
+    const auto count = in.take<std::uint32_t>();
+    if (in.ended()) return false;
+    if (count == 0 || count > landmark_ids_ - id) return wrong("begins " + std::to_string(count) + " that are gone");
+    to_.landmarks.add_gone(count);
     return true;
   }
 
@@ -244,7 +254,6 @@ class map_reader {
         return wrong("is seen by " + by + ", which shows another");
       l.observations.push_back(o);
     }
-    replacements_.push_back(no_id);
     to_.landmarks.add(std::move(l));
     return true;
   }
@@ -252,7 +261,7 @@ class map_reader {
   content& to_;
   std::uint32_t version_;
   std::uint32_t keyframe_ids_ = 0, landmark_ids_ = 0;
-  std::vector<landmark_id> replacements_;
+  std::vector<std::pair<landmark_id, landmark_id>> replacements_;  ///< of erased landmarks
 };
 
 }  // namespace orbis::slam::detail

@@ -15,7 +15,7 @@
 namespace orbis::slam::detail {
 
 inline constexpr std::string_view map_magic = "orbismap";
-inline constexpr std::uint32_t map_version = 2;
+inline constexpr std::uint32_t map_version = 3;
 
 inline void put_pose(std::string& to, const se3& pose) {
   const auto& q = pose.rotation().unit_quaternion();
@@ -73,13 +73,20 @@ inline void put_landmark(std::string& to, const landmark& l) {
     }
   });
   put_section(bytes, "land", [&](std::string& to) {
-    for (landmark_id id = 0; id != m.landmark_end(); ++id) {
-      if (m.has_landmark(id)) {
-        put(to, static_cast<std::uint32_t>(m.landmark_at(id).observations.size()));
-        put_landmark(to, m.landmark_at(id));
+    const auto is_gone = [&m](landmark_id id) { return m.replacement_of(id) == no_id; };
+    for (landmark_id id = 0; id != m.landmark_end();) {
+      // Ids that are gone: by pages where the map has forgotten them, one by one where it still knows of them.
+      landmark_id next = m.landmarks().next_known_id(id);
+      while (next != m.landmark_end() && is_gone(next)) next = m.landmarks().next_known_id(next + 1);
+      if (next != id) put(to, run_of_gone, next - id);
+      if (next == m.landmark_end()) break;
+      if (m.has_landmark(next)) {
+        put(to, static_cast<std::uint32_t>(m.landmark_at(next).observations.size()));
+        put_landmark(to, m.landmark_at(next));
       } else {
-        put(to, std::uint32_t{0}, m.replacement_of(id).value());
+        put(to, std::uint32_t{0}, m.replacement_of(next).value());
       }
+      id = next + 1;
     }
   });
   return bytes;

@@ -12,21 +12,23 @@
 #include <utility>
 #include <vector>
 
+#include <orbis/slam/detail/map/paged_slots.hpp>
 #include <orbis/slam/ids.hpp>
 
 namespace orbis::slam::detail {
 
 /// Objects with the ids 0, 1, 2 ... in the order in which they were added. No id is used twice, but the memory of
-/// erased objects is. An erased id remembers which object replaced it, if one did, and takes four bytes. References
-/// stay valid until their object is erased. All operations take O(1) where nothing else is said.
-template <std::default_initializable T, class Id>
+/// erased objects is. An erased id remembers which object replaced it, if one did, at least until `remembered` more ids
+/// were given (`no_id`: for ever). References stay valid until their object is erased. All operations take O(1) where
+/// nothing else is said.
+template <std::default_initializable T, class Id, std::uint32_t remembered = no_id>
 class slot_map {
  public:
   static constexpr std::uint32_t most_ids = 0x7fffffffU;
 
   /// Adds an object and returns its id. @pre fewer than `most_ids` ids were given so far
   Id add(T value) {
-    assert(slot_of_.size() < most_ids);
+    assert(slots_.size() < most_ids);
     std::uint32_t slot = static_cast<std::uint32_t>(items_.size());
     if (free_.empty()) {
       items_.push_back(std::move(value));
@@ -35,64 +37,81 @@ class slot_map {
       free_.pop_back();
       items_[slot] = std::move(value);
     }
-    slot_of_.push_back(slot);
+    slots_.push_back(slot);
     return last_id();
   }
 
   /// Adds an id whose object was erased before: for maps that are read from a file.
   /// @pre `replacement` is `no_id`, or the id of an object that will be added
   Id add_erased(Id replacement) {
-    assert(slot_of_.size() < most_ids);
-    slot_of_.push_back(erased | replacement.value());
+    assert(slots_.size() < most_ids);
+    slots_.push_back(paged_slots::erased | replacement.value());
     return last_id();
+  }
+  /// Adds `count` ids whose objects were erased before, and that nothing replaced. O(1) amortised.
+  /// @pre at most `most_ids` ids in all
+  void add_gone(std::uint32_t count) {
+    assert(count <= most_ids - slots_.size());
+    slots_.push_gone(count);
   }
 
   /// Erases an object; `replacement` takes its place. @pre contains(i); replacement is no_id or another contained id
   void erase(Id i, Id replacement = no_id) {
     assert(contains(i) && (replacement == no_id || (replacement != i && contains(replacement))));
-    const std::uint32_t slot = std::exchange(slot_of_[i.value()], erased | replacement.value());
+    const std::uint32_t slot = slots_[i.value()];
+    slots_.erase(i.value(), paged_slots::erased | replacement.value());
     items_[slot] = T{};
     free_.push_back(slot);
   }
 
-  [[nodiscard]] bool contains(Id i) const noexcept {
-    return i.value() < slot_of_.size() && (slot_of_[i.value()] & erased) == 0;
-  }
+  [[nodiscard]] bool contains(Id i) const noexcept { return slots_.contains(i.value()); }
   /// @pre contains(i)
   [[nodiscard]] const T& operator[](Id i) const {
     assert(contains(i));
-    return items_[slot_of_[i.value()]];
+    return items_[slots_[i.value()]];
   }
   [[nodiscard]] T& operator[](Id i) {
     assert(contains(i));
-    return items_[slot_of_[i.value()]];
+    return items_[slots_[i.value()]];
   }
   /// The number of objects.
   [[nodiscard]] std::size_t size() const noexcept { return items_.size() - free_.size(); }
   [[nodiscard]] bool empty() const noexcept { return size() == 0; }
   /// The id that the next object will get.
-  [[nodiscard]] Id end_id() const noexcept { return static_cast<std::uint32_t>(slot_of_.size()); }
+  [[nodiscard]] Id end_id() const noexcept { return slots_.size(); }
+  /// The first id from `i` on that has an object; `end_id()` if there is none. O(erased ids in between), the long
+  /// forgotten ones 256 at once.
+  [[nodiscard]] Id next_id(Id i) const noexcept { return slots_.next_contained(i.value()); }
+  /// The first id from `i` on that has an object or a replacement; `end_id()` if there is none. Cost as `next_id`.
+  [[nodiscard]] Id next_known_id(Id i) const noexcept { return slots_.next_known(i.value()); }
 
   /// `i` itself while its object is there; otherwise the object that replaced it, over all replacements since; `no_id`
-  /// if there is none. O(replacements).
+  /// if there is none, or if that was forgotten. O(replacements).
   [[nodiscard]] Id replacement_of(Id i) const noexcept {
     std::uint32_t at = i.value();
-    while (at < slot_of_.size() && (slot_of_[at] & erased) != 0)
-      at = slot_of_[at] == no_id ? no_id : slot_of_[at] & ~erased;
-    return at < slot_of_.size() ? at : no_id;
+    while (at < slots_.size()) {
+      const std::uint32_t slot = slots_[at];
+      if ((slot & paged_slots::erased) == 0) return at;
+      if (slot == paged_slots::gone) break;
+      at = slot & ~paged_slots::erased;
+    }
+    return no_id;
   }
 
   /// Moves all objects and erased ids of `other` behind those of this one. Returns by how much its ids have grown. Ids
-  /// inside the objects are not changed. O(ids of `other`).
+  /// inside the objects are not changed. O(ids of `other`), the long forgotten ones 256 at once.
   std::uint32_t append(slot_map&& other) {
-    assert(slot_of_.size() + other.slot_of_.size() <= most_ids);
-    const auto offset = static_cast<std::uint32_t>(slot_of_.size());
-    for (const std::uint32_t slot : other.slot_of_) {
-      if ((slot & erased) == 0) {
+    assert(other.slots_.size() <= most_ids - slots_.size());
+    const std::uint32_t offset = slots_.size();
+    for (std::uint32_t i = 0; i != other.slots_.size();) {
+      const std::uint32_t known = other.slots_.next_known(i);
+      slots_.push_gone(known - i);
+      if ((i = known) == other.slots_.size()) break;
+      const std::uint32_t slot = other.slots_[i++];
+      if ((slot & paged_slots::erased) == 0)
         add(std::move(other.items_[slot]));
-      } else {
-        slot_of_.push_back(slot == no_id ? no_id : slot + offset);
-      }
+      else
+        slots_.push_back(slot + offset);
     }
     other = slot_map{};
     return offset;
@@ -124,9 +143,7 @@ class slot_map {
     friend bool operator==(const const_iterator& a, const const_iterator& b) { return a.at_ == b.at_; }
 
    private:
-    void skip() {
-      while (at_ < all_->end_id() && !all_->contains(at_)) ++at_;
-    }
+    void skip() { at_ = all_->next_id(at_); }
     const slot_map* all_ = nullptr;
     Id at_ = 0;
   };
@@ -143,11 +160,9 @@ class slot_map {
   }
 
  private:
-  static constexpr std::uint32_t erased = 0x80000000U;
+  [[nodiscard]] Id last_id() const noexcept { return slots_.size() - 1; }
 
-  [[nodiscard]] Id last_id() const noexcept { return static_cast<std::uint32_t>(slot_of_.size()) - 1; }
-
-  std::vector<std::uint32_t> slot_of_;  ///< by id: index in `items_`; or `erased` with the id of the replacement
+  paged_slots slots_{remembered};  ///< by id: index in `items_`
   std::deque<T> items_;
   std::vector<std::uint32_t> free_;  ///< slots without an object
 };

@@ -115,8 +115,7 @@ void apply(basic_map<D>& m, const snapshot& s, const bundle_solution& solved) {
   for (keyframe_id k = s.end_keyframe; k < m.keyframe_end(); ++k)
     if (m.has_keyframe(k))
       if (const auto T_new_old = motion_of(m, k, s, solved)) m.set_pose(k, *T_new_old * m.at(k).T_world_camera);
-  for (landmark_id l = s.end_landmark; l < m.landmark_end(); ++l) {
-    if (!m.has_landmark(l)) continue;
+  for (landmark_id l = m.next_landmark(s.end_landmark); l != m.landmark_end(); l = m.next_landmark(l + 1)) {
     if (const auto T_new_old = motion_of(m, m.landmark_at(l).created, s, solved)) {
       m.move_landmark(l, sim3(*T_new_old));
       m.update_landmark(l);

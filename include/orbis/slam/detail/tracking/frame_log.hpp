@@ -5,8 +5,8 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <deque>
 #include <map>
-#include <vector>
 
 #include <orbis/core/se3.hpp>
 #include <orbis/core/trajectory.hpp>
@@ -51,7 +51,7 @@ class frame_log {
   }
 
  private:
-  std::vector<logged_frame> frames_;
+  std::deque<logged_frame> frames_;  // grows without moving what is there: no frame waits for it
 };
 
 }  // namespace orbis::slam::detail
