@@ -49,12 +49,13 @@ class renderer {
 
   [[nodiscard]] int tile_rows() const noexcept { return (k_.height + tile - 1) / tile; }
 
-  /// Renders the pixels of one row of tiles into `out`, whose images have the camera's size.
+  /// Renders the pixels of one row of tiles into `out`, whose images have the camera's size; without colours, which are
+  /// a third of the work, if its colour image is empty.
   void render_tile_row(int row, exact_view& out) const {
     render_rows(row * tile, std::min(row * tile + tile, k_.height), out);
   }
 
-  /// Renders the pixels of the rows from `y0` to before `y1`.
+  /// Renders the pixels of the rows from `y0` to before `y1`, as above.
   void render_rows(int y0, int y1, exact_view& out) const {
     std::vector<const candidate*> band, near;
     const double top = (y0 - 0.5 - k_.cy) / k_.fy, bottom = (y1 - 0.5 - k_.cy) / k_.fy;
@@ -132,12 +133,13 @@ class renderer {
       v = h.axis == 2 ? p.y + half.y : p.z + half.z;
       cosine = std::abs(along) / range_per_depth;
     }
+    out.depth(x, y) = static_cast<float>(h.t);
+    out.cosine(x, y) = static_cast<float>(cosine);
+    if (out.color.empty()) return;
     const double footprint = h.t * inverse_fx_ / std::max(cosine, 0.25);
     const std::uint32_t colour = textures_->sample(c.index, face, u, v, footprint);
     out.color(x, y) = {static_cast<std::uint8_t>(colour), static_cast<std::uint8_t>(colour >> 8U),
                        static_cast<std::uint8_t>(colour >> 16U)};
-    out.depth(x, y) = static_cast<float>(h.t);
-    out.cosine(x, y) = static_cast<float>(cosine);
   }
 
   const texture_set* textures_;

@@ -59,10 +59,11 @@ class simulator {
   }
 
   /// The same with row `y` of the image `row_time(y)` seconds after `time`, where `at(time)` is the `moment` of any
-  /// time.
+  /// time; without its colour image if `with_color` is false.
   template <execution_policy Policy, class At, class RowTime>
-  [[nodiscard]] exact_view exact_rows(const Policy& policy, const At& at, double time, const RowTime& row_time) const {
-    exact_view out{image<rgb8>(k_.width, k_.height), image<float>(k_.width, k_.height),
+  [[nodiscard]] exact_view exact_rows(const Policy& policy, const At& at, double time, const RowTime& row_time,
+                                      bool with_color = true) const {
+    exact_view out{with_color ? image<rgb8>(k_.width, k_.height) : image<rgb8>(), image<float>(k_.width, k_.height),
                    image<float>(k_.width, k_.height)};
     for_each_index(policy, static_cast<std::size_t>(k_.height), renderer::tile, [&](std::size_t row) {
       const int y = static_cast<int>(row);
@@ -78,8 +79,8 @@ class simulator {
     exact_view seen = color_view(policy, at, time);
     if (sensor_.motion_blur > 1) blur(policy, at, time, seen.color);
     if (!sensor_.shutter.is_depth_simultaneous()) {
-      exact_view surface =
-          exact_rows(policy, at, time, [&](int y) { return sensor_.shutter.depth_time(y, k_.height); });
+      exact_view surface = exact_rows(
+          policy, at, time, [&](int y) { return sensor_.shutter.depth_time(y, k_.height); }, false);
       seen.depth = std::move(surface.depth);
       seen.cosine = std::move(surface.cosine);
     }
