@@ -83,14 +83,14 @@ template <feature_descriptor D>
   return s;
 }
 
-/// Copies the landmarks among the next `count` ids, with their observations, so that a caller who shares the map can do
-/// it part by part. Keyframes, landmarks and observations may be added in between; they take no part. O(observations).
+/// Copies the next `count` landmarks, with their observations, so that a caller who shares the map can do it part by
+/// part. Keyframes, landmarks and observations may be added in between; they take no part. O(observations).
 template <feature_descriptor D, camera::camera_model Camera>
-void take_landmarks(snapshot& s, const basic_map<D>& m, const camera_rig<Camera>& rig, std::uint32_t count) {
-  const landmark_id end = s.next_landmark + std::min(count, s.end_landmark - s.next_landmark);
-  for (; s.next_landmark != end; ++s.next_landmark) {
-    if (!m.has_landmark(s.next_landmark)) continue;
+void take_landmarks(snapshot& s, const basic_map<D>& m, const camera_rig<Camera>& rig, std::size_t count) {
+  const auto next = [&](landmark_id from) { return std::min(m.next_landmark(from), s.end_landmark); };
+  for (s.next_landmark = next(s.next_landmark); s.has_more() && count != 0; --count) {
     s.add_shared_landmark(m, m.landmark_at(s.next_landmark), rig, [&](keyframe_id k) { return s.index_of(k); });
+    s.next_landmark = next(s.next_landmark + 1);
   }
 }
 
@@ -99,7 +99,7 @@ template <feature_descriptor D, camera::camera_model Camera>
 [[nodiscard]] snapshot take(const basic_map<D>& m, const camera_rig<Camera>& rig,
                             const global_adjustment_options& o = {}) {
   snapshot s = take_keyframes(m, o);
-  take_landmarks(s, m, rig, s.end_landmark.value());
+  take_landmarks(s, m, rig, m.landmark_count());
   return s;
 }
 
