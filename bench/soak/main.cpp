@@ -26,8 +26,10 @@
 #include <utility>
 #include <vector>
 
-#include <malloc.h>
 #include <unistd.h>
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
 
 #include <orbis/camera/any.hpp>
 #include <orbis/io/recording.hpp>
@@ -54,10 +56,14 @@ double resident_megabytes() {
   return 1e-6 * resident * static_cast<double>(sysconf(_SC_PAGESIZE));
 }
 
-/// Megabytes of the heap that are in use: what is kept, without what malloc holds for later.
+/// Megabytes of the heap that are in use: what is kept, without what malloc holds for later. 0 where nobody tells.
 double heap_megabytes() {
+#ifdef __GLIBC__
   const struct mallinfo2 heap = mallinfo2();
   return 1e-6 * static_cast<double>(heap.uordblks + heap.hblkhd);
+#else
+  return 0.0;
+#endif
 }
 
 double part_of(std::vector<double> values, double part) {

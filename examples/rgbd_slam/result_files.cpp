@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
-#include <memory>
 #include <mutex>
 #include <string_view>
 #include <system_error>
@@ -78,10 +77,20 @@ std::optional<identity> identity_of(const fs::path& path) {
   return identity{status.st_dev, status.st_ino};
 }
 
-/// Held while the hidden folders are made, while files are put in place, and while an interrupt removes what is not.
-std::mutex& end_of_run() {
-  static std::mutex& mutex = *new std::mutex;
-  return mutex;
+/// Never destroyed: the thread that waits for signals may use it until the process is gone.
+hidden_folders& hidden() {
+  static hidden_folders& folders = *new hidden_folders;
+  return folders;
+}
+
+/// What an interrupt leaves to be done.
+void remove_hidden_folders() {
+  const std::lock_guard lock{hidden().mutex};
+  std::error_code ignored;
+  // A thread that makes a file at this moment makes the removal fail: it is tried again. Once the folder is gone, no
+  // file can be made in it.
+  for (const fs::path& path : hidden().paths)
+    for (int i = 0; i != 1000 && fs::exists(path, ignored); ++i) fs::remove_all(path, ignored);
 }
 
 }  // namespace
@@ -203,20 +212,11 @@ result<result_files> result_files::begin(const settings& s) {
     if (auto added = add(s.floor_map, {files.floor_name_, picture}, files.floor_folder_); !added)
       return orbis::fail(added.error());
   }
-  const auto temporary = std::make_shared<std::vector<fs::path>>();
-  interrupts::before_end([temporary] {
-    const std::lock_guard lock{end_of_run()};
-    std::error_code ignored;
-    // Again where another thread made a file meanwhile. Without its folder it makes none.
-    for (const fs::path& path : *temporary)
-      for (int i = 0; i != 1000 && fs::exists(path, ignored); ++i) fs::remove_all(path, ignored);
-  });
-  const std::lock_guard lock{end_of_run()};
+  interrupts::before_end(remove_hidden_folders);
   for (place& p : places) {
-    auto folder = staged_folder::open(p.folder, std::move(p.names));
+    auto folder = staged_folder::open(p.folder, std::move(p.names), hidden());
     if (!folder) return orbis::fail(folder.error());
     files.folders_.push_back(*std::move(folder));
-    temporary->push_back(files.folders_.back().path());
   }
   return files;
 }
@@ -225,6 +225,8 @@ result_files::~result_files() {
   if (folders_.empty()) return;
   folders_.clear();
   interrupts::before_end({});
+  const std::lock_guard lock{hidden().mutex};
+  hidden().paths.clear();
 }
 
 file_names result_files::made(const file_names& coming) const {
@@ -244,10 +246,9 @@ file_names result_files::of_earlier_runs(const file_names& made) const {
 }
 
 result<void> result_files::put_in_place() {
-  const std::lock_guard lock{end_of_run()};
   std::vector<staged_folder*> folders;
   for (staged_folder& f : folders_) folders.push_back(&f);
-  return staged_folder::put_in_place(folders);
+  return staged_folder::put_in_place(folders, hidden());
 }
 
 }  // namespace app

@@ -137,7 +137,8 @@ void clear_leftovers(const fs::path& folder, const std::vector<std::string>& nam
 
 }  // namespace
 
-result<staged_folder> staged_folder::open(const fs::path& folder, std::vector<std::string> names) {
+result<staged_folder> staged_folder::open(const fs::path& folder, std::vector<std::string> names,
+                                          hidden_folders& hidden) {
   std::error_code ec;
   fs::create_directories(folder, ec);
   if (ec) return failure(folder, "cannot be made: " + ec.message());
@@ -153,8 +154,10 @@ result<staged_folder> staged_folder::open(const fs::path& folder, std::vector<st
   const folder_lock lock{made.folder_lock_.get()};
   clear_leftovers(made.folder_, made.names_);
   std::string name = (made.folder_ / (std::string{prefix} + "XXXXXX")).string();
+  const std::lock_guard registers{hidden.mutex};
+  hidden.paths.emplace_back();
   if (::mkdtemp(name.data()) == nullptr) return failure(folder, "no file can be made in it: " + reason(errno));
-  made.staging_ = name;
+  made.staging_ = hidden.paths.back() = name;
   made.staging_lock_ = open_folder(made.staging_);
   ::flock(made.staging_lock_.get(), LOCK_EX);
   return made;
@@ -174,7 +177,7 @@ void staged_folder::discard() noexcept {
   staging_.clear();
 }
 
-result<void> staged_folder::put_in_place(std::span<staged_folder* const> folders) {
+result<void> staged_folder::put_in_place(std::span<staged_folder* const> folders, hidden_folders& hidden) {
   // In the order of their numbers, so that two programs never wait for each other.
   std::vector<staged_folder*> ordered(folders.begin(), folders.end());
   const auto number = [](const staged_folder* f) {
@@ -186,6 +189,7 @@ result<void> staged_folder::put_in_place(std::span<staged_folder* const> folders
   std::vector<std::unique_ptr<folder_lock>> locks;
   for (const staged_folder* f : ordered) locks.push_back(std::make_unique<folder_lock>(f->folder_lock_.get()));
 
+  const std::lock_guard stays{hidden.mutex};
   std::error_code ec;
   std::vector<move> moves;
   for (staged_folder* f : folders) {
@@ -197,6 +201,7 @@ result<void> staged_folder::put_in_place(std::span<staged_folder* const> folders
     ::fsync(f->staging_lock_.get());
     fs::rename(f->staging_, marked, ec);
     if (ec) return failure(f->folder_, "the new files cannot be put in place: " + ec.message());
+    std::replace(hidden.paths.begin(), hidden.paths.end(), f->staging_, marked);
     f->staging_ = marked;
     for (move& m : moves_to(f->folder_, marked, f->names_)) {
       m.has_old = m.replaces && ::link(m.to.c_str(), m.old.c_str()) == 0;

@@ -12,6 +12,7 @@
 #pragma once
 
 #include <filesystem>
+#include <mutex>
 #include <span>
 #include <string>
 #include <vector>
@@ -34,12 +35,19 @@ class descriptor {
   int number_ = -1;
 };
 
+/// The hidden folders of this process, for another thread that removes them when the process is interrupted.
+struct hidden_folders {
+  std::mutex mutex;  ///< of the paths; held while a folder is made, and while files are put in place
+  std::vector<std::filesystem::path> paths;
+};
+
 class staged_folder {
  public:
-  /// Makes `folder` where it does not exist, and the hidden folder in it. Finishes or removes what processes that are
-  /// gone have left there. `names`: of the files that may be put in place. Errors: write_failed.
+  /// Makes `folder` where it does not exist, and the hidden folder in it, and adds it to `hidden`. Finishes or removes
+  /// what processes that are gone have left there. `names`: of the files that may be put in place. Errors:
+  /// write_failed.
   [[nodiscard]] static orbis::result<staged_folder> open(const std::filesystem::path& folder,
-                                                         std::vector<std::string> names);
+                                                         std::vector<std::string> names, hidden_folders& hidden);
   staged_folder(staged_folder&&) = default;
   staged_folder& operator=(staged_folder&&) = delete;
   ~staged_folder() { discard(); }
@@ -52,7 +60,9 @@ class staged_folder {
   void discard() noexcept;
 
   /// Puts the files of all folders in place: all of them, or none if an error is returned. Errors: write_failed.
-  [[nodiscard]] static orbis::result<void> put_in_place(std::span<staged_folder* const> folders);
+  /// `hidden`: as for `open`.
+  [[nodiscard]] static orbis::result<void> put_in_place(std::span<staged_folder* const> folders,
+                                                        hidden_folders& hidden);
 
  private:
   staged_folder() = default;

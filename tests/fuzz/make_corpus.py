@@ -441,8 +441,8 @@ def slam_maps():
     slam_map("keypoints_apart", [keyframe([keypoint(0), keypoint(1e30)])], [parent(NONE)], [])
     slam_map("many_keypoints", [keyframe([], count=0xffffffff)], [parent(NONE)], [])
     slam_map("many_observations", three, line, [landmark([(0, 0)], count=0xffffffff)])
-    slam_map("many_keyframes", three, line, seen, sizes(keyframes=0xffffffff))
-    slam_map("many_landmarks", three, line, seen, sizes(landmarks=0xffffffff))
+    slam_map("many_keyframes", three, line, seen, sizes(keyframes=0x7fffffff))
+    slam_map("many_landmarks", three, line, seen, sizes(landmarks=0x10000000))
     slam_map("fewer_landmarks", three, line, seen, sizes(landmarks=2))
     def gone(count):
         return struct.pack("<II", 0xffffffff, count)
@@ -452,11 +452,12 @@ def slam_maps():
 
     slam_map("gone", three, line, seen + [gone(9), landmark([(1, 2)]), landmark(13), gone(1000)], sizes_3(1015), version=3)
     slam_map("gone_ones_one_by_one", three, line, seen + [landmark(NONE), landmark(NONE)], sizes_3(6), version=3)
-    slam_map("all_gone", three, line, [gone(0x7fffffff)], sizes_3(0x7fffffff), version=3)
+    slam_map("all_gone", three, line, [gone(0x10000000)], sizes_3(0x10000000), version=3)
     slam_map("none_gone", three, line, seen + [gone(0)], sizes_3(5), version=3)
     slam_map("too_many_gone", three, line, seen + [gone(7)], sizes_3(10), version=3)
     slam_map("became_gone", three, line, seen + [landmark(5), gone(3)], sizes_3(8), version=3)
-    slam_map("too_many_ids", three, line, [gone(0x80000000)], sizes_3(0x80000000), version=3)
+    slam_map("too_many_ids", three, line, [gone(0x10000001)], sizes_3(0x10000001), version=3)
+    slam_map("too_many_keyframes", three, line, seen, sizes(keyframes=0x80000000))
     slam_map("no_levels", three, line, seen, sizes(levels=0))
     slam_map("scale_factor_1", three, line, seen, sizes(factor=1.0))
     slam_map("all_see_one", [keyframe([keypoint(0)])] * 12, [parent(NONE)] + [parent(0)] * 11,

@@ -161,6 +161,21 @@ TEST_CASE("Erased landmarks take few bytes of a file, in version 2 eight each") 
   CHECK(again->landmark_count() == m.landmark_count());
   CHECK(test::fault_of(*again) == "");
 
+  // With so many that there is no place for them: new ids, and the same map otherwise.
+  content.landmarks.add_gone(slam::detail::most_landmarks_of_file);
+  slam::map full{content};
+  const auto fresh = parsed(slam::map_bytes(full));
+  REQUIRE(fresh.has_value());
+  CHECK(fresh->landmark_end().value() == m.landmark_count());
+  CHECK(fresh->landmark_ids_left() > 7 * slam::detail::most_landmarks_of_file);
+  CHECK(test::fault_of(*fresh) == "");
+  CHECK(fresh->keyframes().size() == m.keyframes().size());
+  auto before = m.landmarks().begin();
+  for (const auto& l : fresh->landmarks()) {
+    REQUIRE(l.position == before->position);
+    REQUIRE(l.observations == before->observations);
+    ++before;
+  }
   // As version 2 wrote it.
   std::string land, older = few;
   std::size_t gone = 0, replaced = 0;

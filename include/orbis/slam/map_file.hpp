@@ -19,11 +19,14 @@
 ///           response (f32), octave (i32), depth (f32), x and y of the ray (f64; NaN without one), descriptor (32
 ///           bytes)
 ///     tree  for each keyframe: parent (id), number of loop edges (u32), their other ends (ids)
-///     land  for each landmark id the number of observations (u32). 0: it was erased; its replacement (id). ffffffff:
-///           it was erased, and nothing replaced it, nor so many ids from it on (u32, at least 1); in versions 1 and 2
-///           the replacement is ffffffff then. Otherwise position, normal (3 f64 each), least and greatest distance (f64), descriptor (32 bytes), keyframe that
-///           created it (id), times visible, times found (u32 each), whether the descriptor is current (a byte), and
-///           the observations: keyframe (id), keypoint (u32)
+///     land  for each landmark id the number of observations (u32). 0: it was erased; the id that replaced it, or none.
+///           ffffffff (version 3): a run of erased ids that nothing replaced; its length (u32, at least 1, this id
+///           included). Otherwise position, normal (3 f64 each), least and greatest distance (f64), descriptor (32
+///           bytes), keyframe that created it (id), times visible, times found (u32 each), whether the descriptor is
+///           current (a byte), and the observations: keyframe (id), keypoint (u32)
+///
+/// A file has at most 2^28 ids of landmarks. A map that gave more is written without those that are erased: its
+/// landmarks have new ids when it is read.
 ///
 /// The covisibility graph and the grids of keypoints are not stored: they follow from the rest.
 #pragma once

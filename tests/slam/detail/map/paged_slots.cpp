@@ -47,6 +47,9 @@ void check(const slots& tested, const plain_slots& plain, std::uint32_t remember
   }
   REQUIRE(contained == tested.size());
   REQUIRE(known == tested.size());
+  std::uint32_t last = tested.size();
+  while (last != 0 && !tested.contains(last - 1)) --last;
+  REQUIRE(tested.last_contained() == (last == 0 ? tested.size() : last - 1));
   REQUIRE_FALSE(tested.contains(tested.size()));
 }
 
@@ -122,6 +125,40 @@ TEST_CASE("What is erased at once is remembered for as many ids as were asked fo
   CHECK(tested[slots::page_size] == 1);
 }
 
+TEST_CASE("What was erased takes next to no memory, and what is there a page at most") {
+  constexpr std::uint32_t remembered = 5000, every = 1000, ids = 3000000;
+  slots tested(remembered);
+  const std::size_t at_first = tested.memory_bytes();
+  for (std::uint32_t i = 0; i != ids; ++i) {
+    tested.push_back(i);
+    if (i >= 300 && (i - 300) % every != 0) tested.erase(i - 300, slots::erased | 1U);
+  }
+  const std::size_t page = slots::page_size * sizeof(std::uint32_t) + 10;
+  // Vectors may be twice as long as what is in them.
+  CHECK(tested.memory_bytes() - at_first < 2 * (page * (ids / every + (remembered + 600) / slots::page_size) + ids / 60));
+  slots all_gone(remembered);
+  for (std::uint32_t i = 0; i != ids; ++i) {
+    all_gone.push_back(i);
+    all_gone.erase(i, slots::gone);
+  }
+  CHECK(all_gone.memory_bytes() < 2 * (page * (remembered / slots::page_size + 2) + ids / 60));
+}
+
+TEST_CASE("What comes from elsewhere is remembered as long as what is erased here") {
+  constexpr std::uint32_t remembered = 1000;
+  slots tested(remembered);
+  tested.adopt(true);
+  for (std::uint32_t i = 0; i != 5000; ++i) tested.push_back(slots::erased | i);
+  tested.adopt(false);
+  for (std::uint32_t i = 0; i != remembered - slots::page_size; ++i) {
+    tested.push_back(i);
+    REQUIRE(tested[0] == slots::erased);
+  }
+  for (std::uint32_t i = 0; i != 2 * slots::page_size; ++i) tested.push_back(i);
+  CHECK(tested[0] == slots::gone);
+  CHECK(tested.last_contained() == tested.size() - 1);
+}
+
 TEST_CASE("Two thousand million ids that are gone are passed over in a moment") {
   slots tested(1000);
   tested.push_back(4);
@@ -131,4 +168,7 @@ TEST_CASE("Two thousand million ids that are gone are passed over in a moment") 
   CHECK(tested.next_known(1) == 2000000001);
   CHECK(tested[2000000001] == 5);
   CHECK(tested[1000000000] == slots::gone);
+  tested.erase(2000000001, slots::gone);
+  CHECK(tested.last_contained() == 0);
+  CHECK(tested.memory_bytes() < 200000);
 }

@@ -123,7 +123,7 @@ TEST_CASE("A store behaves as a map from numbers after any sequence of operation
   CHECK(a.end > 500);
 }
 
-TEST_CASE("A store that need not remember forgets what replaced an object long ago, and takes little memory") {
+TEST_CASE("A store that need not remember forgets what replaced an object long ago") {
   slam::detail::slot_map<int, slam::landmark_id, 1000> all;
   for (int i = 0; i != 5; ++i) all.add(i);
   all.erase(0, 4);
@@ -145,6 +145,15 @@ TEST_CASE("A store that need not remember forgets what replaced an object long a
   CHECK(all.next_id(0) == 2);
   CHECK(all.next_id(5) == all.end_id());
   CHECK(all.next_known_id(0) == 0);
+
+  // What another store has erased is erased here when it is appended.
+  decltype(all) recent;
+  for (int i = 0; i != 5000; ++i) recent.add(i);
+  for (std::uint32_t i = 0; i != 256; ++i) recent.erase(i, 300);
+  decltype(all) into;
+  into.append(std::move(recent));
+  CHECK(into.replacement_of(0) == 300);
+  CHECK(into.back() == 4999);
 
   decltype(all) other;
   other.add_gone(100);

@@ -42,6 +42,8 @@ struct map_content {
   std::map<keyframe_id, erased_keyframe> erased;
 };
 
+/// A map that gave more ids to landmarks is written without those of erased ones, so that it can go on when it is read.
+inline constexpr std::uint32_t most_landmarks_of_file = 1U << 28U;
 /// In a file, instead of a landmark's number of observations: a number of ids follows that are gone.
 inline constexpr std::uint32_t run_of_gone = 0xffffffffU;
 

@@ -59,8 +59,8 @@ class map_reader {
     to_.scale_factor = in.take<double>();
     keyframe_ids_ = in.take<std::uint32_t>();
     landmark_ids_ = in.take<std::uint32_t>();
-    if (constexpr std::uint32_t most = decltype(to_.landmarks)::most_ids; keyframe_ids_ > most || landmark_ids_ > most)
-      return wrong("more ids than there can be");
+    if (keyframe_ids_ > decltype(to_.keyframes)::most_ids || landmark_ids_ > most_landmarks_of_file)
+      return wrong("more ids than a file may have");
     const auto sensor = version_ < 2 ? 0 : in.take<std::uint32_t>();
     if (sensor > static_cast<std::uint32_t>(sensor_kind::monocular))
       return wrong("a sensor of kind " + std::to_string(sensor));
@@ -128,6 +128,7 @@ class map_reader {
   }
 
   bool landmarks(section_reader in) {
+    to_.landmarks.adopt(true);
     for (landmark_id id = 0; id != landmark_ids_; id = to_.landmarks.end_id()) {
       const auto count = in.take<std::uint32_t>();
       const bool is_run = version_ >= 3 && count == run_of_gone;
@@ -135,6 +136,7 @@ class map_reader {
       if (in.ended()) problem = "the section ends within it";
       if (!whole || in.ended()) return wrong("landmark " + to_string(id) + ": " + problem);
     }
+    to_.landmarks.adopt(false);
     for (const auto& [id, replacement] : replacements_)
       if (!to_.landmarks.contains(replacement))
         return wrong("landmark " + to_string(id) + ": became one that is not there");

@@ -47,10 +47,13 @@ inline void put_landmark(std::string& to, const landmark& l) {
 [[nodiscard]] inline std::string write_sections(const map& m) {
   std::string bytes(map_magic);
   put(bytes, map_version);
+  const bool leaves_out_erased = m.landmark_end() > most_landmarks_of_file;
+  const std::uint32_t landmark_ids =
+      leaves_out_erased ? static_cast<std::uint32_t>(m.landmark_count()) : m.landmark_end().value();
   put_section(bytes, "size", [&](std::string& to) {
     const auto& all = m.content();
     put(to, static_cast<std::uint32_t>(all.levels), all.min_shared, all.scale_factor, m.keyframe_end().value(),
-        m.landmark_end().value(), static_cast<std::uint32_t>(all.sensor), std::uint32_t{all.scale_is_known});
+        landmark_ids, static_cast<std::uint32_t>(all.sensor), std::uint32_t{all.scale_is_known});
   });
   put_section(bytes, "kfrm", [&](std::string& to) {
     for (keyframe_id id = 0; id != m.keyframe_end(); ++id) {
@@ -78,12 +81,12 @@ inline void put_landmark(std::string& to, const landmark& l) {
       // Ids that are gone: by pages where the map has forgotten them, one by one where it still knows of them.
       landmark_id next = m.landmarks().next_known_id(id);
       while (next != m.landmark_end() && is_gone(next)) next = m.landmarks().next_known_id(next + 1);
-      if (next != id) put(to, run_of_gone, next - id);
+      if (next != id && !leaves_out_erased) put(to, run_of_gone, next - id);
       if (next == m.landmark_end()) break;
       if (m.has_landmark(next)) {
         put(to, static_cast<std::uint32_t>(m.landmark_at(next).observations.size()));
         put_landmark(to, m.landmark_at(next));
-      } else {
+      } else if (!leaves_out_erased) {
         put(to, std::uint32_t{0}, m.replacement_of(next).value());
       }
       id = next + 1;

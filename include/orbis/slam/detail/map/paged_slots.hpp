@@ -18,18 +18,18 @@ namespace orbis::slam::detail {
 /// with the id that replaced it; or `gone`: erased, and nothing replaced it.
 ///
 /// Numbers are in pages of 256. A page whose ids are all erased is given back when `remembered` more ids were given
-/// since, and its ids are `gone` then: they take 16 bytes for a thousand. So a robot that never stops needs memory for
-/// the objects that are there, not for those that were.
+/// since, and its ids are `gone` then: they take 16 bytes for a thousand. A page with one id that is not erased takes 1
+/// kB. So a robot that never stops needs memory for the objects that are there, and next to none for those that were.
 class paged_slots {
  public:
   static constexpr std::uint32_t erased = 0x80000000U;
   static constexpr std::uint32_t gone = no_id;
   static constexpr std::uint32_t page_size = 256;
 
-  explicit paged_slots(std::uint32_t remembered) noexcept : remembered_{remembered} {}
+  explicit paged_slots(std::uint32_t remembered) : remembered_{remembered} {}
   paged_slots(const paged_slots&) = default;
   /// `other` has no ids afterwards.
-  paged_slots(paged_slots&& other) noexcept : paged_slots{other.remembered_} { swap(other); }
+  paged_slots(paged_slots&& other) : paged_slots{other.remembered_} { swap(other); }
   paged_slots& operator=(paged_slots other) noexcept {
     swap(other);
     return *this;
@@ -71,13 +71,40 @@ class paged_slots {
   }
 
   /// The first id from `i` on that is not erased; `size()` if there is none. O(erased ids in between), but a page that
-  /// was given back takes one step, and so do 256 of them that never were.
+  /// was given back takes one step, as do 65536 ids that were `gone` from the start.
   [[nodiscard]] std::uint32_t next_contained(std::uint32_t i) const noexcept {
     return next(i, [](std::uint32_t slot) { return (slot & erased) == 0; });
   }
   /// The first id from `i` on that is not `gone`; `size()` if there is none. Cost as `next_contained`.
   [[nodiscard]] std::uint32_t next_known(std::uint32_t i) const noexcept {
     return next(i, [](std::uint32_t slot) { return slot != gone; });
+  }
+  /// The last id that is not erased; `size()` if there is none. Cost as `next_contained`.
+  [[nodiscard]] std::uint32_t last_contained() const noexcept {
+    for (std::uint32_t i = size_; i != 0;) {
+      const std::uint32_t at = i - 1;
+      if (page_of(at) == none)
+        i = at - at % (has_chunk(at) ? page_size : chunk_size);
+      else if (contains(at))
+        return at;
+      else
+        --i;
+    }
+    return size_;
+  }
+
+  /// From now on, or no more, ids of another source are added that were erased at times of their own: until the end of
+  /// that nothing is given back, and they count as erased then.
+  void adopt(bool on) noexcept {
+    if (!on)
+      for (; adopted_from_ < retired_.size(); ++adopted_from_) retired_[adopted_from_].since = size_;
+    adopts_ = on;
+    adopted_from_ = retired_.size();
+  }
+  /// Bytes on the heap.
+  [[nodiscard]] std::size_t memory_bytes() const noexcept {
+    return (chunks_.capacity() + pages_.capacity() + slots_.capacity() + free_.capacity()) * sizeof(std::uint32_t) +
+           contained_.capacity() * sizeof(std::uint16_t) + retired_.size() * sizeof(retired_page);
   }
 
  private:
@@ -105,6 +132,8 @@ class paged_slots {
   void swap(paged_slots& other) noexcept {
     std::swap(remembered_, other.remembered_);
     std::swap(size_, other.size_);
+    std::swap(adopts_, other.adopts_);
+    std::swap(adopted_from_, other.adopted_from_);
     chunks_.swap(other.chunks_);
     pages_.swap(other.pages_);
     slots_.swap(other.slots_);
@@ -125,7 +154,7 @@ class paged_slots {
   }
 
   void begin_page() {
-    while (!retired_.empty() && size_ - retired_.front().since >= remembered_) {
+    while (!adopts_ && !retired_.empty() && size_ - retired_.front().since >= remembered_) {
       std::uint32_t& page = pages_[place_of_page(retired_.front().first)];
       free_.push_back(page);
       page = none;
@@ -151,6 +180,8 @@ class paged_slots {
 
   std::uint32_t remembered_;
   std::uint32_t size_ = 0;
+  bool adopts_ = false;
+  std::size_t adopted_from_ = 0;          ///< of `retired_`: where those begin that were erased elsewhere
   std::vector<std::uint32_t> chunks_;     ///< by id / 2^16: which 256 of `pages_`; or `none`
   std::vector<std::uint32_t> pages_;      ///< which page of `slots_`, or `none`, for 256 ids
   std::vector<std::uint32_t> slots_;      ///< page after page

@@ -41,7 +41,10 @@ class slot_map {
     return last_id();
   }
 
-  /// Adds an id whose object was erased before: for maps that are read from a file.
+  /// Between `adopt(true)` and `adopt(false)`: objects and ids of another store are added, as from a file. What was
+  /// erased there counts as erased at the end of that.
+  void adopt(bool on) noexcept { slots_.adopt(on); }
+  /// Adds an id whose object was erased before.
   /// @pre `replacement` is `no_id`, or the id of an object that will be added
   Id add_erased(Id replacement) {
     assert(slots_.size() < most_ids);
@@ -98,11 +101,14 @@ class slot_map {
     return no_id;
   }
 
-  /// Moves all objects and erased ids of `other` behind those of this one. Returns by how much its ids have grown. Ids
-  /// inside the objects are not changed. O(ids of `other`), the long forgotten ones 256 at once.
+  /// Moves all objects and erased ids of `other` behind those of this one, where they count as erased now. Returns by
+  /// how much its ids have grown. Ids inside the objects are not changed.
+  /// @pre at most `most_ids` ids in all. O(ids of `other`), the long forgotten
+  /// ones 256 at once.
   std::uint32_t append(slot_map&& other) {
     assert(other.slots_.size() <= most_ids - slots_.size());
     const std::uint32_t offset = slots_.size();
+    adopt(true);
     for (std::uint32_t i = 0; i != other.slots_.size();) {
       const std::uint32_t known = other.slots_.next_known(i);
       slots_.push_gone(known - i);
@@ -113,6 +119,7 @@ class slot_map {
       else
         slots_.push_back(slot + offset);
     }
+    adopt(false);
     other = slot_map{};
     return offset;
   }
@@ -150,14 +157,10 @@ class slot_map {
 
   [[nodiscard]] const_iterator begin() const { return {*this, 0}; }
   [[nodiscard]] const_iterator end() const { return {*this, end_id()}; }
-  /// The object with the least id. O(erased ids before it). @pre !empty()
+  /// The object with the least id. Cost as `next_id`. @pre !empty()
   [[nodiscard]] const T& front() const { return *begin(); }
-  /// The object with the greatest id. O(erased ids behind it). @pre !empty()
-  [[nodiscard]] const T& back() const {
-    Id last = last_id();
-    while (!contains(last)) last = last - 1U;
-    return (*this)[last];
-  }
+  /// The object with the greatest id. Cost as `next_id`. @pre !empty()
+  [[nodiscard]] const T& back() const { return (*this)[slots_.last_contained()]; }
 
  private:
   [[nodiscard]] Id last_id() const noexcept { return slots_.size() - 1; }

@@ -38,7 +38,8 @@ keyframe_id insert_keyframe(basic_map<D>& m, basic_frame<D> f, const options& o)
   const keyframe_id id = m.add_keyframe(std::move(f));
   for (const landmark_id l : m.at(id).landmarks)
     if (l != no_id) m.update_landmark(l);
-  for (const std::uint32_t i : new_landmark_keypoints<D>(m.at(id), o)) m.add_landmark(id, i);
+  for (const std::uint32_t i : new_landmark_keypoints<D>(m.at(id), o))
+    if (m.landmark_ids_left() != 0) m.add_landmark(id, i);
   return id;
 }
 

@@ -134,7 +134,7 @@ std::size_t triangulate_landmarks(basic_map<D>& m, keyframe_id newest, const cam
     for (const features::match& found : matches) {
       const std::uint32_t i = own.index[found.query], j = others.index[found.train];
       const auto point = pair.point(i, j);
-      if (!point) continue;
+      if (!point || m.landmark_ids_left() == 0) continue;
       const landmark_id l = m.add_landmark(newest, i, *point);
       m.add_observation(l, n.keyframe, j);
       m.update_landmark(l);
