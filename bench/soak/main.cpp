@@ -224,8 +224,9 @@ int soak(const Recording& recording, std::size_t frames) {
       if (memory_then == 0.0 && i >= two_rounds) memory_then = memory_now;
       std::printf("%8zu %6.1f %6.1f %8.1f %6.2f %6.2f %8.1f %8.2f %8.0f %8.1f %10zu %10zu %8zu %6zu\n", i + 1,
                   part_of(tracking, 0.5), part_of(tracking, 0.95), part_of(tracking, 1.0), part_of(waited, 0.5),
-                  part_of(waited, 0.95), part_of(waited, 1.0), hold.take(), memory_now, heap_megabytes(), slam.keyframes().size(),
-                  slam.landmark_count(), map.latest()->map.counts().leaves, lost - lost_before);
+                  part_of(waited, 0.95), part_of(waited, 1.0), hold.take(), memory_now, heap_megabytes(),
+                  slam.keyframes().size(), slam.landmark_count(), map.latest()->map.counts().leaves,
+                  lost - lost_before);
       std::fflush(stdout);
       lost_before = lost;
       tracking.clear();

@@ -135,7 +135,8 @@ TEST_CASE("What was erased takes next to no memory, and what is there a page at 
   }
   const std::size_t page = slots::page_size * sizeof(std::uint32_t) + 10;
   // Vectors may be twice as long as what is in them.
-  CHECK(tested.memory_bytes() - at_first < 2 * (page * (ids / every + (remembered + 600) / slots::page_size) + ids / 60));
+  CHECK(tested.memory_bytes() - at_first <
+        2 * (page * (ids / every + (remembered + 600) / slots::page_size) + ids / 60));
   slots all_gone(remembered);
   for (std::uint32_t i = 0; i != ids; ++i) {
     all_gone.push_back(i);
