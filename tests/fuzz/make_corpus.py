@@ -397,6 +397,9 @@ def slam_maps():
         return (struct.pack("<I8d4Q3IB", count, *position, 0, 0, -1, 0.5, 2.0, 1, 2, 3, 4, created, 2, 1, 1)
                 + b"".join(struct.pack("<II", *o) for o in seen))
 
+    def gone(count):
+        return struct.pack("<II", 0xffffffff, count)
+
     def slam_map(name, keyframes, parents, landmarks, size=None, sections=("size", "kfrm", "tree", "land"), version=1,
                  cut=0, more=b""):
         size = size or struct.pack("<IIdII", 8, 15, 1.2, len(keyframes), len(landmarks))
@@ -406,6 +409,9 @@ def slam_maps():
 
     def sizes(levels=8, shared=15, factor=1.2, keyframes=3, landmarks=4):
         return struct.pack("<IIdII", levels, shared, factor, keyframes, landmarks)
+
+    def sizes_3(landmarks):
+        return sizes(landmarks=landmarks) + struct.pack("<II", 1, 1)
 
     three = [keyframe([keypoint(i, i) for i in range(4)]) for _ in range(3)]
     line = [parent(NONE), parent(0), parent(1)]
@@ -444,12 +450,6 @@ def slam_maps():
     slam_map("many_keyframes", three, line, seen, sizes(keyframes=0x7fffffff))
     slam_map("many_landmarks", three, line, seen, sizes(landmarks=0x10000000))
     slam_map("fewer_landmarks", three, line, seen, sizes(landmarks=2))
-    def gone(count):
-        return struct.pack("<II", 0xffffffff, count)
-
-    def sizes_3(landmarks):
-        return sizes(landmarks=landmarks) + struct.pack("<II", 1, 1)
-
     slam_map("gone", three, line, seen + [gone(9), landmark([(1, 2)]), landmark(13), gone(1000)], sizes_3(1015), version=3)
     slam_map("gone_ones_one_by_one", three, line, seen + [landmark(NONE), landmark(NONE)], sizes_3(6), version=3)
     slam_map("all_gone", three, line, [gone(0x10000000)], sizes_3(0x10000000), version=3)

@@ -176,12 +176,12 @@ TEST_CASE("Erased landmarks take few bytes of a file, in version 2 eight each") 
     REQUIRE(l.observations == before->observations);
     ++before;
   }
+
   // As version 2 wrote it.
   std::string land, older = few;
   std::size_t gone = 0, replaced = 0;
   for (slam::landmark_id id = 0; id != last; ++id)
     if (m.has_landmark(id)) {
-      slam::detail::put(land, static_cast<std::uint32_t>(m.landmark_at(id).observations.size()));
       slam::detail::put_landmark(land, m.landmark_at(id));
     } else {
       ++(m.replacement_of(id) == slam::no_id ? gone : replaced);

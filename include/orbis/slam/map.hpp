@@ -240,7 +240,7 @@ template <feature_descriptor D>
 void basic_map<D>::transform(const sim3& T_new_old) {
   for (keyframe_id k = 0; k != keyframe_end(); ++k)
     if (has_keyframe(k)) move_keyframe(k, T_new_old);
-  for (landmark_id l = next_landmark(0); l != landmark_end(); l = next_landmark(l + 1)) move_landmark(l, T_new_old);
+  for (const landmark_type& l : content_.landmarks) move_landmark(l.id, T_new_old);
   for (auto& [id, e] : content_.erased)
     if (e.replacement == no_id) {
       e.T_replacement_camera = moved(T_new_old, e.T_replacement_camera);

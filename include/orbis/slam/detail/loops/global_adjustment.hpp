@@ -132,13 +132,12 @@ report apply_poses(basic_map<D>& m, const snapshot& s, const bundle_solution& so
   const std::vector<sim3> motion = propagate_motion<D>(m, s.keyframes, poses);
   // Landmarks that take no part move with a keyframe; the others then get their own position.
   std::size_t next = 0;
-  for (landmark_id l = m.next_landmark(0); l != m.landmark_end(); l = m.next_landmark(l + 1)) {
-    while (next != s.landmarks.size() && s.landmarks[next] < l) ++next;
-    const bool adjusted = next != s.landmarks.size() && s.landmarks[next] == l;
-    const auto& seen = m.landmark_at(l);
-    const keyframe_id by = m.has_keyframe(seen.created) ? seen.created : seen.observations.front().keyframe;
-    m.move_landmark(l, motion[by.value()]);
-    if (adjusted) m.set_position(l, solved.points[next]);
+  for (const auto& l : m.landmarks()) {
+    while (next != s.landmarks.size() && s.landmarks[next] < l.id) ++next;
+    const bool adjusted = next != s.landmarks.size() && s.landmarks[next] == l.id;
+    const keyframe_id by = m.has_keyframe(l.created) ? l.created : l.observations.front().keyframe;
+    m.move_landmark(l.id, motion[by.value()]);
+    if (adjusted) m.set_position(l.id, solved.points[next]);
   }
   for (keyframe_id k = 0; k != m.keyframe_end(); ++k)
     if (m.has_keyframe(k)) m.move_keyframe(k, motion[k.value()]);

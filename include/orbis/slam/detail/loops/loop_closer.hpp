@@ -85,12 +85,13 @@ class loop_closer {
 
   /// Updates all landmarks of a map.
   void update(map_id id, effort& by) {
-    const auto is_behind_all = [&](landmark_id& at) {
+    landmark_id at = 0;
+    const auto has_more_after_some = [&] {
       auto& m = shared_.atlas.at(id);
       at = update_landmarks(m, at, at_once);
-      return at == m.landmark_end();
+      return at != m.landmark_end();
     };
-    for (landmark_id at = 0; !locked(by, [&] { return is_behind_all(at); });) {
+    while (locked(by, has_more_after_some)) {
     }
   }
   void fuse(map_id id, std::span<const loop_fusion::pair> pairs, const id_offsets& offsets, effort& by) {

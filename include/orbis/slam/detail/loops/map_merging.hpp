@@ -46,7 +46,7 @@ struct solution {
   std::vector<loop_fusion::pair> pairs;
 };
 
-/// Whether the maps and keyframes of a match are there.
+/// Whether the maps and keyframes of a match are there, and ids are left for the landmarks of both.
 template <feature_descriptor D>
 [[nodiscard]] bool is_possible(const basic_atlas<D>& maps, map_id from, map_id into, const loop_match& match) {
   return from != into && maps.has({from, match.keyframe}) && maps.has({into, match.candidate}) &&

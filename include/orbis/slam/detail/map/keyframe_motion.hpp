@@ -22,8 +22,7 @@ namespace orbis::slam::detail {
 template <feature_descriptor D>
 void move_all(basic_map<D>& m, std::span<const sim3> T_new_old) {
   assert(T_new_old.size() == m.keyframe_end().value());
-  for (landmark_id l = m.next_landmark(0); l != m.landmark_end(); l = m.next_landmark(l + 1))
-    m.move_landmark(l, T_new_old[m.landmark_at(l).observations.front().keyframe.value()]);
+  for (const auto& l : m.landmarks()) m.move_landmark(l.id, T_new_old[l.observations.front().keyframe.value()]);
   for (keyframe_id k = 0; k != m.keyframe_end(); ++k)
     if (m.has_keyframe(k)) m.move_keyframe(k, T_new_old[k.value()]);
 }

@@ -36,6 +36,7 @@ inline void put_keyframe(std::string& to, const keyframe& k) {
 }
 
 inline void put_landmark(std::string& to, const landmark& l) {
+  put(to, static_cast<std::uint32_t>(l.observations.size()));
   for (const vec3& v : {l.position, l.normal}) put(to, v.x(), v.y(), v.z());
   put(to, l.min_distance, l.max_distance);
   put_descriptor(to, l.descriptor);
@@ -76,19 +77,21 @@ inline void put_landmark(std::string& to, const landmark& l) {
     }
   });
   put_section(bytes, "land", [&](std::string& to) {
+    if (leaves_out_erased) {
+      for (const landmark& l : m.landmarks()) put_landmark(to, l);
+      return;
+    }
     const auto is_gone = [&m](landmark_id id) { return m.replacement_of(id) == no_id; };
     for (landmark_id id = 0; id != m.landmark_end();) {
       // Ids that are gone: by pages where the map has forgotten them, one by one where it still knows of them.
       landmark_id next = m.landmarks().next_known_id(id);
       while (next != m.landmark_end() && is_gone(next)) next = m.landmarks().next_known_id(next + 1);
-      if (next != id && !leaves_out_erased) put(to, run_of_gone, next - id);
+      if (next != id) put(to, run_of_gone, next - id);
       if (next == m.landmark_end()) break;
-      if (m.has_landmark(next)) {
-        put(to, static_cast<std::uint32_t>(m.landmark_at(next).observations.size()));
+      if (m.has_landmark(next))
         put_landmark(to, m.landmark_at(next));
-      } else if (!leaves_out_erased) {
+      else
         put(to, std::uint32_t{0}, m.replacement_of(next).value());
-      }
       id = next + 1;
     }
   });

@@ -102,9 +102,8 @@ class slot_map {
   }
 
   /// Moves all objects and erased ids of `other` behind those of this one, where they count as erased now. Returns by
-  /// how much its ids have grown. Ids inside the objects are not changed.
-  /// @pre at most `most_ids` ids in all. O(ids of `other`), the long forgotten
-  /// ones 256 at once.
+  /// how much its ids have grown. Ids inside the objects are not changed. O(ids of `other`), the long forgotten ones
+  /// 256 at once. @pre at most `most_ids` ids in all
   std::uint32_t append(slot_map&& other) {
     assert(other.slots_.size() <= most_ids - slots_.size());
     const std::uint32_t offset = slots_.size();
