@@ -179,6 +179,7 @@ int soak(const Recording& recording, std::size_t frames) {
   };
   slam::options settings;
   settings.threads = {.enabled = true, .wait = true};
+  settings.trajectory_frames = 5000;  // three minutes
   longest_hold hold;
   slam::rgbd_system<camera::any_camera> slam{camera.model, settings};
 

@@ -212,6 +212,24 @@ TEST_CASE("Two runs over the same frames give the same bytes") {
   }
 }
 
+TEST_CASE("A trajectory of the latest frames is the end of that of all frames") {
+  const auto& [camera, recorded] = small_room();
+  slam::options few;
+  few.trajectory_frames = 5;
+  test::slam_system all{camera}, latest{camera, few};
+  for (std::size_t i = 0; i < 15; ++i) {
+    all.track(recorded[i]);
+    latest.track(recorded[i]);
+    const auto expected = all.trajectory(), found = latest.trajectory();
+    REQUIRE(found.size() == std::min<std::size_t>(i + 1, 5));
+    for (std::size_t k = 0; k < found.size(); ++k) {
+      const stamped_pose& same = expected[expected.size() - found.size() + k];
+      CHECK(found[k].timestamp == same.timestamp);
+      CHECK(found[k].T_world_camera.to_matrix() == same.T_world_camera.to_matrix());
+    }
+  }
+}
+
 TEST_CASE("In the dark tracking is lost and comes back with the light") {
   const auto& [camera, recorded] = small_room();
   test::slam_system slam{camera, slam::options{}};

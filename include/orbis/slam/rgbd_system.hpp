@@ -135,7 +135,8 @@ class rgbd_system {
   /// Waits until the threads have nothing to do.
   void wait() const;
 
-  /// Poses of all frames that were tracked in the active map. Frames follow later corrections of their keyframe.
+  /// Poses of all frames that were tracked in the active map, or of the latest (`options::trajectory_frames`). Frames
+  /// follow later corrections of their keyframe.
   /// O(frames).
   [[nodiscard]] orbis::trajectory trajectory() const;
   /// As above, of another map; empty if there is no such map.

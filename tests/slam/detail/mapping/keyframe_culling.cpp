@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <cstddef>
 #include <cstdint>
-#include <utility>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include <orbis/core/random.hpp>
@@ -82,8 +82,12 @@ TEST_CASE("Redundant neighbours go as long as they are redundant, but those that
 
   CHECK(slam::detail::cull_keyframes(kept, 7, close_depth, {}, [](slam::keyframe_id k) { return k != 6; }) ==
         std::vector<slam::keyframe_id>{6});
-  looped.add_loop_edge(0, 2);
-  CHECK(slam::detail::cull_keyframes(looped, 7, close_depth, {}) == std::vector<slam::keyframe_id>{1, 3, 4, 5});
+  // Loop edges keep none, and pass to the replacement: one between 2 and 6 is one between 0 and 6.
+  looped.add_loop_edge(2, 6);
+  CHECK(slam::detail::cull_keyframes(looped, 7, close_depth, {}) == erased);
+  CHECK(looped.replacement_of(slam::keyframe_id{2}) == 0);
+  CHECK(looped.tree().loop_edges(0) == std::vector<slam::keyframe_id>{6});
+  CHECK(looped.tree().loop_edges(6) == std::vector<slam::keyframe_id>{0});
   CHECK(test::fault_of(looped) == "");
 }
 

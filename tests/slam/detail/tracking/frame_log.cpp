@@ -44,3 +44,20 @@ TEST_CASE("Frames follow their keyframe, through erasing and merging, and are li
   CHECK((log.trajectory(maps, first)[1].T_world_camera.inverse() * moved * before).log().norm() < 1e-9);
   CHECK(log.trajectory(maps, second).empty());
 }
+
+TEST_CASE("Frames are forgotten in order where only the latest are kept") {
+  random_bits random(4);
+  slam::atlas maps(8, 1.2);
+  const slam::map_id map = maps.active_id();
+  test::add_random_keyframe(random, maps.active(), 30, 20);
+  slam::detail::frame_log none(0), two(2);
+  for (int i = 0; i < 4; ++i) {
+    none.add({1.0 * i, {map, 0}, {}});
+    two.add({1.0 * i, {map, 0}, {}});
+  }
+  CHECK(none.trajectory(maps, map).empty());
+  const auto left = two.trajectory(maps, map);
+  REQUIRE(left.size() == 2);
+  CHECK(left[0].timestamp == 2.0);
+  CHECK(left[1].timestamp == 3.0);
+}

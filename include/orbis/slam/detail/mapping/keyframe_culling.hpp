@@ -42,15 +42,16 @@ struct keep_none {
 };
 
 /// Erases the redundant neighbours of keyframe `newest`, the strongest first; each is judged after the ones before it
-/// were erased. Kept are the root, keyframes with loop edges, and those for which `keep(id)` is true. Returns the
-/// erased ones.
+/// were erased. Kept are the root and those for which `keep(id)` is true. Loop edges keep no keyframe, as ORB-SLAM has
+/// it, but pass to its replacement: a map that closes loops for days does not grow by two keyframes each time. Returns
+/// the erased ones.
 template <feature_descriptor D, std::predicate<keyframe_id> Keep = keep_none>
 std::vector<keyframe_id> cull_keyframes(basic_map<D>& m, keyframe_id newest, double close_depth,
                                         const culling_options& o, Keep&& keep = {}) {
   std::vector<keyframe_id> erased;
   for (const covisible& n : m.covisibility().neighbors(newest, o.neighborhood)) {
     const keyframe_id k = n.keyframe;
-    if (k == m.tree().root() || !m.tree().loop_edges(k).empty() || keep(k)) continue;
+    if (k == m.tree().root() || keep(k)) continue;
     if (!is_redundant(m, k, close_depth, o)) continue;
     m.erase_keyframe(k);
     erased.push_back(k);

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The tracked frames, each relative to a keyframe, so that they follow later corrections.
+/// The tracked frames, all or the latest, each relative to a keyframe, so that they follow later corrections.
 #pragma once
 
 #include <algorithm>
 #include <cstddef>
 #include <deque>
+#include <limits>
 #include <map>
 
 #include <orbis/core/se3.hpp>
@@ -23,7 +24,14 @@ struct logged_frame {
 
 class frame_log {
  public:
-  void add(const logged_frame& f) { frames_.push_back(f); }
+  frame_log() = default;
+  /// Keeps the latest frames, at most so many.
+  explicit frame_log(std::size_t most) : most_{most} {}
+
+  void add(const logged_frame& f) {
+    frames_.push_back(f);
+    if (frames_.size() > most_) frames_.pop_front();
+  }
 
   /// The present poses of the frames that were tracked in a map, or in one that was merged into it. Empty if there is
   /// no such map. O(frames).
@@ -51,6 +59,7 @@ class frame_log {
   }
 
  private:
+  std::size_t most_ = std::numeric_limits<std::size_t>::max();
   std::deque<logged_frame> frames_;  // grows without moving what is there: no frame waits for it
 };
 

@@ -80,7 +80,7 @@ class front_end {
   }
   /// Counts over all frames; those of mapping are not filled in.
   [[nodiscard]] const track_counters& counters() const noexcept { return counters_; }
-  /// All tracked frames.
+  /// The tracked frames, the latest `options::trajectory_frames`.
   [[nodiscard]] const frame_log& log() const noexcept { return log_; }
   [[nodiscard]] double last_timestamp() const noexcept { return last_.timestamp; }
   /// The present pose of the last tracked frame: later corrections of its keyframe move it.
@@ -215,7 +215,8 @@ front_end<Camera, D, Matchers, Sensor>::front_end(const camera_rig<Camera>& rig,
       start_{rig, settings.start, settings.seed},
       rig_{rig},
       options_{settings},
-      shutter_{settings.shutter} {
+      shutter_{settings.shutter},
+      log_{settings.trajectory_frames} {
   if (settings.estimates_shutter) observer_.emplace();
 }
 
