@@ -25,11 +25,13 @@ using calibration = orbis::slam::calibration<any_camera>;
 struct refined {
   calibration camera;
   orbis::trajectory trajectory;
+  std::optional<lens_doubt> doubt;
 };
 
 /// Tracks all frames with `model` and refines it by the map, the largest one if tracking was lost in between.
 orbis::result<refined> refine(const any_camera& model, const frame_source& source, const settings& s,
-                              const orbis::camera::shutter& shutter, double longest, console& console) {
+                              const orbis::camera::shutter& shutter, const calibration_effort& effort,
+                              console& console) {
   orbis::slam::options options = slam_options(model, source.camera.baseline);
   options.shutter = shutter;
   orbis::slam::rgbd_system<any_camera> slam{model, options};
@@ -39,7 +41,7 @@ orbis::result<refined> refine(const any_camera& model, const frame_source& sourc
     const auto frame = frames.next();
     if (!frame) return orbis::fail(frame.error());
     if (!begin) begin = frame->timestamp;
-    if (frame->timestamp - *begin > longest) break;
+    if (frame->timestamp - *begin > effort.longest) break;
     slam.track(*frame);
     console.advance(i + 1, source.frames, "tracking");
   }
@@ -50,7 +52,10 @@ orbis::result<refined> refine(const any_camera& model, const frame_source& sourc
     return orbis::slam::calibrate(maps.at(map), orbis::slam::make_rig(model, options), {}, console.progress());
   });
   if (!found) return orbis::fail(orbis::errc::degenerate, s.input.string(), found.error().message);
-  return refined{*found, std::move(poses)};
+  std::optional<lens_doubt> doubt;
+  if (effort.checks_lens)
+    doubt = slam.inspect([&](const orbis::slam::atlas& maps) { return find_lens_doubt(maps.at(map), model, options); });
+  return refined{*found, std::move(poses), doubt};
 }
 
 /// The parameters of a camera by their names.
@@ -103,10 +108,11 @@ orbis::result<calibration_rounds> calibrate_by(const frame_source& source, const
   calibration_rounds rounds;
   for (int round = 1; round <= effort.most_rounds && !(round > 1 && is_settled(rounds.last, 1.0)); ++round) {
     console.stage("calibrating");
-    auto next = refine(camera, source, s, shutter, effort.longest, console);
+    auto next = refine(camera, source, s, shutter, effort, console);
     if (!next) return orbis::fail(next.error());
     rounds.last = std::move(next->camera);
     rounds.trajectory = std::move(next->trajectory);
+    rounds.doubt = next->doubt;
     rounds.last.camera = camera = with_what_was_given(rounds.last, given_values);
     char text[160];
     std::snprintf(text, sizeof text, "round %d: %zu keyframes, %zu observations, their error %.3f -> %.3f deviations",

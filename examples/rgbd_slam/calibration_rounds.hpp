@@ -4,6 +4,7 @@
 #pragma once
 
 #include <limits>
+#include <optional>
 #include <vector>
 
 #include <orbis/camera/any.hpp>
@@ -12,6 +13,7 @@
 #include <orbis/core/trajectory.hpp>
 #include <orbis/slam/calibration.hpp>
 
+#include "camera_check.hpp"
 #include "console.hpp"
 #include "settings.hpp"
 #include "source.hpp"
@@ -22,11 +24,13 @@ struct calibration_rounds {
   orbis::slam::calibration<orbis::camera::any_camera> last;   ///< the last round; what was held has the values given
   std::vector<orbis::slam::calibrated_parameter> parameters;  ///< over all rounds: `before` is what was given
   orbis::trajectory trajectory;                               ///< of the last round
+  std::optional<lens_doubt> doubt;                            ///< likewise
 };
 
 struct calibration_effort {
   int most_rounds = 5;
   double longest = std::numeric_limits<double>::infinity();  ///< of the recording, seconds
+  bool checks_lens = false;                                  ///< asks for `calibration_rounds::doubt`
 };
 
 /// Rounds until nothing changes. Errors: frames that cannot be read, no_data if tracking never starts,

@@ -7,6 +7,23 @@
 #include <cstdio>
 
 namespace app {
+namespace {
+
+// A focal length makes up for a lens that bends, to some extent: images that such a lens explains better, or that do
+// not tell, say little about the focal length.
+constexpr double somewhat = 0.98, clearly = 0.95;  // of the error
+
+auto calibrate_small(const orbis::slam::map& map, const orbis::camera::any_camera& camera,
+                     const orbis::slam::options& options) {
+  return orbis::slam::calibrate(map, orbis::slam::make_rig(camera, options), {.max_keyframes = 60});
+}
+
+double focal_of(const orbis::slam::calibration_summary& found) {
+  const auto fx = std::ranges::find(found.parameters, "fx", &orbis::slam::calibrated_parameter::name);
+  return fx != found.parameters.end() ? fx->after : 0.0;
+}
+
+}  // namespace
 
 orbis::camera::any_camera with_lens(const orbis::camera::any_camera& camera) {
   const auto* const plain = camera.get_if<orbis::camera::pinhole>();
@@ -28,19 +45,31 @@ std::optional<focal_doubt> find_doubt(const orbis::slam::map& map, const orbis::
                                       const orbis::slam::options& options) {
   constexpr std::size_t few = 8;  // keyframes
   if (map.keyframes().size() < few) return std::nullopt;
-  const auto calibrate_as = [&](const orbis::camera::any_camera& model) {
-    return orbis::slam::calibrate(map, orbis::slam::make_rig(model, options), {.max_keyframes = 60});
-  };
-  const auto as_given = calibrate_as(camera);
+  const auto as_given = calibrate_small(map, camera, options);
   auto doubt = as_given ? find_doubt(as_given->parameters) : std::nullopt;
   if (!doubt || camera.get_if<orbis::camera::pinhole>() == nullptr) return doubt;
-  // A focal length makes up for a lens that bends, to some extent: images that such a lens explains better, or that do
-  // not tell, say little about the focal length.
-  constexpr double somewhat = 0.98, clearly = 0.95;  // of the error
-  const auto bent = calibrate_as(with_lens(camera));
+  const auto bent = calibrate_small(map, with_lens(camera), options);
   if (!bent || !bent->is_complete() || bent->final_rms < clearly * as_given->final_rms) return std::nullopt;
   doubt->is_sure = bent->final_rms >= somewhat * as_given->final_rms;
   return doubt;
+}
+
+std::optional<lens_doubt> find_lens_doubt(const orbis::slam::map& map, const orbis::camera::any_camera& camera,
+                                          const orbis::slam::options& options) {
+  if (camera.get_if<orbis::camera::pinhole>() == nullptr) return std::nullopt;
+  const auto plain = calibrate_small(map, camera, options), bent = calibrate_small(map, with_lens(camera), options);
+  if (!plain || !bent || !bent->is_complete() || bent->final_rms >= somewhat * plain->final_rms) return std::nullopt;
+  return lens_doubt{focal_of(*plain), focal_of(*bent), plain->final_rms, bent->final_rms};
+}
+
+std::string in_words(const lens_doubt& doubt) {
+  char text[240];
+  std::snprintf(
+      text, sizeof text,
+      "a lens with distortion explains the images better (their error is %.3f instead of %.3f deviations), and "
+      "its focal length would be %.0f instead of %.0f pixels: see --distortion",
+      doubt.lens_rms, doubt.pinhole_rms, doubt.lens_focal, doubt.pinhole_focal);
+  return text;
 }
 
 std::string in_words(const focal_doubt& doubt) {

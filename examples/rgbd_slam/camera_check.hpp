@@ -23,6 +23,12 @@ struct focal_doubt {
 /// The camera; a pinhole with a lens without distortion, which can be estimated.
 [[nodiscard]] orbis::camera::any_camera with_lens(const orbis::camera::any_camera& camera);
 
+/// That a lens with distortion explains the images better than a pinhole does, each with its own focal length.
+struct lens_doubt {
+  double pinhole_focal, lens_focal;  ///< pixels
+  double pinhole_rms, lens_rms;      ///< of the images' errors, standard deviations
+};
+
 /// Of the parameters that a calibration found; empty where it does not tell, as where one was held.
 [[nodiscard]] std::optional<focal_doubt> find_doubt(std::span<const orbis::slam::calibrated_parameter> found);
 /// Of a map made with the camera. Poses of a wrong camera are some percent too near to each other or too far apart, but
@@ -31,7 +37,13 @@ struct focal_doubt {
 [[nodiscard]] std::optional<focal_doubt> find_doubt(const orbis::slam::map& map,
                                                     const orbis::camera::any_camera& camera,
                                                     const orbis::slam::options& options);
+/// Of a map made with the camera; empty where the camera is no pinhole, or where the images do not tell. Two small
+/// self-calibrations.
+[[nodiscard]] std::optional<lens_doubt> find_lens_doubt(const orbis::slam::map& map,
+                                                        const orbis::camera::any_camera& camera,
+                                                        const orbis::slam::options& options);
 /// What the user should know.
 [[nodiscard]] std::string in_words(const focal_doubt& doubt);
+[[nodiscard]] std::string in_words(const lens_doubt& doubt);
 
 }  // namespace app

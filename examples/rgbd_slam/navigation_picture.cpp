@@ -19,6 +19,11 @@ using orbis::vec3;
 using orbis::octree::occupancy;
 
 constexpr rgb8 dark{28, 32, 40}, nothing{205, 206, 208};
+constexpr rgb8 white{255, 255, 255}, costly{250, 190, 140}, too_near{235, 150, 120};  // of the floor
+constexpr rgb8 at_obstacle{120, 60, 140}, far_off{235, 245, 250};                     // of the slice
+const cv::Scalar start_color{22, 140, 80};
+
+cv::Scalar on_sheet(rgb8 c) { return {static_cast<double>(c.r), static_cast<double>(c.g), static_cast<double>(c.b)}; }
 
 rgb8 mixed(rgb8 a, rgb8 b, double t) {
   const auto byte = [&](std::uint8_t u, std::uint8_t v) {
@@ -31,10 +36,16 @@ rgb8 cost_color(std::uint8_t cost) {
   namespace cost_of = orbis::nav::floor_cost;
   if (cost == cost_of::lethal) return dark;
   if (cost == cost_of::no_information) return nothing;
-  if (cost == cost_of::inscribed) return {235, 150, 120};
-  return mixed({255, 255, 255}, {250, 190, 140}, cost / 252.0);
+  if (cost == cost_of::inscribed) return too_near;
+  return mixed(white, costly, cost / 252.0);
 }
-rgb8 distance_color(double share) { return mixed({120, 60, 140}, {235, 245, 250}, std::sqrt(std::max(0.0, share))); }
+rgb8 distance_color(double share) { return mixed(at_obstacle, far_off, std::sqrt(std::max(0.0, share))); }
+
+/// Of a colour, in a legend.
+struct meaning {
+  cv::Scalar color;
+  std::string text;
+};
 
 /// What is seen from above, metres.
 struct window {
@@ -98,10 +109,11 @@ orbis::result<void> write_navigation_picture(const navigation_picture& what, con
   const int width = std::max(1, static_cast<int>(scale * size.x())),
             height = std::max(1, static_cast<int>(scale * size.y()));
 
-  sheet s{1500, static_cast<int>(top) + height + 60};
+  sheet s{1500, static_cast<int>(top) + height + 90};
   s.text(what.title, {60, 44}, ink, 19, 0.0, true);
   s.text(what.subtitle, {60, 70}, faint, 13);
-  const auto panel = [&](double x, const std::string& title, const orbis::image<rgb8>& picture, bool has_path) {
+  const auto panel = [&](double x, const std::string& title, const orbis::image<rgb8>& picture, bool has_path,
+                         const std::vector<meaning>& colors) {
     axes a{s,
            x,
            top,
@@ -112,24 +124,33 @@ orbis::result<void> write_navigation_picture(const navigation_picture& what, con
            false};
     a.frame(title, "x, m", "y, m");
     s.paste(picture, static_cast<int>(x), static_cast<int>(top));
+    vec2 entry{x, top + height + 66};
+    for (const meaning& m : colors) entry = s.legend(entry, m.color, m.text);
+    s.legend(s.legend(entry, on_sheet(dark), "occupied"), on_sheet(nothing), "unknown");
     if (!has_path || what.path.empty()) return;
+    s.legend(s.legend(s.legend({x, entry.y() + 20}, start_color, "start"), error_color, "goal"), estimate_color,
+             "path");
     std::vector<vec2> way;
     for (const vec3& p : what.path) way.emplace_back(p.x(), p.y());
     a.curve(way, estimate_color, 2.4);
-    s.dot(a.place(way.front().x(), way.front().y()), {22, 140, 80}, 5.0);
+    s.dot(a.place(way.front().x(), way.front().y()), start_color, 5.0);
     s.dot(a.place(way.back().x(), way.back().y()), error_color, 5.0);
   };
   char text[160];
   double x = panels == 1 ? 0.5 * (1500 - width) : left;
   if (what.floor != nullptr) {
-    std::snprintf(text, sizeof text, "floor at %.2f m: free, costs, occupied, unknown", what.floor->floor);
-    panel(x, text, draw_floor(what, w, width, height), what.field == nullptr);
+    std::snprintf(text, sizeof text, "floor at %.2f m", what.floor->floor);
+    panel(x, text, draw_floor(what, w, width, height), what.field == nullptr,
+          {{on_sheet(white), "free"},
+           {on_sheet(costly), "near an obstacle"},
+           {on_sheet(too_near), "too near for the robot"}});
     x += most_across + gap;
   }
   if (what.field != nullptr) {
     std::snprintf(text, sizeof text, "distance to obstacles at a height of %.2f m, 0 to %.1f m", what.height,
                   what.field->reach());
-    panel(x, text, draw_slice(what, w, width, height), true);
+    panel(x, text, draw_slice(what, w, width, height), true,
+          {{on_sheet(at_obstacle), "at an obstacle"}, {on_sheet(far_off), "far from any"}});
   }
   return s.write(path);
 }

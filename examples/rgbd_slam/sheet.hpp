@@ -40,12 +40,18 @@ class sheet {
   /// `align`: 0 the text begins at `p`, 0.5 it is centred there, 1 it ends there.
   void text(const std::string& what, const orbis::vec2& p, const cv::Scalar& color = ink, double size = 13.0,
             double align = 0.0, bool bold = false) {
-    const double scale = size * zoom / 30.0;
-    const int thickness = bold ? 3 : 2;
-    int below = 0;
-    const cv::Size extent = cv::getTextSize(what, cv::FONT_HERSHEY_SIMPLEX, scale, thickness, &below);
-    const cv::Point from(static_cast<int>(p.x() * zoom - align * extent.width), static_cast<int>(p.y() * zoom));
-    cv::putText(pixels_, what, from, cv::FONT_HERSHEY_SIMPLEX, scale, color, thickness, cv::LINE_AA);
+    const cv::Point from(static_cast<int>((p.x() - align * width_of(what, size, bold)) * zoom),
+                         static_cast<int>(p.y() * zoom));
+    cv::putText(pixels_, what, from, cv::FONT_HERSHEY_SIMPLEX, scale_of(size), color, thickness_of(bold), cv::LINE_AA);
+  }
+  /// An entry of a legend, which begins at `p`. Returns where the next one does.
+  orbis::vec2 legend(const orbis::vec2& p, const cv::Scalar& color, const std::string& meaning) {
+    constexpr double radius = 5.0, size = 11.5, to_text = 16.0, apart = 20.0;
+    const orbis::vec2 middle = p + orbis::vec2(radius, -4.0);
+    dot(middle, faint, radius + 0.5);  // the rim of what is nearly white
+    dot(middle, color, radius);
+    text(meaning, p + orbis::vec2(to_text, 0.0), ink, size);
+    return p + orbis::vec2(to_text + width_of(meaning, size) + apart, 0.0);
   }
   void paste(const orbis::image<orbis::rgb8>& picture, int x, int y) {
     const cv::Mat from(picture.height(), picture.width(), CV_8UC3,
@@ -61,6 +67,13 @@ class sheet {
   }
 
  private:
+  static double scale_of(double size) { return size * zoom / 30.0; }
+  static int thickness_of(bool bold) { return bold ? 3 : 2; }
+  static double width_of(const std::string& what, double size, bool bold = false) {
+    int below = 0;
+    const cv::Size extent = cv::getTextSize(what, cv::FONT_HERSHEY_SIMPLEX, scale_of(size), thickness_of(bold), &below);
+    return static_cast<double>(extent.width) / zoom;
+  }
   static cv::Point at(const orbis::vec2& p) {  // with four fractional bits
     return {static_cast<int>(std::lround(p.x() * zoom * 16)), static_cast<int>(std::lround(p.y() * zoom * 16))};
   }
