@@ -87,7 +87,7 @@ exit_code calibrate(const settings& s, console& console) {
   orbis::camera::camera_settings camera = source->camera;
   if (s.distortion) camera.model = with_lens(camera.model);
   const shutter_results shutter = find_shutter(*source, s, false, console).shutter;
-  const auto found = calibrate_by(*source, s, shutter.shutter, camera.model, {.checks_lens = true}, console);
+  const auto found = calibrate_by(*source, s, shutter.shutter, camera.model, {.compares_lens = true}, console);
   if (!found) return give_up(found.error());
   const auto is_held_distortion = [](const calibrated_parameter& p) { return p.name == "k1" && p.is_held; };
   if (s.distortion && std::ranges::any_of(found->parameters, is_held_distortion))
@@ -108,7 +108,9 @@ exit_code calibrate(const settings& s, console& console) {
             printed;
   if (!found->last.is_complete())
     console.warn("what was kept needs more motion: turn the camera about all axes, near and far from textured things");
-  if (found->doubt) console.warn(in_words(*found->doubt));
+  const auto& lens = found->lens;
+  if (lens && (lens->has_distortion() || (!lens->is_determined && find_doubt(found->parameters))))
+    console.warn(in_words(*lens));
   camera = with_shutter(std::move(camera), shutter);
   if (!s.out.empty()) {
     if (const auto written = orbis::io::write_camera(s.out, camera); !written) return give_up(written.error());

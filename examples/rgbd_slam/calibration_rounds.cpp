@@ -25,7 +25,7 @@ using calibration = orbis::slam::calibration<any_camera>;
 struct refined {
   calibration camera;
   orbis::trajectory trajectory;
-  std::optional<lens_doubt> doubt;
+  std::optional<lens_comparison> lens;
 };
 
 /// Tracks all frames with `model` and refines it by the map, the largest one if tracking was lost in between.
@@ -52,10 +52,10 @@ orbis::result<refined> refine(const any_camera& model, const frame_source& sourc
     return orbis::slam::calibrate(maps.at(map), orbis::slam::make_rig(model, options), {}, console.progress());
   });
   if (!found) return orbis::fail(orbis::errc::degenerate, s.input.string(), found.error().message);
-  std::optional<lens_doubt> doubt;
-  if (effort.checks_lens)
-    doubt = slam.inspect([&](const orbis::slam::atlas& maps) { return find_lens_doubt(maps.at(map), model, options); });
-  return refined{*found, std::move(poses), doubt};
+  std::optional<lens_comparison> lens;
+  if (effort.compares_lens)
+    lens = slam.inspect([&](const orbis::slam::atlas& maps) { return compare_lens(maps.at(map), model, options); });
+  return refined{*found, std::move(poses), lens};
 }
 
 /// The parameters of a camera by their names.
@@ -112,7 +112,7 @@ orbis::result<calibration_rounds> calibrate_by(const frame_source& source, const
     if (!next) return orbis::fail(next.error());
     rounds.last = std::move(next->camera);
     rounds.trajectory = std::move(next->trajectory);
-    rounds.doubt = next->doubt;
+    rounds.lens = next->lens;
     rounds.last.camera = camera = with_what_was_given(rounds.last, given_values);
     char text[160];
     std::snprintf(text, sizeof text, "round %d: %zu keyframes, %zu observations, their error %.3f -> %.3f deviations",

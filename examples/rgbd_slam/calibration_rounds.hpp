@@ -24,13 +24,13 @@ struct calibration_rounds {
   orbis::slam::calibration<orbis::camera::any_camera> last;   ///< the last round; what was held has the values given
   std::vector<orbis::slam::calibrated_parameter> parameters;  ///< over all rounds: `before` is what was given
   orbis::trajectory trajectory;                               ///< of the last round
-  std::optional<lens_doubt> doubt;                            ///< likewise
+  std::optional<lens_comparison> lens;                        ///< likewise
 };
 
 struct calibration_effort {
   int most_rounds = 5;
   double longest = std::numeric_limits<double>::infinity();  ///< of the recording, seconds
-  bool checks_lens = false;                                  ///< asks for `calibration_rounds::doubt`
+  bool compares_lens = false;                                ///< asks for `calibration_rounds::lens`
 };
 
 /// Rounds until nothing changes. Errors: frames that cannot be read, no_data if tracking never starts,

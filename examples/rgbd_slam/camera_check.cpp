@@ -54,21 +54,25 @@ std::optional<focal_doubt> find_doubt(const orbis::slam::map& map, const orbis::
   return doubt;
 }
 
-std::optional<lens_doubt> find_lens_doubt(const orbis::slam::map& map, const orbis::camera::any_camera& camera,
-                                          const orbis::slam::options& options) {
+bool lens_comparison::has_distortion() const { return is_determined && lens_rms < somewhat * pinhole_rms; }
+
+std::optional<lens_comparison> compare_lens(const orbis::slam::map& map, const orbis::camera::any_camera& camera,
+                                            const orbis::slam::options& options) {
   if (camera.get_if<orbis::camera::pinhole>() == nullptr) return std::nullopt;
   const auto plain = calibrate_small(map, camera, options), bent = calibrate_small(map, with_lens(camera), options);
-  if (!plain || !bent || !bent->is_complete() || bent->final_rms >= somewhat * plain->final_rms) return std::nullopt;
-  return lens_doubt{focal_of(*plain), focal_of(*bent), plain->final_rms, bent->final_rms};
+  if (!plain || !bent) return std::nullopt;
+  return lens_comparison{focal_of(*plain), focal_of(*bent), plain->final_rms, bent->final_rms, bent->is_complete()};
 }
 
-std::string in_words(const lens_doubt& doubt) {
+std::string in_words(const lens_comparison& lens) {
+  if (!lens.has_distortion())
+    return "the motion does not tell whether the lens has distortion; if it has, the focal length that was found makes "
+           "up for it and is wrong";
   char text[240];
-  std::snprintf(
-      text, sizeof text,
-      "a lens with distortion explains the images better (their error is %.3f instead of %.3f deviations), and "
-      "its focal length would be %.0f instead of %.0f pixels: see --distortion",
-      doubt.lens_rms, doubt.pinhole_rms, doubt.lens_focal, doubt.pinhole_focal);
+  std::snprintf(text, sizeof text,
+                "a lens with distortion explains the images better (their error is %.3f instead of %.3f deviations), "
+                "and its focal length would be %.0f instead of %.0f pixels: see --distortion",
+                lens.lens_rms, lens.pinhole_rms, lens.lens_focal, lens.pinhole_focal);
   return text;
 }
 

@@ -23,10 +23,12 @@ struct focal_doubt {
 /// The camera; a pinhole with a lens without distortion, which can be estimated.
 [[nodiscard]] orbis::camera::any_camera with_lens(const orbis::camera::any_camera& camera);
 
-/// That a lens with distortion explains the images better than a pinhole does, each with its own focal length.
-struct lens_doubt {
+/// How a pinhole and a lens with distortion explain the images, each with its own focal length.
+struct lens_comparison {
   double pinhole_focal, lens_focal;  ///< pixels
   double pinhole_rms, lens_rms;      ///< of the images' errors, standard deviations
+  bool is_determined;                ///< whether the motion tells of distortion
+  [[nodiscard]] bool has_distortion() const;
 };
 
 /// Of the parameters that a calibration found; empty where it does not tell, as where one was held.
@@ -37,13 +39,12 @@ struct lens_doubt {
 [[nodiscard]] std::optional<focal_doubt> find_doubt(const orbis::slam::map& map,
                                                     const orbis::camera::any_camera& camera,
                                                     const orbis::slam::options& options);
-/// Of a map made with the camera; empty where the camera is no pinhole, or where the images do not tell. Two small
-/// self-calibrations.
-[[nodiscard]] std::optional<lens_doubt> find_lens_doubt(const orbis::slam::map& map,
-                                                        const orbis::camera::any_camera& camera,
-                                                        const orbis::slam::options& options);
+/// Of a map made with the camera; empty where the camera is no pinhole. Two small self-calibrations.
+[[nodiscard]] std::optional<lens_comparison> compare_lens(const orbis::slam::map& map,
+                                                          const orbis::camera::any_camera& camera,
+                                                          const orbis::slam::options& options);
 /// What the user should know.
 [[nodiscard]] std::string in_words(const focal_doubt& doubt);
-[[nodiscard]] std::string in_words(const lens_doubt& doubt);
+[[nodiscard]] std::string in_words(const lens_comparison& lens);
 
 }  // namespace app

@@ -8,6 +8,7 @@ string(REGEX REPLACE "fx = [0-9.]+\nfy = [0-9.]+" "fx = 270.0\nfy = 270.0" wrong
 file(WRITE ${WORK}/wrong.toml "${wrong}")
 
 app(0 calibrate room --camera wrong.toml --read-out-ms 0 --out found.toml)
+check(NOT err MATCHES "distortion")
 check(out MATCHES "fx +270\\.00 +26[0-9]\\.[0-9]+ +[0-9.]+\n")
 check(out MATCHES "cx +159\\.50 ")
 check(out MATCHES "depth_scale +5000")
@@ -57,6 +58,9 @@ check(NOT err MATCHES "focal length")
 summary(fx ${WORK}/bent_out intrinsics fx)
 check(fx GREATER 260 AND fx LESS 265)
 app_fails(5 "does not determine the distortion" calibrate bent --distortion --read-out-ms 0 --out found.toml)
+# Without --distortion its focal length is wrong, and that is said.
+app(0 calibrate bent --frames 60 --read-out-ms 0)
+check(err MATCHES "does not tell whether the lens has distortion")
 
 # Without poses the depth scale is nobody's to know; without motion nothing is, and no file is written.
 file(REMOVE ${WORK}/room/groundtruth.txt ${WORK}/found.toml)
