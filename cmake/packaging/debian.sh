@@ -13,7 +13,7 @@ mkdir "$scratch/orbis"
 cp -r "$root"/{CMakeLists.txt,CHANGELOG.md,LICENSE,README.md,cmake,include} "$scratch/orbis"
 mv "$scratch/orbis/cmake/packaging/debian" "$scratch/orbis/debian"
 cd "$scratch/orbis"
-DEB_BUILD_OPTIONS="parallel=$(nproc) ${DEB_BUILD_OPTIONS:-}" dpkg-buildpackage --build=binary --no-sign
+DEB_BUILD_OPTIONS="parallel=${JOBS:-$(nproc)} ${DEB_BUILD_OPTIONS:-}" dpkg-buildpackage --build=binary --no-sign
 cd ..
 # A package that is made here and belongs to no distribution closes no bug, and nobody receives its mail.
 lintian --fail-on error --suppress-tags initial-upload-closes-no-bugs,bogus-mail-host,bogus-mail-host-in-debian-changelog ./*.changes

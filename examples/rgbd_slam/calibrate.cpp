@@ -109,7 +109,7 @@ exit_code calibrate(const settings& s, console& console) {
   if (!found->last.is_complete())
     console.warn("what was kept needs more motion: turn the camera about all axes, near and far from textured things");
   const auto& lens = found->lens;
-  if (lens && (lens->has_distortion() || (!lens->is_determined && find_doubt(found->parameters))))
+  if (lens && (lens->has_distortion() || (!lens->is_determined && has_other_focal_length(found->parameters))))
     console.warn(in_words(*lens));
   camera = with_shutter(std::move(camera), shutter);
   if (!s.out.empty()) {

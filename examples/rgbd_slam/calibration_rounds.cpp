@@ -28,9 +28,13 @@ struct refined {
   std::optional<lens_comparison> lens;
 };
 
+/// Whether another round would change nothing.
+bool is_last_round(const calibration& c) { return is_settled(c, 1.0); }
+
 /// Tracks all frames with `model` and refines it by the map, the largest one if tracking was lost in between.
+/// `is_last`: there is no round after it, whatever it finds.
 orbis::result<refined> refine(const any_camera& model, const frame_source& source, const settings& s,
-                              const orbis::camera::shutter& shutter, const calibration_effort& effort,
+                              const orbis::camera::shutter& shutter, const calibration_effort& effort, bool is_last,
                               console& console) {
   orbis::slam::options options = slam_options(model, source.camera.baseline);
   options.shutter = shutter;
@@ -53,8 +57,9 @@ orbis::result<refined> refine(const any_camera& model, const frame_source& sourc
   });
   if (!found) return orbis::fail(orbis::errc::degenerate, s.input.string(), found.error().message);
   std::optional<lens_comparison> lens;
-  if (effort.compares_lens)
-    lens = slam.inspect([&](const orbis::slam::atlas& maps) { return compare_lens(maps.at(map), model, options); });
+  if (effort.compares_lens && (is_last || is_last_round(*found)))
+    lens = slam.inspect(
+        [&](const orbis::slam::atlas& maps) { return compare_lens(maps.at(map), model, *found, options); });
   return refined{*found, std::move(poses), lens};
 }
 
@@ -102,13 +107,13 @@ bool is_settled(const calibration& c, double deviations) {
 
 orbis::result<calibration_rounds> calibrate_by(const frame_source& source, const settings& s,
                                                const orbis::camera::shutter& shutter, const any_camera& given,
-                                               const calibration_effort& effort, console& console) {
+                                               const calibration_effort& effort, bool is_last, console& console) {
   const parameter_table given_values = table_of(given);
   any_camera camera = given;
   calibration_rounds rounds;
-  for (int round = 1; round <= effort.most_rounds && !(round > 1 && is_settled(rounds.last, 1.0)); ++round) {
+  for (int round = 1; round <= effort.most_rounds && !(round > 1 && is_last_round(rounds.last)); ++round) {
     console.stage("calibrating");
-    auto next = refine(camera, source, s, shutter, effort, console);
+    auto next = refine(camera, source, s, shutter, effort, round == effort.most_rounds, console);
     if (!next) return orbis::fail(next.error());
     rounds.last = std::move(next->camera);
     rounds.trajectory = std::move(next->trajectory);

@@ -24,7 +24,7 @@ struct calibration_rounds {
   orbis::slam::calibration<orbis::camera::any_camera> last;   ///< the last round; what was held has the values given
   std::vector<orbis::slam::calibrated_parameter> parameters;  ///< over all rounds: `before` is what was given
   orbis::trajectory trajectory;                               ///< of the last round
-  std::optional<lens_comparison> lens;                        ///< likewise
+  std::optional<lens_comparison> lens;                        ///< of the last round, if it was asked for
 };
 
 struct calibration_effort {

@@ -13,11 +13,6 @@ namespace {
 // not tell, say little about the focal length.
 constexpr double somewhat = 0.98, clearly = 0.95;  // of the error
 
-auto calibrate_small(const orbis::slam::map& map, const orbis::camera::any_camera& camera,
-                     const orbis::slam::options& options) {
-  return orbis::slam::calibrate(map, orbis::slam::make_rig(camera, options), {.max_keyframes = 60});
-}
-
 double focal_of(const orbis::slam::calibration_summary& found) {
   const auto fx = std::ranges::find(found.parameters, "fx", &orbis::slam::calibrated_parameter::name);
   return fx != found.parameters.end() ? fx->after : 0.0;
@@ -30,25 +25,32 @@ orbis::camera::any_camera with_lens(const orbis::camera::any_camera& camera) {
   return plain != nullptr ? orbis::camera::radial_tangential{plain->k(), {}} : camera;
 }
 
-std::optional<focal_doubt> find_doubt(std::span<const orbis::slam::calibrated_parameter> found) {
-  if (std::ranges::any_of(found, &orbis::slam::calibrated_parameter::is_held)) return std::nullopt;
+bool has_other_focal_length(std::span<const orbis::slam::calibrated_parameter> found) {
   constexpr double least_change = 0.015, sigmas = 6.0;
-  for (const auto& p : found) {
-    if (p.name != "fx") continue;
-    const double change = std::abs(p.after - p.before);
-    if (change > sigmas * p.deviation && change > least_change * p.before) return focal_doubt{p.before, p.after};
-  }
-  return std::nullopt;
+  return std::ranges::any_of(found, [](const orbis::slam::calibrated_parameter& p) {
+    const double change = std::abs(p.after - p.before);  // 0 where it was held
+    return p.name == "fx" && change > sigmas * p.deviation && change > least_change * p.before;
+  });
+}
+
+std::optional<focal_doubt> find_doubt(std::span<const orbis::slam::calibrated_parameter> found) {
+  if (std::ranges::any_of(found, &orbis::slam::calibrated_parameter::is_held) || !has_other_focal_length(found))
+    return std::nullopt;
+  const auto fx = std::ranges::find(found, "fx", &orbis::slam::calibrated_parameter::name);
+  return focal_doubt{fx->before, fx->after};
 }
 
 std::optional<focal_doubt> find_doubt(const orbis::slam::map& map, const orbis::camera::any_camera& camera,
                                       const orbis::slam::options& options) {
   constexpr std::size_t few = 8;  // keyframes
   if (map.keyframes().size() < few) return std::nullopt;
-  const auto as_given = calibrate_small(map, camera, options);
+  const auto calibrate_as = [&](const orbis::camera::any_camera& model) {
+    return orbis::slam::calibrate(map, orbis::slam::make_rig(model, options), {.max_keyframes = 60});
+  };
+  const auto as_given = calibrate_as(camera);
   auto doubt = as_given ? find_doubt(as_given->parameters) : std::nullopt;
   if (!doubt || camera.get_if<orbis::camera::pinhole>() == nullptr) return doubt;
-  const auto bent = calibrate_small(map, with_lens(camera), options);
+  const auto bent = calibrate_as(with_lens(camera));
   if (!bent || !bent->is_complete() || bent->final_rms < clearly * as_given->final_rms) return std::nullopt;
   doubt->is_sure = bent->final_rms >= somewhat * as_given->final_rms;
   return doubt;
@@ -57,15 +59,17 @@ std::optional<focal_doubt> find_doubt(const orbis::slam::map& map, const orbis::
 bool lens_comparison::has_distortion() const { return is_determined && lens_rms < somewhat * pinhole_rms; }
 
 std::optional<lens_comparison> compare_lens(const orbis::slam::map& map, const orbis::camera::any_camera& camera,
+                                            const orbis::slam::calibration_summary& as_pinhole,
                                             const orbis::slam::options& options) {
   if (camera.get_if<orbis::camera::pinhole>() == nullptr) return std::nullopt;
-  const auto plain = calibrate_small(map, camera, options), bent = calibrate_small(map, with_lens(camera), options);
-  if (!plain || !bent) return std::nullopt;
-  return lens_comparison{focal_of(*plain), focal_of(*bent), plain->final_rms, bent->final_rms, bent->is_complete()};
+  const auto bent = orbis::slam::calibrate(map, orbis::slam::make_rig(with_lens(camera), options));
+  if (!bent) return std::nullopt;
+  return lens_comparison{focal_of(as_pinhole), focal_of(*bent), as_pinhole.final_rms, bent->final_rms,
+                         bent->is_complete()};
 }
 
 std::string in_words(const lens_comparison& lens) {
-  if (!lens.has_distortion())
+  if (!lens.is_determined)
     return "the motion does not tell whether the lens has distortion; if it has, the focal length that was found makes "
            "up for it and is wrong";
   char text[240];

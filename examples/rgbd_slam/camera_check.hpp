@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Whether the camera's focal length fits what was recorded with it.
+/// Whether the camera's focal length, and its lens, fit what was recorded with it.
 #pragma once
 
 #include <optional>
@@ -23,11 +23,12 @@ struct focal_doubt {
 /// The camera; a pinhole with a lens without distortion, which can be estimated.
 [[nodiscard]] orbis::camera::any_camera with_lens(const orbis::camera::any_camera& camera);
 
-/// How a pinhole and a lens with distortion explain the images, each with its own focal length.
+/// How a pinhole and a lens with distortion explain the images.
 struct lens_comparison {
-  double pinhole_focal, lens_focal;  ///< pixels
+  double pinhole_focal, lens_focal;  ///< fx of each, pixels
   double pinhole_rms, lens_rms;      ///< of the images' errors, standard deviations
-  bool is_determined;                ///< whether the motion tells of distortion
+  bool is_determined;                ///< whether the motion determines the distortion
+  /// Whether the images tell that there is some.
   [[nodiscard]] bool has_distortion() const;
 };
 
@@ -39,12 +40,17 @@ struct lens_comparison {
 [[nodiscard]] std::optional<focal_doubt> find_doubt(const orbis::slam::map& map,
                                                     const orbis::camera::any_camera& camera,
                                                     const orbis::slam::options& options);
-/// Of a map made with the camera; empty where the camera is no pinhole. Two small self-calibrations.
+/// Whether a calibration found clearly another focal length, whatever of the rest was held.
+[[nodiscard]] bool has_other_focal_length(std::span<const orbis::slam::calibrated_parameter> found);
+/// Of a map made with the camera, and a calibration by that map. Empty where the camera is no pinhole, or the images
+/// tell nothing. One self-calibration.
 [[nodiscard]] std::optional<lens_comparison> compare_lens(const orbis::slam::map& map,
                                                           const orbis::camera::any_camera& camera,
+                                                          const orbis::slam::calibration_summary& as_pinhole,
                                                           const orbis::slam::options& options);
 /// What the user should know.
 [[nodiscard]] std::string in_words(const focal_doubt& doubt);
+/// @pre lens.has_distortion(), or it is not determined
 [[nodiscard]] std::string in_words(const lens_comparison& lens);
 
 }  // namespace app

@@ -109,7 +109,7 @@ orbis::result<void> write_navigation_picture(const navigation_picture& what, con
   const int width = std::max(1, static_cast<int>(scale * size.x())),
             height = std::max(1, static_cast<int>(scale * size.y()));
 
-  sheet s{1500, static_cast<int>(top) + height + 90};
+  sheet s{1500, static_cast<int>(top) + height + 100};
   s.text(what.title, {60, 44}, ink, 19, 0.0, true);
   s.text(what.subtitle, {60, 70}, faint, 13);
   const auto panel = [&](double x, const std::string& title, const orbis::image<rgb8>& picture, bool has_path,

@@ -41,8 +41,10 @@ enum class correction_kind : std::uint8_t {
 /// The poses of a map changed by more than local adjustment changes them. What was built on them has to be moved.
 struct correction_event {
   correction_kind kind{};
-  map_id map = 0;             ///< the corrected map
-  map_keyframe from{}, to{};  ///< of a loop or merger: the keyframes of the same place (`from` by its new id)
+  map_id map = 0;  ///< the corrected map
+  /// Of a loop or merger: the keyframes of the same place (`from` by its new id). With threads either may have been
+  /// erased since (`basic_atlas::current` gives its replacement).
+  map_keyframe from{}, to{};
   map_id merged = 0;          ///< of a merger: the map that became a part of `map`
   id_offsets offsets{};       ///< of a merger: by how much the ids of `merged` grew
   sim3 T_corrected_before{};  ///< the correction at keyframe `from`, in the world of the map; with depth of scale 1

@@ -226,8 +226,8 @@ struct options {
   fusion_options fusion{};
   moving_options moving{};
   thread_options threads{};
-  /// `trajectory` holds so many frames at most, the latest of those that were tracked. For robots that run for days; a
-  /// frame takes 72 bytes.
+  /// The trajectories of all maps hold so many frames together, at most: the latest of those that were tracked. For
+  /// robots that run for days; a frame takes 72 bytes.
   std::size_t trajectory_frames = std::numeric_limits<std::size_t>::max();
   bool localization_only = false;     ///< no keyframes are made, and the map is kept unchanged: for a loaded map
   std::optional<se3> initial_pose{};  ///< `T_world_camera` of the first frame of a map; default: the identity

@@ -135,11 +135,10 @@ class rgbd_system {
   /// Waits until the threads have nothing to do.
   void wait() const;
 
-  /// Poses of all frames that were tracked in the active map, or of the latest (`options::trajectory_frames`). Frames
-  /// follow later corrections of their keyframe.
-  /// O(frames).
+  /// Poses of the frames that were tracked in the active map: all, or those that `options::trajectory_frames` leaves.
+  /// Frames follow later corrections of their keyframe. O(frames).
   [[nodiscard]] orbis::trajectory trajectory() const;
-  /// As above, of another map; empty if there is no such map.
+  /// As above, of another map; empty if there is no such map, or none of its frames is left.
   [[nodiscard]] orbis::trajectory trajectory(map_id map) const;
   /// Time stamp, pose and frame index of each keyframe of the active map.
   [[nodiscard]] std::vector<keyframe_pose> keyframes() const;

@@ -88,6 +88,29 @@ TEST_CASE("Closing a loop takes the drift out of keyframes and landmarks, erased
   CHECK(test::fault_of(r.m) == "");
 }
 
+TEST_CASE("Where keyframes with a loop edge are erased, the next correction still has a tie between both sides") {
+  open_ring r;
+  REQUIRE(slam::detail::loop_correction::close(r.m, r.match, r.world.rig).corrected);
+  // All that saw the place from either side but the first few and the last few, which share nothing with each other.
+  for (std::uint32_t k = 2; k <= 12; ++k) r.m.erase_keyframe(k);
+  for (std::uint32_t k = 92; k <= r.last.value(); ++k) r.m.erase_keyframe(k);
+  const slam::keyframe_id a = r.m.replacement_of(r.match.keyframe), b = r.m.replacement_of(r.match.candidate);
+  REQUIRE(r.m.tree().loop_edges(a) == std::vector<slam::keyframe_id>{b});
+  CHECK(r.m.covisibility().shared(a, b) < 25);
+
+  slam::detail::loop_match elsewhere = r.match;
+  elsewhere.keyframe = 60;
+  elsewhere.candidate = 30;
+  const auto taken = slam::detail::loop_correction::take(r.m, elsewhere);
+  REQUIRE(taken);
+  const auto tie = std::find_if(taken->edges.begin(), taken->edges.end(), [&](const auto& e) {
+    return e.from == std::max(a, b).value() && e.to == std::min(a, b).value();
+  });
+  REQUIRE(tie != taken->edges.end());
+  CHECK(tie->weight == 0.25);
+  CHECK(test::fault_of(r.m) == "");
+}
+
 TEST_CASE("Without depth a loop takes out the drift of the scale as well") {
   test::ring_world world{{.shrinks = 0.004}};
   slam::map m = world.round(4);

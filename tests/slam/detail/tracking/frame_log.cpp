@@ -61,3 +61,24 @@ TEST_CASE("Frames are forgotten in order where only the latest are kept") {
   CHECK(left[0].timestamp == 2.0);
   CHECK(left[1].timestamp == 3.0);
 }
+
+TEST_CASE("Frames that were forgotten count for the map that theirs became a part of") {
+  random_bits random(5);
+  slam::atlas maps(8, 1.2);
+  const slam::map_id first = maps.active_id();
+  test::add_random_keyframe(random, maps.active(), 30, 20);
+  const slam::map_id second = maps.create();
+  test::add_random_keyframe(random, maps.active(), 30, 20);
+  const slam::map_id third = maps.create();
+  test::add_random_keyframe(random, maps.active(), 30, 20);
+  slam::detail::frame_log log(2);
+  for (int i = 0; i < 3; ++i) log.add({1.0 * i, {first, 0}, {}});
+  for (int i = 3; i < 5; ++i) log.add({1.0 * i, {second, 0}, {}});
+  for (int i = 5; i < 9; ++i) log.add({1.0 * i, {third, 0}, {}});
+  CHECK(log.largest_map(maps) == third);  // 3, 2 and 4 frames, of which 0, 0 and 2 are kept
+  maps.merge(second, first, se3{});
+  CHECK(log.largest_map(maps) == first);
+  maps.merge(first, third, se3{});
+  CHECK(log.largest_map(maps) == third);
+  CHECK(log.trajectory(maps, third).size() == 2);
+}

@@ -77,8 +77,12 @@ template <feature_descriptor D>
     return e.kind == edge_kind::loop && std::min(e.from, e.to) == std::min(a, b) &&
            std::max(e.from, e.to) == std::max(a, b);
   });
-  for (essential_edge& e : s.edges)  // the more landmarks they share, the better their relative pose is known
-    e.weight *= static_cast<double>(std::clamp(e.shared, 1U, o.strong)) / o.strong;
+  for (essential_edge& e : s.edges) {
+    // The more landmarks two keyframes share, the better their relative pose is known. But an edge of an earlier loop
+    // may have passed on to keyframes that share few, although many of their neighbours do: it stays a tie.
+    const std::uint32_t least = e.kind == edge_kind::loop ? std::max(1U, o.strong / 4) : 1U;
+    e.weight *= static_cast<double>(std::clamp(e.shared, least, o.strong)) / o.strong;
+  }
   s.edges.push_back(
       {b, a, edge_kind::loop, static_cast<std::uint32_t>(match.inliers), match.scaled_motion(), o.loop_weight});
   return s;

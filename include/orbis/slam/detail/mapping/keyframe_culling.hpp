@@ -42,9 +42,9 @@ struct keep_none {
 };
 
 /// Erases the redundant neighbours of keyframe `newest`, the strongest first; each is judged after the ones before it
-/// were erased. Kept are the root and those for which `keep(id)` is true. Loop edges keep no keyframe, as ORB-SLAM has
-/// it, but pass to its replacement: a map that closes loops for days does not grow by two keyframes each time. Returns
-/// the erased ones.
+/// were erased. Kept are the root and those for which `keep(id)` is true. Keyframes with loop edges are erased like
+/// others, and their edges pass to the replacement (ORB-SLAM keeps such keyframes: a map that closes loops for days
+/// would grow by two keyframes for each). Returns the erased ones.
 template <feature_descriptor D, std::predicate<keyframe_id> Keep = keep_none>
 std::vector<keyframe_id> cull_keyframes(basic_map<D>& m, keyframe_id newest, double close_depth,
                                         const culling_options& o, Keep&& keep = {}) {

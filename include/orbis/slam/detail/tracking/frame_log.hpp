@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The tracked frames, all or the latest, each relative to a keyframe, so that they follow later corrections.
+/// The tracked frames, each relative to a keyframe, so that they follow later corrections. If there is a limit, the
+/// latest frames are kept, and the others are counted.
 #pragma once
 
 #include <algorithm>
@@ -30,11 +31,15 @@ class frame_log {
 
   void add(const logged_frame& f) {
     frames_.push_back(f);
-    if (frames_.size() > most_) frames_.pop_front();
+    if (frames_.size() <= most_) return;
+    forgotten& old = forgotten_[frames_.front().reference.map];
+    ++old.frames;
+    old.reference = frames_.front().reference;
+    frames_.pop_front();
   }
 
-  /// The present poses of the frames that were tracked in a map, or in one that was merged into it. Empty if there is
-  /// no such map. O(frames).
+  /// The present poses of the frames that are kept and were tracked in a map, or in one that was merged into it. Empty
+  /// if there is no such map. O(frames).
   template <feature_descriptor D>
   [[nodiscard]] orbis::trajectory trajectory(const basic_atlas<D>& maps, map_id map) const {
     orbis::trajectory all;
@@ -47,20 +52,29 @@ class frame_log {
     return all;
   }
 
-  /// The map with most frames, the oldest where equal; the active map if there are no frames. O(frames).
+  /// The map with most frames, kept or not, the oldest where equal; the active map if there are no frames. O(frames).
   template <feature_descriptor D>
   [[nodiscard]] map_id largest_map(const basic_atlas<D>& maps) const {
     std::map<map_id, std::size_t> frames;
     for (const logged_frame& f : frames_)
       if (const map_id m = maps.current(f.reference).map; maps.contains(m)) ++frames[m];
+    for (const auto& [map, old] : forgotten_)
+      if (const map_id m = maps.current(old.reference).map; maps.contains(m)) frames[m] += old.frames;
     const auto most = std::max_element(frames.begin(), frames.end(),
                                        [](const auto& a, const auto& b) { return a.second < b.second; });
     return most == frames.end() ? maps.active_id() : most->first;
   }
 
  private:
+  /// Of the frames of a map.
+  struct forgotten {
+    std::size_t frames = 0;
+    map_keyframe reference;  ///< of the last one: it leads to the map that this one became a part of
+  };
+
   std::size_t most_ = std::numeric_limits<std::size_t>::max();
-  std::deque<logged_frame> frames_;  // grows without moving what is there: no frame waits for it
+  std::deque<logged_frame> frames_;        // grows without moving what is there: no frame waits for it
+  std::map<map_id, forgotten> forgotten_;  ///< by the map in which they were tracked
 };
 
 }  // namespace orbis::slam::detail
