@@ -107,7 +107,7 @@ bool is_settled(const calibration& c, double deviations) {
 
 orbis::result<calibration_rounds> calibrate_by(const frame_source& source, const settings& s,
                                                const orbis::camera::shutter& shutter, const any_camera& given,
-                                               const calibration_effort& effort, bool is_last, console& console) {
+                                               const calibration_effort& effort, console& console) {
   const parameter_table given_values = table_of(given);
   any_camera camera = given;
   calibration_rounds rounds;
