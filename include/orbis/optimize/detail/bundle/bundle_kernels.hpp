@@ -320,7 +320,7 @@ ORBIS_ALWAYS_INLINE double linearize_camera(const camera_work<R>& work, const Lo
     });
 
     L share[9];
-    double* const mixed = work.mixed + mixed_block::size * (first / 8);
+    double* const mixed = work.sums != nullptr ? work.mixed + mixed_block::size * (first / 8) : nullptr;
     if constexpr (through_camera) {
       unroll<3>([&](auto i) ORBIS_INLINE_LAMBDA { b[i] = L(0.0) - b[i]; });
       const auto cross = [&](const L* v, L* out) ORBIS_INLINE_LAMBDA {  // hat(q) v
