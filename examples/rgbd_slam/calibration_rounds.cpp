@@ -59,7 +59,7 @@ orbis::result<refined> refine(const any_camera& model, const frame_source& sourc
   std::optional<lens_comparison> lens;
   if (effort.compares_lens && (is_last || is_last_round(*found)))
     lens = slam.inspect(
-        [&](const orbis::slam::atlas& maps) { return compare_lens(maps.at(map), model, *found, options); });
+        [&](const orbis::slam::atlas& maps) { return compare_lens(maps.at(map), model, *found, options, {}); });
   return refined{*found, std::move(poses), lens};
 }
 

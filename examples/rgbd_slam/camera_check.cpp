@@ -13,9 +13,10 @@ namespace {
 // not tell, say little about the focal length.
 constexpr double somewhat = 0.98, clearly = 0.95;  // of the error
 
-double focal_of(const orbis::slam::calibration_summary& found) {
-  const auto fx = std::ranges::find(found.parameters, "fx", &orbis::slam::calibrated_parameter::name);
-  return fx != found.parameters.end() ? fx->after : 0.0;
+/// What was found of fx; null if it is not among them.
+const orbis::slam::calibrated_parameter* find_focal(std::span<const orbis::slam::calibrated_parameter> found) {
+  const auto fx = std::ranges::find(found, "fx", &orbis::slam::calibrated_parameter::name);
+  return fx != found.end() ? &*fx : nullptr;
 }
 
 }  // namespace
@@ -27,16 +28,16 @@ orbis::camera::any_camera with_lens(const orbis::camera::any_camera& camera) {
 
 bool has_other_focal_length(std::span<const orbis::slam::calibrated_parameter> found) {
   constexpr double least_change = 0.015, sigmas = 6.0;
-  return std::ranges::any_of(found, [](const orbis::slam::calibrated_parameter& p) {
-    const double change = std::abs(p.after - p.before);  // 0 where it was held
-    return p.name == "fx" && change > sigmas * p.deviation && change > least_change * p.before;
-  });
+  const auto* const fx = find_focal(found);
+  if (fx == nullptr) return false;
+  const double change = std::abs(fx->after - fx->before);  // 0 where it was held
+  return change > sigmas * fx->deviation && change > least_change * fx->before;
 }
 
 std::optional<focal_doubt> find_doubt(std::span<const orbis::slam::calibrated_parameter> found) {
   if (std::ranges::any_of(found, &orbis::slam::calibrated_parameter::is_held) || !has_other_focal_length(found))
     return std::nullopt;
-  const auto fx = std::ranges::find(found, "fx", &orbis::slam::calibrated_parameter::name);
+  const auto* const fx = find_focal(found);
   return focal_doubt{fx->before, fx->after};
 }
 
@@ -44,15 +45,13 @@ std::optional<focal_doubt> find_doubt(const orbis::slam::map& map, const orbis::
                                       const orbis::slam::options& options) {
   constexpr std::size_t few = 8;  // keyframes
   if (map.keyframes().size() < few) return std::nullopt;
-  const auto calibrate_as = [&](const orbis::camera::any_camera& model) {
-    return orbis::slam::calibrate(map, orbis::slam::make_rig(model, options), {.max_keyframes = 60});
-  };
-  const auto as_given = calibrate_as(camera);
+  const orbis::slam::calibration_options small{.max_keyframes = 60};
+  const auto as_given = orbis::slam::calibrate(map, orbis::slam::make_rig(camera, options), small);
   auto doubt = as_given ? find_doubt(as_given->parameters) : std::nullopt;
   if (!doubt || camera.get_if<orbis::camera::pinhole>() == nullptr) return doubt;
-  const auto bent = calibrate_as(with_lens(camera));
-  if (!bent || !bent->is_complete() || bent->final_rms < clearly * as_given->final_rms) return std::nullopt;
-  doubt->is_sure = bent->final_rms >= somewhat * as_given->final_rms;
+  const auto lens = compare_lens(map, camera, *as_given, options, small);
+  if (!lens || !lens->is_determined || lens->lens_rms < clearly * lens->pinhole_rms) return std::nullopt;
+  doubt->is_sure = !lens->has_distortion();
   return doubt;
 }
 
@@ -60,12 +59,13 @@ bool lens_comparison::has_distortion() const { return is_determined && lens_rms 
 
 std::optional<lens_comparison> compare_lens(const orbis::slam::map& map, const orbis::camera::any_camera& camera,
                                             const orbis::slam::calibration_summary& as_pinhole,
-                                            const orbis::slam::options& options) {
+                                            const orbis::slam::options& options,
+                                            const orbis::slam::calibration_options& how) {
   if (camera.get_if<orbis::camera::pinhole>() == nullptr) return std::nullopt;
-  const auto bent = orbis::slam::calibrate(map, orbis::slam::make_rig(with_lens(camera), options));
+  const auto bent = orbis::slam::calibrate(map, orbis::slam::make_rig(with_lens(camera), options), how);
   if (!bent) return std::nullopt;
-  return lens_comparison{focal_of(as_pinhole), focal_of(*bent), as_pinhole.final_rms, bent->final_rms,
-                         bent->is_complete()};
+  return lens_comparison{find_focal(as_pinhole.parameters)->after, find_focal(bent->parameters)->after,
+                         as_pinhole.final_rms, bent->final_rms, bent->is_complete()};
 }
 
 std::string in_words(const lens_comparison& lens) {

@@ -42,12 +42,13 @@ struct lens_comparison {
                                                     const orbis::slam::options& options);
 /// Whether a calibration found clearly another focal length, whatever of the rest was held.
 [[nodiscard]] bool has_other_focal_length(std::span<const orbis::slam::calibrated_parameter> found);
-/// Of a map made with the camera, and a calibration by that map. Empty where the camera is no pinhole, or the images
-/// tell nothing. One self-calibration.
+/// Of a map made with the camera, and a calibration by that map, which was done as `how` says. Empty where the camera
+/// is no pinhole, or the images tell nothing. One self-calibration.
 [[nodiscard]] std::optional<lens_comparison> compare_lens(const orbis::slam::map& map,
                                                           const orbis::camera::any_camera& camera,
                                                           const orbis::slam::calibration_summary& as_pinhole,
-                                                          const orbis::slam::options& options);
+                                                          const orbis::slam::options& options,
+                                                          const orbis::slam::calibration_options& how);
 /// What the user should know.
 [[nodiscard]] std::string in_words(const focal_doubt& doubt);
 /// @pre lens.has_distortion(), or it is not determined

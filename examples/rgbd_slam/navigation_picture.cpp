@@ -43,7 +43,7 @@ rgb8 distance_color(double share) { return mixed(at_obstacle, far_off, std::sqrt
 
 /// Of a colour, in a legend.
 struct meaning {
-  cv::Scalar color;
+  rgb8 color;
   std::string text;
 };
 
@@ -125,7 +125,7 @@ orbis::result<void> write_navigation_picture(const navigation_picture& what, con
     a.frame(title, "x, m", "y, m");
     s.paste(picture, static_cast<int>(x), static_cast<int>(top));
     vec2 entry{x, top + height + 66};
-    for (const meaning& m : colors) entry = s.legend(entry, m.color, m.text);
+    for (const meaning& m : colors) entry = s.legend(entry, on_sheet(m.color), m.text);
     s.legend(s.legend(entry, on_sheet(dark), "occupied"), on_sheet(nothing), "unknown");
     if (!has_path || what.path.empty()) return;
     s.legend(s.legend(s.legend({x, entry.y() + 20}, start_color, "start"), error_color, "goal"), estimate_color,
@@ -141,16 +141,14 @@ orbis::result<void> write_navigation_picture(const navigation_picture& what, con
   if (what.floor != nullptr) {
     std::snprintf(text, sizeof text, "floor at %.2f m", what.floor->floor);
     panel(x, text, draw_floor(what, w, width, height), what.field == nullptr,
-          {{on_sheet(white), "free"},
-           {on_sheet(costly), "near an obstacle"},
-           {on_sheet(too_near), "too near for the robot"}});
+          {{white, "free"}, {costly, "near an obstacle"}, {too_near, "too near for the robot"}});
     x += most_across + gap;
   }
   if (what.field != nullptr) {
     std::snprintf(text, sizeof text, "distance to obstacles at a height of %.2f m, 0 to %.1f m", what.height,
                   what.field->reach());
     panel(x, text, draw_slice(what, w, width, height), true,
-          {{on_sheet(at_obstacle), "at an obstacle"}, {on_sheet(far_off), "far from any"}});
+          {{at_obstacle, "at an obstacle"}, {far_off, "far from any"}});
   }
   return s.write(path);
 }

@@ -25,9 +25,8 @@ struct logged_frame {
 
 class frame_log {
  public:
-  frame_log() = default;
   /// Keeps the latest frames, at most so many.
-  explicit frame_log(std::size_t most) : most_{most} {}
+  explicit frame_log(std::size_t most = std::numeric_limits<std::size_t>::max()) : most_{most} {}
 
   void add(const logged_frame& f) {
     frames_.push_back(f);
@@ -56,10 +55,11 @@ class frame_log {
   template <feature_descriptor D>
   [[nodiscard]] map_id largest_map(const basic_atlas<D>& maps) const {
     std::map<map_id, std::size_t> frames;
-    for (const logged_frame& f : frames_)
-      if (const map_id m = maps.current(f.reference).map; maps.contains(m)) ++frames[m];
-    for (const auto& [map, old] : forgotten_)
-      if (const map_id m = maps.current(old.reference).map; maps.contains(m)) frames[m] += old.frames;
+    const auto count = [&](const map_keyframe& reference, std::size_t number) {
+      if (const map_id m = maps.current(reference).map; maps.contains(m)) frames[m] += number;
+    };
+    for (const logged_frame& f : frames_) count(f.reference, 1);
+    for (const auto& [map, old] : forgotten_) count(old.reference, old.frames);
     const auto most = std::max_element(frames.begin(), frames.end(),
                                        [](const auto& a, const auto& b) { return a.second < b.second; });
     return most == frames.end() ? maps.active_id() : most->first;
@@ -72,7 +72,7 @@ class frame_log {
     map_keyframe reference;  ///< of the last one: it leads to the map that this one became a part of
   };
 
-  std::size_t most_ = std::numeric_limits<std::size_t>::max();
+  std::size_t most_;
   std::deque<logged_frame> frames_;        // grows without moving what is there: no frame waits for it
   std::map<map_id, forgotten> forgotten_;  ///< by the map in which they were tracked
 };
