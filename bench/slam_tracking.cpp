@@ -27,6 +27,7 @@
 #include <orbis/camera/settings.hpp>
 #include <orbis/features/orb.hpp>
 #include <orbis/io/recording.hpp>
+#include <orbis/slam/definitions.hpp>
 #include <orbis/slam/place_recognition.hpp>
 #include <orbis/slam/rgbd_system.hpp>
 

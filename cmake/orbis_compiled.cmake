@@ -19,11 +19,26 @@ foreach(_orbis_component IN LISTS ORBIS_PROVIDED_COMPONENTS)
   endif()
 endforeach()
 
-add_library(orbis_compiled STATIC ${_orbis_sources})
-add_library(orbis::compiled ALIAS orbis_compiled)
-set_target_properties(orbis_compiled PROPERTIES EXPORT_NAME compiled OUTPUT_NAME orbis POSITION_INDEPENDENT_CODE ON)
-target_compile_definitions(orbis_compiled PUBLIC ORBIS_COMPILED)
-target_compile_options(orbis_compiled PRIVATE -ffp-contract=off)  # the same bits as everywhere
+# _orbis_add_compiled(<name> <archive> <macro> <source>...): the target orbis_<name>.
+function(_orbis_add_compiled name archive macro)
+  add_library(orbis_${name} STATIC ${ARGN})
+  add_library(orbis::${name} ALIAS orbis_${name})
+  set_target_properties(orbis_${name} PROPERTIES EXPORT_NAME ${name} OUTPUT_NAME ${archive} POSITION_INDEPENDENT_CODE ON)
+  target_compile_definitions(orbis_${name} PUBLIC ${macro})
+  target_compile_options(orbis_${name} PRIVATE -ffp-contract=off)  # the same bits as everywhere
+endfunction()
+
+_orbis_add_compiled(compiled orbis ORBIS_COMPILED ${_orbis_sources})
 foreach(_orbis_component IN LISTS ORBIS_COMPILED_COMPONENTS)
   target_link_libraries(orbis_compiled PUBLIC orbis_${_orbis_component})
 endforeach()
+set(ORBIS_COMPILED_LIBRARIES compiled)
+
+# orbis::compiled_io: the same for recordings on disk and synthetic ones (cmake/compiled_io), with ORBIS_COMPILED_IO. It
+# stands apart, as it needs image codecs, which who links orbis::compiled need not have.
+if("io" IN_LIST ORBIS_PROVIDED_COMPONENTS)
+  file(GLOB _orbis_sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/cmake/compiled_io/*.cpp)
+  _orbis_add_compiled(compiled_io orbis_io ORBIS_COMPILED_IO ${_orbis_sources})
+  target_link_libraries(orbis_compiled_io PUBLIC orbis_io)
+  list(APPEND ORBIS_COMPILED_LIBRARIES compiled_io)
+endif()

@@ -27,6 +27,7 @@
 /// | `monocular.hpp` | the same for one camera without depth, and the options that suit it |
 /// | `any_sensor.hpp` | the same for any of these |
 /// | `calibration.hpp` | the camera refined by the map that was made with it |
+/// | `definitions.hpp` | not included here: for `orbis::compiled` and a system of types of your own |
 /// | `camera_rig.hpp` | the camera with its image pyramid and the weight of depth |
 /// | `pyramid_scales.hpp` | the scales of an image pyramid |
 /// | `matchers.hpp` | how tracking matches features, replaceable |

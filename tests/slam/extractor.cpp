@@ -11,6 +11,7 @@
 #include <orbis/camera/pinhole.hpp>
 #include <orbis/features/orb.hpp>
 #include <orbis/io/synthetic.hpp>
+#include <orbis/slam/definitions.hpp>
 #include <orbis/slam/rgbd_system.hpp>
 #include <orbis/slam/validate.hpp>
 

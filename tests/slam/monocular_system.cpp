@@ -9,6 +9,7 @@
 #include <orbis/io/mono_recording.hpp>
 #include <orbis/io/synthetic.hpp>
 #include <orbis/slam/any_system.hpp>
+#include <orbis/slam/definitions.hpp>
 #include <orbis/slam/monocular_system.hpp>
 #include <orbis/slam/validate.hpp>
 

@@ -6,6 +6,7 @@
 
 #include <orbis/features/orb.hpp>
 #include <orbis/io/synthetic.hpp>
+#include <orbis/slam/definitions.hpp>
 #include <orbis/slam/rgbd_system.hpp>
 
 #include "support/catch.hpp"

@@ -22,16 +22,11 @@
 
 #include <orbis/camera/rgbd_frame.hpp>
 #include <orbis/camera/settings.hpp>
+#include <orbis/core/image.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/core/trajectory.hpp>
-#include <orbis/io/camera_file.hpp>
-#include <orbis/io/detail/recordings/icl_nuim.hpp>
+#include <orbis/io/detail/recordings/color_registration.hpp>
 #include <orbis/io/detail/recordings/recording_index.hpp>
-#include <orbis/io/detail/recordings/scannet.hpp>
-#include <orbis/io/detail/recordings/seven_scenes.hpp>
-#include <orbis/io/detail/recordings/sized_image.hpp>
-#include <orbis/io/detail/recordings/tum.hpp>
-#include <orbis/io/image.hpp>
 
 namespace orbis::io {
 
@@ -61,12 +56,7 @@ struct recording_options {
 class recording {
  public:
   /// @pre !index.frames.empty()
-  recording(detail::recording_index index, camera::camera_settings camera, recording_format format)
-      : index_{std::move(index)}, camera_{std::move(camera)}, format_{format} {
-    assert(!index_.frames.empty());
-    if (const auto* depth = camera_.model.get_if<camera::pinhole>(); index_.color && depth != nullptr)
-      registration_.emplace(*index_.color, *depth);
-  }
+  recording(detail::recording_index index, camera::camera_settings camera, recording_format format);
 
   [[nodiscard]] std::size_t size() const noexcept { return index_.frames.size(); }
   /// Of the colour image, seconds. @pre i < size()
@@ -79,36 +69,13 @@ class recording {
   /// What is worth a warning: images without a partner, lines left out, depth that is not registered.
   [[nodiscard]] std::span<const std::string> notes() const noexcept { return index_.notes; }
   /// Every file that the recording is read from: lists, poses, camera, and all images.
-  [[nodiscard]] std::vector<std::filesystem::path> files() const {
-    std::vector<std::filesystem::path> all = index_.files;
-    for (const detail::recording_entry& entry : index_.frames) all.insert(all.end(), {entry.color, entry.depth});
-    return all;
-  }
+  [[nodiscard]] std::vector<std::filesystem::path> files() const;
 
   /// Reads frame `i`. Colour and depth have the camera's size. Errors: not_found, unreadable,
   /// malformed (damaged, or of another size than the camera's), unsupported. @pre i < size()
-  [[nodiscard]] result<camera::rgbd_frame> frame(std::size_t i) const {
-    assert(i < size());
-    const detail::recording_entry& entry = index_.frames[i];
-    auto depth = read_sized_depth(entry.depth);
-    if (!depth) return fail(depth.error());
-    auto image = read_registered(entry.color, depth->view());
-    if (!image) return fail(image.error());
-    return camera::rgbd_frame{.timestamp = entry.timestamp,
-                              .color = *std::move(image),
-                              .depth = *std::move(depth),
-                              .depth_scale = camera_.depth_scale,
-                              .T_world_camera = entry.T_world_camera};
-  }
+  [[nodiscard]] result<camera::rgbd_frame> frame(std::size_t i) const;
   /// Reads the colour image of frame `i` alone. Errors as above. @pre i < size()
-  [[nodiscard]] result<image<rgb8>> color(std::size_t i) const {
-    assert(i < size());
-    const detail::recording_entry& entry = index_.frames[i];
-    if (!registration_ || !registration_->needs_depth()) return read_registered(entry.color, {});
-    const auto depth = read_sized_depth(entry.depth);
-    if (!depth) return fail(depth.error());
-    return read_registered(entry.color, depth->view());
-  }
+  [[nodiscard]] result<image<rgb8>> color(std::size_t i) const;
 
   /// Goes over the frames once, reading each when it is reached. Ends at the first frame that cannot
   /// be read; then the recording's `status` says why. The frame a reference was taken to lives until
@@ -135,15 +102,7 @@ class recording {
     [[nodiscard]] friend bool operator==(const iterator& it, std::default_sentinel_t) noexcept { return !it.frame_; }
 
    private:
-    void read() {
-      frame_.reset();
-      if (i_ == of_->size()) return;
-      auto frame = of_->frame(i_);
-      if (frame)
-        frame_ = std::make_shared<const camera::rgbd_frame>(*std::move(frame));
-      else
-        of_->status_ = fail(std::move(frame.error()));
-    }
+    void read();
 
     recording* of_ = nullptr;
     std::size_t i_ = 0;
@@ -160,17 +119,10 @@ class recording {
   [[nodiscard]] const result<void>& status() const noexcept { return status_; }
 
  private:
-  [[nodiscard]] result<image<std::uint16_t>> read_sized_depth(const std::filesystem::path& path) const {
-    return detail::sized(read_depth(path), path, camera_.model.width(), camera_.model.height());
-  }
+  [[nodiscard]] result<image<std::uint16_t>> read_sized_depth(const std::filesystem::path& path) const;
   /// The colour image as the camera of depth sees it.
   [[nodiscard]] result<image<rgb8>> read_registered(const std::filesystem::path& path,
-                                                    image_view<const std::uint16_t> depth) const {
-    const camera::intrinsics& k = registration_ ? registration_->color().k() : camera_.model.k();
-    auto image = detail::sized(read_color(path), path, k.width, k.height);
-    if (image && registration_) image = registration_->register_color(image->view(), depth, camera_.depth_scale);
-    return image;
-  }
+                                                    image_view<const std::uint16_t> depth) const;
 
   detail::recording_index index_;
   camera::camera_settings camera_;
@@ -180,32 +132,13 @@ class recording {
 };
 
 /// Which format the recording in `folder` has; `automatic` if none is recognised.
-[[nodiscard]] inline recording_format detect_format(const std::filesystem::path& folder) {
-  if (detail::is_icl_nuim(folder)) return recording_format::icl_nuim;
-  if (detail::is_tum(folder)) return recording_format::tum;
-  if (detail::is_seven_scenes(folder)) return recording_format::seven_scenes;
-  if (detail::is_scannet(folder)) return recording_format::scannet;
-  return recording_format::automatic;
-}
+[[nodiscard]] recording_format detect_format(const std::filesystem::path& folder);
 
 namespace detail {
 
 /// The index of the recording in `folder`, and its format in place of `automatic`. Errors: as `open_recording`.
-[[nodiscard]] inline result<recording_index> index_recording(const std::filesystem::path& folder,
-                                                             recording_format& format, double max_time_difference) {
-  if (format == recording_format::automatic) format = detect_format(folder);
-  switch (format) {
-    case recording_format::tum: return index_tum(folder, max_time_difference);
-    case recording_format::seven_scenes: return index_seven_scenes(folder);
-    case recording_format::icl_nuim: return index_icl_nuim(folder);
-    case recording_format::scannet: return index_scannet(folder);
-    case recording_format::automatic: break;
-  }
-  return fail(unknown_recording(
-      folder,
-      "no known recording: neither rgb.txt and depth.txt (TUM), nor frame-*.color.png (7-Scenes), nor "
-      "numbered images in rgb and depth (ICL-NUIM), nor color, depth and intrinsic_depth.txt (ScanNet)"));
-}
+[[nodiscard]] result<recording_index> index_recording(const std::filesystem::path& folder, recording_format& format,
+                                                      double max_time_difference);
 
 }  // namespace detail
 
@@ -215,36 +148,11 @@ namespace detail {
 /// files or the folder's name tell; else this fails.
 /// Errors: not_found, unreadable, unsupported (no known format), no_data (nothing in it), malformed
 /// (with file and line), invalid_argument (no camera known).
-[[nodiscard]] inline result<recording> open_recording(const std::filesystem::path& folder,
-                                                      const recording_options& options = {}) {
-  std::error_code ignored;
-  if (!detail::present(folder)) return fail(errc::not_found, folder.string(), "no such folder");
-  if (!std::filesystem::is_directory(folder, ignored))
-    return fail(errc::unsupported, folder.string(), "a recording is a folder, this is a file");
-
-  recording_format format = options.format;
-  auto index = detail::index_recording(folder, format, options.max_time_difference);
-  if (!index) return fail(index.error());
-
-  std::optional<camera::camera_settings> camera = options.camera;
-  if (const auto file = folder / "camera.toml"; !camera && detail::present(file)) {
-    auto read = read_camera(file);
-    if (!read) return fail(read.error());
-    camera = *std::move(read);
-    index->files.push_back(file);
-  }
-  if (!camera) camera = index->camera;
-  if (!camera)
-    return fail(errc::invalid_argument, folder.string(),
-                "the camera is not known: put a camera.toml into the folder, or name a camera");
-  if (index->color) {
-    const auto size = [](const camera::intrinsics& k) {
-      return std::to_string(k.width) + " x " + std::to_string(k.height);
-    };
-    index->notes.push_back("colour images of " + size(index->color->model.k()) +
-                           " pixels are resampled to the depth camera, " + size(camera->model.k()));
-  }
-  return recording(*std::move(index), *std::move(camera), format);
-}
+[[nodiscard]] result<recording> open_recording(const std::filesystem::path& folder,
+                                               const recording_options& options = {});
 
 }  // namespace orbis::io
+
+#ifndef ORBIS_COMPILED_IO
+#include <orbis/io/detail/compiled/recording_functions.hpp>
+#endif

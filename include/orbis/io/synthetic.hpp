@@ -52,16 +52,7 @@ class synthetic_recording {
   class iterator;
 
   /// @pre frames >= 0, fps > 0, width and height > 0, depth_scale > 0, and those of scene and path
-  explicit synthetic_recording(const synthetic_options& options = {})
-      : options_{options},
-        path_{options.path, options.seed,
-              (options.frames_around > 0 ? options.frames_around : options.frames) / options.fps},
-        k_{detail::synthetic::usual_intrinsics(options.width, options.height)},
-        scene_{std::make_shared<detail::synthetic::scene>(options.scene, options.seed)},
-        simulator_{std::make_shared<detail::synthetic::texture_set>(detail::synthetic::painted(*scene_), texel(k_)), k_,
-                   options.depth_scale, options.sensor, options.seed} {
-    assert(options.frames >= 0 && options.fps > 0.0);
-  }
+  explicit synthetic_recording(const synthetic_options& options = {});
 
   [[nodiscard]] std::size_t size() const noexcept { return static_cast<std::size_t>(options_.frames); }
   [[nodiscard]] bool empty() const noexcept { return size() == 0; }
@@ -91,15 +82,10 @@ class synthetic_recording {
   /// The exact pose of frame `i`.
   [[nodiscard]] se3 T_world_camera(std::size_t i) const { return path_.at(timestamp(i)).T_world_camera(); }
   /// The exact poses of all frames.
-  [[nodiscard]] trajectory ground_truth() const {
-    trajectory all;
-    all.reserve(size());
-    for (std::size_t i = 0; i != size(); ++i) all.push_back({timestamp(i), T_world_camera(i)});
-    return all;
-  }
+  [[nodiscard]] trajectory ground_truth() const;
 
   /// Frame `i` as the sensor sees it. Errors: invalid_argument if there is no frame `i`.
-  [[nodiscard]] result<camera::rgbd_frame> frame(std::size_t i) const { return render(par, i); }
+  [[nodiscard]] result<camera::rgbd_frame> frame(std::size_t i) const;
 
   /// Frame `i` as the sensor sees it, made on the policy's threads. Errors: as `frame`.
   template <execution_policy Policy>
@@ -111,7 +97,7 @@ class synthetic_recording {
 
   /// Frame `i` as a stereo camera sees it, whose left camera is `camera()` and whose right one stands
   /// `stereo_camera().baseline` to the right of it. Errors: as `frame`.
-  [[nodiscard]] result<camera::stereo_frame> stereo_frame(std::size_t i) const { return render_stereo(par, i); }
+  [[nodiscard]] result<camera::stereo_frame> stereo_frame(std::size_t i) const;
   template <execution_policy Policy>
   [[nodiscard]] result<camera::stereo_frame> render_stereo(const Policy& policy, std::size_t i) const {
     if (i >= size()) return no_such_frame(i);
@@ -149,13 +135,8 @@ class synthetic_recording {
  private:
   /// Texels are about the size of a pixel at 2 m.
   [[nodiscard]] static double texel(const camera::intrinsics& k) noexcept { return std::max(0.003, 2.0 / k.fx); }
-  [[nodiscard]] detail::synthetic::moment moment_at(double time) const {
-    return {scene_->solids_at(time), path_.at(time)};
-  }
-  [[nodiscard]] tl::unexpected<error> no_such_frame(std::size_t i) const {
-    return fail(errc::invalid_argument, "frame",
-                "there is no frame " + std::to_string(i) + " among " + std::to_string(size()));
-  }
+  [[nodiscard]] detail::synthetic::moment moment_at(double time) const;
+  [[nodiscard]] tl::unexpected<error> no_such_frame(std::size_t i) const;
 
   synthetic_options options_;
   detail::synthetic::camera_path path_;
@@ -188,10 +169,7 @@ class synthetic_recording::iterator {
   [[nodiscard]] friend bool operator==(const iterator& a, const iterator& b) noexcept { return a.index_ == b.index_; }
 
  private:
-  void load() {
-    frame_ = index_ < recording_->size() ? std::make_shared<const camera::rgbd_frame>(recording_->frame(index_).value())
-                                         : nullptr;
-  }
+  void load();
 
   const synthetic_recording* recording_ = nullptr;
   std::size_t index_ = 0;
@@ -202,3 +180,7 @@ inline synthetic_recording::iterator synthetic_recording::begin() const { return
 inline synthetic_recording::iterator synthetic_recording::end() const { return {*this, size()}; }
 
 }  // namespace orbis::io
+
+#ifndef ORBIS_COMPILED_IO
+#include <orbis/io/detail/compiled/synthetic_functions.hpp>
+#endif

@@ -3,15 +3,7 @@
 /// A vocabulary for ORB descriptors that needs no file.
 #pragma once
 
-#include <cstddef>
-#include <span>
-#include <string>
-#include <string_view>
-
-#include <orbis/core/bytes.hpp>
-#include <orbis/places/detail/default_vocabulary_data.hpp>
 #include <orbis/places/vocabulary.hpp>
-#include <orbis/places/vocabulary_file.hpp>
 
 namespace orbis::places {
 
@@ -19,14 +11,11 @@ namespace orbis::places {
 /// rooms. Takes a few milliseconds: keep the result, whose copies share the tree. A vocabulary that is trained on
 /// recordings of your own places, or a larger one, recognises more.
 ///
-/// The example `train_vocabulary` makes the same bytes again: see the head of default_vocabulary_data.hpp.
-[[nodiscard]] inline vocabulary default_vocabulary() {
-  std::string bytes;
-  bytes.reserve(detail::default_vocabulary_size + 4);
-  for (const std::string_view text : detail::default_vocabulary_text)
-    if (!append_base85(bytes, text)) return {};  // never: tests read it
-  bytes.resize(detail::default_vocabulary_size);
-  return parse_vocabulary(std::as_bytes(std::span{bytes}), "default vocabulary").value();
-}
+/// The example `train_vocabulary` makes the same bytes again: see the head of detail/default_vocabulary_data.hpp.
+[[nodiscard]] vocabulary default_vocabulary();
 
 }  // namespace orbis::places
+
+#ifndef ORBIS_COMPILED
+#include <orbis/places/detail/compiled/default_vocabulary_functions.hpp>
+#endif

@@ -25,3 +25,7 @@ using monocular_system =
     rgbd_system<camera::any_camera, features::orb_extractor, orb_matchers, bag_of_words_places, monocular>;
 
 }  // namespace orbis::slam
+
+#ifdef ORBIS_COMPILED
+#include <orbis/slam/detail/compiled/monocular_system.hpp>
+#endif

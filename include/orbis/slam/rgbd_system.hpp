@@ -23,6 +23,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
@@ -37,13 +38,11 @@
 #include <orbis/features/orb.hpp>
 #include <orbis/slam/atlas.hpp>
 #include <orbis/slam/camera_rig.hpp>
-#include <orbis/slam/detail/system/back_end.hpp>
+#include <orbis/slam/detail/system/definitions_check.hpp>
 #include <orbis/slam/detail/system/shared_state.hpp>
-#include <orbis/slam/detail/system/stopwatch.hpp>
-#include <orbis/slam/detail/tracking/front_end.hpp>
 #include <orbis/slam/events.hpp>
 #include <orbis/slam/extractor.hpp>
-#include <orbis/slam/map_file.hpp>
+#include <orbis/slam/map.hpp>
 #include <orbis/slam/matchers.hpp>
 #include <orbis/slam/options.hpp>
 #include <orbis/slam/place_recognition.hpp>
@@ -52,6 +51,15 @@
 #include <orbis/slam/track_result.hpp>
 
 namespace orbis::slam {
+namespace detail {
+
+template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
+class front_end;
+template <camera::camera_model Camera, feature_descriptor D, place_recognizer<D> Places>
+class back_end;
+class stopwatch;
+
+}  // namespace detail
 
 /// Tracks the frames of one camera and builds a map of landmarks. Images are not kept; a caller who needs those of
 /// keyframes keeps them when `track` returns a keyframe.
@@ -69,6 +77,11 @@ template <camera::camera_model Camera, feature_extractor Extractor = features::o
           place_recognizer<descriptor_of_t<Extractor>> Places = bag_of_words_places,
           sensor<descriptor_of_t<Extractor>> Sensor = rgbd>
 class rgbd_system {
+  static_assert(
+      detail::has_definitions<detail::of_system, Camera, Extractor, Matchers, Places, Sensor>,
+      "orbis::compiled does not hold the system of these types (it does for camera::any_camera, where the other "
+      "arguments are the library's): include <orbis/slam/definitions.hpp>");
+
  public:
   using descriptor_type = descriptor_of_t<Extractor>;
   using atlas_type = basic_atlas<descriptor_type>;
@@ -96,6 +109,8 @@ class rgbd_system {
   template <camera::depth_source Depth>
   requires measures<Sensor, Camera, Extractor, image_view<const rgb8>, Depth> track_result
   track(double timestamp, image_view<const rgb8> color, const Depth& depth) {
+    static_assert(detail::has_definitions<detail::of_system, rgbd_system, Depth>,
+                  "orbis::compiled does not hold `track` for this type of depth: include <orbis/slam/definitions.hpp>");
     return track_images(timestamp, color, depth);
   }
   /// As above, for a sensor that takes the two images of a rectified stereo pair. `timestamp`: seconds.
@@ -149,7 +164,7 @@ class rgbd_system {
   /// Time stamp and pose of each keyframe of the active map.
   [[nodiscard]] orbis::trajectory keyframe_trajectory() const;
   /// What the frames tell of the shutter; empty without `options::estimates_shutter`. For the thread that tracks.
-  [[nodiscard]] std::optional<shutter_estimate> estimated_shutter() const { return front_end_.estimated_shutter(); }
+  [[nodiscard]] std::optional<shutter_estimate> estimated_shutter() const;
   /// The number of landmarks of the active map.
   [[nodiscard]] std::size_t landmark_count() const;
   [[nodiscard]] track_counters counters() const;
@@ -182,6 +197,8 @@ class rgbd_system {
 
  private:
   using frame_type = basic_frame<descriptor_type>;
+  using front_end = detail::front_end<Camera, descriptor_type, Matchers, Sensor>;
+  using back_end = detail::back_end<Camera, descriptor_type, Places>;
 
   template <class... Images>
   track_result track_images(double timestamp, const Images&... images);
@@ -207,10 +224,10 @@ class rgbd_system {
   Extractor extract_;
   [[no_unique_address]] Sensor sensor_{};
   detail::shared_state<Camera, descriptor_type, Places> shared_;
-  detail::front_end<Camera, descriptor_type, Matchers, Sensor> front_end_;
+  std::unique_ptr<front_end> front_end_;
   track_state reported_state_ = track_state::not_started;
   std::atomic<bool> localization_only_;
-  detail::back_end<Camera, descriptor_type, Places> back_end_;  ///< last: its threads use the rest
+  std::unique_ptr<back_end> back_end_;  ///< last: its threads use the rest
 };
 
 template <class Camera>
@@ -220,281 +237,10 @@ rgbd_system(Camera) -> rgbd_system<Camera>;
 template <class Camera, class Extractor>
 rgbd_system(Camera, options, Extractor) -> rgbd_system<Camera, Extractor>;
 
-// The members are defined outside of the class, so that a compiled instantiation of it (`extern template`) covers them.
-
-#define ORBIS_SLAM_SYSTEM_TEMPLATE                                    \
-  template <camera::camera_model Camera, feature_extractor Extractor, \
-            tracking_matchers<descriptor_of_t<Extractor>> Matchers,   \
-            place_recognizer<descriptor_of_t<Extractor>> Places, sensor<descriptor_of_t<Extractor>> Sensor>
-#define ORBIS_SLAM_SYSTEM rgbd_system<Camera, Extractor, Matchers, Places, Sensor>
-
-ORBIS_SLAM_SYSTEM_TEMPLATE
-ORBIS_SLAM_SYSTEM::rgbd_system(Camera camera, const options& settings) requires
-    std::constructible_from<Extractor, const features::orb_options&> && std::default_initializable<Places>
-    : rgbd_system(std::move(camera), settings, Extractor(settings.features), Places{}) {}
-
-ORBIS_SLAM_SYSTEM_TEMPLATE
-ORBIS_SLAM_SYSTEM::rgbd_system(Camera camera, const options& settings, Extractor extractor, Places places)
-    : options_{settings},
-      extract_{std::move(extractor)},
-      shared_{make_rig(std::move(camera), settings, measures_scale<Sensor>(settings)), options_, std::move(places)},
-      front_end_{shared_.rig, options_},
-      localization_only_{settings.localization_only},
-      back_end_{shared_} {}
-
-ORBIS_SLAM_SYSTEM_TEMPLATE
-ORBIS_SLAM_SYSTEM::~rgbd_system() = default;
-
-ORBIS_SLAM_SYSTEM_TEMPLATE
-void ORBIS_SLAM_SYSTEM::listen(listeners callbacks) { shared_.callbacks = std::move(callbacks); }
-
-ORBIS_SLAM_SYSTEM_TEMPLATE
-track_result ORBIS_SLAM_SYSTEM::track(const camera::rgbd_frame& f) requires
-    measures<Sensor, Camera, Extractor, image_view<const rgb8>, camera::depth_view<std::uint16_t>> {
-  return track_images(f.timestamp, f.color.view(), f.depth_metres());
-}
-
-ORBIS_SLAM_SYSTEM_TEMPLATE
-track_result ORBIS_SLAM_SYSTEM::track(double timestamp, image_view<const rgb8> left,
-                                      image_view<const rgb8> right) requires
-    measures<Sensor, Camera, Extractor, image_view<const rgb8>, image_view<const rgb8>> {
-  return track_images(timestamp, left, right);
-}
-
-ORBIS_SLAM_SYSTEM_TEMPLATE
-track_result ORBIS_SLAM_SYSTEM::track(double timestamp, image_view<const std::uint8_t> left,
-                                      image_view<const std::uint8_t> right) requires
-    measures<Sensor, Camera, Extractor, image_view<const std::uint8_t>, image_view<const std::uint8_t>> {
-  return track_images(timestamp, left, right);
-}
-
-ORBIS_SLAM_SYSTEM_TEMPLATE
-track_result ORBIS_SLAM_SYSTEM::track(double timestamp, image_view<const rgb8> color) requires
-    measures<Sensor, Camera, Extractor, image_view<const rgb8>> {
-  return track_images(timestamp, color);
-}
-
-ORBIS_SLAM_SYSTEM_TEMPLATE
-track_result ORBIS_SLAM_SYSTEM::track(double timestamp, image_view<const std::uint8_t> grey) requires
-    measures<Sensor, Camera, Extractor, image_view<const std::uint8_t>> {
-  return track_images(timestamp, grey);
-}
-
-ORBIS_SLAM_SYSTEM_TEMPLATE
-template <class... Images>
-track_result ORBIS_SLAM_SYSTEM::track_images(double timestamp, const Images&... images) {
-  track_result result;
-  detail::stopwatch clock;
-  frame_type f = measure(timestamp, images...);
-  front_end_.depth().see_nothing();
-  if constexpr (has_depth_image<Sensor, Images...>)
-    if (are_usable(timestamp, images...)) front_end_.depth().see(Sensor::depth_image(images...));
-  clock.lap(result.timings.features_ms);
-  if (options_.threads.wait) back_end_.wait_for_room();
-  const auto follow_rows = [&](frame_type& seen, const frame_motion& motion) {
-    if constexpr (follows_rows<Sensor, descriptor_type, Camera, Images...>)
-      Sensor::follow_rows(shared_.rig, motion, seen, images...);
-  };
-  const std::optional<map_keyframe> made = localize(std::move(f), std::cref(follow_rows), result, clock);
-  if (made) {
-    if (const auto& first = front_end_.first_keyframe()) dispatch_keyframe(*first);
-    dispatch_keyframe(*made);
-  }
-  report(result, made);
-  clock.lap(result.timings.mapping_ms);
-  return result;
-}
-
-ORBIS_SLAM_SYSTEM_TEMPLATE
-template <class... Images>
-auto ORBIS_SLAM_SYSTEM::measure(double timestamp, const Images&... images) const -> frame_type {
-  frame_type f;
-  // Others do not come here; clang before 16 instantiates members of which the constraints do not hold.
-  if constexpr (measures<Sensor, Camera, Extractor, Images...>)
-    if (are_usable(timestamp, images...)) {
-      f = sensor_.measure(shared_.rig, extract_, images...);
-      f.scale_is_known = shared_.rig.scale_is_known;
-      if (!f.scale_is_known) std::fill(f.depth.begin(), f.depth.end(), 0.0F);  // what a sensor of run time may measure
-      if (front_end_.looks_at_rows()) detail::keep_as_read(f);
-    }
-  f.timestamp = std::isfinite(timestamp) ? timestamp : front_end_.last_timestamp();
-  f.index = front_end_.counters().frames;
-  return f;
-}
-
-ORBIS_SLAM_SYSTEM_TEMPLATE
-std::optional<map_keyframe> ORBIS_SLAM_SYSTEM::localize(
-    frame_type f, const std::function<void(frame_type&, const frame_motion&)>& follow_rows, track_result& result,
-    detail::stopwatch& clock) {
-  const auto lock = shared_.lock();
-  atlas_type& maps = shared_.atlas;
-  const bool is_frozen = localization_only_;
-  const auto similar = [this](const auto& features, std::size_t count) {
-    return shared_.similar(shared_.places.describe(features), count, [](map_keyframe) { return false; });
-  };
-  const auto drop = [this](map_id m) {  // unless mapping works on it; then it stays
-    if (const auto edit = shared_.try_edit()) shared_.remove_map(m);
-  };
-  front_end_.sync_with_map(maps);
-  result.inliers = front_end_.localize(f, maps, is_frozen, follow_rows, similar, drop);
-  clock.lap(result.timings.tracking_ms);
-  std::optional<map_keyframe> made;
-  if (front_end_.is_tracking()) {
-    front_end_.update_reference(f, maps);
-    const bool may_grow = front_end_.begins_map() || (!is_frozen && !back_end_.is_full());
-    if (may_grow && front_end_.needs_keyframe(f, result.inliers, maps)) made = front_end_.make_keyframe(f, maps);
-  }
-  front_end_.finish(std::move(f), maps, made);
-  return made;
-}
-
-ORBIS_SLAM_SYSTEM_TEMPLATE
-void ORBIS_SLAM_SYSTEM::dispatch_keyframe(map_keyframe k) {
-  if (const auto& callback = shared_.callbacks.keyframe_made)  // its map may have been merged into another one since
-    callback(shared_.locked([&] { return shared_.event_of(shared_.atlas.current(k)); }));
-  back_end_.process(k);
-}
-
-ORBIS_SLAM_SYSTEM_TEMPLATE
-void ORBIS_SLAM_SYSTEM::report(track_result& result, const std::optional<map_keyframe>& made) {
-  auto lock = shared_.lock();
-  result.state = front_end_.state();
-  result.map = shared_.atlas.active_id();
-  if (made) result.keyframe = shared_.atlas.current(*made).keyframe;
-  if (front_end_.is_tracking()) {
-    result.T_world_camera = front_end_.last_pose(shared_.atlas);
-    result.twist = front_end_.last_twist();
-  }
-  const state_event changed{std::exchange(reported_state_, result.state), result.state,
-                            front_end_.counters().frames - 1};
-  lock.unlock();
-  if (changed.from != changed.to && shared_.callbacks.state_changed) shared_.callbacks.state_changed(changed);
-}
-
-ORBIS_SLAM_SYSTEM_TEMPLATE
-track_state ORBIS_SLAM_SYSTEM::state() const {
-  return shared_.locked([&] { return front_end_.state(); });
-}
-
-ORBIS_SLAM_SYSTEM_TEMPLATE
-std::optional<tracked_frame> ORBIS_SLAM_SYSTEM::last_frame() const {
-  if (reported_state_ != track_state::tracking && reported_state_ != track_state::relocalized) return std::nullopt;
-  return front_end_.last_frame();
-}
-
-ORBIS_SLAM_SYSTEM_TEMPLATE
-void ORBIS_SLAM_SYSTEM::wait() const { back_end_.wait(); }
-
-ORBIS_SLAM_SYSTEM_TEMPLATE
-orbis::trajectory ORBIS_SLAM_SYSTEM::trajectory() const {
-  return shared_.locked([&] { return front_end_.log().trajectory(shared_.atlas, shared_.atlas.active_id()); });
-}
-
-ORBIS_SLAM_SYSTEM_TEMPLATE
-orbis::trajectory ORBIS_SLAM_SYSTEM::trajectory(map_id map) const {
-  return shared_.locked([&] { return front_end_.log().trajectory(shared_.atlas, map); });
-}
-
-ORBIS_SLAM_SYSTEM_TEMPLATE
-std::vector<keyframe_pose> ORBIS_SLAM_SYSTEM::keyframes() const {
-  pose_revision never{.map = no_id};
-  return *keyframes_since(never);
-}
-
-ORBIS_SLAM_SYSTEM_TEMPLATE
-std::optional<std::vector<keyframe_pose>> ORBIS_SLAM_SYSTEM::keyframes_since(pose_revision& seen) const {
-  return shared_.locked([&]() -> std::optional<std::vector<keyframe_pose>> {
-    const map_type& active = shared_.atlas.active();
-    const pose_revision now{shared_.atlas.active_id(), active.pose_changes()};
-    if (std::exchange(seen, now) == now) return std::nullopt;
-    std::vector<keyframe_pose> all;
-    for (const auto& k : active.keyframes()) all.push_back({k.timestamp, k.T_world_camera, k.index});
-    return all;
-  });
-}
-
-ORBIS_SLAM_SYSTEM_TEMPLATE
-orbis::trajectory ORBIS_SLAM_SYSTEM::keyframe_trajectory() const {
-  orbis::trajectory all;
-  for (const keyframe_pose& k : keyframes()) all.push_back({k.timestamp, k.T_world_camera});
-  return all;
-}
-
-ORBIS_SLAM_SYSTEM_TEMPLATE
-std::size_t ORBIS_SLAM_SYSTEM::landmark_count() const {
-  return shared_.locked([&] { return shared_.atlas.active().landmark_count(); });
-}
-
-ORBIS_SLAM_SYSTEM_TEMPLATE
-track_counters ORBIS_SLAM_SYSTEM::counters() const {
-  return shared_.locked([&] {
-    track_counters all = front_end_.counters();
-    all.loops_closed = shared_.loops_closed;
-    all.maps_merged = shared_.maps_merged;
-    all.keyframes_culled = shared_.keyframes_culled;
-    return all;
-  });
-}
-
-ORBIS_SLAM_SYSTEM_TEMPLATE
-map_id ORBIS_SLAM_SYSTEM::active_map() const {
-  return shared_.locked([&] { return shared_.atlas.active_id(); });
-}
-
-ORBIS_SLAM_SYSTEM_TEMPLATE
-map_id ORBIS_SLAM_SYSTEM::largest_map() const {
-  return shared_.locked([&] { return front_end_.log().largest_map(shared_.atlas); });
-}
-
-ORBIS_SLAM_SYSTEM_TEMPLATE
-bool ORBIS_SLAM_SYSTEM::activate(map_id map) {
-  return shared_.locked([&] {
-    if (!shared_.atlas.contains(map)) return false;
-    if (map != shared_.atlas.active_id()) {
-      shared_.atlas.activate(map);
-      front_end_.set_lost();
-    }
-    return true;
-  });
-}
-
-ORBIS_SLAM_SYSTEM_TEMPLATE
-result<void> ORBIS_SLAM_SYSTEM::save_map(const std::filesystem::path& path)
-    const requires std::same_as<descriptor_of_t<Extractor>, features::binary_descriptor<256>> {
-  const std::string bytes = inspect([](const atlas_type& all) { return map_bytes(all.active()); });
-  return write_map_bytes(path, bytes);
-}
-
-ORBIS_SLAM_SYSTEM_TEMPLATE
-result<void> ORBIS_SLAM_SYSTEM::load_map(const std::filesystem::path& path) requires
-    std::same_as<descriptor_of_t<Extractor>, features::binary_descriptor<256>> {
-  auto loaded = read_map(path);
-  if (!loaded) return fail(loaded.error());
-  const auto& content = loaded->content();
-  if (content.levels != shared_.rig.scales.levels() || !(content.scale_factor == shared_.rig.scales.factor()))
-    return fail(errc::unsupported, path.string(), "the map was made with another image pyramid");
-  if (loaded->scale_is_known() != shared_.rig.scale_is_known)
-    return fail(errc::unsupported, path.string(),
-                shared_.rig.scale_is_known ? "the map was made without depth, its unit of length is not the metre"
-                                           : "the map was made with depth, and this sensor measures none");
-  if (loaded->keyframes().empty()) return fail(errc::no_data, path.string(), "the map has no keyframes");
-  std::vector<std::pair<keyframe_id, typename Places::signature>> bow_vectors;  // before tracking has to wait
-  for (const auto& k : loaded->keyframes()) bow_vectors.emplace_back(k.id, shared_.places.describe(k.features));
-  const auto lock = shared_.lock();
-  const map_id before = shared_.atlas.active_id();
-  const bool drop = shared_.atlas.active().keyframes().empty();
-  const map_id id = shared_.atlas.create(*std::move(loaded));
-  if (drop) shared_.atlas.remove(before);
-  for (const auto& [k, seen] : bow_vectors) shared_.places.add({id, k}, seen);
-  front_end_.set_lost();
-  return {};
-}
-
-#undef ORBIS_SLAM_SYSTEM
-#undef ORBIS_SLAM_SYSTEM_TEMPLATE
-
 }  // namespace orbis::slam
 
 #ifdef ORBIS_COMPILED
 #include <orbis/slam/detail/compiled/rgbd_system.hpp>
+#else
+#include <orbis/slam/detail/system/rgbd_system_functions.hpp>
 #endif

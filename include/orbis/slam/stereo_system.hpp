@@ -25,3 +25,7 @@ using stereo_system =
     rgbd_system<camera::any_camera, features::orb_extractor, orb_matchers, bag_of_words_places, stereo>;
 
 }  // namespace orbis::slam
+
+#ifdef ORBIS_COMPILED
+#include <orbis/slam/detail/compiled/stereo_system.hpp>
+#endif

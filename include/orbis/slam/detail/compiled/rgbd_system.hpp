@@ -1,32 +1,35 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// What the library orbis::compiled holds of the SLAM system: that of a camera whose model is known at run time, with
-/// the default extractor, matchers and places. cmake/compiled/slam_*.cpp instantiate it, part by part, so that none of
-/// them takes much time and memory.
+/// What the library orbis::compiled holds of the SLAM system from RGB-D: that of a camera whose model is known at run
+/// time, with the default extractor, matchers and places. cmake/compiled/slam_system.cpp instantiates it.
 #pragma once
 
+#include <cstdint>
+
 #include <orbis/camera/any.hpp>
-#include <orbis/slam/detail/compiled/loops.hpp>
-#include <orbis/slam/detail/compiled/mapping.hpp>
-#include <orbis/slam/detail/system/back_end.hpp>
-#include <orbis/slam/detail/tracking/front_end.hpp>
-#include <orbis/slam/detail/tracking/tracker.hpp>
+#include <orbis/camera/depth.hpp>
+#include <orbis/core/image.hpp>
+#include <orbis/features/orb.hpp>
+#include <orbis/slam/detail/system/definitions_check.hpp>
 #include <orbis/slam/matchers.hpp>
 #include <orbis/slam/place_recognition.hpp>
 #include <orbis/slam/rgbd_system.hpp>
 #include <orbis/slam/sensor.hpp>
+#include <orbis/slam/track_result.hpp>
 
 namespace orbis::slam {
-namespace detail {
 
-extern template class tracker<camera::any_camera, compiled_descriptor, orb_matchers>;
-extern template class front_end<camera::any_camera, compiled_descriptor, orb_matchers, rgbd>;
-extern template class local_mapper<camera::any_camera, compiled_descriptor, bag_of_words_places>;
-extern template class loop_closer<camera::any_camera, compiled_descriptor, bag_of_words_places>;
-extern template class back_end<camera::any_camera, compiled_descriptor, bag_of_words_places>;
-
-}  // namespace detail
+template <>
+inline constexpr bool detail::is_compiled<detail::of_system, camera::any_camera, features::orb_extractor, orb_matchers,
+                                          bag_of_words_places, rgbd> = true;
+template <class T>
+inline constexpr bool detail::is_compiled<detail::of_system, rgbd_system<camera::any_camera>, camera::depth_view<T>> =
+    true;
 
 extern template class rgbd_system<camera::any_camera>;
+extern template track_result rgbd_system<camera::any_camera>::track_images(double, const image_view<const rgb8>&,
+                                                                           const camera::depth_view<std::uint16_t>&);
+extern template track_result rgbd_system<camera::any_camera>::track_images(double, const image_view<const rgb8>&,
+                                                                           const camera::depth_view<float>&);
 
 }  // namespace orbis::slam

@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// The functions of mono_recording.hpp: inline, or, with ORBIS_COMPILED_IO, compiled once, by
+/// cmake/compiled_io/mono_recording.cpp.
+#pragma once
+
+#include <cassert>
+#include <cstddef>
+#include <filesystem>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include <orbis/camera/mono_frame.hpp>
+#include <orbis/camera/settings.hpp>
+#include <orbis/core/result.hpp>
+#include <orbis/core/trajectory.hpp>
+#include <orbis/io/camera_file.hpp>
+#include <orbis/io/detail/compiled_once.hpp>
+#include <orbis/io/detail/recordings/one_camera.hpp>
+#include <orbis/io/detail/recordings/recording_index.hpp>
+#include <orbis/io/detail/recordings/sized_image.hpp>
+#include <orbis/io/image.hpp>
+#include <orbis/io/mono_recording.hpp>
+#include <orbis/io/recording.hpp>
+
+namespace orbis::io {
+
+ORBIS_COMPILED_IO_ONCE std::vector<std::filesystem::path> mono_recording::files() const {
+  std::vector<std::filesystem::path> all = index_.files;
+  for (const detail::recording_entry& entry : index_.frames) all.push_back(entry.color);
+  return all;
+}
+
+ORBIS_COMPILED_IO_ONCE result<camera::mono_frame> mono_recording::frame(std::size_t i) const {
+  auto image = color(i);
+  if (!image) return fail(image.error());
+  const detail::recording_entry& entry = index_.frames[i];
+  return camera::mono_frame{entry.timestamp, *std::move(image), entry.T_world_camera};
+}
+
+ORBIS_COMPILED_IO_ONCE result<image<rgb8>> mono_recording::color(std::size_t i) const {
+  assert(i < size());
+  const std::filesystem::path& file = index_.frames[i].color;
+  return detail::sized(read_color(file), file, camera_.model.width(), camera_.model.height());
+}
+
+ORBIS_COMPILED_IO_ONCE mono_format detect_mono_format(const std::filesystem::path& folder) {
+  if (!detail::asl_camera_folder(folder).empty()) return mono_format::asl;
+  if (detail::is_kitti_camera(folder)) return mono_format::kitti;
+  if (!detail::image_list_of(folder).empty()) return mono_format::tum;
+  if (detect_format(folder) != recording_format::automatic) return mono_format::rgbd;
+  if (!detail::image_folder_of(folder).empty()) return mono_format::images;
+  return mono_format::automatic;
+}
+
+ORBIS_COMPILED_IO_ONCE result<mono_recording> open_mono_recording(const std::filesystem::path& folder,
+                                                                  const mono_recording_options& options) {
+  std::error_code ignored;
+  if (!detail::present(folder)) return fail(errc::not_found, folder.string(), "no such folder");
+  if (!std::filesystem::is_directory(folder, ignored))
+    return fail(errc::unsupported, folder.string(), "a recording is a folder, this is a file");
+  std::optional<camera::camera_settings> camera = options.camera;
+  std::optional<std::filesystem::path> camera_file;
+  if (const auto file = folder / "camera.toml"; !camera && detail::present(file)) {
+    auto read = read_camera(file);
+    if (!read) return fail(read.error());
+    camera = *std::move(read);
+    camera_file = file;
+  }
+  const mono_format format = options.format == mono_format::automatic ? detect_mono_format(folder) : options.format;
+  const auto read_index = [&]() -> result<detail::recording_index> {
+    switch (format) {
+      case mono_format::tum: return detail::index_image_list(folder);
+      case mono_format::kitti: return detail::index_kitti_camera(folder);
+      case mono_format::asl: return detail::index_asl_camera(folder);
+      case mono_format::rgbd: {
+        recording_format with_depth = recording_format::automatic;
+        return detail::index_recording(folder, with_depth, recording_options{}.max_time_difference);
+      }
+      case mono_format::images: return detail::index_image_folder(folder, camera ? camera->fps : 30.0);
+      case mono_format::automatic: break;
+    }
+    return fail(detail::unknown_recording(
+        folder,
+        "no known recording of one camera: neither rgb.txt (TUM), nor image_0 or image_2 with calib.txt (KITTI), nor "
+        "mav0/cam0 (ASL, EuRoC), nor PNG or JPEG images in it or in rgb, color, images, left or data"));
+  };
+  auto index = read_index();
+  if (!index) return fail(index.error());
+  if (camera_file) index->files.push_back(*camera_file);
+  if (!camera) camera = index->camera;
+  if (!options.camera && !camera_file && index->color) camera->model = index->color->model;  // images as they are
+  if (!camera)
+    return fail(errc::invalid_argument, folder.string(),
+                "the camera is not known: put a camera.toml into the folder, or name a camera");
+  return mono_recording(*std::move(index), *std::move(camera), format);
+}
+
+}  // namespace orbis::io

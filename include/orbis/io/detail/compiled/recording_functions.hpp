@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// The functions of recording.hpp: inline, or, with ORBIS_COMPILED_IO, compiled once, by
+/// cmake/compiled_io/recording.cpp.
+#pragma once
+
+#include <cassert>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <iterator>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include <orbis/camera/rgbd_frame.hpp>
+#include <orbis/camera/settings.hpp>
+#include <orbis/core/result.hpp>
+#include <orbis/core/trajectory.hpp>
+#include <orbis/io/camera_file.hpp>
+#include <orbis/io/detail/compiled_once.hpp>
+#include <orbis/io/detail/recordings/icl_nuim.hpp>
+#include <orbis/io/detail/recordings/recording_index.hpp>
+#include <orbis/io/detail/recordings/scannet.hpp>
+#include <orbis/io/detail/recordings/seven_scenes.hpp>
+#include <orbis/io/detail/recordings/sized_image.hpp>
+#include <orbis/io/detail/recordings/tum.hpp>
+#include <orbis/io/image.hpp>
+#include <orbis/io/recording.hpp>
+
+namespace orbis::io {
+
+ORBIS_COMPILED_IO_ONCE recording::recording(detail::recording_index index, camera::camera_settings camera,
+                                            recording_format format)
+    : index_{std::move(index)}, camera_{std::move(camera)}, format_{format} {
+  assert(!index_.frames.empty());
+  if (const auto* depth = camera_.model.get_if<camera::pinhole>(); index_.color && depth != nullptr)
+    registration_.emplace(*index_.color, *depth);
+}
+
+ORBIS_COMPILED_IO_ONCE std::vector<std::filesystem::path> recording::files() const {
+  std::vector<std::filesystem::path> all = index_.files;
+  for (const detail::recording_entry& entry : index_.frames) all.insert(all.end(), {entry.color, entry.depth});
+  return all;
+}
+
+ORBIS_COMPILED_IO_ONCE result<camera::rgbd_frame> recording::frame(std::size_t i) const {
+  assert(i < size());
+  const detail::recording_entry& entry = index_.frames[i];
+  auto depth = read_sized_depth(entry.depth);
+  if (!depth) return fail(depth.error());
+  auto image = read_registered(entry.color, depth->view());
+  if (!image) return fail(image.error());
+  return camera::rgbd_frame{.timestamp = entry.timestamp,
+                            .color = *std::move(image),
+                            .depth = *std::move(depth),
+                            .depth_scale = camera_.depth_scale,
+                            .T_world_camera = entry.T_world_camera};
+}
+
+ORBIS_COMPILED_IO_ONCE result<image<rgb8>> recording::color(std::size_t i) const {
+  assert(i < size());
+  const detail::recording_entry& entry = index_.frames[i];
+  if (!registration_ || !registration_->needs_depth()) return read_registered(entry.color, {});
+  const auto depth = read_sized_depth(entry.depth);
+  if (!depth) return fail(depth.error());
+  return read_registered(entry.color, depth->view());
+}
+
+ORBIS_COMPILED_IO_ONCE void recording::iterator::read() {
+  frame_.reset();
+  if (i_ == of_->size()) return;
+  auto frame = of_->frame(i_);
+  if (frame)
+    frame_ = std::make_shared<const camera::rgbd_frame>(*std::move(frame));
+  else
+    of_->status_ = fail(std::move(frame.error()));
+}
+
+ORBIS_COMPILED_IO_ONCE result<image<std::uint16_t>> recording::read_sized_depth(
+    const std::filesystem::path& path) const {
+  return detail::sized(read_depth(path), path, camera_.model.width(), camera_.model.height());
+}
+
+ORBIS_COMPILED_IO_ONCE result<image<rgb8>> recording::read_registered(const std::filesystem::path& path,
+                                                                      image_view<const std::uint16_t> depth) const {
+  const camera::intrinsics& k = registration_ ? registration_->color().k() : camera_.model.k();
+  auto image = detail::sized(read_color(path), path, k.width, k.height);
+  if (image && registration_) image = registration_->register_color(image->view(), depth, camera_.depth_scale);
+  return image;
+}
+
+ORBIS_COMPILED_IO_ONCE recording_format detect_format(const std::filesystem::path& folder) {
+  if (detail::is_icl_nuim(folder)) return recording_format::icl_nuim;
+  if (detail::is_tum(folder)) return recording_format::tum;
+  if (detail::is_seven_scenes(folder)) return recording_format::seven_scenes;
+  if (detail::is_scannet(folder)) return recording_format::scannet;
+  return recording_format::automatic;
+}
+
+namespace detail {
+
+ORBIS_COMPILED_IO_ONCE result<recording_index> index_recording(const std::filesystem::path& folder,
+                                                               recording_format& format, double max_time_difference) {
+  if (format == recording_format::automatic) format = detect_format(folder);
+  switch (format) {
+    case recording_format::tum: return index_tum(folder, max_time_difference);
+    case recording_format::seven_scenes: return index_seven_scenes(folder);
+    case recording_format::icl_nuim: return index_icl_nuim(folder);
+    case recording_format::scannet: return index_scannet(folder);
+    case recording_format::automatic: break;
+  }
+  return fail(unknown_recording(
+      folder,
+      "no known recording: neither rgb.txt and depth.txt (TUM), nor frame-*.color.png (7-Scenes), nor "
+      "numbered images in rgb and depth (ICL-NUIM), nor color, depth and intrinsic_depth.txt (ScanNet)"));
+}
+
+}  // namespace detail
+
+ORBIS_COMPILED_IO_ONCE result<recording> open_recording(const std::filesystem::path& folder,
+                                                        const recording_options& options) {
+  std::error_code ignored;
+  if (!detail::present(folder)) return fail(errc::not_found, folder.string(), "no such folder");
+  if (!std::filesystem::is_directory(folder, ignored))
+    return fail(errc::unsupported, folder.string(), "a recording is a folder, this is a file");
+
+  recording_format format = options.format;
+  auto index = detail::index_recording(folder, format, options.max_time_difference);
+  if (!index) return fail(index.error());
+
+  std::optional<camera::camera_settings> camera = options.camera;
+  if (const auto file = folder / "camera.toml"; !camera && detail::present(file)) {
+    auto read = read_camera(file);
+    if (!read) return fail(read.error());
+    camera = *std::move(read);
+    index->files.push_back(file);
+  }
+  if (!camera) camera = index->camera;
+  if (!camera)
+    return fail(errc::invalid_argument, folder.string(),
+                "the camera is not known: put a camera.toml into the folder, or name a camera");
+  if (index->color) {
+    const auto size = [](const camera::intrinsics& k) {
+      return std::to_string(k.width) + " x " + std::to_string(k.height);
+    };
+    index->notes.push_back("colour images of " + size(index->color->model.k()) +
+                           " pixels are resampled to the depth camera, " + size(camera->model.k()));
+  }
+  return recording(*std::move(index), *std::move(camera), format);
+}
+
+}  // namespace orbis::io

@@ -1,0 +1,177 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// The functions of calibration.hpp. With orbis::compiled, which holds them for the descriptors of ORB, only
+/// definitions.hpp includes them.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <concepts>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <string_view>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include <orbis/camera/any.hpp>
+#include <orbis/camera/parameters.hpp>
+#include <orbis/core/execution.hpp>
+#include <orbis/core/result.hpp>
+#include <orbis/core/se3.hpp>
+#include <orbis/core/types.hpp>
+#include <orbis/optimize/bundle_problem.hpp>
+#include <orbis/optimize/self_calibration.hpp>
+#include <orbis/slam/calibration.hpp>
+#include <orbis/slam/camera_rig.hpp>
+#include <orbis/slam/detail/mapping/map_bundle.hpp>
+#include <orbis/slam/detail/system/definitions_check.hpp>
+#include <orbis/slam/map.hpp>
+
+namespace orbis::slam {
+
+template <class... Ts>
+struct detail::included_definitions<detail::of_calibration, Ts...> {};
+
+namespace detail {
+
+/// Where the stretch of `count` keyframes begins that observes most landmarks. O(keypoints).
+template <feature_descriptor D>
+[[nodiscard]] std::size_t first_to_take(const basic_map<D>& m, std::size_t count) {
+  std::vector<std::size_t> up_to{0};  // so many observations by the keyframes before
+  for (const auto& k : m.keyframes())
+    up_to.push_back(up_to.back() +
+                    static_cast<std::size_t>(k.landmarks.size() - static_cast<std::size_t>(std::count(
+                                                                      k.landmarks.begin(), k.landmarks.end(), no_id))));
+  std::size_t first = 0;
+  for (std::size_t i = 0; i + count < up_to.size(); ++i)
+    if (up_to[i + count] - up_to[i] > up_to[first + count] - up_to[first]) first = i;
+  return first;
+}
+
+/// The keyframes that take part, and the landmarks that two of them observe.
+template <feature_descriptor D, class Camera>
+[[nodiscard]] bundle_snapshot calibration_problem_of(const basic_map<D>& m, const camera_rig<Camera>& rig,
+                                                     std::size_t max_keyframes) {
+  bundle_snapshot s;
+  std::vector<std::uint32_t> index(m.keyframe_end().value(), no_id);
+  const std::size_t first = first_to_take(m, max_keyframes);
+  std::size_t number = 0;
+  for (const auto& k : m.keyframes()) {
+    const std::size_t i = number++;
+    if (i < first || i - first >= max_keyframes) continue;
+    index[k.id.value()] = static_cast<std::uint32_t>(s.keyframes.size());
+    s.add_keyframe(k.id, k.T_world_camera, false);
+  }
+  for (const auto& l : m.landmarks()) s.add_shared_landmark(m, l, rig, [&](keyframe_id k) { return index[k.value()]; });
+  return s;
+}
+
+/// Which of the parameters belong together, in the order in which they are given up.
+template <camera::parametric_camera Camera>
+[[nodiscard]] constexpr std::array<std::uint32_t, 3> parameter_groups() {
+  constexpr std::uint32_t focal_lengths = 0x3, principal_point = 0xc;
+  constexpr std::uint32_t tangential = std::same_as<Camera, camera::radial_tangential> ? 0xc0 : 0;
+  constexpr std::uint32_t all = (1U << camera::parameters_of<Camera>::count) - 1U,
+                          central = principal_point | tangential;
+  return {all & ~(focal_lengths | central), central, focal_lengths};
+}
+
+/// The parameters that are estimated if all are determined. Of a lens whose distortion is a fraction, numerator and
+/// denominator are determined only together, and so are, nearly, more than two powers of the radius.
+template <camera::parametric_camera Camera>
+[[nodiscard]] std::uint32_t usual_parameters(const Camera&) {
+  return (1U << camera::parameters_of<Camera>::count) - 1U;
+}
+[[nodiscard]] inline std::uint32_t usual_parameters(const camera::radial_tangential& c) {
+  return c.distortion().k3 != 0.0 ? 0x1ffU : 0xffU;
+}
+
+/// How far one standard deviation of the parameters named moves a pixel, at most, pixels.
+template <camera::parametric_camera Camera, class Covariance>
+[[nodiscard]] double effect_of(const Camera& camera, const Covariance& covariance, std::uint32_t parameters) {
+  constexpr int count = camera::parameters_of<Camera>::count, steps = 8;
+  double largest = 0.0;
+  for (int i = 0; i <= steps; ++i)
+    for (int j = 0; j <= steps; ++j) {
+      const auto ray = camera.unproject({(camera.width() - 1.0) * i / steps, (camera.height() - 1.0) * j / steps});
+      matrix<2, 3> by_point;
+      matrix<2, count> by_parameters;
+      if (!ray || !camera::parameters_of<Camera>::project(camera, *ray, by_point, by_parameters)) continue;
+      for (int k = 0; k != count; ++k)
+        if ((parameters >> k & 1U) == 0) by_parameters.col(k).setZero();
+      const mat2 moved = by_parameters * covariance * by_parameters.transpose();
+      largest = std::max(largest, std::sqrt(std::max(0.0, moved.trace())));
+    }
+  return largest;
+}
+
+template <camera::parametric_camera Camera>
+[[nodiscard]] result<calibration<Camera>> calibrate_model(const Camera& before, const bundle_snapshot& problem,
+                                                          double bf, const calibration_options& options,
+                                                          const progress& callback) {
+  using parameters = camera::parameters_of<Camera>;
+  const std::uint32_t usual = usual_parameters(before);
+  constexpr auto groups = parameter_groups<Camera>();
+  std::uint32_t free = usual;
+  std::optional<optimize::self_calibrated<Camera>> found;
+  while (!found) {
+    auto poses = problem.poses;
+    auto points = problem.points;
+    auto tried =
+        optimize::self_calibrate<Camera>(before, poses, points, problem.observations,
+                                         {.bf = bf, .free = free, .keeps_aspect = options.keeps_aspect}, callback);
+    if (!tried && tried.error().code != errc::degenerate) return fail(tried.error());
+    const auto is_vague = [&](std::uint32_t group) {
+      return (free & group) != 0 &&
+             (!tried || effect_of(tried->camera, tried->covariance, free & group) > options.max_effect);
+    };
+    if (std::none_of(groups.begin(), groups.end(), is_vague)) {
+      found = *std::move(tried);
+      break;
+    }
+    // Distortion must not make up for a focal length that is held: the groups are given up in their order.
+    free &= ~*std::find_if(groups.begin(), groups.end(), [&](std::uint32_t group) { return (free & group) != 0; });
+    if (free == 0)
+      return fail(errc::degenerate, "calibration",
+                  tried ? "the motion of the camera does not determine its parameters" : tried.error().message);
+  }
+  calibration<Camera> out{{{},
+                           problem.poses.size(),
+                           problem.points.size(),
+                           found->observations,
+                           found->outliers,
+                           found->initial_rms,
+                           found->final_rms},
+                          found->camera};
+  const auto from = parameters::get(before), to = parameters::get(found->camera);
+  for (int i = 0; i != parameters::count; ++i)
+    if ((usual >> i & 1U) != 0)
+      out.parameters.push_back({parameters::names[static_cast<std::size_t>(i)], from[i], to[i],
+                                std::sqrt(std::max(0.0, found->covariance(i, i))), (free >> i & 1U) == 0});
+  return out;
+}
+
+template <feature_descriptor D, calibrated_camera Camera>
+[[nodiscard]] result<calibration<Camera>> calibrate_by_map(const basic_map<D>& m, const camera_rig<Camera>& rig,
+                                                           const calibration_options& options,
+                                                           const progress& callback) {
+  camera_rig<Camera> loose = rig;  // a depth error counts as many pixels as bf says
+  loose.model.bf *= std::sqrt(options.depth_weight);
+  const bundle_snapshot problem = calibration_problem_of(m, loose, options.max_keyframes);
+  if constexpr (std::same_as<Camera, camera::any_camera>) {
+    return rig.camera().visit([&](const auto& model) -> result<calibration<Camera>> {
+      auto found = calibrate_model(model, problem, loose.model.bf, options, callback);
+      if (!found) return fail(found.error());
+      return calibration<Camera>{std::move(*found), found->camera};
+    });
+  } else {
+    return calibrate_model(rig.camera(), problem, loose.model.bf, options, callback);
+  }
+}
+
+}  // namespace detail
+}  // namespace orbis::slam
