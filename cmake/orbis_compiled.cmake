@@ -28,11 +28,14 @@ function(_orbis_add_compiled name archive macro)
   target_compile_options(orbis_${name} PRIVATE -ffp-contract=off)  # the same bits as everywhere
 endfunction()
 
-_orbis_add_compiled(compiled orbis ORBIS_COMPILED ${_orbis_sources})
-foreach(_orbis_component IN LISTS ORBIS_COMPILED_COMPONENTS)
-  target_link_libraries(orbis_compiled PUBLIC orbis_${_orbis_component})
-endforeach()
-set(ORBIS_COMPILED_LIBRARIES compiled)
+set(ORBIS_COMPILED_LIBRARIES)
+if(_orbis_sources)
+  _orbis_add_compiled(compiled orbis ORBIS_COMPILED ${_orbis_sources})
+  foreach(_orbis_component IN LISTS ORBIS_COMPILED_COMPONENTS)
+    target_link_libraries(orbis_compiled PUBLIC orbis_${_orbis_component})
+  endforeach()
+  list(APPEND ORBIS_COMPILED_LIBRARIES compiled)
+endif()
 
 # orbis::compiled_io: the same for recordings on disk and synthetic ones (cmake/compiled_io), with ORBIS_COMPILED_IO. It
 # stands apart, as it needs image codecs, which who links orbis::compiled need not have.

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <string>
 #include <thread>
+#include <unordered_map>
 #include <utility>
 #include <vector>
 
@@ -145,7 +146,7 @@ void track_frames(slam_system& slam, const frame_source& source, const settings&
 /// they were made; those that were culled were redundant to the landmarks, not to the dense cloud and the octree.
 std::optional<se3> present_pose(const orbis::slam::atlas& maps, const orbis::slam::map_keyframe& made) {
   const orbis::slam::map_keyframe now = maps.current(made);
-  if (now.map != maps.active_id()) return std::nullopt;
+  if (now.map != maps.active_id() || !maps.active().remembers(now.keyframe)) return std::nullopt;
   return maps.active().pose_of(now.keyframe);
 }
 
@@ -185,7 +186,7 @@ auto graph_of(const slam_system& slam) {
       }
       graph.keyframes.clear();
       graph.edges.clear();
-      std::vector<std::uint32_t> place(map.keyframe_end().value());  // of each keyframe in the list
+      std::unordered_map<std::uint32_t, std::uint32_t> place;  // of each keyframe in the list
       for (const auto& k : map.keyframes()) {
         place[k.id.value()] = static_cast<std::uint32_t>(graph.keyframes.size());
         graph.keyframes.push_back(k.T_world_camera);

@@ -400,6 +400,9 @@ def slam_maps():
     def gone(count):
         return struct.pack("<II", 0xffffffff, count)
 
+    def forgotten(count):
+        return b"\2" + struct.pack("<I", count)
+
     def slam_map(name, keyframes, parents, landmarks, size=None, sections=("size", "kfrm", "tree", "land"), version=1,
                  cut=0, more=b""):
         size = size or struct.pack("<IIdII", 8, 15, 1.2, len(keyframes), len(landmarks))
@@ -418,6 +421,20 @@ def slam_maps():
     seen = [landmark([(0, 0), (1, 1)]), landmark([(1, 0), (2, 3)], 1), landmark(0), landmark([(2, 0)], 2)]
     slam_map("good", three, line, seen)
     slam_map("empty", [], [], [])
+
+    def forgetful(name, ids, keyframes, parents=(), version=4):
+        slam_map(name, keyframes, parents, [], sizes(keyframes=ids, landmarks=0) + struct.pack("<II", 1, 1),
+                 version=version)
+
+    one = [keyframe([keypoint(0)])]
+    forgetful("forgotten", 9, [forgotten(2)] + one + [erased(2), forgotten(4)] + one, [parent(NONE), parent(2)])
+    forgetful("forgotten_all", 9, [forgotten(9)])
+    forgetful("forgotten_many", 1 << 28, [forgotten((1 << 28) - 1)] + one, [parent(NONE)])
+    forgetful("forgotten_beyond", (1 << 28) + 1, [forgotten((1 << 28) + 1)])
+    forgetful("forgotten_too_many", 9, [forgotten(10)])
+    forgetful("forgotten_none", 9, [forgotten(0)])
+    forgetful("forgotten_heir", 2, [erased(1), forgotten(1)])
+    forgetful("forgotten_version_3", 9, [forgotten(9)], version=3)
     slam_map("all_erased", [erased(1), erased(NONE)], [], [landmark(NONE)])
     slam_map("heirs", [erased(2), three[0], erased(1)], [parent(NONE)], [landmark([(1, 0)])])
     slam_map("own_heir", [erased(2), three[0], erased(0)], [parent(NONE)], [landmark([(1, 0)])])

@@ -7,6 +7,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include <orbis/core/bytes.hpp>
 #include <orbis/slam/detail/map/file_sections.hpp>
@@ -51,8 +52,10 @@ void check(const std::string& file) {
   const auto again = slam::parse_map(std::as_bytes(std::span{written}));
   fuzz::require(again && slam::map_bytes(*again) == written, "what was read is written and read to the same bytes");
   for (slam::landmark_id l = m.next_landmark(0); l < m.landmark_end(); l = m.next_landmark(l + 2)) m.update_landmark(l);
-  for (slam::keyframe_id k = 0; k < m.keyframe_end(); k += 2)
-    if (m.has_keyframe(k)) m.erase_keyframe(k);
+  std::vector<slam::keyframe_id> there;
+  for (const auto& k : m.keyframes()) there.push_back(k.id);
+  for (const slam::keyframe_id k : there)
+    if (k.value() % 2 == 0) m.erase_keyframe(k);
   for (const auto& k : m.keyframes())
     for (std::uint32_t i = 0; i != k.size(); ++i)
       if (k.landmarks[i] == slam::no_id && k.has_depth(i)) m.add_landmark(k.id, i);

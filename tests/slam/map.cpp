@@ -71,6 +71,61 @@ TEST_CASE("Where corrections change the scale, erased keyframes and what hangs o
   CHECK(other.scale_of(4 + offsets.keyframes) == Approx(2.25));
 }
 
+TEST_CASE("Erased keyframes are forgotten but for those that are asked for, the latest, and what they lead to") {
+  for (const std::uint64_t seed : {23U, 24U}) {
+    random_bits random(seed);
+    slam::map m = test::random_map(seed, 8000, 12);
+    m.transform(test::random_motion(random));
+    const slam::map before = m;
+    std::vector<slam::keyframe_id> erased;
+    for (slam::keyframe_id k = 0; k != m.keyframe_end(); ++k) {
+      CHECK(m.remembers(k));
+      if (!m.has_keyframe(k)) erased.push_back(k);
+    }
+    REQUIRE(erased.size() > 100);
+    const std::vector<slam::keyframe_id> keep{erased[3], erased[50], erased[3], m.keyframes().back().id,
+                                              m.keyframe_end()};
+    m.forget_erased(keep, 10);
+    REQUIRE(fault_of(m) == "");
+    CHECK(m.keyframe_end() == before.keyframe_end());
+    CHECK(m.keyframes().size() == before.keyframes().size());
+    std::size_t remembered = 0, late = 0;
+    slam::keyframe_id next = m.next_remembered(0);
+    for (slam::keyframe_id k = 0; k != m.keyframe_end(); ++k) {
+      CHECK((k == next) == m.remembers(k));
+      if (k == next) next = m.next_remembered(k + 1);
+      if (!m.remembers(k)) continue;
+      CHECK((m.pose_of(k).inverse() * before.pose_of(k)).log().norm() == 0.0);
+      CHECK(m.replacement_of(k) == before.replacement_of(k));
+      if (m.has_keyframe(k)) continue;
+      ++remembered;
+      late += before.content().erasures - before.content().erased.at(k).number <= 10 ? 1U : 0U;
+    }
+    CHECK(next == m.keyframe_end());
+    CHECK(m.remembers(erased[3]));
+    CHECK(m.remembers(erased[50]));
+    CHECK(late == 10);
+    CHECK(remembered < 60);
+    CHECK(m.content().forgotten == erased.size() - remembered);
+
+    // It goes on, alone and as a part of another one.
+    for (int step = 0; step != 500; ++step) test::change_somehow(random, m, 12);
+    REQUIRE(fault_of(m) == "");
+    slam::map other = test::random_map(seed + 10, 1000, 12);
+    other.forget_erased({}, 0);
+    CHECK(other.content().erased.empty());
+    const std::size_t both = m.content().forgotten + other.content().forgotten;
+    const se3 T = m.pose_of(erased[50]);
+    m.append(std::move(other), se3{}, {m.tree().root(), other.tree().root()});
+    CHECK(m.content().forgotten == both);
+    CHECK((m.pose_of(erased[50]).inverse() * T).log().norm() < 1e-12);
+    REQUIRE(fault_of(m) == "");
+    m.forget_erased({}, 0);
+    CHECK(m.content().erased.empty());
+    REQUIRE(fault_of(m) == "");
+  }
+}
+
 TEST_CASE("Keyframes that share landmarks come most shared first") {
   random_bits random(3);
   slam::map m(8, 1.2);

@@ -102,11 +102,11 @@ TEST_CASE("A file with one wrong bit says in which section") {
   damaged[100] = static_cast<char>(damaged[100] ^ 1);
   CHECK(fault_of(damaged) == "some.map: section \"kfrm\" from byte 60 is damaged: its checksum does not fit");
   std::string newer = bytes;
-  newer[8] = 4;
+  newer[8] = 5;
   const auto m = parsed(newer);
   REQUIRE_FALSE(m.has_value());
   CHECK(m.error().code == errc::unsupported);
-  CHECK(m.error().message == "version 4, this reads versions 1 to 3");
+  CHECK(m.error().message == "version 5, this reads versions 1 to 4");
 }
 
 TEST_CASE("A file says what sensor the map was made with, and one of version 1 is read, which does not") {
@@ -196,6 +196,73 @@ TEST_CASE("Erased landmarks take few bytes of a file, in version 2 eight each") 
   CHECK((old ? "" : old.error().to_string()) == "");
   REQUIRE(old.has_value());
   CHECK(slam::map_bytes(*old) == few);
+}
+
+TEST_CASE("Keyframes that were forgotten are runs of ids, which versions before 4 do not have") {
+  random_bits random(14);
+  slam::map m = test::random_map(13, 3000);
+  slam::keyframe_id kept = slam::no_id;
+  for (slam::keyframe_id k = 20; k != m.keyframe_end() && kept == slam::no_id; ++k)
+    if (!m.has_keyframe(k)) kept = k;
+  REQUIRE(kept != slam::no_id);
+  const std::size_t before = slam::map_bytes(m).size();
+  const se3 T = m.pose_of(kept);
+  m.forget_erased(std::vector{kept}, 3);
+  REQUIRE(m.content().forgotten > 50);
+  const std::string bytes = slam::map_bytes(m);
+  CHECK(bytes.size() < before - 30 * m.content().forgotten);
+  const auto again = parsed(bytes);
+  CHECK((again ? "" : again.error().to_string()) == "");
+  REQUIRE(again.has_value());
+  CHECK(test::fault_of(*again) == "");
+  CHECK(slam::map_bytes(*again) == bytes);
+  CHECK(again->keyframe_end() == m.keyframe_end());
+  CHECK(again->content().forgotten == m.content().forgotten);
+  CHECK((again->pose_of(kept).inverse() * T).log().norm() < 1e-9);
+  for (slam::keyframe_id k = 0; k != m.keyframe_end(); ++k) REQUIRE(again->remembers(k) == m.remembers(k));
+
+  // However many there are, they cost nothing.
+  constexpr std::uint32_t many = 200000000;
+  auto content = m.content();
+  content.keyframes.add_gone(many);
+  content.forgotten += many;
+  const slam::map long_lived{content};
+  CHECK(slam::map_bytes(long_lived).size() <= bytes.size() + 5);
+  const auto long_read = parsed(slam::map_bytes(long_lived));
+  REQUIRE(long_read.has_value());
+  CHECK(long_read->keyframe_end() == m.keyframe_end() + many);
+  CHECK(test::fault_of(*long_read) == "");
+
+  std::string older = bytes;
+  older[8] = 3;
+  CHECK(fault_of(older).find("neither there nor erased") != std::string::npos);
+
+  // Damage that fits its checksum: a run that is longer than what there is, or empty; a replacement that is forgotten.
+  const auto with_keyframes = [&](std::uint32_t ids, const auto& put_all) {
+    std::string file = slam::map_bytes(slam::map(8, 1.2)).substr(0, 12);
+    slam::detail::put_section(file, "size", [&](std::string& to) {
+      slam::detail::put(to, std::uint32_t{8}, std::uint32_t{15}, 1.2, ids, std::uint32_t{0}, std::uint32_t{0},
+                        std::uint32_t{1});
+    });
+    slam::detail::put_section(file, "kfrm", put_all);
+    slam::detail::put_section(file, "tree", [](std::string&) {});
+    slam::detail::put_section(file, "land", [](std::string&) {});
+    return file;
+  };
+  const auto run_of = [](std::uint32_t count) {
+    return [count](std::string& to) { slam::detail::put(to, slam::detail::forgotten_keyframes, count); };
+  };
+  CHECK(fault_of(with_keyframes(7, run_of(7))) == "");
+  constexpr std::uint32_t most = slam::detail::most_keyframes_of_file;
+  CHECK(fault_of(with_keyframes(most, run_of(most))) == "");
+  CHECK(fault_of(with_keyframes(most + 1, run_of(most + 1))) == "some.map: more ids than a file may have");
+  CHECK(fault_of(with_keyframes(7, run_of(8))) == "some.map: keyframe 0: begins 8 that are forgotten");
+  CHECK(fault_of(with_keyframes(7, run_of(0))) == "some.map: keyframe 0: begins 0 that are forgotten");
+  CHECK(fault_of(with_keyframes(2, [](std::string& to) {
+          slam::detail::put(to, slam::detail::gone_keyframe, std::uint32_t{1});
+          slam::detail::put_pose(to, se3{});
+          slam::detail::put(to, slam::detail::forgotten_keyframes, std::uint32_t{1});
+        })) == "some.map: keyframe 0: became one that is forgotten");
 }
 
 TEST_CASE("Corrections of the scale are in the lengths that a file holds") {

@@ -4,12 +4,16 @@
 #include <optional>
 #include <utility>
 
+#include <orbis/core/file.hpp>
 #include <orbis/features/orb.hpp>
 #include <orbis/io/synthetic.hpp>
 #include <orbis/slam/definitions.hpp>
+#include <orbis/slam/map.hpp>
+#include <orbis/slam/map_file.hpp>
 #include <orbis/slam/rgbd_system.hpp>
 
 #include "support/catch.hpp"
+#include "support/temporary_folder.hpp"
 
 namespace orbis::test {
 
@@ -60,4 +64,28 @@ TEST_CASE("A system takes another extractor by type") {
   slam::rgbd_system slam{recorded.camera().model, slam::options{}, sparse_extractor{}};
   for (const auto& f : recorded) CHECK(slam.track(f).tracked());
   CHECK(slam.map().keyframes().front().size() <= 400);
+}
+
+TEST_CASE("A system with a limited trajectory forgets erased keyframes, but not of a map that is kept unchanged") {
+  using namespace orbis;
+  const test::temporary_folder folder;
+  const io::synthetic_recording recorded{{.frames = 1, .width = 320, .height = 240}};
+  slam::options settings;
+  slam::map m(settings.features.levels, settings.features.scale_factor);
+  m.add_keyframe({});
+  for (int i = 0; i != 3000; ++i) m.erase_keyframe(m.add_keyframe({}));
+  const auto file = folder.path() / "made.map", saved = folder.path() / "saved.map";
+  REQUIRE(slam::write_map(file, m));
+  for (const bool is_kept : {true, false}) {
+    settings.trajectory_frames = 10;
+    settings.localization_only = is_kept;
+    slam::rgbd_system<camera::any_camera> slam{recorded.camera().model, settings};
+    REQUIRE(slam.load_map(file));
+    slam.track(recorded.frame(0).value());
+    REQUIRE(slam.save_map(saved));
+    const auto bytes = read_file(saved);
+    REQUIRE(bytes);
+    CHECK((*bytes == read_file(file).value()) == is_kept);
+    CHECK(slam::read_map(saved).value().content().forgotten == (is_kept ? 0U : 3000U - 1024U));
+  }
 }

@@ -53,7 +53,7 @@ TEST_CASE("What is wrong is said in words") {
   CHECK(fault_after([](parts& p) {
           for (auto& [id, e] : p.erased) e.T_replacement_camera = se3(so3{}, vec3(not_a_number, 0, 0));
         }) == "keyframe 2: was at no finite place");
-  CHECK(fault_after([](parts& p) { p.erased.clear(); }) == "keyframe 2: is gone, and where it was is not known");
+  CHECK(fault_after([](parts& p) { p.erased.clear(); }) == "keyframes: are gone, and where they were is not known");
   CHECK(fault_after([](parts& p) { p.erased[9] = {}; }) == "keyframes: are remembered as erased that never were");
   CHECK(fault_after([](parts& p) { p.tree = {}; }) == "tree: does not have all keyframes");
   CHECK(fault_after([](parts& p) {

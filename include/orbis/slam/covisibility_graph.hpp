@@ -13,6 +13,7 @@
 #include <cstdint>
 #include <limits>
 #include <span>
+#include <unordered_map>
 #include <utility>
 #include <vector>
 
@@ -46,19 +47,20 @@ template <class Pairs>
 /// The graph depends on the counts alone, not on the order of the changes.
 ///
 /// Let d be the number of keyframes that one shares landmarks with. Lookups and changes cost O(log d); adding a pair,
-/// removing a pair and lowering the strongest one cost O(d). Memory: O(1) for each id and for each pair.
+/// removing a pair and lowering the strongest one cost O(d). Memory: O(1) for each
+/// keyframe that shares something, and for each pair.
 class covisibility_graph {
  public:
   explicit covisibility_graph(std::uint32_t min_shared = 15) : min_shared_{min_shared} {}
 
   [[nodiscard]] std::uint32_t min_shared() const noexcept { return min_shared_; }
+  /// The number of keyframes that share a landmark with another one.
+  [[nodiscard]] std::size_t size() const noexcept { return nodes_.size(); }
 
   /// Two keyframes share `count` more landmarks. @pre a != b
   void share(keyframe_id a, keyframe_id b, std::uint32_t count = 1) {
     assert(a != b);
     if (count == 0) return;
-    if (const std::size_t needed = std::size_t{std::max(a, b).value()} + 1; needed > nodes_.size())
-      nodes_.resize(needed);
     increase(nodes_[a.value()], b, count);
     increase(nodes_[b.value()], a, count);
   }
@@ -66,25 +68,24 @@ class covisibility_graph {
   void unshare(keyframe_id a, keyframe_id b, std::uint32_t count = 1) {
     assert(shared(a, b) >= count);
     if (count == 0) return;
-    decrease(nodes_[a.value()], b, count);
-    decrease(nodes_[b.value()], a, count);
+    decrease(a, b, count);
+    decrease(b, a, count);
   }
   /// Removes a keyframe from all pairs. O(d^2) at most.
   void erase(keyframe_id k) {
-    if (k.value() >= nodes_.size()) return;
-    for (const covisible& other : std::exchange(nodes_[k.value()], {}).pairs)
-      decrease(nodes_[other.keyframe.value()], k, other.shared);
+    const auto gone = nodes_.extract(k.value());
+    if (gone.empty()) return;
+    for (const covisible& other : gone.mapped().pairs) decrease(other.keyframe, k, other.shared);
   }
   /// Adds another graph, whose ids grow by `offset`. @pre this graph has no ids from `offset` on
   void append(covisibility_graph&& other, std::uint32_t offset) {
-    assert(nodes_.size() <= offset);
-    nodes_.resize(offset);
-    for (node& n : other.nodes_) {
+    for (auto& [id, n] : other.nodes_) {
+      assert(!nodes_.contains(id + offset));
       for (covisible& pair : n.pairs) pair.keyframe += offset;
-      if (n.strongest.keyframe != no_id) n.strongest.keyframe += offset;
-      nodes_.push_back(std::move(n));
+      n.strongest.keyframe += offset;
+      nodes_[id + offset] = std::move(n);
     }
-    other.nodes_.clear();
+    other.nodes_ = {};
   }
 
   /// The number of landmarks that both observe.
@@ -100,12 +101,13 @@ class covisibility_graph {
   }
   /// All keyframes that share a landmark with `k`, with or without an edge, by ascending id.
   [[nodiscard]] std::span<const covisible> sharing(keyframe_id k) const {
-    return k.value() < nodes_.size() ? std::span<const covisible>{nodes_[k.value()].pairs}
-                                     : std::span<const covisible>{};
+    const auto n = nodes_.find(k.value());
+    return n != nodes_.end() ? std::span<const covisible>{n->second.pairs} : std::span<const covisible>{};
   }
   /// The keyframe that `k` shares most with; `no_id` if it shares nothing.
   [[nodiscard]] covisible strongest(keyframe_id k) const {
-    return k.value() < nodes_.size() ? nodes_[k.value()].strongest : covisible{};
+    const auto n = nodes_.find(k.value());
+    return n != nodes_.end() ? n->second.strongest : covisible{};
   }
 
   /// The neighbours of `k` in the graph, the strongest first; at most `limit`. O(d log d).
@@ -130,14 +132,15 @@ class covisibility_graph {
   }
 
  private:
-  struct node {
+  struct node {                    // of a keyframe that shares something
     std::vector<covisible> pairs;  ///< by ascending keyframe
     covisible strongest;
   };
 
   /// Whether the edge to `b` is the only one of `a`, because no pair reaches `min_shared`.
   [[nodiscard]] bool is_only_edge(keyframe_id a, keyframe_id b) const {
-    return nodes_[a.value()].strongest.keyframe == b && nodes_[a.value()].strongest.shared < min_shared_;
+    const covisible most = strongest(a);
+    return most.keyframe == b && most.shared < min_shared_;
   }
   static void increase(node& n, keyframe_id k, std::uint32_t count) {
     auto at = detail::find_pair(n.pairs, k);
@@ -145,10 +148,12 @@ class covisibility_graph {
     at->shared += count;
     if (stronger(*at, n.strongest)) n.strongest = *at;
   }
-  static void decrease(node& n, keyframe_id k, std::uint32_t count) {
+  void decrease(keyframe_id of, keyframe_id k, std::uint32_t count) {
+    node& n = nodes_.find(of.value())->second;
     const auto at = detail::find_pair(n.pairs, k);
     at->shared -= count;
     if (at->shared == 0) n.pairs.erase(at);
+    if (n.pairs.empty()) return static_cast<void>(nodes_.erase(of.value()));
     if (n.strongest.keyframe != k) return;
     n.strongest = {};
     for (const covisible& pair : n.pairs)
@@ -156,7 +161,7 @@ class covisibility_graph {
   }
 
   std::uint32_t min_shared_;
-  std::vector<node> nodes_;  ///< by keyframe
+  std::unordered_map<std::uint32_t, node> nodes_;  ///< by keyframe
 };
 
 }  // namespace orbis::slam

@@ -2,7 +2,7 @@
 /// @file
 /// The functions of `rgbd_system` and `calibrate`, for programs that link `orbis::compiled` and use one of them with
 /// types that it does not hold: another camera than `any_camera`, an extractor, matchers, places or a sensor of their
-/// own. Include it in the sources that do. Header-only programs have them by `rgbd_system.hpp` and `calibration.hpp`.
+/// own. Every source that does includes it. Header-only programs have them by `rgbd_system.hpp` and `calibration.hpp`.
 #pragma once
 
 #include <orbis/slam/detail/mapping/calibration_functions.hpp>

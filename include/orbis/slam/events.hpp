@@ -15,7 +15,8 @@
 
 namespace orbis::slam {
 
-/// A keyframe was made, or culled.
+/// A keyframe was made, or culled. With `options::trajectory_frames` maps forget where culled ones were in the end
+/// (`basic_map::remembers`).
 struct keyframe_event {
   map_keyframe id;
   double timestamp = 0.0;  ///< seconds

@@ -9,6 +9,8 @@
 #include <cstddef>
 #include <cstdint>
 #include <iterator>
+#include <map>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -73,6 +75,10 @@ class basic_map {
   [[nodiscard]] std::uint32_t landmark_ids_left() const noexcept {
     return decltype(content_.landmarks)::most_ids - landmark_end().value();
   }
+  /// How many keyframes may still be added, of 2^31 - 1 in the life of a map.
+  [[nodiscard]] std::uint32_t keyframe_ids_left() const noexcept {
+    return decltype(content_.keyframes)::most_ids - keyframe_end().value();
+  }
   /// The first landmark from `id` on; `landmark_end()` if there is none. O(erased ids in between).
   [[nodiscard]] landmark_id next_landmark(landmark_id id) const noexcept { return content_.landmarks.next_id(id); }
   [[nodiscard]] bool has_keyframe(keyframe_id id) const noexcept { return content_.keyframes.contains(id); }
@@ -88,15 +94,19 @@ class basic_map {
     return content_.landmarks.replacement_of(id);
   }
   /// The keyframe that stands for `id` now: itself while it is there, otherwise its nearest ancestor in the spanning
-  /// tree that is; `no_id` if no keyframe is left.
+  /// tree that is; `no_id` if no keyframe is left, or it was forgotten and the map comes from a file.
   [[nodiscard]] keyframe_id replacement_of(keyframe_id id) const noexcept {
     return content_.keyframes.replacement_of(id);
   }
   /// How often a pose was set or a keyframe added or erased: while it stays, the keyframes and their poses do.
   [[nodiscard]] std::uint64_t pose_changes() const noexcept { return pose_changes_; }
-  /// `T_world_camera` of a keyframe. An erased keyframe moves with the one that replaced it. @pre id < keyframe_end()
+  /// Whether it is known where a keyframe is or, if it was erased, was (`forget_erased`).
+  [[nodiscard]] bool remembers(keyframe_id id) const { return has_keyframe(id) || content_.erased.contains(id); }
+  /// The first id from `id` on that the map remembers; `keyframe_end()` if there is none.
+  [[nodiscard]] keyframe_id next_remembered(keyframe_id id) const;
+  /// `T_world_camera` of a keyframe. An erased keyframe moves with the one that replaced it. @pre remembers(id)
   [[nodiscard]] se3 pose_of(keyframe_id id) const;
-  /// `basic_keyframe::scale`, that of an erased keyframe as well. @pre id < keyframe_end()
+  /// `basic_keyframe::scale`, that of an erased keyframe as well. @pre remembers(id)
   [[nodiscard]] double scale_of(keyframe_id id) const;
 
   [[nodiscard]] const covisibility_graph& covisibility() const noexcept { return covisibility_; }
@@ -138,6 +148,10 @@ class basic_map {
   /// Erases a keyframe with its observations, and landmarks that no other keyframe observes. Its children in the
   /// spanning tree get other parents. `pose_of` still gives its pose. @pre has_keyframe(id)
   void erase_keyframe(keyframe_id id);
+  /// Forgets where erased keyframes were, but for those of `keep` and the `latest` ones, and those that they were
+  /// replaced by. What is not forgotten takes some 130 bytes a keyframe. Let n be the number of those that were not
+  /// forgotten before: O((n + keep) log n).
+  void forget_erased(std::span<const keyframe_id> keep, std::size_t latest);
   /// Records that a loop was closed between two keyframes. @pre a != b, and both are there
   void add_loop_edge(keyframe_id a, keyframe_id b) { content_.tree.add_loop_edge(a, b); }
 
@@ -171,7 +185,7 @@ class basic_map {
   /// Makes another map a part of this one: its world is moved by `T_this_other`, its spanning tree attached at `link`.
   /// No landmarks are fused. Returns by how much its ids have grown. O(both maps).
   /// @pre both have the same pyramid; `link` refers to keyframes that are there, unless either map is empty;
-  /// landmark_ids_left() >= other.landmark_end()
+  /// landmark_ids_left() >= other.landmark_end(), keyframe_ids_left() >= other.keyframe_end()
   id_offsets append(basic_map&& other, const sim3& T_this_other, const map_link& link);
   id_offsets append(basic_map&& other, const se3& T_this_other, const map_link& link) {
     return append(std::move(other), sim3(T_this_other), link);
@@ -205,8 +219,8 @@ using map = basic_map<features::binary_descriptor<256>>;
 template <feature_descriptor D>
 basic_map<D>::basic_map(detail::map_content<D> content)
     : content_{std::move(content)}, covisibility_{content_.min_shared} {
-  for (keyframe_id k = 0; k != keyframe_end(); ++k)
-    if (has_keyframe(k)) content_.keyframes[k].landmarks.assign(content_.keyframes[k].size(), no_id);
+  for (keyframe_id k = content_.keyframes.next_id(0); k != keyframe_end(); k = content_.keyframes.next_id(k + 1))
+    content_.keyframes[k].landmarks.assign(content_.keyframes[k].size(), no_id);
   for (const landmark_type& l : content_.landmarks)
     for (const observation& o : l.observations) content_.keyframes[o.keyframe].landmarks[o.feature] = l.id;
   for (const keyframe_type& k : content_.keyframes) count_covisible(k, k.id);
@@ -237,9 +251,36 @@ double basic_map<D>::scale_of(keyframe_id id) const {
 }
 
 template <feature_descriptor D>
+keyframe_id basic_map<D>::next_remembered(keyframe_id id) const {
+  const auto gone = content_.erased.lower_bound(id);
+  if (gone != content_.erased.end() && gone->first == id) return id;
+  const keyframe_id there = content_.keyframes.next_id(id);
+  return gone == content_.erased.end() ? there : std::min(there, gone->first);
+}
+
+template <feature_descriptor D>
+void basic_map<D>::forget_erased(std::span<const keyframe_id> keep, std::size_t latest) {
+  std::map<keyframe_id, detail::erased_keyframe> kept;
+  const auto take = [&](keyframe_id id) {  // with all that it leads to
+    for (auto e = content_.erased.find(id); e != content_.erased.end();) {
+      const keyframe_id next = e->second.replacement;
+      kept.insert(content_.erased.extract(e));
+      e = next == no_id ? content_.erased.end() : content_.erased.find(next);
+    }
+  };
+  for (const keyframe_id id : keep) take(id);
+  std::vector<keyframe_id> young;
+  for (const auto& [id, e] : content_.erased)
+    if (content_.erasures - e.number <= latest) young.push_back(id);
+  for (const keyframe_id id : young) take(id);
+  content_.forgotten += content_.erased.size();
+  content_.erased = std::move(kept);
+}
+
+template <feature_descriptor D>
 void basic_map<D>::transform(const sim3& T_new_old) {
-  for (keyframe_id k = 0; k != keyframe_end(); ++k)
-    if (has_keyframe(k)) move_keyframe(k, T_new_old);
+  for (keyframe_id k = content_.keyframes.next_id(0); k != keyframe_end(); k = content_.keyframes.next_id(k + 1))
+    move_keyframe(k, T_new_old);
   for (const landmark_type& l : content_.landmarks) move_landmark(l.id, T_new_old);
   for (auto& [id, e] : content_.erased)
     if (e.replacement == no_id) {
@@ -276,7 +317,8 @@ void basic_map<D>::erase_keyframe(keyframe_id id) {
       content_.tree.erase(id, [&](keyframe_id a, keyframe_id b) { return covisibility_.shared(a, b); });
   covisibility_.erase(id);
   const keyframe_type& gone = at(id);
-  detail::erased_keyframe& kept = content_.erased[id] = {replacement, gone.T_world_camera, gone.scale};
+  detail::erased_keyframe& kept =
+      content_.erased[id] = {replacement, gone.T_world_camera, gone.scale, content_.erasures++};
   if (replacement != no_id) {
     const keyframe_type& by = at(replacement);
     kept.T_replacement_camera = detail::scaled(by.T_world_camera.inverse() * gone.T_world_camera, 1.0 / by.scale);
@@ -357,9 +399,13 @@ id_offsets basic_map<D>::append(basic_map&& other, const sim3& T_this_other, con
   assert(content_.levels == other.content_.levels && content_.scale_factor == other.content_.scale_factor);
   other.transform(T_this_other);
   const id_offsets offsets{keyframe_end().value(), landmark_end().value()};
-  for (const auto& [id, e] : other.content_.erased)
-    content_.erased[id + offsets.keyframes] = {
-        e.replacement == no_id ? keyframe_id{} : e.replacement + offsets.keyframes, e.T_replacement_camera, e.scale};
+  for (const auto& [id, e] : other.content_.erased) {
+    detail::erased_keyframe& here = content_.erased[id + offsets.keyframes] = e;
+    if (e.replacement != no_id) here.replacement += offsets.keyframes;
+    here.number += content_.erasures;  // as if all had been erased now, in their order
+  }
+  content_.erasures += other.content_.erasures;
+  content_.forgotten += other.content_.forgotten;
   content_.tree.append(std::move(other.content_.tree), offsets.keyframes, link.into, link.from);
   covisibility_.append(std::move(other.covisibility_), offsets.keyframes);
   content_.keyframes.append(std::move(other.content_.keyframes));
@@ -368,8 +414,8 @@ id_offsets basic_map<D>::append(basic_map&& other, const sim3& T_this_other, con
     content_.sensor = other.content_.sensor;
     content_.scale_is_known = other.content_.scale_is_known;
   }
-  for (keyframe_id id = offsets.keyframes; id != keyframe_end(); ++id) {
-    if (!has_keyframe(id)) continue;
+  for (keyframe_id id = content_.keyframes.next_id(offsets.keyframes); id != keyframe_end();
+       id = content_.keyframes.next_id(id + 1)) {
     keyframe_type& k = content_.keyframes[id];
     k.id = id;
     for (landmark_id& l : k.landmarks)
@@ -443,5 +489,9 @@ void basic_map<D>::count_covisible(const keyframe_type& k, keyframe_id below) {
   std::sort(entries.begin(), entries.end(), [](const auto& a, const auto& b) { return a.id < b.id; });
   for (const auto& e : entries) covisibility_.share(k.id, e.id, e.count);
 }
+
+#ifdef ORBIS_COMPILED
+extern template class basic_map<features::binary_descriptor<256>>;
+#endif
 
 }  // namespace orbis::slam

@@ -5,7 +5,7 @@
 /// A file is little-endian; equal maps give equal bytes on every machine:
 ///
 ///     0   "orbismap"
-///     8   version (u32), 3; versions 1 and 2 are read as well
+///     8   version (u32), 4; versions 1 to 3 are read as well
 ///     12  the sections "size", "kfrm", "tree" and "land", each: its name (4 bytes), the length of its content (u64),
 ///         the content, CRC-32C of all three (u32)
 ///
@@ -17,7 +17,8 @@
 ///     kfrm  for each keyframe id a byte. 0: it was erased; its replacement (id) and its pose relative to that. 1: time
 ///           stamp (f64), frame index (u64), pose, number of keypoints (u32), and for each keypoint x, y, size, angle,
 ///           response (f32), octave (i32), depth (f32), x and y of the ray (f64; NaN without one), descriptor (32
-///           bytes)
+///           bytes). 2 (version 4): a run of ids that the map has forgotten; its length (u32, at least
+///           1, this id included)
 ///     tree  for each keyframe: parent (id), number of loop edges (u32), their other ends (ids)
 ///     land  for each landmark id the number of observations (u32). 0: it was erased; the id that replaced it, or none.
 ///           ffffffff (version 3): a run of erased ids that nothing replaced; its length (u32, at least 1, this id
@@ -25,8 +26,8 @@
 ///           bytes), keyframe that created it (id), times visible, times found (u32 each), whether the descriptor is
 ///           current (a byte), and the observations: keyframe (id), keypoint (u32)
 ///
-/// A file has at most 2^28 ids of landmarks. A map that gave more is written without those that are erased: its
-/// landmarks have new ids when it is read.
+/// A file has at most 2^28 ids of keyframes, and as many of landmarks. A map that gave more is written without those
+/// that are erased: its landmarks have new ids when it is read.
 ///
 /// The covisibility graph and the grids of keypoints are not stored: they follow from the rest.
 #pragma once

@@ -227,7 +227,8 @@ struct options {
   moving_options moving{};
   thread_options threads{};
   /// The trajectories of all maps hold so many frames together, at most: the latest of those that were tracked. For
-  /// robots that run for days; a frame takes 72 bytes.
+  /// robots that run for days; a frame takes 72 bytes. If it is limited, the active map forgets where erased keyframes
+  /// were that none of these frames hangs on, but for the latest (`basic_map::remembers`).
   std::size_t trajectory_frames = std::numeric_limits<std::size_t>::max();
   bool localization_only = false;     ///< no keyframes are made, and the map is kept unchanged: for a loaded map
   std::optional<se3> initial_pose{};  ///< `T_world_camera` of the first frame of a map; default: the identity

@@ -11,6 +11,7 @@
 #include <concepts>
 #include <cstddef>
 #include <cstdint>
+#include <unordered_map>
 #include <utility>
 #include <vector>
 
@@ -22,10 +23,8 @@ namespace orbis::slam {
 /// Children and loop edges are sorted by id. Who chooses the parents is not decided here.
 class spanning_tree {
  public:
-  [[nodiscard]] std::size_t size() const noexcept { return size_; }
-  [[nodiscard]] bool contains(keyframe_id k) const noexcept {
-    return k.value() < nodes_.size() && nodes_[k.value()].present;
-  }
+  [[nodiscard]] std::size_t size() const noexcept { return nodes_.size(); }
+  [[nodiscard]] bool contains(keyframe_id k) const noexcept { return nodes_.contains(k.value()); }
   /// The root; `no_id` while there is no keyframe.
   [[nodiscard]] keyframe_id root() const noexcept { return root_; }
   /// The parent of a keyframe; `no_id` for the root. @pre contains(k)
@@ -42,10 +41,8 @@ class spanning_tree {
 
   /// Adds a keyframe. @pre !contains(k); contains(parent), or `parent` is `no_id` and the tree is empty
   void add(keyframe_id k, keyframe_id parent) {
-    assert(!contains(k) && (parent == no_id ? size_ == 0 : contains(parent)));
-    if (k.value() >= nodes_.size()) nodes_.resize(std::size_t{k.value()} + 1);
-    nodes_[k.value()].present = true;
-    ++size_;
+    assert(!contains(k) && (parent == no_id ? size() == 0 : contains(parent)));
+    nodes_.try_emplace(k.value());
     if (parent == no_id) {
       root_ = k;
     } else {
@@ -86,8 +83,7 @@ class spanning_tree {
   /// none is left. O(children^2). @pre contains(k)
   template <std::invocable<keyframe_id, keyframe_id> Shared>
   keyframe_id erase(keyframe_id k, Shared&& shared) {
-    const node gone = std::exchange(nodes_[k.value()], {});
-    --size_;
+    const node gone = std::move(nodes_.extract(k.value()).mapped());
     std::vector<keyframe_id> orphans = gone.children;
     keyframe_id replacement = gone.parent;
     if (replacement != no_id) {
@@ -110,36 +106,34 @@ class spanning_tree {
   /// Adds another tree, whose ids grow by `offset`. Its keyframe `by` becomes its root and a child of `at`.
   /// @pre this tree has no ids from `offset` on; `at` and `by` are there, unless either tree is empty
   void append(spanning_tree&& other, std::uint32_t offset, keyframe_id at, keyframe_id by) {
-    assert(nodes_.size() <= offset);
-    if (other.size_ != 0 && size_ != 0) other.set_root(by);
-    nodes_.resize(offset);
-    for (node& n : other.nodes_) {
+    const bool was_empty = size() == 0;
+    if (other.size() != 0 && !was_empty) other.set_root(by);
+    for (auto& [id, n] : other.nodes_) {
+      assert(!contains(id + offset));
       if (n.parent != no_id) n.parent += offset;
       for (keyframe_id& c : n.children) c += offset;
       for (keyframe_id& l : n.loops) l += offset;
-      nodes_.push_back(std::move(n));
+      nodes_[id + offset] = std::move(n);
     }
-    if (other.size_ != 0) {
-      if (size_ == 0) {
+    if (other.size() != 0) {
+      if (was_empty) {
         root_ = other.root_ + offset;
       } else {
         attach(by + offset, at);
       }
     }
-    size_ += other.size_;
     other = {};
   }
 
  private:
   struct node {
     keyframe_id parent;
-    bool present = false;
     std::vector<keyframe_id> children, loops;
   };
 
   [[nodiscard]] const node& at(keyframe_id k) const {
     assert(contains(k));
-    return nodes_[k.value()];
+    return nodes_.find(k.value())->second;
   }
   static void insert(std::vector<keyframe_id>& sorted, keyframe_id k) {
     const auto place = std::lower_bound(sorted.begin(), sorted.end(), k);
@@ -177,8 +171,7 @@ class spanning_tree {
     }
   }
 
-  std::vector<node> nodes_;  ///< by keyframe
-  std::size_t size_ = 0;
+  std::unordered_map<std::uint32_t, node> nodes_;  ///< by keyframe
   keyframe_id root_;
 };
 

@@ -64,7 +64,9 @@ struct tracked_feature {
 
 /// What tracking knows of a frame, to be shown or logged.
 struct tracked_frame {
-  map_keyframe reference;  ///< the keyframe that the frame's pose follows; `atlas::current` gives its present id
+  /// The keyframe that the frame's pose follows. `atlas::current` gives its present id; with
+  /// `options::trajectory_frames` it may be forgotten one day (`basic_map::remembers`).
+  map_keyframe reference;
   se3 T_reference_camera;  ///< in lengths over the reference's scale (`basic_map::scale_of`), which is 1 with depth
   std::vector<tracked_feature> features;
   vec6 twist = vec6::Zero();  ///< see `track_result::twist`

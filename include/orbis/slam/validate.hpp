@@ -43,10 +43,12 @@ class map_check {
     return pose.translation().allFinite() && pose.rotation().unit_quaternion().coeffs().allFinite();
   }
 
+  /// The first keyframe from an id on that is there.
+  [[nodiscard]] keyframe_id next(keyframe_id id) const { return m_.keyframes().next_id(id); }
+
   [[nodiscard]] result<void> keyframes() const {
     std::size_t count = 0;
-    for (keyframe_id id = 0; id != m_.keyframe_end(); ++id) {
-      if (!m_.has_keyframe(id)) continue;
+    for (keyframe_id id = next(0); id != m_.keyframe_end(); id = next(id + 1)) {
       ++count;
       const auto& k = m_.at(id);
       if (k.id != id) return wrong_keyframe(id, "calls itself " + to_string(k.id));
@@ -95,13 +97,13 @@ class map_check {
   /// Against a recount.
   [[nodiscard]] result<void> covisibility() const {
     const covisibility_graph& graph = m_.covisibility();
-    for (keyframe_id id = 0; id != m_.keyframe_end(); ++id) {
+    std::size_t sharing = 0;
+    for (keyframe_id id = next(0); id != m_.keyframe_end(); id = next(id + 1)) {
       counter<keyframe_id> counted;
-      if (m_.has_keyframe(id))
-        for (const landmark_id l : m_.at(id).landmarks)
-          if (l != no_id)
-            for (const observation& o : m_.landmark_at(l).observations)
-              if (o.keyframe != id) counted.add(o.keyframe);
+      for (const landmark_id l : m_.at(id).landmarks)
+        if (l != no_id)
+          for (const observation& o : m_.landmark_at(l).observations)
+            if (o.keyframe != id) counted.add(o.keyframe);
       std::vector<covisible> shared;
       covisible most;
       for (const auto& e : counted.entries()) {
@@ -110,6 +112,7 @@ class map_check {
       }
       std::sort(shared.begin(), shared.end(),
                 [](const covisible& a, const covisible& b) { return a.keyframe < b.keyframe; });
+      sharing += shared.empty() ? 0 : 1;
       if (!std::ranges::equal(shared, graph.sharing(id)))
         return wrong_keyframe(id, "shares other landmarks than the covisibility graph counts");
       if (most != graph.strongest(id)) return wrong_keyframe(id, "does not share most with whom the graph says");
@@ -118,6 +121,8 @@ class map_check {
           return wrong_keyframe(id, "has an edge to keyframe " + to_string(n.keyframe) + ", but not back");
       if (!shared.empty() && graph.neighbors(id).empty()) return wrong_keyframe(id, "shares landmarks but has no edge");
     }
+    if (sharing != graph.size())
+      return fail(errc::malformed, "covisibility", "has keyframes that share landmarks and are not there");
     return {};
   }
 
@@ -158,16 +163,20 @@ class map_check {
 
   /// What was erased leads to what is there.
   [[nodiscard]] result<void> lineage() const {
-    for (keyframe_id id = 0; id != m_.keyframe_end(); ++id) {
+    for (keyframe_id id = m_.next_remembered(0); id != m_.keyframe_end(); id = m_.next_remembered(id + 1)) {
       const keyframe_id replacement = m_.replacement_of(id);
       if (replacement != no_id && !m_.has_keyframe(replacement))
         return wrong_keyframe(id, "became one that is not there");
       if (m_.has_keyframe(id)) continue;
-      if (!m_.content().erased.contains(id)) return wrong_keyframe(id, "is gone, and where it was is not known");
+      const keyframe_id next = m_.content().erased.at(id).replacement;
+      if (next != no_id && !m_.remembers(next)) return wrong_keyframe(id, "became one that is forgotten");
       if (!is_finite(m_.pose_of(id))) return wrong_keyframe(id, "was at no finite place");
     }
-    if (m_.content().erased.size() + m_.keyframes().size() != m_.keyframe_end().value())
+    const std::size_t known = m_.content().erased.size() + m_.content().forgotten + m_.keyframes().size();
+    if (known > m_.keyframe_end().value())
       return fail(errc::malformed, "keyframes", "are remembered as erased that never were");
+    if (known < m_.keyframe_end().value())
+      return fail(errc::malformed, "keyframes", "are gone, and where they were is not known");
     const auto& all = m_.landmarks();
     for (landmark_id id = all.next_known_id(0); id != m_.landmark_end(); id = all.next_known_id(id + 1))
       if (const landmark_id now = m_.replacement_of(id); now != no_id && !m_.has_landmark(now))

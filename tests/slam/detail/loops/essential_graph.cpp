@@ -88,5 +88,4 @@ TEST_CASE("Only the tree is left when nothing is strong, and nothing when there 
   const slam::map m = test::random_map(91, 200);
   for (const auto& e : slam::detail::essential_graph(m, 1000)) CHECK(e.kind != edge_kind::covisibility);
   CHECK(slam::detail::essential_graph(slam::map(8, 1.2)).empty());
-  CHECK(slam::detail::poses_of(slam::map(8, 1.2)).empty());
 }

@@ -104,7 +104,7 @@ TEST_CASE("Where keyframes with a loop edge are erased, the next correction stil
   const auto taken = slam::detail::loop_correction::take(r.m, elsewhere);
   REQUIRE(taken);
   const auto tie = std::find_if(taken->edges.begin(), taken->edges.end(), [&](const auto& e) {
-    return e.from == std::max(a, b).value() && e.to == std::min(a, b).value();
+    return taken->keyframes[e.from] == std::max(a, b) && taken->keyframes[e.to] == std::min(a, b);
   });
   REQUIRE(tie != taken->edges.end());
   CHECK(tie->weight == 0.25);

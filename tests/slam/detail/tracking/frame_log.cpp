@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <vector>
+
 #include <orbis/core/random.hpp>
 #include <orbis/slam/detail/tracking/frame_log.hpp>
 
@@ -43,6 +45,25 @@ TEST_CASE("Frames follow their keyframe, through erasing and merging, and are li
   REQUIRE(log.trajectory(maps, first).size() == 3);
   CHECK((log.trajectory(maps, first)[1].T_world_camera.inverse() * moved * before).log().norm() < 1e-9);
   CHECK(log.trajectory(maps, second).empty());
+}
+
+TEST_CASE("A log names the keyframes that its frames hang on, also after their map was merged") {
+  random_bits random(5);
+  slam::atlas maps(8, 1.2);
+  const slam::map_id first = maps.active_id();
+  for (int i = 0; i < 3; ++i) test::add_random_keyframe(random, maps.active(), 30, 20);
+  const slam::map_id second = maps.create();
+  for (int i = 0; i < 2; ++i) test::add_random_keyframe(random, maps.active(), 30, 20);
+  slam::detail::frame_log log(4);
+  CHECK(log.references(maps, first).empty());
+  log.add({0.0, {first, 2}, {}});  // will be forgotten
+  for (const slam::map_keyframe k : {slam::map_keyframe{first, 0}, {first, 0}, {second, 1}, {first, 1}})
+    log.add({1.0, k, {}});
+  using ids = std::vector<slam::keyframe_id>;
+  CHECK(log.references(maps, first) == ids{0, 1});
+  CHECK(log.references(maps, second) == ids{1});
+  maps.merge(second, first, se3{});
+  CHECK(log.references(maps, first) == ids{0, 4, 1});
 }
 
 TEST_CASE("Frames are forgotten in order where only the latest are kept") {

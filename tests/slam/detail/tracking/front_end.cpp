@@ -10,6 +10,8 @@
 #include <orbis/camera/depth.hpp>
 #include <orbis/core/image.hpp>
 #include <orbis/core/sim3.hpp>
+#include <orbis/slam/detail/depth/surface.hpp>
+#include <orbis/slam/detail/depth/surface_memory.hpp>
 #include <orbis/slam/detail/tracking/front_end.hpp>
 #include <orbis/slam/monocular.hpp>
 #include <orbis/slam/validate.hpp>
@@ -36,7 +38,8 @@ struct scene_of {
   bool is_frozen = false;
   std::size_t frames = 0;
 
-  explicit scene_of(const test::ring_options& o = {.steps = 60, .drift = 0.0}) : world{o} {
+  explicit scene_of(const test::ring_options& o = {.steps = 60, .drift = 0.0}, const slam::options& settings = {})
+      : world{o}, options{settings} {
     options.initial_pose = world.truth(0);
     options.min_start_points = 50;
   }
@@ -286,4 +289,83 @@ TEST_CASE("A frame without keypoints is held by the depth of a known corner, and
   s.front_end.depth().see_nothing();
   CHECK(s.see_nothing(1.0) == 0);
   CHECK(s.front_end.state() == track_state::lost);
+}
+
+TEST_CASE("Where the trajectory is limited, the map forgets erased keyframes that no frame of it hangs on") {
+  constexpr std::size_t latest = decltype(scene::front_end)::latest_erased;
+  slam::options limited;
+  limited.trajectory_frames = 4;
+  scene s({.steps = 60, .drift = 0.0}, limited), twin;
+  std::uint32_t step = 0;
+  const auto walk = [&](std::uint32_t end) {
+    for (; step != end; ++step) {
+      REQUIRE(s.see(step) > 30);
+      REQUIRE(twin.see(step) > 30);
+    }
+  };
+  std::size_t most = 0;
+  const auto erase_many = [&](scene& in) {
+    slam::map& m = in.maps.active();
+    for (int i = 0; i != 5000; ++i) {
+      m.erase_keyframe(m.add_keyframe({}));
+      in.front_end.forget_erased(in.maps);
+      most = std::max(most, m.content().erased.size());
+    }
+    CHECK((slam::validate(m) ? "" : slam::validate(m).error().to_string()) == "");
+  };
+  walk(12);
+  const slam::map_keyframe last = s.front_end.last_reference();
+  REQUIRE(s.maps.active().keyframes().size() > 1);
+  for (scene* in : {&s, &twin}) in->maps.active().erase_keyframe(last.keyframe);
+
+  erase_many(s);
+  CHECK(most <= 2 * latest + 1);
+  CHECK(s.maps.active().content().forgotten > 5000 - 2 * latest);
+  erase_many(twin);
+  CHECK(most == 5001);
+  CHECK(twin.maps.active().content().forgotten == 0);
+
+  // What frames of the trajectory hang on was erased first, and is remembered.
+  CHECK(s.maps.active().remembers(last.keyframe));
+  const auto check_alike = [&] {
+    CHECK(s.front_end.last_pose(s.maps).to_matrix() == twin.front_end.last_pose(twin.maps).to_matrix());
+    const auto all = twin.front_end.log().trajectory(twin.maps, 0), end = s.front_end.log().trajectory(s.maps, 0);
+    REQUIRE(end.size() == 4);
+    for (std::size_t i = 0; i != 4; ++i)
+      CHECK(end[i].T_world_camera.to_matrix() == all[all.size() - 4 + i].T_world_camera.to_matrix());
+  };
+  check_alike();
+  walk(20);
+  check_alike();
+  REQUIRE(s.front_end.last_reference().keyframe != last.keyframe);
+  erase_many(s);
+  CHECK_FALSE(s.maps.active().remembers(last.keyframe));
+  CHECK(twin.maps.active().remembers(last.keyframe));
+  erase_many(twin);
+  walk(24);
+  check_alike();
+}
+
+TEST_CASE("A frame and a surface that hang on a keyframe that was forgotten harm nobody") {
+  scene s;
+  s.see(0);
+  REQUIRE(s.see(1) > 30);
+  slam::map& m = s.maps.active();
+  const se3 before = s.front_end.last_pose(s.maps);
+  const slam::keyframe_id other = m.add_keyframe({});
+  const slam::keyframe_id gone = s.front_end.last_reference().keyframe;
+  m.erase_keyframe(gone);
+  m.forget_erased({}, 0);
+  REQUIRE(m.has_keyframe(other));
+  REQUIRE_FALSE(m.remembers(gone));
+  CHECK(s.front_end.last_pose(s.maps).to_matrix() == before.to_matrix());
+  s.front_end.sync_with_map(s.maps);
+
+  slam::detail::surface_memory memory(4);
+  std::vector<slam::detail::placed_surface> around;
+  slam::detail::surface seen;
+  memory.keep({s.maps.active_id(), gone}, se3{}, seen);
+  memory.keep({s.maps.active_id(), other}, se3{}, seen);
+  memory.around(s.maps, se3{}, 4, around);
+  CHECK(around.size() == 1);
 }

@@ -14,9 +14,11 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <system_error>
 #include <utility>
 #include <vector>
 
+#include <orbis/camera/pinhole.hpp>
 #include <orbis/camera/rgbd_frame.hpp>
 #include <orbis/camera/settings.hpp>
 #include <orbis/core/result.hpp>

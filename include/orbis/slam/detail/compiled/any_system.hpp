@@ -11,19 +11,13 @@
 #include <orbis/core/image.hpp>
 #include <orbis/features/orb.hpp>
 #include <orbis/slam/any_system.hpp>
-#include <orbis/slam/detail/system/definitions_check.hpp>
+#include <orbis/slam/detail/compiled/rgbd_system.hpp>
 #include <orbis/slam/matchers.hpp>
 #include <orbis/slam/place_recognition.hpp>
 #include <orbis/slam/rgbd_system.hpp>
 #include <orbis/slam/track_result.hpp>
 
 namespace orbis::slam {
-
-template <>
-inline constexpr bool detail::is_compiled<detail::of_system, camera::any_camera, features::orb_extractor, orb_matchers,
-                                          bag_of_words_places, any_sensor> = true;
-template <class T>
-inline constexpr bool detail::is_compiled<detail::of_system, any_system, camera::depth_view<T>> = true;
 
 extern template class rgbd_system<camera::any_camera, features::orb_extractor, orb_matchers, bag_of_words_places,
                                   any_sensor>;

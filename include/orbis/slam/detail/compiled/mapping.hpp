@@ -17,11 +17,7 @@
 #include <orbis/slam/map.hpp>
 #include <orbis/slam/options.hpp>
 
-namespace orbis::slam {
-
-extern template class basic_map<features::binary_descriptor<256>>;
-
-namespace detail {
+namespace orbis::slam::detail {
 
 using compiled_rig = camera_rig<camera::any_camera>;
 using compiled_descriptor = features::binary_descriptor<256>;
@@ -37,5 +33,4 @@ extern template bundle_solution bundle_solver<camera::any_camera>::solve(const b
                                                                          const progress&, bundle_solution,
                                                                          const sequential_policy&);
 
-}  // namespace detail
-}  // namespace orbis::slam
+}  // namespace orbis::slam::detail

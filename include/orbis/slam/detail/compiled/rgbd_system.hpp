@@ -4,6 +4,7 @@
 /// time, with the default extractor, matchers and places. cmake/compiled/slam_system.cpp instantiates it.
 #pragma once
 
+#include <concepts>
 #include <cstdint>
 
 #include <orbis/camera/any.hpp>
@@ -19,12 +20,26 @@
 
 namespace orbis::slam {
 
-template <>
-inline constexpr bool detail::is_compiled<detail::of_system, camera::any_camera, features::orb_extractor, orb_matchers,
-                                          bag_of_words_places, rgbd> = true;
-template <class T>
-inline constexpr bool detail::is_compiled<detail::of_system, rgbd_system<camera::any_camera>, camera::depth_view<T>> =
-    true;
+struct stereo;
+struct monocular;
+struct any_sensor;
+
+namespace detail {
+
+template <class Sensor>
+concept library_sensor = std::same_as<Sensor, rgbd> || std::same_as<Sensor, stereo> ||
+    std::same_as<Sensor, monocular> || std::same_as<Sensor, any_sensor>;
+
+template <library_sensor Sensor>
+inline constexpr bool
+    is_compiled<of_system, camera::any_camera, features::orb_extractor, orb_matchers, bag_of_words_places, Sensor> =
+        true;
+template <library_sensor Sensor, class T>
+inline constexpr bool is_compiled<
+    of_system, rgbd_system<camera::any_camera, features::orb_extractor, orb_matchers, bag_of_words_places, Sensor>,
+    camera::depth_view<T>> = true;
+
+}  // namespace detail
 
 extern template class rgbd_system<camera::any_camera>;
 extern template track_result rgbd_system<camera::any_camera>::track_images(double, const image_view<const rgb8>&,

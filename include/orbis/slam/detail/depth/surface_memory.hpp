@@ -41,7 +41,7 @@ class surface_memory {
     near_.clear();
     for (std::uint32_t i = 0; i != kept_.size(); ++i) {
       const map_keyframe k = maps.current(kept_[i].anchor);
-      if (k.map != maps.active_id() || !(k.keyframe < maps.active().keyframe_end())) continue;
+      if (k.map != maps.active_id() || !maps.active().remembers(k.keyframe)) continue;
       const se3 T = maps.active().pose_of(k.keyframe) * kept_[i].T_anchor_camera;
       near_.push_back({distance(T, T_world_camera), i, T});
     }

@@ -30,10 +30,10 @@ enum class edge_kind { tree, loop, covisibility };
   return "unknown";
 }
 
-/// An edge of a pose graph: its ends index `poses_of(map)`.
+/// An edge of a pose graph.
 struct essential_edge {
-  std::uint32_t from = no_id;  ///< a keyframe's id
-  std::uint32_t to = no_id;    ///< a keyframe's id
+  std::uint32_t from = no_id;  ///< a keyframe's id; for `optimize_poses` an index
+  std::uint32_t to = no_id;    ///< as `from`
   edge_kind kind = edge_kind::tree;
   std::uint32_t shared = 0;  ///< landmarks that both observe
   sim3 measurement;          ///< `T_from_to`; lengths at `from` are its scale times those at `to`
@@ -68,17 +68,9 @@ template <feature_descriptor D>
   return edges;
 }
 
-/// `T_world_camera` of every keyframe, by id; the identity for erased ones, which no edge touches.
-template <feature_descriptor D>
-[[nodiscard]] std::vector<sim3> poses_of(const basic_map<D>& m) {
-  std::vector<sim3> poses(m.keyframe_end().value());
-  for (const auto& k : m.keyframes()) poses[k.id.value()] = sim3(k.T_world_camera);
-  return poses;
-}
-
-/// Moves poses, as `poses_of`, such that they agree with the edges; those with a nonzero entry in `is_fixed` stay.
-/// `scale_is_known`: all scales are and remain 1; otherwise scales are adjusted as well. Returns the number of
-/// iterations; empty, and the poses are of no use, if it fails or `callback` cancels it.
+/// Moves poses such that they agree with the edges, whose ends are indices of them; those with a nonzero entry in
+/// `is_fixed` stay. `scale_is_known`: all scales are and remain 1; otherwise scales are adjusted as well. Returns the
+/// number of iterations; empty, and the poses are of no use, if it fails or `callback` cancels it.
 [[nodiscard]] std::optional<int> optimize_poses(std::span<sim3> poses, const std::vector<essential_edge>& edges,
                                                 std::span<const std::uint8_t> is_fixed, bool scale_is_known,
                                                 int max_iterations, const progress& callback = {});

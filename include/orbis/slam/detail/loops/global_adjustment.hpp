@@ -13,6 +13,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <unordered_map>
 #include <vector>
 
 #include <orbis/camera/model.hpp>
@@ -39,11 +40,12 @@ struct report {
 };
 
 struct snapshot : bundle_snapshot {
-  std::vector<std::uint32_t> index;  ///< by keyframe id: its index in the arrays, or `no_id`
-  landmark_id next_landmark = 0;     ///< the first one that was not looked at yet
+  std::unordered_map<std::uint32_t, std::uint32_t> index;  ///< by keyframe id: its index in the arrays
+  landmark_id next_landmark = 0;                           ///< the first one that was not looked at yet
 
   [[nodiscard]] std::uint32_t index_of(keyframe_id k) const {
-    return k.value() < index.size() ? index[k.value()] : no_id;
+    const auto i = index.find(k.value());
+    return i != index.end() ? i->second : no_id;
   }
   /// Whether `take_landmarks` has more to do.
   [[nodiscard]] bool has_more() const noexcept { return next_landmark != end_landmark; }
@@ -61,7 +63,6 @@ template <feature_descriptor D>
 [[nodiscard]] snapshot take_keyframes(const basic_map<D>& m, const global_adjustment_options& o = {}) {
   snapshot s;
   if (m.keyframes().size() < 2) return s;
-  s.index.assign(m.keyframe_end().value(), no_id);
   s.end_keyframe = m.keyframe_end();
   s.end_landmark = m.landmark_end();
   std::size_t keypoints = 0;
@@ -72,7 +73,7 @@ template <feature_descriptor D>
       shared += *l != no_id && m.landmark_at(*l).observations.size() > 1;
     const bool is_root = k.id == m.tree().root();
     if (shared < o.min_observations && !is_root) continue;
-    s.index[k.id.value()] = static_cast<std::uint32_t>(s.keyframes.size());
+    s.index.emplace(k.id.value(), static_cast<std::uint32_t>(s.keyframes.size()));
     s.add_keyframe(k.id, k.T_world_camera, is_root);
   }
   // Arrays that grow are copied, and whoever waits for a part of the landmarks would wait for that as well.
@@ -129,18 +130,17 @@ report apply_poses(basic_map<D>& m, const snapshot& s, const bundle_solution& so
   const std::vector<double> growth = growth_of(s, solved, m.scale_is_known());
   for (std::size_t k = 0; k != solved.poses.size(); ++k)
     poses.emplace_back(solved.poses[k].rotation(), solved.poses[k].translation(), growth[k]);
-  const std::vector<sim3> motion = propagate_motion<D>(m, s.keyframes, poses);
+  const keyframe_motions motion = propagate_motion<D>(m, s.keyframes, poses);
   // Landmarks that take no part move with a keyframe; the others then get their own position.
   std::size_t next = 0;
   for (const auto& l : m.landmarks()) {
     while (next != s.landmarks.size() && s.landmarks[next] < l.id) ++next;
     const bool adjusted = next != s.landmarks.size() && s.landmarks[next] == l.id;
     const keyframe_id by = m.has_keyframe(l.created) ? l.created : l.observations.front().keyframe;
-    m.move_landmark(l.id, motion[by.value()]);
+    m.move_landmark(l.id, motion.at(by.value()));
     if (adjusted) m.set_position(l.id, solved.points[next]);
   }
-  for (keyframe_id k = 0; k != m.keyframe_end(); ++k)
-    if (m.has_keyframe(k)) m.move_keyframe(k, motion[k.value()]);
+  for (const auto& k : m.keyframes()) m.move_keyframe(k.id, motion.at(k.id.value()));
   return {s.keyframes.size(), s.landmarks.size(),  s.observations.size(), 0,
           solved.iterations,  solved.initial_cost, solved.final_cost};
 }

@@ -50,13 +50,13 @@ struct snapshot {
   loop_match match;
   loop_fusion::snapshot<D> fusion;
   std::vector<keyframe_id> keyframes;
-  std::vector<sim3> poses;  ///< by keyframe id
+  std::vector<sim3> poses;  ///< by keyframe of the snapshot
   std::vector<essential_edge> edges;
-  std::vector<std::uint8_t> is_fixed;  ///< by keyframe id
+  std::vector<std::uint8_t> is_fixed;  ///< by keyframe
 };
 
 struct solution {
-  std::vector<sim3> poses;  ///< by keyframe id
+  std::vector<sim3> poses;  ///< by keyframe of the snapshot
   std::vector<loop_fusion::pair> pairs;
   int iterations = 0;
 };
@@ -68,10 +68,12 @@ template <feature_descriptor D>
                                               const loop_correction_options& o = {}) {
   if (!m.has_keyframe(match.keyframe) || !m.has_keyframe(match.candidate) || match.keyframe == match.candidate)
     return std::nullopt;
-  snapshot<D> s{match, loop_fusion::take(m, m, match, o.fusion), {}, poses_of(m), essential_graph(m, o.strong), {}};
-  s.is_fixed.assign(s.poses.size(), 0);
-  s.is_fixed[m.tree().root().value()] = 1;
-  for (const auto& k : m.keyframes()) s.keyframes.push_back(k.id);
+  snapshot<D> s{match, loop_fusion::take(m, m, match, o.fusion), {}, {}, essential_graph(m, o.strong), {}};
+  for (const auto& k : m.keyframes()) {
+    s.keyframes.push_back(k.id);
+    s.poses.emplace_back(k.T_world_camera);
+    s.is_fixed.push_back(k.id == m.tree().root() ? 1 : 0);
+  }
   const std::uint32_t a = match.keyframe.value(), b = match.candidate.value();
   std::erase_if(s.edges, [&](const essential_edge& e) {
     return e.kind == edge_kind::loop && std::min(e.from, e.to) == std::min(a, b) &&
@@ -85,6 +87,14 @@ template <feature_descriptor D>
   }
   s.edges.push_back(
       {b, a, edge_kind::loop, static_cast<std::uint32_t>(match.inliers), match.scaled_motion(), o.loop_weight});
+  for (essential_edge& e : s.edges) {  // from ids to indices: in the end most ids are those of erased keyframes
+    const auto index_of = [&s](std::uint32_t id) {
+      return static_cast<std::uint32_t>(std::lower_bound(s.keyframes.begin(), s.keyframes.end(), keyframe_id{id}) -
+                                        s.keyframes.begin());
+    };
+    e.from = index_of(e.from);
+    e.to = index_of(e.to);
+  }
   return s;
 }
 
@@ -106,9 +116,7 @@ template <feature_descriptor D>
 report apply_poses(basic_map<D>& m, const snapshot<D>& s, const solution& solved) {
   report done;
   done.iterations = solved.iterations;
-  std::vector<sim3> poses;
-  for (const keyframe_id k : s.keyframes) poses.push_back(solved.poses[k.value()]);
-  const std::vector<sim3> motion = propagate_motion<D>(m, s.keyframes, poses);
+  const keyframe_motions motion = propagate_motion<D>(m, s.keyframes, solved.poses);
   const keyframe_id a = m.replacement_of(s.match.keyframe), b = m.replacement_of(s.match.candidate);
   if (a == no_id || b == no_id) return done;
   const se3 before = m.at(a).T_world_camera;
@@ -117,7 +125,7 @@ report apply_poses(basic_map<D>& m, const snapshot<D>& s, const solution& solved
   done.corrected = true;
   done.keyframes = m.keyframes().size();
   done.moved = (m.at(a).T_world_camera.translation() - before.translation()).norm();
-  done.scale = motion[a.value()].scale();
+  done.scale = motion.at(a.value()).scale();
   done.turned = (before.rotation().inverse() * m.at(a).T_world_camera.rotation()).log().norm();
   return done;
 }

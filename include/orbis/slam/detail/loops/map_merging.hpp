@@ -46,15 +46,16 @@ struct solution {
   std::vector<loop_fusion::pair> pairs;
 };
 
-/// Whether the maps and keyframes of a match are there, and ids are left for the landmarks of both.
+/// Whether the maps and keyframes of a match are there, and ids are left for what both hold.
 template <feature_descriptor D>
 [[nodiscard]] bool is_possible(const basic_atlas<D>& maps, map_id from, map_id into, const loop_match& match) {
   return from != into && maps.has({from, match.keyframe}) && maps.has({into, match.candidate}) &&
-         maps.at(into).landmark_ids_left() >= maps.at(from).landmark_end().value();
+         maps.at(into).landmark_ids_left() >= maps.at(from).landmark_end().value() &&
+         maps.at(into).keyframe_ids_left() > maps.at(from).keyframe_end().value();
 }
 
 /// Copies what merging map `from`, which contains the keyframe of the match, into map `into`, which contains the
-/// candidate, needs. Empty if a map or keyframe is gone, or ids of landmarks run out. O(features of the neighbourhood).
+/// candidate, needs. Empty if a map or keyframe is gone, or ids run out. O(features of the neighbourhood).
 template <feature_descriptor D>
 [[nodiscard]] std::optional<snapshot<D>> take(const basic_atlas<D>& maps, map_id from, map_id into,
                                               const loop_match& match, const loop_fusion_options& o = {}) {

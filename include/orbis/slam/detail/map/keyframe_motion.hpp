@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <unordered_map>
 #include <vector>
 
 #include <orbis/core/se3.hpp>
@@ -16,15 +17,16 @@
 
 namespace orbis::slam::detail {
 
+/// Motions in the world, `T_new_old`, by keyframe.
+using keyframe_motions = std::unordered_map<std::uint32_t, sim3>;
+
 /// Moves every keyframe `k` by `T_new_old[k]`, a motion in the world, and every landmark with the oldest keyframe that
 /// observes it. `map.update_landmark` is not called: see `update_landmarks`. O(map).
-/// @pre T_new_old.size() == m.keyframe_end()
+/// @pre there is a motion for every keyframe of the map
 template <feature_descriptor D>
-void move_all(basic_map<D>& m, std::span<const sim3> T_new_old) {
-  assert(T_new_old.size() == m.keyframe_end().value());
-  for (const auto& l : m.landmarks()) m.move_landmark(l.id, T_new_old[l.observations.front().keyframe.value()]);
-  for (keyframe_id k = 0; k != m.keyframe_end(); ++k)
-    if (m.has_keyframe(k)) m.move_keyframe(k, T_new_old[k.value()]);
+void move_all(basic_map<D>& m, const keyframe_motions& T_new_old) {
+  for (const auto& l : m.landmarks()) m.move_landmark(l.id, T_new_old.at(l.observations.front().keyframe.value()));
+  for (const auto& k : m.keyframes()) m.move_keyframe(k.id, T_new_old.at(k.id.value()));
 }
 
 /// Calls `map.update_landmark` for `count` landmarks from the id `first` on, or for all that are left. Returns the id
@@ -49,31 +51,25 @@ template <feature_descriptor D>
   return around;
 }
 
-/// The motion of every keyframe of a map (`T_new_old`, in the world, by id), given new poses for some of them, with the
-/// scale of the lengths in their views. The others move with their parent in the spanning tree. The identity where
-/// there is no keyframe, and where no keyframe up to the root has a new pose. New poses of erased keyframes are
-/// ignored. O(ids of keyframes).
+/// The motion of every keyframe of a map, given new poses for some of them, with the scale of the lengths in their
+/// views. The others move with their parent in the spanning tree; the identity where no keyframe up to the root has a
+/// new pose. New poses of erased keyframes are ignored. O(keyframes).
 template <feature_descriptor D>
-[[nodiscard]] std::vector<sim3> propagate_motion(const basic_map<D>& m, std::span<const keyframe_id> solved,
-                                                 std::span<const sim3> T_world_camera) {
+[[nodiscard]] keyframe_motions propagate_motion(const basic_map<D>& m, std::span<const keyframe_id> solved,
+                                                std::span<const sim3> T_world_camera) {
   assert(solved.size() == T_world_camera.size());
-  std::vector<sim3> motion(m.keyframe_end().value());
-  std::vector<std::uint8_t> known(m.keyframe_end().value(), 0);
+  keyframe_motions motion;
   for (std::size_t i = 0; i != solved.size(); ++i) {
     const keyframe_id k = solved[i];
-    if (!m.has_keyframe(k)) continue;
-    motion[k.value()] = T_world_camera[i] * sim3(m.at(k).T_world_camera.inverse());
-    known[k.value()] = 1;
+    if (m.has_keyframe(k)) motion[k.value()] = T_world_camera[i] * sim3(m.at(k).T_world_camera.inverse());
   }
   std::vector<keyframe_id> path;
   for (const auto& k : m.keyframes()) {
     path.clear();
     keyframe_id at = k.id;
-    for (; at != no_id && known[at.value()] == 0; at = m.tree().parent(at)) path.push_back(at);
-    for (const keyframe_id follows : path) {
-      if (at != no_id) motion[follows.value()] = motion[at.value()];
-      known[follows.value()] = 1;
-    }
+    for (; at != no_id && !motion.contains(at.value()); at = m.tree().parent(at)) path.push_back(at);
+    const sim3 with = at != no_id ? motion.at(at.value()) : sim3{};
+    for (const keyframe_id follows : path) motion.emplace(follows.value(), with);
   }
   return motion;
 }

@@ -3,6 +3,7 @@
 /// The data of a map, from which everything else in it follows.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <map>
 
@@ -23,6 +24,7 @@ struct erased_keyframe {
   keyframe_id replacement;   ///< may be erased itself; `no_id` if no keyframe was left
   se3 T_replacement_camera;  ///< in lengths over the replacement's `scale`; without a replacement: `T_world_camera`
   double scale = 1.0;        ///< over that of the replacement
+  std::uint64_t number = 0;  ///< keyframes were erased in this order
 };
 
 /// How many ids later an erased landmark may be forgotten: who still asks for its replacement holds a frame, or what a
@@ -39,11 +41,17 @@ struct map_content {
   slot_map<basic_keyframe<D>, keyframe_id> keyframes;
   slot_map<basic_landmark<D>, landmark_id, remembered_landmarks> landmarks;
   spanning_tree tree;
-  std::map<keyframe_id, erased_keyframe> erased;
+  std::map<keyframe_id, erased_keyframe> erased;  ///< those that were not forgotten
+  std::uint64_t erasures = 0;                     ///< the numbers of all erased keyframes are less
+  std::size_t forgotten = 0;                      ///< ids of keyframes that are neither there nor in `erased`
 };
 
 /// A map that gave more ids to landmarks is written without those of erased ones, so that it can go on when it is read.
 inline constexpr std::uint32_t most_landmarks_of_file = 1U << 28U;
+/// Ids of keyframes in a file: those of some years.
+inline constexpr std::uint32_t most_keyframes_of_file = 1U << 28U;
+/// In a file, before a keyframe: what follows.
+inline constexpr std::uint8_t gone_keyframe = 0, kept_keyframe = 1, forgotten_keyframes = 2;
 /// In a file, instead of a landmark's number of observations: a number of ids follows that are gone.
 inline constexpr std::uint32_t run_of_gone = 0xffffffffU;
 

@@ -9,6 +9,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -59,7 +60,7 @@ class map_reader {
     to_.scale_factor = in.take<double>();
     keyframe_ids_ = in.take<std::uint32_t>();
     landmark_ids_ = in.take<std::uint32_t>();
-    if (keyframe_ids_ > decltype(to_.keyframes)::most_ids || landmark_ids_ > most_landmarks_of_file)
+    if (keyframe_ids_ > most_keyframes_of_file || landmark_ids_ > most_landmarks_of_file)
       return wrong("more ids than a file may have");
     const auto sensor = version_ < 2 ? 0 : in.take<std::uint32_t>();
     if (sensor > static_cast<std::uint32_t>(sensor_kind::monocular))
@@ -75,18 +76,20 @@ class map_reader {
   }
 
   bool keyframes(section_reader in) {
-    for (keyframe_id id = 0; id != keyframe_ids_; ++id) {
+    for (keyframe_id id = 0; id != keyframe_ids_; id = to_.keyframes.end_id()) {
       const std::string name = "keyframe " + to_string(id);
       const auto state = in.take<std::uint8_t>();
       if (in.ended()) return wrong(name + ": the section ends before it");
-      if (state > 1) return wrong(name + ": neither there nor erased");
-      if (!(state == 0 ? erased(in, id) : keyframe_at(in, id))) return wrong(name + ": " + problem);
+      if (state > (version_ >= 4 ? forgotten_keyframes : kept_keyframe))
+        return wrong(name + ": neither there nor erased");
+      if (!(state == kept_keyframe ? keyframe_at(in, id) : state == gone_keyframe ? erased(in, id) : forgotten(in, id)))
+        return wrong(name + ": " + problem);
     }
     return replacements_end() && ends(in, "kfrm");
   }
 
   bool tree(section_reader in) {
-    std::vector<std::vector<keyframe_id>> children(keyframe_ids_);
+    std::map<keyframe_id, std::vector<keyframe_id>> children;
     std::vector<std::pair<keyframe_id, keyframe_id>> loops;
     keyframe_id root;
     for (const keyframe& k : to_.keyframes) {
@@ -96,7 +99,7 @@ class map_reader {
       if (in.ended() || in.left() / sizeof(keyframe_id) < count) return wrong(name + ": the section ends within it");
       if (parent != no_id && !to_.keyframes.contains(parent)) return wrong(name + ": its parent is not there");
       if (parent == no_id && std::exchange(root, k.id) != no_id) return wrong(name + ": a second root");
-      if (parent != no_id) children[parent.value()].push_back(k.id);
+      if (parent != no_id) children[parent].push_back(k.id);
       keyframe_id last;
       for (std::uint32_t i = 0; i != count; ++i) {
         const keyframe_id other = in.take<std::uint32_t>();
@@ -110,7 +113,9 @@ class map_reader {
     while (!open.empty()) {
       const keyframe_id parent = open.back();
       open.pop_back();
-      for (const keyframe_id child : children[parent.value()]) {
+      const auto below = children.find(parent);
+      if (below == children.end()) continue;
+      for (const keyframe_id child : below->second) {
         to_.tree.add(child, parent);
         open.push_back(child);
       }
@@ -161,7 +166,7 @@ class map_reader {
     if (in.ended()) return wrong("the section ends within it");
     if (!pose) return wrong("its pose is none");
     if (replacement != no_id && replacement >= keyframe_ids_) return wrong("its replacement never was");
-    to_.erased[id] = {replacement, *pose};
+    to_.erased[id] = {replacement, *pose, 1.0, to_.erasures++};
     to_.keyframes.add_erased(replacement);
     return true;
   }
@@ -199,13 +204,27 @@ class map_reader {
     return true;
   }
 
-  /// The chains of replacements have no cycle.
+  bool forgotten(section_reader& in, keyframe_id id) {
+    const auto count = in.take<std::uint32_t>();
+    if (in.ended()) return wrong("the section ends within it");
+    if (count == 0 || count > keyframe_ids_ - id)
+      return wrong("begins " + std::to_string(count) + " that are forgotten");
+    to_.keyframes.add_gone(count);
+    to_.forgotten += count;
+    return true;
+  }
+
+  /// The chains of replacements lead to keyframes that are there, or to none.
   bool replacements_end() {
-    std::vector<keyframe_id> met(keyframe_ids_);
-    for (keyframe_id id = 0; id != keyframe_ids_; ++id)
-      for (keyframe_id k = id; k != no_id && !to_.keyframes.contains(k); k = to_.erased.at(k).replacement) {
-        if (met[k.value()] == id) return wrong("keyframe " + to_string(id) + ": is its own replacement");
-        if (std::exchange(met[k.value()], id) != no_id) break;  // from here on it has been followed before
+    std::map<keyframe_id, keyframe_id> met;  // from which one it was reached first
+    for (const auto& [id, e] : to_.erased)
+      for (keyframe_id k = id; k != no_id && !to_.keyframes.contains(k);) {
+        const auto at = to_.erased.find(k);
+        if (at == to_.erased.end()) return wrong("keyframe " + to_string(id) + ": became one that is forgotten");
+        const auto [first, is_new] = met.emplace(k, id);
+        if (!is_new && first->second == id) return wrong("keyframe " + to_string(id) + ": is its own replacement");
+        if (!is_new) break;  // from here on it has been followed before
+        k = at->second.replacement;
       }
     return true;
   }

@@ -15,7 +15,7 @@
 namespace orbis::slam::detail {
 
 inline constexpr std::string_view map_magic = "orbismap";
-inline constexpr std::uint32_t map_version = 3;
+inline constexpr std::uint32_t map_version = 4;
 
 inline void put_pose(std::string& to, const se3& pose) {
   const auto& q = pose.rotation().unit_quaternion();
@@ -58,10 +58,15 @@ inline void put_landmark(std::string& to, const landmark& l) {
   });
   put_section(bytes, "kfrm", [&](std::string& to) {
     for (keyframe_id id = 0; id != m.keyframe_end(); ++id) {
-      put(to, static_cast<std::uint8_t>(m.has_keyframe(id)));
+      if (const keyframe_id next = m.next_remembered(id); next != id) {
+        put(to, forgotten_keyframes, next - id);
+        if ((id = next) == m.keyframe_end()) break;
+      }
       if (m.has_keyframe(id)) {
+        put(to, kept_keyframe);
         put_keyframe(to, m.at(id));
       } else {
+        put(to, gone_keyframe);
         const erased_keyframe& e = m.content().erased.at(id);
         put(to, e.replacement.value());
         const double scale = e.replacement == no_id ? 1.0 : m.scale_of(e.replacement);

@@ -70,20 +70,24 @@ class paged_slots {
     if (i / page_size != size_ / page_size) end_page(i);
   }
 
-  /// The first id from `i` on that is not erased; `size()` if there is none. O(erased ids in between), but a page that
-  /// was given back takes one step, as do 65536 ids that were `gone` from the start.
+  /// The first id from `i` on that is not erased; `size()` if there is none. O(erased ids in between), but a page whose
+  /// ids are all erased takes one step, as do 65536 ids that were `gone` from the start.
   [[nodiscard]] std::uint32_t next_contained(std::uint32_t i) const noexcept {
-    return next(i, [](std::uint32_t slot) { return (slot & erased) == 0; });
+    return next(
+        i, [this](std::uint32_t page) { return contained_[page] != 0; },
+        [](std::uint32_t slot) { return (slot & erased) == 0; });
   }
-  /// The first id from `i` on that is not `gone`; `size()` if there is none. Cost as `next_contained`.
+  /// The first id from `i` on that is not `gone`; `size()` if there is none. O(ids in between), but a page that was
+  /// given back takes one step, as do 65536 ids that were `gone` from the start.
   [[nodiscard]] std::uint32_t next_known(std::uint32_t i) const noexcept {
-    return next(i, [](std::uint32_t slot) { return slot != gone; });
+    return next(
+        i, [](std::uint32_t) { return true; }, [](std::uint32_t slot) { return slot != gone; });
   }
   /// The last id that is not erased; `size()` if there is none. Cost as `next_contained`.
   [[nodiscard]] std::uint32_t last_contained() const noexcept {
     for (std::uint32_t i = size_; i != 0;) {
       const std::uint32_t at = i - 1;
-      if (page_of(at) == none)
+      if (const std::uint32_t page = page_of(at); page == none || contained_[page] == 0)
         i = at - at % (has_chunk(at) ? page_size : chunk_size);
       else if (contains(at))
         return at;
@@ -116,10 +120,10 @@ class paged_slots {
     std::uint32_t since;  ///< size() when its last id was erased
   };
 
-  template <class Wanted>
-  [[nodiscard]] std::uint32_t next(std::uint32_t i, Wanted wanted) const noexcept {
+  template <class MayHold, class Wanted>
+  [[nodiscard]] std::uint32_t next(std::uint32_t i, MayHold may_hold, Wanted wanted) const noexcept {
     while (i < size_) {
-      if (page_of(i) == none)
+      if (const std::uint32_t page = page_of(i); page == none || !may_hold(page))
         i += has_chunk(i) ? page_size - i % page_size : chunk_size - i % chunk_size;
       else if (wanted((*this)[i]))
         return i;

@@ -82,8 +82,8 @@ class slot_map {
   [[nodiscard]] bool empty() const noexcept { return size() == 0; }
   /// The id that the next object will get.
   [[nodiscard]] Id end_id() const noexcept { return slots_.size(); }
-  /// The first id from `i` on that has an object; `end_id()` if there is none. O(erased ids in between), the long
-  /// forgotten ones 256 at once.
+  /// The first id from `i` on that has an object; `end_id()` if there is none. O(erased ids in between), 256
+  /// at once where all are erased.
   [[nodiscard]] Id next_id(Id i) const noexcept { return slots_.next_contained(i.value()); }
   /// The first id from `i` on that has an object or a replacement; `end_id()` if there is none. Cost as `next_id`.
   [[nodiscard]] Id next_known_id(Id i) const noexcept { return slots_.next_known(i.value()); }

@@ -14,6 +14,7 @@
 #include <optional>
 #include <string_view>
 #include <type_traits>
+#include <unordered_map>
 #include <utility>
 #include <vector>
 
@@ -57,16 +58,20 @@ template <feature_descriptor D, class Camera>
 [[nodiscard]] bundle_snapshot calibration_problem_of(const basic_map<D>& m, const camera_rig<Camera>& rig,
                                                      std::size_t max_keyframes) {
   bundle_snapshot s;
-  std::vector<std::uint32_t> index(m.keyframe_end().value(), no_id);
+  std::unordered_map<std::uint32_t, std::uint32_t> index;  // by keyframe
   const std::size_t first = first_to_take(m, max_keyframes);
   std::size_t number = 0;
   for (const auto& k : m.keyframes()) {
     const std::size_t i = number++;
     if (i < first || i - first >= max_keyframes) continue;
-    index[k.id.value()] = static_cast<std::uint32_t>(s.keyframes.size());
+    index.emplace(k.id.value(), static_cast<std::uint32_t>(s.keyframes.size()));
     s.add_keyframe(k.id, k.T_world_camera, false);
   }
-  for (const auto& l : m.landmarks()) s.add_shared_landmark(m, l, rig, [&](keyframe_id k) { return index[k.value()]; });
+  for (const auto& l : m.landmarks())
+    s.add_shared_landmark(m, l, rig, [&](keyframe_id k) {
+      const auto i = index.find(k.value());
+      return i != index.end() ? i->second : no_id;
+    });
   return s;
 }
 

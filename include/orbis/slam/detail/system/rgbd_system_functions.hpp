@@ -172,6 +172,7 @@ std::optional<map_keyframe> ORBIS_SLAM_SYSTEM::localize(
     if (may_grow && front_end_->needs_keyframe(f, result.inliers, maps)) made = front_end_->make_keyframe(f, maps);
   }
   front_end_->finish(std::move(f), maps, made);
+  if (!is_frozen) front_end_->forget_erased(maps);
   return made;
 }
 

@@ -20,7 +20,8 @@ namespace orbis::slam::detail {
 
 /// Two locks, always taken in this order:
 ///  - `edit()`: held while maps are changed in several steps (mapping of a keyframe, correction of a loop, global
-///    adjustment), so that between the steps only tracking adds to a map;
+///    adjustment), so that between the steps only tracking adds to a map, and lets it
+///    forget keyframes that were erased long ago;
 ///  - `lock()`: held while anything here is read or changed, for a short time; never while solving, nor while callbacks
 ///    are called.
 ///

@@ -9,6 +9,8 @@
 #include <deque>
 #include <limits>
 #include <map>
+#include <utility>
+#include <vector>
 
 #include <orbis/core/se3.hpp>
 #include <orbis/core/trajectory.hpp>
@@ -47,6 +49,18 @@ class frame_log {
       if (k.map == map && maps.contains(map))
         all.push_back({f.timestamp, maps.at(map).pose_of(k.keyframe) *
                                         scaled(f.T_reference_camera, maps.at(map).scale_of(k.keyframe))});
+    }
+    return all;
+  }
+
+  /// The keyframes of a map that frames which are kept hang on, by their present ids. O(frames).
+  template <feature_descriptor D>
+  [[nodiscard]] std::vector<keyframe_id> references(const basic_atlas<D>& maps, map_id map) const {
+    std::vector<keyframe_id> all;
+    map_keyframe before;
+    for (const logged_frame& f : frames_) {
+      if (std::exchange(before, f.reference) == f.reference) continue;  // as most are
+      if (const map_keyframe k = maps.current(f.reference); k.map == map) all.push_back(k.keyframe);
     }
     return all;
   }

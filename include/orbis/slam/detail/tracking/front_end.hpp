@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <functional>
+#include <limits>
 #include <optional>
 #include <span>
 #include <type_traits>
@@ -57,6 +58,8 @@ class front_end {
   /// The keyframes with the most similar appearance, as ids.
   using appearance_search =
       std::function<std::vector<map_keyframe>(const decltype(frame_type::features)&, std::size_t count)>;
+  /// So many erased keyframes are remembered in any case: who got their ids from an event may still ask where they are.
+  static constexpr std::size_t latest_erased = 1024;
   /// Called for a map that is left behind with few keyframes.
   using map_drop = std::function<void(map_id)>;
 
@@ -125,6 +128,10 @@ class front_end {
   /// Counts a frame and, if it was localised, keeps it for the next prediction and in the log.
   /// `made`: the keyframe that it became.
   void finish(frame_type f, const atlas_type& maps, const std::optional<map_keyframe>& made);
+  /// Where the trajectory is limited, so is what the active map remembers of erased keyframes: those that frames of the
+  /// trajectory hang on, and the latest. O(1), but O(frames + n log n) for every thousandth erased keyframe, where n
+  /// are remembered.
+  void forget_erased(atlas_type& maps);
 
  private:
   static constexpr bool may_lack_scale = Sensor::scale != scale_source::sensor;
@@ -203,6 +210,7 @@ class front_end {
   motion_model motion_;
   track_counters counters_;
   frame_log log_;
+  std::size_t most_erased_ = 2 * latest_erased;  ///< of any map, before it is made to forget
 };
 
 // The members are defined outside of the class, so that a compiled instantiation of it (`extern template`) covers them.
@@ -273,7 +281,7 @@ std::size_t front_end<Camera, D, Matchers, Sensor>::drop_disagreeing(frame_type&
 template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
 se3 front_end<Camera, D, Matchers, Sensor>::last_pose(const atlas_type& maps) const {
   const map_keyframe k = maps.current(last_reference_);
-  return maps.contains(k.map) && k.keyframe < maps.at(k.map).keyframe_end()
+  return maps.contains(k.map) && maps.at(k.map).remembers(k.keyframe)
              ? maps.at(k.map).pose_of(k.keyframe) * scaled(T_reference_last_, maps.at(k.map).scale_of(k.keyframe))
              : last_.T_world_camera;
 }
@@ -304,7 +312,7 @@ void front_end<Camera, D, Matchers, Sensor>::sync_with_map(const atlas_type& map
   if (!maps.contains(now.map)) return;
   last_.T_world_camera = last_pose(maps);
   const map_keyframe last = maps.current(last_reference_);
-  if (last.map == now.map && last.keyframe < maps.at(now.map).keyframe_end()) {
+  if (last.map == now.map && maps.at(now.map).remembers(last.keyframe)) {
     const double scale = maps.at(now.map).scale_of(last.keyframe);
     const double grown = scale / std::exchange(last_scale_, scale);
     motion_.scale_by(grown);
@@ -597,6 +605,17 @@ void front_end<Camera, D, Matchers, Sensor>::finish(frame_type f, const atlas_ty
   else if (depth_.needs_surface(maps, f.T_world_camera))
     depth_.keep(last_reference_, T_reference_last_, f.twist, shutter_);
   last_ = std::move(f);
+}
+
+template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
+void front_end<Camera, D, Matchers, Sensor>::forget_erased(atlas_type& maps) {
+  if (options_.trajectory_frames == std::numeric_limits<std::size_t>::max()) return;
+  if (maps.active().content().erased.size() < most_erased_) return;
+  std::vector<keyframe_id> keep = log_.references(maps, maps.active_id());
+  for (const map_keyframe& k : {maps.current(reference_), maps.current(last_reference_)})
+    if (k.map == maps.active_id()) keep.push_back(k.keyframe);
+  maps.active().forget_erased(keep, latest_erased);
+  most_erased_ = maps.active().content().erased.size() + latest_erased;
 }
 
 }  // namespace orbis::slam::detail
