@@ -6,6 +6,7 @@
 #include <orbis/features/orb.hpp>
 #include <orbis/io/synthetic.hpp>
 #include <orbis/places/default_vocabulary.hpp>
+#include <orbis/places/detail/default_vocabulary_data.hpp>
 #include <orbis/places/keyframe_database.hpp>
 #include <orbis/places/vocabulary_file.hpp>
 
