@@ -11,7 +11,6 @@
 #include <span>
 #include <string>
 #include <string_view>
-#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -60,10 +59,7 @@ ORBIS_COMPILED_IO_ONCE mono_format detect_mono_format(const std::filesystem::pat
 
 ORBIS_COMPILED_IO_ONCE result<mono_recording> open_mono_recording(const std::filesystem::path& folder,
                                                                   const mono_recording_options& options) {
-  std::error_code ignored;
-  if (!detail::present(folder)) return fail(errc::not_found, folder.string(), "no such folder");
-  if (!std::filesystem::is_directory(folder, ignored))
-    return fail(errc::unsupported, folder.string(), "a recording is a folder, this is a file");
+  if (const auto is_folder = detail::check_folder(folder); !is_folder) return fail(is_folder.error());
   std::optional<camera::camera_settings> camera = options.camera;
   std::optional<std::filesystem::path> camera_file;
   if (const auto file = folder / "camera.toml"; !camera && detail::present(file)) {

@@ -14,7 +14,6 @@
 #include <span>
 #include <string>
 #include <string_view>
-#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -126,10 +125,7 @@ ORBIS_COMPILED_IO_ONCE result<recording_index> index_recording(const std::filesy
 
 ORBIS_COMPILED_IO_ONCE result<recording> open_recording(const std::filesystem::path& folder,
                                                         const recording_options& options) {
-  std::error_code ignored;
-  if (!detail::present(folder)) return fail(errc::not_found, folder.string(), "no such folder");
-  if (!std::filesystem::is_directory(folder, ignored))
-    return fail(errc::unsupported, folder.string(), "a recording is a folder, this is a file");
+  if (const auto is_folder = detail::check_folder(folder); !is_folder) return fail(is_folder.error());
 
   recording_format format = options.format;
   auto index = detail::index_recording(folder, format, options.max_time_difference);

@@ -11,7 +11,6 @@
 #include <span>
 #include <string>
 #include <string_view>
-#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -80,10 +79,7 @@ ORBIS_COMPILED_IO_ONCE stereo_format detect_stereo_format(const std::filesystem:
 
 ORBIS_COMPILED_IO_ONCE result<stereo_recording> open_stereo_recording(const std::filesystem::path& folder,
                                                                       const stereo_recording_options& options) {
-  std::error_code ignored;
-  if (!detail::present(folder)) return fail(errc::not_found, folder.string(), "no such folder");
-  if (!std::filesystem::is_directory(folder, ignored))
-    return fail(errc::unsupported, folder.string(), "a recording is a folder, this is a file");
+  if (const auto is_folder = detail::check_folder(folder); !is_folder) return fail(is_folder.error());
   const stereo_format format =
       options.format == stereo_format::automatic ? detect_stereo_format(folder) : options.format;
   const bool has_cameras = format == stereo_format::kitti || format == stereo_format::asl;

@@ -122,6 +122,15 @@ inline result<void> check_first_frame(const recording_index& index, const std::f
   return text;
 }
 
+/// Whether there is a folder. Errors: not_found, unsupported (a file).
+[[nodiscard]] inline result<void> check_folder(const std::filesystem::path& folder) {
+  std::error_code ignored;
+  if (!present(folder)) return fail(errc::not_found, folder.string(), "no such folder");
+  if (!std::filesystem::is_directory(folder, ignored))
+    return fail(errc::unsupported, folder.string(), "a recording is a folder, this is a file");
+  return {};
+}
+
 /// That a folder is no recording: what was looked for, and what there is instead.
 [[nodiscard]] inline error unknown_recording(const std::filesystem::path& folder, const std::string& looked_for) {
   return {errc::unsupported, folder.string(), looked_for + "; the folder " + describe_content(folder)};
