@@ -2,6 +2,7 @@
 #include <iterator>
 #include <string>
 
+#include <orbis/camera/presets.hpp>
 #include <orbis/io/recording.hpp>
 
 #include "io/recordings.hpp"
