@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
 #
-# Fetches the libraries of Debian 12 for 64-bit ARM that run.sh wants, and unpacks them into a folder. Nothing is installed,
+# Fetches the libraries of Debian 12 for 64-bit ARM that run.sh and tests/aarch64.sh want, and unpacks them into a folder. Nothing is installed,
 # and the lists of packages of this system stay as they are.
 #
 # usage: bench/board/sysroot.sh FOLDER
@@ -23,6 +23,6 @@ export APT_CONFIG="$root/.apt/conf"
 apt-get update
 cd "$root/.apt"
 apt-get download zlib1g{,-dev} libpng16-16 libpng-dev libjpeg62-turbo{,-dev} liboctomap{1.9,-dev} libtbb12 \
-  libopencv-{core,flann,imgproc,features2d}{406,-dev} liblapack3 libblas3 libgfortran5 \
+  libopencv-{core,flann,imgproc,features2d,calib3d}{406,-dev} liblapack3 libblas3 libgfortran5 \
   libgl1 libglx0 libglvnd0 libx11-6 libxcb1 libxau6 libxdmcp6 libbsd0 libmd0
 for package in *.deb; do dpkg -x "$package" "$root"; done

@@ -103,3 +103,14 @@ TEST_CASE("A system with another descriptor, distance and extractor tracks a rec
   const auto valid = slam::validate(slam.map());
   CHECK((valid ? "" : valid.error().to_string()) == "");
 }
+
+TEST_CASE("A system takes another extractor by type") {
+  struct sparse_extractor {
+    features::orb_extractor inner{{.max_features = 400}};
+    [[nodiscard]] features::features operator()(image_view<const rgb8> image) const { return inner(image); }
+  };
+  const io::synthetic_recording recorded{{.frames = 10, .seed = 5, .width = 320, .height = 240, .frames_around = 300}};
+  slam::rgbd_system slam{recorded.camera().model, slam::options{}, sparse_extractor{}};
+  for (const auto& f : recorded) CHECK(slam.track(f).tracked());
+  CHECK(slam.map().keyframes().front().size() <= 400);
+}

@@ -5,9 +5,7 @@
 #include <utility>
 
 #include <orbis/core/file.hpp>
-#include <orbis/features/orb.hpp>
 #include <orbis/io/synthetic.hpp>
-#include <orbis/slam/definitions.hpp>
 #include <orbis/slam/map.hpp>
 #include <orbis/slam/map_file.hpp>
 #include <orbis/slam/rgbd_system.hpp>
@@ -53,18 +51,6 @@ const slam::map& slam_system::map() const { return held_->system.map(); }
 void slam_system::look(const std::function<void(const slam::atlas&)>& read) const { held_->system.inspect(read); }
 
 }  // namespace orbis::test
-
-TEST_CASE("A system takes another extractor by type") {
-  using namespace orbis;
-  struct sparse_extractor {
-    features::orb_extractor inner{{.max_features = 400}};
-    [[nodiscard]] features::features operator()(image_view<const rgb8> image) const { return inner(image); }
-  };
-  const io::synthetic_recording recorded{{.frames = 10, .seed = 5, .width = 320, .height = 240, .frames_around = 300}};
-  slam::rgbd_system slam{recorded.camera().model, slam::options{}, sparse_extractor{}};
-  for (const auto& f : recorded) CHECK(slam.track(f).tracked());
-  CHECK(slam.map().keyframes().front().size() <= 400);
-}
 
 TEST_CASE("A system with a limited trajectory forgets erased keyframes, but not of a map that is kept unchanged") {
   using namespace orbis;
