@@ -84,7 +84,7 @@ for component in $(printf '%s\n' "${quick[@]%%/*}" | sort -u); do
         parts+=("$out/${source//\//_}.quick.o")
         continue
       fi
-      files+=("$source")
+      files+=("$PWD/$source")  # found from the folder of the batch, too
       bytes=$((bytes + $(wc -c <"$source")))
     fi
     if ((${#files[@]})) && { ((bytes > 25000)) || [[ $source == - ]]; }; then

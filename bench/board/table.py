@@ -3,9 +3,11 @@
 """Turns the counts of count.c into a table of work and implied times on a Raspberry Pi 4.
 
 usage: table.py COUNTS.tsv... [--stages]
+       table.py --lanes [--stages] NEON.tsv PORTABLE.tsv AVX2.tsv
 
 Each file is what one program has written. Without --stages a row is the mean over the pieces between a label and "end";
-with it (slam.cpp) the frames are taken apart into the stages of `track`.
+with it (slam.cpp) the frames are taken apart into the stages of `track`. With --lanes: the instructions of the same program
+in three kinds of vector code, and those of a lane by AVX2's, whose vectors have 256 bits, not 128.
 """
 import csv
 import sys
@@ -105,11 +107,26 @@ def stages(rows):
     return found
 
 
+def lanes(names, taken_apart):
+    """Prints instructions of NEON, portable and AVX2 code, and what a lane costs by AVX2."""
+    neon, portable, avx2 = (taken_apart(read(name)) for name in names)
+    mean = lambda all_of: sum(c["instructions"] for c in all_of) / len(all_of) / 1e6
+    print(f"{'':32} {'NEON':>9} {'portable':>9} {'AVX2':>9}   of a lane: {'NEON':>6} {'portable':>9}")
+    for label in neon:
+        if label in portable and label in avx2:
+            n, p, a = mean(neon[label]), mean(portable[label]), mean(avx2[label])
+            print(f"{label:32} {n:8.2f}M {p:8.2f}M {a:8.2f}M   {'':10} {n / a / 2:6.2f} {p / a / 2:9.2f}")
+
+
 def main():
     names = [a for a in sys.argv[1:] if not a.startswith("--")]
     by_stage = "--stages" in sys.argv
     if not names:
         sys.exit(__doc__)
+    if "--lanes" in sys.argv:
+        if len(names) != 3:
+            sys.exit("table.py: --lanes takes three files: NEON, portable, AVX2")
+        return lanes(names, stages if by_stage else pieces)
     print(f"{'':32} {'pieces':>6} {'instr.':>8} {'vector':>7} {'wide':>7} {'slow':>6} {'mispr.':>7} "
           f"{'L1':>8} {'ahead':>6} {'L2':>8} {'ahead':>6} {'ms':>8} {'fast':>8} {'slow':>8}")
     for name in names:
