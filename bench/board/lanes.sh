@@ -23,6 +23,7 @@ build() {
   echo "compiling $1" >&2
   "${CXX:-g++}" "${flags[@]}" -o "$native/$1" "bench/board/$1.cpp" "${@:2}" -lpng -ljpeg -lz
 }
+${CC:-gcc} -O2 -Wall -Wextra -fPIC -shared -fvisibility=hidden -o "$out/libcount.so" bench/board/count.c
 build features -lopencv_features2d -lopencv_core
 build octree -loctomap -loctomath
 build slam
@@ -31,7 +32,7 @@ count() {  # name of the counts, program and its arguments
   for cpu in max core2duo; do  # QEMU's "max" has AVX2 and no AVX-512
     echo "counting $1 ($cpu)" >&2
     qemu-x86_64 -cpu "$cpu" -plugin "./$out/libcount.so,out=$native/$1_$cpu.tsv" "$native/$2" "${@:3}" >&2 ||
-      echo "lanes.sh: $2 failed on $cpu: see README.md on AVX2 of QEMU 7.2" >&2
+      echo "lanes.sh: $2 failed on $cpu; README.md tells of AVX2 in QEMU 7.2" >&2
   done
 }
 count features_1000 features "$data" 8 1000 8
