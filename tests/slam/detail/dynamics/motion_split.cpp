@@ -38,7 +38,9 @@ struct scene {
       if (!pixel) return false;
       optimize::pose_observation o;
       o.point = known;
-      o.pixel = *pixel + vec2(bits.uniform(-0.7, 0.7), bits.uniform(-0.7, 0.7));
+      const double noise_y = bits.uniform(-0.7, 0.7);  // one after the other: arguments have no order
+      const double noise_x = bits.uniform(-0.7, 0.7);
+      o.pixel = *pixel + vec2(noise_x, noise_y);
       o.right = model.right(o.pixel.x(), seen.z());
       o.information = 1.0;
       observations.push_back(o);
@@ -46,11 +48,13 @@ struct scene {
       return true;
     };
     while (observations.size() < room) {
-      const vec3 p(bits.uniform(-1.5, 1.5), bits.uniform(-1.0, 1.0), bits.uniform(2.0, 4.0));
+      const double z = bits.uniform(2.0, 4.0), y = bits.uniform(-1.0, 1.0), x = bits.uniform(-1.5, 1.5);
+      const vec3 p(x, y, z);
       add(p, p, trust_of_room);
     }
     while (observations.size() < room + body) {
-      const vec3 p(bits.uniform(-0.3, 0.3), bits.uniform(-0.4, 0.4), bits.uniform(0.9, 1.1));
+      const double z = bits.uniform(0.9, 1.1), y = bits.uniform(-0.4, 0.4), x = bits.uniform(-0.3, 0.3);
+      const vec3 p(x, y, z);
       add(p, moved * p, 0.0);
     }
   }
@@ -95,8 +99,10 @@ TEST_CASE("What moves is found where the pose is right already, which then stays
 TEST_CASE("Nothing moves where the outliers have no motion in common or lie among what stands still") {
   scene still(vec3::Zero());
   random_bits bits{3};
-  for (std::size_t i = 0; i < still.observations.size(); i += 3)
-    still.observations[i].pixel += vec2(bits.uniform(-20.0, 20.0), bits.uniform(-20.0, 20.0));
+  for (std::size_t i = 0; i < still.observations.size(); i += 3) {
+    const double y = bits.uniform(-20.0, 20.0), x = bits.uniform(-20.0, 20.0);
+    still.observations[i].pixel += vec2(x, y);
+  }
   CHECK(!still.split(still.truth));
   scene shaken(vec3::Zero());  // every third point is seen elsewhere, all alike
   for (std::size_t i = 0; i < shaken.observations.size(); i += 3) shaken.observations[i].pixel.x() += 8.0;
