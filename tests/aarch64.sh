@@ -10,10 +10,17 @@
 # libeigen3-dev, libexpected-dev, libtomlplusplus-dev, libnanoflann-dev and catch2, as `./run test-aarch64` installs them.
 # Objects are kept in build/aarch64 and made again only where something has changed.
 set -euo pipefail
-cd "$(dirname "${BASH_SOURCE[0]}")/.."
-[[ -d ${1:-}/usr/include/octomap ]] || { sed -n '8,11s/^# \{0,1\}//p' tests/aarch64.sh >&2; exit 1; }
+here=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
+if [[ -z ${1:-} || ! -e $1/complete ]]; then
+  sed -n '8,11s/^# \{0,1\}//p' "$here/tests/aarch64.sh" >&2
+  exit 1
+fi
 root=$(cd "$1" && pwd)
 shift
+data=${ORBIS_DATA_DIR:-$here/../shared/data}
+data=$(cd "$data" 2>/dev/null && pwd || echo none)
+export ORBIS_DATA_DIR=$data  # the tests read it, from another folder
+cd "$here"
 
 compiler=${AARCH64_CXX:-aarch64-linux-gnu-g++}
 jobs=${JOBS:-$(nproc)}
@@ -28,35 +35,39 @@ if [[ ! -e $out/include/catch2/catch.hpp ]]; then
   echo "tests/aarch64.sh: wants Catch2 2 (catch2/catch.hpp), of which only headers are needed" >&2
   exit 1
 fi
-data=${ORBIS_DATA_DIR:-$PWD/../shared/data}
 lib=$root/usr/lib/aarch64-linux-gnu
 flags=(-std=c++20 -O1 -w -Wno-psabi -Iinclude -Itests -isystem "$out/include" -isystem "$root/usr/include"
   -isystem "$root/usr/include/aarch64-linux-gnu" -isystem "$root/usr/include/opencv4" "-DORBIS_DATA_DIR=\"$data\"")
 compiled=(-ffp-contract=off -DORBIS_COMPILED -DORBIS_COMPILED_IO)
 
 makefile=$out/Makefile
+rules=$makefile.rules
 objects=()
 programs=()
-: >"$makefile.rules"
+: >"$rules"
+keep() {  # file: what is read becomes this file, whose time stays if nothing has changed
+  cat >"$1.new"
+  if cmp -s "$1.new" "$1"; then rm "$1.new"; else mv "$1.new" "$1"; fi
+}
 compile() {  # object, source, options...: a rule
   objects+=("$1")
-  printf '%s: %s\n\t@echo "  %s"\n\t@%s %s -MMD -MP -c -o $@ $<\n' "$1" "$2" "$2" "$compiler" \
-    "$(printf '%q ' "${flags[@]}" "${@:3}")" >>"$makefile.rules"
+  printf '%s: %s %s\n\t@echo "  %s"\n\t@%s %s -MMD -MP -c -o $@ $<\n' "$1" "$2" "$out/flags" "$2" "$compiler" \
+    "$(printf '%q ' "${flags[@]}" "${@:3}")" >>"$rules"
 }
-batch() {  # name, file...: puts the files into one translation unit, if that is not made of them already
-  local unit=$out/batches/$1.cpp
-  awk -f tests/batch.awk "${@:2}" >"$unit.new"
-  if cmp -s "$unit.new" "$unit"; then rm "$unit.new"; else mv "$unit.new" "$unit"; fi
-}
-program() {  # name, object...: a rule
+program() {  # name, object...: a rule; made again, too, when it is made of others
   programs+=("$out/$1")
-  printf '%s: %s\n\t@%s -o $@ $^ -L%s -lopencv_calib3d -lopencv_features2d -lopencv_imgproc -lopencv_core -loctomap %s\n' \
-    "$out/$1" "${*:2}" "$compiler" "$lib" "-loctomath -lpng16 -ljpeg -lz -Wl,--allow-shlib-undefined" >>"$makefile.rules"
+  printf '%s\n' "${@:2}" | keep "$out/$1.list"
+  printf '%s: %s %s\n\t@%s -o $@ $(filter %%.o %%.a,$^) -L%q %s\n' "$out/$1" "${*:2}" "$out/$1.list" "$compiler" "$lib" \
+    "-lopencv_calib3d -lopencv_features2d -lopencv_imgproc -lopencv_core -loctomap -loctomath -lpng16 -ljpeg -lz \
+-Wl,--allow-shlib-undefined" >>"$rules"
 }
+printf '%s\n' "$compiler" "${flags[@]}" "${compiled[@]}" | keep "$out/flags"
 
-printf '#define CATCH_CONFIG_MAIN\n#include <catch2/catch.hpp>\n\n#include "support/count_allocations.hpp"\n' >"$out/main.cpp.new"
-if cmp -s "$out/main.cpp.new" "$out/main.cpp"; then rm "$out/main.cpp.new"; else mv "$out/main.cpp.new" "$out/main.cpp"; fi
+# Components that count allocations have a file for that, allocations.cpp; the kernels' tests have it here.
+printf '#define CATCH_CONFIG_MAIN\n#include <catch2/catch.hpp>\n' | keep "$out/main.cpp"
+printf '#include "support/count_allocations.hpp"\n' | keep "$out/counting.cpp"
 compile "$out/main.o" "$out/main.cpp"
+compile "$out/counting.o" "$out/counting.cpp"
 
 # The library.
 archive=()
@@ -65,11 +76,12 @@ for source in cmake/compiled/*.cpp cmake/compiled_io/*.cpp; do
   compile "$object" "$source" "${compiled[@]}"
   archive+=("$object")
 done
-printf '%s: %s\n\t@rm -f $@ && %s rcs $@ $^\n' "$out/liborbis.a" "${archive[*]}" "${AARCH64_AR:-aarch64-linux-gnu-ar}" \
-  >>"$makefile.rules"
+printf '%s\n' "${archive[@]}" | keep "$out/liborbis.list"
+printf '%s: %s %s\n\t@rm -f $@ && %s rcs $@ $(filter %%.o,$^)\n' "$out/liborbis.a" "${archive[*]}" "$out/liborbis.list" \
+  "${AARCH64_AR:-aarch64-linux-gnu-ar}" >>"$rules"
 
 # The quick tests, a program for each component.
-mapfile -t quick < <(grep -oE '[a-z_]+/[a-z_/]+\.cpp' tests/quick.cmake | grep -v '/allocations\.cpp$')
+mapfile -t quick < <(grep -v '^ *#' tests/quick.cmake | grep -oE '[a-z0-9_]+/[a-z0-9_/]+\.cpp')
 for component in $(printf '%s\n' "${quick[@]%%/*}" | sort -u); do
   parts=()
   files=()
@@ -84,12 +96,12 @@ for component in $(printf '%s\n' "${quick[@]%%/*}" | sort -u); do
         parts+=("$out/${source//\//_}.quick.o")
         continue
       fi
-      files+=("$PWD/$source")  # found from the folder of the batch, too
+      files+=("$here/$source")  # found from the folder of the batch, too
       bytes=$((bytes + $(wc -c <"$source")))
     fi
     if ((${#files[@]})) && { ((bytes > 25000)) || [[ $source == - ]]; }; then
       number=$((number + 1))
-      batch "${component}_$number" "${files[@]}"
+      awk -f tests/batch.awk "${files[@]}" | keep "$out/batches/${component}_$number.cpp"
       compile "$out/${component}_$number.o" "$out/batches/${component}_$number.cpp" "${compiled[@]}"
       parts+=("$out/${component}_$number.o")
       files=()
@@ -99,7 +111,7 @@ for component in $(printf '%s\n' "${quick[@]%%/*}" | sort -u); do
   program "test_$component" "${parts[@]}" "$out/main.o" "$out/liborbis.a"
 done
 
-# Where the kernels' tests stand; those that compare with a library that is not here are left out.
+# Where the kernels' tests stand.
 places=(tests/core/simd.cpp tests/core/simd tests/core/rounded.cpp tests/core/bytes.cpp tests/camera/project_lanes.cpp
   tests/camera/shutter_correction.cpp
   tests/features/detail tests/places/detail tests/cloud/detail/knn tests/cloud/detail/rays
@@ -110,15 +122,14 @@ places=(tests/core/simd.cpp tests/core/simd tests/core/rounded.cpp tests/core/by
   tests/nav/squared_distances.cpp)
 parts=()
 while read -r source; do
-  grep -qE 'opencv|octomap|orbis/io|interop' "$source" && continue
   compile "$out/${source//\//_}.o" "$source"
   parts+=("$out/${source//\//_}.o")
 done < <(for place in "${places[@]}"; do if [[ -e $place ]]; then find "$place" -name '*.cpp'; fi; done | sort)
-program test_kernels "${parts[@]}" "$out/main.o"
+program test_kernels "${parts[@]}" "$out/counting.o" "$out/main.o"
 
 {
   printf 'all: %s\n' "${programs[*]}"
-  cat "$makefile.rules"
+  cat "$rules"
   printf -- '-include %s\n' "${objects[*]/%.o/.d}"
 } >"$makefile"
 make -f "$makefile" -j "$jobs" --no-print-directory
@@ -126,12 +137,13 @@ make -f "$makefile" -j "$jobs" --no-print-directory
 # As many at a time as there are processors; what each says is kept until it has ended.
 export QEMU_LD_PREFIX=${AARCH64_ROOT:-/usr/aarch64-linux-gnu}
 export QEMU_SET_ENV=LD_LIBRARY_PATH=$lib:$root/lib/aarch64-linux-gnu:$lib/blas:$lib/lapack
-run() {  # program, Catch2 options...
+run() {  # program, Catch2 options...; 0 or 1, as xargs ends at 255
   local status=0
   qemu-aarch64 "$1" "${@:2}" >"$1.log" 2>&1 || status=$?
   printf '%s: %s\n' "${1##*/}" "$(tail -n 2 "$1.log" | tr '\n' ' ')"
-  ((status == 0)) || cat "$1.log"
-  return "$status"
+  ((status == 0)) && return
+  cat "$1.log"
+  return 1
 }
 export -f run
 printf '%s\0' "${programs[@]}" | xargs -0 -P "$jobs" -I '{}' bash -c 'run "$@"' run '{}' "$@"
