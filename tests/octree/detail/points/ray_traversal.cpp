@@ -71,8 +71,9 @@ TEST_CASE("Rays along and across the border of the grid end") {
   check_ray(grid, tree, {-3270.0F, 1.0F, 3276.7F}, {-3276.75F, 1.05F, 3276.7F});
   check_ray(grid, tree, {0.0F, 0.0F, 0.0F}, {4000.0F, 0.0F, 0.0F});
   check_ray(grid, tree, {4000.0F, 0.0F, 0.0F}, {0.0F, 0.0F, 0.0F});
-  check_ray(grid, tree, {0.0F, 0.0F, 0.0F}, {std::numeric_limits<float>::quiet_NaN(), 0.0F, 0.0F});
-  check_ray(grid, tree, {0.0F, 0.0F, 0.0F}, {0.0F, std::numeric_limits<float>::infinity(), 0.0F});
+  // OctoMap makes integers of such numbers, which gives another one on each processor.
+  CHECK(!grid.key(vec3f{std::numeric_limits<float>::quiet_NaN(), 0.0F, 0.0F}));
+  CHECK(!grid.key(vec3f{0.0F, std::numeric_limits<float>::infinity(), 0.0F}));
 }
 
 TEST_CASE("Of a ray that is too short for a float only the first voxel counts") {
