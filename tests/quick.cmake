@@ -5,9 +5,11 @@
 # the library takes four. The rest is in the whole suite, `./run test all`: kernels against plain code, most recordings, the
 # other readers and file formats, every header alone, tutorials, fuzz inputs, consumers.
 set(ORBIS_QUICK_TESTS
-  camera/allocations.cpp camera/depth.cpp camera/intrinsics.cpp camera/kannala_brandt.cpp camera/parameters.cpp camera/pinhole.cpp camera/presets.cpp
-  camera/radial_tangential.cpp camera/rays.cpp camera/shutter.cpp camera/stereo.cpp camera/world_point.cpp
-  cloud/allocations.cpp cloud/filter_chain.cpp cloud/filters.cpp cloud/neighbors.cpp cloud/statistical.cpp cloud/voxel_grid.cpp
+  camera/allocations.cpp camera/depth.cpp camera/intrinsics.cpp camera/kannala_brandt.cpp camera/parameters.cpp
+  camera/pinhole.cpp camera/presets.cpp camera/radial_tangential.cpp camera/rays.cpp camera/shutter.cpp camera/stereo.cpp
+  camera/world_point.cpp
+  cloud/allocations.cpp cloud/filter_chain.cpp cloud/filters.cpp cloud/neighbors.cpp cloud/statistical.cpp
+  cloud/voxel_grid.cpp
   core/bits.cpp core/bytes.cpp core/cow_pages.cpp core/execution.cpp core/file.cpp core/hash_index.cpp core/image.cpp
   core/point.cpp core/random.cpp core/result.cpp core/se3.cpp core/sim3.cpp core/so3.cpp core/thread_pool.cpp
   core/trajectory.cpp core/types.cpp core/utf8.cpp
@@ -22,5 +24,5 @@ set(ORBIS_QUICK_TESTS
   optimize/alignment.cpp optimize/allocations.cpp optimize/pnp.cpp optimize/pose_graph.cpp optimize/ransac.cpp
   optimize/robust_loss.cpp optimize/triangulation.cpp
   places/allocations.cpp places/inverted_index.cpp places/keyframe_database.cpp places/score.cpp places/vocabulary.cpp
-  slam/allocations.cpp slam/covisibility_graph.cpp slam/events.cpp slam/frame.cpp slam/ids.cpp slam/landmark.cpp slam/map.cpp slam/map_file.cpp
-  slam/rgbd_system.cpp slam/sensor.cpp slam/spanning_tree.cpp slam/tested_system.cpp)
+  slam/allocations.cpp slam/covisibility_graph.cpp slam/events.cpp slam/frame.cpp slam/ids.cpp slam/landmark.cpp
+  slam/map.cpp slam/map_file.cpp slam/rgbd_system.cpp slam/sensor.cpp slam/spanning_tree.cpp slam/tested_system.cpp)

@@ -29,19 +29,13 @@ mkdir -p "$native"
 flags=(-std=c++20 -O3 -DNDEBUG -ffp-contract=off -w -Iinclude -MMD -isystem /usr/include/eigen3
   -isystem /usr/include/opencv4)
 
-# Whether a program is older than what it was made of.
-outdated() {
-  [[ -e $native/$1 && -e $native/$1.d ]] || return 0
-  local source
-  for source in $(sed -e 's/^[^:]*://' -e 's/\\$//' "$native/$1.d"); do [[ $source -nt $native/$1 ]] && return 0; done
-  return 1
-}
+. bench/board/programs.sh
 build() {
-  outdated "$1" || return 0
+  outdated "$native/$1" || return 0
   echo "compiling $1" >&2
   "${CXX:-g++}" "${flags[@]}" -MF "$native/$1.d" -o "$native/$1" "bench/board/$1.cpp" "${@:2}" -lpng -ljpeg -lz
 }
-${CC:-gcc} -O2 -Wall -Wextra -fPIC -shared -fvisibility=hidden -o "$out/libcount.so" bench/board/count.c
+build_plugin "$out/libcount.so"
 build features -lopencv_features2d -lopencv_core
 build octree -loctomap -loctomath
 build slam

@@ -39,20 +39,14 @@ done
 flags=(-std=c++20 -O3 -DNDEBUG -ffp-contract=off -w -Wno-psabi -Iinclude -MMD -isystem "$root/usr/include"
   -isystem "$root/usr/include/aarch64-linux-gnu" -isystem "$root/usr/include/opencv4" -isystem "$out/include")
 
-# Whether a program is older than what it was made of.
-outdated() {
-  [[ -e $out/$1 && -e $out/$1.d ]] || return 0
-  local source
-  for source in $(sed -e 's/^[^:]*://' -e 's/\\$//' "$out/$1.d"); do [[ $source -nt $out/$1 ]] && return 0; done
-  return 1
-}
+. bench/board/programs.sh
 build() {
-  outdated "$1" || return 0
+  outdated "$out/$1" || return 0
   echo "compiling $1" >&2
   "${AARCH64_CXX:-aarch64-linux-gnu-g++}" "${flags[@]}" -MF "$out/$1.d" -o "$out/$1" "bench/board/$1.cpp" -L"$lib" \
     "${@:2}" -lpng16 -ljpeg -lz -Wl,--allow-shlib-undefined
 }
-${CC:-gcc} -O2 -Wall -Wextra -fPIC -shared -fvisibility=hidden -o "$out/libcount.so" bench/board/count.c
+build_plugin "$out/libcount.so"
 build features -lopencv_features2d -lopencv_core
 build octree -loctomap -loctomath
 build slam
