@@ -197,7 +197,10 @@ TEST_CASE("frames come from the device without hardware that OpenNI2 has for tes
   CHECK(!live.device().notes.empty());  // not calibrated
   double last = -1.0;
   for (int i = 0; i != 5; ++i) {
-    const auto frame = live.next(never).value();
+    const auto given = live.next(never);
+    INFO(message_of(given));
+    REQUIRE(given);
+    const auto& frame = *given;
     CHECK(frame.timestamp > last);
     last = frame.timestamp;
     CHECK(frame.color.width() == 320);

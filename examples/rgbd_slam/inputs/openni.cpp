@@ -3,9 +3,13 @@
 
 #ifdef RGBD_SLAM_OPENNI
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
+#include <deque>
+#include <iterator>
+#include <thread>
 #include <utility>
 
 #include <OpenNI.h>
@@ -42,8 +46,18 @@ std::optional<openni::VideoMode> mode_of(const openni::SensorInfo& info, openni:
 
 class openni_camera final : public camera_device {
  public:
-  // OpenNI2 itself is left as it is: to shut it down unloads drivers whose threads may still run.
+  // Drivers tell a stream's thread to end and do not wait for it, and it sleeps for as long as a frame takes: what it
+  // uses is kept until then. OpenNI2 itself is left as it is, as to shut it down unloads the drivers.
   ~openni_camera() override {
+    color_frames_.clear();
+    depth_frames_.clear();
+    bool is_running = false;
+    for (openni::VideoStream* s : {&depth_, &color_}) {
+      if (!s->isValid()) continue;
+      s->stop();
+      is_running = true;
+    }
+    if (is_running) std::this_thread::sleep_for(std::chrono::milliseconds{150});
     for (openni::VideoStream* s : {&depth_, &color_}) s->destroy();
     device_.close();
   }
@@ -89,16 +103,7 @@ class openni_camera final : public camera_device {
     if (streams[ready]->readFrame(&frame) != openni::STATUS_OK || !frame.isValid())
       return fail(errc::unreadable, name, "was disconnected (" + reason() + ")");
     newest_index_ = std::max(newest_index_, frame.getFrameIndex());
-    (ready == 0 ? color_frame_ : depth_frame_) = frame;
-    if (!color_frame_.isValid() || !depth_frame_.isValid()) return std::optional<source_frame>{};
-    constexpr double most_apart = 0.020;  // seconds, as of recordings
-    const double t = 1e-6 * static_cast<double>(color_frame_.getTimestamp()),
-                 t_depth = 1e-6 * static_cast<double>(depth_frame_.getTimestamp());
-    if (std::abs(t - t_depth) > most_apart) return std::optional<source_frame>{};  // the partner is still to come
-    auto f = frame_of(t);
-    color_frame_.release();
-    depth_frame_.release();
-    return f;
+    return add(ready == 0 ? color_frames_ : depth_frames_, std::move(frame));
   }
 
  private:
@@ -137,13 +142,37 @@ class openni_camera final : public camera_device {
     return {};
   }
 
-  [[nodiscard]] result<std::optional<source_frame>> frame_of(double t) const {
+  using frames = std::deque<openni::VideoFrameRef>;
+
+  static double time_of(const openni::VideoFrameRef& f) { return 1e-6 * static_cast<double>(f.getTimestamp()); }
+
+  /// Colour and depth of one time, once both are there. Either stream may be some frames ahead of the other.
+  result<std::optional<source_frame>> add(frames& to, openni::VideoFrameRef frame) {
+    constexpr double most_apart = 0.020;  // seconds, as of recordings
+    constexpr std::size_t most = 16;      // of a stream that wait for the other one
+    const bool is_color = &to == &color_frames_;
+    frames& others = is_color ? depth_frames_ : color_frames_;
+    const auto apart = [&](const openni::VideoFrameRef& other) { return std::abs(time_of(other) - time_of(frame)); };
+    const auto partner = std::ranges::min_element(others, {}, apart);
+    if (partner == others.end() || apart(*partner) > most_apart) {
+      to.push_back(std::move(frame));
+      if (to.size() > most) to.pop_front();
+      return std::optional<source_frame>{};
+    }
+    auto both = is_color ? frame_of(frame, *partner) : frame_of(*partner, frame);
+    others.erase(others.begin(), std::next(partner));  // those before wait in vain
+    to.clear();
+    return both;
+  }
+
+  [[nodiscard]] result<std::optional<source_frame>> frame_of(const openni::VideoFrameRef& color_frame,
+                                                             const openni::VideoFrameRef& depth_frame) const {
     const int width = camera.model.width(), height = camera.model.height();
-    for (const auto* f : {&color_frame_, &depth_frame_})
+    for (const auto* f : {&color_frame, &depth_frame})
       if (f->getWidth() != width || f->getHeight() != height)
         return fail(errc::malformed, name, "gives images of another size than at first");
     source_frame out;
-    out.timestamp = t;
+    out.timestamp = time_of(color_frame);
     out.depth_scale = camera.depth_scale;
     out.color = orbis::image<orbis::rgb8>(width, height);
     out.depth = orbis::image<std::uint16_t>(width, height);
@@ -153,15 +182,15 @@ class openni_camera final : public camera_device {
         std::memcpy(&to(0, y), row, static_cast<std::size_t>(width) * bytes);
     };
     static_assert(sizeof(orbis::rgb8) == 3);
-    copy(color_frame_, out.color, 3);
-    copy(depth_frame_, out.depth, 2);
+    copy(color_frame, out.color, 3);
+    copy(depth_frame, out.depth, 2);
     return std::optional{std::move(out)};
   }
 
   openni::Device device_;
   openni::VideoStream color_, depth_;
-  openni::VideoFrameRef color_frame_, depth_frame_;
-  std::optional<int> last_;  // frames of a file
+  frames color_frames_, depth_frames_;  // without a partner as yet
+  std::optional<int> last_;             // frames of a file
   int newest_index_ = 0;
 };
 
