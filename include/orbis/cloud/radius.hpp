@@ -67,7 +67,7 @@ class crowd_search {
       const std::array<float, 3> q{leaf.axis[0][i], leaf.axis[1][i], leaf.axis[2][i]};
       bool has_enough = (all_near ? size : within(l, q)) >= enough_;
       if (!has_enough && usable && !gathered) {
-        usable = gather_near_leaves(*tree_, kernels_, box, bound_, open_, near_);
+        usable = gather_near(*tree_, 0, kernels_, box, bound_, open_, near_);
         gathered = usable;
       }
       if (!has_enough) has_enough = usable ? enough_near(q) : enough_anywhere(q);

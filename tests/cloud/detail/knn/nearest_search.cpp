@@ -158,9 +158,53 @@ TEST_CASE("the nearest of some distances are selected and summed alike by all in
       } else {
         CHECK(kind == 2);  // only where roots are too small for the fast way
       }
+      if (count <= orbis::cloud::detail::leaf_width) CHECK(kernels.ranked(found.data(), wanted) == sorted[wanted - 1]);
       found.resize(count);
       std::sort(found.begin(), found.end());
       CHECK(found == sorted);  // they are still there
+    }
+  }
+}
+
+TEST_CASE("the nearest distances of several points are summed as those of each") {
+  using orbis::cloud::detail::leaf_width;
+  orbis::random_bits random{8};
+  for (int round = 0; round != 200; ++round) {
+    const std::size_t wanted = 1 + random.below(round % 2 == 0 ? 16 : 40);
+    const std::size_t stride = 96 + random.below(3), first = random.below(8), last = 9 + random.below(8);
+    std::vector<float> found(leaf_width * stride, std::numeric_limits<float>::infinity());
+    std::array<std::uint32_t, leaf_width> counts{};
+    std::array<float, leaf_width> bounds{};
+    for (std::size_t i = 0; i != leaf_width; ++i) {
+      counts[i] = random.below(static_cast<std::uint32_t>(round % 3 == 0 ? stride - leaf_width : 36));
+      bounds[i] = static_cast<float>(std::pow(2.0, random.uniform(round % 5 == 0 ? -140 : -3, 3)));
+      for (std::size_t n = 0; n != counts[i]; ++n) {
+        const double share = random.uniform();
+        found[i * stride + n] = round % 4 == 1 ? bounds[i] * static_cast<float>(random.below(3))  // ties
+                                               : bounds[i] * static_cast<float>(share);
+      }
+      if (round % 4 == 1) bounds[i] *= 2;
+    }
+    for (const level l : levels) {
+      INFO("round " << round << " level " << static_cast<int>(l));
+      const orbis::simd::level_limit limit{l};
+      const orbis::cloud::detail::knn_kernels kernels;
+      constexpr double unset = 0.125;
+      std::array<orbis::cloud::detail::nearest_sum, leaf_width> sums;
+      sums.fill({unset, 0.0F});
+      kernels.sums_of_each(found.data(), stride, first, last, counts.data(), wanted, bounds.data(), sums.data());
+      for (std::size_t i = 0; i != leaf_width; ++i) {
+        INFO("point " << i << " count " << counts[i] << " wanted " << wanted);
+        if (i < first || i >= last || counts[i] < wanted) {
+          CHECK(sums[i].roots == unset);
+          continue;
+        }
+        const auto alone = kernels.sum_nearest(found.data() + i * stride, counts[i], wanted, bounds[i]);
+        CHECK(sums[i].largest_squared == alone.largest_squared);
+        CHECK((sums[i].roots < 0) == (alone.roots < 0));
+        CHECK(std::abs(sums[i].roots - alone.roots) <=
+              2 * std::abs(alone.roots) * orbis::cloud::detail::roots_slack(wanted));
+      }
     }
   }
 }
@@ -263,7 +307,7 @@ TEST_CASE("boxes and leaves are measured alike by all instruction sets") {
       CHECK(std::equal(found.begin(), found.begin() + static_cast<std::ptrdiff_t>(n), expected.begin()));
     }
     const std::array<float, 3> middle{1.2F, 1.1F, 1.0F};
-    std::vector<std::uint32_t> scratch(near.leaves.size() + 16);
+    std::vector<std::uint32_t> scratch(16 * (near.leaves.size() + 16));
     std::vector<float> found(4000);
     std::vector<float> found_reference(4000);
     const std::size_t n =
@@ -273,9 +317,31 @@ TEST_CASE("boxes and leaves are measured alike by all instruction sets") {
     found.resize(n + 16);
     found_reference.resize(n + 16);
     CHECK(found == found_reference);
+    // The points of a leaf one after the other.
+    constexpr std::size_t stride = 400;
+    const std::uint32_t own = near.leaves[near.count / 2];
+    const point_row& points_of_leaf = tree.leaves[own];
+    const std::size_t first = 3, last = tree.size_of(own) - 2;
+    std::vector<float> rows(leaf_width * stride, -1.0F);
+    std::array<std::uint32_t, leaf_width> counts{};
+    kernels.near_points_of_each(tree.leaves.data(), near, points_of_leaf, first, last, 0.02F, scratch.data(),
+                                rows.data(), stride, 300, counts.data());
+    for (std::size_t i = 0; i != leaf_width; ++i) {
+      const std::array<float, 3> q{points_of_leaf.axis[0][i], points_of_leaf.axis[1][i], points_of_leaf.axis[2][i]};
+      const auto row = rows.begin() + static_cast<std::ptrdiff_t>(i * stride);
+      if (i < first || i >= last) {
+        CHECK(counts[i] == 0);
+        CHECK(*row == -1.0F);
+        continue;
+      }
+      std::vector<float> alone(stride);
+      CHECK(counts[i] == near_points_reference(tree.leaves.data(), near, q, 0.02F, alone.data(), 300));
+      CHECK(counts[i] > 0);
+      CHECK(std::equal(row, row + static_cast<std::ptrdiff_t>(counts[i] + leaf_width), alone.begin()));
+    }
     CHECK(near.count > 16);
     near.leaves.resize(near.count);
-    CHECK(near.leaves == leaves);
+    CHECK(std::equal(near.leaves.begin(), near.leaves.end(), leaves.begin(), leaves.end()));
     for (std::size_t i = 0; i != near.count; ++i) {
       const auto& from = tree.levels[0][leaves[i] / 16];
       for (std::size_t a = 0; a != 3; ++a) {

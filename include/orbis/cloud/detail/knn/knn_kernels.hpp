@@ -17,6 +17,7 @@
 #include <vector>
 
 #include <orbis/cloud/detail/knn/leaf_hierarchy.hpp>
+#include <orbis/cloud/detail/knn/line_vector.hpp>
 #include <orbis/cloud/detail/knn/rank_bracket.hpp>
 #include <orbis/core/simd.hpp>
 
@@ -39,8 +40,8 @@ struct nearby_leaves {
   explicit nearby_leaves(std::size_t most)
       : stride{(most / leaf_width + 2) * leaf_width}, boxes(6 * stride), leaves(stride) {}
   std::size_t stride;
-  std::vector<float> boxes;  ///< as `box_axes` says
-  std::vector<std::uint32_t> leaves;
+  line_vector<float> boxes;  ///< as `box_axes` says
+  line_vector<std::uint32_t> leaves;
   std::size_t count = 0;
   /// Whether a further row of children may be added.
   [[nodiscard]] bool has_room() const noexcept { return count + 2 * leaf_width <= stride; }
@@ -176,10 +177,22 @@ struct chosen_leaves {
 };
 
 /// Writes the squared distances within `bound` from a point to those of the leaves of `near` whose boxes are within
-/// `bound`, then sixteen times infinity. Returns how many they are. Ends
-/// early with more than `capacity` of them; touches no more than `capacity + 3 * leaf_width`. `scratch`: longer by
-/// sixteen than `near.leaves`.
+/// `bound`, then sixteen times infinity. Returns how many they are. Ends early with more than `capacity` of them;
+/// touches no more than `capacity + 3 * leaf_width`. `scratch`: longer by sixteen than `near.leaves`.
 struct near_in_leaves {
+  /// The same of the leaves that were chosen.
+  template <simd::vector V>
+  static ORBIS_ALWAYS_INLINE std::size_t collect(const point_row* leaves, const std::uint32_t* chosen,
+                                                 std::size_t number, const spread_point<V>& q, const V& bound,
+                                                 float* found, std::size_t capacity) noexcept {
+    std::size_t count = 0;
+    for (std::size_t i = 0; i != number; ++i) {
+      count += near_in_leaf::keep(leaves[chosen[i]], q, bound, found + count);
+      if (count > capacity) break;
+    }
+    simd::vec<float, leaf_width, typename V::target_type>(std::numeric_limits<float>::infinity()).store(found + count);
+    return count;
+  }
   template <simd::target Target>
   static ORBIS_ALWAYS_INLINE std::size_t run(const point_row* leaves, const nearby_leaves& near,
                                              const std::array<float, 3>& query, float bound, std::uint32_t* scratch,
@@ -189,13 +202,31 @@ struct near_in_leaves {
     const lanes border = bound;
     const std::size_t chosen =
         chosen_leaves::find<lanes, simd::native_vec<std::uint32_t, Target>>(near, q, border, scratch);
-    std::size_t count = 0;
-    for (std::size_t i = 0; i != chosen; ++i) {
-      count += near_in_leaf::keep(leaves[scratch[i]], q, border, found + count);
-      if (count > capacity) break;
-    }
-    simd::vec<float, leaf_width, Target>(std::numeric_limits<float>::infinity()).store(found + count);
-    return count;
+    return collect(leaves, scratch, chosen, q, border, found, capacity);
+  }
+};
+
+/// `near_in_leaves` for the points [first, last) of a leaf, whose rows in `found` are `stride` long; sets their
+/// `counts`. `scratch`: sixteen times as long. What one step writes is read by the next one after those of the other
+/// points.
+struct near_in_leaves_each {
+  template <simd::target Target>
+  static ORBIS_ALWAYS_INLINE void run(const point_row* leaves, const nearby_leaves& near, const point_row& points,
+                                      std::size_t first, std::size_t last, float bound, std::uint32_t* scratch,
+                                      float* found, std::size_t stride, std::size_t capacity, std::uint32_t* counts) {
+    using lanes = simd::native_vec<float, Target>;
+    using numbers = simd::native_vec<std::uint32_t, Target>;
+    const std::size_t length = near.leaves.size() + leaf_width;
+    const lanes border = bound;
+    const auto point = [&](std::size_t i) ORBIS_INLINE_LAMBDA {
+      return spread_point<lanes>{{points.axis[0][i], points.axis[1][i], points.axis[2][i]}};
+    };
+    for (std::size_t i = first; i != last; ++i)
+      counts[i] =
+          static_cast<std::uint32_t>(chosen_leaves::find<lanes, numbers>(near, point(i), border, scratch + i * length));
+    for (std::size_t i = first; i != last; ++i)
+      counts[i] = static_cast<std::uint32_t>(near_in_leaves::collect(leaves, scratch + i * length, counts[i], point(i),
+                                                                     border, found + i * stride, capacity));
   }
 };
 
@@ -255,15 +286,26 @@ class lane_counter {
 /// The sum of the roots of the `wanted` smallest distances, and the largest of them.
 /// @pre 0 < wanted <= count, no distance above `bound`, and sixteen times infinity after them
 struct sum_nearest {
+  /// Adds -1 to the lanes of `count` where `v` is greater than `other`.
+  template <simd::vector V, simd::vector Numbers>
+  static ORBIS_ALWAYS_INLINE void count_smaller(Numbers& count, float other, const V& v) noexcept {
+    if constexpr (V::count == leaf_width)
+      count = select(V(other) < v, count - Numbers(1), count);  // one instruction with a mask
+    else
+      count += select(V(other) < v, Numbers(-1), Numbers(0));
+  }
   /// The `rank`-th smallest (from 1) of sixteen values: by counting, for each of them, how many are smaller.
   template <simd::target Target>
   static ORBIS_ALWAYS_INLINE float ranked(const float* values, std::size_t rank) noexcept {
     using lanes = simd::vec<float, leaf_width, Target>;
     using numbers = simd::vec<std::int32_t, leaf_width, Target>;
     const lanes v = lanes::load(values);
-    numbers smaller = 0;  // for each value, minus how many are
-    for (std::size_t i = 0; i != leaf_width; ++i) smaller += select(lanes(values[i]) < v, numbers(-1), numbers(0));
-    return simd::greatest(select(smaller > numbers(-static_cast<std::int32_t>(rank)), v, lanes(0.0F)));
+    numbers even = 0, odd = 0;  // for each value, minus how many are smaller
+    for (std::size_t i = 0; i != leaf_width; i += 2) {
+      count_smaller(even, values[i], v);
+      count_smaller(odd, values[i + 1], v);
+    }
+    return simd::greatest(select(even + odd > numbers(-static_cast<std::int32_t>(rank)), v, lanes(0.0F)));
   }
   /// The same of thirty-two values, of which those from `count` on are infinite.
   template <simd::target Target>
@@ -271,13 +313,14 @@ struct sum_nearest {
     using lanes = simd::vec<float, leaf_width, Target>;
     using numbers = simd::vec<std::int32_t, leaf_width, Target>;
     const lanes v0 = lanes::load(values), v1 = lanes::load(values + leaf_width);
-    const numbers one = -1, none = 0, least = -static_cast<std::int32_t>(rank);
     numbers smaller0 = 0, smaller1 = 0;
-    for (std::size_t i = 0; i != count; ++i) {
-      const lanes other = values[i];
-      smaller0 += select(other < v0, one, none);
-      smaller1 += select(other < v1, one, none);
+    for (std::size_t i = 0; i < count; i += 4) {
+      for (std::size_t k = i; k != i + 4; ++k) {
+        count_smaller(smaller0, values[k], v0);
+        count_smaller(smaller1, values[k], v1);
+      }
     }
+    const numbers least = -static_cast<std::int32_t>(rank);
     const lanes zero = 0.0F;
     return simd::greatest(max(select(smaller0 > least, v0, zero), select(smaller1 > least, v1, zero)));
   }
@@ -289,13 +332,15 @@ struct sum_nearest {
   struct root_sum {
     using lanes = simd::native_vec<float, Target>;
     using mask = typename lanes::mask_type;
-    simd::vec<double, lanes::count, Target> sum = 0.0;
+    simd::vec<double, lanes::count / 2, Target> low = 0.0, high = 0.0;  // of the lower and the higher lanes
     lanes corrections = 0.0F;
     mask tiny = mask::first(0);
 
     ORBIS_ALWAYS_INLINE void add(const lanes& all, const mask& in) noexcept {
       if constexpr (Target::needs < simd::level::avx2) {
-        sum += simd::sqrt(simd::convert<double>(select(in, all, lanes(0.0F))));
+        const lanes v = select(in, all, lanes(0.0F));
+        low += simd::sqrt(simd::convert<double>(v.low()));
+        high += simd::sqrt(simd::convert<double>(v.high()));
       } else {
         const lanes zero = 0.0F, half = 0.5F, three_halves = 1.5F;
         const mask usual = in & (all >= lanes(0x1p-70F));
@@ -310,14 +355,22 @@ struct sum_nearest {
         y = simd::approximate_multiply_add(y, simd::approximate_multiply_add(-(half_v * y), y, half), y);
         const lanes s = v * y;
         corrections = simd::approximate_multiply_add(simd::approximate_multiply_add(-s, s, v), half * y, corrections);
-        sum += simd::convert<double>(s);
+        low += simd::convert<double>(s.low());
+        high += simd::convert<double>(s.high());
       }
     }
     /// Negative where it is not known.
     [[nodiscard]] ORBIS_ALWAYS_INLINE double total() const noexcept {
-      return simd::any(tiny) ? -1.0 : simd::sum(sum + simd::convert<double>(corrections));
+      if (simd::any(tiny)) return -1.0;
+      return simd::sum((low + simd::convert<double>(corrections.low())) +
+                       (high + simd::convert<double>(corrections.high())));
     }
   };
+
+  /// A sum of roots, if it is known, and `times` that of the largest squared distance.
+  static ORBIS_ALWAYS_INLINE double with_largest(double roots, std::size_t times, float largest_squared) noexcept {
+    return roots < 0 ? -1.0 : roots + static_cast<double>(times) * std::sqrt(static_cast<double>(largest_squared));
+  }
 
   template <simd::target Target>
   static ORBIS_ALWAYS_INLINE nearest_sum run(const float* found, std::size_t count, std::size_t wanted, float bound) {
@@ -368,11 +421,69 @@ struct sum_nearest {
       smaller.add(in);
       roots.add(v, in);
     }
-    const double total = roots.total();
-    out.roots = total < 0 ? -1.0
-                          : total + static_cast<double>(wanted - smaller.total()) *
-                                        std::sqrt(static_cast<double>(out.largest_squared));
+    out.roots = with_largest(roots.total(), wanted - smaller.total(), out.largest_squared);
     return out;
+  }
+};
+
+/// `sum_nearest` for the points [first, last) of a leaf, whose rows in `found` are `stride` long; not for those with
+/// fewer than `wanted`.
+struct sum_nearest_each {
+  template <simd::target Target>
+  static ORBIS_ALWAYS_INLINE void run(const float* found, std::size_t stride, std::size_t first, std::size_t last,
+                                      const std::uint32_t* counts, std::size_t wanted, const float* bounds,
+                                      nearest_sum* out) {
+    std::uint32_t left = (1U << last) - (1U << first);
+    if constexpr (simd::native_vec<float, Target>::count == leaf_width)
+      if (wanted <= leaf_width) left = sum_few<Target>(found, stride, left, counts, wanted, out);
+    for (; left != 0; left &= left - 1) {
+      const auto i = static_cast<std::size_t>(std::countr_zero(left));
+      if (counts[i] >= wanted) out[i] = sum_nearest::run<Target>(found + i * stride, counts[i], wanted, bounds[i]);
+    }
+  }
+
+ private:
+  /// Where two registers hold what was found, one holds all but the largest. Both steps take long for one point, and
+  /// little more for several, one after the other. Returns the points that are left.
+  template <simd::target Target>
+  static ORBIS_ALWAYS_INLINE std::uint32_t sum_few(const float* found, std::size_t stride, std::uint32_t points,
+                                                   const std::uint32_t* counts, std::size_t wanted, nearest_sum* out) {
+    using lanes = simd::native_vec<float, Target>;
+    std::array<std::array<float, 2 * leaf_width>, leaf_width> smaller;
+    std::array<std::uint32_t, leaf_width> number;
+    std::uint32_t few = 0;
+    for (std::uint32_t rest = points; rest != 0; rest &= rest - 1) {
+      const auto i = static_cast<std::size_t>(std::countr_zero(rest));
+      const float* const row = found + i * stride;
+      if (counts[i] < wanted || counts[i] > 2 * leaf_width) continue;
+      few |= 1U << i;
+      const bool is_one = counts[i] <= leaf_width;
+      const float largest = is_one ? sum_nearest::ranked<Target>(row, wanted)
+                                   : sum_nearest::ranked_of_two<Target>(row, counts[i], wanted);
+      out[i].largest_squared = largest;
+      const lanes v = lanes::load(row);
+      std::size_t n = simd::compress_store(smaller[i].data(), v, v < lanes(largest));
+      if (!is_one) {
+        const lanes w = lanes::load(row + leaf_width);
+        n += simd::compress_store(smaller[i].data() + n, w, w < lanes(largest));
+      }
+      number[i] = static_cast<std::uint32_t>(n);
+    }
+    for (std::uint32_t rest = few; rest != 0; rest &= rest - 1) {
+      const auto i = static_cast<std::size_t>(std::countr_zero(rest));
+      sum_nearest::root_sum<Target> roots;
+      roots.add(lanes::load(smaller[i].data()), lanes::mask_type::first(number[i]));
+      out[i].roots = sum_nearest::with_largest(roots.total(), wanted - number[i], out[i].largest_squared);
+    }
+    return points & ~few;
+  }
+};
+
+/// The `rank`-th smallest, from 1, of sixteen values that are not negative.
+struct ranked_of_leaf {
+  template <simd::target Target>
+  static ORBIS_ALWAYS_INLINE float run(const float* values, std::size_t rank) {
+    return sum_nearest::ranked<Target>(values, rank);
   }
 };
 
@@ -418,15 +529,23 @@ struct knn_kernels {
                                   std::uint32_t*, std::size_t);
   using leaf_code = std::size_t(const point_row&, const point&, float, float*);
   using distances_code = std::uint32_t(const point_row&, const point&, float, float*);
+  using each_code = void(const point_row*, const nearby_leaves&, const point_row&, std::size_t, std::size_t, float,
+                         std::uint32_t*, float*, std::size_t, std::size_t, std::uint32_t*);
   using sum_code = nearest_sum(const float*, std::size_t, std::size_t, float);
+  using sums_code = void(const float*, std::size_t, std::size_t, std::size_t, const std::uint32_t*, std::size_t,
+                         const float*, nearest_sum*);
+  using rank_code = float(const float*, std::size_t);
 
   boxes_code* near_boxes = simd::kernel<detail::near_boxes, boxes_code>();
   gather_code* gather = simd::kernel<gather_leaves, gather_code>();
   leaves_code* near_points = simd::kernel<near_in_leaves, leaves_code>();
+  each_code* near_points_of_each = simd::kernel<near_in_leaves_each, each_code>();
   places_code* near_places = simd::kernel<places_in_leaves, places_code>();
   leaf_code* in_leaf = simd::kernel<near_in_leaf, leaf_code>();
   distances_code* distances = simd::kernel<leaf_distances, distances_code>();
   sum_code* sum_nearest = simd::kernel<detail::sum_nearest, sum_code>();
+  sums_code* sums_of_each = simd::kernel<sum_nearest_each, sums_code>();
+  rank_code* ranked = simd::kernel<ranked_of_leaf, rank_code>();
 };
 
 }  // namespace orbis::cloud::detail
@@ -434,7 +553,10 @@ struct knn_kernels {
 ORBIS_COMPILED_KERNEL(orbis::cloud::detail::near_boxes, orbis::cloud::detail::knn_kernels::boxes_code);
 ORBIS_COMPILED_KERNEL(orbis::cloud::detail::gather_leaves, orbis::cloud::detail::knn_kernels::gather_code);
 ORBIS_COMPILED_KERNEL(orbis::cloud::detail::near_in_leaves, orbis::cloud::detail::knn_kernels::leaves_code);
+ORBIS_COMPILED_KERNEL(orbis::cloud::detail::near_in_leaves_each, orbis::cloud::detail::knn_kernels::each_code);
 ORBIS_COMPILED_KERNEL(orbis::cloud::detail::places_in_leaves, orbis::cloud::detail::knn_kernels::places_code);
 ORBIS_COMPILED_KERNEL(orbis::cloud::detail::near_in_leaf, orbis::cloud::detail::knn_kernels::leaf_code);
 ORBIS_COMPILED_KERNEL(orbis::cloud::detail::leaf_distances, orbis::cloud::detail::knn_kernels::distances_code);
 ORBIS_COMPILED_KERNEL(orbis::cloud::detail::sum_nearest, orbis::cloud::detail::knn_kernels::sum_code);
+ORBIS_COMPILED_KERNEL(orbis::cloud::detail::sum_nearest_each, orbis::cloud::detail::knn_kernels::sums_code);
+ORBIS_COMPILED_KERNEL(orbis::cloud::detail::ranked_of_leaf, orbis::cloud::detail::knn_kernels::rank_code);

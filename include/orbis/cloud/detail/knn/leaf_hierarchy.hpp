@@ -279,15 +279,21 @@ template <execution_policy Policy, point_range Points>
   out.leaves.resize(rows(out.members.size()));
   out.levels.emplace_back(rows(out.leaves.size()), empty_boxes());
   for_each_index(policy, out.leaves.size(), 1024, [&](std::size_t l) {
-    box_row& boxes = out.levels[0][l / leaf_width];
-    for (std::size_t a = 0; a != 3; ++a) out.leaves[l].axis[a].fill(inf);
+    point_row& leaf = out.leaves[l];
+    box3 box{{inf, inf, inf}, {-inf, -inf, -inf}};
+    for (std::size_t a = 0; a != 3; ++a) leaf.axis[a].fill(inf);
     for (std::size_t i = 0; i != out.size_of(l); ++i) {
       const std::array<float, 3> p = order.position(out.members[l * leaf_width + i]);
       for (std::size_t a = 0; a != 3; ++a) {
-        out.leaves[l].axis[a][i] = p[a];
-        boxes.low[a][l % leaf_width] = std::min(boxes.low[a][l % leaf_width], p[a]);
-        boxes.high[a][l % leaf_width] = std::max(boxes.high[a][l % leaf_width], p[a]);
+        leaf.axis[a][i] = p[a];
+        box.low[a] = std::min(box.low[a], p[a]);
+        box.high[a] = std::max(box.high[a], p[a]);
       }
+    }
+    box_row& boxes = out.levels[0][l / leaf_width];
+    for (std::size_t a = 0; a != 3; ++a) {
+      boxes.low[a][l % leaf_width] = box.low[a];
+      boxes.high[a][l % leaf_width] = box.high[a];
     }
   });
   while (out.levels.back().size() > 1) {

@@ -11,10 +11,12 @@
 #include <cstdint>
 #include <limits>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include <orbis/cloud/detail/knn/knn_kernels.hpp>
 #include <orbis/cloud/detail/knn/leaf_hierarchy.hpp>
+#include <orbis/cloud/detail/knn/line_vector.hpp>
 #include <orbis/cloud/detail/knn/squared_distance.hpp>
 
 namespace orbis::cloud::detail {
@@ -25,9 +27,10 @@ struct open_row {
   std::uint32_t row;
 };
 
-/// Gathers the leaves within `bound`, squared, of a box; false if they are too many. `open` is scratch.
-[[nodiscard]] inline bool gather_near_leaves(const leaf_hierarchy& tree, const knn_kernels& kernels, const box3& box,
-                                             float bound, std::vector<open_row>& open, nearby_leaves& near) {
+/// Gathers the children within `bound`, squared, of a box that rows of `level` have: leaves where that is 0, else rows
+/// of the level below. False if they are too many. `open` is scratch.
+[[nodiscard]] inline bool gather_near(const leaf_hierarchy& tree, std::uint32_t level, const knn_kernels& kernels,
+                                      const box3& box, float bound, std::vector<open_row>& open, nearby_leaves& near) {
   near.count = 0;
   open.clear();
   open.push_back({static_cast<std::uint32_t>(tree.levels.size() - 1), 0});
@@ -38,7 +41,7 @@ struct open_row {
     const box_row& boxes = tree.levels[next.level][next.row];
     std::uint32_t mask = kernels.near_boxes(boxes, box, bound, distance.data());
     const auto child = static_cast<std::uint32_t>(next.row * leaf_width);
-    if (next.level == 0) {
+    if (next.level == level) {
       if (!near.has_room()) return false;
       kernels.gather(boxes, mask, child, near);
     } else {
@@ -102,10 +105,10 @@ class nearest_search {
         kernels_{kernels},
         wanted_{wanted},
         capacity_{3 * wanted + 64},
-        stride_{capacity_ + 4 * leaf_width},
+        stride_{(capacity_ / leaf_width + 5) * leaf_width},
         shared_{192 + 2 * wanted},
         own_{192 + 2 * wanted},
-        chosen_(own_.leaves.size() + leaf_width),
+        chosen_(leaf_width * (own_.leaves.size() + leaf_width)),
         found_(leaf_width * stride_),
         places_(with_places ? leaf_width * stride_ : 0),
         hoped_{1.0F + 1.7F / std::sqrt(static_cast<float>(wanted))},
@@ -117,29 +120,28 @@ class nearest_search {
   /// returns the `wanted`-th smallest. `places_of` tells which points they are.
   template <class F>
   void visit_leaf(std::size_t l, F&& f) {
-    const std::size_t size = tree_->size_of(l);
-    if (!(usual_ >= 0)) {
-      const found_within first = search_alone(l, 0);
-      usual_ = first.count < wanted_ ? 0.0F : first.bound;
-    }
-    std::array<float, 2 * leaf_width> largest;
-    largest.fill(infinity);
-    for (std::size_t first = 0; first != size;) {
-      box3 box{query(l, first), query(l, first)};
-      std::size_t last = first + 1;
-      while (last != size && grow(box, query(l, last))) ++last;
-      visit_run(l, first, last, box, largest, f);
-      first = last;
-    }
-    // The median: an outlier says nothing about its neighbours.
-    const float median = kernels_.sum_nearest(largest.data(), size, size / 2 + 1, most).largest_squared;
-    if (median <= most) usual_ = median;
+    search_leaf(l, [&](std::size_t first, std::size_t last) {
+      for (std::size_t i = first; i != last; ++i) largest_[i] = f(i, found_of(i), bounds_[i]);
+    });
+  }
+  /// As `visit_leaf`, but calls `f(i, found, sum)`, and sums up the nearest itself; not where fewer than `wanted` are
+  /// found. @pre not made `with_places`
+  template <class F>
+  void visit_sums(std::size_t l, F&& f) {
+    std::array<nearest_sum, leaf_width> sums;
+    search_leaf(l, [&](std::size_t first, std::size_t last) {
+      kernels_.sums_of_each(found_.data(), stride_, first, last, counts_.data(), wanted_, bounds_.data(), sums.data());
+      for (std::size_t i = first; i != last; ++i) {
+        largest_[i] = counts_[i] < wanted_ ? infinity : sums[i].largest_squared;
+        f(i, found_of(i), std::as_const(sums[i]));
+      }
+    });
   }
 
   /// Which points were found for the i-th of the leaf that is being visited, in the order of `found`, as places in
   /// `leaf_hierarchy::members`; null where that is not known, as for outliers.
   [[nodiscard]] const std::uint32_t* places_of(std::size_t i) const noexcept {
-    return results_[i].has_places ? places_.data() + i * stride_ : nullptr;
+    return has_places_[i] ? places_.data() + i * stride_ : nullptr;
   }
 
   /// Calls `f(member, squared distance)` for every point within `bound` of the i-th of the leaf that is being
@@ -195,24 +197,50 @@ class nearest_search {
     return true;
   }
 
+  [[nodiscard]] std::span<float> found_of(std::size_t i) noexcept { return {found_.data() + i * stride_, counts_[i]}; }
+
+  /// Searches for the points of a leaf, run by run of points that share candidates: `f(first, last)`, which sets their
+  /// `largest_`.
   template <class F>
-  void visit_run(std::size_t l, std::size_t first, std::size_t last, const box3& box,
-                 std::array<float, 2 * leaf_width>& largest, F&& f) {
+  void search_leaf(std::size_t l, F&& f) {
+    const std::size_t size = tree_->size_of(l);
+    if (!(usual_ >= 0)) {
+      const found_within first = search_alone(l, 0);
+      usual_ = first.count < wanted_ ? 0.0F : first.bound;
+    }
+    largest_.fill(infinity);
+    for (std::size_t first = 0; first != size;) {
+      box3 box{query(l, first), query(l, first)};
+      std::size_t last = first + 1;
+      while (last != size && grow(box, query(l, last))) ++last;
+      search_run(l, first, last, box);
+      f(first, last);
+      first = last;
+    }
+    // The median: an outlier says nothing about its neighbours.
+    const float median = kernels_.ranked(largest_.data(), size / 2 + 1);
+    if (median <= most) usual_ = median;
+  }
+
+  void search_run(std::size_t l, std::size_t first, std::size_t last, const box3& box) {
     const float hoped = std::min(usual_ * hoped_, most);
     const float reach = std::min(usual_ * reach_, most);
-    const bool shared = gather_near(box, reach, shared_);
+    const bool shared = gather_shared(l, box, reach);
     shared_reach_ = shared ? reach : -1.0F;
+    const bool at_once = shared && places_.empty();
+    if (at_once)
+      kernels_.near_points_of_each(tree_->leaves.data(), shared_, tree_->leaves[l], first, last, hoped, chosen_.data(),
+                                   found_.data(), stride_, capacity_, counts_.data());
     for (std::size_t i = first; i != last; ++i) {
-      found_within result{0, hoped};
+      found_within result{at_once ? counts_[i] : 0, hoped};
       if (shared) {
-        result = search_near(shared_, l, i, hoped);
+        if (!at_once) result = search_near(shared_, l, i, hoped);
         if (result.count < wanted_) result = search_near(shared_, l, i, reach);
       }
       if (result.count < wanted_ || result.count > capacity_) result = search_alone(l, i);
-      results_[i] = result;
-    }
-    for (std::size_t i = first; i != last; ++i) {
-      largest[i] = f(i, std::span{found_.data() + i * stride_, results_[i].count}, results_[i].bound);
+      counts_[i] = static_cast<std::uint32_t>(result.count);
+      bounds_[i] = result.bound;
+      has_places_[i] = result.has_places;
     }
   }
   [[nodiscard]] found_within search_near(const nearby_leaves& near, std::size_t l, std::size_t i, float bound) {
@@ -224,8 +252,47 @@ class nearest_search {
     return {kernels_.near_places(leaves, near, q, bound, chosen_.data(), found, places, capacity_), bound, true};
   }
 
-  [[nodiscard]] bool gather_near(const box3& box, float bound, nearby_leaves& near) {
-    return gather_near_leaves(*tree_, kernels_, box, bound, open_, near);
+  [[nodiscard]] bool gather_leaves(const box3& box, float bound, nearby_leaves& near) {
+    return gather_near(*tree_, 0, kernels_, box, bound, open_, near);
+  }
+  /// As above into `shared_`, for a box within leaf `l`. The leaves of a row come one after the other, and share the
+  /// rows that are near.
+  [[nodiscard]] bool gather_shared(std::size_t l, const box3& box, float bound) {
+    if (!have_near_rows(l / leaf_width, bound)) return gather_leaves(box, bound, shared_);
+    shared_.count = 0;
+    std::array<float, leaf_width> distance;
+    for (std::size_t first = 0; first < near_rows_.count; first += leaf_width) {
+      std::uint32_t mask = kernels_.near_boxes(near_rows_.row(first), box, bound, distance.data());
+      for (; mask != 0; mask &= mask - 1) {
+        if (!shared_.has_room()) return false;
+        const std::uint32_t near = near_rows_.leaves[first + static_cast<std::size_t>(std::countr_zero(mask))];
+        const box_row& boxes = tree_->levels[0][near];
+        kernels_.gather(boxes, kernels_.near_boxes(boxes, box, bound, distance.data()),
+                        near * static_cast<std::uint32_t>(leaf_width), shared_);
+      }
+    }
+    shared_.finish();
+    return true;
+  }
+
+  /// Whether `near_rows_` are all rows of leaves within `bound`, squared, of a row; gathers them if they are not.
+  [[nodiscard]] bool have_near_rows(std::size_t row, float bound) {
+    if (row == near_rows_of_ && bound <= near_rows_reach_) return true;
+    if (tree_->levels.size() == 1 || (row == near_rows_of_ && bound >= too_many_rows_)) return false;
+    const box_row& above = tree_->levels[1][row / leaf_width];
+    box3 box;
+    for (std::size_t a = 0; a != 3; ++a) {
+      box.low[a] = above.low[a][row % leaf_width];
+      box.high[a] = above.high[a][row % leaf_width];
+    }
+    constexpr float spare = 1.3F;  // for what the next leaves want
+    near_rows_of_ = row;
+    near_rows_reach_ = std::min(spare * bound, most);
+    too_many_rows_ = infinity;
+    if (gather_near(*tree_, 1, kernels_, box, near_rows_reach_, open_, near_rows_)) return true;
+    near_rows_reach_ = -1.0F;
+    too_many_rows_ = bound;
+    return false;
   }
 
   /// The `wanted` nearest and perhaps some more; fewer where squared distances overflow.
@@ -242,7 +309,7 @@ class nearest_search {
     if (result.count < wanted_) return search_outwards(q, found);
     std::fill_n(found + result.count, leaf_width, infinity);
     float bound = kernels_.sum_nearest(found, result.count, wanted_, most).largest_squared;
-    if (!gather_near({q, q}, bound, own_)) return search_outwards(q, found);
+    if (!gather_leaves({q, q}, bound, own_)) return search_outwards(q, found);
     for (;;) {
       result = search_near(own_, l, i, bound);
       if (result.count <= capacity_) return result;
@@ -303,12 +370,21 @@ class nearest_search {
   std::size_t stride_;
   nearby_leaves shared_;  ///< of a run of points
   nearby_leaves own_;     ///< of one point
-  std::vector<std::uint32_t> chosen_;
-  std::vector<float> found_;
-  std::vector<std::uint32_t> places_;  ///< of what was found; empty where nobody asks
+  // The rows of leaves within a squared distance of one of them, and the one from which on they are too many.
+  nearby_leaves near_rows_{128};
+  std::size_t near_rows_of_ = std::numeric_limits<std::size_t>::max();
+  float near_rows_reach_ = -1;
+  float too_many_rows_ = infinity;
+  line_vector<std::uint32_t> chosen_;
+  line_vector<float> found_;
+  line_vector<std::uint32_t> places_;  ///< of what was found; empty where nobody asks
   std::vector<pending> pending_;
   std::vector<open_row> open_;
-  std::array<found_within, leaf_width> results_{};  ///< of the leaf that is being visited
+  // Of the points of the leaf that is being visited.
+  std::array<std::uint32_t, leaf_width> counts_{};
+  std::array<float, leaf_width> bounds_{};
+  std::array<bool, leaf_width> has_places_{};
+  std::array<float, leaf_width> largest_{};  ///< the squared distance to the `wanted`-th nearest
   float hoped_;              ///< what of `usual_` should suffice: its scatter falls with the number of neighbours
   float reach_;              ///< what of `usual_` should suffice in any case
   float shared_reach_ = -1;  ///< squared distance from the run's box within which `shared_` is all there is
