@@ -114,7 +114,7 @@ void add_statistical(const std::string& name, const std::function<const points&(
         k, asked);
   };
   for (const std::size_t k : {5U, 20U, 100U, 200U}) sorted(100'000, k, who::every_level);
-  for (const std::size_t k : {8U, 50U}) {
+  for (const std::size_t k : {10U, 50U}) {
     for (const std::size_t n : {10'000U, 100'000U, 300'000U}) sorted(n, k, who::every_level);
     sorted(1'000'000, k, who::all);
     sorted(10'000'000, k, who::ours);

@@ -12,8 +12,10 @@
 #include <string>
 #include <thread>
 #include <utility>
+#include <vector>
 
 #include "inputs/camera_device.hpp"
+#include "inputs/frame_pairs.hpp"
 #include "inputs/live_source.hpp"
 #include "io/recordings.hpp"
 #include "support/catch.hpp"
@@ -182,6 +184,44 @@ TEST_CASE("a camera that is not there or not known to this build is refused in w
   CHECK_THAT(video,
              Contains(app::has_video_cameras() ? "no video camera that can be opened" : "libopencv-videoio-dev"));
   if (app::has_video_cameras()) CHECK_THAT(message_of(app::open_video_camera({.name = "0"})), Contains("--camera"));
+}
+
+TEST_CASE("colour and depth of one time are paired, whichever stream is ahead, and whatever is lost") {
+  struct taken {
+    app::stream of;
+    int number;
+  };
+  using app::stream;
+  const auto pairs_of = [](double fps, const std::vector<taken>& order) {
+    app::frame_pairs<int> pairs{1.0 / fps};
+    std::vector<std::pair<int, int>> found;
+    for (const taken& t : order)
+      if (const auto both = pairs.add(t.of, t.number, t.number / fps + (t.of == stream::depth ? 0.003 : 0.0)))
+        found.emplace_back(both->color, both->depth);
+    return found;
+  };
+  for (const double fps : {15.0, 30.0, 60.0})
+    for (const int ahead : {-9, -2, 0, 2, 9}) {  // of depth
+      CAPTURE(fps, ahead);
+      std::vector<taken> order;
+      std::vector<std::pair<int, int>> expected;
+      for (int i = 0; i != 60; ++i) {
+        const int depth = i + ahead;
+        if (depth >= 0 && depth < 60 && depth != 20) order.push_back({stream::depth, depth});
+        if (i != 30) order.push_back({stream::color, i});
+      }
+      for (int depth = 60 + ahead; depth < 60; ++depth) order.push_back({stream::depth, depth});
+      for (int i = 0; i != 60; ++i)
+        if (i != 20 && i != 30 && i >= ahead) expected.emplace_back(i, i);
+      CHECK(pairs_of(fps, order) == expected);
+    }
+  // What waits for more than sixteen frames is given up.
+  std::vector<taken> late;
+  for (int i = 0; i != 20; ++i) late.push_back({stream::color, i});
+  for (int i = 0; i != 20; ++i) late.push_back({stream::depth, i});
+  const auto found = pairs_of(30.0, late);
+  REQUIRE(found.size() == 16);
+  CHECK(found.front() == std::pair{4, 4});
 }
 
 #ifdef RGBD_SLAM_OPENNI

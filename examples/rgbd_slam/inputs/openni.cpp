@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "inputs/camera_device.hpp"
+#include "inputs/frame_pairs.hpp"
 
 #ifdef RGBD_SLAM_OPENNI
 #include <algorithm>
@@ -7,8 +8,6 @@
 #include <cmath>
 #include <cstdint>
 #include <cstring>
-#include <deque>
-#include <iterator>
 #include <thread>
 #include <utility>
 
@@ -46,18 +45,14 @@ std::optional<openni::VideoMode> mode_of(const openni::SensorInfo& info, openni:
 
 class openni_camera final : public camera_device {
  public:
-  // Drivers tell a stream's thread to end and do not wait for it, and it sleeps for as long as a frame takes: what it
-  // uses is kept until then. OpenNI2 itself is left as it is, as to shut it down unloads the drivers.
+  // Some drivers, that of the device without hardware among them, tell a stream's thread to end and do not wait for it;
+  // it sleeps for as long as a frame takes, and what it uses is kept until then. OpenNI2 itself is left as it is, as to
+  // shut it down unloads the drivers.
   ~openni_camera() override {
-    color_frames_.clear();
-    depth_frames_.clear();
-    bool is_running = false;
-    for (openni::VideoStream* s : {&depth_, &color_}) {
-      if (!s->isValid()) continue;
-      s->stop();
-      is_running = true;
-    }
-    if (is_running) std::this_thread::sleep_for(std::chrono::milliseconds{150});
+    pairs_.clear();
+    for (openni::VideoStream* s : {&depth_, &color_})
+      if (s->isValid()) s->stop();
+    if (is_started_) std::this_thread::sleep_for(std::chrono::duration<double>(std::max(0.1, 2.0 * interval_)));
     for (openni::VideoStream* s : {&depth_, &color_}) s->destroy();
     device_.close();
   }
@@ -87,6 +82,7 @@ class openni_camera final : public camera_device {
       notes.emplace_back("the camera does not register depth to colour: colours may be a little off");
     }
     device_.setDepthColorSyncEnabled(true);
+    pairs_ = frame_pairs<openni::VideoFrameRef>{interval_};
     return choose_camera(options, mode);
   }
 
@@ -103,7 +99,10 @@ class openni_camera final : public camera_device {
     if (streams[ready]->readFrame(&frame) != openni::STATUS_OK || !frame.isValid())
       return fail(errc::unreadable, name, "was disconnected (" + reason() + ")");
     newest_index_ = std::max(newest_index_, frame.getFrameIndex());
-    return add(ready == 0 ? color_frames_ : depth_frames_, std::move(frame));
+    const double time = 1e-6 * static_cast<double>(frame.getTimestamp());
+    auto both = pairs_.add(ready == 0 ? stream::color : stream::depth, std::move(frame), time);
+    if (!both) return std::optional<source_frame>{};
+    return frame_of(*both);
   }
 
  private:
@@ -116,6 +115,8 @@ class openni_camera final : public camera_device {
     if (!device_.isFile()) stream.setVideoMode(*mode);
     stream.setMirroringEnabled(false);  // which is how these cameras come
     if (stream.start() != openni::STATUS_OK) return fail(errc::unreadable, name, reason());
+    is_started_ = true;
+    interval_ = std::max(interval_, 1.0 / std::max(1, stream.getVideoMode().getFps()));
     return {};
   }
 
@@ -142,37 +143,14 @@ class openni_camera final : public camera_device {
     return {};
   }
 
-  using frames = std::deque<openni::VideoFrameRef>;
-
-  static double time_of(const openni::VideoFrameRef& f) { return 1e-6 * static_cast<double>(f.getTimestamp()); }
-
-  /// Colour and depth of one time, once both are there. Either stream may be some frames ahead of the other.
-  result<std::optional<source_frame>> add(frames& to, openni::VideoFrameRef frame) {
-    constexpr double most_apart = 0.020;  // seconds, as of recordings
-    constexpr std::size_t most = 16;      // of a stream that wait for the other one
-    const bool is_color = &to == &color_frames_;
-    frames& others = is_color ? depth_frames_ : color_frames_;
-    const auto apart = [&](const openni::VideoFrameRef& other) { return std::abs(time_of(other) - time_of(frame)); };
-    const auto partner = std::ranges::min_element(others, {}, apart);
-    if (partner == others.end() || apart(*partner) > most_apart) {
-      to.push_back(std::move(frame));
-      if (to.size() > most) to.pop_front();
-      return std::optional<source_frame>{};
-    }
-    auto both = is_color ? frame_of(frame, *partner) : frame_of(*partner, frame);
-    others.erase(others.begin(), std::next(partner));  // those before wait in vain
-    to.clear();
-    return both;
-  }
-
-  [[nodiscard]] result<std::optional<source_frame>> frame_of(const openni::VideoFrameRef& color_frame,
-                                                             const openni::VideoFrameRef& depth_frame) const {
+  [[nodiscard]] result<std::optional<source_frame>> frame_of(
+      const frame_pairs<openni::VideoFrameRef>::pair& both) const {
     const int width = camera.model.width(), height = camera.model.height();
-    for (const auto* f : {&color_frame, &depth_frame})
+    for (const auto* f : {&both.color, &both.depth})
       if (f->getWidth() != width || f->getHeight() != height)
         return fail(errc::malformed, name, "gives images of another size than at first");
     source_frame out;
-    out.timestamp = time_of(color_frame);
+    out.timestamp = 1e-6 * static_cast<double>(both.color.getTimestamp());
     out.depth_scale = camera.depth_scale;
     out.color = orbis::image<orbis::rgb8>(width, height);
     out.depth = orbis::image<std::uint16_t>(width, height);
@@ -182,16 +160,18 @@ class openni_camera final : public camera_device {
         std::memcpy(&to(0, y), row, static_cast<std::size_t>(width) * bytes);
     };
     static_assert(sizeof(orbis::rgb8) == 3);
-    copy(color_frame, out.color, 3);
-    copy(depth_frame, out.depth, 2);
+    copy(both.color, out.color, 3);
+    copy(both.depth, out.depth, 2);
     return std::optional{std::move(out)};
   }
 
   openni::Device device_;
   openni::VideoStream color_, depth_;
-  frames color_frames_, depth_frames_;  // without a partner as yet
-  std::optional<int> last_;             // frames of a file
+  frame_pairs<openni::VideoFrameRef> pairs_;
+  std::optional<int> last_;  // frames of a file
   int newest_index_ = 0;
+  bool is_started_ = false;  // at least one stream
+  double interval_ = 0.0;    // of the frames of the slower stream, seconds
 };
 
 }  // namespace

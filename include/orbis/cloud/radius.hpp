@@ -16,6 +16,7 @@
 
 #include <orbis/cloud/detail/knn/knn_kernels.hpp>
 #include <orbis/cloud/detail/knn/leaf_hierarchy.hpp>
+#include <orbis/cloud/detail/knn/line_vector.hpp>
 #include <orbis/cloud/detail/knn/nearest_search.hpp>
 #include <orbis/cloud/detail/knn/reported_chunks.hpp>
 #include <orbis/cloud/detail/knn/squared_distance.hpp>
@@ -101,8 +102,8 @@ class crowd_search {
   std::size_t enough_;
   nearby_leaves near_;
   std::vector<open_row> open_;
-  std::vector<std::uint32_t> chosen_;
-  std::vector<float> found_;
+  line_vector<std::uint32_t> chosen_;
+  line_vector<float> found_;
 };
 
 }  // namespace detail

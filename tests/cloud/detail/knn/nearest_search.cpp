@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -98,6 +99,41 @@ TEST_CASE("mean distances equal brute force with every instruction set and numbe
   }
 }
 
+TEST_CASE("the nearest are the same where too many rows are near to be shared") {
+  using namespace orbis::cloud::detail;
+  points cloud = orbis::test::uniform_cloud(9'000, 21, 1.0);
+  const points far = orbis::test::uniform_cloud(60, 22, 200.0);
+  cloud.insert(cloud.end(), far.begin(), far.end());
+  const auto tree = make_leaves(orbis::seq, cloud, 9);
+  for (const level l : levels) {
+    const orbis::simd::level_limit limit{l};
+    const knn_kernels kernels;
+    const auto largest_of_all = [&](std::size_t most_near_rows) {
+      nearest_search search{tree, kernels, 9, false, most_near_rows};
+      std::vector<float> largest(leaf_width * tree.leaves.size());
+      for (std::size_t leaf = 0; leaf != tree.leaves.size(); ++leaf)
+        search.visit_sums(leaf, [&](std::size_t i, std::span<float>, const nearest_sum& sum) {
+          largest[leaf * leaf_width + i] = sum.largest_squared;
+        });
+      return largest;
+    };
+    const auto expected = largest_of_all(10'000);
+    CHECK(largest_of_all(128) == expected);
+    CHECK(largest_of_all(16) == expected);  // too many for some
+    CHECK(largest_of_all(0) == expected);   // too many for all
+    std::size_t wrong = 0;
+    for (std::size_t n = 0; n < tree.members.size(); n += 97) {
+      const orbis::vec3f p = cloud[tree.members[n]];
+      std::vector<float> all;
+      for (const orbis::vec3f& q : cloud)
+        all.push_back(orbis::cloud::detail::squared_distance<float>({p.x(), p.y(), p.z()}, {q.x(), q.y(), q.z()}));
+      std::nth_element(all.begin(), all.begin() + 8, all.end());
+      wrong += expected[n] == all[8] ? 0 : 1;
+    }
+    CHECK(wrong == 0);
+  }
+}
+
 TEST_CASE("mean distances of larger clouds equal those of a k-d tree") {
   points scattered = orbis::test::room_cloud(240, 160, 0.002, 3);
   orbis::random_bits random{4};
@@ -172,11 +208,13 @@ TEST_CASE("the nearest distances of several points are summed as those of each")
   for (int round = 0; round != 200; ++round) {
     const std::size_t wanted = 1 + random.below(round % 2 == 0 ? 16 : 40);
     const std::size_t stride = 96 + random.below(3), first = random.below(8), last = 9 + random.below(8);
-    std::vector<float> found(leaf_width * stride, std::numeric_limits<float>::infinity());
+    std::vector<float> found(leaf_width * stride + leaf_width, 0.0F);  // what was found for other points before
     std::array<std::uint32_t, leaf_width> counts{};
     std::array<float, leaf_width> bounds{};
     for (std::size_t i = 0; i != leaf_width; ++i) {
       counts[i] = random.below(static_cast<std::uint32_t>(round % 3 == 0 ? stride - leaf_width : 36));
+      std::fill_n(found.begin() + static_cast<std::ptrdiff_t>(i * stride + counts[i]), leaf_width,
+                  std::numeric_limits<float>::infinity());
       bounds[i] = static_cast<float>(std::pow(2.0, random.uniform(round % 5 == 0 ? -140 : -3, 3)));
       for (std::size_t n = 0; n != counts[i]; ++n) {
         const double share = random.uniform();
@@ -324,7 +362,7 @@ TEST_CASE("boxes and leaves are measured alike by all instruction sets") {
     const std::size_t first = 3, last = tree.size_of(own) - 2;
     std::vector<float> rows(leaf_width * stride, -1.0F);
     std::array<std::uint32_t, leaf_width> counts{};
-    kernels.near_points_of_each(tree.leaves.data(), near, points_of_leaf, first, last, 0.02F, scratch.data(),
+    kernels.near_points_of_each(tree.leaves.data(), near, points_of_leaf, first, last, 0.2F, scratch.data(),
                                 rows.data(), stride, 300, counts.data());
     for (std::size_t i = 0; i != leaf_width; ++i) {
       const std::array<float, 3> q{points_of_leaf.axis[0][i], points_of_leaf.axis[1][i], points_of_leaf.axis[2][i]};
@@ -335,9 +373,18 @@ TEST_CASE("boxes and leaves are measured alike by all instruction sets") {
         continue;
       }
       std::vector<float> alone(stride);
-      CHECK(counts[i] == near_points_reference(tree.leaves.data(), near, q, 0.02F, alone.data(), 300));
-      CHECK(counts[i] > 0);
+      CHECK(counts[i] == near_points_reference(tree.leaves.data(), near, q, 0.2F, alone.data(), 300));
+      CHECK(counts[i] > 8);
       CHECK(std::equal(row, row + static_cast<std::ptrdiff_t>(counts[i] + leaf_width), alone.begin()));
+    }
+    // With more than there is room for it ends early.
+    constexpr std::size_t few = 8;
+    std::fill(rows.begin(), rows.end(), -1.0F);
+    kernels.near_points_of_each(tree.leaves.data(), near, points_of_leaf, first, last, 0.2F, scratch.data(),
+                                rows.data(), stride, few, counts.data());
+    for (std::size_t i = first; i != last; ++i) {
+      CHECK(counts[i] > few);
+      CHECK(rows[i * stride + few + 3 * leaf_width] == -1.0F);
     }
     CHECK(near.count > 16);
     near.leaves.resize(near.count);

@@ -35,7 +35,7 @@ struct box_axes {
   }
 };
 
-/// The leaves near a group of queries, and their boxes.
+/// The leaves near a group of queries, or rows of leaves, and their boxes.
 struct nearby_leaves {
   explicit nearby_leaves(std::size_t most)
       : stride{(most / leaf_width + 2) * leaf_width}, boxes(6 * stride), leaves(stride) {}
@@ -207,8 +207,8 @@ struct near_in_leaves {
 };
 
 /// `near_in_leaves` for the points [first, last) of a leaf, whose rows in `found` are `stride` long; sets their
-/// `counts`. `scratch`: sixteen times as long. What one step writes is read by the next one after those of the other
-/// points.
+/// `counts`. `scratch`: sixteen rows, each longer by sixteen than `near.leaves`. In two passes, so that what the first
+/// one writes for a point has reached the cache when the second one reads it.
 struct near_in_leaves_each {
   template <simd::target Target>
   static ORBIS_ALWAYS_INLINE void run(const point_row* leaves, const nearby_leaves& near, const point_row& points,
@@ -289,7 +289,7 @@ struct sum_nearest {
   /// Adds -1 to the lanes of `count` where `v` is greater than `other`.
   template <simd::vector V, simd::vector Numbers>
   static ORBIS_ALWAYS_INLINE void count_smaller(Numbers& count, float other, const V& v) noexcept {
-    if constexpr (V::count == leaf_width)
+    if constexpr (V::is_native)
       count = select(V(other) < v, count - Numbers(1), count);  // one instruction with a mask
     else
       count += select(V(other) < v, Numbers(-1), Numbers(0));
@@ -487,7 +487,7 @@ struct ranked_of_leaf {
   }
 };
 
-/// Adds to `near` the boxes with bits in `wanted`; the first box of the row is that of leaf `first`.
+/// Adds to `near` the boxes with bits in `wanted`; the first box of the row is that of leaf, or row, `first`.
 struct gather_leaves {
   template <simd::target Target>
   static ORBIS_ALWAYS_INLINE void run(const box_row& boxes, std::uint32_t wanted, std::uint32_t first,

@@ -9,12 +9,13 @@
 
 namespace orbis::cloud::detail {
 
-/// Allocates at cache lines. A register of 64 bytes that is stored across two of them cannot be read again until it has
-/// reached the cache.
+/// Allocates at cache lines. On many processors a register that is stored across two of them cannot be read again until
+/// it has reached the cache; so rows whose first registers are read soon after begin at a line.
 template <class T>
 struct line_allocator {
   using value_type = T;
   static constexpr std::align_val_t line{64};
+  static_assert(alignof(T) <= 64);
   line_allocator() = default;
   template <class U>
   line_allocator(const line_allocator<U>&) noexcept {}  // NOLINT(google-explicit-constructor)

@@ -27,8 +27,8 @@ struct open_row {
   std::uint32_t row;
 };
 
-/// Gathers the children within `bound`, squared, of a box that rows of `level` have: leaves where that is 0, else rows
-/// of the level below. False if they are too many. `open` is scratch.
+/// Gathers what rows of `level` hold boxes of (level 0: leaves; otherwise rows of the level below), as far as it is
+/// within `bound`, squared, of `box`. False if that is too many. `open` is scratch.
 [[nodiscard]] inline bool gather_near(const leaf_hierarchy& tree, std::uint32_t level, const knn_kernels& kernels,
                                       const box3& box, float bound, std::vector<open_row>& open, nearby_leaves& near) {
   near.count = 0;
@@ -98,17 +98,20 @@ void for_each_within(const leaf_hierarchy& tree, const knn_kernels& kernels, con
 /// spatial databases", ACM TODS 24, 1999.
 class nearest_search {
  public:
-  /// `with_places`: it is to be found as well which points they are.
+  /// `with_places`: it is to be found as well which points they are. `most_near_rows`: of leaves, that those of a row
+  /// share; a matter of speed.
   /// @pre 0 < wanted <= points in the leaves
-  nearest_search(const leaf_hierarchy& tree, const knn_kernels& kernels, std::size_t wanted, bool with_places = false)
+  nearest_search(const leaf_hierarchy& tree, const knn_kernels& kernels, std::size_t wanted, bool with_places = false,
+                 std::size_t most_near_rows = 128)
       : tree_{&tree},
         kernels_{kernels},
         wanted_{wanted},
         capacity_{3 * wanted + 64},
-        stride_{(capacity_ / leaf_width + 5) * leaf_width},
+        stride_{(capacity_ / leaf_width + 5) * leaf_width},  // kernels write beyond; rows begin at cache lines
         shared_{192 + 2 * wanted},
         own_{192 + 2 * wanted},
-        chosen_(leaf_width * (own_.leaves.size() + leaf_width)),
+        near_rows_{most_near_rows},
+        chosen_((with_places ? 1 : leaf_width) * (own_.leaves.size() + leaf_width)),
         found_(leaf_width * stride_),
         places_(with_places ? leaf_width * stride_ : 0),
         hoped_{1.0F + 1.7F / std::sqrt(static_cast<float>(wanted))},
@@ -124,8 +127,8 @@ class nearest_search {
       for (std::size_t i = first; i != last; ++i) largest_[i] = f(i, found_of(i), bounds_[i]);
     });
   }
-  /// As `visit_leaf`, but calls `f(i, found, sum)`, and sums up the nearest itself; not where fewer than `wanted` are
-  /// found. @pre not made `with_places`
+  /// As `visit_leaf`, but sums up the nearest itself, and calls `f(i, found, sum)`. `sum` says nothing where fewer than
+  /// `wanted` were found.
   template <class F>
   void visit_sums(std::size_t l, F&& f) {
     std::array<nearest_sum, leaf_width> sums;
@@ -252,13 +255,11 @@ class nearest_search {
     return {kernels_.near_places(leaves, near, q, bound, chosen_.data(), found, places, capacity_), bound, true};
   }
 
-  [[nodiscard]] bool gather_leaves(const box3& box, float bound, nearby_leaves& near) {
-    return gather_near(*tree_, 0, kernels_, box, bound, open_, near);
-  }
-  /// As above into `shared_`, for a box within leaf `l`. The leaves of a row come one after the other, and share the
-  /// rows that are near.
+  /// Gathers the leaves near a box within leaf `l` into `shared_`. The box of its row holds those of its leaves, so
+  /// what is near to them is near to the row: the leaves of a row, which come one after the other, share the rows that
+  /// are.
   [[nodiscard]] bool gather_shared(std::size_t l, const box3& box, float bound) {
-    if (!have_near_rows(l / leaf_width, bound)) return gather_leaves(box, bound, shared_);
+    if (!have_near_rows(l / leaf_width, bound)) return gather_near(*tree_, 0, kernels_, box, bound, open_, shared_);
     shared_.count = 0;
     std::array<float, leaf_width> distance;
     for (std::size_t first = 0; first < near_rows_.count; first += leaf_width) {
@@ -309,7 +310,7 @@ class nearest_search {
     if (result.count < wanted_) return search_outwards(q, found);
     std::fill_n(found + result.count, leaf_width, infinity);
     float bound = kernels_.sum_nearest(found, result.count, wanted_, most).largest_squared;
-    if (!gather_leaves({q, q}, bound, own_)) return search_outwards(q, found);
+    if (!gather_near(*tree_, 0, kernels_, {q, q}, bound, open_, own_)) return search_outwards(q, found);
     for (;;) {
       result = search_near(own_, l, i, bound);
       if (result.count <= capacity_) return result;
@@ -368,13 +369,12 @@ class nearest_search {
   std::size_t wanted_;
   std::size_t capacity_;
   std::size_t stride_;
-  nearby_leaves shared_;  ///< of a run of points
-  nearby_leaves own_;     ///< of one point
-  // The rows of leaves within a squared distance of one of them, and the one from which on they are too many.
-  nearby_leaves near_rows_{128};
-  std::size_t near_rows_of_ = std::numeric_limits<std::size_t>::max();
-  float near_rows_reach_ = -1;
-  float too_many_rows_ = infinity;
+  nearby_leaves shared_;     ///< of a run of points
+  nearby_leaves own_;        ///< of one point
+  nearby_leaves near_rows_;  ///< rows of leaves that are near to one of them, ...
+  std::size_t near_rows_of_ = std::numeric_limits<std::size_t>::max();  ///< ... this one; none at first
+  float near_rows_reach_ = -1;      ///< how far, squared; negative where it is not known
+  float too_many_rows_ = infinity;  ///< the squared distance within which that row has too many
   line_vector<std::uint32_t> chosen_;
   line_vector<float> found_;
   line_vector<std::uint32_t> places_;  ///< of what was found; empty where nobody asks
