@@ -363,7 +363,7 @@ TEST_CASE("boxes and leaves are measured alike by all instruction sets") {
     std::vector<float> rows(leaf_width * stride, -1.0F);
     std::array<std::uint32_t, leaf_width> counts{};
     kernels.near_points_of_each(tree.leaves.data(), near, points_of_leaf, first, last, 0.2F, scratch.data(),
-                                rows.data(), stride, 300, counts.data());
+                                rows.data(), nullptr, stride, 300, counts.data());
     for (std::size_t i = 0; i != leaf_width; ++i) {
       const std::array<float, 3> q{points_of_leaf.axis[0][i], points_of_leaf.axis[1][i], points_of_leaf.axis[2][i]};
       const auto row = rows.begin() + static_cast<std::ptrdiff_t>(i * stride);
@@ -377,11 +377,31 @@ TEST_CASE("boxes and leaves are measured alike by all instruction sets") {
       CHECK(counts[i] > 8);
       CHECK(std::equal(row, row + static_cast<std::ptrdiff_t>(counts[i] + leaf_width), alone.begin()));
     }
+    // And which they are.
+    std::vector<float> rows_again(leaf_width * stride, -1.0F);
+    std::vector<std::uint32_t> places(leaf_width * stride);
+    std::array<std::uint32_t, leaf_width> counts_again{};
+    kernels.near_points_of_each(tree.leaves.data(), near, points_of_leaf, first, last, 0.2F, scratch.data(),
+                                rows_again.data(), places.data(), stride, 300, counts_again.data());
+    CHECK(counts_again == counts);
+    CHECK(rows_again == rows);
+    std::size_t elsewhere = 0;
+    for (std::size_t i = first; i != last; ++i)
+      for (std::size_t n = 0; n != counts[i]; ++n) {
+        const std::uint32_t place = places[i * stride + n];
+        const point_row& at = tree.leaves[place / leaf_width];
+        const std::size_t lane = place % leaf_width;
+        const float d =
+            squared_distance<float>({points_of_leaf.axis[0][i], points_of_leaf.axis[1][i], points_of_leaf.axis[2][i]},
+                                    {at.axis[0][lane], at.axis[1][lane], at.axis[2][lane]});
+        elsewhere += d == rows[i * stride + n] ? 0 : 1;
+      }
+    CHECK(elsewhere == 0);
     // With more than there is room for it ends early.
     constexpr std::size_t few = 8;
     std::fill(rows.begin(), rows.end(), -1.0F);
     kernels.near_points_of_each(tree.leaves.data(), near, points_of_leaf, first, last, 0.2F, scratch.data(),
-                                rows.data(), stride, few, counts.data());
+                                rows.data(), nullptr, stride, few, counts.data());
     for (std::size_t i = first; i != last; ++i) {
       CHECK(counts[i] > few);
       CHECK(rows[i * stride + few + 3 * leaf_width] == -1.0F);

@@ -206,14 +206,53 @@ struct near_in_leaves {
   }
 };
 
-/// `near_in_leaves` for the points [first, last) of a leaf, whose rows in `found` are `stride` long; sets their
-/// `counts`. `scratch`: sixteen rows, each longer by sixteen than `near.leaves`. In two passes, so that what the first
-/// one writes for a point has reached the cache when the second one reads it.
+/// As `near_in_leaves`, and writes which points they are, as places in `leaf_hierarchy::members`, beside them.
+struct places_in_leaves {
+  template <simd::vector V>
+  static ORBIS_ALWAYS_INLINE std::size_t collect(const point_row* leaves, const std::uint32_t* chosen,
+                                                 std::size_t number, const spread_point<V>& q, const V& bound,
+                                                 float* found, std::uint32_t* places, std::size_t capacity) noexcept {
+    using numbers = simd::native_vec<std::uint32_t, typename V::target_type>;
+    std::size_t count = 0;
+    for (std::size_t i = 0; i != number && count <= capacity; ++i) {
+      const point_row& leaf = leaves[chosen[i]];
+      for (std::size_t at = 0; at != leaf_width; at += V::count) {
+        const V d = point_distances(leaf, at, q);
+        const auto within = d <= bound;
+        if constexpr (V::count == 4)
+          if (simd::none(within)) continue;
+        const numbers place = numbers::iota() + numbers(chosen[i] * static_cast<std::uint32_t>(leaf_width) +
+                                                        static_cast<std::uint32_t>(at));
+        simd::compress_store(places + count, place, within);
+        count += simd::compress_store(found + count, d, within);
+      }
+    }
+    simd::vec<float, leaf_width, typename V::target_type>(std::numeric_limits<float>::infinity()).store(found + count);
+    return count;
+  }
+  template <simd::target Target>
+  static ORBIS_ALWAYS_INLINE std::size_t run(const point_row* leaves, const nearby_leaves& near,
+                                             const std::array<float, 3>& query, float bound, std::uint32_t* scratch,
+                                             float* found, std::uint32_t* places, std::size_t capacity) {
+    using lanes = simd::native_vec<float, Target>;
+    const spread_point<lanes> q{query};
+    const lanes border = bound;
+    const std::size_t chosen =
+        chosen_leaves::find<lanes, simd::native_vec<std::uint32_t, Target>>(near, q, border, scratch);
+    return collect(leaves, scratch, chosen, q, border, found, places, capacity);
+  }
+};
+
+/// `near_in_leaves` or, with `places`, `places_in_leaves` for the points [first, last) of a leaf, whose rows in `found`
+/// and `places` are `stride` long; sets their `counts`. `scratch`: sixteen rows, each longer by sixteen than
+/// `near.leaves`. In two passes, so that what the first one writes for a point has reached the cache when the second
+/// one reads it.
 struct near_in_leaves_each {
   template <simd::target Target>
   static ORBIS_ALWAYS_INLINE void run(const point_row* leaves, const nearby_leaves& near, const point_row& points,
                                       std::size_t first, std::size_t last, float bound, std::uint32_t* scratch,
-                                      float* found, std::size_t stride, std::size_t capacity, std::uint32_t* counts) {
+                                      float* found, std::uint32_t* places, std::size_t stride, std::size_t capacity,
+                                      std::uint32_t* counts) {
     using lanes = simd::native_vec<float, Target>;
     using numbers = simd::native_vec<std::uint32_t, Target>;
     const std::size_t length = near.leaves.size() + leaf_width;
@@ -224,39 +263,14 @@ struct near_in_leaves_each {
     for (std::size_t i = first; i != last; ++i)
       counts[i] =
           static_cast<std::uint32_t>(chosen_leaves::find<lanes, numbers>(near, point(i), border, scratch + i * length));
-    for (std::size_t i = first; i != last; ++i)
-      counts[i] = static_cast<std::uint32_t>(near_in_leaves::collect(leaves, scratch + i * length, counts[i], point(i),
-                                                                     border, found + i * stride, capacity));
-  }
-};
-
-/// As `near_in_leaves`, and writes which points they are, as places in `leaf_hierarchy::members`, beside them.
-struct places_in_leaves {
-  template <simd::target Target>
-  static ORBIS_ALWAYS_INLINE std::size_t run(const point_row* leaves, const nearby_leaves& near,
-                                             const std::array<float, 3>& query, float bound, std::uint32_t* scratch,
-                                             float* found, std::uint32_t* places, std::size_t capacity) {
-    using lanes = simd::native_vec<float, Target>;
-    using numbers = simd::native_vec<std::uint32_t, Target>;
-    const spread_point<lanes> q{query};
-    const lanes border = bound;
-    const std::size_t chosen = chosen_leaves::find<lanes, numbers>(near, q, border, scratch);
-    std::size_t count = 0;
-    for (std::size_t i = 0; i != chosen && count <= capacity; ++i) {
-      const point_row& leaf = leaves[scratch[i]];
-      for (std::size_t at = 0; at != leaf_width; at += lanes::count) {
-        const lanes d = point_distances(leaf, at, q);
-        const auto within = d <= border;
-        if constexpr (lanes::count == 4)
-          if (simd::none(within)) continue;
-        const numbers place = numbers::iota() + numbers(scratch[i] * static_cast<std::uint32_t>(leaf_width) +
-                                                        static_cast<std::uint32_t>(at));
-        simd::compress_store(places + count, place, within);
-        count += simd::compress_store(found + count, d, within);
-      }
+    for (std::size_t i = first; i != last; ++i) {
+      const std::uint32_t* const chosen = scratch + i * length;
+      float* const row = found + i * stride;
+      counts[i] = static_cast<std::uint32_t>(
+          places == nullptr ? near_in_leaves::collect(leaves, chosen, counts[i], point(i), border, row, capacity)
+                            : places_in_leaves::collect(leaves, chosen, counts[i], point(i), border, row,
+                                                        places + i * stride, capacity));
     }
-    simd::vec<float, leaf_width, Target>(std::numeric_limits<float>::infinity()).store(found + count);
-    return count;
   }
 };
 
@@ -530,7 +544,7 @@ struct knn_kernels {
   using leaf_code = std::size_t(const point_row&, const point&, float, float*);
   using distances_code = std::uint32_t(const point_row&, const point&, float, float*);
   using each_code = void(const point_row*, const nearby_leaves&, const point_row&, std::size_t, std::size_t, float,
-                         std::uint32_t*, float*, std::size_t, std::size_t, std::uint32_t*);
+                         std::uint32_t*, float*, std::uint32_t*, std::size_t, std::size_t, std::uint32_t*);
   using sum_code = nearest_sum(const float*, std::size_t, std::size_t, float);
   using sums_code = void(const float*, std::size_t, std::size_t, std::size_t, const std::uint32_t*, std::size_t,
                          const float*, nearest_sum*);

@@ -111,7 +111,7 @@ class nearest_search {
         shared_{192 + 2 * wanted},
         own_{192 + 2 * wanted},
         near_rows_{most_near_rows},
-        chosen_((with_places ? 1 : leaf_width) * (own_.leaves.size() + leaf_width)),
+        chosen_(leaf_width * (own_.leaves.size() + leaf_width)),
         found_(leaf_width * stride_),
         places_(with_places ? leaf_width * stride_ : 0),
         hoped_{1.0F + 1.7F / std::sqrt(static_cast<float>(wanted))},
@@ -230,16 +230,14 @@ class nearest_search {
     const float reach = std::min(usual_ * reach_, most);
     const bool shared = gather_shared(l, box, reach);
     shared_reach_ = shared ? reach : -1.0F;
-    const bool at_once = shared && places_.empty();
-    if (at_once)
+    const bool with_places = !places_.empty();
+    if (shared)
       kernels_.near_points_of_each(tree_->leaves.data(), shared_, tree_->leaves[l], first, last, hoped, chosen_.data(),
-                                   found_.data(), stride_, capacity_, counts_.data());
+                                   found_.data(), with_places ? places_.data() : nullptr, stride_, capacity_,
+                                   counts_.data());
     for (std::size_t i = first; i != last; ++i) {
-      found_within result{at_once ? counts_[i] : 0, hoped};
-      if (shared) {
-        if (!at_once) result = search_near(shared_, l, i, hoped);
-        if (result.count < wanted_) result = search_near(shared_, l, i, reach);
-      }
+      found_within result{shared ? counts_[i] : 0, hoped, with_places};
+      if (shared && result.count < wanted_) result = search_near(shared_, l, i, reach);
       if (result.count < wanted_ || result.count > capacity_) result = search_alone(l, i);
       counts_[i] = static_cast<std::uint32_t>(result.count);
       bounds_[i] = result.bound;
