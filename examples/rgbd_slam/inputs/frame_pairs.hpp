@@ -26,10 +26,9 @@ class frame_pairs {
     Frame color, depth;
   };
 
-  frame_pairs() = default;
   /// `interval`: of the frames of a stream, seconds. Frames belong together where they are less than half of it apart,
   /// and at most 20 ms, as in recordings.
-  explicit frame_pairs(double interval) : most_apart_{std::min(0.020, 0.49 * interval)} {}
+  explicit frame_pairs(double interval = 1.0 / 30.0) : most_apart_{std::min(0.020, 0.49 * interval)} {}
 
   /// The next frame of a stream, with its time in seconds. The pair that it completes, if it does.
   std::optional<pair> add(stream of, Frame frame, double time) {
@@ -60,7 +59,7 @@ class frame_pairs {
     Frame frame;
     double time;
   };
-  double most_apart_ = 0.015;
+  double most_apart_;
   std::array<std::deque<timed>, 2> waiting_;
 };
 

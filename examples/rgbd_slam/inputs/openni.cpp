@@ -43,6 +43,8 @@ std::optional<openni::VideoMode> mode_of(const openni::SensorInfo& info, openni:
   return best;
 }
 
+double seconds(const openni::VideoFrameRef& f) { return 1e-6 * static_cast<double>(f.getTimestamp()); }
+
 class openni_camera final : public camera_device {
  public:
   // Some drivers, that of the device without hardware among them, tell a stream's thread to end and do not wait for it;
@@ -99,7 +101,7 @@ class openni_camera final : public camera_device {
     if (streams[ready]->readFrame(&frame) != openni::STATUS_OK || !frame.isValid())
       return fail(errc::unreadable, name, "was disconnected (" + reason() + ")");
     newest_index_ = std::max(newest_index_, frame.getFrameIndex());
-    const double time = 1e-6 * static_cast<double>(frame.getTimestamp());
+    const double time = seconds(frame);
     auto both = pairs_.add(ready == 0 ? stream::color : stream::depth, std::move(frame), time);
     if (!both) return std::optional<source_frame>{};
     return frame_of(*both);
@@ -150,7 +152,7 @@ class openni_camera final : public camera_device {
       if (f->getWidth() != width || f->getHeight() != height)
         return fail(errc::malformed, name, "gives images of another size than at first");
     source_frame out;
-    out.timestamp = 1e-6 * static_cast<double>(both.color.getTimestamp());
+    out.timestamp = seconds(both.color);
     out.depth_scale = camera.depth_scale;
     out.color = orbis::image<orbis::rgb8>(width, height);
     out.depth = orbis::image<std::uint16_t>(width, height);

@@ -52,13 +52,7 @@ class crowd_search {
   template <class F>
   void visit_leaf(std::size_t l, F&& f) {
     const std::size_t size = tree_->size_of(l);
-    const box_row& boxes = tree_->levels[0][l / leaf_width];
-    const std::size_t place = l % leaf_width;
-    box3 box;
-    for (std::size_t a = 0; a != 3; ++a) {
-      box.low[a] = boxes.low[a][place];
-      box.high[a] = boxes.high[a][place];
-    }
+    const box3 box = tree_->levels[0][l / leaf_width].child(l % leaf_width);
     // No two points of a box are further apart than its corners, rounding included.
     const bool all_near = squared_distance(box.low, box.high) <= bound_;
     bool gathered = false;

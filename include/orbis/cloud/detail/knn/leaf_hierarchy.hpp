@@ -28,15 +28,18 @@ struct alignas(64) point_row {
   std::array<std::array<float, leaf_width>, 3> axis;
 };
 
+struct box3 {
+  std::array<float, 3> low;
+  std::array<float, 3> high;
+};
+
 /// The boxes of sixteen children, axis by axis; places without a child lie at infinity.
 struct alignas(64) box_row {
   std::array<std::array<float, leaf_width>, 3> low;
   std::array<std::array<float, leaf_width>, 3> high;
-};
-
-struct box3 {
-  std::array<float, 3> low;
-  std::array<float, 3> high;
+  [[nodiscard]] box3 child(std::size_t i) const noexcept {
+    return {{low[0][i], low[1][i], low[2][i]}, {high[0][i], high[1][i], high[2][i]}};
+  }
 };
 
 /// Cells of a grid and their keys along a Hilbert curve through it.

@@ -11,7 +11,6 @@
 #include <cstdint>
 #include <limits>
 #include <span>
-#include <utility>
 #include <vector>
 
 #include <orbis/cloud/detail/knn/knn_kernels.hpp>
@@ -136,7 +135,7 @@ class nearest_search {
       kernels_.sums_of_each(found_.data(), stride_, first, last, counts_.data(), wanted_, bounds_.data(), sums.data());
       for (std::size_t i = first; i != last; ++i) {
         largest_[i] = counts_[i] < wanted_ ? infinity : sums[i].largest_squared;
-        f(i, found_of(i), std::as_const(sums[i]));
+        f(i, found_of(i), sums[i]);
       }
     });
   }
@@ -278,12 +277,7 @@ class nearest_search {
   [[nodiscard]] bool have_near_rows(std::size_t row, float bound) {
     if (row == near_rows_of_ && bound <= near_rows_reach_) return true;
     if (tree_->levels.size() == 1 || (row == near_rows_of_ && bound >= too_many_rows_)) return false;
-    const box_row& above = tree_->levels[1][row / leaf_width];
-    box3 box;
-    for (std::size_t a = 0; a != 3; ++a) {
-      box.low[a] = above.low[a][row % leaf_width];
-      box.high[a] = above.high[a][row % leaf_width];
-    }
+    const box3 box = tree_->levels[1][row / leaf_width].child(row % leaf_width);
     constexpr float spare = 1.3F;  // for what the next leaves want
     near_rows_of_ = row;
     near_rows_reach_ = std::min(spare * bound, most);
