@@ -4,19 +4,25 @@
 # For 64-bit ARM: compiles the library (orbis::compiled, orbis::compiled_io), the quick tests (tests/quick.cmake) and the
 # tests of the vector kernels, and runs them under qemu-user. The tests of the kernels are header-only and compare each
 # kernel with plain code, bit by bit, here with a compiler that fuses products into sums where it can.
+# With "all", every test of every component instead of the quick ones, which takes hours.
 #
-# usage: tests/aarch64.sh SYSROOT [Catch2 options]
+# usage: tests/aarch64.sh SYSROOT [all] [Catch2 options]
 # SYSROOT holds libraries for ARM, as bench/board/sysroot.sh unpacks them. Needs g++-aarch64-linux-gnu, qemu-user,
 # libeigen3-dev, libexpected-dev, libtomlplusplus-dev, libnanoflann-dev and catch2, as `./run test-aarch64` installs them.
 # Objects are kept in build/aarch64 and made again only where something has changed.
 set -euo pipefail
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 if [[ -z ${1:-} || ! -e $1/complete ]]; then
-  sed -n '8,11s/^# \{0,1\}//p' "$here/tests/aarch64.sh" >&2
+  sed -n '8,12s/^# \{0,1\}//p' "$here/tests/aarch64.sh" >&2
   exit 1
 fi
 root=$(cd "$1" && pwd)
 shift
+tier=quick
+if [[ ${1:-} == all ]]; then
+  tier=all
+  shift
+fi
 data=${ORBIS_DATA_DIR:-$here/../shared/data}
 data=$(cd "$data" 2>/dev/null && pwd || echo none)
 export ORBIS_DATA_DIR=$data  # the tests read it, from another folder
@@ -36,7 +42,7 @@ if [[ ! -e $out/include/catch2/catch.hpp ]]; then
   exit 1
 fi
 lib=$root/usr/lib/aarch64-linux-gnu
-flags=(-std=c++20 -O1 -w -Wno-psabi -Iinclude -Itests -isystem "$out/include" -isystem "$root/usr/include"
+flags=(-std=c++20 -O1 -w -Wno-psabi -Iinclude -Itests -Iexamples -isystem "$out/include" -isystem "$root/usr/include"
   -isystem "$root/usr/include/aarch64-linux-gnu" -isystem "$root/usr/include/opencv4" "-DORBIS_DATA_DIR=\"$data\"")
 compiled=(-ffp-contract=off -DORBIS_COMPILED -DORBIS_COMPILED_IO)
 
@@ -80,37 +86,6 @@ printf '%s\n' "${archive[@]}" | keep "$out/liborbis.list"
 printf '%s: %s %s\n\t@rm -f $@ && %s rcs $@ $(filter %%.o,$^)\n' "$out/liborbis.a" "${archive[*]}" "$out/liborbis.list" \
   "${AARCH64_AR:-aarch64-linux-gnu-ar}" >>"$rules"
 
-# The quick tests, a program for each component.
-mapfile -t quick < <(grep -v '^ *#' tests/quick.cmake | grep -oE '[a-z0-9_]+/[a-z0-9_/]+\.cpp')
-for component in $(printf '%s\n' "${quick[@]%%/*}" | sort -u); do
-  parts=()
-  files=()
-  bytes=0
-  number=0
-  for source in "${quick[@]}" -; do
-    if [[ $source == "$component"/* ]]; then
-      source=tests/$source
-      # What cannot stand in a namespace, or is switched by the preprocessor, is compiled alone (as in batches.cmake).
-      if grep -qE '^(namespace [a-z_:]+ *\{|template *<>|struct [a-z_]+::|# *define|#ifdef|# *if defined|int main)' "$source"; then
-        compile "$out/${source//\//_}.quick.o" "$source" "${compiled[@]}"
-        parts+=("$out/${source//\//_}.quick.o")
-        continue
-      fi
-      files+=("$here/$source")  # found from the folder of the batch, too
-      bytes=$((bytes + $(wc -c <"$source")))
-    fi
-    if ((${#files[@]})) && { ((bytes > 25000)) || [[ $source == - ]]; }; then
-      number=$((number + 1))
-      awk -f tests/batch.awk "${files[@]}" | keep "$out/batches/${component}_$number.cpp"
-      compile "$out/${component}_$number.o" "$out/batches/${component}_$number.cpp" "${compiled[@]}"
-      parts+=("$out/${component}_$number.o")
-      files=()
-      bytes=0
-    fi
-  done
-  program "test_$component" "${parts[@]}" "$out/main.o" "$out/liborbis.a"
-done
-
 # Where the kernels' tests stand.
 places=(tests/core/simd.cpp tests/core/simd tests/core/rounded.cpp tests/core/bytes.cpp tests/camera/project_lanes.cpp
   tests/camera/shutter_correction.cpp
@@ -120,12 +95,55 @@ places=(tests/core/simd.cpp tests/core/simd tests/core/rounded.cpp tests/core/by
   tests/optimize/bundle_instances*.cpp  # what those of bundle adjustment share
   tests/octree/detail/storage tests/octree/detail/points tests/octree/detail/depth tests/nav/detail/floor
   tests/nav/squared_distances.cpp)
+mapfile -t kernels < <(for place in "${places[@]}"; do if [[ -e $place ]]; then find "$place" -name '*.cpp'; fi; done | sort)
 parts=()
-while read -r source; do
+for source in "${kernels[@]}"; do
   compile "$out/${source//\//_}.o" "$source"
   parts+=("$out/${source//\//_}.o")
-done < <(for place in "${places[@]}"; do if [[ -e $place ]]; then find "$place" -name '*.cpp'; fi; done | sort)
-program test_kernels "${parts[@]}" "$out/counting.o" "$out/main.o"
+done
+program kernels "${parts[@]}" "$out/counting.o" "$out/main.o"
+
+# The other tests, a program for each component.
+if [[ $tier == quick ]]; then
+  mapfile -t sources < <(grep -v '^ *#' tests/quick.cmake | grep -oE '[a-z0-9_]+/[a-z0-9_/]+\.cpp')
+else
+  mapfile -t sources < <(cd tests && find core camera features places optimize cloud octree slam mapping nav eval io \
+    interop -name '*.cpp' | sort | grep -vxFf <(printf '%s\n' "${kernels[@]#tests/}" | grep -v bundle_instances))
+fi
+for component in $(printf '%s\n' "${sources[@]%%/*}" | sort -u); do
+  parts=()
+  if [[ $tier == all && $component == io ]]; then  # worlds that the tests of several components are made of
+    for source in tests/support/synthetic/*.cpp; do
+      compile "$out/${source//\//_}.o" "$source" "${compiled[@]}"
+      parts+=("$out/${source//\//_}.o")
+    done
+  fi
+  files=()
+  bytes=0
+  number=0
+  for source in "${sources[@]}" -; do
+    if [[ $source == "$component"/* ]]; then
+      source=tests/$source
+      # What cannot stand in a namespace, or is switched by the preprocessor, is compiled alone (as in batches.cmake).
+      if grep -qE '^(namespace [a-z_:]+ *\{|template *<>|struct [a-z_]+::|# *define|#ifdef|# *if defined|int main)' "$source"; then
+        compile "$out/${source//\//_}.compiled.o" "$source" "${compiled[@]}"
+        parts+=("$out/${source//\//_}.compiled.o")
+        continue
+      fi
+      files+=("$here/$source")  # found from the folder of the batch, too
+      bytes=$((bytes + $(wc -c <"$source")))
+    fi
+    if ((${#files[@]})) && { ((bytes > 25000)) || [[ $source == - ]]; }; then
+      number=$((number + 1))
+      awk -f tests/batch.awk "${files[@]}" | keep "$out/batches/${tier}_${component}_$number.cpp"
+      compile "$out/${tier}_${component}_$number.o" "$out/batches/${tier}_${component}_$number.cpp" "${compiled[@]}"
+      parts+=("$out/${tier}_${component}_$number.o")
+      files=()
+      bytes=0
+    fi
+  done
+  program "${tier}_$component" "${parts[@]}" "$out/main.o" "$out/liborbis.a"
+done
 
 {
   printf 'all: %s\n' "${programs[*]}"

@@ -48,8 +48,9 @@ TEST_CASE("the neighbours of all points are those that brute force finds, ties b
   points overflowing = orbis::test::uniform_cloud(20, 3, 1e17);
   for (int i = 0; i != 20; ++i) overflowing.emplace_back(1e20F * static_cast<float>(i), 0.0F, 0.0F);
   clouds.emplace_back("overflowing", overflowing);
+  for (auto& hard : orbis::test::hard_clouds()) clouds.push_back(std::move(hard));
   for (const auto& [name, cloud] : clouds) {
-    for (const std::size_t k : {1U, 6U, 40U}) {
+    for (const std::size_t k : {1U, 2U, 3U, 4U, 6U, 40U}) {
       using orbis::simd::level;
       for (const level l : {level::portable, level::avx2, level::avx512}) {
         INFO(name << " k " << k << " level " << static_cast<int>(l));

@@ -106,4 +106,50 @@ inline std::vector<std::pair<std::string, points>> all_clouds() {
   return out;
 }
 
+/// Clouds that are hard on guesses: density that leaps, ties, magnitudes from one end to the other.
+inline std::vector<std::pair<std::string, points>> hard_clouds() {
+  std::vector<std::pair<std::string, points>> out;
+  random_bits random{11};
+  points nested;  // clusters within clusters
+  for (int i = 0; i != 900; ++i) {
+    const double scale = std::pow(2.0, -0.1 * i);
+    nested.emplace_back((vec3{random.uniform(), random.uniform(), random.uniform()} * scale).cast<float>());
+  }
+  out.push_back({"nested", nested});
+
+  points mixed = uniform_cloud(700, 12, 0.01);  // dense and thin, alternating along the curve
+  const points thin = uniform_cloud(150, 13, 1.0);
+  mixed.insert(mixed.end(), thin.begin(), thin.end());
+  out.push_back({"dense within thin", mixed});
+
+  points shell;  // all at almost the same distance from the one in the middle
+  for (int i = 0; i != 800; ++i) {
+    const vec3 v{random.normal(), random.normal(), random.normal()};
+    shell.emplace_back(v.normalized().cast<float>());
+  }
+  shell.emplace_back(0.0F, 0.0F, 0.0F);
+  out.push_back({"shell", shell});
+
+  points copies;  // many copies of few points, and few copies of many
+  for (int i = 0; i != 6; ++i) {
+    const vec3f p{0.1F * static_cast<float>(i), 0.0F, 0.0F};
+    copies.insert(copies.end(), 120, p);
+    copies.push_back(p + vec3f{1e-3F, 0.0F, 0.0F});
+  }
+  out.push_back({"copies", copies});
+
+  points line;
+  for (int i = 0; i != 600; ++i) line.emplace_back(static_cast<float>(i), 0.0F, 0.0F);
+  out.push_back({"even line", line});
+
+  points huge;  // squares overflow between, but not within clusters
+  for (int c = 0; c != 4; ++c) {
+    const points cluster = uniform_cloud(30, 14 + static_cast<std::uint64_t>(c), 1e17);
+    for (const vec3f& p : cluster) huge.push_back(p + vec3f{1e20F * static_cast<float>(c), 0.0F, 0.0F});
+  }
+  huge.emplace_back(3e38F, -3e38F, 3e38F);
+  out.push_back({"overflowing", huge});
+  return out;
+}
+
 }  // namespace orbis::test

@@ -85,7 +85,7 @@ TEST_CASE("copies too many are those that share a cell") {
   cloud.insert(cloud.end(), others.begin(), others.end());
   const leaf_hierarchy tree = make_leaves(orbis::seq, cloud, 51);
   CHECK(tree.left_out.size() == 949);
-  CHECK(tree.members.size() == 351);
+  CHECK(tree.in_leaves == 351);
   CHECK(tree.finite == 1300);
 }
 

@@ -25,52 +25,6 @@ namespace {
 
 constexpr std::array levels{level::portable, level::avx2, level::avx512};
 
-/// Clouds that are hard on guesses: density that leaps, ties, magnitudes from one end to the other.
-std::vector<std::pair<std::string, points>> hard_clouds() {
-  std::vector<std::pair<std::string, points>> out;
-  orbis::random_bits random{11};
-  points nested;  // clusters within clusters
-  for (int i = 0; i != 900; ++i) {
-    const double scale = std::pow(2.0, -0.1 * i);
-    nested.emplace_back((orbis::vec3{random.uniform(), random.uniform(), random.uniform()} * scale).cast<float>());
-  }
-  out.push_back({"nested", nested});
-
-  points mixed = orbis::test::uniform_cloud(700, 12, 0.01);  // dense and thin, alternating along the curve
-  const points thin = orbis::test::uniform_cloud(150, 13, 1.0);
-  mixed.insert(mixed.end(), thin.begin(), thin.end());
-  out.push_back({"dense within thin", mixed});
-
-  points shell;  // all at almost the same distance from the one in the middle
-  for (int i = 0; i != 800; ++i) {
-    const orbis::vec3 v{random.normal(), random.normal(), random.normal()};
-    shell.emplace_back(v.normalized().cast<float>());
-  }
-  shell.emplace_back(0.0F, 0.0F, 0.0F);
-  out.push_back({"shell", shell});
-
-  points copies;  // many copies of few points, and few copies of many
-  for (int i = 0; i != 6; ++i) {
-    const orbis::vec3f p{0.1F * static_cast<float>(i), 0.0F, 0.0F};
-    copies.insert(copies.end(), 120, p);
-    copies.push_back(p + orbis::vec3f{1e-3F, 0.0F, 0.0F});
-  }
-  out.push_back({"copies", copies});
-
-  points line;
-  for (int i = 0; i != 600; ++i) line.emplace_back(static_cast<float>(i), 0.0F, 0.0F);
-  out.push_back({"even line", line});
-
-  points huge;  // squares overflow between, but not within clusters
-  for (int c = 0; c != 4; ++c) {
-    const points cluster = orbis::test::uniform_cloud(30, 14 + static_cast<std::uint64_t>(c), 1e17);
-    for (const orbis::vec3f& p : cluster) huge.push_back(p + orbis::vec3f{1e20F * static_cast<float>(c), 0.0F, 0.0F});
-  }
-  huge.emplace_back(3e38F, -3e38F, 3e38F);
-  out.push_back({"overflowing", huge});
-  return out;
-}
-
 std::size_t differences(const std::vector<float>& found, const std::vector<float>& expected) {
   if (found.size() != expected.size()) return found.size() + expected.size();
   std::size_t different = 0;
@@ -85,7 +39,7 @@ std::size_t differences(const std::vector<float>& found, const std::vector<float
 
 TEST_CASE("mean distances equal brute force with every instruction set and number of threads") {
   auto clouds = orbis::test::all_clouds();
-  for (auto& hard : hard_clouds()) clouds.push_back(std::move(hard));
+  for (auto& hard : orbis::test::hard_clouds()) clouds.push_back(std::move(hard));
   for (const auto& [name, cloud] : clouds) {
     for (const std::size_t k : {1U, 2U, 15U, 16U, 50U, 200U}) {
       const auto expected = orbis::test::reference_mean_distances(cloud, k);
@@ -122,7 +76,7 @@ TEST_CASE("the nearest are the same where too many rows are near to be shared") 
     CHECK(largest_of_all(16) == expected);  // too many for some
     CHECK(largest_of_all(0) == expected);   // too many for all
     std::size_t wrong = 0;
-    for (std::size_t n = 0; n < tree.members.size(); n += 97) {
+    for (std::size_t n = 0; n < tree.in_leaves; n += 97) {
       const orbis::vec3f p = cloud[tree.members[n]];
       std::vector<float> all;
       for (const orbis::vec3f& q : cloud)

@@ -231,13 +231,14 @@ struct surplus_copy {
 struct leaf_hierarchy {
   std::vector<point_row> leaves;
   std::vector<std::vector<box_row>> levels;  ///< [0]: boxes of the leaves; the last one is a single row
-  std::vector<std::uint32_t> members;        ///< indices of the points, leaf after leaf
+  std::vector<std::uint32_t> members;        ///< indices of the points, leaf after leaf; the last one filled up with 0
   std::vector<surplus_copy> left_out;        ///< identical points beyond `most_copies`, in no leaf
+  std::size_t in_leaves = 0;                 ///< points that are in the leaves
   std::size_t finite = 0;                    ///< points that are in the leaves or left out
 
   /// How many points the leaf holds.
   [[nodiscard]] std::size_t size_of(std::size_t leaf) const noexcept {
-    return std::min(leaf_width, members.size() - leaf * leaf_width);
+    return std::min(leaf_width, in_leaves - leaf * leaf_width);
   }
 };
 
@@ -262,7 +263,9 @@ template <execution_policy Policy, point_range Points>
   out.finite = entries.size();
   std::size_t copies = 0;
   for (const auto& range : order.left_out()) copies += range.end - range.begin;
-  out.members.reserve(entries.size() - copies);
+  out.in_leaves = entries.size() - copies;
+  out.leaves.resize((out.in_leaves + leaf_width - 1) / leaf_width);
+  out.members.reserve(leaf_width * out.leaves.size());
   out.left_out.reserve(copies);
   std::size_t next = 0;
   const auto take = [&](std::size_t end) {
@@ -276,10 +279,10 @@ template <execution_policy Policy, point_range Points>
   take(entries.size());
   order.drop_entries();
   if (out.members.empty()) return out;
+  out.members.resize(leaf_width * out.leaves.size());
 
   constexpr float inf = std::numeric_limits<float>::infinity();
   const auto rows = [](std::size_t n) { return (n + leaf_width - 1) / leaf_width; };
-  out.leaves.resize(rows(out.members.size()));
   out.levels.emplace_back(rows(out.leaves.size()), empty_boxes());
   for_each_index(policy, out.leaves.size(), 1024, [&](std::size_t l) {
     point_row& leaf = out.leaves[l];

@@ -13,6 +13,7 @@
 #include <span>
 #include <vector>
 
+#include <orbis/cloud/detail/knn/few_nearest.hpp>
 #include <orbis/cloud/detail/knn/knn_kernels.hpp>
 #include <orbis/cloud/detail/knn/leaf_hierarchy.hpp>
 #include <orbis/cloud/detail/knn/line_vector.hpp>
@@ -114,7 +115,9 @@ class nearest_search {
         found_(leaf_width * stride_),
         places_(with_places ? leaf_width * stride_ : 0),
         hoped_{1.0F + 1.7F / std::sqrt(static_cast<float>(wanted))},
-        reach_{1.5F * hoped_} {}
+        reach_{1.5F * hoped_},
+        most_spread_{wanted <= most_few + 1 ? 128.0F : 32.0F},
+        spare_{wanted <= most_few + 1 ? 4.0F : 1.3F} {}
 
   /// Searches for the points of one leaf, then calls `f(i, found, bound)` for the i-th of them in any
   /// order. `found`: squared distances up to `bound`, the nearest among them; fewer than `wanted` where
@@ -122,7 +125,8 @@ class nearest_search {
   /// returns the `wanted`-th smallest. `places_of` tells which points they are.
   template <class F>
   void visit_leaf(std::size_t l, F&& f) {
-    search_leaf(l, [&](std::size_t first, std::size_t last) {
+    search_leaf(l, [&](std::size_t first, std::size_t last, const box3& box) {
+      search_run(l, first, last, box);
       for (std::size_t i = first; i != last; ++i) largest_[i] = f(i, found_of(i), bounds_[i]);
     });
   }
@@ -131,11 +135,47 @@ class nearest_search {
   template <class F>
   void visit_sums(std::size_t l, F&& f) {
     std::array<nearest_sum, leaf_width> sums;
-    search_leaf(l, [&](std::size_t first, std::size_t last) {
+    search_leaf(l, [&](std::size_t first, std::size_t last, const box3& box) {
+      search_run(l, first, last, box);
       kernels_.sums_of_each(found_.data(), stride_, first, last, counts_.data(), wanted_, bounds_.data(), sums.data());
       for (std::size_t i = first; i != last; ++i) {
         largest_[i] = counts_[i] < wanted_ ? infinity : sums[i].largest_squared;
         f(i, found_of(i), sums[i]);
+      }
+    });
+  }
+
+  /// Searches for the points of one leaf, all of them at once by `few`, a kernel as `few_nearest`, and calls
+  /// `found_few(rows, i)` for the i-th of them, in any order, where that found `Width` other points; `f` as
+  /// `visit_leaf` does for the others. @pre wanted == Width + 1
+  template <std::size_t Width, class FoundFew, class F>
+  void visit_few(std::size_t l, few_nearest_code<Width>* few, FoundFew&& found_few, F&& f) {
+    few_rows<Width> rows, alone;
+    const auto is_found = [](const few_rows<Width>& in, std::size_t i) {
+      return in.index[Width - 1][i] != few_rows<Width>::none;
+    };
+    search_leaf(l, [&](std::size_t first, std::size_t last, const box3& box) {
+      const float reach = std::min(usual_ * reach_, most);
+      const bool shared = share(l, box, reach);
+      if (!shared) shared_.count = 0;
+      few(*tree_, shared_, l, first, last, reach, rows);
+      for (std::size_t i = first; i != last; ++i) {
+        const few_rows<Width>* found = nullptr;
+        if (const float bound = rows.squared[Width - 1][i]; is_found(rows, i)) {
+          if (bound <= shared_reach_) {
+            found = &rows;
+          } else if (const std::array<float, 3> q = query(l, i); gather_own(l, {q, q}, bound)) {
+            few(*tree_, own_, l, i, i + 1, bound, alone);
+            if (is_found(alone, i)) found = &alone;
+          }
+        }
+        if (found != nullptr) {
+          largest_[i] = found->squared[Width - 1][i];
+          found_few(*found, i);
+        } else {
+          keep(i, search_alone(l, i));
+          largest_[i] = f(i, found_of(i), bounds_[i]);
+        }
       }
     });
   }
@@ -194,15 +234,15 @@ class nearest_search {
       grown.low[a] = std::min(box.low[a], p[a]);
       grown.high[a] = std::max(box.high[a], p[a]);
     }
-    if (squared_distance(grown.low, grown.high) > 32.0F * usual_) return false;
+    if (squared_distance(grown.low, grown.high) > most_spread_ * usual_) return false;
     box = grown;
     return true;
   }
 
   [[nodiscard]] std::span<float> found_of(std::size_t i) noexcept { return {found_.data() + i * stride_, counts_[i]}; }
 
-  /// Searches for the points of a leaf, run by run of points that share candidates: `f(first, last)`, which sets their
-  /// `largest_`.
+  /// Searches for the points of a leaf, run by run of points that share candidates: `f(first, last, box)`, where `box`
+  /// holds them, which sets their `largest_`.
   template <class F>
   void search_leaf(std::size_t l, F&& f) {
     const std::size_t size = tree_->size_of(l);
@@ -215,8 +255,7 @@ class nearest_search {
       box3 box{query(l, first), query(l, first)};
       std::size_t last = first + 1;
       while (last != size && grow(box, query(l, last))) ++last;
-      search_run(l, first, last, box);
-      f(first, last);
+      f(first, last, box);
       first = last;
     }
     // The median: an outlier says nothing about its neighbours.
@@ -227,8 +266,7 @@ class nearest_search {
   void search_run(std::size_t l, std::size_t first, std::size_t last, const box3& box) {
     const float hoped = std::min(usual_ * hoped_, most);
     const float reach = std::min(usual_ * reach_, most);
-    const bool shared = gather_shared(l, box, reach);
-    shared_reach_ = shared ? reach : -1.0F;
+    const bool shared = share(l, box, reach);
     const bool with_places = !places_.empty();
     if (shared)
       kernels_.near_points_of_each(tree_->leaves.data(), shared_, tree_->leaves[l], first, last, hoped, chosen_.data(),
@@ -238,10 +276,19 @@ class nearest_search {
       found_within result{shared ? counts_[i] : 0, hoped, with_places};
       if (shared && result.count < wanted_) result = search_near(shared_, l, i, reach);
       if (result.count < wanted_ || result.count > capacity_) result = search_alone(l, i);
-      counts_[i] = static_cast<std::uint32_t>(result.count);
-      bounds_[i] = result.bound;
-      has_places_[i] = result.has_places;
+      keep(i, result);
     }
+  }
+  void keep(std::size_t i, const found_within& result) noexcept {
+    counts_[i] = static_cast<std::uint32_t>(result.count);
+    bounds_[i] = result.bound;
+    has_places_[i] = result.has_places;
+  }
+  /// Gathers what the points within a box share, as far as `reach`, squared; false if that is too much.
+  [[nodiscard]] bool share(std::size_t l, const box3& box, float reach) {
+    const bool shared = gather_shared(l, box, reach);
+    shared_reach_ = shared ? reach : -1.0F;
+    return shared;
   }
   [[nodiscard]] found_within search_near(const nearby_leaves& near, std::size_t l, std::size_t i, float bound) {
     const point_row* const leaves = tree_->leaves.data();
@@ -257,19 +304,28 @@ class nearest_search {
   /// are.
   [[nodiscard]] bool gather_shared(std::size_t l, const box3& box, float bound) {
     if (!have_near_rows(l / leaf_width, bound)) return gather_near(*tree_, 0, kernels_, box, bound, open_, shared_);
-    shared_.count = 0;
+    return gather_rows(box, bound, shared_);
+  }
+  /// Gathers the leaves near a box within leaf `l` into `own_`.
+  [[nodiscard]] bool gather_own(std::size_t l, const box3& box, float bound) {
+    if (l / leaf_width == near_rows_of_ && bound <= near_rows_reach_) return gather_rows(box, bound, own_);
+    return gather_near(*tree_, 0, kernels_, box, bound, open_, own_);
+  }
+  /// Gathers the leaves near a box from the rows that are near.
+  [[nodiscard]] bool gather_rows(const box3& box, float bound, nearby_leaves& near) {
+    near.count = 0;
     std::array<float, leaf_width> distance;
     for (std::size_t first = 0; first < near_rows_.count; first += leaf_width) {
       std::uint32_t mask = kernels_.near_boxes(near_rows_.row(first), box, bound, distance.data());
       for (; mask != 0; mask &= mask - 1) {
-        if (!shared_.has_room()) return false;
-        const std::uint32_t near = near_rows_.leaves[first + static_cast<std::size_t>(std::countr_zero(mask))];
-        const box_row& boxes = tree_->levels[0][near];
+        if (!near.has_room()) return false;
+        const std::uint32_t row = near_rows_.leaves[first + static_cast<std::size_t>(std::countr_zero(mask))];
+        const box_row& boxes = tree_->levels[0][row];
         kernels_.gather(boxes, kernels_.near_boxes(boxes, box, bound, distance.data()),
-                        near * static_cast<std::uint32_t>(leaf_width), shared_);
+                        row * static_cast<std::uint32_t>(leaf_width), near);
       }
     }
-    shared_.finish();
+    near.finish();
     return true;
   }
 
@@ -278,9 +334,8 @@ class nearest_search {
     if (row == near_rows_of_ && bound <= near_rows_reach_) return true;
     if (tree_->levels.size() == 1 || (row == near_rows_of_ && bound >= too_many_rows_)) return false;
     const box3 box = tree_->levels[1][row / leaf_width].child(row % leaf_width);
-    constexpr float spare = 1.3F;  // for what the next leaves want
     near_rows_of_ = row;
-    near_rows_reach_ = std::min(spare * bound, most);
+    near_rows_reach_ = std::min(spare_ * bound, most);
     too_many_rows_ = infinity;
     if (gather_near(*tree_, 1, kernels_, box, near_rows_reach_, open_, near_rows_)) return true;
     near_rows_reach_ = -1.0F;
@@ -302,7 +357,7 @@ class nearest_search {
     if (result.count < wanted_) return search_outwards(q, found);
     std::fill_n(found + result.count, leaf_width, infinity);
     float bound = kernels_.sum_nearest(found, result.count, wanted_, most).largest_squared;
-    if (!gather_near(*tree_, 0, kernels_, {q, q}, bound, open_, own_)) return search_outwards(q, found);
+    if (!gather_own(l, {q, q}, bound)) return search_outwards(q, found);
     for (;;) {
       result = search_near(own_, l, i, bound);
       if (result.count <= capacity_) return result;
@@ -377,8 +432,11 @@ class nearest_search {
   std::array<float, leaf_width> bounds_{};
   std::array<bool, leaf_width> has_places_{};
   std::array<float, leaf_width> largest_{};  ///< the squared distance to the `wanted`-th nearest
-  float hoped_;              ///< what of `usual_` should suffice: its scatter falls with the number of neighbours
-  float reach_;              ///< what of `usual_` should suffice in any case
+  float hoped_;  ///< what of `usual_` should suffice: its scatter falls with the number of neighbours
+  float reach_;  ///< what of `usual_` should suffice in any case
+  // Of few neighbours the furthest is near beside the size of a leaf: what is a little further away is hardly more.
+  float most_spread_;        ///< squared, of points that share candidates, by `usual_`
+  float spare_;              ///< how much further than a leaf wants the rows near to it are looked for, squared
   float shared_reach_ = -1;  ///< squared distance from the run's box within which `shared_` is all there is
   float usual_ = -1;         ///< squared distance to the `wanted`-th nearest; negative where not known yet
 };

@@ -64,7 +64,7 @@ class neighbor_graph {
   }
 
   /// How many points there are, and how many neighbours each of them has.
-  [[nodiscard]] std::size_t size() const noexcept { return tree_.members.size() + tree_.left_out.size(); }
+  [[nodiscard]] std::size_t size() const noexcept { return tree_.in_leaves + tree_.left_out.size(); }
   [[nodiscard]] std::size_t width() const noexcept { return width_; }
   [[nodiscard]] const leaf_hierarchy& tree() const noexcept { return tree_; }
   /// Which point of the cloud has a place.
@@ -153,9 +153,9 @@ class neighbor_graph {
   static constexpr std::uint32_t leaf_bits = leaf_width;
   static_assert(leaf_width == 16, "four bits say which point of a leaf");
 
-  [[nodiscard]] bool is_in_leaf(std::size_t place) const noexcept { return place < tree_.members.size(); }
+  [[nodiscard]] bool is_in_leaf(std::size_t place) const noexcept { return place < tree_.in_leaves; }
   [[nodiscard]] const surplus_copy& copy(std::size_t place) const noexcept {
-    return tree_.left_out[place - tree_.members.size()];
+    return tree_.left_out[place - tree_.in_leaves];
   }
 
   /// Writes the rows of one leaf after the other: how many leaves are listed, these, and a code for each neighbour.

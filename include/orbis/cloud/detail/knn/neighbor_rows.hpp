@@ -39,30 +39,68 @@ inline float write_row(rank_sorter& gathered, std::uint32_t self, std::span<neig
   return last_squared;
 }
 
+/// Writes the i-th point's row of what `few_nearest` has found.
+template <std::size_t Width>
+void write_few(const few_rows<Width>& rows, std::size_t i, std::span<neighbor<float>> row) {
+  bool in_order = true;
+  for (std::size_t n = 0; n != Width; ++n) {
+    row[n] = {rows.index[n][i], std::sqrt(rows.squared[n][i])};
+    // Different squares can have the same root.
+    in_order = in_order && (n == 0 || row[n].distance != row[n - 1].distance || row[n].index > row[n - 1].index);
+  }
+  if (!in_order) std::sort(row.begin(), row.end(), nearest_sink<float>::less);
+}
+
+/// Writes the row of the i-th point of leaf `l` from what `search` has found for it: `found`, up to `bound`, squared.
+/// Returns the squared distance to the last. `gathered` is scratch.
+ORBIS_ALWAYS_INLINE float write_found(const leaf_hierarchy& tree, const knn_kernels& kernels, nearest_search& search,
+                                      rank_sorter& gathered, std::size_t l, std::size_t i, std::span<float> found,
+                                      float bound, std::span<neighbor<float>> row) {
+  const std::size_t wanted = row.size() + 1;  // with the point itself
+  const std::uint32_t self = tree.members[l * leaf_width + i];
+  if (const std::uint32_t* const places = search.places_of(i)) {
+    gathered.assign(found, places, tree.members.data());
+    return write_row(gathered, self, row);
+  }
+  const float largest = found.size() < wanted
+                            ? std::numeric_limits<float>::infinity()
+                            : kernels.sum_nearest(found.data(), found.size(), wanted, bound).largest_squared;
+  gathered.clear();
+  search.visit_within(l, i, largest, [&](std::uint32_t member, float d) { gathered.add(member, d); });
+  write_row(gathered, self, row);
+  return largest;
+}
+
 /// For the points of the leaves [begin, end), calls `row_of(l, i)` for the i-th point of leaf `l`, writes its `width`
 /// nearest other points, nearest first, into the span that this returns, and calls `done(l)` after each leaf.
 /// @pre 0 < width < points in the leaves
 template <class RowOf, class Done>
 void find_neighbor_rows(const leaf_hierarchy& tree, const knn_kernels& kernels, std::size_t width, std::size_t begin,
                         std::size_t end, RowOf&& row_of, Done&& done) {
-  const std::size_t wanted = width + 1;  // with the point itself
-  nearest_search search{tree, kernels, wanted, true};
+  nearest_search search{tree, kernels, width + 1, true};  // with the point itself
   rank_sorter gathered;
+  const auto write = [&](std::size_t l) {
+    return [&, l](std::size_t i, std::span<float> found, float bound) ORBIS_INLINE_LAMBDA {
+      return write_found(tree, kernels, search, gathered, l, i, found, bound, row_of(l, i));
+    };
+  };
+  const auto few = [&]<std::size_t Width>(few_nearest_code<Width>* kernel) {
+    for (std::size_t l = begin; l != end; ++l) {
+      const auto found_few = [&](const few_rows<Width>& rows, std::size_t i) { write_few(rows, i, row_of(l, i)); };
+      search.visit_few<Width>(l, kernel, found_few, write(l));
+      done(l);
+    }
+  };
+  static_assert(most_few == 4);
+  switch (width) {
+    case 1: return few(few_nearest_kernel<1>());
+    case 2: return few(few_nearest_kernel<2>());
+    case 3: return few(few_nearest_kernel<3>());
+    case 4: return few(few_nearest_kernel<4>());
+    default: break;
+  }
   for (std::size_t l = begin; l != end; ++l) {
-    search.visit_leaf(l, [&](std::size_t i, std::span<float> found, float bound) {
-      const std::uint32_t self = tree.members[l * leaf_width + i];
-      if (const std::uint32_t* const places = search.places_of(i)) {
-        gathered.assign(found, places, tree.members.data());
-        return write_row(gathered, self, row_of(l, i));
-      }
-      const float largest = found.size() < wanted
-                                ? std::numeric_limits<float>::infinity()
-                                : kernels.sum_nearest(found.data(), found.size(), wanted, bound).largest_squared;
-      gathered.clear();
-      search.visit_within(l, i, largest, [&](std::uint32_t member, float d) { gathered.add(member, d); });
-      write_row(gathered, self, row_of(l, i));
-      return largest;
-    });
+    search.visit_leaf(l, write(l));
     done(l);
   }
 }
