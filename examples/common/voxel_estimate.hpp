@@ -7,7 +7,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <cstdio>
+#include <optional>
 #include <string>
 
 #include <orbis/camera/intrinsics.hpp>
@@ -27,14 +29,19 @@ class voxel_estimate {
   [[nodiscard]] double voxels(double resolution) const {
     return std::min(16.0 * lengths_ / resolution, volume_ / (resolution * resolution * resolution));
   }
+  /// Of the octree, as measured where little of it can be pruned.
+  [[nodiscard]] double bytes(double resolution) const { return 8.0 * voxels(resolution); }
   [[nodiscard]] bool takes_long(double resolution) const { return voxels(resolution) >= 1e8; }
-  [[nodiscard]] bool is_too_large(double resolution) const { return voxels(resolution) >= 2e9; }
+  /// Whether they are more than anybody has use for, or do not fit into `memory` bytes (where that is known).
+  [[nodiscard]] bool is_too_large(double resolution, std::optional<std::uint64_t> memory) const {
+    return voxels(resolution) >= 2e9 || (memory && bytes(resolution) > static_cast<double>(*memory));
+  }
 
-  /// "voxels of 1 mm: `what` has about 2.3 billion of them".
+  /// "voxels of 1 mm: `what` has about 0.3 billion of them, 2.4 GB".
   [[nodiscard]] std::string in_words(double resolution, const std::string& what) const {
     char text[160];
-    std::snprintf(text, sizeof text, "voxels of %g mm: %s has about %.1f billion of them", 1000.0 * resolution,
-                  what.c_str(), 1e-9 * voxels(resolution));
+    std::snprintf(text, sizeof text, "voxels of %g mm: %s has about %.1f billion of them, %.1f GB", 1000.0 * resolution,
+                  what.c_str(), 1e-9 * voxels(resolution), 1e-9 * bytes(resolution));
     return text;
   }
 

@@ -12,6 +12,8 @@
 #include <orbis/io.hpp>
 #include <orbis/octree.hpp>
 
+#include "../common/memory.hpp"
+#include "../common/same_file.hpp"
 #include "../common/voxel_estimate.hpp"
 
 int complain(int code, const std::string& why) {
@@ -48,6 +50,9 @@ int main(int argc, char** argv) try {
   if (!(q.norm() > 1e-6 && orbis::vec3{p.data()}.norm() + q.norm() < 1e6)) return complain(1, "--pose: is no pose");
   if (!(resolution >= 1e-4 && resolution <= 1e3)) return complain(1, "--resolution: is not 0.0001 ... 1000");
   if (!(scale == 0.0 || (scale >= 1e-3 && scale <= 1e9))) return complain(1, "--scale: is not 0.001 ... 1e9");
+  for (const std::string& read : {input, camera_name})
+    if (examples::is_same_file(output, read)) return complain(1, examples::would_be_lost(output, read));
+  examples::limit_memory();
   const auto depth = orbis::io::read_depth(input);
   if (!depth) return complain(2, depth.error().to_string());
   const auto camera = camera_named(camera_name, depth->width(), depth->height());
@@ -57,7 +62,7 @@ int main(int argc, char** argv) try {
   const double units = scale > 0.0 ? scale : camera->depth_scale;
   const auto voxels =
       examples::voxels_of_depth(camera->model.k(), [&](std::size_t i) { return depth->pixels()[i] / units; });
-  if (voxels.is_too_large(resolution))
+  if (voxels.is_too_large(resolution, examples::free_memory()))
     return complain(2, "--resolution: " + voxels.in_words(resolution, "the image") + ", too many");
   if (voxels.takes_long(resolution))
     std::fprintf(stderr, "depth_to_octree: %s; this takes long\n", voxels.in_words(resolution, "the image").c_str());

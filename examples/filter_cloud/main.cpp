@@ -12,6 +12,9 @@
 #include <orbis/cloud.hpp>
 #include <orbis/io.hpp>
 
+#include "../common/near_origin.hpp"
+#include "../common/same_file.hpp"
+
 int complain(int code, const std::string& why) { return std::fprintf(stderr, "filter_cloud: %s\n", why.c_str()), code; }
 
 int main(int argc, char** argv) try {
@@ -37,11 +40,13 @@ int main(int argc, char** argv) try {
   }
   if (!(sigma >= 0 && sigma < 1e6)) return complain(1, "--sigma: is not 0 ... 1000000");
   if (voxel != 0 && !(voxel >= 1e-6 && voxel < 1e6)) return complain(1, "--voxel: is not 0, nor a micrometre or more");
-  const auto eye = xyz.empty() ? std::nullopt : std::optional{orbis::vec3{xyz.data()}};
+  auto eye = xyz.empty() ? std::nullopt : std::optional{orbis::vec3{xyz.data()}};
   if (eye ? !eye->allFinite() : filter == "range-statistical") return complain(1, "--origin: wants a finite place");
-  const auto read = orbis::io::read_cloud(input);
+  if (examples::is_same_file(output, input)) return complain(1, examples::would_be_lost(output, input));
+  const auto read = examples::read_near_origin(input);  // and written where it was
   if (!read) return complain(2, read.error().to_string());
-  const auto cloud = voxel > 0 ? voxel_grid(*read, {.size = voxel}) : *read;
+  if (eye) *eye -= read->origin;
+  const auto cloud = voxel > 0 ? voxel_grid(read->cloud, {.size = voxel}) : read->cloud;
   const auto& p = cloud.points;
   const auto finite = pass_through_inliers(p);
   if (finite.empty()) return complain(2, input + ": has no finite points");
@@ -54,8 +59,9 @@ int main(int argc, char** argv) try {
                     : filter == "cluster"           ? cluster_inliers(par, p, {k.value_or(12)})
                                           : (best = filter_automatically(par, p, {k.value_or(8), eye})).inliers;
   const auto why = filter == "auto" ? to_string(best.choice.chain) + ": " + best.choice.reason : filter;
-  if (auto ok = orbis::io::write_ply(output, extract(cloud, kept)); !ok) return complain(2, ok.error().to_string());
-  std::printf("%zu points, %zu to filter, %zu kept; %s\n", read->size(), finite.size(), kept.size(), why.c_str());
+  const orbis::io::ply_options options{.origin = read->origin};
+  if (auto ok = orbis::io::write_ply(output, cloud, kept, options); !ok) return complain(2, ok.error().to_string());
+  std::printf("%zu points, %zu to filter, %zu kept; %s\n", read->cloud.size(), finite.size(), kept.size(), why.c_str());
 } catch (const std::exception& e) {  // no memory, no threads
   return complain(2, std::string{"gave up: "} + e.what());
 }

@@ -6,6 +6,7 @@
 #include <malloc.h>
 #endif
 
+#include "../common/memory.hpp"
 #include "command_line.hpp"
 #include "commands.hpp"
 #include "interrupts.hpp"
@@ -19,6 +20,7 @@ void set_up_memory() {
   mallopt(M_MMAP_THRESHOLD, 1 << 20);
   mallopt(M_ARENA_MAX, 2);
 #endif
+  examples::limit_memory();
 }
 
 }  // namespace

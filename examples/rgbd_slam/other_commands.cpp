@@ -9,9 +9,10 @@
 #include <orbis/cloud/extract.hpp>
 #include <orbis/core/point.hpp>
 #include <orbis/core/trajectory.hpp>
-#include <orbis/io/cloud_file.hpp>
 #include <orbis/io/trajectory_file.hpp>
 
+#include "../common/memory.hpp"
+#include "../common/near_origin.hpp"
 #include "../common/voxel_estimate.hpp"
 #include "accuracy.hpp"
 #include "commands.hpp"
@@ -100,19 +101,6 @@ void keep_finite(orbis::point_cloud& cloud) {
   if (finite.size() != cloud.size()) cloud = orbis::cloud::extract(cloud, finite);
 }
 
-/// A point with half of the points on either side, along each axis: a few stray ones do not move it.
-orbis::vec3f middle_of(const std::vector<orbis::vec3f>& points) {
-  orbis::vec3f middle;
-  std::vector<float> along(points.size());
-  for (const int axis : {0, 1, 2}) {
-    std::transform(points.begin(), points.end(), along.begin(), [&](const orbis::vec3f& p) { return p[axis]; });
-    const auto half = along.begin() + static_cast<std::ptrdiff_t>(along.size() / 2);
-    std::nth_element(along.begin(), half, along.end());
-    middle[axis] = *half;
-  }
-  return middle;
-}
-
 /// Says when the octree's voxels are so small that the rays to the points take long, and refuses those that may fill
 /// gigabytes.
 orbis::result<void> check_resolution(const std::vector<orbis::vec3f>& points, const orbis::vec3& origin,
@@ -127,7 +115,7 @@ orbis::result<void> check_resolution(const std::vector<orbis::vec3f>& points, co
   rays.add(0.0, 4.0 / 3.0 * std::numbers::pi * longest * longest * longest);  // together at most a ball
   if (!rays.takes_long(s.resolution)) return {};
   const std::string text = rays.in_words(s.resolution, "the space before the points");
-  if (rays.is_too_large(s.resolution))
+  if (rays.is_too_large(s.resolution, examples::free_memory()))
     return orbis::fail(orbis::errc::invalid_argument, "--resolution", text + ", too many");
   console.warn(r.warnings.emplace_back(text + "; this takes long"));
   return {};
@@ -138,33 +126,29 @@ orbis::result<mapped> map_cloud_file(const settings& s, const std::filesystem::p
     return orbis::fail(orbis::errc::invalid_argument, s.input.string(),
                        "the filter ray-evidence wants a recording: a cloud has no depth images");
   console.stage("reading");
-  auto cloud = orbis::io::read_cloud(s.input);
-  if (!cloud) return orbis::fail(cloud.error());
-  const std::size_t in_file = cloud->size();
-  keep_finite(*cloud);
-  const orbis::vec3 origin =
-      cloud->empty() ? orbis::vec3::Zero() : nearby_origin(middle_of(cloud->points).cast<double>());
-  if (!origin.isZero()) {
-    cloud = orbis::io::read_cloud(s.input, origin);
-    if (!cloud) return orbis::fail(cloud.error());
-    keep_finite(*cloud);
-  }
-  if (cloud->empty()) return orbis::fail(orbis::errc::no_data, s.input.string(), "the cloud has no finite points");
+  auto read = examples::read_near_origin(s.input);
+  if (!read) return orbis::fail(read.error());
+  const orbis::vec3 origin = read->origin;
+  orbis::point_cloud& cloud = read->cloud;
+  const std::size_t in_file = cloud.size();
+  keep_finite(cloud);
+  if (cloud.empty()) return orbis::fail(orbis::errc::no_data, s.input.string(), "the cloud has no finite points");
   const std::string name = s.input.filename().string();
   const std::string left_out =
-      in_file == cloud->size() ? "" : ", " + count_text(in_file - cloud->size()) + " without coordinates left out";
-  console.finish(name + ": " + count_text(cloud->size()) + " points" + left_out);
+      in_file == cloud.size() ? "" : ", " + count_text(in_file - cloud.size()) + " without coordinates left out";
+  console.finish(name + ": " + count_text(cloud.size()) + " points" + left_out);
   results r = begin_results(s, name, nullptr, folder);
-  r.setup.emplace_back("points", count_text(cloud->size()) + left_out);
+  r.setup.emplace_back("points", count_text(cloud.size()) + left_out);
   r.truth_note = "A cloud, without SLAM.";
   settings moved = s;
+  r.origin = origin;
   if (!origin.isZero()) console.warn(r.warnings.emplace_back(origin_note(origin)));
   if (moved.origin) {
     *moved.origin -= origin;
-    if (auto fine = check_resolution(cloud->points, *moved.origin, s, r, console); !fine)
+    if (auto fine = check_resolution(cloud.points, *moved.origin, s, r, console); !fine)
       return orbis::fail(fine.error());
   }
-  return mapped{std::move(r), map_cloud(*std::move(cloud), moved, console), {}};
+  return mapped{std::move(r), map_cloud(std::move(cloud), moved, console), {}};
 }
 
 }  // namespace

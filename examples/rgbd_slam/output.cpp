@@ -47,6 +47,7 @@ results begin_results(const settings& s, const std::string& title, const frame_s
     return std::string{buffer};
   };
   if (source != nullptr) {
+    r.origin = source->origin;
     const auto& camera = source->camera;
     const auto& k = camera.model.k();
     r.setup.emplace_back("input", source->kind);

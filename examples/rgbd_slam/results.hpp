@@ -144,6 +144,7 @@ struct results {
   std::vector<std::string> files, files_of_earlier_runs;   ///< names of what is in `out` in the end
   std::vector<std::pair<std::string, std::string>> setup;  ///< what was used, in words
   std::optional<world_results> world;                      ///< empty: that of a cloud, which nobody turned
+  orbis::vec3 origin = orbis::vec3::Zero();                ///< of the results in coordinates of the input, metres
   std::optional<slam_results> slam;
   std::optional<live_results> live;
   std::optional<map_results> map;

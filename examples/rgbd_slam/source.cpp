@@ -16,6 +16,8 @@
 #include <orbis/io/stereo_recording.hpp>
 #include <orbis/io/synthetic.hpp>
 
+#include "../common/memory.hpp"
+#include "../common/near_origin.hpp"
 #include "../common/voxel_estimate.hpp"
 #include "background.hpp"
 #include "inputs/file_recording.hpp"
@@ -65,10 +67,11 @@ source_frame with_right(orbis::camera::stereo_frame pair) {
 orbis::vec3 take_origin_off(frame_source& source) {
   const orbis::vec3 origin = source.ground_truth.empty()
                                  ? orbis::vec3::Zero()
-                                 : nearby_origin(source.ground_truth.front().T_world_camera.translation());
+                                 : examples::nearby_origin(source.ground_truth.front().T_world_camera.translation());
   for (orbis::stamped_pose& p : source.ground_truth)
     p.T_world_camera = {p.T_world_camera.rotation(), p.T_world_camera.translation() - origin};
   if (!origin.isZero()) source.notes.push_back(origin_note(origin));
+  source.origin = origin;
   return origin;
 }
 
@@ -351,7 +354,7 @@ frame_source make_synthetic(const settings& s) {
 }
 
 /// Says when the octree's voxels are so small that a frame takes seconds, and refuses those of which one frame alone
-/// may fill gigabytes. The first frame stands for all.
+/// may fill the memory. The first frame stands for all; if further ones fill it, the program gives up (`limit_memory`).
 result<void> check_resolution(frame_source& source, const settings& s) {
   const orbis::camera::intrinsics& k = source.camera.model.k();
   if (source.frames == 0 || source.is_monocular() || source.is_live) return {};  // a camera's frames are seen once
@@ -367,7 +370,7 @@ result<void> check_resolution(frame_source& source, const settings& s) {
   });
   if (!voxels.takes_long(s.resolution)) return {};
   const std::string text = voxels.in_words(s.resolution, "the first frame alone");
-  if (voxels.is_too_large(s.resolution))
+  if (voxels.is_too_large(s.resolution, examples::free_memory()))
     return fail(orbis::errc::invalid_argument, "--resolution", text + ", too many");
   source.notes.push_back(text + "; this takes long");
   return {};
@@ -381,12 +384,6 @@ std::string describe(const frame_source& source) {
 }
 
 }  // namespace
-
-orbis::vec3 nearby_origin(const orbis::vec3& place) {
-  constexpr double far = 1000.0;
-  if (!place.allFinite() || place.cwiseAbs().maxCoeff() < far) return orbis::vec3::Zero();
-  return place.array().round();
-}
 
 std::string origin_note(const orbis::vec3& origin) {
   char text[1200];  // doubles may have 309 digits

@@ -53,6 +53,7 @@ struct frame_source {
   bool made = false;  ///< frames are rendered or come from a camera: to keep them is cheaper than to ask once more
   /// Frees what the making of frames needs; it is there again when a frame is asked for. Empty: nothing is.
   std::function<void()> rest;
+  orbis::vec3 origin = orbis::vec3::Zero();  ///< taken off all positions, metres
   orbis::trajectory ground_truth;            ///< empty if not known
   std::vector<std::filesystem::path> files;  ///< that it is read from
   std::vector<std::string> notes;            ///< worth a warning
@@ -60,10 +61,7 @@ struct frame_source {
   std::function<double(const orbis::vec3&)> surface_distance;
 };
 
-/// Where the results' world begins in coordinates as maps of the earth have them, metres: a place with whole numbers at
-/// `place`, or zero where `place` is so near to the origin that floats and octrees do for it.
-[[nodiscard]] orbis::vec3 nearby_origin(const orbis::vec3& place);
-/// What a user is told about it.
+/// What a user is told about an origin that was taken off.
 [[nodiscard]] std::string origin_note(const orbis::vec3& origin);
 
 /// The recording that the settings name; says what it is.

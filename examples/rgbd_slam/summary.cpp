@@ -93,7 +93,9 @@ std::string summary_json(const results& r) {
                                {"last_timestamp", poses.back().timestamp}});
   }
   const auto& w = r.world;
-  j["world"] = {{"up_from", w ? json(w->up_from) : null}, {"confidence", w ? or_null(w->confidence) : null}};
+  j["world"] = {{"up_from", w ? json(w->up_from) : null},
+                {"confidence", w ? or_null(w->confidence) : null},
+                {"origin_m", {r.origin.x(), r.origin.y(), r.origin.z()}}};
   j["scale"] = a ? json(a->scale) : null;
   j["ate_rmse_m"] = a ? json(a->ate_rmse_m) : null;
   j["rpe_trans_rmse_m"] = a ? or_null(a->rpe_trans_rmse_m) : null;

@@ -8,6 +8,7 @@
 #include <fstream>
 #include <string>
 #include <string_view>
+#include <system_error>
 
 #include <orbis/core/result.hpp>
 #include <orbis/places/vocabulary.hpp>
@@ -25,6 +26,9 @@ using namespace orbis::places;
 /// Errors: not_found, unreadable, malformed, unsupported (gzip among them).
 template <std::size_t Bits = 256>
 [[nodiscard]] result<basic_vocabulary<Bits>> load_vocabulary(const std::filesystem::path& path) {
+  if (std::error_code ignored;
+      std::filesystem::exists(path, ignored) && !std::filesystem::is_regular_file(path, ignored))
+    return fail(errc::unreadable, path.string(), "is not a regular file");  // a pipe may wait for ever
   char head[8] = {};
   std::ifstream in{path, std::ios::binary};
   in.read(head, sizeof head);

@@ -22,6 +22,7 @@
 #include <orbis/core/file.hpp>
 #include <orbis/places.hpp>
 
+#include "../common/same_file.hpp"
 #include "load_vocabulary.hpp"
 #include "recall.hpp"
 #include "sources.hpp"
@@ -94,6 +95,7 @@ int train(const settings& s) {
 }
 
 int convert(const settings& s) {
+  if (examples::is_same_file(s.output, s.input)) return complain(1, examples::would_be_lost(s.output, s.input));
   const auto words = dbow::load_vocabulary(s.input);
   if (!words) return complain(2, words.error().to_string());
   return write(s, *words, "///     train_vocabulary convert\n");

@@ -68,6 +68,26 @@ TEST_CASE("the neighbours of all points are those that brute force finds, ties b
   }
 }
 
+TEST_CASE("the neighbours are the same where too many leaves are near to be shared") {
+  points cloud = orbis::test::uniform_cloud(9'000, 21, 1.0);
+  const points far = orbis::test::uniform_cloud(60, 22, 200.0);
+  cloud.insert(cloud.end(), far.begin(), far.end());
+  using orbis::simd::level;
+  for (const level l : {level::portable, level::avx2, level::avx512}) {
+    const orbis::simd::level_limit limit{l};
+    for (const std::size_t k : {1U, 2U, 3U, 4U, 9U}) {
+      INFO("k " << k << " level " << static_cast<int>(l));
+      const neighbor_table found = orbis::cloud::all_knn(orbis::seq, cloud, k);
+      std::size_t different = 0;
+      for (std::size_t i = 0; i < cloud.size(); i += i < 9'000 ? 97 : 1) {
+        const auto expected = reference_neighbors(cloud, i, k);
+        different += std::equal(found[i].begin(), found[i].end(), expected.begin(), expected.end()) ? 0 : 1;
+      }
+      CHECK(different == 0);
+    }
+  }
+}
+
 TEST_CASE("neighbours come in plain metres, identical points among them") {
   const std::vector<orbis::vec3> cloud{{0, 0, 0}, {0, 3, 4}, {0, 0, 0}, {0, 0, 10}};
   const neighbor_table found = orbis::cloud::all_knn(orbis::seq, cloud, 2);

@@ -36,6 +36,9 @@ enum class ply_encoding { ascii, binary };  ///< binary: little-endian
 
 struct ply_options {
   ply_encoding encoding = ply_encoding::binary;
+  /// Added to the coordinates as they are written, metres: what `parse_ply` took off. If it is not zero they are
+  /// written as double.
+  vec3 origin = vec3::Zero();
 };
 
 /// The vertices of a PLY file in memory: `x y z` of any type and, where they are there, `red green
@@ -114,11 +117,13 @@ template <class Point, class Color>
 result<void> write_ply_vertices(const std::filesystem::path& path, std::size_t count, bool colored, const Point& point,
                                 const Color& color, const ply_options& options) {
   const bool binary = options.encoding == ply_encoding::binary;
+  const bool far = !options.origin.isZero();
+  const std::string axis = far ? "\nproperty double " : "\nproperty float ";
   return write_file_atomically(path, [&](std::ostream& out) {
-    std::string bytes =
-        std::string{"ply\nformat "} + (binary ? "binary_little_endian" : "ascii") + " 1.0\nelement vertex " +
-        std::to_string(count) + "\nproperty float x\nproperty float y\nproperty float z\n" +
-        (colored ? "property uchar red\nproperty uchar green\nproperty uchar blue\n" : "") + "end_header\n";
+    std::string bytes = std::string{"ply\nformat "} + (binary ? "binary_little_endian" : "ascii") +
+                        " 1.0\nelement vertex " + std::to_string(count) + axis + "x" + axis + "y" + axis + "z\n" +
+                        (colored ? "property uchar red\nproperty uchar green\nproperty uchar blue\n" : "") +
+                        "end_header\n";
     const auto flush = [&] {
       out.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
       bytes.clear();
@@ -128,16 +133,23 @@ result<void> write_ply_vertices(const std::filesystem::path& path, std::size_t c
     for (std::size_t i = 0; i != count; ++i) {
       const std::array<float, 3> xyz = point(i);
       const rgb8 c = colored ? color(i) : rgb8{};
+      const auto for_each_coordinate = [&](const auto& f) {
+        for (std::size_t a = 0; a != 3; ++a)
+          if (far)
+            f(double{xyz[a]} + options.origin[static_cast<int>(a)]);
+          else
+            f(xyz[a]);
+      };
       if (binary) {
-        for (const float v : xyz) append_little_endian(bytes, v);
+        for_each_coordinate([&](auto v) { append_little_endian(bytes, v); });
         if (colored)
           for (const std::uint8_t v : {c.r, c.g, c.b}) append_little_endian(bytes, v);
       } else {
         char buffer[64];
-        for (const float v : xyz) {
+        for_each_coordinate([&](auto v) {
           bytes.append(buffer, std::to_chars(buffer, buffer + sizeof buffer, v).ptr);
           bytes += ' ';
-        }
+        });
         if (colored)
           for (const unsigned v : {c.r, c.g, c.b}) bytes += std::to_string(v) + ' ';
         bytes.back() = '\n';

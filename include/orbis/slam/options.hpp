@@ -181,7 +181,9 @@ struct thread_options {
   /// adjustment have one thread each, and `track` returns as soon as the pose is known.
   bool enabled = false;
   std::size_t max_waiting = 3;  ///< keyframes that may wait for mapping; with so many no further one is made, ...
-  bool wait = false;            ///< ... or `track` waits: for recordings, which must not outrun the mapping
+  /// ... or `track` waits: for recordings, which must not outrun the mapping. Otherwise an adjustment also ends early
+  /// where a keyframe waits.
+  bool wait = false;
 };
 
 /// `options::bf` of a depth camera that triangulates: focal length (pixels) and distance of projector and camera

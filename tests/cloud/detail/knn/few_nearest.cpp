@@ -41,7 +41,10 @@ template <std::size_t Width>
 tally compare(const orbis::test::points& cloud, std::uint64_t seed) {
   constexpr float most = std::numeric_limits<float>::max();
   // As `all_knn` does, of identical points no more than there is use for.
-  const leaf_hierarchy tree = make_leaves(orbis::seq, cloud, Width + 1);
+  leaf_hierarchy tree = make_leaves(orbis::seq, cloud, Width + 1);
+  // Indices as of a cloud of up to 2^32 points, in the same order.
+  const auto spread = (few_rows<Width>::none - 1) / static_cast<std::uint32_t>(std::max<std::size_t>(cloud.size(), 1));
+  for (std::uint32_t& index : tree.members) index *= spread;
   const knn_kernels kernels;
   orbis::random_bits random{seed};
   tally seen;
@@ -50,7 +53,7 @@ tally compare(const orbis::test::points& cloud, std::uint64_t seed) {
     const std::size_t size = tree.size_of(l);
     const std::size_t first = random.below(static_cast<std::uint32_t>(size));
     const std::size_t last = first + 1 + random.below(static_cast<std::uint32_t>(size - first));
-    const auto nearest = others_of(cloud, tree.members[l * leaf_width + first]);
+    const auto nearest = others_of(cloud, tree.members[l * leaf_width + first] / spread);
     float bound = most;
     if (random.below(4) != 0 && !nearest.empty())
       bound = nearest[random.below(static_cast<std::uint32_t>(std::min<std::size_t>(nearest.size(), 12)))].first;
@@ -65,7 +68,7 @@ tally compare(const orbis::test::points& cloud, std::uint64_t seed) {
     few_rows<Width> rows;
     few_nearest_kernel<Width>()(tree, near, l, first, last, bound, rows);
     for (std::size_t i = first; i != last; ++i) {
-      const std::uint32_t self = tree.members[l * leaf_width + i];
+      const std::uint32_t self = tree.members[l * leaf_width + i] / spread;
       const auto expected = others_of(cloud, self);
       const float furthest = rows.squared[Width - 1][i];
       if (rows.index[Width - 1][i] == few_rows<Width>::none) {
@@ -74,12 +77,13 @@ tally compare(const orbis::test::points& cloud, std::uint64_t seed) {
         ++seen.right;
         for (std::size_t n = 0; n != Width; ++n) {
           CHECK(rows.squared[n][i] == expected[n].first);
-          CHECK(rows.index[n][i] == expected[n].second);
+          CHECK(rows.index[n][i] == expected[n].second * spread);
         }
       } else {
         ++seen.beyond;
         for (std::size_t n = 0; n != Width; ++n) {
-          const std::uint32_t other = rows.index[n][i];
+          const std::uint32_t other = rows.index[n][i] / spread;
+          REQUIRE(other < cloud.size());
           CHECK(rows.squared[n][i] == orbis::test::squared(cloud[self], cloud[other]));
           CHECK(rows.squared[n][i] >= expected[n].first);
         }

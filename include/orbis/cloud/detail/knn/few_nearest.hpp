@@ -16,8 +16,12 @@
 
 namespace orbis::cloud::detail {
 
-/// Up to so many neighbours `few_nearest` is faster than choosing among candidates, point by point.
+/// Up to how many neighbours `few_nearest` is faster than choosing among candidates, point by point: a longer row pays
+/// with as many lanes as a leaf has points.
 inline constexpr std::size_t most_few = 4;
+[[nodiscard]] inline bool is_few(std::size_t neighbors) noexcept {
+  return neighbors <= (simd::best_level() == simd::level::avx512 ? most_few : 2);
+}
 
 /// The `Width` nearest other points of each point of a leaf: in row n the squared distances to the n-th nearest, and
 /// their indices.
@@ -31,10 +35,10 @@ struct few_rows {
 /// Fills `out` for the points [first, last) of leaf `l` from it and from the leaves of `near` within `bound`, squared.
 /// Where the last of a row is within `bound`, too, the row is right if `near` has all leaves within `bound` of the
 /// point; otherwise its distances are not less than they should be. Those at equal squared distances are in the order
-/// of their indices. `none` as the last index: the leaf has too few points, or squared distances overflow, or too many
+/// of their indices. `none` as the last index: there are too few points, or squared distances overflow, or too many
 /// points are as near.
 ///
-/// Three passes: the neighbours within the leaf itself, where the lanes are its points, which costs 16 (6 + 7 Width)
+/// Three passes: the neighbours within the leaf itself, where the lanes are its points, which costs 16 (8 + 9 Width)
 /// operations for as many points as there are lanes; what is as near in other leaves, point by point, where the lanes
 /// are those of the other leaf; and that is put into the rows as in the first pass.
 template <std::size_t Width>
@@ -55,11 +59,11 @@ struct few_nearest {
       rows.add_own(tree, l, at);
       rows.store(out, at);
     });
-    as_near others;
+    candidates others;
     std::array<std::int32_t, leaf_width> counts{};
     for (std::size_t i = first; i != last; ++i) {
       counts[i] = others.template find<Target>(tree, near, l, i, std::min(bound, out.squared[Width - 1][i]));
-      if (counts[i] <= as_near::most) continue;
+      if (counts[i] <= candidates::most) continue;
       counts[i] = 0;
       out.index[Width - 1][i] = few_rows<Width>::none;
     }
@@ -76,9 +80,9 @@ struct few_nearest {
   static constexpr float infinity = std::numeric_limits<float>::infinity();
 
   /// For each point of a leaf the points of others that are as near as the last of its row.
-  struct as_near {
+  struct candidates {
     static constexpr std::int32_t most = 3 * leaf_width;
-    static constexpr std::size_t stride = most + 2 * leaf_width;  // written beyond the last
+    static constexpr std::size_t stride = most + 2 * leaf_width;  // one is written beyond the last, one parts the rows
     alignas(64) std::array<float, leaf_width * stride> squared;
     alignas(64) std::array<std::uint32_t, leaf_width * stride> index;
 
@@ -97,7 +101,8 @@ struct few_nearest {
       for (std::size_t begin = 0; begin < near.count; begin += lanes::count) {
         const auto boxes = (box_distances(near.row(0), begin, q, q) <= border) &
                            (numbers::load(near.leaves.data() + begin) != numbers(static_cast<std::uint32_t>(l)));
-        for (std::uint32_t rest = simd::bits(boxes); rest != 0 && count <= most; rest &= rest - 1) {
+        for (std::uint32_t rest = simd::bits(boxes); rest != 0; rest &= rest - 1) {
+          if (count > most) return count;
           const std::size_t other = near.leaves[begin + static_cast<std::size_t>(std::countr_zero(rest))];
           const std::uint32_t* const members = tree.members.data() + other * leaf_width;
           for (std::size_t at = 0; at != leaf_width; at += lanes::count) {
@@ -125,7 +130,7 @@ struct few_nearest {
     std::array<lanes, Width> squared;
     std::array<numbers, Width> index;
 
-    /// Empty rows; those that are not active stay so, as nothing is nearer than less than nothing.
+    /// Empty rows; those that are not active stay so: -1 is less than any squared distance.
     explicit ORBIS_ALWAYS_INLINE sorted_rows(const mask& active) noexcept {
       squared.fill(select(active, lanes(std::numeric_limits<float>::max()), lanes(-1.0F)));
       index.fill(numbers(static_cast<std::int32_t>(few_rows<Width>::none ^ sign)));
@@ -151,12 +156,12 @@ struct few_nearest {
         insert(select(self, lanes(infinity), d), numbers(static_cast<std::int32_t>(members[i] ^ sign)));
       }
     }
-    ORBIS_ALWAYS_INLINE void add(const as_near& others, const std::array<std::int32_t, leaf_width>& counts,
+    ORBIS_ALWAYS_INLINE void add(const candidates& others, const std::array<std::int32_t, leaf_width>& counts,
                                  std::size_t at) noexcept {
       const numbers number = numbers::load(counts.data() + at);
       const std::int32_t columns = simd::greatest(number);
       const numbers begin = (numbers::iota() + numbers(static_cast<std::int32_t>(at))) *
-                            numbers(static_cast<std::int32_t>(as_near::stride));
+                            numbers(static_cast<std::int32_t>(candidates::stride));
       for (std::int32_t i = 0; i < columns; ++i) {
         const mask there = numbers(i) < number;
         const lanes d = simd::gather(others.squared.data() + i, begin, there, lanes(infinity));

@@ -264,8 +264,8 @@ template <execution_policy Policy, point_range Points>
   std::size_t copies = 0;
   for (const auto& range : order.left_out()) copies += range.end - range.begin;
   out.in_leaves = entries.size() - copies;
-  out.leaves.resize((out.in_leaves + leaf_width - 1) / leaf_width);
-  out.members.reserve(leaf_width * out.leaves.size());
+  const std::size_t leaves = (out.in_leaves + leaf_width - 1) / leaf_width;
+  out.members.reserve(leaf_width * leaves);
   out.left_out.reserve(copies);
   std::size_t next = 0;
   const auto take = [&](std::size_t end) {
@@ -279,7 +279,8 @@ template <execution_policy Policy, point_range Points>
   take(entries.size());
   order.drop_entries();
   if (out.members.empty()) return out;
-  out.members.resize(leaf_width * out.leaves.size());
+  out.members.resize(leaf_width * leaves);
+  out.leaves.resize(leaves);
 
   constexpr float inf = std::numeric_limits<float>::infinity();
   const auto rows = [](std::size_t n) { return (n + leaf_width - 1) / leaf_width; };

@@ -116,8 +116,8 @@ class nearest_search {
         places_(with_places ? leaf_width * stride_ : 0),
         hoped_{1.0F + 1.7F / std::sqrt(static_cast<float>(wanted))},
         reach_{1.5F * hoped_},
-        most_spread_{wanted <= most_few + 1 ? 128.0F : 32.0F},
-        spare_{wanted <= most_few + 1 ? 4.0F : 1.3F} {}
+        most_spread_{with_places && is_few(wanted - 1) ? 128.0F : 32.0F},
+        spare_{with_places && is_few(wanted - 1) ? 4.0F : 1.3F} {}
 
   /// Searches for the points of one leaf, then calls `f(i, found, bound)` for the i-th of them in any
   /// order. `found`: squared distances up to `bound`, the nearest among them; fewer than `wanted` where
@@ -156,8 +156,7 @@ class nearest_search {
     };
     search_leaf(l, [&](std::size_t first, std::size_t last, const box3& box) {
       const float reach = std::min(usual_ * reach_, most);
-      const bool shared = share(l, box, reach);
-      if (!shared) shared_.count = 0;
+      share(l, box, reach);
       few(*tree_, shared_, l, first, last, reach, rows);
       for (std::size_t i = first; i != last; ++i) {
         const few_rows<Width>* found = nullptr;
@@ -284,10 +283,11 @@ class nearest_search {
     bounds_[i] = result.bound;
     has_places_[i] = result.has_places;
   }
-  /// Gathers what the points within a box share, as far as `reach`, squared; false if that is too much.
-  [[nodiscard]] bool share(std::size_t l, const box3& box, float reach) {
+  /// Gathers what the points within a box share, as far as `reach`, squared; nothing, and false, if that is too much.
+  bool share(std::size_t l, const box3& box, float reach) {
     const bool shared = gather_shared(l, box, reach);
     shared_reach_ = shared ? reach : -1.0F;
+    if (!shared) shared_.count = 0;  // not some of them
     return shared;
   }
   [[nodiscard]] found_within search_near(const nearby_leaves& near, std::size_t l, std::size_t i, float bound) {
@@ -421,7 +421,7 @@ class nearest_search {
   nearby_leaves near_rows_;  ///< rows of leaves that are near to one of them, ...
   std::size_t near_rows_of_ = std::numeric_limits<std::size_t>::max();  ///< ... this one; none at first
   float near_rows_reach_ = -1;      ///< how far, squared; negative where it is not known
-  float too_many_rows_ = infinity;  ///< the squared distance within which that row has too many
+  float too_many_rows_ = infinity;  ///< asked for so far, squared, that row had too many
   line_vector<std::uint32_t> chosen_;
   line_vector<float> found_;
   line_vector<std::uint32_t> places_;  ///< of what was found; empty where nobody asks

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The neighbours of the points of some leaves, one point after the other.
+/// The neighbours of the points of some leaves, as rows of a table.
 #pragma once
 
 #include <algorithm>
@@ -92,7 +92,7 @@ void find_neighbor_rows(const leaf_hierarchy& tree, const knn_kernels& kernels, 
     }
   };
   static_assert(most_few == 4);
-  switch (width) {
+  switch (is_few(width) ? width : 0) {
     case 1: return few(few_nearest_kernel<1>());
     case 2: return few(few_nearest_kernel<2>());
     case 3: return few(few_nearest_kernel<3>());

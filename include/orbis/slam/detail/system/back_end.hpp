@@ -62,7 +62,8 @@ back_end<Camera, D, Places>::back_end(shared_state<Camera, D, Places>& shared)
     if (closer_.close(k)) global_->push_once(shared_.locked([&] { return shared_.atlas.current(k).map; }));
   });
   mapping_ = std::make_unique<worker<map_keyframe>>([this](map_keyframe k) {
-    mapper_.process(k, [this] { return mapping_->waiting() != 0; });
+    // Where frames wait for the mapping, the load of the machine decides about time, not about the map.
+    mapper_.process(k, [this] { return !shared_.settings.threads.wait && mapping_->waiting() != 0; });
     loops_->wait_for_room(most_waiting());
     loops_->push(k);
   });

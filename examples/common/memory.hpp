@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// How much memory there is, so that a program that wants more than that ends with a message, and not the machine.
+#pragma once
+
+#include <algorithm>
+#include <charconv>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <system_error>
+
+#ifdef __linux__
+#include <sys/resource.h>
+#include <unistd.h>
+#endif
+
+#include <orbis/core/file.hpp>
+
+namespace examples {
+
+/// The first whole number in `text` after `label`; nullopt where there is none. What does not fit is the largest.
+[[nodiscard]] inline std::optional<std::uint64_t> number_after(std::string_view text, std::string_view label) {
+  const std::size_t at = text.find(label);
+  if (at == text.npos) return std::nullopt;
+  text.remove_prefix(at + label.size());
+  text.remove_prefix(std::min(text.find_first_not_of(" \t"), text.size()));
+  std::uint64_t number = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  if (error == std::errc::result_out_of_range) return ~std::uint64_t{0};
+  if (error != std::errc{}) return std::nullopt;
+  return number;
+}
+
+/// What a control group says of itself; empty where it has none.
+struct memory_group {
+  std::string limit;  ///< bytes, or a word where there is none
+  std::string use;    ///< bytes, with files that are kept for the next time
+  std::string stat;   ///< numbers with names, among them those of such files
+};
+
+/// Bytes that may still be taken, by the text of /proc/meminfo and a control group; nullopt where the first does not
+/// say.
+[[nodiscard]] inline std::optional<std::uint64_t> free_memory(std::string_view meminfo, const memory_group& group) {
+  const auto available = number_after(meminfo, "MemAvailable:");  // kB
+  if (!available) return std::nullopt;
+  const std::uint64_t bytes = *available * 1024;
+  const auto limit = number_after(group.limit, "");
+  if (!limit) return bytes;
+  const std::string stat = "\n" + group.stat;
+  const std::uint64_t used = number_after(group.use, "").value_or(0);
+  const std::uint64_t files =
+      number_after(stat, "\ninactive_file ").value_or(0) +  // given back when they are in the way
+      number_after(stat, "\nactive_file ").value_or(0);
+  const std::uint64_t taken = used - std::min(used, files);
+  return std::min(bytes, *limit - std::min(*limit, taken));
+}
+
+/// The same of this system, with the control group of a container.
+[[nodiscard]] inline std::optional<std::uint64_t> free_memory() {
+  const auto text = [](const std::string& path) { return orbis::read_file(path, 65536).value_or(std::string{}); };
+  const std::string folder = "/sys/fs/cgroup/";
+  memory_group group{text(folder + "memory.max"), text(folder + "memory.current"), text(folder + "memory.stat")};
+  if (group.limit.empty()) {  // the first version
+    const std::string first = folder + "memory/memory.";
+    group = {text(first + "limit_in_bytes"), text(first + "usage_in_bytes"), text(first + "stat")};
+  }
+  return free_memory(text("/proc/meminfo"), group);
+}
+
+/// From now on what would take nearly all memory that is free fails with std::bad_alloc, instead of a machine that
+/// swaps and ends some program. Does nothing where the system does not say what is free, or knows no such limit.
+inline void limit_memory() {
+#ifdef __linux__
+  const auto bytes = free_memory();
+  const auto pages = orbis::read_file("/proc/self/statm", 4096);
+  rlimit limit{};
+  if (!bytes || !pages || ::getrlimit(RLIMIT_DATA, &limit) != 0) return;
+  // Of its seven numbers the sixth is what the program has for data, in pages.
+  std::string_view rest = *pages;
+  for (int n = 0; n != 5; ++n) rest.remove_prefix(std::min(rest.find(' '), rest.size() - 1) + 1);
+  const auto page = static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
+  const std::uint64_t most = number_after(rest, "").value_or(0) * page + *bytes / 10 * 9;
+  if (limit.rlim_cur != RLIM_INFINITY && limit.rlim_cur <= most) return;
+  limit.rlim_cur = limit.rlim_max == RLIM_INFINITY ? most : std::min<rlim_t>(most, limit.rlim_max);
+  ::setrlimit(RLIMIT_DATA, &limit);
+#endif
+}
+
+}  // namespace examples
