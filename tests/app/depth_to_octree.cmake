@@ -53,6 +53,23 @@ fails(2 "nikon: no such file" ${depth} no.bt --camera nikon)
 fails(2 "000000.png: no depth" ${depth} no.bt --pose 0 0 90000 0 0 0 1)
 
 # Voxels so small that one image has billions of them; some that only take long are warned of.
+# What is read is not written over.
+file(SHA256 ${WORK}/${depth} before)
+file(SHA256 ${WORK}/room/camera.toml camera_before)
+fails(1 "000000.png: is an input" ${depth} ${depth} --camera room/camera.toml)
+fails(1 "camera.toml: is an input" ${depth} room/camera.toml --camera room/camera.toml)
+file(SHA256 ${WORK}/${depth} after)
+check(before STREQUAL after)
+file(SHA256 ${WORK}/room/camera.toml after)
+check(camera_before STREQUAL after)
+
+# A camera of which each pixel has metres to itself: said beforehand, and ended where there is no memory for it.
+execute_process(COMMAND bash -c "ulimit -v 400000; exec \"$@\"" limited ${APP} ${depth} no.bt --camera 1,1,1,1 --resolution 0.02
+                WORKING_DIRECTORY ${WORK} RESULT_VARIABLE result ERROR_VARIABLE err)
+check(result EQUAL 2)
+check(err MATCHES "^depth_to_octree: voxels of 20 mm: the image has about [0-9.]+ billion of them, [0-9.]+ GB; this takes long\ndepth_to_octree: gave up: [^\n]*\n$")
+check(NOT EXISTS ${WORK}/no.bt)
+
 fails(2 "--resolution: voxels of 0.2 mm: the image has about .* too many" ${depth} no.bt --resolution 0.0002 --scale 1000)
 
 # The same camera, as a file and as numbers.

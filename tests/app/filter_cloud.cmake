@@ -58,6 +58,13 @@ string(REPLACE COUNT 2 nans "${header}end_header\nnan nan nan\n0 inf 0\n")
 file(WRITE ${WORK}/nans.ply "${nans}")
 fails(2 "nans.ply: has no finite points" nans.ply no.ply)
 fails(2 "no/such/folder" wall.ply no/such/folder/out.ply)
+# What is read is not written over, whatever it is called; of other columns the result has nothing.
+file(CREATE_LINK ${WORK}/wall.ply ${WORK}/link.ply SYMBOLIC)
+file(SHA256 ${WORK}/wall.ply before)
+fails(1 "wall.ply: is an input" wall.ply wall.ply)
+fails(1 "link.ply: is an input" wall.ply link.ply)
+file(SHA256 ${WORK}/wall.ply after)
+check(before STREQUAL after)
 
 # `kept` points, as it says and as the file has them; `mode` in what it says.
 function(keeps kept mode)
@@ -80,6 +87,27 @@ keeps(900 log-statistical wall.ply out.ply --filter log-statistical)
 keeps(900 range-statistical wall.ply out.ply --filter range-statistical --origin 0,0,-1 --neighbors 8 --sigma 5)
 keeps(900 cluster wall.ply out.ply --filter cluster)
 keeps(901 none wall.ply out.ply --filter none --origin -1,0,0)
+
+# Coordinates as maps of the earth have them: 900 points 1 cm apart stay 900 places, where they were.
+set(points "")
+foreach(x RANGE 10 39)
+  foreach(y RANGE 10 39)
+    string(APPEND points "455000.${x} 5430000.${y} 3\n")
+  endforeach()
+endforeach()
+string(REPLACE COUNT 900 far "${header}end_header\n")
+string(REPLACE "float" "double" far "${far}")
+file(WRITE ${WORK}/far.ply "${far}${points}")
+app(0 far.ply out.ply --filter none)
+check(out MATCHES "^900 points, 900 to filter, 900 kept")
+file(STRINGS ${WORK}/out.ply axis REGEX "^property double z" LIMIT_INPUT 400)
+check(axis)
+app(0 far.ply out.ply --filter none --voxel 0.004)
+check(out MATCHES ", 900 to filter, 900 kept")  # as doubles they are told apart
+app(0 out.ply again.ply --filter none --voxel 0.004)
+check(out MATCHES ", 900 to filter, 900 kept")
+app(0 far.ply out.ply --filter range-statistical --origin 455000,5430000,0 --neighbors 8 --sigma 5)
+check(out MATCHES ", 900 kept")
 
 # A voxel grid first; what is filtered is filtered for good.
 app(0 wall.ply out.ply --voxel 0.1 --filter none)

@@ -9,6 +9,8 @@
 #include <string>
 #include <vector>
 
+#include <orbis/core/file.hpp>
+#include <orbis/core/point.hpp>
 #include <orbis/io/ply.hpp>
 
 #include "support/catch.hpp"
@@ -51,6 +53,28 @@ TEST_CASE("clouds survive writing and reading a PLY exactly") {
       const auto read = io::read_ply(folder / "c.ply").value();
       CHECK(read.points == cloud.points);
       CHECK(read.colors == cloud.colors);
+    }
+}
+
+TEST_CASE("a cloud far from its origin is written where it was, to a tenth of a millimetre") {
+  const orbis::test::temporary_folder folder;
+  const orbis::vec3 origin{455'000.0, 5'430'000.0, -3.0};
+  for (const auto encoding : {io::ply_encoding::ascii, io::ply_encoding::binary})
+    for (const bool colored : {false, true}) {
+      const auto cloud = some_cloud(colored);
+      REQUIRE(io::write_ply(folder / "far.ply", cloud, {.encoding = encoding, .origin = origin}));
+      const auto text = orbis::read_file(folder / "far.ply").value();
+      CHECK(text.find("property double z\n") != text.npos);
+      const auto read = io::parse_ply(text, {}, origin).value();
+      CHECK(read.colors == cloud.colors);
+      REQUIRE(read.points.size() == cloud.points.size());
+      double worst = 0.0;
+      for (std::size_t i = 0; i != read.points.size(); ++i)
+        if (orbis::is_finite(cloud.points[i]))
+          worst = std::max(worst, double{(read.points[i] - cloud.points[i]).cwiseAbs().maxCoeff()} /
+                                      (1.0 + double{cloud.points[i].norm()}));
+      CHECK(worst < 1e-4);
+      CHECK(io::read_ply(folder / "far.ply").value().points[0].y() > 5e6F - 1e3F);
     }
 }
 

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <stdexcept>
 #include <thread>
+#include <vector>
 
 #include <orbis/camera/any.hpp>
 #include <orbis/slam/detail/system/back_end.hpp>
@@ -78,6 +79,23 @@ TEST_CASE("Where loop closing takes long, keyframes wait for mapping, not in a q
   CHECK_FALSE(back_end.is_full());
   CHECK(s.shared.loops_closed >= 1);
   CHECK(slam::validate(s.shared.atlas.active()));
+}
+
+TEST_CASE("Where frames wait for the mapping, keyframes that wait do not cut an adjustment short") {
+  using back_end_type = slam::detail::back_end<camera::any_camera, features::binary_descriptor<256>, bow_places>;
+  const auto poses_after = [](bool threads) {
+    scene s{threads};
+    s.options.threads.wait = true;
+    back_end_type back_end{s.shared};
+    for (const std::uint32_t k : {20U, 30U, 40U}) back_end.process({0, k});
+    back_end.wait();
+    CHECK(s.shared.loops_closed == 0);
+    std::vector<double> out;
+    for (const auto& k : s.shared.atlas.active().keyframes())
+      for (int i = 0; i != 16; ++i) out.push_back(k.T_world_camera.matrix().data()[i]);
+    return out;
+  };
+  CHECK(poses_after(true) == poses_after(false));
 }
 
 TEST_CASE("What a callback throws on a thread of the back end comes to its user") {
