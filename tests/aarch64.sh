@@ -4,7 +4,8 @@
 # For 64-bit ARM: compiles the library (orbis::compiled, orbis::compiled_io), the quick tests (tests/quick.cmake) and the
 # tests of the vector kernels, and runs them under qemu-user. The tests of the kernels are header-only and compare each
 # kernel with plain code, bit by bit, here with a compiler that fuses products into sums where it can.
-# With "all", every test of every component instead of the quick ones, which takes hours.
+# With "all", every test of every component instead of the quick ones, which takes hours; without those that compare with
+# PCL, Open3D, OMPL, FCL or Ceres.
 #
 # usage: tests/aarch64.sh SYSROOT [all] [Catch2 options]
 # SYSROOT holds libraries for ARM, as bench/board/sysroot.sh unpacks them. Needs g++-aarch64-linux-gnu, qemu-user,
@@ -13,7 +14,7 @@
 set -euo pipefail
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 if [[ -z ${1:-} || ! -e $1/complete ]]; then
-  sed -n '8,12s/^# \{0,1\}//p' "$here/tests/aarch64.sh" >&2
+  sed -n '8,13s/^# \{0,1\}//p' "$here/tests/aarch64.sh" >&2
   exit 1
 fi
 root=$(cd "$1" && pwd)
@@ -109,6 +110,10 @@ if [[ $tier == quick ]]; then
 else
   mapfile -t sources < <(cd tests && find core camera features places optimize cloud octree slam mapping nav eval io \
     interop -name '*.cpp' | sort | grep -vxFf <(printf '%s\n' "${kernels[@]#tests/}" | grep -v bundle_instances))
+fi
+if ((${#sources[@]} == 0)); then
+  echo "tests/aarch64.sh: finds no tests" >&2
+  exit 1
 fi
 for component in $(printf '%s\n' "${sources[@]%%/*}" | sort -u); do
   parts=()
