@@ -14,7 +14,7 @@
 set -euo pipefail
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 if [[ -z ${1:-} || ! -e $1/complete ]]; then
-  sed -n '11,14s/^# \{0,1\}//p' "$here/tests/aarch64.sh" >&2
+  sed -n '10,13s/^# \{0,1\}//p' "$here/tests/aarch64.sh" >&2
   exit 1
 fi
 root=$(cd "$1" && pwd)
