@@ -91,8 +91,10 @@ TEST_CASE("Where frames wait for the mapping, keyframes that wait do not cut an 
     back_end.wait();
     CHECK(s.shared.loops_closed == 0);
     std::vector<double> out;
-    for (const auto& k : s.shared.atlas.active().keyframes())
-      for (int i = 0; i != 16; ++i) out.push_back(k.T_world_camera.matrix().data()[i]);
+    for (const auto& k : s.shared.atlas.active().keyframes()) {
+      const vec6 pose = k.T_world_camera.log();
+      out.insert(out.end(), pose.begin(), pose.end());
+    }
     return out;
   };
   CHECK(poses_after(true) == poses_after(false));
