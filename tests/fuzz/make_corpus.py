@@ -739,6 +739,7 @@ def configs():
     config("help", "help = true\n")
     config("other_types", "frames = 'many'\nresolution = 1979-05-27T07:32:00Z\n")
     config("out_of_range", "resolution = nan\n")
+    config("next_to_nothing", "read-out-ms = 1e-320\nsigma = 1e-320\n")
     config("infinite", "sigma = inf\n")
     config("huge", "frames = 9223372036854775807\n")
     config("negative", "seed = -1\n", "1")

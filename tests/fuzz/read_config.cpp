@@ -11,6 +11,7 @@
 #include <fstream>
 #include <string>
 #include <string_view>
+#include <system_error>
 #include <variant>
 
 #include <unistd.h>
@@ -35,7 +36,9 @@ class own_file {
   }
   [[nodiscard]] std::string path() const { return path_.string(); }
   void write(std::string_view bytes) const {
-    std::ofstream out{path_, std::ios::binary | std::ios::trunc};
+    std::error_code ignored;
+    std::filesystem::remove(path_, ignored);  // cutting a file short makes some file systems write it out at once
+    std::ofstream out{path_, std::ios::binary};
     out.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
     fuzz::require(out.good(), "the file can be written");
   }
@@ -51,10 +54,18 @@ template <class Work>
   fuzz::require(file != nullptr && ::ftruncate(::fileno(file), 0) == 0, "a temporary file can be written");
   ::lseek(::fileno(file), 0, SEEK_SET);
   const int kept = ::dup(STDERR_FILENO);
+  const auto restore = [&] {
+    ::dup2(kept, STDERR_FILENO);
+    ::close(kept);
+  };
   ::dup2(::fileno(file), STDERR_FILENO);
-  work();
-  ::dup2(kept, STDERR_FILENO);
-  ::close(kept);
+  try {
+    work();
+  } catch (...) {  // which is to be seen
+    restore();
+    throw;
+  }
+  restore();
   std::string said(static_cast<std::size_t>(::lseek(::fileno(file), 0, SEEK_CUR)), '\0');
   fuzz::require(::pread(::fileno(file), said.data(), said.size(), 0) == static_cast<::ssize_t>(said.size()),
                 "a temporary file can be read");
