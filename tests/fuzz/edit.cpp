@@ -358,7 +358,8 @@ class session {
     if ((flags & 2U) != 0) s.options.max_range = 9.25 * resolution;
     // Many long rays through large leaves make more nodes than can be looked at in a second.
     for (vec3f& p : s.points) {
-      const double voxels = static_cast<double>((p - origin).cwiseAbs().sum()) / resolution;
+      const double length = std::min(static_cast<double>((p - origin).norm()), s.options.max_range);
+      const double voxels = 1.75 * length / resolution;
       if (voxels <= voxels_left_)
         voxels_left_ -= voxels;
       else
@@ -537,7 +538,7 @@ class session {
   std::optional<map> copy_;
   std::optional<voxels> copied_;
   std::uint64_t changes_ = 0;
-  double voxels_left_ = 4000.0;  ///< so many voxels all rays from now on may pass through, about
+  double voxels_left_ = 1500.0;  ///< so many voxels all rays from now on may pass through, about
 };
 
 }  // namespace
