@@ -10,9 +10,17 @@
 #include <thread>
 #include <vector>
 
+#include <fcntl.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
 #include <unistd.h>
+
+#ifdef __linux__
+#include <cstdio>
+
+#include <sys/syscall.h>
+#endif
 
 #include <orbis/core/file.hpp>
 
@@ -34,7 +42,69 @@ result<void> write_text(const fs::path& path, const std::string& text) {
   return write_file_atomically(path, [&](std::ostream& out) { out << text; });
 }
 
+#ifdef __linux__
+/// What this program asked of the system, in that order, while somebody listens.
+struct disk_call {
+  enum class kind { sync_file, sync_folder, rename } what;
+  ::ino_t file;
+  ::off_t bytes;  ///< in the file at that time
+};
+std::vector<disk_call>* disk_calls = nullptr;
+#endif
+
 }  // namespace
+
+#ifdef __linux__
+// In place of those of the C library, for this program and for the C++ library.
+extern "C" int fsync(int file) {
+  if (struct stat state{}; disk_calls != nullptr && ::fstat(file, &state) == 0)
+    disk_calls->push_back({S_ISDIR(state.st_mode) ? disk_call::kind::sync_folder : disk_call::kind::sync_file,
+                           state.st_ino, state.st_size});
+  return static_cast<int>(::syscall(SYS_fsync, file));
+}
+extern "C" int rename(const char* from, const char* to) noexcept(noexcept(::rename(from, to))) {
+  if (struct stat state{}; disk_calls != nullptr && ::stat(from, &state) == 0)
+    disk_calls->push_back({disk_call::kind::rename, state.st_ino, state.st_size});
+  return static_cast<int>(::syscall(SYS_renameat2, AT_FDCWD, from, AT_FDCWD, to, 0));
+}
+
+TEST_CASE("a file is whole on the disk before it gets its name, and then its name is") {
+  const scratch_folder folder;
+  const auto inode_of = [](const fs::path& path) {
+    struct stat state {};
+    REQUIRE(::stat(path.c_str(), &state) == 0);
+    return state.st_ino;
+  };
+  const auto calls_of = [](const fs::path& path, const std::string& text) {
+    std::vector<disk_call> calls;
+    disk_calls = &calls;
+    const auto written = write_text(path, text);
+    disk_calls = nullptr;
+    REQUIRE(written);
+    return calls;
+  };
+  for (const std::size_t size : {std::size_t{10}, std::size_t{1} << 20U}) {  // buffered, and beyond the buffer
+    const fs::path path = folder / "file";
+    const std::vector<disk_call> calls = calls_of(path, std::string(size, 'x'));
+    REQUIRE(calls.size() == 3);
+    CHECK(calls[0].what == disk_call::kind::sync_file);
+    CHECK(calls[0].file == inode_of(path));
+    CHECK(calls[0].bytes == static_cast<::off_t>(size));
+    CHECK(calls[1].what == disk_call::kind::rename);
+    CHECK(calls[1].file == inode_of(path));
+    CHECK(calls[2].what == disk_call::kind::sync_folder);
+    CHECK(calls[2].file == inode_of(folder.path()));
+  }
+  // The folder of a name without one is the current one.
+  const fs::path before = fs::current_path();
+  fs::current_path(folder.path());
+  const std::vector<disk_call> calls = calls_of("bare", "text");
+  fs::current_path(before);
+  REQUIRE(calls.size() == 3);
+  CHECK(calls[2].what == disk_call::kind::sync_folder);
+  CHECK(calls[2].file == inode_of(folder.path()));
+}
+#endif
 
 TEST_CASE("what was written is read again whatever the bytes") {
   const scratch_folder folder;
@@ -163,6 +233,39 @@ TEST_CASE("threads that write the same file leave one of their files and nothing
   CHECK(failures == 0);
   const std::string left = read_file(path).value();
   CHECK(left == std::string(100000, left.at(0)));
+  CHECK(folder.files() == 1);
+}
+
+TEST_CASE("processes that write the same file leave one of their files and nothing else") {
+  const scratch_folder folder;
+  const fs::path path = folder / "shared";
+  const auto content = [](char name) { return std::string(name == 'a' ? 20000 : 30000, name); };
+  REQUIRE(write_text(path, content('a')));
+  std::vector<::pid_t> writers;
+  for (const char name : {'a', 'b'}) {  // they begin with the same number of calls, and so do the names they make up
+    const ::pid_t writer = ::fork();
+    if (writer == 0) {
+      int failures = 0;
+      for (int i = 0; i != 200; ++i) failures += write_text(path, content(name)) ? 0 : 1;
+      ::_exit(failures == 0 ? 0 : 1);
+    }
+    writers.push_back(writer);
+  }
+  int reads = 0, torn = 0, failed = 0;
+  while (!writers.empty()) {
+    const auto got = read_file(path);
+    torn += got && (*got == content('a') || *got == content('b')) ? 0 : 1;
+    ++reads;
+    std::erase_if(writers, [&](::pid_t writer) {
+      int status = 0;
+      if (writer > 0 && ::waitpid(writer, &status, WNOHANG) == 0) return false;
+      failed += writer > 0 && WIFEXITED(status) && WEXITSTATUS(status) == 0 ? 0 : 1;
+      return true;
+    });
+  }
+  CAPTURE(reads);
+  CHECK(failed == 0);
+  CHECK(torn == 0);
   CHECK(folder.files() == 1);
 }
 

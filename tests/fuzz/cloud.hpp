@@ -3,12 +3,15 @@
 /// What must hold for every reader of clouds.
 #pragma once
 
+#include <cmath>
 #include <cstddef>
+#include <iterator>
 #include <optional>
 #include <string_view>
 
 #include <orbis/core/point_cloud.hpp>
 #include <orbis/core/result.hpp>
+#include <orbis/core/types.hpp>
 
 #include "fuzz/target.hpp"
 
@@ -30,6 +33,25 @@ auto check_cloud_reader(std::string_view bytes, std::size_t memory_per_byte, Rea
 
 inline void check_cloud(const point_cloud& cloud) {
   require(cloud.colors.empty() || cloud.colors.size() == cloud.points.size(), "a colour for each point, or none");
+}
+
+/// Where a cloud may be read from: nearby, in a map's coordinates, and out of all bounds.
+[[nodiscard]] inline vec3 some_origin(std::size_t which) {
+  constexpr double origins[][3] = {{1.0, -2.5, 3.0}, {4.5e5, 5.6e6, 120.25}, {1e-3, -1e10, 1e300}};
+  const auto& o = origins[which % std::size(origins)];
+  return {o[0], o[1], o[2]};
+}
+
+/// `moved` is `cloud` with `origin` taken off, as far as floats can tell.
+inline void check_moved(const point_cloud& cloud, const point_cloud& moved, const vec3& origin) {
+  require(moved.size() == cloud.size() && moved.colors == cloud.colors, "an origin changes coordinates only");
+  for (std::size_t i = 0; i != cloud.size(); ++i)
+    for (int axis = 0; axis != 3; ++axis) {
+      const double was = cloud.points[i][axis], is = moved.points[i][axis], wanted = was - origin[axis];
+      if (!std::isfinite(was) || !std::isfinite(is) || std::abs(wanted) > 3e38) continue;  // beyond a float's range
+      require(std::abs(is - wanted) <= 1.2e-7 * (std::abs(was) + std::abs(wanted)) + 1e-44,
+              "an origin is taken off each coordinate");
+    }
 }
 
 }  // namespace orbis::fuzz

@@ -356,6 +356,15 @@ class session {
     scan s{points(), origin, {}, map{resolution, where().tree_depth}};
     s.options.mode = (flags & 1U) != 0 ? octree::ray_mode::discretized : octree::ray_mode::every_ray;
     if ((flags & 2U) != 0) s.options.max_range = 9.25 * resolution;
+    // Many long rays through large leaves make more nodes than can be looked at in a second.
+    for (vec3f& p : s.points) {
+      const double length = std::min(static_cast<double>((p - origin).norm()), s.options.max_range);
+      const double voxels = 1.75 * length / resolution;
+      if (voxels <= voxels_left_)
+        voxels_left_ -= voxels;
+      else
+        p = origin;
+    }
     s.alone.integrate(s.points, s.origin, s.options);
     return s;
   }
@@ -529,6 +538,7 @@ class session {
   std::optional<map> copy_;
   std::optional<voxels> copied_;
   std::uint64_t changes_ = 0;
+  double voxels_left_ = 1500.0;  ///< so many voxels all rays from now on may pass through, about
 };
 
 }  // namespace

@@ -306,14 +306,14 @@ def crc32c(data):
 
 
 def vocabularies():
-    """Of descriptors of 64 bits."""
+    """Of descriptors of 64 bits and, at the end, of 256."""
     rng = random.Random(5)
 
-    def compact(name, counts, words, nodes=None, bits=64, weighting=0, version=1, weights=None, cut=0):
+    def compact(name, counts, words, nodes=None, bits=64, weighting=0, version=1, weights=None, cut=0, size=8):
         nodes = nodes if nodes is not None else 1 + sum(counts)
         weights = weights if weights is not None else [1.0 + i for i in range(words)]
         body = struct.pack("<5I28x", bits, weighting, nodes, len(counts), words)
-        body += bytes(rng.randrange(256) for _ in range(8 * (nodes - 1))) if nodes < 1000 else b""
+        body += bytes(rng.randrange(256) for _ in range(size * (nodes - 1))) if nodes < 1000 else b""
         body += b"".join(struct.pack("<f", w) for w in weights) + b"".join(struct.pack("<H", c) for c in counts)
         data = b"orbisvoc" + struct.pack("<II", version, crc32c(body)) + body
         write("read_vocabulary", "own_" + name, data[:len(data) - cut])
@@ -366,6 +366,12 @@ def vocabularies():
     yaml("beyond", [item(9, 0)])
     yaml("cut", good[:-1] + ["      - { nodeId:7, parentId:2, weight:"])
     yaml("brackets", ["      []\n"])
+
+    compact("256_two_levels", [3, 2, 2, 2], 6, bits=256, size=32)
+    compact("256_uneven", [3, 0, 2, 0, 0, 4], 7, bits=256, size=32)
+    bits = lambda: " ".join(str(rng.randrange(256)) for _ in range(32))
+    text("256_good", [f"{p} {w} {bits()} {1.25 * w}\n" for p, w in tree])
+    yaml("256_good", [item(i + 1, p, str(1.25 * w)) for i, (p, w) in enumerate(tree)], [3, 4, 5, 6, 7])
 
 
 def slam_maps():
@@ -647,6 +653,110 @@ def texts():
     write("read_list", "long_path", b"1 " + b"a/" * 900 + b"b\n")
 
 
+def ros_messages():
+    """The first byte is the kind: 0 an image, 1 a compressed one, 2 a camera."""
+    text = lambda t: struct.pack("<I", len(t)) + t
+    header = struct.pack("<3I", 7, 100, 250000000) + text(b"camera")
+
+    def image(name, encoding, width, height, data, big_endian=0, step=None, cut=0):
+        step = step if step is not None else len(data) // height
+        message = header + struct.pack("<2I", height, width) + text(encoding) + struct.pack("<BI", big_endian, step) + text(data)
+        write("read_ros", "image_" + name, b"0" + message[:len(message) - cut])
+
+    image("grey", b"mono8", 6, 4, bytes(range(24)))
+    image("rgb", b"rgb8", 3, 2, bytes(range(18)))
+    image("bgra", b"bgra8", 3, 2, bytes(range(24)))
+    image("mosaic", b"bayer_rggb8", 6, 4, bytes(range(24)))
+    image("mosaic_of_rows", b"bayer_gbrg8", 9, 1, bytes(range(9)))
+    image("depth", b"16UC1", 3, 2, struct.pack("<6H", 0, 1, 1000, 2000, 65534, 65535))
+    image("depth_big_endian", b"mono16", 3, 2, struct.pack(">6H", 0, 1, 1000, 2000, 65534, 65535), 1)
+    image("metres", b"32FC1", 3, 2, struct.pack("<6f", 0, 1.5, -1, float("nan"), float("inf"), 13.2))
+    image("long_rows", b"8UC1", 3, 2, bytes(40))
+    image("short_rows", b"rgb8", 3, 2, bytes(18), step=8)
+    image("too_few", b"8UC1", 3, 200, bytes(60), step=3)
+    image("huge", b"mono8", 2**32 - 1, 2**32 - 1, bytes(60), step=2**32 - 1)
+    image("no_pixels", b"mono8", 0, 0, bytes(60), step=0)
+    image("other", b"yuv422", 2, 2, bytes(8))
+    image("long_name", b"y" * 400, 2, 2, bytes(8))
+    image("cut", b"mono8", 6, 4, bytes(24), cut=3)
+
+    def compressed(name, form, data):
+        write("read_ros", "compressed_" + name, b"1" + header + text(form) + text(data))
+
+    rows = lambda height, width: b"".join(b"\0" + bytes((7 * x + y) % 256 for x in range(width)) for y in range(height))
+    jpeg = (here / "read_jpeg" / "baseline").read_bytes()
+    color, depth = png(9, 7, 8, 2, rows(7, 27)), png(9, 7, 16, 0, rows(7, 18))
+    compressed("png", b"rgb8; png compressed bgr8", color)
+    compressed("jpeg", b"bgr8; jpeg compressed bgr8", jpeg)
+    compressed("jpeg_alone", b"jpeg", jpeg)
+    compressed("mosaic", b"bayer_rggb8; jpeg compressed ", jpeg)
+    compressed("depth", b"16UC1; compressedDepth png", bytes(12) + depth)
+    compressed("depth_alone", b"16UC1; png compressed ", depth)
+    compressed("metres", b"32FC1; compressedDepth png", struct.pack("<I2f", 0, 800.0, -0.5) + depth)
+    compressed("metres_no_scale", b"32FC1; compressedDepth png", struct.pack("<I2f", 0, float("nan"), 0.0) + depth)
+    compressed("rvl", b"16UC1; compressedDepth rvl", bytes(40))
+    compressed("short", b"16UC1; compressedDepth png", bytes(5))
+    compressed("empty", b"", b"")
+
+    def camera(name, model, distortion, width=640, height=480, k=(525.0, 0, 319.5, 0, 525.0, 239.5, 0, 0, 1), p=None):
+        p = p if p is not None else (*k[:3], -50.0, *k[3:6], 0, *k[6:], 0)
+        message = (header + struct.pack("<2I", height, width) + text(model)
+                   + struct.pack(f"<I{len(distortion)}d", len(distortion), *distortion)
+                   + struct.pack("<9d9d12d", *k, 1, 0, 0, 0, 1, 0, 0, 0, 1, *p) + struct.pack("<6IB", *6 * [0], 0))
+        write("read_ros", "camera_" + name, b"2" + message)
+
+    camera("plumb_bob", b"plumb_bob", (0.1, -0.2, 1e-3, 1e-3, 0.01))
+    camera("rational", b"rational_polynomial", (0.1, -0.2, 1e-3, 1e-3, 0.01, 0.1, 0.1, 0.1))
+    camera("equidistant", b"equidistant", (0.1, -0.2, 0.01, 1e-3))
+    camera("straight", b"plumb_bob", 5 * (0,))
+    camera("uncalibrated", b"", (), k=9 * (0,))
+    camera("no_size", b"plumb_bob", (), 0, 0)
+    camera("huge", b"plumb_bob", (), 2**31 - 1, 2**32 - 1)
+    camera("no_number", b"plumb_bob", (float("nan"),), k=(525.0, 0, float("inf"), 0, 525.0, 239.5, 0, 0, 1))
+    camera("other", b"m" * 300, (1, 2, 3))
+
+
+def configs():
+    """The first byte is the command: 0 run, 1 demo, 2 live, 3 map."""
+    def config(name, text, commands="0"):
+        for command in commands:
+            write("read_config", name + ("_" + command if len(commands) > 1 else ""),
+                  command.encode() + (text if isinstance(text, bytes) else text.encode()))
+
+    config("map", 'resolution = 0.02\nmax-depth = 5\nfilter = "radius"\nneighbors = 7\nradius = 0.1\nsigma = 1.5\n'
+           'depth-memory = 32\nthreads = 2\nquiet = true\nrobot-radius = 0.3\nrobot-height = 1\n'
+           'floor-map = "floor.yaml"\ngravity = "0,1,0"\n', "0123")
+    config("slam", 'moving = "off"\ndepth-term = "on"\ndeterministic = true\nlive-map = false\nrealtime = true\n'
+           'save-map = "a.map"\nload-map = "b.map"\nread-out-ms = 20\n', "012")
+    config("run", 'sensor = "stereo"\nformat = "kitti"\ncamera = "tum_fr1"\nframes = 100\nstride = 2\n'
+           'topics = "/left,/right"\nintrinsics = "given"\nread-out-ms = "auto"\n')
+    config("demo", "width = 320\nseed = 7\nperson = true\nprofile = \"small\"\n", "1")
+    config("origin", 'origin = "1,2,3"\n', "3")
+    config("viewer", 'viewer = "web"\nviewer-port = 0\nviewer-hold = true\n')
+    config("contradiction", "localize-only = true\nsave-map = 'a'\nload-map = 'b'\n")
+    config("unknown", "colour = 1\n")
+    config("itself", 'config = "other.toml"\n')
+    config("help", "help = true\n")
+    config("other_types", "frames = 'many'\nresolution = 1979-05-27T07:32:00Z\n")
+    config("out_of_range", "resolution = nan\n")
+    config("next_to_nothing", "read-out-ms = 1e-320\nsigma = 1e-320\n")
+    config("infinite", "sigma = inf\n")
+    config("huge", "frames = 9223372036854775807\n")
+    config("negative", "seed = -1\n", "1")
+    config("flag_number", "quiet = 3\ndeterministic = -1\n")
+    config("table", "[resolution]\nvalue = 1\n")
+    config("list", "topics = ['a', 'b']\n")
+    config("twice", "frames = 1\nframes = 2\n")
+    config("required", "out = ''\nDATASET = 'a'\n")
+    config("lines", 'filter = "a\\nb"\n"key\\nwith\\nlines" = 1\n')
+    config("letters", "k\u00e4se = 1\n")
+    config("letters_quoted", "# k\u00e4se\n'k\u00e4se' = \"\u00e4\\\"\u00e4\"\n")
+    config("letters_of_presentation", "\ufec1ing = 'off'\n")
+    config("latin", b"out = '\xe4'\n")
+    config("broken", "resolution 0.1\n")
+    config("empty", "")
+
+
 if __name__ == "__main__":
     images()
     clouds()
@@ -660,3 +770,5 @@ if __name__ == "__main__":
     edits()
     depth_images()
     compressed_depths()
+    ros_messages()
+    configs()

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// Any bytes as a PCD file, in text, binary and compressed.
+// Any bytes as a PCD file, in text, binary and compressed, as it is and with an origin taken off.
 #include <cstdint>
 #include <string_view>
 
@@ -18,5 +18,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (!read) return 0;
   fuzz::check_cloud(read->cloud);
   fuzz::require(read->width * read->height == read->cloud.size(), "the shape is that of the points");
+  const vec3 origin = fuzz::some_origin(size);
+  const auto moved = io::parse_pcd({reinterpret_cast<const char*>(data), size}, "fuzz.pcd", origin);
+  fuzz::require(moved.has_value(), "an origin does not make a file unreadable");
+  fuzz::check_moved(read->cloud, moved->cloud, origin);
   return 0;
 }

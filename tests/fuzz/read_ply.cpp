@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// Any bytes as a PLY file.
+// Any bytes as a PLY file, as it is and with an origin taken off.
 #include <cstdint>
 #include <string_view>
 
@@ -14,6 +14,11 @@ using namespace orbis;
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const auto cloud = fuzz::check_cloud_reader({reinterpret_cast<const char*>(data), size}, 128,
                                               [](std::string_view bytes) { return io::parse_ply(bytes, "fuzz.ply"); });
-  if (cloud) fuzz::check_cloud(*cloud);
+  if (!cloud) return 0;
+  fuzz::check_cloud(*cloud);
+  const vec3 origin = fuzz::some_origin(size);
+  const auto moved = io::parse_ply({reinterpret_cast<const char*>(data), size}, "fuzz.ply", origin);
+  fuzz::require(moved.has_value(), "an origin does not make a file unreadable");
+  fuzz::check_moved(*cloud, *moved, origin);
   return 0;
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// Any bytes as a vocabulary: our own format as it is and with its checksum put right, and the formats of others.
+// Any bytes as a vocabulary, of descriptors of 64 and of 256 bits: our own format as it is and with its checksum put
+// right, and the formats of others.
 #include <array>
 #include <cstdint>
 #include <optional>
@@ -21,16 +22,16 @@ namespace {
 using namespace orbis;
 using namespace orbis::places;
 
-// Short descriptors: more nodes for as many bytes.
-using words = basic_vocabulary<64>;
-
-void use(const words& read) {
+template <std::size_t Bits>
+void use(const basic_vocabulary<Bits>& read) {
   const std::string bytes = vocabulary_bytes(read);
-  const auto again = parse_vocabulary<64>(std::as_bytes(std::span{bytes}));
+  const auto again = parse_vocabulary<Bits>(std::as_bytes(std::span{bytes}));
   fuzz::require(again && *again == read, "what was read can be written and read again");
   fuzz::require(vocabulary_bytes(*again) == bytes, "to the same bytes");
-  std::vector<std::uint64_t> image;
-  for (std::uint64_t i = 0; i != 40; ++i) image.push_back(i * 0x9e3779b97f4a7c15ULL);
+  std::vector<std::array<std::uint64_t, Bits / 64>> image(40);
+  std::uint64_t number = 0;
+  for (auto& descriptor : image)
+    for (std::uint64_t& part : descriptor) part = number++ * 0x9e3779b97f4a7c15ULL;
   bag_of_words bag;
   transform_workspace memory;
   std::vector<std::uint32_t> nodes, plain_nodes;
@@ -43,9 +44,9 @@ void use(const words& read) {
   fuzz::require(bag == with && nodes == plain_nodes, "levels make no difference");
 }
 
-template <class Parse>
+template <std::size_t Bits, class Parse>
 void check(Parse&& parse, std::size_t size, std::size_t times) {
-  std::optional<result<words>> got;
+  std::optional<result<basic_vocabulary<Bits>>> got;
   const std::size_t peak = fuzz::peak_bytes_of([&] { got.emplace(parse()); });
   fuzz::require(peak <= times * size + 8192, "memory in proportion to the file");
   if (*got) return use(**got);
@@ -54,16 +55,24 @@ void check(Parse&& parse, std::size_t size, std::size_t times) {
   fuzz::require(!e.message.empty() && e.to_string().size() < 300, "the reason is given, and short");
 }
 
+// Of short descriptors there are more nodes in as many bytes; those of 256 bits are what is used.
+template <std::size_t Bits>
+void check_all(std::string bytes) {
+  const std::size_t size = bytes.size();
+  check<Bits>([&] { return dbow::parse_dbow_text<Bits>(bytes); }, size, 16);
+  check<Bits>([&] { return dbow::parse_dbow_yaml<Bits>(bytes); }, size, 16);
+  check<Bits>([&] { return parse_vocabulary<Bits>(std::as_bytes(std::span{bytes})); }, size, 8);
+  if (size < 16) return;
+  const std::uint32_t sum = crc32c(std::as_bytes(std::span{bytes}).subspan(16));
+  for (unsigned i = 0; i != 4; ++i) bytes[12 + i] = static_cast<char>((sum >> (8 * i)) & 0xffU);
+  check<Bits>([&] { return parse_vocabulary<Bits>(std::as_bytes(std::span{bytes})); }, size, 8);
+}
+
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  std::string bytes{reinterpret_cast<const char*>(data), size};
-  check([&] { return dbow::parse_dbow_text<64>(bytes); }, size, 16);
-  check([&] { return dbow::parse_dbow_yaml<64>(bytes); }, size, 16);
-  check([&] { return parse_vocabulary<64>(std::as_bytes(std::span{bytes})); }, size, 8);
-  if (size < 16) return 0;
-  const std::uint32_t sum = crc32c(std::as_bytes(std::span{bytes}).subspan(16));
-  for (unsigned i = 0; i != 4; ++i) bytes[12 + i] = static_cast<char>((sum >> (8 * i)) & 0xffU);
-  check([&] { return parse_vocabulary<64>(std::as_bytes(std::span{bytes})); }, size, 8);
+  const std::string bytes{reinterpret_cast<const char*>(data), size};
+  check_all<64>(bytes);
+  check_all<256>(bytes);
   return 0;
 }

@@ -1,9 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <cstdint>
+#include <filesystem>
+
+#include <sys/resource.h>
+#include <sys/stat.h>
+
 #include <orbis/io/image.hpp>
 
-#include "support/temporary_folder.hpp"
 #include "support/catch.hpp"
 #include "support/data.hpp"
+#include "support/temporary_folder.hpp"
 
 namespace io = orbis::io;
 
@@ -17,6 +23,33 @@ TEST_CASE("what is not an image is named with its fault") {
   CHECK(io::read_depth(empty).error().code == orbis::errc::malformed);
   CHECK(io::read_color(folder / "c.png").error().code == orbis::errc::not_found);
   CHECK(io::read_depth(folder.path()).error().code == orbis::errc::unreadable);
+}
+
+TEST_CASE("nobody waits for an image that is a pipe") {
+  const orbis::test::temporary_folder folder;
+  const auto pipe = folder / "pipe.png";
+  REQUIRE(::mkfifo(pipe.c_str(), 0600) == 0);
+  CHECK(io::read_color(pipe).error().to_string() == pipe.string() + ": is not a regular file");
+  CHECK(io::read_depth(pipe).error().code == orbis::errc::unreadable);
+}
+
+TEST_CASE("a file larger than any image is refused before it is read") {
+  const orbis::test::temporary_folder folder;
+  const auto large = folder.write("large.png", "\x89PNG\r\n\x1a\n");
+  std::filesystem::resize_file(large, (std::uintmax_t{1} << 30) + 1);  // takes no space
+  const auto peak_kilobytes = [] {
+    rusage usage{};
+    ::getrusage(RUSAGE_SELF, &usage);
+    return usage.ru_maxrss;
+  };
+  const auto before = peak_kilobytes();
+  const auto color = io::read_color(large);
+  const auto depth = io::read_depth(large);
+  CHECK(peak_kilobytes() - before < 40'000);
+  for (const auto& error : {color.error(), depth.error()}) {
+    CHECK(error.code == orbis::errc::malformed);
+    CHECK(error.message == "is larger than 1073741824 bytes, and no such file is");
+  }
 }
 
 TEST_CASE("the kind of an image is what its bytes say") {

@@ -56,6 +56,41 @@ std::string encode(int width, int height, int components, bool progressive = fal
   return bytes;
 }
 
+/// A marker segment of a JPEG file.
+std::string segment(char marker, const std::string& content) {
+  const std::size_t length = content.size() + 2;
+  return std::string{'\xff', marker, static_cast<char>(length >> 8U), static_cast<char>(length & 0xffU)} + content;
+}
+
+/// What stands before the first scan of a progressive grey image.
+std::string progressive_header(int width, int height) {
+  const auto low = [](int v) { return static_cast<char>(v & 0xff); };
+  const auto high = [](int v) { return static_cast<char>(v >> 8); };
+  return "\xff\xd8" + segment('\xdb', '\0' + std::string(64, '\1')) +
+         segment('\xc2', {'\x08', high(height), low(height), high(width), low(width), 1, 1, '\x11', 0}) +
+         // DC: one bit that says "as before". AC: one bit for a run of 2^14 and more blocks without anything, two bits
+         // for one of two or three.
+         segment('\xc4', '\0' + std::string{'\1'} + std::string(15, '\0') + '\0') +
+         segment('\xc4', '\x10' + std::string{'\1', '\1'} + std::string(14, '\0') + "\xe0\x10");
+}
+
+/// A grey image of 2048x2048 pixels whose coefficients come bit by bit, each in a scan of its own, and are all zero.
+std::string many_empty_scans(int count) {
+  constexpr int blocks = 256 * 256;
+  std::string bytes =
+      progressive_header(2048, 2048) + segment('\xda', {1, 1, 0, 0, 0, 0}) + std::string(blocks / 8, '\0');
+  // 0 and 14 bits, twice: 2 * 32767 blocks; 10 and one bit: two blocks. After a byte 0xff stands 0.
+  static_assert(2 * 32767 + 2 == blocks);
+  const std::string nothing{'\x7f', '\xfe', '\xff', '\0', '\xfe', '\x7f'};
+  for (int scan = 0; scan != count - 1; ++scan) {
+    const auto frequency = static_cast<char>(1 + scan / 11);
+    const int bit = 10 - scan % 11;
+    const auto bits = static_cast<char>((bit == 10 ? 0 : bit + 1) << 4 | bit);
+    bytes += segment('\xda', {1, 1, 0, frequency, frequency, bits}) + nothing;
+  }
+  return bytes + "\xff\xd9";
+}
+
 }  // namespace
 
 TEST_CASE("a JPEG has its colours in place") {
@@ -169,6 +204,27 @@ TEST_CASE("a progressive JPEG of more scans than anybody needs is refused before
   REQUIRE_FALSE(read);
   CHECK(read.error().code == orbis::errc::malformed);
   CHECK(read.error().to_string().find("too many scans") != std::string::npos);
+}
+
+TEST_CASE("the larger a JPEG is the fewer scans it may have") {
+  // 2^30 pixels in all scans together; 2^22 pixels here.
+  CHECK(io::decode_jpeg(many_empty_scans(255)));
+  const auto read = io::decode_jpeg(many_empty_scans(256), "many.jpg");
+  REQUIRE_FALSE(read);
+  CHECK(read.error().code == orbis::errc::malformed);
+  CHECK(read.error().to_string().find("has too many scans") != std::string::npos);
+}
+
+TEST_CASE("a JPEG of several scans may not have as many pixels as one of one scan") {
+  const auto header = [](int width, int height) {  // and bytes enough for the pixels
+    return progressive_header(width, height) + segment('\xda', {1, 1, 0, 0, 0, 0}) + std::string(1 << 18, '\0');
+  };
+  const std::string largest = header(8192, 8192);
+  CHECK(io::detail::jpeg_decoder{largest}.read_header());
+  const auto read = io::decode_jpeg(header(8193, 8192), "large.jpg");
+  REQUIRE_FALSE(read);
+  CHECK(read.error().code == orbis::errc::malformed);
+  CHECK(read.error().to_string().find("has several scans, and too many pixels for that") != std::string::npos);
 }
 
 TEST_CASE("a damaged JPEG is given up at the first thing that is wrong") {

@@ -218,13 +218,19 @@ TEST_CASE("compressed texts in a PNG take no memory") {
 TEST_CASE("an image file is written whole or the error says why not") {
   const orbis::test::temporary_folder folder;
   const auto depth = pattern<std::uint16_t>(8, 8);
+  const auto files = [&] {  // hidden and temporary ones, too
+    return std::distance(std::filesystem::directory_iterator{folder.path()}, std::filesystem::directory_iterator{});
+  };
   REQUIRE(io::write_png(folder / "d.png", depth));
-  CHECK_FALSE(std::filesystem::exists(folder / "d.png.part"));
+  CHECK(files() == 1);
   const auto nowhere = io::write_png(folder / "missing" / "d.png", depth);
   REQUIRE_FALSE(nowhere);
   CHECK(nowhere.error().code == orbis::errc::write_failed);
   const auto empty = io::write_png(folder / "e.png", image<rgb8>{});
   REQUIRE_FALSE(empty);
   CHECK(empty.error().code == orbis::errc::invalid_argument);
-  CHECK_FALSE(std::filesystem::exists(folder / "e.png"));
+  CHECK(files() == 1);
+  std::filesystem::create_directories(folder / "f.png" / "full");
+  CHECK(io::write_png(folder / "f.png", depth).error().code == orbis::errc::write_failed);
+  CHECK(files() == 2);
 }

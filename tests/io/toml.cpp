@@ -28,6 +28,17 @@ TEST_CASE("what is no TOML is refused with its place and ends no program") {
     CHECK(message("a = 1\n " + head + "\nb = 1") == "f.toml: not TOML: a table without a name");
 }
 
+TEST_CASE("letters beyond ASCII stand in strings and comments only") {
+  const auto message = [](const std::string& text) { return io::parse_toml(text, "f.toml").error().to_string(); };
+  for (const std::string bad : {R"(ä = 1)", "a\xef\xbb\x81 = 1", R"(a = ä)", "a = 1 \xc2\xa0", R"(a = '#' ä)",
+                                R"(a = "\"" ä)", R"(a = ""ä"")", R"(a = '''x'''''ä)", "a = 1 # b\nä = 2"})
+    CHECK(message(bad) == "f.toml: not TOML: letters beyond ASCII want quotes");
+  for (const std::string good : {R"(# ä)", R"("ä" = 'ä')", R"(a = "\"ä" # ä)", R"(a = '\' # ä)", R"(a = '' # ä)",
+                                 "a = \"\"\"ä\nä\"\"ä\"\"\"\"\" # '", "a = '''ä\n'ä'''\nb = 'ä'"})
+    CHECK(io::parse_toml(good));
+  CHECK(io::parse_toml("a = \"ä\"").value()["a"].value<std::string>() == "ä");
+}
+
 TEST_CASE("a file of settings has an end") {
   const orbis::test::temporary_folder folder;
   const std::string largest = "#" + std::string(io::max_toml_bytes - 1, '.');

@@ -32,6 +32,8 @@ using depth_image = orbis::image<std::uint16_t>;
 /// The camera of `info`. `rectified`: of images that have been rectified.
 result<orbis::camera::any_camera> camera_of(const ros_messages::camera_info& info, bool rectified,
                                             const std::string& where) {
+  if (info.width == 0 || info.height == 0 || info.width > 65536 || info.height > 65536)
+    return fail(errc::malformed, where, "has no camera whose images have a size: is the camera calibrated?");
   const auto width = static_cast<int>(info.width), height = static_cast<int>(info.height);
   const orbis::camera::intrinsics k =
       rectified && info.P[0] > 0.0
@@ -52,7 +54,7 @@ result<orbis::camera::any_camera> camera_of(const ros_messages::camera_info& inf
     return orbis::camera::any_camera{
         orbis::camera::radial_tangential{k, {at(0), at(1), at(2), at(3), at(4), at(5), at(6), at(7)}}};
   return fail(errc::unsupported, where,
-              "distortion model \"" + info.distortion_model + "\" with " + std::to_string(d.size()) +
+              "distortion model \"" + in_short(info.distortion_model) + "\" with " + std::to_string(d.size()) +
                   " numbers is not one of plumb_bob, rational_polynomial, equidistant");
 }
 
@@ -169,7 +171,7 @@ class bag_recording final : public file_recording {
 
   [[nodiscard]] std::string topics_in_words() const {
     std::string text;
-    for (const auto& [name, t] : topics_) text += (text.empty() ? "" : ", ") + name + " (" + t.encoding + ")";
+    for (const auto& [name, t] : topics_) text += (text.empty() ? "" : ", ") + name + " (" + in_short(t.encoding) + ")";
     return text.empty() ? "there are no images in it" : "there are " + text;
   }
 

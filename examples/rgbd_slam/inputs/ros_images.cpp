@@ -51,7 +51,8 @@ std::size_t bytes_of(std::string_view encoding) {
 
 result<void> check_pixels(const ros_messages::image& m, const std::string& where) {
   const std::size_t bytes = bytes_of(m.encoding);
-  if (bytes == 0) return fail(errc::unsupported, where, "images in the encoding " + m.encoding + " are not read");
+  if (bytes == 0)
+    return fail(errc::unsupported, where, "images in the encoding " + in_short(m.encoding) + " are not read");
   if (m.width == 0 || m.height == 0 || m.width > 65536 || m.height > 65536 || m.step < m.width * bytes ||
       m.data.size() < std::size_t{m.step} * m.height)
     return fail(errc::malformed, where, "an image has fewer pixels than its size says");
@@ -112,16 +113,16 @@ result<color_image> color_of(const ros_messages::compressed_image& m, const std:
   const std::string_view bytes = bytes_in(m);
   const bool has_colors = contains(m.format, "compressed bgr") || contains(m.format, "compressed rgb");
   if (m.format.starts_with("bayer_") && !has_colors)
-    return fail(errc::unsupported, where, "compressed images in the encoding " + m.format + " are not read");
+    return fail(errc::unsupported, where, "compressed images in the encoding " + in_short(m.format) + " are not read");
   if (orbis::io::is_png(bytes)) return orbis::io::decode_png_color(bytes, where);
   if (orbis::io::is_jpeg(bytes)) return orbis::io::decode_jpeg(bytes, where);
-  return fail(errc::unsupported, where, "is neither PNG nor JPEG; its format says \"" + m.format + "\"");
+  return fail(errc::unsupported, where, "is neither PNG nor JPEG; its format says \"" + in_short(m.format) + "\"");
 }
 
 result<depth_image> depth_of(const ros_messages::image& m, const std::string& where) {
   if (auto ok = check_pixels(m, where); !ok) return fail(ok.error());
   if (!is_depth_encoding(m.encoding))
-    return fail(errc::unsupported, where, "is no depth image: its encoding is " + m.encoding);
+    return fail(errc::unsupported, where, "is no depth image: its encoding is " + in_short(m.encoding));
   const bool in_metres = is_in_metres(m.encoding),
              swap = (m.is_bigendian != 0) == (std::endian::native == std::endian::little);
   depth_image out(static_cast<int>(m.width), static_cast<int>(m.height));
@@ -138,7 +139,7 @@ result<depth_image> depth_of(const ros_messages::compressed_image& m, const std:
   const bool has_header = contains(m.format, "compressedDepth");
   std::string_view bytes = bytes_in(m);
   if (!is_depth_encoding(m.format) || contains(m.format, "rvl") || (is_in_metres(m.format) && !has_header))
-    return fail(errc::unsupported, where, "compressed depth in the format \"" + m.format + "\" is not read");
+    return fail(errc::unsupported, where, "compressed depth in the format \"" + in_short(m.format) + "\" is not read");
   if (has_header) bytes.remove_prefix(std::min(header, bytes.size()));
   if (!orbis::io::is_png(bytes)) return fail(errc::malformed, where, "a compressed depth image holds no PNG");
   auto out = orbis::io::decode_png_depth(bytes, where);

@@ -5,6 +5,7 @@
 /// CODEC".
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <string_view>
@@ -24,6 +25,12 @@ inline constexpr double metres_scale = 5000.0;
 [[nodiscard]] bool is_in_metres(std::string_view encoding);
 /// Whether images of this encoding are read (not: formats).
 [[nodiscard]] bool is_known_encoding(std::string_view encoding);
+
+/// A name out of a message, as errors have it: no longer than a line.
+[[nodiscard]] inline std::string in_short(std::string_view name) {
+  constexpr std::size_t most = 60;
+  return name.size() <= most ? std::string{name} : std::string{name.substr(0, most)} + "...";
+}
 
 /// A grey or colour image, or the mosaic of a colour filter (Bayer) with the colours between its pixels filled in.
 /// `where` names the source in errors. Errors: unsupported (another encoding, which is named), malformed (fewer pixels

@@ -47,6 +47,38 @@ namespace detail {
   return true;
 }
 
+/// Whether all is ASCII that stands beside strings and comments, as TOML wants it: toml++ 3.3 asks of some other
+/// characters whether they are blanks, and does not know.
+[[nodiscard]] inline bool is_ascii_beside_texts(std::string_view text) noexcept {
+  if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
+  for (std::size_t i = 0; i < text.size();) {
+    const char c = text[i];
+    if (static_cast<unsigned char>(c) >= 0x80) return false;
+    if (c == '#') {
+      i = std::min(text.find_first_of("\n\v\f\r", i), text.size());
+      continue;
+    }
+    if (c != '"' && c != '\'') {
+      ++i;
+      continue;
+    }
+    const std::string_view three = c == '"' ? "\"\"\"" : "'''";
+    const bool has_lines = text.substr(i).starts_with(three);
+    for (i += has_lines ? 3 : 1; i < text.size(); ++i) {
+      if (c == '"' && text[i] == '\\') {
+        ++i;  // whatever it is
+      } else if (!has_lines && text[i] == '\n') {
+        break;  // an error, where toml++ ends
+      } else if (text[i] == c && (!has_lines || text.substr(i).starts_with(three))) {
+        i += has_lines ? 3 : 1;
+        for (int more = 0; has_lines && more != 2 && i < text.size() && text[i] == c; ++more) ++i;  // of the string
+        break;
+      }
+    }
+  }
+  return true;
+}
+
 }  // namespace detail
 
 /// The table that `text` is. `where` names the source in errors. Errors: malformed, with the line where it is known (no
@@ -56,6 +88,7 @@ namespace detail {
   if (text.size() > max_toml_bytes) return reject("is too large for a file of settings");
   if (!is_utf8(text)) return reject("not TOML: no UTF-8");
   if (!detail::has_keys_in_heads(text)) return reject("not TOML: a table without a name");
+  if (!detail::is_ascii_beside_texts(text)) return reject("not TOML: letters beyond ASCII want quotes");
   try {
     return toml::parse(text, std::string_view{});
   } catch (const toml::parse_error& e) {

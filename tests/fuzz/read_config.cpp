@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// Any bytes as the file of rgbd_slam --config, for the command that the first byte names. There are settings, each
+// within its bounds, or one line that says what is wrong.
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <string_view>
+#include <system_error>
+#include <variant>
+
+#include <unistd.h>
+
+// Its source, so that the fuzzer sees into it.
+#include "fuzz/target.hpp"
+#include "rgbd_slam/command_line.cpp"
+
+namespace {
+
+using namespace orbis;
+
+/// A file of this process, gone when the program is.
+class own_file {
+ public:
+  own_file() : path_{std::filesystem::temp_directory_path() / ("orbis_fuzz_" + std::to_string(::getpid()) + ".toml")} {}
+  own_file(const own_file&) = delete;
+  own_file& operator=(const own_file&) = delete;
+  ~own_file() {
+    std::error_code ignored;
+    std::filesystem::remove(path_, ignored);
+  }
+  [[nodiscard]] std::string path() const { return path_.string(); }
+  void write(std::string_view bytes) const {
+    std::error_code ignored;
+    std::filesystem::remove(path_, ignored);  // cutting a file short makes some file systems write it out at once
+    std::ofstream out{path_, std::ios::binary};
+    out.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+    fuzz::require(out.good(), "the file can be written");
+  }
+
+ private:
+  std::filesystem::path path_;
+};
+
+/// What `work` writes on the standard error.
+template <class Work>
+[[nodiscard]] std::string complaint_of(Work&& work) {
+  static std::FILE* const file = std::tmpfile();
+  fuzz::require(file != nullptr && ::ftruncate(::fileno(file), 0) == 0, "a temporary file can be written");
+  ::lseek(::fileno(file), 0, SEEK_SET);
+  const int kept = ::dup(STDERR_FILENO);
+  const auto restore = [&] {
+    ::dup2(kept, STDERR_FILENO);
+    ::close(kept);
+  };
+  ::dup2(::fileno(file), STDERR_FILENO);
+  try {
+    work();
+  } catch (...) {  // which is to be seen
+    restore();
+    throw;
+  }
+  restore();
+  std::string said(static_cast<std::size_t>(::lseek(::fileno(file), 0, SEEK_CUR)), '\0');
+  fuzz::require(::pread(::fileno(file), said.data(), said.size(), 0) == static_cast<::ssize_t>(said.size()),
+                "a temporary file can be read");
+  return said;
+}
+
+template <class List, class T>
+[[nodiscard]] bool is_one_of(const List& list, const T& value) {
+  return std::find(std::begin(list), std::end(list), value) != std::end(list);
+}
+
+void check(const app::settings& s) {
+  const auto within = [](double v, double low, double high) { return v >= low && v <= high; };
+  fuzz::require(within(s.resolution, 0.001, 10.0) && within(s.radius, 1e-6, 1000.0) && within(s.sigma, 0.0, 1000.0),
+                "numbers of the map are within their bounds");
+  fuzz::require(within(s.robot_radius, 0.001, 10.0) && within(s.robot_height, 0.001, 10.0), "a robot has a size");
+  fuzz::require(!s.max_depth || within(*s.max_depth, 0.1, 1000.0), "so is the depth");
+  fuzz::require(!s.read_out_ms || within(*s.read_out_ms, 0.0, 200.0), "so is the time of the shutter");
+  fuzz::require(s.stride >= 1 && s.stride <= 100'000'000 && s.frames <= 100'000'000, "so are numbers of frames");
+  fuzz::require(s.width >= 160 && s.width <= 1920 && s.threads <= 1024 && s.viewer_port <= 65535, "and all others");
+  fuzz::require(!s.neighbors || (*s.neighbors >= 1 && *s.neighbors <= 100'000), "and neighbours");
+  fuzz::require(is_one_of(app::filter_names(), s.filter) && is_one_of(app::profile_names(), s.profile),
+                "names are those that are known");
+  fuzz::require(is_one_of(std::array{"auto", "rgbd", "stereo", "mono"}, s.sensor), "and so are sensors");
+  fuzz::require(!s.gravity || (s.gravity->allFinite() && !s.gravity->isZero()), "gravity has a direction");
+  fuzz::require(!s.origin || s.origin->allFinite(), "an origin is a point");
+  fuzz::require(!s.out.empty(), "what the command line says stays");
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  if (size == 0) return 0;
+  static const own_file file;
+  file.write({reinterpret_cast<const char*>(data) + 1, size - 1});
+  constexpr std::array commands{"run", "demo", "live", "map"};
+  std::array<std::string, 7> words{"rgbd_slam", commands[data[0] % 4U], "--out", "somewhere", "--config", file.path(),
+                                   "recording"};
+  std::array<char*, 7> arguments{};
+  std::transform(words.begin(), words.end(), arguments.begin(), [](std::string& w) { return w.data(); });
+  const int count = words[1] == "demo" ? 6 : 7;  // which has no recording
+
+  std::variant<app::settings, app::exit_code> got;
+  const std::string said = complaint_of([&] { got = app::read_command_line(count, arguments.data()); });
+  if (const auto* const s = std::get_if<app::settings>(&got)) {
+    fuzz::require(said.empty(), "there is nothing to complain about");
+    check(*s);
+  } else {
+    const auto code = std::get<app::exit_code>(got);
+    fuzz::require(code == app::bad_usage || code == app::bad_input, "an exit code says what kind of fault it is");
+    fuzz::require(said.starts_with("rgbd_slam: ") && said.find('\n') + 1 == said.size(), "one line says what is wrong");
+  }
+  return 0;
+}
