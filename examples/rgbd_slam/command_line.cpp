@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <sstream>
 #include <string>
 #include <tuple>
@@ -187,8 +188,8 @@ void add_shutter_option(CLI::App& cmd, settings& s) {
   cmd.add_option_function<std::string>(
          "--read-out-ms",
          [&s](const std::string& value) {
-           double ms = 0.0;  // read as the check reads it: std::stod throws at what is next to nothing
-           if (value != "auto" && CLI::detail::lexical_cast(value, ms)) s.read_out_ms = ms;
+           // The check has seen that it is a number; std::stod throws at what is next to nothing.
+           if (value != "auto") s.read_out_ms = std::strtod(value.c_str(), nullptr);
          },
          "in how many milliseconds the camera's rolling shutter reads an image, the top row first; 0: a global "
          "shutter; "
