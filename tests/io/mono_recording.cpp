@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include <orbis/io/mono_recording.hpp>
+#include <orbis/io/recording.hpp>
 #include <orbis/io/stereo_recording.hpp>
 
 #include "io/recordings.hpp"
