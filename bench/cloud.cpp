@@ -161,7 +161,7 @@ void add_select(std::size_t n) {
 }
 
 [[maybe_unused]] const bool registered = [] {
-  for (const std::size_t k : {8U, 50U}) add_neighbors(100'000, k);
+  for (const std::size_t k : {1U, 8U, 50U}) add_neighbors(100'000, k);
   for (const bool shuffled : {false, true}) {
     add_radius(300'000, shuffled, {.radius = 0.02, .min_neighbors = 5});
     add_radius(300'000, shuffled, {.radius = 0.05, .min_neighbors = 50});
