@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <charconv>
 #include <cstdint>
+#include <exception>
+#include <new>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -86,6 +88,12 @@ inline void limit_memory() {
   limit.rlim_cur = limit.rlim_max == RLIM_INFINITY ? most : std::min<rlim_t>(most, limit.rlim_max);
   ::setrlimit(RLIMIT_DATA, &limit);
 #endif
+}
+
+/// Why a program gives up that `e` has come to the end of.
+[[nodiscard]] inline std::string why_it_gave_up(const std::exception& e) {
+  const bool no_memory = dynamic_cast<const std::bad_alloc*>(&e) != nullptr;
+  return std::string{"gave up: "} + (no_memory ? "there is not enough memory" : e.what());
 }
 
 }  // namespace examples

@@ -72,5 +72,5 @@ int main(int argc, char** argv) try {
   if (scan.used == 0) return complain(2, input + ": no depth in it lies in the map");
   if (const auto done = write_bt(map, output); !done) return complain(2, done.error().to_string());
 } catch (const std::exception& e) {  // no memory, no threads
-  return complain(2, std::string{"gave up: "} + e.what());
+  return complain(2, examples::why_it_gave_up(e));
 }

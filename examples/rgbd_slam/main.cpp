@@ -43,7 +43,7 @@ int main(int argc, char** argv) {
       case app::command::calibrate: return app::calibrate(settings, console);
     }
   } catch (const std::exception& e) {  // no memory, no threads
-    console.error({orbis::errc::unreadable, {}, std::string{"gave up: "} + e.what()});
+    console.error({orbis::errc::unreadable, {}, examples::why_it_gave_up(e)});
   }
   return app::bad_input;
 }
