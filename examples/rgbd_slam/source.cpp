@@ -64,15 +64,13 @@ source_frame with_right(orbis::camera::stereo_frame pair) {
 }
 
 /// What is taken off all positions, so that results are near their origin; tells the user if that is something.
-orbis::vec3 take_origin_off(frame_source& source) {
-  const orbis::vec3 origin = source.ground_truth.empty()
-                                 ? orbis::vec3::Zero()
-                                 : examples::nearby_origin(source.ground_truth.front().T_world_camera.translation());
+void take_origin_off(frame_source& source) {
+  if (source.ground_truth.empty()) return;
+  const orbis::vec3 origin = examples::nearby_origin(source.ground_truth.front().T_world_camera.translation());
+  source.origin = origin;
   for (orbis::stamped_pose& p : source.ground_truth)
     p.T_world_camera = {p.T_world_camera.rotation(), p.T_world_camera.translation() - origin};
   if (!origin.isZero()) source.notes.push_back(origin_note(origin));
-  source.origin = origin;
-  return origin;
 }
 
 /// What is the same for recordings of any sensor.
@@ -114,8 +112,8 @@ result<frame_source> open_stereo_recording(const settings& s) {
   const auto recording = std::make_shared<const orbis::io::stereo_recording>(*std::move(opened));
   frame_source source = describe(*recording, "stereo recording", s);
   source.sensor = sensor_kind::stereo;
-  const orbis::vec3 origin = take_origin_off(source);
-  source.frame = [recording, origin, stride = s.stride](std::size_t i) -> result<source_frame> {
+  take_origin_off(source);
+  source.frame = [recording, origin = source.origin, stride = s.stride](std::size_t i) -> result<source_frame> {
     auto pair = moved(recording->frame(i * stride), origin);
     if (!pair) return fail(pair.error());
     return with_right(*std::move(pair));
@@ -152,8 +150,8 @@ result<frame_source> open_recording(const settings& s) {
 
   const auto recording = std::make_shared<const orbis::io::recording>(*std::move(opened));
   frame_source source = describe(*recording, "recording", s);
-  const orbis::vec3 origin = take_origin_off(source);
-  source.frame = [recording, origin, stride = s.stride](std::size_t i) -> result<source_frame> {
+  take_origin_off(source);
+  source.frame = [recording, origin = source.origin, stride = s.stride](std::size_t i) -> result<source_frame> {
     auto frame = moved(recording->frame(i * stride), origin);
     if (!frame) return fail(frame.error());
     return with_depth(*std::move(frame));

@@ -359,11 +359,7 @@ class session {
     // Many long rays through large leaves make more nodes than can be looked at in a second.
     for (vec3f& p : s.points) {
       const double length = std::min(static_cast<double>((p - origin).norm()), s.options.max_range);
-      const double voxels = 1.75 * length / resolution;
-      if (voxels <= voxels_left_)
-        voxels_left_ -= voxels;
-      else
-        p = origin;
+      if (!rays_.take(length, resolution)) p = origin;
     }
     s.alone.integrate(s.points, s.origin, s.options);
     return s;
@@ -538,7 +534,7 @@ class session {
   std::optional<map> copy_;
   std::optional<voxels> copied_;
   std::uint64_t changes_ = 0;
-  double voxels_left_ = 1500.0;  ///< so many voxels all rays from now on may pass through, about
+  fuzz::ray_budget rays_{1500.0};
 };
 
 }  // namespace

@@ -27,8 +27,7 @@ struct scan {
   bool tame = true;  ///< everything is near, so that many copies can be afforded
 };
 
-/// `voxels_left`: how many voxels all rays from now on may pass through, about.
-[[nodiscard]] scan next_scan(source& from, double resolution, double& voxels_left) {
+[[nodiscard]] scan next_scan(source& from, double resolution, fuzz::ray_budget& rays) {
   constexpr double ranges[] = {std::numeric_limits<double>::infinity(), 0.0, 1.0, 7.25};  // voxels
   constexpr int most_points = 48, most_wild_points = 4;
   const unsigned flags = from.byte();
@@ -47,11 +46,7 @@ struct scan {
     // Many long rays take OctoMap, and what looks at the map, too long.
     if (octree::voxel_grid{resolution}.key(p)) {
       const double length = std::min<double>((p - s.origin).cast<double>().norm(), s.options.max_range);
-      const double voxels = 1.75 * length / resolution;
-      if (voxels <= voxels_left)
-        voxels_left -= voxels;
-      else  // or it is no number
-        p = s.origin;
+      if (!rays.take(length, resolution)) p = s.origin;
     }
     s.points.push_back(p);
   }
@@ -101,9 +96,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   fuzz::map ours{resolution}, shuffled{resolution};
   octomap::OcTree theirs{resolution};
   bool comparable = true;
-  double voxels_left = 32000.0;  // with sanitizers half a second
+  fuzz::ray_budget rays{32000.0};  // with sanitizers half a second
   for (int scans = 0; scans != 4 && !from.empty(); ++scans) {
-    scan s = next_scan(from, resolution, voxels_left);
+    scan s = next_scan(from, resolution, rays);
     const auto done = ours.integrate(s.points, s.origin, s.options);
     check_summary(s, done);
     comparable = insert_into_octomap(theirs, s) && comparable;

@@ -40,6 +40,22 @@ inline constexpr std::size_t memory_for_any_file = 8192;
 /// What follows a file's header.
 [[nodiscard]] inline std::string data_of(const std::string& file) { return file.substr(file.find("\ndata\n") + 6); }
 /// OctoMap reports on the standard error what it does; not while this lives.
+/// How many voxels all rays of an input may pass through together, about: what bounds the time that it may take.
+class ray_budget {
+ public:
+  explicit ray_budget(double voxels) : left_{voxels} {}
+  /// Whether a ray of `length` still may; takes it off if so. Not one whose length is no number.
+  [[nodiscard]] bool take(double length, double resolution) {
+    const double voxels = 1.75 * length / resolution;
+    if (!(voxels <= left_)) return false;
+    left_ -= voxels;
+    return true;
+  }
+
+ private:
+  double left_;
+};
+
 class octomap_silence {
  public:
   octomap_silence() : kept_{dup(STDERR_FILENO)} {

@@ -115,9 +115,13 @@ class nearest_search {
         found_(leaf_width * stride_),
         places_(with_places ? leaf_width * stride_ : 0),
         hoped_{1.0F + 1.7F / std::sqrt(static_cast<float>(wanted))},
-        reach_{1.5F * hoped_},
-        most_spread_{with_places && is_few(wanted - 1) ? 128.0F : 32.0F},
-        spare_{with_places && is_few(wanted - 1) ? 4.0F : 1.3F} {}
+        reach_{1.5F * hoped_} {
+    // Of few neighbours the furthest is near beside the size of a leaf: what is a little further away is hardly more.
+    if (with_places && is_few(wanted - 1)) {
+      most_spread_ = 128.0F;
+      spare_ = 4.0F;
+    }
+  }
 
   /// Searches for the points of one leaf, then calls `f(i, found, bound)` for the i-th of them in any
   /// order. `found`: squared distances up to `bound`, the nearest among them; fewer than `wanted` where
@@ -432,11 +436,10 @@ class nearest_search {
   std::array<float, leaf_width> bounds_{};
   std::array<bool, leaf_width> has_places_{};
   std::array<float, leaf_width> largest_{};  ///< the squared distance to the `wanted`-th nearest
-  float hoped_;  ///< what of `usual_` should suffice: its scatter falls with the number of neighbours
-  float reach_;  ///< what of `usual_` should suffice in any case
-  // Of few neighbours the furthest is near beside the size of a leaf: what is a little further away is hardly more.
-  float most_spread_;        ///< squared, of points that share candidates, by `usual_`
-  float spare_;              ///< how much further than a leaf wants the rows near to it are looked for, squared
+  float hoped_;              ///< what of `usual_` should suffice: its scatter falls with the number of neighbours
+  float reach_;              ///< what of `usual_` should suffice in any case
+  float most_spread_ = 32;   ///< squared, of points that share candidates, by `usual_`
+  float spare_ = 1.3F;       ///< how much further than a leaf wants the rows near to it are looked for, squared
   float shared_reach_ = -1;  ///< squared distance from the run's box within which `shared_` is all there is
   float usual_ = -1;         ///< squared distance to the `wanted`-th nearest; negative where not known yet
 };

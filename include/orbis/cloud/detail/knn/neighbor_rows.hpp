@@ -42,13 +42,10 @@ inline float write_row(rank_sorter& gathered, std::uint32_t self, std::span<neig
 /// Writes the i-th point's row of what `few_nearest` has found.
 template <std::size_t Width>
 void write_few(const few_rows<Width>& rows, std::size_t i, std::span<neighbor<float>> row) {
-  bool in_order = true;
-  for (std::size_t n = 0; n != Width; ++n) {
-    row[n] = {rows.index[n][i], std::sqrt(rows.squared[n][i])};
-    // Different squares can have the same root.
-    in_order = in_order && (n == 0 || row[n].distance != row[n - 1].distance || row[n].index > row[n - 1].index);
-  }
-  if (!in_order) std::sort(row.begin(), row.end(), nearest_sink<float>::less);
+  for (std::size_t n = 0; n != Width; ++n) row[n] = {rows.index[n][i], std::sqrt(rows.squared[n][i])};
+  // Different squares can have the same root.
+  constexpr auto less = nearest_sink<float>::less;
+  if (!std::is_sorted(row.begin(), row.end(), less)) std::sort(row.begin(), row.end(), less);
 }
 
 /// Writes the row of the i-th point of leaf `l` from what `search` has found for it: `found`, up to `bound`, squared.
