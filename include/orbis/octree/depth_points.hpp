@@ -37,8 +37,9 @@ class pixel_rays {
     if constexpr (std::same_as<Camera, camera::any_camera>) {
       camera.visit([&](const auto& model) { fit(model); });
     } else {
+      [[maybe_unused]] Camera* last = nullptr;
       if constexpr (std::regular<Camera>) {
-        const auto* last = std::any_cast<Camera>(&camera_);
+        last = std::any_cast<Camera>(&camera_);
         if (last != nullptr && *last == camera) return;
       }
       width_ = static_cast<int>(camera.width());
@@ -46,7 +47,12 @@ class pixel_rays {
       separable_ = std::same_as<Camera, camera::pinhole>;
       ++version_;
       tabulate(camera);
-      if constexpr (std::regular<Camera>) camera_ = camera;
+      if constexpr (std::regular<Camera>) {
+        if (last != nullptr)
+          *last = camera;  // in place: nothing is allocated
+        else
+          camera_ = camera;
+      }
     }
   }
 

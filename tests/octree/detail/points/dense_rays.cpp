@@ -14,6 +14,7 @@
 #include <orbis/octree/detail/points/dense_rays.hpp>
 #include <orbis/octree/detail/points/point_integrator.hpp>
 
+#include "octree/detail/points/scan_walk.hpp"
 #include "support/allocations.hpp"
 #include "support/catch.hpp"
 
@@ -21,101 +22,12 @@ using namespace orbis;
 using namespace orbis::octree;
 using namespace orbis::octree::detail;
 using octree::detail::dense_rays;
-using octree::detail::ray_batch;
+using test::free_voxels;
+using test::mark;
+using test::scan;
+using test::walk;
 
 namespace {
-
-/// The free voxels of some bricks, by name.
-using voxels = std::map<std::uint64_t, std::array<std::uint64_t, 8>>;
-
-/// Without `hidden`, if any.
-[[nodiscard]] voxels free_voxels(const scan_masks& masks, const scan_masks* hidden) {
-  voxels all;
-  for (const scan_brick& b : masks.bricks()) {
-    auto free = b.free;
-    std::uint64_t any = 0;
-    const scan_brick* const hide = hidden != nullptr ? hidden->find(b.name) : nullptr;
-    for (std::size_t i = 0; i != 8; ++i) {
-      free[i] &= ~b.occupied[i];
-      if (hide != nullptr) free[i] &= ~hide->free[i];
-      any |= free[i];
-    }
-    if (any != 0) all[b.name] = free;
-  }
-  return all;
-}
-
-struct scan {
-  voxel_grid grid;
-  float3 origin;
-  std::vector<float3> points{};
-  double limit = std::numeric_limits<double>::infinity();
-
-  [[nodiscard]] ray_endpoint end_of(std::size_t i) const {
-    const float3 ray = difference(points[i], origin);
-    ray_endpoint e;
-    e.point = length(ray) <= limit ? points[i] : cut_off(origin, ray, length(ray), limit);
-    if (const auto k = grid.key(e.point)) e.key = *k;
-    return e;
-  }
-};
-
-/// Marks a scan however many or few its rays are for the voxels; false if it cannot be done.
-template <class Policy>
-[[nodiscard]] bool mark(const Policy& policy, dense_rays& rays, const scan& s, scan_masks& masks,
-                        const scan_masks* hidden = nullptr) {
-  const std::size_t count = s.points.size();
-  const auto point = [&](std::size_t i) { return s.points[i]; };
-  // Whether it is the fastest way does not matter here.
-  [[maybe_unused]] const bool pays = rays.plan(s.grid, s.origin, count, point, [&](std::size_t) { return s.limit; });
-  const std::size_t workers = policy.threads(), share = (count / workers + 256) & ~std::size_t{255};
-  const auto range = [&](std::size_t w) {
-    return std::pair{std::min(count, w * share), std::min(count, (w + 1) * share)};
-  };
-  const voxel_key from = *s.grid.key(s.origin);
-  const auto points = std::make_unique<point_batch>();
-  const auto batch = std::make_unique<ray_batch>();
-  std::array<double, point_batch::capacity> limits;
-  limits.fill(s.limit);
-  masks.clear();
-  rays.start(s.origin, count, workers);
-  for (std::size_t w = 0; w != workers; ++w) {
-    const auto [begin, end] = range(w);
-    for (std::size_t i = begin; i < end; i += point_batch::capacity) {
-      const std::size_t n = std::min(end - i, point_batch::capacity);
-      load_points(point, i, n, *points);
-      limit_rays()({s.grid, s.origin, from}, *points, limits.data(), n, *batch);
-      for (std::size_t k = 0; k != n; ++k)
-        if ((batch->hit[k >> 6U] >> (k & 63U) & 1U) != 0) masks.mark_occupied(s.end_of(i + k).key);
-      rays.add(w, *batch, i, n);
-      for (std::size_t k = 0; k != n; ++k)
-        if (((batch->hit[k >> 6U] | batch->cut[k >> 6U]) >> (k & 63U) & 1U) != 0)
-          masks.mark_ray(s.grid, s.origin, from, s.end_of(i + k).point, s.end_of(i + k).key);
-    }
-  }
-  const vec3 centre{static_cast<double>(s.origin[0]), static_cast<double>(s.origin[1]),
-                    static_cast<double>(s.origin[2])};
-  const auto saturated = [&](std::uint64_t name, std::array<std::uint64_t, 8>& mask) {
-    const scan_brick* const hide = hidden != nullptr ? hidden->find(name) : nullptr;
-    if (hide != nullptr)
-      for (std::size_t i = 0; i != 8; ++i) mask[i] |= hide->free[i];
-  };
-  const auto end_of = [&](std::uint32_t i) { return s.end_of(i); };
-  return rays.mark(policy, depth_sensor{s.grid, se3{so3{}, centre}, s.limit}, range, end_of, masks, saturated);
-}
-
-/// Ray by ray.
-void walk(const scan& s, scan_masks& masks) {
-  masks.clear();
-  const voxel_key from = *s.grid.key(s.origin);
-  for (std::size_t i = 0; i != s.points.size(); ++i) {
-    const double distance = length(difference(s.points[i], s.origin));
-    const ray_endpoint e = s.end_of(i);
-    if (!std::isfinite(static_cast<float>(distance)) || !s.grid.key(e.point)) continue;
-    masks.mark_ray(s.grid, s.origin, from, e.point, e.key);
-    if (distance <= s.limit) masks.mark_occupied(e.key);
-  }
-}
 
 /// A scan of one of several kinds.
 [[nodiscard]] scan random_scan(random_bits& random, std::uint64_t kind, double voxel, const vec3& origin) {

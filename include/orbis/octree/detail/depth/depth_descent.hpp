@@ -5,11 +5,13 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
 
+#include <orbis/core/execution.hpp>
 #include <orbis/octree/detail/depth/view_frame.hpp>
 #include <orbis/octree/detail/depth/voxel_ray_test.hpp>
 #include <orbis/octree/detail/storage/node_name.hpp>
@@ -170,8 +172,7 @@ struct depth_descent {
     return false;
   }
   [[nodiscard]] bool test_box(const voxel_test& test, const pixel_box& box, float near_z) const {
-    if ((box.u1 - box.u0) * (box.v1 - box.v0) < 1024)
-      return rays.test(test, box, near_z, own.unsure);
+    if ((box.u1 - box.u0) * (box.v1 - box.v0) < 1024) return rays.test(test, box, near_z, own.unsure);
     // A voxel at the camera: most of its box are rays that pass it by, tile by tile.
     constexpr std::int32_t size = 128;
     for (std::int32_t v = box.v0 & -size; v <= box.v1; v += size)
@@ -191,5 +192,28 @@ struct depth_descent {
            test_tile(test, box, near_z, u, v + half, half) || test_tile(test, box, near_z, u + half, v + half, half);
   }
 };
+
+/// Marks in `masks` the free voxels below the nodes of a frame, each of the policy's threads with a worker of its own;
+/// see depth_descent.
+template <execution_policy Policy, class Rays, class Saturated>
+void descend_nodes(const Policy& policy, const view_frame& frame, const depth_sensor& sensor, const Rays& rays,
+                   bool on_face, scan_masks& masks, Saturated& saturated, std::vector<descent_worker>& workers) {
+  workers.resize(std::clamp<std::size_t>(policy.threads(), 1, std::max<std::size_t>(1, frame.nodes.size())));
+  std::atomic<std::size_t> next{0};
+  for_each_index(policy, workers.size(), 1, [&](std::size_t i) {
+    workers[i].bricks.clear();
+    const depth_descent<Rays, Saturated> descent{frame, workers[i], sensor, rays, masks, saturated, on_face};
+    for (std::size_t n; (n = next.fetch_add(1, std::memory_order_relaxed)) < frame.nodes.size();) {
+      const view_frame::node& node = frame.nodes[n];
+      descent.descend(node.key, node.center, view_frame::list_level, node.inside);
+    }
+  });
+  for (const descent_worker& w : workers)
+    for (const auto& b : w.bricks) {
+      auto& free = masks.at(named_key(b.name)).free;
+      for (std::size_t i = 0; i != free.size(); ++i) free[i] |= b.free[i];
+    }
+  masks.mark_free(*sensor.key);
+}
 
 }  // namespace orbis::octree::detail

@@ -30,15 +30,18 @@ struct depth_frame : view_frame {
   endpoint_image ends;
   direction_index map;  ///< of cameras that are not pinholes
 
-  /// Works out what the tests need to know about the image. @pre `ends` and, if need be, `map` are its own
-  void set_scene(const depth_sensor& sensor) {
+  /// Works out what the tests need to know about the image. `ray_error`: how far rays may be from their pixels', at
+  /// z = 1. @pre `ends` and, if need be, `map` are its own
+  void set_scene(const depth_sensor& sensor, float ray_error = 0.0F) {
     const pixel_rays& rays = ends.rays();
     const int width = rays.width(), height = rays.height();
     if (rays.separable()) {
       scene.map = nullptr;
       const vec2f focal = rays.focal().cast<float>(), center = rays.center().cast<float>();
-      set_view(sensor, {focal.x(), focal.y(), center.x(), center.y(), width, height, rays.x(0)[0],
-                        rays.x(0)[width - 1], *rays.y(0), *rays.y(height - 1)});
+      set_view(sensor,
+               {focal.x(), focal.y(), center.x(), center.y(), width, height, rays.x(0)[0], rays.x(0)[width - 1],
+                *rays.y(0), *rays.y(height - 1)},
+               ray_error);
     } else {
       scene.map = &map;
       set_view(sensor, {map.focal().x(), map.focal().y(), map.center().x(), map.center().y(), width, height,
@@ -49,8 +52,11 @@ struct depth_frame : view_frame {
   /// Whether there are so many rays that it is better to look at voxels than to walk them: where there
   /// is less than a pixel for half a voxel's edge, most voxels would have to be tested one by one.
   [[nodiscard]] bool is_dense(const end_counts& counts) const {
-    const double mean_z = counts.sum_z / static_cast<double>(counts.used + counts.truncated);
-    return mean_z < 0.45 * static_cast<double>(scene.voxel) * static_cast<double>(std::max(scene.fx, scene.fy));
+    return is_dense(counts.sum_z / static_cast<double>(counts.used + counts.truncated),
+                    static_cast<double>(scene.voxel), static_cast<double>(std::max(scene.fx, scene.fy)));
+  }
+  [[nodiscard]] static bool is_dense(double mean_z, double voxel, double focal) {
+    return mean_z < 0.45 * voxel * focal;
   }
   [[nodiscard]] std::size_t memory_bytes() const noexcept {
     return view_frame::memory_bytes() + ends.memory_bytes() + map.memory_bytes();
@@ -64,8 +70,7 @@ struct depth_rays {
   const depth_sensor& sensor;
   const EndOf& end_of;
 
-  [[nodiscard]] unsigned sample(const child_offsets& o, const float3& world, const children& c,
-                                unsigned wanted) const {
+  [[nodiscard]] unsigned sample(const child_offsets& o, const float3& world, const children& c, unsigned wanted) const {
     return frame.sample(frame.scene, frame.ends, o, world, c, wanted);
   }
   [[nodiscard]] bool test(const voxel_test& t, const pixel_box& box, float near_z,

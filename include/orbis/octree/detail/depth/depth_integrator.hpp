@@ -85,8 +85,6 @@ class depth_integrator {
   }
 
  private:
-  using words = std::array<std::uint64_t, 8>;
-
   // -- one frame
 
   template <class Policy, class Depth, class Saturated>
@@ -98,22 +96,9 @@ class depth_integrator {
     frame_.list_nodes(sensor, bounds.first, bounds.second);
     const bool on_face = frame_.is_on_face(sensor);
 
-    workers_.resize(std::clamp<std::size_t>(policy.threads(), 1, std::max<std::size_t>(1, frame_.nodes.size())));
     const auto end = [&](int u, int v) { return end_of(sensor, depth, u, v); };
-    const depth_rays<decltype(end)> rays{frame_, sensor, end};
-    std::atomic<std::size_t> next{0};
-    for_each_index(policy, workers_.size(), 1, [&](std::size_t i) {
-      workers_[i].bricks.clear();
-      const depth_descent<depth_rays<decltype(end)>, Saturated> descent{frame_, workers_[i], sensor, rays,
-                                                                        masks,  saturated,   on_face};
-      for (std::size_t n; (n = next.fetch_add(1, std::memory_order_relaxed)) < frame_.nodes.size();) {
-        const depth_frame::node& node = frame_.nodes[n];
-        descent.descend(node.key, node.center, depth_frame::list_level, node.inside);
-      }
-    });
-    for (const descent_worker& w : workers_)
-      for (const auto& b : w.bricks) join(masks.at(named_key(b.name)).free, b.free);
-    masks.mark_free(*sensor.key);
+    descend_nodes(policy, frame_, sensor, depth_rays<decltype(end)>{frame_, sensor, end}, on_face, masks, saturated,
+                  workers_);
     if (on_face) {
       first_voxels around{sensor};
       for_each_end(sensor, depth, [&](const ray_endpoint& e) { around.add(e); });
@@ -153,9 +138,6 @@ class depth_integrator {
       masks.mark_ray(sensor.grid, sensor.pose.centre, *sensor.key, e.point, e.key);
       frame_.ends.clear(u, v);
     }
-  }
-  static void join(words& to, const words& from) noexcept {
-    for (std::size_t i = 0; i != 8; ++i) to[i] |= from[i];
   }
   depth_frame frame_;
   point_integrator walker_;

@@ -10,6 +10,7 @@
 #include <cassert>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include <orbis/camera/depth.hpp>
@@ -36,10 +37,9 @@ class endpoint_image {
   end_counts find_ends(const Policy& policy, const depth_sensor& sensor, const Depth& depth, const Camera& camera,
                        scan_masks& masks) {
     rays_.fit(camera);
+    resize(rays_.width(), rays_.height());
     assert(static_cast<int>(depth.width()) == rays_.width() && static_cast<int>(depth.height()) == rays_.height());
     const auto rows = static_cast<std::size_t>(rays_.height());
-    stride_ = static_cast<std::size_t>(rays_.width() + 2 * pixel_rays::padding - 1) & ~std::size_t{15};
-    z_.resize(stride_ * rows + pixel_rays::padding);
     const std::size_t chunks = (rows + rows_per_chunk - 1) / rows_per_chunk;
     workers_.resize(std::clamp<std::size_t>(policy.threads(), 1, std::max<std::size_t>(chunks, 1)));
     std::atomic<std::size_t> next{0};
@@ -62,11 +62,27 @@ class endpoint_image {
     return counts;
   }
 
+  /// Begins an image of this size whose ends are filled in through `ends()`.
+  void lay_out(int width, int height) {
+    resize(width, height);
+    std::fill(z_.end() - pixel_rays::padding, z_.end(), 0.0F);
+  }
+  /// The depths of all rows of that image, `stride()` for each.
+  [[nodiscard]] std::span<float> ends() noexcept { return std::span{z_}.first(z_.size() - pixel_rays::padding); }
+  /// Makes it the part of that image from pixel `first` of `ends()` on, the image of `camera`.
+  /// @pre there are no ends elsewhere; at least 16 columns are left over on the right
+  void crop(const camera::pinhole& camera, std::uint32_t first) {
+    rays_.fit(camera);
+    first_ = first;
+  }
+
   [[nodiscard]] const pixel_rays& rays() const noexcept { return rays_; }
   /// Forgets the end of a pixel's ray.
   void clear(int u, int v) noexcept { z_[static_cast<std::size_t>(v) * stride_ + static_cast<std::size_t>(u)] = 0.0F; }
   /// The depths (metres) at which the rays of row `v` end, 0 where there is none; padded with zeros.
-  [[nodiscard]] const float* z(int v) const noexcept { return z_.data() + static_cast<std::size_t>(v) * stride_; }
+  [[nodiscard]] const float* z(int v) const noexcept {
+    return z_.data() + first_ + static_cast<std::size_t>(v) * stride_;
+  }
   /// From row to row of `z`.
   [[nodiscard]] std::size_t stride() const noexcept { return stride_; }
   /// One number for a pixel, and back.
@@ -119,6 +135,11 @@ class endpoint_image {
     }
   };
 
+  void resize(int width, int height) {
+    stride_ = static_cast<std::size_t>(width + 2 * pixel_rays::padding - 1) & ~std::size_t{15};
+    z_.resize(stride_ * static_cast<std::size_t>(height) + pixel_rays::padding);
+    first_ = 0;
+  }
   template <class Depth>
   void add_row(worker& w, scan_masks& masks, const depth_sensor& sensor, const Depth& depth, int v) {
     float* const z = z_.data() + static_cast<std::size_t>(v) * stride_;
@@ -161,7 +182,7 @@ class endpoint_image {
   fresh_kernel* fresh_;
   pixel_rays rays_;
   std::vector<float> z_;
-  std::size_t stride_ = 0;
+  std::size_t stride_ = 0, first_ = 0;
   std::vector<worker> workers_;
 };
 

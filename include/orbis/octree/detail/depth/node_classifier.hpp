@@ -58,6 +58,11 @@ struct depth_scene {
   [[nodiscard]] float margin(float l1) const noexcept { return margin_0 + margin_1 * l1; }
 };
 
+/// A box of pixels, its last row and column included.
+struct pixel_box {
+  std::int32_t u0, u1, v0, v1;
+};
+
 /// The offsets of a node's children from its centre.
 struct child_offsets {
   alignas(32) std::array<float, 8> x{}, y{}, z{};                    ///< in the camera frame

@@ -48,7 +48,8 @@ struct view_frame {
   std::vector<node> nodes;             ///< that rays may touch, at list_level
 
   /// Works out what the tests need to know of a view; what they need of the rays themselves is up to the caller.
-  void set_view(const depth_sensor& sensor, const view_extent& e) {
+  /// `ray_error`: how far rays may be from where they are taken to be, at z = 1.
+  void set_view(const depth_sensor& sensor, const view_extent& e, float ray_error = 0.0F) {
     depth_scene& s = scene;
     const auto& rows = sensor.pose.rows;
     for (std::size_t i = 0; i != 3; ++i) {
@@ -73,14 +74,41 @@ struct view_frame {
     for (const float c : sensor.pose.centre) l1 += std::fabs(c);
     s.voxel = static_cast<float>(sensor.grid.resolution());
     s.margin_0 = u * (8.0F * l1 + 8.0F * s.voxel);
-    s.margin_1 = 64.0F * u;
-    s.pixel_margin = 0.01F + 1e-6F * (s.last_u + s.last_v);
+    s.margin_1 = 64.0F * u + ray_error;
+    s.pixel_margin = 0.01F + 1e-6F * (s.last_u + s.last_v) + ray_error * std::max(s.fx, s.fy);
     s.near_z = 0.1F * s.voxel;
     const float slope = 2.0F * (1.0F + std::max(std::fabs(s.min_x), std::fabs(s.max_x)) +
                                 std::max(std::fabs(s.min_y), std::fabs(s.max_y)));
     s.ball = 0.5F * s.voxel - 2.0F * s.margin_0;
     s.ball_slope = 2.0F * s.margin_1 * slope;
     s.pyramid = &pyramid;
+  }
+  [[nodiscard]] pixel_box all_pixels() const noexcept {
+    return {0, static_cast<std::int32_t>(scene.last_u), 0, static_cast<std::int32_t>(scene.last_v)};
+  }
+  /// Where the rays of a box of pixels are, at z = 1.
+  struct bounds_at_1 {
+    float x0, x1, y0, y1;
+  };
+  /// `room`: how far from the middle of its pixel a ray may be, pixels.
+  [[nodiscard]] bounds_at_1 bounds(const pixel_box& box, float room) const noexcept {
+    const auto edge = [&](std::int32_t pixel, float off, float centre, float per_f) {
+      return (static_cast<float>(pixel) + off - centre) * per_f;
+    };
+    return {edge(box.u0, -room, scene.cx, scene.per_fx), edge(box.u1, room, scene.cx, scene.per_fx),
+            edge(box.v0, -room, scene.cy, scene.per_fy), edge(box.v1, room, scene.cy, scene.per_fy)};
+  }
+  /// The least and the greatest coordinates of their directions in the world.
+  [[nodiscard]] std::pair<float3, float3> directions(const pixel_box& box, float room) const noexcept {
+    const auto [x0, x1, y0, y1] = bounds(box, room);
+    std::pair<float3, float3> range;
+    for (std::size_t i = 0; i != 3; ++i) {
+      const float middle = 0.5F * ((x0 + x1) * scene.x_axis[i] + (y0 + y1) * scene.y_axis[i]) + scene.z_axis[i];
+      const float half = 0.5F * ((x1 - x0) * std::fabs(scene.x_axis[i]) + (y1 - y0) * std::fabs(scene.y_axis[i]));
+      range.first[i] = middle - half;
+      range.second[i] = middle + half;
+    }
+    return range;
   }
   /// Half the diagonal of a pixel at z = 1.
   [[nodiscard]] float half_diagonal() const noexcept {

@@ -90,11 +90,6 @@ struct voxel_test {
   }
 };
 
-/// A box of pixels, its last row and column included.
-struct pixel_box {
-  std::int32_t u0, u1, v0, v1;
-};
-
 /// The numbers that decide about a ray and a cube, see voxel_test; for several rays, several cubes, or both.
 template <class V>
 struct ray_and_cube {
@@ -262,9 +257,10 @@ struct sample_children_kernel {
     using floats = simd::vec<float, 8, Target>;
     using integers = simd::vec<std::int32_t, 8, Target>;
     const integers row_size(static_cast<std::int32_t>(ends.stride()));
-    const sampled_pixels<floats, integers> at{
-        s, c, wanted, [&](const integers& u, const integers& v)
-                          ORBIS_INLINE_LAMBDA { return simd::gather(ends.z(0), v * row_size + u); }};
+    const sampled_pixels<floats, integers> at{s, c, wanted,
+                                              [&](const integers& u, const integers& v) ORBIS_INLINE_LAMBDA {
+                                                return simd::gather(ends.z(0), v * row_size + u);
+                                              }};
     const pixel_rays& rays = ends.rays();
     floats x, y;
     if (rays.separable()) {

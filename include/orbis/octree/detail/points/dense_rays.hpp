@@ -13,6 +13,7 @@
 #include <vector>
 
 #include <orbis/core/execution.hpp>
+#include <orbis/core/random.hpp>
 #include <orbis/core/simd.hpp>
 #include <orbis/octree/detail/depth/depth_descent.hpp>
 #include <orbis/octree/detail/depth/first_steps.hpp>
@@ -51,33 +52,8 @@ struct window_frame : view_frame {
     scene.tiles = {2.05F, 4.1F, 8.2F};
     set_spacing(half_diagonal());
   }
-  [[nodiscard]] pixel_box all_cells() const noexcept {
-    return {0, static_cast<std::int32_t>(scene.last_u), 0, static_cast<std::int32_t>(scene.last_v)};
-  }
-  /// Where the rays of a box of cells are, at z = 1.
-  struct bounds_at_1 {
-    float x0, x1, y0, y1;
-  };
-  [[nodiscard]] bounds_at_1 bounds(const pixel_box& box) const noexcept {
-    const float room = 0.51F + 4e-6F * scene.fx;  // beside the middle of a cell
-    const auto edge = [&](std::int32_t cell, float off, float centre) {
-      return (static_cast<float>(cell) + off - centre) * scene.per_fx;
-    };
-    return {edge(box.u0, -room, scene.cx), edge(box.u1, room, scene.cx), edge(box.v0, -room, scene.cy),
-            edge(box.v1, room, scene.cy)};
-  }
-  /// The same in the world.
-  [[nodiscard]] std::pair<float3, float3> directions(const pixel_box& box) const noexcept {
-    const auto [x0, x1, y0, y1] = bounds(box);
-    std::pair<float3, float3> range;
-    for (std::size_t i = 0; i != 3; ++i) {
-      const float middle = 0.5F * ((x0 + x1) * scene.x_axis[i] + (y0 + y1) * scene.y_axis[i]) + scene.z_axis[i];
-      const float half = 0.5F * ((x1 - x0) * std::fabs(scene.x_axis[i]) + (y1 - y0) * std::fabs(scene.y_axis[i]));
-      range.first[i] = middle - half;
-      range.second[i] = middle + half;
-    }
-    return range;
-  }
+  /// How far from the middle of its cell a ray may be, in cells.
+  [[nodiscard]] float room() const noexcept { return 0.51F + 4e-6F * scene.fx; }
 };
 
 /// The rays of a window for the descent, see depth_rays. `EndOf`: the ray_endpoint of a ray.
@@ -95,7 +71,7 @@ struct cell_rays {
   }
   [[nodiscard]] bool may_cross(const voxel_test& t, const pixel_box& part, std::int32_t, std::int32_t,
                                std::int32_t) const {
-    const auto [x0, x1, y0, y1] = frame.bounds(part);
+    const auto [x0, x1, y0, y1] = frame.bounds(part, frame.room());
     return t.may_cross(x0, x1, y0, y1);
   }
   [[nodiscard]] bool visits(std::uint32_t number, const voxel_key& voxel) const {
@@ -202,7 +178,7 @@ class dense_rays {
         }
       };
       around.add(
-          order, f.all_cells(), [&](const pixel_box& box) { return f.directions(box); }, for_each);
+          order, f.all_pixels(), [&](const pixel_box& box) { return f.directions(box, f.room()); }, for_each);
     }
     around.mark(masks);
   }
@@ -216,12 +192,10 @@ class dense_rays {
   void sample(const float3& origin, std::size_t count, Point&& point, Limit&& limit) {
     sample_.directions.clear();
     sample_.length = 0.0;
-    double part = 0.0;
+    random_bits random{1};
     for (std::size_t k = 0; k != most_sampled; ++k) {
-      // One of each stretch, not always at the same place: scans repeat themselves row by row.
-      part += 0.6180339887498949;
-      part -= part >= 1.0 ? 1.0 : 0.0;
-      const double place = (static_cast<double>(k) + part) * static_cast<double>(count) / most_sampled;
+      // Somewhere in each stretch, at random: regular steps and the rows of a scan get into step.
+      const double place = (static_cast<double>(k) + random.uniform()) * static_cast<double>(count) / most_sampled;
       const std::size_t i = std::min(static_cast<std::size_t>(place), count - 1);
       const float3 p = point(i);
       vec3 d;

@@ -22,6 +22,7 @@
 #include <orbis/core/rounded.hpp>
 #include <orbis/octree/detail/points/dense_rays.hpp>
 #include <orbis/octree/detail/points/limit_rays.hpp>
+#include <orbis/octree/detail/points/organised_rays.hpp>
 #include <orbis/octree/detail/points/point_keys.hpp>
 #include <orbis/octree/detail/points/ray_rasterizer.hpp>
 #include <orbis/octree/detail/storage/scan_masks.hpp>
@@ -66,11 +67,16 @@ class point_integrator {
     const sensor from = start(grid, origin, options);
     if (options.mode == ray_mode::every_ray) {
       const auto limit = [&](std::size_t i) { return from.limit(i); };
-      if (from.key && dense_.plan(grid, origin, count, point, limit)) {
-        if (const auto done = mark_dense(policy, from, count, point, options, saturated)) return *done;
-        for (worker& w : active_) w.clear();  // too close to the border of the grid
+      const auto done_by = [&](auto& marker) -> std::optional<integration_summary> {
+        if (!from.key || !marker.plan(grid, origin, count, point, limit)) return std::nullopt;
+        auto done = mark_by(marker, policy, from, count, point, options, saturated);
+        if (done) return done;
+        for (worker& w : active_) w.clear();
         start(grid, origin, options);
-      }
+        return std::nullopt;
+      };
+      if (const auto done = done_by(organised_)) return *done;
+      if (const auto done = done_by(dense_)) return *done;
       for_each_with_worker(policy, count, 4096, [&](worker& w, std::size_t begin, std::size_t end) {
         w.add_points(from, begin, end, point, [](std::size_t, std::size_t) {});
       });
@@ -107,7 +113,7 @@ class point_integrator {
   }
 
   [[nodiscard]] std::size_t memory_bytes() const noexcept {
-    std::size_t bytes = workers_.capacity() * sizeof(worker) + dense_.memory_bytes();
+    std::size_t bytes = workers_.capacity() * sizeof(worker) + organised_.memory_bytes() + dense_.memory_bytes();
     for (const worker& w : workers_) bytes += w.masks.memory_bytes() + w.ends.memory_bytes() + w.sweep.memory_bytes();
     return bytes;
   }
@@ -150,10 +156,10 @@ class point_integrator {
     std::array<double, point_batch::capacity> limits;
     batch_keys keys;
     ray_batch rays;
-    std::array<voxel_key, 1024> marked;  ///< some that are: points of the next row of an image end in the same voxels
+    std::array<std::uint64_t, 1024> seen;  ///< voxels that are marked: points of the next row of an image end in them
 
     void clear() noexcept {
-      marked.fill({~std::uint32_t{0}, 0, 0});
+      seen.fill(~std::uint64_t{0});
       masks.clear();
       ends.clear();
       summary = {};
@@ -189,16 +195,28 @@ class point_integrator {
       summary.rejected += count - used - cut;
       ray_batch::bits fresh;
       from.fresh_hits(rays, count, fresh);
+      // A voxel as one number. Whether it is one of those seen lately cannot be foretold, so nothing branches.
+      constexpr unsigned bits = 21;
+      static_assert(max_tree_depth <= bits);
+      std::array<std::uint64_t, ray_batch::capacity> unseen;
+      std::size_t unseen_count = 0;
       for (std::size_t word = 0; word != fresh.size(); ++word)
         for (std::uint64_t left = fresh[word]; left != 0; left &= left - 1) {
           const std::size_t i = 64 * word + static_cast<std::size_t>(std::countr_zero(left));
           const auto at = [&](std::size_t axis) { return static_cast<std::uint32_t>(rays.way[axis][i]); };
-          const voxel_key k{base.x + at(0), base.y + at(1), base.z + at(2)};
-          voxel_key& last = marked[(k.x * 5 + k.y * 37 + k.z * 331) % marked.size()];
-          if (k == last) continue;
-          last = k;
-          masks.mark_occupied(k);
+          const std::uint64_t x = base.x + at(0), y = base.y + at(1), z = base.z + at(2);
+          const std::uint64_t voxel = x | y << bits | z << 2 * bits;
+          std::uint64_t& last = seen[(x * 5 + y * 37 + z * 331) % seen.size()];
+          unseen[unseen_count] = voxel;
+          unseen_count += last != voxel ? 1 : 0;
+          last = voxel;
         }
+      for (std::size_t i = 0; i != unseen_count; ++i) {
+        const auto at = [&](unsigned axis) {
+          return static_cast<std::uint32_t>(unseen[i] >> axis * bits) & ((1U << bits) - 1);
+        };
+        masks.mark_occupied({at(0), at(1), at(2)});
+      }
     }
     /// The points [begin, end) in mode discretized.
     template <class Point>
@@ -289,13 +307,13 @@ class point_integrator {
     });
     for (worker& w : active_) w.add_batched(from);
   }
-  /// A scan for which dense_ has a plan; empty if it cannot be done.
-  template <class Policy, class Point, class Saturated>
-  std::optional<integration_summary> mark_dense(const Policy& policy, const sensor& from, std::size_t count,
-                                                Point&& point, const integration_options& options,
-                                                Saturated& saturated) {
+  /// A scan for which dense_ or organised_ has a plan; empty if it cannot be done.
+  template <class Marker, class Policy, class Point, class Saturated>
+  std::optional<integration_summary> mark_by(Marker& marker, const Policy& policy, const sensor& from,
+                                             std::size_t count, Point&& point, const integration_options& options,
+                                             Saturated& saturated) {
     const std::size_t workers = active_.size();
-    dense_.start(from.origin, count, workers);
+    marker.start(from.origin, count, workers);
     const auto range = [&](std::size_t i) {
       const std::size_t share = (count / workers + point_batch::capacity) & ~(point_batch::capacity - 1);
       return std::pair{std::min(count, i * share), std::min(count, (i + 1) * share)};
@@ -303,7 +321,7 @@ class point_integrator {
     for_each_index(policy, workers, 1, [&](std::size_t i) {
       worker& w = workers_[i];
       const auto [begin, end] = range(i);
-      w.add_points(from, begin, end, point, [&](std::size_t first, std::size_t n) { dense_.add(i, w.rays, first, n); });
+      w.add_points(from, begin, end, point, [&](std::size_t first, std::size_t n) { marker.add(i, w.rays, first, n); });
       w.sweep.flush(w.masks);
     });
     worker& all = join_workers();
@@ -311,7 +329,7 @@ class point_integrator {
                                static_cast<double>(from.origin[2])}};
     const depth_sensor camera{from.grid, pose, from.max_range};
     const auto end_of = [&](std::uint32_t i) { return from.end(point(i), from.limit(i)); };
-    if (!dense_.mark(policy, camera, range, end_of, all.masks, saturated)) return std::nullopt;
+    if (!marker.mark(policy, camera, range, end_of, all.masks, saturated)) return std::nullopt;
     clip(all.masks, from.grid, options.bounds);
     return all.summary;
   }
@@ -343,6 +361,7 @@ class point_integrator {
     });
   }
 
+  organised_rays organised_;
   dense_rays dense_;
   std::vector<worker> workers_ = std::vector<worker>(1);  ///< only ever more: their memory is kept
   std::span<worker> active_;                              ///< those of the current scan

@@ -1,0 +1,279 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// The voxels that the rays of an organised point cloud cross: one whose points are the pixels of a depth image, in
+/// their order, though nobody has said so. They are found as those of the depth image are.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <utility>
+#include <vector>
+
+#include <orbis/core/execution.hpp>
+#include <orbis/core/se3.hpp>
+#include <orbis/core/simd.hpp>
+#include <orbis/octree/detail/depth/depth_descent.hpp>
+#include <orbis/octree/detail/depth/depth_frame.hpp>
+#include <orbis/octree/detail/depth/first_steps.hpp>
+#include <orbis/octree/detail/points/limit_rays.hpp>
+#include <orbis/octree/detail/points/pinhole_fit.hpp>
+#include <orbis/octree/detail/storage/scan_masks.hpp>
+
+namespace orbis::octree::detail {
+
+/// The image that rays are placed in.
+struct pixel_placement {
+  static constexpr std::int32_t nowhere = -1;
+
+  float3 origin{};
+  std::array<float3, 3> axes{};  ///< x, y and z of the camera, in the world
+  float fx = 1, fy = 1, cx = 0, cy = 0;
+  float last_u = 0, last_v = 0;    ///< the last column and row
+  float error_u = 0, error_v = 0;  ///< how far from the middle of its pixel a ray may be
+  std::int32_t stride = 0;
+};
+
+/// The pixels of the rays of a batch, as row * stride + column, and the depths at which the rays end. `left_out`, bit
+/// i: ray i lies in the middle of no pixel.
+struct pixel_places {
+  alignas(64) std::array<std::int32_t, ray_batch::capacity> pixel;
+  alignas(64) std::array<float, ray_batch::capacity> z;
+  ray_batch::bits left_out;
+  struct bounds {  ///< of those that are placed; max_z = 0: there are none
+    float max_z = 0.0F;
+    float u0 = std::numeric_limits<float>::infinity(), u1 = -u0, v0 = u0, v1 = u1;
+
+    void add(const bounds& b) noexcept {
+      max_z = std::max(max_z, b.max_z);
+      u0 = std::min(u0, b.u0), u1 = std::max(u1, b.u1);
+      v0 = std::min(v0, b.v0), v1 = std::max(v1, b.v1);
+    }
+  } within;
+};
+
+/// Places the first `count` rays of a batch.
+struct place_in_pixels_kernel {
+  template <simd::target Target>
+  static ORBIS_ALWAYS_INLINE void run(const pixel_placement& t, const ray_batch& rays, std::size_t count,
+                                      pixel_places& places) noexcept {
+    using floats = simd::native_vec<float, Target>;
+    using integers = simd::native_vec<std::int32_t, Target>;
+    using mask = typename floats::mask_type;
+    constexpr std::size_t n = floats::count;
+    places.left_out = {};
+    constexpr float far = std::numeric_limits<float>::infinity();
+    floats max_z(0.0F), u0(far), u1(-far), v0(far), v1(-far);
+    for (std::size_t i = 0; i < count; i += n) {
+      const auto ray = [&](std::size_t axis) ORBIS_INLINE_LAMBDA {
+        return floats::load(rays.end[axis].data() + i) - floats(t.origin[axis]);
+      };
+      const auto way = [&](std::size_t axis) ORBIS_INLINE_LAMBDA { return integers::load(rays.way[axis].data() + i); };
+      const std::uint64_t there = (rays.hit[i >> 6U] | rays.cut[i >> 6U]) >> (i & 63U);
+      const mask valid = mask::from_bits(there & ((std::uint64_t{1} << n) - 1)) &
+                         simd::mask_as<4>((way(0) | way(1) | way(2)) != integers(0));  // the others visit nothing
+      const floats dx = ray(0), dy = ray(1), dz = ray(2);
+      const auto along = [&](const float3& a) ORBIS_INLINE_LAMBDA {
+        return simd::approximate_multiply_add(floats(a[0]), dx,
+                                              simd::approximate_multiply_add(floats(a[1]), dy, floats(a[2]) * dz));
+      };
+      const floats z = along(t.axes[2]), per_z = 1.0F / z;
+      const floats at_u = simd::approximate_multiply_add(floats(t.fx), along(t.axes[0]) * per_z, floats(t.cx));
+      const floats at_v = simd::approximate_multiply_add(floats(t.fy), along(t.axes[1]) * per_z, floats(t.cy));
+      const floats u = floor(at_u + 0.5F), v = floor(at_v + 0.5F);
+      const mask placed = valid & (z > std::numeric_limits<float>::min()) & (abs(at_u - u) <= t.error_u) &
+                          (abs(at_v - v) <= t.error_v) & (u >= 0.0F) & (v >= 0.0F) & (u <= t.last_u) & (v <= t.last_v);
+      max_z = max(max_z, select(placed, z, floats(0.0F)));
+      u0 = min(u0, select(placed, u, floats(far)));
+      u1 = max(u1, select(placed, u, floats(-far)));
+      v0 = min(v0, select(placed, v, floats(far)));
+      v1 = max(v1, select(placed, v, floats(-far)));
+      const integers pixel = simd::convert<std::int32_t>(select(placed, v, floats(0.0F))) * integers(t.stride) +
+                             simd::convert<std::int32_t>(select(placed, u, floats(0.0F)));
+      select(placed, pixel, integers(pixel_placement::nowhere)).store(places.pixel.data() + i);
+      z.store(places.z.data() + i);
+      places.left_out[i >> 6U] |= std::uint64_t{simd::bits(and_not(valid, placed))} << (i & 63U);
+    }
+    places.within = {greatest(max_z), -greatest(-u0), greatest(u1), -greatest(-v0), greatest(v1)};
+  }
+};
+
+using place_in_pixels = void(const pixel_placement&, const ray_batch&, std::size_t, pixel_places&);
+
+/// Collects the rays of a scan and marks their voxels. Keeps its memory from scan to scan.
+class organised_rays {
+ public:
+  /// Whether the scan's points are the pixels of a depth image that has so many of them for its voxels that this is the
+  /// way to mark them. Nothing is done otherwise. O(1). `limit(i)`: how far the i-th ray goes at most, metres
+  template <class Point, class Limit>
+  [[nodiscard]] bool plan(const voxel_grid& grid, const float3& origin, std::size_t count, Point&& point,
+                          Limit&& limit) {
+    if (count > most_rays || !fit_.fit(origin, count, point, limit)) return false;
+    const auto& k = fit_.camera().k();
+    return depth_frame::is_dense(fit_.mean_z(), grid.resolution(), std::max(k.fx, k.fy));
+  }
+  /// Begins a scan that is planned, and that `workers` threads add.
+  void start(const float3& origin, std::size_t count, std::size_t workers) {
+    const camera::pinhole& camera = fit_.camera();
+    frame_.ends.lay_out(camera.width(), camera.height());
+    pose_ = {fit_.rotation(),
+             vec3{static_cast<double>(origin[0]), static_cast<double>(origin[1]), static_cast<double>(origin[2])}};
+    const camera::float_pose pose{pose_};
+    const auto& k = camera.k();
+    placement_ = {.origin = origin,
+                  .fx = static_cast<float>(k.fx),
+                  .fy = static_cast<float>(k.fy),
+                  .cx = static_cast<float>(k.cx),
+                  .cy = static_cast<float>(k.cy),
+                  .last_u = static_cast<float>(k.width - 1),
+                  .last_v = static_cast<float>(k.height - 1),
+                  .error_u = static_cast<float>(fit_.error() * k.fx),
+                  .error_v = static_cast<float>(fit_.error() * k.fy),
+                  .stride = static_cast<std::int32_t>(frame_.ends.stride())};
+    for (std::size_t i = 0; i != 3; ++i)
+      for (std::size_t axis = 0; axis != 3; ++axis) placement_.axes[axis][i] = pose.rows[i][axis];
+    count_ = count;
+    pixel_.resize(count);
+    z_.resize(count);
+    within_.assign(workers, {});
+    numbers_.resize(frame_.ends.ends().size());
+    place_ = simd::kernel<place_in_pixels_kernel, place_in_pixels>();
+  }
+  /// Adds the rays of a batch of `count` points, from the scan's `first` on. Those that must be walked instead are what
+  /// remains in `rays`. For several workers at a time.
+  void add(std::size_t worker, ray_batch& rays, std::size_t first, std::size_t count) {
+    pixel_places places;
+    place_(placement_, rays, count, places);
+    std::copy_n(places.pixel.data(), count, pixel_.data() + first);
+    std::copy_n(places.z.data(), count, z_.data() + first);
+    within_[worker].add(places.within);
+    for (std::size_t w = 0; w != places.left_out.size(); ++w) {
+      rays.hit[w] &= places.left_out[w];
+      rays.cut[w] &= places.left_out[w];
+    }
+  }
+  /// Marks the voxels of the rays that have been added, except that voxels for which `saturated` says that a miss would
+  /// not change them may be missing, see depth_integrator::mark, and those that are occupied in `masks`. False, and
+  /// nothing is marked, if rays come too close to the border of the grid, or if there are many for the same pixels.
+  /// `end_of(i)`: the ray_endpoint of the i-th point. What each worker added is not asked for, unlike by dense_rays.
+  template <execution_policy Policy, class Range, class EndOf, class Saturated>
+  [[nodiscard]] bool mark(const Policy& policy, const depth_sensor& scan, Range&&, const EndOf& end_of,
+                          scan_masks& masks, Saturated& saturated) {
+    fill_image(policy);
+    std::size_t second = 0;
+    for (std::size_t i = 0; i != bands_; ++i) second += second_[i].size();
+    if (second > count_ / 64) return false;
+    pixel_places::bounds within;
+    for (const auto& b : within_) within.add(b);
+    const float max_z = within.max_z;
+    if (!(max_z > 0.0F)) return true;
+    const std::uint32_t first = crop(within);
+
+    const depth_sensor sensor{scan.grid, pose_, scan.max_range};
+    frame_.set_scene(sensor, ray_error());
+    const auto bounds = frame_.bounds_of(sensor, max_z);
+    if (!bounds) return false;
+    const pixel_rays& rays = frame_.ends.rays();
+    frame_.pyramid.build(rays.width(), rays.height(), max_z, [&](int v) { return frame_.ends.z(v); });
+    frame_.list_nodes(sensor, bounds->first, bounds->second);
+    const bool on_face = frame_.is_on_face(sensor);
+    const auto end_at = [&](int u, int v) { return end_of(numbers_[first + frame_.ends.number(u, v)]); };
+    descend_nodes(policy, frame_, sensor, depth_rays<decltype(end_at)>{frame_, sensor, end_at}, on_face, masks,
+                  saturated, workers_);
+    if (on_face) walk_first_steps(sensor, end_at, masks);
+    for (std::size_t i = 0; i != bands_; ++i)
+      for (const std::uint32_t number : second_[i]) {
+        const ray_endpoint e = end_of(number);
+        masks.mark_ray(sensor.grid, sensor.pose.centre, *sensor.key, e.point, e.key);
+      }
+    return true;
+  }
+  [[nodiscard]] std::size_t memory_bytes() const noexcept {
+    std::size_t bytes = fit_.memory_bytes() + frame_.memory_bytes() + workers_.capacity() * sizeof(descent_worker) +
+                        (pixel_.capacity() + z_.capacity() + numbers_.capacity()) * sizeof(float);
+    for (const descent_worker& w : workers_) bytes += w.memory_bytes();
+    for (const auto& s : second_) bytes += s.capacity() * sizeof(s[0]);
+    return bytes;
+  }
+
+ private:
+  static constexpr std::size_t most_rays = std::size_t{1} << 24U;
+
+  /// What the errors of rays come to beyond those that depth_scene allows for: there 10 u |c|_1 are for the rounding of
+  /// points and 19 u |c|_1 are left over, here a ray may be off along x and along y, and is found to be so in float.
+  [[nodiscard]] float ray_error() const {
+    constexpr double u = 0x1p-24;
+    return static_cast<float>(std::max(0.0, 1.5 * fit_.error() - 22.0 * u));
+  }
+  /// Cuts off the columns and rows around the image that no ray has been placed in, and says which pixel is the first
+  /// one then.
+  std::uint32_t crop(const pixel_places::bounds& b) {
+    camera::intrinsics k = fit_.camera().k();
+    k.width = static_cast<int>(b.u1 - b.u0) + 1;
+    k.height = static_cast<int>(b.v1 - b.v0) + 1;
+    k.cx -= static_cast<double>(b.u0);
+    k.cy -= static_cast<double>(b.v0);
+    const std::uint32_t first = static_cast<std::uint32_t>(b.v0) * static_cast<std::uint32_t>(placement_.stride) +
+                                static_cast<std::uint32_t>(b.u0);
+    frame_.ends.crop(camera::pinhole{k}, first);
+    return first;
+  }
+  /// The depth and the number of each pixel's first ray; `second_` gets the other rays. A thread for each band of rows.
+  template <class Policy>
+  void fill_image(const Policy& policy) {
+    const std::span<float> ends = frame_.ends.ends();
+    bands_ = within_.size();
+    if (second_.size() < bands_) second_.resize(bands_);
+    for_each_index(policy, bands_, 1, [&](std::size_t band) {
+      const auto begin = static_cast<std::uint32_t>(ends.size() * band / bands_);
+      const auto size = static_cast<std::uint32_t>(ends.size() * (band + 1) / bands_) - begin;
+      std::vector<std::uint32_t>& second = second_[band];
+      second.clear();
+      std::fill_n(ends.data() + begin, size, 0.0F);
+      for (std::size_t i = 0; i != count_; ++i) {
+        const std::uint32_t at = static_cast<std::uint32_t>(pixel_[i]) - begin;
+        if (at >= size) continue;
+        const std::uint32_t pixel = at + begin;
+        if (ends[pixel] != 0.0F) {
+          second.push_back(static_cast<std::uint32_t>(i));
+          continue;
+        }
+        ends[pixel] = z_[i];
+        numbers_[pixel] = static_cast<std::uint32_t>(i);
+      }
+    });
+  }
+  template <class EndAt>
+  void walk_first_steps(const depth_sensor& sensor, const EndAt& end_at, scan_masks& masks) const {
+    first_voxels around{sensor};
+    const auto for_each = [&](const pixel_box& box, auto&& use) {
+      for (std::int32_t v = box.v0; v <= box.v1; ++v)
+        for (std::int32_t u = box.u0; u <= box.u1; ++u)
+          if (frame_.ends.z(v)[u] > 0.0F && !use(end_at(u, v))) return;
+    };
+    const float room = frame_.scene.pixel_margin;
+    around.add(
+        first_step_order{sensor}, frame_.all_pixels(),
+        [&](const pixel_box& box) { return frame_.directions(box, room); }, for_each);
+    around.mark(masks);
+  }
+
+  pinhole_fit fit_;
+  depth_frame frame_;
+  se3 pose_;
+  pixel_placement placement_;
+  place_in_pixels* place_ = nullptr;
+  std::vector<std::int32_t> pixel_;           ///< of each ray
+  std::vector<float> z_;                      ///< at which it ends
+  std::vector<pixel_places::bounds> within_;  ///< of each worker's rays
+  std::vector<std::uint32_t> numbers_;        ///< of each pixel's ray, where it has one
+  std::vector<std::vector<std::uint32_t>> second_;
+  std::size_t count_ = 0, bands_ = 0;
+  std::vector<descent_worker> workers_;
+};
+
+}  // namespace orbis::octree::detail
+
+ORBIS_COMPILED_KERNEL(orbis::octree::detail::place_in_pixels_kernel, orbis::octree::detail::place_in_pixels);

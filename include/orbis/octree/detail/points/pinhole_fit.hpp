@@ -1,0 +1,342 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// The camera that the points of a cloud were seen with, found from the points.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include <Eigen/Cholesky>
+
+#include <orbis/camera/pinhole.hpp>
+#include <orbis/core/jacobi.hpp>
+#include <orbis/core/random.hpp>
+#include <orbis/core/so3.hpp>
+#include <orbis/core/types.hpp>
+#include <orbis/octree/detail/points/ray_traversal.hpp>
+
+namespace orbis::octree::detail {
+
+/// Finds the rotation and the intrinsics of a pinhole camera whose pixels the points of a cloud are, pixel by pixel
+/// along the rows or along the columns of the image; pixels may be missing, also whole rows. The camera's centre is
+/// known. Points on one row lie in a plane with the centre, so the rows give the x axis; then that pixels are equally
+/// far apart at z = 1 gives the z axis and the spacing. What that gives is refined by least squares (Gauss-Newton).
+/// Looks at about a thousand points, whatever the cloud's size. Keeps its memory.
+class pinhole_fit {
+ public:
+  /// Whether the points were seen by such a camera, but for a few. `point(i)`: the i-th of `count` points as float3;
+  /// `limit(i)`: how far the ray to it goes at most, metres, negative or NaN if there is none.
+  template <class Point, class Limit>
+  [[nodiscard]] bool fit(const float3& origin, std::size_t count, Point&& point, Limit&& limit) {
+    if (count < most_runs * run_length) return false;
+    const auto direction = [&](std::size_t i, vec3& d) {
+      const float3 p = point(i);
+      for (std::size_t axis = 0; axis != 3; ++axis)
+        d[static_cast<int>(axis)] = static_cast<double>(p[axis]) - static_cast<double>(origin[axis]);
+      const double length = d.norm();
+      if (!(length > 0.0 && length < 1e30 && limit(i) >= 0.0)) return 0.0;
+      d /= length;
+      return std::min(length, limit(i));
+    };
+    if (!take_runs(count, direction) || !find_x_axis() || !find_columns() || !find_rows()) return false;
+    find_center();
+    // What is far aside may be out by a pixel at first.
+    for (int step = 0; step != 4; ++step)
+      if ((step % 2 == 0 && !number_pixels()) || !refine()) return false;
+    return set_error() && set_image(count) && holds(count, direction);
+  }
+
+  [[nodiscard]] const camera::pinhole& camera() const noexcept { return camera_; }
+  /// R_world_camera.
+  [[nodiscard]] const so3& rotation() const noexcept { return rotation_; }
+  /// How far the rays of the points may be from those of their pixels, at z = 1, along x and along y.
+  [[nodiscard]] double error() const noexcept { return error_; }
+  /// How deep rays end on average, metres.
+  [[nodiscard]] double mean_z() const noexcept { return mean_z_; }
+  [[nodiscard]] std::size_t memory_bytes() const noexcept {
+    return runs_.capacity() * sizeof(run) + gaps_.capacity() * sizeof(double) + pixels_.capacity() * sizeof(pixel);
+  }
+
+ private:
+  static constexpr std::size_t most_runs = 128, run_length = 8;
+  static constexpr double straight = 1e-5;    ///< radians by which the points of a row may be off its plane
+  static constexpr double most_error = 1e-5;  ///< of rays, at z = 1
+  static constexpr int widest = 4096;         ///< pixels
+
+  /// Points that follow each other in the cloud, in a row of the image.
+  struct run {
+    std::array<vec3, run_length> d;  ///< of length 1
+    vec3 normal;
+    double length;                    ///< of the first ray, metres
+    double x_gap = 0.0, x_way = 0.0;  ///< at z = 1: the least way from a point to the next; from the first to the last
+    double y = 0.0;
+  };
+  /// A ray, and the pixel that it is.
+  struct pixel {
+    vec3 d;
+    double u, v;
+  };
+
+  /// Runs that lie in one row each, all over the cloud.
+  template <class Direction>
+  bool take_runs(std::size_t count, const Direction& direction) {
+    runs_.clear();
+    std::size_t tried = 0;
+    random_bits random{1};
+    for (std::size_t k = 0; k != most_runs; ++k) {
+      const std::size_t begin = place(k, count - run_length, random);
+      run r;
+      bool valid = true;
+      for (std::size_t i = 0; i != run_length && valid; ++i) {
+        const double length = direction(begin + i, r.d[i]);
+        valid = length > 0.0;
+        if (i == 0) r.length = length;
+      }
+      if (!valid) continue;
+      ++tried;
+      if (is_row(r)) runs_.push_back(r);
+      if (tried == most_runs / 4 && 2 * runs_.size() < tried) return false;
+    }
+    return runs_.size() >= most_runs / 4 && 4 * runs_.size() > 3 * tried;
+  }
+  /// Somewhere in the k-th stretch of [0, last]. At random: regular steps and the rows of a scan get into step.
+  [[nodiscard]] static std::size_t place(std::size_t k, std::size_t last, random_bits& random) {
+    const double at = (static_cast<double>(k) + random.uniform()) * static_cast<double>(last) / most_runs;
+    return std::min(static_cast<std::size_t>(at), last);
+  }
+  [[nodiscard]] static bool is_row(run& r) {
+    const vec3 way = r.d.back() - r.d.front();
+    for (std::size_t i = 1; i != run_length; ++i)
+      if (!((r.d[i] - r.d[i - 1]).dot(way) > 0.0)) return false;
+    r.normal = r.d.front().cross(r.d.back());
+    const double size = r.normal.norm();
+    if (!(size > 1e-5)) return false;
+    r.normal /= size;
+    for (const std::size_t i : {run_length / 3, run_length / 2})
+      if (!(std::fabs(r.normal.dot(r.d[i])) < straight)) return false;
+    return true;
+  }
+  /// The x axis lies in the planes of all rows.
+  bool find_x_axis() {
+    mat3 moments = mat3::Zero();
+    vec3 mean = vec3::Zero();
+    for (const run& r : runs_) {
+      moments += r.normal * r.normal.transpose();
+      mean += r.d.front();
+    }
+    const symmetric_eigen<3> e = eigen_of_symmetric<3>(moments);
+    if (!(e.values[1] > 1e-5 * e.values[2] && e.values[0] < 1e-3 * e.values[1])) return false;
+    vec3 x = e.vectors.col(0);
+    if (x.dot(runs_.front().d.back() - runs_.front().d.front()) < 0.0) x = -x;
+    vec3 z = mean - x * x.dot(mean);
+    if (!(z.norm() > 0.1 * static_cast<double>(runs_.size()))) return false;
+    z.normalize();
+    axes_.row(0) = x;
+    axes_.row(1) = z.cross(x);
+    axes_.row(2) = z;
+    return project();
+  }
+  /// Works out where the runs are at z = 1; forgets those that are not in front of the camera.
+  bool project() {
+    std::erase_if(runs_, [&](run& r) {
+      std::array<double, run_length> x;
+      r.y = 0.0;
+      for (std::size_t i = 0; i != run_length; ++i) {
+        const vec3 c = axes_ * r.d[i];
+        if (!(c.z() > 0.1)) return true;
+        x[i] = c.x() / c.z();
+        r.y += c.y() / c.z() / run_length;
+      }
+      r.x_gap = std::fabs(x[1] - x[0]);
+      for (std::size_t i = 2; i != run_length; ++i) r.x_gap = std::min(r.x_gap, std::fabs(x[i] - x[i - 1]));
+      r.x_way = std::fabs(x.back() - x.front());
+      return false;
+    });
+    return runs_.size() >= most_runs / 4;
+  }
+  /// The way from column to column, and the z axis: if it is turned by t about x, a row that is seen at y has
+  /// its points (cos t - y sin t) as far apart as they are at z = 1.
+  bool find_columns() {
+    gaps_.clear();
+    for (const run& r : runs_) gaps_.push_back(r.x_gap);
+    const auto middle = gaps_.begin() + static_cast<std::ptrdiff_t>(gaps_.size() / 2);
+    std::nth_element(gaps_.begin(), middle, gaps_.end());
+    double a = *middle, b = 0.0;
+    std::size_t used = 0;
+    for (const double close : {0.3, 0.05, 0.01}) {
+      used = 0;
+      double w = 0.0, wy = 0.0, wyy = 0.0, wg = 0.0, wyg = 0.0;
+      for (const run& r : runs_) {
+        const double want = a + b * r.y, steps = std::round(r.x_way / want);
+        if (!(std::fabs(r.x_gap - want) < close * want) || !(steps >= 1.0 && steps < 1e3)) continue;
+        // From the first loop on it is known how many steps there are to the last point.
+        const double n = close > 0.1 ? 1.0 : steps, gap = close > 0.1 ? r.x_gap : r.x_way / steps;
+        if (!(std::fabs(gap - want) < close * want)) continue;
+        ++used;
+        w += n * n;
+        wy += n * n * r.y;
+        wyy += n * n * r.y * r.y;
+        wg += n * n * gap;
+        wyg += n * n * r.y * gap;
+      }
+      const double det = w * wyy - wy * wy;
+      if (2 * used < runs_.size() || !(det > 1e-9 * w * w)) return false;
+      b = (w * wyg - wy * wg) / det;
+      a = (wg - b * wy) / w;
+      if (!(a > 0.0)) return false;
+    }
+    const double turn = std::atan2(-b, a);
+    const vec3 y = axes_.row(1), z = axes_.row(2);
+    axes_.row(1) = std::cos(turn) * y + std::sin(turn) * z;
+    axes_.row(2) = std::cos(turn) * z - std::sin(turn) * y;
+    step_x_ = std::hypot(a, b);
+    return project();
+  }
+  /// The way from row to row: the largest of which all ways between rows are multiples.
+  bool find_rows() {
+    std::sort(runs_.begin(), runs_.end(), [](const run& a, const run& b) { return a.y < b.y; });
+    gaps_.clear();
+    for (std::size_t i = 1; i != runs_.size(); ++i)
+      if (const double gap = runs_[i].y - runs_[i - 1].y; gap > 0.05 * step_x_) gaps_.push_back(gap);
+    if (gaps_.size() < most_runs / 16) return false;
+    const double least = *std::min_element(gaps_.begin(), gaps_.end());
+    for (int part = 1; part != 16; ++part) {
+      double step = least / part;
+      bool fits = true;
+      for (const double close : {0.1, 0.05}) {
+        std::size_t tried = 0, good = 0;
+        double n = 0.0, sum = 0.0;
+        for (const double gap : gaps_) {
+          const double steps = std::round(gap / step);
+          if (steps > 40.0) continue;  // so many cannot be counted yet
+          ++tried;
+          if (std::fabs(gap / step - steps) > close) continue;
+          ++good;
+          n += steps;
+          sum += gap;
+        }
+        fits = fits && 2 * tried > gaps_.size() && 20 * good > 19 * tried;
+        if (!fits) break;
+        step = sum / n;
+      }
+      if (!fits) continue;
+      step_y_ = step;
+      return true;
+    }
+    return false;
+  }
+  /// Lets the point that is nearest to the axis be in the middle of pixel (0, 0).
+  void find_center() {
+    fx_ = 1.0 / step_x_;
+    fy_ = 1.0 / step_y_;
+    double least = 1e30;
+    for (const run& r : runs_) {
+      const vec3 c = axes_ * r.d.front();
+      const double x = c.x() / c.z(), y = c.y() / c.z(), aside = std::max(std::fabs(x), std::fabs(y));
+      if (aside >= least) continue;
+      least = aside;
+      cx_ = -fx_ * x;
+      cy_ = -fy_ * y;
+    }
+  }
+  /// Which pixels the first and the last points of the runs are. Forgets those that are none, if they are few.
+  bool number_pixels() {
+    pixels_.clear();
+    for (const run& r : runs_)
+      for (const vec3& d : {r.d.front(), r.d.back()}) {
+        const vec3 c = axes_ * d;
+        const double u = fx_ * c.x() / c.z() + cx_, v = fy_ * c.y() / c.z() + cy_;
+        const pixel p{d, std::round(u), std::round(v)};
+        if (std::max(std::fabs(p.u - u), std::fabs(p.v - v)) < 0.25) pixels_.push_back(p);
+      }
+    return 20 * pixels_.size() > 17 * 2 * runs_.size();
+  }
+  /// One step of Gauss and Newton for the rotation and the intrinsics.
+  bool refine() {
+    matrix<7, 7> h = matrix<7, 7>::Zero();
+    matrix<7> g = matrix<7>::Zero();
+    square_ = 0.0;
+    for (const pixel& p : pixels_) {
+      const vec3 c = axes_ * p.d;
+      const double x = c.x() / c.z(), y = c.y() / c.z();
+      // The turn of the camera about its axes, fx, fy, cx, cy.
+      matrix<7> ju, jv;
+      ju << fx_ * x * y, -fx_ * (1.0 + x * x), fx_ * y, x, 0.0, 1.0, 0.0;
+      jv << fy_ * (1.0 + y * y), -fy_ * x * y, -fy_ * x, 0.0, y, 0.0, 1.0;
+      const double ru = fx_ * x + cx_ - p.u, rv = fy_ * y + cy_ - p.v;
+      square_ += ru * ru / (fx_ * fx_) + rv * rv / (fy_ * fy_);
+      h.noalias() += ju * ju.transpose() + jv * jv.transpose();
+      g += ju * ru + jv * rv;
+    }
+    // Where the view is so narrow that a turn and a shift are the same, any of them will do.
+    for (int i = 0; i != 7; ++i) h(i, i) *= 1.0 + 1e-12;
+    const matrix<7> step = h.ldlt().solve(-g);
+    if (!step.allFinite()) return false;
+    const vec3 turn = step.head<3>();
+    axes_ = so3::exp(-turn).rotation_matrix() * axes_;
+    fx_ += step[3];
+    fy_ += step[4];
+    cx_ += step[5];
+    cy_ += step[6];
+    return fx_ > 0.0 && fy_ > 0.0;
+  }
+  /// From what is left between rays and pixels; it is the rounding of the points.
+  bool set_error() {
+    const double mean = std::sqrt(square_ / (2.0 * static_cast<double>(pixels_.size())));
+    error_ = std::max(5e-7, 8.0 * mean);
+    return error_ < most_error && error_ * std::max(fx_, fy_) < 0.05;
+  }
+  /// The image, with room around the pixels of the sample.
+  bool set_image(std::size_t count) {
+    double u0 = pixels_.front().u, u1 = u0, v0 = pixels_.front().v, v1 = v0, z = 0.0;
+    for (const pixel& p : pixels_) {
+      u0 = std::min(u0, p.u), u1 = std::max(u1, p.u);
+      v0 = std::min(v0, p.v), v1 = std::max(v1, p.v);
+    }
+    for (const run& r : runs_) z += axes_.row(2).dot(r.d.front()) * r.length;
+    mean_z_ = z / static_cast<double>(runs_.size());
+    const double room_u = std::ceil(0.04 * (u1 - u0)) + 8.0, room_v = std::ceil(0.04 * (v1 - v0)) + 8.0;
+    const double width = u1 - u0 + 1.0 + 2.0 * room_u, height = v1 - v0 + 1.0 + 2.0 * room_v;
+    if (!(width <= widest && height <= widest && width * height <= 16.0 * static_cast<double>(count))) return false;
+    cx_ += room_u - u0;
+    cy_ += room_v - v0;
+    camera_ = camera::pinhole{static_cast<int>(width), static_cast<int>(height), fx_, fy_, cx_, cy_};
+    rotation_ = so3{mat3(axes_.transpose())};
+    return true;
+  }
+  /// Whether it is so of other points as well.
+  template <class Direction>
+  [[nodiscard]] bool holds(std::size_t count, const Direction& direction) const {
+    std::size_t tried = 0, good = 0;
+    random_bits random{2};
+    for (std::size_t k = 0; k != most_runs; ++k) {
+      vec3 d;
+      if (direction(place(k, count - 1, random), d) == 0.0) continue;
+      ++tried;
+      const vec3 c = axes_ * d;
+      const auto is_pixel = [&](double at, double f, double centre) {
+        const double p = f * at / c.z() + centre;
+        return std::fabs(p - std::round(p)) <= error_ * f;
+      };
+      if (c.z() > 0.0 && is_pixel(c.x(), fx_, cx_) && is_pixel(c.y(), fy_, cy_)) ++good;
+    }
+    return 50 * good > 49 * tried;
+  }
+
+  std::vector<run> runs_;
+  std::vector<double> gaps_;
+  std::vector<pixel> pixels_;
+  mat3 axes_ = mat3::Identity();  ///< R_camera_world
+  double step_x_ = 0.0, step_y_ = 0.0, fx_ = 0.0, fy_ = 0.0, cx_ = 0.0, cy_ = 0.0;
+  double square_ = 0.0;  ///< of what is left, at z = 1, all together
+  double error_ = 0.0, mean_z_ = 0.0;
+  camera::pinhole camera_;
+  so3 rotation_;
+};
+
+}  // namespace orbis::octree::detail

@@ -1,0 +1,227 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include <orbis/core/random.hpp>
+#include <orbis/octree/detail/points/organised_rays.hpp>
+#include <orbis/octree/detail/points/point_integrator.hpp>
+
+#include "octree/detail/points/scan_walk.hpp"
+#include "support/allocations.hpp"
+#include "support/catch.hpp"
+
+using namespace orbis;
+using namespace orbis::octree;
+using namespace orbis::octree::detail;
+using octree::detail::organised_rays;
+using test::free_voxels;
+using test::mark;
+using test::scan;
+using test::walk;
+
+namespace {
+
+/// What a depth camera sees, with edges, holes and a few points that do not belong there.
+[[nodiscard]] scan camera_scan(random_bits& random, double voxel, const vec3& origin) {
+  const auto at = [&](double half) { return random.uniform(-half, half); };
+  scan s{voxel_grid{voxel},
+         {static_cast<float>(origin.x()), static_cast<float>(origin.y()), static_cast<float>(origin.z())}};
+  const so3 turned = random.below(4) == 0 ? so3{} : so3::exp({at(2.0), at(2.0), at(2.0)});
+  const double reach = voxel * random.uniform(3.0, 40.0), fx = random.uniform(60.0, 400.0),
+               fy = fx * random.uniform(0.8, 1.2);
+  const int width = 80 + static_cast<int>(random.below(40)), height = 50 + static_cast<int>(random.below(40));
+  const double cx = width * random.uniform(0.3, 0.7), cy = height * random.uniform(0.3, 0.7);
+  const bool by_columns = random.below(3) == 0, has_edges = random.below(2) == 0;
+  const int outer = by_columns ? width : height, inner = by_columns ? height : width;
+  const int hole = static_cast<int>(random.below(static_cast<std::uint32_t>(outer)));
+  for (int i = 0; i != outer; ++i)
+    for (int k = 0; k != inner; ++k) {
+      if (i >= hole && i < hole + 9 && k > inner / 2) continue;
+      const int u = by_columns ? i : k, v = by_columns ? k : i;
+      const vec3 d{(u - cx) / fx, (v - cy) / fy, 1.0};
+      double z = reach * (0.7 + 0.3 * std::sin(0.1 * u) * std::cos(0.07 * v));
+      if (has_edges) z *= u / 11 % 3 == 0 ? 0.2 : 1.0;
+      const vec3 p = origin + turned * vec3(d * z);
+      s.points.push_back({static_cast<float>(p.x()), static_cast<float>(p.y()), static_cast<float>(p.z())});
+      if (random.below(600) == 0) s.points.back() = s.origin;
+      if (random.below(600) == 0) s.points.back()[random.below(3)] = std::numeric_limits<float>::quiet_NaN();
+      if (random.below(600) == 0) s.points.back()[random.below(3)] += static_cast<float>(voxel);
+      if (random.below(600) == 0) s.points.push_back(s.points.front());
+    }
+  if (random.below(3) == 0) s.limit = reach * random.uniform(0.1, 0.9);
+  return s;
+}
+
+[[nodiscard]] vec3 random_origin(random_bits& random, double voxel) {
+  vec3 origin{random.uniform(-2.0, 2.0), random.uniform(-2.0, 2.0), random.uniform(-2.0, 2.0)};
+  switch (random.below(5)) {
+    case 0: origin.setZero(); break;
+    case 1: origin[static_cast<int>(random.below(3))] = voxel * random.below(9); break;
+    case 2: origin = voxel * vec3{1.0, 2.0, 3.0}; break;
+    case 3: origin = vec3::Constant(0.5 * voxel); break;
+    default: break;
+  }
+  return origin;
+}
+
+[[nodiscard]] bool plan(organised_rays& rays, const scan& s) {
+  return rays.plan(
+      s.grid, s.origin, s.points.size(), [&](std::size_t i) { return s.points[i]; },
+      [&](std::size_t) { return s.limit; });
+}
+
+/// One whose camera is found.
+[[nodiscard]] scan fitting_scan(random_bits& random, organised_rays& rays, double voxel) {
+  for (;;) {
+    scan s = camera_scan(random, voxel, random_origin(random, voxel));
+    if (plan(rays, s)) return s;
+  }
+}
+
+}  // namespace
+
+TEST_CASE("The rays of an organised cloud mark the voxels that they cross one by one") {
+  random_bits random{81};
+  organised_rays rays;
+  scan_masks want, got;
+  for (int run = 0; run != 150; ++run) {
+    const double voxel = std::array{0.05, 0.1, 0.02, 1.0 / 3.0}[random.below(4)];
+    const scan s = fitting_scan(random, rays, voxel);
+    walk(s, want);
+    INFO("run " << run);
+    REQUIRE(mark(seq, rays, s, got));
+    REQUIRE(free_voxels(got, nullptr) == free_voxels(want, nullptr));
+    REQUIRE(mark(par.with(3), rays, s, got));
+    REQUIRE(free_voxels(got, nullptr) == free_voxels(want, nullptr));
+  }
+}
+
+TEST_CASE("Every instruction set marks the voxels of an organised cloud") {
+  random_bits random{82};
+  scan_masks want, got;
+  for (int run = 0; run != 8; ++run) {
+    organised_rays any;
+    const scan s = fitting_scan(random, any, 0.05);
+    walk(s, want);
+    for (const simd::level level : simd::available_levels()) {
+      const simd::level_limit limit{level};
+      organised_rays rays;
+      REQUIRE(mark(seq, rays, s, got));
+      REQUIRE(free_voxels(got, nullptr) == free_voxels(want, nullptr));
+    }
+  }
+}
+
+TEST_CASE("Nearly all organised clouds are found to be") {
+  random_bits random{83};
+  organised_rays rays;
+  int found = 0;
+  for (int run = 0; run != 100; ++run) found += plan(rays, camera_scan(random, 0.1, {1.0, 0.5, -0.5})) ? 1 : 0;
+  CHECK(found >= 85);
+}
+
+TEST_CASE("Points for the same pixels: few are walked, many are left to others") {
+  random_bits random{84};
+  organised_rays rays;
+  scan_masks want, got;
+  scan s = fitting_scan(random, rays, 0.05);
+  const std::size_t count = s.points.size();
+  for (std::size_t i = 0; i < count; i += 100) {  // nearer and further on the same rays
+    float3 p = s.points[i];
+    for (std::size_t axis = 0; axis != 3; ++axis) p[axis] = s.origin[axis] + 2.0F * (p[axis] - s.origin[axis]);
+    s.points.push_back(p);
+  }
+  walk(s, want);
+  REQUIRE(mark(seq, rays, s, got));
+  CHECK(free_voxels(got, nullptr) == free_voxels(want, nullptr));
+  REQUIRE(mark(par.with(3), rays, s, got));
+  CHECK(free_voxels(got, nullptr) == free_voxels(want, nullptr));
+
+  s.points.insert(s.points.end(), s.points.begin(), s.points.begin() + static_cast<std::ptrdiff_t>(count / 2));
+  CHECK_FALSE(mark(seq, rays, s, got));
+  walk(s, want);
+  point_integrator marker;
+  marker.mark(seq, s.grid, s.points, s.origin, {.max_range = s.limit});
+  CHECK(free_voxels(marker.masks(), nullptr) == free_voxels(want, nullptr));
+}
+
+TEST_CASE("Saturated voxels of an organised cloud may be left out and no others are") {
+  random_bits random{85};
+  organised_rays rays;
+  scan_masks want, got, hidden;
+  for (int run = 0; run != 10; ++run) {
+    const scan s = fitting_scan(random, rays, 0.05);
+    walk(s, want);
+    hidden.clear();
+    for (const scan_brick& b : want.bricks())
+      for (std::size_t i = 0; i != 8; ++i)
+        if (random.below(2) == 0) hidden.at(named_key(b.name)).free[i] = b.free[i];
+    REQUIRE(mark(seq, rays, s, got, &hidden));
+    REQUIRE(free_voxels(got, &hidden) == free_voxels(want, &hidden));
+  }
+}
+
+TEST_CASE("Close to the border of the grid an organised cloud is left to others") {
+  random_bits random{86};
+  organised_rays rays;
+  scan_masks masks;
+  scan s = fitting_scan(random, rays, 0.1);
+  s.limit = std::numeric_limits<double>::infinity();
+  float most = 0.0F;
+  for (const float3& p : s.points)
+    for (std::size_t i = 0; i != 3; ++i)
+      if (std::isfinite(p[i])) most = std::max(most, std::fabs(p[i]));
+  int depth = 5;
+  while (0.05 * std::ldexp(1.0, depth) < static_cast<double>(most)) ++depth;
+  s.grid = voxel_grid{2.0 * static_cast<double>(most) / std::ldexp(1.0, depth) * 1.001, depth};
+  CHECK_FALSE(mark(seq, rays, s, masks));
+}
+
+TEST_CASE("A cloud of points and its integrator agree, organised or not, with ranges of its own") {
+  random_bits random{87};
+  organised_rays any;
+  scan_masks want;
+  point_integrator marker;
+  for (int run = 0; run != 12; ++run) {
+    scan s = fitting_scan(random, any, 0.05);
+    s.limit = std::numeric_limits<double>::infinity();
+    std::vector<float> ranges;
+    for (std::size_t i = 0; i != s.points.size(); ++i)
+      ranges.push_back(random.below(3) == 0 ? static_cast<float>(random.uniform(0.1, 1.0)) : 1e9F);
+    want.clear();
+    const voxel_key from = *s.grid.key(s.origin);
+    for (std::size_t i = 0; i != s.points.size(); ++i) {
+      scan one = s;
+      one.points = {s.points[i]};
+      one.limit = static_cast<double>(ranges[i]);
+      const ray_endpoint e = one.end_of(0);
+      if (!std::isfinite(e.point[0]) || !std::isfinite(e.point[1]) || !std::isfinite(e.point[2])) continue;
+      want.mark_ray(s.grid, s.origin, from, e.point, e.key);
+      if (length(difference(s.points[i], s.origin)) <= one.limit) want.mark_occupied(e.key);
+    }
+    marker.mark(run % 2 == 0 ? par.with(1) : par.with(3), s.grid, s.points, s.origin, {.beam_ranges = ranges});
+    REQUIRE(free_voxels(marker.masks(), nullptr) == free_voxels(want, nullptr));
+  }
+}
+
+TEST_CASE("The next organised cloud takes no memory") {
+  random_bits random{88};
+  organised_rays any;
+  scan s = fitting_scan(random, any, 0.05);
+  const scan_masks masks;
+  point_integrator marker;
+  const auto integrate = [&] { return marker.mark(seq, s.grid, s.points, s.origin, {}); };
+  integrate();
+  s.origin[0] += 1e-7F;  // the camera that is found is another one
+  integrate();
+  for (float3& p : s.points) p[0] += 1e-7F;
+  const std::size_t before = test::allocations(), bytes = marker.memory_bytes();
+  integrate();
+  if (test::counts_allocations()) CHECK(test::allocations() == before);
+  CHECK(marker.memory_bytes() == bytes);
+}
