@@ -8,9 +8,11 @@
 
 #include <CLI/CLI.hpp>
 
+#include "../common/memory.hpp"
 #include "adjust.hpp"
 
 int main(int argc, char** argv) try {
+  examples::limit_memory();
   settings s;
   CLI::App cli{"Adjusts cameras and points of a file of Bundle Adjustment in the Large", "bundle_adjust"};
   cli.add_option("FILE", s.input, "the problem, unpacked")->required();
@@ -40,5 +42,5 @@ int main(int argc, char** argv) try {
   if (!problem) return complain(2, problem.error().to_string());
   return s.loss == "cauchy" || s.loss == "tukey" ? adjust_redescending(s, *problem) : adjust_convex(s, *problem);
 } catch (const std::exception& e) {  // no memory, no threads
-  return complain(2, std::string{"gave up: "} + e.what());
+  return complain(2, examples::why_it_gave_up(e));
 }

@@ -10,7 +10,7 @@
 namespace examples {
 
 /// Whether both names lead to one file that exists, by links as well.
-[[nodiscard]] inline bool is_same_file(const std::string& a, const std::string& b) {
+[[nodiscard]] inline bool is_same_file(const std::filesystem::path& a, const std::filesystem::path& b) {
   std::error_code ignored;
   return std::filesystem::equivalent(a, b, ignored);
 }

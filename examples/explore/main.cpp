@@ -20,6 +20,8 @@
 #include <orbis/nav.hpp>
 #include <orbis/octree.hpp>
 
+#include "../common/memory.hpp"
+
 using orbis::se3;
 using orbis::vec3;
 
@@ -209,6 +211,7 @@ double coverage(const explorer& robot, const vec3& start, std::size_t& air) {
 }
 
 int main(int argc, char** argv) try {
+  examples::limit_memory();
   std::string output;
   double resolution = 0.05, radius = 0.2, range = 4.0;
   int budget = 600, width = 160;
@@ -276,5 +279,5 @@ int main(int argc, char** argv) try {
               robot.frontiers.size(), why.c_str());
   if (const auto written = write_bt(robot.map, output); !written) return complain(2, written.error().to_string());
 } catch (const std::exception& e) {  // no memory, no threads
-  return complain(2, std::string{"gave up: "} + e.what());
+  return complain(2, examples::why_it_gave_up(e));
 }

@@ -12,12 +12,14 @@
 #include <orbis/cloud.hpp>
 #include <orbis/io.hpp>
 
+#include "../common/memory.hpp"
 #include "../common/near_origin.hpp"
 #include "../common/same_file.hpp"
 
 int complain(int code, const std::string& why) { return std::fprintf(stderr, "filter_cloud: %s\n", why.c_str()), code; }
 
 int main(int argc, char** argv) try {
+  examples::limit_memory();
   using namespace orbis::cloud;
   using orbis::par;
   std::string input, output, filter = "auto";
@@ -63,5 +65,5 @@ int main(int argc, char** argv) try {
   if (auto ok = orbis::io::write_ply(output, cloud, kept, options); !ok) return complain(2, ok.error().to_string());
   std::printf("%zu points, %zu to filter, %zu kept; %s\n", read->cloud.size(), finite.size(), kept.size(), why.c_str());
 } catch (const std::exception& e) {  // no memory, no threads
-  return complain(2, std::string{"gave up: "} + e.what());
+  return complain(2, examples::why_it_gave_up(e));
 }

@@ -12,6 +12,8 @@
 #include <orbis/optimize/chordal_initialization.hpp>
 #include <orbis/optimize/pose_graph.hpp>
 
+#include "../common/memory.hpp"
+
 namespace optimize = orbis::optimize;
 
 struct settings {
@@ -82,6 +84,7 @@ int run(const settings& s, orbis::io::g2o_graph& graph, Loss loss) {
 }
 
 int main(int argc, char** argv) try {
+  examples::limit_memory();
   settings s;
   CLI::App cli{"Optimises the poses of a g2o file (VERTEX_SE3:QUAT, EDGE_SE3:QUAT, FIX)", "pose_graph"};
   cli.add_option("FILE", s.input, "the graph")->required();
@@ -113,5 +116,5 @@ int main(int argc, char** argv) try {
   if (s.loss == "tukey") return run(s, *graph, optimize::tukey{s.width});
   return run(s, *graph, optimize::trivial{});
 } catch (const std::exception& e) {  // no memory, no threads
-  return complain(2, std::string{"gave up: "} + e.what());
+  return complain(2, examples::why_it_gave_up(e));
 }

@@ -11,6 +11,7 @@
 
 #include <orbis/slam/any_system.hpp>
 
+#include "../common/same_file.hpp"
 #include "corrected_frame.hpp"
 #include "interrupts.hpp"
 #include "profiles.hpp"
@@ -244,11 +245,6 @@ void collect(const slam_system& slam, tracked_frames& out) {
   out.slam.landmarks = slam.landmark_count();
 }
 
-bool is_same_file(const std::filesystem::path& a, const std::filesystem::path& b) {
-  std::error_code ignored;
-  return std::filesystem::equivalent(a, b, ignored);
-}
-
 std::string in_words(const slam_results& slam) {
   const auto count = [](std::size_t n, const char* what) {
     return n == 0 ? std::string{} : ", " + std::to_string(n) + " " + what + (n == 1 ? "" : "s");
@@ -317,7 +313,7 @@ orbis::result<tracked_frames> track(const frame_source& source, const shutter_re
   console.finish(in_words(out.slam));
 
   // A map that was missed is not replaced by one without it.
-  const bool spares_loaded = out.missed_map && is_same_file(s.load_map, s.save_map);
+  const bool spares_loaded = out.missed_map && examples::is_same_file(s.load_map, s.save_map);
   if (!s.save_map.empty() && !out.slam.trajectory.empty() && !spares_loaded) {
     console.stage("saving");
     if (auto saved = slam.save_map(landmark_map))
@@ -340,7 +336,8 @@ orbis::error explain_miss(const tracked_frames& tracked, const settings& s) {
   std::string message = "the camera was never found in this map: none of " + std::to_string(tracked.slam.frames) +
                         " frames shows a place that it knows";
   if (tracked.slam.tracked != 0) message += "; the results are those of a map of their own";
-  if (tracked.slam.tracked != 0 && is_same_file(s.load_map, s.save_map)) message += ", which was not saved over it";
+  if (tracked.slam.tracked != 0 && examples::is_same_file(s.load_map, s.save_map))
+    message += ", which was not saved over it";
   return {orbis::errc::no_data, s.load_map.string(), std::move(message)};
 }
 

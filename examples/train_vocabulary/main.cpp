@@ -22,6 +22,7 @@
 #include <orbis/core/file.hpp>
 #include <orbis/places.hpp>
 
+#include "../common/memory.hpp"
 #include "../common/same_file.hpp"
 #include "load_vocabulary.hpp"
 #include "recall.hpp"
@@ -141,6 +142,7 @@ int judge(const settings& s) {
 }
 
 int main(int argc, char** argv) try {
+  examples::limit_memory();
   settings s;
   CLI::App cli{"Vocabularies of visual words: learns, converts and measures them", "train_vocabulary"};
   cli.require_subcommand(1);
@@ -175,5 +177,5 @@ int main(int argc, char** argv) try {
   if (train_command->parsed()) return train(s);
   return convert_command->parsed() ? convert(s) : judge(s);
 } catch (const std::exception& e) {  // no memory, no threads
-  return complain(2, std::string{"gave up: "} + e.what());
+  return complain(2, examples::why_it_gave_up(e));
 }
