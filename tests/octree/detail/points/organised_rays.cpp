@@ -34,7 +34,7 @@ namespace {
   const so3 turned = random.below(4) == 0 ? so3{} : so3::exp({at(2.0), at(2.0), at(2.0)});
   const double reach = voxel * random.uniform(3.0, 40.0), fx = random.uniform(60.0, 400.0),
                fy = fx * random.uniform(0.8, 1.2);
-  const int width = 80 + static_cast<int>(random.below(40)), height = 50 + static_cast<int>(random.below(40));
+  const int width = 90 + static_cast<int>(random.below(40)), height = 60 + static_cast<int>(random.below(40));
   const double cx = width * random.uniform(0.3, 0.7), cy = height * random.uniform(0.3, 0.7);
   const bool by_columns = random.below(3) == 0, has_edges = random.below(2) == 0;
   const int outer = by_columns ? width : height, inner = by_columns ? height : width;
@@ -101,6 +101,59 @@ TEST_CASE("The rays of an organised cloud mark the voxels that they cross one by
   }
 }
 
+TEST_CASE("Rays that are as far off their pixels as they may be mark the voxels that they cross") {
+  random_bits random{89};
+  pinhole_fit fit;
+  organised_rays rays;
+  scan_masks want, got;
+  constexpr int width = 160, height = 120;
+  int fitting = 0;
+  for (int run = 0; fitting != 10; ++run) {
+    REQUIRE(run < 200);
+    const auto at = [&](double half) { return random.uniform(-half, half); };
+    const auto sign = [&] { return random.below(2) == 0 ? 1.0 : -1.0; };
+    scan s{voxel_grid{1.0}, {static_cast<float>(at(0.5)), static_cast<float>(at(0.5)), static_cast<float>(at(0.5))}};
+    const vec3 origin{static_cast<double>(s.origin[0]), static_cast<double>(s.origin[1]),
+                      static_cast<double>(s.origin[2])};
+    // Long rays, few of them long: there are voxels that a single ray decides about.
+    const double f = random.uniform(800.0, 3000.0), reach = std::min(1500.0, 0.42 * f);
+    const double off = random.uniform(1.2e-6, 2.0e-6), far = random.uniform(0.005, 0.1);
+    const so3 turned = so3::exp({at(2.0), at(2.0), at(2.0)});
+    std::vector<vec3> pixels;
+    for (int v = 0; v != height; ++v)
+      for (int u = 0; u != width; ++u) {
+        const double z = reach * (random.uniform() < far ? random.uniform(0.5, 1.0) : 0.06);
+        pixels.push_back(turned * vec3(z * vec3{(u - 0.5 * width) / f, (v - 0.5 * height) / f, 1.0}));
+        const vec3 p = origin + pixels.back() + turned * vec3(z * vec3{at(off), at(off), 0.0});
+        s.points.push_back({static_cast<float>(p.x()), static_cast<float>(p.y()), static_cast<float>(p.z())});
+      }
+    // What the camera is found from stays; all other points go to one side, as far as they may.
+    std::vector<bool> kept(s.points.size());
+    const auto point = [&](std::size_t i) {
+      kept[i] = true;
+      return s.points[i];
+    };
+    INFO("run " << run);
+    if (!fit.fit(s.origin, s.points.size(), point, [&](std::size_t) { return s.limit; })) continue;
+    ++fitting;
+    const auto& k = fit.camera().k();
+    const double e = random.uniform(0.75, 0.97) * fit.error(), right = sign() * e, down = sign() * e;
+    for (std::size_t i = 0; i != pixels.size(); ++i) {
+      if (kept[i]) continue;
+      const vec3 c = fit.rotation().inverse() * pixels[i];
+      const double u = std::round(k.fx * c.x() / c.z() + k.cx), v = std::round(k.fy * c.y() / c.z() + k.cy);
+      const vec3 p =
+          origin + fit.rotation() * vec3(c.z() * vec3{(u - k.cx) / k.fx + right, (v - k.cy) / k.fy + down, 1.0});
+      s.points[i] = {static_cast<float>(p.x()), static_cast<float>(p.y()), static_cast<float>(p.z())};
+    }
+    REQUIRE(plan(rays, s));
+    walk(s, want);
+    REQUIRE(mark(seq, rays, s, got));
+    const bool same = free_voxels(got, nullptr) == free_voxels(want, nullptr);
+    REQUIRE(same);
+  }
+}
+
 TEST_CASE("Every instruction set marks the voxels of an organised cloud") {
   random_bits random{82};
   scan_masks want, got;
@@ -125,6 +178,54 @@ TEST_CASE("Nearly all organised clouds are found to be") {
   CHECK(found >= 85);
 }
 
+TEST_CASE("An image is taken as one only if it has points all over") {
+  organised_rays rays;
+  scan s{voxel_grid{0.01}, {0.0F, 0.0F, 0.0F}};
+  const auto take = [&](auto&& wanted) {
+    random_bits random{90};
+    s.points.clear();
+    for (int v = 0; v != 240; ++v)
+      for (int u = 0; u != 320; ++u) {
+        const float z = 1.0F + 0.001F * static_cast<float>(u % 7);
+        const float x = (static_cast<float>(u) - 160.0F) / 262.0F, y = (static_cast<float>(v) - 120.0F) / 262.0F;
+        if (wanted(random, u, v)) s.points.push_back({x * z, y * z, z});
+      }
+  };
+  const auto all = [](random_bits&, int, int) { return true; };
+  take(all);
+  CHECK(plan(rays, s));
+  take([](random_bits&, int u, int v) { return u > 120 || v > 100; });  // a hole
+  CHECK(plan(rays, s));
+  take([](random_bits& random, int, int) { return random.below(10) == 0; });
+  CHECK_FALSE(plan(rays, s));
+  take([](random_bits& random, int, int) { return random.below(4) == 0; });
+  CHECK_FALSE(plan(rays, s));
+  take([](random_bits&, int, int v) { return v % 8 == 0; });
+  CHECK_FALSE(plan(rays, s));
+  take([](random_bits&, int u, int) { return u % 4 == 0; });
+  CHECK_FALSE(plan(rays, s));
+  take([](random_bits&, int u, int v) { return u < 32 || v % 32 == 0; });
+  CHECK_FALSE(plan(rays, s));
+  take(all);
+  const std::vector<float3> once = s.points;
+  s.points.insert(s.points.end(), once.begin(), once.end());
+  CHECK_FALSE(plan(rays, s));
+}
+
+TEST_CASE("A point far behind the others is walked") {
+  random_bits random{91};
+  organised_rays rays;
+  scan_masks want, got;
+  scan s = fitting_scan(random, rays, 0.1);
+  s.limit = std::numeric_limits<double>::infinity();
+  for (const std::size_t i : {1000U, 2000U})
+    for (std::size_t axis = 0; axis != 3; ++axis)
+      s.points[i][axis] = s.origin[axis] + 60.0F * (s.points[i][axis] - s.origin[axis]);
+  walk(s, want);
+  REQUIRE(mark(seq, rays, s, got));
+  CHECK(free_voxels(got, nullptr) == free_voxels(want, nullptr));
+}
+
 TEST_CASE("Points for the same pixels: few are walked, many are left to others") {
   random_bits random{84};
   organised_rays rays;
@@ -142,7 +243,9 @@ TEST_CASE("Points for the same pixels: few are walked, many are left to others")
   REQUIRE(mark(par.with(3), rays, s, got));
   CHECK(free_voxels(got, nullptr) == free_voxels(want, nullptr));
 
-  s.points.insert(s.points.end(), s.points.begin(), s.points.begin() + static_cast<std::ptrdiff_t>(count / 2));
+  s.points.insert(s.points.begin() + static_cast<std::ptrdiff_t>(count), s.points.begin(),
+                  s.points.begin() + static_cast<std::ptrdiff_t>(count / 20));
+  REQUIRE(plan(rays, s));
   CHECK_FALSE(mark(seq, rays, s, got));
   walk(s, want);
   point_integrator marker;

@@ -78,7 +78,7 @@ class endpoint_image {
 
   [[nodiscard]] const pixel_rays& rays() const noexcept { return rays_; }
   /// Forgets the end of a pixel's ray.
-  void clear(int u, int v) noexcept { z_[static_cast<std::size_t>(v) * stride_ + static_cast<std::size_t>(u)] = 0.0F; }
+  void clear(int u, int v) noexcept { z_[first_ + number(u, v)] = 0.0F; }
   /// The depths (metres) at which the rays of row `v` end, 0 where there is none; padded with zeros.
   [[nodiscard]] const float* z(int v) const noexcept {
     return z_.data() + first_ + static_cast<std::size_t>(v) * stride_;

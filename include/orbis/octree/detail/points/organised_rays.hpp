@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -33,11 +34,12 @@ struct pixel_placement {
   float fx = 1, fy = 1, cx = 0, cy = 0;
   float last_u = 0, last_v = 0;    ///< the last column and row
   float error_u = 0, error_v = 0;  ///< how far from the middle of its pixel a ray may be
+  float far = 0;                   ///< rays that end deeper are better walked: the voxels around them have no others
   std::int32_t stride = 0;
 };
 
 /// The pixels of the rays of a batch, as row * stride + column, and the depths at which the rays end. `left_out`, bit
-/// i: ray i lies in the middle of no pixel.
+/// i: ray i lies in the middle of no pixel, or ends too far away.
 struct pixel_places {
   alignas(64) std::array<std::int32_t, ray_batch::capacity> pixel;
   alignas(64) std::array<float, ray_batch::capacity> z;
@@ -83,8 +85,9 @@ struct place_in_pixels_kernel {
       const floats at_u = simd::approximate_multiply_add(floats(t.fx), along(t.axes[0]) * per_z, floats(t.cx));
       const floats at_v = simd::approximate_multiply_add(floats(t.fy), along(t.axes[1]) * per_z, floats(t.cy));
       const floats u = floor(at_u + 0.5F), v = floor(at_v + 0.5F);
-      const mask placed = valid & (z > std::numeric_limits<float>::min()) & (abs(at_u - u) <= t.error_u) &
-                          (abs(at_v - v) <= t.error_v) & (u >= 0.0F) & (v >= 0.0F) & (u <= t.last_u) & (v <= t.last_v);
+      const mask placed = valid & (z > std::numeric_limits<float>::min()) & (z <= t.far) &
+                          (abs(at_u - u) <= t.error_u) & (abs(at_v - v) <= t.error_v) & (u >= 0.0F) & (v >= 0.0F) &
+                          (u <= t.last_u) & (v <= t.last_v);
       max_z = max(max_z, select(placed, z, floats(0.0F)));
       u0 = min(u0, select(placed, u, floats(far)));
       u1 = max(u1, select(placed, u, floats(-far)));
@@ -110,9 +113,11 @@ class organised_rays {
   template <class Point, class Limit>
   [[nodiscard]] bool plan(const voxel_grid& grid, const float3& origin, std::size_t count, Point&& point,
                           Limit&& limit) {
-    if (count > most_rays || !fit_.fit(origin, count, point, limit)) return false;
-    const auto& k = fit_.camera().k();
-    return depth_frame::is_dense(fit_.mean_z(), grid.resolution(), std::max(k.fx, k.fy));
+    if (count < fewest_rays || count > most_rays || !fit_.fit(origin, count, point, limit)) return false;
+    voxel_ = grid.resolution();
+    // Where pixels have no points, here and there, those that have are further apart; holes are less bad.
+    const double filled = std::min(1.0, 1.25 * fit_.filled());
+    return depth_frame::is_dense(fit_.mean_z(), voxel_, focal() * std::sqrt(filled));
   }
   /// Begins a scan that is planned, and that `workers` threads add.
   void start(const float3& origin, std::size_t count, std::size_t workers) {
@@ -131,6 +136,7 @@ class organised_rays {
                   .last_v = static_cast<float>(k.height - 1),
                   .error_u = static_cast<float>(fit_.error() * k.fx),
                   .error_v = static_cast<float>(fit_.error() * k.fy),
+                  .far = static_cast<float>(2.0 * voxel_ * focal()),
                   .stride = static_cast<std::int32_t>(frame_.ends.stride())};
     for (std::size_t i = 0; i != 3; ++i)
       for (std::size_t axis = 0; axis != 3; ++axis) placement_.axes[axis][i] = pose.rows[i][axis];
@@ -157,7 +163,7 @@ class organised_rays {
   /// Marks the voxels of the rays that have been added, except that voxels for which `saturated` says that a miss would
   /// not change them may be missing, see depth_integrator::mark, and those that are occupied in `masks`. False, and
   /// nothing is marked, if rays come too close to the border of the grid, or if there are many for the same pixels.
-  /// `end_of(i)`: the ray_endpoint of the i-th point. What each worker added is not asked for, unlike by dense_rays.
+  /// `end_of(i)`: the ray_endpoint of the i-th point. (Called as dense_rays::mark is, which asks for ranges.)
   template <execution_policy Policy, class Range, class EndOf, class Saturated>
   [[nodiscard]] bool mark(const Policy& policy, const depth_sensor& scan, Range&&, const EndOf& end_of,
                           scan_masks& masks, Saturated& saturated) {
@@ -192,6 +198,7 @@ class organised_rays {
   }
   [[nodiscard]] std::size_t memory_bytes() const noexcept {
     std::size_t bytes = fit_.memory_bytes() + frame_.memory_bytes() + workers_.capacity() * sizeof(descent_worker) +
+                        within_.capacity() * sizeof(within_[0]) +
                         (pixel_.capacity() + z_.capacity() + numbers_.capacity()) * sizeof(float);
     for (const descent_worker& w : workers_) bytes += w.memory_bytes();
     for (const auto& s : second_) bytes += s.capacity() * sizeof(s[0]);
@@ -199,13 +206,18 @@ class organised_rays {
   }
 
  private:
-  static constexpr std::size_t most_rays = std::size_t{1} << 24U;
+  static constexpr std::size_t fewest_rays = 4096, most_rays = std::size_t{1} << 24U;
 
-  /// What the errors of rays come to beyond those that depth_scene allows for: there 10 u |c|_1 are for the rounding of
-  /// points and 19 u |c|_1 are left over, here a ray may be off along x and along y, and is found to be so in float.
+  /// The smaller one decides how far rays are apart.
+  [[nodiscard]] double focal() const { return std::min(fit_.camera().k().fx, fit_.camera().k().fy); }
+  /// What the errors of rays come to beyond those that depth_scene allows for, which are 10 u |c|_1 for the rounding of
+  /// points, not to be counted twice, and 19 u |c|_1 that are left over. A ray may be off along x and along y, sqrt(2)
+  /// times the error in all, and floats that say so are wrong by some 7 u, and by the rounding of cx and cy.
   [[nodiscard]] float ray_error() const {
     constexpr double u = 0x1p-24;
-    return static_cast<float>(std::max(0.0, 1.5 * fit_.error() - 22.0 * u));
+    const auto& k = fit_.camera().k();
+    const double centre = std::max(k.cx / k.fx, k.cy / k.fy);
+    return static_cast<float>(std::max(0.0, 1.5 * fit_.error() + (7.0 + 3.0 * centre - 29.0) * u));
   }
   /// Cuts off the columns and rows around the image that no ray has been placed in, and says which pixel is the first
   /// one then.
@@ -261,6 +273,7 @@ class organised_rays {
   }
 
   pinhole_fit fit_;
+  double voxel_ = 0.0;
   depth_frame frame_;
   se3 pose_;
   pixel_placement placement_;

@@ -48,7 +48,7 @@ class pinhole_fit {
     // What is far aside may be out by a pixel at first.
     for (int step = 0; step != 4; ++step)
       if ((step % 2 == 0 && !number_pixels()) || !refine()) return false;
-    return set_error() && set_image(count) && holds(count, direction);
+    return set_image(count) && set_error() && holds(count, direction);
   }
 
   [[nodiscard]] const camera::pinhole& camera() const noexcept { return camera_; }
@@ -56,6 +56,8 @@ class pinhole_fit {
   [[nodiscard]] const so3& rotation() const noexcept { return rotation_; }
   /// How far the rays of the points may be from those of their pixels, at z = 1, along x and along y.
   [[nodiscard]] double error() const noexcept { return error_; }
+  /// About which share of the image's pixels have points, the image being no larger than it must be.
+  [[nodiscard]] double filled() const noexcept { return filled_; }
   /// How deep rays end on average, metres.
   [[nodiscard]] double mean_z() const noexcept { return mean_z_; }
   [[nodiscard]] std::size_t memory_bytes() const noexcept {
@@ -67,6 +69,7 @@ class pinhole_fit {
   static constexpr double straight = 1e-5;    ///< radians by which the points of a row may be off its plane
   static constexpr double most_error = 1e-5;  ///< of rays, at z = 1
   static constexpr int widest = 4096;         ///< pixels
+  static constexpr double widest_slope = 4.0;
 
   /// Points that follow each other in the cloud, in a row of the image.
   struct run {
@@ -252,7 +255,7 @@ class pinhole_fit {
         const vec3 c = axes_ * d;
         const double u = fx_ * c.x() / c.z() + cx_, v = fy_ * c.y() / c.z() + cy_;
         const pixel p{d, std::round(u), std::round(v)};
-        if (std::max(std::fabs(p.u - u), std::fabs(p.v - v)) < 0.25) pixels_.push_back(p);
+        if (std::fabs(p.u - u) < 0.25 && std::fabs(p.v - v) < 0.25) pixels_.push_back(p);
       }
     return 20 * pixels_.size() > 17 * 2 * runs_.size();
   }
@@ -285,13 +288,7 @@ class pinhole_fit {
     cy_ += step[6];
     return fx_ > 0.0 && fy_ > 0.0;
   }
-  /// From what is left between rays and pixels; it is the rounding of the points.
-  bool set_error() {
-    const double mean = std::sqrt(square_ / (2.0 * static_cast<double>(pixels_.size())));
-    error_ = std::max(5e-7, 8.0 * mean);
-    return error_ < most_error && error_ * std::max(fx_, fy_) < 0.05;
-  }
-  /// The image, with room around the pixels of the sample.
+  /// The image, with room around the pixels of the sample. Not of a very wide view, where floats are too coarse.
   bool set_image(std::size_t count) {
     double u0 = pixels_.front().u, u1 = u0, v0 = pixels_.front().v, v1 = v0, z = 0.0;
     for (const pixel& p : pixels_) {
@@ -302,16 +299,25 @@ class pinhole_fit {
     mean_z_ = z / static_cast<double>(runs_.size());
     const double room_u = std::ceil(0.04 * (u1 - u0)) + 8.0, room_v = std::ceil(0.04 * (v1 - v0)) + 8.0;
     const double width = u1 - u0 + 1.0 + 2.0 * room_u, height = v1 - v0 + 1.0 + 2.0 * room_v;
-    if (!(width <= widest && height <= widest && width * height <= 16.0 * static_cast<double>(count))) return false;
+    size_ = (u1 - u0 + 1.0) * (v1 - v0 + 1.0);
+    if (!(width <= widest && height <= widest && size_ <= 16.0 * static_cast<double>(count))) return false;
     cx_ += room_u - u0;
     cy_ += room_v - v0;
+    slope_ = std::max(std::max(cx_, width - cx_) / fx_, std::max(cy_, height - cy_) / fy_);
+    if (!(slope_ < widest_slope)) return false;
     camera_ = camera::pinhole{static_cast<int>(width), static_cast<int>(height), fx_, fy_, cx_, cy_};
     rotation_ = so3{mat3(axes_.transpose())};
     return true;
   }
-  /// Whether it is so of other points as well.
+  /// From what is left between rays and pixels, which is the rounding of the points; and floats can tell no less.
+  bool set_error() {
+    const double mean = std::sqrt(square_ / (2.0 * static_cast<double>(pixels_.size())));
+    error_ = std::max(5e-7 * std::max(1.0, 0.5 * (1.0 + slope_ * slope_)), 8.0 * mean);
+    return error_ < most_error && error_ * std::max(fx_, fy_) < 0.05;
+  }
+  /// Whether it is so of other points as well, and which share of the image's pixels they are.
   template <class Direction>
-  [[nodiscard]] bool holds(std::size_t count, const Direction& direction) const {
+  [[nodiscard]] bool holds(std::size_t count, const Direction& direction) {
     std::size_t tried = 0, good = 0;
     random_bits random{2};
     for (std::size_t k = 0; k != most_runs; ++k) {
@@ -319,13 +325,15 @@ class pinhole_fit {
       if (direction(place(k, count - 1, random), d) == 0.0) continue;
       ++tried;
       const vec3 c = axes_ * d;
-      const auto is_pixel = [&](double at, double f, double centre) {
-        const double p = f * at / c.z() + centre;
-        return std::fabs(p - std::round(p)) <= error_ * f;
+      const auto is_pixel = [&](double at, double f, double centre, int size) {
+        const double p = f * at / c.z() + centre, whole = std::round(p);
+        return std::fabs(p - whole) <= error_ * f && whole >= 0.0 && whole < size;
       };
-      if (c.z() > 0.0 && is_pixel(c.x(), fx_, cx_) && is_pixel(c.y(), fy_, cy_)) ++good;
+      if (c.z() > 0.0 && is_pixel(c.x(), fx_, cx_, camera_.width()) && is_pixel(c.y(), fy_, cy_, camera_.height()))
+        ++good;
     }
-    return 50 * good > 49 * tried;
+    filled_ = static_cast<double>(count) * static_cast<double>(tried) / most_runs / size_;
+    return 50 * good > 49 * tried && filled_ < 1.1;  // or most pixels have several points
   }
 
   std::vector<run> runs_;
@@ -334,7 +342,9 @@ class pinhole_fit {
   mat3 axes_ = mat3::Identity();  ///< R_camera_world
   double step_x_ = 0.0, step_y_ = 0.0, fx_ = 0.0, fy_ = 0.0, cx_ = 0.0, cy_ = 0.0;
   double square_ = 0.0;  ///< of what is left, at z = 1, all together
-  double error_ = 0.0, mean_z_ = 0.0;
+  double size_ = 0.0;    ///< of the image without room around it, pixels
+  double slope_ = 0.0;   ///< of its sides, the largest
+  double error_ = 0.0, mean_z_ = 0.0, filled_ = 0.0;
   camera::pinhole camera_;
   so3 rotation_;
 };
