@@ -115,7 +115,9 @@ class organised_rays {
                           Limit&& limit) {
     if (count < fewest_rays || count > most_rays || !fit_.fit(origin, count, point, limit)) return false;
     voxel_ = grid.resolution();
-    // Where pixels have no points, here and there, those that have are further apart; holes are less bad.
+    // Where pixels have no points, here and there, those that have are further apart; holes are less bad. With few of
+    // them dense_rays does better, whose cells hold several rays.
+    if (fit_.filled() < 0.4) return false;
     const double filled = std::min(1.0, 1.25 * fit_.filled());
     return depth_frame::is_dense(fit_.mean_z(), voxel_, focal() * std::sqrt(filled));
   }
