@@ -24,6 +24,7 @@ using namespace orbis::octree::detail;
 using octree::detail::dense_rays;
 using test::free_voxels;
 using test::mark;
+using test::random_origin;
 using test::scan;
 using test::walk;
 
@@ -69,19 +70,6 @@ namespace {
   return s;
 }
 
-[[nodiscard]] vec3 random_origin(random_bits& random, double voxel) {
-  vec3 origin{random.uniform(-2.0, 2.0), random.uniform(-2.0, 2.0), random.uniform(-2.0, 2.0)};
-  switch (random.below(6)) {
-    case 0: origin.setZero(); break;
-    case 1: origin[static_cast<int>(random.below(3))] = voxel * random.below(9); break;
-    case 2: origin = voxel * vec3{1.0, 2.0, 3.0}; break;
-    case 3: origin *= 300.0; break;
-    case 4: origin = vec3::Constant(0.5 * voxel); break;
-    default: break;
-  }
-  return origin;
-}
-
 }  // namespace
 
 TEST_CASE("Rays of any kind from any place mark the voxels that they cross one by one") {
@@ -91,7 +79,8 @@ TEST_CASE("Rays of any kind from any place mark the voxels that they cross one b
   for (int run = 0; run != 120; ++run) {
     const auto kind = static_cast<std::uint64_t>(run % 8);
     const double voxel = std::array{0.05, 0.1, 0.02, 1.0 / 3.0}[random.below(4)];
-    const scan s = random_scan(random, kind, voxel, random_origin(random, voxel));
+    const double far = random.below(6) == 0 ? 300.0 : 1.0;
+    const scan s = random_scan(random, kind, voxel, far * random_origin(random, voxel));
     walk(s, want);
     INFO("kind " << kind << ", run " << run);
     REQUIRE(mark(seq, rays, s, got));
@@ -103,38 +92,15 @@ TEST_CASE("Rays of any kind from any place mark the voxels that they cross one b
 
 TEST_CASE("Every instruction set marks the same voxels") {
   random_bits random{72};
-  scan_masks want, got;
-  for (std::uint64_t kind = 0; kind != 8; ++kind) {
-    const scan s = random_scan(random, kind, 0.05, random_origin(random, 0.05));
-    walk(s, want);
-    for (const simd::level level : simd::available_levels()) {
-      const simd::level_limit limit{level};
-      dense_rays rays;
-      REQUIRE(mark(seq, rays, s, got));
-      REQUIRE(free_voxels(got, nullptr) == free_voxels(want, nullptr));
-    }
-  }
+  for (std::uint64_t kind = 0; kind != 8; ++kind)
+    test::require_of_every_level<dense_rays>(random_scan(random, kind, 0.05, random_origin(random, 0.05)));
 }
 
 TEST_CASE("Saturated voxels may be left out and no others are") {
   random_bits random{73};
   dense_rays rays;
-  scan_masks want, got, hidden;
-  for (int run = 0; run != 10; ++run) {
-    const scan s = random_scan(random, 0, 0.05, random_origin(random, 0.05));
-    walk(s, want);
-    hidden.clear();
-    for (const scan_brick& b : want.bricks())
-      for (std::size_t i = 0; i != 8; ++i)
-        if (random.below(2) == 0) hidden.at(named_key(b.name)).free[i] = b.free[i];
-    REQUIRE(mark(seq, rays, s, got, &hidden));
-    REQUIRE(free_voxels(got, &hidden) == free_voxels(want, &hidden));
-    for (const auto& [name, free] : free_voxels(got, nullptr)) {
-      const scan_brick* const b = want.find(name);
-      REQUIRE(b != nullptr);
-      for (std::size_t i = 0; i != 8; ++i) REQUIRE((free[i] & ~b->free[i]) == 0);
-    }
-  }
+  for (int run = 0; run != 10; ++run)
+    test::require_but_saturated(rays, random_scan(random, 0, 0.05, random_origin(random, 0.05)), random);
 }
 
 TEST_CASE("Close to the border of the grid rays have to be walked") {

@@ -21,6 +21,7 @@ using namespace orbis::octree::detail;
 using octree::detail::organised_rays;
 using test::free_voxels;
 using test::mark;
+using test::random_origin;
 using test::scan;
 using test::walk;
 
@@ -55,18 +56,6 @@ namespace {
     }
   if (random.below(3) == 0) s.limit = reach * random.uniform(0.1, 0.9);
   return s;
-}
-
-[[nodiscard]] vec3 random_origin(random_bits& random, double voxel) {
-  vec3 origin{random.uniform(-2.0, 2.0), random.uniform(-2.0, 2.0), random.uniform(-2.0, 2.0)};
-  switch (random.below(5)) {
-    case 0: origin.setZero(); break;
-    case 1: origin[static_cast<int>(random.below(3))] = voxel * random.below(9); break;
-    case 2: origin = voxel * vec3{1.0, 2.0, 3.0}; break;
-    case 3: origin = vec3::Constant(0.5 * voxel); break;
-    default: break;
-  }
-  return origin;
 }
 
 [[nodiscard]] bool plan(organised_rays& rays, const scan& s) {
@@ -156,18 +145,8 @@ TEST_CASE("Rays that are as far off their pixels as they may be mark the voxels 
 
 TEST_CASE("Every instruction set marks the voxels of an organised cloud") {
   random_bits random{82};
-  scan_masks want, got;
-  for (int run = 0; run != 8; ++run) {
-    organised_rays any;
-    const scan s = fitting_scan(random, any, 0.05);
-    walk(s, want);
-    for (const simd::level level : simd::available_levels()) {
-      const simd::level_limit limit{level};
-      organised_rays rays;
-      REQUIRE(mark(seq, rays, s, got));
-      REQUIRE(free_voxels(got, nullptr) == free_voxels(want, nullptr));
-    }
-  }
+  organised_rays any;
+  for (int run = 0; run != 8; ++run) test::require_of_every_level<organised_rays>(fitting_scan(random, any, 0.05));
 }
 
 TEST_CASE("Nearly all organised clouds are found to be") {
@@ -256,17 +235,7 @@ TEST_CASE("Points for the same pixels: few are walked, many are left to others")
 TEST_CASE("Saturated voxels of an organised cloud may be left out and no others are") {
   random_bits random{85};
   organised_rays rays;
-  scan_masks want, got, hidden;
-  for (int run = 0; run != 10; ++run) {
-    const scan s = fitting_scan(random, rays, 0.05);
-    walk(s, want);
-    hidden.clear();
-    for (const scan_brick& b : want.bricks())
-      for (std::size_t i = 0; i != 8; ++i)
-        if (random.below(2) == 0) hidden.at(named_key(b.name)).free[i] = b.free[i];
-    REQUIRE(mark(seq, rays, s, got, &hidden));
-    REQUIRE(free_voxels(got, &hidden) == free_voxels(want, &hidden));
-  }
+  for (int run = 0; run != 10; ++run) test::require_but_saturated(rays, fitting_scan(random, rays, 0.05), random);
 }
 
 TEST_CASE("Close to the border of the grid an organised cloud is left to others") {

@@ -14,10 +14,13 @@
 #include <vector>
 
 #include <orbis/core/execution.hpp>
+#include <orbis/core/random.hpp>
 #include <orbis/octree/detail/depth/endpoint_rows.hpp>
 #include <orbis/octree/detail/points/limit_rays.hpp>
 #include <orbis/octree/detail/points/point_keys.hpp>
 #include <orbis/octree/detail/storage/scan_masks.hpp>
+
+#include "support/catch.hpp"
 
 namespace orbis::test {
 
@@ -114,6 +117,49 @@ inline void walk(const scan& s, scan_masks& masks) {
     if (!std::isfinite(static_cast<float>(distance)) || !s.grid.key(e.point)) continue;
     masks.mark_ray(s.grid, s.origin, from, e.point, e.key);
     if (distance <= s.limit) masks.mark_occupied(e.key);
+  }
+}
+
+/// Where rays begin: anywhere, or on corners, faces and in the middle of voxels.
+[[nodiscard]] inline vec3 random_origin(random_bits& random, double voxel) {
+  vec3 origin{random.uniform(-2.0, 2.0), random.uniform(-2.0, 2.0), random.uniform(-2.0, 2.0)};
+  switch (random.below(5)) {
+    case 0: origin.setZero(); break;
+    case 1: origin[static_cast<int>(random.below(3))] = voxel * random.below(9); break;
+    case 2: origin = voxel * vec3{1.0, 2.0, 3.0}; break;
+    case 3: origin = vec3::Constant(0.5 * voxel); break;
+    default: break;
+  }
+  return origin;
+}
+
+/// Requires of every instruction set the voxels of the walk.
+template <class Rays>
+void require_of_every_level(const scan& s) {
+  scan_masks want, got;
+  walk(s, want);
+  for (const simd::level level : simd::available_levels()) {
+    const simd::level_limit limit{level};
+    Rays rays;
+    REQUIRE(mark(seq, rays, s, got));
+    REQUIRE(free_voxels(got, nullptr) == free_voxels(want, nullptr));
+  }
+}
+
+/// Requires that of some saturated voxels any may be left out, of the others none, and that no others are marked.
+template <class Rays>
+void require_but_saturated(Rays& rays, const scan& s, random_bits& random) {
+  scan_masks want, got, hidden;
+  walk(s, want);
+  for (const scan_brick& b : want.bricks())
+    for (std::size_t i = 0; i != 8; ++i)
+      if (random.below(2) == 0) hidden.at(named_key(b.name)).free[i] = b.free[i];
+  REQUIRE(mark(seq, rays, s, got, &hidden));
+  REQUIRE(free_voxels(got, &hidden) == free_voxels(want, &hidden));
+  for (const auto& [name, free] : free_voxels(got, nullptr)) {
+    const scan_brick* const b = want.find(name);
+    REQUIRE(b != nullptr);
+    for (std::size_t i = 0; i != 8; ++i) REQUIRE((free[i] & ~b->free[i]) == 0);
   }
 }
 
