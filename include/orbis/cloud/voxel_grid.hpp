@@ -147,8 +147,9 @@ struct centroid_fold {
   }
   [[nodiscard]] voxel_summary summary(const record& r) const {
     voxel_summary out;
+    const auto mean = [&](double sum) { return r.count == 1 ? sum : sum / r.count; };  // many voxels have one point
     for (std::size_t a = 0; a != 3; ++a)
-      out.words[a] = std::bit_cast<std::uint32_t>(static_cast<float>(r.position[a] / r.count));
+      out.words[a] = std::bit_cast<std::uint32_t>(static_cast<float>(mean(r.position[a])));
     if constexpr (Colored) {
       const auto channel = [&](std::size_t c) {
         return static_cast<std::uint8_t>((r.color[c] + r.count / 2) / r.count);  // rounded
@@ -193,7 +194,7 @@ struct choice_fold {
 /// The index of one point for each occupied voxel, in the order in which the voxels are first seen; with
 /// `voxel_first` that is ascending; the same for every policy. Whatever belongs to the points rides along by index.
 /// Points that are not finite are left out, as are those more than 2^31 voxels from the origin. O(n). Memory
-/// meanwhile: about 20 bytes per point, 30 with colours; a few MB for fewer than 2^15 points.
+/// meanwhile: about 20 bytes per point, 30 with colours; less than 1 MB for fewer than 2^12 points.
 /// @pre size > 0, fewer than 2^32 - 1 points; `choice` may be asked by several threads at a time
 template <execution_policy Policy, point_range Points, voxel_choice Choice = voxel_first>
 [[nodiscard]] std::vector<std::uint32_t> voxel_grid_indices(const Policy& policy, const Points& points,
@@ -208,7 +209,7 @@ template <execution_policy Policy, point_range Points, voxel_choice Choice = vox
 /// `colors` is not empty: by default the centroid, with `voxel_first`, `voxel_random` or another
 /// `voxel_choice` one of the points; the same for every policy. Points that are not finite are left out, as are those
 /// more than 2^31 voxels from the origin. O(n). Memory meanwhile: about 20 bytes per point,
-/// 30 with colours; a few MB for fewer than 2^15 points.
+/// 30 with colours; less than 1 MB for fewer than 2^12 points.
 ///
 /// Coordinates are summed in double in the order of the points. Where many voxels are occupied, the points are first
 /// brought into parts whose voxels fit into the cache.

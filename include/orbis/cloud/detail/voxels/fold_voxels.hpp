@@ -75,6 +75,7 @@ template <point_range Points, voxel_fold Fold>
   voxel_table<typename Fold::record> table;
   point_block<voxel_scalar<Points>> block{size};
   const std::size_t count = std::ranges::size(points);
+  table.clear(std::min(most, std::size_t{1} << 12U));
   constexpr std::size_t piece = 4096;
   for (std::size_t from = 0; from < count; from += piece) {
     for_each_cell_of(
@@ -114,22 +115,25 @@ class voxel_parts {
     std::unique_ptr<rgb8[]> colors;
     if constexpr (Fold::has_colors) colors = std::make_unique_for_overwrite<rgb8[]>(starts_.back());
     std::vector<std::uint32_t> voxels(parts());
-    for_each_chunk(policy, parts(), std::max<std::size_t>(1, parts() / 32), [&](std::size_t begin, std::size_t end) {
-      voxel_table<typename Fold::record> table;
-      point_block<voxel_scalar<Points>> block{size_};
-      for (std::size_t part = begin; part != end; ++part) {
-        fill(table, block, part, fold);
-        std::size_t at = starts_[part];
-        for (const auto& row : table.rows()) {  // what is left of them takes the place of the points
-          const voxel_summary summary = fold.summary(row.record);
-          if constexpr (Fold::has_colors) colors[at] = summary.color;
-          entries_[at++] = {summary.words, row.first};
-          part_of_[row.first] = first_of_voxel;
-        }
-        voxels[part] = static_cast<std::uint32_t>(table.rows().size());
-        table.clear();
-      }
-    });
+    // Few chunks, as each has a table of its own.
+    const std::size_t chunks = policy.threads() == 1 ? 1 : std::size_t{8} * policy.threads();
+    for_each_chunk(policy, parts(), std::max<std::size_t>(1, parts() / chunks),
+                   [&](std::size_t begin, std::size_t end) {
+                     voxel_table<typename Fold::record> table;
+                     point_block<voxel_scalar<Points>> block{size_};
+                     for (std::size_t part = begin; part != end; ++part) {
+                       table.clear(starts_[part + 1] - starts_[part]);
+                       fill(table, block, part, fold);
+                       std::size_t at = starts_[part];
+                       for (const auto& row : table.rows()) {  // what is left of them takes the place of the points
+                         const voxel_summary summary = fold.summary(row.record);
+                         if constexpr (Fold::has_colors) colors[at] = summary.color;
+                         entries_[at++] = {summary.words, row.first};
+                         part_of_[row.first] = first_of_voxel;
+                       }
+                       voxels[part] = static_cast<std::uint32_t>(table.rows().size());
+                     }
+                   });
     const first_points firsts{policy, part_of_.get(), count_};
     fold.resize(firsts.count());
     for_each_index(policy, parts(), 8, [&](std::size_t part) {
@@ -139,7 +143,7 @@ class voxel_parts {
   }
 
  private:
-  static constexpr std::size_t points_of_part = 4096;
+  static constexpr std::size_t points_of_part = 2048;
   static constexpr std::size_t grain = std::size_t{1} << 15U;
   static constexpr std::uint16_t no_part = 0xffff;
   static constexpr std::uint16_t first_of_voxel = 0xfffe;
@@ -284,18 +288,18 @@ template <point_range Points>
 }
 
 /// Gathers the points of every voxel, see `voxel_fold`; the same for every policy. Points that have no cell are left
-/// out. O(n). Memory: about 20 bytes per point beyond 2^15 points, 30 with colours.
+/// out. O(n). Memory: about 20 bytes per point beyond 2^12 points, 30 with colours.
 /// @pre size > 0, fewer than 2^32 points
 template <execution_policy Policy, point_range Points, voxel_fold Fold>
 void fold_voxels(const Policy& policy, const Points& points, double size, Fold&& fold) {
-  constexpr std::size_t small = std::size_t{1} << 15U;
+  constexpr std::size_t small = std::size_t{1} << 12U, few = std::size_t{1} << 15U;
   const std::size_t count = std::ranges::size(points);
   if (count <= small) {
     static_cast<void>(fold_in_one_table(points, size, count, fold));
     return;
   }
   if (policy.threads() == 1 && voxels_are_few(points, size) &&
-      fold_in_one_table(points, size, std::min(small, count / 8), fold))
+      fold_in_one_table(points, size, std::min(few, count / 8), fold))
     return;
   voxel_parts<Points, std::remove_cvref_t<Fold>>{points, size}.fold(policy, fold);
 }

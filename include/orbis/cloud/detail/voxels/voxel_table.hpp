@@ -49,10 +49,13 @@ class voxel_table {
     return rows_.emplace_back(row{key, first, {}});
   }
   [[nodiscard]] const std::vector<row>& rows() const noexcept { return rows_; }
-  /// Forgets the rows, keeps the memory.
-  void clear() noexcept {
+  /// Forgets the rows and makes room for `expected` ones. Keeps the memory.
+  void clear(std::size_t expected) {
     rows_.clear();
-    std::fill(slots_.begin(), slots_.end(), none);
+    rows_.reserve(expected);
+    const std::size_t slots = std::bit_ceil(std::max<std::size_t>(64, 3 * expected));
+    slots_.assign(slots, none);
+    shift_ = 64 - static_cast<unsigned>(std::countr_zero(slots));
   }
 
  private:
