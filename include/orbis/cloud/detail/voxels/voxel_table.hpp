@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <span>
 #include <vector>
 
 #include <orbis/cloud/detail/voxels/voxel_cells.hpp>
@@ -27,7 +28,7 @@ template <std::uint64_t Salt>
 }
 
 /// Rows by key, with what is needed of a row side by side: one miss of the cache for a voxel that is known, besides the
-/// one for its slot. Open addressing with linear probing, at most half full.
+/// one for its slot. Open addressing with linear probing, at most a third full.
 template <class Record>
 class voxel_table {
  public:
@@ -41,25 +42,25 @@ class voxel_table {
   [[nodiscard]] row& at(const voxel_key& key, std::uint32_t first) {
     std::size_t i = place(key);
     if (slots_[i] != none) return rows_[slots_[i]];
-    if (2 * (rows_.size() + 1) > slots_.size()) {
+    if (size_ == most_) {
       grow();
       i = place(key);
     }
-    slots_[i] = static_cast<std::uint32_t>(rows_.size());
-    return rows_.emplace_back(row{key, first, {}});
+    slots_[i] = static_cast<std::uint32_t>(size_);
+    row& made = rows_[size_++];
+    made = {key, first, {}};
+    return made;
   }
-  [[nodiscard]] const std::vector<row>& rows() const noexcept { return rows_; }
+  [[nodiscard]] std::span<const row> rows() const noexcept { return std::span{rows_}.first(size_); }
   /// Forgets the rows and makes room for `expected` ones. Keeps the memory.
   void clear(std::size_t expected) {
-    rows_.clear();
-    rows_.reserve(expected);
-    const std::size_t slots = std::bit_ceil(std::max<std::size_t>(64, 3 * expected));
-    slots_.assign(slots, none);
-    shift_ = 64 - static_cast<unsigned>(std::countr_zero(slots));
+    size_ = 0;
+    make_room(std::max(expected, fewest));
   }
 
  private:
   static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
+  static constexpr std::size_t fewest = 21;
 
   [[nodiscard]] std::size_t place(const voxel_key& key) const noexcept {
     std::size_t i = static_cast<std::size_t>(mixed_key<0>(key) >> shift_);
@@ -67,13 +68,21 @@ class voxel_table {
     return i;
   }
   void grow() {
-    slots_.assign(2 * slots_.size(), none);
-    --shift_;
-    for (std::size_t r = 0; r != rows_.size(); ++r) slots_[place(rows_[r].key)] = static_cast<std::uint32_t>(r);
+    make_room(2 * most_);
+    for (std::size_t r = 0; r != size_; ++r) slots_[place(rows_[r].key)] = static_cast<std::uint32_t>(r);
+  }
+  /// For `most` rows; the slots are empty then.
+  void make_room(std::size_t most) {
+    most_ = most;
+    if (rows_.size() < most) rows_.resize(most);
+    const std::size_t slots = std::bit_ceil(3 * most);
+    slots_.assign(slots, none);
+    shift_ = 64 - static_cast<unsigned>(std::countr_zero(slots));
   }
 
-  std::vector<row> rows_;
+  std::vector<row> rows_ = std::vector<row>(fewest);                         ///< the first size_ are in use
   std::vector<std::uint32_t> slots_ = std::vector<std::uint32_t>(64, none);  ///< 2^(64 - shift_)
+  std::size_t size_ = 0, most_ = fewest;
   unsigned shift_ = 58;
 };
 
