@@ -122,7 +122,7 @@ class voxel_parts {
                      voxel_table<typename Fold::record> table;
                      point_block<voxel_scalar<Points>> block{size_};
                      for (std::size_t part = begin; part != end; ++part) {
-                       table.clear(starts_[part + 1] - starts_[part]);
+                       table.clear(std::min<std::size_t>(starts_[part + 1] - starts_[part], usual_voxels));
                        fill(table, block, part, fold);
                        std::size_t at = starts_[part];
                        for (const auto& row : table.rows()) {  // what is left of them takes the place of the points
@@ -144,6 +144,7 @@ class voxel_parts {
 
  private:
   static constexpr std::size_t points_of_part = 2048;
+  static constexpr std::size_t usual_voxels = 2 * points_of_part;  ///< of a part at most; points may be far more
   static constexpr std::size_t grain = std::size_t{1} << 15U;
   static constexpr std::uint16_t no_part = 0xffff;
   static constexpr std::uint16_t first_of_voxel = 0xfffe;
