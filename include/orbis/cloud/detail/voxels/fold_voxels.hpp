@@ -117,23 +117,23 @@ class voxel_parts {
     std::vector<std::uint32_t> voxels(parts());
     // Few chunks, as each has a table of its own.
     const std::size_t chunks = policy.threads() == 1 ? 1 : std::size_t{8} * policy.threads();
-    for_each_chunk(policy, parts(), std::max<std::size_t>(1, parts() / chunks),
-                   [&](std::size_t begin, std::size_t end) {
-                     voxel_table<typename Fold::record> table;
-                     point_block<voxel_scalar<Points>> block{size_};
-                     for (std::size_t part = begin; part != end; ++part) {
-                       table.clear(std::min<std::size_t>(starts_[part + 1] - starts_[part], usual_voxels));
-                       fill(table, block, part, fold);
-                       std::size_t at = starts_[part];
-                       for (const auto& row : table.rows()) {  // what is left of them takes the place of the points
-                         const voxel_summary summary = fold.summary(row.record);
-                         if constexpr (Fold::has_colors) colors[at] = summary.color;
-                         entries_[at++] = {summary.words, row.first};
-                         part_of_[row.first] = first_of_voxel;
-                       }
-                       voxels[part] = static_cast<std::uint32_t>(table.rows().size());
-                     }
-                   });
+    const std::size_t width = std::max<std::size_t>(1, parts() / chunks);
+    for_each_chunk(policy, parts(), width, [&](std::size_t begin, std::size_t end) {
+      voxel_table<typename Fold::record> table;
+      point_block<voxel_scalar<Points>> block{size_};
+      for (std::size_t part = begin; part != end; ++part) {
+        table.clear(std::min<std::size_t>(starts_[part + 1] - starts_[part], usual_voxels));
+        fill(table, block, part, fold);
+        std::size_t at = starts_[part];
+        for (const auto& row : table.rows()) {  // what is left of them takes the place of the points
+          const voxel_summary summary = fold.summary(row.record);
+          if constexpr (Fold::has_colors) colors[at] = summary.color;
+          entries_[at++] = {summary.words, row.first};
+          part_of_[row.first] = first_of_voxel;
+        }
+        voxels[part] = static_cast<std::uint32_t>(table.rows().size());
+      }
+    });
     const first_points firsts{policy, part_of_.get(), count_};
     fold.resize(firsts.count());
     for_each_index(policy, parts(), 8, [&](std::size_t part) {

@@ -198,9 +198,10 @@ struct depth_descent {
 template <execution_policy Policy, class Rays, class Saturated>
 void descend_nodes(const Policy& policy, const view_frame& frame, const depth_sensor& sensor, const Rays& rays,
                    bool on_face, scan_masks& masks, Saturated& saturated, std::vector<descent_worker>& workers) {
-  workers.resize(std::clamp<std::size_t>(policy.threads(), 1, std::max<std::size_t>(1, frame.nodes.size())));
+  const std::size_t count = std::clamp<std::size_t>(policy.threads(), 1, std::max<std::size_t>(1, frame.nodes.size()));
+  if (workers.size() < count) workers.resize(count);  // only ever more: their memory is kept
   std::atomic<std::size_t> next{0};
-  for_each_index(policy, workers.size(), 1, [&](std::size_t i) {
+  for_each_index(policy, count, 1, [&](std::size_t i) {
     workers[i].bricks.clear();
     const depth_descent<Rays, Saturated> descent{frame, workers[i], sensor, rays, masks, saturated, on_face};
     for (std::size_t n; (n = next.fetch_add(1, std::memory_order_relaxed)) < frame.nodes.size();) {
@@ -208,10 +209,10 @@ void descend_nodes(const Policy& policy, const view_frame& frame, const depth_se
       descent.descend(node.key, node.center, view_frame::list_level, node.inside);
     }
   });
-  for (const descent_worker& w : workers)
-    for (const auto& b : w.bricks) {
+  for (std::size_t i = 0; i != count; ++i)
+    for (const auto& b : workers[i].bricks) {
       auto& free = masks.at(named_key(b.name)).free;
-      for (std::size_t i = 0; i != free.size(); ++i) free[i] |= b.free[i];
+      for (std::size_t octant = 0; octant != free.size(); ++octant) free[octant] |= b.free[octant];
     }
   masks.mark_free(*sensor.key);
 }

@@ -87,19 +87,9 @@ struct place_rays_kernel {
     const integers lanes = integers::load(count_up.data());
     floats max_z(0.0F);
     for (std::size_t i = 0; i < count; i += n) {
-      const auto ray = [&](std::size_t axis) ORBIS_INLINE_LAMBDA {
-        return floats::load(rays.end[axis].data() + i) - floats(t.origin[axis]);
-      };
-      const auto way = [&](std::size_t axis) ORBIS_INLINE_LAMBDA { return integers::load(rays.way[axis].data() + i); };
-      const std::uint64_t there = (rays.hit[i >> 6U] | rays.cut[i >> 6U]) >> (i & 63U);
-      const mask valid = mask::from_bits(there & (n == 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << n) - 1)) &
-                         simd::mask_as<4>((way(0) | way(1) | way(2)) != integers(0));  // the others visit nothing
-      const floats dx = ray(0), dy = ray(1), dz = ray(2);
-      const auto along = [&](const float3& a) ORBIS_INLINE_LAMBDA {
-        return simd::approximate_multiply_add(floats(a[0]), dx,
-                                              simd::approximate_multiply_add(floats(a[1]), dy, floats(a[2]) * dz));
-      };
-      const floats a = along(t.axes[0]), b = along(t.axes[1]), c = along(t.axes[2]);
+      const ray_lanes<Target> r{rays, t.origin, i};
+      const mask valid = r.leaves;
+      const floats a = r.along(t.axes[0]), b = r.along(t.axes[1]), c = r.along(t.axes[2]);
       const floats size_a = abs(a), size_b = abs(b), size_c = abs(c);
       const mask by_c = (size_c >= size_a) & (size_c >= size_b), by_a = and_not(size_a >= size_b, by_c);
       const floats main = select(by_c, c, select(by_a, a, b)), depth = abs(main), inverse = 1.0F / depth;
@@ -184,10 +174,7 @@ class binned_rays {
       const std::uint64_t ray = std::uint64_t{std::bit_cast<std::uint32_t>(placed[i].z)} << 32U | (first + i) << 8U;
       b.bins[c] = std::max(before - rank, ray) | (rank + 1);
     }
-    for (std::size_t w = 0; w != places.left_out.size(); ++w) {
-      rays.hit[w] &= places.left_out[w];
-      rays.cut[w] &= places.left_out[w];
-    }
+    rays.keep(places.left_out);
   }
   /// Sorts the rays that have been added: `range(worker)` are the points that each worker added.
   template <execution_policy Policy, class Range>

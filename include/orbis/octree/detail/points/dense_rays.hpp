@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -22,6 +21,7 @@
 #include <orbis/octree/detail/points/binned_rays.hpp>
 #include <orbis/octree/detail/points/cell_tests.hpp>
 #include <orbis/octree/detail/points/direction_windows.hpp>
+#include <orbis/octree/detail/points/scan_sample.hpp>
 #include <orbis/octree/detail/storage/scan_masks.hpp>
 
 namespace orbis::octree::detail {
@@ -112,7 +112,6 @@ class dense_rays {
     rays_.sort(policy, range);
     if (rays_.size() == 0) return true;
     bool on_face = false;
-    std::size_t nodes = 0;
     for (std::size_t i = 0; i != direction_windows::faces; ++i) {
       window_frame& f = frames_[i];
       f.nodes.clear();
@@ -126,26 +125,10 @@ class dense_rays {
                       [&](int v) { return f.rays.z + static_cast<std::ptrdiff_t>(v) * w.stride; });
       f.list_nodes(f.sensor, bounds->first, bounds->second);
       on_face = on_face || f.is_on_face(f.sensor);
-      nodes += f.nodes.size();
     }
-    workers_.resize(std::clamp<std::size_t>(policy.threads(), 1, std::max<std::size_t>(1, nodes)));
-    std::atomic<std::size_t> next{0};
-    for_each_index(policy, workers_.size(), 1, [&](std::size_t i) {
-      workers_[i].bricks.clear();
-      for (std::size_t n; (n = next.fetch_add(1, std::memory_order_relaxed)) < nodes;) {
-        const window_frame* f = frames_.data();
-        for (; n >= f->nodes.size(); ++f) n -= f->nodes.size();
-        const cell_rays<EndOf> rays{*f, end_of};
-        const depth_descent<cell_rays<EndOf>, Saturated> descent{*f,    workers_[i], f->sensor, rays,
-                                                                 masks, saturated,   on_face};
-        descent.descend(f->nodes[n].key, f->nodes[n].center, view_frame::list_level, f->nodes[n].inside);
-      }
-    });
-    for (const descent_worker& w : workers_)
-      for (const auto& b : w.bricks) {
-        auto& free = masks.at(named_key(b.name)).free;
-        for (std::size_t i = 0; i != 8; ++i) free[i] |= b.free[i];
-      }
+    for (const window_frame& f : frames_)
+      if (!f.nodes.empty())
+        descend_nodes(policy, f, f.sensor, cell_rays<EndOf>{f, end_of}, on_face, masks, saturated, workers_);
     masks.mark_free(*sensor.key);
     if (on_face) walk_first_steps(sensor, end_of, masks);
     return true;
@@ -194,18 +177,12 @@ class dense_rays {
     sample_.length = 0.0;
     random_bits random{1};
     for (std::size_t k = 0; k != most_sampled; ++k) {
-      // Somewhere in each stretch, at random: regular steps and the rows of a scan get into step.
-      const double place = (static_cast<double>(k) + random.uniform()) * static_cast<double>(count) / most_sampled;
-      const std::size_t i = std::min(static_cast<std::size_t>(place), count - 1);
-      const float3 p = point(i);
+      const std::size_t i = place_in_stretch(k, most_sampled, count - 1, random);
       vec3 d;
-      for (int axis = 0; axis != 3; ++axis)
-        d[axis] = static_cast<double>(p[static_cast<std::size_t>(axis)]) -
-                  static_cast<double>(origin[static_cast<std::size_t>(axis)]);
-      const double length = d.norm();
-      if (!(length > 0.0 && length < 1e30 && limit(i) >= 0.0)) continue;
-      sample_.directions.push_back(d / length);
-      sample_.length += std::min(length, limit(i));
+      const auto length = length_of_ray(origin, point(i), limit(i), d);
+      if (!length) continue;
+      sample_.directions.push_back(d);
+      sample_.length += *length;
     }
     sample_.length /= static_cast<double>(std::max<std::size_t>(1, sample_.directions.size()));
   }

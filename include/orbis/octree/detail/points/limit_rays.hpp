@@ -44,6 +44,13 @@ struct ray_batch {
     (is_hit ? hit : cut)[i >> 6U] |= std::uint64_t{1} << (i & 63U);
   }
   void clear() noexcept { hit = cut = {}; }
+  /// Takes out all rays but those of `left`.
+  void keep(const bits& left) noexcept {
+    for (std::size_t w = 0; w != left.size(); ++w) {
+      hit[w] &= left[w];
+      cut[w] &= left[w];
+    }
+  }
   /// Eight bits from bit i on. @pre i is a multiple of eight
   [[nodiscard]] static std::uint32_t eight(const bits& b, std::size_t i) noexcept {
     return static_cast<std::uint32_t>(b[i >> 6U] >> (i & 63U)) & 0xffU;
@@ -52,6 +59,30 @@ struct ray_batch {
     std::size_t n = 0;
     for (const std::uint64_t word : b) n += static_cast<std::size_t>(std::popcount(word));
     return n;
+  }
+};
+
+/// The rays of a batch from ray `i` on, as many as a vector holds. @pre i is a multiple of that
+template <simd::target Target>
+struct ray_lanes {
+  using floats = simd::native_vec<float, Target>;
+  using integers = simd::native_vec<std::int32_t, Target>;
+  using mask = typename floats::mask_type;
+  std::array<floats, 3> ray;  ///< from the origin to the end
+  mask leaves;                ///< that end outside the origin's voxel; the others visit nothing
+
+  ORBIS_ALWAYS_INLINE ray_lanes(const ray_batch& rays, const float3& origin, std::size_t i) noexcept {
+    for (std::size_t axis = 0; axis != 3; ++axis)
+      ray[axis] = floats::load(rays.end[axis].data() + i) - floats(origin[axis]);
+    const auto way = [&](std::size_t axis) ORBIS_INLINE_LAMBDA { return integers::load(rays.way[axis].data() + i); };
+    const std::uint64_t there = (rays.hit[i >> 6U] | rays.cut[i >> 6U]) >> (i & 63U);
+    leaves = mask::from_bits(there & ((std::uint64_t{1} << floats::count) - 1)) &
+             simd::mask_as<4>((way(0) | way(1) | way(2)) != integers(0));
+  }
+  /// How far the rays reach along an axis; up to rounding.
+  [[nodiscard]] ORBIS_ALWAYS_INLINE floats along(const float3& a) const noexcept {
+    return simd::approximate_multiply_add(floats(a[0]), ray[0],
+                                          simd::approximate_multiply_add(floats(a[1]), ray[1], floats(a[2]) * ray[2]));
   }
 };
 

@@ -67,33 +67,23 @@ struct place_in_pixels_kernel {
     using mask = typename floats::mask_type;
     constexpr std::size_t n = floats::count;
     places.left_out = {};
-    constexpr float far = std::numeric_limits<float>::infinity();
-    floats max_z(0.0F), u0(far), u1(-far), v0(far), v1(-far);
+    constexpr float none = std::numeric_limits<float>::infinity();
+    floats max_z(0.0F), u0(none), u1(-none), v0(none), v1(-none);
     for (std::size_t i = 0; i < count; i += n) {
-      const auto ray = [&](std::size_t axis) ORBIS_INLINE_LAMBDA {
-        return floats::load(rays.end[axis].data() + i) - floats(t.origin[axis]);
-      };
-      const auto way = [&](std::size_t axis) ORBIS_INLINE_LAMBDA { return integers::load(rays.way[axis].data() + i); };
-      const std::uint64_t there = (rays.hit[i >> 6U] | rays.cut[i >> 6U]) >> (i & 63U);
-      const mask valid = mask::from_bits(there & ((std::uint64_t{1} << n) - 1)) &
-                         simd::mask_as<4>((way(0) | way(1) | way(2)) != integers(0));  // the others visit nothing
-      const floats dx = ray(0), dy = ray(1), dz = ray(2);
-      const auto along = [&](const float3& a) ORBIS_INLINE_LAMBDA {
-        return simd::approximate_multiply_add(floats(a[0]), dx,
-                                              simd::approximate_multiply_add(floats(a[1]), dy, floats(a[2]) * dz));
-      };
-      const floats z = along(t.axes[2]), per_z = 1.0F / z;
-      const floats at_u = simd::approximate_multiply_add(floats(t.fx), along(t.axes[0]) * per_z, floats(t.cx));
-      const floats at_v = simd::approximate_multiply_add(floats(t.fy), along(t.axes[1]) * per_z, floats(t.cy));
+      const ray_lanes<Target> r{rays, t.origin, i};
+      const mask valid = r.leaves;
+      const floats z = r.along(t.axes[2]), per_z = 1.0F / z;
+      const floats at_u = simd::approximate_multiply_add(floats(t.fx), r.along(t.axes[0]) * per_z, floats(t.cx));
+      const floats at_v = simd::approximate_multiply_add(floats(t.fy), r.along(t.axes[1]) * per_z, floats(t.cy));
       const floats u = floor(at_u + 0.5F), v = floor(at_v + 0.5F);
       const mask placed = valid & (z > std::numeric_limits<float>::min()) & (z <= t.far) &
                           (abs(at_u - u) <= t.error_u) & (abs(at_v - v) <= t.error_v) & (u >= 0.0F) & (v >= 0.0F) &
                           (u <= t.last_u) & (v <= t.last_v);
       max_z = max(max_z, select(placed, z, floats(0.0F)));
-      u0 = min(u0, select(placed, u, floats(far)));
-      u1 = max(u1, select(placed, u, floats(-far)));
-      v0 = min(v0, select(placed, v, floats(far)));
-      v1 = max(v1, select(placed, v, floats(-far)));
+      u0 = min(u0, select(placed, u, floats(none)));
+      u1 = max(u1, select(placed, u, floats(-none)));
+      v0 = min(v0, select(placed, v, floats(none)));
+      v1 = max(v1, select(placed, v, floats(-none)));
       const integers pixel = simd::convert<std::int32_t>(select(placed, v, floats(0.0F))) * integers(t.stride) +
                              simd::convert<std::int32_t>(select(placed, u, floats(0.0F)));
       select(placed, pixel, integers(pixel_placement::nowhere)).store(places.pixel.data() + i);
@@ -143,7 +133,6 @@ class organised_rays {
                   .stride = static_cast<std::int32_t>(frame_.ends.stride())};
     for (std::size_t i = 0; i != 3; ++i)
       for (std::size_t axis = 0; axis != 3; ++axis) placement_.axes[axis][i] = pose.rows[i][axis];
-    count_ = count;
     pixel_.resize(count);
     z_.resize(count);
     within_.assign(workers, {});
@@ -158,10 +147,7 @@ class organised_rays {
     std::copy_n(places.pixel.data(), count, pixel_.data() + first);
     std::copy_n(places.z.data(), count, z_.data() + first);
     within_[worker].add(places.within);
-    for (std::size_t w = 0; w != places.left_out.size(); ++w) {
-      rays.hit[w] &= places.left_out[w];
-      rays.cut[w] &= places.left_out[w];
-    }
+    rays.keep(places.left_out);
   }
   /// Marks the voxels of the rays that have been added, except that voxels for which `saturated` says that a miss would
   /// not change them may be missing, see depth_integrator::mark, and those that are occupied in `masks`. False, and
@@ -172,8 +158,8 @@ class organised_rays {
                           scan_masks& masks, Saturated& saturated) {
     fill_image(policy);
     std::size_t second = 0;
-    for (std::size_t i = 0; i != bands_; ++i) second += second_[i].size();
-    if (second > count_ / 64) return false;
+    for (const auto& s : second_) second += s.size();
+    if (second > pixel_.size() / 64) return false;
     pixel_places::bounds within;
     for (const auto& b : within_) within.add(b);
     const float max_z = within.max_z;
@@ -192,8 +178,8 @@ class organised_rays {
     descend_nodes(policy, frame_, sensor, depth_rays<decltype(end_at)>{frame_, sensor, end_at}, on_face, masks,
                   saturated, workers_);
     if (on_face) walk_first_steps(sensor, end_at, masks);
-    for (std::size_t i = 0; i != bands_; ++i)
-      for (const std::uint32_t number : second_[i]) {
+    for (const auto& s : second_)
+      for (const std::uint32_t number : s) {
         const ray_endpoint e = end_of(number);
         masks.mark_ray(sensor.grid, sensor.pose.centre, *sensor.key, e.point, e.key);
       }
@@ -239,15 +225,15 @@ class organised_rays {
   template <class Policy>
   void fill_image(const Policy& policy) {
     const std::span<float> ends = frame_.ends.ends();
-    bands_ = within_.size();
-    if (second_.size() < bands_) second_.resize(bands_);
-    for_each_index(policy, bands_, 1, [&](std::size_t band) {
-      const auto begin = static_cast<std::uint32_t>(ends.size() * band / bands_);
-      const auto size = static_cast<std::uint32_t>(ends.size() * (band + 1) / bands_) - begin;
+    const std::size_t bands = within_.size();
+    second_.resize(std::max(second_.size(), bands));
+    for (auto& s : second_) s.clear();
+    for_each_index(policy, bands, 1, [&](std::size_t band) {
+      const auto begin = static_cast<std::uint32_t>(ends.size() * band / bands);
+      const auto size = static_cast<std::uint32_t>(ends.size() * (band + 1) / bands) - begin;
       std::vector<std::uint32_t>& second = second_[band];
-      second.clear();
       std::fill_n(ends.data() + begin, size, 0.0F);
-      for (std::size_t i = 0; i != count_; ++i) {
+      for (std::size_t i = 0; i != pixel_.size(); ++i) {
         const std::uint32_t at = static_cast<std::uint32_t>(pixel_[i]) - begin;
         if (at >= size) continue;
         const std::uint32_t pixel = at + begin;
@@ -281,12 +267,11 @@ class organised_rays {
   se3 pose_;
   pixel_placement placement_;
   place_in_pixels* place_ = nullptr;
-  std::vector<std::int32_t> pixel_;           ///< of each ray
-  std::vector<float> z_;                      ///< at which it ends
-  std::vector<pixel_places::bounds> within_;  ///< of each worker's rays
-  std::vector<std::uint32_t> numbers_;        ///< of each pixel's ray, where it has one
-  std::vector<std::vector<std::uint32_t>> second_;
-  std::size_t count_ = 0, bands_ = 0;
+  std::vector<std::int32_t> pixel_;                 ///< of each ray
+  std::vector<float> z_;                            ///< at which it ends
+  std::vector<pixel_places::bounds> within_;        ///< of each worker's rays
+  std::vector<std::uint32_t> numbers_;              ///< of each pixel's ray, where it has one
+  std::vector<std::vector<std::uint32_t>> second_;  ///< of each band of rows: further rays of pixels that have one
   std::vector<descent_worker> workers_;
 };
 

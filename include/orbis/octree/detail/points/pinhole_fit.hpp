@@ -19,6 +19,7 @@
 #include <orbis/core/so3.hpp>
 #include <orbis/core/types.hpp>
 #include <orbis/octree/detail/points/ray_traversal.hpp>
+#include <orbis/octree/detail/points/scan_sample.hpp>
 
 namespace orbis::octree::detail {
 
@@ -35,13 +36,7 @@ class pinhole_fit {
   [[nodiscard]] bool fit(const float3& origin, std::size_t count, Point&& point, Limit&& limit) {
     if (count < most_runs * run_length) return false;
     const auto direction = [&](std::size_t i, vec3& d) {
-      const float3 p = point(i);
-      for (std::size_t axis = 0; axis != 3; ++axis)
-        d[static_cast<int>(axis)] = static_cast<double>(p[axis]) - static_cast<double>(origin[axis]);
-      const double length = d.norm();
-      if (!(length > 0.0 && length < 1e30 && limit(i) >= 0.0)) return 0.0;
-      d /= length;
-      return std::min(length, limit(i));
+      return length_of_ray(origin, point(i), limit(i), d).value_or(0.0);
     };
     if (!take_runs(count, direction) || !find_x_axis() || !find_columns() || !find_rows()) return false;
     find_center();
@@ -53,7 +48,7 @@ class pinhole_fit {
 
   [[nodiscard]] const camera::pinhole& camera() const noexcept { return camera_; }
   /// R_world_camera.
-  [[nodiscard]] const so3& rotation() const noexcept { return rotation_; }
+  [[nodiscard]] so3 rotation() const { return so3{mat3(axes_.transpose())}; }
   /// How far the rays of the points may be from those of their pixels, at z = 1, along x and along y.
   [[nodiscard]] double error() const noexcept { return error_; }
   /// About which share of the image's pixels have points, the image being no larger than it must be.
@@ -92,7 +87,7 @@ class pinhole_fit {
     std::size_t tried = 0;
     random_bits random{1};
     for (std::size_t k = 0; k != most_runs; ++k) {
-      const std::size_t begin = place(k, count - run_length, random);
+      const std::size_t begin = place_in_stretch(k, most_runs, count - run_length, random);
       run r;
       bool valid = true;
       for (std::size_t i = 0; i != run_length && valid; ++i) {
@@ -106,11 +101,6 @@ class pinhole_fit {
       if (tried == most_runs / 4 && 2 * runs_.size() < tried) return false;
     }
     return runs_.size() >= most_runs / 4 && 4 * runs_.size() > 3 * tried;
-  }
-  /// Somewhere in the k-th stretch of [0, last]. At random: regular steps and the rows of a scan get into step.
-  [[nodiscard]] static std::size_t place(std::size_t k, std::size_t last, random_bits& random) {
-    const double at = (static_cast<double>(k) + random.uniform()) * static_cast<double>(last) / most_runs;
-    return std::min(static_cast<std::size_t>(at), last);
   }
   [[nodiscard]] static bool is_row(run& r) {
     const vec3 way = r.d.back() - r.d.front();
@@ -197,7 +187,7 @@ class pinhole_fit {
     const vec3 y = axes_.row(1), z = axes_.row(2);
     axes_.row(1) = std::cos(turn) * y + std::sin(turn) * z;
     axes_.row(2) = std::cos(turn) * z - std::sin(turn) * y;
-    step_x_ = std::hypot(a, b);
+    fx_ = 1.0 / std::hypot(a, b);
     return project();
   }
   /// The way from row to row: the largest of which all ways between rows are multiples.
@@ -205,7 +195,7 @@ class pinhole_fit {
     std::sort(runs_.begin(), runs_.end(), [](const run& a, const run& b) { return a.y < b.y; });
     gaps_.clear();
     for (std::size_t i = 1; i != runs_.size(); ++i)
-      if (const double gap = runs_[i].y - runs_[i - 1].y; gap > 0.05 * step_x_) gaps_.push_back(gap);
+      if (const double gap = runs_[i].y - runs_[i - 1].y; gap > 0.05 / fx_) gaps_.push_back(gap);
     if (gaps_.size() < most_runs / 16) return false;
     const double least = *std::min_element(gaps_.begin(), gaps_.end());
     for (int part = 1; part != 16; ++part) {
@@ -228,15 +218,13 @@ class pinhole_fit {
         step = sum / n;
       }
       if (!fits) continue;
-      step_y_ = step;
+      fy_ = 1.0 / step;
       return true;
     }
     return false;
   }
   /// Lets the point that is nearest to the axis be in the middle of pixel (0, 0).
   void find_center() {
-    fx_ = 1.0 / step_x_;
-    fy_ = 1.0 / step_y_;
     double least = 1e30;
     for (const run& r : runs_) {
       const vec3 c = axes_ * r.d.front();
@@ -306,7 +294,6 @@ class pinhole_fit {
     slope_ = std::max(std::max(cx_, width - cx_) / fx_, std::max(cy_, height - cy_) / fy_);
     if (!(slope_ < widest_slope)) return false;
     camera_ = camera::pinhole{static_cast<int>(width), static_cast<int>(height), fx_, fy_, cx_, cy_};
-    rotation_ = so3{mat3(axes_.transpose())};
     return true;
   }
   /// From what is left between rays and pixels, which is the rounding of the points; and floats can tell no less.
@@ -322,7 +309,7 @@ class pinhole_fit {
     random_bits random{2};
     for (std::size_t k = 0; k != most_runs; ++k) {
       vec3 d;
-      if (direction(place(k, count - 1, random), d) == 0.0) continue;
+      if (direction(place_in_stretch(k, most_runs, count - 1, random), d) == 0.0) continue;
       ++tried;
       const vec3 c = axes_ * d;
       const auto is_pixel = [&](double at, double f, double centre, int size) {
@@ -340,13 +327,12 @@ class pinhole_fit {
   std::vector<double> gaps_;
   std::vector<pixel> pixels_;
   mat3 axes_ = mat3::Identity();  ///< R_camera_world
-  double step_x_ = 0.0, step_y_ = 0.0, fx_ = 0.0, fy_ = 0.0, cx_ = 0.0, cy_ = 0.0;
+  double fx_ = 0.0, fy_ = 0.0, cx_ = 0.0, cy_ = 0.0;
   double square_ = 0.0;  ///< of what is left, at z = 1, all together
   double size_ = 0.0;    ///< of the image without room around it, pixels
   double slope_ = 0.0;   ///< of its sides, the largest
   double error_ = 0.0, mean_z_ = 0.0, filled_ = 0.0;
   camera::pinhole camera_;
-  so3 rotation_;
 };
 
 }  // namespace orbis::octree::detail
