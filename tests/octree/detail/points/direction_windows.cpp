@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -100,4 +101,26 @@ TEST_CASE("However many rays there are, or however close together, there are not
   check();
   for (vec3& d : sample) d = vec3{d.x() + random.uniform(-1.0, 1.0), 0.0, 1.0}.normalized();  // a fan
   check();
+}
+
+TEST_CASE("The axes of windows are at right angles however the rays go") {
+  random_bits random{44};
+  direction_windows windows;
+  for (const double spread : {0.0, 1e-17, 1e-16, 1e-15, 1e-12, 1e-8, 1e-4, 1.0})
+    for (int run = 0; run != 50; ++run) {
+      const auto at = [&](double half) { return random.uniform(-half, half); };
+      const vec3 way = run == 0   ? vec3{1.0, 1.0, 1.0}
+                       : run == 1 ? vec3{0.0, 0.0, -1.0}
+                       : run == 2 ? vec3{1.0, 1.0, 0.0}
+                                  : vec3{at(1.0), at(1.0), at(1.0)};
+      std::vector<vec3> sample;
+      for (int i = 0; i != 1000; ++i)
+        sample.push_back((way.normalized() + vec3{at(spread), at(spread), at(spread)}).normalized());
+      windows.fit({sample, 1.0}, 100000, 0.01, 2.0, 16.0);
+      for (const direction_window& w : windows.window)
+        for (std::size_t i = 0; i != 3; ++i) {
+          REQUIRE(axis(w, i).norm() == Approx(1.0));
+          REQUIRE(std::abs(axis(w, i).dot(axis(w, (i + 1) % 3))) < 1e-6);
+        }
+    }
 }

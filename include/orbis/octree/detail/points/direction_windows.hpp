@@ -121,9 +121,14 @@ struct direction_windows {
     // Across the mean the rays spread furthest along a side of the image.
     const mat3 across = mat3::Identity() - mean * mean.transpose();
     const symmetric_eigen<3> spread = eigen_of_symmetric<3>(across * moments * across);
-    const vec3 x = (across * spread.vectors.col(2)).normalized();
+    vec3 x = across * spread.vectors.col(2);
+    if (x.squaredNorm() < 0.5) {  // of rays that go the same way up to rounding: any side will do
+      int least = 0;
+      mean.cwiseAbs().minCoeff(&least);
+      x = across.col(least);
+    }
+    x.normalize();
     mat3 turned;
-    if (!x.allFinite()) return mat3::Identity();
     turned << x.transpose(), mean.cross(x).transpose(), mean.transpose();
     return turned;
   }
