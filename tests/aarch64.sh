@@ -90,7 +90,7 @@ printf '%s: %s %s\n\t@rm -f $@ && %s rcs $@ $(filter %%.o,$^)\n' "$out/liborbis.
 # Where the kernels' tests stand.
 places=(tests/core/simd.cpp tests/core/simd tests/core/rounded.cpp tests/core/bytes.cpp tests/camera/project_lanes.cpp
   tests/camera/shutter_correction.cpp
-  tests/features/detail tests/places/detail tests/cloud/detail/knn tests/cloud/detail/rays
+  tests/features/detail tests/places/detail tests/cloud/detail/knn tests/cloud/detail/rays tests/cloud/detail/voxels
   tests/cloud/detail/select/local_shape.cpp tests/optimize/pnp.cpp
   tests/optimize/detail/bundle tests/optimize/detail/sparse tests/optimize/detail/pose
   tests/optimize/bundle_instances*.cpp  # what those of bundle adjustment share

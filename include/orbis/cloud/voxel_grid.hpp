@@ -125,13 +125,14 @@ template <bool Colored>
 struct centroid_fold {
   static constexpr bool has_colors = Colored;
   struct plain_record {
-    std::array<double, 3> position{};
-    std::uint32_t count = 0;
+    std::array<double, 3> position;
+    std::uint32_t count;
   };
   struct colored_record : plain_record {
-    std::array<std::uint64_t, 3> color{};
+    std::array<std::uint64_t, 3> color;
   };
   using record = std::conditional_t<Colored, colored_record, plain_record>;
+  static constexpr record empty{};
 
   std::span<const rgb8> colors;
   point_cloud& out;
@@ -175,8 +176,9 @@ struct choice_fold {
   static constexpr bool has_colors = false;
   static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
   struct record {
-    std::uint32_t chosen = none;
+    std::uint32_t chosen;
   };
+  static constexpr record empty{none};
 
   const Choice& choice;
   std::vector<std::uint32_t>& out;
@@ -194,7 +196,7 @@ struct choice_fold {
 /// The index of one point for each occupied voxel, in the order in which the voxels are first seen; with
 /// `voxel_first` that is ascending; the same for every policy. Whatever belongs to the points rides along by index.
 /// Points that are not finite are left out, as are those more than 2^31 voxels from the origin. O(n). Memory
-/// meanwhile: about 20 bytes per point, 30 with colours; less than 1 MB for fewer than 2^12 points.
+/// meanwhile: up to 5 MB for a cloud of at most 2^17 points or voxels, about 20 bytes per point otherwise.
 /// @pre size > 0, fewer than 2^32 - 1 points; `choice` may be asked by several threads at a time
 template <execution_policy Policy, point_range Points, voxel_choice Choice = voxel_first>
 [[nodiscard]] std::vector<std::uint32_t> voxel_grid_indices(const Policy& policy, const Points& points,
@@ -208,8 +210,8 @@ template <execution_policy Policy, point_range Points, voxel_choice Choice = vox
 /// One point for each occupied voxel, in the order in which the voxels are first seen, with its colour where
 /// `colors` is not empty: by default the centroid, with `voxel_first`, `voxel_random` or another
 /// `voxel_choice` one of the points; the same for every policy. Points that are not finite are left out, as are those
-/// more than 2^31 voxels from the origin. O(n). Memory meanwhile: about 20 bytes per point,
-/// 30 with colours; less than 1 MB for fewer than 2^12 points.
+/// more than 2^31 voxels from the origin. O(n). Memory meanwhile: up to 12 MB for
+/// a cloud of at most 2^17 points or voxels, about 20 bytes per point, 30 with colours, otherwise.
 ///
 /// Coordinates are summed in double in the order of the points. Where many voxels are occupied, the points are first
 /// brought into parts whose voxels fit into the cache.

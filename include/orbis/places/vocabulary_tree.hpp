@@ -13,8 +13,8 @@
 
 #include <orbis/core/bits.hpp>
 #include <orbis/core/result.hpp>
+#include <orbis/core/table_memory.hpp>
 #include <orbis/places/bag_of_words.hpp>
-#include <orbis/places/detail/table_memory.hpp>
 
 namespace orbis::places {
 
@@ -30,7 +30,7 @@ struct tree_node {
 /// To make one: `resize`, fill in `descriptors` and `weights`, then call `connect_tree`.
 template <std::size_t Bits>
 struct vocabulary_tree {
-  detail::table_memory<bit_words<Bits>> descriptors;  ///< that of node i at i - 1: the root has none
+  table_memory<bit_words<Bits>> descriptors;  ///< that of node i at i - 1: the root has none
   std::vector<tree_node> nodes;  ///< up to the last that has children, and one more; all others are leaves
   std::vector<float> weights;    ///< of the words
   std::uint32_t node_count = 1;
@@ -41,7 +41,7 @@ struct vocabulary_tree {
   /// Makes room for so many nodes, the root among them. Their descriptors have no values yet. @pre > 0
   void resize(std::uint32_t nodes_with_root) {
     node_count = nodes_with_root;
-    descriptors = detail::table_memory<bit_words<Bits>>(nodes_with_root - 1);
+    descriptors = table_memory<bit_words<Bits>>(nodes_with_root - 1);
   }
 
   [[nodiscard]] std::uint32_t word_count() const noexcept { return static_cast<std::uint32_t>(weights.size()); }

@@ -55,3 +55,22 @@ TEST_CASE("cells are found by rounding down on every instruction set") {
     check_cells<double>(inverse_size);
   }
 }
+
+TEST_CASE("hashes are those of the cubes that cells lie in on every instruction set") {
+  using orbis::cloud::detail::mixed_key;
+  using orbis::cloud::detail::voxel_hashes;
+  orbis::random_bits random{2};
+  std::array<std::array<std::int32_t, 64>, 3> cells{};
+  for (auto& axis : cells)
+    for (std::size_t i = 0; i != axis.size(); ++i)
+      axis[i] = i % 2 == 0 ? static_cast<std::int32_t>(random.below(2000)) - 1000
+                           : static_cast<std::int32_t>(static_cast<std::uint32_t>(random()));
+  for (const auto level : {orbis::simd::level::portable, orbis::simd::level::avx2, orbis::simd::level::avx512})
+    for (const int bits : {0, 3}) {
+      std::array<std::uint32_t, 64> hashes{};
+      orbis::simd::kernel<voxel_hashes, voxel_hashes::signature>(level)(cells[0].data(), cells[1].data(),
+                                                                        cells[2].data(), 64, bits, hashes.data());
+      for (std::size_t i = 0; i != hashes.size(); ++i)
+        REQUIRE(hashes[i] == mixed_key({cells[0][i] >> bits, cells[1][i] >> bits, cells[2][i] >> bits}));
+    }
+}

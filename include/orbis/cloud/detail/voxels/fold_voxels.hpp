@@ -21,6 +21,8 @@
 #include <orbis/core/execution.hpp>
 #include <orbis/core/image.hpp>
 #include <orbis/core/point.hpp>
+#include <orbis/core/random.hpp>
+#include <orbis/core/table_memory.hpp>
 
 namespace orbis::cloud::detail {
 
@@ -30,36 +32,30 @@ struct voxel_summary {
   rgb8 color;
 };
 
-/// How points become voxels: each voxel has a record to which its points are added one after another in the order of
-/// the cloud, and `put(number, summary)` is called once for each voxel, numbered in the order in which they are first
-/// seen, after `resize(count)`. Different voxels at the same time.
+/// How points become voxels: each voxel has a record, first `empty`, to which its points are added one after another in
+/// the order of the cloud, and `put(number, summary)` is called once for each voxel, numbered in the order in which
+/// they are first seen, after `resize(count)`. Different voxels at the same time.
 template <class F>
 concept voxel_fold = requires(const F& fold, F& out, typename F::record& r, std::uint32_t i) {
-  requires std::default_initializable<typename F::record>;
   { F::has_colors } -> std::convertible_to<bool>;
+  { F::empty } -> std::convertible_to<typename F::record>;
   fold.add(r, i, std::array<double, 3>{});
   { fold.summary(std::as_const(r)) } -> std::same_as<voxel_summary>;
   out.resize(std::size_t{});
   out.put(i, voxel_summary{});
 };
 
-/// Calls `f(i, key, coordinates)` for the points of [begin, end) that have a voxel and, if it takes them, `g(i)` for
-/// the others.
-template <class S, point_range Points, class F, class G>
-void for_each_cell_of(point_block<S>& block, const Points& points, std::size_t begin, std::size_t end, F&& f, G&& g) {
+/// Takes the points of [begin, end) into `block`, as many at a time as it holds, and calls `f(from, count)` for those
+/// of [from, from + count).
+template <class S, int CubeBits, point_range Points, class F>
+void for_each_block(point_block<S, CubeBits>& block, const Points& points, std::size_t begin, std::size_t end, F&& f) {
   const auto first = std::ranges::begin(points);
   for (std::size_t from = begin; from != end;) {
-    const std::size_t count = std::min(end - from, point_block<S>::capacity);
+    const std::size_t count = std::min(end - from, block.capacity);
     block.assign(count, [&](std::size_t i) {
       return coordinates<S>(first[static_cast<std::ranges::range_difference_t<const Points>>(from + i)]);
     });
-    for (std::size_t i = 0; i != count; ++i) {
-      const voxel_key key = block.key(i);
-      if (is_cell(key))
-        f(static_cast<std::uint32_t>(from + i), key, block.point(i));
-      else
-        g(static_cast<std::uint32_t>(from + i));
-    }
+    f(from, count);
     from += count;
   }
 }
@@ -69,21 +65,26 @@ template <class Points>
 using voxel_scalar =
     std::conditional_t<std::is_same_v<point_scalar_t<std::ranges::range_value_t<Points>>, float>, float, double>;
 
-/// One pass with one table, which gives up at more than `most` voxels: false.
+/// One pass with one table, first for `expected` voxels, which gives up at more than `most`: false.
 template <point_range Points, voxel_fold Fold>
-[[nodiscard]] bool fold_in_one_table(const Points& points, double size, std::size_t most, Fold& fold) {
-  voxel_table<typename Fold::record> table;
+[[nodiscard]] bool fold_in_one_table(const Points& points, double size, std::size_t expected, std::size_t most,
+                                     Fold& fold) {
+  voxel_table<typename Fold::record> table{fold.empty};
   point_block<voxel_scalar<Points>> block{size};
   const std::size_t count = std::ranges::size(points);
-  table.clear(std::min(most, std::size_t{1} << 12U));
+  table.clear(expected);
   constexpr std::size_t piece = 4096;
-  for (std::size_t from = 0; from < count; from += piece) {
-    for_each_cell_of(
-        block, points, from, std::min(count, from + piece),
-        [&](std::uint32_t i, const voxel_key& key, const std::array<double, 3>& p) {
-          fold.add(table.at(key, i).record, i, p);
-        },
-        [](std::uint32_t) {});
+  for (std::size_t begin = 0; begin < count; begin += piece) {
+    for_each_block(block, points, begin, std::min(count, begin + piece), [&](std::size_t from, std::size_t taken) {
+      table.reserve_more(taken);
+      table.expect(block.hashes(taken));
+      for (std::size_t i = 0; i != taken; ++i) {
+        if (!is_cell(block.key(i))) continue;
+        const auto index = static_cast<std::uint32_t>(from + i);
+        table.update(block.key(i), block.hash(i), index,
+                     [&](auto& record) { fold.add(record, index, block.point(i)); });
+      }
+    });
     if (table.rows().size() > most) return false;
   }
   fold.resize(table.rows().size());
@@ -119,7 +120,7 @@ class voxel_parts {
     const std::size_t chunks = policy.threads() == 1 ? 1 : std::size_t{8} * policy.threads();
     const std::size_t width = std::max<std::size_t>(1, parts() / chunks);
     for_each_chunk(policy, parts(), width, [&](std::size_t begin, std::size_t end) {
-      voxel_table<typename Fold::record> table;
+      voxel_table<typename Fold::record> table{fold.empty};
       point_block<voxel_scalar<Points>> block{size_};
       for (std::size_t part = begin; part != end; ++part) {
         table.clear(std::min<std::size_t>(starts_[part + 1] - starts_[part], usual_voxels));
@@ -182,10 +183,6 @@ class voxel_parts {
   };
 
   [[nodiscard]] std::size_t parts() const noexcept { return starts_.size() - 1; }
-  [[nodiscard]] std::uint16_t part_of(const voxel_key& key) const noexcept {
-    return static_cast<std::uint16_t>(mixed_key<0x2545f4914f6cdd1cULL>({key[0] >> 3, key[1] >> 3, key[2] >> 3}) >>
-                                      (64 - bits_));
-  }
 
   template <execution_policy Policy>
   void distribute(const Policy& policy) {
@@ -193,14 +190,14 @@ class voxel_parts {
     std::vector<std::uint32_t> at((count_ + grain - 1) / grain * parts());
     for_each_chunk(policy, count_, grain, [&](std::size_t begin, std::size_t end) {
       const auto counts = at.begin() + static_cast<std::ptrdiff_t>(begin / grain * parts());
-      point_block<voxel_scalar<Points>> block{size_};
-      for_each_cell_of(
-          block, points_, begin, end,
-          [&](std::uint32_t i, const voxel_key& key, const std::array<double, 3>&) {
-            part_of_[i] = part_of(key);
-            ++counts[part_of_[i]];
-          },
-          [&](std::uint32_t i) { part_of_[i] = no_part; });
+      point_block<voxel_scalar<Points>, 3> block{size_};
+      for_each_block(block, points_, begin, end, [&](std::size_t from, std::size_t taken) {
+        for (std::size_t i = 0; i != taken; ++i) {
+          std::uint16_t& part = part_of_[from + i];
+          part = is_cell(block.key(i)) ? static_cast<std::uint16_t>(block.hash(i) >> (32 - bits_)) : no_part;
+          if (part != no_part) ++counts[part];
+        }
+      });
     });
     std::uint32_t sum = 0;
     for (std::size_t part = 0; part != parts(); ++part) {
@@ -209,7 +206,8 @@ class voxel_parts {
     }
     starts_[parts()] = sum;
 
-    entries_ = std::make_unique_for_overwrite<entry[]>(sum);
+    memory_ = table_memory<entry>{sum};
+    entries_ = memory_.values().data();
     for_each_chunk(policy, count_, grain, [&](std::size_t begin, std::size_t end) {
       const auto next = at.begin() + static_cast<std::ptrdiff_t>(begin / grain * parts());
       if constexpr (keeps_coordinates) {
@@ -222,12 +220,14 @@ class voxel_parts {
         }
       } else {
         point_block<voxel_scalar<Points>> block{size_};
-        for_each_cell_of(
-            block, points_, begin, end,
-            [&](std::uint32_t i, const voxel_key& key, const std::array<double, 3>&) {
-              entries_[next[part_of_[i]]++] = {std::bit_cast<std::array<std::uint32_t, 3>>(key), i};
-            },
-            [](std::uint32_t) {});
+        for_each_block(block, points_, begin, end, [&](std::size_t from, std::size_t taken) {
+          for (std::size_t i = 0; i != taken; ++i) {
+            const std::uint16_t part = part_of_[from + i];
+            if (part == no_part) continue;
+            entries_[next[part]++] = {std::bit_cast<std::array<std::uint32_t, 3>>(block.key(i)),
+                                      static_cast<std::uint32_t>(from + i)};
+          }
+        });
       }
     });
   }
@@ -235,23 +235,28 @@ class voxel_parts {
   void fill(voxel_table<typename Fold::record>& table, point_block<voxel_scalar<Points>>& block, std::size_t part,
             const Fold& fold) const {
     const std::size_t end = starts_[part + 1];
+    const auto add = [&](const voxel_key& key, std::uint32_t hash, std::uint32_t index,
+                         const std::array<double, 3>& p) {
+      table.update(key, hash, index, [&](auto& record) { fold.add(record, index, p); });
+    };
     if constexpr (keeps_coordinates) {
       for (std::size_t from = starts_[part]; from != end;) {
         const std::size_t count = std::min<std::size_t>(end - from, block.capacity);
         block.assign(count,
                      [&](std::size_t i) { return std::bit_cast<std::array<float, 3>>(entries_[from + i].words); });
-        for (std::size_t i = 0; i != count; ++i) {
-          const std::uint32_t index = entries_[from + i].index;
-          fold.add(table.at(block.key(i), index).record, index, block.point(i));
-        }
+        table.reserve_more(count);
+        for (std::size_t i = 0; i != count; ++i)
+          add(block.key(i), block.hash(i), entries_[from + i].index, block.point(i));
         from += count;
       }
     } else {
       const auto first = std::ranges::begin(points_);
       for (std::size_t at = starts_[part]; at != end; ++at) {
+        const auto key = std::bit_cast<voxel_key>(entries_[at].words);
         const std::uint32_t index = entries_[at].index;
-        fold.add(table.at(std::bit_cast<voxel_key>(entries_[at].words), index).record, index,
-                 coordinates<double>(first[static_cast<std::ranges::range_difference_t<const Points>>(index)]));
+        table.reserve_more(1);
+        add(key, mixed_key(key), index,
+            coordinates<double>(first[static_cast<std::ranges::range_difference_t<const Points>>(index)]));
       }
     }
   }
@@ -262,46 +267,48 @@ class voxel_parts {
   std::size_t bits_;
   std::vector<std::uint32_t> starts_;         ///< of each part in the entries, and the end
   std::unique_ptr<std::uint16_t[]> part_of_;  ///< of each point; in the end also a mark
-  std::unique_ptr<entry[]> entries_;
+  table_memory<entry> memory_;
+  entry* entries_ = nullptr;
 };
 
-/// Whether so many points share voxels that one table will do: judged by some of the points. @pre the cloud is not
-/// empty
+/// About how many voxels are occupied, rather too many than too few, but at most as many as there are points: judged by
+/// how often random points share a voxel. Of v voxels with as many points each, s samples find s^2 / (2 v) taken; where
+/// points are not spread evenly, they find more. @pre the cloud is not empty
 template <point_range Points>
-[[nodiscard]] bool voxels_are_few(const Points& points, double size) {
+[[nodiscard]] std::size_t estimated_voxels(const Points& points, double size) {
   const std::size_t count = std::ranges::size(points);
-  const std::size_t sample = std::min<std::size_t>(4096, count / 64 + 1);
+  const std::size_t sample = std::min<std::size_t>(4096, count / 64 + 1), stretch = count / sample;
   struct nothing {};
-  voxel_table<nothing> table;
+  voxel_table<nothing> table{{}};
+  table.clear(sample);
   point_block<voxel_scalar<Points>> block{size};
   const auto first = std::ranges::begin(points);
   for (std::size_t from = 0; from != sample;) {
     const std::size_t taken = std::min<std::size_t>(sample - from, block.capacity);
     block.assign(taken, [&](std::size_t i) {
-      const std::size_t at = (from + i) * (count / sample);
+      const std::size_t at = (from + i) * stretch + mix64(from + i) % stretch;
       return coordinates<voxel_scalar<Points>>(first[static_cast<std::ranges::range_difference_t<const Points>>(at)]);
     });
     for (std::size_t i = 0; i != taken; ++i)
-      if (is_cell(block.key(i))) static_cast<void>(table.at(block.key(i), 0));
+      if (is_cell(block.key(i))) table.update(block.key(i), block.hash(i), 0, [](nothing&) {});
     from += taken;
   }
-  return 8 * table.rows().size() <= 7 * sample;
+  const std::size_t shared = sample - table.rows().size();  // with those that have no voxel
+  return shared == 0 ? count : std::min(count, sample * sample / shared);
 }
 
 /// Gathers the points of every voxel, see `voxel_fold`; the same for every policy. Points that have no cell are left
-/// out. O(n). Memory: about 20 bytes per point beyond 2^12 points, 30 with colours.
+/// out. O(n). Memory: for at most 2^17 points or voxels that of a table for them, else about 20 bytes per point, 30
+/// with colours.
 /// @pre size > 0, fewer than 2^32 points
 template <execution_policy Policy, point_range Points, voxel_fold Fold>
 void fold_voxels(const Policy& policy, const Points& points, double size, Fold&& fold) {
-  constexpr std::size_t small = std::size_t{1} << 12U, few = std::size_t{1} << 15U;
+  constexpr std::size_t small = std::size_t{1} << 12U, medium = std::size_t{1} << 17U;
   const std::size_t count = std::ranges::size(points);
-  if (count <= small) {
-    static_cast<void>(fold_in_one_table(points, size, count, fold));
-    return;
+  if (count <= small || policy.threads() == 1) {
+    const std::size_t expected = count <= small ? count : estimated_voxels(points, size);
+    if ((count <= medium || expected <= medium / 2) && fold_in_one_table(points, size, expected, medium, fold)) return;
   }
-  if (policy.threads() == 1 && voxels_are_few(points, size) &&
-      fold_in_one_table(points, size, std::min(few, count / 8), fold))
-    return;
   voxel_parts<Points, std::remove_cvref_t<Fold>>{points, size}.fold(policy, fold);
 }
 

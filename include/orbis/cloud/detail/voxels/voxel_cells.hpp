@@ -3,14 +3,13 @@
 /// In which cell of a grid points lie, block by block.
 #pragma once
 
-#include <algorithm>
 #include <array>
+#include <bit>
 #include <concepts>
 #include <cstddef>
 #include <cstdint>
-#include <ranges>
+#include <span>
 
-#include <orbis/core/point.hpp>
 #include <orbis/core/simd.hpp>
 
 namespace orbis::cloud::detail {
@@ -48,8 +47,39 @@ struct voxel_cells {
   }
 };
 
-/// Some points of a cloud with their cells.
-template <std::floating_point S>
+/// 32 mixed bits of a cell, the upper ones best; of a number or of lanes.
+template <class U>
+[[nodiscard]] ORBIS_ALWAYS_INLINE constexpr U mixed_cell(const U& x, const U& y, const U& z) noexcept {
+  // Cells far apart may differ in their upper bits alone, which a product would lose.
+  U h = (x ^ (x >> 16)) * U(0x9e3779b1U) + (y ^ (y >> 16)) * U(0x85ebca77U) + (z ^ (z >> 16)) * U(0xc2b2ae3dU);
+  h = (h ^ (h >> 15)) * U(0x2c1b3c6dU);
+  return h ^ (h >> 14);
+}
+[[nodiscard]] constexpr std::uint32_t mixed_key(const voxel_key& key) noexcept {
+  return mixed_cell(std::bit_cast<std::uint32_t>(key[0]), std::bit_cast<std::uint32_t>(key[1]),
+                    std::bit_cast<std::uint32_t>(key[2]));
+}
+
+/// `hashes[i] = mixed_key({x[i] >> bits, y[i] >> bits, z[i] >> bits})`: of cubes with an edge of 2^bits cells. @pre
+/// count is a multiple of eight
+struct voxel_hashes {
+  using signature = void(const std::int32_t* x, const std::int32_t* y, const std::int32_t* z, std::size_t count,
+                         int bits, std::uint32_t* hashes);
+
+  template <simd::target Target>
+  static ORBIS_ALWAYS_INLINE void run(const std::int32_t* x, const std::int32_t* y, const std::int32_t* z,
+                                      std::size_t count, int bits, std::uint32_t* hashes) {
+    using cells = simd::vec<std::int32_t, 8, Target>;
+    for (std::size_t i = 0; i != count; i += cells::count)
+      mixed_cell(simd::convert<std::uint32_t>(cells::load(x + i) >> bits),
+                 simd::convert<std::uint32_t>(cells::load(y + i) >> bits),
+                 simd::convert<std::uint32_t>(cells::load(z + i) >> bits))
+          .store(hashes + i);
+  }
+};
+
+/// Some points of a cloud with their cells, axis by axis, and the hashes of cubes of 2^CubeBits cells.
+template <std::floating_point S, int CubeBits = 0>
 class point_block {
  public:
   static constexpr std::size_t capacity = 256;
@@ -62,22 +92,28 @@ class point_block {
   void assign(std::size_t count, const Point& point) {
     for (std::size_t i = 0; i != count; ++i) {
       const std::array<S, 3> p = point(i);
-      for (std::size_t a = 0; a != 3; ++a) x_[3 * i + a] = p[a];
+      for (std::size_t a = 0; a != 3; ++a) x_[a][i] = p[a];
     }
-    run_(x_.data(), (3 * count + 7) / 8 * 8, inverse_size_, cells_.data());
+    const std::size_t lanes = (count + 7) / 8 * 8;
+    for (std::size_t a = 0; a != 3; ++a) find_cells_(x_[a].data(), lanes, inverse_size_, cells_[a].data());
+    find_hashes_(cells_[0].data(), cells_[1].data(), cells_[2].data(), lanes, CubeBits, hashes_.data());
   }
-  [[nodiscard]] voxel_key key(std::size_t i) const noexcept {
-    return {cells_[3 * i], cells_[3 * i + 1], cells_[3 * i + 2]};
+  [[nodiscard]] voxel_key key(std::size_t i) const noexcept { return {cells_[0][i], cells_[1][i], cells_[2][i]}; }
+  [[nodiscard]] std::uint32_t hash(std::size_t i) const noexcept { return hashes_[i]; }
+  [[nodiscard]] std::span<const std::uint32_t> hashes(std::size_t count) const noexcept {
+    return std::span{hashes_}.first(count);
   }
   [[nodiscard]] std::array<double, 3> point(std::size_t i) const noexcept {
-    return {double{x_[3 * i]}, double{x_[3 * i + 1]}, double{x_[3 * i + 2]}};
+    return {double{x_[0][i]}, double{x_[1][i]}, double{x_[2][i]}};
   }
 
  private:
   double inverse_size_;
-  typename voxel_cells<S>::signature* run_ = simd::kernel<voxel_cells<S>, typename voxel_cells<S>::signature>();
-  alignas(64) std::array<S, 3 * capacity> x_{};
-  alignas(64) std::array<std::int32_t, 3 * capacity> cells_{};
+  typename voxel_cells<S>::signature* find_cells_ = simd::kernel<voxel_cells<S>, typename voxel_cells<S>::signature>();
+  voxel_hashes::signature* find_hashes_ = simd::kernel<voxel_hashes, voxel_hashes::signature>();
+  alignas(64) std::array<std::array<S, capacity>, 3> x_{};
+  alignas(64) std::array<std::array<std::int32_t, capacity>, 3> cells_{};
+  alignas(64) std::array<std::uint32_t, capacity> hashes_{};
 };
 
 }  // namespace orbis::cloud::detail

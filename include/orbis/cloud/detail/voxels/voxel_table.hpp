@@ -1,89 +1,108 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The occupied voxels of a small part of space, in the order in which they are first seen.
+/// The occupied voxels of a cloud or of a part of it, in the order in which they are first seen.
 #pragma once
 
 #include <algorithm>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
+#include <memory>
 #include <span>
+#include <type_traits>
+#include <utility>
 #include <vector>
 
 #include <orbis/cloud/detail/voxels/voxel_cells.hpp>
 
 namespace orbis::cloud::detail {
 
-/// 64 mixed bits of a key, the upper ones best. `Salt` makes different functions.
-template <std::uint64_t Salt>
-[[nodiscard]] constexpr std::uint64_t mixed_key(const voxel_key& key) noexcept {
-  const auto term = [](std::int32_t cell, std::uint64_t odd) {
-    return static_cast<std::uint64_t>(std::int64_t{cell}) * odd;
-  };
-  std::uint64_t h = term(key[0], 0x9e3779b97f4a7c15ULL + Salt) + term(key[1], 0xbf58476d1ce4e5b9ULL + Salt) +
-                    term(key[2], 0x94d049bb133111ebULL + Salt);
-  h ^= h >> 32U;
-  return h * 0xd6e8feb86659fd93ULL;
-}
-
 /// Rows by key, with what is needed of a row side by side: one miss of the cache for a voxel that is known, besides the
-/// one for its slot. Open addressing with linear probing, at most a third full.
+/// one for its slot. Open addressing with linear probing, at most half full.
+///
+/// Whether a voxel is new is hard to foretell, so that an update does the same for new ones and known ones: it reads a
+/// row, which is row 0 for an empty slot, and writes one, which is the next free one then.
 template <class Record>
 class voxel_table {
+  static_assert(std::is_trivially_copyable_v<Record> && std::is_trivially_default_constructible_v<Record>);
+
  public:
   struct row {
+    Record record;
     voxel_key key;
     std::uint32_t first;  ///< the point that made it
-    Record record;
   };
 
-  /// The row of `key`; a new one, with `first` and an empty record, if there is none.
-  [[nodiscard]] row& at(const voxel_key& key, std::uint32_t first) {
-    std::size_t i = place(key);
-    if (slots_[i] != none) return rows_[slots_[i]];
-    if (size_ == most_) {
-      grow();
-      i = place(key);
-    }
-    slots_[i] = static_cast<std::uint32_t>(size_);
-    row& made = rows_[size_++];
-    made = {key, first, {}};
-    return made;
-  }
-  [[nodiscard]] std::span<const row> rows() const noexcept { return std::span{rows_}.first(size_); }
+  /// New rows begin with the record `empty`.
+  explicit voxel_table(const Record& empty) : empty_{empty} { clear(0); }
+
   /// Forgets the rows and makes room for `expected` ones. Keeps the memory.
   void clear(std::size_t expected) {
     size_ = 0;
     make_room(std::max(expected, fewest));
   }
+  /// Makes room for `count` more rows than there are.
+  void reserve_more(std::size_t count) {
+    if (size_ + count <= most_) return;
+    make_room(std::max(2 * most_, size_ + count));
+    for (std::uint32_t r = 1; r <= size_; ++r) slots_[free_slot(mixed_key(rows_[r].key))] = r;
+  }
+  /// Brings into the cache what updates with these hashes will need, if the table is large.
+  void expect(std::span<const std::uint32_t> hashes) const noexcept {
+    if (slots_.size() < large) return;
+    for (const std::uint32_t hash : hashes) __builtin_prefetch(&slots_[hash >> shift_]);
+    for (const std::uint32_t hash : hashes) __builtin_prefetch(&rows_[slots_[hash >> shift_]]);
+  }
+  /// `add(record)` for the row of a key; for a new one, with `first`, if there is none. @pre hash == mixed_key(key),
+  /// there is room for one more row
+  template <class Add>
+  void update(const voxel_key& key, std::uint32_t hash, std::uint32_t first, const Add& add) {
+    std::size_t i = hash >> shift_;
+    std::uint32_t known = slots_[i];
+    while ((known != 0) & !same_key(rows_[known].key, key)) {
+      i = (i + 1) & mask_;
+      known = slots_[i];
+    }
+    row made = rows_[known];
+    made.key = key;
+    made.first = known != 0 ? made.first : first;
+    add(made.record);
+    const std::uint32_t place = known != 0 ? known : static_cast<std::uint32_t>(size_ + 1);
+    rows_[place] = made;
+    slots_[i] = place;
+    size_ += known == 0;
+  }
+  [[nodiscard]] std::span<const row> rows() const noexcept { return {rows_.get() + 1, size_}; }
 
  private:
-  static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
-  static constexpr std::size_t fewest = 21;
+  static constexpr std::size_t fewest = 64, large = std::size_t{1} << 16U;
 
-  [[nodiscard]] std::size_t place(const voxel_key& key) const noexcept {
-    std::size_t i = static_cast<std::size_t>(mixed_key<0>(key) >> shift_);
-    while (slots_[i] != none && !same_key(rows_[slots_[i]].key, key)) i = (i + 1) & (slots_.size() - 1);
+  [[nodiscard]] std::size_t free_slot(std::uint32_t hash) const noexcept {
+    std::size_t i = hash >> shift_;
+    while (slots_[i] != 0) i = (i + 1) & mask_;
     return i;
-  }
-  void grow() {
-    make_room(2 * most_);
-    for (std::size_t r = 0; r != size_; ++r) slots_[place(rows_[r].key)] = static_cast<std::uint32_t>(r);
   }
   /// For `most` rows; the slots are empty then.
   void make_room(std::size_t most) {
     most_ = most;
-    if (rows_.size() < most) rows_.resize(most);
-    const std::size_t slots = std::bit_ceil(3 * most);
-    slots_.assign(slots, none);
-    shift_ = 64 - static_cast<unsigned>(std::countr_zero(slots));
+    if (capacity_ < most) {
+      auto rows = std::make_unique_for_overwrite<row[]>(most + 1);  // not touched before it is needed
+      rows[0] = {empty_, {}, 0};
+      if (size_ != 0) std::copy_n(&rows_[1], size_, &rows[1]);
+      rows_ = std::move(rows);
+      capacity_ = most;
+    }
+    const std::size_t slots = std::min(std::bit_ceil(2 * most), std::size_t{1} << 32U);  // as many as hashes
+    slots_.assign(slots, 0);
+    mask_ = slots - 1;
+    shift_ = 32 - static_cast<unsigned>(std::countr_zero(slots));
   }
 
-  std::vector<row> rows_ = std::vector<row>(fewest);                         ///< the first size_ are in use
-  std::vector<std::uint32_t> slots_ = std::vector<std::uint32_t>(64, none);  ///< 2^(64 - shift_)
-  std::size_t size_ = 0, most_ = fewest;
-  unsigned shift_ = 58;
+  Record empty_;
+  std::unique_ptr<row[]> rows_;       ///< after row 0, which is what a new one begins as, size_ ones
+  std::vector<std::uint32_t> slots_;  ///< 2^(32 - shift_) numbers of rows, 0 for none
+  std::size_t size_ = 0, most_ = 0, capacity_ = 0, mask_ = 0;
+  unsigned shift_ = 0;
 };
 
 }  // namespace orbis::cloud::detail

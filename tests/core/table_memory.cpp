@@ -3,11 +3,11 @@
 #include <cstdint>
 #include <utility>
 
-#include <orbis/places/detail/table_memory.hpp>
+#include <orbis/core/table_memory.hpp>
 
 #include "support/catch.hpp"
 
-using orbis::places::detail::table_memory;
+using orbis::table_memory;
 
 TEST_CASE("tables begin at a cache line, large ones at a huge page") {
   using entry = std::array<std::uint64_t, 3>;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Memory for a large table that is read all over the place.
+/// Memory for a large table that is read or written all over the place.
 #pragma once
 
 #include <cstddef>
@@ -13,10 +13,11 @@
 #include <sys/mman.h>
 #endif
 
-namespace orbis::places::detail {
+namespace orbis {
 
 /// `count` values of `T`, not initialised, at an address that is a multiple of a cache line; a large table is on huge
-/// pages where the system has them to give, so that addresses are found without a miss of their own.
+/// pages where the system has them to give, so that addresses are found without a miss of their own, and memory that is
+/// used for the first time costs little.
 template <class T>
 requires std::is_trivially_copyable_v<T>
 class table_memory {
@@ -48,4 +49,4 @@ class table_memory {
   std::size_t size_ = 0;
 };
 
-}  // namespace orbis::places::detail
+}  // namespace orbis
