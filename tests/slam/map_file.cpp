@@ -8,6 +8,7 @@
 #include <string>
 
 #include <orbis/core/random.hpp>
+#include <orbis/core/types.hpp>
 #include <orbis/slam/detail/map/file_sections.hpp>
 #include <orbis/slam/detail/map/map_writer.hpp>
 #include <orbis/slam/map_file.hpp>
@@ -72,6 +73,28 @@ TEST_CASE("Small maps: nothing, nothing left, a keyframe without keypoints, a ke
   f.depth[1] = 0.0F;
   slam::detail::insert_keyframe(other, f, {});
   round_trip(other);
+}
+
+TEST_CASE("Rays in a file are rays, and where there is none there is no depth") {
+  using limits = std::numeric_limits<double>;
+  const vec3 none = vec3::Constant(limits::quiet_NaN());
+  const auto problem_of = [](const vec3& ray, float depth) {
+    random_bits random(1);
+    slam::map m(8, 1.2);
+    auto f = test::random_frame(random, 2, 0);
+    f.rays[1] = ray;
+    f.depth[1] = depth;
+    slam::detail::insert_keyframe(m, f, {});
+    const auto again = parsed(slam::map_bytes(m));
+    return again ? std::string() : again.error().to_string();
+  };
+  CHECK(problem_of(none, 0.0F).empty());
+  CHECK(problem_of({1e29, -1e29, 1.0}, 0.0F).empty());
+  for (const vec3& ray : {none, vec3{limits::infinity(), 0.0, 1.0}, vec3{0.0, -limits::infinity(), 1.0},
+                          vec3{limits::quiet_NaN(), 0.0, limits::quiet_NaN()}, vec3{0.0, 1e300, 1.0}}) {
+    INFO(ray.transpose());
+    CHECK(problem_of(ray, 2.0F).find("keypoint 1 has a ray that is none") != std::string::npos);
+  }
 }
 
 TEST_CASE("A file that is cut off says in which section") {

@@ -45,6 +45,10 @@ TEST_CASE("What is wrong is said in words") {
   CHECK(fault_after([](parts& p) { p.keyframes[3].T_world_camera = se3(so3{}, vec3(0, not_a_number, 0)); }) ==
         "keyframe 3: has a pose that is not finite");
   CHECK(fault_after([](parts& p) { p.keyframes[3].scale = not_a_number; }) == "keyframe 3: has a scale that is none");
+  CHECK(fault_after([](parts& p) {
+          p.keyframes[1].depth[2] = 1.0F;
+          p.keyframes[1].rays[2].setConstant(not_a_number);
+        }) == "keyframe 1: has depth at keypoint 2, which has no ray");
   CHECK(fault_after([](parts& p) { p.landmarks[1].observations.clear(); }) == "landmark 1: is seen by no keyframe");
   CHECK(fault_after([](parts& p) { p.landmarks[1].position.z() = not_a_number; }) ==
         "landmark 1: is at no finite place");

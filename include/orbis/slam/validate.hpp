@@ -58,6 +58,8 @@ class map_check {
       if (!is_finite(k.T_world_camera)) return wrong_keyframe(id, "has a pose that is not finite");
       if (!(k.scale > 0.0 && std::isfinite(k.scale))) return wrong_keyframe(id, "has a scale that is none");
       for (std::size_t i = 0; i != n; ++i) {
+        if (k.has_depth(i) && !k.rays[i].allFinite())
+          return wrong_keyframe(id, "has depth at keypoint " + std::to_string(i) + ", which has no ray");
         const landmark_id l = k.landmarks[i];
         const auto at = "keypoint " + std::to_string(i) + " shows landmark " + to_string(l);
         if (l == no_id) continue;

@@ -24,6 +24,8 @@ namespace orbis::slam::detail {
 
 /// The bound of all coordinates, metres: sums and products stay finite.
 inline constexpr double farthest = 1e12;
+/// That of rays at z = 1: where they are times a depth is finite, and so is its square.
+inline constexpr double farthest_aside = 1e30;
 inline constexpr std::size_t bytes_of_keypoint = 76, bytes_of_observation = 8;
 
 /// A pose with the bits that were written; empty if the numbers are no pose.
@@ -191,12 +193,15 @@ class map_reader {
       p.octave = in.take<std::int32_t>();
       k.depth.push_back(in.take<float>());
       const double x = in.take<double>(), y = in.take<double>();
-      k.rays.emplace_back(x, y, std::isnan(x) || std::isnan(y) ? std::numeric_limits<double>::quiet_NaN() : 1.0);
+      const bool has_ray = std::abs(x) < farthest_aside && std::abs(y) < farthest_aside;
+      k.rays.emplace_back(x, y, has_ray ? 1.0 : std::numeric_limits<double>::quiet_NaN());
       k.features.descriptors.push_back(take_descriptor(in));
       k.features.keypoints.push_back(p);
       if (!std::isfinite(p.x) || !std::isfinite(p.y) || p.octave < 0 || p.octave >= to_.levels ||
           !(k.depth.back() >= 0.0F && std::isfinite(k.depth.back())))
         return wrong("keypoint " + std::to_string(i) + " has a place, level or depth that is none");
+      if (!has_ray && !(std::isnan(x) && std::isnan(y) && k.depth.back() == 0.0F))
+        return wrong("keypoint " + std::to_string(i) + " has a ray that is none, or depth without a ray");
     }
     k.landmarks.assign(n, no_id);
     k.grid = features::keypoint_grid(k.features.keypoints);
