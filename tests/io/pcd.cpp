@@ -154,6 +154,9 @@ TEST_CASE("hostile PCD headers are refused without a large allocation") {
   CHECK(refused("FIELDS x y z\nSIZE 4 4 3\nTYPE F F F\nWIDTH 1\nDATA ascii\n0 0 0\n") == "malformed");
   CHECK(refused("FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1000000000\nWIDTH 1\nDATA ascii\n0 0 0\n") ==
         "malformed");
+  // Points of many numbers, of which the data hold few.
+  CHECK(refused("FIELDS x y z n\nSIZE 4 4 4 1\nTYPE F F F U\nCOUNT 1 1 1 60000\nWIDTH 1\nDATA ascii\n0 0 0 1\n") ==
+        "malformed");
   CHECK(refused("FIELDS x y\nSIZE 4 4\nTYPE F F\nWIDTH 1\nDATA ascii\n0 0\n") == "unsupported");
   CHECK(refused(fields + "WIDTH 1\nHEIGHT 1\nDATA ascii\n0 zero 0\n") == "malformed");
 }

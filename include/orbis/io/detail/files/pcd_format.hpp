@@ -146,12 +146,12 @@ inline std::uint32_t packed_rgb(const rgb8& c) {
 /// From lines of text. Errors: malformed, with the line.
 inline result<point_cloud> read_pcd_text(std::string_view body, const pcd_header& header, const pcd_columns& columns,
                                          const vec3& origin, const std::string& where) {
-  if (header.points > body.size() / header.tokens + 1)
+  if (header.points > (body.size() + 1) / (2 * header.tokens))  // numbers of a digit each, and what separates them
     return fail(errc::malformed, where,
                 "the data end early: there cannot be " + std::to_string(header.points) + " points in them");
   point_cloud cloud;
   cloud.points.reserve(static_cast<std::size_t>(header.points));
-  std::vector<std::string_view> tokens(header.tokens);
+  std::vector<std::string_view> tokens(header.points == 0 ? 0 : header.tokens);
   std::size_t bad_line = 0;
   for_each_line(body, [&](std::string_view line, std::size_t number) {
     if (cloud.size() == header.points) return false;
