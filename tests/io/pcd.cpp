@@ -9,9 +9,9 @@
 
 #include <orbis/io/pcd.hpp>
 
-#include "support/temporary_folder.hpp"
 #include "support/catch.hpp"
 #include "support/data.hpp"
+#include "support/temporary_folder.hpp"
 
 namespace io = orbis::io;
 using orbis::rgb8;
