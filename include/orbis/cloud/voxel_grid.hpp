@@ -196,7 +196,7 @@ struct choice_fold {
 /// The index of one point for each occupied voxel, in the order in which the voxels are first seen; with
 /// `voxel_first` that is ascending; the same for every policy. Whatever belongs to the points rides along by index.
 /// Points that are not finite are left out, as are those more than 2^31 voxels from the origin. O(n). Memory
-/// meanwhile: up to 5 MB for a cloud of at most 2^17 points or voxels, about 20 bytes per point otherwise.
+/// meanwhile: about 20 bytes per point and 10 MB, on one thread the latter alone for at most 2^17 points.
 /// @pre size > 0, fewer than 2^32 - 1 points; `choice` may be asked by several threads at a time
 template <execution_policy Policy, point_range Points, voxel_choice Choice = voxel_first>
 [[nodiscard]] std::vector<std::uint32_t> voxel_grid_indices(const Policy& policy, const Points& points,
@@ -210,8 +210,8 @@ template <execution_policy Policy, point_range Points, voxel_choice Choice = vox
 /// One point for each occupied voxel, in the order in which the voxels are first seen, with its colour where
 /// `colors` is not empty: by default the centroid, with `voxel_first`, `voxel_random` or another
 /// `voxel_choice` one of the points; the same for every policy. Points that are not finite are left out, as are those
-/// more than 2^31 voxels from the origin. O(n). Memory meanwhile: up to 12 MB for
-/// a cloud of at most 2^17 points or voxels, about 20 bytes per point, 30 with colours, otherwise.
+/// more than 2^31 voxels from the origin. O(n). Memory meanwhile: about 20 bytes
+/// per point, 25 with colours, and 25 MB, on one thread the latter alone for at most 2^17 points.
 ///
 /// Coordinates are summed in double in the order of the points. Where many voxels are occupied, the points are first
 /// brought into parts whose voxels fit into the cache.

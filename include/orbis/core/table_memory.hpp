@@ -41,8 +41,8 @@ class table_memory {
 #endif
   }
 
-  [[nodiscard]] std::span<T> values() noexcept { return {values_.get(), size_}; }
-  [[nodiscard]] std::span<const T> values() const noexcept { return {values_.get(), size_}; }
+  [[nodiscard]] std::span<T> values() noexcept { return {values_.get(), values_ ? size_ : 0}; }
+  [[nodiscard]] std::span<const T> values() const noexcept { return {values_.get(), values_ ? size_ : 0}; }
 
  private:
   std::unique_ptr<T, release> values_{nullptr, release{std::align_val_t{line}}};

@@ -34,7 +34,7 @@ void fill(voxel_table<count>& table, std::uint32_t n, const Key& key) {
     const auto [at, is_new] = row_of.try_emplace(k, rows.size());
     if (is_new) rows.push_back({k, i, 7});
     std::uint32_t& times = rows[at->second].n;
-    table.reserve_more(1);
+    table.reserve_more(1, 6'000);
     table.update(k, mixed_key(k), i, [&](count& c) { REQUIRE(c.n++ == times); });
     ++times;
     REQUIRE(table.rows().size() == rows.size());
@@ -73,6 +73,19 @@ TEST_CASE("a table of voxels that is asked to expect large blocks is the same") 
     return voxel_key{k, -k, 3};
   });
   table.expect(hashes);
+}
+
+TEST_CASE("a table that grows while keys come in the order of their hashes is not slow") {
+  std::vector<voxel_key> keys;
+  for (std::int32_t i = 0; i != 200'000; ++i) keys.push_back({i % 100, i / 100 % 100, i / 10'000});
+  std::sort(keys.begin(), keys.end(),
+            [](const voxel_key& a, const voxel_key& b) { return mixed_key(a) < mixed_key(b); });
+  voxel_table<count> table{{0}};
+  for (const voxel_key& k : keys) {  // with rows side by side this would take minutes
+    table.reserve_more(1, keys.size());
+    table.update(k, mixed_key(k), 0, [](count& c) { ++c.n; });
+  }
+  CHECK(table.rows().size() == keys.size());
 }
 
 TEST_CASE("voxels have hashes of their own, close together and far apart") {

@@ -6,9 +6,9 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <concepts>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <memory>
 #include <ranges>
 #include <type_traits>
@@ -76,7 +76,7 @@ template <point_range Points, voxel_fold Fold>
   constexpr std::size_t piece = 4096;
   for (std::size_t begin = 0; begin < count; begin += piece) {
     for_each_block(block, points, begin, std::min(count, begin + piece), [&](std::size_t from, std::size_t taken) {
-      table.reserve_more(taken);
+      table.reserve_more(taken, std::min(count, most + piece));
       table.expect(block.hashes(taken));
       for (std::size_t i = 0; i != taken; ++i) {
         if (!is_cell(block.key(i))) continue;
@@ -93,9 +93,9 @@ template <point_range Points, voxel_fold Fold>
   return true;
 }
 
-/// A cloud cut into parts, each with all points of its voxels in their order, of so few voxels that their table stays
-/// in the cache. A part is a random choice of cubes of 8^3 voxels: neighbours in the cloud are mostly neighbours in a
-/// part.
+/// A cloud cut into parts, each with all points of its voxels in their order, as a rule of so few voxels that their
+/// table stays in the cache. A part is a random choice of cubes of 8^3 voxels: neighbours in the cloud are mostly
+/// neighbours in a part.
 ///
 /// Source: Shatdal, Kant, Naughton, "Cache conscious algorithms for relational query processing", VLDB 1994
 /// (partitioning before hashing).
@@ -117,7 +117,7 @@ class voxel_parts {
     if constexpr (Fold::has_colors) colors = std::make_unique_for_overwrite<rgb8[]>(starts_.back());
     std::vector<std::uint32_t> voxels(parts());
     // Few chunks, as each has a table of its own.
-    const std::size_t chunks = policy.threads() == 1 ? 1 : std::size_t{8} * policy.threads();
+    const std::size_t chunks = policy.threads() <= 1 ? 1 : std::size_t{8} * policy.threads();
     const std::size_t width = std::max<std::size_t>(1, parts() / chunks);
     for_each_chunk(policy, parts(), width, [&](std::size_t begin, std::size_t end) {
       voxel_table<typename Fold::record> table{fold.empty};
@@ -145,7 +145,7 @@ class voxel_parts {
 
  private:
   static constexpr std::size_t points_of_part = 2048;
-  static constexpr std::size_t usual_voxels = 2 * points_of_part;  ///< of a part at most; points may be far more
+  static constexpr std::size_t usual_voxels = 2 * points_of_part;  ///< of a part at most, as a rule
   static constexpr std::size_t grain = std::size_t{1} << 15U;
   static constexpr std::uint16_t no_part = 0xffff;
   static constexpr std::uint16_t first_of_voxel = 0xfffe;
@@ -244,7 +244,8 @@ class voxel_parts {
         const std::size_t count = std::min<std::size_t>(end - from, block.capacity);
         block.assign(count,
                      [&](std::size_t i) { return std::bit_cast<std::array<float, 3>>(entries_[from + i].words); });
-        table.reserve_more(count);
+        table.reserve_more(count, starts_[part + 1] - starts_[part]);
+        table.expect(block.hashes(count));
         for (std::size_t i = 0; i != count; ++i)
           add(block.key(i), block.hash(i), entries_[from + i].index, block.point(i));
         from += count;
@@ -254,7 +255,7 @@ class voxel_parts {
       for (std::size_t at = starts_[part]; at != end; ++at) {
         const auto key = std::bit_cast<voxel_key>(entries_[at].words);
         const std::uint32_t index = entries_[at].index;
-        table.reserve_more(1);
+        table.reserve_more(1, end - starts_[part]);
         add(key, mixed_key(key), index,
             coordinates<double>(first[static_cast<std::ranges::range_difference_t<const Points>>(index)]));
       }
@@ -272,14 +273,19 @@ class voxel_parts {
 };
 
 /// About how many voxels are occupied, rather too many than too few, but at most as many as there are points: judged by
-/// how often random points share a voxel. Of v voxels with as many points each, s samples find s^2 / (2 v) taken; where
-/// points are not spread evenly, they find more. @pre the cloud is not empty
+/// a sample of them. Of the voxels that it finds, f1 are found once and f2 twice: those not found are at least
+/// f1^2 / (2 f2), and about twice as many where some have more points than others. @pre the cloud is not empty
+///
+/// Source: A. Chao, "Nonparametric estimation of the number of classes in a population", Scandinavian Journal of
+/// Statistics 11, 1984.
 template <point_range Points>
 [[nodiscard]] std::size_t estimated_voxels(const Points& points, double size) {
   const std::size_t count = std::ranges::size(points);
   const std::size_t sample = std::min<std::size_t>(4096, count / 64 + 1), stretch = count / sample;
-  struct nothing {};
-  voxel_table<nothing> table{{}};
+  struct times {
+    std::uint32_t n;
+  };
+  voxel_table<times> table{{}};
   table.clear(sample);
   point_block<voxel_scalar<Points>> block{size};
   const auto first = std::ranges::begin(points);
@@ -290,22 +296,28 @@ template <point_range Points>
       return coordinates<voxel_scalar<Points>>(first[static_cast<std::ranges::range_difference_t<const Points>>(at)]);
     });
     for (std::size_t i = 0; i != taken; ++i)
-      if (is_cell(block.key(i))) table.update(block.key(i), block.hash(i), 0, [](nothing&) {});
+      if (is_cell(block.key(i))) table.update(block.key(i), block.hash(i), 0, [](times& t) { ++t.n; });
     from += taken;
   }
-  const std::size_t shared = sample - table.rows().size();  // with those that have no voxel
-  return shared == 0 ? count : std::min(count, sample * sample / shared);
+  std::size_t in_voxels = 0, once = 0, twice = 0;
+  for (const auto& row : table.rows()) {
+    in_voxels += row.record.n;
+    once += row.record.n == 1;
+    twice += row.record.n == 2;
+  }
+  const std::size_t at_most = std::min(count, in_voxels * stretch + count / 16);  // some points have no voxel
+  return twice == 0 ? at_most : std::min(at_most, 2 * table.rows().size() + once * once / twice);
 }
 
 /// Gathers the points of every voxel, see `voxel_fold`; the same for every policy. Points that have no cell are left
-/// out. O(n). Memory: for at most 2^17 points or voxels that of a table for them, else about 20 bytes per point, 30
-/// with colours.
-/// @pre size > 0, fewer than 2^32 points
+/// out. O(n). Memory: for at most 2^17 points on one thread a table for them, else 20 bytes per point, 25 with
+/// colours; besides, for a while, a table that turns out to be too small, or that of the largest part.
+/// @pre size > 0, fewer than 2^32 - 1 points
 template <execution_policy Policy, point_range Points, voxel_fold Fold>
 void fold_voxels(const Policy& policy, const Points& points, double size, Fold&& fold) {
   constexpr std::size_t small = std::size_t{1} << 12U, medium = std::size_t{1} << 17U;
   const std::size_t count = std::ranges::size(points);
-  if (count <= small || policy.threads() == 1) {
+  if (count <= small || policy.threads() <= 1) {
     const std::size_t expected = count <= small ? count : estimated_voxels(points, size);
     if ((count <= medium || expected <= medium / 2) && fold_in_one_table(points, size, expected, medium, fold)) return;
   }

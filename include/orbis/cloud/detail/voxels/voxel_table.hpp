@@ -17,8 +17,8 @@
 
 namespace orbis::cloud::detail {
 
-/// Rows by key, with what is needed of a row side by side: one miss of the cache for a voxel that is known, besides the
-/// one for its slot. Open addressing with linear probing, at most half full.
+/// Rows by key, with what is needed of a row side by side: one or two misses of the cache for a voxel that is known,
+/// besides the one for its slot. Open addressing with linear probing, at most half full.
 ///
 /// Whether a voxel is new is hard to foretell, so that an update does the same for new ones and known ones: it reads a
 /// row, which is row 0 for an empty slot, and writes one, which is the next free one then.
@@ -28,9 +28,9 @@ class voxel_table {
 
  public:
   struct row {
-    Record record;
     voxel_key key;
     std::uint32_t first;  ///< the point that made it
+    Record record;
   };
 
   /// New rows begin with the record `empty`.
@@ -41,23 +41,27 @@ class voxel_table {
     size_ = 0;
     make_room(std::max(expected, fewest));
   }
-  /// Makes room for `count` more rows than there are.
-  void reserve_more(std::size_t count) {
-    if (size_ + count <= most_) return;
-    make_room(std::max(2 * most_, size_ + count));
-    for (std::uint32_t r = 1; r <= size_; ++r) slots_[free_slot(mixed_key(rows_[r].key))] = r;
+  /// Makes room for `count` more rows than there are: for twice as many as before, but for `limit` at most, where it is
+  /// enough.
+  void reserve_more(std::size_t count, std::size_t limit) {
+    const std::size_t needed = size_ + count;
+    if (needed <= most_) return;
+    salt_ *= 0x9e3779b1U;  // with the same order of hashes all rows would come to lie side by side
+    make_room(std::max(needed, std::min(2 * most_, limit)));
+    for (std::size_t r = 1; r <= size_; ++r) slots_[free_slot(mixed_key(rows_[r].key))] = static_cast<std::uint32_t>(r);
   }
   /// Brings into the cache what updates with these hashes will need, if the table is large.
   void expect(std::span<const std::uint32_t> hashes) const noexcept {
     if (slots_.size() < large) return;
-    for (const std::uint32_t hash : hashes) __builtin_prefetch(&slots_[hash >> shift_]);
-    for (const std::uint32_t hash : hashes) __builtin_prefetch(&rows_[slots_[hash >> shift_]]);
+    for (const std::uint32_t hash : hashes) __builtin_prefetch(&slots_[slot_of(hash)]);
+    for (const std::uint32_t hash : hashes) __builtin_prefetch(&rows_[slots_[slot_of(hash)]]);
   }
-  /// `add(record)` for the row of a key; for a new one, with `first`, if there is none. @pre hash == mixed_key(key),
+  /// `add(record)` for the record of a key, or for that of a new row, with `first`, if there is none. The record is a
+  /// copy that is stored afterwards. @pre hash == mixed_key(key),
   /// there is room for one more row
   template <class Add>
   void update(const voxel_key& key, std::uint32_t hash, std::uint32_t first, const Add& add) {
-    std::size_t i = hash >> shift_;
+    std::size_t i = slot_of(hash);
     std::uint32_t known = slots_[i];
     while ((known != 0) & !same_key(rows_[known].key, key)) {
       i = (i + 1) & mask_;
@@ -77,23 +81,25 @@ class voxel_table {
  private:
   static constexpr std::size_t fewest = 64, large = std::size_t{1} << 16U;
 
+  /// Where to look for a key first.
+  [[nodiscard]] std::size_t slot_of(std::uint32_t hash) const noexcept { return (hash * salt_) >> shift_; }
   [[nodiscard]] std::size_t free_slot(std::uint32_t hash) const noexcept {
-    std::size_t i = hash >> shift_;
+    std::size_t i = slot_of(hash);
     while (slots_[i] != 0) i = (i + 1) & mask_;
     return i;
   }
   /// For `most` rows; the slots are empty then.
   void make_room(std::size_t most) {
-    most_ = most;
     if (capacity_ < most) {
       auto rows = std::make_unique_for_overwrite<row[]>(most + 1);  // not touched before it is needed
-      rows[0] = {empty_, {}, 0};
+      rows[0] = {{}, 0, empty_};
       if (size_ != 0) std::copy_n(&rows_[1], size_, &rows[1]);
       rows_ = std::move(rows);
       capacity_ = most;
     }
     const std::size_t slots = std::min(std::bit_ceil(2 * most), std::size_t{1} << 32U);  // as many as hashes
     slots_.assign(slots, 0);
+    most_ = most;
     mask_ = slots - 1;
     shift_ = 32 - static_cast<unsigned>(std::countr_zero(slots));
   }
@@ -102,6 +108,7 @@ class voxel_table {
   std::unique_ptr<row[]> rows_;       ///< after row 0, which is what a new one begins as, size_ ones
   std::vector<std::uint32_t> slots_;  ///< 2^(32 - shift_) numbers of rows, 0 for none
   std::size_t size_ = 0, most_ = 0, capacity_ = 0, mask_ = 0;
+  std::uint32_t salt_ = 1;  ///< odd
   unsigned shift_ = 0;
 };
 
