@@ -252,7 +252,7 @@ void window_backend::upload_voxels(const shown_voxels& voxels) {
     if (block.voxels.empty()) continue;
     low = low.min(Eigen::Array2i{index[0], index[1]});
     high = high.max(Eigen::Array2i{index[0] + 1, index[1] + 1});
-    const auto at = [&](std::size_t axis, std::uint8_t inside, float edge) {
+    const auto at = [&, &index = index](std::size_t axis, std::uint8_t inside, float edge) {  // for clang before 16
       return static_cast<float>(index[axis] * block_voxels + inside) * resolution + 0.5F * edge;
     };
     for (const shown_voxel& v : block.voxels) {
