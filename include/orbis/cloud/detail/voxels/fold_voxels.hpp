@@ -244,7 +244,7 @@ class voxel_parts {
         const std::size_t count = std::min<std::size_t>(end - from, block.capacity);
         block.assign(count,
                      [&](std::size_t i) { return std::bit_cast<std::array<float, 3>>(entries_[from + i].words); });
-        table.reserve_more(count, starts_[part + 1] - starts_[part]);
+        table.reserve_more(count, end - starts_[part]);
         table.expect(block.hashes(count));
         for (std::size_t i = 0; i != count; ++i)
           add(block.key(i), block.hash(i), entries_[from + i].index, block.point(i));

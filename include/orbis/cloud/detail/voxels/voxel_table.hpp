@@ -57,8 +57,7 @@ class voxel_table {
     for (const std::uint32_t hash : hashes) __builtin_prefetch(&rows_[slots_[slot_of(hash)]]);
   }
   /// `add(record)` for the record of a key, or for that of a new row, with `first`, if there is none. The record is a
-  /// copy that is stored afterwards. @pre hash == mixed_key(key),
-  /// there is room for one more row
+  /// copy that is stored afterwards. @pre hash == mixed_key(key), there is room for one more row
   template <class Add>
   void update(const voxel_key& key, std::uint32_t hash, std::uint32_t first, const Add& add) {
     std::size_t i = slot_of(hash);

@@ -122,11 +122,7 @@ struct direction_windows {
     const mat3 across = mat3::Identity() - mean * mean.transpose();
     const symmetric_eigen<3> spread = eigen_of_symmetric<3>(across * moments * across);
     vec3 x = across * spread.vectors.col(2);
-    if (x.squaredNorm() < 0.5) {  // of rays that go the same way up to rounding: any side will do
-      int least = 0;
-      mean.cwiseAbs().minCoeff(&least);
-      x = across.col(least);
-    }
+    if (x.squaredNorm() < 0.5) x = mean.unitOrthogonal();  // rays that go the same way up to rounding: any side will do
     x.normalize();
     mat3 turned;
     turned << x.transpose(), mean.cross(x).transpose(), mean.transpose();
