@@ -1,22 +1,18 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Fixed-size vectors and matrices whose layout does not depend on compiler flags.
+/// Names of the fixed-size vectors and matrices whose layout does not depend on compiler flags.
 ///
 /// `alignof(Eigen::Vector4d)` is 16 or 32 depending on `-mavx2`; a struct that stores one has two
-/// layouts in one program. Every size Eigen would align is therefore declared unaligned here.
+/// layouts in one program. Every size Eigen would align is therefore declared unaligned (`orbis::matrix`).
 #pragma once
+
+#include <type_traits>
 
 #include <Eigen/Core>
 
-namespace orbis {
+#include <orbis/core/small_matrix.hpp>
 
-/// An `R x C` matrix of `S`; the same layout under every `-m` flag. Sizes that Eigen never aligns
-/// stay the plain Eigen type, so `vec3` *is* `Eigen::Vector3d`.
-template <int R, int C = 1, class S = double>
-using matrix =
-    Eigen::Matrix<S, R, C,
-                  ((R == 1 && C != 1) ? Eigen::RowMajor : Eigen::ColMajor) |
-                      ((static_cast<unsigned>(R * C) * sizeof(S)) % 16 == 0 ? Eigen::DontAlign : Eigen::AutoAlign)>;
+namespace orbis {
 
 using vec2 = matrix<2>;
 using vec3 = matrix<3>;

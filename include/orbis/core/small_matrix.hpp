@@ -1,0 +1,453 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Arithmetic of fixed-size Eigen matrices that compiles fast: every operation returns a plain matrix at once, without
+/// Eigen's expression classes, which cost a compiler ten times as much per formula.
+///
+/// Code inside namespace orbis finds these operators by ordinary lookup, and they match better than Eigen's members, so
+/// that a formula reads as with Eigen. Code outside of the namespace keeps Eigen's operators. Operands of which one is an
+/// Eigen expression or of dynamic size fall back to Eigen.
+///
+/// Sums of products of three run as `x + (y + z)`, as Eigen's do; where Eigen uses vector registers the last bits may
+/// differ from its results.
+#pragma once
+
+#include <cmath>
+#include <concepts>
+#include <cstddef>
+#include <type_traits>
+
+#include <Eigen/Core>
+
+namespace orbis {
+
+/// An `R x C` matrix of `S`; the same layout under every `-m` flag. Sizes that Eigen never aligns
+/// stay the plain Eigen type, so `vec3` *is* `Eigen::Vector3d`.
+template <int R, int C = 1, class S = double>
+using matrix =
+    Eigen::Matrix<S, R, C,
+                  ((R == 1 && C != 1) ? Eigen::RowMajor : Eigen::ColMajor) |
+                      ((static_cast<unsigned>(R * C) * sizeof(S)) % 16 == 0 ? Eigen::DontAlign : Eigen::AutoAlign)>;
+
+namespace detail {
+
+/// A scalar that multiplies a matrix of `S` without a loss that Eigen refuses.
+template <class T, class S>
+concept factor_of = std::same_as<T, S> || std::integral<T>;
+
+/// The sum of `count` products of entries `step_a` and `step_b` apart.
+template <int N, class S>
+[[nodiscard]] inline S sum_of_products(const S* a, int step_a, const S* b, int step_b) {
+  if constexpr (N == 1) {
+    return a[0] * b[0];
+  } else if constexpr (N == 2) {
+    return a[0] * b[0] + a[step_a] * b[step_b];
+  } else if constexpr (N == 3) {
+    return a[0] * b[0] + (a[step_a] * b[step_b] + a[2 * step_a] * b[2 * step_b]);
+  } else {
+    S sum = a[0] * b[0];
+#pragma GCC unroll 16
+    for (int k = 1; k < N; ++k) sum += a[k * step_a] * b[k * step_b];
+    return sum;
+  }
+}
+
+template <int R, int C, int O>
+inline constexpr int row_step = (O & Eigen::RowMajor) != 0 ? C : 1;
+template <int R, int C, int O>
+inline constexpr int column_step = (O & Eigen::RowMajor) != 0 ? 1 : R;
+
+}  // namespace detail
+
+/// @name Sums, differences, and products with a scalar
+/// @{
+template <class S, int R, int C, int O>
+  requires(R > 0 && C > 0)
+[[nodiscard]] inline Eigen::Matrix<S, R, C, O> operator+(const Eigen::Matrix<S, R, C, O, R, C>& a,
+                                                         const Eigen::Matrix<S, R, C, O, R, C>& b) {
+  Eigen::Matrix<S, R, C, O> out;
+#pragma GCC unroll 16
+  for (int i = 0; i < R * C; ++i) out.data()[i] = a.data()[i] + b.data()[i];
+  return out;
+}
+
+template <class S, int R, int C, int O>
+  requires(R > 0 && C > 0)
+[[nodiscard]] inline Eigen::Matrix<S, R, C, O> operator-(const Eigen::Matrix<S, R, C, O, R, C>& a,
+                                                         const Eigen::Matrix<S, R, C, O, R, C>& b) {
+  Eigen::Matrix<S, R, C, O> out;
+#pragma GCC unroll 16
+  for (int i = 0; i < R * C; ++i) out.data()[i] = a.data()[i] - b.data()[i];
+  return out;
+}
+
+template <class S, int R, int C, int O>
+  requires(R > 0 && C > 0)
+[[nodiscard]] inline Eigen::Matrix<S, R, C, O> operator-(const Eigen::Matrix<S, R, C, O, R, C>& a) {
+  Eigen::Matrix<S, R, C, O> out;
+#pragma GCC unroll 16
+  for (int i = 0; i < R * C; ++i) out.data()[i] = -a.data()[i];
+  return out;
+}
+
+template <class S, int R, int C, int O, detail::factor_of<S> T>
+  requires(R > 0 && C > 0)
+[[nodiscard]] inline Eigen::Matrix<S, R, C, O> operator*(const Eigen::Matrix<S, R, C, O, R, C>& a, T t) {
+  Eigen::Matrix<S, R, C, O> out;
+  const S s = static_cast<S>(t);
+#pragma GCC unroll 16
+  for (int i = 0; i < R * C; ++i) out.data()[i] = a.data()[i] * s;
+  return out;
+}
+
+template <class S, int R, int C, int O, detail::factor_of<S> T>
+  requires(R > 0 && C > 0)
+[[nodiscard]] inline Eigen::Matrix<S, R, C, O> operator*(T t, const Eigen::Matrix<S, R, C, O, R, C>& a) {
+  return a * t;
+}
+
+template <class S, int R, int C, int O, detail::factor_of<S> T>
+  requires(R > 0 && C > 0)
+[[nodiscard]] inline Eigen::Matrix<S, R, C, O> operator/(const Eigen::Matrix<S, R, C, O, R, C>& a, T t) {
+  Eigen::Matrix<S, R, C, O> out;
+  const S s = static_cast<S>(t);
+#pragma GCC unroll 16
+  for (int i = 0; i < R * C; ++i) out.data()[i] = a.data()[i] / s;
+  return out;
+}
+
+template <class S, int R, int C, int O>
+  requires(R > 0 && C > 0)
+inline Eigen::Matrix<S, R, C, O>& operator+=(Eigen::Matrix<S, R, C, O, R, C>& a,
+                                             const Eigen::Matrix<S, R, C, O, R, C>& b) {
+#pragma GCC unroll 16
+  for (int i = 0; i < R * C; ++i) a.data()[i] += b.data()[i];
+  return a;
+}
+
+template <class S, int R, int C, int O>
+  requires(R > 0 && C > 0)
+inline Eigen::Matrix<S, R, C, O>& operator-=(Eigen::Matrix<S, R, C, O, R, C>& a,
+                                             const Eigen::Matrix<S, R, C, O, R, C>& b) {
+#pragma GCC unroll 16
+  for (int i = 0; i < R * C; ++i) a.data()[i] -= b.data()[i];
+  return a;
+}
+
+template <class S, int R, int C, int O, detail::factor_of<S> T>
+  requires(R > 0 && C > 0)
+inline Eigen::Matrix<S, R, C, O>& operator*=(Eigen::Matrix<S, R, C, O, R, C>& a, T t) {
+  const S s = static_cast<S>(t);
+#pragma GCC unroll 16
+  for (int i = 0; i < R * C; ++i) a.data()[i] *= s;
+  return a;
+}
+
+template <class S, int R, int C, int O, detail::factor_of<S> T>
+  requires(R > 0 && C > 0)
+inline Eigen::Matrix<S, R, C, O>& operator/=(Eigen::Matrix<S, R, C, O, R, C>& a, T t) {
+  const S s = static_cast<S>(t);
+#pragma GCC unroll 16
+  for (int i = 0; i < R * C; ++i) a.data()[i] /= s;
+  return a;
+}
+/// @}
+
+/// @name Products of matrices
+/// @{
+template <class S, int R, int K, int C, int OA, int OB>
+  requires(R > 0 && K > 0 && C > 0)
+[[nodiscard]] inline matrix<R, C, S> operator*(const Eigen::Matrix<S, R, K, OA, R, K>& a,
+                                               const Eigen::Matrix<S, K, C, OB, K, C>& b) {
+  matrix<R, C, S> out;
+#pragma GCC unroll 8
+  for (int c = 0; c < C; ++c)
+#pragma GCC unroll 8
+    for (int r = 0; r < R; ++r)
+      out.data()[R == 1 ? c : c * R + r] = detail::sum_of_products<K>(
+          a.data() + r * detail::row_step<R, K, OA>, detail::column_step<R, K, OA>,
+          b.data() + c * detail::column_step<K, C, OB>, detail::row_step<K, C, OB>);
+  return out;
+}
+
+/// The transposed matrix.
+template <class S, int R, int C, int O>
+  requires(R > 0 && C > 0)
+[[nodiscard]] inline matrix<C, R, S> transposed(const Eigen::Matrix<S, R, C, O, R, C>& a) {
+  matrix<C, R, S> out;
+  for (int r = 0; r < R; ++r)
+    for (int c = 0; c < C; ++c)
+      out.data()[C == 1 ? r : r * C + c] = a.data()[r * detail::row_step<R, C, O> + c * detail::column_step<R, C, O>];
+  return out;
+}
+
+/// `transposed(a) * b`, without the copy.
+template <class S, int K, int R, int C, int OA, int OB>
+  requires(R > 0 && K > 0 && C > 0)
+[[nodiscard]] inline matrix<R, C, S> transposed_product(const Eigen::Matrix<S, K, R, OA, K, R>& a,
+                                                        const Eigen::Matrix<S, K, C, OB, K, C>& b) {
+  matrix<R, C, S> out;
+  for (int c = 0; c < C; ++c)
+    for (int r = 0; r < R; ++r)
+      out.data()[R == 1 ? c : c * R + r] = detail::sum_of_products<K>(
+          a.data() + r * detail::column_step<K, R, OA>, detail::row_step<K, R, OA>,
+          b.data() + c * detail::column_step<K, C, OB>, detail::row_step<K, C, OB>);
+  return out;
+}
+
+/// `a * transposed(b)` of two vectors.
+template <class S, int R, int C>
+  requires(R > 0 && C > 0)
+[[nodiscard]] inline matrix<R, C, S> outer_product(const matrix<R, 1, S>& a, const matrix<C, 1, S>& b) {
+  matrix<R, C, S> out;
+  for (int c = 0; c < C; ++c)
+    for (int r = 0; r < R; ++r) out.data()[R == 1 ? c : c * R + r] = a.data()[r] * b.data()[c];
+  return out;
+}
+/// @}
+
+/// @name Products of vectors, lengths
+/// @{
+template <class S, int R, int C, int OA, int OB>
+  requires(R > 0 && C > 0 && (R == 1 || C == 1))
+[[nodiscard]] inline S dot(const Eigen::Matrix<S, R, C, OA, R, C>& a, const Eigen::Matrix<S, R, C, OB, R, C>& b) {
+  return detail::sum_of_products<R * C>(a.data(), 1, b.data(), 1);
+}
+
+template <class S>
+[[nodiscard]] inline matrix<3, 1, S> cross(const Eigen::Matrix<S, 3, 1>& a, const Eigen::Matrix<S, 3, 1>& b) {
+  const S *p = a.data(), *q = b.data();
+  return {p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]};
+}
+
+/// The sum of the squares of all entries.
+template <class S, int R, int C, int O>
+  requires(R > 0 && C > 0)
+[[nodiscard]] inline S squared_norm(const Eigen::Matrix<S, R, C, O, R, C>& a) {
+  return detail::sum_of_products<R * C>(a.data(), 1, a.data(), 1);
+}
+
+/// The root of the sum of the squares of all entries.
+template <class S, int R, int C, int O>
+  requires(R > 0 && C > 0)
+[[nodiscard]] inline S norm(const Eigen::Matrix<S, R, C, O, R, C>& a) {
+  return std::sqrt(squared_norm(a));
+}
+
+/// The vector of length 1 in the same direction; one of length 0 as it is.
+template <class S, int R, int C, int O>
+  requires(R > 0 && C > 0)
+[[nodiscard]] inline Eigen::Matrix<S, R, C, O> normalized(const Eigen::Matrix<S, R, C, O, R, C>& a) {
+  const S square = squared_norm(a);
+  return square > S(0) ? a / std::sqrt(square) : a;
+}
+/// @}
+
+/// @name Parts
+/// @{
+/// `N` entries of a vector from entry `first` on.
+template <int N, class S, int R, int O>
+  requires(N > 0 && N <= R)
+[[nodiscard]] inline matrix<N, 1, S> segment(const Eigen::Matrix<S, R, 1, O, R, 1>& v, int first) {
+  matrix<N, 1, S> out;
+  for (int i = 0; i < N; ++i) out.data()[i] = v.data()[first + i];
+  return out;
+}
+template <int N, class S>
+[[nodiscard]] inline matrix<N, 1, S> segment(const Eigen::Matrix<S, Eigen::Dynamic, 1>& v, Eigen::Index first) {
+  matrix<N, 1, S> out;
+  for (int i = 0; i < N; ++i) out.data()[i] = v.data()[first + i];
+  return out;
+}
+/// The first `N` entries of a vector.
+template <int N, class S, int R, int O>
+[[nodiscard]] inline matrix<N, 1, S> head(const Eigen::Matrix<S, R, 1, O, R, 1>& v) {
+  return segment<N>(v, 0);
+}
+/// The last `N` entries of a vector.
+template <int N, class S, int R, int O>
+[[nodiscard]] inline matrix<N, 1, S> tail(const Eigen::Matrix<S, R, 1, O, R, 1>& v) {
+  return segment<N>(v, R - N);
+}
+
+/// The `P x Q` part of a matrix whose first entry is (row, column).
+template <int P, int Q, class S, int R, int C, int O>
+  requires(P > 0 && Q > 0 && P <= R && Q <= C)
+[[nodiscard]] inline matrix<P, Q, S> block(const Eigen::Matrix<S, R, C, O, R, C>& m, int row, int column) {
+  matrix<P, Q, S> out;
+  for (int c = 0; c < Q; ++c)
+    for (int r = 0; r < P; ++r)
+      out.data()[P == 1 ? c : c * P + r] =
+          m.data()[(row + r) * detail::row_step<R, C, O> + (column + c) * detail::column_step<R, C, O>];
+  return out;
+}
+/// Writes `part` into a matrix, its first entry at (row, column).
+template <class S, int R, int C, int O, int P, int Q, int OP>
+  requires(P > 0 && Q > 0 && P <= R && Q <= C)
+inline void set_block(Eigen::Matrix<S, R, C, O, R, C>& m, int row, int column,
+                      const Eigen::Matrix<S, P, Q, OP, P, Q>& part) {
+  for (int c = 0; c < Q; ++c)
+    for (int r = 0; r < P; ++r)
+      m.data()[(row + r) * detail::row_step<R, C, O> + (column + c) * detail::column_step<R, C, O>] =
+          part.data()[r * detail::row_step<P, Q, OP> + c * detail::column_step<P, Q, OP>];
+}
+/// Column `c` of a matrix.
+template <class S, int R, int C, int O>
+[[nodiscard]] inline matrix<R, 1, S> column_of(const Eigen::Matrix<S, R, C, O, R, C>& m, int c) {
+  return block<R, 1>(m, 0, c);
+}
+/// Row `r` of a matrix, as a column vector.
+template <class S, int R, int C, int O>
+[[nodiscard]] inline matrix<C, 1, S> row_of(const Eigen::Matrix<S, R, C, O, R, C>& m, int r) {
+  matrix<C, 1, S> out;
+  for (int c = 0; c < C; ++c)
+    out.data()[c] = m.data()[r * detail::row_step<R, C, O> + c * detail::column_step<R, C, O>];
+  return out;
+}
+/// The matrix with `v` on its diagonal.
+template <class S, int R, int O>
+  requires(R > 0)
+[[nodiscard]] inline matrix<R, R, S> diagonal_matrix(const Eigen::Matrix<S, R, 1, O, R, 1>& v) {
+  matrix<R, R, S> out;
+  for (int c = 0; c < R; ++c)
+    for (int r = 0; r < R; ++r) out.data()[c * R + r] = r == c ? v.data()[r] : S(0);
+  return out;
+}
+/// The entries on the diagonal of a square matrix.
+template <class S, int R, int O>
+  requires(R > 0)
+[[nodiscard]] inline matrix<R, 1, S> diagonal_of(const Eigen::Matrix<S, R, R, O, R, R>& m) {
+  matrix<R, 1, S> out;
+  for (int r = 0; r < R; ++r) out.data()[r] = m.data()[r * R + r];
+  return out;
+}
+/// @}
+
+/// @name Matrices of one value
+/// @{
+/// A matrix of type `M` with all entries equal to `value`.
+template <class M>
+[[nodiscard]] inline M filled(typename M::Scalar value) {
+  M out;
+  for (int i = 0; i < M::SizeAtCompileTime; ++i) out.data()[i] = value;
+  return out;
+}
+/// A matrix of type `M` with all entries 0.
+template <class M>
+[[nodiscard]] inline M zeros() {
+  return filled<M>(typename M::Scalar(0));
+}
+/// A matrix of type `M` with 1 on its diagonal and 0 elsewhere.
+template <class M>
+[[nodiscard]] inline M identity() {
+  M out = zeros<M>();
+  for (int i = 0; i < M::RowsAtCompileTime && i < M::ColsAtCompileTime; ++i) out(i, i) = typename M::Scalar(1);
+  return out;
+}
+/// @}
+
+/// @name Entries
+/// @{
+/// Whether no entry is infinite or not a number.
+template <class S, int R, int C, int O>
+  requires(R > 0 && C > 0)
+[[nodiscard]] inline bool all_finite(const Eigen::Matrix<S, R, C, O, R, C>& a) {
+  bool finite = true;
+  for (int i = 0; i < R * C; ++i) finite = finite && std::isfinite(a.data()[i]);
+  return finite;
+}
+/// The largest absolute value of an entry; not a number where the first entry is none.
+template <class S, int R, int C, int O>
+  requires(R > 0 && C > 0)
+[[nodiscard]] inline S largest_magnitude(const Eigen::Matrix<S, R, C, O, R, C>& a) {
+  S most = std::abs(a.data()[0]);
+  for (int i = 1; i < R * C; ++i) {
+    const S size = std::abs(a.data()[i]);
+    if (size > most) most = size;
+  }
+  return most;
+}
+/// Entry by entry, the product.
+template <class S, int R, int C, int O>
+  requires(R > 0 && C > 0)
+[[nodiscard]] inline Eigen::Matrix<S, R, C, O> entrywise_product(const Eigen::Matrix<S, R, C, O, R, C>& a,
+                                                                 const Eigen::Matrix<S, R, C, O, R, C>& b) {
+  Eigen::Matrix<S, R, C, O> out;
+  for (int i = 0; i < R * C; ++i) out.data()[i] = a.data()[i] * b.data()[i];
+  return out;
+}
+/// Entry by entry, the smaller value.
+template <class S, int R, int C, int O>
+  requires(R > 0 && C > 0)
+[[nodiscard]] inline Eigen::Matrix<S, R, C, O> entrywise_min(const Eigen::Matrix<S, R, C, O, R, C>& a,
+                                                             const Eigen::Matrix<S, R, C, O, R, C>& b) {
+  Eigen::Matrix<S, R, C, O> out;
+  for (int i = 0; i < R * C; ++i) out.data()[i] = b.data()[i] < a.data()[i] ? b.data()[i] : a.data()[i];
+  return out;
+}
+/// Entry by entry, the larger value.
+template <class S, int R, int C, int O>
+  requires(R > 0 && C > 0)
+[[nodiscard]] inline Eigen::Matrix<S, R, C, O> entrywise_max(const Eigen::Matrix<S, R, C, O, R, C>& a,
+                                                             const Eigen::Matrix<S, R, C, O, R, C>& b) {
+  Eigen::Matrix<S, R, C, O> out;
+  for (int i = 0; i < R * C; ++i) out.data()[i] = a.data()[i] < b.data()[i] ? b.data()[i] : a.data()[i];
+  return out;
+}
+/// The same entries as another scalar.
+template <class T, class S, int R, int C, int O>
+  requires(R > 0 && C > 0)
+[[nodiscard]] inline matrix<R, C, T> converted(const Eigen::Matrix<S, R, C, O, R, C>& a) {
+  matrix<R, C, T> out;
+  for (int i = 0; i < R * C; ++i) out.data()[i] = static_cast<T>(a.data()[i]);
+  return out;
+}
+/// @}
+
+/// @name Square matrices
+/// @{
+template <class S, int N, int O>
+  requires(N > 0)
+[[nodiscard]] inline S trace(const Eigen::Matrix<S, N, N, O, N, N>& m) {
+  S sum = m.data()[0];
+  for (int i = 1; i < N; ++i) sum += m.data()[i * N + i];
+  return sum;
+}
+template <class S, int O>
+[[nodiscard]] inline S determinant(const Eigen::Matrix<S, 2, 2, O, 2, 2>& m) {
+  return m(0, 0) * m(1, 1) - m(1, 0) * m(0, 1);
+}
+template <class S, int O>
+[[nodiscard]] inline S determinant(const Eigen::Matrix<S, 3, 3, O, 3, 3>& m) {
+  return m(0, 0) * (m(1, 1) * m(2, 2) - m(1, 2) * m(2, 1)) - m(0, 1) * (m(1, 0) * m(2, 2) - m(1, 2) * m(2, 0)) +
+         m(0, 2) * (m(1, 0) * m(2, 1) - m(1, 1) * m(2, 0));
+}
+/// The inverse by cofactors. Entries are not finite where the matrix is singular.
+template <class S, int O>
+[[nodiscard]] inline Eigen::Matrix<S, 2, 2, O> inverse(const Eigen::Matrix<S, 2, 2, O, 2, 2>& m) {
+  const S scale = S(1) / determinant(m);
+  Eigen::Matrix<S, 2, 2, O> out;
+  out(0, 0) = m(1, 1) * scale, out(1, 0) = -m(1, 0) * scale;
+  out(0, 1) = -m(0, 1) * scale, out(1, 1) = m(0, 0) * scale;
+  return out;
+}
+template <class S, int O>
+[[nodiscard]] inline Eigen::Matrix<S, 3, 3, O> inverse(const Eigen::Matrix<S, 3, 3, O, 3, 3>& m) {
+  Eigen::Matrix<S, 3, 3, O> out;  // the adjugate first
+  for (int i = 0; i < 3; ++i)
+    for (int k = 0; k < 3; ++k) {
+      const int p = (i + 1) % 3, q = (i + 2) % 3, s = (k + 1) % 3, t = (k + 2) % 3;
+      out(k, i) = m(p, s) * m(q, t) - m(p, t) * m(q, s);
+    }
+  const S scale = S(1) / (out(0, 0) * m(0, 0) + (out(0, 1) * m(1, 0) + out(0, 2) * m(2, 0)));
+  return out * scale;
+}
+/// Adds `weight * transposed(j) * j` to a symmetric matrix.
+template <class S, int N, int O, int M, int OJ>
+  requires(N > 0 && M > 0)
+inline void add_symmetric_product(Eigen::Matrix<S, N, N, O, N, N>& h, S weight,
+                                  const Eigen::Matrix<S, M, N, OJ, M, N>& j) {
+  h += transposed_product(j, weight * j);
+}
+/// @}
+
+}  // namespace orbis
