@@ -61,7 +61,7 @@ struct projected_lanes {
 template <camera_model Camera>
 [[gnu::noinline]] void project_each(const Camera& camera, const lane_array& x, const lane_array& y, const lane_array& z,
                                     bool with_jacobian, projected_lanes& out) {
-  matrix<2, 3> j = matrix<2, 3>::Zero();
+  matrix<2, 3> j = zeros<matrix<2, 3>>();
   for (std::size_t i = 0; i != x.size(); ++i) {
     const vec3 p(x[i], y[i], z[i]);
     const auto pixel = with_jacobian ? camera.project(p, j) : camera.project(p);

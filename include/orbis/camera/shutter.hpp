@@ -50,8 +50,8 @@ struct shutter {
 [[nodiscard]] inline vec3 moved_by(const vec6& twist, double t, const vec3& p, double inverse_scale = 1.0) {
   const vec3 w(t * twist[3], t * twist[4], t * twist[5]);
   const vec3 v(inverse_scale * (t * twist[0]), inverse_scale * (t * twist[1]), inverse_scale * (t * twist[2]));
-  const vec3 a = w.cross(p) + v;
-  return p + a + 0.5 * w.cross(a);
+  const vec3 a = cross(w, p) + v;
+  return p + a + 0.5 * cross(w, a);
 }
 
 }  // namespace orbis::camera

@@ -103,9 +103,9 @@ class shutter_correction {
   static constexpr float no_depth = std::numeric_limits<float>::max();
 
   [[nodiscard]] result<void> check(const detail::row_time& time, const vec6& twist) const {
-    if (!twist.allFinite()) return fail(errc::invalid_argument, "twist", "it is not finite");
+    if (!all_finite(twist)) return fail(errc::invalid_argument, "twist", "it is not finite");
     constexpr double most = 0.3;
-    if (!(time.largest(camera_.height()) * twist.tail<3>().norm() <= most))
+    if (!(time.largest(camera_.height()) * norm(tail<3>(twist)) <= most))
       return fail(errc::invalid_argument, "twist", "the camera turns by more than 0.3 radians while the image is read");
     return {};
   }

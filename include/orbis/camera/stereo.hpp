@@ -34,7 +34,7 @@ struct stereo_rig {
   se3 T_left_right;  ///< from the right camera's frame to the left one's, metres
 
   /// The distance between the two centres, metres.
-  [[nodiscard]] double baseline() const { return T_left_right.translation().norm(); }
+  [[nodiscard]] double baseline() const { return norm(T_left_right.translation()); }
 };
 
 template <class Left, class Right>
@@ -92,14 +92,14 @@ namespace detail {
 /// The axes of the rectified cameras as columns, in the left camera's frame: x along the baseline, z as near to the
 /// mean of both cameras' axes as that allows. Empty if the cameras do not stand side by side, or look apart.
 [[nodiscard]] inline std::optional<mat3> rectified_axes(const se3& T_left_right) {
-  const vec3 x = T_left_right.translation().normalized();
+  const vec3 x = normalized(T_left_right.translation());
   const vec3 left = vec3::UnitZ(), right = T_left_right.rotation() * left;
-  const vec3 y = (left + right).cross(x);
-  if (!x.allFinite() || !(x.x() > 0.5) || !(y.norm() > 0.1)) return std::nullopt;
+  const vec3 y = cross(left + right, x);
+  if (!all_finite(x) || !(x.x() > 0.5) || !(norm(y) > 0.1)) return std::nullopt;
   mat3 axes;
-  axes << x, y.normalized(), x.cross(y.normalized());
+  axes << x, normalized(y), cross(x, normalized(y));
   const vec3 z = axes.col(2), upright = T_left_right.rotation() * vec3::UnitY();
-  if (z.dot(left) < 0.5 || z.dot(right) < 0.5 || !(axes.col(1).dot(upright) > 0.5)) return std::nullopt;
+  if (dot(z, left) < 0.5 || dot(z, right) < 0.5 || !(dot(axes.col(1), upright) > 0.5)) return std::nullopt;
   return axes;
 }
 
@@ -144,7 +144,7 @@ template <camera_model Left, camera_model Right>
       for (const double u : {0.0, 0.6, 1.0}) {
         const vec2 pixel{u * (w - 1), v * (h - 1)};
         const auto ray = camera.unproject(pixel);
-        if (!ray || !((*k.project(*ray) - pixel).norm() < 1e-6)) return false;
+        if (!ray || !(norm(*k.project(*ray) - pixel) < 1e-6)) return false;
       }
     return true;
   };
@@ -182,12 +182,12 @@ template <camera_model Left, camera_model Right>
 
   const int width = options.width > 0 ? options.width : rig.left.width();
   const int height = options.height > 0 ? options.height : rig.left.height();
-  vec2 middle = vec2::Zero();  // of what both see, on the plane z = 1
+  vec2 middle = zeros<vec2>();  // of what both see, on the plane z = 1
   const auto add_middle = [&](const auto& camera, const mat3& R_camera_ideal) {
     const auto ray = camera.unproject({0.5 * (camera.width() - 1), 0.5 * (camera.height() - 1)});
-    const vec3 seen = R_camera_ideal.transpose() * *ray;
-    if (!(seen.z() > 0.1 * seen.norm())) return false;
-    middle += 0.5 * seen.head<2>() / seen.z();
+    const vec3 seen = transposed(R_camera_ideal) * *ray;
+    if (!(seen.z() > 0.1 * norm(seen))) return false;
+    middle += 0.5 * head<2>(seen) / seen.z();
     return true;
   };
   if (!add_middle(rig.left, left) || !add_middle(rig.right, right)) return reject("the cameras look apart");

@@ -46,7 +46,7 @@ class undistortion {
   /// The ideal camera stands where `camera` does, turned by `R_camera_ideal` (a rotation). O(pixels of `ideal`)
   /// projections.
   template <camera_model Camera>
-  undistortion(const Camera& camera, const pinhole& ideal, const mat3& R_camera_ideal = mat3::Identity())
+  undistortion(const Camera& camera, const pinhole& ideal, const mat3& R_camera_ideal = identity<mat3>())
       : source_width_{camera.width()},
         source_height_{camera.height()},
         source_{ideal.width(), ideal.height(), vec2f::Constant(std::numeric_limits<float>::quiet_NaN())} {

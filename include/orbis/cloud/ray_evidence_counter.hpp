@@ -119,7 +119,7 @@ class ray_evidence_counter {
   void review(const Policy& policy, const View& view) {
     assert(view.depth.width() == camera_.width() && view.depth.height() == camera_.height());
     const se3 pose = view.T_world_camera;
-    if (!pose.to_matrix().allFinite() || blocks_.index.empty()) return;
+    if (!all_finite(pose.to_matrix()) || blocks_.index.empty()) return;
     for (auto* counters : {&through_dropped_, &refuted_}) counters->resize(through_.size(), 0);
     windows_.take(policy, view.depth, options_.window);
     const detail::ray_view placed = view_at(pose, windows_);
@@ -173,7 +173,7 @@ class ray_evidence_counter {
   template <class Policy, class Kernel>
   void change(const Policy& policy, const detail::depth_windows& windows, const se3& pose, const Kernel& kernel) {
     assert(windows.width() == camera_.width() && windows.height() == camera_.height());
-    if (!pose.to_matrix().allFinite() || blocks_.index.empty()) return;
+    if (!all_finite(pose.to_matrix()) || blocks_.index.empty()) return;
     const detail::ray_view placed = view_at(pose, windows);
     test_.place(pose, placed, windows);
     for_each_seen_block(policy, placed, [&](std::size_t first, const auto&, const detail::block_verdict& verdict) {

@@ -68,13 +68,13 @@ template <execution_policy Policy, point_range Points>
   for_each_index(policy, count, 4096, [&](std::size_t i) {
     const auto p = coordinates<double>(detail::point_at(points, i));
     const vec3 position{p[0], p[1], p[2]};
-    if (!position.allFinite()) return;
+    if (!all_finite(position)) return;
     float range = unknown;
     if (!origins.ranges.empty()) {
       range = origins.ranges[i];
     } else {
       const vec3 origin = origins.per_point.empty() ? *common : vec3{origins.per_point[i].cast<double>()};
-      range = static_cast<float>((position - origin).norm());
+      range = static_cast<float>(norm(position - origin));
     }
     if (std::isfinite(range) && range >= 0) out[i] = range;
   });

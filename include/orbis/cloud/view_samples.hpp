@@ -73,7 +73,7 @@ class view_samples {
     assert(view.depth.width() == camera.width() && view.depth.height() == camera.height());
     const std::uint32_t first_tile = views_++ * tiles * tiles;
     const se3 pose = view.T_world_camera;
-    if (!pose.to_matrix().allFinite()) return;
+    if (!all_finite(pose.to_matrix())) return;
     for (int j = 0; j != across_; ++j) {
       for (int i = 0; i != across_; ++i) {
         const int x = (2 * i + 1) * camera.width() / (2 * across_);

@@ -12,8 +12,6 @@
 #include <limits>
 #include <utility>
 
-#include <Eigen/LU>
-
 #include <orbis/core/result.hpp>
 #include <orbis/core/so3.hpp>
 #include <orbis/core/types.hpp>
@@ -184,14 +182,14 @@ template <int N>
 /// Source: S. Umeyama, "Least-squares estimation of transformation parameters between two point
 /// patterns", PAMI 13(4), 1991.
 [[nodiscard]] inline result<so3> nearest_rotation(const mat3& m) {
-  const double size = m.cwiseAbs().maxCoeff();
-  if (!m.allFinite()) return fail(errc::degenerate, "rotation matrix", "is not finite");
-  const double determinant = size > 0.0 ? mat3(m / size).determinant() : 0.0;
-  if (determinant < 0.0) return fail(errc::degenerate, "rotation matrix", "mirrors: its determinant is negative");
-  if (!(determinant > 16.0 * std::numeric_limits<double>::epsilon()))
+  const double size = largest_magnitude(m);
+  if (!all_finite(m)) return fail(errc::degenerate, "rotation matrix", "is not finite");
+  const double volume = size > 0.0 ? determinant(m / size) : 0.0;
+  if (volume < 0.0) return fail(errc::degenerate, "rotation matrix", "mirrors: its determinant is negative");
+  if (!(volume > 16.0 * std::numeric_limits<double>::epsilon()))
     return fail(errc::degenerate, "rotation matrix", "is singular");
   const auto [u, values, v] = singular_values_of<3>(m);
-  return so3{mat3(u * v.transpose())};
+  return so3{u * transposed(v)};
 }
 
 }  // namespace orbis

@@ -23,7 +23,7 @@ class basic_se3 {
   using tangent = matrix<6, 1, S>;
   using point = matrix<3, 1, S>;
 
-  basic_se3() : t_{point::Zero()} {}
+  basic_se3() : t_{zeros<point>()} {}
   basic_se3(const basic_so3<S>& rotation, const point& translation) : r_{rotation}, t_{translation} {}
 
   [[nodiscard]] static basic_se3 exp(const tangent& xi) {
@@ -66,7 +66,7 @@ class basic_se3 {
   /// `exp(adjoint() * xi) == T exp(xi) T^-1`.
   [[nodiscard]] matrix<6, 6, S> adjoint() const {
     const matrix<3, 3, S> r = rotation_matrix();
-    matrix<6, 6, S> ad = matrix<6, 6, S>::Zero();
+    matrix<6, 6, S> ad = zeros<matrix<6, 6, S>>();
     ad.template topLeftCorner<3, 3>() = r;
     ad.template topRightCorner<3, 3>() = hat<S>(t_) * r;
     ad.template bottomRightCorner<3, 3>() = r;
@@ -79,11 +79,11 @@ class basic_se3 {
 
   /// `exp(xi + delta) ~ exp(left_jacobian(xi) * delta) * exp(xi)`.
   [[nodiscard]] static matrix<6, 6, S> left_jacobian(const tangent& xi) {
-    const matrix<3, 3, S> j = basic_so3<S>::left_jacobian(xi.template tail<3>());
+    const matrix<3, 3, S> j = basic_so3<S>::left_jacobian(tail<3>(xi));
     return block_triangular(j, q_matrix(xi));
   }
   [[nodiscard]] static matrix<6, 6, S> left_jacobian_inverse(const tangent& xi) {
-    const matrix<3, 3, S> j = basic_so3<S>::left_jacobian_inverse(xi.template tail<3>());
+    const matrix<3, 3, S> j = basic_so3<S>::left_jacobian_inverse(tail<3>(xi));
     return block_triangular(j, -(j * q_matrix(xi) * j));
   }
   /// `exp(xi + delta) ~ exp(xi) * exp(right_jacobian(xi) * delta)`.
@@ -93,7 +93,7 @@ class basic_se3 {
  private:
   [[nodiscard]] static matrix<6, 6, S> block_triangular(const matrix<3, 3, S>& diagonal,
                                                         const matrix<3, 3, S>& corner) {
-    matrix<6, 6, S> m = matrix<6, 6, S>::Zero();
+    matrix<6, 6, S> m = zeros<matrix<6, 6, S>>();
     m.template topLeftCorner<3, 3>() = diagonal;
     m.template topRightCorner<3, 3>() = corner;
     m.template bottomRightCorner<3, 3>() = diagonal;
@@ -102,9 +102,9 @@ class basic_se3 {
 
   /// How the translation's tangent depends on the rotation: Barfoot's Q_l, equation 7.86.
   [[nodiscard]] static matrix<3, 3, S> q_matrix(const tangent& xi) {
-    const matrix<3, 3, S> p = hat<S>(xi.template head<3>());
-    const matrix<3, 3, S> k = hat<S>(xi.template tail<3>());
-    const S t2 = xi.template tail<3>().squaredNorm();
+    const matrix<3, 3, S> p = hat<S>(head<3>(xi));
+    const matrix<3, 3, S> k = hat<S>(tail<3>(xi));
+    const S t2 = squared_norm(tail<3>(xi));
     // (t - sin t) / t^3, (t^2 + 2 cos t - 2) / (2 t^4), (2 t - 3 sin t + t cos t) / (2 t^5)
     S a = S(0), b = S(0), c = S(0);
     if (t2 < S(1)) {  // the closed forms cancel to nothing here

@@ -33,8 +33,8 @@ template <int N, class S>
   for (S n = norm; n > S(0.5); n /= S(2)) ++doublings;
 
   square x = a * std::ldexp(S(1), -doublings);
-  square sum = square::Identity();
-  square term = square::Identity();
+  square sum = identity<square>();
+  square term = identity<square>();
   for (int n = 2; n != 16; ++n) {  // 0.5^15 / 16! is below the rounding of double
     term = (term * x / static_cast<S>(n)).eval();
     sum += term;
@@ -59,7 +59,7 @@ class basic_sim3 {
   using point = matrix<3, 1, S>;
 
   /// The identity.
-  basic_sim3() : t_{point::Zero()} {}
+  basic_sim3() : t_{zeros<point>()} {}
   /// @pre scale > 0
   basic_sim3(const basic_so3<S>& rotation, const point& translation, S scale)
       : r_{rotation}, t_{translation}, scale_{scale} {
@@ -69,8 +69,8 @@ class basic_sim3 {
   explicit basic_sim3(const basic_se3<S>& rigid) : basic_sim3(rigid.rotation(), rigid.translation(), S(1)) {}
 
   [[nodiscard]] static basic_sim3 exp(const tangent& xi) {
-    const point phi = xi.template segment<3>(3);
-    return {basic_so3<S>::exp(phi), translation_integral(phi, xi[6]) * xi.template head<3>(), std::exp(xi[6])};
+    const point phi = segment<3>(xi, 3);
+    return {basic_so3<S>::exp(phi), translation_integral(phi, xi[6]) * head<3>(xi), std::exp(xi[6])};
   }
   [[nodiscard]] tangent log() const {
     const point phi = r_.log();
@@ -94,7 +94,7 @@ class basic_sim3 {
   [[nodiscard]] matrix<3, 3, S> rotation_matrix() const { return r_.rotation_matrix(); }
   /// The homogeneous 4x4 matrix.
   [[nodiscard]] matrix<4, 4, S> to_matrix() const {
-    matrix<4, 4, S> m = matrix<4, 4, S>::Identity();
+    matrix<4, 4, S> m = identity<matrix<4, 4, S>>();
     m.template topLeftCorner<3, 3>() = scale_ * rotation_matrix();
     m.template topRightCorner<3, 1>() = t_;
     return m;
@@ -102,7 +102,7 @@ class basic_sim3 {
   /// `exp(adjoint() * xi) == T exp(xi) T^-1`.
   [[nodiscard]] matrix<7, 7, S> adjoint() const {
     const matrix<3, 3, S> r = rotation_matrix();
-    matrix<7, 7, S> ad = matrix<7, 7, S>::Zero();
+    matrix<7, 7, S> ad = zeros<matrix<7, 7, S>>();
     ad.template block<3, 3>(0, 0) = scale_ * r;
     ad.template block<3, 3>(0, 3) = hat<S>(t_) * r;
     ad.template block<3, 1>(0, 6) = -t_;
@@ -112,11 +112,11 @@ class basic_sim3 {
   }
   /// `exp(xi + delta) ~ exp(left_jacobian(xi) * delta) * exp(xi)`.
   [[nodiscard]] static matrix<7, 7, S> left_jacobian(const tangent& xi) {
-    const matrix<3, 3, S> k = hat<S>(xi.template segment<3>(3));
-    matrix<7, 7, S> ad = matrix<7, 7, S>::Zero();  // ad * eta is the Lie bracket of xi and eta
-    ad.template block<3, 3>(0, 0) = k + xi[6] * matrix<3, 3, S>::Identity();
-    ad.template block<3, 3>(0, 3) = hat<S>(xi.template head<3>());
-    ad.template block<3, 1>(0, 6) = -xi.template head<3>();
+    const matrix<3, 3, S> k = hat<S>(segment<3>(xi, 3));
+    matrix<7, 7, S> ad = zeros<matrix<7, 7, S>>();  // ad * eta is the Lie bracket of xi and eta
+    ad.template block<3, 3>(0, 0) = k + xi[6] * identity<matrix<3, 3, S>>();
+    ad.template block<3, 3>(0, 3) = hat<S>(head<3>(xi));
+    ad.template block<3, 1>(0, 6) = -head<3>(xi);
     ad.template block<3, 3>(3, 3) = k;
     return detail::exponential_integral<7, S>(ad);
   }
@@ -130,7 +130,7 @@ class basic_sim3 {
  private:
   /// What takes `rho` to the translation of `exp`.
   [[nodiscard]] static matrix<3, 3, S> translation_integral(const point& phi, S sigma) {
-    return detail::exponential_integral<3, S>(hat<S>(phi) + sigma * matrix<3, 3, S>::Identity());
+    return detail::exponential_integral<3, S>(hat<S>(phi) + sigma * identity<matrix<3, 3, S>>());
   }
 
   basic_so3<S> r_;

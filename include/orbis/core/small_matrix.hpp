@@ -195,9 +195,10 @@ template <class S, int K, int R, int C, int OA, int OB>
 }
 
 /// `a * transposed(b)` of two vectors.
-template <class S, int R, int C>
+template <class S, int R, int C, int OA, int OB>
   requires(R > 0 && C > 0)
-[[nodiscard]] inline matrix<R, C, S> outer_product(const matrix<R, 1, S>& a, const matrix<C, 1, S>& b) {
+[[nodiscard]] inline matrix<R, C, S> outer_product(const Eigen::Matrix<S, R, 1, OA, R, 1>& a,
+                                                   const Eigen::Matrix<S, C, 1, OB, C, 1>& b) {
   matrix<R, C, S> out;
   for (int c = 0; c < C; ++c)
     for (int r = 0; r < R; ++r) out.data()[R == 1 ? c : c * R + r] = a.data()[r] * b.data()[c];
@@ -303,6 +304,22 @@ template <class S, int R, int C, int O>
     out.data()[c] = m.data()[r * detail::row_step<R, C, O> + c * detail::column_step<R, C, O>];
   return out;
 }
+/// The matrix with columns `a`, `b` and `c`.
+template <class S>
+[[nodiscard]] inline matrix<3, 3, S> columns(const Eigen::Matrix<S, 3, 1>& a, const Eigen::Matrix<S, 3, 1>& b,
+                                             const Eigen::Matrix<S, 3, 1>& c) {
+  matrix<3, 3, S> out;
+  for (int i = 0; i < 3; ++i) out(i, 0) = a[i], out(i, 1) = b[i], out(i, 2) = c[i];
+  return out;
+}
+/// The matrix with rows `a`, `b` and `c`.
+template <class S>
+[[nodiscard]] inline matrix<3, 3, S> rows(const Eigen::Matrix<S, 3, 1>& a, const Eigen::Matrix<S, 3, 1>& b,
+                                          const Eigen::Matrix<S, 3, 1>& c) {
+  matrix<3, 3, S> out;
+  for (int i = 0; i < 3; ++i) out(0, i) = a[i], out(1, i) = b[i], out(2, i) = c[i];
+  return out;
+}
 /// The matrix with `v` on its diagonal.
 template <class S, int R, int O>
   requires(R > 0)
@@ -400,6 +417,30 @@ template <class T, class S, int R, int C, int O>
   matrix<R, C, T> out;
   for (int i = 0; i < R * C; ++i) out.data()[i] = static_cast<T>(a.data()[i]);
   return out;
+}
+/// @}
+
+/// @name Expressions of Eigen's, and matrices of dynamic size: by Eigen
+/// @{
+template <class D>
+[[nodiscard]] inline auto transposed(const Eigen::MatrixBase<D>& a) {
+  return a.transpose().eval();
+}
+template <class A, class B>
+[[nodiscard]] inline auto dot(const Eigen::MatrixBase<A>& a, const Eigen::MatrixBase<B>& b) {
+  return a.dot(b);
+}
+template <class D>
+[[nodiscard]] inline auto squared_norm(const Eigen::MatrixBase<D>& a) {
+  return a.squaredNorm();
+}
+template <class D>
+[[nodiscard]] inline auto norm(const Eigen::MatrixBase<D>& a) {
+  return a.norm();
+}
+template <class D>
+[[nodiscard]] inline bool all_finite(const Eigen::MatrixBase<D>& a) {
+  return a.allFinite();
 }
 /// @}
 

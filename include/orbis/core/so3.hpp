@@ -103,7 +103,7 @@ class basic_so3 {
   /// `exp(adjoint() * phi) == R exp(phi) R^-1`.
   [[nodiscard]] matrix<3, 3, S> adjoint() const { return rotation_matrix(); }
   /// The angle in radians, in [0, pi].
-  [[nodiscard]] S angle() const { return log().norm(); }
+  [[nodiscard]] S angle() const { return norm(log()); }
   template <std::floating_point T>
   [[nodiscard]] basic_so3<T> cast() const {
     return basic_so3<T>(typename basic_so3<T>::quaternion(q_.template cast<T>()));

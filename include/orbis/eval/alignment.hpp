@@ -76,21 +76,21 @@ struct alignment {
     return fail(errc::no_data, where,
                 "only " + std::to_string(pairs.size()) + " poses have a reference pose, at least 3 are needed");
   const auto n = static_cast<double>(pairs.size());
-  vec3 mean_e = vec3::Zero(), mean_r = vec3::Zero();
+  vec3 mean_e = zeros<vec3>(), mean_r = zeros<vec3>();
   for (const pose_pair& p : pairs) {
     mean_e += p.estimate.translation() / n;
     mean_r += p.reference.translation() / n;
   }
-  mat3 covariance = mat3::Zero();
+  mat3 covariance = zeros<mat3>();
   double variance_e = 0.0, variance_r = 0.0;
   for (const pose_pair& p : pairs) {
     const vec3 e = p.estimate.translation() - mean_e;
     const vec3 r = p.reference.translation() - mean_r;
-    covariance += r * e.transpose() / n;
-    variance_e += e.squaredNorm() / n;
-    variance_r += r.squaredNorm() / n;
+    covariance += r * transposed(e) / n;
+    variance_e += squared_norm(e) / n;
+    variance_r += squared_norm(r) / n;
   }
-  if (!covariance.allFinite() || !std::isfinite(variance_e) || !std::isfinite(variance_r))
+  if (!all_finite(covariance) || !std::isfinite(variance_e) || !std::isfinite(variance_r))
     return fail(errc::degenerate, where, "a position is not finite");
   const Eigen::JacobiSVD<mat3> svd{covariance, Eigen::ComputeFullU | Eigen::ComputeFullV};
   const vec3 s = svd.singularValues();
@@ -98,9 +98,9 @@ struct alignment {
     return fail(errc::degenerate, where, "all positions lie on one line, the rotation about it is not determined");
   // Where the best orthogonal matrix mirrors, the best rotation flips the weakest direction.
   vec3 sign(1.0, 1.0, 1.0);
-  if (svd.matrixU().determinant() * svd.matrixV().determinant() < 0.0) sign[2] = -1.0;
-  const so3 rotation(mat3(svd.matrixU() * sign.asDiagonal() * svd.matrixV().transpose()));
-  const double scale = with_scale ? s.dot(sign) / variance_e : 1.0;
+  if (determinant(svd.matrixU()) * determinant(svd.matrixV()) < 0.0) sign[2] = -1.0;
+  const so3 rotation(mat3(svd.matrixU() * sign.asDiagonal() * transposed(svd.matrixV())));
+  const double scale = with_scale ? dot(s, sign) / variance_e : 1.0;
   return alignment{scale, se3(rotation, mean_r - rotation * vec3(scale * mean_e)), pairs.size()};
 }
 
@@ -113,8 +113,8 @@ struct alignment {
 [[nodiscard]] inline result<alignment> align_poses(const std::vector<pose_pair>& pairs) {
   if (pairs.empty()) return fail(errc::no_data, "pose alignment", "no pose has a reference pose");
   const auto n = static_cast<double>(pairs.size());
-  vec3 mean_e = vec3::Zero(), mean_r = vec3::Zero();
-  mat3 mean_rotation = mat3::Zero();
+  vec3 mean_e = zeros<vec3>(), mean_r = zeros<vec3>();
+  mat3 mean_rotation = zeros<mat3>();
   for (const pose_pair& p : pairs) {
     mean_e += p.estimate.translation() / n;
     mean_r += p.reference.translation() / n;
@@ -123,7 +123,7 @@ struct alignment {
   const auto rotation = nearest_rotation(mean_rotation);
   if (!rotation) return fail(rotation.error());
   const vec3 translation = mean_r - *rotation * mean_e;
-  if (!translation.allFinite()) return fail(errc::degenerate, "pose alignment", "a position is not finite");
+  if (!all_finite(translation)) return fail(errc::degenerate, "pose alignment", "a position is not finite");
   return alignment{1.0, se3(*rotation, translation), pairs.size()};
 }
 

@@ -32,7 +32,7 @@ struct absolute_trajectory_error {
   std::vector<double> errors;
   errors.reserve(pairs.size());
   for (const pose_pair& p : pairs)
-    errors.push_back((*aligned * p.estimate.translation() - p.reference.translation()).norm());
+    errors.push_back(norm(*aligned * p.estimate.translation() - p.reference.translation()));
   return absolute_trajectory_error{summarize(std::move(errors)), *aligned};
 }
 

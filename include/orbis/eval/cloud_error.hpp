@@ -46,7 +46,7 @@ template <execution_policy Policy, point_range Points, distance_function Distanc
   for_each_index(policy, n, 4096, [&](std::size_t i) {
     const auto xyz = coordinates<double>(begin[static_cast<std::ranges::range_difference_t<const Points>>(i)]);
     const vec3 p(xyz[0], xyz[1], xyz[2]);
-    distances[i] = p.allFinite() ? std::abs(static_cast<double>(distance(p))) : HUGE_VAL;
+    distances[i] = all_finite(p) ? std::abs(static_cast<double>(distance(p))) : HUGE_VAL;
   });
   std::erase_if(distances, [](double d) { return !std::isfinite(d); });
   if (distances.empty()) return fail(errc::no_data, "cloud error", "there is no finite point to measure");

@@ -63,7 +63,7 @@ struct relative_pose_error {
     const se3 moved = pairs[i].estimate.inverse() * pairs[*j].estimate;
     const se3 truly = pairs[i].reference.inverse() * pairs[*j].reference;
     const se3 error = truly.inverse() * moved;
-    metres.push_back(error.translation().norm());
+    metres.push_back(norm(error.translation()));
     degrees.push_back(error.rotation().angle() * 180.0 / std::numbers::pi);
   }
   if (metres.empty()) return fail(errc::no_data, where, "no two poses that far apart have a reference pose each");

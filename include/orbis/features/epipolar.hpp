@@ -106,7 +106,7 @@ struct epipolar_source {
     for (std::size_t t = 0; t != keypoints.size(); ++t) {
       const vec2f p = geometry.point(t, keypoints[t]);
       const float scale = std::pow(rule.scale_factor, static_cast<float>(keypoints[t].octave));
-      if (epipole && (p - *epipole).norm() < rule.epipole_radius * scale) continue;
+      if (epipole && norm(p - *epipole) < rule.epipole_radius * scale) continue;
       memory.x[t] = p.x();
       memory.y[t] = p.y();
       memory.limit[t] = rule.distance * scale;

@@ -48,7 +48,7 @@ concept epipolar_geometry = requires(const G& geometry, std::size_t i, const key
 
 /// The pixel of a homogeneous vector, if it is not at infinity.
 [[nodiscard]] inline std::optional<vec2f> pixel_of(const vec3& p) noexcept {
-  if (!(std::abs(p.z()) > 1e-12 * p.norm())) return std::nullopt;
+  if (!(std::abs(p.z()) > 1e-12 * norm(p))) return std::nullopt;
   return vec2f{static_cast<float>(p.x() / p.z()), static_cast<float>(p.y() / p.z())};
 }
 
@@ -58,8 +58,8 @@ class fundamental_geometry {
   explicit fundamental_geometry(const mat3& F) : F_{F} {
     // The epipole is orthogonal to every column; the two that span most give it best.
     for (int i = 0; i != 3; ++i) {
-      const vec3 normal = vec3{F.col(i)}.cross(vec3{F.col((i + 1) % 3)});
-      if (normal.norm() > epipole_.norm()) epipole_ = normal;
+      const vec3 normal = cross(vec3{F.col(i)}, vec3{F.col((i + 1) % 3)});
+      if (norm(normal) > norm(epipole_)) epipole_ = normal;
     }
   }
   /// From the intrinsic matrices (pixels) and the pose of the query's camera in the train's.
@@ -79,7 +79,7 @@ class fundamental_geometry {
 
  private:
   mat3 F_;
-  vec3 epipole_ = vec3::Zero();
+  vec3 epipole_ = zeros<vec3>();
 };
 
 /// Two images of any central camera, by the rays through their keypoints: lines and points are of

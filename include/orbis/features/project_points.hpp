@@ -39,12 +39,12 @@ class camera_projection {
                     pixel->y() < camera_.height() - 0.5))
       return std::nullopt;
     const vec3 towards = origin_ - position;
-    const double distance = towards.norm();
+    const double distance = norm(towards);
     projection p;
     p.x = static_cast<float>(pixel->x());
     p.y = static_cast<float>(pixel->y());
     p.distance = static_cast<float>(distance);
-    if constexpr (requires { point.normal; }) p.cosine = static_cast<float>(towards.dot(point.normal) / distance);
+    if constexpr (requires { point.normal; }) p.cosine = static_cast<float>(dot(towards, point.normal) / distance);
     if constexpr (requires { point.min_distance; }) p.min_distance = static_cast<float>(point.min_distance);
     if constexpr (requires { point.max_distance; }) p.max_distance = static_cast<float>(point.max_distance);
     return p;

@@ -25,7 +25,7 @@ namespace orbis::io {
 struct bal_observation {
   std::uint32_t camera = 0;
   std::uint32_t point = 0;
-  vec2 pixel = vec2::Zero();  ///< from the middle of the image, y upwards
+  vec2 pixel = zeros<vec2>();  ///< from the middle of the image, y upwards
 };
 
 /// Cameras, points, and which sees which where.
@@ -39,10 +39,10 @@ struct bal_problem {
 /// finite. Points behind the camera have a pixel too, as the residuals of the paper have it.
 [[nodiscard]] inline std::optional<vec2> project_bal(std::span<const double, 9> camera, const vec3& point) {
   const vec3 p = so3::exp(vec3(camera[0], camera[1], camera[2])) * point + vec3(camera[3], camera[4], camera[5]);
-  const vec2 d = p.head<2>() / p.z();
-  const double r2 = d.squaredNorm();
+  const vec2 d = head<2>(p) / p.z();
+  const double r2 = squared_norm(d);
   const vec2 pixel = -camera[6] * (1.0 + r2 * (camera[7] + r2 * camera[8])) * d;
-  if (!pixel.allFinite()) return std::nullopt;
+  if (!all_finite(pixel)) return std::nullopt;
   return pixel;
 }
 

@@ -21,7 +21,7 @@ namespace orbis::io {
 /// `origin` is taken off the coordinates before they become floats: for clouds far from where their coordinates begin.
 /// Errors: not_found, unreadable, malformed, unsupported (neither of the two).
 [[nodiscard]] inline result<point_cloud> read_cloud(const std::filesystem::path& path,
-                                                    const vec3& origin = vec3::Zero()) {
+                                                    const vec3& origin = zeros<vec3>()) {
   const auto bytes = read_file(path);
   if (!bytes) return fail(bytes.error());
   const std::string_view start = std::string_view{*bytes}.substr(0, 256);

@@ -17,7 +17,7 @@ struct g2o_edge {
   std::uint32_t from = 0;
   std::uint32_t to = 0;
   se3 measurement;
-  mat6 information = mat6::Identity();
+  mat6 information = identity<mat6>();
 };
 
 /// A graph of poses, in metres.

@@ -47,7 +47,7 @@ struct pcd_options {
 /// they are there. All else is passed over. `origin` is taken off the coordinates before they become floats.
 /// Errors: malformed (damaged, truncated), unsupported (no x, y and z).
 [[nodiscard]] inline result<organized_cloud> parse_pcd(std::string_view bytes, const std::string& where = {},
-                                                       const vec3& origin = vec3::Zero()) {
+                                                       const vec3& origin = zeros<vec3>()) {
   using namespace detail;
   const auto header = take_pcd_header(bytes, where);
   if (!header) return fail(header.error());

@@ -38,7 +38,7 @@ struct ply_options {
   ply_encoding encoding = ply_encoding::binary;
   /// Added to the coordinates as they are written, metres: what `parse_ply` took off. If it is not zero they are
   /// written as double.
-  vec3 origin = vec3::Zero();
+  vec3 origin = zeros<vec3>();
 };
 
 /// The vertices of a PLY file in memory: `x y z` of any type and, where they are there, `red green
@@ -46,7 +46,7 @@ struct ply_options {
 /// the coordinates before they become floats, which are no finer than half a metre at 5000 km.
 /// Errors: malformed (damaged, truncated), unsupported (no vertices with x, y and z).
 [[nodiscard]] inline result<point_cloud> parse_ply(std::string_view bytes, const std::string& where = {},
-                                                   const vec3& origin = vec3::Zero()) {
+                                                   const vec3& origin = zeros<vec3>()) {
   using namespace detail;
   const auto header = take_ply_header(bytes, where);
   if (!header) return fail(header.error());

@@ -159,7 +159,7 @@ template <class Octree, execution_policy Policy, keyframe_range Keyframes, camer
   const auto wrong_size = [] {
     return fail(errc::invalid_argument, "keyframes", "an image is not of the camera's size");
   };
-  const auto finite_pose = [](const auto& k) { return se3(k.T_world_camera).to_matrix().allFinite(); };
+  const auto finite_pose = [](const auto& k) { return all_finite(se3(k.T_world_camera).to_matrix()); };
   const std::size_t looks = view_passes(options.filter);
   const std::size_t total = (2U + looks) * std::ranges::size(keyframes);
   std::size_t done = 0;

@@ -399,7 +399,7 @@ class live_map {
   };
 
   [[nodiscard]] static std::optional<se3> if_finite(const se3& T) {
-    return T.to_matrix().allFinite() ? std::optional{T} : std::nullopt;
+    return all_finite(T.to_matrix()) ? std::optional{T} : std::nullopt;
   }
   [[nodiscard]] static bool are_different(std::span<const std::uint64_t> frames) {
     std::vector<std::uint64_t> sorted(frames.begin(), frames.end());
@@ -451,7 +451,7 @@ class live_map {
     for (const entry& k : keyframes_) {
       if (!k.waiting) continue;
       const double moved = k.used ? frustum_.displacement(*k.used, *k.wanted, k.reach) : k.reach;
-      const double distance = robot ? (k.wanted->translation() - *robot).norm() : 0.0;
+      const double distance = robot ? norm(k.wanted->translation() - *robot) : 0.0;
       queue_.push_back({moved / (1.0 + distance), k.frame});
     }
     std::sort(queue_.begin(), queue_.end(), [](const ranked& a, const ranked& b) {

@@ -63,7 +63,7 @@ class moving_filter {
       if (v.unjudged && leaves_next(v)) settled = change(policy, map, v);
     }
     forget(frame);
-    if (!T_world_camera.to_matrix().allFinite()) return map.add_keyframe(policy, frame, depth, T_world_camera);
+    if (!all_finite(T_world_camera.to_matrix())) return map.add_keyframe(policy, frame, depth, T_world_camera);
     auto& now = judge_.add(policy, frame, depth, T_world_camera, pose_in(map));
     result<octree::integration_summary> added{};
     if (judge_.judge(now) == 0) {

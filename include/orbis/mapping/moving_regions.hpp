@@ -159,7 +159,7 @@ class moving_regions {
       if (label_[s.cell] != label::unknown) continue;
       label_[s.cell] = s.what;
       around(s.cell, [&](std::size_t next) {
-        const float way = s.way + (point(next) - point(s.cell)).norm();
+        const float way = s.way + norm(point(next) - point(s.cell));
         if (label_[next] == label::unknown && way <= options_.reach)
           push({way, static_cast<std::uint32_t>(next), s.what});
       });

@@ -4,7 +4,7 @@
 ///
 /// @code
 ///   const mapping::upright_view view = mapping::find_upright(frame.depth_metres(), camera::ray_table{camera});
-///   options.initial_pose = se3{view.R_world_camera, vec3::Zero()};   // of slam::rgbd_system
+///   options.initial_pose = se3{view.R_world_camera, zeros<vec3>()};   // of slam::rgbd_system
 /// @endcode
 #pragma once
 
@@ -72,14 +72,14 @@ struct upright_view {
 /// bottom, along x.
 [[nodiscard]] inline so3 upright_rotation(const vec3& up_camera) {
   vec3 ahead = vec3::UnitZ() - up_camera.z() * up_camera;
-  if (ahead.norm() < 1e-3) {
+  if (norm(ahead) < 1e-3) {
     ahead = up_camera.z() > 0 ? vec3::UnitY() : vec3(-vec3::UnitY());
-    ahead -= up_camera.dot(ahead) * up_camera;
+    ahead -= dot(up_camera, ahead) * up_camera;
   }
   ahead.normalize();
   mat3 rows;
   rows.row(0) = ahead;
-  rows.row(1) = up_camera.cross(ahead);
+  rows.row(1) = cross(up_camera, ahead);
   rows.row(2) = up_camera;
   return so3{rows};
 }

@@ -50,7 +50,7 @@ struct distance_field_options {
 /// A distance and its gradient: dimensionless, of length about 1 where one obstacle is nearest.
 struct distance_with_gradient {
   double distance = 0.0;  ///< metres
-  vec3 gradient = vec3::Zero();
+  vec3 gradient = zeros<vec3>();
 };
 
 /// Distances in metres. A voxel's distance is the one between its centre and the centre of the nearest voxel that is an
@@ -112,7 +112,7 @@ class metric_distances {
     const auto k = grid_.key(p);
     if (!k) return 0.0;
     const auto c = coordinates<double>(p);
-    const double off = (vec3{c[0], c[1], c[2]} - grid_.center(*k)).norm();
+    const double off = norm(vec3{c[0], c[1], c[2]} - grid_.center(*k));
     return std::max(0.0, distance(*k) - off - half_diagonal());
   }
   /// Squared distances in voxels.

@@ -53,7 +53,7 @@ struct floor_map_options {
 /// The floor by square cells, one for each column of voxels. Cell (0, 0) has the least x and y.
 struct floor_map {
   double resolution = 0.0;     ///< the edge of a cell, metres
-  vec2 origin = vec2::Zero();  ///< the low corner of cell (0, 0), metres
+  vec2 origin = zeros<vec2>();  ///< the low corner of cell (0, 0), metres
   double floor = 0.0;          ///< height of the floor that was looked from, metres; see find_floor
   image<floor_state> states{};
   image<float> heights{};  ///< of the floor, metres; NaN where the robot does not get to

@@ -163,7 +163,7 @@ class floor_view {
                              : (*costs_)(x, y) == floor_cost::no_information;
   }
   [[nodiscard]] bool is_in_region(const vec3& p) const noexcept {
-    if (!p.allFinite()) return false;
+    if (!all_finite(p)) return false;
     const auto& r = options_.region;
     return !r || (p.x() >= r->min.x() && p.y() >= r->min.y() && p.x() <= r->max.x() && p.y() <= r->max.y());
   }
@@ -176,7 +176,7 @@ class floor_view {
     const auto cell = map_->cell(p);
     if (!cell) return -radius - resolution();
     const double d = distance((*cell)[0], (*cell)[1]);
-    const double off = (map_->center((*cell)[0], (*cell)[1]) - p.head<2>()).norm();
+    const double off = norm(map_->center((*cell)[0], (*cell)[1]) - head<2>(p));
     if (d + off - 0.4999 * resolution() < radius) return detail::blocked;
     return d - off - 0.7072 * resolution() - radius;
   }

@@ -47,7 +47,7 @@ struct frontier_octant {
 /// Frontier voxels that hang together: each is one of the 26 neighbours of another one.
 struct frontier_cluster {
   std::size_t size = 0;                    ///< voxels
-  vec3 center = vec3::Zero();              ///< mean of the voxels' centres, metres
+  vec3 center = zeros<vec3>();              ///< mean of the voxels' centres, metres
   octree::voxel_key voxel;                 ///< the frontier voxel whose centre is nearest to `center`
   std::vector<frontier_octant> octants{};  ///< all of its voxels, in Morton order
 };
@@ -359,7 +359,7 @@ inline std::vector<frontier_cluster> frontiers::clusters(const cluster_options& 
     c.center /= static_cast<double>(c.size);
     double nearest = std::numeric_limits<double>::infinity();
     for_each_voxel([&](const octree::voxel_key& k) {
-      const double away = (grid_.center(k) - c.center).squaredNorm();
+      const double away = squared_norm(grid_.center(k) - c.center);
       if (away < nearest) nearest = away, c.voxel = k;
     });
   }

@@ -49,7 +49,7 @@ namespace orbis::nav {
     // Octants are in Morton order: those of a cube follow each other.
     for (std::size_t i = 0; i != c.octants.size();) {
       const octree::voxel_key cube = octree::node_key(c.octants[i].octant, level);
-      vec3 sum = vec3::Zero();
+      vec3 sum = zeros<vec3>();
       double count = 0.0;
       for (; i != c.octants.size() && octree::node_key(c.octants[i].octant, level) == cube; ++i)
         for (std::uint64_t rest = c.octants[i].mask; rest != 0; rest &= rest - 1) {
@@ -104,7 +104,7 @@ enum class next_view_status : std::uint8_t {
 struct next_view {
   next_view_status status = next_view_status::nothing_to_see;
   se3 T_world_camera{};       ///< the camera's axes: x to the right, y down, z ahead; x is level
-  vec3 place = vec3::Zero();  ///< that it looks at, metres
+  vec3 place = zeros<vec3>();  ///< that it looks at, metres
   double gain = 0.0;          ///< unknown space that it would see, cubic metres
   double utility = 0.0;       ///< gain * exp(-lambda * length of the path); 0 if that is too small for a double
   found_path path{};
@@ -114,9 +114,9 @@ struct next_view {
 /// @pre `to` is not `from`, and neither above nor below it
 [[nodiscard]] inline se3 looking_at(const vec3& from, const vec3& to) {
   mat3 axes;
-  axes.col(2) = (to - from).normalized();
-  axes.col(0) = axes.col(2).cross(vec3::UnitZ()).normalized();
-  axes.col(1) = axes.col(2).cross(axes.col(0));
+  axes.col(2) = normalized(to - from);
+  axes.col(0) = normalized(cross(axes.col(2), vec3::UnitZ()));
+  axes.col(1) = cross(axes.col(2), axes.col(0));
   return {so3{axes}, from};
 }
 
@@ -168,7 +168,7 @@ template <planning_map Map, robot_shape Shape, camera::camera_model Camera>
       c.view.T_world_camera = pose;
       c.view.place = place;
       c.view.gain = seen;
-      c.bound = std::log(seen) - options.lambda * (from - position).norm();
+      c.bound = std::log(seen) - options.lambda * norm(from - position);
     }
   std::stable_sort(candidates.begin(), candidates.end(),
                    [](const candidate& a, const candidate& b) { return a.bound > b.bound; });

@@ -85,7 +85,7 @@ struct found_path {
 /// The length of a polyline, in the unit of its points.
 [[nodiscard]] inline double length_of(const std::vector<vec3>& points) noexcept {
   double sum = 0.0;
-  for (std::size_t i = 1; i < points.size(); ++i) sum += (points[i] - points[i - 1]).norm();
+  for (std::size_t i = 1; i < points.size(); ++i) sum += norm(points[i] - points[i - 1]);
   return sum;
 }
 
@@ -169,7 +169,7 @@ namespace detail {
 /// Whether the straight way, which is free, costs no more than its length: no other one is cheaper.
 template <planning_space Space>
 [[nodiscard]] bool costs_its_length(const Space& space, const vec3& a, const vec3& b) {
-  return space.is_uniform() || cost_of(space, a, b) <= (b - a).norm() * (1.0 + 1e-9);
+  return space.is_uniform() || cost_of(space, a, b) <= norm(b - a) * (1.0 + 1e-9);
 }
 
 /// Searches over the middles of cells, from a start that is free to a goal (finite) or, where none of `exits` can be
@@ -238,7 +238,7 @@ template <planning_space Space>
   }
   const bool is_inside = space.key(goal).has_value();
   const bool is_free = is_inside && space.is_free(goal);
-  if (!goal.allFinite()) {
+  if (!all_finite(goal)) {
     out.status = path_status::goal_outside;
     return out;
   }

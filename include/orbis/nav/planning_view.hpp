@@ -145,10 +145,10 @@ class planning_view {
 
  private:
   [[nodiscard]] bool is_short(const vec3& a, const vec3& b) const noexcept {
-    return (b - a).norm() <= 4.0 * resolution() * grid().cells();
+    return norm(b - a) <= 4.0 * resolution() * grid().cells();
   }
   [[nodiscard]] bool is_in_region(const vec3& p) const noexcept {
-    if (!p.allFinite()) return false;
+    if (!all_finite(p)) return false;
     const auto& r = options_.region;
     return !r || ((p.array() >= r->min.array()).all() && (p.array() <= r->max.array()).all());
   }
@@ -176,7 +176,7 @@ class planning_view {
     const auto look = [&](const octree::voxel_key& at, const vec3& away) {
       const std::uint16_t squared = reader.squared(at);
       const bool is_far = squared == squared_distance_view::far;
-      const double d = is_far ? field_->reach() : std::sqrt(static_cast<double>(squared)) * cell, off = away.norm();
+      const double d = is_far ? field_->reach() : std::sqrt(static_cast<double>(squared)) * cell, off = norm(away);
       least = std::max(least, d - off);
       if (!is_far) most = std::min(most, d + off);
     };

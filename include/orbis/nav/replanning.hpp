@@ -98,9 +98,9 @@ class path_monitor {
     double least = -1.0;
     for (std::size_t i = 0; i + 1 != points_.size(); ++i) {
       const vec3 along = points_[i + 1] - points_[i];
-      const double squared = along.squaredNorm();
-      const double t = squared > 0.0 ? std::clamp((position - points_[i]).dot(along) / squared, 0.0, 1.0) : 0.0;
-      const double away = (points_[i] + t * along - position).squaredNorm();
+      const double squared = squared_norm(along);
+      const double t = squared > 0.0 ? std::clamp(dot(position - points_[i], along) / squared, 0.0, 1.0) : 0.0;
+      const double away = squared_norm(points_[i] + t * along - position);
       if (least < 0.0 || away < least) least = away, nearest = i;
     }
     const auto passed = static_cast<std::ptrdiff_t>(nearest);
@@ -174,7 +174,7 @@ class replanner {
   /// What is an obstacle on a floor, and where.
   struct floor_obstacles {
     double resolution = 0.0;
-    vec2 origin = vec2::Zero();
+    vec2 origin = zeros<vec2>();
     image<float> squared{};
     friend bool operator==(const floor_obstacles&, const floor_obstacles&) = default;
   };
@@ -208,7 +208,7 @@ class replanner {
   path_monitor monitor_;
   detail::map_follower tried_;
   floor_obstacles tried_floor_;
-  vec3 position_ = vec3::Zero();
+  vec3 position_ = zeros<vec3>();
   std::size_t planned_ = 0;
 };
 

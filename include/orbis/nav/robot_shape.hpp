@@ -34,7 +34,7 @@ struct vertical_cylinder {
 /// What a shape touches while its reference point goes straight from `a` to `b`.
 template <class Shape>
 struct swept_shape {
-  vec3 a = vec3::Zero(), b = vec3::Zero();
+  vec3 a = zeros<vec3>(), b = zeros<vec3>();
   Shape shape{};
 };
 

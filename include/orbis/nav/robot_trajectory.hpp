@@ -30,9 +30,9 @@ struct motion_limits {
 
 /// Where a robot is at a moment.
 struct motion_state {
-  vec3 position = vec3::Zero();      ///< metres
-  vec3 velocity = vec3::Zero();      ///< metres / second
-  vec3 acceleration = vec3::Zero();  ///< metres / second^2
+  vec3 position = zeros<vec3>();      ///< metres
+  vec3 velocity = zeros<vec3>();      ///< metres / second
+  vec3 acceleration = zeros<vec3>();  ///< metres / second^2
 };
 
 /// A piece of a path over a parameter from 0 to `length`: a straight line along `direction`, or a corner that turns
@@ -45,7 +45,7 @@ struct motion_state {
 /// is the Bezier curve of degree 4 whose control points lie on both legs of the corner, half of the length long: its
 /// end, the middle of the leg, the corner (see corner_points).
 struct path_piece {
-  vec3 start = vec3::Zero();
+  vec3 start = zeros<vec3>();
   vec3 direction = vec3::UnitX(), turned = vec3::UnitX();  ///< of length 1
   double length = 0.0;
 
@@ -147,8 +147,8 @@ class robot_trajectory {
       for (int k = 0; k != n; ++k) {
         const double h = piece.length / n, s = k * h;
         // |q'| is least and |q''| greatest in the middle.
-        const auto far = std::max(piece.first(s).norm(), piece.first(s + h).norm());
-        const auto near = std::max(piece.second(s).norm(), piece.second(s + h).norm());
+        const auto far = std::max(norm(piece.first(s)), norm(piece.first(s + h)));
+        const auto near = std::max(norm(piece.second(s)), norm(piece.second(s + h)));
         all.push_back({p, s, h, is_line ? 1.0 : far, is_line ? 0.0 : near});
         u.back() = std::min(u.back(), cap(all.back()));
         u.push_back(cap(all.back()));
@@ -187,7 +187,7 @@ class robot_trajectory {
     if (!pieces_.empty()) knots_.push_back({time, pieces_.size() - 1, pieces_.back().length, 0.0, 0.0});
   }
 
-  vec3 start_ = vec3::Zero(), end_ = vec3::Zero();
+  vec3 start_ = zeros<vec3>(), end_ = zeros<vec3>();
   std::vector<path_piece> pieces_;
   std::vector<knot> knots_;
   std::size_t stops_ = 0;
@@ -201,11 +201,11 @@ namespace detail {
 template <inflatable_space Space>
 [[nodiscard]] bool is_free_curve(const Space& space, const std::array<vec3, 5>& points, int halvings = 6) {
   const vec3 along = points[4] - points[0];
-  const double squared = along.squaredNorm();
+  const double squared = squared_norm(along);
   double away = 0.0;
   for (const vec3& p : points) {
-    const double t = squared > 0.0 ? std::clamp((p - points[0]).dot(along) / squared, 0.0, 1.0) : 0.0;
-    away = std::max(away, (p - (points[0] + t * along)).norm());
+    const double t = squared > 0.0 ? std::clamp(dot(p - points[0], along) / squared, 0.0, 1.0) : 0.0;
+    away = std::max(away, norm(p - (points[0] + t * along)));
   }
   const double rounding = 1e-9 * space.resolution();
   if (space.is_free(points[0], points[4], away + rounding)) return true;
@@ -241,13 +241,13 @@ template <inflatable_space Space>
   constexpr double least = 1e-100;  // of a leg that has a direction: its square is a number
   std::vector<vec3> corners;
   for (const vec3& p : points)
-    if (corners.empty() || (p - corners.back()).norm() > least) corners.push_back(p);
+    if (corners.empty() || norm(p - corners.back()) > least) corners.push_back(p);
   std::vector<path_piece> pieces;
   std::vector<bool> stops;
   vec3 from = corners.front();
   const std::size_t last = corners.size() - 1;
   const auto line_to = [&](const vec3& to, const vec3& direction, bool stop) {
-    const double length = (to - from).norm();
+    const double length = norm(to - from);
     if (length > least) {
       pieces.push_back({from, direction, direction, length});
       stops.push_back(stop);
@@ -257,15 +257,15 @@ template <inflatable_space Space>
   bool stop = false;  // at the start of the next piece
   for (std::size_t i = 1; i <= last; ++i) {
     const vec3 leg = corners[i] - corners[i - 1];
-    const vec3 direction = leg.normalized();
+    const vec3 direction = normalized(leg);
     if (i == last) {
       line_to(corners[i], direction, stop);
       break;
     }
     const vec3 next = corners[i + 1] - corners[i];
-    const vec3 turned = next.normalized();
+    const vec3 turned = normalized(next);
     // What two corners share is halved.
-    const double room = std::min(leg.norm() * (i == 1 ? 1.0 : 0.5), next.norm() * (i + 1 == last ? 1.0 : 0.5));
+    const double room = std::min(norm(leg) * (i == 1 ? 1.0 : 0.5), norm(next) * (i + 1 == last ? 1.0 : 0.5));
     bool rounded = false;
     for (double share = 1.0; share > 0.01 && !rounded; share *= 0.5) {
       const path_piece corner{corners[i] - share * room * direction, direction, turned, 2.0 * share * room};

@@ -60,7 +60,7 @@ class view_gain {
   /// The number of unknown voxels seen from a pose; 0 from outside of the grid. O(voxels along the rays)
   [[nodiscard]] std::size_t operator()(const se3& T_world_camera) {
     const vec3 origin = T_world_camera.translation();
-    const std::optional<octree::voxel_key> start = origin.allFinite() ? grid_.key(origin) : std::nullopt;
+    const std::optional<octree::voxel_key> start = all_finite(origin) ? grid_.key(origin) : std::nullopt;
     if (!start || !counts_any_) return 0;
     ++view_;
     count_ = 0;

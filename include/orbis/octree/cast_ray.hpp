@@ -33,7 +33,7 @@ enum class ray_end {
 struct ray_hit {
   ray_end end = ray_end::out_of_grid;
   voxel_key key;              ///< the voxel where it ended
-  vec3 point = vec3::Zero();  ///< its centre, metres; both are zero if the ray starts outside the grid
+  vec3 point = zeros<vec3>();  ///< its centre, metres; both are zero if the ray starts outside the grid
 
   /// Whether something occupied was hit.
   [[nodiscard]] explicit operator bool() const noexcept { return end == ray_end::hit; }

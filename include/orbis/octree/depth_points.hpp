@@ -103,7 +103,7 @@ class pixel_rays {
 
   std::vector<float> x_, y_;
   std::any camera_;
-  vec2 focal_ = vec2::Ones(), center_ = vec2::Zero();
+  vec2 focal_ = filled<vec2>(1), center_ = zeros<vec2>();
   int width_ = 0;
   int height_ = 0;
   unsigned version_ = 0;

@@ -93,7 +93,7 @@ class voxel_grid {
     const auto along = [&](std::uint32_t c) {
       return rounded_product((static_cast<double>(c) - half_) / cells + 0.5, resolution_ * cells);
     };
-    return level == depth_ ? vec3(vec3::Zero()) : vec3{along(k.x), along(k.y), along(k.z)};
+    return level == depth_ ? vec3(zeros<vec3>()) : vec3{along(k.x), along(k.y), along(k.z)};
   }
   /// The edge of a node at `level`, metres.
   [[nodiscard]] double node_size(int level) const noexcept { return resolution_ * node_cells(level); }
@@ -142,8 +142,8 @@ class voxel_grid {
 
 /// An axis-aligned box, metres.
 struct bounding_box {
-  vec3 min = vec3::Zero();
-  vec3 max = vec3::Zero();
+  vec3 min = zeros<vec3>();
+  vec3 max = zeros<vec3>();
 };
 
 /// The cube of the node at `level` whose lowest voxel is `k`, metres.

@@ -20,12 +20,12 @@ namespace orbis::octree {
 
 /// A ball, metres. @pre radius >= 0
 struct sphere {
-  vec3 center = vec3::Zero();
+  vec3 center = zeros<vec3>();
   double radius = 0.0;
 };
 /// Everything within `radius` of the segment from `a` to `b`, metres. @pre radius >= 0
 struct capsule {
-  vec3 a = vec3::Zero(), b = vec3::Zero();
+  vec3 a = zeros<vec3>(), b = zeros<vec3>();
   double radius = 0.0;
 };
 
@@ -43,7 +43,7 @@ struct capsule {
 }
 [[nodiscard]] inline bool touches(const sphere& s, const bounding_box& b) noexcept {
   const vec3 nearest = s.center.cwiseMax(b.min).cwiseMin(b.max);
-  return (s.center - nearest).squaredNorm() <= s.radius * s.radius;
+  return squared_norm(s.center - nearest) <= s.radius * s.radius;
 }
 namespace detail {
 /// Exact, see below.
@@ -65,24 +65,24 @@ namespace detail {
       for (; knots[place - 1] > t; --place) knots[place] = knots[place - 1];
       knots[place] = t;
     }
-  double best = 0.0, slope = away(0.0).dot(along);
+  double best = 0.0, slope = dot(away(0.0), along);
   for (std::size_t i = 1; i != count && slope < 0.0; ++i) {
-    const double next = away(knots[i]).dot(along);
+    const double next = dot(away(knots[i]), along);
     const double share = next > 0.0 ? slope / (slope - next) : 1.0;
     best = knots[i - 1] + share * (knots[i] - knots[i - 1]);
     slope = next;
   }
-  return away(best).squaredNorm() <= c.radius * c.radius;
+  return squared_norm(away(best)) <= c.radius * c.radius;
 }
 }  // namespace detail
 
 [[nodiscard]] inline bool touches(const capsule& c, const bounding_box& b) noexcept {
   // Most boxes are farther from the segment than the ball around them, or nearer than the ball in them.
   const vec3 middle = 0.5 * (b.min + b.max), half = b.max - middle, along = c.b - c.a, from = middle - c.a;
-  const double squares = along.squaredNorm(), product = from.dot(along);
+  const double squares = squared_norm(along), product = dot(from, along);
   // Where the segment is nearest to the middle of the box: at its beginning, its end, or between.
   const double share = product <= 0.0 ? 0.0 : product >= squares ? 1.0 : product / squares;
-  const double apart = (from - share * along).squaredNorm();
+  const double apart = squared_norm(from - share * along);
   const double outside = (c.radius + 1.7320508075688773 * half.maxCoeff()) * (1.0 + 1e-9);
   if (apart > outside * outside) return false;
   const double inside = (c.radius + half.minCoeff()) * (1.0 - 1e-9);
@@ -90,9 +90,9 @@ namespace detail {
   // That point of the segment may be near enough to the box; or else the plane through the nearest point of the box,
   // across the way between the two, may keep both ends away. A ball is one or the other, but for rounding.
   const vec3 point = c.a + share * along, nearest = point.cwiseMax(b.min).cwiseMin(b.max), way = point - nearest;
-  const double squared = way.squaredNorm(), reach = c.radius * c.radius;
+  const double squared = squared_norm(way), reach = c.radius * c.radius;
   if (squared < reach * (1.0 - 1e-9)) return true;
-  const double gap = std::min((c.a - nearest).dot(way), (c.b - nearest).dot(way));
+  const double gap = std::min(dot(c.a - nearest, way), dot(c.b - nearest, way));
   if (gap > 0.0 && gap * gap > reach * squared * (1.0 + 1e-9)) return false;
   return detail::touches_exactly(c, b);
 }
@@ -225,7 +225,7 @@ class overlap_search {
 /// Nodes without anything occupied are passed over as a whole. @pre finite coordinates
 template <octree_map Map, overlap_shape Shape>
 [[nodiscard]] bool overlaps(const Map& map, const Shape& shape, const overlap_options& options = {}) {
-  assert(bounds_of(shape).min.allFinite() && bounds_of(shape).max.allFinite());
+  assert(all_finite(bounds_of(shape).min) && all_finite(bounds_of(shape).max));
   using search = detail::overlap_search<typename Map::model, Shape>;
   return search{map.store(), map.grid(), shape, options.unknown == occupancy::occupied}.run();
 }

@@ -52,7 +52,7 @@ class normal_estimator {
     const std::uint32_t last = grid_.cells() - 1;
     const auto is_inside = [&](std::uint32_t c) { return 0 < c && c < last; };
     if (!is_inside(k.x) || !is_inside(k.y) || !is_inside(k.z)) return std::nullopt;
-    vec3 down = vec3::Zero();
+    vec3 down = zeros<vec3>();
     for (int z = -1; z <= 1; ++z)
       for (int y = -1; y <= 1; ++y)
         for (int x = -1; x <= 1; ++x) {
@@ -61,7 +61,7 @@ class normal_estimator {
           const double p = occupied_at({moved(k.x, x), moved(k.y, y), moved(k.z, z)});
           down -= p * weights[static_cast<std::size_t>(steps)] * vec3{double(x), double(y), double(z)};
         }
-    const double length = down.norm();
+    const double length = norm(down);
     if (!(length > 1e-6)) return std::nullopt;
     return vec3(down / length);
   }

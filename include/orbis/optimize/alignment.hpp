@@ -104,10 +104,10 @@ requires(std::same_as<Transform, se3> || std::same_as<Transform, sim3>)
   };
   std::vector<typename estimator_type::pair> pairs;
   pairs.reserve(n);
-  vec3 from_centre = vec3::Zero(), to_centre = vec3::Zero();
+  vec3 from_centre = zeros<vec3>(), to_centre = zeros<vec3>();
   for (std::size_t i = 0; i != n; ++i) {
     const typename estimator_type::pair p{read(from, i), read(to, i), weight_of(i), static_cast<std::uint32_t>(i)};
-    if (!p.from.allFinite() || !p.to.allFinite() || !(p.weight > 0.0) || !std::isfinite(p.weight)) continue;
+    if (!all_finite(p.from) || !all_finite(p.to) || !(p.weight > 0.0) || !std::isfinite(p.weight)) continue;
     pairs.push_back(p);
     from_centre += p.from;
     to_centre += p.to;
@@ -117,12 +117,12 @@ requires(std::same_as<Transform, se3> || std::same_as<Transform, sim3>)
                 "of " + std::to_string(n) + " pairs " + std::to_string(pairs.size()) + " are finite, three are needed");
   from_centre /= static_cast<double>(pairs.size());
   to_centre /= static_cast<double>(pairs.size());
-  mat3 spread = mat3::Zero(), spread_to = mat3::Zero();
+  mat3 spread = zeros<mat3>(), spread_to = zeros<mat3>();
   for (auto& p : pairs) {
     p.from -= from_centre;
     p.to -= to_centre;
-    spread += p.from * p.from.transpose();
-    spread_to += p.to * p.to.transpose();
+    spread += p.from * transposed(p.from);
+    spread_to += p.to * transposed(p.to);
   }
   random_bits random(mix64(options.seed));
   shuffle(pairs, random);
@@ -151,7 +151,7 @@ requires(std::same_as<Transform, se3> || std::same_as<Transform, sim3>)
   out.inliers.reserve(found->inliers.size());
   double sum = 0.0;
   for (std::size_t i = 0; i != n; ++i) {
-    const double weight = weight_of(i), e = weight * (transform * read(from, i) - read(to, i)).squaredNorm();
+    const double weight = weight_of(i), e = weight * squared_norm(transform * read(from, i) - read(to, i));
     if (!(weight > 0.0) || !(e < options.threshold * options.threshold)) continue;
     out.inliers.push_back(static_cast<std::uint32_t>(i));
     sum += e;

@@ -36,7 +36,7 @@ namespace orbis::optimize {
 template <int N>
 struct dual {
   double value = 0.0;
-  matrix<N> slope = matrix<N>::Zero();  ///< the derivatives of `value`
+  matrix<N> slope = zeros<matrix<N>>();  ///< the derivatives of `value`
 
   dual() = default;
   /// A constant.
@@ -69,7 +69,7 @@ struct dual {
   friend bool operator==(const dual& a, const dual& b) { return a.value == b.value; }
   friend auto operator<=>(const dual& a, const dual& b) { return a.value <=> b.value; }
 
-  friend bool isfinite(const dual& a) { return std::isfinite(a.value) && a.slope.allFinite(); }
+  friend bool isfinite(const dual& a) { return std::isfinite(a.value) && all_finite(a.slope); }
   friend bool isnan(const dual& a) { return std::isnan(a.value) || a.slope.hasNaN(); }
   friend bool isinf(const dual& a) { return std::isinf(a.value); }
 
@@ -195,7 +195,7 @@ struct rigid {
     return {a.rotation * b.rotation, a * b.translation};
   }
   [[nodiscard]] rigid inverse() const {
-    const matrix<3, 3, S> back = rotation.transpose();
+    const matrix<3, 3, S> back = transposed(rotation);
     return {back, -(back * translation)};
   }
 };
@@ -211,9 +211,9 @@ template <>
 struct lift<lie_group<se3>> {
   template <class S>
   [[nodiscard]] static rigid<S> at(const lie_group<se3>&, const se3& p, const matrix<6, 1, S>& d) {
-    const matrix<3, 1, S> rho = d.template head<3>(), phi = d.template tail<3>();
+    const matrix<3, 1, S> rho = head<3>(d), phi = tail<3>(d);
     const matrix<3, 3, S> rotation = p.rotation_matrix().template cast<S>();
-    return {rotation * (matrix<3, 3, S>::Identity() + hat<S>(phi)),
+    return {rotation * (identity<matrix<3, 3, S>>() + hat<S>(phi)),
             p.translation().template cast<S>() + rotation * rho};
   }
 };
@@ -277,7 +277,7 @@ struct automatic_bundle_residual {
   }
   /// Empty where `f` says so, and where a value is not finite.
   [[nodiscard]] value_type residual(const view& v, const vec3& point, const observation& o) const {
-    const value_type r = f(detail::lifted<double>(manifold, v, matrix<M::dimension>::Zero()), point, o);
+    const value_type r = f(detail::lifted<double>(manifold, v, zeros<matrix<M::dimension>>()), point, o);
     return r && r->allFinite() ? r : std::nullopt;
   }
   /// The residual and its derivatives, which are unchanged where it is empty.
@@ -295,9 +295,9 @@ struct automatic_bundle_residual {
     matrix<dimension, n> all;
     for (int i = 0; i != dimension; ++i) {
       values[i] = (*r)[i].value;
-      all.row(i) = (*r)[i].slope.transpose();
+      all.row(i) = transposed((*r)[i].slope);
     }
-    if (!values.allFinite() || !all.allFinite()) return std::nullopt;
+    if (!all_finite(values) || !all_finite(all)) return std::nullopt;
     by_camera = all.template leftCols<M::dimension>();
     by_point = all.template rightCols<3>();
     return values;

@@ -197,7 +197,7 @@ class bundle_adjuster {
       for (std::size_t c = 0; c != cameras.size(); ++c) {
         if (equations_.structure().count[c] == 0) continue;
         const auto view = equations_.residual().prepare(cameras[c]);
-        if (view.rotation.allFinite() && view.translation.allFinite()) continue;
+        if (all_finite(view.rotation) && all_finite(view.translation)) continue;
         summary.status = bundle_status::bad_pose;
         summary.where = c;
         return false;

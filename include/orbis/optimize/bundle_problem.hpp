@@ -20,7 +20,7 @@ namespace orbis::optimize {
 struct bundle_observation {
   std::uint32_t pose = 0;
   std::uint32_t point = 0;
-  vec2 pixel = vec2::Zero();
+  vec2 pixel = zeros<vec2>();
   double right = std::numeric_limits<double>::quiet_NaN();  ///< as in `pose_observation`; NaN without depth
   double information = 1.0;                                 ///< 1 / sigma^2 of the pixel, 1 / pixel^2
 };

@@ -62,14 +62,14 @@ initialize_chordally(std::span<se3> vertices, const Edges& edges, const pose_gra
   // Rotations: R_to = R_from * R_from_to, row by row.
   detail::chordal_system rows{structure, 3};
   for_each_edge([&](std::size_t bundle, const auto& e) {
-    const mat3 turn = e.measurement.rotation_matrix().transpose();
-    const double weight = e.information.template bottomRightCorner<3, 3>().trace() / 3.0;
+    const mat3 turn = transposed(e.measurement.rotation_matrix());
+    const double weight = trace(e.information.template bottomRightCorner<3, 3>()) / 3.0;
     rows.add(
-        bundle, e.from, e.to, turn, weight * mat3::Identity(),
+        bundle, e.from, e.to, turn, weight * identity<mat3>(),
         [&](std::uint32_t v, std::size_t side) {
-          return vec3(vertices[v].rotation_matrix().row(static_cast<Eigen::Index>(side)).transpose());
+          return vec3(transposed(vertices[v].rotation_matrix().row(static_cast<Eigen::Index>(side))));
         },
-        [](std::size_t) { return vec3(vec3::Zero()); });
+        [](std::size_t) { return vec3(zeros<vec3>()); });
   });
   if (!rows.solve()) return {pose_graph_status::singular, rows.failed_vertex()};
   std::vector<so3> rotations(vertices.size());
@@ -79,7 +79,7 @@ initialize_chordally(std::span<se3> vertices, const Edges& edges, const pose_gra
     if (u == detail::pose_graph_structure::held) continue;
     mat3 relaxed;
     for (std::size_t side = 0; side != 3; ++side)
-      relaxed.row(static_cast<Eigen::Index>(side)) = rows.solution(side, u).transpose();
+      relaxed.row(static_cast<Eigen::Index>(side)) = transposed(rows.solution(side, u));
     const auto nearest = detail::nearest_rotation(relaxed);
     if (!nearest) return {pose_graph_status::singular, v};
     rotations[v] = *nearest;
@@ -91,9 +91,9 @@ initialize_chordally(std::span<se3> vertices, const Edges& edges, const pose_gra
     const mat3 r = rotations[e.from].rotation_matrix();
     const mat3 turned = r * e.measurement.rotation_matrix();
     // The information is about the translation in the measured frame of `to`.
-    const mat3 weight = turned * e.information.template topLeftCorner<3, 3>() * turned.transpose();
+    const mat3 weight = turned * block<3, 3>(e.information, 0, 0) * transposed(turned);
     positions.add(
-        bundle, e.from, e.to, mat3::Identity(), weight,
+        bundle, e.from, e.to, identity<mat3>(), weight,
         [&](std::uint32_t v, std::size_t) { return vertices[v].translation(); },
         [&](std::size_t) { return vec3(r * e.measurement.translation()); });
   });

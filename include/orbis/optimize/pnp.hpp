@@ -51,10 +51,10 @@ class p3p_solutions {
 [[nodiscard]] inline p3p_solutions p3p(const std::array<vec3, 3>& points_world, const std::array<vec3, 3>& rays) {
   p3p_solutions solutions;
   detail::for_each_p3p(points_world,
-                       {vec3(rays[0]).normalized(), vec3(rays[1]).normalized(), vec3(rays[2]).normalized()},
+                       {normalized(vec3(rays[0])), normalized(vec3(rays[1])), normalized(vec3(rays[2]))},
                        [&](const mat3& rotation, const vec3& translation) {
                          const se3 pose = se3(so3(rotation), translation).inverse();
-                         if (pose.translation().allFinite()) solutions.push_back(pose);
+                         if (all_finite(pose.translation())) solutions.push_back(pose);
                        });
   return solutions;
 }
@@ -120,7 +120,7 @@ template <camera::camera_model Camera>
   const double squared_threshold = options.threshold * options.threshold;
   const auto error_at = [&](const se3& T_camera_world, std::size_t i) {
     const auto pixel = camera.project(T_camera_world * points_world[i]);
-    return pixel ? (*pixel - pixels[i]).squaredNorm() : std::numeric_limits<double>::infinity();
+    return pixel ? squared_norm(*pixel - pixels[i]) : std::numeric_limits<double>::infinity();
   };
   std::vector<std::uint32_t> inliers;
   inliers.reserve(n);
@@ -149,7 +149,7 @@ template <camera::camera_model Camera>
     for (int k = 0; k != 3 && inliers.size() >= 3; ++k) {
       workspace.part.assign(inliers.begin(), inliers.end());
       const auto sum_up = [&](const detail::centred_pose& at, detail::pose_equations& e) {
-        e = {mat6::Zero(), vec6::Zero(), 0.0};
+        e = {zeros<mat6>(), zeros<vec6>(), 0.0};
         for (const std::uint32_t i : workspace.part) {
           const vec3 p = at.rotation * (points_world[i] - matches.centre) + at.translation;
           matrix<2, 3> j;
@@ -161,9 +161,9 @@ template <camera::camera_model Camera>
           matrix<2, 6> by_motion;
           by_motion << j, -(j * hat<double>(p));
           const vec2 r = *pixel - pixels[i];
-          e.h.noalias() += by_motion.transpose() * by_motion;
-          e.g.noalias() += by_motion.transpose() * r;
-          e.cost += r.squaredNorm();
+          e.h.noalias() += transposed(by_motion) * by_motion;
+          e.g.noalias() += transposed(by_motion) * r;
+          e.cost += squared_norm(r);
         }
       };
       const auto refined = detail::descend_pose(model.pose, 10, sum_up);

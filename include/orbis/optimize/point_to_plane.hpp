@@ -22,19 +22,19 @@ struct point_to_plane {
   using point = se3;
   static constexpr int dimension = 1;
 
-  vec3 measured = vec3::Zero();  ///< q, in the camera frame, metres
-  vec3 on_plane = vec3::Zero();  ///< p, in the world frame, metres
+  vec3 measured = zeros<vec3>();  ///< q, in the camera frame, metres
+  vec3 on_plane = zeros<vec3>();  ///< p, in the world frame, metres
   vec3 normal = vec3::UnitZ();   ///< n, in the world frame, of unit length
   double information = 1.0;      ///< 1 / sigma^2 along the normal, 1 / m^2
 
   [[nodiscard]] bool is_usable() const {
-    return measured.allFinite() && on_plane.allFinite() && std::abs(normal.squaredNorm() - 1.0) < 1e-6 &&
+    return all_finite(measured) && all_finite(on_plane) && std::abs(squared_norm(normal) - 1.0) < 1e-6 &&
            information > 0.0 && std::isfinite(information);
   }
   /// The residual; empty if it is not finite.
   [[nodiscard]] std::optional<matrix<1>> residual(const se3& T_world_camera) const {
     const vec3 off = T_world_camera * measured - on_plane;
-    const matrix<1> r(std::sqrt(information) * normal.dot(off));
+    const matrix<1> r(std::sqrt(information) * dot(normal, off));
     if (!std::isfinite(r[0])) return std::nullopt;
     return r;
   }
@@ -45,7 +45,7 @@ struct point_to_plane {
     if (!r) return r;
     vec3 turned = T_world_camera.rotation().inverse() * normal;
     turned *= std::sqrt(information);
-    const vec3 lever = measured.cross(turned);
+    const vec3 lever = cross(measured, turned);
     for (int k = 0; k != 3; ++k) {
       jacobian[k] = turned[k];
       jacobian[3 + k] = lever[k];
@@ -59,7 +59,7 @@ struct point_to_plane {
 struct plane_observation {
   std::uint32_t pose = 0;
   std::uint32_t point = 0;
-  vec3 measured = vec3::Zero();  ///< in the camera frame, metres
+  vec3 measured = zeros<vec3>();  ///< in the camera frame, metres
   vec3 normal = vec3::UnitZ();   ///< of the plane, in the world frame, of unit length
   double information = 1.0;      ///< 1 / sigma^2 along the normal, 1 / m^2
 };
@@ -80,14 +80,14 @@ struct point_to_plane_adjustment {
     return {T_world_camera.rotation_matrix(), T_world_camera.translation()};
   }
   [[nodiscard]] static bool is_usable(const observation& o) {
-    return o.information > 0.0 && std::isfinite(o.information) && o.measured.allFinite() &&
-           std::abs(o.normal.squaredNorm() - 1.0) < 1e-6;
+    return o.information > 0.0 && std::isfinite(o.information) && all_finite(o.measured) &&
+           std::abs(squared_norm(o.normal) - 1.0) < 1e-6;
   }
   [[nodiscard]] static std::optional<matrix<1>> residual(const view& v, const vec3& point, const observation& o) {
     vec3 off = v.rotation * o.measured;
     off += v.translation;
     off -= point;
-    const matrix<1> r(o.normal.dot(off));
+    const matrix<1> r(dot(o.normal, off));
     if (!std::isfinite(r[0])) return std::nullopt;
     return r;
   }
@@ -95,8 +95,8 @@ struct point_to_plane_adjustment {
                                                           matrix<1, 6>& by_camera, matrix<1, 3>& by_point) {
     const auto r = residual(v, point, o);
     if (!r) return r;
-    const vec3 turned = v.rotation.transpose() * o.normal;
-    const vec3 lever = o.measured.cross(turned);
+    const vec3 turned = transposed(v.rotation) * o.normal;
+    const vec3 lever = cross(o.measured, turned);
     for (int k = 0; k != 3; ++k) {
       by_camera[k] = turned[k];
       by_camera[3 + k] = lever[k];

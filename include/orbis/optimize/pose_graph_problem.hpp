@@ -23,7 +23,7 @@ struct pose_graph_edge {
   std::uint32_t from = 0;
   std::uint32_t to = 0;
   T measurement{};
-  matrix<Dimension, Dimension> information = matrix<Dimension, Dimension>::Identity();
+  matrix<Dimension, Dimension> information = identity<matrix<Dimension, Dimension>>();
 };
 
 /// A type with the members of `pose_graph_edge`, for vertices of type T.

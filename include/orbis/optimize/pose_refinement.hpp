@@ -100,9 +100,9 @@ class pose_refiner {
       for (int attempt = 0; attempt < 8 && !accepted; ++attempt, lambda *= accepted ? 1.0 : 10.0) {
         if (!(cholesky.factor(lambda) > 0.0)) continue;
         const vec6 step = cholesky.solve(-now.g);
-        if (!step.allFinite()) continue;
+        if (!all_finite(step)) continue;
         // What the step gains by the model is at least half of this.
-        if (-now.g.dot(step) <= negligible * now.cost || step.squaredNorm() < 1e-20)
+        if (-dot(now.g, step) <= negligible * now.cost || squared_norm(step) < 1e-20)
           return refinement_status::converged;
         const se3 there = se3::exp(step) * T_camera_world_;
         const pose_normal_equations then = linearize(there, loss);
@@ -158,7 +158,7 @@ class pose_refiner {
 
   template <class Loss>
   [[nodiscard]] pose_normal_equations linearize(const se3& pose, const Loss& loss) {
-    pose_normal_equations e{mat6::Zero(), vec6::Zero(), 0.0};
+    pose_normal_equations e{zeros<mat6>(), zeros<vec6>(), 0.0};
     const pose_at at = at_pose(pose);
     auto* const sum = sum_pose_function<Camera, Loss>();
     pieces_.for_each([&](const pose_lanes& lanes, std::size_t, std::size_t, std::size_t padded) {

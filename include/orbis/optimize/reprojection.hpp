@@ -19,8 +19,8 @@ namespace orbis::optimize {
 
 /// Observation of a known point in an image.
 struct pose_observation {
-  vec3 point = vec3::Zero();  ///< in the world, metres
-  vec2 pixel = vec2::Zero();
+  vec3 point = zeros<vec3>();  ///< in the world, metres
+  vec2 pixel = zeros<vec2>();
   /// The virtual right coordinate `u - bf / depth` of an RGB-D or stereo camera, pixels; NaN where the depth is
   /// unknown.
   double right = std::numeric_limits<double>::quiet_NaN();
@@ -30,8 +30,8 @@ struct pose_observation {
 
 /// A pose in the form that residuals use: from the world to the camera.
 struct camera_view {
-  mat3 rotation = mat3::Identity();
-  vec3 translation = vec3::Zero();
+  mat3 rotation = identity<mat3>();
+  vec3 translation = zeros<vec3>();
 };
 
 /// The reprojection error, projected minus observed, in pixels: two coordinates, and with depth a third, `u - bf / z`,
@@ -81,7 +81,7 @@ struct reprojection {
     return {inverse.rotation_matrix(), inverse.translation()};
   }
   [[nodiscard]] static bool is_usable(const observation& o) {
-    return o.information > 0.0 && std::isfinite(o.information) && o.pixel.allFinite() && !std::isinf(o.right);
+    return o.information > 0.0 && std::isfinite(o.information) && all_finite(o.pixel) && !std::isinf(o.right);
   }
   [[nodiscard]] std::optional<vec3> residual(const view& v, const vec3& point, const observation& o) const {
     return residual_in_camera(v, v.rotation * point + v.translation, o);
@@ -128,7 +128,7 @@ struct reprojection {
 
  private:
   [[nodiscard]] static pose_observation as_pose_observation(const observation& o) {
-    return {vec3::Zero(), o.pixel, o.right, o.information};
+    return {zeros<vec3>(), o.pixel, o.right, o.information};
   }
   [[nodiscard]] vec3 difference(const vec2& pixel, double z, const pose_observation& o) const {
     return {pixel.x() - o.pixel.x(), pixel.y() - o.pixel.y(), o.has_depth() ? right(pixel.x(), z) - o.right : 0.0};

@@ -68,7 +68,7 @@ struct posed_camera_manifold {
   [[nodiscard]] static point retract(const point& p, const tangent& d) {
     using parameters = camera::parameters_of<Camera>;
     constexpr int most_halvings = 60;
-    const vec6 move = d.template head<6>();
+    const vec6 move = head<6>(d);
     const auto from = parameters::get(p.camera);
     double share = 1.0;
     for (int k = 0; k != most_halvings; ++k, share *= 0.5) {

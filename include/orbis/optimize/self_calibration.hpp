@@ -35,7 +35,7 @@ struct self_calibrated {
   using parameter_matrix = matrix<camera::parameters_of<Camera>::count, camera::parameters_of<Camera>::count>;
   Camera camera;
   /// Of the parameters, in the order of `camera::parameters_of`; 0 for those that were not estimated.
-  parameter_matrix covariance = parameter_matrix::Zero();
+  parameter_matrix covariance = zeros<parameter_matrix>();
   std::size_t observations = 0;  ///< that took part
   std::size_t outliers = 0;      ///< of these, left out in the end
   double initial_rms = 0.0;      ///< of the observations that are no outliers, in standard deviations, before ...

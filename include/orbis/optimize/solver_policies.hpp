@@ -131,7 +131,7 @@ struct gauss_newton {
     const Eigen::VectorXd none;
     if (!problem.factor(none)) return step_outcome::singular;
     detail::newton_step(problem, w.step);
-    if (detail::is_rounding(-0.5 * problem.gradient().dot(w.step), problem.cost())) return step_outcome::stationary;
+    if (detail::is_rounding(-0.5 * dot(problem.gradient(), w.step), problem.cost())) return step_outcome::stationary;
     return std::isfinite(problem.try_step(w.step)) ? step_outcome::taken : step_outcome::exhausted;
   }
 };
@@ -155,7 +155,7 @@ struct levenberg_marquardt {
       w.damping = s.lambda * w.metric;
       if (problem.factor(w.damping)) {
         detail::newton_step(problem, w.step);
-        const double predicted = 0.5 * (w.step.cwiseProduct(w.damping) - problem.gradient()).dot(w.step);
+        const double predicted = 0.5 * dot(w.step.cwiseProduct(w.damping) - problem.gradient(), w.step);
         if (detail::is_rounding(predicted, problem.cost())) return detail::bottom_or_stuck(problem);
         const double gain = (problem.cost() - problem.try_step(w.step)) / predicted;
         if (gain > 0.0) {
@@ -190,7 +190,7 @@ struct dogleg {
     const Eigen::VectorXd& g = problem.gradient();
     w.cauchy = -g.cwiseQuotient(w.metric);
     const double along = problem.curvature(w.cauchy);
-    w.cauchy *= along > 0.0 ? -g.dot(w.cauchy) / along : 0.0;
+    w.cauchy *= along > 0.0 ? -dot(g, w.cauchy) / along : 0.0;
     const double newton = length(w.newton, w), cauchy = length(w.cauchy, w);
     if (s.radius < 0.0) s.radius = initial_radius > 0.0 ? initial_radius : newton;
 
@@ -206,7 +206,7 @@ struct dogleg {
         const double c = cauchy * cauchy - s.radius * s.radius;
         w.step = w.cauchy + (-c / (b + std::sqrt(b * b - a * c))) * w.scratch;
       }
-      const double predicted = -g.dot(w.step) - 0.5 * problem.curvature(w.step);
+      const double predicted = -dot(g, w.step) - 0.5 * problem.curvature(w.step);
       if (detail::is_rounding(predicted, problem.cost())) return detail::bottom_or_stuck(problem);
       const double gain = (problem.cost() - problem.try_step(w.step)) / predicted;
       const double far = length(w.step, w);
@@ -220,7 +220,7 @@ struct dogleg {
  private:
   [[nodiscard]] static double weighted_dot(const Eigen::VectorXd& a, const Eigen::VectorXd& weights,
                                            const Eigen::VectorXd& b) {
-    return a.cwiseProduct(weights).dot(b);
+    return dot(a.cwiseProduct(weights), b);
   }
   [[nodiscard]] static double square(const Eigen::VectorXd& x, const step_workspace& w) {
     return weighted_dot(x, w.metric, x);

@@ -50,7 +50,7 @@ struct triangulation_options {
 
 struct triangulation {
   triangulation_status status = triangulation_status::too_few_views;
-  vec3 point = vec3::Zero();  ///< in the world frame, metres; valid only if `ok()`
+  vec3 point = zeros<vec3>();  ///< in the world frame, metres; valid only if `ok()`
   double parallax = 0.0;  ///< the angle between the rays (for more than two views between two distant ones), radians
   double error = 0.0;     ///< root mean square distance from the rays at z = 1
   [[nodiscard]] bool ok() const noexcept { return status == triangulation_status::ok; }
@@ -85,21 +85,21 @@ requires std::same_as<std::ranges::range_value_t<Poses>, se3> && std::same_as<st
   triangulation out;
   const std::size_t n = rays.size();
   if (n < 2) return out;
-  const auto direction = [&](std::size_t i) { return vec3((T_world_camera[i].rotation() * rays[i]).normalized()); };
+  const auto direction = [&](std::size_t i) { return vec3(normalized(T_world_camera[i].rotation() * rays[i])); };
   // The point nearest to all rays, about their first camera for the sake of digits.
   const vec3 origin = T_world_camera[0].translation();
-  mat3 a = mat3::Zero();
-  vec3 b = vec3::Zero();
+  mat3 a = zeros<mat3>();
+  vec3 b = zeros<vec3>();
   double baseline = 0.0;
   out.status = triangulation_status::not_finite;
   for (std::size_t i = 0; i != n; ++i) {
-    if (!rays[i].allFinite() || rays[i].z() == 0.0 || !T_world_camera[i].to_matrix().allFinite()) return out;
+    if (!all_finite(rays[i]) || rays[i].z() == 0.0 || !all_finite(T_world_camera[i].to_matrix())) return out;
     const vec3 d = direction(i);
-    const mat3 across = mat3::Identity() - d * d.transpose();
+    const mat3 across = identity<mat3>() - d * transposed(d);
     a += across;
     const vec3 from_origin = T_world_camera[i].translation() - origin;
     b += across * from_origin;
-    baseline = std::max(baseline, from_origin.norm());
+    baseline = std::max(baseline, norm(from_origin));
   }
   // Two rays that are far apart: the one farthest from the first, and the one farthest from that.
   const auto farthest_from = [&](std::size_t k) {
@@ -119,30 +119,30 @@ requires std::same_as<std::ranges::range_value_t<Poses>, se3> && std::same_as<st
   detail::small_cholesky<3> factors;
   if (!factors.set(a) || !(factors.factor(0.0) > 0.0)) return out;
   vec3 point = factors.solve(b);
-  if (!point.allFinite()) return out;
+  if (!all_finite(point)) return out;
 
   const auto error_at = [&](const vec3& p, mat3* h, vec3* g) {
     double sum = 0.0;
     for (std::size_t i = 0; i != n; ++i) {
       const vec3 seen = T_world_camera[i].rotation().inverse() * vec3(p + (origin - T_world_camera[i].translation()));
       const double inverse_z = 1.0 / seen.z();
-      const vec2 xy = seen.template head<2>() * inverse_z;
+      const vec2 xy = head<2>(seen) * inverse_z;
       const vec2 r = xy - vec2(rays[i].x() / rays[i].z(), rays[i].y() / rays[i].z());
-      sum += r.squaredNorm();
+      sum += squared_norm(r);
       if (h == nullptr) continue;
       matrix<2, 3> j;
       j << inverse_z, 0.0, -xy.x() * inverse_z, 0.0, inverse_z, -xy.y() * inverse_z;
-      j = (j * T_world_camera[i].rotation_matrix().transpose()).eval();
-      *h += j.transpose() * j;
-      *g += j.transpose() * r;
+      j = (j * transposed(T_world_camera[i].rotation_matrix())).eval();
+      *h += transposed(j) * j;
+      *g += transposed(j) * r;
     }
     return sum;
   };
   double lambda = 1e-6;
   double error = error_at(point, nullptr, nullptr);
   for (int k = 0; k != 20; ++k) {
-    mat3 h = mat3::Zero();
-    vec3 g = vec3::Zero();
+    mat3 h = zeros<mat3>();
+    vec3 g = zeros<vec3>();
     error_at(point, &h, &g);
     if (!factors.set(h)) break;
     bool better = false;
@@ -161,7 +161,7 @@ requires std::same_as<std::ranges::range_value_t<Poses>, se3> && std::same_as<st
   }
   out.point = origin + point;
   out.error = std::sqrt(error / static_cast<double>(n));
-  if (!out.point.allFinite()) return out;
+  if (!all_finite(out.point)) return out;
   out.status = triangulation_status::ok;
   for (std::size_t i = 0; i != n; ++i) {
     const vec3 seen = T_world_camera[i].rotation().inverse() * vec3(point + (origin - T_world_camera[i].translation()));

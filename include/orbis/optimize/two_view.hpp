@@ -113,7 +113,7 @@ struct homography_estimate {
 /// `T_second_first`, in units of the distance of the plane from the first camera.
 struct plane_motion {
   so3 R_second_first;
-  vec3 translation = vec3::Zero();
+  vec3 translation = zeros<vec3>();
   vec3 normal = vec3::UnitZ();
 };
 

@@ -95,7 +95,7 @@ class basic_atlas {
     for (const auto& k : at(into).keyframes()) {
       if (link.from == no_id) break;
       const vec3 root = T_into_from * at(from).at(link.from).T_world_camera.translation();
-      const double squared = (k.T_world_camera.translation() - root).squaredNorm();
+      const double squared = squared_norm(k.T_world_camera.translation() - root);
       if (link.into != no_id && !(squared < least)) continue;
       least = squared;
       link.into = k.id;

@@ -46,7 +46,7 @@ template <camera::camera_model Camera>
 /// The focal length in the middle of the image, pixels per radian; 0 if the camera cannot project there.
 template <camera::camera_model Camera>
 [[nodiscard]] double focal_length(const Camera& camera) {
-  matrix<2, 3> j = matrix<2, 3>::Zero();
+  matrix<2, 3> j = zeros<matrix<2, 3>>();
   return camera.project(vec3(0.0, 0.0, 1.0), j) ? std::sqrt(std::abs(j(0, 0) * j(1, 1))) : 0.0;
 }
 

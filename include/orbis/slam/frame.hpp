@@ -59,7 +59,7 @@ struct basic_frame {
   /// With a rolling shutter the keypoints as they were read; the other members hold where they are at the frame's time.
   /// Empty with a global shutter.
   std::vector<keypoint_as_read> as_read;
-  vec6 twist = vec6::Zero();  ///< of the camera in its own frame while it was read, per second, translation first
+  vec6 twist = zeros<vec6>();  ///< of the camera in its own frame while it was read, per second, translation first
 
   /// The number of features.
   [[nodiscard]] std::size_t size() const noexcept { return features.size(); }

@@ -25,8 +25,8 @@ struct observation {
 template <feature_descriptor D>
 struct basic_landmark {
   landmark_id id;
-  vec3 position = vec3::Zero();           ///< in the world, metres
-  vec3 normal = vec3::Zero();             ///< mean direction towards the keyframes that observe it, unit length
+  vec3 position = zeros<vec3>();           ///< in the world, metres
+  vec3 normal = zeros<vec3>();             ///< mean direction towards the keyframes that observe it, unit length
   D descriptor{};                         ///< the most typical one of its observations
   double min_distance = 0.0;              ///< from which it appears at the coarsest pyramid level, metres
   double max_distance = 0.0;              ///< from which it appears at the finest pyramid level, metres

@@ -377,13 +377,13 @@ void basic_map<D>::fuse(landmark_id from, landmark_id into) {
 template <feature_descriptor D>
 void basic_map<D>::update_landmark(landmark_id id) {
   landmark_type& l = content_.landmarks[id];
-  vec3 sum = vec3::Zero();
+  vec3 sum = zeros<vec3>();
   for (const observation& o : l.observations)
-    sum += (at(o.keyframe).T_world_camera.translation() - l.position).normalized();
-  l.normal = sum.norm() > 0.0 ? vec3(sum.normalized()) : vec3::Zero();
+    sum += normalized(at(o.keyframe).T_world_camera.translation() - l.position);
+  l.normal = norm(sum) > 0.0 ? vec3(normalized(sum)) : zeros<vec3>();
   const observation& last = l.observations.back();
   const keyframe_type& k = at(last.keyframe);
-  const double distance = (k.T_world_camera.translation() - l.position).norm();
+  const double distance = norm(k.T_world_camera.translation() - l.position);
   l.max_distance = distance * std::pow(content_.scale_factor, k.features.keypoints[last.feature].octave);
   l.min_distance = l.max_distance / std::pow(content_.scale_factor, content_.levels - 1);
   if (std::exchange(l.has_current_descriptor, true)) return;

@@ -67,7 +67,7 @@ concept measures = requires(const S& s, const camera_rig<Camera>& rig, const Ext
 /// How the camera moves while a frame is taken.
 struct frame_motion {
   camera::shutter shutter{};  ///< the delay of the depth image is that of this frame
-  vec6 twist = vec6::Zero();  ///< of the camera in its own frame, per second, translation first
+  vec6 twist = zeros<vec6>();  ///< of the camera in its own frame, per second, translation first
 };
 
 /// Whether a sensor brings what it measures to the times of a rolling shutter's rows, once the motion is known:

@@ -50,7 +50,7 @@ struct track_result {
   std::optional<keyframe_id> keyframe;  ///< the keyframe that the frame became, if it did
   /// With a rolling shutter the motion of the camera, in its own frame, while the frame was taken: per second,
   /// translation first. Zero where it is not known. `camera::shutter_correction` takes it.
-  vec6 twist = vec6::Zero();
+  vec6 twist = zeros<vec6>();
   track_timings timings;
   [[nodiscard]] bool tracked() const noexcept { return T_world_camera.has_value(); }
 };
@@ -69,7 +69,7 @@ struct tracked_frame {
   map_keyframe reference;
   se3 T_reference_camera;  ///< in lengths over the reference's scale (`basic_map::scale_of`), which is 1 with depth
   std::vector<tracked_feature> features;
-  vec6 twist = vec6::Zero();  ///< see `track_result::twist`
+  vec6 twist = zeros<vec6>();  ///< see `track_result::twist`
 };
 
 /// Counts over all frames so far. Frames before the first map begins are neither tracked nor lost.

@@ -40,7 +40,7 @@ class map_check {
     return fail(errc::malformed, "landmark " + to_string(l), std::move(what));
   }
   [[nodiscard]] static bool is_finite(const se3& pose) {
-    return pose.translation().allFinite() && pose.rotation().unit_quaternion().coeffs().allFinite();
+    return all_finite(pose.translation()) && all_finite(pose.rotation().unit_quaternion().coeffs());
   }
 
   /// The first keyframe from an id on that is there.
@@ -58,7 +58,7 @@ class map_check {
       if (!is_finite(k.T_world_camera)) return wrong_keyframe(id, "has a pose that is not finite");
       if (!(k.scale > 0.0 && std::isfinite(k.scale))) return wrong_keyframe(id, "has a scale that is none");
       for (std::size_t i = 0; i != n; ++i) {
-        if (k.has_depth(i) && !k.rays[i].allFinite())
+        if (k.has_depth(i) && !all_finite(k.rays[i]))
           return wrong_keyframe(id, "has depth at keypoint " + std::to_string(i) + ", which has no ray");
         const landmark_id l = k.landmarks[i];
         const auto at = "keypoint " + std::to_string(i) + " shows landmark " + to_string(l);
@@ -80,7 +80,7 @@ class map_check {
       if (l.id != id) return wrong_landmark(id, "calls itself " + to_string(l.id));
       if (l.observations.empty()) return wrong_landmark(id, "is seen by no keyframe");
       if (l.created >= m_.keyframe_end()) return wrong_landmark(id, "comes from a keyframe that never was");
-      if (!l.position.allFinite() || !l.normal.allFinite()) return wrong_landmark(id, "is at no finite place");
+      if (!all_finite(l.position) || !all_finite(l.normal)) return wrong_landmark(id, "is at no finite place");
       for (std::size_t i = 0; i != l.observations.size(); ++i) {
         const observation& o = l.observations[i];
         const std::string by = "keyframe " + to_string(o.keyframe);

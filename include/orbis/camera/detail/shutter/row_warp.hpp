@@ -146,7 +146,7 @@ class row_warp {
   void assign(const Camera& camera, const row_time& time, const vec6& twist) {
     time_ = time;
     twist_ = twist;
-    const double shift = time.largest(camera.height()) * twist.head<3>().norm();
+    const double shift = time.largest(camera.height()) * norm(head<3>(twist));
     constexpr double nearest = 0.25, largest_angle = 0.1;  // metres; of the shift, seen from the point
     most_inverse_ = shift > largest_angle * nearest ? largest_angle / shift : 1.0 / nearest;
     for (std::size_t j = 0; j != down_; ++j)
@@ -232,7 +232,7 @@ class row_warp {
   std::vector<warp_parabolas> nodes_;  // NaN where there is no pixel
   std::vector<warp_parabolas> row_;    // of the present row
   row_time time_;
-  vec6 twist_ = vec6::Zero();
+  vec6 twist_ = zeros<vec6>();
   double most_inverse_ = 0.0;  // up to which the parabolas hold, 1 / metre
 };
 

@@ -62,7 +62,7 @@ template <camera::camera_model Camera>
       const auto ray = camera.unproject({-0.5 + camera.width() * (i / double{steps}),  //
                                          -0.5 + camera.height() * (j / double{steps})});
       if (!ray || !ray->allFinite()) return std::nullopt;
-      angle = std::max(angle, std::atan2(ray->template head<2>().norm(), ray->z()));
+      angle = std::max(angle, std::atan2(norm(ray->template head<2>()), ray->z()));
     }
   }
   return 1.02 * angle + 0.02;
@@ -79,7 +79,7 @@ class block_test {
 
   /// For the next questions. @pre the pose is finite
   void place(const se3& T_world_camera, const ray_view& view, const depth_windows& windows) {
-    rotation_ = T_world_camera.rotation_matrix().transpose();
+    rotation_ = transposed(T_world_camera.rotation_matrix());
     absolute_ = rotation_.cwiseAbs();
     origin_ = T_world_camera.translation();
     view_ = &view;
@@ -97,16 +97,16 @@ class block_test {
     }
     const vec3 c = rotation_ * (middle - origin_);
     // The kernels' rounding is some 1e-6 of the distance.
-    const double slack = 1e-5 * (c.norm() + half.norm());
+    const double slack = 1e-5 * (norm(c) + norm(half));
     if constexpr (std::same_as<Camera, camera::pinhole>) {
       const vec3 h = absolute_ * half + vec3::Constant(slack);
       return pinhole_says_nothing(c - h, c + h);
     } else {
       if (!angle_) return false;
-      const double radius = half.norm() + slack;
-      const double distance = c.norm();
+      const double radius = norm(half) + slack;
+      const double distance = norm(c);
       if (distance <= radius) return false;
-      return std::atan2(c.head<2>().norm(), c.z()) - std::asin(radius / distance) > *angle_;
+      return std::atan2(norm(head<2>(c)), c.z()) - std::asin(radius / distance) > *angle_;
     }
   }
 

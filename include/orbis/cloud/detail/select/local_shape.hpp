@@ -123,22 +123,22 @@ template <point_range Points>
   };
   const vec3 own = at(i);
   const auto count = static_cast<double>(neighbors.size());
-  vec3 mean = vec3::Zero();
-  mat3 squares = mat3::Zero();
+  vec3 mean = zeros<vec3>();
+  mat3 squares = zeros<mat3>();
   double distance = 0;
   for (const auto& n : neighbors) {
     const vec3 d = at(n.index) - own;
     mean += d;
-    squares += d * d.transpose();
+    squares += d * transposed(d);
     distance += static_cast<double>(n.distance);
   }
   mean /= count;
   distance /= count;
   if (!(distance > 0)) return 0;
   Eigen::SelfAdjointEigenSolver<mat3> solver;
-  solver.computeDirect((squares / count - mean * mean.transpose()) / (distance * distance));
+  solver.computeDirect((squares / count - mean * transposed(mean)) / (distance * distance));
   const double thickness = std::max(0.0, solver.eigenvalues()[0]);
-  const double height = solver.eigenvectors().col(0).dot(mean) / distance;
+  const double height = dot(solver.eigenvectors().col(0), mean) / distance;
   return std::sqrt(thickness + height * height);
 }
 

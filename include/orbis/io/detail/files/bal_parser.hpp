@@ -91,7 +91,7 @@ class bal_parser {
       return reject("there are not as many numbers in the file as " + std::to_string(cameras) + " cameras, " +
                     std::to_string(points) + " points and " + std::to_string(observations) + " observations have");
     problem.cameras.resize(static_cast<std::size_t>(cameras));
-    problem.points.resize(static_cast<std::size_t>(points), vec3::Zero());
+    problem.points.resize(static_cast<std::size_t>(points), zeros<vec3>());
     problem.observations.resize(static_cast<std::size_t>(observations));
     return true;
   }

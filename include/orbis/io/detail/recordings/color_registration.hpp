@@ -53,7 +53,7 @@ class color_registration {
         shrink_{static_cast<int>(std::lround(std::clamp(color.model.k().fx / depth.k().fx, 1.0, most(color.model))))} {}
 
   /// Whether `register_color` wants the depth image: the two cameras are more than a tenth of a millimetre apart.
-  [[nodiscard]] bool needs_depth() const noexcept { return color_.T_color_depth.translation().norm() > 1e-4; }
+  [[nodiscard]] bool needs_depth() const noexcept { return norm(color_.T_color_depth.translation()) > 1e-4; }
   [[nodiscard]] const camera::pinhole& color() const noexcept { return color_.model; }
 
   /// Black where the colour image has nothing. `depth_scale`: stored depth per metre. `depth` may be empty unless

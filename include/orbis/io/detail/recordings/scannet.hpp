@@ -110,7 +110,7 @@ namespace orbis::io::detail {
   if (!T_rig_depth) return fail(T_rig_depth.error());
   index.camera = camera::camera_settings{.model = *depth, .depth_scale = 1000.0, .fps = frames_per_second};
   const color_camera beside{*color, T_rig_color->inverse() * *T_rig_depth};
-  if (!(color->k() == depth->k()) || beside.T_color_depth.log().norm() > 1e-6) index.color = beside;
+  if (!(color->k() == depth->k()) || norm(beside.T_color_depth.log()) > 1e-6) index.color = beside;
   return index;
 }
 

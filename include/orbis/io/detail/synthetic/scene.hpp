@@ -83,7 +83,7 @@ class scene {
   /// Where the ray `origin + t direction` first meets a surface: `t`, empty if the ray starts outside
   /// of the room, or the direction is zero or not finite. What moves does not count.
   [[nodiscard]] std::optional<double> cast(const vec3& origin, const vec3& direction) const noexcept {
-    if (!origin.allFinite() || !direction.allFinite() || direction.isZero(0.0)) return std::nullopt;
+    if (!all_finite(origin) || !all_finite(direction) || direction.isZero(0.0)) return std::nullopt;
     double t = std::numeric_limits<double>::infinity();
     for (std::size_t i = 0; i != still_; ++i)
       t = std::min(t, intersect(solids_[i], solids_[i].to_local(to_triple(origin)),

@@ -40,10 +40,10 @@ class view_frustum {
   /// `reach` (metres along the optical axis). A change moves points by an affine function, whose norm is largest at a
   /// corner: of the nine corners, one is the camera's centre. Infinite if the reach or a pose is not finite. O(1).
   [[nodiscard]] double displacement(const se3& T_world_before, const se3& T_world_after, double reach) const {
-    double largest = (T_world_after.translation() - T_world_before.translation()).norm();
+    double largest = norm(T_world_after.translation() - T_world_before.translation());
     for (const vec3& c : corners_) {
       const vec3 far = reach * c;
-      const double moved = (T_world_after * far - T_world_before * far).norm();
+      const double moved = norm(T_world_after * far - T_world_before * far);
       if (!std::isfinite(moved)) return std::numeric_limits<double>::infinity();  // NaN would get lost in a maximum
       largest = std::max(largest, moved);
     }
@@ -60,13 +60,13 @@ class view_frustum {
   }
   /// `ray`: x and y at z = 1.
   void include(vec2 ray) {
-    if (!ray.allFinite()) return;
+    if (!all_finite(ray)) return;
     // Depth along the axis says little of rays that are almost at right angles to it: what is farther off than 80
     // degrees counts as if it were there.
     constexpr double widest = 5.67;
-    const double off_axis = ray.norm();
+    const double off_axis = norm(ray);
     if (off_axis > widest) ray *= widest / off_axis;
-    for (std::size_t i = 0; i != sides; ++i) reach_[i] = std::max(reach_[i], direction(i).dot(ray));
+    for (std::size_t i = 0; i != sides; ++i) reach_[i] = std::max(reach_[i], dot(direction(i), ray));
   }
   /// A corner is where two neighbouring sides meet.
   void close() {
@@ -75,7 +75,7 @@ class view_frustum {
       const double of_a = reach_[i], of_b = reach_[(i + 1) % sides];
       const double sine = a.x() * b.y() - a.y() * b.x();
       corners_[i] = {(of_a * b.y() - of_b * a.y()) / sine, (a.x() * of_b - b.x() * of_a) / sine, 1.0};
-      if (!corners_[i].allFinite()) corners_[i] = vec3::UnitZ();  // there is no ray
+      if (!all_finite(corners_[i])) corners_[i] = vec3::UnitZ();  // there is no ray
     }
   }
 

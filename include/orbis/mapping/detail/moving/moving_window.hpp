@@ -62,7 +62,7 @@ class moving_window {
   void push(const Policy& policy, Keyframe k) {
     const se3 T_world_camera = k.T_world_camera;
     kept_.push_back({{count_++, std::move(k)}, T_world_camera});
-    assert(T_world_camera.to_matrix().allFinite());
+    assert(all_finite(T_world_camera.to_matrix()));
     if (!judge_) {
       kept_.back().is_judged = true;
       return;

@@ -37,13 +37,13 @@ template <camera::depth_source Depth>
     for (int x0 = 0; x0 + size <= rays.width(); x0 += size) {
       samples.clear();
       std::size_t pixels = 0;
-      vec3 sum = vec3::Zero();
+      vec3 sum = zeros<vec3>();
       for (int y = y0; y < y0 + size; y += step)
         for (int x = x0; x < x0 + size; x += step) {
           ++pixels;
           const float z = depth(x, y);
           const vec2f& ray = rays(x, y);
-          if (!(z > 0.0F) || !std::isfinite(z) || !ray.allFinite()) continue;
+          if (!(z > 0.0F) || !std::isfinite(z) || !all_finite(ray)) continue;
           samples.push_back({ray.x(), ray.y(), 1.0 / static_cast<double>(z)});
           sum += vec3(ray.x(), ray.y(), samples.back().inverse);
         }
@@ -63,7 +63,7 @@ template <camera::depth_source Depth>
       const double z = 1.0 / mean.z();
       if (rest * z > 0.004 + 0.0025 * z) continue;  // relative to the depth
       const vec3 normal(a, b, mean.z() - a * mean.x() - b * mean.y());
-      out.normals.push_back(-normal.normalized());
+      out.normals.push_back(-normalized(normal));
     }
   return out;
 }

@@ -32,17 +32,17 @@ struct found_up {
 /// What normals say about the direction `up`.
 struct up_ballot {
   double along = 0.0, across = 0.0;  ///< weights
-  mat3 spread = mat3::Zero();        ///< of the normals across, minus that of the normals along it
+  mat3 spread = zeros<mat3>();        ///< of the normals across, minus that of the normals along it
 
   up_ballot(std::span<const vec3> normals, const vec3& up, double reach) {
     for (const vec3& n : normals) {
-      const double c = n.dot(up);
+      const double c = dot(n, up);
       if (const double w = fit_of(c, reach); w > 0) {
         across += w;
-        spread += w * n * n.transpose();
-      } else if (const double v = fit_of(n.cross(up).norm(), reach); v > 0) {
+        spread += w * n * transposed(n);
+      } else if (const double v = fit_of(norm(cross(n, up)), reach); v > 0) {
         along += v;
-        spread -= v * n * n.transpose();
+        spread -= v * n * transposed(n);
       }
     }
   }
@@ -56,7 +56,7 @@ struct up_ballot {
   const auto score = [&](const vec3& up, double reach) {
     double sum = 0.0;
     for (const vec3& n : normals) {
-      const double c = n.dot(up), along = c * c;
+      const double c = dot(n, up), along = c * c;
       // Floors and tables are seen from above. Half for walls, which fit many directions.
       sum += 0.5 * fit_of(c, reach) + (c > 0 ? 1.0 : 0.5) * fit_of(std::sqrt(std::max(0.0, 1.0 - along)), reach);
     }
@@ -85,7 +85,7 @@ struct up_ballot {
   for (const double reach : {10.0, 8.0, 6.0, 5.0, 5.0, 5.0, 5.0, 5.0}) {
     const symmetric_eigen<3> axes = eigen_of_symmetric<3>(up_ballot{normals, up, std::sin(reach * degree)}.spread);
     const vec3 refined = axes.vectors.col(0);
-    up = refined.dot(up) < 0 ? vec3(-refined) : refined;
+    up = dot(refined, up) < 0 ? vec3(-refined) : refined;
   }
   if (std::acos(std::clamp(-up.y(), -1.0, 1.0)) > max_tilt + wide) return std::nullopt;
   const up_ballot last{normals, up, std::sin(5.0 * degree)};

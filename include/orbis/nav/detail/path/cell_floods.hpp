@@ -74,7 +74,7 @@ class cell_floods {
     for (std::int64_t r = 0; std::pow(static_cast<double>(2 * r + 1), Space::dimensions) <= most; ++r) {
       for_each_in_shell(middle, r, [&](const key& k) {
         if (!is_free(k)) return;
-        open.emplace_back((space_.center(k) - goal_).squaredNorm(), k);
+        open.emplace_back(squared_norm(space_.center(k) - goal_), k);
         std::push_heap(open.begin(), open.end(), is_later);
       });
       const double seen = (static_cast<double>(r) + 0.499) * space_.resolution();
@@ -140,12 +140,12 @@ class cell_floods {
   }
   void push(const key& k, mark which) {
     auto& flood = which == mark::near ? near_ : far_;
-    flood.push_back({(space_.center(k) - (which == mark::near ? goal_ : start_)).squaredNorm(), k});
+    flood.push_back({squared_norm(space_.center(k) - (which == mark::near ? goal_ : start_)), k});
     std::push_heap(flood.begin(), flood.end());
   }
   /// A cell that hangs together with the start.
   void look_at(const key& k) {
-    if (const double away = (space_.center(k) - goal_).squaredNorm(); away < nearest_away_)
+    if (const double away = squared_norm(space_.center(k) - goal_); away < nearest_away_)
       nearest_away_ = away, nearest_ = k;
   }
   /// One more cell's neighbours. True if that is where the floods meet. @pre not empty

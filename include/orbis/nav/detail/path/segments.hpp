@@ -30,7 +30,7 @@ inline constexpr double blocked = -std::numeric_limits<double>::infinity();
 /// Steps from clearance to clearance, after J. C. Hart, "Sphere tracing", The Visual Computer 12, 1996.
 template <class Margin, class IsBlocked>
 [[nodiscard]] bool is_way_free(const vec3& a, const vec3& b, double cell, Margin&& margin, IsBlocked&& is_blocked) {
-  const double length = (b - a).norm();
+  const double length = norm(b - a);
   const auto at = [&](double t) -> vec3 { return t >= length ? b : vec3{a + (b - a) * (t / length)}; };
   const double least_step = 0.2 * cell;  // several of them cost less than an exact test
   // First what costs little: most ways that are not free are seen to be so by the margins alone.
@@ -59,7 +59,7 @@ template <class Margin, class IsBlocked>
 /// Whether the margins alone say that it is free, in steps of a tenth of a cell at least.
 template <class Margin>
 [[nodiscard]] bool is_way_surely_free(const vec3& a, const vec3& b, double cell, Margin&& margin) {
-  const double length = (b - a).norm();
+  const double length = norm(b - a);
   double t = 0.0;
   do {
     const double m = margin(t > 0.0 ? vec3{a + (b - a) * (t / length)} : a);
@@ -75,7 +75,7 @@ template <class Margin>
 /// J. Amanatides, A. Woo, "A fast voxel traversal algorithm for ray tracing", Eurographics, 1987.
 template <class Space>
 [[nodiscard]] double cost_of(const Space& space, const vec3& a, const vec3& b) {
-  const double length = (b - a).norm();
+  const double length = norm(b - a);
   const auto key = space.key(a), end = space.key(b);
   if (space.is_uniform() || length == 0.0 || !key || !end) return length;
   const vec3 middle = space.center(*key);

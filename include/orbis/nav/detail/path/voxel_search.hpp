@@ -216,7 +216,7 @@ class voxel_search {
   [[nodiscard]] double ahead(std::uint32_t number) const {
     if (number == to) return 0.0;
     const vec3 p = position(number);
-    if (any_angle_) return (p - goal_).norm();
+    if (any_angle_) return norm(p - goal_);
     if (exits_.empty()) return length_in_steps(p - goal_);
     double least = infinity;
     for (std::size_t i = 0; i != exits_.size(); ++i)
@@ -235,7 +235,7 @@ class voxel_search {
 
   void expand(std::uint32_t number) {
     const key k = key_of(number);
-    if (const double away = (space_.center(k) - goal_).squaredNorm(); away < nearest_away_)
+    if (const double away = squared_norm(space_.center(k) - goal_); away < nearest_away_)
       nearest_away_ = away, nearest_ = number;
     node& n = at(number);
     // As if the parent saw them; it costs its length at least.
@@ -250,7 +250,7 @@ class voxel_search {
     const trust known = any_angle_ && !is_uniform_ ? trust::bound : trust::exact;
     for (std::size_t i = 0; i != exits_.size(); ++i)
       if (exits_[i] == k)
-        offer(to, above, any_angle_ ? above_cost + (places_[1] - above_position).norm() : n.cost + exit_costs_[i],
+        offer(to, above, any_angle_ ? above_cost + norm(places_[1] - above_position) : n.cost + exit_costs_[i],
               known);
     for_each_direction([&](unsigned direction) {
       const key beside = neighbor(k, direction);
@@ -265,7 +265,7 @@ class voxel_search {
         return;
       }
       const double cost = any_angle_
-                              ? line_begin + (space_.center(beside) - above_position).norm() + half_cell(m, beside)
+                              ? line_begin + norm(space_.center(beside) - above_position) + half_cell(m, beside)
                               : n.cost + step_cost(n, k, m, beside, direction);
       if (cost < m.cost && is_free(m, beside)) offer(other, above, cost, known);
     });
@@ -345,7 +345,7 @@ class voxel_search {
   bool any_angle_, is_uniform_;
   double weight_;
   std::array<vec3, 2> places_{};  ///< start and goal
-  vec3 goal_ = vec3::Zero();
+  vec3 goal_ = zeros<vec3>();
   std::vector<key> doors_, exits_;
   std::vector<double> exit_costs_;
   std::array<node, 2> ends_{};

@@ -270,7 +270,7 @@ class direction_index {
 
   unsigned version_ = 0;
   float min_x_ = 0, max_x_ = 0, min_y_ = 0, max_y_ = 0, per_x_ = 1, per_y_ = 1;
-  vec2f focal_ = vec2f::Ones(), center_ = vec2f::Zero();
+  vec2f focal_ = filled<vec2f>(1), center_ = zeros<vec2f>();
   std::vector<std::array<std::int32_t, 2>> outer_;
   std::vector<entry> cells_, entries_;
   std::array<std::vector<tile>, 4> tiles_;

@@ -110,22 +110,22 @@ struct direction_windows {
  private:
   /// From the world to the cube. Rays all around: any will do.
   [[nodiscard]] static mat3 turn(const std::vector<vec3>& directions) {
-    vec3 mean = vec3::Zero();
-    mat3 moments = mat3::Zero();
+    vec3 mean = zeros<vec3>();
+    mat3 moments = zeros<mat3>();
     for (const vec3& d : directions) {
       mean += d;
-      moments += d * d.transpose();
+      moments += d * transposed(d);
     }
-    if (!(mean.norm() > 0.6 * static_cast<double>(directions.size()))) return mat3::Identity();
+    if (!(norm(mean) > 0.6 * static_cast<double>(directions.size()))) return identity<mat3>();
     mean.normalize();
     // Across the mean the rays spread furthest along a side of the image.
-    const mat3 across = mat3::Identity() - mean * mean.transpose();
+    const mat3 across = identity<mat3>() - mean * transposed(mean);
     const symmetric_eigen<3> spread = eigen_of_symmetric<3>(across * moments * across);
     vec3 x = across * spread.vectors.col(2);
-    if (x.squaredNorm() < 0.5) x = mean.unitOrthogonal();  // rays that go the same way up to rounding: any side will do
+    if (squared_norm(x) < 0.5) x = mean.unitOrthogonal();  // rays that go the same way up to rounding: any side will do
     x.normalize();
     mat3 turned;
-    turned << x.transpose(), mean.cross(x).transpose(), mean.transpose();
+    turned << transposed(x), transposed(cross(mean, x)), transposed(mean);
     return turned;
   }
 };

@@ -48,7 +48,7 @@ class pinhole_fit {
 
   [[nodiscard]] const camera::pinhole& camera() const noexcept { return camera_; }
   /// R_world_camera.
-  [[nodiscard]] so3 rotation() const { return so3{mat3(axes_.transpose())}; }
+  [[nodiscard]] so3 rotation() const { return so3{mat3(transposed(axes_))}; }
   /// How far the rays of the points may be from those of their pixels, at z = 1, along x and along y.
   [[nodiscard]] double error() const noexcept { return error_; }
   /// About which share of the image's pixels have points, the image being no larger than it must be.
@@ -105,32 +105,32 @@ class pinhole_fit {
   [[nodiscard]] static bool is_row(run& r) {
     const vec3 way = r.d.back() - r.d.front();
     for (std::size_t i = 1; i != run_length; ++i)
-      if (!((r.d[i] - r.d[i - 1]).dot(way) > 0.0)) return false;
-    r.normal = r.d.front().cross(r.d.back());
-    const double size = r.normal.norm();
+      if (!(dot(r.d[i] - r.d[i - 1], way) > 0.0)) return false;
+    r.normal = cross(r.d.front(), r.d.back());
+    const double size = norm(r.normal);
     if (!(size > 1e-5)) return false;
     r.normal /= size;
     for (const std::size_t i : {run_length / 3, run_length / 2})
-      if (!(std::fabs(r.normal.dot(r.d[i])) < straight)) return false;
+      if (!(std::fabs(dot(r.normal, r.d[i])) < straight)) return false;
     return true;
   }
   /// The x axis lies in the planes of all rows.
   bool find_x_axis() {
-    mat3 moments = mat3::Zero();
-    vec3 mean = vec3::Zero();
+    mat3 moments = zeros<mat3>();
+    vec3 mean = zeros<vec3>();
     for (const run& r : runs_) {
-      moments += r.normal * r.normal.transpose();
+      moments += r.normal * transposed(r.normal);
       mean += r.d.front();
     }
     const symmetric_eigen<3> e = eigen_of_symmetric<3>(moments);
     if (!(e.values[1] > 1e-5 * e.values[2] && e.values[0] < 1e-3 * e.values[1])) return false;
     vec3 x = e.vectors.col(0);
-    if (x.dot(runs_.front().d.back() - runs_.front().d.front()) < 0.0) x = -x;
-    vec3 z = mean - x * x.dot(mean);
-    if (!(z.norm() > 0.1 * static_cast<double>(runs_.size()))) return false;
+    if (dot(x, runs_.front().d.back() - runs_.front().d.front()) < 0.0) x = -x;
+    vec3 z = mean - x * dot(x, mean);
+    if (!(norm(z) > 0.1 * static_cast<double>(runs_.size()))) return false;
     z.normalize();
     axes_.row(0) = x;
-    axes_.row(1) = z.cross(x);
+    axes_.row(1) = cross(z, x);
     axes_.row(2) = z;
     return project();
   }
@@ -249,8 +249,8 @@ class pinhole_fit {
   }
   /// One step of Gauss and Newton for the rotation and the intrinsics.
   bool refine() {
-    matrix<7, 7> h = matrix<7, 7>::Zero();
-    matrix<7> g = matrix<7>::Zero();
+    matrix<7, 7> h = zeros<matrix<7, 7>>();
+    matrix<7> g = zeros<matrix<7>>();
     square_ = 0.0;
     for (const pixel& p : pixels_) {
       const vec3 c = axes_ * p.d;
@@ -261,14 +261,14 @@ class pinhole_fit {
       jv << fy_ * (1.0 + y * y), -fy_ * x * y, -fy_ * x, 0.0, y, 0.0, 1.0;
       const double ru = fx_ * x + cx_ - p.u, rv = fy_ * y + cy_ - p.v;
       square_ += ru * ru / (fx_ * fx_) + rv * rv / (fy_ * fy_);
-      h.noalias() += ju * ju.transpose() + jv * jv.transpose();
+      h.noalias() += ju * transposed(ju) + jv * transposed(jv);
       g += ju * ru + jv * rv;
     }
     // Where the view is so narrow that a turn and a shift are the same, any of them will do.
     for (int i = 0; i != 7; ++i) h(i, i) *= 1.0 + 1e-12;
     const matrix<7> step = h.ldlt().solve(-g);
-    if (!step.allFinite()) return false;
-    const vec3 turn = step.head<3>();
+    if (!all_finite(step)) return false;
+    const vec3 turn = head<3>(step);
     axes_ = so3::exp(-turn).rotation_matrix() * axes_;
     fx_ += step[3];
     fy_ += step[4];
@@ -283,7 +283,7 @@ class pinhole_fit {
       u0 = std::min(u0, p.u), u1 = std::max(u1, p.u);
       v0 = std::min(v0, p.v), v1 = std::max(v1, p.v);
     }
-    for (const run& r : runs_) z += axes_.row(2).dot(r.d.front()) * r.length;
+    for (const run& r : runs_) z += dot(axes_.row(2), r.d.front()) * r.length;
     mean_z_ = z / static_cast<double>(runs_.size());
     const double room_u = std::ceil(0.04 * (u1 - u0)) + 8.0, room_v = std::ceil(0.04 * (v1 - v0)) + 8.0;
     const double width = u1 - u0 + 1.0 + 2.0 * room_u, height = v1 - v0 + 1.0 + 2.0 * room_v;
@@ -326,7 +326,7 @@ class pinhole_fit {
   std::vector<run> runs_;
   std::vector<double> gaps_;
   std::vector<pixel> pixels_;
-  mat3 axes_ = mat3::Identity();  ///< R_camera_world
+  mat3 axes_ = identity<mat3>();  ///< R_camera_world
   double fx_ = 0.0, fy_ = 0.0, cx_ = 0.0, cy_ = 0.0;
   double square_ = 0.0;  ///< of what is left, at z = 1, all together
   double size_ = 0.0;    ///< of the image without room around it, pixels

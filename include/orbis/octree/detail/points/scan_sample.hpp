@@ -27,7 +27,7 @@ namespace orbis::octree::detail {
                                                          vec3& direction) {
   for (std::size_t axis = 0; axis != 3; ++axis)
     direction[static_cast<int>(axis)] = static_cast<double>(p[axis]) - static_cast<double>(origin[axis]);
-  const double length = direction.norm();
+  const double length = norm(direction);
   if (!(length > 0.0 && length < 1e30 && limit >= 0.0)) return std::nullopt;
   direction /= length;
   return std::min(length, limit);

@@ -108,17 +108,16 @@ class bundle_equations {
     double sum = 0.0;
     for (std::size_t u = 0; u != structure_.unknowns(); ++u) {
       const auto part = camera_part(x, u);
-      sum += part.dot(camera_hessian_[u] * part);
+      sum += dot(part, camera_hessian_[u] * part);
     }
     for (std::size_t p = 0; p != structure_.points(); ++p) {
-      const auto y = x.template segment<3>(point_row(p));
-      sum += y.dot(point_hessian(p) * y);
+      const auto y = segment<3>(x, point_row(p));
+      sum += dot(y, point_hessian(p) * y);
     }
     for (const bundle_structure::group& g : structure_.groups)
       for (std::uint32_t i = 0; i != g.points * g.cameras; ++i) {
         const std::size_t number = g.first_mixed + i;
-        sum += 2.0 * camera_part(x, structure_.mixed_unknown[number])
-                         .dot(mixed_block(number) * x.template segment<3>(point_row(g.first_point + i % g.points)));
+        sum += 2.0 * dot(camera_part(x, structure_.mixed_unknown[number]), mixed_block(number) * segment<3>(x, point_row(g.first_point + i % g.points)));
       }
     return sum;
   }
@@ -270,7 +269,7 @@ class bundle_equations {
   };
 
   [[nodiscard]] auto camera_part(const Eigen::VectorXd& x, std::size_t u) const {
-    return x.template segment<camera_size>(static_cast<Eigen::Index>(camera_size * u));
+    return segment<camera_size>(x, static_cast<Eigen::Index>(camera_size * u));
   }
   [[nodiscard]] Eigen::Index point_row(std::size_t p) const {
     return static_cast<Eigen::Index>(camera_size * structure_.unknowns() + 3 * p);
@@ -280,7 +279,7 @@ class bundle_equations {
     const std::size_t n = structure_.unknowns(), points = structure_.points();
     segment_cost_.assign(structure_.segments.size(), 0.0);
     segment_sums_.resize(segment_size * structure_.segments.size());
-    camera_hessian_.assign(n, camera_block::Zero());
+    camera_hessian_.assign(n, zeros<camera_block>());
     mixed_.resize(mixed_block_tile::size * structure_.mixed_tiles());
     normal_.resize(point_size * points);
     inverse_.resize(normal_.size());
@@ -459,7 +458,7 @@ class bundle_equations {
     }
     for (std::size_t u = 0; u != structure_.unknowns(); ++u) {
       camera_block& h = camera_hessian_[u];
-      h.template triangularView<Eigen::StrictlyLower>() = h.transpose();
+      h.template triangularView<Eigen::StrictlyLower>() = transposed(h);
       for (int i = 0; i != camera_size; ++i) diagonal_[static_cast<Eigen::Index>(camera_size * u) + i] = h(i, i);
     }
   }

@@ -94,8 +94,8 @@ template <bool Derive, class R, int Columns>
 [[gnu::noinline]] void evaluate_tile(const camera_work<R>& work, std::size_t first, const double* where,
                                      tile_of_residuals<R, Columns>& out) {
   constexpr int rows = R::dimension;
-  matrix<rows, Columns> by_camera = matrix<rows, Columns>::Zero();
-  matrix<rows, 3> by_point = matrix<rows, 3>::Zero();
+  matrix<rows, Columns> by_camera = zeros<matrix<rows, Columns>>();
+  matrix<rows, 3> by_point = zeros<matrix<rows, 3>>();
   for (std::size_t i = 0; i != 8; ++i) {
     out.valid[i] = 0.0;
     std::optional<matrix<rows>> r;

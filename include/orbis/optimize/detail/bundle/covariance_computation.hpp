@@ -128,7 +128,7 @@ class covariance_computation {
 
   /// The blocks of the inverse of the reduced system where the system itself has blocks.
   void invert_reduced() {
-    block_at_.assign(structure().slots.size(), camera_block::Zero());
+    block_at_.assign(structure().slots.size(), zeros<camera_block>());
     std::vector<std::vector<std::uint32_t>> slots_of(unknowns_);
     for (std::uint32_t s = 0; s != structure().slots.size(); ++s) slots_of[structure().slots[s].column].push_back(s);
     std::vector<double> x(camera_size * unknowns_);
@@ -157,7 +157,7 @@ class covariance_computation {
   }
 
   void write_cameras(Output& out, std::size_t cameras, const Options& options) const {
-    out.cameras.assign(cameras, camera_block::Zero());
+    out.cameras.assign(cameras, zeros<camera_block>());
     for (std::size_t c = 0; c != cameras; ++c) {
       const std::uint32_t u = structure().unknown[c];
       const bool is_fixed = !options.fixed_poses.empty() && options.fixed_poses[c] != 0;
@@ -167,7 +167,7 @@ class covariance_computation {
     for (std::size_t s = 0; s != structure().slots.size(); ++s) {
       const block_place& slot = structure().slots[s];
       if (slot.row != slot.column || is_blind(slot.row)) continue;
-      out.cameras[structure().camera[slot.row]] = 0.5 * (block_at_[s] + block_at_[s].transpose());
+      out.cameras[structure().camera[slot.row]] = 0.5 * (block_at_[s] + transposed(block_at_[s]));
     }
   }
 
@@ -187,19 +187,19 @@ class covariance_computation {
     const std::size_t p = g.first_point + i, source = structure().point_source[p];
     if (!moves_point(p)) return;
     const auto number = [&](std::size_t a) { return g.first_mixed + a * g.points + i; };
-    mat3 sum = mat3::Zero();
+    mat3 sum = zeros<mat3>();
     std::size_t pair = g.first_pair;
     for (std::size_t a = 0; a != g.cameras; ++a) {
       const auto own = equations_.mixed_block(number(a));
-      sum += own.transpose() * block_at_[structure().diagonal_slot[structure().mixed_unknown[number(a)]]] * own;
+      sum += transposed(own) * block_at_[structure().diagonal_slot[structure().mixed_unknown[number(a)]]] * own;
       for (std::size_t b = 0; b != a; ++b, ++pair) {
-        const mat3 share = own.transpose() * block_at_[structure().pair_slot[pair]] * equations_.mixed_block(number(b));
-        sum += share + share.transpose();
+        const mat3 share = transposed(own) * block_at_[structure().pair_slot[pair]] * equations_.mixed_block(number(b));
+        sum += share + transposed(share);
       }
     }
     const mat3 inverse = point_inverse(p);
     const mat3 block = inverse + inverse * sum * inverse;
-    out.points[source] = 0.5 * (block + block.transpose());
+    out.points[source] = 0.5 * (block + transposed(block));
   }
 
   [[nodiscard]] mat3 point_inverse(std::size_t p) const {

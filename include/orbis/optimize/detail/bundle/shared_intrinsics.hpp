@@ -156,15 +156,15 @@ class shared_intrinsics {
     double points = 0.0;
     for (std::size_t p = 0; p + 1 < begins_.size(); ++p) {
       if (!eliminate(p, 0.0)) continue;
-      Eigen::VectorXd move = rows.bottomRows(count()).transpose() * point_.theta_gradient;
+      Eigen::VectorXd move = transposed(rows.bottomRows(count())) * point_.theta_gradient;
       for (const seen& o : point_.by)
-        if (o.row != none) move += rows.template middleRows<6>(o.row).transpose() * o.gradient;
-      spread += move * move.transpose();
+        if (o.row != none) move += transposed(rows.template middleRows<6>(o.row)) * o.gradient;
+      spread += move * transposed(move);
       points += 1.0;
     }
     spread *= points / std::max(points - 1.0, 1.0);
-    out = basis_ * spread * basis_.transpose();
-    return out.allFinite();
+    out = basis_ * spread * transposed(basis_);
+    return all_finite(out);
   }
 
  private:
@@ -363,12 +363,12 @@ class shared_intrinsics {
       const mat3 by_point = by_q * view.rotation;
       const mat3 weighted = weight * by_point;
       const vec3 pull = weight * *r;
-      part.own += by_point.transpose() * weighted;
-      part.gradient += by_point.transpose() * pull;
-      part.theta_point += j.by_theta.transpose() * weighted;
-      part.theta_gradient += j.by_theta.transpose() * pull;
-      s.pose_point = j.by_pose.transpose() * weighted;
-      s.gradient = j.by_pose.transpose() * pull;
+      part.own += transposed(by_point) * weighted;
+      part.gradient += transposed(by_point) * pull;
+      part.theta_point += transposed(j.by_theta) * weighted;
+      part.theta_gradient += transposed(j.by_theta) * pull;
+      s.pose_point = transposed(j.by_pose) * weighted;
+      s.gradient = transposed(j.by_pose) * pull;
       rows_.push_back(j);
     }
     part.is_determined = rows_.size() >= 2;
@@ -378,11 +378,11 @@ class shared_intrinsics {
   void add_directly() {
     const Eigen::Index theta = pose_rows_;
     for (const jacobians& j : rows_) {
-      const matrix<6, 3> weighted = j.weight * j.by_pose.transpose();
-      direct_.block(theta, theta, count(), count()) += j.by_theta.transpose() * (j.weight * j.by_theta);
+      const matrix<6, 3> weighted = j.weight * transposed(j.by_pose);
+      direct_.block(theta, theta, count(), count()) += transposed(j.by_theta) * (j.weight * j.by_theta);
       if (j.row == none) continue;
       direct_.template block<6, 6>(j.row, j.row) += weighted * j.by_pose;
-      direct_.block(theta, j.row, count(), 6) += (weighted * j.by_theta).transpose();
+      direct_.block(theta, j.row, count(), 6) += transposed(weighted * j.by_theta);
     }
   }
 
@@ -394,7 +394,7 @@ class shared_intrinsics {
     own.diagonal() *= 1.0 + damping;
     const Eigen::LLT<mat3> factor(own);
     if (factor.info() != Eigen::Success || !(factor.rcond() > 1e-12)) return false;
-    point_.inverse = factor.solve(mat3::Identity());
+    point_.inverse = factor.solve(identity<mat3>());
     point_.gradient = part.gradient;
     const vec3 back = point_.inverse * part.gradient;
     point_.theta_point = part.theta_point;
@@ -412,13 +412,13 @@ class shared_intrinsics {
   void take_away() {
     const Eigen::Index theta = pose_rows_;
     const block_t3 theta_inverse = point_.theta_point * point_.inverse;
-    removed_.block(theta, theta, count(), count()) += theta_inverse * point_.theta_point.transpose();
+    removed_.block(theta, theta, count(), count()) += theta_inverse * transposed(point_.theta_point);
     for (const seen& a : point_.by) {
       if (a.row == none) continue;
       const block_63 a_inverse = a.pose_point * point_.inverse;
-      removed_.block(theta, a.row, count(), 6) += theta_inverse * a.pose_point.transpose();
+      removed_.block(theta, a.row, count(), 6) += theta_inverse * transposed(a.pose_point);
       for (const seen& b : point_.by)
-        if (b.row <= a.row) removed_.template block<6, 6>(a.row, b.row) += a_inverse * b.pose_point.transpose();
+        if (b.row <= a.row) removed_.template block<6, 6>(a.row, b.row) += a_inverse * transposed(b.pose_point);
     }
   }
 
@@ -457,20 +457,20 @@ class shared_intrinsics {
     const Eigen::LLT<Eigen::MatrixXd, Eigen::Lower> factor(reduced_);
     if (factor.info() != Eigen::Success) return std::nullopt;
     const Eigen::VectorXd d = -factor.solve(gradient_);
-    if (!d.allFinite()) return std::nullopt;
+    if (!all_finite(d)) return std::nullopt;
     const theta_vector theta = d.tail(count());
     const std::optional<Camera> camera = parameters::with(now_.camera, parameters::get(now_.camera) + basis_ * theta);
     if (!camera) return std::nullopt;
     estimate to{*camera, now_.poses, now_.points};
     for (std::size_t p = 0; p + 1 < begins_.size(); ++p) {
       if (!eliminate(p, damping)) continue;
-      vec3 pull = point_.gradient + point_.theta_point.transpose() * theta;
+      vec3 pull = point_.gradient + transposed(point_.theta_point) * theta;
       for (const seen& s : point_.by)
-        if (s.row != none) pull += s.pose_point.transpose() * d.template segment<6>(s.row);
+        if (s.row != none) pull += transposed(s.pose_point) * segment<6>(d, s.row);
       to.points[observations_[begins_[p]].point] -= point_.inverse * pull;
     }
     for (std::size_t i = 0; i != to.poses.size(); ++i)
-      if (row_of_[i] != none) to.poses[i] = to.poses[i] * se3::exp(vec6(d.template segment<6>(row_of_[i])));
+      if (row_of_[i] != none) to.poses[i] = to.poses[i] * se3::exp(vec6(segment<6>(d, row_of_[i])));
     return to;
   }
 

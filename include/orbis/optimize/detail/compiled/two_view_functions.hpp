@@ -55,7 +55,7 @@ ORBIS_COMPILED_ONCE result<relative_pose_estimate> essential_of_matches(const st
                     std::to_string(found->inliers.size()) + " inliers");
 
   mat3 essential = polished(estimator, *found, squared_threshold, options.min_inliers);
-  essential *= std::sqrt(2.0) / essential.norm();
+  essential *= std::sqrt(2.0) / norm(essential);
   relative_pose_estimate out;
   out.essential = essential;
   out.iterations = found->iterations;
@@ -117,9 +117,9 @@ ORBIS_COMPILED_ONCE result<homography_estimate> estimate_homography(std::span<co
   if (n < 4) return fail(errc::no_data, where, "fewer than four matches");
   std::vector<typename estimator_type::match> matches;
   matches.reserve(n);
-  vec2 first_centre = vec2::Zero(), second_centre = vec2::Zero();
+  vec2 first_centre = zeros<vec2>(), second_centre = zeros<vec2>();
   for (std::size_t i = 0; i != n; ++i) {
-    if (!first[i].allFinite() || !second[i].allFinite()) continue;
+    if (!all_finite(first[i]) || !all_finite(second[i])) continue;
     matches.push_back({first[i], second[i], static_cast<std::uint32_t>(i)});
     first_centre += first[i];
     second_centre += second[i];
@@ -132,14 +132,14 @@ ORBIS_COMPILED_ONCE result<homography_estimate> estimate_homography(std::span<co
   second_centre /= static_cast<double>(matches.size());
   // About the centres and in units of the size of the images, so that the entries of H have one magnitude.
   double size = 0.0;
-  mat2 first_spread = mat2::Zero(), second_spread = mat2::Zero();
+  mat2 first_spread = zeros<mat2>(), second_spread = zeros<mat2>();
   for (auto& m : matches) {
     m.first -= first_centre;
     m.second -= second_centre;
-    first_spread += m.first * m.first.transpose();
-    second_spread += m.second * m.second.transpose();
+    first_spread += m.first * transposed(m.first);
+    second_spread += m.second * transposed(m.second);
   }
-  size = std::sqrt((first_spread.trace() + second_spread.trace()) / static_cast<double>(2 * matches.size()));
+  size = std::sqrt((trace(first_spread) + trace(second_spread)) / static_cast<double>(2 * matches.size()));
   const double threshold = options.threshold / size;
   if (!(size > 0.0) || !std::isfinite(threshold))
     return fail(errc::degenerate, where, "the points all lie on one line or in one place");
@@ -155,7 +155,7 @@ ORBIS_COMPILED_ONCE result<homography_estimate> estimate_homography(std::span<co
   auto found = ransac(estimator, asked, ransac_policies{msac{}, uniform_sampling{}, sprt{}, iterated_refinement{}});
   if (!found) {
     const auto is_line = [](const mat2& spread) {
-      return !(spread.determinant() > 1e-12 * spread.trace() * spread.trace());
+      return !(determinant(spread) > 1e-12 * trace(spread) * trace(spread));
     };
     if (found.error().code == errc::degenerate && (is_line(first_spread) || is_line(second_spread)))
       return fail(errc::degenerate, where, "the points all lie on one line or in one place");
@@ -177,7 +177,7 @@ ORBIS_COMPILED_ONCE result<homography_estimate> estimate_homography(std::span<co
     return fail(std::move(enough.error()));
   out.rmse = size * std::sqrt(sum / static_cast<double>(out.inliers.size()));
   // Back from the centres.
-  mat3 to_centre = mat3::Identity(), from_centre = mat3::Identity();
+  mat3 to_centre = identity<mat3>(), from_centre = identity<mat3>();
   for (int i = 0; i != 2; ++i) {
     to_centre(i, i) = 1.0 / size;
     to_centre(i, 2) = -first_centre[i] / size;
@@ -185,40 +185,39 @@ ORBIS_COMPILED_ONCE result<homography_estimate> estimate_homography(std::span<co
     from_centre(i, 2) = second_centre[i];
   }
   const mat3 whole = from_centre * model.forward * to_centre;
-  out.H_second_first = whole / (whole(2, 2) != 0.0 ? whole(2, 2) : whole.norm());
+  out.H_second_first = whole / (whole(2, 2) != 0.0 ? whole(2, 2) : norm(whole));
   return out;
 }
 
 ORBIS_COMPILED_ONCE result<std::vector<plane_motion>> decompose_homography(const mat3& homography, const vec3& ray) {
   constexpr const char* where = "homography";
   mat3 h = homography;
-  if (!h.allFinite()) return fail(errc::degenerate, where, "is not finite");
-  const auto [squares, vectors] = eigen_of_symmetric<3>(mat3(h.transpose() * h));
+  if (!all_finite(h)) return fail(errc::degenerate, where, "is not finite");
+  const auto [squares, vectors] = eigen_of_symmetric<3>(mat3(transposed(h) * h));
   const double middle = std::sqrt(std::fmax(0.0, squares[1]));
   if (!(squares[0] > 1e-20 * squares[2])) return fail(errc::degenerate, where, "is singular");
   // R + t n^T has the middle singular value 1, and a positive determinant where camera and plane are on proper sides.
   h /= middle;
-  if (h.determinant() < 0.0) h = -h;
+  if (determinant(h) < 0.0) h = -h;
   const double s1 = squares[2] / (middle * middle), s3 = squares[0] / (middle * middle);
   std::vector<plane_motion> motions;
   if (!(s1 - s3 > 1e-12)) {
-    motions.push_back({so3(h), vec3::Zero(), vec3(ray).normalized()});
+    motions.push_back({so3(h), zeros<vec3>(), normalized(vec3(ray))});
     return motions;
   }
   mat3 v;
   for (int k = 0; k != 3; ++k) v.col(k) = vectors.col(2 - k);
-  if (v.determinant() < 0.0) v = -v;
+  if (determinant(v) < 0.0) v = -v;
   const double a = std::sqrt(std::fmax(0.0, 1.0 - s3) / (s1 - s3)), b = std::sqrt(std::fmax(0.0, s1 - 1.0) / (s1 - s3));
   for (const double sign : {1.0, -1.0}) {
-    const vec3 u = a * v.col(0) + sign * b * v.col(2);
-    mat3 before, after;
-    before << v.col(1), u, v.col(1).cross(u);
-    const vec3 hv = h * v.col(1), hu = h * u;
-    after << hv, hu, hv.cross(hu);
-    const so3 rotation(mat3(after * before.transpose()));
+    const vec3 middle = column_of(v, 1), u = a * column_of(v, 0) + sign * b * column_of(v, 2);
+    const mat3 before = columns(middle, u, cross(middle, u));
+    const vec3 hv = h * middle, hu = h * u;
+    const mat3 after = columns(hv, hu, cross(hv, hu));
+    const so3 rotation(mat3(after * transposed(before)));
     vec3 normal = before.col(2);
     vec3 translation = (h - rotation.rotation_matrix()) * normal;
-    if (normal.dot(ray) < 0.0) {
+    if (dot(normal, ray) < 0.0) {
       normal = -normal;
       translation = -translation;
     }

@@ -180,16 +180,16 @@ struct two_view_inliers {
     small_cholesky<5> factors;
     if (!factors.set(h) || !(factors.factor(0.0) > small_cholesky<5>::determined)) return;
     matrix<5, 5> covariance = factors.inverse() * square(sigma);
-    matrix<5, 5> jackknife = matrix<5, 5>::Zero();
+    matrix<5, 5> jackknife = zeros<matrix<5, 5>>();
     for (const epipolar_equations& part : of_part) {
       const auto [part_h, part_g] = part.by_motion(motion);
       if (!factors.set(matrix<5, 5>(h - part_h)) || !(factors.factor(0.0) > small_cholesky<5>::determined)) return;
       const matrix<5> step = factors.solve(matrix<5>(part_g - g));
-      jackknife += step * step.transpose();
+      jackknife += step * transposed(step);
     }
     jackknife *= static_cast<double>(parts - 1) / static_cast<double>(parts);
     const auto largest = [](const auto& c) {
-      return std::pair{eigen_of_symmetric<3>(mat3(c.template topLeftCorner<3, 3>())).values[2],
+      return std::pair{eigen_of_symmetric<3>(mat3(block<3, 3>(c, 0, 0))).values[2],
                        eigen_of_symmetric<2>(mat2(c.template bottomRightCorner<2, 2>())).values[1]};
     };
     const auto [turn, direction] = largest(covariance);
@@ -259,8 +259,8 @@ ORBIS_COMPILED_ONCE result<two_view_reconstruction> reconstruction_of_matches(co
     const vec3 ray = matches[plane->inliers.empty() ? 0 : plane->inliers.front()].first.direction();
     if (const auto motions = decompose_homography(forward, ray))
       for (const plane_motion& m : *motions)
-        if (m.translation.squaredNorm() > 0.0)
-          plane_motions.emplace_back(m.R_second_first, vec3(m.translation.normalized()));
+        if (squared_norm(m.translation) > 0.0)
+          plane_motions.emplace_back(m.R_second_first, vec3(normalized(m.translation)));
     for (const epipolar_motion& m : plane_motions) search.add(m);
     for (const std::uint32_t i : plane->inliers) of_plane.push_back(matches[i]);
   }

@@ -83,7 +83,7 @@ class alignment_estimator {
   }
 
   [[nodiscard]] double squared_error(const model& m, std::size_t i) const {
-    return pairs_[i].weight * (m.transform * pairs_[i].from - pairs_[i].to).squaredNorm();
+    return pairs_[i].weight * squared_norm(m.transform * pairs_[i].from - pairs_[i].to);
   }
   void squared_errors(const model& m, std::size_t first, std::span<float, consensus_block> out) const {
     using V = simd::vec<float, 4, simd::portable>;

@@ -30,24 +30,24 @@ struct epipolar_motion {
   epipolar_motion(const so3& r, const vec3& t) : rotation{r}, direction{t}, e{hat<double>(t) * r.rotation_matrix()} {}
   /// After a step: `exp(d.head<3>())` on the left of the rotation, the rest on the sphere of directions.
   [[nodiscard]] epipolar_motion moved(const matrix<5>& d) const {
-    return {so3::exp(vec3(d.template head<3>())) * rotation, step_on_sphere(direction, vec2(d.template tail<2>()))};
+    return {so3::exp(vec3(head<3>(d))) * rotation, step_on_sphere(direction, vec2(tail<2>(d)))};
   }
 };
 
 /// The squared Sampson distance of a match in units of its metric.
 [[nodiscard]] inline double squared_sampson(const mat3& e, const image_match& m) {
   const vec3 first = m.first.direction(), second = m.second.direction();
-  const vec3 line = e * first, other = e.transpose() * second;
-  const double c = second.dot(line);
+  const vec3 line = e * first, other = transposed(e) * second;
+  const double c = dot(second, line);
   return c * c /
-         (pixel_gradient(m.second)(line.x(), line.y()).squaredNorm() +
-          pixel_gradient(m.first)(other.x(), other.y()).squaredNorm());
+         (squared_norm(pixel_gradient(m.second)(line.x(), line.y())) +
+          squared_norm(pixel_gradient(m.first)(other.x(), other.y())));
 }
 
 /// Normal equations of Sampson distances for the nine entries of E, row by row; `cost` is the sum of squares.
 struct epipolar_equations {
-  matrix<9, 9> h = matrix<9, 9>::Zero();
-  matrix<9> g = matrix<9>::Zero();
+  matrix<9, 9> h = zeros<matrix<9, 9>>();
+  matrix<9> g = zeros<matrix<9>>();
   double cost = 0.0;
 
   /// Adds a match, to the lower triangle of `h`. `weight(squared distance)` is its weight.
@@ -55,15 +55,15 @@ struct epipolar_equations {
   void add(const mat3& e, const image_match& m, const Weight& weight) {
     const pixel_gradient by_first(m.first), by_second(m.second);
     const vec3 first = m.first.direction(), second = m.second.direction();
-    const vec3 line = e * first, other = e.transpose() * second;
-    const double c = second.dot(line);
+    const vec3 line = e * first, other = transposed(e) * second;
+    const double c = dot(second, line);
     const vec2 p = by_second(line.x(), line.y()), q = by_first(other.x(), other.y());
-    const double inverse = 1.0 / std::sqrt(p.squaredNorm() + q.squaredNorm());
+    const double inverse = 1.0 / std::sqrt(squared_norm(p) + squared_norm(q));
     const double r = c * inverse;
     const double w = weight(r * r);
     if (!(w > 0.0)) return;
     // r = c / s: dr = (dc - r ds) / s, and s ds = p dp + q dq.
-    vec3 dp = vec3::Zero(), dq = vec3::Zero();
+    vec3 dp = zeros<vec3>(), dq = zeros<vec3>();
     dp.template head<2>() = by_second.back(p) * (r * inverse);
     dq.template head<2>() = by_first.back(q) * (r * inverse);
     matrix<9> d;
@@ -103,7 +103,7 @@ struct epipolar_equations {
       for (int entry = 0; entry != 9; ++entry) by_step(entry, j) = d(entry / 3, entry % 3);
     }
     const matrix<9, 5> h_by_step = h.lazyProduct(by_step);
-    return {by_step.transpose().lazyProduct(h_by_step), by_step.transpose().lazyProduct(g)};
+    return {transposed(by_step).lazyProduct(h_by_step), transposed(by_step).lazyProduct(g)};
   }
 };
 

@@ -34,11 +34,11 @@ namespace orbis::optimize::detail {
 /// The four poses `T_second_first` (translations of length 1) that an essential matrix may stand for.
 [[nodiscard]] inline std::array<se3, 4> decompose_essential(const mat3& essential) {
   auto [u, values, v] = singular_values_of<3>(mat3(essential));
-  if (u.determinant() < 0.0) u.col(2) = -u.col(2).eval();
-  if (v.determinant() < 0.0) v.col(2) = -v.col(2).eval();
+  if (determinant(u) < 0.0) u.col(2) = -u.col(2).eval();
+  if (determinant(v) < 0.0) v.col(2) = -v.col(2).eval();
   mat3 quarter;
   quarter << 0, -1, 0, 1, 0, 0, 0, 0, 1;
-  const so3 one(mat3(u * quarter * v.transpose())), other(mat3(u * quarter.transpose() * v.transpose()));
+  const so3 one(mat3(u * quarter * transposed(v))), other(mat3(u * transposed(quarter) * transposed(v)));
   const vec3 t = u.col(2);
   return {se3(one, t), se3(one, -t), se3(other, t), se3(other, -t)};
 }
@@ -109,7 +109,7 @@ class essential_estimator {
       small_cholesky<5> factors;
       if (!factors.set(a) || !(factors.factor(0.0) > 0.0)) return std::nullopt;
       const matrix<5> d = -factors.solve(g);
-      if (!(d.norm() < 1.0)) return std::nullopt;
+      if (!(norm(d) < 1.0)) return std::nullopt;
       return m.moved(d);
     };
     const auto found = descend(
@@ -137,10 +137,10 @@ class essential_estimator {
 [[nodiscard]] inline std::size_t explained_by_rotation(const std::vector<image_match>& matches,
                                                        std::span<const std::uint32_t> inliers,
                                                        double squared_threshold) {
-  mat3 rotation = mat3::Identity();
+  mat3 rotation = identity<mat3>();
   std::size_t explained = 0;
   for (int round = 0; round != 10; ++round) {
-    mat3 products = mat3::Zero();
+    mat3 products = zeros<mat3>();
     explained = 0;
     for (const std::uint32_t i : inliers) {
       const metric_ray& to = matches[i].second;
@@ -150,7 +150,7 @@ class essential_estimator {
       const double squared = p.z() > 0.0 ? u * u + v * v : std::numeric_limits<double>::infinity();
       explained += squared < 2.0 * squared_threshold ? 1U : 0U;
       const double weight = round == 0 ? 1.0 : 1.0 / (1.0 + squared / squared_threshold);
-      products += weight * from.normalized() * to.direction().normalized().transpose();
+      products += weight * normalized(from) * transposed(normalized(to.direction()));
     }
     const auto turn = find_best_rotation(products, 1e-10);
     if (!turn) break;

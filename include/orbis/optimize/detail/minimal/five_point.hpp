@@ -119,8 +119,8 @@ inline void add_product(cubic& sum, const quadric& a, const linear& b) noexcept 
       for (std::size_t k = 1; k != 4; ++k) power[a][k] = power[a][k - 1] * p[static_cast<Eigen::Index>(a)];
     }
     double error = 0.0;
-    mat3 normal = mat3::Zero();
-    vec3 gradient = vec3::Zero();
+    mat3 normal = zeros<mat3>();
+    vec3 gradient = zeros<vec3>();
     std::array<std::array<double, 4>, 20> terms;  // with their derivatives by x, y and z
     for (std::size_t t = 0; t != 20; ++t) {
       const auto [i, j, k] = cubic_terms[t];
@@ -135,16 +135,16 @@ inline void add_product(cubic& sum, const quadric& a, const linear& b) noexcept 
       const vec3 by_p(sum[1], sum[2], sum[3]);
       error += sum[0] * sum[0];
       gradient += sum[0] * by_p;
-      normal += by_p * by_p.transpose();
+      normal += by_p * transposed(by_p);
     }
     if (step != 0 && !(error < last)) break;
     last = error;
     previous = p;
     p -= normal.inverse() * gradient;
-    if (error == 0.0 || !p.allFinite()) break;
+    if (error == 0.0 || !all_finite(p)) break;
   }
   p = previous;
-  const double size = 1.0 + p.squaredNorm();  // of the matrix
+  const double size = 1.0 + squared_norm(p);  // of the matrix
   return last <= 1e-16 * size * size * size;
 }
 
@@ -220,7 +220,7 @@ inline void add_product(cubic& sum, const quadric& a, const linear& b) noexcept 
   five_point_solutions solutions;
   std::array<std::array<double, 9>, 5> rows;
   for (std::size_t i = 0; i != 5; ++i) {
-    const vec3 a = vec3(first[i]).normalized(), b = vec3(second[i]).normalized();
+    const vec3 a = normalized(vec3(first[i])), b = normalized(vec3(second[i]));
     if (!std::isfinite(a.sum() + b.sum())) return solutions;
     for (int row = 0; row != 3; ++row)
       for (int column = 0; column != 3; ++column)
@@ -269,12 +269,12 @@ inline void add_product(cubic& sum, const quadric& a, const linear& b) noexcept 
         at(i, part) = (((p[4] * z + p[3]) * z + p[2]) * z + p[1]) * z + p[0];
       }
     for (int i = 0; i != 3; ++i) at.row(i).normalize();
-    vec3 null = at.row(0).cross(at.row(1)).transpose();
+    vec3 null = cross(row_of(at, 0), row_of(at, 1));
     for (const auto& [i, j] : {std::pair{0, 2}, std::pair{1, 2}})
-      if (const vec3 other = at.row(i).cross(at.row(j)).transpose(); other.squaredNorm() > null.squaredNorm())
+      if (const vec3 other = cross(row_of(at, i), row_of(at, j)); squared_norm(other) > squared_norm(null))
         null = other;
     vec3 p(null.x() / null.z(), null.y() / null.z(), z);
-    if (!p.allFinite()) continue;
+    if (!all_finite(p)) continue;
     if (!epipolar_cubics::polish(cubics, p)) continue;
     mat3 essential;
     for (std::size_t row = 0; row != 3; ++row)
@@ -283,8 +283,8 @@ inline void add_product(cubic& sum, const quadric& a, const linear& b) noexcept 
         essential(static_cast<Eigen::Index>(row), static_cast<Eigen::Index>(column)) =
             l[0] * p.x() + l[1] * p.y() + l[2] * p.z() + l[3];
       }
-    essential *= std::sqrt(2.0) / essential.norm();
-    if (essential.allFinite()) solutions.push_back(essential);
+    essential *= std::sqrt(2.0) / norm(essential);
+    if (all_finite(essential)) solutions.push_back(essential);
   }
   return solutions;
 }

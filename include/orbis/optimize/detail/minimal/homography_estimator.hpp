@@ -35,7 +35,7 @@ namespace orbis::optimize::detail {
     // The fourth point in terms of the other three, by the areas of triangles.
     weights[k] = vec3(cross(3, 1, 2), cross(0, 3, 2), cross(0, 1, 3));
     const double area = cross(0, 1, 2);
-    const double extent = (p[1] - p[0]).squaredNorm() + (p[2] - p[0]).squaredNorm() + (p[3] - p[0]).squaredNorm();
+    const double extent = squared_norm(p[1] - p[0]) + squared_norm(p[2] - p[0]) + squared_norm(p[3] - p[0]);
     if (!(std::min(std::fabs(area), weights[k].cwiseAbs().minCoeff()) > 1e-6 * extent)) return false;
     weights[k] /= area;
     for (int i = 0; i != 3; ++i) bases[k].col(i) = weights[k][i] * p[static_cast<std::size_t>(i)].homogeneous();
@@ -43,8 +43,8 @@ namespace orbis::optimize::detail {
   const vec3 ratio = weights[1].cwiseQuotient(weights[0]);
   if (!(ratio.minCoeff() > 0.0)) return false;  // some points would see the plane from behind
   out = bases[1] * bases[0].inverse();
-  out /= out.norm();
-  return out.allFinite();
+  out /= norm(out);
+  return all_finite(out);
 }
 
 class homography_estimator {
@@ -87,8 +87,8 @@ class homography_estimator {
   [[nodiscard]] double squared_error(const model& m, std::size_t i) const {
     const match& x = matches_[i];
     const vec3 p = m.forward * x.first.homogeneous(), q = m.backward * x.second.homogeneous();
-    return 0.5 * ((p.template head<2>() / p.z() - x.second).squaredNorm() +
-                  (q.template head<2>() / q.z() - x.first).squaredNorm());
+    return 0.5 * (squared_norm(head<2>(p) / p.z() - x.second) +
+                  squared_norm(head<2>(q) / q.z() - x.first));
   }
 
   void squared_errors(const model& m, std::size_t first, std::span<float, consensus_block> out) const {
@@ -123,8 +123,8 @@ class homography_estimator {
       small_cholesky<8> factors;
       if (!factors.set(e.h) || !(factors.factor(1e-9) > 0.0)) return std::nullopt;
       const matrix<8> entries = -factors.solve(e.g);
-      if (!entries.allFinite()) return std::nullopt;
-      mat3 d = mat3::Identity();
+      if (!all_finite(entries)) return std::nullopt;
+      mat3 d = identity<mat3>();
       for (int j = 0; j != 8; ++j) d(j / 3, j % 3) += entries[j];
       return made_of(d * m.forward);
     };
@@ -134,16 +134,16 @@ class homography_estimator {
 
  private:
   [[nodiscard]] static model made_of(const mat3& h) {
-    model m{h / h.norm(), h.inverse()};
-    m.backward /= m.backward.norm();
+    model m{h / norm(h), h.inverse()};
+    m.backward /= norm(m.backward);
     return m;
   }
 
   /// Normal equations for D in (I + D) H, whose last entry is 0; the lower triangle of `h`. `cost` is the sum of
   /// squares.
   struct equations {
-    matrix<8, 8> h = matrix<8, 8>::Zero();
-    matrix<8> g = matrix<8>::Zero();
+    matrix<8, 8> h = zeros<matrix<8, 8>>();
+    matrix<8> g = zeros<matrix<8>>();
     double cost = 0.0;
   };
   [[nodiscard]] equations sum_up(const model& m, std::span<const std::uint32_t> inliers) const {
@@ -153,7 +153,7 @@ class homography_estimator {
       const auto add = [&](const vec3& p, const vec2& seen, const mat3& by_d, const vec3& moved) {
         // p moves by by_d * D * moved.
         const double inverse = 1.0 / p.z();
-        const vec2 xy = p.template head<2>() * inverse;
+        const vec2 xy = head<2>(p) * inverse;
         matrix<2, 3> projection;
         projection << inverse, 0.0, -xy.x() * inverse, 0.0, inverse, -xy.y() * inverse;
         const matrix<2, 3> a = projection * by_d;
@@ -164,10 +164,10 @@ class homography_estimator {
           for (int l = k; l != 8; ++l) e.h(l, k) += j(0, l) * j(0, k) + j(1, l) * j(1, k);
           e.g[k] += j(0, k) * r[0] + j(1, k) * r[1];
         }
-        e.cost += r.squaredNorm();
+        e.cost += squared_norm(r);
       };
       const vec3 p = m.forward * x.first.homogeneous();
-      add(p, x.second, mat3::Identity(), p);
+      add(p, x.second, identity<mat3>(), p);
       add(m.backward * x.second.homogeneous(), x.first, -m.backward, x.second.homogeneous());
     }
     return e;

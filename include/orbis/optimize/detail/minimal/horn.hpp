@@ -37,7 +37,7 @@ struct best_rotation {
 /// points: the eigenvector of the largest eigenvalue of Horn's symmetric 4x4 matrix. That eigenvalue is the trace.
 /// Empty if two rotations are equally good: the points lie on a line or in one place.
 [[nodiscard]] inline std::optional<best_rotation> find_best_rotation(const mat3& m, double relative_gap) {
-  const double size = m.norm();
+  const double size = norm(m);
   if (!(size > 0.0) || !std::isfinite(size)) return std::nullopt;
   const mat3 s = m / size;
   // The lower triangle.
@@ -56,7 +56,7 @@ struct best_rotation {
   };
   const double c0 =
       laplace(minors(a00, a10, a20, a30, a10, a11, a21, a31), minors(a20, a21, a22, a32, a30, a31, a32, a33));
-  const double c1 = -8.0 * s.determinant();
+  const double c1 = -8.0 * determinant(s);
   // |s| = 1: the largest root lies between 1 and sqrt(3), and Newton's method from above decreases monotonically.
   double x = 1.7320508075688774, slope = 0.0;
   for (int i = 0; i != 50; ++i) {
@@ -84,7 +84,7 @@ struct best_rotation {
              -(a20 * high[4] - a21 * high[2] + a32 * high[0]), a20 * high[3] - a21 * high[1] + b22 * high[0])};
     std::size_t best = 0;
     for (std::size_t k = 1; k != 4; ++k)
-      if (columns[k].squaredNorm() > columns[best].squaredNorm()) best = k;
+      if (squared_norm(columns[k]) > squared_norm(columns[best])) best = k;
     const vec4& q = columns[best];
     return best_rotation{so3::quaternion(q[0], q[1], q[2], q[3]).normalized(), x * size};
   }
@@ -150,8 +150,8 @@ template <class Pair>
   const double spread = std::sqrt(moments.from_spread) * std::sqrt(moments.to_spread);
   // Points in one place, up to the rounding of their coordinates.
   const double rounding = 1e-30 * static_cast<double>(n);
-  if (!(moments.from_spread > rounding * moments.from_mean.squaredNorm()) ||
-      !(moments.to_spread > rounding * moments.to_mean.squaredNorm()) || !(moments.products.norm() > 1e-10 * spread))
+  if (!(moments.from_spread > rounding * squared_norm(moments.from_mean)) ||
+      !(moments.to_spread > rounding * squared_norm(moments.to_mean)) || !(norm(moments.products) > 1e-10 * spread))
     return std::nullopt;
   const auto turn = find_best_rotation(moments.products, 1e-10);
   if (!turn) return std::nullopt;

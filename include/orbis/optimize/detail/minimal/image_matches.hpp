@@ -34,7 +34,7 @@ struct metric_ray {
 /// False if the camera cannot unproject the pixel.
 template <camera::camera_model Camera>
 [[nodiscard]] bool read_ray(const Camera& camera, const vec2& pixel, metric_ray& out) {
-  if (!pixel.allFinite()) return false;
+  if (!all_finite(pixel)) return false;
   matrix<2, 3> j;
   const auto ray = camera.unproject(pixel);
   if (!ray || !camera.project(*ray, j)) return false;

@@ -61,7 +61,7 @@ struct conic {
 };
 
 /// The trace of the product.
-[[nodiscard]] inline double dot(const conic& a, const conic& b) noexcept {
+[[nodiscard]] inline double contraction(const conic& a, const conic& b) noexcept {
   return a.xx * b.xx + a.yy * b.yy + a.zz * b.zz + 2.0 * (a.xy * b.xy + a.xz * b.xz + a.yz * b.yz);
 }
 
@@ -117,7 +117,7 @@ inline void polish_depths(vec3& l, const std::array<double, 3>& cosines, const s
     const double a = l(0) - b12 * l(1), b = l(1) - b12 * l(0), c = l(0) - b13 * l(2);
     const double d = l(2) - b13 * l(0), e = l(1) - b23 * l(2), f = l(2) - b23 * l(1);
     const double determinant = -a * d * e - b * c * f;
-    const double length = l.squaredNorm();
+    const double length = squared_norm(l);
     if (determinant * determinant < 1e-28 * length * length * length)
       return;  // a double root: no more digits to be had
     const double scale = 0.5 / determinant;
@@ -133,20 +133,20 @@ template <class Solution>
 void for_each_p3p(const std::array<vec3, 3>& points_world, const std::array<vec3, 3>& rays, Solution&& solution) {
   const vec3 &y1 = rays[0], &y2 = rays[1], &y3 = rays[2];
   const vec3 d12 = points_world[0] - points_world[1], d13 = points_world[0] - points_world[2];
-  const vec3 normal = d12.cross(d13);
-  double a12 = d12.squaredNorm(), a13 = d13.squaredNorm();
-  double a23 = (points_world[1] - points_world[2]).squaredNorm();
+  const vec3 normal = cross(d12, d13);
+  double a12 = squared_norm(d12), a13 = squared_norm(d13);
+  double a23 = squared_norm(points_world[1] - points_world[2]);
   const double extent = a12 + a13 + a23;
-  const double area = normal.squaredNorm();
+  const double area = squared_norm(normal);
   if (!(area > 1e-18 * extent * extent) || !std::isfinite(area + y1.sum() + y2.sum() + y3.sum())) return;
   a12 /= extent, a13 /= extent, a23 /= extent;
-  const double b12 = y1.dot(y2), b13 = y1.dot(y3), b23 = y2.dot(y3);
+  const double b12 = dot(y1, y2), b13 = dot(y1, y3), b23 = dot(y2, y3);
 
   conic first{a23, -a23 * b12, 0.0, a23 - a12, a12 * b23, -a12};
   conic second{a23, 0.0, -a23 * b13, -a13, a13 * b23, a23 - a13};
   conic first_adjugate = first.adjugate(), second_adjugate = second.adjugate();
-  double c0 = dot(first_adjugate, first) / 3.0, c1 = dot(first_adjugate, second);
-  double c2 = dot(second_adjugate, first), c3 = dot(second_adjugate, second) / 3.0;
+  double c0 = contraction(first_adjugate, first) / 3.0, c1 = contraction(first_adjugate, second);
+  double c2 = contraction(second_adjugate, first), c3 = contraction(second_adjugate, second) / 3.0;
   if (std::fabs(c3) < std::fabs(c0)) {
     std::swap(first, second);
     std::swap(c0, c3);
@@ -162,7 +162,7 @@ void for_each_p3p(const std::array<vec3, 3>& points_world, const std::array<vec3
 
   // The inverse of [d12 d13 normal], by rows.
   const double inverse_area = 1.0 / area;
-  const vec3 i12 = d13.cross(normal) * inverse_area, i13 = normal.cross(d12) * inverse_area;
+  const vec3 i12 = cross(d13, normal) * inverse_area, i13 = cross(normal, d12) * inverse_area;
   const vec3 i_normal = normal * inverse_area;
   const vec3 centre = (points_world[0] + points_world[1] + points_world[2]) / 3.0;
   const double size = std::sqrt(extent);
@@ -183,7 +183,7 @@ void for_each_p3p(const std::array<vec3, 3>& points_world, const std::array<vec3
     }
     // (cu u + cv v) on the conic: qa cu^2 + 2 qb cu cv + qc cv^2 = 0, in homogeneous coordinates.
     const vec3 qu = q.times(u), qv = q.times(v);
-    const double qa = u.dot(qu), qb = u.dot(qv), qc = v.dot(qv);
+    const double qa = dot(u, qu), qb = dot(u, qv), qc = dot(v, qv);
     const double discriminant = qb * qb - qa * qc;
     // Slightly negative is a double root, up to rounding.
     if (!(discriminant > -1e-10 * (qa * qa + qb * qb + qc * qc))) continue;
@@ -192,7 +192,7 @@ void for_each_p3p(const std::array<vec3, 3>& points_world, const std::array<vec3
       vec3 l = k == 0 ? vec3(root * u + qa * v) : vec3(qc * u + root * v);  // cu / cv is root / qa, or qc / root
       if (l.sum() < 0.0) l = -l;
       if (!(l.minCoeff() > 0.0)) continue;
-      const double measured = 2.0 * (l.squaredNorm() - b12 * l(0) * l(1) - b13 * l(0) * l(2) - b23 * l(1) * l(2));
+      const double measured = 2.0 * (squared_norm(l) - b12 * l(0) * l(1) - b13 * l(0) * l(2) - b23 * l(1) * l(2));
       if (!(measured > 0.0)) continue;
       l *= 1.0 / std::sqrt(measured);
       polish_depths(l, {b12, b13, b23}, {a12, a13, a23});
@@ -200,7 +200,7 @@ void for_each_p3p(const std::array<vec3, 3>& points_world, const std::array<vec3
       l *= size;
       const vec3 p1 = l(0) * y1, p2 = l(1) * y2, p3 = l(2) * y3;
       const vec3 s12 = p1 - p2, s13 = p1 - p3;
-      const mat3 rotation = s12 * i12.transpose() + s13 * i13.transpose() + s12.cross(s13) * i_normal.transpose();
+      const mat3 rotation = s12 * transposed(i12) + s13 * transposed(i13) + cross(s12, s13) * transposed(i_normal);
       solution(rotation, vec3((p1 + p2 + p3) / 3.0 - rotation * centre));
     }
   }

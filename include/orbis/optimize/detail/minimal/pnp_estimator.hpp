@@ -51,7 +51,7 @@ template <class SumUp>
     small_cholesky<6> factors;
     if (!factors.set(damped) || !(factors.factor(0.0) > 0.0)) return std::nullopt;
     const vec6 d = -factors.solve(e.g);
-    if (!(d.tail<3>().norm() < 1.0)) return std::nullopt;  // also where it is not a number
+    if (!(norm(tail<3>(d)) < 1.0)) return std::nullopt;  // also where it is not a number
     const se3 motion = se3::exp(d);
     const so3 turned = motion.rotation() * s.rotation;
     return state{turned, {turned.rotation_matrix(), motion * s.pose.translation}};
@@ -156,11 +156,11 @@ class pnp_estimator {
 
 /// Why the points themselves determine no pose; empty if they do.
 [[nodiscard]] inline std::string pnp_degeneracy(const pnp_matches& matches) {
-  mat3 covariance = mat3::Zero();
-  for (const vec3& p : matches.points) covariance += p * p.transpose();
+  mat3 covariance = zeros<mat3>();
+  for (const vec3& p : matches.points) covariance += p * transposed(p);
   const vec3 spread = eigen_of_symmetric<3>(covariance).values;
   // Up to the rounding of the points about the origin of the world.
-  const double rounding = 1e-30 * matches.centre.squaredNorm() * static_cast<double>(matches.size());
+  const double rounding = 1e-30 * squared_norm(matches.centre) * static_cast<double>(matches.size());
   if (!(spread[2] > rounding)) return "the points all lie in one place";
   if (!(spread[1] > 1e-12 * spread[2])) return "the points all lie on one line";
   return {};

@@ -31,8 +31,8 @@ namespace orbis::optimize::detail {
 
 /// From the world, with the centre of the points as origin, to the camera.
 struct centred_pose {
-  mat3 rotation = mat3::Identity();
-  vec3 translation = vec3::Zero();
+  mat3 rotation = identity<mat3>();
+  vec3 translation = zeros<vec3>();
 };
 
 /// The coordinates of a match, each in a list of its own: X Y Z, x y, and the three entries of the derivative.
@@ -129,7 +129,7 @@ struct pnp_matches {
   std::vector<float> float_columns;     ///< likewise
   std::vector<double> gathered;         ///< those of one refinement
   std::size_t stride = 0;               ///< size, rounded up to whole blocks
-  vec3 centre = vec3::Zero();
+  vec3 centre = zeros<vec3>();
 
   [[nodiscard]] std::size_t size() const noexcept { return original.size(); }
 
@@ -140,7 +140,7 @@ struct pnp_matches {
     original.clear();
     original.reserve(points_world.size());
     for (std::size_t i = 0; i != points_world.size(); ++i)
-      if (points_world[i].allFinite() && pixels[i].allFinite()) original.push_back(static_cast<std::uint32_t>(i));
+      if (all_finite(points_world[i]) && all_finite(pixels[i])) original.push_back(static_cast<std::uint32_t>(i));
     random_bits random(mix64(seed));
     shuffle(original, random);
 

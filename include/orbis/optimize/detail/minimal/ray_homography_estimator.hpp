@@ -79,8 +79,8 @@ class ray_homography_estimator {
       small_cholesky<8> factors;
       if (!factors.set(e.h) || !(factors.factor(1e-9) > 0.0)) return std::nullopt;
       const matrix<8> entries = -factors.solve(e.g);
-      if (!entries.allFinite()) return std::nullopt;
-      mat3 d = mat3::Identity();
+      if (!all_finite(entries)) return std::nullopt;
+      mat3 d = identity<mat3>();
       for (int j = 0; j != 8; ++j) d(j / 3, j % 3) += entries[j];
       return made_of(d * m.forward, in_front);
     };
@@ -91,19 +91,19 @@ class ray_homography_estimator {
  private:
   /// Empty if singular.
   [[nodiscard]] static std::optional<model> made_of(const mat3& h, const vec3& in_front) {
-    model m{h / h.norm(), h.inverse()};
+    model m{h / norm(h), h.inverse()};
     if ((m.forward * in_front).z() < 0.0) m.forward = -m.forward;
-    m.backward /= m.backward.norm();
+    m.backward /= norm(m.backward);
     if ((m.backward * (m.forward * in_front)).z() < 0.0) m.backward = -m.backward;
-    if (!m.forward.allFinite() || !m.backward.allFinite()) return std::nullopt;
+    if (!all_finite(m.forward) || !all_finite(m.backward)) return std::nullopt;
     return m;
   }
 
   /// Normal equations for D in (I + D) H, whose last entry is 0; the lower triangle of `h`. `cost` is the sum of
   /// squares.
   struct equations {
-    matrix<8, 8> h = matrix<8, 8>::Zero();
-    matrix<8> g = matrix<8>::Zero();
+    matrix<8, 8> h = zeros<matrix<8, 8>>();
+    matrix<8> g = zeros<matrix<8>>();
     double cost = 0.0;
   };
   [[nodiscard]] equations sum_up(const model& m, std::span<const std::uint32_t> inliers) const {
@@ -113,7 +113,7 @@ class ray_homography_estimator {
       const auto add = [&](const vec3& p, const metric_ray& seen, const mat3& by_d, const vec3& moved) {
         // p moves by by_d * D * moved.
         const double inverse = 1.0 / p.z();
-        const vec2 xy = p.template head<2>() * inverse;
+        const vec2 xy = head<2>(p) * inverse;
         matrix<2, 3> projection;
         projection << inverse, 0.0, -xy.x() * inverse, 0.0, inverse, -xy.y() * inverse;
         mat2 metric;
@@ -126,10 +126,10 @@ class ray_homography_estimator {
           for (int l = k; l != 8; ++l) e.h(l, k) += j(0, l) * j(0, k) + j(1, l) * j(1, k);
           e.g[k] += j(0, k) * r[0] + j(1, k) * r[1];
         }
-        e.cost += r.squaredNorm();
+        e.cost += squared_norm(r);
       };
       const vec3 p = m.forward * x.first.direction();
-      add(p, x.second, mat3::Identity(), p);
+      add(p, x.second, identity<mat3>(), p);
       add(m.backward * x.second.direction(), x.first, -m.backward, x.second.direction());
     }
     return e;

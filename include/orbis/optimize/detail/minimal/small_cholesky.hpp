@@ -69,7 +69,7 @@ class small_cholesky {
   [[nodiscard]] square inverse() const {
     square out;
     for (int j = 0; j != N; ++j) {
-      vector unit = vector::Zero();
+      vector unit = zeros<vector>();
       unit[j] = 1.0;
       out.col(j) = solve(unit);
     }

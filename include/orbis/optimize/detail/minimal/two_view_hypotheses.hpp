@@ -46,12 +46,12 @@ inline constexpr double line_gate = 3.841, point_gate = 5.991;
 [[nodiscard]] inline so3 prevailing_rotation(const std::vector<image_match>& matches) {
   so3 rotation;
   for (const double scale : {100.0, 50.0, 25.0, 12.0, 6.0, 4.0, 3.0, 3.0, 3.0}) {
-    mat3 products = mat3::Zero();
+    mat3 products = zeros<mat3>();
     const mat3 r = rotation.rotation_matrix();
     for (const image_match& m : matches) {
       const vec3 from = m.first.direction();
       const double weight = falling_weight(squared_transfer(r * from, m.second) / (scale * scale));
-      if (weight > 0.0) products += weight * from.normalized() * m.second.direction().normalized().transpose();
+      if (weight > 0.0) products += weight * normalized(from) * transposed(normalized(m.second.direction()));
     }
     const auto turn = find_best_rotation(products, 1e-12);
     if (!turn) break;
@@ -76,8 +76,8 @@ inline constexpr double line_gate = 3.841, point_gate = 5.991;
     small_cholesky<5> factors;
     if (!factors.set(h) || !(factors.factor(1e-6) > 0.0)) return std::nullopt;
     matrix<5> step = -factors.solve(g);
-    if (!step.allFinite()) return std::nullopt;
-    const double size = step.norm();
+    if (!all_finite(step)) return std::nullopt;
+    const double size = norm(step);
     if (size > 0.3) step *= 0.3 / size;
     motion = motion.moved(step);
     if (size < 1e-5 && scale == scales.back()) break;
@@ -115,8 +115,8 @@ inline constexpr double least_disparity = 4.0;
   if (squared_disparity(rotation, m) < least_disparity * least_disparity) return agreement::far;
   // t + depth_1 u = depth_2 v.
   const vec3 u = rotation * m.first.direction(), v = m.second.direction();
-  const vec3 normal = u.cross(v);
-  return v.cross(t).dot(normal) > 0.0 && u.cross(t).dot(normal) > 0.0 ? agreement::near : agreement::behind;
+  const vec3 normal = cross(u, v);
+  return dot(cross(v, t), normal) > 0.0 && dot(cross(u, t), normal) > 0.0 ? agreement::near : agreement::behind;
 }
 
 /// What a match adds to the score of a motion.
@@ -156,10 +156,10 @@ struct model_scores {
     const vec3 first = m.first.direction(), second = m.second.direction();
     for (const double d : {squared_transfer(forward * first, m.second), squared_transfer(backward * second, m.first)})
       if (d < point_gate) sum.homography += point_gate - d;
-    const vec3 line = e * first, other = e.transpose() * second;
-    const double c = second.dot(line);
-    for (const double g : {pixel_gradient(m.second)(line.x(), line.y()).squaredNorm(),
-                           pixel_gradient(m.first)(other.x(), other.y()).squaredNorm()})
+    const vec3 line = e * first, other = transposed(e) * second;
+    const double c = dot(second, line);
+    for (const double g : {squared_norm(pixel_gradient(m.second)(line.x(), line.y())),
+                           squared_norm(pixel_gradient(m.first)(other.x(), other.y()))})
       if (const double d = c * c / g; d < line_gate) sum.essential += point_gate - d;
   }
   return sum;

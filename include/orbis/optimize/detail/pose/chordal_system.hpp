@@ -24,11 +24,11 @@ namespace orbis::optimize::detail {
 
 /// The rotation nearest to `m`, whose determinant may even be negative; empty where `m` has rank 1.
 [[nodiscard]] inline std::optional<so3> nearest_rotation(const mat3& m) {
-  if (!m.allFinite()) return std::nullopt;
+  if (!all_finite(m)) return std::nullopt;
   auto [u, values, v] = singular_values_of<3>(m);
   if (!(values[1] > 1e-9 * values[0])) return std::nullopt;
-  if (u.determinant() * v.determinant() < 0.0) u.col(2) = -u.col(2);
-  return so3{mat3(u * v.transpose())};
+  if (determinant(u) * determinant(v) < 0.0) u.col(2) = -u.col(2);
+  return so3{mat3(u * transposed(v))};
 }
 
 /// Linear least squares over the edges of a graph. The unknowns are one or more vectors of three numbers per vertex,
@@ -42,8 +42,8 @@ class chordal_system {
   }
 
   void clear() {
-    diagonal_.assign(structure_.vertices.size(), mat3::Zero());
-    off_diagonal_.assign(structure_.places.size(), mat3::Zero());
+    diagonal_.assign(structure_.vertices.size(), zeros<mat3>());
+    off_diagonal_.assign(structure_.places.size(), zeros<mat3>());
     for (std::vector<double>& x : right_) x.assign(3 * structure_.vertices.size(), 0.0);
   }
 
@@ -54,7 +54,7 @@ class chordal_system {
            Known&& known, Offset&& offset) {
     const std::uint32_t a = structure_.unknown[from], b = structure_.unknown[to];
     constexpr std::uint32_t held = pose_graph_structure::held;
-    const mat3 back = turn.transpose() * weight;
+    const mat3 back = transposed(turn) * weight;
     if (a != held) diagonal_[a] += back * turn;
     if (b != held) diagonal_[b] += weight;
     if (a != held && b != held)

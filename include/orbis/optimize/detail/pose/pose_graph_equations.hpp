@@ -67,11 +67,11 @@ class pose_graph_equations {
 
   /// `x^T H x`.
   [[nodiscard]] double curvature(const Eigen::VectorXd& x) const {
-    const auto part = [&](std::size_t u) { return x.template segment<size>(static_cast<Eigen::Index>(size * u)); };
+    const auto part = [&](std::size_t u) { return segment<size>(x, static_cast<Eigen::Index>(size * u)); };
     double sum = 0.0;
-    for (std::size_t u = 0; u != on_diagonal_.size(); ++u) sum += part(u).dot(on_diagonal_[u] * part(u));
+    for (std::size_t u = 0; u != on_diagonal_.size(); ++u) sum += dot(part(u), on_diagonal_[u] * part(u));
     for (std::size_t k = 0; k != off_diagonal_.size(); ++k)
-      sum += 2.0 * part(structure_.places[k].row).dot(off_diagonal_[k] * part(structure_.places[k].column));
+      sum += 2.0 * dot(part(structure_.places[k].row), off_diagonal_[k] * part(structure_.places[k].column));
     return sum;
   }
 
@@ -90,7 +90,7 @@ class pose_graph_equations {
     for_each_chunk(policy, structure_.vertices.size(), grain, [&](std::size_t begin, std::size_t end) {
       for (std::size_t u = begin; u != end; ++u) {
         const std::uint32_t v = structure_.vertices[u];
-        tried_[v] = estimate_[v] * T::exp(step.template segment<size>(static_cast<Eigen::Index>(size * u)));
+        tried_[v] = estimate_[v] * T::exp(segment<size>(step, static_cast<Eigen::Index>(size * u)));
       }
     });
     for_each_chunk(policy, structure_.bundles.size(), grain, [&](std::size_t begin, std::size_t end) {
@@ -99,7 +99,7 @@ class pose_graph_equations {
       for (std::uint32_t at = structure_.bundles[begin].begin; at != last.begin + last.count; ++at) {
         const auto& e = edges[structure_.bundled[at]];
         const matrix<Between::dimension> r = between_.residual(tried_[e.from], tried_[e.to], e.measurement);
-        cost += 0.5 * loss_.cost(r.dot(e.information * r));
+        cost += 0.5 * loss_.cost(dot(r, e.information * r));
       }
       chunk_costs_[begin / grain] = cost;
     });
@@ -130,7 +130,7 @@ class pose_graph_equations {
     sum.to.setZero();
     sum.gradient_from.setZero();
     sum.gradient_to.setZero();
-    block mixed = block::Zero();
+    block mixed = zeros<block>();
     double cost = 0.0;
     for (std::uint32_t at = bundle.begin; at != bundle.begin + bundle.count; ++at) {
       const auto& e = edges[structure_.bundled[at]];
@@ -138,7 +138,7 @@ class pose_graph_equations {
       const matrix<Between::dimension> r =
           between_.linearize(estimate_[e.from], estimate_[e.to], e.measurement, by_from, by_to);
       const matrix<Between::dimension> pull = e.information * r;
-      const double squared = r.dot(pull);
+      const double squared = dot(r, pull);
       const double weight = loss_.weight(squared);
       cost += 0.5 * loss_.cost(squared);
       const matrix<Between::dimension, Between::dimension> information = weight * e.information;
@@ -146,11 +146,11 @@ class pose_graph_equations {
       const auto& from = along ? by_from : by_to;
       const auto& to = along ? by_to : by_from;
       const matrix<Between::dimension, size> weighted = information * to;
-      sum.to.noalias() += to.transpose() * weighted;
-      mixed.noalias() += from.transpose() * weighted;
-      sum.from.noalias() += from.transpose() * (information * from);
-      sum.gradient_from.noalias() += weight * (from.transpose() * pull);
-      sum.gradient_to.noalias() += weight * (to.transpose() * pull);
+      sum.to.noalias() += transposed(to) * weighted;
+      mixed.noalias() += transposed(from) * weighted;
+      sum.from.noalias() += transposed(from) * (information * from);
+      sum.gradient_from.noalias() += weight * (transposed(from) * pull);
+      sum.gradient_to.noalias() += weight * (transposed(to) * pull);
     }
     if (b < off_diagonal_.size()) off_diagonal_[b] = mixed;
     return cost;
@@ -158,8 +158,8 @@ class pose_graph_equations {
 
   /// Adds up the contributions of the bundles at an unknown.
   void gather(std::size_t u) {
-    block hessian = block::Zero();
-    vector gradient = vector::Zero();
+    block hessian = zeros<block>();
+    vector gradient = zeros<vector>();
     for (std::uint32_t at = structure_.first_touch[u]; at != structure_.first_touch[u + 1]; ++at) {
       const contribution& s = contributions_[structure_.touches[at] / 2];
       const bool is_to = structure_.touches[at] % 2 != 0;

@@ -29,7 +29,7 @@ struct pose_graph_finding {
 /// accepted.
 template <int N>
 [[nodiscard]] bool is_information(const matrix<N, N>& given, bool semidefinite) {
-  if (!given.allFinite()) return false;
+  if (!all_finite(given)) return false;
   double inverse_scale[N];
   for (int i = 0; i != N; ++i) {
     if (!(semidefinite ? given(i, i) >= 0.0 : given(i, i) > 0.0)) return false;
@@ -38,7 +38,7 @@ template <int N>
   matrix<N, N> m;
   for (int i = 0; i != N; ++i)
     for (int j = 0; j != N; ++j) m(i, j) = given(i, j) * inverse_scale[i] * inverse_scale[j];
-  if (!((m - m.transpose()).cwiseAbs().maxCoeff() <= 1e-6)) return false;
+  if (!((m - transposed(m)).cwiseAbs().maxCoeff() <= 1e-6)) return false;
   if (semidefinite) m.diagonal().array() += 1e-9;
   for (int j = 0; j != N; ++j) {  // Cholesky factorisation
     for (int i = j; i != N; ++i)
@@ -56,9 +56,9 @@ template <int Dimension, class T, class Edges>
                                                   bool semidefinite_information) {
   const auto is_finite = [](const T& pose) {
     if constexpr (requires { pose.to_matrix(); })
-      return pose.to_matrix().allFinite();
+      return all_finite(pose.to_matrix());
     else
-      return pose.rotation_matrix().allFinite();
+      return all_finite(pose.rotation_matrix());
   };
   for (std::size_t i = 0; i != vertices.size(); ++i)
     if (!is_finite(vertices[i])) return {pose_graph_status::bad_vertex, i};

@@ -92,7 +92,7 @@ requires(B >= 1) class block_cholesky {
       const target& t = targets_[k];
       unaligned to{values_.data() + t.begin, Eigen::OuterStride<>{static_cast<Eigen::Index>(t.stride)}};
       if (t.transposed)
-        to = off_diagonal[k].transpose();
+        to = transposed(off_diagonal[k]);
       else
         to = off_diagonal[k];
     }

@@ -50,7 +50,7 @@ class block_conjugate_gradients {
       small_cholesky<B> factors;
       const bool is_definite = factors.set(diagonal[i]) && factors.factor(0.0) > 0.0;
       if (is_definite) inverse_[i] = factors.inverse();
-      if (!is_definite || !inverse_[i].allFinite()) {
+      if (!is_definite || !all_finite(inverse_[i])) {
         failed_block_ = static_cast<std::uint32_t>(i);
         return false;
       }
@@ -107,7 +107,7 @@ class block_conjugate_gradients {
     for (std::size_t k = 0; k != places_.size(); ++k) {
       const auto& [row, column] = places_[k];
       at(image_, row).noalias() += off_diagonal_[k] * at(direction_, column);
-      at(image_, column).noalias() += off_diagonal_[k].transpose() * at(direction_, row);
+      at(image_, column).noalias() += transposed(off_diagonal_[k]) * at(direction_, row);
     }
   }
 

@@ -35,7 +35,7 @@ class dense_block_solver {
       if (places_[k].row > places_[k].column)
         put(places_[k].row, places_[k].column, off_diagonal[k]);
       else
-        put(places_[k].column, places_[k].row, off_diagonal[k].transpose());
+        put(places_[k].column, places_[k].row, transposed(off_diagonal[k]));
     return cholesky_.factor();
   }
   [[nodiscard]] std::uint32_t failed_block() const { return static_cast<std::uint32_t>(cholesky_.failed_row() / C); }

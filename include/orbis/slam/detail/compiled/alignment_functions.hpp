@@ -25,8 +25,8 @@ ORBIS_COMPILED_ONCE depth_equations equations_of(std::span<const plane_observati
   e.term.at = at;
   if (planes.empty()) return e;
   constexpr double width = 2.0;  // of Huber's loss
-  std::array<mat6, 3> h{mat6::Zero(), mat6::Zero(), mat6::Zero()};
-  std::array<vec6, 2> g{vec6::Zero(), vec6::Zero()};
+  std::array<mat6, 3> h{zeros<mat6>(), zeros<mat6>(), zeros<mat6>()};
+  std::array<vec6, 2> g{zeros<vec6>(), zeros<vec6>()};
   double weights = 0.0, squares = 0.0, range = 0.0, cost = 0.0;
   for (const plane_observation_of_row& o : planes) {
     optimize::point_to_plane seen = o.seen;
@@ -34,14 +34,14 @@ ORBIS_COMPILED_ONCE depth_equations equations_of(std::span<const plane_observati
     matrix<1, 6> right;
     const auto r = seen.linearize(at.T_world_camera, right);
     if (!r) continue;
-    const vec6 j = -right.transpose();  // a step of the camera from the left is one of its pose from the right, back
+    const vec6 j = -transposed(right);  // a step of the camera from the left is one of its pose from the right, back
     const double error = std::abs((*r)[0]);
     const double weight = error <= width ? 1.0 : width / error;
     cost += 0.5 * weight * error * error;
     squares += error * error;
     weights += weight * seen.information;
-    range += seen.measured.norm();
-    const mat6 a = weight * j * j.transpose();
+    range += norm(seen.measured);
+    const mat6 a = weight * j * transposed(j);
     const vec6 b = weight * (*r)[0] * j;
     h[0] += a, h[1] -= o.time * a, h[2] += o.time * o.time * a;
     g[0] += b, g[1] -= o.time * b;
@@ -50,20 +50,20 @@ ORBIS_COMPILED_ONCE depth_equations equations_of(std::span<const plane_observati
   e.deviation = std::sqrt(squares / n);
 
   // Eigenvalues where a radian counts as the metres at the mean range.
-  vec6 scale = vec6::Ones();
+  vec6 scale = filled<vec6>(1);
   scale.tail<3>().setConstant(n / range);
   const mat6 scaled = scale.asDiagonal() * h[0] * scale.asDiagonal() / weights;
   const symmetric_eigen<6> directions = eigen_of_symmetric<6>(scaled);
   e.least = directions.values[0];
-  mat6 keep = mat6::Zero();
+  mat6 keep = zeros<mat6>();
   for (int i = 0; i != 6; ++i) {
     if (!(directions.values[i] > weakest)) continue;
     ++e.determined;
-    keep += directions.vectors.col(i) * directions.vectors.col(i).transpose();
+    keep += directions.vectors.col(i) * transposed(directions.vectors.col(i));
   }
   keep = scale.cwiseInverse().asDiagonal() * keep * scale.asDiagonal();  // of scaled gradients: of gradients
   const double share = std::min(1.0, points / n);
-  for (mat6& m : h) m = share * (keep * m * keep.transpose());
+  for (mat6& m : h) m = share * (keep * m * transposed(keep));
   for (vec6& v : g) v = share * (keep * v);
   e.term.h << h[0], h[1], h[1], h[2];
   e.term.g << g[0], g[1];
@@ -72,10 +72,10 @@ ORBIS_COMPILED_ONCE depth_equations equations_of(std::span<const plane_observati
 }
 
 ORBIS_COMPILED_ONCE vec6 step_of(const depth_equations& e) {
-  const symmetric_eigen<6> h = eigen_of_symmetric<6>(e.term.h.topLeftCorner<6, 6>());
-  vec6 step = vec6::Zero();
+  const symmetric_eigen<6> h = eigen_of_symmetric<6>(block<6, 6>(e.term.h, 0, 0));
+  vec6 step = zeros<vec6>();
   for (int i = 6 - e.determined; i < 6; ++i)  // the others are zero
-    if (h.values[i] > 0.0) step -= h.vectors.col(i) * (h.vectors.col(i).dot(e.term.g.head<6>()) / h.values[i]);
+    if (h.values[i] > 0.0) step -= h.vectors.col(i) * (dot(h.vectors.col(i), head<6>(e.term.g)) / h.values[i]);
   return step;
 }
 

@@ -33,9 +33,9 @@ template <class T>
   for (const essential_edge& e : edges) {
     const sim3& m = e.measurement;
     if constexpr (std::same_as<T, se3>)
-      measured.push_back({e.from, e.to, se3(m.rotation(), m.translation()), square(e.weight * square::Identity())});
+      measured.push_back({e.from, e.to, se3(m.rotation(), m.translation()), square(e.weight * identity<square>())});
     else
-      measured.push_back({e.from, e.to, m, square(e.weight * square::Identity())});
+      measured.push_back({e.from, e.to, m, square(e.weight * identity<square>())});
   }
   optimize::pose_graph_solver<T> solver;
   const auto summary =

@@ -18,7 +18,7 @@
 namespace orbis::slam::detail {
 
 ORBIS_COMPILED_ONCE vec6 twist_prior::expected(const se3& T_camera_world) const {
-  if (!T_world_before) return vec6::Zero();
+  if (!T_world_before) return zeros<vec6>();
   const vec6 mean = (T_camera_world * *T_world_before).inverse().log() / interval;
   return mean + trend * (mean - twist_before);
 }
@@ -41,7 +41,7 @@ ORBIS_COMPILED_ONCE void add_terms(moving_pose_equations& e, const std::array<ma
     const matrix<12, 1> slope = q.h * step;
     e.h += q.h;
     e.g += q.g + slope;
-    e.cost += q.cost + step.dot(q.g + 0.5 * slope);
+    e.cost += q.cost + dot(step, q.g + 0.5 * slope);
   }
   if (!terms.moves) return;
 
@@ -62,8 +62,8 @@ ORBIS_COMPILED_ONCE void add_terms(moving_pose_equations& e, const std::array<ma
 
 ORBIS_COMPILED_ONCE matrix<12, 1> newton_step(const moving_pose_equations& e, bool moves) {
   if (moves) return e.h.ldlt().solve(-e.g);
-  matrix<12, 1> step = matrix<12, 1>::Zero();
-  step.head<6>() = e.h.topLeftCorner<6, 6>().ldlt().solve(-e.g.head<6>());
+  matrix<12, 1> step = zeros<matrix<12, 1>>();
+  step.head<6>() = block<6, 6>(e.h, 0, 0).ldlt().solve(-head<6>(e.g));
   return step;
 }
 
@@ -81,14 +81,14 @@ ORBIS_COMPILED_ONCE void early_depth_twist::determine(const std::array<mat6, 3>&
   const mat6 tie =
       (mat6(deviations_of(prior).cwiseAbs2().asDiagonal()) + by_pose * by_pose * former_covariance_).inverse();
   const mat6 mixed = h[1] + by_pose * tie;
-  const mat6 of_twist = h[2] + tie - mixed.transpose() * (h[0] + by_pose * by_pose * tie).inverse() * mixed;
+  const mat6 of_twist = h[2] + tie - transposed(mixed) * (h[0] + by_pose * by_pose * tie).inverse() * mixed;
   // From one frame to the next a twist changes by twice the deviation of the prior, which is that from the mean.
   const mat6 change = mat6((2.0 * deviations_of(prior)).cwiseAbs2().asDiagonal());
   gain_ = change * (change + of_twist.inverse()).inverse();
 }
 
 ORBIS_COMPILED_ONCE vec6 early_depth_twist::between(const twist_prior& prior, const vec6& refined) const {
-  if (!prior.T_world_before || !gain_.allFinite()) return refined;
+  if (!prior.T_world_before || !all_finite(gain_)) return refined;
   return prior.twist_before + gain_ * (refined - prior.twist_before);
 }
 

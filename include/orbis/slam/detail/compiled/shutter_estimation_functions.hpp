@@ -21,9 +21,9 @@ namespace orbis::slam::detail {
 ORBIS_COMPILED_ONCE bool eliminate_pose(shutter_equations& e, vec2& gradient, const mat6& pose,
                                         const matrix<6, 2>& mixed, const vec6& pose_gradient) {
   const matrix<6, 2> solved = pose.inverse() * mixed;
-  if (!solved.allFinite()) return false;
-  e.h -= mixed.transpose() * solved;
-  gradient -= solved.transpose() * pose_gradient;
+  if (!all_finite(solved)) return false;
+  e.h -= transposed(mixed) * solved;
+  gradient -= transposed(solved) * pose_gradient;
   return true;
 }
 
@@ -37,21 +37,21 @@ ORBIS_COMPILED_ONCE shutter_estimate shutter_estimator::estimate(const camera::s
     sum.c += e.c;
   }
   if (!(sum.h(0, 0) > 0.0)) return result;
-  const bool tells_delay = sum.h(1, 1) > 0.0 && sum.h.determinant() > 0.0;
-  matrix<2, 2> inverse = matrix<2, 2>::Zero();
+  const bool tells_delay = sum.h(1, 1) > 0.0 && determinant(sum.h) > 0.0;
+  matrix<2, 2> inverse = zeros<matrix<2, 2>>();
   if (tells_delay)
     inverse = sum.h.inverse();
   else
     inverse(0, 0) = 1.0 / sum.h(0, 0);
   const vec2 found = inverse * sum.c;
-  matrix<2, 2> spread = matrix<2, 2>::Zero();
+  matrix<2, 2> spread = zeros<matrix<2, 2>>();
   for (const auto& [id, e] : blocks_) {
     const vec2 apart = e.h * found - e.c;
-    spread += apart * apart.transpose();
+    spread += apart * transposed(apart);
   }
   const auto n = static_cast<double>(blocks_.size());
   const matrix<2, 2> covariance = n / (n - 1.0) * (inverse * spread * inverse);
-  if (!found.allFinite() || !covariance.allFinite()) return result;
+  if (!all_finite(found) || !all_finite(covariance)) return result;
   result.read_out = found[0];
   result.read_out_deviation = std::sqrt(std::max(0.0, covariance(0, 0)));
   if (tells_delay) {

@@ -91,10 +91,10 @@ association associate(std::span<const surface_sample> samples, std::size_t strid
       if (cell == nullptr || !cell->is_there()) continue;
       visible = true;
       const vec3 normal = cell->normal();
-      const double off = normal.dot(there - cell->point());
+      const double off = dot(normal, there - cell->point());
       const double deviation = std::max(0.002, s.point.z() * s.point.z() / rig.model.bf * std::abs(s.normal.z()));
       if (std::abs(off) > std::max(gate.distance, gate.deviations * deviation) ||
-          normal.dot(place[k].rotation * s.normal) < gate.cosine)
+          dot(normal, place[k].rotation * s.normal) < gate.cosine)
         continue;
       ++count.consistent;
       to.push_back({{s.point, surfaces[k].T_world_camera * cell->point(), place[k].to_world * normal,

@@ -45,9 +45,9 @@ struct depth_alignment {
   starts[1].T_world_camera = last;
   std::size_t next = 2;
   for (const double sign : {-1.0, 1.0}) {
-    starts[next++].T_world_camera = last * se3(so3::exp(vec3(0.0, sign * angle, 0.0)), vec3::Zero());
-    starts[next++].T_world_camera = last * se3(so3::exp(vec3(0.0, 2.0 * sign * angle, 0.0)), vec3::Zero());
-    starts[next++].T_world_camera = last * se3(so3::exp(vec3(sign * angle, 0.0, 0.0)), vec3::Zero());
+    starts[next++].T_world_camera = last * se3(so3::exp(vec3(0.0, sign * angle, 0.0)), zeros<vec3>());
+    starts[next++].T_world_camera = last * se3(so3::exp(vec3(0.0, 2.0 * sign * angle, 0.0)), zeros<vec3>());
+    starts[next++].T_world_camera = last * se3(so3::exp(vec3(sign * angle, 0.0, 0.0)), zeros<vec3>());
   }
   return starts;
 }
@@ -170,22 +170,22 @@ class depth_tracker {
       a.determined = e.determined;
       a.least = e.least;
       const vec6 step = step_of(e);
-      if (!step.allFinite()) break;
+      if (!all_finite(step)) break;
       a.at.T_world_camera = a.at.T_world_camera * se3::exp(-step);
       distance = std::max(0.05, 0.8 * distance);
-      if (step.squaredNorm() < 1e-8 && distance <= 0.05) break;
+      if (squared_norm(step) < 1e-8 && distance <= 0.05) break;
     }
     return a;
   }
 
   void move_to_frame_time(const vec6& twist, const camera::shutter& shutter) {
-    const vec3 turning = twist.tail<3>();
+    const vec3 turning = tail<3>(twist);
     for (std::size_t i = 0; i != now_.cells.size(); ++i) {
       surface_cell& c = now_.cells[i];
       if (!c.is_there()) continue;
       const double t = shutter.depth_time(now_.pixel_row(i), rig_.camera().height());
       const vec3 p = moved_by(twist, t, c.point());
-      const vec3 n = (c.normal() + t * turning.cross(c.normal())).normalized();
+      const vec3 n = normalized(c.normal() + t * cross(turning, c.normal()));
       c.measured *= static_cast<float>(p.z()) / c.z;
       c.x = static_cast<float>(p.x()), c.y = static_cast<float>(p.y()), c.z = static_cast<float>(p.z());
       c.nx = static_cast<float>(n.x()), c.ny = static_cast<float>(n.y()), c.nz = static_cast<float>(n.z());

@@ -59,7 +59,7 @@ class surface_memory {
   /// How far the view has changed between two poses: metres, where a radian counts as two of them.
   [[nodiscard]] static double distance(const se3& a, const se3& b) {
     const se3 between = a.inverse() * b;
-    return between.translation().norm() + 2.0 * between.rotation().angle();
+    return norm(between.translation()) + 2.0 * between.rotation().angle();
   }
 
  private:

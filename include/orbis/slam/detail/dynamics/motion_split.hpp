@@ -123,7 +123,7 @@ class motion_splitter {
   [[nodiscard]] double score(const se3& T_world_camera) const {
     const se3 T_camera_world = T_world_camera.inverse();
     double sum = 0.0, weight = 0.0;
-    vec3 mean = vec3::Zero(), squares = vec3::Zero();
+    vec3 mean = zeros<vec3>(), squares = zeros<vec3>();
     for (std::size_t i = 0; i != observations_.size(); ++i) {
       const double left = 1.0 - error(T_camera_world, i) / error_limit(observations_[i].has_depth());
       if (!(left > 0.0)) continue;
@@ -241,7 +241,7 @@ class motion_splitter {
     };
     std::array<neighbour, 6> nearest;
     for (std::size_t i = 0; i != observations_.size(); ++i) {
-      neighbour n{(observations_[i].point - observations_[which].point).squaredNorm(), outliers[i] != 0};
+      neighbour n{squared_norm(observations_[i].point - observations_[which].point), outliers[i] != 0};
       if (i == which || !(n.distance < nearest.back().distance)) continue;
       nearest.back() = n;
       for (std::size_t k = nearest.size() - 1; k != 0 && nearest[k].distance < nearest[k - 1].distance; --k)

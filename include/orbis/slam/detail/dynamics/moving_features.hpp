@@ -168,13 +168,13 @@ class moving_features {
       if (is_left_out_[i] != 0 || agrees_[i] != 0) continue;
       const features::keypoint& k = f.features.keypoints[i];
       const bool deep = f.has_depth(i);
-      const vec3 p = deep ? f.point_camera(i) : vec3::Zero();
+      const vec3 p = deep ? f.point_camera(i) : zeros<vec3>();
       constexpr double pixels = 25.0;
       double nearest = deep ? options_.moving.reach * options_.moving.reach : pixels * pixels;
       const track* by = nullptr;
       for (const labelled& l : known) {
         const auto dx = static_cast<double>(l.x - k.x), dy = static_cast<double>(l.y - k.y);
-        const double d = deep ? (l.point - p).squaredNorm() : dx * dx + dy * dy;
+        const double d = deep ? squared_norm(l.point - p) : dx * dx + dy * dy;
         if (d < nearest) nearest = d, by = l.moves;
       }
       if (by == nullptr) continue;
@@ -235,7 +235,7 @@ class moving_features {
     features::keypoint at;
     D descriptor{};
     float flow_x = 0.0F, flow_y = 0.0F;  ///< pixels since the frame before
-    vec3 anchor = vec3::Zero();          ///< where it was a little earlier, world
+    vec3 anchor = zeros<vec3>();          ///< where it was a little earlier, world
     double anchored = 0.0;               ///< when that was, seconds
     double moved = 0.0;                  ///< when it was last seen to move, or first seen
     bool has_anchor = false;
@@ -292,7 +292,7 @@ class moving_features {
     const auto expected = rig_.camera().project(T_camera_world * t.anchor);
     if (!expected) return false;
     const double information = rig_.scales.information(t.at.octave);
-    return (*expected - f.pixel(t.feature)).squaredNorm() * information > 2.0 * error_limit(false);
+    return squared_norm(*expected - f.pixel(t.feature)) * information > 2.0 * error_limit(false);
   }
 
   /// How much a landmark is to be trusted to stand still, by its age.

@@ -112,8 +112,8 @@ template <feature_descriptor D, camera::camera_model Camera>
   std::vector<std::vector<double>> ratios(s.keyframes.size());
   for (std::size_t i = 0; i != s.observations.size(); ++i) {
     const std::uint32_t pose = s.observations[i].pose, point = s.observations[i].point;
-    const double before = (s.points[point] - s.poses[pose].translation()).norm();
-    const double after = (solved.points[point] - solved.poses[pose].translation()).norm();
+    const double before = norm(s.points[point] - s.poses[pose].translation());
+    const double after = norm(solved.points[point] - solved.poses[pose].translation());
     if (solved.outliers[i] == 0 && before > 0.0 && after > 0.0) ratios[pose].push_back(after / before);
   }
   for (std::size_t k = 0; k != growth.size(); ++k)

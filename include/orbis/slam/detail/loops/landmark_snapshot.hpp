@@ -26,8 +26,8 @@ namespace orbis::slam::detail {
 /// What the search for a landmark needs, but for the descriptor.
 struct snapshot_landmark {
   landmark_id id;
-  vec3 position = vec3::Zero();  ///< in the world of its map, metres
-  vec3 normal = vec3::Zero();
+  vec3 position = zeros<vec3>();  ///< in the world of its map, metres
+  vec3 normal = zeros<vec3>();
   double min_distance = 0.0;
   double max_distance = 0.0;
 };

@@ -124,9 +124,9 @@ report apply_poses(basic_map<D>& m, const snapshot<D>& s, const solution& solved
   if (a != b) m.add_loop_edge(a, b);
   done.corrected = true;
   done.keyframes = m.keyframes().size();
-  done.moved = (m.at(a).T_world_camera.translation() - before.translation()).norm();
+  done.moved = norm(m.at(a).T_world_camera.translation() - before.translation());
   done.scale = motion.at(a.value()).scale();
-  done.turned = (before.rotation().inverse() * m.at(a).T_world_camera.rotation()).log().norm();
+  done.turned = norm((before.rotation().inverse() * m.at(a).T_world_camera.rotation()).log());
   return done;
 }
 

@@ -140,10 +140,10 @@ template <feature_descriptor D, camera::camera_model Camera>
   double sine = 0.0;
   for (const observation& o : l.observations) {
     const vec3 other = l.position - m.at(o.keyframe).T_world_camera.translation();
-    sine = std::max(sine, ray.cross(other).norm() / (ray.norm() * other.norm()));
+    sine = std::max(sine, norm(cross(ray, other)) / (norm(ray) * norm(other)));
   }
   const double angle = rig.scales.scale(k.features.keypoints[feature].octave) / focal_length(rig.camera());
-  return ray.norm() * angle / sine;
+  return norm(ray) * angle / sine;
 }
 
 template <feature_descriptor D, camera::camera_model Camera>
@@ -157,7 +157,7 @@ template <feature_descriptor D, camera::camera_model Camera>
     if (l == no_id && !k.has_depth(i)) continue;
     // The measured depth rather than the landmark, which may rest on the observations of others.
     const vec3 point = k.has_depth(i) ? k.point_camera(i) : T_camera_world * m.landmark_at(l).position;
-    if (!point.allFinite() || !(point.z() > 0.0)) continue;
+    if (!all_finite(point) || !(point.z() > 0.0)) continue;
     v.features.keypoints.push_back(k.features.keypoints[i]);
     v.features.descriptors.push_back(k.features.descriptors[i]);
     v.points.push_back(point);
@@ -176,7 +176,7 @@ template <feature_descriptor D>
   keyframe_id last = std::min(a, b);
   for (keyframe_id k = last + 1; k <= std::max(a, b); ++k) {
     if (!m.has_keyframe(k)) continue;
-    length += (m.at(k).T_world_camera.translation() - m.at(last).T_world_camera.translation()).norm();
+    length += norm(m.at(k).T_world_camera.translation() - m.at(last).T_world_camera.translation());
     last = k;
   }
   return length;
@@ -257,7 +257,7 @@ class checker {
 
   /// The scale by the depths of landmarks that both sides have: their median ratio. False if that is not sure.
   [[nodiscard]] bool measure_scale(loop_match& found) const {
-    std::vector<vec3> at(s_.seen.image.size(), vec3::Zero());
+    std::vector<vec3> at(s_.seen.image.size(), zeros<vec3>());
     for (std::size_t i = 0; i != s_.seen.points.size(); ++i) at[s_.seen.index[i]] = s_.seen.points[i];
     const se3 T_keyframe_world = (s_.landmarks.T_world_camera * found.T_candidate_keyframe).inverse();
     std::vector<double> ratios;
@@ -285,8 +285,8 @@ class checker {
     // Where the neighbour is clearly apart, it is found there as far away as the scale says.
     const se3 T_keyframe_neighbor =
         (s_.landmarks.T_world_camera * found.T_candidate_keyframe).inverse() * localized.T_world_camera;
-    const double expected = found.scale * n.T_keyframe_camera.translation().norm();
-    const double off = (T_keyframe_neighbor.translation() - found.scale * n.T_keyframe_camera.translation()).norm();
+    const double expected = found.scale * norm(n.T_keyframe_camera.translation());
+    const double off = norm(T_keyframe_neighbor.translation() - found.scale * n.T_keyframe_camera.translation());
     return off <= 0.3 * expected || expected <= 0.02 * found.scale * s_.seen.median_depth;
   }
 
@@ -294,8 +294,8 @@ class checker {
   [[nodiscard]] bool is_plausible(const se3& T_candidate_keyframe) const {
     const se3& was = s_.seen.image.T_world_camera;
     const se3 is = s_.landmarks.T_world_camera * T_candidate_keyframe;
-    const double moved = (is.translation() - was.translation()).norm();
-    const double turned = (was.rotation().inverse() * is.rotation()).log().norm();
+    const double moved = norm(is.translation() - was.translation());
+    const double turned = norm((was.rotation().inverse() * is.rotation()).log());
     if (!rig_.scale_is_known) return turned <= options_.max_rotation;
     return moved <= options_.max_translation + options_.translation_per_metre * s_.path_length &&
            turned <= options_.max_rotation + options_.rotation_per_metre * s_.path_length;

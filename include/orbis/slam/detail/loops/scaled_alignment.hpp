@@ -29,8 +29,8 @@ namespace orbis::slam::detail {
 
 /// A point as a camera knows it.
 struct known_point {
-  vec3 position = vec3::Zero();  ///< in the camera, in its unit
-  vec2 pixel = vec2::Zero();     ///< where the camera saw it
+  vec3 position = zeros<vec3>();  ///< in the camera, in its unit
+  vec2 pixel = zeros<vec2>();     ///< where the camera saw it
   double information = 1.0;      ///< 1 / sigma^2 of the pixel, 1 / pixel^2
 };
 
@@ -70,7 +70,7 @@ class scaled_alignment {
  private:
   [[nodiscard]] double reprojected(const vec3& point, const known_point& seen) const {
     const auto pixel = point.z() > 0.0 ? camera_.project(point) : std::nullopt;
-    return pixel ? seen.information * (*pixel - seen.pixel).squaredNorm() : std::numeric_limits<double>::infinity();
+    return pixel ? seen.information * squared_norm(*pixel - seen.pixel) : std::numeric_limits<double>::infinity();
   }
   [[nodiscard]] std::optional<model> fit_to(std::span<const std::uint32_t> indices) const {
     std::vector<vec3> from, to;

@@ -18,7 +18,7 @@ namespace orbis::slam::detail {
 
 /// A point to search for.
 struct candidate_point {
-  vec3 position = vec3::Zero();  ///< in the world, metres
+  vec3 position = zeros<vec3>();  ///< in the world, metres
   landmark_id landmark;          ///< `no_id` for a point that is known from the depth of the last frame alone
 };
 

@@ -263,7 +263,7 @@ class map_reader {
     l.found = in.take<std::uint32_t>();
     l.has_current_descriptor = in.take<std::uint8_t>() != 0;
     if (in.ended() || in.left() / bytes_of_observation < count) return in.end();
-    if (!(l.position.array().abs() < farthest).all() || !l.normal.allFinite() || !(l.min_distance >= 0.0) ||
+    if (!(l.position.array().abs() < farthest).all() || !all_finite(l.normal) || !(l.min_distance >= 0.0) ||
         !(l.max_distance >= 0.0) || !std::isfinite(l.max_distance))
       return wrong("is at no finite place");
     if (l.created >= keyframe_ids_) return wrong("comes from a keyframe that never was");

@@ -108,8 +108,8 @@ template <camera::parametric_camera Camera, class Covariance>
       if (!ray || !camera::parameters_of<Camera>::project(camera, *ray, by_point, by_parameters)) continue;
       for (int k = 0; k != count; ++k)
         if ((parameters >> k & 1U) == 0) by_parameters.col(k).setZero();
-      const mat2 moved = by_parameters * covariance * by_parameters.transpose();
-      largest = std::max(largest, std::sqrt(std::max(0.0, moved.trace())));
+      const mat2 moved = by_parameters * covariance * transposed(by_parameters);
+      largest = std::max(largest, std::sqrt(std::max(0.0, trace(moved))));
     }
   return largest;
 }

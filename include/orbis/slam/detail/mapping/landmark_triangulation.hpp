@@ -77,8 +77,8 @@ struct view_pair {
     if (!agrees<Camera, D>(rig, a, T_a_world, i, *p) || !agrees<Camera, D>(rig, b, T_b_world, j, *p))
       return std::nullopt;
     // A point that is twice as far appears half as large.
-    const double factor = in_b.norm() * rig.scales.scale(b.features.keypoints[j].octave) /
-                          (in_a.norm() * rig.scales.scale(a.features.keypoints[i].octave));
+    const double factor = norm(in_b) * rig.scales.scale(b.features.keypoints[j].octave) /
+                          (norm(in_a) * rig.scales.scale(a.features.keypoints[i].octave));
     const double limit = options.scale_tolerance * rig.scales.factor();
     return factor <= limit && factor * limit >= 1.0 ? p : std::nullopt;
   }
@@ -125,7 +125,7 @@ std::size_t triangulate_landmarks(basic_map<D>& m, keyframe_id newest, const cam
     const auto& other = m.at(n.keyframe);
     const se3 T_other_k = other.T_world_camera.inverse() * k.T_world_camera;
     const double unit = rig.scale_is_known ? 1.0 : median_depth(m, other);
-    if (!(T_other_k.translation().norm() >= o.min_baseline * unit)) continue;
+    if (!(norm(T_other_k.translation()) >= o.min_baseline * unit)) continue;
     own.assign(k);
     others.assign(other);
     const view_pair<Camera, D> pair{rig, o, k, other, focal};

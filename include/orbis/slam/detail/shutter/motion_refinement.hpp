@@ -27,7 +27,7 @@ namespace orbis::slam::detail {
 /// A pose and the camera's twist there.
 struct moving_pose {
   se3 T_world_camera;
-  vec6 twist = vec6::Zero();  ///< of the camera in its own frame, per second, translation first
+  vec6 twist = zeros<vec6>();  ///< of the camera in its own frame, per second, translation first
 };
 
 /// What is known of the twist before the frame is looked at: the mean motion since a former pose, which is followed
@@ -36,7 +36,7 @@ struct twist_prior {
   std::optional<se3> T_world_before;   ///< the former pose ...
   double interval = 0.0;               ///< ... and the seconds since
   double trend = 0.0;                  ///< which part of the change from `twist_before` to the mean motion is added
-  vec6 twist_before = vec6::Zero();    ///< at the former pose
+  vec6 twist_before = zeros<vec6>();    ///< at the former pose
   double translation_deviation = 0.5;  ///< metres per second
   double rotation_deviation = 1.0;     ///< radians per second
 
@@ -68,7 +68,7 @@ struct row_observation {
 template <feature_descriptor D>
 [[nodiscard]] vec6 motion_between(const basic_frame<D>& before, const basic_frame<D>& after) {
   const double interval = after.timestamp - before.timestamp;
-  if (!(interval > 0.0)) return vec6::Zero();
+  if (!(interval > 0.0)) return zeros<vec6>();
   return (before.T_world_camera.inverse() * after.T_world_camera).log() / interval;
 }
 
@@ -119,8 +119,8 @@ template <camera::camera_model Camera>
 /// motion of the camera frame (`exp(step) * T_camera_world`), then that of the twist.
 struct pose_quadratic {
   moving_pose at;
-  matrix<12, 12> h = matrix<12, 12>::Zero();
-  matrix<12, 1> g = matrix<12, 1>::Zero();
+  matrix<12, 12> h = zeros<matrix<12, 12>>();
+  matrix<12, 1> g = zeros<matrix<12, 1>>();
   double cost = 0.0;
 
   /// Takes the twist for known: the cost no longer depends on it.
@@ -156,8 +156,8 @@ template <camera::camera_model Camera>
                                               const refinement_terms& terms = {}) {
   constexpr double width = row_loss_width;
   moving_pose_equations e;
-  std::array<mat6, 3> h{mat6::Zero(), mat6::Zero(), mat6::Zero()};  // times 1, time, time squared
-  std::array<vec6, 2> g{vec6::Zero(), vec6::Zero()};
+  std::array<mat6, 3> h{zeros<mat6>(), zeros<mat6>(), zeros<mat6>()};  // times 1, time, time squared
+  std::array<vec6, 2> g{zeros<vec6>(), zeros<vec6>()};
   for (const row_observation& o : observations) {
     matrix<3, 6> j;
     const auto r = row_residual(model, T_camera_world, twist, o, j);
@@ -165,7 +165,7 @@ template <camera::camera_model Camera>
     const double error = std::sqrt(r->squaredNorm() * o.seen.information);
     const double weight = o.seen.information * (error <= width ? 1.0 : width / error);
     e.cost += error <= width ? 0.5 * error * error : width * (error - 0.5 * width);
-    const matrix<6, 3> weighted = weight * j.transpose();
+    const matrix<6, 3> weighted = weight * transposed(j);
     const mat6 a = weighted * j;
     const vec6 b = weighted * *r;
     h[0] += a, h[1] -= o.time * a, h[2] += o.time * o.time * a;
@@ -191,15 +191,15 @@ class early_depth_twist {
     constexpr double width = row_loss_width;
     constexpr double share = 0.25;  // of the information of independent errors: landmarks that are near err together
     const se3 T_camera_world = at.T_world_camera.inverse();
-    std::array<mat6, 3> h{mat6::Identity(), mat6::Zero(), mat6::Zero()};  // a metre or a radian, if nothing is seen
+    std::array<mat6, 3> h{identity<mat6>(), zeros<mat6>(), zeros<mat6>()};  // a metre or a radian, if nothing is seen
     for (const row_observation& o : observations) {
       matrix<3, 6> j;
       const auto r = row_residual(model, T_camera_world, at.twist, o, j);
       if (!r) continue;
       const auto by_pixel = j.template topRows<2>();
-      const double error = std::sqrt(r->template head<2>().squaredNorm() * o.seen.information);
+      const double error = std::sqrt(squared_norm(r->template head<2>()) * o.seen.information);
       const double weight = share * o.seen.information * (error <= width ? 1.0 : width / error);
-      const mat6 a = weight * by_pixel.transpose() * by_pixel;
+      const mat6 a = weight * transposed(by_pixel) * by_pixel;
       h[0] += a, h[1] -= o.time * a, h[2] += o.time * o.time * a;
     }
     determine(h, prior);
@@ -215,8 +215,8 @@ class early_depth_twist {
   /// From what the pixels determine, by powers of the rows' times.
   void determine(const std::array<mat6, 3>& h, const twist_prior& prior);
 
-  mat6 pose_covariance_ = mat6::Zero(), former_covariance_ = mat6::Zero();  ///< by pixels alone
-  mat6 gain_ = mat6::Identity();
+  mat6 pose_covariance_ = zeros<mat6>(), former_covariance_ = zeros<mat6>();  ///< by pixels alone
+  mat6 gain_ = identity<mat6>();
 };
 
 /// Refines pose and twist, or the pose alone, by Gauss-Newton steps as long as they lower the cost. The observations
@@ -231,9 +231,9 @@ template <camera::camera_model Camera>
   moving_pose_equations now = linearize(observations, model, T_camera_world, twist, prior, terms);
   for (int k = 0; k != iterations; ++k) {
     const matrix<12, 1> step = newton_step(now, terms.moves);
-    if (!step.allFinite()) break;
-    const se3 there = se3::exp(step.template head<6>()) * T_camera_world;
-    const vec6 moving = twist + step.template tail<6>();
+    if (!all_finite(step)) break;
+    const se3 there = se3::exp(head<6>(step)) * T_camera_world;
+    const vec6 moving = twist + tail<6>(step);
     const moving_pose_equations then = linearize(observations, model, there, moving, prior, terms);
     if (!(then.cost < now.cost)) break;
     const double gain = now.cost - then.cost;

@@ -54,7 +54,7 @@ struct depth_change {
 /// A frame as it was read, with its motion as its neighbours tell it.
 struct row_view {
   se3 T_world_camera;
-  vec6 twist = vec6::Zero();
+  vec6 twist = zeros<vec6>();
   std::vector<keypoint_as_read> read;
   std::vector<depth_change> changes;   ///< by keypoint
   std::vector<landmark_id> landmarks;  ///< by keypoint
@@ -63,8 +63,8 @@ struct row_view {
 
 /// Linear equations `h * (read-out, delay) = c`.
 struct shutter_equations {
-  matrix<2, 2> h = matrix<2, 2>::Zero();
-  vec2 c = vec2::Zero();
+  matrix<2, 2> h = zeros<matrix<2, 2>>();
+  vec2 c = zeros<vec2>();
 };
 
 /// Eliminates the relative pose from equations and gradient; false if the points do not determine it.
@@ -89,14 +89,14 @@ template <camera::camera_model Camera>
     return camera::shutter{.color_read_out = 1.0}.color_time(static_cast<double>(v), height);
   };
   const auto speed = [](const vec6& twist, const vec3& p) {
-    return vec3(vec3(twist[3], twist[4], twist[5]).cross(p) + vec3(twist[0], twist[1], twist[2]));
+    return vec3(cross(vec3(twist[3], twist[4], twist[5]), p) + vec3(twist[0], twist[1], twist[2]));
   };
   const se3 T_to_from = to.T_world_camera.inverse() * from.T_world_camera;
-  mat6 pose = mat6::Zero();
-  matrix<6, 2> mixed = matrix<6, 2>::Zero();
-  vec6 pose_gradient = vec6::Zero();
+  mat6 pose = zeros<mat6>();
+  matrix<6, 2> mixed = zeros<matrix<6, 2>>();
+  vec6 pose_gradient = zeros<vec6>();
   shutter_equations e;
-  vec2 gradient = vec2::Zero();
+  vec2 gradient = zeros<vec2>();
   std::size_t count = 0;
   for (std::size_t i = 0; i != to.read.size(); ++i) {
     if (to.landmarks[i] == no_id) continue;
@@ -127,17 +127,17 @@ template <camera::camera_model Camera>
     const double z = static_cast<double>(b.depth);
     const double by_depth = o.has_depth() ? rig.model.bf / (z * z) : 0.0;  // of what was measured
     by_shutter(2, 1) -= by_depth * change_b.rate();
-    pose += weight * (by_pose.transpose() * by_pose);
-    mixed += weight * (by_pose.transpose() * by_shutter);
-    pose_gradient += weight * (by_pose.transpose() * *r);
-    e.h += weight * (by_shutter.transpose() * by_shutter);
-    gradient += weight * (by_shutter.transpose() * *r);
+    pose += weight * (transposed(by_pose) * by_pose);
+    mixed += weight * (transposed(by_pose) * by_shutter);
+    pose_gradient += weight * (transposed(by_pose) * *r);
+    e.h += weight * (transposed(by_shutter) * by_shutter);
+    gradient += weight * (transposed(by_shutter) * *r);
     ++count;
     // Depth is noisy, and so is its rate, whose square would be too large: the delay would come out too small. The
     // squared errors of three readings with the same noise are a parabola without this bias.
     const auto moved = [&](float in_a, float in_b) {
-      const vec3 row = by_point.row(2).transpose();
-      return (*r)[2] + row.dot(T_to_from.rotation() * vec3(static_cast<double>(in_a) * ray)) -
+      const vec3 row = transposed(by_point.row(2));
+      return (*r)[2] + dot(row, T_to_from.rotation() * vec3(static_cast<double>(in_a) * ray)) -
              by_depth * static_cast<double>(in_b);
     };
     const auto squared = [](double x) { return x * x; };

@@ -92,7 +92,7 @@ class front_end {
   [[nodiscard]] map_keyframe last_reference() const noexcept { return last_reference_; }
 
   /// The motion during the read-out of the last tracked frame; zero with a global shutter.
-  [[nodiscard]] vec6 last_twist() const { return shutter_.is_global() ? vec6(vec6::Zero()) : last_.twist; }
+  [[nodiscard]] vec6 last_twist() const { return shutter_.is_global() ? vec6(zeros<vec6>()) : last_.twist; }
 
   /// The last tracked frame with its features. For the thread that tracks; takes no look at the maps. O(features).
   [[nodiscard]] tracked_frame last_frame() const;
@@ -476,7 +476,7 @@ void front_end<Camera, D, Matchers, Sensor>::refine_motion(frame_type& f, const 
   const auto expected_twist = [&] {
     return prior.T_world_before ? prior.expected(f.T_world_camera.inverse()) : f.twist;
   };
-  moving_pose refined{f.T_world_camera, rolls ? expected_twist() : vec6(vec6::Zero())};
+  moving_pose refined{f.T_world_camera, rolls ? expected_twist() : vec6(zeros<vec6>())};
   const int rounds = with_depth ? 3 : !rolls ? 0 : shutter_.is_depth_simultaneous() ? 1 : 2;
   if (!rolls && with_depth) find_observations(f, m, rig_, rows_);
   for (int round = 0; round != rounds; ++round) {

@@ -32,7 +32,7 @@ template <feature_descriptor D>
   const auto& last = m.keyframes().back();
   e.since = f.timestamp - last.timestamp;
   const se3 motion = last.T_world_camera.inverse() * f.T_world_camera;
-  e.moved = motion.translation().norm();
+  e.moved = norm(motion.translation());
   if (!scale_is_known) {
     const double depth = median_depth(m, f);
     e.moved = depth > 0.0 ? e.moved / depth : 0.0;

@@ -31,7 +31,7 @@ namespace orbis::slam::detail {
 /// A point that two frames observe.
 struct start_point {
   std::uint32_t first = 0, second = 0;  ///< keypoints of the two frames
-  vec3 position = vec3::Zero();         ///< in the world
+  vec3 position = zeros<vec3>();         ///< in the world
 };
 
 /// Two frames with poses, and the points that they share. The first camera is the world; the unit of length is the

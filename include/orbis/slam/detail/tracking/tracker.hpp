@@ -133,7 +133,7 @@ std::size_t tracker<Camera, D, Matchers>::by_turning(basic_frame<D>& f, const ba
   for (int across = -steps; across <= steps; ++across)
     for (int down = -steps; down <= steps; ++down) {
       const vec3 turn(high * down / steps, wide * across / steps, 0.0);
-      const se3 turned = last.T_world_camera * se3{so3::exp(turn), vec3::Zero()};
+      const se3 turned = last.T_world_camera * se3{so3::exp(turn), zeros<vec3>()};
       const search_list<D> list = seen_points(m, last, turned, radius);
       if (list.size() < options_.min_inliers) continue;
       const auto matches = Matchers::motion(features::feature_view<D>{list.keypoints, list.descriptors}, f.features,
