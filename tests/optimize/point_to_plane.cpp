@@ -6,7 +6,7 @@
 #include <orbis/core/execution.hpp>
 #include <orbis/optimize/bundle_adjustment.hpp>
 #include <orbis/optimize/detail/minimal/descent.hpp>
-#include <orbis/optimize/detail/minimal/small_cholesky.hpp>
+#include <orbis/core/small_cholesky.hpp>
 #include <orbis/optimize/point_to_plane.hpp>
 
 #include "support.hpp"

@@ -98,8 +98,8 @@ namespace detail {
   if (!all_finite(x) || !(x.x() > 0.5) || !(norm(y) > 0.1)) return std::nullopt;
   mat3 axes;
   axes << x, normalized(y), cross(x, normalized(y));
-  const vec3 z = axes.col(2), upright = T_left_right.rotation() * vec3::UnitY();
-  if (dot(z, left) < 0.5 || dot(z, right) < 0.5 || !(dot(axes.col(1), upright) > 0.5)) return std::nullopt;
+  const vec3 z = column_of(axes, 2), upright = T_left_right.rotation() * vec3::UnitY();
+  if (dot(z, left) < 0.5 || dot(z, right) < 0.5 || !(dot(column_of(axes, 1), upright) > 0.5)) return std::nullopt;
   return axes;
 }
 

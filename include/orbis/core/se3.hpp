@@ -67,14 +67,14 @@ class basic_se3 {
   [[nodiscard]] matrix<6, 6, S> adjoint() const {
     const matrix<3, 3, S> r = rotation_matrix();
     matrix<6, 6, S> ad = zeros<matrix<6, 6, S>>();
-    ad.template topLeftCorner<3, 3>() = r;
-    ad.template topRightCorner<3, 3>() = hat<S>(t_) * r;
-    ad.template bottomRightCorner<3, 3>() = r;
+    set_block(ad, 0, 0, r);
+    set_block(ad, 0, 3, hat<S>(t_) * r);
+    set_block(ad, 3, 3, r);
     return ad;
   }
   template <std::floating_point T>
   [[nodiscard]] basic_se3<T> cast() const {
-    return {r_.template cast<T>(), t_.template cast<T>()};
+    return {r_.template cast<T>(), converted<T>(t_)};
   }
 
   /// `exp(xi + delta) ~ exp(left_jacobian(xi) * delta) * exp(xi)`.
@@ -94,9 +94,9 @@ class basic_se3 {
   [[nodiscard]] static matrix<6, 6, S> block_triangular(const matrix<3, 3, S>& diagonal,
                                                         const matrix<3, 3, S>& corner) {
     matrix<6, 6, S> m = zeros<matrix<6, 6, S>>();
-    m.template topLeftCorner<3, 3>() = diagonal;
-    m.template topRightCorner<3, 3>() = corner;
-    m.template bottomRightCorner<3, 3>() = diagonal;
+    set_block(m, 0, 0, diagonal);
+    set_block(m, 0, 3, corner);
+    set_block(m, 3, 3, diagonal);
     return m;
   }
 

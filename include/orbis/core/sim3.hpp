@@ -76,7 +76,9 @@ class basic_sim3 {
     const point phi = r_.log();
     const S sigma = std::log(scale_);
     tangent xi;
-    xi << translation_integral(phi, sigma).inverse() * t_, phi, sigma;
+    set_block(xi, 0, 0, orbis::inverse(translation_integral(phi, sigma)) * t_);
+    set_block(xi, 3, 0, phi);
+    xi[6] = sigma;
     return xi;
   }
   [[nodiscard]] basic_sim3 inverse() const {
@@ -95,18 +97,18 @@ class basic_sim3 {
   /// The homogeneous 4x4 matrix.
   [[nodiscard]] matrix<4, 4, S> to_matrix() const {
     matrix<4, 4, S> m = identity<matrix<4, 4, S>>();
-    m.template topLeftCorner<3, 3>() = scale_ * rotation_matrix();
-    m.template topRightCorner<3, 1>() = t_;
+    set_block(m, 0, 0, scale_ * rotation_matrix());
+    set_block(m, 0, 3, t_);
     return m;
   }
   /// `exp(adjoint() * xi) == T exp(xi) T^-1`.
   [[nodiscard]] matrix<7, 7, S> adjoint() const {
     const matrix<3, 3, S> r = rotation_matrix();
     matrix<7, 7, S> ad = zeros<matrix<7, 7, S>>();
-    ad.template block<3, 3>(0, 0) = scale_ * r;
-    ad.template block<3, 3>(0, 3) = hat<S>(t_) * r;
-    ad.template block<3, 1>(0, 6) = -t_;
-    ad.template block<3, 3>(3, 3) = r;
+    set_block(ad, 0, 0, scale_ * r);
+    set_block(ad, 0, 3, hat<S>(t_) * r);
+    set_block(ad, 0, 6, -t_);
+    set_block(ad, 3, 3, r);
     ad(6, 6) = S(1);
     return ad;
   }
@@ -114,14 +116,14 @@ class basic_sim3 {
   [[nodiscard]] static matrix<7, 7, S> left_jacobian(const tangent& xi) {
     const matrix<3, 3, S> k = hat<S>(segment<3>(xi, 3));
     matrix<7, 7, S> ad = zeros<matrix<7, 7, S>>();  // ad * eta is the Lie bracket of xi and eta
-    ad.template block<3, 3>(0, 0) = k + xi[6] * identity<matrix<3, 3, S>>();
-    ad.template block<3, 3>(0, 3) = hat<S>(head<3>(xi));
-    ad.template block<3, 1>(0, 6) = -head<3>(xi);
-    ad.template block<3, 3>(3, 3) = k;
+    set_block(ad, 0, 0, k + xi[6] * identity<matrix<3, 3, S>>());
+    set_block(ad, 0, 3, hat<S>(head<3>(xi)));
+    set_block(ad, 0, 6, -head<3>(xi));
+    set_block(ad, 3, 3, k);
     return detail::exponential_integral<7, S>(ad);
   }
   [[nodiscard]] static matrix<7, 7, S> left_jacobian_inverse(const tangent& xi) {
-    return left_jacobian(xi).partialPivLu().inverse();
+    return orbis::inverse(left_jacobian(xi));
   }
   /// `exp(xi + delta) ~ exp(xi) * exp(right_jacobian(xi) * delta)`.
   [[nodiscard]] static matrix<7, 7, S> right_jacobian(const tangent& xi) { return left_jacobian(-xi); }

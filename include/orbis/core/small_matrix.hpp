@@ -270,6 +270,17 @@ template <int N, class S, int R, int O>
   return segment<N>(v, R - N);
 }
 
+/// The entries of `a`, then those of `b`.
+template <class S, int M, int N, int OA, int OB>
+  requires(M > 0 && N > 0)
+[[nodiscard]] inline matrix<M + N, 1, S> stacked(const Eigen::Matrix<S, M, 1, OA, M, 1>& a,
+                                                 const Eigen::Matrix<S, N, 1, OB, N, 1>& b) {
+  matrix<M + N, 1, S> out;
+  for (int i = 0; i < M; ++i) out.data()[i] = a.data()[i];
+  for (int i = 0; i < N; ++i) out.data()[M + i] = b.data()[i];
+  return out;
+}
+
 /// The `P x Q` part of a matrix whose first entry is (row, column).
 template <int P, int Q, class S, int R, int C, int O>
   requires(P > 0 && Q > 0 && P <= R && Q <= C)
@@ -291,6 +302,15 @@ inline void set_block(Eigen::Matrix<S, R, C, O, R, C>& m, int row, int column,
       m.data()[(row + r) * detail::row_step<R, C, O> + (column + c) * detail::column_step<R, C, O>] =
           part.data()[r * detail::row_step<P, Q, OP> + c * detail::column_step<P, Q, OP>];
 }
+/// `a` with `b` to the right of it.
+template <class S, int R, int C, int D, int OA, int OB>
+[[nodiscard]] inline matrix<R, C + D, S> side_by_side(const Eigen::Matrix<S, R, C, OA, R, C>& a,
+                                                      const Eigen::Matrix<S, R, D, OB, R, D>& b) {
+  matrix<R, C + D, S> out;
+  set_block(out, 0, 0, a);
+  set_block(out, 0, C, b);
+  return out;
+}
 /// Column `c` of a matrix.
 template <class S, int R, int C, int O>
 [[nodiscard]] inline matrix<R, 1, S> column_of(const Eigen::Matrix<S, R, C, O, R, C>& m, int c) {
@@ -303,6 +323,15 @@ template <class S, int R, int C, int O>
   for (int c = 0; c < C; ++c)
     out.data()[c] = m.data()[r * detail::row_step<R, C, O> + c * detail::column_step<R, C, O>];
   return out;
+}
+template <class S, int R, int C, int O>
+inline void set_column(Eigen::Matrix<S, R, C, O, R, C>& m, int c, const matrix<R, 1, S>& v) {
+  set_block(m, 0, c, v);
+}
+template <class S, int R, int C, int O>
+inline void set_row(Eigen::Matrix<S, R, C, O, R, C>& m, int r, const matrix<C, 1, S>& v) {
+  for (int c = 0; c < C; ++c)
+    m.data()[r * detail::row_step<R, C, O> + c * detail::column_step<R, C, O>] = v.data()[c];
 }
 /// The matrix with columns `a`, `b` and `c`.
 template <class S>
@@ -328,6 +357,12 @@ template <class S, int R, int O>
   for (int c = 0; c < R; ++c)
     for (int r = 0; r < R; ++r) out.data()[c * R + r] = r == c ? v.data()[r] : S(0);
   return out;
+}
+/// Multiplies the entries on the diagonal of a square matrix by `factor` and adds `summand`.
+template <class S, int R, int O>
+  requires(R > 0)
+inline void change_diagonal(Eigen::Matrix<S, R, R, O, R, R>& m, S factor, S summand) {
+  for (int r = 0; r < R; ++r) m.data()[r * R + r] = m.data()[r * R + r] * factor + summand;
 }
 /// The entries on the diagonal of a square matrix.
 template <class S, int R, int O>
@@ -371,6 +406,61 @@ template <class S, int R, int C, int O>
   bool finite = true;
   for (int i = 0; i < R * C; ++i) finite = finite && std::isfinite(a.data()[i]);
   return finite;
+}
+template <class S, int R, int C, int O>
+  requires(R > 0 && C > 0)
+[[nodiscard]] inline S sum_of(const Eigen::Matrix<S, R, C, O, R, C>& a) {
+  if constexpr (R * C == 3) return a.data()[0] + (a.data()[1] + a.data()[2]);
+  S sum = a.data()[0];
+  for (int i = 1; i < R * C; ++i) sum += a.data()[i];
+  return sum;
+}
+template <class S, int R, int C, int O>
+  requires(R > 0 && C > 0)
+[[nodiscard]] inline S smallest_of(const Eigen::Matrix<S, R, C, O, R, C>& a) {
+  S least = a.data()[0];
+  for (int i = 1; i < R * C; ++i)
+    if (a.data()[i] < least) least = a.data()[i];
+  return least;
+}
+template <class S, int R, int C, int O>
+  requires(R > 0 && C > 0)
+[[nodiscard]] inline S largest_of(const Eigen::Matrix<S, R, C, O, R, C>& a) {
+  S most = a.data()[0];
+  for (int i = 1; i < R * C; ++i)
+    if (a.data()[i] > most) most = a.data()[i];
+  return most;
+}
+/// Whether each entry of `a` is at most that of `b`.
+template <class S, int R, int C, int O>
+  requires(R > 0 && C > 0)
+[[nodiscard]] inline bool all_at_most(const Eigen::Matrix<S, R, C, O, R, C>& a,
+                                      const Eigen::Matrix<S, R, C, O, R, C>& b) {
+  for (int i = 0; i < R * C; ++i)
+    if (!(a.data()[i] <= b.data()[i])) return false;
+  return true;
+}
+/// The matrix with `summand` added to each entry.
+template <class S, int R, int C, int O>
+  requires(R > 0 && C > 0)
+[[nodiscard]] inline Eigen::Matrix<S, R, C, O> shifted(const Eigen::Matrix<S, R, C, O, R, C>& a,
+                                                       std::type_identity_t<S> summand) {
+  Eigen::Matrix<S, R, C, O> out;
+  for (int i = 0; i < R * C; ++i) out.data()[i] = a.data()[i] + summand;
+  return out;
+}
+/// The absolute values of the entries.
+template <class S, int R, int C, int O>
+  requires(R > 0 && C > 0)
+[[nodiscard]] inline Eigen::Matrix<S, R, C, O> magnitudes(const Eigen::Matrix<S, R, C, O, R, C>& a) {
+  Eigen::Matrix<S, R, C, O> out;
+  for (int i = 0; i < R * C; ++i) out.data()[i] = std::abs(a.data()[i]);
+  return out;
+}
+/// `(x, y, 1)` of a point `(x, y)`.
+template <class S, int O>
+[[nodiscard]] inline matrix<3, 1, S> homogeneous(const Eigen::Matrix<S, 2, 1, O, 2, 1>& p) {
+  return {p.data()[0], p.data()[1], S(1)};
 }
 /// The largest absolute value of an entry; not a number where the first entry is none.
 template <class S, int R, int C, int O>
@@ -482,12 +572,31 @@ template <class S, int O>
   const S scale = S(1) / (out(0, 0) * m(0, 0) + (out(0, 1) * m(1, 0) + out(0, 2) * m(2, 0)));
   return out * scale;
 }
-/// Adds `weight * transposed(j) * j` to a symmetric matrix.
-template <class S, int N, int O, int M, int OJ>
-  requires(N > 0 && M > 0)
-inline void add_symmetric_product(Eigen::Matrix<S, N, N, O, N, N>& h, S weight,
-                                  const Eigen::Matrix<S, M, N, OJ, M, N>& j) {
-  h += transposed_product(j, weight * j);
+/// The inverse by elimination with row pivots. Entries are not finite where the matrix is singular.
+template <class S, int N, int O>
+  requires(N > 3)
+[[nodiscard]] inline Eigen::Matrix<S, N, N, O> inverse(Eigen::Matrix<S, N, N, O, N, N> m) {
+  Eigen::Matrix<S, N, N, O> out = identity<Eigen::Matrix<S, N, N, O>>();
+  for (int c = 0; c < N; ++c) {
+    int pivot = c;
+    for (int r = c + 1; r < N; ++r)
+      if (std::abs(m(r, c)) > std::abs(m(pivot, c))) pivot = r;
+    const S scale = S(1) / m(pivot, c);
+    for (int k = 0; k < N; ++k) {
+      const S a = m(pivot, k), b = out(pivot, k);
+      m(pivot, k) = m(c, k), out(pivot, k) = out(c, k);
+      m(c, k) = a * scale, out(c, k) = b * scale;
+    }
+    for (int r = 0; r < N; ++r) {
+      if (r == c) continue;
+      const S factor = m(r, c);
+      for (int k = 0; k < N; ++k) {
+        m(r, k) -= factor * m(c, k);
+        out(r, k) -= factor * out(c, k);
+      }
+    }
+  }
+  return out;
 }
 /// @}
 

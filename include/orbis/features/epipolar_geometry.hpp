@@ -58,7 +58,7 @@ class fundamental_geometry {
   explicit fundamental_geometry(const mat3& F) : F_{F} {
     // The epipole is orthogonal to every column; the two that span most give it best.
     for (int i = 0; i != 3; ++i) {
-      const vec3 normal = cross(vec3{F.col(i)}, vec3{F.col((i + 1) % 3)});
+      const vec3 normal = cross(column_of(F, i), column_of(F, (i + 1) % 3));
       if (norm(normal) > norm(epipole_)) epipole_ = normal;
     }
   }

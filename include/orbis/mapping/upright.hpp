@@ -71,17 +71,13 @@ struct upright_view {
 /// a unit vector of the camera's frame. A camera that looks straight up or down has the top of its image, or the
 /// bottom, along x.
 [[nodiscard]] inline so3 upright_rotation(const vec3& up_camera) {
-  vec3 ahead = vec3::UnitZ() - up_camera.z() * up_camera;
+  vec3 ahead = vec3(0.0, 0.0, 1.0) - up_camera.z() * up_camera;
   if (norm(ahead) < 1e-3) {
-    ahead = up_camera.z() > 0 ? vec3::UnitY() : vec3(-vec3::UnitY());
+    ahead = vec3(0.0, up_camera.z() > 0 ? 1.0 : -1.0, 0.0);
     ahead -= dot(up_camera, ahead) * up_camera;
   }
-  ahead.normalize();
-  mat3 rows;
-  rows.row(0) = ahead;
-  rows.row(1) = cross(up_camera, ahead);
-  rows.row(2) = up_camera;
-  return so3{rows};
+  ahead = normalized(ahead);
+  return so3{rows(ahead, cross(up_camera, ahead), up_camera)};
 }
 
 /// The upright world of a depth image: from gravity where it is given, else from planes.

@@ -113,11 +113,8 @@ struct next_view {
 /// The pose of a level camera at `from` that looks at `to` (metres).
 /// @pre `to` is not `from`, and neither above nor below it
 [[nodiscard]] inline se3 looking_at(const vec3& from, const vec3& to) {
-  mat3 axes;
-  axes.col(2) = normalized(to - from);
-  axes.col(0) = normalized(cross(axes.col(2), vec3::UnitZ()));
-  axes.col(1) = cross(axes.col(2), axes.col(0));
-  return {so3{axes}, from};
+  const vec3 ahead = normalized(to - from), right = normalized(cross(ahead, vec3(0.0, 0.0, 1.0)));
+  return {so3{columns(right, cross(ahead, right), ahead)}, from};
 }
 
 /// The best of random views of the places, from where the robot (whose camera is at its reference point) is free and

@@ -126,7 +126,7 @@ class planning_view {
   /// The point of the grid that is nearest to `p`, metres.
   [[nodiscard]] vec3 clamped(const vec3& p) const {
     const double edge = 0.5 * resolution() * grid().cells();
-    return p.cwiseMax(vec3::Constant(-edge)).cwiseMin(vec3::Constant(edge));
+    return entrywise_min(entrywise_max(p, filled<vec3>(-edge)), filled<vec3>(edge));
   }
   /// `p` as it is.
   [[nodiscard]] const vec3& placed(const vec3& p) const noexcept { return p; }
@@ -150,7 +150,7 @@ class planning_view {
   [[nodiscard]] bool is_in_region(const vec3& p) const noexcept {
     if (!all_finite(p)) return false;
     const auto& r = options_.region;
-    return !r || ((p.array() >= r->min.array()).all() && (p.array() <= r->max.array()).all());
+    return !r || (all_at_most(r->min, p) && all_at_most(p, r->max));
   }
   [[nodiscard]] vec3 ball_at(const vec3& p, int i) const noexcept {
     return {p.x(), p.y(), p.z() + cover_.low + i * cover_.spacing};
@@ -186,7 +186,7 @@ class planning_view {
       return most - 0.4999 * cell < cover_.inner || least - 0.8661 * cell - cover_.outer > 0.5 * cell;
     };
     // Beyond the grid's last voxel the field says nothing of obstacles in the grid.
-    if (!is_certain() && !away.isZero())
+    if (!is_certain() && away != zeros<vec3>())
       for (unsigned i = 1; i != 8; ++i) {
         const auto beside = [&](unsigned bit, int axis) { return (i & bit) == 0 ? 0 : away[axis] < 0.0 ? -1 : 1; };
         const int x = beside(1U, 0), y = beside(2U, 1), z = beside(4U, 2);

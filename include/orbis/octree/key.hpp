@@ -149,8 +149,8 @@ struct bounding_box {
 /// The cube of the node at `level` whose lowest voxel is `k`, metres.
 [[nodiscard]] inline bounding_box cube_of(const voxel_grid& grid, const voxel_key& k, int level) {
   const double half = grid.cells() / 2, cells = node_cells(level);
-  const vec3 low = vec3{static_cast<double>(k.x), static_cast<double>(k.y), static_cast<double>(k.z)}.array() - half;
-  return {low * grid.resolution(), vec3(low.array() + cells) * grid.resolution()};
+  const vec3 low{static_cast<double>(k.x) - half, static_cast<double>(k.y) - half, static_cast<double>(k.z) - half};
+  return {low * grid.resolution(), shifted(low, cells) * grid.resolution()};
 }
 
 /// The voxels from `low` to `high`, both included.

@@ -203,7 +203,7 @@ class occupancy_octree {
   std::size_t evict_outside(const bounding_box& box, Evict&& evict) {
     const auto is_outside = [&](std::uint64_t name) {
       const bounding_box cube = cube_of(grid_, detail::named_key(name), detail::named_level(name));
-      return (cube.min.array() > box.max.array()).any() || (cube.max.array() < box.min.array()).any();
+      return !all_at_most(cube.min, box.max) || !all_at_most(box.min, cube.max);
     };
     std::vector<std::uint64_t> bricks, large;
     std::vector<detail::tree_part<value_type>> parts = detail::stored_parts(store_);
@@ -345,11 +345,10 @@ class occupancy_octree {
   [[nodiscard]] std::optional<bounding_box> bounds() const {
     std::optional<bounding_box> box;
     for_each_leaf([&](const leaf& l) {
-      const vec3 low = l.center.array() - l.size / 2.0;
-      const vec3 high = low.array() + l.size;
+      const vec3 low = shifted(l.center, -l.size / 2.0), high = shifted(low, l.size);
       if (!box) box = bounding_box{low, high};
-      box->min = box->min.cwiseMin(low);
-      box->max = box->max.cwiseMax(high);
+      box->min = entrywise_min(box->min, low);
+      box->max = entrywise_max(box->max, high);
     });
     return box;
   }

@@ -31,18 +31,23 @@ struct capsule {
 
 [[nodiscard]] inline bounding_box bounds_of(const bounding_box& b) { return b; }
 [[nodiscard]] inline bounding_box bounds_of(const sphere& s) {
-  return {s.center.array() - s.radius, s.center.array() + s.radius};
+  return {shifted(s.center, -s.radius), shifted(s.center, s.radius)};
 }
 [[nodiscard]] inline bounding_box bounds_of(const capsule& c) {
-  return {c.a.cwiseMin(c.b).array() - c.radius, c.a.cwiseMax(c.b).array() + c.radius};
+  return {shifted(entrywise_min(c.a, c.b), -c.radius), shifted(entrywise_max(c.a, c.b), c.radius)};
+}
+
+/// The point of a box that is nearest to `p`.
+[[nodiscard]] inline vec3 clamped(const vec3& p, const bounding_box& b) {
+  return entrywise_min(entrywise_max(p, b.min), b.max);
 }
 
 /// Whether a shape and a box have a point in common; faces and corners belong to them.
 [[nodiscard]] inline bool touches(const bounding_box& a, const bounding_box& b) noexcept {
-  return (a.min.array() <= b.max.array()).all() && (a.max.array() >= b.min.array()).all();
+  return all_at_most(a.min, b.max) && all_at_most(b.min, a.max);
 }
 [[nodiscard]] inline bool touches(const sphere& s, const bounding_box& b) noexcept {
-  const vec3 nearest = s.center.cwiseMax(b.min).cwiseMin(b.max);
+  const vec3 nearest = clamped(s.center, b);
   return squared_norm(s.center - nearest) <= s.radius * s.radius;
 }
 namespace detail {
@@ -53,7 +58,7 @@ namespace detail {
   // parameters at which the segment crosses the planes of the faces: look for the piece where it is 0.
   const auto away = [&](double t) -> vec3 {
     const vec3 p = c.a + t * along;
-    return p - p.cwiseMax(b.min).cwiseMin(b.max);
+    return p - clamped(p, b);
   };
   std::array<double, 8> knots{0.0, 1.0};
   std::size_t count = 2;
@@ -83,13 +88,13 @@ namespace detail {
   // Where the segment is nearest to the middle of the box: at its beginning, its end, or between.
   const double share = product <= 0.0 ? 0.0 : product >= squares ? 1.0 : product / squares;
   const double apart = squared_norm(from - share * along);
-  const double outside = (c.radius + 1.7320508075688773 * half.maxCoeff()) * (1.0 + 1e-9);
+  const double outside = (c.radius + 1.7320508075688773 * largest_of(half)) * (1.0 + 1e-9);
   if (apart > outside * outside) return false;
-  const double inside = (c.radius + half.minCoeff()) * (1.0 - 1e-9);
+  const double inside = (c.radius + smallest_of(half)) * (1.0 - 1e-9);
   if (apart < inside * inside) return true;
   // That point of the segment may be near enough to the box; or else the plane through the nearest point of the box,
   // across the way between the two, may keep both ends away. A ball is one or the other, but for rounding.
-  const vec3 point = c.a + share * along, nearest = point.cwiseMax(b.min).cwiseMin(b.max), way = point - nearest;
+  const vec3 point = c.a + share * along, nearest = clamped(point, b), way = point - nearest;
   const double squared = squared_norm(way), reach = c.radius * c.radius;
   if (squared < reach * (1.0 - 1e-9)) return true;
   const double gap = std::min(dot(c.a - nearest, way), dot(c.b - nearest, way));
@@ -123,11 +128,11 @@ class overlap_search {
   [[nodiscard]] bool run() const {
     const bounding_box bounds = bounds_of(shape_);
     const double edge = grid_.resolution() * (grid_.cells() / 2);
-    const bool is_inside = (bounds.min.array() >= -edge).all() && (bounds.max.array() <= edge).all();
+    const bool is_inside = smallest_of(bounds.min) >= -edge && largest_of(bounds.max) <= edge;
     if (unknown_blocks_ && !is_inside) return true;
     // Faces that only touch are found as well.
     const auto keys =
-        keys_between(grid_, bounds.min.array() - grid_.resolution(), bounds.max.array() + grid_.resolution());
+        keys_between(grid_, shifted(bounds.min, -grid_.resolution()), shifted(bounds.max, grid_.resolution()));
     if (!keys) return false;
     bool found = false;
     store_.for_each_large([&](std::uint64_t name, T v) {
@@ -237,7 +242,7 @@ template <octree_map Map, overlap_shape Shape,
 void for_each_overlapping_leaf(const Map& map, const Shape& shape, Visit&& visit) {
   const voxel_grid& grid = map.grid();
   const bounding_box bounds = bounds_of(shape);
-  const auto keys = keys_between(grid, bounds.min.array() - grid.resolution(), bounds.max.array() + grid.resolution());
+  const auto keys = keys_between(grid, shifted(bounds.min, -grid.resolution()), shifted(bounds.max, grid.resolution()));
   if (!keys) return;
   detail::visit_leaves_in(map.store(), grid.depth(), *keys, [&](const voxel_key& k, int level, auto v) {
     if (is_occupied<typename Map::model>(v) && touches(shape, cube_of(grid, k, level))) visit(k, level, v);

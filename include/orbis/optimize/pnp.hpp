@@ -161,8 +161,8 @@ template <camera::camera_model Camera>
           matrix<2, 6> by_motion;
           by_motion << j, -(j * hat<double>(p));
           const vec2 r = *pixel - pixels[i];
-          e.h.noalias() += transposed(by_motion) * by_motion;
-          e.g.noalias() += transposed(by_motion) * r;
+          e.h += transposed(by_motion) * by_motion;
+          e.g += transposed(by_motion) * r;
           e.cost += squared_norm(r);
         }
       };

@@ -20,7 +20,7 @@
 #include <string_view>
 #include <type_traits>
 
-#include <orbis/optimize/detail/minimal/small_cholesky.hpp>
+#include <orbis/core/small_cholesky.hpp>
 #include <orbis/optimize/detail/pose/pose_kernels.hpp>
 #include <orbis/optimize/detail/pose/pose_pieces.hpp>
 #include <orbis/optimize/reprojection.hpp>
@@ -215,7 +215,7 @@ template <class Camera, class Loss>
     out.status = status;
     return out;
   };
-  if (!(T_world_camera.to_matrix().cwiseAbs().maxCoeff<Eigen::PropagateNaN>() < 1e100))
+  if (const mat4 pose = T_world_camera.to_matrix(); !all_finite(pose) || !(largest_magnitude(pose) < 1e100))
     return give_up(refinement_status::invalid_start);
 
   std::size_t active = 0;

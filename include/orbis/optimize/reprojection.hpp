@@ -66,10 +66,10 @@ struct reprojection {
     matrix<2, 3> projection;
     const auto pixel = camera.project(point_camera, projection);
     if (!pixel) return std::nullopt;
-    j.template topRows<2>() = projection;
-    j.row(2).setZero();
+    set_block(j, 0, 0, projection);
+    for (int i = 0; i != 3; ++i) j(2, i) = 0.0;
     if (o.has_depth()) {
-      j.row(2) = projection.row(0);
+      for (int i = 0; i != 3; ++i) j(2, i) = projection(0, i);
       j(2, 2) += bf / (point_camera.z() * point_camera.z());
     }
     return difference(*pixel, point_camera.z(), o);

@@ -20,7 +20,7 @@
 #include <Eigen/LU>
 
 #include <orbis/core/se3.hpp>
-#include <orbis/optimize/detail/minimal/small_cholesky.hpp>
+#include <orbis/core/small_cholesky.hpp>
 
 namespace orbis::optimize {
 
@@ -116,7 +116,7 @@ requires std::same_as<std::ranges::range_value_t<Poses>, se3> && std::same_as<st
   farthest_from(farthest_from(0));
   out.status = triangulation_status::no_parallax;
   if (!(out.parallax >= options.min_parallax) || !(baseline > 0.0)) return out;
-  detail::small_cholesky<3> factors;
+  small_cholesky<3> factors;
   if (!factors.set(a) || !(factors.factor(0.0) > 0.0)) return out;
   vec3 point = factors.solve(b);
   if (!all_finite(point)) return out;

@@ -40,11 +40,11 @@ class octant_overlap_search {
   [[nodiscard]] bool run() {
     const octree::bounding_box bounds = bounds_of(shape_);
     const double edge = grid_.resolution() * (grid_.cells() / 2);
-    const bool is_inside = (bounds.min.array() >= -edge).all() && (bounds.max.array() <= edge).all();
+    const bool is_inside = smallest_of(bounds.min) >= -edge && largest_of(bounds.max) <= edge;
     if (unknown_blocks_ && !is_inside) return true;
     // Faces that only touch are found as well.
     const auto keys =
-        octree::keys_between(grid_, bounds.min.array() - grid_.resolution(), bounds.max.array() + grid_.resolution());
+        octree::keys_between(grid_, shifted(bounds.min, -grid_.resolution()), shifted(bounds.max, grid_.resolution()));
     if (!keys) return false;
     const std::uint32_t differ =
         (keys->low.x ^ keys->high.x) | (keys->low.y ^ keys->high.y) | (keys->low.z ^ keys->high.z);

@@ -80,7 +80,7 @@ class block_test {
   /// For the next questions. @pre the pose is finite
   void place(const se3& T_world_camera, const ray_view& view, const depth_windows& windows) {
     rotation_ = transposed(T_world_camera.rotation_matrix());
-    absolute_ = rotation_.cwiseAbs();
+    absolute_ = magnitudes(rotation_);
     origin_ = T_world_camera.translation();
     view_ = &view;
     windows_ = &windows;

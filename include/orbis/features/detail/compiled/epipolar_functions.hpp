@@ -15,6 +15,6 @@ namespace orbis::features {
 
 ORBIS_COMPILED_ONCE fundamental_geometry::fundamental_geometry(const mat3& K_query, const mat3& K_train,
                                                                const se3& T_train_query)
-    : fundamental_geometry{mat3{transposed(K_train.inverse()) * essential(T_train_query) * K_query.inverse()}} {}
+    : fundamental_geometry{transposed(inverse(K_train)) * essential(T_train_query) * inverse(K_query)} {}
 
 }  // namespace orbis::features

@@ -84,7 +84,7 @@ struct up_ballot {
   vec3 up = *best;
   for (const double reach : {10.0, 8.0, 6.0, 5.0, 5.0, 5.0, 5.0, 5.0}) {
     const symmetric_eigen<3> axes = eigen_of_symmetric<3>(up_ballot{normals, up, std::sin(reach * degree)}.spread);
-    const vec3 refined = axes.vectors.col(0);
+    const vec3 refined = column_of(axes.vectors, 0);
     up = dot(refined, up) < 0 ? vec3(-refined) : refined;
   }
   if (std::acos(std::clamp(-up.y(), -1.0, 1.0)) > max_tilt + wide) return std::nullopt;

@@ -61,8 +61,8 @@ struct direction_windows {
     std::array<box, faces> boxes;
     for (const vec3& direction : sample.directions) {
       const vec3 d = turned * direction;
-      int axis = 0;
-      d.cwiseAbs().maxCoeff(&axis);
+      int axis = std::fabs(d[1]) > std::fabs(d[0]) ? 1 : 0;
+      if (std::fabs(d[2]) > std::fabs(d[axis])) axis = 2;
       box& b = boxes[static_cast<std::size_t>(2 * axis + (d[axis] < 0.0 ? 1 : 0))];
       const auto x = static_cast<float>(d[axis_x(axis)] / std::fabs(d[axis]));
       const auto y = static_cast<float>(d[axis_y(axis)] / std::fabs(d[axis]));
@@ -121,7 +121,7 @@ struct direction_windows {
     // Across the mean the rays spread furthest along a side of the image.
     const mat3 across = identity<mat3>() - mean * transposed(mean);
     const symmetric_eigen<3> spread = eigen_of_symmetric<3>(across * moments * across);
-    vec3 x = across * spread.vectors.col(2);
+    vec3 x = across * column_of(spread.vectors, 2);
     if (squared_norm(x) < 0.5) x = mean.unitOrthogonal();  // rays that go the same way up to rounding: any side will do
     x.normalize();
     mat3 turned;

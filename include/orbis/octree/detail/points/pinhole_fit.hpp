@@ -17,6 +17,7 @@
 #include <orbis/core/jacobi.hpp>
 #include <orbis/core/random.hpp>
 #include <orbis/core/so3.hpp>
+#include <orbis/core/small_cholesky.hpp>
 #include <orbis/core/types.hpp>
 #include <orbis/octree/detail/points/ray_traversal.hpp>
 #include <orbis/octree/detail/points/scan_sample.hpp>
@@ -124,14 +125,12 @@ class pinhole_fit {
     }
     const symmetric_eigen<3> e = eigen_of_symmetric<3>(moments);
     if (!(e.values[1] > 1e-5 * e.values[2] && e.values[0] < 1e-3 * e.values[1])) return false;
-    vec3 x = e.vectors.col(0);
+    vec3 x = column_of(e.vectors, 0);
     if (dot(x, runs_.front().d.back() - runs_.front().d.front()) < 0.0) x = -x;
     vec3 z = mean - x * dot(x, mean);
     if (!(norm(z) > 0.1 * static_cast<double>(runs_.size()))) return false;
     z.normalize();
-    axes_.row(0) = x;
-    axes_.row(1) = cross(z, x);
-    axes_.row(2) = z;
+    axes_ = rows(x, cross(z, x), z);
     return project();
   }
   /// Works out where the runs are at z = 1; forgets those that are not in front of the camera.
@@ -184,9 +183,9 @@ class pinhole_fit {
       if (!(a > 0.0)) return false;
     }
     const double turn = std::atan2(-b, a);
-    const vec3 y = axes_.row(1), z = axes_.row(2);
-    axes_.row(1) = std::cos(turn) * y + std::sin(turn) * z;
-    axes_.row(2) = std::cos(turn) * z - std::sin(turn) * y;
+    const vec3 y = row_of(axes_, 1), z = row_of(axes_, 2);
+    set_row(axes_, 1, std::cos(turn) * y + std::sin(turn) * z);
+    set_row(axes_, 2, std::cos(turn) * z - std::sin(turn) * y);
     fx_ = 1.0 / std::hypot(a, b);
     return project();
   }
@@ -261,13 +260,13 @@ class pinhole_fit {
       jv << fy_ * (1.0 + y * y), -fy_ * x * y, -fy_ * x, 0.0, y, 0.0, 1.0;
       const double ru = fx_ * x + cx_ - p.u, rv = fy_ * y + cy_ - p.v;
       square_ += ru * ru / (fx_ * fx_) + rv * rv / (fy_ * fy_);
-      h.noalias() += ju * transposed(ju) + jv * transposed(jv);
+      h += outer_product(ju, ju) + outer_product(jv, jv);
       g += ju * ru + jv * rv;
     }
     // Where the view is so narrow that a turn and a shift are the same, any of them will do.
-    for (int i = 0; i != 7; ++i) h(i, i) *= 1.0 + 1e-12;
-    const matrix<7> step = h.ldlt().solve(-g);
-    if (!all_finite(step)) return false;
+    const auto solved = solve_semidefinite(h, matrix<7>(-g));
+    if (!solved || !all_finite(*solved)) return false;
+    const matrix<7>& step = *solved;
     const vec3 turn = head<3>(step);
     axes_ = so3::exp(-turn).rotation_matrix() * axes_;
     fx_ += step[3];
@@ -283,7 +282,7 @@ class pinhole_fit {
       u0 = std::min(u0, p.u), u1 = std::max(u1, p.u);
       v0 = std::min(v0, p.v), v1 = std::max(v1, p.v);
     }
-    for (const run& r : runs_) z += dot(axes_.row(2), r.d.front()) * r.length;
+    for (const run& r : runs_) z += dot(row_of(axes_, 2), r.d.front()) * r.length;
     mean_z_ = z / static_cast<double>(runs_.size());
     const double room_u = std::ceil(0.04 * (u1 - u0)) + 8.0, room_v = std::ceil(0.04 * (v1 - v0)) + 8.0;
     const double width = u1 - u0 + 1.0 + 2.0 * room_u, height = v1 - v0 + 1.0 + 2.0 * room_v;

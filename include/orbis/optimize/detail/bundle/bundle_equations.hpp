@@ -111,7 +111,7 @@ class bundle_equations {
       sum += dot(part, camera_hessian_[u] * part);
     }
     for (std::size_t p = 0; p != structure_.points(); ++p) {
-      const auto y = segment<3>(x, point_row(p));
+      const vec3 y = segment<3>(x, point_row(p));
       sum += dot(y, point_hessian(p) * y);
     }
     for (const bundle_structure::group& g : structure_.groups)
@@ -246,7 +246,7 @@ class bundle_equations {
         if (!through_camera || i < 3 || i >= 6) block(i, k) = tile[mixed_block_tile::row(i) + 8 * k];
     if constexpr (through_camera) {
       const double* const q = tile + mixed_block_tile::q;
-      block.template middleRows<3>(3) = hat<double>(vec3{q[0], q[8], q[16]}) * block.template topRows<3>();
+      set_block(block, 3, 0, hat<double>(vec3{q[0], q[8], q[16]}) * orbis::block<3, 3>(block, 0, 0));
     }
     return block;
   }
@@ -366,14 +366,13 @@ class bundle_equations {
     return bundle_structure::none;
   }
   void subtract(std::size_t s, const elimination_buffer& sum) {
-    using body_block = Eigen::Matrix<double, rows::has_last ? rows::body : camera_size, camera_size>;
+    constexpr int body = rows::has_last ? rows::body : camera_size;
     const double* const taken = sum.blocks.data() + rows::block * s;
     camera_block& to = reduced_block(s);
-    to.template topRows<body_block::RowsAtCompileTime>() -=
-        Eigen::Map<const body_block, Eigen::Unaligned, Eigen::OuterStride<>>(taken, Eigen::OuterStride<>(rows::body));
+    for (int c = 0; c < camera_size; ++c)
+      for (int r = 0; r < body; ++r) to(r, c) -= taken[static_cast<int>(rows::body) * c + r];
     if constexpr (rows::has_last)
-      to.row(camera_size - 1) -=
-          Eigen::Map<const Eigen::Matrix<double, 1, camera_size>>(taken + rows::at(camera_size - 1, 0));
+      for (int c = 0; c < camera_size; ++c) to(camera_size - 1, c) -= taken[rows::at(camera_size - 1, 0) + c];
   }
   void add_to_right(const elimination_buffer& sum) {
     for (std::size_t i = 0; i != reduced_right_.size(); ++i) reduced_right_[i] += sum.right[i];
@@ -458,7 +457,8 @@ class bundle_equations {
     }
     for (std::size_t u = 0; u != structure_.unknowns(); ++u) {
       camera_block& h = camera_hessian_[u];
-      h.template triangularView<Eigen::StrictlyLower>() = transposed(h);
+      for (int i = 1; i < camera_size; ++i)
+        for (int j = 0; j < i; ++j) h(i, j) = h(j, i);
       for (int i = 0; i != camera_size; ++i) diagonal_[static_cast<Eigen::Index>(camera_size * u) + i] = h(i, i);
     }
   }

@@ -18,7 +18,7 @@
 #include <orbis/core/types.hpp>
 #include <orbis/optimize/bundle_problem.hpp>
 #include <orbis/optimize/detail/bundle/bundle_equations.hpp>
-#include <orbis/optimize/detail/minimal/small_cholesky.hpp>
+#include <orbis/core/small_cholesky.hpp>
 
 namespace orbis::optimize::detail {
 

@@ -20,9 +20,9 @@ template <class R>
   matrix<R::dimension, R::intrinsic_dimension> by_intrinsics;
   const auto r = residual.linearize_in_camera(view, q, o, by_q, by_intrinsics);
   if (!r) return r;
-  by_camera.template leftCols<3>() = -by_q;
-  by_camera.template middleCols<3>(3) = by_q * hat<double>(q);
-  if constexpr (R::intrinsic_dimension != 0) by_camera.template rightCols<R::intrinsic_dimension>() = by_intrinsics;
+  set_block(by_camera, 0, 0, -by_q);
+  set_block(by_camera, 0, 3, by_q * hat<double>(q));
+  if constexpr (R::intrinsic_dimension != 0) set_block(by_camera, 0, 6, by_intrinsics);
   by_point = by_q * view.rotation;
   return r;
 }

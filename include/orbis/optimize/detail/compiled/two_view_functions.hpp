@@ -206,7 +206,7 @@ ORBIS_COMPILED_ONCE result<std::vector<plane_motion>> decompose_homography(const
     return motions;
   }
   mat3 v;
-  for (int k = 0; k != 3; ++k) v.col(k) = vectors.col(2 - k);
+  for (int k = 0; k != 3; ++k) set_column(v, k, column_of(vectors, 2 - k));
   if (determinant(v) < 0.0) v = -v;
   const double a = std::sqrt(std::fmax(0.0, 1.0 - s3) / (s1 - s3)), b = std::sqrt(std::fmax(0.0, s1 - 1.0) / (s1 - s3));
   for (const double sign : {1.0, -1.0}) {
@@ -215,7 +215,7 @@ ORBIS_COMPILED_ONCE result<std::vector<plane_motion>> decompose_homography(const
     const vec3 hv = h * middle, hu = h * u;
     const mat3 after = columns(hv, hu, cross(hv, hu));
     const so3 rotation(mat3(after * transposed(before)));
-    vec3 normal = before.col(2);
+    vec3 normal = column_of(before, 2);
     vec3 translation = (h - rotation.rotation_matrix()) * normal;
     if (dot(normal, ray) < 0.0) {
       normal = -normal;

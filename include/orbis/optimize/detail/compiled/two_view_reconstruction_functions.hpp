@@ -23,7 +23,7 @@
 #include <orbis/optimize/detail/minimal/essential_estimator.hpp>
 #include <orbis/optimize/detail/minimal/image_matches.hpp>
 #include <orbis/optimize/detail/minimal/ray_homography_estimator.hpp>
-#include <orbis/optimize/detail/minimal/small_cholesky.hpp>
+#include <orbis/core/small_cholesky.hpp>
 #include <orbis/optimize/detail/minimal/two_view_hypotheses.hpp>
 #include <orbis/optimize/ransac.hpp>
 #include <orbis/optimize/triangulation.hpp>
@@ -190,7 +190,7 @@ struct two_view_inliers {
     jackknife *= static_cast<double>(parts - 1) / static_cast<double>(parts);
     const auto largest = [](const auto& c) {
       return std::pair{eigen_of_symmetric<3>(mat3(block<3, 3>(c, 0, 0))).values[2],
-                       eigen_of_symmetric<2>(mat2(c.template bottomRightCorner<2, 2>())).values[1]};
+                       eigen_of_symmetric<2>(block<2, 2>(c, 3, 3)).values[1]};
     };
     const auto [turn, direction] = largest(covariance);
     const auto [turn_of_parts, direction_of_parts] = largest(jackknife);

@@ -99,7 +99,7 @@ struct epipolar_equations {
     for (int j = 0; j != 5; ++j) {
       const mat3 d =
           j < 3 ? mat3(hat<double>(m.direction) * hat<double>(vec3(vec3::Unit(j))) * m.rotation.rotation_matrix())
-                : mat3(hat<double>(vec3(basis.col(j - 3))) * m.rotation.rotation_matrix());
+                : mat3(hat<double>(column_of(basis, j - 3)) * m.rotation.rotation_matrix());
       for (int entry = 0; entry != 9; ++entry) by_step(entry, j) = d(entry / 3, entry % 3);
     }
     const matrix<9, 5> h_by_step = h.lazyProduct(by_step);

@@ -25,7 +25,7 @@
 #include <orbis/optimize/detail/minimal/five_point.hpp>
 #include <orbis/optimize/detail/minimal/horn.hpp>
 #include <orbis/optimize/detail/minimal/image_matches.hpp>
-#include <orbis/optimize/detail/minimal/small_cholesky.hpp>
+#include <orbis/core/small_cholesky.hpp>
 #include <orbis/optimize/detail/unroll.hpp>
 #include <orbis/optimize/ransac.hpp>
 
@@ -33,13 +33,13 @@ namespace orbis::optimize::detail {
 
 /// The four poses `T_second_first` (translations of length 1) that an essential matrix may stand for.
 [[nodiscard]] inline std::array<se3, 4> decompose_essential(const mat3& essential) {
-  auto [u, values, v] = singular_values_of<3>(mat3(essential));
-  if (determinant(u) < 0.0) u.col(2) = -u.col(2).eval();
-  if (determinant(v) < 0.0) v.col(2) = -v.col(2).eval();
+  auto [u, values, v] = singular_values_of<3>(essential);
+  if (determinant(u) < 0.0) set_column(u, 2, -column_of(u, 2));
+  if (determinant(v) < 0.0) set_column(v, 2, -column_of(v, 2));
   mat3 quarter;
   quarter << 0, -1, 0, 1, 0, 0, 0, 0, 1;
-  const so3 one(mat3(u * quarter * transposed(v))), other(mat3(u * transposed(quarter) * transposed(v)));
-  const vec3 t = u.col(2);
+  const so3 one(u * quarter * transposed(v)), other(u * transposed(quarter) * transposed(v));
+  const vec3 t = column_of(u, 2);
   return {se3(one, t), se3(one, -t), se3(other, t), se3(other, -t)};
 }
 
@@ -104,8 +104,8 @@ class essential_estimator {
     const se3 pose = decompose_essential(start)[0];
     const auto step = [](const epipolar_motion& m, const epipolar_equations& at) -> std::optional<epipolar_motion> {
       auto [a, g] = at.by_motion(m);
-      a.diagonal() *= 1.0 + 1e-9;
-      a.diagonal().array() += 1e-12 * a.diagonal().maxCoeff();
+      change_diagonal(a, 1.0 + 1e-9, 0.0);
+      change_diagonal(a, 1.0, 1e-12 * largest_of(diagonal_of(a)));
       small_cholesky<5> factors;
       if (!factors.set(a) || !(factors.factor(0.0) > 0.0)) return std::nullopt;
       const matrix<5> d = -factors.solve(g);

@@ -140,7 +140,7 @@ inline void add_product(cubic& sum, const quadric& a, const linear& b) noexcept 
     if (step != 0 && !(error < last)) break;
     last = error;
     previous = p;
-    p -= normal.inverse() * gradient;
+    p -= inverse(normal) * gradient;
     if (error == 0.0 || !all_finite(p)) break;
   }
   p = previous;
@@ -221,7 +221,7 @@ inline void add_product(cubic& sum, const quadric& a, const linear& b) noexcept 
   std::array<std::array<double, 9>, 5> rows;
   for (std::size_t i = 0; i != 5; ++i) {
     const vec3 a = normalized(vec3(first[i])), b = normalized(vec3(second[i]));
-    if (!std::isfinite(a.sum() + b.sum())) return solutions;
+    if (!std::isfinite(sum_of(a) + sum_of(b))) return solutions;
     for (int row = 0; row != 3; ++row)
       for (int column = 0; column != 3; ++column)
         rows[i][static_cast<std::size_t>(3 * row + column)] = b[row] * a[column];
@@ -268,7 +268,7 @@ inline void add_product(cubic& sum, const quadric& a, const linear& b) noexcept 
         const auto& p = b[static_cast<std::size_t>(i)][static_cast<std::size_t>(part)];
         at(i, part) = (((p[4] * z + p[3]) * z + p[2]) * z + p[1]) * z + p[0];
       }
-    for (int i = 0; i != 3; ++i) at.row(i).normalize();
+    for (int i = 0; i != 3; ++i) set_row(at, i, normalized(row_of(at, i)));
     vec3 null = cross(row_of(at, 0), row_of(at, 1));
     for (const auto& [i, j] : {std::pair{0, 2}, std::pair{1, 2}})
       if (const vec3 other = cross(row_of(at, i), row_of(at, j)); squared_norm(other) > squared_norm(null))

@@ -16,7 +16,7 @@
 
 #include <orbis/core/types.hpp>
 #include <orbis/optimize/detail/minimal/descent.hpp>
-#include <orbis/optimize/detail/minimal/small_cholesky.hpp>
+#include <orbis/core/small_cholesky.hpp>
 #include <orbis/optimize/ransac.hpp>
 
 namespace orbis::optimize::detail {
@@ -36,13 +36,13 @@ namespace orbis::optimize::detail {
     weights[k] = vec3(cross(3, 1, 2), cross(0, 3, 2), cross(0, 1, 3));
     const double area = cross(0, 1, 2);
     const double extent = squared_norm(p[1] - p[0]) + squared_norm(p[2] - p[0]) + squared_norm(p[3] - p[0]);
-    if (!(std::min(std::fabs(area), weights[k].cwiseAbs().minCoeff()) > 1e-6 * extent)) return false;
+    if (!(std::min(std::fabs(area), smallest_of(magnitudes(weights[k]))) > 1e-6 * extent)) return false;
     weights[k] /= area;
-    for (int i = 0; i != 3; ++i) bases[k].col(i) = weights[k][i] * p[static_cast<std::size_t>(i)].homogeneous();
+    for (int i = 0; i != 3; ++i) set_column(bases[k], i, weights[k][i] * homogeneous(p[static_cast<std::size_t>(i)]));
   }
-  const vec3 ratio = weights[1].cwiseQuotient(weights[0]);
-  if (!(ratio.minCoeff() > 0.0)) return false;  // some points would see the plane from behind
-  out = bases[1] * bases[0].inverse();
+  for (int i = 0; i != 3; ++i)
+    if (!(weights[1][i] / weights[0][i] > 0.0)) return false;  // some points would see the plane from behind
+  out = bases[1] * inverse(bases[0]);
   out /= norm(out);
   return all_finite(out);
 }
@@ -86,7 +86,7 @@ class homography_estimator {
 
   [[nodiscard]] double squared_error(const model& m, std::size_t i) const {
     const match& x = matches_[i];
-    const vec3 p = m.forward * x.first.homogeneous(), q = m.backward * x.second.homogeneous();
+    const vec3 p = m.forward * homogeneous(x.first), q = m.backward * homogeneous(x.second);
     return 0.5 * (squared_norm(head<2>(p) / p.z() - x.second) +
                   squared_norm(head<2>(q) / q.z() - x.first));
   }
@@ -134,7 +134,7 @@ class homography_estimator {
 
  private:
   [[nodiscard]] static model made_of(const mat3& h) {
-    model m{h / norm(h), h.inverse()};
+    model m{h / norm(h), inverse(h)};
     m.backward /= norm(m.backward);
     return m;
   }
@@ -158,7 +158,7 @@ class homography_estimator {
         projection << inverse, 0.0, -xy.x() * inverse, 0.0, inverse, -xy.y() * inverse;
         const matrix<2, 3> a = projection * by_d;
         matrix<2, 8> j;
-        for (int k = 0; k != 8; ++k) j.col(k) = a.col(k / 3) * moved[k % 3];
+        for (int k = 0; k != 8; ++k) set_column(j, k, column_of(a, k / 3) * moved[k % 3]);
         const vec2 r = xy - seen;
         for (int k = 0; k != 8; ++k) {
           for (int l = k; l != 8; ++l) e.h(l, k) += j(0, l) * j(0, k) + j(1, l) * j(1, k);
@@ -166,9 +166,9 @@ class homography_estimator {
         }
         e.cost += squared_norm(r);
       };
-      const vec3 p = m.forward * x.first.homogeneous();
+      const vec3 p = m.forward * homogeneous(x.first);
       add(p, x.second, identity<mat3>(), p);
-      add(m.backward * x.second.homogeneous(), x.first, -m.backward, x.second.homogeneous());
+      add(m.backward * homogeneous(x.second), x.first, -m.backward, homogeneous(x.second));
     }
     return e;
   }

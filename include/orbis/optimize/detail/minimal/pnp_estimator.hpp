@@ -18,7 +18,7 @@
 #include <orbis/optimize/detail/minimal/descent.hpp>
 #include <orbis/optimize/detail/minimal/p3p_equations.hpp>
 #include <orbis/optimize/detail/minimal/pnp_matches.hpp>
-#include <orbis/optimize/detail/minimal/small_cholesky.hpp>
+#include <orbis/core/small_cholesky.hpp>
 #include <orbis/optimize/ransac.hpp>
 
 namespace orbis::optimize::detail {
@@ -46,8 +46,7 @@ template <class SumUp>
   const auto step = [](const state& s, const pose_equations& e) -> std::optional<state> {
     // A very small damping, so that directions stay that the matches do not determine.
     mat6 damped = e.h;
-    damped.diagonal() *= 1.0 + 1e-9;
-    damped.diagonal().array() += 1e-12 * e.h.diagonal().maxCoeff();
+    change_diagonal(damped, 1.0 + 1e-9, 1e-12 * largest_of(diagonal_of(e.h)));
     small_cholesky<6> factors;
     if (!factors.set(damped) || !(factors.factor(0.0) > 0.0)) return std::nullopt;
     const vec6 d = -factors.solve(e.g);

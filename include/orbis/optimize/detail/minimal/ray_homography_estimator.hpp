@@ -18,7 +18,7 @@
 #include <orbis/optimize/detail/minimal/descent.hpp>
 #include <orbis/optimize/detail/minimal/homography_estimator.hpp>
 #include <orbis/optimize/detail/minimal/image_matches.hpp>
-#include <orbis/optimize/detail/minimal/small_cholesky.hpp>
+#include <orbis/core/small_cholesky.hpp>
 
 namespace orbis::optimize::detail {
 
@@ -91,7 +91,7 @@ class ray_homography_estimator {
  private:
   /// Empty if singular.
   [[nodiscard]] static std::optional<model> made_of(const mat3& h, const vec3& in_front) {
-    model m{h / norm(h), h.inverse()};
+    model m{h / norm(h), inverse(h)};
     if ((m.forward * in_front).z() < 0.0) m.forward = -m.forward;
     m.backward /= norm(m.backward);
     if ((m.backward * (m.forward * in_front)).z() < 0.0) m.backward = -m.backward;
@@ -120,7 +120,7 @@ class ray_homography_estimator {
         metric << seen.xx, seen.xy, 0.0, seen.yy;
         const matrix<2, 3> a = metric * projection * by_d;
         matrix<2, 8> j;
-        for (int k = 0; k != 8; ++k) j.col(k) = a.col(k / 3) * moved[k % 3];
+        for (int k = 0; k != 8; ++k) set_column(j, k, column_of(a, k / 3) * moved[k % 3]);
         const vec2 r = metric * vec2(xy.x() - seen.x, xy.y() - seen.y);
         for (int k = 0; k != 8; ++k) {
           for (int l = k; l != 8; ++l) e.h(l, k) += j(0, l) * j(0, k) + j(1, l) * j(1, k);

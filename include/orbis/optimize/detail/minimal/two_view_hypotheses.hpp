@@ -26,7 +26,7 @@
 #include <orbis/optimize/detail/minimal/horn.hpp>
 #include <orbis/optimize/detail/minimal/image_matches.hpp>
 #include <orbis/optimize/detail/minimal/ray_homography_estimator.hpp>
-#include <orbis/optimize/detail/minimal/small_cholesky.hpp>
+#include <orbis/core/small_cholesky.hpp>
 
 namespace orbis::optimize::detail {
 

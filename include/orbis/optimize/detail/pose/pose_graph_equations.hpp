@@ -146,11 +146,11 @@ class pose_graph_equations {
       const auto& from = along ? by_from : by_to;
       const auto& to = along ? by_to : by_from;
       const matrix<Between::dimension, size> weighted = information * to;
-      sum.to.noalias() += transposed(to) * weighted;
-      mixed.noalias() += transposed(from) * weighted;
-      sum.from.noalias() += transposed(from) * (information * from);
-      sum.gradient_from.noalias() += weight * (transposed(from) * pull);
-      sum.gradient_to.noalias() += weight * (transposed(to) * pull);
+      sum.to += transposed(to) * weighted;
+      mixed += transposed(from) * weighted;
+      sum.from += transposed(from) * (information * from);
+      sum.gradient_from += weight * (transposed(from) * pull);
+      sum.gradient_to += weight * (transposed(to) * pull);
     }
     if (b < off_diagonal_.size()) off_diagonal_[b] = mixed;
     return cost;
@@ -168,8 +168,10 @@ class pose_graph_equations {
     }
     on_diagonal_[u] = hessian;
     const auto row = static_cast<Eigen::Index>(size * u);
-    gradient_.template segment<size>(row) = gradient;
-    diagonal_.template segment<size>(row) = hessian.diagonal();
+    for (int i = 0; i != size; ++i) {
+      gradient_[row + i] = gradient[i];
+      diagonal_[row + i] = hessian(i, i);
+    }
   }
 
   [[nodiscard]] double sum_of_chunks() const {

@@ -38,8 +38,8 @@ template <int N>
   matrix<N, N> m;
   for (int i = 0; i != N; ++i)
     for (int j = 0; j != N; ++j) m(i, j) = given(i, j) * inverse_scale[i] * inverse_scale[j];
-  if (!((m - transposed(m)).cwiseAbs().maxCoeff() <= 1e-6)) return false;
-  if (semidefinite) m.diagonal().array() += 1e-9;
+  if (!(largest_magnitude(m - transposed(m)) <= 1e-6)) return false;
+  if (semidefinite) change_diagonal(m, 1.0, 1e-9);
   for (int j = 0; j != N; ++j) {  // Cholesky factorisation
     for (int i = j; i != N; ++i)
       for (int k = 0; k != j; ++k) m(i, j) -= m(i, k) * m(j, k);

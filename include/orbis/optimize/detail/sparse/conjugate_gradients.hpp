@@ -16,7 +16,7 @@
 #include <Eigen/Core>
 
 #include <orbis/core/types.hpp>
-#include <orbis/optimize/detail/minimal/small_cholesky.hpp>
+#include <orbis/core/small_cholesky.hpp>
 #include <orbis/optimize/detail/sparse/block_ordering.hpp>
 
 namespace orbis::optimize::detail {

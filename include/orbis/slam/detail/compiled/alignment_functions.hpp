@@ -51,22 +51,25 @@ ORBIS_COMPILED_ONCE depth_equations equations_of(std::span<const plane_observati
 
   // Eigenvalues where a radian counts as the metres at the mean range.
   vec6 scale = filled<vec6>(1);
-  scale.tail<3>().setConstant(n / range);
-  const mat6 scaled = scale.asDiagonal() * h[0] * scale.asDiagonal() / weights;
+  for (int i = 3; i != 6; ++i) scale[i] = n / range;
+  mat6 scaled;
+  for (int i = 0; i != 6; ++i)
+    for (int k = 0; k != 6; ++k) scaled(i, k) = scale[i] * h[0](i, k) * scale[k] / weights;
   const symmetric_eigen<6> directions = eigen_of_symmetric<6>(scaled);
   e.least = directions.values[0];
   mat6 keep = zeros<mat6>();
   for (int i = 0; i != 6; ++i) {
     if (!(directions.values[i] > weakest)) continue;
     ++e.determined;
-    keep += directions.vectors.col(i) * transposed(directions.vectors.col(i));
+    const vec6 v = column_of(directions.vectors, i);
+    keep += outer_product(v, v);
   }
-  keep = scale.cwiseInverse().asDiagonal() * keep * scale.asDiagonal();  // of scaled gradients: of gradients
+  for (int i = 0; i != 6; ++i)  // of scaled gradients: of gradients
+    for (int k = 0; k != 6; ++k) keep(i, k) *= scale[k] / scale[i];
   const double share = std::min(1.0, points / n);
   for (mat6& m : h) m = share * (keep * m * transposed(keep));
   for (vec6& v : g) v = share * (keep * v);
-  e.term.h << h[0], h[1], h[1], h[2];
-  e.term.g << g[0], g[1];
+  set_parts(e.term, h, g);
   e.term.cost = share * cost;
   return e;
 }
@@ -75,7 +78,8 @@ ORBIS_COMPILED_ONCE vec6 step_of(const depth_equations& e) {
   const symmetric_eigen<6> h = eigen_of_symmetric<6>(block<6, 6>(e.term.h, 0, 0));
   vec6 step = zeros<vec6>();
   for (int i = 6 - e.determined; i < 6; ++i)  // the others are zero
-    if (h.values[i] > 0.0) step -= h.vectors.col(i) * (dot(h.vectors.col(i), head<6>(e.term.g)) / h.values[i]);
+    if (const vec6 v = column_of(h.vectors, i); h.values[i] > 0.0)
+      step -= v * (dot(v, head<6>(e.term.g)) / h.values[i]);
   return step;
 }
 

@@ -12,6 +12,7 @@
 
 #include <orbis/core/compiled_once.hpp>
 #include <orbis/core/se3.hpp>
+#include <orbis/core/small_cholesky.hpp>
 #include <orbis/core/types.hpp>
 #include <orbis/slam/detail/shutter/motion_refinement.hpp>
 
@@ -24,20 +25,18 @@ ORBIS_COMPILED_ONCE vec6 twist_prior::expected(const se3& T_camera_world) const 
 }
 
 ORBIS_COMPILED_ONCE void pose_quadratic::hold_twist() {
-  h.rightCols<6>().setZero();
-  h.bottomRows<6>().setZero();
-  g.tail<6>().setZero();
+  for (int i = 0; i != 12; ++i)
+    for (int k = 6; k != 12; ++k) h(i, k) = h(k, i) = 0.0;
+  for (int i = 6; i != 12; ++i) g[i] = 0.0;
 }
 
 ORBIS_COMPILED_ONCE void add_terms(moving_pose_equations& e, const std::array<mat6, 3>& h, const std::array<vec6, 2>& g,
                                    const se3& T_camera_world, const vec6& twist, const twist_prior& prior,
                                    const refinement_terms& terms) {
-  e.h << h[0], h[1], h[1], h[2];
-  e.g << g[0], g[1];
+  set_parts(e, h, g);
   if (terms.other != nullptr) {
     const pose_quadratic& q = *terms.other;
-    matrix<12, 1> step;
-    step << (T_camera_world * q.at.T_world_camera).log(), twist - q.at.twist;
+    const matrix<12, 1> step = stacked((T_camera_world * q.at.T_world_camera).log(), twist - q.at.twist);
     const matrix<12, 1> slope = q.h * step;
     e.h += q.h;
     e.g += q.g + slope;
@@ -61,30 +60,29 @@ ORBIS_COMPILED_ONCE void add_terms(moving_pose_equations& e, const std::array<ma
 }
 
 ORBIS_COMPILED_ONCE matrix<12, 1> newton_step(const moving_pose_equations& e, bool moves) {
-  if (moves) return e.h.ldlt().solve(-e.g);
-  matrix<12, 1> step = zeros<matrix<12, 1>>();
-  step.head<6>() = block<6, 6>(e.h, 0, 0).ldlt().solve(-head<6>(e.g));
-  return step;
+  if (moves) return solve_semidefinite(e.h, matrix<12>(-e.g)).value_or(zeros<matrix<12>>());
+  const auto pose = solve_semidefinite(block<6, 6>(e.h, 0, 0), vec6(-head<6>(e.g)));
+  return stacked(pose.value_or(zeros<vec6>()), zeros<vec6>());
 }
 
-[[nodiscard]] inline vec6 deviations_of(const twist_prior& prior) {
-  vec6 d;
-  d << vec3::Constant(prior.translation_deviation), vec3::Constant(prior.rotation_deviation);
-  return d;
+/// The squares of the deviations, times the square of `factor`, on the diagonal.
+[[nodiscard]] inline mat6 variances_of(const twist_prior& prior, double factor) {
+  const double t = factor * prior.translation_deviation, r = factor * prior.rotation_deviation;
+  return diagonal_matrix(stacked(filled<vec3>(t * t), filled<vec3>(r * r)));
 }
 
 ORBIS_COMPILED_ONCE void early_depth_twist::determine(const std::array<mat6, 3>& h, const twist_prior& prior) {
-  pose_covariance_ = h[0].inverse();
+  pose_covariance_ = inverse(h[0]);
   if (!prior.T_world_before) return;
   // The prior ties the twist to both poses, of which the former one is not exact either.
   const double by_pose = (1.0 + prior.trend) / prior.interval;
   const mat6 tie =
-      (mat6(deviations_of(prior).cwiseAbs2().asDiagonal()) + by_pose * by_pose * former_covariance_).inverse();
+      inverse(variances_of(prior, 1.0) + by_pose * by_pose * former_covariance_);
   const mat6 mixed = h[1] + by_pose * tie;
-  const mat6 of_twist = h[2] + tie - transposed(mixed) * (h[0] + by_pose * by_pose * tie).inverse() * mixed;
+  const mat6 of_twist = h[2] + tie - transposed(mixed) * inverse(h[0] + by_pose * by_pose * tie) * mixed;
   // From one frame to the next a twist changes by twice the deviation of the prior, which is that from the mean.
-  const mat6 change = mat6((2.0 * deviations_of(prior)).cwiseAbs2().asDiagonal());
-  gain_ = change * (change + of_twist.inverse()).inverse();
+  const mat6 change = variances_of(prior, 2.0);
+  gain_ = change * inverse(change + inverse(of_twist));
 }
 
 ORBIS_COMPILED_ONCE vec6 early_depth_twist::between(const twist_prior& prior, const vec6& refined) const {

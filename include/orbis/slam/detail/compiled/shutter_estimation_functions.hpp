@@ -40,7 +40,7 @@ ORBIS_COMPILED_ONCE shutter_estimate shutter_estimator::estimate(const camera::s
   const bool tells_delay = sum.h(1, 1) > 0.0 && determinant(sum.h) > 0.0;
   matrix<2, 2> inverse = zeros<matrix<2, 2>>();
   if (tells_delay)
-    inverse = sum.h.inverse();
+    inverse = orbis::inverse(sum.h);
   else
     inverse(0, 0) = 1.0 / sum.h(0, 0);
   const vec2 found = inverse * sum.c;

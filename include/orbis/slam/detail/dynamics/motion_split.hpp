@@ -132,10 +132,10 @@ class motion_splitter {
       sum += left * w;
       weight += w;
       mean += w * p;
-      squares += w * p.cwiseProduct(p);
+      squares += w * entrywise_product(p, p);
     }
     if (!(weight > 0.0)) return 0.0;
-    const double variance = (squares / weight - (mean / weight).cwiseAbs2()).sum();
+    const double variance = sum_of(squares / weight - entrywise_product(mean / weight, mean / weight));
     return sum * std::sqrt(std::max(variance, 0.0));
   }
 

@@ -110,8 +110,7 @@ template <camera::camera_model Camera>
   mat3 by_point;
   const auto r = model.residual(q, o.seen, by_point);
   if (!r) return std::nullopt;
-  j.template leftCols<3>() = by_point;
-  j.template rightCols<3>() = -by_point * hat<double>(q);
+  j = side_by_side(by_point, -by_point * hat<double>(q));
   return r;
 }
 
@@ -139,6 +138,16 @@ struct moving_pose_equations {
   matrix<12, 1> g;
   double cost = 0.0;  ///< half the robust sum
 };
+
+/// The equations for a pose and its twist (h, g of `to`) of those given by powers of the rows' times.
+template <class Equations>
+void set_parts(Equations& to, const std::array<mat6, 3>& h, const std::array<vec6, 2>& g) {
+  set_block(to.h, 0, 0, h[0]);
+  set_block(to.h, 0, 6, h[1]);
+  set_block(to.h, 6, 0, h[1]);
+  set_block(to.h, 6, 6, h[2]);
+  to.g = stacked(g[0], g[1]);
+}
 
 /// Adds to equations of the keypoints, which are given by powers of the rows' times, what else determines pose and
 /// twist.
@@ -196,8 +205,8 @@ class early_depth_twist {
       matrix<3, 6> j;
       const auto r = row_residual(model, T_camera_world, at.twist, o, j);
       if (!r) continue;
-      const auto by_pixel = j.template topRows<2>();
-      const double error = std::sqrt(squared_norm(r->template head<2>()) * o.seen.information);
+      const matrix<2, 6> by_pixel = block<2, 6>(j, 0, 0);
+      const double error = std::sqrt(squared_norm(head<2>(*r)) * o.seen.information);
       const double weight = share * o.seen.information * (error <= width ? 1.0 : width / error);
       const mat6 a = weight * transposed(by_pixel) * by_pixel;
       h[0] += a, h[1] -= o.time * a, h[2] += o.time * o.time * a;

@@ -116,14 +116,13 @@ template <camera::camera_model Camera>
     const double information = std::min(from.information[at->second], to.information[i]);
     const double error = std::sqrt(r->squaredNorm() * information);
     const double weight = information * (error <= width ? 1.0 : width / error);
-    matrix<3, 6> by_pose;
-    by_pose.template leftCols<3>() = by_point;
-    by_pose.template rightCols<3>() = -by_point * hat<double>(q);
+    const matrix<3, 6> by_pose = side_by_side(by_point, -by_point * hat<double>(q));
     const depth_change change_a = from.changes[at->second].if_even(a.depth), change_b = to.changes[i].if_even(b.depth);
     matrix<3, 2> by_shutter;
-    by_shutter.col(0) =
-        by_point * (T_to_from.rotation() * (share(a.y) * speed(from.twist, there)) - share(b.y) * speed(to.twist, q));
-    by_shutter.col(1) = by_point * (T_to_from.rotation() * vec3(change_a.rate() * ray));
+    set_column(
+        by_shutter, 0,
+        by_point * (T_to_from.rotation() * (share(a.y) * speed(from.twist, there)) - share(b.y) * speed(to.twist, q)));
+    set_column(by_shutter, 1, by_point * (T_to_from.rotation() * (change_a.rate() * ray)));
     const double z = static_cast<double>(b.depth);
     const double by_depth = o.has_depth() ? rig.model.bf / (z * z) : 0.0;  // of what was measured
     by_shutter(2, 1) -= by_depth * change_b.rate();
@@ -136,7 +135,7 @@ template <camera::camera_model Camera>
     // Depth is noisy, and so is its rate, whose square would be too large: the delay would come out too small. The
     // squared errors of three readings with the same noise are a parabola without this bias.
     const auto moved = [&](float in_a, float in_b) {
-      const vec3 row = transposed(by_point.row(2));
+      const vec3 row = row_of(by_point, 2);
       return (*r)[2] + dot(row, T_to_from.rotation() * vec3(static_cast<double>(in_a) * ray)) -
              by_depth * static_cast<double>(in_b);
     };

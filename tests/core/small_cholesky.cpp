@@ -4,7 +4,7 @@
 #include <Eigen/Cholesky>
 
 #include <orbis/core/random.hpp>
-#include <orbis/optimize/detail/minimal/small_cholesky.hpp>
+#include <orbis/core/small_cholesky.hpp>
 
 #include "support/catch.hpp"
 
@@ -23,7 +23,7 @@ void check_size() {
     const double damping = trial % 2 == 0 ? 0.0 : random.uniform(0, 10);
     matrix<N> b;
     for (int i = 0; i != N; ++i) b[i] = random.normal() * a.col(i).norm();
-    optimize::detail::small_cholesky<N> cholesky;
+    small_cholesky<N> cholesky;
     REQUIRE(cholesky.set(h));
     REQUIRE(cholesky.factor(damping) > 0.0);
     const matrix<N> x = cholesky.solve(b);
@@ -49,7 +49,7 @@ TEST_CASE("Small systems are solved whatever the units") {
 }
 
 TEST_CASE("Small systems that are not determined show it in the smallest pivot, or say so at once") {
-  optimize::detail::small_cholesky<3> cholesky;
+  small_cholesky<3> cholesky;
   mat3 h = vec3(1, 2, 3) * vec3(1, 2, 3).transpose() + vec3(0, 1, -1) * vec3(0, 1, -1).transpose();
   REQUIRE(cholesky.set(h));
   CHECK_FALSE(cholesky.factor(0.0) > cholesky.determined);

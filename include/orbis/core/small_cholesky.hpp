@@ -4,10 +4,11 @@
 #pragma once
 
 #include <cmath>
+#include <optional>
 
 #include <orbis/core/types.hpp>
 
-namespace orbis::optimize::detail {
+namespace orbis {
 
 /// `H = L D L^T` of a symmetric N x N matrix that is first scaled to a unit diagonal, so that its pivots do not depend
 /// on the units of the unknowns or on the number of residuals. O(N^3), for N up to about ten.
@@ -71,7 +72,7 @@ class small_cholesky {
     for (int j = 0; j != N; ++j) {
       vector unit = zeros<vector>();
       unit[j] = 1.0;
-      out.col(j) = solve(unit);
+      set_column(out, j, solve(unit));
     }
     return out;
   }
@@ -84,4 +85,15 @@ class small_cholesky {
   double scaled_[N][N] = {}, l_[N][N] = {};  // the lower triangles
 };
 
-}  // namespace orbis::optimize::detail
+/// The solution of `h x = b` for a positive semidefinite matrix, damped by the least factor that makes its pivots
+/// positive, 1e-12 or more. Empty if an entry on the diagonal is not positive and finite.
+template <int N>
+[[nodiscard]] std::optional<matrix<N>> solve_semidefinite(const matrix<N, N>& h, const matrix<N>& b) {
+  small_cholesky<N> factors;
+  if (!factors.set(h)) return std::nullopt;
+  for (double damping = 1e-12; damping < 1.0; damping *= 100.0)
+    if (factors.factor(damping) > 1e-15) return factors.solve(b);
+  return std::nullopt;
+}
+
+}  // namespace orbis
