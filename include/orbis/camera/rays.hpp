@@ -20,7 +20,7 @@ class ray_table {
   /// O(width * height) un-projections; pixels without a ray get NaN.
   template <camera_model Camera>
   explicit ray_table(const Camera& camera)
-      : rays_{camera.width(), camera.height(), vec2f::Constant(std::numeric_limits<float>::quiet_NaN())} {
+      : rays_{camera.width(), camera.height(), filled<vec2f>(std::numeric_limits<float>::quiet_NaN())} {
     for (int y = 0; y != camera.height(); ++y)
       for (int x = 0; x != camera.width(); ++x) {
         if (const auto ray = camera.unproject({x, y})) rays_(x, y) = ray->template head<2>().template cast<float>();

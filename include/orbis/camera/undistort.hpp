@@ -49,7 +49,7 @@ class undistortion {
   undistortion(const Camera& camera, const pinhole& ideal, const mat3& R_camera_ideal = identity<mat3>())
       : source_width_{camera.width()},
         source_height_{camera.height()},
-        source_{ideal.width(), ideal.height(), vec2f::Constant(std::numeric_limits<float>::quiet_NaN())} {
+        source_{ideal.width(), ideal.height(), filled<vec2f>(std::numeric_limits<float>::quiet_NaN())} {
     for (int y = 0; y != ideal.height(); ++y)
       for (int x = 0; x != ideal.width(); ++x) {
         const auto ray = ideal.unproject({x, y});

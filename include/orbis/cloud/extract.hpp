@@ -39,8 +39,8 @@ enum class non_finite {
 
 /// A box along the axes, its faces included; unlimited by default.
 struct pass_through_options {
-  vec3 low = vec3::Constant(-std::numeric_limits<double>::infinity());  ///< metres
-  vec3 high = vec3::Constant(std::numeric_limits<double>::infinity());  ///< metres
+  vec3 low = filled<vec3>(-std::numeric_limits<double>::infinity());  ///< metres
+  vec3 high = filled<vec3>(std::numeric_limits<double>::infinity());  ///< metres
 };
 
 /// The indices, ascending, of the finite points inside the box. O(n).

@@ -13,8 +13,6 @@
 #include <concepts>
 #include <limits>
 
-#include <Eigen/LU>
-
 #include <orbis/core/se3.hpp>
 #include <orbis/core/so3.hpp>
 #include <orbis/core/types.hpp>
@@ -27,20 +25,24 @@ namespace detail {
 template <int N, class S>
 [[nodiscard]] matrix<N, N, S> exponential_integral(const matrix<N, N, S>& a) {
   using square = matrix<N, N, S>;
-  const S norm = a.cwiseAbs().colwise().sum().maxCoeff();
-  if (!std::isfinite(norm)) return square::Constant(std::numeric_limits<S>::quiet_NaN());
+  S largest = S(0);  // sum of the magnitudes in a column
+  for (int c = 0; c != N; ++c) {
+    const S sum = sum_of(magnitudes(column_of(a, c)));
+    if (!std::isfinite(sum)) return filled<square>(std::numeric_limits<S>::quiet_NaN());
+    largest = std::max(largest, sum);
+  }
   int doublings = 0;
-  for (S n = norm; n > S(0.5); n /= S(2)) ++doublings;
+  for (S n = largest; n > S(0.5); n /= S(2)) ++doublings;
 
   square x = a * std::ldexp(S(1), -doublings);
   square sum = identity<square>();
   square term = identity<square>();
   for (int n = 2; n != 16; ++n) {  // 0.5^15 / 16! is below the rounding of double
-    term = (term * x / static_cast<S>(n)).eval();
+    term = term * x / static_cast<S>(n);
     sum += term;
   }
   for (; doublings != 0; --doublings) {  // F(2x) = F(x) (exp(x) + 1) / 2, exp(x) = 1 + x F(x)
-    sum = (sum + S(0.5) * (sum * x * sum)).eval();
+    sum += S(0.5) * (sum * x * sum);
     x *= S(2);
   }
   return sum;

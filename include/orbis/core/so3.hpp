@@ -44,7 +44,7 @@ class basic_so3 {
   using quaternion = Eigen::Quaternion<S, Eigen::DontAlign>;
 
   /// The identity.
-  basic_so3() : q_{quaternion::Identity()} {}
+  basic_so3() : q_{S(1), S(0), S(0), S(0)} {}
   /// From a quaternion of any positive norm; normalises it.
   explicit basic_so3(const Eigen::Quaternion<S>& q) : q_{unit(q.x(), q.y(), q.z(), q.w())} {}
   explicit basic_so3(const quaternion& q) : q_{unit(q.x(), q.y(), q.z(), q.w())} {}
@@ -56,7 +56,7 @@ class basic_so3 {
   }
   /// From a matrix that is a rotation up to rounding. For matrices that are further off use
   /// `nearest_rotation`.
-  explicit basic_so3(const matrix<3, 3, S>& r) : basic_so3(quaternion(r)) {}
+  explicit basic_so3(const matrix<3, 3, S>& r) : basic_so3(quaternion_of(r)) {}
 
   /// The rotation by `|phi|` radians about `phi`.
   [[nodiscard]] static basic_so3 exp(const tangent& phi) {
@@ -90,23 +90,43 @@ class basic_so3 {
 
   [[nodiscard]] basic_so3 inverse() const {
     basic_so3 r;
-    r.q_ = q_.conjugate();
+    r.q_ = quaternion(q_.w(), -q_.x(), -q_.y(), -q_.z());
     return r;
   }
   [[nodiscard]] friend basic_so3 operator*(const basic_so3& a, const basic_so3& b) {
-    return basic_so3(quaternion(a.q_ * b.q_));
+    const quaternion &p = a.q_, &q = b.q_;
+    return basic_so3(quaternion(p.w() * q.w() - p.x() * q.x() - p.y() * q.y() - p.z() * q.z(),
+                                p.w() * q.x() + p.x() * q.w() + p.y() * q.z() - p.z() * q.y(),
+                                p.w() * q.y() + p.y() * q.w() + p.z() * q.x() - p.x() * q.z(),
+                                p.w() * q.z() + p.z() * q.w() + p.x() * q.y() - p.y() * q.x()));
   }
-  [[nodiscard]] friend point operator*(const basic_so3& r, const point& p) { return r.q_ * p; }
+  [[nodiscard]] friend point operator*(const basic_so3& r, const point& p) {
+    const point v(r.q_.x(), r.q_.y(), r.q_.z());
+    point twice = cross(v, p);
+    twice += twice;
+    return p + r.q_.w() * twice + cross(v, twice);
+  }
 
   [[nodiscard]] const quaternion& unit_quaternion() const { return q_; }
-  [[nodiscard]] matrix<3, 3, S> rotation_matrix() const { return q_.toRotationMatrix(); }
+  [[nodiscard]] matrix<3, 3, S> rotation_matrix() const {
+    const S tx = S(2) * q_.x(), ty = S(2) * q_.y(), tz = S(2) * q_.z();
+    const S twx = tx * q_.w(), twy = ty * q_.w(), twz = tz * q_.w();
+    const S txx = tx * q_.x(), txy = ty * q_.x(), txz = tz * q_.x();
+    const S tyy = ty * q_.y(), tyz = tz * q_.y(), tzz = tz * q_.z();
+    matrix<3, 3, S> m;
+    m(0, 0) = S(1) - (tyy + tzz), m(0, 1) = txy - twz, m(0, 2) = txz + twy;
+    m(1, 0) = txy + twz, m(1, 1) = S(1) - (txx + tzz), m(1, 2) = tyz - twx;
+    m(2, 0) = txz - twy, m(2, 1) = tyz + twx, m(2, 2) = S(1) - (txx + tyy);
+    return m;
+  }
   /// `exp(adjoint() * phi) == R exp(phi) R^-1`.
   [[nodiscard]] matrix<3, 3, S> adjoint() const { return rotation_matrix(); }
   /// The angle in radians, in [0, pi].
   [[nodiscard]] S angle() const { return norm(log()); }
   template <std::floating_point T>
   [[nodiscard]] basic_so3<T> cast() const {
-    return basic_so3<T>(typename basic_so3<T>::quaternion(q_.template cast<T>()));
+    return basic_so3<T>(typename basic_so3<T>::quaternion(static_cast<T>(q_.w()), static_cast<T>(q_.x()),
+                                                          static_cast<T>(q_.y()), static_cast<T>(q_.z())));
   }
 
   /// `exp(phi + delta) ~ exp(left_jacobian(phi) * delta) * exp(phi)`.
@@ -152,6 +172,24 @@ class basic_so3 {
     if (!(square > S(0))) return quaternion(w, x, y, z);
     const S norm = std::sqrt(square);
     return quaternion(w / norm, x / norm, y / norm, z / norm);
+  }
+  /// Source: K. Shoemake, "Animating rotation with quaternion curves", SIGGRAPH 1985, appendix I.
+  [[nodiscard]] static quaternion quaternion_of(const matrix<3, 3, S>& m) {
+    const S trace = m(0, 0) + (m(1, 1) + m(2, 2));
+    if (trace > S(0)) {
+      const S root = std::sqrt(trace + S(1)), scale = S(0.5) / root;
+      return quaternion(S(0.5) * root, (m(2, 1) - m(1, 2)) * scale, (m(0, 2) - m(2, 0)) * scale,
+                        (m(1, 0) - m(0, 1)) * scale);
+    }
+    int i = m(1, 1) > m(0, 0) ? 1 : 0;
+    if (m(2, 2) > m(i, i)) i = 2;
+    const int j = (i + 1) % 3, k = (i + 2) % 3;
+    const S root = std::sqrt(m(i, i) - m(j, j) - m(k, k) + S(1)), scale = S(0.5) / root;
+    S v[3];
+    v[i] = S(0.5) * root;
+    v[j] = (m(j, i) + m(i, j)) * scale;
+    v[k] = (m(k, i) + m(i, k)) * scale;
+    return quaternion((m(k, j) - m(j, k)) * scale, v[0], v[1], v[2]);
   }
   /// `I + a hat(phi) + b hat(phi)^2`.
   [[nodiscard]] static matrix<3, 3, S> polynomial_of_hat(const tangent& phi, S a, S b) {

@@ -104,7 +104,7 @@ class ray_geometry {
   }
   [[nodiscard]] vec2f point(std::size_t i, const keypoint&) const noexcept {
     const vec3& r = train_rays_[i];
-    if (!(r.z() > 0.0)) return vec2f::Constant(std::numeric_limits<float>::quiet_NaN());
+    if (!(r.z() > 0.0)) return filled<vec2f>(std::numeric_limits<float>::quiet_NaN());
     return {static_cast<float>(focal_ * r.x() / r.z()), static_cast<float>(focal_ * r.y() / r.z())};
   }
   [[nodiscard]] std::optional<vec2f> epipole() const noexcept {
@@ -124,7 +124,7 @@ template <camera::camera_model Camera>
   std::vector<vec3> rays;
   rays.reserve(keypoints.size());
   for (const keypoint& k : keypoints)
-    rays.push_back(camera.unproject(vec2{k.x, k.y}).value_or(vec3::Constant(std::numeric_limits<double>::quiet_NaN())));
+    rays.push_back(camera.unproject(vec2{k.x, k.y}).value_or(filled<vec3>(std::numeric_limits<double>::quiet_NaN())));
   return rays;
 }
 

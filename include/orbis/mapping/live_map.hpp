@@ -151,7 +151,7 @@ class live_map {
   result<void> set_depth(const Policy& policy, std::uint64_t frame, const depth_view& depth) {
     const entry* const k = find(frame);
     if (k == nullptr) return fail(errc::not_found, "keyframe " + std::to_string(frame), "there is no such keyframe");
-    const se3 pose = k->wanted ? *k->wanted : se3{so3{}, vec3::Constant(std::numeric_limits<double>::quiet_NaN())};
+    const se3 pose = k->wanted ? *k->wanted : se3{so3{}, filled<vec3>(std::numeric_limits<double>::quiet_NaN())};
     if (auto added = add_keyframe(policy, frame, depth, pose, completeness::filtered); !added)
       return fail(std::move(added.error()));
     return {};

@@ -64,7 +64,7 @@ struct upright_view {
   double confidence = 0.0;
 
   /// The direction of up in the camera's frame; a unit vector.
-  [[nodiscard]] vec3 up_camera() const { return R_world_camera.inverse() * vec3::UnitZ(); }
+  [[nodiscard]] vec3 up_camera() const { return R_world_camera.inverse() * vec3(0.0, 0.0, 1.0); }
 };
 
 /// The rotation to a world with z up, in which the camera looks along x as far as that is horizontal: with `up_camera`
@@ -98,13 +98,13 @@ template <camera::depth_source Depth>
 [[nodiscard]] upright_view find_upright(const Depth& depth, const camera::ray_table& rays,
                                         const upright_options& options = {}) {
   assert(depth.width() == rays.width() && depth.height() == rays.height());
-  if (options.gravity_camera && options.gravity_camera->allFinite() && options.gravity_camera->norm() > 0)
+  if (options.gravity_camera && options.gravity_camera->allFinite() && options.norm(*gravity_camera) > 0)
     return {upright_rotation(-options.gravity_camera->normalized()), upright_source::gravity, 1.0};
   const detail::planar_blocks blocks = detail::find_planar_blocks(depth, rays);
   const std::optional<detail::found_up> found = detail::vote_for_up(blocks.normals, options.max_tilt);
   const double all = static_cast<double>(std::max<std::size_t>(blocks.with_depth, 1));
   if (!found || found->fixing < options.min_support * all)
-    return {upright_rotation(-vec3::UnitY()), upright_source::assumed, 0.0};
+    return {upright_rotation(-vec3(0.0, 1.0, 0.0)), upright_source::assumed, 0.0};
   const bool floor_suffices = found->along >= options.min_support * all;
   return {upright_rotation(found->up), floor_suffices ? upright_source::floor : upright_source::walls,
           std::min(1.0, found->fixing / all)};

@@ -40,7 +40,7 @@ struct swept_shape {
 
 [[nodiscard]] inline octree::bounding_box bounds_of(const swept_shape<vertical_capsule>& s) {
   const octree::bounding_box b = bounds_of(octree::capsule{s.a, s.b, s.shape.radius});
-  return {b.min + s.shape.low * vec3::UnitZ(), b.max + s.shape.high * vec3::UnitZ()};
+  return {b.min + s.shape.low * vec3(0.0, 0.0, 1.0), b.max + s.shape.high * vec3(0.0, 0.0, 1.0)};
 }
 [[nodiscard]] inline octree::bounding_box bounds_of(const swept_shape<vertical_cylinder>& s) {
   const octree::bounding_box b = bounds_of(octree::capsule{s.a, s.b, s.shape.radius});
@@ -49,7 +49,7 @@ struct swept_shape {
 }
 /// Exact: the segment may as well be stretched in the box as in the robot.
 [[nodiscard]] inline bool touches(const swept_shape<vertical_capsule>& s, const octree::bounding_box& box) noexcept {
-  const octree::bounding_box stretched{box.min - s.shape.high * vec3::UnitZ(), box.max - s.shape.low * vec3::UnitZ()};
+  const octree::bounding_box stretched{box.min - s.shape.high * vec3(0.0, 0.0, 1.0), box.max - s.shape.low * vec3(0.0, 0.0, 1.0)};
   return touches(octree::capsule{s.a, s.b, s.shape.radius}, stretched);
 }
 /// Exact: the robot meets the box where its heights do (a piece of the way) and, seen from above, its circle does.

@@ -46,7 +46,7 @@ struct motion_state {
 /// end, the middle of the leg, the corner (see corner_points).
 struct path_piece {
   vec3 start = zeros<vec3>();
-  vec3 direction = vec3::UnitX(), turned = vec3::UnitX();  ///< of length 1
+  vec3 direction = vec3(1.0, 0.0, 0.0), turned = vec3(1.0, 0.0, 0.0);  ///< of length 1
   double length = 0.0;
 
   [[nodiscard]] vec3 position(double s) const {

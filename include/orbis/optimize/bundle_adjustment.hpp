@@ -161,7 +161,7 @@ class bundle_adjuster {
 
   [[nodiscard]] double chi2_in(const typename Residual::view& view, const vec3& point, const observation& o) const {
     const auto r = equations_.residual().residual(view, point, o);
-    return r ? o.information * r->squaredNorm() : std::numeric_limits<double>::infinity();
+    return r ? o.information * squared_norm(*r) : std::numeric_limits<double>::infinity();
   }
 
   [[nodiscard]] static bool check(std::size_t cameras, std::size_t points, std::span<const observation> observations,

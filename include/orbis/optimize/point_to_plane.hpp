@@ -24,7 +24,7 @@ struct point_to_plane {
 
   vec3 measured = zeros<vec3>();  ///< q, in the camera frame, metres
   vec3 on_plane = zeros<vec3>();  ///< p, in the world frame, metres
-  vec3 normal = vec3::UnitZ();   ///< n, in the world frame, of unit length
+  vec3 normal = vec3(0.0, 0.0, 1.0);   ///< n, in the world frame, of unit length
   double information = 1.0;      ///< 1 / sigma^2 along the normal, 1 / m^2
 
   [[nodiscard]] bool is_usable() const {
@@ -60,7 +60,7 @@ struct plane_observation {
   std::uint32_t pose = 0;
   std::uint32_t point = 0;
   vec3 measured = zeros<vec3>();  ///< in the camera frame, metres
-  vec3 normal = vec3::UnitZ();   ///< of the plane, in the world frame, of unit length
+  vec3 normal = vec3(0.0, 0.0, 1.0);   ///< of the plane, in the world frame, of unit length
   double information = 1.0;      ///< 1 / sigma^2 along the normal, 1 / m^2
 };
 

@@ -114,7 +114,7 @@ struct homography_estimate {
 struct plane_motion {
   so3 R_second_first;
   vec3 translation = zeros<vec3>();
-  vec3 normal = vec3::UnitZ();
+  vec3 normal = vec3(0.0, 0.0, 1.0);
 };
 
 /// The homography that takes `first[i]` to `second[i]` (pixels). Empty if three points of an image lie on one line, or
@@ -135,7 +135,7 @@ struct plane_motion {
 /// is no translation. (Two more would have the plane behind the first camera.) `ray` is any matched ray of the first
 /// camera, which lies in front of it. Errors: `degenerate` if the homography is singular or not finite.
 [[nodiscard]] result<std::vector<plane_motion>> decompose_homography(const mat3& homography,
-                                                                     const vec3& ray = vec3::UnitZ());
+                                                                     const vec3& ray = vec3(0.0, 0.0, 1.0));
 
 struct two_view_options {
   double deviation = 1.0;            ///< standard deviation of a matched pixel, along each axis, pixels

@@ -133,7 +133,7 @@ template <camera::camera_model Camera, feature_descriptor D>
   for (std::size_t i = 0; i < n; ++i) {
     const auto& k = f.features.keypoints[i];
     f.rays[i] =
-        rig.camera().unproject(vec2(k.x, k.y)).value_or(vec3::Constant(std::numeric_limits<double>::quiet_NaN()));
+        rig.camera().unproject(vec2(k.x, k.y)).value_or(filled<vec3>(std::numeric_limits<double>::quiet_NaN()));
   }
   f.grid = features::keypoint_grid(f.features.keypoints);
   return f;

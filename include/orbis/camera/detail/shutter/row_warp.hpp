@@ -137,7 +137,7 @@ class row_warp {
     rays_.reserve(across_ * down_);
     for (std::size_t j = 0; j != down_; ++j)
       for (std::size_t i = 0; i != across_; ++i)
-        rays_.push_back(camera.unproject({place(i), place(j)}).value_or(vec3::Constant(unknown)));
+        rays_.push_back(camera.unproject({place(i), place(j)}).value_or(filled<vec3>(unknown)));
     nodes_.resize(across_ * down_);
     row_.resize(across_);
   }
@@ -199,7 +199,7 @@ class row_warp {
     std::array<vec3, 3> f;
     for (std::size_t k = 0; k != 3; ++k) {
       const auto p = exactly(camera, rays_[j * across_ + i], place(j), static_cast<double>(k) * h);
-      f[k] = p ? vec3(p->x - place(i), p->y - place(j), p->ratio) : vec3::Constant(unknown);
+      f[k] = p ? vec3(p->x - place(i), p->y - place(j), p->ratio) : filled<vec3>(unknown);
     }
     const vec3 second = (f[0] - 2.0 * f[1] + f[2]) / (2.0 * h * h), first = (f[1] - f[0]) / h - h * second;
     warp_parabolas p;

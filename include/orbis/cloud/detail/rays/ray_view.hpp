@@ -99,7 +99,7 @@ class block_test {
     // The kernels' rounding is some 1e-6 of the distance.
     const double slack = 1e-5 * (norm(c) + norm(half));
     if constexpr (std::same_as<Camera, camera::pinhole>) {
-      const vec3 h = absolute_ * half + vec3::Constant(slack);
+      const vec3 h = absolute_ * half + filled<vec3>(slack);
       return pinhole_says_nothing(c - h, c + h);
     } else {
       if (!angle_) return false;

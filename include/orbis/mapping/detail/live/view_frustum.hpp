@@ -75,7 +75,7 @@ class view_frustum {
       const double of_a = reach_[i], of_b = reach_[(i + 1) % sides];
       const double sine = a.x() * b.y() - a.y() * b.x();
       corners_[i] = {(of_a * b.y() - of_b * a.y()) / sine, (a.x() * of_b - b.x() * of_a) / sine, 1.0};
-      if (!all_finite(corners_[i])) corners_[i] = vec3::UnitZ();  // there is no ray
+      if (!all_finite(corners_[i])) corners_[i] = vec3(0.0, 0.0, 1.0);  // there is no ray
     }
   }
 

@@ -37,7 +37,7 @@ struct cell_grid {
       for (int x = 0; x != across; ++x) {
         const auto ray = camera.unproject(vec2{edge * x + 0.5 * (edge - 1), edge * y + 0.5 * (edge - 1)});
         rays.push_back(ray ? vec2f{ray->template head<2>().template cast<float>()}
-                           : vec2f{vec2f::Constant(std::numeric_limits<float>::quiet_NaN())});
+                           : filled<vec2f>(std::numeric_limits<float>::quiet_NaN()));
       }
   }
   [[nodiscard]] std::size_t size() const noexcept { return rays.size(); }

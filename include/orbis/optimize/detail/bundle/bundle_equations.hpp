@@ -341,7 +341,7 @@ class bundle_equations {
     if (slot.row == slot.column)
       reduced_block(s) = camera_hessian_[slot.row];
     else
-      reduced_block(s).setZero();
+      reduced_block(s) = zeros<camera_block>();
   }
   /// Eliminates the points of a run. Returns the first one whose block is not positive definite, or `none`.
   [[nodiscard]] std::size_t eliminate_run(const elimination_run& run, const double* point_damping,
@@ -445,7 +445,7 @@ class bundle_equations {
   }
   void add_up_cameras() {
     gradient_.head(static_cast<Eigen::Index>(camera_size * structure_.unknowns())).setZero();
-    for (camera_block& h : camera_hessian_) h.setZero();
+    for (camera_block& h : camera_hessian_) h = zeros<camera_block>();
     for (std::size_t s = 0; s != structure_.segments.size(); ++s) {
       if (!moves_camera(s)) continue;
       const std::size_t u = structure_.unknown[structure_.segments[s].camera];

@@ -174,7 +174,7 @@ class covariance_computation {
   /// V^-1 + V^-1 W^T S^-1 W V^-1, of which the sum over pairs of cameras takes most.
   template <class Policy>
   void write_points(const Policy& policy, Output& out, std::size_t points, const Options& options) const {
-    out.points.assign(points, mat3::Constant(std::numeric_limits<double>::quiet_NaN()));
+    out.points.assign(points, filled<mat3>(std::numeric_limits<double>::quiet_NaN()));
     for (std::size_t j = 0; j != points; ++j)
       if (!options.fixed_points.empty() && options.fixed_points[j] != 0) out.points[j].setZero();
     if (points_ == 0) return;
@@ -205,7 +205,7 @@ class covariance_computation {
   [[nodiscard]] mat3 point_inverse(std::size_t p) const {
     small_cholesky<3> factors;
     const bool is_definite = factors.set(equations_.point_hessian(p)) && factors.factor(0.0) > 0.0;
-    return is_definite ? factors.inverse() : mat3(mat3::Constant(std::numeric_limits<double>::quiet_NaN()));
+    return is_definite ? factors.inverse() : filled<mat3>(std::numeric_limits<double>::quiet_NaN());
   }
 
   bundle_equations<R, Loss, Reduced> equations_;

@@ -295,7 +295,7 @@ class shared_intrinsics {
     const bundle_observation& o = observations_[k];
     auto r = residual_.residual(views[o.pose], points[o.point], o);
     if (r && !std::isnan(o.right)) (*r)[2] -= (*r)[0];  // the depth alone: bf times the inverse depths' difference
-    return r ? o.information * r->squaredNorm() : std::numeric_limits<double>::infinity();
+    return r ? o.information * squared_norm(*r) : std::numeric_limits<double>::infinity();
   }
   [[nodiscard]] double cost_of(const estimate& e) const {
     const std::vector<view_type> views = views_of(e);
@@ -356,7 +356,7 @@ class shared_intrinsics {
       }
       s.takes_part = true;
       s.row = row_of_[o.pose];
-      const double weight = o.information * loss_.weight(o.information * r->squaredNorm());
+      const double weight = o.information * loss_.weight(o.information * squared_norm(*r));
       jacobians j{s.row, weight, {}, by_all * basis_};
       j.by_pose.template leftCols<3>() = -by_q;
       j.by_pose.template rightCols<3>() = by_q * hat<double>(q);

@@ -6,8 +6,6 @@
 #include <cassert>
 #include <span>
 
-#include <Eigen/Core>
-
 #include <orbis/core/compiled_once.hpp>
 #include <orbis/optimize/detail/sparse/dense_cholesky.hpp>
 
@@ -15,12 +13,17 @@ namespace orbis::optimize::detail {
 
 ORBIS_COMPILED_ONCE void dense_cholesky::solve(std::span<double> x) const {
   assert(x.size() == size_);
-  const auto n = static_cast<Eigen::Index>(size_);
-  const Eigen::Map<const Eigen::MatrixXd, Eigen::Unaligned, Eigen::OuterStride<>> l(
-      values_.data(), n, n, Eigen::OuterStride<>(static_cast<Eigen::Index>(stride_)));
-  Eigen::Map<Eigen::VectorXd> y(x.data(), n);
-  l.triangularView<Eigen::Lower>().solveInPlace(y);
-  l.triangularView<Eigen::Lower>().transpose().solveInPlace(y);
+  for (std::size_t c = 0; c != size_; ++c) {
+    const double* const l = values_.data() + c * stride_;
+    x[c] /= l[c];
+    for (std::size_t r = c + 1; r != size_; ++r) x[r] -= l[r] * x[c];
+  }
+  for (std::size_t c = size_; c-- != 0;) {
+    const double* const l = values_.data() + c * stride_;
+    double sum = x[c];
+    for (std::size_t r = c + 1; r != size_; ++r) sum -= l[r] * x[r];
+    x[c] = sum / l[c];
+  }
 }
 
 }  // namespace orbis::optimize::detail

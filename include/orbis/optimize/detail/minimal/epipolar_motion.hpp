@@ -30,7 +30,7 @@ struct epipolar_motion {
   epipolar_motion(const so3& r, const vec3& t) : rotation{r}, direction{t}, e{hat<double>(t) * r.rotation_matrix()} {}
   /// After a step: `exp(d.head<3>())` on the left of the rotation, the rest on the sphere of directions.
   [[nodiscard]] epipolar_motion moved(const matrix<5>& d) const {
-    return {so3::exp(vec3(head<3>(d))) * rotation, step_on_sphere(direction, vec2(tail<2>(d)))};
+    return {so3::exp(head<3>(d)) * rotation, step_on_sphere(direction, tail<2>(d))};
   }
 };
 
@@ -63,9 +63,8 @@ struct epipolar_equations {
     const double w = weight(r * r);
     if (!(w > 0.0)) return;
     // r = c / s: dr = (dc - r ds) / s, and s ds = p dp + q dq.
-    vec3 dp = zeros<vec3>(), dq = zeros<vec3>();
-    dp.template head<2>() = by_second.back(p) * (r * inverse);
-    dq.template head<2>() = by_first.back(q) * (r * inverse);
+    const vec2 back_p = by_second.back(p) * (r * inverse), back_q = by_first.back(q) * (r * inverse);
+    const vec3 dp(back_p.x(), back_p.y(), 0.0), dq(back_q.x(), back_q.y(), 0.0);
     matrix<9> d;
     for (int row = 0; row != 3; ++row)
       for (int column = 0; column != 3; ++column)
@@ -98,12 +97,12 @@ struct epipolar_equations {
     const matrix<3, 2> basis = tangent_basis(m.direction);
     for (int j = 0; j != 5; ++j) {
       const mat3 d =
-          j < 3 ? mat3(hat<double>(m.direction) * hat<double>(vec3(vec3::Unit(j))) * m.rotation.rotation_matrix())
-                : mat3(hat<double>(column_of(basis, j - 3)) * m.rotation.rotation_matrix());
+          j < 3 ? hat<double>(m.direction) * hat<double>(column_of(identity<mat3>(), j)) * m.rotation.rotation_matrix()
+                : hat<double>(column_of(basis, j - 3)) * m.rotation.rotation_matrix();
       for (int entry = 0; entry != 9; ++entry) by_step(entry, j) = d(entry / 3, entry % 3);
     }
-    const matrix<9, 5> h_by_step = h.lazyProduct(by_step);
-    return {transposed(by_step).lazyProduct(h_by_step), transposed(by_step).lazyProduct(g)};
+    const matrix<9, 5> h_by_step = h * by_step;
+    return {transposed_product(by_step, h_by_step), transposed_product(by_step, g)};
   }
 };
 

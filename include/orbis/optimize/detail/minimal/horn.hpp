@@ -86,14 +86,14 @@ struct best_rotation {
     for (std::size_t k = 1; k != 4; ++k)
       if (squared_norm(columns[k]) > squared_norm(columns[best])) best = k;
     const vec4& q = columns[best];
-    return best_rotation{so3::quaternion(q[0], q[1], q[2], q[3]).normalized(), x * size};
+    return best_rotation{so3(so3::quaternion(q[0], q[1], q[2], q[3])).unit_quaternion(), x * size};
   }
   mat4 a;
   a << a00, a10, a20, a30, a10, a11, a21, a31, a20, a21, a22, a32, a30, a31, a32, a33;
   const auto eigen = eigen_of_symmetric<4>(a);
   if (!(eigen.values[3] - eigen.values[2] > relative_gap)) return std::nullopt;
   const mat4& q = eigen.vectors;
-  return best_rotation{so3::quaternion(q(0, 3), q(1, 3), q(2, 3), q(3, 3)).normalized(), eigen.values[3] * size};
+  return best_rotation{so3(so3::quaternion(q(0, 3), q(1, 3), q(2, 3), q(3, 3))).unit_quaternion(), eigen.values[3] * size};
 }
 
 /// The moments of pairs of points that absolute orientation needs.

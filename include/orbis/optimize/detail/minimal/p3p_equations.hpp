@@ -85,7 +85,7 @@ struct conic {
   else if (square < 0.0 || std::isnan(square))
     return false;
   else
-    v.setZero();  // the same line twice
+    v = zeros<vec3>();  // the same line twice
   // C + [v]x is the outer product of the lines: any row is one of them, any column the other.
   const double m[3][3] = {
       {c.xx, c.xy - v.z(), c.xz + v.y()}, {c.xy + v.z(), c.yy, c.yz - v.x()}, {c.xz - v.y(), c.yz + v.x(), c.zz}};

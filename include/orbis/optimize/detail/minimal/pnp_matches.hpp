@@ -150,7 +150,7 @@ struct pnp_matches {
     rays.clear();
     points.reserve(original.size());
     rays.reserve(original.size());
-    centre.setZero();
+    centre = zeros<vec3>();
     std::size_t kept = 0;
     for (const std::uint32_t i : original) {
       matrix<2, 3> by_point;

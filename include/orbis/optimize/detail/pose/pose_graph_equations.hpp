@@ -126,10 +126,7 @@ class pose_graph_equations {
   [[nodiscard]] double linearize_bundle(std::size_t b, const Edges& edges) {
     const edge_bundle& bundle = structure_.bundles[b];
     contribution& sum = contributions_[b];
-    sum.from.setZero();
-    sum.to.setZero();
-    sum.gradient_from.setZero();
-    sum.gradient_to.setZero();
+    sum = {zeros<block>(), zeros<block>(), zeros<vector>(), zeros<vector>()};
     block mixed = zeros<block>();
     double cost = 0.0;
     for (std::uint32_t at = bundle.begin; at != bundle.begin + bundle.count; ++at) {

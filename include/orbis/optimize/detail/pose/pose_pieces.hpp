@@ -58,7 +58,7 @@ class pose_pieces {
 
   void pack(std::size_t first) {
     const std::size_t count = std::min(observations_.size() - first, pose_lanes::capacity);
-    const pose_observation nothing{.point = vec3::UnitZ(), .information = 0.0};
+    const pose_observation nothing{.point = vec3(0.0, 0.0, 1.0), .information = 0.0};
     for (std::size_t i = 0; i != padded(count); ++i) {
       const bool use = i < count && usable(observations_[first + i]);
       const pose_observation& o = use ? observations_[first + i] : nothing;

@@ -20,7 +20,7 @@ namespace orbis::slam::detail {
 
 ORBIS_COMPILED_ONCE bool eliminate_pose(shutter_equations& e, vec2& gradient, const mat6& pose,
                                         const matrix<6, 2>& mixed, const vec6& pose_gradient) {
-  const matrix<6, 2> solved = pose.inverse() * mixed;
+  const matrix<6, 2> solved = inverse(pose) * mixed;
   if (!all_finite(solved)) return false;
   e.h -= transposed(mixed) * solved;
   gradient -= transposed(solved) * pose_gradient;

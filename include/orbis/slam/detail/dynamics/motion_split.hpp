@@ -182,7 +182,7 @@ class motion_splitter {
   [[nodiscard]] double error(const se3& T_camera_world, std::size_t i) const {
     const optimize::pose_observation& o = observations_[i];
     const auto r = model_.residual(T_camera_world * o.point, o);
-    return r ? r->squaredNorm() * o.information : std::numeric_limits<double>::infinity();
+    return r ? squared_norm(*r) * o.information : std::numeric_limits<double>::infinity();
   }
 
   /// A rigid motion among the outliers, by RANSAC.

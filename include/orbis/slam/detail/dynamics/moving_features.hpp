@@ -157,11 +157,11 @@ class moving_features {
     std::vector<labelled> known;
     for (const track& t : next_)
       if (t.has_moved)
-        known.push_back({f.has_depth(t.feature) ? f.point_camera(t.feature) : vec3::Constant(1e9), t.at.x, t.at.y, &t});
+        known.push_back({f.has_depth(t.feature) ? f.point_camera(t.feature) : filled<vec3>(1e9), t.at.x, t.at.y, &t});
     if (known.size() < options_.moving.min_features / 2) return;
     for (std::size_t i = 0; i != f.size(); ++i)
       if (agrees_[i] != 0 && is_left_out_[i] == 0)
-        known.push_back({f.has_depth(i) ? f.point_camera(i) : vec3::Constant(1e9), f.features.keypoints[i].x,
+        known.push_back({f.has_depth(i) ? f.point_camera(i) : filled<vec3>(1e9), f.features.keypoints[i].x,
                          f.features.keypoints[i].y, nullptr});
     std::vector<track> more;
     for (std::size_t i = 0; i != f.size(); ++i) {

@@ -38,7 +38,7 @@ template <camera::camera_model Camera, feature_descriptor D>
                           std::size_t i, const vec3& point) {
   const optimize::pose_observation o = observation_of(rig, f, i, point);
   const auto error = rig.model.residual(T_camera_world * point, o);
-  return error && error->squaredNorm() * o.information <= error_limit(o.has_depth());
+  return error && squared_norm(*error) * o.information <= error_limit(o.has_depth());
 }
 
 }  // namespace orbis::slam::detail

@@ -171,7 +171,7 @@ template <camera::camera_model Camera>
     matrix<3, 6> j;
     const auto r = row_residual(model, T_camera_world, twist, o, j);
     if (!r) continue;
-    const double error = std::sqrt(r->squaredNorm() * o.seen.information);
+    const double error = std::sqrt(squared_norm(*r) * o.seen.information);
     const double weight = o.seen.information * (error <= width ? 1.0 : width / error);
     e.cost += error <= width ? 0.5 * error * error : width * (error - 0.5 * width);
     const matrix<6, 3> weighted = weight * transposed(j);

@@ -114,7 +114,7 @@ template <camera::camera_model Camera>
     const auto r = rig.model.residual(q, o, by_point);
     if (!r) continue;
     const double information = std::min(from.information[at->second], to.information[i]);
-    const double error = std::sqrt(r->squaredNorm() * information);
+    const double error = std::sqrt(squared_norm(*r) * information);
     const double weight = information * (error <= width ? 1.0 : width / error);
     const matrix<3, 6> by_pose = side_by_side(by_point, -by_point * hat<double>(q));
     const depth_change change_a = from.changes[at->second].if_even(a.depth), change_b = to.changes[i].if_even(b.depth);
