@@ -98,7 +98,7 @@ template <camera::depth_source Depth>
 [[nodiscard]] upright_view find_upright(const Depth& depth, const camera::ray_table& rays,
                                         const upright_options& options = {}) {
   assert(depth.width() == rays.width() && depth.height() == rays.height());
-  if (options.gravity_camera && options.gravity_camera->allFinite() && options.norm(*gravity_camera) > 0)
+  if (options.gravity_camera && options.gravity_camera->allFinite() && norm(*options.gravity_camera) > 0)
     return {upright_rotation(-options.gravity_camera->normalized()), upright_source::gravity, 1.0};
   const detail::planar_blocks blocks = detail::find_planar_blocks(depth, rays);
   const std::optional<detail::found_up> found = detail::vote_for_up(blocks.normals, options.max_tilt);
