@@ -7,7 +7,6 @@
 /// | alignment.hpp | rigid or similarity transform between two lists of points, closed form or with outliers |
 /// | automatic_residual.hpp | a residual of your own whose Jacobians are computed with dual numbers |
 /// | bundle_adjustment.hpp | bundle adjustment: cameras and points from observations |
-/// | bundle_covariance.hpp | covariances of the cameras and points of a bundle adjustment |
 /// | bundle_problem.hpp | observations, residual concepts, options and summary of bundle adjustment |
 /// | chordal_initialization.hpp | a start for pose graphs whose odometry is too far off |
 /// | pnp.hpp | camera pose from known points and pixels with outliers (P3P in RANSAC); P3P |
@@ -29,7 +28,6 @@
 #include <orbis/optimize/alignment.hpp>
 #include <orbis/optimize/automatic_residual.hpp>
 #include <orbis/optimize/bundle_adjustment.hpp>
-#include <orbis/optimize/bundle_covariance.hpp>
 #include <orbis/optimize/bundle_problem.hpp>
 #include <orbis/optimize/chordal_initialization.hpp>
 #include <orbis/optimize/pnp.hpp>

@@ -114,9 +114,6 @@ class bundle_adjuster {
     return run(policy, cameras, points, options, callback, report, summary);
   }
 
-  /// The normal equations at the estimate that was linearised last.
-  [[nodiscard]] const auto& equations() const { return equations_; }
-
  private:
   using equations_type = detail::bundle_equations<Residual, Loss, ReducedSolver>;
 
