@@ -5,7 +5,6 @@
 /// | header | what it is for |
 /// | --- | --- |
 /// | alignment.hpp | rigid or similarity transform between two lists of points, closed form or with outliers |
-/// | automatic_residual.hpp | a residual of your own whose Jacobians are computed with dual numbers |
 /// | bundle_adjustment.hpp | bundle adjustment: cameras and points from observations |
 /// | bundle_problem.hpp | observations, residual concepts, options and summary of bundle adjustment |
 /// | chordal_initialization.hpp | a start for pose graphs whose odometry is too far off |
@@ -26,7 +25,6 @@
 #pragma once
 
 #include <orbis/optimize/alignment.hpp>
-#include <orbis/optimize/automatic_residual.hpp>
 #include <orbis/optimize/bundle_adjustment.hpp>
 #include <orbis/optimize/bundle_problem.hpp>
 #include <orbis/optimize/chordal_initialization.hpp>

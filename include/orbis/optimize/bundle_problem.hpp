@@ -43,15 +43,6 @@ struct lie_group {
   [[nodiscard]] static point retract(const point& p, const tangent& d) { return p * T::exp(d); }
 };
 
-/// Vectors of N numbers; a step is added.
-template <int N>
-struct euclidean {
-  using point = matrix<N>;
-  using tangent = matrix<N>;
-  static constexpr int dimension = N;
-  [[nodiscard]] static point retract(const point& p, const tangent& d) { return p + d; }
-};
-
 /// An observation names its camera `pose` and its `point` by index. `information` is 1 / sigma^2, the weight of its
 /// squared residual.
 template <class O>
