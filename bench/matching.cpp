@@ -179,24 +179,6 @@ void add_guided(std::size_t count) {
       }
     });
   }
-
-  add_row("motion_statistics/" + std::to_string(count) + "/orbis", [count](benchmark::State& state) {
-    // Half of the candidates move alike.
-    const auto a = random_features(count, 1), b = random_features(count, 2);
-    auto trains = b.keypoints;
-    std::vector<candidate> all, candidates;
-    for (std::uint32_t i = 0; i != count; ++i) {
-      if (i % 2 == 0) trains[i].x = a.keypoints[i].x + 10.0F, trains[i].y = a.keypoints[i].y - 5.0F;
-      all.push_back({i, i, 30});
-    }
-    motion_statistics::workspace memory;
-    for (auto _ : state) {
-      candidates = all;
-      motion_statistics{}(candidates, a.keypoints, trains, memory);
-      benchmark::DoNotOptimize(candidates.data());
-    }
-    state.counters["kept"] = static_cast<double>(candidates.size());
-  });
 }
 
 /// Pairs of frames of the kitchen: time for a pair, the share of the matches (with depth) that are right, and how many

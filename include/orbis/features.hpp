@@ -13,7 +13,6 @@
 /// | `features/match.hpp` | `match`, `candidate`, concepts of sources and stages |
 /// | `features/matcher.hpp` | matchers composed of a source and stages with `\|` |
 /// | `features/stages.hpp` | stages: ratio test, cross check, distance, uniqueness, rotation |
-/// | `features/motion_statistics.hpp` | the stage that keeps matches whose neighbours move alike |
 /// | `features/brute_force.hpp` | the source that compares all pairs |
 /// | `features/windowed.hpp` | the source that looks near predicted positions |
 /// | `features/projected.hpp` | the source that looks where known points project to |
@@ -37,7 +36,6 @@
 #include <orbis/features/hamming.hpp>
 #include <orbis/features/match.hpp>
 #include <orbis/features/matcher.hpp>
-#include <orbis/features/motion_statistics.hpp>
 #include <orbis/features/node_guided.hpp>
 #include <orbis/features/orb.hpp>
 #include <orbis/features/project_points.hpp>
