@@ -157,8 +157,6 @@ void add_guided(std::size_t count) {
   mat3 K;
   K << 500.0, 0.0, 320.0, 0.0, 500.0, 240.0, 0.0, 0.0, 1.0;
   const fundamental_geometry geometry{K, K, se3{so3::exp(vec3{0.0, 0.05, 0.0}), vec3{0.2, 0.02, 0.03}}};
-  std::vector<std::uint32_t> nodes(count);
-  for (std::size_t i = 0; i != count; ++i) nodes[i] = static_cast<std::uint32_t>(i % 100);
 
   for (const auto& [name, level] : {levels[0], levels[3]}) {  // there are two kernels
     const std::string who = std::string("/") + name;
@@ -166,18 +164,6 @@ void add_guided(std::size_t count) {
     add_matcher(group + "/projected_20px" + who, level, projected(hamming{}, {.radius = 20.0F}) | unique{}, count,
                 points, project);
     add_matcher(group + "/epipolar" + who, level, epipolar(hamming{}) | unique{}, count, geometry);
-    add_row(group + "/node_guided_100" + who, [=, level = level](benchmark::State& state) {
-      const auto a = random_features(count, 1), b = random_features(count, 2);
-      const simd::level_limit limit{level};
-      const auto matcher = node_guided(hamming{}) | unique{};
-      std::vector<match> matches;
-      decltype(matcher)::workspace memory;
-      const node_index query_nodes{nodes}, train_nodes{nodes};
-      for (auto _ : state) {
-        matcher.match_into(matches, memory, a, b, query_nodes, train_nodes);
-        benchmark::DoNotOptimize(matches.data());
-      }
-    });
   }
 }
 

@@ -19,7 +19,6 @@
 /// | `features/project_points.hpp` | projections by a camera and its pose, for `projected` |
 /// | `features/epipolar.hpp` | the source that looks along epipolar lines |
 /// | `features/epipolar_geometry.hpp` | epipolar lines of two pinhole images, or of any two cameras |
-/// | `features/node_guided.hpp` | the source that compares under common vocabulary nodes |
 /// | `features/stereo.hpp` | `stereo_matcher`: the right coordinates of features of a stereo pair |
 /// | `features/grid.hpp` | an index of keypoints by position |
 /// | `features/depth.hpp` | the depth at a keypoint and its standard deviation |
@@ -36,7 +35,6 @@
 #include <orbis/features/hamming.hpp>
 #include <orbis/features/match.hpp>
 #include <orbis/features/matcher.hpp>
-#include <orbis/features/node_guided.hpp>
 #include <orbis/features/orb.hpp>
 #include <orbis/features/project_points.hpp>
 #include <orbis/features/projected.hpp>

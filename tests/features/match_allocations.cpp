@@ -8,7 +8,6 @@
 #include <orbis/features/brute_force.hpp>
 #include <orbis/features/epipolar.hpp>
 #include <orbis/features/matcher.hpp>
-#include <orbis/features/node_guided.hpp>
 #include <orbis/features/project_points.hpp>
 #include <orbis/features/projected.hpp>
 #include <orbis/features/stages.hpp>
@@ -60,10 +59,4 @@ TEST_CASE("a matcher whose memory has served before allocates nothing") {
   K << 500.0, 0.0, 320.0, 0.0, 500.0, 240.0, 0.0, 0.0, 1.0;
   const fundamental_geometry geometry{K, K, se3{so3{}, vec3{0.1, 0.0, 0.0}}};
   check_second_call(epipolar(hamming{}) | cross_check{} | unique{}, geometry);
-
-  std::vector<std::uint32_t> query_nodes(300), train_nodes(400);
-  for (std::uint32_t i = 0; i != 300; ++i) query_nodes[i] = i % 17;
-  for (std::uint32_t i = 0; i != 400; ++i) train_nodes[i] = i % 19;
-  check_second_call(node_guided(hamming{}) | cross_check{} | unique{}, node_index{query_nodes},
-                    node_index{train_nodes});
 }
