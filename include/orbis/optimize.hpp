@@ -7,7 +7,6 @@
 /// | alignment.hpp | rigid or similarity transform between two lists of points, closed form or with outliers |
 /// | bundle_adjustment.hpp | bundle adjustment: cameras and points from observations |
 /// | bundle_problem.hpp | observations, residual concepts, options and summary of bundle adjustment |
-/// | chordal_initialization.hpp | a start for pose graphs whose odometry is too far off |
 /// | pnp.hpp | camera pose from known points and pixels with outliers (P3P in RANSAC); P3P |
 /// | point_to_plane.hpp | distance of a measured point from a plane, as a residual |
 /// | pose_graph.hpp | pose graph optimisation |
@@ -27,7 +26,6 @@
 #include <orbis/optimize/alignment.hpp>
 #include <orbis/optimize/bundle_adjustment.hpp>
 #include <orbis/optimize/bundle_problem.hpp>
-#include <orbis/optimize/chordal_initialization.hpp>
 #include <orbis/optimize/pnp.hpp>
 #include <orbis/optimize/point_to_plane.hpp>
 #include <orbis/optimize/pose_graph.hpp>
