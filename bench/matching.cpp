@@ -101,17 +101,6 @@ void add_brute_force(std::size_t count) {
   for (const auto& [name, level] : levels) {
     add_matcher(group + "/knn2/" + name, level, brute_force(hamming{}) | ratio_test{1.0F}, count);
     add_matcher(group + "/cross_check/" + name, level, brute_force(hamming{}) | cross_check{}, count);
-    add_row(group + "/knn10/" + name, [count, level = level](benchmark::State& state) {
-      const simd::level_limit limit{level};
-      const auto a = random_features(count, 1), b = random_features(count, 2);
-      std::vector<features::detail::neighbor> nearest(10 * count);
-      features::detail::hamming_workspace memory;
-      for (auto _ : state) {
-        features::detail::hamming_k_nearest(std::span<const descriptor>{a.descriptors},
-                                            std::span<const descriptor>{b.descriptors}, 10, std::span{nearest}, memory);
-        benchmark::DoNotOptimize(nearest.data());
-      }
-    });
   }
   add_row(group + "/knn2/popcnt64_loop", [count](benchmark::State& state) {
     const auto a = random_features(count, 1), b = random_features(count, 2);
@@ -121,16 +110,15 @@ void add_brute_force(std::size_t count) {
       benchmark::DoNotOptimize(nearest.data());
     }
   });
-  for (const int k : {2, 10})
-    add_row(group + "/knn" + std::to_string(k) + "/opencv", [count, k](benchmark::State& state) {
-      const auto a = random_features(count, 1), b = random_features(count, 2);
-      const cv::BFMatcher matcher(cv::NORM_HAMMING);
-      for (auto _ : state) {
-        std::vector<std::vector<cv::DMatch>> matches;
-        matcher.knnMatch(rows_of(a), rows_of(b), matches, k);
-        benchmark::DoNotOptimize(matches.data());
-      }
-    });
+  add_row(group + "/knn2/opencv", [count](benchmark::State& state) {
+    const auto a = random_features(count, 1), b = random_features(count, 2);
+    const cv::BFMatcher matcher(cv::NORM_HAMMING);
+    for (auto _ : state) {
+      std::vector<std::vector<cv::DMatch>> matches;
+      matcher.knnMatch(rows_of(a), rows_of(b), matches, 2);
+      benchmark::DoNotOptimize(matches.data());
+    }
+  });
   for (const bool crossed : {false, true})
     add_row(group + (crossed ? "/cross_check/opencv" : "/match/opencv"), [count, crossed](benchmark::State& state) {
       const auto a = random_features(count, 1), b = random_features(count, 2);
