@@ -16,7 +16,7 @@
 /// | ransac_policies.hpp | scoring, sampling, preemption and local optimisation for RANSAC |
 /// | reprojection.hpp | reprojection error for any camera model |
 /// | reprojection_with_intrinsics.hpp | the same with intrinsics among the unknowns; the camera of BAL files |
-/// | robust_loss.hpp | robust losses (Huber, Cauchy, Tukey, Geman-McClure), chi-squared gates |
+/// | robust_loss.hpp | robust losses (Huber, Cauchy, Tukey), chi-squared gates |
 /// | self_calibration.hpp | bundle adjustment of images of one camera whose intrinsics are among the unknowns |
 /// | solver_policies.hpp | damping (Gauss-Newton, Levenberg-Marquardt, dogleg), solvers of the reduced system |
 /// | triangulation.hpp | points from two or more rays |
