@@ -106,8 +106,7 @@ class bundle_adjuster {
                              const bundle_options& options = {}, progress callback = {}, Report&& report = {}) {
     assert(cameras.size() == equations_.structure().count.size());
     bundle_summary summary;
-    if (!std::equal(fixed_.begin(), fixed_.end(), options.fixed_poses.begin(), options.fixed_poses.end()) ||
-        hold_ != options.hold) {
+    if (!std::equal(fixed_.begin(), fixed_.end(), options.fixed_poses.begin(), options.fixed_poses.end())) {
       const detail::stage_watch watch{summary.seconds.set_up};
       set_up(cameras.size(), points.size(), observations_, options);
     }
@@ -177,9 +176,7 @@ class bundle_adjuster {
     assert(options.fixed_poses.empty() || options.fixed_poses.size() == cameras);
     observations_ = observations;
     fixed_.assign(options.fixed_poses.begin(), options.fixed_poses.end());
-    hold_ = options.hold;
-    equations_.set_structure(cameras, points, observations, options.fixed_poses,
-                             options.hold == bundle_gauge::first_camera);
+    equations_.set_structure(cameras, points, observations, options.fixed_poses);
   }
 
   /// Counts the observations that cannot be used at all.
@@ -240,7 +237,6 @@ class bundle_adjuster {
   step_workspace workspace_;
   std::span<const observation> observations_;  // of the last call of `solve`
   std::vector<std::uint8_t> fixed_;            // of the structure
-  bundle_gauge hold_ = bundle_gauge::damped;
   std::vector<typename Residual::view> chi2_views_;
 };
 

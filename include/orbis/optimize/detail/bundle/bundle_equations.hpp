@@ -50,7 +50,7 @@ class bundle_equations {
 
   /// Orders the observations and finds the blocks of the reduced system.
   void set_structure(std::size_t cameras, std::size_t points, std::span<const observation> observations,
-                     std::span<const std::uint8_t> fixed, bool hold_first);
+                     std::span<const std::uint8_t> fixed);
 
   /// Begins at these estimates, with the observations that are not ignored and have a projection there; counts them in
   /// `summary`.
@@ -513,8 +513,8 @@ bundle_equations<R, Loss, Reduced>::bundle_equations(R residual, Loss loss, cons
 template <bundle_residual R, robust_loss Loss, reduced_solver Reduced>
 void bundle_equations<R, Loss, Reduced>::set_structure(std::size_t cameras, std::size_t points,
                                                        std::span<const observation> observations,
-                                                       std::span<const std::uint8_t> fixed, bool hold_first) {
-  structure_.build(cameras, points, observations, fixed, hold_first,
+                                                       std::span<const std::uint8_t> fixed) {
+  structure_.build(cameras, points, observations, fixed,
                    [&](std::uint32_t k) { return residual_.is_usable(observations[k]); });
   const std::size_t places = structure_.places();
   base_information_.assign(places, 0.0);
