@@ -10,8 +10,8 @@
 #include <orbis/camera/depth.hpp>
 #include <orbis/core/image.hpp>
 #include <orbis/core/sim3.hpp>
+#include <orbis/slam/detail/depth/depth_tracker.hpp>
 #include <orbis/slam/detail/depth/surface.hpp>
-#include <orbis/slam/detail/depth/surface_memory.hpp>
 #include <orbis/slam/detail/tracking/front_end.hpp>
 #include <orbis/slam/monocular.hpp>
 
