@@ -101,17 +101,6 @@ void add_brute_force(std::size_t count) {
   for (const auto& [name, level] : levels) {
     add_matcher(group + "/knn2/" + name, level, brute_force(hamming{}) | ratio_test{1.0F}, count);
     add_matcher(group + "/cross_check/" + name, level, brute_force(hamming{}) | cross_check{}, count);
-    add_row(group + "/knn10/" + name, [count, level = level](benchmark::State& state) {
-      const simd::level_limit limit{level};
-      const auto a = random_features(count, 1), b = random_features(count, 2);
-      std::vector<features::detail::neighbor> nearest(10 * count);
-      features::detail::hamming_workspace memory;
-      for (auto _ : state) {
-        features::detail::hamming_k_nearest(std::span<const descriptor>{a.descriptors},
-                                            std::span<const descriptor>{b.descriptors}, 10, std::span{nearest}, memory);
-        benchmark::DoNotOptimize(nearest.data());
-      }
-    });
   }
   add_row(group + "/knn2/popcnt64_loop", [count](benchmark::State& state) {
     const auto a = random_features(count, 1), b = random_features(count, 2);
@@ -121,16 +110,15 @@ void add_brute_force(std::size_t count) {
       benchmark::DoNotOptimize(nearest.data());
     }
   });
-  for (const int k : {2, 10})
-    add_row(group + "/knn" + std::to_string(k) + "/opencv", [count, k](benchmark::State& state) {
-      const auto a = random_features(count, 1), b = random_features(count, 2);
-      const cv::BFMatcher matcher(cv::NORM_HAMMING);
-      for (auto _ : state) {
-        std::vector<std::vector<cv::DMatch>> matches;
-        matcher.knnMatch(rows_of(a), rows_of(b), matches, k);
-        benchmark::DoNotOptimize(matches.data());
-      }
-    });
+  add_row(group + "/knn2/opencv", [count](benchmark::State& state) {
+    const auto a = random_features(count, 1), b = random_features(count, 2);
+    const cv::BFMatcher matcher(cv::NORM_HAMMING);
+    for (auto _ : state) {
+      std::vector<std::vector<cv::DMatch>> matches;
+      matcher.knnMatch(rows_of(a), rows_of(b), matches, 2);
+      benchmark::DoNotOptimize(matches.data());
+    }
+  });
   for (const bool crossed : {false, true})
     add_row(group + (crossed ? "/cross_check/opencv" : "/match/opencv"), [count, crossed](benchmark::State& state) {
       const auto a = random_features(count, 1), b = random_features(count, 2);
@@ -157,8 +145,6 @@ void add_guided(std::size_t count) {
   mat3 K;
   K << 500.0, 0.0, 320.0, 0.0, 500.0, 240.0, 0.0, 0.0, 1.0;
   const fundamental_geometry geometry{K, K, se3{so3::exp(vec3{0.0, 0.05, 0.0}), vec3{0.2, 0.02, 0.03}}};
-  std::vector<std::uint32_t> nodes(count);
-  for (std::size_t i = 0; i != count; ++i) nodes[i] = static_cast<std::uint32_t>(i % 100);
 
   for (const auto& [name, level] : {levels[0], levels[3]}) {  // there are two kernels
     const std::string who = std::string("/") + name;
@@ -166,37 +152,7 @@ void add_guided(std::size_t count) {
     add_matcher(group + "/projected_20px" + who, level, projected(hamming{}, {.radius = 20.0F}) | unique{}, count,
                 points, project);
     add_matcher(group + "/epipolar" + who, level, epipolar(hamming{}) | unique{}, count, geometry);
-    add_row(group + "/node_guided_100" + who, [=, level = level](benchmark::State& state) {
-      const auto a = random_features(count, 1), b = random_features(count, 2);
-      const simd::level_limit limit{level};
-      const auto matcher = node_guided(hamming{}) | unique{};
-      std::vector<match> matches;
-      decltype(matcher)::workspace memory;
-      const node_index query_nodes{nodes}, train_nodes{nodes};
-      for (auto _ : state) {
-        matcher.match_into(matches, memory, a, b, query_nodes, train_nodes);
-        benchmark::DoNotOptimize(matches.data());
-      }
-    });
   }
-
-  add_row("motion_statistics/" + std::to_string(count) + "/orbis", [count](benchmark::State& state) {
-    // Half of the candidates move alike.
-    const auto a = random_features(count, 1), b = random_features(count, 2);
-    auto trains = b.keypoints;
-    std::vector<candidate> all, candidates;
-    for (std::uint32_t i = 0; i != count; ++i) {
-      if (i % 2 == 0) trains[i].x = a.keypoints[i].x + 10.0F, trains[i].y = a.keypoints[i].y - 5.0F;
-      all.push_back({i, i, 30});
-    }
-    motion_statistics::workspace memory;
-    for (auto _ : state) {
-      candidates = all;
-      motion_statistics{}(candidates, a.keypoints, trains, memory);
-      benchmark::DoNotOptimize(candidates.data());
-    }
-    state.counters["kept"] = static_cast<double>(candidates.size());
-  });
 }
 
 /// Pairs of frames of the kitchen: time for a pair, the share of the matches (with depth) that are right, and how many

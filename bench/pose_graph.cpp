@@ -31,9 +31,9 @@
 #include <orbis/core/execution.hpp>
 #include <orbis/core/simd.hpp>
 #include <orbis/io/g2o.hpp>
-#include <orbis/optimize/chordal_initialization.hpp>
 #include <orbis/optimize/pose_graph.hpp>
 
+#include "../examples/pose_graph/chordal.hpp"
 #include "support/synthetic/pose_graph.hpp"
 
 namespace orbis::bench {
@@ -219,7 +219,7 @@ problem& named(const std::string& name) {
     if (name == "grid_2744")
       options.shape = test::graph_shape::grid, options.poses_per_turn = 14, options.closure_probability = 0.3;
     p.graph = test::make_pose_graph(options).measured;
-    if (is_failure(initialize_chordally(std::span{p.graph.vertices}, p.graph.edges).status)) std::abort();
+    if (is_failure(examples::start_chordally(std::span{p.graph.vertices}, p.graph.edges).status)) std::abort();
   }
   poses vertices;
   p.best = solve<dogleg>(p, vertices).final_cost;

@@ -17,8 +17,7 @@
 #include <orbis/core/random.hpp>
 #include <orbis/slam/detail/loops/essential_graph.hpp>
 #include <orbis/slam/detail/map/local_map.hpp>
-#include <orbis/slam/detail/mapping/keyframe_culling.hpp>
-#include <orbis/slam/detail/mapping/landmark_culling.hpp>
+#include <orbis/slam/detail/mapping/culling.hpp>
 #include <orbis/slam/map.hpp>
 #include <orbis/slam/map_file.hpp>
 

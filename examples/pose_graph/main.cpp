@@ -9,10 +9,10 @@
 #include <CLI/CLI.hpp>
 
 #include <orbis/io/g2o.hpp>
-#include <orbis/optimize/chordal_initialization.hpp>
 #include <orbis/optimize/pose_graph.hpp>
 
 #include "../common/memory.hpp"
+#include "chordal.hpp"
 
 namespace optimize = orbis::optimize;
 
@@ -106,9 +106,9 @@ int main(int argc, char** argv) try {
   auto graph = orbis::io::read_g2o(s.input);
   if (!graph) return complain(2, graph.error().to_string());
   if (s.chordal) {
-    const auto start = optimize::initialize_chordally(
-        std::span{graph->vertices}, graph->edges,
-        {.fixed = graph->fixed, .hold = optimize::pose_graph_gauge::first_of_each_piece});
+    const auto start =
+        examples::start_chordally(std::span{graph->vertices}, graph->edges,
+                                  {.fixed = graph->fixed, .hold = optimize::pose_graph_gauge::first_of_each_piece});
     if (is_failure(start.status)) return complain(2, s.input + ": " + to_string(start));
   }
   if (s.loss == "huber") return run(s, *graph, optimize::huber{s.width});

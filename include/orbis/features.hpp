@@ -13,14 +13,12 @@
 /// | `features/match.hpp` | `match`, `candidate`, concepts of sources and stages |
 /// | `features/matcher.hpp` | matchers composed of a source and stages with `\|` |
 /// | `features/stages.hpp` | stages: ratio test, cross check, distance, uniqueness, rotation |
-/// | `features/motion_statistics.hpp` | the stage that keeps matches whose neighbours move alike |
 /// | `features/brute_force.hpp` | the source that compares all pairs |
 /// | `features/windowed.hpp` | the source that looks near predicted positions |
 /// | `features/projected.hpp` | the source that looks where known points project to |
 /// | `features/project_points.hpp` | projections by a camera and its pose, for `projected` |
 /// | `features/epipolar.hpp` | the source that looks along epipolar lines |
 /// | `features/epipolar_geometry.hpp` | epipolar lines of two pinhole images, or of any two cameras |
-/// | `features/node_guided.hpp` | the source that compares under common vocabulary nodes |
 /// | `features/stereo.hpp` | `stereo_matcher`: the right coordinates of features of a stereo pair |
 /// | `features/grid.hpp` | an index of keypoints by position |
 /// | `features/depth.hpp` | the depth at a keypoint and its standard deviation |
@@ -37,8 +35,6 @@
 #include <orbis/features/hamming.hpp>
 #include <orbis/features/match.hpp>
 #include <orbis/features/matcher.hpp>
-#include <orbis/features/motion_statistics.hpp>
-#include <orbis/features/node_guided.hpp>
 #include <orbis/features/orb.hpp>
 #include <orbis/features/project_points.hpp>
 #include <orbis/features/projected.hpp>

@@ -5,11 +5,8 @@
 /// | header | what it is for |
 /// | --- | --- |
 /// | alignment.hpp | rigid or similarity transform between two lists of points, closed form or with outliers |
-/// | automatic_residual.hpp | a residual of your own whose Jacobians are computed with dual numbers |
 /// | bundle_adjustment.hpp | bundle adjustment: cameras and points from observations |
-/// | bundle_covariance.hpp | covariances of the cameras and points of a bundle adjustment |
 /// | bundle_problem.hpp | observations, residual concepts, options and summary of bundle adjustment |
-/// | chordal_initialization.hpp | a start for pose graphs whose odometry is too far off |
 /// | pnp.hpp | camera pose from known points and pixels with outliers (P3P in RANSAC); P3P |
 /// | point_to_plane.hpp | distance of a measured point from a plane, as a residual |
 /// | pose_graph.hpp | pose graph optimisation |
@@ -19,7 +16,7 @@
 /// | ransac_policies.hpp | scoring, sampling, preemption and local optimisation for RANSAC |
 /// | reprojection.hpp | reprojection error for any camera model |
 /// | reprojection_with_intrinsics.hpp | the same with intrinsics among the unknowns; the camera of BAL files |
-/// | robust_loss.hpp | robust losses (Huber, Cauchy, Tukey, Geman-McClure), chi-squared gates |
+/// | robust_loss.hpp | robust losses (Huber, Cauchy, Tukey), chi-squared gates |
 /// | self_calibration.hpp | bundle adjustment of images of one camera whose intrinsics are among the unknowns |
 /// | solver_policies.hpp | damping (Gauss-Newton, Levenberg-Marquardt, dogleg), solvers of the reduced system |
 /// | triangulation.hpp | points from two or more rays |
@@ -27,11 +24,8 @@
 #pragma once
 
 #include <orbis/optimize/alignment.hpp>
-#include <orbis/optimize/automatic_residual.hpp>
 #include <orbis/optimize/bundle_adjustment.hpp>
-#include <orbis/optimize/bundle_covariance.hpp>
 #include <orbis/optimize/bundle_problem.hpp>
-#include <orbis/optimize/chordal_initialization.hpp>
 #include <orbis/optimize/pnp.hpp>
 #include <orbis/optimize/point_to_plane.hpp>
 #include <orbis/optimize/pose_graph.hpp>

@@ -21,7 +21,6 @@
 /// | `spanning_tree.hpp` | the tree of keyframes, and the loops closed between them |
 /// | `atlas.hpp` | several maps, one of them active |
 /// | `map_file.hpp` | saving and loading a map |
-/// | `validate.hpp` | whether a map is consistent |
 /// | `sensor.hpp` | what a frame measures for each feature: RGB-D |
 /// | `stereo.hpp` | the same for a stereo camera, and the options that suit it |
 /// | `monocular.hpp` | the same for one camera without depth, and the options that suit it |
@@ -60,4 +59,3 @@
 #include <orbis/slam/stereo.hpp>
 #include <orbis/slam/stereo_system.hpp>
 #include <orbis/slam/track_result.hpp>
-#include <orbis/slam/validate.hpp>

@@ -3,4 +3,4 @@
 
 using namespace orbis::features;
 
-const auto matcher = node_guided(hamming{}) | motion_statistics{} | projected(hamming{});
+const auto matcher = windowed(hamming{}) | cross_check{} | projected(hamming{});

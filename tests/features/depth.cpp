@@ -128,10 +128,3 @@ TEST_CASE("the deviation says how far the depth is off, under the sensor's noise
   CHECK(ratio < 1.0);
   CHECK(ratio > 0.2);
 }
-
-TEST_CASE("the virtual right column is that of a camera a baseline to the right") {
-  const double f = 525.0, cx = 320.0, baseline = 0.08, x = 0.3, z = 2.5;
-  const double left = f * x / z + cx;
-  const double right = f * (x - baseline) / z + cx;
-  CHECK(virtual_right(left, z, f * baseline) == Approx(right));
-}

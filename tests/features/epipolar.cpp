@@ -88,8 +88,13 @@ TEST_CASE("lines of rays are those of pixels, for a camera that has both") {
   K << 500.0, 0.0, 320.0, 0.0, 500.0, 240.0, 0.0, 0.0, 1.0;
   const auto q = test::random_features(200, 3);
   const auto t = test::random_features(300, 4);
-  const auto q_rays = rays_through(camera, q.keypoints);
-  auto t_rays = rays_through(camera, t.keypoints);
+  const auto rays_through = [&](const std::vector<keypoint>& keypoints) {
+    std::vector<vec3> rays;
+    for (const keypoint& k : keypoints) rays.push_back(camera.unproject(vec2{k.x, k.y}).value());
+    return rays;
+  };
+  const auto q_rays = rays_through(q.keypoints);
+  auto t_rays = rays_through(t.keypoints);
   constexpr auto matcher = epipolar(hamming{}, {.epipole_radius = 20.0F}) | cross_check{};
   const auto by_pixels = matcher(q, t, fundamental_geometry{K, K, sideways()});
   CHECK(by_pixels.size() > 20);

@@ -8,8 +8,6 @@
 #include <orbis/features/brute_force.hpp>
 #include <orbis/features/epipolar.hpp>
 #include <orbis/features/matcher.hpp>
-#include <orbis/features/motion_statistics.hpp>
-#include <orbis/features/node_guided.hpp>
 #include <orbis/features/project_points.hpp>
 #include <orbis/features/projected.hpp>
 #include <orbis/features/stages.hpp>
@@ -44,8 +42,7 @@ void check_second_call(const Matcher& matcher, const Where&... where) {
 
 TEST_CASE("a matcher whose memory has served before allocates nothing") {
   check_second_call(brute_force(hamming{}) | ratio_test{0.9F} | cross_check{} | max_distance{60});
-  check_second_call(brute_force(hamming{}) | cross_check{} | unique{} | rotation_consistency{} |
-                    motion_statistics{.strictness = 0.5F, .cells = 8, .rotations = true, .scales = true});
+  check_second_call(brute_force(hamming{}) | cross_check{} | unique{} | rotation_consistency{});
 
   const auto queries = test::random_features(300, 1);
   std::vector<window> windows;
@@ -62,10 +59,4 @@ TEST_CASE("a matcher whose memory has served before allocates nothing") {
   K << 500.0, 0.0, 320.0, 0.0, 500.0, 240.0, 0.0, 0.0, 1.0;
   const fundamental_geometry geometry{K, K, se3{so3{}, vec3{0.1, 0.0, 0.0}}};
   check_second_call(epipolar(hamming{}) | cross_check{} | unique{}, geometry);
-
-  std::vector<std::uint32_t> query_nodes(300), train_nodes(400);
-  for (std::uint32_t i = 0; i != 300; ++i) query_nodes[i] = i % 17;
-  for (std::uint32_t i = 0; i != 400; ++i) train_nodes[i] = i % 19;
-  check_second_call(node_guided(hamming{}) | cross_check{} | unique{}, node_index{query_nodes},
-                    node_index{train_nodes});
 }

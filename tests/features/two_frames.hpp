@@ -14,7 +14,6 @@
 #include <orbis/features/depth.hpp>
 #include <orbis/features/epipolar.hpp>
 #include <orbis/features/matcher.hpp>
-#include <orbis/features/motion_statistics.hpp>
 #include <orbis/features/orb.hpp>
 #include <orbis/features/project_points.hpp>
 #include <orbis/features/projected.hpp>
@@ -71,8 +70,7 @@ inline match_rate judge(const std::vector<features::match>& matches, const seen_
 }
 
 /// Ways to match two frames `gap` frames apart.
-inline constexpr std::array<const char*, 5> matcher_names{"brute_force", "windowed", "motion_statistics", "projected",
-                                                          "epipolar"};
+inline constexpr std::array<const char*, 4> matcher_names{"brute_force", "windowed", "projected", "epipolar"};
 
 inline std::vector<features::match> matches_by(std::size_t which, const seen_frame& a, const seen_frame& b,
                                                std::size_t gap) {
@@ -90,10 +88,6 @@ inline std::vector<features::match> matches_by(std::size_t which, const seen_fra
       return near(a.features, b.features, windows);
     }
     case 2: {
-      constexpr auto together = brute_force(hamming{}) | motion_statistics{.strictness = 3.0F};
-      return together(a.features, b.features);
-    }
-    case 3: {
       constexpr auto where = projected(hamming{}, {.radius = 8.0F}) | max_distance{64} | unique{};
       std::vector<vec3> points;
       for (const auto& p : a.points) points.push_back(p.value_or(vec3::Constant(std::nan(""))));

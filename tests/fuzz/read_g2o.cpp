@@ -9,9 +9,9 @@
 
 #include <orbis/core/execution.hpp>
 #include <orbis/io/g2o.hpp>
-#include <orbis/optimize/chordal_initialization.hpp>
 #include <orbis/optimize/pose_graph.hpp>
 
+#include "../../examples/pose_graph/chordal.hpp"
 #include "fuzz/target.hpp"
 
 namespace {
@@ -56,8 +56,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   solve<optimize::levenberg_marquardt>(*graph, graph->vertices);
   solve<optimize::dogleg>(*graph, graph->vertices);
   std::vector<se3> start = graph->vertices;
-  const auto s = optimize::initialize_chordally(std::span{start}, graph->edges,
-                                                {.fixed = graph->fixed, .semidefinite_information = true});
+  const auto s = examples::start_chordally(std::span{start}, graph->edges,
+                                           {.fixed = graph->fixed, .semidefinite_information = true});
   if (s.status == optimize::pose_graph_status::converged) solve<optimize::dogleg>(*graph, start);
   return 0;
 }

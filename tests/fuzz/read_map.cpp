@@ -12,9 +12,9 @@
 #include <orbis/core/bytes.hpp>
 #include <orbis/slam/detail/map/file_sections.hpp>
 #include <orbis/slam/map_file.hpp>
-#include <orbis/slam/validate.hpp>
 
 #include "fuzz/target.hpp"
+#include "support/validate.hpp"
 
 namespace {
 
@@ -46,7 +46,7 @@ void check(const std::string& file) {
     return;
   }
   slam::map& m = **got;
-  const auto whole = slam::validate(m);
+  const auto whole = test::validate(m);
   fuzz::require(whole.has_value(), whole ? "" : whole.error().to_string().c_str());
   const std::string written = slam::map_bytes(m);
   const auto again = slam::parse_map(std::as_bytes(std::span{written}));
@@ -59,7 +59,7 @@ void check(const std::string& file) {
   for (const auto& k : m.keyframes())
     for (std::uint32_t i = 0; i != k.size(); ++i)
       if (k.landmarks[i] == slam::no_id && k.has_depth(i)) m.add_landmark(k.id, i);
-  fuzz::require(slam::validate(m).has_value(), "a map that was read stays whole");
+  fuzz::require(test::validate(m).has_value(), "a map that was read stays whole");
 }
 
 }  // namespace

@@ -5,11 +5,11 @@
 #include <type_traits>
 
 #include <orbis/core/random.hpp>
-#include <orbis/optimize/automatic_residual.hpp>
 #include <orbis/optimize/point_to_plane.hpp>
 #include <orbis/optimize/reprojection.hpp>
 #include <orbis/optimize/reprojection_with_intrinsics.hpp>
 
+#include "dual_numbers.hpp"
 #include "support.hpp"
 #include "support/catch.hpp"
 #include "templated_residuals.hpp"
@@ -20,13 +20,13 @@ using optimize::lie_group;
 /// The camera of BAL in any type of number.
 template <class S>
 struct lifted_bal {
-  optimize::rigid<S> T_camera_world;
+  test::rigid<S> T_camera_world;
   S focal, k1, k2;
 };
 template <>
-struct optimize::lift<optimize::bal_manifold> {
+struct test::lift<optimize::bal_manifold> {
   template <class S>
-  static lifted_bal<S> at(const bal_manifold&, const bal_camera& c, const matrix<9, 1, S>& d) {
+  static lifted_bal<S> at(const optimize::bal_manifold&, const optimize::bal_camera& c, const matrix<9, 1, S>& d) {
     const matrix<3, 1, S> rho = d.template head<3>(), phi = d.template segment<3>(3);
     const mat3 rotation = c.T_camera_world.rotation_matrix();
     const matrix<3, 3, S> turn = matrix<3, 3, S>::Identity() - hat<S>(phi);
@@ -57,7 +57,7 @@ struct reprojection_by_definition {
   Camera camera;
   double bf;
   template <class S>
-  matrix<3, 1, S> operator()(const optimize::rigid<S>& T_world_camera, const matrix<3, 1, S>& point,
+  matrix<3, 1, S> operator()(const test::rigid<S>& T_world_camera, const matrix<3, 1, S>& point,
                              const optimize::bundle_observation& o) const {
     return test::reproject<S>(camera, bf, T_world_camera.inverse() * point, o.pixel, o.right);
   }
@@ -76,7 +76,7 @@ struct bal_by_definition {
 
 struct plane_by_definition {
   template <class S>
-  matrix<1, 1, S> operator()(const optimize::rigid<S>& T_world_camera, const matrix<3, 1, S>& point,
+  matrix<1, 1, S> operator()(const test::rigid<S>& T_world_camera, const matrix<3, 1, S>& point,
                              const optimize::plane_observation& o) const {
     const matrix<3, 1, S> measured = o.measured.cast<S>(), normal = o.normal.cast<S>();
     return matrix<1, 1, S>(normal.dot(T_world_camera * measured - point));
@@ -102,8 +102,8 @@ template <class Camera>
 void check_reprojection(const Camera& camera) {
   random_bits random(7);
   const optimize::reprojection analytic{camera, 38.0};
-  const optimize::automatic_bundle_residual by_dual_numbers{reprojection_by_definition<Camera>{camera, 38.0},
-                                                            lie_group<se3>{}};
+  const test::automatic_bundle_residual by_dual_numbers{reprojection_by_definition<Camera>{camera, 38.0},
+                                                        lie_group<se3>{}};
   for (std::uint32_t trial = 0; trial != 100; ++trial) {
     const se3 pose = test::random_pose(random);
     const vec3 p = test::random_point_in_view(random);
@@ -117,7 +117,7 @@ void check_reprojection(const Camera& camera) {
                                       return test::reproject<typename std::decay_t<decltype(q)>::Scalar>(
                                           camera, 38.0, q, o.pixel, o.right);
                                     },
-                                    optimize::euclidean<3>{}};
+                                    test::euclidean<3>{}};
     mat3 expected = mat3::Zero();
     const auto s = in_camera.linearize(p, expected);
     REQUIRE((r && s));
@@ -142,7 +142,7 @@ TEST_CASE("Analytic Jacobians of the camera with nine parameters are those of du
                                  random.uniform(-0.1, 0.1)};
     const vec3 p = test::random_point_in_view(random);
     check_bundle_residual(optimize::bal_reprojection{},
-                          optimize::automatic_bundle_residual{bal_by_definition{}, optimize::bal_manifold{}}, c,
+                          test::automatic_bundle_residual{bal_by_definition{}, optimize::bal_manifold{}}, c,
                           c.T_camera_world.inverse() * vec3(p.x(), p.y(), -p.z()),
                           optimize::bundle_observation{.pixel = vec2(10.0, -20.0)});
   }
@@ -157,7 +157,7 @@ TEST_CASE("Analytic Jacobians of point to plane are those of dual numbers") {
     const vec3 point = test::random_vector(random, 4.0);
     check_bundle_residual(
         optimize::point_to_plane_adjustment{},
-        optimize::automatic_bundle_residual<plane_by_definition, lie_group<se3>, optimize::plane_observation>{
+        test::automatic_bundle_residual<plane_by_definition, lie_group<se3>, optimize::plane_observation>{
             plane_by_definition{}},
         pose, point, o);
 

@@ -44,14 +44,14 @@ TEST_CASE("Analytic Jacobians between poses are those of dual numbers") {
     const se3 rest(so3::exp(random.uniform(0.3, 2.5) * test::random_vector(random, 1.0).normalized()),
                    test::random_vector(random, 2.0));
     const se3 measured = a.inverse() * b * rest.inverse();
-    const auto lifted = [&]<class S>(const optimize::rigid<S>& x, const optimize::rigid<S>& y) {
-      const optimize::rigid<S> m{measured.rotation_matrix().cast<S>(), measured.translation().cast<S>()};
+    const auto lifted = [&]<class S>(const test::rigid<S>& x, const test::rigid<S>& y) {
+      const test::rigid<S> m{measured.rotation_matrix().cast<S>(), measured.translation().cast<S>()};
       return m.inverse() * (x.inverse() * y);
     };
     check_between(
         optimize::quaternion_between{},
-        [&]<class S>(const optimize::rigid<S>& x, const optimize::rigid<S>& y) {
-          const optimize::rigid<S> d = lifted(x, y);
+        [&]<class S>(const test::rigid<S>& x, const test::rigid<S>& y) {
+          const test::rigid<S> d = lifted(x, y);
           matrix<6, 1, S> r;
           r << d.translation, test::quaternion_vector<S>(d.rotation);
           return r;
@@ -59,10 +59,8 @@ TEST_CASE("Analytic Jacobians between poses are those of dual numbers") {
         a, b, measured);
     check_between(
         optimize::logarithm_between<se3>{},
-        [&]<class S>(const optimize::rigid<S>& x, const optimize::rigid<S>& y) {
-          return test::logarithm<S>(lifted(x, y));
-        },
-        a, b, measured);
+        [&]<class S>(const test::rigid<S>& x, const test::rigid<S>& y) { return test::logarithm<S>(lifted(x, y)); }, a,
+        b, measured);
     const mat3 back = measured.rotation_matrix().transpose();
     check_between(
         optimize::logarithm_between<so3>{},

@@ -255,7 +255,6 @@ TEST_CASE("Pose refinement gives the same bits for every instruction set") {
   check_levels(pinhole_camera, own_loss{}, 300);
   check_levels(pinhole_camera, optimize::cauchy{2.0}, 300);
   check_levels(pinhole_camera, optimize::tukey{40.0}, 300);
-  check_levels(pinhole_camera, optimize::geman_mcclure{20.0}, 300);
 }
 
 TEST_CASE("Pose refinement of 500 stereo observations finds all inliers and the pose to half a millimetre") {

@@ -3,9 +3,9 @@
 #include <cstddef>
 #include <limits>
 
-#include <orbis/optimize/automatic_residual.hpp>
 #include <orbis/optimize/reprojection_with_intrinsics.hpp>
 
+#include "dual_numbers.hpp"
 #include "residual_checks.hpp"
 #include "support.hpp"
 #include "support/catch.hpp"
@@ -49,7 +49,7 @@ void check_jacobians(const Camera& truth) {
   using model_type = reprojection_with_intrinsics<Camera, Free...>;
   using manifold = typename model_type::camera_manifold;
   constexpr int count = parameters_of<Camera>::count, size = manifold::dimension;
-  using number = optimize::dual<15>;  // enough for all models, so that there is one kind to compile
+  using number = test::dual<15>;  // enough for all models, so that there is one kind to compile
   static_assert(count + 3 <= 15);
   static_assert(optimize::camera_frame_residual<model_type>);
   random_bits random(21);

@@ -17,7 +17,9 @@
 #include <orbis/core/se3.hpp>
 #include <orbis/core/sim3.hpp>
 #include <orbis/core/so3.hpp>
-#include <orbis/optimize/automatic_residual.hpp>
+#include <orbis/optimize/bundle_problem.hpp>
+
+#include "dual_numbers.hpp"
 
 namespace orbis::test {
 
@@ -45,17 +47,17 @@ struct similarity {
 
 /// A rotation matrix.
 template <>
-struct orbis::optimize::lift<orbis::optimize::lie_group<orbis::so3>> {
+struct orbis::test::lift<orbis::optimize::lie_group<orbis::so3>> {
   template <class S>
-  static matrix<3, 3, S> at(const lie_group<so3>&, const so3& p, const matrix<3, 1, S>& d) {
+  static matrix<3, 3, S> at(const optimize::lie_group<so3>&, const so3& p, const matrix<3, 1, S>& d) {
     return p.rotation_matrix().cast<S>() * (matrix<3, 3, S>::Identity() + hat<S>(d));
   }
 };
 /// A `similarity`.
 template <>
-struct orbis::optimize::lift<orbis::optimize::lie_group<orbis::sim3>> {
+struct orbis::test::lift<orbis::optimize::lie_group<orbis::sim3>> {
   template <class S>
-  static test::similarity<S> at(const lie_group<sim3>&, const sim3& p, const matrix<7, 1, S>& d) {
+  static test::similarity<S> at(const optimize::lie_group<sim3>&, const sim3& p, const matrix<7, 1, S>& d) {
     const matrix<3, 1, S> rho = d.template head<3>(), phi = d.template segment<3>(3);
     const S scale(p.scale());
     const matrix<3, 3, S> rotation = p.rotation_matrix().cast<S>();
@@ -95,9 +97,9 @@ struct automatic {
   /// The point `p` whose step has the variables `first`, `first + 1`, ...
   template <int N, class Manifold>
   static auto seeded(const typename Manifold::point& p, int& first) {
-    matrix<Manifold::dimension, 1, optimize::dual<N>> d;
-    for (int i = 0; i != Manifold::dimension; ++i) d[i] = optimize::dual<N>::variable(0.0, first++);
-    return optimize::lift<Manifold>::template at<optimize::dual<N>>(Manifold{}, p, d);
+    matrix<Manifold::dimension, 1, dual<N>> d;
+    for (int i = 0; i != Manifold::dimension; ++i) d[i] = dual<N>::variable(0.0, first++);
+    return lift<Manifold>::template at<dual<N>>(Manifold{}, p, d);
   }
 };
 
@@ -159,7 +161,7 @@ matrix<3, 1, S> solve(const matrix<3, 3, S>& m, const matrix<3, 1, S>& b) {
 }
 
 template <class S>
-matrix<6, 1, S> logarithm(const optimize::rigid<S>& t) {
+matrix<6, 1, S> logarithm(const rigid<S>& t) {
   const matrix<3, 1, S> phi = logarithm<S>(t.rotation);
   matrix<6, 1, S> xi;
   xi << solve<S>(integral<S>(hat<S>(phi)), t.translation), phi;

@@ -13,10 +13,10 @@
 #include <orbis/io/synthetic.hpp>
 #include <orbis/slam/definitions.hpp>
 #include <orbis/slam/rgbd_system.hpp>
-#include <orbis/slam/validate.hpp>
 
 #include "slam/known_places.hpp"
 #include "support/catch.hpp"
+#include "support/validate.hpp"
 
 using namespace orbis;
 
@@ -100,7 +100,7 @@ TEST_CASE("A system with another descriptor, distance and extractor tracks a rec
   CHECK(worst < 0.03);
   CHECK(slam.keyframes().size() >= 2);
   CHECK(slam.landmark_count() > 200);
-  const auto valid = slam::validate(slam.map());
+  const auto valid = test::validate(slam.map());
   CHECK((valid ? "" : valid.error().to_string()) == "");
 }
 

@@ -11,11 +11,11 @@
 #include <orbis/slam/any_system.hpp>
 #include <orbis/slam/definitions.hpp>
 #include <orbis/slam/monocular_system.hpp>
-#include <orbis/slam/validate.hpp>
 
 #include "support/catch.hpp"
 #include "support/data.hpp"
 #include "support/temporary_folder.hpp"
+#include "support/validate.hpp"
 
 using namespace orbis;
 
@@ -57,7 +57,7 @@ tracked track_all(System& slam, const io::synthetic_recording& room) {
 
 template <class System>
 std::string fault_of(const System& slam) {
-  const auto valid = slam::validate(slam.map());
+  const auto valid = test::validate(slam.map());
   return valid ? "" : valid.error().to_string();
 }
 

@@ -11,7 +11,8 @@
 #include <orbis/core/random.hpp>
 #include <orbis/slam/detail/mapping/keyframe_insertion.hpp>
 #include <orbis/slam/map.hpp>
-#include <orbis/slam/validate.hpp>
+
+#include "support/validate.hpp"
 
 namespace orbis::test {
 
@@ -50,7 +51,7 @@ namespace orbis::test {
 
 /// What `validate` finds wrong; empty if nothing.
 [[nodiscard]] inline std::string fault_of(const slam::map& m) {
-  const auto valid = slam::validate(m);
+  const auto valid = test::validate(m);
   return valid ? std::string{} : valid.error().to_string();
 }
 

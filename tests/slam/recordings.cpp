@@ -10,13 +10,13 @@
 #include <orbis/eval/ate.hpp>
 #include <orbis/eval/rpe.hpp>
 #include <orbis/io/synthetic.hpp>
-#include <orbis/slam/validate.hpp>
 
 #include "slam/tested_system.hpp"
 #include "support/catch.hpp"
 #include "support/synthetic/close_people.hpp"
 #include "support/synthetic/effects.hpp"
 #include "support/synthetic/sequence.hpp"
+#include "support/validate.hpp"
 
 using namespace orbis;
 namespace syn = test;
@@ -42,7 +42,7 @@ outcome judge(const test::slam_system& slam, const Sequence& frames, std::vector
   const std::size_t last = frames.size() - 1;
   if (!found.empty() && found.back().timestamp == frames.timestamp(last))
     o.end = (found.back().T_world_camera.translation() - frames.T_world_camera(last).translation()).norm();
-  const auto valid = slam::validate(slam.map());
+  const auto valid = test::validate(slam.map());
   CHECK((valid ? "" : valid.error().to_string()) == "");
   return o;
 }

@@ -12,11 +12,11 @@
 #include <orbis/io/recording.hpp>
 #include <orbis/io/synthetic.hpp>
 #include <orbis/optimize/alignment.hpp>
-#include <orbis/slam/validate.hpp>
 
 #include "slam/tested_system.hpp"
 #include "support/catch.hpp"
 #include "support/data.hpp"
+#include "support/validate.hpp"
 
 using namespace orbis;
 
@@ -80,7 +80,7 @@ TEST_CASE("A walk through a synthetic room is tracked without a lost frame and w
   CHECK(slam.keyframes().size() == keyframes);
   CHECK(slam.keyframes().front().frame == 0);
   CHECK(slam.landmark_count() > 300);
-  const auto valid = slam::validate(slam.map());
+  const auto valid = test::validate(slam.map());
   CHECK((valid ? "" : valid.error().to_string()) == "");
 }
 

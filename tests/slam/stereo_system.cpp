@@ -7,10 +7,10 @@
 #include <orbis/io/synthetic.hpp>
 #include <orbis/slam/any_system.hpp>
 #include <orbis/slam/stereo_system.hpp>
-#include <orbis/slam/validate.hpp>
 
 #include "support/catch.hpp"
 #include "support/data.hpp"
+#include "support/validate.hpp"
 
 using namespace orbis;
 
@@ -39,7 +39,7 @@ TEST_CASE("A stereo camera's round of a room is as exact as that of an RGB-D cam
     CHECK(rgbd.track(room.frame(i).value()).tracked());
   }
   CHECK(stereo.counters().loops_closed >= 1);
-  const auto valid = slam::validate(stereo.map());
+  const auto valid = test::validate(stereo.map());
   CHECK((valid ? "" : valid.error().to_string()) == "");
   const auto ours = eval::ate(stereo.trajectory(), room.ground_truth());
   const auto theirs = eval::ate(rgbd.trajectory(), room.ground_truth());

@@ -12,11 +12,11 @@
 
 #include <orbis/eval/ate.hpp>
 #include <orbis/slam/detail/system/worker.hpp>
-#include <orbis/slam/validate.hpp>
 
 #include "slam/tested_system.hpp"
 #include "support/catch.hpp"
 #include "support/synthetic/sequence.hpp"
+#include "support/validate.hpp"
 
 using namespace orbis;
 namespace syn = test;
@@ -65,7 +65,7 @@ TEST_CASE("With threads every run gives much the same trajectory, as good as tha
     }
     slam.wait();
     CHECK(slam.counters().loops_closed >= 1);
-    const auto valid = slam::validate(slam.map());
+    const auto valid = test::validate(slam.map());
     CHECK((valid ? "" : valid.error().to_string()) == "");
     runs.push_back(slam.trajectory());
     REQUIRE(runs.back().size() == r.frames.size());

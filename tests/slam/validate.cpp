@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include "support/validate.hpp"
+
 #include <limits>
 #include <string>
 #include <utility>
 
 #include <orbis/core/random.hpp>
-#include <orbis/slam/validate.hpp>
 
 #include "slam/random_map.hpp"
 #include "support/catch.hpp"

@@ -143,11 +143,4 @@ template <camera::depth_source Depth>
   return keypoint_depth{median, std::hypot(options.noise(median), 0.5 * (farthest - nearest))};
 }
 
-/// The column at which a second camera to the right would see a point: `u - bf / z`, pixels, where
-/// `bf` is focal length (pixels) times baseline (metres). @pre z > 0
-[[nodiscard]] constexpr double virtual_right(double u, double z, double bf) noexcept {
-  assert(z > 0.0);
-  return u - bf / z;
-}
-
 }  // namespace orbis::features

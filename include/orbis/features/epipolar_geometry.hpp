@@ -10,11 +10,9 @@
 #include <limits>
 #include <optional>
 #include <span>
-#include <vector>
 
 #include <Eigen/Geometry>
 
-#include <orbis/camera/model.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/core/types.hpp>
 #include <orbis/features/descriptor.hpp>
@@ -117,16 +115,6 @@ class ray_geometry {
   vec3 centre_;
   double focal_;
 };
-
-/// The ray through each keypoint, scaled to z = 1; NaN where the camera has none.
-template <camera::camera_model Camera>
-[[nodiscard]] std::vector<vec3> rays_through(const Camera& camera, std::span<const keypoint> keypoints) {
-  std::vector<vec3> rays;
-  rays.reserve(keypoints.size());
-  for (const keypoint& k : keypoints)
-    rays.push_back(camera.unproject(vec2{k.x, k.y}).value_or(filled<vec3>(std::numeric_limits<double>::quiet_NaN())));
-  return rays;
-}
 
 static_assert(epipolar_geometry<fundamental_geometry> && epipolar_geometry<ray_geometry>);
 

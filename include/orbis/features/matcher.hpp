@@ -7,7 +7,7 @@
 ///   std::vector<match> matches = matcher(f1.descriptors, f2.descriptors);
 /// @endcode
 ///
-/// A chain begins with one source (`brute_force`, `windowed`, `projected`, `epipolar`, `node_guided`); a stage is
+/// A chain begins with one source (`brute_force`, `windowed`, `projected`, `epipolar`); a stage is
 /// anything that satisfies `match_stage`, a lambda `bool(const candidate&)` for example. Stages judge candidates in
 /// their order; each knows the nearest neighbour, the second distance and the reverse neighbour as the source found
 /// them among *all* descriptors, not among what earlier stages left over.

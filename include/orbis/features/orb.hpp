@@ -21,7 +21,6 @@
 #include <orbis/features/detail/extract/fast.hpp>
 #include <orbis/features/detail/extract/kept_memory.hpp>
 #include <orbis/features/detail/extract/orientation.hpp>
-#include <orbis/features/detail/extract/spread.hpp>
 #include <orbis/features/detail/extract/steered_brief.hpp>
 #include <orbis/features/extractor.hpp>
 #include <orbis/features/grey.hpp>

@@ -106,16 +106,12 @@ class bundle_adjuster {
                              const bundle_options& options = {}, progress callback = {}, Report&& report = {}) {
     assert(cameras.size() == equations_.structure().count.size());
     bundle_summary summary;
-    if (!std::equal(fixed_.begin(), fixed_.end(), options.fixed_poses.begin(), options.fixed_poses.end()) ||
-        hold_ != options.hold) {
+    if (!std::equal(fixed_.begin(), fixed_.end(), options.fixed_poses.begin(), options.fixed_poses.end())) {
       const detail::stage_watch watch{summary.seconds.set_up};
       set_up(cameras.size(), points.size(), observations_, options);
     }
     return run(policy, cameras, points, options, callback, report, summary);
   }
-
-  /// The normal equations at the estimate that was linearised last.
-  [[nodiscard]] const auto& equations() const { return equations_; }
 
  private:
   using equations_type = detail::bundle_equations<Residual, Loss, ReducedSolver>;
@@ -180,9 +176,7 @@ class bundle_adjuster {
     assert(options.fixed_poses.empty() || options.fixed_poses.size() == cameras);
     observations_ = observations;
     fixed_.assign(options.fixed_poses.begin(), options.fixed_poses.end());
-    hold_ = options.hold;
-    equations_.set_structure(cameras, points, observations, options.fixed_poses,
-                             options.hold == bundle_gauge::first_camera);
+    equations_.set_structure(cameras, points, observations, options.fixed_poses);
   }
 
   /// Counts the observations that cannot be used at all.
@@ -243,7 +237,6 @@ class bundle_adjuster {
   step_workspace workspace_;
   std::span<const observation> observations_;  // of the last call of `solve`
   std::vector<std::uint8_t> fixed_;            // of the structure
-  bundle_gauge hold_ = bundle_gauge::damped;
   std::vector<typename Residual::view> chi2_views_;
 };
 

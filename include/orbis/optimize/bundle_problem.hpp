@@ -43,15 +43,6 @@ struct lie_group {
   [[nodiscard]] static point retract(const point& p, const tangent& d) { return p * T::exp(d); }
 };
 
-/// Vectors of N numbers; a step is added.
-template <int N>
-struct euclidean {
-  using point = matrix<N>;
-  using tangent = matrix<N>;
-  static constexpr int dimension = N;
-  [[nodiscard]] static point retract(const point& p, const tangent& d) { return p + d; }
-};
-
 /// An observation names its camera `pose` and its `point` by index. `information` is 1 / sigma^2, the weight of its
 /// squared residual.
 template <class O>
@@ -101,13 +92,8 @@ concept camera_frame_residual =
   { r.linearize_in_camera(view, q, o, by_q, by_intrinsics) } -> std::same_as<std::optional<matrix<R::dimension>>>;
 };
 
-/// What fixes the directions that no observation determines: position and rotation of the whole and, without depth,
-/// its scale.
-enum class bundle_gauge {
-  damped,       ///< the fixed poses; the damping of the steps holds what they leave free
-  first_camera  ///< the fixed poses; without any, the first camera with observations, its intrinsics included
-};
-
+/// Directions that neither the observations nor what is fixed determine (position and rotation of the whole and,
+/// without depth, its scale) are held by the damping of the steps.
 struct bundle_options {
   int max_iterations = 10;
   double relative_tolerance = 1e-6;              ///< stop when a step lowers the cost by less than this fraction
@@ -115,7 +101,6 @@ struct bundle_options {
   std::span<const std::uint8_t> fixed_poses{};   ///< empty, or one entry per pose: nonzero keeps the pose fixed
   std::span<const std::uint8_t> fixed_points{};  ///< empty, or one entry per point: nonzero keeps the point fixed
   std::span<const std::uint8_t> ignored{};       ///< empty, or one entry per observation: nonzero leaves it out
-  bundle_gauge hold = bundle_gauge::damped;
 };
 
 enum class bundle_status {

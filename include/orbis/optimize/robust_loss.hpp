@@ -68,18 +68,7 @@ struct tukey {
   }
 };
 
-/// Bounded: approaches `width^2` as a rational function, and is half of that where the residual is `width`.
-struct geman_mcclure {
-  double width = 1.0;
-  [[nodiscard]] double cost(double squared) const noexcept { return squared * share(squared); }
-  [[nodiscard]] double weight(double squared) const noexcept { return share(squared) * share(squared); }
-
- private:
-  [[nodiscard]] double share(double squared) const noexcept { return width * width / (width * width + squared); }
-};
-
-static_assert(robust_loss<trivial> && robust_loss<huber> && robust_loss<cauchy> && robust_loss<tukey> &&
-              robust_loss<geman_mcclure>);
+static_assert(robust_loss<trivial> && robust_loss<huber> && robust_loss<cauchy> && robust_loss<tukey>);
 
 /// The 95 % quantile of the chi-squared distribution: 95 % of the correct whitened residuals with `dimension` entries
 /// have a squared norm below it. For a reprojection error `dimension` is 2, with depth 3. @pre 1 <= dimension <= 3

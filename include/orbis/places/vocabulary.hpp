@@ -88,7 +88,7 @@ class basic_vocabulary {
   }
 
   /// The words of an image's descriptors as a bag, and the direct index: `nodes[i]` becomes descriptor `i`'s node at
-  /// `options.node_depth` (or its leaf, where that is higher), as `features::node_index` takes it.
+  /// `options.node_depth` (or its leaf, where that is higher).
   template <bit_string_range_of<Bits> Descriptors>
   void transform(const Descriptors& descriptors, bag_of_words& bag, std::vector<std::uint32_t>& nodes,
                  transform_workspace& memory, const transform_options& options = {}) const {

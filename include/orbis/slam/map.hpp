@@ -32,8 +32,8 @@ namespace orbis::slam {
 ///
 /// Invariants: an observation is stored on both sides, so `keyframe.landmarks[f] == l` if and only if
 /// `landmark.observations` contains `{keyframe, f}`; the covisibility graph counts exactly these observations; the
-/// spanning tree contains all keyframes (`validate` checks this). References to keyframes and landmarks stay valid
-/// until these are erased. Const members may be called from several threads at once.
+/// spanning tree contains all keyframes. References to keyframes and landmarks stay valid until these are erased. Const
+/// members may be called from several threads at once.
 ///
 /// Let n be the number of observations of a landmark: a change to one of them costs O(n), independent of the map's
 /// size.

@@ -45,7 +45,7 @@ namespace orbis::slam {
 /// The bytes of a map's file. O(map).
 [[nodiscard]] std::string map_bytes(const map& m);
 
-/// The map in `bytes`; `where` names their origin in errors. The map is consistent (`validate`), whatever the bytes.
+/// The map in `bytes`; `where` names their origin in errors. The map is consistent, whatever the bytes.
 /// Errors: `malformed` (with the section and what is wrong in it), `unsupported` (another version).
 [[nodiscard]] result<map> parse_map(std::span<const std::byte> bytes, const std::string& where = "bytes");
 

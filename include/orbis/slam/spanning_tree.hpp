@@ -33,11 +33,6 @@ class spanning_tree {
   [[nodiscard]] const std::vector<keyframe_id>& children(keyframe_id k) const { return at(k).children; }
   /// The other ends of the loop edges of a keyframe, by ascending id. @pre contains(k)
   [[nodiscard]] const std::vector<keyframe_id>& loop_edges(keyframe_id k) const { return at(k).loops; }
-  /// Whether `k` is `ancestor` or below it. O(depth).
-  [[nodiscard]] bool descends_from(keyframe_id k, keyframe_id ancestor) const {
-    while (k != no_id && k != ancestor) k = at(k).parent;
-    return k == ancestor;
-  }
 
   /// Adds a keyframe. @pre !contains(k); contains(parent), or `parent` is `no_id` and the tree is empty
   void add(keyframe_id k, keyframe_id parent) {
@@ -48,14 +43,6 @@ class spanning_tree {
     } else {
       attach(k, parent);
     }
-  }
-
-  /// Gives a keyframe another parent. @pre both are there, and `parent` does not descend from `k`
-  void set_parent(keyframe_id k, keyframe_id parent) {
-    assert(contains(parent) && !descends_from(parent, k));
-    if (nodes_[k.value()].parent == parent) return;
-    remove(nodes_[nodes_[k.value()].parent.value()].children, k);
-    attach(k, parent);
   }
 
   /// Makes `k` the root: the edges between it and the old root change direction. O(depth). @pre contains(k)

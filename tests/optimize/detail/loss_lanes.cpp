@@ -36,6 +36,5 @@ TEST_CASE("Every loss on lanes is what it is on numbers") {
   check(optimize::huber{2.45});
   check(optimize::cauchy{1.5});
   check(optimize::tukey{4.0});
-  check(optimize::geman_mcclure{3.0});
   check(own{});
 }

@@ -73,15 +73,4 @@ struct lanes_of_loss<tukey> {
   }
 };
 
-template <>
-struct lanes_of_loss<geman_mcclure> {
-  template <camera::double_lanes L>
-  static ORBIS_ALWAYS_INLINE void weigh(const geman_mcclure& loss, const L& squared, L& cost, L& weight) {
-    const double bound = loss.width * loss.width;
-    const L share = bound / (bound + squared);
-    cost = squared * share;
-    weight = share * share;
-  }
-};
-
 }  // namespace orbis::optimize::detail

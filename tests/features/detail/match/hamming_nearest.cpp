@@ -10,7 +10,6 @@
 #include <orbis/features/detail/match/hamming_nearest.hpp>
 #include <orbis/features/hamming.hpp>
 
-#include "features/k_nearest_by.hpp"
 #include "support/catch.hpp"
 
 using namespace orbis;
@@ -113,36 +112,6 @@ TEST_CASE("every SIMD level finds the two nearest and the reverse nearest of the
     }
 }
 
-TEST_CASE("every SIMD level finds any number of nearest neighbours, lower indices first") {
-  const auto level = GENERATE(from_range(simd::available_levels()));
-  const simd::level_limit limit{level};
-  const int variety = GENERATE(256, 12, 2);
-  hamming_workspace workspace;
-  for (const std::size_t queries : {1U, 30U})
-    for (const std::size_t trains : {0U, 3U, 70U, 256U, 300U, 1100U}) {
-      const auto q = random_descriptors(queries, 20 + queries, variety);
-      const auto t = random_descriptors(trains, 2000 + trains, variety);
-      std::vector<std::vector<neighbor>> sorted(queries);
-      for (std::size_t i = 0; i != queries; ++i) {
-        for (std::size_t j = 0; j != trains; ++j)
-          sorted[i].push_back({static_cast<std::uint32_t>(j), naive_distance(q[i], t[j])});
-        std::stable_sort(sorted[i].begin(), sorted[i].end(),
-                         [](const neighbor& a, const neighbor& b) { return a.distance < b.distance; });
-      }
-      for (const std::size_t k : {1U, 2U, 5U, 100U, 300U}) {
-        INFO("level " << static_cast<int>(level) << ", " << queries << " x " << trains << ", " << k);
-        std::vector<neighbor> expected;
-        for (auto row : sorted) {
-          row.resize(k);
-          expected.insert(expected.end(), row.begin(), row.end());
-        }
-        std::vector<neighbor> found(queries * k, {7, 7});
-        hamming_k_nearest(std::span<const descriptor>{q}, std::span<const descriptor>{t}, k, found, workspace);
-        REQUIRE(found == expected);
-      }
-    }
-}
-
 TEST_CASE("queries whose nearest lie at very different distances do not mislead each other") {
   // Groups of queries with near and with far trains in turn: the first block's limit is guessed from the last query.
   const auto level = GENERATE(from_range(simd::available_levels()));
@@ -194,10 +163,6 @@ TEST_CASE("descriptors of other lengths have the neighbours of the definition, a
                std::span{expected_reverse}, distances);
     CHECK(nearest == expected);
     CHECK(reverse == expected_reverse);
-    std::vector<neighbor> found(5 * q.size()), wanted(5 * q.size());
-    hamming_k_nearest(std::span<const other>{q}, std::span<const other>{t}, 5, found, memory);
-    test::k_nearest_by(hamming{}, std::span<const other>{q}, std::span<const other>{t}, 5, std::span{wanted});
-    CHECK(found == wanted);
   };
   check(std::integral_constant<std::size_t, 64>{});
   check(std::integral_constant<std::size_t, 128>{});

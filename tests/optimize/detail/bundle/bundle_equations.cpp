@@ -54,8 +54,7 @@ Eigen::VectorXd step_of(equations_of<R>& equations, const std::vector<Camera>& c
                         const std::vector<bundle_observation>& observations, const std::vector<std::uint8_t>& fixed,
                         Eigen::VectorXd& damping) {
   optimize::bundle_summary summary;
-  equations.set_structure(cameras.size(), points.size(), std::span<const bundle_observation>(observations), fixed,
-                          false);
+  equations.set_structure(cameras.size(), points.size(), std::span<const bundle_observation>(observations), fixed);
   equations.begin(seq, std::span<const Camera>(cameras), std::span<const vec3>(points), {}, summary);
   equations.linearize(seq);
   damping = 1e-3 * equations.diagonal();

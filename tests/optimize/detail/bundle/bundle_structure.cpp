@@ -27,9 +27,9 @@ std::vector<bundle_observation> random_observations(std::uint64_t seed, std::uin
 }
 
 bundle_structure structure_of(std::size_t cameras, std::size_t points, const std::vector<bundle_observation>& all,
-                              const std::vector<std::uint8_t>& fixed = {}, bool hold_first = false) {
+                              const std::vector<std::uint8_t>& fixed = {}) {
   bundle_structure s;
-  s.build(cameras, points, std::span<const bundle_observation>(all), fixed, hold_first,
+  s.build(cameras, points, std::span<const bundle_observation>(all), fixed,
           [&](std::uint32_t k) { return all[k].information > 0.0; });
   return s;
 }
@@ -147,15 +147,4 @@ TEST_CASE("Points that the same cameras see form groups") {
   CHECK(large.pair_slot.size() == 3);
   for (const auto& g : large.groups) CHECK(g.first_pair == 0);
   CHECK(large.pairs() == 600);
-}
-
-TEST_CASE("The first camera with observations can be held, unless another is fixed") {
-  auto all = random_observations(3, 5, 10, 60);
-  std::erase_if(all, [](const auto& o) { return o.pose == 0; });
-  const auto held = structure_of(5, 10, all, {}, true);
-  CHECK(held.unknown[1] == bundle_structure::none);
-  CHECK(held.unknowns() == 3);
-  const auto fixed = structure_of(5, 10, all, {0, 0, 0, 1, 0}, true);
-  CHECK(fixed.unknown[1] != bundle_structure::none);
-  CHECK(fixed.unknowns() == 3);
 }

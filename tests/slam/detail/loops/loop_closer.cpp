@@ -4,11 +4,11 @@
 
 #include <orbis/camera/any.hpp>
 #include <orbis/slam/detail/loops/loop_closer.hpp>
-#include <orbis/slam/validate.hpp>
 
 #include "slam/known_places.hpp"
 #include "slam/ring_world.hpp"
 #include "support/catch.hpp"
+#include "support/validate.hpp"
 
 using namespace orbis;
 
@@ -58,7 +58,7 @@ TEST_CASE("A loop is closed once, reported, and adjusted globally") {
     CHECK(e.locked_milliseconds < e.milliseconds);
   }
   CHECK(s.world.errors(s.m())[0] < closed);
-  CHECK(slam::validate(s.m()));
+  CHECK(test::validate(s.m()));
 }
 
 TEST_CASE("Nothing is closed without a place, with a place nearby, or when it is switched off") {
@@ -99,7 +99,7 @@ TEST_CASE("Maps that meet become one, in the world of the older one") {
   CHECK(s.m().at(3).T_world_camera.to_matrix() == before.to_matrix());
   CHECK(s.shared.places.contains({0, 16}));
   CHECK_FALSE(s.shared.places.contains({1, 2}));
-  CHECK(slam::validate(s.m()));
+  CHECK(test::validate(s.m()));
 }
 
 TEST_CASE("Without depth maps that meet become one, in world and unit of the older one, whichever sees the other") {
@@ -123,7 +123,7 @@ TEST_CASE("Without depth maps that meet become one, in world and unit of the old
     CHECK(s.told[0].merged == (older_sees ? 0U : 1U));
     CHECK(s.told[0].T_corrected_before.scale() == Approx(older_sees ? 1.0 : 1.0 / unit).epsilon(0.01));
     CHECK(s.told[0].T_map_before.scale() == Approx(older_sees ? 1.0 / unit : 1.0).epsilon(0.01));
-    CHECK(slam::validate(s.m()));
+    CHECK(test::validate(s.m()));
     const auto older = s.shared.atlas.current(of_older), newer = s.shared.atlas.current(of_newer);
     CHECK((s.m().at(older.keyframe).T_world_camera.inverse() * before).log().norm() < 1e-9);
     CHECK(s.m().scale_of(older.keyframe) == Approx(1.0));

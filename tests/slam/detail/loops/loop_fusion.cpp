@@ -4,10 +4,10 @@
 #include <span>
 
 #include <orbis/slam/detail/loops/loop_fusion.hpp>
-#include <orbis/slam/validate.hpp>
 
 #include "slam/ring_world.hpp"
 #include "support/catch.hpp"
+#include "support/validate.hpp"
 
 using namespace orbis;
 namespace fusion = slam::detail::loop_fusion;
@@ -65,7 +65,7 @@ TEST_CASE("Landmarks of both ends are found to be the same and fused, those of t
   CHECK(s.m.landmark_count() == before.landmark_count() - counts.fused);
   CHECK(s.m.covisibility().shared(63, 3) > 50);
   for (const auto& p : pairs) CHECK(s.m.has_landmark(p.observed.landmark));
-  const auto valid = slam::validate(s.m);
+  const auto valid = test::validate(s.m);
   CHECK((valid ? "" : valid.error().to_string()) == "");
   const auto again = fusion::fuse<features::binary_descriptor<256>>(s.m, pairs);
   CHECK(again.fused + again.observed == 0);
@@ -102,5 +102,5 @@ TEST_CASE("Pairs whose keyframe or landmark is gone are left out") {
   s.m.erase_keyframe(63);
   fusion::fuse<features::binary_descriptor<256>>(s.m, pairs);
   CHECK_FALSE(s.m.has_landmark(removed));
-  CHECK(slam::validate(s.m));
+  CHECK(test::validate(s.m));
 }

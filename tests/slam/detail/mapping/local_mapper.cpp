@@ -4,11 +4,11 @@
 
 #include <orbis/camera/any.hpp>
 #include <orbis/slam/detail/mapping/local_mapper.hpp>
-#include <orbis/slam/validate.hpp>
 
 #include "slam/known_places.hpp"
 #include "slam/ring_world.hpp"
 #include "support/catch.hpp"
+#include "support/validate.hpp"
 
 using namespace orbis;
 
@@ -45,7 +45,7 @@ TEST_CASE("Mapping keyframe by keyframe keeps a map consistent, and its poses cl
     const auto id = slam::detail::insert_keyframe(s.m(), f, s.options);
     s.mapper.process({0, id}, at_leisure);
     CHECK(s.shared.places.contains({0, id}));
-    const auto valid = slam::validate(s.m());
+    const auto valid = test::validate(s.m());
     CHECK((valid ? "" : valid.error().to_string()) == "");
   }
   CHECK(s.world.errors(s.m())[0] < 0.03);

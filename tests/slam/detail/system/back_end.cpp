@@ -9,10 +9,10 @@
 
 #include <orbis/camera/any.hpp>
 #include <orbis/slam/detail/system/back_end.hpp>
-#include <orbis/slam/validate.hpp>
 
 #include "slam/ring_world.hpp"
 #include "support/catch.hpp"
+#include "support/validate.hpp"
 
 using namespace orbis;
 
@@ -46,7 +46,7 @@ TEST_CASE("A keyframe is mapped, closes a loop, and the map is adjusted, in thre
     back_end.wait();
     CHECK(s.shared.loops_closed == 1);
     CHECK(s.world.errors(s.shared.atlas.active())[0] < 0.6 * before);
-    CHECK(slam::validate(s.shared.atlas.active()));
+    CHECK(test::validate(s.shared.atlas.active()));
     CHECK_FALSE(back_end.is_full());
   }
 }
@@ -57,7 +57,7 @@ TEST_CASE("A back end that ends does not wait for what is in its queue") {
     slam::detail::back_end<camera::any_camera, features::binary_descriptor<256>, bow_places> back_end{s.shared};
     for (std::uint32_t k = 0; k != 64; ++k) back_end.process({0, k});
   }
-  CHECK(slam::validate(s.shared.atlas.active()));
+  CHECK(test::validate(s.shared.atlas.active()));
 }
 
 TEST_CASE("Where loop closing takes long, keyframes wait for mapping, not in a queue behind it") {
@@ -78,7 +78,7 @@ TEST_CASE("Where loop closing takes long, keyframes wait for mapping, not in a q
   back_end.wait();
   CHECK_FALSE(back_end.is_full());
   CHECK(s.shared.loops_closed >= 1);
-  CHECK(slam::validate(s.shared.atlas.active()));
+  CHECK(test::validate(s.shared.atlas.active()));
 }
 
 TEST_CASE("Where frames wait for the mapping, keyframes that wait do not cut an adjustment short") {

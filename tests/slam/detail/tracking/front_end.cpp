@@ -10,14 +10,14 @@
 #include <orbis/camera/depth.hpp>
 #include <orbis/core/image.hpp>
 #include <orbis/core/sim3.hpp>
+#include <orbis/slam/detail/depth/depth_tracker.hpp>
 #include <orbis/slam/detail/depth/surface.hpp>
-#include <orbis/slam/detail/depth/surface_memory.hpp>
 #include <orbis/slam/detail/tracking/front_end.hpp>
 #include <orbis/slam/monocular.hpp>
-#include <orbis/slam/validate.hpp>
 
 #include "slam/ring_world.hpp"
 #include "support/catch.hpp"
+#include "support/validate.hpp"
 
 using namespace orbis;
 using slam::track_state;
@@ -91,7 +91,7 @@ TEST_CASE("The first frame begins the map, and the ones that follow are tracked 
   CHECK(s.front_end.counters().tracked == 8);
   CHECK(s.front_end.counters().lost == 0);
   CHECK(s.front_end.log().trajectory(s.maps, 0).size() == 8);
-  CHECK(slam::validate(s.maps.active()));
+  CHECK(test::validate(s.maps.active()));
 }
 
 TEST_CASE("A camera that was lost is found by appearance, and not before") {
@@ -216,7 +216,7 @@ TEST_CASE("The first two frames of a map without depth both count, and so do the
   while (step != 6 && s.see(step) == 0) ++step;
   REQUIRE(s.front_end.state() == track_state::tracking);
   const slam::map& m = s.maps.active();
-  CHECK(slam::validate(m));
+  CHECK(test::validate(m));
   REQUIRE(m.keyframes().size() == 2);
   REQUIRE(m.landmark_count() >= s.options.start.min_points);
   for (const auto& l : m.landmarks()) {
@@ -311,7 +311,7 @@ TEST_CASE("Where the trajectory is limited, the map forgets erased keyframes tha
       in.front_end.forget_erased(in.maps);
       most = std::max(most, m.content().erased.size());
     }
-    CHECK((slam::validate(m) ? "" : slam::validate(m).error().to_string()) == "");
+    CHECK((test::validate(m) ? "" : test::validate(m).error().to_string()) == "");
   };
   walk(12);
   const slam::map_keyframe last = s.front_end.last_reference();

@@ -16,11 +16,36 @@
 
 #include <orbis/core/image.hpp>
 #include <orbis/core/simd/dispatch.hpp>
-#include <orbis/features/detail/extract/binomial.hpp>
+#include <orbis/core/simd/integer.hpp>
+#include <orbis/core/simd/vec.hpp>
 #include <orbis/features/detail/extract/fast_scores.hpp>
 #include <orbis/features/extractor.hpp>
 
 namespace orbis::features::detail {
+
+/// to[x] = (a[x] + 2 b[x] + c[x] + 2) / 4. @pre `to` overlaps none of the others
+struct binomial_kernel {
+  using signature = void(const std::uint8_t* a, const std::uint8_t* b, const std::uint8_t* c, int count,
+                         std::uint8_t* to);
+  template <class Target>
+  static ORBIS_ALWAYS_INLINE void run(const std::uint8_t* a, const std::uint8_t* b, const std::uint8_t* c, int count,
+                                      std::uint8_t* to) {
+    using bytes = simd::native_vec<std::uint8_t, Target>;
+    constexpr int step = static_cast<int>(bytes::count);
+    const auto block = [&](int x) ORBIS_INLINE_LAMBDA {
+      // The mean of a and c, rounded down; then its mean with b, rounded up: together that is the rounding wanted.
+      const bytes va = bytes::load(a + x), vb = bytes::load(b + x), vc = bytes::load(c + x);
+      const bytes ac = average(va, vc) - ((va ^ vc) & bytes(1));
+      average(ac, vb).store(to + x);
+    };
+    if (count < step) {
+      for (int x = 0; x < count; ++x) to[x] = static_cast<std::uint8_t>((a[x] + 2 * b[x] + c[x] + 2) >> 2);
+      return;
+    }
+    for (int x = 0; x <= count - step; x += step) block(x);
+    if (count % step != 0) block(count - step);  // overlaps the block before it
+  }
+};
 
 /// Finds FAST-9/16 corners: nine contiguous pixels of the circle of radius 3 are all brighter or all
 /// darker than the centre by more than a threshold. The response is the largest threshold at which
@@ -175,3 +200,5 @@ struct fast9 {
 static_assert(corner_detector<fast9>);
 
 }  // namespace orbis::features::detail
+
+ORBIS_COMPILED_KERNEL(orbis::features::detail::binomial_kernel, orbis::features::detail::binomial_kernel::signature);

@@ -27,26 +27,11 @@ struct hamming_workspace {
   std::vector<std::uint32_t> reverse_distance;
 };
 
-/// What a search has found for each query: any number of neighbours, in rows of `k`, ascending.
-struct keep_k {
-  neighbor* rows;
-  std::size_t k;
-  [[nodiscard]] std::size_t rank() const noexcept { return k; }
-  [[nodiscard]] std::uint32_t limit(std::size_t q) const noexcept { return rows[q * k + k - 1].distance; }
-  /// @pre distance < limit(q); indices arrive ascending
-  ORBIS_ALWAYS_INLINE void insert(std::size_t q, std::uint32_t index, std::uint32_t distance) const noexcept {
-    neighbor* const row = rows + q * k;
-    std::size_t at = k - 1;
-    for (; at != 0 && row[at - 1].distance > distance; --at) row[at] = row[at - 1];
-    row[at] = {index, distance};
-  }
-};
-
 /// What a search has found for each query: the nearest and the distance of the second.
 struct keep_two {
   nearest_two* nearest;
-  [[nodiscard]] static std::size_t rank() noexcept { return 2; }
   [[nodiscard]] std::uint32_t limit(std::size_t q) const noexcept { return nearest[q].second_distance; }
+  /// @pre distance < limit(q); indices arrive ascending
   ORBIS_ALWAYS_INLINE void insert(std::size_t q, std::uint32_t index, std::uint32_t distance) const noexcept {
     nearest_two& n = nearest[q];
     if (distance < n.distance) {
@@ -58,8 +43,8 @@ struct keep_two {
 };
 
 /// Compares pair by pair: for so few that slices do not pay.
-template <class Target, class D, class Keep>
-ORBIS_ALWAYS_INLINE void search_pairs(std::span<const D> queries, std::span<const D> trains, const Keep& keep,
+template <class Target, class D>
+ORBIS_ALWAYS_INLINE void search_pairs(std::span<const D> queries, std::span<const D> trains, const keep_two& keep,
                                       std::span<std::uint32_t> reverse, hamming_workspace& workspace) {
   workspace.reverse_distance.assign(reverse.size(), none);
   for (std::size_t q = 0; q != queries.size(); ++q) {
@@ -89,8 +74,8 @@ ORBIS_ALWAYS_INLINE void for_each_bit(const slice<Words>& bits, const slice<Word
 
 /// Compares all queries with one block of trains after the other, so that the block's table stays in the first-level
 /// cache.
-template <class Target, class D, class Keep>
-ORBIS_ALWAYS_INLINE void search_slices(std::span<const D> queries, std::span<const D> trains, const Keep& keep,
+template <class Target, class D>
+ORBIS_ALWAYS_INLINE void search_slices(std::span<const D> queries, std::span<const D> trains, const keep_two& keep,
                                        std::span<std::uint32_t> reverse, hamming_workspace& workspace) {
   constexpr std::size_t Words = slice_words<Target>;
   auto& tables = [&]() -> auto& {
@@ -112,7 +97,7 @@ ORBIS_ALWAYS_INLINE void search_slices(std::span<const D> queries, std::span<con
     for (std::size_t t = 0; t != block.size(); ++t) valid.words[t / 64] |= std::uint64_t{1} << (t % 64);
     slice_distances<Words> least;
     for (slice<Words>& plane : least) plane.words.fill(~std::uint64_t{0});
-    const std::size_t rank = std::min(keep.rank(), block.size());
+    const std::size_t rank = std::min<std::size_t>(2, block.size());
     std::uint32_t guess = 0;
     slice_distances<Words>
         distances;  // of the current query; declared here, because clearing them for each costs a twelfth
@@ -145,8 +130,8 @@ ORBIS_ALWAYS_INLINE void search_slices(std::span<const D> queries, std::span<con
 }
 
 struct hamming_search_kernel {
-  template <class Target, class D, class Keep>
-  static ORBIS_ALWAYS_INLINE void run(std::span<const D> queries, std::span<const D> trains, const Keep& keep,
+  template <class Target, class D>
+  static ORBIS_ALWAYS_INLINE void run(std::span<const D> queries, std::span<const D> trains, const keep_two& keep,
                                       std::span<std::uint32_t> reverse, hamming_workspace& workspace) {
     // A table costs about as much as a dozen queries save; a block costs the same however few trains it holds.
     if constexpr (bits_of<D> == 256) {
@@ -157,15 +142,6 @@ struct hamming_search_kernel {
   }
 };
 
-template <class D, class Keep>
-void hamming_search(std::span<const D> queries, std::span<const D> trains, const Keep& keep,
-                    std::span<std::uint32_t> reverse, hamming_workspace& workspace) {
-  using signature =
-      void(std::span<const D>, std::span<const D>, const Keep&, std::span<std::uint32_t>, hamming_workspace&);
-  simd::kernel<hamming_search_kernel, signature, simd::popcnt, simd::avx2, simd::avx512>()(queries, trains, keep,
-                                                                                           reverse, workspace);
-}
-
 /// For each query its nearest and second nearest train; if `reverse` is not empty, for each train its nearest
 /// query (the lowest on ties), in the same pass. O(queries x trains) time, O(queries + trains) memory, all of it in
 /// `workspace`. Strings of 256 bits are the fast ones.
@@ -175,18 +151,10 @@ void hamming_nearest(std::span<const D> queries, std::span<const D> trains, std:
                      std::span<std::uint32_t> reverse, hamming_workspace& workspace) {
   assert(nearest.size() == queries.size() && (reverse.empty() || reverse.size() == trains.size()));
   std::fill(nearest.begin(), nearest.end(), nearest_two{});
-  hamming_search(queries, trains, keep_two{nearest.data()}, reverse, workspace);
-}
-
-/// For each query its `k` nearest trains by ascending distance, then index: row `q` begins at `nearest[q * k]`;
-/// where there are fewer trains, the rest of the row keeps the default.
-/// @pre k > 0; nearest.size() == queries.size() * k
-template <bit_string D>
-void hamming_k_nearest(std::span<const D> queries, std::span<const D> trains, std::size_t k,
-                       std::span<neighbor> nearest, hamming_workspace& workspace) {
-  assert(k > 0 && nearest.size() == queries.size() * k);
-  std::fill(nearest.begin(), nearest.end(), neighbor{});
-  hamming_search(queries, trains, keep_k{nearest.data(), k}, {}, workspace);
+  using signature =
+      void(std::span<const D>, std::span<const D>, const keep_two&, std::span<std::uint32_t>, hamming_workspace&);
+  simd::kernel<hamming_search_kernel, signature, simd::popcnt, simd::avx2, simd::avx512>()(
+      queries, trains, keep_two{nearest.data()}, reverse, workspace);
 }
 
 }  // namespace orbis::features::detail

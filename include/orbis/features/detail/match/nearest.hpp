@@ -13,13 +13,6 @@
 
 namespace orbis::features::detail {
 
-/// One of the nearest.
-struct neighbor {
-  std::uint32_t index = none;
-  std::uint32_t distance = none;
-  friend constexpr bool operator==(const neighbor&, const neighbor&) = default;
-};
-
 /// The nearest of a set, the lowest index on ties, and the distance of the second nearest.
 struct nearest_two {
   std::uint32_t index = none;

@@ -50,7 +50,7 @@ class bundle_equations {
 
   /// Orders the observations and finds the blocks of the reduced system.
   void set_structure(std::size_t cameras, std::size_t points, std::span<const observation> observations,
-                     std::span<const std::uint8_t> fixed, bool hold_first);
+                     std::span<const std::uint8_t> fixed);
 
   /// Begins at these estimates, with the observations that are not ignored and have a projection there; counts them in
   /// `summary`.
@@ -175,8 +175,6 @@ class bundle_equations {
     std::copy(reduced_right_.begin(), reduced_right_.end(), step.data());
     if (structure_.unknowns() != 0) reduced_.solve({step.data(), reduced_right_.size()});
   }
-  /// Replaces a right-hand side of the reduced system that was factored last by the solution.
-  void solve_reduced(std::span<double> x) { reduced_.solve(x); }
   /// The step of the points, for that of the cameras in `step`.
   template <class Policy>
   void solve_points(const Policy& policy, Eigen::VectorXd& step) {
@@ -228,8 +226,24 @@ class bundle_equations {
     return structure_.unknowns() != 0 || std::find(holds_point_.begin(), holds_point_.end(), 0) != holds_point_.end();
   }
 
+ private:
+  using rows = row_layout<camera_size>;
+  static constexpr std::size_t segment_size = camera_numbers<camera_size>;
+  static constexpr std::size_t slot_grain = 256;
+  static constexpr bool through_camera = camera_frame_residual<R>;
+  using mixed_block_tile = mixed_tile<camera_size, through_camera>;
+
+  /// Chunks whose points are eliminated one after the other, and the slots that they touch. The bounds depend only on
+  /// the problem.
+  struct elimination_run {
+    std::size_t first_chunk = 0, end_chunk = 0, first_slot = 0, end_slot = 0;
+  };
+  /// What they subtract from the reduced system.
+  struct elimination_buffer {
+    std::vector<double> blocks, right, scratch;
+  };
+
   // The blocks of the normal equations at the estimate last linearised.
-  [[nodiscard]] const camera_block& camera_hessian(std::size_t unknown) const { return camera_hessian_[unknown]; }
   [[nodiscard]] mat3 point_hessian(std::size_t point) const {
     const double* const v = normal_.data() + point_size * point;
     mat3 h;
@@ -250,23 +264,6 @@ class bundle_equations {
     }
     return block;
   }
-
- private:
-  using rows = row_layout<camera_size>;
-  static constexpr std::size_t segment_size = camera_numbers<camera_size>;
-  static constexpr std::size_t slot_grain = 256;
-  static constexpr bool through_camera = camera_frame_residual<R>;
-  using mixed_block_tile = mixed_tile<camera_size, through_camera>;
-
-  /// Chunks whose points are eliminated one after the other, and the slots that they touch. The bounds depend only on
-  /// the problem.
-  struct elimination_run {
-    std::size_t first_chunk = 0, end_chunk = 0, first_slot = 0, end_slot = 0;
-  };
-  /// What they subtract from the reduced system.
-  struct elimination_buffer {
-    std::vector<double> blocks, right, scratch;
-  };
 
   [[nodiscard]] auto camera_part(const Eigen::VectorXd& x, std::size_t u) const {
     return segment<camera_size>(x, static_cast<Eigen::Index>(camera_size * u));
@@ -515,8 +512,8 @@ bundle_equations<R, Loss, Reduced>::bundle_equations(R residual, Loss loss, cons
 template <bundle_residual R, robust_loss Loss, reduced_solver Reduced>
 void bundle_equations<R, Loss, Reduced>::set_structure(std::size_t cameras, std::size_t points,
                                                        std::span<const observation> observations,
-                                                       std::span<const std::uint8_t> fixed, bool hold_first) {
-  structure_.build(cameras, points, observations, fixed, hold_first,
+                                                       std::span<const std::uint8_t> fixed) {
+  structure_.build(cameras, points, observations, fixed,
                    [&](std::uint32_t k) { return residual_.is_usable(observations[k]); });
   const std::size_t places = structure_.places();
   base_information_.assign(places, 0.0);

@@ -73,14 +73,13 @@ class bundle_structure {
   /// Most observations of a chunk by cameras that may move.
   [[nodiscard]] std::size_t largest_chunk() const { return largest_chunk_; }
 
-  /// Orders the observations for which `is_usable(index)`. Cameras without any do not move. With `hold_first` the first
-  /// camera with observations does not move either, unless another is fixed.
+  /// Orders the observations for which `is_usable(index)`. Cameras without any do not move.
   /// @pre their indices are in range, `fixed` is empty or has one entry for each camera
   template <class Observation, class Usable>
   void build(std::size_t cameras, std::size_t points, std::span<const Observation> observations,
-             std::span<const std::uint8_t> fixed, bool hold_first, const Usable& is_usable) {
+             std::span<const std::uint8_t> fixed, const Usable& is_usable) {
     sort(cameras, points, observations, is_usable);
-    number_cameras(cameras, fixed, hold_first);
+    number_cameras(cameras, fixed);
     order_points(points);
     find_points_alike();
     lay_out(cameras);
@@ -124,18 +123,11 @@ class bundle_structure {
         by_point_[cursor_[at->other]++] = {at->observation, c};
   }
 
-  void number_cameras(std::size_t cameras, std::span<const std::uint8_t> fixed, bool hold_first) {
+  void number_cameras(std::size_t cameras, std::span<const std::uint8_t> fixed) {
     unknown.assign(cameras, none);
     camera.clear();
-    std::uint32_t held = none;
-    for (std::uint32_t c = 0; c != cameras && hold_first; ++c) {
-      if (count[c] == 0) continue;
-      if (held == none) held = c;
-      hold_first = fixed.empty() || fixed[c] == 0;
-    }
-    if (!hold_first) held = none;
     for (std::uint32_t c = 0; c != cameras; ++c)
-      if (count[c] != 0 && c != held && (fixed.empty() || fixed[c] == 0)) {
+      if (count[c] != 0 && (fixed.empty() || fixed[c] == 0)) {
         unknown[c] = static_cast<std::uint32_t>(camera.size());
         camera.push_back(c);
       }

@@ -33,15 +33,14 @@ ORBIS_KERNEL_INSTANCE(ORBIS_INSTANTIATE_OPTIMIZE, optimize::detail::substitute_k
                         double(const optimize::detail::camera_work<optimize::residual>&, const optimize::loss&)); \
   ORBIS_KERNEL_INSTANCE(what, optimize::detail::cost_kernel<optimize::residual, optimize::loss>,                  \
                         double(const optimize::detail::camera_work<optimize::residual>&, const optimize::loss&));
-#define ORBIS_INSTANTIATE_BUNDLE(what, residual, loss)                                                               \
-  ORBIS_INSTANTIATE_BUNDLE_KERNELS(what, residual, loss)                                                             \
-  what optimize::detail::bundle_equations<optimize::residual, optimize::loss, optimize::automatic_reduced_solver>::  \
-      bundle_equations(optimize::residual, optimize::loss, const optimize::automatic_reduced_solver&);               \
-  what void optimize::detail::                                                                                       \
-      bundle_equations<optimize::residual, optimize::loss, optimize::automatic_reduced_solver>::set_structure(       \
-          std::size_t, std::size_t, std::span<const optimize::residual::observation>, std::span<const std::uint8_t>, \
-          bool);                                                                                                     \
-  ORBIS_INSTANTIATE_BUNDLE_RUN(what, residual, loss, sequential_policy)                                              \
+#define ORBIS_INSTANTIATE_BUNDLE(what, residual, loss)                                                                \
+  ORBIS_INSTANTIATE_BUNDLE_KERNELS(what, residual, loss)                                                              \
+  what optimize::detail::bundle_equations<optimize::residual, optimize::loss, optimize::automatic_reduced_solver>::   \
+      bundle_equations(optimize::residual, optimize::loss, const optimize::automatic_reduced_solver&);                \
+  what void optimize::detail::                                                                                        \
+      bundle_equations<optimize::residual, optimize::loss, optimize::automatic_reduced_solver>::set_structure(        \
+          std::size_t, std::size_t, std::span<const optimize::residual::observation>, std::span<const std::uint8_t>); \
+  ORBIS_INSTANTIATE_BUNDLE_RUN(what, residual, loss, sequential_policy)                                               \
   ORBIS_INSTANTIATE_BUNDLE_RUN(what, residual, loss, parallel_policy)
 #define ORBIS_INSTANTIATE_BUNDLE_RUN(what, residual, loss, policy)                                                  \
   what optimize::bundle_summary optimize::bundle_adjuster<optimize::residual, optimize::loss>::run(                 \

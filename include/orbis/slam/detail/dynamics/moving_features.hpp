@@ -73,10 +73,6 @@ class moving_features {
     trusts_old_only_ = false;
   }
   [[nodiscard]] bool is_enabled() const noexcept { return options_.moving.enabled; }
-  /// Whether a feature of the present frame is left out.
-  [[nodiscard]] bool leaves_out(std::size_t feature) const noexcept {
-    return !is_left_out_.empty() && is_left_out_[feature] != 0;
-  }
   /// How many features of the last frame were left out.
   [[nodiscard]] std::size_t size() const noexcept { return tracks_.size(); }
   /// Where these were, pixels.

@@ -12,8 +12,7 @@
 
 #include <orbis/camera/model.hpp>
 #include <orbis/core/execution.hpp>
-#include <orbis/slam/detail/mapping/keyframe_culling.hpp>
-#include <orbis/slam/detail/mapping/landmark_culling.hpp>
+#include <orbis/slam/detail/mapping/culling.hpp>
 #include <orbis/slam/detail/mapping/landmark_fusion.hpp>
 #include <orbis/slam/detail/mapping/landmark_triangulation.hpp>
 #include <orbis/slam/detail/mapping/local_adjustment.hpp>

@@ -4,11 +4,11 @@
 #include <vector>
 
 #include <orbis/core/execution.hpp>
-#include <orbis/optimize/automatic_residual.hpp>
 #include <orbis/optimize/bundle_adjustment.hpp>
 #include <orbis/optimize/reprojection.hpp>
 
 #include "bundle_instances.hpp"
+#include "dual_numbers.hpp"
 #include "support.hpp"
 #include "support/catch.hpp"
 #include "templated_residuals.hpp"
@@ -22,7 +22,7 @@ const camera::pinhole plain{640, 480, 517.3, 510.5, 318.6, 255.3};
 
 struct reprojection_by_definition {
   template <class S>
-  matrix<3, 1, S> operator()(const optimize::rigid<S>& T_world_camera, const matrix<3, 1, S>& point,
+  matrix<3, 1, S> operator()(const test::rigid<S>& T_world_camera, const matrix<3, 1, S>& point,
                              const optimize::bundle_observation& o) const {
     return test::reproject<S>(plain, 40.0, T_world_camera.inverse() * point, o.pixel, o.right);
   }
@@ -59,10 +59,10 @@ TEST_CASE("Bundle adjustment with Jacobians of dual numbers ends where the analy
   };
   std::vector<se3> a, b;
   const auto analytic = solve(optimize::bundle_adjuster{optimize::reprojection{plain, 40.0}, optimize::huber{2.45}}, a);
-  const auto by_dual_numbers = solve(
-      optimize::bundle_adjuster{optimize::automatic_bundle_residual{reprojection_by_definition{}, lie_group<se3>{}},
-                                optimize::huber{2.45}},
-      b);
+  const auto by_dual_numbers =
+      solve(optimize::bundle_adjuster{test::automatic_bundle_residual{reprojection_by_definition{}, lie_group<se3>{}},
+                                      optimize::huber{2.45}},
+            b);
   REQUIRE_FALSE(is_failure(analytic.status));
   REQUIRE_FALSE(is_failure(by_dual_numbers.status));
   CHECK(by_dual_numbers.initial_cost == Approx(analytic.initial_cost).epsilon(1e-12));

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include "pose_graph/chordal.hpp"
+
 #include <cmath>
 #include <cstring>
 #include <limits>
 
-#include <orbis/optimize/chordal_initialization.hpp>
 #include <orbis/optimize/pose_graph.hpp>
 
 #include "pose_graphs.hpp"
@@ -12,6 +13,7 @@
 
 using namespace orbis;
 using namespace orbis::optimize;
+using examples::start_chordally;
 
 TEST_CASE("Without noise the truth comes out, wherever the vertices were") {
   random_bits random{371};
@@ -19,9 +21,8 @@ TEST_CASE("Without noise the truth comes out, wherever the vertices were") {
     std::vector<se3> vertices;
     for (std::size_t i = 0; i != made.truth.size(); ++i) vertices.push_back(test::random_pose(random, 50.0));
     vertices[0] = made.truth[0];
-    REQUIRE(
-        initialize_chordally(std::span<se3>{vertices}, made.measured.edges, {.fixed = made.measured.fixed}).status ==
-        pose_graph_status::converged);
+    REQUIRE(start_chordally(std::span<se3>{vertices}, made.measured.edges, {.fixed = made.measured.fixed}).status ==
+            pose_graph_status::converged);
     CHECK(test::position_error(vertices, made.truth) < 1e-6);
     for (std::size_t i = 0; i != vertices.size(); ++i) CHECK(test::angle_between(vertices[i], made.truth[i]) < 1e-7);
     CHECK(test::same_bits({vertices[0]}, {made.truth[0]}));
@@ -33,9 +34,8 @@ TEST_CASE("Noisy graphs converge from it to the best minimum, and from odometry 
   const auto run = [](const test::synthetic_graph& made, bool chordal) {
     std::vector<se3> vertices = made.measured.vertices;
     if (chordal)
-      REQUIRE(
-          initialize_chordally(std::span<se3>{vertices}, made.measured.edges, {.fixed = made.measured.fixed}).status ==
-          pose_graph_status::converged);
+      REQUIRE(start_chordally(std::span<se3>{vertices}, made.measured.edges, {.fixed = made.measured.fixed}).status ==
+              pose_graph_status::converged);
     return test::solve<gauss_newton>(seq, vertices, made.measured.edges,
                                      {.max_iterations = 25, .fixed = made.measured.fixed});
   };
@@ -72,14 +72,13 @@ TEST_CASE("Fixed vertices hold the start, weights count, failures change nothing
       {.from = 2, .to = 1, .measurement = se3{so3{}, vec3(-3, 0, 0)}, .information = strong.asDiagonal()}};
   const std::vector<std::uint8_t> ends{1, 0, 1};
   std::vector<se3> vertices{se3{}, se3{so3::exp(vec3(1, 2, 3)), vec3(9, 9, 9)}, se3{so3{}, vec3(6, 0, 0)}};
-  REQUIRE(initialize_chordally(std::span<se3>{vertices}, edges, {.fixed = ends}).status ==
-          pose_graph_status::converged);
+  REQUIRE(start_chordally(std::span<se3>{vertices}, edges, {.fixed = ends}).status == pose_graph_status::converged);
   CHECK((vertices[1].translation() - vec3(2.5, 0, 0)).norm() < 1e-12);
   CHECK(vertices[1].rotation().angle() < 1e-12);
 
   const auto before = vertices;
   const auto refused = [&](const std::vector<edge>& bad, pose_graph_status status, std::size_t where) {
-    const auto s = initialize_chordally(std::span<se3>{vertices}, bad);
+    const auto s = start_chordally(std::span<se3>{vertices}, bad);
     CHECK(s.status == status);
     CHECK(s.where == where);
     CHECK(test::same_bits(vertices, before));
@@ -90,7 +89,7 @@ TEST_CASE("Fixed vertices hold the start, weights count, failures change nothing
   bad = edges;
   bad[0].measurement = se3{so3{}, vec3(std::numeric_limits<double>::quiet_NaN(), 0, 0)};
   refused(bad, pose_graph_status::bad_measurement, 0);
-  CHECK(initialize_chordally(std::span<se3>{vertices}, std::vector<edge>{}).status == pose_graph_status::nothing_to_do);
+  CHECK(start_chordally(std::span<se3>{vertices}, std::vector<edge>{}).status == pose_graph_status::nothing_to_do);
   // Half a turn one way and half a turn the other, about axes at right angles: no rotation is nearest.
   bad = edges;
   const double pi = std::acos(-1.0);
@@ -98,5 +97,5 @@ TEST_CASE("Fixed vertices hold the start, weights count, failures change nothing
   bad[1] = bad[0];
   bad[1].measurement = se3{so3{}, vec3::Zero()};
   std::vector<se3> two(2);
-  CHECK(initialize_chordally(std::span<se3>{two}, bad).status == pose_graph_status::singular);
+  CHECK(start_chordally(std::span<se3>{two}, bad).status == pose_graph_status::singular);
 }

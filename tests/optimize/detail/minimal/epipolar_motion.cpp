@@ -2,7 +2,7 @@
 #include <cmath>
 #include <vector>
 
-#include <orbis/optimize/detail/minimal/unit_sphere.hpp>
+#include <orbis/optimize/detail/minimal/epipolar_motion.hpp>
 
 #include "optimize/support.hpp"
 #include "support/catch.hpp"
