@@ -97,7 +97,7 @@ class block_conjugate_gradients {
 
   [[nodiscard]] static double dot(const std::vector<double>& a, const std::vector<double>& b) {
     const auto n = static_cast<Eigen::Index>(a.size());
-    return dot(Eigen::Map<const Eigen::VectorXd>(a.data(), n), Eigen::Map<const Eigen::VectorXd>(b.data(), n));
+    return Eigen::Map<const Eigen::VectorXd>(a.data(), n).dot(Eigen::Map<const Eigen::VectorXd>(b.data(), n));
   }
   void precondition() {
     for (std::size_t i = 0; i != size_; ++i) at(preconditioned_, i).noalias() = inverse_[i] * at(residual_, i);

@@ -34,7 +34,7 @@ inline constexpr std::size_t bytes_of_keypoint = 76, bytes_of_observation = 8;
   for (double& x : v) x = from.take<double>();
   const basic_so3<double>::quaternion q(v[6], v[3], v[4], v[5]);
   const vec3 t(v[0], v[1], v[2]);
-  if (!(largest_magnitude(t) < farthest) || !all_finite(t) || !(std::abs(squared_norm(q) - 1.0) < 1e-6)) return std::nullopt;
+  if (!(largest_magnitude(t) < farthest) || !all_finite(t) || !(std::abs(q.squaredNorm() - 1.0) < 1e-6)) return std::nullopt;
   return se3(so3::from_unit_quaternion(q), t);
 }
 [[nodiscard]] inline features::binary_descriptor<256> take_descriptor(section_reader& from) {
