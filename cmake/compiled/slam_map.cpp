@@ -1,4 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include <orbis/slam/detail/compiled/map_file_functions.hpp>
+#include <orbis/slam/calibration-inl.hpp>
+#include <orbis/slam/map-inl.hpp>
+#include <orbis/slam/map_file-inl.hpp>
 
-template class orbis::slam::basic_map<orbis::features::binary_descriptor<256>>;
+namespace orbis::slam {
+
+template class basic_map<features::binary_descriptor<256>>;
+template result<calibration<camera::any_camera>> calibrate(const map&, const camera_rig<camera::any_camera>&,
+                                                           const calibration_options&, const progress&);
+
+}  // namespace orbis::slam

@@ -14,7 +14,6 @@
 #include <orbis/core/execution.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/slam/camera_rig.hpp>
-#include <orbis/slam/detail/system/definitions_check.hpp>
 #include <orbis/slam/map.hpp>
 
 namespace orbis::slam {
@@ -64,16 +63,6 @@ struct calibration : calibration_summary {
   Camera camera;
 };
 
-namespace detail {
-
-/// As `calibrate`; defined in calibration_functions.hpp.
-template <feature_descriptor D, calibrated_camera Camera>
-[[nodiscard]] result<calibration<Camera>> calibrate_by_map(const basic_map<D>& m, const camera_rig<Camera>& rig,
-                                                           const calibration_options& options,
-                                                           const progress& callback);
-
-}  // namespace detail
-
 /// Refines the camera of a map by its keyframes and landmarks, whose poses and positions are refined with it but not
 /// changed in the map. The map should be made again with the camera that was found, and that be refined in turn, until
 /// nothing changes: what did not fit the first camera had been left out of the map.
@@ -84,16 +73,10 @@ template <feature_descriptor D, calibrated_camera Camera>
 template <feature_descriptor D, calibrated_camera Camera>
 [[nodiscard]] result<calibration<Camera>> calibrate(const basic_map<D>& m, const camera_rig<Camera>& rig,
                                                     const calibration_options& options = {},
-                                                    const progress& callback = {}) {
-  static_assert(detail::has_definitions<detail::of_calibration, D, Camera>,
-                "orbis::compiled holds this for the descriptors of ORB: include <orbis/slam/definitions.hpp>");
-  return detail::calibrate_by_map(m, rig, options, callback);
-}
+                                                    const progress& callback = {});
 
 }  // namespace orbis::slam
 
-#ifdef ORBIS_COMPILED
-#include <orbis/slam/detail/compiled/calibration.hpp>
-#else
-#include <orbis/slam/detail/mapping/calibration_functions.hpp>
+#ifndef ORBIS_COMPILED
+#include <orbis/slam/calibration-inl.hpp>
 #endif

@@ -35,12 +35,12 @@ camera_rig(optimize::reprojection<Camera>, pyramid_scales) -> camera_rig<Camera>
 
 /// The rig of a camera with the settings of a system.
 template <camera::camera_model Camera>
-[[nodiscard]] camera_rig<Camera> make_rig(Camera camera, const options& settings, bool scale_is_known = true) {
+[[nodiscard]] camera_rig<Camera> make_rig(Camera camera, const options& settings) {
   return {{std::move(camera), settings.bf},
           {settings.features.levels, static_cast<double>(settings.features.scale_factor)},
           settings.min_depth,
           settings.max_depth,
-          scale_is_known};
+          settings.scale_is_measured};
 }
 
 /// The focal length in the middle of the image, pixels per radian; 0 if the camera cannot project there.

@@ -62,5 +62,5 @@ namespace orbis::slam {
 }  // namespace orbis::slam
 
 #ifndef ORBIS_COMPILED
-#include <orbis/slam/detail/compiled/map_file_functions.hpp>
+#include <orbis/slam/map_file-inl.hpp>
 #endif

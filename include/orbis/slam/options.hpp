@@ -3,6 +3,8 @@
 /// The options of the SLAM system.
 #pragma once
 
+#include <algorithm>
+#include <cassert>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -220,7 +222,9 @@ struct options {
   adjustment_options adjustment{};
   culling_options culling{};
   recovery_options recovery{};
-  bool scale_is_measured = true;  ///< for `any_sensor`: off for images of one camera, see `monocular_options`
+  /// Off for one camera without depth (`monocular_options`): a map begins with two frames between which there is enough
+  /// parallax, lengths are in a unit of the map's own, and their drift is corrected at loops.
+  bool scale_is_measured = true;
   start_options start{};
   depth_term_options depth_term{};
   place_options places{};
@@ -239,5 +243,39 @@ struct options {
   std::function<se3()> find_initial_pose{};
   std::uint64_t seed = 1;  ///< of RANSAC
 };
+
+/// The settings of a rectified stereo camera of focal length `focal` (pixels) and `baseline` (metres), on top of
+/// others: `bf`, the range of depth from a baseline to a disparity of a pixel, and points as close as 40 baselines,
+/// whose depth a single pair tells well enough (R. Mur-Artal, J. D. Tardos, "ORB-SLAM2", T-RO 33 (2017), section
+/// III.A). Points farther than these become landmarks by parallax. @pre focal > 0, baseline > 0
+[[nodiscard]] inline options stereo_options(double focal, double baseline, options settings = {}) {
+  assert(focal > 0.0 && baseline > 0.0);
+  settings.bf = focal * baseline;
+  settings.min_depth = baseline;
+  settings.max_depth = settings.bf;
+  settings.close_depth = std::min(40.0 * baseline, settings.max_depth);
+  return settings;
+}
+
+/// The settings of a camera without depth, on top of others. Lengths of `keyframes.moved` and
+/// `triangulation.min_baseline` are then shares of the median depth of the landmarks in view. More keyframes are made,
+/// for landmarks to be triangulated by, and landmarks need three of them. The figures are those of R. Mur-Artal, J. M.
+/// M. Montiel, J. D. Tardos, "ORB-SLAM", T-RO 31 (2015), where it gives them.
+[[nodiscard]] inline options monocular_options(options settings = {}) {
+  settings.scale_is_measured = false;
+  settings.keyframes.moved = 0.03;
+  settings.keyframes.inlier_ratio = settings.keyframes.inlier_ratio_start = 0.9;
+  settings.culling.min_support = 3;
+  settings.culling.least_support = 2;
+  settings.triangulation.neighbors = 20;
+  settings.triangulation.min_baseline = 0.01;
+  settings.triangulation.min_parallax = 0.02;
+  settings.fusion.neighbors = 20;
+  settings.recovery.min_map_keyframes = 5;
+  settings.moving.enabled = false;
+  settings.depth_term.enabled = settings.depth_term.recovers = false;
+  settings.places.loop.max_rotation = 60.0 * std::numbers::pi / 180.0;
+  return settings;
+}
 
 }  // namespace orbis::slam

@@ -35,8 +35,8 @@ ORBIS_COMPILED_ONCE void make_rays_meet(const mat3& essential, vec3& first, vec3
   const double size = squared_norm(n) + squared_norm(m);
   if (!(size > 0.0)) return;
   lambda *= 2.0 * d / size;
-  second.template head<2>() -= lambda * n;
-  first.template head<2>() -= lambda * m;
+  set_block(second, 0, 0, head<2>(second) - lambda * n);
+  set_block(first, 0, 0, head<2>(first) - lambda * m);
 }
 
 }  // namespace detail

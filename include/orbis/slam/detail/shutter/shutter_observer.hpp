@@ -19,7 +19,7 @@
 #include <orbis/slam/frame.hpp>
 #include <orbis/slam/ids.hpp>
 #include <orbis/slam/map.hpp>
-#include <orbis/slam/sensor.hpp>
+#include <orbis/slam/measure.hpp>
 #include <orbis/slam/shutter_estimate.hpp>
 
 namespace orbis::slam::detail {

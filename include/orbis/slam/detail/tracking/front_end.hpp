@@ -9,7 +9,6 @@
 #include <limits>
 #include <optional>
 #include <span>
-#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -30,25 +29,18 @@
 #include <orbis/slam/detail/tracking/tracker.hpp>
 #include <orbis/slam/ids.hpp>
 #include <orbis/slam/matchers.hpp>
+#include <orbis/slam/measure.hpp>
 #include <orbis/slam/options.hpp>
-#include <orbis/slam/sensor.hpp>
 #include <orbis/slam/track_result.hpp>
 
 namespace orbis::slam::detail {
-
-/// Takes the place of `monocular_start` where a sensor always measures depth.
-struct no_start {
-  template <class... T>
-  explicit no_start(const T&...) {}
-  void reset() noexcept {}
-};
 
 /// Tracks the frames of one camera. It takes no lock: the caller makes sure that the maps are not changed during a
 /// call. For each frame, in this order: `sync_with_map`, `localize`, `update_reference` and, if `needs_keyframe`,
 /// `make_keyframe`, then `finish`.
 ///
 /// The scheme is that of R. Mur-Artal, J. D. Tardos, "ORB-SLAM2", T-RO 33 (2017), section III.
-template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
+template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers>
 class front_end {
  public:
   using frame_type = basic_frame<D>;
@@ -134,9 +126,6 @@ class front_end {
   void forget_erased(atlas_type& maps);
 
  private:
-  static constexpr bool may_lack_scale = Sensor::scale != scale_source::sensor;
-  using start_type = std::conditional_t<may_lack_scale, monocular_start<Camera, D>, no_start>;
-
   /// Begins a map with a frame, if the sensor says that it can; without depth, with a frame before it as well. The map
   /// becomes the active one. Returns the number of its points.
   std::size_t begin_map(frame_type& f, atlas_type& maps, const map_drop& drop);
@@ -185,7 +174,7 @@ class front_end {
   tracker<Camera, D, Matchers> tracker_;
   moving_features<Camera, D, Matchers> moving_;
   depth_tracker<Camera> depth_;
-  [[no_unique_address]] start_type start_;
+  monocular_start<Camera, D> start_;  ///< for maps without a known scale
   const camera_rig<Camera>& rig_;
   const options& options_;
   camera::shutter shutter_;
@@ -215,8 +204,8 @@ class front_end {
 
 // The members are defined outside of the class, so that a compiled instantiation of it (`extern template`) covers them.
 
-template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
-front_end<Camera, D, Matchers, Sensor>::front_end(const camera_rig<Camera>& rig, const options& settings)
+template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers>
+front_end<Camera, D, Matchers>::front_end(const camera_rig<Camera>& rig, const options& settings)
     : tracker_{rig, settings},
       moving_{rig, settings},
       depth_{rig, settings.depth_term},
@@ -228,24 +217,24 @@ front_end<Camera, D, Matchers, Sensor>::front_end(const camera_rig<Camera>& rig,
   if (settings.estimates_shutter) observer_.emplace();
 }
 
-template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
-void front_end<Camera, D, Matchers, Sensor>::update_reference(const frame_type& f, const atlas_type& maps) {
+template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers>
+void front_end<Camera, D, Matchers>::update_reference(const frame_type& f, const atlas_type& maps) {
   if (!maps.active().keyframes().empty())
     reference_ = {maps.active_id(), most_shared(maps.active(), f, reference_.keyframe)};
 }
 
-template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
-bool front_end<Camera, D, Matchers, Sensor>::needs_keyframe(const frame_type& f, std::size_t inliers,
+template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers>
+bool front_end<Camera, D, Matchers>::needs_keyframe(const frame_type& f, std::size_t inliers,
                                                             const atlas_type& maps) const {
   if (begins_map()) return true;
   if (f.held_by_depth)
-    return f.timestamp - held_since_ >= options_.keyframes.interval && Sensor::begins_map(f, options_) > 0;
+    return f.timestamp - held_since_ >= options_.keyframes.interval && start_points(f, options_) > 0;
   return is_keyframe_due(gather_evidence(maps.active(), f, reference_.keyframe, inliers, options_, rig_.scale_is_known),
                          options_.keyframes);
 }
 
-template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
-map_keyframe front_end<Camera, D, Matchers, Sensor>::make_keyframe(frame_type& f, atlas_type& maps) {
+template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers>
+map_keyframe front_end<Camera, D, Matchers>::make_keyframe(frame_type& f, atlas_type& maps) {
   basic_map<D>& m = maps.active();
   first_new_ = m.landmark_end();
   const keyframe_id id = insert_keyframe(m, f, options_);
@@ -258,16 +247,16 @@ map_keyframe front_end<Camera, D, Matchers, Sensor>::make_keyframe(frame_type& f
   return reference_ = {maps.active_id(), id};
 }
 
-template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
-std::size_t front_end<Camera, D, Matchers, Sensor>::track_local_map(frame_type& f, basic_map<D>& m, double radius,
+template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers>
+std::size_t front_end<Camera, D, Matchers>::track_local_map(frame_type& f, basic_map<D>& m, double radius,
                                                                     bool is_frozen) {
   return tracker_.on_local_map(
       f, m, reference_.keyframe, radius, moving_, [&](landmark_id l) { is_frozen ? void() : m.count_visible(l); },
       [&](landmark_id l) { is_frozen ? void() : m.count_found(l); });
 }
 
-template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
-std::size_t front_end<Camera, D, Matchers, Sensor>::drop_disagreeing(frame_type& f, const basic_map<D>& m) const {
+template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers>
+std::size_t front_end<Camera, D, Matchers>::drop_disagreeing(frame_type& f, const basic_map<D>& m) const {
   const se3 T_camera_world = f.T_world_camera.inverse();
   std::size_t left = 0;
   for (std::size_t i = 0; i != f.size(); ++i) {
@@ -278,16 +267,16 @@ std::size_t front_end<Camera, D, Matchers, Sensor>::drop_disagreeing(frame_type&
   return left;
 }
 
-template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
-se3 front_end<Camera, D, Matchers, Sensor>::last_pose(const atlas_type& maps) const {
+template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers>
+se3 front_end<Camera, D, Matchers>::last_pose(const atlas_type& maps) const {
   const map_keyframe k = maps.current(last_reference_);
   return maps.contains(k.map) && maps.at(k.map).remembers(k.keyframe)
              ? maps.at(k.map).pose_of(k.keyframe) * scaled(T_reference_last_, maps.at(k.map).scale_of(k.keyframe))
              : last_.T_world_camera;
 }
 
-template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
-tracked_frame front_end<Camera, D, Matchers, Sensor>::last_frame() const {
+template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers>
+tracked_frame front_end<Camera, D, Matchers>::last_frame() const {
   tracked_frame shown{last_reference_, T_reference_last_, {}, last_twist()};
   shown.features.reserve(last_.size());
   for (std::size_t i = 0; i != last_.size(); ++i) {
@@ -302,8 +291,8 @@ tracked_frame front_end<Camera, D, Matchers, Sensor>::last_frame() const {
   return shown;
 }
 
-template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
-void front_end<Camera, D, Matchers, Sensor>::sync_with_map(const atlas_type& maps) {
+template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers>
+void front_end<Camera, D, Matchers>::sync_with_map(const atlas_type& maps) {
   const map_keyframe now = maps.current(reference_);
   if (now.map != reference_.map)
     for (landmark_id& l : last_.landmarks)
@@ -316,13 +305,13 @@ void front_end<Camera, D, Matchers, Sensor>::sync_with_map(const atlas_type& map
     const double scale = maps.at(now.map).scale_of(last.keyframe);
     const double grown = scale / std::exchange(last_scale_, scale);
     motion_.scale_by(grown);
-    last_.twist.template head<3>() *= grown;
+    set_block(last_.twist, 0, 0, head<3>(last_.twist) * grown);
   }
   reference_.keyframe = maps.at(now.map).replacement_of(now.keyframe);
 }
 
-template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
-std::size_t front_end<Camera, D, Matchers, Sensor>::localize(frame_type& f, atlas_type& maps, bool is_frozen,
+template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers>
+std::size_t front_end<Camera, D, Matchers>::localize(frame_type& f, atlas_type& maps, bool is_frozen,
                                                              const row_follower& follow_rows,
                                                              const appearance_search& similar, const map_drop& drop) {
   first_new_ = no_id;
@@ -350,17 +339,16 @@ std::size_t front_end<Camera, D, Matchers, Sensor>::localize(frame_type& f, atla
   return begin_map(f, maps, drop);
 }
 
-template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
-std::size_t front_end<Camera, D, Matchers, Sensor>::begin_map(frame_type& f, atlas_type& maps, const map_drop& drop) {
-  std::size_t points = Sensor::begins_map(f, options_);
+template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers>
+std::size_t front_end<Camera, D, Matchers>::begin_map(frame_type& f, atlas_type& maps, const map_drop& drop) {
+  std::size_t points = start_points(f, options_);
   if (points == 0) return 0;
   std::optional<monocular_start_result<D>> start;
-  if constexpr (may_lack_scale)
-    if (!rig_.scale_is_known) {
-      start = start_.see(f);
-      if (!start) return 0;
-      points = start->points.size();
-    }
+  if (!rig_.scale_is_known) {
+    start = start_.see(f);
+    if (!start) return 0;
+    points = start->points.size();
+  }
   enter_new_map(maps, drop);
   f.landmarks.assign(f.size(), no_id);  // of searches in other maps
   f.T_world_camera = options_.find_initial_pose ? options_.find_initial_pose() : options_.initial_pose.value_or(se3{});
@@ -370,8 +358,8 @@ std::size_t front_end<Camera, D, Matchers, Sensor>::begin_map(frame_type& f, atl
   return points;
 }
 
-template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
-void front_end<Camera, D, Matchers, Sensor>::enter_new_map(atlas_type& maps, const map_drop& drop) {
+template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers>
+void front_end<Camera, D, Matchers>::enter_new_map(atlas_type& maps, const map_drop& drop) {
   if (state_ == track_state::not_started) return;
   const map_id before = maps.active_id();
   maps.create();
@@ -380,8 +368,8 @@ void front_end<Camera, D, Matchers, Sensor>::enter_new_map(atlas_type& maps, con
   motion_.reset();
 }
 
-template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
-void front_end<Camera, D, Matchers, Sensor>::add_start(monocular_start_result<D> start, frame_type& f,
+template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers>
+void front_end<Camera, D, Matchers>::add_start(monocular_start_result<D> start, frame_type& f,
                                                        atlas_type& maps) {
   // An initial pose that was asked for just now is that of `f`, otherwise that of the first frame.
   const se3 T_world_first =
@@ -399,8 +387,8 @@ void front_end<Camera, D, Matchers, Sensor>::add_start(monocular_start_result<D>
   if (state_ == track_state::lost) --counters_.lost;
 }
 
-template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
-std::size_t front_end<Camera, D, Matchers, Sensor>::track_from_last(frame_type& f, atlas_type& maps, bool is_frozen,
+template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers>
+std::size_t front_end<Camera, D, Matchers>::track_from_last(frame_type& f, atlas_type& maps, bool is_frozen,
                                                                     const row_follower& follow_rows) {
   const se3 predicted = motion_.predict({last_.timestamp, last_.T_world_camera}, f.timestamp);
   if (!shutter_.is_global()) {
@@ -423,8 +411,8 @@ std::size_t front_end<Camera, D, Matchers, Sensor>::track_from_last(frame_type& 
   return inliers;
 }
 
-template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
-std::size_t front_end<Camera, D, Matchers, Sensor>::relocalize(frame_type& f, atlas_type& maps, bool is_frozen,
+template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers>
+std::size_t front_end<Camera, D, Matchers>::relocalize(frame_type& f, atlas_type& maps, bool is_frozen,
                                                                const row_follower& follow_rows,
                                                                const appearance_search& similar) {
   moving_.clear();
@@ -445,17 +433,17 @@ std::size_t front_end<Camera, D, Matchers, Sensor>::relocalize(frame_type& f, at
   return 0;
 }
 
-template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
-std::size_t front_end<Camera, D, Matchers, Sensor>::search_in_place(frame_type& f, atlas_type& maps, bool is_frozen,
+template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers>
+std::size_t front_end<Camera, D, Matchers>::search_in_place(frame_type& f, atlas_type& maps, bool is_frozen,
                                                                     const row_follower& follow_rows) {
   const bool is_here = last_.size() != 0 && reference_.map == maps.active_id() && maps.has(reference_);
   const bool is_recent = f.timestamp - last_.timestamp < options_.recovery.new_map_after;
-  if (!is_here || (is_frozen && !is_recent) || Sensor::begins_map(f, options_) == 0) return 0;
+  if (!is_here || (is_frozen && !is_recent) || start_points(f, options_) == 0) return 0;
   return tracker_.by_turning(f, maps.active(), last_) == 0 ? 0 : track_found(f, maps, is_frozen, follow_rows);
 }
 
-template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
-std::size_t front_end<Camera, D, Matchers, Sensor>::track_found(frame_type& f, atlas_type& maps, bool is_frozen,
+template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers>
+std::size_t front_end<Camera, D, Matchers>::track_found(frame_type& f, atlas_type& maps, bool is_frozen,
                                                                 const row_follower& follow_rows) {
   const std::size_t inliers = track_local_map(f, maps.active(), 3.0 * options_.search_radius, is_frozen);
   if (inliers < options_.recovery.min_inliers) return 0;
@@ -464,8 +452,8 @@ std::size_t front_end<Camera, D, Matchers, Sensor>::track_found(frame_type& f, a
   return inliers;
 }
 
-template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
-void front_end<Camera, D, Matchers, Sensor>::refine_motion(frame_type& f, const atlas_type& maps, bool is_next,
+template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers>
+void front_end<Camera, D, Matchers>::refine_motion(frame_type& f, const atlas_type& maps, bool is_next,
                                                            const row_follower& follow_rows) {
   const basic_map<D>& m = maps.active();
   const bool rolls = !shutter_.is_global();
@@ -505,8 +493,8 @@ void front_end<Camera, D, Matchers, Sensor>::refine_motion(frame_type& f, const 
   });
 }
 
-template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
-std::optional<depth_alignment> front_end<Camera, D, Matchers, Sensor>::align_depth(const frame_type& f,
+template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers>
+std::optional<depth_alignment> front_end<Camera, D, Matchers>::align_depth(const frame_type& f,
                                                                                    const atlas_type& maps) {
   constexpr double longest = 2.0;  // seconds
   const double interval = f.timestamp - last_.timestamp;
@@ -518,8 +506,8 @@ std::optional<depth_alignment> front_end<Camera, D, Matchers, Sensor>::align_dep
   return depth_.align(search_starts(last_.T_world_camera, predicted, interval), shutter_);
 }
 
-template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
-std::size_t front_end<Camera, D, Matchers, Sensor>::track_from_depth(frame_type& f, atlas_type& maps,
+template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers>
+std::size_t front_end<Camera, D, Matchers>::track_from_depth(frame_type& f, atlas_type& maps,
                                                                      const depth_alignment& aligned, bool is_frozen,
                                                                      const row_follower& follow_rows) {
   f.T_world_camera = aligned.at.T_world_camera;
@@ -546,8 +534,8 @@ std::size_t front_end<Camera, D, Matchers, Sensor>::track_from_depth(frame_type&
   return inliers;
 }
 
-template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
-std::size_t front_end<Camera, D, Matchers, Sensor>::settle(frame_type& f, atlas_type& maps, std::size_t inliers,
+template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers>
+std::size_t front_end<Camera, D, Matchers>::settle(frame_type& f, atlas_type& maps, std::size_t inliers,
                                                            bool is_frozen, const row_follower& follow_rows) {
   // Where something moves in the view, that is what does not fit.
   if (!options_.depth_term.recovers || moving_.size() != 0 || !depth_.is_surrounded()) return inliers;
@@ -563,8 +551,8 @@ std::size_t front_end<Camera, D, Matchers, Sensor>::settle(frame_type& f, atlas_
   return inliers;
 }
 
-template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
-bool front_end<Camera, D, Matchers, Sensor>::hold_by_depth(frame_type& f, const depth_alignment& aligned) {
+template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers>
+bool front_end<Camera, D, Matchers>::hold_by_depth(frame_type& f, const depth_alignment& aligned) {
   if (!depth_.holds_alone(aligned)) return false;
   f.T_world_camera = aligned.at.T_world_camera;
   f.landmarks.assign(f.size(), no_id);
@@ -574,15 +562,15 @@ bool front_end<Camera, D, Matchers, Sensor>::hold_by_depth(frame_type& f, const 
   return true;
 }
 
-template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
-void front_end<Camera, D, Matchers, Sensor>::observe(const frame_type& f, const atlas_type& maps,
+template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers>
+void front_end<Camera, D, Matchers>::observe(const frame_type& f, const atlas_type& maps,
                                                      const std::optional<map_keyframe>& made) {
   if (state_ != track_state::tracking || last_.index + 1 != f.index || last_.size() == 0) return observer_->interrupt();
   if (const auto changed = observer_->add(last_, f, made, maps.active(), rig_, shutter_)) shutter_ = *changed;
 }
 
-template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
-void front_end<Camera, D, Matchers, Sensor>::finish(frame_type f, const atlas_type& maps,
+template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers>
+void front_end<Camera, D, Matchers>::finish(frame_type f, const atlas_type& maps,
                                                     const std::optional<map_keyframe>& made) {
   ++counters_.frames;
   counters_.tracked += is_tracking();
@@ -607,8 +595,8 @@ void front_end<Camera, D, Matchers, Sensor>::finish(frame_type f, const atlas_ty
   last_ = std::move(f);
 }
 
-template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
-void front_end<Camera, D, Matchers, Sensor>::forget_erased(atlas_type& maps) {
+template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers>
+void front_end<Camera, D, Matchers>::forget_erased(atlas_type& maps) {
   if (options_.trajectory_frames == std::numeric_limits<std::size_t>::max()) return;
   if (maps.active().content().erased.size() < most_erased_) return;
   std::vector<keyframe_id> keep = log_.references(maps, maps.active_id());

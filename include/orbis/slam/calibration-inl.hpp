@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The functions of calibration.hpp. With orbis::compiled, which holds them for the descriptors of ORB, only
-/// definitions.hpp includes them.
+/// The functions of calibration.hpp.
 #pragma once
 
 #include <algorithm>
@@ -29,13 +28,9 @@
 #include <orbis/slam/calibration.hpp>
 #include <orbis/slam/camera_rig.hpp>
 #include <orbis/slam/detail/mapping/map_bundle.hpp>
-#include <orbis/slam/detail/system/definitions_check.hpp>
 #include <orbis/slam/map.hpp>
 
 namespace orbis::slam {
-
-template <class... Ts>
-struct detail::included_definitions<detail::of_calibration, Ts...> {};
 
 namespace detail {
 
@@ -160,23 +155,25 @@ template <camera::parametric_camera Camera>
   return out;
 }
 
+
+}  // namespace detail
+
 template <feature_descriptor D, calibrated_camera Camera>
-[[nodiscard]] result<calibration<Camera>> calibrate_by_map(const basic_map<D>& m, const camera_rig<Camera>& rig,
+result<calibration<Camera>> calibrate(const basic_map<D>& m, const camera_rig<Camera>& rig,
                                                            const calibration_options& options,
                                                            const progress& callback) {
   camera_rig<Camera> loose = rig;  // a depth error counts as many pixels as bf says
   loose.model.bf *= std::sqrt(options.depth_weight);
-  const bundle_snapshot problem = calibration_problem_of(m, loose, options.max_keyframes);
+  const detail::bundle_snapshot problem = detail::calibration_problem_of(m, loose, options.max_keyframes);
   if constexpr (std::same_as<Camera, camera::any_camera>) {
     return rig.camera().visit([&](const auto& model) -> result<calibration<Camera>> {
-      auto found = calibrate_model(model, problem, loose.model.bf, options, callback);
+      auto found = detail::calibrate_model(model, problem, loose.model.bf, options, callback);
       if (!found) return fail(found.error());
       return calibration<Camera>{std::move(*found), found->camera};
     });
   } else {
-    return calibrate_model(rig.camera(), problem, loose.model.bf, options, callback);
+    return detail::calibrate_model(rig.camera(), problem, loose.model.bf, options, callback);
   }
 }
 
-}  // namespace detail
 }  // namespace orbis::slam

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The functions of `rgbd_system`. With orbis::compiled, which holds them for the library's own types, only
-/// definitions.hpp includes them.
+/// The functions of system.hpp.
 #pragma once
 
 #include <algorithm>
@@ -28,7 +27,6 @@
 #include <orbis/slam/atlas.hpp>
 #include <orbis/slam/camera_rig.hpp>
 #include <orbis/slam/detail/system/back_end.hpp>
-#include <orbis/slam/detail/system/definitions_check.hpp>
 #include <orbis/slam/detail/system/shared_state.hpp>
 #include <orbis/slam/detail/system/stopwatch.hpp>
 #include <orbis/slam/detail/tracking/front_end.hpp>
@@ -39,90 +37,107 @@
 #include <orbis/slam/matchers.hpp>
 #include <orbis/slam/options.hpp>
 #include <orbis/slam/place_recognition.hpp>
-#include <orbis/slam/rgbd_system.hpp>
-#include <orbis/slam/sensor.hpp>
+#include <orbis/slam/measure.hpp>
 #include <orbis/slam/shutter_estimate.hpp>
+#include <orbis/slam/system.hpp>
 #include <orbis/slam/track_result.hpp>
 
 namespace orbis::slam {
 
-template <class... Ts>
-struct detail::included_definitions<detail::of_system, Ts...> {};
-
 #define ORBIS_SLAM_SYSTEM_TEMPLATE                                    \
   template <camera::camera_model Camera, feature_extractor Extractor, \
             tracking_matchers<descriptor_of_t<Extractor>> Matchers,   \
-            place_recognizer<descriptor_of_t<Extractor>> Places, sensor<descriptor_of_t<Extractor>> Sensor>
-#define ORBIS_SLAM_SYSTEM rgbd_system<Camera, Extractor, Matchers, Places, Sensor>
+            place_recognizer<descriptor_of_t<Extractor>> Places>
+#define ORBIS_SLAM_SYSTEM system<Camera, Extractor, Matchers, Places>
 
 ORBIS_SLAM_SYSTEM_TEMPLATE
-ORBIS_SLAM_SYSTEM::rgbd_system(Camera camera, const options& settings) requires
+ORBIS_SLAM_SYSTEM::system(Camera camera, const options& settings) requires
     std::constructible_from<Extractor, const features::orb_options&> && std::default_initializable<Places>
-    : rgbd_system(std::move(camera), settings, Extractor(settings.features), Places{}) {}
+    : system(std::move(camera), settings, Extractor(settings.features), Places{}) {}
 
 ORBIS_SLAM_SYSTEM_TEMPLATE
-ORBIS_SLAM_SYSTEM::rgbd_system(Camera camera, const options& settings, Extractor extractor, Places places)
+ORBIS_SLAM_SYSTEM::system(Camera camera, const options& settings, Extractor extractor, Places places)
     : options_{settings},
       extract_{std::move(extractor)},
-      shared_{make_rig(std::move(camera), settings, measures_scale<Sensor>(settings)), options_, std::move(places)},
+      shared_{make_rig(std::move(camera), settings), options_, std::move(places)},
       front_end_{std::make_unique<front_end>(shared_.rig, options_)},
       localization_only_{settings.localization_only},
       back_end_{std::make_unique<back_end>(shared_)} {}
 
 ORBIS_SLAM_SYSTEM_TEMPLATE
-ORBIS_SLAM_SYSTEM::~rgbd_system() = default;
+ORBIS_SLAM_SYSTEM::~system() = default;
 
 ORBIS_SLAM_SYSTEM_TEMPLATE
 void ORBIS_SLAM_SYSTEM::listen(listeners callbacks) { shared_.callbacks = std::move(callbacks); }
 
 ORBIS_SLAM_SYSTEM_TEMPLATE
-track_result ORBIS_SLAM_SYSTEM::track(const camera::rgbd_frame& f) requires
-    measures<Sensor, Camera, Extractor, image_view<const rgb8>, camera::depth_view<std::uint16_t>> {
-  return track_images(f.timestamp, f.color.view(), f.depth_metres());
+template <camera::depth_source Depth>
+track_result ORBIS_SLAM_SYSTEM::track(double timestamp, image_view<const rgb8> color, const Depth& depth) {
+  detail::stopwatch clock;
+  front_end_->depth().see_nothing();
+  if (!are_usable(timestamp, color, depth)) return track_frame(timestamp, {}, {}, clock);
+  frame_type f = measure_rgbd(shared_.rig, extract_, color, depth);
+  front_end_->depth().see(depth);
+  return track_frame(timestamp, std::move(f),
+                     [&](frame_type& seen, const frame_motion& m) { follow_rows(shared_.rig, m, seen, depth); }, clock);
 }
 
 ORBIS_SLAM_SYSTEM_TEMPLATE
-track_result ORBIS_SLAM_SYSTEM::track(double timestamp, image_view<const rgb8> left,
-                                      image_view<const rgb8> right) requires
-    measures<Sensor, Camera, Extractor, image_view<const rgb8>, image_view<const rgb8>> {
-  return track_images(timestamp, left, right);
+template <class Measure>
+  requires std::is_invocable_r_v<basic_frame<descriptor_of_t<Extractor>>, const Measure&, const camera_rig<Camera>&,
+                                 const Extractor&>
+track_result ORBIS_SLAM_SYSTEM::track_measured(double timestamp, const Measure& measure) {
+  detail::stopwatch clock;
+  front_end_->depth().see_nothing();
+  return track_frame(timestamp, std::isfinite(timestamp) ? measure(shared_.rig, extract_) : frame_type{}, {}, clock);
+}
+
+ORBIS_SLAM_SYSTEM_TEMPLATE
+track_result ORBIS_SLAM_SYSTEM::track(double timestamp, image_view<const rgb8> left, image_view<const rgb8> right) {
+  return track_measured(timestamp, [&](const auto& rig, const Extractor& extract) {
+    return are_usable(timestamp, left, right) ? measure_stereo(rig, extract, left, right, stereo_) : frame_type{};
+  });
 }
 
 ORBIS_SLAM_SYSTEM_TEMPLATE
 track_result ORBIS_SLAM_SYSTEM::track(double timestamp, image_view<const std::uint8_t> left,
-                                      image_view<const std::uint8_t> right) requires
-    measures<Sensor, Camera, Extractor, image_view<const std::uint8_t>, image_view<const std::uint8_t>> {
-  return track_images(timestamp, left, right);
+                                      image_view<const std::uint8_t> right)
+  requires grey_extractor<Extractor>
+{
+  return track_measured(timestamp, [&](const auto& rig, const Extractor& extract) {
+    return are_usable(timestamp, left, right) ? measure_stereo(rig, extract, left, right, stereo_) : frame_type{};
+  });
 }
 
 ORBIS_SLAM_SYSTEM_TEMPLATE
-track_result ORBIS_SLAM_SYSTEM::track(double timestamp, image_view<const rgb8> color) requires
-    measures<Sensor, Camera, Extractor, image_view<const rgb8>> {
-  return track_images(timestamp, color);
+track_result ORBIS_SLAM_SYSTEM::track(double timestamp, image_view<const rgb8> color) {
+  return track_measured(timestamp, [&](const auto& rig, const Extractor& extract) {
+    return are_usable(timestamp, color) ? measure_monocular(rig, extract, color) : frame_type{};
+  });
 }
 
 ORBIS_SLAM_SYSTEM_TEMPLATE
-track_result ORBIS_SLAM_SYSTEM::track(double timestamp, image_view<const std::uint8_t> grey) requires
-    measures<Sensor, Camera, Extractor, image_view<const std::uint8_t>> {
-  return track_images(timestamp, grey);
+track_result ORBIS_SLAM_SYSTEM::track(double timestamp, image_view<const std::uint8_t> grey)
+  requires grey_extractor<Extractor>
+{
+  return track_measured(timestamp, [&](const auto& rig, const Extractor& extract) {
+    return are_usable(timestamp, grey) ? measure_monocular(rig, extract, grey) : frame_type{};
+  });
 }
 
 ORBIS_SLAM_SYSTEM_TEMPLATE
-template <class... Images>
-track_result ORBIS_SLAM_SYSTEM::track_images(double timestamp, const Images&... images) {
+track_result ORBIS_SLAM_SYSTEM::track_frame(double timestamp, frame_type f, const row_follower& follow,
+                                            detail::stopwatch& clock) {
   track_result result;
-  detail::stopwatch clock;
-  frame_type f = measure(timestamp, images...);
-  front_end_->depth().see_nothing();
-  if constexpr (has_depth_image<Sensor, Images...>)
-    if (are_usable(timestamp, images...)) front_end_->depth().see(Sensor::depth_image(images...));
+  f.scale_is_known = shared_.rig.scale_is_known;
+  if (!f.scale_is_known) std::fill(f.depth.begin(), f.depth.end(), 0.0F);
+  if (front_end_->looks_at_rows()) detail::keep_as_read(f);
+  f.timestamp = std::isfinite(timestamp) ? timestamp : front_end_->last_timestamp();
+  f.index = front_end_->counters().frames;
   clock.lap(result.timings.features_ms);
   if (options_.threads.wait) back_end_->wait_for_room();
-  const auto follow_rows = [&](frame_type& seen, const frame_motion& motion) {
-    if constexpr (follows_rows<Sensor, descriptor_type, Camera, Images...>)
-      Sensor::follow_rows(shared_.rig, motion, seen, images...);
-  };
-  const std::optional<map_keyframe> made = localize(std::move(f), std::cref(follow_rows), result, clock);
+  const row_follower stay = [](frame_type&, const frame_motion&) {};
+  const std::optional<map_keyframe> made = localize(std::move(f), follow ? follow : stay, result, clock);
   if (made) {
     if (const auto& first = front_end_->first_keyframe()) dispatch_keyframe(*first);
     dispatch_keyframe(*made);
@@ -133,26 +148,8 @@ track_result ORBIS_SLAM_SYSTEM::track_images(double timestamp, const Images&... 
 }
 
 ORBIS_SLAM_SYSTEM_TEMPLATE
-template <class... Images>
-auto ORBIS_SLAM_SYSTEM::measure(double timestamp, const Images&... images) const -> frame_type {
-  frame_type f;
-  // Others do not come here; clang before 16 instantiates members of which the constraints do not hold.
-  if constexpr (measures<Sensor, Camera, Extractor, Images...>)
-    if (are_usable(timestamp, images...)) {
-      f = sensor_.measure(shared_.rig, extract_, images...);
-      f.scale_is_known = shared_.rig.scale_is_known;
-      if (!f.scale_is_known) std::fill(f.depth.begin(), f.depth.end(), 0.0F);  // what a sensor of run time may measure
-      if (front_end_->looks_at_rows()) detail::keep_as_read(f);
-    }
-  f.timestamp = std::isfinite(timestamp) ? timestamp : front_end_->last_timestamp();
-  f.index = front_end_->counters().frames;
-  return f;
-}
-
-ORBIS_SLAM_SYSTEM_TEMPLATE
 std::optional<map_keyframe> ORBIS_SLAM_SYSTEM::localize(
-    frame_type f, const std::function<void(frame_type&, const frame_motion&)>& follow_rows, track_result& result,
-    detail::stopwatch& clock) {
+    frame_type f, const row_follower& follow, track_result& result, detail::stopwatch& clock) {
   const auto lock = shared_.lock();
   atlas_type& maps = shared_.atlas;
   const bool is_frozen = localization_only_;
@@ -163,7 +160,7 @@ std::optional<map_keyframe> ORBIS_SLAM_SYSTEM::localize(
     if (const auto edit = shared_.try_edit()) shared_.remove_map(m);
   };
   front_end_->sync_with_map(maps);
-  result.inliers = front_end_->localize(f, maps, is_frozen, follow_rows, similar, drop);
+  result.inliers = front_end_->localize(f, maps, is_frozen, follow, similar, drop);
   clock.lap(result.timings.tracking_ms);
   std::optional<map_keyframe> made;
   if (front_end_->is_tracking()) {
@@ -325,7 +322,3 @@ result<void> ORBIS_SLAM_SYSTEM::load_map(const std::filesystem::path& path) requ
 #undef ORBIS_SLAM_SYSTEM_TEMPLATE
 
 }  // namespace orbis::slam
-
-#ifdef ORBIS_COMPILED
-#include <orbis/slam/detail/compiled/system_parts.hpp>
-#endif

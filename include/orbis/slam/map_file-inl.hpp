@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The functions of map_file.hpp: inline, or, with ORBIS_COMPILED, compiled once, by cmake/compiled/slam_map.cpp.
+/// The functions of map_file.hpp.
 #pragma once
 
 #include <cstddef>
@@ -13,7 +13,7 @@
 #include <utility>
 
 #include <orbis/core/bytes.hpp>
-#include <orbis/core/compiled_once.hpp>
+#include <orbis/core/inline.hpp>
 #include <orbis/core/file.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/slam/detail/map/file_sections.hpp>
@@ -23,9 +23,9 @@
 
 namespace orbis::slam {
 
-ORBIS_COMPILED_ONCE std::string map_bytes(const map& m) { return detail::write_sections(m); }
+ORBIS_INLINE std::string map_bytes(const map& m) { return detail::write_sections(m); }
 
-ORBIS_COMPILED_ONCE result<map> parse_map(std::span<const std::byte> bytes, const std::string& where) {
+ORBIS_INLINE result<map> parse_map(std::span<const std::byte> bytes, const std::string& where) {
   const std::string_view text{reinterpret_cast<const char*>(bytes.data()), bytes.size()};
   constexpr std::size_t head = detail::map_magic.size() + sizeof(detail::map_version);
   if (text.substr(0, detail::map_magic.size()) != detail::map_magic)
@@ -50,18 +50,18 @@ ORBIS_COMPILED_ONCE result<map> parse_map(std::span<const std::byte> bytes, cons
   return map{std::move(parts)};
 }
 
-ORBIS_COMPILED_ONCE result<map> read_map(const std::filesystem::path& path) {
+ORBIS_INLINE result<map> read_map(const std::filesystem::path& path) {
   const auto bytes = read_file(path);
   if (!bytes) return fail(bytes.error());
   return parse_map(std::as_bytes(std::span{*bytes}), path.string());
 }
 
-ORBIS_COMPILED_ONCE result<void> write_map_bytes(const std::filesystem::path& path, const std::string& bytes) {
+ORBIS_INLINE result<void> write_map_bytes(const std::filesystem::path& path, const std::string& bytes) {
   return write_file_atomically(
       path, [&](std::ostream& out) { out.write(bytes.data(), static_cast<std::streamsize>(bytes.size())); });
 }
 
-ORBIS_COMPILED_ONCE result<void> write_map(const std::filesystem::path& path, const map& m) {
+ORBIS_INLINE result<void> write_map(const std::filesystem::path& path, const map& m) {
   return write_map_bytes(path, map_bytes(m));
 }
 

@@ -3,7 +3,7 @@
 /// Keyframe-based SLAM from an RGB-D camera.
 ///
 /// @code
-///   orbis::slam::rgbd_system slam{camera, orbis::slam::options{}};
+///   orbis::slam::system slam{camera, orbis::slam::options{}};
 ///   for (const auto& frame : recording) slam.track(frame);
 ///   auto trajectory = slam.trajectory();
 /// @endcode
@@ -25,10 +25,11 @@
 #include <functional>
 #include <memory>
 #include <optional>
-#include <string>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
+#include <orbis/camera/any.hpp>
 #include <orbis/camera/depth.hpp>
 #include <orbis/camera/model.hpp>
 #include <orbis/camera/rgbd_frame.hpp>
@@ -38,22 +39,22 @@
 #include <orbis/features/orb.hpp>
 #include <orbis/slam/atlas.hpp>
 #include <orbis/slam/camera_rig.hpp>
-#include <orbis/slam/detail/system/definitions_check.hpp>
 #include <orbis/slam/detail/system/shared_state.hpp>
+#include <orbis/slam/detail/system/stopwatch.hpp>
 #include <orbis/slam/events.hpp>
 #include <orbis/slam/extractor.hpp>
 #include <orbis/slam/map.hpp>
 #include <orbis/slam/matchers.hpp>
 #include <orbis/slam/options.hpp>
 #include <orbis/slam/place_recognition.hpp>
-#include <orbis/slam/sensor.hpp>
+#include <orbis/slam/measure.hpp>
 #include <orbis/slam/shutter_estimate.hpp>
 #include <orbis/slam/track_result.hpp>
 
 namespace orbis::slam {
 namespace detail {
 
-template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers, sensor<D> Sensor>
+template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers>
 class front_end;
 template <camera::camera_model Camera, feature_descriptor D, place_recognizer<D> Places>
 class back_end;
@@ -71,60 +72,52 @@ class stopwatch;
 /// left half changed: the system is to be destroyed.
 ///
 /// Template parameters: the camera model; the extractor, which determines the type of descriptors; the matchers of
-/// tracking; place recognition; the sensor, which determines what a frame measures.
+/// tracking; place recognition. orbis::compiled holds the system of `camera::any_camera` and the library's own parts;
+/// a program that links it and replaces a part includes `<orbis/slam/system-inl.hpp>`.
 template <camera::camera_model Camera, feature_extractor Extractor = features::orb_extractor,
           tracking_matchers<descriptor_of_t<Extractor>> Matchers = orb_matchers,
-          place_recognizer<descriptor_of_t<Extractor>> Places = bag_of_words_places,
-          sensor<descriptor_of_t<Extractor>> Sensor = rgbd>
-class rgbd_system {
-  static_assert(
-      detail::has_definitions<detail::of_system, Camera, Extractor, Matchers, Places, Sensor>,
-      "orbis::compiled does not hold the system of these types (it does for camera::any_camera, where the other "
-      "arguments are the library's): include <orbis/slam/definitions.hpp>");
-
+          place_recognizer<descriptor_of_t<Extractor>> Places = bag_of_words_places>
+class system {
  public:
   using descriptor_type = descriptor_of_t<Extractor>;
   using atlas_type = basic_atlas<descriptor_type>;
   using map_type = basic_map<descriptor_type>;
 
   /// A system with an extractor made from `settings.features` and default places.
-  explicit rgbd_system(Camera camera, const options& settings = {}) requires
+  explicit system(Camera camera, const options& settings = {}) requires
       std::constructible_from<Extractor, const features::orb_options&> && std::default_initializable<Places>;
   /// A system with an extractor, and optionally places, of the caller's. `settings.features.levels` and `scale_factor`
   /// must describe the image pyramid of the extractor.
-  rgbd_system(Camera camera, const options& settings, Extractor extractor, Places places = Places{});
-  rgbd_system(const rgbd_system&) = delete;
-  rgbd_system& operator=(const rgbd_system&) = delete;
+  system(Camera camera, const options& settings, Extractor extractor, Places places = Places{});
+  system(const system&) = delete;
+  system& operator=(const system&) = delete;
   /// Waits for the threads to finish their running job; what waits is dropped.
-  ~rgbd_system();
+  ~system();
 
   /// Registers callbacks. @pre no frame was tracked yet
   void listen(listeners callbacks);
 
   /// Tracks the next frame. Frames of another size than the camera's, or without a finite time stamp, count as lost.
   /// @pre time stamps ascend
-  track_result track(const camera::rgbd_frame& f) requires
-      measures<Sensor, Camera, Extractor, image_view<const rgb8>, camera::depth_view<std::uint16_t>>;
+  track_result track(const camera::rgbd_frame& f) { return track(f.timestamp, f.color.view(), f.depth_metres()); }
   /// As above; the images are used in place. `timestamp`: seconds; `depth`: metres, registered to the colour image.
   template <camera::depth_source Depth>
-  requires measures<Sensor, Camera, Extractor, image_view<const rgb8>, Depth> track_result
-  track(double timestamp, image_view<const rgb8> color, const Depth& depth) {
-    static_assert(detail::has_definitions<detail::of_system, rgbd_system, Depth>,
-                  "orbis::compiled does not hold `track` for this type of depth: include <orbis/slam/definitions.hpp>");
-    return track_images(timestamp, color, depth);
-  }
-  /// As above, for a sensor that takes the two images of a rectified stereo pair. `timestamp`: seconds.
-  track_result track(double timestamp, image_view<const rgb8> left, image_view<const rgb8> right) requires
-      measures<Sensor, Camera, Extractor, image_view<const rgb8>, image_view<const rgb8>>;
-  track_result track(double timestamp, image_view<const std::uint8_t> left,
-                     image_view<const std::uint8_t> right) requires
-      measures<Sensor, Camera, Extractor, image_view<const std::uint8_t>, image_view<const std::uint8_t>>;
-
-  /// As above, for a sensor that takes one image.
-  track_result track(double timestamp,
-                     image_view<const rgb8> color) requires measures<Sensor, Camera, Extractor, image_view<const rgb8>>;
-  track_result track(double timestamp, image_view<const std::uint8_t> grey) requires
-      measures<Sensor, Camera, Extractor, image_view<const std::uint8_t>>;
+  track_result track(double timestamp, image_view<const rgb8> color, const Depth& depth);
+  /// As above, of a rectified stereo pair (`stereo_options`). `timestamp`: seconds.
+  track_result track(double timestamp, image_view<const rgb8> left, image_view<const rgb8> right);
+  track_result track(double timestamp, image_view<const std::uint8_t> left, image_view<const std::uint8_t> right)
+    requires grey_extractor<Extractor>;
+  /// As above, of one image without depth, for a system with `monocular_options`.
+  track_result track(double timestamp, image_view<const rgb8> color);
+  track_result track(double timestamp, image_view<const std::uint8_t> grey)
+    requires grey_extractor<Extractor>;
+  /// As above, of a sensor of another kind: `measure(rig, extract)` makes the frame, as the functions of `measure.hpp` do,
+  /// with the depth of each feature, or 0. For types of `Measure` that are not the library's own, include
+  /// `<orbis/slam/system-inl.hpp>`.
+  template <class Measure>
+    requires std::is_invocable_r_v<basic_frame<descriptor_of_t<Extractor>>, const Measure&, const camera_rig<Camera>&,
+                                   const Extractor&>
+  track_result track_measured(double timestamp, const Measure& measure);
 
   /// The state after the last frame.
   [[nodiscard]] track_state state() const;
@@ -197,23 +190,22 @@ class rgbd_system {
 
  private:
   using frame_type = basic_frame<descriptor_type>;
-  using front_end = detail::front_end<Camera, descriptor_type, Matchers, Sensor>;
+  using front_end = detail::front_end<Camera, descriptor_type, Matchers>;
   using back_end = detail::back_end<Camera, descriptor_type, Places>;
+  /// Brings what was measured to the times of a rolling shutter's rows, once the motion is known.
+  using row_follower = std::function<void(frame_type&, const frame_motion&)>;
 
-  template <class... Images>
-  track_result track_images(double timestamp, const Images&... images);
   /// Whether the images have the size of the camera, and a time.
   template <class... Images>
   [[nodiscard]] bool are_usable(double timestamp, const Images&... images) const {
     return std::isfinite(timestamp) &&
            ((images.width() == camera().width() && images.height() == camera().height()) && ...);
   }
-  /// The frame with its features; without any if the images do not fit or it has no time.
-  template <class... Images>
-  [[nodiscard]] frame_type measure(double timestamp, const Images&... images) const;
+  /// Tracks a frame that has just been measured; one without features if its images could not be used.
+  track_result track_frame(double timestamp, frame_type f, const row_follower& follow, detail::stopwatch& clock);
   /// Localises a frame and makes a keyframe of it if that is due. `lap`: notes the time of localisation.
   std::optional<map_keyframe> localize(frame_type f,
-                                       const std::function<void(frame_type&, const frame_motion&)>& follow_rows,
+                                       const row_follower& follow,
                                        track_result& result, detail::stopwatch& clock);
   /// Passes a new keyframe to the callbacks and the back end.
   void dispatch_keyframe(map_keyframe k);
@@ -222,7 +214,7 @@ class rgbd_system {
 
   options options_;
   Extractor extract_;
-  [[no_unique_address]] Sensor sensor_{};
+  stereo_memory stereo_;
   detail::shared_state<Camera, descriptor_type, Places> shared_;
   std::unique_ptr<front_end> front_end_;
   track_state reported_state_ = track_state::not_started;
@@ -231,16 +223,34 @@ class rgbd_system {
 };
 
 template <class Camera>
+system(Camera, options) -> system<Camera>;
+template <class Camera>
+system(Camera) -> system<Camera>;
+template <class Camera, class Extractor>
+system(Camera, options, Extractor) -> system<Camera, Extractor>;
+
+/// A system for colour images with registered depth. The first frame with enough depth begins a map.
+template <camera::camera_model Camera, feature_extractor Extractor = features::orb_extractor,
+          tracking_matchers<descriptor_of_t<Extractor>> Matchers = orb_matchers,
+          place_recognizer<descriptor_of_t<Extractor>> Places = bag_of_words_places>
+class rgbd_system : public system<Camera, Extractor, Matchers, Places> {
+ public:
+  using system<Camera, Extractor, Matchers, Places>::system;
+};
+template <class Camera>
 rgbd_system(Camera, options) -> rgbd_system<Camera>;
 template <class Camera>
 rgbd_system(Camera) -> rgbd_system<Camera>;
 template <class Camera, class Extractor>
 rgbd_system(Camera, options, Extractor) -> rgbd_system<Camera, Extractor>;
 
+/// A system for rectified stereo pairs, with `stereo_options`.
+using stereo_system = system<camera::any_camera>;
+/// A system for one camera without depth, with `monocular_options`.
+using monocular_system = system<camera::any_camera>;
+
 }  // namespace orbis::slam
 
-#ifdef ORBIS_COMPILED
-#include <orbis/slam/detail/compiled/rgbd_system.hpp>
-#else
-#include <orbis/slam/detail/system/rgbd_system_functions.hpp>
+#ifndef ORBIS_COMPILED
+#include <orbis/slam/system-inl.hpp>
 #endif

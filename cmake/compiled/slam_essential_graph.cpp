@@ -1,2 +1,0 @@
-// SPDX-License-Identifier: BSD-3-Clause
-#include <orbis/slam/detail/compiled/essential_graph_functions.hpp>

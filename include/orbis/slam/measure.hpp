@@ -1,0 +1,202 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// What a frame measures for each of its features: its ray, and the depth that belongs to a right coordinate, or none.
+///
+/// Tracking and adjustments compare right coordinates (`optimize::reprojection`): those of a second camera, or of a
+/// virtual one that stands for the depth sensor. A sensor of another kind is a function that makes such a frame, for
+/// `system::track_measured`.
+#pragma once
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <concepts>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <numbers>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include <orbis/camera/depth.hpp>
+#include <orbis/camera/model.hpp>
+#include <orbis/camera/shutter.hpp>
+#include <orbis/core/image.hpp>
+#include <orbis/core/types.hpp>
+#include <orbis/features/depth.hpp>
+#include <orbis/features/extractor.hpp>
+#include <orbis/features/grey.hpp>
+#include <orbis/features/pyramid.hpp>
+#include <orbis/features/stereo.hpp>
+#include <orbis/slam/camera_rig.hpp>
+#include <orbis/slam/detail/shutter/row_times.hpp>
+#include <orbis/slam/extractor.hpp>
+#include <orbis/slam/frame.hpp>
+#include <orbis/slam/options.hpp>
+
+namespace orbis::slam {
+
+/// How the camera moves while a frame is taken.
+struct frame_motion {
+  camera::shutter shutter{};  ///< the delay of the depth image is that of this frame
+  vec6 twist = zeros<vec6>();  ///< of the camera in its own frame, per second, translation first
+};
+
+/// An extractor that takes grey images as well.
+template <class E>
+concept grey_extractor = feature_extractor<E> && std::invocable<const E&, image_view<const std::uint8_t>>;
+
+namespace detail {
+
+/// A frame of features, with rays, before their depth is measured. Features whose pixel has no ray get NaN.
+template <camera::camera_model Camera, feature_descriptor D>
+[[nodiscard]] basic_frame<D> frame_of(const camera_rig<Camera>& rig, features::basic_features<D> features,
+                                      sensor_kind sensor) {
+  basic_frame<D> f;
+  f.sensor = sensor;
+  f.features = std::move(features);
+  const std::size_t n = f.features.size();
+  f.depth.resize(n);
+  f.rays.resize(n);
+  f.landmarks.assign(n, no_id);
+  for (std::size_t i = 0; i < n; ++i) {
+    const auto& k = f.features.keypoints[i];
+    f.rays[i] =
+        rig.camera().unproject(vec2(k.x, k.y)).value_or(filled<vec3>(std::numeric_limits<double>::quiet_NaN()));
+  }
+  f.grid = features::keypoint_grid(f.features.keypoints);
+  return f;
+}
+
+}  // namespace detail
+
+/// The number of points with which a frame can begin a map: of its features with depth, where lengths are measured
+/// (`options::scale_is_measured`), else of its features; 0 if there are fewer than `settings.min_start_points`.
+template <feature_descriptor D>
+[[nodiscard]] std::size_t start_points(const basic_frame<D>& f, const options& settings) {
+  std::size_t points = 0;
+  for (std::size_t i = 0; i < f.size(); ++i) points += !settings.scale_is_measured || f.has_depth(i);
+  return points < settings.min_start_points ? 0 : points;
+}
+
+/// Extracts the features of a colour image and reads their depth from the registered depth image. Depth outside of the
+/// rig's range is not used. @pre all images have the size of the camera
+template <camera::camera_model Camera, feature_extractor Extractor, camera::depth_source Depth>
+[[nodiscard]] basic_frame<descriptor_of_t<Extractor>> measure_rgbd(const camera_rig<Camera>& rig,
+                                                                   const Extractor& extract,
+                                                                   image_view<const rgb8> color, const Depth& depth) {
+  const auto usable = [&](double z) { return z >= rig.min_depth && z <= rig.max_depth; };
+  auto f = detail::frame_of(rig, extract(color), sensor_kind::rgbd);
+  for (std::size_t i = 0; i < f.size(); ++i) {
+    const auto& k = f.features.keypoints[i];
+    const auto z = std::isnan(f.rays[i].x()) ? std::nullopt : features::depth_at(depth, k.x, k.y);
+    f.depth[i] = z && usable(z->z) ? static_cast<float>(z->z) : 0.0F;
+  }
+  return f;
+}
+
+/// Sets `depth` of `f.as_read` to what each keypoint's row of the colour image would have measured at its own time: it
+/// is read where the camera, which moves on, sees the same point in the depth image. @pre all images have the size of
+/// the camera
+template <camera::camera_model Camera, feature_descriptor D, camera::depth_source Depth>
+void follow_rows(const camera_rig<Camera>& rig, const frame_motion& m, basic_frame<D>& f, const Depth& depth) {
+  for (keypoint_as_read& k : f.as_read) {
+    const double v = static_cast<double>(k.y);
+    const double later = m.shutter.depth_time(v, depth.height()) - m.shutter.color_time(v, depth.height());
+    if (later == 0.0 || !(k.stored_depth > 0.0F)) continue;
+    const auto stored = static_cast<double>(k.stored_depth);
+    const vec3 there = detail::moved_by(m.twist, -later, stored * vec3(k.ray_x, k.ray_y, 1.0));
+    const auto pixel = there.z() > 0.0 ? rig.camera().project(there) : std::nullopt;
+    const auto read = pixel ? features::depth_at(depth, static_cast<float>(pixel->x()), static_cast<float>(pixel->y()))
+                            : std::nullopt;
+    // Where the two readings lie on different surfaces, neither can be trusted.
+    constexpr double same_surface = 0.1;
+    const double change = read ? read->z - there.z() : 0.0, z = stored + change;
+    const bool usable = read && std::abs(change) < same_surface * stored && z >= rig.min_depth && z <= rig.max_depth;
+    k.depth = usable ? static_cast<float>(z) : 0.0F;
+  }
+}
+
+/// The working memory of `measure_stereo`, for one call at a time.
+struct stereo_memory {
+  features::stereo_matcher<> match{};
+  image<std::uint8_t> grey_left{}, grey_right{};
+  features::image_pyramid pyramid_left{}, pyramid_right{};
+  std::vector<float> columns{};
+};
+
+namespace detail {
+
+/// A frame of the left features. `Pixels`: the images, or the pyramids that the extractor has made of them.
+template <camera::camera_model Camera, feature_descriptor D, class Pixels>
+[[nodiscard]] basic_frame<D> match_stereo(const camera_rig<Camera>& rig, stereo_memory& memory,
+                                          features::basic_features<D> left, const Pixels& left_pixels,
+                                          const features::basic_features<D>& right, const Pixels& right_pixels) {
+  auto f = frame_of(rig, std::move(left), sensor_kind::stereo);
+  const double bf = rig.model.bf;
+  const std::vector<float>& columns = memory.columns;
+  memory.match.into(memory.columns, f.features, left_pixels, right, right_pixels,
+              {.levels = rig.scales.levels(),
+               .scale_factor = static_cast<float>(rig.scales.factor()),
+               .min_disparity = static_cast<float>(bf / rig.max_depth),
+               .max_disparity = static_cast<float>(bf / rig.min_depth)});
+  for (std::size_t i = 0; i != f.size(); ++i)
+    if (!std::isnan(columns[i]) && !std::isnan(f.rays[i].x()))
+      f.depth[i] =
+          static_cast<float>(bf / (static_cast<double>(f.features.keypoints[i].x) - static_cast<double>(columns[i])));
+  return f;
+}
+
+}  // namespace detail
+
+/// A frame of the left image of a rectified pair (`camera::rectify`). A feature has the right coordinate that
+/// `features::stereo_matcher` finds for it, or none; its depth is `options::bf` over the disparity, where that lies
+/// within the rig's range. Features without a right coordinate become landmarks once other keyframes see them under
+/// enough parallax. @pre both images have the size of the camera
+template <camera::camera_model Camera, grey_extractor Extractor>
+[[nodiscard]] basic_frame<descriptor_of_t<Extractor>> measure_stereo(const camera_rig<Camera>& rig,
+                                                                     const Extractor& extract,
+                                                                     image_view<const std::uint8_t> left,
+                                                                     image_view<const std::uint8_t> right,
+                                                                     stereo_memory& memory) {
+  if constexpr (features::pyramid_extractor<Extractor>) {
+    decltype(extract(left)) left_features, right_features;
+    extract.into(left_features, memory.pyramid_left, left);
+    extract.into(right_features, memory.pyramid_right, right);
+    return detail::match_stereo(rig, memory, std::move(left_features), memory.pyramid_left, right_features,
+                                memory.pyramid_right);
+  } else {
+    return detail::match_stereo(rig, memory, extract(left), left, extract(right), right);
+  }
+}
+/// As above, of images in colour.
+template <camera::camera_model Camera, feature_extractor Extractor>
+[[nodiscard]] basic_frame<descriptor_of_t<Extractor>> measure_stereo(const camera_rig<Camera>& rig,
+                                                                     const Extractor& extract,
+                                                                     image_view<const rgb8> left,
+                                                                     image_view<const rgb8> right,
+                                                                     stereo_memory& memory) {
+  const auto grey_of = [](image_view<const rgb8> color, image<std::uint8_t>& to) {
+    if (to.width() != color.width() || to.height() != color.height())
+      to = image<std::uint8_t>(color.width(), color.height());
+    features::luma(color, to.view());
+    return std::as_const(to).view();
+  };
+  const auto grey_left = grey_of(left, memory.grey_left), grey_right = grey_of(right, memory.grey_right);
+  if constexpr (grey_extractor<Extractor>)
+    return measure_stereo(rig, extract, grey_left, grey_right, memory);
+  else
+    return detail::match_stereo(rig, memory, extract(left), grey_left, extract(right), grey_right);
+}
+
+/// A frame of one image, in colour or in grey, without depth. @pre the image has the size of the camera
+template <camera::camera_model Camera, feature_extractor Extractor, class Pixel>
+  requires std::invocable<const Extractor&, image_view<const Pixel>>
+[[nodiscard]] basic_frame<descriptor_of_t<Extractor>> measure_monocular(const camera_rig<Camera>& rig,
+                                                                        const Extractor& extract,
+                                                                        image_view<const Pixel> picture) {
+  return detail::frame_of(rig, extract(picture), sensor_kind::monocular);
+}
+
+}  // namespace orbis::slam
