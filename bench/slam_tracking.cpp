@@ -27,9 +27,9 @@
 #include <orbis/camera/settings.hpp>
 #include <orbis/features/orb.hpp>
 #include <orbis/io/recording.hpp>
-#include <orbis/slam/definitions.hpp>
+#include <orbis/slam/system-inl.hpp>
 #include <orbis/slam/place_recognition.hpp>
-#include <orbis/slam/rgbd_system.hpp>
+#include <orbis/slam/system.hpp>
 
 #include "support/synthetic/read_ahead.hpp"
 #include "support/synthetic/sequence.hpp"

@@ -25,4 +25,4 @@ set(ORBIS_QUICK_TESTS
   optimize/robust_loss.cpp optimize/triangulation.cpp
   places/allocations.cpp places/inverted_index.cpp places/keyframe_database.cpp places/score.cpp places/vocabulary.cpp
   slam/allocations.cpp slam/covisibility_graph.cpp slam/events.cpp slam/frame.cpp slam/ids.cpp slam/landmark.cpp
-  slam/map.cpp slam/map_file.cpp slam/rgbd_system.cpp slam/sensor.cpp slam/spanning_tree.cpp slam/tested_system.cpp)
+  slam/map.cpp slam/map_file.cpp slam/system.cpp slam/measure.cpp slam/spanning_tree.cpp slam/tested_system.cpp)

@@ -20,7 +20,7 @@
 #include <orbis/mapping/keyframe_points.hpp>
 #include <orbis/mapping/live_map.hpp>
 #include <orbis/octree/occupancy_octree.hpp>
-#include <orbis/slam/rgbd_system.hpp>
+#include <orbis/slam/system.hpp>
 
 #include "../../examples/rgbd_slam/profiles.hpp"
 #include "marks.hpp"

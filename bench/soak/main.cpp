@@ -35,7 +35,7 @@
 #include <orbis/io/recording.hpp>
 #include <orbis/mapping/live_map_thread.hpp>
 #include <orbis/octree/occupancy_octree.hpp>
-#include <orbis/slam/rgbd_system.hpp>
+#include <orbis/slam/system.hpp>
 
 #include "support/synthetic/sequence.hpp"
 

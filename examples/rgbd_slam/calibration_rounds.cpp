@@ -12,7 +12,7 @@
 #include <utility>
 
 #include <orbis/camera/parameters.hpp>
-#include <orbis/slam/rgbd_system.hpp>
+#include <orbis/slam/system.hpp>
 
 #include "slam_options.hpp"
 

@@ -6,7 +6,7 @@
 #include <optional>
 #include <string>
 
-#include <orbis/slam/rgbd_system.hpp>
+#include <orbis/slam/system.hpp>
 
 #include "interrupts.hpp"
 #include "profiles.hpp"

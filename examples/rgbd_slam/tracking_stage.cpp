@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include <orbis/slam/any_system.hpp>
+#include <orbis/slam/system.hpp>
 
 #include "../common/same_file.hpp"
 #include "corrected_frame.hpp"
@@ -25,7 +25,7 @@ namespace {
 
 using orbis::se3;
 using orbis::slam::map_id;
-using slam_system = orbis::slam::any_system;
+using slam_system = orbis::slam::system<orbis::camera::any_camera>;
 
 orbis::slam::options options_for(const frame_source& source, const settings& s) {
   orbis::slam::options options = slam_options(source.camera.model, source.camera.baseline);

@@ -1,7 +1,7 @@
 // error: feature_extractor[<']
 // An extractor that does not give features is refused by name.
 #include <orbis/camera/pinhole.hpp>
-#include <orbis/slam/rgbd_system.hpp>
+#include <orbis/slam/system.hpp>
 
 struct empty_handed {
   int operator()(orbis::image_view<const orbis::rgb8>) const { return 0; }

@@ -11,8 +11,8 @@
 #include <orbis/camera/pinhole.hpp>
 #include <orbis/features/orb.hpp>
 #include <orbis/io/synthetic.hpp>
-#include <orbis/slam/definitions.hpp>
-#include <orbis/slam/rgbd_system.hpp>
+#include <orbis/slam/system-inl.hpp>
+#include <orbis/slam/system.hpp>
 
 #include "slam/known_places.hpp"
 #include "support/catch.hpp"

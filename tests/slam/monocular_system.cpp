@@ -8,9 +8,8 @@
 #include <orbis/eval/ate.hpp>
 #include <orbis/io/mono_recording.hpp>
 #include <orbis/io/synthetic.hpp>
-#include <orbis/slam/any_system.hpp>
-#include <orbis/slam/definitions.hpp>
-#include <orbis/slam/monocular_system.hpp>
+#include <orbis/slam/system-inl.hpp>
+#include <orbis/slam/system.hpp>
 
 #include "support/catch.hpp"
 #include "support/data.hpp"
@@ -66,7 +65,7 @@ std::string fault_of(const System& slam) {
 TEST_CASE("One camera's round of a room has the shape of the truth, in a unit of its own, and closes the loop") {
   for (const std::uint64_t seed : {1U, 4U}) {
     const io::synthetic_recording room{{.frames = 200, .fps = 20, .seed = seed, .width = 640, .height = 480}};
-    slam::any_system slam{room.camera().model, slam::monocular_options()};
+    slam::system<camera::any_camera> slam{room.camera().model, slam::monocular_options()};
     const tracked sum = track_all(slam, room);
     REQUIRE(sum.first.has_value());
     CHECK(*sum.first < 30);
@@ -88,7 +87,7 @@ TEST_CASE("One camera's round of a room is as good with threads, and goes on aft
       {.frames = 230, .fps = 20, .seed = 4, .width = 640, .height = 480, .frames_around = 200}};
   auto options = slam::monocular_options();
   options.threads.enabled = options.threads.wait = true;
-  slam::any_system slam{room.camera().model, options};
+  slam::system<camera::any_camera> slam{room.camera().model, options};
   const tracked sum = track_all(slam, room);
   slam.wait();
   REQUIRE(sum.first.has_value());
@@ -111,7 +110,7 @@ TEST_CASE("A camera that only turns begins no map") {
                                       .height = 480,
                                       .frames_around = 200,
                                       .path = {.semi_axis_x = 0.0, .semi_axis_y = 0.0, .wobble = 0.0, .jitter = 0.0}}};
-  slam::any_system slam{room.camera().model, slam::monocular_options()};
+  slam::system<camera::any_camera> slam{room.camera().model, slam::monocular_options()};
   const tracked sum = track_all(slam, room);
   CHECK(!sum.first.has_value());
   CHECK(slam.state() == slam::track_state::not_started);
@@ -124,7 +123,7 @@ TEST_CASE("A map that is lost young is begun anew at once") {
   auto options = slam::monocular_options();
   options.recovery.min_map_keyframes = 1000;  // every map is young
   options.recovery.new_map_after = 1000.0;
-  slam::any_system slam{room.camera().model, options};
+  slam::system<camera::any_camera> slam{room.camera().model, options};
   std::size_t i = 0;
   const auto track_until = [&](auto&& done) {
     for (; i != room.size(); ++i) {
@@ -146,7 +145,7 @@ TEST_CASE("A map that is lost young is begun anew at once") {
 TEST_CASE("A camera that comes back to a map is found in it") {
   const io::synthetic_recording room{{.frames = 100, .fps = 20, .seed = 1, .width = 640, .height = 480}};
   const image<rgb8> black(640, 480);
-  slam::any_system slam{room.camera().model, slam::monocular_options()};
+  slam::system<camera::any_camera> slam{room.camera().model, slam::monocular_options()};
   track_all(slam, room);
   const slam::map_id first = slam.active_map();
   double time = room.ground_truth().back().timestamp;
@@ -155,35 +154,18 @@ TEST_CASE("A camera that comes back to a map is found in it") {
   CHECK(slam.active_map() == first);
 }
 
-/// A sensor of a user's own that measures no lengths, and does not say what it is.
-struct own_sensor {
-  static constexpr slam::scale_source scale = slam::scale_source::free;
-  template <camera::camera_model Camera, slam::feature_extractor Extractor>
-  [[nodiscard]] static slam::basic_frame<slam::descriptor_of_t<Extractor>> measure(const slam::camera_rig<Camera>& rig,
-                                                                                   const Extractor& extract,
-                                                                                   image_view<const rgb8> color) {
-    auto f = slam::monocular::measure(rig, extract, color);
-    f.sensor = slam::sensor_kind::unknown;
-    return f;
-  }
-  template <slam::feature_descriptor D>
-  [[nodiscard]] static std::size_t begins_map(const slam::basic_frame<D>& f, const slam::options&) {
-    return f.size();
-  }
-};
-
 TEST_CASE("A map without depth is loaded by a system without depth only, which is then found in it") {
   const test::temporary_folder folder;
   const auto file = folder.path() / "room.map";
   const io::synthetic_recording room{{.frames = 80, .fps = 20, .seed = 1, .width = 640, .height = 480}};
-  slam::any_system slam{room.camera().model, slam::monocular_options()};
+  slam::system<camera::any_camera> slam{room.camera().model, slam::monocular_options()};
   track_all(slam, room);
   REQUIRE(slam.save_map(file));
-  slam::any_system again{room.camera().model, slam::monocular_options()};
+  slam::system<camera::any_camera> again{room.camera().model, slam::monocular_options()};
   REQUIRE(again.load_map(file));
   const auto frame = room.frame(60).value();
   CHECK(again.track(frame.timestamp, frame.color.view()).state == slam::track_state::relocalized);
-  slam::any_system with_depth{room.camera().model, slam::options{}};
+  slam::system<camera::any_camera> with_depth{room.camera().model, slam::options{}};
   const auto refused = with_depth.load_map(file);
   REQUIRE(!refused);
   CHECK(refused.error().code == errc::unsupported);
@@ -193,7 +175,7 @@ TEST_CASE("A map without depth is loaded by a system without depth only, which i
 TEST_CASE("A drive with one camera has the shape of the truth") {
   ORBIS_NEEDS_DATA("kitti07_mono");
   const auto recording = io::open_mono_recording(test::data_dir() / "kitti07_mono").value();
-  slam::any_system slam{recording.camera().model, slam::monocular_options()};
+  slam::system<camera::any_camera> slam{recording.camera().model, slam::monocular_options()};
   std::size_t first = recording.size(), lost = 0;
   for (std::size_t i = 0; i != recording.size(); ++i) {
     const auto frame = recording.frame(i).value();
@@ -210,18 +192,20 @@ TEST_CASE("A drive with one camera has the shape of the truth") {
   CHECK(error->translation.rmse < 0.01 * length(truth));
 }
 
-TEST_CASE("The system of one camera needs no sensor of run time, and takes one of the user's own") {
-  const test::temporary_folder folder;
+TEST_CASE("A sensor of a user's own measures frames for the system") {
   const io::synthetic_recording room{{.frames = 40, .fps = 20, .seed = 1, .width = 640, .height = 480}};
-  slam::rgbd_system<camera::any_camera, features::orb_extractor, slam::orb_matchers, slam::bag_of_words_places,
-                    own_sensor>
-      slam{room.camera().model, slam::monocular_options()};
-  slam::any_system any{room.camera().model, slam::monocular_options()};
-  CHECK(track_all(slam, room).first == track_all(any, room).first);
-  CHECK(slam.landmark_count() == any.landmark_count());
-  CHECK(slam.landmark_count() > 200);
-  CHECK_FALSE(slam.map().scale_is_known());
-  REQUIRE(slam.save_map(folder.path() / "own.map"));
-  CHECK(slam.load_map(folder.path() / "own.map"));
-  CHECK(any.load_map(folder.path() / "own.map"));
+  slam::system own{room.camera().model, slam::monocular_options()},
+      library{room.camera().model, slam::monocular_options()};
+  for (std::size_t i = 0; i != room.size(); ++i) {
+    const auto frame = room.frame(i).value();
+    const auto measured = own.track_measured(frame.timestamp, [&](const auto& rig, const auto& extract) {
+      auto f = slam::measure_monocular(rig, extract, frame.color.view());
+      f.sensor = slam::sensor_kind::unknown;
+      return f;
+    });
+    CHECK(measured.tracked() == library.track(frame.timestamp, frame.color.view()).tracked());
+  }
+  CHECK(own.landmark_count() == library.landmark_count());
+  CHECK(own.landmark_count() > 200);
+  CHECK_FALSE(own.map().scale_is_known());
 }

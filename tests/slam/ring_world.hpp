@@ -19,7 +19,7 @@
 #include <orbis/slam/camera_rig.hpp>
 #include <orbis/slam/detail/mapping/keyframe_insertion.hpp>
 #include <orbis/slam/map.hpp>
-#include <orbis/slam/rgbd_system.hpp>  // declares what orbis::compiled holds
+#include <orbis/slam/system.hpp>
 
 namespace orbis::test {
 

@@ -5,8 +5,7 @@
 #include <orbis/eval/ate.hpp>
 #include <orbis/io/stereo_recording.hpp>
 #include <orbis/io/synthetic.hpp>
-#include <orbis/slam/any_system.hpp>
-#include <orbis/slam/stereo_system.hpp>
+#include <orbis/slam/system.hpp>
 
 #include "support/catch.hpp"
 #include "support/data.hpp"
@@ -31,8 +30,8 @@ se3 whole_way(const trajectory& poses) { return poses.front().T_world_camera.inv
 TEST_CASE("A stereo camera's round of a room is as exact as that of an RGB-D camera, and closes the loop") {
   const io::synthetic_recording room{{.frames = 120, .fps = 10, .seed = 3, .width = 320, .height = 240}};
   const auto both = room.stereo_camera(), one = room.camera();
-  slam::any_system stereo{both.model, slam::stereo_options(both.model.k().fx, *both.baseline)};
-  slam::any_system rgbd{one.model, slam::options{.bf = one.model.k().fx * *one.baseline}};
+  slam::system<camera::any_camera> stereo{both.model, slam::stereo_options(both.model.k().fx, *both.baseline)};
+  slam::system<camera::any_camera> rgbd{one.model, slam::options{.bf = one.model.k().fx * *one.baseline}};
   for (std::size_t i = 0; i != room.size(); ++i) {
     const auto pair = room.stereo_frame(i).value();
     CHECK(stereo.track(pair.timestamp, pair.left.view(), pair.right.view()).tracked());
@@ -71,7 +70,7 @@ TEST_CASE("A system takes a stereo pair, or colour and depth, whichever it is gi
   const io::synthetic_recording room{{.frames = 3, .seed = 3, .width = 320, .height = 240, .frames_around = 300}};
   const auto both = room.stereo_camera();
   slam::stereo_system stereo{both.model, slam::stereo_options(both.model.k().fx, *both.baseline)};
-  slam::any_system any{both.model, slam::stereo_options(both.model.k().fx, *both.baseline)};
+  slam::system<camera::any_camera> any{both.model, slam::stereo_options(both.model.k().fx, *both.baseline)};
   for (std::size_t i = 0; i != room.size(); ++i) {
     const auto pair = room.stereo_frame(i).value();
     CHECK(stereo.track(pair.timestamp, pair.left.view(), pair.right.view()).tracked());

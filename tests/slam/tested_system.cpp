@@ -8,7 +8,7 @@
 #include <orbis/io/synthetic.hpp>
 #include <orbis/slam/map.hpp>
 #include <orbis/slam/map_file.hpp>
-#include <orbis/slam/rgbd_system.hpp>
+#include <orbis/slam/system.hpp>
 
 #include "support/catch.hpp"
 #include "support/temporary_folder.hpp"

@@ -44,7 +44,7 @@ namespace orbis::io {
     }
     if (!detail::trimmed(line).empty()) return reject("a pose has 8 numbers: timestamp tx ty tz qx qy qz qw");
     const so3::quaternion q(v[7], v[4], v[5], v[6]);
-    if (!(norm(q) > 1e-6) || !std::isfinite(norm(q))) return reject("a quaternion that is no rotation");
+    if (!(q.norm() > 1e-6) || !std::isfinite(q.norm())) return reject("a quaternion that is no rotation");
     poses.push_back({v[0], se3(so3(q), vec3(v[1], v[2], v[3]))});
     return true;
   });

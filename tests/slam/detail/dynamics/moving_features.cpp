@@ -8,7 +8,7 @@
 #include <orbis/camera/pinhole.hpp>
 #include <orbis/core/random.hpp>
 #include <orbis/slam/detail/dynamics/moving_features.hpp>
-#include <orbis/slam/sensor.hpp>
+#include <orbis/slam/measure.hpp>
 
 #include "support/catch.hpp"
 

@@ -13,7 +13,7 @@
 #include <orbis/slam/detail/depth/depth_tracker.hpp>
 #include <orbis/slam/detail/depth/surface.hpp>
 #include <orbis/slam/detail/tracking/front_end.hpp>
-#include <orbis/slam/monocular.hpp>
+#include <orbis/slam/measure.hpp>
 
 #include "slam/ring_world.hpp"
 #include "support/catch.hpp"
@@ -27,18 +27,17 @@ namespace {
 using descriptor = features::binary_descriptor<256>;
 
 /// The front end on its own: keyframes are made, and nothing else is done with them.
-template <class Sensor>
-struct scene_of {
+struct scene {
   test::ring_world world;
   slam::options options;
   slam::atlas maps{8, 1.2};
-  slam::detail::front_end<camera::any_camera, descriptor, slam::orb_matchers, Sensor> front_end{world.rig, options};
+  slam::detail::front_end<camera::any_camera, descriptor, slam::orb_matchers> front_end{world.rig, options};
   std::vector<slam::map_keyframe> similar;  ///< what place recognition says
   std::vector<slam::map_id> dropped;
   bool is_frozen = false;
   std::size_t frames = 0;
 
-  explicit scene_of(const test::ring_options& o = {.steps = 60, .drift = 0.0}, const slam::options& settings = {})
+  explicit scene(const test::ring_options& o = {.steps = 60, .drift = 0.0}, const slam::options& settings = {})
       : world{o}, options{settings} {
     options.initial_pose = world.truth(0);
     options.min_start_points = 50;
@@ -72,7 +71,6 @@ struct scene_of {
     return (world.truth(step).inverse() * front_end.last_pose(maps)).log().norm();
   }
 };
-using scene = scene_of<slam::rgbd>;
 
 }  // namespace
 
@@ -181,7 +179,7 @@ TEST_CASE("Tracking goes on when the map was merged, moved and culled between tw
 }
 
 TEST_CASE("Tracking goes on when a correction has changed the lengths of a map without depth") {
-  scene_of<slam::monocular> s({.steps = 60, .density = 60.0, .drift = 0.0, .shrinks = 1e-9});
+  scene s({.steps = 60, .density = 60.0, .drift = 0.0, .shrinks = 1e-9});
   s.options = slam::monocular_options(s.options);
   s.is_frozen = true;
   s.world.walk(s.maps.active(), 0, 20, s.world.truth(0));
@@ -208,7 +206,7 @@ TEST_CASE("Tracking goes on when a correction has changed the lengths of a map w
 }
 
 TEST_CASE("The first two frames of a map without depth both count, and so do their landmarks for the second") {
-  scene_of<slam::monocular> s({.steps = 60, .density = 60.0, .drift = 0.0, .shrinks = 1e-9});
+  scene s({.steps = 60, .density = 60.0, .drift = 0.0, .shrinks = 1e-9});
   s.options = slam::monocular_options(s.options);
   s.options.start.min_matches = 60;
   s.options.initial_pose.reset();

@@ -12,7 +12,7 @@
 #include <orbis/optimize/triangulation.hpp>
 #include <orbis/slam/camera_rig.hpp>
 #include <orbis/slam/detail/tracking/monocular_start.hpp>
-#include <orbis/slam/sensor.hpp>
+#include <orbis/slam/measure.hpp>
 
 #include "support/catch.hpp"
 #include "support/random_motion.hpp"

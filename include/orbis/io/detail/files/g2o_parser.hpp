@@ -114,7 +114,7 @@ class g2o_parser {
     for (double& value : v)
       if (!read_number(line, value, "a pose has 7 numbers, x y z qx qy qz qw")) return false;
     const so3::quaternion q(v[6], v[3], v[4], v[5]);
-    if (!(norm(q) > 1e-6) || !std::isfinite(norm(q))) return reject("a quaternion that is no rotation");
+    if (!(q.norm() > 1e-6) || !std::isfinite(q.norm())) return reject("a quaternion that is no rotation");
     pose = se3(so3(q), vec3(v[0], v[1], v[2]));
     return true;
   }

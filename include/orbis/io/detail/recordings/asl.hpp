@@ -132,7 +132,7 @@ struct asl_camera {
     bool good = parse_number(next(), nanoseconds);
     for (double& value : v) good = good && parse_number(next(), value) && std::isfinite(value);
     const so3::quaternion q = good ? so3::quaternion(v[3], v[4], v[5], v[6]) : so3::quaternion(0.0, 0.0, 0.0, 0.0);
-    if (!(norm(q) > 1e-6) || !std::isfinite(norm(q))) return bad_line = number, false;
+    if (!(q.norm() > 1e-6) || !std::isfinite(q.norm())) return bad_line = number, false;
     poses.push_back({1e-9 * static_cast<double>(nanoseconds), se3{so3{q}, vec3{v[0], v[1], v[2]}}});
     return true;
   });
