@@ -45,7 +45,7 @@ struct scene {
   }
 };
 
-double error(const se3& a, const se3& b) { return (a.inverse() * b).log().norm(); }
+double pose_error(const se3& a, const se3& b) { return (a.inverse() * b).log().norm(); }
 
 }  // namespace
 
@@ -57,7 +57,7 @@ TEST_CASE("A corner holds the camera after a step of decimetres and ten degrees"
   REQUIRE(found);
   CHECK(found->determined == 6);
   CHECK(found->seen.share() > 0.9);
-  CHECK(error(found->at.T_world_camera, pose) < 6e-3);
+  CHECK(pose_error(found->at.T_world_camera, pose) < 6e-3);
 }
 
 TEST_CASE("A wall holds the distance to it and what can be told of the direction, and leaves the rest") {
@@ -92,7 +92,7 @@ TEST_CASE("The term of depth pulls towards the true pose, and is nothing where n
   const auto term = s.tracker.term_at({off, vec6::Zero()}, {});
   REQUIRE(term);
   const vec6 step = term->h.topLeftCorner<6, 6>().ldlt().solve(-term->g.head<6>());
-  CHECK(error(off * se3::exp(-step), pose) < 0.25 * error(off, pose));
+  CHECK(pose_error(off * se3::exp(-step), pose) < 0.25 * pose_error(off, pose));
   s.maps.create();
   CHECK(!s.tracker.surround(s.maps, pose));
 }
