@@ -21,14 +21,12 @@
 /// | decay.hpp | what time does to voxels that are not observed |
 /// | voxel_layer.hpp | colours, labels or counts beside the map |
 /// | files.hpp | OctoMap's `.bt` and `.ot` |
-/// | compact_file.hpp | small files with every value and checksums |
 /// | depth_points.hpp | world points of a depth image |
 #pragma once
 
 #include <orbis/octree/accessor.hpp>
 #include <orbis/octree/cast_ray.hpp>
 #include <orbis/octree/change_log.hpp>
-#include <orbis/octree/compact_file.hpp>
 #include <orbis/octree/decay.hpp>
 #include <orbis/octree/depth_points.hpp>
 #include <orbis/octree/files.hpp>

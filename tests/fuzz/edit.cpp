@@ -16,7 +16,6 @@
 #include <vector>
 
 #include <orbis/core/random.hpp>
-#include <orbis/octree/compact_file.hpp>
 #include <orbis/octree/decay.hpp>
 #include <orbis/octree/nodes.hpp>
 #include <orbis/octree/overlap.hpp>
@@ -27,9 +26,11 @@
 namespace {
 
 using namespace orbis;
+using fuzz::leaves_of;
 using fuzz::map;
 using fuzz::require;
 using fuzz::source;
+using tree_node = fuzz::tree_leaf;  // of the pruned tree, cut off or not
 using octree::block;
 using octree::node_kind;
 using octree::voxel_key;
@@ -46,14 +47,6 @@ struct window {
   voxel_key low;
 
   [[nodiscard]] std::uint32_t edge() const { return octree::node_cells(level); }
-};
-
-/// A node of the pruned tree.
-struct tree_node {
-  voxel_key key;
-  int level = 0;
-  float value = 0.0F;
-  friend bool operator==(const tree_node&, const tree_node&) = default;
 };
 
 /// What a map is to be: every voxel of the window, in Morton order, so that nodes are consecutive.
@@ -163,12 +156,6 @@ class reference_tree {
   std::vector<std::vector<node>> levels_;  ///< from level 1 on
 };
 
-[[nodiscard]] std::vector<tree_node> leaves_of(const map& m) {
-  std::vector<tree_node> leaves;
-  m.for_each_leaf([&](const map::leaf& l) { leaves.push_back({l.key, m.tree_depth() - l.depth, l.log_odds}); });
-  return leaves;
-}
-
 /// Questions about boxes: which leaves lie there, and whether something is in the way.
 void check_box(const map& m, const voxels& v, const std::vector<tree_node>& leaves, random_bits& random) {
   const window& w = v.where();
@@ -244,11 +231,11 @@ void check(const map& m, const voxels& v, random_bits& random) {
   for (int i = 0; i != 2; ++i) check_box(m, v, leaves, random);
 }
 
-/// The file of the same map, built anew of nothing but its leaves.
-[[nodiscard]] std::string file_of_leaves(const map& m) {
+/// The same map, built anew of nothing but its leaves.
+[[nodiscard]] map rebuilt(const map& m) {
   map fresh{resolution, m.tree_depth()};
   m.for_each_leaf([&](const map::leaf& l) { fresh.set_unknown_node(l.key, l.depth, l.log_odds + 0.0F); });
-  return octree::compact_bytes(fresh);
+  return fresh;
 }
 
 /// A copy elsewhere, kept up to date by the log of changes.
@@ -316,12 +303,8 @@ class session {
       random_bits random{0};
       check(*copy_, *copied_, random);
     }
-    const std::string file = octree::compact_bytes(map_);
-    const auto read = octree::read_compact(fuzz::bytes_of(file));
-    require(read && octree::compact_bytes(*read) == file, "a file reads back to the same bytes");
-    const auto leaves = leaves_of(map_);
     const bool root_is_full = reference_tree{expected_}.top().kind == node_kind::leaf;
-    require(root_is_full || file_of_leaves(map_) == file, "a map does not remember how it came about");
+    require(root_is_full || leaves_of(rebuilt(map_)) == leaves_of(map_), "a map does not remember how it came about");
     if (map_.tree_depth() == octree::default_tree_depth) fuzz::check_map(map_);
   }
 
@@ -486,10 +469,14 @@ class session {
     });
   }
   void through_file() {
-    const std::string bytes = octree::compact_bytes(map_);
-    auto read = octree::read_compact(fuzz::bytes_of(bytes));
-    require(read.has_value(), "a file can be read");
-    map_ = *std::move(read);
+    if (map_.tree_depth() == octree::default_tree_depth) {
+      const std::string bytes = octree::ot_bytes(map_);
+      auto read = octree::read_ot(fuzz::bytes_of(bytes));
+      require(read.has_value(), "a file can be read");
+      map_ = *std::move(read);
+    } else {
+      map_ = rebuilt(map_);
+    }
     is_tracked_ = false;
     mirror_.start_anew();
   }

@@ -14,7 +14,6 @@
 #include <orbis/camera/pinhole.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/random.hpp>
-#include <orbis/octree/compact_file.hpp>
 #include <orbis/octree/files.hpp>
 #include <orbis/octree/scan_history.hpp>
 
@@ -71,10 +70,13 @@ void put(const Policy& policy, Map& map, const scan& s, const integration_option
 
 template <class Model>
 std::string bytes_of(const occupancy_octree<Model>& map) {
-  if constexpr (octomap_model<Model>)
-    return ot_bytes(map);
-  else
-    return compact_bytes(map);
+  if constexpr (octomap_model<Model>) return ot_bytes(map);
+  std::string leaves;
+  map.for_each_leaf([&](const auto& leaf) {
+    leaves += std::to_string(morton_code(leaf.key)) + ' ' + std::to_string(leaf.depth) + ' ' +
+              std::to_string(leaf.log_odds) + '\n';
+  });
+  return leaves;
 }
 template <class Octree>
 Octree map_of(const std::map<std::uint64_t, scan>& scans, const integration_options& options) {
