@@ -6,7 +6,7 @@
 /// | --- | --- |
 /// | occupancy_octree.hpp | the map: insertion, queries, snapshots, rolling window |
 /// | integration.hpp | options of an insertion, and what became of a scan's points |
-/// | sensor_model.hpp | what a hit and a miss do to a voxel; models in float, int16 and int8, or your own |
+/// | sensor_model.hpp | what a hit and a miss do to a voxel: OctoMap's model, or your own |
 /// | key.hpp | voxel keys, the grid, boxes, Morton order |
 /// | accessor.hpp | many look-ups near each other; the concept of a map |
 /// | octants.hpp | what is known, as bit masks of 4x4x4 voxels |

@@ -84,14 +84,3 @@ TEST_CASE("An accessor answers as the map and as OctoMap do") {
   CHECK(near.state(vec3f{nan, 0.0F, 0.0F}) == occupancy::unknown);
   CHECK(!near.log_odds(vec3f{1e6F, 0.0F, 0.0F}));
 }
-
-TEST_CASE("An accessor of an integer model gives log-odds in their own unit") {
-  occupancy_octree<octree::log_odds<std::int16_t>> map{0.1};
-  map.integrate(std::vector<vec3f>{{1.05F, 0.05F, 0.05F}}, vec3f{0.05F, 0.05F, 0.05F});
-  auto near = map.accessor();
-  const vec3f end{1.05F, 0.05F, 0.05F};
-  CHECK(near.value(end) == std::optional<std::int16_t>{std::int16_t{847}});
-  CHECK(near.log_odds(end) == map.log_odds(end));
-  CHECK(near.probability(end) == map.probability(end));
-  CHECK(near.state(vec3f{0.5F, 0.05F, 0.05F}) == occupancy::free);
-}

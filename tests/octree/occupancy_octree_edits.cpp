@@ -186,36 +186,6 @@ TEST_CASE("Readers on other threads use snapshots while the writer goes on") {
   CHECK(hits.back() > 10);
 }
 
-TEST_CASE("Maps of integers are maps too and take less memory") {
-  random_bits random{47};
-  occupancy_octree<> floats{0.05};
-  occupancy_octree<log_odds<std::int16_t>> shorts{0.05};
-  occupancy_octree<log_odds<std::int8_t>> bytes{0.05};
-  for (int i = 0; i != 8; ++i) {
-    const vec3f origin = test::random_points(random, 1, 0.4)[0];
-    const auto points = test::shell_scan(random, 1500, origin);
-    floats.integrate(points, origin);
-    shorts.integrate(points, origin);
-    bytes.integrate(points, origin);
-  }
-  CHECK(shorts.memory_bytes() < floats.memory_bytes());
-  CHECK(bytes.memory_bytes() < shorts.memory_bytes());
-  std::size_t known = 0, differ = 0;
-  for (int i = 0; i != 50000; ++i) {
-    const vec3f p = test::random_points(random, 1, 2.2)[0];
-    const auto v = floats.log_odds(p);
-    REQUIRE(shorts.log_odds(p).has_value() == v.has_value());
-    REQUIRE(bytes.log_odds(p).has_value() == v.has_value());
-    if (!v) continue;
-    ++known;
-    REQUIRE(std::abs(*shorts.log_odds(p) - *v) < 0.02F);
-    REQUIRE(std::abs(*bytes.log_odds(p) - *v) < 0.2F);
-    differ += floats.state(p) != shorts.state(p) ? 1 : 0;
-  }
-  CHECK(known > 5000);
-  CHECK(differ < known / 100);
-}
-
 TEST_CASE("A deeper tree holds what lies further away") {
   occupancy_octree<> usual{0.01}, deep{0.01, 21};
   const std::vector<vec3f> points{{8000.0F, 0.0F, 1.0F}};

@@ -6,7 +6,6 @@
 #include <concepts>
 #include <cstdint>
 #include <optional>
-#include <type_traits>
 
 #include <orbis/core/point.hpp>
 #include <orbis/octree/detail/storage/brick.hpp>
@@ -22,22 +21,10 @@ concept octree_map = sensor_model<typename M::model> && requires(const M& map) {
   { map.grid() } -> std::same_as<const voxel_grid&>;
 };
 
-/// The type of log-odds in results: as they are stored, or float for models of integers.
-template <sensor_model Model>
-using log_odds_type =
-    std::conditional_t<std::floating_point<typename Model::value_type>, typename Model::value_type, float>;
-
-/// The log-odds and the probability that a stored value stands for; empty if there is none.
-template <sensor_model Model>
-[[nodiscard]] std::optional<log_odds_type<Model>> log_odds_at(std::optional<typename Model::value_type> v) noexcept {
-  if constexpr (std::floating_point<typename Model::value_type>)
-    return v;
-  else
-    return v ? std::optional{static_cast<float>(to_log_odds<Model>(*v))} : std::nullopt;
-}
+/// The probability that a stored value stands for; empty if there is none.
 template <sensor_model Model>
 [[nodiscard]] std::optional<double> probability_at(std::optional<typename Model::value_type> v) noexcept {
-  return v ? std::optional{probability_of<Model>(*v)} : std::nullopt;
+  return v ? std::optional{probability_of(*v)} : std::nullopt;
 }
 
 /// The queries of a map for points or voxels of which each lies near the one before: along a ray, on
@@ -52,13 +39,11 @@ template <sensor_model Model>
 class octree_accessor {
  public:
   using value_type = typename Model::value_type;
-  using log_odds_type = octree::log_odds_type<Model>;
 
   octree_accessor(const detail::brick_store<value_type>& store, const voxel_grid& grid) noexcept
       : reader_{store}, grid_{grid} {}
 
-  /// What is stored at `p`, in the model's units: empty where unknown or outside the grid. O(1), as
-  /// are all.
+  /// What is stored at `p`: empty where unknown or outside the grid. O(1), as are all.
   template <point_like P>
   [[nodiscard]] std::optional<value_type> value(const P& p) noexcept {
     const auto key = grid_.key(p);
@@ -68,7 +53,7 @@ class octree_accessor {
   /// The log-odds at `p`, empty where unknown or outside the grid.
   template <class P>
   requires point_like<P> || std::same_as<P, voxel_key>
-  [[nodiscard]] std::optional<log_odds_type> log_odds(const P& p) noexcept { return log_odds_at<Model>(value(p)); }
+  [[nodiscard]] std::optional<value_type> log_odds(const P& p) noexcept { return value(p); }
   /// The probability that `p` is occupied, empty where unknown or outside the grid.
   template <class P>
   requires point_like<P> || std::same_as<P, voxel_key>

@@ -43,24 +43,8 @@ template <sensor_model M>
   return M::occupancy_threshold > 0 ? T{0} : largest_free_value<M>();
 }
 
-namespace detail {
-
-/// Puts a value at `distance` (units, signed) from where it comes to rest; integers are rounded towards
-/// that place.
-template <sensor_model M>
-[[nodiscard]] inline typename M::value_type at_distance(typename M::value_type rest, double distance) noexcept {
-  using T = typename M::value_type;
-  if constexpr (std::integral<T>) distance = std::trunc(distance);
-  return static_cast<T>(static_cast<double>(rest) + distance);
-}
-
-}  // namespace detail
-
 /// Log-odds halve in every `half_life`. Applying it twice is applying it once for the sum of the times,
 /// but for rounding.
-///
-/// Integer values come at least one unit nearer to rest each time, so that none is ever stuck: apply it
-/// rarely enough that one unit is little of what it should take away.
 /// @pre half_life > 0, elapsed >= 0
 template <sensor_model M = log_odds<>>
 struct exponential_decay {
@@ -72,12 +56,12 @@ struct exponential_decay {
     assert(half_life > 0.0 && elapsed >= 0.0);
     const auto rest = resting_value<M>(v);
     const double distance = static_cast<double>(v) - static_cast<double>(rest);
-    return detail::at_distance<M>(rest, rounded_product(distance, std::exp2(-elapsed / half_life)));
+    return static_cast<typename M::value_type>(static_cast<double>(rest) +
+                                               rounded_product(distance, std::exp2(-elapsed / half_life)));
   }
 };
 
-/// Log-odds fall, or rise, by `rate` in every second until they are at rest. Integers as above, but that
-/// nothing happens while no time passes.
+/// Log-odds fall, or rise, by `rate` in every second until they are at rest.
 /// @pre rate >= 0, elapsed >= 0
 template <sensor_model M = log_odds<>>
 struct linear_decay {
@@ -89,8 +73,8 @@ struct linear_decay {
     assert(rate >= 0.0 && elapsed >= 0.0);
     const auto rest = resting_value<M>(v);
     const double distance = static_cast<double>(v) - static_cast<double>(rest);
-    const double step = rounded_product(rate * elapsed, units_per_log_odds<M>);
-    return detail::at_distance<M>(rest, std::copysign(std::max(std::abs(distance) - step, 0.0), distance));
+    const double left = std::max(std::abs(distance) - rate * elapsed, 0.0);
+    return static_cast<typename M::value_type>(static_cast<double>(rest) + std::copysign(left, distance));
   }
 };
 
@@ -122,7 +106,7 @@ struct forget_below {
   [[nodiscard]] std::optional<typename model::value_type> operator()(typename model::value_type v) const {
     const std::optional<typename model::value_type> later = policy(v);
     if (!later) return std::nullopt;
-    const double distance = to_log_odds<model>(*later) - to_log_odds<model>(resting_value<model>(*later));
+    const double distance = static_cast<double>(*later) - static_cast<double>(resting_value<model>(*later));
     return std::abs(distance) <= margin ? std::nullopt : later;
   }
 };

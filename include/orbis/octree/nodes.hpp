@@ -55,7 +55,7 @@ struct max_of_children {
 struct mean_of_children {
   template <sensor_model M>
   [[nodiscard]] static double carried(typename M::value_type v) noexcept {
-    return probability_of<M>(v);
+    return probability_of(v);
   }
   template <sensor_model M>
   [[nodiscard]] static typename M::value_type value(double p) noexcept {

@@ -77,7 +77,7 @@ class normal_estimator {
   }
   [[nodiscard]] double occupied_at(const voxel_key& k) noexcept {
     const auto v = reader_.value(k);
-    return v ? probability_of<model>(*v) : unknown_;
+    return v ? probability_of(*v) : unknown_;
   }
 
   detail::store_reader<typename model::value_type> reader_;
