@@ -13,8 +13,6 @@
 /// | nodes.hpp | nodes of any size, inner nodes made of their children by a policy |
 /// | cast_ray.hpp | what a ray meets first, one ray or many |
 /// | overlap.hpp | whether boxes, spheres and capsules are free |
-/// | render.hpp | depth images and labels that a camera would see |
-/// | surface.hpp | centres and normals of occupied voxels |
 /// | change_log.hpp | which voxels changed since a revision |
 /// | scan_history.hpp | a map that follows its scans when they change, are removed or come late |
 /// | scan_voxels.hpp | the voxels that one scan observes, packed; the marker that finds them |
@@ -36,9 +34,7 @@
 #include <orbis/octree/occupancy_octree.hpp>
 #include <orbis/octree/octants.hpp>
 #include <orbis/octree/overlap.hpp>
-#include <orbis/octree/render.hpp>
 #include <orbis/octree/scan_history.hpp>
 #include <orbis/octree/scan_voxels.hpp>
 #include <orbis/octree/sensor_model.hpp>
-#include <orbis/octree/surface.hpp>
 #include <orbis/octree/voxel_layer.hpp>

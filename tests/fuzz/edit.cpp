@@ -420,7 +420,10 @@ class session {
       case 4: transform_by([&](float v) { return voxel{0.0F * v}; }); break;
       case 5: transform_by([](float) { return voxel{}; }); break;
       case 6:
-        transform_by(octree::forget_below{octree::occupied_only{octree::exponential_decay<>{1.0, 0.75}}, 0.6});
+        transform_by([](float v) {
+          const float later = octree::exponential_decay<>{1.0, 0.75}(v);
+          return v < 0.0F || later > 0.6F ? voxel{later} : voxel{};
+        });
         break;
       default:
         map_.to_maximum_likelihood();

@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include <algorithm>
 #include <cmath>
-#include <cstdint>
 #include <limits>
-#include <optional>
 #include <vector>
 
 #include <orbis/core/random.hpp>
@@ -42,7 +39,7 @@ std::vector<typename M::value_type> values() {
   return all;
 }
 
-/// Holds for every policy and every value: towards rest, not beyond it, and never across the threshold.
+/// Holds for every value: towards rest, not beyond it, and never across the threshold.
 template <class M, class Policy>
 void check_towards_rest(const Policy& policy) {
   for (const auto v : values<M>()) {
@@ -63,24 +60,18 @@ TEMPLATE_TEST_CASE("Decay goes towards rest and never turns free into occupied o
   constexpr double forever = std::numeric_limits<double>::infinity();
   for (const double elapsed : {0.0, 1e-9, 0.033, 1.0, 60.0, 1e6, forever}) {
     check_towards_rest<M>(exponential_decay<M>{.half_life = 30.0, .elapsed = elapsed});
-    check_towards_rest<M>(linear_decay<M>{.rate = 0.02, .elapsed = elapsed});
-    check_towards_rest<M>(occupied_only{exponential_decay<M>{.half_life = 0.5, .elapsed = elapsed}});
   }
   for (const auto v : values<M>()) {
     REQUIRE(exponential_decay<M>{.half_life = 5.0, .elapsed = forever}(v) == resting_value<M>(v));
-    REQUIRE(linear_decay<M>{.rate = 0.1, .elapsed = forever}(v) == resting_value<M>(v));
     REQUIRE(exponential_decay<M>{.half_life = 5.0, .elapsed = 0.0}(v) == v);
-    REQUIRE(linear_decay<M>{.rate = 0.1, .elapsed = 0.0}(v) == v);
   }
 }
 
-TEST_CASE("Log-odds halve in a half-life and fall by the rate in a second") {
+TEST_CASE("Log-odds halve in a half-life") {
   for (const float v : values<log_odds<>>()) {
     if (std::abs(v) < 1e-30F) continue;
     REQUIRE(exponential_decay<>{.half_life = 7.0, .elapsed = 7.0}(v) == v / 2);
     REQUIRE(exponential_decay<>{.half_life = 7.0, .elapsed = 21.0}(v) == v / 8);
-    const float fallen = linear_decay<>{.rate = 0.25, .elapsed = 2.0}(v);
-    REQUIRE(fallen == Approx(std::copysign(std::max(std::abs(v) - 0.5F, 0.0F), v)).margin(1e-7));
   }
 }
 
@@ -93,45 +84,4 @@ TEST_CASE("Two steps of decay are one of the time of both") {
         exponential_decay<>{.half_life = 15.0, .elapsed = b}(exponential_decay<>{.half_life = 15.0, .elapsed = a}(v));
     REQUIRE(twice == Approx(exponential_decay<>{.half_life = 15.0, .elapsed = a + b}(v)).epsilon(3e-7));
   }
-}
-
-TEST_CASE("Free voxels keep their value where only occupied ones decay") {
-  const occupied_only ghosts{exponential_decay<>{.half_life = 10.0, .elapsed = 10.0}};
-  const occupied_only forgetful{forget_below{exponential_decay<>{.half_life = 10.0, .elapsed = 10.0}, 0.5}};
-  static_assert(decay_policy<decltype(ghosts), log_odds<>> && decay_policy<decltype(forgetful), log_odds<>>);
-  for (const float v : values<log_odds<>>()) {
-    REQUIRE(ghosts(v) == (v < 0 ? v : ghosts.policy(v)));
-    const std::optional<float> kept = forgetful(v);
-    if (v < 0)
-      REQUIRE(kept == v);
-    else
-      REQUIRE(kept == (v / 2 <= 0.5F ? std::nullopt : std::optional{ghosts.policy(v)}));
-  }
-}
-
-TEMPLATE_TEST_CASE("A belief near rest is forgotten and every belief is in the end", "", log_odds<>, low_threshold,
-                   high_threshold) {
-  using M = TestType;
-  const forget_below forgetting{exponential_decay<M>{.half_life = 30.0, .elapsed = 10.0}, 0.1};
-  for (const auto v : values<M>()) {
-    std::optional<typename M::value_type> value = v;
-    int steps = 0;
-    for (; value && steps != 1000; ++steps) {
-      const auto later = forgetting.policy(*value);
-      const double distance = static_cast<double>(later) - static_cast<double>(resting_value<M>(later));
-      value = decayed<M>(forgetting, *value);
-      REQUIRE(value.has_value() == (std::abs(distance) > 0.1));
-      if (value) REQUIRE(*value == later);
-    }
-    REQUIRE(steps < 40);
-  }
-}
-
-TEST_CASE("A function is a decay policy too") {
-  const auto halve = [](float v) { return v / 2; };
-  const auto forget = [](float) { return std::optional<float>{}; };
-  static_assert(decay_policy<decltype(halve), log_odds<>> && decay_policy<decltype(forget), log_odds<>>);
-  static_assert(!decay_policy<int, log_odds<>>);
-  CHECK(decayed<log_odds<>>(halve, 3.0F) == 1.5F);
-  CHECK(decayed<log_odds<>>(forget, 3.0F) == std::nullopt);
 }
