@@ -10,7 +10,6 @@
 /// | key.hpp | voxel keys, the grid, boxes, Morton order |
 /// | accessor.hpp | many look-ups near each other; the concept of a map |
 /// | octants.hpp | what is known, as bit masks of 4x4x4 voxels |
-/// | nodes.hpp | nodes of any size, inner nodes made of their children by a policy |
 /// | cast_ray.hpp | what a ray meets first, one ray or many |
 /// | overlap.hpp | whether boxes, spheres and capsules are free |
 /// | change_log.hpp | which voxels changed since a revision |
@@ -30,7 +29,6 @@
 #include <orbis/octree/files.hpp>
 #include <orbis/octree/integration.hpp>
 #include <orbis/octree/key.hpp>
-#include <orbis/octree/nodes.hpp>
 #include <orbis/octree/occupancy_octree.hpp>
 #include <orbis/octree/octants.hpp>
 #include <orbis/octree/overlap.hpp>

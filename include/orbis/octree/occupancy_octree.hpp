@@ -316,14 +316,6 @@ class occupancy_octree {
       detail::visit_leaves_in(store_, tree_depth(), *keys,
                               [&](const voxel_key& key, int level, value_type v) { visit(leaf_of(key, level, v)); });
   }
-  /// Calls `visit(const leaf&)` for every leaf of the tree cut off at `depth` (tree_depth(): all of it): an inner node
-  /// at `depth` counts as a leaf whose value `Policy` makes of its children. O(known voxels).
-  template <node_policy<Model> Policy = max_of_children, std::invocable<const leaf&> Visit>
-  void for_each_leaf_down_to(int depth, Visit&& visit, Policy = {}) const {
-    detail::visit_nodes_down_to<Model, Policy>(
-        store_, tree_depth(), tree_depth() - depth,
-        [&](const voxel_key& key, int level, value_type v, node_kind) { visit(leaf_of(key, level, v)); });
-  }
   /// Calls `visit(const vec3& center)` (metres) for every occupied voxel, also for each voxel of a larger leaf.
   /// O(bricks + voxels visited).
   template <std::invocable<const vec3&> Visit>

@@ -101,18 +101,6 @@ template <sensor_model M>
   return std::nextafter(M::occupancy_threshold, -std::numeric_limits<typename M::value_type>::infinity());
 }
 
-/// The value for log-odds: the nearest within the bounds, but never on the other side of the
-/// threshold, so that what was free stays free. @pre not NaN
-template <sensor_model M>
-[[nodiscard]] typename M::value_type from_log_odds(double log_odds) noexcept {
-  using T = typename M::value_type;
-  if (log_odds <= static_cast<double>(M::clamp_min)) return M::clamp_min;
-  if (log_odds >= static_cast<double>(M::clamp_max)) return M::clamp_max;
-  const auto nearest = static_cast<T>(log_odds);
-  const bool free = log_odds < static_cast<double>(M::occupancy_threshold);
-  return free && is_occupied<M>(nearest) ? largest_free_value<M>() : nearest;
-}
-
 // -- models from probabilities
 
 /// The probabilities behind OctoMap's constants.
