@@ -382,12 +382,12 @@ TEST_CASE("A moved-from map is empty and large leaves that come and go take no m
 TEST_CASE("Payload is evicted with its voxels by whoever keeps it") {
   random_bits random{50};
   occupancy_octree<> map{0.1};
-  voxel_layer<hit_count> layer;
+  voxel_layer<std::uint32_t> layer;
   const auto points = test::shell_scan(random, 2000, vec3f::Zero());
   map.integrate(points, vec3f::Zero());
-  annotate(layer, map.grid(), points, vec3f::Zero(), {}, [](hit_count& h, std::size_t) { h.update(); });
+  for (const vec3f& p : points) ++layer.make(*map.grid().key(p));
   const std::size_t before = layer.size();
   map.evict_outside({{-0.5, -0.5, -0.5}, {0.5, 0.5, 0.5}}, [&](const auto& leaf) { layer.erase_brick(leaf.key); });
   CHECK(layer.size() < before);
-  layer.for_each([&](const voxel_key& k, const hit_count&) { REQUIRE(map.state(k) == occupancy::occupied); });
+  layer.for_each([&](const voxel_key& k, std::uint32_t) { REQUIRE(map.state(k) == occupancy::occupied); });
 }
