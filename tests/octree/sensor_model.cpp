@@ -12,6 +12,7 @@
 #include "support/catch.hpp"
 
 using namespace orbis::octree;
+using orbis::octree::detail::constexpr_log;
 
 namespace {
 
@@ -23,6 +24,9 @@ struct cautious : octomap_probabilities {
 static_assert(sensor_model<log_odds<>> && sensor_model<log_odds<double>>);
 static_assert(sensor_model<sensor_model_from<cautious>> && sensor_model<sensor_model_from<cautious, double>>);
 static_assert(after_hit<log_odds<>>(0.0F) == log_odds<>::hit);
+
+static_assert(constexpr_log(1.0) == 0.0);
+static_assert(static_cast<float>(constexpr_log(2.0)) == 0.693147181F);
 
 TEST_CASE("The default sensor model has OctoMap's constants to the last bit") {
   const octomap::OcTree tree{0.1};
@@ -97,4 +101,22 @@ TEMPLATE_TEST_CASE("The largest free value is free and the next one is occupied"
                    sensor_model_from<cautious>) {
   CHECK_FALSE(is_occupied<TestType>(largest_free_value<TestType>()));
   CHECK(is_occupied<TestType>(std::nextafter(largest_free_value<TestType>(), 1e9F)));
+}
+
+TEST_CASE("The logarithm is right to three units in the last place and rounds to std::log's float") {
+  orbis::random_bits random{3};
+  const auto check = [](double x) {
+    const double ours = constexpr_log(x), theirs = std::log(x);
+    const double ulp = std::abs(theirs) * std::numeric_limits<double>::epsilon();
+    REQUIRE(std::abs(ours - theirs) <= 3.0 * ulp);
+    REQUIRE(static_cast<float>(ours) == static_cast<float>(theirs));
+  };
+  for (int i = 0; i != 200000; ++i) {
+    check(std::exp(random.uniform(-700.0, 700.0)));
+    check(std::exp(random.uniform(-5.0, 5.0)));  // odds of sensor models
+    check(1.0 + random.uniform(-1.0, 1.0) * std::exp(-random.uniform(0.0, 30.0)));
+  }
+  for (const double x : {std::numeric_limits<double>::min(), std::numeric_limits<double>::max(), 1.4142135623730951,
+                         std::nextafter(1.4142135623730951, 2.0), std::nextafter(1.0, 0.0), std::nextafter(1.0, 2.0)})
+    check(x);
 }
