@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// `.bt` and `.ot` of the map of 50 frames, in memory: the same bytes are written, the same bytes are read. Our
-// own files beside them, which OctoMap has no like of: all values, and free and occupied alone.
+// `.bt` and `.ot` of the map of 50 frames, in memory: the same bytes are written, the same bytes are read.
 #include <memory>
 #include <span>
 #include <sstream>
 #include <string>
 
-#include <orbis/octree/compact_file.hpp>
 #include <orbis/octree/files.hpp>
 
 #include "octree_support.hpp"
@@ -32,12 +30,6 @@ struct ot {
   static std::unique_ptr<octomap::OcTree> read(std::istream& in) {
     return std::unique_ptr<octomap::OcTree>{dynamic_cast<octomap::OcTree*>(octomap::AbstractOcTree::read(in))};
   }
-};
-
-template <bool OccupancyOnly>
-struct compact {
-  static std::string write(const map& m) { return octree::compact_bytes(m, {.occupancy_only = OccupancyOnly}); }
-  static auto read(std::span<const std::byte> bytes) { return octree::read_compact(bytes); }
 };
 
 template <class Format>
@@ -101,15 +93,10 @@ void bench_octomap_read(benchmark::State& state, double resolution) {
 }
 
 template <class Format>
-void add_our_rows(const std::string& format, double r) {
+void add_rows(const std::string& format, double r) {
   const std::string size = in_centimetres(r);
   add_row("octree_write_" + format + "/" + size + "/orbis", [=](auto& s) { bench_write<Format>(s, r); });
   add_row("octree_read_" + format + "/" + size + "/orbis", [=](auto& s) { bench_read<Format>(s, r); });
-}
-template <class Format>
-void add_rows(const std::string& format, double r) {
-  const std::string size = in_centimetres(r);
-  add_our_rows<Format>(format, r);
   add_row("octree_write_" + format + "/" + size + "/octomap", [=](auto& s) { bench_octomap_write<Format>(s, r); });
   add_row("octree_read_" + format + "/" + size + "/octomap", [=](auto& s) { bench_octomap_read<Format>(s, r); });
 }
@@ -118,8 +105,6 @@ void add_rows(const std::string& format, double r) {
   for (const double resolution : {0.05, 0.02}) {
     add_rows<bt>("bt", resolution);
     add_rows<ot>("ot", resolution);
-    add_our_rows<compact<true>>("compact_occupancy", resolution);
-    add_our_rows<compact<false>>("compact", resolution);
   }
   return true;
 }();

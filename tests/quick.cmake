@@ -19,7 +19,7 @@ set(ORBIS_QUICK_TESTS
   io/camera_file.cpp io/image.cpp io/ply.cpp io/pcd.cpp io/png.cpp io/recording.cpp io/trajectory_file.cpp
   mapping/allocations.cpp mapping/dense_cloud.cpp mapping/depth_store.cpp mapping/keyframe.cpp mapping/live_map.cpp
   nav/path_search.cpp
-  octree/allocations.cpp octree/cast_ray.cpp octree/files.cpp octree/key.cpp octree/nodes.cpp octree/occupancy_octree.cpp
+  octree/allocations.cpp octree/cast_ray.cpp octree/files.cpp octree/key.cpp octree/occupancy_octree.cpp
   octree/occupancy_octree_depth.cpp octree/sensor_model.cpp
   optimize/alignment.cpp optimize/allocations.cpp optimize/pnp.cpp optimize/pose_graph.cpp optimize/ransac.cpp
   optimize/robust_loss.cpp optimize/triangulation.cpp

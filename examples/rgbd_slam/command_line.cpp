@@ -118,7 +118,7 @@ void add_robot_options(CLI::App& cmd, settings& s) {
 }
 
 void add_plan_options(CLI::App& cmd, settings& s, std::string& from, std::string& to) {
-  cmd.add_option("MAP", s.input, "an octree map: .bt, .ot or .orbis")->required()->type_name("");
+  cmd.add_option("MAP", s.input, "an octree map: .bt or .ot")->required()->type_name("");
   cmd.add_option("--from", from, "where the robot is, metres")->required()->type_name("X,Y,Z");
   cmd.add_option("--to", to, "where it is to go")->required()->type_name("X,Y,Z");
   metres(cmd, "--robot-radius,--radius", s.robot_radius, "of the robot, metres", 0.001, 10.0);

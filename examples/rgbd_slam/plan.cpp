@@ -20,7 +20,6 @@
 #include <orbis/nav/path_search.hpp>
 #include <orbis/nav/planning_view.hpp>
 #include <orbis/nav/robot_shape.hpp>
-#include <orbis/octree/compact_file.hpp>
 #include <orbis/octree/files.hpp>
 
 #include "commands.hpp"
@@ -35,7 +34,7 @@ namespace nav = orbis::nav;
 using octree = orbis::octree::occupancy_octree<>;
 using orbis::octree::occupancy;
 
-/// A map of any of the three kinds, by what it begins with.
+/// A map of either kind, by what it begins with.
 orbis::result<octree> read_map(const std::filesystem::path& path) {
   const auto bytes = orbis::read_file(path);
   if (!bytes) return orbis::fail(bytes.error());
@@ -43,8 +42,7 @@ orbis::result<octree> read_map(const std::filesystem::path& path) {
   const auto begins_with = [&](std::string_view magic) { return bytes->starts_with(magic); };
   if (begins_with("# Octomap OcTree binary file")) return orbis::octree::read_bt<octree::model>(view, path.string());
   if (begins_with("# Octomap OcTree file")) return orbis::octree::read_ot<octree::model>(view, path.string());
-  if (begins_with("\x89orbis")) return orbis::octree::read_compact<octree::model>(view, path.string());
-  return orbis::fail(orbis::errc::unsupported, path.string(), "is no octree map: neither .bt nor .ot nor .orbis");
+  return orbis::fail(orbis::errc::unsupported, path.string(), "is no octree map: neither .bt nor .ot");
 }
 
 orbis::result<void> write_path(const std::filesystem::path& path, const std::vector<orbis::vec3>& points) {

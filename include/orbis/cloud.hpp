@@ -10,9 +10,8 @@
 /// | `filter_chain.hpp`         | several filters in order, as data                                           |
 /// | `filter_choice.hpp`        | options and result of the automatic selection, with its evidence            |
 /// | `flying_pixels.hpp`        | depth images without the wrong pixels at edges                              |
-/// | `leaf_search.hpp`          | nearest neighbours of single points, without further libraries              |
 /// | `log_statistical.hpp`      | filter: mean neighbour distance relative to its median                      |
-/// | `nanoflann.hpp`            | the same by nanoflann's k-d tree; to be included by name, needs nanoflann   |
+/// | `nanoflann.hpp`            | neighbours of single points by a k-d tree; included by name, needs nanoflann |
 /// | `neighbors.hpp`            | concepts of a nearest-neighbour search and of what gathers its results      |
 /// | `radius.hpp`               | filter: points with too few neighbours within a radius                      |
 /// | `ray_evidence.hpp`         | filter: points that the rays of depth images pass through                   |
@@ -31,7 +30,6 @@
 #include <orbis/cloud/filter_chain.hpp>
 #include <orbis/cloud/filter_choice.hpp>
 #include <orbis/cloud/flying_pixels.hpp>
-#include <orbis/cloud/leaf_search.hpp>
 #include <orbis/cloud/log_statistical.hpp>
 #include <orbis/cloud/neighbors.hpp>
 #include <orbis/cloud/radius.hpp>

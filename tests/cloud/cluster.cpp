@@ -6,13 +6,13 @@
 #include <numeric>
 #include <vector>
 
+#include <orbis/cloud/all_knn.hpp>
 #include <orbis/cloud/cluster.hpp>
 
 #include "cloud/clouds.hpp"
 #include "cloud/reference.hpp"
 #include "support/catch.hpp"
 
-using orbis::cloud::cluster_decision;
 using orbis::cloud::cluster_filter;
 using orbis::cloud::cluster_inliers;
 using orbis::cloud::cluster_link;
@@ -69,10 +69,34 @@ std::vector<std::uint32_t> reference_components(const points& cloud, const clust
   return component;
 }
 
+/// What `separate` makes of a cloud without the points that are `gone`. `spacing`: empty for the mean distance.
+cluster_result separated(const points& cloud, const std::vector<char>& gone, const std::vector<float>& spacing,
+                         const cluster_options& options = {}) {
+  namespace detail = orbis::cloud::detail;
+  const detail::neighbor_graph graph{orbis::par, detail::make_leaves(orbis::par, cloud, options.neighbors + 1),
+                                     cloud.size(), options.neighbors};
+  std::vector<float> spacings = graph.mean_distance(orbis::par, options.neighbors);
+  std::vector<char> left_out(graph.size(), 0);
+  const std::vector<std::uint32_t> place = graph.places(cloud.size());
+  for (std::size_t i = 0; i != cloud.size(); ++i) {
+    if (!gone.empty()) left_out[place[i]] = gone[i];
+    if (!spacing.empty()) spacings[place[i]] = spacing[i];
+  }
+  return detail::numbered(
+      detail::separate(orbis::par, graph, left_out, spacings, options), cloud.size(),
+      [&](std::size_t i) { return left_out[place[i]] != 0 ? -1 : static_cast<std::int64_t>(place[i]); },
+      [](std::size_t) { return false; });
+}
+
 }  // namespace
 
 TEST_CASE("components are those of a flood fill, under every policy") {
-  for (const auto& [name, cloud] : orbis::test::all_clouds()) {
+  auto clouds = orbis::test::all_clouds();
+  clouds.emplace_back("wall and ball", wall_and_ball(25, 0.3));
+  points bits = orbis::test::room_cloud(60, 45, 0.004, 5);  // many small components, among them copies
+  for (std::size_t i = 0; i != 60; ++i) bits.push_back(bits[40 * i]);
+  clouds.emplace_back("bits", bits);
+  for (const auto& [name, cloud] : clouds) {
     for (const auto link : {cluster_link::mutual, cluster_link::either}) {
       for (const double reach : {0.0, 1.1, 3.0}) {
         INFO(name << " reach " << reach);
@@ -121,30 +145,6 @@ TEST_CASE("a component is as far away as its closest point") {
   CHECK(cluster_inliers(orbis::seq, cloud).size() == 3600);
 }
 
-TEST_CASE("the components of a cloud are those of its table of neighbours") {
-  auto clouds = orbis::test::all_clouds();
-  clouds.emplace_back("wall and ball", wall_and_ball(25, 0.3));
-  points bits = orbis::test::room_cloud(60, 45, 0.004, 5);  // many small components, among them copies
-  for (std::size_t i = 0; i != 60; ++i) bits.push_back(bits[40 * i]);
-  clouds.emplace_back("bits", bits);
-  for (const auto& [name, cloud] : clouds) {
-    for (const cluster_link link : {cluster_link::mutual, cluster_link::either}) {
-      for (const double reach : {1.2, 3.0}) {
-        INFO(name << " reach " << reach);
-        const cluster_options options{.reach = reach, .link = link, .min_size = 40};
-        const auto table = orbis::cloud::all_knn(orbis::seq, cloud, options.neighbors);
-        const cluster_result expected = cluster_decision(orbis::seq, cloud, table, {}, {}, options);
-        const cluster_result found = cluster_filter(orbis::par.with(3), cloud, options);
-        CHECK(found.inliers == expected.inliers);
-        CHECK(found.component == expected.component);
-        CHECK(found.sizes == expected.sizes);
-        CHECK(found.removed == expected.removed);
-        CHECK(found.min_size == expected.min_size);
-      }
-    }
-  }
-}
-
 TEST_CASE("where nothing is large everything stays") {
   CHECK(cluster_inliers(orbis::seq, orbis::test::uniform_cloud(20, 1)).size() == 20);
   CHECK(cluster_inliers(orbis::seq, points{}).empty());
@@ -161,24 +161,22 @@ TEST_CASE("points that are gone link nothing and stay gone") {
     cloud.emplace_back(0.31F, 0.31F, 1.68F + 0.01F * static_cast<float>(i));
     gone.push_back(1);
   }
-  const auto table = orbis::cloud::all_knn(orbis::seq, cloud, 12);
-  CHECK(cluster_decision(orbis::par, cloud, table, {}, {}).inliers.size() == cloud.size());
-  const auto without = cluster_decision(orbis::par, cloud, table, gone, {});
+  CHECK(separated(cloud, {}, {}).inliers.size() == cloud.size());
+  const auto without = separated(cloud, gone, {});
   CHECK(without.inliers.size() == 3600);
   CHECK(without.component.back() == cluster_result::none);
   CHECK(std::count(without.removed.begin(), without.removed.end(), char{1}) >= 1);
   // Spacings may come from elsewhere.
   const std::vector<float> wide(cloud.size(), 0.2F);
-  CHECK(cluster_decision(orbis::par, cloud, table, gone, wide).inliers.size() == cloud.size() - 30);
+  CHECK(separated(cloud, gone, wide).inliers.size() == cloud.size() - 30);
 }
 
 TEST_CASE("spacings that are not known for lack of any link what they like, and with no gap nothing is close") {
   const points cloud = wall_and_ball(25, 0.3);
-  const auto table = orbis::cloud::all_knn(orbis::seq, cloud, 12);
   std::vector<float> spacing(cloud.size(), 0.01F);
   std::fill_n(spacing.begin(), 3600, std::numeric_limits<float>::infinity());
-  CHECK(cluster_decision(orbis::seq, cloud, table, {}, spacing, {.min_gap = 0}).inliers.size() == 3600);
-  CHECK(cluster_decision(orbis::seq, cloud, table, {}, spacing, {.min_gap = 1}).inliers.size() == cloud.size());
+  CHECK(separated(cloud, {}, spacing, {.min_gap = 0}).inliers.size() == 3600);
+  CHECK(separated(cloud, {}, spacing, {.min_gap = 1}).inliers.size() == cloud.size());
 }
 
 TEST_CASE("points that are not finite are in no component") {

@@ -16,9 +16,8 @@
 #include <vector>
 
 #include <orbis/core/random.hpp>
-#include <orbis/octree/compact_file.hpp>
 #include <orbis/octree/decay.hpp>
-#include <orbis/octree/nodes.hpp>
+#include <orbis/octree/occupancy_octree.hpp>
 #include <orbis/octree/overlap.hpp>
 
 #include "fuzz/octree.hpp"
@@ -27,11 +26,12 @@
 namespace {
 
 using namespace orbis;
+using fuzz::leaves_of;
 using fuzz::map;
 using fuzz::require;
 using fuzz::source;
+using fuzz::tree_leaf;
 using octree::block;
-using octree::node_kind;
 using octree::voxel_key;
 using model = map::model;
 using voxel = std::optional<float>;
@@ -46,14 +46,6 @@ struct window {
   voxel_key low;
 
   [[nodiscard]] std::uint32_t edge() const { return octree::node_cells(level); }
-};
-
-/// A node of the pruned tree.
-struct tree_node {
-  voxel_key key;
-  int level = 0;
-  float value = 0.0F;
-  friend bool operator==(const tree_node&, const tree_node&) = default;
 };
 
 /// What a map is to be: every voxel of the window, in Morton order, so that nodes are consecutive.
@@ -90,9 +82,10 @@ class voxels {
 /// The tree above voxels, made of nothing but them.
 class reference_tree {
  public:
+  enum class kind { none, leaf, inner };
   struct node {
-    node_kind kind = node_kind::none;
-    float value = 0.0F;
+    reference_tree::kind kind = kind::none;
+    float value = 0.0F;  ///< of a leaf
   };
 
   explicit reference_tree(const voxels& of) : of_{of}, levels_(static_cast<std::size_t>(of.where().level)) {
@@ -101,32 +94,22 @@ class reference_tree {
       for (std::size_t i = 0; i != levels_[level].size(); ++i) levels_[level][i] = parent(level, 8 * i);
     }
   }
-  /// The node at a level up to the window's that contains `k`.
-  [[nodiscard]] node at(const voxel_key& k, int level) const {
-    const voxel_key& low = of_.where().low;
-    return at(octree::morton_code({k.x - low.x, k.y - low.y, k.z - low.z}) >> 3 * level,
-              static_cast<std::size_t>(level));
-  }
   [[nodiscard]] node top() const { return at(0, levels_.size()); }
-  /// The leaves, and the inner nodes at `lowest` in place of what is below them, in Morton order. Eight equal
-  /// children of the tree's root are no leaf, unless the root was made one.
-  [[nodiscard]] std::vector<tree_node> cut(int lowest, bool root_may_be_leaf) const {
-    std::vector<tree_node> found;
+  /// The leaves in Morton order. Eight equal children of the tree's root are no leaf, unless the root was made one.
+  [[nodiscard]] std::vector<tree_leaf> leaves(bool root_may_be_leaf) const {
+    std::vector<tree_leaf> found;
     const window& w = of_.where();
-    if (lowest <= w.level)
-      add(0, levels_.size(), static_cast<std::size_t>(lowest), w.level == w.tree_depth && !root_may_be_leaf, found);
-    else if (top().kind != node_kind::none)
-      found.push_back({octree::node_key(w.low, lowest), lowest, top().value});
+    add(0, levels_.size(), w.level == w.tree_depth && !root_may_be_leaf, found);
     return found;
   }
   [[nodiscard]] std::size_t inner_nodes(bool root_may_be_leaf) const {
     const window& w = of_.where();
-    if (top().kind == node_kind::none) return 0;
+    if (top().kind == kind::none) return 0;
     std::size_t inner = static_cast<std::size_t>(w.tree_depth - w.level);
     for (const auto& level : levels_)
-      inner += static_cast<std::size_t>(
-          std::ranges::count_if(level, [](const node& n) { return n.kind == node_kind::inner; }));
-    const bool root_has_to = w.level == w.tree_depth && !root_may_be_leaf && top().kind == node_kind::leaf;
+      inner +=
+          static_cast<std::size_t>(std::ranges::count_if(level, [](const node& n) { return n.kind == kind::inner; }));
+    const bool root_has_to = w.level == w.tree_depth && !root_may_be_leaf && top().kind == kind::leaf;
     return inner + (root_has_to ? 1 : 0);
   }
 
@@ -134,43 +117,35 @@ class reference_tree {
   [[nodiscard]] node at(std::size_t i, std::size_t level) const {
     if (level != 0) return levels_[level - 1][i];
     const voxel& v = of_.all()[i];
-    return v ? node{node_kind::leaf, *v} : node{};
+    return v ? node{kind::leaf, *v} : node{};
   }
   [[nodiscard]] node parent(std::size_t level, std::size_t first) const {
     const node one = at(first, level);
-    bool same = one.kind == node_kind::leaf;
-    std::optional<float> largest;
+    bool same = one.kind == kind::leaf, known = false;
     for (std::size_t i = first; i != first + 8; ++i) {
       const node n = at(i, level);
-      same = same && n.kind == node_kind::leaf && n.value == one.value;
-      if (n.kind != node_kind::none) largest = largest ? std::max(*largest, n.value) : n.value;
+      same = same && n.kind == kind::leaf && n.value == one.value;
+      known = known || n.kind != kind::none;
     }
-    if (!largest) return {};
-    return {same ? node_kind::leaf : node_kind::inner, *largest};
+    if (!known) return {};
+    return same ? one : node{kind::inner};
   }
-  void add(std::size_t i, std::size_t level, std::size_t lowest, bool has_to_have_children,
-           std::vector<tree_node>& found) const {
+  void add(std::size_t i, std::size_t level, bool has_to_have_children, std::vector<tree_leaf>& found) const {
     const node n = at(i, level);
-    if (n.kind == node_kind::none) return;
-    if (level == lowest || (n.kind == node_kind::leaf && !has_to_have_children)) {
+    if (n.kind == kind::none) return;
+    if (n.kind == kind::leaf && !has_to_have_children) {
       found.push_back({of_.key(i << 3 * level), static_cast<int>(level), n.value});
       return;
     }
-    for (std::size_t child = 0; child != 8; ++child) add(8 * i + child, level - 1, lowest, false, found);
+    for (std::size_t child = 0; child != 8; ++child) add(8 * i + child, level - 1, false, found);
   }
 
   const voxels& of_;
   std::vector<std::vector<node>> levels_;  ///< from level 1 on
 };
 
-[[nodiscard]] std::vector<tree_node> leaves_of(const map& m) {
-  std::vector<tree_node> leaves;
-  m.for_each_leaf([&](const map::leaf& l) { leaves.push_back({l.key, m.tree_depth() - l.depth, l.log_odds}); });
-  return leaves;
-}
-
 /// Questions about boxes: which leaves lie there, and whether something is in the way.
-void check_box(const map& m, const voxels& v, const std::vector<tree_node>& leaves, random_bits& random) {
+void check_box(const map& m, const voxels& v, const std::vector<tree_leaf>& leaves, random_bits& random) {
   const window& w = v.where();
   octree::key_box box;
   const auto axis = [&](std::uint32_t from, std::uint32_t& low, std::uint32_t& high) {
@@ -181,8 +156,8 @@ void check_box(const map& m, const voxels& v, const std::vector<tree_node>& leav
   axis(w.low.y, box.low.y, box.high.y);
   axis(w.low.z, box.low.z, box.high.z);
 
-  std::vector<tree_node> inside = leaves, found;
-  std::erase_if(inside, [&](const tree_node& n) { return !box.overlaps(n.key, n.level); });
+  std::vector<tree_leaf> inside = leaves, found;
+  std::erase_if(inside, [&](const tree_leaf& n) { return !box.overlaps(n.key, n.level); });
   octree::detail::visit_leaves_in(m.store(), m.tree_depth(), box, [&](const voxel_key& k, int level, float value) {
     found.push_back({k, level, value});
   });
@@ -205,50 +180,34 @@ void check_box(const map& m, const voxels& v, const std::vector<tree_node>& leav
 
 /// Everything that a map says is what the voxels say.
 void check(const map& m, const voxels& v, random_bits& random) {
-  const window& w = v.where();
   const reference_tree tree{v};
-  const std::vector<tree_node> leaves = leaves_of(m);
+  const std::vector<tree_leaf> leaves = leaves_of(m);
   const bool root_is_leaf = leaves.size() == 1 && leaves[0].level == m.tree_depth();
-  require(leaves == tree.cut(0, root_is_leaf), "the leaves are those of the voxels");
+  require(leaves == tree.leaves(root_is_leaf), "the leaves are those of the voxels");
 
   const octree::octree_counts counts = m.counts();
   const auto occupied = std::count_if(leaves.begin(), leaves.end(),
-                                      [](const tree_node& n) { return octree::is_occupied<model>(n.value); });
+                                      [](const tree_leaf& n) { return octree::is_occupied<model>(n.value); });
   require(counts.leaves == leaves.size() && counts.occupied_leaves == static_cast<std::size_t>(occupied) &&
               counts.free_leaves == leaves.size() - counts.occupied_leaves &&
               counts.nodes == leaves.size() + tree.inner_nodes(root_is_leaf),
           "nodes and leaves are counted");
   require(m.empty() == leaves.empty(), "a map is empty if, and only if, it has no leaves");
 
-  const int lowest = static_cast<int>(random.below(static_cast<std::uint32_t>(m.tree_depth())));
-  std::vector<tree_node> found;
-  m.for_each_leaf_down_to(m.tree_depth() - lowest, [&](const map::leaf& l) {
-    found.push_back({l.key, m.tree_depth() - l.depth, l.log_odds});
-  });
-  require(found == tree.cut(lowest, root_is_leaf), "a tree cut off has inner nodes for what is below");
-
   auto near = m.accessor();
   for (int i = 0; i != 64; ++i) {
     const voxel_key k = v.key(random.below(static_cast<std::uint32_t>(v.all().size())));
     require(m.value(k) == v[k] && near.value(k) == v[k], "a voxel has its value");
     require(m.value(m.grid().center(k)) == v[k] && near.state(k) == m.state(k), "and so has its centre");
-    if (i % 8 != 0) continue;
-    for (int level = 0; level != m.tree_depth(); ++level) {
-      const auto node = find_node(m, k, m.tree_depth() - level);
-      auto expected = level <= w.level ? tree.at(k, level) : tree.top();
-      if (level > w.level && expected.kind == node_kind::leaf) expected.kind = node_kind::inner;
-      require(node.kind == expected.kind && (!node.is_known() || node.value == expected.value),
-              "a node is found, of its kind and with its value");
-    }
   }
   for (int i = 0; i != 2; ++i) check_box(m, v, leaves, random);
 }
 
-/// The file of the same map, built anew of nothing but its leaves.
-[[nodiscard]] std::string file_of_leaves(const map& m) {
+/// The same map, built anew of nothing but its leaves.
+[[nodiscard]] map rebuilt(const map& m) {
   map fresh{resolution, m.tree_depth()};
   m.for_each_leaf([&](const map::leaf& l) { fresh.set_unknown_node(l.key, l.depth, l.log_odds + 0.0F); });
-  return octree::compact_bytes(fresh);
+  return fresh;
 }
 
 /// A copy elsewhere, kept up to date by the log of changes.
@@ -316,12 +275,8 @@ class session {
       random_bits random{0};
       check(*copy_, *copied_, random);
     }
-    const std::string file = octree::compact_bytes(map_);
-    const auto read = octree::read_compact(fuzz::bytes_of(file));
-    require(read && octree::compact_bytes(*read) == file, "a file reads back to the same bytes");
-    const auto leaves = leaves_of(map_);
-    const bool root_is_full = reference_tree{expected_}.top().kind == node_kind::leaf;
-    require(root_is_full || file_of_leaves(map_) == file, "a map does not remember how it came about");
+    const bool root_is_full = reference_tree{expected_}.top().kind == reference_tree::kind::leaf;
+    require(root_is_full || leaves_of(rebuilt(map_)) == leaves_of(map_), "a map does not remember how it came about");
     if (map_.tree_depth() == octree::default_tree_depth) fuzz::check_map(map_);
   }
 
@@ -437,7 +392,10 @@ class session {
       case 4: transform_by([&](float v) { return voxel{0.0F * v}; }); break;
       case 5: transform_by([](float) { return voxel{}; }); break;
       case 6:
-        transform_by(octree::forget_below{octree::occupied_only{octree::exponential_decay<>{1.0, 0.75}}, 0.6});
+        transform_by([](float v) {
+          const float later = octree::exponential_decay<>{1.0, 0.75}(v);
+          return v < 0.0F || later > 0.6F ? voxel{later} : voxel{};
+        });
         break;
       default:
         map_.to_maximum_likelihood();
@@ -486,10 +444,14 @@ class session {
     });
   }
   void through_file() {
-    const std::string bytes = octree::compact_bytes(map_);
-    auto read = octree::read_compact(fuzz::bytes_of(bytes));
-    require(read.has_value(), "a file can be read");
-    map_ = *std::move(read);
+    if (map_.tree_depth() == octree::default_tree_depth) {
+      const std::string bytes = octree::ot_bytes(map_);
+      auto read = octree::read_ot(fuzz::bytes_of(bytes));
+      require(read.has_value(), "a file can be read");
+      map_ = *std::move(read);
+    } else {
+      map_ = rebuilt(map_);
+    }
     is_tracked_ = false;
     mirror_.start_anew();
   }

@@ -16,7 +16,6 @@
 #include <orbis/core/execution.hpp>
 #include <orbis/core/image.hpp>
 #include <orbis/core/random.hpp>
-#include <orbis/octree/compact_file.hpp>
 #include <orbis/octree/depth_points.hpp>
 
 #include "fuzz/octree.hpp"
@@ -188,7 +187,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         return done;
       });
     }
-    require(octree::compact_bytes(ours) == octree::compact_bytes(by_points), "the map is the one made of the points");
+    require(fuzz::leaves_of(ours) == fuzz::leaves_of(by_points), "the map is the one made of the points");
   }
   return 0;
 }

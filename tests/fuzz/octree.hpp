@@ -10,6 +10,7 @@
 #include <span>
 #include <sstream>
 #include <string>
+#include <vector>
 
 #include <fcntl.h>
 #include <octomap/octomap.h>
@@ -35,6 +36,20 @@ inline constexpr std::size_t memory_for_any_file = 8192;
 
 [[nodiscard]] inline std::uint32_t edge_in_voxels(const map& m, const map::leaf& leaf) {
   return octree::node_cells(m.grid().depth() - leaf.depth);
+}
+
+/// A leaf of the pruned tree.
+struct tree_leaf {
+  octree::voxel_key key;
+  int level = 0;
+  float value = 0.0F;
+  friend bool operator==(const tree_leaf&, const tree_leaf&) = default;
+};
+/// All that a map knows.
+[[nodiscard]] inline std::vector<tree_leaf> leaves_of(const map& m) {
+  std::vector<tree_leaf> leaves;
+  m.for_each_leaf([&](const map::leaf& l) { leaves.push_back({l.key, m.tree_depth() - l.depth, l.log_odds}); });
+  return leaves;
 }
 
 /// What follows a file's header.

@@ -12,12 +12,15 @@
 #include <vector>
 
 #include <orbis/octree/detail/storage/brick.hpp>
-#include <orbis/octree/nodes.hpp>
+#include <orbis/octree/sensor_model.hpp>
 
 namespace orbis::test {
 
 using namespace octree;
 using namespace octree::detail;
+
+/// What a node is: nothing is known there, one value for all of it, or children.
+enum class node_kind : std::uint8_t { none, leaf, inner };
 
 /// A node's kind, and its value: a leaf's own, or the maximum over an inner node's leaves.
 template <class T>

@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <map>
 #include <type_traits>
 #include <utility>
@@ -11,7 +10,6 @@
 #include <orbis/core/random.hpp>
 #include <orbis/octree/voxel_layer.hpp>
 
-#include "octree/support.hpp"
 #include "support/catch.hpp"
 
 using namespace orbis;
@@ -131,19 +129,7 @@ TEST_CASE("A layer that moves along needs no more memory than its widest moment"
   CHECK(layer.memory_bytes() == widest);
 }
 
-TEST_CASE("Ready-made payloads gather in their voxels") {
-  voxel_layer<label_votes<>> labels;
-  labels.make({1, 1, 1}).update(3);
-  labels.make({1, 1, 1}).update(3);
-  labels.make({1, 1, 1}).update(9);
-  CHECK(labels.find({1, 1, 1})->label() == 3);
-  voxel_layer<hit_count> hits;
-  for (int i = 0; i != 5; ++i) hits.make({70, 0, 1U << 20U}).update();
-  CHECK(hits.find({70, 0, 1U << 20U})->count() == 5);
-  CHECK(hits.find({71, 0, 1U << 20U}) == nullptr);
-}
-static_assert(voxel_payload<rgb_mean> && voxel_payload<label_votes<>> && voxel_payload<hit_count>);
-static_assert(sizeof(rgb_mean) == 8 && sizeof(label_votes<>) == 4 && sizeof(hit_count) == 4);
+static_assert(voxel_payload<rgb_mean> && sizeof(rgb_mean) == 8);
 
 namespace {
 
@@ -186,85 +172,4 @@ TEST_CASE("A mean colour of many observations stays near their mean and follows 
   CHECK(mean.color() == rgb8{255, 0, 7});
   for (int i = 0; i != 100000; ++i) mean.update({255, 255, 255});
   CHECK(mean.color() == rgb8{255, 255, 255});
-}
-
-TEST_CASE("The label of more than half of the observations wins whatever their order") {
-  orbis::random_bits random{3};
-  int majorities = 0;
-  for (int run = 0; run != 2000; ++run) {
-    std::map<std::uint16_t, int> naive;
-    label_votes<> votes;
-    CHECK_FALSE(votes.label().has_value());
-    const std::uint32_t n = 1 + random.below(60), favour = random.below(4);
-    for (std::uint32_t i = 0; i != n; ++i) {
-      const auto label = static_cast<std::uint16_t>(random.below(4) < favour ? 1000 : random.below(5));
-      ++naive[label];
-      votes.update(label);
-    }
-    for (const auto& [label, count] : naive)
-      if (2 * count > static_cast<int>(n)) {
-        ++majorities;
-        REQUIRE(votes.label() == label);
-        REQUIRE(votes.votes() >= 2 * count - static_cast<int>(n));
-      }
-  }
-  CHECK(majorities > 500);
-}
-
-TEST_CASE("Counters stop at their end instead of starting again") {
-  label_votes<std::uint8_t> votes;
-  for (int i = 0; i != 1000; ++i) votes.update(7);
-  CHECK(votes.label() == 7);
-  CHECK(votes.votes() == 255);
-  votes.update(8);
-  CHECK(votes.votes() == 254);
-  hit_count hits;
-  for (int i = 0; i != 1000; ++i) hits.update();
-  CHECK(hits.count() == 1000);
-}
-TEST_CASE("Payload goes to the voxels of the points that count as hits") {
-  constexpr float nan = std::numeric_limits<float>::quiet_NaN();
-  const std::vector<vec3f> points{{1.01F, 0.01F, 0.01F}, {1.02F, 0.02F, 0.02F}, {0.51F, 0.0F, 0.0F}, {3.0F, 0.0F, 0.0F},
-                                  {nan, 0.0F, 0.0F},     {1e9F, 0.0F, 0.0F},    {0.0F, 1.5F, 0.0F}};
-  const std::vector<rgb8> colors{{10, 20, 30}, {30, 40, 50}, {1, 2, 3}, {9, 9, 9}, {9, 9, 9}, {9, 9, 9}, {7, 7, 7}};
-  const voxel_grid grid{0.1};
-  const vec3f origin = vec3f::Zero();
-  voxel_layer<rgb_mean> layer;
-  const auto update = [&](rgb_mean& c, std::size_t i) { c.update(colors[i]); };
-
-  CHECK(annotate(layer, grid, points, origin, {.max_range = 2.0}, update) == 4);
-  CHECK(layer.size() == 3);
-  REQUIRE(layer.find(*grid.key(points[0])) != nullptr);
-  CHECK(layer.find(*grid.key(points[0]))->count() == 2);
-  CHECK(layer.find(*grid.key(points[0]))->color() == rgb8{20, 30, 40});
-  CHECK(layer.find(*grid.key(points[2]))->color() == rgb8{1, 2, 3});
-  CHECK(layer.find(*grid.key(points[3])) == nullptr);
-
-  layer.clear();
-  const std::vector<float> ranges{2.0F, 0.5F, 2.0F, 2.0F, 2.0F, 2.0F, nan};
-  CHECK(annotate(layer, grid, points, origin, {.beam_ranges = ranges}, update) == 2);
-  layer.clear();
-  const bounding_box box{{0.9, -1.0, -1.0}, {1.2, 1.0, 1.0}};
-  CHECK(annotate(layer, grid, points, origin, {.bounds = box}, update) == 2);
-  CHECK(annotate(layer, grid, points, origin, {.bounds = bounding_box{{1e8, 0, 0}, {2e8, 1, 1}}}, update) == 0);
-  CHECK(annotate(layer, grid, std::vector<vec3f>{}, origin, {}, update) == 0);
-}
-
-TEST_CASE("Every voxel with payload is an occupied voxel of the same scan and the other way round") {
-  random_bits random{77};
-  occupancy_octree<> map{0.1};
-  voxel_layer<hit_count> hits;
-  const auto points = test::shell_scan(random, 3000, vec3f::Zero());
-  const integration_options options{.max_range = 1.6};
-  const auto summary = map.integrate(points, vec3f{0.0F, 0.0F, 0.0F}, options);
-  const std::size_t used = annotate(hits, map.grid(), points, vec3f{0.0F, 0.0F, 0.0F}, options,
-                                    [](hit_count& h, std::size_t) { h.update(); });
-  CHECK(used == summary.used);
-  CHECK(hits.size() == summary.occupied);
-  std::size_t counted = 0;
-  hits.for_each([&](const voxel_key& k, const hit_count& h) {
-    REQUIRE(map.state(k) == occupancy::occupied);
-    counted += h.count();
-  });
-  CHECK(counted == used);
 }

@@ -21,7 +21,6 @@
 #include <utility>
 #include <vector>
 
-#include <orbis/cloud/all_knn.hpp>
 #include <orbis/cloud/detail/knn/knn_kernels.hpp>
 #include <orbis/cloud/detail/knn/leaf_hierarchy.hpp>
 #include <orbis/cloud/detail/knn/neighbor_graph.hpp>
@@ -112,19 +111,19 @@ struct linked_components {
   [[nodiscard]] bool is_small(std::uint32_t i) noexcept { return sizes[sets.root(i)] < min_size; }
 };
 
-/// Finds the components of `count` vertices, and which of them go. `takes_part(i)`: whether a vertex is there at all.
-/// `for_each_neighbor(i, f)` calls `f(j, distance)` for those that can be linked with it. `make_nearest()` makes a
-/// function of a vertex and of `counts(j)`: the vertex nearest to it of those that count, and the distance.
-/// O(links), 9 bytes for each vertex.
-template <execution_policy Policy, class TakesPart, class ForEachNeighbor, class MakeNearest>
-[[nodiscard]] linked_components find_components(const Policy& policy, std::size_t count, const TakesPart& takes_part,
-                                                const ForEachNeighbor& for_each_neighbor,
-                                                std::span<const float> spacing, const MakeNearest& make_nearest,
-                                                const cluster_options& options) {
+/// The components of a graph, and which of them go. `gone`: by place, whether a point takes no part, or empty.
+/// `spacing`: by place, metres. O(links), 9 bytes for each vertex.
+template <execution_policy Policy>
+[[nodiscard]] linked_components separate(const Policy& policy, const neighbor_graph& graph, std::span<const char> gone,
+                                         std::span<const float> spacing, const cluster_options& options) {
+  const std::size_t count = graph.size(), width = std::min(options.neighbors, graph.width());
   const auto reach = static_cast<float>(options.reach);
+  const auto takes_part = [&](std::uint32_t i) { return gone.empty() || gone[i] == 0; };
   const auto for_each_link = [&](std::uint32_t i, auto&& f) {
-    for_each_neighbor(i, [&](std::uint32_t j, float distance) {
+    const std::array<float, 3> at = graph.position(i);
+    graph.for_each_neighbor(i, width, [&](std::uint32_t j) {
       if (!takes_part(j)) return;
+      const float distance = std::sqrt(squared_distance(at, graph.position(j)));
       const float limit =
           options.link == cluster_link::mutual ? std::min(spacing[i], spacing[j]) : std::max(spacing[i], spacing[j]);
       if (distance <= reach * limit) f(j, distance);
@@ -148,11 +147,12 @@ template <execution_policy Policy, class TakesPart, class ForEachNeighbor, class
   }
   if (small_ones.empty() || small_ones.size() == present) return out;
   const auto is_main = [&](std::uint32_t j) { return takes_part(j) && !out.is_small(j); };
-  const auto nearest = make_nearest();
+  const knn_kernels kernels;
   std::vector<char> apart(small_ones.size(), 0);
   for_each_index(policy, small_ones.size(), 64, [&](std::size_t s) {
     const std::uint32_t i = small_ones[s];
-    const auto [main, distance] = nearest(i, is_main);
+    const nearest_place main = find_nearest(graph.tree(), kernels, graph.position(i), is_main);
+    assert(main.found());
     double within = 0;  // mean length of its links
     double links = 0;
     for_each_link(i, [&](std::uint32_t, float length) {
@@ -160,46 +160,15 @@ template <execution_policy Policy, class TakesPart, class ForEachNeighbor, class
       links += 1;
     });
     if (links > 0) within /= links;
-    const double local = std::max(within, double{spacing[main]});
+    const double local = std::max(within, double{spacing[main.place]});
     const double gap = options.min_gap > 0 ? options.min_gap * local : 0;  // spacings may be infinite
-    apart[s] = distance > gap ? 1 : 0;
+    apart[s] = std::sqrt(main.distance_squared) > gap ? 1 : 0;
   });
   for (const std::uint32_t i : small_ones) out.goes[out.sets.root(i)] = 1;
   for (std::size_t s = 0; s != small_ones.size(); ++s) {
     if (apart[s] == 0) out.goes[out.sets.root(small_ones[s])] = 0;  // one point close to the surface is enough
   }
   return out;
-}
-
-/// The vertex nearest to `p`, and its distance, for `find_components`.
-template <class Counts>
-[[nodiscard]] std::pair<std::uint32_t, float> nearest_place_of(const leaf_hierarchy& tree, const knn_kernels& kernels,
-                                                               const std::array<float, 3>& p, const Counts& counts) {
-  const nearest_place found = find_nearest(tree, kernels, p, counts);
-  assert(found.found());
-  return {found.place, std::sqrt(found.distance_squared)};
-}
-
-/// The components of a graph. `gone`: by place, whether a point takes no part, or empty. `spacing`: by place, metres.
-template <execution_policy Policy>
-[[nodiscard]] linked_components separate(const Policy& policy, const neighbor_graph& graph, std::span<const char> gone,
-                                         std::span<const float> spacing, const cluster_options& options) {
-  const std::size_t width = std::min(options.neighbors, graph.width());
-  const knn_kernels kernels;
-  return find_components(
-      policy, graph.size(), [&](std::uint32_t i) { return gone.empty() || gone[i] == 0; },
-      [&](std::uint32_t i, auto&& f) {
-        const std::array<float, 3> at = graph.position(i);
-        graph.for_each_neighbor(i, width,
-                                [&](std::uint32_t j) { f(j, std::sqrt(squared_distance(at, graph.position(j)))); });
-      },
-      spacing,
-      [&] {
-        return [&](std::uint32_t i, const auto& counts) {
-          return nearest_place_of(graph.tree(), kernels, graph.position(i), counts);
-        };
-      },
-      options);
 }
 
 /// Numbers components by their first points. `vertex(i)`: of point `i` of the cloud; negative where it takes no part.
@@ -229,47 +198,6 @@ template <class Vertex, class Stays>
 }
 
 }  // namespace detail
-
-/// The components of a neighbour graph that is known already, and which of them go: see `cluster_inliers`.
-/// `gone`: for each point whether it is an outlier already, or empty; those take no part, and are not among
-/// the inliers. `spacing`: for each point the spacing that counts, metres, or empty for the mean over the
-/// first `neighbors` of its row. Points without a row are kept or dropped as `non_finite` says. O(n k).
-/// @pre table is that of points; gone and spacing are empty or as long as points; reach, min_gap >= 0
-template <execution_policy Policy, point_range Points>
-[[nodiscard]] cluster_result cluster_decision(const Policy& policy, const Points& points, const neighbor_table& table,
-                                              std::span<const char> gone, std::span<const float> spacing,
-                                              const cluster_options& options = {}) {
-  const std::size_t count = std::ranges::size(points);
-  assert(table.points == count && options.neighbors > 0 && options.reach >= 0 && options.min_gap >= 0);
-  assert(gone.empty() || gone.size() == count);
-  assert(spacing.empty() || spacing.size() == count);
-  const std::size_t width = std::min(options.neighbors, table.width);
-  std::vector<float> own;
-  if (spacing.empty()) {
-    own = mean_knn_distance(policy, table, options.neighbors);
-    spacing = own;
-  }
-  const auto is_left = [&](std::size_t i) { return gone.empty() || gone[i] == 0; };
-  const auto takes_part = [&](std::size_t i) {
-    return is_left(i) && is_finite(coordinates<float>(detail::point_at(points, i)));
-  };
-  const auto for_each_neighbor = [&](std::size_t i, auto&& f) {
-    for (const neighbor<float>& n : table[i].first(std::min(width, table[i].size()))) f(n.index, n.distance);
-  };
-  const auto make_nearest = [&] {
-    constexpr std::size_t all = std::numeric_limits<std::size_t>::max();
-    return [&points, tree = detail::make_leaves(policy, points, all), kernels = detail::knn_kernels{}](
-               std::uint32_t i, const auto& counts) {
-      const auto found = detail::nearest_place_of(tree, kernels, coordinates<float>(detail::point_at(points, i)),
-                                                  [&](std::uint32_t place) { return counts(tree.members[place]); });
-      return std::pair{tree.members[found.first], found.second};
-    };
-  };
-  return detail::numbered(
-      detail::find_components(policy, count, takes_part, for_each_neighbor, spacing, make_nearest, options), count,
-      [&](std::size_t i) { return takes_part(i) ? static_cast<std::int64_t>(i) : -1; },
-      [&](std::size_t i) { return is_left(i) && options.non_finite == non_finite::keep; });
-}
 
 /// Finds the points that `cluster_inliers` returns, and the components they are in.
 template <execution_policy Policy, point_range Points>

@@ -29,7 +29,7 @@ namespace orbis::cloud {
 /// no harm. Memory: about 20 bytes per point, and the indices of the finite ones where not all are.
 ///
 /// The tree reads the points where they are, at random: where a large cloud has no order in memory (shuffled, out of
-/// a hash), queries wait for memory most of the time, and `leaf_search`, which orders a copy, is faster.
+/// a hash), queries wait for memory most of the time.
 /// @pre fewer than 2^32 points
 template <point_range Points>
 class nanoflann_search

@@ -6,12 +6,70 @@
 #include <concepts>
 #include <cstdint>
 #include <optional>
-#include <type_traits>
 
 #include <orbis/core/point.hpp>
 #include <orbis/octree/detail/storage/brick.hpp>
-#include <orbis/octree/detail/storage/store_reader.hpp>
 #include <orbis/octree/sensor_model.hpp>
+
+namespace orbis::octree::detail {
+
+/// Reads octants, bricks and chunks of a store, which must outlive it and stay as it is. One for each
+/// thread.
+template <class T>
+class store_reader {
+ public:
+  using chunk = typename brick_store<T>::chunk;
+
+  explicit store_reader(const brick_store<T>& store) noexcept : store_{&store} {}
+
+  /// The octant that contains `k`; nothing in it is known where nothing is stored. O(1).
+  [[nodiscard]] const octant_view<T>& octant(const voxel_key& k) noexcept {
+    if (const std::uint32_t far = distance(k); far >= cells_) move(k, far);
+    return octant_;
+  }
+  /// The value of voxel `k`, empty where nothing is known. O(1).
+  [[nodiscard]] std::optional<T> value(const voxel_key& k) noexcept {
+    const octant_view<T>& o = octant(k);
+    const std::uint32_t place = place_in_octant(k);
+    return (o.known >> place & 1U) != 0 ? std::optional{o.at(place)} : std::nullopt;
+  }
+  /// The octant asked for last.
+  [[nodiscard]] const octant_view<T>& last() const noexcept { return octant_; }
+  /// Whether all that is known in the octant asked for last is less than `bound`.
+  [[nodiscard]] bool is_below(T bound) const noexcept { return max_ < bound; }
+  [[nodiscard]] const brick_store<T>& store() const noexcept { return *store_; }
+
+ private:
+  /// At least as large as the smallest node that contains both `k` and the last octant.
+  [[nodiscard]] std::uint32_t distance(const voxel_key& k) const noexcept {
+    return (k.x ^ at_.x) | (k.y ^ at_.y) | (k.z ^ at_.z);
+  }
+  void move(const voxel_key& k, std::uint32_t far) noexcept {
+    at_ = k;
+    if (far >= node_cells(chunk_level)) chunk_ = store_->find_chunk(k);
+    if (far >= node_cells(brick_level)) brick_ = chunk_ == nullptr ? nullptr : store_->find(*chunk_, place_in_chunk(k));
+    if (brick_ != nullptr) {
+      octant_ = store_->view(*brick_, place_in_brick(k) >> 6U);
+      max_ = brick_->value[place_in_brick(k) >> 6U];
+      cells_ = node_cells(octant_level);
+    } else {
+      const T* const large = store_->find_large_value(k);
+      octant_ = large == nullptr ? octant_view<T>{} : octant_view<T>{~std::uint64_t{0}, nullptr, 0, large};
+      max_ = large == nullptr ? T{} : *large;
+      cells_ = node_cells(chunk_ == nullptr && !store_->has_large() ? chunk_level : brick_level);
+    }
+  }
+
+  const brick_store<T>* store_;
+  voxel_key at_{~0U, ~0U, ~0U};  ///< the voxel asked for last; at first far from all
+  std::uint32_t cells_ = 0;      ///< the edge of the node around it that `octant_` stands for
+  const chunk* chunk_ = nullptr;
+  const brick<T>* brick_ = nullptr;
+  octant_view<T> octant_;
+  T max_{};  ///< the largest value in the octant, if anything is known there
+};
+
+}  // namespace orbis::octree::detail
 
 namespace orbis::octree {
 
@@ -22,22 +80,10 @@ concept octree_map = sensor_model<typename M::model> && requires(const M& map) {
   { map.grid() } -> std::same_as<const voxel_grid&>;
 };
 
-/// The type of log-odds in results: as they are stored, or float for models of integers.
-template <sensor_model Model>
-using log_odds_type =
-    std::conditional_t<std::floating_point<typename Model::value_type>, typename Model::value_type, float>;
-
-/// The log-odds and the probability that a stored value stands for; empty if there is none.
-template <sensor_model Model>
-[[nodiscard]] std::optional<log_odds_type<Model>> log_odds_at(std::optional<typename Model::value_type> v) noexcept {
-  if constexpr (std::floating_point<typename Model::value_type>)
-    return v;
-  else
-    return v ? std::optional{static_cast<float>(to_log_odds<Model>(*v))} : std::nullopt;
-}
+/// The probability that a stored value stands for; empty if there is none.
 template <sensor_model Model>
 [[nodiscard]] std::optional<double> probability_at(std::optional<typename Model::value_type> v) noexcept {
-  return v ? std::optional{probability_of<Model>(*v)} : std::nullopt;
+  return v ? std::optional{probability_of(*v)} : std::nullopt;
 }
 
 /// The queries of a map for points or voxels of which each lies near the one before: along a ray, on
@@ -52,13 +98,11 @@ template <sensor_model Model>
 class octree_accessor {
  public:
   using value_type = typename Model::value_type;
-  using log_odds_type = octree::log_odds_type<Model>;
 
   octree_accessor(const detail::brick_store<value_type>& store, const voxel_grid& grid) noexcept
       : reader_{store}, grid_{grid} {}
 
-  /// What is stored at `p`, in the model's units: empty where unknown or outside the grid. O(1), as
-  /// are all.
+  /// What is stored at `p`: empty where unknown or outside the grid. O(1), as are all.
   template <point_like P>
   [[nodiscard]] std::optional<value_type> value(const P& p) noexcept {
     const auto key = grid_.key(p);
@@ -68,7 +112,7 @@ class octree_accessor {
   /// The log-odds at `p`, empty where unknown or outside the grid.
   template <class P>
   requires point_like<P> || std::same_as<P, voxel_key>
-  [[nodiscard]] std::optional<log_odds_type> log_odds(const P& p) noexcept { return log_odds_at<Model>(value(p)); }
+  [[nodiscard]] std::optional<value_type> log_odds(const P& p) noexcept { return value(p); }
   /// The probability that `p` is occupied, empty where unknown or outside the grid.
   template <class P>
   requires point_like<P> || std::same_as<P, voxel_key>

@@ -53,7 +53,7 @@ struct octree_leaf {
   int depth = 0;    ///< the tree's depth for a single voxel
   vec3 center;      ///< metres
   double size = 0;  ///< edge, metres
-  T log_odds{};     ///< in the model's units
+  T log_odds{};
   bool occupied = false;
 };
 
@@ -73,8 +73,7 @@ template <sensor_model Model = log_odds<>>
 class occupancy_octree {
  public:
   using model = Model;
-  using value_type = typename Model::value_type;  ///< what is stored: log-odds in the model's units
-  using log_odds_type = octree::log_odds_type<Model>;
+  using value_type = typename Model::value_type;  ///< what is stored: log-odds
   using leaf = octree_leaf<value_type>;
 
   /// `resolution`: the edge of a voxel, metres. `tree_depth`: the map is 2^tree_depth voxels wide.
@@ -130,7 +129,7 @@ class occupancy_octree {
     change(store_, track_.on ? &track_.log : nullptr);
   }
 
-  /// Gives all voxels of a node one value, in the model's units. `key`: the node's lowest voxel; `depth`: of the node
+  /// Gives all voxels of a node one value. `key`: the node's lowest voxel; `depth`: of the node
   /// in the tree (0: the root, tree_depth(): one voxel). O(1).
   /// @pre the node is unknown as a whole; key is a multiple of the node's size
   void set_unknown_node(const voxel_key& key, int depth, value_type value) {
@@ -264,7 +263,7 @@ class occupancy_octree {
 
   // -- queries
 
-  /// What is stored at `p` (metres), in the model's units: empty where unknown or outside the grid. O(1), as are the
+  /// What is stored at `p` (metres): empty where unknown or outside the grid. O(1), as are the
   /// queries for one place below.
   template <point_like P>
   [[nodiscard]] std::optional<value_type> value(const P& p) const {
@@ -275,7 +274,7 @@ class occupancy_octree {
   /// The log-odds at `p`, empty where unknown or outside the grid.
   template <class P>
   requires point_like<P> || std::same_as<P, voxel_key>
-  [[nodiscard]] std::optional<log_odds_type> log_odds(const P& p) const { return log_odds_at<Model>(value(p)); }
+  [[nodiscard]] std::optional<value_type> log_odds(const P& p) const { return value(p); }
   /// The probability that `p` is occupied, empty where unknown or outside the grid.
   template <class P>
   requires point_like<P> || std::same_as<P, voxel_key>
@@ -316,14 +315,6 @@ class occupancy_octree {
     if (const auto keys = keys_between(grid_, box.min, box.max))
       detail::visit_leaves_in(store_, tree_depth(), *keys,
                               [&](const voxel_key& key, int level, value_type v) { visit(leaf_of(key, level, v)); });
-  }
-  /// Calls `visit(const leaf&)` for every leaf of the tree cut off at `depth` (tree_depth(): all of it): an inner node
-  /// at `depth` counts as a leaf whose value `Policy` makes of its children. O(known voxels).
-  template <node_policy<Model> Policy = max_of_children, std::invocable<const leaf&> Visit>
-  void for_each_leaf_down_to(int depth, Visit&& visit, Policy = {}) const {
-    detail::visit_nodes_down_to<Model, Policy>(
-        store_, tree_depth(), tree_depth() - depth,
-        [&](const voxel_key& key, int level, value_type v, node_kind) { visit(leaf_of(key, level, v)); });
   }
   /// Calls `visit(const vec3& center)` (metres) for every occupied voxel, also for each voxel of a larger leaf.
   /// O(bricks + voxels visited).

@@ -6,18 +6,42 @@
 /// probabilistic 3D mapping framework based on octrees", Autonomous Robots 34, 2013: the belief is
 /// kept as log-odds `L(n) = log(P(n) / (1 - P(n)))`; an observation adds to it (equation 2), and the
 /// sum is clamped (equation 4) so that the map stays able to change and compresses well.
-///
-/// A model counts in its own units: log-odds themselves in floating point, or whole multiples of a
-/// small step, which take a half or a quarter of the memory.
 #pragma once
 
+#include <bit>
+#include <cassert>
 #include <cmath>
 #include <concepts>
 #include <cstdint>
 #include <limits>
 #include <type_traits>
 
-#include <orbis/octree/detail/storage/constexpr_log.hpp>
+namespace orbis::octree::detail {
+
+/// The natural logarithm of `x`, within three units in the last place of a double, so that its float is
+/// std::log's (but for one value in some ten million, where the two round apart).
+///
+/// `x = m * 2^e` with `m` in [0.7, 1.41]; `log(m) = 2 atanh(s)` for `s = (m - 1) / (m + 1)`, by the
+/// series `s + s^3 / 3 + s^5 / 5 + ...`, |s| < 0.172. For constants: at run time std::log is faster.
+/// @pre x is positive and normal
+[[nodiscard]] constexpr double constexpr_log(double x) noexcept {
+  const auto bits = std::bit_cast<std::uint64_t>(x);
+  assert(bits >> 52U >= 1 && bits >> 52U < 0x7ff);
+  auto exponent = static_cast<int>(bits >> 52U) - 1023;
+  double m = std::bit_cast<double>((bits & 0x000fffffffffffffULL) | 0x3ff0000000000000ULL);
+  if (m > 1.4142135623730951) {
+    m *= 0.5;
+    ++exponent;
+  }
+  const double s = (m - 1.0) / (m + 1.0);
+  double series = 0.0;
+  for (int k = 27; k != 1; k -= 2) series = (series + 1.0 / k) * (s * s);
+  // log 2 in two parts, the first of which is exact when multiplied by an exponent.
+  constexpr double log2_high = 0x1.62e42fee00000p-1, log2_low = 0x1.a39ef35793c76p-33;
+  return exponent * log2_high + (2.0 * s + (2.0 * s * series + exponent * log2_low));
+}
+
+}  // namespace orbis::octree::detail
 
 namespace orbis::octree {
 
@@ -34,12 +58,9 @@ enum class occupancy { unknown, free, occupied };
 
 // -- what makes a sensor model; apart, so that a compiler's message names what is wrong
 
-/// Beliefs are floating-point numbers or signed integers.
-template <class T>
-concept belief_value = std::floating_point<T> || std::signed_integral<T>;
-/// All five constants are there and have the value type.
+/// All five constants are there and have the value type, a floating-point one.
 template <class M>
-concept has_constants_of_its_value_type = belief_value<typename M::value_type> && requires {
+concept has_constants_of_its_value_type = std::floating_point<typename M::value_type> && requires {
   { M::hit } -> std::same_as<const typename M::value_type&>;
   { M::miss } -> std::same_as<const typename M::value_type&>;
   { M::clamp_min } -> std::same_as<const typename M::value_type&>;
@@ -53,20 +74,11 @@ concept clamps_are_ordered = M::clamp_min < M::clamp_max;
 /// At the lower bound a voxel is free, at the upper one it is occupied.
 template <class M>
 concept threshold_is_between_clamps = M::clamp_min < M::occupancy_threshold&& M::occupancy_threshold <= M::clamp_max;
-/// One observation more at either bound stays within the value type, so that sums need no wider one.
-template <class M>
-concept sums_fit_value_type = std::floating_point<typename M::value_type> ||
-    (M::clamp_max <= std::numeric_limits<typename M::value_type>::max() - M::hit &&
-     M::clamp_min >= std::numeric_limits<typename M::value_type>::min() - M::miss);
-/// `scale`: units for each 1.0 of log-odds. An integer model says its scale; without one it is 1.
-template <class M>
-concept scale_is_positive = (std::floating_point<typename M::value_type> && !requires { M::scale; }) || M::scale > 0;
-
 /// A sensor model: additive hit and miss, bounds, and the value from which on a voxel counts as
-/// occupied. All are compile-time constants in the model's units.
+/// occupied. All are compile-time constants.
 template <class M>
 concept sensor_model = has_constants_of_its_value_type<M> && hit_raises_and_miss_lowers<M> && clamps_are_ordered<M> &&
-    threshold_is_between_clamps<M> && sums_fit_value_type<M> && scale_is_positive<M>;
+    threshold_is_between_clamps<M>;
 
 /// A sensor model whose maps OctoMap's files can hold.
 template <class M>
@@ -81,42 +93,14 @@ concept octomap_model = sensor_model<M> && std::same_as<typename M::value_type, 
 /// @endcode
 ///
 /// Or say probabilities, see sensor_model_from.
-template <belief_value T = float>
-struct log_odds;
-
-template <std::floating_point T>
-struct log_odds<T> {
+template <std::floating_point T = float>
+struct log_odds {
   using value_type = T;
   static constexpr T hit{0.847297847F};
   static constexpr T miss{-0.405465096F};
   static constexpr T clamp_min{-2.00002789F};
   static constexpr T clamp_max{3.51103067F};
   static constexpr T occupancy_threshold{0};
-};
-
-/// The model above with values in thousandths of log-odds: hit and miss are right to 0.12 %, the bounds to 0.001 %.
-template <>
-struct log_odds<std::int16_t> {
-  using value_type = std::int16_t;
-  static constexpr double scale = 1000.0;
-  static constexpr value_type hit = 847;
-  static constexpr value_type miss = -405;
-  static constexpr value_type clamp_min = -2000;
-  static constexpr value_type clamp_max = 3511;
-  static constexpr value_type occupancy_threshold = 0;
-};
-
-/// The model above with values in steps of 0.037 of log-odds. A miss is almost exactly eleven steps and a hit
-/// twenty-three: both are right to 0.06 %, the bounds to 0.5 % (probabilities 0.1202 and 0.9707).
-template <>
-struct log_odds<std::int8_t> {
-  using value_type = std::int8_t;
-  static constexpr double scale = 27.13;
-  static constexpr value_type hit = 23;
-  static constexpr value_type miss = -11;
-  static constexpr value_type clamp_min = -54;
-  static constexpr value_type clamp_max = 95;
-  static constexpr value_type occupancy_threshold = 0;
 };
 
 /// The value after one more observation that the voxel is occupied. A value at or beyond its bound
@@ -139,54 +123,10 @@ template <sensor_model M>
   return v >= M::occupancy_threshold;
 }
 
-// -- a model's units and the log-odds and probabilities they stand for
-
-/// Units for each 1.0 of log-odds.
-template <sensor_model M>
-inline constexpr double units_per_log_odds = [] {
-  if constexpr (requires { M::scale; })
-    return static_cast<double>(M::scale);
-  else
-    return 1.0;
-}();
-
-/// The log-odds that a value stands for.
-template <sensor_model M>
-[[nodiscard]] constexpr double to_log_odds(typename M::value_type v) noexcept {
-  return static_cast<double>(v) / units_per_log_odds<M>;
-}
-/// The probability that a value stands for.
-template <sensor_model M>
-[[nodiscard]] double probability_of(typename M::value_type v) noexcept {
-  return probability_of(to_log_odds<M>(v));
-}
-
 /// The largest value that counts as free.
 template <sensor_model M>
 [[nodiscard]] inline typename M::value_type largest_free_value() noexcept {
-  using T = typename M::value_type;
-  if constexpr (std::floating_point<T>)
-    return std::nextafter(M::occupancy_threshold, -std::numeric_limits<T>::infinity());
-  else
-    return static_cast<T>(M::occupancy_threshold - 1);
-}
-
-/// The value for log-odds: the nearest within the bounds, but never on the other side of the
-/// threshold, so that what was free stays free. @pre not NaN
-template <sensor_model M>
-[[nodiscard]] typename M::value_type from_log_odds(double log_odds) noexcept {
-  using T = typename M::value_type;
-  const double units = log_odds * units_per_log_odds<M>;
-  if (units <= static_cast<double>(M::clamp_min)) return M::clamp_min;
-  if (units >= static_cast<double>(M::clamp_max)) return M::clamp_max;
-  const auto nearest = static_cast<T>(std::floating_point<T> ? units : std::round(units));
-  const bool free = units < static_cast<double>(M::occupancy_threshold);
-  return free && is_occupied<M>(nearest) ? largest_free_value<M>() : nearest;
-}
-/// The value of one model as a value of another, see from_log_odds.
-template <sensor_model From, sensor_model To>
-[[nodiscard]] typename To::value_type convert_value(typename From::value_type v) noexcept {
-  return from_log_odds<To>(to_log_odds<From>(v));
+  return std::nextafter(M::occupancy_threshold, -std::numeric_limits<typename M::value_type>::infinity());
 }
 
 // -- models from probabilities
@@ -210,47 +150,29 @@ concept sensor_probabilities = requires {
   requires 0 < P::occupancy_threshold&& P::occupancy_threshold < 1;
 };
 
-/// The scale that sensor_model_from takes unless the probabilities bring their own (`scale`).
-template <belief_value T>
-inline constexpr double default_scale = std::floating_point<T> ? 1.0
-                                        : sizeof(T) == 1       ? log_odds<std::int8_t>::scale
-                                                               : log_odds<std::int16_t>::scale;
-
 namespace detail {
 
-/// Rounded to the nearest; a bound of `T` if beyond, which no sensor model can have.
-template <belief_value T>
-[[nodiscard]] constexpr T units_of_probability(double probability, double scale) noexcept {
-  const double units = constexpr_log(probability / (1.0 - probability)) * scale;
-  if constexpr (std::floating_point<T>) return static_cast<T>(units);
-  if (units <= static_cast<double>(std::numeric_limits<T>::lowest())) return std::numeric_limits<T>::lowest();
-  if (units >= static_cast<double>(std::numeric_limits<T>::max())) return std::numeric_limits<T>::max();
-  return static_cast<T>(units < 0 ? units - 0.5 : units + 0.5);
+template <std::floating_point T>
+[[nodiscard]] constexpr T constant_log_odds(double probability) noexcept {
+  return static_cast<T>(constexpr_log(probability / (1.0 - probability)));
 }
 
 }  // namespace detail
 
-/// The sensor model of five probabilities, worked out by the compiler; integers are rounded to the
-/// nearest.
+/// The sensor model of five probabilities, worked out by the compiler.
 ///
 /// @code
 ///   struct doubtful : orbis::octree::octomap_probabilities { static constexpr double hit = 0.6; };
-///   orbis::octree::occupancy_octree<orbis::octree::sensor_model_from<doubtful, std::int16_t>> map{0.05};
+///   orbis::octree::occupancy_octree<orbis::octree::sensor_model_from<doubtful>> map{0.05};
 /// @endcode
-template <sensor_probabilities P, belief_value T = float>
+template <sensor_probabilities P, std::floating_point T = float>
 struct sensor_model_from {
   using value_type = T;
-  static constexpr double scale = [] {
-    if constexpr (requires { P::scale; })
-      return static_cast<double>(P::scale);
-    else
-      return default_scale<T>;
-  }();
-  static constexpr T hit = detail::units_of_probability<T>(P::hit, scale);
-  static constexpr T miss = detail::units_of_probability<T>(P::miss, scale);
-  static constexpr T clamp_min = detail::units_of_probability<T>(P::clamp_min, scale);
-  static constexpr T clamp_max = detail::units_of_probability<T>(P::clamp_max, scale);
-  static constexpr T occupancy_threshold = detail::units_of_probability<T>(P::occupancy_threshold, scale);
+  static constexpr T hit = detail::constant_log_odds<T>(P::hit);
+  static constexpr T miss = detail::constant_log_odds<T>(P::miss);
+  static constexpr T clamp_min = detail::constant_log_odds<T>(P::clamp_min);
+  static constexpr T clamp_max = detail::constant_log_odds<T>(P::clamp_max);
+  static constexpr T occupancy_threshold = detail::constant_log_odds<T>(P::occupancy_threshold);
 };
 
 }  // namespace orbis::octree

@@ -1,20 +1,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
 /// A sparse layer of payload beside a map: colours, labels or counts, one value for each voxel that has any,
-/// under the keys of the map. All payloads here count in integers: the same observations in the same order
-/// give the same bits on every machine.
+/// under the keys of the map.
 #pragma once
 
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <cassert>
 #include <concepts>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
-#include <optional>
-#include <ranges>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -22,9 +18,6 @@
 #include <orbis/core/cow_pages.hpp>
 #include <orbis/core/hash_index.hpp>
 #include <orbis/core/image.hpp>
-#include <orbis/core/point.hpp>
-#include <orbis/octree/detail/points/ray_traversal.hpp>
-#include <orbis/octree/integration.hpp>
 #include <orbis/octree/key.hpp>
 
 namespace orbis::octree {
@@ -64,44 +57,6 @@ class rgb_mean {
 
   std::array<std::uint16_t, 3> sum_{};
   std::uint16_t count_ = 0;
-};
-
-/// The label that most observations agree on, without counting each: if more than half of them say
-/// the same, it is that one (as long as the counter does not saturate).
-///
-/// R. S. Boyer, J S. Moore, "MJRTY: a fast majority vote algorithm", in: Automated Reasoning, 1991.
-template <std::unsigned_integral Label = std::uint16_t>
-class label_votes {
- public:
-  void update(Label seen) noexcept {
-    if (votes_ == 0) label_ = seen;
-    if (seen != label_)
-      --votes_;
-    else if (votes_ != std::numeric_limits<Label>::max())
-      ++votes_;
-  }
-  /// The label ahead; empty if there is none.
-  [[nodiscard]] std::optional<Label> label() const noexcept {
-    return votes_ == 0 ? std::nullopt : std::optional{label_};
-  }
-  /// By how many votes it is ahead, at least.
-  [[nodiscard]] Label votes() const noexcept { return votes_; }
-  friend bool operator==(const label_votes&, const label_votes&) = default;
-
- private:
-  Label label_ = 0;
-  Label votes_ = 0;
-};
-
-/// How often something was seen; stops at 2^32 - 1.
-class hit_count {
- public:
-  void update() noexcept { count_ += count_ != std::numeric_limits<std::uint32_t>::max() ? 1U : 0U; }
-  [[nodiscard]] std::uint32_t count() const noexcept { return count_; }
-  friend bool operator==(const hit_count&, const hit_count&) = default;
-
- private:
-  std::uint32_t count_ = 0;
 };
 
 /// Values in octants of 4x4x4 voxels. Costs 64 values for each octant that has any. A copy shares
@@ -235,36 +190,5 @@ class voxel_layer {
   cow_pages<octant> octants_;
   std::vector<std::uint32_t> free_;  ///< octants not in use
 };
-
-/// Calls `update(payload, i)` with the payload of the voxel that holds point i, made if need be, for
-/// every point that is finite, within range of `origin` (`max_range`, `beam_ranges`) and within
-/// `bounds`, in their order. Give it what `integrate` got. Returns the number of those points.
-///
-/// @code
-///   map.integrate(points, origin, options);
-///   annotate(colors, map.grid(), points, origin, options, [&](rgb_mean& c, std::size_t i) { c.update(rgb[i]); });
-/// @endcode
-template <voxel_payload T, point_range Points, point_like Origin, std::invocable<T&, std::size_t> Update>
-std::size_t annotate(voxel_layer<T>& layer, const voxel_grid& grid, const Points& points, const Origin& origin,
-                     const integration_options& options, Update&& update) {
-  assert(options.beam_ranges.empty() || options.beam_ranges.size() == std::ranges::size(points));
-  const detail::float3 from = coordinates<float>(origin);
-  const auto box = options.bounds ? keys_between(grid, options.bounds->min, options.bounds->max)
-                                  : std::optional{key_box{{}, {~0U, ~0U, ~0U}}};
-  if (!box) return 0;
-  std::size_t i = 0, used = 0;
-  for (const auto& p : points) {
-    const std::size_t number = i++;
-    const detail::float3 end = coordinates<float>(p);
-    const double distance = detail::length(detail::difference(end, from));
-    const bool within = distance <= options.max_range &&
-                        (options.beam_ranges.empty() || distance <= static_cast<double>(options.beam_ranges[number]));
-    const auto key = within ? grid.key(end) : std::nullopt;
-    if (!key || !box->overlaps(*key, 0)) continue;
-    update(layer.make(*key), number);
-    ++used;
-  }
-  return used;
-}
 
 }  // namespace orbis::octree

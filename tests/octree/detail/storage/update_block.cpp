@@ -46,7 +46,5 @@ TEST_CASE("Sixty-four voxels at once get what one voxel would get at every instr
     const simd::level_limit limit{level};
     check_update<log_odds<float>>();
     check_update<log_odds<double>>();
-    check_update<log_odds<std::int16_t>>();
-    check_update<log_odds<std::int8_t>>();
   }
 }

@@ -13,7 +13,6 @@
 #include <span>
 #include <vector>
 
-#include <orbis/cloud/detail/knn/few_nearest.hpp>
 #include <orbis/cloud/detail/knn/knn_kernels.hpp>
 #include <orbis/cloud/detail/knn/leaf_hierarchy.hpp>
 #include <orbis/cloud/detail/knn/line_vector.hpp>
@@ -115,13 +114,7 @@ class nearest_search {
         found_(leaf_width * stride_),
         places_(with_places ? leaf_width * stride_ : 0),
         hoped_{1.0F + 1.7F / std::sqrt(static_cast<float>(wanted))},
-        reach_{1.5F * hoped_} {
-    // Of few neighbours the furthest is near beside the size of a leaf: what is a little further away is hardly more.
-    if (with_places && is_few(wanted - 1)) {
-      most_spread_ = 128.0F;
-      spare_ = 4.0F;
-    }
-  }
+        reach_{1.5F * hoped_} {}
 
   /// Searches for the points of one leaf, then calls `f(i, found, bound)` for the i-th of them in any
   /// order. `found`: squared distances up to `bound`, the nearest among them; fewer than `wanted` where
@@ -145,40 +138,6 @@ class nearest_search {
       for (std::size_t i = first; i != last; ++i) {
         largest_[i] = counts_[i] < wanted_ ? infinity : sums[i].largest_squared;
         f(i, found_of(i), sums[i]);
-      }
-    });
-  }
-
-  /// Searches for the points of one leaf, all of them at once by `few`, a kernel as `few_nearest`, and calls
-  /// `found_few(rows, i)` for the i-th of them, in any order, where that found `Width` other points; `f` as
-  /// `visit_leaf` does for the others. @pre wanted == Width + 1
-  template <std::size_t Width, class FoundFew, class F>
-  void visit_few(std::size_t l, few_nearest_code<Width>* few, FoundFew&& found_few, F&& f) {
-    few_rows<Width> rows, alone;
-    const auto is_found = [](const few_rows<Width>& in, std::size_t i) {
-      return in.index[Width - 1][i] != few_rows<Width>::none;
-    };
-    search_leaf(l, [&](std::size_t first, std::size_t last, const box3& box) {
-      const float reach = std::min(usual_ * reach_, most);
-      share(l, box, reach);
-      few(*tree_, shared_, l, first, last, reach, rows);
-      for (std::size_t i = first; i != last; ++i) {
-        const few_rows<Width>* found = nullptr;
-        if (const float bound = rows.squared[Width - 1][i]; is_found(rows, i)) {
-          if (bound <= shared_reach_) {
-            found = &rows;
-          } else if (const std::array<float, 3> q = query(l, i); gather_own(l, {q, q}, bound)) {
-            few(*tree_, own_, l, i, i + 1, bound, alone);
-            if (is_found(alone, i)) found = &alone;
-          }
-        }
-        if (found != nullptr) {
-          largest_[i] = found->squared[Width - 1][i];
-          found_few(*found, i);
-        } else {
-          keep(i, search_alone(l, i));
-          largest_[i] = f(i, found_of(i), bounds_[i]);
-        }
       }
     });
   }
@@ -225,6 +184,8 @@ class nearest_search {
   };
   static constexpr float infinity = std::numeric_limits<float>::infinity();
   static constexpr float most = std::numeric_limits<float>::max();
+  static constexpr float most_spread = 32;  ///< squared, of points that share candidates, by `usual_`
+  static constexpr float spare = 1.3F;      ///< how much further than a leaf wants the rows near to it are looked for
 
   [[nodiscard]] std::array<float, 3> query(std::size_t l, std::size_t i) const noexcept {
     const point_row& leaf = tree_->leaves[l];
@@ -237,7 +198,7 @@ class nearest_search {
       grown.low[a] = std::min(box.low[a], p[a]);
       grown.high[a] = std::max(box.high[a], p[a]);
     }
-    if (squared_distance(grown.low, grown.high) > most_spread_ * usual_) return false;
+    if (squared_distance(grown.low, grown.high) > most_spread * usual_) return false;
     box = grown;
     return true;
   }
@@ -339,7 +300,7 @@ class nearest_search {
     if (tree_->levels.size() == 1 || (row == near_rows_of_ && bound >= too_many_rows_)) return false;
     const box3 box = tree_->levels[1][row / leaf_width].child(row % leaf_width);
     near_rows_of_ = row;
-    near_rows_reach_ = std::min(spare_ * bound, most);
+    near_rows_reach_ = std::min(spare * bound, most);
     too_many_rows_ = infinity;
     if (gather_near(*tree_, 1, kernels_, box, near_rows_reach_, open_, near_rows_)) return true;
     near_rows_reach_ = -1.0F;
@@ -438,8 +399,6 @@ class nearest_search {
   std::array<float, leaf_width> largest_{};  ///< the squared distance to the `wanted`-th nearest
   float hoped_;              ///< what of `usual_` should suffice: its scatter falls with the number of neighbours
   float reach_;              ///< what of `usual_` should suffice in any case
-  float most_spread_ = 32;   ///< squared, of points that share candidates, by `usual_`
-  float spare_ = 1.3F;       ///< how much further than a leaf wants the rows near to it are looked for, squared
   float shared_reach_ = -1;  ///< squared distance from the run's box within which `shared_` is all there is
   float usual_ = -1;         ///< squared distance to the `wanted`-th nearest; negative where not known yet
 };

@@ -39,15 +39,6 @@ inline float write_row(rank_sorter& gathered, std::uint32_t self, std::span<neig
   return last_squared;
 }
 
-/// Writes the i-th point's row of what `few_nearest` has found.
-template <std::size_t Width>
-void write_few(const few_rows<Width>& rows, std::size_t i, std::span<neighbor<float>> row) {
-  for (std::size_t n = 0; n != Width; ++n) row[n] = {rows.index[n][i], std::sqrt(rows.squared[n][i])};
-  // Different squares can have the same root.
-  constexpr auto less = nearest_sink<float>::less;
-  if (!std::is_sorted(row.begin(), row.end(), less)) std::sort(row.begin(), row.end(), less);
-}
-
 /// Writes the row of the i-th point of leaf `l` from what `search` has found for it: `found`, up to `bound`, squared.
 /// Returns the squared distance to the last. `gathered` is scratch.
 ORBIS_ALWAYS_INLINE float write_found(const leaf_hierarchy& tree, const knn_kernels& kernels, nearest_search& search,
@@ -76,28 +67,10 @@ void find_neighbor_rows(const leaf_hierarchy& tree, const knn_kernels& kernels, 
                         std::size_t end, RowOf&& row_of, Done&& done) {
   nearest_search search{tree, kernels, width + 1, true};  // with the point itself
   rank_sorter gathered;
-  const auto write = [&](std::size_t l) {
-    return [&, l](std::size_t i, std::span<float> found, float bound) ORBIS_INLINE_LAMBDA {
-      return write_found(tree, kernels, search, gathered, l, i, found, bound, row_of(l, i));
-    };
-  };
-  const auto few = [&]<std::size_t Width>(few_nearest_code<Width>* kernel) {
-    for (std::size_t l = begin; l != end; ++l) {
-      const auto found_few = [&](const few_rows<Width>& rows, std::size_t i) { write_few(rows, i, row_of(l, i)); };
-      search.visit_few<Width>(l, kernel, found_few, write(l));
-      done(l);
-    }
-  };
-  static_assert(most_few == 4);
-  switch (is_few(width) ? width : 0) {
-    case 1: return few(few_nearest_kernel<1>());
-    case 2: return few(few_nearest_kernel<2>());
-    case 3: return few(few_nearest_kernel<3>());
-    case 4: return few(few_nearest_kernel<4>());
-    default: break;
-  }
   for (std::size_t l = begin; l != end; ++l) {
-    search.visit_leaf(l, write(l));
+    search.visit_leaf(l, [&](std::size_t i, std::span<float> found, float bound) ORBIS_INLINE_LAMBDA {
+      return write_found(tree, kernels, search, gathered, l, i, found, bound, row_of(l, i));
+    });
     done(l);
   }
 }

@@ -12,7 +12,6 @@
 #include <vector>
 
 #include <orbis/core/simd.hpp>
-#include <orbis/octree/detail/points/plane_crossings_avx512.hpp>
 #include <orbis/octree/detail/points/plane_stack.hpp>
 
 namespace orbis::octree::detail {
@@ -143,12 +142,9 @@ using crossings_kernel = void(const plane_stack&, queued_rays&, std::size_t, std
 /// order is right, the ray is appended to `doubtful` and taken out (planes = -1); what has been marked of it is right.
 /// @pre the cells of the rays lie in the stack
 [[nodiscard]] inline crossings_kernel* mark_crossings() noexcept {
-#if ORBIS_X86
-  if (simd::best_level() >= simd::level::avx512) return mark_crossings_avx512;
-#endif
-  return simd::kernel<mark_crossings_kernel, crossings_kernel, simd::avx2>();
+  return simd::kernel<mark_crossings_kernel, crossings_kernel>();
 }
 
 }  // namespace orbis::octree::detail
 
-ORBIS_COMPILED_KERNEL_AVX2(orbis::octree::detail::mark_crossings_kernel, orbis::octree::detail::crossings_kernel);
+ORBIS_COMPILED_KERNEL(orbis::octree::detail::mark_crossings_kernel, orbis::octree::detail::crossings_kernel);

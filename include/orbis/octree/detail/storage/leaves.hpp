@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Visits the leaves of the pruned octree, which are found from the bricks alone: all leaves, those in a box, those of
-/// the tree cut off at a depth, and single voxels.
+/// Visits the leaves of the pruned octree, which are found from the bricks alone: all leaves, those in a box, and
+/// single voxels.
 #pragma once
 
 #include <algorithm>
@@ -10,15 +10,25 @@
 #include <concepts>
 #include <cstddef>
 #include <cstdint>
-#include <functional>
-#include <span>
 #include <vector>
 
 #include <orbis/core/bits.hpp>
 #include <orbis/octree/detail/storage/brick.hpp>
 #include <orbis/octree/detail/storage/tree_parts.hpp>
 #include <orbis/octree/key.hpp>
-#include <orbis/octree/nodes.hpp>
+#include <orbis/octree/sensor_model.hpp>
+
+namespace orbis::octree {
+
+/// Numbers of nodes of the pruned octree.
+struct octree_counts {
+  std::size_t nodes = 0;  ///< inner nodes and leaves
+  std::size_t leaves = 0;
+  std::size_t occupied_leaves = 0;
+  std::size_t free_leaves = 0;
+};
+
+}  // namespace orbis::octree
 
 namespace orbis::octree::detail {
 
@@ -148,48 +158,6 @@ template <sensor_model Model>
   return n;
 }
 
-/// Calls `visit(key, level, value, kind)` for every node of the tree cut off at `lowest_level`: its
-/// leaves from there on, and for everything below the inner node at that level, made by `Policy`. In
-/// Morton order. O(bricks log bricks) from bricks on with max_of_children, O(known voxels) otherwise.
-template <sensor_model Model, node_policy<Model> Policy, class Visit>
-void visit_nodes_down_to(const brick_store<typename Model::value_type>& store, int root_level, int lowest_level,
-                         Visit&& visit) {
-  using T = typename Model::value_type;
-  const node_maker<Model, Policy> make{store};
-  const auto report = [&](const voxel_key& key, int level, const auto& entry) {
-    if (entry.kind != node_kind::none) visit(key, level, entry.value(), entry.kind);
-  };
-  const std::vector<tree_part<T>> parts = tree_parts(store, root_level);
-  block<T> scratch;
-  for (std::size_t i = 0; i != parts.size();) {
-    const tree_part<T>& part = parts[i];
-    if (part.content == nullptr && part.level >= lowest_level) {
-      visit(part.key, part.level, part.value, node_kind::leaf);
-      ++i;
-    } else if (lowest_level >= brick_level) {
-      const voxel_key low = node_key(part.key, lowest_level);
-      std::size_t end = i + 1;
-      while (end != parts.size() && node_key(parts[end].key, lowest_level) == low) ++end;
-      report(low, lowest_level, make.over(lowest_level, std::span{parts}.subspan(i, end - i)));
-      i = end;
-    } else {
-      for (std::uint32_t o = 0; o != 8; ++o) {
-        const brick<T>& b = *part.content;
-        const voxel_key octant = child_key(part.key, o, node_cells(octant_level));
-        if ((b.dense >> o & 1U) == 0 || lowest_level == octant_level)
-          report(octant, octant_level, make.octant(b, o));
-        else if (lowest_level == 1)
-          for (std::uint32_t g = 0; g != 64; g += 8)
-            report(voxel_in_octant(octant, g), 1, make.group(store.view(b, o), g));
-        else
-          visit_octant(octant, store.view(b, o), scratch,
-                       [&](const voxel_key& k, int level, T v) { visit(k, level, v, node_kind::leaf); });
-      }
-      ++i;
-    }
-  }
-}
-
 /// Whether everything in the node at `level` >= chunk_level has this value.
 template <class T>
 [[nodiscard]] bool is_one_value(const brick_store<T>& store, const voxel_key& k, int level, T value) {
@@ -282,42 +250,32 @@ void visit_leaves_in(const brick_store<T>& store, int root_level, const key_box&
   }
 }
 
-/// Calls `visit(key, value)` for every known voxel whose value is `wanted`, however large the leaf that
-/// it lies in; leaves larger than a brick come last. O(bricks + voxels visited).
-/// `may_be_wanted(largest value of an octant)`: false if none there is.
-template <class T, std::predicate<T> Wanted, std::predicate<T> MayBeWanted, std::invocable<const voxel_key&, T> Visit>
-void visit_voxels(const brick_store<T>& store, Wanted&& wanted, MayBeWanted&& may_be_wanted, Visit&& visit) {
+/// Calls `visit(key, value)` for every occupied voxel, however large the leaf that it lies in; leaves larger than a
+/// brick come last. O(bricks + voxels visited).
+template <sensor_model Model, std::invocable<const voxel_key&, typename Model::value_type> Visit>
+void visit_occupied_voxels(const brick_store<typename Model::value_type>& store, Visit&& visit) {
+  using T = typename Model::value_type;
   store.for_each_brick([&](const brick<T>& b) {
     const voxel_key key = named_key(b.name);
     for (std::uint32_t o = 0; o != 8; ++o) {
-      if (((b.uniform | b.dense) >> o & 1U) == 0 || !may_be_wanted(b.value[o])) continue;
+      // The value of an octant is its largest.
+      if (((b.uniform | b.dense) >> o & 1U) == 0 || !is_occupied<Model>(b.value[o])) continue;
       const octant_view<T> view = store.view(b, o);
       const voxel_key octant = child_key(key, o, node_cells(octant_level));
-      for (std::uint64_t rest = store.voxels_where(b, o, wanted); rest != 0; rest &= rest - 1) {
+      for (std::uint64_t rest = store.voxels_where(b, o, is_occupied<Model>); rest != 0; rest &= rest - 1) {
         const auto i = static_cast<std::uint32_t>(std::countr_zero(rest));
         visit(voxel_in_octant(octant, i), view.at(i));
       }
     }
   });
   store.for_each_large([&](std::uint64_t name, T v) {
-    if (!wanted(v)) return;
+    if (!is_occupied<Model>(v)) return;
     const voxel_key k = named_key(name);
     const std::uint32_t size = node_cells(named_level(name));
     for (std::uint32_t z = 0; z != size; ++z)
       for (std::uint32_t y = 0; y != size; ++y)
         for (std::uint32_t x = 0; x != size; ++x) visit(voxel_key{k.x + x, k.y + y, k.z + z}, v);
   });
-}
-/// The occupied ones.
-template <sensor_model Model, std::invocable<const voxel_key&, typename Model::value_type> Visit>
-void visit_occupied_voxels(const brick_store<typename Model::value_type>& store, Visit&& visit) {
-  visit_voxels(store, is_occupied<Model>, is_occupied<Model>, visit);
-}
-/// All that are known.
-template <class T, std::invocable<const voxel_key&, T> Visit>
-void visit_known_voxels(const brick_store<T>& store, Visit&& visit) {
-  const auto any = [](T) { return true; };
-  visit_voxels(store, any, any, visit);
 }
 
 }  // namespace orbis::octree::detail

@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <vector>
 
-#include <orbis/cloud/detail/select/sparse_values.hpp>
+#include <orbis/cloud/detail/select/surroundings.hpp>
 #include <orbis/core/random.hpp>
 
 #include "support/catch.hpp"
