@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// Depth images in little memory, without loss: ours beside RVL (A. D. Wilson, "Fast lossless depth image compression",
-// ISS 2017) and PNG (zlib's usual level). Bytes a second are those of the images as they are; `ratio` is what is left
-// of them.
+// Depth images in little memory, without loss: ours beside RVL, from which it comes (A. D. Wilson, "Fast lossless depth
+// image compression", ISS 2017), and PNG (zlib's usual level). Bytes a second are those of the images as they are;
+// `ratio` is what is left of them.
 #include <cstdint>
 #include <cstdlib>
 #include <filesystem>

@@ -3,8 +3,7 @@
 // train_vocabulary train OUT | convert IN OUT | recall [VOCABULARY...]
 //
 // Learns a vocabulary from made-up pictures and rooms, and from recordings if any are named; turns vocabularies of
-// DBoW2 and DBoW3 into ours; measures how well vocabularies recognise places. OUT that ends in .hpp becomes a header
-// with the vocabulary as text, as orbis/places/detail/default_vocabulary_data.hpp is.
+// DBoW2 and DBoW3 into ours; measures how well vocabularies recognise places.
 #include <algorithm>
 #include <cstdint>
 #include <cstdio>
@@ -43,34 +42,12 @@ int complain(int code, const std::string& why) {
   return code;
 }
 
-/// A header with the bytes of a vocabulary as text. String literals stay shorter than what compilers are required to
-/// support.
-std::string header_of(const std::string& bytes, const std::string& made_by) {
-  constexpr std::size_t row = 115, literal = 560 * row;
-  const std::string text = orbis::to_base85(bytes);
-  // Pointers, not views: a compiler would have to count the characters.
-  std::string out =
-      "// SPDX-License-Identifier: BSD-3-Clause\n/// @file\n/// The default vocabulary as text. Made by\n///\n" +
-      made_by +
-      "#pragma once\n\n#include <array>\n#include <cstddef>\n\nnamespace orbis::places::detail {\n\n"
-      "// clang-format off\ninline constexpr std::size_t default_vocabulary_size = " +
-      std::to_string(bytes.size()) + ";\ninline constexpr std::array<const char*, " +
-      std::to_string((text.size() + literal - 1) / literal) + "> default_vocabulary_text{{";
-  for (std::size_t i = 0; i < text.size(); i += row) {
-    out += i % literal == 0 && i != 0 ? ",\n" : "\n";
-    out += '"' + text.substr(i, row) + '"';
-  }
-  return out + "}};\n// clang-format on\n\n}  // namespace orbis::places::detail\n";
-}
-
-int write(const settings& s, const places::vocabulary& words, const std::string& made_by) {
-  std::string bytes = places::vocabulary_bytes(words);
-  const std::size_t size = bytes.size();
-  if (s.output.ends_with(".hpp")) bytes = header_of(bytes, made_by);
+int write(const settings& s, const places::vocabulary& words) {
+  const std::string bytes = places::vocabulary_bytes(words);
   const auto done = orbis::write_file_atomically(
       s.output, [&](std::ostream& out) { out.write(bytes.data(), static_cast<std::streamsize>(bytes.size())); });
   if (!done) return complain(2, done.error().to_string());
-  std::printf("%zu words, %zu nodes, %u levels, %zu bytes\n", words.size(), words.nodes(), words.depth(), size);
+  std::printf("%zu words, %zu nodes, %u levels, %zu bytes\n", words.size(), words.nodes(), words.depth(), bytes.size());
   return 0;
 }
 
@@ -86,20 +63,14 @@ int train(const settings& s) {
   }
   const auto words = places::train(orbis::par, images, s.training);
   if (!words) return complain(2, words.error().to_string());
-  const std::string made_by = "///     train_vocabulary train --textures " + std::to_string(s.textures) + " --rooms " +
-                              std::to_string(s.rooms) + " --views " + std::to_string(s.views) + " --features " +
-                              std::to_string(s.features) + "\n///         --branching " +
-                              std::to_string(s.training.branching) + " --depth " + std::to_string(s.training.depth) +
-                              " --seed " + std::to_string(s.training.seed) +
-                              (s.recordings.empty() ? "" : " --recording ...") + " default_vocabulary_data.hpp\n";
-  return write(s, *words, made_by);
+  return write(s, *words);
 }
 
 int convert(const settings& s) {
   if (examples::is_same_file(s.output, s.input)) return complain(1, examples::would_be_lost(s.output, s.input));
   const auto words = dbow::load_vocabulary(s.input);
   if (!words) return complain(2, words.error().to_string());
-  return write(s, *words, "///     train_vocabulary convert\n");
+  return write(s, *words);
 }
 
 int judge(const settings& s) {
@@ -147,7 +118,7 @@ int main(int argc, char** argv) try {
   CLI::App cli{"Vocabularies of visual words: learns, converts and measures them", "train_vocabulary"};
   cli.require_subcommand(1);
   auto* const train_command = cli.add_subcommand("train", "learns a vocabulary");
-  train_command->add_option("OUT", s.output, "the file to write; .hpp: as a header")->required();
+  train_command->add_option("OUT", s.output, "the file to write")->required();
   train_command->add_option("--textures", s.textures, "pictures made up")->capture_default_str();
   train_command->add_option("--rooms", s.rooms, "rooms made up")->capture_default_str();
   train_command->add_option("--views", s.views, "of each room")->capture_default_str()->check(CLI::Range(1, 1000));
@@ -160,7 +131,7 @@ int main(int argc, char** argv) try {
   train_command->add_option("--seed", s.training.seed)->capture_default_str();
   auto* const convert_command = cli.add_subcommand("convert", "reads DBoW2's text, DBoW3's YAML or our own format");
   convert_command->add_option("IN", s.input, "the vocabulary to read")->required();
-  convert_command->add_option("OUT", s.output, "the file to write; .hpp: as a header")->required();
+  convert_command->add_option("OUT", s.output, "the file to write")->required();
   auto* const recall_command = cli.add_subcommand("recall", "how often places are recognised that are seen again");
   recall_command->add_option("VOCABULARY", s.inputs, "files to compare with the default vocabulary");
   recall_command->add_option("--rooms", s.rooms, "rooms made up, each gone through twice")->capture_default_str();

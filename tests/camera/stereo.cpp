@@ -160,7 +160,7 @@ TEST_CASE("the default focal length leaves no pixel without a source where a lit
 
 TEST_CASE("rigs that are rectified already stay as they are") {
   const pinhole k{1226, 370, 707.0912, 707.0912, 601.8873, 183.1104};
-  const rectification r = rectify(rectified_rig(k, 0.5371507)).value();
+  const rectification r = rectify(stereo_rig{k, k, se3{so3{}, vec3{0.5371507, 0.0, 0.0}}}).value();
   CHECK(r.is_identity());
   CHECK(r.camera() == k);
   CHECK(r.baseline() == 0.5371507);

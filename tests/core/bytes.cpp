@@ -13,6 +13,20 @@ using namespace orbis;
 
 namespace {
 std::uint32_t sum_of(std::string_view text) { return crc32c(std::as_bytes(std::span{text})); }
+
+/// `bytes`, filled up with zeros to a multiple of four, as cmake/default_vocabulary.py writes them.
+std::string to_base85(std::string_view bytes) {
+  std::string text;
+  for (std::size_t i = 0; i < bytes.size(); i += 4) {
+    std::uint32_t value = 0;
+    for (std::size_t k = 0; k != 4; ++k)
+      value = value << 8U | (i + k < bytes.size() ? static_cast<unsigned char>(bytes[i + k]) : 0U);
+    std::string group(5, ' ');
+    for (std::size_t k = 5; k-- != 0; value /= 85) group[k] = orbis::detail::base85_character(value % 85);
+    text += group;
+  }
+  return text;
+}
 }  // namespace
 
 TEST_CASE("the checksum is that of RFC 3720, at every level") {

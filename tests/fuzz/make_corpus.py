@@ -218,13 +218,28 @@ def compressed_depths():
     write("read_depth", "no_pixels", size(0, 9) + b"\0")
     write("read_depth", "plain", size(3, 2) + b"\0" + struct.pack("<6H", 0, 1, 2, 1000, 65534, 65535))
     write("read_depth", "plain_short", size(3, 2) + b"\0" + struct.pack("<5H", 0, 1, 2, 1000, 65534))
-    no_tables, no_words, states = bytes(27), bytes(4), b"\x80\x80\x04" * 4
-    write("read_depth", "no_depth_anywhere", size(40, 30) + b"\1" + no_tables + no_words + states)
-    write("read_depth", "list_too_long", size(4, 4) + b"\2\xff\xff\xff\xff\x0f" + b"\1" * 40)
-    write("read_depth", "depth_beyond_16_bits", size(4, 4) + b"\2\2\xff\xff\3\1" + no_tables + no_words + states)
-    write("read_depth", "rank_beyond_list", size(4, 4) + b"\2\1\5" + (b"\2\0\x80\x20" * 27) + no_words + states)
-    write("read_depth", "frequencies_too_large", size(4, 4) + b"\1" + b"\2\x80\x20\1" * 27 + no_words + states)
-    write("read_depth", "words_missing", size(4, 4) + b"\1" + no_tables + b"\0\0\0\x7f" + states)
+
+    def groups(bits, number):
+        """Groups of some bits, the lowest first, each behind a bit that says whether another follows."""
+        rest = number >> bits
+        return f"{rest != 0:b}{number % (1 << bits):0{bits}b}" + (groups(bits, rest) if rest else "")
+
+    def coded(depths, *runs_and_steps, count=None):
+        """The steps between distinct depths, and numbers that are runs and what stands between them in turn."""
+        bits = groups(2, len(depths) if count is None else count) + "".join(groups(2, d) for d in depths)
+        bits += "".join(groups(1 + i % 2, n) for i, n in enumerate(runs_and_steps))
+        bits += "0" * (-len(bits) % 8)
+        return b"\1" + int(bits, 2).to_bytes(len(bits) // 8, "big")
+
+    write("read_depth", "no_depth_anywhere", size(40, 30) + coded([], 1200))
+    write("read_depth", "coded", size(40, 30) + coded([899, 6], 100, 2, 39, 2, 500, 0, 559))
+    write("read_depth", "list_too_long", size(4, 4) + coded([0] * 40, count=65536))
+    write("read_depth", "depth_beyond_16_bits", size(4, 4) + coded([65000, 535], 16))
+    write("read_depth", "rank_beyond_list", size(4, 4) + coded([99], 3, 4, 12))
+    write("read_depth", "rank_below_list", size(4, 4) + coded([99], 3, 1, 12))
+    write("read_depth", "run_too_long", size(4, 4) + coded([99], 3, 2, 13))
+    write("read_depth", "run_missing", size(4, 4) + coded([99], 3, 2))
+    write("read_depth", "number_without_end", size(4, 4) + b"\1" + b"\xff" * 40)
     write("read_depth", "steps", size(37, 29) + bytes(64 + (x // 5 + y // 3) % 128 for y in range(29) for x in range(37)))
     write("read_depth", "noise", size(20, 20) + bytes(rng.randrange(256) for _ in range(700)))
     write("read_depth", "holes", size(33, 21) + bytes(rng.choice((0, 0, 100, 101)) for _ in range(33 * 21)))

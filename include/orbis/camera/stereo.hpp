@@ -40,11 +40,6 @@ struct stereo_rig {
 template <class Left, class Right>
 stereo_rig(Left, Right, se3) -> stereo_rig<Left, Right>;
 
-/// The rig of two equal cameras that are rectified already. @pre baseline > 0, metres
-[[nodiscard]] inline stereo_rig<pinhole> rectified_rig(const pinhole& camera, double baseline) {
-  return {camera, camera, se3{so3{}, vec3{baseline, 0.0, 0.0}}};
-}
-
 /// How images are rectified.
 struct rectify_options {
   int width = 0;                   ///< of the rectified images, pixels; 0: of the left camera

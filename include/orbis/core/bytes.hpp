@@ -121,23 +121,8 @@ inline constexpr auto base85_digits = [] {
 
 }  // namespace detail
 
-/// `bytes`, filled up with zeros to a multiple of four, as text that can stand in a string literal: five characters for
-/// four bytes.
-[[nodiscard]] inline std::string to_base85(std::string_view bytes) {
-  std::string text;
-  text.reserve(bytes.size() / 4 * 5 + 5);
-  for (std::size_t i = 0; i < bytes.size(); i += 4) {
-    std::uint32_t value = 0;
-    for (std::size_t k = 0; k != 4; ++k)
-      value = value << 8U | (i + k < bytes.size() ? static_cast<unsigned char>(bytes[i + k]) : 0U);
-    std::array<char, 5> group{};
-    for (std::size_t k = 5; k-- != 0; value /= 85) group[k] = detail::base85_character(value % 85);
-    text.append(group.data(), group.size());
-  }
-  return text;
-}
-
-/// Appends the bytes that `text` stands for; false, if it is no such text.
+/// Appends the bytes that `text` stands for, which can stand in a string literal: five characters for four bytes, the
+/// first digit first. False, if it is no such text.
 [[nodiscard]] inline bool append_base85(std::string& bytes, std::string_view text) {
   if (text.size() % 5 != 0) return false;
   std::size_t to = bytes.size();

@@ -26,12 +26,6 @@ template <class S>
   return m;
 }
 
-/// The inverse of `hat`.
-template <class S>
-[[nodiscard]] matrix<3, 1, S> vee(const matrix<3, 3, S>& m) {
-  return {m(2, 1), m(0, 2), m(1, 0)};
-}
-
 /// A rotation, kept as a unit quaternion. Tangent vectors are rotation vectors (axis times angle,
 /// radians). `R_a_b * p_b == p_a`.
 template <std::floating_point S = double>

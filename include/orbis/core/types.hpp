@@ -25,7 +25,6 @@ using mat2 = matrix<2, 2>;
 using mat3 = matrix<3, 3>;
 using mat4 = matrix<4, 4>;
 using mat6 = matrix<6, 6>;
-using mat7 = matrix<7, 7>;
 
 static_assert(std::is_same_v<vec3, Eigen::Vector3d>);
 static_assert(alignof(vec4) == alignof(double) && alignof(vec2f) == alignof(float));

@@ -10,8 +10,7 @@
 
 #include <orbis/core/image.hpp>
 #include <orbis/core/result.hpp>
-#include <orbis/io/detail/files/jpeg_decoder.hpp>
-#include <orbis/io/detail/files/jpeg_encoder.hpp>
+#include <orbis/io/detail/files/jpeg_codec.hpp>
 
 namespace orbis::io {
 

@@ -10,7 +10,7 @@
 #include "io/no_memory.hpp"
 #include "support/catch.hpp"
 
-TEST_CASE("want of memory ends the encoding of a JPEG, anywhere, with that as its error and nothing left behind") {
+TEST_CASE("a lack of memory ends the encoding of a JPEG, anywhere, with that as its error and nothing left behind") {
   if (!orbis::test::no_memory_after::works()) {
     WARN("skipped: this build's operator new cannot be replaced");
     return;

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A JPEG decoder over bytes in memory.
+/// A JPEG decoder and a JPEG encoder, from and into bytes in memory.
 ///
-/// libjpeg reports errors by `longjmp` here. Every function that calls `setjmp` keeps nothing but
-/// trivial locals, so that no destructor is jumped over.
+/// libjpeg reports errors by `longjmp` here, with a message and nothing printed. Every function that calls `setjmp`
+/// keeps nothing but trivial locals, so that no destructor is jumped over.
 #pragma once
 
 #include <algorithm>
@@ -14,13 +14,35 @@
 #include <cstring>
 #include <string>
 #include <string_view>
+#include <utility>
 
+#include <jerror.h>
 #include <jpeglib.h>
 
 #include <orbis/core/image.hpp>
-#include <orbis/io/detail/files/jpeg_errors.hpp>
 
 namespace orbis::io::detail {
+
+/// What an error of libjpeg leaves behind. Whoever calls libjpeg sets `jump` before.
+struct jpeg_errors {
+  jpeg_error_mgr base{};  // first: libjpeg hands a pointer to it back to us
+  std::jmp_buf jump{};
+  char message[JMSG_LENGTH_MAX] = "";
+  bool ends_at_warning = false;  ///< of a decoder
+
+  /// What libjpeg gets. Valid as long as this stays where it is.
+  [[nodiscard]] jpeg_error_mgr* manager() {
+    jpeg_std_error(&base);
+    base.error_exit = [](j_common_ptr info) {
+      jpeg_errors& own = of(info->err);
+      info->err->format_message(info, own.message);
+      std::longjmp(own.jump, 1);
+    };
+    base.output_message = [](j_common_ptr) {};
+    return &base;
+  }
+  [[nodiscard]] static jpeg_errors& of(jpeg_error_mgr* manager) { return *reinterpret_cast<jpeg_errors*>(manager); }
+};
 
 /// A decoder over bytes in memory.
 class jpeg_decoder {
@@ -120,6 +142,78 @@ class jpeg_decoder {
   jpeg_source_mgr source_{};
   progress progress_{};
   std::size_t size_;
+};
+
+class jpeg_encoder {
+ public:
+  jpeg_encoder() {
+    info_.err = errors_.manager();
+    // Not `jpeg_mem_dest`: after an error nobody knows whether its buffer was freed.
+    info_.client_data = this;
+    destination_.init_destination = [](j_compress_ptr info) { make_room(info); };
+    destination_.empty_output_buffer = [](j_compress_ptr info) -> boolean {
+      make_room(info);  // all of it is full, whatever `free_in_buffer` says
+      return TRUE;
+    };
+    destination_.term_destination = [](j_compress_ptr info) {
+      auto* own = static_cast<jpeg_encoder*>(info->client_data);
+      own->bytes_.resize(own->bytes_.size() - info->dest->free_in_buffer);
+    };
+  }
+  jpeg_encoder(const jpeg_encoder&) = delete;
+  jpeg_encoder& operator=(const jpeg_encoder&) = delete;
+  ~jpeg_encoder() { jpeg_destroy_compress(&info_); }
+
+  /// Encodes an image. False: see `out_of_memory` and `message`. @pre it was not called before
+  bool write(image_view<const rgb8> pixels, int quality) {
+    if (setjmp(errors_.jump) != 0) return false;
+    jpeg_create_compress(&info_);
+    info_.dest = &destination_;
+    info_.image_width = static_cast<JDIMENSION>(pixels.width());
+    info_.image_height = static_cast<JDIMENSION>(pixels.height());
+    info_.input_components = 3;
+    info_.in_color_space = JCS_RGB;
+    jpeg_set_defaults(&info_);
+    jpeg_set_quality(&info_, quality, TRUE);
+    jpeg_start_compress(&info_, TRUE);
+    while (info_.next_scanline < info_.image_height) {
+      const rgb8* const row = pixels.data() + static_cast<std::ptrdiff_t>(info_.next_scanline) * pixels.stride();
+      auto* bytes = const_cast<JSAMPLE*>(reinterpret_cast<const JSAMPLE*>(row));  // which libjpeg does not change
+      jpeg_write_scanlines(&info_, &bytes, 1);
+    }
+    jpeg_finish_compress(&info_);
+    return true;
+  }
+
+  /// The JPEG, which is given away. @pre write() was true
+  [[nodiscard]] std::string take() { return std::move(bytes_); }
+  /// Whether it was a lack of memory that ended `write`.
+  [[nodiscard]] bool out_of_memory() const { return errors_.base.msg_code == JERR_OUT_OF_MEMORY; }
+  [[nodiscard]] std::string message() const { return errors_.message; }
+
+ private:
+  [[nodiscard]] bool grow() noexcept {
+    constexpr std::size_t least = std::size_t{1} << 14U;
+    try {
+      bytes_.resize(std::max(least, 2 * bytes_.size()));
+    } catch (...) {
+      return false;
+    }
+    return true;
+  }
+  /// Room behind what is full. No exception goes through libjpeg.
+  static void make_room(j_compress_ptr info) {
+    auto* own = static_cast<jpeg_encoder*>(info->client_data);
+    const std::size_t full = own->bytes_.size();
+    if (!own->grow()) ERREXIT1(info, JERR_OUT_OF_MEMORY, 0);
+    info->dest->next_output_byte = reinterpret_cast<JOCTET*>(own->bytes_.data() + full);
+    info->dest->free_in_buffer = own->bytes_.size() - full;
+  }
+
+  jpeg_compress_struct info_{};
+  jpeg_errors errors_{};
+  jpeg_destination_mgr destination_{};
+  std::string bytes_;
 };
 
 }  // namespace orbis::io::detail
