@@ -1,0 +1,37 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: BSD-3-Clause
+#
+# Counts Eigen's expression classes in a translation unit: each costs a compiler some 80 ms. The limits keep small-matrix
+# arithmetic eager (core/small_matrix.hpp).
+# usage: compile_cost.sh INCLUDE_DIR COMPILER_OPTION...   (needs clang++; prints "[skipped]" without)
+set -euo pipefail
+include=$1
+shift
+if ! command -v clang++ > /dev/null; then
+  echo "[skipped] clang++ is not here, whose -ftime-trace says what is instantiated"
+  exit 0
+fi
+scratch=$(mktemp -d)
+trap 'rm -rf "$scratch"' EXIT
+echo '#include <orbis/slam.hpp>' > "$scratch/include.cpp"
+cat > "$scratch/program.cpp" <<'EOF_PROGRAM'
+#include <orbis/camera/any.hpp>
+#include <orbis/slam.hpp>
+int main() {
+  orbis::slam::rgbd_system slam{orbis::camera::any_camera{orbis::camera::pinhole{320, 240, 260, 260, 159.5, 119.5}}};
+  slam.track(orbis::camera::rgbd_frame{});
+  return static_cast<int>(slam.trajectory().size());
+}
+EOF_PROGRAM
+status=0
+check() {  # name, most classes
+  clang++ -std=c++20 -O0 -ftime-trace -ftime-trace-granularity=0 "-I$include" "${options[@]}" -c "$scratch/$1.cpp" -o "$scratch/$1.o"
+  local found
+  found=$(grep -o '"name":"InstantiateClass","args":{"detail":"Eigen::DenseBase<[^"]*' "$scratch/$1.json" | grep -vc '>::')
+  echo "$1: $found of Eigen's classes, at most $2"
+  ((found <= $2)) || status=1
+}
+options=("$@")
+check include 120
+check program 300
+exit $status
