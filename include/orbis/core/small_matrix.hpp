@@ -4,8 +4,8 @@
 /// Eigen's expression classes, which cost a compiler ten times as much per formula.
 ///
 /// Code inside namespace orbis finds these operators by ordinary lookup, and they match better than Eigen's members, so
-/// that a formula reads as with Eigen. Code outside of the namespace keeps Eigen's operators. Operands of which one is an
-/// Eigen expression or of dynamic size fall back to Eigen.
+/// that a formula reads as with Eigen. Code outside of the namespace keeps Eigen's operators. Operands of which one is
+/// an Eigen expression or of dynamic size fall back to Eigen.
 ///
 /// Sums of products of three run as `x + (y + z)`, as Eigen's do; where Eigen uses vector registers the last bits may
 /// differ from its results.
@@ -34,21 +34,99 @@ namespace detail {
 template <class T, class S>
 concept factor_of = std::same_as<T, S> || std::integral<T>;
 
-/// The sum of `count` products of entries `step_a` and `step_b` apart.
+/// Whether loops over so few entries are unrolled, and functions inlined.
+template <int Operations>
+inline constexpr bool is_small = Operations <= 64;
+
+// Arithmetic of entries; `entrywise` is one function for each number of entries.
+struct sum_of_two {
+  template <class S>
+  static S of(S a, S b) {
+    return a + b;
+  }
+};
+struct difference_of_two {
+  template <class S>
+  static S of(S a, S b) {
+    return a - b;
+  }
+};
+struct product_of_two {
+  template <class S>
+  static S of(S a, S b) {
+    return a * b;
+  }
+};
+struct quotient_of_two {
+  template <class S>
+  static S of(S a, S b) {
+    return a / b;
+  }
+};
+struct smaller_of_two {
+  template <class S>
+  static S of(S a, S b) {
+    return b < a ? b : a;
+  }
+};
+struct larger_of_two {
+  template <class S>
+  static S of(S a, S b) {
+    return a < b ? b : a;
+  }
+};
+
+/// `out[i] = F::of(a[i], b[i * Step])`. A `Step` of 0 is for a scalar.
+template <int N, int Step, class F, class S>
+inline void entrywise(const S* a, const S* b, S* out) {
+  if constexpr (N <= 12) {
+#pragma GCC unroll 12
+    for (int i = 0; i < N; ++i) out[i] = F::of(a[i], b[Step * i]);
+  } else {
+    for (int i = 0; i < N; ++i) out[i] = F::of(a[i], b[Step * i]);
+  }
+}
+
+/// The sum of `N` products of entries `step_a` and `step_b` apart.
 template <int N, class S>
 [[nodiscard]] inline S sum_of_products(const S* a, int step_a, const S* b, int step_b) {
-  if constexpr (N == 1) {
-    return a[0] * b[0];
-  } else if constexpr (N == 2) {
-    return a[0] * b[0] + a[step_a] * b[step_b];
-  } else if constexpr (N == 3) {
+  if constexpr (N == 3) {
     return a[0] * b[0] + (a[step_a] * b[step_b] + a[2 * step_a] * b[2 * step_b]);
   } else {
     S sum = a[0] * b[0];
-#pragma GCC unroll 16
+#pragma GCC unroll 12
     for (int k = 1; k < N; ++k) sum += a[k * step_a] * b[k * step_b];
     return sum;
   }
+}
+
+/// The product of an `R x K` and a `K x C` matrix, column by column. `a_row`, `a_column`, `b_row`, `b_column`: how far
+/// apart the entries of neighbouring rows and columns are.
+template <int R, int K, int C, class S>
+inline void multiply_inline(const S* a, int a_row, int a_column, const S* b, int b_row, int b_column, S* out) {
+#pragma GCC unroll 12
+  for (int c = 0; c < C; ++c)
+#pragma GCC unroll 12
+    for (int r = 0; r < R; ++r) out[c * R + r] = sum_of_products<K>(a + r * a_row, a_column, b + c * b_column, b_row);
+}
+/// As above, for more entries: not inlined, and with rows in the inner loop.
+template <int R, int K, int C, class S>
+[[gnu::noinline]] void multiply(const S* a, int a_row, int a_column, const S* b, int b_row, int b_column, S* out) {
+  for (int c = 0; c < C; ++c) {
+    S* const to = out + c * R;
+    for (int r = 0; r < R; ++r) to[r] = a[r * a_row] * b[c * b_column];
+    for (int k = 1; k < K; ++k) {
+      const S factor = b[k * b_row + c * b_column];
+      for (int r = 0; r < R; ++r) to[r] += a[r * a_row + k * a_column] * factor;
+    }
+  }
+}
+template <int R, int K, int C, class S>
+inline void multiply_any(const S* a, int a_row, int a_column, const S* b, int b_row, int b_column, S* out) {
+  if constexpr (is_small<R * K * C> || K == 3)
+    multiply_inline<R, K, C>(a, a_row, a_column, b, b_row, b_column, out);
+  else
+    multiply<R, K, C>(a, a_row, a_column, b, b_row, b_column, out);
 }
 
 template <int R, int C, int O>
@@ -61,93 +139,69 @@ inline constexpr int column_step = (O & Eigen::RowMajor) != 0 ? 1 : R;
 /// @name Sums, differences, and products with a scalar
 /// @{
 template <class S, int R, int C, int O>
-  requires(R > 0 && C > 0)
-[[nodiscard]] inline Eigen::Matrix<S, R, C, O> operator+(const Eigen::Matrix<S, R, C, O, R, C>& a,
-                                                         const Eigen::Matrix<S, R, C, O, R, C>& b) {
+requires(R > 0 && C > 0) [[nodiscard]] inline Eigen::Matrix<S, R, C, O> operator+(
+    const Eigen::Matrix<S, R, C, O, R, C>& a, const Eigen::Matrix<S, R, C, O, R, C>& b) {
   Eigen::Matrix<S, R, C, O> out;
-#pragma GCC unroll 16
-  for (int i = 0; i < R * C; ++i) out.data()[i] = a.data()[i] + b.data()[i];
+  detail::entrywise<R * C, 1, detail::sum_of_two>(a.data(), b.data(), out.data());
   return out;
 }
-
 template <class S, int R, int C, int O>
-  requires(R > 0 && C > 0)
-[[nodiscard]] inline Eigen::Matrix<S, R, C, O> operator-(const Eigen::Matrix<S, R, C, O, R, C>& a,
-                                                         const Eigen::Matrix<S, R, C, O, R, C>& b) {
+requires(R > 0 && C > 0) [[nodiscard]] inline Eigen::Matrix<S, R, C, O> operator-(
+    const Eigen::Matrix<S, R, C, O, R, C>& a, const Eigen::Matrix<S, R, C, O, R, C>& b) {
   Eigen::Matrix<S, R, C, O> out;
-#pragma GCC unroll 16
-  for (int i = 0; i < R * C; ++i) out.data()[i] = a.data()[i] - b.data()[i];
+  detail::entrywise<R * C, 1, detail::difference_of_two>(a.data(), b.data(), out.data());
   return out;
 }
-
 template <class S, int R, int C, int O>
-  requires(R > 0 && C > 0)
-[[nodiscard]] inline Eigen::Matrix<S, R, C, O> operator-(const Eigen::Matrix<S, R, C, O, R, C>& a) {
+requires(R > 0 && C > 0) [[nodiscard]] inline Eigen::Matrix<S, R, C, O> operator-(
+    const Eigen::Matrix<S, R, C, O, R, C>& a) {
   Eigen::Matrix<S, R, C, O> out;
-#pragma GCC unroll 16
   for (int i = 0; i < R * C; ++i) out.data()[i] = -a.data()[i];
   return out;
 }
-
 template <class S, int R, int C, int O, detail::factor_of<S> T>
-  requires(R > 0 && C > 0)
-[[nodiscard]] inline Eigen::Matrix<S, R, C, O> operator*(const Eigen::Matrix<S, R, C, O, R, C>& a, T t) {
+requires(R > 0 && C > 0) [[nodiscard]] inline Eigen::Matrix<S, R, C, O> operator*(
+    const Eigen::Matrix<S, R, C, O, R, C>& a, T t) {
   Eigen::Matrix<S, R, C, O> out;
   const S s = static_cast<S>(t);
-#pragma GCC unroll 16
-  for (int i = 0; i < R * C; ++i) out.data()[i] = a.data()[i] * s;
+  detail::entrywise<R * C, 0, detail::product_of_two>(a.data(), &s, out.data());
   return out;
 }
-
 template <class S, int R, int C, int O, detail::factor_of<S> T>
-  requires(R > 0 && C > 0)
-[[nodiscard]] inline Eigen::Matrix<S, R, C, O> operator*(T t, const Eigen::Matrix<S, R, C, O, R, C>& a) {
+requires(R > 0 && C > 0) [[nodiscard]] inline Eigen::Matrix<S, R, C, O> operator*(
+    T t, const Eigen::Matrix<S, R, C, O, R, C>& a) {
   return a * t;
 }
-
 template <class S, int R, int C, int O, detail::factor_of<S> T>
-  requires(R > 0 && C > 0)
-[[nodiscard]] inline Eigen::Matrix<S, R, C, O> operator/(const Eigen::Matrix<S, R, C, O, R, C>& a, T t) {
+requires(R > 0 && C > 0) [[nodiscard]] inline Eigen::Matrix<S, R, C, O> operator/(
+    const Eigen::Matrix<S, R, C, O, R, C>& a, T t) {
   Eigen::Matrix<S, R, C, O> out;
   const S s = static_cast<S>(t);
-#pragma GCC unroll 16
-  for (int i = 0; i < R * C; ++i) out.data()[i] = a.data()[i] / s;
+  detail::entrywise<R * C, 0, detail::quotient_of_two>(a.data(), &s, out.data());
   return out;
 }
-
 template <class S, int R, int C, int O>
-  requires(R > 0 && C > 0)
-inline Eigen::Matrix<S, R, C, O>& operator+=(Eigen::Matrix<S, R, C, O, R, C>& a,
-                                             const Eigen::Matrix<S, R, C, O, R, C>& b) {
-#pragma GCC unroll 16
-  for (int i = 0; i < R * C; ++i) a.data()[i] += b.data()[i];
+requires(R > 0 && C > 0) inline Eigen::Matrix<S, R, C, O>& operator+=(Eigen::Matrix<S, R, C, O, R, C>& a,
+                                                                      const Eigen::Matrix<S, R, C, O, R, C>& b) {
+  detail::entrywise<R * C, 1, detail::sum_of_two>(a.data(), b.data(), a.data());
   return a;
 }
-
 template <class S, int R, int C, int O>
-  requires(R > 0 && C > 0)
-inline Eigen::Matrix<S, R, C, O>& operator-=(Eigen::Matrix<S, R, C, O, R, C>& a,
-                                             const Eigen::Matrix<S, R, C, O, R, C>& b) {
-#pragma GCC unroll 16
-  for (int i = 0; i < R * C; ++i) a.data()[i] -= b.data()[i];
+requires(R > 0 && C > 0) inline Eigen::Matrix<S, R, C, O>& operator-=(Eigen::Matrix<S, R, C, O, R, C>& a,
+                                                                      const Eigen::Matrix<S, R, C, O, R, C>& b) {
+  detail::entrywise<R * C, 1, detail::difference_of_two>(a.data(), b.data(), a.data());
   return a;
 }
-
 template <class S, int R, int C, int O, detail::factor_of<S> T>
-  requires(R > 0 && C > 0)
-inline Eigen::Matrix<S, R, C, O>& operator*=(Eigen::Matrix<S, R, C, O, R, C>& a, T t) {
+requires(R > 0 && C > 0) inline Eigen::Matrix<S, R, C, O>& operator*=(Eigen::Matrix<S, R, C, O, R, C>& a, T t) {
   const S s = static_cast<S>(t);
-#pragma GCC unroll 16
-  for (int i = 0; i < R * C; ++i) a.data()[i] *= s;
+  detail::entrywise<R * C, 0, detail::product_of_two>(a.data(), &s, a.data());
   return a;
 }
-
 template <class S, int R, int C, int O, detail::factor_of<S> T>
-  requires(R > 0 && C > 0)
-inline Eigen::Matrix<S, R, C, O>& operator/=(Eigen::Matrix<S, R, C, O, R, C>& a, T t) {
+requires(R > 0 && C > 0) inline Eigen::Matrix<S, R, C, O>& operator/=(Eigen::Matrix<S, R, C, O, R, C>& a, T t) {
   const S s = static_cast<S>(t);
-#pragma GCC unroll 16
-  for (int i = 0; i < R * C; ++i) a.data()[i] /= s;
+  detail::entrywise<R * C, 0, detail::quotient_of_two>(a.data(), &s, a.data());
   return a;
 }
 /// @}
@@ -155,24 +209,17 @@ inline Eigen::Matrix<S, R, C, O>& operator/=(Eigen::Matrix<S, R, C, O, R, C>& a,
 /// @name Products of matrices
 /// @{
 template <class S, int R, int K, int C, int OA, int OB>
-  requires(R > 0 && K > 0 && C > 0)
-[[nodiscard]] inline matrix<R, C, S> operator*(const Eigen::Matrix<S, R, K, OA, R, K>& a,
-                                               const Eigen::Matrix<S, K, C, OB, K, C>& b) {
+requires(R > 0 && K > 0 && C > 0) [[nodiscard]] inline matrix<R, C, S> operator*(
+    const Eigen::Matrix<S, R, K, OA, R, K>& a, const Eigen::Matrix<S, K, C, OB, K, C>& b) {
   matrix<R, C, S> out;
-#pragma GCC unroll 8
-  for (int c = 0; c < C; ++c)
-#pragma GCC unroll 8
-    for (int r = 0; r < R; ++r)
-      out.data()[R == 1 ? c : c * R + r] = detail::sum_of_products<K>(
-          a.data() + r * detail::row_step<R, K, OA>, detail::column_step<R, K, OA>,
-          b.data() + c * detail::column_step<K, C, OB>, detail::row_step<K, C, OB>);
+  detail::multiply_any<R, K, C>(a.data(), detail::row_step<R, K, OA>, detail::column_step<R, K, OA>, b.data(),
+                                detail::row_step<K, C, OB>, detail::column_step<K, C, OB>, out.data());
   return out;
 }
 
 /// The transposed matrix.
 template <class S, int R, int C, int O>
-  requires(R > 0 && C > 0)
-[[nodiscard]] inline matrix<C, R, S> transposed(const Eigen::Matrix<S, R, C, O, R, C>& a) {
+requires(R > 0 && C > 0) [[nodiscard]] inline matrix<C, R, S> transposed(const Eigen::Matrix<S, R, C, O, R, C>& a) {
   matrix<C, R, S> out;
   for (int r = 0; r < R; ++r)
     for (int c = 0; c < C; ++c)
@@ -182,23 +229,19 @@ template <class S, int R, int C, int O>
 
 /// `transposed(a) * b`, without the copy.
 template <class S, int K, int R, int C, int OA, int OB>
-  requires(R > 0 && K > 0 && C > 0)
-[[nodiscard]] inline matrix<R, C, S> transposed_product(const Eigen::Matrix<S, K, R, OA, K, R>& a,
-                                                        const Eigen::Matrix<S, K, C, OB, K, C>& b) {
+requires(R > 0 && K > 0 && C > 0)
+    [[nodiscard]] inline matrix<R, C, S> transposed_product(const Eigen::Matrix<S, K, R, OA, K, R>& a,
+                                                            const Eigen::Matrix<S, K, C, OB, K, C>& b) {
   matrix<R, C, S> out;
-  for (int c = 0; c < C; ++c)
-    for (int r = 0; r < R; ++r)
-      out.data()[R == 1 ? c : c * R + r] = detail::sum_of_products<K>(
-          a.data() + r * detail::column_step<K, R, OA>, detail::row_step<K, R, OA>,
-          b.data() + c * detail::column_step<K, C, OB>, detail::row_step<K, C, OB>);
+  detail::multiply_any<R, K, C>(a.data(), detail::column_step<K, R, OA>, detail::row_step<K, R, OA>, b.data(),
+                                detail::row_step<K, C, OB>, detail::column_step<K, C, OB>, out.data());
   return out;
 }
 
 /// `a * transposed(b)` of two vectors.
 template <class S, int R, int C, int OA, int OB>
-  requires(R > 0 && C > 0)
-[[nodiscard]] inline matrix<R, C, S> outer_product(const Eigen::Matrix<S, R, 1, OA, R, 1>& a,
-                                                   const Eigen::Matrix<S, C, 1, OB, C, 1>& b) {
+requires(R > 0 && C > 0) [[nodiscard]] inline matrix<R, C, S> outer_product(const Eigen::Matrix<S, R, 1, OA, R, 1>& a,
+                                                                            const Eigen::Matrix<S, C, 1, OB, C, 1>& b) {
   matrix<R, C, S> out;
   for (int c = 0; c < C; ++c)
     for (int r = 0; r < R; ++r) out.data()[R == 1 ? c : c * R + r] = a.data()[r] * b.data()[c];
@@ -209,8 +252,8 @@ template <class S, int R, int C, int OA, int OB>
 /// @name Products of vectors, lengths
 /// @{
 template <class S, int R, int C, int OA, int OB>
-  requires(R > 0 && C > 0 && (R == 1 || C == 1))
-[[nodiscard]] inline S dot(const Eigen::Matrix<S, R, C, OA, R, C>& a, const Eigen::Matrix<S, R, C, OB, R, C>& b) {
+requires(R > 0 && C > 0 && (R == 1 || C == 1)) [[nodiscard]] inline S
+    dot(const Eigen::Matrix<S, R, C, OA, R, C>& a, const Eigen::Matrix<S, R, C, OB, R, C>& b) {
   return detail::sum_of_products<R * C>(a.data(), 1, b.data(), 1);
 }
 
@@ -222,22 +265,20 @@ template <class S>
 
 /// The sum of the squares of all entries.
 template <class S, int R, int C, int O>
-  requires(R > 0 && C > 0)
-[[nodiscard]] inline S squared_norm(const Eigen::Matrix<S, R, C, O, R, C>& a) {
+requires(R > 0 && C > 0) [[nodiscard]] inline S squared_norm(const Eigen::Matrix<S, R, C, O, R, C>& a) {
   return detail::sum_of_products<R * C>(a.data(), 1, a.data(), 1);
 }
 
 /// The root of the sum of the squares of all entries.
 template <class S, int R, int C, int O>
-  requires(R > 0 && C > 0)
-[[nodiscard]] inline S norm(const Eigen::Matrix<S, R, C, O, R, C>& a) {
+requires(R > 0 && C > 0) [[nodiscard]] inline S norm(const Eigen::Matrix<S, R, C, O, R, C>& a) {
   return std::sqrt(squared_norm(a));
 }
 
 /// The vector of length 1 in the same direction; one of length 0 as it is.
 template <class S, int R, int C, int O>
-  requires(R > 0 && C > 0)
-[[nodiscard]] inline Eigen::Matrix<S, R, C, O> normalized(const Eigen::Matrix<S, R, C, O, R, C>& a) {
+requires(R > 0 && C > 0)
+    [[nodiscard]] inline Eigen::Matrix<S, R, C, O> normalized(const Eigen::Matrix<S, R, C, O, R, C>& a) {
   const S square = squared_norm(a);
   return square > S(0) ? a / std::sqrt(square) : a;
 }
@@ -247,8 +288,8 @@ template <class S, int R, int C, int O>
 /// @{
 /// `N` entries of a vector from entry `first` on.
 template <int N, class S, int R, int O>
-  requires(N > 0 && N <= R)
-[[nodiscard]] inline matrix<N, 1, S> segment(const Eigen::Matrix<S, R, 1, O, R, 1>& v, int first) {
+requires(N > 0 && N <= R)
+    [[nodiscard]] inline matrix<N, 1, S> segment(const Eigen::Matrix<S, R, 1, O, R, 1>& v, int first) {
   matrix<N, 1, S> out;
   for (int i = 0; i < N; ++i) out.data()[i] = v.data()[first + i];
   return out;
@@ -272,9 +313,8 @@ template <int N, class S, int R, int O>
 
 /// The entries of `a`, then those of `b`.
 template <class S, int M, int N, int OA, int OB>
-  requires(M > 0 && N > 0)
-[[nodiscard]] inline matrix<M + N, 1, S> stacked(const Eigen::Matrix<S, M, 1, OA, M, 1>& a,
-                                                 const Eigen::Matrix<S, N, 1, OB, N, 1>& b) {
+requires(M > 0 && N > 0) [[nodiscard]] inline matrix<M + N, 1, S> stacked(const Eigen::Matrix<S, M, 1, OA, M, 1>& a,
+                                                                          const Eigen::Matrix<S, N, 1, OB, N, 1>& b) {
   matrix<M + N, 1, S> out;
   for (int i = 0; i < M; ++i) out.data()[i] = a.data()[i];
   for (int i = 0; i < N; ++i) out.data()[M + i] = b.data()[i];
@@ -283,8 +323,8 @@ template <class S, int M, int N, int OA, int OB>
 
 /// The `P x Q` part of a matrix whose first entry is (row, column).
 template <int P, int Q, class S, int R, int C, int O>
-  requires(P > 0 && Q > 0 && P <= R && Q <= C)
-[[nodiscard]] inline matrix<P, Q, S> block(const Eigen::Matrix<S, R, C, O, R, C>& m, int row, int column) {
+requires(P > 0 && Q > 0 && P <= R && Q <= C)
+    [[nodiscard]] inline matrix<P, Q, S> block(const Eigen::Matrix<S, R, C, O, R, C>& m, int row, int column) {
   matrix<P, Q, S> out;
   for (int c = 0; c < Q; ++c)
     for (int r = 0; r < P; ++r)
@@ -294,9 +334,9 @@ template <int P, int Q, class S, int R, int C, int O>
 }
 /// Writes `part` into a matrix, its first entry at (row, column).
 template <class S, int R, int C, int O, int P, int Q, int OP>
-  requires(P > 0 && Q > 0 && P <= R && Q <= C)
-inline void set_block(Eigen::Matrix<S, R, C, O, R, C>& m, int row, int column,
-                      const Eigen::Matrix<S, P, Q, OP, P, Q>& part) {
+requires(P > 0 && Q > 0 && P <= R && Q <= C) inline void set_block(Eigen::Matrix<S, R, C, O, R, C>& m, int row,
+                                                                   int column,
+                                                                   const Eigen::Matrix<S, P, Q, OP, P, Q>& part) {
   for (int c = 0; c < Q; ++c)
     for (int r = 0; r < P; ++r)
       m.data()[(row + r) * detail::row_step<R, C, O> + (column + c) * detail::column_step<R, C, O>] =
@@ -330,8 +370,7 @@ inline void set_column(Eigen::Matrix<S, R, C, O, R, C>& m, int c, const matrix<R
 }
 template <class S, int R, int C, int O>
 inline void set_row(Eigen::Matrix<S, R, C, O, R, C>& m, int r, const matrix<C, 1, S>& v) {
-  for (int c = 0; c < C; ++c)
-    m.data()[r * detail::row_step<R, C, O> + c * detail::column_step<R, C, O>] = v.data()[c];
+  for (int c = 0; c < C; ++c) m.data()[r * detail::row_step<R, C, O> + c * detail::column_step<R, C, O>] = v.data()[c];
 }
 /// The matrix with columns `a`, `b` and `c`.
 template <class S>
@@ -351,8 +390,7 @@ template <class S>
 }
 /// The matrix with `v` on its diagonal.
 template <class S, int R, int O>
-  requires(R > 0)
-[[nodiscard]] inline matrix<R, R, S> diagonal_matrix(const Eigen::Matrix<S, R, 1, O, R, 1>& v) {
+requires(R > 0) [[nodiscard]] inline matrix<R, R, S> diagonal_matrix(const Eigen::Matrix<S, R, 1, O, R, 1>& v) {
   matrix<R, R, S> out;
   for (int c = 0; c < R; ++c)
     for (int r = 0; r < R; ++r) out.data()[c * R + r] = r == c ? v.data()[r] : S(0);
@@ -360,14 +398,12 @@ template <class S, int R, int O>
 }
 /// Multiplies the entries on the diagonal of a square matrix by `factor` and adds `summand`.
 template <class S, int R, int O>
-  requires(R > 0)
-inline void change_diagonal(Eigen::Matrix<S, R, R, O, R, R>& m, S factor, S summand) {
+requires(R > 0) inline void change_diagonal(Eigen::Matrix<S, R, R, O, R, R>& m, S factor, S summand) {
   for (int r = 0; r < R; ++r) m.data()[r * R + r] = m.data()[r * R + r] * factor + summand;
 }
 /// The entries on the diagonal of a square matrix.
 template <class S, int R, int O>
-  requires(R > 0)
-[[nodiscard]] inline matrix<R, 1, S> diagonal_of(const Eigen::Matrix<S, R, R, O, R, R>& m) {
+requires(R > 0) [[nodiscard]] inline matrix<R, 1, S> diagonal_of(const Eigen::Matrix<S, R, R, O, R, R>& m) {
   matrix<R, 1, S> out;
   for (int r = 0; r < R; ++r) out.data()[r] = m.data()[r * R + r];
   return out;
@@ -401,31 +437,27 @@ template <class M>
 /// @{
 /// Whether no entry is infinite or not a number.
 template <class S, int R, int C, int O>
-  requires(R > 0 && C > 0)
-[[nodiscard]] inline bool all_finite(const Eigen::Matrix<S, R, C, O, R, C>& a) {
+requires(R > 0 && C > 0) [[nodiscard]] inline bool all_finite(const Eigen::Matrix<S, R, C, O, R, C>& a) {
   bool finite = true;
   for (int i = 0; i < R * C; ++i) finite = finite && std::isfinite(a.data()[i]);
   return finite;
 }
 template <class S, int R, int C, int O>
-  requires(R > 0 && C > 0)
-[[nodiscard]] inline S sum_of(const Eigen::Matrix<S, R, C, O, R, C>& a) {
+requires(R > 0 && C > 0) [[nodiscard]] inline S sum_of(const Eigen::Matrix<S, R, C, O, R, C>& a) {
   if constexpr (R * C == 3) return a.data()[0] + (a.data()[1] + a.data()[2]);
   S sum = a.data()[0];
   for (int i = 1; i < R * C; ++i) sum += a.data()[i];
   return sum;
 }
 template <class S, int R, int C, int O>
-  requires(R > 0 && C > 0)
-[[nodiscard]] inline S smallest_of(const Eigen::Matrix<S, R, C, O, R, C>& a) {
+requires(R > 0 && C > 0) [[nodiscard]] inline S smallest_of(const Eigen::Matrix<S, R, C, O, R, C>& a) {
   S least = a.data()[0];
   for (int i = 1; i < R * C; ++i)
     if (a.data()[i] < least) least = a.data()[i];
   return least;
 }
 template <class S, int R, int C, int O>
-  requires(R > 0 && C > 0)
-[[nodiscard]] inline S largest_of(const Eigen::Matrix<S, R, C, O, R, C>& a) {
+requires(R > 0 && C > 0) [[nodiscard]] inline S largest_of(const Eigen::Matrix<S, R, C, O, R, C>& a) {
   S most = a.data()[0];
   for (int i = 1; i < R * C; ++i)
     if (a.data()[i] > most) most = a.data()[i];
@@ -433,26 +465,25 @@ template <class S, int R, int C, int O>
 }
 /// Whether each entry of `a` is at most that of `b`.
 template <class S, int R, int C, int O>
-  requires(R > 0 && C > 0)
-[[nodiscard]] inline bool all_at_most(const Eigen::Matrix<S, R, C, O, R, C>& a,
-                                      const Eigen::Matrix<S, R, C, O, R, C>& b) {
+requires(R > 0 && C > 0) [[nodiscard]] inline bool all_at_most(const Eigen::Matrix<S, R, C, O, R, C>& a,
+                                                               const Eigen::Matrix<S, R, C, O, R, C>& b) {
   for (int i = 0; i < R * C; ++i)
     if (!(a.data()[i] <= b.data()[i])) return false;
   return true;
 }
 /// The matrix with `summand` added to each entry.
 template <class S, int R, int C, int O>
-  requires(R > 0 && C > 0)
-[[nodiscard]] inline Eigen::Matrix<S, R, C, O> shifted(const Eigen::Matrix<S, R, C, O, R, C>& a,
-                                                       std::type_identity_t<S> summand) {
+requires(R > 0 && C > 0)
+    [[nodiscard]] inline Eigen::Matrix<S, R, C, O> shifted(const Eigen::Matrix<S, R, C, O, R, C>& a,
+                                                           std::type_identity_t<S> summand) {
   Eigen::Matrix<S, R, C, O> out;
   for (int i = 0; i < R * C; ++i) out.data()[i] = a.data()[i] + summand;
   return out;
 }
 /// The absolute values of the entries.
 template <class S, int R, int C, int O>
-  requires(R > 0 && C > 0)
-[[nodiscard]] inline Eigen::Matrix<S, R, C, O> magnitudes(const Eigen::Matrix<S, R, C, O, R, C>& a) {
+requires(R > 0 && C > 0)
+    [[nodiscard]] inline Eigen::Matrix<S, R, C, O> magnitudes(const Eigen::Matrix<S, R, C, O, R, C>& a) {
   Eigen::Matrix<S, R, C, O> out;
   for (int i = 0; i < R * C; ++i) out.data()[i] = std::abs(a.data()[i]);
   return out;
@@ -464,8 +495,7 @@ template <class S, int O>
 }
 /// The largest absolute value of an entry; not a number where the first entry is none.
 template <class S, int R, int C, int O>
-  requires(R > 0 && C > 0)
-[[nodiscard]] inline S largest_magnitude(const Eigen::Matrix<S, R, C, O, R, C>& a) {
+requires(R > 0 && C > 0) [[nodiscard]] inline S largest_magnitude(const Eigen::Matrix<S, R, C, O, R, C>& a) {
   S most = std::abs(a.data()[0]);
   for (int i = 1; i < R * C; ++i) {
     const S size = std::abs(a.data()[i]);
@@ -475,35 +505,34 @@ template <class S, int R, int C, int O>
 }
 /// Entry by entry, the product.
 template <class S, int R, int C, int O>
-  requires(R > 0 && C > 0)
-[[nodiscard]] inline Eigen::Matrix<S, R, C, O> entrywise_product(const Eigen::Matrix<S, R, C, O, R, C>& a,
-                                                                 const Eigen::Matrix<S, R, C, O, R, C>& b) {
+requires(R > 0 && C > 0)
+    [[nodiscard]] inline Eigen::Matrix<S, R, C, O> entrywise_product(const Eigen::Matrix<S, R, C, O, R, C>& a,
+                                                                     const Eigen::Matrix<S, R, C, O, R, C>& b) {
   Eigen::Matrix<S, R, C, O> out;
-  for (int i = 0; i < R * C; ++i) out.data()[i] = a.data()[i] * b.data()[i];
+  detail::entrywise<R * C, 1, detail::product_of_two>(a.data(), b.data(), out.data());
   return out;
 }
 /// Entry by entry, the smaller value.
 template <class S, int R, int C, int O>
-  requires(R > 0 && C > 0)
-[[nodiscard]] inline Eigen::Matrix<S, R, C, O> entrywise_min(const Eigen::Matrix<S, R, C, O, R, C>& a,
-                                                             const Eigen::Matrix<S, R, C, O, R, C>& b) {
+requires(R > 0 && C > 0)
+    [[nodiscard]] inline Eigen::Matrix<S, R, C, O> entrywise_min(const Eigen::Matrix<S, R, C, O, R, C>& a,
+                                                                 const Eigen::Matrix<S, R, C, O, R, C>& b) {
   Eigen::Matrix<S, R, C, O> out;
-  for (int i = 0; i < R * C; ++i) out.data()[i] = b.data()[i] < a.data()[i] ? b.data()[i] : a.data()[i];
+  detail::entrywise<R * C, 1, detail::smaller_of_two>(a.data(), b.data(), out.data());
   return out;
 }
 /// Entry by entry, the larger value.
 template <class S, int R, int C, int O>
-  requires(R > 0 && C > 0)
-[[nodiscard]] inline Eigen::Matrix<S, R, C, O> entrywise_max(const Eigen::Matrix<S, R, C, O, R, C>& a,
-                                                             const Eigen::Matrix<S, R, C, O, R, C>& b) {
+requires(R > 0 && C > 0)
+    [[nodiscard]] inline Eigen::Matrix<S, R, C, O> entrywise_max(const Eigen::Matrix<S, R, C, O, R, C>& a,
+                                                                 const Eigen::Matrix<S, R, C, O, R, C>& b) {
   Eigen::Matrix<S, R, C, O> out;
-  for (int i = 0; i < R * C; ++i) out.data()[i] = a.data()[i] < b.data()[i] ? b.data()[i] : a.data()[i];
+  detail::entrywise<R * C, 1, detail::larger_of_two>(a.data(), b.data(), out.data());
   return out;
 }
 /// The same entries as another scalar.
 template <class T, class S, int R, int C, int O>
-  requires(R > 0 && C > 0)
-[[nodiscard]] inline matrix<R, C, T> converted(const Eigen::Matrix<S, R, C, O, R, C>& a) {
+requires(R > 0 && C > 0) [[nodiscard]] inline matrix<R, C, T> converted(const Eigen::Matrix<S, R, C, O, R, C>& a) {
   matrix<R, C, T> out;
   for (int i = 0; i < R * C; ++i) out.data()[i] = static_cast<T>(a.data()[i]);
   return out;
@@ -537,8 +566,7 @@ template <class D>
 /// @name Square matrices
 /// @{
 template <class S, int N, int O>
-  requires(N > 0)
-[[nodiscard]] inline S trace(const Eigen::Matrix<S, N, N, O, N, N>& m) {
+requires(N > 0) [[nodiscard]] inline S trace(const Eigen::Matrix<S, N, N, O, N, N>& m) {
   S sum = m.data()[0];
   for (int i = 1; i < N; ++i) sum += m.data()[i * N + i];
   return sum;
@@ -574,8 +602,7 @@ template <class S, int O>
 }
 /// The inverse by elimination with row pivots. Entries are not finite where the matrix is singular.
 template <class S, int N, int O>
-  requires(N > 3)
-[[nodiscard]] inline Eigen::Matrix<S, N, N, O> inverse(Eigen::Matrix<S, N, N, O, N, N> m) {
+requires(N > 3) [[nodiscard]] inline Eigen::Matrix<S, N, N, O> inverse(Eigen::Matrix<S, N, N, O, N, N> m) {
   Eigen::Matrix<S, N, N, O> out = identity<Eigen::Matrix<S, N, N, O>>();
   for (int c = 0; c < N; ++c) {
     int pivot = c;
