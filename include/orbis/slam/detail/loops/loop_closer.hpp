@@ -36,10 +36,55 @@ class loop_closer {
 
   /// Searches for places that the keyframe observes again. Returns whether a map was corrected: then it should be
   /// adjusted globally.
-  bool close(map_keyframe k);
+  bool close(map_keyframe k) {
+    if (!shared_.settings.places.enabled) return false;
+    for (map_keyframe& candidate : candidates_of(k)) {
+      effort by;
+      const auto taken = locked(by, [&] { return take(k, candidate); });
+      if (!taken || taken->connected) continue;
+      const loop_check check = loop_verification::verify(*taken, shared_.rig, shared_.settings.places.loop);
+      if (!check) continue;
+      const bool closed =
+          k.map == candidate.map ? correct(k, candidate, check.match, by) : merge(k, candidate, check.match, by);
+      if (closed) return true;
+    }
+    return false;
+  }
 
   /// Adjusts a whole map. Stops without a result if a loop is closed meanwhile, or `stop` is called.
-  void adjust_globally(map_id id);
+  void adjust_globally(map_id id) {
+    if (!shared_.settings.places.adjusts_globally) return;
+    const global_adjustment_options& o = shared_.settings.places.adjustment;
+    effort by;
+    std::uint64_t before = 0;
+    global_adjustment::snapshot s;
+    {
+      const auto edit = shared_.edit();
+      before = corrections_;
+      locked(by, [&] {
+        if (shared_.atlas.contains(id)) s = global_adjustment::take_keyframes(shared_.atlas.at(id), o);
+      });
+      while (s.has_more())
+        locked(by, [&] { global_adjustment::take_landmarks(s, shared_.atlas.at(id), shared_.rig, at_once); });
+    }
+    if (s.empty()) return;
+    const auto go_on = [&](std::size_t, std::size_t) { return !stopped_ && corrections_ == before; };
+    bundle_solver<Camera> solver{shared_.rig.model, global_adjustment::loss};
+    const bundle_solution solved = solver.solve(s, global_adjustment::schedule_of(o), go_on);
+    if (!solved.usable) return;
+    {
+      const auto edit = shared_.edit();
+      if (!locked(by, [&] {
+            if (corrections_ != before || !shared_.atlas.contains(id)) return false;
+            global_adjustment::apply_poses(shared_.atlas.at(id), s, solved);
+            return true;
+          }))
+        return;
+      erase_outliers(id, s, solved, by);
+      update(id, by);
+    }
+    report({.kind = correction_kind::global_adjustment, .map = id}, by);
+  }
 
   /// Ends what can be interrupted soon. May be called from any thread.
   void stop() noexcept { stopped_ = true; }
@@ -75,11 +120,106 @@ class loop_closer {
 
   /// The keyframes with similar appearance; `k` gets its present id. In its own map only keyframes that it shares no
   /// landmark with and that are some keyframes older.
-  std::vector<map_keyframe> candidates_of(map_keyframe& k);
-  std::optional<loop_verification::snapshot<D>> take(map_keyframe& k, map_keyframe& candidate);
-  bool correct(map_keyframe k, map_keyframe candidate, const loop_match& match, effort by);
+  std::vector<map_keyframe> candidates_of(map_keyframe& k) {
+    typename Places::signature bow_vector;
+    {
+      const auto edit = shared_.edit();  // the keyframe must not be erased meanwhile
+      const auto* seen = shared_.locked([&]() -> const basic_keyframe<D>* {
+        k = shared_.atlas.current(k);
+        return shared_.atlas.has(k) ? &shared_.atlas.at(k) : nullptr;
+      });
+      if (seen == nullptr) return {};
+      bow_vector = shared_.places.describe(seen->features);
+    }
+    return shared_.locked([&]() -> std::vector<map_keyframe> {
+      if (!shared_.atlas.has(k)) return {};
+      const place_options& o = shared_.settings.places;
+      const basic_map<D>& m = shared_.atlas.at(k.map);
+      const bool closed_lately = last_closed_.map == k.map && k.keyframe >= last_closed_.keyframe &&
+                                 k.keyframe - last_closed_.keyframe < o.apart;
+      const auto exclude = [&](map_keyframe other) {
+        if (other.map != k.map) return false;
+        if (closed_lately || other.keyframe >= k.keyframe) return true;
+        return k.keyframe - other.keyframe < o.apart || m.covisibility().shared(k.keyframe, other.keyframe) != 0;
+      };
+      return shared_.similar(bow_vector, o.candidates, exclude);
+    });
+  }
+  std::optional<loop_verification::snapshot<D>> take(map_keyframe& k, map_keyframe& candidate) {
+    k = shared_.atlas.current(k);
+    candidate = shared_.atlas.current(candidate);
+    if (!shared_.atlas.has(k) || !shared_.atlas.has(candidate) || k == candidate) return std::nullopt;
+    return loop_verification::take(shared_.atlas.at(k.map), k.keyframe, shared_.atlas.at(candidate.map),
+                                   candidate.keyframe, shared_.rig, shared_.settings.places.loop);
+  }
+  bool correct(map_keyframe k, map_keyframe candidate, const loop_match& match, effort by) {
+    const loop_correction_options& o = shared_.settings.places.correction;
+    correction_event event{.kind = correction_kind::loop, .map = k.map, .from = k, .to = candidate};
+    {
+      const auto edit = shared_.edit();
+      se3 before;
+      const auto taken = locked(by, [&]() -> std::optional<loop_correction::snapshot<D>> {
+        if (!shared_.atlas.has(k)) return std::nullopt;
+        before = shared_.atlas.at(k).T_world_camera;
+        return loop_correction::take(shared_.atlas.at(k.map), match, o);
+      });
+      if (!taken) return false;
+      const auto go_on = [&](std::size_t, std::size_t) { return !stopped_.load(); };
+      const auto solved = loop_correction::solve(*taken, shared_.rig, o, go_on);
+      if (!solved) return false;
+      if (!locked(by, [&] {
+            basic_map<D>& m = shared_.atlas.at(k.map);
+            const loop_correction::report done = loop_correction::apply_poses(m, *taken, *solved);
+            if (!done.corrected) return false;
+            const se3& after = m.at(k.keyframe).T_world_camera;
+            event.T_corrected_before = sim3(after.rotation(), after.translation(), done.scale) * sim3(before.inverse());
+            ++shared_.loops_closed;
+            ++corrections_;
+            return true;
+          }))
+        return false;
+      last_closed_ = k;
+      fuse(k.map, solved->pairs, {}, by);
+      update(k.map, by);
+    }
+    report(std::move(event), by);
+    return true;
+  }
   /// The map of `k` becomes a part of the candidate's.
-  bool merge(map_keyframe k, map_keyframe candidate, const loop_match& match, effort by);
+  bool merge(map_keyframe k, map_keyframe candidate, const loop_match& match, effort by) {
+    const loop_fusion_options& o = shared_.settings.places.correction.fusion;
+    correction_event event{.kind = correction_kind::merge, .map = candidate.map, .to = candidate, .merged = k.map};
+    {
+      const auto edit = shared_.edit();
+      const auto taken = locked(by, [&] { return map_merging::take(shared_.atlas, k.map, candidate.map, match, o); });
+      if (!taken) return false;
+      const map_merging::solution solved = map_merging::solve(*taken, shared_.rig, o);
+      const bool merged = locked(by, [&] {
+        std::vector<keyframe_id> ids;
+        for (const auto& each : shared_.atlas.at(k.map).keyframes()) ids.push_back(each.id);
+        const map_merging::report done = map_merging::join(shared_.atlas, *taken);
+        if (!done.merged) return false;
+        for (const keyframe_id id : ids)
+          shared_.places.rename({k.map, id}, {candidate.map, id + done.offsets.keyframes});
+        event.offsets = done.offsets;
+        event.from = {candidate.map, done.keyframe};
+        event.T_corrected_before = done.T_into_from;
+        if (k.map < candidate.map) {  // the world stays that of the older map
+          event.T_map_before = done.T_into_from.inverse();
+          shared_.atlas.at(candidate.map).transform(event.T_map_before);
+          event.T_corrected_before = sim3{};
+        }
+        ++shared_.maps_merged;
+        ++corrections_;
+        return true;
+      });
+      if (!merged) return false;
+      last_closed_ = event.from;
+      fuse(candidate.map, solved.pairs, event.offsets, by);
+    }
+    report(std::move(event), by);
+    return true;
+  }
 
   // Part by part, so that tracking does not wait for all of it. @pre edit() is held, and the map is there
 
@@ -116,164 +256,5 @@ class loop_closer {
   std::atomic<std::uint64_t> corrections_{0};
   std::atomic<bool> stopped_{false};
 };
-
-template <camera::camera_model Camera, feature_descriptor D, place_recognizer<D> Places>
-bool loop_closer<Camera, D, Places>::close(map_keyframe k) {
-  if (!shared_.settings.places.enabled) return false;
-  for (map_keyframe& candidate : candidates_of(k)) {
-    effort by;
-    const auto taken = locked(by, [&] { return take(k, candidate); });
-    if (!taken || taken->connected) continue;
-    const loop_check check = loop_verification::verify(*taken, shared_.rig, shared_.settings.places.loop);
-    if (!check) continue;
-    const bool closed =
-        k.map == candidate.map ? correct(k, candidate, check.match, by) : merge(k, candidate, check.match, by);
-    if (closed) return true;
-  }
-  return false;
-}
-
-template <camera::camera_model Camera, feature_descriptor D, place_recognizer<D> Places>
-void loop_closer<Camera, D, Places>::adjust_globally(map_id id) {
-  if (!shared_.settings.places.adjusts_globally) return;
-  const global_adjustment_options& o = shared_.settings.places.adjustment;
-  effort by;
-  std::uint64_t before = 0;
-  global_adjustment::snapshot s;
-  {
-    const auto edit = shared_.edit();
-    before = corrections_;
-    locked(by, [&] {
-      if (shared_.atlas.contains(id)) s = global_adjustment::take_keyframes(shared_.atlas.at(id), o);
-    });
-    while (s.has_more())
-      locked(by, [&] { global_adjustment::take_landmarks(s, shared_.atlas.at(id), shared_.rig, at_once); });
-  }
-  if (s.empty()) return;
-  const auto go_on = [&](std::size_t, std::size_t) { return !stopped_ && corrections_ == before; };
-  bundle_solver<Camera> solver{shared_.rig.model, global_adjustment::loss};
-  const bundle_solution solved = solver.solve(s, global_adjustment::schedule_of(o), go_on);
-  if (!solved.usable) return;
-  {
-    const auto edit = shared_.edit();
-    if (!locked(by, [&] {
-          if (corrections_ != before || !shared_.atlas.contains(id)) return false;
-          global_adjustment::apply_poses(shared_.atlas.at(id), s, solved);
-          return true;
-        }))
-      return;
-    erase_outliers(id, s, solved, by);
-    update(id, by);
-  }
-  report({.kind = correction_kind::global_adjustment, .map = id}, by);
-}
-
-template <camera::camera_model Camera, feature_descriptor D, place_recognizer<D> Places>
-std::vector<map_keyframe> loop_closer<Camera, D, Places>::candidates_of(map_keyframe& k) {
-  typename Places::signature bow_vector;
-  {
-    const auto edit = shared_.edit();  // the keyframe must not be erased meanwhile
-    const auto* seen = shared_.locked([&]() -> const basic_keyframe<D>* {
-      k = shared_.atlas.current(k);
-      return shared_.atlas.has(k) ? &shared_.atlas.at(k) : nullptr;
-    });
-    if (seen == nullptr) return {};
-    bow_vector = shared_.places.describe(seen->features);
-  }
-  return shared_.locked([&]() -> std::vector<map_keyframe> {
-    if (!shared_.atlas.has(k)) return {};
-    const place_options& o = shared_.settings.places;
-    const basic_map<D>& m = shared_.atlas.at(k.map);
-    const bool closed_lately = last_closed_.map == k.map && k.keyframe >= last_closed_.keyframe &&
-                               k.keyframe - last_closed_.keyframe < o.apart;
-    const auto exclude = [&](map_keyframe other) {
-      if (other.map != k.map) return false;
-      if (closed_lately || other.keyframe >= k.keyframe) return true;
-      return k.keyframe - other.keyframe < o.apart || m.covisibility().shared(k.keyframe, other.keyframe) != 0;
-    };
-    return shared_.similar(bow_vector, o.candidates, exclude);
-  });
-}
-
-template <camera::camera_model Camera, feature_descriptor D, place_recognizer<D> Places>
-std::optional<loop_verification::snapshot<D>> loop_closer<Camera, D, Places>::take(map_keyframe& k,
-                                                                                   map_keyframe& candidate) {
-  k = shared_.atlas.current(k);
-  candidate = shared_.atlas.current(candidate);
-  if (!shared_.atlas.has(k) || !shared_.atlas.has(candidate) || k == candidate) return std::nullopt;
-  return loop_verification::take(shared_.atlas.at(k.map), k.keyframe, shared_.atlas.at(candidate.map),
-                                 candidate.keyframe, shared_.rig, shared_.settings.places.loop);
-}
-
-template <camera::camera_model Camera, feature_descriptor D, place_recognizer<D> Places>
-bool loop_closer<Camera, D, Places>::correct(map_keyframe k, map_keyframe candidate, const loop_match& match,
-                                             effort by) {
-  const loop_correction_options& o = shared_.settings.places.correction;
-  correction_event event{.kind = correction_kind::loop, .map = k.map, .from = k, .to = candidate};
-  {
-    const auto edit = shared_.edit();
-    se3 before;
-    const auto taken = locked(by, [&]() -> std::optional<loop_correction::snapshot<D>> {
-      if (!shared_.atlas.has(k)) return std::nullopt;
-      before = shared_.atlas.at(k).T_world_camera;
-      return loop_correction::take(shared_.atlas.at(k.map), match, o);
-    });
-    if (!taken) return false;
-    const auto go_on = [&](std::size_t, std::size_t) { return !stopped_.load(); };
-    const auto solved = loop_correction::solve(*taken, shared_.rig, o, go_on);
-    if (!solved) return false;
-    if (!locked(by, [&] {
-          basic_map<D>& m = shared_.atlas.at(k.map);
-          const loop_correction::report done = loop_correction::apply_poses(m, *taken, *solved);
-          if (!done.corrected) return false;
-          const se3& after = m.at(k.keyframe).T_world_camera;
-          event.T_corrected_before = sim3(after.rotation(), after.translation(), done.scale) * sim3(before.inverse());
-          ++shared_.loops_closed;
-          ++corrections_;
-          return true;
-        }))
-      return false;
-    last_closed_ = k;
-    fuse(k.map, solved->pairs, {}, by);
-    update(k.map, by);
-  }
-  report(std::move(event), by);
-  return true;
-}
-
-template <camera::camera_model Camera, feature_descriptor D, place_recognizer<D> Places>
-bool loop_closer<Camera, D, Places>::merge(map_keyframe k, map_keyframe candidate, const loop_match& match, effort by) {
-  const loop_fusion_options& o = shared_.settings.places.correction.fusion;
-  correction_event event{.kind = correction_kind::merge, .map = candidate.map, .to = candidate, .merged = k.map};
-  {
-    const auto edit = shared_.edit();
-    const auto taken = locked(by, [&] { return map_merging::take(shared_.atlas, k.map, candidate.map, match, o); });
-    if (!taken) return false;
-    const map_merging::solution solved = map_merging::solve(*taken, shared_.rig, o);
-    const bool merged = locked(by, [&] {
-      std::vector<keyframe_id> ids;
-      for (const auto& each : shared_.atlas.at(k.map).keyframes()) ids.push_back(each.id);
-      const map_merging::report done = map_merging::join(shared_.atlas, *taken);
-      if (!done.merged) return false;
-      for (const keyframe_id id : ids) shared_.places.rename({k.map, id}, {candidate.map, id + done.offsets.keyframes});
-      event.offsets = done.offsets;
-      event.from = {candidate.map, done.keyframe};
-      event.T_corrected_before = done.T_into_from;
-      if (k.map < candidate.map) {  // the world stays that of the older map
-        event.T_map_before = done.T_into_from.inverse();
-        shared_.atlas.at(candidate.map).transform(event.T_map_before);
-        event.T_corrected_before = sim3{};
-      }
-      ++shared_.maps_merged;
-      ++corrections_;
-      return true;
-    });
-    if (!merged) return false;
-    last_closed_ = event.from;
-    fuse(candidate.map, solved.pairs, event.offsets, by);
-  }
-  report(std::move(event), by);
-  return true;
-}
 
 }  // namespace orbis::slam::detail

@@ -236,13 +236,83 @@ class checker {
     return loop_verdict::accepted;
   }
 
-  [[nodiscard]] std::vector<features::match> match_by_appearance() const;
+  [[nodiscard]] std::vector<features::match> match_by_appearance() const {
+    if (s_.seen.points.empty() || s_.known.points.empty()) return {};
+    const auto matcher = features::brute_force(distance_of_t<D>{}) | features::max_distance{options_.distance} |
+                         features::ratio_test{options_.ratio} | features::cross_check{} |
+                         features::rotation_consistency{};
+    return matcher(s_.seen.features, s_.known.features);
+  }
   /// The rigid motion between the points of the matches, by RANSAC; where lengths are not measured, with the scale.
-  [[nodiscard]] bool align(const std::vector<features::match>& matches, loop_match& found) const;
-  [[nodiscard]] bool align_scaled(const std::vector<features::match>& matches, loop_match& found) const;
+  [[nodiscard]] bool align(const std::vector<features::match>& matches, loop_match& found) const {
+    if (!rig_.scale_is_known) return align_scaled(matches, found);
+    std::vector<vec3> from, to;
+    std::vector<double> deviations;
+    for (const features::match& m : matches) {
+      from.push_back(s_.seen.points[m.query]);
+      to.push_back(s_.known.points[m.train]);
+      deviations.push_back(std::hypot(s_.seen.deviations[m.query], s_.known.deviations[m.train]));
+    }
+    const auto aligned = optimize::estimate_alignment<se3>(from, to,
+                                                           {.threshold = options_.alignment_threshold,
+                                                            .confidence = 0.999,
+                                                            .max_iterations = 3000,
+                                                            .min_inliers = options_.min_aligned,
+                                                            .seed = options_.seed,
+                                                            .deviations = deviations});
+    found.inliers = aligned ? aligned->inliers.size() : 0;
+    if (aligned) found.T_candidate_keyframe = aligned->T_to_from;
+    return aligned.has_value();
+  }
+  [[nodiscard]] bool align_scaled(const std::vector<features::match>& matches, loop_match& found) const {
+    using estimator = scaled_alignment<Camera>;
+    if (matches.empty()) return false;
+    std::vector<double> ratios;
+    for (const features::match& m : matches)
+      ratios.push_back(s_.known.points[m.train].z() / s_.seen.points[m.query].z());
+    const double ratio = median_of(ratios);  // both sides in about the same unit, for what the deviations add up to
+    const auto known = [&](const view<D>& v, std::uint32_t i) {
+      return known_point{v.points[i], v.image.pixel(v.index[i]),
+                         rig_.scales.information(v.features.keypoints[i].octave)};
+    };
+    std::vector<typename estimator::pair> pairs;
+    for (const features::match& m : matches) {
+      const double deviation = std::hypot(ratio * s_.seen.deviations[m.query], s_.known.deviations[m.train]);
+      if (deviation > 0.0 && std::isfinite(deviation))
+        pairs.push_back({known(s_.seen, m.query), known(s_.known, m.train), 1.0 / (deviation * deviation)});
+    }
+    random_bits random(mix64(options_.seed));
+    shuffle(pairs, random);
+    const auto aligned =
+        optimize::ransac(estimator(rig_.camera(), std::move(pairs)), {.threshold = options_.alignment_threshold,
+                                                                      .confidence = 0.999,
+                                                                      .max_iterations = 3000,
+                                                                      .min_inliers = options_.min_aligned,
+                                                                      .seed = options_.seed});
+    found.inliers = aligned ? aligned->inliers.size() : 0;
+    if (!aligned) return false;
+    const sim3& T = aligned->model.T_to_from;
+    found.T_candidate_keyframe = se3(T.rotation(), T.translation());
+    found.scale = T.scale();
+    return true;
+  }
   /// The landmarks around the candidate that a frame observes, and its pose by them, starting from `T_world_camera`.
   [[nodiscard]] optimize::pose_refinement localize(const basic_frame<D>& f, const se3& T_world_camera, double radius,
-                                                   std::vector<loop_pair>* observed) const;
+                                                   std::vector<loop_pair>* observed) const {
+    const auto matches = find_landmarks(s_.landmarks, f, T_world_camera, rig_, radius, options_.landmark_distance);
+    std::vector<optimize::pose_observation> observations;
+    for (const features::match& m : matches)
+      observations.push_back(observation_of(rig_, f, m.train, s_.landmarks.landmarks[m.query].position));
+    std::vector<std::uint8_t> outliers(matches.size());
+    const auto refined = optimize::refine_pose(std::span<const optimize::pose_observation>(observations), rig_.model,
+                                               T_world_camera, std::span<std::uint8_t>(outliers));
+    if (observed != nullptr) {
+      observed->clear();
+      for (std::size_t i = 0; i != matches.size(); ++i)
+        if (outliers[i] == 0) observed->push_back({matches[i].train, s_.landmarks.landmarks[matches[i].query].id});
+    }
+    return refined;
+  }
 
   [[nodiscard]] bool refine(loop_match& found) const {
     const se3 start = s_.landmarks.T_world_camera * found.T_candidate_keyframe;
@@ -305,87 +375,6 @@ class checker {
   const camera_rig<Camera>& rig_;
   const loop_options& options_;
 };
-
-template <camera::camera_model Camera, feature_descriptor D>
-std::vector<features::match> checker<Camera, D>::match_by_appearance() const {
-  if (s_.seen.points.empty() || s_.known.points.empty()) return {};
-  const auto matcher = features::brute_force(distance_of_t<D>{}) | features::max_distance{options_.distance} |
-                       features::ratio_test{options_.ratio} | features::cross_check{} |
-                       features::rotation_consistency{};
-  return matcher(s_.seen.features, s_.known.features);
-}
-
-template <camera::camera_model Camera, feature_descriptor D>
-bool checker<Camera, D>::align(const std::vector<features::match>& matches, loop_match& found) const {
-  if (!rig_.scale_is_known) return align_scaled(matches, found);
-  std::vector<vec3> from, to;
-  std::vector<double> deviations;
-  for (const features::match& m : matches) {
-    from.push_back(s_.seen.points[m.query]);
-    to.push_back(s_.known.points[m.train]);
-    deviations.push_back(std::hypot(s_.seen.deviations[m.query], s_.known.deviations[m.train]));
-  }
-  const auto aligned = optimize::estimate_alignment<se3>(from, to,
-                                                         {.threshold = options_.alignment_threshold,
-                                                          .confidence = 0.999,
-                                                          .max_iterations = 3000,
-                                                          .min_inliers = options_.min_aligned,
-                                                          .seed = options_.seed,
-                                                          .deviations = deviations});
-  found.inliers = aligned ? aligned->inliers.size() : 0;
-  if (aligned) found.T_candidate_keyframe = aligned->T_to_from;
-  return aligned.has_value();
-}
-
-template <camera::camera_model Camera, feature_descriptor D>
-bool checker<Camera, D>::align_scaled(const std::vector<features::match>& matches, loop_match& found) const {
-  using estimator = scaled_alignment<Camera>;
-  if (matches.empty()) return false;
-  std::vector<double> ratios;
-  for (const features::match& m : matches) ratios.push_back(s_.known.points[m.train].z() / s_.seen.points[m.query].z());
-  const double ratio = median_of(ratios);  // both sides in about the same unit, for what the deviations add up to
-  const auto known = [&](const view<D>& v, std::uint32_t i) {
-    return known_point{v.points[i], v.image.pixel(v.index[i]), rig_.scales.information(v.features.keypoints[i].octave)};
-  };
-  std::vector<typename estimator::pair> pairs;
-  for (const features::match& m : matches) {
-    const double deviation = std::hypot(ratio * s_.seen.deviations[m.query], s_.known.deviations[m.train]);
-    if (deviation > 0.0 && std::isfinite(deviation))
-      pairs.push_back({known(s_.seen, m.query), known(s_.known, m.train), 1.0 / (deviation * deviation)});
-  }
-  random_bits random(mix64(options_.seed));
-  shuffle(pairs, random);
-  const auto aligned =
-      optimize::ransac(estimator(rig_.camera(), std::move(pairs)), {.threshold = options_.alignment_threshold,
-                                                                    .confidence = 0.999,
-                                                                    .max_iterations = 3000,
-                                                                    .min_inliers = options_.min_aligned,
-                                                                    .seed = options_.seed});
-  found.inliers = aligned ? aligned->inliers.size() : 0;
-  if (!aligned) return false;
-  const sim3& T = aligned->model.T_to_from;
-  found.T_candidate_keyframe = se3(T.rotation(), T.translation());
-  found.scale = T.scale();
-  return true;
-}
-
-template <camera::camera_model Camera, feature_descriptor D>
-optimize::pose_refinement checker<Camera, D>::localize(const basic_frame<D>& f, const se3& T_world_camera,
-                                                       double radius, std::vector<loop_pair>* observed) const {
-  const auto matches = find_landmarks(s_.landmarks, f, T_world_camera, rig_, radius, options_.landmark_distance);
-  std::vector<optimize::pose_observation> observations;
-  for (const features::match& m : matches)
-    observations.push_back(observation_of(rig_, f, m.train, s_.landmarks.landmarks[m.query].position));
-  std::vector<std::uint8_t> outliers(matches.size());
-  const auto refined = optimize::refine_pose(std::span<const optimize::pose_observation>(observations), rig_.model,
-                                             T_world_camera, std::span<std::uint8_t>(outliers));
-  if (observed != nullptr) {
-    observed->clear();
-    for (std::size_t i = 0; i != matches.size(); ++i)
-      if (outliers[i] == 0) observed->push_back({matches[i].train, s_.landmarks.landmarks[matches[i].query].id});
-  }
-  return refined;
-}
 
 /// Deterministic. The cost is that of tracking a few frames.
 template <camera::camera_model Camera, feature_descriptor D>

@@ -31,7 +31,7 @@ namespace orbis::slam::detail {
 struct known_point {
   vec3 position = zeros<vec3>();  ///< in the camera, in its unit
   vec2 pixel = zeros<vec2>();     ///< where the camera saw it
-  double information = 1.0;      ///< 1 / sigma^2 of the pixel, 1 / pixel^2
+  double information = 1.0;       ///< 1 / sigma^2 of the pixel, 1 / pixel^2
 };
 
 /// The estimator of RANSAC for the similarity that takes points from one camera to another one. The error of a pair is

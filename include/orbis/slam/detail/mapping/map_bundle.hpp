@@ -126,7 +126,46 @@ class bundle_solver {
   template <execution_policy Policy = sequential_policy>
   [[nodiscard]] bundle_solution solve(const bundle_snapshot& s, const bundle_schedule& schedule,
                                       const progress& go_on = {}, bundle_solution memory = {},
-                                      const Policy& policy = seq);
+                                      const Policy& policy = seq) {
+    bundle_solution result = std::move(memory);
+    result.poses.assign(s.poses.begin(), s.poses.end());
+    result.points.assign(s.points.begin(), s.points.end());
+    result.outliers.assign(s.observations.size(), 0);
+    result.usable = schedule.keep_partial;
+    result.complete = false;
+    const auto first_total = static_cast<std::size_t>(std::max(0, schedule.robust_iterations));
+    const std::size_t total = first_total + static_cast<std::size_t>(std::max(0, schedule.iterations));
+    if (schedule.keep_partial && !go_on(0, total)) return result;
+    std::size_t before = 0;
+    const auto step = [&](std::size_t done, std::size_t) { return go_on(before + done, total); };
+    const auto accept = [&](const optimize::bundle_summary& summary) {
+      const bool cancelled = summary.status == optimize::bundle_status::cancelled;
+      result.usable = !optimize::is_failure(summary.status) && (!cancelled || schedule.keep_partial);
+      return result.usable && !cancelled;
+    };
+    const auto robust = adjuster_.solve(policy, std::span<se3>(result.poses), std::span<vec3>(result.points),
+                                        std::span<const optimize::bundle_observation>(s.observations),
+                                        {.max_iterations = schedule.robust_iterations,
+                                         .relative_tolerance = schedule.relative_tolerance,
+                                         .fixed_poses = s.is_fixed},
+                                        step);
+    if (!accept(robust)) return result;
+    find_outliers(s, result);
+    before = first_total;
+    const auto last = adjuster_.solve_again(policy, std::span<se3>(result.poses), std::span<vec3>(result.points),
+                                            {.max_iterations = schedule.iterations,
+                                             .relative_tolerance = schedule.relative_tolerance,
+                                             .fixed_poses = s.is_fixed,
+                                             .ignored = result.outliers},
+                                            step);
+    result.complete = accept(last);
+    if (!result.usable) return result;
+    find_outliers(s, result);
+    result.iterations = robust.iterations + last.iterations;
+    result.initial_cost = robust.initial_cost;
+    result.final_cost = last.final_cost;
+    return result;
+  }
 
  private:
   /// Marks the observations that disagree with the present poses and points.
@@ -140,49 +179,5 @@ class bundle_solver {
   optimize::bundle_adjuster<optimize::reprojection<Camera>> adjuster_;
   std::vector<double> squared_;
 };
-
-template <camera::camera_model Camera>
-template <execution_policy Policy>
-bundle_solution bundle_solver<Camera>::solve(const bundle_snapshot& s, const bundle_schedule& schedule,
-                                             const progress& go_on, bundle_solution memory, const Policy& policy) {
-  bundle_solution result = std::move(memory);
-  result.poses.assign(s.poses.begin(), s.poses.end());
-  result.points.assign(s.points.begin(), s.points.end());
-  result.outliers.assign(s.observations.size(), 0);
-  result.usable = schedule.keep_partial;
-  result.complete = false;
-  const auto first_total = static_cast<std::size_t>(std::max(0, schedule.robust_iterations));
-  const std::size_t total = first_total + static_cast<std::size_t>(std::max(0, schedule.iterations));
-  if (schedule.keep_partial && !go_on(0, total)) return result;
-  std::size_t before = 0;
-  const auto step = [&](std::size_t done, std::size_t) { return go_on(before + done, total); };
-  const auto accept = [&](const optimize::bundle_summary& summary) {
-    const bool cancelled = summary.status == optimize::bundle_status::cancelled;
-    result.usable = !optimize::is_failure(summary.status) && (!cancelled || schedule.keep_partial);
-    return result.usable && !cancelled;
-  };
-  const auto robust = adjuster_.solve(policy, std::span<se3>(result.poses), std::span<vec3>(result.points),
-                                      std::span<const optimize::bundle_observation>(s.observations),
-                                      {.max_iterations = schedule.robust_iterations,
-                                       .relative_tolerance = schedule.relative_tolerance,
-                                       .fixed_poses = s.is_fixed},
-                                      step);
-  if (!accept(robust)) return result;
-  find_outliers(s, result);
-  before = first_total;
-  const auto last = adjuster_.solve_again(policy, std::span<se3>(result.poses), std::span<vec3>(result.points),
-                                          {.max_iterations = schedule.iterations,
-                                           .relative_tolerance = schedule.relative_tolerance,
-                                           .fixed_poses = s.is_fixed,
-                                           .ignored = result.outliers},
-                                          step);
-  result.complete = accept(last);
-  if (!result.usable) return result;
-  find_outliers(s, result);
-  result.iterations = robust.iterations + last.iterations;
-  result.initial_cost = robust.initial_cost;
-  result.final_cost = last.final_cost;
-  return result;
-}
 
 }  // namespace orbis::slam::detail

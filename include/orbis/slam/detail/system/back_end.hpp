@@ -20,14 +20,36 @@ namespace orbis::slam::detail {
 template <camera::camera_model Camera, feature_descriptor D, place_recognizer<D> Places>
 class back_end {
  public:
-  explicit back_end(shared_state<Camera, D, Places>& shared);
+  explicit back_end(shared_state<Camera, D, Places>& shared) : shared_{shared}, mapper_{shared}, closer_{shared} {
+    if (!shared.settings.threads.enabled) return;
+    global_ = std::make_unique<worker<map_id>>([this](map_id m) { closer_.adjust_globally(m); });
+    loops_ = std::make_unique<worker<map_keyframe>>([this](map_keyframe k) {
+      if (closer_.close(k)) global_->push_once(shared_.locked([&] { return shared_.atlas.current(k).map; }));
+    });
+    mapping_ = std::make_unique<worker<map_keyframe>>([this](map_keyframe k) {
+      // Where frames wait for the mapping, the load of the machine decides about time, not about the map.
+      mapper_.process(k, [this] { return !shared_.settings.threads.wait && mapping_->waiting() != 0; });
+      loops_->wait_for_room(most_waiting());
+      loops_->push(k);
+    });
+  }
   back_end(const back_end&) = delete;
   back_end& operator=(const back_end&) = delete;
   /// Waits for the running jobs and drops the others.
-  ~back_end();
+  ~back_end() {
+    closer_.stop();
+    // Each passes jobs to the next one, and queries its own queue: none is destroyed until all have stopped.
+    if (mapping_) mapping_->stop();
+    if (loops_) loops_->stop();
+    if (global_) global_->stop();
+  }
 
   /// Works on a keyframe, or, with threads, adds it to the queue. No lock is held.
-  void process(map_keyframe k);
+  void process(map_keyframe k) {
+    if (mapping_) return mapping_->push(k);
+    mapper_.process(k, [] { return false; });
+    if (closer_.close(k)) closer_.adjust_globally(shared_.atlas.current(k).map);
+  }
   /// Whether so many keyframes wait that no further one should be made.
   [[nodiscard]] bool is_full() const { return mapping_ && mapping_->waiting() >= most_waiting(); }
   /// Waits until `is_full` is false.
@@ -52,37 +74,5 @@ class back_end {
   std::unique_ptr<worker<map_id>> global_;  ///< null without threads, as the others
   std::unique_ptr<worker<map_keyframe>> loops_, mapping_;
 };
-
-template <camera::camera_model Camera, feature_descriptor D, place_recognizer<D> Places>
-back_end<Camera, D, Places>::back_end(shared_state<Camera, D, Places>& shared)
-    : shared_{shared}, mapper_{shared}, closer_{shared} {
-  if (!shared.settings.threads.enabled) return;
-  global_ = std::make_unique<worker<map_id>>([this](map_id m) { closer_.adjust_globally(m); });
-  loops_ = std::make_unique<worker<map_keyframe>>([this](map_keyframe k) {
-    if (closer_.close(k)) global_->push_once(shared_.locked([&] { return shared_.atlas.current(k).map; }));
-  });
-  mapping_ = std::make_unique<worker<map_keyframe>>([this](map_keyframe k) {
-    // Where frames wait for the mapping, the load of the machine decides about time, not about the map.
-    mapper_.process(k, [this] { return !shared_.settings.threads.wait && mapping_->waiting() != 0; });
-    loops_->wait_for_room(most_waiting());
-    loops_->push(k);
-  });
-}
-
-template <camera::camera_model Camera, feature_descriptor D, place_recognizer<D> Places>
-back_end<Camera, D, Places>::~back_end() {
-  closer_.stop();
-  // Each passes jobs to the next one, and queries its own queue: none is destroyed until all have stopped.
-  if (mapping_) mapping_->stop();
-  if (loops_) loops_->stop();
-  if (global_) global_->stop();
-}
-
-template <camera::camera_model Camera, feature_descriptor D, place_recognizer<D> Places>
-void back_end<Camera, D, Places>::process(map_keyframe k) {
-  if (mapping_) return mapping_->push(k);
-  mapper_.process(k, [] { return false; });
-  if (closer_.close(k)) closer_.adjust_globally(shared_.atlas.current(k).map);
-}
 
 }  // namespace orbis::slam::detail

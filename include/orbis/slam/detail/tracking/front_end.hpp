@@ -55,7 +55,17 @@ class front_end {
   /// Called for a map that is left behind with few keyframes.
   using map_drop = std::function<void(map_id)>;
 
-  front_end(const camera_rig<Camera>& rig, const options& settings);
+  front_end(const camera_rig<Camera>& rig, const options& settings)
+      : tracker_{rig, settings},
+        moving_{rig, settings},
+        depth_{rig, settings.depth_term},
+        start_{rig, settings.start, settings.seed},
+        rig_{rig},
+        options_{settings},
+        shutter_{settings.shutter},
+        log_{settings.trajectory_frames} {
+    if (settings.estimates_shutter) observer_.emplace();
+  }
 
   /// When the rows of the images are taken, as far as it is known.
   [[nodiscard]] const camera::shutter& shutter() const noexcept { return shutter_; }
@@ -79,7 +89,12 @@ class front_end {
   [[nodiscard]] const frame_log& log() const noexcept { return log_; }
   [[nodiscard]] double last_timestamp() const noexcept { return last_.timestamp; }
   /// The present pose of the last tracked frame: later corrections of its keyframe move it.
-  [[nodiscard]] se3 last_pose(const atlas_type& maps) const;
+  [[nodiscard]] se3 last_pose(const atlas_type& maps) const {
+    const map_keyframe k = maps.current(last_reference_);
+    return maps.contains(k.map) && maps.at(k.map).remembers(k.keyframe)
+               ? maps.at(k.map).pose_of(k.keyframe) * scaled(T_reference_last_, maps.at(k.map).scale_of(k.keyframe))
+               : last_.T_world_camera;
+  }
   /// That keyframe, by the id that it had then.
   [[nodiscard]] map_keyframe last_reference() const noexcept { return last_reference_; }
 
@@ -87,7 +102,20 @@ class front_end {
   [[nodiscard]] vec6 last_twist() const { return shutter_.is_global() ? vec6(zeros<vec6>()) : last_.twist; }
 
   /// The last tracked frame with its features. For the thread that tracks; takes no look at the maps. O(features).
-  [[nodiscard]] tracked_frame last_frame() const;
+  [[nodiscard]] tracked_frame last_frame() const {
+    tracked_frame shown{last_reference_, T_reference_last_, {}, last_twist()};
+    shown.features.reserve(last_.size());
+    for (std::size_t i = 0; i != last_.size(); ++i) {
+      const landmark_id l = last_.landmarks[i];
+      const auto& at = last_.features.keypoints[i];
+      const bool moved = !last_.as_read.empty();  // shown where they are in the image
+      shown.features.push_back(
+          {moved ? last_.as_read[i].x : at.x, moved ? last_.as_read[i].y : at.y, l != no_id && l < first_new_, false});
+    }
+    for (const vec2& at : moving_.pixels())
+      shown.features.push_back({static_cast<float>(at.x()), static_cast<float>(at.y()), false, true});
+    return shown;
+  }
 
   /// The active map was changed from outside: the camera is searched for in it.
   void set_lost() {
@@ -97,54 +125,239 @@ class front_end {
 
   /// Brings ids and poses that are kept from the last frame to the state of the maps, which may have been merged,
   /// corrected and culled since.
-  void sync_with_map(const atlas_type& maps);
+  void sync_with_map(const atlas_type& maps) {
+    const map_keyframe now = maps.current(reference_);
+    if (now.map != reference_.map)
+      for (landmark_id& l : last_.landmarks)
+        if (l != no_id) l = maps.current(reference_.map, l);
+    reference_ = now;
+    if (!maps.contains(now.map)) return;
+    last_.T_world_camera = last_pose(maps);
+    const map_keyframe last = maps.current(last_reference_);
+    if (last.map == now.map && maps.at(now.map).remembers(last.keyframe)) {
+      const double scale = maps.at(now.map).scale_of(last.keyframe);
+      const double grown = scale / std::exchange(last_scale_, scale);
+      motion_.scale_by(grown);
+      set_block(last_.twist, 0, 0, head<3>(last_.twist) * grown);
+    }
+    reference_.keyframe = maps.at(now.map).replacement_of(now.keyframe);
+  }
 
   /// Estimates the pose of a frame and sets `state()`. Returns the number of landmarks that agree with the pose (of
   /// points with depth, if the frame begins a map), 0 if it has none; `is_tracking()` with 0 where depth alone holds
   /// it. `is_frozen`: nothing is changed in the maps, and no map is begun.
   std::size_t localize(frame_type& f, atlas_type& maps, bool is_frozen, const row_follower& follow_rows,
-                       const appearance_search& similar, const map_drop& drop);
+                       const appearance_search& similar, const map_drop& drop) {
+    first_new_ = no_id;
+    begins_map_ = false;
+    first_keyframe_.reset();
+    if (state_ == track_state::not_started) return is_frozen ? 0 : begin_map(f, maps, drop);
+    if (is_tracking())
+      if (const std::size_t inliers = track_from_last(f, maps, is_frozen, follow_rows); inliers > 0)
+        return settle(f, maps, inliers, is_frozen, follow_rows);
+    const auto aligned = align_depth(f, maps);
+    if (aligned)
+      if (const std::size_t inliers = track_from_depth(f, maps, *aligned, is_frozen, follow_rows); inliers > 0)
+        return inliers;
+    if (const std::size_t inliers = relocalize(f, maps, is_frozen, follow_rows, similar); inliers > 0) return inliers;
+    if (aligned && is_tracking() && hold_by_depth(f, *aligned)) return 0;
+    if (const std::size_t inliers = search_in_place(f, maps, is_frozen, follow_rows); inliers > 0) return inliers;
+    if (is_tracking()) lost_since_ = last_.timestamp;
+    if (!lost_since_) lost_since_ = f.timestamp;
+    state_ = track_state::lost;
+    // Two frames take a while to find: where little is lost, that begins at once.
+    const bool is_here = last_.size() != 0 && maps.current(last_reference_).map == maps.active_id();
+    const bool at_once =
+        is_here && !rig_.scale_is_known && maps.active().keyframes().size() < options_.recovery.min_map_keyframes;
+    if (is_frozen || (!at_once && f.timestamp - *lost_since_ < options_.recovery.new_map_after)) return 0;
+    return begin_map(f, maps, drop);
+  }
 
   /// Makes the keyframe that shares most landmarks with the frame the reference.
-  void update_reference(const frame_type& f, const atlas_type& maps);
+  void update_reference(const frame_type& f, const atlas_type& maps) {
+    if (!maps.active().keyframes().empty())
+      reference_ = {maps.active_id(), most_shared(maps.active(), f, reference_.keyframe)};
+  }
   /// Whether a localised frame should become a keyframe. One that depth holds becomes one if landmarks have not held
   /// the camera for some time, and if a map could begin with it.
-  [[nodiscard]] bool needs_keyframe(const frame_type& f, std::size_t inliers, const atlas_type& maps) const;
+  [[nodiscard]] bool needs_keyframe(const frame_type& f, std::size_t inliers, const atlas_type& maps) const {
+    if (begins_map()) return true;
+    if (f.held_by_depth)
+      return f.timestamp - held_since_ >= options_.keyframes.interval && start_points(f, options_) > 0;
+    return is_keyframe_due(
+        gather_evidence(maps.active(), f, reference_.keyframe, inliers, options_, rig_.scale_is_known),
+        options_.keyframes);
+  }
   /// Whether the last frame begins a map.
   [[nodiscard]] bool begins_map() const noexcept { return begins_map_; }
   /// A keyframe before that of the last frame, with which a map begins that needs two.
   [[nodiscard]] const std::optional<map_keyframe>& first_keyframe() const noexcept { return first_keyframe_; }
   /// Adds a frame to the active map as a keyframe, which becomes the reference.
-  map_keyframe make_keyframe(frame_type& f, atlas_type& maps);
+  map_keyframe make_keyframe(frame_type& f, atlas_type& maps) {
+    basic_map<D>& m = maps.active();
+    first_new_ = m.landmark_end();
+    const keyframe_id id = insert_keyframe(m, f, options_);
+    for (const start_point& p : std::exchange(start_points_, {})) {
+      const landmark_id l = m.add_landmark(id, p.second, p.position);
+      m.add_observation(l, first_keyframe_->keyframe, p.first);
+      m.update_landmark(l);
+    }
+    f.landmarks = m.at(id).landmarks;
+    return reference_ = {maps.active_id(), id};
+  }
 
   /// Counts a frame and, if it was localised, keeps it for the next prediction and in the log.
   /// `made`: the keyframe that it became.
-  void finish(frame_type f, const atlas_type& maps, const std::optional<map_keyframe>& made);
+  void finish(frame_type f, const atlas_type& maps, const std::optional<map_keyframe>& made) {
+    ++counters_.frames;
+    counters_.tracked += is_tracking();
+    counters_.relocalized += state_ == track_state::relocalized;
+    counters_.lost += state_ == track_state::lost;
+    motion_.reset();
+    if (observer_) observe(f, maps, made);
+    if (!is_tracking()) return;
+    if (last_.index + 1 == f.index && state_ == track_state::tracking && last_.size() != 0)
+      motion_.set({last_.timestamp, last_.T_world_camera}, {f.timestamp, f.T_world_camera});
+    last_reference_ = reference_;
+    start_.reset();
+    const basic_keyframe<D>& reference = maps.active().at(reference_.keyframe);
+    last_scale_ = reference.scale;
+    T_reference_last_ = scaled(reference.T_world_camera.inverse() * f.T_world_camera, 1.0 / reference.scale);
+    log_.add({f.timestamp, last_reference_, T_reference_last_});
+    if (!f.held_by_depth || made) held_since_ = f.timestamp;
+    if (made)
+      depth_.keep(*made, se3{}, f.twist, shutter_);
+    else if (depth_.needs_surface(maps, f.T_world_camera))
+      depth_.keep(last_reference_, T_reference_last_, f.twist, shutter_);
+    last_ = std::move(f);
+  }
   /// Where the trajectory is limited, so is what the active map remembers of erased keyframes: those that frames of the
   /// trajectory hang on, and the latest. O(1), but O(frames + n log n) for every thousandth erased keyframe, where n
   /// are remembered.
-  void forget_erased(atlas_type& maps);
+  void forget_erased(atlas_type& maps) {
+    if (options_.trajectory_frames == std::numeric_limits<std::size_t>::max()) return;
+    if (maps.active().content().erased.size() < most_erased_) return;
+    std::vector<keyframe_id> keep = log_.references(maps, maps.active_id());
+    for (const map_keyframe& k : {maps.current(reference_), maps.current(last_reference_)})
+      if (k.map == maps.active_id()) keep.push_back(k.keyframe);
+    maps.active().forget_erased(keep, latest_erased);
+    most_erased_ = maps.active().content().erased.size() + latest_erased;
+  }
 
  private:
   /// Begins a map with a frame, if the sensor says that it can; without depth, with a frame before it as well. The map
   /// becomes the active one. Returns the number of its points.
-  std::size_t begin_map(frame_type& f, atlas_type& maps, const map_drop& drop);
+  std::size_t begin_map(frame_type& f, atlas_type& maps, const map_drop& drop) {
+    std::size_t points = start_points(f, options_);
+    if (points == 0) return 0;
+    std::optional<monocular_start_result<D>> start;
+    if (!rig_.scale_is_known) {
+      start = start_.see(f);
+      if (!start) return 0;
+      points = start->points.size();
+    }
+    enter_new_map(maps, drop);
+    f.landmarks.assign(f.size(), no_id);  // of searches in other maps
+    f.T_world_camera =
+        options_.find_initial_pose ? options_.find_initial_pose() : options_.initial_pose.value_or(se3{});
+    if (start) add_start(*std::move(start), f, maps);
+    begins_map_ = true;
+    state_ = track_state::tracking;
+    return points;
+  }
   /// Makes a new map the active one, unless that is new. One with few keyframes is left behind.
-  void enter_new_map(atlas_type& maps, const map_drop& drop);
+  void enter_new_map(atlas_type& maps, const map_drop& drop) {
+    if (state_ == track_state::not_started) return;
+    const map_id before = maps.active_id();
+    maps.create();
+    if (maps.at(before).keyframes().size() < options_.recovery.min_map_keyframes) drop(before);
+    last_ = {};
+    motion_.reset();
+  }
   /// Adds the first of two frames that a map begins with; with `f`, the second one, their points follow
   /// (`make_keyframe`).
-  void add_start(monocular_start_result<D> start, frame_type& f, atlas_type& maps);
+  void add_start(monocular_start_result<D> start, frame_type& f, atlas_type& maps) {
+    // An initial pose that was asked for just now is that of `f`, otherwise that of the first frame.
+    const se3 T_world_first =
+        options_.find_initial_pose ? f.T_world_camera * start.T_first_second.inverse() : se3(f.T_world_camera);
+    f.T_world_camera = T_world_first * start.T_first_second;
+    frame_type& first = start.first;
+    first.T_world_camera = T_world_first;
+    first.landmarks.assign(first.size(), no_id);
+    const double timestamp = first.timestamp;
+    first_keyframe_ = reference_ = {maps.active_id(), insert_keyframe(maps.active(), std::move(first), options_)};
+    start_points_ = std::move(start.points);
+    for (start_point& p : start_points_) p.position = T_world_first * p.position;
+    log_.add({timestamp, reference_, se3{}});
+    ++counters_.tracked;
+    if (state_ == track_state::lost) --counters_.lost;
+  }
   /// From the last frame, otherwise from the reference keyframe; refined on the local map.
-  std::size_t track_from_last(frame_type& f, atlas_type& maps, bool is_frozen, const row_follower& follow_rows);
+  std::size_t track_from_last(frame_type& f, atlas_type& maps, bool is_frozen, const row_follower& follow_rows) {
+    const se3 predicted = motion_.predict({last_.timestamp, last_.T_world_camera}, f.timestamp);
+    if (!shutter_.is_global()) {
+      f.T_world_camera = predicted;
+      follow_rows(f, {shutter_, motion_between(last_, f)});
+      move_keypoints(f);
+    }
+    moving_.set_last(last_.T_world_camera);
+    moving_.find(f);
+    if (tracker_.by_motion(f, maps.active(), last_, predicted, moving_) == 0 &&
+        tracker_.by_appearance(f, maps.active(), reference_.keyframe) == 0)
+      return 0;
+    moving_.spread(f);
+    move_keypoints(f);
+    const std::size_t inliers = track_local_map(f, maps.active(), options_.search_radius, is_frozen);
+    if (inliers < options_.min_inliers) return 0;
+    refine_motion(f, maps, true, follow_rows);
+    moving_.take_out(f);
+    state_ = track_state::tracking;
+    return inliers;
+  }
   /// From the reference and the keyframes with similar appearance, in any map.
   std::size_t relocalize(frame_type& f, atlas_type& maps, bool is_frozen, const row_follower& follow_rows,
-                         const appearance_search& similar);
+                         const appearance_search& similar) {
+    moving_.clear();
+    std::vector<map_keyframe> candidates = similar(f.features, options_.recovery.candidates);
+    if (reference_.map == maps.active_id() && maps.active().has_keyframe(reference_.keyframe) &&
+        std::find(candidates.begin(), candidates.end(), reference_) == candidates.end())
+      candidates.insert(candidates.begin(), reference_);
+    const map_id active_before = maps.active_id();
+    const map_keyframe reference_before = reference_;
+    for (const map_keyframe& k : candidates) {
+      if (tracker_.by_appearance(f, maps.at(k.map), k.keyframe) == 0) continue;
+      maps.activate(k.map);
+      reference_ = k;
+      if (const std::size_t inliers = track_found(f, maps, is_frozen, follow_rows); inliers > 0) return inliers;
+    }
+    maps.activate(active_before);
+    reference_ = reference_before;
+    return 0;
+  }
   /// Around the last tracked frame's place, for a camera that has turned; by a frame that sees enough to begin a map.
-  std::size_t search_in_place(frame_type& f, atlas_type& maps, bool is_frozen, const row_follower& follow_rows);
-  std::size_t track_local_map(frame_type& f, basic_map<D>& m, double radius, bool is_frozen);
+  std::size_t search_in_place(frame_type& f, atlas_type& maps, bool is_frozen, const row_follower& follow_rows) {
+    const bool is_here = last_.size() != 0 && reference_.map == maps.active_id() && maps.has(reference_);
+    const bool is_recent = f.timestamp - last_.timestamp < options_.recovery.new_map_after;
+    if (!is_here || (is_frozen && !is_recent) || start_points(f, options_) == 0) return 0;
+    return tracker_.by_turning(f, maps.active(), last_) == 0 ? 0 : track_found(f, maps, is_frozen, follow_rows);
+  }
+  std::size_t track_local_map(frame_type& f, basic_map<D>& m, double radius, bool is_frozen) {
+    return tracker_.on_local_map(
+        f, m, reference_.keyframe, radius, moving_, [&](landmark_id l) { is_frozen ? void() : m.count_visible(l); },
+        [&](landmark_id l) { is_frozen ? void() : m.count_found(l); });
+  }
 
   /// Takes from a frame the landmarks that do not agree with its pose. Returns how many are left.
-  std::size_t drop_disagreeing(frame_type& f, const basic_map<D>& m) const;
+  std::size_t drop_disagreeing(frame_type& f, const basic_map<D>& m) const {
+    const se3 T_camera_world = f.T_world_camera.inverse();
+    std::size_t left = 0;
+    for (std::size_t i = 0; i != f.size(); ++i) {
+      landmark_id& l = f.landmarks[i];
+      if (l != no_id && !agrees(rig_, f, T_camera_world, i, m.landmark_at(l).position)) l = no_id;
+      left += l != no_id;
+    }
+    return left;
+  }
 
   /// With a rolling shutter, moves the keypoints of a frame to its time, by the motion since the last frame to its
   /// present pose.
@@ -152,24 +365,125 @@ class front_end {
     if (!shutter_.is_global()) move_to_frame_time(f, rig_, shutter_, motion_between(last_, f));
   }
   /// Lets the observer see a tracked frame.
-  void observe(const frame_type& f, const atlas_type& maps, const std::optional<map_keyframe>& made);
+  void observe(const frame_type& f, const atlas_type& maps, const std::optional<map_keyframe>& made) {
+    if (state_ != track_state::tracking || last_.index + 1 != f.index || last_.size() == 0)
+      return observer_->interrupt();
+    if (const auto changed = observer_->add(last_, f, made, maps.active(), rig_, shutter_)) shutter_ = *changed;
+  }
   /// Refines a frame by the landmarks that it observes and, if it joins in, by depth: the pose and, with a rolling
   /// shutter, the twist, to which the keypoints are moved then. `is_next`: the frame follows the last one.
-  void refine_motion(frame_type& f, const atlas_type& maps, bool is_next, const row_follower& follow_rows);
+  void refine_motion(frame_type& f, const atlas_type& maps, bool is_next, const row_follower& follow_rows) {
+    const basic_map<D>& m = maps.active();
+    const bool rolls = !shutter_.is_global();
+    const bool with_depth = depth_.surround(maps, f.T_world_camera) && options_.depth_term.enabled;
+    twist_prior prior;
+    if (looks_at_rows() && is_next && f.timestamp > last_.timestamp)
+      prior =
+          twist_prior::after({last_.T_world_camera, last_.twist}, f.timestamp - last_.timestamp, motion_.is_known());
+    const auto expected_twist = [&] {
+      return prior.T_world_before ? prior.expected(f.T_world_camera.inverse()) : f.twist;
+    };
+    moving_pose refined{f.T_world_camera, rolls ? expected_twist() : vec6(zeros<vec6>())};
+    const int rounds = with_depth ? 3 : !rolls ? 0 : shutter_.is_depth_simultaneous() ? 1 : 2;
+    if (!rolls && with_depth) find_observations(f, m, rig_, rows_);
+    for (int round = 0; round != rounds; ++round) {
+      if (rolls) {
+        follow_rows(f, {shutter_, refined.twist});  // the depth was read by the motion before
+        find_row_observations(f, m, rig_, shutter_, rows_);
+      }
+      const auto depth = with_depth ? depth_.term_at(refined, shutter_) : std::nullopt;
+      refined = refine_moving_pose(std::span<const row_observation>(rows_), rig_.model, refined, prior,
+                                   with_depth ? 3 : 5, {.other = depth ? &*depth : nullptr, .moves = rolls});
+      if (shutter_.is_depth_early()) {
+        early_depth_.see(std::span<const row_observation>(rows_), rig_.model, refined, prior);
+        refined.twist = early_depth_.between(prior, refined.twist);
+      }
+    }
+    if (shutter_.is_depth_early()) early_depth_.advance();
+    f.T_world_camera = refined.T_world_camera;
+    if (observer_) observer_->set_depths(f, {shutter_, rolls ? refined.twist : expected_twist()}, follow_rows);
+    if (!rolls) {
+      f.twist = expected_twist();
+      return;
+    }
+    move_to_frame_time(f, rig_, shutter(), refined.twist, [&](std::size_t i) {
+      return f.landmarks[i] == no_id ? 0.0
+                                     : (refined.T_world_camera.inverse() * m.landmark_at(f.landmarks[i]).position).z();
+    });
+  }
   /// From a pose that was found by a search, in the active map around the reference: refined on the local map. Sets
   /// `state()` if the frame is found again.
-  std::size_t track_found(frame_type& f, atlas_type& maps, bool is_frozen, const row_follower& follow_rows);
+  std::size_t track_found(frame_type& f, atlas_type& maps, bool is_frozen, const row_follower& follow_rows) {
+    const std::size_t inliers = track_local_map(f, maps.active(), 3.0 * options_.search_radius, is_frozen);
+    if (inliers < options_.recovery.min_inliers) return 0;
+    refine_motion(f, maps, false, follow_rows);
+    state_ = track_state::relocalized;
+    return inliers;
+  }
   /// Aligns the depth of a frame around the last one with the surfaces of keyframes.
-  [[nodiscard]] std::optional<depth_alignment> align_depth(const frame_type& f, const atlas_type& maps);
+  [[nodiscard]] std::optional<depth_alignment> align_depth(const frame_type& f, const atlas_type& maps) {
+    constexpr double longest = 2.0;  // seconds
+    const double interval = f.timestamp - last_.timestamp;
+    if (!options_.depth_term.recovers || !(interval > 0.0 && interval < longest) ||
+        maps.current(last_reference_).map != maps.active_id())
+      return std::nullopt;
+    const se3 predicted = motion_.predict({last_.timestamp, last_.T_world_camera}, f.timestamp);
+    if (!depth_.surround(maps, predicted)) return std::nullopt;
+    return depth_.align(search_starts(last_.T_world_camera, predicted, interval), shutter_);
+  }
   /// From a pose that depth was aligned at, refined on the local map.
   std::size_t track_from_depth(frame_type& f, atlas_type& maps, const depth_alignment& aligned, bool is_frozen,
-                               const row_follower& follow_rows);
+                               const row_follower& follow_rows) {
+    f.T_world_camera = aligned.at.T_world_camera;
+    moving_.clear();
+    if (!shutter_.is_global()) {
+      follow_rows(f, {shutter_, motion_between(last_, f)});
+      move_keypoints(f);
+    }
+    if (tracker_.by_motion(f, maps.active(), last_, aligned.at.T_world_camera, moving_) == 0)
+      f.T_world_camera = aligned.at.T_world_camera;
+    const std::size_t inliers = track_local_map(f, maps.active(), 3.0 * options_.search_radius, is_frozen);
+    const std::size_t few =
+        options_.depth_term.min_inliers * static_cast<std::size_t>(std::max(1, 6 - aligned.determined));
+    if (inliers < (is_tracking() ? std::min(few, options_.min_inliers) : options_.recovery.min_inliers)) return 0;
+    refine_motion(f, maps, true, follow_rows);
+    if (inliers < options_.min_inliers) {
+      const std::size_t confirmed = drop_disagreeing(f, maps.active());
+      if (confirmed < few || !depth_.is_surrounded() ||
+          !depth_.holds(depth_.agreement({f.T_world_camera, f.twist}, shutter_)))
+        return 0;
+      f.held_by_depth = true;
+    }
+    state_ = is_tracking() ? track_state::tracking : track_state::relocalized;
+    return inliers;
+  }
   /// Where the depth of a frame that was tracked by `inliers` landmarks does not fit its pose, but another one: from
   /// there. Returns as `localize`.
   std::size_t settle(frame_type& f, atlas_type& maps, std::size_t inliers, bool is_frozen,
-                     const row_follower& follow_rows);
+                     const row_follower& follow_rows) {
+    // Where something moves in the view, that is what does not fit.
+    if (!options_.depth_term.recovers || moving_.size() != 0 || !depth_.is_surrounded()) return inliers;
+    const association seen = depth_.agreement({f.T_world_camera, f.twist}, shutter_);
+    if (seen.visible < options_.depth_term.min_points || seen.share() >= options_.depth_term.min_share) return inliers;
+    const auto aligned = align_depth(f, maps);
+    constexpr double better = 0.15;
+    if (!aligned || aligned->seen.share() < seen.share() + better) return inliers;
+    unsettled_ = f;
+    if (const std::size_t there = track_from_depth(f, maps, *aligned, is_frozen, follow_rows); there > 0) return there;
+    if (hold_by_depth(f, *aligned)) return 0;
+    std::swap(f, unsettled_);
+    return inliers;
+  }
   /// Takes a pose from depth alone. False if that is not sure, or leaves a direction of it free.
-  bool hold_by_depth(frame_type& f, const depth_alignment& aligned);
+  bool hold_by_depth(frame_type& f, const depth_alignment& aligned) {
+    if (!depth_.holds_alone(aligned)) return false;
+    f.T_world_camera = aligned.at.T_world_camera;
+    f.landmarks.assign(f.size(), no_id);
+    move_keypoints(f);
+    state_ = track_state::tracking;
+    f.held_by_depth = true;
+    return true;
+  }
 
   tracker<Camera, D, Matchers> tracker_;
   moving_features<Camera, D, Matchers> moving_;
@@ -201,409 +515,5 @@ class front_end {
   frame_log log_;
   std::size_t most_erased_ = 2 * latest_erased;  ///< of any map, before it is made to forget
 };
-
-// The members are defined outside of the class, so that a compiled instantiation of it (`extern template`) covers them.
-
-template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers>
-front_end<Camera, D, Matchers>::front_end(const camera_rig<Camera>& rig, const options& settings)
-    : tracker_{rig, settings},
-      moving_{rig, settings},
-      depth_{rig, settings.depth_term},
-      start_{rig, settings.start, settings.seed},
-      rig_{rig},
-      options_{settings},
-      shutter_{settings.shutter},
-      log_{settings.trajectory_frames} {
-  if (settings.estimates_shutter) observer_.emplace();
-}
-
-template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers>
-void front_end<Camera, D, Matchers>::update_reference(const frame_type& f, const atlas_type& maps) {
-  if (!maps.active().keyframes().empty())
-    reference_ = {maps.active_id(), most_shared(maps.active(), f, reference_.keyframe)};
-}
-
-template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers>
-bool front_end<Camera, D, Matchers>::needs_keyframe(const frame_type& f, std::size_t inliers,
-                                                            const atlas_type& maps) const {
-  if (begins_map()) return true;
-  if (f.held_by_depth)
-    return f.timestamp - held_since_ >= options_.keyframes.interval && start_points(f, options_) > 0;
-  return is_keyframe_due(gather_evidence(maps.active(), f, reference_.keyframe, inliers, options_, rig_.scale_is_known),
-                         options_.keyframes);
-}
-
-template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers>
-map_keyframe front_end<Camera, D, Matchers>::make_keyframe(frame_type& f, atlas_type& maps) {
-  basic_map<D>& m = maps.active();
-  first_new_ = m.landmark_end();
-  const keyframe_id id = insert_keyframe(m, f, options_);
-  for (const start_point& p : std::exchange(start_points_, {})) {
-    const landmark_id l = m.add_landmark(id, p.second, p.position);
-    m.add_observation(l, first_keyframe_->keyframe, p.first);
-    m.update_landmark(l);
-  }
-  f.landmarks = m.at(id).landmarks;
-  return reference_ = {maps.active_id(), id};
-}
-
-template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers>
-std::size_t front_end<Camera, D, Matchers>::track_local_map(frame_type& f, basic_map<D>& m, double radius,
-                                                                    bool is_frozen) {
-  return tracker_.on_local_map(
-      f, m, reference_.keyframe, radius, moving_, [&](landmark_id l) { is_frozen ? void() : m.count_visible(l); },
-      [&](landmark_id l) { is_frozen ? void() : m.count_found(l); });
-}
-
-template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers>
-std::size_t front_end<Camera, D, Matchers>::drop_disagreeing(frame_type& f, const basic_map<D>& m) const {
-  const se3 T_camera_world = f.T_world_camera.inverse();
-  std::size_t left = 0;
-  for (std::size_t i = 0; i != f.size(); ++i) {
-    landmark_id& l = f.landmarks[i];
-    if (l != no_id && !agrees(rig_, f, T_camera_world, i, m.landmark_at(l).position)) l = no_id;
-    left += l != no_id;
-  }
-  return left;
-}
-
-template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers>
-se3 front_end<Camera, D, Matchers>::last_pose(const atlas_type& maps) const {
-  const map_keyframe k = maps.current(last_reference_);
-  return maps.contains(k.map) && maps.at(k.map).remembers(k.keyframe)
-             ? maps.at(k.map).pose_of(k.keyframe) * scaled(T_reference_last_, maps.at(k.map).scale_of(k.keyframe))
-             : last_.T_world_camera;
-}
-
-template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers>
-tracked_frame front_end<Camera, D, Matchers>::last_frame() const {
-  tracked_frame shown{last_reference_, T_reference_last_, {}, last_twist()};
-  shown.features.reserve(last_.size());
-  for (std::size_t i = 0; i != last_.size(); ++i) {
-    const landmark_id l = last_.landmarks[i];
-    const auto& at = last_.features.keypoints[i];
-    const bool moved = !last_.as_read.empty();  // shown where they are in the image
-    shown.features.push_back(
-        {moved ? last_.as_read[i].x : at.x, moved ? last_.as_read[i].y : at.y, l != no_id && l < first_new_, false});
-  }
-  for (const vec2& at : moving_.pixels())
-    shown.features.push_back({static_cast<float>(at.x()), static_cast<float>(at.y()), false, true});
-  return shown;
-}
-
-template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers>
-void front_end<Camera, D, Matchers>::sync_with_map(const atlas_type& maps) {
-  const map_keyframe now = maps.current(reference_);
-  if (now.map != reference_.map)
-    for (landmark_id& l : last_.landmarks)
-      if (l != no_id) l = maps.current(reference_.map, l);
-  reference_ = now;
-  if (!maps.contains(now.map)) return;
-  last_.T_world_camera = last_pose(maps);
-  const map_keyframe last = maps.current(last_reference_);
-  if (last.map == now.map && maps.at(now.map).remembers(last.keyframe)) {
-    const double scale = maps.at(now.map).scale_of(last.keyframe);
-    const double grown = scale / std::exchange(last_scale_, scale);
-    motion_.scale_by(grown);
-    set_block(last_.twist, 0, 0, head<3>(last_.twist) * grown);
-  }
-  reference_.keyframe = maps.at(now.map).replacement_of(now.keyframe);
-}
-
-template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers>
-std::size_t front_end<Camera, D, Matchers>::localize(frame_type& f, atlas_type& maps, bool is_frozen,
-                                                             const row_follower& follow_rows,
-                                                             const appearance_search& similar, const map_drop& drop) {
-  first_new_ = no_id;
-  begins_map_ = false;
-  first_keyframe_.reset();
-  if (state_ == track_state::not_started) return is_frozen ? 0 : begin_map(f, maps, drop);
-  if (is_tracking())
-    if (const std::size_t inliers = track_from_last(f, maps, is_frozen, follow_rows); inliers > 0)
-      return settle(f, maps, inliers, is_frozen, follow_rows);
-  const auto aligned = align_depth(f, maps);
-  if (aligned)
-    if (const std::size_t inliers = track_from_depth(f, maps, *aligned, is_frozen, follow_rows); inliers > 0)
-      return inliers;
-  if (const std::size_t inliers = relocalize(f, maps, is_frozen, follow_rows, similar); inliers > 0) return inliers;
-  if (aligned && is_tracking() && hold_by_depth(f, *aligned)) return 0;
-  if (const std::size_t inliers = search_in_place(f, maps, is_frozen, follow_rows); inliers > 0) return inliers;
-  if (is_tracking()) lost_since_ = last_.timestamp;
-  if (!lost_since_) lost_since_ = f.timestamp;
-  state_ = track_state::lost;
-  // Two frames take a while to find: where little is lost, that begins at once.
-  const bool is_here = last_.size() != 0 && maps.current(last_reference_).map == maps.active_id();
-  const bool at_once =
-      is_here && !rig_.scale_is_known && maps.active().keyframes().size() < options_.recovery.min_map_keyframes;
-  if (is_frozen || (!at_once && f.timestamp - *lost_since_ < options_.recovery.new_map_after)) return 0;
-  return begin_map(f, maps, drop);
-}
-
-template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers>
-std::size_t front_end<Camera, D, Matchers>::begin_map(frame_type& f, atlas_type& maps, const map_drop& drop) {
-  std::size_t points = start_points(f, options_);
-  if (points == 0) return 0;
-  std::optional<monocular_start_result<D>> start;
-  if (!rig_.scale_is_known) {
-    start = start_.see(f);
-    if (!start) return 0;
-    points = start->points.size();
-  }
-  enter_new_map(maps, drop);
-  f.landmarks.assign(f.size(), no_id);  // of searches in other maps
-  f.T_world_camera = options_.find_initial_pose ? options_.find_initial_pose() : options_.initial_pose.value_or(se3{});
-  if (start) add_start(*std::move(start), f, maps);
-  begins_map_ = true;
-  state_ = track_state::tracking;
-  return points;
-}
-
-template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers>
-void front_end<Camera, D, Matchers>::enter_new_map(atlas_type& maps, const map_drop& drop) {
-  if (state_ == track_state::not_started) return;
-  const map_id before = maps.active_id();
-  maps.create();
-  if (maps.at(before).keyframes().size() < options_.recovery.min_map_keyframes) drop(before);
-  last_ = {};
-  motion_.reset();
-}
-
-template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers>
-void front_end<Camera, D, Matchers>::add_start(monocular_start_result<D> start, frame_type& f,
-                                                       atlas_type& maps) {
-  // An initial pose that was asked for just now is that of `f`, otherwise that of the first frame.
-  const se3 T_world_first =
-      options_.find_initial_pose ? f.T_world_camera * start.T_first_second.inverse() : se3(f.T_world_camera);
-  f.T_world_camera = T_world_first * start.T_first_second;
-  frame_type& first = start.first;
-  first.T_world_camera = T_world_first;
-  first.landmarks.assign(first.size(), no_id);
-  const double timestamp = first.timestamp;
-  first_keyframe_ = reference_ = {maps.active_id(), insert_keyframe(maps.active(), std::move(first), options_)};
-  start_points_ = std::move(start.points);
-  for (start_point& p : start_points_) p.position = T_world_first * p.position;
-  log_.add({timestamp, reference_, se3{}});
-  ++counters_.tracked;
-  if (state_ == track_state::lost) --counters_.lost;
-}
-
-template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers>
-std::size_t front_end<Camera, D, Matchers>::track_from_last(frame_type& f, atlas_type& maps, bool is_frozen,
-                                                                    const row_follower& follow_rows) {
-  const se3 predicted = motion_.predict({last_.timestamp, last_.T_world_camera}, f.timestamp);
-  if (!shutter_.is_global()) {
-    f.T_world_camera = predicted;
-    follow_rows(f, {shutter_, motion_between(last_, f)});
-    move_keypoints(f);
-  }
-  moving_.set_last(last_.T_world_camera);
-  moving_.find(f);
-  if (tracker_.by_motion(f, maps.active(), last_, predicted, moving_) == 0 &&
-      tracker_.by_appearance(f, maps.active(), reference_.keyframe) == 0)
-    return 0;
-  moving_.spread(f);
-  move_keypoints(f);
-  const std::size_t inliers = track_local_map(f, maps.active(), options_.search_radius, is_frozen);
-  if (inliers < options_.min_inliers) return 0;
-  refine_motion(f, maps, true, follow_rows);
-  moving_.take_out(f);
-  state_ = track_state::tracking;
-  return inliers;
-}
-
-template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers>
-std::size_t front_end<Camera, D, Matchers>::relocalize(frame_type& f, atlas_type& maps, bool is_frozen,
-                                                               const row_follower& follow_rows,
-                                                               const appearance_search& similar) {
-  moving_.clear();
-  std::vector<map_keyframe> candidates = similar(f.features, options_.recovery.candidates);
-  if (reference_.map == maps.active_id() && maps.active().has_keyframe(reference_.keyframe) &&
-      std::find(candidates.begin(), candidates.end(), reference_) == candidates.end())
-    candidates.insert(candidates.begin(), reference_);
-  const map_id active_before = maps.active_id();
-  const map_keyframe reference_before = reference_;
-  for (const map_keyframe& k : candidates) {
-    if (tracker_.by_appearance(f, maps.at(k.map), k.keyframe) == 0) continue;
-    maps.activate(k.map);
-    reference_ = k;
-    if (const std::size_t inliers = track_found(f, maps, is_frozen, follow_rows); inliers > 0) return inliers;
-  }
-  maps.activate(active_before);
-  reference_ = reference_before;
-  return 0;
-}
-
-template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers>
-std::size_t front_end<Camera, D, Matchers>::search_in_place(frame_type& f, atlas_type& maps, bool is_frozen,
-                                                                    const row_follower& follow_rows) {
-  const bool is_here = last_.size() != 0 && reference_.map == maps.active_id() && maps.has(reference_);
-  const bool is_recent = f.timestamp - last_.timestamp < options_.recovery.new_map_after;
-  if (!is_here || (is_frozen && !is_recent) || start_points(f, options_) == 0) return 0;
-  return tracker_.by_turning(f, maps.active(), last_) == 0 ? 0 : track_found(f, maps, is_frozen, follow_rows);
-}
-
-template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers>
-std::size_t front_end<Camera, D, Matchers>::track_found(frame_type& f, atlas_type& maps, bool is_frozen,
-                                                                const row_follower& follow_rows) {
-  const std::size_t inliers = track_local_map(f, maps.active(), 3.0 * options_.search_radius, is_frozen);
-  if (inliers < options_.recovery.min_inliers) return 0;
-  refine_motion(f, maps, false, follow_rows);
-  state_ = track_state::relocalized;
-  return inliers;
-}
-
-template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers>
-void front_end<Camera, D, Matchers>::refine_motion(frame_type& f, const atlas_type& maps, bool is_next,
-                                                           const row_follower& follow_rows) {
-  const basic_map<D>& m = maps.active();
-  const bool rolls = !shutter_.is_global();
-  const bool with_depth = depth_.surround(maps, f.T_world_camera) && options_.depth_term.enabled;
-  twist_prior prior;
-  if (looks_at_rows() && is_next && f.timestamp > last_.timestamp)
-    prior = twist_prior::after({last_.T_world_camera, last_.twist}, f.timestamp - last_.timestamp, motion_.is_known());
-  const auto expected_twist = [&] {
-    return prior.T_world_before ? prior.expected(f.T_world_camera.inverse()) : f.twist;
-  };
-  moving_pose refined{f.T_world_camera, rolls ? expected_twist() : vec6(zeros<vec6>())};
-  const int rounds = with_depth ? 3 : !rolls ? 0 : shutter_.is_depth_simultaneous() ? 1 : 2;
-  if (!rolls && with_depth) find_observations(f, m, rig_, rows_);
-  for (int round = 0; round != rounds; ++round) {
-    if (rolls) {
-      follow_rows(f, {shutter_, refined.twist});  // the depth was read by the motion before
-      find_row_observations(f, m, rig_, shutter_, rows_);
-    }
-    const auto depth = with_depth ? depth_.term_at(refined, shutter_) : std::nullopt;
-    refined = refine_moving_pose(std::span<const row_observation>(rows_), rig_.model, refined, prior,
-                                 with_depth ? 3 : 5, {.other = depth ? &*depth : nullptr, .moves = rolls});
-    if (shutter_.is_depth_early()) {
-      early_depth_.see(std::span<const row_observation>(rows_), rig_.model, refined, prior);
-      refined.twist = early_depth_.between(prior, refined.twist);
-    }
-  }
-  if (shutter_.is_depth_early()) early_depth_.advance();
-  f.T_world_camera = refined.T_world_camera;
-  if (observer_) observer_->set_depths(f, {shutter_, rolls ? refined.twist : expected_twist()}, follow_rows);
-  if (!rolls) {
-    f.twist = expected_twist();
-    return;
-  }
-  move_to_frame_time(f, rig_, shutter(), refined.twist, [&](std::size_t i) {
-    return f.landmarks[i] == no_id ? 0.0
-                                   : (refined.T_world_camera.inverse() * m.landmark_at(f.landmarks[i]).position).z();
-  });
-}
-
-template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers>
-std::optional<depth_alignment> front_end<Camera, D, Matchers>::align_depth(const frame_type& f,
-                                                                                   const atlas_type& maps) {
-  constexpr double longest = 2.0;  // seconds
-  const double interval = f.timestamp - last_.timestamp;
-  if (!options_.depth_term.recovers || !(interval > 0.0 && interval < longest) ||
-      maps.current(last_reference_).map != maps.active_id())
-    return std::nullopt;
-  const se3 predicted = motion_.predict({last_.timestamp, last_.T_world_camera}, f.timestamp);
-  if (!depth_.surround(maps, predicted)) return std::nullopt;
-  return depth_.align(search_starts(last_.T_world_camera, predicted, interval), shutter_);
-}
-
-template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers>
-std::size_t front_end<Camera, D, Matchers>::track_from_depth(frame_type& f, atlas_type& maps,
-                                                                     const depth_alignment& aligned, bool is_frozen,
-                                                                     const row_follower& follow_rows) {
-  f.T_world_camera = aligned.at.T_world_camera;
-  moving_.clear();
-  if (!shutter_.is_global()) {
-    follow_rows(f, {shutter_, motion_between(last_, f)});
-    move_keypoints(f);
-  }
-  if (tracker_.by_motion(f, maps.active(), last_, aligned.at.T_world_camera, moving_) == 0)
-    f.T_world_camera = aligned.at.T_world_camera;
-  const std::size_t inliers = track_local_map(f, maps.active(), 3.0 * options_.search_radius, is_frozen);
-  const std::size_t few =
-      options_.depth_term.min_inliers * static_cast<std::size_t>(std::max(1, 6 - aligned.determined));
-  if (inliers < (is_tracking() ? std::min(few, options_.min_inliers) : options_.recovery.min_inliers)) return 0;
-  refine_motion(f, maps, true, follow_rows);
-  if (inliers < options_.min_inliers) {
-    const std::size_t confirmed = drop_disagreeing(f, maps.active());
-    if (confirmed < few || !depth_.is_surrounded() ||
-        !depth_.holds(depth_.agreement({f.T_world_camera, f.twist}, shutter_)))
-      return 0;
-    f.held_by_depth = true;
-  }
-  state_ = is_tracking() ? track_state::tracking : track_state::relocalized;
-  return inliers;
-}
-
-template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers>
-std::size_t front_end<Camera, D, Matchers>::settle(frame_type& f, atlas_type& maps, std::size_t inliers,
-                                                           bool is_frozen, const row_follower& follow_rows) {
-  // Where something moves in the view, that is what does not fit.
-  if (!options_.depth_term.recovers || moving_.size() != 0 || !depth_.is_surrounded()) return inliers;
-  const association seen = depth_.agreement({f.T_world_camera, f.twist}, shutter_);
-  if (seen.visible < options_.depth_term.min_points || seen.share() >= options_.depth_term.min_share) return inliers;
-  const auto aligned = align_depth(f, maps);
-  constexpr double better = 0.15;
-  if (!aligned || aligned->seen.share() < seen.share() + better) return inliers;
-  unsettled_ = f;
-  if (const std::size_t there = track_from_depth(f, maps, *aligned, is_frozen, follow_rows); there > 0) return there;
-  if (hold_by_depth(f, *aligned)) return 0;
-  std::swap(f, unsettled_);
-  return inliers;
-}
-
-template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers>
-bool front_end<Camera, D, Matchers>::hold_by_depth(frame_type& f, const depth_alignment& aligned) {
-  if (!depth_.holds_alone(aligned)) return false;
-  f.T_world_camera = aligned.at.T_world_camera;
-  f.landmarks.assign(f.size(), no_id);
-  move_keypoints(f);
-  state_ = track_state::tracking;
-  f.held_by_depth = true;
-  return true;
-}
-
-template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers>
-void front_end<Camera, D, Matchers>::observe(const frame_type& f, const atlas_type& maps,
-                                                     const std::optional<map_keyframe>& made) {
-  if (state_ != track_state::tracking || last_.index + 1 != f.index || last_.size() == 0) return observer_->interrupt();
-  if (const auto changed = observer_->add(last_, f, made, maps.active(), rig_, shutter_)) shutter_ = *changed;
-}
-
-template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers>
-void front_end<Camera, D, Matchers>::finish(frame_type f, const atlas_type& maps,
-                                                    const std::optional<map_keyframe>& made) {
-  ++counters_.frames;
-  counters_.tracked += is_tracking();
-  counters_.relocalized += state_ == track_state::relocalized;
-  counters_.lost += state_ == track_state::lost;
-  motion_.reset();
-  if (observer_) observe(f, maps, made);
-  if (!is_tracking()) return;
-  if (last_.index + 1 == f.index && state_ == track_state::tracking && last_.size() != 0)
-    motion_.set({last_.timestamp, last_.T_world_camera}, {f.timestamp, f.T_world_camera});
-  last_reference_ = reference_;
-  start_.reset();
-  const basic_keyframe<D>& reference = maps.active().at(reference_.keyframe);
-  last_scale_ = reference.scale;
-  T_reference_last_ = scaled(reference.T_world_camera.inverse() * f.T_world_camera, 1.0 / reference.scale);
-  log_.add({f.timestamp, last_reference_, T_reference_last_});
-  if (!f.held_by_depth || made) held_since_ = f.timestamp;
-  if (made)
-    depth_.keep(*made, se3{}, f.twist, shutter_);
-  else if (depth_.needs_surface(maps, f.T_world_camera))
-    depth_.keep(last_reference_, T_reference_last_, f.twist, shutter_);
-  last_ = std::move(f);
-}
-
-template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers>
-void front_end<Camera, D, Matchers>::forget_erased(atlas_type& maps) {
-  if (options_.trajectory_frames == std::numeric_limits<std::size_t>::max()) return;
-  if (maps.active().content().erased.size() < most_erased_) return;
-  std::vector<keyframe_id> keep = log_.references(maps, maps.active_id());
-  for (const map_keyframe& k : {maps.current(reference_), maps.current(last_reference_)})
-    if (k.map == maps.active_id()) keep.push_back(k.keyframe);
-  maps.active().forget_erased(keep, latest_erased);
-  most_erased_ = maps.active().content().erased.size() + latest_erased;
-}
 
 }  // namespace orbis::slam::detail

@@ -31,7 +31,7 @@ namespace orbis::slam::detail {
 /// A point that two frames observe.
 struct start_point {
   std::uint32_t first = 0, second = 0;  ///< keypoints of the two frames
-  vec3 position = zeros<vec3>();         ///< in the world
+  vec3 position = zeros<vec3>();        ///< in the world
 };
 
 /// Two frames with poses, and the points that they share. The first camera is the world; the unit of length is the
@@ -69,7 +69,20 @@ class monocular_start {
 
   /// Takes the next frame; its pose does not matter. The beginning of a map, after which all frames are forgotten, or
   /// nothing.
-  [[nodiscard]] std::optional<monocular_start_result<D>> see(const basic_frame<D>& f);
+  [[nodiscard]] std::optional<monocular_start_result<D>> see(const basic_frame<D>& f) {
+    why_ = {errc::no_data, "start of a map", "no frame before it has enough matches"};
+    std::erase_if(candidates_, [&](candidate& c) { return !follow(c, f); });
+    for (candidate& c : candidates_) {
+      auto start = reconstruct(c, f);
+      if (start) {
+        reset();
+        return *std::move(start);
+      }
+      if (&c == &candidates_.front()) why_ = std::move(start.error());
+    }
+    add(f);
+    return std::nullopt;
+  }
 
   /// Forgets all frames.
   void reset() { candidates_.clear(); }
@@ -108,7 +121,31 @@ class monocular_start {
       candidates_.back().windows.push_back({k.x, k.y, static_cast<float>(options_.radius), k.octave - 1, k.octave + 1});
   }
   /// The beginning with a candidate, whose frame is handed over then, and the next frame.
-  [[nodiscard]] result<monocular_start_result<D>> reconstruct(candidate& c, const basic_frame<D>& f) const;
+  [[nodiscard]] result<monocular_start_result<D>> reconstruct(candidate& c, const basic_frame<D>& f) const {
+    std::vector<vec2> first, second;
+    std::vector<double> deviations;
+    for (const features::match& m : c.matches) {
+      first.push_back(c.frame.pixel(m.query));
+      second.push_back(f.pixel(m.train));
+      deviations.push_back(rig_.scales.scale(c.frame.features.keypoints[m.query].octave));
+    }
+    const auto found =
+        optimize::reconstruct_two_views(std::span<const vec2>(first), std::span<const vec2>(second), rig_.camera(),
+                                        {.deviation = options_.deviation,
+                                         .min_points = options_.min_points,
+                                         .min_parallax = options_.min_parallax,
+                                         .seed = seed_},
+                                        deviations);
+    if (!found) return fail(found.error());
+    monocular_start_result<D> start{std::move(c.frame), found->T_first_second,     {},
+                                    found->parallax,    found->rotation_deviation, found->direction_deviation};
+    start.first.T_world_camera = se3();
+    for (std::size_t i = 0; i != found->points.size(); ++i) {
+      const features::match& m = c.matches[found->matches[i]];
+      start.points.push_back({m.query, m.train, found->points[i]});
+    }
+    return start;
+  }
 
   const camera_rig<Camera>& rig_;
   const start_options& options_;
@@ -117,48 +154,5 @@ class monocular_start {
   typename decltype(chain(start_options{}))::workspace memory_;
   error why_;
 };
-
-template <camera::camera_model Camera, feature_descriptor D>
-std::optional<monocular_start_result<D>> monocular_start<Camera, D>::see(const basic_frame<D>& f) {
-  why_ = {errc::no_data, "start of a map", "no frame before it has enough matches"};
-  std::erase_if(candidates_, [&](candidate& c) { return !follow(c, f); });
-  for (candidate& c : candidates_) {
-    auto start = reconstruct(c, f);
-    if (start) {
-      reset();
-      return *std::move(start);
-    }
-    if (&c == &candidates_.front()) why_ = std::move(start.error());
-  }
-  add(f);
-  return std::nullopt;
-}
-
-template <camera::camera_model Camera, feature_descriptor D>
-result<monocular_start_result<D>> monocular_start<Camera, D>::reconstruct(candidate& c, const basic_frame<D>& f) const {
-  std::vector<vec2> first, second;
-  std::vector<double> deviations;
-  for (const features::match& m : c.matches) {
-    first.push_back(c.frame.pixel(m.query));
-    second.push_back(f.pixel(m.train));
-    deviations.push_back(rig_.scales.scale(c.frame.features.keypoints[m.query].octave));
-  }
-  const auto found =
-      optimize::reconstruct_two_views(std::span<const vec2>(first), std::span<const vec2>(second), rig_.camera(),
-                                      {.deviation = options_.deviation,
-                                       .min_points = options_.min_points,
-                                       .min_parallax = options_.min_parallax,
-                                       .seed = seed_},
-                                      deviations);
-  if (!found) return fail(found.error());
-  monocular_start_result<D> start{std::move(c.frame), found->T_first_second,     {},
-                                  found->parallax,    found->rotation_deviation, found->direction_deviation};
-  start.first.T_world_camera = se3();
-  for (std::size_t i = 0; i != found->points.size(); ++i) {
-    const features::match& m = c.matches[found->matches[i]];
-    start.points.push_back({m.query, m.train, found->points[i]});
-  }
-  return start;
-}
 
 }  // namespace orbis::slam::detail

@@ -63,14 +63,90 @@ class tracker {
   /// Searches for what the last frame observed: its landmarks, and its other points with depth. `last` has its present
   /// pose, and landmarks by ids of the map at that time. `predicted`: the expected `T_world_camera`.
   std::size_t by_motion(basic_frame<D>& f, const basic_map<D>& m, const basic_frame<D>& last, const se3& predicted,
-                        moving_features<Camera, D, Matchers>& moving) const;
+                        moving_features<Camera, D, Matchers>& moving) const {
+    for (const double widening : {1.0, 2.0}) {
+      f.T_world_camera = predicted;
+      const search_list<D> list = seen_points(m, last, predicted, widening * options_.motion_radius);
+      std::vector<features::match> matches = Matchers::motion(
+          features::feature_view<D>{list.keypoints, list.descriptors}, f.features, list.windows, f.grid);
+      moving.drop_left_out(matches);
+      if (matches.size() < options_.min_inliers) continue;
+      const std::size_t fitted = refine_on_matches<D>(f, list, matches, rig_);
+      if (const std::size_t inliers = moving.judge(f, m, list, matches, fitted, predicted); inliers >= 10)
+        return inliers;
+    }
+    return 0;
+  }
 
   /// As `by_motion`, for a camera that may have turned in any direction by up to half of its view since the last frame:
   /// tries the turned poses at which most matches are found, from the last frame's place. Some 80 searches.
-  std::size_t by_turning(basic_frame<D>& f, const basic_map<D>& m, const basic_frame<D>& last) const;
+  std::size_t by_turning(basic_frame<D>& f, const basic_map<D>& m, const basic_frame<D>& last) const {
+    const auto& camera = rig_.camera();
+    const auto corner = camera.unproject({0.0, 0.0});
+    if (!corner) return 0;
+    const double wide = std::atan(std::abs(corner->x())), high = std::atan(std::abs(corner->y()));
+    struct attempt {
+      std::size_t matches;
+      se3 T_world_camera;
+    };
+    std::vector<attempt> attempts;
+    constexpr int steps = 4;  // from the middle of the view to its edge
+    const double radius = 4.0 * options_.motion_radius;
+    for (int across = -steps; across <= steps; ++across)
+      for (int down = -steps; down <= steps; ++down) {
+        const vec3 turn(high * down / steps, wide * across / steps, 0.0);
+        const se3 turned = last.T_world_camera * se3{so3::exp(turn), zeros<vec3>()};
+        const search_list<D> list = seen_points(m, last, turned, radius);
+        if (list.size() < options_.min_inliers) continue;
+        const auto matches = Matchers::motion(features::feature_view<D>{list.keypoints, list.descriptors}, f.features,
+                                              list.windows, f.grid);
+        attempts.push_back({matches.size(), turned});
+      }
+    std::stable_sort(attempts.begin(), attempts.end(),
+                     [](const attempt& a, const attempt& b) { return a.matches > b.matches; });
+    if (attempts.size() > 3) attempts.resize(3);
+    for (const attempt& a : attempts) {
+      f.T_world_camera = a.T_world_camera;
+      const search_list<D> list = seen_points(m, last, a.T_world_camera, radius);
+      const auto matches = Matchers::motion(features::feature_view<D>{list.keypoints, list.descriptors}, f.features,
+                                            list.windows, f.grid);
+      if (matches.size() < options_.min_inliers) return 0;
+      const std::size_t inliers = refine_on_matches<D>(f, list, matches, rig_);
+      if (inliers >= 10) return inliers;
+    }
+    return 0;
+  }
 
   /// Matches a frame with a keyframe by appearance and estimates its pose by RANSAC. @pre the keyframe is there
-  std::size_t by_appearance(basic_frame<D>& f, const basic_map<D>& m, keyframe_id id) const;
+  std::size_t by_appearance(basic_frame<D>& f, const basic_map<D>& m, keyframe_id id) const {
+    const auto& k = m.at(id);
+    search_list<D> list;
+    std::vector<features::match> usable;
+    std::vector<vec3> points;
+    std::vector<vec2> pixels;
+    for (const features::match& found : Matchers::appearance(k.features, f.features)) {
+      candidate_point p;
+      p.landmark = k.landmarks[found.query];
+      if (p.landmark != no_id)
+        p.position = m.landmark_at(p.landmark).position;
+      else if (k.has_depth(found.query))
+        p.position = k.point_world(found.query);
+      else
+        continue;
+      usable.push_back({static_cast<std::uint32_t>(list.size()), found.train, found.distance});
+      list.points.push_back(p);
+      points.push_back(p.position);
+      pixels.push_back(f.pixel(found.train));
+    }
+    constexpr std::size_t enough = 12;
+    const auto pose = optimize::estimate_pose(
+        std::span<const vec3>(points), std::span<const vec2>(pixels), rig_.camera(),
+        {.threshold = 5.0, .max_iterations = 500, .min_inliers = enough, .seed = options_.seed});
+    if (!pose) return 0;
+    f.T_world_camera = pose->T_world_camera;
+    const std::size_t inliers = refine_on_matches<D>(f, list, usable, rig_);
+    return inliers >= enough ? inliers : 0;
+  }
 
   /// Searches for the landmarks of the local map in a frame whose pose is known roughly, within `radius` pixels of a
   /// keypoint's level. `expected(id)` is called for the landmarks that the frame is expected to observe, `found(id)`
@@ -95,117 +171,25 @@ class tracker {
  private:
   /// What the last frame observed, where a camera at a pose sees it, to be searched for within `radius` pixels.
   [[nodiscard]] search_list<D> seen_points(const basic_map<D>& m, const basic_frame<D>& last, const se3& T_world_camera,
-                                           double radius) const;
+                                           double radius) const {
+    const features::camera_projection project{rig_.camera(), T_world_camera};
+    search_list<D> list;
+    for (std::size_t i = 0; i < last.size(); ++i) {
+      candidate_point p;
+      p.landmark = m.replacement_of(last.landmarks[i]);
+      if (p.landmark != no_id)
+        p.position = m.landmark_at(p.landmark).position;
+      else if (last.has_depth(i))
+        p.position = last.point_world(i);
+      else
+        continue;
+      add_seen_point(list, project, rig_.scales, p, last.features.descriptors[i], last.features.keypoints[i], radius);
+    }
+    return list;
+  }
 
   const camera_rig<Camera>& rig_;
   const options& options_;
 };
-
-template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers>
-search_list<D> tracker<Camera, D, Matchers>::seen_points(const basic_map<D>& m, const basic_frame<D>& last,
-                                                         const se3& T_world_camera, double radius) const {
-  const features::camera_projection project{rig_.camera(), T_world_camera};
-  search_list<D> list;
-  for (std::size_t i = 0; i < last.size(); ++i) {
-    candidate_point p;
-    p.landmark = m.replacement_of(last.landmarks[i]);
-    if (p.landmark != no_id)
-      p.position = m.landmark_at(p.landmark).position;
-    else if (last.has_depth(i))
-      p.position = last.point_world(i);
-    else
-      continue;
-    add_seen_point(list, project, rig_.scales, p, last.features.descriptors[i], last.features.keypoints[i], radius);
-  }
-  return list;
-}
-
-template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers>
-std::size_t tracker<Camera, D, Matchers>::by_motion(basic_frame<D>& f, const basic_map<D>& m,
-                                                    const basic_frame<D>& last, const se3& predicted,
-                                                    moving_features<Camera, D, Matchers>& moving) const {
-  for (const double widening : {1.0, 2.0}) {
-    f.T_world_camera = predicted;
-    const search_list<D> list = seen_points(m, last, predicted, widening * options_.motion_radius);
-    std::vector<features::match> matches =
-        Matchers::motion(features::feature_view<D>{list.keypoints, list.descriptors}, f.features, list.windows, f.grid);
-    moving.drop_left_out(matches);
-    if (matches.size() < options_.min_inliers) continue;
-    const std::size_t fitted = refine_on_matches<D>(f, list, matches, rig_);
-    if (const std::size_t inliers = moving.judge(f, m, list, matches, fitted, predicted); inliers >= 10) return inliers;
-  }
-  return 0;
-}
-
-template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers>
-std::size_t tracker<Camera, D, Matchers>::by_turning(basic_frame<D>& f, const basic_map<D>& m,
-                                                     const basic_frame<D>& last) const {
-  const auto& camera = rig_.camera();
-  const auto corner = camera.unproject({0.0, 0.0});
-  if (!corner) return 0;
-  const double wide = std::atan(std::abs(corner->x())), high = std::atan(std::abs(corner->y()));
-  struct attempt {
-    std::size_t matches;
-    se3 T_world_camera;
-  };
-  std::vector<attempt> attempts;
-  constexpr int steps = 4;  // from the middle of the view to its edge
-  const double radius = 4.0 * options_.motion_radius;
-  for (int across = -steps; across <= steps; ++across)
-    for (int down = -steps; down <= steps; ++down) {
-      const vec3 turn(high * down / steps, wide * across / steps, 0.0);
-      const se3 turned = last.T_world_camera * se3{so3::exp(turn), zeros<vec3>()};
-      const search_list<D> list = seen_points(m, last, turned, radius);
-      if (list.size() < options_.min_inliers) continue;
-      const auto matches = Matchers::motion(features::feature_view<D>{list.keypoints, list.descriptors}, f.features,
-                                            list.windows, f.grid);
-      attempts.push_back({matches.size(), turned});
-    }
-  std::stable_sort(attempts.begin(), attempts.end(),
-                   [](const attempt& a, const attempt& b) { return a.matches > b.matches; });
-  if (attempts.size() > 3) attempts.resize(3);
-  for (const attempt& a : attempts) {
-    f.T_world_camera = a.T_world_camera;
-    const search_list<D> list = seen_points(m, last, a.T_world_camera, radius);
-    const auto matches =
-        Matchers::motion(features::feature_view<D>{list.keypoints, list.descriptors}, f.features, list.windows, f.grid);
-    if (matches.size() < options_.min_inliers) return 0;
-    const std::size_t inliers = refine_on_matches<D>(f, list, matches, rig_);
-    if (inliers >= 10) return inliers;
-  }
-  return 0;
-}
-
-template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers>
-std::size_t tracker<Camera, D, Matchers>::by_appearance(basic_frame<D>& f, const basic_map<D>& m,
-                                                        keyframe_id id) const {
-  const auto& k = m.at(id);
-  search_list<D> list;
-  std::vector<features::match> usable;
-  std::vector<vec3> points;
-  std::vector<vec2> pixels;
-  for (const features::match& found : Matchers::appearance(k.features, f.features)) {
-    candidate_point p;
-    p.landmark = k.landmarks[found.query];
-    if (p.landmark != no_id)
-      p.position = m.landmark_at(p.landmark).position;
-    else if (k.has_depth(found.query))
-      p.position = k.point_world(found.query);
-    else
-      continue;
-    usable.push_back({static_cast<std::uint32_t>(list.size()), found.train, found.distance});
-    list.points.push_back(p);
-    points.push_back(p.position);
-    pixels.push_back(f.pixel(found.train));
-  }
-  constexpr std::size_t enough = 12;
-  const auto pose =
-      optimize::estimate_pose(std::span<const vec3>(points), std::span<const vec2>(pixels), rig_.camera(),
-                              {.threshold = 5.0, .max_iterations = 500, .min_inliers = enough, .seed = options_.seed});
-  if (!pose) return 0;
-  f.T_world_camera = pose->T_world_camera;
-  const std::size_t inliers = refine_on_matches<D>(f, list, usable, rig_);
-  return inliers >= enough ? inliers : 0;
-}
 
 }  // namespace orbis::slam::detail
