@@ -15,9 +15,9 @@
 #include <benchmark/benchmark.h>
 
 #include <orbis/core/random.hpp>
-#include <orbis/slam/detail/loops/essential_graph.hpp>
+#include <orbis/slam/detail/loops/loop_correction.hpp>
 #include <orbis/slam/detail/map/local_map.hpp>
-#include <orbis/slam/detail/mapping/culling.hpp>
+#include <orbis/slam/detail/mapping/local_mapper.hpp>
 #include <orbis/slam/map.hpp>
 #include <orbis/slam/map_file.hpp>
 

@@ -10,7 +10,7 @@
 #include <orbis/core/random.hpp>
 #include <orbis/core/types.hpp>
 #include <orbis/slam/detail/map/file_sections.hpp>
-#include <orbis/slam/detail/map/map_writer.hpp>
+#include <orbis/slam/map_file-inl.hpp>
 #include <orbis/slam/map_file.hpp>
 
 #include "slam/random_map.hpp"

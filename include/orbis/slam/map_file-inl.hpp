@@ -13,15 +13,108 @@
 #include <utility>
 
 #include <orbis/core/bytes.hpp>
-#include <orbis/core/inline.hpp>
 #include <orbis/core/file.hpp>
+#include <orbis/core/inline.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/slam/detail/map/file_sections.hpp>
+#include <orbis/slam/detail/map/map_content.hpp>
 #include <orbis/slam/detail/map/map_reader.hpp>
-#include <orbis/slam/detail/map/map_writer.hpp>
+#include <orbis/slam/map.hpp>
 #include <orbis/slam/map_file.hpp>
 
 namespace orbis::slam {
+namespace detail {
+
+inline constexpr std::string_view map_magic = "orbismap";
+inline constexpr std::uint32_t map_version = 4;
+
+inline void put_pose(std::string& to, const se3& pose) {
+  const auto& q = pose.rotation().unit_quaternion();
+  put(to, pose.translation().x(), pose.translation().y(), pose.translation().z(), q.x(), q.y(), q.z(), q.w());
+}
+inline void put_descriptor(std::string& to, const features::binary_descriptor<256>& d) {
+  for (const std::uint64_t w : d.words) put(to, w);
+}
+inline void put_keyframe(std::string& to, const keyframe& k) {
+  put(to, k.timestamp, std::uint64_t{k.index});
+  put_pose(to, k.T_world_camera);
+  put(to, static_cast<std::uint32_t>(k.size()));
+  for (std::size_t i = 0; i != k.size(); ++i) {
+    const features::keypoint& p = k.features.keypoints[i];
+    put(to, p.x, p.y, p.size, p.angle, p.response, std::int32_t{p.octave}, k.depth[i], k.rays[i].x(), k.rays[i].y());
+    put_descriptor(to, k.features.descriptors[i]);
+  }
+}
+
+inline void put_landmark(std::string& to, const landmark& l) {
+  put(to, static_cast<std::uint32_t>(l.observations.size()));
+  for (const vec3& v : {l.position, l.normal}) put(to, v.x(), v.y(), v.z());
+  put(to, l.min_distance, l.max_distance);
+  put_descriptor(to, l.descriptor);
+  put(to, l.created.value(), l.visible, l.found, static_cast<std::uint8_t>(l.has_current_descriptor));
+  for (const observation& o : l.observations) put(to, o.keyframe.value(), o.feature);
+}
+
+/// The whole file.
+[[nodiscard]] inline std::string write_sections(const map& m) {
+  std::string bytes(map_magic);
+  put(bytes, map_version);
+  const bool leaves_out_erased = m.landmark_end() > most_landmarks_of_file;
+  const std::uint32_t landmark_ids =
+      leaves_out_erased ? static_cast<std::uint32_t>(m.landmark_count()) : m.landmark_end().value();
+  put_section(bytes, "size", [&](std::string& to) {
+    const auto& all = m.content();
+    put(to, static_cast<std::uint32_t>(all.levels), all.min_shared, all.scale_factor, m.keyframe_end().value(),
+        landmark_ids, static_cast<std::uint32_t>(all.sensor), std::uint32_t{all.scale_is_known});
+  });
+  put_section(bytes, "kfrm", [&](std::string& to) {
+    for (keyframe_id id = 0; id != m.keyframe_end(); ++id) {
+      if (const keyframe_id next = m.next_remembered(id); next != id) {
+        put(to, forgotten_keyframes, next - id);
+        if ((id = next) == m.keyframe_end()) break;
+      }
+      if (m.has_keyframe(id)) {
+        put(to, kept_keyframe);
+        put_keyframe(to, m.at(id));
+      } else {
+        put(to, gone_keyframe);
+        const erased_keyframe& e = m.content().erased.at(id);
+        put(to, e.replacement.value());
+        const double scale = e.replacement == no_id ? 1.0 : m.scale_of(e.replacement);
+        put_pose(to, scaled(e.T_replacement_camera, scale));  // the scales of a map that is read are 1
+      }
+    }
+  });
+  put_section(bytes, "tree", [&](std::string& to) {
+    for (const keyframe& k : m.keyframes()) {
+      const auto& loops = m.tree().loop_edges(k.id);
+      put(to, m.tree().parent(k.id).value(), static_cast<std::uint32_t>(loops.size()));
+      for (const keyframe_id other : loops) put(to, other.value());
+    }
+  });
+  put_section(bytes, "land", [&](std::string& to) {
+    if (leaves_out_erased) {
+      for (const landmark& l : m.landmarks()) put_landmark(to, l);
+      return;
+    }
+    const auto is_gone = [&m](landmark_id id) { return m.replacement_of(id) == no_id; };
+    for (landmark_id id = 0; id != m.landmark_end();) {
+      // Ids that are gone: by pages where the map has forgotten them, one by one where it still knows of them.
+      landmark_id next = m.landmarks().next_known_id(id);
+      while (next != m.landmark_end() && is_gone(next)) next = m.landmarks().next_known_id(next + 1);
+      if (next != id) put(to, run_of_gone, next - id);
+      if (next == m.landmark_end()) break;
+      if (m.has_landmark(next))
+        put_landmark(to, m.landmark_at(next));
+      else
+        put(to, std::uint32_t{0}, m.replacement_of(next).value());
+      id = next + 1;
+    }
+  });
+  return bytes;
+}
+
+}  // namespace detail
 
 ORBIS_INLINE std::string map_bytes(const map& m) { return detail::write_sections(m); }
 

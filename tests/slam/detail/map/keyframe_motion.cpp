@@ -4,7 +4,7 @@
 #include <vector>
 
 #include <orbis/core/random.hpp>
-#include <orbis/slam/detail/loops/essential_graph.hpp>
+#include <orbis/slam/detail/loops/loop_correction.hpp>
 #include <orbis/slam/detail/map/keyframe_motion.hpp>
 
 #include "slam/random_map.hpp"

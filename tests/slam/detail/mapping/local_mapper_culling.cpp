@@ -6,7 +6,7 @@
 #include <vector>
 
 #include <orbis/core/random.hpp>
-#include <orbis/slam/detail/mapping/culling.hpp>
+#include <orbis/slam/detail/mapping/local_mapper.hpp>
 
 #include "slam/random_map.hpp"
 #include "support/catch.hpp"

@@ -10,7 +10,7 @@
 #include <orbis/core/random.hpp>
 #include <orbis/optimize/detail/pose/pose_graph_structure.hpp>
 #include <orbis/optimize/pose_graph_problem.hpp>
-#include <orbis/slam/detail/loops/essential_graph.hpp>
+#include <orbis/slam/detail/loops/loop_correction.hpp>
 
 #include "slam/random_map.hpp"
 #include "support/catch.hpp"
