@@ -19,7 +19,7 @@
 #include <orbis/features/match.hpp>
 #include <orbis/features/matcher.hpp>
 #include <orbis/features/stages.hpp>
-#include <orbis/features/windowed.hpp>
+#include <orbis/features/windowed-inl.hpp>
 #include <orbis/optimize/two_view.hpp>
 #include <orbis/slam/camera_rig.hpp>
 #include <orbis/slam/extractor.hpp>
@@ -31,7 +31,7 @@ namespace orbis::slam::detail {
 /// A point that two frames observe.
 struct start_point {
   std::uint32_t first = 0, second = 0;  ///< keypoints of the two frames
-  vec3 position = zeros<vec3>();         ///< in the world
+  vec3 position = zeros<vec3>();        ///< in the world
 };
 
 /// Two frames with poses, and the points that they share. The first camera is the world; the unit of length is the
