@@ -19,7 +19,7 @@
 #include <orbis/core/se3.hpp>
 #include <orbis/core/sim3.hpp>
 #include <orbis/core/types.hpp>
-#include <orbis/optimize/pose_graph.hpp>
+#include <orbis/optimize/pose_graph-inl.hpp>
 #include <orbis/optimize/pose_graph_problem.hpp>
 #include <orbis/slam/map.hpp>
 
@@ -105,8 +105,8 @@ template <class T>
 }
 
 inline std::optional<int> optimize_poses(std::span<sim3> poses, const std::vector<essential_edge>& edges,
-                                                      std::span<const std::uint8_t> is_fixed, bool scale_is_known,
-                                                      int max_iterations, const progress& callback) {
+                                         std::span<const std::uint8_t> is_fixed, bool scale_is_known,
+                                         int max_iterations, const progress& callback) {
   if (!scale_is_known) return optimize_graph<sim3>(poses, edges, is_fixed, max_iterations, callback);
   std::vector<se3> rigid;
   rigid.reserve(poses.size());
