@@ -28,7 +28,7 @@
 #include <orbis/camera/pinhole.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/io/bal.hpp>
-#include <orbis/optimize/bundle_adjustment.hpp>
+#include <orbis/optimize/bundle_adjustment-inl.hpp>
 #include <orbis/optimize/reprojection_with_intrinsics.hpp>
 
 #include "support/synthetic/bundle.hpp"

@@ -1,8 +1,45 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The solvers of block systems are in optimize.cpp.
-#include <orbis/optimize/detail/compiled/block_solvers.hpp>
-#undef ORBIS_INSTANTIATE_OPTIMIZE
-#define ORBIS_INSTANTIATE_OPTIMIZE template
-#include <orbis/optimize/detail/compiled/pnp.hpp>
-#include <orbis/optimize/detail/compiled/pnp_functions.hpp>
-#include <orbis/optimize/detail/compiled/pose_graph.hpp>
+#include <cstdint>
+#include <span>
+
+#include <orbis/camera/any.hpp>
+#include <orbis/camera/kannala_brandt.hpp>
+#include <orbis/camera/pinhole.hpp>
+#include <orbis/camera/radial_tangential.hpp>
+#include <orbis/core/execution.hpp>
+#include <orbis/core/se3.hpp>
+#include <orbis/core/types.hpp>
+#include <orbis/optimize/pnp-inl.hpp>
+#include <orbis/optimize/pose_graph-inl.hpp>
+#include <orbis/optimize/pose_refinement-inl.hpp>
+
+namespace orbis::optimize {
+
+using points = std::span<const vec3>;
+using pixels = std::span<const vec2>;
+template result<pose_estimate> estimate_pose(points, pixels, const camera::pinhole&, const pnp_options&,
+                                             pnp_workspace&);
+template result<pose_estimate> estimate_pose(points, pixels, const camera::radial_tangential&, const pnp_options&,
+                                             pnp_workspace&);
+template result<pose_estimate> estimate_pose(points, pixels, const camera::any_camera&, const pnp_options&,
+                                             pnp_workspace&);
+
+using observations = std::span<const pose_observation>;
+using outliers = std::span<std::uint8_t>;
+template pose_refinement detail::refine_pose(observations, const camera::pinhole&, double, const se3&, outliers,
+                                             const pose_refinement_options&, const huber&);
+template pose_refinement detail::refine_pose(observations, const camera::radial_tangential&, double, const se3&,
+                                             outliers, const pose_refinement_options&, const huber&);
+template pose_refinement detail::refine_pose(observations, const camera::kannala_brandt&, double, const se3&, outliers,
+                                             const pose_refinement_options&, const huber&);
+
+using edges = std::span<const pose_graph_edge<se3>>;
+template class pose_graph_solver<se3>;
+template pose_graph_summary pose_graph_solver<se3>::solve_edges(const sequential_policy&, std::span<se3>, edges,
+                                                                const pose_graph_options&, const progress&,
+                                                                detail::no_report&);
+template pose_graph_summary pose_graph_solver<se3>::solve_edges(const parallel_policy&, std::span<se3>, edges,
+                                                                const pose_graph_options&, const progress&,
+                                                                detail::no_report&);
+
+}  // namespace orbis::optimize

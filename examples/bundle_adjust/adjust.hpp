@@ -11,7 +11,7 @@
 #include <vector>
 
 #include <orbis/io/bal.hpp>
-#include <orbis/optimize/bundle_adjustment.hpp>
+#include <orbis/optimize/bundle_adjustment-inl.hpp>
 #include <orbis/optimize/reprojection_with_intrinsics.hpp>
 
 namespace optimize = orbis::optimize;

@@ -14,7 +14,7 @@
 #include <orbis/core/jacobi.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/core/types.hpp>
-#include <orbis/optimize/pose_graph.hpp>
+#include <orbis/optimize/pose_graph-inl.hpp>
 
 namespace examples {
 

@@ -9,7 +9,7 @@
 #include <CLI/CLI.hpp>
 
 #include <orbis/io/g2o.hpp>
-#include <orbis/optimize/pose_graph.hpp>
+#include <orbis/optimize/pose_graph-inl.hpp>
 
 #include "../common/memory.hpp"
 #include "chordal.hpp"

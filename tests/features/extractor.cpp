@@ -5,12 +5,12 @@
 #include <vector>
 
 #include <orbis/core/random.hpp>
-#include <orbis/features/brute_force.hpp>
+#include <orbis/features/brute_force-inl.hpp>
 #include <orbis/features/extractor.hpp>
 #include <orbis/features/matcher.hpp>
-#include <orbis/features/orb.hpp>
+#include <orbis/features/orb-inl.hpp>
 #include <orbis/features/stages.hpp>
-#include <orbis/features/windowed.hpp>
+#include <orbis/features/windowed-inl.hpp>
 
 #include "features/images.hpp"
 #include "features/sources.hpp"

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include <orbis/core/random.hpp>
-#include <orbis/features/brute_force.hpp>
+#include <orbis/features/brute_force-inl.hpp>
 #include <orbis/features/matcher.hpp>
 #include <orbis/features/stages.hpp>
 

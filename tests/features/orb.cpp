@@ -11,7 +11,7 @@
 
 #include <orbis/features/brute_force.hpp>
 #include <orbis/features/matcher.hpp>
-#include <orbis/features/orb.hpp>
+#include <orbis/features/orb-inl.hpp>
 #include <orbis/features/stages.hpp>
 #include <orbis/io/image.hpp>
 

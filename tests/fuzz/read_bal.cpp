@@ -9,8 +9,8 @@
 
 #include <orbis/core/execution.hpp>
 #include <orbis/io/bal.hpp>
+#include <orbis/optimize/bundle_adjustment-inl.hpp>
 #include <orbis/optimize/reprojection_with_intrinsics.hpp>
-#include <orbis/optimize/bundle_adjustment.hpp>
 
 #include "fuzz/target.hpp"
 

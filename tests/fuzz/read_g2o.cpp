@@ -9,7 +9,7 @@
 
 #include <orbis/core/execution.hpp>
 #include <orbis/io/g2o.hpp>
-#include <orbis/optimize/pose_graph.hpp>
+#include <orbis/optimize/pose_graph-inl.hpp>
 
 #include "../../examples/pose_graph/chordal.hpp"
 #include "fuzz/target.hpp"

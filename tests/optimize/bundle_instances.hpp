@@ -3,33 +3,44 @@
 // neighbours, unless orbis::compiled has it.
 #pragma once
 
-#include <orbis/core/simd/dispatch.hpp>
-#include <orbis/optimize/detail/compiled/bundle_adjustment.hpp>
-#include <orbis/optimize/reprojection_with_intrinsics.hpp>
+#include <span>
 
-#ifndef ORBIS_TEST_INSTANCES
-#define ORBIS_TEST_INSTANCES extern template
-#endif
-#ifndef ORBIS_TEST_BAL_INSTANCES
-#define ORBIS_TEST_BAL_INSTANCES extern template
-#endif
+#include <orbis/camera/any.hpp>
+#include <orbis/camera/pinhole.hpp>
+#include <orbis/core/execution.hpp>
+#include <orbis/core/types.hpp>
+#include <orbis/optimize/bundle_adjustment-inl.hpp>
+#include <orbis/optimize/reprojection_with_intrinsics-inl.hpp>
 
-namespace orbis {
+/// `what`: `extern template`, or `template` in the source that has it.
+#define ORBIS_TEST_SOLVE(what, residual, loss, policy)                                                                \
+  what bundle_summary bundle_adjuster<residual, loss>::solve(const policy&, std::span<residual::camera_state>,        \
+                                                             std::span<vec3>, std::span<const residual::observation>, \
+                                                             const bundle_options&, progress, detail::no_report&&);   \
+  what bundle_summary bundle_adjuster<residual, loss>::solve_again(const policy&, std::span<residual::camera_state>,  \
+                                                                   std::span<vec3>, const bundle_options&, progress,  \
+                                                                   detail::no_report&&);
+#define ORBIS_TEST_BUNDLE(what, residual, loss)             \
+  what struct detail::bundle_kernels<residual, loss>;       \
+  what class bundle_adjuster<residual, loss>;               \
+  ORBIS_TEST_SOLVE(what, residual, loss, sequential_policy) \
+  ORBIS_TEST_SOLVE(what, residual, loss, parallel_policy)
+/// For cameras with `size` numbers.
+#define ORBIS_TEST_BLOCKS(what, size)            \
+  what struct detail::panel_kernels<size>;       \
+  what struct detail::schur_kernels<size, true>; \
+  what class detail::block_cholesky<size>;       \
+  what class detail::automatic_block_solver<size>;
 
-ORBIS_INSTANTIATE_BUNDLE_KERNELS(ORBIS_TEST_INSTANCES, reprojection<camera::pinhole>, trivial)
+namespace orbis::optimize {
 
-// Cameras with nine numbers.
-ORBIS_KERNEL_INSTANCE(ORBIS_TEST_INSTANCES, optimize::detail::panel_product_kernel<9>, optimize::detail::panel_product);
-ORBIS_KERNEL_INSTANCE(ORBIS_TEST_INSTANCES, optimize::detail::panel_solve_kernel<9>, optimize::detail::panel_solve);
-ORBIS_KERNEL_INSTANCE(ORBIS_TEST_INSTANCES, optimize::detail::eliminate_kernel<9, true>,
-                      optimize::detail::schur_kernels<9, true>::eliminator);
-ORBIS_KERNEL_INSTANCE(ORBIS_TEST_INSTANCES, optimize::detail::substitute_kernel<9, true>,
-                      optimize::detail::schur_kernels<9, true>::substituter);
-namespace optimize::detail {
-ORBIS_TEST_INSTANCES class block_cholesky<9>;
-ORBIS_TEST_INSTANCES class automatic_block_solver<9>;
-}  // namespace optimize::detail
-ORBIS_INSTANTIATE_BUNDLE(ORBIS_TEST_BAL_INSTANCES, bal_reprojection, huber)
-ORBIS_INSTANTIATE_BUNDLE(ORBIS_TEST_BAL_INSTANCES, bal_reprojection, trivial)
+ORBIS_TEST_BLOCKS(extern template, 6)
+ORBIS_TEST_BUNDLE(extern template, reprojection<camera::pinhole>, huber)
+ORBIS_TEST_BUNDLE(extern template, reprojection<camera::any_camera>, huber)
+extern template struct detail::bundle_kernels<reprojection<camera::pinhole>, trivial>;
 
-}  // namespace orbis
+ORBIS_TEST_BLOCKS(extern template, 9)
+ORBIS_TEST_BUNDLE(extern template, bal_reprojection, huber)
+ORBIS_TEST_BUNDLE(extern template, bal_reprojection, trivial)
+
+}  // namespace orbis::optimize

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include <orbis/core/execution.hpp>
-#include <orbis/optimize/bundle_adjustment.hpp>
+#include <orbis/optimize/bundle_adjustment-inl.hpp>
 #include <orbis/optimize/reprojection_with_intrinsics.hpp>
 #include <orbis/optimize/robust_loss.hpp>
 

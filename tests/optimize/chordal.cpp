@@ -5,7 +5,7 @@
 #include <cstring>
 #include <limits>
 
-#include <orbis/optimize/pose_graph.hpp>
+#include <orbis/optimize/pose_graph-inl.hpp>
 
 #include "pose_graphs.hpp"
 #include "support.hpp"

@@ -6,7 +6,7 @@
 #include <orbis/camera/kannala_brandt.hpp>
 #include <orbis/camera/pinhole.hpp>
 #include <orbis/camera/radial_tangential.hpp>
-#include <orbis/optimize/pnp.hpp>
+#include <orbis/optimize/pnp-inl.hpp>
 
 #include "support.hpp"
 #include "support/allocations.hpp"

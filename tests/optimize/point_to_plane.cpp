@@ -4,9 +4,9 @@
 #include <vector>
 
 #include <orbis/core/execution.hpp>
-#include <orbis/optimize/bundle_adjustment.hpp>
-#include <orbis/optimize/detail/minimal/descent.hpp>
 #include <orbis/core/small_cholesky.hpp>
+#include <orbis/optimize/bundle_adjustment-inl.hpp>
+#include <orbis/optimize/detail/minimal/descent.hpp>
 #include <orbis/optimize/point_to_plane.hpp>
 
 #include "support.hpp"
@@ -56,7 +56,7 @@ double align(se3& pose, const std::vector<point_to_plane>& seen) {
   const auto step = [](const se3& at, const equations& e) -> std::optional<se3> {
     mat6 damped = e.h;
     damped.diagonal().array() += 1e-8 * e.h.diagonal().maxCoeff();
-    optimize::detail::small_cholesky<6> factors;
+    small_cholesky<6> factors;
     if (!factors.set(damped) || !(factors.factor(0.0) > 0.0)) return std::nullopt;
     return at * se3::exp(-factors.solve(e.g));
   };

@@ -3,7 +3,7 @@
 #include <limits>
 #include <numeric>
 
-#include <orbis/optimize/pose_graph.hpp>
+#include <orbis/optimize/pose_graph-inl.hpp>
 
 #include "pose_graphs.hpp"
 #include "support.hpp"

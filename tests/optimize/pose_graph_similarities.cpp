@@ -4,7 +4,7 @@
 #include <vector>
 
 #include <orbis/core/sim3.hpp>
-#include <orbis/optimize/pose_graph.hpp>
+#include <orbis/optimize/pose_graph-inl.hpp>
 
 #include "support/catch.hpp"
 

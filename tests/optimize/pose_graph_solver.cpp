@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include <orbis/optimize/pose_graph.hpp>
+#include <orbis/optimize/pose_graph-inl.hpp>
 
 #include "pose_graphs.hpp"
 #include "support/allocations.hpp"

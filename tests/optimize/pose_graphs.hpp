@@ -10,7 +10,7 @@
 
 #include <orbis/core/execution.hpp>
 #include <orbis/core/se3.hpp>
-#include <orbis/optimize/pose_graph.hpp>
+#include <orbis/optimize/pose_graph-inl.hpp>
 
 #include "support/synthetic/pose_graph.hpp"
 
@@ -21,13 +21,13 @@ inline std::vector<test::synthetic_graph> small_graphs(double noise = 1.0) {
   std::vector<test::synthetic_graph> graphs;
   const auto add = [&](test::graph_shape shape, int poses, int turns) {
     graphs.push_back(test::make_pose_graph({.shape = shape,
-                                          .poses_per_turn = poses,
-                                          .turns = turns,
-                                          .radius = 10.0,
-                                          .translation_sigma = 0.05 * noise,
-                                          .rotation_sigma = 0.02 * noise,
-                                          .closure_probability = 0.8,
-                                          .seed = 17}));
+                                            .poses_per_turn = poses,
+                                            .turns = turns,
+                                            .radius = 10.0,
+                                            .translation_sigma = 0.05 * noise,
+                                            .rotation_sigma = 0.02 * noise,
+                                            .closure_probability = 0.8,
+                                            .seed = 17}));
   };
   add(test::graph_shape::sphere, 20, 15);
   add(test::graph_shape::torus, 16, 20);

@@ -5,7 +5,7 @@
 #include <orbis/camera/kannala_brandt.hpp>
 #include <orbis/camera/pinhole.hpp>
 #include <orbis/camera/radial_tangential.hpp>
-#include <orbis/optimize/pose_refinement.hpp>
+#include <orbis/optimize/pose_refinement-inl.hpp>
 
 #include "support.hpp"
 #include "support/allocations.hpp"

@@ -10,6 +10,11 @@
 
 using namespace orbis::optimize;
 
+static_assert(general_damping_policy<gauss_newton> && general_damping_policy<levenberg_marquardt> &&
+              general_damping_policy<dogleg>);
+static_assert(reduced_solver<dense_reduced_solver> && reduced_solver<sparse_reduced_solver>);
+static_assert(reduced_solver<iterative_reduced_solver> && reduced_solver<automatic_reduced_solver>);
+
 namespace {
 
 /// Least squares with as many residuals as a function makes, solved densely.

@@ -9,7 +9,7 @@
 #include <span>
 #include <vector>
 
-#include <orbis/features/detail/match/hamming_nearest.hpp>
+#include <orbis/features/detail/match/hamming_search.hpp>
 #include <orbis/features/detail/match/nearest.hpp>
 #include <orbis/features/hamming.hpp>
 #include <orbis/features/match.hpp>
@@ -65,3 +65,7 @@ template <class Distance>
 }
 
 }  // namespace orbis::features
+
+#ifndef ORBIS_COMPILED
+#include <orbis/features/brute_force-inl.hpp>
+#endif

@@ -132,3 +132,7 @@ template <class Distance>
 }
 
 }  // namespace orbis::features
+
+#ifndef ORBIS_COMPILED
+#include <orbis/features/epipolar-inl.hpp>
+#endif

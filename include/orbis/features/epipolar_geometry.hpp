@@ -11,8 +11,6 @@
 #include <optional>
 #include <span>
 
-#include <Eigen/Geometry>
-
 #include <orbis/core/se3.hpp>
 #include <orbis/core/types.hpp>
 #include <orbis/features/descriptor.hpp>
@@ -121,5 +119,5 @@ static_assert(epipolar_geometry<fundamental_geometry> && epipolar_geometry<ray_g
 }  // namespace orbis::features
 
 #ifndef ORBIS_COMPILED
-#include <orbis/features/detail/compiled/epipolar_functions.hpp>
+#include <orbis/features/epipolar_geometry-inl.hpp>
 #endif

@@ -8,19 +8,13 @@
 #include <cstdint>
 
 #include <orbis/core/image.hpp>
-#include <orbis/core/simd/dispatch.hpp>
-#include <orbis/features/detail/extract/luma_row.hpp>
 
 namespace orbis::features {
 
 /// Writes the luma of a colour image (Rec. 601, rounded to the nearest): the same bits as OpenCV's COLOR_RGB2GRAY.
 /// O(pixels).
 /// @pre both images have the same size
-inline void luma(image_view<const rgb8> from, image_view<std::uint8_t> to) {
-  assert(from.width() == to.width() && from.height() == to.height());
-  const auto row = simd::kernel<detail::luma_kernel, detail::luma_kernel::signature, simd::avx2>();
-  for (int y = 0; y < from.height(); ++y) row(from.row(y).data(), from.width(), to.row(y).data());
-}
+void luma(image_view<const rgb8> from, image_view<std::uint8_t> to);
 
 /// Writes a 16-bit image (infrared, thermal, raw) as 8 bits: values up to `low` become 0, values from `high` on become
 /// 255, those between are scaled linearly and rounded. Use the same `low` and `high` for a whole recording; otherwise
@@ -38,3 +32,7 @@ inline void narrow(image_view<const std::uint16_t> from, image_view<std::uint8_t
 }
 
 }  // namespace orbis::features
+
+#ifndef ORBIS_COMPILED
+#include <orbis/features/grey-inl.hpp>
+#endif

@@ -18,7 +18,8 @@ concept descriptor_distance = std::regular_invocable<const F&, const Descriptor&
     std::convertible_to<std::invoke_result_t<const F&, const Descriptor&, const Descriptor&>, std::uint32_t>;
 
 /// The number of bits in which two descriptors differ, for any `bit_string`. Matchers compare many pairs at once with
-/// vector instructions where their distance is of this type.
+/// vector instructions where their distance is of this type. The library orbis::compiled holds this for strings of 256
+/// bits; with others, its users include brute_force-inl.hpp, windowed-inl.hpp, epipolar-inl.hpp or stereo-inl.hpp.
 struct hamming {
   template <bit_string Descriptor>
   [[nodiscard]] constexpr std::uint32_t operator()(const Descriptor& a, const Descriptor& b) const noexcept {

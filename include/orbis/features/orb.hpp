@@ -8,7 +8,6 @@
 
 #include <algorithm>
 #include <cassert>
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -17,13 +16,9 @@
 
 #include <orbis/core/image.hpp>
 #include <orbis/features/descriptor.hpp>
-#include <orbis/features/detail/extract/cover_first.hpp>
-#include <orbis/features/detail/extract/fast.hpp>
 #include <orbis/features/detail/extract/kept_memory.hpp>
-#include <orbis/features/detail/extract/orientation.hpp>
-#include <orbis/features/detail/extract/steered_brief.hpp>
+#include <orbis/features/detail/extract/orb_parts.hpp>
 #include <orbis/features/extractor.hpp>
-#include <orbis/features/grey.hpp>
 #include <orbis/features/pyramid.hpp>
 
 namespace orbis::features {
@@ -48,6 +43,7 @@ struct orb_options {
 /// Finds keypoints on the levels of an image pyramid and describes them. The parts that find corners, choose among
 /// them, give them a direction and describe them are types. Calls on a const object may run at the same time. The
 /// extractor keeps its working memory for the next call, one piece for each call that ran at the same time.
+/// The library orbis::compiled holds it with the default parts; with others, its users include orb-inl.hpp.
 template <corner_detector Detector = fast9, corner_selection Distribution = cover_first,
           orientation_estimator Orientation = intensity_centroid, patch_descriptor Descriptor = steered_brief>
 class basic_orb_extractor {
@@ -78,19 +74,11 @@ class basic_orb_extractor {
   /// overlap and reach beyond the image. An image with a side of less than 2 `border` + 1 pixels
   /// (39 by default) has no features. O(pixels + features).
   [[nodiscard]] features_type operator()(image_view<const std::uint8_t> image, image_view<const std::uint8_t> mask = {},
-                                         std::span<const region> regions = {}) const {
-    features_type found;
-    into(found, image, mask, regions);
-    return found;
-  }
+                                         std::span<const region> regions = {}) const;
 
   /// The features of the luma of a colour image (`luma`); the rest as for a grey image.
   [[nodiscard]] features_type operator()(image_view<const rgb8> image, image_view<const std::uint8_t> mask = {},
-                                         std::span<const region> regions = {}) const {
-    features_type found;
-    into(found, image, mask, regions);
-    return found;
-  }
+                                         std::span<const region> regions = {}) const;
 
   /// Deleted: make 8 bits of a 16-bit image by `narrow` first, which needs its range of values.
   features_type operator()(image_view<const std::uint16_t> image, image_view<const std::uint8_t> mask = {},
@@ -99,28 +87,12 @@ class basic_orb_extractor {
   /// Replaces the contents of `found` by the features of an image. Allocates nothing once an image of this size with as
   /// many corners has been seen.
   void into(features_type& found, image_view<const std::uint8_t> image, image_view<const std::uint8_t> mask = {},
-            std::span<const region> regions = {}) const {
-    auto memory = kept_.take();
-    extract(found, *memory, memory->pyramid, image, mask, regions);
-    kept_.give(std::move(memory));
-  }
+            std::span<const region> regions = {}) const;
   /// As above, with the image's pyramid left in `pyramid` for others to use: a keypoint's octave is its level there.
   void into(features_type& found, image_pyramid& pyramid, image_view<const std::uint8_t> image,
-            image_view<const std::uint8_t> mask = {}, std::span<const region> regions = {}) const {
-    auto memory = kept_.take();
-    extract(found, *memory, pyramid, image, mask, regions);
-    kept_.give(std::move(memory));
-  }
+            image_view<const std::uint8_t> mask = {}, std::span<const region> regions = {}) const;
   void into(features_type& found, image_view<const rgb8> image, image_view<const std::uint8_t> mask = {},
-            std::span<const region> regions = {}) const {
-    auto memory = kept_.take();
-    const auto pixels = static_cast<std::size_t>(image.width()) * static_cast<std::size_t>(image.height());
-    if (memory->grey.size() < pixels) memory->grey.resize(pixels);
-    const image_view<std::uint8_t> grey{memory->grey.data(), image.width(), image.height()};
-    luma(image, grey);
-    extract(found, *memory, memory->pyramid, grey, mask, regions);
-    kept_.give(std::move(memory));
-  }
+            std::span<const region> regions = {}) const;
 
  private:
   struct workspace {
@@ -133,92 +105,14 @@ class basic_orb_extractor {
   };
 
   void extract(features_type& found, workspace& memory, image_pyramid& pyramid, image_view<const std::uint8_t> image,
-               image_view<const std::uint8_t> mask, std::span<const region> regions) const {
-    assert(mask.empty() || (mask.width() == image.width() && mask.height() == image.height()));
-    found.keypoints.clear();
-    found.descriptors.clear();
-    pyramid.build(image, options_.levels, static_cast<double>(options_.scale_factor), 2 * border + 1);
-    const std::size_t levels = pyramid.size();
-    if (levels == 0 || options_.max_features == 0) return;
-    if (memory.levels.size() < levels) memory.levels.resize(levels);
-    for (std::size_t level = 0; level != levels; ++level) {
-      const image_view<const std::uint8_t> pixels = pyramid[level];
-      level_corners& on = memory.levels[level];
-      on.area = area_of(pixels, image, regions);
-      on.scale = static_cast<double>(image.width()) / pixels.width();
-      detect_(pixels, on.area, {options_.threshold, options_.min_threshold}, memory.detector, on.corners);
-      drop_unwanted(on.corners, pixels, image, mask, regions);
-    }
-    choose_(std::span{memory.levels}.first(levels), options_.max_features, memory.distribution);
-    for (std::size_t level = 0; level != levels; ++level)
-      describe(found, memory, pyramid[level], static_cast<int>(level), image);
-  }
-
-  /// The part of a level in which keypoints can lie: what surrounds all regions, without the border.
+               image_view<const std::uint8_t> mask, std::span<const region> regions) const;
   [[nodiscard]] static region area_of(image_view<const std::uint8_t> level, image_view<const std::uint8_t> image,
-                                      std::span<const region> regions) {
-    const auto extent = [](int level_size, int full_size, std::span<const region> all, int region::*from,
-                           int region::*size) {
-      double first = 0.0, last = full_size - 1.0;
-      if (!all.empty()) {
-        first = full_size;
-        last = -1.0;
-        for (const region& r : all) {
-          first = std::min<double>(first, r.*from);
-          last = std::max(last, static_cast<double>(r.*from) + r.*size - 1.0);
-        }
-      }
-      const auto to_level = [&](double at) { return image_pyramid::full_coordinate(at, full_size, level_size); };
-      // Half a pixel more on both sides, because the position of a keypoint is rounded to a pixel.
-      const double begin = std::clamp(std::floor(to_level(first - 0.5)), static_cast<double>(border), 1e9);
-      const double end =
-          std::clamp(std::ceil(to_level(last + 0.5)) + 1.0, 0.0, static_cast<double>(level_size - border));
-      return std::pair(static_cast<int>(begin), std::max(0, static_cast<int>(end - begin)));
-    };
-    const auto [x, width] = extent(level.width(), image.width(), regions, &region::x, &region::width);
-    const auto [y, height] = extent(level.height(), image.height(), regions, &region::y, &region::height);
-    return {x, y, width, height};
-  }
-
+                                      std::span<const region> regions);
   static void drop_unwanted(std::vector<corner>& corners, image_view<const std::uint8_t> level,
                             image_view<const std::uint8_t> image, image_view<const std::uint8_t> mask,
-                            std::span<const region> regions) {
-    if (mask.empty() && regions.empty()) return;
-    const auto pixel = [](int at, float within, int level_size, int full_size) {
-      return std::clamp(static_cast<int>(std::lround(
-                            image_pyramid::full_coordinate(at + static_cast<double>(within), level_size, full_size))),
-                        0, full_size - 1);
-    };
-    std::erase_if(corners, [&](const corner& c) {
-      const int x = pixel(c.x, c.dx, level.width(), image.width());
-      const int y = pixel(c.y, c.dy, level.height(), image.height());
-      if (!mask.empty() && mask(x, y) == 0) return true;
-      return !regions.empty() &&
-             std::none_of(regions.begin(), regions.end(), [&](const region& r) { return r.contains(x, y); });
-    });
-  }
-
-  /// Appends the chosen corners of a level with orientation and descriptor.
+                            std::span<const region> regions);
   void describe(features_type& found, workspace& memory, image_view<const std::uint8_t> level, int octave,
-                image_view<const std::uint8_t> image) const {
-    const std::vector<corner>& corners = memory.levels[static_cast<std::size_t>(octave)].corners;
-    if (corners.empty()) return;
-    describe_.prepare(level, corners.front().y, corners.back().y + 1, memory.descriptor);
-    const float size = static_cast<float>(Descriptor::diameter) * static_cast<float>(image.width()) /
-                       static_cast<float>(level.width());
-    for (const corner& c : corners) {
-      const orientation o = orient_(level, c.x, c.y);
-      found.descriptors.push_back(describe_(memory.descriptor, c.x, c.y, o));
-      found.keypoints.push_back({.x = static_cast<float>(image_pyramid::full_coordinate(c.x + static_cast<double>(c.dx),
-                                                                                        level.width(), image.width())),
-                                 .y = static_cast<float>(image_pyramid::full_coordinate(
-                                     c.y + static_cast<double>(c.dy), level.height(), image.height())),
-                                 .size = size,
-                                 .angle = o.angle,
-                                 .response = c.response,
-                                 .octave = octave});
-    }
-  }
+                image_view<const std::uint8_t> image) const;
 
   orb_options options_{};
   [[no_unique_address]] Detector detect_{};
@@ -232,3 +126,7 @@ class basic_orb_extractor {
 using orb_extractor = basic_orb_extractor<>;
 
 }  // namespace orbis::features
+
+#ifndef ORBIS_COMPILED
+#include <orbis/features/orb-inl.hpp>
+#endif

@@ -25,7 +25,7 @@
 #include <orbis/features/descriptor.hpp>
 #include <orbis/features/detail/extract/kept_memory.hpp>
 #include <orbis/features/detail/match/search_among.hpp>
-#include <orbis/features/detail/match/slide_differences.hpp>
+#include <orbis/features/detail/match/sliding_square.hpp>
 #include <orbis/features/hamming.hpp>
 #include <orbis/features/match.hpp>
 #include <orbis/features/pyramid.hpp>
@@ -249,3 +249,7 @@ class stereo_matcher {
 };
 
 }  // namespace orbis::features
+
+#ifndef ORBIS_COMPILED
+#include <orbis/features/stereo-inl.hpp>
+#endif

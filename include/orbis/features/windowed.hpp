@@ -78,3 +78,7 @@ template <class Distance>
 }
 
 }  // namespace orbis::features
+
+#ifndef ORBIS_COMPILED
+#include <orbis/features/windowed-inl.hpp>
+#endif

@@ -7,30 +7,75 @@
 /// S. Umeyama, PAMI 13 (1991) for the scale.
 #pragma once
 
-#include <cmath>
 #include <concepts>
 #include <cstddef>
 #include <cstdint>
 #include <iterator>
+#include <optional>
 #include <ranges>
 #include <span>
-#include <string>
-#include <type_traits>
-#include <utility>
 #include <vector>
 
-#include <orbis/core/jacobi.hpp>
 #include <orbis/core/point.hpp>
-#include <orbis/core/random.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/core/sim3.hpp>
 #include <orbis/core/types.hpp>
-#include <orbis/optimize/detail/minimal/alignment_estimator.hpp>
-#include <orbis/optimize/detail/minimal/horn.hpp>
-#include <orbis/optimize/ransac.hpp>
+#include <orbis/optimize/detail/minimal/pair_moments.hpp>
 
 namespace orbis::optimize {
+
+struct alignment_options;
+template <class Transform>
+struct alignment_estimate;
+
+namespace detail {
+
+/// The point `i` of a list.
+template <point_range Points>
+[[nodiscard]] vec3 read_point(const Points& points, std::size_t i) {
+  const auto c =
+      coordinates<double>(std::ranges::begin(points)[static_cast<std::ranges::range_difference_t<Points>>(i)]);
+  return {c[0], c[1], c[2]};
+}
+template <point_range Points>
+[[nodiscard]] std::vector<vec3> read_points(const Points& points) {
+  std::vector<vec3> out(static_cast<std::size_t>(std::ranges::size(points)));
+  for (std::size_t i = 0; i != out.size(); ++i) out[i] = read_point(points, i);
+  return out;
+}
+
+/// Whether lists of this length can be aligned.
+[[nodiscard]] result<void> check_pairs(std::size_t from, std::size_t to, std::span<const double> weights);
+/// What the moments of n pairs tell. Empty: they do not determine a rotation.
+[[nodiscard]] std::optional<sim3> align_by_moments(const pair_moments& moments, std::size_t n, bool with_scale);
+/// Why there is none; `not_finite`: the first pair that is not finite, or n.
+[[nodiscard]] error why_not_aligned(std::size_t not_finite, std::size_t n);
+
+/// The transform between two lists of points. Without weights all pairs are equal.
+template <point_range From, point_range To>
+[[nodiscard]] result<sim3> align(const From& from, const To& to, bool with_scale,
+                                 std::span<const double> weights = {}) {
+  const auto n = static_cast<std::size_t>(std::ranges::size(from));
+  if (auto possible = check_pairs(n, static_cast<std::size_t>(std::ranges::size(to)), weights); !possible)
+    return fail(possible.error());
+  const auto pair = [&](std::size_t i, double* a, double* b) {
+    const vec3 p = read_point(from, i), q = read_point(to, i);
+    for (int k = 0; k != 3; ++k) a[k] = p[k], b[k] = q[k];
+    return weights.empty() ? 1.0 : weights[i];
+  };
+  if (const auto found = align_by_moments(moments_of(n, pair), n, with_scale)) return *found;
+  std::size_t i = 0;
+  while (i != n && all_finite(read_point(from, i)) && all_finite(read_point(to, i))) ++i;
+  return fail(why_not_aligned(i, n));
+}
+
+/// `estimate_alignment` for lists of vectors.
+template <class Transform>
+[[nodiscard]] result<alignment_estimate<Transform>> alignment_of(std::span<const vec3> from, std::span<const vec3> to,
+                                                                 const alignment_options& options);
+
+}  // namespace detail
 
 /// Absolute orientation: the `T_to_from` that minimises the sum of `|T_to_from * from[i] - to[i]|^2`, in closed form.
 /// Every pair counts; see `estimate_alignment` for pairs that may be wrong. O(n).
@@ -83,83 +128,11 @@ template <class Transform = se3, point_range From, point_range To>
 requires(std::same_as<Transform, se3> || std::same_as<Transform, sim3>)
     [[nodiscard]] result<alignment_estimate<Transform>> estimate_alignment(const From& from, const To& to,
                                                                            const alignment_options& options = {}) {
-  constexpr const char* where = "alignment";
-  using estimator_type = detail::alignment_estimator<Transform>;
-  const auto n = static_cast<std::size_t>(std::ranges::size(from));
-  if (n != static_cast<std::size_t>(std::ranges::size(to)))
-    return fail(errc::invalid_argument, where, "the two lists of points differ in length");
-  if (!options.deviations.empty() && options.deviations.size() != n)
-    return fail(errc::invalid_argument, where, "there are not as many deviations as pairs");
-  const ransac_options asked = detail::ransac_part(options);
-  if (const char* const fault = detail::fault_of(asked)) return fail(errc::invalid_argument, where, fault);
-  if (n < 3) return fail(errc::no_data, where, "fewer than three pairs of points");
-  const auto read = [](const auto& points, std::size_t i) {
-    using range = std::remove_cvref_t<decltype(points)>;
-    const auto c =
-        coordinates<double>(std::ranges::begin(points)[static_cast<std::ranges::range_difference_t<range>>(i)]);
-    return vec3(c[0], c[1], c[2]);
-  };
-  const auto weight_of = [&](std::size_t i) {
-    return options.deviations.empty() ? 1.0 : 1.0 / (options.deviations[i] * options.deviations[i]);
-  };
-  std::vector<typename estimator_type::pair> pairs;
-  pairs.reserve(n);
-  vec3 from_centre = zeros<vec3>(), to_centre = zeros<vec3>();
-  for (std::size_t i = 0; i != n; ++i) {
-    const typename estimator_type::pair p{read(from, i), read(to, i), weight_of(i), static_cast<std::uint32_t>(i)};
-    if (!all_finite(p.from) || !all_finite(p.to) || !(p.weight > 0.0) || !std::isfinite(p.weight)) continue;
-    pairs.push_back(p);
-    from_centre += p.from;
-    to_centre += p.to;
-  }
-  if (pairs.size() < 3)
-    return fail(errc::degenerate, where,
-                "of " + std::to_string(n) + " pairs " + std::to_string(pairs.size()) + " are finite, three are needed");
-  from_centre /= static_cast<double>(pairs.size());
-  to_centre /= static_cast<double>(pairs.size());
-  mat3 spread = zeros<mat3>(), spread_to = zeros<mat3>();
-  for (auto& p : pairs) {
-    p.from -= from_centre;
-    p.to -= to_centre;
-    spread += p.from * transposed(p.from);
-    spread_to += p.to * transposed(p.to);
-  }
-  random_bits random(mix64(options.seed));
-  shuffle(pairs, random);
-
-  const estimator_type estimator(std::move(pairs));
-  auto found = ransac(estimator, asked, ransac_policies{msac{}, uniform_sampling{}, sprt{}, iterated_refinement{}});
-  if (!found) {
-    if (found.error().code == errc::degenerate)
-      for (const mat3& s : {spread, spread_to}) {
-        const vec3 sizes = eigen_of_symmetric<3>(s).values;
-        if (!(sizes[1] > 1e-12 * sizes[2]))
-          return fail(errc::degenerate, where, "the points all lie on one line or in one place");
-      }
-    return fail(found.error());
-  }
-  // Back from the centres.
-  const auto& centred = found->model.transform;
-  Transform transform;
-  if constexpr (estimator_type::with_scale)
-    transform =
-        sim3(centred.rotation(),
-             to_centre + centred.translation() - centred.scale() * (centred.rotation() * from_centre), centred.scale());
-  else
-    transform = se3(centred.rotation(), to_centre + centred.translation() - centred.rotation() * from_centre);
-  alignment_estimate<Transform> out{transform, {}, 0.0, found->iterations};
-  out.inliers.reserve(found->inliers.size());
-  double sum = 0.0;
-  for (std::size_t i = 0; i != n; ++i) {
-    const double weight = weight_of(i), e = weight * squared_norm(transform * read(from, i) - read(to, i));
-    if (!(weight > 0.0) || !(e < options.threshold * options.threshold)) continue;
-    out.inliers.push_back(static_cast<std::uint32_t>(i));
-    sum += e;
-  }
-  if (auto enough = detail::enough_inliers(where, out.inliers.size(), n, options.min_inliers, 3); !enough)
-    return fail(std::move(enough.error()));
-  out.rmse = std::sqrt(sum / static_cast<double>(out.inliers.size()));
-  return out;
+  return detail::alignment_of<Transform>(detail::read_points(from), detail::read_points(to), options);
 }
 
 }  // namespace orbis::optimize
+
+#ifndef ORBIS_COMPILED
+#include <orbis/optimize/alignment-inl.hpp>
+#endif

@@ -9,7 +9,6 @@
 #include <optional>
 
 #include <orbis/camera/model.hpp>
-#include <orbis/camera/project_lanes.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/core/types.hpp>
 #include <orbis/optimize/bundle_problem.hpp>
@@ -106,25 +105,8 @@ struct reprojection {
     to[16] = std::isnan(o.right) ? 0.0 : o.right;
     to[24] = std::isnan(o.right) ? 0.0 : 1.0;
   }
-  template <bool Derive, camera::double_lanes L>
-  ORBIS_ALWAYS_INLINE camera::mask_of<L> lanes_in_camera(const view&, const double* measurements, const L* q, L* r,
-                                                         L (*by_q)[3], L (*)[1]) const {
-    camera::lane_projection<L> p;
-    camera::lanes_of<Camera>::template project<Derive>(camera, q[0], q[1], q[2], p);
-    const L has_depth = L::load(measurements + 24), inverse_z = 1.0 / q[2];
-    const L shift = bf * inverse_z;
-    r[0] = p.u - L::load(measurements);
-    r[1] = p.v - L::load(measurements + 8);
-    r[2] = has_depth * ((p.u - shift) - L::load(measurements + 16));
-    if constexpr (Derive) {
-      for (int i = 0; i != 3; ++i) {
-        by_q[0][i] = p.j[0][i];
-        by_q[1][i] = p.j[1][i];
-        by_q[2][i] = has_depth * (i == 2 ? p.j[0][2] + shift * inverse_z : p.j[0][i]);
-      }
-    }
-    return p.valid;
-  }
+  template <bool Derive, class L>
+  auto lanes_in_camera(const view&, const double* measurements, const L* q, L* r, L (*by_q)[3], L (*)[1]) const;
 
  private:
   [[nodiscard]] static pose_observation as_pose_observation(const observation& o) {
@@ -141,3 +123,7 @@ template <class Camera>
 reprojection(Camera) -> reprojection<Camera>;
 
 }  // namespace orbis::optimize
+
+#ifndef ORBIS_COMPILED
+#include <orbis/optimize/reprojection-inl.hpp>
+#endif

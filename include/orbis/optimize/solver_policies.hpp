@@ -18,8 +18,8 @@
 #include <Eigen/Core>
 
 #include <orbis/core/types.hpp>
-#include <orbis/optimize/detail/sparse/block_ordering.hpp>
-#include <orbis/optimize/detail/sparse/reduced_solvers.hpp>
+#include <orbis/optimize/detail/sparse/block_solvers.hpp>
+#include <orbis/optimize/detail/sum_over.hpp>
 
 namespace orbis::optimize {
 
@@ -101,13 +101,26 @@ template <class P>
   return promise <= 1e-12 * problem.cost() ? step_outcome::stationary : step_outcome::exhausted;
 }
 
+/// `out[i] = value(i)` for every unknown.
+template <class Value>
+void set_each(Eigen::VectorXd& out, Eigen::Index size, const Value& value) {
+  if (out.size() != size) out.resize(size);
+  double* const to = out.data();
+  for (Eigen::Index i = 0; i != size; ++i) to[i] = value(i);
+}
+[[nodiscard]] inline double dot_product(const Eigen::VectorXd& a, const Eigen::VectorXd& b) {
+  const double *const p = a.data(), *const q = b.data();
+  return sum_over(static_cast<std::size_t>(a.size()), [&](std::size_t i) { return p[i] * q[i]; });
+}
+
 /// `out = -(H + D)^-1 g` for the D last factored.
 template <class P>
 void newton_step(P& problem, Eigen::VectorXd& out) {
   if constexpr (solves_newton<P>) {
     problem.newton_step(out);
   } else {
-    out = -problem.gradient();
+    const Eigen::VectorXd& g = problem.gradient();
+    set_each(out, g.size(), [&](Eigen::Index i) { return -g[i]; });
     problem.solve(out);
   }
 }
@@ -116,8 +129,10 @@ void newton_step(P& problem, Eigen::VectorXd& out) {
 template <class P>
 void set_metric(P& problem, Eigen::VectorXd& out) {
   const Eigen::VectorXd& diagonal = problem.diagonal();
-  const double least = std::max(1e-12 * diagonal.maxCoeff(), std::numeric_limits<double>::min());
-  out = diagonal.cwiseMax(least);
+  double most = 0.0;
+  for (Eigen::Index i = 0; i != diagonal.size(); ++i) most = std::max(most, diagonal[i]);
+  const double least = std::max(1e-12 * most, std::numeric_limits<double>::min());
+  set_each(out, diagonal.size(), [&](Eigen::Index i) { return std::max(diagonal[i], least); });
 }
 
 }  // namespace detail
@@ -131,7 +146,8 @@ struct gauss_newton {
     const Eigen::VectorXd none;
     if (!problem.factor(none)) return step_outcome::singular;
     detail::newton_step(problem, w.step);
-    if (detail::is_rounding(-0.5 * dot(problem.gradient(), w.step), problem.cost())) return step_outcome::stationary;
+    if (detail::is_rounding(-0.5 * detail::dot_product(problem.gradient(), w.step), problem.cost()))
+      return step_outcome::stationary;
     return std::isfinite(problem.try_step(w.step)) ? step_outcome::taken : step_outcome::exhausted;
   }
 };
@@ -152,10 +168,14 @@ struct levenberg_marquardt {
     detail::set_metric(problem, w.metric);
     if (s.lambda < 0.0) s.lambda = initial;
     for (int attempt = 0; attempt != max_attempts; ++attempt) {
-      w.damping = s.lambda * w.metric;
+      detail::set_each(w.damping, w.metric.size(), [&](Eigen::Index i) { return s.lambda * w.metric[i]; });
       if (problem.factor(w.damping)) {
         detail::newton_step(problem, w.step);
-        const double predicted = 0.5 * dot(w.step.cwiseProduct(w.damping) - problem.gradient(), w.step);
+        const Eigen::VectorXd& g = problem.gradient();
+        const double *const d = w.step.data(), *const damping = w.damping.data(), *const gradient = g.data();
+        const double predicted = 0.5 * detail::sum_over(static_cast<std::size_t>(g.size()), [&](std::size_t i) {
+                                   return (d[i] * damping[i] - gradient[i]) * d[i];
+                                 });
         if (detail::is_rounding(predicted, problem.cost())) return detail::bottom_or_stuck(problem);
         const double gain = (problem.cost() - problem.try_step(w.step)) / predicted;
         if (gain > 0.0) {
@@ -188,25 +208,29 @@ struct dogleg {
     detail::set_metric(problem, w.metric);
     if (!find_newton(problem, w)) return step_outcome::singular;
     const Eigen::VectorXd& g = problem.gradient();
-    w.cauchy = -g.cwiseQuotient(w.metric);
+    const Eigen::Index n = g.size();
+    detail::set_each(w.cauchy, n, [&](Eigen::Index i) { return -(g[i] / w.metric[i]); });
     const double along = problem.curvature(w.cauchy);
-    w.cauchy *= along > 0.0 ? -dot(g, w.cauchy) / along : 0.0;
+    const double stretch = along > 0.0 ? -detail::dot_product(g, w.cauchy) / along : 0.0;
+    detail::set_each(w.cauchy, n, [&](Eigen::Index i) { return w.cauchy[i] * stretch; });
     const double newton = length(w.newton, w), cauchy = length(w.cauchy, w);
     if (s.radius < 0.0) s.radius = initial_radius > 0.0 ? initial_radius : newton;
 
     for (int attempt = 0; attempt != max_attempts; ++attempt) {
       if (newton <= s.radius) {
-        w.step = w.newton;
+        detail::set_each(w.step, n, [&](Eigen::Index i) { return w.newton[i]; });
       } else if (cauchy >= s.radius) {
-        w.step = (s.radius / cauchy) * w.cauchy;
-      } else {
-        w.scratch = w.newton - w.cauchy;  // where does the leg leave the region?
+        const double part = s.radius / cauchy;
+        detail::set_each(w.step, n, [&](Eigen::Index i) { return part * w.cauchy[i]; });
+      } else {  // where does the leg leave the region?
+        detail::set_each(w.scratch, n, [&](Eigen::Index i) { return w.newton[i] - w.cauchy[i]; });
         const double a = square(w.scratch, w);
         const double b = weighted_dot(w.scratch, w.metric, w.cauchy);
         const double c = cauchy * cauchy - s.radius * s.radius;
-        w.step = w.cauchy + (-c / (b + std::sqrt(b * b - a * c))) * w.scratch;
+        const double part = -c / (b + std::sqrt(b * b - a * c));
+        detail::set_each(w.step, n, [&](Eigen::Index i) { return w.cauchy[i] + part * w.scratch[i]; });
       }
-      const double predicted = -dot(g, w.step) - 0.5 * problem.curvature(w.step);
+      const double predicted = -detail::dot_product(g, w.step) - 0.5 * problem.curvature(w.step);
       if (detail::is_rounding(predicted, problem.cost())) return detail::bottom_or_stuck(problem);
       const double gain = (problem.cost() - problem.try_step(w.step)) / predicted;
       const double far = length(w.step, w);
@@ -220,7 +244,8 @@ struct dogleg {
  private:
   [[nodiscard]] static double weighted_dot(const Eigen::VectorXd& a, const Eigen::VectorXd& weights,
                                            const Eigen::VectorXd& b) {
-    return dot(a.cwiseProduct(weights), b);
+    const double *const p = a.data(), *const q = weights.data(), *const r = b.data();
+    return detail::sum_over(static_cast<std::size_t>(a.size()), [&](std::size_t i) { return p[i] * q[i] * r[i]; });
   }
   [[nodiscard]] static double square(const Eigen::VectorXd& x, const step_workspace& w) {
     return weighted_dot(x, w.metric, x);
@@ -234,7 +259,7 @@ struct dogleg {
     const Eigen::VectorXd none;
     bool definite = problem.factor(none);
     for (double lambda = 1e-10; !definite && lambda <= 1.0; lambda *= 100.0) {
-      w.damping = lambda * w.metric;
+      detail::set_each(w.damping, w.metric.size(), [&](Eigen::Index i) { return lambda * w.metric[i]; });
       definite = problem.factor(w.damping);
     }
     if (!definite) return false;
@@ -242,9 +267,6 @@ struct dogleg {
     return true;
   }
 };
-
-static_assert(general_damping_policy<gauss_newton> && general_damping_policy<levenberg_marquardt> &&
-              general_damping_policy<dogleg>);
 
 using block_place = detail::block_place;
 
@@ -263,7 +285,7 @@ concept block_solver = requires(S& s, std::size_t size, std::span<const block_pl
 };
 
 /// A family of solvers of the reduced system of bundle adjustment: `typename R::template solver<C>`, constructed from
-/// an `R`, for every block size C.
+/// an `R`, for every block size C. The code of those below is in the -inl header.
 template <class R>
 concept reduced_solver = std::copyable<R> && block_solver < typename R::template solver<6>,
 6 > &&std::constructible_from<typename R::template solver<6>, const R&>;
@@ -299,7 +321,8 @@ struct automatic_reduced_solver {
   using solver = detail::automatic_block_solver<C>;
 };
 
-static_assert(reduced_solver<dense_reduced_solver> && reduced_solver<sparse_reduced_solver>);
-static_assert(reduced_solver<iterative_reduced_solver> && reduced_solver<automatic_reduced_solver>);
-
 }  // namespace orbis::optimize
+
+#ifndef ORBIS_COMPILED
+#include <orbis/optimize/solver_policies-inl.hpp>
+#endif

@@ -8,19 +8,14 @@
 /// CVIU 68 (1997), for the optimality criterion.
 #pragma once
 
-#include <algorithm>
-#include <cassert>
 #include <cmath>
 #include <concepts>
-#include <cstddef>
 #include <ranges>
 #include <span>
 #include <string_view>
 
-#include <Eigen/LU>
-
 #include <orbis/core/se3.hpp>
-#include <orbis/core/small_cholesky.hpp>
+#include <orbis/core/types.hpp>
 
 namespace orbis::optimize {
 
@@ -66,6 +61,12 @@ namespace detail {
 /// The matrix E with `second^T E first = 0` for rays of one point: translation x rotation of `T_second_first`.
 [[nodiscard]] mat3 essential_of(const se3& T_second_first);
 
+/// `triangulate` for any number of rays.
+template <class S>
+[[nodiscard]] triangulation triangulate_all(std::span<const basic_se3<S>> T_world_camera,
+                                            std::span<const matrix<3, 1, S>> rays,
+                                            const triangulation_options& options);
+
 }  // namespace detail
 
 /// The point whose projections to z = 1 have the least sum of squared distances from the two rays. Constant time.
@@ -79,99 +80,11 @@ template <std::ranges::contiguous_range Poses, std::ranges::contiguous_range Ray
 requires std::same_as<std::ranges::range_value_t<Poses>, se3> && std::same_as<std::ranges::range_value_t<Rays>, vec3>
 [[nodiscard]] triangulation triangulate(const Poses& poses, const Rays& directions,
                                         const triangulation_options& options = {}) {
-  const std::span<const se3> T_world_camera{poses};
-  const std::span<const vec3> rays{directions};
-  assert(T_world_camera.size() == rays.size());
-  triangulation out;
-  const std::size_t n = rays.size();
-  if (n < 2) return out;
-  const auto direction = [&](std::size_t i) { return vec3(normalized(T_world_camera[i].rotation() * rays[i])); };
-  // The point nearest to all rays, about their first camera for the sake of digits.
-  const vec3 origin = T_world_camera[0].translation();
-  mat3 a = zeros<mat3>();
-  vec3 b = zeros<vec3>();
-  double baseline = 0.0;
-  out.status = triangulation_status::not_finite;
-  for (std::size_t i = 0; i != n; ++i) {
-    if (!all_finite(rays[i]) || rays[i].z() == 0.0 || !all_finite(T_world_camera[i].to_matrix())) return out;
-    const vec3 d = direction(i);
-    const mat3 across = identity<mat3>() - d * transposed(d);
-    a += across;
-    const vec3 from_origin = T_world_camera[i].translation() - origin;
-    b += across * from_origin;
-    baseline = std::max(baseline, norm(from_origin));
-  }
-  // Two rays that are far apart: the one farthest from the first, and the one farthest from that.
-  const auto farthest_from = [&](std::size_t k) {
-    std::size_t farthest = k;
-    double angle = 0.0;
-    for (std::size_t i = 0; i != n; ++i)
-      if (const double to_i = detail::angle_between_directions(direction(k), direction(i)); to_i > angle) {
-        angle = to_i;
-        farthest = i;
-      }
-    out.parallax = std::max(out.parallax, angle);
-    return farthest;
-  };
-  farthest_from(farthest_from(0));
-  out.status = triangulation_status::no_parallax;
-  if (!(out.parallax >= options.min_parallax) || !(baseline > 0.0)) return out;
-  small_cholesky<3> factors;
-  if (!factors.set(a) || !(factors.factor(0.0) > 0.0)) return out;
-  vec3 point = factors.solve(b);
-  if (!all_finite(point)) return out;
-
-  const auto error_at = [&](const vec3& p, mat3* h, vec3* g) {
-    double sum = 0.0;
-    for (std::size_t i = 0; i != n; ++i) {
-      const vec3 seen = T_world_camera[i].rotation().inverse() * vec3(p + (origin - T_world_camera[i].translation()));
-      const double inverse_z = 1.0 / seen.z();
-      const vec2 xy = head<2>(seen) * inverse_z;
-      const vec2 r = xy - vec2(rays[i].x() / rays[i].z(), rays[i].y() / rays[i].z());
-      sum += squared_norm(r);
-      if (h == nullptr) continue;
-      matrix<2, 3> j;
-      j << inverse_z, 0.0, -xy.x() * inverse_z, 0.0, inverse_z, -xy.y() * inverse_z;
-      j = (j * transposed(T_world_camera[i].rotation_matrix())).eval();
-      *h += transposed(j) * j;
-      *g += transposed(j) * r;
-    }
-    return sum;
-  };
-  double lambda = 1e-6;
-  double error = error_at(point, nullptr, nullptr);
-  for (int k = 0; k != 20; ++k) {
-    mat3 h = zeros<mat3>();
-    vec3 g = zeros<vec3>();
-    error_at(point, &h, &g);
-    if (!factors.set(h)) break;
-    bool better = false;
-    double gain = 0.0;
-    for (int attempt = 0; attempt != 6 && !better; ++attempt, lambda *= better ? 0.1 : 10.0) {
-      if (!(factors.factor(lambda) > 0.0)) continue;
-      const vec3 next = point - factors.solve(g);
-      const double at_next = error_at(next, nullptr, nullptr);
-      better = at_next < error;
-      if (!better) continue;
-      gain = error - at_next;
-      point = next;
-      error = at_next;
-    }
-    if (!better || gain <= 1e-15 * error) break;
-  }
-  out.point = origin + point;
-  out.error = std::sqrt(error / static_cast<double>(n));
-  if (!all_finite(out.point)) return out;
-  out.status = triangulation_status::ok;
-  for (std::size_t i = 0; i != n; ++i) {
-    const vec3 seen = T_world_camera[i].rotation().inverse() * vec3(point + (origin - T_world_camera[i].translation()));
-    if (!(seen.z() > 0.0)) out.status = triangulation_status::behind_camera;
-  }
-  return out;
+  return detail::triangulate_all<double>(std::span<const se3>{poses}, std::span<const vec3>{directions}, options);
 }
 
 }  // namespace orbis::optimize
 
 #ifndef ORBIS_COMPILED
-#include <orbis/optimize/detail/compiled/triangulation_functions.hpp>
+#include <orbis/optimize/triangulation-inl.hpp>
 #endif

@@ -11,6 +11,7 @@
 
 #include <array>
 #include <cmath>
+#include <concepts>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -52,8 +53,9 @@ struct relative_pose_estimate {
 namespace detail {
 
 /// What `estimate_essential` does with the usable matches of `n`.
-[[nodiscard]] result<relative_pose_estimate> essential_of_matches(const std::vector<image_match>& matches,
-                                                                  std::size_t n, const essential_options& options);
+template <class Match>
+[[nodiscard]] result<relative_pose_estimate> essential_of_matches(const std::vector<Match>& matches, std::size_t n,
+                                                                  const essential_options& options);
 
 }  // namespace detail
 
@@ -128,8 +130,9 @@ struct plane_motion {
 /// Errors: `invalid_argument` for spans of different length or options out of range; `no_data` below four matches;
 /// `degenerate` if fewer than four are finite, all points of an image lie on one line, or no homography has
 /// `min_inliers` inliers. The message says which.
+template <std::same_as<homography_options> Options = homography_options>
 [[nodiscard]] result<homography_estimate> estimate_homography(std::span<const vec2> first, std::span<const vec2> second,
-                                                              const homography_options& options = {});
+                                                              const Options& options = {});
 
 /// The motions that a homography between rays at z = 1 may stand for, whatever its scale and sign: two, or one if there
 /// is no translation. (Two more would have the plane behind the first camera.) `ray` is any matched ray of the first
@@ -165,7 +168,8 @@ struct two_view_reconstruction {
 namespace detail {
 
 /// What `reconstruct_two_views` does with the usable matches of `n`.
-[[nodiscard]] result<two_view_reconstruction> reconstruction_of_matches(const std::vector<image_match>& matches,
+template <class Match>
+[[nodiscard]] result<two_view_reconstruction> reconstruction_of_matches(const std::vector<Match>& matches,
                                                                         std::size_t n, const two_view_options& options);
 
 }  // namespace detail
@@ -213,6 +217,5 @@ template <camera::camera_model Camera>
 }  // namespace orbis::optimize
 
 #ifndef ORBIS_COMPILED
-#include <orbis/optimize/detail/compiled/two_view_functions.hpp>
-#include <orbis/optimize/detail/compiled/two_view_reconstruction_functions.hpp>
+#include <orbis/optimize/two_view-inl.hpp>
 #endif

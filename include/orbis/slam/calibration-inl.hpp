@@ -24,7 +24,7 @@
 #include <orbis/core/se3.hpp>
 #include <orbis/core/types.hpp>
 #include <orbis/optimize/bundle_problem.hpp>
-#include <orbis/optimize/self_calibration.hpp>
+#include <orbis/optimize/self_calibration-inl.hpp>
 #include <orbis/slam/calibration.hpp>
 #include <orbis/slam/camera_rig.hpp>
 #include <orbis/slam/detail/mapping/map_bundle.hpp>
@@ -155,13 +155,11 @@ template <camera::parametric_camera Camera>
   return out;
 }
 
-
 }  // namespace detail
 
 template <feature_descriptor D, calibrated_camera Camera>
 result<calibration<Camera>> calibrate(const basic_map<D>& m, const camera_rig<Camera>& rig,
-                                                           const calibration_options& options,
-                                                           const progress& callback) {
+                                      const calibration_options& options, const progress& callback) {
   camera_rig<Camera> loose = rig;  // a depth error counts as many pixels as bf says
   loose.model.bf *= std::sqrt(options.depth_weight);
   const detail::bundle_snapshot problem = detail::calibration_problem_of(m, loose, options.max_keyframes);

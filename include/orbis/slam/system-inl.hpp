@@ -24,6 +24,7 @@
 #include <orbis/core/trajectory.hpp>
 #include <orbis/features/descriptor.hpp>
 #include <orbis/features/orb.hpp>
+#include <orbis/features/stereo-inl.hpp>
 #include <orbis/slam/atlas.hpp>
 #include <orbis/slam/camera_rig.hpp>
 #include <orbis/slam/detail/system/back_end.hpp>
@@ -35,9 +36,9 @@
 #include <orbis/slam/ids.hpp>
 #include <orbis/slam/map_file.hpp>
 #include <orbis/slam/matchers.hpp>
+#include <orbis/slam/measure.hpp>
 #include <orbis/slam/options.hpp>
 #include <orbis/slam/place_recognition.hpp>
-#include <orbis/slam/measure.hpp>
 #include <orbis/slam/shutter_estimate.hpp>
 #include <orbis/slam/system.hpp>
 #include <orbis/slam/track_result.hpp>
@@ -78,15 +79,16 @@ track_result ORBIS_SLAM_SYSTEM::track(double timestamp, image_view<const rgb8> c
   if (!are_usable(timestamp, color, depth)) return track_frame(timestamp, {}, {}, clock);
   frame_type f = measure_rgbd(shared_.rig, extract_, color, depth);
   front_end_->depth().see(depth);
-  return track_frame(timestamp, std::move(f),
-                     [&](frame_type& seen, const frame_motion& m) { follow_rows(shared_.rig, m, seen, depth); }, clock);
+  return track_frame(
+      timestamp, std::move(f),
+      [&](frame_type& seen, const frame_motion& m) { follow_rows(shared_.rig, m, seen, depth); }, clock);
 }
 
 ORBIS_SLAM_SYSTEM_TEMPLATE
 template <class Measure>
-  requires std::is_invocable_r_v<basic_frame<descriptor_of_t<Extractor>>, const Measure&, const camera_rig<Camera>&,
-                                 const Extractor&>
-track_result ORBIS_SLAM_SYSTEM::track_measured(double timestamp, const Measure& measure) {
+requires std::is_invocable_r_v < basic_frame<descriptor_of_t<Extractor>>,
+const Measure&, const camera_rig<Camera>&,
+    const Extractor& > track_result ORBIS_SLAM_SYSTEM::track_measured(double timestamp, const Measure& measure) {
   detail::stopwatch clock;
   front_end_->depth().see_nothing();
   return track_frame(timestamp, std::isfinite(timestamp) ? measure(shared_.rig, extract_) : frame_type{}, {}, clock);
@@ -101,9 +103,7 @@ track_result ORBIS_SLAM_SYSTEM::track(double timestamp, image_view<const rgb8> l
 
 ORBIS_SLAM_SYSTEM_TEMPLATE
 track_result ORBIS_SLAM_SYSTEM::track(double timestamp, image_view<const std::uint8_t> left,
-                                      image_view<const std::uint8_t> right)
-  requires grey_extractor<Extractor>
-{
+                                      image_view<const std::uint8_t> right) requires grey_extractor<Extractor> {
   return track_measured(timestamp, [&](const auto& rig, const Extractor& extract) {
     return are_usable(timestamp, left, right) ? measure_stereo(rig, extract, left, right, stereo_) : frame_type{};
   });
@@ -117,9 +117,8 @@ track_result ORBIS_SLAM_SYSTEM::track(double timestamp, image_view<const rgb8> c
 }
 
 ORBIS_SLAM_SYSTEM_TEMPLATE
-track_result ORBIS_SLAM_SYSTEM::track(double timestamp, image_view<const std::uint8_t> grey)
-  requires grey_extractor<Extractor>
-{
+track_result ORBIS_SLAM_SYSTEM::track(double timestamp,
+                                      image_view<const std::uint8_t> grey) requires grey_extractor<Extractor> {
   return track_measured(timestamp, [&](const auto& rig, const Extractor& extract) {
     return are_usable(timestamp, grey) ? measure_monocular(rig, extract, grey) : frame_type{};
   });
@@ -148,8 +147,8 @@ track_result ORBIS_SLAM_SYSTEM::track_frame(double timestamp, frame_type f, cons
 }
 
 ORBIS_SLAM_SYSTEM_TEMPLATE
-std::optional<map_keyframe> ORBIS_SLAM_SYSTEM::localize(
-    frame_type f, const row_follower& follow, track_result& result, detail::stopwatch& clock) {
+std::optional<map_keyframe> ORBIS_SLAM_SYSTEM::localize(frame_type f, const row_follower& follow, track_result& result,
+                                                        detail::stopwatch& clock) {
   const auto lock = shared_.lock();
   atlas_type& maps = shared_.atlas;
   const bool is_frozen = localization_only_;

@@ -11,6 +11,8 @@
 #include <utility>
 #include <vector>
 
+#include <orbis/core/inline.hpp>
+#include <orbis/features/detail/extract/orb_parts.hpp>
 #include <orbis/features/extractor.hpp>
 
 namespace orbis::features::detail {
@@ -44,87 +46,57 @@ inline void keep_strongest(std::vector<corner>& corners, int wanted) {
   std::sort(corners.begin(), corners.end(), before_in_image);
 }
 
-/// Chooses the strongest corners of each level, wherever they are. O(n).
-struct strongest {
-  struct workspace {
-    std::vector<int> quotas;
-  };
-  void operator()(std::span<level_corners> levels, int wanted, workspace& memory) const {
-    share_out(levels, wanted, memory.quotas);
-    for (std::size_t i = 0; i != levels.size(); ++i) keep_strongest(levels[i].corners, memory.quotas[i]);
+ORBIS_INLINE void strongest::operator()(std::span<level_corners> levels, int wanted, workspace& memory) const {
+  share_out(levels, wanted, memory.quotas);
+  for (std::size_t i = 0; i != levels.size(); ++i) keep_strongest(levels[i].corners, memory.quotas[i]);
+}
+
+ORBIS_INLINE void cover_first::operator()(std::span<level_corners> levels, int wanted, workspace& memory) const {
+  share_out(levels, wanted, memory.quotas);
+  take_covering(levels, wanted, memory);
+  for (std::size_t l = 0; l != levels.size(); ++l) {
+    std::vector<corner>&corners = levels[l].corners, &covering = memory.covering[l];
+    keep_strongest(covering, memory.quotas[l]);
+    keep_strongest(corners, memory.quotas[l] - static_cast<int>(covering.size()));
+    corners.insert(corners.end(), covering.begin(), covering.end());
+    std::sort(corners.begin(), corners.end(), before_in_image);
   }
-};
-static_assert(corner_selection<strongest>);
+}
 
-/// Covers the image first: it is cut into square cells, as many as a share of the wanted corners, and every cell gives
-/// its strongest corner of all levels. The rest are the strongest corners of their levels, wherever they are, because
-/// strong corners are found again in other images. A cell gives one corner, not one on each level, so that there is
-/// room for these. O(n), and sorting of the chosen corners.
-struct cover_first {
-  double share = 0.25;  ///< of the wanted corners, for covering; 0 ... 1: from best found again to best spread
-
-  struct workspace {
-    struct candidate {
-      float response = -1.0F;
-      std::uint32_t level = 0;
-      std::uint32_t index = 0;
-    };
-    std::vector<int> quotas;
-    std::vector<candidate> best;  ///< of each cell
-    std::vector<std::vector<corner>> covering;
-  };
-
-  /// @pre 0 <= share <= 1
-  void operator()(std::span<level_corners> levels, int wanted, workspace& memory) const {
-    share_out(levels, wanted, memory.quotas);
-    take_covering(levels, wanted, memory);
-    for (std::size_t l = 0; l != levels.size(); ++l) {
-      std::vector<corner>&corners = levels[l].corners, &covering = memory.covering[l];
-      keep_strongest(covering, memory.quotas[l]);
-      keep_strongest(corners, memory.quotas[l] - static_cast<int>(covering.size()));
-      corners.insert(corners.end(), covering.begin(), covering.end());
-      std::sort(corners.begin(), corners.end(), before_in_image);
+/// Moves the strongest corner of each cell to `memory.covering`.
+ORBIS_INLINE void cover_first::take_covering(std::span<level_corners> levels, int wanted, workspace& memory) const {
+  if (memory.covering.size() < levels.size()) memory.covering.resize(levels.size());
+  for (auto& corners : memory.covering) corners.clear();
+  std::size_t all = 0;
+  for (const level_corners& level : levels) all += level.corners.size();
+  const double cells = share * wanted;
+  if (cells < 1.0 || all <= static_cast<std::size_t>(wanted)) return;
+  const region& area = levels[0].area;
+  const double side = std::max(1.0, std::sqrt(static_cast<double>(area.width) * area.height / cells));
+  const int columns = static_cast<int>(area.width / side) + 1, rows = static_cast<int>(area.height / side) + 1;
+  memory.best.assign(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows), {});
+  for (std::uint32_t l = 0; l != levels.size(); ++l) {
+    // A corner's cell by one product and one sum; what lies outside belongs to the cell at the edge.
+    const double step = levels[l].scale / side, left = area.x / side, top = area.y / side;
+    for (std::uint32_t i = 0; i != levels[l].corners.size(); ++i) {
+      const corner& c = levels[l].corners[i];
+      const int column = std::clamp(static_cast<int>(c.x * step - left), 0, columns - 1);
+      const int row = std::clamp(static_cast<int>(c.y * step - top), 0, rows - 1);
+      auto& best = memory.best[static_cast<std::size_t>(row) * static_cast<std::size_t>(columns) +
+                               static_cast<std::size_t>(column)];
+      const bool tie = c.response == best.response && best.level == l;
+      if (c.response > best.response || (tie && before_in_image(c, levels[l].corners[best.index])))
+        best = {c.response, l, i};
     }
   }
-
- private:
-  /// Moves the strongest corner of each cell to `memory.covering`.
-  void take_covering(std::span<level_corners> levels, int wanted, workspace& memory) const {
-    if (memory.covering.size() < levels.size()) memory.covering.resize(levels.size());
-    for (auto& corners : memory.covering) corners.clear();
-    std::size_t all = 0;
-    for (const level_corners& level : levels) all += level.corners.size();
-    const double cells = share * wanted;
-    if (cells < 1.0 || all <= static_cast<std::size_t>(wanted)) return;
-    const region& area = levels[0].area;
-    const double side = std::max(1.0, std::sqrt(static_cast<double>(area.width) * area.height / cells));
-    const int columns = static_cast<int>(area.width / side) + 1, rows = static_cast<int>(area.height / side) + 1;
-    memory.best.assign(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows), {});
-    for (std::uint32_t l = 0; l != levels.size(); ++l) {
-      // A corner's cell by one product and one sum; what lies outside belongs to the cell at the edge.
-      const double step = levels[l].scale / side, left = area.x / side, top = area.y / side;
-      for (std::uint32_t i = 0; i != levels[l].corners.size(); ++i) {
-        const corner& c = levels[l].corners[i];
-        const int column = std::clamp(static_cast<int>(c.x * step - left), 0, columns - 1);
-        const int row = std::clamp(static_cast<int>(c.y * step - top), 0, rows - 1);
-        auto& best = memory.best[static_cast<std::size_t>(row) * static_cast<std::size_t>(columns) +
-                                 static_cast<std::size_t>(column)];
-        const bool tie = c.response == best.response && best.level == l;
-        if (c.response > best.response || (tie && before_in_image(c, levels[l].corners[best.index])))
-          best = {c.response, l, i};
-      }
-    }
-    constexpr float taken = -1.0F;
-    for (const auto& best : memory.best) {
-      if (best.response < 0.0F) continue;
-      corner& c = levels[best.level].corners[best.index];
-      memory.covering[best.level].push_back(c);
-      c.response = taken;
-    }
-    for (level_corners& level : levels)
-      std::erase_if(level.corners, [](const corner& c) { return c.response == taken; });
+  constexpr float taken = -1.0F;
+  for (const auto& best : memory.best) {
+    if (best.response < 0.0F) continue;
+    corner& c = levels[best.level].corners[best.index];
+    memory.covering[best.level].push_back(c);
+    c.response = taken;
   }
-};
-static_assert(corner_selection<cover_first>);
+  for (level_corners& level : levels) std::erase_if(level.corners, [](const corner& c) { return c.response == taken; });
+}
 
 }  // namespace orbis::features::detail

@@ -15,10 +15,12 @@
 #include <vector>
 
 #include <orbis/core/image.hpp>
+#include <orbis/core/inline.hpp>
 #include <orbis/core/simd/dispatch.hpp>
 #include <orbis/core/simd/integer.hpp>
 #include <orbis/core/simd/vec.hpp>
 #include <orbis/features/detail/extract/fast_scores.hpp>
+#include <orbis/features/detail/extract/orb_parts.hpp>
 #include <orbis/features/extractor.hpp>
 
 namespace orbis::features::detail {
@@ -47,158 +49,125 @@ struct binomial_kernel {
   }
 };
 
-/// Finds FAST-9/16 corners: nine contiguous pixels of the circle of radius 3 are all brighter or all
-/// darker than the centre by more than a threshold. The response is the largest threshold at which
-/// the pixel still is a corner; only pixels with a larger one than their eight neighbours count. The
-/// threshold adapts to the texture: a cell of the area that has a corner of at least `strong` keeps only
-/// such ones; the others keep all down to `weak`. As a response does not depend on the threshold, one
-/// pass finds both.
-///
-/// Three things differ from other implementations by default. A slight smoothing, and that a corner whose
-/// neighbour happens to be equal is not lost, make corners come again (by several per cent, under noise and shifts
-/// most). A parabola through the scores of the pixel and its neighbours tells where the peak is (a third less
-/// error). Without them the corners are OpenCV's.
-struct fast9 {
-  int cell = 35;       ///< side, pixels; about the reach of a descriptor
-  bool smooth = true;  ///< look at the image convolved with the binomial (1, 2, 1) / 4 in x and y
-  bool ties = true;    ///< of equal neighbours the last by row, then column, is a corner; false: none of them
+inline constexpr std::size_t row_margin = 64;  // what kernels may touch beside a row
+inline constexpr int band_rows = 64;
 
-  bool subpixel = true;  ///< fill in `dx` and `dy`
+/// Where the parabola through three values at -1, 0 and 1 is highest. @pre the middle one is, and not all are equal
+[[nodiscard]] inline float peak_of(int before, int middle, int after) {
+  return static_cast<float>(before - after) / static_cast<float>(2 * (before - 2 * middle + after));
+}
 
-  struct workspace {
-    std::vector<std::uint8_t> band;  ///< rows of the smoothed image
-    std::vector<std::uint8_t> line;
-    std::vector<std::uint8_t> scores;  ///< of three rows
-    std::vector<std::uint32_t> columns;
-    std::vector<std::uint32_t> cell_of;  ///< of each corner
-    std::vector<float> strongest;        ///< of each cell
+ORBIS_INLINE void fast9::operator()(image_view<const std::uint8_t> image, const region& area,
+                                    const corner_thresholds& thresholds, workspace& memory,
+                                    std::vector<corner>& corners) const {
+  corners.clear();
+  assert(cell >= 1 && 0 <= thresholds.weak && thresholds.weak <= thresholds.strong && thresholds.strong <= 254);
+  assert(area.empty() || (area.x >= 0 && area.y >= 0 && area.x + area.width <= image.width() &&
+                          area.y + area.height <= image.height()));
+  find_peaks(image, area, thresholds.weak, memory, corners);
+  if (thresholds.weak != thresholds.strong) drop_weak(area, thresholds.strong, memory, corners);
+}
+
+ORBIS_INLINE void fast9::find_peaks(image_view<const std::uint8_t> image, const region& area, int threshold,
+                                    workspace& memory, std::vector<corner>& corners) const {
+  // Scores are needed one pixel around the area, to see whether its outermost pixels are peaks.
+  const int left = std::max(circle_radius, area.x - 1);
+  const int right = std::min(image.width() - circle_radius, area.x + area.width + 1);
+  const int top = std::max(circle_radius, area.y - 1);
+  const int bottom = std::min(image.height() - circle_radius, area.y + area.height + 1);
+  if (area.empty() || left >= right || top >= bottom) return;
+  const auto score_row = simd::kernel<fast_scores_kernel, fast_scores_kernel::signature>();
+  const auto peaks_of = simd::kernel<fast_peaks_kernel, fast_peaks_kernel::signature>();
+  const int count = right - left;
+  const auto width = static_cast<std::size_t>(count);
+  const std::size_t pitch = width + 2 * row_margin;
+  memory.scores.assign(std::max(memory.scores.size(), 3 * pitch), 0);
+  if (memory.columns.size() < width) memory.columns.resize(width);
+  const auto row_of = [&](int y) {
+    return memory.scores.data() + static_cast<std::size_t>(y % 3) * pitch + row_margin;
   };
 
-  /// Replaces `corners` by those of the area. Pixels whose circle leaves the image are no corners. O(pixels of the
-  /// area).
-  /// @pre the area lies in the image; 0 <= weak <= strong <= 254; cell >= 1
-  void operator()(image_view<const std::uint8_t> image, const region& area, const corner_thresholds& thresholds,
-                  workspace& memory, std::vector<corner>& corners) const {
-    corners.clear();
-    assert(cell >= 1 && 0 <= thresholds.weak && thresholds.weak <= thresholds.strong && thresholds.strong <= 254);
-    assert(area.empty() || (area.x >= 0 && area.y >= 0 && area.x + area.width <= image.width() &&
-                            area.y + area.height <= image.height()));
-    find_peaks(image, area, thresholds.weak, memory, corners);
-    if (thresholds.weak != thresholds.strong) drop_weak(area, thresholds.strong, memory, corners);
-  }
-
- private:
-  static constexpr std::size_t margin = 64;  // what kernels may touch beside a row
-  static constexpr int band_rows = 64;
-
-  void find_peaks(image_view<const std::uint8_t> image, const region& area, int threshold, workspace& memory,
-                  std::vector<corner>& corners) const {
-    // Scores are needed one pixel around the area, to see whether its outermost pixels are peaks.
-    const int left = std::max(circle_radius, area.x - 1);
-    const int right = std::min(image.width() - circle_radius, area.x + area.width + 1);
-    const int top = std::max(circle_radius, area.y - 1);
-    const int bottom = std::min(image.height() - circle_radius, area.y + area.height + 1);
-    if (area.empty() || left >= right || top >= bottom) return;
-    const auto score_row = simd::kernel<fast_scores_kernel, fast_scores_kernel::signature>();
-    const auto peaks_of = simd::kernel<fast_peaks_kernel, fast_peaks_kernel::signature>();
-    const int count = right - left;
-    const auto width = static_cast<std::size_t>(count);
-    const std::size_t pitch = width + 2 * margin;
-    memory.scores.assign(std::max(memory.scores.size(), 3 * pitch), 0);
-    if (memory.columns.size() < width) memory.columns.resize(width);
-    const auto row_of = [&](int y) { return memory.scores.data() + static_cast<std::size_t>(y % 3) * pitch + margin; };
-
-    for (int y = top; y <= bottom; ++y) {
-      if (y == bottom) {
-        std::memset(row_of(y), 0, width);
-      } else if (smooth) {
-        const int in_band = (y - top) % band_rows;
-        if (in_band == 0) smooth_band(image, left, count, y, std::min(bottom, y + band_rows), memory);
-        score_row(memory.band.data() + static_cast<std::size_t>(in_band + circle_radius) * pitch + margin,
-                  static_cast<std::ptrdiff_t>(pitch), count, static_cast<std::uint8_t>(threshold), row_of(y));
-      } else {
-        score_row(image.data() + y * image.stride() + left, image.stride(), count, static_cast<std::uint8_t>(threshold),
-                  row_of(y));
-      }
-      const int inner = y - 1;  // now both of its neighbours are known
-      if (inner < std::max(top, area.y) || inner >= area.y + area.height) continue;
-      const std::uint8_t* row = row_of(inner);
-      const std::uint8_t* above = row_of(inner + 2);  // the slot before, cyclically; zero above the first row
-      const std::size_t found = peaks_of(above, row, row_of(y), count, ties, memory.columns.data());
-      for (std::size_t i = 0; i != found; ++i) {
-        const std::uint32_t column = memory.columns[i];
-        const int x = left + static_cast<int>(column);
-        if (x < area.x || x >= area.x + area.width) continue;
-        corners.push_back({x, inner, static_cast<float>(row[column] - 1)});
-        if (!subpixel) continue;
-        const std::uint8_t* here = row + column;  // at column 0, what lies before is margin
-        corners.back().dx = peak_of(here[-1], here[0], here[1]);
-        corners.back().dy = peak_of(above[column], here[0], row_of(y)[column]);
-      }
+  for (int y = top; y <= bottom; ++y) {
+    if (y == bottom) {
+      std::memset(row_of(y), 0, width);
+    } else if (smooth) {
+      const int in_band = (y - top) % band_rows;
+      if (in_band == 0) smooth_band(image, left, count, y, std::min(bottom, y + band_rows), memory);
+      score_row(memory.band.data() + static_cast<std::size_t>(in_band + circle_radius) * pitch + row_margin,
+                static_cast<std::ptrdiff_t>(pitch), count, static_cast<std::uint8_t>(threshold), row_of(y));
+    } else {
+      score_row(image.data() + y * image.stride() + left, image.stride(), count, static_cast<std::uint8_t>(threshold),
+                row_of(y));
+    }
+    const int inner = y - 1;  // now both of its neighbours are known
+    if (inner < std::max(top, area.y) || inner >= area.y + area.height) continue;
+    const std::uint8_t* row = row_of(inner);
+    const std::uint8_t* above = row_of(inner + 2);  // the slot before, cyclically; zero above the first row
+    const std::size_t found = peaks_of(above, row, row_of(y), count, ties, memory.columns.data());
+    for (std::size_t i = 0; i != found; ++i) {
+      const std::uint32_t column = memory.columns[i];
+      const int x = left + static_cast<int>(column);
+      if (x < area.x || x >= area.x + area.width) continue;
+      corners.push_back({x, inner, static_cast<float>(row[column] - 1)});
+      if (!subpixel) continue;
+      const std::uint8_t* here = row + column;  // at column 0, what lies before is row_margin
+      corners.back().dx = peak_of(here[-1], here[0], here[1]);
+      corners.back().dy = peak_of(above[column], here[0], row_of(y)[column]);
     }
   }
+}
 
-  /// Smooths what the circles of rows [first, last) see. Bands, so that they are still in the cache when
-  /// the circles look.
-  static void smooth_band(image_view<const std::uint8_t> image, int left, int count, int first, int last,
-                          workspace& memory) {
-    const std::size_t pitch = static_cast<std::size_t>(count) + 2 * margin;
-    const int from = left - circle_radius, columns = count + 2 * circle_radius;  // all of them in the image
-    const int from_more = std::max(0, from - 1), to_more = std::min(image.width(), from + columns + 1);
-    if (memory.band.size() < pitch * (band_rows + 2 * circle_radius))
-      memory.band.resize(pitch * (band_rows + 2 * circle_radius));
-    if (memory.line.size() < pitch) memory.line.resize(pitch);
-    const auto mix = simd::kernel<binomial_kernel, binomial_kernel::signature>();
-    std::uint8_t* line = memory.line.data() + margin;  // begins with column `from`
-    for (int y = first - circle_radius; y != last + circle_radius; ++y) {
-      const std::uint8_t* row = image.row(y).data();
-      const std::uint8_t* above = image.row(std::max(0, y - 1)).data();
-      const std::uint8_t* below = image.row(std::min(image.height() - 1, y + 1)).data();
-      mix(above + from_more, row + from_more, below + from_more, to_more - from_more, line + (from_more - from));
-      if (from == 0) line[-1] = line[0];  // beyond the edge the image goes on as at the edge
-      if (from + columns == image.width()) line[columns] = line[columns - 1];
-      std::uint8_t* to =
-          memory.band.data() + static_cast<std::size_t>(y - first + circle_radius) * pitch + margin - circle_radius;
-      mix(line - 1, line, line + 1, columns, to);
-    }
+/// Smooths what the circles of rows [first, last) see. Bands, so that they are still in the cache when
+/// the circles look.
+ORBIS_INLINE void fast9::smooth_band(image_view<const std::uint8_t> image, int left, int count, int first, int last,
+                                     workspace& memory) {
+  const std::size_t pitch = static_cast<std::size_t>(count) + 2 * row_margin;
+  const int from = left - circle_radius, columns = count + 2 * circle_radius;  // all of them in the image
+  const int from_more = std::max(0, from - 1), to_more = std::min(image.width(), from + columns + 1);
+  if (memory.band.size() < pitch * (band_rows + 2 * circle_radius))
+    memory.band.resize(pitch * (band_rows + 2 * circle_radius));
+  if (memory.line.size() < pitch) memory.line.resize(pitch);
+  const auto mix = simd::kernel<binomial_kernel, binomial_kernel::signature>();
+  std::uint8_t* line = memory.line.data() + row_margin;  // begins with column `from`
+  for (int y = first - circle_radius; y != last + circle_radius; ++y) {
+    const std::uint8_t* row = image.row(y).data();
+    const std::uint8_t* above = image.row(std::max(0, y - 1)).data();
+    const std::uint8_t* below = image.row(std::min(image.height() - 1, y + 1)).data();
+    mix(above + from_more, row + from_more, below + from_more, to_more - from_more, line + (from_more - from));
+    if (from == 0) line[-1] = line[0];  // beyond the edge the image goes on as at the edge
+    if (from + columns == image.width()) line[columns] = line[columns - 1];
+    std::uint8_t* to =
+        memory.band.data() + static_cast<std::size_t>(y - first + circle_radius) * pitch + row_margin - circle_radius;
+    mix(line - 1, line, line + 1, columns, to);
   }
+}
 
-  /// Where the parabola through three values at -1, 0 and 1 is highest. @pre the middle one is, and not all are equal
-  static float peak_of(int before, int middle, int after) {
-    return static_cast<float>(before - after) / static_cast<float>(2 * (before - 2 * middle + after));
-  }
-
-  void drop_weak(const region& area, int strong, workspace& memory, std::vector<corner>& corners) const {
-    const int columns = std::max(1, (area.width + cell / 2) / cell),
-              rows = std::max(1, (area.height + cell / 2) / cell);
-    memory.strongest.assign(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows), 0.0F);
-    if (memory.cell_of.size() < corners.size()) memory.cell_of.resize(corners.size());
-    int y = -1;
-    std::size_t first_of_row = 0;
-    for (std::size_t i = 0; i != corners.size(); ++i) {
-      const corner& c = corners[i];
-      if (c.y != y) {
-        y = c.y;
-        first_of_row =
-            static_cast<std::size_t>(std::min((y - area.y) / cell, rows - 1)) * static_cast<std::size_t>(columns);
-      }
-      const std::size_t at = first_of_row + static_cast<std::size_t>(std::min((c.x - area.x) / cell, columns - 1));
-      memory.cell_of[i] = static_cast<std::uint32_t>(at);
-      memory.strongest[at] = std::max(memory.strongest[at], c.response);
+ORBIS_INLINE void fast9::drop_weak(const region& area, int strong, workspace& memory,
+                                   std::vector<corner>& corners) const {
+  const int columns = std::max(1, (area.width + cell / 2) / cell), rows = std::max(1, (area.height + cell / 2) / cell);
+  memory.strongest.assign(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows), 0.0F);
+  if (memory.cell_of.size() < corners.size()) memory.cell_of.resize(corners.size());
+  int y = -1;
+  std::size_t first_of_row = 0;
+  for (std::size_t i = 0; i != corners.size(); ++i) {
+    const corner& c = corners[i];
+    if (c.y != y) {
+      y = c.y;
+      first_of_row =
+          static_cast<std::size_t>(std::min((y - area.y) / cell, rows - 1)) * static_cast<std::size_t>(columns);
     }
-    // Without a branch: which corners stay is hard to predict.
-    const auto bound = static_cast<float>(strong);
-    std::size_t kept = 0;
-    for (std::size_t i = 0; i != corners.size(); ++i) {
-      const bool weak = corners[i].response < bound, strong_near = memory.strongest[memory.cell_of[i]] >= bound;
-      corners[kept] = corners[i];
-      kept += static_cast<std::size_t>(!(weak & strong_near));
-    }
-    corners.resize(kept);
+    const std::size_t at = first_of_row + static_cast<std::size_t>(std::min((c.x - area.x) / cell, columns - 1));
+    memory.cell_of[i] = static_cast<std::uint32_t>(at);
+    memory.strongest[at] = std::max(memory.strongest[at], c.response);
   }
-};
-static_assert(corner_detector<fast9>);
-
+  // Without a branch: which corners stay is hard to predict.
+  const auto bound = static_cast<float>(strong);
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i != corners.size(); ++i) {
+    const bool weak = corners[i].response < bound, strong_near = memory.strongest[memory.cell_of[i]] >= bound;
+    corners[kept] = corners[i];
+    kept += static_cast<std::size_t>(!(weak & strong_near));
+  }
+  corners.resize(kept);
+}
 }  // namespace orbis::features::detail
-
-ORBIS_COMPILED_KERNEL(orbis::features::detail::binomial_kernel, orbis::features::detail::binomial_kernel::signature);

@@ -142,8 +142,3 @@ struct fast_peaks_kernel {
 };
 
 }  // namespace orbis::features::detail
-
-ORBIS_COMPILED_KERNEL(orbis::features::detail::fast_scores_kernel,
-                      orbis::features::detail::fast_scores_kernel::signature);
-ORBIS_COMPILED_KERNEL(orbis::features::detail::fast_peaks_kernel,
-                      orbis::features::detail::fast_peaks_kernel::signature);

@@ -84,5 +84,3 @@ struct luma_kernel {
 };
 
 }  // namespace orbis::features::detail
-
-ORBIS_COMPILED_KERNEL_AVX2(orbis::features::detail::luma_kernel, orbis::features::detail::luma_kernel::signature);

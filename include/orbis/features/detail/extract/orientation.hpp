@@ -11,16 +11,16 @@
 #include <numbers>
 
 #include <orbis/core/image.hpp>
+#include <orbis/core/inline.hpp>
 #include <orbis/core/simd/dispatch.hpp>
 #include <orbis/core/simd/integer.hpp>
 #include <orbis/core/simd/math.hpp>
 #include <orbis/core/simd/vec.hpp>
 #include <orbis/features/detail/extract/byte_pairs.hpp>
+#include <orbis/features/detail/extract/orb_parts.hpp>
 #include <orbis/features/extractor.hpp>
 
 namespace orbis::features::detail {
-
-inline constexpr int disc_radius = 15;
 
 /// How far the disc reaches to both sides, by distance of the row from its centre.
 inline constexpr std::array<int, disc_radius + 1> disc_half_width = [] {
@@ -111,31 +111,14 @@ struct disc_moments_kernel {
   return rounded < 2.0F * std::numbers::pi_v<float> ? rounded : 0.0F;
 }
 
-/// The direction from a pixel to the centre of brightness of the disc of radius 15 around it
-/// (Rosin, "Measuring corner properties", 1999, as in the ORB paper); 0 where there is none.
-struct intensity_centroid {
-  static constexpr int radius = disc_radius;
-
-  /// @pre at least `radius` pixels from the image's edge, on the right one more
-  [[nodiscard]] orientation operator()(image_view<const std::uint8_t> image, int x, int y) const {
-    assert(x >= radius && y >= radius && x + radius + 1 < image.width() && y + radius < image.height());
-    const auto moments = simd::kernel<disc_moments_kernel, disc_moments_kernel::signature>();
-    const image_moments m = moments(image.data() + y * image.stride() + x, image.stride());
-    if (m.x == 0 && m.y == 0) return {};
-    const double mx = m.x, my = m.y;
-    const double inverse = 1.0 / std::sqrt(mx * mx + my * my);  // exact below the root: 2^53 is not reached
-    return {angle_of(mx, my), static_cast<float>(mx * inverse), static_cast<float>(my * inverse)};
-  }
-};
-static_assert(orientation_estimator<intensity_centroid>);
-
-/// No direction, for cameras that do not roll: descriptors that are not turned tell more patches apart.
-struct upright {
-  static constexpr int radius = 0;
-  [[nodiscard]] orientation operator()(image_view<const std::uint8_t>, int, int) const noexcept { return {}; }
-};
+ORBIS_INLINE orientation intensity_centroid::operator()(image_view<const std::uint8_t> image, int x, int y) const {
+  assert(x >= radius && y >= radius && x + radius + 1 < image.width() && y + radius < image.height());
+  const auto moments = simd::kernel<disc_moments_kernel, disc_moments_kernel::signature>();
+  const image_moments m = moments(image.data() + y * image.stride() + x, image.stride());
+  if (m.x == 0 && m.y == 0) return {};
+  const double mx = m.x, my = m.y;
+  const double inverse = 1.0 / std::sqrt(mx * mx + my * my);  // exact below the root: 2^53 is not reached
+  return {angle_of(mx, my), static_cast<float>(mx * inverse), static_cast<float>(my * inverse)};
+}
 
 }  // namespace orbis::features::detail
-
-ORBIS_COMPILED_KERNEL(orbis::features::detail::disc_moments_kernel,
-                      orbis::features::detail::disc_moments_kernel::signature);

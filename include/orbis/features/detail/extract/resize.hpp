@@ -10,7 +10,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
-#include <vector>
 
 #include <orbis/core/image.hpp>
 #include <orbis/core/simd/convert.hpp>
@@ -18,6 +17,7 @@
 #include <orbis/core/simd/shuffle.hpp>
 #include <orbis/core/simd/vec.hpp>
 #include <orbis/features/detail/extract/byte_pairs.hpp>
+#include <orbis/features/detail/extract/resize_plan.hpp>
 
 namespace orbis::features::detail {
 
@@ -37,23 +37,6 @@ struct resize_tap {
   if (first >= from - 1) return {from - 1, from - 1, 0};
   return {first, first + 1, static_cast<std::uint16_t>(std::lrint((at - whole) * 256.0))};
 }
-
-/// How to get from one width to another; made once, used for any number of images.
-struct resize_plan {
-  int from = 0, to = 0;  ///< widths
-  // Of each pixel of the result, up to a whole number of blocks: it lies between `first` and the pixel after it.
-  std::vector<std::int32_t> first;
-  std::vector<std::uint16_t> weight;  ///< of the pixel after it, in 1/256
-  // Of each eight pixels of the result; empty where they do not lie within sixteen pixels of the source.
-  std::vector<std::int32_t> base;    ///< where the sixteen begin
-  std::vector<std::uint8_t> places;  ///< of each `first` in them, as the low byte of a word whose high byte gives zero
-};
-
-/// Memory of `resize`, which the next call uses again.
-struct resize_workspace {
-  resize_plan plan;
-  std::vector<std::uint16_t> rows;  ///< two of the source, shrunk horizontally
-};
 
 inline constexpr int resize_block = 32;  ///< pixels that are written at a time
 
@@ -179,8 +162,3 @@ inline void resize(image_view<const std::uint8_t> from, image_view<std::uint8_t>
 }
 
 }  // namespace orbis::features::detail
-
-ORBIS_COMPILED_KERNEL(orbis::features::detail::resize_along_kernel,
-                      orbis::features::detail::resize_along_kernel::signature);
-ORBIS_COMPILED_KERNEL(orbis::features::detail::resize_across_kernel,
-                      orbis::features::detail::resize_across_kernel::signature);

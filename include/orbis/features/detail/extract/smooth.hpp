@@ -11,7 +11,6 @@
 #include <cstdint>
 #include <cstring>
 #include <utility>
-#include <vector>
 
 #include <orbis/core/image.hpp>
 #include <orbis/core/simd/dispatch.hpp>
@@ -19,14 +18,9 @@
 #include <orbis/core/simd/shuffle.hpp>
 #include <orbis/core/simd/vec.hpp>
 #include <orbis/features/detail/extract/byte_pairs.hpp>
+#include <orbis/features/detail/extract/orb_parts.hpp>
 
 namespace orbis::features::detail {
-
-/// Memory of `smooth`, which the next call uses again.
-struct smooth_workspace {
-  std::vector<std::uint8_t> line;  ///< a row with its reflections
-  std::vector<std::int16_t> sums;  ///< the last eight rows, smoothed horizontally
-};
 
 /// A Gaussian of sigma 2 at -3 ... 3, in 1/256; their sum is exactly one.
 inline constexpr std::array<std::uint16_t, 7> gaussian_weights{18, 34, 48, 56, 48, 34, 18};
@@ -149,8 +143,3 @@ inline void smooth(image_view<const std::uint8_t> from, image_view<std::uint8_t>
 }
 
 }  // namespace orbis::features::detail
-
-ORBIS_COMPILED_KERNEL(orbis::features::detail::smooth_along_kernel,
-                      orbis::features::detail::smooth_along_kernel::signature);
-ORBIS_COMPILED_KERNEL(orbis::features::detail::smooth_across_kernel,
-                      orbis::features::detail::smooth_across_kernel::signature);

@@ -9,13 +9,13 @@
 #include <cassert>
 #include <cstddef>
 #include <cstdint>
-#include <vector>
 
 #include <orbis/core/image.hpp>
+#include <orbis/core/inline.hpp>
 #include <orbis/core/simd/dispatch.hpp>
 #include <orbis/core/simd/vec.hpp>
 #include <orbis/features/descriptor.hpp>
-#include <orbis/features/detail/extract/orientation.hpp>
+#include <orbis/features/detail/extract/orb_parts.hpp>
 #include <orbis/features/detail/extract/smooth.hpp>
 #include <orbis/features/extractor.hpp>
 
@@ -130,41 +130,22 @@ struct steered_brief_kernel {
   }
 };
 
-/// ORB's descriptor: the standard pattern, turned to the keypoint's direction and rounded to pixels,
-/// on the image smoothed by a Gaussian (7x7, sigma 2). The same bits as OpenCV's ORB wherever the direction is the
-/// same.
-struct steered_brief {
-  using descriptor = binary_descriptor<256>;
-  static constexpr int reach = 18;     ///< of the turned pattern, pixels
-  static constexpr int diameter = 31;  ///< of the described neighbourhood, by convention
+ORBIS_INLINE void steered_brief::prepare(image_view<const std::uint8_t> image, int first, int last,
+                                         workspace& memory) const {
+  const std::ptrdiff_t stride = (static_cast<std::ptrdiff_t>(image.width()) + 63) / 64 * 64;
+  const auto needed = static_cast<std::size_t>(stride) * static_cast<std::size_t>(image.height());
+  if (memory.pixels.size() < needed) memory.pixels.resize(needed);
+  const image_view<std::uint8_t> to{memory.pixels.data(), image.width(), image.height(), stride};
+  smooth(image, to, std::max(0, first - reach), std::min(image.height(), last + reach), memory.smoothing);
+  memory.smoothed = to;
+}
 
-  struct workspace {
-    std::vector<std::uint8_t> pixels;
-    image_view<const std::uint8_t> smoothed;
-    smooth_workspace smoothing;
-  };
-
-  /// Smooths what descriptors of keypoints in rows `[first, last)` need. @pre image of at least 4x4 pixels
-  void prepare(image_view<const std::uint8_t> image, int first, int last, workspace& memory) const {
-    const std::ptrdiff_t stride = (static_cast<std::ptrdiff_t>(image.width()) + 63) / 64 * 64;
-    const auto needed = static_cast<std::size_t>(stride) * static_cast<std::size_t>(image.height());
-    if (memory.pixels.size() < needed) memory.pixels.resize(needed);
-    const image_view<std::uint8_t> to{memory.pixels.data(), image.width(), image.height(), stride};
-    smooth(image, to, std::max(0, first - reach), std::min(image.height(), last + reach), memory.smoothing);
-    memory.smoothed = to;
-  }
-
-  /// @pre at least `reach` pixels from the edge of the prepared image, in its prepared rows
-  [[nodiscard]] descriptor operator()(const workspace& prepared, int x, int y, const orientation& o) const {
-    const image_view<const std::uint8_t>& image = prepared.smoothed;
-    assert(x >= reach && y >= reach && x + reach < image.width() && y + reach < image.height());
-    const auto describe = simd::kernel<steered_brief_kernel, steered_brief_kernel::signature>();
-    return describe(orb_points, o, image.data() + y * image.stride() + x, image.stride());
-  }
-};
-static_assert(patch_descriptor<steered_brief>);
+ORBIS_INLINE steered_brief::descriptor steered_brief::operator()(const workspace& prepared, int x, int y,
+                                                                 const orientation& o) const {
+  const image_view<const std::uint8_t>& image = prepared.smoothed;
+  assert(x >= reach && y >= reach && x + reach < image.width() && y + reach < image.height());
+  const auto describe = simd::kernel<steered_brief_kernel, steered_brief_kernel::signature>();
+  return describe(orb_points, o, image.data() + y * image.stride() + x, image.stride());
+}
 
 }  // namespace orbis::features::detail
-
-ORBIS_COMPILED_KERNEL(orbis::features::detail::steered_brief_kernel,
-                      orbis::features::detail::steered_brief_kernel::signature);

@@ -12,6 +12,7 @@
 #include <orbis/core/bits.hpp>
 #include <orbis/core/simd/dispatch.hpp>
 #include <orbis/core/simd/mask.hpp>
+#include <orbis/features/detail/match/hamming_search.hpp>
 
 namespace orbis::features::detail {
 
@@ -37,8 +38,6 @@ struct hamming_listed_kernel {
   }
 };
 
-/// `distances[i]` becomes the Hamming distance between `query` and `trains[indices[i]]`.
-/// @pre distances.size() == indices.size(); indices are of trains
 template <bit_string D>
 void hamming_listed(const D& query, std::span<const D> trains, std::span<const std::uint32_t> indices,
                     std::span<std::uint32_t> distances) {

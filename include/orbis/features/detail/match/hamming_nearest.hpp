@@ -9,23 +9,15 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
-#include <vector>
 
 #include <orbis/core/bits.hpp>
 #include <orbis/core/simd/dispatch.hpp>
 #include <orbis/features/detail/match/hamming_listed.hpp>
+#include <orbis/features/detail/match/hamming_search.hpp>
 #include <orbis/features/detail/match/hamming_slices.hpp>
 #include <orbis/features/detail/match/nearest.hpp>
 
 namespace orbis::features::detail {
-
-/// Memory of `hamming_nearest`, which the next call uses again.
-struct hamming_workspace {
-  std::vector<slice_query> queries;
-  std::vector<slice_table<4>> table4;  ///< of the current block of trains, for registers of up to 256 bits
-  std::vector<slice_table<8>> table8;  ///< the same for registers of 512 bits
-  std::vector<std::uint32_t> reverse_distance;
-};
 
 /// What a search has found for each query: the nearest and the distance of the second.
 struct keep_two {
@@ -142,10 +134,6 @@ struct hamming_search_kernel {
   }
 };
 
-/// For each query its nearest and second nearest train; if `reverse` is not empty, for each train its nearest
-/// query (the lowest on ties), in the same pass. O(queries x trains) time, O(queries + trains) memory, all of it in
-/// `workspace`. Strings of 256 bits are the fast ones.
-/// @pre nearest.size() == queries.size(); reverse is empty or of the size of trains
 template <bit_string D>
 void hamming_nearest(std::span<const D> queries, std::span<const D> trains, std::span<nearest_two> nearest,
                      std::span<std::uint32_t> reverse, hamming_workspace& workspace) {

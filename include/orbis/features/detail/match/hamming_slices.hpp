@@ -21,33 +21,11 @@
 #include <orbis/core/bits.hpp>
 #include <orbis/core/simd/dispatch.hpp>
 #include <orbis/core/simd/vec.hpp>
+#include <orbis/features/detail/match/hamming_search.hpp>
 
 namespace orbis::features::detail {
 
 inline constexpr std::size_t slice_planes = 9;  // a distance has 9 bits: 0 to 256
-inline constexpr std::size_t slice_groups = 88;
-inline constexpr std::size_t slice_rounds = slice_groups / 8;
-
-/// One bit of `64 * Words` trains.
-template <std::size_t Words>
-struct alignas(8 * Words) slice {
-  std::array<std::uint64_t, Words> words{};
-};
-
-/// What a group of three bits can give, by the pattern of the query's bits.
-template <std::size_t Words>
-struct slice_group {
-  std::array<slice<Words>, 8> majority;  ///< whether at least two of the three bits differ
-  std::array<slice<Words>, 2> parity;    ///< whether one or three do, by the parity of the pattern
-};
-template <std::size_t Words>
-using slice_table = std::array<slice_group<Words>, slice_groups>;
-
-/// Where a query's slices lie: offsets into the two arrays of each group, in units of a 32nd of a slice.
-struct slice_query {
-  std::array<std::uint8_t, slice_groups> majority;
-  std::array<std::uint8_t, slice_groups> parity;
-};
 
 /// The bit planes of the distances, the lowest first.
 template <std::size_t Words>

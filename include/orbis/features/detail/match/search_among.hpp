@@ -10,7 +10,7 @@
 #include <tuple>
 #include <vector>
 
-#include <orbis/features/detail/match/hamming_listed.hpp>
+#include <orbis/features/detail/match/hamming_search.hpp>
 #include <orbis/features/hamming.hpp>
 #include <orbis/features/match.hpp>
 

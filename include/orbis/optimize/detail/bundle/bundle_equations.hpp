@@ -117,7 +117,8 @@ class bundle_equations {
     for (const bundle_structure::group& g : structure_.groups)
       for (std::uint32_t i = 0; i != g.points * g.cameras; ++i) {
         const std::size_t number = g.first_mixed + i;
-        sum += 2.0 * dot(camera_part(x, structure_.mixed_unknown[number]), mixed_block(number) * segment<3>(x, point_row(g.first_point + i % g.points)));
+        sum += 2.0 * dot(camera_part(x, structure_.mixed_unknown[number]),
+                         mixed_block(number) * segment<3>(x, point_row(g.first_point + i % g.points)));
       }
     return sum;
   }
@@ -280,8 +281,10 @@ class bundle_equations {
     mixed_.resize(mixed_block_tile::size * structure_.mixed_tiles());
     normal_.resize(point_size * points);
     inverse_.resize(normal_.size());
-    gradient_.setZero(static_cast<Eigen::Index>(camera_size * n + 3 * points));
-    diagonal_.setZero(gradient_.size());
+    for (auto* const v : {&gradient_, &diagonal_}) {
+      v->resize(static_cast<Eigen::Index>(camera_size * n + 3 * points));
+      std::fill_n(v->data(), v->size(), 0.0);
+    }
     pulled_.resize(4 * points);
     reduced_right_.resize(camera_size * n);
 
@@ -441,7 +444,7 @@ class bundle_equations {
     diagonal[2] = sum[5];
   }
   void add_up_cameras() {
-    gradient_.head(static_cast<Eigen::Index>(camera_size * structure_.unknowns())).setZero();
+    std::fill_n(gradient_.data(), camera_size * structure_.unknowns(), 0.0);
     for (camera_block& h : camera_hessian_) h = zeros<camera_block>();
     for (std::size_t s = 0; s != structure_.segments.size(); ++s) {
       if (!moves_camera(s)) continue;

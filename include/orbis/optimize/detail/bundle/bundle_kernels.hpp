@@ -457,8 +457,13 @@ void find_visible(const camera_work<R>& work, double* flags) {
 template <class R, class Loss>
 struct bundle_kernels {
   using reduce = double(const camera_work<R>&, const Loss&);
-  reduce* linearize = simd::kernel<linearize_kernel<R, Loss>, reduce>();
-  reduce* cost = simd::kernel<cost_kernel<R, Loss>, reduce>();
+  reduce* linearize;
+  reduce* cost;
+  bundle_kernels();
 };
+template <class R, class Loss>
+bundle_kernels<R, Loss>::bundle_kernels()
+    : linearize{simd::kernel<linearize_kernel<R, Loss>, reduce>()},
+      cost{simd::kernel<cost_kernel<R, Loss>, reduce>()} {}
 
 }  // namespace orbis::optimize::detail

@@ -7,6 +7,8 @@
 
 #include <orbis/core/simd/vec.hpp>
 #include <orbis/optimize/bundle_problem.hpp>
+#include <orbis/optimize/reprojection-inl.hpp>
+#include <orbis/optimize/reprojection_with_intrinsics-inl.hpp>
 
 namespace orbis::optimize::detail {
 

@@ -348,8 +348,13 @@ template <int C, bool ThroughCamera>
 struct schur_kernels {
   using eliminator = std::size_t(const elimination&);
   using substituter = void(const substitution&);
-  eliminator* eliminate_points = simd::kernel<eliminate_kernel<C, ThroughCamera>, eliminator>();
-  substituter* substitute_points = simd::kernel<substitute_kernel<C, ThroughCamera>, substituter>();
+  eliminator* eliminate_points;
+  substituter* substitute_points;
+  schur_kernels();
 };
+template <int C, bool ThroughCamera>
+schur_kernels<C, ThroughCamera>::schur_kernels()
+    : eliminate_points{simd::kernel<eliminate_kernel<C, ThroughCamera>, eliminator>()},
+      substitute_points{simd::kernel<substitute_kernel<C, ThroughCamera>, substituter>()} {}
 
 }  // namespace orbis::optimize::detail

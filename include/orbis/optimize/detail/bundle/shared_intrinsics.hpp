@@ -17,6 +17,7 @@
 
 #include <orbis/camera/parameters.hpp>
 #include <orbis/core/se3.hpp>
+#include <orbis/core/small_cholesky.hpp>
 #include <orbis/core/types.hpp>
 #include <orbis/optimize/bundle_problem.hpp>
 #include <orbis/optimize/reprojection_with_intrinsics.hpp>
@@ -31,11 +32,13 @@ class shared_intrinsics {
   using parameters = camera::parameters_of<Camera>;
   using residual_type = reprojection_with_intrinsics<Camera>;
   using view_type = typename residual_type::view;
-  using by_theta_type = Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, parameters::count>;
+  // Theta, the unknowns of the camera, has room for all parameters; only the first `count_` entries are used.
+  using by_theta_type = matrix<3, parameters::count>;
   using block_63 = matrix<6, 3>;
-  using block_t3 = Eigen::Matrix<double, Eigen::Dynamic, 3, 0, parameters::count, 3>;
-  using theta_vector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, parameters::count, 1>;
-  using basis_type = Eigen::Matrix<double, parameters::count, Eigen::Dynamic, 0, parameters::count, parameters::count>;
+  using block_t3 = matrix<parameters::count, 3>;
+  using block_t6 = matrix<parameters::count, 6>;
+  using theta_vector = matrix<parameters::count>;
+  using basis_type = matrix<parameters::count, parameters::count>;
 
   struct estimate {
     Camera camera;
@@ -59,9 +62,7 @@ class shared_intrinsics {
     const bool ties = keeps_aspect && (free & focal_lengths) == focal_lengths;
     for (int i = 0; i != parameters::count; ++i) {
       if ((free >> i & 1U) == 0 || (ties && i == 1)) continue;
-      basis_.conservativeResize(Eigen::NoChange, count() + 1);
-      basis_.col(count() - 1).setZero();
-      basis_(i, count() - 1) = 1.0;
+      basis_(i, count_++) = 1.0;
     }
     if (ties) basis_(1, 0) = parameters::get(start)[1] / parameters::get(start)[0];
     choose(observations);
@@ -142,24 +143,28 @@ class shared_intrinsics {
   /// The covariance of the parameters at the present estimate; false if they are not determined.
   template <class Matrix>
   [[nodiscard]] bool covariance(Matrix& out) {
-    out.setZero();
-    if (count() == 0) return true;
+    out = zeros<Matrix>();
+    if (count_ == 0) return true;
     linearize();
     reduce(0.0);
-    const Eigen::Index size = reduced_.rows(), first = size - count();
+    const Eigen::Index size = reduced_.rows(), first = size - count_;
     const Eigen::LLT<Eigen::MatrixXd, Eigen::Lower> factor(reduced_);
     if (factor.info() != Eigen::Success || !(factor.rcond() > 1e-14)) return false;
-    Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(size, count());  // of the inverse
-    for (Eigen::Index i = 0; i != count(); ++i) rows(first + i, i) = 1.0;
+    Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(size, count_);  // of the inverse
+    for (int i = 0; i != count_; ++i) rows(first + i, i) = 1.0;
     factor.solveInPlace(rows);
-    Eigen::MatrixXd spread = Eigen::MatrixXd::Zero(count(), count());
+    basis_type spread = zeros<basis_type>();
     double points = 0.0;
     for (std::size_t p = 0; p + 1 < begins_.size(); ++p) {
       if (!eliminate(p, 0.0)) continue;
-      Eigen::VectorXd move = transposed(rows.bottomRows(count())) * point_.theta_gradient;
-      for (const seen& o : point_.by)
-        if (o.row != none) move += transposed(rows.template middleRows<6>(o.row)) * o.gradient;
-      spread += move * transposed(move);
+      theta_vector move = zeros<theta_vector>();
+      for (int i = 0; i != count_; ++i) {
+        for (int k = 0; k != count_; ++k) move[i] += rows(first + k, i) * point_.theta_gradient[k];
+        for (const seen& o : point_.by)
+          if (o.row != none)
+            for (int k = 0; k != 6; ++k) move[i] += rows(static_cast<Eigen::Index>(o.row) + k, i) * o.gradient[k];
+      }
+      spread += outer_product(move, move);
       points += 1.0;
     }
     spread *= points / std::max(points - 1.0, 1.0);
@@ -168,9 +173,6 @@ class shared_intrinsics {
   }
 
  private:
-  /// Of the unknowns of the camera.
-  [[nodiscard]] Eigen::Index count() const noexcept { return basis_.cols(); }
-
   void choose(std::span<const bundle_observation> all) {
     const std::vector<view_type> views = views_of(now_);
     std::vector<std::vector<std::uint32_t>> by_point(now_.points.size());
@@ -315,10 +317,10 @@ class shared_intrinsics {
   /// What a point's observations add together.
   struct point_part {
     bool is_determined = false;  ///< by them
-    mat3 own;
-    vec3 gradient;
-    block_t3 theta_point;
-    theta_vector theta_gradient;
+    mat3 own = zeros<mat3>();
+    vec3 gradient = zeros<vec3>();
+    block_t3 theta_point = zeros<block_t3>();
+    theta_vector theta_gradient = zeros<theta_vector>();
   };
   /// The part of a point, its own unknowns eliminated from the gradients.
   struct eliminated {
@@ -333,10 +335,7 @@ class shared_intrinsics {
   void linearize_point(std::size_t p) {
     const vec3& at = now_.points[observations_[begins_[p]].point];
     point_part& part = parts_[p];
-    part.own.setZero();
-    part.gradient.setZero();
-    part.theta_point.setZero(count(), 3);
-    part.theta_gradient.setZero(count());
+    part = {};
     rows_.clear();
     for (std::size_t k = begins_[p]; k != begins_[p + 1]; ++k) {
       seen& s = seen_[k];
@@ -351,15 +350,13 @@ class shared_intrinsics {
       if (!r) continue;
       if (!std::isnan(o.right)) {
         (*r)[2] -= (*r)[0];
-        by_q.row(2) -= by_q.row(0).eval();
-        by_all.row(2) -= by_all.row(0).eval();
+        for (int i = 0; i != 3; ++i) by_q(2, i) -= by_q(0, i);
+        for (int i = 0; i != parameters::count; ++i) by_all(2, i) -= by_all(0, i);
       }
       s.takes_part = true;
       s.row = row_of_[o.pose];
       const double weight = o.information * loss_.weight(o.information * squared_norm(*r));
-      jacobians j{s.row, weight, {}, by_all * basis_};
-      j.by_pose.template leftCols<3>() = -by_q;
-      j.by_pose.template rightCols<3>() = by_q * hat<double>(q);
+      const jacobians j{s.row, weight, side_by_side(-by_q, by_q * hat<double>(q)), by_all * basis_};
       const mat3 by_point = by_q * view.rotation;
       const mat3 weighted = weight * by_point;
       const vec3 pull = weight * *r;
@@ -374,15 +371,27 @@ class shared_intrinsics {
     part.is_determined = rows_.size() >= 2;
   }
 
+  /// Adds `part` to a matrix, its first entry at (row, column); of theta only what is used.
+  template <int R, int C>
+  void add(Eigen::MatrixXd& to, Eigen::Index row, Eigen::Index column, const matrix<R, C>& part) const {
+    const int rows = row == pose_rows_ ? count_ : R, columns = column == pose_rows_ ? count_ : C;
+    for (int c = 0; c != columns; ++c)
+      for (int r = 0; r != rows; ++r) to(row + r, column + c) += part(r, c);
+  }
+  static void clear(Eigen::MatrixXd& m, Eigen::Index size) {
+    m.resize(size, size);
+    std::fill_n(m.data(), m.size(), 0.0);
+  }
+
   /// Adds what of the linearised point does not go by its own unknowns.
   void add_directly() {
     const Eigen::Index theta = pose_rows_;
     for (const jacobians& j : rows_) {
       const matrix<6, 3> weighted = j.weight * transposed(j.by_pose);
-      direct_.block(theta, theta, count(), count()) += transposed(j.by_theta) * (j.weight * j.by_theta);
+      add(direct_, theta, theta, basis_type(transposed(j.by_theta) * (j.weight * j.by_theta)));
       if (j.row == none) continue;
-      direct_.template block<6, 6>(j.row, j.row) += weighted * j.by_pose;
-      direct_.block(theta, j.row, count(), 6) += transposed(weighted * j.by_theta);
+      add(direct_, j.row, j.row, mat6(weighted * j.by_pose));
+      add(direct_, theta, j.row, block_t6(transposed(weighted * j.by_theta)));
     }
   }
 
@@ -391,10 +400,11 @@ class shared_intrinsics {
     const point_part& part = parts_[p];
     if (!part.is_determined) return false;
     mat3 own = part.own;
-    own.diagonal() *= 1.0 + damping;
-    const Eigen::LLT<mat3> factor(own);
-    if (factor.info() != Eigen::Success || !(factor.rcond() > 1e-12)) return false;
-    point_.inverse = factor.solve(identity<mat3>());
+    change_diagonal(own, 1.0 + damping, 0.0);
+    small_cholesky<3> factor;
+    if (!factor.set(own) || !(factor.factor(0.0) > 0.0)) return false;
+    point_.inverse = factor.inverse();
+    if (!(1.0 > 1e-12 * size_of(own) * size_of(point_.inverse))) return false;
     point_.gradient = part.gradient;
     const vec3 back = point_.inverse * part.gradient;
     point_.theta_point = part.theta_point;
@@ -408,25 +418,31 @@ class shared_intrinsics {
     return true;
   }
 
+  /// The largest sum of magnitudes of a column; for a matrix times that for its inverse, the condition.
+  [[nodiscard]] static double size_of(const mat3& m) {
+    double most = 0.0;
+    for (int c = 0; c != 3; ++c) most = std::max(most, std::abs(m(0, c)) + std::abs(m(1, c)) + std::abs(m(2, c)));
+    return most;
+  }
+
   /// Takes away what goes by the unknowns of `point_`; the lower half of the system.
   void take_away() {
     const Eigen::Index theta = pose_rows_;
     const block_t3 theta_inverse = point_.theta_point * point_.inverse;
-    removed_.block(theta, theta, count(), count()) += theta_inverse * transposed(point_.theta_point);
+    add(removed_, theta, theta, basis_type(theta_inverse * transposed(point_.theta_point)));
     for (const seen& a : point_.by) {
       if (a.row == none) continue;
       const block_63 a_inverse = a.pose_point * point_.inverse;
-      removed_.block(theta, a.row, count(), 6) += theta_inverse * transposed(a.pose_point);
+      add(removed_, theta, a.row, block_t6(theta_inverse * transposed(a.pose_point)));
       for (const seen& b : point_.by)
-        if (b.row <= a.row) removed_.template block<6, 6>(a.row, b.row) += a_inverse * transposed(b.pose_point);
+        if (b.row <= a.row) add(removed_, a.row, b.row, mat6(a_inverse * transposed(b.pose_point)));
     }
   }
 
   /// Linearises all residuals at the present estimate.
   void linearize() {
-    const Eigen::Index size = pose_rows_ + count();
     views_ = views_of(now_);
-    direct_.setZero(size, size);
+    clear(direct_, pose_rows_ + count_);
     for (std::size_t p = 0; p + 1 < begins_.size(); ++p) {
       linearize_point(p);
       parts_[p].is_determined = eliminate(p, 0.0);
@@ -437,18 +453,21 @@ class shared_intrinsics {
   /// The reduced system with `damping` times its diagonal added (before the points are eliminated), and its gradient.
   void reduce(double damping) {
     const Eigen::Index size = direct_.rows();
-    removed_.setZero(size, size);
-    gradient_.setZero(size);
+    clear(removed_, size);
+    gradient_.assign(static_cast<std::size_t>(size), 0.0);
     for (std::size_t p = 0; p + 1 < begins_.size(); ++p) {
       if (!eliminate(p, damping)) continue;
       take_away();
-      gradient_.tail(count()) += point_.theta_gradient;
+      double* const by_theta = gradient_.data() + pose_rows_;
+      for (int i = 0; i != count_; ++i) by_theta[i] += point_.theta_gradient[i];
       for (const seen& s : point_.by)
-        if (s.row != none) gradient_.template segment<6>(s.row) += s.gradient;
+        if (s.row != none)
+          for (int i = 0; i != 6; ++i) gradient_.data()[static_cast<int>(s.row) + i] += s.gradient[i];
     }
-    reduced_ = direct_;
-    reduced_.diagonal() *= 1.0 + damping;
-    reduced_ -= removed_;
+    clear(reduced_, size);
+    for (Eigen::Index c = 0; c != size; ++c)
+      for (Eigen::Index r = c; r != size; ++r)
+        reduced_(r, c) = direct_(r, c) * (r == c ? 1.0 + damping : 1.0) - removed_(r, c);
   }
 
   /// Where a damped step leads from what was linearised; empty if there is none, or no such camera.
@@ -456,9 +475,12 @@ class shared_intrinsics {
     reduce(damping);
     const Eigen::LLT<Eigen::MatrixXd, Eigen::Lower> factor(reduced_);
     if (factor.info() != Eigen::Success) return std::nullopt;
-    const Eigen::VectorXd d = -factor.solve(gradient_);
-    if (!all_finite(d)) return std::nullopt;
-    const theta_vector theta = d.tail(count());
+    Eigen::VectorXd d(reduced_.rows());
+    std::transform(gradient_.begin(), gradient_.end(), d.data(), [](double g) { return -g; });
+    factor.solveInPlace(d);
+    if (!std::all_of(d.data(), d.data() + d.size(), [](double x) { return std::isfinite(x); })) return std::nullopt;
+    theta_vector theta = zeros<theta_vector>();
+    for (int i = 0; i != count_; ++i) theta[i] = d[pose_rows_ + i];
     const std::optional<Camera> camera = parameters::with(now_.camera, parameters::get(now_.camera) + basis_ * theta);
     if (!camera) return std::nullopt;
     estimate to{*camera, now_.poses, now_.points};
@@ -486,7 +508,8 @@ class shared_intrinsics {
   double noise_ = 1.0;  ///< standard deviation of the whitened residuals
   huber loss_{2.447};   ///< the chi-squared gate of two coordinates, times the noise
   estimate now_;
-  basis_type basis_;                              ///< how the parameters follow the unknowns, a column each
+  basis_type basis_ = zeros<basis_type>();        ///< how the parameters follow the unknowns, a column each
+  int count_ = 0;                                 ///< of the unknowns of the camera
   std::vector<bundle_observation> observations_;  ///< by point
   std::vector<std::size_t> begins_;               ///< of each point's, and the end
   std::vector<out> out_;                          ///< by observation
@@ -498,7 +521,7 @@ class shared_intrinsics {
   std::vector<point_part> parts_;               ///< by point: the same
   std::vector<jacobians> rows_;                 ///< of the residuals of the point that was linearised last
   Eigen::MatrixXd direct_, reduced_, removed_;  ///< lower halves; `direct_`: without elimination and damping
-  Eigen::VectorXd gradient_;
+  std::vector<double> gradient_;
   eliminated point_;
 };
 

@@ -11,19 +11,13 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <iterator>
 #include <optional>
-#include <ranges>
-#include <span>
-#include <string>
-#include <type_traits>
 
 #include <orbis/core/jacobi.hpp>
-#include <orbis/core/point.hpp>
-#include <orbis/core/result.hpp>
 #include <orbis/core/sim3.hpp>
 #include <orbis/core/so3.hpp>
 #include <orbis/core/types.hpp>
+#include <orbis/optimize/detail/minimal/pair_moments.hpp>
 
 namespace orbis::optimize::detail {
 
@@ -93,60 +87,14 @@ struct best_rotation {
   const auto eigen = eigen_of_symmetric<4>(a);
   if (!(eigen.values[3] - eigen.values[2] > relative_gap)) return std::nullopt;
   const mat4& q = eigen.vectors;
-  return best_rotation{so3(so3::quaternion(q(0, 3), q(1, 3), q(2, 3), q(3, 3))).unit_quaternion(), eigen.values[3] * size};
+  return best_rotation{so3(so3::quaternion(q(0, 3), q(1, 3), q(2, 3), q(3, 3))).unit_quaternion(),
+                       eigen.values[3] * size};
 }
 
-/// The moments of pairs of points that absolute orientation needs.
-struct pair_moments {
-  vec3 from_mean, to_mean;
-  mat3 products;  ///< sum of (from - mean) (to - mean)^T
-  double from_spread = 0.0, to_spread = 0.0;
-};
-
-/// The moments of n pairs: `pair(i, a, b)` writes the i-th pair as two arrays of three doubles and returns its weight.
-/// O(n), two passes.
-template <class Pair>
-[[nodiscard]] pair_moments moments_of(std::size_t n, const Pair& pair) {
-  // Separate sums for even and odd pairs, so that one addition need not wait for the other.
-  double sums[2][7] = {};
-  for (std::size_t i = 0; i != n; ++i) {
-    double a[3], b[3];
-    const double w = pair(i, a, b);
-    double* const sum = sums[i % 2];
-    for (std::size_t k = 0; k != 3; ++k) {
-      sum[k] += w * a[k];
-      sum[3 + k] += w * b[k];
-    }
-    sum[6] += w;
-  }
-  double mean[6];
-  for (std::size_t k = 0; k != 6; ++k) mean[k] = (sums[0][k] + sums[1][k]) / (sums[0][6] + sums[1][6]);
-  double m[11] = {};
-  for (std::size_t i = 0; i != n; ++i) {
-    double a[3], b[3];
-    const double w = pair(i, a, b);
-    const double px = a[0] - mean[0], py = a[1] - mean[1], pz = a[2] - mean[2];
-    const double ax = w * px, ay = w * py, az = w * pz;
-    const double bx = b[0] - mean[3], by = b[1] - mean[4], bz = b[2] - mean[5];
-    m[0] += ax * bx, m[1] += ax * by, m[2] += ax * bz;
-    m[3] += ay * bx, m[4] += ay * by, m[5] += ay * bz;
-    m[6] += az * bx, m[7] += az * by, m[8] += az * bz;
-    m[9] += ax * px + ay * py + az * pz;
-    m[10] += w * (bx * bx + by * by + bz * bz);
-  }
-  pair_moments out;
-  out.from_mean = vec3(mean[0], mean[1], mean[2]);
-  out.to_mean = vec3(mean[3], mean[4], mean[5]);
-  out.products << m[0], m[1], m[2], m[3], m[4], m[5], m[6], m[7], m[8];
-  out.from_spread = m[9];
-  out.to_spread = m[10];
-  return out;
-}
-
-/// The transform between weighted pairs; empty if the points do not determine a rotation.
-template <class Pair>
-[[nodiscard]] std::optional<sim3> align_pairs(std::size_t n, const Pair& pair, bool with_scale) {
-  const pair_moments moments = moments_of(n, pair);
+/// The transform that best takes the first points of n pairs with these moments to the second ones; empty if they do
+/// not determine a rotation.
+[[nodiscard]] inline std::optional<sim3> transform_between(const pair_moments& moments, std::size_t n,
+                                                           bool with_scale) {
   const double spread = std::sqrt(moments.from_spread) * std::sqrt(moments.to_spread);
   // Points in one place, up to the rounding of their coordinates.
   const double rounding = 1e-30 * static_cast<double>(n);
@@ -160,40 +108,10 @@ template <class Pair>
   return sim3(rotation, moments.to_mean - scale * (rotation * moments.from_mean), scale);
 }
 
-/// The transform between two lists of points. Without weights all pairs are equal.
-template <point_range From, point_range To>
-[[nodiscard]] result<sim3> align(const From& from, const To& to, bool with_scale,
-                                 std::span<const double> weights = {}) {
-  constexpr const char* where = "absolute orientation";
-  const auto n = static_cast<std::size_t>(std::ranges::size(from));
-  if (n != static_cast<std::size_t>(std::ranges::size(to)))
-    return fail(errc::invalid_argument, where, "the two lists of points differ in length");
-  if (!weights.empty() && weights.size() != n)
-    return fail(errc::invalid_argument, where, "there are not as many weights as pairs");
-  for (std::size_t i = 0; i != weights.size(); ++i)
-    if (!(weights[i] >= 0.0 && std::isfinite(weights[i])))
-      return fail(errc::invalid_argument, where,
-                  "the weight of pair " + std::to_string(i) + " is negative or not finite");
-  if (n < 3) return fail(errc::no_data, where, "fewer than three pairs of points");
-  const auto read = [](const auto& points, std::size_t i, double* out) {
-    using range = std::remove_cvref_t<decltype(points)>;
-    const auto c =
-        coordinates<double>(std::ranges::begin(points)[static_cast<std::ranges::range_difference_t<range>>(i)]);
-    out[0] = c[0], out[1] = c[1], out[2] = c[2];
-  };
-  const auto pair = [&](std::size_t i, double* a, double* b) {
-    read(from, i, a);
-    read(to, i, b);
-    return weights.empty() ? 1.0 : weights[i];
-  };
-  if (const auto found = align_pairs(n, pair, with_scale)) return *found;
-  for (std::size_t i = 0; i != n; ++i) {
-    double a[3], b[3];
-    pair(i, a, b);
-    if (!std::isfinite(a[0] + a[1] + a[2] + b[0] + b[1] + b[2]))
-      return fail(errc::degenerate, where, "a coordinate of pair " + std::to_string(i) + " is not finite");
-  }
-  return fail(errc::degenerate, where, "the points do not determine a rotation: they lie on a line or in one place");
+/// The transform between weighted pairs; empty if the points do not determine a rotation.
+template <class Pair>
+[[nodiscard]] std::optional<sim3> align_pairs(std::size_t n, const Pair& pair, bool with_scale) {
+  return transform_between(moments_of(n, pair), n, with_scale);
 }
 
 }  // namespace orbis::optimize::detail

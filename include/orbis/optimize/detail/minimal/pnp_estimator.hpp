@@ -14,11 +14,12 @@
 
 #include <orbis/core/jacobi.hpp>
 #include <orbis/core/se3.hpp>
+#include <orbis/core/small_cholesky.hpp>
 #include <orbis/core/types.hpp>
 #include <orbis/optimize/detail/minimal/descent.hpp>
 #include <orbis/optimize/detail/minimal/p3p_equations.hpp>
+#include <orbis/optimize/detail/minimal/pnp_kernels.hpp>
 #include <orbis/optimize/detail/minimal/pnp_matches.hpp>
-#include <orbis/core/small_cholesky.hpp>
 #include <orbis/optimize/ransac.hpp>
 
 namespace orbis::optimize::detail {
@@ -61,6 +62,7 @@ template <class SumUp>
 }
 
 /// P3P with reprojection errors in pixels.
+template <class Matches>
 class pnp_estimator {
  public:
   struct model {
@@ -77,11 +79,19 @@ class pnp_estimator {
     [[nodiscard]] const model* end() const noexcept { return models.data() + size; }
   };
 
-  explicit pnp_estimator(pnp_matches& matches) : matches_{matches} {}
+  explicit pnp_estimator(Matches& matches) : matches_{matches} {}
 
   [[nodiscard]] std::size_t size() const noexcept { return matches_.size(); }
 
-  [[nodiscard]] candidates fit(const std::array<std::uint32_t, 3>& s) const;
+  [[nodiscard]] candidates fit(const std::array<std::uint32_t, 3>& s) const {
+    candidates all;
+    for_each_p3p({matches_.points[s[0]], matches_.points[s[1]], matches_.points[s[2]]},
+                 {matches_.rays[s[0]], matches_.rays[s[1]], matches_.rays[s[2]]},
+                 [&](const mat3& rotation, const vec3& translation) {
+                   if (all.size != 4) all.models[all.size++] = made_of({rotation, translation});
+                 });
+    return all;
+  }
 
   void squared_errors(const model& m, std::size_t first, std::span<float, consensus_block> out) const {
     kernels_.errors(matches_.float_columns.data() + first, matches_.stride, m.rows.data(), out.data());
@@ -102,7 +112,13 @@ class pnp_estimator {
     return refine(start, inliers, 3);
   }
   [[nodiscard]] std::optional<model> refine(const model& start, std::span<const std::uint32_t> inliers,
-                                            int steps) const;
+                                            int steps) const {
+    const std::size_t groups = gather(inliers);
+    const auto pose =
+        descend_pose(start.pose, steps, [&](const centred_pose& at, pose_equations& e) { sum_up(groups, at, e); });
+    if (!pose) return std::nullopt;
+    return made_of(*pose);
+  }
 
   [[nodiscard]] static model made_of(const centred_pose& pose) {
     model m{pose, {}};
@@ -149,7 +165,7 @@ class pnp_estimator {
     e.cost = total(at);
   }
 
-  pnp_matches& matches_;
+  Matches& matches_;
   match_kernels kernels_{};
 };
 
@@ -166,7 +182,3 @@ class pnp_estimator {
 }
 
 }  // namespace orbis::optimize::detail
-
-#ifndef ORBIS_COMPILED
-#include <orbis/optimize/detail/compiled/pnp_functions.hpp>
-#endif

@@ -77,25 +77,27 @@ requires(B >= 1) class block_cholesky {
     return panels_[s].begin + width * (place + (column - node.first) * panels_[s].stride);
   }
 
-  using unaligned = Eigen::Map<block, Eigen::Unaligned, Eigen::OuterStride<>>;
-
   void fill(std::span<const block> diagonal, std::span<const block> off_diagonal, std::span<const double> damping) {
     std::fill(values_.begin(), values_.end(), 0.0);
     for (std::uint32_t k = 0; k != symbolic_.size(); ++k) {
       const std::uint32_t i = symbolic_.order[k];
-      const auto stride = static_cast<Eigen::Index>(panels_[symbolic_.supernode_of[k]].stride);
-      unaligned to{values_.data() + at(k, k), Eigen::OuterStride<>{stride}};
-      to = diagonal[i];
-      if (!damping.empty()) to.diagonal() += Eigen::Map<const matrix<B, 1>>{damping.data() + offset(i)};
+      const std::size_t stride = panels_[symbolic_.supernode_of[k]].stride;
+      double* const to = values_.data() + at(k, k);
+      put(diagonal[i], to, stride);
+      if (!damping.empty())
+        for (std::size_t j = 0; j != width; ++j) to[j * stride + j] += damping[width * i + j];
     }
     for (std::size_t k = 0; k != targets_.size(); ++k) {
       const target& t = targets_[k];
-      unaligned to{values_.data() + t.begin, Eigen::OuterStride<>{static_cast<Eigen::Index>(t.stride)}};
+      double* const to = values_.data() + t.begin;
       if (t.transposed)
-        to = transposed(off_diagonal[k]);
+        put(transposed(off_diagonal[k]), to, t.stride);
       else
-        to = off_diagonal[k];
+        put(off_diagonal[k], to, t.stride);
     }
+  }
+  static void put(const block& from, double* to, std::size_t stride) {
+    for (std::size_t c = 0; c != width; ++c) std::copy_n(from.data() + width * c, width, to + c * stride);
   }
 
   /// Finds for each row of the factor its block row in the panel of `s`.
@@ -143,8 +145,7 @@ requires(B >= 1) class block_cholesky {
       const std::uint32_t i = symbolic_.order[node.first + c];
       double* const inverse = inverse_diagonal_.data() + width * (node.first + c);
       for (std::size_t j = 0; j != width; ++j) {
-        const auto index = static_cast<Eigen::Index>(j);
-        const double given = diagonal[i](index, index) + (damping.empty() ? 0.0 : damping[width * i + j]);
+        const double given = diagonal[i].data()[width * j + j] + (damping.empty() ? 0.0 : damping[width * i + j]);
         if (!factor_column(top, stride, j, tolerance * given, inverse[j])) {
           failed_block_ = i;
           return false;

@@ -14,14 +14,9 @@
 #include <span>
 #include <vector>
 
-namespace orbis::optimize::detail {
+#include <orbis/optimize/detail/sparse/block_solvers.hpp>
 
-/// The place of one block off the diagonal of a symmetric matrix; (column, row) is implied.
-struct block_place {
-  std::uint32_t row = 0;
-  std::uint32_t column = 0;
-  friend bool operator==(const block_place&, const block_place&) = default;
-};
+namespace orbis::optimize::detail {
 
 /// The neighbours of every block: `neighbors(i)` are those that share a place with i.
 class block_adjacency {

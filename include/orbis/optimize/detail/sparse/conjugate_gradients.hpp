@@ -13,11 +13,10 @@
 #include <span>
 #include <vector>
 
-#include <Eigen/Core>
-
-#include <orbis/core/types.hpp>
 #include <orbis/core/small_cholesky.hpp>
-#include <orbis/optimize/detail/sparse/block_ordering.hpp>
+#include <orbis/core/types.hpp>
+#include <orbis/optimize/detail/sparse/block_solvers.hpp>
+#include <orbis/optimize/detail/sum_over.hpp>
 
 namespace orbis::optimize::detail {
 
@@ -92,22 +91,27 @@ class block_conjugate_gradients {
   [[nodiscard]] int iterations() const { return iterations_; }
 
  private:
-  using part = Eigen::Map<vector>;
-  [[nodiscard]] static part at(std::vector<double>& v, std::size_t i) { return part(v.data() + B * i); }
-
+  static constexpr std::size_t width = static_cast<std::size_t>(B);
+  [[nodiscard]] static vector at(const std::vector<double>& v, std::size_t i) {
+    vector part;
+    std::copy_n(v.data() + width * i, width, part.data());
+    return part;
+  }
+  static void put(const vector& part, std::vector<double>& v, std::size_t i) {
+    std::copy_n(part.data(), width, v.data() + width * i);
+  }
   [[nodiscard]] static double dot(const std::vector<double>& a, const std::vector<double>& b) {
-    const auto n = static_cast<Eigen::Index>(a.size());
-    return Eigen::Map<const Eigen::VectorXd>(a.data(), n).dot(Eigen::Map<const Eigen::VectorXd>(b.data(), n));
+    return sum_over(a.size(), [&](std::size_t i) { return a[i] * b[i]; });
   }
   void precondition() {
-    for (std::size_t i = 0; i != size_; ++i) at(preconditioned_, i).noalias() = inverse_[i] * at(residual_, i);
+    for (std::size_t i = 0; i != size_; ++i) put(inverse_[i] * at(residual_, i), preconditioned_, i);
   }
   void multiply() {
-    for (std::size_t i = 0; i != size_; ++i) at(image_, i).noalias() = diagonal_[i] * at(direction_, i);
+    for (std::size_t i = 0; i != size_; ++i) put(diagonal_[i] * at(direction_, i), image_, i);
     for (std::size_t k = 0; k != places_.size(); ++k) {
       const auto& [row, column] = places_[k];
-      at(image_, row).noalias() += off_diagonal_[k] * at(direction_, column);
-      at(image_, column).noalias() += transposed(off_diagonal_[k]) * at(direction_, row);
+      put(at(image_, row) + off_diagonal_[k] * at(direction_, column), image_, row);
+      put(at(image_, column) + transposed_product(off_diagonal_[k], at(direction_, row)), image_, column);
     }
   }
 

@@ -3,6 +3,7 @@
 /// Cholesky factorisation of a dense symmetric positive definite matrix.
 #pragma once
 
+#include <cassert>
 #include <cmath>
 #include <cstddef>
 #include <span>
@@ -86,8 +87,19 @@ class dense_cholesky {
   std::vector<double> values_, product_, inverse_diagonal_, given_;
 };
 
-}  // namespace orbis::optimize::detail
+inline void dense_cholesky::solve(std::span<double> x) const {
+  assert(x.size() == size_);
+  for (std::size_t c = 0; c != size_; ++c) {
+    const double* const l = values_.data() + c * stride_;
+    x[c] /= l[c];
+    for (std::size_t r = c + 1; r != size_; ++r) x[r] -= l[r] * x[c];
+  }
+  for (std::size_t c = size_; c-- != 0;) {
+    const double* const l = values_.data() + c * stride_;
+    double sum = x[c];
+    for (std::size_t r = c + 1; r != size_; ++r) sum -= l[r] * x[r];
+    x[c] = sum / l[c];
+  }
+}
 
-#ifndef ORBIS_COMPILED
-#include <orbis/optimize/detail/compiled/dense_cholesky_functions.hpp>
-#endif
+}  // namespace orbis::optimize::detail

@@ -17,7 +17,7 @@
 #include <orbis/core/types.hpp>
 #include <orbis/features/descriptor.hpp>
 #include <orbis/features/match.hpp>
-#include <orbis/features/windowed.hpp>
+#include <orbis/features/windowed-inl.hpp>
 #include <orbis/slam/camera_rig.hpp>
 #include <orbis/slam/detail/dynamics/motion_split.hpp>
 #include <orbis/slam/detail/map/landmark_search.hpp>
@@ -231,7 +231,7 @@ class moving_features {
     features::keypoint at;
     D descriptor{};
     float flow_x = 0.0F, flow_y = 0.0F;  ///< pixels since the frame before
-    vec3 anchor = zeros<vec3>();          ///< where it was a little earlier, world
+    vec3 anchor = zeros<vec3>();         ///< where it was a little earlier, world
     double anchored = 0.0;               ///< when that was, seconds
     double moved = 0.0;                  ///< when it was last seen to move, or first seen
     bool has_anchor = false;

@@ -10,7 +10,7 @@
 #include <orbis/features/descriptor.hpp>
 #include <orbis/features/project_points.hpp>
 #include <orbis/features/projected.hpp>
-#include <orbis/features/windowed.hpp>
+#include <orbis/features/windowed-inl.hpp>
 #include <orbis/slam/landmark.hpp>
 #include <orbis/slam/pyramid_scales.hpp>
 
@@ -19,7 +19,7 @@ namespace orbis::slam::detail {
 /// A point to search for.
 struct candidate_point {
   vec3 position = zeros<vec3>();  ///< in the world, metres
-  landmark_id landmark;          ///< `no_id` for a point that is known from the depth of the last frame alone
+  landmark_id landmark;           ///< `no_id` for a point that is known from the depth of the last frame alone
 };
 
 /// Points with their descriptors and search windows, index by index.

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The reconstruction of two_view.hpp: inline, or, with ORBIS_COMPILED, compiled once, by
-/// cmake/compiled/optimize_two_view.cpp.
+/// The reconstruction of two_view.hpp.
 #pragma once
 
 #include <algorithm>
@@ -14,16 +13,15 @@
 #include <utility>
 #include <vector>
 
-#include <orbis/core/compiled_once.hpp>
 #include <orbis/core/jacobi.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/core/se3.hpp>
+#include <orbis/core/small_cholesky.hpp>
 #include <orbis/core/types.hpp>
 #include <orbis/optimize/detail/minimal/epipolar_motion.hpp>
 #include <orbis/optimize/detail/minimal/essential_estimator.hpp>
 #include <orbis/optimize/detail/minimal/image_matches.hpp>
 #include <orbis/optimize/detail/minimal/ray_homography_estimator.hpp>
-#include <orbis/core/small_cholesky.hpp>
 #include <orbis/optimize/detail/minimal/two_view_hypotheses.hpp>
 #include <orbis/optimize/ransac.hpp>
 #include <orbis/optimize/triangulation.hpp>
@@ -32,6 +30,7 @@
 namespace orbis::optimize::detail {
 
 /// The search for the motion between two views among all that may be meant.
+template <class Match>
 class two_view_search {
  public:
   struct hypothesis {
@@ -39,7 +38,7 @@ class two_view_search {
     motion_support support;
   };
 
-  explicit two_view_search(const std::vector<image_match>& matches) : matches_{matches} {}
+  explicit two_view_search(const std::vector<Match>& matches) : matches_{matches} {}
 
   /// Refines a motion and takes in all four that its essential matrix stands for.
   void add(const epipolar_motion& start) {
@@ -53,12 +52,12 @@ class two_view_search {
   }
   /// Whether one motion of a plane explains the plane's own matches clearly better than `best` does, which then comes
   /// from what the plane and something else that moves have in common.
-  [[nodiscard]] static bool contradicts(const std::vector<image_match>& plane,
-                                        const std::vector<epipolar_motion>& motions, const epipolar_motion& best) {
+  [[nodiscard]] static bool contradicts(const std::vector<Match>& plane, const std::vector<epipolar_motion>& motions,
+                                        const epipolar_motion& best) {
     constexpr std::array scales{3.0, 2.0, 2.0, 2.0, 2.0, 2.0};
     const auto score = [&](const mat3& e) {
       double sum = 0.0;
-      for (const image_match& m : plane) sum += std::max(0.0, 1.5 * line_gate - squared_sampson(e, m));
+      for (const Match& m : plane) sum += std::max(0.0, 1.5 * line_gate - squared_sampson(e, m));
       return sum;
     };
     const double enough = 1.05 * score(best.e);
@@ -93,7 +92,7 @@ class two_view_search {
       if (same(h.motion, best.motion)) return false;
       const mat3 other = h.motion.rotation.rotation_matrix();
       double sum = 0.0, squares = 0.0;
-      for (const image_match& m : matches_) {
+      for (const Match& m : matches_) {
         const double more = score_of(rotation, best.motion, m) - score_of(other, h.motion, m);
         sum += more;
         squares += more * more;
@@ -117,21 +116,22 @@ class two_view_search {
     });
   }
 
-  const std::vector<image_match>& matches_;
+  const std::vector<Match>& matches_;
   std::vector<hypothesis> all_;
 };
 
 /// The matches that agree with a motion, and what they leave open.
+template <class Match>
 struct two_view_inliers {
-  std::vector<const image_match*> all, near;
+  std::vector<const Match*> all, near;
   double rms = 0.0;    ///< Sampson distance
   double sigma = 0.0;  ///< standard deviation of a match
   double rotation_deviation = 0.0, direction_deviation = 0.0;
 
-  two_view_inliers(const std::vector<image_match>& matches, const epipolar_motion& motion) {
+  two_view_inliers(const std::vector<Match>& matches, const epipolar_motion& motion) {
     std::vector<double> squares;
     const mat3 rotation = motion.rotation.rotation_matrix();
-    for (const image_match& m : matches) {
+    for (const Match& m : matches) {
       double squared = 0.0;
       const agreement a = agreement_of(rotation, motion.direction, motion.e, m, squared);
       if (a != agreement::far && a != agreement::near) continue;
@@ -154,9 +154,9 @@ struct two_view_inliers {
   /// tells what errs together: neighbours, what moves, the rows of a rolling shutter.
   void estimate_deviations(const epipolar_motion& motion) {
     constexpr std::size_t side = 3, parts = side * side;
-    std::vector<const image_match*> order = all;
+    std::vector<const Match*> order = all;
     const auto by = [](double metric_ray::*axis) {
-      return [axis](const image_match* a, const image_match* b) { return a->first.*axis < b->first.*axis; };
+      return [axis](const Match* a, const Match* b) { return a->first.*axis < b->first.*axis; };
     };
     std::sort(order.begin(), order.end(), by(&metric_ray::x));
     std::array<epipolar_equations, parts> of_part;
@@ -207,9 +207,9 @@ struct two_view_inliers {
   }
 };
 
-ORBIS_COMPILED_ONCE result<two_view_reconstruction> reconstruction_of_matches(const std::vector<image_match>& matches,
-                                                                              std::size_t n,
-                                                                              const two_view_options& options) {
+template <class Match>
+result<two_view_reconstruction> reconstruction_of_matches(const std::vector<Match>& matches, std::size_t n,
+                                                          const two_view_options& options) {
   constexpr const char* where = "two views";
   const std::size_t least = std::max<std::size_t>(options.min_points, 8), usable = matches.size();
   const auto refuse = [&](const std::string& why) { return fail(errc::degenerate, where, why); };
@@ -224,11 +224,11 @@ ORBIS_COMPILED_ONCE result<two_view_reconstruction> reconstruction_of_matches(co
   // The cheapest answer first: the camera has only turned.
   const so3 turn = prevailing_rotation(matches);
   const mat3 turned = turn.rotation_matrix();
-  const auto is_still = [&](const image_match& m, double sigma) {
+  const auto is_still = [&](const Match& m, double sigma) {
     return squared_disparity(turned, m) < square(least_disparity * sigma);
   };
   const auto still = static_cast<std::size_t>(
-      std::count_if(matches.begin(), matches.end(), [&](const image_match& m) { return is_still(m, 0.75); }));
+      std::count_if(matches.begin(), matches.end(), [&](const Match& m) { return is_still(m, 0.75); }));
   if (usable - still < least || 5 * still > 4 * usable)
     return refuse("no parallax: a rotation alone explains " + of(still, usable) + " matches");
 
@@ -247,11 +247,11 @@ ORBIS_COMPILED_ONCE result<two_view_reconstruction> reconstruction_of_matches(co
   const auto plane = ransac(planes, asked, ransac_policies{msac{}, uniform_sampling{}, sprt{}, iterated_refinement{}});
 
   // The motions of both models. That of the model that describes the images worse is a rival all the same.
-  two_view_search search(matches);
+  two_view_search<Match> search(matches);
   const se3 first_of_four = decompose_essential(essential->model)[0];
   search.add({first_of_four.rotation(), first_of_four.translation()});
   bool from_homography = false;
-  std::vector<image_match> of_plane;
+  std::vector<Match> of_plane;
   std::vector<epipolar_motion> plane_motions;
   if (plane) {
     const auto& [forward, backward] = plane->model;
@@ -270,9 +270,9 @@ ORBIS_COMPILED_ONCE result<two_view_reconstruction> reconstruction_of_matches(co
   if (search.has_rival(*best)) return refuse(two);
 
   const epipolar_motion motion = best->motion;
-  const two_view_inliers inliers(matches, motion);
+  const two_view_inliers<Match> inliers(matches, motion);
   const auto unmoved = static_cast<std::size_t>(std::count_if(
-      inliers.all.begin(), inliers.all.end(), [&](const image_match* m) { return is_still(*m, inliers.sigma); }));
+      inliers.all.begin(), inliers.all.end(), [&](const Match* m) { return is_still(*m, inliers.sigma); }));
   if (2 * unmoved > inliers.all.size())
     return refuse("no parallax: a rotation alone explains " + of(unmoved, inliers.all.size()) + " matches that agree");
   if (10 * best->support.behind > inliers.all.size())
@@ -288,7 +288,7 @@ ORBIS_COMPILED_ONCE result<two_view_reconstruction> reconstruction_of_matches(co
   std::vector<seen_point> found;
   const se3 T_first_second = se3(motion.rotation, motion.direction).inverse();
   const double least_seen = std::sqrt(2.0) * inliers.sigma / options.max_depth;
-  for (const image_match* m : inliers.near) {
+  for (const Match* m : inliers.near) {
     if (squared_disparity(motion.rotation.rotation_matrix(), *m) < square(least_seen)) continue;
     const triangulation t = triangulate(se3(), m->first.direction(), T_first_second, m->second.direction());
     if (t.ok()) found.push_back({m->original, t.point, t.parallax});
@@ -303,7 +303,7 @@ ORBIS_COMPILED_ONCE result<two_view_reconstruction> reconstruction_of_matches(co
     angles.push_back(p.parallax);
   }
   two_view_reconstruction out;
-  out.parallax = two_view_inliers::middle_of(angles);
+  out.parallax = two_view_inliers<Match>::middle_of(angles);
   if (!(out.parallax >= options.min_parallax)) return refuse("too little parallax between the rays of a point");
 
   // Only one that would be the answer is compared with all others.
@@ -312,10 +312,11 @@ ORBIS_COMPILED_ONCE result<two_view_reconstruction> reconstruction_of_matches(co
   best = search.best();
   if (best->support.score > 1.02 * score || search.has_rival(*best)) return refuse(two);
   constexpr const char* shared = "two motions share the matches";
-  if (5 * of_plane.size() > 2 * inliers.all.size() && two_view_search::contradicts(of_plane, plane_motions, motion))
+  if (5 * of_plane.size() > 2 * inliers.all.size() &&
+      two_view_search<Match>::contradicts(of_plane, plane_motions, motion))
     return refuse(shared);
-  std::vector<image_match> others;
-  for (const image_match& m : matches)
+  std::vector<Match> others;
+  for (const Match& m : matches)
     if (!(squared_sampson(motion.e, m) < 2.0 * line_gate)) others.push_back(m);
   if (2 * others.size() > inliers.all.size()) {
     asked.threshold = std::sqrt(line_gate);
@@ -325,7 +326,7 @@ ORBIS_COMPILED_ONCE result<two_view_reconstruction> reconstruction_of_matches(co
     if (second && 2 * second->inliers.size() > inliers.all.size()) return refuse(shared);
   }
 
-  const double unit = 1.0 / two_view_inliers::middle_of(depths);
+  const double unit = 1.0 / two_view_inliers<Match>::middle_of(depths);
   for (const seen_point& p : found) {
     out.matches.push_back(p.match);
     out.points.push_back(unit * p.position);

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The functions of two_view.hpp: inline, or, with ORBIS_COMPILED, compiled once, by
-/// cmake/compiled/optimize_two_view.cpp.
+/// The functions of two_view.hpp.
 #pragma once
 
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <concepts>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -15,9 +15,7 @@
 #include <utility>
 #include <vector>
 
-#include <Eigen/LU>
-
-#include <orbis/core/compiled_once.hpp>
+#include <orbis/core/inline.hpp>
 #include <orbis/core/jacobi.hpp>
 #include <orbis/core/random.hpp>
 #include <orbis/core/result.hpp>
@@ -26,21 +24,22 @@
 #include <orbis/optimize/detail/minimal/essential_estimator.hpp>
 #include <orbis/optimize/detail/minimal/homography_estimator.hpp>
 #include <orbis/optimize/detail/minimal/image_matches.hpp>
+#include <orbis/optimize/detail/minimal/two_view_reconstruction.hpp>
 #include <orbis/optimize/ransac.hpp>
 #include <orbis/optimize/triangulation.hpp>
 #include <orbis/optimize/two_view.hpp>
 
 namespace orbis::optimize {
 
-ORBIS_COMPILED_ONCE std::array<se3, 4> decompose_essential(const mat3& essential) {
+ORBIS_INLINE std::array<se3, 4> decompose_essential(const mat3& essential) {
   return detail::decompose_essential(essential);
 }
 
 namespace detail {
 
-ORBIS_COMPILED_ONCE result<relative_pose_estimate> essential_of_matches(const std::vector<image_match>& matches,
-                                                                        std::size_t n,
-                                                                        const essential_options& options) {
+template <class Match>
+result<relative_pose_estimate> essential_of_matches(const std::vector<Match>& matches, std::size_t n,
+                                                    const essential_options& options) {
   constexpr const char* where = "essential matrix";
   const ransac_options asked = ransac_part(options);
   const essential_estimator estimator(matches);
@@ -97,17 +96,17 @@ ORBIS_COMPILED_ONCE result<relative_pose_estimate> essential_of_matches(const st
 
 }  // namespace detail
 
-ORBIS_COMPILED_ONCE std::optional<mat3> homography_of_four(const std::array<vec2, 4>& first,
-                                                           const std::array<vec2, 4>& second) {
+ORBIS_INLINE std::optional<mat3> homography_of_four(const std::array<vec2, 4>& first,
+                                                    const std::array<vec2, 4>& second) {
   mat3 h;
   if (!detail::homography_of_four(first, second, h)) return std::nullopt;
   if (h(2, 2) != 0.0) h /= double{h(2, 2)};
   return h;
 }
 
-ORBIS_COMPILED_ONCE result<homography_estimate> estimate_homography(std::span<const vec2> first,
-                                                                    std::span<const vec2> second,
-                                                                    const homography_options& options) {
+template <std::same_as<homography_options> Options>
+result<homography_estimate> estimate_homography(std::span<const vec2> first, std::span<const vec2> second,
+                                                const Options& options) {
   constexpr const char* where = "homography";
   using estimator_type = detail::homography_estimator;
   const std::size_t n = first.size();
@@ -189,7 +188,7 @@ ORBIS_COMPILED_ONCE result<homography_estimate> estimate_homography(std::span<co
   return out;
 }
 
-ORBIS_COMPILED_ONCE result<std::vector<plane_motion>> decompose_homography(const mat3& homography, const vec3& ray) {
+ORBIS_INLINE result<std::vector<plane_motion>> decompose_homography(const mat3& homography, const vec3& ray) {
   constexpr const char* where = "homography";
   mat3 h = homography;
   if (!all_finite(h)) return fail(errc::degenerate, where, "is not finite");

@@ -1,0 +1,7 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// The functions of brute_force.hpp.
+#pragma once
+
+#include <orbis/features/brute_force.hpp>
+#include <orbis/features/detail/match/hamming_nearest.hpp>

@@ -1,0 +1,7 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// The functions of windowed.hpp.
+#pragma once
+
+#include <orbis/features/detail/match/hamming_listed.hpp>
+#include <orbis/features/windowed.hpp>

@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// The functions of alignment.hpp.
+#pragma once
+
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <orbis/core/inline.hpp>
+#include <orbis/core/jacobi.hpp>
+#include <orbis/core/random.hpp>
+#include <orbis/core/result.hpp>
+#include <orbis/core/se3.hpp>
+#include <orbis/core/sim3.hpp>
+#include <orbis/core/types.hpp>
+#include <orbis/optimize/alignment.hpp>
+#include <orbis/optimize/detail/minimal/alignment_estimator.hpp>
+#include <orbis/optimize/detail/minimal/horn.hpp>
+#include <orbis/optimize/ransac.hpp>
+
+namespace orbis::optimize {
+
+namespace detail {
+
+inline constexpr const char* absolute_orientation_name = "absolute orientation";
+
+ORBIS_INLINE result<void> check_pairs(std::size_t from, std::size_t to, std::span<const double> weights) {
+  constexpr const char* where = absolute_orientation_name;
+  if (from != to) return fail(errc::invalid_argument, where, "the two lists of points differ in length");
+  if (!weights.empty() && weights.size() != from)
+    return fail(errc::invalid_argument, where, "there are not as many weights as pairs");
+  for (std::size_t i = 0; i != weights.size(); ++i)
+    if (!(weights[i] >= 0.0 && std::isfinite(weights[i])))
+      return fail(errc::invalid_argument, where,
+                  "the weight of pair " + std::to_string(i) + " is negative or not finite");
+  if (from < 3) return fail(errc::no_data, where, "fewer than three pairs of points");
+  return {};
+}
+
+ORBIS_INLINE std::optional<sim3> align_by_moments(const pair_moments& moments, std::size_t n, bool with_scale) {
+  return transform_between(moments, n, with_scale);
+}
+
+ORBIS_INLINE error why_not_aligned(std::size_t not_finite, std::size_t n) {
+  if (not_finite != n)
+    return {errc::degenerate, absolute_orientation_name,
+            "a coordinate of pair " + std::to_string(not_finite) + " is not finite"};
+  return {errc::degenerate, absolute_orientation_name,
+          "the points do not determine a rotation: they lie on a line or in one place"};
+}
+
+template <class Transform>
+result<alignment_estimate<Transform>> alignment_of(std::span<const vec3> from, std::span<const vec3> to,
+                                                   const alignment_options& options) {
+  constexpr const char* where = "alignment";
+  using estimator_type = detail::alignment_estimator<Transform>;
+  const std::size_t n = from.size();
+  if (n != to.size()) return fail(errc::invalid_argument, where, "the two lists of points differ in length");
+  if (!options.deviations.empty() && options.deviations.size() != n)
+    return fail(errc::invalid_argument, where, "there are not as many deviations as pairs");
+  const ransac_options asked = detail::ransac_part(options);
+  if (const char* const fault = detail::fault_of(asked)) return fail(errc::invalid_argument, where, fault);
+  if (n < 3) return fail(errc::no_data, where, "fewer than three pairs of points");
+  const auto weight_of = [&](std::size_t i) {
+    return options.deviations.empty() ? 1.0 : 1.0 / (options.deviations[i] * options.deviations[i]);
+  };
+  std::vector<typename estimator_type::pair> pairs;
+  pairs.reserve(n);
+  vec3 from_centre = zeros<vec3>(), to_centre = zeros<vec3>();
+  for (std::size_t i = 0; i != n; ++i) {
+    const typename estimator_type::pair p{from[i], to[i], weight_of(i), static_cast<std::uint32_t>(i)};
+    if (!all_finite(p.from) || !all_finite(p.to) || !(p.weight > 0.0) || !std::isfinite(p.weight)) continue;
+    pairs.push_back(p);
+    from_centre += p.from;
+    to_centre += p.to;
+  }
+  if (pairs.size() < 3)
+    return fail(errc::degenerate, where,
+                "of " + std::to_string(n) + " pairs " + std::to_string(pairs.size()) + " are finite, three are needed");
+  from_centre /= static_cast<double>(pairs.size());
+  to_centre /= static_cast<double>(pairs.size());
+  mat3 spread = zeros<mat3>(), spread_to = zeros<mat3>();
+  for (auto& p : pairs) {
+    p.from -= from_centre;
+    p.to -= to_centre;
+    spread += p.from * transposed(p.from);
+    spread_to += p.to * transposed(p.to);
+  }
+  random_bits random(mix64(options.seed));
+  shuffle(pairs, random);
+
+  const estimator_type estimator(std::move(pairs));
+  auto found = ransac(estimator, asked, ransac_policies{msac{}, uniform_sampling{}, sprt{}, iterated_refinement{}});
+  if (!found) {
+    if (found.error().code == errc::degenerate)
+      for (const mat3& s : {spread, spread_to}) {
+        const vec3 sizes = eigen_of_symmetric<3>(s).values;
+        if (!(sizes[1] > 1e-12 * sizes[2]))
+          return fail(errc::degenerate, where, "the points all lie on one line or in one place");
+      }
+    return fail(found.error());
+  }
+  // Back from the centres.
+  const auto& centred = found->model.transform;
+  Transform transform;
+  if constexpr (estimator_type::with_scale)
+    transform =
+        sim3(centred.rotation(),
+             to_centre + centred.translation() - centred.scale() * (centred.rotation() * from_centre), centred.scale());
+  else
+    transform = se3(centred.rotation(), to_centre + centred.translation() - centred.rotation() * from_centre);
+  alignment_estimate<Transform> out{transform, {}, 0.0, found->iterations};
+  out.inliers.reserve(found->inliers.size());
+  double sum = 0.0;
+  for (std::size_t i = 0; i != n; ++i) {
+    const double weight = weight_of(i), e = weight * squared_norm(transform * from[i] - to[i]);
+    if (!(weight > 0.0) || !(e < options.threshold * options.threshold)) continue;
+    out.inliers.push_back(static_cast<std::uint32_t>(i));
+    sum += e;
+  }
+  if (auto enough = detail::enough_inliers(where, out.inliers.size(), n, options.min_inliers, 3); !enough)
+    return fail(std::move(enough.error()));
+  out.rmse = std::sqrt(sum / static_cast<double>(out.inliers.size()));
+  return out;
+}
+
+}  // namespace detail
+
+}  // namespace orbis::optimize

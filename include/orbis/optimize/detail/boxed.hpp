@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// A value on the heap that may be of an incomplete type where its owner is copied, moved and destroyed: API headers
+/// name the types of solvers and do not include them.
+#pragma once
+
+#include <utility>
+
+namespace orbis::optimize::detail {
+
+/// A `T`, copied with its owner. Empty, and of no use but to be assigned to, after a move.
+template <class T>
+class boxed {
+ public:
+  /// @pre T is complete
+  explicit boxed(T value) : value_{new T(std::move(value))}, copy_{&copied}, destroy_{&destroyed} {}
+  boxed(const boxed& o)
+      : value_{o.value_ == nullptr ? nullptr : o.copy_(*o.value_)}, copy_{o.copy_}, destroy_{o.destroy_} {}
+  boxed(boxed&& o) noexcept : value_{std::exchange(o.value_, nullptr)}, copy_{o.copy_}, destroy_{o.destroy_} {}
+  boxed& operator=(boxed o) noexcept {
+    std::swap(value_, o.value_);
+    return *this;
+  }
+  ~boxed() { destroy_(value_); }
+
+  [[nodiscard]] T& operator*() noexcept { return *value_; }
+  [[nodiscard]] const T& operator*() const noexcept { return *value_; }
+  [[nodiscard]] T* operator->() noexcept { return value_; }
+  [[nodiscard]] const T* operator->() const noexcept { return value_; }
+
+ private:
+  static T* copied(const T& value) { return new T(value); }
+  static void destroyed(T* value) noexcept { delete value; }
+
+  T* value_;
+  T* (*copy_)(const T&);
+  void (*destroy_)(T*) noexcept;
+};
+
+}  // namespace orbis::optimize::detail

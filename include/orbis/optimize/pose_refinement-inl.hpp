@@ -1,0 +1,208 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// The functions of pose_refinement.hpp.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <type_traits>
+
+#include <orbis/core/se3.hpp>
+#include <orbis/core/small_cholesky.hpp>
+#include <orbis/core/types.hpp>
+#include <orbis/optimize/detail/pose/pose_kernels.hpp>
+#include <orbis/optimize/detail/pose/pose_pieces.hpp>
+#include <orbis/optimize/pose_refinement.hpp>
+#include <orbis/optimize/reprojection.hpp>
+#include <orbis/optimize/robust_loss.hpp>
+
+namespace orbis::optimize {
+
+namespace detail {
+
+struct pose_normal_equations {
+  mat6 h;  ///< the lower triangle
+  vec6 g;
+  double cost;  ///< half the robust sum
+};
+
+/// One refinement, for one camera model.
+template <class Camera>
+class pose_refiner {
+ public:
+  pose_refiner(std::span<const pose_observation> observations, const Camera& camera, double bf, const se3& start,
+               std::span<std::uint8_t> outliers, const pose_refinement_options& options)
+      : observations_{observations},
+        camera_{camera},
+        bf_{bf},
+        T_camera_world_{start.inverse()},
+        outliers_{outliers},
+        options_{options},
+        pieces_{observations, outliers} {}
+
+  /// Steps until a step lowers the cost by less than the fraction `enough`.
+  template <class Loss>
+  [[nodiscard]] refinement_status run_round(const Loss& loss, double enough) {
+    double lambda = 1e-6;
+    pose_normal_equations now = linearize(T_camera_world_, loss);
+    for (int k = 0; k < options_.iterations; ++k) {
+      small_cholesky<6> cholesky;
+      if (!cholesky.set(now.h) || !(cholesky.factor(0.0) > cholesky.determined)) return refinement_status::degenerate;
+      bool accepted = false;
+      double gain = 0.0;
+      for (int attempt = 0; attempt < 8 && !accepted; ++attempt, lambda *= accepted ? 1.0 : 10.0) {
+        if (!(cholesky.factor(lambda) > 0.0)) continue;
+        const vec6 step = cholesky.solve(-now.g);
+        if (!all_finite(step)) continue;
+        // What the step gains by the model is at least half of this.
+        if (-dot(now.g, step) <= negligible * now.cost || squared_norm(step) < 1e-20)
+          return refinement_status::converged;
+        const se3 there = se3::exp(step) * T_camera_world_;
+        const pose_normal_equations then = linearize(there, loss);
+        if (!(then.cost < now.cost)) continue;
+        accepted = true;
+        gain = now.cost - then.cost;
+        now = then;
+        T_camera_world_ = there;
+      }
+      if (!accepted) return refinement_status::converged;
+      ++steps_;
+      lambda = std::max(1e-9, lambda * 0.1);
+      if (gain <= enough * now.cost) return refinement_status::converged;
+    }
+    return refinement_status::iteration_limit;
+  }
+
+  /// Decides for every observation at the current pose whether it is an outlier. Returns whether any decision changed.
+  bool apply_gates() {
+    bool changed = false;
+    inliers_ = 0;
+    cost_ = 0.0;
+    std::array<double, pose_lanes::capacity> chi2;
+    const pose_at at = at_pose(T_camera_world_);
+    auto* const judge = judge_pose_function<Camera>();
+    pieces_.for_each([&](const pose_lanes& lanes, std::size_t first, std::size_t count, std::size_t padded) {
+      judge(lanes, padded, camera_, at, chi2.data());
+      for (std::size_t i = 0; i != count; ++i) {
+        const double gate = observations_[first + i].has_depth() ? options_.gate_depth : options_.gate_mono;
+        const bool inside = chi2[i] <= gate && chi2[i] < std::numeric_limits<double>::infinity();
+        changed = changed || (outliers_[first + i] == 0) != inside;
+        outliers_[first + i] = inside ? 0 : 1;
+        inliers_ += inside ? 1U : 0U;
+        cost_ += inside ? 0.5 * chi2[i] : 0.0;
+      }
+    });
+    if (changed) pieces_.update();
+    return changed;
+  }
+
+  [[nodiscard]] se3 T_world_camera() const { return T_camera_world_.inverse(); }
+  [[nodiscard]] std::size_t inliers() const noexcept { return inliers_; }
+  [[nodiscard]] double cost() const noexcept { return cost_; }
+  [[nodiscard]] int steps() const noexcept { return steps_; }
+
+ private:
+  /// Relative to the cost, below what a sum of squares resolves in practice.
+  static constexpr double negligible = 1e-13;
+
+  [[nodiscard]] pose_at at_pose(const se3& pose) const {
+    return {pose.rotation_matrix(), pose.translation(), bf_, options_.gate_depth};
+  }
+
+  template <class Loss>
+  [[nodiscard]] pose_normal_equations linearize(const se3& pose, const Loss& loss) {
+    pose_normal_equations e{zeros<mat6>(), zeros<vec6>(), 0.0};
+    const pose_at at = at_pose(pose);
+    auto* const sum = sum_pose_function<Camera, Loss>();
+    pieces_.for_each([&](const pose_lanes& lanes, std::size_t, std::size_t, std::size_t padded) {
+      pose_sums s;
+      sum(lanes, padded, camera_, at, loss, s);
+      for (int row = 0, k = 0; row != 3; ++row)
+        for (int column = 0; column <= row; ++column, ++k) {
+          e.h(row, column) += s.translation[static_cast<std::size_t>(k)];
+          e.h(3 + row, 3 + column) += s.rotation[static_cast<std::size_t>(k)];
+        }
+      for (int i = 0; i != 9; ++i) e.h(3 + i % 3, i / 3) += s.corner[static_cast<std::size_t>(i)];
+      for (int i = 0; i != 6; ++i) e.g[i] += s.gradient[static_cast<std::size_t>(i)];
+      e.cost += s.cost;
+    });
+    return e;
+  }
+
+  std::span<const pose_observation> observations_;
+  const Camera& camera_;
+  double bf_;
+  se3 T_camera_world_;
+  std::span<std::uint8_t> outliers_;
+  const pose_refinement_options& options_;
+  pose_pieces pieces_;
+  std::size_t inliers_ = 0;
+  double cost_ = 0.0;
+  int steps_ = 0;
+};
+
+/// Least squares; for Huber's loss by one whose width has no bound, which gives the same bits and needs no kernel of
+/// its own.
+template <class Loss>
+[[nodiscard]] auto without_robustness(const Loss&) {
+  if constexpr (std::is_same_v<Loss, huber>)
+    return huber{std::numeric_limits<double>::infinity()};
+  else
+    return trivial{};
+}
+
+template <class Camera, class Loss>
+pose_refinement refine_pose(std::span<const pose_observation> observations, const Camera& camera, double bf,
+                            const se3& T_world_camera, std::span<std::uint8_t> outliers,
+                            const pose_refinement_options& options, const Loss& loss) {
+  pose_refinement out;
+  out.T_world_camera = T_world_camera;
+  const auto give_up = [&](refinement_status status) {
+    std::fill(outliers.begin(), outliers.end(), std::uint8_t{1});
+    out.status = status;
+    return out;
+  };
+  if (const mat4 pose = T_world_camera.to_matrix(); !all_finite(pose) || !(largest_magnitude(pose) < 1e100))
+    return give_up(refinement_status::invalid_start);
+
+  std::size_t active = 0;
+  for (std::size_t i = 0; i < observations.size(); ++i) {
+    outliers[i] = pose_pieces::usable(observations[i]) ? 0 : 1;
+    active += outliers[i] == 0;
+  }
+  if (active < 3) return give_up(refinement_status::too_few_observations);
+
+  pose_refiner<Camera> refiner(observations, camera, bf, T_world_camera, outliers, options);
+  bool changed = true;
+  for (int round = 0; round < options.rounds; ++round) {
+    const bool last = round + 1 == options.rounds;
+    if (last)
+      out.status = refiner.run_round(without_robustness(loss), 1e-9);
+    else if (changed || out.status != refinement_status::converged)
+      out.status = refiner.run_round(loss, 1e-6);  // it only has to tell the outliers
+    else
+      continue;  // the same problem as the last round solved
+    if (out.status == refinement_status::degenerate) return give_up(out.status);
+    changed = refiner.apply_gates();
+    if (refiner.inliers() < 3) return give_up(refinement_status::too_few_observations);
+  }
+  if (options.rounds <= 0) {  // judged only
+    out.status = refinement_status::iteration_limit;
+    refiner.apply_gates();
+    if (refiner.inliers() < 3) return give_up(refinement_status::too_few_observations);
+  }
+  out.inliers = refiner.inliers();
+  out.cost = refiner.cost();
+  out.iterations = refiner.steps();
+  out.T_world_camera = refiner.T_world_camera();
+  return out;
+}
+
+}  // namespace detail
+
+}  // namespace orbis::optimize
