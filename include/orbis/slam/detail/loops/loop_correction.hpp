@@ -19,6 +19,7 @@
 #include <optional>
 #include <span>
 #include <string_view>
+#include <type_traits>
 #include <vector>
 
 #include <orbis/camera/model.hpp>
@@ -92,13 +93,6 @@ template <feature_descriptor D>
   return edges;
 }
 
-/// Moves poses such that they agree with the edges, whose ends are indices of them; those with a nonzero entry in
-/// `is_fixed` stay. `scale_is_known`: all scales are and remain 1; otherwise scales are adjusted as well. Returns the
-/// number of iterations; empty, and the poses are of no use, if it fails or `callback` cancels it.
-[[nodiscard]] std::optional<int> optimize_poses(std::span<sim3> poses, const std::vector<essential_edge>& edges,
-                                                std::span<const std::uint8_t> is_fixed, bool scale_is_known,
-                                                int max_iterations, const progress& callback = {});
-
 /// Optimises poses of type `T`. Their number is that of the vertices.
 template <class T>
 [[nodiscard]] std::optional<int> optimize_graph(std::span<T> poses, const std::vector<essential_edge>& edges,
@@ -122,15 +116,20 @@ template <class T>
   return summary.iterations;
 }
 
-inline std::optional<int> optimize_poses(std::span<sim3> poses, const std::vector<essential_edge>& edges,
-                                         std::span<const std::uint8_t> is_fixed, bool scale_is_known,
-                                         int max_iterations, const progress& callback) {
-  if (!scale_is_known) return optimize_graph<sim3>(poses, edges, is_fixed, max_iterations, callback);
-  std::vector<se3> rigid;
+/// Moves poses such that they agree with the edges, whose ends are indices of them; those with a nonzero entry in
+/// `is_fixed` stay. `scale_is_known`: all scales are and remain 1; otherwise scales are adjusted as well. Returns the
+/// number of iterations; empty, and the poses are of no use, if it fails or `callback` cancels it.
+template <class S = double>
+[[nodiscard]] std::optional<int> optimize_poses(std::type_identity_t<std::span<basic_sim3<S>>> poses,
+                                                const std::vector<essential_edge>& edges,
+                                                std::span<const std::uint8_t> is_fixed, bool scale_is_known,
+                                                int max_iterations, const progress& callback = {}) {
+  if (!scale_is_known) return optimize_graph<basic_sim3<S>>(poses, edges, is_fixed, max_iterations, callback);
+  std::vector<basic_se3<S>> rigid;
   rigid.reserve(poses.size());
-  for (const sim3& p : poses) rigid.emplace_back(p.rotation(), p.translation());
-  const auto iterations = optimize_graph<se3>(rigid, edges, is_fixed, max_iterations, callback);
-  for (std::size_t i = 0; i != poses.size(); ++i) poses[i] = sim3(rigid[i]);
+  for (const basic_sim3<S>& p : poses) rigid.emplace_back(p.rotation(), p.translation());
+  const auto iterations = optimize_graph<basic_se3<S>>(rigid, edges, is_fixed, max_iterations, callback);
+  for (std::size_t i = 0; i != poses.size(); ++i) poses[i] = basic_sim3<S>(rigid[i]);
   return iterations;
 }
 
