@@ -36,12 +36,3 @@ if(_orbis_sources)
   endforeach()
   list(APPEND ORBIS_COMPILED_LIBRARIES compiled)
 endif()
-
-# orbis::compiled_io: the same for recordings on disk and synthetic ones (cmake/compiled_io), with ORBIS_COMPILED_IO. It
-# stands apart, as it needs image codecs, which who links orbis::compiled need not have.
-if("io" IN_LIST ORBIS_PROVIDED_COMPONENTS)
-  file(GLOB _orbis_sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/cmake/compiled_io/*.cpp)
-  _orbis_add_compiled(compiled_io orbis_io ORBIS_COMPILED_IO ${_orbis_sources})
-  target_link_libraries(orbis_compiled_io PUBLIC orbis_io)
-  list(APPEND ORBIS_COMPILED_LIBRARIES compiled_io)
-endif()
