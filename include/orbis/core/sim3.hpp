@@ -8,6 +8,7 @@
 /// cases where angle or log scale vanish.
 #pragma once
 
+#include <algorithm>
 #include <cassert>
 #include <cmath>
 #include <concepts>
