@@ -99,7 +99,7 @@ EOF_PROGRAM
 echo
 for program in octree_from_points octree_from_depth automatic_filter slam_in_three_lines; do
   row "$program" "$scratch/$program.cpp"
-  row "$program, compiled flavour" "$scratch/$program.cpp" -DORBIS_COMPILED -DORBIS_COMPILED_IO
+  row "$program, compiled flavour" "$scratch/$program.cpp" -DORBIS_COMPILED
 done
 
 for log in "$root"/build/*/.ninja_log; do

@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 #
 # orbis::compiled: a static library of what most programs instantiate, so that they need not compile it themselves. Its
-# sources, cmake/compiled/<component>*.cpp, instantiate templates and kernels of the headers and hold the functions marked
-# ORBIS_COMPILED_ONCE. Who links it compiles with ORBIS_COMPILED, which makes the headers declare all of this
-# (include/orbis/<component>/detail/compiled) and changes nothing else: programs with and without it can be linked
-# together.
+# sources, cmake/compiled/<component>*.cpp, instantiate templates and kernels of the headers and hold the functions that
+# are no templates. Who links it compiles with ORBIS_COMPILED, which makes the headers declare all of this and changes
+# nothing else: programs with and without it can be linked together.
 if(PROJECT_IS_TOP_LEVEL AND NOT CMAKE_BUILD_TYPE AND NOT CMAKE_CONFIGURATION_TYPES)
   set(CMAKE_BUILD_TYPE Release)
 endif()
@@ -18,30 +17,21 @@ foreach(_orbis_component IN LISTS ORBIS_PROVIDED_COMPONENTS)
     list(APPEND _orbis_sources ${_orbis_found})
   endif()
 endforeach()
+# Who links the library need not have what io needs: io is linked to build it, and by those who ask for io themselves.
+set(ORBIS_COMPILED_NEEDS ${ORBIS_COMPILED_COMPONENTS})
+list(REMOVE_ITEM ORBIS_COMPILED_NEEDS io)
 
-# _orbis_add_compiled(<name> <archive> <macro> <source>...): the target orbis_<name>.
-function(_orbis_add_compiled name archive macro)
-  add_library(orbis_${name} STATIC ${ARGN})
-  add_library(orbis::${name} ALIAS orbis_${name})
-  set_target_properties(orbis_${name} PROPERTIES EXPORT_NAME ${name} OUTPUT_NAME ${archive} POSITION_INDEPENDENT_CODE ON)
-  target_compile_definitions(orbis_${name} PUBLIC ${macro})
-  target_compile_options(orbis_${name} PRIVATE -ffp-contract=off)  # the same bits as everywhere
-endfunction()
-
-set(ORBIS_COMPILED_LIBRARIES)
 if(_orbis_sources)
-  _orbis_add_compiled(compiled orbis ORBIS_COMPILED ${_orbis_sources})
-  foreach(_orbis_component IN LISTS ORBIS_COMPILED_COMPONENTS)
+  add_library(orbis_compiled STATIC ${_orbis_sources})
+  add_library(orbis::compiled ALIAS orbis_compiled)
+  set_target_properties(orbis_compiled PROPERTIES EXPORT_NAME compiled OUTPUT_NAME orbis POSITION_INDEPENDENT_CODE ON)
+  target_compile_definitions(orbis_compiled PUBLIC ORBIS_COMPILED)
+  target_compile_options(orbis_compiled PRIVATE -ffp-contract=off)  # the same bits as everywhere
+  foreach(_orbis_component IN LISTS ORBIS_COMPILED_NEEDS)
     target_link_libraries(orbis_compiled PUBLIC orbis_${_orbis_component})
   endforeach()
-  list(APPEND ORBIS_COMPILED_LIBRARIES compiled)
-endif()
-
-# orbis::compiled_io: the same for recordings on disk and synthetic ones (cmake/compiled_io), with ORBIS_COMPILED_IO. It
-# stands apart, as it needs image codecs, which who links orbis::compiled need not have.
-if("io" IN_LIST ORBIS_PROVIDED_COMPONENTS)
-  file(GLOB _orbis_sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/cmake/compiled_io/*.cpp)
-  _orbis_add_compiled(compiled_io orbis_io ORBIS_COMPILED_IO ${_orbis_sources})
-  target_link_libraries(orbis_compiled_io PUBLIC orbis_io)
-  list(APPEND ORBIS_COMPILED_LIBRARIES compiled_io)
+  if("io" IN_LIST ORBIS_COMPILED_COMPONENTS)
+    target_link_libraries(orbis_compiled PRIVATE $<BUILD_INTERFACE:orbis_io>
+      INTERFACE $<INSTALL_INTERFACE:$<$<TARGET_EXISTS:orbis::io>:orbis::io>>)
+  endif()
 endif()

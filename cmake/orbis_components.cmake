@@ -7,7 +7,7 @@
 set(ORBIS_ALL_COMPONENTS core camera features places optimize cloud octree io eval slam mapping nav
                          cloud_nanoflann interop_opencv interop_octomap interop_pcl interop_open3d interop_ompl interop_fcl)
 # One header each, for another library: provided where that library is, and asked for by name.
-set(ORBIS_OPTIONAL_COMPONENTS "^(cloud_nanoflann|interop_.*|compiled|compiled_io)$")
+set(ORBIS_OPTIONAL_COMPONENTS "^(cloud_nanoflann|interop_.*|compiled)$")
 
 set(ORBIS_core_PACKAGES Eigen3 tl-expected Threads)
 set(ORBIS_core_LIBRARIES Eigen3::Eigen tl::expected Threads::Threads)

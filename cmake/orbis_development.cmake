@@ -11,7 +11,7 @@ target_compile_options(orbis_development INTERFACE
 
 # The flavour of the library that our programs use: the compiled one where it is built.
 add_library(orbis_flavour INTERFACE)
-foreach(library IN LISTS ORBIS_COMPILED_LIBRARIES)
-  target_compile_options(orbis_${library} PRIVATE $<TARGET_PROPERTY:orbis_development,INTERFACE_COMPILE_OPTIONS>)
-  target_link_libraries(orbis_flavour INTERFACE orbis_${library})
-endforeach()
+if(TARGET orbis_compiled)
+  target_compile_options(orbis_compiled PRIVATE $<TARGET_PROPERTY:orbis_development,INTERFACE_COMPILE_OPTIONS>)
+  target_link_libraries(orbis_flavour INTERFACE orbis_compiled)
+endif()

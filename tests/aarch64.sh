@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
 #
-# For 64-bit ARM: compiles the library (orbis::compiled, orbis::compiled_io), the quick tests (tests/quick.cmake) and the
+# For 64-bit ARM: compiles the library (orbis::compiled), the quick tests (tests/quick.cmake) and the
 # tests of the vector kernels, and runs them under qemu-user. The tests of the kernels are header-only and compare each
 # kernel with plain code, bit by bit, here with a compiler that fuses products into sums where it can.
 # With "all", every test of every component instead of the quick ones, which takes hours; without those that compare with
@@ -45,7 +45,7 @@ fi
 lib=$root/usr/lib/aarch64-linux-gnu
 flags=(-std=c++20 -O1 -w -Wno-psabi -Iinclude -Itests -Iexamples -isystem "$out/include" -isystem "$root/usr/include"
   -isystem "$root/usr/include/aarch64-linux-gnu" -isystem "$root/usr/include/opencv4" "-DORBIS_DATA_DIR=\"$data\"")
-compiled=(-ffp-contract=off -DORBIS_COMPILED -DORBIS_COMPILED_IO)
+compiled=(-ffp-contract=off -DORBIS_COMPILED)
 
 makefile=$out/Makefile
 rules=$makefile.rules
@@ -78,7 +78,7 @@ compile "$out/counting.o" "$out/counting.cpp"
 
 # The library.
 archive=()
-for source in cmake/compiled/*.cpp cmake/compiled_io/*.cpp; do
+for source in cmake/compiled/*.cpp; do
   object=$out/${source//\//_}.o
   compile "$object" "$source" "${compiled[@]}"
   archive+=("$object")

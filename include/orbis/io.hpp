@@ -10,11 +10,10 @@
 /// | `synthetic.hpp`       | a recording rendered on the fly, whose poses and surfaces are known exactly      |
 /// | `synthetic_options.hpp` | its room, its camera's path and its sensor's errors                            |
 /// | `camera_file.hpp`     | `camera.toml`: model, size, intrinsics, distortion, depth scale                  |
-/// | `toml.hpp`            | settings in TOML from bytes that nobody has looked at                            |
-/// | `trajectory_file.hpp` | trajectories in TUM format                                                       |
-/// | `image.hpp`           | colour and depth images, whatever their format                                   |
-/// | `png.hpp`, `jpeg.hpp` | images of one format, read and written                                           |
-/// | `cloud_file.hpp`      | point clouds, whatever their format                                              |
+/// | `toml.hpp`            | settings in TOML from bytes that nobody has looked at; not included here, as it brings
+/// toml++ | | `trajectory_file.hpp` | trajectories in TUM format | | `image.hpp`           | colour and depth images,
+/// whatever their format                                   | | `png.hpp`, `jpeg.hpp` | images of one format, read and
+/// written                                           | | `cloud_file.hpp`      | point clouds, whatever their format |
 /// | `ply.hpp`, `pcd.hpp`  | point clouds of one format, read and written                                     |
 /// | `bal_problem.hpp`, `bal.hpp` | bundle adjustment problems ("bundle adjustment in the large"); their files |
 /// | `g2o_graph.hpp`, `g2o.hpp` | pose graphs; their files                                                    |
@@ -36,5 +35,4 @@
 #include <orbis/io/stereo_recording.hpp>
 #include <orbis/io/synthetic.hpp>
 #include <orbis/io/synthetic_options.hpp>
-#include <orbis/io/toml.hpp>
 #include <orbis/io/trajectory_file.hpp>

@@ -7,9 +7,9 @@ function(run)
   endif()
 endfunction()
 
-# Builds and runs a program with what pkg-config says of a package.
+# Builds and runs a program with what pkg-config says of a package, with options that follow the program.
 function(build_by_pkg_config name package program)
-  execute_process(COMMAND ${PKG_CONFIG} --cflags --libs ${package} OUTPUT_VARIABLE flags RESULT_VARIABLE status)
+  execute_process(COMMAND ${PKG_CONFIG} --cflags --libs ${ARGN} ${package} OUTPUT_VARIABLE flags RESULT_VARIABLE status)
   if(NOT status EQUAL 0)
     message(FATAL_ERROR "pkg-config does not know ${package}")
   endif()
@@ -41,16 +41,20 @@ if(WAY STREQUAL "find_package")
   endif()
   if(BUILD)  # the compiled flavour, as this build has it
     run(${CMAKE_COMMAND} --install ${BUILD} --prefix ${SCRATCH}/with_library)
-    run(${CMAKE_COMMAND} -S ${PROJECT} -B ${SCRATCH}/mixed ${options} -DWAY=find_package -DMIXED=ON
-        -DCMAKE_PREFIX_PATH=${SCRATCH}/with_library)
-    run(${CMAKE_COMMAND} --build ${SCRATCH}/mixed)
-    run(${SCRATCH}/mixed/consumer)
+    foreach(with_io IN ITEMS OFF ON)
+      run(${CMAKE_COMMAND} -S ${PROJECT} -B ${SCRATCH}/mixed_${with_io} ${options} -DWAY=find_package -DMIXED=ON
+          -DWITH_IO=${with_io} -DCMAKE_PREFIX_PATH=${SCRATCH}/with_library)
+      run(${CMAKE_COMMAND} --build ${SCRATCH}/mixed_${with_io})
+      run(${SCRATCH}/mixed_${with_io}/consumer)
+    endforeach()
     if(PKG_CONFIG)
       file(GLOB directory ${SCRATCH}/with_library/lib*/pkgconfig ${SCRATCH}/with_library/lib/*/pkgconfig)
       list(JOIN directory ":" directory)
       set(ENV{PKG_CONFIG_PATH} ${SCRATCH}/with_library/share/pkgconfig:${directory})
-      build_by_pkg_config(recording orbis-compiled-io
-        "#include <orbis/io/recording.hpp>\nint main() { return orbis::io::open_recording(\"nowhere\") ? 1 : 0; }\n")
+      build_by_pkg_config(octree orbis-compiled
+        "#include <orbis/octree.hpp>\nint main() { return orbis::octree::occupancy_octree<>{0.05}.num_occupied_leaves() == 0 ? 0 : 1; }\n")
+      build_by_pkg_config(recording orbis-compiled
+        "#include <orbis/io/recording.hpp>\nint main() { return orbis::io::open_recording(\"nowhere\") ? 1 : 0; }\n" --static)
     endif()
   endif()
 endif()

@@ -5,6 +5,7 @@
 #include <optional>
 #include <string_view>
 
+#include <orbis/io/detail/files/jpeg_codec.hpp>
 #include <orbis/io/jpeg.hpp>
 
 #include "fuzz/target.hpp"

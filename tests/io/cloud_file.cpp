@@ -4,6 +4,8 @@
 
 #include <orbis/core/bytes.hpp>
 #include <orbis/io/cloud_file.hpp>
+#include <orbis/io/pcd.hpp>
+#include <orbis/io/ply.hpp>
 
 #include "support/catch.hpp"
 #include "support/temporary_folder.hpp"

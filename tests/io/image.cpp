@@ -6,6 +6,7 @@
 #include <sys/stat.h>
 
 #include <orbis/io/image.hpp>
+#include <orbis/io/png.hpp>
 
 #include "support/catch.hpp"
 #include "support/data.hpp"

@@ -8,6 +8,7 @@
 
 #include <jpeglib.h>
 
+#include <orbis/io/detail/files/jpeg_codec.hpp>
 #include <orbis/io/jpeg.hpp>
 
 #include "io/quiet.hpp"

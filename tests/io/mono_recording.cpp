@@ -8,6 +8,7 @@
 #include <vector>
 
 #include <orbis/io/mono_recording.hpp>
+#include <orbis/io/png.hpp>
 #include <orbis/io/recording.hpp>
 #include <orbis/io/stereo_recording.hpp>
 

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include <orbis/core/file.hpp>
 #include <orbis/io/pcd.hpp>
 
 #include "support/catch.hpp"

@@ -3,6 +3,7 @@
 #include <string>
 
 #include <orbis/camera/presets.hpp>
+#include <orbis/io/png.hpp>
 #include <orbis/io/recording.hpp>
 
 #include "io/recordings.hpp"

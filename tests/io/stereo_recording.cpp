@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <string>
 
+#include <orbis/io/png.hpp>
 #include <orbis/io/stereo_recording.hpp>
 
 #include "io/recordings.hpp"

@@ -8,6 +8,7 @@
 #include <iterator>
 
 #include <orbis/core/random.hpp>
+#include <orbis/io/detail/synthetic/scene.hpp>
 #include <orbis/io/synthetic.hpp>
 
 #include "support/catch.hpp"

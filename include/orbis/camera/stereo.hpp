@@ -91,8 +91,7 @@ namespace detail {
   const vec3 left = vec3(0.0, 0.0, 1.0), right = T_left_right.rotation() * left;
   const vec3 y = cross(left + right, x);
   if (!all_finite(x) || !(x.x() > 0.5) || !(norm(y) > 0.1)) return std::nullopt;
-  mat3 axes;
-  axes << x, normalized(y), cross(x, normalized(y));
+  const mat3 axes = columns(x, normalized(y), cross(x, normalized(y)));
   const vec3 z = column_of(axes, 2), upright = T_left_right.rotation() * vec3(0.0, 1.0, 0.0);
   if (dot(z, left) < 0.5 || dot(z, right) < 0.5 || !(dot(column_of(axes, 1), upright) > 0.5)) return std::nullopt;
   return axes;

@@ -13,9 +13,6 @@
 #include <utility>
 #include <vector>
 
-#include <Eigen/LU>
-#include <Eigen/SVD>
-
 #include <orbis/core/jacobi.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/core/se3.hpp>
@@ -92,15 +89,16 @@ struct alignment {
   }
   if (!all_finite(covariance) || !std::isfinite(variance_e) || !std::isfinite(variance_r))
     return fail(errc::degenerate, where, "a position is not finite");
-  const Eigen::JacobiSVD<mat3> svd{covariance, Eigen::ComputeFullU | Eigen::ComputeFullV};
-  const vec3 s = svd.singularValues();
+  auto [u, s, v] = singular_values_of<3>(covariance);
   if (!(s[1] > 1e-9 * std::sqrt(variance_e * variance_r)) || !(s[1] > 0.0))
     return fail(errc::degenerate, where, "all positions lie on one line, the rotation about it is not determined");
   // Where the best orthogonal matrix mirrors, the best rotation flips the weakest direction.
-  vec3 sign(1.0, 1.0, 1.0);
-  if (determinant(svd.matrixU()) * determinant(svd.matrixV()) < 0.0) sign[2] = -1.0;
-  const so3 rotation(mat3(svd.matrixU() * sign.asDiagonal() * transposed(svd.matrixV())));
-  const double scale = with_scale ? dot(s, sign) / variance_e : 1.0;
+  if (determinant(u) * determinant(v) < 0.0) {
+    s[2] = -s[2];
+    set_column(u, 2, vec3(-column_of(u, 2)));
+  }
+  const so3 rotation(u * transposed(v));
+  const double scale = with_scale ? (s[0] + s[1] + s[2]) / variance_e : 1.0;
   return alignment{scale, se3(rotation, mean_r - rotation * vec3(scale * mean_e)), pairs.size()};
 }
 

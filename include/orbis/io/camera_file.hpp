@@ -45,6 +45,6 @@ result<void> write_camera(const std::filesystem::path& path, const camera::camer
 
 }  // namespace orbis::io
 
-#ifndef ORBIS_COMPILED_IO
-#include <orbis/io/detail/compiled/camera_file_functions.hpp>
+#ifndef ORBIS_COMPILED
+#include <orbis/io/camera_file-inl.hpp>
 #endif

@@ -6,38 +6,21 @@
 #include <cstdint>
 #include <filesystem>
 
-#include <orbis/core/file.hpp>
 #include <orbis/core/image.hpp>
 #include <orbis/core/result.hpp>
-#include <orbis/io/jpeg.hpp>
-#include <orbis/io/png.hpp>
 
 namespace orbis::io {
 
-namespace detail {
-/// More than an image file of `max_image_pixels` has, compressed or not.
-inline constexpr std::uintmax_t max_image_bytes = std::uintmax_t{1} << 30;
-}  // namespace detail
-
 /// A PNG (8 or 16 bit, grey, palette, with or without alpha) or JPEG as 8-bit colour.
 /// Errors: not_found, unreadable, malformed (damaged, truncated, more than 1 GiB), unsupported (another format).
-[[nodiscard]] inline result<image<rgb8>> read_color(const std::filesystem::path& path) {
-  const auto bytes = read_file(path, detail::max_image_bytes);
-  if (!bytes) return fail(bytes.error());
-  if (bytes->empty()) return fail(errc::malformed, path.string(), "the file is empty");
-  if (is_png(*bytes)) return decode_png_color(*bytes, path.string());
-  if (is_jpeg(*bytes)) return decode_jpeg(*bytes, path.string());
-  return fail(errc::unsupported, path.string(), "is neither a PNG nor a JPEG image");
-}
+[[nodiscard]] result<image<rgb8>> read_color(const std::filesystem::path& path);
 
 /// A 16-bit grey PNG, as stored (no scale applied).
 /// Errors: not_found, unreadable, malformed (damaged, truncated, more than 1 GiB), unsupported (anything else).
-[[nodiscard]] inline result<image<std::uint16_t>> read_depth(const std::filesystem::path& path) {
-  const auto bytes = read_file(path, detail::max_image_bytes);
-  if (!bytes) return fail(bytes.error());
-  if (bytes->empty()) return fail(errc::malformed, path.string(), "the file is empty");
-  if (!is_png(*bytes)) return fail(errc::unsupported, path.string(), "a depth image must be a 16-bit grey PNG");
-  return decode_png_depth(*bytes, path.string());
-}
+[[nodiscard]] result<image<std::uint16_t>> read_depth(const std::filesystem::path& path);
 
 }  // namespace orbis::io
+
+#ifndef ORBIS_COMPILED
+#include <orbis/io/image-inl.hpp>
+#endif

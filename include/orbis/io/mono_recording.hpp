@@ -11,14 +11,12 @@
 /// @endcode
 #pragma once
 
-#include <cassert>
 #include <cstddef>
 #include <filesystem>
 #include <optional>
 #include <span>
 #include <string>
 #include <string_view>
-#include <utility>
 #include <vector>
 
 #include <orbis/camera/mono_frame.hpp>
@@ -58,10 +56,7 @@ struct mono_recording_options {
 class mono_recording {
  public:
   /// @pre !index.frames.empty()
-  mono_recording(detail::recording_index index, camera::camera_settings camera, mono_format format)
-      : index_{std::move(index)}, camera_{std::move(camera)}, format_{format} {
-    assert(!index_.frames.empty());
-  }
+  mono_recording(detail::recording_index index, camera::camera_settings camera, mono_format format);
 
   [[nodiscard]] std::size_t size() const noexcept { return index_.frames.size(); }
   /// Seconds. @pre i < size()
@@ -105,6 +100,6 @@ class mono_recording {
 
 }  // namespace orbis::io
 
-#ifndef ORBIS_COMPILED_IO
-#include <orbis/io/detail/compiled/mono_recording_functions.hpp>
+#ifndef ORBIS_COMPILED
+#include <orbis/io/mono_recording-inl.hpp>
 #endif

@@ -7,7 +7,6 @@
 /// @endcode
 #pragma once
 
-#include <cassert>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -25,10 +24,13 @@
 #include <orbis/core/image.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/core/trajectory.hpp>
-#include <orbis/io/detail/recordings/color_registration.hpp>
 #include <orbis/io/detail/recordings/recording_index.hpp>
 
 namespace orbis::io {
+
+namespace detail {
+class color_registration;
+}
 
 /// The layouts we read. `automatic`: look which one it is.
 enum class recording_format { automatic, tum, seven_scenes, icl_nuim, scannet };
@@ -127,7 +129,7 @@ class recording {
   detail::recording_index index_;
   camera::camera_settings camera_;
   recording_format format_;
-  std::optional<detail::color_registration> registration_;
+  std::shared_ptr<const detail::color_registration> registration_;  // where colour is to be resampled
   result<void> status_;
 };
 
@@ -153,6 +155,6 @@ namespace detail {
 
 }  // namespace orbis::io
 
-#ifndef ORBIS_COMPILED_IO
-#include <orbis/io/detail/compiled/recording_functions.hpp>
+#ifndef ORBIS_COMPILED
+#include <orbis/io/recording-inl.hpp>
 #endif

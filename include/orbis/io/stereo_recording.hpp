@@ -11,7 +11,6 @@
 /// @endcode
 #pragma once
 
-#include <cassert>
 #include <cstddef>
 #include <filesystem>
 #include <optional>
@@ -106,6 +105,6 @@ class stereo_recording {
 
 }  // namespace orbis::io
 
-#ifndef ORBIS_COMPILED_IO
-#include <orbis/io/detail/compiled/stereo_recording_functions.hpp>
+#ifndef ORBIS_COMPILED
+#include <orbis/io/stereo_recording-inl.hpp>
 #endif

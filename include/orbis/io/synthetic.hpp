@@ -10,15 +10,12 @@
 #pragma once
 
 #include <algorithm>
-#include <cassert>
 #include <cstddef>
-#include <cstdint>
 #include <iterator>
 #include <memory>
-#include <string>
-#include <utility>
-#include <vector>
+#include <type_traits>
 
+#include <orbis/camera/intrinsics.hpp>
 #include <orbis/camera/model.hpp>
 #include <orbis/camera/pinhole.hpp>
 #include <orbis/camera/rgbd_frame.hpp>
@@ -30,15 +27,26 @@
 #include <orbis/core/se3.hpp>
 #include <orbis/core/trajectory.hpp>
 #include <orbis/core/types.hpp>
-#include <orbis/io/detail/synthetic/camera_path.hpp>
-#include <orbis/io/detail/synthetic/looks.hpp>
-#include <orbis/io/detail/synthetic/scene.hpp>
-#include <orbis/io/detail/synthetic/sensor.hpp>
-#include <orbis/io/detail/synthetic/simulator.hpp>
-#include <orbis/io/detail/synthetic/texture.hpp>
+#include <orbis/io/detail/synthetic/exact_view.hpp>
 #include <orbis/io/synthetic_options.hpp>
 
 namespace orbis::io {
+
+namespace detail::synthetic {
+
+class scene;
+struct recorded_room;
+
+/// A policy with as many threads. What is rendered does not depend on them.
+template <execution_policy Policy>
+[[nodiscard]] parallel_policy threads_of(const Policy& policy) {
+  if constexpr (std::is_same_v<Policy, parallel_policy>)
+    return policy;
+  else
+    return par.with(std::max(1U, static_cast<unsigned>(policy.threads())));
+}
+
+}  // namespace detail::synthetic
 
 /// A recording of a hand-held camera going once round a furnished room, with everything known
 /// exactly. Frames are independent: each can be asked for in any order, from several threads, and is
@@ -62,9 +70,9 @@ class synthetic_recording {
   /// The distance (metres, unsigned) of a point of the world to the nearest surface that a camera could see: the error
   /// of a map point. Exact in front of the surfaces; behind them, where solids overlap, the distance to the hull of the
   /// one that the point is deepest in. What moves does not count. O(solids of the room)
-  [[nodiscard]] double surface_distance(const vec3& p_world) const noexcept { return scene_->distance(p_world); }
-  /// The room's solids, for tests of this component.
-  [[nodiscard]] const detail::synthetic::scene& scene() const noexcept { return *scene_; }
+  [[nodiscard]] double surface_distance(const vec3& p_world) const noexcept;
+  /// The room's solids, for tests of this component (io/detail/synthetic/scene.hpp).
+  [[nodiscard]] const detail::synthetic::scene& scene() const noexcept;
   /// A pinhole camera of 525 pixels focal length at 640 pixels width.
   [[nodiscard]] camera::camera_settings camera() const {
     return {.model = camera::pinhole{k_},
@@ -80,7 +88,7 @@ class synthetic_recording {
     return both;
   }
   /// The exact pose of frame `i`.
-  [[nodiscard]] se3 T_world_camera(std::size_t i) const { return path_.at(timestamp(i)).T_world_camera(); }
+  [[nodiscard]] se3 T_world_camera(std::size_t i) const;
   /// The exact poses of all frames.
   [[nodiscard]] trajectory ground_truth() const;
 
@@ -90,9 +98,7 @@ class synthetic_recording {
   /// Frame `i` as the sensor sees it, made on the policy's threads. Errors: as `frame`.
   template <execution_policy Policy>
   [[nodiscard]] result<camera::rgbd_frame> render(const Policy& policy, std::size_t i) const {
-    if (i >= size()) return no_such_frame(i);
-    return simulator_.frame(
-        policy, [this](double time) { return moment_at(time); }, timestamp(i), i);
+    return render_on(detail::synthetic::threads_of(policy), i);
   }
 
   /// Frame `i` as a stereo camera sees it, whose left camera is `camera()` and whose right one stands
@@ -100,17 +106,14 @@ class synthetic_recording {
   [[nodiscard]] result<camera::stereo_frame> stereo_frame(std::size_t i) const;
   template <execution_policy Policy>
   [[nodiscard]] result<camera::stereo_frame> render_stereo(const Policy& policy, std::size_t i) const {
-    if (i >= size()) return no_such_frame(i);
-    return simulator_.stereo(
-        policy, [this](double time) { return moment_at(time); }, timestamp(i), i, options_.sensor.stereo_baseline);
+    return render_stereo_on(detail::synthetic::threads_of(policy), i);
   }
 
   /// Colour, depth (metres) and angles of frame `i` without any error of the sensor.
   /// Errors: invalid_argument if there is no frame `i`.
   template <execution_policy Policy>
   [[nodiscard]] result<detail::synthetic::exact_view> exact(const Policy& policy, std::size_t i) const {
-    if (i >= size()) return no_such_frame(i);
-    return simulator_.exact(policy, moment_at(timestamp(i)));
+    return exact_on(detail::synthetic::threads_of(policy), i);
   }
 
   /// What a camera of any model sees from any place in the room: depths in metres along its axis, without any error; 0
@@ -122,8 +125,7 @@ class synthetic_recording {
       const int y = static_cast<int>(row);
       for (int x = 0; x != camera.width(); ++x)
         if (const auto ray = camera.unproject(vec2{double(x), double(y)}))  // its z is 1: lengths along it are depths
-          depth(x, y) = static_cast<float>(
-              scene_->cast(T_world_camera.translation(), T_world_camera.rotation() * *ray).value_or(0.0));
+          depth(x, y) = static_cast<float>(depth_along(T_world_camera.translation(), T_world_camera.rotation() * *ray));
     });
     return depth;
   }
@@ -133,16 +135,15 @@ class synthetic_recording {
   [[nodiscard]] iterator end() const;
 
  private:
-  /// Texels are about the size of a pixel at 2 m.
-  [[nodiscard]] static double texel(const camera::intrinsics& k) noexcept { return std::max(0.003, 2.0 / k.fx); }
-  [[nodiscard]] detail::synthetic::moment moment_at(double time) const;
-  [[nodiscard]] tl::unexpected<error> no_such_frame(std::size_t i) const;
+  [[nodiscard]] result<camera::rgbd_frame> render_on(const parallel_policy& policy, std::size_t i) const;
+  [[nodiscard]] result<camera::stereo_frame> render_stereo_on(const parallel_policy& policy, std::size_t i) const;
+  [[nodiscard]] result<detail::synthetic::exact_view> exact_on(const parallel_policy& policy, std::size_t i) const;
+  /// From a place along a ray to the nearest surface, in lengths of the ray; 0 if there is none.
+  [[nodiscard]] double depth_along(const vec3& origin, const vec3& ray) const;
 
   synthetic_options options_;
-  detail::synthetic::camera_path path_;
   camera::intrinsics k_;
-  std::shared_ptr<const detail::synthetic::scene> scene_;
-  detail::synthetic::simulator simulator_;
+  std::shared_ptr<const detail::synthetic::recorded_room> room_;  // copies share it
 };
 
 /// A single pass over the frames; a frame lives until the iterator moves on.
@@ -181,6 +182,6 @@ inline synthetic_recording::iterator synthetic_recording::end() const { return {
 
 }  // namespace orbis::io
 
-#ifndef ORBIS_COMPILED_IO
-#include <orbis/io/detail/compiled/synthetic_functions.hpp>
+#ifndef ORBIS_COMPILED
+#include <orbis/io/synthetic-inl.hpp>
 #endif

@@ -3,7 +3,6 @@
 /// Settings in TOML from bytes that nobody has looked at, by toml++.
 #pragma once
 
-#include <algorithm>
 #include <cstddef>
 #include <filesystem>
 #include <string>
@@ -11,9 +10,7 @@
 
 #include <toml++/toml.h>
 
-#include <orbis/core/file.hpp>
 #include <orbis/core/result.hpp>
-#include <orbis/core/utf8.hpp>
 
 namespace orbis::io {
 
@@ -21,87 +18,15 @@ namespace orbis::io {
 /// the text; this much does not use up a stack.
 inline constexpr std::size_t max_toml_bytes = 16384;
 
-namespace detail {
-
-/// Whether each line that begins as the head of a table has a key in it: toml++ 3.3 takes that for granted.
-[[nodiscard]] inline bool has_keys_in_heads(std::string_view text) noexcept {
-  const auto skip_blanks = [](std::string_view& line) {
-    line.remove_prefix(std::min(line.find_first_not_of(" \t"), line.size()));
-  };
-  if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
-  while (!text.empty()) {
-    std::string_view line = text.substr(0, text.find('\n'));
-    text.remove_prefix(std::min(line.size() + 1, text.size()));
-    skip_blanks(line);
-    if (!line.starts_with('[')) continue;
-    for (int brackets = 0; brackets != 2 && line.starts_with('['); ++brackets) {
-      line.remove_prefix(1);
-      skip_blanks(line);
-    }
-    if (line.empty()) return false;
-    const char c = line.front();
-    const bool begins_key = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
-                            std::string_view{"_-\"'"}.find(c) != std::string_view::npos;
-    if (!begins_key) return false;
-  }
-  return true;
-}
-
-/// Whether all is ASCII that stands beside strings and comments, as TOML wants it: toml++ 3.3 asks of some other
-/// characters whether they are blanks, and does not know.
-[[nodiscard]] inline bool is_ascii_beside_texts(std::string_view text) noexcept {
-  if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
-  for (std::size_t i = 0; i < text.size();) {
-    const char c = text[i];
-    if (static_cast<unsigned char>(c) >= 0x80) return false;
-    if (c == '#') {
-      i = std::min(text.find_first_of("\n\v\f\r", i), text.size());
-      continue;
-    }
-    if (c != '"' && c != '\'') {
-      ++i;
-      continue;
-    }
-    const std::string_view three = c == '"' ? "\"\"\"" : "'''";
-    const bool has_lines = text.substr(i).starts_with(three);
-    for (i += has_lines ? 3 : 1; i < text.size(); ++i) {
-      if (c == '"' && text[i] == '\\') {
-        ++i;  // whatever it is
-      } else if (!has_lines && text[i] == '\n') {
-        break;  // an error, where toml++ ends
-      } else if (text[i] == c && (!has_lines || text.substr(i).starts_with(three))) {
-        i += has_lines ? 3 : 1;
-        for (int more = 0; has_lines && more != 2 && i < text.size() && text[i] == c; ++more) ++i;  // of the string
-        break;
-      }
-    }
-  }
-  return true;
-}
-
-}  // namespace detail
-
 /// The table that `text` is. `where` names the source in errors. Errors: malformed, with the line where it is known (no
 /// TOML; more than `max_toml_bytes`; a list of lists over several lines, whose lines could be heads of tables).
-[[nodiscard]] inline result<toml::table> parse_toml(std::string_view text, const std::filesystem::path& where = {}) {
-  const auto reject = [&](const char* why) { return fail(errc::malformed, where.string(), why); };
-  if (text.size() > max_toml_bytes) return reject("is too large for a file of settings");
-  if (!is_utf8(text)) return reject("not TOML: no UTF-8");
-  if (!detail::has_keys_in_heads(text)) return reject("not TOML: a table without a name");
-  if (!detail::is_ascii_beside_texts(text)) return reject("not TOML: letters beyond ASCII want quotes");
-  try {
-    return toml::parse(text, std::string_view{});
-  } catch (const toml::parse_error& e) {
-    return fail(errc::malformed, where.string() + ":" + std::to_string(e.source().begin.line),
-                "not TOML: " + std::string{e.description()});
-  }
-}
+[[nodiscard]] result<toml::table> parse_toml(std::string_view text, const std::filesystem::path& where = {});
 
 /// Reads a file of settings; see `parse_toml`. Errors: not_found, unreadable, malformed.
-[[nodiscard]] inline result<toml::table> read_toml(const std::filesystem::path& path) {
-  const auto text = read_file(path, max_toml_bytes);
-  if (!text) return fail(text.error());
-  return parse_toml(*text, path);
-}
+[[nodiscard]] result<toml::table> read_toml(const std::filesystem::path& path);
 
 }  // namespace orbis::io
+
+#ifndef ORBIS_COMPILED
+#include <orbis/io/toml-inl.hpp>
+#endif

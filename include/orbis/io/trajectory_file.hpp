@@ -4,84 +4,28 @@
 /// and metres, one pose `T_world_camera` a line, `#` for comments.
 #pragma once
 
-#include <algorithm>
-#include <charconv>
-#include <cmath>
-#include <cstddef>
 #include <filesystem>
-#include <ostream>
-#include <string>
 #include <string_view>
 
-#include <orbis/core/file.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/core/trajectory.hpp>
-#include <orbis/io/detail/text.hpp>
 
 namespace orbis::io {
 
 /// The poses in `text`, sorted by time (stably). `where` names the source in errors; quaternions of
 /// any positive norm are normalised. Text without poses gives an empty trajectory.
 /// Errors: malformed, with the line (not 8 numbers, NaN or infinity, a zero quaternion).
-[[nodiscard]] inline result<trajectory> parse_trajectory(std::string_view text,
-                                                         const std::filesystem::path& where = {}) {
-  trajectory poses;
-  std::string problem;
-  std::size_t problem_line = 0;
-  detail::for_each_line(text, [&](std::string_view line, std::size_t number) {
-    const auto reject = [&](std::string why) {
-      problem = std::move(why);
-      problem_line = number;
-      return false;
-    };
-    double v[8];
-    for (double& value : v) {
-      const std::string_view field = detail::next_field(line);
-      if (field.empty()) return reject("a pose has 8 numbers: timestamp tx ty tz qx qy qz qw");
-      if (!detail::parse_number(field, value))
-        return reject("\"" + std::string{field.substr(0, 40)} + "\" is not a number");
-      if (!std::isfinite(value)) return reject("a pose with NaN or infinity");
-    }
-    if (!detail::trimmed(line).empty()) return reject("a pose has 8 numbers: timestamp tx ty tz qx qy qz qw");
-    const so3::quaternion q(v[7], v[4], v[5], v[6]);
-    if (!(q.norm() > 1e-6) || !std::isfinite(q.norm())) return reject("a quaternion that is no rotation");
-    poses.push_back({v[0], se3(so3(q), vec3(v[1], v[2], v[3]))});
-    return true;
-  });
-  if (problem_line != 0) return fail(errc::malformed, detail::at_line(where, problem_line), std::move(problem));
-  std::stable_sort(poses.begin(), poses.end(),
-                   [](const stamped_pose& a, const stamped_pose& b) { return a.timestamp < b.timestamp; });
-  return poses;
-}
+[[nodiscard]] result<trajectory> parse_trajectory(std::string_view text, const std::filesystem::path& where = {});
 
 /// Reads a trajectory file; see `parse_trajectory`. Errors: not_found, unreadable, malformed.
-[[nodiscard]] inline result<trajectory> read_trajectory(const std::filesystem::path& path) {
-  const auto text = read_file(path);
-  if (!text) return fail(text.error());
-  return parse_trajectory(*text, path);
-}
+[[nodiscard]] result<trajectory> read_trajectory(const std::filesystem::path& path);
 
 /// Writes a trajectory file, whole or not at all: 9 decimals for the time, 9 significant digits for
 /// the rest. Errors: write_failed.
-inline result<void> write_trajectory(const std::filesystem::path& path, const trajectory& poses) {
-  std::string text = "# timestamp tx ty tz qx qy qz qw\n";
-  const auto add = [&](double value, std::chars_format format, int precision) {
-    char buffer[400];  // the largest double has 309 digits before the point
-    const auto [end, failure] = std::to_chars(buffer, buffer + sizeof buffer, value, format, precision);
-    if (failure == std::errc{}) text.append(buffer, end);
-  };
-  for (const stamped_pose& pose : poses) {
-    const vec3& t = pose.T_world_camera.translation();
-    const auto& q = pose.T_world_camera.rotation().unit_quaternion();
-    add(pose.timestamp, std::chars_format::fixed, 9);
-    for (const double value : {t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w()}) {
-      text += ' ';
-      add(value, std::chars_format::general, 9);
-    }
-    text += '\n';
-  }
-  return write_file_atomically(
-      path, [&](std::ostream& out) { out.write(text.data(), static_cast<std::streamsize>(text.size())); });
-}
+result<void> write_trajectory(const std::filesystem::path& path, const trajectory& poses);
 
 }  // namespace orbis::io
+
+#ifndef ORBIS_COMPILED
+#include <orbis/io/trajectory_file-inl.hpp>
+#endif

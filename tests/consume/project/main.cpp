@@ -6,9 +6,12 @@
 #include <orbis/cloud.hpp>
 #include <orbis/octree.hpp>
 
-#ifdef MIXED
+#ifdef WITH_IO
+#include <orbis/io/jpeg.hpp>
 #include <orbis/io/synthetic.hpp>
+#endif
 
+#ifdef MIXED
 std::size_t occupied_leaves_of_other_unit();  // other_unit.cpp
 #endif
 
@@ -24,7 +27,10 @@ int main() {
                      map.state(std::array<float, 3>{1.001F, 0.001F, 0.0F}) == orbis::octree::occupancy::occupied;
 #ifdef MIXED
   if (map.num_occupied_leaves() != occupied_leaves_of_other_unit()) return 2;
-  if (!orbis::io::synthetic_recording{{.frames = 1, .width = 32, .height = 24}}.frame(0)) return 3;
+#endif
+#ifdef WITH_IO
+  const auto frame = orbis::io::synthetic_recording{{.frames = 1, .width = 32, .height = 24}}.frame(0);
+  if (!frame || !orbis::io::encode_jpeg(frame->color.view())) return 3;
 #endif
   return right ? 0 : 1;
 }

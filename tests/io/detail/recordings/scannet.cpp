@@ -7,6 +7,7 @@
 
 #include <orbis/io/detail/recordings/scannet.hpp>
 #include <orbis/io/mono_recording.hpp>
+#include <orbis/io/png.hpp>
 #include <orbis/io/recording.hpp>
 
 #include "io/recordings.hpp"

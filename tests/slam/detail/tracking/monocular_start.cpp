@@ -8,6 +8,7 @@
 #include <orbis/camera/pinhole.hpp>
 #include <orbis/core/random.hpp>
 #include <orbis/features/orb.hpp>
+#include <orbis/io/detail/synthetic/camera_path.hpp>
 #include <orbis/io/synthetic.hpp>
 #include <orbis/optimize/triangulation.hpp>
 #include <orbis/slam/camera_rig.hpp>

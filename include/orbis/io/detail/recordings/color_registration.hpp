@@ -8,20 +8,13 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <optional>
 
 #include <orbis/camera/pinhole.hpp>
 #include <orbis/core/image.hpp>
-#include <orbis/core/se3.hpp>
 #include <orbis/core/types.hpp>
+#include <orbis/io/detail/recordings/recording_index.hpp>
 
 namespace orbis::io::detail {
-
-/// A colour camera, and where the depth camera is in its frame.
-struct color_camera {
-  camera::pinhole model;
-  se3 T_color_depth;
-};
 
 /// Averages of n x n pixels; what is left over at the right and at the bottom is dropped. @pre n >= 1
 [[nodiscard]] inline image<rgb8> reduced(image_view<const rgb8> in, int n) {
@@ -84,7 +77,7 @@ class color_registration {
   }
   /// Bilinear, at `pixel` of the image that was not reduced.
   void sample(image_view<const rgb8> from, const vec2& pixel, rgb8& to) const {
-    const vec2 at = (pixel.array() + 0.5) / shrink_ - 0.5;
+    const vec2 at((pixel.x() + 0.5) / shrink_ - 0.5, (pixel.y() + 0.5) / shrink_ - 0.5);
     const double right = from.width() - 1, bottom = from.height() - 1;
     if (!(at.x() >= -0.5 && at.y() >= -0.5 && at.x() <= right + 0.5 && at.y() <= bottom + 0.5)) return;
     const double u = std::clamp(at.x(), 0.0, right), v = std::clamp(at.y(), 0.0, bottom);

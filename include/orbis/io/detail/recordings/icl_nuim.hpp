@@ -20,6 +20,7 @@
 
 #include <orbis/camera/presets.hpp>
 #include <orbis/core/result.hpp>
+#include <orbis/io/detail/recordings/recording_folder.hpp>
 #include <orbis/io/detail/recordings/recording_index.hpp>
 #include <orbis/io/detail/recordings/tum.hpp>
 #include <orbis/io/detail/text.hpp>

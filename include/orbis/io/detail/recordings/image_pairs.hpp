@@ -20,6 +20,8 @@
 #include <orbis/core/file.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/io/camera_file.hpp>
+#include <orbis/io/detail/recordings/paired_images.hpp>
+#include <orbis/io/detail/recordings/recording_folder.hpp>
 #include <orbis/io/detail/recordings/recording_index.hpp>
 #include <orbis/io/detail/recordings/seven_scenes.hpp>
 #include <orbis/io/detail/recordings/stereo_index.hpp>

@@ -22,6 +22,7 @@
 #include <orbis/core/file.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/core/se3.hpp>
+#include <orbis/io/detail/recordings/recording_folder.hpp>
 #include <orbis/io/detail/recordings/recording_index.hpp>
 #include <orbis/io/detail/recordings/seven_scenes.hpp>
 #include <orbis/io/detail/recordings/stereo_index.hpp>

@@ -21,6 +21,7 @@
 #include <orbis/core/se3.hpp>
 #include <orbis/io/detail/recordings/asl.hpp>
 #include <orbis/io/detail/recordings/kitti.hpp>
+#include <orbis/io/detail/recordings/recording_folder.hpp>
 #include <orbis/io/detail/recordings/recording_index.hpp>
 #include <orbis/io/detail/recordings/tum.hpp>
 #include <orbis/io/detail/text.hpp>

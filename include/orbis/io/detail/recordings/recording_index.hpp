@@ -3,23 +3,23 @@
 /// What the readers of recording formats hand to `recording`: a list of frames, not yet read.
 #pragma once
 
-#include <algorithm>
-#include <cctype>
-#include <cstddef>
 #include <filesystem>
-#include <initializer_list>
-#include <map>
 #include <optional>
 #include <string>
-#include <system_error>
 #include <vector>
 
+#include <orbis/camera/pinhole.hpp>
 #include <orbis/camera/settings.hpp>
-#include <orbis/core/result.hpp>
+#include <orbis/core/se3.hpp>
 #include <orbis/core/trajectory.hpp>
-#include <orbis/io/detail/recordings/color_registration.hpp>
 
 namespace orbis::io::detail {
+
+/// A colour camera, and where the depth camera is in its frame.
+struct color_camera {
+  camera::pinhole model;
+  se3 T_color_depth;
+};
 
 /// One frame: its files and what is known about their moment.
 struct recording_entry {
@@ -38,102 +38,5 @@ struct recording_index {
   std::vector<std::string> notes;                 ///< what a user should be warned about
   std::vector<std::filesystem::path> files;       ///< that were read for this; images are not among them
 };
-
-/// Gives every frame the ground truth's pose at its time: interpolated where poses are at most 0.2 s
-/// apart, else the nearest within `max_distance` seconds.
-inline void attach_ground_truth(recording_index& index, double max_distance) {
-  std::size_t without = 0;
-  for (recording_entry& frame : index.frames) {
-    frame.T_world_camera = interpolate(index.ground_truth, frame.timestamp, 0.2, max_distance);
-    without += frame.T_world_camera ? 0U : 1U;
-  }
-  if (!index.ground_truth.empty() && without != 0)
-    index.notes.push_back(std::to_string(without) + " of " + std::to_string(index.frames.size()) +
-                          " frames lie outside the ground truth");
-}
-
-/// Fails if a frame list is empty or its first images do not exist: the list is wrong as a whole.
-/// Later images are looked for when they are read. Errors: no_data, not_found.
-inline result<void> check_first_frame(const recording_index& index, const std::filesystem::path& where) {
-  if (index.frames.empty()) return fail(errc::no_data, where.string(), "there is not one frame in this recording");
-  for (const std::filesystem::path& path : {index.frames.front().color, index.frames.front().depth}) {
-    std::error_code ignored;
-    if (!path.empty() && !std::filesystem::exists(path, ignored))
-      return fail(errc::not_found, path.string(), "the first image of the recording does not exist");
-  }
-  return {};
-}
-
-/// The regular files and folders directly in `folder`, sorted by name; empty if it cannot be read.
-[[nodiscard]] inline std::vector<std::filesystem::path> list_folder(const std::filesystem::path& folder) {
-  std::vector<std::filesystem::path> paths;
-  std::error_code failure;
-  for (std::filesystem::directory_iterator it{folder, failure}, end; !failure && it != end; it.increment(failure))
-    paths.push_back(it->path());
-  std::sort(paths.begin(), paths.end());
-  return paths;
-}
-
-/// Whether a file's name ends as an image's that we read.
-[[nodiscard]] inline bool is_image_name(const std::filesystem::path& path) {
-  std::string ending = path.extension().string();
-  for (char& c : ending) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return ending == ".png" || ending == ".jpg" || ending == ".jpeg";
-}
-
-/// Whether there is something called `path`.
-[[nodiscard]] inline bool present(const std::filesystem::path& path) {
-  std::error_code ignored;
-  return std::filesystem::exists(path, ignored);
-}
-
-/// The first of these that is in `folder`; empty if there is none.
-[[nodiscard]] inline std::filesystem::path first_present(const std::filesystem::path& folder,
-                                                         std::initializer_list<const char*> names) {
-  for (const char* const name : names)
-    if (present(folder / name)) return folder / name;
-  return {};
-}
-
-/// What is in a folder, for a message: "holds calib.txt, 120 .png files, left/". At most eight items, each a folder, a
-/// file, or all files with one ending.
-[[nodiscard]] inline std::string describe_content(const std::filesystem::path& folder) {
-  constexpr std::size_t most = 8;
-  std::vector<std::string> items;
-  std::map<std::string, std::vector<std::string>> by_ending;
-  for (const auto& path : list_folder(folder)) {
-    std::error_code ignored;
-    if (std::filesystem::is_directory(path, ignored))
-      items.push_back(path.filename().string() + "/");
-    else
-      by_ending[path.extension().string()].push_back(path.filename().string());
-  }
-  for (const auto& [ending, names] : by_ending) {
-    if (names.size() <= 3)
-      items.insert(items.end(), names.begin(), names.end());
-    else
-      items.push_back(std::to_string(names.size()) +
-                      (ending.empty() ? " files without an ending" : " " + ending + " files"));
-  }
-  if (items.empty()) return "is empty";
-  std::string text = "holds ";
-  for (std::size_t i = 0; i != std::min(items.size(), most); ++i) text += (i == 0 ? "" : ", ") + items[i];
-  if (items.size() > most) text += " and " + std::to_string(items.size() - most) + " more";
-  return text;
-}
-
-/// Whether there is a folder. Errors: not_found, unsupported (a file).
-[[nodiscard]] inline result<void> check_folder(const std::filesystem::path& folder) {
-  std::error_code ignored;
-  if (!present(folder)) return fail(errc::not_found, folder.string(), "no such folder");
-  if (!std::filesystem::is_directory(folder, ignored))
-    return fail(errc::unsupported, folder.string(), "a recording is a folder, this is a file");
-  return {};
-}
-
-/// That a folder is no recording: what was looked for, and what there is instead.
-[[nodiscard]] inline error unknown_recording(const std::filesystem::path& folder, const std::string& looked_for) {
-  return {errc::unsupported, folder.string(), looked_for + "; the folder " + describe_content(folder)};
-}
 
 }  // namespace orbis::io::detail

@@ -22,6 +22,7 @@
 #include <orbis/core/jacobi.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/core/se3.hpp>
+#include <orbis/io/detail/recordings/recording_folder.hpp>
 #include <orbis/io/detail/recordings/recording_index.hpp>
 #include <orbis/io/detail/text.hpp>
 #include <orbis/io/image.hpp>
@@ -53,10 +54,11 @@ namespace orbis::io::detail {
   if (count != 16) return fail(errc::malformed, path.string(), "a pose is a 4x4 matrix, 16 numbers");
 
   mat3 r;
-  r << m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10];
+  for (int y = 0; y != 3; ++y)
+    for (int x = 0; x != 3; ++x) r(y, x) = m[static_cast<std::size_t>(4 * y + x)];
   const bool last_row =
       std::abs(m[12]) < 1e-3 && std::abs(m[13]) < 1e-3 && std::abs(m[14]) < 1e-3 && std::abs(m[15] - 1.0) < 1e-3;
-  if (!last_row || determinant(r) < 0.0 || (transposed(r) * r - identity<mat3>()).cwiseAbs().maxCoeff() > 0.05)
+  if (!last_row || determinant(r) < 0.0 || largest_magnitude(mat3(transposed(r) * r - identity<mat3>())) > 0.05)
     return fail(errc::malformed, path.string(), "the matrix is no rigid transform");
   const auto rotation = nearest_rotation(r);
   if (!rotation) return fail(errc::malformed, path.string(), rotation.error().message);

@@ -21,6 +21,7 @@
 #include <orbis/core/file.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/core/trajectory.hpp>
+#include <orbis/io/detail/recordings/recording_folder.hpp>
 #include <orbis/io/detail/recordings/recording_index.hpp>
 #include <orbis/io/detail/text.hpp>
 #include <orbis/io/trajectory_file.hpp>

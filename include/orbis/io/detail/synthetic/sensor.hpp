@@ -13,6 +13,7 @@
 #include <orbis/core/image.hpp>
 #include <orbis/core/random.hpp>
 #include <orbis/io/detail/synthetic/arithmetic.hpp>
+#include <orbis/io/detail/synthetic/exact_view.hpp>
 #include <orbis/io/synthetic_options.hpp>
 
 ORBIS_BEGIN_UNFUSED
@@ -28,14 +29,6 @@ namespace orbis::io::detail::synthetic {
   const auto level = static_cast<std::uint64_t>(floor_of(0.8 * time));
   return 1.0 + options.exposure_jumps * (2.0 * upper_fraction(noise_word(seed, 0x65787073ULL, level)) - 1.0);
 }
-
-/// The exact picture of a moment: for each pixel the depth (metres) and the cosine of the angle
-/// between ray and surface normal.
-struct exact_view {
-  image<rgb8> color;
-  image<float> depth;
-  image<float> cosine;
-};
 
 /// Applies the errors of one frame, row by row; rows do not depend on each other's results.
 class sensor {

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The functions of stereo_recording.hpp: inline, or, with ORBIS_COMPILED_IO, compiled once, by
-/// cmake/compiled_io/stereo_recording.cpp.
+/// The functions of stereo_recording.hpp.
 #pragma once
 
 #include <cassert>
@@ -17,12 +16,13 @@
 #include <orbis/camera/settings.hpp>
 #include <orbis/camera/stereo.hpp>
 #include <orbis/camera/stereo_frame.hpp>
+#include <orbis/core/inline.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/core/trajectory.hpp>
-#include <orbis/io/detail/compiled_once.hpp>
 #include <orbis/io/detail/recordings/asl.hpp>
 #include <orbis/io/detail/recordings/image_pairs.hpp>
 #include <orbis/io/detail/recordings/kitti.hpp>
+#include <orbis/io/detail/recordings/recording_folder.hpp>
 #include <orbis/io/detail/recordings/sized_image.hpp>
 #include <orbis/io/detail/recordings/stereo_index.hpp>
 #include <orbis/io/image.hpp>
@@ -30,8 +30,8 @@
 
 namespace orbis::io {
 
-ORBIS_COMPILED_IO_ONCE stereo_recording::stereo_recording(detail::stereo_index index, camera::rectification straight,
-                                                          stereo_format format)
+ORBIS_INLINE stereo_recording::stereo_recording(detail::stereo_index index, camera::rectification straight,
+                                                stereo_format format)
     : index_{std::move(index)}, straight_{std::move(straight)}, format_{format} {
   assert(!index_.images.frames.empty());
   const so3& turn = straight_.R_left_rectified();
@@ -42,13 +42,13 @@ ORBIS_COMPILED_IO_ONCE stereo_recording::stereo_recording(detail::stereo_index i
     if (f.T_world_camera) f.T_world_camera = turned(*f.T_world_camera);
 }
 
-ORBIS_COMPILED_IO_ONCE std::vector<std::filesystem::path> stereo_recording::files() const {
+ORBIS_INLINE std::vector<std::filesystem::path> stereo_recording::files() const {
   std::vector<std::filesystem::path> all = index_.images.files;
   for (const auto& entry : index_.images.frames) all.insert(all.end(), {entry.color, entry.depth});
   return all;
 }
 
-ORBIS_COMPILED_IO_ONCE result<camera::stereo_frame> stereo_recording::frame(std::size_t i) const {
+ORBIS_INLINE result<camera::stereo_frame> stereo_recording::frame(std::size_t i) const {
   auto a = left(i);
   if (!a) return fail(a.error());
   const auto& entry = index_.images.frames[i];
@@ -58,27 +58,27 @@ ORBIS_COMPILED_IO_ONCE result<camera::stereo_frame> stereo_recording::frame(std:
   return camera::stereo_frame{entry.timestamp, *std::move(a), *std::move(b), entry.T_world_camera};
 }
 
-ORBIS_COMPILED_IO_ONCE result<image<rgb8>> stereo_recording::left(std::size_t i) const {
+ORBIS_INLINE result<image<rgb8>> stereo_recording::left(std::size_t i) const {
   assert(i < size());
   auto a = read(index_.images.frames[i].color, index_.cameras.left);
   if (a && !straight_.is_identity()) a = straight_.left().bilinear(a->view());
   return a;
 }
 
-ORBIS_COMPILED_IO_ONCE result<image<rgb8>> stereo_recording::read(const std::filesystem::path& path,
-                                                                  const camera::any_camera& camera) {
+ORBIS_INLINE result<image<rgb8>> stereo_recording::read(const std::filesystem::path& path,
+                                                        const camera::any_camera& camera) {
   return detail::sized(read_color(path), path, camera.width(), camera.height());
 }
 
-ORBIS_COMPILED_IO_ONCE stereo_format detect_stereo_format(const std::filesystem::path& folder) {
+ORBIS_INLINE stereo_format detect_stereo_format(const std::filesystem::path& folder) {
   if (detail::is_asl(folder)) return stereo_format::asl;
   if (detail::is_kitti(folder)) return stereo_format::kitti;
   if (detail::is_image_pairs(folder)) return stereo_format::pairs;
   return stereo_format::automatic;
 }
 
-ORBIS_COMPILED_IO_ONCE result<stereo_recording> open_stereo_recording(const std::filesystem::path& folder,
-                                                                      const stereo_recording_options& options) {
+ORBIS_INLINE result<stereo_recording> open_stereo_recording(const std::filesystem::path& folder,
+                                                            const stereo_recording_options& options) {
   if (const auto is_folder = detail::check_folder(folder); !is_folder) return fail(is_folder.error());
   const stereo_format format =
       options.format == stereo_format::automatic ? detect_stereo_format(folder) : options.format;

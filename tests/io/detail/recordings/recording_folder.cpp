@@ -2,10 +2,10 @@
 #include <string>
 #include <vector>
 
-#include <orbis/io/detail/recordings/recording_index.hpp>
+#include <orbis/io/detail/recordings/recording_folder.hpp>
 
-#include "support/temporary_folder.hpp"
 #include "support/catch.hpp"
+#include "support/temporary_folder.hpp"
 
 namespace io = orbis::io;
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The functions of mono_recording.hpp: inline, or, with ORBIS_COMPILED_IO, compiled once, by
-/// cmake/compiled_io/mono_recording.cpp.
+/// The functions of mono_recording.hpp.
 #pragma once
 
 #include <cassert>
@@ -16,11 +15,12 @@
 
 #include <orbis/camera/mono_frame.hpp>
 #include <orbis/camera/settings.hpp>
+#include <orbis/core/inline.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/core/trajectory.hpp>
 #include <orbis/io/camera_file.hpp>
-#include <orbis/io/detail/compiled_once.hpp>
 #include <orbis/io/detail/recordings/one_camera.hpp>
+#include <orbis/io/detail/recordings/recording_folder.hpp>
 #include <orbis/io/detail/recordings/recording_index.hpp>
 #include <orbis/io/detail/recordings/sized_image.hpp>
 #include <orbis/io/image.hpp>
@@ -29,26 +29,32 @@
 
 namespace orbis::io {
 
-ORBIS_COMPILED_IO_ONCE std::vector<std::filesystem::path> mono_recording::files() const {
+ORBIS_INLINE mono_recording::mono_recording(detail::recording_index index, camera::camera_settings camera,
+                                            mono_format format)
+    : index_{std::move(index)}, camera_{std::move(camera)}, format_{format} {
+  assert(!index_.frames.empty());
+}
+
+ORBIS_INLINE std::vector<std::filesystem::path> mono_recording::files() const {
   std::vector<std::filesystem::path> all = index_.files;
   for (const detail::recording_entry& entry : index_.frames) all.push_back(entry.color);
   return all;
 }
 
-ORBIS_COMPILED_IO_ONCE result<camera::mono_frame> mono_recording::frame(std::size_t i) const {
+ORBIS_INLINE result<camera::mono_frame> mono_recording::frame(std::size_t i) const {
   auto image = color(i);
   if (!image) return fail(image.error());
   const detail::recording_entry& entry = index_.frames[i];
   return camera::mono_frame{entry.timestamp, *std::move(image), entry.T_world_camera};
 }
 
-ORBIS_COMPILED_IO_ONCE result<image<rgb8>> mono_recording::color(std::size_t i) const {
+ORBIS_INLINE result<image<rgb8>> mono_recording::color(std::size_t i) const {
   assert(i < size());
   const std::filesystem::path& file = index_.frames[i].color;
   return detail::sized(read_color(file), file, camera_.model.width(), camera_.model.height());
 }
 
-ORBIS_COMPILED_IO_ONCE mono_format detect_mono_format(const std::filesystem::path& folder) {
+ORBIS_INLINE mono_format detect_mono_format(const std::filesystem::path& folder) {
   if (!detail::asl_camera_folder(folder).empty()) return mono_format::asl;
   if (detail::is_kitti_camera(folder)) return mono_format::kitti;
   if (!detail::image_list_of(folder).empty()) return mono_format::tum;
@@ -57,8 +63,8 @@ ORBIS_COMPILED_IO_ONCE mono_format detect_mono_format(const std::filesystem::pat
   return mono_format::automatic;
 }
 
-ORBIS_COMPILED_IO_ONCE result<mono_recording> open_mono_recording(const std::filesystem::path& folder,
-                                                                  const mono_recording_options& options) {
+ORBIS_INLINE result<mono_recording> open_mono_recording(const std::filesystem::path& folder,
+                                                        const mono_recording_options& options) {
   if (const auto is_folder = detail::check_folder(folder); !is_folder) return fail(is_folder.error());
   std::optional<camera::camera_settings> camera = options.camera;
   std::optional<std::filesystem::path> camera_file;

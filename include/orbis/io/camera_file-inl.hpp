@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The functions of camera_file.hpp: inline, or, with ORBIS_COMPILED_IO, compiled once, by
-/// cmake/compiled_io/camera_file.cpp.
+/// The functions of camera_file.hpp.
 #pragma once
 
 #include <algorithm>
@@ -23,16 +22,15 @@
 #include <orbis/camera/radial_tangential.hpp>
 #include <orbis/camera/settings.hpp>
 #include <orbis/core/file.hpp>
+#include <orbis/core/inline.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/io/camera_file.hpp>
-#include <orbis/io/detail/compiled_once.hpp>
 #include <orbis/io/detail/files/camera_fields.hpp>
 #include <orbis/io/toml.hpp>
 
 namespace orbis::io {
 
-ORBIS_COMPILED_IO_ONCE result<camera::camera_settings> parse_camera(std::string_view text,
-                                                                    const std::filesystem::path& where) {
+ORBIS_INLINE result<camera::camera_settings> parse_camera(std::string_view text, const std::filesystem::path& where) {
   const auto parsed = parse_toml(text, where);
   if (!parsed) return fail(parsed.error());
   const toml::table& table = *parsed;
@@ -85,14 +83,13 @@ ORBIS_COMPILED_IO_ONCE result<camera::camera_settings> parse_camera(std::string_
   return settings;
 }
 
-ORBIS_COMPILED_IO_ONCE result<camera::camera_settings> read_camera(const std::filesystem::path& path) {
+ORBIS_INLINE result<camera::camera_settings> read_camera(const std::filesystem::path& path) {
   const auto text = read_file(path, max_toml_bytes);
   if (!text) return fail(text.error());
   return parse_camera(*text, path);
 }
 
-ORBIS_COMPILED_IO_ONCE result<void> write_camera(const std::filesystem::path& path,
-                                                 const camera::camera_settings& settings) {
+ORBIS_INLINE result<void> write_camera(const std::filesystem::path& path, const camera::camera_settings& settings) {
   const auto number = [](double value) {
     char buffer[40];
     std::string text(buffer, std::to_chars(buffer, buffer + sizeof buffer, value).ptr);

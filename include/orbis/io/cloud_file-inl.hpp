@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// The functions of cloud_file.hpp.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include <orbis/core/file.hpp>
+#include <orbis/core/inline.hpp>
+#include <orbis/core/point_cloud.hpp>
+#include <orbis/core/result.hpp>
+#include <orbis/core/types.hpp>
+#include <orbis/io/cloud_file.hpp>
+#include <orbis/io/pcd.hpp>
+#include <orbis/io/ply.hpp>
+
+namespace orbis::io {
+
+ORBIS_INLINE result<point_cloud> read_cloud(const std::filesystem::path& path, const vec3& origin) {
+  const auto bytes = read_file(path);
+  if (!bytes) return fail(bytes.error());
+  const std::string_view start = std::string_view{*bytes}.substr(0, 256);
+  if (start.starts_with("ply\n") || start.starts_with("ply\r") || path.extension() == ".ply")
+    return parse_ply(*bytes, path.string(), origin);
+  if (path.extension() == ".pcd" || start.starts_with("# .PCD") || start.starts_with("VERSION ")) {
+    auto organized = parse_pcd(*bytes, path.string(), origin);
+    if (!organized) return fail(organized.error());
+    return std::move(organized->cloud);
+  }
+  return fail(errc::unsupported, path.string(), "is neither a PLY nor a PCD file");
+}
+
+}  // namespace orbis::io

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// The functions of jpeg.hpp.
+#pragma once
+
+#include <cassert>
+#include <string>
+#include <string_view>
+
+#include <orbis/core/image.hpp>
+#include <orbis/core/inline.hpp>
+#include <orbis/core/result.hpp>
+#include <orbis/io/detail/files/jpeg_codec.hpp>
+#include <orbis/io/jpeg.hpp>
+
+namespace orbis::io {
+
+ORBIS_INLINE result<image<rgb8>> decode_jpeg(std::string_view bytes, const std::string& where) {
+  detail::jpeg_decoder decoder{bytes};
+  if (!decoder.read_header()) return fail(errc::malformed, where, "damaged JPEG: " + decoder.message());
+  image<rgb8> pixels(decoder.width(), decoder.height());
+  if (!decoder.read_pixels(pixels.data())) return fail(errc::malformed, where, "damaged JPEG: " + decoder.message());
+  return pixels;
+}
+
+ORBIS_INLINE result<std::string> encode_jpeg(image_view<const rgb8> pixels, int quality) {
+  assert(1 <= quality && quality <= 100);
+  if (pixels.empty()) return fail(errc::invalid_argument, {}, "a JPEG without pixels");
+  detail::jpeg_encoder encoder;
+  if (encoder.write(pixels, quality)) return encoder.take();
+  if (encoder.out_of_memory()) return fail(errc::exception, {}, "no memory");
+  return fail(errc::invalid_argument, {}, "no JPEG: " + encoder.message());
+}
+
+}  // namespace orbis::io

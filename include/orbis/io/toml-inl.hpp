@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// The functions of toml.hpp.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <filesystem>
+#include <string>
+#include <string_view>
+
+#include <toml++/toml.h>
+
+#include <orbis/core/file.hpp>
+#include <orbis/core/inline.hpp>
+#include <orbis/core/result.hpp>
+#include <orbis/core/utf8.hpp>
+#include <orbis/io/toml.hpp>
+
+namespace orbis::io {
+
+namespace detail {
+
+/// Whether each line that begins as the head of a table has a key in it: toml++ 3.3 takes that for granted.
+[[nodiscard]] inline bool has_keys_in_heads(std::string_view text) noexcept {
+  const auto skip_blanks = [](std::string_view& line) {
+    line.remove_prefix(std::min(line.find_first_not_of(" \t"), line.size()));
+  };
+  if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
+  while (!text.empty()) {
+    std::string_view line = text.substr(0, text.find('\n'));
+    text.remove_prefix(std::min(line.size() + 1, text.size()));
+    skip_blanks(line);
+    if (!line.starts_with('[')) continue;
+    for (int brackets = 0; brackets != 2 && line.starts_with('['); ++brackets) {
+      line.remove_prefix(1);
+      skip_blanks(line);
+    }
+    if (line.empty()) return false;
+    const char c = line.front();
+    const bool begins_key = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+                            std::string_view{"_-\"'"}.find(c) != std::string_view::npos;
+    if (!begins_key) return false;
+  }
+  return true;
+}
+
+/// Whether all is ASCII that stands beside strings and comments, as TOML wants it: toml++ 3.3 asks of some other
+/// characters whether they are blanks, and does not know.
+[[nodiscard]] inline bool is_ascii_beside_texts(std::string_view text) noexcept {
+  if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
+  for (std::size_t i = 0; i < text.size();) {
+    const char c = text[i];
+    if (static_cast<unsigned char>(c) >= 0x80) return false;
+    if (c == '#') {
+      i = std::min(text.find_first_of("\n\v\f\r", i), text.size());
+      continue;
+    }
+    if (c != '"' && c != '\'') {
+      ++i;
+      continue;
+    }
+    const std::string_view three = c == '"' ? "\"\"\"" : "'''";
+    const bool has_lines = text.substr(i).starts_with(three);
+    for (i += has_lines ? 3 : 1; i < text.size(); ++i) {
+      if (c == '"' && text[i] == '\\') {
+        ++i;  // whatever it is
+      } else if (!has_lines && text[i] == '\n') {
+        break;  // an error, where toml++ ends
+      } else if (text[i] == c && (!has_lines || text.substr(i).starts_with(three))) {
+        i += has_lines ? 3 : 1;
+        for (int more = 0; has_lines && more != 2 && i < text.size() && text[i] == c; ++more) ++i;  // of the string
+        break;
+      }
+    }
+  }
+  return true;
+}
+
+}  // namespace detail
+
+ORBIS_INLINE result<toml::table> parse_toml(std::string_view text, const std::filesystem::path& where) {
+  const auto reject = [&](const char* why) { return fail(errc::malformed, where.string(), why); };
+  if (text.size() > max_toml_bytes) return reject("is too large for a file of settings");
+  if (!is_utf8(text)) return reject("not TOML: no UTF-8");
+  if (!detail::has_keys_in_heads(text)) return reject("not TOML: a table without a name");
+  if (!detail::is_ascii_beside_texts(text)) return reject("not TOML: letters beyond ASCII want quotes");
+  try {
+    return toml::parse(text, std::string_view{});
+  } catch (const toml::parse_error& e) {
+    return fail(errc::malformed, where.string() + ":" + std::to_string(e.source().begin.line),
+                "not TOML: " + std::string{e.description()});
+  }
+}
+
+ORBIS_INLINE result<toml::table> read_toml(const std::filesystem::path& path) {
+  const auto text = read_file(path, max_toml_bytes);
+  if (!text) return fail(text.error());
+  return parse_toml(*text, path);
+}
+
+}  // namespace orbis::io
