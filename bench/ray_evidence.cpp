@@ -16,7 +16,7 @@
 
 #include <orbis/camera/cloud.hpp>
 #include <orbis/camera/radial_tangential.hpp>
-#include <orbis/cloud/ray_evidence.hpp>
+#include <orbis/cloud/ray_evidence-inl.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/random.hpp>
 

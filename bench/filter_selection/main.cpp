@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include <orbis/cloud/select.hpp>
+#include <orbis/cloud/select-inl.hpp>
 
 #include "heat_map.hpp"
 #include "scores.hpp"

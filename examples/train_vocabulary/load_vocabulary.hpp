@@ -12,7 +12,7 @@
 
 #include <orbis/core/result.hpp>
 #include <orbis/places/vocabulary.hpp>
-#include <orbis/places/vocabulary_file.hpp>
+#include <orbis/places/vocabulary_file-inl.hpp>
 
 #include "dbow_text.hpp"
 #include "dbow_yaml.hpp"

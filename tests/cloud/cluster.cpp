@@ -73,8 +73,9 @@ std::vector<std::uint32_t> reference_components(const points& cloud, const clust
 cluster_result separated(const points& cloud, const std::vector<char>& gone, const std::vector<float>& spacing,
                          const cluster_options& options = {}) {
   namespace detail = orbis::cloud::detail;
-  const detail::neighbor_graph graph{orbis::par, detail::make_leaves(orbis::par, cloud, options.neighbors + 1),
-                                     cloud.size(), options.neighbors};
+  const detail::neighbor_graph graph{
+      orbis::par, detail::make_leaves(orbis::par, orbis::cloud::detail::viewed_points{cloud}, options.neighbors + 1),
+      cloud.size(), options.neighbors};
   std::vector<float> spacings = graph.mean_distance(orbis::par, options.neighbors);
   std::vector<char> left_out(graph.size(), 0);
   const std::vector<std::uint32_t> place = graph.places(cloud.size());

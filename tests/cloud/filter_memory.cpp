@@ -7,6 +7,7 @@
 
 #include <orbis/cloud/cluster.hpp>
 #include <orbis/cloud/detail/knn/leaf_hierarchy.hpp>
+#include <orbis/cloud/detail/point_view.hpp>
 #include <orbis/cloud/log_statistical.hpp>
 #include <orbis/cloud/select.hpp>
 #include <orbis/cloud/statistical.hpp>
@@ -42,7 +43,9 @@ TEST_CASE("filters hold no list of the neighbours of all points") {
   for (const auto& p : cloud) ranges.push_back(p.norm());
   const auto policy = orbis::par.with(2);
   const std::size_t n = cloud.size();
-  CHECK(bytes_per_point(n, [&] { return orbis::cloud::detail::make_leaves(policy, cloud, 51); }) < 18.5);
+  CHECK(bytes_per_point(n, [&] {
+          return orbis::cloud::detail::make_leaves(policy, orbis::cloud::detail::viewed_points{cloud}, 51);
+        }) < 18.5);
   // Twelve neighbours as a table are 96 bytes.
   CHECK(bytes_per_point(n, [&] { return orbis::cloud::filter_automatically(policy, cloud, {.ranges = ranges}); }) <
         75.0);

@@ -12,7 +12,7 @@
 #include <orbis/camera/kannala_brandt.hpp>
 #include <orbis/camera/pinhole.hpp>
 #include <orbis/camera/radial_tangential.hpp>
-#include <orbis/cloud/ray_evidence.hpp>
+#include <orbis/cloud/ray_evidence-inl.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/random.hpp>
 

@@ -9,7 +9,7 @@
 #include <orbis/camera/any.hpp>
 #include <orbis/cloud/log_statistical.hpp>
 #include <orbis/cloud/radius.hpp>
-#include <orbis/cloud/select.hpp>
+#include <orbis/cloud/select-inl.hpp>
 #include <orbis/cloud/statistical.hpp>
 #include <orbis/cloud/view_samples.hpp>
 #include <orbis/cloud/voxel_grid.hpp>

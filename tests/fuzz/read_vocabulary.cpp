@@ -11,7 +11,7 @@
 #include <vector>
 
 #include <orbis/core/bytes.hpp>
-#include <orbis/places/vocabulary_file.hpp>
+#include <orbis/places/vocabulary_file-inl.hpp>
 
 #include "fuzz/target.hpp"
 #include "train_vocabulary/dbow_text.hpp"

@@ -12,7 +12,7 @@
 #include <orbis/interop/octomap.hpp>
 #include <orbis/nav/detail/map_queries.hpp>
 #include <orbis/nav/distance_field.hpp>
-#include <orbis/nav/floor_map.hpp>
+#include <orbis/nav/floor_map-inl.hpp>
 #include <orbis/nav/frontiers.hpp>
 #include <orbis/nav/next_view.hpp>
 #include <orbis/nav/path_search.hpp>

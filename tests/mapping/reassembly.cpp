@@ -8,7 +8,7 @@
 #include <vector>
 
 #include <orbis/cloud/detail/voxels/voxel_hash.hpp>
-#include <orbis/cloud/ray_evidence.hpp>
+#include <orbis/cloud/ray_evidence-inl.hpp>
 #include <orbis/io/recording.hpp>
 #include <orbis/io/synthetic.hpp>
 #include <orbis/mapping/dense_cloud.hpp>

@@ -10,8 +10,8 @@
 
 #include <orbis/core/execution.hpp>
 #include <orbis/core/random.hpp>
-#include <orbis/places/train.hpp>
-#include <orbis/places/vocabulary.hpp>
+#include <orbis/places/train-inl.hpp>
+#include <orbis/places/vocabulary-inl.hpp>
 
 namespace orbis::test {
 

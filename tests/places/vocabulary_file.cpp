@@ -10,11 +10,11 @@
 #include <orbis/core/bytes.hpp>
 #include <orbis/core/file.hpp>
 #include <orbis/core/random.hpp>
-#include <orbis/places/vocabulary_file.hpp>
+#include <orbis/places/vocabulary_file-inl.hpp>
 
-#include "support/temporary_folder.hpp"
 #include "places/images.hpp"
 #include "support/catch.hpp"
+#include "support/temporary_folder.hpp"
 
 using namespace orbis;
 using namespace orbis::places;

@@ -9,18 +9,16 @@
 /// JASA 88, 1993; taken from the lower half, which outliers do not reach.
 #pragma once
 
-#include <algorithm>
 #include <cassert>
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <optional>
-#include <utility>
 #include <vector>
 
-#include <orbis/cloud/all_knn.hpp>
-#include <orbis/cloud/detail/select/decision.hpp>
+#include <orbis/cloud/detail/point_view.hpp>
+#include <orbis/cloud/detail/threads_of.hpp>
+#include <orbis/cloud/extract.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/point.hpp>
 
@@ -47,46 +45,24 @@ struct log_statistical_result {
 
 /// Decides on mean distances that are known already: see `log_statistical_inliers`. Points that have none
 /// (NaN) are kept or dropped as `non_finite` says. O(n).
-[[nodiscard]] inline log_statistical_result log_statistical_decision(std::vector<float> mean_distance,
-                                                                     const log_statistical_options& options = {}) {
-  log_statistical_result out;
-  std::vector<float> values;
-  values.reserve(mean_distance.size());
-  for (const float d : mean_distance) {
-    if (d > 0 && std::isfinite(d)) values.push_back(d);
-  }
-  out.judged = values.size();
-  out.threshold = options.threshold;
-  if (!values.empty()) {
-    // Order is kept by the logarithm: only two values need theirs.
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>((values.size() - 1) / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    out.median = std::log(double{*middle});
-    // The median of the distances to it of those below it, and itself, lies at their own median.
-    const auto quarter = values.begin() + (middle - values.begin()) / 2;
-    std::nth_element(values.begin(), quarter, middle + 1);
-    out.scale = std::max(1.4826 * (out.median - std::log(double{*quarter})), options.least_scale);
-    if (options.sigmas.has_value()) out.threshold = *options.sigmas * out.scale;
-    out.threshold_distance = std::exp(out.median + out.threshold);
-  }
-  out.inliers = detail::indices_where(mean_distance.size(), [&](std::size_t i) {
-    const float d = mean_distance[i];
-    return std::isnan(d) ? options.non_finite == non_finite::keep : !(double{d} > out.threshold_distance);
-  });
-  out.mean_distance = std::move(mean_distance);
-  return out;
-}
+[[nodiscard]] log_statistical_result log_statistical_decision(std::vector<float> mean_distance,
+                                                              const log_statistical_options& options = {});
+
+namespace detail {
+
+/// `log_statistical_filter` for any points.
+template <execution_policy Policy>
+[[nodiscard]] log_statistical_result filter_by_logarithm(const Policy& policy, const point_view& points,
+                                                         const log_statistical_options& options);
+
+}  // namespace detail
 
 /// Finds the points that `log_statistical_inliers` returns, their scores and the threshold.
 template <execution_policy Policy, point_range Points>
 [[nodiscard]] log_statistical_result log_statistical_filter(const Policy& policy, const Points& points,
                                                             const log_statistical_options& options = {}) {
   assert(options.neighbors > 0);
-  log_statistical_result out =
-      log_statistical_decision(all_mean_knn_distance(policy, points, options.neighbors), options);
-  out.inliers = detail::inliers_by_score(points, out.mean_distance, options.non_finite,
-                                         [&](float d) { return double{d} > out.threshold_distance; });
-  return out;
+  return detail::filter_by_logarithm(detail::threads_of(policy), detail::viewed_points{points}, options);
 }
 
 /// The indices, ascending, of the points whose mean distance to their `neighbors` nearest neighbours is
@@ -101,3 +77,7 @@ template <execution_policy Policy, point_range Points>
 }
 
 }  // namespace orbis::cloud
+
+#ifndef ORBIS_COMPILED
+#include <orbis/cloud/log_statistical-inl.hpp>
+#endif

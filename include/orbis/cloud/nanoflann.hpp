@@ -18,7 +18,7 @@
 #include <nanoflann.hpp>
 
 #include <orbis/cloud/detail/knn/squared_distance.hpp>
-#include <orbis/cloud/detail/select/decision.hpp>
+#include <orbis/cloud/detail/point_view.hpp>
 #include <orbis/cloud/neighbors.hpp>
 #include <orbis/core/point.hpp>
 

@@ -7,35 +7,20 @@
 /// measurement says that there is a surface where it ends, and nothing before that. The same idea
 /// carves space in occupancy grids (A. Elfes, 1989) and checks multi-view stereo for violations of
 /// free space (P. Merrell et al., "Real-time visibility-based fusion of depth maps", ICCV 2007).
+///
+/// Users of orbis::compiled who call `ray_evidence_scores` or `ray_evidence_inliers` include ray_evidence-inl.hpp.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
-#include <ranges>
-#include <utility>
 #include <vector>
 
 #include <orbis/camera/model.hpp>
-#include <orbis/cloud/detail/select/decision.hpp>
 #include <orbis/cloud/ray_evidence_counter.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/point.hpp>
 
 namespace orbis::cloud {
-
-namespace detail {
-
-/// `f` with the camera, of the kind that it is where that is known at run time.
-template <camera::camera_model Camera, class F>
-decltype(auto) with_model(const Camera& camera, F&& f) {
-  if constexpr (requires { camera.visit([](const auto&) {}); }) {
-    return camera.visit(f);
-  } else {
-    return f(camera);
-  }
-}
-
-}  // namespace detail
 
 /// How many views pass through each point, and how many support it.
 ///
@@ -59,24 +44,7 @@ template <execution_policy Policy, point_range Points, posed_depth_range Views, 
 [[nodiscard]] std::vector<ray_evidence> ray_evidence_scores(const Policy& policy, const Points& points,
                                                             const Views& views, const Camera& camera,
                                                             const ray_evidence_options& options = {},
-                                                            progress on_progress = {}) {
-  return detail::with_model(camera, [&](const auto& model) {
-    ray_evidence_counter counter{policy, points, model, options};
-    std::size_t done = 0;
-    const std::size_t total = (options.resolve_ghosts ? 2 : 1) * std::ranges::size(views);
-    for (const auto& view : views) {
-      counter.add(policy, view);
-      if (!on_progress(++done, total)) return counter.scores();
-    }
-    if (options.resolve_ghosts) {
-      for (const auto& view : views) {
-        counter.review(policy, view);
-        if (!on_progress(++done, total)) break;
-      }
-    }
-    return counter.scores();
-  });
-}
+                                                            progress on_progress = {});
 
 /// The filter's decision, and what it is based on.
 struct ray_evidence_result {
@@ -92,16 +60,8 @@ struct ray_evidence_result {
 }
 
 /// Decides on counts that are known already. Points without any are inliers. O(n).
-[[nodiscard]] inline ray_evidence_result ray_evidence_decision(std::vector<ray_evidence> scores,
-                                                               const ray_evidence_options& options = {}) {
-  ray_evidence_result out;
-  for (std::size_t i = 0; i != scores.size(); ++i) {
-    if (!is_passed_through(scores[i], options)) out.inliers.push_back(static_cast<std::uint32_t>(i));
-    out.seen += scores[i].through != 0 || scores[i].supported != 0 ? 1 : 0;
-  }
-  out.scores = std::move(scores);
-  return out;
-}
+[[nodiscard]] ray_evidence_result ray_evidence_decision(std::vector<ray_evidence> scores,
+                                                        const ray_evidence_options& options = {});
 
 /// The indices, ascending, of the finite points that rays do not pass through: see
 /// `ray_evidence_scores`, also for `on_progress`.
@@ -109,12 +69,10 @@ template <execution_policy Policy, point_range Points, posed_depth_range Views, 
 [[nodiscard]] std::vector<std::uint32_t> ray_evidence_inliers(const Policy& policy, const Points& points,
                                                               const Views& views, const Camera& camera,
                                                               const ray_evidence_options& options = {},
-                                                              progress on_progress = {}) {
-  auto decided =
-      ray_evidence_decision(ray_evidence_scores(policy, points, views, camera, options, on_progress), options);
-  std::erase_if(decided.inliers,
-                [&](std::uint32_t i) { return !is_finite(coordinates<float>(detail::point_at(points, i))); });
-  return std::move(decided.inliers);
-}
+                                                              progress on_progress = {});
 
 }  // namespace orbis::cloud
+
+#ifndef ORBIS_COMPILED
+#include <orbis/cloud/ray_evidence-inl.hpp>
+#endif

@@ -13,35 +13,24 @@
 /// 3. *Connection*: groups of a few points with nothing around, and small clusters far from the surface.
 ///
 /// Every step is part of the chosen chain only if it removes something.
+///
+/// The library orbis::compiled holds what judges points alone; who gives views includes select-inl.hpp.
 #pragma once
 
-#include <algorithm>
-#include <array>
 #include <cassert>
-#include <cmath>
-#include <cstddef>
 #include <cstdint>
-#include <optional>
 #include <ranges>
 #include <span>
 #include <string>
-#include <type_traits>
-#include <utility>
-#include <variant>
 #include <vector>
 
 #include <orbis/camera/model.hpp>
-#include <orbis/cloud/detail/select/decision.hpp>
-#include <orbis/cloud/detail/select/density_judge.hpp>
-#include <orbis/cloud/detail/select/in_words.hpp>
-#include <orbis/cloud/detail/select/surroundings.hpp>
-#include <orbis/cloud/detail/select/view_judge.hpp>
+#include <orbis/cloud/detail/point_view.hpp>
+#include <orbis/cloud/detail/threads_of.hpp>
 #include <orbis/cloud/filter_chain.hpp>
 #include <orbis/cloud/filter_choice.hpp>
-#include <orbis/cloud/radius.hpp>
-#include <orbis/cloud/ray_evidence.hpp>
+#include <orbis/cloud/ray_evidence_counter.hpp>
 #include <orbis/cloud/sensor_origins.hpp>
-#include <orbis/cloud/statistical.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/point.hpp>
 
@@ -55,20 +44,31 @@ struct automatic_result {
 
 namespace detail {
 
-/// What `judge` and `apply_chain` ask about views where there are none.
-struct without_views {
-  [[nodiscard]] bool operator()(std::span<char>, filter_choice&, std::vector<std::string>&) const noexcept {
-    return true;
-  }
-  void operator()(const ray_step&, std::span<char>) const noexcept { assert(false && "a ray_step needs views"); }
+/// What a choice asks about views. False: cancelled.
+struct view_judge {
+  const void* context = nullptr;
+  /// Clears what is left where the views exclude a point, and adds a step and its reason; null without views.
+  bool (*run)(const void* context, std::span<char> left, filter_choice& choice,
+              std::vector<std::string>& reasons) = nullptr;
 };
 
-template <point_range Points>
-[[nodiscard]] std::vector<char> finite_points(const Points& points) {
-  std::vector<char> out(std::ranges::size(points));
-  for (std::size_t i = 0; i != out.size(); ++i) out[i] = is_finite(coordinates<float>(point_at(points, i))) ? 1 : 0;
-  return out;
-}
+/// How a `ray_step` is applied.
+struct view_filter {
+  const void* context = nullptr;
+  /// Clears what is left where the views exclude a point; null without views.
+  void (*run)(const void* context, const ray_step& step, std::span<char> left) = nullptr;
+};
+
+/// `filter_automatically` for any points and views. `ranges`: of each point, or empty where none is known.
+template <execution_policy Policy>
+[[nodiscard]] automatic_result choose_and_filter(const Policy& policy, const point_view& points,
+                                                 std::span<const float> ranges, const select_options& options,
+                                                 const view_judge& views);
+/// `apply_filter` for any points and views.
+template <execution_policy Policy>
+[[nodiscard]] std::vector<std::uint32_t> apply_chain(const Policy& policy, const point_view& points,
+                                                     std::span<const float> ranges, const filter_chain& chain,
+                                                     const select_options& options, const view_filter& views);
 
 /// The ranges that are given, or those from the sensor's origin; empty where neither is known.
 struct known_ranges {
@@ -77,6 +77,7 @@ struct known_ranges {
 
   template <execution_policy Policy, point_range Points>
   known_ranges(const Policy& policy, const Points& points, const select_options& options) : all{options.ranges} {
+    assert(all.empty() || all.size() == std::ranges::size(points));
     if (!all.empty() || (!options.sensor_origin && !stated_sensor_origin(points))) return;
     own = sensor_ranges(policy, points, {.common = options.sensor_origin});
     all = own;
@@ -84,130 +85,6 @@ struct known_ranges {
   known_ranges(const known_ranges&) = delete;
   known_ranges& operator=(const known_ranges&) = delete;
 };
-
-/// Points left, and with `non_finite::keep` those that are not finite.
-template <point_range Points>
-[[nodiscard]] std::vector<std::uint32_t> kept_points(const Points& points, std::span<const char> left,
-                                                     const select_options& options) {
-  return indices_where(left.size(), [&](std::size_t i) {
-    return left[i] != 0 ||
-           (options.non_finite == non_finite::keep && !is_finite(coordinates<float>(point_at(points, i))));
-  });
-}
-
-inline void remove_gone(const surroundings& around, std::span<char> left) {
-  for (std::size_t i = 0; i != around.size(); ++i) {
-    if (around.gone()[i] != 0) left[around.index(i)] = 0;
-  }
-}
-
-/// Runs a filter of its own on what is left, and clears `left` where it removes a point.
-template <point_range Points, class Filter>
-void apply_alone(const Points& points, std::span<char> left, Filter&& inliers_of) {
-  std::vector<std::uint32_t> index;
-  std::vector<std::array<float, 3>> rest;
-  for (std::size_t i = 0; i != left.size(); ++i) {
-    if (left[i] == 0) continue;
-    index.push_back(static_cast<std::uint32_t>(i));
-    rest.push_back(coordinates<float>(point_at(points, i)));
-    left[i] = 0;
-  }
-  for (const std::uint32_t i : inliers_of(rest)) left[index[i]] = 1;
-}
-
-/// `apply_views(ray_step, left)` clears `left` where the views exclude a point.
-template <execution_policy Policy, point_range Points, class Views>
-[[nodiscard]] std::vector<std::uint32_t> apply_chain(const Policy& policy, const Points& points,
-                                                     const filter_chain& chain, const select_options& options,
-                                                     const Views& apply_views) {
-  std::vector<char> left = finite_points(points);
-  const known_ranges ranges{policy, points, options};
-  std::optional<surroundings> around;
-  std::size_t averaged = 0;  // neighbours, in `around`
-  const auto settle = [&] {
-    if (around) remove_gone(*around, left);
-    around.reset();
-  };
-  const auto look_around = [&](std::size_t neighbors) -> surroundings& {
-    if (around && averaged != neighbors) settle();
-    if (!around) around.emplace(policy, points, left, ranges.all, averaged = neighbors);
-    return *around;
-  };
-  for (const filter_step& any : chain) {
-    std::visit(
-        [&](const auto& step) {
-          using Step = std::remove_cvref_t<decltype(step)>;
-          if constexpr (std::is_same_v<Step, ray_step>) {
-            settle();
-            apply_views(step, left);
-          } else if constexpr (std::is_same_v<Step, density_step> || std::is_same_v<Step, isolation_step>) {
-            look_around(step.neighbors).apply(policy, step);
-          } else if constexpr (std::is_same_v<Step, cluster_options>) {
-            look_around(around ? averaged : step.neighbors).apply(policy, step);
-          } else if constexpr (std::is_same_v<Step, statistical_options>) {
-            settle();
-            apply_alone(points, left, [&](const auto& rest) { return statistical_inliers(policy, rest, step); });
-          } else {
-            static_assert(std::is_same_v<Step, radius_options>, "a kind of step that is not applied");
-            settle();
-            apply_alone(points, left, [&](const auto& rest) { return radius_inliers(policy, rest, step); });
-          }
-        },
-        any);
-  }
-  settle();
-  return kept_points(points, left, options);
-}
-
-[[nodiscard]] inline std::string sentence_of(const filter_choice& choice, std::span<const std::string> reasons,
-                                             bool by_range) {
-  std::string out;
-  for (const std::string& r : reasons) out += (out.empty() ? "" : "; ") + r;
-  if (out.empty()) out = "no point stands out";
-  out += " (median spacing " + in_words(1e3 * choice.evidence.median_spacing) + " mm";
-  return out + (by_range ? ", which grows with range)" : ")");
-}
-
-/// `judge_by_views(left, choice, reasons)` does what judge_views does. False: cancelled.
-template <execution_policy Policy, point_range Points, class Views>
-[[nodiscard]] automatic_result judge(const Policy& policy, const Points& points, const select_options& options,
-                                     const Views& judge_by_views) {
-  assert(options.neighbors > 0);
-  assert(options.ranges.empty() || options.ranges.size() == std::ranges::size(points));
-  constexpr std::size_t enough = 50;
-  automatic_result out;
-  filter_choice& choice = out.choice;
-  choice.evidence.points = std::ranges::size(points);
-  std::vector<char> left = finite_points(points);
-  choice.evidence.finite = static_cast<std::size_t>(std::ranges::count(left, char{1}));
-  std::vector<std::string> reasons;
-  if (!judge_by_views(left, choice, reasons)) {
-    choice.chain.clear();
-    choice.reason = "cancelled";
-    out.inliers = kept_points(points, left, options);
-    return out;
-  }
-  const known_ranges ranges{policy, points, options};
-  surroundings around{policy, points, left, ranges.all, options.neighbors};
-  bool ranged = false;
-  for (std::size_t i = 0; i != around.size() && !ranged; ++i) ranged = around.has_range(i);
-  for (std::size_t i = 0; i != around.size(); ++i) {
-    const bool judged = std::isfinite(around.log_spacing()[i]) && (!ranged || around.has_range(i));
-    choice.evidence.judged += judged ? 1 : 0;
-  }
-  if (choice.evidence.judged < enough) {
-    if (reasons.empty()) reasons.push_back("too few points (" + std::to_string(choice.evidence.judged) + ") to judge");
-    choice.reason = reasons.front();
-  } else {
-    judge_points(policy, around, options, choice, reasons);
-    remove_gone(around, left);
-    const bool by_range = std::ranges::any_of(
-        choice.evidence.density, [](const auto& d) { return d.mode == filter_mode::range_log_statistical; });
-    choice.reason = sentence_of(choice, reasons, by_range);
-  }
-  out.inliers = kept_points(points, left, options);
-  return out;
-}
 
 }  // namespace detail
 
@@ -222,21 +99,17 @@ template <execution_policy Policy, point_range Points, class Views>
 template <execution_policy Policy, point_range Points, posed_depth_range Views, camera::camera_model Camera>
 [[nodiscard]] automatic_result filter_automatically(const Policy& policy, const Points& points, const Views& views,
                                                     const Camera& camera, const select_options& options = {},
-                                                    progress on_progress = {}) {
-  return detail::with_model(camera, [&](const auto& model) {
-    return detail::judge(
-        policy, points, options, [&](std::span<char> left, filter_choice& choice, std::vector<std::string>& reasons) {
-          return detail::judge_views(policy, points, views, model, options, left, choice, reasons, on_progress);
-        });
-  });
-}
+                                                    progress on_progress = {});
 
 /// Judges the cloud by its points alone. An empty cloud, or one too small to judge, gets an empty chain. O(n log n).
 /// @pre neighbors > 0; ranges is empty or as long as points
 template <execution_policy Policy, point_range Points>
 [[nodiscard]] automatic_result filter_automatically(const Policy& policy, const Points& points,
                                                     const select_options& options = {}) {
-  return detail::judge(policy, points, options, detail::without_views{});
+  assert(options.neighbors > 0);
+  const auto& threads = detail::threads_of(policy);
+  return detail::choose_and_filter(threads, detail::viewed_points{points},
+                                   detail::known_ranges{threads, points, options}.all, options, {});
 }
 
 /// Judges the cloud and says which filters suit it: `filter_automatically` without its inliers.
@@ -260,7 +133,9 @@ template <execution_policy Policy, point_range Points, posed_depth_range Views, 
 template <execution_policy Policy, point_range Points>
 [[nodiscard]] std::vector<std::uint32_t> apply_filter(const Policy& policy, const Points& points,
                                                       const filter_chain& chain, const select_options& options = {}) {
-  return detail::apply_chain(policy, points, chain, options, detail::without_views{});
+  const auto& threads = detail::threads_of(policy);
+  return detail::apply_chain(threads, detail::viewed_points{points}, detail::known_ranges{threads, points, options}.all,
+                             chain, options, {});
 }
 /// Applies a chain that may ask depth images. If `on_progress`, which counts the views, cancels, what they say is left
 /// out. @pre there are views if the chain has a `ray_step`
@@ -268,18 +143,10 @@ template <execution_policy Policy, point_range Points, posed_depth_range Views, 
 [[nodiscard]] std::vector<std::uint32_t> apply_filter(const Policy& policy, const Points& points,
                                                       const filter_chain& chain, const Views& views,
                                                       const Camera& camera, const select_options& options = {},
-                                                      progress on_progress = {}) {
-  return detail::with_model(camera, [&](const auto& model) {
-    return detail::apply_chain(policy, points, chain, options, [&](const ray_step& step, std::span<char> left) {
-      assert(std::ranges::size(views) != 0);
-      bool cancelled = false;
-      detail::apply_rays(policy, points, step, views, model, left, cancelled, on_progress);
-    });
-  });
-}
+                                                      progress on_progress = {});
 
 }  // namespace orbis::cloud
 
-#ifdef ORBIS_COMPILED
-#include <orbis/cloud/detail/compiled/select.hpp>
+#ifndef ORBIS_COMPILED
+#include <orbis/cloud/select-inl.hpp>
 #endif

@@ -14,7 +14,7 @@
 #include <type_traits>
 #include <vector>
 
-#include <orbis/cloud/detail/select/decision.hpp>
+#include <orbis/cloud/detail/point_view.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/point.hpp>
 #include <orbis/core/types.hpp>

@@ -16,23 +16,22 @@
 /// S. Phillips, S. L. Waslander, "De-noising of lidar point clouds corrupted by snowfall", CRV 2018.
 #pragma once
 
-#include <algorithm>
 #include <cassert>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <span>
-#include <utility>
 #include <vector>
 
 #include <orbis/cloud/all_knn.hpp>
-#include <orbis/cloud/detail/select/decision.hpp>
+#include <orbis/cloud/detail/point_view.hpp>
+#include <orbis/cloud/detail/threads_of.hpp>
+#include <orbis/cloud/extract.hpp>
 #include <orbis/cloud/sensor_origins.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/point.hpp>
 #include <orbis/core/result.hpp>
-#include <orbis/core/rounded.hpp>
 
 namespace orbis::cloud {
 
@@ -58,44 +57,16 @@ struct statistical_result {
 /// it can come out below zero. Such a cloud has no spread that could be measured: sigma is reported as 0
 /// and the threshold as infinite, everything stays (as in PCL, where both are NaN and no distance is
 /// larger). The same goes, with an infinite sigma, where distances or their squares overflow.
-[[nodiscard]] inline statistical_result statistical_decision(std::vector<float> mean_distance,
-                                                             const statistical_options& options = {}) {
-  constexpr double infinity = std::numeric_limits<double>::infinity();
-  double sum = 0;
-  double sum_of_squares = 0;
-  std::size_t n = 0;
-  for (const float d : mean_distance) {
-    if (std::isnan(d)) continue;
-    sum += d;
-    sum_of_squares += d * d;  // a float product: part of the definition that others share
-    ++n;
-  }
-  statistical_result out;
-  const auto count = static_cast<double>(n);
-  if (n > 0) out.mean = sum / count;
-  const double variance = n > 1 ? (sum_of_squares - sum * sum / count) / (count - 1) : 0.0;
-  out.standard_deviation = std::isnan(variance) ? infinity : std::sqrt(std::max(variance, 0.0));
-  out.threshold =
-      variance >= 0 ? out.mean + rounded_product(options.sigma_multiplier, out.standard_deviation) : infinity;
-  if (std::isnan(out.threshold)) out.threshold = infinity;
-  out.inliers = detail::indices_where(mean_distance.size(), [&](std::size_t i) {
-    if (std::isnan(mean_distance[i])) return options.non_finite == non_finite::keep;
-    return !(mean_distance[i] > out.threshold);
-  });
-  out.mean_distance = std::move(mean_distance);
-  return out;
-}
+[[nodiscard]] statistical_result statistical_decision(std::vector<float> mean_distance,
+                                                      const statistical_options& options = {});
 
 namespace detail {
 
-template <point_range Points>
-[[nodiscard]] statistical_result decide_statistically(const Points& points, std::vector<float> mean_distance,
-                                                      const statistical_options& options) {
-  statistical_result out = statistical_decision(std::move(mean_distance), options);
-  out.inliers =
-      inliers_by_score(points, out.mean_distance, options.non_finite, [&](float d) { return d > out.threshold; });
-  return out;
-}
+/// `statistical_filter` for any points.
+template <execution_policy Policy>
+[[nodiscard]] result<statistical_result> filter_statistically(const Policy& policy, const point_view& points,
+                                                              const statistical_options& options,
+                                                              const progress& on_progress);
 
 }  // namespace detail
 
@@ -104,7 +75,7 @@ template <execution_policy Policy, point_range Points>
 [[nodiscard]] statistical_result statistical_filter(const Policy& policy, const Points& points,
                                                     const statistical_options& options = {}) {
   assert(options.neighbors > 0);
-  return detail::decide_statistically(points, all_mean_knn_distance(policy, points, options.neighbors), options);
+  return *detail::filter_statistically(detail::threads_of(policy), detail::viewed_points{points}, options, progress{});
 }
 
 /// Filters as above and reports progress, in leaves of sixteen points. Errors: `cancelled`, if the callback asks to
@@ -114,9 +85,7 @@ template <execution_policy Policy, point_range Points>
 [[nodiscard]] result<statistical_result> statistical_filter(const Policy& policy, const Points& points,
                                                             const statistical_options& options, progress on_progress) {
   assert(options.neighbors > 0);
-  auto mean_distance = all_mean_knn_distance(policy, points, options.neighbors, on_progress);
-  if (!mean_distance) return fail(mean_distance.error());
-  return detail::decide_statistically(points, *std::move(mean_distance), options);
+  return detail::filter_statistically(detail::threads_of(policy), detail::viewed_points{points}, options, on_progress);
 }
 
 /// The indices, ascending, of the points whose mean distance to their `neighbors` nearest neighbours
@@ -167,39 +136,19 @@ struct range_statistical_result {
 /// without a mean distance (NaN) are kept or dropped as `non_finite` says; those without a range alone
 /// stay. O(n).
 /// @pre ranges is as long as mean_distance; angle >= 0, noise >= 0 and not both zero; least_range > 0
-[[nodiscard]] inline range_statistical_result range_statistical_decision(
-    std::span<const float> mean_distance, std::span<const float> ranges,
-    const range_statistical_options& options = {}) {
-  assert(ranges.size() == mean_distance.size());
-  assert(options.angle >= 0 && options.noise >= 0 && options.angle + options.noise > 0 && options.least_range > 0);
-  range_statistical_result out;
-  out.normalised.assign(mean_distance.size(), std::numeric_limits<float>::quiet_NaN());
-  double sum = 0;
-  for (std::size_t i = 0; i != mean_distance.size(); ++i) {
-    if (!std::isfinite(ranges[i]) || ranges[i] < 0) continue;
-    const auto u = static_cast<float>(mean_distance[i] / explained_spacing(ranges[i], options));
-    out.normalised[i] = u;
-    if (!std::isfinite(u)) continue;
-    sum += u;
-    ++out.judged;
-  }
-  if (out.judged > 0) {
-    const auto count = static_cast<double>(out.judged);
-    out.mean = sum / count;
-    double squares = 0;  // about the mean: no cancellation
-    for (const float u : out.normalised) {
-      if (std::isfinite(u)) squares += (u - out.mean) * (u - out.mean);
-    }
-    if (out.judged > 1) out.standard_deviation = std::sqrt(squares / (count - 1));
-    constexpr double rounding = 1 + 0x1p-20;  // of the scores: equal ones are all as usual
-    out.threshold = out.mean * rounding + options.sigma_multiplier * out.standard_deviation;
-  }
-  out.inliers = detail::indices_where(mean_distance.size(), [&](std::size_t i) {
-    if (std::isnan(mean_distance[i])) return options.non_finite == non_finite::keep;
-    return !(double{out.normalised[i]} > out.threshold);
-  });
-  return out;
-}
+[[nodiscard]] range_statistical_result range_statistical_decision(std::span<const float> mean_distance,
+                                                                  std::span<const float> ranges,
+                                                                  const range_statistical_options& options = {});
+
+namespace detail {
+
+/// `range_statistical_filter` for any points with known ranges.
+template <execution_policy Policy>
+[[nodiscard]] range_statistical_result filter_by_range(const Policy& policy, const point_view& points,
+                                                       std::span<const float> ranges,
+                                                       const range_statistical_options& options);
+
+}  // namespace detail
 
 /// Finds the points that `range_statistical_inliers` returns, their scores and the threshold.
 template <execution_policy Policy, point_range Points>
@@ -207,12 +156,8 @@ template <execution_policy Policy, point_range Points>
                                                                 const sensor_origins& origins,
                                                                 const range_statistical_options& options = {}) {
   assert(options.neighbors > 0);
-  const std::vector<float> spacing = all_mean_knn_distance(policy, points, options.neighbors);
-  const std::vector<float> ranges = sensor_ranges(policy, points, origins);
-  range_statistical_result out = range_statistical_decision(spacing, ranges, options);
-  out.inliers = detail::inliers_by_score(points, out.normalised, options.non_finite,
-                                         [&](float u) { return double{u} > out.threshold; });
-  return out;
+  return detail::filter_by_range(detail::threads_of(policy), detail::viewed_points{points},
+                                 sensor_ranges(policy, points, origins), options);
 }
 
 /// The indices, ascending, of the points whose mean distance to their `neighbors` nearest neighbours,
@@ -229,6 +174,6 @@ template <execution_policy Policy, point_range Points>
 
 }  // namespace orbis::cloud
 
-#ifdef ORBIS_COMPILED
-#include <orbis/cloud/detail/compiled/statistical.hpp>
+#ifndef ORBIS_COMPILED
+#include <orbis/cloud/statistical-inl.hpp>
 #endif

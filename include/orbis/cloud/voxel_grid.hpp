@@ -4,20 +4,18 @@
 #pragma once
 
 #include <array>
-#include <bit>
 #include <cassert>
 #include <concepts>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <optional>
 #include <ranges>
 #include <span>
 #include <type_traits>
 #include <vector>
 
-#include <orbis/cloud/detail/select/decision.hpp>
-#include <orbis/cloud/detail/voxels/fold_voxels.hpp>
+#include <orbis/cloud/detail/point_view.hpp>
+#include <orbis/cloud/detail/threads_of.hpp>
 #include <orbis/cloud/detail/voxels/voxel_hash.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/image.hpp>
@@ -120,76 +118,36 @@ concept voxel_choice = requires(const C& choice, std::uint32_t i) {
 
 namespace detail {
 
-/// Sums the points of a voxel, and their colours.
-template <bool Colored>
-struct centroid_fold {
-  static constexpr bool has_colors = Colored;
-  struct plain_record {
-    std::array<double, 3> position;
-    std::uint32_t count;
-  };
-  struct colored_record : plain_record {
-    std::array<std::uint64_t, 3> color;
-  };
-  using record = std::conditional_t<Colored, colored_record, plain_record>;
-  static constexpr record empty{};
+/// The number type in which cells are found: double holds all that a cloud can have.
+template <point_range Points>
+using voxel_scalar =
+    std::conditional_t<std::is_same_v<point_scalar_t<std::ranges::range_value_t<Points>>, float>, float, double>;
 
-  std::span<const rgb8> colors;
-  point_cloud& out;
-
-  void add(record& r, std::uint32_t i, const std::array<double, 3>& p) const {
-    for (std::size_t a = 0; a != 3; ++a) r.position[a] += p[a];
-    if constexpr (Colored) {
-      r.color[0] += colors[i].r;
-      r.color[1] += colors[i].g;
-      r.color[2] += colors[i].b;
-    }
-    ++r.count;
-  }
-  [[nodiscard]] voxel_summary summary(const record& r) const {
-    voxel_summary out;
-    const auto mean = [&](double sum) { return r.count == 1 ? sum : sum / r.count; };  // many voxels have one point
-    for (std::size_t a = 0; a != 3; ++a)
-      out.words[a] = std::bit_cast<std::uint32_t>(static_cast<float>(mean(r.position[a])));
-    if constexpr (Colored) {
-      const auto channel = [&](std::size_t c) {
-        return static_cast<std::uint8_t>((r.color[c] + r.count / 2) / r.count);  // rounded
-      };
-      out.color = {channel(0), channel(1), channel(2)};
-    }
-    return out;
-  }
-  void resize(std::size_t count) {
-    out.points.resize(count);
-    if constexpr (Colored) out.colors.resize(count);
-  }
-  void put(std::uint32_t number, const voxel_summary& s) {
-    for (std::size_t a = 0; a != 3; ++a)
-      out.points[number][static_cast<Eigen::Index>(a)] = std::bit_cast<float>(s.words[a]);
-    if constexpr (Colored) out.colors[number] = s.color;
+/// A choice of a type that is the user's own.
+struct any_choice {
+  const void* choice = nullptr;
+  bool (*ask)(const void* choice, std::uint32_t kept, std::uint32_t candidate) = nullptr;
+  [[nodiscard]] bool replaces(std::uint32_t kept, std::uint32_t candidate) const {
+    return ask(choice, kept, candidate);
   }
 };
+template <voxel_choice Choice>
+[[nodiscard]] auto known_choice(const Choice& choice) noexcept {
+  if constexpr (std::same_as<Choice, voxel_first> || std::same_as<Choice, voxel_random>)
+    return choice;
+  else
+    return any_choice{&choice, [](const void* own, std::uint32_t kept, std::uint32_t candidate) -> bool {
+                        return static_cast<const Choice*>(own)->replaces(kept, candidate);
+                      }};
+}
 
-/// Keeps one point of a voxel.
-template <class Choice>
-struct choice_fold {
-  static constexpr bool has_colors = false;
-  static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
-  struct record {
-    std::uint32_t chosen;
-  };
-  static constexpr record empty{none};
-
-  const Choice& choice;
-  std::vector<std::uint32_t>& out;
-
-  void add(record& r, std::uint32_t i, const std::array<double, 3>& /*p*/) const {
-    if (r.chosen == none || choice.replaces(r.chosen, i)) r.chosen = i;
-  }
-  [[nodiscard]] voxel_summary summary(const record& r) const { return {{r.chosen}, {}}; }
-  void resize(std::size_t count) { out.resize(count); }
-  void put(std::uint32_t number, const voxel_summary& s) { out[number] = s.words[0]; }
-};
+/// `voxel_grid_indices` and `voxel_grid` for any points.
+template <execution_policy Policy, std::floating_point S, voxel_choice Choice>
+[[nodiscard]] std::vector<std::uint32_t> choose_in_voxels(const Policy& policy, const basic_point_view<S>& points,
+                                                          double size, const Choice& choice);
+template <execution_policy Policy, std::floating_point S>
+[[nodiscard]] point_cloud find_centroids(const Policy& policy, const basic_point_view<S>& points,
+                                         std::span<const rgb8> colors, double size);
 
 }  // namespace detail
 
@@ -202,9 +160,9 @@ template <execution_policy Policy, point_range Points, voxel_choice Choice = vox
 [[nodiscard]] std::vector<std::uint32_t> voxel_grid_indices(const Policy& policy, const Points& points,
                                                             const voxel_grid_options& options = {},
                                                             const Choice& choice = {}) {
-  std::vector<std::uint32_t> chosen;
-  detail::fold_voxels(policy, points, options.size, detail::choice_fold<Choice>{choice, chosen});
-  return chosen;
+  return detail::choose_in_voxels(detail::threads_of(policy),
+                                  detail::basic_viewed_points<detail::voxel_scalar<Points>>{points}.view(),
+                                  options.size, detail::known_choice(choice));
 }
 
 /// One point for each occupied voxel, in the order in which the voxels are first seen, with its colour where
@@ -220,12 +178,9 @@ template <execution_policy Policy, point_range Points>
 [[nodiscard]] point_cloud voxel_grid(const Policy& policy, const Points& points, std::span<const rgb8> colors,
                                      const voxel_grid_options& options = {}, voxel_centroid /*tag*/ = {}) {
   assert(colors.empty() || colors.size() == std::ranges::size(points));
-  point_cloud out;
-  if (colors.empty())
-    detail::fold_voxels(policy, points, options.size, detail::centroid_fold<false>{colors, out});
-  else
-    detail::fold_voxels(policy, points, options.size, detail::centroid_fold<true>{colors, out});
-  return out;
+  return detail::find_centroids(detail::threads_of(policy),
+                                detail::basic_viewed_points<detail::voxel_scalar<Points>>{points}.view(), colors,
+                                options.size);
 }
 template <execution_policy Policy, point_range Points, voxel_choice Choice>
 [[nodiscard]] point_cloud voxel_grid(const Policy& policy, const Points& points, std::span<const rgb8> colors,
@@ -285,3 +240,7 @@ requires(voxel_choice<Choice> || std::same_as<Choice, voxel_centroid>) [[nodisca
 }
 
 }  // namespace orbis::cloud
+
+#ifndef ORBIS_COMPILED
+#include <orbis/cloud/voxel_grid-inl.hpp>
+#endif

@@ -57,6 +57,7 @@ requires requires(const P& p) {
 }
 struct point_traits<P> {
   using scalar = std::remove_cvref_t<decltype(std::declval<const P&>().x)>;
+  using is_default = void;  ///< not a user's own
   static constexpr scalar x(const P& p) noexcept { return p.x; }
   static constexpr scalar y(const P& p) noexcept { return p.y; }
   static constexpr scalar z(const P& p) noexcept { return p.z; }
@@ -70,6 +71,7 @@ requires(
       { p[2] } -> std::convertible_to<double>;
     }) struct point_traits<P> {
   using scalar = std::remove_cvref_t<decltype(std::declval<const P&>()[0])>;
+  using is_default = void;
   static constexpr scalar x(const P& p) noexcept { return p[0]; }
   static constexpr scalar y(const P& p) noexcept { return p[1]; }
   static constexpr scalar z(const P& p) noexcept { return p[2]; }

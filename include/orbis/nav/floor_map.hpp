@@ -8,7 +8,8 @@
 ///   if (floor && floor->state(p) == orbis::nav::floor_state::free) ...
 /// @endcode
 ///
-/// The world is upright: z points up, against gravity.
+/// The world is upright: z points up, against gravity. The library orbis::compiled holds the functions for
+/// octree::occupancy_octree<>; users of other maps include floor_map-inl.hpp.
 #pragma once
 
 #include <array>
@@ -52,9 +53,9 @@ struct floor_map_options {
 
 /// The floor by square cells, one for each column of voxels. Cell (0, 0) has the least x and y.
 struct floor_map {
-  double resolution = 0.0;     ///< the edge of a cell, metres
+  double resolution = 0.0;      ///< the edge of a cell, metres
   vec2 origin = zeros<vec2>();  ///< the low corner of cell (0, 0), metres
-  double floor = 0.0;          ///< height of the floor that was looked from, metres; see find_floor
+  double floor = 0.0;           ///< height of the floor that was looked from, metres; see find_floor
   image<floor_state> states{};
   image<float> heights{};  ///< of the floor, metres; NaN where the robot does not get to
 
@@ -111,4 +112,6 @@ template <planning_map Map>
 
 }  // namespace orbis::nav
 
-#include <orbis/nav/detail/floor/make_floor_map.hpp>
+#ifndef ORBIS_COMPILED
+#include <orbis/nav/floor_map-inl.hpp>
+#endif

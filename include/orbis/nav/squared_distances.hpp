@@ -32,7 +32,7 @@
 #include <orbis/core/cow_pages.hpp>
 #include <orbis/nav/detail/field/block_vector.hpp>
 #include <orbis/nav/detail/field/brick_directory.hpp>
-#include <orbis/nav/detail/field/slice_kernels.hpp>
+#include <orbis/nav/detail/field/slice_code.hpp>
 #include <orbis/octree/key.hpp>
 
 namespace orbis::nav {
@@ -243,7 +243,7 @@ class squared_distances : public squared_distance_view {
   void make_plane(std::uint32_t brick, int z);
   void make_space(std::uint32_t brick, unsigned slices);
 
-  detail::slice_kernels kernels_;
+  detail::slice_code kernels_;
   detail::block_vector<stages> stages_;  ///< by brick
   int bricks_in_reach_;
   int squares_pad_;
@@ -264,5 +264,5 @@ class squared_distances : public squared_distance_view {
 }  // namespace orbis::nav
 
 #ifndef ORBIS_COMPILED
-#include <orbis/nav/detail/compiled/squared_distances_functions.hpp>
+#include <orbis/nav/squared_distances-inl.hpp>
 #endif

@@ -3,6 +3,8 @@
 /// A vocabulary for ORB descriptors that needs no file.
 #pragma once
 
+#include <cstddef>
+
 #include <orbis/places/vocabulary.hpp>
 
 namespace orbis::places {
@@ -12,10 +14,11 @@ namespace orbis::places {
 /// recordings of your own places, or a larger one, recognises more.
 ///
 /// The example `train_vocabulary` makes the same bytes again: see the head of detail/default_vocabulary_data.hpp.
-[[nodiscard]] vocabulary default_vocabulary();
+template <std::size_t Bits = 256>
+requires(Bits == 256) [[nodiscard]] basic_vocabulary<Bits> default_vocabulary();
 
 }  // namespace orbis::places
 
 #ifndef ORBIS_COMPILED
-#include <orbis/places/detail/compiled/default_vocabulary_functions.hpp>
+#include <orbis/places/default_vocabulary-inl.hpp>
 #endif

@@ -4,8 +4,6 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
-#include <bit>
 #include <cassert>
 #include <cstddef>
 #include <cstdint>
@@ -17,7 +15,6 @@
 
 #include <orbis/core/bits.hpp>
 #include <orbis/places/bag_of_words.hpp>
-#include <orbis/places/detail/descent.hpp>
 #include <orbis/places/vocabulary_tree.hpp>
 
 namespace orbis::places {
@@ -35,6 +32,8 @@ struct transform_workspace {
 
 /// A tree of descriptors of `Bits` bits. A descriptor descends from the root to the nearest child at each node; the
 /// leaf that it reaches is its word.
+///
+/// The library orbis::compiled holds that of 256 bits; users of others include vocabulary-inl.hpp.
 ///
 /// Immutable, and cheap to copy: copies share the tree. Made by `train`, `read_vocabulary`, `default_vocabulary`
 /// and the readers of other formats. A default-constructed vocabulary has no words.
@@ -73,9 +72,7 @@ class basic_vocabulary {
   template <bit_string D>
   requires(8 * sizeof(D) == Bits) [[nodiscard]] std::uint32_t word_of(const D& descriptor) const noexcept {
     assert(!empty());
-    std::uint32_t leaf = 0;
-    detail::find_leaves(*tree_, {reinterpret_cast<const std::byte*>(&descriptor), 1, 0, &leaf, nullptr});
-    return tree_->word_of_leaf(leaf);
+    return word_of_bytes(reinterpret_cast<const std::byte*>(&descriptor));
   }
 
   /// The words of an image's descriptors as a bag. Once there was an image of as many descriptors, nothing is
@@ -83,8 +80,7 @@ class basic_vocabulary {
   template <bit_string_range_of<Bits> Descriptors>
   void transform(const Descriptors& descriptors, bag_of_words& bag, transform_workspace& memory,
                  const transform_options& options = {}) const {
-    transform_span(std::span{std::ranges::data(descriptors), std::ranges::size(descriptors)}, bag, nullptr, memory,
-                   options);
+    transform_bytes(bytes_of(descriptors), std::ranges::size(descriptors), bag, nullptr, memory, options);
   }
 
   /// The words of an image's descriptors as a bag, and the direct index: `nodes[i]` becomes descriptor `i`'s node at
@@ -93,8 +89,7 @@ class basic_vocabulary {
   void transform(const Descriptors& descriptors, bag_of_words& bag, std::vector<std::uint32_t>& nodes,
                  transform_workspace& memory, const transform_options& options = {}) const {
     nodes.resize(std::ranges::size(descriptors));
-    transform_span(std::span{std::ranges::data(descriptors), std::ranges::size(descriptors)}, bag, nodes.data(), memory,
-                   options);
+    transform_bytes(bytes_of(descriptors), std::ranges::size(descriptors), bag, nodes.data(), memory, options);
   }
 
   /// Returns the bag; allocates its memory.
@@ -120,49 +115,16 @@ class basic_vocabulary {
     return tree;
   }
 
-  template <class D>
-  void transform_span(std::span<const D> descriptors, bag_of_words& bag, std::uint32_t* nodes,
-                      transform_workspace& memory, const transform_options& options) const {
-    bag.words.clear();
-    memory.words.resize(descriptors.size());
-    if (empty()) {
-      if (nodes != nullptr) std::fill_n(nodes, descriptors.size(), 0U);
-      return;
-    }
-    detail::find_leaves(*tree_, {std::as_bytes(descriptors).data(), descriptors.size(), options.node_depth,
-                                 memory.words.data(), nodes});
-    for (std::uint32_t& leaf : memory.words) leaf = tree_->word_of_leaf(leaf);
-    sort(memory);
-    count(memory.words, bag);
-    normalize(bag, options.norm);
+  template <class Descriptors>
+  [[nodiscard]] static const std::byte* bytes_of(const Descriptors& descriptors) noexcept {
+    return reinterpret_cast<const std::byte*>(std::ranges::data(descriptors));
   }
-
+  [[nodiscard]] std::uint32_t word_of_bytes(const std::byte* descriptor) const noexcept;
+  void transform_bytes(const std::byte* descriptors, std::size_t count, bag_of_words& bag, std::uint32_t* nodes,
+                       transform_workspace& memory, const transform_options& options) const;
   /// Radix sort: a comparison sort would take a quarter of the time of a transform.
-  void sort(transform_workspace& memory) const {
-    if (memory.words.size() < 64) return std::sort(memory.words.begin(), memory.words.end());
-    constexpr unsigned digit = 8;
-    const auto digits = (static_cast<unsigned>(std::bit_width(size() - 1)) + digit - 1) / digit;
-    memory.sorted.resize(memory.words.size());
-    for (unsigned shift = 0; shift != digits * digit; shift += digit) {
-      const auto digit_of = [shift](std::uint32_t word) { return (word >> shift) & 0xffU; };
-      std::array<std::uint32_t, 256> begin{};
-      for (const std::uint32_t word : memory.words) ++begin[digit_of(word)];
-      std::uint32_t before = 0;
-      for (std::uint32_t& at : begin) before += std::exchange(at, before);
-      for (const std::uint32_t word : memory.words) memory.sorted[begin[digit_of(word)]++] = word;
-      memory.words.swap(memory.sorted);
-    }
-  }
-
-  void count(std::span<const std::uint32_t> sorted, bag_of_words& bag) const {
-    const bool counted = weighting() == places::weighting::tf_idf || weighting() == places::weighting::tf;
-    for (std::size_t i = 0; i != sorted.size();) {
-      const std::size_t first = i;
-      while (i != sorted.size() && sorted[i] == sorted[first]) ++i;
-      const float w = weight(sorted[first]);
-      if (w > 0.0F) bag.words.push_back({sorted[first], counted ? w * static_cast<float>(i - first) : w});
-    }
-  }
+  void sort(transform_workspace& memory) const;
+  void count(std::span<const std::uint32_t> sorted, bag_of_words& bag) const;
 
   std::shared_ptr<const tree_type> tree_;
 };
@@ -171,3 +133,7 @@ class basic_vocabulary {
 using vocabulary = basic_vocabulary<256>;
 
 }  // namespace orbis::places
+
+#ifndef ORBIS_COMPILED
+#include <orbis/places/vocabulary-inl.hpp>
+#endif

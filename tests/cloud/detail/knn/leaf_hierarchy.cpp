@@ -7,6 +7,7 @@
 #include <vector>
 
 #include <orbis/cloud/detail/knn/leaf_hierarchy.hpp>
+#include <orbis/cloud/detail/point_view.hpp>
 #include <orbis/core/simd.hpp>
 
 #include "cloud/clouds.hpp"
@@ -21,7 +22,7 @@ TEST_CASE("every finite point is in one leaf, within the boxes above it, or is a
   for (const auto& [name, cloud] : orbis::test::all_clouds()) {
     for (const std::size_t copies : {1U, 9U, 51U}) {
       INFO(name << " copies " << copies);
-      const leaf_hierarchy tree = make_leaves(orbis::par.with(2), cloud, copies);
+      const leaf_hierarchy tree = make_leaves(orbis::par.with(2), orbis::cloud::detail::viewed_points{cloud}, copies);
       std::vector<int> seen(cloud.size(), 0);
       bool in_place = true;
       bool in_boxes = true;
@@ -66,7 +67,7 @@ TEST_CASE("leaves follow the density wherever it is") {
   // Ten thousand points in a millimetre, and one a thousand kilometres away: one cell of any grid.
   auto cloud = orbis::test::uniform_cloud(10'000, 1, 1e-3);
   cloud.emplace_back(1e6F, 0.0F, 0.0F);
-  const leaf_hierarchy tree = make_leaves(orbis::seq, cloud, 51);
+  const leaf_hierarchy tree = make_leaves(orbis::seq, orbis::cloud::detail::viewed_points{cloud}, 51);
   double volume = 0;
   for (std::size_t l = 0; l != tree.leaves.size(); ++l) {
     const auto& boxes = tree.levels[0][l / leaf_width];
@@ -83,7 +84,7 @@ TEST_CASE("copies too many are those that share a cell") {
   std::vector<orbis::vec3f> cloud(1000, orbis::vec3f{1.0F, 2.0F, 3.0F});
   const auto others = orbis::test::uniform_cloud(300, 2);
   cloud.insert(cloud.end(), others.begin(), others.end());
-  const leaf_hierarchy tree = make_leaves(orbis::seq, cloud, 51);
+  const leaf_hierarchy tree = make_leaves(orbis::seq, orbis::cloud::detail::viewed_points{cloud}, 51);
   CHECK(tree.left_out.size() == 949);
   CHECK(tree.in_leaves == 351);
   CHECK(tree.finite == 1300);

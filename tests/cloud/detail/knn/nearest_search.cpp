@@ -12,6 +12,7 @@
 
 #include <orbis/cloud/all_knn.hpp>
 #include <orbis/cloud/detail/knn/nearest_search.hpp>
+#include <orbis/cloud/detail/point_view.hpp>
 #include <orbis/cloud/nanoflann.hpp>
 
 #include "cloud/clouds.hpp"
@@ -58,7 +59,7 @@ TEST_CASE("the nearest are the same where too many rows are near to be shared") 
   points cloud = orbis::test::uniform_cloud(9'000, 21, 1.0);
   const points far = orbis::test::uniform_cloud(60, 22, 200.0);
   cloud.insert(cloud.end(), far.begin(), far.end());
-  const auto tree = make_leaves(orbis::seq, cloud, 9);
+  const auto tree = make_leaves(orbis::seq, orbis::cloud::detail::viewed_points{cloud}, 9);
   for (const level l : levels) {
     const orbis::simd::level_limit limit{l};
     const knn_kernels kernels;
@@ -267,7 +268,7 @@ std::size_t near_points_reference(const point_row* leaves, const nearby_leaves& 
 TEST_CASE("boxes and leaves are measured alike by all instruction sets") {
   using orbis::cloud::detail::box3;
   const auto cloud = orbis::test::uniform_cloud(2000, 7, 3.0);
-  const auto tree = orbis::cloud::detail::make_leaves(orbis::seq, cloud, 51);
+  const auto tree = orbis::cloud::detail::make_leaves(orbis::seq, orbis::cloud::detail::viewed_points{cloud}, 51);
   using namespace orbis::cloud::detail;
   for (const level l : levels) {
     const orbis::simd::level_limit limit{l};
@@ -303,7 +304,7 @@ TEST_CASE("boxes and leaves are measured alike by all instruction sets") {
     std::vector<float> found(4000);
     std::vector<float> found_reference(4000);
     const std::size_t n =
-        kernels.near_points(tree.leaves.data(), near, middle, 0.2F, scratch.data(), found.data(), 3000);
+        kernels.near_point(tree.leaves.data(), near, middle, 0.2F, scratch.data(), found.data(), nullptr, 3000);
     CHECK(n > 16);
     CHECK(n == near_points_reference(tree.leaves.data(), near, middle, 0.2F, found_reference.data(), 3000));
     found.resize(n + 16);

@@ -9,6 +9,7 @@
 
 #include <orbis/cloud/all_knn.hpp>
 #include <orbis/cloud/detail/knn/neighbor_graph.hpp>
+#include <orbis/cloud/detail/point_view.hpp>
 #include <orbis/core/execution.hpp>
 
 #include "cloud/clouds.hpp"
@@ -23,7 +24,8 @@ namespace {
 
 template <class Policy>
 neighbor_graph graph_of(const Policy& policy, const points& cloud, std::size_t k) {
-  return {policy, make_leaves(policy, cloud, std::min(k, cloud.size()) + 1), cloud.size(), k};
+  return {policy, make_leaves(policy, orbis::cloud::detail::viewed_points{cloud}, std::min(k, cloud.size()) + 1),
+          cloud.size(), k};
 }
 
 /// Points whose row in the graph is not, bit for bit, that of the table.
@@ -102,7 +104,8 @@ TEST_CASE("a graph of a part of a cloud is that of the part alone") {
     part.push_back(cloud[i]);
     index.push_back(static_cast<std::uint32_t>(i));
   }
-  const neighbor_graph graph{orbis::seq, make_leaves(orbis::seq, cloud, 13, there), cloud.size(), 12};
+  const neighbor_graph graph{orbis::seq, make_leaves(orbis::seq, orbis::cloud::detail::viewed_points{cloud}, 13, there),
+                             cloud.size(), 12};
   const neighbor_graph alone = graph_of(orbis::seq, part, 12);
   REQUIRE(graph.size() == alone.size());
   std::size_t different = 0;

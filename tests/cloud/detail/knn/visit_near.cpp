@@ -5,6 +5,7 @@
 #include <vector>
 
 #include <orbis/cloud/detail/knn/visit_near.hpp>
+#include <orbis/cloud/detail/point_view.hpp>
 #include <orbis/core/execution.hpp>
 
 #include "cloud/clouds.hpp"
@@ -18,7 +19,8 @@ TEST_CASE("the nearest point of those that count is the one that brute force fin
   orbis::test::points cloud = orbis::test::uniform_cloud(3000, 1);
   for (std::size_t i = 0; i != 1000; ++i) cloud.push_back(cloud[3 * i]);  // copies: ties
   cloud.emplace_back(1e25F, 0.0F, 0.0F);                                  // so far that squares overflow
-  const auto tree = make_leaves(orbis::seq, cloud, std::numeric_limits<std::size_t>::max());
+  const auto tree =
+      make_leaves(orbis::seq, orbis::cloud::detail::viewed_points{cloud}, std::numeric_limits<std::size_t>::max());
   const orbis::cloud::detail::knn_kernels kernels;
   for (const std::uint32_t every : {1U, 7U, 400U, 3999U}) {
     const auto counts = [&](std::uint32_t index) { return index % every == every - 1; };

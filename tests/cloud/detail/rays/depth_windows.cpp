@@ -4,7 +4,7 @@
 #include <limits>
 #include <vector>
 
-#include <orbis/cloud/detail/rays/depth_windows.hpp>
+#include <orbis/cloud/detail/rays/take_depth_windows.hpp>
 #include <orbis/core/random.hpp>
 
 #include "support/catch.hpp"

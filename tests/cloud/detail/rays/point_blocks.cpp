@@ -4,7 +4,8 @@
 #include <cstdint>
 #include <vector>
 
-#include <orbis/cloud/detail/rays/point_blocks.hpp>
+#include <orbis/cloud/detail/point_view.hpp>
+#include <orbis/cloud/detail/rays/make_point_blocks.hpp>
 
 #include "cloud/clouds.hpp"
 #include "support/catch.hpp"
@@ -15,7 +16,7 @@ using orbis::cloud::detail::point_blocks;
 TEST_CASE("blocks hold every finite point once, within their boxes") {
   for (const auto& [name, cloud] : orbis::test::all_clouds()) {
     INFO(name);
-    const point_blocks blocks = make_point_blocks(orbis::par.with(3), cloud);
+    const point_blocks blocks = make_point_blocks(orbis::par.with(3), orbis::cloud::detail::viewed_points{cloud});
     std::vector<std::uint32_t> finite;
     for (std::uint32_t i = 0; i != cloud.size(); ++i) {
       if (cloud[i].allFinite()) finite.push_back(i);
@@ -42,7 +43,7 @@ TEST_CASE("blocks hold every finite point once, within their boxes") {
       }
     }
     CHECK(wrong == 0);
-    const point_blocks alone = make_point_blocks(orbis::seq, cloud);
+    const point_blocks alone = make_point_blocks(orbis::seq, orbis::cloud::detail::viewed_points{cloud});
     CHECK(alone.index == blocks.index);
   }
 }
@@ -56,9 +57,9 @@ TEST_CASE("blocks of a shuffled cloud are small, one wild point or not") {
     return sum / static_cast<double>(blocks.blocks.size());
   };
   // A cube with 128 of the 100,000 points has 1/781 of the volume.
-  CHECK(mean_volume(make_point_blocks(orbis::seq, cloud)) < 5.0 / 781);
+  CHECK(mean_volume(make_point_blocks(orbis::seq, orbis::cloud::detail::viewed_points{cloud})) < 5.0 / 781);
   cloud.emplace_back(1e6F, -1e6F, 2e5F);
-  auto blocks = make_point_blocks(orbis::seq, cloud);
+  auto blocks = make_point_blocks(orbis::seq, orbis::cloud::detail::viewed_points{cloud});
   std::erase_if(blocks.blocks, [](const auto& box) { return box.high[0] > 1e5F; });
   CHECK(blocks.blocks.size() > 700);
   CHECK(mean_volume(blocks) < 0.2);

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include <orbis/cloud/all_knn.hpp>
+#include <orbis/cloud/detail/point_view.hpp>
 #include <orbis/cloud/detail/select/local_shape.hpp>
 
 #include "cloud/clouds.hpp"
@@ -40,8 +41,9 @@ TEST_CASE("a point in a plane, at an edge, in a volume and beside a surface") {
 
 TEST_CASE("what is usual around is a quantile over neighbours, and of any policy") {
   const auto cloud = orbis::test::uniform_cloud(3000, 3);
-  const orbis::cloud::detail::neighbor_graph graph{orbis::seq, orbis::cloud::detail::make_leaves(orbis::seq, cloud, 13),
-                                                   cloud.size(), 12};
+  const orbis::cloud::detail::neighbor_graph graph{
+      orbis::seq, orbis::cloud::detail::make_leaves(orbis::seq, orbis::cloud::detail::viewed_points{cloud}, 13),
+      cloud.size(), 12};
   orbis::random_bits random{4};
   std::vector<float> values(cloud.size());
   for (float& v : values) v = static_cast<float>(random.uniform());
@@ -81,7 +83,8 @@ TEST_CASE("what is usual around is the same on every vector unit, however many v
   for (const std::size_t size : {2U, 7U, 600U}) {
     const auto cloud = orbis::test::uniform_cloud(size, 5);
     const orbis::cloud::detail::neighbor_graph graph{
-        orbis::seq, orbis::cloud::detail::make_leaves(orbis::seq, cloud, 13), cloud.size(), 12};
+        orbis::seq, orbis::cloud::detail::make_leaves(orbis::seq, orbis::cloud::detail::viewed_points{cloud}, 13),
+        cloud.size(), 12};
     const std::size_t width = std::min<std::size_t>(12, size - 1);
     orbis::random_bits random{6};
     for (const double missing : {0.0, 0.1, 0.9, 1.0}) {

@@ -176,11 +176,10 @@ struct chosen_leaves {
   }
 };
 
-/// Writes the squared distances within `bound` from a point to those of the leaves of `near` whose boxes are within
-/// `bound`, then sixteen times infinity. Returns how many they are. Ends early with more than `capacity` of them;
-/// touches no more than `capacity + 3 * leaf_width`. `scratch`: longer by sixteen than `near.leaves`.
+/// Writes the squared distances within `bound` from a point to those of the leaves that were chosen, then sixteen times
+/// infinity. Returns how many they are. Ends early with more than `capacity` of them; touches no more than
+/// `capacity + 3 * leaf_width`.
 struct near_in_leaves {
-  /// The same of the leaves that were chosen.
   template <simd::vector V>
   static ORBIS_ALWAYS_INLINE std::size_t collect(const point_row* leaves, const std::uint32_t* chosen,
                                                  std::size_t number, const spread_point<V>& q, const V& bound,
@@ -192,17 +191,6 @@ struct near_in_leaves {
     }
     simd::vec<float, leaf_width, typename V::target_type>(std::numeric_limits<float>::infinity()).store(found + count);
     return count;
-  }
-  template <simd::target Target>
-  static ORBIS_ALWAYS_INLINE std::size_t run(const point_row* leaves, const nearby_leaves& near,
-                                             const std::array<float, 3>& query, float bound, std::uint32_t* scratch,
-                                             float* found, std::size_t capacity) {
-    using lanes = simd::native_vec<float, Target>;
-    const spread_point<lanes> q{query};
-    const lanes border = bound;
-    const std::size_t chosen =
-        chosen_leaves::find<lanes, simd::native_vec<std::uint32_t, Target>>(near, q, border, scratch);
-    return collect(leaves, scratch, chosen, q, border, found, capacity);
   }
 };
 
@@ -230,21 +218,11 @@ struct places_in_leaves {
     simd::vec<float, leaf_width, typename V::target_type>(std::numeric_limits<float>::infinity()).store(found + count);
     return count;
   }
-  template <simd::target Target>
-  static ORBIS_ALWAYS_INLINE std::size_t run(const point_row* leaves, const nearby_leaves& near,
-                                             const std::array<float, 3>& query, float bound, std::uint32_t* scratch,
-                                             float* found, std::uint32_t* places, std::size_t capacity) {
-    using lanes = simd::native_vec<float, Target>;
-    const spread_point<lanes> q{query};
-    const lanes border = bound;
-    const std::size_t chosen =
-        chosen_leaves::find<lanes, simd::native_vec<std::uint32_t, Target>>(near, q, border, scratch);
-    return collect(leaves, scratch, chosen, q, border, found, places, capacity);
-  }
 };
 
-/// `near_in_leaves` or, with `places`, `places_in_leaves` for the points [first, last) of a leaf, whose rows in `found`
-/// and `places` are `stride` long; sets their `counts`. `scratch`: sixteen rows, each longer by sixteen than
+/// `near_in_leaves` or, with `places`, `places_in_leaves` for the points [first, last) of a leaf and those leaves of
+/// `near` whose boxes are within `bound` of them. Their rows in `found` and `places` are `stride` long; sets their
+/// `counts`. `scratch`: sixteen rows, each longer by sixteen than
 /// `near.leaves`. In two passes, so that what the first one writes for a point has reached the cache when the second
 /// one reads it.
 struct near_in_leaves_each {
@@ -537,40 +515,39 @@ struct knn_kernels {
   using point = std::array<float, 3>;
   using boxes_code = std::uint32_t(const box_axes&, const box3&, float, float*);
   using gather_code = void(const box_row&, std::uint32_t, std::uint32_t, nearby_leaves&);
-  using leaves_code = std::size_t(const point_row*, const nearby_leaves&, const point&, float, std::uint32_t*, float*,
-                                  std::size_t);
-  using places_code = std::size_t(const point_row*, const nearby_leaves&, const point&, float, std::uint32_t*, float*,
-                                  std::uint32_t*, std::size_t);
   using leaf_code = std::size_t(const point_row&, const point&, float, float*);
   using distances_code = std::uint32_t(const point_row&, const point&, float, float*);
   using each_code = void(const point_row*, const nearby_leaves&, const point_row&, std::size_t, std::size_t, float,
                          std::uint32_t*, float*, std::uint32_t*, std::size_t, std::size_t, std::uint32_t*);
-  using sum_code = nearest_sum(const float*, std::size_t, std::size_t, float);
   using sums_code = void(const float*, std::size_t, std::size_t, std::size_t, const std::uint32_t*, std::size_t,
                          const float*, nearest_sum*);
   using rank_code = float(const float*, std::size_t);
 
   boxes_code* near_boxes = simd::kernel<detail::near_boxes, boxes_code>();
   gather_code* gather = simd::kernel<gather_leaves, gather_code>();
-  leaves_code* near_points = simd::kernel<near_in_leaves, leaves_code>();
   each_code* near_points_of_each = simd::kernel<near_in_leaves_each, each_code>();
-  places_code* near_places = simd::kernel<places_in_leaves, places_code>();
   leaf_code* in_leaf = simd::kernel<near_in_leaf, leaf_code>();
   distances_code* distances = simd::kernel<leaf_distances, distances_code>();
-  sum_code* sum_nearest = simd::kernel<detail::sum_nearest, sum_code>();
   sums_code* sums_of_each = simd::kernel<sum_nearest_each, sums_code>();
   rank_code* ranked = simd::kernel<ranked_of_leaf, rank_code>();
+
+  /// `near_points_of_each` for one point: returns its count. `scratch`: longer by sixteen than `near.leaves`.
+  [[nodiscard]] std::size_t near_point(const point_row* leaves, const nearby_leaves& near, const point& query,
+                                       float bound, std::uint32_t* scratch, float* found, std::uint32_t* places,
+                                       std::size_t capacity) const {
+    point_row row{};
+    for (std::size_t a = 0; a != 3; ++a) row.axis[a][0] = query[a];
+    std::uint32_t count = 0;
+    near_points_of_each(leaves, near, row, 0, 1, bound, scratch, found, places, 0, capacity, &count);
+    return count;
+  }
+  /// `sums_of_each` for one point. @pre as for `detail::sum_nearest`
+  [[nodiscard]] nearest_sum sum_nearest(const float* found, std::size_t count, std::size_t wanted, float bound) const {
+    const auto counted = static_cast<std::uint32_t>(count);
+    nearest_sum out;
+    sums_of_each(found, 0, 0, 1, &counted, wanted, &bound, &out);
+    return out;
+  }
 };
 
 }  // namespace orbis::cloud::detail
-
-ORBIS_COMPILED_KERNEL(orbis::cloud::detail::near_boxes, orbis::cloud::detail::knn_kernels::boxes_code);
-ORBIS_COMPILED_KERNEL(orbis::cloud::detail::gather_leaves, orbis::cloud::detail::knn_kernels::gather_code);
-ORBIS_COMPILED_KERNEL(orbis::cloud::detail::near_in_leaves, orbis::cloud::detail::knn_kernels::leaves_code);
-ORBIS_COMPILED_KERNEL(orbis::cloud::detail::near_in_leaves_each, orbis::cloud::detail::knn_kernels::each_code);
-ORBIS_COMPILED_KERNEL(orbis::cloud::detail::places_in_leaves, orbis::cloud::detail::knn_kernels::places_code);
-ORBIS_COMPILED_KERNEL(orbis::cloud::detail::near_in_leaf, orbis::cloud::detail::knn_kernels::leaf_code);
-ORBIS_COMPILED_KERNEL(orbis::cloud::detail::leaf_distances, orbis::cloud::detail::knn_kernels::distances_code);
-ORBIS_COMPILED_KERNEL(orbis::cloud::detail::sum_nearest, orbis::cloud::detail::knn_kernels::sum_code);
-ORBIS_COMPILED_KERNEL(orbis::cloud::detail::sum_nearest_each, orbis::cloud::detail::knn_kernels::sums_code);
-ORBIS_COMPILED_KERNEL(orbis::cloud::detail::ranked_of_leaf, orbis::cloud::detail::knn_kernels::rank_code);

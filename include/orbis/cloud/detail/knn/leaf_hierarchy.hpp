@@ -9,12 +9,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
-#include <ranges>
 #include <span>
 #include <utility>
 #include <vector>
 
-#include <orbis/cloud/detail/select/decision.hpp>
+#include <orbis/cloud/detail/point_view.hpp>
+#include <orbis/cloud/detail/threads_of.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/point.hpp>
 #include <orbis/core/simd.hpp>
@@ -96,7 +96,6 @@ struct fill_curve_keys {
 /// cells a side; where many points share a cell, along a curve of its own within it, and so on. So
 /// the leaves follow the density however uneven it is. Each level divides the extent by a thousand,
 /// of which float has room for 28: O(n) on usual clouds, never worse than 28 times that.
-template <point_range Points>
 class leaf_order {
  public:
   struct entry {
@@ -112,9 +111,9 @@ class leaf_order {
   /// `most_copies` are left out, so that a search never meets more of them than it has use for.
   /// `there`: for each point whether it is looked at; empty for all.
   template <execution_policy Policy>
-  leaf_order(const Policy& policy, const Points& points, std::size_t most_copies, std::span<const char> there = {})
-      : points_{&points}, most_copies_{most_copies} {
-    const auto count = static_cast<std::uint32_t>(std::ranges::size(points));
+  leaf_order(const Policy& policy, const point_view& points, std::size_t most_copies, std::span<const char> there = {})
+      : points_{points}, most_copies_{most_copies} {
+    const auto count = static_cast<std::uint32_t>(points.size());
     const auto counts = [&](std::uint32_t i) { return (there.empty() || there[i] != 0) && is_finite(position(i)); };
     std::size_t present = 0;
     for (std::uint32_t i = 0; i != count; ++i) present += counts(i) ? 1 : 0;
@@ -123,7 +122,7 @@ class leaf_order {
       if (counts(i)) entries_.push_back({0, i});
     }
     spare_.resize(entries_.size());
-    order(policy, 0, entries_.size());
+    order(threads_of(policy), 0, entries_.size());
     std::vector<entry>{}.swap(spare_);
   }
   [[nodiscard]] std::span<const entry> entries() const noexcept { return entries_; }
@@ -131,9 +130,7 @@ class leaf_order {
   void drop_entries() noexcept { std::vector<entry>{}.swap(entries_); }
   /// The entries left out, in ascending order. Each has at least `most_copies` copies elsewhere.
   [[nodiscard]] std::span<const range> left_out() const noexcept { return left_out_; }
-  [[nodiscard]] std::array<float, 3> position(std::uint32_t i) const {
-    return coordinates<float>(point_at(*points_, i));
-  }
+  [[nodiscard]] std::array<float, 3> position(std::uint32_t i) const noexcept { return points_[i]; }
 
  private:
   static constexpr std::size_t few = 2 * leaf_width;  // points that may share a cell
@@ -180,7 +177,7 @@ class leaf_order {
     for (std::size_t first = begin; first != end;) {
       std::size_t last = first + 1;
       while (last != end && entries_[last].key == entries_[first].key) ++last;
-      if (last - first > few) order(seq, first, last);
+      if (last - first > few) order(parallel_policy{1}, first, last);
       first = last;
     }
   }
@@ -214,7 +211,7 @@ class leaf_order {
               first);
   }
 
-  const Points* points_;
+  point_view points_;
   std::size_t most_copies_;
   std::vector<entry> entries_;
   std::vector<entry> spare_;
@@ -254,11 +251,11 @@ struct leaf_hierarchy {
 
 /// `there`: for each point whether it is looked at; empty for all.
 /// @pre most_copies > 0, fewer than 2^32 points; there is empty or as long as points
-template <execution_policy Policy, point_range Points>
-[[nodiscard]] leaf_hierarchy make_leaves(const Policy& policy, const Points& points, std::size_t most_copies,
+template <execution_policy Policy>
+[[nodiscard]] leaf_hierarchy make_leaves(const Policy& policy, const point_view& points, std::size_t most_copies,
                                          std::span<const char> there = {}) {
   leaf_hierarchy out;
-  leaf_order<Points> order{policy, points, most_copies, there};
+  leaf_order order{policy, points, most_copies, there};
   const auto entries = order.entries();
   out.finite = entries.size();
   std::size_t copies = 0;
@@ -320,5 +317,3 @@ template <execution_policy Policy, point_range Points>
 }
 
 }  // namespace orbis::cloud::detail
-
-ORBIS_COMPILED_KERNEL(orbis::cloud::detail::fill_curve_keys, void(orbis::cloud::detail::curve_block&));

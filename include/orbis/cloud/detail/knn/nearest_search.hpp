@@ -259,9 +259,9 @@ class nearest_search {
     const point_row* const leaves = tree_->leaves.data();
     const std::array<float, 3> q = query(l, i);
     float* const found = found_.data() + i * stride_;
-    if (places_.empty()) return {kernels_.near_points(leaves, near, q, bound, chosen_.data(), found, capacity_), bound};
-    std::uint32_t* const places = places_.data() + i * stride_;
-    return {kernels_.near_places(leaves, near, q, bound, chosen_.data(), found, places, capacity_), bound, true};
+    std::uint32_t* const places = places_.empty() ? nullptr : places_.data() + i * stride_;
+    return {kernels_.near_point(leaves, near, q, bound, chosen_.data(), found, places, capacity_), bound,
+            places != nullptr};
   }
 
   /// Gathers the leaves near a box within leaf `l` into `shared_`. The box of its row holds those of its leaves, so

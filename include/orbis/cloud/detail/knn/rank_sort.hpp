@@ -113,5 +113,3 @@ class rank_sorter {
 };
 
 }  // namespace orbis::cloud::detail
-
-ORBIS_COMPILED_KERNEL(orbis::cloud::detail::find_ranks, void(const std::int32_t*, std::size_t, std::int32_t*));

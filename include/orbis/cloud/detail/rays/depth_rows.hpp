@@ -83,9 +83,3 @@ void read_depth_row(const depth_row_kernels& kernels, const Depth& depth, int y,
 }
 
 }  // namespace orbis::cloud::detail
-
-ORBIS_COMPILED_KERNEL_AVX2(orbis::cloud::detail::widen_range,
-                           void(float*, float*, const float*, const float*, std::size_t));
-ORBIS_COMPILED_KERNEL_AVX2(orbis::cloud::detail::replace_zeros, void(float*, float, std::size_t));
-ORBIS_COMPILED_KERNEL_AVX2(orbis::cloud::detail::stored_to_metres,
-                           void(const std::uint16_t*, double, float, float, float*, std::size_t));

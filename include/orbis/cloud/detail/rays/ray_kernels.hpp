@@ -169,16 +169,3 @@ struct ray_kernels {
 };
 
 }  // namespace orbis::cloud::detail
-
-ORBIS_COMPILED_KERNEL(orbis::cloud::detail::locate_in_pinhole,
-                      void(const orbis::cloud::detail::ray_view&, const orbis::cloud::detail::block_axes&,
-                           orbis::cloud::detail::seen_block&));
-ORBIS_COMPILED_KERNEL(orbis::cloud::detail::judge_by_windows,
-                      void(const orbis::cloud::detail::ray_view&, const orbis::cloud::detail::seen_block&,
-                           orbis::cloud::detail::block_verdict&));
-ORBIS_COMPILED_KERNEL(orbis::cloud::detail::count_points<true>,
-                      void(const std::array<std::uint16_t, orbis::cloud::detail::block_verdict::words>&,
-                           std::uint16_t*));
-ORBIS_COMPILED_KERNEL(orbis::cloud::detail::count_points<false>,
-                      void(const std::array<std::uint16_t, orbis::cloud::detail::block_verdict::words>&,
-                           std::uint16_t*));

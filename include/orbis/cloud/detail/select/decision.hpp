@@ -7,10 +7,10 @@
 #include <concepts>
 #include <cstddef>
 #include <cstdint>
-#include <ranges>
 #include <span>
 #include <vector>
 
+#include <orbis/cloud/detail/point_view.hpp>
 #include <orbis/cloud/extract.hpp>
 #include <orbis/core/point.hpp>
 
@@ -29,20 +29,14 @@ template <std::predicate<std::size_t> Keep>
   return out;
 }
 
-/// The i-th point of a cloud.
-template <point_range Points>
-[[nodiscard]] decltype(auto) point_at(const Points& points, std::size_t i) {
-  return std::ranges::begin(points)[static_cast<std::ranges::range_difference_t<const Points>>(i)];
-}
-
 /// The indices, ascending, of the points that are not outliers by their score; those that have none
 /// (NaN) by what `policy` says, unless they are finite: a point that is alone stays.
-template <point_range Points, std::predicate<float> Outlier>
-[[nodiscard]] std::vector<std::uint32_t> inliers_by_score(const Points& points, std::span<const float> score,
+template <std::predicate<float> Outlier>
+[[nodiscard]] std::vector<std::uint32_t> inliers_by_score(const point_view& points, std::span<const float> score,
                                                           non_finite policy, Outlier&& outlier) {
   return indices_where(score.size(), [&](std::size_t i) {
     if (!std::isnan(score[i])) return !outlier(score[i]);
-    return policy == non_finite::keep || is_finite(coordinates<float>(point_at(points, i)));
+    return policy == non_finite::keep || is_finite(points[i]);
   });
 }
 

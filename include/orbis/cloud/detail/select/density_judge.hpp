@@ -115,15 +115,16 @@ template <execution_policy Policy>
 }
 
 [[nodiscard]] inline std::string in_words(const density_evidence& e) {
-  std::string out = percent(e.removed) + " of the points lie more than " + in_words(std::exp(e.threshold)) +
-                    " times sparser than usual";
+  std::string out = joined({percent(e.removed), " of the points lie more than ", in_words(std::exp(e.threshold)),
+                            " times sparser than usual"});
   if (e.mode == filter_mode::range_log_statistical) out += " at their range";
   if (e.mode == filter_mode::local_log_statistical) out += " around them";
   out += " and on no surface";
   if (e.threshold == e.valley_position) {
-    out += " (a population apart: the valley before it is " + in_words(e.valley_ratio) + " times lower than its peak)";
+    out += joined(
+        {" (a population apart: the valley before it is ", in_words(e.valley_ratio), " times lower than its peak)"});
   } else if (e.shoulder > 0.01) {
-    out += " (" + percent(e.shoulder) + " make a shoulder just outside the bulk, as flying pixels do)";
+    out += joined({" (", percent(e.shoulder), " make a shoulder just outside the bulk, as flying pixels do)"});
   }
   return out;
 }
@@ -207,8 +208,8 @@ void judge_points(const Policy& policy, surroundings& around, const select_optio
     step.offset = local.step.offset;
     evidence.isolated = try_step(step);
     if (evidence.isolated > 0) {
-      reasons.push_back(percent(evidence.isolated) + " are groups of fewer than " + std::to_string(step.min_size) +
-                        " points further than " + in_words(step.reach) + " usual spacings from all others");
+      reasons.push_back(joined({percent(evidence.isolated), " are groups of fewer than ", std::to_string(step.min_size),
+                                " points further than ", in_words(step.reach), " usual spacings from all others"}));
     }
   }
   if (options.allows(filter_mode::cluster)) {
@@ -217,8 +218,9 @@ void judge_points(const Policy& policy, surroundings& around, const select_optio
     step.min_gap = 4;
     evidence.clustered = try_step(step);
     if (evidence.clustered > 0) {
-      reasons.push_back(percent(evidence.clustered) + " are clusters of fewer than " + std::to_string(step.min_size) +
-                        " points that hang " + in_words(step.min_gap) + " spacings or more from the surface");
+      reasons.push_back(
+          joined({percent(evidence.clustered), " are clusters of fewer than ", std::to_string(step.min_size),
+                  " points that hang ", in_words(step.min_gap), " spacings or more from the surface"}));
     }
   }
 }

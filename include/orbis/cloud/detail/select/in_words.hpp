@@ -4,7 +4,9 @@
 #pragma once
 
 #include <cstdio>
+#include <initializer_list>
 #include <string>
+#include <string_view>
 
 namespace orbis::cloud::detail {
 
@@ -12,6 +14,12 @@ namespace orbis::cloud::detail {
   char text[32];
   std::snprintf(text, sizeof text, "%.3g", value);
   return text;
+}
+/// Parts of a sentence, one after the other. Sums of strings take long to compile.
+[[nodiscard]] inline std::string joined(std::initializer_list<std::string_view> parts) {
+  std::string out;
+  for (const std::string_view part : parts) out += part;
+  return out;
 }
 [[nodiscard]] inline std::string percent(double share) { return in_words(100 * share) + " %"; }
 

@@ -14,12 +14,11 @@
 #include <utility>
 #include <vector>
 
-#include <Eigen/Eigenvalues>
-
 #include <orbis/cloud/detail/knn/neighbor_graph.hpp>
 #include <orbis/cloud/detail/select/decision.hpp>
 #include <orbis/cloud/neighbors.hpp>
 #include <orbis/core/execution.hpp>
+#include <orbis/core/jacobi.hpp>
 #include <orbis/core/point.hpp>
 #include <orbis/core/simd.hpp>
 #include <orbis/core/types.hpp>
@@ -135,13 +134,10 @@ template <point_range Points>
   mean /= count;
   distance /= count;
   if (!(distance > 0)) return 0;
-  Eigen::SelfAdjointEigenSolver<mat3> solver;
-  solver.computeDirect((squares / count - mean * transposed(mean)) / (distance * distance));
-  const double thickness = std::max(0.0, solver.eigenvalues()[0]);
-  const double height = dot(solver.eigenvectors().col(0), mean) / distance;
+  const auto spread = eigen_of_symmetric<3>((squares / count - mean * transposed(mean)) / (distance * distance));
+  const double thickness = std::max(0.0, spread.values[0]);
+  const double height = dot(column_of(spread.vectors, 0), mean) / distance;
   return std::sqrt(thickness + height * height);
 }
 
 }  // namespace orbis::cloud::detail
-
-ORBIS_COMPILED_KERNEL(orbis::cloud::detail::smallest_of_columns, void(const float*, std::size_t, float*));

@@ -26,8 +26,9 @@ namespace orbis::cloud::detail {
 template <std::ranges::contiguous_range Values>
 [[nodiscard]] double quantile(Values&& values, double q) {
   if (std::ranges::empty(values)) return 0;
-  const auto at = std::ranges::begin(values) + quantile_rank(std::ranges::ssize(values), q);
-  std::nth_element(std::ranges::begin(values), at, std::ranges::end(values));
+  auto* const first = std::ranges::data(values);  // one instantiation for all ranges
+  auto* const at = first + quantile_rank(std::ranges::ssize(values), q);
+  std::nth_element(first, at, first + std::ranges::size(values));
   return static_cast<double>(*at);
 }
 
@@ -116,18 +117,18 @@ struct bulk {
   if (values.empty()) return out;
   // Ranks of distances are those of values, from the other end on the left: no distances are stored.
   const auto median = static_cast<float>(out.median);
-  const auto end_below = std::partition(values.begin(), values.end(), [&](float x) { return x <= median; });
-  const auto below = std::span{values.begin(), end_below};
-  const auto count_below = std::ranges::ssize(below);
-  const auto left = below.begin() + (count_below - 1 - quantile_rank(count_below, 0.5));
-  std::nth_element(below.begin(), left, below.end());
+  float* const begin = values.data();
+  float* const end = begin + values.size();
+  float* const end_below = std::partition(begin, end, [&](float x) { return x <= median; });
+  const std::ptrdiff_t count_below = end_below - begin;
+  float* const left = begin + (count_below - 1 - quantile_rank(count_below, 0.5));
+  std::nth_element(begin, left, end_below);
   out.left_scale = 1.4826 * (out.median - double{*left});
-  const auto above = std::span{end_below, values.end()};
-  const auto equal = std::count(below.begin(), below.end(), median);
-  const std::ptrdiff_t rank = quantile_rank(equal + std::ranges::ssize(above), 0.5);
+  const std::ptrdiff_t equal = std::count(begin, end_below, median);
+  const std::ptrdiff_t rank = quantile_rank(equal + (end - end_below), 0.5);
   if (rank < equal) return out;
-  const auto right = above.begin() + (rank - equal);
-  std::nth_element(above.begin(), right, above.end());
+  float* const right = end_below + (rank - equal);
+  std::nth_element(end_below, right, end);
   out.right_scale = 1.4826 * (double{*right} - out.median);
   return out;
 }

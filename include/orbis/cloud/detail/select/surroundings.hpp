@@ -15,7 +15,7 @@
 #include <utility>
 #include <vector>
 
-#include <orbis/cloud/cluster.hpp>
+#include <orbis/cloud/cluster-inl.hpp>
 #include <orbis/cloud/detail/knn/leaf_hierarchy.hpp>
 #include <orbis/cloud/detail/knn/neighbor_graph.hpp>
 #include <orbis/cloud/detail/knn/squared_distance.hpp>
@@ -90,9 +90,9 @@ class surroundings {
   /// `left`: for each point whether it is there; those that are not finite are not.
   /// `ranges`: metres, for each point of the cloud, not finite or negative where unknown; empty if all are. They
   /// outlive this.
-  template <execution_policy Policy, point_range Points>
-  surroundings(const Policy& policy, const Points& points, std::span<const char> left, std::span<const float> ranges,
-               std::size_t neighbors)
+  template <execution_policy Policy>
+  surroundings(const Policy& policy, const point_view& points, std::span<const char> left,
+               std::span<const float> ranges, std::size_t neighbors)
       : ranges_{ranges} {
     const std::size_t most_copies = std::min(std::max(width, neighbors), left.size()) + 1;
     measure(policy, make_leaves(policy, points, most_copies, left), left.size(), neighbors);

@@ -19,7 +19,7 @@
 #include <orbis/cloud/detail/select/in_words.hpp>
 #include <orbis/cloud/filter_chain.hpp>
 #include <orbis/cloud/filter_choice.hpp>
-#include <orbis/cloud/ray_evidence.hpp>
+#include <orbis/cloud/ray_evidence-inl.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/point.hpp>
 
@@ -47,8 +47,8 @@ struct ray_removals {
 }
 
 /// Clears `left` where the views exclude a point. If cancelled, nothing is removed.
-template <execution_policy Policy, point_range Points, posed_depth_range Views, camera::camera_model Camera>
-ray_removals apply_rays(const Policy& policy, const Points& points, const ray_step& step, const Views& views,
+template <execution_policy Policy, posed_depth_range Views, camera::camera_model Camera>
+ray_removals apply_rays(const Policy& policy, const point_view& points, const ray_step& step, const Views& views,
                         const Camera& camera, std::span<char> left, bool& cancelled, progress on_progress) {
   ray_evidence_counter<Camera> counter{policy, points, camera, step.evidence};
   view_cleaner cleaner;
@@ -66,8 +66,9 @@ ray_removals apply_rays(const Policy& policy, const Points& points, const ray_st
 template <camera::camera_model Camera>
 class made_of_views {
  public:
-  template <execution_policy Policy, point_range Points>
-  made_of_views(const Policy& policy, const Points& points, const Camera& camera, const ray_evidence_options& options)
+  template <execution_policy Policy>
+  made_of_views(const Policy& policy, const point_view& points, const Camera& camera,
+                const ray_evidence_options& options)
       : counter_{policy, sample_of(points), camera, options} {}
 
   template <execution_policy Policy, posed_depth View>
@@ -82,13 +83,12 @@ class made_of_views {
   }
 
  private:
-  template <point_range Points>
-  [[nodiscard]] static std::vector<std::array<float, 3>> sample_of(const Points& points) {
+  [[nodiscard]] static std::vector<std::array<float, 3>> sample_of(const point_view& points) {
     constexpr std::size_t most = 4096;
     std::vector<std::array<float, 3>> sample;
-    const std::size_t size = std::ranges::size(points);
+    const std::size_t size = points.size();
     for (std::size_t i = 0; i < size; i += size / most + 1) {
-      const auto p = coordinates<float>(point_at(points, i));
+      const std::array<float, 3> p = points[i];
       if (is_finite(p)) sample.push_back(p);
     }
     return sample;
@@ -98,8 +98,8 @@ class made_of_views {
 
 /// Judges a cloud by its views, clears `left` where they exclude a point, and adds the step and its
 /// reason. False if cancelled.
-template <execution_policy Policy, point_range Points, posed_depth_range Views, camera::camera_model Camera>
-[[nodiscard]] bool judge_views(const Policy& policy, const Points& points, const Views& views, const Camera& camera,
+template <execution_policy Policy, posed_depth_range Views, camera::camera_model Camera>
+[[nodiscard]] bool judge_views(const Policy& policy, const point_view& points, const Views& views, const Camera& camera,
                                const select_options& options, std::span<char> left, filter_choice& choice,
                                std::vector<std::string>& reasons, progress on_progress) {
   filter_evidence& evidence = choice.evidence;
@@ -146,15 +146,16 @@ template <execution_policy Policy, point_range Points, posed_depth_range Views, 
   evidence.unsupported = static_cast<double>(removed.unsupported) / total;
   if (removed.passed_through + removed.unsupported == 0) return true;
   std::string why;
+  const std::string all = std::to_string(count);
   if (!step.distrusted.empty()) {
-    why = std::to_string(step.distrusted.size()) + " of " + std::to_string(count) +
-          (step.distrusted.size() == 1 ? " views contradicts" : " views contradict") + " the others (by up to " +
-          percent(trust.worst_conflict) + ") and " + (step.distrusted.size() == 1 ? "does" : "do") + " not count; ";
+    const bool one = step.distrusted.size() == 1;
+    why = joined({std::to_string(step.distrusted.size()), " of ", all, one ? " views contradicts" : " views contradict",
+                  " the others (by up to ", percent(trust.worst_conflict), ") and ", one ? "does" : "do",
+                  " not count; "});
   }
-  why += "the rays of " + std::to_string(count) + " views pass through " + percent(evidence.passed_through) +
-         " of the points";
+  why += joined({"the rays of ", all, " views pass through ", percent(evidence.passed_through), " of the points"});
   if (removed.unsupported > 0)
-    why += ", and " + percent(evidence.unsupported) + " are in no trusted view but as stray pixels";
+    why += joined({", and ", percent(evidence.unsupported), " are in no trusted view but as stray pixels"});
   reasons.push_back(std::move(why));
   choice.chain.emplace_back(std::move(step));
   return true;

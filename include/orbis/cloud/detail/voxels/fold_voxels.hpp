@@ -15,6 +15,7 @@
 #include <utility>
 #include <vector>
 
+#include <orbis/cloud/detail/point_view.hpp>
 #include <orbis/cloud/detail/voxels/voxel_cells.hpp>
 #include <orbis/cloud/detail/voxels/voxel_table.hpp>
 #include <orbis/core/bits.hpp>
@@ -47,31 +48,24 @@ concept voxel_fold = requires(const F& fold, F& out, typename F::record& r, std:
 
 /// Takes the points of [begin, end) into `block`, as many at a time as it holds, and calls `f(from, count)` for those
 /// of [from, from + count).
-template <class S, int CubeBits, point_range Points, class F>
-void for_each_block(point_block<S, CubeBits>& block, const Points& points, std::size_t begin, std::size_t end, F&& f) {
-  const auto first = std::ranges::begin(points);
+template <class S, int CubeBits, class F>
+void for_each_block(point_block<S, CubeBits>& block, const basic_point_view<S>& points, std::size_t begin,
+                    std::size_t end, F&& f) {
   for (std::size_t from = begin; from != end;) {
     const std::size_t count = std::min(end - from, block.capacity);
-    block.assign(count, [&](std::size_t i) {
-      return coordinates<S>(first[static_cast<std::ranges::range_difference_t<const Points>>(from + i)]);
-    });
+    block.assign(count, [&](std::size_t i) { return points[from + i]; });
     f(from, count);
     from += count;
   }
 }
 
-/// The number type in which cells are found: double holds all that a cloud can have.
-template <class Points>
-using voxel_scalar =
-    std::conditional_t<std::is_same_v<point_scalar_t<std::ranges::range_value_t<Points>>, float>, float, double>;
-
 /// One pass with one table, first for `expected` voxels, which gives up at more than `most`: false.
-template <point_range Points, voxel_fold Fold>
-[[nodiscard]] bool fold_in_one_table(const Points& points, double size, std::size_t expected, std::size_t most,
-                                     Fold& fold) {
+template <std::floating_point S, voxel_fold Fold>
+[[nodiscard]] bool fold_in_one_table(const basic_point_view<S>& points, double size, std::size_t expected,
+                                     std::size_t most, Fold& fold) {
   voxel_table<typename Fold::record> table{fold.empty};
-  point_block<voxel_scalar<Points>> block{size};
-  const std::size_t count = std::ranges::size(points);
+  point_block<S> block{size};
+  const std::size_t count = points.size();
   table.clear(expected);
   constexpr std::size_t piece = 4096;
   for (std::size_t begin = 0; begin < count; begin += piece) {
@@ -99,13 +93,13 @@ template <point_range Points, voxel_fold Fold>
 ///
 /// Source: Shatdal, Kant, Naughton, "Cache conscious algorithms for relational query processing", VLDB 1994
 /// (partitioning before hashing).
-template <point_range Points, voxel_fold Fold>
+template <std::floating_point S, voxel_fold Fold>
 class voxel_parts {
  public:
-  voxel_parts(const Points& points, double size)
+  voxel_parts(const basic_point_view<S>& points, double size)
       : points_{points},
         size_{size},
-        count_{std::ranges::size(points)},
+        count_{points.size()},
         bits_{std::clamp(std::bit_width(count_ / points_of_part), std::size_t{4}, std::size_t{11})},
         starts_((std::size_t{1} << bits_) + 1),
         part_of_{std::make_unique_for_overwrite<std::uint16_t[]>(count_)} {}
@@ -121,7 +115,7 @@ class voxel_parts {
     const std::size_t width = std::max<std::size_t>(1, parts() / chunks);
     for_each_chunk(policy, parts(), width, [&](std::size_t begin, std::size_t end) {
       voxel_table<typename Fold::record> table{fold.empty};
-      point_block<voxel_scalar<Points>> block{size_};
+      point_block<S> block{size_};
       for (std::size_t part = begin; part != end; ++part) {
         table.clear(std::min<std::size_t>(starts_[part + 1] - starts_[part], usual_voxels));
         fill(table, block, part, fold);
@@ -149,7 +143,7 @@ class voxel_parts {
   static constexpr std::size_t grain = std::size_t{1} << 15U;
   static constexpr std::uint16_t no_part = 0xffff;
   static constexpr std::uint16_t first_of_voxel = 0xfffe;
-  static constexpr bool keeps_coordinates = std::is_same_v<voxel_scalar<Points>, float>;
+  static constexpr bool keeps_coordinates = std::is_same_v<S, float>;
 
   /// A point: its coordinates as float, or its key where they are double; later a voxel's words and first point.
   struct entry {
@@ -190,7 +184,7 @@ class voxel_parts {
     std::vector<std::uint32_t> at((count_ + grain - 1) / grain * parts());
     for_each_chunk(policy, count_, grain, [&](std::size_t begin, std::size_t end) {
       const auto counts = at.begin() + static_cast<std::ptrdiff_t>(begin / grain * parts());
-      point_block<voxel_scalar<Points>, 3> block{size_};
+      point_block<S, 3> block{size_};
       for_each_block(block, points_, begin, end, [&](std::size_t from, std::size_t taken) {
         for (std::size_t i = 0; i != taken; ++i) {
           std::uint16_t& part = part_of_[from + i];
@@ -211,15 +205,14 @@ class voxel_parts {
     for_each_chunk(policy, count_, grain, [&](std::size_t begin, std::size_t end) {
       const auto next = at.begin() + static_cast<std::ptrdiff_t>(begin / grain * parts());
       if constexpr (keeps_coordinates) {
-        const auto first = std::ranges::begin(points_);
         for (std::size_t i = begin; i != end; ++i) {
           if (part_of_[i] == no_part) continue;
-          const auto p = coordinates<float>(first[static_cast<std::ranges::range_difference_t<const Points>>(i)]);
+          const auto p = points_[i];
           entries_[next[part_of_[i]]++] = {std::bit_cast<std::array<std::uint32_t, 3>>(p),
                                            static_cast<std::uint32_t>(i)};
         }
       } else {
-        point_block<voxel_scalar<Points>> block{size_};
+        point_block<S> block{size_};
         for_each_block(block, points_, begin, end, [&](std::size_t from, std::size_t taken) {
           for (std::size_t i = 0; i != taken; ++i) {
             const std::uint16_t part = part_of_[from + i];
@@ -232,7 +225,7 @@ class voxel_parts {
     });
   }
 
-  void fill(voxel_table<typename Fold::record>& table, point_block<voxel_scalar<Points>>& block, std::size_t part,
+  void fill(voxel_table<typename Fold::record>& table, point_block<S>& block, std::size_t part,
             const Fold& fold) const {
     const std::size_t end = starts_[part + 1];
     const auto add = [&](const voxel_key& key, std::uint32_t hash, std::uint32_t index,
@@ -251,18 +244,16 @@ class voxel_parts {
         from += count;
       }
     } else {
-      const auto first = std::ranges::begin(points_);
       for (std::size_t at = starts_[part]; at != end; ++at) {
         const auto key = std::bit_cast<voxel_key>(entries_[at].words);
         const std::uint32_t index = entries_[at].index;
         table.reserve_more(1, end - starts_[part]);
-        add(key, mixed_key(key), index,
-            coordinates<double>(first[static_cast<std::ranges::range_difference_t<const Points>>(index)]));
+        add(key, mixed_key(key), index, coordinates<double>(points_[index]));
       }
     }
   }
 
-  const Points& points_;
+  const basic_point_view<S>& points_;
   double size_;
   std::size_t count_;
   std::size_t bits_;
@@ -278,22 +269,21 @@ class voxel_parts {
 ///
 /// Source: A. Chao, "Nonparametric estimation of the number of classes in a population", Scandinavian Journal of
 /// Statistics 11, 1984.
-template <point_range Points>
-[[nodiscard]] std::size_t estimated_voxels(const Points& points, double size) {
-  const std::size_t count = std::ranges::size(points);
+template <std::floating_point S>
+[[nodiscard]] std::size_t estimated_voxels(const basic_point_view<S>& points, double size) {
+  const std::size_t count = points.size();
   const std::size_t sample = std::min<std::size_t>(4096, count / 64 + 1), stretch = count / sample;
   struct times {
     std::uint32_t n;
   };
   voxel_table<times> table{{}};
   table.clear(sample);
-  point_block<voxel_scalar<Points>> block{size};
-  const auto first = std::ranges::begin(points);
+  point_block<S> block{size};
   for (std::size_t from = 0; from != sample;) {
     const std::size_t taken = std::min<std::size_t>(sample - from, block.capacity);
     block.assign(taken, [&](std::size_t i) {
       const std::size_t at = (from + i) * stretch + mix64(from + i) % stretch;
-      return coordinates<voxel_scalar<Points>>(first[static_cast<std::ranges::range_difference_t<const Points>>(at)]);
+      return points[at];
     });
     for (std::size_t i = 0; i != taken; ++i)
       if (is_cell(block.key(i))) table.update(block.key(i), block.hash(i), 0, [](times& t) { ++t.n; });
@@ -313,15 +303,15 @@ template <point_range Points>
 /// out. O(n). Memory: for at most 2^17 points on one thread a table for them, else 20 bytes per point, 25 with
 /// colours; besides, for a while, a table that turns out to be too small, or that of the largest part.
 /// @pre size > 0, fewer than 2^32 - 1 points
-template <execution_policy Policy, point_range Points, voxel_fold Fold>
-void fold_voxels(const Policy& policy, const Points& points, double size, Fold&& fold) {
+template <execution_policy Policy, std::floating_point S, voxel_fold Fold>
+void fold_voxels(const Policy& policy, const basic_point_view<S>& points, double size, Fold&& fold) {
   constexpr std::size_t small = std::size_t{1} << 12U, medium = std::size_t{1} << 17U;
-  const std::size_t count = std::ranges::size(points);
+  const std::size_t count = points.size();
   if (count <= small || policy.threads() <= 1) {
     const std::size_t expected = count <= small ? count : estimated_voxels(points, size);
     if ((count <= medium || expected <= medium / 2) && fold_in_one_table(points, size, expected, medium, fold)) return;
   }
-  voxel_parts<Points, std::remove_cvref_t<Fold>>{points, size}.fold(policy, fold);
+  voxel_parts<S, std::remove_cvref_t<Fold>>{points, size}.fold(policy, fold);
 }
 
 }  // namespace orbis::cloud::detail

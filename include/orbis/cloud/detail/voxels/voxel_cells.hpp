@@ -10,23 +10,10 @@
 #include <cstdint>
 #include <span>
 
+#include <orbis/cloud/detail/voxels/voxel_key.hpp>
 #include <orbis/core/simd.hpp>
 
 namespace orbis::cloud::detail {
-
-/// A cell of a grid through the origin.
-using voxel_key = std::array<std::int32_t, 3>;
-
-/// Whether a number of `voxel_cells` is that of a cell.
-[[nodiscard]] constexpr bool is_cell(std::int32_t cell) noexcept { return cell > -2147483647 && cell < 2147483647; }
-[[nodiscard]] constexpr bool is_cell(const voxel_key& key) noexcept {
-  return is_cell(key[0]) && is_cell(key[1]) && is_cell(key[2]);
-}
-
-/// Whether two keys are the same. `std::array`'s own comparison is a call of memcmp.
-[[nodiscard]] constexpr bool same_key(const voxel_key& a, const voxel_key& b) noexcept {
-  return ((a[0] ^ b[0]) | (a[1] ^ b[1]) | (a[2] ^ b[2])) == 0;
-}
 
 /// `cells[i] = floor(x[i] * inverse_size)`, in double, where the magnitude is below 2^31 - 1; elsewhere, and where x[i]
 /// is not a number, something for which `is_cell` is false. @pre count is a multiple of eight

@@ -12,7 +12,7 @@
 #include <optional>
 #include <vector>
 
-#include <orbis/cloud/detail/voxels/voxel_cells.hpp>
+#include <orbis/cloud/detail/voxels/voxel_key.hpp>
 #include <orbis/core/hash_index.hpp>
 #include <orbis/core/point.hpp>
 #include <orbis/core/random.hpp>

@@ -14,25 +14,9 @@
 #include <orbis/core/simd/mask.hpp>
 #include <orbis/core/simd/math.hpp>
 #include <orbis/core/simd/vec.hpp>
+#include <orbis/nav/detail/field/slice_code.hpp>
 
 namespace orbis::nav::detail {
-
-/// The farthest that a field can reach, in voxels: its square still fits beside `far_away`.
-inline constexpr int max_reach = 181;
-/// The value of a voxel that is farther from all obstacles than the field reaches.
-inline constexpr std::uint16_t far_away = 0x7fff;
-/// Instead of a value, where a source has nothing to offer: with a square added it is neither equal to a value nor
-/// less.
-inline constexpr std::uint16_t no_offer = 0x8000;
-
-/// Row y * 8 + x.
-using slice = std::array<std::uint16_t, 64>;
-
-/// What a slice offers to slices beside it.
-struct slice_offer {
-  alignas(64) slice value;
-  std::uint16_t least = no_offer;  ///< of the values
-};
 
 template <class Target>
 using slice_lanes = simd::vec<std::uint16_t, 64, Target>;
@@ -181,22 +165,10 @@ template <class K>
 }
 
 /// The kernels for the processor that this runs on.
-struct slice_kernels {
-  choose_offer_kernel::signature* choose_offer = best_code<choose_offer_kernel>();
-  equal_slices_kernel::signature* equal_slices = best_code<equal_slices_kernel>();
-  lower_slices_kernel::signature* lower_slices = best_code<lower_slices_kernel>();
-  equal_rows_kernel::signature* equal_rows = best_code<equal_rows_kernel>();
-  lower_rows_kernel::signature* lower_rows = best_code<lower_rows_kernel>();
-  add_rows_kernel::signature* add_rows = best_code<add_rows_kernel>();
-  combine_slices_kernel::signature* combine_slices = best_code<combine_slices_kernel>();
-};
+[[nodiscard]] inline slice_code best_slice_code() noexcept {
+  return {best_code<choose_offer_kernel>(),  best_code<equal_slices_kernel>(), best_code<lower_slices_kernel>(),
+          best_code<equal_rows_kernel>(),    best_code<lower_rows_kernel>(),   best_code<add_rows_kernel>(),
+          best_code<combine_slices_kernel>()};
+}
 
 }  // namespace orbis::nav::detail
-
-ORBIS_COMPILED_KERNEL(orbis::nav::detail::choose_offer_kernel, orbis::nav::detail::choose_offer_kernel::signature);
-ORBIS_COMPILED_KERNEL(orbis::nav::detail::equal_slices_kernel, orbis::nav::detail::equal_slices_kernel::signature);
-ORBIS_COMPILED_KERNEL(orbis::nav::detail::lower_slices_kernel, orbis::nav::detail::lower_slices_kernel::signature);
-ORBIS_COMPILED_KERNEL(orbis::nav::detail::equal_rows_kernel, orbis::nav::detail::equal_rows_kernel::signature);
-ORBIS_COMPILED_KERNEL(orbis::nav::detail::lower_rows_kernel, orbis::nav::detail::lower_rows_kernel::signature);
-ORBIS_COMPILED_KERNEL(orbis::nav::detail::add_rows_kernel, orbis::nav::detail::add_rows_kernel::signature);
-ORBIS_COMPILED_KERNEL(orbis::nav::detail::combine_slices_kernel, orbis::nav::detail::combine_slices_kernel::signature);

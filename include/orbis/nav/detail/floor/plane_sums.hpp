@@ -102,8 +102,3 @@ struct plane_sums_kernel {
 };
 
 }  // namespace orbis::nav::detail
-
-ORBIS_COMPILED_KERNEL(orbis::nav::detail::plane_sums_kernel<std::int32_t>,
-                      orbis::nav::detail::plane_sums_kernel<std::int32_t>::signature);
-ORBIS_COMPILED_KERNEL(orbis::nav::detail::plane_sums_kernel<double>,
-                      orbis::nav::detail::plane_sums_kernel<double>::signature);

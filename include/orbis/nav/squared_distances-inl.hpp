@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The functions of squared_distances.hpp: inline, or, with ORBIS_COMPILED, compiled once, by
-/// cmake/compiled/nav.cpp.
+/// The functions of squared_distances.hpp.
 #pragma once
 
 #include <algorithm>
@@ -17,13 +16,15 @@
 #include <span>
 #include <type_traits>
 
-#include <orbis/core/compiled_once.hpp>
+#include <orbis/core/inline.hpp>
+#include <orbis/nav/detail/field/slice_kernels.hpp>
 #include <orbis/nav/squared_distances.hpp>
 
 namespace orbis::nav {
 
-ORBIS_COMPILED_ONCE squared_distances::squared_distances(int reach, std::uint32_t cells, bool elsewhere_is_obstacle)
+ORBIS_INLINE squared_distances::squared_distances(int reach, std::uint32_t cells, bool elsewhere_is_obstacle)
     : squared_distance_view{reach, cells, elsewhere_is_obstacle},
+      kernels_{detail::best_slice_code()},
       bricks_in_reach_{(reach + 7) / 8},
       squares_pad_{8 * bricks_in_reach_ + 16},
       squares_(static_cast<std::size_t>(8 * (2 * squares_pad_ + 8))) {
@@ -41,13 +42,13 @@ ORBIS_COMPILED_ONCE squared_distances::squared_distances(int reach, std::uint32_
     }
 }
 
-ORBIS_COMPILED_ONCE std::uint64_t squared_distances::bricks_of(const voxel_cube& cube) const noexcept {
+ORBIS_INLINE std::uint64_t squared_distances::bricks_of(const voxel_cube& cube) const noexcept {
   const auto volume = [](std::int64_t edge) { return edge <= 0 ? 0 : static_cast<std::uint64_t>(edge * edge * edge); };
   const std::int64_t edge = std::int64_t{octree::node_cells(cube.level)} / 8, reach = bricks_in_reach_;
   return elsewhere_ == 0 ? volume(edge) - volume(edge - 2 * reach) : volume(edge + 2 * reach) - volume(edge);
 }
 
-ORBIS_COMPILED_ONCE void squared_distances::begin(std::span<const voxel_cube> cubes) {
+ORBIS_INLINE void squared_distances::begin(std::span<const voxel_cube> cubes) {
   assert(stages_.empty() && !has_cubes());
   begin_update();
   for (const voxel_cube& c : cubes) directory_.add_cube(place_of(octree::node_key(c.low, c.level)), c.level - 3);
@@ -77,13 +78,13 @@ ORBIS_COMPILED_ONCE void squared_distances::begin(std::span<const voxel_cube> cu
   finish_update();
 }
 
-ORBIS_COMPILED_ONCE void squared_distances::update(std::span<const octant_obstacles> octants) {
+ORBIS_INLINE void squared_distances::update(std::span<const octant_obstacles> octants) {
   begin_update();
   set_obstacles(octants);
   finish_update();
 }
 
-ORBIS_COMPILED_ONCE void squared_distances::begin_update() {
+ORBIS_INLINE void squared_distances::begin_update() {
   rows_.clear();
   along_.clear();
   stale_plane_.clear();
@@ -92,7 +93,7 @@ ORBIS_COMPILED_ONCE void squared_distances::begin_update() {
   used_kept_ = 0;
 }
 
-ORBIS_COMPILED_ONCE void squared_distances::finish_update() {
+ORBIS_INLINE void squared_distances::finish_update() {
   std::sort(rows_.begin(), rows_.end());
   rows_.erase(std::unique(rows_.begin(), rows_.end()), rows_.end());
   update_rows();
@@ -106,7 +107,7 @@ ORBIS_COMPILED_ONCE void squared_distances::finish_update() {
   if (buffer_bytes() > std::max(few, field / 8)) release_buffers();
 }
 
-ORBIS_COMPILED_ONCE std::uint32_t squared_distances::make(const detail::brick_place& p) {
+ORBIS_INLINE std::uint32_t squared_distances::make(const detail::brick_place& p) {
   const std::uint32_t found = directory_.find(p);
   if (is_brick(found)) return found;
   const std::uint16_t value = value_without_brick(found);
@@ -128,7 +129,7 @@ ORBIS_COMPILED_ONCE std::uint32_t squared_distances::make(const detail::brick_pl
 
 /// Whether a brick says what would be said of its place without it. Distances do only if all stages do: no value is
 /// less than the distance.
-ORBIS_COMPILED_ONCE bool squared_distances::is_needless(std::uint32_t brick) const {
+ORBIS_INLINE bool squared_distances::is_needless(std::uint32_t brick) const {
   const std::uint16_t without = value_without_brick(directory_.without_number(places_[brick]));
   const stages& s = stages_[brick];
   for (const std::uint16_t top : s.space_top)
@@ -137,7 +138,7 @@ ORBIS_COMPILED_ONCE bool squared_distances::is_needless(std::uint32_t brick) con
   return std::all_of(values.begin(), values.end(), [&](std::uint16_t v) { return v == without; });
 }
 
-ORBIS_COMPILED_ONCE void squared_distances::remove_needless() {
+ORBIS_INLINE void squared_distances::remove_needless() {
   needless_.insert(needless_.end(), stale_space_.begin(), stale_space_.end());
   std::erase_if(needless_, [&](std::uint32_t i) { return !is_needless(i); });
   // From the last: the brick that takes the place of a removed one stays.
@@ -147,7 +148,7 @@ ORBIS_COMPILED_ONCE void squared_distances::remove_needless() {
 }
 
 /// The last brick takes its number.
-ORBIS_COMPILED_ONCE void squared_distances::remove(std::uint32_t brick) {
+ORBIS_INLINE void squared_distances::remove(std::uint32_t brick) {
   const auto last = static_cast<std::uint32_t>(stages_.size() - 1);
   directory_.erase(places_[brick]);
   if (brick != last) {
@@ -161,19 +162,19 @@ ORBIS_COMPILED_ONCE void squared_distances::remove(std::uint32_t brick) {
   places_.resize(last);
 }
 
-ORBIS_COMPILED_ONCE std::size_t squared_distances::buffer_bytes() const noexcept {
+ORBIS_INLINE std::size_t squared_distances::buffer_bytes() const noexcept {
   return kept_.memory_bytes() + rows_.capacity() * sizeof(std::uint64_t) + along_.capacity() * sizeof(along_change) +
          (stale_plane_.capacity() + stale_space_.capacity() + needless_.capacity() + line_.capacity()) *
              sizeof(std::uint32_t) +
          line_bits_.capacity() + left_.capacity() + right_.capacity();
 }
 
-ORBIS_COMPILED_ONCE void squared_distances::release_buffers() {
+ORBIS_INLINE void squared_distances::release_buffers() {
   const auto release = [](auto&... buffers) { ((buffers = std::remove_cvref_t<decltype(buffers)>()), ...); };
   release(rows_, along_, kept_, stale_plane_, stale_space_, needless_, line_, line_bits_, left_, right_);
 }
 
-ORBIS_COMPILED_ONCE int squared_distances::range_of(std::uint16_t least) const noexcept {
+ORBIS_INLINE int squared_distances::range_of(std::uint16_t least) const noexcept {
   const int left = bound() - least;
   if (left < 0) return -1;
   int r = static_cast<int>(std::sqrt(static_cast<float>(left)));
@@ -185,7 +186,7 @@ ORBIS_COMPILED_ONCE int squared_distances::range_of(std::uint16_t least) const n
 // -- the obstacles
 
 /// Takes over the masks, and lists the rows of eight voxels that changed.
-ORBIS_COMPILED_ONCE void squared_distances::set_obstacles(std::span<const octant_obstacles> octants) {
+ORBIS_INLINE void squared_distances::set_obstacles(std::span<const octant_obstacles> octants) {
   detail::brick_place last{-1, -1, -1};
   std::uint32_t number = none;
   for (const octant_obstacles& o : octants) {
@@ -217,7 +218,7 @@ ORBIS_COMPILED_ONCE void squared_distances::set_obstacles(std::span<const octant
 }
 
 /// `row`: z * 8 + y in the brick.
-ORBIS_COMPILED_ONCE void squared_distances::list_row(const detail::brick_place& p, std::size_t row) {
+ORBIS_INLINE void squared_distances::list_row(const detail::brick_place& p, std::size_t row) {
   // Coordinates have at most 21 bits, those of bricks 18.
   rows_.push_back(static_cast<std::uint64_t>(p.z * 8 + static_cast<int>(row >> 3U)) << 39U |
                   static_cast<std::uint64_t>(p.y * 8 + static_cast<int>(row & 7U)) << 18U |
@@ -226,7 +227,7 @@ ORBIS_COMPILED_ONCE void squared_distances::list_row(const detail::brick_place& 
 
 // -- along x
 
-ORBIS_COMPILED_ONCE void squared_distances::update_rows() {
+ORBIS_INLINE void squared_distances::update_rows() {
   const std::span<const std::uint64_t> rows{rows_};
   for (std::size_t first = 0; first != rows.size();) {
     // Rows of a line whose distances may depend on each other are worked out together.
@@ -239,7 +240,7 @@ ORBIS_COMPILED_ONCE void squared_distances::update_rows() {
   }
 }
 
-ORBIS_COMPILED_ONCE void squared_distances::update_line(std::span<const std::uint64_t> rows) {
+ORBIS_INLINE void squared_distances::update_line(std::span<const std::uint64_t> rows) {
   const auto brick_x = [](std::uint64_t row) { return static_cast<int>(row & 0x3ffffU); };
   const auto y = static_cast<int>(rows.front() >> 18U & 0x1fffffU), z = static_cast<int>(rows.front() >> 39U);
   const int first = brick_x(rows.front()) - bricks_in_reach_, last = brick_x(rows.back()) + bricks_in_reach_;
@@ -310,7 +311,7 @@ inline void offer_row(std::uint64_t from, std::uint64_t other, slice_offer& out)
 
 }  // namespace detail
 
-ORBIS_COMPILED_ONCE void squared_distances::keep_plane(std::uint32_t brick, unsigned changed) {
+ORBIS_INLINE void squared_distances::keep_plane(std::uint32_t brick, unsigned changed) {
   stages& s = stages_[brick];
   if (s.kept == none) {
     if (used_kept_ == kept_.size()) kept_.emplace_back();
@@ -326,7 +327,7 @@ ORBIS_COMPILED_ONCE void squared_distances::keep_plane(std::uint32_t brick, unsi
   kept.changed |= static_cast<std::uint8_t>(changed);
 }
 
-ORBIS_COMPILED_ONCE void squared_distances::spread_along_y() {
+ORBIS_INLINE void squared_distances::spread_along_y() {
   detail::slice_offer offer;
   // Calls visit(place of a target brick, z in it, squares, the least of these) for the slices that the row can reach.
   const auto for_each_target = [&](const along_change& c, auto&& visit) {
@@ -381,7 +382,7 @@ ORBIS_COMPILED_ONCE void squared_distances::spread_along_y() {
 }
 
 /// Works a slice of `plane` out of the rows within reach.
-ORBIS_COMPILED_ONCE void squared_distances::make_plane(std::uint32_t brick, int z) {
+ORBIS_INLINE void squared_distances::make_plane(std::uint32_t brick, int z) {
   const detail::brick_place p = places_[brick];
   alignas(64) detail::slice best;
   best.fill(detail::far_away);
@@ -408,7 +409,7 @@ ORBIS_COMPILED_ONCE void squared_distances::make_plane(std::uint32_t brick, int 
 
 // -- along z
 
-ORBIS_COMPILED_ONCE void squared_distances::spread_along_z() {
+ORBIS_INLINE void squared_distances::spread_along_z() {
   detail::slice_offer offer;
   // Calls visit(place of a target brick, its slice at which the source would be, first and last slice in reach).
   const auto for_each_target = [&](const detail::brick_place& p, int z, auto&& visit) {
@@ -469,7 +470,7 @@ ORBIS_COMPILED_ONCE void squared_distances::spread_along_z() {
 }
 
 /// Works slices of the result out of the planes within reach.
-ORBIS_COMPILED_ONCE void squared_distances::make_space(std::uint32_t brick, unsigned slices) {
+ORBIS_INLINE void squared_distances::make_space(std::uint32_t brick, unsigned slices) {
   static constexpr detail::slice obstacles{};
   const detail::brick_place p = places_[brick];
   // The planes above and below the brick, from the nearest to the farthest.
@@ -501,7 +502,7 @@ ORBIS_COMPILED_ONCE void squared_distances::make_space(std::uint32_t brick, unsi
 
 // -- queries
 
-ORBIS_COMPILED_ONCE std::optional<octree::voxel_key> squared_distances::nearest(const octree::voxel_key& k) const {
+ORBIS_INLINE std::optional<octree::voxel_key> squared_distances::nearest(const octree::voxel_key& k) const {
   const int target = squared(k);
   if (target == far) return std::nullopt;
   const auto x = static_cast<int>(k.x), y = static_cast<int>(k.y), z = static_cast<int>(k.z);
@@ -532,7 +533,7 @@ ORBIS_COMPILED_ONCE std::optional<octree::voxel_key> squared_distances::nearest(
   return std::nullopt;
 }
 
-ORBIS_COMPILED_ONCE std::size_t squared_distances::memory_bytes() const noexcept {
+ORBIS_INLINE std::size_t squared_distances::memory_bytes() const noexcept {
   return directory_.memory_bytes() + values_.memory_bytes() + places_.memory_bytes() + stages_.memory_bytes() +
          squares_.capacity() * sizeof(std::uint16_t) + buffer_bytes();
 }

@@ -1,0 +1,180 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// The functions of cluster.hpp.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cassert>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include <orbis/cloud/cluster.hpp>
+#include <orbis/cloud/detail/knn/knn_kernels.hpp>
+#include <orbis/cloud/detail/knn/leaf_hierarchy.hpp>
+#include <orbis/cloud/detail/knn/neighbor_graph.hpp>
+#include <orbis/cloud/detail/knn/squared_distance.hpp>
+#include <orbis/cloud/detail/knn/visit_near.hpp>
+#include <orbis/cloud/detail/select/decision.hpp>
+#include <orbis/core/execution.hpp>
+
+namespace orbis::cloud {
+
+namespace detail {
+
+/// Disjoint sets that several threads join at once. The root of a set is its least element, whatever the
+/// order of joins.
+/// Source: R. J. Anderson, H. Woll, "Wait-free parallel algorithms for the union-find problem", STOC 1991.
+class disjoint_sets {
+ public:
+  explicit disjoint_sets(std::size_t count) : parent_(count) {
+    for (std::size_t i = 0; i != count; ++i) parent_[i] = static_cast<std::uint32_t>(i);
+  }
+  void join(std::uint32_t a, std::uint32_t b) noexcept {
+    for (;;) {
+      a = root(a);
+      b = root(b);
+      if (a == b) return;
+      if (a < b) std::swap(a, b);
+      std::uint32_t expected = a;
+      if (at(a).compare_exchange_strong(expected, b, std::memory_order_relaxed)) return;
+    }
+  }
+  [[nodiscard]] std::uint32_t root(std::uint32_t i) noexcept {
+    for (;;) {
+      std::uint32_t up = at(i).load(std::memory_order_relaxed);
+      if (up == i) return i;
+      const std::uint32_t above = at(up).load(std::memory_order_relaxed);
+      if (above != up) at(i).compare_exchange_weak(up, above, std::memory_order_relaxed);  // halve the path
+      i = above;
+    }
+  }
+
+ private:
+  [[nodiscard]] std::atomic_ref<std::uint32_t> at(std::uint32_t i) noexcept { return std::atomic_ref{parent_[i]}; }
+  std::vector<std::uint32_t> parent_;
+};
+
+[[nodiscard]] inline std::size_t smallest_large(const cluster_options& options, std::size_t points) noexcept {
+  if (options.min_size != 0) return options.min_size;
+  return std::min<std::size_t>(200, std::max<std::size_t>(30, points / 250));
+}
+
+/// Components of linked points, by the least vertex in them, their root.
+struct linked_components {
+  disjoint_sets sets;
+  std::vector<std::uint32_t> sizes;  ///< by root
+  std::vector<char> goes;            ///< by root
+  std::size_t min_size = 0;          ///< as it was applied
+
+  [[nodiscard]] bool is_small(std::uint32_t i) noexcept { return sizes[sets.root(i)] < min_size; }
+};
+
+/// The components of a graph, and which of them go. `gone`: by place, whether a point takes no part, or empty.
+/// `spacing`: by place, metres. O(links), 9 bytes for each vertex.
+template <execution_policy Policy>
+[[nodiscard]] linked_components separate(const Policy& policy, const neighbor_graph& graph, std::span<const char> gone,
+                                         std::span<const float> spacing, const cluster_options& options) {
+  const std::size_t count = graph.size(), width = std::min(options.neighbors, graph.width());
+  const auto reach = static_cast<float>(options.reach);
+  const auto takes_part = [&](std::uint32_t i) { return gone.empty() || gone[i] == 0; };
+  const auto for_each_link = [&](std::uint32_t i, auto&& f) {
+    const std::array<float, 3> at = graph.position(i);
+    graph.for_each_neighbor(i, width, [&](std::uint32_t j) {
+      if (!takes_part(j)) return;
+      const float distance = std::sqrt(squared_distance(at, graph.position(j)));
+      const float limit =
+          options.link == cluster_link::mutual ? std::min(spacing[i], spacing[j]) : std::max(spacing[i], spacing[j]);
+      if (distance <= reach * limit) f(j, distance);
+    });
+  };
+  linked_components out{disjoint_sets{count}, std::vector<std::uint32_t>(count, 0), std::vector<char>(count, 0)};
+  for_each_index(policy, count, 2048, [&](std::size_t vertex) {
+    const auto i = static_cast<std::uint32_t>(vertex);
+    if (takes_part(i)) for_each_link(i, [&](std::uint32_t j, float) { out.sets.join(i, j); });
+  });
+  std::size_t present = 0;
+  for (std::uint32_t i = 0; i != count; ++i) {
+    if (!takes_part(i)) continue;
+    ++present;
+    ++out.sizes[out.sets.root(i)];
+  }
+  out.min_size = smallest_large(options, present);
+  std::vector<std::uint32_t> small_ones;
+  for (std::uint32_t i = 0; i != count; ++i) {
+    if (takes_part(i) && out.is_small(i)) small_ones.push_back(i);
+  }
+  if (small_ones.empty() || small_ones.size() == present) return out;
+  const auto is_main = [&](std::uint32_t j) { return takes_part(j) && !out.is_small(j); };
+  const knn_kernels kernels;
+  std::vector<char> apart(small_ones.size(), 0);
+  for_each_index(policy, small_ones.size(), 64, [&](std::size_t s) {
+    const std::uint32_t i = small_ones[s];
+    const nearest_place main = find_nearest(graph.tree(), kernels, graph.position(i), is_main);
+    assert(main.found());
+    double within = 0;  // mean length of its links
+    double links = 0;
+    for_each_link(i, [&](std::uint32_t, float length) {
+      within += length;
+      links += 1;
+    });
+    if (links > 0) within /= links;
+    const double local = std::max(within, double{spacing[main.place]});
+    const double gap = options.min_gap > 0 ? options.min_gap * local : 0;  // spacings may be infinite
+    apart[s] = std::sqrt(main.distance_squared) > gap ? 1 : 0;
+  });
+  for (const std::uint32_t i : small_ones) out.goes[out.sets.root(i)] = 1;
+  for (std::size_t s = 0; s != small_ones.size(); ++s) {
+    if (apart[s] == 0) out.goes[out.sets.root(small_ones[s])] = 0;  // one point close to the surface is enough
+  }
+  return out;
+}
+
+/// Numbers components by their first points. `vertex(i)`: of point `i` of the cloud; negative where it takes no part.
+/// `stays(i)`: whether such a point is an inlier even so.
+template <class Vertex, class Stays>
+[[nodiscard]] cluster_result numbered(linked_components found, std::size_t count, const Vertex& vertex,
+                                      const Stays& stays) {
+  cluster_result out;
+  out.min_size = found.min_size;
+  out.component.assign(count, cluster_result::none);
+  std::vector<std::uint32_t> number(found.sizes.size(), cluster_result::none);  // by root
+  for (std::size_t i = 0; i != count; ++i) {
+    const std::int64_t v = vertex(i);
+    if (v < 0) continue;
+    const std::uint32_t root = found.sets.root(static_cast<std::uint32_t>(v));
+    if (number[root] == cluster_result::none) {
+      number[root] = static_cast<std::uint32_t>(out.sizes.size());
+      out.sizes.push_back(found.sizes[root]);
+      out.removed.push_back(found.goes[root]);
+    }
+    out.component[i] = number[root];
+  }
+  out.inliers = indices_where(count, [&](std::size_t i) {
+    return out.component[i] != cluster_result::none ? out.removed[out.component[i]] == 0 : stays(i);
+  });
+  return out;
+}
+
+template <execution_policy Policy>
+cluster_result filter_clusters(const Policy& policy, const point_view& points, const cluster_options& options) {
+  const std::size_t count = points.size();
+  const neighbor_graph graph{policy, make_leaves(policy, points, std::min(options.neighbors, count) + 1), count,
+                             options.neighbors};
+  const std::vector<std::uint32_t> place_of = graph.places(count);
+  return numbered(
+      separate(policy, graph, {}, graph.mean_distance(policy, options.neighbors), options), count,
+      [&](std::size_t i) {
+        return place_of[i] == neighbor_graph::no_place ? -1 : static_cast<std::int64_t>(place_of[i]);
+      },
+      [&](std::size_t) { return options.non_finite == non_finite::keep; });
+}
+
+}  // namespace detail
+
+}  // namespace orbis::cloud
