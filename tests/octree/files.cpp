@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include <orbis/core/file.hpp>
 #include <orbis/octree/files.hpp>
 
 #include "octree/support.hpp"
