@@ -3,7 +3,7 @@
 #include <limits>
 #include <vector>
 
-#include <orbis/octree/occupancy_octree.hpp>
+#include <orbis/octree/occupancy_octree-inl.hpp>
 
 #include "octree/support.hpp"
 #include "support/catch.hpp"

@@ -8,6 +8,7 @@
 #include <orbis/camera/pinhole.hpp>
 #include <orbis/io/recording.hpp>
 #include <orbis/io/synthetic.hpp>
+#include <orbis/octree/depth_points.hpp>
 #include <orbis/octree/occupancy_octree.hpp>
 
 #include "octree/support.hpp"

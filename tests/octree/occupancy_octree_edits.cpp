@@ -211,7 +211,7 @@ TEST_CASE("A mirror that applies the logged changes stays the same map") {
   const auto update = [&] {
     map.changes().for_each_since(seen, [&](const voxel_key& octant, std::uint64_t mask) {
       sent += static_cast<std::size_t>(std::popcount(mask));
-      mirror.edit_octant(octant, [&](block<float>& voxels) {
+      mirror.edit_octant(octant, [&](octree::block<float>& voxels) {
         for (std::uint64_t rest = mask; rest != 0; rest &= rest - 1) {
           const auto i = static_cast<std::uint32_t>(std::countr_zero(rest));
           const voxel_key in = voxel_in_brick(i);
@@ -301,29 +301,29 @@ TEST_CASE("A mirror that applies the logged changes stays the same map") {
 TEST_CASE("What an edit leaves unknown is gone with its brick, and what it does not change is left alone") {
   occupancy_octree<> map{0.1};
   const voxel_key k{32768, 32768, 32768};
-  map.edit_octant(k, [](block<float>&) {});
+  map.edit_octant(k, [](octree::block<float>&) {});
   CHECK(map.empty());
-  map.edit_octant(k, [](block<float>& voxels) {
+  map.edit_octant(k, [](octree::block<float>& voxels) {
     for (std::size_t i = 0; i != 64; ++i) voxels.value[i] = 0.01F * static_cast<float>(i) - 1.0F;
     voxels.known = ~std::uint64_t{1};  // what the block says of its first voxel does not count
   });
   CHECK_FALSE(map.value(k));
   map.integrate(std::vector<vec3f>{{0.05F, 0.05F, 0.05F}}, vec3f{0.05F, 0.05F, 0.05F});
   CHECK(map.value(k) == log_odds<>::hit);
-  map.edit_octant(k, [](block<float>& voxels) {
+  map.edit_octant(k, [](octree::block<float>& voxels) {
     voxels.known = ~std::uint64_t{0};
     for (std::size_t i = 0; i != 64; ++i) voxels.value[i] = i % 2 == 0 ? 0.0F : -0.0F;
   });
   CHECK(map.num_leaves() == 1);
-  map.edit_octant(k, [](block<float>& voxels) { voxels.known = 0; });
+  map.edit_octant(k, [](octree::block<float>& voxels) { voxels.known = 0; });
   CHECK(map.empty());
   CHECK(map.num_leaves() == 0);
 
   map.set_unknown_node(k, 11, -0.5F);
   const std::size_t bytes = map.memory_bytes();
-  map.edit_octant({k.x + 8, k.y + 4, k.z}, [](block<float>& voxels) { CHECK(voxels.value[63] == -0.5F); });
+  map.edit_octant({k.x + 8, k.y + 4, k.z}, [](octree::block<float>& voxels) { CHECK(voxels.value[63] == -0.5F); });
   CHECK(map.memory_bytes() == bytes);
-  map.edit_octant({k.x + 8, k.y + 4, k.z}, [](block<float>& voxels) { voxels.value[63] = 0.5F; });
+  map.edit_octant({k.x + 8, k.y + 4, k.z}, [](octree::block<float>& voxels) { voxels.value[63] = 0.5F; });
   CHECK(map.value(voxel_key{k.x + 11, k.y + 7, k.z + 3}) == 0.5F);
   CHECK(map.value(voxel_key{k.x + 10, k.y + 7, k.z + 3}) == -0.5F);
 }

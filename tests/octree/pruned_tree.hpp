@@ -103,13 +103,13 @@ class pruned_tree {
     std::uint32_t children = 0;  ///< their place in nodes_
   };
 
-  [[nodiscard]] children voxel_entries(const block<T>& b, std::uint32_t group) const noexcept {
+  [[nodiscard]] children voxel_entries(const octree::detail::block<T>& b, std::uint32_t group) const noexcept {
     children c;
     for (std::uint32_t i = 0; i != 8; ++i)
       if ((b.known >> (8 * group + i) & 1U) != 0) c[i] = {node_kind::leaf, value_(b.value[8 * group + i])};
     return c;
   }
-  [[nodiscard]] children group_entries(const block<T>& b) const noexcept {
+  [[nodiscard]] children group_entries(const octree::detail::block<T>& b) const noexcept {
     children c;
     for (std::uint32_t i = 0; i != 8; ++i)
       if ((b.known >> (8 * i) & 0xffU) != 0) c[i] = parent_of(voxel_entries(b, i));
@@ -117,7 +117,7 @@ class pruned_tree {
   }
   [[nodiscard]] children octant_entries(const brick<T>& b) const noexcept {
     children c;
-    block<T> voxels;
+    octree::detail::block<T> voxels;
     for (std::uint32_t i = 0; i != 8; ++i) {
       if ((b.uniform >> i & 1U) != 0) c[i] = {node_kind::leaf, value_(b.value[i])};
       if ((b.dense >> i & 1U) == 0) continue;
@@ -165,7 +165,7 @@ class pruned_tree {
     const brick<T>& b = *items_[at.content].content;
     visit_children(visitor, key, brick_level, at.value.value, items_[at.content].octants,
                    [&](std::uint32_t i, const voxel_key& octant, T max) {
-                     block<T> voxels;
+                     octree::detail::block<T> voxels;
                      store_.read_octant(b, i, voxels);
                      visit_children(visitor, octant, octant_level, max, group_entries(voxels),
                                     [&](std::uint32_t j, const voxel_key& group, T m) {

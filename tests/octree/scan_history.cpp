@@ -14,8 +14,8 @@
 #include <orbis/camera/pinhole.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/random.hpp>
-#include <orbis/octree/files.hpp>
-#include <orbis/octree/scan_history.hpp>
+#include <orbis/octree/files-inl.hpp>
+#include <orbis/octree/scan_history-inl.hpp>
 
 #include "octree/support.hpp"
 #include "support/allocations.hpp"
@@ -85,7 +85,7 @@ class mirror {
     using value = typename Octree::value_type;
     std::size_t same = 0;
     log.for_each_since(seen_, [&](const voxel_key& octant, std::uint64_t mask) {
-      block<value> now;
+      octree::block<value> now;
       for (unsigned i = 0; i != 64; ++i) {
         const voxel_key in = morton_key(i), k{octant.x + in.x, octant.y + in.y, octant.z + in.z};
         const auto v = map.value(k);
@@ -93,7 +93,7 @@ class mirror {
         now.known |= std::uint64_t{v.has_value()} << i;
         if ((mask >> i & 1U) != 0 && copy_.value(k) == v) ++same;
       }
-      copy_.edit_octant(octant, [&](block<value>& b) {
+      copy_.edit_octant(octant, [&](octree::block<value>& b) {
         for (unsigned i = 0; i != 64; ++i) {
           if ((mask >> i & 1U) == 0) continue;
           b.value[i] = now.value[i];

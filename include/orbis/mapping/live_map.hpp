@@ -96,7 +96,9 @@ struct correction_progress {
 /// each from the pose that it was marked with (`used_pose`), bit for bit: with tolerance 0 and after `finish` from the
 /// present poses, otherwise from poses within the tolerance. It depends neither on policies nor on limits of time.
 ///
-/// One thread at a time; see live_map_thread.hpp for a map with a thread of its own.
+/// One thread at a time; see live_map_thread.hpp for a map with a thread of its own. With orbis::compiled, an octree of
+/// another model than log_odds<> and a camera that is neither pinhole nor any_camera need
+/// octree/scan_history-inl.hpp as well.
 template <octree::replayable_octree Octree, camera::camera_model Camera, depth_history Depths = depth_store>
 class live_map {
  public:

@@ -22,15 +22,17 @@
 #include <utility>
 #include <vector>
 
+#include <orbis/camera/depth.hpp>
+#include <orbis/camera/model.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/point.hpp>
+#include <orbis/core/se3.hpp>
 #include <orbis/core/types.hpp>
 #include <orbis/octree/accessor.hpp>
 #include <orbis/octree/cast_ray.hpp>
 #include <orbis/octree/change_log.hpp>
-#include <orbis/octree/detail/depth/depth_integrator.hpp>
-#include <orbis/octree/detail/points/point_integrator.hpp>
-#include <orbis/octree/detail/storage/apply_scan.hpp>
+#include <orbis/octree/detail/points/ray_traversal.hpp>
+#include <orbis/octree/detail/points/scan_scratch.hpp>
 #include <orbis/octree/detail/storage/brick.hpp>
 #include <orbis/octree/detail/storage/large_leaves.hpp>
 #include <orbis/octree/detail/storage/leaves.hpp>
@@ -101,7 +103,7 @@ class occupancy_octree {
   template <execution_policy Policy, point_range Points, point_like Origin>
   integration_summary integrate(const Policy& policy, const Points& points, const Origin& origin,
                                 const integration_options& options = {}) {
-    return integrate_points(policy, points, coordinates<float>(origin), options);
+    return integrate_points(detail::as_parallel(policy), scratch_.view(points), coordinates<float>(origin), options);
   }
   template <point_range Points, point_like Origin>
   integration_summary integrate(const Points& points, const Origin& origin, const integration_options& options = {}) {
@@ -109,11 +111,14 @@ class occupancy_octree {
   }
   /// Integrates a depth image (depths in metres along the optical axis). The map is the one that the image's world
   /// points (see append_world_points) make when seen from the camera's centre, but this is many times as fast.
-  /// O(pixels + voxels near surfaces).
+  /// O(pixels + voxels near surfaces). The library orbis::compiled holds this for depth_view of std::uint16_t and float
+  /// with pinhole and any_camera; other sources and models include occupancy_octree-inl.hpp.
   /// @pre depth and camera have the same size; options.beam_ranges is empty
   template <execution_policy Policy, camera::depth_source Depth, camera::camera_model Camera>
   integration_summary integrate(const Policy& policy, const Depth& depth, const Camera& camera,
-                                const se3& T_world_camera, const integration_options& options = {});
+                                const se3& T_world_camera, const integration_options& options = {}) {
+    return integrate_depth(detail::as_parallel(policy), depth, camera, T_world_camera, options);
+  }
   template <camera::depth_source Depth, camera::camera_model Camera>
   integration_summary integrate(const Depth& depth, const Camera& camera, const se3& T_world_camera,
                                 const integration_options& options = {}) {
@@ -191,9 +196,7 @@ class occupancy_octree {
   }
   /// Gives every occupied voxel the model's upper bound and every free one its lower bound, as `.bt` files do.
   /// O(octants).
-  void to_maximum_likelihood() {
-    transform([](value_type v) { return std::optional{is_occupied<Model>(v) ? Model::clamp_max : Model::clamp_min}; });
-  }
+  void to_maximum_likelihood();
   /// A rolling window: removes every brick (8x8x8 voxels) and larger leaf that lies completely outside `box` (metres),
   /// after calling `evict(const leaf&)` for its leaves. `set_unknown_node(leaf.key, leaf.depth, leaf.log_odds)` brings
   /// a leaf back. Returns the number of bricks and larger leaves removed. The change log records what was evicted: it
@@ -221,30 +224,7 @@ class occupancy_octree {
   }
   /// Merges equal uniform bricks to larger leaves. This saves memory and changes no value; inside bricks, pruning is
   /// done at once and always. A later change splits a leaf again. O(bricks).
-  void prune() {
-    const std::vector<detail::tree_part<value_type>> parts = detail::tree_parts(store_, tree_depth());
-    detail::large_leaves<value_type> merged;
-    for (const auto& part : parts)
-      if (part.level > detail::brick_level) merged.add(detail::node_name(part.key, part.level), part.value);
-    const auto is_inside = [&](std::uint64_t name) {
-      const auto* const leaf = merged.find(detail::named_key(name));
-      return leaf != nullptr && leaf->name != name;
-    };
-    std::vector<std::uint64_t> bricks, large;
-    store_.for_each_brick([&](const detail::brick<value_type>& b) {
-      if (is_inside(b.name)) bricks.push_back(b.name);
-    });
-    store_.for_each_large([&](std::uint64_t name, value_type) {
-      if (is_inside(name)) large.push_back(name);
-    });
-    store_.erase_bricks(bricks);
-    store_.erase_large(large);
-    for (std::size_t i = 0; i != merged.size(); ++i) {
-      const auto& [name, v] = merged[i];
-      if (store_.find_large_value(detail::named_key(name)) == nullptr)
-        store_.set_node(detail::named_key(name), detail::named_level(name), v);
-    }
-  }
+  void prune();
 
   /// Starts recording which voxels change (see change_log), or stops and clears the record. After `clear`, an
   /// assignment, a change to a leaf bigger than a brick, or a time without tracking, the log cannot tell what changed:
@@ -323,7 +303,7 @@ class occupancy_octree {
     detail::visit_occupied_voxels<Model>(store_, [&](const voxel_key& key, value_type) { visit(grid_.center(key)); });
   }
   /// Numbers of nodes of the pruned octree. O(bricks + octants that are not uniform), as are the four functions below.
-  [[nodiscard]] octree_counts counts() const { return detail::count_leaves<Model>(store_, tree_depth()); }
+  [[nodiscard]] octree_counts counts() const;
   /// Leaves of the pruned octree, of any size.
   [[nodiscard]] std::size_t num_leaves() const { return counts().leaves; }
   [[nodiscard]] std::size_t num_occupied_leaves() const { return counts().occupied_leaves; }
@@ -333,53 +313,19 @@ class occupancy_octree {
   [[nodiscard]] bool empty() const noexcept { return store_.empty(); }
 
   /// The smallest box around everything known; empty if nothing is.
-  [[nodiscard]] std::optional<bounding_box> bounds() const {
-    std::optional<bounding_box> box;
-    for_each_leaf([&](const leaf& l) {
-      const vec3 low = shifted(l.center, -l.size / 2.0), high = shifted(low, l.size);
-      if (!box) box = bounding_box{low, high};
-      box->min = entrywise_min(box->min, low);
-      box->max = entrywise_max(box->max, high);
-    });
-    return box;
-  }
+  [[nodiscard]] std::optional<bounding_box> bounds() const;
 
   /// Bytes on the heap: of the map (with what copies share), and of the buffers that are kept for the next scan.
   [[nodiscard]] std::size_t memory_bytes() const noexcept { return store_.memory_bytes() + track_.log.memory_bytes(); }
   [[nodiscard]] std::size_t buffer_bytes() const noexcept { return scratch_.memory_bytes(); }
 
  private:
-  template <class Policy, class Points>
-  integration_summary integrate_points(const Policy& policy, const Points& points, const detail::float3& origin,
-                                       const integration_options& options);
-
-  struct scan_buffers {
-    detail::point_integrator marker;
-    detail::depth_integrator depth;
-    detail::scan_masks masks;
-  };
-  /// The buffers of a scan, made with the first one. A copy of the map makes its own.
-  class scratch {
-   public:
-    scratch() = default;
-    scratch(const scratch&) noexcept {}
-    scratch(scratch&&) noexcept = default;
-    scratch& operator=(const scratch&) noexcept { return *this; }
-    scratch& operator=(scratch&&) noexcept = default;
-    ~scratch() = default;
-    [[nodiscard]] scan_buffers& get() {
-      if (!buffers_) buffers_ = std::make_unique<scan_buffers>();
-      return *buffers_;
-    }
-    [[nodiscard]] std::size_t memory_bytes() const noexcept {
-      if (!buffers_) return 0;
-      return sizeof(scan_buffers) + buffers_->marker.memory_bytes() + buffers_->depth.memory_bytes() +
-             buffers_->masks.memory_bytes();
-    }
-
-   private:
-    std::unique_ptr<scan_buffers> buffers_;
-  };
+  /// The parts of `integrate` that are not compiled for each policy and each type of points.
+  integration_summary integrate_points(const parallel_policy& policy, const detail::point_view& points,
+                                       const detail::float3& origin, const integration_options& options);
+  template <class Depth, class Camera>
+  integration_summary integrate_depth(const parallel_policy& policy, const Depth& depth, const Camera& camera,
+                                      const se3& T_world_camera, const integration_options& options);
 
   /// The change log. Copies of the map begin without one, and a map that is moved to a new place takes it along. A map
   /// that is assigned to, or moved from, has changed as a whole, and its own log says so: readers know it by its
@@ -413,22 +359,8 @@ class occupancy_octree {
   [[nodiscard]] leaf leaf_of(const voxel_key& key, int level, value_type v) const {
     return {key, tree_depth() - level, grid_.center(key, level), grid_.node_size(level), v, is_occupied<Model>(v)};
   }
-  void apply_scan(const detail::scan_masks& scan, integration_summary& summary) {
-    detail::apply_scan<Model>(store_, scan, summary, track_.on ? &track_.log : nullptr);
-  }
   /// Stores an octant that has been changed, and forgets its brick if nothing is known there any more.
-  void replace_octant(const voxel_key& k, const block<value_type>& before, block<value_type>& after) {
-    std::uint64_t changed = before.known ^ after.known;
-    for (unsigned i = 0; i != 64; ++i) {
-      after.value[i] = (after.known >> i & 1U) != 0 ? without_sign_of_zero(after.value[i]) : value_type{};
-      changed |= std::uint64_t{before.value[i] != after.value[i]} << i;
-    }
-    if (changed == 0) return;
-    detail::brick<value_type>& b = store_.make(k);
-    store_.write_octant(b, detail::place_in_brick(k) >> 6U, after);
-    if (track_.on) track_.log.record(k, changed);
-    if (!b.is_known()) store_.erase_bricks(std::array{b.name});
-  }
+  void replace_octant(const voxel_key& k, const block<value_type>& before, block<value_type>& after);
   /// -0 is 0: values are told apart bit by bit.
   [[nodiscard]] static constexpr value_type without_sign_of_zero(value_type v) noexcept {
     return v == value_type{} ? value_type{} : v;
@@ -438,82 +370,17 @@ class occupancy_octree {
   }
   void lose_track() { track_.lose(); }
   /// Everything known in a brick, or a larger leaf, is about to change.
-  void note_brick(const voxel_key& k, int level) {
-    if (!track_.on) return;
-    const detail::brick<value_type>* const b = level == detail::brick_level ? store_.find(k) : nullptr;
-    if (b == nullptr) return note_node(k, level);
-    for (unsigned i = 0; i != 8; ++i)
-      track_.log.record(child_key(k, i, node_cells(detail::octant_level)), store_.known(*b, i));
-  }
-  void note_node(const voxel_key& k, int level) {
-    if (!track_.on) return;
-    change_log& log = track_.log;
-    if (level > detail::brick_level) {
-      lose_track();
-    } else if (level == detail::brick_level) {
-      for (unsigned i = 0; i != 8; ++i)
-        log.record(child_key(k, i, node_cells(detail::octant_level)), ~std::uint64_t{0});
-    } else {
-      const std::uint64_t inside = level == 0 ? 1U : level == 1 ? 0xffU : ~std::uint64_t{0};
-      log.record(k, inside << (detail::place_in_brick(k) & 63U));
-    }
-  }
+  void note_brick(const voxel_key& k, int level);
+  void note_node(const voxel_key& k, int level);
 
   voxel_grid grid_;
   detail::brick_store<value_type> store_;
-  scratch scratch_;
+  detail::scan_scratch scratch_;
   tracking track_;
 };
 
-template <sensor_model Model>
-template <class Policy, class Points>
-integration_summary occupancy_octree<Model>::integrate_points(const Policy& policy, const Points& points,
-                                                              const detail::float3& origin,
-                                                              const integration_options& options) {
-  begin_change();
-  detail::point_integrator& marker = scratch_.get().marker;
-  integration_summary summary = marker.mark(
-      policy, grid_, points, origin, options,
-      [this](std::uint64_t name, auto& saturated) { detail::find_saturated<Model>(store_, name, saturated); });
-  apply_scan(marker.masks(), summary);
-  return summary;
-}
-
-template <sensor_model Model>
-template <execution_policy Policy, camera::depth_source Depth, camera::camera_model Camera>
-integration_summary occupancy_octree<Model>::integrate(const Policy& policy, const Depth& depth, const Camera& camera,
-                                                       const se3& T_world_camera, const integration_options& options) {
-  assert(options.beam_ranges.empty());
-  begin_change();
-  scan_buffers& buffers = scratch_.get();
-  detail::scan_masks& masks = buffers.masks;
-  integration_summary summary;
-  if (options.mode == ray_mode::every_ray && options.rays) {
-    summary = buffers.depth.mark(
-        policy, grid_, depth, camera, T_world_camera, options, masks,
-        [this](std::uint64_t name, auto& saturated) { detail::find_saturated<Model>(store_, name, saturated); });
-    detail::clip(masks, grid_, options.bounds);
-    apply_scan(masks, summary);
-  } else if (options.mode == ray_mode::every_ray) {
-    summary = buffers.depth.mark_ends(policy, grid_, depth, camera, T_world_camera, options, masks);
-    detail::clip(masks, grid_, options.bounds);
-    apply_scan(masks, summary);
-  } else {
-    // Whether a voxel is within range is decided at its centre, not at its points.
-    integration_options unlimited = options;
-    unlimited.max_range = std::numeric_limits<double>::infinity();
-    const std::size_t rejected =
-        buffers.depth.mark_ends(policy, grid_, depth, camera, T_world_camera, unlimited, masks).rejected;
-    const detail::float3 origin = coordinates<float>(T_world_camera.translation());
-    summary = buffers.marker.mark_centers(policy, grid_, masks, origin, options);
-    summary.rejected += rejected;
-    apply_scan(buffers.marker.masks(), summary);
-  }
-  return summary;
-}
-
 }  // namespace orbis::octree
 
-#ifdef ORBIS_COMPILED
-#include <orbis/octree/detail/compiled/occupancy_octree.hpp>
+#ifndef ORBIS_COMPILED
+#include <orbis/octree/occupancy_octree-inl.hpp>
 #endif

@@ -9,7 +9,6 @@
 /// order. Replaying is cheap, because no ray is traversed again.
 #pragma once
 
-#include <algorithm>
 #include <chrono>
 #include <concepts>
 #include <cstddef>
@@ -20,13 +19,15 @@
 #include <utility>
 #include <vector>
 
+#include <orbis/camera/depth.hpp>
+#include <orbis/camera/model.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/point.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/octree/change_log.hpp>
 #include <orbis/octree/detail/history/brick_uses.hpp>
-#include <orbis/octree/detail/history/replay_brick.hpp>
-#include <orbis/octree/detail/storage/apply_scan.hpp>
+#include <orbis/octree/detail/history/replayed_brick.hpp>
+#include <orbis/octree/detail/points/scan_scratch.hpp>
 #include <orbis/octree/integration.hpp>
 #include <orbis/octree/occupancy_octree.hpp>
 #include <orbis/octree/scan_voxels.hpp>
@@ -112,28 +113,11 @@ class scan_history {
   /// The same for voxels that were marked before, on another thread for example.
   /// O(bricks observed before and now x log(scans that use a brick)).
   /// @pre `voxels` were marked for this grid
-  void set(std::uint64_t frame, const scan_voxels& voxels) {
-    const std::uint32_t number = make_scan(frame);
-    change_uses(number, voxels);
-    scans_[number].voxels = voxels;
-    apply_fresh(number);
-  }
+  void set(std::uint64_t frame, const scan_voxels& voxels);
   /// Removes a scan; the octants it observed become stale. Returns whether there was one. O(its bricks + scans).
-  bool remove(std::uint64_t frame) {
-    const auto at = find(frame);
-    if (at == order_.end() || at->frame != frame) return false;
-    const std::uint32_t number = at->number;
-    change_uses(number, {});
-    scans_[number] = {};
-    order_.erase(at);
-    free_.push_back(number);
-    return true;
-  }
+  bool remove(std::uint64_t frame);
   /// The voxels of a scan, valid until it changes; null if there is none. O(log scans).
-  [[nodiscard]] const scan_voxels* find_scan(std::uint64_t frame) const noexcept {
-    const auto at = std::lower_bound(order_.begin(), order_.end(), frame, is_before);
-    return at == order_.end() || at->frame != frame ? nullptr : &scans_[at->number].voxels;
-  }
+  [[nodiscard]] const scan_voxels* find_scan(std::uint64_t frame) const noexcept;
   [[nodiscard]] bool contains(std::uint64_t frame) const noexcept { return find_scan(frame) != nullptr; }
   /// How many scans there are.
   [[nodiscard]] std::size_t size() const noexcept { return order_.size(); }
@@ -147,27 +131,11 @@ class scan_history {
   /// policy. Allocates nothing once its buffers have grown. O(bricks x scans that use each).
   template <execution_policy Policy>
   std::size_t replay(const Policy& policy, const replay_limits& limits = {}) {
-    if (stale_bricks() == 0 || limits.bricks == 0) return 0;
-    const auto start = std::chrono::steady_clock::now();
-    const std::size_t wanted = std::min(limits.bricks, stale_bricks());
-    std::size_t done = 0;
-    map_.change_store([&](auto& store, change_log* log) {
-      do {
-        const std::size_t count = std::min(wanted - done, batch * std::max(1U, policy.threads()));
-        replay_first(policy, store, log, count);
-        done += count;
-      } while (done != wanted && std::chrono::steady_clock::now() - start < limits.time);
-    });
-    return done;
+    return replay_stale(detail::as_parallel(policy), limits);
   }
 
   /// Bytes on the heap of the scans and the lists of who observes what; without the map. O(bricks + scans).
-  [[nodiscard]] std::size_t bytes() const noexcept {
-    std::size_t n = uses_.bytes() + scans_.capacity() * sizeof(scan) + order_.capacity() * sizeof(place) +
-                    (free_.capacity() + fresh_.capacity()) * sizeof(std::uint32_t);
-    for (const scan& s : scans_) n += s.voxels.bytes();
-    return n;
-  }
+  [[nodiscard]] std::size_t bytes() const noexcept;
   /// Bytes of the buffers for marking and replaying.
   [[nodiscard]] std::size_t buffer_bytes() const noexcept {
     return marker_.bytes() + marked_.bytes() + replayed_.capacity() * sizeof(replayed_[0]);
@@ -187,110 +155,21 @@ class scan_history {
   };
 
   [[nodiscard]] static bool is_before(const place& p, std::uint64_t frame) noexcept { return p.frame < frame; }
-  [[nodiscard]] auto find(std::uint64_t frame) noexcept {
-    if (order_.empty() || order_.back().frame < frame) return order_.end();
-    return std::lower_bound(order_.begin(), order_.end(), frame, is_before);
-  }
+  [[nodiscard]] typename std::vector<place>::iterator find(std::uint64_t frame) noexcept;
   /// The number of the scan of `frame`, new or not.
-  [[nodiscard]] std::uint32_t make_scan(std::uint64_t frame) {
-    const auto at = find(frame);
-    if (at != order_.end() && at->frame == frame) return at->number;
-    std::uint32_t number = 0;
-    if (free_.empty()) {
-      number = static_cast<std::uint32_t>(scans_.size());
-      scans_.emplace_back();
-    } else {
-      number = free_.back();
-      free_.pop_back();
-    }
-    scans_[number].frame = frame;
-    order_.insert(at, {frame, number});
-    return number;
-  }
-
+  [[nodiscard]] std::uint32_t make_scan(std::uint64_t frame);
   /// Where the scan of `frame` stands, or would stand, among those that use a brick.
-  [[nodiscard]] auto place_of(std::vector<detail::brick_use>& uses, std::uint64_t frame) const noexcept {
-    if (uses.empty() || scans_[uses.back().scan].frame < frame) return uses.end();
-    return std::lower_bound(uses.begin(), uses.end(), frame,
-                            [&](const detail::brick_use& u, std::uint64_t f) { return scans_[u.scan].frame < f; });
-  }
-  [[nodiscard]] static unsigned octants_of(const scan_voxels::part& p) noexcept { return p.free | p.occupied | p.full; }
-  /// The octants of a brick of which two scans say different things.
-  [[nodiscard]] static unsigned different_octants(const scan_voxels& a, const scan_voxels::part& in_a,
-                                                  const scan_voxels& b, const scan_voxels::part& in_b) noexcept {
-    const auto x = a.masks(in_a), y = b.masks(in_b);
-    unsigned different = 0;
-    for (unsigned i = 0; i != 8; ++i)
-      if (((x.free[i] ^ y.free[i]) | (x.occupied[i] ^ y.occupied[i])) != 0) different |= 1U << i;
-    return different;
-  }
+  [[nodiscard]] std::vector<detail::brick_use>::iterator place_of(std::vector<detail::brick_use>& uses,
+                                                                  std::uint64_t frame) const noexcept;
   /// Brings the lists of the bricks' users from what scan `number` says to what `after` says. Where the scan is the
   /// newest of a brick, the brick is left to apply_fresh; elsewhere octants become stale.
-  void change_uses(std::uint32_t number, const scan_voxels& after) {
-    const scan& s = scans_[number];
-    const auto old_parts = s.voxels.parts(), new_parts = after.parts();
-    std::size_t i = 0;
-    const auto drop = [&](const scan_voxels::part& p) {
-      const std::uint32_t brick = uses_.number_of(p.name);
-      auto& uses = uses_[brick].uses;
-      uses.erase(place_of(uses, s.frame));
-      uses_.make_stale(brick, octants_of(p));
-    };
-    fresh_.clear();
-    for (std::uint32_t j = 0; j != new_parts.size(); ++j) {
-      const scan_voxels::part& p = new_parts[j];
-      for (; i != old_parts.size() && old_parts[i].name < p.name; ++i) drop(old_parts[i]);
-      const std::uint32_t brick = uses_.number_of(p.name);
-      auto& uses = uses_[brick].uses;
-      const auto at = place_of(uses, s.frame);
-      if (i != old_parts.size() && old_parts[i].name == p.name) {
-        at->part = j;
-        uses_.make_stale(brick, different_octants(s.voxels, old_parts[i], after, p));
-        ++i;
-      } else if (at == uses.end()) {
-        uses.push_back({number, j});
-        fresh_.push_back(j);
-      } else {
-        uses.insert(at, {number, j});
-        uses_.make_stale(brick, octants_of(p));
-      }
-    }
-    for (; i != old_parts.size(); ++i) drop(old_parts[i]);
-  }
+  void change_uses(std::uint32_t number, const scan_voxels& after);
   /// Applies the parts of a scan that are the newest in their bricks.
-  void apply_fresh(std::uint32_t number) {
-    if (fresh_.empty()) return;
-    const scan_voxels& voxels = scans_[number].voxels;
-    map_.change_store([&](auto& store, change_log* log) {
-      for (const std::uint32_t i : fresh_) {
-        const scan_voxels::part& p = voxels.parts()[i];
-        const voxel_key key = detail::named_key(p.name);
-        auto& b = store.make(key);
-        voxels.for_each_octant(p, [&](unsigned octant, std::uint64_t free, std::uint64_t occupied) {
-          const std::uint64_t changed = detail::apply_octant<model>(store, b, octant, occupied, free).changed;
-          if (log != nullptr) log->record(child_key(key, octant, node_cells(detail::octant_level)), changed);
-        });
-      }
-    });
-  }
+  void apply_fresh(std::uint32_t number);
+  std::size_t replay_stale(const parallel_policy& policy, const replay_limits& limits);
   /// Replays the first `count` stale bricks.
-  template <class Policy>
-  void replay_first(const Policy& policy, detail::brick_store<value_type>& store, change_log* log, std::size_t count) {
-    if (replayed_.size() < count) replayed_.resize(count);
-    const auto stale = uses_.stale().first(count);
-    const auto voxels_of = [&](std::uint32_t number) -> const scan_voxels& { return scans_[number].voxels; };
-    for_each_index(policy, count, 4, [&](std::size_t i) {
-      detail::replay_brick<model>(store, uses_[stale[i]], voxels_of, replayed_[i]);
-    });
-    unknown_.clear();
-    for (std::size_t i = 0; i != count; ++i) {
-      const std::uint64_t name = uses_[stale[i]].name;
-      if (!detail::store_replayed(store, name, replayed_[i], log)) unknown_.push_back(name);
-    }
-    store.erase_bricks(unknown_);
-    uses_.finish(count);
-  }
-
+  void replay_first(const parallel_policy& policy, detail::brick_store<value_type>& store, change_log* log,
+                    std::size_t count);
   Octree map_;
   std::vector<scan> scans_;          ///< by number
   std::vector<std::uint32_t> free_;  ///< numbers that are not in use
@@ -305,3 +184,7 @@ class scan_history {
 };
 
 }  // namespace orbis::octree
+
+#ifndef ORBIS_COMPILED
+#include <orbis/octree/scan_history-inl.hpp>
+#endif

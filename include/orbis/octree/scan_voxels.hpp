@@ -3,13 +3,10 @@
 /// The voxels that one scan observes free and occupied, packed to be kept; and the marker that finds them.
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <bit>
-#include <cassert>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <span>
 #include <utility>
 #include <vector>
@@ -19,13 +16,16 @@
 #include <orbis/core/execution.hpp>
 #include <orbis/core/point.hpp>
 #include <orbis/core/se3.hpp>
-#include <orbis/octree/detail/depth/depth_integrator.hpp>
-#include <orbis/octree/detail/points/point_integrator.hpp>
-#include <orbis/octree/detail/storage/scan_masks.hpp>
+#include <orbis/octree/detail/points/scan_scratch.hpp>
 #include <orbis/octree/integration.hpp>
 #include <orbis/octree/key.hpp>
 
 namespace orbis::octree {
+
+namespace detail {
+struct scan_brick;
+class scan_masks;
+}  // namespace detail
 
 /// The voxels that one scan observes free and occupied: two disjoint sets, as bit masks of octants of 4x4x4 voxels,
 /// grouped by bricks of 8x8x8. A mask is kept only where it is neither empty nor a whole free octant. A depth image of
@@ -95,25 +95,7 @@ class scan_voxels {
   friend class scan_marker;
 
   /// Adds a brick. @pre names come in order
-  void add(const detail::scan_brick& b) {
-    part p{.name = b.name, .first = static_cast<std::uint32_t>(words_.size())};
-    for (unsigned i = 0; i != 8; ++i) {
-      const auto bit = static_cast<std::uint8_t>(1U << i);
-      const std::uint64_t free = b.free[i] & ~b.occupied[i];
-      if (free == ~std::uint64_t{0}) {
-        p.full |= bit;
-      } else if (free != 0) {
-        p.free |= bit;
-        words_.push_back(free);
-      }
-    }
-    for (unsigned i = 0; i != 8; ++i) {
-      if (b.occupied[i] == 0) continue;
-      p.occupied |= static_cast<std::uint8_t>(1U << i);
-      words_.push_back(b.occupied[i]);
-    }
-    if ((p.free | p.occupied | p.full) != 0) parts_.push_back(p);
-  }
+  void add(const detail::scan_brick& b);
 
   std::vector<part> parts_;
   std::vector<std::uint64_t> words_;
@@ -126,81 +108,44 @@ class scan_marker {
   /// Marks a depth image (metres along the optical axis). Unlike `integrate`, this leaves out no voxel for being
   /// saturated, so that the scan may be applied to any map. The same voxels for every policy. The summary counts what
   /// `integrate` counts. O(pixels + voxels near surfaces + bricks).
+  /// The library orbis::compiled holds this for the sources and models that it holds occupancy_octree::integrate for;
+  /// others include scan_voxels-inl.hpp.
   /// @pre depth and camera have the same size; options.beam_ranges is empty
   template <execution_policy Policy, camera::depth_source Depth, camera::camera_model Camera>
   integration_summary mark(const Policy& policy, const voxel_grid& grid, const Depth& depth, const Camera& camera,
-                           const se3& T_world_camera, const integration_options& options, scan_voxels& voxels);
+                           const se3& T_world_camera, const integration_options& options, scan_voxels& voxels) {
+    return mark_depth(detail::as_parallel(policy), grid, depth, camera, T_world_camera, options, voxels);
+  }
   /// Marks points in the world frame (metres), seen from `origin`. O(points x voxels per ray).
   template <execution_policy Policy, point_range Points, point_like Origin>
   integration_summary mark(const Policy& policy, const voxel_grid& grid, const Points& points, const Origin& origin,
-                           const integration_options& options, scan_voxels& voxels);
+                           const integration_options& options, scan_voxels& voxels) {
+    return mark_points(detail::as_parallel(policy), grid, scratch_.view(points), coordinates<float>(origin), options,
+                       voxels);
+  }
   /// Bytes on the heap.
   [[nodiscard]] std::size_t bytes() const noexcept {
-    return depth_.memory_bytes() + points_.memory_bytes() + masks_.memory_bytes() +
-           order_.capacity() * sizeof(order_[0]);
+    return scratch_.memory_bytes() + order_.capacity() * sizeof(order_[0]);
   }
 
  private:
+  template <class Depth, class Camera>
+  integration_summary mark_depth(const parallel_policy& policy, const voxel_grid& grid, const Depth& depth,
+                                 const Camera& camera, const se3& T_world_camera, const integration_options& options,
+                                 scan_voxels& voxels);
+  template <class Policy>
+  integration_summary mark_points(const Policy& policy, const voxel_grid& grid, const detail::point_view& points,
+                                  const std::array<float, 3>& origin, const integration_options& options,
+                                  scan_voxels& voxels);
   /// Packs the masks of a scan, and counts its voxels.
   void pack(const detail::scan_masks& masks, scan_voxels& voxels, integration_summary& summary);
 
-  detail::depth_integrator depth_;
-  detail::point_integrator points_;
-  detail::scan_masks masks_;
+  detail::scan_scratch scratch_;
   std::vector<std::pair<std::uint64_t, std::uint32_t>> order_;
 };
 
-inline void scan_marker::pack(const detail::scan_masks& masks, scan_voxels& voxels, integration_summary& summary) {
-  const std::vector<detail::scan_brick>& bricks = masks.bricks();
-  order_.resize(bricks.size());
-  for (std::uint32_t i = 0; i != bricks.size(); ++i) order_[i] = {bricks[i].name, i};
-  std::sort(order_.begin(), order_.end());
-  voxels.clear();
-  for (const auto& [name, i] : order_) {
-    for (std::size_t octant = 0; octant != 8; ++octant) {
-      const std::uint64_t occupied = bricks[i].occupied[octant];
-      summary.occupied += static_cast<std::size_t>(std::popcount(occupied));
-      summary.free += static_cast<std::size_t>(std::popcount(bricks[i].free[octant] & ~occupied));
-    }
-    voxels.add(bricks[i]);
-  }
-}
-
-template <execution_policy Policy, camera::depth_source Depth, camera::camera_model Camera>
-integration_summary scan_marker::mark(const Policy& policy, const voxel_grid& grid, const Depth& depth,
-                                      const Camera& camera, const se3& T_world_camera,
-                                      const integration_options& options, scan_voxels& voxels) {
-  assert(options.beam_ranges.empty());
-  integration_summary summary;
-  if (options.mode == ray_mode::every_ray) {
-    summary = options.rays ? depth_.mark(policy, grid, depth, camera, T_world_camera, options, masks_)
-                           : depth_.mark_ends(policy, grid, depth, camera, T_world_camera, options, masks_);
-    detail::clip(masks_, grid, options.bounds);
-    pack(masks_, voxels, summary);
-  } else {
-    // Whether a voxel is within range is decided at its centre, not at its points.
-    integration_options unlimited = options;
-    unlimited.max_range = std::numeric_limits<double>::infinity();
-    const std::size_t rejected =
-        depth_.mark_ends(policy, grid, depth, camera, T_world_camera, unlimited, masks_).rejected;
-    const detail::float3 origin = coordinates<float>(T_world_camera.translation());
-    summary = points_.mark_centers(policy, grid, masks_, origin, options);
-    summary.rejected += rejected;
-    pack(points_.masks(), voxels, summary);
-  }
-  return summary;
-}
-
-template <execution_policy Policy, point_range Points, point_like Origin>
-integration_summary scan_marker::mark(const Policy& policy, const voxel_grid& grid, const Points& points,
-                                      const Origin& origin, const integration_options& options, scan_voxels& voxels) {
-  integration_summary summary = points_.mark(policy, grid, points, coordinates<float>(origin), options);
-  pack(points_.masks(), voxels, summary);
-  return summary;
-}
-
 }  // namespace orbis::octree
 
-#ifdef ORBIS_COMPILED
-#include <orbis/octree/detail/compiled/scan_voxels.hpp>
+#ifndef ORBIS_COMPILED
+#include <orbis/octree/scan_voxels-inl.hpp>
 #endif

@@ -40,11 +40,18 @@ struct walked {
          const integration_options& options) {
     std::vector<vec3f> points;
     append_world_points(depth, camera, pose, points);
-    summary = marker.mark(
-        seq, grid, points.size(), [&](std::size_t i) { return coordinates<float>(points[i]); },
-        coordinates<float>(pose.translation()), options);
+    summary = marker.mark(seq, grid, point_reader{}.view(points), coordinates<float>(pose.translation()), options);
   }
 };
+
+/// Saturated voxels of a brick, any.
+void hide_some(std::uint64_t name, std::array<std::uint64_t, 8>& mask) {
+  random_bits bits{name};
+  if (bits.below(3) == 0) mask.fill(~std::uint64_t{0});
+  if (bits.below(2) == 0)
+    for (std::uint64_t& word : mask)
+      word |= bits.below(2) == 0 ? ~std::uint64_t{0} : std::uint64_t{0xff} << (8 * bits.below(8));
+}
 
 [[nodiscard]] std::uint64_t free_word(const scan_brick* b, std::size_t i) {
   return b == nullptr ? 0 : b->free[i] & ~b->occupied[i];
@@ -88,7 +95,7 @@ void require_walked(double resolution, const Depth& depth, const Camera& camera,
     depth_integrator marker;
     scan_masks found;
     const auto summary = marker.mark(seq, grid, depth, camera, pose, options, found);
-    REQUIRE(differences(expected.marker.masks(), found, nothing_saturated{}) == 0);
+    REQUIRE(differences(expected.marker.masks(), found, saturated_voxels{}) == 0);
     REQUIRE(summary.used == expected.summary.used);
     REQUIRE(summary.truncated == expected.summary.truncated);
     REQUIRE(summary.rejected == expected.summary.rejected);
@@ -175,7 +182,7 @@ TEST_CASE("A change of the camera is noticed") {
   const camera::radial_tangential narrow{{96, 72, 90.0, 90.0, 47.0, 36.5}, {-0.2, 0.05}};
   const auto check = [&](const auto& camera) {
     marker.mark(seq, grid, view, camera, pose, {}, found);
-    CHECK(differences(walked(grid, view, camera, pose, {}).marker.masks(), found, nothing_saturated{}) == 0);
+    CHECK(differences(walked(grid, view, camera, pose, {}).marker.masks(), found, saturated_voxels{}) == 0);
   };
   check(wide);
   check(narrow);
@@ -256,16 +263,11 @@ TEST_CASE("Saturated voxels are left out and the others are the walk's") {
     const camera::pinhole camera = camera_of(90, 70);
     const se3 pose = random_pose(random, 1.0);
     const voxel_grid grid{run % 2 == 0 ? 0.1 : 0.06};
-    const auto saturated = [](std::uint64_t name, std::array<std::uint64_t, 8>& mask) {
-      random_bits bits{name};
-      if (bits.below(3) == 0) mask.fill(~std::uint64_t{0});
-      if (bits.below(2) == 0)
-        for (std::uint64_t& word : mask)
-          word |= bits.below(2) == 0 ? ~std::uint64_t{0} : std::uint64_t{0xff} << (8 * bits.below(8));
-    };
     const walked expected{grid, view, camera, pose, {}};
-    marker.mark(seq, grid, view, camera, pose, {}, found, saturated);
-    REQUIRE(differences(expected.marker.masks(), found, saturated) == 0);
+    marker.mark(
+        seq, grid, view, camera, pose, {}, found,
+        {.find = [](const void*, std::uint64_t name, saturated_voxels::words& mask) { hide_some(name, mask); }});
+    REQUIRE(differences(expected.marker.masks(), found, hide_some) == 0);
     left_out += count_free(expected.marker.masks()) - count_free(found);
   }
   CHECK(left_out > 5000);
@@ -283,7 +285,7 @@ TEST_CASE("Every number of threads marks the same voxels") {
     for (const unsigned threads : {2U, 3U, 8U}) {
       const auto b =
           marker.mark(par.with(threads), grid, frame.depth_metres(), camera, *frame.T_world_camera, options, together);
-      CHECK(differences(alone, together, nothing_saturated{}) == 0);
+      CHECK(differences(alone, together, saturated_voxels{}) == 0);
       CHECK(a.used == b.used);
       CHECK(a.truncated == b.truncated);
     }

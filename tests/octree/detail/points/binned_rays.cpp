@@ -69,7 +69,7 @@ struct binned {
     const auto [begin, end] = range(w);
     for (std::size_t i = begin; i < end; i += point_batch::capacity) {
       const std::size_t n = std::min(end - i, point_batch::capacity);
-      load_points([&](std::size_t k) { return s.points[k]; }, i, n, *points);
+      load_points(point_view{s.points.data()->data(), s.points.size()}, i, n, *points);
       limit_rays()({s.grid, s.origin, from}, *points, limits.data(), n, *batch);
       rays.add(w, *batch, i, n);
       for (std::size_t k = 0; k != n; ++k)

@@ -142,7 +142,7 @@ TEST_CASE("A cloud takes the same voxels to the map whichever way its rays are m
     walk(s, want);
     const integration_options options{.max_range = s.limit};
     for (const unsigned threads : {1U, 3U}) {
-      marker.mark(par.with(threads), s.grid, s.points, s.origin, options);
+      marker.mark(par.with(threads), s.grid, point_reader{}.view(s.points), s.origin, options);
       REQUIRE(free_voxels(marker.masks(), nullptr) == free_voxels(want, nullptr));
     }
   }
@@ -160,7 +160,7 @@ TEST_CASE("The second of two equal scans takes no memory") {
   CHECK(rays.memory_bytes() == bytes);
 
   point_integrator marker;
-  const auto scan_again = [&] { return marker.mark(seq, s.grid, s.points, s.origin, {}); };
+  const auto scan_again = [&] { return marker.mark(seq, s.grid, point_reader{}.view(s.points), s.origin, {}); };
   scan_again();
   const std::size_t before = test::allocations();
   scan_again();

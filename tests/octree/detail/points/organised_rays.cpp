@@ -228,7 +228,7 @@ TEST_CASE("Points for the same pixels: few are walked, many are left to others")
   CHECK_FALSE(mark(seq, rays, s, got));
   walk(s, want);
   point_integrator marker;
-  marker.mark(seq, s.grid, s.points, s.origin, {.max_range = s.limit});
+  marker.mark(seq, s.grid, point_reader{}.view(s.points), s.origin, {.max_range = s.limit});
   CHECK(free_voxels(marker.masks(), nullptr) == free_voxels(want, nullptr));
 }
 
@@ -276,7 +276,8 @@ TEST_CASE("A cloud of points and its integrator agree, organised or not, with ra
       want.mark_ray(s.grid, s.origin, from, e.point, e.key);
       if (length(difference(s.points[i], s.origin)) <= one.limit) want.mark_occupied(e.key);
     }
-    marker.mark(run % 2 == 0 ? par.with(1) : par.with(3), s.grid, s.points, s.origin, {.beam_ranges = ranges});
+    marker.mark(run % 2 == 0 ? par.with(1) : par.with(3), s.grid, point_reader{}.view(s.points), s.origin,
+                {.beam_ranges = ranges});
     REQUIRE(free_voxels(marker.masks(), nullptr) == free_voxels(want, nullptr));
   }
 }
@@ -287,7 +288,7 @@ TEST_CASE("The next organised cloud takes no memory") {
   scan s = fitting_scan(random, any, 0.05);
   const scan_masks masks;
   point_integrator marker;
-  const auto integrate = [&] { return marker.mark(seq, s.grid, s.points, s.origin, {}); };
+  const auto integrate = [&] { return marker.mark(seq, s.grid, point_reader{}.view(s.points), s.origin, {}); };
   integrate();
   s.origin[0] += 1e-7F;  // the camera that is found is another one
   integrate();

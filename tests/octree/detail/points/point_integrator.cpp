@@ -141,8 +141,8 @@ template <class Policy>
 [[nodiscard]] observation marked(const Policy& policy, point_integrator& marker, const voxel_grid& grid,
                                  const std::vector<float3>& points, const float3& origin,
                                  const integration_options& options) {
-  const auto summary = marker.mark(
-      policy, grid, points.size(), [&](std::size_t i) { return points[i]; }, origin, options);
+  point_reader reader;
+  const auto summary = marker.mark(policy, grid, reader.view(points), origin, options);
   return observed(marker.masks(), summary);
 }
 
@@ -268,7 +268,8 @@ TEST_CASE("Points of any type and layout mark the same voxels") {
       const integration_options options{.mode = mode};
       const observation want = marked(seq, marker, grid, points, {}, options);
       const auto mark = [&](const auto& range) {
-        const auto summary = marker.mark(seq, grid, range, float3{}, options);
+        point_reader reader;
+        const auto summary = marker.mark(seq, grid, reader.view(range), float3{}, options);
         return observed(marker.masks(), summary);
       };
       CHECK((mark(points) == want));
@@ -292,10 +293,7 @@ TEST_CASE("The second of two equal scans allocates nothing") {
         options.bounds = bounding_box{{-1.0, -1.0, -1.0}, {1.0, 1.0, 1.0}};
         options.beam_ranges = ranges;
       }
-      const auto scan = [&] {
-        return marker.mark(
-            seq, grid, points.size(), [&](std::size_t i) { return points[i]; }, float3{}, options);
-      };
+      const auto scan = [&] { return marker.mark(seq, grid, point_reader{}.view(points), float3{}, options); };
       scan();
       const std::size_t bytes = marker.memory_bytes();
       CHECK(bytes < (std::size_t{32} << 20U));

@@ -23,11 +23,11 @@ TEST_CASE("Every instruction set loads the points as they are") {
     std::vector<std::array<float, 3>> points(count + 1);
     for (auto& p : points)
       for (float& c : p) c = static_cast<float>(random.uniform(-1.0, 1.0));
-    const point_source<std::vector<std::array<float, 3>>> source{points};
+    const point_view source{points.data()->data(), count};
     for (const simd::level level : simd::available_levels()) {
       const simd::level_limit limit{level};
       auto got = std::make_unique<point_batch>();
-      source.load(0, count, *got);
+      load_points(source, 0, count, *got);
       bool same = true;
       for (std::size_t i = 0; i != count; ++i) same = same && std::array{got->x[i], got->y[i], got->z[i]} == points[i];
       REQUIRE(same);

@@ -68,7 +68,7 @@ template <class Policy, class Rays>
 [[nodiscard]] bool mark(const Policy& policy, Rays& rays, const scan& s, scan_masks& masks,
                         const scan_masks* hidden = nullptr) {
   const std::size_t count = s.points.size();
-  const auto point = [&](std::size_t i) { return s.points[i]; };
+  const point_view point{s.points.data()->data(), count};
   // Whether it is the fastest way does not matter here.
   [[maybe_unused]] const bool pays = rays.plan(s.grid, s.origin, count, point, [&](std::size_t) { return s.limit; });
   const std::size_t workers = policy.threads(), share = (count / workers + 256) & ~std::size_t{255};

@@ -9,6 +9,7 @@
 
 #include <orbis/core/random.hpp>
 #include <orbis/octree/detail/storage/brick.hpp>
+#include <orbis/octree/detail/storage/palette_kernels.hpp>
 
 #include "support/catch.hpp"
 
@@ -37,7 +38,7 @@ TEST_CASE("Making a brick inside a large leaf keeps the value of everything else
   brick<float>& b = store.make(inside);
   CHECK(b.uniform == 0xff);
   const std::uint32_t octant = place_in_brick(inside) >> 6U;
-  block<float> voxels;
+  octree::detail::block<float> voxels;
   store.read_octant(b, octant, voxels);
   voxels.value[place_in_brick(inside) & 63U] = -1.0F;
   store.write_octant(b, octant, voxels);
@@ -82,7 +83,7 @@ TEST_CASE("Octants of any number of values come back as they were written") {
       const voxel_key at{1024 + 4 * random.below(12), 1024 + 4 * random.below(12), 1024 + 4 * random.below(12)};
       brick<float>& b = store.make(at);
       const std::uint32_t octant = place_in_brick(at) >> 6U;
-      block<float> voxels, back;
+      octree::detail::block<float> voxels, back;
       voxels.known = random.below(3) == 0 ? ~std::uint64_t{0} : random() & random();
       std::optional<float> largest;
       for (std::uint32_t i = 0; i != 64; ++i) {
@@ -127,7 +128,7 @@ TEST_CASE("Octants of any number of values come back as they were written") {
 TEST_CASE("Records of octants that become uniform are used again") {
   brick_store<float> store;
   brick<float>& b = store.make({0, 0, 0});
-  block<float> mixed, uniform;
+  octree::detail::block<float> mixed, uniform;
   mixed.known = uniform.known = ~std::uint64_t{0};
   uniform.value.fill(1.0F);
   for (std::size_t i = 0; i != 64; ++i) mixed.value[i] = static_cast<float>(i % 7);

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include <orbis/octree/detail/storage/leaves.hpp>
+#include <orbis/octree/detail/storage/palette_kernels.hpp>
 
 #include "octree/pruned_tree.hpp"
 #include "octree/support.hpp"

@@ -3,6 +3,7 @@
 #include <cstdint>
 
 #include <orbis/octree/detail/storage/octant_pools.hpp>
+#include <orbis/octree/detail/storage/palette_kernels.hpp>
 
 #include "support/catch.hpp"
 

@@ -5,6 +5,7 @@
 
 #include <orbis/core/random.hpp>
 #include <orbis/octree/detail/storage/octant_record.hpp>
+#include <orbis/octree/detail/storage/palette_kernels.hpp>
 
 #include "support/catch.hpp"
 

@@ -3,6 +3,7 @@
 
 #include <orbis/core/random.hpp>
 #include <orbis/octree/detail/storage/packed_block.hpp>
+#include <orbis/octree/detail/storage/palette_kernels.hpp>
 
 #include "support/catch.hpp"
 

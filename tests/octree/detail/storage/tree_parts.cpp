@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <vector>
 
+#include <orbis/octree/detail/storage/palette_kernels.hpp>
 #include <orbis/octree/detail/storage/tree_parts.hpp>
 
 #include "support/catch.hpp"

@@ -43,7 +43,7 @@ struct depth_descent {
   const depth_sensor& sensor;
   const Rays& rays;
   const scan_masks& hits;  ///< the voxels that rays end in
-  Saturated& saturated;
+  const Saturated& saturated;
   bool on_face;  ///< the camera's centre lies close to a face of its voxel
 
   /// Finds the free voxels of the node at `level` > brick_level whose lowest voxel is `k`.
@@ -197,7 +197,7 @@ struct depth_descent {
 /// see depth_descent.
 template <execution_policy Policy, class Rays, class Saturated>
 void descend_nodes(const Policy& policy, const view_frame& frame, const depth_sensor& sensor, const Rays& rays,
-                   bool on_face, scan_masks& masks, Saturated& saturated, std::vector<descent_worker>& workers) {
+                   bool on_face, scan_masks& masks, const Saturated& saturated, std::vector<descent_worker>& workers) {
   const std::size_t count = std::clamp<std::size_t>(policy.threads(), 1, std::max<std::size_t>(1, frame.nodes.size()));
   if (workers.size() < count) workers.resize(count);  // only ever more: their memory is kept
   std::atomic<std::size_t> next{0};

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include <orbis/core/simd.hpp>
+#include <orbis/octree/detail/depth/chosen_kernel.hpp>
 #include <orbis/octree/detail/depth/direction_index.hpp>
 #include <orbis/octree/detail/depth/endpoint_image.hpp>
 #include <orbis/octree/detail/depth/endpoint_rows.hpp>
@@ -25,8 +26,8 @@ struct depth_frame : view_frame {
   using test_kernel = bool(const endpoint_image&, const voxel_test&, const pixel_box&, float,
                            std::vector<std::uint32_t>&);
 
-  sample_kernel* sample = simd::kernel<sample_children_kernel, sample_kernel, simd::avx2>();
-  test_kernel* test_pixels = simd::kernel<test_pixels_kernel, test_kernel>();
+  chosen_kernel<sample_children_kernel, sample_kernel, simd::avx2> sample;
+  chosen_kernel<test_pixels_kernel, test_kernel> test_pixels;
   endpoint_image ends;
   direction_index map;  ///< of cameras that are not pinholes
 
@@ -94,7 +95,3 @@ struct depth_rays {
 };
 
 }  // namespace orbis::octree::detail
-
-ORBIS_COMPILED_KERNEL_AVX2(orbis::octree::detail::sample_children_kernel,
-                           orbis::octree::detail::depth_frame::sample_kernel);
-ORBIS_COMPILED_KERNEL(orbis::octree::detail::test_pixels_kernel, orbis::octree::detail::depth_frame::test_kernel);

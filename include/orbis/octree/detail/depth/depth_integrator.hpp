@@ -48,11 +48,10 @@ class depth_integrator {
   /// `saturated(name, mask)` sets the bits of such voxels of a named brick; it may be called from several
   /// threads. O(pixels + bricks seen + voxels at surfaces).
   /// @pre depth and camera have the same size
-  template <execution_policy Policy, camera::depth_source Depth, camera::camera_model Camera,
-            class Saturated = nothing_saturated>
+  template <execution_policy Policy, camera::depth_source Depth, camera::camera_model Camera>
   integration_summary mark(const Policy& policy, const voxel_grid& grid, const Depth& depth, const Camera& camera,
                            const se3& T_world_camera, const integration_options& options, scan_masks& masks,
-                           Saturated&& saturated = {}) {
+                           const saturated_voxels& saturated = {}) {
     const depth_sensor sensor{grid, T_world_camera, options.max_range};
     masks.clear();
     const end_counts ends = frame_.ends.find_ends(policy, sensor, depth, camera, masks);
@@ -87,9 +86,9 @@ class depth_integrator {
  private:
   // -- one frame
 
-  template <class Policy, class Depth, class Saturated>
+  template <class Policy, class Depth>
   void mark_free(const Policy& policy, const depth_sensor& sensor, const Depth& depth, float max_z,
-                 const std::pair<voxel_key, voxel_key>& bounds, scan_masks& masks, Saturated& saturated) {
+                 const std::pair<voxel_key, voxel_key>& bounds, scan_masks& masks, const saturated_voxels& saturated) {
     if (frame_.scene.map != nullptr) walk_outer(sensor, depth, masks);
     frame_.pyramid.build(frame_.ends.rays().width(), frame_.ends.rays().height(), max_z,
                          [&](int v) { return frame_.ends.z(v); });
@@ -124,8 +123,7 @@ class depth_integrator {
                 const se3& T_world_camera, const integration_options& options, scan_masks& masks) {
     points_.clear();
     append_world_points(depth, camera, T_world_camera, points_);
-    const auto point = [this](std::size_t i) { return coordinates<float>(points_[i]); };
-    walker_.mark(policy, sensor.grid, points_.size(), point, sensor.pose.centre,
+    walker_.mark(policy, sensor.grid, reader_.view(points_), sensor.pose.centre,
                  {.max_range = options.max_range, .mode = ray_mode::every_ray});
     masks.merge(walker_.masks());
   }
@@ -142,6 +140,7 @@ class depth_integrator {
   depth_frame frame_;
   point_integrator walker_;
   std::vector<vec3f> points_;
+  point_reader reader_;
   std::vector<descent_worker> workers_;
 };
 

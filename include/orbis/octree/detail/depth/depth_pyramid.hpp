@@ -15,6 +15,7 @@
 #include <vector>
 
 #include <orbis/core/simd.hpp>
+#include <orbis/octree/detail/depth/chosen_kernel.hpp>
 
 namespace orbis::octree::detail {
 
@@ -85,10 +86,6 @@ struct overlap_kernel {
 class depth_pyramid {
  public:
   static constexpr int max_levels = 16;
-
-  depth_pyramid() noexcept
-      : first_{simd::kernel<first_cells_kernel, first_signature, simd::avx2>()},
-        overlap_{simd::kernel<overlap_kernel, overlap_signature, simd::avx2>()} {}
 
   /// `row(v)`: the depths at which the rays of image row v end, 0 where there is none, followed by 16
   /// zeros. `max_z`: the largest of them. O(pixels).
@@ -192,8 +189,8 @@ class depth_pyramid {
     }
   }
 
-  first_signature* first_;
-  overlap_signature* overlap_;
+  chosen_kernel<first_cells_kernel, first_signature, simd::avx2> first_;
+  chosen_kernel<overlap_kernel, overlap_signature, simd::avx2> overlap_;
   std::vector<std::uint32_t> cells_, strict_, some_, scratch_;
   std::array<std::int32_t, max_levels> begin_{}, width_{}, height_{};
   std::size_t family_ = 0;
@@ -203,8 +200,3 @@ class depth_pyramid {
 };
 
 }  // namespace orbis::octree::detail
-
-ORBIS_COMPILED_KERNEL_AVX2(orbis::octree::detail::first_cells_kernel,
-                           void(const float*, const float*, float, int, std::uint32_t*, std::uint32_t*));
-ORBIS_COMPILED_KERNEL_AVX2(orbis::octree::detail::overlap_kernel,
-                           void(const std::uint32_t*, const std::uint32_t*, int, std::uint32_t*));

@@ -28,14 +28,13 @@ namespace orbis::octree::detail {
 /// memory from image to image.
 class endpoint_image {
  public:
-  endpoint_image() noexcept
-      : find_{simd::kernel<find_ends_kernel, find_kernel>()}, fresh_{simd::kernel<fresh_keys_kernel, fresh_kernel>()} {}
-
   /// Takes in an image: the depths at which rays end, and in `masks` the voxels of the ends that are
   /// used, as occupied. O(pixels). @pre depth and camera have the same size
   template <execution_policy Policy, camera::depth_source Depth, camera::camera_model Camera>
   end_counts find_ends(const Policy& policy, const depth_sensor& sensor, const Depth& depth, const Camera& camera,
                        scan_masks& masks) {
+    find_ = simd::kernel<find_ends_kernel, find_kernel>();
+    fresh_ = simd::kernel<fresh_keys_kernel, fresh_kernel>();
     rays_.fit(camera);
     resize(rays_.width(), rays_.height());
     assert(static_cast<int>(depth.width()) == rays_.width() && static_cast<int>(depth.height()) == rays_.height());
@@ -178,8 +177,8 @@ class endpoint_image {
     }
   }
 
-  find_kernel* find_;
-  fresh_kernel* fresh_;
+  find_kernel* find_ = nullptr;
+  fresh_kernel* fresh_ = nullptr;
   pixel_rays rays_;
   std::vector<float> z_;
   std::size_t stride_ = 0, first_ = 0;
@@ -187,14 +186,3 @@ class endpoint_image {
 };
 
 }  // namespace orbis::octree::detail
-
-ORBIS_COMPILED_KERNEL(orbis::octree::detail::find_ends_kernel,
-                      void(const orbis::octree::detail::depth_sensor&, const orbis::octree::detail::end_row&,
-                           orbis::octree::detail::end_counts&));
-ORBIS_COMPILED_KERNEL(orbis::octree::detail::fresh_keys_kernel,
-                      unsigned(const std::array<const std::int32_t*, 3>&, const std::array<const std::int32_t*, 3>&,
-                               int));
-ORBIS_COMPILED_KERNEL_AVX2(orbis::octree::detail::to_metres_kernel<std::uint16_t>,
-                           void(const orbis::octree::detail::metres_row<std::uint16_t>&));
-ORBIS_COMPILED_KERNEL_AVX2(orbis::octree::detail::to_metres_kernel<float>,
-                           void(const orbis::octree::detail::metres_row<float>&));

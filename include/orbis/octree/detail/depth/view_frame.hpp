@@ -15,6 +15,7 @@
 #include <vector>
 
 #include <orbis/core/simd.hpp>
+#include <orbis/octree/detail/depth/chosen_kernel.hpp>
 #include <orbis/octree/detail/depth/depth_pyramid.hpp>
 #include <orbis/octree/detail/depth/endpoint_rows.hpp>
 #include <orbis/octree/detail/depth/node_classifier.hpp>
@@ -41,7 +42,7 @@ struct view_frame {
   };
 
   // Kernels of eight lanes are no faster on AVX-512.
-  classify_kernel* classify = simd::kernel<classify_children_kernel, classify_kernel, simd::avx2>();
+  chosen_kernel<classify_children_kernel, classify_kernel, simd::avx2> classify;
   depth_pyramid pyramid;
   depth_scene scene;
   std::vector<child_offsets> offsets;  ///< for each level, of a node's children at that level
@@ -202,6 +203,3 @@ struct view_frame {
 };
 
 }  // namespace orbis::octree::detail
-
-ORBIS_COMPILED_KERNEL_AVX2(orbis::octree::detail::classify_children_kernel,
-                           orbis::octree::detail::view_frame::classify_kernel);

@@ -12,19 +12,13 @@
 
 #include <orbis/octree/change_log.hpp>
 #include <orbis/octree/detail/history/brick_uses.hpp>
+#include <orbis/octree/detail/history/replayed_brick.hpp>
 #include <orbis/octree/detail/storage/brick.hpp>
 #include <orbis/octree/detail/storage/update_block.hpp>
 #include <orbis/octree/scan_voxels.hpp>
 #include <orbis/octree/sensor_model.hpp>
 
 namespace orbis::octree::detail {
-
-/// What the scans say about the octants of a brick, and the voxels in which that differs from what is stored.
-template <class T>
-struct replayed_brick {
-  std::array<block<T>, 8> octants;
-  std::array<std::uint64_t, 8> changed{};  ///< zero for octants that were not replayed
-};
 
 /// The voxels in which two octants differ; unknown voxels hold 0.
 template <class T>

@@ -247,5 +247,3 @@ class binned_rays {
 };
 
 }  // namespace orbis::octree::detail
-
-ORBIS_COMPILED_KERNEL(orbis::octree::detail::place_rays_kernel, orbis::octree::detail::place_kernel);

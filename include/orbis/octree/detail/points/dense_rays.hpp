@@ -14,6 +14,7 @@
 #include <orbis/core/execution.hpp>
 #include <orbis/core/random.hpp>
 #include <orbis/core/simd.hpp>
+#include <orbis/octree/detail/depth/chosen_kernel.hpp>
 #include <orbis/octree/detail/depth/depth_descent.hpp>
 #include <orbis/octree/detail/depth/first_steps.hpp>
 #include <orbis/octree/detail/depth/view_frame.hpp>
@@ -33,8 +34,8 @@ struct window_frame : view_frame {
   using test_kernel = bool(const depth_scene&, const window_rays&, const voxel_test&, const pixel_box&, float,
                            std::vector<std::uint32_t>&);
 
-  sample_kernel* sample = simd::kernel<sample_cells_kernel, sample_kernel, simd::avx2>();
-  test_kernel* test_cells = simd::kernel<test_cells_kernel, test_kernel>();
+  chosen_kernel<sample_cells_kernel, sample_kernel, simd::avx2> sample;
+  chosen_kernel<test_cells_kernel, test_kernel> test_cells;
   depth_sensor sensor{voxel_grid{1.0}, se3{}, 0.0};
   window_rays rays;
 
@@ -108,7 +109,7 @@ class dense_rays {
   /// point.
   template <execution_policy Policy, class Range, class EndOf, class Saturated>
   [[nodiscard]] bool mark(const Policy& policy, const depth_sensor& sensor, Range&& range, const EndOf& end_of,
-                          scan_masks& masks, Saturated& saturated) {
+                          scan_masks& masks, const Saturated& saturated) {
     rays_.sort(policy, range);
     if (rays_.size() == 0) return true;
     bool on_face = false;
@@ -195,7 +196,3 @@ class dense_rays {
 };
 
 }  // namespace orbis::octree::detail
-
-ORBIS_COMPILED_KERNEL_AVX2(orbis::octree::detail::sample_cells_kernel,
-                           orbis::octree::detail::window_frame::sample_kernel);
-ORBIS_COMPILED_KERNEL(orbis::octree::detail::test_cells_kernel, orbis::octree::detail::window_frame::test_kernel);

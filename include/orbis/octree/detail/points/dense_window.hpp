@@ -180,6 +180,3 @@ class dense_window {
 };
 
 }  // namespace orbis::octree::detail
-
-ORBIS_COMPILED_KERNEL(orbis::octree::detail::traverse_lanes_kernel,
-                      void(std::uint8_t*, std::int64_t, const orbis::octree::detail::traversal_lanes&));

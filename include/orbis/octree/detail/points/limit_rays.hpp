@@ -179,6 +179,3 @@ using limit_kernel = void(const ray_frame&, const point_batch&, const double*, s
 [[nodiscard]] inline limit_kernel* limit_rays() noexcept { return simd::kernel<limit_rays_kernel, limit_kernel>(); }
 
 }  // namespace orbis::octree::detail
-
-ORBIS_COMPILED_KERNEL(orbis::octree::detail::limit_rays_kernel, orbis::octree::detail::limit_kernel);
-ORBIS_COMPILED_KERNEL(orbis::octree::detail::fresh_hits_kernel, orbis::octree::detail::fresh_kernel);

@@ -155,7 +155,7 @@ class organised_rays {
   /// `end_of(i)`: the ray_endpoint of the i-th point. (Called as dense_rays::mark is, which asks for ranges.)
   template <execution_policy Policy, class Range, class EndOf, class Saturated>
   [[nodiscard]] bool mark(const Policy& policy, const depth_sensor& scan, Range&&, const EndOf& end_of,
-                          scan_masks& masks, Saturated& saturated) {
+                          scan_masks& masks, const Saturated& saturated) {
     fill_image(policy);
     std::size_t second = 0;
     for (const auto& s : second_) second += s.size();
@@ -276,5 +276,3 @@ class organised_rays {
 };
 
 }  // namespace orbis::octree::detail
-
-ORBIS_COMPILED_KERNEL(orbis::octree::detail::place_in_pixels_kernel, orbis::octree::detail::place_in_pixels);

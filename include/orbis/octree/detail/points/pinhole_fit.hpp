@@ -11,13 +11,11 @@
 #include <span>
 #include <vector>
 
-#include <Eigen/Cholesky>
-
 #include <orbis/camera/pinhole.hpp>
 #include <orbis/core/jacobi.hpp>
 #include <orbis/core/random.hpp>
-#include <orbis/core/so3.hpp>
 #include <orbis/core/small_cholesky.hpp>
+#include <orbis/core/so3.hpp>
 #include <orbis/core/types.hpp>
 #include <orbis/octree/detail/points/ray_traversal.hpp>
 #include <orbis/octree/detail/points/scan_sample.hpp>

@@ -146,5 +146,3 @@ using crossings_kernel = void(const plane_stack&, queued_rays&, std::size_t, std
 }
 
 }  // namespace orbis::octree::detail
-
-ORBIS_COMPILED_KERNEL(orbis::octree::detail::mark_crossings_kernel, orbis::octree::detail::crossings_kernel);

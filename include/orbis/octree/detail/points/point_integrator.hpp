@@ -13,7 +13,6 @@
 #include <cstdint>
 #include <limits>
 #include <optional>
-#include <ranges>
 #include <span>
 #include <utility>
 #include <vector>
@@ -31,9 +30,17 @@
 
 namespace orbis::octree::detail {
 
-/// No voxel is saturated: a miss may change each of them.
-struct nothing_saturated {
-  void operator()(std::uint64_t, std::array<std::uint64_t, 8>&) const noexcept {}
+/// Sets the bits of voxels, of the named brick, of which nothing needs to be known: a miss would not change them. A
+/// function and what it works on, so that no algorithm is compiled for each map. May be called from several threads.
+struct saturated_voxels {
+  using words = std::array<std::uint64_t, 8>;
+
+  void (*find)(const void* map, std::uint64_t name, words&) = nullptr;  ///< null: no voxel is saturated
+  const void* map = nullptr;
+
+  void operator()(std::uint64_t name, words& saturated) const {
+    if (find != nullptr) find(map, name, saturated);
+  }
 };
 
 /// Removes the voxels outside `bounds` from a scan; does nothing without bounds.
@@ -52,15 +59,16 @@ class point_integrator {
   /// The voxels of the last scan; a voxel both free and occupied counts as occupied.
   [[nodiscard]] const scan_masks& masks() const noexcept { return workers_.front().masks; }
 
-  /// Marks the scan of `count` points, `point(i)` being the i-th as float3, seen from `origin`. In mode every_ray,
+  /// Marks the scan of some points, seen from `origin`. In mode every_ray,
   /// voxels for which `saturated` says that a miss would not change them may be missing among the free ones, see
   /// depth_integrator::mark. The
   /// summary's voxel counts stay zero. Nothing is marked if the origin is not finite; rays are not
   /// traversed if it lies outside the grid. O(points + voxels at surfaces), or O(points x voxels along a ray) where
   /// there are few points for that many voxels.
-  template <execution_policy Policy, class Point, class Saturated = nothing_saturated>
-  integration_summary mark(const Policy& policy, const voxel_grid& grid, std::size_t count, Point&& point,
-                           const float3& origin, const integration_options& options, Saturated&& saturated = {}) {
+  template <execution_policy Policy>
+  integration_summary mark(const Policy& policy, const voxel_grid& grid, const point_view& point, const float3& origin,
+                           const integration_options& options, const saturated_voxels& saturated = {}) {
+    const std::size_t count = point.count;
     assert(options.beam_ranges.empty() || options.beam_ranges.size() == count);
     prepare(policy.threads(), count);
     if (!is_finite(origin)) return {.used = 0, .truncated = 0, .rejected = count};
@@ -69,7 +77,7 @@ class point_integrator {
       const auto limit = [&](std::size_t i) { return from.limit(i); };
       const auto done_by = [&](auto& marker) -> std::optional<integration_summary> {
         if (!from.key || !marker.plan(grid, origin, count, point, limit)) return std::nullopt;
-        auto done = mark_by(marker, policy, from, count, point, options, saturated);
+        auto done = mark_by(marker, policy, from, point, options, saturated);
         if (done) return done;
         for (worker& w : active_) w.clear();
         start(grid, origin, options);
@@ -91,14 +99,6 @@ class point_integrator {
       add_centers(policy, from, workers_[0].ends);
     }
     return finish(policy, grid, options);
-  }
-
-  /// Marks the scan of a range of points.
-  template <execution_policy Policy, point_range Points, class Saturated = nothing_saturated>
-  integration_summary mark(const Policy& policy, const voxel_grid& grid, const Points& points, const float3& origin,
-                           const integration_options& options, Saturated&& saturated = {}) {
-    return mark(policy, grid, static_cast<std::size_t>(std::ranges::size(points)), point_source<Points>{points}, origin,
-                options, saturated);
   }
 
   /// The second half of mode `discretized` alone: marks the rays to the centres of the voxels that are
@@ -166,8 +166,8 @@ class point_integrator {
     }
     /// The points [begin, end) in mode every_ray. `take(begin, count)` may take rays out of `rays`, see
     /// binned_rays::add.
-    template <class Point, class Take>
-    void add_points(const sensor& from, std::size_t begin, std::size_t end, Point&& point, Take&& take) {
+    template <class Take>
+    void add_points(const sensor& from, std::size_t begin, std::size_t end, const point_view& point, Take&& take) {
       if (from.beam_ranges.empty()) limits.fill(from.max_range);
       while (begin != end) {
         const std::size_t n = std::min(end - begin, point_batch::capacity);
@@ -219,8 +219,8 @@ class point_integrator {
       }
     }
     /// The points [begin, end) in mode discretized.
-    template <class Point>
-    void add_ends(const voxel_grid& grid, std::size_t begin, std::size_t end, Point&& point) {
+    template <class Points>
+    void add_ends(const voxel_grid& grid, std::size_t begin, std::size_t end, const Points& point) {
       scan_brick* brick = nullptr;  // of the last point; neighbours mostly lie in the same one
       while (begin != end) {
         const std::size_t n = std::min(end - begin, point_batch::capacity);
@@ -308,10 +308,11 @@ class point_integrator {
     for (worker& w : active_) w.add_batched(from);
   }
   /// A scan for which dense_ or organised_ has a plan; empty if it cannot be done.
-  template <class Marker, class Policy, class Point, class Saturated>
+  template <class Marker, class Policy>
   std::optional<integration_summary> mark_by(Marker& marker, const Policy& policy, const sensor& from,
-                                             std::size_t count, Point&& point, const integration_options& options,
-                                             Saturated& saturated) {
+                                             const point_view& point, const integration_options& options,
+                                             const saturated_voxels& saturated) {
+    const std::size_t count = point.count;
     const std::size_t workers = active_.size();
     marker.start(from.origin, count, workers);
     const auto range = [&](std::size_t i) {

@@ -4,14 +4,12 @@
 #pragma once
 
 #include <array>
-#include <concepts>
 #include <cstddef>
 #include <cstdint>
-#include <ranges>
 #include <utility>
 
-#include <orbis/core/point.hpp>
 #include <orbis/core/simd.hpp>
+#include <orbis/octree/detail/points/read_points.hpp>
 #include <orbis/octree/key.hpp>
 
 namespace orbis::octree::detail {
@@ -53,42 +51,10 @@ struct load_triples_kernel {
   }
 };
 
-/// Whether the points of a range are floats x, y, z, x, y, z ... in memory.
-template <class Points>
-concept float_triples = std::ranges::contiguous_range<Points> && requires(const std::ranges::range_value_t<Points>& p) {
-  requires sizeof(p) == 3 * sizeof(float);
-  { p.data() } -> std::same_as<const float*>;
-  { p[0] } -> std::convertible_to<float>;
-};
-
-/// The points of a range as functions of their number; whole batches at once where that is faster.
-template <point_range Points>
-struct point_source {
-  const Points& points;
-
-  [[nodiscard]] std::array<float, 3> operator()(std::size_t i) const {
-    return coordinates<float>(
-        std::ranges::begin(points)[static_cast<std::ranges::range_difference_t<const Points>>(i)]);
-  }
-  void load(std::size_t begin, std::size_t count, point_batch& batch) const requires float_triples<const Points> {
-    auto* const load_triples = simd::kernel<load_triples_kernel, void(const float*, std::size_t, point_batch&)>();
-    load_triples(std::ranges::data(points)[begin].data(), count, batch);
-  }
-};
-
-/// Loads the points [begin, begin + count) of a source, which is any function of their number.
-template <class Source>
-void load_points(Source&& source, std::size_t begin, std::size_t count, point_batch& batch) {
-  if constexpr (requires { source.load(begin, count, batch); }) {
-    source.load(begin, count, batch);
-  } else {
-    for (std::size_t i = 0; i != count; ++i) {
-      const std::array<float, 3> p = source(begin + i);
-      batch.x[i] = p[0];
-      batch.y[i] = p[1];
-      batch.z[i] = p[2];
-    }
-  }
+/// Loads the points [begin, begin + count).
+inline void load_points(const point_view& points, std::size_t begin, std::size_t count, point_batch& batch) noexcept {
+  auto* const load_triples = simd::kernel<load_triples_kernel, void(const float*, std::size_t, point_batch&)>();
+  load_triples(points.xyz + 3 * begin, count, batch);
 }
 
 /// The voxels of some points, in their order; a voxel that equals the one before may be left out. And the number of
@@ -168,9 +134,3 @@ inline void find_keys(const voxel_grid& grid, const point_batch& points, std::si
 }
 
 }  // namespace orbis::octree::detail
-
-ORBIS_COMPILED_KERNEL(orbis::octree::detail::load_triples_kernel,
-                      void(const float*, std::size_t, orbis::octree::detail::point_batch&));
-ORBIS_COMPILED_KERNEL(orbis::octree::detail::find_keys_kernel,
-                      void(const orbis::octree::voxel_grid&, const orbis::octree::detail::point_batch&, std::size_t,
-                           orbis::octree::detail::batch_keys&));

@@ -174,5 +174,3 @@ using setup_kernel = void(const scan_origin&, const ray_batch&, std::size_t, ray
 [[nodiscard]] inline setup_kernel* set_up_rays() noexcept { return simd::kernel<set_up_rays_kernel, setup_kernel>(); }
 
 }  // namespace orbis::octree::detail
-
-ORBIS_COMPILED_KERNEL(orbis::octree::detail::set_up_rays_kernel, orbis::octree::detail::setup_kernel);

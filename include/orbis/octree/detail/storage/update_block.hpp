@@ -45,6 +45,3 @@ std::uint64_t update_block(block<typename M::value_type>& b, std::uint64_t free,
 }
 
 }  // namespace orbis::octree::detail
-
-ORBIS_COMPILED_KERNEL(orbis::octree::detail::update_block_kernel<orbis::octree::log_odds<>>,
-                      std::uint64_t(orbis::octree::detail::block<float>&, std::uint64_t, std::uint64_t));

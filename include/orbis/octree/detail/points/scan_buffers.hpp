@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// What finds the voxels of a scan, whose memory is kept from scan to scan.
+#pragma once
+
+#include <cstddef>
+#include <limits>
+
+#include <orbis/core/execution.hpp>
+#include <orbis/core/point.hpp>
+#include <orbis/core/se3.hpp>
+#include <orbis/octree/detail/depth/depth_integrator.hpp>
+#include <orbis/octree/detail/points/point_integrator.hpp>
+#include <orbis/octree/detail/storage/scan_masks.hpp>
+#include <orbis/octree/integration.hpp>
+#include <orbis/octree/key.hpp>
+
+namespace orbis::octree::detail {
+
+struct scan_buffers {
+  point_integrator points;
+  depth_integrator depth;
+  scan_masks masks;
+
+  [[nodiscard]] std::size_t memory_bytes() const noexcept {
+    return sizeof(scan_buffers) + points.memory_bytes() + depth.memory_bytes() + masks.memory_bytes();
+  }
+};
+
+/// Marks a depth image, in either mode. The masks are those of `buffers`; `summary` gets what became of the pixels.
+template <class Depth, class Camera>
+const scan_masks& mark_depth(const parallel_policy& policy, scan_buffers& buffers, const voxel_grid& grid,
+                             const Depth& depth, const Camera& camera, const se3& T_world_camera,
+                             const integration_options& options, integration_summary& summary,
+                             const saturated_voxels& saturated = {}) {
+  scan_masks& masks = buffers.masks;
+  if (options.mode == ray_mode::every_ray) {
+    summary = options.rays ? buffers.depth.mark(policy, grid, depth, camera, T_world_camera, options, masks, saturated)
+                           : buffers.depth.mark_ends(policy, grid, depth, camera, T_world_camera, options, masks);
+    clip(masks, grid, options.bounds);
+    return masks;
+  }
+  // Whether a voxel is within range is decided at its centre, not at its points.
+  integration_options unlimited = options;
+  unlimited.max_range = std::numeric_limits<double>::infinity();
+  const std::size_t rejected =
+      buffers.depth.mark_ends(policy, grid, depth, camera, T_world_camera, unlimited, masks).rejected;
+  const float3 origin = coordinates<float>(T_world_camera.translation());
+  summary = buffers.points.mark_centers(policy, grid, masks, origin, options);
+  summary.rejected += rejected;
+  return buffers.points.masks();
+}
+
+}  // namespace orbis::octree::detail

@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// The functions of occupancy_octree.hpp.
+#pragma once
+
+#include <array>
+#include <cassert>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <vector>
+
+#include <orbis/core/execution.hpp>
+#include <orbis/core/point.hpp>
+#include <orbis/core/se3.hpp>
+#include <orbis/core/types.hpp>
+#include <orbis/octree/change_log.hpp>
+#include <orbis/octree/detail/points/point_integrator.hpp>
+#include <orbis/octree/detail/points/scan_buffers.hpp>
+#include <orbis/octree/detail/storage/apply_scan.hpp>
+#include <orbis/octree/detail/storage/brick.hpp>
+#include <orbis/octree/detail/storage/large_leaves.hpp>
+#include <orbis/octree/detail/storage/leaves.hpp>
+#include <orbis/octree/detail/storage/palette_kernels.hpp>
+#include <orbis/octree/detail/storage/tree_parts.hpp>
+#include <orbis/octree/integration.hpp>
+#include <orbis/octree/occupancy_octree.hpp>
+#include <orbis/octree/sensor_model.hpp>
+
+namespace orbis::octree {
+
+namespace detail {
+
+/// What a scan need not say about a map, for point_integrator and depth_integrator.
+template <sensor_model Model>
+[[nodiscard]] saturated_voxels saturated_in(const brick_store<typename Model::value_type>& store) {
+  using map = brick_store<typename Model::value_type>;
+  return {.find =
+              [](const void* of, std::uint64_t name, saturated_voxels::words& saturated) {
+                find_saturated<Model>(*static_cast<const map*>(of), name, saturated);
+              },
+          .map = &store};
+}
+
+}  // namespace detail
+
+template <sensor_model Model>
+integration_summary occupancy_octree<Model>::integrate_points(const parallel_policy& policy,
+                                                              const detail::point_view& points,
+                                                              const detail::float3& origin,
+                                                              const integration_options& options) {
+  begin_change();
+  detail::point_integrator& marker = scratch_.get<detail::scan_buffers>().points;
+  integration_summary summary =
+      marker.mark(policy, grid_, points, origin, options, detail::saturated_in<Model>(store_));
+  detail::apply_scan<Model>(store_, marker.masks(), summary, track_.on ? &track_.log : nullptr);
+  return summary;
+}
+
+template <sensor_model Model>
+template <class Depth, class Camera>
+integration_summary occupancy_octree<Model>::integrate_depth(const parallel_policy& policy, const Depth& depth,
+                                                             const Camera& camera, const se3& T_world_camera,
+                                                             const integration_options& options) {
+  assert(options.beam_ranges.empty());
+  begin_change();
+  detail::scan_buffers& buffers = scratch_.get<detail::scan_buffers>();
+  integration_summary summary;
+  const detail::scan_masks& scan = detail::mark_depth(policy, buffers, grid_, depth, camera, T_world_camera, options,
+                                                      summary, detail::saturated_in<Model>(store_));
+  detail::apply_scan<Model>(store_, scan, summary, track_.on ? &track_.log : nullptr);
+  return summary;
+}
+
+template <sensor_model Model>
+void occupancy_octree<Model>::to_maximum_likelihood() {
+  transform([](value_type v) { return std::optional{is_occupied<Model>(v) ? Model::clamp_max : Model::clamp_min}; });
+}
+
+template <sensor_model Model>
+void occupancy_octree<Model>::prune() {
+  const std::vector<detail::tree_part<value_type>> parts = detail::tree_parts(store_, tree_depth());
+  detail::large_leaves<value_type> merged;
+  for (const auto& part : parts)
+    if (part.level > detail::brick_level) merged.add(detail::node_name(part.key, part.level), part.value);
+  const auto is_inside = [&](std::uint64_t name) {
+    const auto* const leaf = merged.find(detail::named_key(name));
+    return leaf != nullptr && leaf->name != name;
+  };
+  std::vector<std::uint64_t> bricks, large;
+  store_.for_each_brick([&](const detail::brick<value_type>& b) {
+    if (is_inside(b.name)) bricks.push_back(b.name);
+  });
+  store_.for_each_large([&](std::uint64_t name, value_type) {
+    if (is_inside(name)) large.push_back(name);
+  });
+  store_.erase_bricks(bricks);
+  store_.erase_large(large);
+  for (std::size_t i = 0; i != merged.size(); ++i) {
+    const auto& [name, v] = merged[i];
+    if (store_.find_large_value(detail::named_key(name)) == nullptr)
+      store_.set_node(detail::named_key(name), detail::named_level(name), v);
+  }
+}
+
+template <sensor_model Model>
+octree_counts occupancy_octree<Model>::counts() const {
+  return detail::count_leaves<Model>(store_, tree_depth());
+}
+
+template <sensor_model Model>
+std::optional<bounding_box> occupancy_octree<Model>::bounds() const {
+  std::optional<bounding_box> box;
+  for_each_leaf([&](const leaf& l) {
+    const vec3 low = shifted(l.center, -l.size / 2.0), high = shifted(low, l.size);
+    if (!box) box = bounding_box{low, high};
+    box->min = entrywise_min(box->min, low);
+    box->max = entrywise_max(box->max, high);
+  });
+  return box;
+}
+
+template <sensor_model Model>
+void occupancy_octree<Model>::replace_octant(const voxel_key& k, const block<value_type>& before,
+                                             block<value_type>& after) {
+  std::uint64_t changed = before.known ^ after.known;
+  for (unsigned i = 0; i != 64; ++i) {
+    after.value[i] = (after.known >> i & 1U) != 0 ? without_sign_of_zero(after.value[i]) : value_type{};
+    changed |= std::uint64_t{before.value[i] != after.value[i]} << i;
+  }
+  if (changed == 0) return;
+  detail::brick<value_type>& b = store_.make(k);
+  store_.write_octant(b, detail::place_in_brick(k) >> 6U, after);
+  if (track_.on) track_.log.record(k, changed);
+  if (!b.is_known()) store_.erase_bricks(std::array{b.name});
+}
+
+template <sensor_model Model>
+void occupancy_octree<Model>::note_brick(const voxel_key& k, int level) {
+  if (!track_.on) return;
+  const detail::brick<value_type>* const b = level == detail::brick_level ? store_.find(k) : nullptr;
+  if (b == nullptr) return note_node(k, level);
+  for (unsigned i = 0; i != 8; ++i)
+    track_.log.record(child_key(k, i, node_cells(detail::octant_level)), store_.known(*b, i));
+}
+
+template <sensor_model Model>
+void occupancy_octree<Model>::note_node(const voxel_key& k, int level) {
+  if (!track_.on) return;
+  change_log& log = track_.log;
+  if (level > detail::brick_level) {
+    lose_track();
+  } else if (level == detail::brick_level) {
+    for (unsigned i = 0; i != 8; ++i) log.record(child_key(k, i, node_cells(detail::octant_level)), ~std::uint64_t{0});
+  } else {
+    const std::uint64_t inside = level == 0 ? 1U : level == 1 ? 0xffU : ~std::uint64_t{0};
+    log.record(k, inside << (detail::place_in_brick(k) & 63U));
+  }
+}
+
+}  // namespace orbis::octree

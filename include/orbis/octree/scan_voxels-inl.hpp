@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// The functions of scan_voxels.hpp.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cassert>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include <orbis/core/execution.hpp>
+#include <orbis/core/inline.hpp>
+#include <orbis/core/se3.hpp>
+#include <orbis/octree/detail/points/scan_buffers.hpp>
+#include <orbis/octree/detail/storage/palette_kernels.hpp>
+#include <orbis/octree/detail/storage/scan_masks.hpp>
+#include <orbis/octree/integration.hpp>
+#include <orbis/octree/key.hpp>
+#include <orbis/octree/scan_voxels.hpp>
+
+namespace orbis::octree {
+
+ORBIS_INLINE void scan_voxels::add(const detail::scan_brick& b) {
+  part p{.name = b.name, .first = static_cast<std::uint32_t>(words_.size())};
+  for (unsigned i = 0; i != 8; ++i) {
+    const auto bit = static_cast<std::uint8_t>(1U << i);
+    const std::uint64_t free = b.free[i] & ~b.occupied[i];
+    if (free == ~std::uint64_t{0}) {
+      p.full |= bit;
+    } else if (free != 0) {
+      p.free |= bit;
+      words_.push_back(free);
+    }
+  }
+  for (unsigned i = 0; i != 8; ++i) {
+    if (b.occupied[i] == 0) continue;
+    p.occupied |= static_cast<std::uint8_t>(1U << i);
+    words_.push_back(b.occupied[i]);
+  }
+  if ((p.free | p.occupied | p.full) != 0) parts_.push_back(p);
+}
+
+ORBIS_INLINE void scan_marker::pack(const detail::scan_masks& masks, scan_voxels& voxels,
+                                    integration_summary& summary) {
+  const std::vector<detail::scan_brick>& bricks = masks.bricks();
+  order_.resize(bricks.size());
+  for (std::uint32_t i = 0; i != bricks.size(); ++i) order_[i] = {bricks[i].name, i};
+  std::sort(order_.begin(), order_.end());
+  voxels.clear();
+  for (const auto& [name, i] : order_) {
+    for (std::size_t octant = 0; octant != 8; ++octant) {
+      const std::uint64_t occupied = bricks[i].occupied[octant];
+      summary.occupied += static_cast<std::size_t>(std::popcount(occupied));
+      summary.free += static_cast<std::size_t>(std::popcount(bricks[i].free[octant] & ~occupied));
+    }
+    voxels.add(bricks[i]);
+  }
+}
+
+template <class Depth, class Camera>
+integration_summary scan_marker::mark_depth(const parallel_policy& policy, const voxel_grid& grid, const Depth& depth,
+                                            const Camera& camera, const se3& T_world_camera,
+                                            const integration_options& options, scan_voxels& voxels) {
+  assert(options.beam_ranges.empty());
+  integration_summary summary;
+  const detail::scan_masks& scan = detail::mark_depth(policy, scratch_.get<detail::scan_buffers>(), grid, depth, camera,
+                                                      T_world_camera, options, summary);
+  pack(scan, voxels, summary);
+  return summary;
+}
+
+template <class Policy>
+integration_summary scan_marker::mark_points(const Policy& policy, const voxel_grid& grid,
+                                             const detail::point_view& points, const std::array<float, 3>& origin,
+                                             const integration_options& options, scan_voxels& voxels) {
+  detail::point_integrator& marker = scratch_.get<detail::scan_buffers>().points;
+  integration_summary summary = marker.mark(policy, grid, points, origin, options);
+  pack(marker.masks(), voxels, summary);
+  return summary;
+}
+
+}  // namespace orbis::octree
