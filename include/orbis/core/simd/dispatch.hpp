@@ -56,8 +56,7 @@ concept target = requires {
 
 namespace detail {
 
-/// The function that holds the code of `Kernel` for a target. It is not defined in the class, where it would be inline:
-/// compilers instantiate inline functions even if `extern template` says that they are elsewhere.
+/// The function that holds the code of `Kernel` for a target.
 template <class Kernel, class Signature, class Target>
 struct code;
 #define ORBIS_KERNEL_CODE(Target, attribute)                                      \
@@ -108,31 +107,3 @@ template <class Kernel, class Signature, target... Targets>
 }
 
 }  // namespace orbis::simd
-
-/// Explicit instantiation of a kernel for the targets that `kernel` has by default, or without the last:
-/// `ORBIS_KERNEL_INSTANCE(extern template, kernel, signature);` outside of namespaces or in namespace orbis.
-#if ORBIS_X86
-#define ORBIS_KERNEL_INSTANCE_AVX2(what, ...)                                \
-  what struct orbis::simd::detail::code<__VA_ARGS__, orbis::simd::portable>; \
-  what struct orbis::simd::detail::code<__VA_ARGS__, orbis::simd::avx2>
-#define ORBIS_KERNEL_INSTANCE(what, ...)         \
-  ORBIS_KERNEL_INSTANCE_AVX2(what, __VA_ARGS__); \
-  what struct orbis::simd::detail::code<__VA_ARGS__, orbis::simd::avx512>
-#else
-#define ORBIS_KERNEL_INSTANCE_AVX2(what, ...) what struct orbis::simd::detail::code<__VA_ARGS__, orbis::simd::portable>
-#define ORBIS_KERNEL_INSTANCE(what, ...) ORBIS_KERNEL_INSTANCE_AVX2(what, __VA_ARGS__)
-#endif
-
-/// At the end of a kernel's header, outside namespaces: the library orbis::compiled holds the kernel for `portable`,
-/// `avx2` and `avx512`, or without the last, and who links it does not compile the kernel. The arguments are those of
-/// `kernel`. The sources in cmake/compiled define ORBIS_INSTANTIATE_KERNELS.
-#if !defined(ORBIS_COMPILED)
-#define ORBIS_COMPILED_KERNEL(...) static_assert(true)
-#define ORBIS_COMPILED_KERNEL_AVX2(...) static_assert(true)
-#elif defined(ORBIS_INSTANTIATE_KERNELS)
-#define ORBIS_COMPILED_KERNEL(...) ORBIS_KERNEL_INSTANCE(template, __VA_ARGS__)
-#define ORBIS_COMPILED_KERNEL_AVX2(...) ORBIS_KERNEL_INSTANCE_AVX2(template, __VA_ARGS__)
-#else
-#define ORBIS_COMPILED_KERNEL(...) ORBIS_KERNEL_INSTANCE(extern template, __VA_ARGS__)
-#define ORBIS_COMPILED_KERNEL_AVX2(...) ORBIS_KERNEL_INSTANCE_AVX2(extern template, __VA_ARGS__)
-#endif
