@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include <orbis/cloud/all_knn-inl.hpp>
 #include <orbis/cloud/all_knn.hpp>
 
 #include "cloud/clouds.hpp"

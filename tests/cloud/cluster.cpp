@@ -7,6 +7,7 @@
 #include <vector>
 
 #include <orbis/cloud/all_knn.hpp>
+#include <orbis/cloud/cluster-inl.hpp>
 #include <orbis/cloud/cluster.hpp>
 
 #include "cloud/clouds.hpp"

@@ -8,6 +8,7 @@
 
 #include <orbis/cloud/flying_pixels.hpp>
 #include <orbis/core/random.hpp>
+#include <orbis/core/simd/level.hpp>
 #include <orbis/io/recording.hpp>
 #include <orbis/io/synthetic.hpp>
 

@@ -34,6 +34,7 @@
 #include <orbis/slam/events.hpp>
 #include <orbis/slam/extractor.hpp>
 #include <orbis/slam/ids.hpp>
+#include <orbis/slam/map-inl.hpp>
 #include <orbis/slam/map_file.hpp>
 #include <orbis/slam/matchers.hpp>
 #include <orbis/slam/measure.hpp>

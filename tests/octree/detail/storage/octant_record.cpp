@@ -16,8 +16,8 @@ using namespace orbis::octree::detail;
 namespace {
 
 /// An octant of about `kinds` values; unknown voxels hold 0.
-block<float> random_block(random_bits& random, std::uint32_t kinds) {
-  block<float> b;
+octree::detail::block<float> random_block(random_bits& random, std::uint32_t kinds) {
+  octree::detail::block<float> b;
   b.known = random() | random();
   for (unsigned i = 0; i != 64; ++i)
     if ((b.known >> i & 1U) != 0) b.value[i] = static_cast<float>(static_cast<int>(random.below(kinds)) - 2);
@@ -26,9 +26,9 @@ block<float> random_block(random_bits& random, std::uint32_t kinds) {
 
 /// What a record says of each voxel must be what the block says.
 template <class Record>
-void check_record(const Record& r, const block<float>& b) {
+void check_record(const Record& r, const octree::detail::block<float>& b) {
   REQUIRE(r.known == b.known);
-  block<float> back;
+  octree::detail::block<float> back;
   r.unpack(back);
   REQUIRE(back.known == b.known);
   const octant_view<float> view = r.view();
@@ -58,7 +58,7 @@ void check_record(const Record& r, const block<float>& b) {
 TEST_CASE("A packed octant says of every voxel what was packed") {
   random_bits random{401};
   for (int run = 0; run != 300; ++run) {
-    const block<float> b = random_block(random, 8);
+    const octree::detail::block<float> b = random_block(random, 8);
     palette<float> p;
     find_palette(b, p);
     packed_octant<float, 3> r;
@@ -70,7 +70,7 @@ TEST_CASE("A packed octant says of every voxel what was packed") {
 TEST_CASE("A plain octant says of every voxel what was packed") {
   random_bits random{402};
   for (int run = 0; run != 300; ++run) {
-    const block<float> b = random_block(random, 60);
+    const octree::detail::block<float> b = random_block(random, 60);
     plain_octant<float> r;
     r.pack(b);
     check_record(r, b);

@@ -14,8 +14,8 @@ using namespace orbis::octree::detail;
 namespace {
 
 template <class T>
-block<T> random_block(random_bits& random, std::uint32_t kinds) {
-  block<T> b;
+octree::detail::block<T> random_block(random_bits& random, std::uint32_t kinds) {
+  octree::detail::block<T> b;
   b.known = random.below(4) == 0 ? ~std::uint64_t{0} : random() | random();
   for (unsigned i = 0; i != 64; ++i)
     if ((b.known >> i & 1U) != 0) b.value[i] = static_cast<T>(static_cast<int>(random.below(kinds)) - 7);
@@ -24,7 +24,7 @@ block<T> random_block(random_bits& random, std::uint32_t kinds) {
 
 /// The palette of a block, value by value.
 template <class T>
-void palette_one_by_one(const block<T>& b, palette<T>& p) {
+void palette_one_by_one(const octree::detail::block<T>& b, palette<T>& p) {
   p.count = 0;
   p.plane.fill(0);
   for (std::uint64_t rest = b.known; rest != 0;) {
@@ -47,7 +47,7 @@ template <class T>
 void check_round_trip() {
   random_bits random{1};
   for (int i = 0; i != 2000; ++i) {
-    const block<T> b = random_block<T>(random, 1 + random.below(40));
+    const octree::detail::block<T> b = random_block<T>(random, 1 + random.below(40));
     palette<T> p, reference;
     find_palette(b, p);
     palette_one_by_one(b, reference);
@@ -56,7 +56,7 @@ void check_round_trip() {
     REQUIRE(p.plane == reference.plane);
     REQUIRE(std::equal(p.value.begin(), p.value.begin() + p.count, reference.value.begin()));
     const auto bits = static_cast<unsigned>(std::bit_width(p.count - 1));
-    block<T> back;
+    octree::detail::block<T> back;
     back.known = b.known;
     expand_palette(p.value.data(), p.plane.data(), bits, back);
     REQUIRE(back.value == b.value);
@@ -74,7 +74,7 @@ TEST_CASE("A block comes back from its palette at every instruction set") {
 }
 
 TEST_CASE("A palette has the values in the order of their first voxels and every voxel in one place") {
-  block<float> b;
+  octree::detail::block<float> b;
   b.known = 0xf0;
   b.value[4] = 2.0F;
   b.value[5] = -1.0F;

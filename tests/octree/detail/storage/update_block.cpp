@@ -14,7 +14,7 @@ template <sensor_model M>
 void check_update() {
   using value_type = typename M::value_type;
   random_bits random{3};
-  block<value_type> b;
+  octree::detail::block<value_type> b;
   for (int i = 0; i != 3000; ++i) {
     if (i % 40 == 0) {
       b = {};
@@ -25,7 +25,7 @@ void check_update() {
     }
     const std::uint64_t occupied = random() & random();
     const std::uint64_t free = random() & ~occupied;
-    const block<value_type> before = b;
+    const octree::detail::block<value_type> before = b;
     const std::uint64_t changed = update_block<M>(b, free, occupied);
     REQUIRE(b.known == (before.known | free | occupied));
     for (unsigned k = 0; k != 64; ++k) {

@@ -2,6 +2,7 @@
 #include <Eigen/Cholesky>
 
 #include <orbis/core/random.hpp>
+#include <orbis/optimize/detail/sparse/reduced_solvers.hpp>
 #include <orbis/optimize/solver_policies.hpp>
 
 #include "support/catch.hpp"
