@@ -17,6 +17,7 @@
 #include <orbis/core/image.hpp>
 #include <orbis/core/random.hpp>
 #include <orbis/octree/depth_points.hpp>
+#include <orbis/octree/occupancy_octree-inl.hpp>
 
 #include "fuzz/octree.hpp"
 #include "fuzz/source.hpp"

@@ -7,6 +7,7 @@
 #include <orbis/core/random.hpp>
 #include <orbis/io/recording.hpp>
 #include <orbis/octree/depth_points.hpp>
+#include <orbis/octree/occupancy_octree-inl.hpp>
 #include <orbis/octree/files.hpp>
 
 #include "octree/support.hpp"
