@@ -89,10 +89,11 @@ class basic_so3 {
   }
   [[nodiscard]] friend basic_so3 operator*(const basic_so3& a, const basic_so3& b) {
     const quaternion &p = a.q_, &q = b.q_;
-    return basic_so3(quaternion(p.w() * q.w() - p.x() * q.x() - p.y() * q.y() - p.z() * q.z(),
-                                p.w() * q.x() + p.x() * q.w() + p.y() * q.z() - p.z() * q.y(),
-                                p.w() * q.y() + p.y() * q.w() + p.z() * q.x() - p.x() * q.z(),
-                                p.w() * q.z() + p.z() * q.w() + p.x() * q.y() - p.y() * q.x()));
+    // Sums in pairs round less than one after the other.
+    return basic_so3(quaternion((p.w() * q.w() - p.x() * q.x()) - (p.y() * q.y() + p.z() * q.z()),
+                                (p.w() * q.x() + p.x() * q.w()) + (p.y() * q.z() - p.z() * q.y()),
+                                (p.w() * q.y() + p.y() * q.w()) + (p.z() * q.x() - p.x() * q.z()),
+                                (p.w() * q.z() + p.z() * q.w()) + (p.x() * q.y() - p.y() * q.x())));
   }
   [[nodiscard]] friend point operator*(const basic_so3& r, const point& p) {
     const point v(r.q_.x(), r.q_.y(), r.q_.z());
