@@ -11,7 +11,7 @@
 #include <vector>
 
 #include <orbis/eval/ate.hpp>
-#include <orbis/slam/detail/system/worker.hpp>
+#include <orbis/slam/detail/system/back_end.hpp>
 
 #include "slam/tested_system.hpp"
 #include "support/catch.hpp"

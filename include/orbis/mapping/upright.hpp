@@ -15,18 +15,157 @@
 #include <cstdint>
 #include <numbers>
 #include <optional>
+#include <span>
 #include <string_view>
 #include <vector>
+
+#include <Eigen/LU>
 
 #include <orbis/camera/depth.hpp>
 #include <orbis/camera/rays.hpp>
 #include <orbis/core/jacobi.hpp>
 #include <orbis/core/so3.hpp>
 #include <orbis/core/types.hpp>
-#include <orbis/mapping/detail/upright/planar_blocks.hpp>
-#include <orbis/mapping/detail/upright/up_vote.hpp>
 
 namespace orbis::mapping {
+namespace detail {
+
+struct found_up {
+  vec3 up;              ///< unit vector
+  double fixing = 0.0;  ///< how many normals fix it, in the direction in which it is known least
+  double along = 0.0;   ///< how many normals lie along it
+};
+
+/// How well a normal at an angle of sine `off` fits; 1 if exactly, 0 from `reach` on. (Tukey's biweight.)
+[[nodiscard]] inline double fit_of(double off, double reach) noexcept {
+  const double t = off / reach;
+  const double u = 1.0 - t * t;
+  return u > 0 ? u * u : 0.0;
+}
+
+/// What normals say about the direction `up`.
+struct up_ballot {
+  double along = 0.0, across = 0.0;  ///< weights
+  mat3 spread = zeros<mat3>();       ///< of the normals across, minus that of the normals along it
+
+  up_ballot(std::span<const vec3> normals, const vec3& up, double reach) {
+    for (const vec3& n : normals) {
+      const double c = dot(n, up);
+      if (const double w = fit_of(c, reach); w > 0) {
+        across += w;
+        spread += w * n * transposed(n);
+      } else if (const double v = fit_of(norm(cross(n, up)), reach); v > 0) {
+        along += v;
+        spread -= v * n * transposed(n);
+      }
+    }
+  }
+};
+
+/// The direction within `max_tilt` radians of -y that most normals lie along or across; nothing where no normal does,
+/// or where it cannot be told from a turned one. O(normals), for some thousand directions.
+[[nodiscard]] inline std::optional<found_up> vote_for_up(std::span<const vec3> normals, double max_tilt) {
+  constexpr double degree = std::numbers::pi / 180.0;
+  const double wide = std::sin(10.0 * degree);
+  const auto score = [&](const vec3& up, double reach) {
+    double sum = 0.0;
+    for (const vec3& n : normals) {
+      const double c = dot(n, up), along = c * c;
+      // Floors and tables are seen from above. Half for walls, which fit many directions.
+      sum += 0.5 * fit_of(c, reach) + (c > 0 ? 1.0 : 0.5) * fit_of(std::sqrt(std::max(0.0, 1.0 - along)), reach);
+    }
+    return sum * up.y() * up.y();
+  };
+
+  std::optional<vec3> best;
+  double best_score = 0.0;
+  const double step = 2.5 * degree;
+  const int rings = static_cast<int>(std::floor(std::min(max_tilt, 80.0 * degree) / step));
+  for (int ring = 0; ring <= rings; ++ring) {
+    const double tilt = ring * step;
+    const int count = std::max(1, static_cast<int>(std::ceil(2.0 * std::numbers::pi * std::sin(tilt) / step)));
+    for (int i = 0; i != count; ++i) {
+      const double turn = 2.0 * std::numbers::pi * i / count;
+      const vec3 up(std::sin(tilt) * std::cos(turn), -std::cos(tilt), std::sin(tilt) * std::sin(turn));
+      if (const double s = score(up, wide); s > best_score) {
+        best_score = s;
+        best = up;
+      }
+    }
+  }
+  if (!best) return std::nullopt;
+
+  vec3 up = *best;
+  for (const double reach : {10.0, 8.0, 6.0, 5.0, 5.0, 5.0, 5.0, 5.0}) {
+    const symmetric_eigen<3> axes = eigen_of_symmetric<3>(up_ballot{normals, up, std::sin(reach * degree)}.spread);
+    const vec3 refined = column_of(axes.vectors, 0);
+    up = dot(refined, up) < 0 ? vec3(-refined) : refined;
+  }
+  if (std::acos(std::clamp(-up.y(), -1.0, 1.0)) > max_tilt + wide) return std::nullopt;
+  const up_ballot last{normals, up, std::sin(5.0 * degree)};
+  const symmetric_eigen<3> axes = eigen_of_symmetric<3>(last.spread);
+  const double fixing = axes.values(1) - axes.values(0);
+  if (!(fixing > 0)) return std::nullopt;
+  return found_up{up, fixing, last.along};
+}
+
+}  // namespace detail
+
+namespace detail {
+
+struct planar_blocks {
+  std::vector<vec3> normals;   ///< of the flat blocks, in the camera's frame, towards the camera
+  std::size_t with_depth = 0;  ///< blocks that are mostly measured, flat or not
+};
+
+/// Fits a plane to each block of a grid of about 27 by 20 blocks. On a plane `n . p = 1` the inverse depth is linear in
+/// the ray: `1 / z = n . (x, y, 1)`. Blocks whose inverse depths are off by more than a few thousandths, two percent
+/// where they are far, are not flat: the noise of depth grows with depth.
+template <camera::depth_source Depth>
+[[nodiscard]] planar_blocks find_planar_blocks(const Depth& depth, const camera::ray_table& rays) {
+  constexpr int blocks_across = 27;
+  const int size = std::max(4, rays.width() / blocks_across), step = std::max(1, size / 12);
+  planar_blocks out;
+  struct sample {
+    double x, y, inverse;
+  };
+  std::vector<sample> samples;
+  for (int y0 = 0; y0 + size <= rays.height(); y0 += size)
+    for (int x0 = 0; x0 + size <= rays.width(); x0 += size) {
+      samples.clear();
+      std::size_t pixels = 0;
+      vec3 sum = zeros<vec3>();
+      for (int y = y0; y < y0 + size; y += step)
+        for (int x = x0; x < x0 + size; x += step) {
+          ++pixels;
+          const float z = depth(x, y);
+          const vec2f& ray = rays(x, y);
+          if (!(z > 0.0F) || !std::isfinite(z) || !all_finite(ray)) continue;
+          samples.push_back({ray.x(), ray.y(), 1.0 / static_cast<double>(z)});
+          sum += vec3(ray.x(), ray.y(), samples.back().inverse);
+        }
+      if (samples.size() < 4 || 10 * samples.size() < 7 * pixels) continue;
+      ++out.with_depth;
+      const auto n = static_cast<double>(samples.size());
+      const vec3 mean = sum / n;
+      double xx = 0, xy = 0, yy = 0, xi = 0, yi = 0, ii = 0;
+      for (const sample& s : samples) {
+        const double x = s.x - mean.x(), y = s.y - mean.y(), i = s.inverse - mean.z();
+        xx += x * x, xy += x * y, yy += y * y, xi += x * i, yi += y * i, ii += i * i;
+      }
+      const double determinant = xx * yy - xy * xy;
+      if (!(determinant > 1e-6 * xx * yy)) continue;
+      const double a = (yy * xi - xy * yi) / determinant, b = (xx * yi - xy * xi) / determinant;
+      const double rest = std::sqrt(std::max(0.0, ii - a * xi - b * yi) / n);
+      const double z = 1.0 / mean.z();
+      if (rest * z > 0.004 + 0.0025 * z) continue;  // relative to the depth
+      const vec3 normal(a, b, mean.z() - a * mean.x() - b * mean.y());
+      out.normals.push_back(-normalized(normal));
+    }
+  return out;
+}
+
+}  // namespace detail
 
 /// What the direction of up was found from.
 enum class upright_source {

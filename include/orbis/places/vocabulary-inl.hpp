@@ -8,15 +8,101 @@
 #include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <span>
 #include <utility>
 
+#include <orbis/core/bits.hpp>
+#include <orbis/core/simd/dispatch.hpp>
 #include <orbis/places/bag_of_words.hpp>
-#include <orbis/places/detail/descent.hpp>
+#include <orbis/places/detail/nearest_child.hpp>
 #include <orbis/places/vocabulary.hpp>
 #include <orbis/places/vocabulary_tree.hpp>
 
 namespace orbis::places {
+namespace detail {
+
+// Finds the words of many descriptors in a vocabulary's tree at once.
+//
+// In a large tree each level costs a cache miss. So several descriptors descend together, level by level: while one is
+// compared with the children of its node, the children of the other nodes are fetched from memory.
+
+/// Descriptors as bytes, and where to write their leaves and their nodes at `node_depth` (or the leaf, where that is
+/// higher).
+struct descent {
+  const std::byte* descriptors;
+  std::size_t count;
+  std::uint32_t node_depth;
+  std::uint32_t* leaves;
+  std::uint32_t* nodes;  ///< or null
+};
+
+template <class Target, std::size_t Bits>
+ORBIS_ALWAYS_INLINE void descend(const vocabulary_tree<Bits>& tree, const descent& d) {
+  constexpr std::size_t together = 8;  // with a few lines each, about as many as a core can fetch at once
+  constexpr std::size_t line = 64;
+  const tree_node* const nodes = tree.nodes.data();
+  const std::uint32_t inner_end = tree.inner_end();
+  const bit_words<Bits>* const descriptors = tree.descriptors.values().data();
+  struct query_state {
+    bit_words<Bits> query;
+    std::uint32_t node, first, count, at;
+  };
+  std::array<query_state, together> states;
+
+  for (std::size_t begin = 0; begin < d.count; begin += together) {
+    std::size_t active = std::min(together, d.count - begin);
+    for (std::size_t i = 0; i != active; ++i) {
+      query_state& t = states[i];
+      std::memcpy(t.query.data(), d.descriptors + (begin + i) * sizeof t.query, sizeof t.query);
+      t.node = 0;
+      t.at = static_cast<std::uint32_t>(begin + i);
+      if (d.nodes != nullptr) d.nodes[t.at] = 0;
+    }
+    for (std::uint32_t depth = 1; active != 0; ++depth) {
+      // Drop those that are at a leaf; fetch the children of the others.
+      std::size_t kept = 0;
+      for (std::size_t i = 0; i != active; ++i) {
+        query_state& t = states[i];
+        const std::uint32_t first = t.node < inner_end ? nodes[t.node].first_child : 0;
+        const std::uint32_t count = t.node < inner_end ? nodes[t.node + 1].first_child - first : 0;
+        if (count == 0) {
+          d.leaves[t.at] = t.node;
+          continue;
+        }
+        t.first = first;
+        t.count = count;
+        const auto* const bytes = reinterpret_cast<const std::byte*>(descriptors + (first - 1));
+        for (std::size_t b = 0; b < count * sizeof t.query; b += line) prefetch(bytes + b);
+        if (kept != i) states[kept] = t;
+        ++kept;
+      }
+      active = kept;
+      for (std::size_t i = 0; i != active; ++i) {
+        query_state& t = states[i];
+        t.node = t.first + nearest_child<Target, Bits>(t.query, descriptors + (t.first - 1), t.count);
+        if (t.node < inner_end) prefetch(nodes + t.node);
+        if (d.nodes != nullptr && depth <= d.node_depth) d.nodes[t.at] = t.node;
+      }
+    }
+  }
+}
+
+struct descent_kernel {
+  template <class Target, std::size_t Bits>
+  static ORBIS_ALWAYS_INLINE void run(const vocabulary_tree<Bits>& tree, const descent& d) {
+    descend<Target>(tree, d);
+  }
+};
+
+/// Finds the leaves, and the nodes, of all descriptors. O(descriptors x depth x branching).
+template <std::size_t Bits>
+void find_leaves(const vocabulary_tree<Bits>& tree, const descent& d) {
+  using signature = void(const vocabulary_tree<Bits>&, const descent&);
+  simd::kernel<descent_kernel, signature, simd::popcnt, simd::avx2>()(tree, d);
+}
+
+}  // namespace detail
 
 template <std::size_t Bits>
 std::uint32_t basic_vocabulary<Bits>::word_of_bytes(const std::byte* descriptor) const noexcept {

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include <orbis/cloud/detail/point_view.hpp>
-#include <orbis/cloud/detail/rays/make_point_blocks.hpp>
+#include <orbis/cloud/ray_evidence_counter-inl.hpp>
 
 #include "cloud/clouds.hpp"
 #include "support/catch.hpp"

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <limits>
 #include <span>
 #include <vector>
@@ -14,10 +15,110 @@
 #include <orbis/cloud/detail/knn/knn_kernels.hpp>
 #include <orbis/cloud/detail/knn/leaf_hierarchy.hpp>
 #include <orbis/cloud/detail/knn/nearest_search.hpp>
-#include <orbis/cloud/detail/knn/rank_sort.hpp>
 #include <orbis/cloud/neighbors.hpp>
+#include <orbis/core/simd.hpp>
 
 namespace orbis::cloud::detail {
+
+// Sorting a few dozen values by counting, for each of them, how many are smaller: n^2 comparisons, but
+// without a branch and many at a time.
+
+/// For each of `count` values its rank: the number of smaller ones, and of equal ones before it. @pre 16 more values
+/// can be read and written
+struct find_ranks {
+  template <simd::target Target>
+  static ORBIS_ALWAYS_INLINE void run(const std::int32_t* values, std::size_t count, std::int32_t* ranks) {
+    using lanes = simd::native_vec<std::int32_t, Target>;
+    constexpr std::size_t n = lanes::count;
+    const lanes one = 1, none = 0;
+    for (std::size_t i = 0; i < count; i += n) {
+      const lanes v = lanes::load(values + i);
+      lanes rank = 0;
+      const std::size_t here = std::min(i + n, count);
+      std::size_t j = 0;
+      for (; j != i; ++j) rank += select(v < lanes(values[j]), none, one);
+      const lanes place = lanes::iota() + lanes(static_cast<std::int32_t>(i));
+      for (; j != here; ++j)
+        rank +=
+            select(lanes(values[j]) < v + select(lanes(static_cast<std::int32_t>(j)) < place, one, none), one, none);
+      for (; j < count; ++j) rank += select(lanes(values[j]) < v, one, none);
+      rank.store(ranks + i);
+    }
+  }
+};
+
+/// Points by their squared distance, those at the same one by index. Keeps its memory.
+class rank_sorter {
+ public:
+  void clear() noexcept { count_ = 0; }
+  [[nodiscard]] std::size_t size() const noexcept { return count_; }
+  /// @pre distance_squared >= 0: the order of bits is that of values
+  void add(std::uint32_t index, float distance_squared) {
+    if (count_ + 2 * room > keys_.size()) grow();
+    std::memcpy(&keys_[count_], &distance_squared, sizeof distance_squared);
+    indices_[count_++] = index;
+  }
+  /// Takes the points at some places of `members` instead of all that were added. @pre as for `add`
+  void assign(std::span<const float> squared, const std::uint32_t* places, const std::uint32_t* members) {
+    while (squared.size() + 2 * room > keys_.size()) grow();
+    count_ = squared.size();
+    std::memcpy(keys_.data(), squared.data(), squared.size_bytes());
+    for (std::size_t i = 0; i != count_; ++i) indices_[i] = members[places[i]];
+  }
+  /// Calls `f(rank, index, distance_squared)` for all, nearest first, until it returns false.
+  template <class F>
+  void for_each(F&& f) {
+    if (count_ == 0) return;
+    if (count_ <= most_ranked) {
+      find_ranks_(keys_.data(), count_, ranks_.data());
+      for (std::size_t i = 0; i != count_; ++i) sorted_[static_cast<std::size_t>(ranks_[i])] = pack(i);
+      // Equal ones by index. They are few, and what was just written one by one is read one by one.
+      std::uint64_t before = sorted_[0];
+      for (std::size_t i = 1; i < count_; ++i) {
+        const std::uint64_t here = sorted_[i];
+        if (here < before) {
+          std::size_t at = i;
+          for (; at != 0 && here < sorted_[at - 1]; --at) sorted_[at] = sorted_[at - 1];
+          sorted_[at] = here;
+        } else {
+          before = here;
+        }
+      }
+    } else {
+      for (std::size_t i = 0; i != count_; ++i) sorted_[i] = pack(i);
+      std::sort(sorted_.begin(), sorted_.begin() + static_cast<std::ptrdiff_t>(count_));
+    }
+    for (std::size_t i = 0; i != count_; ++i) {
+      const auto bits = static_cast<std::uint32_t>(sorted_[i] >> 32U);
+      float distance_squared;
+      std::memcpy(&distance_squared, &bits, sizeof bits);
+      if (!f(i, static_cast<std::uint32_t>(sorted_[i]), distance_squared)) return;
+    }
+  }
+
+ private:
+  static constexpr std::size_t room = 16;          // read and written beyond the last
+  static constexpr std::size_t most_ranked = 384;  // beyond this n log n wins
+
+  [[nodiscard]] std::uint64_t pack(std::size_t i) const noexcept {
+    return std::uint64_t{static_cast<std::uint32_t>(keys_[i])} << 32U | indices_[i];
+  }
+  void grow() {
+    const std::size_t size = std::max<std::size_t>(128, 2 * keys_.size());
+    keys_.resize(size);
+    indices_.resize(size);
+    ranks_.resize(size);
+    sorted_.resize(size);
+  }
+
+  void (*find_ranks_)(const std::int32_t*, std::size_t, std::int32_t*) =
+      simd::kernel<find_ranks, void(const std::int32_t*, std::size_t, std::int32_t*)>();
+  std::size_t count_ = 0;
+  std::vector<std::int32_t> keys_;
+  std::vector<std::uint32_t> indices_;
+  std::vector<std::int32_t> ranks_;
+  std::vector<std::uint64_t> sorted_;
+};
 
 /// Writes the nearest of what was gathered, but for the point itself, as a row. Returns the squared distance to the
 /// last of them.

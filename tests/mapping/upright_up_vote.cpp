@@ -5,7 +5,7 @@
 
 #include <orbis/core/random.hpp>
 #include <orbis/core/so3.hpp>
-#include <orbis/mapping/detail/upright/up_vote.hpp>
+#include <orbis/mapping/upright.hpp>
 
 #include "support/catch.hpp"
 

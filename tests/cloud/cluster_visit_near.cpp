@@ -4,7 +4,7 @@
 #include <limits>
 #include <vector>
 
-#include <orbis/cloud/detail/knn/visit_near.hpp>
+#include <orbis/cloud/cluster-inl.hpp>
 #include <orbis/cloud/detail/point_view.hpp>
 #include <orbis/core/execution.hpp>
 

@@ -3,7 +3,7 @@
 #include <span>
 #include <vector>
 
-#include <orbis/places/detail/descent.hpp>
+#include <orbis/places/vocabulary-inl.hpp>
 
 #include "places/images.hpp"
 #include "support/catch.hpp"

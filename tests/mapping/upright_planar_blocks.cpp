@@ -5,7 +5,7 @@
 
 #include <orbis/camera/pinhole.hpp>
 #include <orbis/core/random.hpp>
-#include <orbis/mapping/detail/upright/planar_blocks.hpp>
+#include <orbis/mapping/upright.hpp>
 
 #include "support/catch.hpp"
 

@@ -4,7 +4,7 @@
 #include <thread>
 #include <vector>
 
-#include <orbis/slam/detail/system/worker.hpp>
+#include <orbis/slam/detail/system/back_end.hpp>
 
 #include "support/catch.hpp"
 

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include <orbis/cloud/detail/knn/rank_sort.hpp>
+#include <orbis/cloud/detail/knn/neighbor_rows.hpp>
 #include <orbis/core/random.hpp>
 
 #include "support/catch.hpp"

@@ -2,7 +2,7 @@
 #include <vector>
 
 #include <orbis/core/random.hpp>
-#include <orbis/features/detail/extract/luma_row.hpp>
+#include <orbis/features/grey-inl.hpp>
 
 #include "support/catch.hpp"
 

@@ -6,7 +6,7 @@
 #include <memory>
 #include <vector>
 
-#include <orbis/optimize/detail/pose/pose_pieces.hpp>
+#include <orbis/optimize/pose_refinement-inl.hpp>
 
 #include "optimize/support.hpp"
 #include "support/catch.hpp"
