@@ -64,7 +64,7 @@ struct state_event {
 
 /// Callbacks; any of them may be empty. They are called without a lock held, so they may query the system. With
 /// threads, those for culled keyframes and corrections are called from the system's own threads. They must not wait
-/// for the system; what they throw on a thread of the system ends that, see rgbd_system.
+/// for the system; what they throw on a thread of the system ends that, see `system`.
 struct listeners {
   std::function<void(const keyframe_event&)> keyframe_made{};
   std::function<void(const keyframe_event&)> keyframe_culled{};

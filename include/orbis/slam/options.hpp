@@ -195,7 +195,7 @@ struct thread_options {
   return 10.0 * focal_length * baseline;
 }
 
-/// The options of `rgbd_system`.
+/// The options of `system`.
 struct options {
   /// Of the default extractor. `levels` and `scale_factor` describe the pyramid of any other extractor as well.
   features::orb_options features{};
@@ -216,7 +216,7 @@ struct options {
   /// Estimates the shutter from the frames, beginning with `shutter`, and takes to what is significant while it goes
   /// on: after two seconds, and each time the number of frames has doubled. What the map holds by then stays as it is.
   /// It costs a few milliseconds a frame. For recordings: estimate from the first seconds
-  /// (`rgbd_system::estimated_shutter`), then begin again with the result.
+  /// (`system::estimated_shutter`), then begin again with the result.
   bool estimates_shutter = false;
   keyframe_options keyframes{};
   adjustment_options adjustment{};

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Keyframe-based SLAM from an RGB-D camera.
+/// Keyframe-based SLAM from an RGB-D camera, a stereo pair or one camera.
 ///
 /// @code
 ///   orbis::slam::system slam{camera, orbis::slam::options{}};
