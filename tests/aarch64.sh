@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
 #
-# For 64-bit ARM: compiles the library (orbis::compiled), the quick tests (tests/quick.cmake) and the
-# tests of the vector kernels, and runs them under qemu-user. The tests of the kernels are header-only and compare each
+# For 64-bit ARM: compiles the library (orbis::compiled), the quick tests (tests/quick.cmake) and the tests
+# of the vector kernels, and runs them under qemu-user. The tests of the kernels are header-only and compare each
 # kernel with plain code, bit by bit, here with a compiler that fuses products into sums where it can.
 # With "all", every test of every component instead of the quick ones, which takes hours; without those that compare with
 # PCL, Open3D, OMPL, FCL or Ceres.
@@ -90,9 +90,11 @@ printf '%s: %s %s\n\t@rm -f $@ && %s rcs $@ $(filter %%.o,$^)\n' "$out/liborbis.
 # Where the kernels' tests stand.
 places=(tests/core/simd.cpp tests/core/simd tests/core/rounded.cpp tests/core/bytes.cpp tests/camera/project_lanes.cpp
   tests/camera/shutter_correction.cpp
-  tests/features/detail tests/places/detail tests/cloud/detail/knn tests/cloud/detail/rays tests/cloud/detail/voxels
-  tests/cloud/detail/select/local_shape.cpp tests/optimize/pnp.cpp
+  tests/features/detail tests/features/grey_luma_row.cpp tests/places/detail tests/places/vocabulary_descent.cpp
+  tests/cloud/detail/knn tests/cloud/detail/rays tests/cloud/detail/voxels
+  tests/cloud/cluster_visit_near.cpp tests/cloud/detail/select/local_shape.cpp tests/optimize/pnp.cpp
   tests/optimize/detail/bundle tests/optimize/detail/sparse tests/optimize/detail/pose
+  tests/optimize/pose_refinement_pose_pieces.cpp
   tests/optimize/bundle_instances*.cpp  # what those of bundle adjustment share
   tests/octree/detail/storage tests/octree/detail/points tests/octree/detail/depth tests/nav/detail/floor
   tests/nav/squared_distances.cpp)
