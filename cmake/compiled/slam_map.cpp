@@ -6,7 +6,12 @@
 namespace orbis::slam {
 
 template class basic_map<features::binary_descriptor<256>>;
-template result<calibration<camera::any_camera>> calibrate(const map&, const camera_rig<camera::any_camera>&,
-                                                           const calibration_options&, const progress&);
+#define ORBIS_CALIBRATE(model)                                                                        \
+  template result<calibration<camera::model>> calibrate(const map&, const camera_rig<camera::model>&, \
+                                                        const calibration_options&, const progress&)
+ORBIS_CALIBRATE(any_camera);
+ORBIS_CALIBRATE(pinhole);
+ORBIS_CALIBRATE(radial_tangential);
+ORBIS_CALIBRATE(kannala_brandt);
 
 }  // namespace orbis::slam

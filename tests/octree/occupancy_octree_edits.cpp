@@ -7,6 +7,7 @@
 #include <optional>
 #include <thread>
 #include <utility>
+#include <limits>
 #include <vector>
 
 #include <orbis/octree/occupancy_octree.hpp>
@@ -97,6 +98,15 @@ TEST_CASE("A rolling window evicts what lies outside and takes it back") {
 
   for (const auto& leaf : evicted) map.set_unknown_node(leaf.key, leaf.depth, leaf.log_odds);
   CHECK(ot_bytes(map) == whole);
+}
+
+TEST_CASE("A rolling window with a coordinate that is no number evicts nothing for it") {
+  occupancy_octree<> map{0.1};
+  map.integrate(std::vector<vec3f>{{1.0F, 2.0F, 0.5F}}, vec3f(0.0F, 0.0F, 0.0F), {});
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const vec3 far(100.0, 100.0, 100.0);
+  CHECK(map.evict_outside({vec3(nan, -100.0, -100.0), vec3(nan, 100.0, 100.0)}, [](const auto&) {}) == 0);
+  CHECK(map.evict_outside({far, far}, [](const auto&) {}) != 0);
 }
 
 TEST_CASE("Memory stays bounded behind a rolling window") {

@@ -3,12 +3,13 @@
 /// Arithmetic of fixed-size Eigen matrices that compiles fast: every operation returns a plain matrix at once, without
 /// Eigen's expression classes, which cost a compiler ten times as much per formula.
 ///
-/// Code inside namespace orbis finds these operators by ordinary lookup, and they match better than Eigen's members, so
-/// that a formula reads as with Eigen. Code outside of the namespace keeps Eigen's operators. Operands of which one is
-/// an Eigen expression or of dynamic size fall back to Eigen.
+/// Code inside namespace orbis (and below a `using namespace orbis`) finds these operators by ordinary lookup, and they
+/// match better than Eigen's members, so that a formula reads as with Eigen. A sum or product is then a temporary
+/// matrix: no `auto` may hold an expression of Eigen's on it, as in `auto t = (a - b).transpose()`. Other code keeps
+/// Eigen's operators. Operands of which one is an Eigen expression or of dynamic size fall back to Eigen.
 ///
-/// Sums of products of three run as `x + (y + z)`, as Eigen's do; where Eigen uses vector registers the last bits may
-/// differ from its results.
+/// Sums of products run from the first entry to the last, as those of Eigen's vectors of three do; elsewhere the last bits
+/// may differ from its results.
 #pragma once
 
 #include <cmath>
@@ -90,14 +91,10 @@ inline void entrywise(const S* a, const S* b, S* out) {
 /// The sum of `N` products of entries `step_a` and `step_b` apart.
 template <int N, class S>
 [[nodiscard]] inline S sum_of_products(const S* a, int step_a, const S* b, int step_b) {
-  if constexpr (N == 3) {
-    return a[0] * b[0] + (a[step_a] * b[step_b] + a[2 * step_a] * b[2 * step_b]);
-  } else {
-    S sum = a[0] * b[0];
+  S sum = a[0] * b[0];
 #pragma GCC unroll 12
-    for (int k = 1; k < N; ++k) sum += a[k * step_a] * b[k * step_b];
-    return sum;
-  }
+  for (int k = 1; k < N; ++k) sum += a[k * step_a] * b[k * step_b];
+  return sum;
 }
 
 /// The product of an `R x K` and a `K x C` matrix, column by column. `a_row`, `a_column`, `b_row`, `b_column`: how far
@@ -123,7 +120,7 @@ template <int R, int K, int C, class S>
 }
 template <int R, int K, int C, class S>
 inline void multiply_any(const S* a, int a_row, int a_column, const S* b, int b_row, int b_column, S* out) {
-  if constexpr (is_small<R * K * C> || K == 3)
+  if constexpr (is_small<R * K * C>)
     multiply_inline<R, K, C>(a, a_row, a_column, b, b_row, b_column, out);
   else
     multiply<R, K, C>(a, a_row, a_column, b, b_row, b_column, out);
@@ -444,7 +441,6 @@ requires(R > 0 && C > 0) [[nodiscard]] inline bool all_finite(const Eigen::Matri
 }
 template <class S, int R, int C, int O>
 requires(R > 0 && C > 0) [[nodiscard]] inline S sum_of(const Eigen::Matrix<S, R, C, O, R, C>& a) {
-  if constexpr (R * C == 3) return a.data()[0] + (a.data()[1] + a.data()[2]);
   S sum = a.data()[0];
   for (int i = 1; i < R * C; ++i) sum += a.data()[i];
   return sum;
@@ -471,6 +467,14 @@ requires(R > 0 && C > 0) [[nodiscard]] inline bool all_at_most(const Eigen::Matr
     if (!(a.data()[i] <= b.data()[i])) return false;
   return true;
 }
+/// Whether an entry of `a` is greater than that of `b`.
+template <class S, int R, int C, int O>
+requires(R > 0 && C > 0) [[nodiscard]] inline bool any_greater(const Eigen::Matrix<S, R, C, O, R, C>& a,
+                                                               const Eigen::Matrix<S, R, C, O, R, C>& b) {
+  for (int i = 0; i < R * C; ++i)
+    if (a.data()[i] > b.data()[i]) return true;
+  return false;
+}
 /// The matrix with `summand` added to each entry.
 template <class S, int R, int C, int O>
 requires(R > 0 && C > 0)
@@ -493,13 +497,13 @@ template <class S, int O>
 [[nodiscard]] inline matrix<3, 1, S> homogeneous(const Eigen::Matrix<S, 2, 1, O, 2, 1>& p) {
   return {p.data()[0], p.data()[1], S(1)};
 }
-/// The largest absolute value of an entry; not a number where the first entry is none.
+/// The largest absolute value of an entry; not a number where an entry is none.
 template <class S, int R, int C, int O>
 requires(R > 0 && C > 0) [[nodiscard]] inline S largest_magnitude(const Eigen::Matrix<S, R, C, O, R, C>& a) {
   S most = std::abs(a.data()[0]);
   for (int i = 1; i < R * C; ++i) {
     const S size = std::abs(a.data()[i]);
-    if (size > most) most = size;
+    if (size > most || size != size) most = size;
   }
   return most;
 }
@@ -534,7 +538,8 @@ requires(R > 0 && C > 0)
 template <class T, class S, int R, int C, int O>
 requires(R > 0 && C > 0) [[nodiscard]] inline matrix<R, C, T> converted(const Eigen::Matrix<S, R, C, O, R, C>& a) {
   matrix<R, C, T> out;
-  for (int i = 0; i < R * C; ++i) out.data()[i] = static_cast<T>(a.data()[i]);
+  for (int c = 0; c < C; ++c)
+    for (int r = 0; r < R; ++r) out(r, c) = static_cast<T>(a(r, c));
   return out;
 }
 /// @}

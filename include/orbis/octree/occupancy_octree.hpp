@@ -205,7 +205,7 @@ class occupancy_octree {
   std::size_t evict_outside(const bounding_box& box, Evict&& evict) {
     const auto is_outside = [&](std::uint64_t name) {
       const bounding_box cube = cube_of(grid_, detail::named_key(name), detail::named_level(name));
-      return !all_at_most(cube.min, box.max) || !all_at_most(box.min, cube.max);
+      return any_greater(cube.min, box.max) || any_greater(box.min, cube.max);
     };
     std::vector<std::uint64_t> bricks, large;
     std::vector<detail::tree_part<value_type>> parts = detail::stored_parts(store_);

@@ -128,7 +128,7 @@ class overlap_search {
   [[nodiscard]] bool run() const {
     const bounding_box bounds = bounds_of(shape_);
     const double edge = grid_.resolution() * (grid_.cells() / 2);
-    const bool is_inside = smallest_of(bounds.min) >= -edge && largest_of(bounds.max) <= edge;
+    const bool is_inside = all_at_most(filled<vec3>(-edge), bounds.min) && all_at_most(bounds.max, filled<vec3>(edge));
     if (unknown_blocks_ && !is_inside) return true;
     // Faces that only touch are found as well.
     const auto keys =

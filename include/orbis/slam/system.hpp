@@ -45,9 +45,9 @@
 #include <orbis/slam/extractor.hpp>
 #include <orbis/slam/map.hpp>
 #include <orbis/slam/matchers.hpp>
+#include <orbis/slam/measure.hpp>
 #include <orbis/slam/options.hpp>
 #include <orbis/slam/place_recognition.hpp>
-#include <orbis/slam/measure.hpp>
 #include <orbis/slam/shutter_estimate.hpp>
 #include <orbis/slam/track_result.hpp>
 
@@ -101,23 +101,23 @@ class system {
   /// @pre time stamps ascend
   track_result track(const camera::rgbd_frame& f) { return track(f.timestamp, f.color.view(), f.depth_metres()); }
   /// As above; the images are used in place. `timestamp`: seconds; `depth`: metres, registered to the colour image.
+  /// orbis::compiled holds `camera::depth_view` of 16-bit numbers and of float; others include system-inl.hpp.
   template <camera::depth_source Depth>
   track_result track(double timestamp, image_view<const rgb8> color, const Depth& depth);
   /// As above, of a rectified stereo pair (`stereo_options`). `timestamp`: seconds.
   track_result track(double timestamp, image_view<const rgb8> left, image_view<const rgb8> right);
-  track_result track(double timestamp, image_view<const std::uint8_t> left, image_view<const std::uint8_t> right)
-    requires grey_extractor<Extractor>;
+  track_result track(double timestamp, image_view<const std::uint8_t> left,
+                     image_view<const std::uint8_t> right) requires grey_extractor<Extractor>;
   /// As above, of one image without depth, for a system with `monocular_options`.
   track_result track(double timestamp, image_view<const rgb8> color);
-  track_result track(double timestamp, image_view<const std::uint8_t> grey)
-    requires grey_extractor<Extractor>;
-  /// As above, of a sensor of another kind: `measure(rig, extract)` makes the frame, as the functions of `measure.hpp` do,
-  /// with the depth of each feature, or 0. For types of `Measure` that are not the library's own, include
-  /// `<orbis/slam/system-inl.hpp>`.
+  track_result track(double timestamp, image_view<const std::uint8_t> grey) requires grey_extractor<Extractor>;
+  /// As above, of a sensor of another kind: `measure(rig, extract)` makes the frame, as the functions of `measure.hpp`
+  /// do, with the depth of each feature, or 0. There is no depth image then (`options::depth_term`), and depth is taken
+  /// as measured at the frame's time. With orbis::compiled, include `<orbis/slam/system-inl.hpp>`.
   template <class Measure>
-    requires std::is_invocable_r_v<basic_frame<descriptor_of_t<Extractor>>, const Measure&, const camera_rig<Camera>&,
-                                   const Extractor&>
-  track_result track_measured(double timestamp, const Measure& measure);
+  requires std::is_invocable_r_v < basic_frame<descriptor_of_t<Extractor>>,
+  const Measure&, const camera_rig<Camera>&,
+      const Extractor& > track_result track_measured(double timestamp, const Measure& measure);
 
   /// The state after the last frame.
   [[nodiscard]] track_state state() const;
@@ -204,9 +204,8 @@ class system {
   /// Tracks a frame that has just been measured; one without features if its images could not be used.
   track_result track_frame(double timestamp, frame_type f, const row_follower& follow, detail::stopwatch& clock);
   /// Localises a frame and makes a keyframe of it if that is due. `lap`: notes the time of localisation.
-  std::optional<map_keyframe> localize(frame_type f,
-                                       const row_follower& follow,
-                                       track_result& result, detail::stopwatch& clock);
+  std::optional<map_keyframe> localize(frame_type f, const row_follower& follow, track_result& result,
+                                       detail::stopwatch& clock);
   /// Passes a new keyframe to the callbacks and the back end.
   void dispatch_keyframe(map_keyframe k);
   /// Fills in the result of a frame, and reports a change of state.
@@ -246,8 +245,18 @@ rgbd_system(Camera, options, Extractor) -> rgbd_system<Camera, Extractor>;
 
 /// A system for rectified stereo pairs, with `stereo_options`.
 using stereo_system = system<camera::any_camera>;
-/// A system for one camera without depth, with `monocular_options`.
-using monocular_system = system<camera::any_camera>;
+/// A system for one camera without depth: lengths are in a unit of the map's own, whatever the options say.
+class monocular_system : public system<camera::any_camera> {
+ public:
+  explicit monocular_system(camera::any_camera camera, options settings = monocular_options())
+      : system<camera::any_camera>(std::move(camera), without_scale(std::move(settings))) {}
+
+ private:
+  [[nodiscard]] static options without_scale(options settings) {
+    settings.scale_is_measured = false;
+    return settings;
+  }
+};
 
 }  // namespace orbis::slam
 

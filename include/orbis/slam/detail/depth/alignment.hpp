@@ -126,8 +126,8 @@ struct depth_equations {
 /// The motion of the camera frame to the least cost, where the planes determine one; zero in all other directions.
 [[nodiscard]] vec6 step_of(const depth_equations& e);
 
-inline depth_equations equations_of(std::span<const plane_observation_of_row> planes,
-                                                 const moving_pose& at, double points, double weakest) {
+inline depth_equations equations_of(std::span<const plane_observation_of_row> planes, const moving_pose& at,
+                                    double points, double weakest) {
   depth_equations e;
   e.term.at = at;
   if (planes.empty()) return e;

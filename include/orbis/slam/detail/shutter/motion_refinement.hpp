@@ -11,9 +11,6 @@
 #include <span>
 #include <vector>
 
-#include <Eigen/Cholesky>
-#include <Eigen/LU>
-
 #include <orbis/camera/model.hpp>
 #include <orbis/camera/shutter.hpp>
 #include <orbis/core/se3.hpp>
@@ -40,7 +37,7 @@ struct twist_prior {
   std::optional<se3> T_world_before;   ///< the former pose ...
   double interval = 0.0;               ///< ... and the seconds since
   double trend = 0.0;                  ///< which part of the change from `twist_before` to the mean motion is added
-  vec6 twist_before = zeros<vec6>();    ///< at the former pose
+  vec6 twist_before = zeros<vec6>();   ///< at the former pose
   double translation_deviation = 0.5;  ///< metres per second
   double rotation_deviation = 1.0;     ///< radians per second
 
@@ -271,8 +268,8 @@ inline void pose_quadratic::hold_twist() {
 }
 
 inline void add_terms(moving_pose_equations& e, const std::array<mat6, 3>& h, const std::array<vec6, 2>& g,
-                                   const se3& T_camera_world, const vec6& twist, const twist_prior& prior,
-                                   const refinement_terms& terms) {
+                      const se3& T_camera_world, const vec6& twist, const twist_prior& prior,
+                      const refinement_terms& terms) {
   set_parts(e, h, g);
   if (terms.other != nullptr) {
     const pose_quadratic& q = *terms.other;
@@ -316,8 +313,7 @@ inline void early_depth_twist::determine(const std::array<mat6, 3>& h, const twi
   if (!prior.T_world_before) return;
   // The prior ties the twist to both poses, of which the former one is not exact either.
   const double by_pose = (1.0 + prior.trend) / prior.interval;
-  const mat6 tie =
-      inverse(variances_of(prior, 1.0) + by_pose * by_pose * former_covariance_);
+  const mat6 tie = inverse(variances_of(prior, 1.0) + by_pose * by_pose * former_covariance_);
   const mat6 mixed = h[1] + by_pose * tie;
   const mat6 of_twist = h[2] + tie - transposed(mixed) * inverse(h[0] + by_pose * by_pose * tie) * mixed;
   // From one frame to the next a twist changes by twice the deviation of the prior, which is that from the mean.

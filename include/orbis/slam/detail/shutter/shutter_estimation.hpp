@@ -21,8 +21,6 @@
 #include <utility>
 #include <vector>
 
-#include <Eigen/LU>
-
 #include <orbis/camera/model.hpp>
 #include <orbis/camera/shutter.hpp>
 #include <orbis/core/se3.hpp>
@@ -181,8 +179,8 @@ class shutter_estimator {
   std::vector<std::pair<std::uint64_t, shutter_equations>> blocks_;
 };
 
-inline bool eliminate_pose(shutter_equations& e, vec2& gradient, const mat6& pose,
-                                        const matrix<6, 2>& mixed, const vec6& pose_gradient) {
+inline bool eliminate_pose(shutter_equations& e, vec2& gradient, const mat6& pose, const matrix<6, 2>& mixed,
+                           const vec6& pose_gradient) {
   const matrix<6, 2> solved = inverse(pose) * mixed;
   if (!all_finite(solved)) return false;
   e.h -= transposed(mixed) * solved;
