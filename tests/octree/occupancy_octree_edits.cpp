@@ -3,11 +3,11 @@
 #include <atomic>
 #include <bit>
 #include <cmath>
+#include <limits>
 #include <mutex>
 #include <optional>
 #include <thread>
 #include <utility>
-#include <limits>
 #include <vector>
 
 #include <orbis/octree/occupancy_octree.hpp>
