@@ -46,7 +46,7 @@ install(FILES ${PROJECT_BINARY_DIR}/orbis.pc DESTINATION ${CMAKE_INSTALL_DATADIR
 if(TARGET orbis_compiled)
   set(_orbis_pc_private "")  # what a program links that reads recordings: pkg-config --static
   if("io" IN_LIST ORBIS_COMPILED_COMPONENTS)
-    set(_orbis_pc_private "-lpng -ljpeg")
+    set(_orbis_pc_private "libpng libjpeg tomlplusplus")
   endif()
   configure_file(cmake/orbis-compiled.pc.in ${PROJECT_BINARY_DIR}/orbis-compiled.pc @ONLY)
   install(FILES ${PROJECT_BINARY_DIR}/orbis-compiled.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
