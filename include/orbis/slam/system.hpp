@@ -246,10 +246,11 @@ rgbd_system(Camera, options, Extractor) -> rgbd_system<Camera, Extractor>;
 /// A system for rectified stereo pairs, with `stereo_options`.
 using stereo_system = system<camera::any_camera>;
 /// A system for one camera without depth: lengths are in a unit of the map's own, whatever the options say.
-class monocular_system : public system<camera::any_camera> {
+template <camera::camera_model Camera>
+class monocular_system : public system<Camera> {
  public:
-  explicit monocular_system(camera::any_camera camera, options settings = monocular_options())
-      : system<camera::any_camera>(std::move(camera), without_scale(std::move(settings))) {}
+  explicit monocular_system(Camera camera, options settings = monocular_options())
+      : system<Camera>(std::move(camera), without_scale(std::move(settings))) {}
 
  private:
   [[nodiscard]] static options without_scale(options settings) {
